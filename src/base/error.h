@@ -1,0 +1,27 @@
+// Errors of the outside world: files, flags, network. Thrown anywhere, caught once in main.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace tessera {
+
+// Printed as `tessera: error: what: where: why; remedy`.
+//   what    the thing that failed, usually a path
+//   where   the place inside it (line, byte, key); may be empty
+//   why     what is wrong there
+//   remedy  what the person can do about it
+class Error : public std::runtime_error {
+ public:
+  Error(std::string what, std::string where, std::string why, std::string remedy);
+
+  const std::string& subject() const { return subject_; }
+  const std::string& place() const { return place_; }
+  const std::string& reason() const { return reason_; }
+  const std::string& remedy() const { return remedy_; }
+
+ private:
+  std::string subject_, place_, reason_, remedy_;
+};
+
+}  // namespace tessera

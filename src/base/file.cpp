@@ -1,0 +1,118 @@
+#include "base/file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "base/error.h"
+
+namespace tessera {
+namespace {
+
+template <class Container>
+Container readWhole(const fs::path& path) {
+  std::error_code status;
+  if (fs::is_directory(path, status)) throw Error(path.string(), "", "is a folder, not a file", "name the file in it");
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  if (!in) throw Error(path.string(), "", std::strerror(errno), "check the path and its permissions");
+  const std::streamoff size = in.tellg();
+  Container content;
+  if (size > 0) {
+    content.resize(static_cast<size_t>(size));
+    in.seekg(0);
+    in.read(reinterpret_cast<char*>(content.data()), size);
+  }
+  if (!in) throw Error(path.string(), "", "could not be read to its end", "check the disk");
+  return content;
+}
+
+[[noreturn]] void failWriting(const fs::path& path, const fs::path& partial) {
+  const std::string reason = std::strerror(errno);
+  std::error_code ignored;
+  fs::remove(partial, ignored);
+  throw Error(path.string(), "", "could not be written: " + reason, "check free space and permissions");
+}
+
+}  // namespace
+
+Bytes readFile(const fs::path& path) { return readWhole<Bytes>(path); }
+std::string readTextFile(const fs::path& path) { return readWhole<std::string>(path); }
+
+void writeFileAtomically(const fs::path& path, std::span<const std::byte> bytes, bool durable) {
+  std::error_code status;
+  if (path.has_parent_path()) fs::create_directories(path.parent_path(), status);
+  fs::path partial = path;
+  partial += ".partial-" + std::to_string(::getpid());
+  const int file = ::open(partial.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (file < 0) failWriting(path, partial);
+  size_t written = 0;
+  while (written < bytes.size()) {
+    const ssize_t count = ::write(file, bytes.data() + written, bytes.size() - written);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) {
+      const int reason = errno;
+      ::close(file);
+      errno = reason;
+      failWriting(path, partial);
+    }
+    written += static_cast<size_t>(count);
+  }
+  if (durable && ::fsync(file) != 0) {
+    const int reason = errno;
+    ::close(file);
+    errno = reason;
+    failWriting(path, partial);
+  }
+  if (::close(file) != 0 || ::rename(partial.c_str(), path.c_str()) != 0) failWriting(path, partial);
+}
+
+void writeFileAtomically(const fs::path& path, std::string_view text, bool durable) {
+  writeFileAtomically(path, std::as_bytes(std::span(text.data(), text.size())), durable);
+}
+
+std::optional<fs::path> resolveInside(const fs::path& root, std::string_view relative) {
+  if (relative.empty() || relative.find('\0') != std::string_view::npos) return std::nullopt;
+  const fs::path wanted{std::string(relative)};
+  if (wanted.is_absolute()) return std::nullopt;
+  std::error_code status;
+  const fs::path realRoot = fs::weakly_canonical(root, status);
+  if (status) return std::nullopt;
+  const fs::path real = fs::weakly_canonical(realRoot / wanted, status);
+  if (status) return std::nullopt;
+  const auto [rootEnd, rest] = std::mismatch(realRoot.begin(), realRoot.end(), real.begin(), real.end());
+  if (rootEnd != realRoot.end()) return std::nullopt;
+  return real;
+}
+
+bool naturalLess(std::string_view a, std::string_view b) {
+  size_t i = 0, j = 0;
+  const auto isDigit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };
+  while (i < a.size() && j < b.size()) {
+    if (isDigit(a[i]) && isDigit(b[j])) {
+      size_t i0 = i, j0 = j;
+      while (i0 < a.size() && a[i0] == '0') ++i0;
+      while (j0 < b.size() && b[j0] == '0') ++j0;
+      size_t i1 = i0, j1 = j0;
+      while (i1 < a.size() && isDigit(a[i1])) ++i1;
+      while (j1 < b.size() && isDigit(b[j1])) ++j1;
+      if (i1 - i0 != j1 - j0) return i1 - i0 < j1 - j0;
+      const int order = a.substr(i0, i1 - i0).compare(b.substr(j0, j1 - j0));
+      if (order != 0) return order < 0;
+      i = i1;
+      j = j1;
+    } else {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i;
+      ++j;
+    }
+  }
+  if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
+  return a < b;
+}
+
+}  // namespace tessera

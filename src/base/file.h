@@ -1,0 +1,33 @@
+// Files as whole byte strings, written beside and renamed, and paths that cannot leave their folder.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tessera {
+
+namespace fs = std::filesystem;
+using Bytes = std::vector<std::byte>;
+
+// The whole file. Throws Error naming the path when it cannot be read.
+Bytes readFile(const fs::path& path);
+std::string readTextFile(const fs::path& path);
+
+// Writes `path` + ".partial-<pid>" and renames it over `path`, so that a reader (or a kill) sees the old file or the
+// new one, never a piece. With `durable` the bytes reach the disk before the rename. Parent folders are made.
+void writeFileAtomically(const fs::path& path, std::span<const std::byte> bytes, bool durable = false);
+void writeFileAtomically(const fs::path& path, std::string_view text, bool durable = false);
+
+// `root / relative` when the result stays inside `root` (no absolute paths, no `..` that climbs out, no symbolic link
+// that leads out); otherwise nothing. The file need not exist.
+std::optional<fs::path> resolveInside(const fs::path& root, std::string_view relative);
+
+// File names in the order people expect: frame_2 before frame_10.
+bool naturalLess(std::string_view a, std::string_view b);
+
+}  // namespace tessera

@@ -1,0 +1,36 @@
+// A picture in memory: rows from the top, pixels interleaved, no padding.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace tessera {
+
+template <class T>
+struct Image {
+  int width = 0, height = 0, channels = 0;
+  std::vector<T> pixels;  // height × width × channels
+
+  Image() = default;
+  Image(int w, int h, int c, T value = T{})
+      : width(w), height(h), channels(c), pixels(static_cast<size_t>(w) * h * c, value) {}
+
+  size_t offset(int x, int y) const { return (static_cast<size_t>(y) * width + x) * channels; }
+  T* at(int x, int y) { return pixels.data() + offset(x, y); }
+  const T* at(int x, int y) const { return pixels.data() + offset(x, y); }
+  bool empty() const { return pixels.empty(); }
+  size_t pixelCount() const { return static_cast<size_t>(width) * height; }
+};
+
+using ImageU8 = Image<uint8_t>;
+using ImageF = Image<float>;
+
+ImageF toFloat(const ImageU8& image);   // value / 255
+ImageU8 toBytes(const ImageF& image);   // clamp to [0,1], round to nearest
+
+// Mean over the source area that each target pixel covers (exact for any ratio); only for reducing.
+ImageU8 downscaleByArea(const ImageU8& image, int width, int height);
+ImageF downscaleByArea(const ImageF& image, int width, int height);
+
+}  // namespace tessera

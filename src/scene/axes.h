@@ -1,0 +1,37 @@
+// The axis convention, stated once. Every module above uses these; only src/import converts into them.
+//
+//   world    right-handed, Z up, metres where the capture has a scale; double precision
+//   camera   x right, y down, z forward (COLMAP, OpenCV; "RDF")
+//   pixel    (0, 0) is the outer corner of the upper left pixel, whose centre is (0.5, 0.5)
+//
+// Transforms are named targetFromSource and are rigid: worldFromCamera maps a point given in camera axes to the world.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace tessera {
+
+using Vec2d = Eigen::Vector2d;
+using Vec3d = Eigen::Vector3d;
+using Vec3f = Eigen::Vector3f;
+using Mat3d = Eigen::Matrix3d;
+using Mat4d = Eigen::Matrix4d;
+
+struct Pose {
+  Mat3d rotation = Mat3d::Identity();  // columns: the camera's right, down and forward in the world
+  Vec3d translation = Vec3d::Zero();   // the camera's centre in the world
+
+  Vec3d operator*(const Vec3d& x) const { return rotation * x + translation; }
+  Pose inverse() const { return {rotation.transpose(), -(rotation.transpose() * translation)}; }
+};
+
+// Negates the second and third camera axis: between RDF and the OpenGL axes of NeRF files (right, up, backward).
+inline Mat3d flippedYz(const Mat3d& rotation) {
+  Mat3d flipped = rotation;
+  flipped.col(1) *= -1;
+  flipped.col(2) *= -1;
+  return flipped;
+}
+
+}  // namespace tessera

@@ -1,0 +1,33 @@
+// The one contract of everything that can draw: the training-time model, the CPU oracle, Vulkan. `eval` and `render`
+// know nothing else.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "base/image.h"
+#include "scene/camera.h"
+
+namespace tessera {
+
+struct RenderedView {
+  ImageF colour;   // 3 channels, premultiplied by opacity, in the trained sRGB space
+  ImageF opacity;  // 1 channel
+  ImageF depth;    // 1 channel: expected z-depth along the optical axis, premultiplied by opacity
+};
+
+class ViewRenderer {
+ public:
+  virtual ~ViewRenderer() = default;
+
+  // `opaqueDepth`: z-depth of ordinary models already drawn (1 channel, the camera's size, infinity where nothing is);
+  // rays end there.
+  virtual RenderedView render(const Camera& camera, const Pose& worldFromCamera,
+                              const ImageF* opaqueDepth = nullptr) = 0;
+  // What drew it: "cpu avx3 2 threads".
+  virtual std::string device() const = 0;
+  // Colour behind everything, composited under the result by whoever shows it.
+  virtual Eigen::Array3f background() const { return Eigen::Array3f::Zero(); }
+};
+
+}  // namespace tessera
