@@ -1,0 +1,52 @@
+// Volume rendering (Max 1995; building blocks of NeRF): front to back, with its gradient by one back-to-front recursion
+// that never divides by 1 - opacity.
+#pragma once
+
+#include "compute/memory.h"
+
+namespace tessera {
+
+// What a sample's extinction value x means:
+//   opacity      α = x
+//   density      α = 1 - exp(-x · step)
+//   logDensity   α = 1 - exp(-exp(x) · step); gradient through exp clamps x to [-15, 15]
+enum class Extinction { opacity, density, logDensity };
+
+// colour = Σ w c + T · background, depth = Σ w t, opacity = 1 - T. A ray stops after the sample that takes T below
+// `minTransmittance`; later samples get weight zero, and T counts on as it stands there.
+struct CompositeForward {
+  Extinction extinction = Extinction::logDensity;
+  float minTransmittance = 1e-4f;
+  Count rays;
+  Slice<const uint32_t> firstSample;   // [rays + 1]
+  Matrix<const float> x;               // 1 column: opacity, density or log density
+  Slice<const float> steps;            // [samples]; not read for opacity
+  Slice<const float> distances;        // [samples]
+  Matrix<const float> colours;         // [samples], 3 columns
+  Slice<const float> background;       // optional, [rays][3]; else black
+  Slice<float> colour;                 // [rays][3]
+  Slice<float> opacity;                // [rays]
+  Slice<float> depth;                  // [rays]
+  Slice<float> weights;                // [samples]
+};
+
+// Overwrites xGradients, colourGradients (of samples) for all samples of the rays, zero behind the stop.
+struct CompositeBackward {
+  Extinction extinction = Extinction::logDensity;
+  float minTransmittance = 1e-4f;
+  Count rays;
+  Slice<const uint32_t> firstSample;
+  Matrix<const float> x;
+  Slice<const float> steps;
+  Slice<const float> distances;
+  Matrix<const float> colours;
+  Slice<const float> background;          // optional
+  Slice<const float> rayColourGradients;  // [rays][3]
+  Slice<const float> rayOpacityGradients; // optional, [rays]
+  Slice<const float> rayDepthGradients;   // optional, [rays]
+  Slice<const float> weightGradients;     // optional, [samples]: of any other function of the weights (distortion)
+  Slice<float> xGradients;                // [samples]
+  Matrix<float> colourGradients;          // [samples], 3 columns
+};
+
+}  // namespace tessera

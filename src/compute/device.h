@@ -1,0 +1,117 @@
+// The one interface between what is computed and what computes it. Training is written against Device and knows no
+// hardware. Operations are queued in order and never read back in the middle of a step; `read` and `finish` wait.
+//
+// Each operation is a struct of arguments (shapes, what is read, what is written) in a header named after it, and one
+// function here; reference/, cpu/ and vulkan/ each have a file of the same name. device_test.cpp walks
+// operation × device × shape: an operation without a row there does not build.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "compute/adam.h"
+#include "compute/composite.h"
+#include "compute/encodings.h"
+#include "compute/hash_grid.h"
+#include "compute/losses.h"
+#include "compute/memory.h"
+#include "compute/mlp.h"
+#include "compute/occupancy.h"
+#include "compute/rays.h"
+
+namespace tessera {
+
+// X(argument struct): every operation, in the order of the headers.
+#define TESSERA_OPERATIONS(X)   \
+  X(HashGridForward)            \
+  X(HashGridBackward)           \
+  X(MlpForward)                 \
+  X(MlpBackward)                \
+  X(SphericalHarmonicsForward)  \
+  X(SphericalHarmonicsBackward) \
+  X(FrequencyForward)           \
+  X(FrequencyBackward)          \
+  X(GenerateRays)               \
+  X(MarchRays)                  \
+  X(CompactSamples)             \
+  X(GatherRows)                 \
+  X(OccupancyPoints)            \
+  X(OccupancyUpdate)            \
+  X(CompositeForward)           \
+  X(CompositeBackward)          \
+  X(ColourLoss)                 \
+  X(DistortionLoss)             \
+  X(ExposureForward)            \
+  X(ExposureBackward)           \
+  X(Adam)
+
+enum class Operation {
+#define TESSERA_ENUMERATOR(name) k##name,
+  TESSERA_OPERATIONS(TESSERA_ENUMERATOR)
+#undef TESSERA_ENUMERATOR
+};
+
+inline constexpr std::string_view kOperationNames[] = {
+#define TESSERA_NAME(name) #name,
+    TESSERA_OPERATIONS(TESSERA_NAME)
+#undef TESSERA_NAME
+};
+
+class Device {
+ public:
+  virtual ~Device() = default;
+
+  // For people: "cpu AVX3_ZEN4, 2 threads". `target` is the part that bits depend on: "cpu/AVX3".
+  virtual std::string name() const = 0;
+  virtual std::string target() const = 0;
+
+  virtual std::unique_ptr<Memory> allocate(size_t bytes) = 0;  // zeroed
+  virtual void writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) = 0;
+  virtual void readBytes(const Memory& from, size_t offset, std::span<std::byte> to) = 0;  // waits
+  virtual void fillZero(Memory& memory, size_t offset, size_t bytes) = 0;                  // multiples of 4
+  virtual void finish() = 0;
+
+  // False where a device does not have an operation yet; calling it then is our own mistake (CHECK).
+  virtual bool supports(Operation operation) const = 0;
+
+#define TESSERA_RUN(name) virtual void run(const name&);
+  TESSERA_OPERATIONS(TESSERA_RUN)
+#undef TESSERA_RUN
+
+  template <class T>
+  Array<T> array(size_t count) {
+    return count ? Array<T>(allocate(count * sizeof(T)), count) : Array<T>();
+  }
+  template <class T>
+  Array<T> arrayOf(const std::vector<T>& values) {
+    Array<T> made = array<T>(values.size());
+    if (!values.empty()) write(made.all(), std::span<const T>(values));
+    return made;
+  }
+  template <class T>
+  void write(const Slice<T>& to, std::span<const T> from) {
+    CHECK(from.size() <= to.count);
+    if (!from.empty()) writeBytes(*to.memory, to.first * sizeof(T), std::as_bytes(from));
+  }
+  template <class T>
+  std::vector<std::remove_const_t<T>> read(const Slice<T>& from) {
+    std::vector<std::remove_const_t<T>> values(from.count);
+    if (!values.empty()) readBytes(*from.memory, from.first * sizeof(T), std::as_writable_bytes(std::span(values)));
+    return values;
+  }
+  template <class T>
+  void fillZero(const Slice<T>& slice) {
+    if (slice) fillZero(*slice.memory, slice.first * sizeof(T), slice.count * sizeof(T));
+  }
+};
+
+struct DeviceOptions {
+  std::string kind = "cpu";  // auto, cpu, reference, vulkan
+  int threads = 0;           // cpu: 0 = all cores
+};
+
+// Throws Error when there is no such device on this machine. "auto" is cpu until the Vulkan device can train.
+std::unique_ptr<Device> makeDevice(const DeviceOptions& options);
+
+}  // namespace tessera

@@ -1,0 +1,46 @@
+// Memory that the processor can address: what the reference and the cpu device allocate.
+#pragma once
+
+#include <cstdlib>
+#include <cstring>
+#include <new>
+
+#include "compute/memory.h"
+
+namespace tessera {
+
+class HostMemory : public Memory {
+ public:
+  static constexpr size_t kAlignment = 128;
+
+  explicit HostMemory(size_t bytes) : Memory(bytes) {
+    const size_t rounded = (bytes + kAlignment - 1) / kAlignment * kAlignment;
+    data_ = static_cast<std::byte*>(std::aligned_alloc(kAlignment, rounded));
+    if (data_ == nullptr) throw std::bad_alloc();
+    std::memset(data_, 0, rounded);
+  }
+  ~HostMemory() override { std::free(data_); }
+  HostMemory(const HostMemory&) = delete;
+  HostMemory& operator=(const HostMemory&) = delete;
+
+  std::byte* data() { return data_; }
+  const std::byte* data() const { return data_; }
+
+ private:
+  std::byte* data_;
+};
+
+// The elements of a slice that lives in HostMemory; null for an empty slice.
+template <class T>
+T* hostPointer(const Slice<T>& slice) {
+  if (!slice) return nullptr;
+  return reinterpret_cast<T*>(static_cast<HostMemory*>(slice.memory)->data()) + slice.first;
+}
+
+inline uint32_t hostCount(const Count& count) {
+  if (!count.counter) return count.capacity;
+  const uint32_t wanted = *hostPointer(count.counter);
+  return wanted < count.capacity ? wanted : count.capacity;
+}
+
+}  // namespace tessera

@@ -1,0 +1,119 @@
+// Device memory: owned by Array, named by Slice. Its contents are reached through Device::write and Device::read only.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <type_traits>
+
+#include "base/check.h"
+
+namespace tessera {
+
+// One allocation on one device. Each device derives its own.
+class Memory {
+ public:
+  explicit Memory(size_t bytes) : bytes_(bytes) {}
+  virtual ~Memory() = default;
+  size_t bytes() const { return bytes_; }
+
+ private:
+  size_t bytes_;
+};
+
+// `count` elements of T starting at element `first` of an allocation that someone else owns. Empty means "not wanted"
+// wherever an operation says optional.
+template <class T>
+struct Slice {
+  using Element = std::remove_const_t<T>;
+  Memory* memory = nullptr;
+  size_t first = 0;
+  size_t count = 0;
+
+  Slice() = default;
+  Slice(Memory* m, size_t f, size_t c) : memory(m), first(f), count(c) {
+    CHECK((f + c) * sizeof(T) <= (m ? m->bytes() : 0));
+  }
+  // Slice<T> → Slice<const T>
+  template <class U>
+    requires(std::is_same_v<T, const U>)
+  Slice(const Slice<U>& other) : memory(other.memory), first(other.first), count(other.count) {}
+
+  explicit operator bool() const { return memory != nullptr; }
+  Slice part(size_t from, size_t length) const {
+    CHECK(from + length <= count);
+    return Slice(memory, first + from, length);
+  }
+};
+
+// Owns `count` zeroed elements on a device; made by Device::array<T>(). Move only.
+template <class T>
+class Array {
+ public:
+  Array() = default;
+  Array(std::unique_ptr<Memory> memory, size_t count) : memory_(std::move(memory)), count_(count) {}
+
+  size_t size() const { return count_; }
+  Slice<T> all() { return count_ ? Slice<T>(memory_.get(), 0, count_) : Slice<T>(); }
+  Slice<const T> all() const { return count_ ? Slice<const T>(memory_.get(), 0, count_) : Slice<const T>(); }
+  Slice<T> part(size_t first, size_t count) { return all().part(first, count); }
+  Slice<const T> part(size_t first, size_t count) const { return all().part(first, count); }
+  operator Slice<T>() { return all(); }
+  operator Slice<const T>() const { return all(); }
+
+ private:
+  std::unique_ptr<Memory> memory_;
+  size_t count_ = 0;
+};
+
+// How many elements an operation works on. Sizes that only the device knows stay in a device counter: the operation
+// works on min(counter[0], capacity). Without a counter it works on `capacity`. Buffers hold `capacity` elements.
+struct Count {
+  uint32_t capacity = 0;
+  Slice<const uint32_t> counter;  // optional, 1 element
+};
+
+// A matrix of `columns` float columns, one row a sample, in one of two layouts:
+//   row-major    element (row, column) at row × rowStride + column                                  (groupWidth 0)
+//   grouped      element (row, column) at (column / groupWidth) × groupStride + row × rowStride + column % groupWidth
+// The grouped form is how the hash grid writes: one plane per level, `groupWidth` features a plane.
+template <class T>
+struct Matrix {
+  Slice<T> data;
+  uint32_t columns = 0;
+  uint32_t rowStride = 0;
+  uint32_t groupWidth = 0;
+  size_t groupStride = 0;
+
+  Matrix() = default;
+  Matrix(Slice<T> slice, uint32_t width) : data(slice), columns(width), rowStride(width) {}
+  Matrix(Slice<T> slice, uint32_t width, uint32_t stride) : data(slice), columns(width), rowStride(stride) {}
+  template <class U>
+    requires(std::is_same_v<T, const U>)
+  Matrix(const Matrix<U>& other)
+      : data(other.data),
+        columns(other.columns),
+        rowStride(other.rowStride),
+        groupWidth(other.groupWidth),
+        groupStride(other.groupStride) {}
+
+  static Matrix grouped(Slice<T> slice, uint32_t columns, uint32_t width, size_t rows) {
+    Matrix m(slice, columns, width);
+    m.groupWidth = width;
+    m.groupStride = rows * width;
+    return m;
+  }
+  // Columns [first, first + count) of a row-major matrix.
+  Matrix columnRange(uint32_t firstColumn, uint32_t count) const {
+    CHECK(groupWidth == 0u);
+    return Matrix(data.part(firstColumn, data.count - firstColumn), count, rowStride);
+  }
+
+  size_t offset(size_t row, size_t column) const {
+    return groupWidth == 0 ? row * rowStride + column
+                           : column / groupWidth * groupStride + row * rowStride + column % groupWidth;
+  }
+  explicit operator bool() const { return static_cast<bool>(data); }
+};
+
+}  // namespace tessera

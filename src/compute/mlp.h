@@ -1,0 +1,56 @@
+// Small fully connected networks without biases, as tiny-cuda-nn's fully fused MLP: ReLU between layers, sizes padded to
+// multiples of 16. Padding inputs read as zero. Widths 16 to 128.
+#pragma once
+
+#include "compute/memory.h"
+
+namespace tessera {
+
+enum class OutputActivation { none, sigmoid };
+
+struct MlpShape {
+  int inputs = 32;
+  int width = 64;         // 16, 32, 64 or 128
+  int hiddenLayers = 1;   // at least 1
+  int outputs = 16;
+  OutputActivation activation = OutputActivation::none;
+
+  static int padded(int size) { return (size + 15) / 16 * 16; }
+  int layers() const { return hiddenLayers + 1; }
+  int layerInputs(int layer) const { return layer == 0 ? padded(inputs) : width; }
+  int layerOutputs(int layer) const { return layer == hiddenLayers ? padded(outputs) : width; }
+  // Weights of layer l stand at weightOffset(l) as [layerOutputs][layerInputs], row-major.
+  size_t weightOffset(int layer) const {
+    size_t offset = 0;
+    for (int l = 0; l < layer; ++l) offset += static_cast<size_t>(layerInputs(l)) * layerOutputs(l);
+    return offset;
+  }
+  size_t parameters() const { return weightOffset(layers()); }
+  size_t activationsPerSample() const { return static_cast<size_t>(width) * hiddenLayers; }
+};
+
+struct MlpForward {
+  const MlpShape& shape;
+  Count samples;
+  Matrix<const float> input;     // [capacity][inputs]
+  Slice<const float> weights;    // [shape.parameters()]
+  Matrix<float> output;          // [capacity][outputs], row-major
+  Slice<float> activations;      // optional, [hiddenLayers][capacity][width]: kept for backward (after ReLU)
+};
+
+// Adds to `weightGradients`; overwrites `inputGradients`.
+struct MlpBackward {
+  const MlpShape& shape;
+  Count samples;
+  Matrix<const float> input;
+  Slice<const float> weights;
+  Matrix<const float> output;              // read only when the output activation needs it
+  Slice<const float> activations;          // from forward
+  Matrix<const float> outputGradients;     // [capacity][outputs], row-major; with respect to the activated output
+  Slice<const float> firstOutputGradients; // optional, [capacity]: added to the gradient of output 0 (a density that
+                                           // compositing and a colour network both use)
+  Slice<float> weightGradients;            // [shape.parameters()]
+  Matrix<float> inputGradients;            // optional, [capacity][inputs]
+};
+
+}  // namespace tessera

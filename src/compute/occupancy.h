@@ -1,0 +1,35 @@
+// The occupancy grid of instant-ngp (Müller et al. 2022, appendix C), one grid over contracted space.
+#pragma once
+
+#include "compute/memory.h"
+#include "compute/rays.h"
+
+namespace tessera {
+
+// Chooses cells and one jittered point in each: all cells in order when `uniform` = all of them, else `uniform` cells at
+// random and then `occupied` cells at random among those whose bit is set (up to 10 tries each, else any).
+// Random numbers are RandomStream(seed, stream 0x0cc), index = 8 · position in the list + purpose.
+struct OccupancyPoints {
+  const MarchSpace& space;
+  uint32_t uniform = 0, occupied = 0;
+  uint64_t seed = 0;                     // differs for every update
+  Slice<const uint32_t> occupancy;       // bits
+  Slice<uint32_t> cells;                 // [uniform + occupied]
+  Slice<float> positions;                // [uniform + occupied][3], grid coordinates
+};
+
+// First every cell decays (negative ones, never visible, stay as they are); then grid = max(grid, exp(logDensity) · step)
+// at the chosen cells, where step is the marching step there: max(minStep, cone · ‖x‖∞) with x the cell centre in scene
+// units. Then bit = grid > min(threshold, mean over all cells of max(grid, 0)).
+struct OccupancyUpdate {
+  const MarchSpace& space;
+  uint32_t points = 0;
+  float decay = 0.95f;
+  float threshold = 0.01f;
+  Slice<const uint32_t> cells;           // [points]
+  Matrix<const float> logDensity;        // [points], 1 column
+  Slice<float> grid;                     // [resolution³]
+  Slice<uint32_t> occupancy;             // [resolution³ / 32]
+};
+
+}  // namespace tessera

@@ -1,0 +1,95 @@
+// Rays from pixels, and samples along rays through an occupancy grid.
+#pragma once
+
+#include "compute/memory.h"
+
+namespace tessera {
+
+// One photo's view as kernels see it. The pose is in scene units (the region of interest is the cube [-1,1]³).
+struct RayCamera {
+  int32_t lens = 1;              // LensModel
+  float parameters[16] = {};     // as scene/camera.h
+  float rotation[9] = {};        // sceneFromCamera, row-major
+  float centre[3] = {};
+};
+static_assert(sizeof(RayCamera) == 4 * (1 + 16 + 9 + 3));
+
+// Lens distortion is undone here, per ray; photos are never resampled. A pixel where the lens has no inverse gets
+// direction zero: such a ray has no samples. It has no gradient: cameras are fixed.
+struct GenerateRays {
+  Count rays;
+  Slice<const RayCamera> cameras;
+  Slice<const uint32_t> cameraOfRay;   // [capacity]
+  Slice<const float> pixels;           // [capacity][2]
+  Slice<float> origins;                // [capacity][3]
+  Slice<float> directions;             // [capacity][3], unit
+};
+
+// What lies between a ray and its samples.
+//   contracted   MERF's piecewise-projective map (Reiser et al. 2023, eq. 4): identity in [-1,1]³, everything outside
+//                in (-2,2)³; lines stay lines within each of the 7 regions
+//   bounded      only [-1,1]³ exists
+// Grid coordinates u in [0,1]³ are (contracted + 2) / 4, or (x + 1) / 2 when bounded.
+//
+// Steps follow instant-ngp: samples lie on the lattice t(n), n integer + the ray's jitter, with
+//   dt = clamp(cone · t, minStep, maxStep)     (linear, then geometric, then linear; continuous in t)
+// where λ = ln(1 + cone), t_a = minStep/λ, t_b = maxStep/λ:
+//   n(t) = t / minStep                                     t ≤ t_a
+//          n(t_a) + ln(t / t_a) / λ                        t_a < t ≤ t_b
+//          n(t_b) + (t - t_b) / maxStep                    t > t_b
+struct MarchSpace {
+  bool contracted = true;
+  int gridResolution = 128;      // cells per axis, a multiple of 4 and at most 512
+  float near = 0.05f;
+  float far = 100.0f;
+  float minStep = 0.00338f;      // 2√3 / 1024
+  float maxStep = 1e10f;
+  float cone = 1.0f / 256;       // 0: uniform steps
+
+  double stepIndex(double t) const;       // n(t)
+  double distanceAt(double n) const;      // t(n), the inverse
+};
+
+// A sample sits at the middle of its interval [t(n), t(n+1)]. Only samples whose middle lies in an occupied cell are
+// made; empty cells are left by exact plane intersections and whole steps, so the samples are those of brute force.
+// Rays are finished in order while samples fit; a ray that would pass `sampleCapacity` gets none, and so do all after it.
+struct MarchRays {
+  const MarchSpace& space;
+  Count rays;
+  uint32_t sampleCapacity = 0;
+  Slice<const float> origins;            // [rays][3]
+  Slice<const float> directions;         // [rays][3]
+  Slice<const float> jitter;             // optional, [rays], in [0,1) lattice steps; else 0
+  Slice<const float> farOfRay;           // optional, [rays]: the ray ends there (opaque models)
+  Slice<const uint32_t> occupancy;       // bits, cell (x,y,z) at x + R·(y + R·z), least significant first
+  Slice<uint32_t> firstSample;           // [rays + 1]: samples of ray r are [firstSample[r], firstSample[r+1])
+  Slice<uint32_t> sampleCount;           // [1]: total made
+  Slice<uint32_t> rayOfSample;           // [sampleCapacity]
+  Slice<float> positions;                // [sampleCapacity][3], grid coordinates in [0,1]
+  Slice<float> distances;                // [sampleCapacity]: t of the middle
+  Slice<float> steps;                    // [sampleCapacity]: t(n+1) - t(n)
+};
+
+// Keeps of each ray the samples in front of the point where its transmittance falls below `minTransmittance`
+// (the one that crosses included). logDensity as in Composite.
+struct CompactSamples {
+  Count rays;
+  uint32_t sampleCapacity = 0;           // of input and output alike
+  float minTransmittance = 1e-4f;
+  Slice<const uint32_t> firstSample;     // [rays + 1]
+  Matrix<const float> logDensity;        // 1 column
+  Slice<const float> steps;
+  Slice<uint32_t> keptFirstSample;       // [rays + 1]
+  Slice<uint32_t> keptCount;             // [1]
+  Slice<uint32_t> source;                // [sampleCapacity]: the sample that a kept one was
+};
+
+// output row i = input row source[i]. 32-bit elements of any kind.
+struct GatherRows {
+  Count rows;
+  Slice<const uint32_t> source;
+  Matrix<const float> input;
+  Matrix<float> output;                  // same layout kind and columns
+};
+
+}  // namespace tessera
