@@ -8,28 +8,12 @@
 #include <string_view>
 
 #include "scene/axes.h"
+#include "scene/lens.h"
 
 namespace tessera {
 
-// Numbered as in COLMAP's binary files.
-enum class LensModel : int {
-  simplePinhole = 0,           // f, cx, cy
-  pinhole = 1,                 // fx, fy, cx, cy
-  simpleRadial = 2,            // f, cx, cy, k
-  radial = 3,                  // f, cx, cy, k1, k2
-  openCv = 4,                  // fx, fy, cx, cy, k1, k2, p1, p2
-  openCvFisheye = 5,           // fx, fy, cx, cy, k1, k2, k3, k4
-  fullOpenCv = 6,              // fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6
-  fov = 7,                     // fx, fy, cx, cy, omega
-  simpleRadialFisheye = 8,     // f, cx, cy, k
-  radialFisheye = 9,           // f, cx, cy, k1, k2
-  thinPrismFisheye = 10,       // fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1
-  radTanThinPrismFisheye = 11  // fx, fy, cx, cy, k0..k5, p0, p1, s0..s3
-};
-inline constexpr int kLensModelCount = 12;
-
 int lensParameterCount(LensModel model);
-std::string_view lensName(LensModel model);                     // COLMAP's name, "OPENCV_FISHEYE"
+std::string_view lensName(LensModel model);  // COLMAP's name, "OPENCV_FISHEYE"
 std::optional<LensModel> lensFromName(std::string_view name);
 
 struct Camera {
@@ -49,7 +33,8 @@ struct Camera {
   // angle where the distortion polynomial stops growing).
   std::optional<Vec2d> pixelFromCamera(const Vec3d& xInCamera) const;
 
-  // The same lens for a picture reduced or enlarged to width × height.
+  // The same lens for a picture reduced or enlarged to width × height. A lens with one focal length becomes its exact
+  // equivalent with two where rounding made the pixels a little oblong.
   Camera scaledTo(int newWidth, int newHeight) const;
 
   bool operator==(const Camera&) const = default;

@@ -1,0 +1,120 @@
+#include "scene/camera.h"
+
+#include <algorithm>
+
+#include "base/check.h"
+
+namespace tessera {
+namespace {
+
+struct LensFacts {
+  std::string_view name;
+  int parameters;
+  bool oneFocal;
+};
+
+constexpr std::array<LensFacts, kLensModelCount> kLenses = {{
+    {"SIMPLE_PINHOLE", 3, true},
+    {"PINHOLE", 4, false},
+    {"SIMPLE_RADIAL", 4, true},
+    {"RADIAL", 5, true},
+    {"OPENCV", 8, false},
+    {"OPENCV_FISHEYE", 8, false},
+    {"FULL_OPENCV", 12, false},
+    {"FOV", 5, false},
+    {"SIMPLE_RADIAL_FISHEYE", 4, true},
+    {"RADIAL_FISHEYE", 5, true},
+    {"THIN_PRISM_FISHEYE", 12, false},
+    {"RAD_TAN_THIN_PRISM_FISHEYE", 16, false},
+}};
+
+const LensFacts& factsOf(LensModel model) {
+  const int index = static_cast<int>(model);
+  CHECK(index >= 0);
+  CHECK(index < kLensModelCount);
+  return kLenses[static_cast<size_t>(index)];
+}
+
+// The model of two focal lengths that contains a model of one, with the same distortion.
+LensModel withTwoFocals(LensModel model) {
+  switch (model) {
+    case LensModel::simplePinhole:
+      return LensModel::pinhole;
+    case LensModel::simpleRadial:
+    case LensModel::radial:
+      return LensModel::openCv;
+    case LensModel::simpleRadialFisheye:
+    case LensModel::radialFisheye:
+      return LensModel::openCvFisheye;
+    default:
+      return model;
+  }
+}
+
+}  // namespace
+
+int lensParameterCount(LensModel model) {
+  return factsOf(model).parameters;
+}
+std::string_view lensName(LensModel model) {
+  return factsOf(model).name;
+}
+
+std::optional<LensModel> lensFromName(std::string_view name) {
+  for (int i = 0; i < kLensModelCount; ++i) {
+    if (kLenses[static_cast<size_t>(i)].name == name) return static_cast<LensModel>(i);
+  }
+  return std::nullopt;
+}
+
+double Camera::focalX() const {
+  return parameters[0];
+}
+double Camera::focalY() const {
+  return parameters[factsOf(lens).oneFocal ? 0 : 1];
+}
+double Camera::centreX() const {
+  return parameters[factsOf(lens).oneFocal ? 1 : 2];
+}
+double Camera::centreY() const {
+  return parameters[factsOf(lens).oneFocal ? 2 : 3];
+}
+
+std::optional<Vec3d> Camera::directionInCamera(const Vec2d& pixel) const {
+  Vec3d direction;
+  if (!lensUnproject(lens, parameters.data(), pixel.x(), pixel.y(), direction.data())) return std::nullopt;
+  return direction;
+}
+
+std::optional<Vec2d> Camera::pixelFromCamera(const Vec3d& xInCamera) const {
+  Vec2d pixel;
+  if (!lensProject(lens, parameters.data(), xInCamera.data(), pixel.data())) return std::nullopt;
+  return pixel;
+}
+
+Camera Camera::scaledTo(int newWidth, int newHeight) const {
+  CHECK(width > 0);
+  CHECK(height > 0);
+  const double scaleX = static_cast<double>(newWidth) / width, scaleY = static_cast<double>(newHeight) / height;
+  Camera scaled = *this;
+  scaled.width = newWidth;
+  scaled.height = newHeight;
+  if (factsOf(lens).oneFocal) {
+    if (scaleX != scaleY) {
+      scaled.lens = withTwoFocals(lens);
+      scaled.parameters = {};
+      scaled.parameters[0] = scaled.parameters[1] = parameters[0];
+      std::copy(parameters.begin() + 1, parameters.begin() + lensParameterCount(lens), scaled.parameters.begin() + 2);
+    } else {
+      for (int i : {0, 1, 2}) scaled.parameters[static_cast<size_t>(i)] *= scaleX;
+      return scaled;
+    }
+  }
+  scaled.parameters[0] *= scaleX;
+  scaled.parameters[1] *= scaleY;
+  scaled.parameters[2] *= scaleX;
+  scaled.parameters[3] *= scaleY;
+  return scaled;
+}
+
+}  // namespace tessera
