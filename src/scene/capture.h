@@ -27,7 +27,7 @@ struct Photo {
   Pose worldFromCamera;              // in the capture's recentred world
   std::filesystem::path image;       // absolute or relative to the working folder, checked to be inside the capture
   std::filesystem::path mask;        // 1-channel picture, black = do not train on; empty when there is none
-  std::filesystem::path depth;       // EXR or 16-bit PNG of z-depth (along the optical axis), empty when there is none
+  std::filesystem::path depth;       // EXR (world units) or 16-bit PNG of z-depth along the optical axis; may be empty
   float depthUnit = 0.001f;          // world units per step of an integer depth PNG
   Split split = Split::train;
   double exposure = 0;               // log2 gain relative to the capture's mean, 0 when unknown
@@ -63,8 +63,9 @@ struct Capture {
   std::vector<Observation> observations;   // sorted by photo
   std::optional<GeoFrame> geo;
 
-  // x in the source file's world = x in this world + offset: recentring keeps float kernels near zero.
-  Vec3d sourceFromWorldOffset = Vec3d::Zero();
+  // Similarity from this world to the one the photos' poses came in. Import recentres, so that float kernels see small
+  // numbers, turns Z up, and with GPS makes the unit a metre; a capture made by ourselves is its own source.
+  Mat4d sourceFromWorld = Mat4d::Identity();
 
   std::vector<int> photosIn(Split split) const;
 };
