@@ -26,8 +26,8 @@ struct Image {
 using ImageU8 = Image<uint8_t>;
 using ImageF = Image<float>;
 
-ImageF toFloat(const ImageU8& image);   // value / 255
-ImageU8 toBytes(const ImageF& image);   // clamp to [0,1], round to nearest
+ImageF toFloat(const ImageU8& image);  // value / 255
+ImageU8 toBytes(const ImageF& image);  // clamp to [0,1], round to nearest
 
 // Mean over the source area that each target pixel covers (exact for any ratio); only for reducing.
 ImageU8 downscaleByArea(const ImageU8& image, int width, int height);

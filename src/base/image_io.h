@@ -25,11 +25,13 @@ struct DecodedImage {
   bool truncated = false;  // the data ended early: the rest of the picture is what the decoder filled in (grey)
 };
 
-// Size and format from the first bytes.
+// Size and format from the first bytes. A palette or a transparent colour of a PNG can add channels when it is decoded.
 std::optional<ImageInfo> probeImage(std::span<const std::byte> bytes);
-// JPEG or PNG (any depth, palette, interlaced), by content, not by name.
+// JPEG (grey, colour, CMYK) or PNG (any depth, palette, interlaced), by content, not by name. Pixels as stored: EXIF
+// orientation is not applied. A picture whose header claims far more pixels than its bytes could hold is refused.
 std::optional<DecodedImage> decodeImage(std::span<const std::byte> bytes, const DecodeLimits& limits = {});
-// Depth: EXR (the channel "Z", "R" or the only one) as it is; 16-bit PNG as integer × unitsPerStep.
+// Depth: EXR (the channel "Z", "R" or the only one) as it is; grey PNG as integer × unitsPerStep.
+// 0 stays 0: "nothing known here".
 std::optional<ImageF> decodeDepth(std::span<const std::byte> bytes, float pngUnitsPerStep = 0.001f,
                                   const DecodeLimits& limits = {});
 
@@ -37,9 +39,10 @@ ImageInfo probeImageFile(const fs::path& path);  // reads only the head of the f
 DecodedImage readImage(const fs::path& path);
 ImageF readDepth(const fs::path& path, float pngUnitsPerStep = 0.001f);
 
-Bytes encodePng(const ImageU8& image);                          // 1, 3 or 4 channels
-Bytes encodeJpeg(const ImageU8& image, int quality = 95, std::span<const std::byte> exif = {});  // 1 or 3 channels; 4:4:4
-Bytes encodeDepthExr(const ImageF& depth);                      // one 32-bit float channel "Z", ZIP compressed
+Bytes encodePng(const ImageU8& image);  // 1, 3 or 4 channels
+// 1 or 3 channels, 4:4:4. `exif`: a TIFF structure, with or without the leading "Exif\0\0", below 64 KiB.
+Bytes encodeJpeg(const ImageU8& image, int quality = 95, std::span<const std::byte> exif = {});
+Bytes encodeDepthExr(const ImageF& depth);  // one 32-bit float channel "Z", ZIP compressed
 
 void writePng(const fs::path& path, const ImageU8& image);
 void writeJpeg(const fs::path& path, const ImageU8& image, int quality = 95, std::span<const std::byte> exif = {});

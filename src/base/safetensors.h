@@ -22,12 +22,17 @@ struct TensorView {
   std::span<const std::byte> bytes;  // borrowed from the file; length = product(shape) × bytesPerElement
 
   int64_t elements() const;
-  template <class T> std::span<const T> as() const {  // the caller has checked `type`
+  template <class T>
+  std::span<const T> as() const {  // the caller has checked `type`
     return {reinterpret_cast<const T*>(bytes.data()), bytes.size() / sizeof(T)};
   }
 };
 
-struct Safetensors {
+struct Safetensors {  // moves, never copies: the views point into the storage
+  Safetensors() = default;
+  Safetensors(Safetensors&&) = default;
+  Safetensors& operator=(Safetensors&&) = default;
+
   Bytes storage;
   std::map<std::string, TensorView> tensors;
   std::map<std::string, std::string> metadata;
@@ -41,7 +46,8 @@ struct Safetensors {
 std::optional<Safetensors> decodeSafetensors(Bytes bytes);
 Safetensors readSafetensors(const fs::path& path);
 
-// Tensors in name order, header padded so that data starts 8-byte aligned: the same content gives the same bytes.
+// Data in order of element size, then name, so that every tensor is aligned without holes (the header pads to 8 bytes):
+// the same content gives the same bytes.
 Bytes encodeSafetensors(const std::map<std::string, TensorView>& tensors,
                         const std::map<std::string, std::string>& metadata = {});
 
