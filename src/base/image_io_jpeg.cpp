@@ -1,13 +1,13 @@
 // JPEG through libjpeg-turbo. Its errors leave by longjmp, so nothing with a destructor lives in a function that calls
 // setjmp: buffers belong to the callers.
-// clang-format off: jpeglib.h needs <cstdio> before it, and jerror.h after it
-#include <jerror.h>
-#include <jpeglib.h>
-
+// jpeglib.h needs <cstdio> before it, and jerror.h after it.
+// clang-format off
 #include <csetjmp>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <jpeglib.h>
+#include <jerror.h>
 // clang-format on
 
 #include "base/check.h"
