@@ -50,6 +50,9 @@ struct MarchSpace {
   double distanceAt(double n) const;      // t(n), the inverse
 };
 
+// The intervals of a ray are [t(k + jitter), t(k + 1 + jitter)] for integers k ≥ ceil(n(near) - jitter), as long as the
+// middle (the mean of both ends) is below min(far, farOfRay). Cell of a point: floor(u · resolution) per axis, clamped to
+// the grid when contracted; a middle outside the cube of a bounded space has no cell. Work in double.
 // A sample sits at the middle of its interval [t(n), t(n+1)]. Only samples whose middle lies in an occupied cell are
 // made; empty cells are left by exact plane intersections and whole steps, so the samples are those of brute force.
 // Rays are finished in order while samples fit; a ray that would pass `sampleCapacity` gets none, and so do all after it.
