@@ -9,7 +9,9 @@ namespace tessera::check_internal {
 [[noreturn]] void fail(const char* file, int line, const char* expression, const std::string& values);
 
 template <class T>
-concept Streamable = requires(std::ostream& out, const T& value) { out << value; };
+concept Streamable = requires(std::ostream& out, const T& value) {
+  out << value;
+};
 
 template <class T>
 void print(std::ostream& out, const T& value) {
@@ -38,23 +40,44 @@ struct Left {
     print(out, right);
     return {false, out.str()};
   }
-  template <class R> Result operator==(const R& r) const { return result(left == r, r); }
-  template <class R> Result operator!=(const R& r) const { return result(left != r, r); }
-  template <class R> Result operator<(const R& r) const { return result(left < r, r); }
-  template <class R> Result operator<=(const R& r) const { return result(left <= r, r); }
-  template <class R> Result operator>(const R& r) const { return result(left > r, r); }
-  template <class R> Result operator>=(const R& r) const { return result(left >= r, r); }
+  template <class R>
+  Result operator==(const R& r) const {
+    return result(left == r, r);
+  }
+  template <class R>
+  Result operator!=(const R& r) const {
+    return result(left != r, r);
+  }
+  template <class R>
+  Result operator<(const R& r) const {
+    return result(left < r, r);
+  }
+  template <class R>
+  Result operator<=(const R& r) const {
+    return result(left <= r, r);
+  }
+  template <class R>
+  Result operator>(const R& r) const {
+    return result(left > r, r);
+  }
+  template <class R>
+  Result operator>=(const R& r) const {
+    return result(left >= r, r);
+  }
   operator Result() const { return {static_cast<bool>(left), "false"}; }
 };
 
 struct Splitter {
-  template <class L> Left<L> operator<<(const L& left) const { return {left}; }
+  template <class L>
+  Left<L> operator<<(const L& left) const {
+    return {left};
+  }
 };
 
 }  // namespace tessera::check_internal
 
-#define CHECK(expression)                                                                                          \
-  do {                                                                                                             \
-    const ::tessera::check_internal::Result checkResult = ::tessera::check_internal::Splitter{} << expression;     \
-    if (!checkResult.ok) ::tessera::check_internal::fail(__FILE__, __LINE__, #expression, checkResult.values);     \
+#define CHECK(expression)                                                                                      \
+  do {                                                                                                         \
+    const ::tessera::check_internal::Result checkResult = ::tessera::check_internal::Splitter{} << expression; \
+    if (!checkResult.ok) ::tessera::check_internal::fail(__FILE__, __LINE__, #expression, checkResult.values); \
   } while (false)

@@ -40,8 +40,12 @@ Container readWhole(const fs::path& path) {
 
 }  // namespace
 
-Bytes readFile(const fs::path& path) { return readWhole<Bytes>(path); }
-std::string readTextFile(const fs::path& path) { return readWhole<std::string>(path); }
+Bytes readFile(const fs::path& path) {
+  return readWhole<Bytes>(path);
+}
+std::string readTextFile(const fs::path& path) {
+  return readWhole<std::string>(path);
+}
 
 void writeFileAtomically(const fs::path& path, std::span<const std::byte> bytes, bool durable) {
   std::error_code status;
@@ -86,6 +90,10 @@ std::optional<fs::path> resolveInside(const fs::path& root, std::string_view rel
   if (status) return std::nullopt;
   const auto [rootEnd, rest] = std::mismatch(realRoot.begin(), realRoot.end(), real.begin(), real.end());
   if (rootEnd != realRoot.end()) return std::nullopt;
+  // A link to something that does not exist yet is left as it stands: writing through it would still lead out.
+  for (fs::path part = real; part != realRoot && part.has_relative_path(); part = part.parent_path()) {
+    if (fs::is_symlink(fs::symlink_status(part, status))) return std::nullopt;
+  }
   return real;
 }
 

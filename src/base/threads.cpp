@@ -65,7 +65,9 @@ ThreadPool::~ThreadPool() {
   for (std::thread& worker : state_->workers) worker.join();
 }
 
-int ThreadPool::threads() const { return static_cast<int>(state_->workers.size()) + 1; }
+int ThreadPool::threads() const {
+  return static_cast<int>(state_->workers.size()) + 1;
+}
 
 void ThreadPool::run(size_t tasks, const std::function<void(size_t, int)>& body) {
   if (tasks == 0) return;
@@ -92,8 +94,7 @@ void ThreadPool::run(size_t tasks, const std::function<void(size_t, int)>& body)
 
 void ThreadPool::forRanges(size_t count, size_t grain, const std::function<void(size_t, size_t)>& body) {
   grain = std::max<size_t>(grain, 1);
-  run((count + grain - 1) / grain,
-      [&](size_t task, int) { body(task * grain, std::min(count, (task + 1) * grain)); });
+  run((count + grain - 1) / grain, [&](size_t task, int) { body(task * grain, std::min(count, (task + 1) * grain)); });
 }
 
 }  // namespace tessera

@@ -1,0 +1,66 @@
+#include "base/threads.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <stdexcept>
+#include <vector>
+
+namespace tessera {
+namespace {
+
+TEST(ThreadPool, RunsEveryTaskOnceWithAThreadNumberInRange) {
+  for (const int threads : {1, 2, 5}) {
+    ThreadPool pool(threads);
+    EXPECT_EQ(pool.threads(), threads);
+    for (const size_t tasks : {size_t{0}, size_t{1}, size_t{3}, size_t{1000}}) {
+      std::vector<std::atomic<int>> runs(tasks);
+      std::atomic<bool> inRange{true};
+      pool.run(tasks, [&](size_t task, int thread) {
+        ++runs[task];
+        if (thread < 0 || thread >= threads) inRange = false;
+      });
+      EXPECT_TRUE(inRange);
+      for (const auto& count : runs) EXPECT_EQ(count, 1);
+    }
+  }
+}
+
+TEST(ThreadPool, SurvivesManyShortRounds) {
+  ThreadPool pool(3);
+  std::atomic<size_t> sum{0};
+  for (int round = 0; round < 2000; ++round) pool.run(4, [&](size_t task, int) { sum += task; });
+  EXPECT_EQ(sum, 2000u * 6u);
+}
+
+TEST(ThreadPool, RethrowsAndRemainsUsable) {
+  for (const int threads : {1, 2}) {
+    ThreadPool pool(threads);
+    EXPECT_THROW(pool.run(10,
+                          [](size_t task, int) {
+                            if (task == 7) throw std::runtime_error("seven");
+                          }),
+                 std::runtime_error);
+    std::atomic<int> count{0};
+    pool.run(10, [&](size_t, int) { ++count; });
+    EXPECT_EQ(count, 10);
+  }
+}
+
+TEST(ThreadPool, CutsARangeIntoPiecesThatCoverItOnce) {
+  ThreadPool pool(2);
+  for (const size_t grain : {size_t{0}, size_t{1}, size_t{7}, size_t{100}, size_t{1000}}) {
+    std::vector<std::atomic<int>> seen(100);
+    pool.forRanges(100, grain, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) ++seen[i];
+    });
+    for (const auto& count : seen) EXPECT_EQ(count, 1);
+  }
+}
+
+TEST(ThreadPool, UsesTheWholeMachineWhenAskedForZeroThreads) {
+  EXPECT_GE(ThreadPool(0).threads(), 1);
+}
+
+}  // namespace
+}  // namespace tessera
