@@ -8,7 +8,9 @@ namespace tessera {
 
 // Chooses cells and one jittered point in each: all cells in order when `uniform` = all of them, else `uniform` cells at
 // random and then `occupied` cells at random among those whose bit is set (up to 10 tries each, else any).
-// Random numbers are RandomStream(seed, stream 0x0cc), index = 8 · position in the list + purpose.
+// Entry p of the list draws from RandomStream(seed, 0x0cc) at index 16 p + purpose: purposes 0 to 9 are the tries for a
+// cell (`below(index, cells)`; a uniform entry takes the first), 10, 11 and 12 the jitter in x, y, z (`uniform`).
+// Position = (cell + jitter) / resolution, in float.
 struct OccupancyPoints {
   const MarchSpace& space;
   uint32_t uniform = 0, occupied = 0;
