@@ -20,9 +20,10 @@ struct OccupancyPoints {
   Slice<float> positions;                // [uniform + occupied][3], grid coordinates
 };
 
-// First every cell decays (negative ones, never visible, stay as they are); then grid = max(grid, exp(logDensity) · step)
-// at the chosen cells, where step is the marching step there: max(minStep, cone · ‖x‖∞) with x the cell centre in scene
-// units. Then bit = grid > min(threshold, mean over all cells of max(grid, 0)).
+// First every cell decays; then grid = max(grid, exp(min(logDensity, 15)) · step) at the chosen cells (which may repeat),
+// where step is the marching step there: clamp(cone · ‖x‖∞, minStep, maxStep) with x the cell centre in scene units.
+// Negative cells are never visible and stay as they are in both. Then
+// bit = grid > min(threshold, mean over all cells of max(grid, 0)).
 struct OccupancyUpdate {
   const MarchSpace& space;
   uint32_t points = 0;

@@ -1,0 +1,145 @@
+#include "compute/composite.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "compute/reference/convert.h"
+#include "compute/reference/functions.h"
+#include "compute/reference/operations.h"
+
+namespace tessera::reference {
+
+double opacityOf(Extinction extinction, double x, double step) {
+  switch (extinction) {
+    case Extinction::opacity:
+      return x;
+    case Extinction::density:
+      return -std::expm1(-x * step);
+    case Extinction::logDensity:
+      return -std::expm1(-std::exp(x) * step);
+  }
+  return 0;
+}
+
+RayColour compositeRay(Extinction extinction, double minTransmittance, const RaySamples& samples) {
+  RayColour ray;
+  ray.weights.resize(samples.x.size());
+  double transmittance = 1;
+  for (size_t i = 0; i < samples.x.size() && transmittance >= minTransmittance; ++i) {
+    const double alpha = opacityOf(extinction, samples.x[i], samples.steps.empty() ? 0 : samples.steps[i]);
+    const double weight = transmittance * alpha;
+    ray.weights[i] = weight;
+    for (int c = 0; c < 3; ++c) ray.colour[c] += weight * samples.colours[3 * i + c];
+    ray.depth += weight * samples.distances[i];
+    transmittance *= 1 - alpha;
+  }
+  for (int c = 0; c < 3; ++c) ray.colour[c] += transmittance * samples.background[c];
+  ray.opacity = 1 - transmittance;
+  return ray;
+}
+
+RayGradients compositeRayBackward(Extinction extinction, double minTransmittance, const RaySamples& samples,
+                                  const Point& colourGradient, double opacityGradient, double depthGradient,
+                                  View weightGradients) {
+  const size_t all = samples.x.size();
+  RayGradients gradients{Doubles(all), Doubles(3 * all)};
+  Doubles alphas, before;  // opacity of each sample, transmittance in front of it
+  double transmittance = 1;
+  while (alphas.size() < all && transmittance >= minTransmittance) {
+    const size_t i = alphas.size();
+    before.push_back(transmittance);
+    alphas.push_back(opacityOf(extinction, samples.x[i], samples.steps.empty() ? 0 : samples.steps[i]));
+    transmittance *= 1 - alphas[i];
+  }
+  // What one unit of light arriving from behind sample i is worth to the loss. Opacity is 1 - T.
+  double rear = -opacityGradient;
+  for (int c = 0; c < 3; ++c) rear += colourGradient[c] * samples.background[c];
+  for (size_t i = alphas.size(); i-- > 0;) {
+    double worth = weightGradients.empty() ? 0 : weightGradients[i];  // ∂L/∂w_i
+    if (depthGradient != 0) worth += depthGradient * samples.distances[i];
+    for (int c = 0; c < 3; ++c) {
+      worth += colourGradient[c] * samples.colours[3 * i + c];
+      gradients.colours[3 * i + c] = before[i] * alphas[i] * colourGradient[c];
+    }
+    double slope = 1;  // ∂α/∂x
+    if (extinction == Extinction::density) slope = (1 - alphas[i]) * samples.steps[i];
+    if (extinction == Extinction::logDensity)
+      slope = (1 - alphas[i]) * samples.steps[i] * std::exp(std::clamp(samples.x[i], -15.0, 15.0));
+    gradients.x[i] = before[i] * (worth - rear) * slope;
+    rear = alphas[i] * worth + (1 - alphas[i]) * rear;
+  }
+  return gradients;
+}
+
+namespace {
+
+// The samples of every ray, owned.
+struct AllSamples {
+  Indices firstSample;
+  Doubles x, steps, distances, colours, background;
+
+  template <class Arguments>
+  explicit AllSamples(const Arguments& a) {
+    const size_t rays = hostCount(a.rays);
+    firstSample = indices(a.firstSample, rays + 1);
+    const size_t samples = firstSample[rays];
+    x = doubles(a.x, samples);
+    if (a.extinction != Extinction::opacity) steps = doubles(a.steps, samples);
+    distances = doubles(a.distances, samples);
+    colours = doubles(a.colours, samples);
+    background = doubles(a.background, 3 * rays);
+  }
+  RaySamples ofRay(size_t ray) const {
+    const size_t first = firstSample[ray], count = firstSample[ray + 1] - first;
+    RaySamples samples;
+    samples.x = View(x).subspan(first, count);
+    if (!steps.empty()) samples.steps = View(steps).subspan(first, count);
+    if (!distances.empty()) samples.distances = View(distances).subspan(first, count);
+    samples.colours = View(colours).subspan(3 * first, 3 * count);
+    if (!background.empty())
+      samples.background = {background[3 * ray], background[3 * ray + 1], background[3 * ray + 2]};
+    return samples;
+  }
+};
+
+}  // namespace
+
+void run(const CompositeForward& a) {
+  const size_t rays = hostCount(a.rays);
+  const AllSamples all(a);
+  Doubles colour, opacity, depth;
+  for (size_t r = 0; r < rays; ++r) {
+    const RayColour ray = compositeRay(a.extinction, a.minTransmittance, all.ofRay(r));
+    colour.insert(colour.end(), ray.colour.begin(), ray.colour.end());
+    opacity.push_back(ray.opacity);
+    depth.push_back(ray.depth);
+    if (!ray.weights.empty()) store(a.weights.part(all.firstSample[r], ray.weights.size()), ray.weights);
+  }
+  store(a.colour, colour);
+  store(a.opacity, opacity);
+  store(a.depth, depth);
+}
+
+void run(const CompositeBackward& a) {
+  const size_t rays = hostCount(a.rays);
+  const AllSamples all(a);
+  const Doubles colourGradients = doubles(a.rayColourGradients, 3 * rays);
+  const Doubles opacityGradients = doubles(a.rayOpacityGradients, rays);
+  const Doubles depthGradients = doubles(a.rayDepthGradients, rays);
+  const Doubles weightGradients = doubles(a.weightGradients, all.firstSample[rays]);
+  Doubles x(all.firstSample[rays]), colours(3 * x.size());
+  for (size_t r = 0; r < rays; ++r) {
+    const size_t first = all.firstSample[r], count = all.firstSample[r + 1] - first;
+    const RayGradients ray = compositeRayBackward(
+        a.extinction, a.minTransmittance, all.ofRay(r),
+        {colourGradients[3 * r], colourGradients[3 * r + 1], colourGradients[3 * r + 2]},
+        opacityGradients.empty() ? 0 : opacityGradients[r], depthGradients.empty() ? 0 : depthGradients[r],
+        weightGradients.empty() ? View() : View(weightGradients).subspan(first, count));
+    std::copy(ray.x.begin(), ray.x.end(), x.begin() + first);
+    std::copy(ray.colours.begin(), ray.colours.end(), colours.begin() + 3 * first);
+  }
+  store(a.xGradients, x);
+  store(a.colourGradients, colours);
+}
+
+}  // namespace tessera::reference

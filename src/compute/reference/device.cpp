@@ -1,0 +1,48 @@
+#include "compute/reference/device.h"
+
+#include <cstring>
+
+#include "compute/host_memory.h"
+#include "compute/reference/operations.h"
+
+namespace tessera {
+namespace {
+
+std::byte* bytesAt(const Memory& memory, size_t offset, size_t length) {
+  CHECK(offset + length <= memory.bytes());
+  return const_cast<HostMemory&>(static_cast<const HostMemory&>(memory)).data() + offset;
+}
+
+class ReferenceDevice final : public Device {
+ public:
+  std::string name() const override { return "reference"; }
+  std::string target() const override { return "reference"; }
+
+  std::unique_ptr<Memory> allocate(size_t bytes) override { return std::make_unique<HostMemory>(bytes); }
+  void writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) override {
+    std::memcpy(bytesAt(to, offset, from.size()), from.data(), from.size());
+  }
+  void readBytes(const Memory& from, size_t offset, std::span<std::byte> to) override {
+    std::memcpy(to.data(), bytesAt(from, offset, to.size()), to.size());
+  }
+  void fillZero(Memory& memory, size_t offset, size_t bytes) override {
+    std::memset(bytesAt(memory, offset, bytes), 0, bytes);
+  }
+  void finish() override {}
+  bool supports(Operation) const override { return true; }
+
+#define TESSERA_FORWARD(name)                \
+  void run(const name& arguments) override { \
+    reference::run(arguments);               \
+  }
+  TESSERA_OPERATIONS(TESSERA_FORWARD)
+#undef TESSERA_FORWARD
+};
+
+}  // namespace
+
+std::unique_ptr<Device> makeReferenceDevice() {
+  return std::make_unique<ReferenceDevice>();
+}
+
+}  // namespace tessera

@@ -1,0 +1,127 @@
+// The mathematics of every operation, in double, without devices: what the reference device wraps, what the other
+// devices are compared with, and what gradients are checked against by finite differences. Arrays are plain, row-major
+// and exactly as long as the samples, rays or points given; meanings are those of the operation's own header.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "compute/adam.h"
+#include "compute/composite.h"
+#include "compute/hash_grid.h"
+#include "compute/losses.h"
+#include "compute/mlp.h"
+#include "compute/occupancy.h"
+#include "compute/rays.h"
+
+namespace tessera::reference {
+
+using Doubles = std::vector<double>;
+using View = std::span<const double>;
+using Indices = std::span<const uint32_t>;
+
+// hash_grid.cpp
+Doubles hashGridForward(const HashGrid& grid, View positions, View table);  // [n][columns]
+struct HashGridGradients {
+  Doubles table, positions;
+};
+HashGridGradients hashGridBackward(const HashGrid& grid, View positions, View table, View encodedGradients);
+
+// mlp.cpp
+struct MlpResult {
+  Doubles output;       // [n][outputs]
+  Doubles activations;  // [hiddenLayers][n][width]
+};
+MlpResult mlpForward(const MlpShape& shape, size_t samples, View input, View weights);
+struct MlpGradients {
+  Doubles weights, input;
+};
+// `outputGradients` already holds what firstOutputGradients adds.
+MlpGradients mlpBackward(const MlpShape& shape, size_t samples, View input, View weights, View output, View activations,
+                         View outputGradients);
+
+// encodings.cpp: one direction, one input vector
+Doubles sphericalHarmonics(int degree, const double direction[3]);  // [degree²]
+std::array<double, 3> sphericalHarmonicsBackward(int degree, const double direction[3], View gradients);
+Doubles frequencyEncoding(int dimensions, int frequencies, const double* input);
+Doubles frequencyEncodingBackward(int dimensions, int frequencies, const double* input, View gradients);
+
+// rays.cpp
+using Point = std::array<double, 3>;
+Point contract(const Point& x);    // MERF, eq. 4
+Point uncontract(const Point& y);  // its inverse
+Point gridFromScene(const MarchSpace& space, const Point& x);
+Point sceneFromGrid(const MarchSpace& space, const Point& u);
+uint32_t cellOf(const MarchSpace& space, const Point& u);
+Point generateRay(const RayCamera& camera, double pixelX, double pixelY);  // direction; zero where there is none
+
+struct MarchSample {
+  uint64_t step = 0;  // k of the lattice position n = k + jitter
+  double distance = 0, length = 0;
+  Point u{};  // grid coordinates
+  uint32_t cell = 0;
+};
+// Every lattice position inside the space, occupied or not: the definition of the march is these, filtered.
+std::vector<MarchSample> latticeOfRay(const MarchSpace& space, const Point& origin, const Point& direction,
+                                      double jitter, double far);
+std::vector<MarchSample> marchRay(const MarchSpace& space, const Point& origin, const Point& direction, double jitter,
+                                  double far, Indices occupancy);
+// How many of one ray's samples are kept.
+size_t compactRay(double minTransmittance, View logDensity, View steps);
+
+// occupancy.cpp
+struct OccupancyChoice {
+  std::vector<uint32_t> cells;
+  std::vector<float> positions;  // [points][3]; float, because every device must find the same bits
+};
+OccupancyChoice occupancyPoints(const MarchSpace& space, uint32_t uniform, uint32_t occupied, uint64_t seed,
+                                Indices occupancy);
+double marchStepAtCell(const MarchSpace& space, uint32_t cell);
+void occupancyUpdate(const MarchSpace& space, double decay, double threshold, Indices cells, View logDensity,
+                     std::span<double> grid, std::span<uint32_t> occupancy);
+
+// composite.cpp: one ray
+struct RaySamples {
+  View x, steps, distances, colours;  // [n], [n], [n], [n][3]
+  Point background{};
+};
+struct RayColour {
+  Point colour{};
+  double opacity = 0, depth = 0;
+  Doubles weights;
+};
+double opacityOf(Extinction extinction, double x, double step);
+RayColour compositeRay(Extinction extinction, double minTransmittance, const RaySamples& samples);
+struct RayGradients {
+  Doubles x, colours;
+};
+// `weightGradients` may be empty.
+RayGradients compositeRayBackward(Extinction extinction, double minTransmittance, const RaySamples& samples,
+                                  const Point& colourGradient, double opacityGradient, double depthGradient,
+                                  View weightGradients);
+
+// losses.cpp
+struct ValueAndSlope {
+  double value = 0, slope = 0;
+};
+ValueAndSlope colourLoss(ColourLossKind kind, double parameter, double residual);
+double warpDistance(double t);  // MERF's g
+struct LossAndGradients {
+  double loss = 0;
+  Doubles gradients;
+};
+// On normalised fence posts directly: bin i is [fences[i], fences[i+1]]. By the double sum.
+LossAndGradients distortionOfFences(View fences, View weights);
+// One ray of DistortionLoss, unscaled; intervals need not touch.
+LossAndGradients distortionOfRay(View weights, View distances, View steps);
+
+// adam.cpp
+struct AdamState {
+  double parameter = 0, firstMoment = 0, secondMoment = 0;
+  uint32_t count = 0;
+};
+void adamStep(const Adam& options, double gradient, AdamState& state);
+
+}  // namespace tessera::reference

@@ -1,0 +1,83 @@
+#include "compute/occupancy.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/random.h"
+#include "compute/reference/convert.h"
+#include "compute/reference/functions.h"
+#include "compute/reference/operations.h"
+
+namespace tessera::reference {
+namespace {
+
+Point cellCentre(const MarchSpace& space, uint32_t cell) {
+  const uint32_t resolution = space.gridResolution;
+  return {(cell % resolution + 0.5) / resolution, (cell / resolution % resolution + 0.5) / resolution,
+          (cell / resolution / resolution + 0.5) / resolution};
+}
+
+}  // namespace
+
+OccupancyChoice occupancyPoints(const MarchSpace& space, uint32_t uniform, uint32_t occupied, uint64_t seed,
+                                Indices occupancy) {
+  const uint32_t resolution = space.gridResolution, all = resolution * resolution * resolution;
+  const RandomStream random(seed, 0x0cc);
+  OccupancyChoice choice;
+  for (uint64_t i = 0; i < uint64_t{uniform} + occupied; ++i) {
+    const uint64_t index = 16 * i;
+    uint32_t cell = static_cast<uint32_t>(i);
+    if (i >= uniform) {
+      for (uint32_t attempt = 0; attempt < 10; ++attempt) {
+        cell = random.below(index + attempt, all);
+        if (occupancy[cell / 32] >> cell % 32 & 1) break;
+      }
+    } else if (uniform != all) {
+      cell = random.below(index, all);
+    }
+    choice.cells.push_back(cell);
+    const uint32_t corner[3] = {cell % resolution, cell / resolution % resolution, cell / resolution / resolution};
+    for (int a = 0; a < 3; ++a)
+      choice.positions.push_back((static_cast<float>(corner[a]) + random.uniform(index + 10 + a)) /
+                                 static_cast<float>(resolution));
+  }
+  return choice;
+}
+
+double marchStepAtCell(const MarchSpace& space, uint32_t cell) {
+  const Point x = sceneFromGrid(space, cellCentre(space, cell));
+  const double norm = std::max({std::abs(x[0]), std::abs(x[1]), std::abs(x[2])});
+  return std::clamp<double>(space.cone * norm, space.minStep, space.maxStep);
+}
+
+void occupancyUpdate(const MarchSpace& space, double decay, double threshold, Indices cells, View logDensity,
+                     std::span<double> grid, std::span<uint32_t> occupancy) {
+  for (double& value : grid)
+    if (value > 0) value *= decay;
+  for (size_t i = 0; i < cells.size(); ++i) {
+    double& value = grid[cells[i]];
+    if (value >= 0) value = std::max(value, std::exp(std::min(logDensity[i], 15.0)) * marchStepAtCell(space, cells[i]));
+  }
+  double mean = 0;
+  for (double value : grid) mean += std::max(value, 0.0);
+  const double limit = std::min(threshold, mean / grid.size());
+  std::fill(occupancy.begin(), occupancy.end(), 0u);
+  for (size_t cell = 0; cell < grid.size(); ++cell)
+    if (grid[cell] > limit) occupancy[cell / 32] |= 1u << cell % 32;
+}
+
+void run(const OccupancyPoints& a) {
+  const OccupancyChoice choice =
+      occupancyPoints(a.space, a.uniform, a.occupied, a.seed, indices(a.occupancy, a.occupancy.count));
+  std::copy(choice.cells.begin(), choice.cells.end(), hostPointer(a.cells));
+  std::copy(choice.positions.begin(), choice.positions.end(), hostPointer(a.positions));
+}
+
+void run(const OccupancyUpdate& a) {
+  Doubles grid = doubles(a.grid, a.grid.count);
+  occupancyUpdate(a.space, a.decay, a.threshold, indices(a.cells, a.points), doubles(a.logDensity, a.points), grid,
+                  {hostPointer(a.occupancy), a.occupancy.count});
+  store(a.grid, grid);
+}
+
+}  // namespace tessera::reference

@@ -1,0 +1,186 @@
+#include "compute/rays.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "compute/reference/convert.h"
+#include "compute/reference/functions.h"
+#include "compute/reference/operations.h"
+#include "scene/lens.h"
+
+namespace tessera::reference {
+namespace {
+
+int longestAxis(const Point& x) {
+  int axis = 0;
+  for (int a = 1; a < 3; ++a)
+    if (std::abs(x[a]) > std::abs(x[axis])) axis = a;
+  return axis;
+}
+
+}  // namespace
+
+Point contract(const Point& x) {
+  const int axis = longestAxis(x);
+  const double m = std::abs(x[axis]);
+  if (m <= 1) return x;
+  Point y = {x[0] / m, x[1] / m, x[2] / m};
+  y[axis] = std::copysign(2 - 1 / m, x[axis]);
+  return y;
+}
+
+Point uncontract(const Point& y) {
+  const int axis = longestAxis(y);
+  if (std::abs(y[axis]) <= 1) return y;
+  const double m = 1 / (2 - std::abs(y[axis]));
+  Point x = {y[0] * m, y[1] * m, y[2] * m};
+  x[axis] = std::copysign(m, y[axis]);
+  return x;
+}
+
+Point gridFromScene(const MarchSpace& space, const Point& x) {
+  if (!space.contracted) return {(x[0] + 1) / 2, (x[1] + 1) / 2, (x[2] + 1) / 2};
+  const Point y = contract(x);
+  return {(y[0] + 2) / 4, (y[1] + 2) / 4, (y[2] + 2) / 4};
+}
+
+Point sceneFromGrid(const MarchSpace& space, const Point& u) {
+  if (!space.contracted) return {2 * u[0] - 1, 2 * u[1] - 1, 2 * u[2] - 1};
+  return uncontract({4 * u[0] - 2, 4 * u[1] - 2, 4 * u[2] - 2});
+}
+
+uint32_t cellOf(const MarchSpace& space, const Point& u) {
+  const int resolution = space.gridResolution;
+  uint32_t cell[3];
+  for (int a = 0; a < 3; ++a) cell[a] = std::clamp(static_cast<int>(u[a] * resolution), 0, resolution - 1);
+  return cell[0] + resolution * (cell[1] + resolution * cell[2]);
+}
+
+Point generateRay(const RayCamera& camera, double pixelX, double pixelY) {
+  double parameters[16], inCamera[3];
+  std::copy(camera.parameters, camera.parameters + 16, parameters);
+  if (!lensUnproject<double>(static_cast<LensModel>(camera.lens), parameters, pixelX, pixelY, inCamera)) return {};
+  Point direction{};
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column) direction[row] += camera.rotation[3 * row + column] * inCamera[column];
+  const double length = std::hypot(direction[0], direction[1], direction[2]);
+  return {direction[0] / length, direction[1] / length, direction[2] / length};
+}
+
+std::vector<MarchSample> latticeOfRay(const MarchSpace& space, const Point& origin, const Point& direction,
+                                      double jitter, double far) {
+  std::vector<MarchSample> samples;
+  if (direction == Point{}) return samples;
+  const double end = std::min(far, static_cast<double>(space.far));
+  // Nothing of a bounded space is farther away than this.
+  const double reach = std::hypot(origin[0], origin[1], origin[2]) + 2;
+  const double first = std::ceil(space.stepIndex(space.near) - jitter);
+  uint64_t k = static_cast<uint64_t>(std::max(0.0, first));
+  for (;; ++k) {
+    MarchSample sample;
+    const double t = space.distanceAt(k + jitter), next = space.distanceAt(k + 1 + jitter);
+    sample.step = k;
+    sample.distance = (t + next) / 2;
+    sample.length = next - t;
+    if (sample.distance >= end || (!space.contracted && sample.distance > reach)) return samples;
+    Point x;
+    for (int a = 0; a < 3; ++a) x[a] = origin[a] + sample.distance * direction[a];
+    sample.u = gridFromScene(space, x);
+    const bool outside = std::any_of(sample.u.begin(), sample.u.end(), [](double u) { return u < 0 || u >= 1; });
+    if (!space.contracted && outside) continue;
+    sample.cell = cellOf(space, sample.u);
+    samples.push_back(sample);
+  }
+}
+
+std::vector<MarchSample> marchRay(const MarchSpace& space, const Point& origin, const Point& direction, double jitter,
+                                  double far, Indices occupancy) {
+  std::vector<MarchSample> samples = latticeOfRay(space, origin, direction, jitter, far);
+  std::erase_if(samples, [&](const MarchSample& s) { return (occupancy[s.cell / 32] >> s.cell % 32 & 1) == 0; });
+  return samples;
+}
+
+size_t compactRay(double minTransmittance, View logDensity, View steps) {
+  double transmittance = 1;
+  size_t kept = 0;
+  while (kept < logDensity.size() && transmittance >= minTransmittance) {
+    transmittance *= 1 - opacityOf(Extinction::logDensity, logDensity[kept], steps[kept]);
+    ++kept;
+  }
+  return kept;
+}
+
+void run(const GenerateRays& a) {
+  const size_t rays = hostCount(a.rays);
+  const Indices cameraOfRay = indices(a.cameraOfRay, rays);
+  const Doubles pixels = doubles(a.pixels, 2 * rays);
+  Doubles origins, directions;
+  for (size_t r = 0; r < rays; ++r) {
+    CHECK(cameraOfRay[r] < a.cameras.count);
+    const RayCamera& camera = hostPointer(a.cameras)[cameraOfRay[r]];
+    const Point direction = generateRay(camera, pixels[2 * r], pixels[2 * r + 1]);
+    origins.insert(origins.end(), camera.centre, camera.centre + 3);
+    directions.insert(directions.end(), direction.begin(), direction.end());
+  }
+  store(a.origins, origins);
+  store(a.directions, directions);
+}
+
+void run(const MarchRays& a) {
+  const size_t rays = hostCount(a.rays);
+  const Doubles origins = doubles(a.origins, 3 * rays), directions = doubles(a.directions, 3 * rays);
+  const Doubles jitter = doubles(a.jitter, rays), farOfRay = doubles(a.farOfRay, rays);
+  const Indices occupancy = indices(a.occupancy, a.occupancy.count);
+  Doubles positions, distances, steps;
+  uint32_t made = 0;
+  bool full = false;
+  hostPointer(a.firstSample)[0] = 0;
+  for (size_t r = 0; r < rays; ++r) {
+    const Point origin = {origins[3 * r], origins[3 * r + 1], origins[3 * r + 2]};
+    const Point direction = {directions[3 * r], directions[3 * r + 1], directions[3 * r + 2]};
+    const std::vector<MarchSample> samples = marchRay(a.space, origin, direction, jitter.empty() ? 0 : jitter[r],
+                                                      farOfRay.empty() ? a.space.far : farOfRay[r], occupancy);
+    full = full || made + samples.size() > a.sampleCapacity;
+    if (!full)
+      for (const MarchSample& sample : samples) {
+        hostPointer(a.rayOfSample)[made++] = static_cast<uint32_t>(r);
+        positions.insert(positions.end(), sample.u.begin(), sample.u.end());
+        distances.push_back(sample.distance);
+        steps.push_back(sample.length);
+      }
+    hostPointer(a.firstSample)[r + 1] = made;
+  }
+  hostPointer(a.sampleCount)[0] = made;
+  store(a.positions, positions);
+  store(a.distances, distances);
+  store(a.steps, steps);
+}
+
+void run(const CompactSamples& a) {
+  const size_t rays = hostCount(a.rays);
+  const Indices firstSample = indices(a.firstSample, rays + 1);
+  const Doubles logDensity = doubles(a.logDensity, firstSample[rays]), steps = doubles(a.steps, firstSample[rays]);
+  uint32_t made = 0;
+  hostPointer(a.keptFirstSample)[0] = 0;
+  for (size_t r = 0; r < rays; ++r) {
+    const size_t first = firstSample[r], count = firstSample[r + 1] - first;
+    const size_t kept =
+        compactRay(a.minTransmittance, View(logDensity).subspan(first, count), View(steps).subspan(first, count));
+    for (size_t i = 0; i < kept; ++i) hostPointer(a.source)[made++] = static_cast<uint32_t>(first + i);
+    hostPointer(a.keptFirstSample)[r + 1] = made;
+  }
+  hostPointer(a.keptCount)[0] = made;
+}
+
+void run(const GatherRows& a) {
+  const size_t rows = hostCount(a.rows);
+  const Indices source = indices(a.source, rows);
+  CHECK(a.input.columns == a.output.columns);
+  for (size_t row = 0; row < rows; ++row)
+    for (size_t column = 0; column < a.output.columns; ++column)  // bits, whatever they mean
+      std::memcpy(hostPointer(a.output.data) + a.output.offset(row, column),
+                  hostPointer(a.input.data) + a.input.offset(source[row], column), sizeof(float));
+}
+
+}  // namespace tessera::reference
