@@ -67,6 +67,7 @@ struct MarchRays {
   Slice<const uint32_t> occupancy;       // bits, cell (x,y,z) at x + R·(y + R·z), least significant first
   Slice<uint32_t> firstSample;           // [rays + 1]: samples of ray r are [firstSample[r], firstSample[r+1])
   Slice<uint32_t> sampleCount;           // [1]: total made
+  Slice<uint32_t> finishedRays;          // optional, [1]: rays that fit; the counter of what follows
   Slice<uint32_t> rayOfSample;           // [sampleCapacity]
   Slice<float> positions;                // [sampleCapacity][3], grid coordinates in [0,1]
   Slice<float> distances;                // [sampleCapacity]: t of the middle
