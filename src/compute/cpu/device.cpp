@@ -1,0 +1,54 @@
+#include "compute/cpu/device.h"
+
+#include <fmt/format.h>
+
+#include <cstring>
+
+#include "compute/cpu/kernels.h"
+#include "compute/host_memory.h"
+
+namespace tessera {
+namespace {
+
+std::byte* bytesAt(Memory& memory, size_t offset, size_t length) {
+  CHECK(offset + length <= memory.bytes());
+  return static_cast<HostMemory&>(memory).data() + offset;
+}
+
+class CpuDevice final : public Device {
+ public:
+  explicit CpuDevice(int threads) : pool_(threads), context_{pool_} {}
+
+  std::string name() const override { return fmt::format("cpu {}, {} threads", cpu::simdTarget(), pool_.threads()); }
+  std::string target() const override { return fmt::format("cpu/{}", cpu::simdTarget()); }
+
+  std::unique_ptr<Memory> allocate(size_t bytes) override { return std::make_unique<HostMemory>(bytes); }
+  void writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) override {
+    std::memcpy(bytesAt(to, offset, from.size()), from.data(), from.size());
+  }
+  void readBytes(const Memory& from, size_t offset, std::span<std::byte> to) override {
+    std::memcpy(to.data(), bytesAt(const_cast<Memory&>(from), offset, to.size()), to.size());
+  }
+  void fillZero(Memory& memory, size_t offset, size_t bytes) override {
+    std::byte* first = bytesAt(memory, offset, bytes);
+    pool_.forRanges(bytes, size_t{1} << 20,
+                    [&](size_t begin, size_t end) { std::memset(first + begin, 0, end - begin); });
+  }
+  void finish() override {}
+  bool supports(Operation) const override { return true; }
+
+#define TESSERA_FORWARD(name) \
+  void run(const name& arguments) override { cpu::run(context_, arguments); }
+  TESSERA_OPERATIONS(TESSERA_FORWARD)
+#undef TESSERA_FORWARD
+
+ private:
+  ThreadPool pool_;
+  cpu::Context context_;
+};
+
+}  // namespace
+
+std::unique_ptr<Device> makeCpuDevice(int threads) { return std::make_unique<CpuDevice>(threads); }
+
+}  // namespace tessera

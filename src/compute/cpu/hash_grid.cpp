@@ -1,0 +1,358 @@
+// Hash grid on the processor. Forward goes level by level, so that one level's table stays in the second-level cache;
+// indices and weights are computed in vectors, the table is read by plain loads that do not wait for one another.
+// Backward gives each level (and, with many threads, each part of its table) to one task that takes all samples in order:
+// no atomics, and the same sums for any number of threads. Samples of a ray that share a cell are summed in registers.
+
+#include "compute/hash_grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "compute/cpu/kernels.h"
+#include "compute/host_memory.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "compute/cpu/hash_grid.cpp"
+#include <hwy/foreach_target.h>
+// after foreach_target
+#include <hwy/highway.h>
+
+#ifndef TESSERA_CPU_HASH_GRID_ONCE
+#define TESSERA_CPU_HASH_GRID_ONCE
+namespace tessera::cpu {
+
+inline constexpr int kGroup = 32;  // samples whose indices are worked out together
+
+// The eight corners of a group's samples: corner c takes the upper neighbour in x, y, z by its bits 0, 1, 2.
+struct Corners {
+  alignas(64) uint32_t index[8][kGroup];
+  alignas(64) float weight[8][kGroup];
+  alignas(64) uint32_t cell[3][kGroup];
+  alignas(64) float fraction[3][kGroup];
+};
+
+struct TableRange {
+  uint32_t begin, end;  // entries of the level that a task may add to
+};
+
+}  // namespace tessera::cpu
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace tessera::cpu::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Float = hn::CappedTag<float, 16>;
+using Vector = hn::Vec<Float>;
+using Word = hn::RebindToUnsigned<Float>;
+
+HWY_INLINE void cellsOfGroup(const HashGridLevel& level, const float* positions, Corners& corners) {
+  const Float d;
+  const hn::RebindToSigned<Float> di;
+  const Word du;
+  const Vector scale = hn::Set(d, level.scale), half = hn::Set(d, 0.5f);
+  for (int s = 0; s < kGroup; s += static_cast<int>(hn::Lanes(d))) {
+    Vector x, y, z;
+    hn::LoadInterleaved3(d, positions + 3 * s, x, y, z);
+    const Vector at[3] = {hn::MulAdd(x, scale, half), hn::MulAdd(y, scale, half), hn::MulAdd(z, scale, half)};
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto cell = hn::ConvertTo(di, at[axis]);  // positions are not negative: truncation is floor
+      hn::Store(hn::BitCast(du, cell), du, corners.cell[axis] + s);
+      hn::Store(hn::Sub(at[axis], hn::ConvertTo(d, cell)), d, corners.fraction[axis] + s);
+    }
+  }
+}
+
+template <bool kHashed>
+HWY_INLINE void indicesOfGroup(const HashGridLevel& level, Corners& corners) {
+  const Word du;
+  const auto entries = hn::Set(du, level.entries), mask = hn::Set(du, level.entries - 1);
+  const auto primeY = hn::Set(du, kHashed ? 2654435761u : level.resolution);
+  const auto primeZ = hn::Set(du, kHashed ? 805459861u : level.resolution * level.resolution);
+  for (int s = 0; s < kGroup; s += static_cast<int>(hn::Lanes(du))) {
+    const auto x0 = hn::Load(du, corners.cell[0] + s);
+    const auto y0 = hn::Mul(hn::Load(du, corners.cell[1] + s), primeY);
+    const auto z0 = hn::Mul(hn::Load(du, corners.cell[2] + s), primeZ);
+    const auto x1 = hn::Add(x0, hn::Set(du, 1u)), y1 = hn::Add(y0, primeY), z1 = hn::Add(z0, primeZ);
+    for (int c = 0; c < 8; ++c) {
+      const auto x = c & 1 ? x1 : x0, y = c & 2 ? y1 : y0, z = c & 4 ? z1 : z0;
+      if constexpr (kHashed) {
+        hn::Store(hn::And(hn::Xor(x, hn::Xor(y, z)), mask), du, corners.index[c] + s);
+      } else {
+        // x + r (y + r z) < 2 · entries: one subtraction is the modulo.
+        const auto i = hn::Add(x, hn::Add(y, z));
+        hn::Store(hn::IfThenElse(hn::Lt(i, entries), i, hn::Sub(i, entries)), du, corners.index[c] + s);
+      }
+    }
+  }
+}
+
+HWY_INLINE void weightsOfGroup(Corners& corners) {
+  const Float d;
+  const Vector one = hn::Set(d, 1.0f);
+  for (int s = 0; s < kGroup; s += static_cast<int>(hn::Lanes(d))) {
+    const Vector x1 = hn::Load(d, corners.fraction[0] + s), x0 = hn::Sub(one, x1);
+    const Vector y1 = hn::Load(d, corners.fraction[1] + s), y0 = hn::Sub(one, y1);
+    const Vector z1 = hn::Load(d, corners.fraction[2] + s), z0 = hn::Sub(one, z1);
+    const Vector xy[4] = {hn::Mul(x0, y0), hn::Mul(x1, y0), hn::Mul(x0, y1), hn::Mul(x1, y1)};
+    for (int c = 0; c < 8; ++c) hn::Store(hn::Mul(xy[c & 3], c & 4 ? z1 : z0), d, corners.weight[c] + s);
+  }
+}
+
+HWY_INLINE void cornersOfGroup(const HashGridLevel& level, const float* positions, Corners& corners) {
+  cellsOfGroup(level, positions, corners);
+  if (level.hashed) {
+    indicesOfGroup<true>(level, corners);
+  } else {
+    indicesOfGroup<false>(level, corners);
+  }
+}
+
+// Two features an entry: 8 bytes, fetched as one word. All words of the group are fetched before the first is used.
+HWY_INLINE void mixPairs(const float* HWY_RESTRICT table, const Corners& corners, float* HWY_RESTRICT out) {
+  const Float d;
+  alignas(64) float values[8][2 * kGroup];
+  for (int c = 0; c < 8; ++c) {
+    for (int s = 0; s < kGroup; ++s) std::memcpy(&values[c][2 * s], table + 2 * size_t{corners.index[c][s]}, 8);
+  }
+  for (int s = 0; s < kGroup; s += static_cast<int>(hn::Lanes(d))) {
+    Vector sum0 = hn::Zero(d), sum1 = hn::Zero(d);
+    for (int c = 0; c < 8; ++c) {
+      const Vector w = hn::Load(d, corners.weight[c] + s);
+      Vector f0, f1;
+      hn::LoadInterleaved2(d, values[c] + 2 * s, f0, f1);
+      sum0 = hn::MulAdd(w, f0, sum0);
+      sum1 = hn::MulAdd(w, f1, sum1);
+    }
+    hn::StoreInterleaved2(sum0, sum1, d, out + 2 * s);
+  }
+}
+
+void mixAny(const float* table, const Corners& corners, int features, float* out) {
+  for (int s = 0; s < kGroup; ++s) {
+    for (int f = 0; f < features; ++f) {
+      float sum = 0;
+      for (int c = 0; c < 8; ++c) sum += corners.weight[c][s] * table[size_t{corners.index[c][s]} * features + f];
+      out[s * features + f] = sum;
+    }
+  }
+}
+
+// Positions [first, first + kGroup), the last group of a batch filled up with zeros.
+HWY_INLINE const float* groupPositions(const float* positions, size_t first, size_t n, float* padded) {
+  if (first + kGroup <= n) return positions + 3 * first;
+  std::memset(padded, 0, sizeof(float) * 3 * kGroup);
+  std::memcpy(padded, positions + 3 * first, sizeof(float) * 3 * (n - first));
+  return padded;
+}
+
+void forwardRange(const HashGridForward& a, size_t l, size_t begin, size_t end) {
+  const HashGridLevel& level = a.grid.levels[l];
+  const int features = a.grid.features;
+  const float* table = hostPointer(a.table) + level.firstEntry * features;
+  const float* positions = hostPointer(a.positions);
+  float* out = hostPointer(a.encoded.data) + l * a.encoded.groupStride;
+  Corners corners;
+  alignas(64) float padded[3 * kGroup];
+  alignas(64) float tail[8 * kGroup];
+  for (size_t first = begin; first < end; first += kGroup) {
+    cornersOfGroup(level, groupPositions(positions, first, end, padded), corners);
+    weightsOfGroup(corners);
+    const size_t rows = std::min<size_t>(kGroup, end - first);
+    float* to = rows == kGroup ? out + first * features : tail;
+    if (features == 2) {
+      mixPairs(table, corners, to);
+    } else {
+      mixAny(table, corners, features, to);
+    }
+    if (to == tail) std::memcpy(out + first * features, tail, sizeof(float) * rows * features);
+  }
+}
+
+// The eight corner gradients of one cell, [corner][feature], as few vectors.
+using Sixteen = hn::CappedTag<float, 16>;
+
+// Patterns over [corner][feature] of two features: 1 where the corner is the upper neighbour of its axis.
+alignas(64) constexpr float kUpper[3][16] = {{0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1},
+                                             {0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 1, 1, 1, 1},
+                                             {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1}};
+
+template <bool kWhole>
+HWY_INLINE void flushCell(float* HWY_RESTRICT table, const uint32_t* index, const float* sum, TableRange range) {
+  const hn::FixedTag<float, 2> pair;
+  for (int c = 0; c < 8; ++c) {
+    if (!kWhole && (index[c] < range.begin || index[c] >= range.end)) continue;
+    float* to = table + 2 * size_t{index[c]};
+    hn::Store(hn::Add(hn::Load(pair, to), hn::Load(pair, sum + 2 * c)), pair, to);
+  }
+}
+
+template <bool kWhole>
+void backwardPairs(const HashGridBackward& a, const HashGridLevel& level, const float* gradients, float* table, size_t n,
+                   TableRange range) {
+  const Sixteen d;
+  constexpr int kLanes = static_cast<int>(hn::MaxLanes(Sixteen()));
+  constexpr int kVectors = 16 / kLanes;
+  const float* positions = hostPointer(a.positions);
+  Corners corners;
+  alignas(64) float padded[3 * kGroup];
+  alignas(64) float sum[16];
+  uint32_t heldIndex[8] = {};
+  uint32_t held[3] = {~0u, 0, 0};
+  hn::Vec<Sixteen> total[kVectors], sign[3][kVectors], base[3][kVectors];
+  for (int v = 0; v < kVectors; ++v) {
+    total[v] = hn::Zero(d);
+    for (int axis = 0; axis < 3; ++axis) {  // weight along an axis = base + sign · fraction
+      const auto upper = hn::Load(d, kUpper[axis] + v * kLanes);
+      sign[axis][v] = hn::Sub(hn::Add(upper, upper), hn::Set(d, 1.0f));
+      base[axis][v] = hn::Sub(hn::Set(d, 1.0f), upper);
+    }
+  }
+  for (size_t first = 0; first < n; first += kGroup) {
+    cornersOfGroup(level, groupPositions(positions, first, n, padded), corners);
+    const int rows = static_cast<int>(std::min<size_t>(kGroup, n - first));
+    for (int s = 0; s < rows; ++s) {
+      uint64_t word;
+      std::memcpy(&word, gradients + 2 * (first + s), 8);
+      if ((word & 0x7fffffff7fffffffull) == 0) continue;  // behind a surface
+      const uint32_t x = corners.cell[0][s], y = corners.cell[1][s], z = corners.cell[2][s];
+      if (((x ^ held[0]) | (y ^ held[1]) | (z ^ held[2])) != 0) {
+        if (held[0] != ~0u) {
+          for (int v = 0; v < kVectors; ++v) hn::Store(total[v], d, sum + v * kLanes);
+          flushCell<kWhole>(table, heldIndex, sum, range);
+        }
+        held[0] = x;
+        held[1] = y;
+        held[2] = z;
+        for (int c = 0; c < 8; ++c) heldIndex[c] = corners.index[c][s];
+        for (int v = 0; v < kVectors; ++v) total[v] = hn::Zero(d);
+      }
+      const auto g = hn::BitCast(d, hn::Set(hn::Repartition<uint64_t, Sixteen>(), word));
+      const auto fx = hn::Set(d, corners.fraction[0][s]), fy = hn::Set(d, corners.fraction[1][s]),
+                 fz = hn::Set(d, corners.fraction[2][s]);
+      for (int v = 0; v < kVectors; ++v) {
+        const auto wx = hn::MulAdd(sign[0][v], fx, base[0][v]), wy = hn::MulAdd(sign[1][v], fy, base[1][v]),
+                   wz = hn::MulAdd(sign[2][v], fz, base[2][v]);
+        total[v] = hn::MulAdd(hn::Mul(hn::Mul(wx, wy), wz), g, total[v]);
+      }
+    }
+  }
+  if (held[0] != ~0u) {
+    for (int v = 0; v < kVectors; ++v) hn::Store(total[v], d, sum + v * kLanes);
+    flushCell<kWhole>(table, heldIndex, sum, range);
+  }
+}
+
+void backwardAny(const HashGridBackward& a, const HashGridLevel& level, const float* gradients, float* table, size_t n,
+                 TableRange range) {
+  const int features = a.grid.features;
+  const float* positions = hostPointer(a.positions);
+  Corners corners;
+  alignas(64) float padded[3 * kGroup];
+  for (size_t first = 0; first < n; first += kGroup) {
+    cornersOfGroup(level, groupPositions(positions, first, n, padded), corners);
+    weightsOfGroup(corners);
+    const int rows = static_cast<int>(std::min<size_t>(kGroup, n - first));
+    for (int s = 0; s < rows; ++s) {
+      for (int c = 0; c < 8; ++c) {
+        const uint32_t index = corners.index[c][s];
+        if (index < range.begin || index >= range.end) continue;
+        for (int f = 0; f < features; ++f) {
+          table[size_t{index} * features + f] += corners.weight[c][s] * gradients[(first + s) * features + f];
+        }
+      }
+    }
+  }
+}
+
+void backwardLevel(const HashGridBackward& a, size_t l, size_t n, TableRange range) {
+  const HashGridLevel& level = a.grid.levels[l];
+  const float* gradients = hostPointer(a.encodedGradients.data) + l * a.encodedGradients.groupStride;
+  float* table = hostPointer(a.tableGradients) + level.firstEntry * a.grid.features;
+  if (a.grid.features != 2) {
+    backwardAny(a, level, gradients, table, n, range);
+  } else if (range.begin == 0 && range.end >= level.entries) {
+    backwardPairs<true>(a, level, gradients, table, n, range);
+  } else {
+    backwardPairs<false>(a, level, gradients, table, n, range);
+  }
+}
+
+// d value / d x_axis = scale · Σ over the face's corners of weight⊥ · (upper - lower entry).
+void backwardPositions(const HashGridBackward& a, size_t begin, size_t end) {
+  const int features = a.grid.features;
+  const float* positions = hostPointer(a.positions);
+  float* out = hostPointer(a.positionGradients);
+  Corners corners;
+  alignas(64) float padded[3 * kGroup];
+  std::memset(out + 3 * begin, 0, sizeof(float) * 3 * (end - begin));
+  for (size_t l = 0; l < a.grid.levels.size(); ++l) {
+    const HashGridLevel& level = a.grid.levels[l];
+    const float* table = hostPointer(a.table) + level.firstEntry * features;
+    const float* gradients = hostPointer(a.encodedGradients.data) + l * a.encodedGradients.groupStride;
+    for (size_t first = begin; first < end; first += kGroup) {
+      cornersOfGroup(level, groupPositions(positions, first, end, padded), corners);
+      const int rows = static_cast<int>(std::min<size_t>(kGroup, end - first));
+      for (int s = 0; s < rows; ++s) {
+        float dot[8];  // upstream · entry, per corner
+        for (int c = 0; c < 8; ++c) {
+          dot[c] = 0;
+          for (int f = 0; f < features; ++f) {
+            dot[c] += gradients[(first + s) * features + f] * table[size_t{corners.index[c][s]} * features + f];
+          }
+        }
+        const float x = corners.fraction[0][s], y = corners.fraction[1][s], z = corners.fraction[2][s];
+        const auto mix = [](float low, float high, float t) { return low + t * (high - low); };
+        float* to = out + 3 * (first + s);
+        to[0] += level.scale * mix(mix(dot[1] - dot[0], dot[3] - dot[2], y), mix(dot[5] - dot[4], dot[7] - dot[6], y), z);
+        to[1] += level.scale * mix(mix(dot[2] - dot[0], dot[3] - dot[1], x), mix(dot[6] - dot[4], dot[7] - dot[5], x), z);
+        to[2] += level.scale * mix(mix(dot[4] - dot[0], dot[5] - dot[1], x), mix(dot[6] - dot[2], dot[7] - dot[3], x), y);
+      }
+    }
+  }
+}
+
+}  // namespace tessera::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace tessera::cpu {
+
+HWY_EXPORT(forwardRange);
+HWY_EXPORT(backwardLevel);
+HWY_EXPORT(backwardPositions);
+
+void run(Context& context, const HashGridForward& a) {
+  const size_t n = hostCount(a.samples), levels = a.grid.levels.size();
+  if (n == 0) return;
+  constexpr size_t kRange = 4096;  // a multiple of kGroup
+  const size_t ranges = (n + kRange - 1) / kRange;
+  const auto range = HWY_DYNAMIC_DISPATCH(forwardRange);
+  context.pool.run(levels * ranges, [&](size_t task, int) {
+    const size_t first = task % ranges * kRange;
+    range(a, task / ranges, first, std::min(n, first + kRange));
+  });
+}
+
+void run(Context& context, const HashGridBackward& a) {
+  const size_t n = hostCount(a.samples), levels = a.grid.levels.size();
+  if (n == 0) return;
+  if (a.tableGradients) {
+    // Each entry's additions happen in sample order whatever the split, so the split may follow the threads.
+    const size_t splits = std::max<size_t>(1, 2 * context.pool.threads() / levels);
+    const auto level = HWY_DYNAMIC_DISPATCH(backwardLevel);
+    context.pool.run(levels * splits, [&](size_t task, int) {
+      const size_t l = levels - 1 - task / splits, part = task % splits;  // the costly fine levels first
+      const uint64_t entries = a.grid.levels[l].entries;
+      level(a, l, n, {static_cast<uint32_t>(entries * part / splits), static_cast<uint32_t>(entries * (part + 1) / splits)});
+    });
+  }
+  if (a.positionGradients) {
+    const auto positions = HWY_DYNAMIC_DISPATCH(backwardPositions);
+    context.pool.forRanges(n, 1024, [&](size_t begin, size_t end) { positions(a, begin, end); });
+  }
+}
+
+}  // namespace tessera::cpu
+#endif

@@ -1,0 +1,28 @@
+// The kernels behind the cpu device, one file per interface header. Each cuts its work into tasks whose inputs and
+// outputs depend on the task's number alone; sums over tasks are taken in task order. That makes the bits independent of
+// the number of threads.
+#pragma once
+
+#include "base/threads.h"
+#include "compute/device.h"
+
+namespace tessera::cpu {
+
+struct Context {
+  ThreadPool& pool;
+};
+
+#define TESSERA_KERNEL(name) void run(Context& context, const name& arguments);
+TESSERA_OPERATIONS(TESSERA_KERNEL)
+#undef TESSERA_KERNEL
+
+const char* simdTarget();  // the instruction set chosen at run time: "SSE4", "AVX2", "AVX3"
+
+// Multiply-adds per second (counted as 2 operations each) that all threads reach together on registers alone.
+double peakFlops(ThreadPool& pool);
+// 8-byte loads per second at random places of a table of `bytes`, indices streamed from memory, all threads together.
+double gatherRate(ThreadPool& pool, size_t bytes, int tables);
+// Bytes per second, read + written, of a large copy.
+double streamRate(ThreadPool& pool);
+
+}  // namespace tessera::cpu

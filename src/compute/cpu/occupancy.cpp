@@ -1,0 +1,96 @@
+#include "compute/occupancy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "base/random.h"
+#include "compute/cpu/kernels.h"
+#include "compute/host_memory.h"
+
+namespace tessera::cpu {
+namespace {
+
+constexpr size_t kGrain = 1 << 14;  // fixed: partial sums are added in task order; a multiple of 32
+
+bool bitAt(const uint32_t* bits, uint32_t cell) { return (bits[cell / 32] >> (cell % 32)) & 1; }
+
+// The marching step at a cell's centre.
+float stepAt(const MarchSpace& space, uint32_t cell) {
+  if (space.cone <= 0) return space.minStep;
+  const uint32_t r = space.gridResolution;
+  float largest = 0;
+  for (const uint32_t i : {cell % r, cell / r % r, cell / (r * r)}) {
+    const float u = (static_cast<float>(i) + 0.5f) / static_cast<float>(r);
+    largest = std::max(largest, std::abs(space.contracted ? 4 * u - 2 : 2 * u - 1));
+  }
+  const float distance = largest > 1 ? 1 / (2 - largest) : largest;
+  return std::clamp(space.cone * distance, space.minStep, space.maxStep);
+}
+
+}  // namespace
+
+void run(Context& context, const OccupancyPoints& a) {
+  const uint32_t r = a.space.gridResolution, cells = r * r * r;
+  const RandomStream random(a.seed, 0x0cc);
+  const uint32_t* bits = hostPointer(a.occupancy);
+  uint32_t* chosen = hostPointer(a.cells);
+  float* positions = hostPointer(a.positions);
+  context.pool.forRanges(a.uniform + a.occupied, kGrain, [&](size_t begin, size_t end) {
+    for (size_t p = begin; p < end; ++p) {
+      const uint64_t index = 16 * p;
+      uint32_t cell;
+      if (p < a.uniform) {
+        cell = a.uniform == cells ? static_cast<uint32_t>(p) : random.below(index, cells);
+      } else {
+        cell = random.below(index, cells);
+        for (int attempt = 1; attempt < 10 && !bitAt(bits, cell); ++attempt) cell = random.below(index + attempt, cells);
+      }
+      chosen[p] = cell;
+      const uint32_t at[3] = {cell % r, cell / r % r, cell / (r * r)};
+      for (int axis = 0; axis < 3; ++axis) {
+        positions[3 * p + axis] =
+            (static_cast<float>(at[axis]) + random.uniform(index + 10 + axis)) / static_cast<float>(r);
+      }
+    }
+  });
+}
+
+void run(Context& context, const OccupancyUpdate& a) {
+  const uint32_t r = a.space.gridResolution, cells = r * r * r;
+  const uint32_t* chosen = hostPointer(a.cells);
+  const float* logDensity = hostPointer(a.logDensity.data);
+  float* grid = hostPointer(a.grid);
+  uint32_t* bits = hostPointer(a.occupancy);
+  context.pool.forRanges(cells, kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      if (grid[i] > 0) grid[i] *= a.decay;
+    }
+  });
+  for (size_t p = 0; p < a.points; ++p) {  // cells may repeat: one thread, though a maximum has no order
+    float& value = grid[chosen[p]];
+    if (value < 0) continue;
+    value = std::max(value, std::exp(logDensity[a.logDensity.offset(p, 0)]) * stepAt(a.space, chosen[p]));
+  }
+  const size_t tasks = (cells + kGrain - 1) / kGrain;
+  std::vector<double> sums(tasks);
+  context.pool.run(tasks, [&](size_t task, int) {
+    double sum = 0;
+    for (size_t i = task * kGrain; i < std::min<size_t>(cells, (task + 1) * kGrain); ++i) {
+      sum += std::max(grid[i], 0.0f);
+    }
+    sums[task] = sum;
+  });
+  double sum = 0;
+  for (const double part : sums) sum += part;
+  const float threshold = std::min(a.threshold, static_cast<float>(sum / cells));
+  context.pool.forRanges(cells / 32, kGrain / 32, [&](size_t begin, size_t end) {
+    for (size_t word = begin; word < end; ++word) {
+      uint32_t value = 0;
+      for (uint32_t bit = 0; bit < 32; ++bit) value |= static_cast<uint32_t>(grid[32 * word + bit] > threshold) << bit;
+      bits[word] = value;
+    }
+  });
+}
+
+}  // namespace tessera::cpu

@@ -1,0 +1,328 @@
+#include "compute/rays.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include "compute/cpu/kernels.h"
+#include "compute/host_memory.h"
+#include "scene/lens.h"
+
+namespace tessera::cpu {
+namespace {
+
+constexpr size_t kRaysPerTask = 64;  // fixed: tasks write samples of their own, joined in task order
+
+struct Sample {
+  uint32_t ray;
+  float position[3];
+  float distance, step;
+};
+
+// The step lattice t(k), tabulated once for integers; a jittered point lies a constant factor (or offset) further.
+class Lattice {
+ public:
+  explicit Lattice(const MarchSpace& space) : space_(space), growth_(1 + static_cast<double>(space.cone)) {
+    const double last = space.stepIndex(space.far) + 3;
+    for (int k = 0; k <= last; ++k) table_.push_back(space.distanceAt(k));
+    if (space.cone > 0) {
+      const double lambda = std::log1p(static_cast<double>(space.cone));
+      linearEnd_ = 1 / lambda;
+      geometricEnd_ = linearEnd_ + std::log(static_cast<double>(space.maxStep) / space.minStep) / lambda;
+    } else {
+      linearEnd_ = 1e30;
+      geometricEnd_ = 1e30;
+    }
+  }
+
+  // t(k + jitter); factor = growth^jitter.
+  double at(int k, double jitter, double factor) const {
+    if (static_cast<size_t>(k) >= table_.size()) return space_.distanceAt(k + jitter);
+    if (k + jitter <= linearEnd_) return (k + jitter) * space_.minStep;
+    if (k >= linearEnd_ && k + jitter <= geometricEnd_) return table_[k] * factor;
+    return space_.distanceAt(k + jitter);
+  }
+  double factor(double jitter) const { return jitter == 0 ? 1.0 : std::pow(growth_, jitter); }
+
+ private:
+  const MarchSpace& space_;
+  double growth_, linearEnd_, geometricEnd_;
+  std::vector<double> table_;
+};
+
+struct Cell {
+  double u[3];    // grid coordinates in [0,1]
+  int index[3];
+  int region;     // contracted: axis of the largest coordinate outside the unit cube, or -1 inside
+  double sign;    // of that coordinate
+  bool inside;    // false: bounded and outside the cube
+};
+
+Cell cellAt(const MarchSpace& space, const double x[3]) {
+  Cell cell;
+  cell.region = -1;
+  cell.inside = true;
+  cell.sign = 1;
+  const int resolution = space.gridResolution;
+  if (space.contracted) {
+    int axis = 0;
+    for (int a = 1; a < 3; ++a) {
+      if (std::abs(x[a]) > std::abs(x[axis])) axis = a;
+    }
+    const double m = std::abs(x[axis]);
+    if (m > 1) {
+      cell.region = axis;
+      cell.sign = x[axis] < 0 ? -1 : 1;
+      for (int a = 0; a < 3; ++a) cell.u[a] = ((a == axis ? cell.sign * (2 - 1 / m) : x[a] / m) + 2) / 4;
+    } else {
+      for (int a = 0; a < 3; ++a) cell.u[a] = (x[a] + 2) / 4;
+    }
+  } else {
+    for (int a = 0; a < 3; ++a) {
+      cell.u[a] = (x[a] + 1) / 2;
+      cell.inside = cell.inside && cell.u[a] >= 0 && cell.u[a] < 1;
+    }
+  }
+  for (int a = 0; a < 3; ++a) {
+    cell.index[a] = std::clamp(static_cast<int>(std::floor(cell.u[a] * resolution)), 0, resolution - 1);
+  }
+  return cell;
+}
+
+bool occupied(const uint32_t* bits, int resolution, const Cell& cell) {
+  const size_t i = cell.index[0] + static_cast<size_t>(resolution) * (cell.index[1] + static_cast<size_t>(resolution) * cell.index[2]);
+  return (bits[i / 32] >> (i % 32)) & 1;
+}
+
+// The distance at which the ray leaves the cell. Every face of a cell is a plane: x_a = c inside; outside, for the region
+// of axis a, x_a = sign · 1/(2 - y) for its own axis and x_b = y · |x_a| for the others; and region borders are |x_b| = |x_a|.
+double exitDistance(const MarchSpace& space, const Cell& cell, const double o[3], const double d[3], double t) {
+  const double width = (space.contracted ? 4.0 : 2.0) / space.gridResolution, origin = space.contracted ? -2.0 : -1.0;
+  double exit = 1e30;
+  const auto cross = [&](double value, double slope) {  // value + slope · t = 0 ahead of t
+    if (slope == 0) return;
+    const double at = -value / slope;
+    if (at > t) exit = std::min(exit, at);
+  };
+  const int region = cell.region;
+  if (region < 0) {
+    for (int a = 0; a < 3; ++a) {
+      const double low = origin + cell.index[a] * width, high = low + width;
+      cross(o[a] - low, d[a]);
+      cross(o[a] - high, d[a]);
+    }
+    return exit;
+  }
+  const double om = cell.sign * o[region], dm = cell.sign * d[region];  // m along the ray
+  for (int a = 0; a < 3; ++a) {
+    const double low = origin + cell.index[a] * width, high = low + width;
+    if (a == region) {
+      for (const double y : {low, high}) {
+        const double m = 2 - std::abs(y);
+        if (m > 1e-12) cross(om - 1 / m, dm);
+      }
+    } else {
+      cross(o[a] - low * om, d[a] - low * dm);
+      cross(o[a] - high * om, d[a] - high * dm);
+    }
+  }
+  return exit;
+}
+
+void marchRay(const MarchRays& a, const Lattice& lattice, const uint32_t* bits, uint32_t ray,
+              std::vector<Sample>& samples) {
+  const MarchSpace& space = a.space;
+  double o[3], d[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    o[axis] = hostPointer(a.origins)[3 * ray + axis];
+    d[axis] = hostPointer(a.directions)[3 * ray + axis];
+  }
+  if (d[0] == 0 && d[1] == 0 && d[2] == 0) return;
+  const double jitter = a.jitter ? hostPointer(a.jitter)[ray] : 0;
+  double far = space.far, near = space.near;
+  if (a.farOfRay) far = std::min<double>(far, hostPointer(a.farOfRay)[ray]);
+  int k = static_cast<int>(std::ceil(space.stepIndex(near) - jitter));
+  if (!space.contracted) {  // nothing before the cube is entered, nothing after it is left
+    double enter = 0, leave = 1e30;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double t0 = (-1 - o[axis]) / d[axis], t1 = (1 - o[axis]) / d[axis];
+      if (d[axis] == 0) {
+        if (std::abs(o[axis]) > 1) return;
+        continue;
+      }
+      enter = std::max(enter, std::min(t0, t1));
+      leave = std::min(leave, std::max(t0, t1));
+    }
+    if (enter >= leave) return;
+    far = std::min(far, leave * (1 + 1e-6) + 1e-6);
+    if (enter > near) k = std::max(k, static_cast<int>(std::floor(space.stepIndex(enter) - jitter)) - 1);
+  }
+  const double factor = lattice.factor(jitter);
+  double begin = lattice.at(k, jitter, factor);
+  for (;;) {
+    const double end = lattice.at(k + 1, jitter, factor), middle = (begin + end) / 2;
+    if (middle >= far) return;
+    const double x[3] = {o[0] + middle * d[0], o[1] + middle * d[1], o[2] + middle * d[2]};
+    const Cell cell = cellAt(space, x);
+    if (cell.inside && occupied(bits, space.gridResolution, cell)) {
+      Sample sample;
+      sample.ray = ray;
+      for (int axis = 0; axis < 3; ++axis) {
+        sample.position[axis] = std::clamp(static_cast<float>(cell.u[axis]), 0.0f, 1.0f);
+      }
+      sample.distance = static_cast<float>(middle);
+      sample.step = static_cast<float>(end - begin);
+      samples.push_back(sample);
+      ++k;
+      begin = end;
+      continue;
+    }
+    ++k;
+    begin = end;
+    if (!cell.inside) continue;
+    // Whole steps to the first middle past the empty cell; the tolerance only costs one more look.
+    const double exit = exitDistance(space, cell, o, d, middle) * (1 - 1e-9);
+    if (exit >= far) return;
+    if (exit > begin + 4 * (end - middle)) {
+      k = std::max(k, static_cast<int>(std::floor(space.stepIndex(exit) - jitter)) - 1);
+      begin = lattice.at(k, jitter, factor);
+    }
+    while ((begin + lattice.at(k + 1, jitter, factor)) / 2 < exit) {
+      ++k;
+      begin = lattice.at(k, jitter, factor);
+    }
+  }
+}
+
+}  // namespace
+
+void run(Context& context, const GenerateRays& a) {
+  const RayCamera* cameras = hostPointer(a.cameras);
+  const uint32_t* cameraOfRay = hostPointer(a.cameraOfRay);
+  const float* pixels = hostPointer(a.pixels);
+  float* origins = hostPointer(a.origins);
+  float* directions = hostPointer(a.directions);
+  context.pool.forRanges(hostCount(a.rays), 256, [&](size_t begin, size_t end) {
+    for (size_t ray = begin; ray < end; ++ray) {
+      const RayCamera& camera = cameras[cameraOfRay[ray]];
+      float local[3];
+      const bool ok = lensUnproject<float>(static_cast<LensModel>(camera.lens), camera.parameters, pixels[2 * ray],
+                                           pixels[2 * ray + 1], local);
+      float world[3] = {0, 0, 0}, square = 0;
+      for (int i = 0; i < 3 && ok; ++i) {
+        for (int j = 0; j < 3; ++j) world[i] += camera.rotation[3 * i + j] * local[j];
+        square += world[i] * world[i];
+      }
+      const float scale = square > 0 ? 1 / std::sqrt(square) : 0;
+      for (int i = 0; i < 3; ++i) {
+        origins[3 * ray + i] = camera.centre[i];
+        directions[3 * ray + i] = world[i] * scale;
+      }
+    }
+  });
+}
+
+void run(Context& context, const MarchRays& a) {
+  const uint32_t rays = hostCount(a.rays);
+  const size_t tasks = (rays + kRaysPerTask - 1) / kRaysPerTask;
+  const Lattice lattice(a.space);
+  const uint32_t* bits = hostPointer(a.occupancy);
+  uint32_t* firstSample = hostPointer(a.firstSample);
+  std::vector<std::vector<Sample>> made(tasks);
+  context.pool.run(tasks, [&](size_t task, int) {
+    std::vector<Sample>& samples = made[task];
+    samples.reserve(kRaysPerTask * 32);
+    for (size_t ray = task * kRaysPerTask; ray < std::min<size_t>(rays, (task + 1) * kRaysPerTask); ++ray) {
+      const size_t before = samples.size();
+      marchRay(a, lattice, bits, static_cast<uint32_t>(ray), samples);
+      firstSample[ray + 1] = static_cast<uint32_t>(samples.size() - before);  // a count for now
+    }
+  });
+  // Counts to offsets. A ray that does not fit ends the list.
+  firstSample[0] = 0;
+  uint32_t finished = 0;
+  for (uint32_t ray = 0; ray < rays; ++ray) {
+    const uint64_t end = static_cast<uint64_t>(firstSample[ray]) + firstSample[ray + 1];
+    const bool fits = finished == ray && end <= a.sampleCapacity;
+    firstSample[ray + 1] = fits ? static_cast<uint32_t>(end) : firstSample[ray];
+    finished += fits;
+  }
+  if (a.finishedRays) *hostPointer(a.finishedRays) = finished;
+  *hostPointer(a.sampleCount) = firstSample[rays];
+  uint32_t* rayOfSample = hostPointer(a.rayOfSample);
+  float* positions = hostPointer(a.positions);
+  float* distances = hostPointer(a.distances);
+  float* steps = hostPointer(a.steps);
+  context.pool.run(tasks, [&](size_t task, int) {
+    size_t i = firstSample[task * kRaysPerTask];
+    const size_t end = firstSample[std::min<size_t>(rays, (task + 1) * kRaysPerTask)];
+    for (size_t s = 0; i < end; ++i, ++s) {
+      const Sample& sample = made[task][s];
+      rayOfSample[i] = sample.ray;
+      std::memcpy(positions + 3 * i, sample.position, sizeof(sample.position));
+      distances[i] = sample.distance;
+      steps[i] = sample.step;
+    }
+  });
+}
+
+void run(Context& context, const CompactSamples& a) {
+  const uint32_t rays = hostCount(a.rays);
+  const uint32_t* firstSample = hostPointer(a.firstSample);
+  const float* logDensity = hostPointer(a.logDensity.data);
+  const float* steps = hostPointer(a.steps);
+  uint32_t* kept = hostPointer(a.keptFirstSample);
+  uint32_t* source = hostPointer(a.source);
+  context.pool.forRanges(rays, 64, [&](size_t begin, size_t end) {
+    for (size_t ray = begin; ray < end; ++ray) {
+      // Transmittance is exp(-Σ σ step): the sum is enough.
+      float thickness = 0;
+      const float most = -std::log(a.minTransmittance);
+      uint32_t i = firstSample[ray];
+      while (i < firstSample[ray + 1] && thickness <= most) {
+        thickness += std::exp(logDensity[a.logDensity.offset(i, 0)]) * steps[i];
+        ++i;
+      }
+      kept[ray + 1] = i - firstSample[ray];
+    }
+  });
+  kept[0] = 0;
+  for (uint32_t ray = 0; ray < rays; ++ray) kept[ray + 1] += kept[ray];
+  *hostPointer(a.keptCount) = kept[rays];
+  context.pool.forRanges(rays, 256, [&](size_t begin, size_t end) {
+    for (size_t ray = begin; ray < end; ++ray) {
+      for (uint32_t i = kept[ray]; i < kept[ray + 1]; ++i) source[i] = firstSample[ray] + (i - kept[ray]);
+    }
+  });
+}
+
+void run(Context& context, const GatherRows& a) {
+  const uint32_t* source = hostPointer(a.source);
+  const float* input = hostPointer(a.input.data);
+  float* output = hostPointer(a.output.data);
+  const uint32_t group = a.input.groupWidth ? a.input.groupWidth : a.input.columns;
+  CHECK(a.input.columns == a.output.columns);
+  CHECK(a.input.groupWidth == a.output.groupWidth);
+  const size_t groups = a.input.columns / group, rows = hostCount(a.rows);
+  constexpr size_t kRange = 8192;
+  const size_t ranges = (rows + kRange - 1) / kRange;
+  context.pool.run(groups * ranges, [&](size_t task, int) {
+    const size_t g = task / ranges, begin = task % ranges * kRange, end = std::min(rows, begin + kRange);
+    const float* from = input + g * a.input.groupStride;
+    float* to = output + g * a.output.groupStride;
+    if (group == 2) {
+      for (size_t i = begin; i < end; ++i) {
+        std::memcpy(to + i * a.output.rowStride, from + size_t{source[i]} * a.input.rowStride, 8);
+      }
+    } else {
+      for (size_t i = begin; i < end; ++i) {
+        for (uint32_t c = 0; c < group; ++c) {
+          to[i * a.output.rowStride + c] = from[size_t{source[i]} * a.input.rowStride + c];
+        }
+      }
+    }
+  });
+}
+
+}  // namespace tessera::cpu
