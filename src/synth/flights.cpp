@@ -1,0 +1,127 @@
+#include "synth/flights.h"
+
+#include <fmt/format.h>
+
+#include <numbers>
+
+#include "base/check.h"
+#include "base/random.h"
+
+namespace tessera {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+struct Flight {
+  enum class Kind { nadir, oblique, orbit } kind;
+  double altitude, heading;  // metres; radians
+  double share;              // of all photos
+  int photos = 0;
+};
+
+struct Planner {
+  const CityLayout& city;
+  const Camera& camera;
+  RandomStream random;
+  std::vector<Station> stations;
+  double clock = 0;
+
+  double noise(double size) {
+    const uint64_t i = 4 * stations.size() + draws++;
+    return size * (2 * random.uniformDouble(i) - 1);
+  }
+
+  // Wind and a human hand: positions are off by a metre or so, attitudes by a degree or two.
+  void shoot(double x, double y, double altitude, double heading, double pitch, const std::string& name) {
+    draws = 1000 * (stations.size() + 1);
+    x += noise(1.2);
+    y += noise(1.2);
+    double z = city.terrain(0, 0) + altitude + noise(1);
+    z = std::max<double>(z, city.highestNear(static_cast<float>(x), static_cast<float>(y), 9) + 6);
+    stations.push_back(
+        {{cameraRotation(heading + noise(0.035), pitch + noise(0.03), noise(0.02)), {x, y, z}}, clock, name});
+    clock += 3;
+  }
+  uint64_t draws = 0;
+
+  // A lawn mower's path over the city, shifted back so that what the camera sees lies in it.
+  void fly(const Flight& f) {
+    const double halfX = 0.5 * city.area.width(), halfY = 0.5 * city.area.depth();
+    if (f.kind == Flight::Kind::orbit) {
+      const double radius = 0.62 * std::max(halfX, halfY) + 0.45 * f.altitude;
+      for (int i = 0; i < f.photos; ++i) {
+        const double angle = 2 * kPi * i / f.photos;
+        shoot(radius * std::sin(angle), radius * std::cos(angle), f.altitude, angle + kPi,
+              std::atan2(f.altitude - 8, radius), fmt::format("orbit {:.0f} m", f.altitude));
+      }
+      return;
+    }
+    const bool oblique = f.kind == Flight::Kind::oblique;
+    const double pitch = oblique ? 50 * kPi / 180 : kPi / 2;
+    const double back = oblique ? f.altitude / std::tan(pitch) : 0;
+    const double spanX = 2 * halfX, spanY = 2 * halfY;
+    const double ratio = (spanX / camera.width) / (spanY / camera.height);
+    int columns = std::max(1, static_cast<int>(std::lround(std::sqrt(f.photos * ratio))));
+    int rows = std::max(1, (f.photos + columns - 1) / columns);
+    int done = 0;
+    for (int r = 0; r < rows; ++r) {
+      // The last photos are spread over the last row.
+      const int inRow = (f.photos - done + (rows - r) - 1) / (rows - r);
+      for (int k = 0; k < inRow; ++k, ++done) {
+        const int c = r % 2 == 0 ? k : inRow - 1 - k;
+        const double x = -halfX + spanX * (c + 0.5) / inRow, y = -halfY + spanY * (r + 0.5) / rows;
+        const double heading = oblique ? f.heading : (r % 2 == 0 ? kPi / 2 : -kPi / 2) * (spanX >= spanY ? 0 : 1);
+        shoot(x - back * std::sin(heading), y - back * std::cos(heading), f.altitude, heading, pitch,
+              oblique ? fmt::format("oblique {:.0f} m heading {:.0f}", f.altitude, f.heading * 180 / kPi)
+                      : fmt::format("nadir {:.0f} m", f.altitude));
+      }
+    }
+  }
+};
+
+}  // namespace
+
+Mat3d cameraRotation(double heading, double pitch, double roll) {
+  const Vec3d level(std::sin(heading), std::cos(heading), 0);
+  const Vec3d forward = std::cos(pitch) * level - std::sin(pitch) * Vec3d(0, 0, 1);
+  const Vec3d right(level.y(), -level.x(), 0);
+  Mat3d rotation;
+  rotation << right, forward.cross(right), forward;
+  return rotation * Eigen::AngleAxisd(roll, Vec3d(0, 0, 1)).toRotationMatrix();
+}
+
+std::vector<Station> planFlights(const CityLayout& city, const Camera& camera, const FlightOptions& options) {
+  CHECK(options.photos > 0);
+  CHECK(!options.altitudes.empty());
+  std::vector<Flight> flights;
+  for (double altitude : options.altitudes) {
+    flights.push_back({Flight::Kind::nadir, altitude, 0, 0.30});
+    for (int i = 0; i < 4; ++i) flights.push_back({Flight::Kind::oblique, altitude, i * kPi / 2, 0.1375});
+    flights.push_back({Flight::Kind::orbit, altitude, 0, 0.15});
+  }
+  // Largest remainders, so that the flights add up to the photos asked for.
+  const double scale = static_cast<double>(options.photos) / static_cast<double>(options.altitudes.size());
+  double owed = 0;
+  int given = 0;
+  for (Flight& f : flights) {
+    owed += f.share * scale;
+    f.photos = static_cast<int>(std::lround(owed)) - given;
+    given += f.photos;
+  }
+  flights.back().photos += options.photos - given;
+  Planner planner{city, camera, RandomStream(options.seed, 4), {}};
+  for (const Flight& f : flights) planner.fly(f);
+  return std::move(planner.stations);
+}
+
+Camera droneCamera(int width, int height) {
+  Camera camera;
+  camera.width = width;
+  camera.height = height;
+  camera.lens = LensModel::openCv;
+  const double f = 0.5 * width / std::tan(65 * kPi / 360);
+  camera.parameters = {f, f, 0.5 * width + 0.004 * width, 0.5 * height - 0.003 * width, -0.018, 0.006, 0.0003, -0.0002};
+  return camera;
+}
+
+}  // namespace tessera

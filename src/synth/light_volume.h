@@ -1,0 +1,37 @@
+// Light that arrives from the sky and from one bounce, on a grid of probes through the city's air: smooth and free of
+// noise, where ambient occlusion rays per sample would speckle every photo.
+// After the ambient cube of Half-Life 2 (McTaggart, GDC 2004): six directions a probe.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "base/threads.h"
+#include "synth/layout.h"
+#include "synth/sky.h"
+#include "synth/tracer.h"
+
+namespace tessera {
+
+class LightVolume {
+ public:
+  LightVolume() = default;
+  LightVolume(const CityLayout& city, const TraceScene& scene, const Sky& sky, ThreadPool& pool);
+
+  // Irradiance over pi at a surface: what a white diffuse surface would shine with.
+  Vec3f at(const Vec3f& xInWorld, const Vec3f& normal) const;
+
+ private:
+  struct Probe {
+    std::array<Vec3f, 6> light;  // from +x, -x, +y, -y, +z, -z
+    float weight = 1;            // 0 inside a wall
+  };
+  Vec3f openSky(const Vec3f& normal) const;
+
+  Vec3f origin_{0, 0, 0};
+  Vec3f step_{4, 4, 3};
+  std::array<int, 3> size_{0, 0, 0};
+  std::vector<Probe> probes_;
+};
+
+}  // namespace tessera

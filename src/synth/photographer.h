@@ -1,0 +1,43 @@
+// One photo: colour as a camera would give it, exact depth, and what not to train on.
+#pragma once
+
+#include "base/image.h"
+#include "base/threads.h"
+#include "scene/camera.h"
+#include "synth/city_scene.h"
+
+namespace tessera {
+
+struct Exposed {
+  ImageU8 colour;  // sRGB
+  ImageF depth;    // z-depth through pixel centres, metres; 0 where the sky is
+  ImageU8 mask;    // 1 channel: 0 where a moving car is seen or throws its shadow, else 255
+};
+
+struct ShutterOptions {
+  int samplesPerPixel = 4;  // where the picture is even; about three times as many where it is not
+  double exposure = 0;      // log2 gain, applied to linear light after the tone curve: exactly a gain, up to clipping
+  uint64_t seed = 0;        // of the sampling pattern
+};
+
+// Directions of a lens, looked up instead of inverted: the lens is the same for every sample of every photo.
+class LensTable {
+ public:
+  explicit LensTable(const Camera& camera);
+  const Camera& camera() const { return camera_; }
+  // x/z and y/z in camera axes at a pixel position (up to a pixel outside the picture).
+  Eigen::Vector2d slopeAt(double x, double y) const;
+
+ private:
+  Camera camera_;
+  std::vector<Eigen::Vector2d> corners_;  // at whole pixel positions, (width + 3) × (height + 3) from (-1, -1)
+};
+
+// The result depends on everything but the number of threads.
+Exposed takePhoto(const CityScene& city, const TrafficScene* traffic, const LensTable& lens,
+                  const Pose& worldFromCamera, const ShutterOptions& options, ThreadPool& pool);
+
+// Linear radiance to 8-bit sRGB, as photos show it.
+std::array<uint8_t, 3> developed(const Vec3f& radiance, double exposure);
+
+}  // namespace tessera
