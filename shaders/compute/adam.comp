@@ -1,0 +1,36 @@
+// One step of Adam, one parameter at a time (src/compute/adam.h has the formula).
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "kernel.glsl"
+
+layout(local_size_x = 256) in;
+KERNEL_ARGUMENTS(AdamArguments)
+
+// base^exponent by squaring: exact for small exponents, where 1 - β^k needs every bit (pow() has no such promise).
+float power(float base, uint exponent) {
+  float result = 1;
+  for (; exponent != 0 && result != 0; exponent >>= 1) {
+    if ((exponent & 1) != 0) result *= base;
+    base *= base;
+  }
+  return result;
+}
+
+void main() {
+  AdamArguments a = arguments.values;
+  FOR_EACH(i, a.count) {
+    float gradient = a.gradients.values[i];
+    if (gradient == 0 && a.skipZeroGradients != 0) continue;
+    const float parameter = a.parameters.values[i];
+    gradient += a.l2 * parameter;
+    const float m = a.beta1 * a.firstMoments.values[i] + (1 - a.beta1) * gradient;
+    const float v = a.beta2 * a.secondMoments.values[i] + (1 - a.beta2) * gradient * gradient;
+    const uint k = a.counts.values[i] + 1;
+    const float rate = a.rate * sqrt(1 - power(a.beta2, k)) / (1 - power(a.beta1, k));
+    a.parameters.values[i] = parameter - rate * m / (sqrt(v) + a.epsilon);
+    a.firstMoments.values[i] = m;
+    a.secondMoments.values[i] = v;
+    a.counts.values[i] = k;
+    a.gradients.values[i] = 0;
+  }
+}

@@ -1,0 +1,33 @@
+// One invocation a sample and level: adds the sample's gradient to the eight table entries around it.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "float_sum.glsl"
+#include "kernel.glsl"
+#include "hash_grid.glsl"
+
+layout(local_size_x = 128) in;
+layout(constant_id = 0) const uint kFeatures = 2;
+KERNEL_ARGUMENTS(HashGridBackwardArguments)
+
+void main() {
+  const uint levelIndex = gl_WorkGroupID.y;
+  const LevelArguments level = arguments.values.levels[levelIndex];
+  MatrixArguments encoded = arguments.values.encodedGradients;
+
+  FOR_EACH(sampleIndex, countOf(arguments.values.samples)) {
+    float gradient[kFeatures];
+    bool any = false;
+    for (uint f = 0; f < kFeatures; ++f) {
+      gradient[f] = encoded.data.values[elementOf(encoded, sampleIndex, levelIndex * kFeatures + f)];
+      any = any || gradient[f] != 0;
+    }
+    if (!any) continue;
+
+    const Cell cell = cellOf(positionOf(arguments.values.positions, sampleIndex), level);
+    for (uint corner = 0; corner < 8; ++corner) {
+      const float weight = cornerWeight(cell, corner);
+      const uint entry = cornerEntry(cell, corner, level) * kFeatures;
+      for (uint f = 0; f < kFeatures; ++f) addTo(arguments.values.tableGradients, entry + f, weight * gradient[f]);
+    }
+  }
+}

@@ -1,0 +1,30 @@
+// One invocation a sample and level: the trilinear mix of the eight table entries around the sample.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "kernel.glsl"
+#include "hash_grid.glsl"
+
+layout(local_size_x = 128) in;
+layout(constant_id = 0) const uint kFeatures = 2;
+KERNEL_ARGUMENTS(HashGridForwardArguments)
+
+void main() {
+  const uint levelIndex = gl_WorkGroupID.y;
+  const LevelArguments level = arguments.values.levels[levelIndex];
+  FloatPointer table = arguments.values.table;
+  MatrixArguments encoded = arguments.values.encoded;
+
+  FOR_EACH(sampleIndex, countOf(arguments.values.samples)) {
+    const Cell cell = cellOf(positionOf(arguments.values.positions, sampleIndex), level);
+    float mixed[kFeatures];
+    for (uint f = 0; f < kFeatures; ++f) mixed[f] = 0;
+    for (uint corner = 0; corner < 8; ++corner) {
+      const float weight = cornerWeight(cell, corner);
+      const uint entry = cornerEntry(cell, corner, level) * kFeatures;
+      for (uint f = 0; f < kFeatures; ++f) mixed[f] += weight * table.values[entry + f];
+    }
+    for (uint f = 0; f < kFeatures; ++f) {
+      encoded.data.values[elementOf(encoded, sampleIndex, levelIndex * kFeatures + f)] = mixed[f];
+    }
+  }
+}

@@ -1,0 +1,36 @@
+// What every kernel starts with: pointers, the shared argument structs, and how to read them.
+// Defines: FloatPointer, UintPointer, KERNEL_ARGUMENTS(), WANTED(), FOR_EACH(), countOf(), elementOf().
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+
+layout(buffer_reference, std430, buffer_reference_align = 4) buffer FloatPointer { float values[]; };
+layout(buffer_reference, std430, buffer_reference_align = 4) buffer UintPointer { uint values[]; };
+#ifndef TESSERA_SUM_POINTER
+#define SumPointer FloatPointer
+#endif
+
+#include "arguments.h"
+
+// KERNEL_ARGUMENTS(T): the one push constant; `arguments.values` is the T.
+#define KERNEL_ARGUMENTS(type)                                                                            \
+  layout(buffer_reference, std430, buffer_reference_align = 16) buffer ArgumentsPointer { type values; }; \
+  layout(push_constant, std430) uniform Push { ArgumentsPointer arguments; };
+
+// Whether an optional pointer of any type was given.
+#define WANTED(pointer) any(notEqual(uvec2(pointer), uvec2(0)))
+
+// Every index below `count`, shared out among all invocations along x.
+#define FOR_EACH(index, count)                                     \
+  for (uint index = gl_GlobalInvocationID.x; index < (count);      \
+       index += gl_NumWorkGroups.x * gl_WorkGroupSize.x)
+
+uint countOf(CountArguments count) {
+  if (!WANTED(count.counter)) return count.capacity;
+  return min(count.counter.values[0], count.capacity);
+}
+
+// The index of an element of a matrix, in either layout.
+uint elementOf(MatrixArguments m, uint row, uint column) {
+  if (m.groupWidth == 0) return row * m.rowStride + column;
+  return column / m.groupWidth * m.groupStride + row * m.rowStride + column % m.groupWidth;
+}

@@ -1,0 +1,31 @@
+#include "compute/adam.h"
+
+#include "compute/vulkan/vulkan_device.h"
+#include "shaders/adam.h"
+
+namespace tessera {
+
+void VulkanDevice::run(const Adam& options) {
+  const size_t count = options.parameters.count;
+  CHECK(count < size_t{1} << 31);
+  CHECK(options.gradients.count == count);
+  CHECK(options.firstMoments.count == count);
+  CHECK(options.secondMoments.count == count);
+  CHECK(options.counts.count == count);
+  arguments::AdamArguments arguments = {};
+  arguments.parameters = deviceAddress(options.parameters);
+  arguments.gradients = deviceAddress(options.gradients);
+  arguments.firstMoments = deviceAddress(options.firstMoments);
+  arguments.secondMoments = deviceAddress(options.secondMoments);
+  arguments.counts = deviceAddress(options.counts);
+  arguments.count = static_cast<uint32_t>(count);
+  arguments.skipZeroGradients = options.skipZeroGradients;
+  arguments.rate = options.rate;
+  arguments.beta1 = options.beta1;
+  arguments.beta2 = options.beta2;
+  arguments.epsilon = options.epsilon;
+  arguments.l2 = options.l2;
+  queue(kernel(kAdamSpirv), arguments, {groups(count, 256)});
+}
+
+}  // namespace tessera

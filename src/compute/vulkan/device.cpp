@@ -1,0 +1,106 @@
+#include "compute/vulkan/device.h"
+
+#include <algorithm>
+
+#include "compute/vulkan/vulkan_device.h"
+
+namespace tessera {
+
+std::unique_ptr<Device> makeVulkanDevice() {
+  return makeVulkanDevice(GpuOptions());
+}
+
+std::unique_ptr<Device> makeVulkanDevice(const GpuOptions& options) {
+  return std::make_unique<VulkanDevice>(GpuContext::open(options));
+}
+
+VulkanMemory::VulkanMemory(std::shared_ptr<GpuStream> stream, size_t bytes)
+    : Memory(bytes), stream_(std::move(stream)), buffer_(stream_->context(), bytes) {
+  stream_->fillZero(buffer_, 0, (bytes + 3) / 4 * 4);
+}
+
+VulkanDevice::VulkanDevice(std::shared_ptr<const GpuContext> context)
+    : stream_(std::make_shared<GpuStream>(std::move(context))) {}
+
+std::string VulkanDevice::name() const {
+  return "vulkan " + stream_->context()->name();
+}
+std::string VulkanDevice::target() const {
+  return stream_->context()->target();
+}
+
+std::unique_ptr<Memory> VulkanDevice::allocate(size_t bytes) {
+  return std::make_unique<VulkanMemory>(stream_, bytes);
+}
+
+void VulkanDevice::writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) {
+  stream_->upload(static_cast<VulkanMemory&>(to).buffer(), offset, from);
+}
+
+void VulkanDevice::readBytes(const Memory& from, size_t offset, std::span<std::byte> to) {
+  stream_->download(static_cast<const VulkanMemory&>(from).buffer(), offset, to);
+}
+
+void VulkanDevice::fillZero(Memory& memory, size_t offset, size_t bytes) {
+  CHECK(offset + bytes <= memory.bytes());
+  stream_->fillZero(static_cast<VulkanMemory&>(memory).buffer(), offset, bytes);
+}
+
+void VulkanDevice::finish() {
+  stream_->finish();
+}
+
+bool VulkanDevice::supports(Operation operation) const {
+  switch (operation) {
+    case Operation::kHashGridForward:
+    case Operation::kHashGridBackward:
+    case Operation::kMlpForward:
+    case Operation::kMlpBackward:
+    case Operation::kAdam:
+      return true;
+    default:
+      return false;
+  }
+}
+
+const GpuKernel& VulkanDevice::kernel(std::span<const uint32_t> spirv, std::vector<uint32_t> constants) {
+  const auto key = std::make_pair(spirv.data(), std::move(constants));
+  const auto found = kernels_.find(key);
+  if (found != kernels_.end()) return found->second;
+  return kernels_.try_emplace(key, stream_->context(), spirv, key.second).first->second;
+}
+
+const GpuKernel& VulkanDevice::sumKernel(std::span<const uint32_t> withFloatAtomics, std::span<const uint32_t> without,
+                                         std::vector<uint32_t> constants) {
+  return kernel(stream_->context()->features().floatAtomics ? withFloatAtomics : without, std::move(constants));
+}
+
+uint32_t VulkanDevice::groups(size_t count, size_t perGroup) const {
+  const size_t most = stream_->context()->limits().maxComputeWorkGroupCount[0];
+  return static_cast<uint32_t>(std::min((count + perGroup - 1) / perGroup, most));
+}
+
+uint64_t VulkanDevice::scratch(size_t floats) {
+  const size_t bytes = floats * sizeof(float);
+  if (scratch_.bytes() < bytes) {
+    stream_->retire(std::move(scratch_));
+    scratch_ = GpuBuffer();
+    scratch_ = GpuBuffer(stream_->context(), bytes);
+  }
+  return scratch_.address();
+}
+
+arguments::CountArguments countArguments(const Count& count) {
+  return {deviceAddress(count.counter), count.capacity, 0};
+}
+
+arguments::MatrixArguments matrixArguments(const Matrix<const float>& matrix, size_t rows) {
+  if (!matrix) return {};
+  constexpr size_t kIndices = size_t{1} << 31;
+  CHECK(matrix.groupStride < kIndices);
+  if (rows > 0 && matrix.columns > 0) CHECK(matrix.offset(rows - 1, matrix.columns - 1) < kIndices);
+  return {deviceAddress(matrix.data), matrix.columns, matrix.rowStride, matrix.groupWidth,
+          static_cast<uint32_t>(matrix.groupStride)};
+}
+
+}  // namespace tessera

@@ -1,0 +1,62 @@
+#include "compute/hash_grid.h"
+
+#include "compute/vulkan/vulkan_device.h"
+#include "shaders/hash_grid_backward.h"
+#include "shaders/hash_grid_backward_float_atomics.h"
+#include "shaders/hash_grid_forward.h"
+#include "shaders/hash_grid_position_gradients.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr uint32_t kSamplesPerGroup = 128;  // local_size_x of the kernels
+
+void setLevels(const HashGrid& grid, arguments::LevelArguments* levels) {
+  CHECK(grid.levels.size() <= size_t{TESSERA_MAX_LEVELS});
+  CHECK(grid.parameters() < size_t{1} << 31);
+  for (size_t l = 0; l < grid.levels.size(); ++l) {
+    const HashGridLevel& level = grid.levels[l];
+    levels[l] = {
+        level.scale, level.resolution, level.entries, level.hashed, static_cast<uint32_t>(level.firstEntry), 0};
+  }
+}
+
+}  // namespace
+
+void VulkanDevice::run(const HashGridForward& options) {
+  const HashGrid& grid = options.grid;
+  CHECK(options.encoded.columns == grid.columns());
+  arguments::HashGridForwardArguments arguments = {};
+  arguments.samples = countArguments(options.samples);
+  arguments.positions = deviceAddress(options.positions);
+  arguments.table = deviceAddress(options.table);
+  arguments.encoded = matrixArguments(options.encoded, options.samples.capacity);
+  setLevels(grid, arguments.levels);
+  queue(kernel(kHashGridForwardSpirv, {static_cast<uint32_t>(grid.features)}), arguments,
+        {groups(options.samples.capacity, kSamplesPerGroup), static_cast<uint32_t>(grid.levels.size())});
+}
+
+void VulkanDevice::run(const HashGridBackward& options) {
+  const HashGrid& grid = options.grid;
+  CHECK(options.encodedGradients.columns == grid.columns());
+  arguments::HashGridBackwardArguments arguments = {};
+  arguments.samples = countArguments(options.samples);
+  arguments.positions = deviceAddress(options.positions);
+  arguments.table = deviceAddress(options.table);
+  arguments.tableGradients = deviceAddress(options.tableGradients);
+  arguments.positionGradients = deviceAddress(options.positionGradients);
+  arguments.encodedGradients = matrixArguments(options.encodedGradients, options.samples.capacity);
+  arguments.levelCount = static_cast<uint32_t>(grid.levels.size());
+  setLevels(grid, arguments.levels);
+
+  const std::vector<uint32_t> constants = {static_cast<uint32_t>(grid.features)};
+  const uint32_t sampleGroups = groups(options.samples.capacity, kSamplesPerGroup);
+  queue(sumKernel(kHashGridBackwardFloatAtomicsSpirv, kHashGridBackwardSpirv, constants), arguments,
+        {sampleGroups, arguments.levelCount});
+  if (options.positionGradients) {
+    queue(kernel(kHashGridPositionGradientsSpirv, constants), arguments, {sampleGroups});
+  }
+}
+
+}  // namespace tessera

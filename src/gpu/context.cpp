@@ -1,0 +1,152 @@
+#include "gpu/context.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <vector>
+
+#include "base/check.h"
+#include "base/error.h"
+#include "gpu/call.h"
+#include "gpu/physical_device.h"
+#include "gpu/validation.h"
+
+namespace tessera {
+
+namespace {
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value ? value : "";
+}
+
+}  // namespace
+
+std::shared_ptr<GpuContext> GpuContext::open(const GpuOptions& options) {
+  std::shared_ptr<GpuContext> context(new GpuContext);
+  context->createInstance(options.validation || environment("TESSERA_VULKAN_VALIDATION") == "1");
+  context->choosePhysicalDevice(options.device.empty() ? environment("TESSERA_GPU") : options.device);
+  context->chooseQueueFamily();
+  context->chooseFeatures(options.allowed);
+  context->createDevice();
+  return context;
+}
+
+GpuContext::~GpuContext() {
+  if (device_) {
+    vkDeviceWaitIdle(device_);
+    vkDestroyDevice(device_, nullptr);
+  }
+  if (messenger_) destroyValidationMessenger(instance_, messenger_);
+  if (instance_) vkDestroyInstance(instance_, nullptr);
+}
+
+void GpuContext::createInstance(bool validation) {
+  auto application = vulkanStruct<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
+  application.pApplicationName = "tessera";
+  application.apiVersion = VK_API_VERSION_1_2;
+
+  validation = validation && validationInstalled();
+  auto info = vulkanStruct<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
+  info.pApplicationInfo = &application;
+  if (validation) {
+    info.enabledLayerCount = 1;
+    info.ppEnabledLayerNames = &kValidationLayer;
+    info.enabledExtensionCount = 1;
+    info.ppEnabledExtensionNames = &kValidationExtension;
+  }
+  checkVulkan(vkCreateInstance(&info, nullptr, &instance_), "vkCreateInstance");
+  if (validation) messenger_ = createValidationMessenger(instance_);
+}
+
+void GpuContext::choosePhysicalDevice(const std::string& wanted) {
+  const std::vector<PhysicalDevice> devices = physicalDevices(instance_);
+  if (devices.empty()) checkVulkan(VK_ERROR_INCOMPATIBLE_DRIVER, "vkEnumeratePhysicalDevices");
+
+  const PhysicalDevice& chosen = tessera::choosePhysicalDevice(devices, wanted);
+  requireFeatures(chosen);
+  physicalDevice_ = chosen.handle;
+  limits_ = chosen.properties.limits;
+  name_ = fmt::format("{} ({})", chosen.properties.deviceName, chosen.driver);
+  target_ = fmt::format("vulkan/{}/{}", chosen.properties.deviceName, chosen.driver);
+  vkGetPhysicalDeviceMemoryProperties(physicalDevice_, &memory_);
+}
+
+void GpuContext::chooseQueueFamily() {
+  uint32_t count = 0;
+  vkGetPhysicalDeviceQueueFamilyProperties(physicalDevice_, &count, nullptr);
+  std::vector<VkQueueFamilyProperties> families(count);
+  vkGetPhysicalDeviceQueueFamilyProperties(physicalDevice_, &count, families.data());
+  for (VkQueueFlags flags : {VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT, 0 | VK_QUEUE_COMPUTE_BIT}) {
+    for (uint32_t i = 0; i < count; ++i) {
+      if ((families[i].queueFlags & flags) != flags) continue;
+      queueFamily_ = i;
+      return;
+    }
+  }
+  throw Error(name_, "", "it has no compute queue", "choose another device with TESSERA_GPU");
+}
+
+void GpuContext::chooseFeatures(const GpuFeatures& allowed) {
+  const GpuFeatures has = presentFeatures(physicalDevice_);
+  const std::string without = environment("TESSERA_GPU_WITHOUT");
+  const auto use = [&](bool present, bool allow, const char* feature) {
+    const bool used = present && allow && without.find(feature) == std::string::npos;
+    if (used) target_ += fmt::format("+{}", feature);
+    return used;
+  };
+  features_.floatAtomics = use(has.floatAtomics, allowed.floatAtomics, "floatAtomics");
+  features_.float16 = use(has.float16, allowed.float16, "float16");
+  features_.subgroups = use(has.subgroups, allowed.subgroups, "subgroups");
+}
+
+void GpuContext::createDevice() {
+  const float priority = 1;
+  auto queue = vulkanStruct<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
+  queue.queueFamilyIndex = queueFamily_;
+  queue.queueCount = 1;
+  queue.pQueuePriorities = &priority;
+
+  auto atomics = vulkanStruct<VkPhysicalDeviceShaderAtomicFloatFeaturesEXT>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SHADER_ATOMIC_FLOAT_FEATURES_EXT);
+  atomics.shaderBufferFloat32AtomicAdd = VK_TRUE;
+  auto vulkan12 = vulkanStruct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
+  vulkan12.bufferDeviceAddress = VK_TRUE;
+  vulkan12.shaderFloat16 = features_.float16;
+  auto vulkan11 = vulkanStruct<VkPhysicalDeviceVulkan11Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES);
+  vulkan11.storageBuffer16BitAccess = features_.float16;
+  auto features = vulkanStruct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
+  features.pNext = &vulkan11;
+  vulkan11.pNext = &vulkan12;
+
+  const char* atomicsExtension = VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME;
+  auto info = vulkanStruct<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO);
+  info.pNext = &features;
+  info.queueCreateInfoCount = 1;
+  info.pQueueCreateInfos = &queue;
+  if (features_.floatAtomics) {
+    vulkan12.pNext = &atomics;
+    info.enabledExtensionCount = 1;
+    info.ppEnabledExtensionNames = &atomicsExtension;
+  }
+  checkVulkan(vkCreateDevice(physicalDevice_, &info, nullptr, &device_), "vkCreateDevice");
+  vkGetDeviceQueue(device_, queueFamily_, 0, &queue_);
+}
+
+uint32_t GpuContext::memoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted,
+                                VkMemoryPropertyFlags preferred) const {
+  for (VkMemoryPropertyFlags flags : {wanted | preferred, wanted}) {
+    for (uint32_t i = 0; i < memory_.memoryTypeCount; ++i) {
+      const bool allowed = (typeBits >> i & 1) != 0;
+      if (allowed && (memory_.memoryTypes[i].propertyFlags & flags) == flags) return i;
+    }
+  }
+  throw Error(name_, "", "it has no memory of the kind we need", "update the graphics driver");
+}
+
+int GpuContext::validationErrors() {
+  return validationErrorCount();
+}
+
+}  // namespace tessera

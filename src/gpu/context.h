@@ -1,0 +1,77 @@
+// The one door to Vulkan: instance, physical device, logical device and one queue, shared by compute and render.
+// Needs Vulkan 1.2 with buffer device addresses; everything beyond is a feature that has a fallback.
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+namespace tessera {
+
+// What kernels may use where the device has it. As part of GpuOptions: what they may use at all, so that tests force
+// the fallbacks.
+struct GpuFeatures {
+  bool floatAtomics =
+      true;               // 32-bit float atomic add on buffers (VK_EXT_shader_atomic_float); else a compare-swap loop
+  bool float16 = true;    // fp16 arithmetic and 16-bit storage; else fp32
+  bool subgroups = true;  // subgroup arithmetic in compute; else shared memory
+};
+
+struct GpuOptions {
+  // A part of the device's name, any case, or its index. Empty: the environment's TESSERA_GPU, else the best there is
+  // (discrete, integrated, virtual, processor).
+  std::string device;
+  // Masked further by the environment's TESSERA_GPU_WITHOUT, a list of floatAtomics,float16,subgroups.
+  GpuFeatures allowed;
+  // Validation layers, if installed. The environment's TESSERA_VULKAN_VALIDATION=1 turns them on too.
+  bool validation = false;
+};
+
+class GpuContext {
+ public:
+  // Throws Error when there is no driver, no such device, or the device lacks what we need.
+  static std::shared_ptr<GpuContext> open(const GpuOptions& options = {});
+  ~GpuContext();
+  GpuContext(const GpuContext&) = delete;
+  GpuContext& operator=(const GpuContext&) = delete;
+
+  const std::string& name() const { return name_; }      // "NVIDIA GeForce RTX 3060 (driver 535.183)"
+  const std::string& target() const { return target_; }  // what bits depend on: driver, device, features in use
+  const GpuFeatures& features() const { return features_; }
+  const VkPhysicalDeviceLimits& limits() const { return limits_; }
+
+  VkInstance instance() const { return instance_; }
+  VkPhysicalDevice physicalDevice() const { return physicalDevice_; }
+  VkDevice device() const { return device_; }
+  VkQueue queue() const { return queue_; }  // compute and transfer, and graphics where the device draws at all
+  uint32_t queueFamily() const { return queueFamily_; }
+
+  // The first memory type among `typeBits` that has all `wanted` properties, those with `preferred` first.
+  uint32_t memoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted, VkMemoryPropertyFlags preferred) const;
+
+  // Mistakes that the validation layers reported so far in this process.
+  static int validationErrors();
+
+ private:
+  GpuContext() = default;
+  void createInstance(bool validation);
+  void choosePhysicalDevice(const std::string& wanted);
+  void chooseQueueFamily();
+  void chooseFeatures(const GpuFeatures& allowed);
+  void createDevice();
+
+  VkInstance instance_ = VK_NULL_HANDLE;
+  VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
+  VkPhysicalDevice physicalDevice_ = VK_NULL_HANDLE;
+  VkDevice device_ = VK_NULL_HANDLE;
+  VkQueue queue_ = VK_NULL_HANDLE;
+  uint32_t queueFamily_ = 0;
+  VkPhysicalDeviceLimits limits_ = {};
+  VkPhysicalDeviceMemoryProperties memory_ = {};
+  GpuFeatures features_;
+  std::string name_, target_;
+};
+
+}  // namespace tessera

@@ -1,0 +1,118 @@
+#include "gpu/context.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <optional>
+
+#include "gpu/physical_device.h"
+#include "gpu/test_context.h"
+
+namespace tessera {
+namespace {
+
+// Sets an environment variable for as long as it lives.
+class Environment {
+ public:
+  Environment(const char* name, const char* value) : name_(name) {
+    if (const char* before = std::getenv(name)) before_ = before;
+    setenv(name, value, 1);
+  }
+  ~Environment() { before_ ? setenv(name_, before_->c_str(), 1) : unsetenv(name_); }
+
+ private:
+  const char* name_;
+  std::optional<std::string> before_;
+};
+
+PhysicalDevice device(const char* name, VkPhysicalDeviceType type) {
+  PhysicalDevice made;
+  std::snprintf(made.properties.deviceName, sizeof made.properties.deviceName, "%s", name);
+  made.properties.deviceType = type;
+  made.properties.apiVersion = VK_API_VERSION_1_2;
+  return made;
+}
+
+const std::vector<PhysicalDevice> kDevices = {device("llvmpipe", VK_PHYSICAL_DEVICE_TYPE_CPU),
+                                              device("Intel Arc", VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU),
+                                              device("NVIDIA RTX", VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU),
+                                              device("AMD Radeon", VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU)};
+
+std::string nameOf(const PhysicalDevice& chosen) {
+  return chosen.properties.deviceName;
+}
+
+TEST(PhysicalDevice, IsTheFirstDiscreteOneWhenNobodyAsks) {
+  EXPECT_EQ(nameOf(choosePhysicalDevice(kDevices, "")), "NVIDIA RTX");
+}
+
+TEST(PhysicalDevice, FallsBackToTheProcessor) {
+  EXPECT_EQ(nameOf(choosePhysicalDevice({kDevices[0]}, "")), "llvmpipe");
+}
+
+TEST(PhysicalDevice, IsFoundByPartOfItsNameOrItsIndex) {
+  EXPECT_EQ(nameOf(choosePhysicalDevice(kDevices, "radeon")), "AMD Radeon");
+  EXPECT_EQ(nameOf(choosePhysicalDevice(kDevices, "1")), "Intel Arc");
+}
+
+TEST(PhysicalDevice, ThatIsNotThereIsAnErrorThatListsThoseThatAre) {
+  try {
+    choosePhysicalDevice(kDevices, "voodoo");
+    FAIL() << "nothing was thrown";
+  } catch (const Error& error) {
+    EXPECT_NE(error.remedy().find("0 llvmpipe, 1 Intel Arc"), std::string::npos) << error.what();
+  }
+}
+
+TEST(PhysicalDevice, WithAnOldDriverIsRefused) {
+  PhysicalDevice old = kDevices[2];
+  old.properties.apiVersion = VK_API_VERSION_1_1;
+  EXPECT_THROW(requireFeatures(old), Error);
+}
+
+TEST(GpuContext, OpensTheBestDevice) {
+  const auto context = openForTest();
+  SKIP_WITHOUT_VULKAN(context);
+  EXPECT_NE(context->device(), VkDevice(VK_NULL_HANDLE));
+  EXPECT_FALSE(context->name().empty());
+  EXPECT_EQ(context->target().rfind("vulkan/", 0), 0u) << context->target();
+}
+
+TEST(GpuContext, LeavesOutFeaturesThatAreNotAllowed) {
+  GpuOptions options;
+  options.allowed = {.floatAtomics = false, .float16 = false, .subgroups = false};
+  const auto context = openForTest(options);
+  SKIP_WITHOUT_VULKAN(context);
+  EXPECT_FALSE(context->features().floatAtomics);
+  EXPECT_FALSE(context->features().float16);
+  EXPECT_FALSE(context->features().subgroups);
+}
+
+TEST(GpuContext, LeavesOutFeaturesThatTheEnvironmentForbids) {
+  const Environment without("TESSERA_GPU_WITHOUT", "floatAtomics");
+  const auto context = openForTest();
+  SKIP_WITHOUT_VULKAN(context);
+  EXPECT_FALSE(context->features().floatAtomics);
+}
+
+TEST(GpuContext, SaysWhatToInstallWithoutADriver) {
+  const Environment oldName("VK_ICD_FILENAMES", "/nonexistent/driver.json");
+  const Environment newName("VK_DRIVER_FILES", "/nonexistent/driver.json");
+  try {
+    GpuContext::open();
+    FAIL() << "nothing was thrown";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.reason(), "no Vulkan driver is installed");
+    EXPECT_NE(error.remedy().find("mesa-vulkan-drivers"), std::string::npos);
+  }
+}
+
+TEST(GpuContext, RefusesADeviceThatIsNotThere) {
+  SKIP_WITHOUT_VULKAN(openForTest());
+  GpuOptions options;
+  options.device = "no such card";
+  EXPECT_THROW(GpuContext::open(options), Error);
+}
+
+}  // namespace
+}  // namespace tessera

@@ -1,0 +1,53 @@
+#include "gpu/kernel.h"
+
+#include <vector>
+
+#include "gpu/call.h"
+
+namespace tessera {
+
+GpuKernel::GpuKernel(std::shared_ptr<const GpuContext> context, std::span<const uint32_t> spirv,
+                     std::span<const uint32_t> constants)
+    : context_(std::move(context)) {
+  const VkDevice device = context_->device();
+
+  VkPushConstantRange range = {VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(VkDeviceAddress)};
+  auto layoutInfo = vulkanStruct<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
+  layoutInfo.pushConstantRangeCount = 1;
+  layoutInfo.pPushConstantRanges = &range;
+  checkVulkan(vkCreatePipelineLayout(device, &layoutInfo, nullptr, &layout_), "vkCreatePipelineLayout");
+
+  std::vector<VkSpecializationMapEntry> entries;
+  for (uint32_t i = 0; i < constants.size(); ++i) entries.push_back({i, i * 4, 4});
+  VkSpecializationInfo specialization = {};
+  specialization.mapEntryCount = static_cast<uint32_t>(entries.size());
+  specialization.pMapEntries = entries.data();
+  specialization.dataSize = constants.size_bytes();
+  specialization.pData = constants.data();
+
+  auto moduleInfo = vulkanStruct<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
+  moduleInfo.codeSize = spirv.size_bytes();
+  moduleInfo.pCode = spirv.data();
+  VkShaderModule module = VK_NULL_HANDLE;
+  VkResult result = vkCreateShaderModule(device, &moduleInfo, nullptr, &module);
+  if (result == VK_SUCCESS) {
+    auto info = vulkanStruct<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
+    info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+    info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+    info.stage.module = module;
+    info.stage.pName = "main";
+    info.stage.pSpecializationInfo = constants.empty() ? nullptr : &specialization;
+    info.layout = layout_;
+    result = vkCreateComputePipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline_);
+    vkDestroyShaderModule(device, module, nullptr);
+  }
+  if (result != VK_SUCCESS) vkDestroyPipelineLayout(device, layout_, nullptr);
+  checkVulkan(result, "vkCreateComputePipelines");
+}
+
+GpuKernel::~GpuKernel() {
+  vkDestroyPipeline(context_->device(), pipeline_, nullptr);
+  vkDestroyPipelineLayout(context_->device(), layout_, nullptr);
+}
+
+}  // namespace tessera

@@ -1,0 +1,32 @@
+// A compute shader ready to run. Every kernel takes the same thing: one push constant, the address of its arguments.
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "gpu/context.h"
+
+namespace tessera {
+
+class GpuKernel {
+ public:
+  // `constants` are the values of the shader's specialization constants 0, 1, 2, ...
+  GpuKernel(std::shared_ptr<const GpuContext> context, std::span<const uint32_t> spirv,
+            std::span<const uint32_t> constants = {});
+  ~GpuKernel();
+  GpuKernel(const GpuKernel&) = delete;
+  GpuKernel& operator=(const GpuKernel&) = delete;
+
+  VkPipeline pipeline() const { return pipeline_; }
+  VkPipelineLayout layout() const { return layout_; }
+
+ private:
+  std::shared_ptr<const GpuContext> context_;
+  VkPipelineLayout layout_ = VK_NULL_HANDLE;
+  VkPipeline pipeline_ = VK_NULL_HANDLE;
+};
+
+}  // namespace tessera

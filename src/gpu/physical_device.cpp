@@ -1,0 +1,127 @@
+#include "gpu/physical_device.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstring>
+
+#include "base/check.h"
+#include "base/error.h"
+#include "gpu/call.h"
+
+namespace tessera {
+
+namespace {
+
+std::string lowerCase(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+int rank(VkPhysicalDeviceType type) {
+  switch (type) {
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+      return 4;
+    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+      return 3;
+    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+      return 2;
+    case VK_PHYSICAL_DEVICE_TYPE_CPU:
+      return 1;
+    default:
+      return 0;
+  }
+}
+
+bool hasExtension(VkPhysicalDevice device, const char* name) {
+  uint32_t count = 0;
+  checkVulkan(vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr),
+              "vkEnumerateDeviceExtensionProperties");
+  std::vector<VkExtensionProperties> extensions(count);
+  checkVulkan(vkEnumerateDeviceExtensionProperties(device, nullptr, &count, extensions.data()),
+              "vkEnumerateDeviceExtensionProperties");
+  return std::any_of(extensions.begin(), extensions.end(),
+                     [&](const VkExtensionProperties& e) { return std::strcmp(e.extensionName, name) == 0; });
+}
+
+}  // namespace
+
+std::vector<PhysicalDevice> physicalDevices(VkInstance instance) {
+  uint32_t count = 0;
+  checkVulkan(vkEnumeratePhysicalDevices(instance, &count, nullptr), "vkEnumeratePhysicalDevices");
+  std::vector<VkPhysicalDevice> handles(count);
+  checkVulkan(vkEnumeratePhysicalDevices(instance, &count, handles.data()), "vkEnumeratePhysicalDevices");
+  std::vector<PhysicalDevice> devices;
+  for (VkPhysicalDevice handle : handles) {
+    PhysicalDevice& device = devices.emplace_back();
+    device.handle = handle;
+    vkGetPhysicalDeviceProperties(handle, &device.properties);
+    device.driver = fmt::format("driver {:#x}", device.properties.driverVersion);
+    if (device.properties.apiVersion < VK_API_VERSION_1_2) continue;
+    auto driver = vulkanStruct<VkPhysicalDeviceDriverProperties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES);
+    auto properties = vulkanStruct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
+    properties.pNext = &driver;
+    vkGetPhysicalDeviceProperties2(handle, &properties);
+    device.driver = fmt::format("{} {}", driver.driverName, driver.driverInfo);
+  }
+  return devices;
+}
+
+const PhysicalDevice& choosePhysicalDevice(const std::vector<PhysicalDevice>& devices, const std::string& wanted) {
+  CHECK(!devices.empty());
+  if (wanted.empty()) {
+    return *std::max_element(devices.begin(), devices.end(), [](const PhysicalDevice& a, const PhysicalDevice& b) {
+      return rank(a.properties.deviceType) < rank(b.properties.deviceType);
+    });
+  }
+  std::string list;
+  for (size_t i = 0; i < devices.size(); ++i) {
+    const std::string name = devices[i].properties.deviceName;
+    if (std::to_string(i) == wanted) return devices[i];
+    if (lowerCase(name).find(lowerCase(wanted)) != std::string::npos) return devices[i];
+    list += fmt::format("{}{} {}", i ? ", " : "", i, name);
+  }
+  throw Error("Vulkan device \"" + wanted + "\"", "", "there is no such device", "choose one of: " + list);
+}
+
+void requireFeatures(const PhysicalDevice& device) {
+  const std::string remedy = "update the graphics driver, choose another device with TESSERA_GPU, or use --device cpu";
+  if (device.properties.apiVersion < VK_API_VERSION_1_2) {
+    throw Error(device.properties.deviceName, "", "its driver has no Vulkan 1.2", remedy);
+  }
+  auto vulkan12 = vulkanStruct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
+  auto features = vulkanStruct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
+  features.pNext = &vulkan12;
+  vkGetPhysicalDeviceFeatures2(device.handle, &features);
+  if (!vulkan12.bufferDeviceAddress) {
+    throw Error(device.properties.deviceName, "", "its driver has no buffer device addresses", remedy);
+  }
+}
+
+GpuFeatures presentFeatures(VkPhysicalDevice device) {
+  auto atomics = vulkanStruct<VkPhysicalDeviceShaderAtomicFloatFeaturesEXT>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SHADER_ATOMIC_FLOAT_FEATURES_EXT);
+  auto vulkan12 = vulkanStruct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
+  auto vulkan11 = vulkanStruct<VkPhysicalDeviceVulkan11Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES);
+  auto features = vulkanStruct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
+  features.pNext = &vulkan11;
+  vulkan11.pNext = &vulkan12;
+  if (hasExtension(device, VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME)) vulkan12.pNext = &atomics;
+  vkGetPhysicalDeviceFeatures2(device, &features);
+
+  auto subgroup =
+      vulkanStruct<VkPhysicalDeviceSubgroupProperties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES);
+  auto properties = vulkanStruct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
+  properties.pNext = &subgroup;
+  vkGetPhysicalDeviceProperties2(device, &properties);
+
+  GpuFeatures present;
+  present.floatAtomics = atomics.shaderBufferFloat32AtomicAdd;
+  present.float16 = vulkan12.shaderFloat16 && vulkan11.storageBuffer16BitAccess;
+  present.subgroups = (subgroup.supportedStages & VK_SHADER_STAGE_COMPUTE_BIT) &&
+                      (subgroup.supportedOperations & VK_SUBGROUP_FEATURE_ARITHMETIC_BIT);
+  return present;
+}
+
+}  // namespace tessera

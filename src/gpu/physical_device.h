@@ -1,0 +1,31 @@
+// Which of a machine's devices to use, and what it can do.
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include <string>
+#include <vector>
+
+#include "gpu/context.h"
+
+namespace tessera {
+
+struct PhysicalDevice {
+  VkPhysicalDevice handle = VK_NULL_HANDLE;
+  VkPhysicalDeviceProperties properties = {};
+  std::string driver;  // "llvmpipe Mesa 22.3.6 (LLVM 15.0.6)"
+};
+
+std::vector<PhysicalDevice> physicalDevices(VkInstance instance);
+
+// `wanted` is a part of a name, any case, or an index; empty takes the best kind there is. Throws Error that lists the
+// devices when none fits. `devices` must not be empty.
+const PhysicalDevice& choosePhysicalDevice(const std::vector<PhysicalDevice>& devices, const std::string& wanted);
+
+// Throws Error when the device has no Vulkan 1.2 or no buffer device addresses.
+void requireFeatures(const PhysicalDevice& device);
+
+// What the device has of the features that have a fallback. Vulkan 1.2 only.
+GpuFeatures presentFeatures(VkPhysicalDevice device);
+
+}  // namespace tessera

@@ -1,0 +1,132 @@
+#include "gpu/stream.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "gpu/test_context.h"
+#include "shaders/double_values.h"
+
+namespace tessera {
+namespace {
+
+struct Arguments {
+  uint64_t values;
+  uint32_t count;
+  uint32_t unused = 0;
+};
+
+std::vector<uint32_t> numbers(size_t count) {
+  std::vector<uint32_t> values(count);
+  std::iota(values.begin(), values.end(), 1u);
+  return values;
+}
+
+std::vector<uint32_t> downloaded(GpuStream& stream, const GpuBuffer& buffer) {
+  std::vector<uint32_t> values(buffer.bytes() / 4);
+  stream.download(buffer, 0, std::as_writable_bytes(std::span(values)));
+  return values;
+}
+
+void runDouble(GpuStream& stream, const GpuKernel& kernel, const GpuBuffer& buffer) {
+  const Arguments arguments = {buffer.address(), static_cast<uint32_t>(buffer.bytes() / 4)};
+  stream.run(kernel, std::as_bytes(std::span(&arguments, 1)), {(arguments.count + 63) / 64});
+}
+
+class GpuStreamTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    context_ = openForTest();
+    SKIP_WITHOUT_VULKAN(context_);
+  }
+  void TearDown() override { EXPECT_EQ(GpuContext::validationErrors(), 0); }
+
+  std::shared_ptr<GpuContext> context_;
+};
+
+TEST_F(GpuStreamTest, BringsBackWhatItUploaded) {
+  GpuStream stream(context_);
+  const GpuBuffer buffer(context_, 4000);
+  const auto values = numbers(1000);
+  stream.upload(buffer, 0, std::as_bytes(std::span(values)));
+  EXPECT_EQ(downloaded(stream, buffer), values);
+}
+
+TEST_F(GpuStreamTest, CarriesMoreThanItsStagingHolds) {
+  GpuStream stream(context_, 256);
+  const GpuBuffer buffer(context_, 4000);
+  const auto values = numbers(1000);
+  stream.upload(buffer, 0, std::as_bytes(std::span(values)));
+  EXPECT_EQ(downloaded(stream, buffer), values);
+}
+
+TEST_F(GpuStreamTest, WritesReadsAndClearsPartsOnly) {
+  GpuStream stream(context_);
+  const GpuBuffer buffer(context_, 40);
+  auto expected = numbers(10);
+  stream.upload(buffer, 0, std::as_bytes(std::span(expected)));
+  const uint32_t seven = 77;
+  stream.upload(buffer, 8, std::as_bytes(std::span(&seven, 1)));
+  stream.fillZero(buffer, 20, 8);
+  expected[2] = 77;
+  expected[5] = expected[6] = 0;
+  EXPECT_EQ(downloaded(stream, buffer), expected);
+  uint32_t part = 0;
+  stream.download(buffer, 8, std::as_writable_bytes(std::span(&part, 1)));
+  EXPECT_EQ(part, 77u);
+}
+
+TEST_F(GpuStreamTest, KernelsSeeTheResultsOfThoseBeforeThem) {
+  // Not commutative: 2(2x + 1) and 2(2x) + 1 differ, so any missing order shows. Over 128 commands span batches.
+  GpuStream stream(context_);
+  const GpuKernel doubles(context_, kDoubleValuesSpirv);
+  const uint32_t one = 1;
+  const GpuKernel doublesAndAddsOne(context_, kDoubleValuesSpirv, std::span(&one, 1));
+  const GpuBuffer buffer(context_, 40000);
+  auto expected = numbers(10000);
+  stream.upload(buffer, 0, std::as_bytes(std::span(expected)));
+  for (int i = 0; i < 300; ++i) {
+    runDouble(stream, i % 3 == 0 ? doublesAndAddsOne : doubles, buffer);
+    for (uint32_t& value : expected) value = 2 * value + (i % 3 == 0);
+    if (i == 150) stream.fillZero(buffer, 0, 400);
+    if (i == 150) std::fill_n(expected.begin(), 100, 0u);
+  }
+  EXPECT_EQ(downloaded(stream, buffer), expected);
+}
+
+TEST_F(GpuStreamTest, ArgumentsOutliveTheCall) {
+  GpuStream stream(context_, 64);  // room for one set of arguments: each run starts a batch
+  const GpuKernel kernel(context_, kDoubleValuesSpirv);
+  const GpuBuffer a(context_, 256), b(context_, 256);
+  const auto values = numbers(64);
+  stream.upload(a, 0, std::as_bytes(std::span(values)));
+  stream.upload(b, 0, std::as_bytes(std::span(values)));
+  for (int i = 0; i < 5; ++i) runDouble(stream, kernel, i % 2 ? a : b);
+  EXPECT_EQ(downloaded(stream, a)[2], 3u << 2);
+  EXPECT_EQ(downloaded(stream, b)[2], 3u << 3);
+}
+
+TEST_F(GpuStreamTest, KeepsARetiredBufferUntilTheWorkOnItIsDone) {
+  GpuStream stream(context_);
+  const GpuKernel kernel(context_, kDoubleValuesSpirv);
+  for (int i = 0; i < 200; ++i) {
+    GpuBuffer buffer(context_, 4096);
+    stream.fillZero(buffer, 0, 4096);
+    runDouble(stream, kernel, buffer);
+    stream.retire(std::move(buffer));
+  }
+  EXPECT_NO_THROW(stream.finish());
+}
+
+TEST_F(GpuStreamTest, FinishesWhenThereIsNothingToDo) {
+  GpuStream stream(context_);
+  stream.finish();
+  stream.finish();
+}
+
+TEST_F(GpuStreamTest, MemoryThatNoDeviceHasIsAnError) {
+  EXPECT_THROW(GpuBuffer(context_, size_t{1} << 50), Error);
+}
+
+}  // namespace
+}  // namespace tessera

@@ -1,0 +1,33 @@
+// For tests: a context, or a skip by name where the machine has no Vulkan driver at all. With TESSERA_REQUIRE_VULKAN=1
+// in the environment (CI) that is a failure instead.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <string>
+
+#include "base/error.h"
+#include "gpu/context.h"
+
+namespace tessera {
+
+inline bool vulkanIsRequired() {
+  const char* value = std::getenv("TESSERA_REQUIRE_VULKAN");
+  return value != nullptr && std::string(value) == "1";
+}
+
+// Null where there is no driver. Any other failure is thrown.
+inline std::shared_ptr<GpuContext> openForTest(const GpuOptions& options = {}) {
+  try {
+    return GpuContext::open(options);
+  } catch (const Error& error) {
+    if (vulkanIsRequired() || error.reason() != "no Vulkan driver is installed") throw;
+    return nullptr;
+  }
+}
+
+#define SKIP_WITHOUT_VULKAN(context) \
+  if (!(context)) GTEST_SKIP() << "no Vulkan driver is installed (mesa-vulkan-drivers has one for the processor)"
+
+}  // namespace tessera
