@@ -1,0 +1,12 @@
+// Reads what scene/capture_writer.h wrote, exactly.
+#pragma once
+
+#include "base/file.h"
+#include "scene/capture.h"
+
+namespace tessera {
+
+// Throws Error when the folder is no capture of ours (a source is imported first), or when a photo is missing.
+Capture readCapture(const fs::path& folder);
+
+}  // namespace tessera

@@ -1,0 +1,145 @@
+#include "import/clean.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <numeric>
+#include <set>
+
+#include "base/file.h"
+#include "base/image_io.h"
+#include "base/log.h"
+
+namespace tessera {
+namespace {
+
+// EXIF, XMP and the size stand before the picture itself, thumbnails included, in well under this.
+constexpr size_t kHeadBytes = size_t{1} << 20;
+
+Bytes readHead(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  Bytes head(kHeadBytes);
+  in.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<size_t>(std::max<std::streamsize>(in.gcount(), 0)));
+  return head;
+}
+
+PhotoFacts factsOf(const Photo& photo) {
+  PhotoFacts facts;
+  const Bytes head = readHead(photo.image);
+  const auto info = probeImage(head);
+  if (!info || info->format == ImageInfo::Format::exr) return facts;
+  facts.width = info->width;
+  facts.height = info->height;
+  facts.tags = decodePhotoTags(head);
+  return facts;
+}
+
+// A picture made smaller or larger keeps its shape to within the rounding of one pixel on each side.
+bool sameShape(const Camera& camera, int width, int height) {
+  const double scale = static_cast<double>(width) / camera.width;
+  return std::abs(camera.height * scale - height) <= 1 + scale;
+}
+
+}  // namespace
+
+void warnDropped(const std::vector<std::string>& names, const std::string& what) {
+  if (names.empty()) return;
+  std::string first;
+  for (size_t i = 0; i < names.size() && i < 3; ++i) first += (i > 0 ? ", " : "") + names[i];
+  warn("{} photo{} {}; dropped ({}{})", names.size(), names.size() > 1 ? "s" : "", what, first,
+       names.size() > 3 ? ", ..." : "");
+}
+
+void keepPhotos(SourceCapture& source, const std::vector<size_t>& order) {
+  Capture& capture = source.capture;
+  std::vector<Photo> photos;
+  std::vector<bool> inverted;
+  std::vector<int> newIndex(capture.photos.size(), -1);
+  std::vector<int> newCamera(capture.cameras.size(), -1);
+  std::vector<Camera> cameras;
+  for (const size_t old : order) {
+    newIndex[old] = static_cast<int>(photos.size());
+    photos.push_back(std::move(capture.photos[old]));
+    inverted.push_back(old < source.maskIsInverted.size() && source.maskIsInverted[old]);
+    auto& camera = newCamera[static_cast<size_t>(photos.back().camera)];
+    if (camera < 0) {
+      camera = static_cast<int>(cameras.size());
+      cameras.push_back(capture.cameras[static_cast<size_t>(photos.back().camera)]);
+    }
+    photos.back().camera = camera;
+  }
+  capture.photos = std::move(photos);
+  capture.cameras = std::move(cameras);
+  source.maskIsInverted = std::move(inverted);
+  std::vector<Observation> observations;
+  for (Observation observation : capture.observations) {
+    const int photo = newIndex[observation.photo];
+    if (photo < 0) continue;
+    observation.photo = static_cast<uint32_t>(photo);
+    observations.push_back(observation);
+  }
+  std::stable_sort(observations.begin(), observations.end(),
+                   [](const Observation& a, const Observation& b) { return a.photo < b.photo; });
+  capture.observations = std::move(observations);
+}
+
+std::vector<PhotoFacts> cleanSource(SourceCapture& source, ThreadPool& pool) {
+  Capture& capture = source.capture;
+  std::vector<PhotoFacts> facts(capture.photos.size());
+  pool.run(facts.size(), [&](size_t i, int) { facts[i] = factsOf(capture.photos[i]); });
+
+  std::vector<std::string> missing, unreadable, repeated, misshapen;
+  std::set<fs::path> seen;
+  std::vector<size_t> order;
+  size_t rescaled = 0;
+  for (size_t i = 0; i < facts.size(); ++i) {
+    Photo& photo = capture.photos[i];
+    std::error_code status;
+    if (!fs::is_regular_file(photo.image, status)) {
+      missing.push_back(photo.name);
+    } else if (facts[i].width <= 0 || photo.camera >= static_cast<int>(capture.cameras.size())) {
+      unreadable.push_back(photo.name);
+    } else if (!seen.insert(photo.image).second) {
+      repeated.push_back(photo.name);
+    } else {
+      const Camera camera = capture.cameras[static_cast<size_t>(photo.camera)];
+      if (camera.width != facts[i].width || camera.height != facts[i].height) {
+        if (!sameShape(camera, facts[i].width, facts[i].height)) {
+          misshapen.push_back(fmt::format("{} is {}x{}, its camera {}x{}", photo.name, facts[i].width, facts[i].height,
+                                          camera.width, camera.height));
+          continue;
+        }
+        ++rescaled;
+        const Camera scaled = camera.scaledTo(facts[i].width, facts[i].height);
+        for (Observation& observation : capture.observations) {
+          if (observation.photo != i) continue;
+          observation.x *= static_cast<float>(facts[i].width) / static_cast<float>(camera.width);
+          observation.y *= static_cast<float>(facts[i].height) / static_cast<float>(camera.height);
+          observation.error *= static_cast<float>(facts[i].width) / static_cast<float>(camera.width);
+        }
+        const auto found = std::find(capture.cameras.begin(), capture.cameras.end(), scaled);
+        photo.camera = static_cast<int>(found - capture.cameras.begin());
+        if (found == capture.cameras.end()) capture.cameras.push_back(scaled);
+      }
+      if (!photo.gps) photo.gps = facts[i].tags.gps;
+      order.push_back(i);
+    }
+  }
+  warnDropped(missing, "named by the source are not on disk");
+  warnDropped(unreadable, "cannot be read as JPEG or PNG");
+  warnDropped(repeated, "are named more than once");
+  warnDropped(misshapen, "have another shape than their camera");
+  if (rescaled > 0) warn("{} photos have another size than their camera; lenses scaled to fit", rescaled);
+
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return naturalLess(capture.photos[a].name, capture.photos[b].name); });
+  std::vector<PhotoFacts> kept;
+  for (const size_t i : order) kept.push_back(facts[i]);
+  keepPhotos(source, order);
+  return kept;
+}
+
+}  // namespace tessera

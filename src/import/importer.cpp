@@ -1,0 +1,261 @@
+#include "import/importer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <mutex>
+#include <set>
+
+#include "base/error.h"
+#include "base/log.h"
+#include "base/progress.h"
+#include "import/clean.h"
+#include "import/colmap_model.h"
+#include "import/holdout.h"
+#include "import/orient.h"
+#include "import/photo_files.h"
+#include "import/transforms_json.h"
+#include "scene/capture_writer.h"
+
+namespace tessera {
+namespace {
+
+bool isPhotoName(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".jpg" || extension == ".jpeg" || extension == ".png";
+}
+
+size_t countPhotos(const fs::path& folder) {
+  std::error_code status;
+  size_t count = 0;
+  for (const auto& entry : fs::directory_iterator(folder, status)) count += isPhotoName(entry.path());
+  return count;
+}
+
+[[noreturn]] void refuse(const fs::path& source) {
+  std::error_code status;
+  if (!fs::exists(source, status)) throw Error(source.string(), "", "does not exist", "name a folder of posed photos");
+  const fs::path images = fs::is_directory(source / "images", status) ? source / "images" : source;
+  if (const size_t photos = countPhotos(images); photos > 0) {
+    const std::string s = source.string(), i = images.string();
+    throw Error(
+        source.string(), "", fmt::format("holds {} photos but says nowhere from where they were taken", photos),
+        fmt::format("find their poses with COLMAP, then import again:\n"
+                    "  colmap feature_extractor --database_path {0}/database.db --image_path {1} "
+                    "--ImageReader.camera_model OPENCV --ImageReader.single_camera 1 "
+                    "--SiftExtraction.use_gpu 0\n"
+                    "  colmap exhaustive_matcher --database_path {0}/database.db --SiftMatching.use_gpu 0\n"
+                    "  mkdir -p {0}/sparse\n"
+                    "  colmap mapper --database_path {0}/database.db --image_path {1} --output_path {0}/sparse\n"
+                    "  tessera import {0} OUT",
+                    s, i));
+  }
+  throw Error(source.string(), "", "is neither a COLMAP model (sparse/0 and images) nor has it a transforms.json",
+              "name the folder that holds one of them");
+}
+
+SourceCapture readSource(const fs::path& source) {
+  if (const auto files = findTransforms(source); !files.empty()) return readTransforms(files);
+  if (findColmapModel(source)) return readColmap(source);
+  refuse(source);
+}
+
+// Paths in the capture, unique: images/a.jpg and images/a.png reduced to PNG are a.png and a.png.png.
+class Names {
+ public:
+  std::string unique(std::string folder, fs::path name, const std::string& extension) {
+    if (name.is_absolute() || std::find(name.begin(), name.end(), "..") != name.end()) name = name.filename();
+    const fs::path first = *name.begin();
+    if (first == folder && std::distance(name.begin(), name.end()) > 1) name = name.lexically_relative(first);
+    const std::string full = folder + "/" + name.generic_string();
+    std::string candidate = fs::path(full).replace_extension(extension).generic_string();
+    if (used_.contains(candidate)) candidate = full + extension;
+    for (int i = 2; used_.contains(candidate); ++i) candidate = fmt::format("{}_{}{}", full, i, extension);
+    used_.insert(candidate);
+    return candidate;
+  }
+
+ private:
+  std::set<std::string> used_;
+};
+
+struct Size {
+  int width, height;
+};
+
+Size reduced(const PhotoFacts& facts, int downscale) {
+  const auto side = [downscale](int pixels) {
+    return std::max(1, static_cast<int>(std::lround(double(pixels) / downscale)));
+  };
+  return {side(facts.width), side(facts.height)};
+}
+
+// Gives every photo the camera of its reduced size, and moves the observations along.
+void scaleCameras(Capture& capture, const std::vector<PhotoFacts>& facts, int downscale) {
+  if (downscale == 1) return;
+  std::vector<Camera> cameras;
+  std::vector<std::pair<float, float>> factors;
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    Photo& photo = capture.photos[i];
+    const Size size = reduced(facts[i], downscale);
+    const Camera& camera = capture.cameras[static_cast<size_t>(photo.camera)];
+    factors.emplace_back(static_cast<float>(size.width) / static_cast<float>(camera.width),
+                         static_cast<float>(size.height) / static_cast<float>(camera.height));
+    const Camera scaled = camera.scaledTo(size.width, size.height);
+    const auto found = std::find(cameras.begin(), cameras.end(), scaled);
+    photo.camera = static_cast<int>(found - cameras.begin());
+    if (found == cameras.end()) cameras.push_back(scaled);
+  }
+  capture.cameras = std::move(cameras);
+  for (Observation& observation : capture.observations) {
+    const auto [x, y] = factors[observation.photo];
+    observation.x *= x;
+    observation.y *= y;
+    observation.error *= (x + y) / 2;
+  }
+}
+
+struct Outcomes {
+  std::vector<FileOutcome> photos;
+  std::vector<std::string> withoutMask, withoutDepth;
+};
+
+// Brings all pictures over; Photo's paths then point into the capture.
+Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& facts, const fs::path& out,
+                        const ImportOptions& options, double scale, ThreadPool& pool) {
+  std::vector<Photo>& photos = source.capture.photos;
+  std::vector<fs::path> imageTargets, maskTargets, depthTargets;
+  Names names;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const Size size = reduced(facts[i], options.downscale);
+    std::string extension = photos[i].image.extension().string();
+    if (options.downscale > 1) {
+      const bool lossless = int64_t{size.width} * size.height <= kLosslessPixels || extension == ".png";
+      extension = lossless ? ".png" : ".jpg";
+    }
+    const fs::path original = photos[i].name;
+    photos[i].name = names.unique("images", original, extension);
+    imageTargets.push_back(out / photos[i].name);
+    const fs::path inner = fs::path(photos[i].name).lexically_relative("images");
+    maskTargets.push_back(out / names.unique("masks", inner, ".png"));
+    depthTargets.push_back(out / names.unique("depths", inner, ".exr"));
+  }
+  Outcomes outcomes{std::vector<FileOutcome>(photos.size(), FileOutcome::ready), {}, {}};
+  Progress progress("import", static_cast<int64_t>(photos.size()), "photos");
+  std::mutex mutex;
+  int64_t done = 0;
+  pool.run(photos.size(), [&](size_t i, int) {
+    Photo& photo = photos[i];
+    const Size size = reduced(facts[i], options.downscale);
+    outcomes.photos[i] = importPhoto(photo.image, imageTargets[i], size.width, size.height);
+    bool maskOk = true, depthOk = true;
+    if (outcomes.photos[i] == FileOutcome::ready) {
+      photo.image = imageTargets[i];
+      if (!photo.mask.empty()) {
+        maskOk = importMask(photo.mask, maskTargets[i], size.width, size.height, source.maskIsInverted[i]) ==
+                 FileOutcome::ready;
+        photo.mask = maskOk ? maskTargets[i] : fs::path();
+      }
+      if (!photo.depth.empty()) {
+        depthOk = importDepth(photo.depth, depthTargets[i], size.width, size.height, photo.depthUnit, scale) ==
+                  FileOutcome::ready;
+        photo.depth = depthOk ? depthTargets[i] : fs::path();
+      }
+    }
+    const std::lock_guard lock(mutex);
+    if (!maskOk) outcomes.withoutMask.push_back(photo.name);
+    if (!depthOk) outcomes.withoutDepth.push_back(photo.name);
+    progress.update(++done);
+  });
+  progress.finish();
+  return outcomes;
+}
+
+void dropFailed(SourceCapture& source, const Outcomes& outcomes) {
+  std::vector<std::string> truncated, unreadable;
+  std::vector<size_t> kept;
+  for (size_t i = 0; i < outcomes.photos.size(); ++i) {
+    switch (outcomes.photos[i]) {
+      case FileOutcome::ready:
+        kept.push_back(i);
+        break;
+      case FileOutcome::truncated:
+        truncated.push_back(source.capture.photos[i].name);
+        break;
+      case FileOutcome::unreadable:
+        unreadable.push_back(source.capture.photos[i].name);
+        break;
+    }
+  }
+  warnDropped(truncated, "end early (truncated)");
+  warnDropped(unreadable, "cannot be decoded");
+  if (!outcomes.withoutMask.empty()) {
+    warn("{} masks are missing or unreadable: those photos train unmasked ({}, ...)", outcomes.withoutMask.size(),
+         outcomes.withoutMask[0]);
+  }
+  if (!outcomes.withoutDepth.empty()) {
+    warn("{} depth maps are missing or unreadable ({}, ...)", outcomes.withoutDepth.size(), outcomes.withoutDepth[0]);
+  }
+  if (kept.size() < outcomes.photos.size()) keepPhotos(source, kept);
+}
+
+void chooseSplit(const SourceCapture& source, const ImportOptions& options, std::vector<Photo>& photos) {
+  if (options.holdout != "auto") return holdOut(options.holdout, photos);
+  const auto has = [&photos](Split split) {
+    return std::any_of(photos.begin(), photos.end(), [split](const Photo& photo) { return photo.split == split; });
+  };
+  if (!source.hasOwnSplit || !has(Split::train)) return holdOut(photos.size() > 1 ? "every:8" : "none", photos);
+  if (has(Split::test)) return;
+  for (Photo& photo : photos) {
+    if (photo.split == Split::validation) photo.split = Split::test;
+  }
+}
+
+}  // namespace
+
+std::string sourceFormat(const fs::path& source) {
+  if (const auto files = findTransforms(source); !files.empty()) return files[0].filename().string();
+  if (findColmapModel(source)) return "COLMAP model";
+  return "";
+}
+
+Capture importCapture(const fs::path& sourcePath, const fs::path& out, const ImportOptions& options) {
+  if (options.downscale < 1 || options.downscale > 64) {
+    throw Error("--downscale", std::to_string(options.downscale), "is not from 1 to 64", "use 1, 2, 4 or 8");
+  }
+  std::error_code status;
+  if (fs::weakly_canonical(sourcePath) == fs::weakly_canonical(out)) {
+    throw Error(out.string(), "", "is the source itself", "name another folder to write to");
+  }
+  ThreadPool pool(options.threads);
+  SourceCapture source = readSource(sourcePath);
+  const std::vector<PhotoFacts> facts = cleanSource(source, pool);
+  Capture& capture = source.capture;
+  if (capture.photos.empty()) {
+    throw Error(sourcePath.string(), "", "no photo of it can be used", "see the warnings above");
+  }
+
+  std::vector<std::optional<GimbalAngles>> gimbals;
+  for (const PhotoFacts& fact : facts) gimbals.push_back(fact.tags.gimbal);
+  const Orientation orientation = orientWorld(source, gimbals);
+  inform("{} photos, {} points; {}", capture.photos.size(), capture.points.size(), orientation.how);
+
+  scaleCameras(capture, facts, options.downscale);
+  fs::create_directories(out, status);
+  // While pictures change, the folder is not a complete capture.
+  fs::remove(out / "transforms.json", status);
+  dropFailed(source, importPictures(source, facts, out, options, orientation.scale, pool));
+  if (capture.photos.empty()) {
+    throw Error(sourcePath.string(), "", "no photo of it can be decoded", "see the warnings above");
+  }
+  chooseSplit(source, options, capture.photos);
+  capture.root = out;
+  writeCapture(capture);
+  return std::move(capture);
+}
+
+}  // namespace tessera

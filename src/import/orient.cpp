@@ -1,0 +1,135 @@
+#include "import/orient.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "base/log.h"
+#include "import/georeference.h"
+
+namespace tessera {
+namespace {
+
+double scaleOf(const Mat4d& similarity) {
+  return std::cbrt(similarity.topLeftCorner<3, 3>().determinant());
+}
+
+Vec3d medianCentre(const std::vector<Photo>& photos) {
+  Vec3d median = Vec3d::Zero();
+  if (photos.empty()) return median;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const Photo& photo : photos) values.push_back(photo.worldFromCamera.translation[axis]);
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    median[axis] = *middle;
+  }
+  return median;
+}
+
+// Up in camera axes for a camera that hangs at those angles: pitch 0 is level, -90 looks down; roll turns it about its
+// optical axis, clockwise as seen from behind.
+Vec3d upInCamera(const GimbalAngles& gimbal) {
+  const double pitch = gimbal.pitch * M_PI / 180, roll = gimbal.roll * M_PI / 180;
+  const Vec3d level(0, -std::cos(pitch), std::sin(pitch));
+  return Eigen::AngleAxisd(-roll, Vec3d::UnitZ()) * level;
+}
+
+Vec3d planeNormal(const std::vector<Photo>& photos) {
+  Eigen::Matrix3Xd centres(3, static_cast<Eigen::Index>(photos.size()));
+  for (size_t i = 0; i < photos.size(); ++i) {
+    centres.col(static_cast<Eigen::Index>(i)) = photos[i].worldFromCamera.translation;
+  }
+  centres.colwise() -= Vec3d(centres.rowwise().mean());
+  return Eigen::JacobiSVD<Eigen::MatrixXd>(centres, Eigen::ComputeFullU).matrixU().col(2);
+}
+
+struct Up {
+  Vec3d direction;
+  std::string how;
+};
+
+Up findUp(const std::vector<Photo>& photos, const std::vector<std::optional<GimbalAngles>>& gimbals) {
+  Vec3d gimbalUp = Vec3d::Zero(), cameraUp = Vec3d::Zero(), forward = Vec3d::Zero();
+  int withGimbal = 0;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const Mat3d& rotation = photos[i].worldFromCamera.rotation;
+    cameraUp -= rotation.col(1);
+    forward += rotation.col(2);
+    if (i < gimbals.size() && gimbals[i]) {
+      gimbalUp += rotation * upInCamera(*gimbals[i]);
+      ++withGimbal;
+    }
+  }
+  const double n = static_cast<double>(photos.size());
+  if (2 * withGimbal >= static_cast<int>(photos.size()) && gimbalUp.norm() > 0.8 * withGimbal) {
+    return {gimbalUp.normalized(), "up from the gimbal's angles"};
+  }
+  if (cameraUp.norm() > 0.7 * n || photos.size() < 3) {
+    if (!(cameraUp.norm() > 1e-3)) return {Vec3d::UnitZ(), "no direction is up; the source's Z is kept"};
+    return {cameraUp.normalized(), "up from the mean of the cameras' up"};
+  }
+  Vec3d normal = planeNormal(photos);
+  const bool looksAlong = std::abs(forward.normalized().dot(normal)) > 0.7 && forward.norm() > 0.7 * n;
+  if (!looksAlong && cameraUp.norm() > 0.2 * n) return {cameraUp.normalized(), "up from the mean of the cameras' up"};
+  // Looking down from a plane, or all around in one: what few cues there are decide the side.
+  const double side = looksAlong ? -forward.dot(normal) : cameraUp.dot(normal);
+  if (side < 0) normal = -normal;
+  return {normal, "up from the plane that the cameras stand in"};
+}
+
+Mat4d translation(const Vec3d& t) {
+  Mat4d matrix = Mat4d::Identity();
+  matrix.topRightCorner<3, 1>() = t;
+  return matrix;
+}
+
+}  // namespace
+
+double applySimilarity(Capture& capture, const Mat4d& newFromOld) {
+  const double scale = scaleOf(newFromOld);
+  const Mat3d rotation = newFromOld.topLeftCorner<3, 3>() / scale;
+  const auto move = [&newFromOld](const Vec3d& x) -> Vec3d { return (newFromOld * x.homogeneous()).head<3>(); };
+  for (Photo& photo : capture.photos) {
+    photo.worldFromCamera.rotation = rotation * photo.worldFromCamera.rotation;
+    photo.worldFromCamera.translation = move(photo.worldFromCamera.translation);
+    photo.depthUnit *= static_cast<float>(scale);
+  }
+  for (SparsePoint& point : capture.points) point.xInWorld = move(point.xInWorld);
+  const Mat4d oldFromNew = newFromOld.inverse();
+  capture.sourceFromWorld *= oldFromNew;
+  if (capture.geo) capture.geo->enuFromWorld *= oldFromNew;
+  return scale;
+}
+
+Orientation orientWorld(SourceCapture& source, const std::vector<std::optional<GimbalAngles>>& gimbals) {
+  Capture& capture = source.capture;
+  if (source.isOurs || capture.photos.empty()) return {"a capture of our own: its world is kept", 1};
+  Orientation orientation;
+  std::string why;
+  if (const auto found = georeference(capture.photos, why)) {
+    capture.geo = found->frame;
+    orientation.scale = applySimilarity(capture, found->frame.enuFromWorld);
+    orientation.how = fmt::format("east, north, up in metres from {} of {} GPS fixes, which it misses by {:.2f} m",
+                                  found->inliers, found->fixes, found->rmsMetres);
+  } else {
+    const bool hasGps =
+        std::any_of(capture.photos.begin(), capture.photos.end(), [](const Photo& p) { return !!p.gps; });
+    if (hasGps) warn("no geo reference: {}", why);
+    if (source.knowsUp) {
+      orientation.how = "the source's Z is up";
+    } else {
+      const Up up = findUp(capture.photos, gimbals);
+      Mat4d turn = Mat4d::Identity();
+      turn.topLeftCorner<3, 3>() = Eigen::Quaterniond::FromTwoVectors(up.direction, Vec3d::UnitZ()).toRotationMatrix();
+      applySimilarity(capture, turn);
+      orientation.how = up.how;
+    }
+  }
+  applySimilarity(capture, translation(-medianCentre(capture.photos)));
+  return orientation;
+}
+
+}  // namespace tessera

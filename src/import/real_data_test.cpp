@@ -1,0 +1,100 @@
+// Real photographs as they come. They are no part of the project: TESSERA_SHARED_DATA names the folder that holds them.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "import/capture_reader.h"
+#include "import/importer.h"
+#include "import/test_support.h"
+
+namespace tessera {
+namespace {
+
+TEST(RealData, FoxComesInWithoutTheSeventeenPhotosThatDoNotExist) {
+  const auto fox = sharedData("fox");
+  if (!fox) GTEST_SKIP() << "TESSERA_SHARED_DATA/fox is not there";
+  const TemporaryFolder folder;
+  testing::internal::CaptureStderr();
+  const Capture capture = importCapture(*fox, folder / "out", {.downscale = 8});
+  const std::string warnings = testing::internal::GetCapturedStderr();
+  EXPECT_NE(warnings.find("17 photos named by the source are not on disk"), std::string::npos) << warnings;
+  EXPECT_EQ(capture.photos.size(), 50u);
+  EXPECT_EQ(capture.photosIn(Split::test).size(), 7u);
+  ASSERT_EQ(capture.cameras.size(), 1u);
+  EXPECT_EQ(capture.cameras[0].width, 68);  // 540 / 8, rounded
+  EXPECT_EQ(capture.cameras[0].height, 120);
+  EXPECT_EQ(capture.cameras[0].lens, LensModel::openCv);
+  EXPECT_NEAR(capture.cameras[0].focalX(), 687.76 * 68 / 540, 1e-9);
+
+  // Hand-held: everyone looks inwards and stands upright.
+  for (const Photo& photo : capture.photos) {
+    EXPECT_GT(-photo.worldFromCamera.rotation.col(1).z(), 0.7) << photo.name;
+    EXPECT_NEAR(photo.worldFromCamera.rotation.determinant(), 1, 1e-9);
+  }
+  EXPECT_EQ(readCapture(folder / "out").photos.size(), 50u);
+}
+
+TEST(RealData, BrightonBeachLooksDownFromAFlightAndItsPointsProjectBack) {
+  const auto beach = sharedData("brighton_beach");
+  if (!beach) GTEST_SKIP() << "TESSERA_SHARED_DATA/brighton_beach is not there";
+  const TemporaryFolder folder;
+  const Capture capture = importCapture(*beach, folder / "out", {.downscale = 8});
+  ASSERT_EQ(capture.photos.size(), 18u);
+  EXPECT_EQ(capture.photosIn(Split::test).size(), 3u);
+  ASSERT_TRUE(capture.geo.has_value());
+
+  // Poses, lens, axes and scaling together: observations land where their points project.
+  ASSERT_GT(capture.observations.size(), 1000u);
+  std::vector<double> errors, stored;
+  for (const Observation& observation : capture.observations) {
+    const Photo& photo = capture.photos[observation.photo];
+    const auto pixel = capture.cameras[static_cast<size_t>(photo.camera)].pixelFromCamera(
+        photo.worldFromCamera.inverse() * capture.points[observation.point].xInWorld);
+    ASSERT_TRUE(pixel.has_value());
+    errors.push_back((*pixel - Vec2d(observation.x, observation.y)).norm() * 8);
+    stored.push_back(observation.error * 8);
+  }
+  std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
+  std::nth_element(stored.begin(), stored.begin() + stored.size() / 2, stored.end());
+  EXPECT_LT(errors[errors.size() / 2], 1.0);
+  EXPECT_NEAR(stored[stored.size() / 2], errors[errors.size() / 2], 0.02);
+
+  // Nadir at one height, in metres: the drone said 40 m above take-off.
+  double lowest = 1e9, highest = -1e9, ground = 0;
+  for (const Photo& photo : capture.photos) {
+    EXPECT_LT(photo.worldFromCamera.rotation.col(2).z(), -0.98) << photo.name;
+    ASSERT_TRUE(photo.gps.has_value());
+    EXPECT_NEAR(photo.gps->relativeAltitude, 40, 2);
+    lowest = std::min(lowest, photo.worldFromCamera.translation.z());
+    highest = std::max(highest, photo.worldFromCamera.translation.z());
+  }
+  EXPECT_LT(highest - lowest, 4);
+  for (const SparsePoint& point : capture.points)
+    ground += point.xInWorld.z() / static_cast<double>(capture.points.size());
+  EXPECT_NEAR(lowest - ground, 40, 12);
+}
+
+TEST(RealData, BrightonBeachComesBackExactly) {
+  const auto beach = sharedData("brighton_beach");
+  if (!beach) GTEST_SKIP() << "TESSERA_SHARED_DATA/brighton_beach is not there";
+  const TemporaryFolder folder;
+  const Capture written = importCapture(*beach, folder / "out", {.downscale = 16});
+  const Capture read = readCapture(folder / "out");
+  ASSERT_EQ(read.photos.size(), written.photos.size());
+  EXPECT_EQ(read.cameras, written.cameras);
+  for (size_t i = 0; i < read.photos.size(); ++i) {
+    EXPECT_EQ(read.photos[i].name, written.photos[i].name);
+    EXPECT_EQ(read.photos[i].worldFromCamera.rotation, written.photos[i].worldFromCamera.rotation);
+    EXPECT_EQ(read.photos[i].worldFromCamera.translation, written.photos[i].worldFromCamera.translation);
+    EXPECT_EQ(read.photos[i].gps->latitude, written.photos[i].gps->latitude);
+  }
+  EXPECT_EQ(read.sourceFromWorld, written.sourceFromWorld);
+  EXPECT_EQ(read.geo->enuFromWorld, written.geo->enuFromWorld);
+  ASSERT_EQ(read.points.size(), written.points.size());
+  EXPECT_EQ(read.points.back().xInWorld, written.points.back().xInWorld);
+  ASSERT_EQ(read.observations.size(), written.observations.size());
+  EXPECT_EQ(read.observations.back().x, written.observations.back().x);
+}
+
+}  // namespace
+}  // namespace tessera

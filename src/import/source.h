@@ -1,0 +1,18 @@
+// What the reader of one outside format hands to the importer: a capture in the source's own world, not yet held
+// against what is on disk.
+#pragma once
+
+#include "scene/capture.h"
+
+namespace tessera {
+
+struct SourceCapture {
+  Capture capture;           // poses in camera axes as scene/axes.h wants them, world as the source has it
+  bool hasOwnSplit = false;  // Photo::split comes from the source
+  bool knowsUp = false;      // the source's Z is up (NeRF files); COLMAP's world lies anyhow
+  bool isOurs = false;       // written by writeCapture: its world is final
+  // Photos whose mask has the opposite meaning (instant-ngp's dynamic_mask: white = do not train on), by index.
+  std::vector<bool> maskIsInverted;
+};
+
+}  // namespace tessera

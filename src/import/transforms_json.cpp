@@ -1,0 +1,272 @@
+#include "import/transforms_json.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "import/colmap_model.h"
+
+namespace tessera {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::array kIntrinsicKeys = {
+    "w",  "h",  "fl_x",           "fl_y",           "cx",    "cy",   "k1", "k2", "k3", "k4", "k5", "k6",
+    "p1", "p2", "camera_angle_x", "camera_angle_y", "x_fov", "y_fov"};
+
+// Python writes NaN, Infinity and -Infinity, which JSON has no words for: they become null (read as not-a-number).
+std::string withoutPythonNumbers(std::string_view text) {
+  std::string out;
+  out.reserve(text.size());
+  bool inString = false;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (inString) {
+      if (c == '\\' && i + 1 < text.size()) {
+        out += c;
+        out += text[++i];
+        continue;
+      }
+      inString = c != '"';
+    } else if (c == '"') {
+      inString = true;
+    } else {
+      bool replaced = false;
+      for (const std::string_view word : {"NaN", "-Infinity", "Infinity"}) {
+        if (!replaced && text.substr(i, word.size()) == word) {
+          out += "null";
+          i += word.size() - 1;
+          replaced = true;
+        }
+      }
+      if (replaced) continue;
+    }
+    out += c;
+  }
+  return out;
+}
+
+double numberOr(const Json& object, const char* key, double otherwise) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number() ? found->get<double>() : otherwise;
+}
+
+std::string textOr(const Json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
+}
+
+// Object of that name, or an empty one.
+const Json& objectAt(const Json& object, const char* key) {
+  static const Json kNone = Json::object();
+  const auto found = object.find(key);
+  return found != object.end() && found->is_object() ? *found : kNone;
+}
+
+// 3×4 or 4×4 rows; numbers that are not there are not-a-number.
+std::optional<Mat4d> matrixOf(const Json& object, const char* key) {
+  const auto rows = object.find(key);
+  if (rows == object.end() || !rows->is_array() || (rows->size() != 3 && rows->size() != 4)) return std::nullopt;
+  Mat4d matrix = Mat4d::Identity();
+  for (size_t r = 0; r < rows->size(); ++r) {
+    const Json& row = (*rows)[r];
+    if (!row.is_array() || row.size() != 4) return std::nullopt;
+    for (size_t c = 0; c < 4; ++c) {
+      matrix(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) =
+          row[c].is_number() ? row[c].get<double>() : std::nan("");
+    }
+  }
+  return matrix;
+}
+
+void readIntrinsics(const Json& object, Intrinsics& intrinsics) {
+  for (const char* key : kIntrinsicKeys) {
+    const double value = numberOr(object, key, std::nan(""));
+    if (std::isfinite(value)) intrinsics.numbers[key] = value;
+  }
+  if (const std::string model = textOr(object, "camera_model"); !model.empty()) intrinsics.model = model;
+  const auto fisheye = object.find("is_fisheye");
+  if (fisheye != object.end() && fisheye->is_boolean()) intrinsics.fisheye = fisheye->get<bool>();
+}
+
+bool readOurs(const Json& ours, TransformsFile& file, std::string& reason) {
+  file.isOurs = true;
+  if (numberOr(ours, "version", 1) > 1) {
+    reason = "tessera.version: written by a newer tessera";
+    return false;
+  }
+  const auto cameras = ours.find("cameras");
+  if (cameras != ours.end() && cameras->is_array()) {
+    for (const Json& camera : *cameras) {
+      std::vector<double> parameters;
+      std::string why = "is not a camera";
+      std::optional<Camera> decoded;
+      if (camera.is_object() && camera.contains("parameters") && camera["parameters"].is_array()) {
+        for (const Json& p : camera["parameters"]) parameters.push_back(p.is_number() ? p.get<double>() : std::nan(""));
+        const auto side = [&camera](const char* key) {
+          const double value = numberOr(camera, key, 0);
+          return value > 0 && value < 1e9 ? static_cast<uint64_t>(value) : uint64_t{0};
+        };
+        decoded = colmapCamera(textOr(camera, "model"), side("width"), side("height"), parameters, why);
+      }
+      if (!decoded) {
+        reason = fmt::format("tessera.cameras[{}]: {}", file.cameras.size(), why);
+        return false;
+      }
+      file.cameras.push_back(*decoded);
+    }
+  }
+  if (const auto matrix = matrixOf(ours, "source_from_world"); matrix && matrix->allFinite()) {
+    file.sourceFromWorld = *matrix;
+  }
+  const Json& geo = objectAt(ours, "geo");
+  if (const auto matrix = matrixOf(geo, "enu_from_world"); matrix && matrix->allFinite()) {
+    file.geo =
+        GeoFrame{numberOr(geo, "latitude", 0), numberOr(geo, "longitude", 0), numberOr(geo, "altitude", 0), *matrix};
+  }
+  file.observationFile = textOr(ours, "observations");
+  return true;
+}
+
+bool readFrame(const Json& object, const Intrinsics& shared, TransformsFile& file, std::string& reason) {
+  const size_t index = file.frames.size();
+  TransformsFrame frame;
+  if (object.is_object()) frame.file = textOr(object, "file_path");
+  const auto matrix = object.is_object() ? matrixOf(object, "transform_matrix") : std::nullopt;
+  if (frame.file.empty() || !matrix) {
+    reason = fmt::format("frames[{}]: has no {}", index, frame.file.empty() ? "file_path" : "4 x 4 transform_matrix");
+    return false;
+  }
+  frame.worldFromCameraGl = *matrix;
+  frame.mask = textOr(object, "mask_path");
+  frame.depth = textOr(object, "depth_file_path");
+  if (frame.depth.empty()) frame.depth = textOr(object, "depth_path");  // instant-ngp
+  frame.intrinsics = shared;
+  readIntrinsics(object, frame.intrinsics);
+  if (file.isOurs) {
+    const Json& ours = objectAt(object, "tessera");
+    const double camera = numberOr(ours, "camera", -1);
+    if (camera >= 0 && camera < static_cast<double>(file.cameras.size())) frame.camera = static_cast<int>(camera);
+    frame.name = textOr(ours, "name");
+    frame.exposure = numberOr(ours, "exposure", 0);
+    const double unit = numberOr(ours, "depth_unit", 0);
+    frame.depthUnit = unit > 0 && unit < 1e30 ? static_cast<float>(unit) : 0.0f;
+    const Json& gps = objectAt(ours, "gps");
+    const double latitude = numberOr(gps, "latitude", std::nan("")),
+                 longitude = numberOr(gps, "longitude", std::nan(""));
+    if (std::abs(latitude) <= 90 && std::abs(longitude) <= 360) {
+      frame.gps = GpsFix{latitude, longitude, numberOr(gps, "altitude", 0), numberOr(gps, "relative_altitude", 0)};
+    }
+  }
+  file.frames.push_back(std::move(frame));
+  return true;
+}
+
+double numberAt(const Intrinsics& intrinsics, const char* key, double otherwise) {
+  const auto found = intrinsics.numbers.find(key);
+  return found == intrinsics.numbers.end() ? otherwise : found->second;
+}
+
+// Focal length along an axis: fl, else from an angle in radians, else from one in degrees; 0 when there is none.
+double focalOf(const Intrinsics& i, const char* focal, const char* radians, const char* degrees, double size) {
+  if (const double f = numberAt(i, focal, 0); f > 0) return f;
+  double angle = numberAt(i, radians, 0);
+  if (!(angle > 0)) angle = numberAt(i, degrees, 0) * M_PI / 180;
+  return angle > 0 && angle < 3.14 ? size / (2 * std::tan(angle / 2)) : 0;
+}
+
+}  // namespace
+
+std::optional<TransformsFile> decodeTransforms(std::string_view text, std::string& reason) {
+  Json json = Json::parse(text, nullptr, false, true);
+  if (json.is_discarded()) json = Json::parse(withoutPythonNumbers(text), nullptr, false, true);
+  if (!json.is_object()) {
+    reason = json.is_discarded() ? "is not JSON" : "is not a JSON object";
+    return std::nullopt;
+  }
+  TransformsFile file;
+  if (const auto ours = json.find("tessera"); ours != json.end() && ours->is_object()) {
+    if (!readOurs(*ours, file, reason)) return std::nullopt;
+  }
+  Intrinsics shared;
+  readIntrinsics(json, shared);
+  const auto frames = json.find("frames");
+  if (frames == json.end() || !frames->is_array()) {
+    reason = "frames: is missing";
+    return std::nullopt;
+  }
+  for (const Json& frame : *frames) {
+    if (!readFrame(frame, shared, file, reason)) return std::nullopt;
+  }
+  for (const auto& [key, split] :
+       {std::pair{"train_filenames", Split::train}, std::pair{"val_filenames", Split::validation},
+        std::pair{"test_filenames", Split::test}}) {
+    const auto names = json.find(key);
+    if (names == json.end() || !names->is_array()) continue;
+    for (const Json& name : *names) {
+      if (name.is_string()) file.splits[name.get<std::string>()] = split;
+    }
+  }
+  file.pointFile = textOr(json, "ply_file_path");
+  if (const auto applied = matrixOf(json, "applied_transform")) file.appliedTransform = *applied;
+  const double scale = numberOr(json, "applied_scale", 1);
+  if (scale > 0 && std::isfinite(scale)) file.appliedScale = scale;
+  const double step = numberOr(json, "integer_depth_scale", 0);
+  if (step > 0 && std::isfinite(step)) file.integerDepthScale = step;
+  return file;
+}
+
+std::optional<Camera> cameraFromIntrinsics(const Intrinsics& intrinsics, int photoWidth, int photoHeight,
+                                           std::string& reason) {
+  const auto at = [&](const char* key) { return numberAt(intrinsics, key, 0); };
+  double w = at("w"), h = at("h");
+  if (!(w >= 1) || !(h >= 1)) {
+    w = photoWidth;
+    h = photoHeight;
+  }
+  double fx = focalOf(intrinsics, "fl_x", "camera_angle_x", "x_fov", w);
+  double fy = focalOf(intrinsics, "fl_y", "camera_angle_y", "y_fov", h);
+  if (fx <= 0) fx = fy;
+  if (fy <= 0) fy = fx;
+  if (!(fx > 0) || !(w < 1e6) || !(h < 1e6)) {
+    reason = "has no focal length (fl_x, camera_angle_x or x_fov)";
+    return std::nullopt;
+  }
+  std::vector<double> parameters = {fx, fy, numberAt(intrinsics, "cx", w / 2), numberAt(intrinsics, "cy", h / 2)};
+  const auto append = [&](std::initializer_list<const char*> keys) {
+    for (const char* key : keys) parameters.push_back(at(key));
+  };
+  // What is named decides, then what is not zero.
+  std::string model = intrinsics.model;
+  if (model == "SIMPLE_RADIAL" || model == "RADIAL" || model == "PERSPECTIVE" || model.empty()) model = "OPENCV";
+  if (model == "SIMPLE_PINHOLE") model = "PINHOLE";
+  if (intrinsics.fisheye || model == "SIMPLE_RADIAL_FISHEYE" || model == "RADIAL_FISHEYE") model = "OPENCV_FISHEYE";
+  if (model == "OPENCV") {
+    if (at("k4") != 0) {
+      reason = "k4 of a perspective lens (a term in r^8) is not supported: refine the lens without it";
+      return std::nullopt;
+    }
+    if (at("k3") != 0) {
+      model = "FULL_OPENCV";
+    } else if (at("k1") == 0 && at("k2") == 0 && at("p1") == 0 && at("p2") == 0) {
+      model = "PINHOLE";
+    }
+  }
+  if (model == "OPENCV_FISHEYE") {
+    append({"k1", "k2", "k3", "k4"});
+  } else if (model == "OPENCV") {
+    append({"k1", "k2", "p1", "p2"});
+  } else if (model == "FULL_OPENCV") {
+    append({"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"});
+  } else if (model != "PINHOLE") {
+    reason = fmt::format("camera_model {} is not supported here", model);
+    return std::nullopt;
+  }
+  return colmapCamera(model, static_cast<uint64_t>(std::llround(w)), static_cast<uint64_t>(std::llround(h)), parameters,
+                      reason);
+}
+
+}  // namespace tessera

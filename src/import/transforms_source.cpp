@@ -1,0 +1,213 @@
+// From decoded transforms.json files to a capture: paths, cameras, splits, points.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "base/image_io.h"
+#include "base/log.h"
+#include "base/safetensors.h"
+#include "import/transforms_json.h"
+#include "scene/ply.h"
+
+namespace tessera {
+namespace {
+
+bool isFile(const fs::path& path) {
+  std::error_code status;
+  return fs::is_regular_file(path, status);
+}
+
+// A path as written in the file; Blender leaves the extension out, Windows turns slashes. Nothing when it leaves the
+// folder; a path that does not exist when nothing is there.
+std::optional<fs::path> resolvePhoto(const fs::path& root, std::string written) {
+  std::replace(written.begin(), written.end(), '\\', '/');
+  const auto path = resolveInside(root, written);
+  if (!path || isFile(*path)) return path;
+  for (const char* extension : {".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
+    const auto candidate = resolveInside(root, written + extension);
+    if (candidate && isFile(*candidate)) return candidate;
+  }
+  return path;
+}
+
+std::optional<ImageInfo> photoSize(const fs::path& path) {
+  if (!isFile(path)) return std::nullopt;
+  try {
+    return probeImageFile(path);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+// The pose in a camera-to-world matrix, freed of what rounding did to its rotation; nothing when it is not rigid.
+std::optional<Pose> poseFromGl(const Mat4d& worldFromCameraGl) {
+  if (!worldFromCameraGl.allFinite()) return std::nullopt;
+  Mat3d rotation = flippedYz(worldFromCameraGl.topLeftCorner<3, 3>());
+  const double deviation = (rotation.transpose() * rotation - Mat3d::Identity()).norm();
+  if (deviation > 0.02 || rotation.determinant() < 0) return std::nullopt;
+  if (deviation > 1e-9) {  // rounded in writing: the nearest rotation
+    const Eigen::JacobiSVD<Mat3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    rotation = svd.matrixU() * svd.matrixV().transpose();
+  }
+  return Pose{rotation, worldFromCameraGl.topRightCorner<3, 1>()};
+}
+
+std::optional<Split> splitOfName(const fs::path& file) {
+  const std::string name = file.filename().string();
+  if (name == "transforms_train.json") return Split::train;
+  if (name == "transforms_val.json") return Split::validation;
+  if (name == "transforms_test.json") return Split::test;
+  return std::nullopt;
+}
+
+int indexOf(const Camera& camera, std::vector<Camera>& cameras) {
+  const auto found = std::find(cameras.begin(), cameras.end(), camera);
+  const auto index = static_cast<int>(found - cameras.begin());
+  if (found == cameras.end()) cameras.push_back(camera);
+  return index;
+}
+
+void readPoints(const fs::path& file, const TransformsFile& transforms, Capture& capture) {
+  if (transforms.pointFile.empty()) return;
+  const auto path = resolveInside(file.parent_path(), transforms.pointFile);
+  if (!path || !isFile(*path)) {
+    warn("{}: ply_file_path {}: is not there; no sparse points", file.string(), transforms.pointFile);
+    return;
+  }
+  capture.points = readPly(*path);
+  if (!transforms.isOurs) std::erase_if(capture.points, [](const SparsePoint& p) { return !p.xInWorld.allFinite(); });
+}
+
+// `photoOfFrame`: -1 for frames that were dropped.
+void readObservations(const fs::path& file, const TransformsFile& transforms, const std::vector<int>& photoOfFrame,
+                      Capture& capture) {
+  if (transforms.observationFile.empty()) return;
+  const auto path = resolveInside(file.parent_path(), transforms.observationFile);
+  if (!path) throw Error(file.string(), "tessera.observations", "leaves the folder", "import the photos again");
+  const Safetensors tensors = readSafetensors(*path);
+  const auto photo = tensors.require(*path, "photo", TensorType::u32).as<uint32_t>();
+  const auto point = tensors.require(*path, "point", TensorType::u32).as<uint32_t>();
+  const auto pixel = tensors.require(*path, "pixel", TensorType::f32).as<float>();
+  const auto error = tensors.require(*path, "error", TensorType::f32).as<float>();
+  bool valid = point.size() == photo.size() && pixel.size() == 2 * photo.size() && error.size() == photo.size();
+  for (size_t i = 0; valid && i < photo.size(); ++i) {
+    valid = photo[i] < photoOfFrame.size() && point[i] < capture.points.size();
+    if (valid && photoOfFrame[photo[i]] >= 0) {
+      capture.observations.push_back(
+          {static_cast<uint32_t>(photoOfFrame[photo[i]]), point[i], pixel[2 * i], pixel[2 * i + 1], error[i]});
+    }
+  }
+  if (!valid) throw Error(path->string(), "", "does not fit transforms.json", "import the photos again");
+}
+
+struct Dropped {
+  std::vector<std::string> outside, poses, lenses;
+  std::string lensReason;
+};
+
+void reportDropped(const fs::path& file, const Dropped& dropped) {
+  const auto report = [&file](const std::vector<std::string>& names, const std::string& what) {
+    if (!names.empty()) {
+      warn("{}: {} photos {}; dropped ({}{})", file.string(), names.size(), what, names[0],
+           names.size() > 1 ? ", ..." : "");
+    }
+  };
+  report(dropped.outside, "have paths that leave the folder");
+  report(dropped.poses, "have a pose that is not a number or not a rotation and a translation");
+  report(dropped.lenses, "have a lens that cannot be used: " + dropped.lensReason);
+}
+
+// Adds one frame; false when it is dropped.
+bool addFrame(const fs::path& root, const TransformsFile& transforms, const TransformsFrame& frame,
+              SourceCapture& source, Dropped& dropped) {
+  Capture& capture = source.capture;
+  Photo photo;
+  const auto image = resolvePhoto(root, frame.file);
+  if (!image) return dropped.outside.push_back(frame.file), false;
+  photo.image = *image;
+  const auto pose = poseFromGl(frame.worldFromCameraGl);
+  if (!pose) return dropped.poses.push_back(frame.file), false;
+  photo.worldFromCamera = *pose;
+  if (frame.camera >= 0) {
+    photo.camera = frame.camera;
+  } else if (const auto info = photoSize(photo.image)) {  // missing and unreadable photos are told of once, later
+    const auto camera = cameraFromIntrinsics(frame.intrinsics, info->width, info->height, dropped.lensReason);
+    if (!camera) return dropped.lenses.push_back(frame.file), false;
+    photo.camera = indexOf(*camera, capture.cameras);
+  }
+  bool inverted = false;
+  if (!frame.mask.empty()) {
+    if (const auto mask = resolvePhoto(root, frame.mask)) photo.mask = *mask;
+  } else if (!transforms.isOurs) {
+    const fs::path dynamic = photo.image.parent_path() / ("dynamic_mask_" + photo.image.stem().string() + ".png");
+    if (isFile(dynamic)) {
+      photo.mask = dynamic;
+      inverted = true;
+    }
+  }
+  if (!frame.depth.empty()) {
+    if (const auto depth = resolvePhoto(root, frame.depth)) photo.depth = *depth;
+    photo.depthUnit = frame.depthUnit > 0                ? frame.depthUnit
+                      : transforms.integerDepthScale > 0 ? static_cast<float>(transforms.integerDepthScale)
+                                                         : static_cast<float>(0.001 * transforms.appliedScale);
+  }
+  photo.name =
+      !frame.name.empty() ? frame.name : photo.image.lexically_relative(fs::weakly_canonical(root)).generic_string();
+  photo.exposure = frame.exposure;
+  photo.gps = frame.gps;
+  if (const auto split = transforms.splits.find(frame.file); split != transforms.splits.end()) {
+    photo.split = split->second;
+  }
+  capture.photos.push_back(std::move(photo));
+  source.maskIsInverted.push_back(inverted);
+  return true;
+}
+
+}  // namespace
+
+std::vector<fs::path> findTransforms(const fs::path& source) {
+  if (isFile(source) && source.extension() == ".json") return {source};
+  if (isFile(source / "transforms.json")) return {source / "transforms.json"};
+  std::vector<fs::path> files;
+  for (const char* name : {"transforms_train.json", "transforms_val.json", "transforms_test.json"}) {
+    if (isFile(source / name)) files.push_back(source / name);
+  }
+  return files;
+}
+
+SourceCapture readTransforms(const std::vector<fs::path>& files) {
+  SourceCapture source;
+  source.knowsUp = true;
+  Capture& capture = source.capture;
+  for (const fs::path& file : files) {
+    std::string reason;
+    const auto transforms = decodeTransforms(readTextFile(file), reason);
+    if (!transforms) throw Error(file.string(), "", reason, "mend the file or export it again");
+    if (transforms->isOurs) {
+      source.isOurs = true;
+      capture.cameras = transforms->cameras;
+      capture.geo = transforms->geo;
+      capture.sourceFromWorld = transforms->sourceFromWorld;
+    } else {
+      Mat4d scaled = transforms->appliedTransform;
+      scaled.topRows<3>() *= transforms->appliedScale;
+      if (scaled.allFinite() && std::abs(scaled.determinant()) > 1e-12) capture.sourceFromWorld = scaled.inverse();
+    }
+    readPoints(file, *transforms, capture);
+    const auto split = files.size() > 1 ? splitOfName(file) : std::nullopt;  // one alone is a whole capture
+    source.hasOwnSplit = source.hasOwnSplit || split || !transforms->splits.empty();
+    Dropped dropped;
+    std::vector<int> photoOfFrame;
+    for (const TransformsFrame& frame : transforms->frames) {
+      const bool kept = addFrame(file.parent_path(), *transforms, frame, source, dropped);
+      photoOfFrame.push_back(kept ? static_cast<int>(capture.photos.size()) - 1 : -1);
+      if (kept && split) capture.photos.back().split = *split;
+    }
+    reportDropped(file, dropped);
+    readObservations(file, *transforms, photoOfFrame, capture);
+  }
+  return source;
+}
+
+}  // namespace tessera
