@@ -81,6 +81,7 @@ void VulkanDevice::run(const MlpBackward& options) {
   arguments.hiddenLayers = hiddenLayers;
   arguments.sigmoidOutput = shape.activation == OutputActivation::sigmoid;
   const Block block = blockFor(shape, std::max(width, paddedOutputs));
+  if (capacity == 0) return;
   queue(kernel(kMlpBackwardSpirv, block.constants()), arguments, {groups(capacity, block.samples)});
 
   const GpuKernel& weightKernel = sumKernel(kMlpWeightGradientsFloatAtomicsSpirv, kMlpWeightGradientsSpirv);
