@@ -1,0 +1,230 @@
+#include "eval/evaluate.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <set>
+
+#include "base/check.h"
+#include "base/error.h"
+#include "base/image_io.h"
+#include "base/log.h"
+#include "eval/heat_map.h"
+#include "eval/lpips.h"
+#include "eval/psnr.h"
+#include "eval/ssim.h"
+
+namespace tessera {
+namespace {
+
+// Straight alpha over a colour; grey becomes three channels.
+ImageF colourOver(const ImageF& image, const Eigen::Array3f& background) {
+  if (image.channels == 3) return image;
+  ImageF result(image.width, image.height, 3);
+  for (size_t p = 0; p < image.pixelCount(); ++p) {
+    const float* source = image.pixels.data() + p * image.channels;
+    for (int c = 0; c < 3; ++c) {
+      result.pixels[3 * p + c] =
+          image.channels == 1 ? source[0] : source[3] * source[c] + (1 - source[3]) * background[c];
+    }
+  }
+  return result;
+}
+
+ImageF readPhoto(const Photo& photo, const Camera& camera, const Eigen::Array3f& background) {
+  DecodedImage decoded = readImage(photo.image);
+  if (decoded.truncated) warn("{}: the photo is cut short; what is missing is judged as grey", photo.image.string());
+  if (decoded.image.width < camera.width || decoded.image.height < camera.height) {
+    throw Error(photo.image.string(), "",
+                fmt::format("the photo is {}×{}, smaller than its camera, {}×{}", decoded.image.width,
+                            decoded.image.height, camera.width, camera.height),
+                "import the capture again");
+  }
+  // Laid over the background first: straight colour is not to be averaged where alpha is 0.
+  return downscaleByArea(colourOver(toFloat(decoded.image), background), camera.width, camera.height);
+}
+
+std::optional<ImageU8> readMask(const Photo& photo, const Camera& camera) {
+  if (photo.mask.empty()) return std::nullopt;
+  const ImageU8 stored = resampledToNearest(readImage(photo.mask).image, camera.width, camera.height);
+  ImageU8 mask(camera.width, camera.height, 1);
+  for (size_t p = 0; p < mask.pixels.size(); ++p) mask.pixels[p] = stored.pixels[p * stored.channels] < 128 ? 0 : 255;
+  return mask;
+}
+
+ImageF compositeOver(const RenderedView& view, const Eigen::Array3f& background) {
+  ImageF image = view.colour;
+  for (size_t p = 0; p < image.pixelCount(); ++p) {
+    for (int c = 0; c < 3; ++c) image.pixels[3 * p + c] += (1 - view.opacity.pixels[p]) * background[c];
+  }
+  return image;
+}
+
+// argmin over g of Σ (g·rendered − photo)² on the left half, per channel.
+std::array<double, 3> fittedGain(const ImageF& rendered, const ImageF& photo, const ImageU8* mask) {
+  std::array<double, 3> gain = {1, 1, 1};
+  for (int c = 0; c < 3; ++c) {
+    double products = 0, squares = 0;
+    for (int y = 0; y < photo.height; ++y) {
+      for (int x = 0; x < photo.width / 2; ++x) {
+        if (mask && mask->at(x, y)[0] == 0) continue;
+        const double value = rendered.at(x, y)[c];
+        products += value * photo.at(x, y)[c];
+        squares += value * value;
+      }
+    }
+    if (squares > 1e-12) gain[static_cast<size_t>(c)] = products / squares;
+  }
+  return gain;
+}
+
+template <class T>
+Image<T> rightHalf(const Image<T>& image) {
+  const int first = image.width / 2;
+  Image<T> half(image.width - first, image.height, image.channels);
+  for (int y = 0; y < image.height; ++y) {
+    std::copy_n(image.at(first, y), static_cast<size_t>(half.width) * half.channels, half.at(0, y));
+  }
+  return half;
+}
+
+ImageF withMaskedPixelsFrom(ImageF image, const ImageF& other, const ImageU8& mask) {
+  for (size_t p = 0; p < image.pixelCount(); ++p) {
+    if (mask.pixels[p] == 0) std::copy_n(other.pixels.data() + 3 * p, 3, image.pixels.data() + 3 * p);
+  }
+  return image;
+}
+
+class Judge {
+ public:
+  explicit Judge(const EvaluateOptions& options) : options_(options), pool_(options.threads) {
+    if (!options.lpipsWeights.empty()) lpips_.emplace(options.lpipsWeights);
+  }
+
+  std::string lpipsNet() const { return lpips_ ? lpips_->net() : std::string(); }
+
+  void judge(const ImageF& photo, const ImageF& rendered, const ImageU8* mask, ViewResult& result) {
+    result.psnr = tessera::psnr(rendered, photo, mask);
+    result.ssim = tessera::ssim(rendered, photo, mask);
+    if (lpips_ && std::min(photo.width, photo.height) >= lpips_->smallestSide()) {
+      result.lpips = (*lpips_)(mask ? withMaskedPixelsFrom(rendered, photo, *mask) : rendered, photo, pool_).total;
+    }
+  }
+
+  ViewResult view(ViewRenderer& renderer, const Photo& photo, const Camera& camera) {
+    ViewResult result;
+    result.name = photo.name;
+    const ImageF target = readPhoto(photo, camera, renderer.background());
+    const std::optional<ImageU8> mask = readMask(photo, camera);
+    const ImageU8* maskPointer = mask ? &*mask : nullptr;
+
+    const auto start = std::chrono::steady_clock::now();
+    const RenderedView view = renderer.render(camera, photo.worldFromCamera);
+    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    CHECK(view.colour.width == camera.width);
+    CHECK(view.colour.height == camera.height);
+    CHECK(view.colour.channels == 3);
+
+    ImageF rendered = compositeOver(view, renderer.background());
+    if (options_.fitExposure) result.gain = fittedGain(rendered, target, maskPointer);
+    for (size_t i = 0; i < rendered.pixels.size(); ++i) {
+      const float value = rendered.pixels[i] * static_cast<float>(result.gain[i % 3]);
+      rendered.pixels[i] = value > 0 ? std::min(value, 1.0f) : 0.0f;  // NaN is black, and shows as an error
+    }
+
+    std::optional<ImageF> measured;
+    if (!photo.depth.empty()) measured = readDepth(photo.depth, photo.depthUnit);
+    if (options_.fitExposure) {
+      std::optional<ImageU8> halfMask;
+      if (mask) halfMask = rightHalf(*mask);
+      judge(rightHalf(target), rightHalf(rendered), halfMask ? &*halfMask : nullptr, result);
+    } else {
+      judge(target, rendered, maskPointer, result);
+    }
+    if (measured) result.depth = depthError(view.depth, view.opacity, *measured, maskPointer);
+    if (!options_.imagesDir.empty()) writePictures(photo.name, target, rendered);
+    if (options_.onView) {
+      options_.onView(result, {target, rendered, view, maskPointer, measured ? &*measured : nullptr});
+    }
+    return result;
+  }
+
+ private:
+  void writePictures(const std::string& name, const ImageF& target, const ImageF& rendered) {
+    std::string stem = fs::path(name).replace_extension().string();
+    if (!written_.insert(stem).second) stem = name;  // a.jpg and a.png
+    const auto picture = resolveInside(options_.imagesDir, stem + ".png");
+    const auto error = resolveInside(options_.imagesDir, stem + ".error.png");
+    if (!picture || !error) throw Error(name, "", "would be written outside of the folder", "rename the photo");
+    writePng(*picture, toBytes(rendered));
+    writePng(*error, heatMap(absoluteDifference(rendered, target), 0, kBrightestError, ColourMap::inferno));
+  }
+
+  const EvaluateOptions& options_;
+  ThreadPool pool_;
+  std::optional<Lpips> lpips_;
+  std::set<std::string> written_;
+};
+
+// Mean of what exists; views that a mask covers wholly have no PSNR.
+template <class Value>
+double meanOf(const std::vector<ViewResult>& views, Value value, size_t& count) {
+  double sum = 0;
+  count = 0;
+  for (const ViewResult& view : views) {
+    const std::optional<double> found = value(view);
+    if (!found || std::isnan(*found)) continue;
+    sum += *found;
+    ++count;
+  }
+  return count > 0 ? sum / static_cast<double>(count) : std::nan("");
+}
+
+void summarise(EvaluationReport& report) {
+  using Number = std::optional<double>;
+  size_t count = 0;
+  report.psnr = meanOf(
+      report.views, [](const ViewResult& v) { return Number(v.psnr); }, count);
+  report.ssim = meanOf(
+      report.views, [](const ViewResult& v) { return Number(v.ssim); }, count);
+  report.secondsPerFrame = meanOf(
+      report.views, [](const ViewResult& v) { return Number(v.seconds); }, count);
+  const double lpips = meanOf(
+      report.views, [](const ViewResult& v) { return v.lpips; }, count);
+  if (count > 0) report.lpips = lpips;
+  const auto depthMean = [&](double DepthError::*member) {
+    return meanOf(
+        report.views, [&](const ViewResult& v) { return v.depth ? Number(*v.depth.*member) : Number(); }, count);
+  };
+  DepthError depth;
+  depth.absoluteRelative = depthMean(&DepthError::absoluteRelative);
+  depth.rootMeanSquare = depthMean(&DepthError::rootMeanSquare);
+  depth.medianAbsolute = depthMean(&DepthError::medianAbsolute);
+  depth.within125 = depthMean(&DepthError::within125);
+  for (const ViewResult& view : report.views) depth.pixels += view.depth ? view.depth->pixels : 0;
+  if (count > 0) report.depth = depth;
+}
+
+}  // namespace
+
+EvaluationReport evaluate(ViewRenderer& renderer, const Capture& capture, const EvaluateOptions& options) {
+  const std::vector<int> indices = capture.photosIn(options.split);
+  if (indices.empty()) {
+    throw Error(capture.root.string(), "", fmt::format("no photo is in the split \"{}\"", splitName(options.split)),
+                "import with --holdout every:8, or choose another --split");
+  }
+  Judge judge(options);
+  EvaluationReport report;
+  report.split = options.split;
+  report.fitExposure = options.fitExposure;
+  report.lpipsNet = judge.lpipsNet();
+  report.device = renderer.device();
+  for (const int index : indices) {
+    const Photo& photo = capture.photos[static_cast<size_t>(index)];
+    report.views.push_back(judge.view(renderer, photo, capture.cameras[static_cast<size_t>(photo.camera)]));
+  }
+  summarise(report);
+  return report;
+}
+
+}  // namespace tessera

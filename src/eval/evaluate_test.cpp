@@ -1,0 +1,212 @@
+#include "eval/evaluate.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "eval/fake_capture.h"
+#include "eval/psnr.h"
+
+namespace tessera {
+namespace {
+
+TEST(Evaluate, GivesTheCapToARendererThatReturnsThePhotos) {
+  FakeCapture fake("evaluate_perfect");
+  std::vector<ImageF> pictures;
+  for (const char* name : {"a.png", "b.png", "c.png"}) {
+    const ImageU8 image = fakePhoto(64, 48, pictures.size());
+    fake.add(name, image, name[0] == 'b' ? Split::train : Split::test);
+    pictures.push_back(toFloat(image));
+  }
+  FakeRenderer renderer(pictures);
+  int calls = 0;
+  EvaluateOptions options;
+  options.onView = [&](const ViewResult& result, const ViewPictures& seen) {
+    EXPECT_EQ(result.name, calls == 0 ? "a.png" : "c.png");
+    EXPECT_EQ(seen.photo.pixels, seen.rendered.pixels);
+    ++calls;
+  };
+  const EvaluationReport report = evaluate(renderer, fake.capture, options);
+  EXPECT_EQ(calls, 2);
+  ASSERT_EQ(report.views.size(), 2u);
+  EXPECT_EQ(report.psnr, kMaximumPsnr);
+  EXPECT_NEAR(report.ssim, 1.0, 1e-6);
+  EXPECT_FALSE(report.lpips);
+  EXPECT_FALSE(report.depth);
+  EXPECT_EQ(report.device, "fake <device>");
+}
+
+TEST(Evaluate, ClampsAndCompositesOverTheBackground) {
+  FakeCapture fake("evaluate_background");
+  fake.add("a", ImageU8(64, 48, 3, 255));
+  FakeRenderer renderer([](const Camera& camera, int) {
+    RenderedView view{ImageF(camera.width, camera.height, 3, 0.25f), ImageF(camera.width, camera.height, 1, 0.5f),
+                      ImageF(camera.width, camera.height, 1)};
+    return view;
+  });
+  renderer.colourBehind = {0.25f, 0.25f, 0.25f};  // 0.25 + 0.5 · 0.25 = 0.375 against 1
+  EXPECT_NEAR(evaluate(renderer, fake.capture, {}).psnr, -20 * std::log10(0.625), 1e-4);
+  renderer.colourBehind = {9, 9, 9};  // far too bright: clamped to the photo's white
+  EXPECT_EQ(evaluate(renderer, fake.capture, {}).psnr, kMaximumPsnr);
+}
+
+TEST(Evaluate, LaysTransparentPhotosOverTheSameBackground) {
+  FakeCapture fake("evaluate_alpha");
+  ImageU8 photo(128, 96, 4, 255);  // twice the camera's size as well
+  for (size_t p = 0; p < photo.pixelCount(); ++p) photo.pixels[4 * p + 3] = p % 2 == 0 ? 0 : 255;
+  fake.add("a", photo);
+  FakeRenderer renderer([](const Camera& camera, int) {
+    RenderedView view{ImageF(camera.width, camera.height, 3, 0.5f), ImageF(camera.width, camera.height, 1, 0.5f),
+                      ImageF(camera.width, camera.height, 1)};
+    return view;
+  });
+  renderer.colourBehind = {0.2f, 0.4f, 0.6f};
+  EXPECT_GT(evaluate(renderer, fake.capture, {}).psnr, 90);
+}
+
+TEST(Evaluate, DoesNotJudgeMaskedPixels) {
+  FakeCapture fake("evaluate_mask");
+  const ImageU8 photo = fakePhoto(64, 48, 1);
+  Photo& added = fake.add("a", photo);
+  added.mask = fake.capture.root / "mask.png";
+  ImageU8 mask(128, 96, 1, 255);  // of another size than the photo
+  ImageF rendered = toFloat(photo);
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 30; ++x) mask.at(x, y)[0] = 0;
+  }
+  for (int y = 0; y < 10; ++y) {
+    for (int x = 0; x < 15; ++x) rendered.at(x, y)[1] = 0.0f;
+  }
+  writePng(added.mask, mask);
+  FakeRenderer renderer({rendered});
+  const EvaluationReport report = evaluate(renderer, fake.capture, {});
+  EXPECT_EQ(report.psnr, kMaximumPsnr);
+  EXPECT_NEAR(report.ssim, 1.0, 1e-6);
+  fake.capture.photos[0].mask.clear();
+  EXPECT_LT(evaluate(renderer, fake.capture, {}).psnr, 30);
+}
+
+TEST(Evaluate, FindsAKnownGainOnTheLeftAndJudgesTheRight) {
+  FakeCapture fake("evaluate_gain");
+  const ImageU8 photo = fakePhoto(64, 48, 1);
+  fake.add("a", photo);
+  ImageF dark = toFloat(photo);
+  const float gain[3] = {1.25f, 0.8f, 2.0f};
+  for (size_t i = 0; i < dark.pixels.size(); ++i) dark.pixels[i] /= gain[i % 3];
+  FakeRenderer renderer({dark});
+  EvaluateOptions options;
+  EXPECT_LT(evaluate(renderer, fake.capture, options).psnr, 20);
+  options.fitExposure = true;
+  const EvaluationReport report = evaluate(renderer, fake.capture, options);
+  for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(report.views[0].gain[c], gain[c], 1e-5);
+  EXPECT_GT(report.psnr, 90);
+
+  // What only the right half shows never enters the fit: there it stays an error.
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 32; x < 64; ++x) {
+      for (int c = 0; c < 3; ++c) dark.at(x, y)[c] *= 0.5f;
+    }
+  }
+  FakeRenderer halfWrong({dark});
+  const EvaluationReport second = evaluate(halfWrong, fake.capture, options);
+  for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(second.views[0].gain[c], gain[c], 1e-5);
+  EXPECT_LT(second.psnr, 20);
+  EXPECT_NE(toJson(second).find("fitted on the left half, judged on the right"), std::string::npos);
+}
+
+TEST(Evaluate, MeasuresDepthWhereThePhotoHasIt) {
+  FakeCapture fake("evaluate_depth");
+  Photo& added = fake.add("a", fakePhoto(64, 48, 1));
+  added.depth = fake.capture.root / "depth.exr";
+  ImageF depth(64, 48, 1, 2.5f);
+  depth.at(0, 0)[0] = 0;
+  writeDepthExr(added.depth, depth);
+  fake.add("b", fakePhoto(64, 48, 2));
+  FakeRenderer renderer({toFloat(fakePhoto(64, 48, 1)), toFloat(fakePhoto(64, 48, 2))});  // at depth 2
+  const EvaluationReport report = evaluate(renderer, fake.capture, {});
+  ASSERT_TRUE(report.depth);
+  EXPECT_NEAR(report.depth->absoluteRelative, 0.2, 1e-6);
+  EXPECT_NEAR(report.depth->rootMeanSquare, 0.5, 1e-6);
+  EXPECT_EQ(report.depth->pixels, 64u * 48u - 1);
+  EXPECT_FALSE(report.views[1].depth);
+}
+
+TEST(Evaluate, SaysWhatIsMissing) {
+  FakeCapture fake("evaluate_errors");
+  FakeRenderer renderer({ImageF(64, 48, 3)});
+  EXPECT_THROW(evaluate(renderer, fake.capture, {}), Error);  // no photos
+  fake.add("small", ImageU8(32, 24, 3));
+  try {
+    evaluate(renderer, fake.capture, {});
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_NE(error.reason().find("32×24"), std::string::npos) << error.what();
+  }
+  fs::remove(fake.capture.photos[0].image);
+  EXPECT_THROW(evaluate(renderer, fake.capture, {}), Error);
+}
+
+TEST(Evaluate, WritesEachViewsPicturesAndNothingOutside) {
+  FakeCapture fake("evaluate_images");
+  const ImageU8 photo = fakePhoto(64, 48, 1);
+  fake.add("sub/a.jpg", photo);
+  fake.add("sub/a.png", photo);
+  FakeRenderer renderer({toFloat(photo), toFloat(photo)});
+  EvaluateOptions options;
+  options.imagesDir = fake.capture.root / "out";
+  evaluate(renderer, fake.capture, options);
+  EXPECT_EQ(readImage(options.imagesDir / "sub/a.png").image.pixels, photo.pixels);
+  EXPECT_EQ(readImage(options.imagesDir / "sub/a.png.png").image.pixels, photo.pixels);
+  EXPECT_EQ(readImage(options.imagesDir / "sub/a.error.png").image.width, 64);
+  fake.capture.photos[0].name = "../../escaped.jpg";
+  EXPECT_THROW(evaluate(renderer, fake.capture, options), Error);
+}
+
+TEST(Evaluate, WritesEveryPromisedKeyAsJson) {
+  FakeCapture fake("evaluate_json");
+  const ImageU8 photo = fakePhoto(64, 48, 1);
+  Photo& masked = fake.add("a \"quoted\" \xff name", photo);
+  masked.mask = fake.capture.root / "mask.png";
+  writePng(masked.mask, ImageU8(64, 48, 1, 0));  // nothing left to judge
+  fake.add("b", photo);
+  FakeRenderer renderer({toFloat(photo), toFloat(photo)});
+  const auto json = nlohmann::json::parse(toJson(evaluate(renderer, fake.capture, {})));
+  EXPECT_EQ(json["psnr"], kMaximumPsnr);  // of the view that has one
+  EXPECT_TRUE(json["lpips"].is_null());
+  EXPECT_TRUE(json["lpips_net"].is_null());
+  EXPECT_TRUE(json["depth"].is_null());
+  ASSERT_EQ(json["views"].size(), 2u);
+  EXPECT_TRUE(json["views"][0]["psnr"].is_null());
+  EXPECT_TRUE(json["views"][0]["ssim"].is_null());
+  EXPECT_EQ(json["views"][1]["name"], "b");
+  EXPECT_GE(json["seconds_per_frame"].get<double>(), 0.0);
+  EXPECT_EQ(json["device"], "fake <device>");
+  EXPECT_EQ(json["exposure"], "neutral");
+  EXPECT_EQ(json["split"], "test");
+  EXPECT_TRUE(json["units"].contains("psnr"));
+}
+
+TEST(Evaluate, ReportsLpipsWithWeights) {
+  const char* shared = std::getenv("TESSERA_SHARED_DATA");
+  if (shared == nullptr) GTEST_SKIP() << "TESSERA_SHARED_DATA is not set: evaluation with LPIPS weights is not tested";
+  FakeCapture fake("evaluate_lpips");
+  const ImageU8 photo = fakePhoto(64, 48, 1);
+  fake.add("a", photo);
+  FakeRenderer renderer({toFloat(fakePhoto(64, 48, 2))});
+  EvaluateOptions options;
+  options.lpipsWeights = fs::path(shared) / "lpips" / "squeeze.safetensors";
+  const EvaluationReport report = evaluate(renderer, fake.capture, options);
+  ASSERT_TRUE(report.lpips);
+  EXPECT_GT(*report.lpips, 0.05);
+  EXPECT_EQ(report.lpipsNet, "squeeze");
+  FakeRenderer perfect({toFloat(photo)});
+  EXPECT_EQ(*evaluate(perfect, fake.capture, options).lpips, 0.0);
+  options.fitExposure = true;  // 32 pixels wide, the right half can still be judged
+  EXPECT_TRUE(evaluate(perfect, fake.capture, options).lpips);
+}
+
+}  // namespace
+}  // namespace tessera

@@ -1,0 +1,71 @@
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "eval/evaluate.h"
+
+namespace tessera {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json number(std::optional<double> value) {
+  return value && std::isfinite(*value) ? ordered_json(*value) : ordered_json(nullptr);
+}
+
+ordered_json depthObject(const std::optional<DepthError>& depth) {
+  if (!depth) return nullptr;
+  return {{"absolute_relative", number(depth->absoluteRelative)},
+          {"rmse", number(depth->rootMeanSquare)},
+          {"median_absolute", number(depth->medianAbsolute)},
+          {"within_1.25", number(depth->within125)},
+          {"pixels", depth->pixels}};
+}
+
+}  // namespace
+
+std::string_view splitName(Split split) {
+  switch (split) {
+    case Split::train:
+      return "train";
+    case Split::validation:
+      return "validation";
+    case Split::test:
+      return "test";
+  }
+  return "";
+}
+
+std::string_view exposureName(bool fitted) {
+  return fitted ? "fitted on the left half, judged on the right" : "neutral";
+}
+
+std::string toJson(const EvaluationReport& report) {
+  ordered_json views = ordered_json::array();
+  for (const ViewResult& view : report.views) {
+    ordered_json one = {
+        {"name", view.name},           {"psnr", number(view.psnr)},        {"ssim", number(view.ssim)},
+        {"lpips", number(view.lpips)}, {"depth", depthObject(view.depth)}, {"seconds", number(view.seconds)}};
+    if (report.fitExposure) one["gain"] = view.gain;
+    views.push_back(std::move(one));
+  }
+  const ordered_json object = {
+      {"psnr", number(report.psnr)},
+      {"ssim", number(report.ssim)},
+      {"lpips", number(report.lpips)},
+      {"lpips_net", report.lpipsNet.empty() ? ordered_json(nullptr) : ordered_json(report.lpipsNet)},
+      {"depth", depthObject(report.depth)},
+      {"views", std::move(views)},
+      {"seconds_per_frame", number(report.secondsPerFrame)},
+      {"device", report.device},
+      {"exposure", exposureName(report.fitExposure)},
+      {"split", splitName(report.split)},
+      {"units",
+       {{"psnr", "dB, mean over views, unrounded rendering against photo bytes / 255, at most 99"},
+        {"ssim", "11x11 Gaussian, valid windows, mean over views"},
+        {"lpips", "version 0.1, inputs in [-1, 1], mean over views"},
+        {"depth", "z-depth in world units; absolute_relative and within_1.25 are ratios"},
+        {"seconds", "rendering alone"}}}};
+  return object.dump(2, ' ', false, ordered_json::error_handler_t::replace);
+}
+
+}  // namespace tessera
