@@ -135,6 +135,7 @@ void run(const MarchRays& a) {
   Doubles positions, distances, steps;
   uint32_t made = 0;
   bool full = false;
+  uint32_t finished = 0;
   hostPointer(a.firstSample)[0] = 0;
   for (size_t r = 0; r < rays; ++r) {
     const Point origin = {origins[3 * r], origins[3 * r + 1], origins[3 * r + 2]};
@@ -142,16 +143,19 @@ void run(const MarchRays& a) {
     const std::vector<MarchSample> samples = marchRay(a.space, origin, direction, jitter.empty() ? 0 : jitter[r],
                                                       farOfRay.empty() ? a.space.far : farOfRay[r], occupancy);
     full = full || made + samples.size() > a.sampleCapacity;
-    if (!full)
+    if (!full) {
+      ++finished;
       for (const MarchSample& sample : samples) {
         hostPointer(a.rayOfSample)[made++] = static_cast<uint32_t>(r);
         positions.insert(positions.end(), sample.u.begin(), sample.u.end());
         distances.push_back(sample.distance);
         steps.push_back(sample.length);
       }
+    }
     hostPointer(a.firstSample)[r + 1] = made;
   }
   hostPointer(a.sampleCount)[0] = made;
+  if (a.finishedRays) hostPointer(a.finishedRays)[0] = finished;
   store(a.positions, positions);
   store(a.distances, distances);
   store(a.steps, steps);

@@ -1,0 +1,158 @@
+// Walks operation × device × shape: agrees with the reference; gradient agrees with finite differences of the reference
+// forward in double; on the cpu the same bits for 1 and 2 threads.
+#include "compute/device_test.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+
+namespace tessera::device_test {
+namespace {
+
+struct Row {
+  Operation operation;
+  OperationTests (*tests)();
+};
+
+void PrintTo(const Row& row, std::ostream* out) {
+  *out << kOperationNames[static_cast<int>(row.operation)];
+}
+
+constexpr Row kRows[] = {
+#define TESSERA_ROW(name) {Operation::k##name, testsOf<name>},
+    TESSERA_OPERATIONS(TESSERA_ROW)
+#undef TESSERA_ROW
+};
+
+std::string_view nameOf(Operation operation) {
+  return kOperationNames[static_cast<int>(operation)];
+}
+
+uint64_t seedOf(Operation operation, size_t caseIndex) {
+  return 1000 * (1 + static_cast<uint64_t>(operation)) + caseIndex;
+}
+
+uint32_t bitsOf(float value) {
+  uint32_t bits;
+  std::memcpy(&bits, &value, sizeof(bits));
+  return bits;
+}
+
+// Empty when they agree. With `exact` the bits of everything must be equal.
+std::string difference(const Output& got, const Output& want, bool exact) {
+  if (got.values.size() != want.values.size() || got.words.size() != want.words.size()) return "sizes differ";
+  for (size_t i = 0; i < want.words.size(); ++i)
+    if (got.words[i] != want.words[i])
+      return fmt::format("{}[{}] is {} instead of {}", want.name, i, got.words[i], want.words[i]);
+  double largest = 1e-3;
+  for (float value : want.values)
+    if (value != kPoison) largest = std::max<double>(largest, std::abs(value));
+  for (size_t i = 0; i < want.values.size(); ++i) {
+    const float a = got.values[i], b = want.values[i];
+    const bool same = exact || want.tolerance == 0 || b == kPoison ? bitsOf(a) == bitsOf(b)
+                                                                   : std::abs(a - b) <= want.tolerance * largest;
+    if (!same)
+      return fmt::format("{}[{}] is {} instead of {} (largest {}, tolerance {})", want.name, i, a,
+                         b == kPoison ? "untouched" : fmt::format("{}", b), largest, want.tolerance);
+  }
+  return {};
+}
+
+void compare(const Outputs& got, const Outputs& want, bool exact, const std::string& what) {
+  ASSERT_EQ(got.size(), want.size());
+  for (size_t i = 0; i < want.size(); ++i) EXPECT_EQ(difference(got[i], want[i], exact), "") << what;
+}
+
+Outputs outputsOf(const Case& testCase, Device& device, uint64_t seed) {
+  Stage stage(device, seed);
+  testCase.run(stage);
+  return stage.outputs();
+}
+
+class DeviceTest : public testing::TestWithParam<std::tuple<Row, std::string>> {
+ protected:
+  void SetUp() override {
+    const auto& [row, name] = GetParam();
+    operation = row.operation;
+    tests = row.tests();
+    device = deviceNamed(name);
+    if (device == nullptr) GTEST_SKIP() << "this machine has no device \"" << name << "\"";
+    if (!device->supports(operation)) GTEST_SKIP() << name << " does not support " << nameOf(operation);
+  }
+
+  Operation operation{};
+  OperationTests tests;
+  Device* device = nullptr;
+};
+
+TEST_P(DeviceTest, AgreesWithTheReference) {
+  ASSERT_FALSE(tests.cases.empty());
+  Device* const reference = deviceNamed("reference");
+  if (device == reference) GTEST_SKIP() << "is the reference";
+  for (size_t i = 0; i < tests.cases.size(); ++i) {
+    const uint64_t seed = seedOf(operation, i);
+    const Case& testCase = tests.cases[i];
+    compare(outputsOf(testCase, *device, seed), outputsOf(testCase, *reference, seed), false,
+            fmt::format("{}, {}, seed {}", nameOf(operation), testCase.name, seed));
+  }
+}
+
+TEST_P(DeviceTest, HasTheGradientOfFiniteDifferences) {
+  ASSERT_NE(tests.gradients.empty(), tests.noGradient.empty()) << "either a gradient to check, or a reason";
+  if (tests.gradients.empty()) GTEST_SKIP() << tests.noGradient;
+  for (size_t i = 0; i < tests.gradients.size(); ++i) {
+    const uint64_t seed = seedOf(operation, 500 + i);
+    Stage stage(*device, seed);
+    for (const GradientPair& pair : tests.gradients[i].run(stage)) {
+      ASSERT_EQ(pair.fromDevice.size(), pair.byDifferences.size());
+      double largest = 0;
+      for (double slope : pair.byDifferences) largest = std::max(largest, std::abs(slope));
+      EXPECT_GT(largest, 0) << "nothing to compare in " << pair.name;
+      for (size_t k = 0; k < pair.fromDevice.size(); ++k)
+        EXPECT_NEAR(pair.fromDevice[k], pair.byDifferences[k], pair.tolerance * largest)
+            << tests.gradients[i].name << ", " << pair.name << "[" << k << "], seed " << seed;
+    }
+  }
+}
+
+TEST_P(DeviceTest, GivesTheSameBitsForAnyNumberOfThreads) {
+  const auto& name = std::get<1>(GetParam());
+  if (name != "cpu with 2 threads") GTEST_SKIP() << "concerns cpu with 2 threads against 1";
+  for (size_t i = 0; i < tests.cases.size(); ++i) {
+    const uint64_t seed = seedOf(operation, i);
+    compare(outputsOf(tests.cases[i], *device, seed),
+            outputsOf(tests.cases[i], *deviceNamed("cpu with 1 thread"), seed), true,
+            fmt::format("{}, {}, seed {}", nameOf(operation), tests.cases[i].name, seed));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Operations, DeviceTest,
+                         testing::Combine(testing::ValuesIn(kRows), testing::ValuesIn(deviceNames())),
+                         [](const auto& info) {
+                           std::string name =
+                               fmt::format("{}_{}", nameOf(std::get<0>(info.param).operation), std::get<1>(info.param));
+                           std::replace(name.begin(), name.end(), ' ', '_');
+                           return name;
+                         });
+
+// So that whoever reads the log sees what is missing where.
+TEST(Devices, SayWhatTheyDoNotSupport) {
+  for (const std::string& name : deviceNames()) {
+    Device* const device = deviceNamed(name);
+    if (device == nullptr) continue;
+    std::string missing;
+    for (const Row& row : kRows)
+      if (!device->supports(row.operation)) missing += fmt::format(" {}", nameOf(row.operation));
+    std::printf("%s (%s): lacks%s\n", name.c_str(), device->name().c_str(),
+                missing.empty() ? " nothing" : missing.c_str());
+  }
+  EXPECT_NE(deviceNamed("reference"), nullptr);
+  EXPECT_NE(deviceNamed("cpu with 1 thread"), nullptr);
+}
+
+}  // namespace
+}  // namespace tessera::device_test

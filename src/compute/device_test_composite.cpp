@@ -1,0 +1,165 @@
+// Cases of volume rendering.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "compute/device_test.h"
+
+namespace tessera::device_test {
+namespace {
+
+constexpr Extinction kExtinctions[] = {Extinction::opacity, Extinction::density, Extinction::logDensity};
+constexpr const char* kExtinctionNames[] = {"opacity", "density", "log density"};
+
+// Rays that stay clear, that end in the middle, and that meet something wholly opaque.
+std::vector<float> randomExtinctions(Random& random, Extinction extinction, const std::vector<uint32_t>& first) {
+  std::vector<float> x;
+  for (size_t ray = 0; ray + 1 < first.size(); ++ray) {
+    const float thick = ray % 2 == 0 ? 1.0f : 0.1f;
+    for (uint32_t i = first[ray]; i < first[ray + 1]; ++i) {
+      const bool opaque = ray % 3 == 2 && random.below(8) == 0;
+      switch (extinction) {
+        case Extinction::opacity:
+          x.push_back(opaque ? 1.0f : random.uniform(0, thick));
+          break;
+        case Extinction::density:
+          x.push_back(opaque ? 1e4f : random.uniform(0, 60 * thick));
+          break;
+        case Extinction::logDensity:
+          x.push_back(opaque ? 14.0f : random.uniform(-3, 2 + 2 * thick));
+          break;
+      }
+    }
+  }
+  return x;
+}
+
+struct Scene {
+  std::vector<uint32_t> first;
+  std::vector<float> x, steps, distances, colours, background;
+
+  Scene(Random& random, Extinction extinction, size_t rays, uint32_t mostSamples)
+      : first(random.firstSamples(rays, mostSamples)), x(randomExtinctions(random, extinction, first)) {
+    steps = random.floats(x.size(), 0.005f, 0.1f);
+    distances = random.floats(x.size(), 0.1f, 5);
+    colours = random.floats(3 * x.size(), 0, 1);
+    background = random.floats(3 * rays, 0, 1);
+  }
+};
+
+// Sets what forward and backward have in common.
+template <class Arguments>
+void setInputs(Stage& stage, const Scene& scene, Extinction extinction, const Size& size, Layout layout,
+               bool withBackground, Arguments& a) {
+  a.extinction = extinction;
+  a.minTransmittance = size.capacity % 2 ? 1e-4f : 0.01f;
+  a.rays = stage.count(size);
+  a.firstSample = stage.input(scene.first);
+  a.x = stage.matrixOf(scene.x, 1, layout);
+  if (extinction != Extinction::opacity) a.steps = stage.input(scene.steps);
+  a.distances = stage.input(scene.distances);
+  a.colours = stage.matrixOf(scene.colours, 3, layout);
+  if (withBackground) a.background = stage.input(scene.background);
+}
+
+}  // namespace
+
+template <>
+OperationTests testsOf<CompositeForward>() {
+  OperationTests tests;
+  tests.noGradient = "its gradient is CompositeBackward";
+  for (Extinction extinction : kExtinctions)
+    for (const Size& size : kSizes)
+      for (bool strided : {false, true})
+        tests.cases.push_back({fmt::format("{}, rays {}{}", kExtinctionNames[static_cast<int>(extinction)],
+                                           toString(size), strided ? ", strided, background" : ""),
+                               [=](Stage& stage) {
+                                 const Scene scene(stage.random, extinction, size.capacity, 50);
+                                 CompositeForward a;
+                                 setInputs(stage, scene, extinction, size, strided ? Layout::strided : Layout::plain,
+                                           strided, a);
+                                 a.colour = stage.output("colour", 3 * size.capacity);
+                                 a.opacity = stage.output("opacity", size.capacity);
+                                 a.depth = stage.output("depth", size.capacity);
+                                 a.weights = stage.output("weights", scene.x.size());
+                                 stage.device.run(a);
+                               }});
+  return tests;
+}
+
+template <>
+OperationTests testsOf<CompositeBackward>() {
+  OperationTests tests;
+  for (Extinction extinction : kExtinctions)
+    for (const Size& size : kSizes)
+      for (int optional = 0; optional < 16; ++optional) {
+        if (size.capacity > 200 && optional % 5 != 0) continue;
+        tests.cases.push_back({fmt::format("{}, rays {}, optional arguments {:04b}",
+                                           kExtinctionNames[static_cast<int>(extinction)], toString(size), optional),
+                               [=](Stage& stage) {
+                                 const Scene scene(stage.random, extinction, size.capacity, 50);
+                                 const Layout layout = optional & 1 ? Layout::strided : Layout::plain;
+                                 CompositeBackward a;
+                                 setInputs(stage, scene, extinction, size, layout, optional & 1, a);
+                                 a.rayColourGradients = stage.randomInput(3 * size.capacity, -1, 1);
+                                 if (optional & 2) a.rayOpacityGradients = stage.randomInput(size.capacity, -1, 1);
+                                 if (optional & 4) a.rayDepthGradients = stage.randomInput(size.capacity, -1, 1);
+                                 if (optional & 8) a.weightGradients = stage.randomInput(scene.x.size(), -1, 1);
+                                 a.xGradients = stage.output("xGradients", scene.x.size());
+                                 a.colourGradients = stage.outputMatrix("colourGradients", scene.x.size(), 3, layout);
+                                 stage.device.run(a);
+                               }});
+      }
+  for (Extinction extinction : kExtinctions)
+    for (bool everything : {false, true})
+      tests.gradients.push_back(
+          {fmt::format("{}{}", kExtinctionNames[static_cast<int>(extinction)], everything ? ", everything" : ""),
+           [=](Stage& stage) {
+             const Size size{9};
+             const Scene scene(stage.random, extinction, size.capacity, 12);
+             const size_t rays = size.capacity, samples = scene.x.size();
+             const std::vector<float> colour = stage.random.floats(3 * rays, -1, 1);
+             const std::vector<float> opacity = stage.random.floats(rays, -1, 1);
+             const std::vector<float> depth = stage.random.floats(rays, -1, 1);
+             const std::vector<float> weights = stage.random.floats(samples, -1, 1);
+             CompositeBackward a;
+             setInputs(stage, scene, extinction, size, Layout::plain, everything, a);
+             a.rayColourGradients = stage.input(colour);
+             if (everything) {
+               a.rayOpacityGradients = stage.input(opacity);
+               a.rayDepthGradients = stage.input(depth);
+               a.weightGradients = stage.input(weights);
+             }
+             a.xGradients = stage.output("xGradients", samples);
+             a.colourGradients = stage.outputMatrix("colourGradients", samples, 3, Layout::plain);
+             stage.device.run(a);
+
+             const Doubles steps = toDoubles(scene.steps), distances = toDoubles(scene.distances);
+             const auto loss = [&](View x, View colours) {
+               double sum = 0;
+               for (size_t r = 0; r < rays; ++r) {
+                 const size_t first = scene.first[r], count = scene.first[r + 1] - first;
+                 reference::RaySamples ray{x.subspan(first, count), View(steps).subspan(first, count),
+                                           View(distances).subspan(first, count),
+                                           colours.subspan(3 * first, 3 * count)};
+                 if (everything)
+                   for (int c = 0; c < 3; ++c) ray.background[c] = scene.background[3 * r + c];
+                 const reference::RayColour out = reference::compositeRay(extinction, a.minTransmittance, ray);
+                 for (int c = 0; c < 3; ++c) sum += colour[3 * r + c] * out.colour[c];
+                 if (!everything) continue;
+                 sum += opacity[r] * out.opacity + depth[r] * out.depth;
+                 for (size_t i = 0; i < count; ++i) sum += weights[first + i] * out.weights[i];
+               }
+               return sum;
+             };
+             const Doubles x = toDoubles(scene.x), c = toDoubles(scene.colours);
+             return std::vector<GradientPair>{
+                 {"x", stage.device.read(a.xGradients),
+                  centralDifferences([&](View moved) { return loss(moved, c); }, x, 1e-6, firstIndices(samples))},
+                 {"colours", stage.device.read(a.colourGradients.data),
+                  centralDifferences([&](View moved) { return loss(x, moved); }, c, 1e-4, firstIndices(3 * samples))}};
+           }});
+  return tests;
+}
+
+}  // namespace tessera::device_test

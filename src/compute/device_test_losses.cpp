@@ -1,0 +1,224 @@
+// Cases of the losses, exposure and the optimiser.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "compute/device_test.h"
+
+namespace tessera::device_test {
+namespace {
+
+constexpr ColourLossKind kKinds[] = {ColourLossKind::mse, ColourLossKind::huber, ColourLossKind::charbonnier};
+constexpr const char* kKindNames[] = {"mse", "huber", "charbonnier"};
+
+float parameterOf(ColourLossKind kind) {
+  return kind == ColourLossKind::huber ? 0.1f : 1e-3f;
+}
+
+}  // namespace
+
+template <>
+OperationTests testsOf<ColourLoss>() {
+  OperationTests tests;
+  for (ColourLossKind kind : kKinds) {
+    for (const Size& size : kSizes)
+      for (bool weighted : {false, true})
+        tests.cases.push_back({fmt::format("{}, rays {}{}", kKindNames[static_cast<int>(kind)], toString(size),
+                                           weighted ? ", weights" : ""),
+                               [=](Stage& stage) {
+                                 std::vector<float> weights = stage.random.floats(size.capacity, 0, 2);
+                                 for (size_t i = 0; i < weights.size(); i += 3) weights[i] = 0;
+                                 ColourLoss a;
+                                 a.kind = kind;
+                                 a.parameter = parameterOf(kind);
+                                 a.scale = 0.7f;
+                                 a.rays = stage.count(size);
+                                 a.predicted = stage.randomInput(3 * size.capacity, 0, 1);
+                                 a.target = stage.randomInput(3 * size.capacity, 0, 1);
+                                 if (weighted) a.weights = stage.input(weights);
+                                 a.loss = stage.output("loss", 2);
+                                 a.gradients = stage.output("gradients", 3 * size.capacity);
+                                 stage.device.run(a);
+                               }});
+    tests.gradients.push_back({kKindNames[static_cast<int>(kind)], [=](Stage& stage) {
+                                 const uint32_t rays = 21;
+                                 const std::vector<float> predicted = stage.random.floats(3 * rays, 0, 1);
+                                 const std::vector<float> target = stage.random.floats(3 * rays, 0, 1);
+                                 const std::vector<float> weights = stage.random.floats(rays, 0, 2);
+                                 ColourLoss a;
+                                 a.kind = kind;
+                                 a.parameter = parameterOf(kind);
+                                 a.scale = 0.3f;
+                                 a.rays.capacity = rays;
+                                 a.predicted = stage.input(predicted);
+                                 a.target = stage.input(target);
+                                 a.weights = stage.input(weights);
+                                 a.loss = stage.output("loss", 2);
+                                 a.gradients = stage.output("gradients", 3 * rays);
+                                 stage.device.run(a);
+                                 const auto loss = [&](View p) {
+                                   double sum = 0;
+                                   for (size_t i = 0; i < p.size(); ++i)
+                                     sum += a.scale * weights[i / 3] *
+                                            reference::colourLoss(kind, a.parameter, p[i] - target[i]).value;
+                                   return sum;
+                                 };
+                                 return std::vector<GradientPair>{{"predicted", stage.device.read(a.gradients),
+                                                                   centralDifferences(loss, toDoubles(predicted), 1e-7,
+                                                                                      firstIndices(predicted.size()))}};
+                               }});
+  }
+  return tests;
+}
+
+template <>
+OperationTests testsOf<DistortionLoss>() {
+  OperationTests tests;
+  for (const Size& size : kSizes)
+    tests.cases.push_back({"rays " + toString(size), [=](Stage& stage) {
+                             const std::vector<uint32_t> first = stage.random.firstSamples(size.capacity, 40);
+                             std::vector<float> distances;  // increasing along a ray, across the seam of the warp at 1
+                             for (uint32_t i = 0; i < first.back(); ++i)
+                               distances.push_back(0.2f + 0.05f * static_cast<float>(i % 41) +
+                                                   stage.random.uniform(0, 0.04f));
+                             DistortionLoss a;
+                             a.scale = 0.01f;
+                             a.rays = stage.count(size);
+                             a.firstSample = stage.input(first);
+                             a.weights = stage.randomInput(first.back(), 0, 0.1f);
+                             a.distances = stage.input(distances);
+                             a.steps = stage.randomInput(first.back(), 0.01f, 0.05f);
+                             a.loss = stage.output("loss", 1, 1e-4);
+                             a.weightGradients = stage.output("weightGradients", first.back(), 1e-4);
+                             stage.device.run(a);
+                           }});
+  tests.gradients.push_back(
+      {"one ray", [=](Stage& stage) {
+         const uint32_t samples = 14;
+         const std::vector<float> weights = stage.random.floats(samples, 0, 0.2f);
+         const std::vector<float> steps = stage.random.floats(samples, 0.01f, 0.1f);
+         std::vector<float> distances;
+         for (uint32_t i = 0; i < samples; ++i) distances.push_back(0.3f + 0.12f * static_cast<float>(i));
+         DistortionLoss a;
+         a.scale = 1.5f;
+         a.rays.capacity = 1;
+         a.firstSample = stage.input(std::vector<uint32_t>{0, samples});
+         a.weights = stage.input(weights);
+         a.distances = stage.input(distances);
+         a.steps = stage.input(steps);
+         a.loss = stage.output("loss", 1);
+         a.weightGradients = stage.output("weightGradients", samples);
+         stage.device.run(a);
+         const Doubles t = toDoubles(distances), dt = toDoubles(steps);
+         const auto loss = [&](View w) { return a.scale * reference::distortionOfRay(w, t, dt).loss; };
+         return std::vector<GradientPair>{{"weights", stage.device.read(a.weightGradients),
+                                           centralDifferences(loss, toDoubles(weights), 1e-5, firstIndices(samples))}};
+       }});
+  return tests;
+}
+
+template <>
+OperationTests testsOf<ExposureForward>() {
+  OperationTests tests;
+  tests.noGradient = "its gradient is ExposureBackward";
+  for (const Size& size : kSizes)
+    tests.cases.push_back({"rays " + toString(size), [=](Stage& stage) {
+                             ExposureForward a;
+                             a.rays = stage.count(size);
+                             a.colours = stage.randomInput(3 * size.capacity, 0, 1);
+                             a.photoOfRay = stage.input(stage.random.wordsBelow(size.capacity, 7));
+                             a.logGains = stage.randomInput(3 * 7, -2, 2);
+                             a.exposed = stage.output("exposed", 3 * size.capacity);
+                             stage.device.run(a);
+                           }});
+  return tests;
+}
+
+template <>
+OperationTests testsOf<ExposureBackward>() {
+  OperationTests tests;
+  for (const Size& size : kSizes)
+    for (bool inPlace : {false, true})
+      tests.cases.push_back({fmt::format("rays {}{}", toString(size), inPlace ? ", in place" : ""), [=](Stage& stage) {
+                               const std::vector<float> upstream = stage.random.floats(3 * size.capacity, -1, 1);
+                               ExposureBackward a;
+                               a.rays = stage.count(size);
+                               a.colours = stage.randomInput(3 * size.capacity, 0, 1);
+                               a.photoOfRay = stage.input(stage.random.wordsBelow(size.capacity, 7));
+                               a.logGains = stage.randomInput(3 * 7, -2, 2);
+                               if (inPlace) {
+                                 a.colourGradients = stage.output("colourGradients", upstream);
+                                 a.exposedGradients = a.colourGradients;
+                               } else {
+                                 a.colourGradients = stage.output("colourGradients", 3 * size.capacity);
+                                 a.exposedGradients = stage.input(upstream);
+                               }
+                               a.logGainGradients = stage.output("logGainGradients", stage.random.floats(3 * 7, -1, 1));
+                               stage.device.run(a);
+                             }});
+  tests.gradients.push_back(
+      {"three photos", [=](Stage& stage) {
+         const uint32_t rays = 23, photos = 3;
+         const std::vector<float> colours = stage.random.floats(3 * rays, 0, 1);
+         const std::vector<float> gains = stage.random.floats(3 * photos, -1, 1);
+         const std::vector<float> upstream = stage.random.floats(3 * rays, -1, 1);
+         const std::vector<uint32_t> photoOfRay = stage.random.wordsBelow(rays, photos);
+         ExposureBackward a;
+         a.rays.capacity = rays;
+         a.colours = stage.input(colours);
+         a.photoOfRay = stage.input(photoOfRay);
+         a.logGains = stage.input(gains);
+         a.exposedGradients = stage.input(upstream);
+         a.colourGradients = stage.output("colourGradients", 3 * rays);
+         a.logGainGradients = stage.input(std::vector<float>(3 * photos));
+         stage.device.run(a);
+         const auto loss = [&](View c, View g) {
+           double sum = 0;
+           for (size_t i = 0; i < c.size(); ++i)
+             sum += upstream[i] * c[i] * std::exp2(g[3 * photoOfRay[i / 3] + i % 3]);
+           return sum;
+         };
+         const Doubles c = toDoubles(colours), g = toDoubles(gains);
+         return std::vector<GradientPair>{
+             {"colours", stage.device.read(a.colourGradients),
+              centralDifferences([&](View moved) { return loss(moved, g); }, c, 1e-5, firstIndices(c.size()))},
+             {"gains", stage.device.read(a.logGainGradients),
+              centralDifferences([&](View moved) { return loss(c, moved); }, g, 1e-5, firstIndices(g.size()))}};
+       }});
+  return tests;
+}
+
+template <>
+OperationTests testsOf<Adam>() {
+  OperationTests tests;
+  tests.noGradient = "it is the optimiser";
+  for (uint32_t count : {1u, 37u, 1061u, 150001u})
+    for (bool skip : {false, true})
+      for (float l2 : {0.0f, 1e-2f})
+        tests.cases.push_back({fmt::format("{} parameters{}, l2 {}", count, skip ? ", zero gradients skipped" : "", l2),
+                               [=](Stage& stage) {
+                                 std::vector<float> gradients = stage.random.floats(count, -1, 1);
+                                 std::vector<uint32_t> counts = stage.random.wordsBelow(count, 300);
+                                 for (size_t i = 0; i < count; ++i) {
+                                   // Stretches of zeros longer than any vector, as hash tables have; negative zero is
+                                   // zero.
+                                   if (i / 64 % 2 == 1 || stage.random.below(4) == 0)
+                                     gradients[i] = stage.random.below(2) ? 0.0f : -0.0f;
+                                   if (i % 50 == 7) counts[i] = 0;
+                                   if (i % 50 == 8) counts[i] = 5000000;
+                                 }
+                                 Adam a;
+                                 a.skipZeroGradients = skip;
+                                 a.l2 = l2;
+                                 a.parameters = stage.output("parameters", stage.random.floats(count, -1, 1));
+                                 a.gradients = stage.output("gradients", gradients);
+                                 a.firstMoments = stage.output("firstMoments", stage.random.floats(count, -0.1f, 0.1f));
+                                 a.secondMoments =
+                                     stage.output("secondMoments", stage.random.floats(count, 1e-4f, 0.1f));
+                                 a.counts = stage.outputWords("counts", counts);
+                                 stage.device.run(a);
+                               }});
+  return tests;
+}
+
+}  // namespace tessera::device_test

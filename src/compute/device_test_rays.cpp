@@ -1,0 +1,254 @@
+// Cases of ray generation, marching and moving samples about.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "compute/device_test.h"
+#include "scene/camera.h"
+
+namespace tessera::device_test {
+namespace {
+
+// A picture of about 640 × 480 through each lens, distorted as real lenses are, with a random pose.
+RayCamera randomCamera(Random& random, LensModel lens) {
+  RayCamera camera;
+  camera.lens = static_cast<int32_t>(lens);
+  const float focal = random.uniform(400, 700);
+  const bool oneFocal = lens == LensModel::simplePinhole || lens == LensModel::simpleRadial ||
+                        lens == LensModel::radial || lens == LensModel::simpleRadialFisheye ||
+                        lens == LensModel::radialFisheye;
+  int used = 0;
+  camera.parameters[used++] = focal;
+  if (!oneFocal) camera.parameters[used++] = focal * 1.01f;
+  camera.parameters[used++] = 321;
+  camera.parameters[used++] = 239;
+  for (; used < lensParameterCount(lens); ++used) camera.parameters[used] = random.uniform(-0.01f, 0.02f);
+  if (lens == LensModel::fov) camera.parameters[4] = 0.8f;
+  const std::vector<float> axes = random.directions(2);  // made into a rotation by Gram and Schmidt
+  const Vec3d x(axes[0], axes[1], axes[2]), z = x.cross(Vec3d(axes[3], axes[4], axes[5])).normalized(), y = z.cross(x);
+  for (int row = 0; row < 3; ++row) {
+    camera.rotation[3 * row] = static_cast<float>(x[row]);
+    camera.rotation[3 * row + 1] = static_cast<float>(y[row]);
+    camera.rotation[3 * row + 2] = static_cast<float>(z[row]);
+    camera.centre[row] = random.uniform(-1, 1);
+  }
+  return camera;
+}
+
+struct NamedSpace {
+  std::string name;
+  MarchSpace space;
+};
+
+std::vector<NamedSpace> spaces() {
+  std::vector<NamedSpace> made(6);
+  made[0] = {"contracted", {.contracted = true, .gridResolution = 16, .far = 50, .minStep = 0.02f, .cone = 1.0f / 64}};
+  made[1] = {"contracted, uniform steps",
+             {.contracted = true, .gridResolution = 12, .far = 5, .minStep = 0.03f, .cone = 0}};
+  made[2] = {"contracted, steps bounded",
+             {.contracted = true,
+              .gridResolution = 16,
+              .near = 0,
+              .far = 30,
+              .minStep = 0.02f,
+              .maxStep = 0.1f,
+              .cone = 0.02f}};
+  made[3] = {"contracted, fine grid",
+             {.contracted = true, .gridResolution = 64, .far = 1000, .minStep = 0.00338f, .cone = 1.0f / 256}};
+  made[4] = {"bounded, uniform steps", {.contracted = false, .gridResolution = 16, .minStep = 0.02f, .cone = 0}};
+  made[5] = {"bounded, fine grid",
+             {.contracted = false, .gridResolution = 32, .near = 0.2f, .minStep = 0.01f, .cone = 0.01f}};
+  return made;
+}
+
+// Bits of a grid, each set with probability `share`.
+std::vector<uint32_t> randomBits(Random& random, const MarchSpace& space, float share) {
+  const uint32_t cells = space.gridResolution * space.gridResolution * space.gridResolution;
+  std::vector<uint32_t> bits(cells / 32);
+  for (uint32_t cell = 0; cell < cells; ++cell)
+    if (random.uniform(0, 1) < share) bits[cell / 32] |= 1u << cell % 32;
+  return bits;
+}
+
+// Inside and outside of the cube, in all directions, along axes, and none.
+void makeRays(Random& random, size_t rays, std::vector<float>* origins, std::vector<float>* directions) {
+  *origins = random.floats(3 * rays, -0.9f, 0.9f);
+  *directions = random.directions(rays);
+  for (size_t r = 0; r < rays; ++r) {
+    float* const o = origins->data() + 3 * r;
+    float* const d = directions->data() + 3 * r;
+    if (r % 3 == 1)
+      for (int a = 0; a < 3; ++a) o[a] *= 3;
+    if (r % 7 == 3)
+      for (int a = 0; a < 3; ++a) d[a] = a == static_cast<int>(r / 7 % 3) ? (r % 2 ? 1.0f : -1.0f) : 0.0f;
+    if (r % 11 == 5) d[0] = d[1] = d[2] = 0;
+  }
+}
+
+}  // namespace
+
+template <>
+OperationTests testsOf<GenerateRays>() {
+  OperationTests tests;
+  tests.noGradient = "cameras and pixels are fixed";
+  for (const Size& size : kSizes)
+    tests.cases.push_back({"every lens, rays " + toString(size), [=](Stage& stage) {
+                             std::vector<float> words;  // cameras, as 32-bit words
+                             for (int lens = 0; lens < kLensModelCount; ++lens) {
+                               const RayCamera camera = randomCamera(stage.random, static_cast<LensModel>(lens));
+                               const float* const from = reinterpret_cast<const float*>(&camera);
+                               words.insert(words.end(), from, from + sizeof(camera) / sizeof(float));
+                             }
+                             const Slice<float> memory = stage.input(words);
+                             std::vector<float> pixels = stage.random.floats(2 * size.capacity, 0, 480);
+                             for (size_t i = 0; i < pixels.size(); i += 26)
+                               pixels[i] = 1e7f;  // beyond every fold, or far to the side
+                             GenerateRays a;
+                             a.rays = stage.count(size);
+                             a.cameras = Slice<const RayCamera>(memory.memory, 0, kLensModelCount);
+                             a.cameraOfRay = stage.input(stage.random.wordsBelow(size.capacity, kLensModelCount));
+                             a.pixels = stage.input(pixels);
+                             a.origins = stage.output("origins", 3 * size.capacity, 0);
+                             a.directions = stage.output("directions", 3 * size.capacity, 3e-5);
+                             stage.device.run(a);
+                           }});
+  return tests;
+}
+
+template <>
+OperationTests testsOf<MarchRays>() {
+  OperationTests tests;
+  tests.noGradient = "sample positions carry no gradient";
+  for (const NamedSpace& named : spaces())
+    for (const Size& size : {Size{0}, Size{1}, Size{37}, Size{40, 23}, Size{5, 0}, Size{150, 1000}})
+      for (float share : {0.0f, 0.02f, 0.4f, 1.0f})
+        for (int optional = 0; optional < 2; ++optional) {
+          if (share == 1 && size.used() > 40) continue;
+          // The second time samples run out.
+          const uint32_t sampleCapacity = optional == 0 ? 60000 : 300;
+          tests.cases.push_back(
+              {fmt::format("{}, rays {}, {} occupied, {}", named.name, toString(size), share,
+                           optional == 0 ? "plain" : "jitter, far of ray, few samples"),
+               [=](Stage& stage) {
+                 std::vector<float> origins, directions;
+                 makeRays(stage.random, size.capacity, &origins, &directions);
+                 const Slice<float> jitter = optional ? stage.randomInput(size.capacity, 0, 1) : Slice<float>();
+                 const Slice<float> farOfRay = optional ? stage.randomInput(size.capacity, 0, 8) : Slice<float>();
+                 stage.device.run(MarchRays{
+                     named.space, stage.count(size), sampleCapacity, stage.input(origins), stage.input(directions),
+                     jitter, farOfRay, stage.input(randomBits(stage.random, named.space, share)),
+                     stage.outputWords("firstSample", size.capacity + 1), stage.outputWords("sampleCount", 1),
+                     optional ? stage.outputWords("finishedRays", 1) : Slice<uint32_t>(),
+                     stage.outputWords("rayOfSample", sampleCapacity),
+                     stage.output("positions", 3 * sampleCapacity, 1e-6),
+                     stage.output("distances", sampleCapacity, 1e-6), stage.output("steps", sampleCapacity, 1e-6)});
+               }});
+        }
+  return tests;
+}
+
+template <>
+OperationTests testsOf<CompactSamples>() {
+  OperationTests tests;
+  tests.noGradient = "it chooses samples; none is changed";
+  for (const Size& size : kSizes)
+    for (Layout layout : {Layout::plain, Layout::strided})
+      tests.cases.push_back(
+          {fmt::format("rays {}{}", toString(size), layout == Layout::strided ? ", strided" : ""), [=](Stage& stage) {
+             const std::vector<uint32_t> first = stage.random.firstSamples(size.capacity, 40);
+             const uint32_t capacity = first.back() + 9;
+             CompactSamples a;
+             a.rays = stage.count(size);
+             a.sampleCapacity = capacity;
+             a.minTransmittance = layout == Layout::plain ? 1e-4f : 0.3f;
+             a.firstSample = stage.input(first);
+             a.logDensity = stage.randomMatrix(capacity, 1, layout, -3, 6);
+             a.steps = stage.randomInput(capacity, 0.001f, 0.1f);
+             a.keptFirstSample = stage.outputWords("keptFirstSample", size.capacity + 1);
+             a.keptCount = stage.outputWords("keptCount", 1);
+             a.source = stage.outputWords("source", capacity);
+             stage.device.run(a);
+           }});
+  return tests;
+}
+
+template <>
+OperationTests testsOf<GatherRows>() {
+  OperationTests tests;
+  tests.noGradient = "it moves what will be computed again";
+  struct Shape {
+    uint32_t columns;
+    Layout layout;
+  };
+  for (const Shape& shape :
+       {Shape{1, Layout::plain}, Shape{3, Layout::plain}, Shape{16, Layout::strided}, Shape{8, Layout::grouped}})
+    for (const Size& size : kSizes)
+      tests.cases.push_back({fmt::format("{} columns, rows {}", shape.columns, toString(size)), [=](Stage& stage) {
+                               const uint32_t sources = 200;
+                               // Any bits: integers travel this way too, and look like NaN or denormal numbers.
+                               Matrix<float> input = stage.randomMatrix(sources, shape.columns, shape.layout, -1, 1);
+                               std::vector<uint32_t> bits(input.data.count);
+                               for (uint32_t& word : bits) word = stage.random.bits() >> stage.random.below(32);
+                               stage.device.writeBytes(*input.data.memory, input.data.first * sizeof(float),
+                                                       std::as_bytes(std::span(bits)));
+                               GatherRows a;
+                               a.rows = stage.count(size);
+                               a.source = stage.input(stage.random.wordsBelow(size.capacity, sources));
+                               a.input = input;
+                               a.output = stage.outputMatrix("output", size.capacity, shape.columns, shape.layout, 0);
+                               stage.device.run(a);
+                             }});
+  return tests;
+}
+
+template <>
+OperationTests testsOf<OccupancyPoints>() {
+  OperationTests tests;
+  tests.noGradient = "it only chooses where to look";
+  for (const NamedSpace& named : spaces())
+    for (float share : {0.0f, 0.1f, 1.0f}) {
+      const uint32_t all = named.space.gridResolution * named.space.gridResolution * named.space.gridResolution;
+      for (const auto& [uniform, occupied] :
+           {std::pair{all, 0u}, std::pair{1003u, 517u}, std::pair{0u, 33u}, std::pair{17u, 0u}, std::pair{0u, 0u}})
+        tests.cases.push_back({fmt::format("{}, {} occupied, {} + {} points", named.name, share, uniform, occupied),
+                               [=, uniform = uniform, occupied = occupied](Stage& stage) {
+                                 const uint64_t seed = stage.random.bits();
+                                 stage.device.run(
+                                     OccupancyPoints{named.space, uniform, occupied, seed,
+                                                     stage.input(randomBits(stage.random, named.space, share)),
+                                                     stage.outputWords("cells", uniform + occupied),
+                                                     stage.output("positions", 3 * (uniform + occupied), 0)});
+                               }});
+    }
+  return tests;
+}
+
+template <>
+OperationTests testsOf<OccupancyUpdate>() {
+  OperationTests tests;
+  tests.noGradient = "it is no part of the loss";
+  for (const NamedSpace& named : spaces())
+    for (uint32_t points : {0u, 1u, 1003u})
+      for (Layout layout : {Layout::plain, Layout::strided})
+        tests.cases.push_back({fmt::format("{}, {} points", named.name, points), [=](Stage& stage) {
+                                 const uint32_t r = named.space.gridResolution, all = r * r * r;
+                                 std::vector<float> grid = stage.random.floats(all, 0, 0.02f);
+                                 for (float& value : grid) {
+                                   const uint32_t kind = stage.random.below(10);
+                                   if (kind < 2) value = -1;
+                                   if (kind == 3) value = 0;
+                                 }
+                                 std::vector<uint32_t> cells = stage.random.wordsBelow(points, all);
+                                 for (size_t i = 0; i + 1 < cells.size(); i += 5) cells[i + 1] = cells[i];
+                                 std::vector<float> logDensity = stage.random.floats(points, -4, 4);
+                                 for (size_t i = 0; i < logDensity.size(); i += 101)
+                                   logDensity[i] = 200;  // whose exponential is infinite
+                                 stage.device.run(OccupancyUpdate{
+                                     named.space, points, 0.95f, points == 1 ? 1.0f : 0.01f, stage.input(cells),
+                                     stage.matrixOf(logDensity, 1, layout), stage.output("grid", grid, 1e-6),
+                                     stage.outputWords("occupancy", all / 32)});
+                               }});
+  return tests;
+}
+
+}  // namespace tessera::device_test

@@ -1,0 +1,198 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <numeric>
+
+#include "base/error.h"
+#include "compute/device_test.h"
+
+namespace tessera::device_test {
+
+std::vector<float> Random::floats(size_t count, float low, float high) {
+  std::vector<float> values(count);
+  for (float& value : values) value = uniform(low, high);
+  return values;
+}
+
+std::vector<float> Random::directions(size_t count) {
+  std::vector<float> values;
+  while (values.size() < 3 * count) {
+    const float x = uniform(-1, 1), y = uniform(-1, 1), z = uniform(-1, 1);
+    const float length = std::sqrt(x * x + y * y + z * z);
+    if (length < 0.1f || length > 1) continue;
+    for (float a : {x, y, z}) values.push_back(a / length);
+  }
+  return values;
+}
+
+std::vector<uint32_t> Random::wordsBelow(size_t count, uint32_t n) {
+  std::vector<uint32_t> values(count);
+  for (uint32_t& value : values) value = below(n);
+  return values;
+}
+
+std::vector<uint32_t> Random::firstSamples(size_t rays, uint32_t most) {
+  std::vector<uint32_t> first{0};
+  for (size_t r = 0; r < rays; ++r) first.push_back(first.back() + (below(5) == 0 ? 0 : below(most + 1)));
+  return first;
+}
+
+std::string toString(const Size& size) {
+  if (size.counter == kNoCounter) return fmt::format("{}", size.capacity);
+  return fmt::format("counter {} of {}", size.counter, size.capacity);
+}
+
+Count Stage::count(const Size& size) {
+  Count count;
+  count.capacity = size.capacity;
+  if (size.counter != kNoCounter) count.counter = input(std::vector<uint32_t>{static_cast<uint32_t>(size.counter)});
+  return count;
+}
+
+Slice<float> Stage::input(const std::vector<float>& values) {
+  return floats_.emplace_back(device.arrayOf(values)).all();
+}
+
+Slice<uint32_t> Stage::input(const std::vector<uint32_t>& values) {
+  return words_.emplace_back(device.arrayOf(values)).all();
+}
+
+size_t Stage::sizeOf(size_t rows, uint32_t columns, Layout layout) {
+  switch (layout) {
+    case Layout::plain:
+      return rows * columns;
+    case Layout::strided:
+      return rows * (columns + 5);
+    case Layout::grouped:
+      return (rows + 3) * ((columns + 1) / 2 * 2);
+  }
+  return 0;
+}
+
+Matrix<float> Stage::shaped(Slice<float> buffer, size_t rows, uint32_t columns, Layout layout) const {
+  switch (layout) {
+    case Layout::plain:
+      return {buffer, columns};
+    case Layout::strided:
+      return rows == 0 ? Matrix<float>(buffer, columns) : Matrix<float>(buffer, columns + 5).columnRange(3, columns);
+    case Layout::grouped:
+      return Matrix<float>::grouped(buffer, columns, 2, rows + 3);
+  }
+  return {};
+}
+
+Matrix<float> Stage::matrixOf(const std::vector<float>& values, uint32_t columns, Layout layout) {
+  const size_t rows = values.size() / columns;
+  std::vector<float> placed(sizeOf(rows, columns, layout), kPoison);
+  const Matrix<float> matrix = shaped(input(placed), rows, columns, layout);
+  for (size_t i = 0; i < values.size(); ++i)
+    placed[matrix.data.first + matrix.offset(i / columns, i % columns)] = values[i];
+  if (!placed.empty()) device.write(floats_.back().all(), std::span<const float>(placed));
+  return matrix;
+}
+
+Matrix<float> Stage::randomMatrix(size_t rows, uint32_t columns, Layout layout, float low, float high) {
+  return matrixOf(random.floats(rows * columns, low, high), columns, layout);
+}
+
+Slice<float> Stage::output(std::string name, size_t size, double tolerance) {
+  return output(std::move(name), std::vector<float>(size, kPoison), tolerance);
+}
+
+Slice<float> Stage::output(std::string name, const std::vector<float>& initial, double tolerance) {
+  const Slice<float> slice = input(initial);
+  watched_.push_back({std::move(name), tolerance, slice, {}});
+  return slice;
+}
+
+Slice<uint32_t> Stage::outputWords(std::string name, size_t size) {
+  return outputWords(std::move(name), std::vector<uint32_t>(size, kPoisonWord));
+}
+
+Slice<uint32_t> Stage::outputWords(std::string name, const std::vector<uint32_t>& initial) {
+  const Slice<uint32_t> slice = input(initial);
+  watched_.push_back({std::move(name), 0, {}, slice});
+  return slice;
+}
+
+Matrix<float> Stage::outputMatrix(std::string name, size_t rows, uint32_t columns, Layout layout, double tolerance) {
+  return shaped(output(std::move(name), sizeOf(rows, columns, layout), tolerance), rows, columns, layout);
+}
+
+Outputs Stage::outputs() {
+  device.finish();
+  Outputs outputs;
+  for (const Watched& watched : watched_)
+    outputs.push_back({watched.name, device.read(watched.floats), device.read(watched.words), watched.tolerance});
+  return outputs;
+}
+
+Doubles centralDifferences(const std::function<double(View)>& f, Doubles x, double h,
+                           const std::vector<uint32_t>& which) {
+  Doubles slopes;
+  for (uint32_t i : which) {
+    const double kept = x[i];
+    x[i] = kept + h;
+    const double after = f(x);
+    x[i] = kept - h;
+    const double before = f(x);
+    x[i] = kept;
+    slopes.push_back((after - before) / (2 * h));
+  }
+  return slopes;
+}
+
+std::vector<uint32_t> firstIndices(size_t count) {
+  std::vector<uint32_t> which(count);
+  std::iota(which.begin(), which.end(), 0u);
+  return which;
+}
+
+std::vector<float> pick(const std::vector<float>& values, const std::vector<uint32_t>& which) {
+  std::vector<float> picked;
+  for (uint32_t i : which) picked.push_back(values[i]);
+  return picked;
+}
+
+Doubles toDoubles(const std::vector<float>& values) {
+  return {values.begin(), values.end()};
+}
+
+std::vector<float> toFloats(View values) {
+  std::vector<float> floats;
+  for (double value : values) floats.push_back(static_cast<float>(value));
+  return floats;
+}
+
+double dot(View a, View b) {
+  CHECK(a.size() == b.size());
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+}
+
+std::vector<std::string> deviceNames() {
+  std::vector<std::string> names = {"reference", "cpu with 1 thread", "cpu with 2 threads"};
+#ifdef TESSERA_HAS_VULKAN
+  names.push_back("vulkan");
+#endif
+  return names;
+}
+
+Device* deviceNamed(const std::string& name) {
+  static std::map<std::string, std::unique_ptr<Device>> devices;
+  const auto [found, isNew] = devices.try_emplace(name);
+  if (isNew) {
+    DeviceOptions options;
+    options.kind = name.substr(0, name.find(' '));
+    if (options.kind == "cpu") options.threads = name.find('1') != std::string::npos ? 1 : 2;
+    try {
+      found->second = makeDevice(options);
+    } catch (const Error& error) {
+      std::printf("no device \"%s\": %s\n", name.c_str(), error.what());
+    }
+  }
+  return found->second.get();
+}
+
+}  // namespace tessera::device_test
