@@ -17,17 +17,19 @@ void main() {
   FOR_EACH(sampleIndex, countOf(arguments.values.samples)) {
     float gradient[kFeatures];
     bool any = false;
-    for (uint f = 0; f < kFeatures; ++f) {
+    [[unroll]] for (uint f = 0; f < kFeatures; ++f) {
       gradient[f] = encoded.data.values[elementOf(encoded, sampleIndex, levelIndex * kFeatures + f)];
       any = any || gradient[f] != 0;
     }
     if (!any) continue;
 
     const Cell cell = cellOf(positionOf(arguments.values.positions, sampleIndex), level);
-    for (uint corner = 0; corner < 8; ++corner) {
+    [[unroll]] for (uint corner = 0; corner < 8; ++corner) {
       const float weight = cornerWeight(cell, corner);
       const uint entry = cornerEntry(cell, corner, level) * kFeatures;
-      for (uint f = 0; f < kFeatures; ++f) addTo(arguments.values.tableGradients, entry + f, weight * gradient[f]);
+      [[unroll]] for (uint f = 0; f < kFeatures; ++f) {
+        addTo(arguments.values.tableGradients, entry + f, weight * gradient[f]);
+      }
     }
   }
 }

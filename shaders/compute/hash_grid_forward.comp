@@ -17,13 +17,13 @@ void main() {
   FOR_EACH(sampleIndex, countOf(arguments.values.samples)) {
     const Cell cell = cellOf(positionOf(arguments.values.positions, sampleIndex), level);
     float mixed[kFeatures];
-    for (uint f = 0; f < kFeatures; ++f) mixed[f] = 0;
-    for (uint corner = 0; corner < 8; ++corner) {
+    [[unroll]] for (uint f = 0; f < kFeatures; ++f) mixed[f] = 0;
+    [[unroll]] for (uint corner = 0; corner < 8; ++corner) {
       const float weight = cornerWeight(cell, corner);
       const uint entry = cornerEntry(cell, corner, level) * kFeatures;
-      for (uint f = 0; f < kFeatures; ++f) mixed[f] += weight * table.values[entry + f];
+      [[unroll]] for (uint f = 0; f < kFeatures; ++f) mixed[f] += weight * table.values[entry + f];
     }
-    for (uint f = 0; f < kFeatures; ++f) {
+    [[unroll]] for (uint f = 0; f < kFeatures; ++f) {
       encoded.data.values[elementOf(encoded, sampleIndex, levelIndex * kFeatures + f)] = mixed[f];
     }
   }

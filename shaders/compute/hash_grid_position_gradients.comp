@@ -15,10 +15,10 @@ vec3 slopeInLevel(vec3 position, uint sampleIndex, uint levelIndex) {
   MatrixArguments encoded = arguments.values.encodedGradients;
   const Cell cell = cellOf(position, level);
   vec3 slope = vec3(0);
-  for (uint corner = 0; corner < 8; ++corner) {
+  [[unroll]] for (uint corner = 0; corner < 8; ++corner) {
     const uint entry = cornerEntry(cell, corner, level) * kFeatures;
     float value = 0;  // g · θ
-    for (uint f = 0; f < kFeatures; ++f) {
+    [[unroll]] for (uint f = 0; f < kFeatures; ++f) {
       const float g = encoded.data.values[elementOf(encoded, sampleIndex, levelIndex * kFeatures + f)];
       value += g * arguments.values.table.values[entry + f];
     }

@@ -2,6 +2,7 @@
 // Defines: FloatPointer, UintPointer, KERNEL_ARGUMENTS(), WANTED(), FOR_EACH(), countOf(), elementOf().
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
+#extension GL_EXT_control_flow_attributes : require
 
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer FloatPointer { float values[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer UintPointer { uint values[]; };

@@ -39,8 +39,8 @@ void backward(MlpBackwardArguments a, uint firstSample, uint samples) {
     clearSums();
     accumulate(a.weights, offset, kWidth, 1, depth, kWidth);
     barrier();
-    for (uint r = 0; r < kRows; ++r) {
-      for (uint c = 0; c < kColumns; ++c) {
+    [[unroll]] for (uint r = 0; r < kRows; ++r) {
+      [[unroll]] for (uint c = 0; c < kColumns; ++c) {
         state[stateRow(r) * kStride + stateColumn(c)] = sums[r * kColumns + c];
       }
     }
@@ -58,8 +58,8 @@ void backward(MlpBackwardArguments a, uint firstSample, uint samples) {
   for (uint first = 0; first < a.inputGradients.columns; first += kWidth) {
     clearSums();
     accumulate(a.weights, first, a.paddedInputs, 1, kWidth, min(kWidth, a.paddedInputs - first));
-    for (uint r = 0; r < kRows; ++r) {
-      for (uint c = 0; c < kColumns; ++c) {
+    [[unroll]] for (uint r = 0; r < kRows; ++r) {
+      [[unroll]] for (uint c = 0; c < kColumns; ++c) {
         const uint row = firstSample + stateRow(r), column = first + stateColumn(c);
         if (row >= samples || column >= a.inputGradients.columns) continue;
         a.inputGradients.data.values[elementOf(a.inputGradients, row, column)] = sums[r * kColumns + c];

@@ -28,8 +28,8 @@ void forward(MlpForwardArguments a, uint firstSample, uint samples) {
   uint offset = a.paddedInputs * kWidth;  // of the next layer's weights
   for (uint layer = 0; layer < a.hiddenLayers; ++layer) {
     barrier();
-    for (uint r = 0; r < kRows; ++r) {
-      for (uint c = 0; c < kColumns; ++c) {
+    [[unroll]] for (uint r = 0; r < kRows; ++r) {
+      [[unroll]] for (uint c = 0; c < kColumns; ++c) {
         state[stateRow(r) * kStride + stateColumn(c)] = max(sums[r * kColumns + c], 0);
       }
     }
@@ -51,8 +51,8 @@ void forward(MlpForwardArguments a, uint firstSample, uint samples) {
   for (uint first = 0; first < a.paddedOutputs; first += kWidth) {
     clearSums();
     accumulate(a.weights, offset + first * kWidth, 1, kWidth, kWidth, min(kWidth, a.paddedOutputs - first));
-    for (uint r = 0; r < kRows; ++r) {
-      for (uint c = 0; c < kColumns; ++c) {
+    [[unroll]] for (uint r = 0; r < kRows; ++r) {
+      [[unroll]] for (uint c = 0; c < kColumns; ++c) {
         const uint row = firstSample + stateRow(r), column = first + stateColumn(c);
         if (row >= samples || column >= a.outputs.columns) continue;
         const float sum = sums[r * kColumns + c];

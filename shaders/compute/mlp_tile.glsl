@@ -30,7 +30,7 @@ uint stateColumn(uint c) { return gl_LocalInvocationIndex / kRowGroups * kColumn
        firstSample += gl_NumWorkGroups.x * kBlock)
 
 void clearSums() {
-  for (uint i = 0; i < kRows * kColumns; ++i) sums[i] = 0;
+  [[unroll]] for (uint i = 0; i < kRows * kColumns; ++i) sums[i] = 0;
 }
 
 // sums[sample][n] += Σ_{k < depth} state[sample][k] · weights[first + k · kStep + n · nStep] for n < columns; others add
@@ -46,9 +46,9 @@ void accumulate(FloatPointer weights, uint first, uint kStep, uint nStep, uint d
     }
     barrier();
     for (uint k = 0; k < kDepth; ++k) {
-      for (uint r = 0; r < kRows; ++r) {
+      [[unroll]] for (uint r = 0; r < kRows; ++r) {
         const float value = state[stateRow(r) * kStride + k0 + k];
-        for (uint c = 0; c < kColumns; ++c) {
+        [[unroll]] for (uint c = 0; c < kColumns; ++c) {
           sums[r * kColumns + c] += value * weightTile[k * kWidth + stateColumn(c)];
         }
       }

@@ -23,7 +23,7 @@ void main() {
   const uint tileRow = gl_LocalInvocationIndex / 8;
 
   float sums[16];
-  for (uint i = 0; i < 16; ++i) sums[i] = 0;
+  [[unroll]] for (uint i = 0; i < 16; ++i) sums[i] = 0;
   for (uint first = gl_WorkGroupID.z * kDepth; first < samples; first += gl_NumWorkGroups.z * kDepth) {
     barrier();
     for (uint i = gl_LocalInvocationIndex; i < kDepth * kTile; i += kThreads) {
@@ -36,16 +36,16 @@ void main() {
     }
     barrier();
     for (uint k = 0; k < kDepth; ++k) {
-      for (uint r = 0; r < 4; ++r) {
-        for (uint c = 0; c < 4; ++c) {
+      [[unroll]] for (uint r = 0; r < 4; ++r) {
+        [[unroll]] for (uint c = 0; c < 4; ++c) {
           sums[r * 4 + c] += afterTile[k * kTile + r * 8 + tileRow] * beforeTile[k * kTile + c * 8 + tileColumn];
         }
       }
     }
   }
 
-  for (uint r = 0; r < 4; ++r) {
-    for (uint c = 0; c < 4; ++c) {
+  [[unroll]] for (uint r = 0; r < 4; ++r) {
+    [[unroll]] for (uint c = 0; c < 4; ++c) {
       const uint row = firstRow + r * 8 + tileRow, column = firstColumn + c * 8 + tileColumn;
       const float sum = sums[r * 4 + c];
       if (row < a.rows && column < a.columns && sum != 0) addTo(a.gradients, row * a.columns + column, sum);
