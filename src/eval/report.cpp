@@ -192,8 +192,8 @@ std::string ReportBuilder::html(const EvaluationReport& report) const {
   html += bars(report);
   html += table(report, order);
   html +=
-      "<h2>Pictures</h2>\n<p class=\"quiet\" style=\"margin-bottom:.8rem\">Click a picture to enlarge it, click "
-      "beside it or press Tab to go on.</p>\n";
+      "<h2>Pictures</h2>\n<p class=\"quiet\" style=\"margin-bottom:.8rem\">Click a picture to enlarge it and again to "
+      "return.</p>\n";
   for (const size_t i : order) {
     const ViewResult& view = report.views[i];
     html += fmt::format(
@@ -206,8 +206,8 @@ std::string ReportBuilder::html(const EvaluationReport& report) const {
     if (found != figures_.end()) {
       for (const Figure& one : found->second) {
         html += fmt::format(
-            "<figure tabindex=\"0\"><img width=\"{}\" height=\"{}\" alt=\"{}\" "
-            "src=\"data:image/jpeg;base64,{}\"><figcaption>{}</figcaption></figure>\n",
+            "<figure><label><input type=\"checkbox\" autocomplete=\"off\"><img width=\"{}\" height=\"{}\" alt=\"{}\" "
+            "src=\"data:image/jpeg;base64,{}\"></label><figcaption>{}</figcaption></figure>\n",
             one.width, one.height, escapedHtml(one.caption), base64(one.jpeg), escapedHtml(one.caption));
       }
     }

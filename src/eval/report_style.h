@@ -40,11 +40,13 @@ tr:last-child td { border-bottom: 0; }
 .view:target { border-color: var(--accent); }
 .view header { display: flex; flex-wrap: wrap; gap: .2rem 1.2rem; align-items: baseline; margin-bottom: .7rem; }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(230px, 100%), 1fr)); gap: .7rem; }
-figure { margin: 0; cursor: zoom-in; outline: none; }
+figure { margin: 0; }
+figure label { display: block; cursor: zoom-in; }
+figure input { position: absolute; opacity: 0; pointer-events: none; }
 figure img { display: block; width: 100%; height: auto; border-radius: 6px; background: #0004; }
-figure:focus { cursor: default; }
-figure:focus img { position: fixed; inset: 0; width: 100vw; height: 100vh; object-fit: contain; background: #000e;
-  border-radius: 0; z-index: 9; }
+figure input:focus-visible + img { outline: 2px solid var(--accent); }
+figure input:checked + img { position: fixed; inset: 0; width: 100vw; height: 100vh; object-fit: contain;
+  background: #000e; border-radius: 0; z-index: 9; cursor: zoom-out; }
 figcaption { color: var(--quiet); font-size: .85rem; padding-top: .25rem; }
 @media print { .table { max-height: none; } .view { break-inside: avoid; } }
 )css";
