@@ -164,16 +164,6 @@ void planPark(CityLayout& city, Block& block, Dice& dice) {
                                           0.3f);
   }
   block.ponds.push_back(pond);
-  const int trees = static_cast<int>(lawn.width() * lawn.depth() / 62);
-  for (int i = 0; i < trees; ++i) {
-    const Vec2f foot(dice.between(lawn.x0, lawn.x1), dice.between(lawn.y0, lawn.y1));
-    const bool conifer = dice.chance(0.22f);
-    const float height = conifer ? dice.between(8, 14) : dice.between(6, 13);
-    const float radius = conifer ? dice.between(1.7f, 2.5f) : height * dice.between(0.26f, 0.36f);
-    const uint32_t seed = dice.seed();
-    if (pond.reach(foot.x(), foot.y()) < 1.5f || dice.chance(0.15f)) continue;
-    city.trees.push_back({foot, height, radius, conifer, 360, seed});
-  }
   Building kiosk;
   kiosk.centre = {lawn.x0 + 9, lawn.y1 - 8};
   kiosk.halfX = 4.5f;
@@ -182,6 +172,16 @@ void planPark(CityLayout& city, Block& block, Dice& dice) {
   kiosk.style = FacadeStyle::house;
   kiosk.roof = RoofStyle::hip;
   finish(city, kiosk, dice);
+  const int trees = static_cast<int>(lawn.width() * lawn.depth() / 62);
+  for (int i = 0; i < trees; ++i) {
+    const Vec2f foot(dice.between(lawn.x0, lawn.x1), dice.between(lawn.y0, lawn.y1));
+    const bool conifer = dice.chance(0.22f);
+    const float height = conifer ? dice.between(8, 14) : dice.between(6, 13);
+    const float radius = conifer ? dice.between(1.7f, 2.5f) : height * dice.between(0.26f, 0.36f);
+    const uint32_t seed = dice.seed();
+    if (pond.reach(foot.x(), foot.y()) < 1.5f || (foot - kiosk.centre).norm() < 6 + radius) continue;
+    city.trees.push_back({foot, height, radius, conifer, 360, seed});
+  }
 }
 
 // Two rows of detached houses with gardens.
@@ -247,7 +247,7 @@ void planSurroundings(CityLayout& city) {
     return false;
   };
   const float ringArea = outer.width() * outer.depth() - city.area.width() * city.area.depth();
-  const int houses = static_cast<int>(ringArea / 1500), trees = static_cast<int>(ringArea / 420);
+  const int houses = static_cast<int>(ringArea / 700), trees = static_cast<int>(ringArea / 190);
   for (int i = 0; i < houses; ++i) {
     const Vec2f p(dice.between(outer.x0, outer.x1), dice.between(outer.y0, outer.y1));
     Building house;
@@ -268,7 +268,7 @@ void planSurroundings(CityLayout& city) {
     const float grove = valueNoise(p.x() / 45, p.y() / 45, city.seed ^ 0x77u);
     const uint32_t seed = dice.seed();
     const float height = dice.between(5, 11);
-    if (-city.area.inside(p.x(), p.y()) < 6 || grove < dice.between(-0.5f, 0.6f) || onStreet(p, 3) ||
+    if (-city.area.inside(p.x(), p.y()) < 6 || grove < dice.between(-0.8f, 0.7f) || onStreet(p, 3) ||
         city.highestNear(p.x(), p.y(), 2) > city.terrain(p.x(), p.y()))
       continue;
     city.trees.push_back({p, height, height * 0.33f, seed % 4 == 0, 130, seed});

@@ -19,10 +19,11 @@ void addFrustum(const std::array<Vec3f, 4>& low, const std::array<Vec3f, 4>& hig
 
 void addCar(const Vec3f& foot, float yaw, uint32_t seed, SurfaceMesh& mesh) {
   Dice dice(seed);
-  static constexpr float kPaint[8][3] = {{0.75f, 0.75f, 0.76f}, {0.04f, 0.04f, 0.05f}, {0.35f, 0.36f, 0.38f},
-                                         {0.45f, 0.03f, 0.03f}, {0.04f, 0.10f, 0.32f}, {0.80f, 0.80f, 0.78f},
-                                         {0.10f, 0.22f, 0.14f}, {0.70f, 0.42f, 0.05f}};
-  const float* tint = kPaint[dice.below(8)];
+  static constexpr float kPaint[12][3] = {{0.75f, 0.75f, 0.76f}, {0.04f, 0.04f, 0.05f}, {0.35f, 0.36f, 0.38f},
+                                          {0.45f, 0.03f, 0.03f}, {0.04f, 0.10f, 0.32f}, {0.80f, 0.80f, 0.78f},
+                                          {0.10f, 0.22f, 0.14f}, {0.62f, 0.40f, 0.07f}, {0.70f, 0.71f, 0.72f},
+                                          {0.10f, 0.10f, 0.11f}, {0.22f, 0.23f, 0.25f}, {0.78f, 0.77f, 0.75f}};
+  const float* tint = kPaint[dice.below(12)];
   const uint32_t paint = mesh.addObject({.seed = seed, .colour = {tint[0], tint[1], tint[2]}});
   const uint32_t glass = mesh.addObject({.seed = seed, .colour = {0.02f, 0.025f, 0.03f}});
   const uint32_t tyre = mesh.addObject({.seed = seed, .colour = {0.02f, 0.02f, 0.02f}});

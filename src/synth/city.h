@@ -17,7 +17,7 @@ struct CityOptions {
   std::vector<double> altitudes{60, 120};  // of the flights, metres above the ground
   bool traffic = false;                    // cars that move between photos, with masks
   double exposureJitter = 0;               // standard deviation of the photos' log2 gain
-  int samplesPerPixel = 4;                 // more is slower and cleaner; uneven pixels get three times as many
+  int samplesPerPixel = 6;                 // more is slower and cleaner; uneven pixels get three times as many
   int holdoutEvery = 8;                    // photos 0, n, 2n, … are the test split; 0 for none
   bool pinhole = false;                    // an ideal lens instead of a mildly distorted one
   int threads = 0;                         // 0: all

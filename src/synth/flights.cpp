@@ -59,7 +59,11 @@ struct Planner {
     const bool oblique = f.kind == Flight::Kind::oblique;
     const double pitch = oblique ? 50 * kPi / 180 : kPi / 2;
     const double back = oblique ? f.altitude / std::tan(pitch) : 0;
-    const double spanX = 2 * halfX, spanY = 2 * halfY;
+    // Photos at the edge look inwards for the most part: what only one photo sees cannot be learnt from it.
+    const double frameX = f.altitude * camera.width / camera.focalX(),
+                 frameY = f.altitude * camera.height / camera.focalY();
+    const double spanX = 2 * std::max(halfX - 0.25 * frameX, 0.35 * halfX);
+    const double spanY = 2 * std::max(halfY - 0.25 * frameY, 0.35 * halfY);
     const double ratio = (spanX / camera.width) / (spanY / camera.height);
     int columns = std::max(1, static_cast<int>(std::lround(std::sqrt(f.photos * ratio))));
     int rows = std::max(1, (f.photos + columns - 1) / columns);
@@ -69,7 +73,8 @@ struct Planner {
       const int inRow = (f.photos - done + (rows - r) - 1) / (rows - r);
       for (int k = 0; k < inRow; ++k, ++done) {
         const int c = r % 2 == 0 ? k : inRow - 1 - k;
-        const double x = -halfX + spanX * (c + 0.5) / inRow, y = -halfY + spanY * (r + 0.5) / rows;
+        const double x = inRow > 1 ? spanX * (static_cast<double>(c) / (inRow - 1) - 0.5) : 0;
+        const double y = rows > 1 ? spanY * (static_cast<double>(r) / (rows - 1) - 0.5) : 0;
         const double heading = oblique ? f.heading : (r % 2 == 0 ? kPi / 2 : -kPi / 2) * (spanX >= spanY ? 0 : 1);
         shoot(x - back * std::sin(heading), y - back * std::cos(heading), f.altitude, heading, pitch,
               oblique ? fmt::format("oblique {:.0f} m heading {:.0f}", f.altitude, f.heading * 180 / kPi)

@@ -81,7 +81,7 @@ Vec3f plaza(float x, float y, uint32_t seed, float width) {
 
 // Flower beds and shrubs: dots of colour in dark green.
 Vec3f flowers(float x, float y, uint32_t seed, float width) {
-  const float pick = latticeRandom(floorInt(x / 0.5f), floorInt(y / 0.5f), seed);
+  const float pick = latticeRandom(floorInt(x / 0.33f), floorInt(y / 0.33f), seed);
   static const Vec3f kBlooms[4] = {
       {0.6f, 0.08f, 0.10f}, {0.65f, 0.5f, 0.08f}, {0.45f, 0.2f, 0.5f}, {0.7f, 0.66f, 0.6f}};
   const Vec3f green(0.07f, 0.13f, 0.04f);
@@ -95,8 +95,8 @@ Vec3f flowers(float x, float y, uint32_t seed, float width) {
 Vec3f grassColour(float x, float y, uint32_t seed, float width) {
   const float broad = fractalNoise(x, y, seed ^ 0xe1u, 14, 3, width),
               fine = fractalNoise(x, y, seed ^ 0xe2u, 1.3f, 4, width);
-  const Vec3f fresh(0.105f, 0.185f, 0.045f), dry(0.25f, 0.24f, 0.10f);
-  return mix(fresh, dry, clamped(0.28f + 0.5f * broad)) * (1 + 0.28f * fine);
+  const Vec3f fresh(0.085f, 0.130f, 0.042f), dry(0.20f, 0.185f, 0.09f);
+  return mix(fresh, dry, clamped(0.3f + 0.75f * broad)) * (1 + 0.32f * fine);
 }
 
 Vec3f terrainColour(const CityLayout& city, float x, float y, float width) {

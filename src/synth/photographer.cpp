@@ -10,7 +10,7 @@ namespace {
 
 // Radiance to display-linear in [0, 1): a soft shoulder, a little more contrast than the eye (Narkowicz's fit of ACES).
 float toneCurve(float x) {
-  x *= 0.42f;
+  x *= 0.37f;
   return clamped(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f));
 }
 
@@ -116,12 +116,12 @@ Exposed takePhoto(const CityScene& city, const TrafficScene* traffic, const Lens
       const float gain = static_cast<float>(std::exp2(options.exposure));
       for (int i = 0; i < 3; ++i)
         result.colour.at(x, y)[i] = static_cast<uint8_t>(std::lround(255 * srgbFromLinear(clamped(mean[i] * gain))));
-      if (touched) *result.mask.at(x, y) = 0;
-
       float zShare = 1;
+      bool moving = false;
       const Ray centre = sampler.rayAt(x + 0.5, y + 0.5, &zShare);
-      const std::optional<SurfaceHit> hit = firstHit(city, traffic, centre);
+      const std::optional<SurfaceHit> hit = firstHit(city, traffic, centre, &moving);
       *result.depth.at(x, y) = hit ? hit->distance * zShare : 0.f;
+      if (touched || moving) *result.mask.at(x, y) = 0;
     }
   });
   return result;

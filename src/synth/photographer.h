@@ -15,7 +15,7 @@ struct Exposed {
 };
 
 struct ShutterOptions {
-  int samplesPerPixel = 4;  // where the picture is even; about three times as many where it is not
+  int samplesPerPixel = 6;  // where the picture is even; about three times as many where it is not
   double exposure = 0;      // log2 gain, applied to linear light after the tone curve: exactly a gain, up to clipping
   uint64_t seed = 0;        // of the sampling pattern
 };

@@ -109,7 +109,7 @@ Surface surfaceAt(const CityLayout& city, const SurfaceHit& hit, float width) {
       s.albedo = Vec3f(0.022f, 0.045f, 0.036f) * (1 + 0.3f * fractalNoise(p.x(), p.y(), object.seed, 9, 3, width));
       s.normal = waterNormal(p.x(), p.y(), object.seed, width);
       s.gloss = 1;
-      s.reflectance = 0.03f;
+      s.reflectance = 0.045f;
       s.tracedMirror = true;
       break;
     case Material::leaf: {
@@ -123,9 +123,6 @@ Surface surfaceAt(const CityLayout& city, const SurfaceHit& hit, float width) {
       s.translucency = 0.3f;
       break;
     }
-    case Material::hedge:
-      s.albedo = Vec3f(0.06f, 0.11f, 0.04f);
-      break;
     case Material::bark:
     case Material::wood:
       s.albedo = object.colour * (1 + 0.3f * fractalNoise(u * 4, v, object.seed, 0.6f, 3, width));

@@ -25,7 +25,6 @@ enum class Material : uint16_t {
   water,
   bark,
   leaf,
-  hedge,
   wood,
   carPaint,
   carGlass,
