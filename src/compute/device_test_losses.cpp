@@ -78,9 +78,10 @@ OperationTests testsOf<DistortionLoss>() {
     tests.cases.push_back({"rays " + toString(size), [=](Stage& stage) {
                              const std::vector<uint32_t> first = stage.random.firstSamples(size.capacity, 40);
                              std::vector<float> distances;  // increasing along a ray, across the seam of the warp at 1
-                             for (uint32_t i = 0; i < first.back(); ++i)
-                               distances.push_back(0.2f + 0.05f * static_cast<float>(i % 41) +
-                                                   stage.random.uniform(0, 0.04f));
+                             for (uint32_t ray = 0; ray < size.capacity; ++ray)
+                               for (uint32_t i = 0; i < first[ray + 1] - first[ray]; ++i)
+                                 distances.push_back(0.2f + 0.05f * static_cast<float>(i) +
+                                                     stage.random.uniform(0, 0.04f));
                              DistortionLoss a;
                              a.scale = 0.01f;
                              a.rays = stage.count(size);

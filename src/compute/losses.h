@@ -25,7 +25,7 @@ struct ColourLoss {
 
 // Distortion (Barron et al. 2022, eq. 15) in O(n) per ray, on normalised positions s = g(t), g(t) = t/2 for t < 1,
 // 1 - 1/(2t) beyond (MERF's warp): Σ_ij w_i w_j |s_i - s_j| + Σ_i w_i² Δs_i / 3; intervals [t - step/2, t + step/2],
-// s_i their mean in s. loss[0] = scale · Σ_rays.
+// s_i their mean in s. Distances increase along a ray. loss[0] = scale · Σ_rays.
 struct DistortionLoss {
   float scale = 1;
   Count rays;

@@ -21,7 +21,9 @@ struct OccupancyPoints {
 };
 
 // First every cell decays; then grid = max(grid, exp(min(logDensity, 15)) · step) at the chosen cells (which may repeat),
-// where step is the marching step there: clamp(cone · ‖x‖∞, minStep, maxStep) with x the cell centre in scene units.
+// where step is the marching step there: clamp(cone · ‖x‖∞, minStep, maxStep) with x the cell centre in scene units;
+// ‖x‖∞ = 1 / (2 - ‖y‖∞) where the contracted centre y has ‖y‖∞ > 1. (Contracted space fills only half of its grid: cells
+// with two coordinates beyond 1 hold no point of the scene. Marking them negative spares their evaluation.)
 // Negative cells are never visible and stay as they are in both. Then
 // bit = grid > min(threshold, mean over all cells of max(grid, 0)).
 struct OccupancyUpdate {

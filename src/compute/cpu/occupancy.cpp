@@ -13,7 +13,9 @@ namespace {
 
 constexpr size_t kGrain = 1 << 14;  // fixed: partial sums are added in task order; a multiple of 32
 
-bool bitAt(const uint32_t* bits, uint32_t cell) { return (bits[cell / 32] >> (cell % 32)) & 1; }
+bool bitAt(const uint32_t* bits, uint32_t cell) {
+  return (bits[cell / 32] >> (cell % 32)) & 1;
+}
 
 // The marching step at a cell's centre.
 float stepAt(const MarchSpace& space, uint32_t cell) {
@@ -44,7 +46,8 @@ void run(Context& context, const OccupancyPoints& a) {
         cell = a.uniform == cells ? static_cast<uint32_t>(p) : random.below(index, cells);
       } else {
         cell = random.below(index, cells);
-        for (int attempt = 1; attempt < 10 && !bitAt(bits, cell); ++attempt) cell = random.below(index + attempt, cells);
+        for (int attempt = 1; attempt < 10 && !bitAt(bits, cell); ++attempt)
+          cell = random.below(index + attempt, cells);
       }
       chosen[p] = cell;
       const uint32_t at[3] = {cell % r, cell / r % r, cell / (r * r)};
@@ -70,7 +73,8 @@ void run(Context& context, const OccupancyUpdate& a) {
   for (size_t p = 0; p < a.points; ++p) {  // cells may repeat: one thread, though a maximum has no order
     float& value = grid[chosen[p]];
     if (value < 0) continue;
-    value = std::max(value, std::exp(logDensity[a.logDensity.offset(p, 0)]) * stepAt(a.space, chosen[p]));
+    value =
+        std::max(value, std::exp(std::min(logDensity[a.logDensity.offset(p, 0)], 15.0f)) * stepAt(a.space, chosen[p]));
   }
   const size_t tasks = (cells + kGrain - 1) / kGrain;
   std::vector<double> sums(tasks);

@@ -53,7 +53,6 @@ using Point = std::array<double, 3>;
 Point contract(const Point& x);    // MERF, eq. 4
 Point uncontract(const Point& y);  // its inverse
 Point gridFromScene(const MarchSpace& space, const Point& x);
-Point sceneFromGrid(const MarchSpace& space, const Point& u);
 uint32_t cellOf(const MarchSpace& space, const Point& u);
 Point generateRay(const RayCamera& camera, double pixelX, double pixelY);  // direction; zero where there is none
 

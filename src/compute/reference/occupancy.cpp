@@ -45,8 +45,9 @@ OccupancyChoice occupancyPoints(const MarchSpace& space, uint32_t uniform, uint3
 }
 
 double marchStepAtCell(const MarchSpace& space, uint32_t cell) {
-  const Point x = sceneFromGrid(space, cellCentre(space, cell));
-  const double norm = std::max({std::abs(x[0]), std::abs(x[1]), std::abs(x[2])});
+  double norm = 0;
+  for (double u : cellCentre(space, cell)) norm = std::max(norm, std::abs(space.contracted ? 4 * u - 2 : 2 * u - 1));
+  if (norm > 1) norm = 1 / (2 - norm);
   return std::clamp<double>(space.cone * norm, space.minStep, space.maxStep);
 }
 

@@ -45,11 +45,6 @@ Point gridFromScene(const MarchSpace& space, const Point& x) {
   return {(y[0] + 2) / 4, (y[1] + 2) / 4, (y[2] + 2) / 4};
 }
 
-Point sceneFromGrid(const MarchSpace& space, const Point& u) {
-  if (!space.contracted) return {2 * u[0] - 1, 2 * u[1] - 1, 2 * u[2] - 1};
-  return uncontract({4 * u[0] - 2, 4 * u[1] - 2, 4 * u[2] - 2});
-}
-
 uint32_t cellOf(const MarchSpace& space, const Point& u) {
   const int resolution = space.gridResolution;
   uint32_t cell[3];

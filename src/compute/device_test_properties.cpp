@@ -1,0 +1,170 @@
+// What must hold on every device whatever the reference says.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "compute/device_test.h"
+
+namespace tessera::device_test {
+namespace {
+
+class DeviceProperties : public testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override {
+    device = deviceNamed(GetParam());
+    if (device == nullptr) GTEST_SKIP() << "this machine has no device \"" << GetParam() << "\"";
+  }
+  bool lacks(Operation operation) const { return !device->supports(operation); }
+  Device* device = nullptr;
+};
+
+TEST_P(DeviceProperties, MemoryStartsZeroedAndKeepsWhatIsWritten) {
+  Array<float> array = device->array<float>(1001);
+  for (float value : device->read(array.all())) ASSERT_EQ(value, 0.0f);
+  const std::vector<float> written = {1, 2, 3};
+  device->write(array.part(500, 3), std::span<const float>(written));
+  EXPECT_EQ(device->read(array.part(499, 5)), (std::vector<float>{0, 1, 2, 3, 0}));
+  device->fillZero(array.part(501, 1));
+  EXPECT_EQ(device->read(array.part(499, 5)), (std::vector<float>{0, 1, 0, 3, 0}));
+}
+
+TEST_P(DeviceProperties, OpacityIsTheSumOfWeights) {
+  if (lacks(Operation::kCompositeForward)) GTEST_SKIP() << "no CompositeForward";
+  Stage stage(*device, 71);
+  const uint32_t rays = 50;
+  const std::vector<uint32_t> first = stage.random.firstSamples(rays, 60);
+  CompositeForward a;
+  a.rays.capacity = rays;
+  a.firstSample = stage.input(first);
+  a.x = stage.randomMatrix(first.back(), 1, Layout::plain, -3, 4);
+  a.steps = stage.randomInput(first.back(), 0.01f, 0.1f);
+  a.distances = stage.randomInput(first.back(), 0, 1);
+  a.colours = stage.randomMatrix(first.back(), 3, Layout::plain, 1, 1);
+  a.background = stage.input(std::vector<float>(3 * rays, 1.0f));
+  a.colour = stage.output("colour", 3 * rays);
+  a.opacity = stage.output("opacity", rays);
+  a.depth = stage.output("depth", rays);
+  a.weights = stage.output("weights", first.back());
+  device->run(a);
+  const std::vector<float> weights = device->read(a.weights), opacity = device->read(a.opacity);
+  for (float channel : device->read(a.colour)) EXPECT_NEAR(channel, 1, 2e-6) << "white before white is white";
+  for (uint32_t ray = 0; ray < rays; ++ray) {
+    double sum = 0;
+    for (uint32_t i = first[ray]; i < first[ray + 1]; ++i) sum += weights[i];
+    EXPECT_NEAR(opacity[ray], sum, 2e-6) << "ray " << ray;
+  }
+}
+
+TEST_P(DeviceProperties, CompactionKeepsAllSamplesThatCompositingWeighs) {
+  if (lacks(Operation::kCompositeForward) || lacks(Operation::kCompactSamples)) GTEST_SKIP() << "lacks operations";
+  Stage stage(*device, 72);
+  const uint32_t rays = 40;
+  const std::vector<uint32_t> first = stage.random.firstSamples(rays, 60);
+  CompositeForward a;
+  a.rays.capacity = rays;
+  a.firstSample = stage.input(first);
+  a.x = stage.randomMatrix(first.back(), 1, Layout::plain, -1, 6);
+  a.steps = stage.randomInput(first.back(), 0.01f, 0.1f);
+  a.distances = stage.randomInput(first.back(), 0, 1);
+  a.colours = stage.randomMatrix(first.back(), 3, Layout::plain, 0, 1);
+  a.colour = stage.output("colour", 3 * rays);
+  a.opacity = stage.output("opacity", rays);
+  a.depth = stage.output("depth", rays);
+  a.weights = stage.output("weights", first.back());
+  device->run(a);
+  CompactSamples c;
+  c.rays.capacity = rays;
+  c.sampleCapacity = first.back();
+  c.firstSample = a.firstSample;
+  c.logDensity = a.x;
+  c.steps = a.steps;
+  c.keptFirstSample = stage.outputWords("keptFirstSample", rays + 1);
+  c.keptCount = stage.outputWords("keptCount", 1);
+  c.source = stage.outputWords("source", first.back());
+  device->run(c);
+  const std::vector<uint32_t> source = device->read(c.source);
+  const uint32_t kept = device->read(c.keptCount)[0];
+  EXPECT_LT(kept, first.back());
+  std::vector<bool> isKept(first.back());
+  for (uint32_t i = 0; i < kept; ++i) isKept[source[i]] = true;
+  const std::vector<float> weights = device->read(a.weights);
+  for (uint32_t i = 0; i < first.back(); ++i) EXPECT_EQ(isKept[i], weights[i] > 0) << i;
+}
+
+TEST_P(DeviceProperties, OccupancyForgetsWhatIsEmptyAndKeepsWhatIsFull) {
+  if (lacks(Operation::kOccupancyPoints) || lacks(Operation::kOccupancyUpdate)) GTEST_SKIP() << "lacks operations";
+  Stage stage(*device, 73);
+  const MarchSpace space{.contracted = false, .gridResolution = 8, .minStep = 0.01f, .cone = 0};
+  const uint32_t all = 512;
+  const Slice<float> grid = stage.input(std::vector<float>(all, 1.0f));
+  const Slice<uint32_t> bits = stage.input(std::vector<uint32_t>(all / 32, ~0u));
+  const Slice<uint32_t> cells = stage.input(std::vector<uint32_t>(all));
+  const Slice<float> positions = stage.input(std::vector<float>(3 * all));
+  const Slice<float> densities = stage.input(std::vector<float>(all));
+  int updates = 0, lastChange = 0;
+  std::vector<uint32_t> before(all / 32, ~0u);
+  for (; updates < 150; ++updates) {
+    device->run(OccupancyPoints{space, all, 0, static_cast<uint64_t>(updates), bits, cells, positions});
+    std::vector<float> logDensity;  // a wall where x < 1/4, of optical thickness 0.05 per step; nothing beyond
+    const std::vector<float> at = device->read(positions);
+    for (uint32_t i = 0; i < all; ++i) logDensity.push_back(at[3 * i] < 0.25f ? std::log(5.0f) : -30.0f);
+    device->write(densities, std::span<const float>(logDensity));
+    device->run(OccupancyUpdate{space, all, 0.95f, 0.01f, cells, Matrix<float>(densities, 1), grid, bits});
+    const std::vector<uint32_t> now = device->read(bits);
+    if (now != before) lastChange = updates;
+    before = now;
+  }
+  // 0.95^n < 0.01 from n = 90 on, the mean being above 0.01 for as long.
+  EXPECT_NEAR(lastChange, 89, 1);
+  for (uint32_t cell = 0; cell < all; ++cell) EXPECT_EQ(before[cell / 32] >> cell % 32 & 1, cell % 8 < 2 ? 1u : 0u);
+}
+
+TEST_P(DeviceProperties, AdamCountsTheStepsOfEachParameterAndLeavesTheUntouchedAlone) {
+  if (lacks(Operation::kAdam)) GTEST_SKIP() << "no Adam";
+  Stage stage(*device, 74);
+  const size_t n = 101;
+  std::vector<float> parameters = stage.random.floats(n, -1, 1);
+  Adam a;
+  a.skipZeroGradients = true;
+  a.parameters = stage.input(parameters);
+  a.gradients = stage.input(std::vector<float>(n));
+  a.firstMoments = stage.input(std::vector<float>(n));
+  a.secondMoments = stage.input(std::vector<float>(n));
+  a.counts = stage.input(std::vector<uint32_t>(n));
+  Doubles theta = toDoubles(parameters), m(n), v(n);
+  std::vector<uint32_t> counts(n);
+  for (int step = 0; step < 20; ++step) {
+    std::vector<float> gradients(n);
+    for (size_t i = 0; i < n; ++i) {
+      if (i % 10 == 9 || (i + step) % 3 == 0) continue;  // some never, all others in two of three steps
+      const double g = gradients[i] = stage.random.uniform(0.1f, 1) * (stage.random.below(2) ? 1e-6f : 1.0f);
+      m[i] = 0.9 * m[i] + 0.1 * g;
+      v[i] = 0.99 * v[i] + 0.01 * g * g;
+      ++counts[i];
+      const double unbiased = std::sqrt(1 - std::pow(0.99, counts[i])) / (1 - std::pow(0.9, counts[i]));
+      theta[i] -= 1e-2 * unbiased * m[i] / (std::sqrt(v[i]) + 1e-15);
+    }
+    device->write(a.gradients, std::span<const float>(gradients));
+    device->run(a);
+    for (float gradient : device->read(a.gradients)) ASSERT_EQ(gradient, 0.0f);
+  }
+  EXPECT_EQ(device->read(a.counts), counts);
+  const std::vector<float> result = device->read(a.parameters);
+  for (size_t i = 0; i < n; ++i) {
+    EXPECT_NEAR(result[i], theta[i], 1e-5) << i;
+    if (i % 10 == 9) {
+      EXPECT_EQ(result[i], parameters[i]);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, DeviceProperties, testing::ValuesIn(deviceNames()), [](const auto& info) {
+  std::string name = info.param;
+  std::replace(name.begin(), name.end(), ' ', '_');
+  return name;
+});
+
+}  // namespace
+}  // namespace tessera::device_test

@@ -1,0 +1,200 @@
+// The mathematics against values worked out by hand.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/random.h"
+#include "compute/reference/functions.h"
+
+namespace tessera::reference {
+namespace {
+
+TEST(SphericalHarmonics, HaveTinyCudaNnsOrderAndSigns) {
+  const double direction[3] = {0.48, -0.6, 0.64};
+  const Doubles expected = {0.2820948,  0.2931615,  0.3127056,  -0.2345292, -0.3146539, 0.4195386,
+                            0.0721616,  -0.3356309, -0.0707971, 0.1172535,  -0.5327975, 0.2873904,
+                            -0.2273689, -0.2299123, -0.1198794, 0.2406245};
+  const Doubles values = sphericalHarmonics(4, direction);
+  ASSERT_EQ(values.size(), expected.size());
+  for (size_t i = 0; i < values.size(); ++i) EXPECT_NEAR(values[i], expected[i], 1e-7) << i;
+}
+
+TEST(SphericalHarmonics, HaveTheSameNormInEveryDirection) {
+  const RandomStream random(3, 0);
+  for (uint64_t i = 0; i < 100; ++i) {
+    const double z = 2 * random.uniformDouble(2 * i) - 1, angle = 6.2831853 * random.uniformDouble(2 * i + 1);
+    const double r = std::sqrt(1 - z * z), direction[3] = {r * std::cos(angle), r * std::sin(angle), z};
+    for (int degree = 1; degree <= 4; ++degree) {
+      double sum = 0;
+      for (double value : sphericalHarmonics(degree, direction)) sum += value * value;
+      EXPECT_NEAR(sum, degree * degree / (4 * 3.14159265358979), 1e-12);
+    }
+  }
+}
+
+TEST(FrequencyEncoding, PutsTheInputThenSinesThenCosines) {
+  const double x[2] = {0.3, -0.7};
+  const Doubles values = frequencyEncoding(2, 2, x);
+  const Doubles expected = {0.3,           -0.7,           std::sin(0.3), std::sin(-0.7), std::sin(0.6), std::sin(-1.4),
+                            std::cos(0.3), std::cos(-0.7), std::cos(0.6), std::cos(-1.4)};
+  ASSERT_EQ(values.size(), expected.size());
+  for (size_t i = 0; i < values.size(); ++i) EXPECT_NEAR(values[i], expected[i], 1e-15);
+}
+
+TEST(Contraction, MapsKnownPairsBothWays) {
+  const std::pair<Point, Point> pairs[] = {{{2, 1, -.5}, {1.5, .5, -.25}},
+                                           {{-4, 3, 1}, {-1.75, .75, .25}},
+                                           {{1, -10, 2}, {.1, -1.9, .2}},
+                                           {{1e6, 0, 0}, {1.999999, 0, 0}},
+                                           {{.3, -1, .2}, {.3, -1, .2}}};
+  for (const auto& [x, y] : pairs)
+    for (int a = 0; a < 3; ++a) {
+      EXPECT_NEAR(contract(x)[a], y[a], 1e-12);
+      EXPECT_NEAR(uncontract(y)[a], x[a], 1e-4 * std::max(1e-8, std::abs(x[a])));
+    }
+}
+
+TEST(Contraction, StretchesAtMost1Point932TimesAndMostAtACorner) {
+  const auto largestStretch = [](const Point& x) {  // the norm of the Jacobian, by its columns and power iteration
+    double jacobian[3][3];
+    for (int column = 0; column < 3; ++column) {
+      Point after = x, before = x;
+      after[column] += 1e-6;
+      before[column] -= 1e-6;
+      for (int row = 0; row < 3; ++row) jacobian[row][column] = (contract(after)[row] - contract(before)[row]) / 2e-6;
+    }
+    Point v = {0.5, 0.6, -0.7};
+    double length = 0;
+    for (int i = 0; i < 200; ++i) {
+      Point u{}, w{};
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) u[r] += jacobian[r][c] * v[c];
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) w[c] += jacobian[r][c] * u[r];
+      length = std::hypot(w[0], w[1], w[2]);
+      for (int a = 0; a < 3; ++a) v[a] = w[a] / length;
+    }
+    return std::sqrt(length);
+  };
+  const RandomStream random(4, 0);
+  for (uint64_t i = 0; i < 200; ++i) {
+    Point x;
+    for (int a = 0; a < 3; ++a) x[a] = 6 * random.uniformDouble(3 * i + a) - 3;
+    EXPECT_LE(largestStretch(x), 1.932);
+  }
+  EXPECT_NEAR(largestStretch({1 + 1e-5, 1 - 1e-5, 1 - 1e-5}), 1.9319, 1e-3);
+}
+
+TEST(Contraction, KeepsLinesStraightWithinARegion) {
+  const Point o = {1.5, 0.2, -0.3}, d = {0.7, 0.3, 0.2};
+  const auto at = [&](double t) { return contract({o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]}); };
+  const Point a = at(0), b = at(4), middle = at(1.3);
+  const double share = (middle[0] - a[0]) / (b[0] - a[0]);
+  for (int axis = 1; axis < 3; ++axis) EXPECT_NEAR(middle[axis], a[axis] + share * (b[axis] - a[axis]), 1e-12);
+}
+
+TEST(Composite, WeightsAndRemainingTransmittanceSumToOne) {
+  const RandomStream random(5, 0);
+  for (Extinction extinction : {Extinction::opacity, Extinction::density, Extinction::logDensity}) {
+    Doubles x(20), steps(20), distances(20), colours(60, 1.0);
+    for (size_t i = 0; i < x.size(); ++i) {
+      x[i] = 0.9 * random.uniformDouble(3 * i);
+      steps[i] = random.uniformDouble(3 * i + 1);
+      distances[i] = static_cast<double>(i);
+    }
+    const RayColour ray = compositeRay(extinction, 0, {x, steps, distances, colours, {1, 1, 1}});
+    double sum = 0, transmittance = 1;
+    for (size_t i = 0; i < x.size(); ++i) {
+      sum += ray.weights[i];
+      transmittance *= 1 - opacityOf(extinction, x[i], steps[i]);
+    }
+    EXPECT_NEAR(sum + transmittance, 1, 1e-14);
+    EXPECT_NEAR(ray.opacity, sum, 1e-14);
+    for (double channel : ray.colour) EXPECT_NEAR(channel, 1, 1e-14) << "white before white is white";
+  }
+}
+
+TEST(Composite, NeverDividesByTheTransparencyOfAnOpaqueSample) {
+  const Doubles x = {0.5, 1, 0.5}, distances = {1, 2, 3}, colours = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const RaySamples samples{x, {}, distances, colours, {}};
+  const RayGradients gradients = compositeRayBackward(Extinction::opacity, 0, samples, {1, 1, 1}, 0, 0, {});
+  EXPECT_DOUBLE_EQ(gradients.x[0], 0);  // either way a light of 1 arrives
+  EXPECT_DOUBLE_EQ(gradients.x[1], 0.5 * (1 - 0.5));
+  EXPECT_DOUBLE_EQ(gradients.x[2], 0);
+  EXPECT_DOUBLE_EQ(gradients.colours[8], 0);
+}
+
+TEST(Composite, StopsBehindTheSampleThatTakesTransmittanceBelowTheLeast) {
+  const Doubles x = {0.5, 0.9, 0.5}, distances = {1, 2, 3}, colours(9, 1.0);
+  const RaySamples samples{x, {}, distances, colours, {}};
+  const RayColour ray = compositeRay(Extinction::opacity, 0.1, samples);
+  EXPECT_EQ(ray.weights[1], 0.5 * 0.9);
+  EXPECT_EQ(ray.weights[2], 0);
+  EXPECT_DOUBLE_EQ(ray.opacity, 0.95);
+  EXPECT_EQ(compositeRayBackward(Extinction::opacity, 0.1, samples, {1, 1, 1}, 0, 0, {}).x[2], 0);
+}
+
+TEST(ColourLoss, HasTheValuesOfItsFormulas) {
+  EXPECT_NEAR(colourLoss(ColourLossKind::charbonnier, 1e-3, 0.001).value, 0.0014142136, 1e-10);
+  EXPECT_NEAR(colourLoss(ColourLossKind::charbonnier, 1e-3, 0.1).value, 0.1000050, 1e-7);
+  EXPECT_NEAR(colourLoss(ColourLossKind::huber, 0.1, 0.05).value, 0.0125, 1e-15);
+  EXPECT_NEAR(colourLoss(ColourLossKind::huber, 0.1, -0.3).value, 0.25, 1e-15);
+  EXPECT_EQ(colourLoss(ColourLossKind::huber, 0.1, -0.3).slope, -1);
+  EXPECT_EQ(colourLoss(ColourLossKind::mse, 0, 0.5).value, 0.25);
+  EXPECT_EQ(colourLoss(ColourLossKind::mse, 0, 0.5).slope, 1);
+}
+
+TEST(Distortion, HasTheValuesOfItsTable) {
+  const Doubles fences = {0, .1, .3, .35, .7, 1}, weights = {.05, .2, .4, .1, .05};
+  const Doubles slopes = {.458333, .271667, .183333, .393333, .835};
+  const LossAndGradients result = distortionOfFences(fences, weights);
+  EXPECT_NEAR(result.loss, 0.1158333, 1e-7);
+  for (size_t i = 0; i < slopes.size(); ++i) EXPECT_NEAR(result.gradients[i], slopes[i], 1e-6);
+}
+
+TEST(Distortion, OfARayIsThatOfItsWarpedFences) {
+  const Doubles steps = {0.2, 0.5, 1.1, 4}, weights = {0.1, 0.3, 0.2, 0.4};
+  Doubles distances, fences = {warpDistance(0.3)};
+  double t = 0.3;
+  for (double step : steps) {
+    distances.push_back(t + step / 2);
+    t += step;
+    fences.push_back(warpDistance(t));
+  }
+  EXPECT_NEAR(distortionOfRay(weights, distances, steps).loss, distortionOfFences(fences, weights).loss, 1e-14);
+  EXPECT_EQ(warpDistance(1), 0.5);
+  EXPECT_EQ(warpDistance(4), 0.875);
+}
+
+TEST(March, MakesPreciselyTheLatticePointsInOccupiedCells) {
+  // One occupied cell: samples are those whose contracted middle lies in its box, and they follow without gap.
+  MarchSpace space{.contracted = true, .gridResolution = 8, .far = 20, .minStep = 0.01f, .cone = 0};
+  const Point origin = {-0.3, 0.1, 0.2}, direction = {0.6, 0, 0.8};
+  std::vector<uint32_t> occupancy(8 * 8 * 8 / 32);
+  const uint32_t x = 4, y = 4, z = 6;  // contracted [0,.5) × [0,.5) × [1,1.5)
+  const uint32_t cell = x + 8 * (y + 8 * z);
+  occupancy[cell / 32] = 1u << cell % 32;
+  const std::vector<MarchSample> samples = marchRay(space, origin, direction, 0.25, 1e9, occupancy);
+  ASSERT_GT(samples.size(), 10u);
+  // m = z runs from 1 to 2 there: t from 1 to 2.25; x/m stays below a half until -.3 + .6 t = (.2 + .8 t) / 2, t = 2.
+  EXPECT_NEAR(samples.front().distance, 1, 0.011);
+  EXPECT_NEAR(samples.back().distance, 2, 0.011);
+  for (size_t i = 1; i < samples.size(); ++i) EXPECT_EQ(samples[i].step, samples[i - 1].step + 1);
+  for (const MarchSample& sample : samples) {
+    EXPECT_NEAR(sample.distance, (static_cast<double>(sample.step) + 0.75) * space.minStep, 1e-12);
+    EXPECT_EQ(sample.cell, cell);
+  }
+}
+
+TEST(Adam, MovesByTheRateAtTheFirstStep) {
+  Adam options;
+  options.rate = 0.01f;
+  AdamState state{1, 0, 0, 0};
+  adamStep(options, 1e-3, state);  // m / sqrt(v) is sign(g), both corrected
+  EXPECT_NEAR(state.parameter, 1 - 0.01, 1e-8);
+  EXPECT_EQ(state.count, 1u);
+}
+
+}  // namespace
+}  // namespace tessera::reference
