@@ -1,0 +1,70 @@
+// tessera: photographs of a large place to a neural scene. Every verb is a library function; errors are caught here.
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+
+#include "apps/tessera/verbs.h"
+#include "base/error.h"
+
+namespace tessera {
+namespace {
+
+volatile std::sig_atomic_t interrupts = 0;
+
+void onInterrupt(int signal) {
+  interrupts = interrupts + 1;
+  if (interrupts > 1) {
+    std::signal(signal, SIG_DFL);
+    std::raise(signal);
+  }
+}
+
+}  // namespace
+
+bool interrupted() { return interrupts > 0; }
+
+void catchInterrupts() {
+  std::signal(SIGINT, onInterrupt);
+  std::signal(SIGTERM, onInterrupt);
+}
+
+void addDeviceFlags(CLI::App& verb, DeviceOptions& options) {
+  verb.add_option("--device", options.kind, "what computes: auto, cpu, vulkan or reference")->capture_default_str();
+  verb.add_option("--threads", options.threads, "processor threads; 0: all cores")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+}
+
+}  // namespace tessera
+
+int main(int argc, char** argv) {
+  CLI::App app("tessera turns photographs of a large place into a neural scene.\n"
+               "  photos -import-> capture -train-> model -eval, render-> pictures");
+  app.name("tessera");
+  app.require_subcommand(1);
+  app.option_defaults()->always_capture_default();
+  app.set_version_flag("--version", TESSERA_VERSION);
+  tessera::addSynthVerb(app);
+  tessera::addImportVerb(app);
+  tessera::addTrainVerb(app);
+  tessera::addEvalVerb(app);
+  tessera::addRenderVerb(app);
+  tessera::addInfoVerb(app);
+  tessera::addBenchVerb(app);
+  try {
+    app.parse(argc, argv);
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const tessera::Error& error) {
+    std::fprintf(stderr, "tessera: error: %s\n", error.what());
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "tessera: error: memory: this machine has not enough; lower --set samples_per_step or "
+                         "photo_budget_mib\n");
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "tessera: error: internal: %s; please report it\n", error.what());
+  }
+  return 1;
+}

@@ -1,0 +1,80 @@
+#include <fmt/format.h>
+
+#include "apps/tessera/verbs.h"
+#include "base/error.h"
+#include "base/progress.h"
+#include "eval/report.h"
+#include "import/capture_reader.h"
+#include "representations/field/field_renderer.h"
+
+namespace tessera {
+namespace {
+
+Split splitFromName(const std::string& name) {
+  if (name == "train") return Split::train;
+  if (name == "validation") return Split::validation;
+  return Split::test;
+}
+
+}  // namespace
+
+void addEvalVerb(CLI::App& app) {
+  struct Flags {
+    std::string model, capture, split = "test", json, report, exposure = "neutral";
+    EvaluateOptions options;
+    std::string images, lpips;
+    DeviceOptions device;
+  };
+  auto flags = std::make_shared<Flags>();
+  CLI::App* verb = app.add_subcommand("eval", "held-out photos against renderings: PSNR, SSIM, LPIPS, depth error");
+  verb->footer("Example:\n  tessera eval fox.model fox.capture --report fox.html --json fox.json");
+  verb->add_option("model", flags->model, "model folder")->required();
+  verb->add_option("capture", flags->capture, "capture folder")->required();
+  verb->add_option("--split", flags->split, "which photos")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"test", "validation", "train"}));
+  verb->add_option("--exposure", flags->exposure, "neutral, or fitted on the left half and judged on the right")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"neutral", "fitted"}));
+  verb->add_option("--json", flags->json, "write the result as one JSON object here; - prints it");
+  verb->add_option("--report", flags->report, "write a self-contained report.html here; default MODEL/report.html");
+  verb->add_option("--images", flags->images, "write each rendering and its error map as PNG into this folder");
+  verb->add_option("--lpips", flags->lpips, "LPIPS weights (safetensors)");
+  addDeviceFlags(*verb, flags->device);
+  verb->callback([flags] {
+    const Capture capture = readCapture(flags->capture);
+    const std::unique_ptr<Device> device = makeDevice(flags->device);
+    const std::unique_ptr<FieldModel> model = loadFieldModel(*device, flags->model);
+    FieldRenderer renderer(*model);
+    EvaluateOptions options;
+    options.split = splitFromName(flags->split);
+    options.fitExposure = flags->exposure == "fitted";
+    options.lpipsWeights = flags->lpips;
+    options.imagesDir = flags->images;
+    options.threads = flags->device.threads;
+    const size_t views = capture.photosIn(options.split).size();
+    ReportBuilder builder(fs::path(flags->model).filename().string() + " on " +
+                              fs::path(flags->capture).filename().string(), views);
+    Progress progress("evaluating", static_cast<int64_t>(views), "views");
+    int64_t done = 0;
+    options.onView = [&](const ViewResult& result, const ViewPictures& pictures) {
+      builder.add(result, pictures);
+      progress.update(++done, fmt::format("{:.2f} dB", result.psnr));
+    };
+    const EvaluationReport report = evaluate(renderer, capture, options);
+    progress.finish();
+    const fs::path page = flags->report.empty() ? fs::path(flags->model) / "report.html" : fs::path(flags->report);
+    builder.write(page, report);
+    if (flags->json == "-") {
+      fmt::print("{}\n", toJson(report));
+      return;
+    }
+    if (!flags->json.empty()) writeFileAtomically(flags->json, toJson(report) + "\n");
+    fmt::print("{} views: PSNR {:.2f} dB, SSIM {:.4f}{}, exposure {}, {:.2f} s a frame on {}\nreport: {}\n",
+               report.views.size(), report.psnr, report.ssim,
+               report.lpips ? fmt::format(", LPIPS ({}) {:.4f}", report.lpipsNet, *report.lpips) : "",
+               exposureName(report.fitExposure), report.secondsPerFrame, report.device, page.string());
+  });
+}
+
+}  // namespace tessera

@@ -1,0 +1,33 @@
+#include <fmt/format.h>
+
+#include "apps/tessera/verbs.h"
+#include "import/importer.h"
+
+namespace tessera {
+
+void addImportVerb(CLI::App& app) {
+  struct Flags {
+    std::string source, out;
+    ImportOptions options;
+  };
+  auto flags = std::make_shared<Flags>();
+  CLI::App* verb = app.add_subcommand("import", "photographs with poses (COLMAP, nerfstudio, instant-ngp, Blender) to a capture");
+  verb->footer("Example:\n  tessera import flight/ flight.capture --downscale 4");
+  verb->add_option("source", flags->source, "folder with photos and poses")->required();
+  verb->add_option("out", flags->out, "capture folder to write")->required();
+  verb->add_option("--downscale", flags->options.downscale, "divides width and height")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 64));
+  verb->add_option("--holdout", flags->options.holdout,
+                   "photos kept for judging: every:N, list:FILE, none, or auto (the source's own split, else every:8)")
+      ->capture_default_str();
+  verb->add_option("--threads", flags->options.threads, "processor threads; 0: all cores")->capture_default_str();
+  verb->callback([flags] {
+    const Capture capture = importCapture(flags->source, flags->out, flags->options);
+    fmt::print("{}: {} photos ({} to train on, {} held out), {} sparse points{}\n", flags->out, capture.photos.size(),
+               capture.photosIn(Split::train).size(), capture.photosIn(Split::test).size(), capture.points.size(),
+               capture.geo ? ", georeferenced" : "");
+  });
+}
+
+}  // namespace tessera

@@ -1,0 +1,7 @@
+#include "apps/tessera/verbs.h"
+
+namespace tessera {
+
+void addRenderVerb(CLI::App&) {}
+
+}  // namespace tessera

@@ -1,0 +1,31 @@
+// The verbs of the command line. Each file verb_NAME.cpp declares its flags and calls one library function.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+#include "compute/device.h"
+
+namespace tessera {
+
+// Adds the verb to `app`; `run` is called when the verb was given.
+void addSynthVerb(CLI::App& app);
+void addImportVerb(CLI::App& app);
+void addTrainVerb(CLI::App& app);
+void addEvalVerb(CLI::App& app);
+void addRenderVerb(CLI::App& app);
+void addInfoVerb(CLI::App& app);
+void addBenchVerb(CLI::App& app);
+
+// True once SIGINT or SIGTERM has come; a second one ends the process at once.
+bool interrupted();
+void catchInterrupts();
+
+// Flags shared by verbs that compute.
+void addDeviceFlags(CLI::App& verb, DeviceOptions& options);
+
+}  // namespace tessera

@@ -1,0 +1,68 @@
+#include "field/parameters.h"
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+
+namespace tessera {
+
+ParameterGroup::ParameterGroup(Device& device, std::string groupName, const std::vector<float>& initial)
+    : name(std::move(groupName)),
+      values(device.arrayOf(initial)),
+      gradients(device.array<float>(initial.size())),
+      firstMoments(device.array<float>(initial.size())),
+      secondMoments(device.array<float>(initial.size())),
+      counts(device.array<uint32_t>(initial.size())) {}
+
+void ParameterGroup::step(Device& device, Adam settings) {
+  settings.parameters = values;
+  settings.gradients = gradients;
+  settings.firstMoments = firstMoments;
+  settings.secondMoments = secondMoments;
+  settings.counts = counts;
+  device.run(settings);
+}
+
+void TensorSet::addBytes(const std::string& name, TensorType type, std::span<const std::byte> bytes, size_t elements) {
+  tensors_[name] = {type, static_cast<int64_t>(elements), Bytes(bytes.begin(), bytes.end())};
+}
+
+void TensorSet::add(Device& device, const ParameterGroup& group, bool withMoments) {
+  add(group.name, device.read(group.values.all()));
+  if (!withMoments) return;
+  add(group.name + ".m1", device.read(group.firstMoments.all()));
+  add(group.name + ".m2", device.read(group.secondMoments.all()));
+  add(group.name + ".count", device.read(group.counts.all()));
+}
+
+Bytes TensorSet::encode(const std::map<std::string, std::string>& metadata) const {
+  std::map<std::string, TensorView> views;
+  for (const auto& [name, owned] : tensors_) views[name] = {owned.type, {owned.elements}, owned.bytes};
+  return encodeSafetensors(views, metadata);
+}
+
+namespace {
+
+template <class T>
+void loadArray(Device& device, const fs::path& path, const Safetensors& file, const std::string& name, TensorType type,
+               Array<T>& to) {
+  const TensorView& tensor = file.require(path, name, type);
+  if (tensor.elements() != static_cast<int64_t>(to.size())) {
+    throw Error(path.string(), "tensor " + name,
+                fmt::format("has {} numbers where the model's settings want {}", tensor.elements(), to.size()),
+                "the file belongs to another config.toml");
+  }
+  device.write(to.all(), tensor.as<T>());
+}
+
+}  // namespace
+
+void loadGroup(Device& device, const fs::path& path, const Safetensors& file, ParameterGroup& group) {
+  loadArray(device, path, file, group.name, TensorType::f32, group.values);
+  if (!file.tensors.contains(group.name + ".m1")) return;
+  loadArray(device, path, file, group.name + ".m1", TensorType::f32, group.firstMoments);
+  loadArray(device, path, file, group.name + ".m2", TensorType::f32, group.secondMoments);
+  loadArray(device, path, file, group.name + ".count", TensorType::u32, group.counts);
+}
+
+}  // namespace tessera

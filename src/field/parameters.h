@@ -1,0 +1,58 @@
+// Trainable numbers on a device with all that Adam keeps of them, and their form in a safetensors file.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "base/safetensors.h"
+#include "compute/device.h"
+
+namespace tessera {
+
+struct ParameterGroup {
+  std::string name;  // "table", "density", "colour": the tensor is NAME, the moments NAME.m1, NAME.m2, NAME.count
+  Array<float> values, gradients, firstMoments, secondMoments;
+  Array<uint32_t> counts;
+
+  ParameterGroup() = default;
+  ParameterGroup(Device& device, std::string groupName, const std::vector<float>& initial);
+
+  // One step with the accumulated gradients, which are zero afterwards.
+  void step(Device& device, Adam settings);
+};
+
+// Tensors by name, owning their bytes: what a checkpoint is made of.
+class TensorSet {
+ public:
+  template <class T>
+  void add(const std::string& name, const std::vector<T>& values) {
+    addBytes(name, tensorTypeOf<T>(), std::as_bytes(std::span(values)), values.size());
+  }
+  void add(Device& device, const ParameterGroup& group, bool withMoments);
+  Bytes encode(const std::map<std::string, std::string>& metadata) const;
+
+ private:
+  template <class T>
+  static constexpr TensorType tensorTypeOf() {
+    if constexpr (std::is_same_v<T, float>) return TensorType::f32;
+    if constexpr (std::is_same_v<T, uint32_t>) return TensorType::u32;
+    if constexpr (std::is_same_v<T, int64_t>) return TensorType::i64;
+    if constexpr (std::is_same_v<T, double>) return TensorType::f64;
+  }
+  void addBytes(const std::string& name, TensorType type, std::span<const std::byte> bytes, size_t elements);
+
+  struct Owned {
+    TensorType type;
+    int64_t elements;
+    Bytes bytes;
+  };
+  std::map<std::string, Owned> tensors_;
+};
+
+// Fills a group from a file. Throws Error naming `path` when a tensor is missing or of another size; moments are
+// optional (a file for rendering has none).
+void loadGroup(Device& device, const fs::path& path, const Safetensors& file, ParameterGroup& group);
+
+}  // namespace tessera

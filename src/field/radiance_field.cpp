@@ -1,0 +1,120 @@
+#include "field/radiance_field.h"
+
+#include <cmath>
+
+#include "base/random.h"
+
+namespace tessera {
+namespace {
+
+constexpr int kGeometryFeatures = 16;
+
+std::vector<float> uniformTable(size_t count, uint64_t seed) {
+  const RandomStream random(seed, 0x7ab1e);
+  std::vector<float> values(count);
+  for (size_t i = 0; i < count; ++i) values[i] = (2 * random.uniform(i) - 1) * 1e-4f;
+  return values;
+}
+
+std::vector<float> xavier(const MlpShape& shape, uint64_t seed, uint64_t stream) {
+  const RandomStream random(seed, stream);
+  std::vector<float> values(shape.parameters());
+  size_t i = 0;
+  for (int l = 0; l < shape.layers(); ++l) {
+    const size_t end = i + static_cast<size_t>(shape.layerInputs(l)) * shape.layerOutputs(l);
+    const float bound = std::sqrt(6.0f / static_cast<float>(shape.layerInputs(l) + shape.layerOutputs(l)));
+    for (; i < end; ++i) values[i] = (2 * random.uniform(i) - 1) * bound;
+  }
+  return values;
+}
+
+}  // namespace
+
+RadianceFieldShape makeRadianceFieldShape(const HashGridOptions& grid, int width, int densityHidden, int colourHidden) {
+  RadianceFieldShape shape{HashGrid(grid), {}, {}, 4};
+  shape.density.inputs = static_cast<int>(shape.grid.columns());
+  shape.density.width = width;
+  shape.density.hiddenLayers = densityHidden;
+  shape.density.outputs = kGeometryFeatures;
+  shape.colour.inputs = kGeometryFeatures + shape.harmonicsDegree * shape.harmonicsDegree;
+  shape.colour.width = width;
+  shape.colour.hiddenLayers = colourHidden;
+  shape.colour.outputs = 3;
+  shape.colour.activation = OutputActivation::sigmoid;
+  return shape;
+}
+
+RadianceField::RadianceField(Device& device, RadianceFieldShape shape, uint64_t seed)
+    : device_(device),
+      shape_(std::move(shape)),
+      table_(device, "table", uniformTable(shape_.grid.parameters(), seed)),
+      density_(device, "density", xavier(shape_.density, seed, 0xde)),
+      colour_(device, "colour", xavier(shape_.colour, seed, 0xc0)) {}
+
+void RadianceField::reserve(uint32_t samples) {
+  if (samples <= capacity_) return;
+  capacity_ = samples;
+  const size_t n = samples;
+  encoded_ = device_.array<float>(n * shape_.grid.columns());
+  encodedKept_ = device_.array<float>(n * shape_.grid.columns());
+  colourInput_ = device_.array<float>(n * shape_.colour.inputs);
+  colours_ = device_.array<float>(n * 3);
+  densityActivations_ = device_.array<float>(n * shape_.density.activationsPerSample());
+  colourActivations_ = device_.array<float>(n * shape_.colour.activationsPerSample());
+  colourInputGradients_ = device_.array<float>(n * shape_.colour.inputs);
+}
+
+Matrix<float> RadianceField::encodings(bool second) {
+  return Matrix<float>::grouped((second ? encodedKept_ : encoded_).all(), shape_.grid.columns(),
+                                static_cast<uint32_t>(shape_.grid.features), capacity_);
+}
+
+Matrix<const float> RadianceField::logDensity(Count samples, Slice<const float> positions) {
+  CHECK(samples.capacity <= capacity_);
+  const Matrix<float> geometry = Matrix<float>(colourInput_, shape_.colour.inputs).columnRange(0, kGeometryFeatures);
+  device_.run(HashGridForward{shape_.grid, samples, positions, table_.values, encodings(false)});
+  device_.run(MlpForward{shape_.density, samples, encodings(false), density_.values, geometry, {}});
+  inSecond_ = false;
+  return geometry.columnRange(0, 1);
+}
+
+void RadianceField::keepEncodings(Count kept, Slice<const uint32_t> source) {
+  device_.run(GatherRows{kept, source, encodings(false), encodings(true)});
+  inSecond_ = true;
+}
+
+RadianceField::Output RadianceField::forward(Count samples, Slice<const float> positions, Slice<const float> directions,
+                                             Slice<const uint32_t> rayOfSample, bool encodingsKept, bool forBackward) {
+  CHECK(samples.capacity <= capacity_);
+  const Matrix<float> input(colourInput_, shape_.colour.inputs);
+  const Matrix<float> geometry = input.columnRange(0, kGeometryFeatures);
+  const uint32_t harmonics = shape_.harmonicsDegree * shape_.harmonicsDegree;
+  if (!encodingsKept) {
+    inSecond_ = false;
+    device_.run(HashGridForward{shape_.grid, samples, positions, table_.values, encodings(false)});
+  }
+  device_.run(MlpForward{shape_.density, samples, encodings(inSecond_), density_.values, geometry,
+                         forBackward ? densityActivations_.all() : Slice<float>()});
+  device_.run(SphericalHarmonicsForward{shape_.harmonicsDegree, samples, directions, rayOfSample,
+                                        input.columnRange(kGeometryFeatures, harmonics)});
+  device_.run(MlpForward{shape_.colour, samples, input, colour_.values, Matrix<float>(colours_, 3),
+                         forBackward ? colourActivations_.all() : Slice<float>()});
+  return {geometry.columnRange(0, 1), Matrix<float>(colours_, 3)};
+}
+
+void RadianceField::backward(Count samples, Slice<const float> positions, Slice<const float> logDensityGradients,
+                             Matrix<const float> colourGradients) {
+  const Matrix<float> input(colourInput_, shape_.colour.inputs);
+  const Matrix<float> inputGradients(colourInputGradients_, shape_.colour.inputs);
+  device_.run(MlpBackward{shape_.colour, samples, input, colour_.values, Matrix<float>(colours_, 3),
+                          colourActivations_, colourGradients, {}, colour_.gradients, inputGradients});
+  // Gradients of the encodings go to the buffer that the encodings themselves are not in.
+  const Matrix<float> encodedGradients = encodings(!inSecond_);
+  device_.run(MlpBackward{shape_.density, samples, encodings(inSecond_), density_.values,
+                          input.columnRange(0, kGeometryFeatures), densityActivations_,
+                          inputGradients.columnRange(0, kGeometryFeatures), logDensityGradients, density_.gradients,
+                          encodedGradients});
+  device_.run(HashGridBackward{shape_.grid, samples, positions, table_.values, encodedGradients, table_.gradients, {}});
+}
+
+}  // namespace tessera

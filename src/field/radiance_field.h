@@ -1,0 +1,65 @@
+// Instant-NGP's radiance field (Müller et al. 2022, section 5.4): a hash grid, a density network whose first output is
+// the logarithm of density, and a colour network that sees all its outputs and the view direction in spherical harmonics.
+#pragma once
+
+#include "field/parameters.h"
+
+namespace tessera {
+
+struct RadianceFieldShape {
+  HashGrid grid;
+  MlpShape density;  // grid columns → geometry features; output 0 is log density
+  MlpShape colour;   // geometry features + harmonics → 3, sigmoid
+  int harmonicsDegree = 4;
+};
+
+RadianceFieldShape makeRadianceFieldShape(const HashGridOptions& grid, int width, int densityHidden, int colourHidden);
+
+class RadianceField {
+ public:
+  // Tables U(±1e-4), networks Xavier uniform on padded sizes; a function of `seed` alone. Keeps a reference to `device`.
+  RadianceField(Device& device, RadianceFieldShape shape, uint64_t seed);
+
+  // Room for this many samples in the calls below.
+  void reserve(uint32_t samples);
+
+  // Density alone, nothing kept for backward. positions [capacity][3] in [0,1]; the result, 1 column, stays valid until
+  // the next call.
+  Matrix<const float> logDensity(Count samples, Slice<const float> positions);
+
+  // Moves the encodings that the last logDensity call left (of samples `source`) to the front, for `forward` to use.
+  void keepEncodings(Count kept, Slice<const uint32_t> source);
+
+  struct Output {
+    Matrix<const float> logDensity;  // 1 column
+    Matrix<const float> colours;     // 3 columns
+  };
+  // Both networks. With `encodingsKept` the hash grid is not read again. `forBackward` keeps activations.
+  Output forward(Count samples, Slice<const float> positions, Slice<const float> directions,
+                 Slice<const uint32_t> rayOfSample, bool encodingsKept, bool forBackward);
+
+  // After `forward` with the same samples. Adds to the groups' gradients.
+  void backward(Count samples, Slice<const float> positions, Slice<const float> logDensityGradients,
+                Matrix<const float> colourGradients);
+
+  ParameterGroup& table() { return table_; }
+  ParameterGroup& densityNetwork() { return density_; }
+  ParameterGroup& colourNetwork() { return colour_; }
+  const RadianceFieldShape& shape() const { return shape_; }
+
+ private:
+  Matrix<float> encodings(bool second);
+
+  Device& device_;
+  RadianceFieldShape shape_;
+  ParameterGroup table_, density_, colour_;
+  uint32_t capacity_ = 0;
+  bool inSecond_ = false;                 // which of the two encoding buffers holds the kept ones
+  Array<float> encoded_, encodedKept_;    // [levels][capacity][features]
+  Array<float> colourInput_;              // [capacity][geometry features + harmonics]
+  Array<float> colours_;                  // [capacity][3]
+  Array<float> densityActivations_, colourActivations_;
+  Array<float> colourInputGradients_;     // as colourInput_
+};
+
+}  // namespace tessera

@@ -1,0 +1,41 @@
+// Every setting of the `field` representation: flag (`--set`), default, help and the line in config.toml.
+#pragma once
+
+#include "base/config.h"
+#include "field/radiance_field.h"
+
+namespace tessera {
+
+struct FieldConfig {
+  // Scene
+  bool contracted = true;
+  double roiMargin = 1.0;
+  // Model
+  int gridLevels = 16, gridFeatures = 2, gridLog2Size = 17, gridBase = 16, gridFinest = 2048;
+  int width = 64, densityHidden = 1, colourHidden = 2;
+  // Marching
+  int occupancyResolution = 128;
+  double near = 0.05, far = 64, minStep = 0.00338, cone = 0.00390625;
+  // Batches
+  int64_t seed = 0;
+  int samplesPerStep = 1 << 16;
+  int firstRays = 512, mostRays = 1 << 15;
+  double photoBudgetMiB = 0;
+  int stepsPerPhoto = 2;
+  // Occupancy
+  int occupancyEvery = 16, occupancyWarmUp = 256;
+  double occupancyShare = 0.125;
+  // Optimiser
+  double rate = 1e-2, finalRateFactor = 0.03, constantRateShare = 0.4, networkL2 = 1e-6, exposureRate = 1e-3;
+  // Losses
+  std::string loss = "huber";
+  double lossParameter = 0.1, distortion = 0.01;
+  bool exposure = true, randomBackground = true;
+
+  std::vector<ConfigField> fields();
+
+  RadianceFieldShape shape() const;
+  MarchSpace space() const;
+};
+
+}  // namespace tessera

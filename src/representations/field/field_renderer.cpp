@@ -1,0 +1,91 @@
+#include "representations/field/field_renderer.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace tessera {
+namespace {
+
+constexpr uint32_t kRays = 8192;        // of one piece of the picture
+constexpr uint32_t kSamples = 1 << 18;  // rays that do not fit are taken up by the next piece
+constexpr float kMinTransmittance = 1e-3f;
+
+}  // namespace
+
+FieldRenderer::FieldRenderer(FieldModel& model) : model_(model) {
+  Device& device = model.device();
+  marched_ = RaySamples(device, kRays, kSamples);
+  kept_ = RaySamples(device, kRays, kSamples);
+  cameraOfRay_ = device.array<uint32_t>(kRays);
+  pixels_ = device.array<float>(kRays * 2);
+  for (Array<float>* perRay : {&origins_, &directions_, &colour_}) *perRay = device.array<float>(kRays * 3);
+  for (Array<float>* perRay : {&far_, &opacity_, &depth_}) *perRay = device.array<float>(kRays);
+  weights_ = device.array<float>(kSamples);
+}
+
+std::string FieldRenderer::device() const { return model_.device().name(); }
+
+RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
+  Device& device = model_.device();
+  const RayCamera rayCamera = makeRayCamera(camera, worldFromCamera, model_.frame());
+  const Array<RayCamera> cameras = device.arrayOf(std::vector<RayCamera>{rayCamera});
+  const float* forward = rayCamera.rotation;  // third column, at 2, 5, 8
+  const float scale = static_cast<float>(model_.frame().scale);
+  RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
+                    ImageF(camera.width, camera.height, 1)};
+  const size_t pixelCount = view.opacity.pixels.size();
+  std::vector<float> pixels, far;
+  for (size_t first = 0; first < pixelCount;) {
+    const uint32_t rays = static_cast<uint32_t>(std::min<size_t>(kRays, pixelCount - first));
+    pixels.clear();
+    for (size_t i = first; i < first + rays; ++i) {
+      pixels.push_back(static_cast<float>(i % camera.width) + 0.5f);
+      pixels.push_back(static_cast<float>(i / camera.width) + 0.5f);
+    }
+    device.write(pixels_.all(), std::span<const float>(pixels));
+    device.run(GenerateRays{{rays, {}}, cameras, cameraOfRay_, pixels_, origins_, directions_});
+    const std::vector<float> directions = device.read(directions_.all());
+    const auto cosine = [&](size_t ray) {
+      return directions[3 * ray] * forward[2] + directions[3 * ray + 1] * forward[5] + directions[3 * ray + 2] * forward[8];
+    };
+    Slice<const float> farOfRay;
+    if (opaqueDepth != nullptr) {
+      far.clear();
+      for (size_t ray = 0; ray < rays; ++ray) {
+        const float depth = opaqueDepth->pixels[first + ray], along = cosine(ray);
+        far.push_back(along > 0 ? depth * scale / along : std::numeric_limits<float>::infinity());
+      }
+      device.write(far_.all(), std::span<const float>(far));
+      farOfRay = far_;
+    }
+    model_.sample({rays, origins_, directions_, {}, farOfRay}, kMinTransmittance, marched_, kept_);
+    const Count samples{kSamples, kept_.count};
+    const RadianceField::Output output =
+        model_.field().forward(samples, kept_.positions, directions_, kept_.rayOfSample, true, false);
+    CompositeForward composite;
+    composite.minTransmittance = kMinTransmittance;
+    composite.rays = {rays, marched_.finishedRays};
+    composite.firstSample = kept_.firstSample;
+    composite.x = output.logDensity;
+    composite.steps = kept_.steps;
+    composite.distances = kept_.distances;
+    composite.colours = output.colours;
+    composite.colour = colour_;
+    composite.opacity = opacity_;
+    composite.depth = depth_;
+    composite.weights = weights_;
+    device.run(composite);
+    const uint32_t finished = device.read(marched_.finishedRays.all())[0];
+    CHECK(finished >= 1u);  // one ray's steps always fit
+    const std::vector<float> colour = device.read(colour_.part(0, size_t{finished} * 3));
+    const std::vector<float> opacity = device.read(opacity_.part(0, finished));
+    const std::vector<float> depth = device.read(depth_.part(0, finished));
+    std::copy(colour.begin(), colour.end(), view.colour.pixels.begin() + static_cast<ptrdiff_t>(first * 3));
+    std::copy(opacity.begin(), opacity.end(), view.opacity.pixels.begin() + static_cast<ptrdiff_t>(first));
+    for (uint32_t ray = 0; ray < finished; ++ray) view.depth.pixels[first + ray] = depth[ray] * cosine(ray) / scale;
+    first += finished;
+  }
+  return view;
+}
+
+}  // namespace tessera

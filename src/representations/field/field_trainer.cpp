@@ -1,0 +1,240 @@
+#include "representations/field/field_trainer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/random.h"
+#include "train/schedule.h"
+
+namespace tessera {
+namespace {
+
+constexpr uint32_t kMarchedPerKept = 4;        // room for samples that turn out to be hidden
+constexpr float kMinTransmittance = 1e-4f;
+
+ColourLossKind lossKind(const std::string& name) {
+  if (name == "mse") return ColourLossKind::mse;
+  if (name == "huber") return ColourLossKind::huber;
+  if (name == "charbonnier") return ColourLossKind::charbonnier;
+  throw Error("--set loss=" + name, "", "there is no such colour loss", "use huber, mse or charbonnier");
+}
+
+std::vector<RayCamera> rayCameras(const Capture& capture, const SceneFrame& frame) {
+  std::vector<RayCamera> cameras;
+  for (const Photo& photo : capture.photos) {
+    cameras.push_back(makeRayCamera(capture.cameras[photo.camera], photo.worldFromCamera, frame));
+  }
+  return cameras;
+}
+
+std::vector<int> trainingPhotos(const Capture& capture) {
+  std::vector<int> photos = capture.photosIn(Split::train);
+  if (photos.empty()) {
+    throw Error(capture.root.string(), "transforms.json", "no photo is marked for training",
+                "import again with another --holdout");
+  }
+  return photos;
+}
+
+}  // namespace
+
+FieldTrainer::FieldTrainer(Device& device, const Capture& capture, const FieldConfig& config, const SceneFrame& frame)
+    : device_(device),
+      capture_(capture),
+      config_(config),
+      model_(device, config, frame),
+      photos_(capture, trainingPhotos(capture),
+              {static_cast<size_t>(config.photoBudgetMiB * 1048576), config.stepsPerPhoto, static_cast<uint64_t>(config.seed)}),
+      rays_(static_cast<uint32_t>(config.firstRays)),
+      cameras_(device.arrayOf(rayCameras(capture, frame))),
+      exposures_(device, "exposures", std::vector<float>(capture.photos.size() * 3)) {
+  lossKind(config.loss);
+  const uint32_t rays = static_cast<uint32_t>(config.mostRays);
+  const uint32_t samples = static_cast<uint32_t>(config.samplesPerStep) * kMarchedPerKept;
+  marched_ = RaySamples(device, rays, samples);
+  kept_ = RaySamples(device, rays, samples);
+  photoOfRay_ = device.array<uint32_t>(rays);
+  for (Array<float>* perRay : {&weights_, &jitter_, &opacity_, &depth_}) *perRay = device.array<float>(rays);
+  pixels_ = device.array<float>(size_t{rays} * 2);
+  for (Array<float>* perRay : {&targets_, &backgrounds_, &origins_, &directions_, &colour_, &exposed_, &colourGradients_}) {
+    *perRay = device.array<float>(size_t{rays} * 3);
+  }
+  losses_ = device.array<float>(3);
+  for (Array<float>* perSample : {&sampleWeights_, &weightGradients_, &logDensityGradients_}) {
+    *perSample = device.array<float>(samples);
+  }
+  sampleColourGradients_ = device.array<float>(size_t{samples} * 3);
+}
+
+void FieldTrainer::refreshOccupancy(int64_t step) {
+  if (step % config_.occupancyEvery != 0) return;
+  const uint32_t cells = model_.occupancy().cells();
+  const uint64_t seed = mix64(static_cast<uint64_t>(config_.seed) ^ (static_cast<uint64_t>(step) << 20));
+  if (step < config_.occupancyWarmUp) {
+    model_.refreshOccupancy(cells, 0, seed);
+  } else {
+    const uint32_t share = static_cast<uint32_t>(cells * config_.occupancyShare);
+    model_.refreshOccupancy(share, share, seed);
+  }
+}
+
+void FieldTrainer::uploadRays() {
+  device_.write(photoOfRay_.all(), std::span<const uint32_t>(batch_.photoOfRay));
+  device_.write(pixels_.all(), std::span<const float>(batch_.pixels));
+  device_.write(targets_.all(), std::span<const float>(batch_.targets));
+  device_.write(backgrounds_.all(), std::span<const float>(batch_.backgrounds));
+  device_.write(weights_.all(), std::span<const float>(batch_.weights));
+  device_.write(jitter_.all(), std::span<const float>(batch_.jitter));
+  device_.run(GenerateRays{{rays_, {}}, cameras_, photoOfRay_, pixels_, origins_, directions_});
+}
+
+StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
+  refreshOccupancy(step);
+  drawRays(photos_.at(step), static_cast<uint64_t>(config_.seed), step, rays_, config_.randomBackground, batch_);
+  uploadRays();
+  model_.sample({rays_, origins_, directions_, jitter_, {}}, kMinTransmittance, marched_, kept_);
+
+  const uint32_t capacity = static_cast<uint32_t>(kept_.distances.size());
+  const Count samples{capacity, kept_.count};
+  const Count rays{rays_, marched_.finishedRays};
+  RadianceField& field = model_.field();
+  const RadianceField::Output output =
+      field.forward(samples, kept_.positions, directions_, kept_.rayOfSample, true, true);
+
+  CompositeForward composite;
+  composite.minTransmittance = kMinTransmittance;
+  composite.rays = rays;
+  composite.firstSample = kept_.firstSample;
+  composite.x = output.logDensity;
+  composite.steps = kept_.steps;
+  composite.distances = kept_.distances;
+  composite.colours = output.colours;
+  composite.background = backgrounds_;
+  composite.colour = colour_;
+  composite.opacity = opacity_;
+  composite.depth = depth_;
+  composite.weights = sampleWeights_;
+  device_.run(composite);
+  device_.run(ExposureForward{rays, colour_, photoOfRay_, exposures_.values, exposed_});
+
+  ColourLoss loss;
+  loss.kind = lossKind(config_.loss);
+  loss.parameter = static_cast<float>(config_.lossParameter);
+  loss.scale = 1.0f / (3.0f * static_cast<float>(rays_));
+  loss.rays = rays;
+  loss.predicted = exposed_;
+  loss.target = targets_;
+  loss.weights = weights_;
+  loss.loss = losses_.part(0, 2);
+  loss.gradients = colourGradients_;
+  device_.run(loss);
+  device_.run(ExposureBackward{rays, colour_, photoOfRay_, exposures_.values, colourGradients_, colourGradients_,
+                               exposures_.gradients});
+  if (config_.distortion > 0) {
+    DistortionLoss distortion;
+    distortion.scale = static_cast<float>(config_.distortion) / static_cast<float>(rays_);
+    distortion.rays = rays;
+    distortion.firstSample = kept_.firstSample;
+    distortion.weights = sampleWeights_;
+    distortion.distances = kept_.distances;
+    distortion.steps = kept_.steps;
+    distortion.loss = losses_.part(2, 1);
+    distortion.weightGradients = weightGradients_;
+    device_.run(distortion);
+  }
+
+  CompositeBackward back;
+  back.minTransmittance = kMinTransmittance;
+  back.rays = rays;
+  back.firstSample = kept_.firstSample;
+  back.x = output.logDensity;
+  back.steps = kept_.steps;
+  back.distances = kept_.distances;
+  back.colours = output.colours;
+  back.background = backgrounds_;
+  back.rayColourGradients = colourGradients_;
+  if (config_.distortion > 0) back.weightGradients = weightGradients_;
+  back.xGradients = logDensityGradients_;
+  back.colourGradients = Matrix<float>(sampleColourGradients_, 3);
+  device_.run(back);
+  field.backward(samples, kept_.positions, logDensityGradients_, Matrix<const float>(sampleColourGradients_, 3));
+  updateParameters(step, plannedSteps);
+
+  // The step is over: its counters may be read.
+  StepReport report;
+  const std::vector<float> losses = device_.read(losses_.all());
+  report.rays = device_.read(marched_.finishedRays.all())[0];
+  report.samples = device_.read(kept_.count.all())[0];
+  report.marched = device_.read(marched_.count.all())[0];
+  double weight = 0;
+  for (uint32_t ray = 0; ray < report.rays; ++ray) weight += batch_.weights[ray];
+  report.loss = losses[0] + losses[2];
+  report.squaredError = losses[1] / std::max(1.0, 3 * weight);
+
+  const double perRay = std::max(1.0, static_cast<double>(report.samples)) / std::max(1u, report.rays);
+  const double marchedPerRay = std::max(1.0, static_cast<double>(report.marched)) / std::max(1u, report.rays);
+  const double wanted = std::min(config_.samplesPerStep / perRay, 0.9 * capacity / marchedPerRay);
+  const double rounded = std::ceil(wanted / 64) * 64;
+  rays_ = static_cast<uint32_t>(std::clamp<double>(rounded, 64, config_.mostRays));
+  return report;
+}
+
+void FieldTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
+  RateSchedule schedule;
+  schedule.rate = config_.rate;
+  schedule.finalFactor = config_.finalRateFactor;
+  schedule.constantFraction = config_.constantRateShare;
+  Adam adam;
+  adam.rate = static_cast<float>(schedule.at(step, plannedSteps));
+  adam.skipZeroGradients = true;
+  model_.field().table().step(device_, adam);
+  adam.skipZeroGradients = false;
+  adam.l2 = static_cast<float>(config_.networkL2);
+  model_.field().densityNetwork().step(device_, adam);
+  model_.field().colourNetwork().step(device_, adam);
+  if (!config_.exposure) {
+    device_.fillZero(exposures_.gradients.all());
+    return;
+  }
+  Adam exposure;
+  exposure.rate = static_cast<float>(config_.exposureRate * adam.rate / config_.rate);
+  exposure.skipZeroGradients = true;
+  exposures_.step(device_, exposure);
+  if (step % 16 == 15) centreExposures();
+}
+
+// Only differences between photos can be told: the mean gain of each channel stays zero, which is what evaluation uses.
+void FieldTrainer::centreExposures() {
+  std::vector<float> gains = device_.read(exposures_.values.all());
+  const std::vector<int> photos = capture_.photosIn(Split::train);
+  for (int channel = 0; channel < 3; ++channel) {
+    double mean = 0;
+    for (const int photo : photos) mean += gains[3 * photo + channel];
+    mean /= static_cast<double>(photos.size());
+    for (const int photo : photos) gains[3 * photo + channel] -= static_cast<float>(mean);
+  }
+  device_.write(exposures_.values.all(), std::span<const float>(gains));
+}
+
+Bytes FieldTrainer::save() {
+  TensorSet tensors;
+  model_.save(tensors, true);
+  tensors.add(device_, exposures_, true);
+  tensors.add("rays", std::vector<uint32_t>{rays_});
+  return tensors.encode({{"format", "tessera field 1"}, {"device", device_.target()}});
+}
+
+void FieldTrainer::restore(const fs::path& path, const Safetensors& state) {
+  const auto format = state.metadata.find("format");
+  if (format == state.metadata.end() || format->second != "tessera field 1") {
+    throw Error(path.string(), "", "is not a checkpoint of --method field", "train again");
+  }
+  model_.restore(path, state);
+  loadGroup(device_, path, state, exposures_);
+  const TensorView& rays = state.require(path, "rays", TensorType::u32);
+  if (rays.elements() != 1) throw Error(path.string(), "tensor rays", "is not one number", "train again");
+  rays_ = std::clamp(rays.as<uint32_t>()[0], 64u, static_cast<uint32_t>(config_.mostRays));
+}
+
+}  // namespace tessera

@@ -1,0 +1,44 @@
+// One training step of the `field` representation: rays → samples → field → picture → loss → gradients → Adam.
+#pragma once
+
+#include "representations/field/field_model.h"
+#include "train/photo_window.h"
+#include "train/ray_batch.h"
+#include "train/training_loop.h"
+
+namespace tessera {
+
+class FieldTrainer final : public Trainee {
+ public:
+  // Keeps references to `device` and `capture`. Trains on the capture's training photos.
+  FieldTrainer(Device& device, const Capture& capture, const FieldConfig& config, const SceneFrame& frame);
+
+  StepReport step(int64_t step, int64_t plannedSteps) override;
+  Bytes save() override;
+  void restore(const fs::path& path, const Safetensors& state) override;
+
+  FieldModel& model() { return model_; }
+
+ private:
+  void refreshOccupancy(int64_t step);
+  void uploadRays();
+  void updateParameters(int64_t step, int64_t plannedSteps);
+  void centreExposures();
+
+  Device& device_;
+  const Capture& capture_;
+  FieldConfig config_;
+  FieldModel model_;
+  PhotoWindow photos_;
+  uint32_t rays_;            // of the next step
+  RayBatch batch_;
+  Array<RayCamera> cameras_;
+  ParameterGroup exposures_;  // [photos][3], log2 gains
+  RaySamples marched_, kept_;
+  Array<uint32_t> photoOfRay_;
+  Array<float> pixels_, targets_, backgrounds_, weights_, jitter_, origins_, directions_;
+  Array<float> colour_, exposed_, opacity_, depth_, colourGradients_, losses_;
+  Array<float> sampleWeights_, weightGradients_, logDensityGradients_, sampleColourGradients_;
+};
+
+}  // namespace tessera

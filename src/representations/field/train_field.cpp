@@ -1,0 +1,30 @@
+#include "representations/field/train_field.h"
+
+#include "base/log.h"
+
+namespace tessera {
+
+TrainingResult trainField(Device& device, const Capture& capture, const fs::path& model, TrainFieldOptions options) {
+  const ModelFolder folder(model);
+  options.loop.method = "field";
+  const bool goingOn = options.loop.resume && folder.manifest().has_value();
+  // A resumed run stands where the killed one stood, whatever has become of the capture's points since.
+  const SceneFrame frame = goingOn ? folder.readFrame() : fitSceneFrame(capture, options.config.roiMargin);
+  FieldTrainer trainer(device, capture, options.config, frame);
+  if (!goingOn) {
+    if (!folder.manifest()) {
+      writeFileAtomically(folder.configPath(), configToToml(options.config.fields()));
+      folder.writeFrame(frame, options.loop.method, capture.root);
+    }
+  }
+  return runTraining(trainer, folder, options.loop);
+}
+
+FieldConfig resumedFieldConfig(const fs::path& model) {
+  FieldConfig config;
+  const ModelFolder folder(model);
+  if (fs::exists(folder.configPath())) configFromToml(config.fields(), folder.configPath());
+  return config;
+}
+
+}  // namespace tessera

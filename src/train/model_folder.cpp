@@ -1,0 +1,126 @@
+#include "train/model_folder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+
+namespace tessera {
+namespace {
+
+using nlohmann::json;
+
+json parseJson(const fs::path& path) {
+  const std::string text = readTextFile(path);
+  json parsed = json::parse(text, nullptr, false);
+  if (parsed.is_discarded() || !parsed.is_object()) {
+    throw Error(path.string(), "", "is not a JSON object", "restore the file or train again");
+  }
+  return parsed;
+}
+
+}  // namespace
+
+std::optional<ModelManifest> ModelFolder::manifest() const {
+  const fs::path path = root_ / "manifest.json";
+  if (!fs::exists(path)) return std::nullopt;
+  const json parsed = parseJson(path);
+  ModelManifest manifest;
+  try {
+    manifest.method = parsed.at("method").get<std::string>();
+    manifest.step = parsed.at("step").get<int64_t>();
+    manifest.plannedSteps = parsed.at("planned_steps").get<int64_t>();
+    for (const json& file : parsed.at("files")) manifest.files.push_back(file.get<std::string>());
+  } catch (const json::exception& error) {
+    throw Error(path.string(), "", error.what(), "restore the file or train again");
+  }
+  for (const std::string& file : manifest.files) {
+    const std::optional<fs::path> inside = resolveInside(root_, file);
+    if (!inside || !fs::exists(*inside)) {
+      throw Error(path.string(), "files", "names '" + file + "', which is not there", "train again with --resume off");
+    }
+  }
+  return manifest;
+}
+
+void ModelFolder::commit(const ModelManifest& state, const Bytes& block, int keep) const {
+  const std::string name = fmt::format("blocks/0/step-{}.safetensors", state.step);
+  writeFileAtomically(root_ / name, block, true);
+  const json manifest = {
+      {"method", state.method}, {"step", state.step}, {"planned_steps", state.plannedSteps}, {"files", {name}}};
+  writeFileAtomically(root_ / "manifest.json", manifest.dump(2) + "\n", true);
+  std::vector<std::pair<int64_t, fs::path>> old;
+  for (const fs::directory_entry& entry : fs::directory_iterator(root_ / "blocks/0")) {
+    const std::string file = entry.path().filename().string();
+    if (file.starts_with("step-") && file.ends_with(".safetensors")) {
+      old.emplace_back(std::atoll(file.c_str() + 5), entry.path());
+    } else if (file.find(".partial-") != std::string::npos) {
+      fs::remove(entry.path());  // of a run that was killed while writing
+    }
+  }
+  std::sort(old.begin(), old.end());
+  for (size_t i = 0; i + static_cast<size_t>(keep) < old.size(); ++i) fs::remove(old[i].second);
+}
+
+void ModelFolder::writeFrame(const SceneFrame& frame, const std::string& method, const fs::path& capture) const {
+  const json text = {{"method", method},
+                     {"capture", fs::absolute(capture).lexically_normal().string()},
+                     {"blocks", json::array({{{"id", "0"},
+                                              {"centre", {frame.centre.x(), frame.centre.y(), frame.centre.z()}},
+                                              {"scale", frame.scale}}})}};
+  writeFileAtomically(root_ / "blocks.json", text.dump(2) + "\n");
+}
+
+SceneFrame ModelFolder::readFrame() const {
+  const fs::path path = root_ / "blocks.json";
+  const json parsed = parseJson(path);
+  try {
+    const json& block = parsed.at("blocks").at(0);
+    SceneFrame frame;
+    for (int axis = 0; axis < 3; ++axis) frame.centre[axis] = block.at("centre").at(axis).get<double>();
+    frame.scale = block.at("scale").get<double>();
+    return frame;
+  } catch (const json::exception& error) {
+    throw Error(path.string(), "", error.what(), "restore the file or train again");
+  }
+}
+
+void ModelFolder::writePlan(int64_t steps) const {
+  writeFileAtomically(root_ / "plan.json", json({{"steps", steps}}).dump() + "\n", true);
+}
+
+std::optional<int64_t> ModelFolder::readPlan() const {
+  const fs::path path = root_ / "plan.json";
+  if (!fs::exists(path)) return std::nullopt;
+  const json parsed = parseJson(path);
+  if (!parsed.contains("steps") || !parsed["steps"].is_number_integer() || parsed["steps"].get<int64_t>() < 1) {
+    throw Error(path.string(), "steps", "is not a positive whole number", "remove the file");
+  }
+  return parsed["steps"].get<int64_t>();
+}
+
+void ModelFolder::appendMetrics(const json& line) const {
+  std::ofstream out(metricsPath(), std::ios::app);
+  out << line.dump() << '\n';
+  out.flush();
+  if (!out) throw Error(metricsPath().string(), "", "could not be written", "check free space and permissions");
+}
+
+void ModelFolder::cutMetrics(int64_t step) const {
+  if (!fs::exists(metricsPath())) return;
+  std::string kept;
+  std::ifstream in(metricsPath());
+  for (std::string line; std::getline(in, line);) {
+    const json parsed = json::parse(line, nullptr, false);
+    if (parsed.is_object() && parsed.contains("step") && parsed["step"].is_number() &&
+        parsed["step"].get<int64_t>() <= step) {
+      kept += line + "\n";
+    }
+  }
+  writeFileAtomically(metricsPath(), kept);
+}
+
+}  // namespace tessera

@@ -1,0 +1,56 @@
+#include "train/occupancy_grid.h"
+
+#include <algorithm>
+#include <bit>
+#include <numeric>
+
+namespace tessera {
+
+OccupancyGrid::OccupancyGrid(Device& device, const MarchSpace& space)
+    : device_(device),
+      space_(space),
+      cells_(static_cast<uint32_t>(space.gridResolution * space.gridResolution * space.gridResolution)),
+      grid_(device.array<float>(cells_)),
+      bits_(device.arrayOf(std::vector<uint32_t>(cells_ / 32, ~0u))) {}
+
+void OccupancyGrid::update(const LogDensity& logDensity, uint32_t uniform, uint32_t occupied, uint64_t seed,
+                           uint32_t chunk) {
+  const uint32_t points = uniform + occupied;
+  if (chosen_.size() < points) {
+    chosen_ = device_.array<uint32_t>(points);
+    positions_ = device_.array<float>(size_t{points} * 3);
+    logDensities_ = device_.array<float>(points);
+  }
+  device_.run(OccupancyPoints{space_, uniform, occupied, seed, bits_, chosen_, positions_});
+  // The field answers chunk by chunk into a buffer of its own; rows are gathered into one list.
+  std::vector<uint32_t> identity(chunk);
+  std::iota(identity.begin(), identity.end(), 0u);
+  const Array<uint32_t> rows = device_.arrayOf(identity);
+  for (uint32_t first = 0; first < points; first += chunk) {
+    const uint32_t count = std::min(chunk, points - first);
+    const Matrix<const float> answer = logDensity({count, {}}, positions_.part(size_t{first} * 3, size_t{count} * 3));
+    device_.run(GatherRows{{count, {}}, rows, answer, Matrix<float>(logDensities_.part(first, count), 1)});
+  }
+  OccupancyUpdate update{space_};
+  update.points = points;
+  update.cells = chosen_;
+  update.logDensity = Matrix<const float>(logDensities_, 1);
+  update.grid = grid_;
+  update.occupancy = bits_;
+  device_.run(update);
+}
+
+double OccupancyGrid::occupiedFraction() {
+  uint64_t set = 0;
+  for (const uint32_t word : bitWords()) set += std::popcount(word);
+  return static_cast<double>(set) / cells_;
+}
+
+void OccupancyGrid::restore(std::span<const float> values, std::span<const uint32_t> bits) {
+  CHECK(values.size() == grid_.size());
+  CHECK(bits.size() == bits_.size());
+  device_.write(grid_.all(), values);
+  device_.write(bits_.all(), bits);
+}
+
+}  // namespace tessera

@@ -1,0 +1,39 @@
+// Which cells of the scene may hold anything: kept on the device, refreshed from the field as instant-ngp does.
+#pragma once
+
+#include <functional>
+
+#include "compute/device.h"
+
+namespace tessera {
+
+class OccupancyGrid {
+ public:
+  // Every cell starts occupied.
+  OccupancyGrid(Device& device, const MarchSpace& space);
+
+  // Log density at `count` positions ([count][3], grid coordinates); 1 column, valid until the next call.
+  using LogDensity = std::function<Matrix<const float>(Count count, Slice<const float> positions)>;
+
+  // One refresh of `uniform` random and `occupied` occupied cells (or all, with uniform = cells), `chunk` points at a time.
+  void update(const LogDensity& logDensity, uint32_t uniform, uint32_t occupied, uint64_t seed, uint32_t chunk);
+
+  uint32_t cells() const { return cells_; }
+  Slice<const uint32_t> bits() const { return bits_; }
+  double occupiedFraction();
+
+  std::vector<float> values() { return device_.read(grid_.all()); }
+  void restore(std::span<const float> values, std::span<const uint32_t> bits);
+  std::vector<uint32_t> bitWords() { return device_.read(bits_.all()); }
+
+ private:
+  Device& device_;
+  MarchSpace space_;
+  uint32_t cells_;
+  Array<float> grid_;
+  Array<uint32_t> bits_;
+  Array<uint32_t> chosen_;
+  Array<float> positions_, logDensities_;
+};
+
+}  // namespace tessera

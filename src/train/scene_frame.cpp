@@ -1,0 +1,72 @@
+#include "train/scene_frame.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+
+namespace tessera {
+namespace {
+
+constexpr size_t kEnoughPoints = 200;
+
+double percentile(std::vector<double>& values, double fraction) {
+  const size_t rank = static_cast<size_t>(fraction * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(rank), values.end());
+  return values[rank];
+}
+
+SceneFrame frameOfPoints(const Capture& capture) {
+  Vec3d low, high;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    values.reserve(capture.points.size());
+    for (const SparsePoint& point : capture.points) values.push_back(point.xInWorld[axis]);
+    low[axis] = percentile(values, 0.02);
+    high[axis] = percentile(values, 0.98);
+  }
+  return {(low + high) / 2, 2 / std::max(1e-9, (high - low).maxCoeff())};
+}
+
+SceneFrame frameOfCameras(const Capture& capture) {
+  // The point nearest to all optical axes in the least-squares sense; a little weight holds it near the cameras when
+  // the axes are parallel.
+  Mat3d sum = Mat3d::Zero();
+  Vec3d right = Vec3d::Zero(), mean = Vec3d::Zero();
+  for (const Photo& photo : capture.photos) mean += photo.worldFromCamera.translation;
+  mean /= std::max<double>(1, static_cast<double>(capture.photos.size()));
+  for (const Photo& photo : capture.photos) {
+    const Vec3d axis = photo.worldFromCamera.rotation.col(2);
+    const Mat3d across = Mat3d::Identity() - axis * axis.transpose() * 0.999;
+    sum += across;
+    right += across * photo.worldFromCamera.translation;
+  }
+  SceneFrame frame;
+  frame.centre = capture.photos.empty() ? mean : Vec3d(sum.ldlt().solve(right));
+  double reach = 1e-9;
+  for (const Photo& photo : capture.photos) {
+    reach = std::max(reach, (photo.worldFromCamera.translation - frame.centre).lpNorm<Eigen::Infinity>());
+  }
+  frame.scale = 1 / reach;
+  return frame;
+}
+
+}  // namespace
+
+SceneFrame fitSceneFrame(const Capture& capture, double margin) {
+  SceneFrame frame = capture.points.size() >= kEnoughPoints ? frameOfPoints(capture) : frameOfCameras(capture);
+  frame.scale /= margin;
+  return frame;
+}
+
+RayCamera makeRayCamera(const Camera& camera, const Pose& worldFromCamera, const SceneFrame& frame) {
+  RayCamera made;
+  made.lens = static_cast<int32_t>(camera.lens);
+  for (int i = 0; i < 16; ++i) made.parameters[i] = static_cast<float>(camera.parameters[i]);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) made.rotation[3 * i + j] = static_cast<float>(worldFromCamera.rotation(i, j));
+  }
+  const Vec3d centre = frame.sceneFromWorld(worldFromCamera.translation);
+  for (int i = 0; i < 3; ++i) made.centre[i] = static_cast<float>(centre[i]);
+  return made;
+}
+
+}  // namespace tessera

@@ -1,0 +1,24 @@
+// Scene units: the region of interest is the cube [-1,1]³, so that float kernels see small numbers.
+#pragma once
+
+#include "compute/rays.h"
+#include "scene/capture.h"
+
+namespace tessera {
+
+struct SceneFrame {
+  Vec3d centre = Vec3d::Zero();  // of the region of interest, in the world
+  double scale = 1;              // scene units per world unit
+
+  Vec3d sceneFromWorld(const Vec3d& x) const { return (x - centre) * scale; }
+};
+
+// The region of interest of a capture: a cube around what the cameras look at. With enough sparse points, their robust
+// bounds (2nd to 98th percentile per axis); else the point nearest to all optical axes, reaching to the farthest camera.
+// `margin` enlarges it.
+SceneFrame fitSceneFrame(const Capture& capture, double margin);
+
+// A camera as ray kernels want it.
+RayCamera makeRayCamera(const Camera& camera, const Pose& worldFromCamera, const SceneFrame& frame);
+
+}  // namespace tessera

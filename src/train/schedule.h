@@ -1,0 +1,45 @@
+// When training does what.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+
+namespace tessera {
+
+// Warm-up, then constant until `constantFraction` of the steps, then an exponential fall to `finalFactor` at the end.
+struct RateSchedule {
+  double rate = 1e-2;
+  double finalFactor = 0.03;
+  double constantFraction = 0.4;
+  int warmUpSteps = 20;
+
+  double at(int64_t step, int64_t steps) const {
+    double value = rate * std::min(1.0, static_cast<double>(step + 1) / (warmUpSteps + 1));
+    const double fraction = steps > 0 ? static_cast<double>(step) / static_cast<double>(steps) : 0.0;
+    if (fraction > constantFraction) value *= std::pow(finalFactor, (fraction - constantFraction) / (1 - constantFraction));
+    return value;
+  }
+};
+
+// `--minutes` as a number of steps, fixed once, early: from the pace between `measureFrom` and the moment `share` of the
+// time has passed. Until then the schedule does not depend on the number of steps.
+class StepBudget {
+ public:
+  StepBudget(double minutes, double share = 0.06) : seconds_(minutes * 60), share_(share) {}
+
+  // Seconds since training began, at the end of `step`. Returns the number of steps once it can be told.
+  int64_t observe(int64_t step, double seconds) {
+    if (step == kMeasureFrom) measureStart_ = seconds;
+    if (step < 2 * kMeasureFrom || seconds < share_ * seconds_) return 0;
+    const double perStep = (seconds - measureStart_) / static_cast<double>(step - kMeasureFrom);
+    return step + 1 + std::max<int64_t>(0, static_cast<int64_t>((seconds_ - seconds) / perStep));
+  }
+
+ private:
+  static constexpr int64_t kMeasureFrom = 64;
+  double seconds_, share_, measureStart_ = 0;
+};
+
+}  // namespace tessera

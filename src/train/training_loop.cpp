@@ -1,0 +1,136 @@
+#include "train/training_loop.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "base/progress.h"
+#include "train/schedule.h"
+
+namespace tessera {
+namespace {
+
+double psnrOf(double squaredError) { return -10 * std::log10(std::max(squaredError, 1e-10)); }
+
+// Means since the last line of metrics.
+struct Window {
+  int64_t steps = 0;
+  double loss = 0, squaredError = 0, rays = 0, samples = 0, marched = 0, since = 0;
+
+  void add(const StepReport& report) {
+    ++steps;
+    loss += report.loss;
+    squaredError += report.squaredError;
+    rays += report.rays;
+    samples += report.samples;
+    marched += report.marched;
+  }
+};
+
+nlohmann::json metricsLine(int64_t step, double seconds, const Window& window) {
+  const double span = std::max(1e-9, seconds - window.since);
+  return {{"step", step},
+          {"seconds", seconds},
+          {"loss", window.loss / window.steps},
+          {"psnr", psnrOf(window.squaredError / window.steps)},
+          {"rays_per_second", window.rays / span},
+          {"samples_per_second", window.samples / span},
+          {"marched_per_second", window.marched / span},
+          {"steps_per_second", window.steps / span},
+          {"peak_rss_bytes", peakResidentBytes()}};
+}
+
+// Step and plan to go on from.
+ModelManifest startingPoint(Trainee& trainee, const ModelFolder& folder, const TrainingLoopOptions& options) {
+  ModelManifest state;
+  state.method = options.method;
+  const std::optional<ModelManifest> found = folder.manifest();
+  if (found && !options.resume) {
+    throw Error(folder.root().string(), "", fmt::format("already holds a model, trained for {} steps", found->step),
+                "pass --resume to go on with it, or name another folder");
+  }
+  if (found) {
+    if (found->method != options.method) {
+      throw Error(folder.root().string(), "manifest.json", "was trained with --method " + found->method,
+                  "resume with that method");
+    }
+    CHECK(found->files.size() == 1u);
+    const fs::path file = folder.root() / found->files[0];
+    trainee.restore(file, readSafetensors(file));
+    state = *found;
+    folder.cutMetrics(state.step);
+  } else {
+    folder.cutMetrics(-1);
+  }
+  if (options.minutes > 0) {
+    if (options.resume) state.plannedSteps = folder.readPlan().value_or(0);
+  } else {
+    state.plannedSteps = options.steps;
+  }
+  return state;
+}
+
+}  // namespace
+
+TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const TrainingLoopOptions& options) {
+  using Clock = std::chrono::steady_clock;
+  if (!options.resume) fs::remove(folder.root() / "plan.json");
+  ModelManifest state = startingPoint(trainee, folder, options);
+  const auto start = Clock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
+  StepBudget budget(options.minutes);
+  Window window;
+  TrainingResult result;
+  double savedAt = 0, totalSamples = 0;
+  const int64_t firstStep = state.step;
+  std::optional<Progress> progress;
+  if (options.progress) progress.emplace("training", state.plannedSteps, "steps");
+
+  const auto save = [&] {
+    folder.commit(state, trainee.save());
+    savedAt = seconds();
+  };
+  const auto unfinished = [&] { return state.plannedSteps == 0 || state.step < state.plannedSteps; };
+  while (unfinished() && !options.stopRequested()) {
+    const StepReport report = trainee.step(state.step, state.plannedSteps);
+    if (!std::isfinite(report.loss)) {
+      throw Error(folder.root().string(), fmt::format("step {}, block 0", state.step), "the loss is not a number",
+                  "resume with a lower --set rate=..., and report it with the capture");
+    }
+    window.add(report);
+    totalSamples += report.samples;
+    ++state.step;
+    const double now = seconds();
+    if (state.plannedSteps == 0) {
+      state.plannedSteps = budget.observe(state.step - firstStep, now);
+      if (state.plannedSteps != 0) {
+        state.plannedSteps += firstStep;
+        folder.writePlan(state.plannedSteps);
+        if (progress) progress->setTotal(state.plannedSteps);
+      }
+    }
+    result.psnr = psnrOf(window.squaredError / window.steps);
+    if (progress) progress->update(state.step, fmt::format("{:.2f} dB", result.psnr));
+    if (now - window.since >= 2 || !unfinished()) {
+      folder.appendMetrics(metricsLine(state.step, now, window));
+      window = Window();
+      window.since = now;
+    }
+    if (unfinished() && now - savedAt >= options.checkpointSeconds) save();
+  }
+  save();
+  result.step = state.step;
+  result.plannedSteps = state.plannedSteps;
+  result.finished = !unfinished();
+  result.seconds = seconds();
+  result.samplesPerSecond = totalSamples / std::max(1e-9, result.seconds);
+  if (progress) progress->finish(fmt::format("{:.2f} dB", result.psnr));
+  return result;
+}
+
+}  // namespace tessera

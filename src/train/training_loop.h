@@ -1,0 +1,50 @@
+// The loop around any representation's training step: number of steps, checkpoints, metrics, progress, stopping.
+#pragma once
+
+#include <functional>
+
+#include "base/safetensors.h"
+#include "train/model_folder.h"
+
+namespace tessera {
+
+struct StepReport {
+  double loss = 0;
+  double squaredError = 0;  // mean over colour channels, for PSNR
+  uint32_t rays = 0;
+  uint32_t samples = 0;     // that networks were trained on
+  uint32_t marched = 0;     // that density was looked up at
+};
+
+// One representation in training. The state after a step is a function of the capture, the settings and the step alone.
+class Trainee {
+ public:
+  virtual ~Trainee() = default;
+  // `plannedSteps` 0: not known yet.
+  virtual StepReport step(int64_t step, int64_t plannedSteps) = 0;
+  // Everything that later steps depend on, as a safetensors file; and back. `path` is for errors.
+  virtual Bytes save() = 0;
+  virtual void restore(const fs::path& path, const Safetensors& state) = 0;
+};
+
+struct TrainingLoopOptions {
+  std::string method;
+  int64_t steps = 0;               // when no minutes are given
+  double minutes = 0;              // > 0: fixes the number of steps once, early
+  double checkpointSeconds = 60;
+  bool resume = false;
+  bool progress = true;
+  std::function<bool()> stopRequested = [] { return false; };  // save and leave
+};
+
+struct TrainingResult {
+  int64_t step = 0, plannedSteps = 0;
+  bool finished = false;
+  double seconds = 0, psnr = 0, samplesPerSecond = 0;
+};
+
+// Trains until done, asked to stop, or killed. Throws Error at a loss that is not a number (with the step), and when the
+// folder holds a model and `resume` is off.
+TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const TrainingLoopOptions& options);
+
+}  // namespace tessera
