@@ -1,0 +1,148 @@
+#include "import/exif.h"
+
+#include <gtest/gtest.h>
+
+#include "import/test_support.h"
+
+namespace tessera {
+namespace {
+
+TEST(Xmp, ReadsAttributesWithSigns) {
+  const XmpTags tags = decodeXmp(
+      R"(<rdf:Description drone-dji:AbsoluteAltitude="+198.31" drone-dji:RelativeAltitude='-3.5'
+         drone-dji:GimbalPitchDegree = "-89.90" drone-dji:GpsLatitude=" 50.5 " drone-dji:GpsLongtitude="+0.25">)");
+  EXPECT_EQ(tags.absoluteAltitude, 198.31);
+  EXPECT_EQ(tags.relativeAltitude, -3.5);
+  EXPECT_EQ(tags.gimbalPitch, -89.9);
+  EXPECT_EQ(tags.latitude, 50.5);
+  EXPECT_EQ(tags.longitude, 0.25);  // misspelt by older firmware
+  EXPECT_FALSE(tags.gimbalYaw.has_value());
+}
+
+TEST(Xmp, ReadsElements) {
+  const XmpTags tags = decodeXmp(
+      "<drone-dji:GpsLatitude>-12.5</drone-dji:GpsLatitude>\n<drone-dji:GpsLongitude>\n+77 </drone-dji:GpsLongitude>");
+  EXPECT_EQ(tags.latitude, -12.5);
+  EXPECT_EQ(tags.longitude, 77);
+}
+
+TEST(Xmp, IsNotFooledByOtherNamesAndOtherText) {
+  const XmpTags tags = decodeXmp(
+      "x:GpsLatitudeRef=\"5\" GpsLatitude=\"6\" x:GpsLongitude=\"east\" x:RelativeAltitude=\"1e999\" "
+      "x:AbsoluteAltitude=12 x:GimbalYawDegree=\"1 2\" x:GimbalRollDegree>");
+  EXPECT_FALSE(tags.latitude || tags.longitude || tags.relativeAltitude || tags.absoluteAltitude || tags.gimbalYaw ||
+               tags.gimbalRoll);
+}
+
+// A little-endian EXIF block that holds a GPS directory alone.
+class ExifBuilder {
+ public:
+  ExifBuilder& entry(uint16_t tag, uint16_t format, uint32_t count, std::vector<uint8_t> value) {
+    entries_.push_back({tag, format, count, std::move(value)});
+    return *this;
+  }
+  ExifBuilder& rationals(uint16_t tag, const std::vector<uint32_t>& values) {
+    std::vector<uint8_t> bytes;
+    for (uint32_t v : values) put(bytes, v, 4);
+    return entry(tag, 5, static_cast<uint32_t>(values.size() / 2), bytes);
+  }
+  Bytes exif() const {
+    std::vector<uint8_t> out = {'E', 'x', 'i', 'f', 0, 0, 'I', 'I', 42, 0, 8, 0, 0, 0};
+    put(out, 1, 2);
+    put(out, 0x8825, 2);
+    put(out, 4, 2);
+    put(out, 1, 4);
+    put(out, 26, 4);  // the GPS directory, counted from "II"
+    put(out, 0, 4);
+    put(out, entries_.size(), 2);
+    std::vector<uint8_t> data;
+    const size_t dataAt = 26 + 2 + 12 * entries_.size() + 4;
+    for (const Entry& e : entries_) {
+      put(out, e.tag, 2);
+      put(out, e.format, 2);
+      put(out, e.count, 4);
+      if (e.value.size() <= 4) {
+        std::vector<uint8_t> padded = e.value;
+        padded.resize(4);
+        out.insert(out.end(), padded.begin(), padded.end());
+      } else {
+        put(out, dataAt + data.size(), 4);
+        data.insert(data.end(), e.value.begin(), e.value.end());
+      }
+    }
+    put(out, 0, 4);
+    out.insert(out.end(), data.begin(), data.end());
+    Bytes bytes(out.size());
+    std::transform(out.begin(), out.end(), bytes.begin(), [](uint8_t b) { return std::byte{b}; });
+    return bytes;
+  }
+
+ private:
+  struct Entry {
+    uint16_t tag, format;
+    uint32_t count;
+    std::vector<uint8_t> value;
+  };
+  static void put(std::vector<uint8_t>& out, uint64_t value, int bytes) {
+    for (int i = 0; i < bytes; ++i) out.push_back(static_cast<uint8_t>(value >> (8 * i)));
+  }
+  std::vector<Entry> entries_;
+};
+
+ExifBuilder southWest() {
+  ExifBuilder builder;
+  builder.entry(1, 2, 2, {'S', 0}).rationals(2, {50, 1, 30, 1, 3600, 100});
+  builder.entry(3, 2, 2, {'W', 0}).rationals(4, {0, 1, 15, 1, 0, 1});
+  builder.entry(5, 1, 1, {1}).rationals(6, {25, 2});
+  return builder;
+}
+
+TEST(Exif, ReadsGpsWithItsReferences) {
+  const PhotoTags tags = decodePhotoTags(encodeJpeg(gradientPicture(8, 8), 90, southWest().exif()));
+  ASSERT_TRUE(tags.gps.has_value());
+  EXPECT_NEAR(tags.gps->latitude, -(50 + 0.5 + 0.01), 1e-12);
+  EXPECT_NEAR(tags.gps->longitude, -0.25, 1e-12);
+  EXPECT_EQ(tags.gps->altitude, -12.5);  // below the sea
+  EXPECT_FALSE(tags.gimbal.has_value());
+}
+
+TEST(Exif, FindsNothingWhereThereIsNothing) {
+  EXPECT_FALSE(decodePhotoTags(encodeJpeg(gradientPicture(8, 8))).gps.has_value());
+  EXPECT_FALSE(decodePhotoTags(encodePng(gradientPicture(8, 8))).gps.has_value());
+  EXPECT_FALSE(decodePhotoTags({}).gps.has_value());
+}
+
+TEST(Exif, SurvivesEveryTruncation) {
+  const Bytes jpeg = encodeJpeg(gradientPicture(8, 8), 90, southWest().exif());
+  for (size_t length = 0; length < jpeg.size(); ++length) decodePhotoTags(std::span(jpeg).first(length));
+}
+
+TEST(Exif, DoesNotBelieveAReceiverWithoutAFix) {
+  ExifBuilder zero;
+  zero.entry(1, 2, 2, {'N', 0})
+      .rationals(2, {0, 1, 0, 1, 0, 1})
+      .entry(3, 2, 2, {'E', 0})
+      .rationals(4, {0, 0, 0, 0, 0, 0});
+  EXPECT_FALSE(decodePhotoTags(encodeJpeg(gradientPicture(8, 8), 90, zero.exif())).gps.has_value());
+  ExifBuilder beyond;
+  beyond.entry(1, 2, 2, {'N', 0})
+      .rationals(2, {91, 1, 0, 1, 0, 1})
+      .entry(3, 2, 2, {'E', 0})
+      .rationals(4, {1, 1, 0, 1, 0, 1});
+  EXPECT_FALSE(decodePhotoTags(encodeJpeg(gradientPicture(8, 8), 90, beyond.exif())).gps.has_value());
+}
+
+TEST(Exif, ReadsARealDrone) {
+  const auto beach = sharedData("brighton_beach");
+  if (!beach) GTEST_SKIP() << "TESSERA_SHARED_DATA/brighton_beach is not there";
+  const PhotoTags tags = decodePhotoTags(readFile(*beach / "images/DJI_0018.JPG"));
+  ASSERT_TRUE(tags.gps.has_value());
+  EXPECT_EQ(tags.gps->altitude, 198.31);
+  EXPECT_EQ(tags.gps->relativeAltitude, 39.80);
+  ASSERT_TRUE(tags.gimbal.has_value());
+  EXPECT_EQ(tags.gimbal->pitch, -89.9);
+  EXPECT_EQ(tags.gimbal->yaw, 45);
+}
+
+}  // namespace
+}  // namespace tessera

@@ -1,0 +1,261 @@
+#include "import/importer.h"
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "import/capture_reader.h"
+#include "import/test_support.h"
+
+namespace tessera {
+namespace {
+
+// A nerfstudio folder with photos 0.png .. of 16 × 12 pixels, standing on a line and looking north.
+class Import : public testing::Test {
+ protected:
+  struct Frame {
+    std::string file, more;
+  };
+  void SetUp() override {
+    source_ = folder_ / "source";
+    out_ = folder_ / "out";
+    fs::create_directories(source_ / "images");
+  }
+  void add(const std::string& name, int width = 16, int height = 12, const std::string& more = "") {
+    writePng(source_ / name, gradientPicture(width, height, 3, static_cast<int>(frames_.size())));
+    frames_.push_back({name, more});
+  }
+  void write(const std::string& more = "") {
+    std::string json = "{\"w\":16,\"h\":12,\"fl_x\":20" + more + ",\"frames\":[";
+    for (size_t i = 0; i < frames_.size(); ++i) {
+      json += std::string(i > 0 ? "," : "") + "{\"file_path\":\"" + frames_[i].file + "\"" + frames_[i].more +
+              ",\"transform_matrix\":[[1,0,0," + std::to_string(1000 + i) + "],[0,0,-1,0],[0,1,0,2],[0,0,0,1]]}";
+    }
+    writeFileAtomically(source_ / "transforms.json", json + "]}");
+  }
+  Capture run(const ImportOptions& options = {}) {
+    testing::internal::CaptureStderr();
+    try {
+      Capture capture = importCapture(source_, out_, options);
+      log_ = testing::internal::GetCapturedStderr();
+      return capture;
+    } catch (...) {
+      log_ = testing::internal::GetCapturedStderr();
+      throw;
+    }
+  }
+  bool logged(const std::string& text) const { return log_.find(text) != std::string::npos; }
+
+  TemporaryFolder folder_;
+  fs::path source_, out_;
+  std::vector<Frame> frames_;
+  std::string log_;
+};
+
+TEST_F(Import, MakesACaptureThatNeedsItsSourceNoMore) {
+  for (const char* name : {"images/10.png", "images/9.png", "images/8.png"}) add(name);
+  write();
+  run();
+  fs::remove_all(source_);
+  const Capture capture = readCapture(out_);
+  ASSERT_EQ(capture.photos.size(), 3u);
+  EXPECT_EQ(capture.photos[0].name, "images/8.png");  // natural order
+  EXPECT_EQ(capture.photos[2].name, "images/10.png");
+  EXPECT_EQ(readImage(capture.photos[2].image).image.pixels, gradientPicture(16, 12, 3, 0).pixels);
+  // Recentred, and known by how much.
+  EXPECT_LT(capture.photos[0].worldFromCamera.translation.norm(), 3);
+  EXPECT_EQ((capture.sourceFromWorld * capture.photos[2].worldFromCamera.translation.homogeneous()).head<3>(),
+            Vec3d(1000, 0, 2));
+}
+
+TEST_F(Import, HoldsOutEveryEighthInNaturalOrder) {
+  for (int i = 0; i < 20; ++i) add("images/" + std::to_string(i) + ".png");
+  write();
+  std::vector<std::string> names;
+  for (const Capture capture = run(); int i : capture.photosIn(Split::test))
+    names.push_back(capture.photos[size_t(i)].name);
+  EXPECT_EQ(names, (std::vector<std::string>{"images/0.png", "images/8.png", "images/16.png"}));
+  EXPECT_EQ(run({.holdout = "none"}).photosIn(Split::test).size(), 0u);
+  EXPECT_EQ(run({.holdout = "every:5"}).photosIn(Split::test).size(), 4u);
+  writeFileAtomically(folder_ / "list", std::string_view("# held out\n3.png\nimages/7.png\r\n12\nnone.png\n"));
+  EXPECT_EQ(run({.holdout = "list:" + (folder_ / "list").string()}).photosIn(Split::test),
+            (std::vector<int>{3, 7, 12}));
+  EXPECT_TRUE(logged("none.png is not a photo")) << log_;
+  for (const char* wrong : {"every:", "every:1", "every:x", "some", "list:/nowhere"}) {
+    EXPECT_THROW(run({.holdout = wrong}), Error) << wrong;
+  }
+}
+
+TEST_F(Import, KeepsTheSourcesOwnSplitUnlessTold) {
+  for (int i = 0; i < 4; ++i) add("images/" + std::to_string(i) + ".png");
+  write(R"(,"train_filenames":["images/0.png","images/1.png","images/2.png"],"val_filenames":["images/3.png"])");
+  EXPECT_EQ(run().photosIn(Split::test), (std::vector<int>{3}));
+  EXPECT_EQ(run({.holdout = "every:2"}).photosIn(Split::test), (std::vector<int>{0, 2}));
+}
+
+TEST_F(Import, ReducesByAreaAndScalesTheLens) {
+  add("images/a.png");
+  add("images/b.png");
+  write();
+  const Capture capture = run({.downscale = 4});
+  EXPECT_EQ(capture.cameras.at(0).width, 4);
+  EXPECT_EQ(capture.cameras[0].height, 3);
+  EXPECT_EQ(capture.cameras[0].focalX(), 5);
+  const ImageU8 full = gradientPicture(16, 12, 3, 0), reduced = readImage(capture.photos[0].image).image;
+  double sum = 0;
+  for (int y = 4; y < 8; ++y) {
+    for (int x = 8; x < 12; ++x) sum += full.at(x, y)[1];
+  }
+  EXPECT_EQ(reduced.at(2, 1)[1], std::lround(sum / 16));
+}
+
+TEST_F(Import, DropsWhatIsWrongAndSaysSoOnceForEachKind) {
+  add("images/good.png");
+  add("images/again.png");
+  frames_.push_back(frames_[1]);
+  add("images/half.png", 8, 6);
+  add("images/upright.png", 12, 16);
+  for (const char* name : {"images/x.png", "images/y.png", "images/z.png", "images/w.png"})
+    frames_.push_back({name, ""});
+  writeFileAtomically(source_ / "images/text.png", std::string_view("not a picture"));
+  frames_.push_back({"images/text.png", ""});
+  Bytes jpeg = encodeJpeg(gradientPicture(160, 120), 95);
+  jpeg.resize(jpeg.size() / 2);
+  writeFileAtomically(source_ / "images/cut.jpg", jpeg);
+  frames_.push_back({"images/cut.jpg", ""});
+  write();
+  const Capture capture = run();
+  std::vector<std::string> names;
+  for (const Photo& photo : capture.photos) names.push_back(photo.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"images/again.png", "images/good.png", "images/half.png"}));
+  EXPECT_EQ(capture.cameras[static_cast<size_t>(capture.photos[2].camera)].focalX(), 10);
+  EXPECT_TRUE(
+      logged("4 photos named by the source are not on disk; dropped (images/x.png, images/y.png, images/z.png, ...)"))
+      << log_;
+  EXPECT_TRUE(logged("named more than once")) << log_;
+  EXPECT_TRUE(logged("another shape than their camera")) << log_;
+  EXPECT_TRUE(logged("cannot be read as JPEG or PNG")) << log_;
+  EXPECT_TRUE(logged("end early")) << log_;
+  EXPECT_EQ(readCapture(out_).photos.size(), 3u);
+}
+
+TEST_F(Import, FailsWhenNothingIsLeft) {
+  frames_.push_back({"images/nowhere.png", ""});
+  write();
+  EXPECT_THROW(run(), Error);
+  EXPECT_FALSE(fs::exists(out_ / "transforms.json"));
+}
+
+TEST_F(Import, BringsMasksAndDepthsAlong) {
+  add("images/a.png", 16, 12, R"(,"mask_path":"masks/a.png","depth_file_path":"depth/a.exr")");
+  add("images/b.png", 16, 12, R"(,"mask_path":"masks/missing.png")");
+  ImageU8 mask(16, 12, 1, 255);
+  mask.at(5, 5)[0] = 0;
+  writePng(source_ / "masks/a.png", mask);
+  ImageF depth(16, 12, 1, 3.0f);
+  depth.at(9, 9)[0] = 100;
+  writeDepthExr(source_ / "depth/a.exr", depth);
+  write();
+  const Capture capture = run({.downscale = 2});
+  const ImageU8 reduced = readImage(capture.photos[0].mask).image;
+  EXPECT_EQ(reduced.width, 8);
+  for (int y = 0; y < 6; ++y) {
+    for (int x = 0; x < 8; ++x) EXPECT_EQ(reduced.at(x, y)[0], x == 2 && y == 2 ? 0 : 255);
+  }
+  const ImageF read = readDepth(capture.photos[0].depth);
+  EXPECT_EQ(read.width, 8);
+  for (float value : read.pixels) EXPECT_TRUE(value == 3 || value == 100);  // never a mean across an edge
+  EXPECT_TRUE(capture.photos[1].mask.empty());
+  EXPECT_TRUE(logged("1 masks are missing or unreadable")) << log_;
+}
+
+TEST_F(Import, InvertsInstantNgpsDynamicMasks) {
+  add("images/a.png");
+  add("images/b.png");
+  ImageU8 dynamic(16, 12, 3, 0);
+  dynamic.at(4, 4)[2] = 1;
+  writePng(source_ / "images/dynamic_mask_a.png", dynamic);
+  write();
+  const Capture capture = run();
+  const ImageU8 mask = readImage(capture.photos[0].mask).image;
+  EXPECT_EQ(mask.at(4, 4)[0], 0);
+  EXPECT_EQ(mask.at(5, 4)[0], 255);
+}
+
+TEST_F(Import, GoesOnWhereItWas) {
+  add("images/a.png");
+  add("images/b.png");
+  write();
+  run({.downscale = 2});
+  const auto before = fs::last_write_time(out_ / "images/a.png");
+  fs::remove(out_ / "images/b.png");
+  fs::remove(out_ / "transforms.json");
+  run({.downscale = 2});
+  EXPECT_EQ(fs::last_write_time(out_ / "images/a.png"), before);
+  EXPECT_TRUE(fs::exists(out_ / "images/b.png"));
+  EXPECT_EQ(readImage(run({.downscale = 4}).photos[0].image).image.width, 4);  // another size is done anew
+}
+
+TEST_F(Import, GivesPicturesThatWouldCollideTheirOwnNames) {
+  add("images/a.png");
+  writeJpeg(source_ / "images/a.jpg", gradientPicture(16, 12));
+  frames_.push_back({"images/a.jpg", ""});
+  write();
+  const Capture capture = run({.downscale = 2});
+  EXPECT_NE(capture.photos[0].image, capture.photos[1].image);
+  EXPECT_EQ(readCapture(out_).photos.size(), 2u);
+}
+
+TEST_F(Import, KeepsAlphaAndDoesNotLetClearPixelsBleed) {
+  ImageU8 image(16, 12, 4, 0);  // clear black
+  for (int x = 0; x < 15; ++x) {
+    for (int c = 0; c < 4; ++c) image.at(x, 0)[c] = c == 0 || c == 3 ? 255 : 0;  // opaque red
+  }
+  for (const char* name : {"images/a.png", "images/b.png"}) {
+    add(name);
+    writePng(source_ / name, image);
+  }
+  write();
+  const ImageU8 reduced = readImage(run({.downscale = 2}).photos[0].image).image;
+  ASSERT_EQ(reduced.channels, 4);
+  EXPECT_EQ(reduced.at(0, 0)[0], 255);
+  EXPECT_EQ(reduced.at(0, 0)[3], 128);
+  EXPECT_EQ(reduced.at(7, 0)[3], 64);
+}
+
+TEST_F(Import, TellsAFolderOfPhotosWhatToDo) {
+  writePng(source_ / "images/a.png", gradientPicture(8, 8));
+  try {
+    run();
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(error.remedy().find("colmap mapper --database_path " + source_.string()), std::string::npos);
+    EXPECT_NE(error.remedy().find("--image_path " + (source_ / "images").string()), std::string::npos);
+  }
+  fs::remove_all(source_ / "images");
+  EXPECT_THROW(run(), Error);
+  fs::remove_all(source_);
+  EXPECT_THROW(run(), Error);
+}
+
+TEST_F(Import, DoesNotWriteOverItsSource) {
+  add("images/a.png");
+  write();
+  EXPECT_THROW(importCapture(source_, source_ / "images/.."), Error);
+}
+
+TEST_F(Import, TakesItsOwnCapturesAsTheyAre) {
+  for (int i = 0; i < 9; ++i) add("images/" + std::to_string(i) + ".png");
+  write();
+  const Capture first = run();
+  const Capture second = importCapture(out_, folder_ / "again");
+  ASSERT_EQ(second.photos.size(), first.photos.size());
+  for (size_t i = 0; i < 9; ++i) {
+    EXPECT_EQ(second.photos[i].name, first.photos[i].name);
+    EXPECT_EQ(second.photos[i].split, first.photos[i].split);
+    EXPECT_EQ(second.photos[i].worldFromCamera.translation, first.photos[i].worldFromCamera.translation);
+  }
+  EXPECT_EQ(second.sourceFromWorld, first.sourceFromWorld);
+}
+
+}  // namespace
+}  // namespace tessera

@@ -1,0 +1,204 @@
+#include "import/orient.h"
+
+#include <gtest/gtest.h>
+
+#include <GeographicLib/LocalCartesian.hpp>
+
+#include "base/random.h"
+#include "import/georeference.h"
+
+namespace tessera {
+namespace {
+
+// Looks down with its picture's top towards `heading`.
+Pose nadirPose(const Vec3d& centre, double heading) {
+  Pose pose;
+  const Vec3d up(std::sin(heading), std::cos(heading), 0);  // the picture's up
+  pose.rotation.col(1) = -up;
+  pose.rotation.col(2) = -Vec3d::UnitZ();
+  pose.rotation.col(0) = pose.rotation.col(1).cross(pose.rotation.col(2));
+  pose.translation = centre;
+  return pose;
+}
+
+// A lawn-mower flight of 4 × 5 photos 20 m apart at a height of 60 m, in east-north-up, with GPS that errs by `noise`.
+SourceCapture flight(double noise = 0) {
+  SourceCapture source;
+  const RandomStream random(7, 1);
+  uint64_t draw = 0;
+  const GeographicLib::LocalCartesian local(50, 8, 100);
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 5; ++column) {
+      Photo photo;
+      const Vec3d at(20.0 * column, 20.0 * row, 60 + 3 * (column % 2));
+      photo.worldFromCamera = nadirPose(at, row % 2 == 0 ? M_PI / 2 : -M_PI / 2);
+      Vec3d measured = at;
+      for (int axis = 0; axis < 3; ++axis) measured[axis] += noise * (random.uniformDouble(draw++) - 0.5);
+      GpsFix fix;
+      local.Reverse(measured.x(), measured.y(), measured.z(), fix.latitude, fix.longitude, fix.altitude);
+      photo.gps = fix;
+      source.capture.photos.push_back(photo);
+    }
+  }
+  source.capture.points.push_back({Vec3d(40, 30, 0), {}, 0});
+  return source;
+}
+
+// Turns, shrinks and shifts a capture, as structure from motion delivers it.
+void scramble(SourceCapture& source) {
+  Mat4d m = Mat4d::Identity();
+  m.topLeftCorner<3, 3>() = 0.07 * Eigen::AngleAxisd(2, Vec3d(1, -2, 0.5).normalized()).toRotationMatrix();
+  m.topRightCorner<3, 1>() = Vec3d(5, -3, 8);
+  applySimilarity(source.capture, m);
+  source.capture.sourceFromWorld = Mat4d::Identity();
+}
+
+void expectEastNorthUp(const Capture& capture, double tolerance) {
+  const Vec3d step = capture.photos[1].worldFromCamera.translation - capture.photos[0].worldFromCamera.translation;
+  EXPECT_NEAR((step - Vec3d(20, 0, 3)).norm(), 0, tolerance);
+  for (const Photo& photo : capture.photos) EXPECT_LT(photo.worldFromCamera.rotation.col(2).z(), -0.999);
+  EXPECT_NEAR(capture.points[0].xInWorld.z() - capture.photos[0].worldFromCamera.translation.z(), -60, tolerance);
+}
+
+TEST(Orient, FindsEastNorthUpInMetresFromGps) {
+  SourceCapture source = flight();
+  const Capture original = source.capture;
+  scramble(source);
+  const Capture scrambled = source.capture;
+  const Orientation orientation = orientWorld(source, {});
+  expectEastNorthUp(source.capture, 1e-3);  // the Earth's curve over the flight
+  EXPECT_NEAR(orientation.scale, 1 / 0.07, 1e-4);
+
+  // Back to where the poses came from, and on to where on Earth it is.
+  const Photo& photo = source.capture.photos[7];
+  const Vec3d inSource = (source.capture.sourceFromWorld * photo.worldFromCamera.translation.homogeneous()).head<3>();
+  EXPECT_NEAR((inSource - scrambled.photos[7].worldFromCamera.translation).norm(), 0, 1e-9);
+  ASSERT_TRUE(source.capture.geo.has_value());
+  const GeoFrame& geo = *source.capture.geo;
+  const Vec3d enu = (geo.enuFromWorld * photo.worldFromCamera.translation.homogeneous()).head<3>();
+  EXPECT_NEAR((enu - enuFromGps(geo, photo.gps->latitude, photo.gps->longitude, photo.gps->altitude)).norm(), 0, 1e-3);
+}
+
+TEST(Orient, RecentresAmidTheCameras) {
+  SourceCapture source = flight();
+  scramble(source);
+  orientWorld(source, {});
+  Vec3d mean = Vec3d::Zero();
+  for (const Photo& photo : source.capture.photos) mean += photo.worldFromCamera.translation / 20;
+  EXPECT_LT(mean.norm(), 15);
+}
+
+TEST(Orient, ToleratesNoiseAndAThirdOfWildFixes) {
+  SourceCapture source = flight(3);
+  for (int i : {2, 5, 8, 11, 13, 17})
+    source.capture.photos[static_cast<size_t>(i)].gps->latitude += 0.01;  // a kilometre
+  scramble(source);
+  std::string reason;
+  const auto found = georeference(source.capture.photos, reason);
+  ASSERT_TRUE(found.has_value()) << reason;
+  EXPECT_EQ(found->inliers, 14);
+  EXPECT_LT(found->rmsMetres, 2);
+  orientWorld(source, {});
+  for (const Photo& photo : source.capture.photos) EXPECT_LT(photo.worldFromCamera.rotation.col(2).z(), -0.99);
+}
+
+TEST(Orient, PrefersTheBarometerToGpsHeights) {
+  SourceCapture source = flight();
+  int i = 0;
+  for (Photo& photo : source.capture.photos) {
+    photo.gps->relativeAltitude = photo.worldFromCamera.translation.z() - 20;  // took off on a hill
+    photo.gps->altitude += i++ % 3 * 5;
+  }
+  scramble(source);
+  orientWorld(source, {});
+  expectEastNorthUp(source.capture, 1e-2);
+}
+
+TEST(Georeference, RefusesWhatCannotFixATurn) {
+  std::string reason;
+  SourceCapture few = flight();
+  for (size_t i = 2; i < few.capture.photos.size(); ++i) few.capture.photos[i].gps.reset();
+  EXPECT_FALSE(georeference(few.capture.photos, reason).has_value());
+  EXPECT_EQ(reason, "2 photos with GPS; three are needed");
+
+  SourceCapture line = flight();
+  for (size_t i = 5; i < line.capture.photos.size(); ++i) line.capture.photos[i].gps.reset();
+  for (size_t i = 0; i < 5; ++i) {
+    line.capture.photos[i].worldFromCamera.translation.z() = 60;
+    line.capture.photos[i].gps->altitude = 160;
+  }
+  EXPECT_FALSE(georeference(line.capture.photos, reason).has_value());
+  EXPECT_NE(reason.find("line"), std::string::npos) << reason;
+
+  SourceCapture unrelated = flight();
+  const RandomStream random(3, 3);
+  uint64_t draw = 0;
+  for (Photo& photo : unrelated.capture.photos) {
+    photo.worldFromCamera.translation =
+        Vec3d(random.uniformDouble(draw), random.uniformDouble(draw + 1), random.uniformDouble(draw + 2));
+    draw += 3;
+  }
+  EXPECT_FALSE(georeference(unrelated.capture.photos, reason).has_value());
+}
+
+void forgetGps(SourceCapture& source) {
+  for (Photo& photo : source.capture.photos) photo.gps.reset();
+}
+
+TEST(Orient, FindsUpOfANadirFlightFromThePlaneOfItsCameras) {
+  SourceCapture source = flight();
+  forgetGps(source);
+  for (Photo& photo : source.capture.photos) photo.worldFromCamera.translation.z() = 60;
+  scramble(source);
+  orientWorld(source, {});
+  for (const Photo& photo : source.capture.photos) EXPECT_LT(photo.worldFromCamera.rotation.col(2).z(), -0.9999);
+}
+
+TEST(Orient, BelievesTheGimbalBeforeAnyGuess) {
+  // Obliques in one direction: the cameras' up alone would be 60° off.
+  SourceCapture source = flight();
+  forgetGps(source);
+  const Mat3d tilt = Eigen::AngleAxisd(-60 * M_PI / 180, Vec3d::UnitX()).toRotationMatrix();
+  for (Photo& photo : source.capture.photos) {
+    Mat3d level;  // looks north
+    level.col(0) = Vec3d::UnitX();
+    level.col(1) = -Vec3d::UnitZ();
+    level.col(2) = Vec3d::UnitY();
+    photo.worldFromCamera.rotation = tilt * level;
+  }
+  EXPECT_LT(source.capture.photos[0].worldFromCamera.rotation.col(2).z(), 0);  // looks down
+  scramble(source);
+  orientWorld(source, std::vector<std::optional<GimbalAngles>>(20, GimbalAngles{0, -60, 0}));
+  EXPECT_NEAR(source.capture.photos[0].worldFromCamera.rotation.col(2).z(), -std::sin(60 * M_PI / 180), 1e-9);
+}
+
+TEST(Orient, TurnsUprightCamerasUpright) {
+  SourceCapture source;
+  for (int i = 0; i < 12; ++i) {  // an orbit
+    Photo photo;
+    const double angle = i * M_PI / 6;
+    photo.worldFromCamera.rotation.col(2) = Vec3d(-std::cos(angle), -std::sin(angle), 0);
+    photo.worldFromCamera.rotation.col(1) = -Vec3d::UnitZ();
+    photo.worldFromCamera.rotation.col(0) =
+        photo.worldFromCamera.rotation.col(1).cross(photo.worldFromCamera.rotation.col(2));
+    photo.worldFromCamera.translation = Vec3d(5 * std::cos(angle), 5 * std::sin(angle), 1);
+    source.capture.photos.push_back(photo);
+  }
+  scramble(source);
+  orientWorld(source, {});
+  for (const Photo& photo : source.capture.photos) {
+    EXPECT_NEAR((photo.worldFromCamera.rotation.col(1) + Vec3d::UnitZ()).norm(), 0, 1e-9);
+  }
+}
+
+TEST(Orient, LeavesOurOwnWorldsAlone) {
+  SourceCapture source = flight();
+  source.isOurs = true;
+  const Pose before = source.capture.photos[3].worldFromCamera;
+  orientWorld(source, {});
+  EXPECT_EQ(source.capture.photos[3].worldFromCamera.translation, before.translation);
+  EXPECT_EQ(source.capture.photos[3].worldFromCamera.rotation, before.rotation);
+}
+
+}  // namespace
+}  // namespace tessera

@@ -1,0 +1,280 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "base/error.h"
+#include "import/capture_reader.h"
+#include "import/test_support.h"
+#include "import/transforms_json.h"
+#include "scene/capture_writer.h"
+
+namespace tessera {
+namespace {
+
+const std::string kIdentity = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
+
+std::string frame(const std::string& file, const std::string& matrix = kIdentity, const std::string& more = "") {
+  return "{\"file_path\":\"" + file + "\",\"transform_matrix\":" + matrix + more + "}";
+}
+
+Camera cameraOf(const std::string& keys, int width = 100, int height = 80) {
+  std::string reason;
+  const auto file = decodeTransforms("{" + keys + ",\"frames\":[" + frame("a") + "]}", reason);
+  EXPECT_TRUE(file.has_value()) << reason;
+  const auto camera = cameraFromIntrinsics(file->frames[0].intrinsics, width, height, reason);
+  EXPECT_TRUE(camera.has_value()) << reason;
+  return camera.value_or(Camera{});
+}
+
+std::string lensTrouble(const std::string& keys) {
+  std::string reason;
+  const auto file = decodeTransforms("{" + keys + ",\"frames\":[" + frame("a") + "]}", reason);
+  EXPECT_TRUE(file.has_value()) << reason;
+  EXPECT_FALSE(cameraFromIntrinsics(file->frames[0].intrinsics, 100, 80, reason).has_value());
+  return reason;
+}
+
+TEST(Transforms, ReadsEveryWayOfGivingAFocalLength) {
+  EXPECT_NEAR(cameraOf(R"("camera_angle_x":1.5707963267948966)").focalX(), 50, 1e-9);
+  EXPECT_NEAR(cameraOf(R"("camera_angle_x":1.5707963267948966)").focalY(), 50, 1e-9);
+  EXPECT_NEAR(cameraOf(R"("y_fov":90)").focalX(), 40, 1e-9);
+  const Camera both = cameraOf(R"("fl_x":70,"fl_y":71,"camera_angle_x":1,"w":200,"h":160,"cx":99.5)");
+  EXPECT_EQ(both.focalX(), 70);
+  EXPECT_EQ(both.focalY(), 71);
+  EXPECT_EQ(both.centreX(), 99.5);
+  EXPECT_EQ(both.centreY(), 80);
+  EXPECT_EQ(both.width, 200);
+}
+
+TEST(Transforms, ReadsLenses) {
+  EXPECT_EQ(cameraOf(R"("fl_x":70)").lens, LensModel::pinhole);
+  const Camera openCv = cameraOf(R"("fl_x":70,"k1":0.1,"k2":0.2,"p1":0.3,"p2":0.4)");
+  EXPECT_EQ(openCv.lens, LensModel::openCv);
+  EXPECT_EQ(openCv.parameters[6], 0.3);
+  const Camera fisheye = cameraOf(R"("fl_x":70,"k1":0.1,"k4":0.2,"is_fisheye":true)");
+  EXPECT_EQ(fisheye.lens, LensModel::openCvFisheye);
+  EXPECT_EQ(fisheye.parameters[7], 0.2);
+  EXPECT_EQ(cameraOf(R"("fl_x":70,"camera_model":"OPENCV_FISHEYE")").lens, LensModel::openCvFisheye);
+  const Camera sixth = cameraOf(R"("fl_x":70,"k3":0.1,"camera_model":"OPENCV")");
+  EXPECT_EQ(sixth.lens, LensModel::fullOpenCv);
+  EXPECT_EQ(sixth.parameters[8], 0.1);
+}
+
+TEST(Transforms, RefusesLensesThatItWouldDrawWrongly) {
+  EXPECT_NE(lensTrouble(R"("k1":0.1)").find("no focal length"), std::string::npos);
+  EXPECT_NE(lensTrouble(R"("fl_x":70,"k4":0.1)").find("k4"), std::string::npos);
+  EXPECT_NE(lensTrouble(R"("fl_x":70,"camera_model":"EQUIRECTANGULAR")").find("EQUIRECTANGULAR"), std::string::npos);
+}
+
+TEST(Transforms, LetsAFrameSpeakOverTheFile) {
+  std::string reason;
+  const auto file = decodeTransforms(R"({"fl_x":70,"w":100,"unknown":{"a":[1]},"frames":[)" +
+                                         frame("a", kIdentity, R"(,"fl_x":90,"sharpness":3)") + "]}",
+                                     reason);
+  ASSERT_TRUE(file.has_value()) << reason;
+  EXPECT_EQ(file->frames[0].intrinsics.numbers.at("fl_x"), 90);
+  EXPECT_EQ(file->frames[0].intrinsics.numbers.at("w"), 100);
+}
+
+TEST(Transforms, SaysWhatIsMissing) {
+  std::string reason;
+  EXPECT_FALSE(decodeTransforms("{]", reason).has_value());
+  EXPECT_EQ(reason, "is not JSON");
+  EXPECT_FALSE(decodeTransforms("[]", reason).has_value());
+  EXPECT_FALSE(decodeTransforms("{}", reason).has_value());
+  EXPECT_EQ(reason, "frames: is missing");
+  EXPECT_FALSE(decodeTransforms("{\"frames\":[{\"file_path\":\"a\"}]}", reason).has_value());
+  EXPECT_EQ(reason, "frames[0]: has no 4 x 4 transform_matrix");
+  EXPECT_FALSE(decodeTransforms("{\"frames\":[{}]}", reason).has_value());
+}
+
+TEST(Transforms, DropsPosesThatAreNoPosesAndPathsThatLeave) {
+  const TemporaryFolder folder;
+  writePng(folder / "a.png", gradientPicture(8, 8));
+  const std::string nan = "[[NaN,0,0,0],[0,1,0,0],[0,0,1,-Infinity],[0,0,0,1]]";
+  const std::string scaled = "[[0.01,0,0,0],[0,0.01,0,0],[0,0,0.01,0],[0,0,0,1]]";
+  const std::string mirrored = "[[-1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
+  writeFileAtomically(folder / "transforms.json", R"({"fl_x":9,"note":"NaN is \" not here","frames":[)" +
+                                                      frame("a.png") + "," + frame("a.png", nan) + "," +
+                                                      frame("a.png", scaled) + "," + frame("a.png", mirrored) + "," +
+                                                      frame("../a.png") + "," + frame("/etc/passwd") + "]}");
+  testing::internal::CaptureStderr();
+  const SourceCapture source = readTransforms(findTransforms(folder.path()));
+  const std::string warnings = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(source.capture.photos.size(), 1u);
+  EXPECT_NE(warnings.find("3 photos have a pose"), std::string::npos) << warnings;
+  EXPECT_NE(warnings.find("2 photos have paths that leave the folder"), std::string::npos) << warnings;
+}
+
+TEST(Transforms, TurnsOpenGlAxesIntoOurs) {
+  const TemporaryFolder folder;
+  writePng(folder / "a.png", gradientPicture(8, 8));
+  // Looks along world +y (backward = -y), up = +z, right = +x; rounded as files are.
+  writeFileAtomically(
+      folder / "transforms.json",
+      R"({"fl_x":9,"frames":[)" + frame("a.png", "[[1,0.00001,0,5],[0,0,-1,6],[0,1,0,7],[0,0,0,1]]") + "]}");
+  const SourceCapture source = readTransforms(findTransforms(folder.path()));
+  const Pose& pose = source.capture.photos.at(0).worldFromCamera;
+  EXPECT_NEAR((pose.rotation.col(2) - Vec3d(0, 1, 0)).norm(), 0, 1e-4);
+  EXPECT_NEAR((pose.rotation.col(1) - Vec3d(0, 0, -1)).norm(), 0, 1e-4);
+  EXPECT_EQ(pose.translation, Vec3d(5, 6, 7));
+  EXPECT_NEAR((pose.rotation.transpose() * pose.rotation - Mat3d::Identity()).norm(), 0, 1e-14);
+}
+
+TEST(Transforms, ReadsBlendersThreeFilesWithoutExtensions) {
+  const TemporaryFolder folder;
+  for (const std::string split : {"train", "val", "test"}) {
+    writePng(folder / split / "r_0.png", gradientPicture(8, 8, 4));
+    writeFileAtomically(folder / ("transforms_" + split + ".json"),
+                        "{\"camera_angle_x\":0.69,\"frames\":[" + frame("./" + split + "/r_0") + "]}");
+  }
+  const SourceCapture source = readTransforms(findTransforms(folder.path()));
+  ASSERT_EQ(source.capture.photos.size(), 3u);
+  EXPECT_TRUE(source.hasOwnSplit);
+  EXPECT_EQ(source.capture.photos[2].split, Split::test);
+  EXPECT_EQ(source.capture.photos[2].name, "test/r_0.png");
+  EXPECT_EQ(source.capture.cameras.size(), 1u);
+  EXPECT_EQ(source.capture.cameras[0].width, 8);
+}
+
+TEST(Transforms, TakesInstantNgpsDynamicMasksAsInverted) {
+  const TemporaryFolder folder;
+  writePng(folder / "images/a.png", gradientPicture(8, 8));
+  writePng(folder / "images/dynamic_mask_a.png", ImageU8(8, 8, 1, 0));
+  writeFileAtomically(folder / "transforms.json", "{\"fl_x\":9,\"frames\":[" + frame("images/a.png") + "]}");
+  const SourceCapture source = readTransforms(findTransforms(folder.path()));
+  EXPECT_EQ(source.capture.photos.at(0).mask, folder / "images/dynamic_mask_a.png");
+  EXPECT_TRUE(source.maskIsInverted.at(0));
+}
+
+TEST(Transforms, KeepsTheWorldThatAppliedTransformLedTo) {
+  const TemporaryFolder folder;
+  writePng(folder / "a.png", gradientPicture(8, 8));
+  writeFileAtomically(folder / "transforms.json",
+                      R"({"fl_x":9,"applied_transform":[[1,0,0,0],[0,0,1,0],[0,-1,0,0]],"applied_scale":2,"frames":[)" +
+                          frame("a.png", "[[1,0,0,5],[0,1,0,6],[0,0,1,7],[0,0,0,1]]", R"(,"depth_file_path":"d.png")") +
+                          "]}");
+  const SourceCapture source = readTransforms(findTransforms(folder.path()));
+  const Photo& photo = source.capture.photos.at(0);
+  EXPECT_EQ(photo.worldFromCamera.translation, Vec3d(5, 6, 7));
+  EXPECT_FLOAT_EQ(photo.depthUnit, 0.002f);
+  const Vec3d inSource = (source.capture.sourceFromWorld * Vec3d(5, 6, 7).homogeneous()).head<3>();
+  EXPECT_NEAR((inSource - Vec3d(2.5, -3.5, 3)).norm(), 0, 1e-12);
+}
+
+// Everything that a capture can hold, with numbers that decimals cannot write in few digits.
+Capture fullCapture(const fs::path& root) {
+  Capture capture;
+  capture.root = root;
+  capture.cameras = {{8, 6, LensModel::openCv, {1.0 / 3, 0.1, 4.1, 3.2, 0.01, -0.02, 1e-17, 3e-3}},
+                     {8, 6, LensModel::thinPrismFisheye, {5, 6, 4, 3, 1, 2, 3, 4, 5, 6, 7, 1.0 / 7}}};
+  for (int i = 0; i < 3; ++i) {
+    Photo photo;
+    photo.name = "images/" + std::to_string(i) + ".png";
+    photo.image = root / photo.name;
+    writePng(photo.image, gradientPicture(8, 6));
+    photo.camera = i % 2;
+    photo.split = static_cast<Split>(i);
+    photo.worldFromCamera.rotation = Eigen::AngleAxisd(0.1 + i, Vec3d(1, 2, 3).normalized()).toRotationMatrix();
+    photo.worldFromCamera.translation = Vec3d(1.0 / 3, -2e7, 1e-9 * i);
+    capture.photos.push_back(photo);
+  }
+  Photo& rich = capture.photos[1];
+  rich.mask = root / "masks/1.png";
+  writePng(rich.mask, ImageU8(8, 6, 1, 255));
+  rich.depth = root / "depths/1.exr";
+  writeDepthExr(rich.depth, ImageF(8, 6, 1, 2.5f));
+  rich.depthUnit = 0.3f;
+  rich.exposure = -0.7;
+  rich.gps = GpsFix{50.123456789012345, -0.1, 12.5, 40.1};
+  capture.points = {{Vec3d(1.0 / 3, 2, 3), {9, 8, 7}, 0.4f}, {Vec3d(-1, 0, 1e-12), {}, 0}};
+  capture.observations = {{0, 1, 1.5f, 2.25f, 0.1f}, {2, 0, 3, 4, 0.2f}};
+  capture.geo = GeoFrame{1.0 / 3, -75, 12, Mat4d::Identity() * 1.25};
+  capture.sourceFromWorld(0, 3) = 1e6 + 1.0 / 3;
+  return capture;
+}
+
+TEST(Captures, ComeBackExactlyAsTheyWereWritten) {
+  const TemporaryFolder folder;
+  const Capture written = fullCapture(folder.path());
+  writeCapture(written);
+  const Capture read = readCapture(folder.path());
+  EXPECT_EQ(read.cameras, written.cameras);
+  ASSERT_EQ(read.photos.size(), written.photos.size());
+  for (size_t i = 0; i < read.photos.size(); ++i) {
+    const Photo &a = read.photos[i], &b = written.photos[i];
+    EXPECT_EQ(a.name, b.name);
+    EXPECT_EQ(a.camera, b.camera);
+    EXPECT_EQ(a.image, b.image);
+    EXPECT_EQ(a.mask, b.mask);
+    EXPECT_EQ(a.depth, b.depth);
+    EXPECT_EQ(a.worldFromCamera.rotation, b.worldFromCamera.rotation);
+    EXPECT_EQ(a.worldFromCamera.translation, b.worldFromCamera.translation);
+    EXPECT_EQ(a.split, b.split);
+    EXPECT_EQ(a.exposure, b.exposure);
+    ASSERT_EQ(a.gps.has_value(), b.gps.has_value());
+  }
+  EXPECT_EQ(read.photos[1].depthUnit, 0.3f);
+  EXPECT_EQ(read.photos[1].gps->latitude, written.photos[1].gps->latitude);
+  EXPECT_EQ(read.photos[1].gps->relativeAltitude, 40.1);
+  EXPECT_EQ(read.geo->enuFromWorld, written.geo->enuFromWorld);
+  EXPECT_EQ(read.geo->latitude, written.geo->latitude);
+  EXPECT_EQ(read.sourceFromWorld, written.sourceFromWorld);
+  ASSERT_EQ(read.points.size(), 2u);
+  EXPECT_EQ(read.points[0].xInWorld, written.points[0].xInWorld);
+  EXPECT_EQ(read.points[0].colour, written.points[0].colour);
+  ASSERT_EQ(read.observations.size(), 2u);
+  EXPECT_EQ(read.observations[1].photo, 2u);
+  EXPECT_EQ(read.observations[0].y, 2.25f);
+}
+
+TEST(Captures, SpeakNerfstudiosWordsForOneCamera) {
+  const TemporaryFolder folder;
+  Capture capture = fullCapture(folder.path());
+  capture.cameras.resize(1);
+  for (Photo& photo : capture.photos) photo.camera = 0;
+  writeCapture(capture);
+  std::string text = readTextFile(folder / "transforms.json"), reason;
+  text.replace(text.find("\"tessera\""), 9, "\"unknown\"");  // as another reader sees it
+  const auto file = decodeTransforms(text, reason);
+  ASSERT_TRUE(file.has_value()) << reason;
+  EXPECT_FALSE(file->isOurs);
+  EXPECT_EQ(cameraFromIntrinsics(file->frames[0].intrinsics, 8, 6, reason), capture.cameras[0]);
+  EXPECT_EQ(file->splits.at("images/2.png"), Split::test);
+  EXPECT_EQ(file->pointFile, "points.ply");
+}
+
+TEST(Captures, AreNotReadFromFoldersThatAreNone) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(readCapture(folder.path()), Error);
+  writeFileAtomically(folder / "transforms.json", std::string_view("{\"frames\":[]}"));
+  EXPECT_THROW(readCapture(folder.path()), Error);
+  const Capture capture = fullCapture(folder.path());
+  writeCapture(capture);
+  fs::remove(capture.photos[2].image);
+  try {
+    readCapture(folder.path());
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.subject(), capture.photos[2].image.string());
+  }
+}
+
+TEST(Captures, RefuseObservationsOfPhotosThatDoNotExist) {
+  const TemporaryFolder folder;
+  Capture capture = fullCapture(folder.path());
+  capture.observations[0].photo = 7;
+  writeCapture(capture);
+  EXPECT_THROW(readCapture(folder.path()), Error);
+}
+
+TEST(Captures, AreNotWrittenWithPicturesFromOutside) {
+  const TemporaryFolder folder;
+  Capture capture = fullCapture(folder.path());
+  capture.root = folder / "inner";
+  fs::create_directories(capture.root);
+  EXPECT_THROW(writeCapture(capture), Error);
+}
+
+}  // namespace
+}  // namespace tessera
