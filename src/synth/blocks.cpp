@@ -247,7 +247,7 @@ void planSurroundings(CityLayout& city) {
     return false;
   };
   const float ringArea = outer.width() * outer.depth() - city.area.width() * city.area.depth();
-  const int houses = static_cast<int>(ringArea / 700), trees = static_cast<int>(ringArea / 190);
+  const int houses = static_cast<int>(ringArea / 700), trees = static_cast<int>(ringArea / 120);
   for (int i = 0; i < houses; ++i) {
     const Vec2f p(dice.between(outer.x0, outer.x1), dice.between(outer.y0, outer.y1));
     Building house;
@@ -263,6 +263,14 @@ void planSurroundings(CityLayout& city) {
       continue;
     finish(city, house, dice);
   }
+  // An avenue along the edge of the town, where no power line stands.
+  const float west = city.area.x0 - 3.4f, north = city.area.y1 + 3.4f;
+  const auto avenue = [&](const Vec2f& p) {
+    if (dice.chance(0.8f) && !onStreet(p, 2))
+      city.trees.push_back({p, dice.between(7, 11), dice.between(2.2f, 3), false, 220, dice.seed()});
+  };
+  for (float s = city.area.x0; s < city.area.x1; s += dice.between(9, 13)) avenue({s, north});
+  for (float s = city.area.y0; s < city.area.y1; s += dice.between(9, 13)) avenue({west, s});
   for (int i = 0; i < trees; ++i) {
     const Vec2f p(dice.between(outer.x0, outer.x1), dice.between(outer.y0, outer.y1));
     const float grove = valueNoise(p.x() / 45, p.y() / 45, city.seed ^ 0x77u);

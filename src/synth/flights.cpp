@@ -44,18 +44,27 @@ struct Planner {
   }
   uint64_t draws = 0;
 
+  // Round the whole of a small city; in a large one, round blocks spread over it.
+  void orbit(const Flight& f) {
+    const double half = 0.5 * std::max(city.area.width(), city.area.depth());
+    const int circles = half < 130 ? 1 : std::max(1, f.photos / 14);
+    const double radius = 0.62 * std::min(half, 100.0) + 0.45 * f.altitude;
+    for (int i = 0; i < f.photos; ++i) {
+      const int circle = static_cast<int>(static_cast<int64_t>(i) * circles / f.photos);
+      const double turn = static_cast<double>(i) * circles / f.photos - circle;
+      Vec2f middle(0, 0);
+      if (circles > 1)
+        middle = city.blocks[static_cast<size_t>((circle + 0.5) * city.blocks.size() / circles)].area.centre();
+      const double angle = 2 * kPi * turn;
+      shoot(middle.x() + radius * std::sin(angle), middle.y() + radius * std::cos(angle), f.altitude, angle + kPi,
+            std::atan2(f.altitude - 8, radius), fmt::format("orbit {:.0f} m", f.altitude));
+    }
+  }
+
   // A lawn mower's path over the city, shifted back so that what the camera sees lies in it.
   void fly(const Flight& f) {
     const double halfX = 0.5 * city.area.width(), halfY = 0.5 * city.area.depth();
-    if (f.kind == Flight::Kind::orbit) {
-      const double radius = 0.62 * std::max(halfX, halfY) + 0.45 * f.altitude;
-      for (int i = 0; i < f.photos; ++i) {
-        const double angle = 2 * kPi * i / f.photos;
-        shoot(radius * std::sin(angle), radius * std::cos(angle), f.altitude, angle + kPi,
-              std::atan2(f.altitude - 8, radius), fmt::format("orbit {:.0f} m", f.altitude));
-      }
-      return;
-    }
+    if (f.kind == Flight::Kind::orbit) return orbit(f);
     const bool oblique = f.kind == Flight::Kind::oblique;
     const double pitch = oblique ? 50 * kPi / 180 : kPi / 2;
     const double back = oblique ? f.altitude / std::tan(pitch) : 0;

@@ -43,13 +43,14 @@ void addBroadleaf(const Tree& tree, const Vec3f& foot, uint32_t leaves, uint32_t
 void addConifer(const Tree& tree, const Vec3f& foot, uint32_t leaves, uint32_t bark, Dice& dice, SurfaceMesh& mesh) {
   mesh.addTube(foot - Vec3f(0, 0, 0.5f), foot + Vec3f(0, 0, tree.height * 0.96f), 0.025f * tree.height, 0.03f, 5,
                Material::bark, bark);
+  const float card = std::clamp(0.75f * std::sqrt(300.f / static_cast<float>(tree.leafCards)), 0.7f, 1.8f);
   for (int i = 0; i < tree.leafCards; ++i) {
     const float t = 1 - std::sqrt(dice.uniform());  // denser below, where the cone is wide
     const float tier = fraction(t * 9);
     const float r = tree.radius * (1 - t) * (0.65f + 0.4f * (1 - tier)) * std::sqrt(dice.between(0.1f, 1));
     const float angle = kTurn * dice.uniform();
-    addCard(foot + Vec3f(r * std::cos(angle), r * std::sin(angle), tree.height * (0.1f + 0.9f * t)), 0.75f, leaves,
-            dice, mesh);
+    addCard(foot + Vec3f(r * std::cos(angle), r * std::sin(angle), tree.height * (0.1f + 0.9f * t)), card, leaves, dice,
+            mesh);
   }
 }
 

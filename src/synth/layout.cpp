@@ -169,6 +169,9 @@ CityLayout planCity(int blocksX, int blocksY, uint64_t seed) {
   }
   planPoles(city);
   planSurroundings(city);
+  // A large city has fewer and larger leaves a tree, so that it fits into memory.
+  const float leaves = std::clamp(64.f / static_cast<float>(count), 0.15f, 1.f);
+  for (Tree& tree : city.trees) tree.leafCards = static_cast<int>(leaves * static_cast<float>(tree.leafCards));
   return city;
 }
 
