@@ -21,6 +21,23 @@ std::string environment(const char* name) {
   return value ? value : "";
 }
 
+VkInstance makeInstance(bool validation) {
+  auto application = vulkanStruct<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
+  application.pApplicationName = "tessera";
+  application.apiVersion = VK_API_VERSION_1_2;
+  auto info = vulkanStruct<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
+  info.pApplicationInfo = &application;
+  if (validation) {
+    info.enabledLayerCount = 1;
+    info.ppEnabledLayerNames = &kValidationLayer;
+    info.enabledExtensionCount = 1;
+    info.ppEnabledExtensionNames = &kValidationExtension;
+  }
+  VkInstance instance = VK_NULL_HANDLE;
+  checkVulkan(vkCreateInstance(&info, nullptr, &instance), "vkCreateInstance");
+  return instance;
+}
+
 }  // namespace
 
 std::shared_ptr<GpuContext> GpuContext::open(const GpuOptions& options) {
@@ -43,21 +60,11 @@ GpuContext::~GpuContext() {
 }
 
 void GpuContext::createInstance(bool validation) {
-  auto application = vulkanStruct<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
-  application.pApplicationName = "tessera";
-  application.apiVersion = VK_API_VERSION_1_2;
-
   validation = validation && validationInstalled();
-  auto info = vulkanStruct<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
-  info.pApplicationInfo = &application;
-  if (validation) {
-    info.enabledLayerCount = 1;
-    info.ppEnabledLayerNames = &kValidationLayer;
-    info.enabledExtensionCount = 1;
-    info.ppEnabledExtensionNames = &kValidationExtension;
-  }
-  checkVulkan(vkCreateInstance(&info, nullptr, &instance_), "vkCreateInstance");
+  instance_ = makeInstance(validation);
   if (validation) messenger_ = createValidationMessenger(instance_);
+  // Drivers leak when they are unloaded: one instance stays open as long as the process, so that they never are.
+  [[maybe_unused]] static const VkInstance keepsDriversLoaded = makeInstance(false);
 }
 
 void GpuContext::choosePhysicalDevice(const std::string& wanted) {
