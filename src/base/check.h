@@ -4,6 +4,10 @@
 #include <sstream>
 #include <string>
 
+#if defined(__clang__)
+#pragma clang diagnostic ignored "-Woverloaded-shift-op-parentheses"  // how the left value is caught
+#endif
+
 namespace tessera::check_internal {
 
 [[noreturn]] void fail(const char* file, int line, const char* expression, const std::string& values);

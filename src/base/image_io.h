@@ -30,7 +30,7 @@ std::optional<ImageInfo> probeImage(std::span<const std::byte> bytes);
 // JPEG (grey, colour, CMYK) or PNG (any depth, palette, interlaced), by content, not by name. Pixels as stored: EXIF
 // orientation is not applied. A picture whose header claims far more pixels than its bytes could hold is refused.
 std::optional<DecodedImage> decodeImage(std::span<const std::byte> bytes, const DecodeLimits& limits = {});
-// Depth: EXR (the channel "Z", "R" or the only one) as it is; grey PNG as integer × unitsPerStep.
+// Depth: EXR (scan lines, one part; the channel "Z", "R" or the only one) as it is; grey PNG as integer × unitsPerStep.
 // 0 stays 0: "nothing known here".
 std::optional<ImageF> decodeDepth(std::span<const std::byte> bytes, float pngUnitsPerStep = 0.001f,
                                   const DecodeLimits& limits = {});

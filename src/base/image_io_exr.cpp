@@ -6,7 +6,9 @@
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 
+#include <array>
 #include <cstring>
+#include <iterator>
 #include <stdexcept>
 #include <string_view>
 
@@ -16,7 +18,9 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kDeepOrMultipart = 0x800 | 0x1000;
+constexpr uint32_t kTiledDeepOrMultipart = 0x200 | 0x800 | 0x1000;  // nobody's depth map, and not decoded
+constexpr int64_t kMaximumChunk = int64_t{256} << 20;
+constexpr int kLinesPerChunk[] = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};  // by number of the compression
 
 class MemoryInput : public Imf::IStream {
  public:
@@ -67,11 +71,104 @@ uint32_t littleEndian32(std::span<const std::byte> bytes, size_t at) {
 
 // A zero-terminated string at `at`, which moves behind it.
 std::optional<std::string_view> takeString(std::span<const std::byte> bytes, size_t& at) {
+  if (at >= bytes.size()) return std::nullopt;
   const auto* start = reinterpret_cast<const char*>(bytes.data()) + at;
   const size_t length = strnlen(start, bytes.size() - at);
   if (at + length >= bytes.size()) return std::nullopt;
   at += length + 1;
   return std::string_view(start, length);
+}
+
+struct Attribute {
+  const char* name;
+  const char* type;
+  size_t bytes;  // 0: any
+};
+// What a picture needs to be decoded.
+constexpr Attribute kNeeded[] = {{"channels", "chlist", 0},        {"compression", "compression", 1},
+                                 {"dataWindow", "box2i", 16},      {"displayWindow", "box2i", 16},
+                                 {"lineOrder", "lineOrder", 1},    {"pixelAspectRatio", "float", 4},
+                                 {"screenWindowCenter", "v2f", 8}, {"screenWindowWidth", "float", 4}};
+constexpr size_t kNeededCount = std::size(kNeeded);
+
+struct Header {
+  std::array<std::span<const std::byte>, kNeededCount> records;  // name, type, length and value, as in the file
+  std::array<std::span<const std::byte>, kNeededCount> values;
+  size_t length = 0;  // where the header ends
+};
+
+// The header is walked here, before the library sees it: the library allocates by what each attribute claims.
+std::optional<Header> walkHeader(std::span<const std::byte> bytes) {
+  if (!image_codecs::isExr(bytes) || (littleEndian32(bytes, 4) & kTiledDeepOrMultipart) != 0) return std::nullopt;
+  Header header;
+  for (size_t at = 8;;) {
+    const size_t start = at;
+    const auto name = takeString(bytes, at);
+    if (!name) return std::nullopt;
+    if (name->empty()) {
+      header.length = at;
+      return header;
+    }
+    const auto type = takeString(bytes, at);
+    if (!type || bytes.size() - at < 4) return std::nullopt;
+    const size_t length = littleEndian32(bytes, at);
+    at += 4;
+    if (length > bytes.size() - at) return std::nullopt;
+    for (size_t i = 0; i < kNeededCount; ++i) {
+      if (*name != kNeeded[i].name) continue;
+      const bool isRight = *type == kNeeded[i].type && (kNeeded[i].bytes == 0 || kNeeded[i].bytes == length);
+      if (!isRight || !header.records[i].empty()) return std::nullopt;
+      header.records[i] = bytes.subspan(start, at - start + length);
+      header.values[i] = bytes.subspan(at, length);
+    }
+    at += length;
+  }
+}
+
+// How many channels the list holds; nothing when it does not end exactly where it should.
+std::optional<int> channelCount(std::span<const std::byte> list) {
+  int count = 0;
+  for (size_t at = 0;;) {
+    const auto name = takeString(list, at);
+    if (!name) return std::nullopt;
+    if (name->empty()) return at == list.size() ? std::optional(count) : std::nullopt;
+    if (list.size() - at < 16) return std::nullopt;
+    at += 16;
+    ++count;
+  }
+}
+
+std::optional<ImageInfo> infoFrom(const Header& header) {
+  const auto channels = channelCount(header.values[0]);
+  const auto& window = header.values[2];
+  if (!channels || *channels < 1 || window.empty()) return std::nullopt;
+  int64_t side[4];
+  for (size_t i = 0; i < 4; ++i) side[i] = static_cast<int32_t>(littleEndian32(window, 4 * i));
+  const int64_t width = side[2] - side[0] + 1, height = side[3] - side[1] + 1;
+  if (width < 1 || height < 1 || width > INT32_MAX || height > INT32_MAX) return std::nullopt;
+  return ImageInfo{static_cast<int>(width), static_cast<int>(height), *channels, ImageInfo::Format::exr};
+}
+
+// The file with only the needed attributes left in its header, and one string in the place of all others, because the
+// offsets behind the header count from the start of the file.
+std::optional<Bytes> reducedFile(std::span<const std::byte> bytes, const Header& header) {
+  static constexpr char kFiller[] = "filler\0string";  // with its final zero
+  Bytes file(bytes.begin(), bytes.begin() + 8);
+  for (const auto& record : header.records) {
+    if (record.empty()) return std::nullopt;
+    file.insert(file.end(), record.begin(), record.end());
+  }
+  const size_t left = header.length - 1 - file.size();
+  if (left > 0) {
+    if (left < sizeof kFiller + 4) return std::nullopt;
+    const size_t length = left - sizeof kFiller - 4;
+    const auto* start = reinterpret_cast<const std::byte*>(kFiller);
+    file.insert(file.end(), start, start + sizeof kFiller);
+    for (int i = 0; i < 4; ++i) file.push_back(static_cast<std::byte>(length >> (8 * i)));
+    file.insert(file.end(), length, std::byte{' '});
+  }
+  file.insert(file.end(), bytes.begin() + static_cast<std::ptrdiff_t>(header.length - 1), bytes.end());
+  return file;
 }
 
 }  // namespace
@@ -82,49 +179,22 @@ bool isExr(std::span<const std::byte> bytes) {
   return bytes.size() >= 8 && littleEndian32(bytes, 0) == 20000630;
 }
 
-// The header is walked here, before the library sees it: the library allocates by what it claims.
 std::optional<ImageInfo> probeExr(std::span<const std::byte> bytes) {
-  if (!isExr(bytes) || (littleEndian32(bytes, 4) & kDeepOrMultipart) != 0) return std::nullopt;
-  ImageInfo info;
-  info.format = ImageInfo::Format::exr;
-  size_t at = 8;
-  for (;;) {
-    const auto name = takeString(bytes, at);
-    if (!name) return std::nullopt;
-    if (name->empty()) break;
-    if (!takeString(bytes, at) || bytes.size() - at < 4) return std::nullopt;
-    const size_t length = littleEndian32(bytes, at);
-    at += 4;
-    if (length > bytes.size() - at) return std::nullopt;
-    if (*name == "dataWindow" && length == 16) {
-      int64_t side[4];
-      for (size_t i = 0; i < 4; ++i) side[i] = static_cast<int32_t>(littleEndian32(bytes, at + 4 * i));
-      const int64_t width = side[2] - side[0] + 1, height = side[3] - side[1] + 1;
-      if (width < 1 || height < 1 || width > INT32_MAX || height > INT32_MAX) return std::nullopt;
-      info.width = static_cast<int>(width);
-      info.height = static_cast<int>(height);
-    } else if (*name == "channels") {
-      info.channels = 0;
-      const auto list = bytes.subspan(at, length);
-      for (size_t i = 0; i < list.size();) {
-        const auto channel = takeString(list, i);
-        if (!channel || channel->empty()) break;
-        ++info.channels;
-        if (list.size() - i < 16) return std::nullopt;
-        i += 16;
-      }
-    }
-    at += length;
-  }
-  if (info.width == 0 || info.channels == 0) return std::nullopt;
-  return info;
+  const auto header = walkHeader(bytes);
+  return header ? infoFrom(*header) : std::nullopt;
 }
 
 std::optional<ImageF> decodeExrDepth(std::span<const std::byte> bytes, const DecodeLimits& limits) {
-  const auto info = probeExr(bytes);
+  const auto header = walkHeader(bytes);
+  const auto info = header ? infoFrom(*header) : std::nullopt;
   if (!info || !isPlausible(info->width, info->height, bytes.size(), limits)) return std::nullopt;
+  const auto reduced = reducedFile(bytes, *header);
+  if (!reduced) return std::nullopt;
+  const auto compression = static_cast<size_t>(header->values[1][0]);
+  if (compression >= std::size(kLinesPerChunk)) return std::nullopt;
+  if (int64_t{4} * info->width * info->channels > kMaximumChunk / kLinesPerChunk[compression]) return std::nullopt;
   try {
-    MemoryInput stream(bytes);
+    MemoryInput stream(*reduced);
     Imf::InputFile file(stream, 0);
     const Imf::ChannelList& channels = file.header().channels();
     const char* chosen = nullptr;

@@ -8,6 +8,11 @@
 #include <jpeglib.h>
 // clang-format on
 
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfOutputFile.h>
+#include <ImfStringAttribute.h>
 #include <gtest/gtest.h>
 #include <spng.h>
 #include <unistd.h>
@@ -336,6 +341,58 @@ TEST(ImageIo, DepthExrKeepsEveryFloat) {
   EXPECT_EQ(info->format, ImageInfo::Format::exr);
   EXPECT_FALSE(decodeImage(bytes));
   EXPECT_FALSE(decodeDepth(shortened(bytes, 0.7)));
+}
+
+TEST(ImageIo, DepthIsFoundAmongOtherChannelsAndAttributes) {
+  const fs::path path = fs::temp_directory_path() / ("tessera_channels_" + std::to_string(::getpid()) + ".exr");
+  std::vector<half> colour(6 * 5, half(0.25f));
+  std::vector<float> depth(6 * 5);
+  for (size_t i = 0; i < depth.size(); ++i) depth[i] = 1.5f * static_cast<float>(i);
+  for (const bool hasZ : {true, false}) {
+    Imf::Header header(6, 5);
+    header.compression() = Imf::PIZ_COMPRESSION;
+    header.insert("comments", Imf::StringAttribute("made by a renderer that likes to talk"));
+    header.insert("zebra", Imf::StringAttribute("behind all others"));
+    Imf::FrameBuffer source;
+    for (const char* name : {"A", "R"}) {
+      header.channels().insert(name, Imf::Channel(Imf::HALF));
+      source.insert(name,
+                    Imf::Slice(Imf::HALF, reinterpret_cast<char*>(colour.data()), sizeof(half), sizeof(half) * 6));
+    }
+    if (hasZ) {
+      header.channels().insert("Z", Imf::Channel(Imf::FLOAT));
+      source.insert("Z",
+                    Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(depth.data()), sizeof(float), sizeof(float) * 6));
+    }
+    {
+      Imf::OutputFile file(path.c_str(), header);
+      file.setFrameBuffer(source);
+      file.writePixels(5);
+    }
+    const auto decoded = decodeDepth(readFile(path));
+    ASSERT_TRUE(decoded);
+    EXPECT_EQ(decoded->pixels, hasZ ? depth : std::vector<float>(30, 0.25f));  // "R" where there is no "Z"
+    EXPECT_EQ(probeImageFile(path).channels, hasZ ? 3 : 2);
+  }
+  fs::remove(path);
+}
+
+TEST(ImageIo, ExrAttributesWithFalseLengthsAreRefused) {
+  const Bytes bytes = encodeDepthExr(ImageF(4, 4, 1, 1.0f));
+  for (const char* text :
+       {"channels\0chlist", "compression\0compression", "dataWindow\0box2i", "lineOrder\0lineOrder"}) {
+    std::string record(text);  // up to the first zero
+    record += std::string(1, '\0') + (text + record.size() + 1);
+    const auto* start = reinterpret_cast<const std::byte*>(record.data());
+    const auto found = std::search(bytes.begin(), bytes.end(), start, start + record.size());
+    ASSERT_NE(found, bytes.end()) << text;
+    for (const int change : {-1, 1, 2}) {
+      Bytes damaged = bytes;
+      std::byte& length = damaged[static_cast<size_t>(found - bytes.begin()) + record.size() + 1];
+      length = static_cast<std::byte>(static_cast<int>(length) + change);
+      EXPECT_FALSE(decodeDepth(damaged)) << text << change;
+    }
+  }
 }
 
 TEST(ImageIo, DepthPngIsAnIntegerTimesItsUnit) {

@@ -1,7 +1,7 @@
 // Tensors from arbitrary bytes: what is accepted can be read to its last byte, and written and read again.
-#include "base/safetensors.h"
-
 #include <cstdlib>
+
+#include "base/safetensors.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const auto* start = reinterpret_cast<const std::byte*>(data);
