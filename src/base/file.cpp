@@ -84,8 +84,9 @@ std::optional<fs::path> resolveInside(const fs::path& root, std::string_view rel
   const fs::path wanted{std::string(relative)};
   if (wanted.is_absolute()) return std::nullopt;
   std::error_code status;
-  const fs::path realRoot = fs::weakly_canonical(root, status);
+  fs::path realRoot = fs::weakly_canonical(root, status);
   if (status) return std::nullopt;
+  if (!realRoot.has_filename()) realRoot = realRoot.parent_path();  // "out/" that does not exist yet
   const fs::path real = fs::weakly_canonical(realRoot / wanted, status);
   if (status) return std::nullopt;
   const auto [rootEnd, rest] = std::mismatch(realRoot.begin(), realRoot.end(), real.begin(), real.end());

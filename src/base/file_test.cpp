@@ -90,6 +90,14 @@ TEST_F(File, RefusesLinksThatLeadOut) {
   EXPECT_EQ(resolveInside(root_, "circle"), std::nullopt);
 }
 
+TEST_F(File, AcceptsARootThatDoesNotExistYetHoweverItIsWritten) {
+  const fs::path future = fs::canonical(root_) / "future";
+  EXPECT_EQ(resolveInside(future, "a.png"), future / "a.png");
+  EXPECT_EQ(resolveInside(future.string() + "/", "b/a.png"), future / "b/a.png");
+  EXPECT_EQ(resolveInside(future.string() + "/", "../a.png"), std::nullopt);
+  EXPECT_EQ(resolveInside("/", "a.png"), fs::path("/a.png"));
+}
+
 TEST_F(File, AcceptsARootThatIsItselfALink) {
   fs::create_directory_symlink(root_, folder_ / "link");
   EXPECT_EQ(resolveInside(folder_ / "link", "a"), fs::canonical(root_) / "a");
