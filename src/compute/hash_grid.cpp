@@ -7,7 +7,7 @@ namespace tessera {
 
 HashGrid::HashGrid(const HashGridOptions& options) : features(options.features) {
   CHECK(options.levels >= 1);
-  CHECK(options.features == 1 || options.features == 2 || options.features == 4 || options.features == 8);
+  CHECK((options.features == 1 || options.features == 2 || options.features == 4 || options.features == 8));
   CHECK(options.log2TableSize >= 3);
   CHECK(options.log2TableSize <= 28);
   const double ratio = static_cast<double>(options.finestResolution) / options.baseResolution;
