@@ -28,3 +28,9 @@ if(TESSERA_SANITIZER)
     add_link_options(-fsanitize=undefined)
   endif()
 endif()
+
+# Fuzzers see which branches an input took only where the code is instrumented: in every room.
+if(TESSERA_FUZZERS)
+  add_compile_options(-fsanitize=fuzzer-no-link)
+  add_link_options(-fsanitize=fuzzer-no-link)
+endif()

@@ -128,7 +128,7 @@ void configFromToml(const std::vector<ConfigField>& fields, const fs::path& path
                   "did you mean '" + nearest(fields, key.str()) + "'?");
     }
     const bool read = std::visit(
-        [&](auto* value) {
+        [&node = node](auto* value) {
           using T = std::remove_pointer_t<decltype(value)>;
           const auto found = node.template value<T>();
           if (found) *value = *found;

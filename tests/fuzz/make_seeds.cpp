@@ -1,0 +1,95 @@
+// Writes a few small valid inputs for every fuzzer into DIR/<fuzzer>/: libFuzzer grows the rest.
+#include <cstring>
+#include <string>
+
+#include "base/file.h"
+#include "base/image_io.h"
+#include "base/safetensors.h"
+#include "scene/ply.h"
+
+using namespace tessera;
+
+namespace {
+
+template <class T>
+std::string packed(T value) {
+  return {reinterpret_cast<const char*>(&value), sizeof(T)};
+}
+
+std::string sized(const std::string& file) {
+  return packed(static_cast<uint16_t>(file.size())) + file;
+}
+
+std::string doubles(std::initializer_list<double> values) {
+  std::string out;
+  for (double value : values) out += packed(value);
+  return out;
+}
+
+std::string colmapBinary() {
+  const std::string cameras = packed(uint64_t{1}) + packed(1u) + packed(4) + packed(uint64_t{64}) +
+                              packed(uint64_t{48}) + doubles({50, 51, 32, 24, .1, -.05, .001, .002});
+  const std::string images = packed(uint64_t{1}) + packed(1u) + doubles({1, 0, 0, 0, 0, 0, 2}) + packed(1u) + "a.jpg" +
+                             std::string(1, '\0') + packed(uint64_t{1}) + doubles({30, 20}) + packed(uint64_t{5});
+  const std::string points = packed(uint64_t{1}) + packed(uint64_t{5}) + doubles({.1, .2, .3}) + "rgb" + doubles({.5}) +
+                             packed(uint64_t{1}) + packed(1u) + packed(0u);
+  return sized(cameras) + sized(images) + points;
+}
+
+ImageU8 picture(int channels) {
+  ImageU8 image(9, 7, channels);
+  for (size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = static_cast<uint8_t>(i * 37);
+  return image;
+}
+
+// An EXIF block with a latitude; the fuzzer finds the other tags.
+std::string exif() {
+  std::string out("Exif\0\0II*\0\x08\0\0\0\x01\0\x25\x88\x04\0\x01\0\0\0\x1a\0\0\0\0\0\0\0", 32);
+  out += std::string("\x02\0\x01\0\x02\0\x02\0\0\0N\0\0\0\x02\0\x05\0\x03\0\0\0\x38\0\0\0\0\0\0\0", 30);
+  for (uint32_t value : {50u, 1u, 30u, 1u, 0u, 1u}) out += packed(value);
+  return out;
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+  if (count != 2) return 2;
+  const fs::path root = arguments[1];
+  const auto write = [&root](const std::string& name, const auto& content) {
+    writeFileAtomically(root / name, content);
+  };
+  write("colmap_binary/a", colmapBinary());
+  write("colmap_text/a", sized("1 OPENCV 64 48 50 51 32 24 .1 -.05 .001 .002\n") +
+                             sized("1 1 0 0 0 0 0 2 1 a.jpg\n30 20 5 1 2 -1\n") + "5 .1 .2 .3 1 2 3 .5 1 0\n");
+  write("transforms_json/a",
+        std::string(
+            R"({"camera_angle_x":0.7,"w":64,"h":48,"k1":0.1,"ply_file_path":"p.ply","test_filenames":["a.png"],)"
+            R"("frames":[{"file_path":"a.png","transform_matrix":[[1,0,0,1],[0,1,0,2],[0,0,NaN,3],[0,0,0,1]]}]})"));
+  write(
+      "transforms_json/b",
+      std::string(R"({"tessera":{"version":1,"cameras":[{"model":"FOV","width":64,"height":48,"parameters":[50,50,32,)"
+                  R"(24,0.9]}],"geo":{"latitude":1,"enu_from_world":[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}},)"
+                  R"("frames":[{"file_path":"a","transform_matrix":[[1,0,0,1],[0,1,0,2],[0,0,1,3]],)"
+                  R"("tessera":{"camera":0,"gps":{"latitude":1,"longitude":2}}}]})"));
+  write("ply/a", encodePly(std::vector<SparsePoint>(2)));
+  write("ply/b", std::string("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty "
+                             "double z\nproperty uchar red\nproperty float nx\nend_header\n1 2e3 -3 40 nan\n"));
+  const std::string block = exif();
+  write("exif/a", encodeJpeg(picture(3), 50, std::as_bytes(std::span(block.data(), block.size()))));
+  write("exif/b",
+        std::string("\xff\xd8\xff\xe1<x:xmpmeta a:GpsLatitude=\"+1.5\" a:GpsLongtitude='2'><a:GimbalPitchDegree>-90"
+                    "</a:GimbalPitchDegree></x:xmpmeta>"));
+  for (int channels : {1, 3, 4}) {
+    write("image/png" + std::to_string(channels), encodePng(picture(channels)));
+    if (channels != 4) write("image/jpeg" + std::to_string(channels), encodeJpeg(picture(channels)));
+  }
+  write("image/exr", encodeDepthExr(ImageF(9, 7, 1, 2.5f)));
+  const std::string values = doubles({1, 2, 3});
+  const TensorView tensor{TensorType::f64, {3}, std::as_bytes(std::span(values.data(), values.size()))};
+  write("safetensors/a", encodeSafetensors({{"a", tensor}, {"b", tensor}}, {{"key", "value"}}));
+  write("camera_path/a",
+        std::string(
+            R"({"camera_type":"perspective","render_width":64,"render_height":48,"fps":24,"seconds":1,"camera_path":)"
+            R"([{"camera_to_world":[1,0,0,1,0,1,0,2,0,0,1,3,0,0,0,1],"fov":50,"aspect":1.3}]})"));
+  return 0;
+}

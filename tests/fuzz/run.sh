@@ -1,0 +1,32 @@
+#!/bin/sh
+# Builds every fuzzer and runs each for SECONDS (20 unless told). Fails when one finds something; the input that did it
+# is kept in ./fuzz-findings.
+#   tests/fuzz/run.sh [SECONDS] [FUZZER ...]
+set -eu
+cd "$(dirname "$0")/../.."
+seconds=${1:-20}
+[ $# -gt 0 ] && shift
+build=${TESSERA_FUZZ_BUILD:-build/fuzz}
+cmake --preset fuzz -B "$build" >/dev/null
+cmake --build "$build" --target fuzzers
+corpus=$(mktemp -d)
+trap 'rm -rf "$corpus"' EXIT
+"$build/tests/fuzz/make_seeds" "$corpus"
+[ $# -gt 0 ] || set -- $(ls "$corpus")
+failed=0
+for name in "$@"; do
+  mkdir -p fuzz-findings
+  log="$corpus/$name.log"
+  export ASAN_OPTIONS="log_path=$log.asan" UBSAN_OPTIONS="print_stacktrace=1:log_path=$log.asan"
+  if "$build/tests/fuzz/fuzz_$name" -max_total_time="$seconds" -rss_limit_mb=2048 -timeout=10 -max_len=16384 -close_fd_mask=3 \
+    -artifact_prefix="fuzz-findings/$name-" "$corpus/$name" >"$log" 2>&1; then
+    echo "fuzz $name: $(grep -o 'Done .*' "$log" || echo done)"
+  else
+    failed=1
+    echo "fuzz $name: a finding" >&2
+    tail -n 20 "$log" >&2
+    cat "$log.asan"* >&2 2>/dev/null || true
+  fi
+done
+rmdir fuzz-findings 2>/dev/null || true
+exit $failed
