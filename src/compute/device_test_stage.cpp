@@ -2,11 +2,16 @@
 
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <map>
 #include <numeric>
 
 #include "base/error.h"
 #include "compute/device_test.h"
+#ifdef TESSERA_HAS_VULKAN
+#include "compute/vulkan/device.h"
+#include "gpu/context.h"
+#endif
 
 namespace tessera::device_test {
 
@@ -171,10 +176,35 @@ double dot(View a, View b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
+namespace {
+
+std::unique_ptr<Device> openDevice(const std::string& name) {
+#ifdef TESSERA_HAS_VULKAN
+  if (name == "vulkan without float atomics") {
+    GpuOptions options;
+    options.allowed.floatAtomics = false;
+    return makeVulkanDevice(options);
+  }
+#endif
+  DeviceOptions options;
+  options.kind = name.substr(0, name.find(' '));
+  if (options.kind == "cpu") options.threads = name.find('1') != std::string::npos ? 1 : 2;
+  return makeDevice(options);
+}
+
+// TESSERA_REQUIRE_VULKAN=1 in the environment makes a machine without a driver fail instead of skip.
+bool mustBeThere(const std::string& name) {
+  const char* required = std::getenv("TESSERA_REQUIRE_VULKAN");
+  return !name.starts_with("vulkan") || (required != nullptr && std::string(required) == "1");
+}
+
+}  // namespace
+
 std::vector<std::string> deviceNames() {
   std::vector<std::string> names = {"reference", "cpu with 1 thread", "cpu with 2 threads"};
 #ifdef TESSERA_HAS_VULKAN
   names.push_back("vulkan");
+  names.push_back("vulkan without float atomics");
 #endif
   return names;
 }
@@ -183,12 +213,10 @@ Device* deviceNamed(const std::string& name) {
   static std::map<std::string, std::unique_ptr<Device>> devices;
   const auto [found, isNew] = devices.try_emplace(name);
   if (isNew) {
-    DeviceOptions options;
-    options.kind = name.substr(0, name.find(' '));
-    if (options.kind == "cpu") options.threads = name.find('1') != std::string::npos ? 1 : 2;
     try {
-      found->second = makeDevice(options);
+      found->second = openDevice(name);
     } catch (const Error& error) {
+      if (mustBeThere(name)) throw;
       std::printf("no device \"%s\": %s\n", name.c_str(), error.what());
     }
   }
