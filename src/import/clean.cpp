@@ -95,6 +95,7 @@ std::vector<PhotoFacts> cleanSource(SourceCapture& source, ThreadPool& pool) {
   std::set<fs::path> seen;
   std::vector<size_t> order;
   size_t rescaled = 0;
+  std::vector<std::pair<float, float>> factors(facts.size(), {1.0f, 1.0f});
   for (size_t i = 0; i < facts.size(); ++i) {
     Photo& photo = capture.photos[i];
     std::error_code status;
@@ -114,12 +115,8 @@ std::vector<PhotoFacts> cleanSource(SourceCapture& source, ThreadPool& pool) {
         }
         ++rescaled;
         const Camera scaled = camera.scaledTo(facts[i].width, facts[i].height);
-        for (Observation& observation : capture.observations) {
-          if (observation.photo != i) continue;
-          observation.x *= static_cast<float>(facts[i].width) / static_cast<float>(camera.width);
-          observation.y *= static_cast<float>(facts[i].height) / static_cast<float>(camera.height);
-          observation.error *= static_cast<float>(facts[i].width) / static_cast<float>(camera.width);
-        }
+        factors[i] = {static_cast<float>(facts[i].width) / static_cast<float>(camera.width),
+                      static_cast<float>(facts[i].height) / static_cast<float>(camera.height)};
         const auto found = std::find(capture.cameras.begin(), capture.cameras.end(), scaled);
         photo.camera = static_cast<int>(found - capture.cameras.begin());
         if (found == capture.cameras.end()) capture.cameras.push_back(scaled);
@@ -127,6 +124,12 @@ std::vector<PhotoFacts> cleanSource(SourceCapture& source, ThreadPool& pool) {
       if (!photo.gps) photo.gps = facts[i].tags.gps;
       order.push_back(i);
     }
+  }
+  for (Observation& observation : capture.observations) {
+    const auto [x, y] = factors[observation.photo];
+    observation.x *= x;
+    observation.y *= y;
+    observation.error *= (x + y) / 2;
   }
   warnDropped(missing, "named by the source are not on disk");
   warnDropped(unreadable, "cannot be read as JPEG or PNG");

@@ -22,9 +22,9 @@ Points columnsOf(const Points& points, const std::vector<int>& which) {
 // Standard deviations along the two widest directions.
 std::pair<double, double> spreadOf(const Points& points) {
   const Points centred = points.colwise() - points.rowwise().mean();
-  const Vec3d singular = Eigen::JacobiSVD<Eigen::MatrixXd>(centred).singularValues();
-  const double root = std::sqrt(static_cast<double>(points.cols()));
-  return {singular[0] / root, singular[1] / root};
+  const Mat3d covariance = centred * centred.transpose() / static_cast<double>(points.cols());
+  const Vec3d variances = Eigen::SelfAdjointEigenSolver<Mat3d>(covariance, Eigen::EigenvaluesOnly).eigenvalues();
+  return {std::sqrt(std::max(variances[2], 0.0)), std::sqrt(std::max(variances[1], 0.0))};
 }
 
 bool isLine(const Points& points) {
