@@ -1,7 +1,99 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
 #include "apps/tessera/verbs.h"
+#include "base/error.h"
+#include "import/capture_reader.h"
+#include "import/importer.h"
+#include "representations/field/train_field.h"
+#include "train/model_folder.h"
 
 namespace tessera {
+namespace {
 
-void addInfoVerb(CLI::App&) {}
+using nlohmann::ordered_json;
+
+ordered_json describeCapture(const fs::path& folder) {
+  const Capture capture = readCapture(folder);
+  ordered_json info = {{"kind", "capture"},
+                       {"photos", capture.photos.size()},
+                       {"train", capture.photosIn(Split::train).size()},
+                       {"validation", capture.photosIn(Split::validation).size()},
+                       {"test", capture.photosIn(Split::test).size()},
+                       {"points", capture.points.size()},
+                       {"observations", capture.observations.size()},
+                       {"cameras", ordered_json::array()}};
+  for (const Camera& camera : capture.cameras) {
+    info["cameras"].push_back({{"lens", lensName(camera.lens)}, {"width", camera.width}, {"height", camera.height}});
+  }
+  if (capture.geo) {
+    info["origin"] = {{"latitude", capture.geo->latitude}, {"longitude", capture.geo->longitude},
+                      {"altitude", capture.geo->altitude}};
+  }
+  return info;
+}
+
+ordered_json describeModel(const fs::path& folder) {
+  const ModelFolder model(folder);
+  const std::optional<ModelManifest> manifest = model.manifest();
+  const ModelPlacement placement = model.readPlacement();
+  FieldConfig config = resumedFieldConfig(folder);
+  ordered_json info = {{"kind", "model"},
+                       {"method", manifest ? manifest->method : "field"},
+                       {"step", manifest ? manifest->step : 0},
+                       {"planned_steps", manifest ? manifest->plannedSteps : 0},
+                       {"capture", placement.capture.string()},
+                       {"parameters", config.shape().grid.parameters() + config.shape().density.parameters() +
+                                          config.shape().colour.parameters()}};
+  for (const ConfigField& field : config.fields()) info["config"][std::string(field.name)] = configValueText(field);
+  return info;
+}
+
+void printIndented(const ordered_json& info, int indent) {
+  for (const auto& [key, value] : info.items()) {
+    if (value.is_object()) {
+      fmt::print("{:{}}{}:\n", "", indent, key);
+      printIndented(value, indent + 2);
+    } else {
+      fmt::print("{:{}}{:<16} {}\n", "", indent, key, value.is_string() ? value.get<std::string>() : value.dump());
+    }
+  }
+}
+
+}  // namespace
+
+void addInfoVerb(CLI::App& app) {
+  struct Flags {
+    std::string what;
+    bool json = false;
+  };
+  auto flags = std::make_shared<Flags>();
+  CLI::App* verb = app.add_subcommand("info", "what a folder is and holds: source, capture or model");
+  verb->footer("Example:\n  tessera info fox.model --json");
+  verb->add_option("what", flags->what, "a folder")->required();
+  verb->add_flag("--json", flags->json, "as one JSON object");
+  verb->callback([flags] {
+    const fs::path folder = flags->what;
+    if (!fs::is_directory(folder)) throw Error(flags->what, "", "is not a folder", "name a source, capture or model");
+    ordered_json info;
+    if (fs::exists(folder / "blocks.json")) {
+      info = describeModel(folder);
+    } else if (isCapture(folder)) {
+      info = describeCapture(folder);
+    } else {
+      const std::string format = sourceFormat(folder);
+      if (format.empty()) {
+        throw Error(flags->what, "", "holds nothing that tessera knows", "name a source, capture or model folder");
+      }
+      info = {{"kind", "source"}, {"format", format}};
+    }
+    if (flags->json) {
+      fmt::print("{}\n", info.dump(2));
+    } else {
+      printIndented(info, 0);
+    }
+  });
+}
 
 }  // namespace tessera

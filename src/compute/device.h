@@ -34,8 +34,10 @@ namespace tessera {
   X(FrequencyBackward)          \
   X(GenerateRays)               \
   X(MarchRays)                  \
+  X(SelectSamples)              \
   X(CompactSamples)             \
   X(GatherRows)                 \
+  X(ScatterRows)                \
   X(OccupancyPoints)            \
   X(OccupancyUpdate)            \
   X(CompositeForward)           \

@@ -76,7 +76,7 @@ TEST_P(DeviceProperties, CompactionKeepsAllSamplesThatCompositingWeighs) {
   device->run(a);
   CompactSamples c;
   c.rays.capacity = rays;
-  c.sampleCapacity = first.back();
+  c.sampleCapacity = c.keptCapacity = first.back();
   c.firstSample = a.firstSample;
   c.logDensity = a.x;
   c.steps = a.steps;

@@ -147,6 +147,43 @@ OperationTests testsOf<MarchRays>() {
   return tests;
 }
 
+// For each ray a number of its samples, from none to all.
+static std::vector<uint32_t> partOfEach(Random& random, const std::vector<uint32_t>& firstSample) {
+  std::vector<uint32_t> parts;
+  for (size_t ray = 0; ray + 1 < firstSample.size(); ++ray)
+    parts.push_back(random.below(firstSample[ray + 1] - firstSample[ray] + 1));
+  return parts;
+}
+
+template <>
+OperationTests testsOf<SelectSamples>() {
+  OperationTests tests;
+  tests.noGradient = "it chooses samples; none is changed";
+  for (const Size& size : kSizes)
+    for (Layout layout : {Layout::plain, Layout::strided})
+      tests.cases.push_back(
+          {fmt::format("rays {}{}", toString(size), layout == Layout::strided ? ", strided, few fit" : ""),
+           [=](Stage& stage) {
+             const std::vector<uint32_t> first = stage.random.firstSamples(size.capacity, 40);
+             const uint32_t capacity = first.back() + 9;
+             SelectSamples a;
+             a.rays = stage.count(size);
+             a.sampleCapacity = capacity;
+             a.selectedCapacity = layout == Layout::plain ? capacity : capacity / 8;
+             a.most = 11;
+             a.minTransmittance = layout == Layout::plain ? 1e-4f : 0.3f;
+             a.firstSample = stage.input(first);
+             a.logDensity = stage.randomMatrix(capacity, 1, layout, -3, 6);
+             a.steps = stage.randomInput(capacity, 0.001f, 0.1f);
+             a.lookedAt = stage.outputWords("lookedAt", partOfEach(stage.random, first));
+             a.selected = stage.outputWords("selected", a.selectedCapacity);
+             a.selectedCount = stage.outputWords("selectedCount", 1);
+             stage.device.run(a);
+             stage.device.run(SelectSamples(a));  // on from where it stood
+           }});
+  return tests;
+}
+
 template <>
 OperationTests testsOf<CompactSamples>() {
   OperationTests tests;
@@ -160,8 +197,10 @@ OperationTests testsOf<CompactSamples>() {
              CompactSamples a;
              a.rays = stage.count(size);
              a.sampleCapacity = capacity;
+             a.keptCapacity = layout == Layout::plain ? capacity : capacity / 2;  // the second time it does not fit
              a.minTransmittance = layout == Layout::plain ? 1e-4f : 0.3f;
              a.firstSample = stage.input(first);
+             if (layout == Layout::strided) a.lookedAt = stage.input(partOfEach(stage.random, first));
              a.logDensity = stage.randomMatrix(capacity, 1, layout, -3, 6);
              a.steps = stage.randomInput(capacity, 0.001f, 0.1f);
              a.keptFirstSample = stage.outputWords("keptFirstSample", size.capacity + 1);
@@ -196,6 +235,26 @@ OperationTests testsOf<GatherRows>() {
                                a.source = stage.input(stage.random.wordsBelow(size.capacity, sources));
                                a.input = input;
                                a.output = stage.outputMatrix("output", size.capacity, shape.columns, shape.layout, 0);
+                               stage.device.run(a);
+                             }});
+  return tests;
+}
+
+template <>
+OperationTests testsOf<ScatterRows>() {
+  OperationTests tests;
+  tests.noGradient = "it moves what will be computed again";
+  for (uint32_t columns : {1u, 3u})
+    for (const Size& size : kSizes)
+      tests.cases.push_back({fmt::format("{} columns, rows {}", columns, toString(size)), [=](Stage& stage) {
+                               std::vector<uint32_t> target(size.capacity);  // every second row, backwards
+                               for (uint32_t i = 0; i < size.capacity; ++i) target[i] = 2 * (size.capacity - 1 - i);
+                               ScatterRows a;
+                               a.rows = stage.count(size);
+                               a.target = stage.input(target);
+                               a.input = stage.randomMatrix(size.capacity, columns, Layout::plain, -1, 1);
+                               a.output =
+                                   stage.outputMatrix("output", 2 * size.capacity, columns, Layout::strided, 0);
                                stage.device.run(a);
                              }});
   return tests;

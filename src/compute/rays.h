@@ -74,18 +74,38 @@ struct MarchRays {
   Slice<float> steps;                    // [sampleCapacity]: t(n+1) - t(n)
 };
 
+// Which samples to look up next: of each ray that is still transparent, the next `most` behind the `lookedAt` first ones,
+// whose log densities are known. A ray is done when Σ density · step of those passes -ln(minTransmittance). Rays get
+// theirs in order while they fit `selectedCapacity`; a ray that does not gets none, and so do all after it. Looked up
+// in stages, samples behind surfaces are never looked at.
+struct SelectSamples {
+  Count rays;
+  uint32_t sampleCapacity = 0;
+  uint32_t selectedCapacity = 0;
+  uint32_t most = 0;
+  float minTransmittance = 1e-4f;
+  Slice<const uint32_t> firstSample;     // [rays + 1]
+  Matrix<const float> logDensity;        // [sampleCapacity], 1 column
+  Slice<const float> steps;              // [sampleCapacity]
+  Slice<uint32_t> lookedAt;              // [rays], read and advanced
+  Slice<uint32_t> selected;              // [selectedCapacity]: samples, in order
+  Slice<uint32_t> selectedCount;         // [1]
+};
+
 // Keeps of each ray the samples in front of the point where its transmittance falls below `minTransmittance`
 // (the one that crosses included). logDensity as in Composite.
 struct CompactSamples {
   Count rays;
-  uint32_t sampleCapacity = 0;           // of input and output alike
+  uint32_t sampleCapacity = 0;           // of the input
+  uint32_t keptCapacity = 0;             // rays whose samples no longer fit keep none, and so do all after
   float minTransmittance = 1e-4f;
   Slice<const uint32_t> firstSample;     // [rays + 1]
+  Slice<const uint32_t> lookedAt;        // optional, [rays]: only so many samples of a ray have a log density
   Matrix<const float> logDensity;        // 1 column
   Slice<const float> steps;
   Slice<uint32_t> keptFirstSample;       // [rays + 1]
   Slice<uint32_t> keptCount;             // [1]
-  Slice<uint32_t> source;                // [sampleCapacity]: the sample that a kept one was
+  Slice<uint32_t> source;                // [keptCapacity]: the sample that a kept one was
 };
 
 // output row i = input row source[i]. 32-bit elements of any kind.
@@ -94,6 +114,14 @@ struct GatherRows {
   Slice<const uint32_t> source;
   Matrix<const float> input;
   Matrix<float> output;                  // same layout kind and columns
+};
+
+// output row target[i] = input row i. Targets differ. 32-bit elements of any kind.
+struct ScatterRows {
+  Count rows;
+  Slice<const uint32_t> target;
+  Matrix<const float> input;
+  Matrix<float> output;                  // row-major, same columns
 };
 
 }  // namespace tessera

@@ -56,7 +56,7 @@ void RadianceField::reserve(uint32_t samples) {
   capacity_ = samples;
   const size_t n = samples;
   encoded_ = device_.array<float>(n * shape_.grid.columns());
-  encodedKept_ = device_.array<float>(n * shape_.grid.columns());
+  encodedGradients_ = device_.array<float>(n * shape_.grid.columns());
   colourInput_ = device_.array<float>(n * shape_.colour.inputs);
   colours_ = device_.array<float>(n * 3);
   densityActivations_ = device_.array<float>(n * shape_.density.activationsPerSample());
@@ -64,36 +64,26 @@ void RadianceField::reserve(uint32_t samples) {
   colourInputGradients_ = device_.array<float>(n * shape_.colour.inputs);
 }
 
-Matrix<float> RadianceField::encodings(bool second) {
-  return Matrix<float>::grouped((second ? encodedKept_ : encoded_).all(), shape_.grid.columns(),
-                                static_cast<uint32_t>(shape_.grid.features), capacity_);
+Matrix<float> RadianceField::byLevel(Array<float>& encodings) {
+  return Matrix<float>::grouped(encodings, shape_.grid.columns(), static_cast<uint32_t>(shape_.grid.features), capacity_);
 }
 
 Matrix<const float> RadianceField::logDensity(Count samples, Slice<const float> positions) {
   CHECK(samples.capacity <= capacity_);
   const Matrix<float> geometry = Matrix<float>(colourInput_, shape_.colour.inputs).columnRange(0, kGeometryFeatures);
-  device_.run(HashGridForward{shape_.grid, samples, positions, table_.values, encodings(false)});
-  device_.run(MlpForward{shape_.density, samples, encodings(false), density_.values, geometry, {}});
-  inSecond_ = false;
+  device_.run(HashGridForward{shape_.grid, samples, positions, table_.values, byLevel(encoded_)});
+  device_.run(MlpForward{shape_.density, samples, byLevel(encoded_), density_.values, geometry, {}});
   return geometry.columnRange(0, 1);
 }
 
-void RadianceField::keepEncodings(Count kept, Slice<const uint32_t> source) {
-  device_.run(GatherRows{kept, source, encodings(false), encodings(true)});
-  inSecond_ = true;
-}
-
 RadianceField::Output RadianceField::forward(Count samples, Slice<const float> positions, Slice<const float> directions,
-                                             Slice<const uint32_t> rayOfSample, bool encodingsKept, bool forBackward) {
+                                             Slice<const uint32_t> rayOfSample, bool forBackward) {
   CHECK(samples.capacity <= capacity_);
   const Matrix<float> input(colourInput_, shape_.colour.inputs);
   const Matrix<float> geometry = input.columnRange(0, kGeometryFeatures);
   const uint32_t harmonics = shape_.harmonicsDegree * shape_.harmonicsDegree;
-  if (!encodingsKept) {
-    inSecond_ = false;
-    device_.run(HashGridForward{shape_.grid, samples, positions, table_.values, encodings(false)});
-  }
-  device_.run(MlpForward{shape_.density, samples, encodings(inSecond_), density_.values, geometry,
+  device_.run(HashGridForward{shape_.grid, samples, positions, table_.values, byLevel(encoded_)});
+  device_.run(MlpForward{shape_.density, samples, byLevel(encoded_), density_.values, geometry,
                          forBackward ? densityActivations_.all() : Slice<float>()});
   device_.run(SphericalHarmonicsForward{shape_.harmonicsDegree, samples, directions, rayOfSample,
                                         input.columnRange(kGeometryFeatures, harmonics)});
@@ -108,9 +98,8 @@ void RadianceField::backward(Count samples, Slice<const float> positions, Slice<
   const Matrix<float> inputGradients(colourInputGradients_, shape_.colour.inputs);
   device_.run(MlpBackward{shape_.colour, samples, input, colour_.values, Matrix<float>(colours_, 3),
                           colourActivations_, colourGradients, {}, colour_.gradients, inputGradients});
-  // Gradients of the encodings go to the buffer that the encodings themselves are not in.
-  const Matrix<float> encodedGradients = encodings(!inSecond_);
-  device_.run(MlpBackward{shape_.density, samples, encodings(inSecond_), density_.values,
+  const Matrix<float> encodedGradients = byLevel(encodedGradients_);
+  device_.run(MlpBackward{shape_.density, samples, byLevel(encoded_), density_.values,
                           input.columnRange(0, kGeometryFeatures), densityActivations_,
                           inputGradients.columnRange(0, kGeometryFeatures), logDensityGradients, density_.gradients,
                           encodedGradients});

@@ -27,16 +27,13 @@ class RadianceField {
   // the next call.
   Matrix<const float> logDensity(Count samples, Slice<const float> positions);
 
-  // Moves the encodings that the last logDensity call left (of samples `source`) to the front, for `forward` to use.
-  void keepEncodings(Count kept, Slice<const uint32_t> source);
-
   struct Output {
     Matrix<const float> logDensity;  // 1 column
     Matrix<const float> colours;     // 3 columns
   };
-  // Both networks. With `encodingsKept` the hash grid is not read again. `forBackward` keeps activations.
+  // Both networks. `forBackward` keeps activations.
   Output forward(Count samples, Slice<const float> positions, Slice<const float> directions,
-                 Slice<const uint32_t> rayOfSample, bool encodingsKept, bool forBackward);
+                 Slice<const uint32_t> rayOfSample, bool forBackward);
 
   // After `forward` with the same samples. Adds to the groups' gradients.
   void backward(Count samples, Slice<const float> positions, Slice<const float> logDensityGradients,
@@ -48,14 +45,13 @@ class RadianceField {
   const RadianceFieldShape& shape() const { return shape_; }
 
  private:
-  Matrix<float> encodings(bool second);
+  Matrix<float> byLevel(Array<float>& encodings);
 
   Device& device_;
   RadianceFieldShape shape_;
   ParameterGroup table_, density_, colour_;
   uint32_t capacity_ = 0;
-  bool inSecond_ = false;                 // which of the two encoding buffers holds the kept ones
-  Array<float> encoded_, encodedKept_;    // [levels][capacity][features]
+  Array<float> encoded_, encodedGradients_;  // [levels][capacity][features]
   Array<float> colourInput_;              // [capacity][geometry features + harmonics]
   Array<float> colours_;                  // [capacity][3]
   Array<float> densityActivations_, colourActivations_;

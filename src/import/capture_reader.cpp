@@ -33,4 +33,10 @@ Capture readCapture(const fs::path& folder) {
   return std::move(capture);
 }
 
+bool isCapture(const fs::path& folder) {
+  const fs::path file = folder / "transforms.json";
+  std::error_code status;
+  return fs::is_regular_file(file, status) && readTransforms({file}).isOurs;
+}
+
 }  // namespace tessera

@@ -65,24 +65,32 @@ void ModelFolder::commit(const ModelManifest& state, const Bytes& block, int kee
   for (size_t i = 0; i + static_cast<size_t>(keep) < old.size(); ++i) fs::remove(old[i].second);
 }
 
-void ModelFolder::writeFrame(const SceneFrame& frame, const std::string& method, const fs::path& capture) const {
-  const json text = {{"method", method},
-                     {"capture", fs::absolute(capture).lexically_normal().string()},
-                     {"blocks", json::array({{{"id", "0"},
-                                              {"centre", {frame.centre.x(), frame.centre.y(), frame.centre.z()}},
-                                              {"scale", frame.scale}}})}};
+void ModelFolder::writePlacement(const ModelPlacement& placement, const std::string& method) const {
+  const Vec3d& centre = placement.frame.centre;
+  json sourceFromWorld = json::array();
+  for (int i = 0; i < 16; ++i) sourceFromWorld.push_back(placement.sourceFromWorld(i / 4, i % 4));
+  const json text = {
+      {"method", method},
+      {"capture", fs::absolute(placement.capture).lexically_normal().string()},
+      {"source_from_world", sourceFromWorld},
+      {"blocks",
+       json::array({{{"id", "0"}, {"centre", {centre.x(), centre.y(), centre.z()}}, {"scale", placement.frame.scale}}})}};
   writeFileAtomically(root_ / "blocks.json", text.dump(2) + "\n");
 }
 
-SceneFrame ModelFolder::readFrame() const {
+ModelPlacement ModelFolder::readPlacement() const {
   const fs::path path = root_ / "blocks.json";
   const json parsed = parseJson(path);
   try {
     const json& block = parsed.at("blocks").at(0);
-    SceneFrame frame;
-    for (int axis = 0; axis < 3; ++axis) frame.centre[axis] = block.at("centre").at(axis).get<double>();
-    frame.scale = block.at("scale").get<double>();
-    return frame;
+    ModelPlacement placement;
+    for (int axis = 0; axis < 3; ++axis) {
+      placement.frame.centre[axis] = block.at("centre").at(axis).get<double>();
+    }
+    for (int i = 0; i < 16; ++i) placement.sourceFromWorld(i / 4, i % 4) = parsed.at("source_from_world").at(i).get<double>();
+    placement.frame.scale = block.at("scale").get<double>();
+    placement.capture = parsed.at("capture").get<std::string>();
+    return placement;
   } catch (const json::exception& error) {
     throw Error(path.string(), "", error.what(), "restore the file or train again");
   }

@@ -17,6 +17,12 @@ struct ModelManifest {
   std::vector<std::string> files;  // relative, one per block
 };
 
+struct ModelPlacement {
+  SceneFrame frame;
+  Mat4d sourceFromWorld = Mat4d::Identity();  // of the capture: camera paths speak of the source's world
+  fs::path capture;
+};
+
 class ModelFolder {
  public:
   explicit ModelFolder(fs::path root) : root_(std::move(root)) {}
@@ -30,8 +36,9 @@ class ModelFolder {
   // One-block models: writes the checkpoint, then the manifest, then removes older checkpoints but the last `keep`.
   void commit(const ModelManifest& state, const Bytes& block, int keep = 2) const;
 
-  void writeFrame(const SceneFrame& frame, const std::string& method, const fs::path& capture) const;  // blocks.json
-  SceneFrame readFrame() const;
+  // blocks.json: where the model stands, and in whose world.
+  void writePlacement(const ModelPlacement& placement, const std::string& method) const;
+  ModelPlacement readPlacement() const;
 
   // The number of steps that `--minutes` came to; kept apart from checkpoints so that it survives a kill before the next.
   void writePlan(int64_t steps) const;

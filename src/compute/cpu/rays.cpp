@@ -267,30 +267,83 @@ void run(Context& context, const MarchRays& a) {
   });
 }
 
-void run(Context& context, const CompactSamples& a) {
+namespace {
+
+// How many of a ray's first `count` samples stand in front of the point where it is opaque; `*opaque` tells whether there
+// is one. Transmittance is exp(-Σ σ step): the sum is enough.
+uint32_t visibleSamples(const Matrix<const float>& logDensity, const float* data, const float* steps, uint32_t first,
+                        uint32_t count, float minTransmittance, bool* opaque) {
+  const float most = -std::log(minTransmittance);
+  float thickness = 0;
+  uint32_t i = 0;
+  while (i < count && thickness <= most) {
+    thickness += std::exp(data[logDensity.offset(first + i, 0)]) * steps[first + i];
+    ++i;
+  }
+  *opaque = thickness > most;
+  return i;
+}
+
+// Counts in offsets[1 .. rays] to running ends; what no longer fits `capacity` becomes empty, and so does all after it.
+void countsToOffsets(uint32_t* offsets, uint32_t rays, uint32_t capacity) {
+  offsets[0] = 0;
+  bool full = false;
+  for (uint32_t ray = 0; ray < rays; ++ray) {
+    const uint64_t end = static_cast<uint64_t>(offsets[ray]) + offsets[ray + 1];
+    full = full || end > capacity;
+    offsets[ray + 1] = full ? offsets[ray] : static_cast<uint32_t>(end);
+  }
+}
+
+}  // namespace
+
+void run(Context& context, const SelectSamples& a) {
   const uint32_t rays = hostCount(a.rays);
   const uint32_t* firstSample = hostPointer(a.firstSample);
   const float* logDensity = hostPointer(a.logDensity.data);
   const float* steps = hostPointer(a.steps);
-  uint32_t* kept = hostPointer(a.keptFirstSample);
-  uint32_t* source = hostPointer(a.source);
-  context.pool.forRanges(rays, 64, [&](size_t begin, size_t end) {
+  uint32_t* lookedAt = hostPointer(a.lookedAt);
+  uint32_t* selected = hostPointer(a.selected);
+  std::vector<uint32_t> offsets(rays + 1);
+  context.pool.forRanges(rays, kRaysPerTask, [&](size_t begin, size_t end) {
     for (size_t ray = begin; ray < end; ++ray) {
-      // Transmittance is exp(-Σ σ step): the sum is enough.
-      float thickness = 0;
-      const float most = -std::log(a.minTransmittance);
-      uint32_t i = firstSample[ray];
-      while (i < firstSample[ray + 1] && thickness <= most) {
-        thickness += std::exp(logDensity[a.logDensity.offset(i, 0)]) * steps[i];
-        ++i;
+      const uint32_t first = firstSample[ray], left = firstSample[ray + 1] - first - lookedAt[ray];
+      bool opaque = false;
+      if (left > 0) {
+        visibleSamples(a.logDensity, logDensity, steps, first, lookedAt[ray], a.minTransmittance, &opaque);
       }
-      kept[ray + 1] = i - firstSample[ray];
+      offsets[ray + 1] = opaque ? 0 : std::min(left, a.most);
     }
   });
-  kept[0] = 0;
-  for (uint32_t ray = 0; ray < rays; ++ray) kept[ray + 1] += kept[ray];
+  countsToOffsets(offsets.data(), rays, a.selectedCapacity);
+  context.pool.forRanges(rays, 4 * kRaysPerTask, [&](size_t begin, size_t end) {
+    for (size_t ray = begin; ray < end; ++ray) {
+      const uint32_t from = firstSample[ray] + lookedAt[ray];
+      for (uint32_t i = offsets[ray]; i < offsets[ray + 1]; ++i) selected[i] = from + (i - offsets[ray]);
+      lookedAt[ray] += offsets[ray + 1] - offsets[ray];
+    }
+  });
+  *hostPointer(a.selectedCount) = offsets[rays];
+}
+
+void run(Context& context, const CompactSamples& a) {
+  const uint32_t rays = hostCount(a.rays);
+  const uint32_t* firstSample = hostPointer(a.firstSample);
+  const uint32_t* lookedAt = hostPointer(a.lookedAt);
+  const float* logDensity = hostPointer(a.logDensity.data);
+  const float* steps = hostPointer(a.steps);
+  uint32_t* kept = hostPointer(a.keptFirstSample);
+  uint32_t* source = hostPointer(a.source);
+  context.pool.forRanges(rays, kRaysPerTask, [&](size_t begin, size_t end) {
+    for (size_t ray = begin; ray < end; ++ray) {
+      const uint32_t first = firstSample[ray], count = lookedAt ? lookedAt[ray] : firstSample[ray + 1] - first;
+      bool opaque;
+      kept[ray + 1] = visibleSamples(a.logDensity, logDensity, steps, first, count, a.minTransmittance, &opaque);
+    }
+  });
+  countsToOffsets(kept, rays, a.keptCapacity);
   *hostPointer(a.keptCount) = kept[rays];
-  context.pool.forRanges(rays, 256, [&](size_t begin, size_t end) {
+  context.pool.forRanges(rays, 4 * kRaysPerTask, [&](size_t begin, size_t end) {
     for (size_t ray = begin; ray < end; ++ray) {
       for (uint32_t i = kept[ray]; i < kept[ray + 1]; ++i) source[i] = firstSample[ray] + (i - kept[ray]);
     }
@@ -320,6 +373,21 @@ void run(Context& context, const GatherRows& a) {
         for (uint32_t c = 0; c < group; ++c) {
           to[i * a.output.rowStride + c] = from[size_t{source[i]} * a.input.rowStride + c];
         }
+      }
+    }
+  });
+}
+
+void run(Context& context, const ScatterRows& a) {
+  const uint32_t* target = hostPointer(a.target);
+  const float* input = hostPointer(a.input.data);
+  float* output = hostPointer(a.output.data);
+  CHECK(a.input.columns == a.output.columns);
+  CHECK(a.output.groupWidth == 0u);
+  context.pool.forRanges(hostCount(a.rows), 8192, [&](size_t begin, size_t end) {
+    for (size_t row = begin; row < end; ++row) {
+      for (uint32_t c = 0; c < a.input.columns; ++c) {
+        std::memcpy(output + a.output.offset(target[row], c), input + a.input.offset(row, c), sizeof(float));
       }
     }
   });

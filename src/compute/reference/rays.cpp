@@ -156,17 +156,41 @@ void run(const MarchRays& a) {
   store(a.steps, steps);
 }
 
+void run(const SelectSamples& a) {
+  const size_t rays = hostCount(a.rays);
+  const Indices firstSample = indices(a.firstSample, rays + 1);
+  uint32_t* const lookedAt = hostPointer(a.lookedAt);
+  uint32_t made = 0;
+  bool full = false;
+  for (size_t r = 0; r < rays; ++r) {
+    double thickness = 0;
+    for (uint32_t i = firstSample[r]; i < firstSample[r] + lookedAt[r]; ++i)
+      thickness += std::exp(static_cast<double>(hostPointer(a.logDensity.data)[a.logDensity.offset(i, 0)])) *
+                   hostPointer(a.steps)[i];
+    if (thickness > -std::log(static_cast<double>(a.minTransmittance))) continue;
+    const uint32_t left = firstSample[r + 1] - firstSample[r] - lookedAt[r], wanted = std::min(left, a.most);
+    full = full || made + wanted > a.selectedCapacity;
+    if (full) continue;
+    for (uint32_t i = 0; i < wanted; ++i) hostPointer(a.selected)[made++] = firstSample[r] + lookedAt[r] + i;
+    lookedAt[r] += wanted;
+  }
+  hostPointer(a.selectedCount)[0] = made;
+}
+
 void run(const CompactSamples& a) {
   const size_t rays = hostCount(a.rays);
   const Indices firstSample = indices(a.firstSample, rays + 1);
   const Doubles logDensity = doubles(a.logDensity, firstSample[rays]), steps = doubles(a.steps, firstSample[rays]);
   uint32_t made = 0;
+  bool full = false;
   hostPointer(a.keptFirstSample)[0] = 0;
   for (size_t r = 0; r < rays; ++r) {
-    const size_t first = firstSample[r], count = firstSample[r + 1] - first;
+    const size_t first = firstSample[r];
+    const size_t count = a.lookedAt ? hostPointer(a.lookedAt)[r] : firstSample[r + 1] - first;
     const size_t kept =
         compactRay(a.minTransmittance, View(logDensity).subspan(first, count), View(steps).subspan(first, count));
-    for (size_t i = 0; i < kept; ++i) hostPointer(a.source)[made++] = static_cast<uint32_t>(first + i);
+    full = full || made + kept > a.keptCapacity;
+    for (size_t i = 0; i < kept && !full; ++i) hostPointer(a.source)[made++] = static_cast<uint32_t>(first + i);
     hostPointer(a.keptFirstSample)[r + 1] = made;
   }
   hostPointer(a.keptCount)[0] = made;
@@ -180,6 +204,16 @@ void run(const GatherRows& a) {
     for (size_t column = 0; column < a.output.columns; ++column)  // bits, whatever they mean
       std::memcpy(hostPointer(a.output.data) + a.output.offset(row, column),
                   hostPointer(a.input.data) + a.input.offset(source[row], column), sizeof(float));
+}
+
+void run(const ScatterRows& a) {
+  const size_t rows = hostCount(a.rows);
+  const Indices target = indices(a.target, rows);
+  CHECK(a.input.columns == a.output.columns);
+  for (size_t row = 0; row < rows; ++row)
+    for (size_t column = 0; column < a.output.columns; ++column)
+      std::memcpy(hostPointer(a.output.data) + a.output.offset(target[row], column),
+                  hostPointer(a.input.data) + a.input.offset(row, column), sizeof(float));
 }
 
 }  // namespace tessera::reference

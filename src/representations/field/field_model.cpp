@@ -4,6 +4,12 @@
 #include "train/model_folder.h"
 
 namespace tessera {
+namespace {
+
+// Samples of a ray that are looked up before asking whether it is opaque: few at first, for most rays end early.
+constexpr uint32_t kStages[] = {16, 16, 32, 64, 1u << 30};
+
+}  // namespace
 
 RaySamples::RaySamples(Device& device, uint32_t rays, uint32_t samples)
     : firstSample(device.array<uint32_t>(rays + 1)),
@@ -24,8 +30,8 @@ FieldModel::FieldModel(Device& device, const FieldConfig& config, const SceneFra
 
 void FieldModel::sample(const Rays& rays, float minTransmittance, RaySamples& marched, RaySamples& kept) {
   const uint32_t capacity = static_cast<uint32_t>(marched.distances.size());
-  if (source_.size() < capacity) source_ = device_.array<uint32_t>(capacity);
-  field_.reserve(capacity);
+  const uint32_t keptCapacity = static_cast<uint32_t>(kept.distances.size());
+  reserve(rays.count, capacity, keptCapacity);
   MarchRays march{space_};
   march.rays = {rays.count, {}};
   march.sampleCapacity = capacity;
@@ -43,22 +49,44 @@ void FieldModel::sample(const Rays& rays, float minTransmittance, RaySamples& ma
   march.steps = marched.steps;
   device_.run(march);
 
-  const Count samples{capacity, marched.count};
   const Count finished{rays.count, marched.finishedRays};
+  const Matrix<float> logDensities(logDensities_.all(), 1);
+  device_.fillZero(lookedAt_.all());
+  SelectSamples select;
+  select.rays = finished;
+  select.sampleCapacity = capacity;
+  select.selectedCapacity = keptCapacity;
+  select.minTransmittance = minTransmittance;
+  select.firstSample = marched.firstSample;
+  select.logDensity = logDensities;
+  select.steps = marched.steps;
+  select.lookedAt = lookedAt_;
+  select.selected = selected_;
+  select.selectedCount = selectedCount_;
+  for (const uint32_t most : kStages) {
+    select.most = most;
+    device_.run(select);
+    const Count rows{keptCapacity, selectedCount_};
+    device_.run(GatherRows{rows, selected_, Matrix<const float>(marched.positions.all(), 3),
+                           Matrix<float>(selectedPositions_.all(), 3)});
+    device_.run(ScatterRows{rows, selected_, field_.logDensity(rows, selectedPositions_), logDensities});
+  }
+
   CompactSamples compact;
   compact.rays = finished;
   compact.sampleCapacity = capacity;
+  compact.keptCapacity = keptCapacity;
   compact.minTransmittance = minTransmittance;
   compact.firstSample = marched.firstSample;
-  compact.logDensity = field_.logDensity(samples, marched.positions);
+  compact.lookedAt = lookedAt_;
+  compact.logDensity = logDensities;
   compact.steps = marched.steps;
   compact.keptFirstSample = kept.firstSample;
   compact.keptCount = kept.count;
   compact.source = source_;
   device_.run(compact);
 
-  const Count rows{capacity, kept.count};
-  field_.keepEncodings(rows, source_);
+  const Count rows{keptCapacity, kept.count};
   const auto gather = [&](Slice<const float> from, Slice<float> to, uint32_t columns) {
     device_.run(GatherRows{rows, source_, Matrix<const float>(from, columns), Matrix<float>(to, columns)});
   };
@@ -66,6 +94,18 @@ void FieldModel::sample(const Rays& rays, float minTransmittance, RaySamples& ma
   gather(marched.distances, kept.distances, 1);
   gather(marched.steps, kept.steps, 1);
   gather(asFloats(marched.rayOfSample.all()), asFloats(kept.rayOfSample.all()), 1);
+}
+
+void FieldModel::reserve(uint32_t rays, uint32_t marched, uint32_t kept) {
+  field_.reserve(kept);
+  if (lookedAt_.size() < rays) lookedAt_ = device_.array<uint32_t>(rays);
+  if (logDensities_.size() < marched) logDensities_ = device_.array<float>(marched);
+  if (source_.size() < kept) {
+    source_ = device_.array<uint32_t>(kept);
+    selected_ = device_.array<uint32_t>(kept);
+    selectedCount_ = device_.array<uint32_t>(1);
+    selectedPositions_ = device_.array<float>(size_t{kept} * 3);
+  }
 }
 
 void FieldModel::refreshOccupancy(uint32_t uniform, uint32_t occupied, uint64_t seed) {
@@ -105,7 +145,7 @@ std::unique_ptr<FieldModel> loadFieldModel(Device& device, const fs::path& folde
   }
   FieldConfig config;
   configFromToml(config.fields(), model.configPath());
-  auto made = std::make_unique<FieldModel>(device, config, model.readFrame());
+  auto made = std::make_unique<FieldModel>(device, config, model.readPlacement().frame);
   const fs::path file = folder / manifest->files.at(0);
   made->restore(file, readSafetensors(file));
   return made;

@@ -21,12 +21,12 @@ class FieldModel {
  public:
   FieldModel(Device& device, const FieldConfig& config, const SceneFrame& frame);
 
-  // Marches rays and keeps what can be seen: samples in front of the point where transmittance has fallen below
-  // `minTransmittance`. The kept samples' encodings stay in the field for `forward(..., encodingsKept = true)`.
   struct Rays {
     uint32_t count;
     Slice<const float> origins, directions, jitter, far;
   };
+  // Marches rays and keeps what can be seen: samples in front of the point where transmittance has fallen below
+  // `minTransmittance`. Densities are looked up in stages from the front, so that what lies behind surfaces costs little.
   void sample(const Rays& rays, float minTransmittance, RaySamples& marched, RaySamples& kept);
 
   void refreshOccupancy(uint32_t uniform, uint32_t occupied, uint64_t seed);
@@ -43,13 +43,16 @@ class FieldModel {
   void restore(const fs::path& path, const Safetensors& file);
 
  private:
+  void reserve(uint32_t rays, uint32_t marched, uint32_t kept);
+
   Device& device_;
   FieldConfig config_;
   SceneFrame frame_;
   MarchSpace space_;
   RadianceField field_;
   OccupancyGrid occupancy_;
-  Array<uint32_t> source_;
+  Array<uint32_t> source_, lookedAt_, selected_, selectedCount_;
+  Array<float> selectedPositions_, logDensities_;
 };
 
 // A trained model for drawing, from its folder.

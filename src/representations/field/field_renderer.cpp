@@ -6,15 +6,16 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kRays = 8192;        // of one piece of the picture
-constexpr uint32_t kSamples = 1 << 18;  // rays that do not fit are taken up by the next piece
+constexpr uint32_t kRays = 16384;       // of one piece of the picture, at most
+constexpr uint32_t kMarched = 1 << 20;  // rays that do not fit are taken up by the next piece
+constexpr uint32_t kSamples = 1 << 18;  // of those, that can be seen
 constexpr float kMinTransmittance = 1e-3f;
 
 }  // namespace
 
 FieldRenderer::FieldRenderer(FieldModel& model) : model_(model) {
   Device& device = model.device();
-  marched_ = RaySamples(device, kRays, kSamples);
+  marched_ = RaySamples(device, kRays, kMarched);
   kept_ = RaySamples(device, kRays, kSamples);
   cameraOfRay_ = device.array<uint32_t>(kRays);
   pixels_ = device.array<float>(kRays * 2);
@@ -35,8 +36,9 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
                     ImageF(camera.width, camera.height, 1)};
   const size_t pixelCount = view.opacity.pixels.size();
   std::vector<float> pixels, far;
+  uint32_t wanted = 1024;  // rays of the next piece: as many as the last one's samples let expect
   for (size_t first = 0; first < pixelCount;) {
-    const uint32_t rays = static_cast<uint32_t>(std::min<size_t>(kRays, pixelCount - first));
+    const uint32_t rays = static_cast<uint32_t>(std::min<size_t>(wanted, pixelCount - first));
     pixels.clear();
     for (size_t i = first; i < first + rays; ++i) {
       pixels.push_back(static_cast<float>(i % camera.width) + 0.5f);
@@ -61,7 +63,7 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
     model_.sample({rays, origins_, directions_, {}, farOfRay}, kMinTransmittance, marched_, kept_);
     const Count samples{kSamples, kept_.count};
     const RadianceField::Output output =
-        model_.field().forward(samples, kept_.positions, directions_, kept_.rayOfSample, true, false);
+        model_.field().forward(samples, kept_.positions, directions_, kept_.rayOfSample, false);
     CompositeForward composite;
     composite.minTransmittance = kMinTransmittance;
     composite.rays = {rays, marched_.finishedRays};
@@ -84,6 +86,8 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
     std::copy(opacity.begin(), opacity.end(), view.opacity.pixels.begin() + static_cast<ptrdiff_t>(first));
     for (uint32_t ray = 0; ray < finished; ++ray) view.depth.pixels[first + ray] = depth[ray] * cosine(ray) / scale;
     first += finished;
+    const double perRay = std::max(1.0, static_cast<double>(device.read(marched_.count.all())[0]) / finished);
+    wanted = static_cast<uint32_t>(std::clamp(0.9 * kMarched / perRay, 64.0, static_cast<double>(kRays)));
   }
   return view;
 }

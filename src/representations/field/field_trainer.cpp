@@ -10,7 +10,8 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kMarchedPerKept = 4;        // room for samples that turn out to be hidden
+constexpr uint32_t kMarchedPerWanted = 16;     // room for samples that are hidden behind others
+constexpr uint32_t kKeptPerWanted = 2;         // and for steps that see more than the last ones did
 constexpr float kMinTransmittance = 1e-4f;
 
 ColourLossKind lossKind(const std::string& name) {
@@ -51,8 +52,8 @@ FieldTrainer::FieldTrainer(Device& device, const Capture& capture, const FieldCo
       exposures_(device, "exposures", std::vector<float>(capture.photos.size() * 3)) {
   lossKind(config.loss);
   const uint32_t rays = static_cast<uint32_t>(config.mostRays);
-  const uint32_t samples = static_cast<uint32_t>(config.samplesPerStep) * kMarchedPerKept;
-  marched_ = RaySamples(device, rays, samples);
+  const uint32_t samples = static_cast<uint32_t>(config.samplesPerStep) * kKeptPerWanted;
+  marched_ = RaySamples(device, rays, static_cast<uint32_t>(config.samplesPerStep) * kMarchedPerWanted);
   kept_ = RaySamples(device, rays, samples);
   photoOfRay_ = device.array<uint32_t>(rays);
   for (Array<float>* perRay : {&weights_, &jitter_, &opacity_, &depth_}) *perRay = device.array<float>(rays);
@@ -100,7 +101,7 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
   const Count rays{rays_, marched_.finishedRays};
   RadianceField& field = model_.field();
   const RadianceField::Output output =
-      field.forward(samples, kept_.positions, directions_, kept_.rayOfSample, true, true);
+      field.forward(samples, kept_.positions, directions_, kept_.rayOfSample, true);
 
   CompositeForward composite;
   composite.minTransmittance = kMinTransmittance;
@@ -174,7 +175,7 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
 
   const double perRay = std::max(1.0, static_cast<double>(report.samples)) / std::max(1u, report.rays);
   const double marchedPerRay = std::max(1.0, static_cast<double>(report.marched)) / std::max(1u, report.rays);
-  const double wanted = std::min(config_.samplesPerStep / perRay, 0.9 * capacity / marchedPerRay);
+  const double wanted = std::min(config_.samplesPerStep / perRay, 0.9 * static_cast<double>(marched_.distances.size()) / marchedPerRay);
   const double rounded = std::ceil(wanted / 64) * 64;
   rays_ = static_cast<uint32_t>(std::clamp<double>(rounded, 64, config_.mostRays));
   return report;

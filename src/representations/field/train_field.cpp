@@ -9,13 +9,11 @@ TrainingResult trainField(Device& device, const Capture& capture, const fs::path
   options.loop.method = "field";
   const bool goingOn = options.loop.resume && folder.manifest().has_value();
   // A resumed run stands where the killed one stood, whatever has become of the capture's points since.
-  const SceneFrame frame = goingOn ? folder.readFrame() : fitSceneFrame(capture, options.config.roiMargin);
+  const SceneFrame frame = goingOn ? folder.readPlacement().frame : fitSceneFrame(capture, options.config.roiMargin);
   FieldTrainer trainer(device, capture, options.config, frame);
-  if (!goingOn) {
-    if (!folder.manifest()) {
+  if (!folder.manifest()) {
       writeFileAtomically(folder.configPath(), configToToml(options.config.fields()));
-      folder.writeFrame(frame, options.loop.method, capture.root);
-    }
+      folder.writePlacement({frame, capture.sourceFromWorld, capture.root}, options.loop.method);
   }
   return runTraining(trainer, folder, options.loop);
 }

@@ -1,0 +1,109 @@
+#include "compute/roofline.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+
+#include "base/random.h"
+#include "compute/cpu/kernels.h"
+#include "compute/roofline_recorder.h"
+
+namespace tessera {
+namespace {
+
+MachineLimits measureLimits(ThreadPool& pool, const HashGrid& grid) {
+  MachineLimits limits;
+  limits.flops = cpu::peakFlops(pool);
+  limits.streamBytes = cpu::streamRate(pool);
+  std::map<size_t, int> tables;
+  for (const HashGridLevel& level : grid.levels) ++tables[size_t{level.entries} * grid.features * sizeof(float)];
+  for (const auto& [bytes, count] : tables) limits.gathers.push_back({bytes, cpu::gatherRate(pool, bytes, count)});
+  return limits;
+}
+
+// The higher of two measurements: a limit taken in a disturbed moment would flatter every share.
+void raise(MachineLimits& limits, const MachineLimits& again) {
+  limits.flops = std::max(limits.flops, again.flops);
+  limits.streamBytes = std::max(limits.streamBytes, again.streamBytes);
+  for (size_t i = 0; i < limits.gathers.size(); ++i) {
+    limits.gathers[i].lookups = std::max(limits.gathers[i].lookups, again.gathers[i].lookups);
+  }
+}
+
+}  // namespace
+
+void RooflineRecorder::measure(Operation operation, Work work, const std::function<void()>& run) {
+  using Clock = std::chrono::steady_clock;
+  if (!device_.supports(operation)) return;
+  run();
+  device_.finish();
+  double best = 1e30, spent = 0;
+  for (int i = 0; i < 3 || spent < options_.secondsPerRow; ++i) {
+    const auto start = Clock::now();
+    run();
+    device_.finish();
+    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    best = std::min(best, seconds);
+    spent += seconds;
+  }
+  rows_.push_back({operation, std::move(work.name), std::move(work.shape), best, work.amount / best,
+                   std::move(work.unit), work.limit});
+}
+
+void RooflineRecorder::measureStream(Operation operation, std::string shape, double bytes,
+                                     const std::function<void()>& run) {
+  const std::string name(kOperationNames[static_cast<int>(operation)]);
+  measure(operation, {name, std::move(shape), bytes, "B", limits_.streamBytes}, run);
+}
+
+Array<float> RooflineRecorder::randomFloats(size_t count, float low, float high) {
+  const RandomStream random(1, ++arrays_);
+  std::vector<float> values(count);
+  for (size_t i = 0; i < count; ++i) values[i] = low + (high - low) * random.uniform(i);
+  return device_.arrayOf(values);
+}
+
+std::vector<float> rayLikePositions(uint32_t rays, uint32_t perRay, uint64_t seed) {
+  constexpr float kStep = 1.7320508f / 1024;  // instant-ngp's shortest step, in a unit cube
+  const RandomStream random(seed, 0x4a9);
+  std::vector<float> positions;
+  positions.reserve(size_t{rays} * perRay * 3);
+  for (uint32_t ray = 0; ray < rays; ++ray) {
+    float origin[3], direction[3];
+    const float z = 2 * random.uniform(8 * ray) - 1, around = 6.2831853f * random.uniform(8 * ray + 1);
+    const float r = std::sqrt(1 - z * z);
+    direction[0] = r * std::cos(around);
+    direction[1] = r * std::sin(around);
+    direction[2] = z;
+    for (int axis = 0; axis < 3; ++axis) origin[axis] = random.uniform(8 * ray + 2 + axis);
+    for (uint32_t i = 0; i < perRay; ++i) {
+      for (int axis = 0; axis < 3; ++axis) {
+        positions.push_back(std::clamp(origin[axis] + direction[axis] * kStep * static_cast<float>(i), 0.0f, 1.0f));
+      }
+    }
+  }
+  return positions;
+}
+
+Roofline measureRoofline(const RooflineOptions& options) {
+  const std::unique_ptr<Device> device = makeDevice(options.device);
+  const HashGrid grid;  // the default one: 16 levels of two features, at most 2^17 entries
+  const bool isProcessor = options.device.kind == "cpu" || options.device.kind == "auto";
+  const std::unique_ptr<ThreadPool> pool = isProcessor ? std::make_unique<ThreadPool>(options.device.threads) : nullptr;
+  Roofline result;
+  result.device = device->name();
+  if (pool) {
+    result.limits = measureLimits(*pool, grid);
+    raise(result.limits, measureLimits(*pool, grid));
+  }
+  RooflineRecorder recorder(*device, options, result.limits);
+  measureNetworks(recorder);
+  measureHashGrids(recorder, grid);
+  measureSampleStreams(recorder);
+  measureParameterStreams(recorder);
+  result.rows = recorder.takeRows();
+  return result;
+}
+
+}  // namespace tessera

@@ -1,0 +1,62 @@
+// How fast each operation of a device runs, beside what the machine could do at best, measured in the same run
+// (Williams et al. 2009, the roofline model). What is counted:
+//
+//   networks       2 · parameters · samples forward (a multiply and an add a weight), twice that backward (the gradient
+//                  of the weights and that of the inputs); padding of inputs and outputs is not counted
+//   hash grid      8 corners · levels · samples lookups, forward (read) as backward (read, add, write)
+//   all others     bytes of their arguments, each array once however often a kernel passes over it
+//
+// The limit of the hash grid is the gather rate of tables of the same sizes, level by level: lookups / Σ (lookups of a
+// level / rate of its size). Ray-like positions revisit cells that the cache still holds and may pass it.
+// Every time is the best of several: what the code can do, not what the machine was disturbed to.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "compute/device.h"
+
+namespace tessera {
+
+struct RooflineOptions {
+  DeviceOptions device;
+  std::vector<uint32_t> samples = {65536, 8192};  // of networks and hash grid
+  uint32_t streamed = 1 << 20;                    // samples of the operations that only stream: more than caches hold
+  double secondsPerRow = 0.15;                    // repeats for so long, and at least 3 times
+};
+
+// Of all threads together. Zero where it is not measured: any device but the processor.
+struct MachineLimits {
+  double flops = 0;        // multiply-adds on registers, 2 operations each, per second
+  double streamBytes = 0;  // read + written per second by a large copy
+  struct Gather {
+    size_t tableBytes = 0;
+    double lookups = 0;  // 8-byte loads at random places per second
+  };
+  std::vector<Gather> gathers;  // one per table size
+};
+
+struct RooflineRow {
+  Operation operation;
+  std::string name, shape;
+  double seconds = 0;  // of one run
+  double rate = 0;     // per second
+  std::string unit;    // "FLOP", "lookup", "B"
+  double limit = 0;    // per second; 0: not known
+  double share() const { return limit > 0 ? rate / limit : 0; }
+};
+
+struct Roofline {
+  std::string device;
+  MachineLimits limits;
+  std::vector<RooflineRow> rows;
+};
+
+// Throws Error when there is no such device. Operations that the device lacks have no row.
+Roofline measureRoofline(const RooflineOptions& options);
+
+// Samples as marching makes them: `perRay` points half a finest cell or so apart on each of `rays` random lines in
+// [0,1]³. [rays · perRay][3], a function of the arguments alone.
+std::vector<float> rayLikePositions(uint32_t rays, uint32_t perRay, uint64_t seed);
+
+}  // namespace tessera

@@ -1,0 +1,105 @@
+// The rows of the two operations that training spends its time in.
+
+#include <fmt/format.h>
+
+#include "compute/roofline_recorder.h"
+
+namespace tessera {
+namespace {
+
+struct Network {
+  MlpShape shape;
+  bool grouped = false;  // reads and writes the hash grid's layout
+};
+
+double weights(const MlpShape& shape) {
+  return static_cast<double>(shape.inputs) * shape.width +
+         static_cast<double>(shape.width) * shape.width * (shape.hiddenLayers - 1) +
+         static_cast<double>(shape.width) * shape.outputs;
+}
+
+void measureNetwork(RooflineRecorder& recorder, const Network& network, const std::string& title, uint32_t n) {
+  const MlpShape& shape = network.shape;
+  Device& device = recorder.device();
+  const uint32_t inputs = shape.inputs, outputs = shape.outputs;
+  const auto inputMatrix = [&](Array<float>& data) {
+    return network.grouped ? Matrix<float>::grouped(data, inputs, 2, n) : Matrix<float>(data, inputs);
+  };
+  Array<float> x = recorder.randomFloats(size_t{n} * inputs, -1, 1);
+  Array<float> w = recorder.randomFloats(shape.parameters(), -0.2f, 0.2f);
+  Array<float> dy = recorder.randomFloats(size_t{n} * outputs, -1, 1);
+  Array<float> y = device.array<float>(size_t{n} * outputs), dx = device.array<float>(size_t{n} * inputs);
+  Array<float> kept = device.array<float>(n * shape.activationsPerSample());
+  Array<float> dw = device.array<float>(shape.parameters());
+  const MlpForward forward{shape, {n, {}}, inputMatrix(x), w, Matrix<float>(y, outputs), kept};
+  const MlpBackward backward{
+      shape, {n, {}}, inputMatrix(x), w, Matrix<float>(y, outputs), kept, Matrix<float>(dy, outputs),
+      {},    dw,      inputMatrix(dx)};
+  const double flops = 2 * weights(shape) * n, limit = recorder.limits().flops;
+  const std::string where = fmt::format("{}, {} samples", title, n);
+  recorder.measure(Operation::kMlpForward, {"MlpForward", where, flops, "FLOP", limit}, [&] { device.run(forward); });
+  recorder.measure(Operation::kMlpBackward, {"MlpBackward", where, 2 * flops, "FLOP", limit},
+                   [&] { device.run(backward); });
+  recorder.measure(Operation::kMlpBackward, {"Mlp both", where, 3 * flops, "FLOP", limit}, [&] {
+    device.run(forward);
+    device.run(backward);
+  });
+}
+
+void measureHashGrid(RooflineRecorder& recorder, const HashGrid& grid, const std::string& title,
+                     const std::vector<float>& points, double limit) {
+  Device& device = recorder.device();
+  const uint32_t n = static_cast<uint32_t>(points.size() / 3);
+  Array<float> positions = device.arrayOf(points);
+  Array<float> table = recorder.randomFloats(grid.parameters(), -1e-4f, 1e-4f);
+  Array<float> upstream = recorder.randomFloats(size_t{n} * grid.columns(), -1, 1);
+  Array<float> encoded = device.array<float>(size_t{n} * grid.columns()),
+               gradients = device.array<float>(grid.parameters());
+  const uint32_t features = static_cast<uint32_t>(grid.features);
+  const double lookups = 8.0 * static_cast<double>(grid.levels.size()) * n;
+  const std::string where = fmt::format("{} levels x {}, {}, {} samples", grid.levels.size(), features, title, n);
+  const HashGridForward forward{
+      grid, {n, {}}, positions, table, Matrix<float>::grouped(encoded, grid.columns(), features, n)};
+  const HashGridBackward backward{
+      grid, {n, {}}, positions, table, Matrix<float>::grouped(upstream, grid.columns(), features, n), gradients, {}};
+  recorder.measure(Operation::kHashGridForward, {"HashGridForward", where, lookups, "lookup", limit},
+                   [&] { device.run(forward); });
+  recorder.measure(Operation::kHashGridBackward, {"HashGridBackward", where, lookups, "lookup", limit},
+                   [&] { device.run(backward); });
+}
+
+// Lookups per second of a machine that does nothing but fetch, each level from a table of its size.
+double gatherLimit(const MachineLimits& limits, const HashGrid& grid) {
+  double seconds = 0;
+  for (const HashGridLevel& level : grid.levels) {
+    const size_t bytes = size_t{level.entries} * grid.features * sizeof(float);
+    for (const MachineLimits::Gather& gather : limits.gathers) {
+      if (gather.tableBytes == bytes) seconds += 1 / gather.lookups;
+    }
+  }
+  return seconds > 0 ? static_cast<double>(grid.levels.size()) / seconds : 0;
+}
+
+}  // namespace
+
+void measureNetworks(RooflineRecorder& recorder) {
+  for (const uint32_t n : recorder.options().samples) {
+    for (const int width : {16, 32, 64, 128}) {
+      const MlpShape shape{width, width, 2, width, OutputActivation::none};
+      measureNetwork(recorder, {shape, false}, fmt::format("{0}-{0}-{0}-{0}", width), n);
+    }
+    measureNetwork(recorder, {{32, 64, 1, 16, OutputActivation::none}, true}, "density 32-64-16", n);
+    measureNetwork(recorder, {{32, 64, 2, 3, OutputActivation::sigmoid}, false}, "colour 32-64-64-3", n);
+  }
+}
+
+void measureHashGrids(RooflineRecorder& recorder, const HashGrid& grid) {
+  const double limit = gatherLimit(recorder.limits(), grid);
+  for (const uint32_t n : recorder.options().samples) {
+    const Array<float> random = recorder.randomFloats(size_t{n} * 3, 0, 1);
+    measureHashGrid(recorder, grid, "random points", recorder.device().read(random.all()), limit);
+    measureHashGrid(recorder, grid, "points on rays", rayLikePositions(n / 32, 32, 1), limit);
+  }
+}
+
+}  // namespace tessera

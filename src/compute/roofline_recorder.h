@@ -1,0 +1,46 @@
+// What the parts of the roofline share: a device, its limits, and the rows so far.
+#pragma once
+
+#include <functional>
+
+#include "compute/roofline.h"
+
+namespace tessera {
+
+class RooflineRecorder {
+ public:
+  RooflineRecorder(Device& device, const RooflineOptions& options, const MachineLimits& limits)
+      : device_(device), options_(options), limits_(limits) {}
+
+  struct Work {
+    std::string name, shape;
+    double amount = 0;  // of one run
+    std::string unit;
+    double limit = 0;
+  };
+  // Times `run` and adds a row, unless the device lacks the operation.
+  void measure(Operation operation, Work work, const std::function<void()>& run);
+  // An operation that moves this many bytes.
+  void measureStream(Operation operation, std::string shape, double bytes, const std::function<void()>& run);
+
+  Device& device() { return device_; }
+  const RooflineOptions& options() const { return options_; }
+  const MachineLimits& limits() const { return limits_; }
+  std::vector<RooflineRow> takeRows() { return std::move(rows_); }
+
+  Array<float> randomFloats(size_t count, float low, float high);
+
+ private:
+  Device& device_;
+  const RooflineOptions& options_;
+  const MachineLimits& limits_;
+  std::vector<RooflineRow> rows_;
+  uint64_t arrays_ = 0;
+};
+
+void measureNetworks(RooflineRecorder& recorder);
+void measureHashGrids(RooflineRecorder& recorder, const HashGrid& grid);
+void measureSampleStreams(RooflineRecorder& recorder);     // encodings, marching, compaction, compositing
+void measureParameterStreams(RooflineRecorder& recorder);  // losses, exposure, occupancy, Adam
+
+}  // namespace tessera

@@ -1,0 +1,271 @@
+// The rows of the operations that touch each number once. `kLine` samples stand on a ray.
+
+#include <fmt/format.h>
+
+#include <numeric>
+
+#include "compute/roofline_recorder.h"
+
+namespace tessera {
+namespace {
+
+constexpr uint32_t kLine = 32;
+
+std::string shapeOf(double count, const char* what) {
+  return fmt::format("{:.0f} {}", count, what);
+}
+
+// Rays of kLine samples each, as marching would leave them.
+struct Lines {
+  uint32_t rays, samples;
+  Array<uint32_t> firstSample, rayOfSample;
+  Array<float> logDensity, steps, distances, colours, perRay;
+
+  Lines(RooflineRecorder& recorder, uint32_t count) : rays(count / kLine), samples(rays * kLine) {
+    std::vector<uint32_t> first(rays + 1), ray(samples);
+    std::vector<float> t(samples);
+    for (uint32_t r = 0; r <= rays; ++r) first[r] = r * kLine;
+    for (uint32_t s = 0; s < samples; ++s) {
+      ray[s] = s / kLine;
+      t[s] = 1 + 0.01f * static_cast<float>(s % kLine);
+    }
+    Device& device = recorder.device();
+    firstSample = device.arrayOf(first);
+    rayOfSample = device.arrayOf(ray);
+    distances = device.arrayOf(t);
+    steps = recorder.randomFloats(samples, 0.01f, 0.0101f);
+    logDensity = recorder.randomFloats(samples, -2, 2);  // thin: no ray ends before its last sample
+    colours = recorder.randomFloats(size_t{samples} * 3, 0, 1);
+    perRay = recorder.randomFloats(size_t{rays} * 3, -1, 1);
+  }
+};
+
+void measureEncodings(RooflineRecorder& recorder, Lines& lines) {
+  Device& device = recorder.device();
+  const double n = lines.samples, rays = lines.rays;
+  const std::string shape = fmt::format("degree 4, {}", shapeOf(n, "samples"));
+  Array<float> wide = recorder.randomFloats(size_t{lines.samples} * 27, -1, 1);
+  Array<float> narrow = recorder.randomFloats(size_t{lines.samples} * 3, -1, 1);
+  const Matrix<float> harmonics(wide, 16), waves(wide, 27);
+  recorder.measureStream(Operation::kSphericalHarmonicsForward, shape, n * (4 + 64) + rays * 12, [&] {
+    device.run(SphericalHarmonicsForward{4, {lines.samples, {}}, lines.perRay, lines.rayOfSample, harmonics});
+  });
+  recorder.measureStream(Operation::kSphericalHarmonicsBackward, shape, n * (4 + 64 + 12) + rays * 12, [&] {
+    device.run(SphericalHarmonicsBackward{4, {lines.samples, {}}, lines.perRay, lines.rayOfSample, harmonics, narrow});
+  });
+  const std::string frequencies = fmt::format("4 frequencies, {}", shapeOf(n, "samples"));
+  recorder.measureStream(Operation::kFrequencyForward, frequencies, n * (12 + 108), [&] {
+    device.run(FrequencyForward{3, 4, {lines.samples, {}}, lines.colours, waves});
+  });
+  recorder.measureStream(Operation::kFrequencyBackward, frequencies, n * (12 + 108 + 12), [&] {
+    device.run(FrequencyBackward{3, 4, {lines.samples, {}}, lines.colours, waves, narrow});
+  });
+}
+
+void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
+  Device& device = recorder.device();
+  const double n = lines.samples, rays = lines.rays;
+  const std::string shape = fmt::format("{}, {} a ray", shapeOf(n, "samples"), kLine);
+  Array<float> colour = device.array<float>(size_t{lines.rays} * 3), opacity = device.array<float>(lines.rays);
+  Array<float> depth = device.array<float>(lines.rays), weights = device.array<float>(lines.samples);
+  Array<float> dx = device.array<float>(lines.samples), dColours = device.array<float>(size_t{lines.samples} * 3);
+
+  CompositeForward forward;
+  forward.rays = {lines.rays, {}};
+  forward.firstSample = lines.firstSample;
+  forward.x = Matrix<float>(lines.logDensity, 1);
+  forward.steps = lines.steps;
+  forward.distances = lines.distances;
+  forward.colours = Matrix<float>(lines.colours, 3);
+  forward.background = lines.perRay;
+  forward.colour = colour;
+  forward.opacity = opacity;
+  forward.depth = depth;
+  forward.weights = weights;
+  recorder.measureStream(Operation::kCompositeForward, shape, n * 28 + rays * 36, [&] { device.run(forward); });
+
+  CompositeBackward backward;
+  backward.rays = forward.rays;
+  backward.firstSample = forward.firstSample;
+  backward.x = forward.x;
+  backward.steps = forward.steps;
+  backward.distances = forward.distances;
+  backward.colours = forward.colours;
+  backward.background = forward.background;
+  backward.rayColourGradients = lines.perRay;
+  backward.xGradients = dx;
+  backward.colourGradients = Matrix<float>(dColours, 3);
+  recorder.measureStream(Operation::kCompositeBackward, shape, n * (24 + 16) + rays * 28,
+                         [&] { device.run(backward); });
+
+  DistortionLoss distortion;
+  distortion.rays = forward.rays;
+  distortion.firstSample = lines.firstSample;
+  distortion.weights = weights;
+  distortion.distances = lines.distances;
+  distortion.steps = lines.steps;
+  distortion.loss = opacity.part(0, 1);
+  distortion.weightGradients = dx;
+  recorder.measureStream(Operation::kDistortionLoss, shape, n * 16 + rays * 4, [&] { device.run(distortion); });
+
+  Array<uint32_t> first = device.array<uint32_t>(lines.rays + 1), count = device.array<uint32_t>(1);
+  Array<uint32_t> source = device.array<uint32_t>(lines.samples);
+  recorder.measureStream(Operation::kCompactSamples, shape, n * 12 + rays * 8, [&] {
+    device.run(CompactSamples{{lines.rays, {}},
+                              lines.samples,
+                              1e-4f,
+                              lines.firstSample,
+                              Matrix<float>(lines.logDensity, 1),
+                              lines.steps,
+                              first,
+                              count,
+                              source});
+  });
+  if (!device.supports(Operation::kCompactSamples)) return;
+  Array<float> from = recorder.randomFloats(size_t{lines.samples} * 32, -1, 1);
+  Array<float> to = device.array<float>(size_t{lines.samples} * 32);
+  recorder.measureStream(Operation::kGatherRows, fmt::format("32 columns, {}", shapeOf(n, "samples")), n * (4 + 256),
+                         [&] {
+                           device.run(GatherRows{{lines.samples, {}},
+                                                 source,
+                                                 Matrix<float>::grouped(from, 32, 2, lines.samples),
+                                                 Matrix<float>::grouped(to, 32, 2, lines.samples)});
+                         });
+}
+
+// Cells of a hollow ball, a sixth of the region of interest across and two cells thick.
+std::vector<uint32_t> shellOccupancy(const MarchSpace& space) {
+  const int size = space.gridResolution;
+  std::vector<uint32_t> bits(static_cast<size_t>(size) * size * size / 32);
+  for (int z = 0; z < size; ++z) {
+    for (int y = 0; y < size; ++y) {
+      for (int x = 0; x < size; ++x) {
+        const auto centred = [&](int i) { return (i + 0.5f) / size - 0.5f; };
+        const float r2 = centred(x) * centred(x) + centred(y) * centred(y) + centred(z) * centred(z);
+        const size_t cell = x + static_cast<size_t>(size) * (y + static_cast<size_t>(size) * z);
+        if (r2 > 0.18f * 0.18f && r2 < 0.2f * 0.2f) bits[cell / 32] |= 1u << cell % 32;
+      }
+    }
+  }
+  return bits;
+}
+
+void measureRays(RooflineRecorder& recorder, uint32_t capacity) {
+  Device& device = recorder.device();
+  const uint32_t rays = capacity / kLine;
+  std::vector<RayCamera> cameras(1);
+  cameras[0].parameters[0] = cameras[0].parameters[1] = 500;
+  cameras[0].parameters[2] = cameras[0].parameters[3] = 256;
+  for (const int i : {0, 4, 8}) cameras[0].rotation[i] = 1;
+  Array<RayCamera> camera = device.arrayOf(cameras);
+  Array<uint32_t> cameraOfRay = device.array<uint32_t>(rays);
+  Array<float> pixels = recorder.randomFloats(size_t{rays} * 2, 0, 512);
+  Array<float> origins = device.array<float>(size_t{rays} * 3), directions = device.array<float>(size_t{rays} * 3);
+  recorder.measureStream(Operation::kGenerateRays, shapeOf(rays, "rays"), rays * 36.0, [&] {
+    device.run(GenerateRays{{rays, {}}, camera, cameraOfRay, pixels, origins, directions});
+  });
+  if (!device.supports(Operation::kMarchRays)) return;
+
+  const MarchSpace space;
+  Array<uint32_t> occupancy = device.arrayOf(shellOccupancy(space));
+  Array<uint32_t> first = device.array<uint32_t>(rays + 1), counters = device.array<uint32_t>(2);
+  Array<uint32_t> rayOfSample = device.array<uint32_t>(capacity);
+  Array<float> positions = device.array<float>(size_t{capacity} * 3), distances = device.array<float>(capacity);
+  Array<float> steps = device.array<float>(capacity), jitter = recorder.randomFloats(rays, 0, 1);
+  const MarchRays march{space,
+                        {rays, {}},
+                        capacity,
+                        origins,
+                        directions,
+                        jitter,
+                        {},
+                        occupancy,
+                        first,
+                        counters.part(0, 1),
+                        counters.part(1, 1),
+                        rayOfSample,
+                        positions,
+                        distances,
+                        steps};
+  device.run(march);
+  const uint32_t made = device.read(counters.all())[0];
+  recorder.measureStream(Operation::kMarchRays, fmt::format("{} rays, {} samples", rays, made),
+                         made * 24.0 + rays * 32.0, [&] { device.run(march); });
+}
+
+void measureLosses(RooflineRecorder& recorder, uint32_t rays) {
+  Device& device = recorder.device();
+  const std::string shape = shapeOf(rays, "rays");
+  Array<float> predicted = recorder.randomFloats(size_t{rays} * 3, 0, 1),
+               target = recorder.randomFloats(size_t{rays} * 3, 0, 1);
+  Array<float> weights = recorder.randomFloats(rays, 1, 1), loss = device.array<float>(2);
+  Array<float> out = device.array<float>(size_t{rays} * 3), gains = device.array<float>(300),
+               gainGradients = device.array<float>(300);
+  std::vector<uint32_t> photos(rays);
+  for (uint32_t r = 0; r < rays; ++r) photos[r] = r % 100;
+  Array<uint32_t> photoOfRay = device.arrayOf(photos);
+  recorder.measureStream(Operation::kColourLoss, shape, rays * 40.0, [&] {
+    device.run(ColourLoss{ColourLossKind::huber, 0.1f, 1, {rays, {}}, predicted, target, weights, loss, out});
+  });
+  recorder.measureStream(Operation::kExposureForward, shape, rays * 28.0, [&] {
+    device.run(ExposureForward{{rays, {}}, predicted, photoOfRay, gains, out});
+  });
+  recorder.measureStream(Operation::kExposureBackward, shape, rays * 40.0, [&] {
+    device.run(ExposureBackward{{rays, {}}, predicted, photoOfRay, gains, target, out, gainGradients});
+  });
+}
+
+void measureOccupancy(RooflineRecorder& recorder) {
+  Device& device = recorder.device();
+  const MarchSpace space;
+  const uint32_t cells = static_cast<uint32_t>(space.gridResolution) * space.gridResolution * space.gridResolution;
+  const uint32_t half = cells / 8, points = 2 * half;
+  Array<uint32_t> occupancy = device.arrayOf(shellOccupancy(space)), chosen = device.array<uint32_t>(points);
+  Array<float> positions = device.array<float>(size_t{points} * 3), grid = recorder.randomFloats(cells, 0, 0.02f);
+  Array<float> logDensity = recorder.randomFloats(points, -2, 2);
+  recorder.measureStream(Operation::kOccupancyPoints, shapeOf(points, "points"), points * 16.0, [&] {
+    device.run(OccupancyPoints{space, half, half, 1, occupancy, chosen, positions});
+  });
+  recorder.measureStream(
+      Operation::kOccupancyUpdate, fmt::format("{} cells, {} points", cells, points), cells * 8.125 + points * 8.0,
+      [&] {
+        device.run(OccupancyUpdate{space, points, 0.95f, 0.01f, chosen, Matrix<float>(logDensity, 1), grid, occupancy});
+      });
+}
+
+void measureAdam(RooflineRecorder& recorder, size_t n) {
+  Device& device = recorder.device();
+  Array<float> values = recorder.randomFloats(n, -1, 1), gradients = recorder.randomFloats(n, -1, 1);
+  Array<float> first = recorder.randomFloats(n, -1, 1), second = recorder.randomFloats(n, 0.5f, 1);
+  Array<uint32_t> counts = device.array<uint32_t>(n);
+  Adam adam;
+  adam.rate = 1e-6f;
+  adam.l2 = 1e-3f;  // keeps moments from fading into denormal numbers although gradients are zero after the first run
+  adam.parameters = values;
+  adam.gradients = gradients;
+  adam.firstMoments = first;
+  adam.secondMoments = second;
+  adam.counts = counts;
+  recorder.measureStream(Operation::kAdam, fmt::format("all of {} parameters", n), n * 40.0, [&] { device.run(adam); });
+  adam.skipZeroGradients = true;
+  adam.l2 = 0;
+  recorder.measureStream(Operation::kAdam, fmt::format("none of {}: zero gradients", n), n * 4.0,
+                         [&] { device.run(adam); });
+}
+
+}  // namespace
+
+void measureSampleStreams(RooflineRecorder& recorder) {
+  Lines lines(recorder, recorder.options().streamed);
+  measureEncodings(recorder, lines);
+  measureCompositing(recorder, lines);
+  measureRays(recorder, recorder.options().streamed);
+}
+
+void measureParameterStreams(RooflineRecorder& recorder) {
+  measureLosses(recorder, recorder.options().streamed);
+  measureOccupancy(recorder);
+  measureAdam(recorder, size_t{recorder.options().streamed} * 4);
+}
+
+}  // namespace tessera
