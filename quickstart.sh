@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# From a clean Debian 12 to a measured picture: installs packages, builds, makes a small city, trains a radiance field on
+# it and judges it on photos that it has not seen. Run again, it goes on where it was.
+#   ./quickstart.sh [--no-serve]      --no-serve stops before anything is shown in a browser (there is no viewer yet)
+set -euo pipefail
+cd "$(dirname "$0")"
+for argument in "$@"; do
+  [ "$argument" = --no-serve ] || { echo "usage: $0 [--no-serve]" >&2; exit 2; }
+done
+
+tools/install-debian-packages.sh
+tools/build.sh release tessera
+
+tessera=build/release/apps/tessera/tessera
+out=out/quickstart
+begin=$SECONDS
+"$tessera" synth city "$out/city" --blocks 2x2 --size 320x240 --samples 4
+if [ ! -e "$out/model/plan.json" ]; then rm -rf "$out/model"; fi
+"$tessera" train "$out/city" "$out/model" --method field --minutes 3 --resume
+"$tessera" eval "$out/model" "$out/city" --json "$out/result.json" --images "$out/images"
+echo
+echo "held-out views: $(grep -o '"psnr": *[0-9.]*' "$out/result.json" | head -1 | grep -o '[0-9.]*$') dB PSNR, after $((SECONDS - begin)) s"
+echo "report:         $PWD/$out/model/report.html"
+echo "pictures:       $PWD/$out/images"

@@ -1,0 +1,9 @@
+#!/usr/bin/env bash
+# Builds and runs every test. Tests of real photographs skip by name unless TESSERA_SHARED_DATA names their folder.
+#   ./test.sh [PRESET]      release (default), dev, asan or tsan
+set -euo pipefail
+cd "$(dirname "$0")"
+preset=${1:-release}
+tools/install-debian-packages.sh
+tools/build.sh "$preset"
+ctest --preset "$preset" --parallel "$(nproc)" --output-on-failure
