@@ -45,8 +45,11 @@ std::string nearest(const std::vector<ConfigField>& fields, std::string_view nam
 
 template <class T>
 bool parseNumber(std::string_view text, T* value) {
-  const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), *value);
-  return status == std::errc() && end == text.data() + text.size();
+  T parsed{};
+  const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), parsed);
+  if (status != std::errc() || end != text.data() + text.size()) return false;
+  *value = parsed;
+  return true;
 }
 
 bool assign(const ConfigField& field, std::string_view text) {
@@ -130,6 +133,7 @@ void configFromToml(const std::vector<ConfigField>& fields, const fs::path& path
     const bool read = std::visit(
         [&node = node](auto* value) {
           using T = std::remove_pointer_t<decltype(value)>;
+          if (node.is_boolean() != std::is_same_v<T, bool>) return false;  // toml++ would take one for the other
           const auto found = node.template value<T>();
           if (found) *value = *found;
           return found.has_value();
