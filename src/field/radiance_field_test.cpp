@@ -1,0 +1,212 @@
+#include "field/radiance_field.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "base/random.h"
+
+namespace tessera {
+namespace {
+
+RadianceFieldShape tinyShape() {
+  HashGridOptions grid;
+  grid.levels = 3;
+  grid.features = 2;
+  grid.log2TableSize = 7;  // the finest level is hashed
+  grid.baseResolution = 3;
+  grid.finestResolution = 12;
+  return makeRadianceFieldShape(grid, 16, 1, 2);
+}
+
+constexpr uint32_t kCapacity = 24, kSamples = 21, kRays = 4;
+
+// A field on a device, samples to look at, and the scalar Σ a · logDensity + Σ b · colour of what it answers.
+struct Scene {
+  std::unique_ptr<Device> device;
+  RadianceField field;
+  Array<float> positions, directions;
+  Array<uint32_t> rayOfSample, count;
+  std::vector<float> densityFactors, colourFactors;
+
+  explicit Scene(const std::string& kind, uint64_t seed = 1, int threads = 1)
+      : device(makeDevice({kind, threads})), field(*device, tinyShape(), seed) {
+    const RandomStream random(7, 7);
+    uint64_t next = 0;
+    std::vector<float> at, along;
+    std::vector<uint32_t> rays;
+    for (uint32_t i = 0; i < kCapacity; ++i) {
+      for (int axis = 0; axis < 3; ++axis) at.push_back(random.uniform(next++));
+      rays.push_back(i * kRays / kCapacity);
+      densityFactors.push_back(2 * random.uniform(next++) - 1);
+      for (int channel = 0; channel < 3; ++channel) colourFactors.push_back(2 * random.uniform(next++) - 1);
+    }
+    for (uint32_t ray = 0; ray < kRays; ++ray) {
+      const float angle = 6 * random.uniform(next++), z = 1.8f * random.uniform(next++) - 0.9f;
+      const float across = std::sqrt(1 - z * z);
+      along.insert(along.end(), {across * std::cos(angle), across * std::sin(angle), z});
+    }
+    positions = device->arrayOf(at);
+    directions = device->arrayOf(along);
+    rayOfSample = device->arrayOf(rays);
+    count = device->arrayOf(std::vector<uint32_t>{kSamples});
+    field.reserve(kCapacity);
+    // Tables begin so near zero that nothing would be seen of them.
+    std::vector<float> table = device->read(field.table().values.all());
+    for (size_t i = 0; i < table.size(); ++i) table[i] = 2 * random.uniform(1000 + i) - 1;
+    device->write(field.table().values.all(), std::span<const float>(table));
+  }
+
+  Count samples() const { return {kCapacity, count}; }
+
+  struct Answer {
+    std::vector<float> logDensity, colours;
+  };
+  Answer forward() {
+    const RadianceField::Output output = field.forward(samples(), positions, directions, rayOfSample, true);
+    Answer answer;
+    const std::vector<float> density = device->read(output.logDensity.data), colour = device->read(output.colours.data);
+    for (uint32_t i = 0; i < kSamples; ++i) {
+      answer.logDensity.push_back(density[output.logDensity.offset(i, 0)]);
+      for (int k = 0; k < 3; ++k) answer.colours.push_back(colour[output.colours.offset(i, k)]);
+    }
+    return answer;
+  }
+  double scalar() {
+    const Answer answer = forward();
+    double sum = 0;
+    for (size_t i = 0; i < answer.logDensity.size(); ++i) sum += double{densityFactors[i]} * answer.logDensity[i];
+    for (size_t i = 0; i < answer.colours.size(); ++i) sum += double{colourFactors[i]} * answer.colours[i];
+    return sum;
+  }
+  void backward() {
+    const Array<float> density = device->arrayOf(densityFactors), colour = device->arrayOf(colourFactors);
+    field.backward(samples(), positions, density, Matrix<const float>(colour.all(), 3));
+  }
+  std::vector<ParameterGroup*> groups() { return {&field.table(), &field.densityNetwork(), &field.colourNetwork()}; }
+};
+
+double largest(const std::vector<float>& values) {
+  double most = 0;
+  for (const float value : values) most = std::max(most, std::abs(double{value}));
+  return most;
+}
+
+double largestDifference(const std::vector<float>& a, const std::vector<float>& b) {
+  EXPECT_EQ(a.size(), b.size());
+  double most = 0;
+  for (size_t i = 0; i < a.size(); ++i) most = std::max(most, std::abs(double{a[i]} - b[i]));
+  return most;
+}
+
+TEST(RadianceField, GradientsOfAllParametersAgreeWithFiniteDifferences) {
+  Scene scene("reference");
+  scene.forward();
+  scene.backward();
+  for (ParameterGroup* group : scene.groups()) {
+    const std::vector<float> gradients = scene.device->read(group->gradients.all());
+    const std::vector<float> values = scene.device->read(group->values.all());
+    const double scale = largest(gradients);
+    ASSERT_GT(scale, 1e-3) << group->name;
+    // The largest ones, and some from everywhere.
+    std::vector<size_t> chosen(values.size());
+    std::iota(chosen.begin(), chosen.end(), size_t{0});
+    std::sort(chosen.begin(), chosen.end(),
+              [&](size_t a, size_t b) { return std::abs(gradients[a]) > std::abs(gradients[b]); });
+    std::vector<size_t> some(chosen.begin(), chosen.begin() + 20);
+    for (size_t i = 20; i < chosen.size(); i += chosen.size() / 20) some.push_back(chosen[i]);
+    for (const size_t i : some) {
+      constexpr float kStep = 1e-3f;
+      const auto at = [&](float value) {
+        scene.device->write(group->values.part(i, 1), std::span<const float>(&value, 1));
+        return scene.scalar();
+      };
+      const double slope = (at(values[i] + kStep) - at(values[i] - kStep)) / (2 * kStep);
+      at(values[i]);
+      EXPECT_NEAR(gradients[i], slope, 0.01 * scale) << group->name << " " << i;
+    }
+  }
+}
+
+TEST(RadianceField, AddsToGradientsThatAreThere) {
+  Scene scene("reference");
+  scene.forward();
+  scene.backward();
+  std::vector<std::vector<float>> once;
+  for (ParameterGroup* group : scene.groups()) once.push_back(scene.device->read(group->gradients.all()));
+  scene.backward();
+  for (size_t g = 0; g < once.size(); ++g) {
+    std::vector<float> twice = scene.device->read(scene.groups()[g]->gradients.all());
+    for (float& value : twice) value /= 2;
+    EXPECT_LE(largestDifference(once[g], twice), 1e-6 * largest(once[g])) << scene.groups()[g]->name;
+  }
+}
+
+TEST(RadianceField, CpuAgreesWithTheReference) {
+  Scene reference("reference"), cpu("cpu");
+  const Scene::Answer expected = reference.forward(), answer = cpu.forward();
+  ASSERT_GT(largest(expected.logDensity), 0.1);
+  EXPECT_LE(largestDifference(expected.logDensity, answer.logDensity), 1e-4 * largest(expected.logDensity));
+  EXPECT_LE(largestDifference(expected.colours, answer.colours), 1e-4);
+  reference.backward();
+  cpu.backward();
+  for (size_t g = 0; g < reference.groups().size(); ++g) {
+    const std::vector<float> wanted = reference.device->read(reference.groups()[g]->gradients.all());
+    const std::vector<float> found = cpu.device->read(cpu.groups()[g]->gradients.all());
+    EXPECT_LE(largestDifference(wanted, found), 1e-4 * largest(wanted)) << reference.groups()[g]->name;
+  }
+}
+
+TEST(RadianceField, DensityAloneIsTheDensityOfBothNetworksTogether) {
+  Scene scene("cpu");
+  const std::vector<float> together = scene.forward().logDensity;
+  const Matrix<const float> alone = scene.field.logDensity(scene.samples(), scene.positions);
+  const std::vector<float> values = scene.device->read(alone.data);
+  for (uint32_t i = 0; i < kSamples; ++i) EXPECT_EQ(values[alone.offset(i, 0)], together[i]);
+}
+
+TEST(RadianceField, ColourTurnsWithTheViewAndDensityDoesNot) {
+  Scene scene("reference");
+  const Scene::Answer before = scene.forward();
+  std::vector<float> directions = scene.device->read(scene.directions.all());
+  for (float& value : directions) value = -value;
+  scene.device->write(scene.directions.all(), std::span<const float>(directions));
+  const Scene::Answer after = scene.forward();
+  EXPECT_EQ(before.logDensity, after.logDensity);
+  EXPECT_GT(largestDifference(before.colours, after.colours), 1e-3);
+}
+
+TEST(RadianceField, SamplesBeyondTheCounterTeachNothing) {
+  Scene one("cpu"), other("cpu");
+  std::vector<float> positions = other.device->read(other.positions.all());
+  for (size_t i = size_t{kSamples} * 3; i < positions.size(); ++i) positions[i] = 0.25f;
+  other.device->write(other.positions.all(), std::span<const float>(positions));
+  for (Scene* scene : {&one, &other}) {
+    scene->forward();
+    scene->backward();
+  }
+  for (size_t g = 0; g < one.groups().size(); ++g) {
+    EXPECT_EQ(one.device->read(one.groups()[g]->gradients.all()),
+              other.device->read(other.groups()[g]->gradients.all()));
+  }
+}
+
+TEST(RadianceField, BeginsWithTheSameParametersForTheSameSeedOnly) {
+  const std::unique_ptr<Device> cpu = makeDevice({"cpu", 2}), reference = makeDevice({"reference", 0});
+  RadianceField first(*cpu, tinyShape(), 5), again(*reference, tinyShape(), 5), other(*cpu, tinyShape(), 6);
+  const auto groups = [](RadianceField& field) {
+    return std::vector{&field.table(), &field.densityNetwork(), &field.colourNetwork()};
+  };
+  for (int g = 0; g < 3; ++g) {
+    const std::vector<float> values = cpu->read(groups(first)[g]->values.all());
+    EXPECT_EQ(values, reference->read(groups(again)[g]->values.all()));
+    EXPECT_NE(values, cpu->read(groups(other)[g]->values.all()));
+    EXPECT_GT(largest(values), 0);
+  }
+  EXPECT_LE(largest(cpu->read(first.table().values.all())), 1e-4);
+}
+
+}  // namespace
+}  // namespace tessera
