@@ -110,16 +110,33 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
 
   Array<uint32_t> first = device.array<uint32_t>(lines.rays + 1), count = device.array<uint32_t>(1);
   Array<uint32_t> source = device.array<uint32_t>(lines.samples);
+  const std::vector<uint32_t> half(lines.rays, kLine / 2);
+  Array<uint32_t> lookedAt = device.arrayOf(half);
+  SelectSamples select;
+  select.rays = {lines.rays, {}};
+  select.sampleCapacity = select.selectedCapacity = lines.samples;
+  select.most = kLine / 2;
+  select.firstSample = lines.firstSample;
+  select.logDensity = Matrix<float>(lines.logDensity, 1);
+  select.steps = lines.steps;
+  select.lookedAt = lookedAt;
+  select.selected = source;
+  select.selectedCount = count;
+  recorder.measureStream(Operation::kSelectSamples, shape + ", the second half of each", n * (4 + 2) + rays * 16, [&] {
+    device.write(lookedAt.all(), std::span(half));
+    device.run(select);
+  });
   recorder.measureStream(Operation::kCompactSamples, shape, n * 12 + rays * 8, [&] {
-    device.run(CompactSamples{{lines.rays, {}},
-                              lines.samples,
-                              1e-4f,
-                              lines.firstSample,
-                              Matrix<float>(lines.logDensity, 1),
-                              lines.steps,
-                              first,
-                              count,
-                              source});
+    CompactSamples compact;
+    compact.rays = {lines.rays, {}};
+    compact.sampleCapacity = compact.keptCapacity = lines.samples;
+    compact.firstSample = lines.firstSample;
+    compact.logDensity = Matrix<float>(lines.logDensity, 1);
+    compact.steps = lines.steps;
+    compact.keptFirstSample = first;
+    compact.keptCount = count;
+    compact.source = source;
+    device.run(compact);
   });
   if (!device.supports(Operation::kCompactSamples)) return;
   Array<float> from = recorder.randomFloats(size_t{lines.samples} * 32, -1, 1);
@@ -131,6 +148,10 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
                                                  Matrix<float>::grouped(from, 32, 2, lines.samples),
                                                  Matrix<float>::grouped(to, 32, 2, lines.samples)});
                          });
+  recorder.measureStream(
+      Operation::kScatterRows, fmt::format("32 columns, {}", shapeOf(n, "samples")), n * (4 + 256), [&] {
+        device.run(ScatterRows{{lines.samples, {}}, source, Matrix<float>(from, 32), Matrix<float>(to, 32)});
+      });
 }
 
 // Cells of a hollow ball, a sixth of the region of interest across and two cells thick.
