@@ -25,7 +25,7 @@ struct OccupancyPoints {
 // ‖x‖∞ = 1 / (2 - ‖y‖∞) where the contracted centre y has ‖y‖∞ > 1. (Contracted space fills only half of its grid: cells
 // with two coordinates beyond 1 hold no point of the scene. Marking them negative spares their evaluation.)
 // Negative cells are never visible and stay as they are in both. Then
-// bit = grid > min(threshold, mean over all cells of max(grid, 0)).
+// bit = grid > min(threshold, mean over the cells that are not negative).
 struct OccupancyUpdate {
   const MarchSpace& space;
   uint32_t points = 0;

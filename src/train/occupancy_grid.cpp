@@ -13,6 +13,18 @@ OccupancyGrid::OccupancyGrid(Device& device, const MarchSpace& space)
       grid_(device.array<float>(cells_)),
       bits_(device.arrayOf(std::vector<uint32_t>(cells_ / 32, ~0u))) {}
 
+void OccupancyGrid::exclude(const std::vector<bool>& visible) {
+  CHECK(visible.size() == cells_);
+  std::vector<float> values = this->values();
+  std::vector<uint32_t> bits = bitWords();
+  for (uint32_t cell = 0; cell < cells_; ++cell) {
+    if (visible[cell]) continue;
+    values[cell] = -1;
+    bits[cell / 32] &= ~(1u << (cell % 32));
+  }
+  restore(values, bits);
+}
+
 void OccupancyGrid::update(const LogDensity& logDensity, uint32_t uniform, uint32_t occupied, uint64_t seed,
                            uint32_t chunk) {
   const uint32_t points = uniform + occupied;

@@ -9,8 +9,9 @@ namespace tessera {
 
 class OccupancyGrid {
  public:
-  // Every cell starts occupied.
+  // Every cell starts occupied, but those that `visible` says no (see visibleCells): they stay empty for good.
   OccupancyGrid(Device& device, const MarchSpace& space);
+  void exclude(const std::vector<bool>& visible);
 
   // Log density at `count` positions ([count][3], grid coordinates); 1 column, valid until the next call.
   using LogDensity = std::function<Matrix<const float>(Count count, Slice<const float> positions)>;

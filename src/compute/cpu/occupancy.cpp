@@ -77,17 +77,22 @@ void run(Context& context, const OccupancyUpdate& a) {
         std::max(value, std::exp(std::min(logDensity[a.logDensity.offset(p, 0)], 15.0f)) * stepAt(a.space, chosen[p]));
   }
   const size_t tasks = (cells + kGrain - 1) / kGrain;
-  std::vector<double> sums(tasks);
+  std::vector<double> sums(tasks), counts(tasks);
   context.pool.run(tasks, [&](size_t task, int) {
-    double sum = 0;
+    double sum = 0, count = 0;
     for (size_t i = task * kGrain; i < std::min<size_t>(cells, (task + 1) * kGrain); ++i) {
       sum += std::max(grid[i], 0.0f);
+      count += grid[i] >= 0;
     }
     sums[task] = sum;
+    counts[task] = count;
   });
-  double sum = 0;
-  for (const double part : sums) sum += part;
-  const float threshold = std::min(a.threshold, static_cast<float>(sum / cells));
+  double sum = 0, count = 0;
+  for (size_t task = 0; task < tasks; ++task) {
+    sum += sums[task];
+    count += counts[task];
+  }
+  const float threshold = std::min(a.threshold, static_cast<float>(sum / std::max(count, 1.0)));
   context.pool.forRanges(cells / 32, kGrain / 32, [&](size_t begin, size_t end) {
     for (size_t word = begin; word < end; ++word) {
       uint32_t value = 0;

@@ -59,9 +59,13 @@ void occupancyUpdate(const MarchSpace& space, double decay, double threshold, In
     double& value = grid[cells[i]];
     if (value >= 0) value = std::max(value, std::exp(std::min(logDensity[i], 15.0)) * marchStepAtCell(space, cells[i]));
   }
-  double mean = 0;
-  for (double value : grid) mean += std::max(value, 0.0);
-  const double limit = std::min(threshold, mean / grid.size());
+  double sum = 0, count = 0;
+  for (double value : grid) {
+    if (value < 0) continue;
+    sum += value;
+    ++count;
+  }
+  const double limit = std::min(threshold, sum / std::max(count, 1.0));
   std::fill(occupancy.begin(), occupancy.end(), 0u);
   for (size_t cell = 0; cell < grid.size(); ++cell)
     if (grid[cell] > limit) occupancy[cell / 32] |= 1u << cell % 32;

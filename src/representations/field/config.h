@@ -15,7 +15,7 @@ struct FieldConfig {
   int width = 64, densityHidden = 1, colourHidden = 2;
   // Marching
   int occupancyResolution = 128;
-  double near = 0.05, far = 64, minStep = 0.00338, cone = 0.00390625;
+  double near = 0.05, far = 64, minStep = 0.01, cone = 0.0078125;
   // Batches
   int64_t seed = 0;
   int samplesPerStep = 1 << 16;
@@ -24,11 +24,11 @@ struct FieldConfig {
   int stepsPerPhoto = 2;
   // Occupancy
   int occupancyEvery = 16, occupancyWarmUp = 256;
-  double occupancyShare = 0.125;
+  double occupancyShare = 0.0625;
   // Optimiser
   double rate = 1e-2, finalRateFactor = 0.03, constantRateShare = 0.4, networkL2 = 1e-6, exposureRate = 1e-3;
   // Losses
-  std::string loss = "huber";
+  std::string loss = "mse";
   double lossParameter = 0.1, distortion = 0.01;
   bool exposure = true, randomBackground = true;
 

@@ -7,7 +7,7 @@ namespace tessera {
 namespace {
 
 // Samples of a ray that are looked up before asking whether it is opaque: few at first, for most rays end early.
-constexpr uint32_t kStages[] = {16, 16, 32, 64, 1u << 30};
+constexpr uint32_t kStages[] = {16, 16, 32, 32, 64, 64, 128, 1u << 30};
 
 }  // namespace
 

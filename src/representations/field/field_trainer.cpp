@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/random.h"
 #include "train/schedule.h"
+#include "train/visible_cells.h"
 
 namespace tessera {
 namespace {
@@ -51,6 +52,7 @@ FieldTrainer::FieldTrainer(Device& device, const Capture& capture, const FieldCo
       cameras_(device.arrayOf(rayCameras(capture, frame))),
       exposures_(device, "exposures", std::vector<float>(capture.photos.size() * 3)) {
   lossKind(config.loss);
+  model_.occupancy().exclude(visibleCells(capture, frame, model_.space()));
   const uint32_t rays = static_cast<uint32_t>(config.mostRays);
   const uint32_t samples = static_cast<uint32_t>(config.samplesPerStep) * kKeptPerWanted;
   marched_ = RaySamples(device, rays, static_cast<uint32_t>(config.samplesPerStep) * kMarchedPerWanted);

@@ -1,0 +1,113 @@
+#include "train/occupancy_grid.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace tessera {
+namespace {
+
+constexpr int kResolution = 8;
+constexpr uint32_t kCells = kResolution * kResolution * kResolution;
+
+MarchSpace boundedSpace() {
+  MarchSpace space;
+  space.contracted = false;
+  space.gridResolution = kResolution;
+  space.minStep = 0.01f;
+  return space;
+}
+
+// Dense where the first coordinate is below a half, and empty elsewhere.
+class HalfFull {
+ public:
+  explicit HalfFull(Device& device) : device_(device), answer_(device.array<float>(1 << 16)) {}
+
+  Matrix<const float> operator()(Count count, Slice<const float> positions) {
+    const std::vector<float> at = device_.read(positions);
+    std::vector<float> answer(count.capacity);
+    for (uint32_t i = 0; i < count.capacity; ++i) answer[i] = at[3 * size_t{i}] < 0.5f ? 6.0f : -20.0f;
+    device_.write(answer_.all(), std::span<const float>(answer));
+    largestChunk = std::max(largestChunk, count.capacity);
+    asked += count.capacity;
+    return Matrix<const float>(answer_.all(), 1);
+  }
+
+  uint32_t largestChunk = 0, asked = 0;
+
+ private:
+  Device& device_;
+  Array<float> answer_;
+};
+
+int wrongCells(OccupancyGrid& grid) {
+  const std::vector<uint32_t> bits = grid.bitWords();
+  int wrong = 0;
+  for (uint32_t cell = 0; cell < kCells; ++cell) {
+    const bool set = bits[cell / 32] >> (cell % 32) & 1;
+    wrong += set != (cell % kResolution < kResolution / 2);
+  }
+  return wrong;
+}
+
+TEST(OccupancyGrid, BeginsFull) {
+  const std::unique_ptr<Device> device = makeDevice({"reference", 0});
+  OccupancyGrid grid(*device, boundedSpace());
+  EXPECT_EQ(grid.cells(), kCells);
+  EXPECT_EQ(grid.occupiedFraction(), 1);
+}
+
+TEST(OccupancyGrid, LearnsFromAllCellsWhereTheFieldIsDense) {
+  for (const char* kind : {"reference", "cpu"}) {
+    const std::unique_ptr<Device> device = makeDevice({kind, 2});
+    OccupancyGrid grid(*device, boundedSpace());
+    HalfFull field(*device);
+    grid.update(std::ref(field), kCells, 0, 1, 100);  // chunks that do not divide the cells
+    EXPECT_EQ(wrongCells(grid), 0) << kind;
+    EXPECT_EQ(grid.occupiedFraction(), 0.5);
+    EXPECT_EQ(field.asked, kCells);
+    EXPECT_EQ(field.largestChunk, 100u);
+  }
+}
+
+TEST(OccupancyGrid, LearnsFromAShareOfTheCellsInTime) {
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  OccupancyGrid grid(*device, boundedSpace());
+  HalfFull field(*device);
+  grid.update(std::ref(field), kCells / 8, kCells / 8, 0, 1 << 16);
+  EXPECT_EQ(field.asked, kCells / 4);
+  for (uint64_t update = 1; update < 60; ++update) {
+    grid.update(std::ref(field), kCells / 8, kCells / 8, update, 1 << 16);
+  }
+  EXPECT_EQ(wrongCells(grid), 0);
+}
+
+TEST(OccupancyGrid, ForgetsWhatHasBecomeEmpty) {
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  OccupancyGrid grid(*device, boundedSpace());
+  HalfFull field(*device);
+  grid.update(std::ref(field), kCells, 0, 0, 1 << 16);
+  ASSERT_EQ(grid.occupiedFraction(), 0.5);
+  const Array<float> empty = device->arrayOf(std::vector<float>(kCells, -20.0f));
+  for (uint64_t update = 1; update < 200; ++update) {
+    grid.update([&](Count, Slice<const float>) { return Matrix<const float>(empty.all(), 1); }, kCells, 0, update,
+                1 << 16);
+  }
+  const std::vector<float> values = grid.values();
+  for (const float value : values) EXPECT_LT(value, 0.01f);
+}
+
+TEST(OccupancyGrid, ComesBackAsItWas) {
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  OccupancyGrid grid(*device, boundedSpace()), restored(*device, boundedSpace());
+  HalfFull field(*device);
+  grid.update(std::ref(field), kCells, 0, 1, 1 << 16);
+  restored.restore(grid.values(), grid.bitWords());
+  EXPECT_EQ(restored.values(), grid.values());
+  EXPECT_EQ(restored.bitWords(), grid.bitWords());
+  for (OccupancyGrid* each : {&grid, &restored}) each->update(std::ref(field), 64, 64, 9, 1 << 16);
+  EXPECT_EQ(restored.values(), grid.values());
+}
+
+}  // namespace
+}  // namespace tessera

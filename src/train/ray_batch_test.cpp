@@ -1,0 +1,130 @@
+#include "train/ray_batch.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+namespace tessera {
+namespace {
+
+PhotoWindow::Entry entry(int photo, ImageU8 image, ImageU8 mask = {}) {
+  auto decoded = std::make_shared<DecodedPhoto>();
+  decoded->image = std::move(image);
+  decoded->mask = std::move(mask);
+  return {photo, decoded};
+}
+
+// Each pixel says where it lies: red = 16 x, green = 16 y, blue = photo.
+ImageU8 addressed(int width, int height, int photo, int channels = 3, uint8_t alpha = 255) {
+  ImageU8 image(width, height, channels);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      uint8_t* pixel = image.at(x, y);
+      pixel[0] = static_cast<uint8_t>(16 * x);
+      pixel[1] = static_cast<uint8_t>(16 * y);
+      pixel[2] = static_cast<uint8_t>(photo);
+      if (channels == 4) pixel[3] = alpha;
+    }
+  }
+  return image;
+}
+
+std::vector<PhotoWindow::Entry> twoPhotos() {
+  return {entry(4, addressed(7, 5, 4)), entry(9, addressed(5, 9, 9))};
+}
+
+RayBatch draw(const std::vector<PhotoWindow::Entry>& window, uint64_t seed, int64_t step, uint32_t rays = 2000) {
+  RayBatch batch;
+  drawRays(window, seed, step, rays, true, batch);
+  return batch;
+}
+
+TEST(RayBatch, IsAFunctionOfSeedAndStep) {
+  const RayBatch first = draw(twoPhotos(), 1, 7), again = draw(twoPhotos(), 1, 7);
+  EXPECT_EQ(first.pixels, again.pixels);
+  EXPECT_EQ(first.photoOfRay, again.photoOfRay);
+  EXPECT_EQ(first.jitter, again.jitter);
+  EXPECT_EQ(first.backgrounds, again.backgrounds);
+  EXPECT_NE(first.pixels, draw(twoPhotos(), 1, 8).pixels);
+  EXPECT_NE(first.pixels, draw(twoPhotos(), 2, 7).pixels);
+}
+
+TEST(RayBatch, BeginsWithTheSameRaysHoweverManyAreWanted) {
+  const RayBatch many = draw(twoPhotos(), 1, 7), few = draw(twoPhotos(), 1, 7, 50);
+  ASSERT_EQ(few.pixels.size(), 100u);
+  EXPECT_TRUE(std::equal(few.pixels.begin(), few.pixels.end(), many.pixels.begin()));
+  EXPECT_TRUE(std::equal(few.targets.begin(), few.targets.end(), many.targets.begin()));
+}
+
+TEST(RayBatch, TakesColoursFromThePixelsItNames) {
+  const RayBatch batch = draw(twoPhotos(), 3, 0);
+  std::set<std::array<float, 3>> seen;
+  for (size_t ray = 0; ray < batch.weights.size(); ++ray) {
+    const float x = batch.pixels[2 * ray], y = batch.pixels[2 * ray + 1];
+    EXPECT_FLOAT_EQ(batch.targets[3 * ray], 16 * (x - 0.5f) / 255);
+    EXPECT_FLOAT_EQ(batch.targets[3 * ray + 1], 16 * (y - 0.5f) / 255);
+    EXPECT_FLOAT_EQ(batch.targets[3 * ray + 2], static_cast<float>(batch.photoOfRay[ray]) / 255);
+    EXPECT_EQ(batch.weights[ray], 1);
+    EXPECT_GE(batch.jitter[ray], 0);
+    EXPECT_LT(batch.jitter[ray], 1);
+    seen.insert({static_cast<float>(batch.photoOfRay[ray]), x, y});
+  }
+  EXPECT_EQ(seen.size(), 7u * 5 + 5 * 9);  // every pixel has its chance
+}
+
+TEST(RayBatch, GivesMaskedPixelsNoWeightAndPrefersOthers) {
+  ImageU8 mask(7, 5, 1, 255);
+  for (int y = 0; y < 5; ++y) *mask.at(3, y) = 0;
+  const RayBatch batch = draw({entry(0, addressed(7, 5, 0), mask)}, 1, 0);
+  int masked = 0;
+  for (size_t ray = 0; ray < batch.weights.size(); ++ray) {
+    const bool inMask = batch.pixels[2 * ray] == 3.5f;
+    EXPECT_EQ(batch.weights[ray], inMask ? 0 : 1);
+    masked += inMask;
+  }
+  EXPECT_LT(masked, 2000 / 7 / 4);  // a seventh of the pixels, drawn again
+}
+
+TEST(RayBatch, OfPhotosThatAreMaskedWhollyWeighsNothing) {
+  const RayBatch batch = draw({entry(0, addressed(7, 5, 0), ImageU8(7, 5, 1, 0))}, 1, 0, 100);
+  EXPECT_EQ(batch.weights, std::vector<float>(100, 0.0f));
+  for (const float pixel : batch.pixels) EXPECT_GT(pixel, 0);  // they are rays all the same
+}
+
+TEST(RayBatch, LaysTransparentPixelsOverTheBackground) {
+  for (const int alpha : {0, 51, 255}) {
+    const RayBatch batch = draw({entry(0, addressed(7, 5, 100, 4, static_cast<uint8_t>(alpha)))}, 1, 0, 200);
+    const float opacity = static_cast<float>(alpha) / 255;
+    std::set<float> backgrounds;
+    for (size_t ray = 0; ray < batch.weights.size(); ++ray) {
+      const float behind = batch.backgrounds[3 * ray + 2];
+      EXPECT_NEAR(batch.targets[3 * ray + 2], opacity * 100 / 255 + (1 - opacity) * behind, 1e-6);
+      backgrounds.insert(behind);
+    }
+    EXPECT_GT(backgrounds.size(), 150u);  // random ones
+  }
+}
+
+TEST(RayBatch, HasBlackBehindItWhenBackgroundsAreNotRandom) {
+  RayBatch batch;
+  drawRays({entry(0, addressed(7, 5, 100, 4, 51))}, 1, 0, 100, false, batch);
+  EXPECT_EQ(batch.backgrounds, std::vector<float>(300, 0.0f));
+  EXPECT_NEAR(batch.targets[2], 0.2f * 100 / 255, 1e-6);
+}
+
+TEST(RayBatch, ReadsGreyPhotosAsGrey) {
+  const RayBatch batch = draw({entry(0, ImageU8(4, 4, 1, 51))}, 1, 0, 100);
+  for (const float target : batch.targets) EXPECT_FLOAT_EQ(target, 0.2f);
+}
+
+TEST(RayBatch, ShrinksWithTheNumberOfRays) {
+  RayBatch batch;
+  drawRays(twoPhotos(), 1, 0, 100, true, batch);
+  drawRays(twoPhotos(), 1, 1, 10, true, batch);
+  EXPECT_EQ(batch.weights.size(), 10u);
+  EXPECT_EQ(batch.targets.size(), 30u);
+  EXPECT_EQ(batch.photoOfRay.size(), 10u);
+}
+
+}  // namespace
+}  // namespace tessera

@@ -1,0 +1,114 @@
+#include "train/visible_cells.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/threads.h"
+
+namespace tessera {
+namespace {
+
+constexpr int kBlock = 2;              // cells are judged in blocks of 2³
+constexpr size_t kEnough = 20;         // observations of a photo
+constexpr double kNearestShare = 0.02; // of the observations are taken for outliers
+constexpr double kNearShare = 0.8;
+
+// Scene position of a point given in grid coordinates. Nothing for what no point of the scene maps to.
+bool sceneFromGrid(const MarchSpace& space, const Vec3d& u, Vec3d* x) {
+  if (!space.contracted) {
+    *x = 2 * u - Vec3d::Ones();
+    return true;
+  }
+  const Vec3d y = 4 * u - Vec3d::Constant(2);
+  int axis = 0, outside = 0;
+  for (int a = 0; a < 3; ++a) {
+    outside += std::abs(y[a]) > 1;
+    if (std::abs(y[a]) > std::abs(y[axis])) axis = a;
+  }
+  if (outside > 1) return false;
+  *x = y;
+  if (outside == 0) return true;
+  const double m = 1 / std::max(1e-3, 2 - std::abs(y[axis]));
+  *x = y * m;
+  (*x)[axis] = y[axis] < 0 ? -m : m;
+  return true;
+}
+
+struct View {
+  const Camera* camera;
+  Pose cameraFromWorld;
+  double near;
+  double slack;  // pixels beyond the border that still count
+};
+
+bool sees(const View& view, const Vec3d& xInWorld) {
+  const Vec3d x = view.cameraFromWorld * xInWorld;
+  if (x.z() < view.near) return false;
+  const std::optional<Vec2d> pixel = view.camera->pixelFromCamera(x);
+  return pixel && pixel->x() > -view.slack && pixel->y() > -view.slack && pixel->x() < view.camera->width + view.slack &&
+         pixel->y() < view.camera->height + view.slack;
+}
+
+}  // namespace
+
+std::vector<double> nearestContent(const Capture& capture) {
+  std::vector<std::vector<double>> depths(capture.photos.size());
+  for (const Observation& observation : capture.observations) {
+    const Pose& pose = capture.photos[observation.photo].worldFromCamera;
+    const double depth = (capture.points[observation.point].xInWorld - pose.translation).dot(pose.rotation.col(2));
+    if (depth > 0) depths[observation.photo].push_back(depth);
+  }
+  std::vector<double> nearest(capture.photos.size(), 0.0);
+  for (size_t photo = 0; photo < depths.size(); ++photo) {
+    std::vector<double>& values = depths[photo];
+    if (values.size() < kEnough) continue;
+    const auto rank = values.begin() + static_cast<ptrdiff_t>(kNearestShare * static_cast<double>(values.size()));
+    std::nth_element(values.begin(), rank, values.end());
+    nearest[photo] = *rank;
+  }
+  return nearest;
+}
+
+std::vector<bool> visibleCells(const Capture& capture, const SceneFrame& frame, const MarchSpace& space) {
+  const std::vector<double> nearest = nearestContent(capture);
+  std::vector<View> views;
+  for (const int photo : capture.photosIn(Split::train)) {
+    const Camera& camera = capture.cameras[capture.photos[photo].camera];
+    views.push_back({&camera, capture.photos[photo].worldFromCamera.inverse(),
+                     std::max(space.near / frame.scale, kNearShare * nearest[photo]), 0.05 * camera.width});
+  }
+  const int resolution = space.gridResolution, blocks = resolution / kBlock;
+  std::vector<uint8_t> blockVisible(static_cast<size_t>(blocks) * blocks * blocks);
+  ThreadPool pool;
+  pool.run(blocks, [&](size_t z, int) {
+    size_t last = 0;  // neighbours are mostly seen by the same photo
+    for (int y = 0; y < blocks; ++y) {
+      for (int x = 0; x < blocks; ++x) {
+        bool visible = false;
+        // The centre and the corners, drawn in a little so that they lie in the block's own region of the contraction.
+        for (int corner = 8; corner >= 0 && !visible; --corner) {
+          const double reach = corner == 8 ? 0 : 0.98;
+          const Vec3d offset((corner & 1 ? 1 : -1) * reach, (corner & 2 ? 1 : -1) * reach, (corner & 4 ? 1 : -1) * reach);
+          const Vec3d u = (Vec3d(x, y, static_cast<double>(z)) + (offset + Vec3d::Ones()) / 2) / blocks;
+          Vec3d inScene;
+          if (!sceneFromGrid(space, u, &inScene)) continue;
+          const Vec3d inWorld = inScene / frame.scale + frame.centre;
+          for (size_t i = 0; i < views.size() && !visible; ++i) {
+            const size_t candidate = (last + i) % views.size();
+            visible = sees(views[candidate], inWorld);
+            if (visible) last = candidate;
+          }
+        }
+        blockVisible[x + static_cast<size_t>(blocks) * (y + static_cast<size_t>(blocks) * z)] = visible;
+      }
+    }
+  });
+  std::vector<bool> cells(static_cast<size_t>(resolution) * resolution * resolution);
+  for (size_t cell = 0; cell < cells.size(); ++cell) {
+    const size_t x = cell % resolution, y = cell / resolution % resolution, z = cell / resolution / resolution;
+    cells[cell] = blockVisible[x / kBlock + blocks * (y / kBlock + blocks * (z / kBlock))];
+  }
+  return cells;
+}
+
+}  // namespace tessera

@@ -1,0 +1,20 @@
+// Which cells of the occupancy grid a training photo can see at all. What none sees is never trained, would be random
+// when looked at from elsewhere, and is left empty (instant-ngp marks such cells too).
+#pragma once
+
+#include "compute/rays.h"
+#include "scene/capture.h"
+#include "train/scene_frame.h"
+
+namespace tessera {
+
+// One entry a cell, in the order of MarchRays::occupancy. A cell is visible when a training photo has it in its picture
+// no nearer than the photo's nearest content: with sparse points, kNearShare of the depth of the nearest ones observed
+// (the free space below drones and in front of cameras then stays free); else the march's near.
+std::vector<bool> visibleCells(const Capture& capture, const SceneFrame& frame, const MarchSpace& space);
+
+// Per photo, the depth along the optical axis before which nothing was observed, in world units; 0 with fewer than
+// 20 observations.
+std::vector<double> nearestContent(const Capture& capture);
+
+}  // namespace tessera
