@@ -3,15 +3,17 @@
 #include <algorithm>
 
 #include "base/check.h"
+#include "base/image_io.h"
 #include "base/random.h"
 
 namespace tessera {
 namespace {
 
-// What a photo takes when decoded: three or four channels, and a mask.
+// What the cache counts for a photo: its channels, as the head of the file says, and a mask.
 size_t decodedBytes(const Capture& capture, const Photo& photo) {
   const Camera& camera = capture.cameras[photo.camera];
-  return static_cast<size_t>(camera.width) * camera.height * (photo.mask.empty() ? 3 : 4);
+  const int channels = probeImageFile(photo.image).channels + (photo.mask.empty() ? 0 : 1);
+  return static_cast<size_t>(camera.width) * camera.height * static_cast<size_t>(channels);
 }
 
 constexpr size_t kUnlimited = size_t{1} << 60;
@@ -22,15 +24,17 @@ PhotoWindow::PhotoWindow(const Capture& capture, std::vector<int> photos, const 
     : cache_(capture, static_cast<int64_t>(settings.budgetBytes ? settings.budgetBytes : kUnlimited)), photos_(std::move(photos)), settings_(settings) {
   CHECK(!photos_.empty());
   size_t total = 0, largest = 1;
-  for (const int photo : photos_) {
-    const size_t bytes = decodedBytes(capture, capture.photos[photo]);
-    total += bytes;
-    largest = std::max(largest, bytes);
+  if (settings.budgetBytes > 0) {
+    for (const int photo : photos_) {
+      const size_t bytes = decodedBytes(capture, capture.photos[photo]);
+      total += bytes;
+      largest = std::max(largest, bytes);
+    }
   }
   holdsAll_ = settings.budgetBytes == 0 || total <= settings.budgetBytes;
   // One place is for the photo that is being decoded while the window is in use.
   size_ = holdsAll_ ? static_cast<int>(photos_.size())
-                    : static_cast<int>(std::max<size_t>(1, settings.budgetBytes / largest - 1));
+                    : static_cast<int>(std::max<size_t>(2, settings.budgetBytes / largest) - 1);
   size_ = std::min<int>(size_, static_cast<int>(photos_.size()));
   entries_.resize(size_);
 }

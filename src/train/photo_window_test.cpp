@@ -64,6 +64,22 @@ TEST(PhotoWindow, NeverPassesTheBudget) {
   }
 }
 
+TEST(PhotoWindow, CountsAlphaAndMasksAgainstTheBudget) {
+  const TestFolder folder;
+  Capture capture = plainCapture(folder.path(), 8);
+  for (Photo& photo : capture.photos) {
+    writePng(photo.image, ImageU8(16, 12, 4, 200));
+    photo.mask = folder / "mask.png";
+  }
+  writePng(folder / "mask.png", ImageU8(16, 12, 1, 255));
+  for (const size_t budget : {16 * 12 * 20, 16 * 12 * 5 * 7}) {  // as much as without either, and all but one
+    PhotoWindow window(capture, allOf(capture), {budget, 1, 0});
+    EXPECT_FALSE(window.holdsAll());
+    for (int64_t step = 0; step < 20; ++step) EXPECT_EQ(window.at(step)[0].decoded->image.channels, 4);
+    EXPECT_LE(window.counts().peakBytes, static_cast<int64_t>(budget));
+  }
+}
+
 TEST(PhotoWindow, WorksWithOnePhotoWhenNotEvenOneFits) {
   const TestFolder folder;
   const Capture capture = plainCapture(folder.path(), 4);
