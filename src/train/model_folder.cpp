@@ -37,6 +37,9 @@ std::optional<ModelManifest> ModelFolder::manifest() const {
   } catch (const json::exception& error) {
     throw Error(path.string(), "", error.what(), "restore the file or train again");
   }
+  if (manifest.files.empty() || manifest.step < 0 || manifest.plannedSteps < 0) {
+    throw Error(path.string(), "", "names no checkpoint, or a step below zero", "restore the file or train again");
+  }
   for (const std::string& file : manifest.files) {
     const std::optional<fs::path> inside = resolveInside(root_, file);
     if (!inside || !fs::exists(*inside)) {
@@ -56,7 +59,12 @@ void ModelFolder::commit(const ModelManifest& state, const Bytes& block, int kee
   for (const fs::directory_entry& entry : fs::directory_iterator(root_ / "blocks/0")) {
     const std::string file = entry.path().filename().string();
     if (file.starts_with("step-") && file.ends_with(".safetensors")) {
-      old.emplace_back(std::atoll(file.c_str() + 5), entry.path());
+      const int64_t step = std::atoll(file.c_str() + 5);
+      if (step > state.step) {
+        fs::remove(entry.path());  // of a run that was killed before its manifest
+      } else {
+        old.emplace_back(step, entry.path());
+      }
     } else if (file.find(".partial-") != std::string::npos) {
       fs::remove(entry.path());  // of a run that was killed while writing
     }

@@ -79,8 +79,8 @@ ModelManifest startingPoint(Trainee& trainee, const ModelFolder& folder, const T
 
 TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const TrainingLoopOptions& options) {
   using Clock = std::chrono::steady_clock;
-  if (!options.resume) fs::remove(folder.root() / "plan.json");
   ModelManifest state = startingPoint(trainee, folder, options);
+  if (!options.resume) fs::remove(folder.root() / "plan.json");
   const auto start = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
   StepBudget budget(options.minutes);

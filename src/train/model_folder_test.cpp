@@ -1,0 +1,184 @@
+#include "train/model_folder.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "train/test_support.h"
+
+namespace tessera {
+namespace {
+
+Bytes block(size_t size, int value) {
+  return Bytes(size, static_cast<std::byte>(value));
+}
+
+std::vector<std::string> blockFiles(const fs::path& root) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(root / "blocks/0")) names.push_back(entry.path().filename().string());
+  std::sort(names.begin(), names.end(), naturalLess);
+  return names;
+}
+
+std::string errorOf(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+TEST(ModelFolder, HoldsNoModelWhileThereIsNoManifest) {
+  const TestFolder folder;
+  EXPECT_FALSE(ModelFolder(folder.path()).manifest());
+  EXPECT_FALSE(ModelFolder(folder / "nowhere").manifest());
+}
+
+TEST(ModelFolder, ComesBackAsCommitted) {
+  const TestFolder folder;
+  const ModelFolder model(folder / "new/model");
+  model.commit({"field", 120, 500, {}}, block(100, 7));
+  const auto manifest = model.manifest();
+  ASSERT_TRUE(manifest);
+  EXPECT_EQ(manifest->method, "field");
+  EXPECT_EQ(manifest->step, 120);
+  EXPECT_EQ(manifest->plannedSteps, 500);
+  ASSERT_EQ(manifest->files.size(), 1u);
+  EXPECT_EQ(readFile(model.root() / manifest->files[0]), block(100, 7));
+}
+
+TEST(ModelFolder, KeepsTheLastCheckpointsOnly) {
+  const TestFolder folder;
+  const ModelFolder model(folder.path());
+  for (const int64_t step : {8, 9, 10, 100}) model.commit({"field", step, 100, {}}, block(10, 1));
+  EXPECT_EQ(blockFiles(folder.path()), (std::vector<std::string>{"step-10.safetensors", "step-100.safetensors"}));
+  model.commit({"field", 101, 200, {}}, block(10, 1), 1);
+  EXPECT_EQ(blockFiles(folder.path()), (std::vector<std::string>{"step-101.safetensors"}));
+}
+
+TEST(ModelFolder, KilledWhileWritingABlockIsTheModelItWas) {
+  const TestFolder folder;
+  const ModelFolder model(folder.path());
+  model.commit({"field", 10, 100, {}}, block(100, 1));
+  // A block that was being written, and one that was written before its manifest.
+  writeFileAtomically(folder / "blocks/0/step-20.safetensors.partial-123", "half");
+  writeFileAtomically(folder / "blocks/0/step-20.safetensors", "whole");
+  writeFileAtomically(folder / "manifest.json.partial-123", "{\"met");
+  const auto manifest = model.manifest();
+  ASSERT_TRUE(manifest);
+  EXPECT_EQ(manifest->step, 10);
+  EXPECT_EQ(readFile(folder.path() / manifest->files[0]), block(100, 1));
+  // The next commit clears up.
+  model.commit({"field", 20, 100, {}}, block(100, 2));
+  EXPECT_EQ(model.manifest()->step, 20);
+  EXPECT_EQ(readFile(folder / "blocks/0/step-20.safetensors"), block(100, 2));
+  EXPECT_EQ(blockFiles(folder.path()), (std::vector<std::string>{"step-10.safetensors", "step-20.safetensors"}));
+}
+
+TEST(ModelFolder, NeverRemovesTheBlockThatItsManifestNames) {
+  const TestFolder folder;
+  const ModelFolder model(folder.path());
+  // What a longer run left behind must not crowd out what is written now.
+  for (const int64_t step : {500, 600}) model.commit({"field", step, 600, {}}, block(10, 1));
+  fs::remove(folder / "manifest.json");
+  model.commit({"field", 5, 600, {}}, block(10, 2));
+  ASSERT_TRUE(model.manifest());
+  EXPECT_EQ(readFile(folder.path() / model.manifest()->files[0]), block(10, 2));
+}
+
+TEST(ModelFolder, SaysSoWhenABlockIsMissing) {
+  const TestFolder folder;
+  const ModelFolder model(folder.path());
+  model.commit({"field", 10, 100, {}}, block(100, 1));
+  fs::remove(folder / "blocks/0/step-10.safetensors");
+  const std::string error = errorOf([&] { model.manifest(); });
+  EXPECT_TRUE(contains(error, "manifest.json")) << error;
+  EXPECT_TRUE(contains(error, "step-10.safetensors")) << error;
+}
+
+TEST(ModelFolder, RefusesManifestsThatItCannotUnderstand) {
+  const TestFolder folder;
+  writeFileAtomically(folder / "here.safetensors", "block");
+  for (const char* text : {"", "{", "[]", "{}", R"({"method": "field", "step": 1, "planned_steps": 2})",
+                           R"({"method": 3, "step": 1, "planned_steps": 2, "files": []})",
+                           R"({"method": "field", "step": "one", "planned_steps": 2, "files": ["here.safetensors"]})",
+                           R"({"method": "field", "step": 1, "planned_steps": 2, "files": []})",
+                           R"({"method": "field", "step": -1, "planned_steps": 2, "files": ["here.safetensors"]})",
+                           R"({"method": "field", "step": 1, "planned_steps": 2, "files": ["../outside.safetensors"]})",
+                           R"({"method": "field", "step": 1, "planned_steps": 2, "files": ["/etc/passwd"]})"}) {
+    writeFileAtomically(folder / "manifest.json", text);
+    const std::string error = errorOf([&] { ModelFolder(folder.path()).manifest(); });
+    EXPECT_TRUE(contains(error, "manifest.json")) << text << ": " << error;
+  }
+}
+
+TEST(ModelFolder, KnowsWhereInTheWorldItStands) {
+  const TestFolder folder;
+  const ModelFolder model(folder.path());
+  ModelPlacement placement;
+  placement.frame = {{1.0 / 3, -200.125, 3e-9}, 0.1 + 0.2};
+  placement.sourceFromWorld << 0, -2, 0, 500000.25, 2, 0, 0, 4.5e6, 0, 0, 2, 12, 0, 0, 0, 1;
+  placement.capture = "some/../capture";
+  model.writePlacement(placement, "field");
+  const ModelPlacement read = model.readPlacement();
+  EXPECT_EQ(read.frame.centre, placement.frame.centre);
+  EXPECT_EQ(read.frame.scale, placement.frame.scale);
+  EXPECT_EQ(read.sourceFromWorld, placement.sourceFromWorld);
+  EXPECT_EQ(read.capture, fs::absolute("capture"));
+}
+
+TEST(ModelFolder, RefusesPlacementsThatItCannotUnderstand) {
+  const TestFolder folder;
+  const ModelFolder model(folder.path());
+  EXPECT_TRUE(contains(errorOf([&] { model.readPlacement(); }), "blocks.json"));
+  for (const char* text : {"", "{}", R"({"blocks": []})", R"({"blocks": [{"centre": [1, 2], "scale": 1}]})"}) {
+    writeFileAtomically(folder / "blocks.json", text);
+    EXPECT_TRUE(contains(errorOf([&] { model.readPlacement(); }), "blocks.json")) << text;
+  }
+}
+
+TEST(ModelFolder, RemembersItsPlan) {
+  const TestFolder folder;
+  const ModelFolder model(folder.path());
+  EXPECT_FALSE(model.readPlan());
+  model.writePlan(123456789012);
+  EXPECT_EQ(model.readPlan(), 123456789012);
+  for (const char* text : {"{}", R"({"steps": 0})", R"({"steps": "many"})", R"({"steps": 1.5})", "3", ""}) {
+    writeFileAtomically(folder / "plan.json", text);
+    EXPECT_TRUE(contains(errorOf([&] { model.readPlan(); }), "plan.json")) << text;
+  }
+}
+
+TEST(ModelFolder, CutsMetricsBackToACheckpoint) {
+  const TestFolder folder;
+  const ModelFolder model(folder.path());
+  model.cutMetrics(10);  // there are none: nothing to do
+  EXPECT_FALSE(fs::exists(model.metricsPath()));
+  for (const int step : {5, 10, 15, 20}) model.appendMetrics({{"step", step}, {"psnr", 20.5}});
+  {
+    std::ofstream out(model.metricsPath(), std::ios::app);
+    out << "{\"step\": 7, \"ps";  // the line that a kill cut off
+  }
+  model.cutMetrics(15);
+  model.appendMetrics({{"step", 17}});
+  EXPECT_EQ(readTextFile(model.metricsPath()),
+            "{\"psnr\":20.5,\"step\":5}\n{\"psnr\":20.5,\"step\":10}\n"
+            "{\"psnr\":20.5,\"step\":15}\n{\"step\":17}\n");
+  model.cutMetrics(-1);
+  EXPECT_EQ(readTextFile(model.metricsPath()), "");
+}
+
+TEST(ModelFolder, NamesMetricsThatCannotBeWritten) {
+  EXPECT_TRUE(contains(errorOf([] { ModelFolder("/nonexistent").appendMetrics({{"step", 1}}); }), "metrics.jsonl"));
+}
+
+}  // namespace
+}  // namespace tessera

@@ -1,0 +1,312 @@
+#include "train/training_loop.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "base/error.h"
+#include "train/test_support.h"
+
+namespace tessera {
+namespace {
+
+// Its state is one number that every step changes in a way that depends on the step and on all before it.
+class FakeTrainee : public Trainee {
+ public:
+  StepReport step(int64_t step, int64_t plannedSteps) override {
+    if (dieAt == step) throw std::runtime_error("killed");
+    if (pace.count() > 0) std::this_thread::sleep_for(pace);
+    state = state * 6364136223846793005ull + static_cast<uint64_t>(step);
+    steps.push_back(step);
+    planned.push_back(plannedSteps);
+    StepReport report;
+    report.loss = step == nanAt ? std::numeric_limits<double>::quiet_NaN() : 0.5;
+    report.squaredError = 0.01;
+    report.rays = 10;
+    report.samples = 100;
+    report.marched = 200;
+    return report;
+  }
+  Bytes save() override {
+    ++saves;
+    const std::vector<uint64_t> values = {state};
+    return encodeSafetensors({{"state", {TensorType::i64, {1}, std::as_bytes(std::span(values))}}});
+  }
+  void restore(const fs::path& path, const Safetensors& file) override {
+    state = file.require(path, "state", TensorType::i64).as<uint64_t>()[0];
+    ++restores;
+  }
+
+  uint64_t state = 1;
+  int saves = 0, restores = 0;
+  std::vector<int64_t> steps, planned;
+  int64_t nanAt = -1, dieAt = -1;
+  std::chrono::microseconds pace{0};
+};
+
+TrainingLoopOptions options(int64_t steps, bool resume = false) {
+  TrainingLoopOptions made;
+  made.method = "fake";
+  made.steps = steps;
+  made.resume = resume;
+  made.progress = false;
+  return made;
+}
+
+Bytes checkpoint(const ModelFolder& folder) {
+  return readFile(folder.root() / folder.manifest()->files.at(0));
+}
+
+std::vector<int64_t> metricSteps(const ModelFolder& folder) {
+  std::ifstream in(folder.metricsPath());
+  std::vector<int64_t> steps;
+  for (std::string line; std::getline(in, line);) steps.push_back(nlohmann::json::parse(line).at("step"));
+  return steps;
+}
+
+class TrainingLoop : public testing::Test {
+ protected:
+  TrainingLoop() {
+    for (const char* name : {"model", "unbroken"}) fs::create_directories(temporary_ / name);
+  }
+
+  const TestFolder temporary_;
+  const ModelFolder folder_{temporary_ / "model"};
+};
+
+TEST_F(TrainingLoop, DoesEveryStepOnceAndSaves) {
+  FakeTrainee trainee;
+  const TrainingResult result = runTraining(trainee, folder_, options(7));
+  EXPECT_EQ(trainee.steps, (std::vector<int64_t>{0, 1, 2, 3, 4, 5, 6}));
+  EXPECT_EQ(trainee.planned, std::vector<int64_t>(7, 7));
+  EXPECT_TRUE(result.finished);
+  EXPECT_EQ(result.step, 7);
+  EXPECT_EQ(result.plannedSteps, 7);
+  EXPECT_NEAR(result.psnr, 20, 1e-9);
+  const auto manifest = folder_.manifest();
+  ASSERT_TRUE(manifest);
+  EXPECT_EQ(manifest->step, 7);
+  EXPECT_EQ(manifest->method, "fake");
+}
+
+TEST_F(TrainingLoop, WritesMetricsWithEverythingInThem) {
+  FakeTrainee trainee;
+  runTraining(trainee, folder_, options(7));
+  std::ifstream in(folder_.metricsPath());
+  std::string last, line;
+  while (std::getline(in, line)) last = line;
+  const auto metrics = nlohmann::json::parse(last);
+  EXPECT_EQ(metrics.at("step"), 7);
+  EXPECT_NEAR(metrics.at("psnr"), 20, 1e-9);
+  EXPECT_NEAR(metrics.at("loss"), 0.5, 1e-9);
+  EXPECT_NEAR(metrics.at("samples_per_second").get<double>() / metrics.at("rays_per_second").get<double>(), 10, 1e-6);
+  EXPECT_GE(metrics.at("seconds"), 0);
+  EXPECT_GT(metrics.at("peak_rss_bytes"), 1000000);
+}
+
+TEST_F(TrainingLoop, DoesNotTouchAModelUnlessToldToGoOn) {
+  FakeTrainee first, second;
+  runTraining(first, folder_, options(3));
+  folder_.writePlan(99);
+  const Bytes before = checkpoint(folder_);
+  const std::string metrics = readTextFile(folder_.metricsPath());
+  try {
+    runTraining(second, folder_, options(5));
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.subject(), folder_.root().string());
+    EXPECT_NE(error.remedy().find("--resume"), std::string::npos);
+  }
+  EXPECT_TRUE(second.steps.empty());
+  EXPECT_EQ(checkpoint(folder_), before);
+  EXPECT_EQ(readTextFile(folder_.metricsPath()), metrics);
+  EXPECT_EQ(folder_.readPlan(), 99);
+}
+
+TEST_F(TrainingLoop, ResumesToTheSameEndAsAnUnbrokenRun) {
+  FakeTrainee unbroken;
+  const ModelFolder other(temporary_ / "unbroken");
+  runTraining(unbroken, other, options(20));
+  int64_t lastStep = -1;
+  for (const int64_t stopAt : {1, 2, 9, 19, 20}) {
+    FakeTrainee trainee;
+    TrainingLoopOptions some = options(20, true);
+    some.stopRequested = [&] { return !trainee.steps.empty() && trainee.steps.back() + 1 >= stopAt; };
+    const TrainingResult result = runTraining(trainee, folder_, some);
+    EXPECT_EQ(result.step, stopAt);
+    EXPECT_EQ(result.finished, stopAt == 20);
+    EXPECT_EQ(trainee.steps.front(), lastStep + 1);
+    lastStep = trainee.steps.back();
+  }
+  EXPECT_EQ(checkpoint(folder_), checkpoint(other));
+}
+
+TEST_F(TrainingLoop, ResumesAfterBeingKilledFromTheLastCheckpoint) {
+  FakeTrainee unbroken;
+  const ModelFolder other(temporary_ / "unbroken");
+  runTraining(unbroken, other, options(20));
+  for (const int64_t dieAt : {3, 4, 12, -1}) {
+    FakeTrainee trainee;
+    trainee.dieAt = dieAt;
+    TrainingLoopOptions some = options(20, true);
+    some.checkpointSeconds = dieAt == 4 ? 1000 : 0;  // the run that dies at 4 leaves nothing
+    try {
+      runTraining(trainee, folder_, some);
+    } catch (const std::runtime_error& killed) {
+      EXPECT_STREQ(killed.what(), "killed");
+    }
+    if (dieAt == 12) {
+      EXPECT_EQ(trainee.steps.front(), 3);
+    }
+  }
+  EXPECT_EQ(checkpoint(folder_), checkpoint(other));
+  EXPECT_EQ(metricSteps(folder_).back(), 20);
+}
+
+TEST_F(TrainingLoop, ForgetsMetricsOfStepsThatItDoesAgain) {
+  FakeTrainee first;
+  runTraining(first, folder_, options(3));
+  folder_.appendMetrics({{"step", 4}});
+  folder_.appendMetrics({{"step", 5}});
+  FakeTrainee second;
+  runTraining(second, folder_, options(5, true));
+  EXPECT_EQ(metricSteps(folder_), (std::vector<int64_t>{3, 5}));
+}
+
+TEST_F(TrainingLoop, ForgetsMetricsOfARunThatNeverSaved) {
+  folder_.commit({"fake", 1, 1, {}}, {});
+  fs::remove(folder_.root() / "manifest.json");
+  folder_.appendMetrics({{"step", 1}});
+  FakeTrainee trainee;
+  runTraining(trainee, folder_, options(2));
+  EXPECT_EQ(metricSteps(folder_), std::vector<int64_t>{2});
+}
+
+TEST_F(TrainingLoop, HasNothingToDoWhenResumedAtItsEnd) {
+  FakeTrainee first, second;
+  runTraining(first, folder_, options(3));
+  const TrainingResult result = runTraining(second, folder_, options(3, true));
+  EXPECT_TRUE(result.finished);
+  EXPECT_TRUE(second.steps.empty());
+  EXPECT_EQ(folder_.manifest()->step, 3);
+  EXPECT_EQ(second.state, first.state);
+}
+
+TEST_F(TrainingLoop, BeginsWhenToldToResumeWhereThereIsNothing) {
+  FakeTrainee trainee;
+  EXPECT_TRUE(runTraining(trainee, folder_, options(3, true)).finished);
+  EXPECT_EQ(trainee.restores, 0);
+}
+
+TEST_F(TrainingLoop, RefusesToResumeAModelOfAnotherMethod) {
+  FakeTrainee first, second;
+  runTraining(first, folder_, options(3));
+  TrainingLoopOptions other = options(5, true);
+  other.method = "other";
+  try {
+    runTraining(second, folder_, other);
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("fake"), std::string::npos) << error.what();
+  }
+  EXPECT_TRUE(second.steps.empty());
+}
+
+TEST_F(TrainingLoop, NamesTheStepWhoseLossIsNotANumberAndKeepsTheCheckpointBefore) {
+  FakeTrainee first, second;
+  runTraining(first, folder_, options(3));
+  const Bytes before = checkpoint(folder_);
+  second.nanAt = 5;
+  try {
+    runTraining(second, folder_, options(9, true));
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_NE(error.place().find("step 5"), std::string::npos) << error.what();
+    EXPECT_NE(error.place().find("block 0"), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(folder_.manifest()->step, 3);
+  EXPECT_EQ(checkpoint(folder_), before);
+}
+
+TEST_F(TrainingLoop, SavesWhenItIsAskedToStop) {
+  FakeTrainee trainee;
+  TrainingLoopOptions some = options(1000000);
+  some.stopRequested = [&] { return trainee.steps.size() >= 5; };
+  const TrainingResult result = runTraining(trainee, folder_, some);
+  EXPECT_FALSE(result.finished);
+  EXPECT_EQ(result.step, 5);
+  EXPECT_EQ(result.plannedSteps, 1000000);
+  EXPECT_EQ(folder_.manifest()->step, 5);
+  EXPECT_EQ(trainee.saves, 1);
+}
+
+TEST_F(TrainingLoop, FixesTheStepsOfItsMinutesOnceAndRemembersThem) {
+  FakeTrainee trainee;
+  trainee.pace = std::chrono::microseconds(200);
+  TrainingLoopOptions some = options(0);
+  some.minutes = 0.4 / 60;
+  const TrainingResult result = runTraining(trainee, folder_, some);
+  EXPECT_TRUE(result.finished);
+  EXPECT_GT(result.plannedSteps, 128);
+  EXPECT_EQ(result.step, result.plannedSteps);
+  EXPECT_LT(result.seconds, 4);
+  EXPECT_EQ(folder_.readPlan(), result.plannedSteps);
+  // Not known at first; from then on always the same.
+  EXPECT_EQ(trainee.planned.front(), 0);
+  EXPECT_EQ(trainee.planned.back(), result.plannedSteps);
+  for (const int64_t planned : trainee.planned) EXPECT_TRUE(planned == 0 || planned == result.plannedSteps);
+}
+
+TEST_F(TrainingLoop, KeepsTheStepsOfItsMinutesWhenResumed) {
+  FakeTrainee first;
+  first.pace = std::chrono::microseconds(200);
+  TrainingLoopOptions some = options(0, true);
+  some.minutes = 0.4 / 60;
+  some.stopRequested = [&] { return !first.planned.empty() && first.planned.back() != 0; };
+  const TrainingResult stopped = runTraining(first, folder_, some);
+  ASSERT_FALSE(stopped.finished);
+  FakeTrainee second;  // at another pace
+  some.stopRequested = [] { return false; };
+  const TrainingResult result = runTraining(second, folder_, some);
+  EXPECT_EQ(result.plannedSteps, stopped.plannedSteps);
+  EXPECT_EQ(second.steps.front(), stopped.step);
+  EXPECT_EQ(second.steps.back() + 1, stopped.plannedSteps);
+}
+
+TEST_F(TrainingLoop, UsesThePlanOfARunThatWasKilledBeforeItsFirstCheckpoint) {
+  FakeTrainee first;
+  first.pace = std::chrono::microseconds(200);
+  TrainingLoopOptions some = options(0);
+  some.minutes = 0.4 / 60;
+  FakeTrainee* running = &first;
+  some.stopRequested = [&]() -> bool {
+    if (!running->planned.empty() && running->planned.back() != 0) throw std::runtime_error("killed");
+    return false;
+  };
+  EXPECT_THROW(runTraining(first, folder_, some), std::runtime_error);
+  ASSERT_FALSE(folder_.manifest());
+  const int64_t plan = folder_.readPlan().value_or(0);
+  ASSERT_GT(plan, 0);
+  some.stopRequested = [] { return false; };
+  some.resume = true;
+  FakeTrainee second;
+  EXPECT_EQ(runTraining(second, folder_, some).step, plan);
+  EXPECT_EQ(second.planned.front(), plan);
+}
+
+TEST_F(TrainingLoop, MakesANewPlanWhenItBeginsAnew) {
+  fs::create_directories(folder_.root());
+  folder_.writePlan(7);
+  FakeTrainee trainee;
+  TrainingLoopOptions some = options(0);
+  some.minutes = 0.05 / 60;
+  EXPECT_NE(runTraining(trainee, folder_, some).plannedSteps, 7);
+}
+
+}  // namespace
+}  // namespace tessera
