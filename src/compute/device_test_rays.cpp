@@ -205,6 +205,7 @@ OperationTests testsOf<CompactSamples>() {
              a.steps = stage.randomInput(capacity, 0.001f, 0.1f);
              a.keptFirstSample = stage.outputWords("keptFirstSample", size.capacity + 1);
              a.keptCount = stage.outputWords("keptCount", 1);
+             if (layout == Layout::strided) a.finishedRays = stage.outputWords("finishedRays", 1);
              a.source = stage.outputWords("source", capacity);
              stage.device.run(a);
            }});

@@ -105,6 +105,8 @@ struct CompactSamples {
   Slice<const float> steps;
   Slice<uint32_t> keptFirstSample;       // [rays + 1]
   Slice<uint32_t> keptCount;             // [1]
+  Slice<uint32_t> finishedRays;          // optional, [1]: rays before the first that did not fit, or that is still
+                                         // transparent where lookedAt ends short of its samples
   Slice<uint32_t> source;                // [keptCapacity]: the sample that a kept one was
 };
 

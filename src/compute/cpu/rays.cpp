@@ -195,6 +195,35 @@ void marchRay(const MarchRays& a, const Lattice& lattice, const uint32_t* bits, 
   }
 }
 
+// How many of a ray's first `count` samples stand in front of the point where it is opaque; `*opaque` tells whether there
+// is one. Transmittance is exp(-Σ σ step): the sum is enough.
+uint32_t visibleSamples(const Matrix<const float>& logDensity, const float* data, const float* steps, uint32_t first,
+                        uint32_t count, float minTransmittance, bool* opaque) {
+  const float most = -std::log(minTransmittance);
+  float thickness = 0;
+  uint32_t i = 0;
+  while (i < count && thickness <= most) {
+    thickness += std::exp(data[logDensity.offset(first + i, 0)]) * steps[first + i];
+    ++i;
+  }
+  *opaque = thickness > most;
+  return i;
+}
+
+// Counts in offsets[1 .. rays] to running ends; what no longer fits `capacity` becomes empty, and so does all after it.
+// Returns how many fit.
+uint32_t countsToOffsets(uint32_t* offsets, uint32_t rays, uint32_t capacity) {
+  offsets[0] = 0;
+  uint32_t fitting = 0;
+  for (uint32_t ray = 0; ray < rays; ++ray) {
+    const uint64_t end = static_cast<uint64_t>(offsets[ray]) + offsets[ray + 1];
+    const bool fits = fitting == ray && end <= capacity;
+    offsets[ray + 1] = fits ? static_cast<uint32_t>(end) : offsets[ray];
+    fitting += fits;
+  }
+  return fitting;
+}
+
 }  // namespace
 
 void run(Context& context, const GenerateRays& a) {
@@ -239,15 +268,7 @@ void run(Context& context, const MarchRays& a) {
       firstSample[ray + 1] = static_cast<uint32_t>(samples.size() - before);  // a count for now
     }
   });
-  // Counts to offsets. A ray that does not fit ends the list.
-  firstSample[0] = 0;
-  uint32_t finished = 0;
-  for (uint32_t ray = 0; ray < rays; ++ray) {
-    const uint64_t end = static_cast<uint64_t>(firstSample[ray]) + firstSample[ray + 1];
-    const bool fits = finished == ray && end <= a.sampleCapacity;
-    firstSample[ray + 1] = fits ? static_cast<uint32_t>(end) : firstSample[ray];
-    finished += fits;
-  }
+  const uint32_t finished = countsToOffsets(firstSample, rays, a.sampleCapacity);
   if (a.finishedRays) *hostPointer(a.finishedRays) = finished;
   *hostPointer(a.sampleCount) = firstSample[rays];
   uint32_t* rayOfSample = hostPointer(a.rayOfSample);
@@ -266,36 +287,6 @@ void run(Context& context, const MarchRays& a) {
     }
   });
 }
-
-namespace {
-
-// How many of a ray's first `count` samples stand in front of the point where it is opaque; `*opaque` tells whether there
-// is one. Transmittance is exp(-Σ σ step): the sum is enough.
-uint32_t visibleSamples(const Matrix<const float>& logDensity, const float* data, const float* steps, uint32_t first,
-                        uint32_t count, float minTransmittance, bool* opaque) {
-  const float most = -std::log(minTransmittance);
-  float thickness = 0;
-  uint32_t i = 0;
-  while (i < count && thickness <= most) {
-    thickness += std::exp(data[logDensity.offset(first + i, 0)]) * steps[first + i];
-    ++i;
-  }
-  *opaque = thickness > most;
-  return i;
-}
-
-// Counts in offsets[1 .. rays] to running ends; what no longer fits `capacity` becomes empty, and so does all after it.
-void countsToOffsets(uint32_t* offsets, uint32_t rays, uint32_t capacity) {
-  offsets[0] = 0;
-  bool full = false;
-  for (uint32_t ray = 0; ray < rays; ++ray) {
-    const uint64_t end = static_cast<uint64_t>(offsets[ray]) + offsets[ray + 1];
-    full = full || end > capacity;
-    offsets[ray + 1] = full ? offsets[ray] : static_cast<uint32_t>(end);
-  }
-}
-
-}  // namespace
 
 void run(Context& context, const SelectSamples& a) {
   const uint32_t rays = hostCount(a.rays);
@@ -334,14 +325,20 @@ void run(Context& context, const CompactSamples& a) {
   const float* steps = hostPointer(a.steps);
   uint32_t* kept = hostPointer(a.keptFirstSample);
   uint32_t* source = hostPointer(a.source);
+  std::vector<uint8_t> complete(rays);
   context.pool.forRanges(rays, kRaysPerTask, [&](size_t begin, size_t end) {
     for (size_t ray = begin; ray < end; ++ray) {
       const uint32_t first = firstSample[ray], count = lookedAt ? lookedAt[ray] : firstSample[ray + 1] - first;
       bool opaque;
       kept[ray + 1] = visibleSamples(a.logDensity, logDensity, steps, first, count, a.minTransmittance, &opaque);
+      complete[ray] = opaque || first + count == firstSample[ray + 1];
     }
   });
-  countsToOffsets(kept, rays, a.keptCapacity);
+  const uint32_t fitting = countsToOffsets(kept, rays, a.keptCapacity);
+  if (a.finishedRays) {
+    const auto end = complete.begin() + fitting;
+    *hostPointer(a.finishedRays) = static_cast<uint32_t>(std::find(complete.begin(), end, 0) - complete.begin());
+  }
   *hostPointer(a.keptCount) = kept[rays];
   context.pool.forRanges(rays, 4 * kRaysPerTask, [&](size_t begin, size_t end) {
     for (size_t ray = begin; ray < end; ++ray) {

@@ -182,6 +182,7 @@ void run(const CompactSamples& a) {
   const Indices firstSample = indices(a.firstSample, rays + 1);
   const Doubles logDensity = doubles(a.logDensity, firstSample[rays]), steps = doubles(a.steps, firstSample[rays]);
   uint32_t made = 0;
+  size_t finished = 0;
   bool full = false;
   hostPointer(a.keptFirstSample)[0] = 0;
   for (size_t r = 0; r < rays; ++r) {
@@ -191,9 +192,14 @@ void run(const CompactSamples& a) {
         compactRay(a.minTransmittance, View(logDensity).subspan(first, count), View(steps).subspan(first, count));
     full = full || made + kept > a.keptCapacity;
     for (size_t i = 0; i < kept && !full; ++i) hostPointer(a.source)[made++] = static_cast<uint32_t>(first + i);
+    double thickness = 0;
+    for (size_t i = 0; i < kept; ++i) thickness += std::exp(logDensity[first + i]) * steps[first + i];
+    const bool opaque = thickness > -std::log(static_cast<double>(a.minTransmittance));
+    if (finished == r && !full && (opaque || first + count == firstSample[r + 1])) ++finished;
     hostPointer(a.keptFirstSample)[r + 1] = made;
   }
   hostPointer(a.keptCount)[0] = made;
+  if (a.finishedRays) hostPointer(a.finishedRays)[0] = static_cast<uint32_t>(finished);
 }
 
 void run(const GatherRows& a) {

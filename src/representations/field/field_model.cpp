@@ -83,6 +83,7 @@ void FieldModel::sample(const Rays& rays, float minTransmittance, RaySamples& ma
   compact.steps = marched.steps;
   compact.keptFirstSample = kept.firstSample;
   compact.keptCount = kept.count;
+  compact.finishedRays = kept.finishedRays;
   compact.source = source_;
   device_.run(compact);
 

@@ -66,7 +66,7 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
         model_.field().forward(samples, kept_.positions, directions_, kept_.rayOfSample, false);
     CompositeForward composite;
     composite.minTransmittance = kMinTransmittance;
-    composite.rays = {rays, marched_.finishedRays};
+    composite.rays = {rays, kept_.finishedRays};
     composite.firstSample = kept_.firstSample;
     composite.x = output.logDensity;
     composite.steps = kept_.steps;
@@ -77,7 +77,7 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
     composite.depth = depth_;
     composite.weights = weights_;
     device.run(composite);
-    const uint32_t finished = device.read(marched_.finishedRays.all())[0];
+    const uint32_t finished = device.read(kept_.finishedRays.all())[0];
     CHECK(finished >= 1u);  // one ray's steps always fit
     const std::vector<float> colour = device.read(colour_.part(0, size_t{finished} * 3));
     const std::vector<float> opacity = device.read(opacity_.part(0, finished));
@@ -86,8 +86,9 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
     std::copy(opacity.begin(), opacity.end(), view.opacity.pixels.begin() + static_cast<ptrdiff_t>(first));
     for (uint32_t ray = 0; ray < finished; ++ray) view.depth.pixels[first + ray] = depth[ray] * cosine(ray) / scale;
     first += finished;
-    const double perRay = std::max(1.0, static_cast<double>(device.read(marched_.count.all())[0]) / finished);
-    wanted = static_cast<uint32_t>(std::clamp(0.9 * kMarched / perRay, 64.0, static_cast<double>(kRays)));
+    const auto perRay = [&](Slice<const uint32_t> counter) { return std::max(1.0, device.read(counter)[0] / (1.0 * finished)); };
+    const double fitting = std::min(0.9 * kMarched / perRay(marched_.count), 0.9 * kSamples / perRay(kept_.count));
+    wanted = static_cast<uint32_t>(std::clamp(fitting, 64.0, static_cast<double>(kRays)));
   }
   return view;
 }

@@ -100,7 +100,7 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
 
   const uint32_t capacity = static_cast<uint32_t>(kept_.distances.size());
   const Count samples{capacity, kept_.count};
-  const Count rays{rays_, marched_.finishedRays};
+  const Count rays{rays_, kept_.finishedRays};
   RadianceField& field = model_.field();
   const RadianceField::Output output =
       field.forward(samples, kept_.positions, directions_, kept_.rayOfSample, true);
@@ -167,7 +167,7 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
   // The step is over: its counters may be read.
   StepReport report;
   const std::vector<float> losses = device_.read(losses_.all());
-  report.rays = device_.read(marched_.finishedRays.all())[0];
+  report.rays = device_.read(kept_.finishedRays.all())[0];
   report.samples = device_.read(kept_.count.all())[0];
   report.marched = device_.read(marched_.count.all())[0];
   double weight = 0;
