@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# Every operation's rate beside the machine's own limit, and the whole training step. Wants a quiet machine: with
+# CAP_SYS_NICE it runs at real-time priority.
+#   [THREADS=0] bench/compute.sh
+set -euo pipefail
+source "$(dirname "$0")/setup.sh"
+need_tessera
+first=()
+chrt -r 1 true 2> /dev/null && first=(chrt -r 1)
+{
+  "${first[@]}" "$tessera" bench compute --threads "${THREADS:-0}" --json "$out/compute.json"
+  "${first[@]}" "$tessera" bench train --threads "${THREADS:-0}" --json "$out/train.json"
+} | tee "$out/compute.txt"
+verdict "training step, M samples/s" "$(jq '.samples_per_second / 1e6 * 1000 | round / 1000' "$out/train.json")" '>=' 0.5
+# row OPERATION SHAPE: its share of the limit in percent.
+row() { jq --arg o "$1" --arg s "$2" '.operations[] | select(.operation == $o and .shape == $s).share * 1000 | round / 10' "$out/compute.json"; }
+for samples in 65536 8192; do
+  for network in 64-64-64-64 'density 32-64-16' 'colour 32-64-64-3'; do
+    verdict "network $network forward and backward, $samples samples, % of peak" "$(row 'Mlp both' "$network, $samples samples")" '>=' 60
+  done
+  for points in 'random points' 'points on rays'; do
+    shape="16 levels x 2, $points, $samples samples"
+    verdict "hash grid forward, $points, $samples samples, % of gather rate" "$(row HashGridForward "$shape")" '>=' 80
+    verdict "hash grid backward, $points, $samples samples, % of gather rate" "$(row HashGridBackward "$shape")" '>=' 50
+  done
+done
+finish

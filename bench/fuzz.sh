@@ -1,0 +1,6 @@
+#!/usr/bin/env bash
+# Every decoder of outside bytes under libFuzzer with ASan and UBSan, ten minutes each; fails at the first finding.
+#   bench/fuzz.sh [SECONDS]
+set -euo pipefail
+source "$(dirname "$0")/setup.sh"
+tests/fuzz/run.sh "${1:-600}" | tee "$out/fuzz.txt"

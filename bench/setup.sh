@@ -1,0 +1,58 @@
+# Sourced by the scripts of this folder, which run from the repository's root: where things are, and what several share.
+# TESSERA overrides the binary; TESSERA_SHARED_DATA names the folder of photographs.
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+tessera=${TESSERA:-build/release/apps/tessera/tessera}
+out=build/bench
+mkdir -p "$out"
+
+die() {
+  echo "$(basename "$0"): $*" >&2
+  exit 1
+}
+
+need_tessera() {
+  [ -x "$tessera" ] || die "$tessera: not built; run: cmake --preset release && cmake --build --preset release"
+}
+
+# Numbers, not text: holds 27.3 '>=' 27.2
+holds() { awk -v a="$1" -v b="$3" -v how="$2" 'BEGIN { exit !(how == ">=" ? a >= b : a <= b) }'; }
+
+# verdict WHAT VALUE >=|<= BOUND: one line, and a failure remembered for `finish`.
+failures=0
+verdict() {
+  local word=ok
+  holds "$2" "$3" "$4" || { word=FAILED; failures=$((failures + 1)); }
+  echo "$1: $2 (wanted $3 $4) $word"
+}
+finish() { [ "$failures" -eq 0 ] || exit 1; }
+
+# The file that holds a model's state.
+checkpoint() { echo "$1/$(jq -r '.files[0]' "$1/manifest.json")"; }
+
+# photographs NAME DOWNSCALE BOUND: imports real photographs, trains for MINUTES with each of SEEDS, judges held-out views.
+photographs() {
+  local name=$1 downscale=$2 bound=$3 seed psnr
+  local data=${TESSERA_SHARED_DATA:?names no folder; it must hold $name/}/$name work
+  [ -d "$data" ] || die "$data: no such folder"
+  need_tessera
+  work=$(mktemp -d)
+  trap "rm -rf '$work'" EXIT
+  "$tessera" import "$data" "$work/capture" --downscale "$downscale" --holdout every:8
+  echo '[]' > "$work/rows.json"
+  for seed in ${SEEDS:-1 2 3}; do
+    "$tessera" train "$work/capture" "$work/$seed" --method field --minutes "${MINUTES:-10}" --seed "$seed"
+    "$tessera" eval "$work/$seed" "$work/capture" --json "$work/eval.json" ${LPIPS:+--lpips "$LPIPS"}
+    jq --argjson seed "$seed" --slurpfile eval "$work/eval.json" \
+      '. + [{seed: $seed, psnr: $eval[0].psnr, ssim: $eval[0].ssim, lpips: $eval[0].lpips, views: $eval[0].views}]' \
+      "$work/rows.json" > "$work/next.json"
+    mv "$work/next.json" "$work/rows.json"
+  done
+  jq --argjson minutes "${MINUTES:-10}" '{minutes: $minutes, mean_psnr: (map(.psnr) | add / length), runs: .}' \
+    "$work/rows.json" > "$out/$name.json"
+  for seed in ${SEEDS:-1 2 3}; do
+    psnr=$(jq -r --argjson seed "$seed" '.runs[] | select(.seed == $seed).psnr * 100 | round / 100' "$out/$name.json")
+    verdict "$name seed $seed, held-out PSNR in dB" "$psnr" '>=' "$bound"
+  done
+  echo "$name mean held-out PSNR: $(jq -r '.mean_psnr * 100 | round / 100' "$out/$name.json") dB ($out/$name.json)"
+  finish
+}
