@@ -113,6 +113,9 @@ struct DeviceOptions {
   int threads = 0;           // cpu: 0 = all cores
 };
 
+// Throws Error naming the first operation that the device lacks.
+void requireAllOperations(const Device& device);
+
 // Throws Error when there is no such device on this machine. "auto" is cpu until the Vulkan device can train.
 std::unique_ptr<Device> makeDevice(const DeviceOptions& options);
 

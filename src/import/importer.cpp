@@ -44,14 +44,14 @@ size_t countPhotos(const fs::path& folder) {
     const std::string s = source.string(), i = images.string();
     throw Error(
         source.string(), "", fmt::format("holds {} photos but says nowhere from where they were taken", photos),
-        fmt::format("find their poses with COLMAP, then import again:\n"
-                    "  colmap feature_extractor --database_path {0}/database.db --image_path {1} "
+        fmt::format("find their poses with COLMAP, then import again: "
+                    "colmap feature_extractor --database_path {0}/database.db --image_path {1} "
                     "--ImageReader.camera_model OPENCV --ImageReader.single_camera 1 "
-                    "--SiftExtraction.use_gpu 0\n"
-                    "  colmap exhaustive_matcher --database_path {0}/database.db --SiftMatching.use_gpu 0\n"
-                    "  mkdir -p {0}/sparse\n"
-                    "  colmap mapper --database_path {0}/database.db --image_path {1} --output_path {0}/sparse\n"
-                    "  tessera import {0} OUT",
+                    "--SiftExtraction.use_gpu 0 && "
+                    "colmap exhaustive_matcher --database_path {0}/database.db --SiftMatching.use_gpu 0 && "
+                    "mkdir -p {0}/sparse && "
+                    "colmap mapper --database_path {0}/database.db --image_path {1} --output_path {0}/sparse && "
+                    "tessera import {0} OUT",
                     s, i));
   }
   throw Error(source.string(), "", "is neither a COLMAP model (sparse/0 and images) nor has it a transforms.json",

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/log.h"
 #include "base/random.h"
 #include "train/schedule.h"
 #include "train/visible_cells.h"
@@ -232,6 +233,11 @@ void FieldTrainer::restore(const fs::path& path, const Safetensors& state) {
   const auto format = state.metadata.find("format");
   if (format == state.metadata.end() || format->second != "tessera field 1") {
     throw Error(path.string(), "", "is not a checkpoint of --method field", "train again");
+  }
+  const auto device = state.metadata.find("device");
+  if (device != state.metadata.end() && device->second != device_.target()) {
+    warn("{} was trained on {}; going on with {} gives as good a model, but not the same bits", path.string(),
+         device->second, device_.target());
   }
   model_.restore(path, state);
   loadGroup(device_, path, state, exposures_);

@@ -1,0 +1,79 @@
+#include "representations/field/config.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <set>
+
+namespace tessera {
+namespace {
+
+// Another value than the default, whatever the field.
+void change(const ConfigField& field, int i) {
+  std::visit(
+      [i](auto* value) {
+        using T = std::remove_pointer_t<decltype(value)>;
+        if constexpr (std::is_same_v<T, bool>) {
+          *value = !*value;
+        } else if constexpr (std::is_same_v<T, std::string>) {
+          *value += "-" + std::to_string(i);
+        } else {
+          *value += static_cast<T>(i) + static_cast<T>(1) + static_cast<T>(0.123456789);
+        }
+      },
+      field.value);
+}
+
+TEST(FieldConfig, EveryFieldSurvivesItsFile) {
+  FieldConfig written, defaults;
+  std::vector<ConfigField> fields = written.fields();
+  for (size_t i = 0; i < fields.size(); ++i) change(fields[i], static_cast<int>(i));
+  const fs::path path = fs::temp_directory_path() / ("tessera_field_config_" + std::to_string(::getpid()) + ".toml");
+  writeFileAtomically(path, configToToml(fields));
+  FieldConfig read;
+  configFromToml(read.fields(), path);
+  fs::remove(path);
+  const std::vector<ConfigField> again = read.fields(), before = defaults.fields();
+  for (size_t i = 0; i < fields.size(); ++i) {
+    EXPECT_EQ(configValueText(again[i]), configValueText(fields[i])) << fields[i].name;
+    EXPECT_NE(configValueText(again[i]), configValueText(before[i])) << fields[i].name;
+  }
+}
+
+TEST(FieldConfig, EveryMemberIsAField) {
+  // Fields point at members: together they cover the struct, but for what alignment leaves free.
+  FieldConfig config;
+  size_t covered = 0;
+  std::set<std::string_view> names;
+  for (const ConfigField& field : config.fields()) {
+    names.insert(field.name);
+    EXPECT_FALSE(field.help.empty()) << field.name;
+    covered += std::visit([](auto* value) { return sizeof(*value); }, field.value);
+  }
+  EXPECT_EQ(names.size(), config.fields().size());
+  EXPECT_LE(covered, sizeof(FieldConfig));
+  EXPECT_GE(covered + 8 * 8, sizeof(FieldConfig));
+}
+
+TEST(FieldConfig, ShapesTheModelAndItsSpace) {
+  FieldConfig config;
+  config.gridLevels = 5;
+  config.gridFeatures = 4;
+  config.width = 32;
+  config.densityHidden = 2;
+  config.colourHidden = 3;
+  config.contracted = false;
+  config.occupancyResolution = 64;
+  const RadianceFieldShape shape = config.shape();
+  EXPECT_EQ(shape.grid.levels.size(), 5u);
+  EXPECT_EQ(shape.density.inputs, 20);
+  EXPECT_EQ(shape.density.width, 32);
+  EXPECT_EQ(shape.density.hiddenLayers, 2);
+  EXPECT_EQ(shape.colour.hiddenLayers, 3);
+  EXPECT_EQ(shape.colour.inputs, shape.density.outputs + shape.harmonicsDegree * shape.harmonicsDegree);
+  EXPECT_FALSE(config.space().contracted);
+  EXPECT_EQ(config.space().gridResolution, 64);
+}
+
+}  // namespace
+}  // namespace tessera

@@ -1,0 +1,229 @@
+#include "representations/field/field_trainer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "representations/field/cube_scene.h"
+#include "representations/field/field_renderer.h"
+
+namespace tessera {
+namespace {
+
+// Mean over the held-out photos.
+double heldOutPsnr(const CubeScene& scene, TrainedCube& trained) {
+  FieldRenderer renderer(trained.trainer->model());
+  double sum = 0;
+  const std::vector<int> photos = scene.capture().photosIn(Split::test);
+  for (const int index : photos) {
+    const Photo& photo = scene.capture().photos[index];
+    const Camera& camera = scene.capture().cameras[photo.camera];
+    sum += psnrOf(renderer.render(camera, photo.worldFromCamera, nullptr), scene.truth(camera, photo.worldFromCamera));
+  }
+  return sum / static_cast<double>(photos.size());
+}
+
+std::string errorOf(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(FieldTrainer, LearnsWhatHeldOutPhotosSee) {
+  const CubeScene scene;
+  TrainedCube trained(scene, cubeConfig(), 300);
+  EXPECT_GT(heldOutPsnr(scene, trained), 26);
+}
+
+TEST(FieldTrainer, LearnsASceneWithoutBounds) {
+  CubeScene::Options options;
+  options.room = true;
+  options.photos = 28;
+  const CubeScene scene(options);
+  TrainedCube trained(scene, cubeConfig(), 300);
+  EXPECT_GT(heldOutPsnr(scene, trained), 22);
+}
+
+TEST(FieldTrainer, LearnsABoundedScene) {
+  const CubeScene scene;
+  FieldConfig config = cubeConfig();
+  config.contracted = false;
+  TrainedCube trained(scene, config, 300);
+  EXPECT_GT(heldOutPsnr(scene, trained), 26);
+}
+
+TEST(FieldTrainer, LearnsFromFisheyePhotos) {
+  CubeScene::Options options;
+  options.lens = LensModel::openCvFisheye;
+  const CubeScene scene(options);
+  TrainedCube trained(scene, cubeConfig(), 300);
+  EXPECT_GT(heldOutPsnr(scene, trained), 26);
+}
+
+TEST(FieldTrainer, LearnsWithEveryLoss) {
+  const CubeScene scene;
+  for (const char* loss : {"mse", "huber", "charbonnier"}) {
+    FieldConfig config = cubeConfig();
+    config.loss = loss;
+    TrainedCube trained(scene, config, 120);
+    EXPECT_GT(heldOutPsnr(scene, trained), 19) << loss;
+  }
+}
+
+TEST(FieldTrainer, MakesTheSameBytesOnAnyNumberOfThreads) {
+  CubeScene::Options options;
+  options.room = true;
+  options.stain = true;
+  const CubeScene scene(options);
+  const Bytes one = TrainedCube(scene, cubeConfig(), 80, 1).trainer->save();
+  EXPECT_EQ(one, TrainedCube(scene, cubeConfig(), 80, 2).trainer->save());
+  EXPECT_EQ(one, TrainedCube(scene, cubeConfig(), 80, 5).trainer->save());
+  FieldConfig other = cubeConfig();
+  other.seed = 1;
+  EXPECT_NE(one, TrainedCube(scene, other, 80, 2).trainer->save());
+}
+
+TEST(FieldTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
+  const CubeScene scene;
+  constexpr int64_t kSteps = 90;
+  FieldConfig config = cubeConfig();
+  config.photoBudgetMiB = CubeScene::kWidth * CubeScene::kHeight * 4 * 5 / 1048576.0;  // windows move on too
+  TrainedCube unbroken(scene, config, 0);
+  for (int64_t step = 0; step < kSteps; ++step) unbroken.trainer->step(step, kSteps);
+  Bytes state;
+  int64_t step = 0;
+  for (const int64_t until : {1, 15, 16, 17, 50, 90}) {
+    TrainedCube part(scene, config, 0);
+    if (!state.empty()) {
+      const auto file = decodeSafetensors(state);
+      ASSERT_TRUE(file);
+      part.trainer->restore("state", *file);
+    }
+    for (; step < until; ++step) part.trainer->step(step, kSteps);
+    state = part.trainer->save();
+  }
+  EXPECT_EQ(state, unbroken.trainer->save());
+}
+
+TEST(FieldTrainer, TrainsOnAllPhotosWhenFewFitTheBudget) {
+  const CubeScene scene;
+  FieldConfig config = cubeConfig();
+  config.photoBudgetMiB = CubeScene::kWidth * CubeScene::kHeight * 4 * 4 / 1048576.0;
+  config.exposure = true;  // each photo's exposure counts its steps
+  TrainedCube trained(scene, config, 200);
+  const auto file = decodeSafetensors(trained.trainer->save());
+  ASSERT_TRUE(file);
+  const auto counts = file->require("state", "exposures.count", TensorType::u32).as<uint32_t>();
+  for (size_t i = 0; i < scene.capture().photos.size(); ++i) {
+    if (scene.capture().photos[i].split == Split::train) {
+      EXPECT_GT(counts[3 * i], 20u) << i;
+      EXPECT_LT(counts[3 * i], 180u) << i;
+    } else {
+      EXPECT_EQ(counts[3 * i], 0u) << i;  // held out means held out
+    }
+  }
+  EXPECT_GT(heldOutPsnr(scene, trained), 20);
+}
+
+TEST(FieldTrainer, DoesNotLookUnderMasks) {
+  CubeScene::Options options;
+  options.room = true;
+  options.stain = true;
+  options.photos = 28;
+  const CubeScene scene(options);
+  CubeScene bare(options);
+  for (Photo& photo : bare.capture().photos) photo.mask.clear();
+  TrainedCube masked(scene, cubeConfig(), 250), stained(bare, cubeConfig(), 250);
+  const double psnr = heldOutPsnr(scene, masked);
+  EXPECT_GT(psnr, 21);
+  EXPECT_GT(psnr, heldOutPsnr(bare, stained) + 2);
+}
+
+TEST(FieldTrainer, RecoversTheExposuresOfPhotos) {
+  CubeScene::Options options;
+  options.room = true;
+  options.photos = 28;
+  options.log2Gains = {-0.3, 0.25, 0.05};
+  const CubeScene scene(options);
+  FieldConfig config = cubeConfig();
+  config.exposure = true;
+  config.exposureRate = 1e-2;
+  TrainedCube trained(scene, config, 300);
+  const auto file = decodeSafetensors(trained.trainer->save());
+  ASSERT_TRUE(file);
+  const auto gains = file->require("state", "exposures", TensorType::f32).as<float>();
+  const std::vector<int> photos = scene.capture().photosIn(Split::train);
+  double meanOfTruth = 0, meanFound = 0;
+  for (const int photo : photos) {
+    meanOfTruth += options.log2Gains[photo % 3] / static_cast<double>(photos.size());
+    meanFound += gains[3 * photo + 1] / static_cast<double>(photos.size());
+  }
+  EXPECT_NEAR(meanFound, 0, 0.05);  // only differences can be told
+  for (const int photo : photos) {
+    for (int channel = 0; channel < 3; ++channel) {
+      EXPECT_NEAR(gains[3 * photo + channel], options.log2Gains[photo % 3] - meanOfTruth, 0.08) << photo;
+    }
+  }
+}
+
+TEST(FieldTrainer, LeavesExposuresAloneWhenToldTo) {
+  const CubeScene scene;
+  FieldConfig config = cubeConfig();
+  config.exposure = false;
+  TrainedCube trained(scene, config, 20);
+  const auto file = decodeSafetensors(trained.trainer->save());
+  ASSERT_TRUE(file);
+  for (const float gain : file->require("state", "exposures", TensorType::f32).as<float>()) EXPECT_EQ(gain, 0);
+}
+
+TEST(FieldTrainer, AdaptsItsRaysToTheSamplesThatItWants) {
+  const CubeScene scene;
+  TrainedCube trained(scene, cubeConfig(), 150);
+  EXPECT_GT(trained.last.samples, 8192u / 2);
+  EXPECT_LE(trained.last.samples, 8192u * 2);
+  EXPECT_GT(trained.last.rays, 256u);
+  EXPECT_LE(trained.last.rays, 2048u);
+  EXPECT_GE(trained.last.marched, trained.last.samples);
+}
+
+TEST(FieldTrainer, RefusesWhatItCannotTrain) {
+  CubeScene scene;
+  FieldConfig config = cubeConfig();
+  config.loss = "hinge";
+  EXPECT_NE(errorOf([&] { TrainedCube(scene, config, 0); }).find("hinge"), std::string::npos);
+  for (Photo& photo : scene.capture().photos) photo.split = Split::test;
+  EXPECT_NE(errorOf([&] { TrainedCube(scene, cubeConfig(), 0); }).find("no photo"), std::string::npos);
+}
+
+TEST(FieldTrainer, RefusesCheckpointsThatAreNotItsOwn) {
+  const CubeScene scene;
+  TrainedCube trained(scene, cubeConfig(), 2);
+  const Bytes bytes = trained.trainer->save();
+  for (int change = 0; change < 3; ++change) {
+    FieldConfig config = cubeConfig();
+    if (change == 0) config.gridLog2Size = 12;
+    if (change == 1) config.width = 32;
+    if (change == 2) config.occupancyResolution = 16;
+    TrainedCube other(scene, config, 0);
+    const auto file = decodeSafetensors(bytes);
+    ASSERT_TRUE(file);
+    const std::string error = errorOf([&] { other.trainer->restore("some/step-2.safetensors", *file); });
+    EXPECT_NE(error.find("some/step-2.safetensors"), std::string::npos) << change << ": " << error;
+  }
+  CubeScene::Options more;
+  more.photos = 15;
+  const CubeScene larger(more);
+  TrainedCube another(larger, cubeConfig(), 0);
+  EXPECT_NE(errorOf([&] { another.trainer->restore("s", *decodeSafetensors(bytes)); }), "no error");
+  const std::vector<float> zero = {0};
+  const auto foreign =
+      decodeSafetensors(encodeSafetensors({{"table", {TensorType::f32, {1}, std::as_bytes(std::span(zero))}}}));
+  EXPECT_NE(errorOf([&] { another.trainer->restore("s", *foreign); }).find("--method field"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tessera
