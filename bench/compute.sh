@@ -1,15 +1,12 @@
 #!/usr/bin/env bash
-# Every operation's rate beside the machine's own limit, and the whole training step. Wants a quiet machine: with
-# CAP_SYS_NICE it runs at real-time priority.
+# Every operation's rate beside the machine's own limit, and the whole training step. Wants a quiet machine.
 #   [THREADS=0] bench/compute.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
-first=()
-chrt -r 1 true 2> /dev/null && first=(chrt -r 1)
 {
-  "${first[@]}" "$tessera" bench compute --threads "${THREADS:-0}" --json "$out/compute.json"
-  "${first[@]}" "$tessera" bench train --threads "${THREADS:-0}" --json "$out/train.json"
+  alone "$tessera" bench compute --threads "${THREADS:-0}" --json "$out/compute.json"
+  alone "$tessera" bench train --threads "${THREADS:-0}" --json "$out/train.json"
 } | tee "$out/compute.txt"
 verdict "training step, M samples/s" "$(jq '.samples_per_second / 1e6 * 1000 | round / 1000' "$out/train.json")" '>=' 0.5
 # row OPERATION SHAPE: its share of the limit in percent.

@@ -11,10 +11,10 @@ cmake --preset release -B "$build" -DTESSERA_BENCH_LIBTORCH=ON -DTESSERA_TESTS=O
 cmake --build "$build" --target libtorch_step
 seconds=${SECONDS_EACH:-4}
 {
-  "$build/bench/libtorch_step" "$seconds"
-  if [ -n "${OPENBLAS_CORETYPE:-}" ]; then env -u OPENBLAS_CORETYPE "$build/bench/libtorch_step" "$seconds"; fi
+  alone "$build/bench/libtorch_step" "$seconds"
+  if [ -n "${OPENBLAS_CORETYPE:-}" ]; then (unset OPENBLAS_CORETYPE; alone "$build/bench/libtorch_step" "$seconds"); fi
 } | tee "$out/libtorch_step.txt"
-"$tessera" bench train --threads 2 --seconds "$seconds" --json "$out/libtorch_step_ours.json" | tee -a "$out/libtorch_step.txt"
+alone "$tessera" bench train --threads 2 --seconds "$seconds" --json "$out/libtorch_step_ours.json" | tee -a "$out/libtorch_step.txt"
 ours=$(jq .samples_per_second "$out/libtorch_step_ours.json")
 theirs=$(awk '/^samples_per_second/ { if ($2 > best) best = $2 } END { print best }' "$out/libtorch_step.txt")
 verdict "training step, times as fast as libtorch" "$(awk -v a="$ours" -v b="$theirs" 'BEGIN { printf "%.1f", a / b }')" '>=' 8 |
