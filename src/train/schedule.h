@@ -23,23 +23,29 @@ struct RateSchedule {
   }
 };
 
-// `--minutes` as a number of steps, fixed once, early: from the pace between `measureFrom` and the moment `share` of the
-// time has passed. Until then the schedule does not depend on the number of steps.
+// `--minutes` as a number of steps, fixed once, early: from the pace in the second half of the first `share` of the time
+// (the first steps, before the scene's empty space is known, are slower). Until then the schedule does not depend on the
+// number of steps.
 class StepBudget {
  public:
-  StepBudget(double minutes, double share = 0.06) : seconds_(minutes * 60), share_(share) {}
+  explicit StepBudget(double minutes, double share = 0.15) : seconds_(minutes * 60), share_(share) {}
 
-  // Seconds since training began, at the end of `step`. Returns the number of steps once it can be told.
+  // Seconds since training began, after `step` steps. Returns the number of steps once it can be told, else 0.
   int64_t observe(int64_t step, double seconds) {
-    if (step == kMeasureFrom) measureStart_ = seconds;
-    if (step < 2 * kMeasureFrom || seconds < share_ * seconds_) return 0;
-    const double perStep = (seconds - measureStart_) / static_cast<double>(step - kMeasureFrom);
-    return step + 1 + std::max<int64_t>(0, static_cast<int64_t>((seconds_ - seconds) / perStep));
+    if (seconds < share_ / 2 * seconds_) return 0;
+    if (measureStep_ < 0) {
+      measureStep_ = step;
+      measureStart_ = seconds;
+    }
+    if (seconds < share_ * seconds_ || step < measureStep_ + kFewest) return 0;
+    const double perStep = (seconds - measureStart_) / static_cast<double>(step - measureStep_);
+    return step + std::max<int64_t>(0, static_cast<int64_t>((seconds_ - seconds) / perStep));
   }
 
  private:
-  static constexpr int64_t kMeasureFrom = 64;
+  static constexpr int64_t kFewest = 16;
   double seconds_, share_, measureStart_ = 0;
+  int64_t measureStep_ = -1;
 };
 
 }  // namespace tessera

@@ -58,8 +58,8 @@ TEST(StepBudget, CountsASlowStartAgainstTheTimeButNotThePace) {
 TEST(StepBudget, WaitsForEnoughStepsEvenWhenTimeIsShort) {
   int64_t toldAt = 0;
   const int64_t steps = stepsOf(StepBudget(0.001), 0.05, 0, &toldAt);
-  EXPECT_GT(toldAt, 64);
-  EXPECT_EQ(steps, toldAt + 1);  // the time is over: one more and out
+  EXPECT_GE(toldAt, 16);
+  EXPECT_EQ(steps, toldAt);  // the time is over
 }
 
 }  // namespace

@@ -12,6 +12,7 @@ constexpr int kBlock = 2;              // cells are judged in blocks of 2³
 constexpr size_t kEnough = 20;         // observations of a photo
 constexpr double kNearestShare = 0.02; // of the observations are taken for outliers
 constexpr double kNearShare = 0.8;
+constexpr double kSlack = 0.25;        // of the width: other views look a little past what photos show
 
 // Scene position of a point given in grid coordinates. Nothing for what no point of the scene maps to.
 bool sceneFromGrid(const MarchSpace& space, const Vec3d& u, Vec3d* x) {
@@ -75,7 +76,7 @@ std::vector<bool> visibleCells(const Capture& capture, const SceneFrame& frame, 
   for (const int photo : capture.photosIn(Split::train)) {
     const Camera& camera = capture.cameras[capture.photos[photo].camera];
     views.push_back({&camera, capture.photos[photo].worldFromCamera.inverse(),
-                     std::max(space.near / frame.scale, kNearShare * nearest[photo]), 0.05 * camera.width});
+                     std::max(space.near / frame.scale, kNearShare * nearest[photo]), kSlack * camera.width});
   }
   const int resolution = space.gridResolution, blocks = resolution / kBlock;
   std::vector<uint8_t> blockVisible(static_cast<size_t>(blocks) * blocks * blocks);

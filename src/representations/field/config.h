@@ -15,7 +15,7 @@ struct FieldConfig {
   int width = 64, densityHidden = 1, colourHidden = 2;
   // Marching
   int occupancyResolution = 128;
-  double near = 0.05, far = 64, minStep = 0.01, cone = 0.0078125;
+  double near = 0.05, far = 32, minStep = 0.01, cone = 0.0078125;
   // Batches
   int64_t seed = 0;
   int samplesPerStep = 1 << 16;

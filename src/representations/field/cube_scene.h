@@ -21,7 +21,7 @@ class CubeScene {
     LensModel lens = LensModel::pinhole;
     std::vector<double> log2Gains = {0};  // of the photos, in turn
     bool stain = false;                   // a red stain in the corner of every photo that is trained on, under a mask
-    int photos = 14;
+    int photos = 48;
   };
 
   static constexpr int kWidth = 40, kHeight = 32, kStain = 12;
@@ -174,10 +174,16 @@ inline FieldConfig cubeConfig() {
   config.colourHidden = 1;
   config.occupancyResolution = 32;
   config.occupancyWarmUp = 64;
-  config.minStep = 0.02;
+  config.occupancyEvery = 4;
+  config.near = 0.4;  // nothing to see nearer to any camera
+  config.far = 4;
+  config.minStep = 0.05;
+  config.cone = 0.1;
   config.samplesPerStep = 8192;
-  config.firstRays = 256;
-  config.mostRays = 2048;
+  config.firstRays = 512;
+  config.mostRays = 4096;
+  config.rate = 2e-2;
+  config.exposure = false;
   return config;
 }
 
