@@ -1,6 +1,29 @@
 #include "representations/field/config.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "base/error.h"
+
 namespace tessera {
+namespace {
+
+// Also false for what is not a number.
+void within(const char* name, double value, double low, double high) {
+  if (value >= low && value <= high) return;
+  throw Error(fmt::format("--set {}={}", name, value), "", "is out of range",
+              fmt::format("use {} from {} to {}", name, low, high));
+}
+
+void oneOf(const char* name, int value, std::initializer_list<int> allowed) {
+  if (std::find(allowed.begin(), allowed.end(), value) != allowed.end()) return;
+  throw Error(fmt::format("--set {}={}", name, value), "", "is none of the sizes there are",
+              fmt::format("use one of {}", fmt::join(allowed, ", ")));
+}
+
+}  // namespace
 
 std::vector<ConfigField> FieldConfig::fields() {
   return {
@@ -27,7 +50,8 @@ std::vector<ConfigField> FieldConfig::fields() {
       {"steps_per_photo", "with a photo budget: steps after which one photo is exchanged", &stepsPerPhoto},
       {"occupancy_every", "steps between updates of the occupancy grid", &occupancyEvery},
       {"occupancy_warm_up", "steps during which updates look at every cell", &occupancyWarmUp},
-      {"occupancy_share", "share of the cells that an update looks at, at random, and again among occupied ones", &occupancyShare},
+      {"occupancy_share", "share of the cells that an update looks at, at random, and again among occupied ones",
+       &occupancyShare},
       {"rate", "learning rate", &rate},
       {"final_rate_factor", "learning rate at the end, relative", &finalRateFactor},
       {"constant_rate_share", "share of the steps before the learning rate begins to fall", &constantRateShare},
@@ -41,7 +65,45 @@ std::vector<ConfigField> FieldConfig::fields() {
   };
 }
 
+void FieldConfig::check() const {
+  constexpr double kTiny = 1e-12, kHuge = 1e12;
+  oneOf("grid_features", gridFeatures, {1, 2, 4, 8});
+  within("grid_levels", gridLevels, 1, 128 / gridFeatures);
+  within("grid_log2_size", gridLog2Size, 3, 28);
+  within("grid_base", gridBase, 2, 1 << 20);
+  within("grid_finest", gridFinest, gridBase, 1 << 20);
+  oneOf("width", width, {16, 32, 64, 128});
+  within("density_hidden", densityHidden, 1, 16);
+  within("colour_hidden", colourHidden, 1, 16);
+  within("occupancy_resolution", occupancyResolution, 4, 512);
+  if (occupancyResolution % 4 != 0) {
+    throw Error(fmt::format("--set occupancy_resolution={}", occupancyResolution), "", "is no multiple of 4",
+                fmt::format("use occupancy_resolution={}", occupancyResolution / 4 * 4));
+  }
+  within("roi_margin", roiMargin, 1e-6, 1e6);
+  within("near", near, 0, kHuge);
+  within("far", far, near, kHuge);
+  within("min_step", minStep, 1e-6, kHuge);
+  within("cone", cone, 0, 1);
+  within("samples_per_step", samplesPerStep, 64, 1 << 24);
+  within("most_rays", mostRays, 64, 1 << 24);
+  within("first_rays", firstRays, 1, mostRays);
+  within("photo_budget_mib", photoBudgetMiB, 0, kHuge);
+  within("steps_per_photo", stepsPerPhoto, 1, 1 << 30);
+  within("occupancy_every", occupancyEvery, 1, 1 << 30);
+  within("occupancy_warm_up", occupancyWarmUp, 0, 1 << 30);
+  within("occupancy_share", occupancyShare, 0, 1);
+  within("rate", rate, kTiny, kHuge);
+  within("final_rate_factor", finalRateFactor, kTiny, kHuge);
+  within("constant_rate_share", constantRateShare, 0, 1);
+  within("network_l2", networkL2, 0, kHuge);
+  within("exposure_rate", exposureRate, 0, kHuge);
+  within("loss_parameter", lossParameter, kTiny, kHuge);
+  within("distortion", distortion, 0, kHuge);
+}
+
 RadianceFieldShape FieldConfig::shape() const {
+  check();
   HashGridOptions grid;
   grid.levels = gridLevels;
   grid.features = gridFeatures;

@@ -33,6 +33,8 @@ struct FieldConfig {
   bool exposure = true, randomBackground = true;
 
   std::vector<ConfigField> fields();
+  // Throws Error naming the first setting that no model can be made of.
+  void check() const;
 
   RadianceFieldShape shape() const;
   MarchSpace space() const;

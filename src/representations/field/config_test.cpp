@@ -5,6 +5,8 @@
 
 #include <set>
 
+#include "base/error.h"
+
 namespace tessera {
 namespace {
 
@@ -73,6 +75,45 @@ TEST(FieldConfig, ShapesTheModelAndItsSpace) {
   EXPECT_EQ(shape.colour.inputs, shape.density.outputs + shape.harmonicsDegree * shape.harmonicsDegree);
   EXPECT_FALSE(config.space().contracted);
   EXPECT_EQ(config.space().gridResolution, 64);
+}
+
+TEST(FieldConfig, NamesSettingsThatMakeNoModel) {
+  EXPECT_NO_THROW(FieldConfig().check());
+  for (const char* assignment : {"width=17",
+                                 "grid_features=3",
+                                 "grid_levels=0",
+                                 "grid_levels=65",
+                                 "grid_log2_size=60",
+                                 "grid_base=0",
+                                 "grid_finest=8",
+                                 "occupancy_resolution=30",
+                                 "occupancy_resolution=0",
+                                 "samples_per_step=-5",
+                                 "most_rays=0",
+                                 "first_rays=1000000",
+                                 "density_hidden=0",
+                                 "colour_hidden=-1",
+                                 "min_step=0",
+                                 "min_step=nan",
+                                 "far=-1",
+                                 "occupancy_every=0",
+                                 "occupancy_share=2",
+                                 "rate=nan",
+                                 "rate=-1",
+                                 "steps_per_photo=0",
+                                 "photo_budget_mib=-1",
+                                 "roi_margin=0",
+                                 "distortion=inf"}) {
+    FieldConfig config;
+    setConfigField(config.fields(), assignment);
+    const std::string key = std::string(assignment).substr(0, std::string(assignment).find('='));
+    try {
+      config.check();
+      ADD_FAILURE() << assignment;
+    } catch (const Error& error) {
+      EXPECT_NE(error.subject().find(key), std::string::npos) << error.what();
+    }
+  }
 }
 
 }  // namespace

@@ -29,10 +29,8 @@ class CubeScene {
 
   CubeScene() : CubeScene(Options()) {}
   explicit CubeScene(const Options& options) : options_(options) {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
     static int count = 0;
-    root_ = fs::temp_directory_path() /
-            ("tessera-" + std::string(test->name()) + "-" + std::to_string(::getpid()) + "-" + std::to_string(count++));
+    root_ = fs::temp_directory_path() / ("tessera-cube-" + std::to_string(::getpid()) + "-" + std::to_string(count++));
     fs::remove_all(root_);
     fs::create_directories(root_);
     makeCapture();

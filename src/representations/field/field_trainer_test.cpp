@@ -149,8 +149,8 @@ TEST(FieldTrainer, RecoversTheExposuresOfPhotos) {
   const CubeScene scene(options);
   FieldConfig config = cubeConfig();
   config.exposure = true;
-  config.exposureRate = 3e-3;
-  TrainedCube trained(scene, config, 300);
+  config.exposureRate = 8e-3;
+  TrainedCube trained(scene, config, 400);
   const auto file = decodeSafetensors(trained.trainer->save());
   ASSERT_TRUE(file);
   const auto gains = file->require("state", "exposures", TensorType::f32).as<float>();
@@ -163,8 +163,8 @@ TEST(FieldTrainer, RecoversTheExposuresOfPhotos) {
     }
     EXPECT_NEAR(mean[0] + mean[1] + mean[2], 0, 0.05 * static_cast<double>(photos.size()));  // none overall
     for (int i = 0; i < 3; ++i) mean[i] /= count[i];
-    EXPECT_NEAR(mean[1] - mean[0], 0.55, 0.12) << channel;
-    EXPECT_NEAR(mean[2] - mean[0], 0.35, 0.12) << channel;
+    EXPECT_NEAR(mean[1] - mean[0], 0.55, 0.15) << channel;
+    EXPECT_NEAR(mean[2] - mean[0], 0.35, 0.15) << channel;
   }
 }
 

@@ -1,0 +1,393 @@
+// The program as people use it: what it says, what it leaves on disk, and how it ends.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <regex>
+
+#include "base/image_io.h"
+#include "tests/program.h"
+
+namespace tessera {
+namespace {
+
+using nlohmann::json;
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+// Settings that make a model in a moment.
+const std::vector<std::string> kTiny = {"grid_levels=4",
+                                        "grid_log2_size=10",
+                                        "grid_finest=64",
+                                        "width=16",
+                                        "colour_hidden=1",
+                                        "min_step=0.05",
+                                        "cone=0.1",
+                                        "far=8",
+                                        "first_rays=128",
+                                        "most_rays=512",
+                                        "samples_per_step=2048",
+                                        "occupancy_resolution=16",
+                                        "occupancy_warm_up=16",
+                                        "rate=0.02"};
+
+class CommandLine : public testing::Test {
+ protected:
+  // One city for all tests.
+  static void SetUpTestSuite() {
+    folder_ = fs::weakly_canonical(fs::temp_directory_path()) / ("tessera-command-line-" + std::to_string(::getpid()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    const Said said = run({"synth", "city", city(), "--blocks", "1x1", "--photos", "10", "--size", "48x36", "--samples",
+                           "1", "--seed", "3"});
+    ASSERT_EQ(said.exitCode, 0) << said.err;
+    EXPECT_TRUE(contains(said.out, "10 photos")) << said.out;
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder_); }
+
+  static Said run(const std::vector<std::string>& arguments) { return Program(folder_, arguments).wait(); }
+
+  static std::string at(const std::string& name) { return (folder_ / name).string(); }
+  static std::string city() { return at("city"); }
+
+  static std::vector<std::string> trainArguments(const std::string& model, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"train", city(), model};
+    for (const std::string& setting : kTiny) arguments.insert(arguments.end(), {"--set", setting});
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+  static Said train(const std::string& model, const std::vector<std::string>& more) {
+    return run(trainArguments(model, more));
+  }
+  static Bytes checkpoint(const std::string& model) {
+    const json manifest = json::parse(readTextFile(fs::path(model) / "manifest.json"));
+    return readFile(fs::path(model) / manifest.at("files").at(0).get<std::string>());
+  }
+  // A model of a few steps, made once.
+  static std::string model() {
+    const std::string made = at("model");
+    if (!fs::exists(made)) {
+      const Said said = train(made, {"--steps", "6"});
+      EXPECT_EQ(said.exitCode, 0) << said.err;
+    }
+    return made;
+  }
+
+  // Fails with exit code 1 and one line of the one form; the line.
+  static std::string failureOf(const std::vector<std::string>& arguments) {
+    const Said said = run(arguments);
+    std::string command;
+    for (const std::string& word : arguments) command += word + " ";
+    EXPECT_EQ(said.exitCode, 1) << command << said.out << said.err;
+    const size_t begin = said.err.find("tessera: error: ");
+    EXPECT_NE(begin, std::string::npos) << command << said.err;
+    if (begin == std::string::npos) return {};
+    const std::string line = said.err.substr(begin);
+    EXPECT_TRUE(begin == 0 || said.err[begin - 1] == '\n') << said.err;
+    EXPECT_EQ(line.find('\n'), line.size() - 1) << command << "more than one line: " << line;
+    EXPECT_TRUE(std::regex_search(line, std::regex("^tessera: error: .+: .+; .+\n$"))) << command << line;
+    EXPECT_FALSE(contains(line, "internal")) << command << line;
+    return line;
+  }
+  static std::string usageErrorOf(const std::vector<std::string>& arguments) {
+    const Said said = run(arguments);
+    std::string command;
+    for (const std::string& word : arguments) command += word + " ";
+    EXPECT_EQ(said.exitCode, 2) << command << said.out << said.err;
+    EXPECT_TRUE(said.out.empty()) << command << said.out;
+    EXPECT_FALSE(said.err.empty()) << command;
+    return said.err;
+  }
+
+  static fs::path folder_;
+};
+
+fs::path CommandLine::folder_;
+
+TEST_F(CommandLine, HelpOfEveryVerbHasDefaultsAndAnExample) {
+  const std::vector<std::vector<std::string>> verbs = {
+      {"synth", "city"}, {"import"},           {"train"},         {"eval"}, {"render"},
+      {"info"},          {"bench", "compute"}, {"bench", "train"}};
+  for (std::vector<std::string> verb : verbs) {
+    std::string name = "tessera";
+    for (const std::string& word : verb) name += " " + word;
+    verb.push_back("--help");
+    const Said said = run(verb);
+    EXPECT_EQ(said.exitCode, 0) << name;
+    EXPECT_TRUE(said.err.empty()) << said.err;
+    EXPECT_TRUE(contains(said.out, "Example")) << name << "\n" << said.out;
+    EXPECT_TRUE(contains(said.out, name + " ")) << name << "\n" << said.out;
+    if (verb[0] != "info") {
+      EXPECT_TRUE(std::regex_search(said.out, std::regex("\\[[^\\]]+\\]"))) << said.out;
+    }
+  }
+  const Said said = run({"--help"});
+  EXPECT_EQ(said.exitCode, 0);
+  for (const auto& verb : verbs) EXPECT_TRUE(contains(said.out, "  " + verb[0] + " ")) << said.out;
+}
+
+TEST_F(CommandLine, SaysItsVersion) {
+  const Said said = run({"--version"});
+  EXPECT_EQ(said.exitCode, 0);
+  EXPECT_TRUE(std::regex_search(said.out, std::regex("\\d+\\.\\d+\\.\\d+"))) << said.out;
+}
+
+TEST_F(CommandLine, EndsWithTwoWhenItIsUsedWrongly) {
+  usageErrorOf({});
+  usageErrorOf({"fly"});
+  usageErrorOf({"train"});
+  usageErrorOf({"train", city()});
+  usageErrorOf({"train", city(), at("m"), "--stops", "3"});
+  usageErrorOf({"train", city(), at("m"), "--steps", "many"});
+  usageErrorOf({"train", city(), at("m"), "--steps", "3", "--minutes", "1"});
+  usageErrorOf({"train", city(), at("m"), "--minutes", "-1"});
+  usageErrorOf({"train", city(), at("m"), "--method", "guess"});
+  usageErrorOf({"train", city(), at("m"), "--threads", "-3"});
+  usageErrorOf({"eval", model(), city(), "--split", "best"});
+  usageErrorOf({"import", city()});
+  usageErrorOf({"import", city(), at("i"), "--downscale", "0"});
+  usageErrorOf({"render", model(), at("r")});
+  usageErrorOf({"bench"});
+  EXPECT_FALSE(fs::exists(at("m")));
+}
+
+TEST_F(CommandLine, RefusesSizesThatAreNone) {
+  for (const char* size : {"640", "640x", "x480", "0x10", "640x480x3", "-1x5", "640 x 480"}) {
+    EXPECT_TRUE(contains(usageErrorOf({"synth", "city", at("none"), "--size", size}), size));
+    EXPECT_TRUE(contains(usageErrorOf({"render", model(), at("r"), "--views", city(), "--size", size}), size));
+  }
+  EXPECT_FALSE(fs::exists(at("none")));
+}
+
+TEST_F(CommandLine, ExplainsWhatIsWrongWithAFolder) {
+  fs::create_directories(at("empty"));
+  EXPECT_TRUE(contains(failureOf({"import", at("missing"), at("out1")}), at("missing")));
+  EXPECT_TRUE(contains(failureOf({"import", at("empty"), at("out1")}), at("empty")));
+  EXPECT_TRUE(contains(failureOf({"train", at("missing"), at("out1")}), at("missing")));
+  EXPECT_TRUE(contains(failureOf({"train", at("empty"), at("out1")}), "tessera import"));
+  EXPECT_TRUE(contains(failureOf({"info", at("missing")}), at("missing")));
+  EXPECT_TRUE(contains(failureOf({"info", at("empty")}), at("empty")));
+  EXPECT_TRUE(contains(failureOf({"eval", at("empty"), city()}), at("empty")));
+  EXPECT_TRUE(contains(failureOf({"eval", city(), city()}), "tessera train"));
+  EXPECT_TRUE(contains(failureOf({"eval", model(), model()}), model()));
+  EXPECT_TRUE(contains(failureOf({"eval", model(), at("missing")}), at("missing")));
+  EXPECT_TRUE(contains(failureOf({"render", at("missing"), at("out1"), "--views", city()}), at("missing")));
+  EXPECT_TRUE(contains(failureOf({"render", model(), at("out1"), "--path", at("missing.json")}), "missing.json"));
+  EXPECT_FALSE(fs::exists(at("out1") + "/transforms.json"));
+}
+
+TEST_F(CommandLine, RecognisesAPlainFolderOfPhotosAndSaysWhatToDo) {
+  for (int i = 0; i < 3; ++i) writePng(folder_ / "plain" / (std::to_string(i) + ".png"), ImageU8(8, 6, 3, 90));
+  EXPECT_TRUE(contains(failureOf({"import", at("plain"), at("out2")}), "colmap"));
+}
+
+TEST_F(CommandLine, ExplainsWhatIsWrongWithSettings) {
+  const auto failure = [&](const std::string& setting) {
+    return failureOf({"train", city(), at("unset"), "--steps", "1", "--set", setting});
+  };
+  EXPECT_TRUE(contains(failure("rat=3"), "did you mean 'rate'?"));
+  EXPECT_TRUE(contains(failure("rate=fast"), "rate wants a number"));
+  EXPECT_TRUE(contains(failure("rate"), "rate"));
+  EXPECT_TRUE(contains(failure("loss=hinge"), "hinge"));
+  writeFileAtomically(folder_ / "wrong.toml", "rate = 1\nwidht = 64\n");
+  const std::string file = failureOf({"train", city(), at("unset"), "--config", at("wrong.toml")});
+  EXPECT_TRUE(contains(file, "wrong.toml: line 2")) << file;
+  EXPECT_TRUE(contains(file, "did you mean 'width'?")) << file;
+  EXPECT_FALSE(fs::exists(at("unset") + "/manifest.json"));
+}
+
+TEST_F(CommandLine, ExplainsSettingsThatMakeNoModel) {
+  for (const char* setting :
+       {"width=17", "grid_features=3", "grid_levels=0", "occupancy_resolution=30", "samples_per_step=0",
+        "samples_per_step=-5", "most_rays=0", "density_hidden=0", "min_step=0", "occupancy_every=0", "rate=nan",
+        "steps_per_photo=0", "grid_log2_size=60"}) {
+    const std::string line = failureOf({"train", city(), at("unset"), "--steps", "1", "--set", setting});
+    const std::string key = std::string(setting).substr(0, std::string(setting).find('='));
+    EXPECT_TRUE(contains(line, key)) << setting << ": " << line;
+  }
+}
+
+TEST_F(CommandLine, DoesNotTouchAModelUnlessToldToGoOn) {
+  const Bytes before = checkpoint(model());
+  EXPECT_TRUE(contains(failureOf(trainArguments(model(), {"--steps", "9"})), "--resume"));
+  EXPECT_EQ(checkpoint(model()), before);
+}
+
+TEST_F(CommandLine, ExplainsModelsThatAreBroken) {
+  const auto copied = [&](const std::string& name) {
+    fs::copy(model(), at(name), fs::copy_options::recursive);
+    return at(name);
+  };
+  const std::string truncated = copied("truncated");
+  const fs::path block = fs::path(truncated) / "blocks/0/step-6.safetensors";
+  fs::resize_file(block, fs::file_size(block) / 2);
+  EXPECT_TRUE(contains(failureOf({"eval", truncated, city()}), block.string()));
+  EXPECT_TRUE(contains(failureOf({"train", city(), truncated, "--resume", "--steps", "9"}), block.string()));
+  fs::remove(block);
+  EXPECT_TRUE(contains(failureOf({"eval", truncated, city()}), "step-6.safetensors"));
+
+  const std::string unlisted = copied("unlisted");
+  fs::remove(fs::path(unlisted) / "manifest.json");
+  EXPECT_TRUE(contains(failureOf({"eval", unlisted, city()}), "manifest.json"));
+  EXPECT_TRUE(contains(failureOf({"render", unlisted, at("r"), "--views", city()}), "manifest.json"));
+
+  const std::string foreign = copied("foreign");
+  json manifest = json::parse(readTextFile(fs::path(foreign) / "manifest.json"));
+  manifest["method"] = "mesh";
+  writeFileAtomically(fs::path(foreign) / "manifest.json", manifest.dump());
+  EXPECT_TRUE(contains(failureOf({"train", city(), foreign, "--resume", "--steps", "9"}), "mesh"));
+
+  const std::string misset = copied("misset");
+  writeFileAtomically(fs::path(misset) / "config.toml", "grid_levels = 5\n");
+  EXPECT_TRUE(contains(failureOf({"eval", misset, city()}), "step-6.safetensors"));
+}
+
+TEST_F(CommandLine, ExplainsCapturesThatAreBroken) {
+  fs::copy(city(), at("cut"), fs::copy_options::recursive);
+  const fs::path transforms = folder_ / "cut/transforms.json";
+  const std::string whole = readTextFile(transforms);
+  writeFileAtomically(transforms, whole.substr(0, whole.size() / 2));
+  for (const std::vector<std::string>& command : {std::vector<std::string>{"train", at("cut"), at("out3")},
+                                                  {"info", at("cut")},
+                                                  {"eval", model(), at("cut")},
+                                                  {"import", at("cut"), at("out3")}}) {
+    EXPECT_TRUE(contains(failureOf(command), "transforms.json"));
+  }
+  writeFileAtomically(transforms, whole);
+  const fs::path photo = folder_ / "cut" / json::parse(whole).at("frames").at(2).at("file_path").get<std::string>();
+  const Bytes picture = readFile(photo);
+  writeFileAtomically(photo, std::span(picture).first(picture.size() / 2));
+  std::vector<std::string> command = trainArguments(at("out3"), {"--steps", "3"});
+  command[1] = at("cut");
+  EXPECT_TRUE(contains(failureOf(command), photo.filename().string()));
+  fs::remove(photo);
+  EXPECT_TRUE(contains(failureOf(command), photo.filename().string()));
+}
+
+TEST_F(CommandLine, ExplainsWhenItCannotWrite) {
+  writeFileAtomically(folder_ / "file", "in the way");
+  EXPECT_TRUE(contains(failureOf({"synth", "city", at("file/city"), "--photos", "2", "--size", "16x12"}), at("file")));
+  EXPECT_TRUE(contains(failureOf(trainArguments(at("file/model"), {"--steps", "2"})), at("file")));
+  EXPECT_TRUE(contains(failureOf({"eval", model(), city(), "--json", at("file/eval.json")}), at("file")));
+  EXPECT_TRUE(contains(failureOf({"render", model(), at("file/frames"), "--views", city()}), at("file")));
+}
+
+TEST_F(CommandLine, RefusesDevicesThatAreNone) {
+  failureOf(trainArguments(at("none"), {"--device", "abacus"}));
+}
+
+TEST_F(CommandLine, GoesTheWholeWayFromACityToPictures) {
+  const std::string trained = at("whole");
+  Said said = train(trained, {"--steps", "12", "--json"});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  const json training = json::parse(said.out);
+  EXPECT_EQ(training.at("step"), 12);
+  EXPECT_EQ(training.at("finished"), true);
+  EXPECT_GT(training.at("psnr"), 3);
+  for (const char* file : {"config.toml", "blocks.json", "manifest.json", "metrics.jsonl"}) {
+    EXPECT_TRUE(fs::exists(fs::path(trained) / file)) << file;
+  }
+  const std::string metrics = readTextFile(fs::path(trained) / "metrics.jsonl");
+  const json line = json::parse(metrics.substr(0, metrics.find('\n')));
+  for (const char* key :
+       {"step", "seconds", "loss", "psnr", "rays_per_second", "samples_per_second", "peak_rss_bytes"}) {
+    EXPECT_TRUE(line.contains(key)) << key;
+  }
+
+  said = run({"eval", trained, city(), "--json", "-", "--report", at("report.html"), "--images", at("images")});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  const json evaluation = json::parse(said.out);
+  EXPECT_GT(evaluation.at("psnr"), 3);
+  EXPECT_TRUE(evaluation.at("ssim").is_number());
+  EXPECT_TRUE(evaluation.at("lpips").is_null());
+  EXPECT_TRUE(evaluation.at("seconds_per_frame").is_number());
+  EXPECT_TRUE(contains(evaluation.at("device"), "cpu"));
+  ASSERT_GT(evaluation.at("views").size(), 0u);
+  for (const json& view : evaluation.at("views")) {
+    EXPECT_TRUE(view.at("name").is_string());
+    EXPECT_TRUE(view.at("psnr").is_number());
+    EXPECT_TRUE(view.at("ssim").is_number());
+  }
+  EXPECT_TRUE(contains(readTextFile(at("report.html")), "<html"));
+  EXPECT_FALSE(fs::is_empty(at("images")));
+
+  said = run({"render", trained, at("frames"), "--views", city(), "--size", "24x18"});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  size_t frames = 0;
+  for (const auto& entry : fs::directory_iterator(at("frames"))) {
+    const ImageInfo info = probeImageFile(entry.path());
+    EXPECT_EQ(info.width, 24);
+    EXPECT_EQ(info.height, 18);
+    ++frames;
+  }
+  EXPECT_EQ(frames, evaluation.at("views").size());
+
+  said = run({"info", trained, "--json"});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  const json about = json::parse(said.out);
+  EXPECT_EQ(about.at("kind"), "model");
+  EXPECT_EQ(about.at("method"), "field");
+  EXPECT_EQ(about.at("step"), 12);
+  said = run({"info", city(), "--json"});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_EQ(json::parse(said.out).at("kind"), "capture");
+  EXPECT_EQ(json::parse(said.out).at("photos"), 10);
+  said = run({"info", trained});
+  EXPECT_EQ(said.exitCode, 0);
+  EXPECT_TRUE(contains(said.out, "field")) << said.out;
+}
+
+TEST_F(CommandLine, EndsWithTheSameBytesHoweverOftenItIsKilled) {
+  Said said = train(at("unbroken"), {"--steps", "150", "--threads", "1"});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  int killed = 0;
+  for (const int milliseconds : {0, 40, 90, 170}) {
+    Program program(folder_, trainArguments(at("killed"), {"--steps", "150", "--resume", "--checkpoint-seconds", "0"}));
+    waitForFile(program, folder_ / "killed/manifest.json");
+    std::this_thread::sleep_for(std::chrono::milliseconds(milliseconds));
+    program.kill(SIGKILL);
+    killed += program.wait().exitCode == 128 + SIGKILL;
+  }
+  EXPECT_GT(killed, 0);
+  said = train(at("killed"), {"--steps", "150", "--resume", "--threads", "2"});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_EQ(checkpoint(at("killed")), checkpoint(at("unbroken")));
+}
+
+TEST_F(CommandLine, SavesAndLeavesInPeaceWhenItIsInterrupted) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const std::string name = at("interrupted-" + std::to_string(signal));
+    Program program(folder_, trainArguments(name, {"--steps", "100000000"}));
+    waitForFile(program, name + "/blocks.json");
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    program.kill(signal);
+    const Said said = program.wait();
+    EXPECT_EQ(said.exitCode, 0) << said.err;
+    EXPECT_TRUE(contains(said.out, "--resume")) << said.out;
+    const json manifest = json::parse(readTextFile(fs::path(name) / "manifest.json"));
+    EXPECT_EQ(manifest.at("planned_steps"), 100000000);
+    EXPECT_FALSE(checkpoint(name).empty());
+  }
+}
+
+TEST_F(CommandLine, ImportsPhotographsFromTheWild) {
+  const char* shared = std::getenv("TESSERA_SHARED_DATA");
+  for (const char* name : {"fox", "brighton_beach"}) {
+    if (shared == nullptr || !fs::is_directory(fs::path(shared) / name)) {
+      GTEST_SKIP() << "TESSERA_SHARED_DATA/" << name << " is not there";
+    }
+  }
+  for (const char* name : {"fox", "brighton_beach"}) {
+    Said said = run({"import", (fs::path(shared) / name).string(), at(name), "--downscale", "8"});
+    ASSERT_EQ(said.exitCode, 0) << said.err;
+    EXPECT_TRUE(contains(said.out, std::string(name) == "fox" ? "50 photos" : "18 photos")) << said.out;
+    said = run({"info", at(name), "--json"});
+    EXPECT_EQ(json::parse(said.out).at("kind"), "capture");
+    EXPECT_GT(json::parse(said.out).at("test"), 0);
+  }
+}
+
+}  // namespace
+}  // namespace tessera
