@@ -23,7 +23,9 @@ void onInterrupt(int signal) {
 
 }  // namespace
 
-bool interrupted() { return interrupts > 0; }
+bool interrupted() {
+  return interrupts > 0;
+}
 
 void catchInterrupts() {
   std::signal(SIGINT, onInterrupt);
@@ -40,8 +42,9 @@ void addDeviceFlags(CLI::App& verb, DeviceOptions& options) {
 }  // namespace tessera
 
 int main(int argc, char** argv) {
-  CLI::App app("tessera turns photographs of a large place into a neural scene.\n"
-               "  photos -import-> capture -train-> model -eval, render-> pictures");
+  CLI::App app(
+      "tessera turns photographs of a large place into a neural scene.\n"
+      "  photos -import-> capture -train-> model -eval, render-> pictures");
   app.name("tessera");
   app.require_subcommand(1);
   app.option_defaults()->always_capture_default();
@@ -61,8 +64,9 @@ int main(int argc, char** argv) {
   } catch (const tessera::Error& error) {
     std::fprintf(stderr, "tessera: error: %s\n", error.what());
   } catch (const std::bad_alloc&) {
-    std::fprintf(stderr, "tessera: error: memory: this machine has not enough; lower --set samples_per_step or "
-                         "photo_budget_mib\n");
+    std::fprintf(stderr,
+                 "tessera: error: memory: this machine has not enough; lower --set samples_per_step or "
+                 "photo_budget_mib\n");
   } catch (const std::exception& error) {
     std::fprintf(stderr, "tessera: error: internal: %s; please report it\n", error.what());
   }

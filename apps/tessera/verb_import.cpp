@@ -11,7 +11,8 @@ void addImportVerb(CLI::App& app) {
     ImportOptions options;
   };
   auto flags = std::make_shared<Flags>();
-  CLI::App* verb = app.add_subcommand("import", "photographs with poses (COLMAP, nerfstudio, instant-ngp, Blender) to a capture");
+  CLI::App* verb =
+      app.add_subcommand("import", "photographs with poses (COLMAP, nerfstudio, instant-ngp, Blender) to a capture");
   verb->footer("Example:\n  tessera import flight/ flight.capture --downscale 4");
   verb->add_option("source", flags->source, "folder with photos and poses")->required();
   verb->add_option("out", flags->out, "capture folder to write")->required();

@@ -28,7 +28,8 @@ ordered_json describeCapture(const fs::path& folder) {
     info["cameras"].push_back({{"lens", lensName(camera.lens)}, {"width", camera.width}, {"height", camera.height}});
   }
   if (capture.geo) {
-    info["origin"] = {{"latitude", capture.geo->latitude}, {"longitude", capture.geo->longitude},
+    info["origin"] = {{"latitude", capture.geo->latitude},
+                      {"longitude", capture.geo->longitude},
                       {"altitude", capture.geo->altitude}};
   }
   return info;

@@ -47,7 +47,8 @@ std::vector<View> viewsOfPath(const CameraPath& path, const Mat4d& sourceFromWor
   for (const CameraPathView& view : path.views) {
     Pose pose = view.worldFromCamera;
     pose.translation = (worldFromSource * pose.translation.homogeneous()).head<3>();
-    pose.rotation = Eigen::Quaterniond(Mat3d(worldFromSource.topLeftCorner<3, 3>() * pose.rotation / scale)).normalized();
+    pose.rotation =
+        Eigen::Quaterniond(Mat3d(worldFromSource.topLeftCorner<3, 3>() * pose.rotation / scale)).normalized();
     views.push_back({fmt::format("{:05}", views.size()), path.cameraOf(view), pose});
   }
   return views;
@@ -77,8 +78,9 @@ ImageU8 finished(const RenderedView& view, const Eigen::Array3f& background) {
 void addRenderVerb(CLI::App& app) {
   auto flags = std::make_shared<RenderFlags>();
   CLI::App* verb = app.add_subcommand("render", "pictures of a model: PNGs into a folder, or an .mp4 through ffmpeg");
-  verb->footer("Examples:\n  tessera render fox.model frames/ --views fox.capture\n"
-               "  tessera render fox.model flight.mp4 --path camera_path.json --size 1280x720");
+  verb->footer(
+      "Examples:\n  tessera render fox.model frames/ --views fox.capture\n"
+      "  tessera render fox.model flight.mp4 --path camera_path.json --size 1280x720");
   verb->add_option("model", flags->model, "model folder")->required();
   verb->add_option("out", flags->out, "folder for PNGs, or a file ending in .mp4")->required();
   CLI::Option* views = verb->add_option("--views", flags->views, "draw the views of this capture");

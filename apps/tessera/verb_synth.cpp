@@ -34,7 +34,9 @@ void addSynthVerb(CLI::App& app) {
   verb->add_option("--photos", flags->city.photos, "photos; 0: as many as the size wants")->capture_default_str();
   verb->add_option("--size", flags->size, "photo size in pixels")->capture_default_str();
   verb->add_option("--seed", flags->city.seed, "another city")->capture_default_str();
-  verb->add_option("--altitudes", flags->city.altitudes, "flights, metres above ground")->delimiter(',')->capture_default_str();
+  verb->add_option("--altitudes", flags->city.altitudes, "flights, metres above ground")
+      ->delimiter(',')
+      ->capture_default_str();
   verb->add_flag("--traffic", flags->city.traffic, "cars that move between photos, with masks");
   verb->add_option("--exposure-jitter", flags->city.exposureJitter, "spread of the photos' exposure, in stops")
       ->capture_default_str();

@@ -51,10 +51,11 @@ void addTrainVerb(CLI::App& app) {
     const std::unique_ptr<Device> device = makeDevice(flags->device);
     const TrainingResult result = trainField(*device, readCapture(flags->capture), flags->model, flags->options);
     if (flags->json) {
-      fmt::print("{{\"step\": {}, \"planned_steps\": {}, \"finished\": {}, \"seconds\": {:.3f}, \"psnr\": {:.4f}, "
-                 "\"samples_per_second\": {:.0f}, \"device\": \"{}\"}}\n",
-                 result.step, result.plannedSteps, result.finished, result.seconds, result.psnr,
-                 result.samplesPerSecond, device->name());
+      fmt::print(
+          "{{\"step\": {}, \"planned_steps\": {}, \"finished\": {}, \"seconds\": {:.3f}, \"psnr\": {:.4f}, "
+          "\"samples_per_second\": {:.0f}, \"device\": \"{}\"}}\n",
+          result.step, result.plannedSteps, result.finished, result.seconds, result.psnr, result.samplesPerSecond,
+          device->name());
     } else {
       fmt::print("{}: {} of {} steps in {:.0f} s, {:.2f} dB on the training photos, {:.2f} M samples/s on {}\n",
                  flags->model, result.step, result.plannedSteps, result.seconds, result.psnr,

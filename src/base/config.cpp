@@ -81,7 +81,8 @@ void setConfigField(const std::vector<ConfigField>& fields, std::string_view ass
                 "did you mean '" + nearest(fields, name) + "'?");
   }
   if (equals == std::string_view::npos || !assign(*field, assignment.substr(equals + 1))) {
-    throw Error("--set " + std::string(assignment), "", name + " wants " + typeName(*field), "write " + name + "=VALUE");
+    throw Error("--set " + std::string(assignment), "", name + " wants " + typeName(*field),
+                "write " + name + "=VALUE");
   }
 }
 

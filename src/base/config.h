@@ -1,5 +1,5 @@
-// Settings as plain structs. A struct lists its fields once; that list is the flag, the default, the help text, the `--set`
-// key and the line in config.toml.
+// Settings as plain structs. A struct lists its fields once; that list is the flag, the default, the help text, the
+// `--set` key and the line in config.toml.
 #pragma once
 
 #include <cstdint>

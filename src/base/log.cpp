@@ -17,7 +17,11 @@ spdlog::logger& logger() {
 
 }  // namespace
 
-void logWarning(const std::string& text) { logger().warn("{}", text); }
-void logInfo(const std::string& text) { logger().info("{}", text); }
+void logWarning(const std::string& text) {
+  logger().warn("{}", text);
+}
+void logInfo(const std::string& text) {
+  logger().info("{}", text);
+}
 
 }  // namespace tessera

@@ -14,12 +14,12 @@ struct Adam {
   float beta1 = 0.9f, beta2 = 0.99f;
   float epsilon = 1e-15f;
   float l2 = 0;
-  bool skipZeroGradients = false;   // for hash tables: no moment decay, no count
-  Slice<float> parameters;          // [n]
-  Slice<float> gradients;           // [n]; zero afterwards
-  Slice<float> firstMoments;        // [n]
-  Slice<float> secondMoments;       // [n]
-  Slice<uint32_t> counts;           // [n]: steps taken
+  bool skipZeroGradients = false;  // for hash tables: no moment decay, no count
+  Slice<float> parameters;         // [n]
+  Slice<float> gradients;          // [n]; zero afterwards
+  Slice<float> firstMoments;       // [n]
+  Slice<float> secondMoments;      // [n]
+  Slice<uint32_t> counts;          // [n]: steps taken
 };
 
 }  // namespace tessera

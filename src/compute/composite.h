@@ -18,16 +18,16 @@ struct CompositeForward {
   Extinction extinction = Extinction::logDensity;
   float minTransmittance = 1e-4f;
   Count rays;
-  Slice<const uint32_t> firstSample;   // [rays + 1]
-  Matrix<const float> x;               // 1 column: opacity, density or log density
-  Slice<const float> steps;            // [samples]; not read for opacity
-  Slice<const float> distances;        // [samples]
-  Matrix<const float> colours;         // [samples], 3 columns
-  Slice<const float> background;       // optional, [rays][3]; else black
-  Slice<float> colour;                 // [rays][3]
-  Slice<float> opacity;                // [rays]
-  Slice<float> depth;                  // [rays]
-  Slice<float> weights;                // [samples]
+  Slice<const uint32_t> firstSample;  // [rays + 1]
+  Matrix<const float> x;              // 1 column: opacity, density or log density
+  Slice<const float> steps;           // [samples]; not read for opacity
+  Slice<const float> distances;       // [samples]
+  Matrix<const float> colours;        // [samples], 3 columns
+  Slice<const float> background;      // optional, [rays][3]; else black
+  Slice<float> colour;                // [rays][3]
+  Slice<float> opacity;               // [rays]
+  Slice<float> depth;                 // [rays]
+  Slice<float> weights;               // [samples]
 };
 
 // Overwrites xGradients, colourGradients (of samples) for all samples of the rays, zero behind the stop.
@@ -40,13 +40,13 @@ struct CompositeBackward {
   Slice<const float> steps;
   Slice<const float> distances;
   Matrix<const float> colours;
-  Slice<const float> background;          // optional
-  Slice<const float> rayColourGradients;  // [rays][3]
-  Slice<const float> rayOpacityGradients; // optional, [rays]
-  Slice<const float> rayDepthGradients;   // optional, [rays]
-  Slice<const float> weightGradients;     // optional, [samples]: of any other function of the weights (distortion)
-  Slice<float> xGradients;                // [samples]
-  Matrix<float> colourGradients;          // [samples], 3 columns
+  Slice<const float> background;           // optional
+  Slice<const float> rayColourGradients;   // [rays][3]
+  Slice<const float> rayOpacityGradients;  // optional, [rays]
+  Slice<const float> rayDepthGradients;    // optional, [rays]
+  Slice<const float> weightGradients;      // optional, [samples]: of any other function of the weights (distortion)
+  Slice<float> xGradients;                 // [samples]
+  Matrix<float> colourGradients;           // [samples], 3 columns
 };
 
 }  // namespace tessera

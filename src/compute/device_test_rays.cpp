@@ -254,8 +254,7 @@ OperationTests testsOf<ScatterRows>() {
                                a.rows = stage.count(size);
                                a.target = stage.input(target);
                                a.input = stage.randomMatrix(size.capacity, columns, Layout::plain, -1, 1);
-                               a.output =
-                                   stage.outputMatrix("output", 2 * size.capacity, columns, Layout::strided, 0);
+                               a.output = stage.outputMatrix("output", 2 * size.capacity, columns, Layout::strided, 0);
                                stage.device.run(a);
                              }});
   return tests;

@@ -9,9 +9,9 @@ namespace tessera {
 struct SphericalHarmonicsForward {
   int degree = 4;
   Count samples;
-  Slice<const float> directions;       // [rays][3]
-  Slice<const uint32_t> rayOfSample;   // optional, [capacity]: which direction a sample has; else its own index
-  Matrix<float> encoded;               // [capacity][degree²], row-major
+  Slice<const float> directions;      // [rays][3]
+  Slice<const uint32_t> rayOfSample;  // optional, [capacity]: which direction a sample has; else its own index
+  Matrix<float> encoded;              // [capacity][degree²], row-major
 };
 
 // Overwrites `directionGradients` (per sample). The gradient is of the polynomials as functions on R³.
@@ -21,7 +21,7 @@ struct SphericalHarmonicsBackward {
   Slice<const float> directions;
   Slice<const uint32_t> rayOfSample;
   Matrix<const float> encodedGradients;
-  Slice<float> directionGradients;     // [capacity][3]
+  Slice<float> directionGradients;  // [capacity][3]
 };
 
 // x, then sin(2^k x) for k in [0, frequencies), then cos(2^k x): per k all input components (MERF's order).
@@ -30,8 +30,8 @@ struct FrequencyForward {
   int dimensions = 3;
   int frequencies = 4;
   Count samples;
-  Slice<const float> inputs;           // [capacity][dimensions]
-  Matrix<float> encoded;               // row-major
+  Slice<const float> inputs;  // [capacity][dimensions]
+  Matrix<float> encoded;      // row-major
 };
 
 // Overwrites `inputGradients`.
@@ -41,7 +41,7 @@ struct FrequencyBackward {
   Count samples;
   Slice<const float> inputs;
   Matrix<const float> encodedGradients;
-  Slice<float> inputGradients;         // [capacity][dimensions]
+  Slice<float> inputGradients;  // [capacity][dimensions]
 };
 
 }  // namespace tessera

@@ -15,18 +15,18 @@ namespace tessera {
 
 struct HashGridOptions {
   int levels = 16;
-  int features = 2;            // per entry: 1, 2, 4 or 8
-  int log2TableSize = 17;      // most entries of one level
+  int features = 2;        // per entry: 1, 2, 4 or 8
+  int log2TableSize = 17;  // most entries of one level
   int baseResolution = 16;
   int finestResolution = 2048;
 };
 
 struct HashGridLevel {
-  float scale = 0;             // resolution - 1, before rounding up
-  uint32_t resolution = 0;     // lattice points per axis
-  uint32_t entries = 0;        // a multiple of 8; a power of two where hashed
+  float scale = 0;          // resolution - 1, before rounding up
+  uint32_t resolution = 0;  // lattice points per axis
+  uint32_t entries = 0;     // a multiple of 8; a power of two where hashed
   bool hashed = false;
-  size_t firstEntry = 0;       // of this level, in the one table of all levels
+  size_t firstEntry = 0;  // of this level, in the one table of all levels
 };
 
 struct HashGrid {
@@ -60,10 +60,10 @@ struct HashGridBackward {
   const HashGrid& grid;
   Count samples;
   Slice<const float> positions;
-  Slice<const float> table;               // read only for position gradients
-  Matrix<const float> encodedGradients;   // as `encoded`
-  Slice<float> tableGradients;            // [grid.entries()][features]
-  Slice<float> positionGradients;         // optional, [capacity][3]
+  Slice<const float> table;              // read only for position gradients
+  Matrix<const float> encodedGradients;  // as `encoded`
+  Slice<float> tableGradients;           // [grid.entries()][features]
+  Slice<float> positionGradients;        // optional, [capacity][3]
 };
 
 }  // namespace tessera

@@ -13,14 +13,14 @@ enum class ColourLossKind { mse, huber, charbonnier };
 // Loss = scale · Σ_rays weight · Σ_channels f(predicted - target). Gradient with respect to `predicted`.
 struct ColourLoss {
   ColourLossKind kind = ColourLossKind::huber;
-  float parameter = 0.1f;              // δ or ε
-  float scale = 1;                     // usually 1 / (3 · rays)
+  float parameter = 0.1f;  // δ or ε
+  float scale = 1;         // usually 1 / (3 · rays)
   Count rays;
-  Slice<const float> predicted;        // [rays][3]
-  Slice<const float> target;           // [rays][3]
-  Slice<const float> weights;          // optional, [rays]: 0 takes a ray out (masks)
-  Slice<float> loss;                   // [2], overwritten: the loss, and Σ weight · Σ r² (for PSNR)
-  Slice<float> gradients;              // [rays][3], overwritten
+  Slice<const float> predicted;  // [rays][3]
+  Slice<const float> target;     // [rays][3]
+  Slice<const float> weights;    // optional, [rays]: 0 takes a ray out (masks)
+  Slice<float> loss;             // [2], overwritten: the loss, and Σ weight · Σ r² (for PSNR)
+  Slice<float> gradients;        // [rays][3], overwritten
 };
 
 // Distortion (Barron et al. 2022, eq. 15) in O(n) per ray, on normalised positions s = g(t), g(t) = t/2 for t < 1,
@@ -29,21 +29,21 @@ struct ColourLoss {
 struct DistortionLoss {
   float scale = 1;
   Count rays;
-  Slice<const uint32_t> firstSample;   // [rays + 1]
-  Slice<const float> weights;          // [samples]
-  Slice<const float> distances;        // [samples]
-  Slice<const float> steps;            // [samples]
-  Slice<float> loss;                   // [1], overwritten
-  Slice<float> weightGradients;        // [samples], overwritten
+  Slice<const uint32_t> firstSample;  // [rays + 1]
+  Slice<const float> weights;         // [samples]
+  Slice<const float> distances;       // [samples]
+  Slice<const float> steps;           // [samples]
+  Slice<float> loss;                  // [1], overwritten
+  Slice<float> weightGradients;       // [samples], overwritten
 };
 
 // Per-photo exposure: exposed = colour · 2^(logGain[photo of ray]) per channel, in the trained colour space.
 struct ExposureForward {
   Count rays;
-  Slice<const float> colours;          // [rays][3]
-  Slice<const uint32_t> photoOfRay;    // [rays]
-  Slice<const float> logGains;         // [photos][3]
-  Slice<float> exposed;                // [rays][3]
+  Slice<const float> colours;        // [rays][3]
+  Slice<const uint32_t> photoOfRay;  // [rays]
+  Slice<const float> logGains;       // [photos][3]
+  Slice<float> exposed;              // [rays][3]
 };
 
 // Overwrites colourGradients, adds to logGainGradients.
@@ -52,9 +52,9 @@ struct ExposureBackward {
   Slice<const float> colours;
   Slice<const uint32_t> photoOfRay;
   Slice<const float> logGains;
-  Slice<const float> exposedGradients; // [rays][3]
-  Slice<float> colourGradients;        // [rays][3]; may be the same memory as exposedGradients
-  Slice<float> logGainGradients;       // [photos][3]
+  Slice<const float> exposedGradients;  // [rays][3]
+  Slice<float> colourGradients;         // [rays][3]; may be the same memory as exposedGradients
+  Slice<float> logGainGradients;        // [photos][3]
 };
 
 }  // namespace tessera

@@ -36,8 +36,8 @@ struct Slice {
   }
   // Slice<T> → Slice<const T>
   template <class U>
-    requires(std::is_same_v<T, const U>)
-  Slice(const Slice<U>& other) : memory(other.memory), first(other.first), count(other.count) {}
+  requires(std::is_same_v<T, const U>) Slice(const Slice<U>& other)
+      : memory(other.memory), first(other.first), count(other.count) {}
 
   explicit operator bool() const { return memory != nullptr; }
   Slice part(size_t from, size_t length) const {
@@ -67,7 +67,9 @@ class Array {
 };
 
 // The same memory as 32-bit floats, for operations that only move bits.
-inline Slice<float> asFloats(const Slice<uint32_t>& words) { return Slice<float>(words.memory, words.first, words.count); }
+inline Slice<float> asFloats(const Slice<uint32_t>& words) {
+  return Slice<float>(words.memory, words.first, words.count);
+}
 inline Slice<const float> asFloats(const Slice<const uint32_t>& words) {
   return Slice<const float>(words.memory, words.first, words.count);
 }
@@ -95,8 +97,7 @@ struct Matrix {
   Matrix(Slice<T> slice, uint32_t width) : data(slice), columns(width), rowStride(width) {}
   Matrix(Slice<T> slice, uint32_t width, uint32_t stride) : data(slice), columns(width), rowStride(stride) {}
   template <class U>
-    requires(std::is_same_v<T, const U>)
-  Matrix(const Matrix<U>& other)
+  requires(std::is_same_v<T, const U>) Matrix(const Matrix<U>& other)
       : data(other.data),
         columns(other.columns),
         rowStride(other.rowStride),

@@ -1,5 +1,5 @@
-// Small fully connected networks without biases, as tiny-cuda-nn's fully fused MLP: ReLU between layers, sizes padded to
-// multiples of 16. Padding inputs read as zero. Widths 16 to 128.
+// Small fully connected networks without biases, as tiny-cuda-nn's fully fused MLP: ReLU between layers, sizes padded
+// to multiples of 16. Padding inputs read as zero. Widths 16 to 128.
 #pragma once
 
 #include "compute/memory.h"
@@ -10,8 +10,8 @@ enum class OutputActivation { none, sigmoid };
 
 struct MlpShape {
   int inputs = 32;
-  int width = 64;         // 16, 32, 64 or 128
-  int hiddenLayers = 1;   // at least 1
+  int width = 64;        // 16, 32, 64 or 128
+  int hiddenLayers = 1;  // at least 1
   int outputs = 16;
   OutputActivation activation = OutputActivation::none;
 
@@ -32,10 +32,10 @@ struct MlpShape {
 struct MlpForward {
   const MlpShape& shape;
   Count samples;
-  Matrix<const float> input;     // [capacity][inputs]
-  Slice<const float> weights;    // [shape.parameters()]
-  Matrix<float> output;          // [capacity][outputs], row-major
-  Slice<float> activations;      // optional, [hiddenLayers][capacity][width]: kept for backward (after ReLU)
+  Matrix<const float> input;   // [capacity][inputs]
+  Slice<const float> weights;  // [shape.parameters()]
+  Matrix<float> output;        // [capacity][outputs], row-major
+  Slice<float> activations;    // optional, [hiddenLayers][capacity][width]: kept for backward (after ReLU)
 };
 
 // Adds to `weightGradients`; overwrites `inputGradients`.
@@ -44,13 +44,13 @@ struct MlpBackward {
   Count samples;
   Matrix<const float> input;
   Slice<const float> weights;
-  Matrix<const float> output;              // read only when the output activation needs it
-  Slice<const float> activations;          // from forward
-  Matrix<const float> outputGradients;     // [capacity][outputs], row-major; with respect to the activated output
-  Slice<const float> firstOutputGradients; // optional, [capacity]: added to the gradient of output 0 (a density that
-                                           // compositing and a colour network both use)
-  Slice<float> weightGradients;            // [shape.parameters()]
-  Matrix<float> inputGradients;            // optional, [capacity][inputs]
+  Matrix<const float> output;               // read only when the output activation needs it
+  Slice<const float> activations;           // from forward
+  Matrix<const float> outputGradients;      // [capacity][outputs], row-major; with respect to the activated output
+  Slice<const float> firstOutputGradients;  // optional, [capacity]: added to the gradient of output 0 (a density that
+                                            // compositing and a colour network both use)
+  Slice<float> weightGradients;             // [shape.parameters()]
+  Matrix<float> inputGradients;             // optional, [capacity][inputs]
 };
 
 }  // namespace tessera

@@ -7,9 +7,9 @@ namespace tessera {
 
 // One photo's view as kernels see it. The pose is in scene units (the region of interest is the cube [-1,1]³).
 struct RayCamera {
-  int32_t lens = 1;              // LensModel
-  float parameters[16] = {};     // as scene/camera.h
-  float rotation[9] = {};        // sceneFromCamera, row-major
+  int32_t lens = 1;           // LensModel
+  float parameters[16] = {};  // as scene/camera.h
+  float rotation[9] = {};     // sceneFromCamera, row-major
   float centre[3] = {};
 };
 static_assert(sizeof(RayCamera) == 4 * (1 + 16 + 9 + 3));
@@ -19,10 +19,10 @@ static_assert(sizeof(RayCamera) == 4 * (1 + 16 + 9 + 3));
 struct GenerateRays {
   Count rays;
   Slice<const RayCamera> cameras;
-  Slice<const uint32_t> cameraOfRay;   // [capacity]
-  Slice<const float> pixels;           // [capacity][2]
-  Slice<float> origins;                // [capacity][3]
-  Slice<float> directions;             // [capacity][3], unit
+  Slice<const uint32_t> cameraOfRay;  // [capacity]
+  Slice<const float> pixels;          // [capacity][2]
+  Slice<float> origins;               // [capacity][3]
+  Slice<float> directions;            // [capacity][3], unit
 };
 
 // What lies between a ray and its samples.
@@ -39,75 +39,75 @@ struct GenerateRays {
 //          n(t_b) + (t - t_b) / maxStep                    t > t_b
 struct MarchSpace {
   bool contracted = true;
-  int gridResolution = 128;      // cells per axis, a multiple of 4 and at most 512
+  int gridResolution = 128;  // cells per axis, a multiple of 4 and at most 512
   float near = 0.05f;
   float far = 100.0f;
-  float minStep = 0.00338f;      // 2√3 / 1024
+  float minStep = 0.00338f;  // 2√3 / 1024
   float maxStep = 1e10f;
-  float cone = 1.0f / 256;       // 0: uniform steps
+  float cone = 1.0f / 256;  // 0: uniform steps
 
-  double stepIndex(double t) const;       // n(t)
-  double distanceAt(double n) const;      // t(n), the inverse
+  double stepIndex(double t) const;   // n(t)
+  double distanceAt(double n) const;  // t(n), the inverse
 };
 
 // The intervals of a ray are [t(k + jitter), t(k + 1 + jitter)] for integers k ≥ ceil(n(near) - jitter), as long as the
-// middle (the mean of both ends) is below min(far, farOfRay). Cell of a point: floor(u · resolution) per axis, clamped to
-// the grid when contracted; a middle outside the cube of a bounded space has no cell. Work in double.
-// A sample sits at the middle of its interval [t(n), t(n+1)]. Only samples whose middle lies in an occupied cell are
-// made; empty cells are left by exact plane intersections and whole steps, so the samples are those of brute force.
-// Rays are finished in order while samples fit; a ray that would pass `sampleCapacity` gets none, and so do all after it.
+// middle (the mean of both ends) is below min(far, farOfRay). Cell of a point: floor(u · resolution) per axis, clamped
+// to the grid when contracted; a middle outside the cube of a bounded space has no cell. Work in double. A sample sits
+// at the middle of its interval [t(n), t(n+1)]. Only samples whose middle lies in an occupied cell are made; empty
+// cells are left by exact plane intersections and whole steps, so the samples are those of brute force. Rays are
+// finished in order while samples fit; a ray that would pass `sampleCapacity` gets none, and so do all after it.
 struct MarchRays {
   const MarchSpace& space;
   Count rays;
   uint32_t sampleCapacity = 0;
-  Slice<const float> origins;            // [rays][3]
-  Slice<const float> directions;         // [rays][3]
-  Slice<const float> jitter;             // optional, [rays], in [0,1) lattice steps; else 0
-  Slice<const float> farOfRay;           // optional, [rays]: the ray ends there (opaque models)
-  Slice<const uint32_t> occupancy;       // bits, cell (x,y,z) at x + R·(y + R·z), least significant first
-  Slice<uint32_t> firstSample;           // [rays + 1]: samples of ray r are [firstSample[r], firstSample[r+1])
-  Slice<uint32_t> sampleCount;           // [1]: total made
-  Slice<uint32_t> finishedRays;          // optional, [1]: rays that fit; the counter of what follows
-  Slice<uint32_t> rayOfSample;           // [sampleCapacity]
-  Slice<float> positions;                // [sampleCapacity][3], grid coordinates in [0,1]
-  Slice<float> distances;                // [sampleCapacity]: t of the middle
-  Slice<float> steps;                    // [sampleCapacity]: t(n+1) - t(n)
+  Slice<const float> origins;       // [rays][3]
+  Slice<const float> directions;    // [rays][3]
+  Slice<const float> jitter;        // optional, [rays], in [0,1) lattice steps; else 0
+  Slice<const float> farOfRay;      // optional, [rays]: the ray ends there (opaque models)
+  Slice<const uint32_t> occupancy;  // bits, cell (x,y,z) at x + R·(y + R·z), least significant first
+  Slice<uint32_t> firstSample;      // [rays + 1]: samples of ray r are [firstSample[r], firstSample[r+1])
+  Slice<uint32_t> sampleCount;      // [1]: total made
+  Slice<uint32_t> finishedRays;     // optional, [1]: rays that fit; the counter of what follows
+  Slice<uint32_t> rayOfSample;      // [sampleCapacity]
+  Slice<float> positions;           // [sampleCapacity][3], grid coordinates in [0,1]
+  Slice<float> distances;           // [sampleCapacity]: t of the middle
+  Slice<float> steps;               // [sampleCapacity]: t(n+1) - t(n)
 };
 
-// Which samples to look up next: of each ray that is still transparent, the next `most` behind the `lookedAt` first ones,
-// whose log densities are known. A ray is done when Σ density · step of those passes -ln(minTransmittance). Rays get
-// theirs in order while they fit `selectedCapacity`; a ray that does not gets none, and so do all after it. Looked up
-// in stages, samples behind surfaces are never looked at.
+// Which samples to look up next: of each ray that is still transparent, the next `most` behind the `lookedAt` first
+// ones, whose log densities are known. A ray is done when Σ density · step of those passes -ln(minTransmittance). Rays
+// get theirs in order while they fit `selectedCapacity`; a ray that does not gets none, and so do all after it. Looked
+// up in stages, samples behind surfaces are never looked at.
 struct SelectSamples {
   Count rays;
   uint32_t sampleCapacity = 0;
   uint32_t selectedCapacity = 0;
   uint32_t most = 0;
   float minTransmittance = 1e-4f;
-  Slice<const uint32_t> firstSample;     // [rays + 1]
-  Matrix<const float> logDensity;        // [sampleCapacity], 1 column
-  Slice<const float> steps;              // [sampleCapacity]
-  Slice<uint32_t> lookedAt;              // [rays], read and advanced
-  Slice<uint32_t> selected;              // [selectedCapacity]: samples, in order
-  Slice<uint32_t> selectedCount;         // [1]
+  Slice<const uint32_t> firstSample;  // [rays + 1]
+  Matrix<const float> logDensity;     // [sampleCapacity], 1 column
+  Slice<const float> steps;           // [sampleCapacity]
+  Slice<uint32_t> lookedAt;           // [rays], read and advanced
+  Slice<uint32_t> selected;           // [selectedCapacity]: samples, in order
+  Slice<uint32_t> selectedCount;      // [1]
 };
 
 // Keeps of each ray the samples in front of the point where its transmittance falls below `minTransmittance`
 // (the one that crosses included). logDensity as in Composite.
 struct CompactSamples {
   Count rays;
-  uint32_t sampleCapacity = 0;           // of the input
-  uint32_t keptCapacity = 0;             // rays whose samples no longer fit keep none, and so do all after
+  uint32_t sampleCapacity = 0;  // of the input
+  uint32_t keptCapacity = 0;    // rays whose samples no longer fit keep none, and so do all after
   float minTransmittance = 1e-4f;
-  Slice<const uint32_t> firstSample;     // [rays + 1]
-  Slice<const uint32_t> lookedAt;        // optional, [rays]: only so many samples of a ray have a log density
-  Matrix<const float> logDensity;        // 1 column
+  Slice<const uint32_t> firstSample;  // [rays + 1]
+  Slice<const uint32_t> lookedAt;     // optional, [rays]: only so many samples of a ray have a log density
+  Matrix<const float> logDensity;     // 1 column
   Slice<const float> steps;
-  Slice<uint32_t> keptFirstSample;       // [rays + 1]
-  Slice<uint32_t> keptCount;             // [1]
-  Slice<uint32_t> finishedRays;          // optional, [1]: rays before the first that did not fit, or that is still
-                                         // transparent where lookedAt ends short of its samples
-  Slice<uint32_t> source;                // [keptCapacity]: the sample that a kept one was
+  Slice<uint32_t> keptFirstSample;  // [rays + 1]
+  Slice<uint32_t> keptCount;        // [1]
+  Slice<uint32_t> finishedRays;     // optional, [1]: rays before the first that did not fit, or that is still
+                                    // transparent where lookedAt ends short of its samples
+  Slice<uint32_t> source;           // [keptCapacity]: the sample that a kept one was
 };
 
 // output row i = input row source[i]. 32-bit elements of any kind.
@@ -115,7 +115,7 @@ struct GatherRows {
   Count rows;
   Slice<const uint32_t> source;
   Matrix<const float> input;
-  Matrix<float> output;                  // same layout kind and columns
+  Matrix<float> output;  // same layout kind and columns
 };
 
 // output row target[i] = input row i. Targets differ. 32-bit elements of any kind.
@@ -123,7 +123,7 @@ struct ScatterRows {
   Count rows;
   Slice<const uint32_t> target;
   Matrix<const float> input;
-  Matrix<float> output;                  // row-major, same columns
+  Matrix<float> output;  // row-major, same columns
 };
 
 }  // namespace tessera

@@ -65,7 +65,8 @@ void RadianceField::reserve(uint32_t samples) {
 }
 
 Matrix<float> RadianceField::byLevel(Array<float>& encodings) {
-  return Matrix<float>::grouped(encodings, shape_.grid.columns(), static_cast<uint32_t>(shape_.grid.features), capacity_);
+  return Matrix<float>::grouped(encodings, shape_.grid.columns(), static_cast<uint32_t>(shape_.grid.features),
+                                capacity_);
 }
 
 Matrix<const float> RadianceField::logDensity(Count samples, Slice<const float> positions) {
@@ -96,8 +97,16 @@ void RadianceField::backward(Count samples, Slice<const float> positions, Slice<
                              Matrix<const float> colourGradients) {
   const Matrix<float> input(colourInput_, shape_.colour.inputs);
   const Matrix<float> inputGradients(colourInputGradients_, shape_.colour.inputs);
-  device_.run(MlpBackward{shape_.colour, samples, input, colour_.values, Matrix<float>(colours_, 3),
-                          colourActivations_, colourGradients, {}, colour_.gradients, inputGradients});
+  device_.run(MlpBackward{shape_.colour,
+                          samples,
+                          input,
+                          colour_.values,
+                          Matrix<float>(colours_, 3),
+                          colourActivations_,
+                          colourGradients,
+                          {},
+                          colour_.gradients,
+                          inputGradients});
   const Matrix<float> encodedGradients = byLevel(encodedGradients_);
   device_.run(MlpBackward{shape_.density, samples, byLevel(encoded_), density_.values,
                           input.columnRange(0, kGeometryFeatures), densityActivations_,

@@ -1,5 +1,6 @@
 // Instant-NGP's radiance field (Müller et al. 2022, section 5.4): a hash grid, a density network whose first output is
-// the logarithm of density, and a colour network that sees all its outputs and the view direction in spherical harmonics.
+// the logarithm of density, and a colour network that sees all its outputs and the view direction in spherical
+// harmonics.
 #pragma once
 
 #include "field/parameters.h"
@@ -17,7 +18,8 @@ RadianceFieldShape makeRadianceFieldShape(const HashGridOptions& grid, int width
 
 class RadianceField {
  public:
-  // Tables U(±1e-4), networks Xavier uniform on padded sizes; a function of `seed` alone. Keeps a reference to `device`.
+  // Tables U(±1e-4), networks Xavier uniform on padded sizes; a function of `seed` alone. Keeps a reference to
+  // `device`.
   RadianceField(Device& device, RadianceFieldShape shape, uint64_t seed);
 
   // Room for this many samples in the calls below.
@@ -52,10 +54,10 @@ class RadianceField {
   ParameterGroup table_, density_, colour_;
   uint32_t capacity_ = 0;
   Array<float> encoded_, encodedGradients_;  // [levels][capacity][features]
-  Array<float> colourInput_;              // [capacity][geometry features + harmonics]
-  Array<float> colours_;                  // [capacity][3]
+  Array<float> colourInput_;                 // [capacity][geometry features + harmonics]
+  Array<float> colours_;                     // [capacity][3]
   Array<float> densityActivations_, colourActivations_;
-  Array<float> colourInputGradients_;     // as colourInput_
+  Array<float> colourInputGradients_;  // as colourInput_
 };
 
 }  // namespace tessera

@@ -82,7 +82,8 @@ void ModelFolder::writePlacement(const ModelPlacement& placement, const std::str
       {"capture", fs::absolute(placement.capture).lexically_normal().string()},
       {"source_from_world", sourceFromWorld},
       {"blocks",
-       json::array({{{"id", "0"}, {"centre", {centre.x(), centre.y(), centre.z()}}, {"scale", placement.frame.scale}}})}};
+       json::array(
+           {{{"id", "0"}, {"centre", {centre.x(), centre.y(), centre.z()}}, {"scale", placement.frame.scale}}})}};
   writeFileAtomically(root_ / "blocks.json", text.dump(2) + "\n");
 }
 
@@ -95,7 +96,8 @@ ModelPlacement ModelFolder::readPlacement() const {
     for (int axis = 0; axis < 3; ++axis) {
       placement.frame.centre[axis] = block.at("centre").at(axis).get<double>();
     }
-    for (int i = 0; i < 16; ++i) placement.sourceFromWorld(i / 4, i % 4) = parsed.at("source_from_world").at(i).get<double>();
+    for (int i = 0; i < 16; ++i)
+      placement.sourceFromWorld(i / 4, i % 4) = parsed.at("source_from_world").at(i).get<double>();
     placement.frame.scale = block.at("scale").get<double>();
     placement.capture = parsed.at("capture").get<std::string>();
     return placement;

@@ -12,8 +12,8 @@ namespace tessera {
 
 struct ModelManifest {
   std::string method;
-  int64_t step = 0;        // steps done
-  int64_t plannedSteps = 0;  // 0 while `--minutes` has not fixed it
+  int64_t step = 0;                // steps done
+  int64_t plannedSteps = 0;        // 0 while `--minutes` has not fixed it
   std::vector<std::string> files;  // relative, one per block
 };
 
@@ -40,7 +40,8 @@ class ModelFolder {
   void writePlacement(const ModelPlacement& placement, const std::string& method) const;
   ModelPlacement readPlacement() const;
 
-  // The number of steps that `--minutes` came to; kept apart from checkpoints so that it survives a kill before the next.
+  // The number of steps that `--minutes` came to; kept apart from checkpoints so that it survives a kill before the
+  // next.
   void writePlan(int64_t steps) const;
   std::optional<int64_t> readPlan() const;
 

@@ -16,7 +16,8 @@ class OccupancyGrid {
   // Log density at `count` positions ([count][3], grid coordinates); 1 column, valid until the next call.
   using LogDensity = std::function<Matrix<const float>(Count count, Slice<const float> positions)>;
 
-  // One refresh of `uniform` random and `occupied` occupied cells (or all, with uniform = cells), `chunk` points at a time.
+  // One refresh of `uniform` random and `occupied` occupied cells (or all, with uniform = cells), `chunk` points at a
+  // time.
   void update(const LogDensity& logDensity, uint32_t uniform, uint32_t occupied, uint64_t seed, uint32_t chunk);
 
   uint32_t cells() const { return cells_; }

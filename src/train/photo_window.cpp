@@ -21,7 +21,9 @@ constexpr size_t kUnlimited = size_t{1} << 60;
 }  // namespace
 
 PhotoWindow::PhotoWindow(const Capture& capture, std::vector<int> photos, const Settings& settings)
-    : cache_(capture, static_cast<int64_t>(settings.budgetBytes ? settings.budgetBytes : kUnlimited)), photos_(std::move(photos)), settings_(settings) {
+    : cache_(capture, static_cast<int64_t>(settings.budgetBytes ? settings.budgetBytes : kUnlimited)),
+      photos_(std::move(photos)),
+      settings_(settings) {
   CHECK(!photos_.empty());
   size_t total = 0, largest = 1;
   if (settings.budgetBytes > 0) {

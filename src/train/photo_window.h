@@ -12,8 +12,8 @@ namespace tessera {
 class PhotoWindow {
  public:
   struct Settings {
-    size_t budgetBytes = 0;    // of decoded photos; 0: no limit
-    int stepsPerPhoto = 2;     // every so many steps the oldest photo of the window leaves and another comes
+    size_t budgetBytes = 0;  // of decoded photos; 0: no limit
+    int stepsPerPhoto = 2;   // every so many steps the oldest photo of the window leaves and another comes
     uint64_t seed = 0;
   };
 
@@ -39,8 +39,8 @@ class PhotoWindow {
   Settings settings_;
   int size_ = 0;
   bool holdsAll_ = false;
-  int64_t first_ = -1;                          // sequence position of the window's oldest photo
-  std::vector<Entry> entries_;                  // entry i holds the sequence position ≡ i modulo size
+  int64_t first_ = -1;          // sequence position of the window's oldest photo
+  std::vector<Entry> entries_;  // entry i holds the sequence position ≡ i modulo size
   mutable int64_t shuffledEpoch_ = -1;
   mutable std::vector<int> shuffled_;
 };

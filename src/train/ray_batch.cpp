@@ -28,7 +28,8 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, uint64_t seed, int6
       const ImageU8& image = entry.decoded->image;
       const uint32_t x = random.below(draw++, static_cast<uint32_t>(image.width));
       const uint32_t y = random.below(draw++, static_cast<uint32_t>(image.height));
-      const bool masked = !entry.decoded->mask.empty() && *entry.decoded->mask.at(static_cast<int>(x), static_cast<int>(y)) < 128;
+      const bool masked =
+          !entry.decoded->mask.empty() && *entry.decoded->mask.at(static_cast<int>(x), static_cast<int>(y)) < 128;
       batch.weights[ray] = masked ? 0.0f : 1.0f;
       if (masked && attempt + 1 < kTries) continue;
       batch.photoOfRay[ray] = static_cast<uint32_t>(entry.photo);

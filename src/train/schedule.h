@@ -18,14 +18,15 @@ struct RateSchedule {
   double at(int64_t step, int64_t steps) const {
     double value = rate * std::min(1.0, static_cast<double>(step + 1) / (warmUpSteps + 1));
     const double fraction = steps > 0 ? static_cast<double>(step) / static_cast<double>(steps) : 0.0;
-    if (fraction > constantFraction) value *= std::pow(finalFactor, (fraction - constantFraction) / (1 - constantFraction));
+    if (fraction > constantFraction)
+      value *= std::pow(finalFactor, (fraction - constantFraction) / (1 - constantFraction));
     return value;
   }
 };
 
-// `--minutes` as a number of steps, fixed once, early: from the pace in the second half of the first `share` of the time
-// (the first steps, before the scene's empty space is known, are slower). Until then the schedule does not depend on the
-// number of steps.
+// `--minutes` as a number of steps, fixed once, early: from the pace in the second half of the first `share` of the
+// time (the first steps, before the scene's empty space is known, are slower). Until then the schedule does not depend
+// on the number of steps.
 class StepBudget {
  public:
   explicit StepBudget(double minutes, double share = 0.15) : seconds_(minutes * 60), share_(share) {}

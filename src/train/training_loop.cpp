@@ -15,7 +15,9 @@
 namespace tessera {
 namespace {
 
-double psnrOf(double squaredError) { return -10 * std::log10(std::max(squaredError, 1e-10)); }
+double psnrOf(double squaredError) {
+  return -10 * std::log10(std::max(squaredError, 1e-10));
+}
 
 // Means since the last line of metrics.
 struct Window {

@@ -12,8 +12,8 @@ struct StepReport {
   double loss = 0;
   double squaredError = 0;  // mean over colour channels, for PSNR
   uint32_t rays = 0;
-  uint32_t samples = 0;     // that networks were trained on
-  uint32_t marched = 0;     // that density was looked up at
+  uint32_t samples = 0;  // that networks were trained on
+  uint32_t marched = 0;  // that density was looked up at
 };
 
 // One representation in training. The state after a step is a function of the capture, the settings and the step alone.
@@ -29,8 +29,8 @@ class Trainee {
 
 struct TrainingLoopOptions {
   std::string method;
-  int64_t steps = 0;               // when no minutes are given
-  double minutes = 0;              // > 0: fixes the number of steps once, early
+  int64_t steps = 0;   // when no minutes are given
+  double minutes = 0;  // > 0: fixes the number of steps once, early
   double checkpointSeconds = 60;
   bool resume = false;
   bool progress = true;
@@ -43,8 +43,8 @@ struct TrainingResult {
   double seconds = 0, psnr = 0, samplesPerSecond = 0;
 };
 
-// Trains until done, asked to stop, or killed. Throws Error at a loss that is not a number (with the step), and when the
-// folder holds a model and `resume` is off.
+// Trains until done, asked to stop, or killed. Throws Error at a loss that is not a number (with the step), and when
+// the folder holds a model and `resume` is off.
 TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const TrainingLoopOptions& options);
 
 }  // namespace tessera

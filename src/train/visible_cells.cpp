@@ -8,11 +8,11 @@
 namespace tessera {
 namespace {
 
-constexpr int kBlock = 2;              // cells are judged in blocks of 2³
-constexpr size_t kEnough = 20;         // observations of a photo
-constexpr double kNearestShare = 0.02; // of the observations are taken for outliers
+constexpr int kBlock = 2;               // cells are judged in blocks of 2³
+constexpr size_t kEnough = 20;          // observations of a photo
+constexpr double kNearestShare = 0.02;  // of the observations are taken for outliers
 constexpr double kNearShare = 0.8;
-constexpr double kSlack = 0.25;        // of the width: other views look a little past what photos show
+constexpr double kSlack = 0.25;  // of the width: other views look a little past what photos show
 
 // Scene position of a point given in grid coordinates. Nothing for what no point of the scene maps to.
 bool sceneFromGrid(const MarchSpace& space, const Vec3d& u, Vec3d* x) {
@@ -46,8 +46,8 @@ bool sees(const View& view, const Vec3d& xInWorld) {
   const Vec3d x = view.cameraFromWorld * xInWorld;
   if (x.z() < view.near) return false;
   const std::optional<Vec2d> pixel = view.camera->pixelFromCamera(x);
-  return pixel && pixel->x() > -view.slack && pixel->y() > -view.slack && pixel->x() < view.camera->width + view.slack &&
-         pixel->y() < view.camera->height + view.slack;
+  return pixel && pixel->x() > -view.slack && pixel->y() > -view.slack &&
+         pixel->x() < view.camera->width + view.slack && pixel->y() < view.camera->height + view.slack;
 }
 
 }  // namespace
@@ -89,7 +89,8 @@ std::vector<bool> visibleCells(const Capture& capture, const SceneFrame& frame, 
         // The centre and the corners, drawn in a little so that they lie in the block's own region of the contraction.
         for (int corner = 8; corner >= 0 && !visible; --corner) {
           const double reach = corner == 8 ? 0 : 0.98;
-          const Vec3d offset((corner & 1 ? 1 : -1) * reach, (corner & 2 ? 1 : -1) * reach, (corner & 4 ? 1 : -1) * reach);
+          const Vec3d offset((corner & 1 ? 1 : -1) * reach, (corner & 2 ? 1 : -1) * reach,
+                             (corner & 4 ? 1 : -1) * reach);
           const Vec3d u = (Vec3d(x, y, static_cast<double>(z)) + (offset + Vec3d::Ones()) / 2) / blocks;
           Vec3d inScene;
           if (!sceneFromGrid(space, u, &inScene)) continue;

@@ -37,8 +37,10 @@ class CpuDevice final : public Device {
   void finish() override {}
   bool supports(Operation) const override { return true; }
 
-#define TESSERA_FORWARD(name) \
-  void run(const name& arguments) override { cpu::run(context_, arguments); }
+#define TESSERA_FORWARD(name)                \
+  void run(const name& arguments) override { \
+    cpu::run(context_, arguments);           \
+  }
   TESSERA_OPERATIONS(TESSERA_FORWARD)
 #undef TESSERA_FORWARD
 
@@ -49,6 +51,8 @@ class CpuDevice final : public Device {
 
 }  // namespace
 
-std::unique_ptr<Device> makeCpuDevice(int threads) { return std::make_unique<CpuDevice>(threads); }
+std::unique_ptr<Device> makeCpuDevice(int threads) {
+  return std::make_unique<CpuDevice>(threads);
+}
 
 }  // namespace tessera

@@ -134,7 +134,8 @@ void run(Context& context, const FrequencyBackward& a) {
         float sum = g[c];
         for (int k = 0; k < a.frequencies; ++k) {
           const float angle = std::ldexp(inputs[i * n + c], k);
-          sum += std::ldexp(g[n + k * n + c] * std::cos(angle) - g[n + (a.frequencies + k) * n + c] * std::sin(angle), k);
+          sum +=
+              std::ldexp(g[n + k * n + c] * std::cos(angle) - g[n + (a.frequencies + k) * n + c] * std::sin(angle), k);
         }
         out[i * n + c] = sum;
       }

@@ -1,6 +1,6 @@
 // The kernels behind the cpu device, one file per interface header. Each cuts its work into tasks whose inputs and
-// outputs depend on the task's number alone; sums over tasks are taken in task order. That makes the bits independent of
-// the number of threads.
+// outputs depend on the task's number alone; sums over tasks are taken in task order. That makes the bits independent
+// of the number of threads.
 #pragma once
 
 #include "base/threads.h"

@@ -32,7 +32,9 @@ ValueAndSlope robust(ColourLossKind kind, float parameter, float r) {
 }
 
 // MERF's warp of distance (building blocks 7.1).
-float warped(float t) { return t < 1 ? t / 2 : 1 - 1 / (2 * t); }
+float warped(float t) {
+  return t < 1 ? t / 2 : 1 - 1 / (2 * t);
+}
 
 }  // namespace
 
@@ -98,8 +100,8 @@ void run(Context& context, const DistortionLoss& a) {
         const double w = weights[i];
         sum += 2 * w * (m * beforeW - beforeWm) + w * w * width / 3;
         const double afterW = totalW - beforeW - w, afterWm = totalWm - beforeWm - w * m;
-        gradients[i] = static_cast<float>(
-            a.scale * (2 * (m * (beforeW - afterW) + afterWm - beforeWm) + 2.0 / 3 * w * width));
+        gradients[i] =
+            static_cast<float>(a.scale * (2 * (m * (beforeW - afterW) + afterWm - beforeWm) + 2.0 / 3 * w * width));
         beforeW += w;
         beforeWm += w * m;
       }

@@ -23,11 +23,11 @@
 #define TESSERA_CPU_MLP_ONCE
 namespace tessera::cpu {
 
-inline constexpr int kRows = 96;        // samples of a block: a multiple of every tile height below
+inline constexpr int kRows = 96;  // samples of a block: a multiple of every tile height below
 inline constexpr int kMaxWidth = 128;
-inline constexpr int kParts = 32;       // partial weight gradients, whatever the number of threads
+inline constexpr int kParts = 32;  // partial weight gradients, whatever the number of threads
 
-struct BlockBuffers {                   // of one thread
+struct BlockBuffers {  // of one thread
   alignas(128) float input[kRows * kMaxWidth];
   alignas(128) float hidden[2][kRows * kMaxWidth];
   alignas(128) float output[kRows * kMaxWidth];
@@ -46,9 +46,9 @@ using Float = hn::CappedTag<float, 16>;
 using Vector = hn::Vec<Float>;
 
 #if HWY_TARGET <= HWY_AVX3
-constexpr int kWide = 4;          // vectors side by side in a tile: 32 registers
+constexpr int kWide = 4;  // vectors side by side in a tile: 32 registers
 #else
-constexpr int kWide = 2;          // 16 registers
+constexpr int kWide = 2;  // 16 registers
 #endif
 
 // out[r][v] = Σ_k x[r · xRow + k · xStep] · b[k · bRow + v · lanes]
@@ -74,8 +74,8 @@ enum class Finish { none, relu, maskByActivation };
 
 // out[rows][columns] = finish(x[rows][depth] · b[depth][columns]); rows a multiple of R.
 template <int R, int V, Finish kFinish>
-HWY_NOINLINE void productBlock(const float* x, size_t xRow, const float* b, int depth, int columns, int rows, float* out,
-                               size_t outRow, const float* activation, size_t activationRow) {
+HWY_NOINLINE void productBlock(const float* x, size_t xRow, const float* b, int depth, int columns, int rows,
+                               float* out, size_t outRow, const float* activation, size_t activationRow) {
   const Float d;
   const int lanes = static_cast<int>(hn::Lanes(d));
   for (int column = 0; column < columns; column += V * lanes) {
@@ -208,8 +208,8 @@ void forwardBlock(const MlpForward& a, const float* transposed, size_t n, size_t
   const MlpShape& shape = a.shape;
   const int rows = static_cast<int>(std::min<size_t>(kRows, n - first));
   size_t stride = 0;
-  const float* x = blockRows(a.input, hostPointer(a.input.data), first, rows, shape.layerInputs(0), buffers.input,
-                             &stride);
+  const float* x =
+      blockRows(a.input, hostPointer(a.input.data), first, rows, shape.layerInputs(0), buffers.input, &stride);
   float* kept = hostPointer(a.activations);
   for (int l = 0; l < shape.hiddenLayers; ++l) {
     float* h = buffers.hidden[l % 2];
@@ -222,7 +222,8 @@ void forwardBlock(const MlpForward& a, const float* transposed, size_t n, size_t
     stride = shape.width;
   }
   const int last = shape.hiddenLayers, outputs = shape.layerOutputs(last);
-  product<Finish::none>(x, stride, transposed + shape.weightOffset(last), shape.width, outputs, buffers.output, outputs);
+  product<Finish::none>(x, stride, transposed + shape.weightOffset(last), shape.width, outputs, buffers.output,
+                        outputs);
   if (shape.activation == OutputActivation::sigmoid) sigmoidBlock(buffers.output, kRows * outputs);
   unpackRows(buffers.output, outputs, a.output, hostPointer(a.output.data), first, rows);
 }

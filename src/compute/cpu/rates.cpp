@@ -19,7 +19,9 @@ HWY_BEFORE_NAMESPACE();
 namespace tessera::cpu::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-const char* targetName() { return hwy::TargetName(HWY_TARGET); }
+const char* targetName() {
+  return hwy::TargetName(HWY_TARGET);
+}
 
 // Returns the multiply-adds done (lanes counted); the result goes to `sink` so that nothing is optimised away.
 size_t multiplyAdds(size_t rounds, float* sink) {
@@ -61,7 +63,9 @@ double bestRate(double amount, const std::function<void()>& work) {
 
 }  // namespace
 
-const char* simdTarget() { return HWY_DYNAMIC_DISPATCH(targetName)(); }
+const char* simdTarget() {
+  return HWY_DYNAMIC_DISPATCH(targetName)();
+}
 
 double peakFlops(ThreadPool& pool) {
   const size_t threads = pool.threads();

@@ -52,11 +52,11 @@ class Lattice {
 };
 
 struct Cell {
-  double u[3];    // grid coordinates in [0,1]
+  double u[3];  // grid coordinates in [0,1]
   int index[3];
-  int region;     // contracted: axis of the largest coordinate outside the unit cube, or -1 inside
-  double sign;    // of that coordinate
-  bool inside;    // false: bounded and outside the cube
+  int region;   // contracted: axis of the largest coordinate outside the unit cube, or -1 inside
+  double sign;  // of that coordinate
+  bool inside;  // false: bounded and outside the cube
 };
 
 Cell cellAt(const MarchSpace& space, const double x[3]) {
@@ -91,12 +91,14 @@ Cell cellAt(const MarchSpace& space, const double x[3]) {
 }
 
 bool occupied(const uint32_t* bits, int resolution, const Cell& cell) {
-  const size_t i = cell.index[0] + static_cast<size_t>(resolution) * (cell.index[1] + static_cast<size_t>(resolution) * cell.index[2]);
+  const size_t i = cell.index[0] +
+                   static_cast<size_t>(resolution) * (cell.index[1] + static_cast<size_t>(resolution) * cell.index[2]);
   return (bits[i / 32] >> (i % 32)) & 1;
 }
 
-// The distance at which the ray leaves the cell. Every face of a cell is a plane: x_a = c inside; outside, for the region
-// of axis a, x_a = sign · 1/(2 - y) for its own axis and x_b = y · |x_a| for the others; and region borders are |x_b| = |x_a|.
+// The distance at which the ray leaves the cell. Every face of a cell is a plane: x_a = c inside; outside, for the
+// region of axis a, x_a = sign · 1/(2 - y) for its own axis and x_b = y · |x_a| for the others; and region borders are
+// |x_b| = |x_a|.
 double exitDistance(const MarchSpace& space, const Cell& cell, const double o[3], const double d[3], double t) {
   const double width = (space.contracted ? 4.0 : 2.0) / space.gridResolution, origin = space.contracted ? -2.0 : -1.0;
   double exit = 1e30;
@@ -195,8 +197,8 @@ void marchRay(const MarchRays& a, const Lattice& lattice, const uint32_t* bits, 
   }
 }
 
-// How many of a ray's first `count` samples stand in front of the point where it is opaque; `*opaque` tells whether there
-// is one. Transmittance is exp(-Σ σ step): the sum is enough.
+// How many of a ray's first `count` samples stand in front of the point where it is opaque; `*opaque` tells whether
+// there is one. Transmittance is exp(-Σ σ step): the sum is enough.
 uint32_t visibleSamples(const Matrix<const float>& logDensity, const float* data, const float* steps, uint32_t first,
                         uint32_t count, float minTransmittance, bool* opaque) {
   const float most = -std::log(minTransmittance);

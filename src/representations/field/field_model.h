@@ -26,7 +26,8 @@ class FieldModel {
     Slice<const float> origins, directions, jitter, far;
   };
   // Marches rays and keeps what can be seen: samples in front of the point where transmittance has fallen below
-  // `minTransmittance`. Densities are looked up in stages from the front, so that what lies behind surfaces costs little.
+  // `minTransmittance`. Densities are looked up in stages from the front, so that what lies behind surfaces costs
+  // little.
   void sample(const Rays& rays, float minTransmittance, RaySamples& marched, RaySamples& kept);
 
   void refreshOccupancy(uint32_t uniform, uint32_t occupied, uint64_t seed);

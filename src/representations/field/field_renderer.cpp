@@ -24,7 +24,9 @@ FieldRenderer::FieldRenderer(FieldModel& model) : model_(model) {
   weights_ = device.array<float>(kSamples);
 }
 
-std::string FieldRenderer::device() const { return model_.device().name(); }
+std::string FieldRenderer::device() const {
+  return model_.device().name();
+}
 
 RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
   Device& device = model_.device();
@@ -48,7 +50,8 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
     device.run(GenerateRays{{rays, {}}, cameras, cameraOfRay_, pixels_, origins_, directions_});
     const std::vector<float> directions = device.read(directions_.all());
     const auto cosine = [&](size_t ray) {
-      return directions[3 * ray] * forward[2] + directions[3 * ray + 1] * forward[5] + directions[3 * ray + 2] * forward[8];
+      return directions[3 * ray] * forward[2] + directions[3 * ray + 1] * forward[5] +
+             directions[3 * ray + 2] * forward[8];
     };
     Slice<const float> farOfRay;
     if (opaqueDepth != nullptr) {
@@ -86,7 +89,9 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
     std::copy(opacity.begin(), opacity.end(), view.opacity.pixels.begin() + static_cast<ptrdiff_t>(first));
     for (uint32_t ray = 0; ray < finished; ++ray) view.depth.pixels[first + ray] = depth[ray] * cosine(ray) / scale;
     first += finished;
-    const auto perRay = [&](Slice<const uint32_t> counter) { return std::max(1.0, device.read(counter)[0] / (1.0 * finished)); };
+    const auto perRay = [&](Slice<const uint32_t> counter) {
+      return std::max(1.0, device.read(counter)[0] / (1.0 * finished));
+    };
     const double fitting = std::min(0.9 * kMarched / perRay(marched_.count), 0.9 * kSamples / perRay(kept_.count));
     wanted = static_cast<uint32_t>(std::clamp(fitting, 64.0, static_cast<double>(kRays)));
   }

@@ -12,8 +12,8 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kMarchedPerWanted = 16;     // room for samples that are hidden behind others
-constexpr uint32_t kKeptPerWanted = 2;         // and for steps that see more than the last ones did
+constexpr uint32_t kMarchedPerWanted = 16;  // room for samples that are hidden behind others
+constexpr uint32_t kKeptPerWanted = 2;      // and for steps that see more than the last ones did
 constexpr float kMinTransmittance = 1e-4f;
 
 ColourLossKind lossKind(const std::string& name) {
@@ -48,7 +48,8 @@ FieldTrainer::FieldTrainer(Device& device, const Capture& capture, const FieldCo
       config_(config),
       model_(device, config, frame),
       photos_(capture, trainingPhotos(capture),
-              {static_cast<size_t>(config.photoBudgetMiB * 1048576), config.stepsPerPhoto, static_cast<uint64_t>(config.seed)}),
+              {static_cast<size_t>(config.photoBudgetMiB * 1048576), config.stepsPerPhoto,
+               static_cast<uint64_t>(config.seed)}),
       rays_(static_cast<uint32_t>(config.firstRays)),
       cameras_(device.arrayOf(rayCameras(capture, frame))),
       exposures_(device, "exposures", std::vector<float>(capture.photos.size() * 3)) {
@@ -61,7 +62,8 @@ FieldTrainer::FieldTrainer(Device& device, const Capture& capture, const FieldCo
   photoOfRay_ = device.array<uint32_t>(rays);
   for (Array<float>* perRay : {&weights_, &jitter_, &opacity_, &depth_}) *perRay = device.array<float>(rays);
   pixels_ = device.array<float>(size_t{rays} * 2);
-  for (Array<float>* perRay : {&targets_, &backgrounds_, &origins_, &directions_, &colour_, &exposed_, &colourGradients_}) {
+  for (Array<float>* perRay :
+       {&targets_, &backgrounds_, &origins_, &directions_, &colour_, &exposed_, &colourGradients_}) {
     *perRay = device.array<float>(size_t{rays} * 3);
   }
   losses_ = device.array<float>(3);
@@ -103,8 +105,7 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
   const Count samples{capacity, kept_.count};
   const Count rays{rays_, kept_.finishedRays};
   RadianceField& field = model_.field();
-  const RadianceField::Output output =
-      field.forward(samples, kept_.positions, directions_, kept_.rayOfSample, true);
+  const RadianceField::Output output = field.forward(samples, kept_.positions, directions_, kept_.rayOfSample, true);
 
   CompositeForward composite;
   composite.minTransmittance = kMinTransmittance;
@@ -178,7 +179,8 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
 
   const double perRay = std::max(1.0, static_cast<double>(report.samples)) / std::max(1u, report.rays);
   const double marchedPerRay = std::max(1.0, static_cast<double>(report.marched)) / std::max(1u, report.rays);
-  const double wanted = std::min(config_.samplesPerStep / perRay, 0.9 * static_cast<double>(marched_.distances.size()) / marchedPerRay);
+  const double wanted =
+      std::min(config_.samplesPerStep / perRay, 0.9 * static_cast<double>(marched_.distances.size()) / marchedPerRay);
   const double rounded = std::ceil(wanted / 64) * 64;
   rays_ = static_cast<uint32_t>(std::clamp<double>(rounded, 64, config_.mostRays));
   return report;

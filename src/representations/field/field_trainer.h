@@ -30,7 +30,7 @@ class FieldTrainer final : public Trainee {
   FieldConfig config_;
   FieldModel model_;
   PhotoWindow photos_;
-  uint32_t rays_;            // of the next step
+  uint32_t rays_;  // of the next step
   RayBatch batch_;
   Array<RayCamera> cameras_;
   ParameterGroup exposures_;  // [photos][3], log2 gains

@@ -12,8 +12,8 @@ TrainingResult trainField(Device& device, const Capture& capture, const fs::path
   const SceneFrame frame = goingOn ? folder.readPlacement().frame : fitSceneFrame(capture, options.config.roiMargin);
   FieldTrainer trainer(device, capture, options.config, frame);
   if (!folder.manifest()) {
-      writeFileAtomically(folder.configPath(), configToToml(options.config.fields()));
-      folder.writePlacement({frame, capture.sourceFromWorld, capture.root}, options.loop.method);
+    writeFileAtomically(folder.configPath(), configToToml(options.config.fields()));
+    folder.writePlacement({frame, capture.sourceFromWorld, capture.root}, options.loop.method);
   }
   return runTraining(trainer, folder, options.loop);
 }
