@@ -46,6 +46,7 @@ void addTrainVerb(CLI::App& app) {
     if (!flags->configFile.empty()) configFromToml(config.fields(), flags->configFile);
     for (const std::string& setting : flags->settings) setConfigField(config.fields(), setting);
     if (seed->count() > 0) config.seed = flags->seed;
+    if (flags->options.loop.resume) requireSameConfig(flags->model, config);
     catchInterrupts();
     flags->options.loop.stopRequested = interrupted;
     const std::unique_ptr<Device> device = makeDevice(flags->device);

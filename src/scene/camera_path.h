@@ -14,8 +14,8 @@
 namespace tessera {
 
 struct CameraPathView {
-  // In the world that the file speaks of, camera axes already ours. That is the capture's source world: subtract
-  // Capture::sourceFromWorldOffset from the translation (and from nothing else) before rendering.
+  // In the world that the file speaks of, camera axes already ours. That is the capture's source world: apply the inverse
+  // of Capture::sourceFromWorld before rendering.
   Pose worldFromCamera;
   double verticalFieldOfView = 50;  // degrees
 };

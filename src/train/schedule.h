@@ -29,11 +29,11 @@ struct RateSchedule {
 // on the number of steps.
 class StepBudget {
  public:
-  explicit StepBudget(double minutes, double share = 0.15) : seconds_(minutes * 60), share_(share) {}
+  explicit StepBudget(double minutes, double share = 0.25) : seconds_(minutes * 60), share_(share) {}
 
   // Seconds since training began, after `step` steps. Returns the number of steps once it can be told, else 0.
   int64_t observe(int64_t step, double seconds) {
-    if (seconds < share_ / 2 * seconds_) return 0;
+    if (seconds < 0.8 * share_ * seconds_) return 0;
     if (measureStep_ < 0) {
       measureStep_ = step;
       measureStart_ = seconds;

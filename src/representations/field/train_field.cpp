@@ -1,6 +1,8 @@
 #include "representations/field/train_field.h"
 
-#include "base/log.h"
+#include <fmt/format.h>
+
+#include "base/error.h"
 
 namespace tessera {
 
@@ -23,6 +25,18 @@ FieldConfig resumedFieldConfig(const fs::path& model) {
   const ModelFolder folder(model);
   if (fs::exists(folder.configPath())) configFromToml(config.fields(), folder.configPath());
   return config;
+}
+
+void requireSameConfig(const fs::path& model, FieldConfig config) {
+  if (!ModelFolder(model).manifest()) return;
+  FieldConfig saved = resumedFieldConfig(model);
+  const std::vector<ConfigField> before = saved.fields(), now = config.fields();
+  for (size_t i = 0; i < now.size(); ++i) {
+    const std::string was = configValueText(before[i]), is = configValueText(now[i]);
+    if (was == is) continue;
+    throw Error(model.string(), "config.toml", fmt::format("the run has {}={}, not {}", now[i].name, was, is),
+                "resume without that setting, or train into another folder");
+  }
 }
 
 }  // namespace tessera

@@ -16,4 +16,7 @@ TrainingResult trainField(Device& device, const Capture& capture, const fs::path
 // The settings of the run that `model` holds; the defaults when it holds none.
 FieldConfig resumedFieldConfig(const fs::path& model);
 
+// Throws Error when `model` holds a run of other settings: resumed, it would be repeatable from neither.
+void requireSameConfig(const fs::path& model, FieldConfig config);
+
 }  // namespace tessera
