@@ -34,10 +34,9 @@ namespace tessera {
   X(FrequencyBackward)          \
   X(GenerateRays)               \
   X(MarchRays)                  \
-  X(SelectSamples)              \
+  X(OpticalDepth)               \
   X(CompactSamples)             \
   X(GatherRows)                 \
-  X(ScatterRows)                \
   X(OccupancyPoints)            \
   X(OccupancyUpdate)            \
   X(CompositeForward)           \

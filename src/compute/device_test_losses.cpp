@@ -123,15 +123,21 @@ OperationTests testsOf<ExposureForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is ExposureBackward";
   for (const Size& size : kSizes)
-    tests.cases.push_back({"rays " + toString(size), [=](Stage& stage) {
-                             ExposureForward a;
-                             a.rays = stage.count(size);
-                             a.colours = stage.randomInput(3 * size.capacity, 0, 1);
-                             a.photoOfRay = stage.input(stage.random.wordsBelow(size.capacity, 7));
-                             a.logGains = stage.randomInput(3 * 7, -2, 2);
-                             a.exposed = stage.output("exposed", 3 * size.capacity);
-                             stage.device.run(a);
-                           }});
+    for (bool background : {false, true})
+      tests.cases.push_back(
+          {fmt::format("rays {}{}", toString(size), background ? ", background" : ""), [=](Stage& stage) {
+             ExposureForward a;
+             a.rays = stage.count(size);
+             a.colours = stage.randomInput(3 * size.capacity, 0, 1);
+             if (background) {
+               a.opacity = stage.randomInput(size.capacity, 0, 1);
+               a.background = stage.randomInput(3 * size.capacity, 0, 1);
+             }
+             a.photoOfRay = stage.input(stage.random.wordsBelow(size.capacity, 7));
+             a.logGains = stage.randomInput(3 * 7, -2, 2);
+             a.exposed = stage.output("exposed", 3 * size.capacity);
+             stage.device.run(a);
+           }});
   return tests;
 }
 
@@ -140,7 +146,7 @@ OperationTests testsOf<ExposureBackward>() {
   OperationTests tests;
   for (const Size& size : kSizes)
     for (bool inPlace : {false, true})
-      tests.cases.push_back({fmt::format("rays {}{}", toString(size), inPlace ? ", in place" : ""), [=](Stage& stage) {
+      tests.cases.push_back({fmt::format("rays {}{}", toString(size), inPlace ? ", in place, background" : ""), [=](Stage& stage) {
                                const std::vector<float> upstream = stage.random.floats(3 * size.capacity, -1, 1);
                                ExposureBackward a;
                                a.rays = stage.count(size);
@@ -148,6 +154,8 @@ OperationTests testsOf<ExposureBackward>() {
                                a.photoOfRay = stage.input(stage.random.wordsBelow(size.capacity, 7));
                                a.logGains = stage.randomInput(3 * 7, -2, 2);
                                if (inPlace) {
+                                 a.background = stage.randomInput(3 * size.capacity, 0, 1);
+                                 a.opacityGradients = stage.output("opacityGradients", size.capacity);
                                  a.colourGradients = stage.output("colourGradients", upstream);
                                  a.exposedGradients = a.colourGradients;
                                } else {
@@ -162,29 +170,36 @@ OperationTests testsOf<ExposureBackward>() {
          const uint32_t rays = 23, photos = 3;
          const std::vector<float> colours = stage.random.floats(3 * rays, 0, 1);
          const std::vector<float> gains = stage.random.floats(3 * photos, -1, 1);
+         const std::vector<float> opacity = stage.random.floats(rays, 0, 1);
+         const std::vector<float> background = stage.random.floats(3 * rays, 0, 1);
          const std::vector<float> upstream = stage.random.floats(3 * rays, -1, 1);
          const std::vector<uint32_t> photoOfRay = stage.random.wordsBelow(rays, photos);
          ExposureBackward a;
          a.rays.capacity = rays;
          a.colours = stage.input(colours);
+         a.background = stage.input(background);
          a.photoOfRay = stage.input(photoOfRay);
          a.logGains = stage.input(gains);
          a.exposedGradients = stage.input(upstream);
          a.colourGradients = stage.output("colourGradients", 3 * rays);
+         a.opacityGradients = stage.output("opacityGradients", rays);
          a.logGainGradients = stage.input(std::vector<float>(3 * photos));
          stage.device.run(a);
-         const auto loss = [&](View c, View g) {
+         const auto loss = [&](View c, View o, View g) {
            double sum = 0;
            for (size_t i = 0; i < c.size(); ++i)
-             sum += upstream[i] * c[i] * std::exp2(g[3 * photoOfRay[i / 3] + i % 3]);
+             sum += upstream[i] *
+                    (c[i] * std::exp2(g[3 * photoOfRay[i / 3] + i % 3]) + (1 - o[i / 3]) * background[i]);
            return sum;
          };
-         const Doubles c = toDoubles(colours), g = toDoubles(gains);
+         const Doubles c = toDoubles(colours), o = toDoubles(opacity), g = toDoubles(gains);
          return std::vector<GradientPair>{
              {"colours", stage.device.read(a.colourGradients),
-              centralDifferences([&](View moved) { return loss(moved, g); }, c, 1e-5, firstIndices(c.size()))},
+              centralDifferences([&](View moved) { return loss(moved, o, g); }, c, 1e-5, firstIndices(c.size()))},
+             {"opacity", stage.device.read(a.opacityGradients),
+              centralDifferences([&](View moved) { return loss(c, moved, g); }, o, 1e-5, firstIndices(o.size()))},
              {"gains", stage.device.read(a.logGainGradients),
-              centralDifferences([&](View moved) { return loss(c, moved); }, g, 1e-5, firstIndices(g.size()))}};
+              centralDifferences([&](View moved) { return loss(c, o, moved); }, g, 1e-5, firstIndices(g.size()))}};
        }});
   return tests;
 }

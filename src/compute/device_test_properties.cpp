@@ -77,12 +77,14 @@ TEST_P(DeviceProperties, CompactionKeepsAllSamplesThatCompositingWeighs) {
   CompactSamples c;
   c.rays.capacity = rays;
   c.sampleCapacity = c.keptCapacity = first.back();
+  c.mostOpticalDepth = -std::log(a.minTransmittance);
   c.firstSample = a.firstSample;
   c.logDensity = a.x;
   c.steps = a.steps;
   c.keptFirstSample = stage.outputWords("keptFirstSample", rays + 1);
   c.keptCount = stage.outputWords("keptCount", 1);
   c.source = stage.outputWords("source", first.back());
+  c.rayOfSample = stage.outputWords("rayOfSample", first.back());
   device->run(c);
   const std::vector<uint32_t> source = device->read(c.source);
   const uint32_t kept = device->read(c.keptCount)[0];
@@ -106,7 +108,7 @@ TEST_P(DeviceProperties, OccupancyForgetsWhatIsEmptyAndKeepsWhatIsFull) {
   int updates = 0, lastChange = 0;
   std::vector<uint32_t> before(all / 32, ~0u);
   for (; updates < 150; ++updates) {
-    device->run(OccupancyPoints{space, all, 0, static_cast<uint64_t>(updates), bits, cells, positions});
+    device->run(OccupancyPoints{space, all, 0, static_cast<uint64_t>(updates), {}, bits, cells, positions});
     std::vector<float> logDensity;  // a wall where x < 1/4, of optical thickness 0.05 per step; nothing beyond
     const std::vector<float> at = device->read(positions);
     for (uint32_t i = 0; i < all; ++i) logDensity.push_back(at[3 * i] < 0.25f ? std::log(5.0f) : -30.0f);

@@ -134,52 +134,72 @@ OperationTests testsOf<MarchRays>() {
                  makeRays(stage.random, size.capacity, &origins, &directions);
                  const Slice<float> jitter = optional ? stage.randomInput(size.capacity, 0, 1) : Slice<float>();
                  const Slice<float> farOfRay = optional ? stage.randomInput(size.capacity, 0, 8) : Slice<float>();
-                 stage.device.run(MarchRays{
-                     named.space, stage.count(size), sampleCapacity, stage.input(origins), stage.input(directions),
-                     jitter, farOfRay, stage.input(randomBits(stage.random, named.space, share)),
-                     stage.outputWords("firstSample", size.capacity + 1), stage.outputWords("sampleCount", 1),
-                     optional ? stage.outputWords("finishedRays", 1) : Slice<uint32_t>(),
-                     stage.outputWords("rayOfSample", sampleCapacity),
-                     stage.output("positions", 3 * sampleCapacity, 1e-6),
-                     stage.output("distances", sampleCapacity, 1e-6), stage.output("steps", sampleCapacity, 1e-6)});
+                 MarchRays a{named.space};
+                 a.rays = stage.count(size);
+                 a.sampleCapacity = sampleCapacity;
+                 a.origins = stage.input(origins);
+                 a.directions = stage.input(directions);
+                 a.jitter = jitter;
+                 a.farOfRay = farOfRay;
+                 a.occupancy = stage.input(randomBits(stage.random, named.space, share));
+                 a.firstSample = stage.outputWords("firstSample", size.capacity + 1);
+                 a.sampleCount = stage.outputWords("sampleCount", 1);
+                 if (optional) {
+                   a.finishedRays = stage.outputWords("finishedRays", 1);
+                   a.rayOfSample = stage.outputWords("rayOfSample", sampleCapacity);
+                 }
+                 a.positions = stage.output("positions", 3 * sampleCapacity, 1e-6);
+                 a.distances = stage.output("distances", sampleCapacity, 1e-6);
+                 a.steps = stage.output("steps", sampleCapacity, 1e-6);
+                 stage.device.run(a);
                }});
         }
+  for (const NamedSpace& named : spaces())
+    for (float share : {0.1f, 1.0f})
+      tests.cases.push_back({fmt::format("{}, {} occupied, in rounds", named.name, share), [=](Stage& stage) {
+                               const uint32_t rays = 37, sampleCapacity = 300;
+                               std::vector<float> origins, directions;
+                               makeRays(stage.random, rays, &origins, &directions);
+                               const std::vector<float> opaque = stage.random.floats(rays, 0, 1);
+                               MarchRays a{named.space};
+                               a.rays.capacity = rays;
+                               a.sampleCapacity = sampleCapacity;
+                               a.mostOpticalDepth = 0.8f;
+                               a.origins = stage.input(origins);
+                               a.directions = stage.input(directions);
+                               a.jitter = stage.randomInput(rays, 0, 1);
+                               a.occupancy = stage.input(randomBits(stage.random, named.space, share));
+                               a.opticalDepth = stage.input(opaque);
+                               a.nextStep = stage.outputWords("nextStep", std::vector<uint32_t>(rays));
+                               for (const uint32_t most : {5u, 0u, 1u, 15u, ~0u}) {  // the fourth time not all fit
+                                 a.most = most;
+                                 a.firstSample = stage.outputWords("firstSample", rays + 1);
+                                 a.sampleCount = stage.outputWords("sampleCount", 1);
+                                 a.positions = stage.output("positions", 3 * sampleCapacity, 1e-6);
+                                 a.distances = stage.output("distances", sampleCapacity, 1e-6);
+                                 a.steps = stage.output("steps", sampleCapacity, 1e-6);
+                                 stage.device.run(a);
+                               }
+                             }});
   return tests;
 }
 
-// For each ray a number of its samples, from none to all.
-static std::vector<uint32_t> partOfEach(Random& random, const std::vector<uint32_t>& firstSample) {
-  std::vector<uint32_t> parts;
-  for (size_t ray = 0; ray + 1 < firstSample.size(); ++ray)
-    parts.push_back(random.below(firstSample[ray + 1] - firstSample[ray] + 1));
-  return parts;
-}
-
 template <>
-OperationTests testsOf<SelectSamples>() {
+OperationTests testsOf<OpticalDepth>() {
   OperationTests tests;
-  tests.noGradient = "it chooses samples; none is changed";
+  tests.noGradient = "it only decides which samples are seen";
   for (const Size& size : kSizes)
     for (Layout layout : {Layout::plain, Layout::strided})
       tests.cases.push_back(
-          {fmt::format("rays {}{}", toString(size), layout == Layout::strided ? ", strided, few fit" : ""),
-           [=](Stage& stage) {
+          {fmt::format("rays {}{}", toString(size), layout == Layout::strided ? ", strided" : ""), [=](Stage& stage) {
              const std::vector<uint32_t> first = stage.random.firstSamples(size.capacity, 40);
-             const uint32_t capacity = first.back() + 9;
-             SelectSamples a;
+             OpticalDepth a;
              a.rays = stage.count(size);
-             a.sampleCapacity = capacity;
-             a.selectedCapacity = layout == Layout::plain ? capacity : capacity / 8;
-             a.most = 11;
-             a.minTransmittance = layout == Layout::plain ? 1e-4f : 0.3f;
              a.firstSample = stage.input(first);
-             a.logDensity = stage.randomMatrix(capacity, 1, layout, -3, 6);
-             a.steps = stage.randomInput(capacity, 0.001f, 0.1f);
-             a.lookedAt = stage.outputWords("lookedAt", partOfEach(stage.random, first));
-             a.selected = stage.outputWords("selected", a.selectedCapacity);
-             a.selectedCount = stage.outputWords("selectedCount", 1);
+             a.logDensity = stage.randomMatrix(first.back(), 1, layout, -3, 6);
+             a.steps = stage.randomInput(first.back(), 0.001f, 0.1f);
+             a.opticalDepth = stage.output("opticalDepth", stage.random.floats(size.capacity, 0, 3));
              stage.device.run(a);
-             stage.device.run(SelectSamples(a));  // on from where it stood
            }});
   return tests;
 }
@@ -189,26 +209,40 @@ OperationTests testsOf<CompactSamples>() {
   OperationTests tests;
   tests.noGradient = "it chooses samples; none is changed";
   for (const Size& size : kSizes)
-    for (Layout layout : {Layout::plain, Layout::strided})
-      tests.cases.push_back(
-          {fmt::format("rays {}{}", toString(size), layout == Layout::strided ? ", strided" : ""), [=](Stage& stage) {
-             const std::vector<uint32_t> first = stage.random.firstSamples(size.capacity, 40);
-             const uint32_t capacity = first.back() + 9;
-             CompactSamples a;
-             a.rays = stage.count(size);
-             a.sampleCapacity = capacity;
-             a.keptCapacity = layout == Layout::plain ? capacity : capacity / 2;  // the second time it does not fit
-             a.minTransmittance = layout == Layout::plain ? 1e-4f : 0.3f;
-             a.firstSample = stage.input(first);
-             if (layout == Layout::strided) a.lookedAt = stage.input(partOfEach(stage.random, first));
-             a.logDensity = stage.randomMatrix(capacity, 1, layout, -3, 6);
-             a.steps = stage.randomInput(capacity, 0.001f, 0.1f);
-             a.keptFirstSample = stage.outputWords("keptFirstSample", size.capacity + 1);
-             a.keptCount = stage.outputWords("keptCount", 1);
-             if (layout == Layout::strided) a.finishedRays = stage.outputWords("finishedRays", 1);
-             a.source = stage.outputWords("source", capacity);
-             stage.device.run(a);
-           }});
+    for (const uint32_t rounds : {1u, 3u})
+      tests.cases.push_back({fmt::format("rays {}, {} rounds", toString(size), rounds), [=](Stage& stage) {
+                               std::vector<uint32_t> first;
+                               uint32_t capacity = 9;  // of a round
+                               for (uint32_t round = 0; round < rounds; ++round) {
+                                 const auto ofRound = stage.random.firstSamples(size.capacity, 40 / rounds);
+                                 first.insert(first.end(), ofRound.begin(), ofRound.end());
+                                 capacity = std::max(capacity, ofRound.back() + 9);
+                               }
+                               std::vector<uint32_t> nextStep = stage.random.wordsBelow(size.capacity, 500);
+                               for (uint32_t& step : nextStep)
+                                 if (step > 50) step = MarchRays::kThrough;
+                               CompactSamples a;
+                               a.rays = stage.count(size);
+                               a.rounds = rounds;
+                               a.sampleCapacity = capacity;
+                               a.keptCapacity = capacity * rounds;
+                               a.mostOpticalDepth = 9.2f;
+                               a.firstSample = stage.input(first);
+                               if (rounds > 1) {  // some are not finished, and not all fit
+                                 a.nextStep = stage.input(nextStep);
+                                 a.finishedRays = stage.outputWords("finishedRays", 1);
+                                 a.mostOpticalDepth = 1.2f;
+                                 a.keptCapacity = capacity / 2;
+                               }
+                               a.logDensity = stage.randomMatrix(size_t{capacity} * rounds, 1,
+                                                                 rounds > 1 ? Layout::strided : Layout::plain, -3, 6);
+                               a.steps = stage.randomInput(size_t{capacity} * rounds, 0.001f, 0.1f);
+                               a.keptFirstSample = stage.outputWords("keptFirstSample", size.capacity + 1);
+                               a.keptCount = stage.outputWords("keptCount", 1);
+                               a.source = stage.outputWords("source", a.keptCapacity);
+                               a.rayOfSample = stage.outputWords("rayOfSample", a.keptCapacity);
+                               stage.device.run(a);
+                             }});
   return tests;
 }
 
@@ -242,25 +276,6 @@ OperationTests testsOf<GatherRows>() {
 }
 
 template <>
-OperationTests testsOf<ScatterRows>() {
-  OperationTests tests;
-  tests.noGradient = "it moves what will be computed again";
-  for (uint32_t columns : {1u, 3u})
-    for (const Size& size : kSizes)
-      tests.cases.push_back({fmt::format("{} columns, rows {}", columns, toString(size)), [=](Stage& stage) {
-                               std::vector<uint32_t> target(size.capacity);  // every second row, backwards
-                               for (uint32_t i = 0; i < size.capacity; ++i) target[i] = 2 * (size.capacity - 1 - i);
-                               ScatterRows a;
-                               a.rows = stage.count(size);
-                               a.target = stage.input(target);
-                               a.input = stage.randomMatrix(size.capacity, columns, Layout::plain, -1, 1);
-                               a.output = stage.outputMatrix("output", 2 * size.capacity, columns, Layout::strided, 0);
-                               stage.device.run(a);
-                             }});
-  return tests;
-}
-
-template <>
 OperationTests testsOf<OccupancyPoints>() {
   OperationTests tests;
   tests.noGradient = "it only chooses where to look";
@@ -272,8 +287,12 @@ OperationTests testsOf<OccupancyPoints>() {
         tests.cases.push_back({fmt::format("{}, {} occupied, {} + {} points", named.name, share, uniform, occupied),
                                [=, uniform = uniform, occupied = occupied](Stage& stage) {
                                  const uint64_t seed = stage.random.bits();
+                                 Slice<const uint32_t> candidates;  // all; for many points, every third
+                                 std::vector<uint32_t> thirds;
+                                 for (uint32_t cell = 1; cell < all; cell += 3) thirds.push_back(cell);
+                                 if (uniform == 1003) candidates = stage.input(thirds);
                                  stage.device.run(
-                                     OccupancyPoints{named.space, uniform, occupied, seed,
+                                     OccupancyPoints{named.space, uniform, occupied, seed, candidates,
                                                      stage.input(randomBits(stage.random, named.space, share)),
                                                      stage.outputWords("cells", uniform + occupied),
                                                      stage.output("positions", 3 * (uniform + occupied), 0)});

@@ -34,7 +34,7 @@ struct MlpForward {
   Count samples;
   Matrix<const float> input;   // [capacity][inputs]
   Slice<const float> weights;  // [shape.parameters()]
-  Matrix<float> output;        // [capacity][outputs], row-major
+  Matrix<float> output;        // [capacity][outputs or fewer: the first ones are wanted], row-major
   Slice<float> activations;    // optional, [hiddenLayers][capacity][width]: kept for backward (after ReLU)
 };
 

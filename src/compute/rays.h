@@ -56,58 +56,61 @@ struct MarchSpace {
 // at the middle of its interval [t(n), t(n+1)]. Only samples whose middle lies in an occupied cell are made; empty
 // cells are left by exact plane intersections and whole steps, so the samples are those of brute force. Rays are
 // finished in order while samples fit; a ray that would pass `sampleCapacity` gets none, and so do all after it.
+//
+// Marching can be done in rounds, so that nobody looks behind surfaces: each run makes the next `most` samples of a ray,
+// from `nextStep` on, and none of a ray whose `opticalDepth` is above `mostOpticalDepth`.
 struct MarchRays {
+  static constexpr uint32_t kThrough = 0xffffffffu;  // nextStep of a ray that has no more samples
+
   const MarchSpace& space;
   Count rays;
   uint32_t sampleCapacity = 0;
+  uint32_t most = 0xffffffffu;
+  float mostOpticalDepth = 0;
   Slice<const float> origins;       // [rays][3]
   Slice<const float> directions;    // [rays][3]
   Slice<const float> jitter;        // optional, [rays], in [0,1) lattice steps; else 0
   Slice<const float> farOfRay;      // optional, [rays]: the ray ends there (opaque models)
   Slice<const uint32_t> occupancy;  // bits, cell (x,y,z) at x + R·(y + R·z), least significant first
+  Slice<const float> opticalDepth;  // optional, [rays]: of the samples before
+  Slice<uint32_t> nextStep;         // optional, [rays]: the first k to look at; advanced for rays that fit. A ray that
+                                    // got `most` samples goes on behind the last of them, any other is kThrough
   Slice<uint32_t> firstSample;      // [rays + 1]: samples of ray r are [firstSample[r], firstSample[r+1])
   Slice<uint32_t> sampleCount;      // [1]: total made
   Slice<uint32_t> finishedRays;     // optional, [1]: rays that fit; the counter of what follows
-  Slice<uint32_t> rayOfSample;      // [sampleCapacity]
+  Slice<uint32_t> rayOfSample;      // optional, [sampleCapacity]
   Slice<float> positions;           // [sampleCapacity][3], grid coordinates in [0,1]
   Slice<float> distances;           // [sampleCapacity]: t of the middle
   Slice<float> steps;               // [sampleCapacity]: t(n+1) - t(n)
 };
 
-// Which samples to look up next: of each ray that is still transparent, the next `most` behind the `lookedAt` first
-// ones, whose log densities are known. A ray is done when Σ density · step of those passes -ln(minTransmittance). Rays
-// get theirs in order while they fit `selectedCapacity`; a ray that does not gets none, and so do all after it. Looked
-// up in stages, samples behind surfaces are never looked at.
-struct SelectSamples {
+// opticalDepth[ray] += Σ exp(logDensity) · step over the ray's samples, in order. Transmittance is exp(-opticalDepth).
+struct OpticalDepth {
   Count rays;
-  uint32_t sampleCapacity = 0;
-  uint32_t selectedCapacity = 0;
-  uint32_t most = 0;
-  float minTransmittance = 1e-4f;
   Slice<const uint32_t> firstSample;  // [rays + 1]
-  Matrix<const float> logDensity;     // [sampleCapacity], 1 column
-  Slice<const float> steps;           // [sampleCapacity]
-  Slice<uint32_t> lookedAt;           // [rays], read and advanced
-  Slice<uint32_t> selected;           // [selectedCapacity]: samples, in order
-  Slice<uint32_t> selectedCount;      // [1]
-};
-
-// Keeps of each ray the samples in front of the point where its transmittance falls below `minTransmittance`
-// (the one that crosses included). logDensity as in Composite.
-struct CompactSamples {
-  Count rays;
-  uint32_t sampleCapacity = 0;  // of the input
-  uint32_t keptCapacity = 0;    // rays whose samples no longer fit keep none, and so do all after
-  float minTransmittance = 1e-4f;
-  Slice<const uint32_t> firstSample;  // [rays + 1]
-  Slice<const uint32_t> lookedAt;     // optional, [rays]: only so many samples of a ray have a log density
   Matrix<const float> logDensity;     // 1 column
   Slice<const float> steps;
-  Slice<uint32_t> keptFirstSample;  // [rays + 1]
-  Slice<uint32_t> keptCount;        // [1]
-  Slice<uint32_t> finishedRays;     // optional, [1]: rays before the first that did not fit, or that is still
-                                    // transparent where lookedAt ends short of its samples
-  Slice<uint32_t> source;           // [keptCapacity]: the sample that a kept one was
+  Slice<float> opticalDepth;  // [rays]
+};
+
+// Keeps of each ray the samples in front of the point where its optical depth passes `mostOpticalDepth` (the one that
+// crosses included), out of all rounds of marching: sample i of round q stands at row q · sampleCapacity + i.
+struct CompactSamples {
+  Count rays;
+  uint32_t rounds = 1;
+  uint32_t sampleCapacity = 0;  // of a round
+  uint32_t keptCapacity = 0;    // rays whose samples no longer fit keep none, and so do all after
+  float mostOpticalDepth = 0;
+  Slice<const uint32_t> firstSample;  // [rounds][rays.capacity + 1]
+  Slice<const uint32_t> nextStep;     // optional, [rays]: as the last round left it
+  Matrix<const float> logDensity;     // [rounds · sampleCapacity], 1 column
+  Slice<const float> steps;           // [rounds · sampleCapacity]
+  Slice<uint32_t> keptFirstSample;    // [rays + 1]
+  Slice<uint32_t> keptCount;          // [1]
+  Slice<uint32_t> finishedRays;       // optional, [1]: rays before the first that did not fit, or that is still
+                                      // transparent and not kThrough
+  Slice<uint32_t> source;             // [keptCapacity]: the row that a kept sample was
+  Slice<uint32_t> rayOfSample;        // [keptCapacity]
 };
 
 // output row i = input row source[i]. 32-bit elements of any kind.
@@ -116,14 +119,6 @@ struct GatherRows {
   Slice<const uint32_t> source;
   Matrix<const float> input;
   Matrix<float> output;  // same layout kind and columns
-};
-
-// output row target[i] = input row i. Targets differ. 32-bit elements of any kind.
-struct ScatterRows {
-  Count rows;
-  Slice<const uint32_t> target;
-  Matrix<const float> input;
-  Matrix<float> output;  // row-major, same columns
 };
 
 }  // namespace tessera

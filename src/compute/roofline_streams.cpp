@@ -109,33 +109,23 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
   recorder.measureStream(Operation::kDistortionLoss, shape, n * 16 + rays * 4, [&] { device.run(distortion); });
 
   Array<uint32_t> first = device.array<uint32_t>(lines.rays + 1), count = device.array<uint32_t>(1);
-  Array<uint32_t> source = device.array<uint32_t>(lines.samples);
-  const std::vector<uint32_t> half(lines.rays, kLine / 2);
-  Array<uint32_t> lookedAt = device.arrayOf(half);
-  SelectSamples select;
-  select.rays = {lines.rays, {}};
-  select.sampleCapacity = select.selectedCapacity = lines.samples;
-  select.most = kLine / 2;
-  select.firstSample = lines.firstSample;
-  select.logDensity = Matrix<float>(lines.logDensity, 1);
-  select.steps = lines.steps;
-  select.lookedAt = lookedAt;
-  select.selected = source;
-  select.selectedCount = count;
-  recorder.measureStream(Operation::kSelectSamples, shape + ", the second half of each", n * (4 + 2) + rays * 16, [&] {
-    device.write(lookedAt.all(), std::span(half));
-    device.run(select);
+  Array<uint32_t> source = device.array<uint32_t>(lines.samples), rayOfSample = device.array<uint32_t>(lines.samples);
+  recorder.measureStream(Operation::kOpticalDepth, shape, n * 8 + rays * 12, [&] {
+    device.run(
+        OpticalDepth{{lines.rays, {}}, lines.firstSample, Matrix<float>(lines.logDensity, 1), lines.steps, opacity});
   });
-  recorder.measureStream(Operation::kCompactSamples, shape, n * 12 + rays * 8, [&] {
+  recorder.measureStream(Operation::kCompactSamples, shape, n * 16 + rays * 8, [&] {
     CompactSamples compact;
     compact.rays = {lines.rays, {}};
     compact.sampleCapacity = compact.keptCapacity = lines.samples;
+    compact.mostOpticalDepth = 1e6f;  // thin: no ray ends before its last sample
     compact.firstSample = lines.firstSample;
     compact.logDensity = Matrix<float>(lines.logDensity, 1);
     compact.steps = lines.steps;
     compact.keptFirstSample = first;
     compact.keptCount = count;
     compact.source = source;
+    compact.rayOfSample = rayOfSample;
     device.run(compact);
   });
   if (!device.supports(Operation::kCompactSamples)) return;
@@ -148,10 +138,6 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
                                                  Matrix<float>::grouped(from, 32, 2, lines.samples),
                                                  Matrix<float>::grouped(to, 32, 2, lines.samples)});
                          });
-  recorder.measureStream(
-      Operation::kScatterRows, fmt::format("32 columns, {}", shapeOf(n, "samples")), n * (4 + 256), [&] {
-        device.run(ScatterRows{{lines.samples, {}}, source, Matrix<float>(from, 32), Matrix<float>(to, 32)});
-      });
 }
 
 // Cells of a hollow ball, a sixth of the region of interest across and two cells thick.
@@ -193,21 +179,20 @@ void measureRays(RooflineRecorder& recorder, uint32_t capacity) {
   Array<uint32_t> rayOfSample = device.array<uint32_t>(capacity);
   Array<float> positions = device.array<float>(size_t{capacity} * 3), distances = device.array<float>(capacity);
   Array<float> steps = device.array<float>(capacity), jitter = recorder.randomFloats(rays, 0, 1);
-  const MarchRays march{space,
-                        {rays, {}},
-                        capacity,
-                        origins,
-                        directions,
-                        jitter,
-                        {},
-                        occupancy,
-                        first,
-                        counters.part(0, 1),
-                        counters.part(1, 1),
-                        rayOfSample,
-                        positions,
-                        distances,
-                        steps};
+  MarchRays march{space};
+  march.rays = {rays, {}};
+  march.sampleCapacity = capacity;
+  march.origins = origins;
+  march.directions = directions;
+  march.jitter = jitter;
+  march.occupancy = occupancy;
+  march.firstSample = first;
+  march.sampleCount = counters.part(0, 1);
+  march.finishedRays = counters.part(1, 1);
+  march.rayOfSample = rayOfSample;
+  march.positions = positions;
+  march.distances = distances;
+  march.steps = steps;
   device.run(march);
   const uint32_t made = device.read(counters.all())[0];
   recorder.measureStream(Operation::kMarchRays, fmt::format("{} rays, {} samples", rays, made),
@@ -229,10 +214,10 @@ void measureLosses(RooflineRecorder& recorder, uint32_t rays) {
     device.run(ColourLoss{ColourLossKind::huber, 0.1f, 1, {rays, {}}, predicted, target, weights, loss, out});
   });
   recorder.measureStream(Operation::kExposureForward, shape, rays * 28.0, [&] {
-    device.run(ExposureForward{{rays, {}}, predicted, photoOfRay, gains, out});
+    device.run(ExposureForward{{rays, {}}, predicted, {}, {}, photoOfRay, gains, out});
   });
   recorder.measureStream(Operation::kExposureBackward, shape, rays * 40.0, [&] {
-    device.run(ExposureBackward{{rays, {}}, predicted, photoOfRay, gains, target, out, gainGradients});
+    device.run(ExposureBackward{{rays, {}}, predicted, {}, photoOfRay, gains, target, out, {}, gainGradients});
   });
 }
 
@@ -245,7 +230,7 @@ void measureOccupancy(RooflineRecorder& recorder) {
   Array<float> positions = device.array<float>(size_t{points} * 3), grid = recorder.randomFloats(cells, 0, 0.02f);
   Array<float> logDensity = recorder.randomFloats(points, -2, 2);
   recorder.measureStream(Operation::kOccupancyPoints, shapeOf(points, "points"), points * 16.0, [&] {
-    device.run(OccupancyPoints{space, half, half, 1, occupancy, chosen, positions});
+    device.run(OccupancyPoints{space, half, half, 1, {}, occupancy, chosen, positions});
   });
   recorder.measureStream(
       Operation::kOccupancyUpdate, fmt::format("{} cells, {} points", cells, points), cells * 8.125 + points * 8.0,

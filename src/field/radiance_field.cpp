@@ -69,12 +69,10 @@ Matrix<float> RadianceField::byLevel(Array<float>& encodings) {
                                 capacity_);
 }
 
-Matrix<const float> RadianceField::logDensity(Count samples, Slice<const float> positions) {
+void RadianceField::logDensity(Count samples, Slice<const float> positions, Matrix<float> logDensities) {
   CHECK(samples.capacity <= capacity_);
-  const Matrix<float> geometry = Matrix<float>(colourInput_, shape_.colour.inputs).columnRange(0, kGeometryFeatures);
   device_.run(HashGridForward{shape_.grid, samples, positions, table_.values, byLevel(encoded_)});
-  device_.run(MlpForward{shape_.density, samples, byLevel(encoded_), density_.values, geometry, {}});
-  return geometry.columnRange(0, 1);
+  device_.run(MlpForward{shape_.density, samples, byLevel(encoded_), density_.values, logDensities, {}});
 }
 
 RadianceField::Output RadianceField::forward(Count samples, Slice<const float> positions, Slice<const float> directions,

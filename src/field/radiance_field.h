@@ -25,9 +25,8 @@ class RadianceField {
   // Room for this many samples in the calls below.
   void reserve(uint32_t samples);
 
-  // Density alone, nothing kept for backward. positions [capacity][3] in [0,1]; the result, 1 column, stays valid until
-  // the next call.
-  Matrix<const float> logDensity(Count samples, Slice<const float> positions);
+  // Density alone, nothing kept for backward. positions [capacity][3] in [0,1]; logDensities 1 column.
+  void logDensity(Count samples, Slice<const float> positions, Matrix<float> logDensities);
 
   struct Output {
     Matrix<const float> logDensity;  // 1 column

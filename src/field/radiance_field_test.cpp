@@ -162,9 +162,10 @@ TEST(RadianceField, CpuAgreesWithTheReference) {
 TEST(RadianceField, DensityAloneIsTheDensityOfBothNetworksTogether) {
   Scene scene("cpu");
   const std::vector<float> together = scene.forward().logDensity;
-  const Matrix<const float> alone = scene.field.logDensity(scene.samples(), scene.positions);
-  const std::vector<float> values = scene.device->read(alone.data);
-  for (uint32_t i = 0; i < kSamples; ++i) EXPECT_EQ(values[alone.offset(i, 0)], together[i]);
+  Array<float> alone = scene.device->array<float>(kCapacity);
+  scene.field.logDensity(scene.samples(), scene.positions, Matrix<float>(alone, 1));
+  const std::vector<float> values = scene.device->read(alone.all());
+  for (uint32_t i = 0; i < kSamples; ++i) EXPECT_EQ(values[i], together[i]);
 }
 
 TEST(RadianceField, ColourTurnsWithTheViewAndDensityDoesNot) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <numeric>
 
 namespace tessera {
 
@@ -17,12 +16,17 @@ void OccupancyGrid::exclude(const std::vector<bool>& visible) {
   CHECK(visible.size() == cells_);
   std::vector<float> values = this->values();
   std::vector<uint32_t> bits = bitWords();
+  std::vector<uint32_t> candidates;
   for (uint32_t cell = 0; cell < cells_; ++cell) {
-    if (visible[cell]) continue;
+    if (visible[cell]) {
+      candidates.push_back(cell);
+      continue;
+    }
     values[cell] = -1;
     bits[cell / 32] &= ~(1u << (cell % 32));
   }
   restore(values, bits);
+  candidates_ = device_.arrayOf(candidates);
 }
 
 void OccupancyGrid::update(const LogDensity& logDensity, uint32_t uniform, uint32_t occupied, uint64_t seed,
@@ -33,15 +37,11 @@ void OccupancyGrid::update(const LogDensity& logDensity, uint32_t uniform, uint3
     positions_ = device_.array<float>(size_t{points} * 3);
     logDensities_ = device_.array<float>(points);
   }
-  device_.run(OccupancyPoints{space_, uniform, occupied, seed, bits_, chosen_, positions_});
-  // The field answers chunk by chunk into a buffer of its own; rows are gathered into one list.
-  std::vector<uint32_t> identity(chunk);
-  std::iota(identity.begin(), identity.end(), 0u);
-  const Array<uint32_t> rows = device_.arrayOf(identity);
+  device_.run(OccupancyPoints{space_, uniform, occupied, seed, candidates_, bits_, chosen_, positions_});
   for (uint32_t first = 0; first < points; first += chunk) {
     const uint32_t count = std::min(chunk, points - first);
-    const Matrix<const float> answer = logDensity({count, {}}, positions_.part(size_t{first} * 3, size_t{count} * 3));
-    device_.run(GatherRows{{count, {}}, rows, answer, Matrix<float>(logDensities_.part(first, count), 1)});
+    logDensity({count, {}}, positions_.part(size_t{first} * 3, size_t{count} * 3),
+               Matrix<float>(logDensities_.part(first, count), 1));
   }
   OccupancyUpdate update{space_};
   update.points = points;

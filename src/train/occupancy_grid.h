@@ -13,15 +13,16 @@ class OccupancyGrid {
   OccupancyGrid(Device& device, const MarchSpace& space);
   void exclude(const std::vector<bool>& visible);
 
-  // Log density at `count` positions ([count][3], grid coordinates); 1 column, valid until the next call.
-  using LogDensity = std::function<Matrix<const float>(Count count, Slice<const float> positions)>;
+  // Writes log density, 1 column, at `count` positions ([count][3], grid coordinates).
+  using LogDensity = std::function<void(Count count, Slice<const float> positions, Matrix<float> logDensities)>;
 
-  // One refresh of `uniform` random and `occupied` occupied cells (or all, with uniform = cells), `chunk` points at a
-  // time.
+  // One refresh of `uniform` random and `occupied` occupied cells (or all, with uniform = visibleCells), `chunk` points
+  // at a time.
   void update(const LogDensity& logDensity, uint32_t uniform, uint32_t occupied, uint64_t seed, uint32_t chunk);
 
   uint32_t cells() const { return cells_; }
   Slice<const uint32_t> bits() const { return bits_; }
+  uint32_t visibleCells() const { return candidates_.size() ? static_cast<uint32_t>(candidates_.size()) : cells_; }
   double occupiedFraction();
 
   std::vector<float> values() { return device_.read(grid_.all()); }
@@ -34,6 +35,7 @@ class OccupancyGrid {
   uint32_t cells_;
   Array<float> grid_;
   Array<uint32_t> bits_;
+  Array<uint32_t> candidates_;  // the visible cells, unless all are
   Array<uint32_t> chosen_;
   Array<float> positions_, logDensities_;
 };

@@ -21,23 +21,21 @@ MarchSpace boundedSpace() {
 // Dense where the first coordinate is below a half, and empty elsewhere.
 class HalfFull {
  public:
-  explicit HalfFull(Device& device) : device_(device), answer_(device.array<float>(1 << 16)) {}
+  explicit HalfFull(Device& device) : device_(device) {}
 
-  Matrix<const float> operator()(Count count, Slice<const float> positions) {
+  void operator()(Count count, Slice<const float> positions, Matrix<float> logDensities) {
     const std::vector<float> at = device_.read(positions);
     std::vector<float> answer(count.capacity);
     for (uint32_t i = 0; i < count.capacity; ++i) answer[i] = at[3 * size_t{i}] < 0.5f ? 6.0f : -20.0f;
-    device_.write(answer_.all(), std::span<const float>(answer));
+    device_.write(logDensities.data, std::span<const float>(answer));
     largestChunk = std::max(largestChunk, count.capacity);
     asked += count.capacity;
-    return Matrix<const float>(answer_.all(), 1);
   }
 
   uint32_t largestChunk = 0, asked = 0;
 
  private:
   Device& device_;
-  Array<float> answer_;
 };
 
 int wrongCells(OccupancyGrid& grid) {
@@ -88,13 +86,32 @@ TEST(OccupancyGrid, ForgetsWhatHasBecomeEmpty) {
   HalfFull field(*device);
   grid.update(std::ref(field), kCells, 0, 0, 1 << 16);
   ASSERT_EQ(grid.occupiedFraction(), 0.5);
-  const Array<float> empty = device->arrayOf(std::vector<float>(kCells, -20.0f));
+  const std::vector<float> empty(kCells, -20.0f);
   for (uint64_t update = 1; update < 200; ++update) {
-    grid.update([&](Count, Slice<const float>) { return Matrix<const float>(empty.all(), 1); }, kCells, 0, update,
-                1 << 16);
+    grid.update([&](Count, Slice<const float>, Matrix<float> to) { device->write(to.data, std::span(empty)); }, kCells, 0,
+                update, 1 << 16);
   }
   const std::vector<float> values = grid.values();
   for (const float value : values) EXPECT_LT(value, 0.01f);
+}
+
+TEST(OccupancyGrid, NeverLooksAtCellsThatNobodySees) {
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  OccupancyGrid grid(*device, boundedSpace());
+  std::vector<bool> visible(kCells);
+  for (uint32_t cell = 0; cell < kCells; ++cell) visible[cell] = cell % kResolution >= kResolution / 2 - 1;
+  grid.exclude(visible);
+  EXPECT_EQ(grid.visibleCells(), kCells / kResolution * 5);
+  HalfFull field(*device);
+  const auto inVisible = [&](Count count, Slice<const float> positions, Matrix<float> logDensities) {
+    const std::vector<float> at = device->read(positions);
+    for (size_t i = 0; i < at.size(); i += 3) EXPECT_GE(at[i] * kResolution, kResolution / 2 - 1);
+    field(count, positions, logDensities);
+  };
+  grid.update(inVisible, grid.visibleCells(), 0, 1, 1 << 16);
+  EXPECT_EQ(field.asked, grid.visibleCells());
+  grid.update(inVisible, 50, 50, 2, 1 << 16);
+  EXPECT_EQ(grid.occupiedFraction(), 1.0 / kResolution);  // dense and visible: one layer
 }
 
 TEST(OccupancyGrid, ComesBackAsItWas) {

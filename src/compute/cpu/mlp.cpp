@@ -1,6 +1,7 @@
-// Fused MLP: a block of samples stays in cache through all layers. Everything is row-major (one row a sample), so that
-// forward (X · Wᵀ), input gradient (dY · W) and weight gradient (dYᵀ · X) are three products whose inner loop is
-// "broadcast one number, multiply-add a few vectors", with the accumulators in registers.
+// Fused MLP: a block of samples stays in cache through all layers. Forward (X · Wᵀ), input gradient (dY · W) and weight
+// gradient (dYᵀ · X) are three products whose inner loop is "broadcast one number, multiply-add a few vectors", with the
+// accumulators in registers. Numbers to broadcast may lie anywhere, so the hash grid's planes are read where they are;
+// vectors are rows, one row a sample.
 
 #include "compute/mlp.h"
 
@@ -25,7 +26,7 @@ namespace tessera::cpu {
 
 inline constexpr int kRows = 96;  // samples of a block: a multiple of every tile height below
 inline constexpr int kMaxWidth = 128;
-inline constexpr int kParts = 32;  // partial weight gradients, whatever the number of threads
+inline constexpr int kParts = 16;  // partial weight gradients, whatever the number of threads
 
 struct BlockBuffers {  // of one thread
   alignas(128) float input[kRows * kMaxWidth];
@@ -51,10 +52,25 @@ constexpr int kWide = 4;  // vectors side by side in a tile: 32 registers
 constexpr int kWide = 2;  // 16 registers
 #endif
 
-// out[r][v] = Σ_k x[r · xRow + k · xStep] · b[k · bRow + v · lanes]
+// Numbers to broadcast: element (row, column) of a block in any of Matrix's layouts.
+struct Numbers {
+  const float* data;
+  size_t rowStride;
+  size_t groupStride = 0;
+  uint32_t shift = 31, mask = 0x7fffffff;  // column → group, column within the group; row-major: one group
+
+  const float* column(int c) const { return data + (c >> shift) * groupStride + (c & mask); }
+  Numbers from(int row, int firstColumn) const {  // firstColumn: of a group
+    Numbers part = *this;
+    part.data = column(firstColumn) + row * rowStride;
+    return part;
+  }
+};
+
+// out[r][v] = Σ_k x(row r, column k) · b[k · bRow + v · lanes]
 template <int R, int V>
-HWY_INLINE void productTile(const float* HWY_RESTRICT x, size_t xRow, size_t xStep, const float* HWY_RESTRICT b,
-                            size_t bRow, int depth, Vector (&sum)[R][V]) {
+HWY_INLINE void productTile(const Numbers& x, const float* HWY_RESTRICT b, size_t bRow, int depth,
+                            Vector (&sum)[R][V]) {
   const Float d;
   const size_t lanes = hn::Lanes(d);
   for (int r = 0; r < R; ++r) {
@@ -63,9 +79,30 @@ HWY_INLINE void productTile(const float* HWY_RESTRICT x, size_t xRow, size_t xSt
   for (int k = 0; k < depth; ++k) {
     Vector row[V];
     for (int v = 0; v < V; ++v) row[v] = hn::LoadU(d, b + k * bRow + v * lanes);
+    const float* HWY_RESTRICT numbers = x.column(k);
     for (int r = 0; r < R; ++r) {
-      const Vector factor = hn::Set(d, x[r * xRow + k * xStep]);
+      const Vector factor = hn::Set(d, numbers[r * x.rowStride]);
       for (int v = 0; v < V; ++v) sum[r][v] = hn::MulAdd(factor, row[v], sum[r][v]);
+    }
+  }
+}
+
+// sum[r][v] = Σ_rows x(row, column r) · b[row · bRow + v · lanes]
+template <int R, int V>
+HWY_INLINE void outerTile(const Numbers& x, const float* HWY_RESTRICT b, size_t bRow, int rows, Vector (&sum)[R][V]) {
+  const Float d;
+  const size_t lanes = hn::Lanes(d);
+  const float* columns[R];
+  for (int r = 0; r < R; ++r) {
+    columns[r] = x.column(r);
+    for (int v = 0; v < V; ++v) sum[r][v] = hn::Zero(d);
+  }
+  for (int row = 0; row < rows; ++row) {
+    Vector vectors[V];
+    for (int v = 0; v < V; ++v) vectors[v] = hn::LoadU(d, b + row * bRow + v * lanes);
+    for (int r = 0; r < R; ++r) {
+      const Vector factor = hn::Set(d, columns[r][row * x.rowStride]);
+      for (int v = 0; v < V; ++v) sum[r][v] = hn::MulAdd(factor, vectors[v], sum[r][v]);
     }
   }
 }
@@ -74,14 +111,14 @@ enum class Finish { none, relu, maskByActivation };
 
 // out[rows][columns] = finish(x[rows][depth] · b[depth][columns]); rows a multiple of R.
 template <int R, int V, Finish kFinish>
-HWY_NOINLINE void productBlock(const float* x, size_t xRow, const float* b, int depth, int columns, int rows,
-                               float* out, size_t outRow, const float* activation, size_t activationRow) {
+HWY_NOINLINE void productBlock(const Numbers& x, const float* b, int depth, int columns, int rows, float* out,
+                               size_t outRow, const float* activation, size_t activationRow) {
   const Float d;
   const int lanes = static_cast<int>(hn::Lanes(d));
   for (int column = 0; column < columns; column += V * lanes) {
     for (int row = 0; row < rows; row += R) {
       Vector sum[R][V];
-      productTile<R, V>(x + row * xRow, xRow, 1, b + column, columns, depth, sum);
+      productTile<R, V>(x.from(row, 0), b + column, columns, depth, sum);
       for (int r = 0; r < R; ++r) {
         for (int v = 0; v < V; ++v) {
           Vector value = sum[r][v];
@@ -98,32 +135,31 @@ HWY_NOINLINE void productBlock(const float* x, size_t xRow, const float* b, int 
 }
 
 template <Finish kFinish>
-void product(const float* x, size_t xRow, const float* b, int depth, int columns, float* out, size_t outRow,
+void product(const Numbers& x, const float* b, int depth, int columns, float* out, size_t outRow,
              const float* activation = nullptr, size_t activationRow = 0) {
   const int vectors = columns / static_cast<int>(hn::Lanes(Float()));
   if (vectors % 4 == 0 && kWide == 4) {
-    productBlock<6, kWide, kFinish>(x, xRow, b, depth, columns, kRows, out, outRow, activation, activationRow);
+    productBlock<6, kWide, kFinish>(x, b, depth, columns, kRows, out, outRow, activation, activationRow);
   } else if (vectors % 2 == 0) {
-    productBlock<kWide == 4 ? 12 : 6, 2, kFinish>(x, xRow, b, depth, columns, kRows, out, outRow, activation,
+    productBlock<kWide == 4 ? 12 : 6, 2, kFinish>(x, b, depth, columns, kRows, out, outRow, activation,
                                                   activationRow);
   } else {
-    productBlock<12, 1, kFinish>(x, xRow, b, depth, columns, kRows, out, outRow, activation, activationRow);
+    productBlock<kWide == 4 ? 24 : 12, 1, kFinish>(x, b, depth, columns, kRows, out, outRow, activation, activationRow);
   }
 }
 
-// sum[o][i] += Σ_rows dy[row][o] · x[row][i]
+// sum[i][o] += Σ_rows x(row, i) · y[row][o]; x has `inputs` columns, y `outputs`.
 template <int R, int V>
-HWY_NOINLINE void outerBlock(const float* dy, size_t dyRow, const float* x, size_t xRow, int outputs, int inputs,
-                             float* sum) {
+HWY_NOINLINE void outerBlock(const Numbers& x, int inputs, const float* y, size_t yRow, int outputs, float* sum) {
   const Float d;
   const int lanes = static_cast<int>(hn::Lanes(d));
-  for (int i = 0; i < inputs; i += V * lanes) {
-    for (int o = 0; o < outputs; o += R) {
+  for (int o = 0; o < outputs; o += V * lanes) {
+    for (int i = 0; i < inputs; i += R) {
       Vector tile[R][V];
-      productTile<R, V>(dy + o, 1, dyRow, x + i, xRow, kRows, tile);
+      outerTile<R, V>(x.from(0, i), y + o, yRow, kRows, tile);
       for (int r = 0; r < R; ++r) {
         for (int v = 0; v < V; ++v) {
-          float* to = sum + static_cast<size_t>(o + r) * inputs + i + v * lanes;
+          float* to = sum + static_cast<size_t>(i + r) * outputs + o + v * lanes;
           hn::StoreU(hn::Add(hn::LoadU(d, to), tile[r][v]), d, to);
         }
       }
@@ -131,14 +167,14 @@ HWY_NOINLINE void outerBlock(const float* dy, size_t dyRow, const float* x, size
   }
 }
 
-void outer(const float* dy, size_t dyRow, const float* x, size_t xRow, int outputs, int inputs, float* sum) {
-  const int vectors = inputs / static_cast<int>(hn::Lanes(Float()));
+void outer(const Numbers& x, int inputs, const float* y, size_t yRow, int outputs, float* sum) {
+  const int vectors = outputs / static_cast<int>(hn::Lanes(Float()));
   if (vectors % 4 == 0 && kWide == 4) {
-    outerBlock<4, kWide>(dy, dyRow, x, xRow, outputs, inputs, sum);
+    outerBlock<4, kWide>(x, inputs, y, yRow, outputs, sum);
   } else if (vectors % 2 == 0) {
-    outerBlock<kWide == 4 ? 8 : 4, 2>(dy, dyRow, x, xRow, outputs, inputs, sum);
+    outerBlock<kWide == 4 ? 8 : 4, 2>(x, inputs, y, yRow, outputs, sum);
   } else {
-    outerBlock<kWide == 4 ? 16 : 8, 1>(dy, dyRow, x, xRow, outputs, inputs, sum);
+    outerBlock<kWide == 4 ? 16 : 8, 1>(x, inputs, y, yRow, outputs, sum);
   }
 }
 
@@ -165,12 +201,30 @@ void packRows(const Matrix<const float>& matrix, const float* data, size_t first
   if (rows < kRows) std::memset(block + rows * width, 0, sizeof(float) * (kRows - rows) * width);
 }
 
+// The first columns of a block's rows.
 void unpackRows(const float* block, int width, const Matrix<float>& matrix, float* data, size_t first, int rows) {
   const int columns = static_cast<int>(matrix.columns);
   if (matrix.groupWidth == 2) {
+    // Two groups of two rows at a time.
+    const hn::FixedTag<uint64_t, 2> d;
+    const auto pair = [&](const float* from) { return hn::LoadU(d, reinterpret_cast<const uint64_t*>(from)); };
+    const auto store = [&](hn::Vec<decltype(d)> value, float* to) {
+      hn::StoreU(value, d, reinterpret_cast<uint64_t*>(to));
+    };
+    const int evenRows = matrix.rowStride == 2 ? rows / 2 * 2 : 0, evenGroups = columns / 4 * 2;
     for (int g = 0; g < columns / 2; ++g) {
       float* to = data + g * matrix.groupStride + first * matrix.rowStride;
-      for (int r = 0; r < rows; ++r) std::memcpy(to + r * matrix.rowStride, block + r * width + g * 2, 8);
+      for (int r = g < evenGroups ? evenRows : 0; r < rows; ++r) {
+        std::memcpy(to + r * matrix.rowStride, block + r * width + g * 2, 8);
+      }
+    }
+    for (int r = 0; r < evenRows; r += 2) {
+      for (int g = 0; g < evenGroups; g += 2) {
+        const auto upper = pair(block + r * width + g * 2), lower = pair(block + (r + 1) * width + g * 2);
+        float* to = data + g * matrix.groupStride + (first + r) * 2;
+        store(hn::InterleaveLower(d, upper, lower), to);
+        store(hn::InterleaveUpper(d, upper, lower), to + matrix.groupStride);
+      }
     }
   } else if (matrix.groupWidth == 0) {
     for (int r = 0; r < rows; ++r) {
@@ -183,16 +237,24 @@ void unpackRows(const float* block, int width, const Matrix<float>& matrix, floa
   }
 }
 
-// The rows as the kernels want them: in place where they are whole, row-major and wide enough, else packed.
-const float* blockRows(const Matrix<const float>& matrix, const float* data, size_t first, int rows, int width,
-                       float* block, size_t* stride) {
-  if (rows == kRows && matrix.groupWidth == 0 && static_cast<int>(matrix.columns) == width) {
-    *stride = matrix.rowStride;
-    return data + first * matrix.rowStride;
+Numbers rowMajor(const float* data, size_t rowStride) {
+  return {data, rowStride};
+}
+
+// The rows where they are if they are whole, else packed into `block`.
+Numbers blockNumbers(const Matrix<const float>& matrix, const float* data, size_t first, int rows, int width,
+                     float* block) {
+  if (rows < kRows || static_cast<int>(matrix.columns) != width) {
+    packRows(matrix, data, first, rows, width, block);
+    return rowMajor(block, width);
   }
-  packRows(matrix, data, first, rows, width, block);
-  *stride = width;
-  return block;
+  Numbers numbers = rowMajor(data + first * matrix.rowStride, matrix.rowStride);
+  if (matrix.groupWidth != 0) {
+    numbers.groupStride = matrix.groupStride;
+    numbers.shift = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(matrix.groupWidth));
+    numbers.mask = matrix.groupWidth - 1;
+  }
+  return numbers;
 }
 
 void sigmoidBlock(float* block, int count) {
@@ -207,23 +269,18 @@ void sigmoidBlock(float* block, int count) {
 void forwardBlock(const MlpForward& a, const float* transposed, size_t n, size_t first, BlockBuffers& buffers) {
   const MlpShape& shape = a.shape;
   const int rows = static_cast<int>(std::min<size_t>(kRows, n - first));
-  size_t stride = 0;
-  const float* x =
-      blockRows(a.input, hostPointer(a.input.data), first, rows, shape.layerInputs(0), buffers.input, &stride);
+  Numbers x = blockNumbers(a.input, hostPointer(a.input.data), first, rows, shape.layerInputs(0), buffers.input);
   float* kept = hostPointer(a.activations);
   for (int l = 0; l < shape.hiddenLayers; ++l) {
     float* h = buffers.hidden[l % 2];
     float* keep = kept ? kept + (static_cast<size_t>(l) * a.samples.capacity + first) * shape.width : nullptr;
     if (keep && rows == kRows) h = keep;
-    product<Finish::relu>(x, stride, transposed + shape.weightOffset(l), shape.layerInputs(l), shape.width, h,
-                          shape.width);
+    product<Finish::relu>(x, transposed + shape.weightOffset(l), shape.layerInputs(l), shape.width, h, shape.width);
     if (keep && h != keep) std::memcpy(keep, h, sizeof(float) * rows * shape.width);
-    x = h;
-    stride = shape.width;
+    x = rowMajor(h, shape.width);
   }
   const int last = shape.hiddenLayers, outputs = shape.layerOutputs(last);
-  product<Finish::none>(x, stride, transposed + shape.weightOffset(last), shape.width, outputs, buffers.output,
-                        outputs);
+  product<Finish::none>(x, transposed + shape.weightOffset(last), shape.width, outputs, buffers.output, outputs);
   if (shape.activation == OutputActivation::sigmoid) sigmoidBlock(buffers.output, kRows * outputs);
   unpackRows(buffers.output, outputs, a.output, hostPointer(a.output.data), first, rows);
 }
@@ -259,28 +316,25 @@ void backwardBlock(const MlpBackward& a, size_t n, size_t first, float* weightGr
   size_t dyStride = shape.layerOutputs(shape.hiddenLayers);
   for (int l = shape.hiddenLayers; l >= 0; --l) {
     const int outputs = shape.layerOutputs(l), inputs = shape.layerInputs(l);
-    const float* x;
-    size_t xStride = width;
-    if (l > 0) {
-      x = kept + (static_cast<size_t>(l - 1) * a.samples.capacity + first) * width;
-      if (rows < kRows) {
-        std::memcpy(buffers.hidden[0], x, sizeof(float) * rows * width);
-        std::memset(buffers.hidden[0] + rows * width, 0, sizeof(float) * (kRows - rows) * width);
-        x = buffers.hidden[0];
-      }
-    } else {
-      x = blockRows(a.input, hostPointer(a.input.data), first, rows, inputs, buffers.input, &xStride);
-    }
-    outer(dy, dyStride, x, xStride, outputs, inputs, weightGradients + shape.weightOffset(l));
-    if (l == 0 && !a.inputGradients) break;
+    float* gradients = weightGradients + shape.weightOffset(l);
+    const Numbers upstream = rowMajor(dy, dyStride);
     float* dx = buffers.gradient[l % 2];
-    if (l > 0) {
-      product<Finish::maskByActivation>(dy, dyStride, weights + shape.weightOffset(l), outputs, inputs, dx, inputs, x,
-                                        xStride);
-    } else {
-      product<Finish::none>(dy, dyStride, weights + shape.weightOffset(l), outputs, inputs, dx, inputs);
+    if (l == 0) {  // [inputs][outputs], unlike all others: the input need not be rows then
+      const Numbers x = blockNumbers(a.input, hostPointer(a.input.data), first, rows, inputs, buffers.input);
+      outer(x, inputs, dy, dyStride, outputs, gradients);
+      if (!a.inputGradients) break;
+      product<Finish::none>(upstream, weights, outputs, inputs, dx, inputs);
       unpackRows(dx, inputs, a.inputGradients, hostPointer(a.inputGradients.data), first, rows);
+      break;
     }
+    const float* x = kept + (static_cast<size_t>(l - 1) * a.samples.capacity + first) * width;
+    if (rows < kRows) {
+      std::memcpy(buffers.hidden[0], x, sizeof(float) * rows * width);
+      std::memset(buffers.hidden[0] + rows * width, 0, sizeof(float) * (kRows - rows) * width);
+      x = buffers.hidden[0];
+    }
+    outer(upstream, outputs, x, width, inputs, gradients);
+    product<Finish::maskByActivation>(upstream, weights + shape.weightOffset(l), outputs, inputs, dx, inputs, x, width);
     dy = dx;
     dyStride = inputs;
   }
@@ -351,9 +405,14 @@ void run(Context& context, const MlpBackward& a) {
     }
   });
   float* sum = hostPointer(a.weightGradients);
-  for (size_t part = 0; part < parts; ++part) {
-    for (size_t i = 0; i < parameters; ++i) sum[i] += partial[part * parameters + i];
-  }
+  const size_t inputs = a.shape.layerInputs(0), outputs = a.shape.layerOutputs(0), firstLayer = inputs * outputs;
+  context.pool.forRanges(parameters, 1024, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      float total = 0;
+      for (size_t part = 0; part < parts; ++part) total += partial[part * parameters + i];
+      sum[i < firstLayer ? i % outputs * inputs + i / outputs : i] += total;  // see backwardBlock
+    }
+  });
 }
 
 }  // namespace tessera::cpu

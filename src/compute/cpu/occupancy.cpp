@@ -33,7 +33,10 @@ float stepAt(const MarchSpace& space, uint32_t cell) {
 }  // namespace
 
 void run(Context& context, const OccupancyPoints& a) {
-  const uint32_t r = a.space.gridResolution, cells = r * r * r;
+  const uint32_t r = a.space.gridResolution;
+  const uint32_t* candidates = hostPointer(a.candidates);
+  const uint32_t all = candidates ? static_cast<uint32_t>(a.candidates.count) : r * r * r;
+  const auto cellOf = [&](uint32_t candidate) { return candidates ? candidates[candidate] : candidate; };
   const RandomStream random(a.seed, 0x0cc);
   const uint32_t* bits = hostPointer(a.occupancy);
   uint32_t* chosen = hostPointer(a.cells);
@@ -43,11 +46,11 @@ void run(Context& context, const OccupancyPoints& a) {
       const uint64_t index = 16 * p;
       uint32_t cell;
       if (p < a.uniform) {
-        cell = a.uniform == cells ? static_cast<uint32_t>(p) : random.below(index, cells);
+        cell = cellOf(a.uniform == all ? static_cast<uint32_t>(p) : random.below(index, all));
       } else {
-        cell = random.below(index, cells);
+        cell = cellOf(random.below(index, all));
         for (int attempt = 1; attempt < 10 && !bitAt(bits, cell); ++attempt)
-          cell = random.below(index + attempt, cells);
+          cell = cellOf(random.below(index + attempt, all));
       }
       chosen[p] = cell;
       const uint32_t at[3] = {cell % r, cell / r % r, cell / (r * r)};

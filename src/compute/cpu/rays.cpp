@@ -25,7 +25,6 @@ class Lattice {
  public:
   explicit Lattice(const MarchSpace& space) : space_(space), growth_(1 + static_cast<double>(space.cone)) {
     const double last = space.stepIndex(space.far) + 3;
-    for (int k = 0; k <= last; ++k) table_.push_back(space.distanceAt(k));
     if (space.cone > 0) {
       const double lambda = std::log1p(static_cast<double>(space.cone));
       linearEnd_ = 1 / lambda;
@@ -33,6 +32,10 @@ class Lattice {
     } else {
       linearEnd_ = 1e30;
       geometricEnd_ = 1e30;
+    }
+    for (int k = 0; k <= last; ++k) {  // exact now and then; products in between save an exponential each
+      const bool grows = k % 64 != 0 && k - 1 >= linearEnd_ && k <= geometricEnd_;
+      table_.push_back(grows ? table_.back() * growth_ : space.distanceAt(k));
     }
   }
 
@@ -132,15 +135,21 @@ double exitDistance(const MarchSpace& space, const Cell& cell, const double o[3]
   return exit;
 }
 
-void marchRay(const MarchRays& a, const Lattice& lattice, const uint32_t* bits, uint32_t ray,
-              std::vector<Sample>& samples) {
+// Adds the ray's next samples; returns the lattice step to go on from.
+uint32_t marchRay(const MarchRays& a, const Lattice& lattice, const uint32_t* bits, uint32_t ray,
+                  std::vector<Sample>& samples) {
   const MarchSpace& space = a.space;
+  const uint32_t from = a.nextStep ? hostPointer(a.nextStep)[ray] : 0;
+  if (from == MarchRays::kThrough) return from;
+  if (a.opticalDepth && hostPointer(a.opticalDepth)[ray] > a.mostOpticalDepth) return from;
+  uint32_t left = a.most;
+  if (left == 0) return from;
   double o[3], d[3];
   for (int axis = 0; axis < 3; ++axis) {
     o[axis] = hostPointer(a.origins)[3 * ray + axis];
     d[axis] = hostPointer(a.directions)[3 * ray + axis];
   }
-  if (d[0] == 0 && d[1] == 0 && d[2] == 0) return;
+  if (d[0] == 0 && d[1] == 0 && d[2] == 0) return MarchRays::kThrough;
   const double jitter = a.jitter ? hostPointer(a.jitter)[ray] : 0;
   double far = space.far, near = space.near;
   if (a.farOfRay) far = std::min<double>(far, hostPointer(a.farOfRay)[ray]);
@@ -150,21 +159,22 @@ void marchRay(const MarchRays& a, const Lattice& lattice, const uint32_t* bits, 
     for (int axis = 0; axis < 3; ++axis) {
       const double t0 = (-1 - o[axis]) / d[axis], t1 = (1 - o[axis]) / d[axis];
       if (d[axis] == 0) {
-        if (std::abs(o[axis]) > 1) return;
+        if (std::abs(o[axis]) > 1) return MarchRays::kThrough;
         continue;
       }
       enter = std::max(enter, std::min(t0, t1));
       leave = std::min(leave, std::max(t0, t1));
     }
-    if (enter >= leave) return;
+    if (enter >= leave) return MarchRays::kThrough;
     far = std::min(far, leave * (1 + 1e-6) + 1e-6);
     if (enter > near) k = std::max(k, static_cast<int>(std::floor(space.stepIndex(enter) - jitter)) - 1);
   }
+  k = std::max(k, static_cast<int>(std::min<uint32_t>(from, 1u << 30)));
   const double factor = lattice.factor(jitter);
   double begin = lattice.at(k, jitter, factor);
   for (;;) {
     const double end = lattice.at(k + 1, jitter, factor), middle = (begin + end) / 2;
-    if (middle >= far) return;
+    if (middle >= far) return MarchRays::kThrough;
     const double x[3] = {o[0] + middle * d[0], o[1] + middle * d[1], o[2] + middle * d[2]};
     const Cell cell = cellAt(space, x);
     if (cell.inside && occupied(bits, space.gridResolution, cell)) {
@@ -177,6 +187,7 @@ void marchRay(const MarchRays& a, const Lattice& lattice, const uint32_t* bits, 
       sample.step = static_cast<float>(end - begin);
       samples.push_back(sample);
       ++k;
+      if (--left == 0) return static_cast<uint32_t>(k);
       begin = end;
       continue;
     }
@@ -185,7 +196,7 @@ void marchRay(const MarchRays& a, const Lattice& lattice, const uint32_t* bits, 
     if (!cell.inside) continue;
     // Whole steps to the first middle past the empty cell; the tolerance only costs one more look.
     const double exit = exitDistance(space, cell, o, d, middle) * (1 - 1e-9);
-    if (exit >= far) return;
+    if (exit >= far) return MarchRays::kThrough;
     if (exit > begin + 4 * (end - middle)) {
       k = std::max(k, static_cast<int>(std::floor(space.stepIndex(exit) - jitter)) - 1);
       begin = lattice.at(k, jitter, factor);
@@ -195,21 +206,6 @@ void marchRay(const MarchRays& a, const Lattice& lattice, const uint32_t* bits, 
       begin = lattice.at(k, jitter, factor);
     }
   }
-}
-
-// How many of a ray's first `count` samples stand in front of the point where it is opaque; `*opaque` tells whether
-// there is one. Transmittance is exp(-Σ σ step): the sum is enough.
-uint32_t visibleSamples(const Matrix<const float>& logDensity, const float* data, const float* steps, uint32_t first,
-                        uint32_t count, float minTransmittance, bool* opaque) {
-  const float most = -std::log(minTransmittance);
-  float thickness = 0;
-  uint32_t i = 0;
-  while (i < count && thickness <= most) {
-    thickness += std::exp(data[logDensity.offset(first + i, 0)]) * steps[first + i];
-    ++i;
-  }
-  *opaque = thickness > most;
-  return i;
 }
 
 // Counts in offsets[1 .. rays] to running ends; what no longer fits `capacity` becomes empty, and so does all after it.
@@ -261,18 +257,20 @@ void run(Context& context, const MarchRays& a) {
   const uint32_t* bits = hostPointer(a.occupancy);
   uint32_t* firstSample = hostPointer(a.firstSample);
   std::vector<std::vector<Sample>> made(tasks);
+  std::vector<uint32_t> nextStep(rays);
   context.pool.run(tasks, [&](size_t task, int) {
     std::vector<Sample>& samples = made[task];
     samples.reserve(kRaysPerTask * 32);
     for (size_t ray = task * kRaysPerTask; ray < std::min<size_t>(rays, (task + 1) * kRaysPerTask); ++ray) {
       const size_t before = samples.size();
-      marchRay(a, lattice, bits, static_cast<uint32_t>(ray), samples);
+      nextStep[ray] = marchRay(a, lattice, bits, static_cast<uint32_t>(ray), samples);
       firstSample[ray + 1] = static_cast<uint32_t>(samples.size() - before);  // a count for now
     }
   });
   const uint32_t finished = countsToOffsets(firstSample, rays, a.sampleCapacity);
   if (a.finishedRays) *hostPointer(a.finishedRays) = finished;
   *hostPointer(a.sampleCount) = firstSample[rays];
+  if (a.nextStep) std::copy(nextStep.begin(), nextStep.begin() + finished, hostPointer(a.nextStep));
   uint32_t* rayOfSample = hostPointer(a.rayOfSample);
   float* positions = hostPointer(a.positions);
   float* distances = hostPointer(a.distances);
@@ -282,7 +280,7 @@ void run(Context& context, const MarchRays& a) {
     const size_t end = firstSample[std::min<size_t>(rays, (task + 1) * kRaysPerTask)];
     for (size_t s = 0; i < end; ++i, ++s) {
       const Sample& sample = made[task][s];
-      rayOfSample[i] = sample.ray;
+      if (rayOfSample) rayOfSample[i] = sample.ray;
       std::memcpy(positions + 3 * i, sample.position, sizeof(sample.position));
       distances[i] = sample.distance;
       steps[i] = sample.step;
@@ -290,50 +288,51 @@ void run(Context& context, const MarchRays& a) {
   });
 }
 
-void run(Context& context, const SelectSamples& a) {
-  const uint32_t rays = hostCount(a.rays);
+void run(Context& context, const OpticalDepth& a) {
   const uint32_t* firstSample = hostPointer(a.firstSample);
   const float* logDensity = hostPointer(a.logDensity.data);
   const float* steps = hostPointer(a.steps);
-  uint32_t* lookedAt = hostPointer(a.lookedAt);
-  uint32_t* selected = hostPointer(a.selected);
-  std::vector<uint32_t> offsets(rays + 1);
-  context.pool.forRanges(rays, kRaysPerTask, [&](size_t begin, size_t end) {
+  float* opticalDepth = hostPointer(a.opticalDepth);
+  context.pool.forRanges(hostCount(a.rays), 4 * kRaysPerTask, [&](size_t begin, size_t end) {
     for (size_t ray = begin; ray < end; ++ray) {
-      const uint32_t first = firstSample[ray], left = firstSample[ray + 1] - first - lookedAt[ray];
-      bool opaque = false;
-      if (left > 0) {
-        visibleSamples(a.logDensity, logDensity, steps, first, lookedAt[ray], a.minTransmittance, &opaque);
+      for (uint32_t i = firstSample[ray]; i < firstSample[ray + 1]; ++i) {
+        opticalDepth[ray] += std::exp(logDensity[a.logDensity.offset(i, 0)]) * steps[i];
       }
-      offsets[ray + 1] = opaque ? 0 : std::min(left, a.most);
     }
   });
-  countsToOffsets(offsets.data(), rays, a.selectedCapacity);
-  context.pool.forRanges(rays, 4 * kRaysPerTask, [&](size_t begin, size_t end) {
-    for (size_t ray = begin; ray < end; ++ray) {
-      const uint32_t from = firstSample[ray] + lookedAt[ray];
-      for (uint32_t i = offsets[ray]; i < offsets[ray + 1]; ++i) selected[i] = from + (i - offsets[ray]);
-      lookedAt[ray] += offsets[ray + 1] - offsets[ray];
-    }
-  });
-  *hostPointer(a.selectedCount) = offsets[rays];
 }
 
 void run(Context& context, const CompactSamples& a) {
   const uint32_t rays = hostCount(a.rays);
+  const size_t rowOfRound = size_t{a.rays.capacity} + 1;
   const uint32_t* firstSample = hostPointer(a.firstSample);
-  const uint32_t* lookedAt = hostPointer(a.lookedAt);
+  const uint32_t* nextStep = hostPointer(a.nextStep);
   const float* logDensity = hostPointer(a.logDensity.data);
   const float* steps = hostPointer(a.steps);
   uint32_t* kept = hostPointer(a.keptFirstSample);
   uint32_t* source = hostPointer(a.source);
+  uint32_t* rayOfSample = hostPointer(a.rayOfSample);
+  // visit(row) for each of the ray's samples, until it says no.
+  const auto forSamples = [&](size_t ray, const auto& visit) {
+    for (uint32_t round = 0; round < a.rounds; ++round) {
+      const uint32_t* first = firstSample + round * rowOfRound + ray;
+      for (uint32_t i = first[0]; i < first[1]; ++i) {
+        if (!visit(round * a.sampleCapacity + i)) return;
+      }
+    }
+  };
   std::vector<uint8_t> complete(rays);
   context.pool.forRanges(rays, kRaysPerTask, [&](size_t begin, size_t end) {
     for (size_t ray = begin; ray < end; ++ray) {
-      const uint32_t first = firstSample[ray], count = lookedAt ? lookedAt[ray] : firstSample[ray + 1] - first;
-      bool opaque;
-      kept[ray + 1] = visibleSamples(a.logDensity, logDensity, steps, first, count, a.minTransmittance, &opaque);
-      complete[ray] = opaque || first + count == firstSample[ray + 1];
+      float opticalDepth = 0;
+      uint32_t count = 0;
+      forSamples(ray, [&](uint32_t row) {
+        opticalDepth += std::exp(logDensity[a.logDensity.offset(row, 0)]) * steps[row];
+        ++count;
+        return opticalDepth <= a.mostOpticalDepth;
+      });
+      kept[ray + 1] = count;
+      complete[ray] = opticalDepth > a.mostOpticalDepth || !nextStep || nextStep[ray] == MarchRays::kThrough;
     }
   });
   const uint32_t fitting = countsToOffsets(kept, rays, a.keptCapacity);
@@ -344,7 +343,14 @@ void run(Context& context, const CompactSamples& a) {
   *hostPointer(a.keptCount) = kept[rays];
   context.pool.forRanges(rays, 4 * kRaysPerTask, [&](size_t begin, size_t end) {
     for (size_t ray = begin; ray < end; ++ray) {
-      for (uint32_t i = kept[ray]; i < kept[ray + 1]; ++i) source[i] = firstSample[ray] + (i - kept[ray]);
+      uint32_t i = kept[ray];
+      const uint32_t last = kept[ray + 1];
+      if (i == last) continue;
+      forSamples(ray, [&](uint32_t row) {
+        source[i] = row;
+        rayOfSample[i] = static_cast<uint32_t>(ray);
+        return ++i < last;
+      });
     }
   });
 }
@@ -372,21 +378,6 @@ void run(Context& context, const GatherRows& a) {
         for (uint32_t c = 0; c < group; ++c) {
           to[i * a.output.rowStride + c] = from[size_t{source[i]} * a.input.rowStride + c];
         }
-      }
-    }
-  });
-}
-
-void run(Context& context, const ScatterRows& a) {
-  const uint32_t* target = hostPointer(a.target);
-  const float* input = hostPointer(a.input.data);
-  float* output = hostPointer(a.output.data);
-  CHECK(a.input.columns == a.output.columns);
-  CHECK(a.output.groupWidth == 0u);
-  context.pool.forRanges(hostCount(a.rows), 8192, [&](size_t begin, size_t end) {
-    for (size_t row = begin; row < end; ++row) {
-      for (uint32_t c = 0; c < a.input.columns; ++c) {
-        std::memcpy(output + a.output.offset(target[row], c), input + a.input.offset(row, c), sizeof(float));
       }
     }
   });

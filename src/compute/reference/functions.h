@@ -67,16 +67,15 @@ std::vector<MarchSample> latticeOfRay(const MarchSpace& space, const Point& orig
                                       double jitter, double far);
 std::vector<MarchSample> marchRay(const MarchSpace& space, const Point& origin, const Point& direction, double jitter,
                                   double far, Indices occupancy);
-// How many of one ray's samples are kept.
-size_t compactRay(double minTransmittance, View logDensity, View steps);
 
 // occupancy.cpp
 struct OccupancyChoice {
   std::vector<uint32_t> cells;
   std::vector<float> positions;  // [points][3]; float, because every device must find the same bits
 };
+// `candidates` empty: all cells.
 OccupancyChoice occupancyPoints(const MarchSpace& space, uint32_t uniform, uint32_t occupied, uint64_t seed,
-                                Indices occupancy);
+                                Indices candidates, Indices occupancy);
 double marchStepAtCell(const MarchSpace& space, uint32_t cell);
 void occupancyUpdate(const MarchSpace& space, double decay, double threshold, Indices cells, View logDensity,
                      std::span<double> grid, std::span<uint32_t> occupancy);

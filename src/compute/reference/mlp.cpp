@@ -74,10 +74,15 @@ void run(const MlpForward& a) {
   const size_t samples = hostCount(a.samples);
   const size_t width = a.shape.width;
   CHECK(a.input.columns == static_cast<uint32_t>(a.shape.inputs));
-  CHECK(a.output.columns == static_cast<uint32_t>(a.shape.outputs));
+  CHECK(a.output.columns <= static_cast<uint32_t>(a.shape.outputs));
   const MlpResult result =
       mlpForward(a.shape, samples, doubles(a.input, samples), doubles(a.weights, a.shape.parameters()));
-  store(a.output, result.output);
+  Doubles wanted;
+  for (size_t s = 0; s < samples; ++s) {
+    const auto row = result.output.begin() + static_cast<ptrdiff_t>(s * a.shape.outputs);
+    wanted.insert(wanted.end(), row, row + a.output.columns);
+  }
+  store(a.output, wanted);
   for (int l = 0; a.activations && l < a.shape.hiddenLayers; ++l)
     store(a.activations.part(l * a.samples.capacity * width, samples * width),
           View(result.activations).subspan(l * samples * width, samples * width));

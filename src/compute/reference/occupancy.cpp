@@ -20,20 +20,23 @@ Point cellCentre(const MarchSpace& space, uint32_t cell) {
 }  // namespace
 
 OccupancyChoice occupancyPoints(const MarchSpace& space, uint32_t uniform, uint32_t occupied, uint64_t seed,
-                                Indices occupancy) {
-  const uint32_t resolution = space.gridResolution, all = resolution * resolution * resolution;
+                                Indices candidates, Indices occupancy) {
+  const uint32_t resolution = space.gridResolution;
+  const uint32_t all =
+      candidates.empty() ? resolution * resolution * resolution : static_cast<uint32_t>(candidates.size());
+  const auto cellOf = [&](uint32_t candidate) { return candidates.empty() ? candidate : candidates[candidate]; };
   const RandomStream random(seed, 0x0cc);
   OccupancyChoice choice;
   for (uint64_t i = 0; i < uint64_t{uniform} + occupied; ++i) {
     const uint64_t index = 16 * i;
-    uint32_t cell = static_cast<uint32_t>(i);
+    uint32_t cell = 0;
     if (i >= uniform) {
       for (uint32_t attempt = 0; attempt < 10; ++attempt) {
-        cell = random.below(index + attempt, all);
+        cell = cellOf(random.below(index + attempt, all));
         if (occupancy[cell / 32] >> cell % 32 & 1) break;
       }
-    } else if (uniform != all) {
-      cell = random.below(index, all);
+    } else {
+      cell = cellOf(uniform == all ? static_cast<uint32_t>(i) : random.below(index, all));
     }
     choice.cells.push_back(cell);
     const uint32_t corner[3] = {cell % resolution, cell / resolution % resolution, cell / resolution / resolution};
@@ -73,7 +76,9 @@ void occupancyUpdate(const MarchSpace& space, double decay, double threshold, In
 
 void run(const OccupancyPoints& a) {
   const OccupancyChoice choice =
-      occupancyPoints(a.space, a.uniform, a.occupied, a.seed, indices(a.occupancy, a.occupancy.count));
+      occupancyPoints(a.space, a.uniform, a.occupied, a.seed,
+                                                 indices(a.candidates, a.candidates.count),
+                                                 indices(a.occupancy, a.occupancy.count));
   std::copy(choice.cells.begin(), choice.cells.end(), hostPointer(a.cells));
   std::copy(choice.positions.begin(), choice.positions.end(), hostPointer(a.positions));
 }

@@ -96,16 +96,6 @@ std::vector<MarchSample> marchRay(const MarchSpace& space, const Point& origin, 
   return samples;
 }
 
-size_t compactRay(double minTransmittance, View logDensity, View steps) {
-  double transmittance = 1;
-  size_t kept = 0;
-  while (kept < logDensity.size() && transmittance >= minTransmittance) {
-    transmittance *= 1 - opacityOf(Extinction::logDensity, logDensity[kept], steps[kept]);
-    ++kept;
-  }
-  return kept;
-}
-
 void run(const GenerateRays& a) {
   const size_t rays = hostCount(a.rays);
   const Indices cameraOfRay = indices(a.cameraOfRay, rays);
@@ -126,7 +116,9 @@ void run(const MarchRays& a) {
   const size_t rays = hostCount(a.rays);
   const Doubles origins = doubles(a.origins, 3 * rays), directions = doubles(a.directions, 3 * rays);
   const Doubles jitter = doubles(a.jitter, rays), farOfRay = doubles(a.farOfRay, rays);
+  const Doubles opticalDepth = doubles(a.opticalDepth, rays);
   const Indices occupancy = indices(a.occupancy, a.occupancy.count);
+  uint32_t* const nextStep = hostPointer(a.nextStep);
   Doubles positions, distances, steps;
   uint32_t made = 0;
   bool full = false;
@@ -135,13 +127,21 @@ void run(const MarchRays& a) {
   for (size_t r = 0; r < rays; ++r) {
     const Point origin = {origins[3 * r], origins[3 * r + 1], origins[3 * r + 2]};
     const Point direction = {directions[3 * r], directions[3 * r + 1], directions[3 * r + 2]};
-    const std::vector<MarchSample> samples = marchRay(a.space, origin, direction, jitter.empty() ? 0 : jitter[r],
-                                                      farOfRay.empty() ? a.space.far : farOfRay[r], occupancy);
+    std::vector<MarchSample> samples;
+    const bool opaque = !opticalDepth.empty() && opticalDepth[r] > a.mostOpticalDepth;
+    if (!opaque)
+      samples = marchRay(a.space, origin, direction, jitter.empty() ? 0 : jitter[r],
+                         farOfRay.empty() ? a.space.far : farOfRay[r], occupancy);
+    if (nextStep) std::erase_if(samples, [&](const MarchSample& sample) { return sample.step < nextStep[r]; });
+    if (samples.size() > a.most) samples.resize(a.most);
     full = full || made + samples.size() > a.sampleCapacity;
     if (!full) {
       ++finished;
+      if (nextStep && !opaque && a.most > 0)
+        nextStep[r] = samples.size() == a.most ? static_cast<uint32_t>(samples.back().step) + 1 : MarchRays::kThrough;
       for (const MarchSample& sample : samples) {
-        hostPointer(a.rayOfSample)[made++] = static_cast<uint32_t>(r);
+        if (a.rayOfSample) hostPointer(a.rayOfSample)[made] = static_cast<uint32_t>(r);
+        ++made;
         positions.insert(positions.end(), sample.u.begin(), sample.u.end());
         distances.push_back(sample.distance);
         steps.push_back(sample.length);
@@ -156,50 +156,49 @@ void run(const MarchRays& a) {
   store(a.steps, steps);
 }
 
-void run(const SelectSamples& a) {
+void run(const OpticalDepth& a) {
   const size_t rays = hostCount(a.rays);
   const Indices firstSample = indices(a.firstSample, rays + 1);
-  uint32_t* const lookedAt = hostPointer(a.lookedAt);
-  uint32_t made = 0;
-  bool full = false;
+  const Doubles logDensity = doubles(a.logDensity, rays ? firstSample[rays] : 0);
   for (size_t r = 0; r < rays; ++r) {
-    double thickness = 0;
-    for (uint32_t i = firstSample[r]; i < firstSample[r] + lookedAt[r]; ++i)
-      thickness += std::exp(static_cast<double>(hostPointer(a.logDensity.data)[a.logDensity.offset(i, 0)])) *
-                   hostPointer(a.steps)[i];
-    if (thickness > -std::log(static_cast<double>(a.minTransmittance))) continue;
-    const uint32_t left = firstSample[r + 1] - firstSample[r] - lookedAt[r], wanted = std::min(left, a.most);
-    full = full || made + wanted > a.selectedCapacity;
-    if (full) continue;
-    for (uint32_t i = 0; i < wanted; ++i) hostPointer(a.selected)[made++] = firstSample[r] + lookedAt[r] + i;
-    lookedAt[r] += wanted;
+    double sum = hostPointer(a.opticalDepth)[r];
+    for (uint32_t i = firstSample[r]; i < firstSample[r + 1]; ++i)
+      sum += std::exp(logDensity[i]) * hostPointer(a.steps)[i];
+    hostPointer(a.opticalDepth)[r] = static_cast<float>(sum);
   }
-  hostPointer(a.selectedCount)[0] = made;
 }
 
 void run(const CompactSamples& a) {
   const size_t rays = hostCount(a.rays);
-  const Indices firstSample = indices(a.firstSample, rays + 1);
-  const Doubles logDensity = doubles(a.logDensity, firstSample[rays]), steps = doubles(a.steps, firstSample[rays]);
-  uint32_t made = 0;
-  size_t finished = 0;
+  const Indices firstSample = indices(a.firstSample, a.rounds * (a.rays.capacity + size_t{1}));
+  const Indices nextStep = indices(a.nextStep, rays);
+  uint32_t made = 0, finished = 0;
   bool full = false;
   hostPointer(a.keptFirstSample)[0] = 0;
   for (size_t r = 0; r < rays; ++r) {
-    const size_t first = firstSample[r];
-    const size_t count = a.lookedAt ? hostPointer(a.lookedAt)[r] : firstSample[r + 1] - first;
-    const size_t kept =
-        compactRay(a.minTransmittance, View(logDensity).subspan(first, count), View(steps).subspan(first, count));
-    full = full || made + kept > a.keptCapacity;
-    for (size_t i = 0; i < kept && !full; ++i) hostPointer(a.source)[made++] = static_cast<uint32_t>(first + i);
-    double thickness = 0;
-    for (size_t i = 0; i < kept; ++i) thickness += std::exp(logDensity[first + i]) * steps[first + i];
-    const bool opaque = thickness > -std::log(static_cast<double>(a.minTransmittance));
-    if (finished == r && !full && (opaque || first + count == firstSample[r + 1])) ++finished;
+    double opticalDepth = 0;
+    std::vector<uint32_t> kept;
+    for (uint32_t round = 0; round < a.rounds; ++round) {
+      const Indices first = firstSample.subspan(round * (a.rays.capacity + size_t{1}) + r, 2);
+      for (uint32_t i = first[0]; i < first[1] && opticalDepth <= a.mostOpticalDepth; ++i) {
+        const uint32_t row = round * a.sampleCapacity + i;
+        const double logDensity = hostPointer(a.logDensity.data)[a.logDensity.offset(row, 0)];
+        opticalDepth += std::exp(logDensity) * hostPointer(a.steps)[row];
+        kept.push_back(row);
+      }
+    }
+    full = full || made + kept.size() > a.keptCapacity;
+    if (full) kept.clear();
+    for (const uint32_t row : kept) {
+      hostPointer(a.source)[made] = row;
+      hostPointer(a.rayOfSample)[made++] = static_cast<uint32_t>(r);
+    }
+    const bool through = nextStep.empty() || nextStep[r] == MarchRays::kThrough;
+    if (finished == r && !full && (opticalDepth > a.mostOpticalDepth || through)) ++finished;
     hostPointer(a.keptFirstSample)[r + 1] = made;
   }
   hostPointer(a.keptCount)[0] = made;
-  if (a.finishedRays) hostPointer(a.finishedRays)[0] = static_cast<uint32_t>(finished);
+  if (a.finishedRays) hostPointer(a.finishedRays)[0] = finished;
 }
 
 void run(const GatherRows& a) {
@@ -210,16 +209,6 @@ void run(const GatherRows& a) {
     for (size_t column = 0; column < a.output.columns; ++column)  // bits, whatever they mean
       std::memcpy(hostPointer(a.output.data) + a.output.offset(row, column),
                   hostPointer(a.input.data) + a.input.offset(source[row], column), sizeof(float));
-}
-
-void run(const ScatterRows& a) {
-  const size_t rows = hostCount(a.rows);
-  const Indices target = indices(a.target, rows);
-  CHECK(a.input.columns == a.output.columns);
-  for (size_t row = 0; row < rows; ++row)
-    for (size_t column = 0; column < a.output.columns; ++column)
-      std::memcpy(hostPointer(a.output.data) + a.output.offset(target[row], column),
-                  hostPointer(a.input.data) + a.input.offset(row, column), sizeof(float));
 }
 
 }  // namespace tessera::reference

@@ -44,6 +44,7 @@ std::vector<ConfigField> FieldConfig::fields() {
       {"cone", "marching step relative to distance; 0 for uniform steps", &cone},
       {"seed", "of everything random", &seed},
       {"samples_per_step", "samples that a step aims for; rays adapt", &samplesPerStep},
+      {"samples_per_pass", "samples of which a step keeps everything at a time; few fit caches", &samplesPerPass},
       {"first_rays", "rays of the first step", &firstRays},
       {"most_rays", "rays that a step never exceeds", &mostRays},
       {"photo_budget_mib", "memory for decoded photos in MiB; 0: all that are needed", &photoBudgetMiB},
@@ -85,7 +86,15 @@ void FieldConfig::check() const {
   within("far", far, near, kHuge);
   within("min_step", minStep, 1e-6, kHuge);
   within("cone", cone, 0, 1);
+  const MarchSpace marched = space();
+  const double steps = marched.stepIndex(marched.far) - marched.stepIndex(marched.near);
+  if (!(steps <= kMostSteps)) {
+    throw Error(fmt::format("--set min_step={} cone={}", minStep, cone), "",
+                fmt::format("a ray from near to far would take {:.0f} steps", steps),
+                fmt::format("use longer ones: at most {}", kMostSteps));
+  }
   within("samples_per_step", samplesPerStep, 64, 1 << 24);
+  within("samples_per_pass", samplesPerPass, 64, 1 << 24);
   within("most_rays", mostRays, 64, 1 << 24);
   within("first_rays", firstRays, 1, mostRays);
   within("photo_budget_mib", photoBudgetMiB, 0, kHuge);

@@ -7,6 +7,8 @@
 namespace tessera {
 
 struct FieldConfig {
+  static constexpr uint32_t kMostSteps = 16384;  // that the longest ray may take
+
   // Scene
   bool contracted = true;
   double roiMargin = 1.0;
@@ -18,7 +20,7 @@ struct FieldConfig {
   double near = 0.05, far = 32, minStep = 0.01, cone = 0.0078125;
   // Batches
   int64_t seed = 0;
-  int samplesPerStep = 1 << 16;
+  int samplesPerStep = 1 << 16, samplesPerPass = 1 << 13;
   int firstRays = 512, mostRays = 1 << 15;
   double photoBudgetMiB = 0;
   int stepsPerPhoto = 2;

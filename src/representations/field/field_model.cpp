@@ -1,20 +1,20 @@
 #include "representations/field/field_model.h"
 
+#include <cmath>
+
 #include "base/error.h"
 #include "train/model_folder.h"
 
 namespace tessera {
 namespace {
 
-// Samples of a ray that are looked up before asking whether it is opaque: few at first, for most rays end early.
-constexpr uint32_t kStages[] = {16, 16, 32, 32, 64, 64, 128, 1u << 30};
+// Samples of a ray that a round makes: few at first, for most rays end early.
+constexpr uint32_t kMostOfRound[RaySamples::kRounds] = {8, 8, 16, 32, 64, 128, 256, 0xffffffffu};
 
 }  // namespace
 
 RaySamples::RaySamples(Device& device, uint32_t rays, uint32_t samples)
     : firstSample(device.array<uint32_t>(rays + 1)),
-      count(device.array<uint32_t>(1)),
-      finishedRays(device.array<uint32_t>(1)),
       rayOfSample(device.array<uint32_t>(samples)),
       positions(device.array<float>(size_t{samples} * 3)),
       distances(device.array<float>(samples)),
@@ -37,92 +37,86 @@ FieldModel::FieldModel(Device& device, const FieldConfig& config, const SceneFra
       field_(device, config.shape(), static_cast<uint64_t>(config.seed)),
       occupancy_(device, space_) {}
 
-void FieldModel::sample(const Rays& rays, float minTransmittance, RaySamples& marched, RaySamples& kept) {
-  const uint32_t capacity = static_cast<uint32_t>(marched.distances.size());
-  const uint32_t keptCapacity = static_cast<uint32_t>(kept.distances.size());
-  reserve(rays.count, capacity, keptCapacity);
-  MarchRays march{space_};
-  march.rays = {rays.count, {}};
-  march.sampleCapacity = capacity;
-  march.origins = rays.origins;
-  march.directions = rays.directions;
-  march.jitter = rays.jitter;
-  march.farOfRay = rays.far;
-  march.occupancy = occupancy_.bits();
-  march.firstSample = marched.firstSample;
-  march.sampleCount = marched.count;
-  march.finishedRays = marched.finishedRays;
-  march.rayOfSample = marched.rayOfSample;
-  march.positions = marched.positions;
-  march.distances = marched.distances;
-  march.steps = marched.steps;
-  device_.run(march);
-
-  const Count finished{rays.count, marched.finishedRays};
-  const Matrix<float> logDensities(logDensities_.all(), 1);
-  device_.fillZero(lookedAt_.all());
-  SelectSamples select;
-  select.rays = finished;
-  select.sampleCapacity = capacity;
-  select.selectedCapacity = keptCapacity;
-  select.minTransmittance = minTransmittance;
-  select.firstSample = marched.firstSample;
-  select.logDensity = logDensities;
-  select.steps = marched.steps;
-  select.lookedAt = lookedAt_;
-  select.selected = selected_;
-  select.selectedCount = selectedCount_;
-  for (const uint32_t most : kStages) {
-    select.most = most;
-    device_.run(select);
-    const Count rows{keptCapacity, selectedCount_};
-    device_.run(GatherRows{rows, selected_, Matrix<const float>(marched.positions.all(), 3),
-                           Matrix<float>(selectedPositions_.all(), 3)});
-    device_.run(ScatterRows{rows, selected_, field_.logDensity(rows, selectedPositions_), logDensities});
+void FieldModel::sample(const Rays& rays, float minTransmittance, RaySamples& seen) {
+  const uint32_t capacity = static_cast<uint32_t>(seen.distances.size());
+  reserve(rays.count, capacity);
+  const float mostOpticalDepth = -std::log(minTransmittance);
+  const uint32_t firstsOfRound = rays.count + 1;
+  device_.fillZero(nextStep_.part(0, rays.count));
+  device_.fillZero(opticalDepth_.part(0, rays.count));
+  for (uint32_t round = 0; round < RaySamples::kRounds; ++round) {
+    const auto ofRound = [&](Array<float>& array, uint32_t columns) {
+      return array.part(size_t{round} * capacity * columns, size_t{capacity} * columns);
+    };
+    MarchRays march{space_};
+    march.rays = {rays.count, {}};
+    march.sampleCapacity = capacity;
+    march.most = kMostOfRound[round];
+    march.mostOpticalDepth = mostOpticalDepth;
+    march.origins = rays.origins;
+    march.directions = rays.directions;
+    march.jitter = rays.jitter;
+    march.farOfRay = rays.far;
+    march.occupancy = occupancy_.bits();
+    march.opticalDepth = opticalDepth_;
+    march.nextStep = nextStep_;
+    march.firstSample = roundFirst_.part(size_t{round} * firstsOfRound, firstsOfRound);
+    march.sampleCount = seen.counters.part(2 + round, 1);
+    march.positions = ofRound(positions_, 3);
+    march.distances = ofRound(distances_, 1);
+    march.steps = ofRound(steps_, 1);
+    device_.run(march);
+    const Count made{capacity, march.sampleCount};
+    const Matrix<float> logDensities(ofRound(logDensities_, 1), 1);
+    field_.logDensity(made, march.positions, logDensities);
+    device_.run(OpticalDepth{march.rays, march.firstSample, logDensities, march.steps, opticalDepth_});
   }
 
   CompactSamples compact;
-  compact.rays = finished;
-  compact.sampleCapacity = capacity;
-  compact.keptCapacity = keptCapacity;
-  compact.minTransmittance = minTransmittance;
-  compact.firstSample = marched.firstSample;
-  compact.lookedAt = lookedAt_;
-  compact.logDensity = logDensities;
-  compact.steps = marched.steps;
-  compact.keptFirstSample = kept.firstSample;
-  compact.keptCount = kept.count;
-  compact.finishedRays = kept.finishedRays;
+  compact.rays = {rays.count, {}};
+  compact.rounds = RaySamples::kRounds;
+  compact.sampleCapacity = compact.keptCapacity = capacity;
+  compact.mostOpticalDepth = mostOpticalDepth;
+  compact.firstSample = roundFirst_;
+  compact.nextStep = nextStep_;
+  compact.logDensity = Matrix<float>(logDensities_, 1);
+  compact.steps = steps_;
+  compact.keptFirstSample = seen.firstSample;
+  compact.keptCount = seen.counters.part(0, 1);
+  compact.finishedRays = seen.counters.part(1, 1);
   compact.source = source_;
+  compact.rayOfSample = seen.rayOfSample;
   device_.run(compact);
 
-  const Count rows{keptCapacity, kept.count};
-  const auto gather = [&](Slice<const float> from, Slice<float> to, uint32_t columns) {
-    device_.run(GatherRows{rows, source_, Matrix<const float>(from, columns), Matrix<float>(to, columns)});
+  const auto gather = [&](Array<float>& from, Array<float>& to, uint32_t columns) {
+    device_.run(GatherRows{seen.samples(), source_, Matrix<float>(from, columns), Matrix<float>(to, columns)});
   };
-  gather(marched.positions, kept.positions, 3);
-  gather(marched.distances, kept.distances, 1);
-  gather(marched.steps, kept.steps, 1);
-  gather(asFloats(marched.rayOfSample.all()), asFloats(kept.rayOfSample.all()), 1);
+  gather(positions_, seen.positions, 3);
+  gather(distances_, seen.distances, 1);
+  gather(steps_, seen.steps, 1);
 }
 
-void FieldModel::reserve(uint32_t rays, uint32_t marched, uint32_t kept) {
-  field_.reserve(kept);
-  if (lookedAt_.size() < rays) lookedAt_ = device_.array<uint32_t>(rays);
-  if (logDensities_.size() < marched) logDensities_ = device_.array<float>(marched);
-  if (source_.size() < kept) {
-    source_ = device_.array<uint32_t>(kept);
-    selected_ = device_.array<uint32_t>(kept);
-    selectedCount_ = device_.array<uint32_t>(1);
-    selectedPositions_ = device_.array<float>(size_t{kept} * 3);
+void FieldModel::reserve(uint32_t rays, uint32_t samples) {
+  field_.reserve(samples);
+  if (nextStep_.size() < rays) {
+    nextStep_ = device_.array<uint32_t>(rays);
+    opticalDepth_ = device_.array<float>(rays);
+    roundFirst_ = device_.array<uint32_t>(size_t{RaySamples::kRounds} * (rays + 1));
+  }
+  if (source_.size() < samples) {
+    const size_t all = size_t{RaySamples::kRounds} * samples;
+    source_ = device_.array<uint32_t>(samples);
+    positions_ = device_.array<float>(all * 3);
+    for (Array<float>* perSample : {&distances_, &steps_, &logDensities_}) *perSample = device_.array<float>(all);
   }
 }
 
 void FieldModel::refreshOccupancy(uint32_t uniform, uint32_t occupied, uint64_t seed) {
   constexpr uint32_t kChunk = 1 << 16;
   field_.reserve(kChunk);
-  occupancy_.update([&](Count count, Slice<const float> positions) { return field_.logDensity(count, positions); },
-                    uniform, occupied, seed, kChunk);
+  occupancy_.update([&](Count count, Slice<const float> positions, Matrix<float> logDensities) {
+    field_.logDensity(count, positions, logDensities);
+  }, uniform, occupied, seed, kChunk);
 }
 
 void FieldModel::save(TensorSet& tensors, bool withMoments) {

@@ -8,13 +8,20 @@
 
 namespace tessera {
 
-// Samples of a set of rays on the device: what marching makes and everything later reads.
+// The samples of a set of rays that can be seen, on the device, ray by ray.
 struct RaySamples {
-  Array<uint32_t> firstSample, count, finishedRays, rayOfSample;
+  Array<uint32_t> firstSample, rayOfSample;
   Array<float> positions, distances, steps;
+  Slice<uint32_t> counters;  // [kCounters]; whoever samples says where
+
+  static constexpr uint32_t kRounds = 8;
+  static constexpr uint32_t kCounters = 2 + kRounds;  // samples, finished rays, densities looked up in each round
 
   RaySamples() = default;
   RaySamples(Device& device, uint32_t rays, uint32_t samples);
+
+  Count samples() const { return {static_cast<uint32_t>(distances.size()), counters.part(0, 1)}; }
+  Count finished(uint32_t rays) const { return {rays, counters.part(1, 1)}; }
 };
 
 class FieldModel {
@@ -25,10 +32,10 @@ class FieldModel {
     uint32_t count;
     Slice<const float> origins, directions, jitter, far;
   };
-  // Marches rays and keeps what can be seen: samples in front of the point where transmittance has fallen below
-  // `minTransmittance`. Densities are looked up in stages from the front, so that what lies behind surfaces costs
-  // little.
-  void sample(const Rays& rays, float minTransmittance, RaySamples& marched, RaySamples& kept);
+  // Finds the samples of rays that can be seen: those in front of the point where transmittance has fallen below
+  // `minTransmittance`. Marches in rounds from the front and looks densities up in between, so that what lies behind
+  // surfaces costs nothing. Rays whose samples do not fit are not finished, nor are those after them.
+  void sample(const Rays& rays, float minTransmittance, RaySamples& seen);
 
   void refreshOccupancy(uint32_t uniform, uint32_t occupied, uint64_t seed);
 
@@ -44,7 +51,7 @@ class FieldModel {
   void restore(const fs::path& path, const Safetensors& file);
 
  private:
-  void reserve(uint32_t rays, uint32_t marched, uint32_t kept);
+  void reserve(uint32_t rays, uint32_t samples);
 
   Device& device_;
   FieldConfig config_;
@@ -52,8 +59,10 @@ class FieldModel {
   MarchSpace space_;
   RadianceField field_;
   OccupancyGrid occupancy_;
-  Array<uint32_t> source_, lookedAt_, selected_, selectedCount_;
-  Array<float> selectedPositions_, logDensities_;
+
+  // Of marching, all rounds.
+  Array<uint32_t> nextStep_, roundFirst_, source_;
+  Array<float> opticalDepth_, positions_, distances_, steps_, logDensities_;
 };
 
 // A trained model for drawing, from its folder.

@@ -6,17 +6,18 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kRays = 16384;       // of one piece of the picture, at most
-constexpr uint32_t kMarched = 1 << 20;  // rays that do not fit are taken up by the next piece
-constexpr uint32_t kSamples = 1 << 18;  // of those, that can be seen
+constexpr uint32_t kRays = 4096;        // of one piece of the picture, at most
+constexpr uint32_t kSamples = 1 << 16;  // rays that do not fit are taken up by the next piece
+static_assert(kSamples >= FieldConfig::kMostSteps);
 constexpr float kMinTransmittance = 1e-3f;
 
 }  // namespace
 
 FieldRenderer::FieldRenderer(FieldModel& model) : model_(model) {
   Device& device = model.device();
-  marched_ = RaySamples(device, kRays, kMarched);
-  kept_ = RaySamples(device, kRays, kSamples);
+  seen_ = RaySamples(device, kRays, kSamples);
+  counters_ = device.array<uint32_t>(RaySamples::kCounters);
+  seen_.counters = counters_;
   cameraOfRay_ = device.array<uint32_t>(kRays);
   pixels_ = device.array<float>(kRays * 2);
   for (Array<float>* perRay : {&origins_, &directions_, &colour_}) *perRay = device.array<float>(kRays * 3);
@@ -63,24 +64,24 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
       device.write(far_.all(), std::span<const float>(far));
       farOfRay = far_;
     }
-    model_.sample({rays, origins_, directions_, {}, farOfRay}, kMinTransmittance, marched_, kept_);
-    const Count samples{kSamples, kept_.count};
+    model_.sample({rays, origins_, directions_, {}, farOfRay}, kMinTransmittance, seen_);
     const RadianceField::Output output =
-        model_.field().forward(samples, kept_.positions, directions_, kept_.rayOfSample, false);
+        model_.field().forward(seen_.samples(), seen_.positions, directions_, seen_.rayOfSample, false);
     CompositeForward composite;
     composite.minTransmittance = kMinTransmittance;
-    composite.rays = {rays, kept_.finishedRays};
-    composite.firstSample = kept_.firstSample;
+    composite.rays = seen_.finished(rays);
+    composite.firstSample = seen_.firstSample;
     composite.x = output.logDensity;
-    composite.steps = kept_.steps;
-    composite.distances = kept_.distances;
+    composite.steps = seen_.steps;
+    composite.distances = seen_.distances;
     composite.colours = output.colours;
     composite.colour = colour_;
     composite.opacity = opacity_;
     composite.depth = depth_;
     composite.weights = weights_;
     device.run(composite);
-    const uint32_t finished = device.read(kept_.finishedRays.all())[0];
+    const std::vector<uint32_t> counters = device.read(counters_.all());
+    const uint32_t finished = counters[1];
     CHECK(finished >= 1u);  // one ray's steps always fit
     const std::vector<float> colour = device.read(colour_.part(0, size_t{finished} * 3));
     const std::vector<float> opacity = device.read(opacity_.part(0, finished));
@@ -89,10 +90,10 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
     std::copy(opacity.begin(), opacity.end(), view.opacity.pixels.begin() + static_cast<ptrdiff_t>(first));
     for (uint32_t ray = 0; ray < finished; ++ray) view.depth.pixels[first + ray] = depth[ray] * cosine(ray) / scale;
     first += finished;
-    const auto perRay = [&](Slice<const uint32_t> counter) {
-      return std::max(1.0, device.read(counter)[0] / (1.0 * finished));
-    };
-    const double fitting = std::min(0.9 * kMarched / perRay(marched_.count), 0.9 * kSamples / perRay(kept_.count));
+    // Each round of marching has room for so many samples, and so has what is seen.
+    const uint32_t fullest =
+        std::max(counters[0], *std::max_element(counters.begin() + 2, counters.begin() + RaySamples::kCounters));
+    const double fitting = 0.9 * kSamples / std::max(1.0, fullest / (1.0 * finished));
     wanted = static_cast<uint32_t>(std::clamp(fitting, 64.0, static_cast<double>(kRays)));
   }
   return view;

@@ -16,8 +16,8 @@ class FieldRenderer final : public ViewRenderer {
 
  private:
   FieldModel& model_;
-  RaySamples marched_, kept_;
-  Array<uint32_t> cameraOfRay_;
+  RaySamples seen_;
+  Array<uint32_t> counters_, cameraOfRay_;
   Array<float> pixels_, origins_, directions_, far_, colour_, opacity_, depth_, weights_;
 };
 

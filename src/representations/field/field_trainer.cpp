@@ -12,8 +12,9 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kMarchedPerWanted = 16;  // room for samples that are hidden behind others
-constexpr uint32_t kKeptPerWanted = 2;      // and for steps that see more than the last ones did
+constexpr uint32_t kRoomPerWanted = 4;  // for passes that see more than the last step's did
+constexpr uint32_t kRoomPerRay = 8;     // so that the first round of marching fits
+constexpr uint32_t kLosses = 3;         // of a pass: colour loss, squared error, distortion loss
 constexpr float kMinTransmittance = 1e-4f;
 
 ColourLossKind lossKind(const std::string& name) {
@@ -56,17 +57,22 @@ FieldTrainer::FieldTrainer(Device& device, const Capture& capture, const FieldCo
   lossKind(config.loss);
   model_.occupancy().exclude(visibleCells(capture, frame, model_.space()));
   const uint32_t rays = static_cast<uint32_t>(config.mostRays);
-  const uint32_t samples = static_cast<uint32_t>(config.samplesPerStep) * kKeptPerWanted;
-  marched_ = RaySamples(device, rays, static_cast<uint32_t>(config.samplesPerStep) * kMarchedPerWanted);
-  kept_ = RaySamples(device, rays, samples);
+  const uint32_t perPass = static_cast<uint32_t>(std::min(config.samplesPerStep, config.samplesPerPass));
+  passes_ = (static_cast<uint32_t>(config.samplesPerStep) + perPass - 1) / perPass;
+  const uint32_t raysPerPass = (rays + passes_ - 1) / passes_;
+  const uint32_t samples = std::max({kRoomPerWanted * perPass, kRoomPerRay * raysPerPass, FieldConfig::kMostSteps});
+  seen_ = RaySamples(device, raysPerPass, samples);
+  counters_ = device.array<uint32_t>(size_t{passes_} * RaySamples::kCounters);
   photoOfRay_ = device.array<uint32_t>(rays);
-  for (Array<float>* perRay : {&weights_, &jitter_, &opacity_, &depth_}) *perRay = device.array<float>(rays);
+  for (Array<float>* perRay : {&weights_, &jitter_, &opacity_, &depth_, &opacityGradients_}) {
+    *perRay = device.array<float>(rays);
+  }
   pixels_ = device.array<float>(size_t{rays} * 2);
   for (Array<float>* perRay :
        {&targets_, &backgrounds_, &origins_, &directions_, &colour_, &exposed_, &colourGradients_}) {
     *perRay = device.array<float>(size_t{rays} * 3);
   }
-  losses_ = device.array<float>(3);
+  losses_ = device.array<float>(size_t{passes_} * kLosses);
   for (Array<float>* perSample : {&sampleWeights_, &weightGradients_, &logDensityGradients_}) {
     *perSample = device.array<float>(samples);
   }
@@ -75,7 +81,7 @@ FieldTrainer::FieldTrainer(Device& device, const Capture& capture, const FieldCo
 
 void FieldTrainer::refreshOccupancy(int64_t step) {
   if (step % config_.occupancyEvery != 0) return;
-  const uint32_t cells = model_.occupancy().cells();
+  const uint32_t cells = model_.occupancy().visibleCells();
   const uint64_t seed = mix64(static_cast<uint64_t>(config_.seed) ^ (static_cast<uint64_t>(step) << 20));
   if (step < config_.occupancyWarmUp) {
     model_.refreshOccupancy(cells, 0, seed);
@@ -99,52 +105,86 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
   refreshOccupancy(step);
   drawRays(photos_.at(step), static_cast<uint64_t>(config_.seed), step, rays_, config_.randomBackground, batch_);
   uploadRays();
-  model_.sample({rays_, origins_, directions_, jitter_, {}}, kMinTransmittance, marched_, kept_);
+  const auto raysBefore = [&](uint32_t pass) { return static_cast<uint32_t>(uint64_t{rays_} * pass / passes_); };
+  for (uint32_t pass = 0; pass < passes_; ++pass) {
+    addGradients(pass, raysBefore(pass), raysBefore(pass + 1) - raysBefore(pass));
+  }
+  updateParameters(step, plannedSteps);
 
-  const uint32_t capacity = static_cast<uint32_t>(kept_.distances.size());
-  const Count samples{capacity, kept_.count};
-  const Count rays{rays_, kept_.finishedRays};
+  // The step is over: its counters may be read.
+  const std::vector<uint32_t> counters = device_.read(counters_.all());
+  const std::vector<float> losses = device_.read(losses_.all());
+  StepReport report;
+  double squares = 0, weight = 0;
+  for (uint32_t pass = 0; pass < passes_; ++pass) {
+    const uint32_t* counter = &counters[size_t{pass} * RaySamples::kCounters];
+    report.samples += counter[0];
+    report.rays += counter[1];
+    for (uint32_t round = 0; round < RaySamples::kRounds; ++round) report.marched += counter[2 + round];
+    const float* loss = &losses[size_t{pass} * kLosses];
+    report.loss += loss[0] + loss[2];
+    squares += loss[1];
+    for (uint32_t ray = 0; ray < counter[1]; ++ray) weight += batch_.weights[raysBefore(pass) + ray];
+  }
+  report.squaredError = squares / std::max(1.0, 3 * weight);
+
+  const double perRay = std::max(1.0, static_cast<double>(report.samples)) / std::max(1u, report.rays);
+  const double rounded = std::ceil(config_.samplesPerStep / perRay / 64) * 64;
+  rays_ = static_cast<uint32_t>(std::clamp<double>(rounded, 64, config_.mostRays));
+  return report;
+}
+
+void FieldTrainer::addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCount) {
+  const auto ofRays = [&](auto& array, uint32_t columns) {
+    return array.part(size_t{firstRay} * columns, size_t{rayCount} * columns);
+  };
+  const Slice<const float> directions = ofRays(directions_, 3);
+  const Slice<const uint32_t> photoOfRay = ofRays(photoOfRay_, 1);
+  const Slice<float> losses = losses_.part(size_t{pass} * kLosses, kLosses);
+  seen_.counters = counters_.part(size_t{pass} * RaySamples::kCounters, RaySamples::kCounters);
+  model_.sample({rayCount, ofRays(origins_, 3), directions, ofRays(jitter_, 1), {}}, kMinTransmittance, seen_);
+  const Count samples = seen_.samples(), rays = seen_.finished(rayCount);
   RadianceField& field = model_.field();
-  const RadianceField::Output output = field.forward(samples, kept_.positions, directions_, kept_.rayOfSample, true);
+  const RadianceField::Output output = field.forward(samples, seen_.positions, directions, seen_.rayOfSample, true);
 
   CompositeForward composite;
   composite.minTransmittance = kMinTransmittance;
   composite.rays = rays;
-  composite.firstSample = kept_.firstSample;
+  composite.firstSample = seen_.firstSample;
   composite.x = output.logDensity;
-  composite.steps = kept_.steps;
-  composite.distances = kept_.distances;
+  composite.steps = seen_.steps;
+  composite.distances = seen_.distances;
   composite.colours = output.colours;
-  composite.background = backgrounds_;
-  composite.colour = colour_;
-  composite.opacity = opacity_;
-  composite.depth = depth_;
+  composite.colour = ofRays(colour_, 3);
+  composite.opacity = ofRays(opacity_, 1);
+  composite.depth = ofRays(depth_, 1);
   composite.weights = sampleWeights_;
   device_.run(composite);
-  device_.run(ExposureForward{rays, colour_, photoOfRay_, exposures_.values, exposed_});
+  device_.run(ExposureForward{rays, composite.colour, composite.opacity, ofRays(backgrounds_, 3), photoOfRay,
+                              exposures_.values, ofRays(exposed_, 3)});
 
   ColourLoss loss;
   loss.kind = lossKind(config_.loss);
   loss.parameter = static_cast<float>(config_.lossParameter);
   loss.scale = 1.0f / (3.0f * static_cast<float>(rays_));
   loss.rays = rays;
-  loss.predicted = exposed_;
-  loss.target = targets_;
-  loss.weights = weights_;
-  loss.loss = losses_.part(0, 2);
-  loss.gradients = colourGradients_;
+  loss.predicted = ofRays(exposed_, 3);
+  loss.target = ofRays(targets_, 3);
+  loss.weights = ofRays(weights_, 1);
+  loss.loss = losses.part(0, 2);
+  loss.gradients = ofRays(colourGradients_, 3);
   device_.run(loss);
-  device_.run(ExposureBackward{rays, colour_, photoOfRay_, exposures_.values, colourGradients_, colourGradients_,
-                               exposures_.gradients});
+  device_.run(ExposureBackward{rays, composite.colour, ofRays(backgrounds_, 3), photoOfRay, exposures_.values,
+                               loss.gradients, loss.gradients, ofRays(opacityGradients_, 1), exposures_.gradients});
   if (config_.distortion > 0) {
     DistortionLoss distortion;
     distortion.scale = static_cast<float>(config_.distortion) / static_cast<float>(rays_);
     distortion.rays = rays;
-    distortion.firstSample = kept_.firstSample;
+    distortion.firstSample = seen_.firstSample;
     distortion.weights = sampleWeights_;
-    distortion.distances = kept_.distances;
-    distortion.steps = kept_.steps;
-    distortion.loss = losses_.part(2, 1);
+    distortion.distances = seen_.distances;
+    distortion.steps = seen_.steps;
+    distortion.loss = losses.part(2, 1);
     distortion.weightGradients = weightGradients_;
     device_.run(distortion);
   }
@@ -152,38 +192,18 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
   CompositeBackward back;
   back.minTransmittance = kMinTransmittance;
   back.rays = rays;
-  back.firstSample = kept_.firstSample;
+  back.firstSample = seen_.firstSample;
   back.x = output.logDensity;
-  back.steps = kept_.steps;
-  back.distances = kept_.distances;
+  back.steps = seen_.steps;
+  back.distances = seen_.distances;
   back.colours = output.colours;
-  back.background = backgrounds_;
-  back.rayColourGradients = colourGradients_;
+  back.rayColourGradients = loss.gradients;
+  back.rayOpacityGradients = ofRays(opacityGradients_, 1);
   if (config_.distortion > 0) back.weightGradients = weightGradients_;
   back.xGradients = logDensityGradients_;
   back.colourGradients = Matrix<float>(sampleColourGradients_, 3);
   device_.run(back);
-  field.backward(samples, kept_.positions, logDensityGradients_, Matrix<const float>(sampleColourGradients_, 3));
-  updateParameters(step, plannedSteps);
-
-  // The step is over: its counters may be read.
-  StepReport report;
-  const std::vector<float> losses = device_.read(losses_.all());
-  report.rays = device_.read(kept_.finishedRays.all())[0];
-  report.samples = device_.read(kept_.count.all())[0];
-  report.marched = device_.read(marched_.count.all())[0];
-  double weight = 0;
-  for (uint32_t ray = 0; ray < report.rays; ++ray) weight += batch_.weights[ray];
-  report.loss = losses[0] + losses[2];
-  report.squaredError = losses[1] / std::max(1.0, 3 * weight);
-
-  const double perRay = std::max(1.0, static_cast<double>(report.samples)) / std::max(1u, report.rays);
-  const double marchedPerRay = std::max(1.0, static_cast<double>(report.marched)) / std::max(1u, report.rays);
-  const double wanted =
-      std::min(config_.samplesPerStep / perRay, 0.9 * static_cast<double>(marched_.distances.size()) / marchedPerRay);
-  const double rounded = std::ceil(wanted / 64) * 64;
-  rays_ = static_cast<uint32_t>(std::clamp<double>(rounded, 64, config_.mostRays));
-  return report;
+  field.backward(samples, seen_.positions, logDensityGradients_, Matrix<const float>(sampleColourGradients_, 3));
 }
 
 void FieldTrainer::updateParameters(int64_t step, int64_t plannedSteps) {

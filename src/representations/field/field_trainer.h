@@ -22,6 +22,8 @@ class FieldTrainer final : public Trainee {
  private:
   void refreshOccupancy(int64_t step);
   void uploadRays();
+  // One pass: rays [firstRay, firstRay + rayCount) of the step, from marching to the gradients of all parameters.
+  void addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCount);
   void updateParameters(int64_t step, int64_t plannedSteps);
   void centreExposures();
 
@@ -30,14 +32,15 @@ class FieldTrainer final : public Trainee {
   FieldConfig config_;
   FieldModel model_;
   PhotoWindow photos_;
-  uint32_t rays_;  // of the next step
+  uint32_t rays_;    // of the next step
+  uint32_t passes_;  // of a step: a part of the rays each, so that what a pass computes stays in caches
   RayBatch batch_;
   Array<RayCamera> cameras_;
   ParameterGroup exposures_;  // [photos][3], log2 gains
-  RaySamples marched_, kept_;
-  Array<uint32_t> photoOfRay_;
+  RaySamples seen_;  // of one pass
+  Array<uint32_t> photoOfRay_, counters_;
   Array<float> pixels_, targets_, backgrounds_, weights_, jitter_, origins_, directions_;
-  Array<float> colour_, exposed_, opacity_, depth_, colourGradients_, losses_;
+  Array<float> colour_, exposed_, opacity_, depth_, colourGradients_, opacityGradients_, losses_;
   Array<float> sampleWeights_, weightGradients_, logDensityGradients_, sampleColourGradients_;
 };
 
