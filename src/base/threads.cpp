@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <exception>
 #include <mutex>
@@ -9,6 +10,21 @@
 #include <vector>
 
 namespace tessera {
+namespace {
+
+// Work often comes in pieces of a fraction of a millisecond, and waking a thread takes as long as some of them: who
+// waits looks again for a while before going to sleep.
+constexpr std::chrono::microseconds kPatience{50};
+
+template <class Condition>
+void waitAwake(const Condition& condition) {
+  const auto until = std::chrono::steady_clock::now() + kPatience;
+  while (!condition() && std::chrono::steady_clock::now() < until) {
+    for (int i = 0; i < 16 && !condition(); ++i) std::atomic_signal_fence(std::memory_order_seq_cst);
+  }
+}
+
+}  // namespace
 
 struct ThreadPool::State {
   std::vector<std::thread> workers;
@@ -17,9 +33,9 @@ struct ThreadPool::State {
   const std::function<void(size_t, int)>* body = nullptr;
   size_t tasks = 0;
   std::atomic<size_t> next{0};
-  size_t generation = 0;
-  int busy = 0;
-  bool stopping = false;
+  std::atomic<size_t> generation{0};
+  std::atomic<int> busy{0};
+  std::atomic<bool> stopping{false};
   std::exception_ptr failure;
 
   void work(int thread) {
@@ -38,6 +54,7 @@ struct ThreadPool::State {
   void loop(int thread) {
     size_t seen = 0;
     for (;;) {
+      waitAwake([&] { return stopping || generation != seen; });
       {
         std::unique_lock lock(mutex);
         wake.wait(lock, [&] { return stopping || generation != seen; });
@@ -87,6 +104,7 @@ void ThreadPool::run(size_t tasks, const std::function<void(size_t, int)>& body)
   }
   state.wake.notify_all();
   state.work(0);
+  waitAwake([&] { return state.busy == 0; });
   std::unique_lock lock(state.mutex);
   state.done.wait(lock, [&] { return state.busy == 0; });
   if (state.failure) std::rethrow_exception(state.failure);

@@ -30,10 +30,14 @@ struct CompositeForward {
   Slice<float> weights;               // [samples]
 };
 
-// Overwrites xGradients, colourGradients (of samples) for all samples of the rays, zero behind the stop.
+// Overwrites xGradients, colourGradients (of samples) for all samples of the rays, zero behind the stop. A place near a
+// camera is seen by few photos and by many of their pixels: unscaled, it learns fastest and becomes fog. With
+// `fullGradientDistance` d both gradients of a sample at distance t are scaled by min(1, (t/d)²) (Philip and
+// Deschaintre 2023, gradient scaling); they are no longer those of the loss.
 struct CompositeBackward {
   Extinction extinction = Extinction::logDensity;
   float minTransmittance = 1e-4f;
+  float fullGradientDistance = 0;
   Count rays;
   Slice<const uint32_t> firstSample;
   Matrix<const float> x;

@@ -105,6 +105,7 @@ OperationTests testsOf<CompositeBackward>() {
                                  if (optional & 2) a.rayOpacityGradients = stage.randomInput(size.capacity, -1, 1);
                                  if (optional & 4) a.rayDepthGradients = stage.randomInput(size.capacity, -1, 1);
                                  if (optional & 8) a.weightGradients = stage.randomInput(scene.x.size(), -1, 1);
+                                 if (optional & 2) a.fullGradientDistance = 2;
                                  a.xGradients = stage.output("xGradients", scene.x.size());
                                  a.colourGradients = stage.outputMatrix("colourGradients", scene.x.size(), 3, layout);
                                  stage.device.run(a);

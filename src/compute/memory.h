@@ -104,6 +104,9 @@ struct Matrix {
         groupWidth(other.groupWidth),
         groupStride(other.groupStride) {}
 
+  // Rows that a plane should have room for, at least `rows`: planes a power of two apart would all fall on the same few
+  // lines of a cache.
+  static size_t rowsOfPlane(size_t rows) { return (rows + 63) / 64 * 64 + 24; }
   static Matrix grouped(Slice<T> slice, uint32_t columns, uint32_t width, size_t rows) {
     Matrix m(slice, columns, width);
     m.groupWidth = width;

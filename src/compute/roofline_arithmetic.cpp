@@ -22,13 +22,14 @@ void measureNetwork(RooflineRecorder& recorder, const Network& network, const st
   const MlpShape& shape = network.shape;
   Device& device = recorder.device();
   const uint32_t inputs = shape.inputs, outputs = shape.outputs;
+  const size_t planeRows = Matrix<float>::rowsOfPlane(n);
   const auto inputMatrix = [&](Array<float>& data) {
-    return network.grouped ? Matrix<float>::grouped(data, inputs, 2, n) : Matrix<float>(data, inputs);
+    return network.grouped ? Matrix<float>::grouped(data, inputs, 2, planeRows) : Matrix<float>(data, inputs);
   };
-  Array<float> x = recorder.randomFloats(size_t{n} * inputs, -1, 1);
+  Array<float> x = recorder.randomFloats(planeRows * inputs, -1, 1);
   Array<float> w = recorder.randomFloats(shape.parameters(), -0.2f, 0.2f);
   Array<float> dy = recorder.randomFloats(size_t{n} * outputs, -1, 1);
-  Array<float> y = device.array<float>(size_t{n} * outputs), dx = device.array<float>(size_t{n} * inputs);
+  Array<float> y = device.array<float>(size_t{n} * outputs), dx = device.array<float>(planeRows * inputs);
   Array<float> kept = device.array<float>(n * shape.activationsPerSample());
   Array<float> dw = device.array<float>(shape.parameters());
   const MlpForward forward{shape, {n, {}}, inputMatrix(x), w, Matrix<float>(y, outputs), kept};
@@ -50,18 +51,20 @@ void measureHashGrid(RooflineRecorder& recorder, const HashGrid& grid, const std
                      const std::vector<float>& points, double limit) {
   Device& device = recorder.device();
   const uint32_t n = static_cast<uint32_t>(points.size() / 3);
+  const size_t planeRows = Matrix<float>::rowsOfPlane(n);
   Array<float> positions = device.arrayOf(points);
   Array<float> table = recorder.randomFloats(grid.parameters(), -1e-4f, 1e-4f);
-  Array<float> upstream = recorder.randomFloats(size_t{n} * grid.columns(), -1, 1);
-  Array<float> encoded = device.array<float>(size_t{n} * grid.columns()),
+  Array<float> upstream = recorder.randomFloats(planeRows * grid.columns(), -1, 1);
+  Array<float> encoded = device.array<float>(planeRows * grid.columns()),
                gradients = device.array<float>(grid.parameters());
   const uint32_t features = static_cast<uint32_t>(grid.features);
   const double lookups = 8.0 * static_cast<double>(grid.levels.size()) * n;
   const std::string where = fmt::format("{} levels x {}, {}, {} samples", grid.levels.size(), features, title, n);
   const HashGridForward forward{
-      grid, {n, {}}, positions, table, Matrix<float>::grouped(encoded, grid.columns(), features, n)};
+      grid, {n, {}}, positions, table, Matrix<float>::grouped(encoded, grid.columns(), features, planeRows)};
   const HashGridBackward backward{
-      grid, {n, {}}, positions, table, Matrix<float>::grouped(upstream, grid.columns(), features, n), gradients, {}};
+      grid,      {n, {}}, positions, table, Matrix<float>::grouped(upstream, grid.columns(), features, planeRows),
+      gradients, {}};
   recorder.measure(Operation::kHashGridForward, {"HashGridForward", where, lookups, "lookup", limit},
                    [&] { device.run(forward); });
   recorder.measure(Operation::kHashGridBackward, {"HashGridBackward", where, lookups, "lookup", limit},

@@ -55,8 +55,9 @@ void RadianceField::reserve(uint32_t samples) {
   if (samples <= capacity_) return;
   capacity_ = samples;
   const size_t n = samples;
-  encoded_ = device_.array<float>(n * shape_.grid.columns());
-  encodedGradients_ = device_.array<float>(n * shape_.grid.columns());
+  for (Array<float>* encodings : {&encoded_, &encodedGradients_}) {
+    *encodings = device_.array<float>(Matrix<float>::rowsOfPlane(n) * shape_.grid.columns());
+  }
   colourInput_ = device_.array<float>(n * shape_.colour.inputs);
   colours_ = device_.array<float>(n * 3);
   densityActivations_ = device_.array<float>(n * shape_.density.activationsPerSample());
@@ -66,7 +67,7 @@ void RadianceField::reserve(uint32_t samples) {
 
 Matrix<float> RadianceField::byLevel(Array<float>& encodings) {
   return Matrix<float>::grouped(encodings, shape_.grid.columns(), static_cast<uint32_t>(shape_.grid.features),
-                                capacity_);
+                                Matrix<float>::rowsOfPlane(capacity_));
 }
 
 void RadianceField::logDensity(Count samples, Slice<const float> positions, Matrix<float> logDensities) {

@@ -123,6 +123,11 @@ void run(Context& context, const CompositeBackward& a) {
             break;
           }
         }
+        if (a.fullGradientDistance > 0 && distances[i] < a.fullGradientDistance) {
+          const float nearness = distances[i] / a.fullGradientDistance, scale = nearness * nearness;
+          xGradients[i] *= scale;
+          for (int k = 0; k < 3; ++k) dc[k] *= scale;
+        }
       }
       for (uint32_t i = stop; i < last; ++i) {
         xGradients[i] = 0;

@@ -1,7 +1,7 @@
 // Fused MLP: a block of samples stays in cache through all layers. Forward (X · Wᵀ), input gradient (dY · W) and weight
-// gradient (dYᵀ · X) are three products whose inner loop is "broadcast one number, multiply-add a few vectors", with the
-// accumulators in registers. Numbers to broadcast may lie anywhere, so the hash grid's planes are read where they are;
-// vectors are rows, one row a sample.
+// gradient (dYᵀ · X) are three products whose inner loop is "broadcast one number, multiply-add a few vectors", with
+// the accumulators in registers. Numbers to broadcast may lie anywhere, so the hash grid's planes are read where they
+// are; vectors are rows, one row a sample.
 
 #include "compute/mlp.h"
 
@@ -47,61 +47,119 @@ using Float = hn::CappedTag<float, 16>;
 using Vector = hn::Vec<Float>;
 
 #if HWY_TARGET <= HWY_AVX3
-constexpr int kWide = 4;  // vectors side by side in a tile: 32 registers
+constexpr int kWide = 4;          // vectors side by side in a tile: 32 registers
+constexpr bool kShuffles = true;  // one load a multiply-add is too many: four numbers are fetched at once and spread
 #else
 constexpr int kWide = 2;  // 16 registers
+constexpr bool kShuffles = false;
 #endif
 
 // Numbers to broadcast: element (row, column) of a block in any of Matrix's layouts.
 struct Numbers {
   const float* data;
   size_t rowStride;
-  size_t groupStride = 0;
-  uint32_t shift = 31, mask = 0x7fffffff;  // column → group, column within the group; row-major: one group
-
-  const float* column(int c) const { return data + (c >> shift) * groupStride + (c & mask); }
-  Numbers from(int row, int firstColumn) const {  // firstColumn: of a group
-    Numbers part = *this;
-    part.data = column(firstColumn) + row * rowStride;
-    return part;
-  }
+  size_t groupStride = 0;  // 0: row-major
+  uint32_t groupWidth = 0;
 };
 
-// out[r][v] = Σ_k x(row r, column k) · b[k · bRow + v · lanes]
-template <int R, int V>
-HWY_INLINE void productTile(const Numbers& x, const float* HWY_RESTRICT b, size_t bRow, int depth,
+// The same, with what can be known when compiling: the addresses of a tile's rows are then constants apart.
+//   kStride  16 to 128   row-major rows of so many
+//            2           planes of two columns, as the hash grid writes them
+//            0           any other
+template <int kStride>
+struct NumbersOf {
+  const float* data;
+  size_t rowStride, groupStride;
+  uint32_t groupWidth;
+
+  explicit NumbersOf(const Numbers& x)
+      : data(x.data), rowStride(x.rowStride), groupStride(x.groupStride), groupWidth(x.groupWidth) {}
+  HWY_INLINE const float* column(int c) const {
+    if (kStride > 2) return data + c;
+    if (kStride == 2) return data + (c >> 1) * groupStride + (c & 1);
+    return groupStride ? data + c / groupWidth * groupStride + c % groupWidth : data + c;
+  }
+  HWY_INLINE size_t row(int r) const { return kStride ? size_t{kStride} * r : rowStride * r; }
+};
+
+template <int kStride>
+struct Stride {
+  static constexpr int value = kStride;
+};
+
+// call(Stride<kStride>()) with the best one for `x`.
+template <class Call>
+void withStride(const Numbers& x, const Call& call) {
+  if (x.groupStride != 0) return x.groupWidth == 2 && x.rowStride == 2 ? call(Stride<2>()) : call(Stride<0>());
+  switch (x.rowStride) {
+    case 16:
+      return call(Stride<16>());
+    case 32:
+      return call(Stride<32>());
+    case 64:
+      return call(Stride<64>());
+    case 128:
+      return call(Stride<128>());
+    default:
+      return call(Stride<0>());
+  }
+}
+
+// out[r][v] = Σ_k x(row + r, column k) · b[k · bRow + v · lanes]
+template <int R, int V, int kStride>
+HWY_INLINE void productTile(const NumbersOf<kStride>& x, int row, const float* HWY_RESTRICT b, size_t bRow, int depth,
                             Vector (&sum)[R][V]) {
   const Float d;
   const size_t lanes = hn::Lanes(d);
   for (int r = 0; r < R; ++r) {
     for (int v = 0; v < V; ++v) sum[r][v] = hn::Zero(d);
   }
+  const size_t firstRow = x.row(row);
+  if constexpr (kShuffles && V <= 2 && kStride > 2) {
+    for (int k = 0; k < depth; k += 4) {  // depths are multiples of 16
+      Vector vectors[4][V];
+      for (int i = 0; i < 4; ++i) {
+        for (int v = 0; v < V; ++v) vectors[i][v] = hn::LoadU(d, b + (k + i) * bRow + v * lanes);
+      }
+      for (int r = 0; r < R; ++r) {
+        const Vector four = hn::LoadDup128(d, x.data + firstRow + x.row(r) + k);
+        for (int v = 0; v < V; ++v) {
+          sum[r][v] = hn::MulAdd(hn::Broadcast<0>(four), vectors[0][v], sum[r][v]);
+          sum[r][v] = hn::MulAdd(hn::Broadcast<1>(four), vectors[1][v], sum[r][v]);
+          sum[r][v] = hn::MulAdd(hn::Broadcast<2>(four), vectors[2][v], sum[r][v]);
+          sum[r][v] = hn::MulAdd(hn::Broadcast<3>(four), vectors[3][v], sum[r][v]);
+        }
+      }
+    }
+    return;
+  }
   for (int k = 0; k < depth; ++k) {
-    Vector row[V];
-    for (int v = 0; v < V; ++v) row[v] = hn::LoadU(d, b + k * bRow + v * lanes);
-    const float* HWY_RESTRICT numbers = x.column(k);
+    Vector vectors[V];
+    for (int v = 0; v < V; ++v) vectors[v] = hn::LoadU(d, b + k * bRow + v * lanes);
+    const float* HWY_RESTRICT numbers = x.column(k) + firstRow;
     for (int r = 0; r < R; ++r) {
-      const Vector factor = hn::Set(d, numbers[r * x.rowStride]);
-      for (int v = 0; v < V; ++v) sum[r][v] = hn::MulAdd(factor, row[v], sum[r][v]);
+      const Vector factor = hn::Set(d, numbers[x.row(r)]);
+      for (int v = 0; v < V; ++v) sum[r][v] = hn::MulAdd(factor, vectors[v], sum[r][v]);
     }
   }
 }
 
-// sum[r][v] = Σ_rows x(row, column r) · b[row · bRow + v · lanes]
-template <int R, int V>
-HWY_INLINE void outerTile(const Numbers& x, const float* HWY_RESTRICT b, size_t bRow, int rows, Vector (&sum)[R][V]) {
+// sum[r][v] = Σ_rows x(row, column + r) · b[row · bRow + v · lanes]
+template <int R, int V, int kStride>
+HWY_INLINE void outerTile(const NumbersOf<kStride>& x, int column, const float* HWY_RESTRICT b, size_t bRow, int rows,
+                          Vector (&sum)[R][V]) {
   const Float d;
   const size_t lanes = hn::Lanes(d);
   const float* columns[R];
   for (int r = 0; r < R; ++r) {
-    columns[r] = x.column(r);
+    columns[r] = kStride > 2 ? x.column(column) + r : x.column(column + r);
     for (int v = 0; v < V; ++v) sum[r][v] = hn::Zero(d);
   }
   for (int row = 0; row < rows; ++row) {
     Vector vectors[V];
     for (int v = 0; v < V; ++v) vectors[v] = hn::LoadU(d, b + row * bRow + v * lanes);
     for (int r = 0; r < R; ++r) {
-      const Vector factor = hn::Set(d, columns[r][row * x.rowStride]);
+      const Vector factor = hn::Set(d, columns[r][x.row(row)]);
       for (int v = 0; v < V; ++v) sum[r][v] = hn::MulAdd(factor, vectors[v], sum[r][v]);
     }
   }
@@ -110,15 +168,15 @@ HWY_INLINE void outerTile(const Numbers& x, const float* HWY_RESTRICT b, size_t 
 enum class Finish { none, relu, maskByActivation };
 
 // out[rows][columns] = finish(x[rows][depth] · b[depth][columns]); rows a multiple of R.
-template <int R, int V, Finish kFinish>
-HWY_NOINLINE void productBlock(const Numbers& x, const float* b, int depth, int columns, int rows, float* out,
-                               size_t outRow, const float* activation, size_t activationRow) {
+template <int R, int V, Finish kFinish, int kStride>
+HWY_NOINLINE void productBlock(const NumbersOf<kStride>& x, const float* b, int depth, int columns, int rows,
+                               float* out, size_t outRow, const float* activation, size_t activationRow) {
   const Float d;
   const int lanes = static_cast<int>(hn::Lanes(d));
   for (int column = 0; column < columns; column += V * lanes) {
     for (int row = 0; row < rows; row += R) {
       Vector sum[R][V];
-      productTile<R, V>(x.from(row, 0), b + column, columns, depth, sum);
+      productTile<R, V>(x, row, b + column, columns, depth, sum);
       for (int r = 0; r < R; ++r) {
         for (int v = 0; v < V; ++v) {
           Vector value = sum[r][v];
@@ -138,25 +196,30 @@ template <Finish kFinish>
 void product(const Numbers& x, const float* b, int depth, int columns, float* out, size_t outRow,
              const float* activation = nullptr, size_t activationRow = 0) {
   const int vectors = columns / static_cast<int>(hn::Lanes(Float()));
-  if (vectors % 4 == 0 && kWide == 4) {
-    productBlock<6, kWide, kFinish>(x, b, depth, columns, kRows, out, outRow, activation, activationRow);
-  } else if (vectors % 2 == 0) {
-    productBlock<kWide == 4 ? 12 : 6, 2, kFinish>(x, b, depth, columns, kRows, out, outRow, activation,
-                                                  activationRow);
-  } else {
-    productBlock<kWide == 4 ? 24 : 12, 1, kFinish>(x, b, depth, columns, kRows, out, outRow, activation, activationRow);
-  }
+  withStride(x, [&](auto stride) {
+    const NumbersOf<decltype(stride)::value> numbers(x);
+    if (vectors % 4 == 0 && kWide == 4) {
+      productBlock<6, kWide, kFinish>(numbers, b, depth, columns, kRows, out, outRow, activation, activationRow);
+    } else if (vectors % 2 == 0) {
+      productBlock<kWide == 4 ? 12 : 6, 2, kFinish>(numbers, b, depth, columns, kRows, out, outRow, activation,
+                                                    activationRow);
+    } else {
+      productBlock<kWide == 4 ? 24 : 12, 1, kFinish>(numbers, b, depth, columns, kRows, out, outRow, activation,
+                                                     activationRow);
+    }
+  });
 }
 
 // sum[i][o] += Σ_rows x(row, i) · y[row][o]; x has `inputs` columns, y `outputs`.
-template <int R, int V>
-HWY_NOINLINE void outerBlock(const Numbers& x, int inputs, const float* y, size_t yRow, int outputs, float* sum) {
+template <int R, int V, int kStride>
+HWY_NOINLINE void outerBlock(const NumbersOf<kStride>& x, int inputs, const float* y, size_t yRow, int outputs,
+                             float* sum) {
   const Float d;
   const int lanes = static_cast<int>(hn::Lanes(d));
   for (int o = 0; o < outputs; o += V * lanes) {
     for (int i = 0; i < inputs; i += R) {
       Vector tile[R][V];
-      outerTile<R, V>(x.from(0, i), y + o, yRow, kRows, tile);
+      outerTile<R, V>(x, i, y + o, yRow, kRows, tile);
       for (int r = 0; r < R; ++r) {
         for (int v = 0; v < V; ++v) {
           float* to = sum + static_cast<size_t>(i + r) * outputs + o + v * lanes;
@@ -169,13 +232,16 @@ HWY_NOINLINE void outerBlock(const Numbers& x, int inputs, const float* y, size_
 
 void outer(const Numbers& x, int inputs, const float* y, size_t yRow, int outputs, float* sum) {
   const int vectors = outputs / static_cast<int>(hn::Lanes(Float()));
-  if (vectors % 4 == 0 && kWide == 4) {
-    outerBlock<4, kWide>(x, inputs, y, yRow, outputs, sum);
-  } else if (vectors % 2 == 0) {
-    outerBlock<kWide == 4 ? 8 : 4, 2>(x, inputs, y, yRow, outputs, sum);
-  } else {
-    outerBlock<kWide == 4 ? 16 : 8, 1>(x, inputs, y, yRow, outputs, sum);
-  }
+  withStride(x, [&](auto stride) {
+    const NumbersOf<decltype(stride)::value> numbers(x);
+    if (vectors % 4 == 0 && kWide == 4) {
+      outerBlock<4, kWide>(numbers, inputs, y, yRow, outputs, sum);
+    } else if (vectors % 2 == 0) {
+      outerBlock<kWide == 4 ? 8 : 4, 2>(numbers, inputs, y, yRow, outputs, sum);
+    } else {
+      outerBlock<kWide == 4 ? 16 : 8, 1>(numbers, inputs, y, yRow, outputs, sum);
+    }
+  });
 }
 
 // Rows [first, first + rows) of a matrix into a block of `width` columns; missing rows and columns are zero.
@@ -248,13 +314,7 @@ Numbers blockNumbers(const Matrix<const float>& matrix, const float* data, size_
     packRows(matrix, data, first, rows, width, block);
     return rowMajor(block, width);
   }
-  Numbers numbers = rowMajor(data + first * matrix.rowStride, matrix.rowStride);
-  if (matrix.groupWidth != 0) {
-    numbers.groupStride = matrix.groupStride;
-    numbers.shift = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(matrix.groupWidth));
-    numbers.mask = matrix.groupWidth - 1;
-  }
-  return numbers;
+  return {data + first * matrix.rowStride, matrix.rowStride, matrix.groupStride, matrix.groupWidth};
 }
 
 void sigmoidBlock(float* block, int count) {
@@ -309,35 +369,32 @@ void backwardBlock(const MlpBackward& a, size_t n, size_t first, float* weightGr
   const MlpShape& shape = a.shape;
   const int rows = static_cast<int>(std::min<size_t>(kRows, n - first));
   const float* weights = hostPointer(a.weights);
+  const Numbers input =
+      blockNumbers(a.input, hostPointer(a.input.data), first, rows, shape.layerInputs(0), buffers.input);
   const float* kept = hostPointer(a.activations);
-  const size_t width = shape.width;
   outputGradientBlock(a, first, rows, buffers.output);
   const float* dy = buffers.output;
-  size_t dyStride = shape.layerOutputs(shape.hiddenLayers);
-  for (int l = shape.hiddenLayers; l >= 0; --l) {
-    const int outputs = shape.layerOutputs(l), inputs = shape.layerInputs(l);
-    float* gradients = weightGradients + shape.weightOffset(l);
-    const Numbers upstream = rowMajor(dy, dyStride);
-    float* dx = buffers.gradient[l % 2];
-    if (l == 0) {  // [inputs][outputs], unlike all others: the input need not be rows then
-      const Numbers x = blockNumbers(a.input, hostPointer(a.input.data), first, rows, inputs, buffers.input);
-      outer(x, inputs, dy, dyStride, outputs, gradients);
-      if (!a.inputGradients) break;
-      product<Finish::none>(upstream, weights, outputs, inputs, dx, inputs);
-      unpackRows(dx, inputs, a.inputGradients, hostPointer(a.inputGradients.data), first, rows);
-      break;
-    }
-    const float* x = kept + (static_cast<size_t>(l - 1) * a.samples.capacity + first) * width;
+  for (int l = shape.hiddenLayers; l > 0; --l) {
+    const int outputs = shape.layerOutputs(l), width = shape.width;
+    const Numbers upstream = rowMajor(dy, outputs);
+    const float* h = kept + (static_cast<size_t>(l - 1) * a.samples.capacity + first) * width;
     if (rows < kRows) {
-      std::memcpy(buffers.hidden[0], x, sizeof(float) * rows * width);
+      std::memcpy(buffers.hidden[0], h, sizeof(float) * rows * width);
       std::memset(buffers.hidden[0] + rows * width, 0, sizeof(float) * (kRows - rows) * width);
-      x = buffers.hidden[0];
+      h = buffers.hidden[0];
     }
-    outer(upstream, outputs, x, width, inputs, gradients);
-    product<Finish::maskByActivation>(upstream, weights + shape.weightOffset(l), outputs, inputs, dx, inputs, x, width);
-    dy = dx;
-    dyStride = inputs;
+    float* dh = buffers.gradient[l % 2];
+    outer(upstream, outputs, h, width, width, weightGradients + shape.weightOffset(l));
+    product<Finish::maskByActivation>(upstream, weights + shape.weightOffset(l), outputs, width, dh, width, h, width);
+    dy = dh;
   }
+  // Gradients of the first layer as [inputs][outputs], unlike all others: the input need not be rows then.
+  const int outputs = shape.layerOutputs(0), inputs = shape.layerInputs(0);
+  outer(input, inputs, dy, outputs, outputs, weightGradients);
+  if (!a.inputGradients) return;
+  float* dx = buffers.gradient[0];
+  product<Finish::none>(rowMajor(dy, outputs), weights, outputs, inputs, dx, inputs);
+  unpackRows(dx, inputs, a.inputGradients, hostPointer(a.inputGradients.data), first, rows);
 }
 
 }  // namespace tessera::cpu::HWY_NAMESPACE
@@ -383,10 +440,11 @@ void run(Context& context, const MlpForward& a) {
   checkShape(a.shape);
   CHECK(a.output.groupWidth == 0u);
   const size_t n = hostCount(a.samples);
+  if (n == 0) return;
   const size_t blocks = (n + kRows - 1) / kRows;
   const std::vector<float> transposed = transposeLayers(a.shape, hostPointer(a.weights));
   const auto block = HWY_DYNAMIC_DISPATCH(forwardBlock);
-  context.pool.forRanges(blocks, 8, [&](size_t begin, size_t end) {
+  context.pool.forRanges(blocks, 2, [&](size_t begin, size_t end) {
     for (size_t b = begin; b < end; ++b) block(a, transposed.data(), n, b * kRows, threadBuffers());
   });
 }

@@ -135,8 +135,15 @@ void run(const CompositeBackward& a) {
         {colourGradients[3 * r], colourGradients[3 * r + 1], colourGradients[3 * r + 2]},
         opacityGradients.empty() ? 0 : opacityGradients[r], depthGradients.empty() ? 0 : depthGradients[r],
         weightGradients.empty() ? View() : View(weightGradients).subspan(first, count));
-    std::copy(ray.x.begin(), ray.x.end(), x.begin() + first);
-    std::copy(ray.colours.begin(), ray.colours.end(), colours.begin() + 3 * first);
+    for (size_t i = 0; i < count; ++i) {
+      double scale = 1;
+      if (a.fullGradientDistance > 0) {
+        const double nearness = all.distances[first + i] / a.fullGradientDistance;
+        scale = std::min(1.0, nearness * nearness);
+      }
+      x[first + i] = ray.x[i] * scale;
+      for (size_t c = 0; c < 3; ++c) colours[3 * (first + i) + c] = ray.colours[3 * i + c] * scale;
+    }
   }
   store(a.xGradients, x);
   store(a.colourGradients, colours);

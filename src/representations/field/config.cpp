@@ -44,7 +44,8 @@ std::vector<ConfigField> FieldConfig::fields() {
       {"cone", "marching step relative to distance; 0 for uniform steps", &cone},
       {"seed", "of everything random", &seed},
       {"samples_per_step", "samples that a step aims for; rays adapt", &samplesPerStep},
-      {"samples_per_pass", "samples of which a step keeps everything at a time; few fit caches", &samplesPerPass},
+      {"samples_per_pass", "samples of which a step keeps everything at a time: fewer take less memory",
+       &samplesPerPass},
       {"first_rays", "rays of the first step", &firstRays},
       {"most_rays", "rays that a step never exceeds", &mostRays},
       {"photo_budget_mib", "memory for decoded photos in MiB; 0: all that are needed", &photoBudgetMiB},
@@ -61,6 +62,8 @@ std::vector<ConfigField> FieldConfig::fields() {
       {"loss", "colour loss: huber, mse or charbonnier", &loss},
       {"loss_parameter", "delta of huber, epsilon of charbonnier", &lossParameter},
       {"distortion", "weight of the distortion loss", &distortion},
+      {"full_gradient_distance", "samples nearer to the camera learn more slowly, or fog gathers there",
+       &fullGradientDistance},
       {"exposure", "fit an exposure to each photo", &exposure},
       {"random_background", "train against random colours behind the scene", &randomBackground},
   };
@@ -109,6 +112,7 @@ void FieldConfig::check() const {
   within("exposure_rate", exposureRate, 0, kHuge);
   within("loss_parameter", lossParameter, kTiny, kHuge);
   within("distortion", distortion, 0, kHuge);
+  within("full_gradient_distance", fullGradientDistance, 0, kHuge);
 }
 
 RadianceFieldShape FieldConfig::shape() const {

@@ -20,8 +20,8 @@ struct FieldConfig {
   double near = 0.05, far = 32, minStep = 0.01, cone = 0.0078125;
   // Batches
   int64_t seed = 0;
-  int samplesPerStep = 1 << 16, samplesPerPass = 1 << 13;
-  int firstRays = 512, mostRays = 1 << 15;
+  int samplesPerStep = 1 << 16, samplesPerPass = 1 << 16;
+  int firstRays = 512, mostRays = 1 << 14;
   double photoBudgetMiB = 0;
   int stepsPerPhoto = 2;
   // Occupancy
@@ -31,7 +31,7 @@ struct FieldConfig {
   double rate = 1e-2, finalRateFactor = 0.03, constantRateShare = 0.4, networkL2 = 1e-6, exposureRate = 1e-3;
   // Losses
   std::string loss = "mse";
-  double lossParameter = 0.1, distortion = 0.01;
+  double lossParameter = 0.1, distortion = 0.01, fullGradientDistance = 0;
   bool exposure = true, randomBackground = true;
 
   std::vector<ConfigField> fields();

@@ -12,7 +12,7 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kRoomPerWanted = 4;  // for passes that see more than the last step's did
+constexpr uint32_t kRoomPerWanted = 2;  // for passes that see more than the last step's did
 constexpr uint32_t kRoomPerRay = 8;     // so that the first round of marching fits
 constexpr uint32_t kLosses = 3;         // of a pass: colour loss, squared error, distortion loss
 constexpr float kMinTransmittance = 1e-4f;
@@ -191,6 +191,7 @@ void FieldTrainer::addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCo
 
   CompositeBackward back;
   back.minTransmittance = kMinTransmittance;
+  back.fullGradientDistance = static_cast<float>(config_.fullGradientDistance);
   back.rays = rays;
   back.firstSample = seen_.firstSample;
   back.x = output.logDensity;

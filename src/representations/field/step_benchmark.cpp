@@ -17,32 +17,33 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-// A batch as marching leaves it, and room for what a step computes.
+// A batch as marching leaves it, and room for what a pass of it computes.
 class Step {
  public:
   Step(Device& device, const StepBenchmarkOptions& options)
       : device_(device),
         config_(options.config),
         field_(device, config_.shape(), 1),
-        rays_{options.rays, {}},
-        samples_{options.rays * options.samplesPerRay, {}} {
-    const size_t rays = rays_.capacity, samples = samples_.capacity;
+        samplesPerRay_(options.samplesPerRay),
+        allRays_(options.rays),
+        raysOfPass_(std::clamp(static_cast<uint32_t>(config_.samplesPerPass) / samplesPerRay_, 1u, allRays_)) {
+    const size_t rays = raysOfPass_, samples = size_t{rays} * samplesPerRay_, allRays = allRays_;
     std::vector<uint32_t> first(rays + 1), rayOfSample(samples);
-    std::vector<float> directions, targets(rays * 3), distances(samples);
+    std::vector<float> directions, targets(allRays * 3), distances(samples);
     const RandomStream random(1, 0x57e9);
     for (size_t r = 0; r <= rays; ++r) first[r] = static_cast<uint32_t>(r) * options.samplesPerRay;
     for (size_t s = 0; s < samples; ++s) {
       rayOfSample[s] = static_cast<uint32_t>(s) / options.samplesPerRay;
       distances[s] = 1 + kStep * static_cast<float>(s % options.samplesPerRay);
     }
-    for (size_t r = 0; r < rays; ++r) {
+    for (size_t r = 0; r < allRays; ++r) {
       const float z = 2 * random.uniform(2 * r) - 1, around = 6.2831853f * random.uniform(2 * r + 1);
       const float xy = std::sqrt(1 - z * z);
       for (const float component : {xy * std::cos(around), xy * std::sin(around), z}) directions.push_back(component);
     }
     for (size_t i = 0; i < targets.size(); ++i) targets[i] = random.uniform((uint64_t{1} << 40) + i);
-    field_.reserve(samples_.capacity);
-    positions_ = device.arrayOf(rayLikePositions(options.rays, options.samplesPerRay, 1));
+    field_.reserve(static_cast<uint32_t>(samples));
+    allPositions_ = device.arrayOf(rayLikePositions(options.rays, options.samplesPerRay, 1));
     firstSample_ = device.arrayOf(first);
     rayOfSample_ = device.arrayOf(rayOfSample);
     directions_ = device.arrayOf(directions);
@@ -56,7 +57,15 @@ class Step {
     losses_ = device.array<float>(2);
   }
 
-  void forward() { output_ = field_.forward(samples_, positions_, directions_, rayOfSample_, true); }
+  uint32_t passes() const { return (allRays_ + raysOfPass_ - 1) / raysOfPass_; }
+  void beginPass(uint32_t pass) {
+    firstRay_ = pass * raysOfPass_;
+    rays_ = {std::min(raysOfPass_, allRays_ - firstRay_), {}};
+    samples_ = {rays_.capacity * samplesPerRay_, {}};
+    positions_ = ofAll(allPositions_, samplesPerRay_ * 3);
+  }
+
+  void forward() { output_ = field_.forward(samples_, positions_, ofAll(directions_, 3), rayOfSample_, true); }
 
   void composite() {
     CompositeForward composite;
@@ -75,10 +84,10 @@ class Step {
     ColourLoss loss;
     loss.kind = ColourLossKind::huber;
     loss.parameter = static_cast<float>(config_.lossParameter);
-    loss.scale = 1.0f / (3.0f * static_cast<float>(rays_.capacity));
+    loss.scale = 1.0f / (3.0f * static_cast<float>(allRays_));
     loss.rays = rays_;
     loss.predicted = colour_;
-    loss.target = targets_;
+    loss.target = ofAll(targets_, 3);
     loss.loss = losses_;
     loss.gradients = colourGradients_;
     device_.run(loss);
@@ -111,18 +120,26 @@ class Step {
     field_.colourNetwork().step(device_, settings);
   }
 
-  double loss() { return device_.read(losses_.all())[0]; }
+  double lossOfPass() { return device_.read(losses_.all())[0]; }
 
  private:
   static constexpr float kStep = 0.05f;  // so that a ray of densities near 1 is half transparent at first
+
+  // What of a whole batch belongs to this pass's rays.
+  Slice<const float> ofAll(const Array<float>& array, uint32_t perRay) const {
+    return array.part(size_t{firstRay_} * perRay, size_t{rays_.capacity} * perRay);
+  }
 
   Device& device_;
   FieldConfig config_;
   RadianceField field_;
   RadianceField::Output output_;
-  Count rays_, samples_;
+  uint32_t samplesPerRay_, allRays_, raysOfPass_, firstRay_ = 0;
+  Count rays_, samples_;  // of a pass
+  Slice<const float> positions_;
+  Array<float> allPositions_;
   Array<uint32_t> firstSample_, rayOfSample_;
-  Array<float> positions_, directions_, targets_, distances_, steps_;
+  Array<float> directions_, targets_, distances_, steps_;
   Array<float> colour_, opacity_, depth_, weights_, losses_;
   Array<float> colourGradients_, logDensityGradients_, sampleColourGradients_;
 };
@@ -135,31 +152,41 @@ StepBenchmark benchmarkStep(Device& device, const StepBenchmarkOptions& options)
     const char* name;
     void (Step::*run)();
     std::vector<double> seconds;
+    double now = 0;
   };
   Part parts[] = {{"forward", &Step::forward, {}},
                   {"composite", &Step::composite, {}},
                   {"backward", &Step::backward, {}},
-                  {"adam", &Step::adam, {}}};
+                  {"adam", &Step::adam, {}}};  // the last one once a step, the others in every pass
   StepBenchmark result;
   result.samples = options.rays * options.samplesPerRay;
   std::vector<double> whole;
   double spent = 0;
   for (int i = 0; i < 5 || spent < options.seconds; ++i) {
     const bool counts = i >= 2;
-    double total = 0;
-    for (Part& part : parts) {
+    double total = 0, loss = 0;
+    const auto time = [&](Part& part) {
       const auto start = Clock::now();
       (step.*part.run)();
       device.finish();
-      const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
-      if (counts) part.seconds.push_back(seconds);
-      total += seconds;
+      part.now += std::chrono::duration<double>(Clock::now() - start).count();
+    };
+    for (uint32_t pass = 0; pass < step.passes(); ++pass) {
+      step.beginPass(pass);
+      for (Part* part = parts; part != parts + 3; ++part) time(*part);
+      loss += step.lossOfPass();
+    }
+    time(parts[3]);
+    for (Part& part : parts) {
+      if (counts) part.seconds.push_back(part.now);
+      total += part.now;
+      part.now = 0;
     }
     if (counts) {
       whole.push_back(total);
       spent += total;
     }
-    result.lastLoss = step.loss();
+    result.lastLoss = loss;
     if (i == 0) result.firstLoss = result.lastLoss;
   }
   result.steps = static_cast<int>(whole.size());
