@@ -43,6 +43,7 @@ namespace tessera {
   X(CompositeBackward)          \
   X(ColourLoss)                 \
   X(DistortionLoss)             \
+  X(DepthLoss)                  \
   X(ExposureForward)            \
   X(ExposureBackward)           \
   X(Adam)

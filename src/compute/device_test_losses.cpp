@@ -119,6 +119,54 @@ OperationTests testsOf<DistortionLoss>() {
 }
 
 template <>
+OperationTests testsOf<DepthLoss>() {
+  OperationTests tests;
+  for (const Size& size : kSizes)
+    tests.cases.push_back({"rays " + toString(size), [=](Stage& stage) {
+                             const std::vector<uint32_t> first = stage.random.firstSamples(size.capacity, 40);
+                             std::vector<float> known = stage.random.floats(size.capacity, 0.5f, 4);
+                             for (size_t ray = 0; ray < known.size(); ray += 3) known[ray] = 0;
+                             DepthLoss a;
+                             a.scale = 0.3f;
+                             a.rays = stage.count(size);
+                             a.firstSample = stage.input(first);
+                             a.weights = stage.randomInput(first.back(), 0, 0.1f);
+                             a.distances = stage.randomInput(first.back(), 0.1f, 6);
+                             a.known = stage.input(known);
+                             a.loss = stage.output("loss", 1);
+                             a.weightGradients =
+                                 stage.output("weightGradients", stage.random.floats(first.back(), -1, 1));
+                             stage.device.run(a);
+                           }});
+  tests.gradients.push_back(
+      {"two rays", [=](Stage& stage) {
+         const std::vector<uint32_t> first = {0, 9, 17};
+         const std::vector<float> weights = stage.random.floats(17, 0, 0.2f), known = {1.1f, 0.4f};
+         const std::vector<float> distances = stage.random.floats(17, 0.2f, 2);
+         DepthLoss a;
+         a.scale = 1.5f;
+         a.tolerance = 0.1f;
+         a.rays.capacity = 2;
+         a.firstSample = stage.input(first);
+         a.weights = stage.input(weights);
+         a.distances = stage.input(distances);
+         a.known = stage.input(known);
+         a.loss = stage.output("loss", 1);
+         a.weightGradients = stage.input(std::vector<float>(17));
+         stage.device.run(a);
+         const Doubles t = toDoubles(distances);
+         const auto loss = [&](View w) {
+           return a.scale *
+                  (reference::depthLossOfRay(known[0], a.tolerance, w.subspan(0, 9), View(t).subspan(0, 9)).loss +
+                   reference::depthLossOfRay(known[1], a.tolerance, w.subspan(9), View(t).subspan(9)).loss);
+         };
+         return std::vector<GradientPair>{{"weights", stage.device.read(a.weightGradients),
+                                           centralDifferences(loss, toDoubles(weights), 1e-5, firstIndices(17))}};
+       }});
+  return tests;
+}
+
+template <>
 OperationTests testsOf<ExposureForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is ExposureBackward";
@@ -146,25 +194,26 @@ OperationTests testsOf<ExposureBackward>() {
   OperationTests tests;
   for (const Size& size : kSizes)
     for (bool inPlace : {false, true})
-      tests.cases.push_back({fmt::format("rays {}{}", toString(size), inPlace ? ", in place, background" : ""), [=](Stage& stage) {
-                               const std::vector<float> upstream = stage.random.floats(3 * size.capacity, -1, 1);
-                               ExposureBackward a;
-                               a.rays = stage.count(size);
-                               a.colours = stage.randomInput(3 * size.capacity, 0, 1);
-                               a.photoOfRay = stage.input(stage.random.wordsBelow(size.capacity, 7));
-                               a.logGains = stage.randomInput(3 * 7, -2, 2);
-                               if (inPlace) {
-                                 a.background = stage.randomInput(3 * size.capacity, 0, 1);
-                                 a.opacityGradients = stage.output("opacityGradients", size.capacity);
-                                 a.colourGradients = stage.output("colourGradients", upstream);
-                                 a.exposedGradients = a.colourGradients;
-                               } else {
-                                 a.colourGradients = stage.output("colourGradients", 3 * size.capacity);
-                                 a.exposedGradients = stage.input(upstream);
-                               }
-                               a.logGainGradients = stage.output("logGainGradients", stage.random.floats(3 * 7, -1, 1));
-                               stage.device.run(a);
-                             }});
+      tests.cases.push_back(
+          {fmt::format("rays {}{}", toString(size), inPlace ? ", in place, background" : ""), [=](Stage& stage) {
+             const std::vector<float> upstream = stage.random.floats(3 * size.capacity, -1, 1);
+             ExposureBackward a;
+             a.rays = stage.count(size);
+             a.colours = stage.randomInput(3 * size.capacity, 0, 1);
+             a.photoOfRay = stage.input(stage.random.wordsBelow(size.capacity, 7));
+             a.logGains = stage.randomInput(3 * 7, -2, 2);
+             if (inPlace) {
+               a.background = stage.randomInput(3 * size.capacity, 0, 1);
+               a.opacityGradients = stage.output("opacityGradients", size.capacity);
+               a.colourGradients = stage.output("colourGradients", upstream);
+               a.exposedGradients = a.colourGradients;
+             } else {
+               a.colourGradients = stage.output("colourGradients", 3 * size.capacity);
+               a.exposedGradients = stage.input(upstream);
+             }
+             a.logGainGradients = stage.output("logGainGradients", stage.random.floats(3 * 7, -1, 1));
+             stage.device.run(a);
+           }});
   tests.gradients.push_back(
       {"three photos", [=](Stage& stage) {
          const uint32_t rays = 23, photos = 3;
@@ -188,8 +237,7 @@ OperationTests testsOf<ExposureBackward>() {
          const auto loss = [&](View c, View o, View g) {
            double sum = 0;
            for (size_t i = 0; i < c.size(); ++i)
-             sum += upstream[i] *
-                    (c[i] * std::exp2(g[3 * photoOfRay[i / 3] + i % 3]) + (1 - o[i / 3]) * background[i]);
+             sum += upstream[i] * (c[i] * std::exp2(g[3 * photoOfRay[i / 3] + i % 3]) + (1 - o[i / 3]) * background[i]);
            return sum;
          };
          const Doubles c = toDoubles(colours), o = toDoubles(opacity), g = toDoubles(gains);

@@ -37,6 +37,21 @@ struct DistortionLoss {
   Slice<float> weightGradients;       // [samples], overwritten
 };
 
+// Pulls what a ray sees to where structure from motion found a point, at distance D: scale · Σ_rays (1 - Σ_i w_i (1 -
+// r_i)), r_i = min(1, max(0, |t_i - D| / D - tolerance)). That is the Wasserstein distance between the ray's weights
+// and a surface at D, in shares of D; light from behind the scene, and from twice as far, counts as 1.
+struct DepthLoss {
+  float scale = 1;
+  float tolerance = 0.01f;
+  Count rays;
+  Slice<const uint32_t> firstSample;  // [rays + 1]
+  Slice<const float> weights;         // [samples]
+  Slice<const float> distances;       // [samples]
+  Slice<const float> known;           // [rays]: D; 0: not known, and no loss
+  Slice<float> loss;                  // [1], overwritten
+  Slice<float> weightGradients;       // [samples], added to
+};
+
 // Per-photo exposure: exposed = colour · 2^(logGain[photo of ray]) + (1 - opacity) · background per channel, in the
 // trained colour space. Colours are of the scene alone: what stands behind it is not exposed with it.
 struct ExposureForward {

@@ -108,6 +108,17 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
   distortion.weightGradients = dx;
   recorder.measureStream(Operation::kDistortionLoss, shape, n * 16 + rays * 4, [&] { device.run(distortion); });
 
+  recorder.measureStream(Operation::kDepthLoss, shape, n * 16 + rays * 8, [&] {
+    device.run(DepthLoss{1,
+                         0.01f,
+                         {lines.rays, {}},
+                         lines.firstSample,
+                         weights,
+                         lines.distances,
+                         lines.distances.part(0, lines.rays),
+                         opacity.part(0, 1),
+                         dx});
+  });
   Array<uint32_t> first = device.array<uint32_t>(lines.rays + 1), count = device.array<uint32_t>(1);
   Array<uint32_t> source = device.array<uint32_t>(lines.samples), rayOfSample = device.array<uint32_t>(lines.samples);
   recorder.measureStream(Operation::kOpticalDepth, shape, n * 8 + rays * 12, [&] {

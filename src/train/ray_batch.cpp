@@ -5,8 +5,8 @@
 
 namespace tessera {
 
-void drawRays(const std::vector<PhotoWindow::Entry>& window, uint64_t seed, int64_t step, uint32_t rays,
-              bool randomBackground, RayBatch& batch) {
+void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<std::vector<KnownDistance>>& known,
+              const RayBatchOptions& options, int64_t step, uint32_t rays, RayBatch& batch) {
   CHECK(!window.empty());
   constexpr int kTries = 4;
   constexpr uint64_t kDrawsPerRay = 32;
@@ -16,21 +16,34 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, uint64_t seed, int6
   batch.backgrounds.resize(3 * size_t{rays});
   batch.weights.resize(rays);
   batch.jitter.resize(rays);
-  const RandomStream random(seed, 0x4a75 + (static_cast<uint64_t>(step) << 16));
+  batch.distances.assign(rays, 0.0f);
+  const RandomStream random(options.seed, 0x4a75 + (static_cast<uint64_t>(step) << 16));
   for (uint32_t ray = 0; ray < rays; ++ray) {
     uint64_t draw = kDrawsPerRay * ray;
     batch.jitter[ray] = random.uniform(draw++);
     float* background = &batch.backgrounds[3 * size_t{ray}];
-    for (int k = 0; k < 3; ++k) background[k] = randomBackground ? random.uniform(draw + k) : 0.0f;
+    for (int k = 0; k < 3; ++k) background[k] = options.randomBackground ? random.uniform(draw + k) : 0.0f;
     draw += 3;
+    const bool wantsKnown = random.uniform(draw++) < options.knownShare;
     for (int attempt = 0; attempt < kTries; ++attempt) {
       const PhotoWindow::Entry& entry = window[random.below(draw++, static_cast<uint32_t>(window.size()))];
       const ImageU8& image = entry.decoded->image;
-      const uint32_t x = random.below(draw++, static_cast<uint32_t>(image.width));
-      const uint32_t y = random.below(draw++, static_cast<uint32_t>(image.height));
+      uint32_t x = random.below(draw++, static_cast<uint32_t>(image.width));
+      uint32_t y = random.below(draw++, static_cast<uint32_t>(image.height));
+      batch.distances[ray] = 0;
+      if (wantsKnown && !known.empty() && !known[entry.photo].empty()) {
+        const std::vector<KnownDistance>& ofPhoto = known[entry.photo];
+        const KnownDistance& chosen = ofPhoto[random.below(draw++, static_cast<uint32_t>(ofPhoto.size()))];
+        if (chosen.x < static_cast<uint32_t>(image.width) && chosen.y < static_cast<uint32_t>(image.height)) {
+          x = chosen.x;
+          y = chosen.y;
+          batch.distances[ray] = chosen.distance;
+        }
+      }
       const bool masked =
           !entry.decoded->mask.empty() && *entry.decoded->mask.at(static_cast<int>(x), static_cast<int>(y)) < 128;
       batch.weights[ray] = masked ? 0.0f : 1.0f;
+      if (masked) batch.distances[ray] = 0;
       if (masked && attempt + 1 < kTries) continue;
       batch.photoOfRay[ray] = static_cast<uint32_t>(entry.photo);
       batch.pixels[2 * size_t{ray}] = static_cast<float>(x) + 0.5f;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "scene/capture.h"
+#include "train/known_distances.h"
 #include "train/photo_window.h"
 
 namespace tessera {
@@ -13,11 +14,19 @@ struct RayBatch {
   std::vector<float> backgrounds;    // [rays][3]
   std::vector<float> weights;        // [rays]: 0 where a mask says so
   std::vector<float> jitter;         // [rays], in [0,1)
+  std::vector<float> distances;      // [rays]: where the ray's surface is known to be, scene units; 0: not known
+};
+
+struct RayBatchOptions {
+  uint64_t seed = 0;
+  bool randomBackground = true;
+  double knownShare = 0;  // of the rays go through pixels whose distance is known, in photos that have some
 };
 
 // Uniform over the window's photos and their pixels; a function of window, seed and step. Masked pixels are drawn again
 // a few times before they are kept with weight zero.
-void drawRays(const std::vector<PhotoWindow::Entry>& window, uint64_t seed, int64_t step, uint32_t rays,
-              bool randomBackground, RayBatch& batch);
+// `known` is by photo, and may be empty.
+void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<std::vector<KnownDistance>>& known,
+              const RayBatchOptions& options, int64_t step, uint32_t rays, RayBatch& batch);
 
 }  // namespace tessera

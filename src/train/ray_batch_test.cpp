@@ -35,7 +35,7 @@ std::vector<PhotoWindow::Entry> twoPhotos() {
 
 RayBatch draw(const std::vector<PhotoWindow::Entry>& window, uint64_t seed, int64_t step, uint32_t rays = 2000) {
   RayBatch batch;
-  drawRays(window, seed, step, rays, true, batch);
+  drawRays(window, {}, {seed, true, 0}, step, rays, batch);
   return batch;
 }
 
@@ -107,7 +107,7 @@ TEST(RayBatch, LaysTransparentPixelsOverTheBackground) {
 
 TEST(RayBatch, HasBlackBehindItWhenBackgroundsAreNotRandom) {
   RayBatch batch;
-  drawRays({entry(0, addressed(7, 5, 100, 4, 51))}, 1, 0, 100, false, batch);
+  drawRays({entry(0, addressed(7, 5, 100, 4, 51))}, {}, {1, false, 0}, 0, 100, batch);
   EXPECT_EQ(batch.backgrounds, std::vector<float>(300, 0.0f));
   EXPECT_NEAR(batch.targets[2], 0.2f * 100 / 255, 1e-6);
 }
@@ -117,10 +117,40 @@ TEST(RayBatch, ReadsGreyPhotosAsGrey) {
   for (const float target : batch.targets) EXPECT_FLOAT_EQ(target, 0.2f);
 }
 
+TEST(RayBatch, DrawsAShareOfItsRaysWhereDistancesAreKnown) {
+  std::vector<std::vector<KnownDistance>> known(10);
+  known[4] = {{1, 2, 1.5f}, {6, 4, 2.5f}, {7, 0, 9.0f}};  // the last one is beside the photo
+  RayBatch batch;
+  drawRays(twoPhotos(), known, {1, true, 0.25}, 0, 4000, batch);
+  int inFour = 0, counts[2] = {};
+  for (size_t ray = 0; ray < batch.weights.size(); ++ray) {
+    const float x = batch.pixels[2 * ray], y = batch.pixels[2 * ray + 1];
+    EXPECT_FLOAT_EQ(batch.targets[3 * ray], 16 * (x - 0.5f) / 255);
+    inFour += batch.photoOfRay[ray] == 4;
+    if (batch.distances[ray] == 0) continue;
+    EXPECT_EQ(batch.photoOfRay[ray], 4u);
+    const bool first = batch.distances[ray] == 1.5f;
+    EXPECT_TRUE(first ? x == 1.5f && y == 2.5f : batch.distances[ray] == 2.5f && x == 6.5f && y == 4.5f);
+    ++counts[first];
+  }
+  EXPECT_NEAR(inFour, 2000, 150);
+  EXPECT_NEAR(counts[0], 2000 * 0.25 / 3, 50);
+  EXPECT_NEAR(counts[1], 2000 * 0.25 / 3, 50);
+  drawRays(twoPhotos(), known, {1, true, 0}, 0, 4000, batch);
+  EXPECT_EQ(batch.distances, std::vector<float>(4000, 0.0f));
+}
+
+TEST(RayBatch, KnowsNoDistancesUnderMasks) {
+  const std::vector<std::vector<KnownDistance>> known = {{{3, 2, 1.5f}}};
+  RayBatch batch;
+  drawRays({entry(0, addressed(7, 5, 0), ImageU8(7, 5, 1, 0))}, known, {1, true, 1}, 0, 100, batch);
+  EXPECT_EQ(batch.distances, std::vector<float>(100, 0.0f));
+}
+
 TEST(RayBatch, ShrinksWithTheNumberOfRays) {
   RayBatch batch;
-  drawRays(twoPhotos(), 1, 0, 100, true, batch);
-  drawRays(twoPhotos(), 1, 1, 10, true, batch);
+  drawRays(twoPhotos(), {}, {1, true, 0}, 0, 100, batch);
+  drawRays(twoPhotos(), {}, {1, true, 0}, 1, 10, batch);
   EXPECT_EQ(batch.weights.size(), 10u);
   EXPECT_EQ(batch.targets.size(), 30u);
   EXPECT_EQ(batch.photoOfRay.size(), 10u);

@@ -13,7 +13,7 @@ struct StepReport {
   double squaredError = 0;  // mean over colour channels, for PSNR
   uint32_t rays = 0;
   uint32_t samples = 0;  // that networks were trained on
-  uint32_t marched = 0;  // that density was looked up at
+  uint32_t marched = 0;  // whose density was looked up to find those
 };
 
 // One representation in training. The state after a step is a function of the capture, the settings and the step alone.

@@ -114,6 +114,33 @@ void run(Context& context, const DistortionLoss& a) {
   *hostPointer(a.loss) = static_cast<float>(a.scale * loss);
 }
 
+void run(Context& context, const DepthLoss& a) {
+  const uint32_t* firstSample = hostPointer(a.firstSample);
+  const float* weights = hostPointer(a.weights);
+  const float* distances = hostPointer(a.distances);
+  const float* known = hostPointer(a.known);
+  float* gradients = hostPointer(a.weightGradients);
+  const size_t rays = hostCount(a.rays), tasks = (rays + kRaysPerTask - 1) / kRaysPerTask;
+  std::vector<double> sums(tasks);
+  context.pool.run(tasks, [&](size_t task, int) {
+    double loss = 0;
+    for (size_t ray = task * kRaysPerTask; ray < std::min(rays, (task + 1) * kRaysPerTask); ++ray) {
+      if (known[ray] <= 0) continue;
+      loss += 1;
+      for (uint32_t i = firstSample[ray]; i < firstSample[ray + 1]; ++i) {
+        const float off = std::abs(distances[i] - known[ray]) / known[ray] - a.tolerance;
+        const float gain = 1 - std::clamp(off, 0.0f, 1.0f);
+        loss -= weights[i] * gain;
+        gradients[i] -= a.scale * gain;
+      }
+    }
+    sums[task] = loss;
+  });
+  double loss = 0;
+  for (const double sum : sums) loss += sum;
+  *hostPointer(a.loss) = static_cast<float>(a.scale * loss);
+}
+
 void run(Context& context, const ExposureForward& a) {
   const float* colours = hostPointer(a.colours);
   const uint32_t* photoOfRay = hostPointer(a.photoOfRay);

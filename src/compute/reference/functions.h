@@ -114,6 +114,8 @@ struct LossAndGradients {
 LossAndGradients distortionOfFences(View fences, View weights);
 // One ray of DistortionLoss, unscaled; intervals need not touch.
 LossAndGradients distortionOfRay(View weights, View distances, View steps);
+// One ray of DepthLoss, unscaled.
+LossAndGradients depthLossOfRay(double known, double tolerance, View weights, View distances);
 
 // adam.cpp
 struct AdamState {

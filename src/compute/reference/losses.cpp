@@ -60,6 +60,18 @@ LossAndGradients distortionOfRay(View weights, View distances, View steps) {
   return distortionOfBins(weights, from, to);
 }
 
+LossAndGradients depthLossOfRay(double known, double tolerance, View weights, View distances) {
+  LossAndGradients result{0, Doubles(weights.size())};
+  if (known <= 0) return result;
+  result.loss = 1;
+  for (size_t i = 0; i < weights.size(); ++i) {
+    const double r = std::min(1.0, std::max(0.0, std::abs(distances[i] - known) / known - tolerance));
+    result.loss -= weights[i] * (1 - r);
+    result.gradients[i] = r - 1;
+  }
+  return result;
+}
+
 void run(const ColourLoss& a) {
   const size_t rays = hostCount(a.rays);
   const Doubles predicted = doubles(a.predicted, 3 * rays), target = doubles(a.target, 3 * rays);
@@ -92,6 +104,24 @@ void run(const DistortionLoss& a) {
   }
   store(a.loss, loss);
   store(a.weightGradients, gradients);
+}
+
+void run(const DepthLoss& a) {
+  const size_t rays = hostCount(a.rays);
+  const Indices firstSample = indices(a.firstSample, rays + 1);
+  const size_t samples = firstSample[rays];
+  const Doubles weights = doubles(a.weights, samples), distances = doubles(a.distances, samples);
+  const Doubles known = doubles(a.known, rays);
+  Doubles loss(1), gradients;
+  for (size_t r = 0; r < rays; ++r) {
+    const size_t first = firstSample[r], count = firstSample[r + 1] - first;
+    const LossAndGradients ray = depthLossOfRay(known[r], a.tolerance, View(weights).subspan(first, count),
+                                                View(distances).subspan(first, count));
+    loss[0] += a.scale * ray.loss;
+    for (double g : ray.gradients) gradients.push_back(a.scale * g);
+  }
+  store(a.loss, loss);
+  add(a.weightGradients, gradients);
 }
 
 void run(const ExposureForward& a) {

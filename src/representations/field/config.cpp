@@ -58,10 +58,14 @@ std::vector<ConfigField> FieldConfig::fields() {
       {"final_rate_factor", "learning rate at the end, relative", &finalRateFactor},
       {"constant_rate_share", "share of the steps before the learning rate begins to fall", &constantRateShare},
       {"network_l2", "weight decay of the networks", &networkL2},
+      {"table_l2", "weight decay of the hash table's entries that a step touches", &tableL2},
       {"exposure_rate", "learning rate of the photos' exposures", &exposureRate},
       {"loss", "colour loss: huber, mse or charbonnier", &loss},
       {"loss_parameter", "delta of huber, epsilon of charbonnier", &lossParameter},
       {"distortion", "weight of the distortion loss", &distortion},
+      {"depth", "weight of the depth loss, on rays through sparse points", &depth},
+      {"depth_tolerance", "of sparse points' distances, relative", &depthTolerance},
+      {"known_share", "share of the rays through sparse points, in captures that have some", &knownShare},
       {"full_gradient_distance", "samples nearer to the camera learn more slowly, or fog gathers there",
        &fullGradientDistance},
       {"exposure", "fit an exposure to each photo", &exposure},
@@ -109,9 +113,13 @@ void FieldConfig::check() const {
   within("final_rate_factor", finalRateFactor, kTiny, kHuge);
   within("constant_rate_share", constantRateShare, 0, 1);
   within("network_l2", networkL2, 0, kHuge);
+  within("table_l2", tableL2, 0, kHuge);
   within("exposure_rate", exposureRate, 0, kHuge);
   within("loss_parameter", lossParameter, kTiny, kHuge);
   within("distortion", distortion, 0, kHuge);
+  within("depth", depth, 0, kHuge);
+  within("depth_tolerance", depthTolerance, 0, 1);
+  within("known_share", knownShare, 0, 1);
   within("full_gradient_distance", fullGradientDistance, 0, kHuge);
 }
 

@@ -28,10 +28,12 @@ struct FieldConfig {
   int occupancyEvery = 16, occupancyWarmUp = 256;
   double occupancyShare = 0.0625;
   // Optimiser
-  double rate = 1e-2, finalRateFactor = 0.03, constantRateShare = 0.4, networkL2 = 1e-6, exposureRate = 1e-3;
+  double rate = 1e-2, finalRateFactor = 0.03, constantRateShare = 0.4, networkL2 = 1e-6, tableL2 = 0,
+         exposureRate = 1e-3;
   // Losses
   std::string loss = "mse";
-  double lossParameter = 0.1, distortion = 0.01, fullGradientDistance = 0;
+  double lossParameter = 0.1, distortion = 0.01, fullGradientDistance = 1;
+  double depth = 0.03, depthTolerance = 0.01, knownShare = 0.125;
   bool exposure = true, randomBackground = true;
 
   std::vector<ConfigField> fields();

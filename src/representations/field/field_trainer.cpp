@@ -14,8 +14,9 @@ namespace {
 
 constexpr uint32_t kRoomPerWanted = 2;  // for passes that see more than the last step's did
 constexpr uint32_t kRoomPerRay = 8;     // so that the first round of marching fits
-constexpr uint32_t kLosses = 3;         // of a pass: colour loss, squared error, distortion loss
+constexpr uint32_t kLosses = 4;         // of a pass: colour loss, squared error, distortion, depth
 constexpr float kMinTransmittance = 1e-4f;
+constexpr double kMostPointError = 2;  // pixels of the capture's photos: sparse points worse than that teach nothing
 
 ColourLossKind lossKind(const std::string& name) {
   if (name == "mse") return ColourLossKind::mse;
@@ -51,6 +52,7 @@ FieldTrainer::FieldTrainer(Device& device, const Capture& capture, const FieldCo
       photos_(capture, trainingPhotos(capture),
               {static_cast<size_t>(config.photoBudgetMiB * 1048576), config.stepsPerPhoto,
                static_cast<uint64_t>(config.seed)}),
+      known_(knownDistances(capture, frame, kMostPointError)),
       rays_(static_cast<uint32_t>(config.firstRays)),
       cameras_(device.arrayOf(rayCameras(capture, frame))),
       exposures_(device, "exposures", std::vector<float>(capture.photos.size() * 3)) {
@@ -64,7 +66,7 @@ FieldTrainer::FieldTrainer(Device& device, const Capture& capture, const FieldCo
   seen_ = RaySamples(device, raysPerPass, samples);
   counters_ = device.array<uint32_t>(size_t{passes_} * RaySamples::kCounters);
   photoOfRay_ = device.array<uint32_t>(rays);
-  for (Array<float>* perRay : {&weights_, &jitter_, &opacity_, &depth_, &opacityGradients_}) {
+  for (Array<float>* perRay : {&weights_, &jitter_, &distances_, &opacity_, &depth_, &opacityGradients_}) {
     *perRay = device.array<float>(rays);
   }
   pixels_ = device.array<float>(size_t{rays} * 2);
@@ -98,12 +100,14 @@ void FieldTrainer::uploadRays() {
   device_.write(backgrounds_.all(), std::span<const float>(batch_.backgrounds));
   device_.write(weights_.all(), std::span<const float>(batch_.weights));
   device_.write(jitter_.all(), std::span<const float>(batch_.jitter));
+  device_.write(distances_.all(), std::span<const float>(batch_.distances));
   device_.run(GenerateRays{{rays_, {}}, cameras_, photoOfRay_, pixels_, origins_, directions_});
 }
 
 StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
   refreshOccupancy(step);
-  drawRays(photos_.at(step), static_cast<uint64_t>(config_.seed), step, rays_, config_.randomBackground, batch_);
+  drawRays(photos_.at(step), known_,
+           {static_cast<uint64_t>(config_.seed), config_.randomBackground, config_.knownShare}, step, rays_, batch_);
   uploadRays();
   const auto raysBefore = [&](uint32_t pass) { return static_cast<uint32_t>(uint64_t{rays_} * pass / passes_); };
   for (uint32_t pass = 0; pass < passes_; ++pass) {
@@ -122,7 +126,7 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
     report.rays += counter[1];
     for (uint32_t round = 0; round < RaySamples::kRounds; ++round) report.marched += counter[2 + round];
     const float* loss = &losses[size_t{pass} * kLosses];
-    report.loss += loss[0] + loss[2];
+    report.loss += loss[0] + loss[2] + loss[3];
     squares += loss[1];
     for (uint32_t ray = 0; ray < counter[1]; ++ray) weight += batch_.weights[raysBefore(pass) + ray];
   }
@@ -176,17 +180,28 @@ void FieldTrainer::addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCo
   device_.run(loss);
   device_.run(ExposureBackward{rays, composite.colour, ofRays(backgrounds_, 3), photoOfRay, exposures_.values,
                                loss.gradients, loss.gradients, ofRays(opacityGradients_, 1), exposures_.gradients});
-  if (config_.distortion > 0) {
-    DistortionLoss distortion;
-    distortion.scale = static_cast<float>(config_.distortion) / static_cast<float>(rays_);
-    distortion.rays = rays;
-    distortion.firstSample = seen_.firstSample;
-    distortion.weights = sampleWeights_;
-    distortion.distances = seen_.distances;
-    distortion.steps = seen_.steps;
-    distortion.loss = losses.part(2, 1);
-    distortion.weightGradients = weightGradients_;
-    device_.run(distortion);
+  DistortionLoss distortion;
+  distortion.scale = static_cast<float>(config_.distortion) / static_cast<float>(rays_);
+  distortion.rays = rays;
+  distortion.firstSample = seen_.firstSample;
+  distortion.weights = sampleWeights_;
+  distortion.distances = seen_.distances;
+  distortion.steps = seen_.steps;
+  distortion.loss = losses.part(2, 1);
+  distortion.weightGradients = weightGradients_;
+  device_.run(distortion);
+  if (config_.depth > 0 && config_.knownShare > 0) {
+    DepthLoss depth;
+    depth.scale = static_cast<float>(config_.depth) / static_cast<float>(rays_);
+    depth.tolerance = static_cast<float>(config_.depthTolerance);
+    depth.rays = rays;
+    depth.firstSample = seen_.firstSample;
+    depth.weights = sampleWeights_;
+    depth.distances = seen_.distances;
+    depth.known = ofRays(distances_, 1);
+    depth.loss = losses.part(3, 1);
+    depth.weightGradients = weightGradients_;
+    device_.run(depth);
   }
 
   CompositeBackward back;
@@ -200,7 +215,7 @@ void FieldTrainer::addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCo
   back.colours = output.colours;
   back.rayColourGradients = loss.gradients;
   back.rayOpacityGradients = ofRays(opacityGradients_, 1);
-  if (config_.distortion > 0) back.weightGradients = weightGradients_;
+  back.weightGradients = weightGradients_;
   back.xGradients = logDensityGradients_;
   back.colourGradients = Matrix<float>(sampleColourGradients_, 3);
   device_.run(back);
@@ -215,6 +230,7 @@ void FieldTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
   Adam adam;
   adam.rate = static_cast<float>(schedule.at(step, plannedSteps));
   adam.skipZeroGradients = true;
+  adam.l2 = static_cast<float>(config_.tableL2);
   model_.field().table().step(device_, adam);
   adam.skipZeroGradients = false;
   adam.l2 = static_cast<float>(config_.networkL2);

@@ -32,14 +32,15 @@ class FieldTrainer final : public Trainee {
   FieldConfig config_;
   FieldModel model_;
   PhotoWindow photos_;
-  uint32_t rays_;    // of the next step
+  std::vector<std::vector<KnownDistance>> known_;  // [photo]
+  uint32_t rays_;                                  // of the next step
   uint32_t passes_;  // of a step: a part of the rays each, so that what is kept until backward fits memory
   RayBatch batch_;
   Array<RayCamera> cameras_;
   ParameterGroup exposures_;  // [photos][3], log2 gains
   RaySamples seen_;           // of one pass
   Array<uint32_t> photoOfRay_, counters_;
-  Array<float> pixels_, targets_, backgrounds_, weights_, jitter_, origins_, directions_;
+  Array<float> pixels_, targets_, backgrounds_, weights_, jitter_, distances_, origins_, directions_;
   Array<float> colour_, exposed_, opacity_, depth_, colourGradients_, opacityGradients_, losses_;
   Array<float> sampleWeights_, weightGradients_, logDensityGradients_, sampleColourGradients_;
 };

@@ -1,0 +1,55 @@
+#include "train/known_distances.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace tessera {
+namespace {
+
+// A photo of 100 × 80 pixels from the origin along +z, and two more that nobody trains on or that see nothing.
+Capture threePhotos() {
+  Capture capture;
+  Camera camera;
+  camera.width = 100;
+  camera.height = 80;
+  capture.cameras.push_back(camera);
+  capture.photos.resize(3);
+  capture.photos[1].split = Split::test;
+  return capture;
+}
+
+void observe(Capture& capture, uint32_t photo, const Vec3d& point, float x, float y, float error = 0.5f) {
+  capture.observations.push_back({photo, static_cast<uint32_t>(capture.points.size()), x, y, error});
+  capture.points.push_back({point, {}, error});
+}
+
+TEST(KnownDistances, AreFromTheCameraToThePointInSceneUnits) {
+  Capture capture = threePhotos();
+  capture.photos[0].worldFromCamera.translation = Vec3d(0, 0, -1);
+  observe(capture, 0, Vec3d(3, 0, 3), 17.9f, 40.2f);
+  SceneFrame frame;
+  frame.scale = 0.5;
+  const auto known = knownDistances(capture, frame, 2);
+  ASSERT_EQ(known.size(), 3u);
+  ASSERT_EQ(known[0].size(), 1u);
+  EXPECT_EQ(known[0][0].x, 17u);
+  EXPECT_EQ(known[0][0].y, 40u);
+  EXPECT_FLOAT_EQ(known[0][0].distance, 2.5f);
+  EXPECT_TRUE(known[2].empty());
+}
+
+TEST(KnownDistances, LeaveOutWhatCannotBeTrusted) {
+  Capture capture = threePhotos();
+  observe(capture, 0, Vec3d(0, 0, 2), 50, 40, 2.5f);  // too far from its pixels
+  observe(capture, 0, Vec3d(0, 0, 2), 50, 40, std::nanf(""));
+  observe(capture, 0, Vec3d(0, 0, -2), 50, 40);  // behind the camera
+  observe(capture, 0, Vec3d(0, 0, 2), 100, 40);  // beside the photo
+  observe(capture, 0, Vec3d(0, 0, 2), 50, -0.5f);
+  observe(capture, 0, Vec3d(0, 0, 2), std::nanf(""), 40);
+  observe(capture, 1, Vec3d(0, 0, 2), 50, 40);  // held out
+  for (const auto& photo : knownDistances(capture, SceneFrame(), 2)) EXPECT_TRUE(photo.empty());
+}
+
+}  // namespace
+}  // namespace tessera
