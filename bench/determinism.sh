@@ -13,7 +13,7 @@ trap 'rm -rf "$work"' EXIT
 capture=${1:-$work/city}
 [ -e "$capture" ] || "$tessera" synth city "$capture" --blocks 1x1 --photos 16 --size 160x120 --samples 2 --traffic
 
-train() { "$tessera" train "$capture" "$@" --method field --steps "$steps" --seed 7 --set samples_per_step=8192; }
+train() { "$tessera" train "$capture" "$@" --method field --steps "$steps" --seed 7 --set samples_per_step=8192 --set samples_per_pass=2048; }
 
 train "$work/one" --threads 1
 started=$(date +%s%N)
@@ -25,7 +25,7 @@ killed=0
 mkdir "$work/killed"
 while [ "$killed" -lt "$kills" ]; do
   nap=$(awk -v l="$lasted" -v k="$kills" -v r="$RANDOM" 'BEGIN { printf "%.3f", 0.05 + l / 1e9 * 1.6 / k * r / 32768 }')
-  "$tessera" train "$capture" "$work/killed" --method field --steps "$steps" --seed 7 --set samples_per_step=8192 \
+  "$tessera" train "$capture" "$work/killed" --method field --steps "$steps" --seed 7 --set samples_per_step=8192 --set samples_per_pass=2048 \
     --threads 2 --resume --checkpoint-seconds 0.3 > "$work/log" 2>&1 &
   pid=$!
   sleep "$nap"

@@ -65,7 +65,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "tessera: error: %s\n", error.what());
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr,
-                 "tessera: error: memory: this machine has not enough; lower --set samples_per_step or "
+                 "tessera: error: memory: this machine has not enough; lower --set samples_per_pass or "
                  "photo_budget_mib\n");
   } catch (const std::exception& error) {
     std::fprintf(stderr, "tessera: error: internal: %s; please report it\n", error.what());

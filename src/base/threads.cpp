@@ -20,7 +20,11 @@ template <class Condition>
 void waitAwake(const Condition& condition) {
   const auto until = std::chrono::steady_clock::now() + kPatience;
   while (!condition() && std::chrono::steady_clock::now() < until) {
-    for (int i = 0; i < 16 && !condition(); ++i) std::atomic_signal_fence(std::memory_order_seq_cst);
+    for (int i = 0; i < 16 && !condition(); ++i) {
+#if defined(__x86_64__)
+      __builtin_ia32_pause();
+#endif
+    }
   }
 }
 

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 namespace tessera {
@@ -29,7 +31,17 @@ TEST(ThreadPool, RunsEveryTaskOnceWithAThreadNumberInRange) {
 TEST(ThreadPool, SurvivesManyShortRounds) {
   ThreadPool pool(3);
   std::atomic<size_t> sum{0};
-  for (int round = 0; round < 2000; ++round) pool.run(4, [&](size_t task, int) { sum += task; });
+  for (int round = 0; round < 2000; ++round) {
+    // Now and then the workers, or the caller, wait for so long that they go to sleep.
+    const auto nap = [&](bool wanted) {
+      if (wanted) std::this_thread::sleep_for(std::chrono::microseconds(300));
+    };
+    nap(round % 20 == 0);
+    pool.run(4, [&](size_t task, int) {
+      nap(task == 1 && round % 20 == 10);
+      sum += task;
+    });
+  }
   EXPECT_EQ(sum, 2000u * 6u);
 }
 

@@ -57,6 +57,44 @@ TEST_P(DeviceProperties, OpacityIsTheSumOfWeights) {
   }
 }
 
+TEST_P(DeviceProperties, MarchingInRoundsMakesTheSamplesOfOneMarch) {
+  if (lacks(Operation::kMarchRays)) GTEST_SKIP() << "lacks operations";
+  Stage stage(*device, 74);
+  const uint32_t rays = 50, room = 20000;
+  const MarchSpace space{.contracted = true, .gridResolution = 16, .far = 50, .minStep = 0.02f, .cone = 1.0f / 64};
+  std::vector<uint32_t> bits(16 * 16 * 16 / 32);
+  for (uint32_t& word : bits) word = stage.random.bits();
+  MarchRays march{space};
+  march.rays.capacity = rays;
+  march.sampleCapacity = room;
+  march.origins = stage.input(stage.random.floats(3 * rays, -1.5f, 1.5f));
+  march.directions = stage.input(stage.random.directions(rays));
+  march.jitter = stage.randomInput(rays, 0, 1);
+  march.occupancy = stage.input(bits);
+  march.firstSample = stage.outputWords("firstSample", rays + 1);
+  march.sampleCount = stage.outputWords("sampleCount", 1);
+  march.positions = stage.output("positions", 3 * room);
+  march.distances = stage.output("distances", room);
+  march.steps = stage.output("steps", room);
+  std::vector<std::vector<float>> whole(rays), pieces(rays);
+  const auto collect = [&](std::vector<std::vector<float>>& samples) {
+    device->run(march);
+    const std::vector<uint32_t> first = device->read(march.firstSample);
+    const std::vector<float> distances = device->read(march.distances);
+    for (uint32_t ray = 0; ray < rays; ++ray) {
+      samples[ray].insert(samples[ray].end(), distances.begin() + first[ray], distances.begin() + first[ray + 1]);
+    }
+  };
+  collect(whole);
+  march.nextStep = stage.input(std::vector<uint32_t>(rays));
+  for (const uint32_t most : {1u, 7u, 16u, 3u, 0xffffffffu}) {
+    march.most = most;
+    collect(pieces);
+  }
+  EXPECT_EQ(whole, pieces);
+  for (const uint32_t next : device->read(march.nextStep)) EXPECT_EQ(next, MarchRays::kThrough);
+}
+
 TEST_P(DeviceProperties, CompactionKeepsAllSamplesThatCompositingWeighs) {
   if (lacks(Operation::kCompositeForward) || lacks(Operation::kCompactSamples)) GTEST_SKIP() << "lacks operations";
   Stage stage(*device, 72);

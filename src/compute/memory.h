@@ -66,14 +66,6 @@ class Array {
   size_t count_ = 0;
 };
 
-// The same memory as 32-bit floats, for operations that only move bits.
-inline Slice<float> asFloats(const Slice<uint32_t>& words) {
-  return Slice<float>(words.memory, words.first, words.count);
-}
-inline Slice<const float> asFloats(const Slice<const uint32_t>& words) {
-  return Slice<const float>(words.memory, words.first, words.count);
-}
-
 // How many elements an operation works on. Sizes that only the device knows stay in a device counter: the operation
 // works on min(counter[0], capacity). Without a counter it works on `capacity`. Buffers hold `capacity` elements.
 struct Count {

@@ -57,8 +57,9 @@ struct MarchSpace {
 // cells are left by exact plane intersections and whole steps, so the samples are those of brute force. Rays are
 // finished in order while samples fit; a ray that would pass `sampleCapacity` gets none, and so do all after it.
 //
-// Marching can be done in rounds, so that nobody looks behind surfaces: each run makes the next `most` samples of a ray,
-// from `nextStep` on, and none of a ray whose `opticalDepth` is above `mostOpticalDepth`.
+// Marching can be done in rounds, so that nobody looks behind surfaces: each run makes the next `most` samples of a
+// ray, from `nextStep` on, and none of a ray whose `opticalDepth` is above `mostOpticalDepth`. Rays that do not fit in
+// one round may go on in a later one.
 struct MarchRays {
   static constexpr uint32_t kThrough = 0xffffffffu;  // nextStep of a ray that has no more samples
 
@@ -77,7 +78,7 @@ struct MarchRays {
                                     // got `most` samples goes on behind the last of them, any other is kThrough
   Slice<uint32_t> firstSample;      // [rays + 1]: samples of ray r are [firstSample[r], firstSample[r+1])
   Slice<uint32_t> sampleCount;      // [1]: total made
-  Slice<uint32_t> finishedRays;     // optional, [1]: rays that fit; the counter of what follows
+  Slice<uint32_t> finishedRays;     // optional, [1]: rays that fit
   Slice<uint32_t> rayOfSample;      // optional, [sampleCapacity]
   Slice<float> positions;           // [sampleCapacity][3], grid coordinates in [0,1]
   Slice<float> distances;           // [sampleCapacity]: t of the middle
@@ -94,12 +95,13 @@ struct OpticalDepth {
 };
 
 // Keeps of each ray the samples in front of the point where its optical depth passes `mostOpticalDepth` (the one that
-// crosses included), out of all rounds of marching: sample i of round q stands at row q · sampleCapacity + i.
+// crosses included), out of all rounds of marching: sample i of round q stands at row q · sampleCapacity + i. The first
+// ray whose samples do not fit, or that is still transparent and not kThrough, keeps none, and so do all after it.
 struct CompactSamples {
   Count rays;
   uint32_t rounds = 1;
   uint32_t sampleCapacity = 0;  // of a round
-  uint32_t keptCapacity = 0;    // rays whose samples no longer fit keep none, and so do all after
+  uint32_t keptCapacity = 0;
   float mostOpticalDepth = 0;
   Slice<const uint32_t> firstSample;  // [rounds][rays.capacity + 1]
   Slice<const uint32_t> nextStep;     // optional, [rays]: as the last round left it
@@ -107,8 +109,7 @@ struct CompactSamples {
   Slice<const float> steps;           // [rounds · sampleCapacity]
   Slice<uint32_t> keptFirstSample;    // [rays + 1]
   Slice<uint32_t> keptCount;          // [1]
-  Slice<uint32_t> finishedRays;       // optional, [1]: rays before the first that did not fit, or that is still
-                                      // transparent and not kThrough
+  Slice<uint32_t> finishedRays;       // optional, [1]: rays before that first one
   Slice<uint32_t> source;             // [keptCapacity]: the row that a kept sample was
   Slice<uint32_t> rayOfSample;        // [keptCapacity]
 };

@@ -140,15 +140,11 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
     device.run(compact);
   });
   if (!device.supports(Operation::kCompactSamples)) return;
-  Array<float> from = recorder.randomFloats(size_t{lines.samples} * 32, -1, 1);
-  Array<float> to = device.array<float>(size_t{lines.samples} * 32);
-  recorder.measureStream(Operation::kGatherRows, fmt::format("32 columns, {}", shapeOf(n, "samples")), n * (4 + 256),
-                         [&] {
-                           device.run(GatherRows{{lines.samples, {}},
-                                                 source,
-                                                 Matrix<float>::grouped(from, 32, 2, lines.samples),
-                                                 Matrix<float>::grouped(to, 32, 2, lines.samples)});
-                         });
+  Array<float> to = device.array<float>(size_t{lines.samples} * 3);
+  recorder.measureStream(
+      Operation::kGatherRows, fmt::format("3 columns, {}", shapeOf(n, "samples")), n * (4 + 24), [&] {
+        device.run(GatherRows{{lines.samples, {}}, source, Matrix<float>(lines.colours, 3), Matrix<float>(to, 3)});
+      });
 }
 
 // Cells of a hollow ball, a sixth of the region of interest across and two cells thick.
@@ -208,6 +204,18 @@ void measureRays(RooflineRecorder& recorder, uint32_t capacity) {
   const uint32_t made = device.read(counters.all())[0];
   recorder.measureStream(Operation::kMarchRays, fmt::format("{} rays, {} samples", rays, made),
                          made * 24.0 + rays * 32.0, [&] { device.run(march); });
+  Array<uint32_t> nextStep = device.array<uint32_t>(rays);
+  Array<float> opticalDepth = device.array<float>(rays);
+  march.most = 8;
+  march.nextStep = nextStep;
+  march.opticalDepth = opticalDepth;
+  device.run(march);
+  const uint32_t round = device.read(counters.all())[0];
+  recorder.measureStream(Operation::kMarchRays, fmt::format("{} rays, the first {} samples", rays, round),
+                         round * 24.0 + rays * 44.0, [&] {
+                           device.fillZero(nextStep.all());
+                           device.run(march);
+                         });
 }
 
 void measureLosses(RooflineRecorder& recorder, uint32_t rays) {

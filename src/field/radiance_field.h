@@ -24,6 +24,7 @@ class RadianceField {
 
   // Room for this many samples in the calls below.
   void reserve(uint32_t samples);
+  uint32_t capacity() const { return capacity_; }
 
   // Density alone, nothing kept for backward. positions [capacity][3] in [0,1]; logDensities 1 column.
   void logDensity(Count samples, Slice<const float> positions, Matrix<float> logDensities);
@@ -52,7 +53,7 @@ class RadianceField {
   RadianceFieldShape shape_;
   ParameterGroup table_, density_, colour_;
   uint32_t capacity_ = 0;
-  Array<float> encoded_, encodedGradients_;  // [levels][capacity][features]
+  Array<float> encoded_, encodedGradients_;  // [levels][Matrix::rowsOfPlane(capacity)][features]
   Array<float> colourInput_;                 // [capacity][geometry features + harmonics]
   Array<float> colours_;                     // [capacity][3]
   Array<float> densityActivations_, colourActivations_;

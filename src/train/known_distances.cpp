@@ -3,13 +3,13 @@
 namespace tessera {
 
 std::vector<std::vector<KnownDistance>> knownDistances(const Capture& capture, const SceneFrame& frame,
-                                                       double mostError) {
+                                                       double mostPixelsOff) {
   std::vector<std::vector<KnownDistance>> known(capture.photos.size());
   for (const Observation& observation : capture.observations) {
     const Photo& photo = capture.photos[observation.photo];
     const SparsePoint& point = capture.points[observation.point];
     const Camera& camera = capture.cameras[photo.camera];
-    if (photo.split != Split::train || !(point.error <= mostError)) continue;
+    if (photo.split != Split::train || !(observation.error <= mostPixelsOff)) continue;
     const bool inside = observation.x >= 0 && observation.y >= 0 && observation.x < static_cast<float>(camera.width) &&
                         observation.y < static_cast<float>(camera.height);
     const Vec3d offset = point.xInWorld - photo.worldFromCamera.translation;

@@ -21,7 +21,7 @@ Capture threePhotos() {
 
 void observe(Capture& capture, uint32_t photo, const Vec3d& point, float x, float y, float error = 0.5f) {
   capture.observations.push_back({photo, static_cast<uint32_t>(capture.points.size()), x, y, error});
-  capture.points.push_back({point, {}, error});
+  capture.points.push_back({point, {}, 0.3f});
 }
 
 TEST(KnownDistances, AreFromTheCameraToThePointInSceneUnits) {
@@ -41,7 +41,7 @@ TEST(KnownDistances, AreFromTheCameraToThePointInSceneUnits) {
 
 TEST(KnownDistances, LeaveOutWhatCannotBeTrusted) {
   Capture capture = threePhotos();
-  observe(capture, 0, Vec3d(0, 0, 2), 50, 40, 2.5f);  // too far from its pixels
+  observe(capture, 0, Vec3d(0, 0, 2), 50, 40, 2.5f);  // too far off
   observe(capture, 0, Vec3d(0, 0, 2), 50, 40, std::nanf(""));
   observe(capture, 0, Vec3d(0, 0, -2), 50, 40);  // behind the camera
   observe(capture, 0, Vec3d(0, 0, 2), 100, 40);  // beside the photo

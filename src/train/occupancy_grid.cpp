@@ -25,6 +25,7 @@ void OccupancyGrid::exclude(const std::vector<bool>& visible) {
     values[cell] = -1;
     bits[cell / 32] &= ~(1u << (cell % 32));
   }
+  CHECK(!candidates.empty());
   restore(values, bits);
   candidates_ = device_.arrayOf(candidates);
 }

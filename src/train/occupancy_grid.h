@@ -11,7 +11,7 @@ class OccupancyGrid {
  public:
   // Every cell starts occupied, but those that `visible` says no (see visibleCells): they stay empty for good.
   OccupancyGrid(Device& device, const MarchSpace& space);
-  void exclude(const std::vector<bool>& visible);
+  void exclude(const std::vector<bool>& visible);  // at least one is
 
   // Writes log density, 1 column, at `count` positions ([count][3], grid coordinates).
   using LogDensity = std::function<void(Count count, Slice<const float> positions, Matrix<float> logDensities)>;

@@ -43,13 +43,13 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
       const bool masked =
           !entry.decoded->mask.empty() && *entry.decoded->mask.at(static_cast<int>(x), static_cast<int>(y)) < 128;
       batch.weights[ray] = masked ? 0.0f : 1.0f;
-      if (masked) batch.distances[ray] = 0;
       if (masked && attempt + 1 < kTries) continue;
       batch.photoOfRay[ray] = static_cast<uint32_t>(entry.photo);
       batch.pixels[2 * size_t{ray}] = static_cast<float>(x) + 0.5f;
       batch.pixels[2 * size_t{ray} + 1] = static_cast<float>(y) + 0.5f;
       const uint8_t* pixel = image.at(static_cast<int>(x), static_cast<int>(y));
       const float alpha = image.channels == 4 ? static_cast<float>(pixel[3]) / 255 : 1.0f;
+      if (masked || alpha < 1) batch.distances[ray] = 0;  // what is known is not what the photo shows there
       for (int k = 0; k < 3; ++k) {
         const float value = static_cast<float>(pixel[image.channels >= 3 ? k : 0]) / 255;
         batch.targets[3 * size_t{ray} + k] = value * alpha + background[k] * (1 - alpha);

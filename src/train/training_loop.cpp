@@ -102,7 +102,7 @@ TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const Tr
     const StepReport report = trainee.step(state.step, state.plannedSteps);
     if (!std::isfinite(report.loss)) {
       throw Error(folder.root().string(), fmt::format("step {}, block 0", state.step), "the loss is not a number",
-                  "resume with a lower --set rate=..., and report it with the capture");
+                  "train into another folder with a lower --set rate=..., and report it with the capture");
     }
     window.add(report);
     totalSamples += report.samples;

@@ -26,7 +26,7 @@ namespace tessera::cpu {
 
 inline constexpr int kRows = 96;  // samples of a block: a multiple of every tile height below
 inline constexpr int kMaxWidth = 128;
-inline constexpr int kParts = 16;  // partial weight gradients, whatever the number of threads
+inline constexpr int kParts = 16;  // partial weight gradients, so at most as many threads: the same bits for any number
 
 struct BlockBuffers {  // of one thread
   alignas(128) float input[kRows * kMaxWidth];
@@ -439,6 +439,7 @@ BlockBuffers& threadBuffers() {
 void run(Context& context, const MlpForward& a) {
   checkShape(a.shape);
   CHECK(a.output.groupWidth == 0u);
+  CHECK(a.output.columns <= static_cast<uint32_t>(a.shape.outputs));
   const size_t n = hostCount(a.samples);
   if (n == 0) return;
   const size_t blocks = (n + kRows - 1) / kRows;

@@ -335,11 +335,10 @@ void run(Context& context, const CompactSamples& a) {
       complete[ray] = opticalDepth > a.mostOpticalDepth || !nextStep || nextStep[ray] == MarchRays::kThrough;
     }
   });
-  const uint32_t fitting = countsToOffsets(kept, rays, a.keptCapacity);
-  if (a.finishedRays) {
-    const auto end = complete.begin() + fitting;
-    *hostPointer(a.finishedRays) = static_cast<uint32_t>(std::find(complete.begin(), end, 0) - complete.begin());
-  }
+  const auto fitting = complete.begin() + countsToOffsets(kept, rays, a.keptCapacity);
+  const auto finished = static_cast<uint32_t>(std::find(complete.begin(), fitting, 0) - complete.begin());
+  std::fill(kept + finished, kept + rays + 1, kept[finished]);
+  if (a.finishedRays) *hostPointer(a.finishedRays) = finished;
   *hostPointer(a.keptCount) = kept[rays];
   context.pool.forRanges(rays, 4 * kRaysPerTask, [&](size_t begin, size_t end) {
     for (size_t ray = begin; ray < end; ++ray) {

@@ -187,14 +187,14 @@ void run(const CompactSamples& a) {
         kept.push_back(row);
       }
     }
-    full = full || made + kept.size() > a.keptCapacity;
+    const bool through = nextStep.empty() || nextStep[r] == MarchRays::kThrough;
+    full = full || made + kept.size() > a.keptCapacity || !(opticalDepth > a.mostOpticalDepth || through);
     if (full) kept.clear();
     for (const uint32_t row : kept) {
       hostPointer(a.source)[made] = row;
       hostPointer(a.rayOfSample)[made++] = static_cast<uint32_t>(r);
     }
-    const bool through = nextStep.empty() || nextStep[r] == MarchRays::kThrough;
-    if (finished == r && !full && (opticalDepth > a.mostOpticalDepth || through)) ++finished;
+    finished += !full;
     hostPointer(a.keptFirstSample)[r + 1] = made;
   }
   hostPointer(a.keptCount)[0] = made;

@@ -36,6 +36,7 @@ void VulkanDevice::run(const MlpForward& options) {
   const MlpShape& shape = options.shape;
   const size_t capacity = options.samples.capacity;
   CHECK(options.input.columns == static_cast<uint32_t>(shape.inputs));
+  CHECK(options.output.columns <= static_cast<uint32_t>(shape.outputs));
   CHECK(options.weights.count == shape.parameters());
   CHECK(capacity * shape.activationsPerSample() < size_t{1} << 31);
 

@@ -96,9 +96,9 @@ void FieldConfig::check() const {
   const MarchSpace marched = space();
   const double steps = marched.stepIndex(marched.far) - marched.stepIndex(marched.near);
   if (!(steps <= kMostSteps)) {
-    throw Error(fmt::format("--set min_step={} cone={}", minStep, cone), "",
+    throw Error(fmt::format("--set min_step={} cone={} far={}", minStep, cone, far), "",
                 fmt::format("a ray from near to far would take {:.0f} steps", steps),
-                fmt::format("use longer ones: at most {}", kMostSteps));
+                fmt::format("use longer ones or a nearer far: at most {} steps", kMostSteps));
   }
   within("samples_per_step", samplesPerStep, 64, 1 << 24);
   within("samples_per_pass", samplesPerPass, 64, 1 << 24);

@@ -77,6 +77,16 @@ TEST(FieldConfig, ShapesTheModelAndItsSpace) {
   EXPECT_EQ(config.space().gridResolution, 64);
 }
 
+TEST(FieldConfig, RefusesRaysOfTooManySteps) {
+  FieldConfig config;
+  config.cone = 0;
+  EXPECT_NO_THROW(config.check());
+  config.minStep = 0.001;
+  EXPECT_THROW(config.check(), Error);
+  config.far = 16;
+  EXPECT_NO_THROW(config.check());
+}
+
 TEST(FieldConfig, NamesSettingsThatMakeNoModel) {
   EXPECT_NO_THROW(FieldConfig().check());
   for (const char* assignment : {"width=17",
@@ -95,7 +105,6 @@ TEST(FieldConfig, NamesSettingsThatMakeNoModel) {
                                  "colour_hidden=-1",
                                  "min_step=0",
                                  "min_step=nan",
-                                 "min_step=1e-5",
                                  "samples_per_pass=0",
                                  "depth=-1",
                                  "depth_tolerance=2",

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "base/image_io.h"
+#include "base/random.h"
 #include "representations/field/train_field.h"
 #include "scene/view_renderer.h"
 
@@ -22,6 +23,7 @@ class CubeScene {
     std::vector<double> log2Gains = {0};  // of the photos, in turn
     bool stain = false;                   // a red stain in the corner of every photo that is trained on, under a mask
     int photos = 48;
+    int observationsPerPhoto = 0;  // exact ones
   };
 
   static constexpr int kWidth = 40, kHeight = 32, kStain = 12;
@@ -121,7 +123,22 @@ class CubeScene {
       photo.worldFromCamera.rotation.col(2) = -outward;
       writePhoto(photo, camera, i);
       capture_.photos.push_back(photo);
+      for (int k = 0; k < options_.observationsPerPhoto; ++k) observe(i, camera, k);
     }
+  }
+
+  // A point where the middle of some pixel looks, if it looks at anything.
+  void observe(int index, const Camera& camera, int k) {
+    const RandomStream random(9, static_cast<uint64_t>(index));
+    const Vec2d pixel(random.below(2 * k, kWidth) + 0.5, random.below(2 * k + 1, kHeight) + 0.5);
+    const Pose& pose = capture_.photos[index].worldFromCamera;
+    Vec3d colour;
+    const Vec3d along = pose.rotation * *camera.directionInCamera(pixel);
+    const double distance = trace(pose.translation - centre(), along, &colour);
+    if (!std::isfinite(distance)) return;
+    capture_.observations.push_back({static_cast<uint32_t>(index), static_cast<uint32_t>(capture_.points.size()),
+                                     static_cast<float>(pixel.x()), static_cast<float>(pixel.y()), 0});
+    capture_.points.push_back({pose.translation + distance * along, {}, 0});
   }
 
   void writePhoto(Photo& photo, const Camera& camera, int index) const {

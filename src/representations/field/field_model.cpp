@@ -1,5 +1,6 @@
 #include "representations/field/field_model.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
@@ -39,7 +40,8 @@ FieldModel::FieldModel(Device& device, const FieldConfig& config, const SceneFra
 
 void FieldModel::sample(const Rays& rays, float minTransmittance, RaySamples& seen) {
   const uint32_t capacity = static_cast<uint32_t>(seen.distances.size());
-  reserve(rays.count, capacity);
+  reserve(static_cast<uint32_t>(seen.firstSample.size()) - 1, capacity);
+  CHECK(rays.count < seen.firstSample.size());
   const float mostOpticalDepth = -std::log(minTransmittance);
   const uint32_t firstsOfRound = rays.count + 1;
   device_.fillZero(nextStep_.part(0, rays.count));
@@ -98,7 +100,7 @@ void FieldModel::sample(const Rays& rays, float minTransmittance, RaySamples& se
 
 void FieldModel::reserve(uint32_t rays, uint32_t samples) {
   field_.reserve(samples);
-  if (nextStep_.size() < rays) {
+  if (nextStep_.size() < rays || !roundFirst_.size()) {
     nextStep_ = device_.array<uint32_t>(rays);
     opticalDepth_ = device_.array<float>(rays);
     roundFirst_ = device_.array<uint32_t>(size_t{RaySamples::kRounds} * (rays + 1));
@@ -112,11 +114,12 @@ void FieldModel::reserve(uint32_t rays, uint32_t samples) {
 }
 
 void FieldModel::refreshOccupancy(uint32_t uniform, uint32_t occupied, uint64_t seed) {
-  constexpr uint32_t kChunk = 1 << 16;
-  field_.reserve(kChunk);
-  occupancy_.update([&](Count count, Slice<const float> positions, Matrix<float> logDensities) {
-    field_.logDensity(count, positions, logDensities);
-  }, uniform, occupied, seed, kChunk);
+  // As many at a time as there is room for anyway.
+  const uint32_t chunk = std::clamp<uint32_t>(field_.capacity(), 1 << 12, 1 << 16);
+  field_.reserve(chunk);
+  occupancy_.update([&](Count count, Slice<const float> positions,
+                        Matrix<float> logDensities) { field_.logDensity(count, positions, logDensities); },
+                    uniform, occupied, seed, chunk);
 }
 
 void FieldModel::save(TensorSet& tensors, bool withMoments) {

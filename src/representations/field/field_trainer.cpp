@@ -16,7 +16,7 @@ constexpr uint32_t kRoomPerWanted = 2;  // for passes that see more than the las
 constexpr uint32_t kRoomPerRay = 8;     // so that the first round of marching fits
 constexpr uint32_t kLosses = 4;         // of a pass: colour loss, squared error, distortion, depth
 constexpr float kMinTransmittance = 1e-4f;
-constexpr double kMostPointError = 2;  // pixels of the capture's photos: sparse points worse than that teach nothing
+constexpr double kMostPixelsOff = 2;  // an observation farther from its point's image teaches nothing
 
 ColourLossKind lossKind(const std::string& name) {
   if (name == "mse") return ColourLossKind::mse;
@@ -52,17 +52,23 @@ FieldTrainer::FieldTrainer(Device& device, const Capture& capture, const FieldCo
       photos_(capture, trainingPhotos(capture),
               {static_cast<size_t>(config.photoBudgetMiB * 1048576), config.stepsPerPhoto,
                static_cast<uint64_t>(config.seed)}),
-      known_(knownDistances(capture, frame, kMostPointError)),
+      known_(knownDistances(capture, frame, kMostPixelsOff)),
       rays_(static_cast<uint32_t>(config.firstRays)),
       cameras_(device.arrayOf(rayCameras(capture, frame))),
       exposures_(device, "exposures", std::vector<float>(capture.photos.size() * 3)) {
   lossKind(config.loss);
-  model_.occupancy().exclude(visibleCells(capture, frame, model_.space()));
+  const std::vector<bool> visible = visibleCells(capture, frame, model_.space());
+  if (std::find(visible.begin(), visible.end(), true) == visible.end()) {
+    throw Error(capture.root.string(), "transforms.json", "no training photo sees any of the scene",
+                "look whether the poses are right, and the lens and its distortion");
+  }
+  model_.occupancy().exclude(visible);
   const uint32_t rays = static_cast<uint32_t>(config.mostRays);
   const uint32_t perPass = static_cast<uint32_t>(std::min(config.samplesPerStep, config.samplesPerPass));
   passes_ = (static_cast<uint32_t>(config.samplesPerStep) + perPass - 1) / perPass;
   const uint32_t raysPerPass = (rays + passes_ - 1) / passes_;
-  const uint32_t samples = std::max({kRoomPerWanted * perPass, kRoomPerRay * raysPerPass, FieldConfig::kMostSteps});
+  const uint32_t samples =
+      std::max({kRoomPerWanted * perPass, std::min(kRoomPerRay * raysPerPass, 4 * perPass), FieldConfig::kMostSteps});
   seen_ = RaySamples(device, raysPerPass, samples);
   counters_ = device.array<uint32_t>(size_t{passes_} * RaySamples::kCounters);
   photoOfRay_ = device.array<uint32_t>(rays);
@@ -88,7 +94,7 @@ void FieldTrainer::refreshOccupancy(int64_t step) {
   if (step < config_.occupancyWarmUp) {
     model_.refreshOccupancy(cells, 0, seed);
   } else {
-    const uint32_t share = static_cast<uint32_t>(cells * config_.occupancyShare);
+    const uint32_t share = static_cast<uint32_t>(std::ceil(cells * config_.occupancyShare));
     model_.refreshOccupancy(share, share, seed);
   }
 }
@@ -106,8 +112,9 @@ void FieldTrainer::uploadRays() {
 
 StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
   refreshOccupancy(step);
-  drawRays(photos_.at(step), known_,
-           {static_cast<uint64_t>(config_.seed), config_.randomBackground, config_.knownShare}, step, rays_, batch_);
+  const double knownShare = config_.depth > 0 ? config_.knownShare : 0;
+  drawRays(photos_.at(step), known_, {static_cast<uint64_t>(config_.seed), config_.randomBackground, knownShare}, step,
+           rays_, batch_);
   uploadRays();
   const auto raysBefore = [&](uint32_t pass) { return static_cast<uint32_t>(uint64_t{rays_} * pass / passes_); };
   for (uint32_t pass = 0; pass < passes_; ++pass) {
@@ -133,8 +140,10 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
   report.squaredError = squares / std::max(1.0, 3 * weight);
 
   const double perRay = std::max(1.0, static_cast<double>(report.samples)) / std::max(1u, report.rays);
-  const double rounded = std::ceil(config_.samplesPerStep / perRay / 64) * 64;
-  rays_ = static_cast<uint32_t>(std::clamp<double>(rounded, 64, config_.mostRays));
+  double wanted = config_.samplesPerStep / perRay;
+  if (report.rays < rays_) wanted = std::min<double>(wanted, report.rays);  // not all of them fitted
+  const double rounded = std::ceil(wanted / 8) * 8;
+  rays_ = static_cast<uint32_t>(std::clamp<double>(rounded, 8, config_.mostRays));
   return report;
 }
 
@@ -282,7 +291,7 @@ void FieldTrainer::restore(const fs::path& path, const Safetensors& state) {
   loadGroup(device_, path, state, exposures_);
   const TensorView& rays = state.require(path, "rays", TensorType::u32);
   if (rays.elements() != 1) throw Error(path.string(), "tensor rays", "is not one number", "train again");
-  rays_ = std::clamp(rays.as<uint32_t>()[0], 64u, static_cast<uint32_t>(config_.mostRays));
+  rays_ = std::clamp(rays.as<uint32_t>()[0], 1u, static_cast<uint32_t>(config_.mostRays));
 }
 
 }  // namespace tessera

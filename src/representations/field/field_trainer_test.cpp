@@ -91,34 +91,102 @@ TEST(FieldTrainer, MakesTheSameBytesOnAnyNumberOfThreads) {
   options.room = true;
   options.stain = true;
   const CubeScene scene(options);
-  const Bytes one = TrainedCube(scene, cubeConfig(), 80, 1).trainer->save();
-  EXPECT_EQ(one, TrainedCube(scene, cubeConfig(), 80, 2).trainer->save());
-  EXPECT_EQ(one, TrainedCube(scene, cubeConfig(), 80, 5).trainer->save());
-  FieldConfig other = cubeConfig();
-  other.seed = 1;
-  EXPECT_NE(one, TrainedCube(scene, other, 80, 2).trainer->save());
+  FieldConfig config = cubeConfig();
+  for (const int samplesPerPass : {8192, 1000}) {  // one pass, and nine of which some have no ray at first
+    config.samplesPerPass = samplesPerPass;
+    config.firstRays = samplesPerPass == 1000 ? 4 : 512;
+    const Bytes one = TrainedCube(scene, config, 80, 1).trainer->save();
+    EXPECT_EQ(one, TrainedCube(scene, config, 80, 2).trainer->save());
+    EXPECT_EQ(one, TrainedCube(scene, config, 80, 5).trainer->save());
+    FieldConfig other = config;
+    other.seed = 1;
+    EXPECT_NE(one, TrainedCube(scene, other, 80, 2).trainer->save());
+  }
+}
+
+TEST(FieldTrainer, LearnsAsMuchInSeveralPasses) {
+  const CubeScene scene;
+  FieldConfig config = cubeConfig();
+  config.samplesPerPass = 1000;
+  TrainedCube trained(scene, config, 300);
+  EXPECT_GT(heldOutPsnr(scene, trained), 17);
+  EXPECT_GT(trained.last.samples, 8192u / 2);
 }
 
 TEST(FieldTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
   const CubeScene scene;
   constexpr int64_t kSteps = 90;
-  FieldConfig config = cubeConfig();
-  config.photoBudgetMiB = CubeScene::kWidth * CubeScene::kHeight * 4 * 5 / 1048576.0;  // windows move on too
-  TrainedCube unbroken(scene, config, 0);
-  for (int64_t step = 0; step < kSteps; ++step) unbroken.trainer->step(step, kSteps);
-  Bytes state;
-  int64_t step = 0;
-  for (const int64_t until : {1, 15, 16, 17, 50, 90}) {
-    TrainedCube part(scene, config, 0);
-    if (!state.empty()) {
-      const auto file = decodeSafetensors(state);
-      ASSERT_TRUE(file);
-      part.trainer->restore("state", *file);
+  FieldConfig plain = cubeConfig();
+  plain.photoBudgetMiB = CubeScene::kWidth * CubeScene::kHeight * 4 * 5 / 1048576.0;  // windows move on too
+  FieldConfig passes = cubeConfig();
+  passes.samplesPerPass = 1000;
+  FieldConfig crowded = cubeConfig();  // thousands of steps a ray: not all rays of a step are finished
+  crowded.minStep = 0.001;
+  crowded.cone = 0;
+  crowded.far = 8;
+  for (const FieldConfig& config : {plain, passes, crowded}) {
+    TrainedCube unbroken(scene, config, 0);
+    for (int64_t step = 0; step < kSteps; ++step) unbroken.trainer->step(step, kSteps);
+    Bytes state;
+    int64_t step = 0;
+    for (const int64_t until : {0, 1, 15, 16, 17, 50, 90}) {
+      TrainedCube part(scene, config, 0);
+      if (!state.empty()) {
+        const auto file = decodeSafetensors(state);
+        ASSERT_TRUE(file);
+        part.trainer->restore("state", *file);
+      }
+      for (; step < until; ++step) part.trainer->step(step, kSteps);
+      state = part.trainer->save();
     }
-    for (; step < until; ++step) part.trainer->step(step, kSteps);
-    state = part.trainer->save();
+    EXPECT_EQ(state, unbroken.trainer->save());
   }
-  EXPECT_EQ(state, unbroken.trainer->save());
+}
+
+TEST(FieldTrainer, DrawsFewerRaysWhenTheyDoNotFit) {
+  const CubeScene scene;
+  FieldConfig config = cubeConfig();
+  config.minStep = 0.001;
+  config.cone = 0;
+  config.far = 8;
+  config.firstRays = 4096;
+  TrainedCube trained(scene, config, 0);
+  const StepReport first = trained.trainer->step(0, 0);
+  EXPECT_GT(first.rays, 0u);
+  EXPECT_LT(first.rays, 4096u);
+  const auto file = decodeSafetensors(trained.trainer->save());
+  ASSERT_TRUE(file);
+  EXPECT_LT(file->require("state", "rays", TensorType::u32).as<uint32_t>()[0], first.rays + 8);
+}
+
+// Mean of |expected - true| z-depth where the held-out views are opaque.
+double heldOutDepthError(const CubeScene& scene, TrainedCube& trained) {
+  FieldRenderer renderer(trained.trainer->model());
+  double sum = 0;
+  int count = 0;
+  for (const int index : scene.capture().photosIn(Split::test)) {
+    const Photo& photo = scene.capture().photos[index];
+    const Camera& camera = scene.capture().cameras[photo.camera];
+    const RenderedView view = renderer.render(camera, photo.worldFromCamera, nullptr);
+    const RenderedView truth = scene.truth(camera, photo.worldFromCamera);
+    for (size_t i = 0; i < truth.depth.pixels.size(); ++i, ++count) {
+      sum += std::abs(view.depth.pixels[i] - truth.depth.pixels[i]);
+    }
+  }
+  return sum / count;
+}
+
+TEST(FieldTrainer, LearnsFromSparsePointsWhereSurfacesAre) {
+  CubeScene::Options options;
+  options.room = true;
+  options.photos = 10;
+  options.observationsPerPhoto = 150;
+  const CubeScene scene(options);
+  FieldConfig with = cubeConfig(), without = cubeConfig();
+  with.depth = 0.5;
+  without.depth = 0;
+  TrainedCube taught(scene, with, 200), untaught(scene, without, 200);
+  EXPECT_LT(heldOutDepthError(scene, taught), 0.7 * heldOutDepthError(scene, untaught));
 }
 
 TEST(FieldTrainer, TrainsOnAllPhotosWhenFewFitTheBudget) {

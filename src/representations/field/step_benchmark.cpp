@@ -147,6 +147,8 @@ class Step {
 }  // namespace
 
 StepBenchmark benchmarkStep(Device& device, const StepBenchmarkOptions& options) {
+  CHECK(options.rays > 0u);
+  CHECK(options.samplesPerRay > 0u);
   Step step(device, options);
   struct Part {
     const char* name;

@@ -11,7 +11,7 @@
 namespace tessera {
 
 struct StepBenchmarkOptions {
-  FieldConfig config;  // the model's shape, loss and rates
+  FieldConfig config;  // the model's shape, samples_per_pass, delta of the Huber loss, decay of the networks
   uint32_t rays = 2048;
   uint32_t samplesPerRay = 32;
   double seconds = 5;  // repeats for so long, after two steps that do not count, and at least 3 times
