@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "compute/cpu/kernels.h"
@@ -34,6 +35,19 @@ ValueAndSlope robust(ColourLossKind kind, float parameter, float r) {
 // MERF's warp of distance (building blocks 7.1).
 float warped(float t) {
   return t < 1 ? t / 2 : 1 - 1 / (2 * t);
+}
+
+// Σ lossOfRay(ray), added in one fixed order.
+template <class LossOfRay>
+double sumOverRays(ThreadPool& pool, size_t rays, const LossOfRay& lossOfRay) {
+  const size_t tasks = (rays + kRaysPerTask - 1) / kRaysPerTask;
+  std::vector<double> sums(tasks);
+  pool.run(tasks, [&](size_t task, int) {
+    for (size_t ray = task * kRaysPerTask; ray < std::min(rays, (task + 1) * kRaysPerTask); ++ray) {
+      sums[task] += lossOfRay(ray);
+    }
+  });
+  return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
 }  // namespace
@@ -76,41 +90,33 @@ void run(Context& context, const DistortionLoss& a) {
   const float* distances = hostPointer(a.distances);
   const float* steps = hostPointer(a.steps);
   float* gradients = hostPointer(a.weightGradients);
-  const size_t rays = hostCount(a.rays), tasks = (rays + kRaysPerTask - 1) / kRaysPerTask;
-  std::vector<double> sums(tasks);
-  context.pool.run(tasks, [&](size_t task, int) {
-    double loss = 0;
-    for (size_t ray = task * kRaysPerTask; ray < std::min(rays, (task + 1) * kRaysPerTask); ++ray) {
-      const uint32_t first = firstSample[ray], last = firstSample[ray + 1];
-      double totalW = 0, totalWm = 0;
-      const auto interval = [&](uint32_t i, double* middle, double* width) {
-        const double s0 = warped(distances[i] - steps[i] / 2), s1 = warped(distances[i] + steps[i] / 2);
-        *middle = (s0 + s1) / 2;
-        *width = s1 - s0;
-      };
-      double m, width;
-      for (uint32_t i = first; i < last; ++i) {
-        interval(i, &m, &width);
-        totalW += weights[i];
-        totalWm += weights[i] * m;
-      }
-      double beforeW = 0, beforeWm = 0, sum = 0;
-      for (uint32_t i = first; i < last; ++i) {
-        interval(i, &m, &width);
-        const double w = weights[i];
-        sum += 2 * w * (m * beforeW - beforeWm) + w * w * width / 3;
-        const double afterW = totalW - beforeW - w, afterWm = totalWm - beforeWm - w * m;
-        gradients[i] =
-            static_cast<float>(a.scale * (2 * (m * (beforeW - afterW) + afterWm - beforeWm) + 2.0 / 3 * w * width));
-        beforeW += w;
-        beforeWm += w * m;
-      }
-      loss += sum;
+  const double loss = sumOverRays(context.pool, hostCount(a.rays), [&](size_t ray) {
+    const uint32_t first = firstSample[ray], last = firstSample[ray + 1];
+    double totalW = 0, totalWm = 0;
+    const auto interval = [&](uint32_t i, double* middle, double* width) {
+      const double s0 = warped(distances[i] - steps[i] / 2), s1 = warped(distances[i] + steps[i] / 2);
+      *middle = (s0 + s1) / 2;
+      *width = s1 - s0;
+    };
+    double m, width;
+    for (uint32_t i = first; i < last; ++i) {
+      interval(i, &m, &width);
+      totalW += weights[i];
+      totalWm += weights[i] * m;
     }
-    sums[task] = loss;
+    double beforeW = 0, beforeWm = 0, sum = 0;
+    for (uint32_t i = first; i < last; ++i) {
+      interval(i, &m, &width);
+      const double w = weights[i];
+      sum += 2 * w * (m * beforeW - beforeWm) + w * w * width / 3;
+      const double afterW = totalW - beforeW - w, afterWm = totalWm - beforeWm - w * m;
+      gradients[i] =
+          static_cast<float>(a.scale * (2 * (m * (beforeW - afterW) + afterWm - beforeWm) + 2.0 / 3 * w * width));
+      beforeW += w;
+      beforeWm += w * m;
+    }
+    return sum;
   });
-  double loss = 0;
-  for (const double sum : sums) loss += sum;
   *hostPointer(a.loss) = static_cast<float>(a.scale * loss);
 }
 
@@ -120,24 +126,17 @@ void run(Context& context, const DepthLoss& a) {
   const float* distances = hostPointer(a.distances);
   const float* known = hostPointer(a.known);
   float* gradients = hostPointer(a.weightGradients);
-  const size_t rays = hostCount(a.rays), tasks = (rays + kRaysPerTask - 1) / kRaysPerTask;
-  std::vector<double> sums(tasks);
-  context.pool.run(tasks, [&](size_t task, int) {
-    double loss = 0;
-    for (size_t ray = task * kRaysPerTask; ray < std::min(rays, (task + 1) * kRaysPerTask); ++ray) {
-      if (known[ray] <= 0) continue;
-      loss += 1;
-      for (uint32_t i = firstSample[ray]; i < firstSample[ray + 1]; ++i) {
-        const float off = std::abs(distances[i] - known[ray]) / known[ray] - a.tolerance;
-        const float gain = 1 - std::clamp(off, 0.0f, 1.0f);
-        loss -= weights[i] * gain;
-        gradients[i] -= a.scale * gain;
-      }
+  const double loss = sumOverRays(context.pool, hostCount(a.rays), [&](size_t ray) {
+    if (known[ray] <= 0) return 0.0;
+    double sum = 1;
+    for (uint32_t i = firstSample[ray]; i < firstSample[ray + 1]; ++i) {
+      const float off = std::abs(distances[i] - known[ray]) / known[ray] - a.tolerance;
+      const float gain = 1 - std::clamp(off, 0.0f, 1.0f);
+      sum -= weights[i] * gain;
+      gradients[i] -= a.scale * gain;
     }
-    sums[task] = loss;
+    return sum;
   });
-  double loss = 0;
-  for (const double sum : sums) loss += sum;
   *hostPointer(a.loss) = static_cast<float>(a.scale * loss);
 }
 
