@@ -1,5 +1,7 @@
 // tessera: photographs of a large place to a neural scene. Every verb is a library function; errors are caught here.
 
+#include <malloc.h>
+
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -42,6 +44,9 @@ void addDeviceFlags(CLI::App& verb, DeviceOptions& options) {
 }  // namespace tessera
 
 int main(int argc, char** argv) {
+  // Photos come and go: their memory goes back to the system each time, however large those before were. (By default
+  // glibc would keep it, in pieces that others do not fit.)
+  mallopt(M_MMAP_THRESHOLD, 1 << 19);
   CLI::App app(
       "tessera turns photographs of a large place into a neural scene.\n"
       "  photos -import-> capture -train-> model -eval, render-> pictures");

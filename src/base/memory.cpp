@@ -1,5 +1,8 @@
 #include "base/memory.h"
 
+#include <unistd.h>
+
+#include <algorithm>
 #include <fstream>
 #include <string>
 #include <string_view>
@@ -22,6 +25,15 @@ int64_t peakResidentBytes() {
 }
 int64_t residentBytes() {
   return statusBytes("VmRSS:");
+}
+
+int64_t usableMemoryBytes() {
+  int64_t bytes = static_cast<int64_t>(sysconf(_SC_PHYS_PAGES)) * sysconf(_SC_PAGESIZE);
+  for (const char* path : {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"}) {
+    int64_t limit = 0;  // "max" where there is none
+    if (std::ifstream(path) >> limit && limit > 0) bytes = std::min(bytes, limit);
+  }
+  return bytes;
 }
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// What this process holds in memory, from /proc.
+// What this process holds in memory, from /proc, and what it may.
 #pragma once
 
 #include <cstdint>
@@ -7,5 +7,8 @@ namespace tessera {
 
 int64_t peakResidentBytes();
 int64_t residentBytes();
+
+// The machine's memory, or less where a control group (a container, a service) limits it.
+int64_t usableMemoryBytes();
 
 }  // namespace tessera

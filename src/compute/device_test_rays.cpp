@@ -126,33 +126,34 @@ OperationTests testsOf<MarchRays>() {
           if (share == 1 && size.used() > 40) continue;
           // The second time samples run out.
           const uint32_t sampleCapacity = optional == 0 ? 60000 : 300;
-          tests.cases.push_back(
-              {fmt::format("{}, rays {}, {} occupied, {}", named.name, toString(size), share,
-                           optional == 0 ? "plain" : "jitter, far of ray, few samples"),
-               [=](Stage& stage) {
-                 std::vector<float> origins, directions;
-                 makeRays(stage.random, size.capacity, &origins, &directions);
-                 const Slice<float> jitter = optional ? stage.randomInput(size.capacity, 0, 1) : Slice<float>();
-                 const Slice<float> farOfRay = optional ? stage.randomInput(size.capacity, 0, 8) : Slice<float>();
-                 MarchRays a{named.space};
-                 a.rays = stage.count(size);
-                 a.sampleCapacity = sampleCapacity;
-                 a.origins = stage.input(origins);
-                 a.directions = stage.input(directions);
-                 a.jitter = jitter;
-                 a.farOfRay = farOfRay;
-                 a.occupancy = stage.input(randomBits(stage.random, named.space, share));
-                 a.firstSample = stage.outputWords("firstSample", size.capacity + 1);
-                 a.sampleCount = stage.outputWords("sampleCount", 1);
-                 if (optional) {
-                   a.finishedRays = stage.outputWords("finishedRays", 1);
-                   a.rayOfSample = stage.outputWords("rayOfSample", sampleCapacity);
-                 }
-                 a.positions = stage.output("positions", 3 * sampleCapacity, 1e-6);
-                 a.distances = stage.output("distances", sampleCapacity, 1e-6);
-                 a.steps = stage.output("steps", sampleCapacity, 1e-6);
-                 stage.device.run(a);
-               }});
+          tests.cases.push_back({fmt::format("{}, rays {}, {} occupied, {}", named.name, toString(size), share,
+                                             optional == 0 ? "plain" : "jitter, far of ray, few samples"),
+                                 [=](Stage& stage) {
+                                   std::vector<float> origins, directions;
+                                   makeRays(stage.random, size.capacity, &origins, &directions);
+                                   const Slice<float> jitter =
+                                       optional ? stage.randomInput(size.capacity, 0, 1) : Slice<float>();
+                                   const Slice<float> farOfRay =
+                                       optional ? stage.randomInput(size.capacity, 0, 8) : Slice<float>();
+                                   MarchRays a{named.space};
+                                   a.rays = stage.count(size);
+                                   a.sampleCapacity = sampleCapacity;
+                                   a.origins = stage.input(origins);
+                                   a.directions = stage.input(directions);
+                                   a.jitter = jitter;
+                                   a.farOfRay = farOfRay;
+                                   a.occupancy = stage.input(randomBits(stage.random, named.space, share));
+                                   a.firstSample = stage.outputWords("firstSample", size.capacity + 1);
+                                   a.sampleCount = stage.outputWords("sampleCount", 1);
+                                   if (optional) {
+                                     a.finishedRays = stage.outputWords("finishedRays", 1);
+                                     a.rayOfSample = stage.outputWords("rayOfSample", sampleCapacity);
+                                   }
+                                   a.positions = stage.output("positions", 3 * sampleCapacity, 1e-6);
+                                   a.distances = stage.output("distances", sampleCapacity, 1e-6);
+                                   a.steps = stage.output("steps", sampleCapacity, 1e-6);
+                                   stage.device.run(a);
+                                 }});
         }
   for (const NamedSpace& named : spaces())
     for (float share : {0.1f, 1.0f})
@@ -282,21 +283,23 @@ OperationTests testsOf<OccupancyPoints>() {
   for (const NamedSpace& named : spaces())
     for (float share : {0.0f, 0.1f, 1.0f}) {
       const uint32_t all = named.space.gridResolution * named.space.gridResolution * named.space.gridResolution;
-      for (const auto& [uniform, occupied] :
-           {std::pair{all, 0u}, std::pair{1003u, 517u}, std::pair{0u, 33u}, std::pair{17u, 0u}, std::pair{0u, 0u}})
-        tests.cases.push_back({fmt::format("{}, {} occupied, {} + {} points", named.name, share, uniform, occupied),
-                               [=, uniform = uniform, occupied = occupied](Stage& stage) {
-                                 const uint64_t seed = stage.random.bits();
-                                 Slice<const uint32_t> candidates;  // all; for many points, every third
-                                 std::vector<uint32_t> thirds;
-                                 for (uint32_t cell = 1; cell < all; cell += 3) thirds.push_back(cell);
-                                 if (uniform == 1003) candidates = stage.input(thirds);
-                                 stage.device.run(
-                                     OccupancyPoints{named.space, uniform, occupied, seed, candidates,
-                                                     stage.input(randomBits(stage.random, named.space, share)),
-                                                     stage.outputWords("cells", uniform + occupied),
-                                                     stage.output("positions", 3 * (uniform + occupied), 0)});
-                               }});
+      for (const auto& [uniform, occupied, first] :
+           {std::tuple{all, 0u, 0u}, std::tuple{1003u, 517u, 0u}, std::tuple{1003u, 517u, 777u},
+            std::tuple{0u, 33u, 5u}, std::tuple{17u, 0u, 0u}, std::tuple{0u, 0u, 0u}})
+        tests.cases.push_back(
+            {fmt::format("{}, {} occupied, {} + {} points from {}", named.name, share, uniform, occupied, first),
+             [=, uniform = uniform, occupied = occupied, first = first](Stage& stage) {
+               const uint32_t points = uniform + occupied - first;
+               const uint64_t seed = stage.random.bits();
+               Slice<const uint32_t> candidates;  // all; for many points, every third
+               std::vector<uint32_t> thirds;
+               for (uint32_t cell = 1; cell < all; cell += 3) thirds.push_back(cell);
+               if (uniform == 1003) candidates = stage.input(thirds);
+               stage.device.run(OccupancyPoints{named.space, uniform, occupied, seed, candidates,
+                                                stage.input(randomBits(stage.random, named.space, share)),
+                                                stage.outputWords("cells", points),
+                                                stage.output("positions", 3 * points, 0), first});
+             }});
     }
   return tests;
 }

@@ -17,8 +17,9 @@ struct OccupancyPoints {
   uint64_t seed = 0;                 // differs for every update
   Slice<const uint32_t> candidates;  // optional, cells; else all there are
   Slice<const uint32_t> occupancy;   // bits
-  Slice<uint32_t> cells;             // [uniform + occupied]
-  Slice<float> positions;            // [uniform + occupied][3], grid coordinates
+  Slice<uint32_t> cells;             // [points], at most uniform + occupied - first
+  Slice<float> positions;            // [points][3], grid coordinates
+  uint32_t first = 0;                // of the list: these points are its entries [first, first + points)
 };
 
 // First every cell decays; then grid = max(grid, exp(min(logDensity, 15)) · step) at the chosen cells (which may

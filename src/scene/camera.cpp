@@ -11,6 +11,7 @@ struct LensFacts {
   std::string_view name;
   int parameters;
   bool oneFocal;
+  bool fisheye = false;
 };
 
 constexpr std::array<LensFacts, kLensModelCount> kLenses = {{
@@ -19,13 +20,13 @@ constexpr std::array<LensFacts, kLensModelCount> kLenses = {{
     {"SIMPLE_RADIAL", 4, true},
     {"RADIAL", 5, true},
     {"OPENCV", 8, false},
-    {"OPENCV_FISHEYE", 8, false},
+    {"OPENCV_FISHEYE", 8, false, true},
     {"FULL_OPENCV", 12, false},
     {"FOV", 5, false},
-    {"SIMPLE_RADIAL_FISHEYE", 4, true},
-    {"RADIAL_FISHEYE", 5, true},
-    {"THIN_PRISM_FISHEYE", 12, false},
-    {"RAD_TAN_THIN_PRISM_FISHEYE", 16, false},
+    {"SIMPLE_RADIAL_FISHEYE", 4, true, true},
+    {"RADIAL_FISHEYE", 5, true, true},
+    {"THIN_PRISM_FISHEYE", 12, false, true},
+    {"RAD_TAN_THIN_PRISM_FISHEYE", 16, false, true},
 }};
 
 const LensFacts& factsOf(LensModel model) {
@@ -58,6 +59,10 @@ int lensParameterCount(LensModel model) {
 }
 std::string_view lensName(LensModel model) {
   return factsOf(model).name;
+}
+
+bool lensIsFisheye(LensModel model) {
+  return factsOf(model).fisheye;
 }
 
 std::optional<LensModel> lensFromName(std::string_view name) {

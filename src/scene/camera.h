@@ -15,6 +15,7 @@ namespace tessera {
 int lensParameterCount(LensModel model);
 std::string_view lensName(LensModel model);  // COLMAP's name, "OPENCV_FISHEYE"
 std::optional<LensModel> lensFromName(std::string_view name);
+bool lensIsFisheye(LensModel model);  // may see more than 90° off its axis
 
 struct Camera {
   int width = 0, height = 0;

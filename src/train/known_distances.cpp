@@ -13,7 +13,8 @@ std::vector<std::vector<KnownDistance>> knownDistances(const Capture& capture, c
     const bool inside = observation.x >= 0 && observation.y >= 0 && observation.x < static_cast<float>(camera.width) &&
                         observation.y < static_cast<float>(camera.height);
     const Vec3d offset = point.xInWorld - photo.worldFromCamera.translation;
-    if (!inside || !(offset.dot(photo.worldFromCamera.rotation.col(2)) > 0)) continue;
+    const bool behind = !(offset.dot(photo.worldFromCamera.rotation.col(2)) > 0);
+    if (!inside || (behind && !lensIsFisheye(camera.lens))) continue;
     known[observation.photo].push_back({static_cast<uint32_t>(observation.x), static_cast<uint32_t>(observation.y),
                                         static_cast<float>(offset.norm() * frame.scale)});
   }

@@ -11,8 +11,8 @@ struct KnownDistance {
   float distance = 0;     // from the camera, scene units
 };
 
-// [photo], empty for photos that are not trained on. Observations outside their photo, of points behind its camera, or
-// more than `mostPixelsOff` from their point's image are left out.
+// [photo], empty for photos that are not trained on. Observations outside their photo, of points behind its camera
+// (unless that is a fisheye), or more than `mostPixelsOff` from their point's image are left out.
 std::vector<std::vector<KnownDistance>> knownDistances(const Capture& capture, const SceneFrame& frame,
                                                        double mostPixelsOff);
 

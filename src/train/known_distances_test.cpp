@@ -39,6 +39,15 @@ TEST(KnownDistances, AreFromTheCameraToThePointInSceneUnits) {
   EXPECT_TRUE(known[2].empty());
 }
 
+TEST(KnownDistances, OfAFisheyeReachBehindItsPlane) {
+  Capture capture = threePhotos();
+  capture.cameras[0].lens = LensModel::openCvFisheye;
+  observe(capture, 0, Vec3d(4, 0, -3), 95, 40);
+  const auto known = knownDistances(capture, SceneFrame(), 2);
+  ASSERT_EQ(known[0].size(), 1u);
+  EXPECT_FLOAT_EQ(known[0][0].distance, 5);
+}
+
 TEST(KnownDistances, LeaveOutWhatCannotBeTrusted) {
   Capture capture = threePhotos();
   observe(capture, 0, Vec3d(0, 0, 2), 50, 40, 2.5f);  // too far off

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <unordered_set>
 
 #include "base/error.h"
 
@@ -81,6 +82,7 @@ void ModelFolder::writePlacement(const ModelPlacement& placement, const std::str
       {"method", method},
       {"capture", fs::absolute(placement.capture).lexically_normal().string()},
       {"source_from_world", sourceFromWorld},
+      {"trained_on", placement.trainedOn},
       {"blocks",
        json::array(
            {{{"id", "0"}, {"centre", {centre.x(), centre.y(), centre.z()}}, {"scale", placement.frame.scale}}})}};
@@ -100,24 +102,29 @@ ModelPlacement ModelFolder::readPlacement() const {
       placement.sourceFromWorld(i / 4, i % 4) = parsed.at("source_from_world").at(i).get<double>();
     placement.frame.scale = block.at("scale").get<double>();
     placement.capture = parsed.at("capture").get<std::string>();
+    placement.trainedOn = parsed.at("trained_on").get<std::vector<std::string>>();
     return placement;
   } catch (const json::exception& error) {
     throw Error(path.string(), "", error.what(), "restore the file or train again");
   }
 }
 
-void ModelFolder::writePlan(int64_t steps) const {
-  writeFileAtomically(root_ / "plan.json", json({{"steps", steps}}).dump() + "\n", true);
+void ModelFolder::writePlan(const StepPlan& plan) const {
+  writeFileAtomically(root_ / "plan.json", json({{"steps", plan.steps}, {"made_at", plan.madeAt}}).dump() + "\n", true);
 }
 
-std::optional<int64_t> ModelFolder::readPlan() const {
+std::optional<StepPlan> ModelFolder::readPlan() const {
   const fs::path path = root_ / "plan.json";
   if (!fs::exists(path)) return std::nullopt;
   const json parsed = parseJson(path);
-  if (!parsed.contains("steps") || !parsed["steps"].is_number_integer() || parsed["steps"].get<int64_t>() < 1) {
-    throw Error(path.string(), "steps", "is not a positive whole number", "remove the file");
-  }
-  return parsed["steps"].get<int64_t>();
+  const auto number = [&](const char* key, int64_t fewest) {
+    if (!parsed.is_object() || !parsed.contains(key) || !parsed[key].is_number_integer() ||
+        parsed[key].get<int64_t>() < fewest) {
+      throw Error(path.string(), key, fmt::format("is not a whole number from {} on", fewest), "remove the file");
+    }
+    return parsed[key].get<int64_t>();
+  };
+  return StepPlan{number("steps", 1), number("made_at", 0)};
 }
 
 void ModelFolder::appendMetrics(const json& line) const {
@@ -139,6 +146,43 @@ void ModelFolder::cutMetrics(int64_t step) const {
     }
   }
   writeFileAtomically(metricsPath(), kept);
+}
+
+void requireSameWorld(const ModelFolder& model, const Capture& capture) {
+  const ModelPlacement placement = model.readPlacement();
+  const double off = (capture.sourceFromWorld - placement.sourceFromWorld).norm();
+  if (off <= 1e-9 * placement.sourceFromWorld.norm()) return;
+  throw Error(capture.root.string(), "transforms.json",
+              fmt::format("its world is not the one of {}, which was trained on {}", model.root().string(),
+                          placement.capture.string()),
+              "use that capture, or train on this one");
+}
+
+void requireTrainedOn(const ModelFolder& model, const Capture& capture) {
+  requireSameWorld(model, capture);
+  const std::vector<std::string> before = model.readPlacement().trainedOn, now = trainingNames(capture);
+  if (now == before) return;
+  const auto [was, is] = std::mismatch(before.begin(), before.end(), now.begin(), now.end());
+  throw Error(capture.root.string(), "transforms.json",
+              fmt::format("{} was trained on other photos: {} of them, not {}; '{}' is the first that differs",
+                          model.root().string(), before.size(), now.size(), was != before.end() ? *was : *is),
+              "resume with the same capture, or train into another folder");
+}
+
+std::vector<std::string> trainedOnAmong(const ModelFolder& model, const Capture& capture, Split split) {
+  const std::vector<std::string> names = model.readPlacement().trainedOn;
+  const std::unordered_set<std::string> trainedOn(names.begin(), names.end());
+  std::vector<std::string> found;
+  for (const int photo : capture.photosIn(split)) {
+    if (trainedOn.contains(capture.photos[photo].name)) found.push_back(capture.photos[photo].name);
+  }
+  return found;
+}
+
+std::vector<std::string> trainingNames(const Capture& capture) {
+  std::vector<std::string> names;
+  for (const int photo : capture.photosIn(Split::train)) names.push_back(capture.photos[photo].name);
+  return names;
 }
 
 }  // namespace tessera

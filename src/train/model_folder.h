@@ -17,10 +17,19 @@ struct ModelManifest {
   std::vector<std::string> files;  // relative, one per block
 };
 
+// The number of steps that `--minutes` came to. The steps before `madeAt` were done without knowing it, and are done so
+// again when they have to be repeated.
+struct StepPlan {
+  int64_t steps = 0, madeAt = 0;
+
+  bool operator==(const StepPlan&) const = default;
+};
+
 struct ModelPlacement {
   SceneFrame frame;
   Mat4d sourceFromWorld = Mat4d::Identity();  // of the capture: camera paths speak of the source's world
   fs::path capture;
+  std::vector<std::string> trainedOn;  // names of photos, in the capture's order
 };
 
 class ModelFolder {
@@ -40,10 +49,9 @@ class ModelFolder {
   void writePlacement(const ModelPlacement& placement, const std::string& method) const;
   ModelPlacement readPlacement() const;
 
-  // The number of steps that `--minutes` came to; kept apart from checkpoints so that it survives a kill before the
-  // next.
-  void writePlan(int64_t steps) const;
-  std::optional<int64_t> readPlan() const;
+  // Kept apart from checkpoints so that it survives a kill before the next.
+  void writePlan(const StepPlan& plan) const;
+  std::optional<StepPlan> readPlan() const;
 
   // Appends one JSON object as a line. `cutMetrics` drops lines of steps after `step` (what a killed run had done since
   // its last checkpoint).
@@ -53,5 +61,14 @@ class ModelFolder {
  private:
   fs::path root_;
 };
+
+// Throws Error when the capture's world is not the one that the model lies in: poses would mean other places.
+void requireSameWorld(const ModelFolder& model, const Capture& capture);
+// Throws Error also when the model was trained on other photos.
+void requireTrainedOn(const ModelFolder& model, const Capture& capture);
+// The photos of `split` that the model was trained on.
+std::vector<std::string> trainedOnAmong(const ModelFolder& model, const Capture& capture, Split split);
+
+std::vector<std::string> trainingNames(const Capture& capture);
 
 }  // namespace tessera

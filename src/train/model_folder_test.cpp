@@ -127,12 +127,46 @@ TEST(ModelFolder, KnowsWhereInTheWorldItStands) {
   placement.frame = {{1.0 / 3, -200.125, 3e-9}, 0.1 + 0.2};
   placement.sourceFromWorld << 0, -2, 0, 500000.25, 2, 0, 0, 4.5e6, 0, 0, 2, 12, 0, 0, 0, 1;
   placement.capture = "some/../capture";
+  placement.trainedOn = {"cam0/1.jpg", "Straße \"7\".png"};
   model.writePlacement(placement, "field");
   const ModelPlacement read = model.readPlacement();
   EXPECT_EQ(read.frame.centre, placement.frame.centre);
   EXPECT_EQ(read.frame.scale, placement.frame.scale);
   EXPECT_EQ(read.sourceFromWorld, placement.sourceFromWorld);
   EXPECT_EQ(read.capture, fs::absolute("capture"));
+  EXPECT_EQ(read.trainedOn, placement.trainedOn);
+}
+
+TEST(ModelFolder, KnowsTheCaptureThatItWasTrainedOn) {
+  const TestFolder folder;
+  const ModelFolder model(folder.path());
+  Capture capture;
+  capture.root = "flight";
+  capture.sourceFromWorld(0, 3) = 500000.25;
+  capture.photos.resize(3);
+  for (int i = 0; i < 3; ++i) capture.photos[i].name = std::string(1, static_cast<char>('a' + i));
+  capture.photos[1].split = Split::test;
+  ModelPlacement placement;
+  placement.sourceFromWorld = capture.sourceFromWorld;
+  placement.capture = capture.root;
+  placement.trainedOn = trainingNames(capture);
+  EXPECT_EQ(placement.trainedOn, (std::vector<std::string>{"a", "c"}));
+  model.writePlacement(placement, "field");
+  requireTrainedOn(model, capture);
+  EXPECT_TRUE(trainedOnAmong(model, capture, Split::test).empty());
+
+  capture.photos[1].split = Split::train;
+  capture.photos[2].split = Split::test;
+  EXPECT_EQ(trainedOnAmong(model, capture, Split::test), std::vector<std::string>{"c"});
+  requireSameWorld(model, capture);
+  EXPECT_TRUE(contains(errorOf([&] { requireTrainedOn(model, capture); }), "'c' is the first that differs"));
+  capture.photos[2].split = Split::train;
+  EXPECT_TRUE(contains(errorOf([&] { requireTrainedOn(model, capture); }), "2 of them, not 3"));
+  capture.photos.resize(1);
+  EXPECT_TRUE(contains(errorOf([&] { requireTrainedOn(model, capture); }), "'c' is the first that differs"));
+
+  capture.sourceFromWorld(0, 3) += 0.25;
+  EXPECT_TRUE(contains(errorOf([&] { requireSameWorld(model, capture); }), "flight: transforms.json"));
 }
 
 TEST(ModelFolder, RefusesPlacementsThatItCannotUnderstand) {
@@ -149,9 +183,11 @@ TEST(ModelFolder, RemembersItsPlan) {
   const TestFolder folder;
   const ModelFolder model(folder.path());
   EXPECT_FALSE(model.readPlan());
-  model.writePlan(123456789012);
-  EXPECT_EQ(model.readPlan(), 123456789012);
-  for (const char* text : {"{}", R"({"steps": 0})", R"({"steps": "many"})", R"({"steps": 1.5})", "3", ""}) {
+  model.writePlan({123456789012, 345});
+  EXPECT_EQ(model.readPlan(), (StepPlan{123456789012, 345}));
+  for (const char* text :
+       {"{}", R"({"steps": 0, "made_at": 1})", R"({"steps": "many", "made_at": 1})", R"({"steps": 9})",
+        R"({"steps": 1.5, "made_at": 1})", R"({"steps": 9, "made_at": -1})", "3", ""}) {
     writeFileAtomically(folder / "plan.json", text);
     EXPECT_TRUE(contains(errorOf([&] { model.readPlan(); }), "plan.json")) << text;
   }

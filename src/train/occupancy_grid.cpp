@@ -35,14 +35,15 @@ void OccupancyGrid::update(const LogDensity& logDensity, uint32_t uniform, uint3
   const uint32_t points = uniform + occupied;
   if (chosen_.size() < points) {
     chosen_ = device_.array<uint32_t>(points);
-    positions_ = device_.array<float>(size_t{points} * 3);
     logDensities_ = device_.array<float>(points);
   }
-  device_.run(OccupancyPoints{space_, uniform, occupied, seed, candidates_, bits_, chosen_, positions_});
+  if (positions_.size() < size_t{chunk} * 3) positions_ = device_.array<float>(size_t{chunk} * 3);
   for (uint32_t first = 0; first < points; first += chunk) {
     const uint32_t count = std::min(chunk, points - first);
-    logDensity({count, {}}, positions_.part(size_t{first} * 3, size_t{count} * 3),
-               Matrix<float>(logDensities_.part(first, count), 1));
+    const Slice<float> positions = positions_.part(0, size_t{count} * 3);
+    device_.run(OccupancyPoints{space_, uniform, occupied, seed, candidates_, bits_, chosen_.part(first, count),
+                                positions, first});
+    logDensity({count, {}}, positions, Matrix<float>(logDensities_.part(first, count), 1));
   }
   OccupancyUpdate update{space_};
   update.points = points;

@@ -37,7 +37,8 @@ class OccupancyGrid {
   Array<uint32_t> bits_;
   Array<uint32_t> candidates_;  // the visible cells, unless all are
   Array<uint32_t> chosen_;
-  Array<float> positions_, logDensities_;
+  Array<float> positions_;  // of one chunk
+  Array<float> logDensities_;
 };
 
 }  // namespace tessera

@@ -10,7 +10,7 @@ namespace tessera {
 namespace {
 
 // What the cache counts for a photo: its channels, as the head of the file says, and a mask.
-size_t decodedBytes(const Capture& capture, const Photo& photo) {
+size_t decodedBytesOf(const Capture& capture, const Photo& photo) {
   const Camera& camera = capture.cameras[photo.camera];
   const int channels = probeImageFile(photo.image).channels + (photo.mask.empty() ? 0 : 1);
   return static_cast<size_t>(camera.width) * camera.height * static_cast<size_t>(channels);
@@ -20,6 +20,12 @@ constexpr size_t kUnlimited = size_t{1} << 60;
 
 }  // namespace
 
+size_t decodedBytes(const Capture& capture, const std::vector<int>& photos) {
+  size_t total = 0;
+  for (const int photo : photos) total += decodedBytesOf(capture, capture.photos[photo]);
+  return total;
+}
+
 PhotoWindow::PhotoWindow(const Capture& capture, std::vector<int> photos, const Settings& settings)
     : cache_(capture, static_cast<int64_t>(settings.budgetBytes ? settings.budgetBytes : kUnlimited)),
       photos_(std::move(photos)),
@@ -28,7 +34,7 @@ PhotoWindow::PhotoWindow(const Capture& capture, std::vector<int> photos, const 
   size_t total = 0, largest = 1;
   if (settings.budgetBytes > 0) {
     for (const int photo : photos_) {
-      const size_t bytes = decodedBytes(capture, capture.photos[photo]);
+      const size_t bytes = decodedBytesOf(capture, capture.photos[photo]);
       total += bytes;
       largest = std::max(largest, bytes);
     }

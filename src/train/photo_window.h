@@ -9,6 +9,9 @@
 
 namespace tessera {
 
+// Of these photos when decoded, masks included, as the heads of the files say.
+size_t decodedBytes(const Capture& capture, const std::vector<int>& photos);
+
 class PhotoWindow {
  public:
   struct Settings {

@@ -47,8 +47,13 @@ nlohmann::json metricsLine(int64_t step, double seconds, const Window& window) {
           {"peak_rss_bytes", peakResidentBytes()}};
 }
 
-// Step and plan to go on from.
-ModelManifest startingPoint(Trainee& trainee, const ModelFolder& folder, const TrainingLoopOptions& options) {
+// Where to go on from.
+struct Start {
+  ModelManifest state;
+  int64_t planMadeAt = 0;  // see StepPlan
+};
+
+Start startingPoint(Trainee& trainee, const ModelFolder& folder, const TrainingLoopOptions& options) {
   ModelManifest state;
   state.method = options.method;
   const std::optional<ModelManifest> found = folder.manifest();
@@ -70,18 +75,19 @@ ModelManifest startingPoint(Trainee& trainee, const ModelFolder& folder, const T
     folder.cutMetrics(-1);
   }
   if (options.minutes > 0) {
-    if (options.resume) state.plannedSteps = folder.readPlan().value_or(0);
-  } else {
-    state.plannedSteps = options.steps;
+    const StepPlan plan = options.resume ? folder.readPlan().value_or(StepPlan()) : StepPlan();
+    state.plannedSteps = plan.steps;
+    return {state, plan.madeAt};
   }
-  return state;
+  state.plannedSteps = options.steps;
+  return {state, 0};
 }
 
 }  // namespace
 
 TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const TrainingLoopOptions& options) {
   using Clock = std::chrono::steady_clock;
-  ModelManifest state = startingPoint(trainee, folder, options);
+  auto [state, planMadeAt] = startingPoint(trainee, folder, options);
   if (!options.resume) fs::remove(folder.root() / "plan.json");
   const auto start = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
@@ -99,7 +105,7 @@ TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const Tr
   };
   const auto unfinished = [&] { return state.plannedSteps == 0 || state.step < state.plannedSteps; };
   while (unfinished() && !options.stopRequested()) {
-    const StepReport report = trainee.step(state.step, state.plannedSteps);
+    const StepReport report = trainee.step(state.step, state.step < planMadeAt ? 0 : state.plannedSteps);
     if (!std::isfinite(report.loss)) {
       throw Error(folder.root().string(), fmt::format("step {}, block 0", state.step), "the loss is not a number",
                   "train into another folder with a lower --set rate=..., and report it with the capture");
@@ -112,7 +118,8 @@ TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const Tr
       state.plannedSteps = budget.observe(state.step - firstStep, now);
       if (state.plannedSteps != 0) {
         state.plannedSteps += firstStep;
-        folder.writePlan(state.plannedSteps);
+        planMadeAt = state.step;
+        folder.writePlan({state.plannedSteps, planMadeAt});
         if (progress) progress->setTotal(state.plannedSteps);
       }
     }

@@ -112,7 +112,7 @@ TEST_F(TrainingLoop, WritesMetricsWithEverythingInThem) {
 TEST_F(TrainingLoop, DoesNotTouchAModelUnlessToldToGoOn) {
   FakeTrainee first, second;
   runTraining(first, folder_, options(3));
-  folder_.writePlan(99);
+  folder_.writePlan({99, 9});
   const Bytes before = checkpoint(folder_);
   const std::string metrics = readTextFile(folder_.metricsPath());
   try {
@@ -125,7 +125,7 @@ TEST_F(TrainingLoop, DoesNotTouchAModelUnlessToldToGoOn) {
   EXPECT_TRUE(second.steps.empty());
   EXPECT_EQ(checkpoint(folder_), before);
   EXPECT_EQ(readTextFile(folder_.metricsPath()), metrics);
-  EXPECT_EQ(folder_.readPlan(), 99);
+  EXPECT_EQ(folder_.readPlan(), (StepPlan{99, 9}));
 }
 
 TEST_F(TrainingLoop, ResumesToTheSameEndAsAnUnbrokenRun) {
@@ -255,7 +255,7 @@ TEST_F(TrainingLoop, FixesTheStepsOfItsMinutesOnceAndRemembersThem) {
   EXPECT_GT(result.plannedSteps, 128);
   EXPECT_EQ(result.step, result.plannedSteps);
   EXPECT_LT(result.seconds, 4);
-  EXPECT_EQ(folder_.readPlan(), result.plannedSteps);
+  EXPECT_EQ(folder_.readPlan()->steps, result.plannedSteps);
   // Not known at first; from then on always the same.
   EXPECT_EQ(trainee.planned.front(), 0);
   EXPECT_EQ(trainee.planned.back(), result.plannedSteps);
@@ -290,18 +290,22 @@ TEST_F(TrainingLoop, UsesThePlanOfARunThatWasKilledBeforeItsFirstCheckpoint) {
   };
   EXPECT_THROW(runTraining(first, folder_, some), std::runtime_error);
   ASSERT_FALSE(folder_.manifest());
-  const int64_t plan = folder_.readPlan().value_or(0);
-  ASSERT_GT(plan, 0);
+  const StepPlan plan = folder_.readPlan().value_or(StepPlan());
+  ASSERT_GT(plan.steps, 0);
+  ASSERT_GT(plan.madeAt, 0);
   some.stopRequested = [] { return false; };
   some.resume = true;
   FakeTrainee second;
-  EXPECT_EQ(runTraining(second, folder_, some).step, plan);
-  EXPECT_EQ(second.planned.front(), plan);
+  EXPECT_EQ(runTraining(second, folder_, some).step, plan.steps);
+  // The steps of the killed run again, as it did them.
+  for (size_t i = 0; i < second.steps.size(); ++i) {
+    ASSERT_EQ(second.planned[i], second.steps[i] < plan.madeAt ? 0 : plan.steps) << second.steps[i];
+  }
 }
 
 TEST_F(TrainingLoop, MakesANewPlanWhenItBeginsAnew) {
   fs::create_directories(folder_.root());
-  folder_.writePlan(7);
+  folder_.writePlan({7, 3});
   FakeTrainee trainee;
   TrainingLoopOptions some = options(0);
   some.minutes = 0.05 / 60;

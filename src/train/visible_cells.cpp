@@ -42,9 +42,14 @@ struct View {
   double slack;  // pixels beyond the border that still count
 };
 
+// Along the optical axis; along the ray for fisheyes, which see behind that plane.
+double depthOf(const Camera& camera, const Vec3d& xInCamera) {
+  return lensIsFisheye(camera.lens) ? xInCamera.norm() : xInCamera.z();
+}
+
 bool sees(const View& view, const Vec3d& xInWorld) {
   const Vec3d x = view.cameraFromWorld * xInWorld;
-  if (x.z() < view.near) return false;
+  if (depthOf(*view.camera, x) < view.near) return false;
   const std::optional<Vec2d> pixel = view.camera->pixelFromCamera(x);
   return pixel && pixel->x() > -view.slack && pixel->y() > -view.slack &&
          pixel->x() < view.camera->width + view.slack && pixel->y() < view.camera->height + view.slack;
@@ -55,8 +60,9 @@ bool sees(const View& view, const Vec3d& xInWorld) {
 std::vector<double> nearestContent(const Capture& capture) {
   std::vector<std::vector<double>> depths(capture.photos.size());
   for (const Observation& observation : capture.observations) {
-    const Pose& pose = capture.photos[observation.photo].worldFromCamera;
-    const double depth = (capture.points[observation.point].xInWorld - pose.translation).dot(pose.rotation.col(2));
+    const Photo& photo = capture.photos[observation.photo];
+    const double depth = depthOf(capture.cameras[photo.camera],
+                                 photo.worldFromCamera.inverse() * capture.points[observation.point].xInWorld);
     if (depth > 0) depths[observation.photo].push_back(depth);
   }
   std::vector<double> nearest(capture.photos.size(), 0.0);

@@ -13,8 +13,8 @@ namespace tessera {
 // (the free space below drones and in front of cameras then stays free); else the march's near.
 std::vector<bool> visibleCells(const Capture& capture, const SceneFrame& frame, const MarchSpace& space);
 
-// Per photo, the depth along the optical axis before which nothing was observed, in world units; 0 with fewer than
-// 20 observations.
+// Per photo, the depth before which nothing was observed, in world units: along the optical axis, for fisheyes along
+// the ray. 0 with fewer than 20 observations.
 std::vector<double> nearestContent(const Capture& capture);
 
 }  // namespace tessera

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "base/random.h"
 
@@ -86,6 +87,29 @@ TEST(VisibleCells, KeepFreeWhatIsNearerThanAnythingObserved) {
   const std::vector<bool> cells = visibleCells(capture, SceneFrame(), march);
   EXPECT_FALSE(at(cells, march, inside(march, 0.05, 0.2, 0.05)));
   EXPECT_TRUE(at(cells, march, inside(march, 0.05, 0.6, 0.05)));
+}
+
+TEST(VisibleCells, ReachBehindAFisheyeThatSeesMoreThanHalfOfTheSphere) {
+  Capture capture = lookingAlongY();
+  capture.cameras[0].lens = LensModel::openCvFisheye;
+  capture.cameras[0].parameters = {40, 40, 50, 50};  // 107 degrees to where it is looked a little past the border
+  const MarchSpace march = space(true);
+  const auto isSeen = [&](double x, double y, double z) {
+    return at(visibleCells(capture, SceneFrame(), march), march, inside(march, x, y, z));
+  };
+  EXPECT_TRUE(isSeen(0.05, 0.8, 0.05));
+  EXPECT_TRUE(isSeen(0.8, 0.05, 0.05));
+  EXPECT_TRUE(isSeen(0.8, -0.1, 0.05));  // behind the plane at right angles to the axis
+  EXPECT_FALSE(at(visibleCells(capture, SceneFrame(), march), march, Vec3d(0.51, 0.01, 0.51)));  // right behind
+  // What is nearer than anything observed, on a ring at right angles to the axis and on one behind it.
+  for (uint32_t i = 0; i < 100; ++i) {
+    const double angle = 0.0628 * i;
+    capture.points.push_back({Vec3d(std::cos(angle), i % 2 ? 0.0 : -0.3, std::sin(angle)), {}, 0});
+    capture.observations.push_back({0, i, 50, 50, 0});
+  }
+  EXPECT_NEAR(nearestContent(capture)[0], 1, 0.05);
+  EXPECT_FALSE(isSeen(0.4, -0.1, 0.05));
+  EXPECT_TRUE(isSeen(0.95, -0.1, 0.05));
 }
 
 TEST(NearestContent, IsUnknownWithFewObservations) {

@@ -41,12 +41,12 @@ void run(Context& context, const OccupancyPoints& a) {
   const uint32_t* bits = hostPointer(a.occupancy);
   uint32_t* chosen = hostPointer(a.cells);
   float* positions = hostPointer(a.positions);
-  context.pool.forRanges(a.uniform + a.occupied, kGrain, [&](size_t begin, size_t end) {
+  context.pool.forRanges(a.cells.count, kGrain, [&](size_t begin, size_t end) {
     for (size_t p = begin; p < end; ++p) {
-      const uint64_t index = 16 * p;
+      const uint64_t point = a.first + p, index = 16 * point;
       uint32_t cell;
-      if (p < a.uniform) {
-        cell = cellOf(a.uniform == all ? static_cast<uint32_t>(p) : random.below(index, all));
+      if (point < a.uniform) {
+        cell = cellOf(a.uniform == all ? static_cast<uint32_t>(point) : random.below(index, all));
       } else {
         cell = cellOf(random.below(index, all));
         for (int attempt = 1; attempt < 10 && !bitAt(bits, cell); ++attempt)

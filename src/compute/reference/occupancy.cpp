@@ -76,11 +76,10 @@ void occupancyUpdate(const MarchSpace& space, double decay, double threshold, In
 
 void run(const OccupancyPoints& a) {
   const OccupancyChoice choice =
-      occupancyPoints(a.space, a.uniform, a.occupied, a.seed,
-                                                 indices(a.candidates, a.candidates.count),
-                                                 indices(a.occupancy, a.occupancy.count));
-  std::copy(choice.cells.begin(), choice.cells.end(), hostPointer(a.cells));
-  std::copy(choice.positions.begin(), choice.positions.end(), hostPointer(a.positions));
+      occupancyPoints(a.space, a.uniform, a.occupied, a.seed, indices(a.candidates, a.candidates.count),
+                      indices(a.occupancy, a.occupancy.count));
+  std::copy_n(choice.cells.begin() + a.first, a.cells.count, hostPointer(a.cells));
+  std::copy_n(choice.positions.begin() + 3 * size_t{a.first}, 3 * a.cells.count, hostPointer(a.positions));
 }
 
 void run(const OccupancyUpdate& a) {

@@ -80,6 +80,35 @@ TEST(TrainField, StaysInItsFrameWhenTheCaptureHasChanged) {
   EXPECT_EQ(ModelFolder(scene / "model").manifest()->step, 5);
 }
 
+TEST(TrainField, GoesOnOnlyWithTheCaptureThatItBeganWith) {
+  CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  trainField(*device, scene.capture(), scene / "model", options(3));
+  const Bytes before = checkpoint(scene / "model");
+  scene.capture().photos[0].split = Split::test;
+  EXPECT_THROW(trainField(*device, scene.capture(), scene / "model", options(5, true)), Error);
+  EXPECT_EQ(checkpoint(scene / "model"), before);
+  scene.capture().photos[0].split = Split::train;
+  trainField(*device, scene.capture(), scene / "model", options(5, true));
+  EXPECT_EQ(ModelFolder(scene / "model").manifest()->step, 5);
+}
+
+TEST(TrainField, GivesPhotosHalfOfTheMemoryWhereAllDoNotFit) {
+  const CubeScene scene;
+  const std::vector<int> photos = scene.capture().photosIn(Split::train);
+  const int64_t all = static_cast<int64_t>(photos.size()) * CubeScene::kWidth * CubeScene::kHeight * 4;
+  ASSERT_EQ(decodedBytes(scene.capture(), photos), static_cast<size_t>(all));
+  FieldConfig config;
+  settlePhotoBudget(config, scene.capture(), 2 * all);
+  EXPECT_EQ(config.photoBudgetMiB, 0);
+  settlePhotoBudget(config, scene.capture(), 2 * all - 2);
+  EXPECT_GT(config.photoBudgetMiB, 0);
+  EXPECT_LE(config.photoBudgetMiB * 1048576, static_cast<double>(all) - 1);
+  config.photoBudgetMiB = 0.5;
+  settlePhotoBudget(config, scene.capture(), 1000);
+  EXPECT_EQ(config.photoBudgetMiB, 0.5);
+}
+
 TEST(TrainField, NamesACheckpointThatIsBroken) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
