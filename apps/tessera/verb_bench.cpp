@@ -24,7 +24,10 @@ void printRoofline(const Roofline& roofline) {
   fmt::print("{}\n\nlimits, measured now\n", roofline.device);
   if (roofline.limits.flops > 0) {
     fmt::print("  {:<44} {}\n", "multiply-adds on registers", scaled(roofline.limits.flops, "FLOP"));
-    fmt::print("  {:<44} {}\n", "large copy, read + written", scaled(roofline.limits.streamBytes, "B"));
+    for (const MachineLimits::Stream& stream : roofline.limits.streams) {
+      fmt::print("  {:<44} {}\n", fmt::format("copy within {:.0f} KiB, read + written", stream.bytes / 1024.0),
+                 scaled(stream.rate, "B"));
+    }
     for (const MachineLimits::Gather& gather : roofline.limits.gathers) {
       fmt::print("  {:<44} {}\n", fmt::format("random 8-byte loads from {:.0f} KiB", gather.tableBytes / 1024.0),
                  scaled(gather.lookups, "lookup"));
@@ -40,11 +43,15 @@ void printRoofline(const Roofline& roofline) {
   fmt::print(
       "\nBest of several runs each. Networks count 2 x weights x samples forward and twice that backward; the hash\n"
       "grid 8 x levels x samples lookups against random gathers from tables of the same sizes; all others the bytes\n"
-      "of their arguments, each once. Points on rays revisit what the cache still holds and may pass the limit.\n");
+      "of their arguments, each once, against a copy of the same size. Points on rays revisit what the cache still "
+      "holds and may pass the limit.\n");
 }
 
 ordered_json toJson(const Roofline& roofline) {
-  ordered_json gathers = ordered_json::array(), rows = ordered_json::array();
+  ordered_json streams = ordered_json::array(), gathers = ordered_json::array(), rows = ordered_json::array();
+  for (const MachineLimits::Stream& stream : roofline.limits.streams) {
+    streams.push_back({{"footprint_bytes", stream.bytes}, {"bytes_per_second", stream.rate}});
+  }
   for (const MachineLimits::Gather& gather : roofline.limits.gathers) {
     gathers.push_back({{"table_bytes", gather.tableBytes}, {"lookups_per_second", gather.lookups}});
   }
@@ -59,7 +66,7 @@ ordered_json toJson(const Roofline& roofline) {
   }
   return {{"device", roofline.device},
           {"flops_per_second", roofline.limits.flops},
-          {"stream_bytes_per_second", roofline.limits.streamBytes},
+          {"streams", streams},
           {"gathers", gathers},
           {"operations", rows}};
 }

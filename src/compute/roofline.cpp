@@ -1,6 +1,7 @@
 #include "compute/roofline.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -15,7 +16,6 @@ namespace {
 MachineLimits measureLimits(ThreadPool& pool, const HashGrid& grid) {
   MachineLimits limits;
   limits.flops = cpu::peakFlops(pool);
-  limits.streamBytes = cpu::streamRate(pool);
   std::map<size_t, int> tables;
   for (const HashGridLevel& level : grid.levels) ++tables[size_t{level.entries} * grid.features * sizeof(float)];
   for (const auto& [bytes, count] : tables) limits.gathers.push_back({bytes, cpu::gatherRate(pool, bytes, count)});
@@ -25,7 +25,6 @@ MachineLimits measureLimits(ThreadPool& pool, const HashGrid& grid) {
 // The higher of two measurements: a limit taken in a disturbed moment would flatter every share.
 void raise(MachineLimits& limits, const MachineLimits& again) {
   limits.flops = std::max(limits.flops, again.flops);
-  limits.streamBytes = std::max(limits.streamBytes, again.streamBytes);
   for (size_t i = 0; i < limits.gathers.size(); ++i) {
     limits.gathers[i].lookups = std::max(limits.gathers[i].lookups, again.gathers[i].lookups);
   }
@@ -54,7 +53,18 @@ void RooflineRecorder::measure(Operation operation, Work work, const std::functi
 void RooflineRecorder::measureStream(Operation operation, std::string shape, double bytes,
                                      const std::function<void()>& run) {
   const std::string name(kOperationNames[static_cast<int>(operation)]);
-  measure(operation, {name, std::move(shape), bytes, "B", limits_.streamBytes}, run);
+  measure(operation, {name, std::move(shape), bytes, "B", streamLimit(bytes)}, run);
+}
+
+double RooflineRecorder::streamLimit(double bytes) {
+  if (!pool_) return 0;
+  const size_t footprint = std::clamp(std::bit_ceil(static_cast<size_t>(bytes)), size_t{1} << 16, size_t{1} << 29);
+  const auto place = std::lower_bound(limits_.streams.begin(), limits_.streams.end(), footprint,
+                                      [](const MachineLimits::Stream& a, size_t b) { return a.bytes < b; });
+  if (place != limits_.streams.end() && place->bytes == footprint) return place->rate;
+  const double rate = std::max(cpu::streamRate(*pool_, footprint), cpu::streamRate(*pool_, footprint));
+  limits_.streams.insert(place, {footprint, rate});
+  return rate;
 }
 
 Array<float> RooflineRecorder::randomFloats(size_t count, float low, float high) {
@@ -97,7 +107,7 @@ Roofline measureRoofline(const RooflineOptions& options) {
     result.limits = measureLimits(*pool, grid);
     raise(result.limits, measureLimits(*pool, grid));
   }
-  RooflineRecorder recorder(*device, options, result.limits);
+  RooflineRecorder recorder(*device, pool.get(), options, result.limits);
   measureNetworks(recorder);
   measureHashGrids(recorder, grid);
   measureSampleStreams(recorder);

@@ -4,7 +4,8 @@
 //   networks       2 · parameters · samples forward (a multiply and an add a weight), twice that backward (the gradient
 //                  of the weights and that of the inputs); padding of inputs and outputs is not counted
 //   hash grid      8 corners · levels · samples lookups, forward (read) as backward (read, add, write)
-//   all others     bytes of their arguments, each array once however often a kernel passes over it
+//   all others     bytes of their arguments, each array once however often a kernel passes over it; the limit is a copy
+//                  of the same footprint (to the next power of two)
 //
 // The limit of the hash grid is the gather rate of tables of the same sizes, level by level: lookups / Σ (lookups of a
 // level / rate of its size). Ray-like positions revisit cells that the cache still holds and may pass it.
@@ -27,8 +28,12 @@ struct RooflineOptions {
 
 // Of all threads together. Zero where it is not measured: any device but the processor.
 struct MachineLimits {
-  double flops = 0;        // multiply-adds on registers, 2 operations each, per second
-  double streamBytes = 0;  // read + written per second by a large copy
+  double flops = 0;  // multiply-adds on registers, 2 operations each, per second
+  struct Stream {
+    size_t bytes = 0;  // footprint: half of it is copied to the other half
+    double rate = 0;   // bytes read + written per second
+  };
+  std::vector<Stream> streams;  // by footprint
   struct Gather {
     size_t tableBytes = 0;
     double lookups = 0;  // 8-byte loads at random places per second

@@ -3,14 +3,16 @@
 
 #include <functional>
 
+#include "base/threads.h"
 #include "compute/roofline.h"
 
 namespace tessera {
 
 class RooflineRecorder {
  public:
-  RooflineRecorder(Device& device, const RooflineOptions& options, const MachineLimits& limits)
-      : device_(device), options_(options), limits_(limits) {}
+  // `pool` measures the limits of streams, which are added to `limits`; none where the device is not the processor.
+  RooflineRecorder(Device& device, ThreadPool* pool, const RooflineOptions& options, MachineLimits& limits)
+      : device_(device), pool_(pool), options_(options), limits_(limits) {}
 
   struct Work {
     std::string name, shape;
@@ -31,9 +33,12 @@ class RooflineRecorder {
   Array<float> randomFloats(size_t count, float low, float high);
 
  private:
+  double streamLimit(double bytes);
+
   Device& device_;
+  ThreadPool* pool_;
   const RooflineOptions& options_;
-  const MachineLimits& limits_;
+  MachineLimits& limits_;
   std::vector<RooflineRow> rows_;
   uint64_t arrays_ = 0;
 };

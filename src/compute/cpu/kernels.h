@@ -22,7 +22,7 @@ const char* simdTarget();  // the instruction set chosen at run time: "SSE4", "A
 double peakFlops(ThreadPool& pool);
 // 8-byte loads per second at random places of a table of `bytes`, indices streamed from memory, all threads together.
 double gatherRate(ThreadPool& pool, size_t bytes, int tables);
-// Bytes per second, read + written, of a large copy.
-double streamRate(ThreadPool& pool);
+// Bytes per second, read + written, of copies from one half of `bytes` to the other, all threads together.
+double streamRate(ThreadPool& pool, size_t bytes);
 
 }  // namespace tessera::cpu
