@@ -145,6 +145,22 @@ TEST_F(Import, FailsWhenNothingIsLeft) {
   EXPECT_FALSE(fs::exists(out_ / "transforms.json"));
 }
 
+TEST_F(Import, DropsPanoramasAndFailsWhenThereIsNothingElse) {
+  for (const char* name : {"a.png", "b.png"}) writePng(source_ / "images" / name, gradientPicture(16, 8));
+  const fs::path model = source_ / "sparse/0";
+  writeFileAtomically(model / "images.txt", std::string_view("1 1 0 0 0 0 0 0 1 a.png\n\n2 1 0 0 0 1 0 0 2 b.png\n\n"));
+  writeFileAtomically(model / "cameras.txt",
+                      std::string_view("1 EQUIRECTANGULAR 16 8 16 8\n2 EUCM 16 8 9 9 8 4 0.6 1.1\n"));
+  const Capture capture = run();
+  ASSERT_EQ(capture.photos.size(), 1u);
+  EXPECT_EQ(capture.cameras.at(0).lens, LensModel::eucm);
+  EXPECT_EQ(readCapture(out_).cameras, capture.cameras);
+  EXPECT_TRUE(logged("1 photos were taken with the lens EQUIRECTANGULAR")) << log_;
+  writeFileAtomically(model / "cameras.txt",
+                      std::string_view("1 EQUIRECTANGULAR 16 8 16 8\n2 EQUIRECTANGULAR 16 8 16 8\n"));
+  EXPECT_THROW(run(), Error);
+}
+
 TEST_F(Import, BringsMasksAndDepthsAlong) {
   add("images/a.png", 16, 12, R"(,"mask_path":"masks/a.png","depth_file_path":"depth/a.exr")");
   add("images/b.png", 16, 12, R"(,"mask_path":"masks/missing.png")");
