@@ -15,6 +15,11 @@ namespace {
 // Models that are special cases of another, and one that is not a lens with a focal length.
 constexpr int kSimpleFisheye = 14, kFisheye = 15, kEquirectangular = 17;
 constexpr uint64_t kMaxSide = 1 << 20;
+constexpr double kFarthest = 1e12;  // what lies beyond is no place, and its square or product may not be a number
+
+bool isPlace(const Vec3d& x) {
+  return (x.array().abs() < kFarthest).all();  // false for NaN too
+}
 
 std::optional<Camera> checkedCamera(LensModel lens, uint64_t width, uint64_t height, std::span<const double> parameters,
                                     std::string& reason) {
@@ -31,9 +36,9 @@ std::optional<Camera> checkedCamera(LensModel lens, uint64_t width, uint64_t hei
   camera.height = static_cast<int>(height);
   camera.lens = lens;
   std::copy(parameters.begin(), parameters.end(), camera.parameters.begin());
-  const bool finite = std::all_of(parameters.begin(), parameters.end(), [](double p) { return std::isfinite(p); });
-  if (!finite || !(camera.focalX() > 0) || !(camera.focalY() > 0)) {
-    reason = "its parameters are not finite, or its focal length is not positive";
+  const bool sane = std::all_of(parameters.begin(), parameters.end(), [](double p) { return std::abs(p) < kFarthest; });
+  if (!sane || !(camera.focalX() > 0) || !(camera.focalY() > 0)) {
+    reason = "its parameters are not finite or absurd, or its focal length is not positive";
     return std::nullopt;
   }
   if (lens == LensModel::eucm && !(parameters[4] >= 0 && parameters[4] <= 1 && parameters[5] > 0)) {
@@ -47,7 +52,7 @@ std::optional<Pose> poseOf(const ColmapModel::Image& image) {
   const auto& q = image.quaternion;
   const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   const Vec3d t(image.translation[0], image.translation[1], image.translation[2]);
-  if (!std::isfinite(norm) || norm < 1e-6 || !t.allFinite()) return std::nullopt;
+  if (!std::isfinite(norm) || norm < 1e-6 || !isPlace(t)) return std::nullopt;
   const Eigen::Quaterniond rotation(q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm);
   return Pose{rotation.toRotationMatrix(), t}.inverse();
 }
@@ -147,7 +152,7 @@ SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageF
   }
   std::unordered_map<uint64_t, uint32_t> pointIndex;
   for (const ColmapModel::Point& point : model.points) {
-    if (!point.point.xInWorld.allFinite()) continue;
+    if (!isPlace(point.point.xInWorld)) continue;
     if (pointIndex.emplace(point.id, static_cast<uint32_t>(capture.points.size())).second) {
       capture.points.push_back(point.point);
     }
@@ -192,7 +197,7 @@ SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageF
   source.maskIsInverted.assign(capture.photos.size(), false);
   if (withoutCamera > 0) warn("{} photos name a camera that the model lacks; dropped", withoutCamera);
   if (outside > 0) warn("{} photos have paths that leave {}; dropped", outside, imageFolder.string());
-  if (withoutPose > 0) warn("{} photos have a pose that is not a number; dropped", withoutPose);
+  if (withoutPose > 0) warn("{} photos have a pose that is not a number or absurdly far away; dropped", withoutPose);
   for (const auto& [lens, photos] : unusable)
     warn("{} photos were taken with the lens {}, which cannot be used; dropped", photos, lens);
   return source;

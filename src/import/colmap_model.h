@@ -46,7 +46,7 @@ std::optional<ColmapModel> decodeColmapText(std::string_view cameras, std::strin
                                             std::string& reason);
 
 // A camera from COLMAP's model name or number and its parameters; nothing for another lens, another number of
-// parameters, no size, or numbers that are not finite. Fisheye lenses without distortion are taken as OPENCV_FISHEYE.
+// parameters, no size, or numbers that are absurd. Fisheye lenses without distortion are taken as OPENCV_FISHEYE.
 std::optional<Camera> colmapCamera(std::string_view model, uint64_t width, uint64_t height,
                                    std::span<const double> parameters, std::string& reason);
 std::optional<Camera> colmapCamera(int model, uint64_t width, uint64_t height, std::span<const double> parameters,
@@ -56,7 +56,7 @@ std::string_view colmapUnusableLens(int model);  // name of a model whose parame
 bool isColmapLens(std::string_view model);       // whether colmapCamera knows it
 
 // Poses, points, and tracks as observations with each one's own reprojection error. Image paths become
-// `imageFolder`/name; photos whose camera is missing or unusable or whose name leaves the folder
+// `imageFolder`/name; photos whose camera is missing or unusable, whose pose is absurd, or whose name leaves the folder
 // are dropped with a warning.
 SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageFolder);
 

@@ -133,6 +133,7 @@ TEST(Colmap, SaysWhatIsWrongWithACamera) {
   EXPECT_EQ(reason, "cameras.txt: line 1: PINHOLE takes 4 parameters, not 3");
   EXPECT_FALSE(decodeColmapText("1 EUCM 640 480 1 2 3 4 1.5 1\n", "", "", reason).has_value());
   EXPECT_EQ(reason, "cameras.txt: line 1: EUCM wants alpha from 0 to 1 and beta above 0");
+  EXPECT_FALSE(decodeColmapText("1 PINHOLE 640 480 1 2 1e300 4\n", "", "", reason).has_value());
   EXPECT_FALSE(decodeColmapText("1 PINHOLE 640 99999999999 1 2 3 4\n", "", "", reason).has_value());
   EXPECT_FALSE(decodeColmapText("1 PINHOLE 640 480 nan 2 3 4\n", "", "", reason).has_value());
   EXPECT_FALSE(decodeColmapText("1 PINHOLE 640 480 -5 2 3 4\n", "", "", reason).has_value());
@@ -183,13 +184,23 @@ TEST(Colmap, DropsImagesThatCannotBe) {
   bad = good;
   bad.translation[1] = std::numeric_limits<double>::quiet_NaN();
   model.images.push_back(bad);
+  bad.translation = {1.5e308, -1.5e308, 1.5e308};  // finite; turned by its rotation, no more
+  bad.quaternion = {0.9, 0.1, 0.3, 0.2};
+  model.images.push_back(bad);
   testing::internal::CaptureStderr();
   const SourceCapture source = captureFromColmap(model, folder.path());
   const std::string warnings = testing::internal::GetCapturedStderr();
   EXPECT_EQ(source.capture.photos.size(), 1u);
   EXPECT_NE(warnings.find("2 photos have paths that leave"), std::string::npos) << warnings;
-  EXPECT_NE(warnings.find("2 photos have a pose that is not a number"), std::string::npos) << warnings;
+  EXPECT_NE(warnings.find("3 photos have a pose that is not a number"), std::string::npos) << warnings;
   EXPECT_NE(warnings.find("1 photos name a camera"), std::string::npos) << warnings;
+}
+
+TEST(Colmap, KeepsNoPointThatIsAbsurdlyFarAway) {
+  ColmapModel model;
+  model.points = {{1, {Vec3d(1, 2, 3), {}, 0}}, {2, {Vec3d(0, -1e308, 0), {}, 0}}};
+  model.points.push_back({3, {Vec3d(0, std::nan(""), 0), {}, 0}});
+  EXPECT_EQ(captureFromColmap(model, "/nowhere").capture.points.size(), 1u);
 }
 
 TEST(Colmap, DropsOnlyThePhotosOfALensThatCannotBeUsed) {
