@@ -16,6 +16,7 @@
 #include "import/holdout.h"
 #include "import/orient.h"
 #include "import/photo_files.h"
+#include "import/picture_origins.h"
 #include "import/transforms_json.h"
 #include "scene/capture_writer.h"
 
@@ -130,6 +131,7 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
   std::vector<Photo>& photos = source.capture.photos;
   std::vector<fs::path> imageTargets, maskTargets, depthTargets;
   Names names;
+  PictureOrigins origins;
   for (size_t i = 0; i < photos.size(); ++i) {
     const Size size = reduced(facts[i], options.downscale);
     std::string extension = photos[i].image.extension().string();
@@ -141,9 +143,22 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
     photos[i].name = names.unique("images", original, extension);
     imageTargets.push_back(out / photos[i].name);
     const fs::path inner = fs::path(photos[i].name).lexically_relative("images");
-    maskTargets.push_back(out / names.unique("masks", inner, ".png"));
+    if (options.downscale > 1 && fs::weakly_canonical(photos[i].image) == fs::weakly_canonical(out / photos[i].name)) {
+      throw Error(out.string(), "", "holds the photos themselves: reduced ones would take their place",
+                  "name another folder to write to");
+    }
+    const std::string mask = names.unique("masks", inner, ".png");
+    maskTargets.push_back(out / mask);
+    const std::string how = fmt::format("{} x {}", size.width, size.height);
+    origins.add(photos[i].name, photos[i].image, how);
+    if (!photos[i].mask.empty())
+      origins.add(mask, photos[i].mask, how + (source.maskIsInverted[i] ? ", inverted" : ""));
     depthTargets.push_back(out / names.unique("depths", inner, ".exr"));
   }
+  // While pictures change, the folder is not a complete capture.
+  std::error_code status;
+  fs::remove(out / "transforms.json", status);
+  origins.claim(out);
   Outcomes outcomes{std::vector<FileOutcome>(photos.size(), FileOutcome::ready), {}, {}};
   Progress progress("import", static_cast<int64_t>(photos.size()), "photos");
   std::mutex mutex;
@@ -246,8 +261,6 @@ Capture importCapture(const fs::path& sourcePath, const fs::path& out, const Imp
 
   scaleCameras(capture, facts, options.downscale);
   fs::create_directories(out, status);
-  // While pictures change, the folder is not a complete capture.
-  fs::remove(out / "transforms.json", status);
   dropFailed(source, importPictures(source, facts, out, options, orientation.scale, pool));
   if (capture.photos.empty()) {
     throw Error(sourcePath.string(), "", "no photo of it can be decoded", "see the warnings above");

@@ -1,5 +1,6 @@
-// Puts a photo, a mask or a depth map into a capture folder, reduced when asked. All are resumable: a file that is
-// there already, of the right size and not older than its source, is left alone.
+// Puts a photo, a mask or a depth map into a capture folder, reduced when asked. A photo or a mask that is there already,
+// of the right size and not older than its source, is left alone: that it was made from this source is the caller's to
+// know (picture_origins.h).
 #pragma once
 
 #include "base/file.h"
