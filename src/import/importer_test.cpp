@@ -326,6 +326,36 @@ TEST_F(Import, TellsAFolderOfPhotosWhatToDo) {
   EXPECT_THROW(run(), Error);
 }
 
+TEST_F(Import, FindsThePhotosOfACamerasCardInItsFolders) {
+  fs::remove_all(source_);
+  source_ = folder_ / "the pilot's card";
+  for (const char* name : {"DCIM/100MEDIA/DJI_0001.JPG", "DCIM/101MEDIA/DJI_0002.JPG", "DCIM/101MEDIA/DJI_0003.DNG"})
+    writeFileAtomically(source_ / name, std::string_view("any"));
+  try {
+    run();
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(error.reason().find("holds 2 photos"), std::string::npos) << error.reason();
+    EXPECT_NE(error.remedy().find("1 others (.DNG)"), std::string::npos) << error.remedy();
+    const std::string quoted = "'" + (folder_ / "the pilot'\\''s card").string();
+    EXPECT_NE(error.remedy().find("--image_path " + quoted + "'"), std::string::npos) << error.remedy();
+    EXPECT_NE(error.remedy().find("mkdir -p " + quoted + "/sparse' &&"), std::string::npos) << error.remedy();
+    EXPECT_NE(error.remedy().find("tessera import " + quoted + "' OUT"), std::string::npos) << error.remedy();
+  }
+}
+
+TEST_F(Import, AsksForJpegOfAFolderOfPhotosThatItCannotRead) {
+  for (const char* name : {"IMG_1.HEIC", "IMG_2.HEIC"}) writeFileAtomically(source_ / name, std::string_view("any"));
+  fs::remove_all(source_ / "images");
+  try {
+    run();
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(error.reason().find("holds 2 photos (.HEIC)"), std::string::npos) << error.reason();
+    EXPECT_NE(error.remedy().find("JPEG"), std::string::npos) << error.remedy();
+  }
+}
+
 TEST_F(Import, DoesNotWriteOverItsSource) {
   add("images/a.png");
   write();
