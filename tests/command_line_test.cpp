@@ -148,6 +148,8 @@ TEST_F(CommandLine, EndsWithTwoWhenItIsUsedWrongly) {
   usageErrorOf({"eval", model(), city(), "--split", "best"});
   usageErrorOf({"import", city()});
   usageErrorOf({"import", city(), at("i"), "--downscale", "0"});
+  usageErrorOf({"import", city(), at("i"), "--threads", "-1"});
+  usageErrorOf({"synth", "city", at("none"), "--threads", "-1"});
   usageErrorOf({"render", model(), at("r")});
   usageErrorOf({"bench"});
   EXPECT_FALSE(fs::exists(at("m")));

@@ -22,7 +22,9 @@ void addImportVerb(CLI::App& app) {
   verb->add_option("--holdout", flags->options.holdout,
                    "photos kept for judging: every:N, list:FILE, none, or auto (the source's own split, else every:8)")
       ->capture_default_str();
-  verb->add_option("--threads", flags->options.threads, "processor threads; 0: all cores")->capture_default_str();
+  verb->add_option("--threads", flags->options.threads, "processor threads; 0: all cores")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
   verb->callback([flags] {
     const Capture capture = importCapture(flags->source, flags->out, flags->options);
     fmt::print("{}: {} photos ({} to train on, {} held out), {} sparse points{}\n", flags->out, capture.photos.size(),

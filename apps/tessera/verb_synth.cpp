@@ -42,7 +42,9 @@ void addSynthVerb(CLI::App& app) {
       ->capture_default_str();
   verb->add_option("--samples", flags->city.samplesPerPixel, "rays per pixel")->capture_default_str();
   verb->add_flag("--pinhole", flags->city.pinhole, "an ideal lens instead of a mildly distorted one");
-  verb->add_option("--threads", flags->city.threads, "processor threads; 0: all cores")->capture_default_str();
+  verb->add_option("--threads", flags->city.threads, "processor threads; 0: all cores")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
   verb->callback([flags] {
     parsePair(flags->blocks, "--blocks", &flags->city.blocksX, &flags->city.blocksY);
     parsePair(flags->size, "--size", &flags->city.width, &flags->city.height);

@@ -16,7 +16,7 @@ RayCamera randomCamera(Random& random, LensModel lens) {
   const float focal = random.uniform(400, 700);
   const bool oneFocal = lens == LensModel::simplePinhole || lens == LensModel::simpleRadial ||
                         lens == LensModel::radial || lens == LensModel::simpleRadialFisheye ||
-                        lens == LensModel::radialFisheye;
+                        lens == LensModel::radialFisheye || lens == LensModel::simpleDivision;
   int used = 0;
   camera.parameters[used++] = focal;
   if (!oneFocal) camera.parameters[used++] = focal * 1.01f;
@@ -24,6 +24,10 @@ RayCamera randomCamera(Random& random, LensModel lens) {
   camera.parameters[used++] = 239;
   for (; used < lensParameterCount(lens); ++used) camera.parameters[used] = random.uniform(-0.01f, 0.02f);
   if (lens == LensModel::fov) camera.parameters[4] = 0.8f;
+  if (lens == LensModel::eucm) {
+    camera.parameters[4] = 0.6f;
+    camera.parameters[5] = 1.1f;
+  }
   const std::vector<float> axes = random.directions(2);  // made into a rotation by Gram and Schmidt
   const Vec3d x(axes[0], axes[1], axes[2]), z = x.cross(Vec3d(axes[3], axes[4], axes[5])).normalized(), y = z.cross(x);
   for (int row = 0; row < 3; ++row) {
@@ -93,9 +97,10 @@ OperationTests testsOf<GenerateRays>() {
   tests.noGradient = "cameras and pixels are fixed";
   for (const Size& size : kSizes)
     tests.cases.push_back({"every lens, rays " + toString(size), [=](Stage& stage) {
+                             constexpr uint32_t kLenses = std::size(kLensModels);
                              std::vector<float> words;  // cameras, as 32-bit words
-                             for (int lens = 0; lens < kLensModelCount; ++lens) {
-                               const RayCamera camera = randomCamera(stage.random, static_cast<LensModel>(lens));
+                             for (const LensModel lens : kLensModels) {
+                               const RayCamera camera = randomCamera(stage.random, lens);
                                const float* const from = reinterpret_cast<const float*>(&camera);
                                words.insert(words.end(), from, from + sizeof(camera) / sizeof(float));
                              }
@@ -105,8 +110,8 @@ OperationTests testsOf<GenerateRays>() {
                                pixels[i] = 1e7f;  // beyond every fold, or far to the side
                              GenerateRays a;
                              a.rays = stage.count(size);
-                             a.cameras = Slice<const RayCamera>(memory.memory, 0, kLensModelCount);
-                             a.cameraOfRay = stage.input(stage.random.wordsBelow(size.capacity, kLensModelCount));
+                             a.cameras = Slice<const RayCamera>(memory.memory, 0, kLenses);
+                             a.cameraOfRay = stage.input(stage.random.wordsBelow(size.capacity, kLenses));
                              a.pixels = stage.input(pixels);
                              a.origins = stage.output("origins", 3 * size.capacity, 0);
                              a.directions = stage.output("directions", 3 * size.capacity, 3e-5);

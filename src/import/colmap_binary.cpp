@@ -71,6 +71,7 @@ bool decodeCameras(std::span<const std::byte> bytes, ColmapModel& model, std::st
     const auto width = in.take<uint64_t>(), height = in.take<uint64_t>();
     const int parameterCount = colmapParameterCount(lens);
     if (in.ok() && parameterCount < 0) {
+      // How many parameters it has, and so where the next camera begins, is not known either.
       reason = fmt::format("byte {}: lens model number {} is not known", begin, lens);
       return false;
     }
@@ -79,6 +80,10 @@ bool decodeCameras(std::span<const std::byte> bytes, ColmapModel& model, std::st
     if (!in.ok()) {
       reason = fmt::format("ends within camera {} of {}", i + 1, count);
       return false;
+    }
+    if (const std::string_view unusable = colmapUnusableLens(lens); !unusable.empty()) {
+      model.unusable[id] = unusable;
+      continue;
     }
     std::string why;
     const auto camera =

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "base/error.h"
 #include "base/log.h"
@@ -11,9 +12,14 @@
 namespace tessera {
 namespace {
 
-// Models younger than the twelve that are special cases of one of them.
-constexpr int kSimpleFisheye = 14, kFisheye = 15;
+// Models that are special cases of another, and one that is not a lens with a focal length.
+constexpr int kSimpleFisheye = 14, kFisheye = 15, kEquirectangular = 17;
 constexpr uint64_t kMaxSide = 1 << 20;
+constexpr double kFarthest = 1e12;  // what lies beyond is no place, and its square or product may not be a number
+
+bool isPlace(const Vec3d& x) {
+  return (x.array().abs() < kFarthest).all();  // false for NaN too
+}
 
 std::optional<Camera> checkedCamera(LensModel lens, uint64_t width, uint64_t height, std::span<const double> parameters,
                                     std::string& reason) {
@@ -30,9 +36,13 @@ std::optional<Camera> checkedCamera(LensModel lens, uint64_t width, uint64_t hei
   camera.height = static_cast<int>(height);
   camera.lens = lens;
   std::copy(parameters.begin(), parameters.end(), camera.parameters.begin());
-  const bool finite = std::all_of(parameters.begin(), parameters.end(), [](double p) { return std::isfinite(p); });
-  if (!finite || !(camera.focalX() > 0) || !(camera.focalY() > 0)) {
-    reason = "its parameters are not finite, or its focal length is not positive";
+  const bool sane = std::all_of(parameters.begin(), parameters.end(), [](double p) { return std::abs(p) < kFarthest; });
+  if (!sane || !(camera.focalX() > 0) || !(camera.focalY() > 0)) {
+    reason = "its parameters are not finite or absurd, or its focal length is not positive";
+    return std::nullopt;
+  }
+  if (lens == LensModel::eucm && !(parameters[4] >= 0 && parameters[4] <= 1 && parameters[5] > 0)) {
+    reason = "EUCM wants alpha from 0 to 1 and beta above 0";
     return std::nullopt;
   }
   return camera;
@@ -42,7 +52,7 @@ std::optional<Pose> poseOf(const ColmapModel::Image& image) {
   const auto& q = image.quaternion;
   const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   const Vec3d t(image.translation[0], image.translation[1], image.translation[2]);
-  if (!std::isfinite(norm) || norm < 1e-6 || !t.allFinite()) return std::nullopt;
+  if (!std::isfinite(norm) || norm < 1e-6 || !isPlace(t)) return std::nullopt;
   const Eigen::Quaterniond rotation(q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm);
   return Pose{rotation.toRotationMatrix(), t}.inverse();
 }
@@ -84,7 +94,17 @@ fs::path findImages(const fs::path& source, const fs::path& model) {
 int colmapParameterCount(int model) {
   if (model == kSimpleFisheye) return 3;
   if (model == kFisheye) return 4;
-  return model >= 0 && model < kLensModelCount ? lensParameterCount(static_cast<LensModel>(model)) : -1;
+  if (model == kEquirectangular) return 2;
+  const auto lens = lensFromNumber(model);
+  return lens ? lensParameterCount(*lens) : -1;
+}
+
+std::string_view colmapUnusableLens(int model) {
+  return model == kEquirectangular ? "EQUIRECTANGULAR" : "";
+}
+
+bool isColmapLens(std::string_view model) {
+  return model == "SIMPLE_FISHEYE" || model == "FISHEYE" || lensFromName(model);
 }
 
 std::optional<Camera> colmapCamera(int model, uint64_t width, uint64_t height, std::span<const double> parameters,
@@ -99,11 +119,12 @@ std::optional<Camera> colmapCamera(int model, uint64_t width, uint64_t height, s
     std::copy(parameters.end() - 3, parameters.end(), full.begin() + 1);
     return checkedCamera(LensModel::openCvFisheye, width, height, full, reason);
   }
-  if (colmapParameterCount(model) < 0) {
+  const auto lens = lensFromNumber(model);
+  if (!lens) {
     reason = fmt::format("lens model number {} is not known", model);
     return std::nullopt;
   }
-  return checkedCamera(static_cast<LensModel>(model), width, height, parameters, reason);
+  return checkedCamera(*lens, width, height, parameters, reason);
 }
 
 std::optional<Camera> colmapCamera(std::string_view model, uint64_t width, uint64_t height,
@@ -131,15 +152,20 @@ SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageF
   }
   std::unordered_map<uint64_t, uint32_t> pointIndex;
   for (const ColmapModel::Point& point : model.points) {
-    if (!point.point.xInWorld.allFinite()) continue;
+    if (!isPlace(point.point.xInWorld)) continue;
     if (pointIndex.emplace(point.id, static_cast<uint32_t>(capture.points.size())).second) {
       capture.points.push_back(point.point);
     }
   }
 
   size_t withoutCamera = 0, outside = 0, withoutPose = 0;
+  std::map<std::string, size_t> unusable;  // photos of each lens
   const fs::path maskFolder = imageFolder.parent_path() / "masks";
   for (const ColmapModel::Image& image : model.images) {
+    if (const auto lens = model.unusable.find(image.camera); lens != model.unusable.end()) {
+      ++unusable[lens->second];
+      continue;
+    }
     const auto camera = cameraIndex.find(image.camera);
     const auto path = resolveInside(imageFolder, image.name);
     const auto worldFromCamera = poseOf(image);
@@ -171,7 +197,9 @@ SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageF
   source.maskIsInverted.assign(capture.photos.size(), false);
   if (withoutCamera > 0) warn("{} photos name a camera that the model lacks; dropped", withoutCamera);
   if (outside > 0) warn("{} photos have paths that leave {}; dropped", outside, imageFolder.string());
-  if (withoutPose > 0) warn("{} photos have a pose that is not a number; dropped", withoutPose);
+  if (withoutPose > 0) warn("{} photos have a pose that is not a number or absurdly far away; dropped", withoutPose);
+  for (const auto& [lens, photos] : unusable)
+    warn("{} photos were taken with the lens {}, which cannot be used; dropped", photos, lens);
   return source;
 }
 

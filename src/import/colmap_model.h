@@ -33,6 +33,7 @@ struct ColmapModel {
     SparsePoint point;
   };
   std::unordered_map<uint32_t, Camera> cameras;
+  std::unordered_map<uint32_t, std::string> unusable;  // cameras whose lens is not known here: the lens's name
   std::vector<Image> images;
   std::vector<Point> points;
 };
@@ -45,16 +46,18 @@ std::optional<ColmapModel> decodeColmapText(std::string_view cameras, std::strin
                                             std::string& reason);
 
 // A camera from COLMAP's model name or number and its parameters; nothing for another lens, another number of
-// parameters, no size, or numbers that are not finite. Newer fisheye lenses without distortion are taken as
-// OPENCV_FISHEYE.
+// parameters, no size, or numbers that are absurd. Fisheye lenses without distortion are taken as OPENCV_FISHEYE.
 std::optional<Camera> colmapCamera(std::string_view model, uint64_t width, uint64_t height,
                                    std::span<const double> parameters, std::string& reason);
 std::optional<Camera> colmapCamera(int model, uint64_t width, uint64_t height, std::span<const double> parameters,
                                    std::string& reason);
-int colmapParameterCount(int model);  // -1 for a model that is not known
+int colmapParameterCount(int model);             // -1 for a model that is not known
+std::string_view colmapUnusableLens(int model);  // name of a model whose parameters can be skipped but not used, or ""
+bool isColmapLens(std::string_view model);       // whether colmapCamera knows it
 
 // Poses, points, and tracks as observations with each one's own reprojection error. Image paths become
-// `imageFolder`/name; photos whose camera is missing or whose name leaves the folder are dropped with a warning.
+// `imageFolder`/name; photos whose camera is missing or unusable, whose pose is absurd, or whose name leaves the folder
+// are dropped with a warning.
 SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageFolder);
 
 // The folder of the sparse model in a source folder (sparse/0, sparse, colmap/sparse/0, or itself), if it has one.

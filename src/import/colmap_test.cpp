@@ -35,11 +35,11 @@ struct BinaryModel {
   Writer cameras, images, points;
 
   BinaryModel() {
-    cameras.add(uint64_t{kLensModelCount});
-    for (int i = kLensModelCount - 1; i >= 0; --i) {
-      cameras.add(uint32_t(10 + 3 * i)).add(int32_t{i}).add(uint64_t{640}).add(uint64_t{480});
-      for (int p = 0; p < lensParameterCount(static_cast<LensModel>(i)); ++p)
-        cameras.add(p < 4 ? 100.0 + p : 0.001 * p);
+    cameras.add(uint64_t{std::size(kLensModels)});
+    for (auto lens = std::rbegin(kLensModels); lens != std::rend(kLensModels); ++lens) {
+      const int number = static_cast<int>(*lens);
+      cameras.add(uint32_t(10 + 3 * number)).add(int32_t{number}).add(uint64_t{640}).add(uint64_t{480});
+      for (int p = 0; p < lensParameterCount(*lens); ++p) cameras.add(p < 4 ? 100.0 + p : 0.001 * p);
     }
     images.add(uint64_t{2});
     images.add(uint32_t{9}).add(0.5).add(0.5).add(-0.5).add(0.5).add(1.0).add(2.0).add(3.0).add(uint32_t{13});
@@ -62,9 +62,12 @@ struct BinaryModel {
 TEST(Colmap, ReadsBinaryModels) {
   const auto model = BinaryModel().decode();
   ASSERT_TRUE(model.has_value());
-  EXPECT_EQ(model->cameras.size(), 12u);
+  EXPECT_EQ(model->cameras.size(), 15u);
   EXPECT_EQ(model->cameras.at(22).lens, LensModel::openCv);
   EXPECT_EQ(model->cameras.at(43).parameters[15], 0.015);
+  EXPECT_EQ(model->cameras.at(46).lens, LensModel::simpleDivision);
+  EXPECT_EQ(model->cameras.at(49).lens, LensModel::division);
+  EXPECT_EQ(model->cameras.at(58).lens, LensModel::eucm);
   ASSERT_EQ(model->images.size(), 2u);
   EXPECT_EQ(model->images[1].name, "a photo.jpg");
   ASSERT_EQ(model->images[0].keypoints.size(), 1u);  // the other belongs to no point
@@ -128,8 +131,9 @@ TEST(Colmap, SaysWhatIsWrongWithACamera) {
   std::string reason;
   EXPECT_FALSE(decodeColmapText("1 PINHOLE 640 480 1 2 3\n", "", "", reason).has_value());
   EXPECT_EQ(reason, "cameras.txt: line 1: PINHOLE takes 4 parameters, not 3");
-  EXPECT_FALSE(decodeColmapText("1 EUCM 640 480 1 2 3\n", "", "", reason).has_value());
-  EXPECT_NE(reason.find("'EUCM' is not known"), std::string::npos);
+  EXPECT_FALSE(decodeColmapText("1 EUCM 640 480 1 2 3 4 1.5 1\n", "", "", reason).has_value());
+  EXPECT_EQ(reason, "cameras.txt: line 1: EUCM wants alpha from 0 to 1 and beta above 0");
+  EXPECT_FALSE(decodeColmapText("1 PINHOLE 640 480 1 2 1e300 4\n", "", "", reason).has_value());
   EXPECT_FALSE(decodeColmapText("1 PINHOLE 640 99999999999 1 2 3 4\n", "", "", reason).has_value());
   EXPECT_FALSE(decodeColmapText("1 PINHOLE 640 480 nan 2 3 4\n", "", "", reason).has_value());
   EXPECT_FALSE(decodeColmapText("1 PINHOLE 640 480 -5 2 3 4\n", "", "", reason).has_value());
@@ -180,13 +184,50 @@ TEST(Colmap, DropsImagesThatCannotBe) {
   bad = good;
   bad.translation[1] = std::numeric_limits<double>::quiet_NaN();
   model.images.push_back(bad);
+  bad.translation = {1.5e308, -1.5e308, 1.5e308};  // finite; turned by its rotation, no more
+  bad.quaternion = {0.9, 0.1, 0.3, 0.2};
+  model.images.push_back(bad);
   testing::internal::CaptureStderr();
   const SourceCapture source = captureFromColmap(model, folder.path());
   const std::string warnings = testing::internal::GetCapturedStderr();
   EXPECT_EQ(source.capture.photos.size(), 1u);
   EXPECT_NE(warnings.find("2 photos have paths that leave"), std::string::npos) << warnings;
-  EXPECT_NE(warnings.find("2 photos have a pose that is not a number"), std::string::npos) << warnings;
+  EXPECT_NE(warnings.find("3 photos have a pose that is not a number"), std::string::npos) << warnings;
   EXPECT_NE(warnings.find("1 photos name a camera"), std::string::npos) << warnings;
+}
+
+TEST(Colmap, KeepsNoPointThatIsAbsurdlyFarAway) {
+  ColmapModel model;
+  model.points = {{1, {Vec3d(1, 2, 3), {}, 0}}, {2, {Vec3d(0, -1e308, 0), {}, 0}}};
+  model.points.push_back({3, {Vec3d(0, std::nan(""), 0), {}, 0}});
+  EXPECT_EQ(captureFromColmap(model, "/nowhere").capture.points.size(), 1u);
+}
+
+TEST(Colmap, DropsOnlyThePhotosOfALensThatCannotBeUsed) {
+  const std::string images = "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0 0 2 b.jpg\n\n3 1 0 0 0 0 0 0 2 c.jpg\n\n";
+  std::string reason;
+  const auto text = decodeColmapText("2 EQUIRECTANGULAR 64 32 64 32\n1 PINHOLE 4 4 1 1 2 2\n", images, "", reason);
+  ASSERT_TRUE(text.has_value()) << reason;
+  Writer cameras;
+  cameras.add(uint64_t{2});
+  cameras.add(uint32_t{2}).add(int32_t{17}).add(uint64_t{64}).add(uint64_t{32}).add(64.0).add(32.0);
+  cameras.add(uint32_t{1}).add(int32_t{1}).add(uint64_t{4}).add(uint64_t{4}).add(1.0).add(1.0).add(2.0).add(2.0);
+  auto binary = decodeColmapBinary(cameras.bytes, Writer().add(uint64_t{0}).bytes, {}, reason);
+  ASSERT_TRUE(binary.has_value()) << reason;
+  binary->images = text->images;
+  const TemporaryFolder folder;
+  for (const auto& model : {*text, *binary}) {
+    testing::internal::CaptureStderr();
+    const SourceCapture source = captureFromColmap(model, folder.path());
+    const std::string warnings = testing::internal::GetCapturedStderr();
+    ASSERT_EQ(source.capture.photos.size(), 1u);
+    EXPECT_EQ(source.capture.photos[0].name, "a.jpg");
+    EXPECT_NE(warnings.find("2 photos were taken with the lens EQUIRECTANGULAR"), std::string::npos) << warnings;
+    EXPECT_EQ(warnings.find("name a camera"), std::string::npos) << warnings;
+  }
+  // A lens of a number that nobody knows: where the next camera begins is not known either.
+  cameras.bytes[12] = std::byte{99};
+  EXPECT_FALSE(decodeColmapBinary(cameras.bytes, Writer().add(uint64_t{0}).bytes, {}, reason).has_value());
 }
 
 TEST(Colmap, IsFoundWhereItsToolsPutIt) {

@@ -81,6 +81,10 @@ bool decodeCameras(std::string_view text, ColmapModel& model, std::string& reaso
     bool ok = hasId && words.number(width) && words.number(height);
     std::vector<double> parameters;
     while (ok && !words.atEnd() && parameters.size() < 32) ok = words.number(parameters.emplace_back());
+    if (ok && !isColmapLens(lens)) {
+      model.unusable[id] = lens;
+      continue;
+    }
     std::string why = "expected: id MODEL width height parameters";
     const auto camera = ok ? colmapCamera(lens, width, height, parameters, why) : std::nullopt;
     if (!camera) {

@@ -16,43 +16,81 @@
 #include "import/holdout.h"
 #include "import/orient.h"
 #include "import/photo_files.h"
+#include "import/picture_origins.h"
 #include "import/transforms_json.h"
 #include "scene/capture_writer.h"
 
 namespace tessera {
 namespace {
 
-bool isPhotoName(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension == ".jpg" || extension == ".jpeg" || extension == ".png";
+// Photos in a folder and the folders in it, by what can be done with them.
+struct PhotoCount {
+  size_t readable = 0, convertible = 0;  // JPEG and PNG; pictures that other programs make JPEG of
+  std::string firstConvertible;          // extension, as found
+};
+
+PhotoCount countPhotos(const fs::path& folder) {
+  constexpr size_t kMostEntries = 100000;  // someone may name the root of a disk
+  constexpr int kDeepest = 4;
+  PhotoCount count;
+  std::error_code status;
+  fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, status), end;
+  for (size_t entries = 0; !status && at != end && entries < kMostEntries; at.increment(status), ++entries) {
+    if (at.depth() >= kDeepest) at.disable_recursion_pending();
+    const std::string found = at->path().extension().string();
+    std::string extension = found;
+    std::transform(extension.begin(), extension.end(), extension.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    const auto isOneOf = [&extension](std::initializer_list<const char*> names) {
+      return std::find(names.begin(), names.end(), extension) != names.end();
+    };
+    count.readable += isOneOf({".jpg", ".jpeg", ".png"});
+    if (!isOneOf({".tif", ".tiff", ".heic", ".heif", ".webp", ".dng"})) continue;
+    if (count.convertible++ == 0) count.firstConvertible = found;
+  }
+  return count;
 }
 
-size_t countPhotos(const fs::path& folder) {
-  std::error_code status;
-  size_t count = 0;
-  for (const auto& entry : fs::directory_iterator(folder, status)) count += isPhotoName(entry.path());
-  return count;
+// One word for a POSIX shell.
+std::string shellWord(const fs::path& path) {
+  const std::string text = path.string();
+  const bool plain = std::all_of(text.begin(), text.end(), [](unsigned char c) {
+    return std::isalnum(c) || std::string_view("/._-+,:@%").find(static_cast<char>(c)) != std::string_view::npos;
+  });
+  if (plain && !text.empty()) return text;
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return word + "'";
 }
 
 [[noreturn]] void refuse(const fs::path& source) {
   std::error_code status;
   if (!fs::exists(source, status)) throw Error(source.string(), "", "does not exist", "name a folder of posed photos");
   const fs::path images = fs::is_directory(source / "images", status) ? source / "images" : source;
-  if (const size_t photos = countPhotos(images); photos > 0) {
-    const std::string s = source.string(), i = images.string();
+  const PhotoCount photos = countPhotos(images);
+  if (photos.readable > 0) {
     throw Error(
-        source.string(), "", fmt::format("holds {} photos but says nowhere from where they were taken", photos),
-        fmt::format("find their poses with COLMAP, then import again: "
-                    "colmap feature_extractor --database_path {0}/database.db --image_path {1} "
+        source.string(), "",
+        fmt::format("holds {} photos but says nowhere from where they were taken", photos.readable),
+        fmt::format("{4}find their poses with COLMAP, then import again: "
+                    "colmap feature_extractor --database_path {0} --image_path {1} "
                     "--ImageReader.camera_model OPENCV --ImageReader.single_camera 1 "
                     "--SiftExtraction.use_gpu 0 && "
-                    "colmap exhaustive_matcher --database_path {0}/database.db --SiftMatching.use_gpu 0 && "
-                    "mkdir -p {0}/sparse && "
-                    "colmap mapper --database_path {0}/database.db --image_path {1} --output_path {0}/sparse && "
-                    "tessera import {0} OUT",
-                    s, i));
+                    "colmap exhaustive_matcher --database_path {0} --SiftMatching.use_gpu 0 && "
+                    "mkdir -p {2} && "
+                    "colmap mapper --database_path {0} --image_path {1} --output_path {2} && "
+                    "tessera import {3} OUT",
+                    shellWord(source / "database.db"), shellWord(images), shellWord(source / "sparse"),
+                    shellWord(source),
+                    photos.convertible > 0 ? fmt::format("convert the {} others ({}) to JPEG if they are wanted; ",
+                                                         photos.convertible, photos.firstConvertible)
+                                           : ""));
+  }
+  if (photos.convertible > 0) {
+    throw Error(source.string(), "",
+                fmt::format("holds {} photos ({}), but photos must be JPEG or PNG", photos.convertible,
+                            photos.firstConvertible),
+                "convert them to JPEG of full size and best quality, with their EXIF data, then import again");
   }
   throw Error(source.string(), "", "is neither a COLMAP model (sparse/0 and images) nor has it a transforms.json",
               "name the folder that holds one of them");
@@ -130,6 +168,7 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
   std::vector<Photo>& photos = source.capture.photos;
   std::vector<fs::path> imageTargets, maskTargets, depthTargets;
   Names names;
+  PictureOrigins origins;
   for (size_t i = 0; i < photos.size(); ++i) {
     const Size size = reduced(facts[i], options.downscale);
     std::string extension = photos[i].image.extension().string();
@@ -141,9 +180,22 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
     photos[i].name = names.unique("images", original, extension);
     imageTargets.push_back(out / photos[i].name);
     const fs::path inner = fs::path(photos[i].name).lexically_relative("images");
-    maskTargets.push_back(out / names.unique("masks", inner, ".png"));
+    if (options.downscale > 1 && fs::weakly_canonical(photos[i].image) == fs::weakly_canonical(out / photos[i].name)) {
+      throw Error(out.string(), "", "holds the photos themselves: reduced ones would take their place",
+                  "name another folder to write to");
+    }
+    const std::string mask = names.unique("masks", inner, ".png");
+    maskTargets.push_back(out / mask);
+    const std::string how = fmt::format("{} x {}", size.width, size.height);
+    origins.add(photos[i].name, photos[i].image, how);
+    if (!photos[i].mask.empty())
+      origins.add(mask, photos[i].mask, how + (source.maskIsInverted[i] ? ", inverted" : ""));
     depthTargets.push_back(out / names.unique("depths", inner, ".exr"));
   }
+  // While pictures change, the folder is not a complete capture.
+  std::error_code status;
+  fs::remove(out / "transforms.json", status);
+  origins.claim(out);
   Outcomes outcomes{std::vector<FileOutcome>(photos.size(), FileOutcome::ready), {}, {}};
   Progress progress("import", static_cast<int64_t>(photos.size()), "photos");
   std::mutex mutex;
@@ -161,7 +213,7 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
         photo.mask = maskOk ? maskTargets[i] : fs::path();
       }
       if (!photo.depth.empty()) {
-        depthOk = importDepth(photo.depth, depthTargets[i], size.width, size.height, photo.depthUnit, scale) ==
+        depthOk = importDepth(photo.depth, depthTargets[i], size.width, size.height, {photo.depthUnit, scale}) ==
                   FileOutcome::ready;
         photo.depth = depthOk ? depthTargets[i] : fs::path();
       }
@@ -246,8 +298,6 @@ Capture importCapture(const fs::path& sourcePath, const fs::path& out, const Imp
 
   scaleCameras(capture, facts, options.downscale);
   fs::create_directories(out, status);
-  // While pictures change, the folder is not a complete capture.
-  fs::remove(out / "transforms.json", status);
   dropFailed(source, importPictures(source, facts, out, options, orientation.scale, pool));
   if (capture.photos.empty()) {
     throw Error(sourcePath.string(), "", "no photo of it can be decoded", "see the warnings above");

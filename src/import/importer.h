@@ -11,7 +11,7 @@
 //
 // The result is self-contained: images/, masks/ (black = do not train), depths/ (EXR), transforms.json, points.ply,
 // observations.safetensors; see scene/capture_writer.h. Run again after a kill, it goes on where it was:
-// transforms.json is written last.
+// transforms.json is written last, and sources.txt says which pictures may be kept (picture_origins.h).
 #pragma once
 
 #include <string>

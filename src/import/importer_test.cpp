@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+
 #include "base/error.h"
 #include "import/capture_reader.h"
 #include "import/test_support.h"
@@ -145,6 +147,22 @@ TEST_F(Import, FailsWhenNothingIsLeft) {
   EXPECT_FALSE(fs::exists(out_ / "transforms.json"));
 }
 
+TEST_F(Import, DropsPanoramasAndFailsWhenThereIsNothingElse) {
+  for (const char* name : {"a.png", "b.png"}) writePng(source_ / "images" / name, gradientPicture(16, 8));
+  const fs::path model = source_ / "sparse/0";
+  writeFileAtomically(model / "images.txt", std::string_view("1 1 0 0 0 0 0 0 1 a.png\n\n2 1 0 0 0 1 0 0 2 b.png\n\n"));
+  writeFileAtomically(model / "cameras.txt",
+                      std::string_view("1 EQUIRECTANGULAR 16 8 16 8\n2 EUCM 16 8 9 9 8 4 0.6 1.1\n"));
+  const Capture capture = run();
+  ASSERT_EQ(capture.photos.size(), 1u);
+  EXPECT_EQ(capture.cameras.at(0).lens, LensModel::eucm);
+  EXPECT_EQ(readCapture(out_).cameras, capture.cameras);
+  EXPECT_TRUE(logged("1 photos were taken with the lens EQUIRECTANGULAR")) << log_;
+  writeFileAtomically(model / "cameras.txt",
+                      std::string_view("1 EQUIRECTANGULAR 16 8 16 8\n2 EQUIRECTANGULAR 16 8 16 8\n"));
+  EXPECT_THROW(run(), Error);
+}
+
 TEST_F(Import, BringsMasksAndDepthsAlong) {
   add("images/a.png", 16, 12, R"(,"mask_path":"masks/a.png","depth_file_path":"depth/a.exr")");
   add("images/b.png", 16, 12, R"(,"mask_path":"masks/missing.png")");
@@ -195,6 +213,77 @@ TEST_F(Import, GoesOnWhereItWas) {
   EXPECT_EQ(readImage(run({.downscale = 4}).photos[0].image).image.width, 4);  // another size is done anew
 }
 
+// The pixel in the corner, which tells the pictures of this fixture apart.
+int cornerOf(const fs::path& picture) {
+  return readImage(picture).image.at(0, 0)[0];
+}
+
+TEST_F(Import, KeepsNoPictureOfAnotherSource) {
+  const std::string mask = R"(,"mask_path":"masks/a.png")";
+  add("images/a.png", 16, 12, mask);
+  writePng(source_ / "masks/a.png", ImageU8(16, 12, 1, 255));
+  write();
+  const fs::path first = source_;
+  source_ = folder_ / "other";
+  frames_.clear();
+  add("images/a.png", 16, 12, mask);
+  writePng(source_ / "images/a.png", gradientPicture(16, 12, 3, 100));
+  writePng(source_ / "masks/a.png", ImageU8(16, 12, 1, 0));
+  write();
+  const fs::path second = source_;
+  const auto longAgo = fs::file_time_type::clock::now() - std::chrono::hours(1000);
+  for (const fs::path& folder : {first, second}) {
+    for (const char* name : {"images/a.png", "masks/a.png"}) fs::last_write_time(folder / name, longAgo);
+  }
+  for (const int downscale : {2, 1}) {
+    source_ = first;
+    run({.downscale = downscale});
+    const int before = cornerOf(out_ / "images/a.png");
+    source_ = second;
+    const Capture capture = run({.downscale = downscale});
+    EXPECT_EQ(cornerOf(out_ / "images/a.png"), before + 100);
+    EXPECT_EQ(cornerOf(capture.photos[0].mask), 0);
+  }
+  EXPECT_EQ(cornerOf(first / "images/a.png"), 0);  // what was linked is still there
+}
+
+TEST_F(Import, DoesAPictureAnewWhoseSourceWasExchanged) {
+  for (const char* name : {"images/a.png", "images/b.png"}) add(name);
+  write();
+  run({.downscale = 2});
+  const auto time = fs::last_write_time(out_ / "images/a.png");
+  const int before = cornerOf(out_ / "images/b.png");
+  writePng(source_ / "images/b.png", gradientPicture(16, 12, 3, 100));
+  fs::last_write_time(source_ / "images/b.png", time - std::chrono::hours(1000));  // an older file, moved here
+  run({.downscale = 2});
+  EXPECT_EQ(fs::last_write_time(out_ / "images/a.png"), time);
+  EXPECT_EQ(cornerOf(out_ / "images/b.png"), before + 99);  // the fixture's own was of seed 1
+}
+
+TEST_F(Import, DoesAPictureAnewOfWhichNothingIsKnown) {
+  add("images/a.png");
+  write();
+  run({.downscale = 2});
+  const int before = cornerOf(out_ / "images/a.png");
+  writePng(out_ / "images/a.png", ImageU8(8, 6, 3, 200));
+  fs::remove(out_ / "sources.txt");
+  run({.downscale = 2});
+  EXPECT_EQ(cornerOf(out_ / "images/a.png"), before);
+}
+
+TEST_F(Import, LeavesThePhotosOfAModelAloneThatIsImportedInPlace) {
+  writePng(source_ / "images/a.png", gradientPicture(16, 12));
+  const Bytes before = readFile(source_ / "images/a.png");
+  const fs::path model = source_ / "sparse/0";
+  writeFileAtomically(model / "images.txt", std::string_view("1 1 0 0 0 0 0 0 1 a.png\n\n"));
+  writeFileAtomically(model / "cameras.txt", std::string_view("1 PINHOLE 16 12 9 9 8 6\n"));
+  for (int i = 0; i < 2; ++i) importCapture(model, source_);
+  EXPECT_EQ(readCapture(source_).photos.size(), 1u);
+  EXPECT_THROW(importCapture(model, source_, {.downscale = 2}), Error);
+  EXPECT_EQ(readFile(source_ / "images/a.png"), before);
+  EXPECT_EQ(readCapture(source_).photos.size(), 1u);  // still complete
+}
+
 TEST_F(Import, GivesPicturesThatWouldCollideTheirOwnNames) {
   add("images/a.png");
   writeJpeg(source_ / "images/a.jpg", gradientPicture(16, 12));
@@ -235,6 +324,36 @@ TEST_F(Import, TellsAFolderOfPhotosWhatToDo) {
   EXPECT_THROW(run(), Error);
   fs::remove_all(source_);
   EXPECT_THROW(run(), Error);
+}
+
+TEST_F(Import, FindsThePhotosOfACamerasCardInItsFolders) {
+  fs::remove_all(source_);
+  source_ = folder_ / "the pilot's card";
+  for (const char* name : {"DCIM/100MEDIA/DJI_0001.JPG", "DCIM/101MEDIA/DJI_0002.JPG", "DCIM/101MEDIA/DJI_0003.DNG"})
+    writeFileAtomically(source_ / name, std::string_view("any"));
+  try {
+    run();
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(error.reason().find("holds 2 photos"), std::string::npos) << error.reason();
+    EXPECT_NE(error.remedy().find("1 others (.DNG)"), std::string::npos) << error.remedy();
+    const std::string quoted = "'" + (folder_ / "the pilot'\\''s card").string();
+    EXPECT_NE(error.remedy().find("--image_path " + quoted + "'"), std::string::npos) << error.remedy();
+    EXPECT_NE(error.remedy().find("mkdir -p " + quoted + "/sparse' &&"), std::string::npos) << error.remedy();
+    EXPECT_NE(error.remedy().find("tessera import " + quoted + "' OUT"), std::string::npos) << error.remedy();
+  }
+}
+
+TEST_F(Import, AsksForJpegOfAFolderOfPhotosThatItCannotRead) {
+  for (const char* name : {"IMG_1.HEIC", "IMG_2.HEIC"}) writeFileAtomically(source_ / name, std::string_view("any"));
+  fs::remove_all(source_ / "images");
+  try {
+    run();
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(error.reason().find("holds 2 photos (.HEIC)"), std::string::npos) << error.reason();
+    EXPECT_NE(error.remedy().find("JPEG"), std::string::npos) << error.remedy();
+  }
 }
 
 TEST_F(Import, DoesNotWriteOverItsSource) {

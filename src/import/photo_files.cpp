@@ -119,8 +119,9 @@ FileOutcome importMask(const fs::path& source, const fs::path& target, int width
   return FileOutcome::ready;
 }
 
-FileOutcome importDepth(const fs::path& source, const fs::path& target, int width, int height, float unit,
-                        double scale) {
+FileOutcome importDepth(const fs::path& source, const fs::path& target, int width, int height,
+                        const DepthUnits& units) {
+  const auto [unit, scale] = units;
   std::error_code status;
   if (!fs::is_regular_file(source, status)) return FileOutcome::unreadable;
   const Bytes bytes = readFile(source);

@@ -1,5 +1,6 @@
-// Puts a photo, a mask or a depth map into a capture folder, reduced when asked. All are resumable: a file that is
-// there already, of the right size and not older than its source, is left alone.
+// Puts a photo, a mask or a depth map into a capture folder, reduced when asked. A photo or a mask that is there
+// already, of the right size and not older than its source, is left alone: that it was made from this source is the
+// caller's to know (picture_origins.h).
 #pragma once
 
 #include "base/file.h"
@@ -19,9 +20,12 @@ inline constexpr int64_t kLosslessPixels = int64_t{1} << 21;
 // One channel, 0 or 255. A pixel is trained on only where all of its area is white; `inverted`: where all is black.
 FileOutcome importMask(const fs::path& source, const fs::path& target, int width, int height, bool inverted);
 
+struct DepthUnits {
+  float unit = 1;    // world units per step of a PNG
+  double scale = 1;  // world units per unit of an EXR
+};
 // Depth is never averaged (a mean across an edge lies on nothing): the sample nearest to each pixel's centre is taken.
-// Written as EXR in world units: PNG steps × `unit`, EXR values × `scale`.
-FileOutcome importDepth(const fs::path& source, const fs::path& target, int width, int height, float unit,
-                        double scale);
+// Written as EXR in world units.
+FileOutcome importDepth(const fs::path& source, const fs::path& target, int width, int height, const DepthUnits& units);
 
 }  // namespace tessera

@@ -167,7 +167,10 @@ Capture fullCapture(const fs::path& root) {
   Capture capture;
   capture.root = root;
   capture.cameras = {{8, 6, LensModel::openCv, {1.0 / 3, 0.1, 4.1, 3.2, 0.01, -0.02, 1e-17, 3e-3}},
-                     {8, 6, LensModel::thinPrismFisheye, {5, 6, 4, 3, 1, 2, 3, 4, 5, 6, 7, 1.0 / 7}}};
+                     {8, 6, LensModel::thinPrismFisheye, {5, 6, 4, 3, 1, 2, 3, 4, 5, 6, 7, 1.0 / 7}},
+                     {8, 6, LensModel::simpleDivision, {5, 4, 3, -1.0 / 7}},
+                     {8, 6, LensModel::division, {5, 6, 4, 3, 1.0 / 7}},
+                     {8, 6, LensModel::eucm, {5, 6, 4, 3, 1.0 / 7, 1.1}}};
   for (int i = 0; i < 3; ++i) {
     Photo photo;
     photo.name = "images/" + std::to_string(i) + ".png";

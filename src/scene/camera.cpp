@@ -8,32 +8,36 @@ namespace tessera {
 namespace {
 
 struct LensFacts {
+  LensModel model;
   std::string_view name;
   int parameters;
   bool oneFocal;
-  bool fisheye = false;
+  bool seesBehind = false;
 };
 
-constexpr std::array<LensFacts, kLensModelCount> kLenses = {{
-    {"SIMPLE_PINHOLE", 3, true},
-    {"PINHOLE", 4, false},
-    {"SIMPLE_RADIAL", 4, true},
-    {"RADIAL", 5, true},
-    {"OPENCV", 8, false},
-    {"OPENCV_FISHEYE", 8, false, true},
-    {"FULL_OPENCV", 12, false},
-    {"FOV", 5, false},
-    {"SIMPLE_RADIAL_FISHEYE", 4, true, true},
-    {"RADIAL_FISHEYE", 5, true, true},
-    {"THIN_PRISM_FISHEYE", 12, false, true},
-    {"RAD_TAN_THIN_PRISM_FISHEYE", 16, false, true},
+constexpr std::array<LensFacts, std::size(kLensModels)> kLenses = {{
+    {LensModel::simplePinhole, "SIMPLE_PINHOLE", 3, true},
+    {LensModel::pinhole, "PINHOLE", 4, false},
+    {LensModel::simpleRadial, "SIMPLE_RADIAL", 4, true},
+    {LensModel::radial, "RADIAL", 5, true},
+    {LensModel::openCv, "OPENCV", 8, false},
+    {LensModel::openCvFisheye, "OPENCV_FISHEYE", 8, false, true},
+    {LensModel::fullOpenCv, "FULL_OPENCV", 12, false},
+    {LensModel::fov, "FOV", 5, false},
+    {LensModel::simpleRadialFisheye, "SIMPLE_RADIAL_FISHEYE", 4, true, true},
+    {LensModel::radialFisheye, "RADIAL_FISHEYE", 5, true, true},
+    {LensModel::thinPrismFisheye, "THIN_PRISM_FISHEYE", 12, false, true},
+    {LensModel::radTanThinPrismFisheye, "RAD_TAN_THIN_PRISM_FISHEYE", 16, false, true},
+    {LensModel::simpleDivision, "SIMPLE_DIVISION", 4, true, true},
+    {LensModel::division, "DIVISION", 5, false, true},
+    {LensModel::eucm, "EUCM", 6, false, true},
 }};
 
 const LensFacts& factsOf(LensModel model) {
-  const int index = static_cast<int>(model);
-  CHECK(index >= 0);
-  CHECK(index < kLensModelCount);
-  return kLenses[static_cast<size_t>(index)];
+  const auto found =
+      std::find_if(kLenses.begin(), kLenses.end(), [model](const LensFacts& l) { return l.model == model; });
+  CHECK(found != kLenses.end());
+  return *found;
 }
 
 // The model of two focal lengths that contains a model of one, with the same distortion.
@@ -47,6 +51,8 @@ LensModel withTwoFocals(LensModel model) {
     case LensModel::simpleRadialFisheye:
     case LensModel::radialFisheye:
       return LensModel::openCvFisheye;
+    case LensModel::simpleDivision:
+      return LensModel::division;
     default:
       return model;
   }
@@ -61,13 +67,20 @@ std::string_view lensName(LensModel model) {
   return factsOf(model).name;
 }
 
-bool lensIsFisheye(LensModel model) {
-  return factsOf(model).fisheye;
+bool lensSeesBehind(LensModel model) {
+  return factsOf(model).seesBehind;
 }
 
 std::optional<LensModel> lensFromName(std::string_view name) {
-  for (int i = 0; i < kLensModelCount; ++i) {
-    if (kLenses[static_cast<size_t>(i)].name == name) return static_cast<LensModel>(i);
+  for (const LensFacts& lens : kLenses) {
+    if (lens.name == name) return lens.model;
+  }
+  return std::nullopt;
+}
+
+std::optional<LensModel> lensFromNumber(int number) {
+  for (const LensModel model : kLensModels) {
+    if (static_cast<int>(model) == number) return model;
   }
   return std::nullopt;
 }

@@ -1,4 +1,5 @@
-// A camera: picture size and lens. All twelve lens models of COLMAP.
+// A camera: picture size and lens. COLMAP's lens models but its panoramas; its two fisheyes without distortion are
+// OPENCV_FISHEYE without distortion here.
 // Source: COLMAP's camera models (src/colmap/sensor/models.h describes the parameters).
 #pragma once
 
@@ -15,7 +16,8 @@ namespace tessera {
 int lensParameterCount(LensModel model);
 std::string_view lensName(LensModel model);  // COLMAP's name, "OPENCV_FISHEYE"
 std::optional<LensModel> lensFromName(std::string_view name);
-bool lensIsFisheye(LensModel model);  // may see more than 90° off its axis
+std::optional<LensModel> lensFromNumber(int number);  // COLMAP's
+bool lensSeesBehind(LensModel model);                 // may see more than 90° off its axis
 
 struct Camera {
   int width = 0, height = 0;

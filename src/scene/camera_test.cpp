@@ -41,6 +41,13 @@ Camera lensOf(LensModel model) {
     case LensModel::radTanThinPrismFisheye:
       p.insert(p.end(), {-0.02, 0.08, -0.06, 0.01, 1e-3, -1e-4, 7e-4, -3e-4, 5e-4, -1e-4, -4e-4, 2e-5});
       break;
+    case LensModel::simpleDivision:
+    case LensModel::division:
+      p.insert(p.end(), {-0.15});
+      break;
+    case LensModel::eucm:
+      p.insert(p.end(), {0.6, 1.1});
+      break;
     default:
       break;
   }
@@ -49,9 +56,9 @@ Camera lensOf(LensModel model) {
   return camera;
 }
 
-class EveryLens : public testing::TestWithParam<int> {
+class EveryLens : public testing::TestWithParam<LensModel> {
  protected:
-  Camera camera_ = lensOf(static_cast<LensModel>(GetParam()));
+  Camera camera_ = lensOf(GetParam());
 };
 
 TEST_P(EveryLens, ProjectsBackToThePixelItCameFrom) {
@@ -99,6 +106,10 @@ TEST_P(EveryLens, IsFoundByItsName) {
   EXPECT_EQ(lensFromName(lensName(camera_.lens)), camera_.lens);
 }
 
+TEST_P(EveryLens, IsFoundByItsNumber) {
+  EXPECT_EQ(lensFromNumber(static_cast<int>(camera_.lens)), camera_.lens);
+}
+
 TEST_P(EveryLens, SeesNothingForNotANumber) {
   EXPECT_FALSE(camera_.directionInCamera({std::nan(""), 3}).has_value());
   EXPECT_FALSE(camera_.pixelFromCamera({std::nan(""), 0, 1}).has_value());
@@ -106,8 +117,8 @@ TEST_P(EveryLens, SeesNothingForNotANumber) {
   EXPECT_FALSE(camera_.directionInCamera({5, 3}).has_value());
 }
 
-INSTANTIATE_TEST_SUITE_P(Camera, EveryLens, testing::Range(0, kLensModelCount),
-                         [](const auto& info) { return std::string(lensName(static_cast<LensModel>(info.param))); });
+INSTANTIATE_TEST_SUITE_P(Camera, EveryLens, testing::ValuesIn(kLensModels),
+                         [](const auto& info) { return std::string(lensName(info.param)); });
 
 // Numbers worked out by hand from OpenCV's formula, so that signs and order of the tangential terms are pinned.
 TEST(Camera, DistortsAsOpenCvDoes) {
@@ -124,6 +135,75 @@ TEST(Camera, ProjectsFisheyeByAngle) {
   const Vec2d pixel = *camera.pixelFromCamera({std::sin(theta), 0, std::cos(theta)});
   EXPECT_NEAR(pixel.x(), 10 * 1.1, 1e-12);
   EXPECT_NEAR(pixel.y(), 0, 1e-12);
+}
+
+TEST(Camera, ProjectsByDivision) {
+  // Worked out by hand: the pixel at r = 0.5 looks along (0.5, 0, 1 + k/4).
+  for (const double k : {-0.4, 0.4}) {
+    const Camera camera{100, 100, LensModel::division, {20, 40, 3, 5, k}};
+    const Vec3d expected = Vec3d(0.3, -0.4, 1 + k / 4).normalized();
+    EXPECT_NEAR((*camera.directionInCamera({3 + 20 * 0.3, 5 - 40 * 0.4}) - expected).norm(), 0, 1e-15);
+    EXPECT_NEAR((*camera.pixelFromCamera(expected * 7) - Vec2d(9, -11)).norm(), 0, 1e-13);
+  }
+}
+
+TEST(Camera, SeesBehindItselfByDivision) {
+  const Camera camera{4000, 4000, LensModel::simpleDivision, {500, 2000, 2000, -0.25}};
+  for (const double r : {1.9999, 2.0, 2.5, 3.9}) {  // 90° at r = 2
+    const auto direction = camera.directionInCamera({2000 + 500 * r, 2000});
+    ASSERT_TRUE(direction.has_value());
+    EXPECT_NEAR((*direction - Vec3d(r, 0, 1 - 0.25 * r * r).normalized()).norm(), 0, 1e-15);
+    EXPECT_NEAR(camera.pixelFromCamera(*direction)->x(), 2000 + 500 * r, 1e-9);
+  }
+  EXPECT_FALSE(camera.pixelFromCamera({0, 0, -1}).has_value());
+}
+
+TEST(Camera, HasNoRayBeyondTheFoldOfADivision) {
+  // k = 0.25 folds at r = 2, where the direction is (2, 0, 2).
+  const Camera camera{4000, 4000, LensModel::simpleDivision, {500, 2000, 2000, 0.25}};
+  EXPECT_TRUE(camera.directionInCamera({2000 + 500 * 1.99, 2000}).has_value());
+  EXPECT_FALSE(camera.directionInCamera({2000 + 500 * 2.01, 2000}).has_value());
+  EXPECT_NEAR(camera.pixelFromCamera({0.99, 0, 1})->x(), 2000 + 500 * 1.736, 1);
+  EXPECT_FALSE(camera.pixelFromCamera({1.01, 0, 1}).has_value());
+  EXPECT_FALSE(camera.pixelFromCamera({0.5, 0, -1}).has_value());
+  EXPECT_FALSE(camera.pixelFromCamera({0, 0, -1}).has_value());
+}
+
+TEST(Camera, ProjectsByTheEnhancedUnifiedModel) {
+  const Camera camera{100, 100, LensModel::eucm, {20, 40, 3, 5, 0.6, 1.3}};
+  const double rho = std::sqrt(1.3 * (0.25 + 0.0625) + 1), divisor = 0.6 * rho + 0.4;
+  const Vec2d pixel = *camera.pixelFromCamera({0.5, -0.25, 1});
+  EXPECT_NEAR(pixel.x(), 3 + 20 * 0.5 / divisor, 1e-14);
+  EXPECT_NEAR(pixel.y(), 5 - 40 * 0.25 / divisor, 1e-14);
+  const Camera pinhole{100, 100, LensModel::eucm, {20, 40, 3, 5, 0, 1}};
+  EXPECT_NEAR((*pinhole.pixelFromCamera({1, 2, 4}) - Vec2d(8, 25)).norm(), 0, 1e-14);
+  EXPECT_FALSE(pinhole.pixelFromCamera({1, 2, -4}).has_value());
+}
+
+TEST(Camera, SeesThroughTheEnhancedUnifiedModelUpToItsFold) {
+  for (const double alpha : {0.3, 0.5, 0.6, 0.8, 1.0}) {
+    const Camera camera{4000, 4000, LensModel::eucm, {500, 500, 2000, 2000, alpha, 1.2}};
+    double last = 0, widest = 0;
+    for (double theta = 0.01; theta < 3.14; theta += 0.01) {
+      const Vec3d direction(std::sin(theta), 0, std::cos(theta));
+      const auto pixel = camera.pixelFromCamera(direction);
+      if (!pixel) break;
+      EXPECT_GT(pixel->x() - 2000, last) << alpha << " " << theta;
+      last = pixel->x() - 2000;
+      widest = theta;
+      const auto back = camera.directionInCamera(*pixel);
+      ASSERT_TRUE(back.has_value()) << alpha << " " << theta;
+      EXPECT_NEAR((*back - direction).norm(), 0, 1e-7) << alpha << " " << theta;
+    }
+    EXPECT_EQ(widest > M_PI / 2, alpha < 1) << alpha;
+    if (alpha <= 0.5) continue;
+    const double fold = 500 / std::sqrt(1.2 * (2 * alpha - 1));
+    EXPECT_NEAR(last, fold, 0.01 * fold);
+    EXPECT_FALSE(camera.directionInCamera({2000 + 1.001 * fold, 2000}).has_value());
+  }
+  const Camera none{4000, 4000, LensModel::eucm, {500, 500, 2000, 2000, 1.5, 1.2}};
+  EXPECT_FALSE(none.directionInCamera({2100, 2000}).has_value());
+  EXPECT_FALSE(none.pixelFromCamera({0.1, 0, 1}).has_value());
 }
 
 TEST(Camera, SeesBehindItselfThroughAFisheye) {
@@ -162,6 +242,7 @@ TEST(Camera, SeesNothingBehindAPerspectiveLens) {
 
 TEST(Camera, KnowsNoLensOfAnotherName) {
   EXPECT_FALSE(lensFromName("BROWN_CONRADY").has_value());
+  for (const int number : {-1, 14, 17}) EXPECT_FALSE(lensFromNumber(number).has_value());
 }
 
 }  // namespace

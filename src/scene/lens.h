@@ -4,9 +4,11 @@
 // A lens is a map of a plane onto itself followed by focal lengths and principal point. Perspective lenses distort
 // (x/z, y/z); fisheye lenses distort θ·(cos φ, sin φ), θ being the angle off the optical axis, which reaches past 90°.
 // Such a map is only meant up to where it first folds (its Jacobian determinant, 1 at the centre, reaches zero):
-// nothing beyond the fold is ever returned.
+// nothing beyond the fold is ever returned. The division and the unified model are maps between plane and directions
+// in closed form, both ways, and reach past 90° too.
 //
-// Source: COLMAP's camera models (src/colmap/sensor/models.h).
+// Source: COLMAP's camera models (src/colmap/sensor/models.h). Division: Fitzgibbon, "Simultaneous linear estimation of
+// multiple view geometry and lens distortion", 2001. EUCM: Khomutenko et al., "An Enhanced Unified Camera Model", 2016.
 #pragma once
 
 #include <cmath>
@@ -16,36 +18,54 @@ namespace tessera {
 
 // Numbered as in COLMAP's binary files.
 enum class LensModel : int {
-  simplePinhole = 0,           // f, cx, cy
-  pinhole = 1,                 // fx, fy, cx, cy
-  simpleRadial = 2,            // f, cx, cy, k
-  radial = 3,                  // f, cx, cy, k1, k2
-  openCv = 4,                  // fx, fy, cx, cy, k1, k2, p1, p2
-  openCvFisheye = 5,           // fx, fy, cx, cy, k1, k2, k3, k4
-  fullOpenCv = 6,              // fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6
-  fov = 7,                     // fx, fy, cx, cy, omega
-  simpleRadialFisheye = 8,     // f, cx, cy, k
-  radialFisheye = 9,           // f, cx, cy, k1, k2
-  thinPrismFisheye = 10,       // fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1
-  radTanThinPrismFisheye = 11  // fx, fy, cx, cy, k0..k5, p0, p1, s0..s3
+  simplePinhole = 0,            // f, cx, cy
+  pinhole = 1,                  // fx, fy, cx, cy
+  simpleRadial = 2,             // f, cx, cy, k
+  radial = 3,                   // f, cx, cy, k1, k2
+  openCv = 4,                   // fx, fy, cx, cy, k1, k2, p1, p2
+  openCvFisheye = 5,            // fx, fy, cx, cy, k1, k2, k3, k4
+  fullOpenCv = 6,               // fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6
+  fov = 7,                      // fx, fy, cx, cy, omega
+  simpleRadialFisheye = 8,      // f, cx, cy, k
+  radialFisheye = 9,            // f, cx, cy, k1, k2
+  thinPrismFisheye = 10,        // fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1
+  radTanThinPrismFisheye = 11,  // fx, fy, cx, cy, k0..k5, p0, p1, s0..s3
+  simpleDivision = 12,          // f, cx, cy, k
+  division = 13,                // fx, fy, cx, cy, k
+  eucm = 16                     // fx, fy, cx, cy, alpha, beta
 };
-inline constexpr int kLensModelCount = 12;
+inline constexpr LensModel kLensModels[] = {LensModel::simplePinhole,
+                                            LensModel::pinhole,
+                                            LensModel::simpleRadial,
+                                            LensModel::radial,
+                                            LensModel::openCv,
+                                            LensModel::openCvFisheye,
+                                            LensModel::fullOpenCv,
+                                            LensModel::fov,
+                                            LensModel::simpleRadialFisheye,
+                                            LensModel::radialFisheye,
+                                            LensModel::thinPrismFisheye,
+                                            LensModel::radTanThinPrismFisheye,
+                                            LensModel::simpleDivision,
+                                            LensModel::division,
+                                            LensModel::eucm};
 
 namespace lens_internal {
 
-// One set of terms that all twelve models fill in part.
+// One set of terms that all models fill in part.
 template <class T>
 struct Terms {
   T fx, fy, cx, cy;
   bool fisheye = false;
-  bool plain = false;        // no distortion at all
+  bool plain = false;        // the plane itself is not distorted
   bool radialFirst = false;  // tangential and prism terms act on the radially distorted point
-  bool isFov = false;
+  bool isFov = false, isDivision = false, isUnified = false;
   T k[6] = {};                           // radial: numerator 1 + Σ k[i] r^(2i+2)
   T d[3] = {};                           // denominator 1 + Σ d[i] r^(2i+2)
   T p1 = 0, p2 = 0;                      // tangential, as OpenCV names them
   T sx1 = 0, sx2 = 0, sy1 = 0, sy2 = 0;  // thin prism: factors of r² and r⁴
-  T omega = 0;
+  T omega = 0;                           // of FOV
+  T alpha = 0, beta = 1;                 // of EUCM
 };
 
 template <class T>
@@ -53,7 +73,7 @@ Terms<T> termsOf(LensModel model, const T* p) {
   Terms<T> t{};
   const bool oneFocal = model == LensModel::simplePinhole || model == LensModel::simpleRadial ||
                         model == LensModel::radial || model == LensModel::simpleRadialFisheye ||
-                        model == LensModel::radialFisheye;
+                        model == LensModel::radialFisheye || model == LensModel::simpleDivision;
   t.fx = p[0];
   t.fy = oneFocal ? p[0] : p[1];
   t.cx = p[oneFocal ? 1 : 2];
@@ -116,6 +136,16 @@ Terms<T> termsOf(LensModel model, const T* p) {
       t.sy1 = q[10];
       t.sy2 = q[11];
       break;
+    case LensModel::simpleDivision:
+    case LensModel::division:
+      t.plain = t.isDivision = true;
+      t.k[0] = q[0];
+      break;
+    case LensModel::eucm:
+      t.plain = t.isUnified = true;
+      t.alpha = q[0];
+      t.beta = q[1];
+      break;
   }
   return t;
 }
@@ -127,7 +157,7 @@ struct Distorted {
   T determinant() const { return xa * yb - xb * ya; }
 };
 
-// The plane map of every model but FOV, with its Jacobian.
+// The plane map of the polynomial models, with its Jacobian.
 template <class T>
 Distorted<T> distort(const Terms<T>& t, T a, T b) {
   const T r2 = a * a + b * b;
@@ -225,6 +255,59 @@ bool undistort(const Terms<T>& t, T x, T y, T& a, T& b) {
   return error < 64 * kEpsilon * scale && isBeforeFold(t, a, b);
 }
 
+// Division model: the direction through (a, b) is (a, b, 1 + k r²). It turns away from the axis as r grows, for k > 0
+// until r² = 1/k, where it folds.
+template <class T>
+bool divisionUnproject(T k, T a, T b, T& z) {
+  const T kr2 = k * (a * a + b * b);
+  z = 1 + kr2;
+  return kr2 < 1;
+}
+
+// The smaller root r of k ρ r² - z r + ρ = 0, as a factor of the unit direction's (a, b).
+template <class T>
+bool divisionProject(T k, T z, T& a, T& b) {
+  const T rho2 = a * a + b * b;
+  const T square = z * z - 4 * k * rho2;
+  if (!(square > 0)) return false;
+  const T root = std::sqrt(square);
+  // Behind the camera z + root cancels. On the axis there it is zero, as it is behind every lens with k ≥ 0.
+  const T factor = z > 0 ? 2 / (z + root) : (z - root) / (2 * k * rho2);
+  if (!(factor > 0)) return false;
+  a *= factor;
+  b *= factor;
+  return true;
+}
+
+template <class T>
+bool isUnifiedLens(T alpha, T beta) {
+  return alpha >= 0 && alpha <= 1 && beta > 0;
+}
+
+// Unified model: the direction through (a, b) is (a, b, z) with z = (1 - α²βr²) / (α √(1 - (2α - 1)βr²) + 1 - α).
+template <class T>
+bool unifiedUnproject(T alpha, T beta, T a, T b, T& z) {
+  if (!isUnifiedLens(alpha, beta)) return false;
+  const T s = beta * (a * a + b * b);
+  const T square = 1 - (2 * alpha - 1) * s;
+  if (!(square > 0)) return false;
+  z = (1 - alpha * alpha * s) / (alpha * std::sqrt(square) + 1 - alpha);
+  return true;
+}
+
+// (a, b) / (α ρ + (1 - α) z) with ρ² = β (a² + b²) + z², of a unit direction.
+template <class T>
+bool unifiedProject(T alpha, T beta, T z, T& a, T& b) {
+  if (!isUnifiedLens(alpha, beta)) return false;
+  const T rho = std::sqrt(beta * (a * a + b * b) + z * z);
+  const T divisor = alpha * rho + (1 - alpha) * z;
+  // The second is the sign of ∂r/∂θ: beyond it the map folds back.
+  if (!(divisor > 0) || !(alpha * z + (1 - alpha) * rho > 0)) return false;
+  a /= divisor;
+  b /= divisor;
+  return true;
+}
+
 }  // namespace lens_internal
 
 // Unit direction in camera axes (right, down, forward) of the ray through pixel position (x, y); false where the lens
@@ -246,7 +329,11 @@ bool lensUnproject(LensModel model, const T* parameters, T x, T y, T directionOu
     if (!undistort(t, T(a), T(b), a, b)) return false;
   }
   T z = 1;
-  if (t.fisheye) {
+  if (t.isDivision) {
+    if (!divisionUnproject(t.k[0], a, b, z)) return false;
+  } else if (t.isUnified) {
+    if (!unifiedUnproject(t.alpha, t.beta, a, b, z)) return false;
+  } else if (t.fisheye) {
     const T theta = std::sqrt(a * a + b * b);
     if (!(theta <= T(3.14159265358979))) return false;
     const T factor = theta < T(1e-3) ? 1 - theta * theta / 6 : std::sin(theta) / theta;
@@ -267,8 +354,14 @@ bool lensProject(LensModel model, const T* parameters, const T xInCamera[3], T p
   using namespace lens_internal;
   const Terms<T> t = termsOf(model, parameters);
   T a = xInCamera[0], b = xInCamera[1];
-  const T z = xInCamera[2];
-  if (t.fisheye) {
+  T z = xInCamera[2];
+  if (t.isDivision || t.isUnified) {
+    const T length = std::hypot(a, b, z);
+    a /= length;
+    b /= length;
+    z /= length;
+    if (!(t.isDivision ? divisionProject(t.k[0], z, a, b) : unifiedProject(t.alpha, t.beta, z, a, b))) return false;
+  } else if (t.fisheye) {
     const T rho = std::hypot(a, b);
     if (rho == 0) {
       if (!(z > 0)) return false;

@@ -142,7 +142,7 @@ Capture synthesiseCity(const fs::path& out, const CityOptions& options) {
       if (options.traffic) traffic.emplace(city, stations[i].seconds);
       const ShutterOptions shutter{options.samplesPerPixel, photo.exposure, mix64(options.seed) + i};
       const Exposed exposed =
-          takePhoto(city, traffic ? &*traffic : nullptr, lens, photo.worldFromCamera, shutter, pool);
+          takePhoto({city, traffic ? &*traffic : nullptr}, lens, photo.worldFromCamera, shutter, pool);
       writePhoto(photo, exposed,
                  {*photo.gps, 36 * camera.focalX() / camera.width, photo.exposure, stations[i].seconds});
     }

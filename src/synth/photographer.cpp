@@ -80,13 +80,17 @@ std::array<uint8_t, 3> developed(const Vec3f& radiance, double exposure) {
   return bytes;
 }
 
-Exposed takePhoto(const CityScene& city, const TrafficScene* traffic, const LensTable& lens,
-                  const Pose& worldFromCamera, const ShutterOptions& options, ThreadPool& pool) {
+Exposed takePhoto(const Moment& moment, const LensTable& lens, const Pose& worldFromCamera,
+                  const ShutterOptions& options, ThreadPool& pool) {
   const Camera& camera = lens.camera();
   Exposed result{ImageU8(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
                  ImageU8(camera.width, camera.height, 1, 255)};
-  const Sampler sampler{
-      city, traffic, lens, worldFromCamera, static_cast<float>(1 / camera.focalX()), RandomStream(options.seed, 3)};
+  const Sampler sampler{moment.city,
+                        moment.traffic,
+                        lens,
+                        worldFromCamera,
+                        static_cast<float>(1 / camera.focalX()),
+                        RandomStream(options.seed, 3)};
   pool.run(camera.height, [&](size_t row, int) {
     const int y = static_cast<int>(row);
     for (int x = 0; x < camera.width; ++x) {
@@ -119,7 +123,7 @@ Exposed takePhoto(const CityScene& city, const TrafficScene* traffic, const Lens
       float zShare = 1;
       bool moving = false;
       const Ray centre = sampler.rayAt(x + 0.5, y + 0.5, &zShare);
-      const std::optional<SurfaceHit> hit = firstHit(city, traffic, centre, &moving);
+      const std::optional<SurfaceHit> hit = firstHit(moment.city, moment.traffic, centre, &moving);
       *result.depth.at(x, y) = hit ? hit->distance * zShare : 0.f;
       if (touched || moving) *result.mask.at(x, y) = 0;
     }

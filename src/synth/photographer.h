@@ -33,9 +33,15 @@ class LensTable {
   std::vector<Eigen::Vector2d> corners_;  // at whole pixel positions, (width + 3) × (height + 3) from (-1, -1)
 };
 
+// What stands before the lens.
+struct Moment {
+  const CityScene& city;
+  const TrafficScene* traffic = nullptr;  // cars, where they are at that time; none: empty streets
+};
+
 // The result depends on everything but the number of threads.
-Exposed takePhoto(const CityScene& city, const TrafficScene* traffic, const LensTable& lens,
-                  const Pose& worldFromCamera, const ShutterOptions& options, ThreadPool& pool);
+Exposed takePhoto(const Moment& moment, const LensTable& lens, const Pose& worldFromCamera,
+                  const ShutterOptions& options, ThreadPool& pool);
 
 // Linear radiance to 8-bit sRGB, as photos show it.
 std::array<uint8_t, 3> developed(const Vec3f& radiance, double exposure);

@@ -32,8 +32,8 @@ TEST(Photographer, GivesTheSameBytesForAnyNumberOfThreads) {
   const TrafficScene traffic(city(), 12);
   ThreadPool one(1), three(3);
   const Pose pose = view(10, -90, 70, 0, 45);
-  const Exposed a = takePhoto(city(), &traffic, lens, pose, {2, 0.3, 9}, one);
-  const Exposed b = takePhoto(city(), &traffic, lens, pose, {2, 0.3, 9}, three);
+  const Exposed a = takePhoto({city(), &traffic}, lens, pose, {2, 0.3, 9}, one);
+  const Exposed b = takePhoto({city(), &traffic}, lens, pose, {2, 0.3, 9}, three);
   EXPECT_EQ(a.colour.pixels, b.colour.pixels);
   EXPECT_EQ(a.depth.pixels, b.depth.pixels);
   EXPECT_EQ(a.mask.pixels, b.mask.pixels);
@@ -56,8 +56,8 @@ TEST(Photographer, PutsDepthOfTwoPhotosOnTheSameSurfaces) {
   const LensTable lens(camera);
   ThreadPool pool(2);
   const Pose poseA = view(0, -70, 75, 0, 55), poseB = view(25, -60, 65, -20, 60);
-  const Exposed a = takePhoto(city(), nullptr, lens, poseA, {1, 0, 1}, pool),
-                b = takePhoto(city(), nullptr, lens, poseB, {1, 0, 1}, pool);
+  const Exposed a = takePhoto({city()}, lens, poseA, {1, 0, 1}, pool),
+                b = takePhoto({city()}, lens, poseB, {1, 0, 1}, pool);
   int agree = 0, behind = 0;
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
@@ -87,7 +87,7 @@ TEST(Photographer, MeasuresDepthAlongTheOpticalAxis) {
   const Camera camera = droneCamera(40, 30);
   ThreadPool pool(1);
   const Pose pose = view(0, 0, 400, 0, 90);
-  const Exposed photo = takePhoto(city(), nullptr, LensTable(camera), pose, {1, 0, 1}, pool);
+  const Exposed photo = takePhoto({city()}, LensTable(camera), pose, {1, 0, 1}, pool);
   for (const auto& [x, y] : {std::pair(0, 0), std::pair(39, 2), std::pair(3, 29)}) {
     const Vec3d point = pointAt(camera, pose, photo.depth, x, y);
     EXPECT_NEAR(*photo.depth.at(x, y), 400 - point.z(), 1e-3);
@@ -97,8 +97,7 @@ TEST(Photographer, MeasuresDepthAlongTheOpticalAxis) {
 
 TEST(Photographer, ShowsSkyWithoutDepth) {
   ThreadPool pool(1);
-  const Exposed photo =
-      takePhoto(city(), nullptr, LensTable(droneCamera(24, 18)), view(0, 0, 150, 40, -30), {1, 0, 1}, pool);
+  const Exposed photo = takePhoto({city()}, LensTable(droneCamera(24, 18)), view(0, 0, 150, 40, -30), {1, 0, 1}, pool);
   for (float depth : photo.depth.pixels) EXPECT_EQ(depth, 0);
   EXPECT_GT(photo.colour.at(12, 9)[2], photo.colour.at(12, 9)[0]) << "it is blue";
 }
@@ -109,8 +108,8 @@ TEST(Photographer, MasksAllThatTrafficChanges) {
   ThreadPool pool(2);
   const TrafficScene traffic(city(), 5);
   const Pose pose = view(0, -20, 90, 0, 80);
-  const Exposed with = takePhoto(city(), &traffic, lens, pose, {2, 0, 3}, pool),
-                without = takePhoto(city(), nullptr, lens, pose, {2, 0, 3}, pool);
+  const Exposed with = takePhoto({city(), &traffic}, lens, pose, {2, 0, 3}, pool),
+                without = takePhoto({city()}, lens, pose, {2, 0, 3}, pool);
   int masked = 0, changed = 0, cars = 0;
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
@@ -141,8 +140,8 @@ TEST(Photographer, AppliesExposureAsAGainOfLinearLight) {
   const LensTable lens(droneCamera(40, 30));
   ThreadPool pool(2);
   const Pose pose = view(0, -60, 60, 0, 60);
-  const Exposed plain = takePhoto(city(), nullptr, lens, pose, {2, 0, 3}, pool),
-                darker = takePhoto(city(), nullptr, lens, pose, {2, -1, 3}, pool);
+  const Exposed plain = takePhoto({city()}, lens, pose, {2, 0, 3}, pool),
+                darker = takePhoto({city()}, lens, pose, {2, -1, 3}, pool);
   const auto linear = [](uint8_t value) {
     const double v = value / 255.0;
     return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);

@@ -14,7 +14,7 @@ std::vector<std::vector<KnownDistance>> knownDistances(const Capture& capture, c
                         observation.y < static_cast<float>(camera.height);
     const Vec3d offset = point.xInWorld - photo.worldFromCamera.translation;
     const bool behind = !(offset.dot(photo.worldFromCamera.rotation.col(2)) > 0);
-    if (!inside || (behind && !lensIsFisheye(camera.lens))) continue;
+    if (!inside || (behind && !lensSeesBehind(camera.lens))) continue;
     known[observation.photo].push_back({static_cast<uint32_t>(observation.x), static_cast<uint32_t>(observation.y),
                                         static_cast<float>(offset.norm() * frame.scale)});
   }

@@ -3,10 +3,13 @@
 #include <Eigen/Dense>
 #include <algorithm>
 
+#include "base/log.h"
+
 namespace tessera {
 namespace {
 
 constexpr size_t kEnoughPoints = 200;
+constexpr double kFarOut = 10;  // times as far out as nine cameras in ten: a pose gone wrong
 
 double percentile(std::vector<double>& values, double fraction) {
   const size_t rank = static_cast<size_t>(fraction * static_cast<double>(values.size() - 1));
@@ -26,24 +29,53 @@ SceneFrame frameOfPoints(const Capture& capture) {
   return {(low + high) / 2, 2 / std::max(1e-9, (high - low).maxCoeff())};
 }
 
+// All photos but those few that would shrink the scene of all others to a speck.
+std::vector<const Photo*> photosTogether(const Capture& capture) {
+  Vec3d median = Vec3d::Zero();
+  for (int axis = 0; axis < 3 && !capture.photos.empty(); ++axis) {
+    std::vector<double> values;
+    for (const Photo& photo : capture.photos) values.push_back(photo.worldFromCamera.translation[axis]);
+    median[axis] = percentile(values, 0.5);
+  }
+  std::vector<double> distances;
+  for (const Photo& photo : capture.photos) distances.push_back((photo.worldFromCamera.translation - median).norm());
+  std::vector<double> sorted = distances;
+  const double most = sorted.empty() ? 0 : percentile(sorted, 0.9);
+  std::vector<const Photo*> together;
+  std::string first;
+  for (size_t i = 0; i < distances.size(); ++i) {
+    if (most > 0 && distances[i] > kFarOut * most) {
+      if (first.empty()) first = capture.photos[i].name;
+    } else {
+      together.push_back(&capture.photos[i]);
+    }
+  }
+  if (together.size() < distances.size()) {
+    warn(
+        "{} photos stand more than {} times as far out as nine in ten do ({}, ...): the region of interest is fitted "
+        "without them",
+        distances.size() - together.size(), kFarOut, first);
+  }
+  return together;
+}
+
 SceneFrame frameOfCameras(const Capture& capture) {
   // The point nearest to all optical axes in the least-squares sense; a little weight holds it near the cameras when
   // the axes are parallel.
   Mat3d sum = Mat3d::Zero();
-  Vec3d right = Vec3d::Zero(), mean = Vec3d::Zero();
-  for (const Photo& photo : capture.photos) mean += photo.worldFromCamera.translation;
-  mean /= std::max<double>(1, static_cast<double>(capture.photos.size()));
-  for (const Photo& photo : capture.photos) {
-    const Vec3d axis = photo.worldFromCamera.rotation.col(2);
+  Vec3d right = Vec3d::Zero();
+  const std::vector<const Photo*> photos = photosTogether(capture);
+  for (const Photo* photo : photos) {
+    const Vec3d axis = photo->worldFromCamera.rotation.col(2);
     const Mat3d across = Mat3d::Identity() - axis * axis.transpose() * 0.999;
     sum += across;
-    right += across * photo.worldFromCamera.translation;
+    right += across * photo->worldFromCamera.translation;
   }
   SceneFrame frame;
-  frame.centre = capture.photos.empty() ? mean : Vec3d(sum.ldlt().solve(right));
+  if (!photos.empty()) frame.centre = sum.ldlt().solve(right);
   double reach = 1e-9;
-  for (const Photo& photo : capture.photos) {
-    reach = std::max(reach, (photo.worldFromCamera.translation - frame.centre).lpNorm<Eigen::Infinity>());
+  for (const Photo* photo : photos) {
+    reach = std::max(reach, (photo->worldFromCamera.translation - frame.centre).lpNorm<Eigen::Infinity>());
   }
   frame.scale = 1 / reach;
   return frame;

@@ -15,7 +15,7 @@ struct SceneFrame {
 
 // The region of interest of a capture: a cube around what the cameras look at. With enough sparse points, their robust
 // bounds (2nd to 98th percentile per axis); else the point nearest to all optical axes, reaching to the farthest
-// camera. `margin` enlarges it.
+// camera, without those few that stand ten times as far out as most (warned of). `margin` enlarges it.
 SceneFrame fitSceneFrame(const Capture& capture, double margin);
 
 // A camera as ray kernels want it.

@@ -73,6 +73,28 @@ TEST(SceneFrame, WithoutPointsLiesWhereTheCamerasLook) {
   }
 }
 
+TEST(SceneFrame, WithoutPointsIsNotMovedByACameraFarAway) {
+  Capture capture = orbit({300, -200, 10}, 20);
+  const SceneFrame before = fitSceneFrame(capture, 1);
+  capture.photos.insert(capture.photos.begin() + 3, lookingAt({1e9, 2e9, -1e9}, {0, 0, 0}));
+  capture.photos[3].name = "stray.jpg";
+  testing::internal::CaptureStderr();
+  const SceneFrame after = fitSceneFrame(capture, 1);
+  const std::string warnings = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(after.centre, before.centre);
+  EXPECT_EQ(after.scale, before.scale);
+  EXPECT_NE(warnings.find("1 photos stand"), std::string::npos) << warnings;
+  EXPECT_NE(warnings.find("stray.jpg"), std::string::npos) << warnings;
+}
+
+TEST(SceneFrame, WithoutPointsReachesToCamerasThatStandApartForAReason) {
+  Capture capture = orbit({0, 0, 0}, 20);
+  for (const Vec3d& from : {Vec3d(0, 0, 150), Vec3d(10, 0, 160)}) capture.photos.push_back(lookingAt(from, {0, 0, 1}));
+  for (int i = 0; i < 40; ++i) capture.photos.push_back(lookingAt({1, 2, 3}, {0.1 * i, 0, 0}));  // on a tripod
+  const SceneFrame frame = fitSceneFrame(capture, 1);
+  EXPECT_NEAR(frame.sceneFromWorld({10, 0, 160}).lpNorm<Eigen::Infinity>(), 1, 1e-9);
+}
+
 TEST(SceneFrame, OfCamerasThatAllLookTheSameWayIsFinite) {
   Capture capture;
   for (int i = 0; i < 5; ++i) capture.photos.push_back(lookingAt(Vec3d(i, 0, 30), Vec3d(i, 0, 0)));

@@ -44,7 +44,7 @@ struct View {
 
 // Along the optical axis; along the ray for fisheyes, which see behind that plane.
 double depthOf(const Camera& camera, const Vec3d& xInCamera) {
-  return lensIsFisheye(camera.lens) ? xInCamera.norm() : xInCamera.z();
+  return lensSeesBehind(camera.lens) ? xInCamera.norm() : xInCamera.z();
 }
 
 bool sees(const View& view, const Vec3d& xInWorld) {

@@ -1,0 +1,65 @@
+#include "import/picture_origins.h"
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+
+namespace tessera {
+namespace {
+
+constexpr size_t kDigits = 16;
+
+// FNV-1a.
+std::string hashOf(const std::string& text) {
+  uint64_t hash = 0xcbf29ce484222325ull;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;
+  return fmt::format("{:016x}", hash);
+}
+
+std::map<std::string, std::string> readFingerprints(const fs::path& file) {
+  std::map<std::string, std::string> fingerprints;
+  std::error_code status;
+  if (!fs::is_regular_file(file, status)) return fingerprints;
+  const std::string text = readTextFile(file);
+  for (size_t begin = 0; begin < text.size();) {
+    const size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string line = text.substr(begin, end - begin);
+    if (line.size() > kDigits + 2) fingerprints[line.substr(kDigits + 2)] = line.substr(0, kDigits);
+    begin = end + 1;
+  }
+  return fingerprints;
+}
+
+}  // namespace
+
+void PictureOrigins::add(const std::string& picture, const fs::path& source, const std::string& how) {
+  std::error_code status;
+  const fs::path path = fs::weakly_canonical(source, status);
+  const uintmax_t bytes = fs::file_size(source, status);
+  const auto time = fs::last_write_time(source, status).time_since_epoch().count();
+  origins_[picture] = {source, hashOf(fmt::format("{}\n{}\n{}\n{}", path.string(), bytes, time, how))};
+}
+
+void PictureOrigins::claim(const fs::path& capture) const {
+  const fs::path file = capture / "sources.txt";
+  const auto known = readFingerprints(file);
+  std::string text;
+  for (const auto& [picture, origin] : origins_) {
+    const auto found = known.find(picture);
+    const fs::path path = capture / picture;
+    std::error_code status;
+    // A picture that is its source, linked or imported in place, is no copy of anything else.
+    if ((found == known.end() || found->second != origin.fingerprint) && fs::is_regular_file(path, status) &&
+        !fs::equivalent(path, origin.source, status)) {
+      fs::remove(path, status);
+      if (status) {
+        throw Error(path.string(), "", "is of another import and could not be removed: " + status.message(),
+                    "name another folder to write to");
+      }
+    }
+    if (picture.find('\n') == picture.npos) text += fmt::format("{}  {}\n", origin.fingerprint, picture);
+  }
+  writeFileAtomically(file, text);
+}
+
+}  // namespace tessera
