@@ -75,6 +75,23 @@ class CommandLine : public testing::Test {
     return made;
   }
 
+  // A camera path that stops at the first three photos of the city; poses are moved by 2 · (x + (5, 0, 0)) unless they
+  // are to stay in the source's world.
+  static std::string writePath(const std::string& name, bool inSourceWorld) {
+    json views = json::array();
+    const json capture = json::parse(readTextFile(fs::path(city()) / "transforms.json"));
+    for (int i = 0; i < 3; ++i) {
+      json matrix = capture.at("frames").at(i).at("transform_matrix");
+      if (!inSourceWorld) {
+        for (int k = 0; k < 3; ++k) matrix[k][3] = 2 * (matrix[k][3].get<double>() + (k == 0 ? 5 : 0));
+      }
+      views.push_back({{"camera_to_world", matrix}, {"fov", 50}});
+    }
+    const json path = {{"camera_path", views}, {"render_width", 24}, {"render_height", 18}, {"fps", 10}};
+    writeFileAtomically(at(name), path.dump());
+    return at(name);
+  }
+
   // Fails with exit code 1 and one line of the one form; the line.
   static std::string failureOf(const std::vector<std::string>& arguments) {
     const Said said = run(arguments);
@@ -151,6 +168,8 @@ TEST_F(CommandLine, EndsWithTwoWhenItIsUsedWrongly) {
   usageErrorOf({"import", city(), at("i"), "--threads", "-1"});
   usageErrorOf({"synth", "city", at("none"), "--threads", "-1"});
   usageErrorOf({"render", model(), at("r")});
+  usageErrorOf({"render", model(), at("r"), "--views", city(), "--path", at("path.json")});
+  usageErrorOf({"render", model(), at("r"), "--views", city(), "--dataparser-transforms", at("transforms.json")});
   usageErrorOf({"bench"});
   EXPECT_FALSE(fs::exists(at("m")));
 }
@@ -318,7 +337,8 @@ TEST_F(CommandLine, GoesTheWholeWayFromACityToPictures) {
   said = run({"render", trained, at("frames"), "--views", city(), "--size", "24x18"});
   ASSERT_EQ(said.exitCode, 0) << said.err;
   size_t frames = 0;
-  for (const auto& entry : fs::directory_iterator(at("frames"))) {
+  for (const auto& entry : fs::recursive_directory_iterator(at("frames"))) {
+    if (!entry.is_regular_file()) continue;
     const ImageInfo info = probeImageFile(entry.path());
     EXPECT_EQ(info.width, 24);
     EXPECT_EQ(info.height, 18);
@@ -339,6 +359,52 @@ TEST_F(CommandLine, GoesTheWholeWayFromACityToPictures) {
   said = run({"info", trained});
   EXPECT_EQ(said.exitCode, 0);
   EXPECT_TRUE(contains(said.out, "field")) << said.out;
+}
+
+TEST_F(CommandLine, FollowsACameraPath) {
+  const std::string path = writePath("flights/path.json", true);
+  Said said = run({"render", model(), at("flown"), "--path", path});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.out, "3 frames")) << said.out;
+  std::vector<ImageU8> frames;
+  for (const char* name : {"flown/00000.png", "flown/00001.png", "flown/00002.png"}) {
+    frames.push_back(readImage(at(name)).image);
+    EXPECT_EQ(frames.back().width, 24);
+    EXPECT_EQ(frames.back().height, 18);
+  }
+  EXPECT_NE(frames[0].pixels, frames[1].pixels);
+  said = run({"render", model(), at("flown-large"), "--path", path, "--size", "32x20"});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_EQ(probeImageFile(at("flown-large/00002.png")).width, 32);
+
+  // The same places as nerfstudio's viewer tells them.
+  const std::string moved = writePath("viewer/path.json", false);
+  writeFileAtomically(at("moved.json"),
+                      std::string_view(R"({"transform": [[1,0,0,5],[0,1,0,0],[0,0,1,0]], "scale": 2})"));
+  said = run({"render", model(), at("flown-moved"), "--path", moved, "--dataparser-transforms", at("moved.json")});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_EQ(readImage(at("flown-moved/00001.png")).image.pixels, frames[1].pixels);
+  said = run({"render", model(), at("flown-elsewhere"), "--path", moved});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_NE(readImage(at("flown-elsewhere/00001.png")).image.pixels, frames[1].pixels);
+  fs::rename(at("moved.json"), at("viewer/dataparser_transforms.json"));
+  said = run({"render", model(), at("flown-beside"), "--path", moved});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.err, "dataparser_transforms.json")) << said.err;
+  EXPECT_EQ(readImage(at("flown-beside/00001.png")).image.pixels, frames[1].pixels);
+  const std::string wrong = failureOf({"render", model(), at("none"), "--path", path, "--dataparser-transforms", path});
+  EXPECT_TRUE(contains(wrong, "flights/path.json")) << wrong;
+  EXPECT_FALSE(fs::exists(at("none")));
+}
+
+TEST_F(CommandLine, FilmsACameraPath) {
+  if (!isInPath("ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed: videos are not tested";
+  const Said said = run({"render", model(), at("film/flight.mp4"), "--path", writePath("film.json", true)});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  const std::string film = readTextFile(at("film/flight.mp4"));
+  EXPECT_EQ(film.substr(4, 4), "ftyp");
+  EXPECT_TRUE(contains(film, "avc1"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(at("film")), fs::directory_iterator()), 1);
 }
 
 TEST_F(CommandLine, EndsWithTheSameBytesHoweverOftenItIsKilled) {

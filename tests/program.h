@@ -9,6 +9,8 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdlib>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -74,6 +76,16 @@ class Program {
   fs::path out_, err_;
   pid_t process_ = -1;
 };
+
+// Whether a program of that name can be started.
+inline bool isInPath(const std::string& name) {
+  const char* search = std::getenv("PATH");
+  std::stringstream folders(search == nullptr ? "" : search);
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    if (::access((folder + "/" + name).c_str(), X_OK) == 0) return true;
+  }
+  return false;
+}
 
 // Until the file is there, or the program has ended.
 inline void waitForFile(Program& program, const fs::path& file) {

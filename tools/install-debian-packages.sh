@@ -16,7 +16,7 @@ packages=(
 for argument in "$@"; do
   case "$argument" in
     --fuzz) packages+=(clang-14 libclang-rt-14-dev) ;;
-    --bench) packages+=(libtorch-dev vulkan-tools) ;;
+    --bench) packages+=(jq libtorch-dev libopenblas0-pthread vulkan-tools) ;;
     *) echo "usage: $0 [--fuzz] [--bench]" >&2; exit 2 ;;
   esac
 done

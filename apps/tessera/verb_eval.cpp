@@ -8,21 +8,10 @@
 #include "representations/field/field_renderer.h"
 
 namespace tessera {
-namespace {
-
-Split splitFromName(const std::string& name) {
-  if (name == "train") return Split::train;
-  if (name == "validation") return Split::validation;
-  return Split::test;
-}
-
-}  // namespace
 
 void addEvalVerb(CLI::App& app) {
   struct Flags {
-    std::string model, capture, split = "test", json, report, exposure = "neutral";
-    EvaluateOptions options;
-    std::string images, lpips;
+    std::string model, capture, split = "test", exposure = "neutral", json, report, images, lpips;
     DeviceOptions device;
   };
   auto flags = std::make_shared<Flags>();
@@ -47,7 +36,7 @@ void addEvalVerb(CLI::App& app) {
     const std::unique_ptr<FieldModel> model = loadFieldModel(*device, flags->model);
     FieldRenderer renderer(*model);
     EvaluateOptions options;
-    options.split = splitFromName(flags->split);
+    options.split = *splitFromName(flags->split);
     options.fitExposure = flags->exposure == "fitted";
     options.lpipsWeights = flags->lpips;
     options.imagesDir = flags->images;

@@ -12,7 +12,7 @@
 
 namespace tessera {
 
-// Adds the verb to `app`; `run` is called when the verb was given.
+// Each adds its verb to `app`, which does its work when the verb was given.
 void addSynthVerb(CLI::App& app);
 void addImportVerb(CLI::App& app);
 void addTrainVerb(CLI::App& app);

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <set>
 
 namespace tessera::device_test {
 namespace {
@@ -79,12 +80,15 @@ class DeviceTest : public testing::TestWithParam<OperationOnDevice> {
  protected:
   void SetUp() override {
     const auto& [row, name] = GetParam();
+    useSimdTargetOf(name);
     operation = row.operation;
     tests = row.tests();
     device = deviceNamed(name);
     if (device == nullptr) GTEST_SKIP() << "this machine has no device \"" << name << "\"";
     if (!device->supports(operation)) GTEST_SKIP() << name << " does not support " << nameOf(operation);
   }
+
+  void TearDown() override { useSimdTargetOf({}); }
 
   Operation operation{};
   OperationTests tests;
@@ -144,6 +148,12 @@ std::vector<std::string> devicesButTheReference() {
   return names;
 }
 
+std::vector<std::string> cpusWithTwoThreads() {
+  std::vector<std::string> names = lesserCpuNames();
+  names.push_back("cpu with 2 threads");
+  return names;
+}
+
 std::string testName(const testing::TestParamInfo<OperationOnDevice>& info) {
   std::string name = fmt::format("{}_{}", nameOf(std::get<0>(info.param).operation), std::get<1>(info.param));
   std::replace(name.begin(), name.end(), ' ', '_');
@@ -152,7 +162,7 @@ std::string testName(const testing::TestParamInfo<OperationOnDevice>& info) {
 
 INSTANTIATE_TEST_SUITE_P(Device, Values, testing::ValuesIn(rows(false, devicesButTheReference())), testName);
 INSTANTIATE_TEST_SUITE_P(Device, Gradients, testing::ValuesIn(rows(true, deviceNames())), testName);
-INSTANTIATE_TEST_SUITE_P(Device, Threads, testing::ValuesIn(rows(false, {"cpu with 2 threads"})), testName);
+INSTANTIATE_TEST_SUITE_P(Device, Threads, testing::ValuesIn(rows(false, cpusWithTwoThreads())), testName);
 
 TEST(Operations, HaveAGradientToCheckOrAReasonForNone) {
   for (const Row& row : kRows) {
@@ -163,17 +173,31 @@ TEST(Operations, HaveAGradientToCheckOrAReasonForNone) {
   }
 }
 
+TEST(Devices, RunTheKernelsOfEachInstructionSetThatTheMachineHas) {
+  std::set<std::string> targets = {deviceNamed("cpu with 2 threads")->target()};
+  for (const std::string& name : lesserCpuNames()) {
+    useSimdTargetOf(name);
+    const std::string target = deviceNamed(name)->target();
+    EXPECT_EQ(name, "cpu " + target.substr(target.find('/') + 1) + " with 2 threads");
+    EXPECT_TRUE(targets.insert(target).second) << target;
+  }
+  useSimdTargetOf({});
+  EXPECT_TRUE(targets.contains(deviceNamed("cpu with 2 threads")->target()));
+}
+
 // So that whoever reads the log sees what is missing where.
 TEST(Devices, SayWhatTheyDoNotSupport) {
   for (const std::string& name : deviceNames()) {
     Device* const device = deviceNamed(name);
     if (device == nullptr) continue;
+    useSimdTargetOf(name);
     std::string missing;
     for (const Row& row : kRows)
       if (!device->supports(row.operation)) missing += fmt::format(" {}", nameOf(row.operation));
     std::printf("%s (%s) lacks%s\n", name.c_str(), device->name().c_str(),
                 missing.empty() ? " nothing" : missing.c_str());
   }
+  useSimdTargetOf({});
   EXPECT_NE(deviceNamed("reference"), nullptr);
   EXPECT_NE(deviceNamed("cpu with 1 thread"), nullptr);
 }

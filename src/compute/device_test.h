@@ -144,5 +144,9 @@ double dot(View a, View b);
 // The devices of this build, by name: "reference", "cpu with 1 thread", ... Null where this machine has none.
 std::vector<std::string> deviceNames();
 Device* deviceNamed(const std::string& name);
+// The cpu device with each lesser instruction set that this machine has: "cpu AVX2 with 2 threads", ... All cpu devices
+// share one set, so a test on a device first says which.
+std::vector<std::string> lesserCpuNames();
+void useSimdTargetOf(const std::string& name);  // the best where the name says none
 
 }  // namespace tessera::device_test

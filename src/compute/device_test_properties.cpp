@@ -13,9 +13,11 @@ namespace {
 class DeviceProperties : public testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
+    useSimdTargetOf(GetParam());
     device = deviceNamed(GetParam());
     if (device == nullptr) GTEST_SKIP() << "this machine has no device \"" << GetParam() << "\"";
   }
+  void TearDown() override { useSimdTargetOf({}); }
   bool lacks(Operation operation) const { return !device->supports(operation); }
   Device* device = nullptr;
 };

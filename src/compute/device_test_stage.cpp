@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "base/error.h"
+#include "compute/cpu/simd_targets.h"
 #include "compute/device_test.h"
 #ifdef TESSERA_HAS_VULKAN
 #include "compute/vulkan/device.h"
@@ -188,7 +189,7 @@ std::unique_ptr<Device> openDevice(const std::string& name) {
 #endif
   DeviceOptions options;
   options.kind = name.substr(0, name.find(' '));
-  if (options.kind == "cpu") options.threads = name.find('1') != std::string::npos ? 1 : 2;
+  if (options.kind == "cpu") options.threads = name.find("1 thread") != std::string::npos ? 1 : 2;
   return makeDevice(options);
 }
 
@@ -198,15 +199,33 @@ bool mustBeThere(const std::string& name) {
   return !name.starts_with("vulkan") || (required != nullptr && std::string(required) == "1");
 }
 
+// "cpu AVX2 with 2 threads" → "AVX2"; empty where the name says none.
+std::string simdTargetOf(const std::string& name) {
+  const size_t begin = name.find(' ') + 1, end = name.find(" with ");
+  return name.starts_with("cpu ") && begin < end ? name.substr(begin, end - begin) : std::string();
+}
+
 }  // namespace
+
+std::vector<std::string> lesserCpuNames() {
+  std::vector<std::string> names;
+  for (const std::string& target : cpu::simdTargets()) names.push_back("cpu " + target + " with 2 threads");
+  if (!names.empty()) names.erase(names.begin());  // the best is what cpu devices take by themselves
+  return names;
+}
 
 std::vector<std::string> deviceNames() {
   std::vector<std::string> names = {"reference", "cpu with 1 thread", "cpu with 2 threads"};
+  for (std::string& name : lesserCpuNames()) names.push_back(std::move(name));
 #ifdef TESSERA_HAS_VULKAN
   names.push_back("vulkan");
   names.push_back("vulkan without float atomics");
 #endif
   return names;
+}
+
+void useSimdTargetOf(const std::string& name) {
+  cpu::useSimdTarget(simdTargetOf(name));
 }
 
 Device* deviceNamed(const std::string& name) {

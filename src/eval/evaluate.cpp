@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <set>
 
 #include "base/check.h"
 #include "base/error.h"
@@ -11,6 +10,7 @@
 #include "base/log.h"
 #include "eval/heat_map.h"
 #include "eval/lpips.h"
+#include "eval/picture_files.h"
 #include "eval/psnr.h"
 #include "eval/ssim.h"
 
@@ -52,14 +52,6 @@ std::optional<ImageU8> readMask(const Photo& photo, const Camera& camera) {
   return mask;
 }
 
-ImageF compositeOver(const RenderedView& view, const Eigen::Array3f& background) {
-  ImageF image = view.colour;
-  for (size_t p = 0; p < image.pixelCount(); ++p) {
-    for (int c = 0; c < 3; ++c) image.pixels[3 * p + c] += (1 - view.opacity.pixels[p]) * background[c];
-  }
-  return image;
-}
-
 // argmin over g of Σ (g·rendered − photo)² on the left half, per channel.
 std::array<double, 3> fittedGain(const ImageF& rendered, const ImageF& photo, const ImageU8* mask) {
   std::array<double, 3> gain = {1, 1, 1};
@@ -97,7 +89,8 @@ ImageF withMaskedPixelsFrom(ImageF image, const ImageF& other, const ImageU8& ma
 
 class Judge {
  public:
-  explicit Judge(const EvaluateOptions& options) : options_(options), pool_(options.threads) {
+  explicit Judge(const EvaluateOptions& options)
+      : options_(options), pool_(options.threads), pictures_(options.imagesDir) {
     if (!options.lpipsWeights.empty()) lpips_.emplace(options.lpipsWeights);
   }
 
@@ -151,19 +144,16 @@ class Judge {
 
  private:
   void writePictures(const std::string& name, const ImageF& target, const ImageF& rendered) {
-    std::string stem = fs::path(name).replace_extension().string();
-    if (!written_.insert(stem).second) stem = name;  // a.jpg and a.png
-    const auto picture = resolveInside(options_.imagesDir, stem + ".png");
-    const auto error = resolveInside(options_.imagesDir, stem + ".error.png");
-    if (!picture || !error) throw Error(name, "", "would be written outside of the folder", "rename the photo");
-    writePng(*picture, toBytes(rendered));
-    writePng(*error, heatMap(absoluteDifference(rendered, target), 0, kBrightestError, ColourMap::inferno));
+    const std::string stem = pictures_.stemOf(name);
+    writePng(pictures_.at(stem, ".png"), toBytes(rendered));
+    writePng(pictures_.at(stem, ".error.png"),
+             heatMap(absoluteDifference(rendered, target), 0, kBrightestError, ColourMap::inferno));
   }
 
   const EvaluateOptions& options_;
   ThreadPool pool_;
   std::optional<Lpips> lpips_;
-  std::set<std::string> written_;
+  PictureFiles pictures_;
 };
 
 // Mean of what exists; views that a mask covers wholly have no PSNR.

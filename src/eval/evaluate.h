@@ -73,6 +73,7 @@ EvaluationReport evaluate(ViewRenderer& renderer, const Capture& capture, const 
 std::string toJson(const EvaluationReport& report);
 
 std::string_view splitName(Split split);
+std::optional<Split> splitFromName(std::string_view name);
 std::string_view exposureName(bool fitted);  // "neutral", or how it was fitted
 
 }  // namespace tessera

@@ -35,6 +35,13 @@ std::string_view splitName(Split split) {
   return "";
 }
 
+std::optional<Split> splitFromName(std::string_view name) {
+  for (const Split split : {Split::train, Split::validation, Split::test}) {
+    if (name == splitName(split)) return split;
+  }
+  return std::nullopt;
+}
+
 std::string_view exposureName(bool fitted) {
   return fitted ? "fitted on the left half, judged on the right" : "neutral";
 }

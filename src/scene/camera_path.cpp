@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "base/error.h"
+#include "base/log.h"
 
 namespace tessera {
 namespace {
@@ -26,14 +27,15 @@ std::optional<double> finiteNumber(const json& object, const char* key, double a
   return std::isfinite(value) ? std::optional(value) : std::nullopt;
 }
 
-// Sixteen numbers, row by row, or four rows of four.
-std::optional<std::array<double, 16>> matrixFrom(const json& value) {
-  std::array<double, 16> matrix{};
+// Rows of four numbers, flat or nested; those that the file leaves out are the identity's.
+std::optional<Mat4d> matrixFrom(const json& value, size_t rows) {
+  Eigen::Matrix<double, 4, 4, Eigen::RowMajor> matrix = Mat4d::Identity();
   size_t count = 0;
   const auto take = [&](const json& number) {
-    if (!number.is_number() || count >= 16) return false;
-    matrix[count] = number.get<double>();
-    return std::abs(matrix[count++]) < kFarthest;  // false for NaN too
+    if (!number.is_number() || count >= 4 * rows) return false;
+    const double given = number.get<double>();
+    matrix.data()[count++] = given;
+    return std::abs(given) < kFarthest;  // false for NaN too
   };
   if (!value.is_array()) return std::nullopt;
   for (const json& item : value) {
@@ -45,21 +47,23 @@ std::optional<std::array<double, 16>> matrixFrom(const json& value) {
       return std::nullopt;
     }
   }
-  return count == 16 ? std::optional(matrix) : std::nullopt;
+  return count == 4 * rows ? std::optional<Mat4d>(matrix) : std::nullopt;
+}
+
+// The nearest rotation, where it is near.
+std::optional<Mat3d> rotationFrom(const Mat3d& given) {
+  if ((given.transpose() * given - Mat3d::Identity()).cwiseAbs().maxCoeff() > kRotationTolerance) return std::nullopt;
+  if (given.determinant() < 0) return std::nullopt;
+  const Eigen::JacobiSVD<Mat3d> svd(given, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return Mat3d(svd.matrixU() * svd.matrixV().transpose());
 }
 
 std::optional<Pose> poseFrom(const json& value) {
-  const auto matrix = matrixFrom(value);
+  const auto matrix = matrixFrom(value, 4);
   if (!matrix) return std::nullopt;
-  const Mat4d m = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix->data());
-  const Mat3d rotation = m.topLeftCorner<3, 3>();
-  if ((rotation.transpose() * rotation - Mat3d::Identity()).cwiseAbs().maxCoeff() > kRotationTolerance) {
-    return std::nullopt;
-  }
-  if (rotation.determinant() < 0) return std::nullopt;
-  const Eigen::JacobiSVD<Mat3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Mat3d nearest = svd.matrixU() * svd.matrixV().transpose();
-  return Pose{flippedYz(nearest), m.topRightCorner<3, 1>()};
+  const auto rotation = rotationFrom(matrix->topLeftCorner<3, 3>());
+  if (!rotation) return std::nullopt;
+  return Pose{flippedYz(*rotation), matrix->topRightCorner<3, 1>()};
 }
 
 }  // namespace
@@ -97,6 +101,7 @@ std::optional<CameraPath> decodeCameraPath(std::string_view text) {
     if (name != "perspective" && name != "fisheye") return std::nullopt;
     path.fisheye = name == "fisheye";
   }
+  path.fromViewer = file.contains("keyframes");
   const auto views = file.find("camera_path");
   if (views == file.end() || !views->is_array() || views->empty()) return std::nullopt;
   for (const json& item : *views) {
@@ -111,11 +116,51 @@ std::optional<CameraPath> decodeCameraPath(std::string_view text) {
   return path;
 }
 
-CameraPath readCameraPath(const fs::path& path) {
+std::optional<Mat4d> decodeDataparserTransforms(std::string_view text) {
+  const json file = json::parse(text, nullptr, false);
+  if (!file.is_object()) return std::nullopt;
+  const auto transform = file.find("transform");
+  if (transform == file.end()) return std::nullopt;
+  const auto matrix = matrixFrom(*transform, 3);
+  const auto scale = finiteNumber(file, "scale", 1);
+  if (!matrix || !scale || !(*scale > 1 / kFarthest && *scale < kFarthest)) return std::nullopt;
+  const auto rotation = rotationFrom(matrix->topLeftCorner<3, 3>());
+  if (!rotation) return std::nullopt;
+  Mat4d dataparserFromSource = Mat4d::Identity();
+  dataparserFromSource.topLeftCorner<3, 3>() = *scale * *rotation;
+  dataparserFromSource.topRightCorner<3, 1>() = *scale * matrix->topRightCorner<3, 1>();
+  return dataparserFromSource;
+}
+
+Mat4d readDataparserTransforms(const fs::path& path) {
+  const auto decoded = decodeDataparserTransforms(readTextFile(path));
+  if (!decoded) {
+    throw Error(path.string(), "", "does not say how nerfstudio turned and scaled the world",
+                "name the dataparser_transforms.json of the training run, with its transform (3x4) and scale");
+  }
+  return *decoded;
+}
+
+CameraPath readCameraPath(const fs::path& path, const fs::path& dataparserTransforms) {
   auto decoded = decodeCameraPath(readTextFile(path));
   if (!decoded) {
     throw Error(path.string(), "", "is not a camera path that can be followed",
                 "export it from nerfstudio's viewer as perspective or fisheye, with at least one frame");
+  }
+  std::error_code status;
+  fs::path transforms = dataparserTransforms;
+  if (const fs::path beside = path.parent_path() / "dataparser_transforms.json";
+      transforms.empty() && fs::exists(beside, status)) {
+    transforms = beside;
+    inform("{}: followed in the world of {}", path.string(), beside.string());
+  }
+  if (!transforms.empty()) {
+    decoded->pathFromSource = readDataparserTransforms(transforms);
+  } else if (decoded->fromViewer) {
+    warn(
+        "{}: nerfstudio's viewer wrote it, but without its run's dataparser_transforms.json it is followed in the "
+        "source's own world; copy that file beside it, or pass --dataparser-transforms",
+        path.string());
   }
   return std::move(*decoded);
 }

@@ -1,6 +1,10 @@
 // The camera path of nerfstudio's viewer (camera_path.json): what a video follows.
 // Source: nerfstudio, cameras/camera_paths.py and the viewer's export; the field of view is vertical, pixels are
 // square.
+//
+// The viewer exports poses in the world that nerfstudio trained in: its dataparser turned, moved and scaled the
+// source's. A training run leaves what it did in dataparser_transforms.json. Source: nerfstudio,
+// data/dataparsers/base_dataparser.py.
 #pragma once
 
 #include <optional>
@@ -14,9 +18,7 @@
 namespace tessera {
 
 struct CameraPathView {
-  // In the world that the file speaks of, camera axes already ours. That is the capture's source world: apply the inverse
-  // of Capture::sourceFromWorld before rendering.
-  Pose worldFromCamera;
+  Pose worldFromCamera;             // in the world that the file speaks of, camera axes already ours
   double verticalFieldOfView = 50;  // degrees
 };
 
@@ -26,6 +28,9 @@ struct CameraPath {
   double seconds = 0;    // as the file says; the frames are `views`, one each
   bool fisheye = false;  // equidistant instead of perspective
   std::vector<CameraPathView> views;
+  bool fromViewer = false;  // has the viewer's key frames: the poses are in nerfstudio's world, not in the source's
+  // Similarity from the capture's source world (Capture::sourceFromWorld) to that of `views`. Not part of the file.
+  Mat4d pathFromSource = Mat4d::Identity();
 
   // The lens of one frame: pinhole, or an OpenCV fisheye without distortion, centred.
   Camera cameraOf(const CameraPathView& view) const;
@@ -36,7 +41,17 @@ struct CameraPath {
 // that has no lens model (equirectangular). Unknown keys are ignored; absent size, rate and duration are nerfstudio's
 // defaults.
 std::optional<CameraPath> decodeCameraPath(std::string_view text);
-CameraPath readCameraPath(const fs::path& path);  // throws Error naming the path
+
+// Text of a dataparser_transforms.json: {"transform": 3×4, "scale": s}. The similarity x ↦ s · (transform · x) from the
+// world of the source, before what transforms.json calls applied_transform, to the one that nerfstudio trained in.
+// Nothing when the text is not JSON of this form, a number is not finite or out of bounds, or the matrix is no
+// rotation.
+std::optional<Mat4d> decodeDataparserTransforms(std::string_view text);
+Mat4d readDataparserTransforms(const fs::path& path);  // throws Error naming the path
+
+// With `pathFromSource` of the named dataparser_transforms.json, or else of the one beside `path`, where there is one;
+// warns when the path comes from the viewer and there is none. Throws Error naming the file that is wrong.
+CameraPath readCameraPath(const fs::path& path, const fs::path& dataparserTransforms = {});
 
 std::string encodeCameraPath(const CameraPath& path);
 void writeCameraPath(const fs::path& file, const CameraPath& path);

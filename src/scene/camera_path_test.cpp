@@ -114,6 +114,60 @@ TEST(CameraPath, RefusesWhatCannotBeFollowed) {
   }
 }
 
+// As nerfstudio writes it for a capture whose poses were turned from COLMAP's axes.
+constexpr const char* kTransforms =
+    R"({"transform": [[0, 1, 0, 0.5], [1, 0, 0, -0.25], [0, 0, -1, 2]], "scale": 0.125})";
+
+TEST(CameraPath, KnowsTheWorldOfADataparser) {
+  const auto dataparserFromSource = decodeDataparserTransforms(kTransforms);
+  ASSERT_TRUE(dataparserFromSource);
+  // s · (transform · x): the translation is scaled too.
+  const Vec3d moved = (*dataparserFromSource * Vec3d(3, 4, 5).homogeneous()).head<3>();
+  EXPECT_TRUE(moved.isApprox(0.125 * Vec3d(4 + 0.5, 3 - 0.25, -5 + 2)));
+  EXPECT_EQ(dataparserFromSource->row(3), Mat4d::Identity().row(3));
+  const auto unscaled = decodeDataparserTransforms(R"({"transform": [1,0,0,7, 0,1,0,0, 0,0,1,0]})");
+  ASSERT_TRUE(unscaled);
+  EXPECT_EQ((*unscaled)(0, 3), 7);
+}
+
+TEST(CameraPath, RefusesDataparsersThatAreNone) {
+  const std::string turned = R"("transform": [[1,0,0,0],[0,1,0,0],[0,0,1,0]])";
+  EXPECT_TRUE(decodeDataparserTransforms("{" + turned + R"(, "scale": 2})"));
+  for (const std::string& text :
+       {std::string(), std::string("[]"), std::string("{}"), std::string(R"({"scale": 2})"),
+        "{" + turned + R"(, "scale": 0})", "{" + turned + R"(, "scale": -1})", "{" + turned + R"(, "scale": 1e300})",
+        "{" + turned + R"(, "scale": "one"})", "{" + turned + R"(, "scale": null})",
+        std::string(R"({"transform": [[1,0,0,0],[0,1,0,0]], "scale": 1})"),
+        std::string(R"({"transform": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]], "scale": 1})"),
+        std::string(R"({"transform": [[2,0,0,0],[0,1,0,0],[0,0,1,0]], "scale": 1})"),
+        std::string(R"({"transform": [[1,0,0,0],[0,1,0,0],[0,0,-1,0]], "scale": 1})"),
+        std::string(R"({"transform": [[1,0,0,1e300],[0,1,0,0],[0,0,1,0]], "scale": 1})"), std::string(100000, '[')}) {
+    EXPECT_FALSE(decodeDataparserTransforms(text)) << text.substr(0, 120);
+  }
+}
+
+TEST(CameraPath, TakesTheDataparserThatIsNamedOrLiesBesideIt) {
+  const fs::path folder = fs::temp_directory_path() / ("tessera_dataparser_" + std::to_string(::getpid()));
+  const fs::path file = folder / "path.json", beside = folder / "dataparser_transforms.json";
+  writeFileAtomically(file, std::string_view(kFromViewer));
+  EXPECT_EQ(readCameraPath(file).pathFromSource, Mat4d::Identity());
+  EXPECT_TRUE(readCameraPath(file).fromViewer);
+  writeFileAtomically(beside, std::string_view(kTransforms));
+  EXPECT_EQ(readCameraPath(file).pathFromSource, *decodeDataparserTransforms(kTransforms));
+  const std::string other = R"({"transform": [[1,0,0,0],[0,1,0,0],[0,0,1,0]], "scale": 4})";
+  writeFileAtomically(folder / "named.json", other);
+  EXPECT_EQ(readCameraPath(file, folder / "named.json").pathFromSource, *decodeDataparserTransforms(other));
+  writeFileAtomically(beside, std::string_view("{}"));
+  try {
+    readCameraPath(file);
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.subject(), beside.string());
+  }
+  EXPECT_THROW(readCameraPath(file, folder / "missing.json"), Error);
+  fs::remove_all(folder);
+}
+
 TEST(CameraPath, NamesAFileThatIsNotOne) {
   const fs::path file = fs::temp_directory_path() / ("tessera_no_path_" + std::to_string(::getpid()) + ".json");
   writeFileAtomically(file, std::string_view("{}"));

@@ -16,6 +16,15 @@ struct RenderedView {
   ImageF depth;    // 1 channel: expected z-depth along the optical axis, premultiplied by opacity
 };
 
+// The picture that people see: 3 channels, opaque.
+inline ImageF compositeOver(const RenderedView& view, const Eigen::Array3f& background) {
+  ImageF image = view.colour;
+  for (size_t p = 0; p < image.pixelCount(); ++p) {
+    for (int c = 0; c < 3; ++c) image.pixels[3 * p + c] += (1 - view.opacity.pixels[p]) * background[c];
+  }
+  return image;
+}
+
 class ViewRenderer {
  public:
   virtual ~ViewRenderer() = default;

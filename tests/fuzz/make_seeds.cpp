@@ -91,5 +91,7 @@ int main(int count, char** arguments) {
         std::string(
             R"({"camera_type":"perspective","render_width":64,"render_height":48,"fps":24,"seconds":1,"camera_path":)"
             R"([{"camera_to_world":[1,0,0,1,0,1,0,2,0,0,1,3,0,0,0,1],"fov":50,"aspect":1.3}]})"));
+  write("dataparser_transforms/a",
+        std::string(R"({"transform":[[0,1,0,0.3],[1,0,0,-0.1],[0,0,-1,-0.08]],"scale":0.125})"));
   return 0;
 }

@@ -6,8 +6,10 @@
 #include <numeric>
 #include <vector>
 
+#include "base/check.h"
 #include "base/random.h"
 #include "compute/cpu/kernels.h"
+#include "compute/cpu/simd_targets.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "compute/cpu/rates.cpp"
@@ -65,6 +67,23 @@ double bestRate(double amount, const std::function<void()>& work) {
 
 const char* simdTarget() {
   return HWY_DYNAMIC_DISPATCH(targetName)();
+}
+
+std::vector<std::string> simdTargets() {
+  std::vector<std::string> names;
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) names.emplace_back(hwy::TargetName(target));
+  return names;
+}
+
+void useSimdTarget(const std::string& name) {
+  hwy::SetSupportedTargetsForTest(0);
+  if (name.empty()) return;
+  int64_t wanted = 0;
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    if (name == hwy::TargetName(target)) wanted = target;
+  }
+  CHECK(wanted != 0);
+  hwy::SetSupportedTargetsForTest(wanted);
 }
 
 double peakFlops(ThreadPool& pool) {

@@ -1,0 +1,77 @@
+#include "eval/render_views.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <cmath>
+
+#include "base/check.h"
+#include "base/error.h"
+#include "base/image_io.h"
+#include "eval/evaluate.h"
+#include "eval/picture_files.h"
+#include "eval/video.h"
+
+namespace tessera {
+
+std::vector<NamedView> viewsOfCapture(const Capture& capture, std::optional<Split> split) {
+  std::vector<NamedView> views;
+  for (const Photo& photo : capture.photos) {
+    if (split && photo.split != *split) continue;
+    views.push_back({photo.name, capture.cameras[static_cast<size_t>(photo.camera)], photo.worldFromCamera});
+  }
+  if (views.empty()) {
+    throw Error(capture.root.string(), "",
+                fmt::format("no photo is in the split \"{}\"", split ? splitName(*split) : "all"),
+                "import with --holdout every:8, or choose another --split");
+  }
+  return views;
+}
+
+std::vector<NamedView> viewsOfPath(const CameraPath& path, const Mat4d& sourceFromWorld) {
+  const Mat4d worldFromPath = (path.pathFromSource * sourceFromWorld).inverse();
+  const double scale = std::cbrt(worldFromPath.topLeftCorner<3, 3>().determinant());
+  std::vector<NamedView> views;
+  for (const CameraPathView& view : path.views) {
+    Pose pose;
+    pose.translation = (worldFromPath * view.worldFromCamera.translation.homogeneous()).head<3>();
+    pose.rotation =
+        Eigen::Quaterniond(Mat3d(worldFromPath.topLeftCorner<3, 3>() * view.worldFromCamera.rotation / scale))
+            .normalized();
+    views.push_back({fmt::format("{:05}", views.size()), path.cameraOf(view), pose});
+  }
+  return views;
+}
+
+void renderViews(ViewRenderer& renderer, const std::vector<NamedView>& views, const fs::path& out,
+                 const RenderViewsOptions& options) {
+  CHECK(!views.empty());
+  CHECK((options.width > 0) == (options.height > 0));
+  const bool isVideo = out.extension() == ".mp4";
+  int width = options.width, height = options.height;
+  std::optional<VideoWriter> video;
+  if (isVideo) {
+    if (width == 0) width = views[0].camera.width, height = views[0].camera.height;
+    VideoOptions videoOptions;
+    videoOptions.width = width;
+    videoOptions.height = height;
+    videoOptions.framesPerSecond = options.framesPerSecond;
+    video.emplace(out, videoOptions);
+  }
+  PictureFiles files(out);
+  size_t done = 0;
+  for (const NamedView& view : views) {
+    const Camera camera = width > 0 ? view.camera.scaledTo(width, height) : view.camera;
+    const ImageU8 picture =
+        toBytes(compositeOver(renderer.render(camera, view.worldFromCamera), renderer.background()));
+    if (video) {
+      video->add(picture);
+    } else {
+      writePng(files.at(files.stemOf(view.name), ".png"), picture);
+    }
+    if (options.onView) options.onView(++done);
+  }
+  if (video) video->finish();
+}
+
+}  // namespace tessera

@@ -1,0 +1,118 @@
+#include "eval/render_views.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include "base/error.h"
+#include "base/image_io.h"
+#include "eval/evaluate.h"
+#include "eval/fake_capture.h"
+
+namespace tessera {
+namespace {
+
+// Pictures of one grey each: 10 times the number of the photo, in bytes.
+FakeRenderer greyByPhoto() {
+  return FakeRenderer([](const Camera& camera, int photo) {
+    const float grey = static_cast<float>(10 * photo) / 255;
+    return RenderedView{ImageF(camera.width, camera.height, 3, grey), ImageF(camera.width, camera.height, 1, 1.0f),
+                        ImageF(camera.width, camera.height, 1, 1.0f)};
+  });
+}
+
+TEST(RenderViews, WritesPhotosOfOneNameInSeveralFoldersApart) {
+  FakeCapture fake("render_names");
+  const std::vector<std::string> photos = {"cam0/1.jpg",   "cam1/1.jpg", "train/r_0.png",
+                                           "test/r_0.png", "a.jpg",      "a.png"};
+  for (const std::string& name : photos) fake.add(name, ImageU8(64, 48, 3));
+  FakeRenderer renderer = greyByPhoto();
+  const fs::path out = fake.capture.root / "out";
+  size_t calls = 0;
+  RenderViewsOptions options;
+  options.onView = [&](size_t done) { EXPECT_EQ(done, ++calls); };
+  renderViews(renderer, viewsOfCapture(fake.capture, std::nullopt), out, options);
+  EXPECT_EQ(calls, photos.size());
+  const std::vector<std::string> pictures = {"cam0/1.png",   "cam1/1.png", "train/r_0.png",
+                                             "test/r_0.png", "a.png",      "a.png.png"};
+  for (size_t i = 0; i < pictures.size(); ++i) {
+    EXPECT_EQ(readImage(out / pictures[i]).image.pixels[0], 10 * i) << pictures[i];
+  }
+  fake.capture.photos[0].name = "../../escaped.jpg";
+  EXPECT_THROW(renderViews(renderer, viewsOfCapture(fake.capture, std::nullopt), out, {}), Error);
+}
+
+TEST(RenderViews, TakesTheSplitThatIsAskedForAndNoOther) {
+  FakeCapture fake("render_splits");
+  fake.add("learned.png", ImageU8(64, 48, 3), Split::train);
+  fake.add("watched.png", ImageU8(64, 48, 3), Split::validation);
+  fake.add("judged.png", ImageU8(64, 48, 3), Split::test);
+  for (const auto& [name, photo] :
+       {std::pair("train", "learned.png"), {"validation", "watched.png"}, {"test", "judged.png"}}) {
+    const auto views = viewsOfCapture(fake.capture, *splitFromName(name));
+    ASSERT_EQ(views.size(), 1u) << name;
+    EXPECT_EQ(views[0].name, photo);
+  }
+  EXPECT_EQ(viewsOfCapture(fake.capture, std::nullopt).size(), 3u);
+  EXPECT_FALSE(splitFromName("all"));
+  fake.capture.photos.pop_back();
+  EXPECT_THROW(viewsOfCapture(fake.capture, Split::test), Error);
+}
+
+TEST(RenderViews, LaysViewsOverTheBackgroundInTheSizeAskedFor) {
+  FakeCapture fake("render_background");
+  fake.add("a.png", ImageU8(64, 48, 3));
+  FakeRenderer renderer([](const Camera& camera, int) {
+    return RenderedView{ImageF(camera.width, camera.height, 3, 0.25f), ImageF(camera.width, camera.height, 1, 0.5f),
+                        ImageF(camera.width, camera.height, 1)};
+  });
+  renderer.colourBehind = {0, 0.5f, 1};
+  RenderViewsOptions options;
+  options.width = 10;
+  options.height = 6;
+  const fs::path out = fake.capture.root / "out";
+  renderViews(renderer, viewsOfCapture(fake.capture, Split::test), out, options);
+  const ImageU8 picture = readImage(out / "a.png").image;
+  EXPECT_EQ(picture.width, 10);
+  EXPECT_EQ(picture.height, 6);
+  EXPECT_EQ(std::vector<uint8_t>(picture.pixels.begin(), picture.pixels.begin() + 3),
+            (std::vector<uint8_t>{64, 128, 191}));
+}
+
+Mat4d similarity(double scale, double angle, const Vec3d& translation) {
+  Mat4d matrix = Mat4d::Identity();
+  matrix.topLeftCorner<3, 3>() = scale * Eigen::AngleAxisd(angle, Vec3d(1, -2, 0.5).normalized()).toRotationMatrix();
+  matrix.topRightCorner<3, 1>() = translation;
+  return matrix;
+}
+
+// A camera carried along by a similarity, which leaves its rotation without scale.
+Pose moved(const Mat4d& matrix, double scale, const Pose& pose) {
+  return {matrix.topLeftCorner<3, 3>() * pose.rotation / scale, (matrix * pose.translation.homogeneous()).head<3>()};
+}
+
+TEST(RenderViews, BringAPathBackFromTheWorldsThatItWasCarriedThrough) {
+  const Mat4d sourceFromWorld = similarity(3, 0.7, {100, -20, 4});
+  const Mat4d pathFromSource = similarity(0.02, -1.9, {-2, 0.1, 0.3});
+  std::vector<Pose> poses;
+  CameraPath path;
+  path.width = 40;
+  path.height = 30;
+  path.pathFromSource = pathFromSource;
+  for (int i = 0; i < 3; ++i) {
+    poses.push_back({Eigen::AngleAxisd(0.4 + i, Vec3d(3, 1, 2).normalized()).toRotationMatrix(), Vec3d(i, 2, -1)});
+    path.views.push_back({moved(pathFromSource, 0.02, moved(sourceFromWorld, 3, poses.back())), 60.0 + i});
+  }
+  const std::vector<NamedView> views = viewsOfPath(path, sourceFromWorld);
+  ASSERT_EQ(views.size(), 3u);
+  EXPECT_EQ(views[0].name, "00000");
+  EXPECT_EQ(views[2].name, "00002");
+  for (size_t i = 0; i < views.size(); ++i) {
+    EXPECT_TRUE(views[i].worldFromCamera.rotation.isApprox(poses[i].rotation, 1e-9));
+    EXPECT_LT((views[i].worldFromCamera.translation - poses[i].translation).norm(), 1e-9);
+    EXPECT_EQ(views[i].camera, path.cameraOf(path.views[i]));
+  }
+}
+
+}  // namespace
+}  // namespace tessera

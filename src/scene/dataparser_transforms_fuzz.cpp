@@ -1,0 +1,12 @@
+// dataparser_transforms.json from arbitrary text: what is accepted is finite and can be undone.
+#include <Eigen/LU>
+#include <cstdlib>
+
+#include "scene/camera_path.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  const auto dataparserFromSource = tessera::decodeDataparserTransforms({reinterpret_cast<const char*>(data), size});
+  if (!dataparserFromSource) return 0;
+  if (!dataparserFromSource->allFinite() || !dataparserFromSource->inverse().allFinite()) std::abort();
+  return 0;
+}
