@@ -287,6 +287,32 @@ TEST_F(CommandLine, ExplainsCapturesThatAreBroken) {
   EXPECT_TRUE(contains(failureOf(command), photo.filename().string()));
 }
 
+TEST_F(CommandLine, HoldsAModelAgainstTheCaptureThatItIsUsedWith) {
+  fs::copy(city(), at("resplit"), fs::copy_options::recursive);
+  const fs::path transforms = folder_ / "resplit/transforms.json";
+  json capture = json::parse(readTextFile(transforms));
+  const json heldOut = capture.at("test_filenames");
+  capture["test_filenames"] = {capture.at("train_filenames").at(0)};
+  capture["train_filenames"].erase(0);
+  for (const json& name : heldOut) capture["train_filenames"].push_back(name);
+  writeFileAtomically(transforms, capture.dump());
+  const Said judged = run({"eval", model(), at("resplit"), "--report", at("resplit.html")});
+  EXPECT_EQ(judged.exitCode, 0) << judged.err;
+  EXPECT_TRUE(contains(judged.err, "1 of the views were trained on")) << judged.err;
+  std::vector<std::string> goingOn = trainArguments(model(), {"--steps", "9", "--resume"});
+  goingOn[1] = at("resplit");
+  EXPECT_TRUE(contains(failureOf(goingOn), "other photos"));
+  EXPECT_FALSE(contains(run({"eval", model(), city(), "--report", at("city.html")}).err, "trained on"));
+
+  const std::string moved = at("moved");
+  fs::copy(model(), moved, fs::copy_options::recursive);
+  json placement = json::parse(readTextFile(fs::path(moved) / "blocks.json"));
+  placement["source_from_world"][3] = 12.5;
+  writeFileAtomically(fs::path(moved) / "blocks.json", placement.dump());
+  EXPECT_TRUE(contains(failureOf({"eval", moved, city()}), "its world is not the one"));
+  EXPECT_TRUE(contains(failureOf({"render", moved, at("r"), "--views", city()}), "its world is not the one"));
+}
+
 TEST_F(CommandLine, ExplainsWhenItCannotWrite) {
   writeFileAtomically(folder_ / "file", "in the way");
   EXPECT_TRUE(contains(failureOf({"synth", "city", at("file/city"), "--photos", "2", "--size", "16x12"}), at("file")));

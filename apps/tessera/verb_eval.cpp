@@ -2,10 +2,12 @@
 
 #include "apps/tessera/verbs.h"
 #include "base/error.h"
+#include "base/log.h"
 #include "base/progress.h"
 #include "eval/report.h"
 #include "import/capture_reader.h"
 #include "representations/field/field_renderer.h"
+#include "train/model_folder.h"
 
 namespace tessera {
 
@@ -34,9 +36,15 @@ void addEvalVerb(CLI::App& app) {
     const Capture capture = readCapture(flags->capture);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
     const std::unique_ptr<FieldModel> model = loadFieldModel(*device, flags->model);
-    FieldRenderer renderer(*model);
     EvaluateOptions options;
     options.split = *splitFromName(flags->split);
+    const ModelFolder folder(flags->model);
+    requireSameWorld(folder, capture);
+    if (const auto known = trainedOnAmong(folder, capture, options.split);
+        options.split != Split::train && !known.empty()) {
+      warn("{} of the views were trained on ('{}' first): the numbers flatter the model", known.size(), known.front());
+    }
+    FieldRenderer renderer(*model);
     options.fitExposure = flags->exposure == "fitted";
     options.lpipsWeights = flags->lpips;
     options.imagesDir = flags->images;

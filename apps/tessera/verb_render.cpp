@@ -58,7 +58,9 @@ void addRenderVerb(CLI::App& app) {
       views = viewsOfPath(path, ModelFolder(flags->model).readPlacement().sourceFromWorld);
       options.framesPerSecond = path.framesPerSecond;
     } else {
-      views = viewsOfCapture(readCapture(flags->views), splitFromName(flags->split));  // all: no split
+      const Capture capture = readCapture(flags->views);
+      requireSameWorld(ModelFolder(flags->model), capture);
+      views = viewsOfCapture(capture, splitFromName(flags->split));  // all: no split
     }
     const std::unique_ptr<Device> device = makeDevice(flags->device);
     const std::unique_ptr<FieldModel> model = loadFieldModel(*device, flags->model);
