@@ -161,8 +161,8 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
         photo.mask = maskOk ? maskTargets[i] : fs::path();
       }
       if (!photo.depth.empty()) {
-        depthOk = importDepth(photo.depth, depthTargets[i], size.width, size.height, photo.depthUnit, scale) ==
-                  FileOutcome::ready;
+        depthOk = importDepth(photo.depth, depthTargets[i], size.width, size.height, photo.depthUnit,
+                              scale * source.exrUnit[i]) == FileOutcome::ready;
         photo.depth = depthOk ? depthTargets[i] : fs::path();
       }
     }

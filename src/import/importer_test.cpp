@@ -168,6 +168,22 @@ TEST_F(Import, BringsMasksAndDepthsAlong) {
   EXPECT_TRUE(logged("1 masks are missing or unreadable")) << log_;
 }
 
+TEST_F(Import, ScalesDepthMapsOfEitherKindByAppliedScale) {
+  add("images/a.png", 16, 12, R"(,"depth_file_path":"depth/a.exr")");
+  add("images/b.png", 16, 12, R"(,"depth_file_path":"depth/b.png")");
+  add("images/0.png");  // comes first
+  writeDepthExr(source_ / "depth/a.exr", ImageF(16, 12, 1, 0.2f));
+  writePng(source_ / "depth/b.png", ImageU8(16, 12, 1, 200));
+  write(R"(,"applied_scale":2)");
+  const Capture capture = run();
+  EXPECT_FLOAT_EQ(readDepth(capture.photos.at(1).depth).at(3, 3)[0], 0.4f);
+  EXPECT_FLOAT_EQ(readDepth(capture.photos.at(2).depth).at(3, 3)[0], 0.4f);
+  // Once is enough.
+  const Capture again = importCapture(out_, folder_ / "again");
+  EXPECT_FLOAT_EQ(readDepth(again.photos.at(1).depth).at(3, 3)[0], 0.4f);
+  EXPECT_FLOAT_EQ(readDepth(again.photos.at(2).depth).at(3, 3)[0], 0.4f);
+}
+
 TEST_F(Import, InvertsInstantNgpsDynamicMasks) {
   add("images/a.png");
   add("images/b.png");

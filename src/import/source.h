@@ -13,6 +13,8 @@ struct SourceCapture {
   bool isOurs = false;       // written by writeCapture: its world is final
   // Photos whose mask has the opposite meaning (instant-ngp's dynamic_mask: white = do not train on), by index.
   std::vector<bool> maskIsInverted;
+  // World units per unit of an EXR depth map, by index; 1 beyond the end. Integer maps have Photo::depthUnit.
+  std::vector<double> exrUnit;
 };
 
 }  // namespace tessera

@@ -161,6 +161,7 @@ bool addFrame(const fs::path& root, const TransformsFile& transforms, const Tran
   }
   capture.photos.push_back(std::move(photo));
   source.maskIsInverted.push_back(inverted);
+  source.exrUnit.push_back(transforms.isOurs ? 1 : transforms.appliedScale);
   return true;
 }
 
