@@ -45,12 +45,15 @@ bool sameShape(const Camera& camera, int width, int height) {
 
 }  // namespace
 
-void warnDropped(const std::vector<std::string>& names, const std::string& what) {
-  if (names.empty()) return;
+std::string firstOf(const std::vector<std::string>& names) {
   std::string first;
   for (size_t i = 0; i < names.size() && i < 3; ++i) first += (i > 0 ? ", " : "") + names[i];
-  warn("{} photo{} {}; dropped ({}{})", names.size(), names.size() > 1 ? "s" : "", what, first,
-       names.size() > 3 ? ", ..." : "");
+  return names.size() > 3 ? first + ", ..." : first;
+}
+
+void warnDropped(const std::vector<std::string>& names, const std::string& what) {
+  if (names.empty()) return;
+  warn("{} photo{} {}; dropped ({})", names.size(), names.size() > 1 ? "s" : "", what, firstOf(names));
 }
 
 void keepPhotos(SourceCapture& source, const std::vector<size_t>& order) {

@@ -7,11 +7,19 @@
 #include "base/image_io.h"
 #include "base/log.h"
 #include "base/safetensors.h"
+#include "import/clean.h"
 #include "import/transforms_json.h"
 #include "scene/ply.h"
 
 namespace tessera {
 namespace {
+
+// A place farther from the origin is none, though it is a number.
+constexpr double kFarthest = 1e12;
+
+bool isPlace(const Vec3d& x) {
+  return x.allFinite() && x.cwiseAbs().maxCoeff() <= kFarthest;
+}
 
 bool isFile(const fs::path& path) {
   std::error_code status;
@@ -40,9 +48,10 @@ std::optional<ImageInfo> photoSize(const fs::path& path) {
   }
 }
 
-// The pose in a camera-to-world matrix, freed of what rounding did to its rotation; nothing when it is not rigid.
+// The pose in a camera-to-world matrix, freed of what rounding did to its rotation; nothing when it is not rigid
+// or stands nowhere.
 std::optional<Pose> poseFromGl(const Mat4d& worldFromCameraGl) {
-  if (!worldFromCameraGl.allFinite()) return std::nullopt;
+  if (!worldFromCameraGl.allFinite() || !isPlace(worldFromCameraGl.topRightCorner<3, 1>())) return std::nullopt;
   Mat3d rotation = flippedYz(worldFromCameraGl.topLeftCorner<3, 3>());
   const double deviation = (rotation.transpose() * rotation - Mat3d::Identity()).norm();
   if (deviation > 0.02 || rotation.determinant() < 0) return std::nullopt;
@@ -76,7 +85,7 @@ void readPoints(const fs::path& file, const TransformsFile& transforms, Capture&
     return;
   }
   capture.points = readPly(*path);
-  if (!transforms.isOurs) std::erase_if(capture.points, [](const SparsePoint& p) { return !p.xInWorld.allFinite(); });
+  if (!transforms.isOurs) std::erase_if(capture.points, [](const SparsePoint& p) { return !isPlace(p.xInWorld); });
 }
 
 // `photoOfFrame`: -1 for frames that were dropped.
@@ -102,20 +111,22 @@ void readObservations(const fs::path& file, const TransformsFile& transforms, co
 }
 
 struct Dropped {
-  std::vector<std::string> outside, poses, lenses;
+  std::vector<std::string> outside, poses, lenses;  // whole photos
+  std::vector<std::string> masks, depths;           // these alone
   std::string lensReason;
 };
 
 void reportDropped(const fs::path& file, const Dropped& dropped) {
   const auto report = [&file](const std::vector<std::string>& names, const std::string& what) {
-    if (!names.empty()) {
-      warn("{}: {} photos {}; dropped ({}{})", file.string(), names.size(), what, names[0],
-           names.size() > 1 ? ", ..." : "");
-    }
+    if (!names.empty()) warn("{}: {} {} ({})", file.string(), names.size(), what, firstOf(names));
   };
-  report(dropped.outside, "have paths that leave the folder");
-  report(dropped.poses, "have a pose that is not a number or not a rotation and a translation");
-  report(dropped.lenses, "have a lens that cannot be used: " + dropped.lensReason);
+  report(dropped.outside, "photos have paths that leave the folder; dropped");
+  report(dropped.poses,
+         "photos have a pose that is not a number, farther out than 1e12, or not a rotation and a "
+         "translation; dropped");
+  report(dropped.lenses, "photos have a lens that cannot be used: " + dropped.lensReason + "; dropped");
+  report(dropped.masks, "masks have paths that leave the folder: those photos train unmasked");
+  report(dropped.depths, "depth maps have paths that leave the folder; ignored");
 }
 
 // Adds one frame; false when it is dropped.
@@ -138,7 +149,11 @@ bool addFrame(const fs::path& root, const TransformsFile& transforms, const Tran
   }
   bool inverted = false;
   if (!frame.mask.empty()) {
-    if (const auto mask = resolvePhoto(root, frame.mask)) photo.mask = *mask;
+    if (const auto mask = resolvePhoto(root, frame.mask)) {
+      photo.mask = *mask;
+    } else {
+      dropped.masks.push_back(frame.mask);
+    }
   } else if (!transforms.isOurs) {
     const fs::path dynamic = photo.image.parent_path() / ("dynamic_mask_" + photo.image.stem().string() + ".png");
     if (isFile(dynamic)) {
@@ -147,7 +162,11 @@ bool addFrame(const fs::path& root, const TransformsFile& transforms, const Tran
     }
   }
   if (!frame.depth.empty()) {
-    if (const auto depth = resolvePhoto(root, frame.depth)) photo.depth = *depth;
+    if (const auto depth = resolvePhoto(root, frame.depth)) {
+      photo.depth = *depth;
+    } else {
+      dropped.depths.push_back(frame.depth);
+    }
     photo.depthUnit = frame.depthUnit > 0                ? frame.depthUnit
                       : transforms.integerDepthScale > 0 ? static_cast<float>(transforms.integerDepthScale)
                                                          : static_cast<float>(0.001 * transforms.appliedScale);

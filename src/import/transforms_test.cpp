@@ -26,6 +26,24 @@ Camera cameraOf(const std::string& keys, int width = 100, int height = 80) {
   return camera.value_or(Camera{});
 }
 
+// A source of the frames, which name a.png, b.png, ... in `folder`, and what was said while it was read.
+struct Read {
+  SourceCapture source;
+  std::string warnings;
+  bool warned(const std::string& text) const { return warnings.find(text) != std::string::npos; }
+};
+
+Read readSource(const TemporaryFolder& folder, const std::string& keys, const std::vector<std::string>& frames) {
+  for (const char* name : {"a.png", "b.png", "c.png", "d.png"}) writePng(folder / name, gradientPicture(8, 8));
+  std::string json = "{\"fl_x\":9" + keys + ",\"frames\":[";
+  for (size_t i = 0; i < frames.size(); ++i) json += (i > 0 ? "," : "") + frames[i];
+  writeFileAtomically(folder / "transforms.json", json + "]}");
+  testing::internal::CaptureStderr();
+  Read read{readTransforms(findTransforms(folder.path())), ""};
+  read.warnings = testing::internal::GetCapturedStderr();
+  return read;
+}
+
 std::string lensTrouble(const std::string& keys) {
   std::string reason;
   const auto file = decodeTransforms("{" + keys + ",\"frames\":[" + frame("a") + "]}", reason);
@@ -104,6 +122,30 @@ TEST(Transforms, DropsPosesThatAreNoPosesAndPathsThatLeave) {
   EXPECT_EQ(source.capture.photos.size(), 1u);
   EXPECT_NE(warnings.find("3 photos have a pose"), std::string::npos) << warnings;
   EXPECT_NE(warnings.find("2 photos have paths that leave the folder"), std::string::npos) << warnings;
+}
+
+TEST(Transforms, DropsPosesThatAreNumbersButNoPlaces) {
+  const TemporaryFolder folder;
+  const Read read = readSource(folder, "",
+                               {frame("a.png", "[[1,0,0,1e12],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"),
+                                frame("b.png", "[[1,0,0,0],[0,1,0,-1.1e12],[0,0,1,0],[0,0,0,1]]"),
+                                frame("c.png", "[[1,0,0,0],[0,1,0,0],[0,0,1,1e300],[0,0,0,1]]")});
+  ASSERT_EQ(read.source.capture.photos.size(), 1u);
+  EXPECT_EQ(read.source.capture.photos[0].name, "a.png");
+  EXPECT_TRUE(read.warned("2 photos have a pose")) << read.warnings;
+}
+
+TEST(Transforms, SaysWhichMasksAndDepthMapsLeaveTheFolder) {
+  const TemporaryFolder folder;
+  const Read read = readSource(folder, "",
+                               {frame("a.png", kIdentity, R"(,"mask_path":"../m.png","depth_file_path":"/d.exr")"),
+                                frame("b.png", kIdentity, R"(,"mask_path":"/etc/m.png")"), frame("c.png")});
+  ASSERT_EQ(read.source.capture.photos.size(), 3u);
+  EXPECT_TRUE(read.source.capture.photos[1].mask.empty());
+  EXPECT_TRUE(
+      read.warned("2 masks have paths that leave the folder: those photos train unmasked (../m.png, /etc/m.png)"))
+      << read.warnings;
+  EXPECT_TRUE(read.warned("1 depth maps have paths that leave the folder; ignored (/d.exr)")) << read.warnings;
 }
 
 TEST(Transforms, TurnsOpenGlAxesIntoOurs) {
