@@ -17,6 +17,9 @@ constexpr std::array kIntrinsicKeys = {
     "w",  "h",  "fl_x",           "fl_y",           "cx",    "cy",   "k1", "k2", "k3", "k4", "k5", "k6",
     "p1", "p2", "camera_angle_x", "camera_angle_y", "x_fov", "y_fov"};
 
+// applied_scale and applied_transform reach from here to there; beyond lie slips.
+constexpr double kTiny = 1e-12, kHuge = 1e12;
+
 // Python writes NaN, Infinity and -Infinity, which JSON has no words for: they become null (read as not-a-number).
 std::string withoutPythonNumbers(std::string_view text) {
   std::string out;
@@ -90,6 +93,35 @@ void readIntrinsics(const Json& object, Intrinsics& intrinsics) {
   if (const std::string model = textOr(object, "camera_model"); !model.empty()) intrinsics.model = model;
   const auto fisheye = object.find("is_fisheye");
   if (fisheye != object.end() && fisheye->is_boolean()) intrinsics.fisheye = fisheye->get<bool>();
+}
+
+// Whether it can be undone without leaving the numbers that places have. A similarity's determinant is the cube of its
+// size, so it is judged by that.
+bool isInvertible(const Mat4d& applied) {
+  const Mat3d linear = applied.topLeftCorner<3, 3>();
+  const double size = linear.norm() / std::sqrt(3.0);
+  return applied.allFinite() && applied.row(3) == Mat4d::Identity().row(3) && size >= kTiny && size <= kHuge &&
+         std::abs((linear / size).determinant()) > 1e-6 &&
+         applied.topRightCorner<3, 1>().cwiseAbs().maxCoeff() <= kHuge;
+}
+
+void readApplied(const Json& json, TransformsFile& file) {
+  if (const auto scale = json.find("applied_scale"); scale != json.end() && !scale->is_null()) {
+    const double value = numberOr(json, "applied_scale", 0);
+    if (value >= kTiny && value <= kHuge) {
+      file.appliedScale = value;
+    } else {
+      file.appliedTrouble = "applied_scale is not a number from 1e-12 to 1e12";
+    }
+  }
+  if (const auto matrix = json.find("applied_transform"); matrix != json.end() && !matrix->is_null()) {
+    const auto applied = matrixOf(json, "applied_transform");
+    if (applied && isInvertible(*applied)) {
+      file.appliedTransform = *applied;
+    } else {
+      file.appliedTrouble = "applied_transform is not a 3 x 4 matrix that can be inverted";
+    }
+  }
 }
 
 bool readOurs(const Json& ours, TransformsFile& file, std::string& reason) {
@@ -211,9 +243,7 @@ std::optional<TransformsFile> decodeTransforms(std::string_view text, std::strin
     }
   }
   file.pointFile = textOr(json, "ply_file_path");
-  if (const auto applied = matrixOf(json, "applied_transform")) file.appliedTransform = *applied;
-  const double scale = numberOr(json, "applied_scale", 1);
-  if (scale > 0 && std::isfinite(scale)) file.appliedScale = scale;
+  readApplied(json, file);
   const double step = numberOr(json, "integer_depth_scale", 0);
   if (step > 0 && std::isfinite(step)) file.integerDepthScale = step;
   return file;

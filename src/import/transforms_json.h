@@ -39,8 +39,9 @@ struct TransformsFile {
   std::vector<TransformsFrame> frames;
   std::map<std::string, Split> splits;  // file_path → split, from train/val/test_filenames
   std::string pointFile, observationFile;
-  Mat4d appliedTransform = Mat4d::Identity();
+  Mat4d appliedTransform = Mat4d::Identity();  // invertible; its last row is 0 0 0 1
   double appliedScale = 1;
+  std::string appliedTrouble;    // why one of the two was not taken over; empty when all is well
   double integerDepthScale = 0;  // instant-ngp: world units per step, 0: not given
   // Of our own captures only.
   bool isOurs = false;

@@ -210,9 +210,15 @@ SourceCapture readTransforms(const std::vector<fs::path>& files) {
       capture.geo = transforms->geo;
       capture.sourceFromWorld = transforms->sourceFromWorld;
     } else {
-      Mat4d scaled = transforms->appliedTransform;
-      scaled.topRows<3>() *= transforms->appliedScale;
-      if (scaled.allFinite() && std::abs(scaled.determinant()) > 1e-12) capture.sourceFromWorld = scaled.inverse();
+      Mat4d worldFromSource = transforms->appliedTransform;
+      worldFromSource.topRows<3>() *= transforms->appliedScale;
+      capture.sourceFromWorld = worldFromSource.inverse();
+      if (!transforms->appliedTrouble.empty()) {
+        warn(
+            "{}: {}; ignored, so depth maps may have the wrong scale, and camera paths made for the source another "
+            "place",
+            file.string(), transforms->appliedTrouble);
+      }
     }
     readPoints(file, *transforms, capture);
     const auto split = files.size() > 1 ? splitOfName(file) : std::nullopt;  // one alone is a whole capture

@@ -204,6 +204,34 @@ TEST(Transforms, KeepsTheWorldThatAppliedTransformLedTo) {
   EXPECT_NEAR((inSource - Vec3d(2.5, -3.5, 3)).norm(), 0, 1e-12);
 }
 
+TEST(Transforms, UndoesAppliedScalesOfAnySize) {
+  const TemporaryFolder folder;
+  for (const double scale : {1e-11, 1e-5, 1e5}) {
+    const std::string keys = R"(,"applied_transform":[[0,1,0,1],[1,0,0,2],[0,0,-1,3]],"applied_scale":)";
+    const Read read = readSource(folder, keys + std::to_string(scale * 1e11) + "e-11", {frame("a.png")});
+    // World x = scale × (source y + 1).
+    const Vec3d inSource = (read.source.capture.sourceFromWorld * Vec3d(5 * scale, 0, 0).homogeneous()).head<3>();
+    EXPECT_NEAR((inSource - Vec3d(-2, 4, 3)).norm(), 0, 1e-9) << scale;
+    EXPECT_EQ(read.warnings, "");
+  }
+}
+
+TEST(Transforms, SaysWhenAppliedTransformsCannotBeUndone) {
+  const TemporaryFolder folder;
+  for (const char* matrix : {"[[1,0,0,0],[0,1,0,0],[0,0,0,0]]", "[[1,0,0,0],[0,1,0,0],[0,0,1,NaN]]", "[1,2,3]",
+                             "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,0]]", "[[1,2,0,0],[2,4,0,0],[0,0,1,0]]"}) {
+    const Read read =
+        readSource(folder, R"(,"applied_scale":2,"applied_transform":)" + std::string(matrix), {frame("a.png")});
+    EXPECT_TRUE(read.warned("applied_transform is not a 3 x 4 matrix that can be inverted; ignored")) << matrix;
+    EXPECT_EQ(read.source.capture.sourceFromWorld(0, 0), 0.5) << matrix;
+  }
+  for (const char* scale : {"0", "-1", "1e-200", "1e300", "\"2\"", "NaN"}) {
+    const Read read = readSource(folder, R"(,"applied_scale":)" + std::string(scale), {frame("a.png")});
+    EXPECT_EQ(read.warned("applied_scale is not a number"), std::string(scale) != "NaN") << scale;
+    EXPECT_EQ(read.source.capture.sourceFromWorld, Mat4d::Identity()) << scale;
+  }
+}
+
 // Everything that a capture can hold, with numbers that decimals cannot write in few digits.
 Capture fullCapture(const fs::path& root) {
   Capture capture;
