@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "import/colmap_model.h"
@@ -16,6 +16,34 @@ using Json = nlohmann::json;
 constexpr std::array kIntrinsicKeys = {
     "w",  "h",  "fl_x",           "fl_y",           "cx",    "cy",   "k1", "k2", "k3", "k4", "k5", "k6",
     "p1", "p2", "camera_angle_x", "camera_angle_y", "x_fov", "y_fov"};
+
+// What is read below, of the file and of its frames.
+constexpr std::array kReadKeys = {
+    "train_filenames",   "val_filenames", "test_filenames",      "frames",       "file_path",      "transform_matrix",
+    "mask_path",         "depth_path",    "depth_file_path",     "camera_model", "is_fisheye",     "ply_file_path",
+    "applied_transform", "applied_scale", "integer_depth_scale", "tessera",      "ftheta_p0",      "ftheta_p1",
+    "ftheta_p2",         "ftheta_p3",     "ftheta_p4",           "latlong",      "equirectangular"};
+
+// What the programs that write such files say to themselves; nothing here depends on it.
+constexpr std::array kOthersKeys = {
+    // instant-ngp
+    "aabb_scale", "aabb", "render_aabb", "scale", "offset", "up", "n_frames", "sharpness",
+    "sharpness_discard_threshold", "sharpen", "envmap", "white_transparent", "black_transparent", "fix_premult",
+    "importance_sampling", "enable_ray_loading", "enable_depth_loading", "n_extra_learnable_dims", "driver_parameters",
+    // nerfstudio
+    "colmap_im_id", "orientation_override",
+    // Blender
+    "rotation", "near", "far"};
+
+// What says something of the pictures that is not followed, and what comes of that.
+constexpr std::pair<const char*, const char*> kUnmetKeys[] = {
+    {"rolling_shutter", "every photo counts as taken in one moment"},
+    {"transform_matrix_start", "every photo counts as taken in one moment"},
+    {"transform_matrix_end", "every photo counts as taken in one moment"},
+    {"from_na", "poses are read with OpenGL axes"},
+    {"normal_mts_args", "poses are read with OpenGL axes"},
+    {"fisheye_crop_radius", "what lies outside the circle is trained on unless masks hide it"},
+    {"time", "everything counts as standing still"}};
 
 // applied_scale and applied_transform reach from here to there; beyond lie slips.
 constexpr double kTiny = 1e-12, kHuge = 1e12;
@@ -85,6 +113,33 @@ std::optional<Mat4d> matrixOf(const Json& object, const char* key) {
   return matrix;
 }
 
+// null, false, 0, and lists of these.
+bool saysNothing(const Json& value) {
+  const auto isNothing = [](const Json& v) {
+    return v.is_null() || (v.is_boolean() && !v.get<bool>()) || (v.is_number() && v.get<double>() == 0);
+  };
+  return value.is_array() ? std::all_of(value.begin(), value.end(), isNothing) : isNothing(value);
+}
+
+void noteKeys(const Json& object, TransformsFile& file) {
+  static const std::set<std::string_view> kKnown = [] {
+    std::set<std::string_view> known(kIntrinsicKeys.begin(), kIntrinsicKeys.end());
+    known.insert(kReadKeys.begin(), kReadKeys.end());
+    known.insert(kOthersKeys.begin(), kOthersKeys.end());
+    return known;
+  }();
+  for (const auto& [key, value] : object.items()) {
+    if (kKnown.contains(key)) continue;
+    const auto unmet = std::find_if(std::begin(kUnmetKeys), std::end(kUnmetKeys),
+                                    [&key = key](const auto& entry) { return key == entry.first; });
+    if (unmet == std::end(kUnmetKeys)) {
+      file.unknownKeys.insert(key);
+    } else if (!saysNothing(value)) {
+      file.unmetKeys[key] = unmet->second;
+    }
+  }
+}
+
 void readIntrinsics(const Json& object, Intrinsics& intrinsics) {
   for (const char* key : kIntrinsicKeys) {
     const double value = numberOr(object, key, std::nan(""));
@@ -93,6 +148,14 @@ void readIntrinsics(const Json& object, Intrinsics& intrinsics) {
   if (const std::string model = textOr(object, "camera_model"); !model.empty()) intrinsics.model = model;
   const auto fisheye = object.find("is_fisheye");
   if (fisheye != object.end() && fisheye->is_boolean()) intrinsics.fisheye = fisheye->get<bool>();
+  // instant-ngp names some lenses by keys of their own, and those decide.
+  std::string lens = object.contains("ftheta_p0") ? "FTHETA" : "";
+  for (const auto& [key, model] : {std::pair{"latlong", "LATLONG"}, std::pair{"equirectangular", "EQUIRECTANGULAR"}}) {
+    if (const auto value = object.find(key); value != object.end() && !saysNothing(*value)) lens = model;
+  }
+  if (lens.empty()) return;
+  intrinsics.model = lens;
+  intrinsics.fisheye = false;
 }
 
 // Whether it can be undone without leaving the numbers that places have. A similarity's determinant is the cube of its
@@ -172,6 +235,7 @@ bool readFrame(const Json& object, const Intrinsics& shared, TransformsFile& fil
     reason = fmt::format("frames[{}]: has no {}", index, frame.file.empty() ? "file_path" : "4 x 4 transform_matrix");
     return false;
   }
+  noteKeys(object, file);
   frame.worldFromCameraGl = *matrix;
   frame.mask = textOr(object, "mask_path");
   frame.depth = textOr(object, "depth_file_path");
@@ -223,6 +287,7 @@ std::optional<TransformsFile> decodeTransforms(std::string_view text, std::strin
   if (const auto ours = json.find("tessera"); ours != json.end() && ours->is_object()) {
     if (!readOurs(*ours, file, reason)) return std::nullopt;
   }
+  noteKeys(json, file);
   Intrinsics shared;
   readIntrinsics(json, shared);
   const auto frames = json.find("frames");

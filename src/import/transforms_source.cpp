@@ -129,6 +129,27 @@ void reportDropped(const fs::path& file, const Dropped& dropped) {
   report(dropped.depths, "depth maps have paths that leave the folder; ignored");
 }
 
+// What the file says and nothing here follows: one line of each kind.
+void reportKeys(const fs::path& file, const TransformsFile& transforms) {
+  constexpr size_t kNamed = 10;
+  if (const auto& keys = transforms.unknownKeys; !keys.empty()) {
+    std::string names;
+    size_t named = 0;
+    for (auto key = keys.begin(); key != keys.end() && named < kNamed; ++key, ++named) {
+      names += fmt::format("{}{:.60}", named > 0 ? ", " : "", *key);
+    }
+    if (keys.size() > kNamed) names += fmt::format(" and {} more", keys.size() - kNamed);
+    warn("{}: ignored, as unknown to tessera: {}", file.string(), names);
+  }
+  for (const auto& [key, consequence] : transforms.unmetKeys) {
+    warn("{}: {} is not followed: {}", file.string(), key, consequence);
+  }
+  if (!transforms.isOurs && !transforms.appliedTrouble.empty()) {
+    warn("{}: {}; ignored, so depth maps may have the wrong scale, and camera paths made for the source another place",
+         file.string(), transforms.appliedTrouble);
+  }
+}
+
 // Adds one frame; false when it is dropped.
 bool addFrame(const fs::path& root, const TransformsFile& transforms, const TransformsFrame& frame,
               SourceCapture& source, Dropped& dropped) {
@@ -204,6 +225,7 @@ SourceCapture readTransforms(const std::vector<fs::path>& files) {
     std::string reason;
     const auto transforms = decodeTransforms(readTextFile(file), reason);
     if (!transforms) throw Error(file.string(), "", reason, "mend the file or export it again");
+    reportKeys(file, *transforms);
     if (transforms->isOurs) {
       source.isOurs = true;
       capture.cameras = transforms->cameras;
@@ -213,12 +235,6 @@ SourceCapture readTransforms(const std::vector<fs::path>& files) {
       Mat4d worldFromSource = transforms->appliedTransform;
       worldFromSource.topRows<3>() *= transforms->appliedScale;
       capture.sourceFromWorld = worldFromSource.inverse();
-      if (!transforms->appliedTrouble.empty()) {
-        warn(
-            "{}: {}; ignored, so depth maps may have the wrong scale, and camera paths made for the source another "
-            "place",
-            file.string(), transforms->appliedTrouble);
-      }
     }
     readPoints(file, *transforms, capture);
     const auto split = files.size() > 1 ? splitOfName(file) : std::nullopt;  // one alone is a whole capture

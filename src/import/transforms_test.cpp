@@ -82,6 +82,10 @@ TEST(Transforms, RefusesLensesThatItWouldDrawWrongly) {
   EXPECT_NE(lensTrouble(R"("k1":0.1)").find("no focal length"), std::string::npos);
   EXPECT_NE(lensTrouble(R"("fl_x":70,"k4":0.1)").find("k4"), std::string::npos);
   EXPECT_NE(lensTrouble(R"("fl_x":70,"camera_model":"EQUIRECTANGULAR")").find("EQUIRECTANGULAR"), std::string::npos);
+  EXPECT_NE(lensTrouble(R"("fl_x":70,"is_fisheye":true,"ftheta_p0":0,"ftheta_p1":1)").find("FTHETA"),
+            std::string::npos);
+  EXPECT_NE(lensTrouble(R"("fl_x":70,"latlong":true)").find("LATLONG"), std::string::npos);
+  EXPECT_EQ(cameraOf(R"("fl_x":70,"latlong":false)").lens, LensModel::pinhole);
 }
 
 TEST(Transforms, LetsAFrameSpeakOverTheFile) {
@@ -146,6 +150,31 @@ TEST(Transforms, SaysWhichMasksAndDepthMapsLeaveTheFolder) {
       read.warned("2 masks have paths that leave the folder: those photos train unmasked (../m.png, /etc/m.png)"))
       << read.warnings;
   EXPECT_TRUE(read.warned("1 depth maps have paths that leave the folder; ignored (/d.exr)")) << read.warnings;
+}
+
+TEST(Transforms, NamesTheKeysThatItDoesNotKnowOnceEach) {
+  const TemporaryFolder folder;
+  const std::string more = R"(,"blur":1,"colmap_im_id":3,"sharpness":2,"rotation":0.1)";
+  const Read few = readSource(
+      folder, R"(,"aabb_scale":4,"scale":1,"offset":[0,0,0],"near":0,"far":9,"k5":0,"camera_angle_y":1,"wind":"west")",
+      {frame("a.png", kIdentity, more), frame("b.png", kIdentity, more)});
+  EXPECT_TRUE(few.warned("transforms.json: ignored, as unknown to tessera: blur, wind\n")) << few.warnings;
+  EXPECT_EQ(few.warnings.find("blur"), few.warnings.rfind("blur"));
+  std::string many;
+  for (char c = 'a'; c <= 'm'; ++c) many += std::string(",\"key_") + c + "\":0";
+  EXPECT_TRUE(readSource(folder, many, {frame("a.png")}).warned("key_i, key_j and 3 more\n"));
+}
+
+TEST(Transforms, SaysWhatComesOfKeysThatItDoesNotFollow) {
+  const TemporaryFolder folder;
+  const Read read =
+      readSource(folder, R"(,"rolling_shutter":[0,0,0.02,0],"from_na":true)",
+                 {frame("a.png", kIdentity, R"(,"time":0.0)"), frame("b.png", kIdentity, R"(,"time":0.5)")});
+  EXPECT_TRUE(read.warned("rolling_shutter is not followed: every photo counts as taken in one moment"));
+  EXPECT_TRUE(read.warned("from_na is not followed: poses are read with OpenGL axes"));
+  EXPECT_TRUE(read.warned("time is not followed: everything counts as standing still"));
+  EXPECT_EQ(
+      readSource(folder, R"(,"rolling_shutter":[0,0,0,0],"from_na":false,"time":null)", {frame("a.png")}).warnings, "");
 }
 
 TEST(Transforms, TurnsOpenGlAxesIntoOurs) {
