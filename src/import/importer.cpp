@@ -203,18 +203,6 @@ void dropFailed(SourceCapture& source, const Outcomes& outcomes) {
   if (kept.size() < outcomes.photos.size()) keepPhotos(source, kept);
 }
 
-void chooseSplit(const SourceCapture& source, const ImportOptions& options, std::vector<Photo>& photos) {
-  if (options.holdout != "auto") return holdOut(options.holdout, photos);
-  const auto has = [&photos](Split split) {
-    return std::any_of(photos.begin(), photos.end(), [split](const Photo& photo) { return photo.split == split; });
-  };
-  if (!source.hasOwnSplit || !has(Split::train)) return holdOut(photos.size() > 1 ? "every:8" : "none", photos);
-  if (has(Split::test)) return;
-  for (Photo& photo : photos) {
-    if (photo.split == Split::validation) photo.split = Split::test;
-  }
-}
-
 }  // namespace
 
 std::string sourceFormat(const fs::path& source) {
@@ -233,6 +221,7 @@ Capture importCapture(const fs::path& sourcePath, const fs::path& out, const Imp
   }
   ThreadPool pool(options.threads);
   SourceCapture source = readSource(sourcePath);
+  if (options.holdout == "auto" && source.splitError) throw *source.splitError;
   const std::vector<PhotoFacts> facts = cleanSource(source, pool);
   Capture& capture = source.capture;
   if (capture.photos.empty()) {
@@ -252,7 +241,7 @@ Capture importCapture(const fs::path& sourcePath, const fs::path& out, const Imp
   if (capture.photos.empty()) {
     throw Error(sourcePath.string(), "", "no photo of it can be decoded", "see the warnings above");
   }
-  chooseSplit(source, options, capture.photos);
+  chooseSplit(source, options.holdout);
   capture.root = out;
   writeCapture(capture);
   return std::move(capture);

@@ -79,7 +79,14 @@ TEST_F(Import, HoldsOutEveryEighthInNaturalOrder) {
   writeFileAtomically(folder_ / "list", std::string_view("# held out\n3.png\nimages/7.png\r\n12\nnone.png\n"));
   EXPECT_EQ(run({.holdout = "list:" + (folder_ / "list").string()}).photosIn(Split::test),
             (std::vector<int>{3, 7, 12}));
-  EXPECT_TRUE(logged("none.png is not a photo")) << log_;
+  EXPECT_TRUE(logged("1 of 4 names are no photos of this capture (none.png)")) << log_;
+  writeFileAtomically(folder_ / "list", std::string_view("./images/4.png\n.//5.png\n"));
+  EXPECT_EQ(run({.holdout = "list:" + (folder_ / "list").string()}).photosIn(Split::test), (std::vector<int>{4, 5}));
+  EXPECT_FALSE(logged("no photo")) << log_;
+  writeFileAtomically(folder_ / "list", std::string_view("photos/3.png\nnone.png\n40\n"));
+  EXPECT_NO_THROW(run({.holdout = "list:" + (folder_ / "list").string()}));  // 3 by its name without folders
+  writeFileAtomically(folder_ / "list", std::string_view("none.png\n40\n"));
+  EXPECT_THROW(run({.holdout = "list:" + (folder_ / "list").string()}), Error);
   for (const char* wrong : {"every:", "every:1", "every:x", "some", "list:/nowhere"}) {
     EXPECT_THROW(run({.holdout = wrong}), Error) << wrong;
   }
@@ -90,6 +97,32 @@ TEST_F(Import, KeepsTheSourcesOwnSplitUnlessTold) {
   write(R"(,"train_filenames":["images/0.png","images/1.png","images/2.png"],"val_filenames":["images/3.png"])");
   EXPECT_EQ(run().photosIn(Split::test), (std::vector<int>{3}));
   EXPECT_EQ(run({.holdout = "every:2"}).photosIn(Split::test), (std::vector<int>{0, 2}));
+}
+
+TEST_F(Import, RefusesSplitsThatFitNoPhotoBeforeItCopiesAny) {
+  for (int i = 0; i < 4; ++i) add("images/" + std::to_string(i) + ".png");
+  write(R"(,"train_filenames":["images/0.png"],"test_filenames":["3.png"])");
+  try {
+    run();
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.place(), "test_filenames");
+    EXPECT_NE(error.remedy().find("--holdout"), std::string::npos);
+  }
+  EXPECT_FALSE(fs::exists(out_));
+  EXPECT_EQ(run({.holdout = "every:2"}).photosIn(Split::test), (std::vector<int>{0, 2}));
+}
+
+TEST_F(Import, SaysWhenNothingIsHeldOut) {
+  for (int i = 0; i < 3; ++i) add("images/" + std::to_string(i) + ".png");
+  write(R"(,"train_filenames":["images/0.png","images/1.png","images/2.png"],"test_filenames":[])");
+  EXPECT_EQ(run().photosIn(Split::test).size(), 0u);
+  EXPECT_TRUE(logged("no photo is held out")) << log_;
+  run({.holdout = "none"});
+  EXPECT_FALSE(logged("held out")) << log_;
+  write(R"(,"test_filenames":["images/0.png","images/1.png","images/2.png"])");
+  EXPECT_EQ(run().photosIn(Split::test), (std::vector<int>{0}));
+  EXPECT_TRUE(logged("leaves nothing to train on")) << log_;
 }
 
 TEST_F(Import, ReducesByAreaAndScalesTheLens) {

@@ -17,12 +17,15 @@ constexpr std::array kIntrinsicKeys = {
     "w",  "h",  "fl_x",           "fl_y",           "cx",    "cy",   "k1", "k2", "k3", "k4", "k5", "k6",
     "p1", "p2", "camera_angle_x", "camera_angle_y", "x_fov", "y_fov"};
 
-// What is read below, of the file and of its frames.
-constexpr std::array kReadKeys = {
-    "train_filenames",   "val_filenames", "test_filenames",      "frames",       "file_path",      "transform_matrix",
-    "mask_path",         "depth_path",    "depth_file_path",     "camera_model", "is_fisheye",     "ply_file_path",
-    "applied_transform", "applied_scale", "integer_depth_scale", "tessera",      "ftheta_p0",      "ftheta_p1",
-    "ftheta_p2",         "ftheta_p3",     "ftheta_p4",           "latlong",      "equirectangular"};
+constexpr std::pair<const char*, Split> kSplitKeys[] = {
+    {"train_filenames", Split::train}, {"val_filenames", Split::validation}, {"test_filenames", Split::test}};
+
+// What else is read below, of the file and of its frames.
+constexpr std::array kReadKeys = {"frames",        "file_path",         "transform_matrix", "mask_path",
+                                  "depth_path",    "depth_file_path",   "camera_model",     "is_fisheye",
+                                  "ply_file_path", "applied_transform", "applied_scale",    "integer_depth_scale",
+                                  "tessera",       "ftheta_p0",         "ftheta_p1",        "ftheta_p2",
+                                  "ftheta_p3",     "ftheta_p4",         "latlong",          "equirectangular"};
 
 // What the programs that write such files say to themselves; nothing here depends on it.
 constexpr std::array kOthersKeys = {
@@ -126,6 +129,7 @@ void noteKeys(const Json& object, TransformsFile& file) {
     std::set<std::string_view> known(kIntrinsicKeys.begin(), kIntrinsicKeys.end());
     known.insert(kReadKeys.begin(), kReadKeys.end());
     known.insert(kOthersKeys.begin(), kOthersKeys.end());
+    for (const auto& [key, split] : kSplitKeys) known.insert(key);
     return known;
   }();
   for (const auto& [key, value] : object.items()) {
@@ -156,6 +160,18 @@ void readIntrinsics(const Json& object, Intrinsics& intrinsics) {
   if (lens.empty()) return;
   intrinsics.model = lens;
   intrinsics.fisheye = false;
+}
+
+void readSplits(const Json& json, TransformsFile& file) {
+  for (const auto& [key, split] : kSplitKeys) {
+    const auto names = json.find(key);
+    if (names == json.end() || !names->is_array()) continue;
+    SplitList list{key, split, {}};
+    for (const Json& name : *names) {
+      if (name.is_string()) list.names.push_back(name.get<std::string>());
+    }
+    file.splitLists.push_back(std::move(list));
+  }
 }
 
 // Whether it can be undone without leaving the numbers that places have. A similarity's determinant is the cube of its
@@ -298,16 +314,8 @@ std::optional<TransformsFile> decodeTransforms(std::string_view text, std::strin
   for (const Json& frame : *frames) {
     if (!readFrame(frame, shared, file, reason)) return std::nullopt;
   }
-  for (const auto& [key, split] :
-       {std::pair{"train_filenames", Split::train}, std::pair{"val_filenames", Split::validation},
-        std::pair{"test_filenames", Split::test}}) {
-    const auto names = json.find(key);
-    if (names == json.end() || !names->is_array()) continue;
-    for (const Json& name : *names) {
-      if (name.is_string()) file.splits[name.get<std::string>()] = split;
-    }
-  }
   file.pointFile = textOr(json, "ply_file_path");
+  readSplits(json, file);
   readApplied(json, file);
   const double step = numberOr(json, "integer_depth_scale", 0);
   if (step > 0 && std::isfinite(step)) file.integerDepthScale = step;

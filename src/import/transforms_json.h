@@ -36,9 +36,16 @@ struct TransformsFrame {
   std::optional<GpsFix> gps;
 };
 
+// train_filenames, val_filenames or test_filenames.
+struct SplitList {
+  std::string key;
+  Split split = Split::train;
+  std::vector<std::string> names;  // as written
+};
+
 struct TransformsFile {
   std::vector<TransformsFrame> frames;
-  std::map<std::string, Split> splits;  // file_path → split, from train/val/test_filenames
+  std::vector<SplitList> splitLists;  // train, validation, test, as far as they are there
   std::string pointFile, observationFile;
   Mat4d appliedTransform = Mat4d::Identity();  // invertible; its last row is 0 0 0 1
   double appliedScale = 1;
@@ -56,6 +63,9 @@ struct TransformsFile {
 // Untrusted text: nothing, and why in `reason`, when it is not such a file. Unknown keys are noted; NaN and
 // Infinity as Python writes them are understood.
 std::optional<TransformsFile> decodeTransforms(std::string_view text, std::string& reason);
+
+// The same of a file; throws Error.
+TransformsFile loadTransforms(const fs::path& file);
 
 // The camera for a photo of that size (used where the file gives none). Nothing for a lens that is not known, or that
 // has no focal length.

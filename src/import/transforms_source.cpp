@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <unordered_map>
 
 #include "base/error.h"
 #include "base/image_io.h"
@@ -150,6 +151,52 @@ void reportKeys(const fs::path& file, const TransformsFile& transforms) {
   }
 }
 
+// "./images/a.jpg" and "images\\a.jpg" are images/a.jpg.
+std::string normalPath(std::string written) {
+  std::replace(written.begin(), written.end(), '\\', '/');
+  return fs::path(written).lexically_normal().generic_string();
+}
+
+// The split of each frame by the lists of names (a later list wins: what is to be held out is), none where no list has
+// it. A list that fits no frame at all would hold out nothing: it goes into `error`.
+std::vector<std::optional<Split>> splitsOfFrames(const fs::path& file, const TransformsFile& transforms,
+                                                 std::optional<Error>& error) {
+  std::vector<std::optional<Split>> splits(transforms.frames.size());
+  std::unordered_map<std::string, std::vector<size_t>> framesOfPath;
+  for (size_t i = 0; i < splits.size(); ++i) framesOfPath[normalPath(transforms.frames[i].file)].push_back(i);
+  for (const SplitList& list : transforms.splitLists) {
+    std::vector<std::string> strangers;
+    for (const std::string& name : list.names) {
+      const auto frames = framesOfPath.find(normalPath(name));
+      if (frames == framesOfPath.end()) {
+        strangers.push_back(name);
+      } else {
+        for (const size_t i : frames->second) splits[i] = list.split;
+      }
+    }
+    if (strangers.empty()) continue;
+    if (strangers.size() == list.names.size()) {
+      error = Error(file.string(), list.key, "names no frame of this file (" + firstOf(strangers) + ")",
+                    "write its names as file_path has them, or split anew with --holdout every:8");
+    } else {
+      warn("{}: {}: {} of {} names are of no frame ({})", file.string(), list.key, strangers.size(), list.names.size(),
+           firstOf(strangers));
+    }
+  }
+  // Where only the held-out frames are listed, the others are plainly meant to train.
+  const bool listsTraining =
+      std::any_of(transforms.splitLists.begin(), transforms.splitLists.end(),
+                  [](const SplitList& list) { return list.split == Split::train && !list.names.empty(); });
+  std::vector<std::string> unlisted;
+  for (size_t i = 0; listsTraining && !error && i < splits.size(); ++i) {
+    if (!splits[i]) unlisted.push_back(transforms.frames[i].file);
+  }
+  if (!unlisted.empty()) {
+    warn("{}: {} frames are in no list of a split; they train ({})", file.string(), unlisted.size(), firstOf(unlisted));
+  }
+  return splits;
+}
+
 // Adds one frame; false when it is dropped.
 bool addFrame(const fs::path& root, const TransformsFile& transforms, const TransformsFrame& frame,
               SourceCapture& source, Dropped& dropped) {
@@ -196,9 +243,6 @@ bool addFrame(const fs::path& root, const TransformsFile& transforms, const Tran
       !frame.name.empty() ? frame.name : photo.image.lexically_relative(fs::weakly_canonical(root)).generic_string();
   photo.exposure = frame.exposure;
   photo.gps = frame.gps;
-  if (const auto split = transforms.splits.find(frame.file); split != transforms.splits.end()) {
-    photo.split = split->second;
-  }
   capture.photos.push_back(std::move(photo));
   source.maskIsInverted.push_back(inverted);
   source.exrUnit.push_back(transforms.isOurs ? 1 : transforms.appliedScale);
@@ -217,37 +261,48 @@ std::vector<fs::path> findTransforms(const fs::path& source) {
   return files;
 }
 
+TransformsFile loadTransforms(const fs::path& file) {
+  std::string reason;
+  auto transforms = decodeTransforms(readTextFile(file), reason);
+  if (!transforms) throw Error(file.string(), "", reason, "mend the file or export it again");
+  return std::move(*transforms);
+}
+
 SourceCapture readTransforms(const std::vector<fs::path>& files) {
   SourceCapture source;
   source.knowsUp = true;
   Capture& capture = source.capture;
   for (const fs::path& file : files) {
-    std::string reason;
-    const auto transforms = decodeTransforms(readTextFile(file), reason);
-    if (!transforms) throw Error(file.string(), "", reason, "mend the file or export it again");
-    reportKeys(file, *transforms);
-    if (transforms->isOurs) {
+    const TransformsFile transforms = loadTransforms(file);
+    reportKeys(file, transforms);
+    if (transforms.isOurs) {
       source.isOurs = true;
-      capture.cameras = transforms->cameras;
-      capture.geo = transforms->geo;
-      capture.sourceFromWorld = transforms->sourceFromWorld;
+      capture.cameras = transforms.cameras;
+      capture.geo = transforms.geo;
+      capture.sourceFromWorld = transforms.sourceFromWorld;
     } else {
-      Mat4d worldFromSource = transforms->appliedTransform;
-      worldFromSource.topRows<3>() *= transforms->appliedScale;
+      Mat4d worldFromSource = transforms.appliedTransform;
+      worldFromSource.topRows<3>() *= transforms.appliedScale;
       capture.sourceFromWorld = worldFromSource.inverse();
     }
-    readPoints(file, *transforms, capture);
-    const auto split = files.size() > 1 ? splitOfName(file) : std::nullopt;  // one alone is a whole capture
-    source.hasOwnSplit = source.hasOwnSplit || split || !transforms->splits.empty();
+    readPoints(file, transforms, capture);
+    std::vector<std::optional<Split>> splits;
+    if (const auto split = files.size() > 1 ? splitOfName(file) : std::nullopt) {  // one alone is a whole capture
+      splits.assign(transforms.frames.size(), split);
+      source.hasOwnSplit = true;
+    } else {
+      splits = splitsOfFrames(file, transforms, source.splitError);
+      for (const SplitList& list : transforms.splitLists) source.hasOwnSplit |= !list.names.empty();
+    }
     Dropped dropped;
     std::vector<int> photoOfFrame;
-    for (const TransformsFrame& frame : transforms->frames) {
-      const bool kept = addFrame(file.parent_path(), *transforms, frame, source, dropped);
+    for (size_t i = 0; i < transforms.frames.size(); ++i) {
+      const bool kept = addFrame(file.parent_path(), transforms, transforms.frames[i], source, dropped);
       photoOfFrame.push_back(kept ? static_cast<int>(capture.photos.size()) - 1 : -1);
-      if (kept && split) capture.photos.back().split = *split;
+      if (kept) capture.photos.back().split = splits[i].value_or(Split::train);
     }
     reportDropped(file, dropped);
-    readObservations(file, *transforms, photoOfFrame, capture);
+    readObservations(file, transforms, photoOfFrame, capture);
   }
   return source;
 }

@@ -152,6 +152,41 @@ TEST(Transforms, SaysWhichMasksAndDepthMapsLeaveTheFolder) {
   EXPECT_TRUE(read.warned("1 depth maps have paths that leave the folder; ignored (/d.exr)")) << read.warnings;
 }
 
+TEST(Transforms, FindsTheNamesOfSplitsHoweverTheirPathsAreWritten) {
+  const TemporaryFolder folder;
+  const Read read = readSource(
+      folder, R"(,"train_filenames":["./d.png"],"val_filenames":["x/../c.png"],"test_filenames":["a.png",".\\b.png"])",
+      {frame("./a.png"), frame("b.png"), frame("c.png"), frame("d.png")});
+  std::vector<Split> splits;
+  for (const Photo& photo : read.source.capture.photos) splits.push_back(photo.split);
+  EXPECT_EQ(splits, (std::vector<Split>{Split::test, Split::test, Split::validation, Split::train}));
+  EXPECT_TRUE(read.source.hasOwnSplit);
+  EXPECT_FALSE(read.source.splitError.has_value());
+  EXPECT_EQ(read.warnings, "");
+}
+
+TEST(Transforms, SaysWhichNamesOfSplitsFitNoFrameAndWhichFramesNoList) {
+  const TemporaryFolder folder;
+  const Read read =
+      readSource(folder, R"(,"train_filenames":["a.png"],"test_filenames":["b.png","e.png","images/b.png"])",
+                 {frame("a.png"), frame("b.png"), frame("c.png"), frame("d.png")});
+  EXPECT_TRUE(read.warned("test_filenames: 2 of 3 names are of no frame (e.png, images/b.png)")) << read.warnings;
+  EXPECT_TRUE(read.warned("2 frames are in no list of a split; they train (c.png, d.png)")) << read.warnings;
+  EXPECT_FALSE(read.source.splitError.has_value());
+  EXPECT_EQ(read.source.capture.photos.at(1).split, Split::test);
+  // Where only the held-out ones are named, the others are known to train.
+  EXPECT_EQ(readSource(folder, R"(,"test_filenames":["b.png"])", {frame("a.png"), frame("b.png")}).warnings, "");
+}
+
+TEST(Transforms, DoesNotTakeAListThatFitsNoFrameForASplit) {
+  const TemporaryFolder folder;
+  const Read read = readSource(folder, R"(,"train_filenames":["a.png"],"test_filenames":["images/b.png"])",
+                               {frame("a.png"), frame("b.png")});
+  ASSERT_TRUE(read.source.splitError.has_value());
+  EXPECT_EQ(read.source.splitError->place(), "test_filenames");
+  EXPECT_NE(read.source.splitError->reason().find("images/b.png"), std::string::npos);
+}
+
 TEST(Transforms, NamesTheKeysThatItDoesNotKnowOnceEach) {
   const TemporaryFolder folder;
   const std::string more = R"(,"blur":1,"colmap_im_id":3,"sharpness":2,"rotation":0.1)";
@@ -339,7 +374,8 @@ TEST(Captures, SpeakNerfstudiosWordsForOneCamera) {
   ASSERT_TRUE(file.has_value()) << reason;
   EXPECT_FALSE(file->isOurs);
   EXPECT_EQ(cameraFromIntrinsics(file->frames[0].intrinsics, 8, 6, reason), capture.cameras[0]);
-  EXPECT_EQ(file->splits.at("images/2.png"), Split::test);
+  ASSERT_EQ(file->splitLists.size(), 3u);
+  EXPECT_EQ(file->splitLists[2].names, std::vector<std::string>{"images/2.png"});
   EXPECT_EQ(file->pointFile, "points.ply");
 }
 
@@ -357,6 +393,17 @@ TEST(Captures, AreNotReadFromFoldersThatAreNone) {
   } catch (const Error& error) {
     EXPECT_EQ(error.subject(), capture.photos[2].image.string());
   }
+}
+
+TEST(Captures, RefuseListsOfSplitsThatFitNoPhoto) {
+  const TemporaryFolder folder;
+  writeCapture(fullCapture(folder.path()));
+  std::string text = readTextFile(folder / "transforms.json");
+  const size_t list = text.find("\"test_filenames\"");
+  text.replace(text.find("images/2", list), 8, "images/7");
+  writeFileAtomically(folder / "transforms.json", text);
+  EXPECT_THROW(readCapture(folder.path()), Error);
+  EXPECT_TRUE(isCapture(folder.path()));
 }
 
 TEST(Captures, RefuseObservationsOfPhotosThatDoNotExist) {
