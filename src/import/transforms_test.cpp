@@ -278,6 +278,11 @@ TEST(Transforms, UndoesAppliedScalesOfAnySize) {
     EXPECT_NEAR((inSource - Vec3d(-2, 4, 3)).norm(), 0, 1e-9) << scale;
     EXPECT_EQ(read.warnings, "");
   }
+  // The transform may hold the scale itself.
+  const Read read =
+      readSource(folder, R"(,"applied_transform":[[1e-5,0,0,0],[0,1e-5,0,0],[0,0,1e-5,0]])", {frame("a.png")});
+  EXPECT_NEAR(read.source.capture.sourceFromWorld(1, 1), 1e5, 1e-6);
+  EXPECT_EQ(read.warnings, "");
 }
 
 TEST(Transforms, SaysWhenAppliedTransformsCannotBeUndone) {
