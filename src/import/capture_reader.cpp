@@ -17,6 +17,7 @@ Capture readCapture(const fs::path& folder) {
     throw Error(file.string(), "", "was not written by tessera",
                 "import it first: tessera import " + folder.string() + " CAPTURE");
   }
+  if (source.splitError) throw *source.splitError;
   Capture& capture = source.capture;
   capture.root = folder;
   if (capture.photos.empty()) throw Error(file.string(), "frames", "has no photos", "import the photos again");
@@ -36,7 +37,7 @@ Capture readCapture(const fs::path& folder) {
 bool isCapture(const fs::path& folder) {
   const fs::path file = folder / "transforms.json";
   std::error_code status;
-  return fs::is_regular_file(file, status) && readTransforms({file}).isOurs;
+  return fs::is_regular_file(file, status) && loadTransforms(file).isOurs;
 }
 
 }  // namespace tessera

@@ -45,18 +45,22 @@ bool sameShape(const Camera& camera, int width, int height) {
 
 }  // namespace
 
-void warnDropped(const std::vector<std::string>& names, const std::string& what) {
-  if (names.empty()) return;
+std::string firstOf(const std::vector<std::string>& names) {
   std::string first;
   for (size_t i = 0; i < names.size() && i < 3; ++i) first += (i > 0 ? ", " : "") + names[i];
-  warn("{} photo{} {}; dropped ({}{})", names.size(), names.size() > 1 ? "s" : "", what, first,
-       names.size() > 3 ? ", ..." : "");
+  return names.size() > 3 ? first + ", ..." : first;
+}
+
+void warnDropped(const std::vector<std::string>& names, const std::string& what) {
+  if (names.empty()) return;
+  warn("{} photo{} {}; dropped ({})", names.size(), names.size() > 1 ? "s" : "", what, firstOf(names));
 }
 
 void keepPhotos(SourceCapture& source, const std::vector<size_t>& order) {
   Capture& capture = source.capture;
   std::vector<Photo> photos;
   std::vector<bool> inverted;
+  std::vector<double> exrUnit;
   std::vector<int> newIndex(capture.photos.size(), -1);
   std::vector<int> newCamera(capture.cameras.size(), -1);
   std::vector<Camera> cameras;
@@ -64,6 +68,7 @@ void keepPhotos(SourceCapture& source, const std::vector<size_t>& order) {
     newIndex[old] = static_cast<int>(photos.size());
     photos.push_back(std::move(capture.photos[old]));
     inverted.push_back(old < source.maskIsInverted.size() && source.maskIsInverted[old]);
+    exrUnit.push_back(old < source.exrUnit.size() ? source.exrUnit[old] : 1);
     auto& camera = newCamera[static_cast<size_t>(photos.back().camera)];
     if (camera < 0) {
       camera = static_cast<int>(cameras.size());
@@ -74,6 +79,7 @@ void keepPhotos(SourceCapture& source, const std::vector<size_t>& order) {
   capture.photos = std::move(photos);
   capture.cameras = std::move(cameras);
   source.maskIsInverted = std::move(inverted);
+  source.exrUnit = std::move(exrUnit);
   std::vector<Observation> observations;
   for (Observation observation : capture.observations) {
     const int photo = newIndex[observation.photo];

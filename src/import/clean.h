@@ -24,6 +24,9 @@ void keepPhotos(SourceCapture& source, const std::vector<size_t>& order);
 // goes into Photo::gps where the source had none. Returns the facts of the photos that are left.
 std::vector<PhotoFacts> cleanSource(SourceCapture& source, ThreadPool& pool);
 
+// "a.jpg, b.jpg, c.jpg, ..."
+std::string firstOf(const std::vector<std::string>& names);
+
 // "12 photos WHAT; dropped (a.jpg, b.jpg, c.jpg, ...)".
 void warnDropped(const std::vector<std::string>& names, const std::string& what);
 

@@ -1,11 +1,13 @@
 #include "import/holdout.h"
 
+#include <algorithm>
 #include <charconv>
 #include <set>
 
 #include "base/error.h"
 #include "base/file.h"
 #include "base/log.h"
+#include "import/clean.h"
 
 namespace tessera {
 namespace {
@@ -20,7 +22,7 @@ void holdOutList(const fs::path& file, std::vector<Photo>& photos) {
     std::string line = text.substr(at, end - at);
     at = end + 1;
     while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
-    if (!line.empty() && line[0] != '#') names.insert(line);
+    if (!line.empty() && line[0] != '#') names.insert(fs::path(line).lexically_normal().generic_string());
   }
   std::set<std::string> found;
   for (Photo& photo : photos) {
@@ -35,6 +37,7 @@ void holdOutList(const fs::path& file, std::vector<Photo>& photos) {
     }
   }
   // Names are often written with the extension that the photo had before it was reduced.
+  std::vector<std::string> strangers;
   for (const std::string& name : names) {
     if (found.contains(name)) continue;
     const std::string stem = fs::path(name).stem().string();
@@ -44,8 +47,15 @@ void holdOutList(const fs::path& file, std::vector<Photo>& photos) {
       photo.split = Split::test;
       matched = true;
     }
-    if (!matched) warn("{}: {} is not a photo of this capture", file.string(), name);
+    if (!matched) strangers.push_back(name);
   }
+  if (strangers.empty()) return;
+  if (strangers.size() == names.size()) {
+    throw Error(file.string(), "", "names no photo of this capture (" + firstOf(strangers) + ")",
+                "write one photo's name a line");
+  }
+  warn("{}: {} of {} names are no photos of this capture ({})", file.string(), strangers.size(), names.size(),
+       firstOf(strangers));
 }
 
 }  // namespace
@@ -68,6 +78,25 @@ void holdOut(const std::string& rule, std::vector<Photo>& photos) {
     if (photo.split == Split::train) return;
   }
   throw Error("--holdout", rule, "holds out every photo", "leave some to train on");
+}
+
+void chooseSplit(SourceCapture& source, const std::string& rule) {
+  std::vector<Photo>& photos = source.capture.photos;
+  if (rule != "auto") return holdOut(rule, photos);
+  const auto has = [&photos](Split split) {
+    return std::any_of(photos.begin(), photos.end(), [split](const Photo& photo) { return photo.split == split; });
+  };
+  if (!source.hasOwnSplit || !has(Split::train)) {
+    if (source.hasOwnSplit) warn("the source's own split leaves nothing to train on; it is not used");
+    holdOut(photos.size() > 1 ? "every:8" : "none", photos);
+  } else if (!has(Split::test)) {
+    for (Photo& photo : photos) {
+      if (photo.split == Split::validation) photo.split = Split::test;
+    }
+  }
+  if (!has(Split::test)) {
+    warn("no photo is held out, so there is nothing to measure with; --holdout every:8 holds out every 8th");
+  }
 }
 
 }  // namespace tessera

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "scene/capture.h"
+#include "import/source.h"
 
 namespace tessera {
 
@@ -12,7 +12,12 @@ namespace tessera {
 //   every:N    photo 0, N, 2N, ... are test, the others train
 //   list:FILE  the photos named in FILE, one a line (path, file name, or name without extension), are test
 //   none       all are train
-// Throws Error for another word, and when nothing would be left to train on.
+// Throws Error for another word, for a list none of whose names is a photo's, and when nothing would be left to train
+// on.
 void holdOut(const std::string& rule, std::vector<Photo>& photos);
+
+// The same for the photos of a source; "auto" takes the source's own split, else every:8. Where a source has validation
+// photos but no test photos, those become the test split.
+void chooseSplit(SourceCapture& source, const std::string& rule);
 
 }  // namespace tessera

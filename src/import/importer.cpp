@@ -213,8 +213,8 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
         photo.mask = maskOk ? maskTargets[i] : fs::path();
       }
       if (!photo.depth.empty()) {
-        depthOk = importDepth(photo.depth, depthTargets[i], size.width, size.height, {photo.depthUnit, scale}) ==
-                  FileOutcome::ready;
+        depthOk = importDepth(photo.depth, depthTargets[i], size.width, size.height,
+                              {photo.depthUnit, scale * source.exrUnit[i]}) == FileOutcome::ready;
         photo.depth = depthOk ? depthTargets[i] : fs::path();
       }
     }
@@ -255,18 +255,6 @@ void dropFailed(SourceCapture& source, const Outcomes& outcomes) {
   if (kept.size() < outcomes.photos.size()) keepPhotos(source, kept);
 }
 
-void chooseSplit(const SourceCapture& source, const ImportOptions& options, std::vector<Photo>& photos) {
-  if (options.holdout != "auto") return holdOut(options.holdout, photos);
-  const auto has = [&photos](Split split) {
-    return std::any_of(photos.begin(), photos.end(), [split](const Photo& photo) { return photo.split == split; });
-  };
-  if (!source.hasOwnSplit || !has(Split::train)) return holdOut(photos.size() > 1 ? "every:8" : "none", photos);
-  if (has(Split::test)) return;
-  for (Photo& photo : photos) {
-    if (photo.split == Split::validation) photo.split = Split::test;
-  }
-}
-
 }  // namespace
 
 std::string sourceFormat(const fs::path& source) {
@@ -285,6 +273,7 @@ Capture importCapture(const fs::path& sourcePath, const fs::path& out, const Imp
   }
   ThreadPool pool(options.threads);
   SourceCapture source = readSource(sourcePath);
+  if (options.holdout == "auto" && source.splitError) throw *source.splitError;
   const std::vector<PhotoFacts> facts = cleanSource(source, pool);
   Capture& capture = source.capture;
   if (capture.photos.empty()) {
@@ -302,7 +291,7 @@ Capture importCapture(const fs::path& sourcePath, const fs::path& out, const Imp
   if (capture.photos.empty()) {
     throw Error(sourcePath.string(), "", "no photo of it can be decoded", "see the warnings above");
   }
-  chooseSplit(source, options, capture.photos);
+  chooseSplit(source, options.holdout);
   capture.root = out;
   writeCapture(capture);
   return std::move(capture);

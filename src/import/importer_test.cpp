@@ -81,7 +81,14 @@ TEST_F(Import, HoldsOutEveryEighthInNaturalOrder) {
   writeFileAtomically(folder_ / "list", std::string_view("# held out\n3.png\nimages/7.png\r\n12\nnone.png\n"));
   EXPECT_EQ(run({.holdout = "list:" + (folder_ / "list").string()}).photosIn(Split::test),
             (std::vector<int>{3, 7, 12}));
-  EXPECT_TRUE(logged("none.png is not a photo")) << log_;
+  EXPECT_TRUE(logged("1 of 4 names are no photos of this capture (none.png)")) << log_;
+  writeFileAtomically(folder_ / "list", std::string_view("./images/4.png\n.//5.png\n"));
+  EXPECT_EQ(run({.holdout = "list:" + (folder_ / "list").string()}).photosIn(Split::test), (std::vector<int>{4, 5}));
+  EXPECT_FALSE(logged("no photo")) << log_;
+  writeFileAtomically(folder_ / "list", std::string_view("photos/3.png\nnone.png\n40\n"));
+  EXPECT_NO_THROW(run({.holdout = "list:" + (folder_ / "list").string()}));  // 3 by its name without folders
+  writeFileAtomically(folder_ / "list", std::string_view("none.png\n40\n"));
+  EXPECT_THROW(run({.holdout = "list:" + (folder_ / "list").string()}), Error);
   for (const char* wrong : {"every:", "every:1", "every:x", "some", "list:/nowhere"}) {
     EXPECT_THROW(run({.holdout = wrong}), Error) << wrong;
   }
@@ -92,6 +99,32 @@ TEST_F(Import, KeepsTheSourcesOwnSplitUnlessTold) {
   write(R"(,"train_filenames":["images/0.png","images/1.png","images/2.png"],"val_filenames":["images/3.png"])");
   EXPECT_EQ(run().photosIn(Split::test), (std::vector<int>{3}));
   EXPECT_EQ(run({.holdout = "every:2"}).photosIn(Split::test), (std::vector<int>{0, 2}));
+}
+
+TEST_F(Import, RefusesSplitsThatFitNoPhotoBeforeItCopiesAny) {
+  for (int i = 0; i < 4; ++i) add("images/" + std::to_string(i) + ".png");
+  write(R"(,"train_filenames":["images/0.png"],"test_filenames":["3.png"])");
+  try {
+    run();
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.place(), "test_filenames");
+    EXPECT_NE(error.remedy().find("--holdout"), std::string::npos);
+  }
+  EXPECT_FALSE(fs::exists(out_));
+  EXPECT_EQ(run({.holdout = "every:2"}).photosIn(Split::test), (std::vector<int>{0, 2}));
+}
+
+TEST_F(Import, SaysWhenNothingIsHeldOut) {
+  for (int i = 0; i < 3; ++i) add("images/" + std::to_string(i) + ".png");
+  write(R"(,"train_filenames":["images/0.png","images/1.png","images/2.png"],"test_filenames":[])");
+  EXPECT_EQ(run().photosIn(Split::test).size(), 0u);
+  EXPECT_TRUE(logged("no photo is held out")) << log_;
+  run({.holdout = "none"});
+  EXPECT_FALSE(logged("held out")) << log_;
+  write(R"(,"test_filenames":["images/0.png","images/1.png","images/2.png"])");
+  EXPECT_EQ(run().photosIn(Split::test), (std::vector<int>{0}));
+  EXPECT_TRUE(logged("leaves nothing to train on")) << log_;
 }
 
 TEST_F(Import, ReducesByAreaAndScalesTheLens) {
@@ -184,6 +217,22 @@ TEST_F(Import, BringsMasksAndDepthsAlong) {
   for (float value : read.pixels) EXPECT_TRUE(value == 3 || value == 100);  // never a mean across an edge
   EXPECT_TRUE(capture.photos[1].mask.empty());
   EXPECT_TRUE(logged("1 masks are missing or unreadable")) << log_;
+}
+
+TEST_F(Import, ScalesDepthMapsOfEitherKindByAppliedScale) {
+  add("images/a.png", 16, 12, R"(,"depth_file_path":"depth/a.exr")");
+  add("images/b.png", 16, 12, R"(,"depth_file_path":"depth/b.png")");
+  add("images/0.png");  // comes first
+  writeDepthExr(source_ / "depth/a.exr", ImageF(16, 12, 1, 0.2f));
+  writePng(source_ / "depth/b.png", ImageU8(16, 12, 1, 200));
+  write(R"(,"applied_scale":2)");
+  const Capture capture = run();
+  EXPECT_FLOAT_EQ(readDepth(capture.photos.at(1).depth).at(3, 3)[0], 0.4f);
+  EXPECT_FLOAT_EQ(readDepth(capture.photos.at(2).depth).at(3, 3)[0], 0.4f);
+  // Once is enough.
+  const Capture again = importCapture(out_, folder_ / "again");
+  EXPECT_FLOAT_EQ(readDepth(again.photos.at(1).depth).at(3, 3)[0], 0.4f);
+  EXPECT_FLOAT_EQ(readDepth(again.photos.at(2).depth).at(3, 3)[0], 0.4f);
 }
 
 TEST_F(Import, InvertsInstantNgpsDynamicMasks) {

@@ -18,6 +18,7 @@ TEST(RealData, FoxComesInWithoutTheSeventeenPhotosThatDoNotExist) {
   const Capture capture = importCapture(*fox, folder / "out", {.downscale = 8});
   const std::string warnings = testing::internal::GetCapturedStderr();
   EXPECT_NE(warnings.find("17 photos named by the source are not on disk"), std::string::npos) << warnings;
+  EXPECT_EQ(warnings.find("unknown"), std::string::npos) << warnings;
   EXPECT_EQ(capture.photos.size(), 50u);
   EXPECT_EQ(capture.photosIn(Split::test).size(), 7u);
   ASSERT_EQ(capture.cameras.size(), 1u);

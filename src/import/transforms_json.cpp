@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "import/colmap_model.h"
@@ -16,6 +16,40 @@ using Json = nlohmann::json;
 constexpr std::array kIntrinsicKeys = {
     "w",  "h",  "fl_x",           "fl_y",           "cx",    "cy",   "k1", "k2", "k3", "k4", "k5", "k6",
     "p1", "p2", "camera_angle_x", "camera_angle_y", "x_fov", "y_fov"};
+
+constexpr std::pair<const char*, Split> kSplitKeys[] = {
+    {"train_filenames", Split::train}, {"val_filenames", Split::validation}, {"test_filenames", Split::test}};
+
+// What else is read below, of the file and of its frames.
+constexpr std::array kReadKeys = {"frames",        "file_path",         "transform_matrix", "mask_path",
+                                  "depth_path",    "depth_file_path",   "camera_model",     "is_fisheye",
+                                  "ply_file_path", "applied_transform", "applied_scale",    "integer_depth_scale",
+                                  "tessera",       "ftheta_p0",         "ftheta_p1",        "ftheta_p2",
+                                  "ftheta_p3",     "ftheta_p4",         "latlong",          "equirectangular"};
+
+// What the programs that write such files say to themselves; nothing here depends on it.
+constexpr std::array kOthersKeys = {
+    // instant-ngp
+    "aabb_scale", "aabb", "render_aabb", "scale", "offset", "up", "n_frames", "sharpness",
+    "sharpness_discard_threshold", "sharpen", "envmap", "white_transparent", "black_transparent", "fix_premult",
+    "importance_sampling", "enable_ray_loading", "enable_depth_loading", "n_extra_learnable_dims", "driver_parameters",
+    // nerfstudio
+    "colmap_im_id", "orientation_override",
+    // Blender
+    "rotation", "near", "far"};
+
+// What says something of the pictures that is not followed, and what comes of that.
+constexpr std::pair<const char*, const char*> kUnmetKeys[] = {
+    {"rolling_shutter", "every photo counts as taken in one moment"},
+    {"transform_matrix_start", "every photo counts as taken in one moment"},
+    {"transform_matrix_end", "every photo counts as taken in one moment"},
+    {"from_na", "poses are read with OpenGL axes"},
+    {"normal_mts_args", "poses are read with OpenGL axes"},
+    {"fisheye_crop_radius", "what lies outside the circle is trained on unless masks hide it"},
+    {"time", "everything counts as standing still"}};
+
+// applied_scale and applied_transform reach from here to there; beyond lie slips.
+constexpr double kTiny = 1e-12, kHuge = 1e12;
 
 // Python writes NaN, Infinity and -Infinity, which JSON has no words for: they become null (read as not-a-number).
 std::string withoutPythonNumbers(std::string_view text) {
@@ -82,6 +116,34 @@ std::optional<Mat4d> matrixOf(const Json& object, const char* key) {
   return matrix;
 }
 
+// null, false, 0, and lists of these.
+bool saysNothing(const Json& value) {
+  const auto isNothing = [](const Json& v) {
+    return v.is_null() || (v.is_boolean() && !v.get<bool>()) || (v.is_number() && v.get<double>() == 0);
+  };
+  return value.is_array() ? std::all_of(value.begin(), value.end(), isNothing) : isNothing(value);
+}
+
+void noteKeys(const Json& object, TransformsFile& file) {
+  static const std::set<std::string_view> kKnown = [] {
+    std::set<std::string_view> known(kIntrinsicKeys.begin(), kIntrinsicKeys.end());
+    known.insert(kReadKeys.begin(), kReadKeys.end());
+    known.insert(kOthersKeys.begin(), kOthersKeys.end());
+    for (const auto& [key, split] : kSplitKeys) known.insert(key);
+    return known;
+  }();
+  for (const auto& [key, value] : object.items()) {
+    if (kKnown.contains(key)) continue;
+    const auto unmet = std::find_if(std::begin(kUnmetKeys), std::end(kUnmetKeys),
+                                    [&key = key](const auto& entry) { return key == entry.first; });
+    if (unmet == std::end(kUnmetKeys)) {
+      file.unknownKeys.insert(key);
+    } else if (!saysNothing(value)) {
+      file.unmetKeys[key] = unmet->second;
+    }
+  }
+}
+
 void readIntrinsics(const Json& object, Intrinsics& intrinsics) {
   for (const char* key : kIntrinsicKeys) {
     const double value = numberOr(object, key, std::nan(""));
@@ -90,6 +152,55 @@ void readIntrinsics(const Json& object, Intrinsics& intrinsics) {
   if (const std::string model = textOr(object, "camera_model"); !model.empty()) intrinsics.model = model;
   const auto fisheye = object.find("is_fisheye");
   if (fisheye != object.end() && fisheye->is_boolean()) intrinsics.fisheye = fisheye->get<bool>();
+  // instant-ngp names some lenses by keys of their own, and those decide.
+  std::string lens = object.contains("ftheta_p0") ? "FTHETA" : "";
+  for (const auto& [key, model] : {std::pair{"latlong", "LATLONG"}, std::pair{"equirectangular", "EQUIRECTANGULAR"}}) {
+    if (const auto value = object.find(key); value != object.end() && !saysNothing(*value)) lens = model;
+  }
+  if (lens.empty()) return;
+  intrinsics.model = lens;
+  intrinsics.fisheye = false;
+}
+
+void readSplits(const Json& json, TransformsFile& file) {
+  for (const auto& [key, split] : kSplitKeys) {
+    const auto names = json.find(key);
+    if (names == json.end() || !names->is_array()) continue;
+    SplitList list{key, split, {}};
+    for (const Json& name : *names) {
+      if (name.is_string()) list.names.push_back(name.get<std::string>());
+    }
+    file.splitLists.push_back(std::move(list));
+  }
+}
+
+// Whether it can be undone without leaving the numbers that places have. A similarity's determinant is the cube of its
+// size, so it is judged by that.
+bool isInvertible(const Mat4d& applied) {
+  const Mat3d linear = applied.topLeftCorner<3, 3>();
+  const double size = linear.norm() / std::sqrt(3.0);
+  return applied.allFinite() && applied.row(3) == Mat4d::Identity().row(3) && size >= kTiny && size <= kHuge &&
+         std::abs((linear / size).determinant()) > 1e-6 &&
+         applied.topRightCorner<3, 1>().cwiseAbs().maxCoeff() <= kHuge;
+}
+
+void readApplied(const Json& json, TransformsFile& file) {
+  if (const auto scale = json.find("applied_scale"); scale != json.end() && !scale->is_null()) {
+    const double value = numberOr(json, "applied_scale", 0);
+    if (value >= kTiny && value <= kHuge) {
+      file.appliedScale = value;
+    } else {
+      file.appliedTrouble = "applied_scale is not a number from 1e-12 to 1e12";
+    }
+  }
+  if (const auto matrix = json.find("applied_transform"); matrix != json.end() && !matrix->is_null()) {
+    const auto applied = matrixOf(json, "applied_transform");
+    if (applied && isInvertible(*applied)) {
+      file.appliedTransform = *applied;
+    } else {
+      file.appliedTrouble = "applied_transform is not a 3 x 4 matrix that can be inverted";
+    }
+  }
 }
 
 bool readOurs(const Json& ours, TransformsFile& file, std::string& reason) {
@@ -140,6 +251,7 @@ bool readFrame(const Json& object, const Intrinsics& shared, TransformsFile& fil
     reason = fmt::format("frames[{}]: has no {}", index, frame.file.empty() ? "file_path" : "4 x 4 transform_matrix");
     return false;
   }
+  noteKeys(object, file);
   frame.worldFromCameraGl = *matrix;
   frame.mask = textOr(object, "mask_path");
   frame.depth = textOr(object, "depth_file_path");
@@ -191,6 +303,7 @@ std::optional<TransformsFile> decodeTransforms(std::string_view text, std::strin
   if (const auto ours = json.find("tessera"); ours != json.end() && ours->is_object()) {
     if (!readOurs(*ours, file, reason)) return std::nullopt;
   }
+  noteKeys(json, file);
   Intrinsics shared;
   readIntrinsics(json, shared);
   const auto frames = json.find("frames");
@@ -201,19 +314,9 @@ std::optional<TransformsFile> decodeTransforms(std::string_view text, std::strin
   for (const Json& frame : *frames) {
     if (!readFrame(frame, shared, file, reason)) return std::nullopt;
   }
-  for (const auto& [key, split] :
-       {std::pair{"train_filenames", Split::train}, std::pair{"val_filenames", Split::validation},
-        std::pair{"test_filenames", Split::test}}) {
-    const auto names = json.find(key);
-    if (names == json.end() || !names->is_array()) continue;
-    for (const Json& name : *names) {
-      if (name.is_string()) file.splits[name.get<std::string>()] = split;
-    }
-  }
   file.pointFile = textOr(json, "ply_file_path");
-  if (const auto applied = matrixOf(json, "applied_transform")) file.appliedTransform = *applied;
-  const double scale = numberOr(json, "applied_scale", 1);
-  if (scale > 0 && std::isfinite(scale)) file.appliedScale = scale;
+  readSplits(json, file);
+  readApplied(json, file);
   const double step = numberOr(json, "integer_depth_scale", 0);
   if (step > 0 && std::isfinite(step)) file.integerDepthScale = step;
   return file;

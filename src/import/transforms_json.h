@@ -8,6 +8,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,13 +36,23 @@ struct TransformsFrame {
   std::optional<GpsFix> gps;
 };
 
+// train_filenames, val_filenames or test_filenames.
+struct SplitList {
+  std::string key;
+  Split split = Split::train;
+  std::vector<std::string> names;  // as written
+};
+
 struct TransformsFile {
   std::vector<TransformsFrame> frames;
-  std::map<std::string, Split> splits;  // file_path → split, from train/val/test_filenames
+  std::vector<SplitList> splitLists;  // train, validation, test, as far as they are there
   std::string pointFile, observationFile;
-  Mat4d appliedTransform = Mat4d::Identity();
+  Mat4d appliedTransform = Mat4d::Identity();  // invertible; its last row is 0 0 0 1
   double appliedScale = 1;
-  double integerDepthScale = 0;  // instant-ngp: world units per step, 0: not given
+  std::string appliedTrouble;                    // why one of the two was not taken over; empty when all is well
+  double integerDepthScale = 0;                  // instant-ngp: world units per step, 0: not given
+  std::set<std::string> unknownKeys;             // of the file and its frames
+  std::map<std::string, std::string> unmetKeys;  // known, not followed → what comes of that
   // Of our own captures only.
   bool isOurs = false;
   std::vector<Camera> cameras;
@@ -49,9 +60,12 @@ struct TransformsFile {
   std::optional<GeoFrame> geo;
 };
 
-// Untrusted text: nothing, and why in `reason`, when it is not such a file. Unknown keys are ignored; NaN and Infinity
-// as Python writes them are understood.
+// Untrusted text: nothing, and why in `reason`, when it is not such a file. Unknown keys are noted; NaN and
+// Infinity as Python writes them are understood.
 std::optional<TransformsFile> decodeTransforms(std::string_view text, std::string& reason);
+
+// The same of a file; throws Error.
+TransformsFile loadTransforms(const fs::path& file);
 
 // The camera for a photo of that size (used where the file gives none). Nothing for a lens that is not known, or that
 // has no focal length.

@@ -2,16 +2,25 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <unordered_map>
 
 #include "base/error.h"
 #include "base/image_io.h"
 #include "base/log.h"
 #include "base/safetensors.h"
+#include "import/clean.h"
 #include "import/transforms_json.h"
 #include "scene/ply.h"
 
 namespace tessera {
 namespace {
+
+// A place farther from the origin is none, though it is a number.
+constexpr double kFarthest = 1e12;
+
+bool isPlace(const Vec3d& x) {
+  return x.allFinite() && x.cwiseAbs().maxCoeff() <= kFarthest;
+}
 
 bool isFile(const fs::path& path) {
   std::error_code status;
@@ -40,9 +49,10 @@ std::optional<ImageInfo> photoSize(const fs::path& path) {
   }
 }
 
-// The pose in a camera-to-world matrix, freed of what rounding did to its rotation; nothing when it is not rigid.
+// The pose in a camera-to-world matrix, freed of what rounding did to its rotation; nothing when it is not rigid
+// or stands nowhere.
 std::optional<Pose> poseFromGl(const Mat4d& worldFromCameraGl) {
-  if (!worldFromCameraGl.allFinite()) return std::nullopt;
+  if (!worldFromCameraGl.allFinite() || !isPlace(worldFromCameraGl.topRightCorner<3, 1>())) return std::nullopt;
   Mat3d rotation = flippedYz(worldFromCameraGl.topLeftCorner<3, 3>());
   const double deviation = (rotation.transpose() * rotation - Mat3d::Identity()).norm();
   if (deviation > 0.02 || rotation.determinant() < 0) return std::nullopt;
@@ -76,7 +86,7 @@ void readPoints(const fs::path& file, const TransformsFile& transforms, Capture&
     return;
   }
   capture.points = readPly(*path);
-  if (!transforms.isOurs) std::erase_if(capture.points, [](const SparsePoint& p) { return !p.xInWorld.allFinite(); });
+  if (!transforms.isOurs) std::erase_if(capture.points, [](const SparsePoint& p) { return !isPlace(p.xInWorld); });
 }
 
 // `photoOfFrame`: -1 for frames that were dropped.
@@ -102,20 +112,89 @@ void readObservations(const fs::path& file, const TransformsFile& transforms, co
 }
 
 struct Dropped {
-  std::vector<std::string> outside, poses, lenses;
+  std::vector<std::string> outside, poses, lenses;  // whole photos
+  std::vector<std::string> masks, depths;           // these alone
   std::string lensReason;
 };
 
 void reportDropped(const fs::path& file, const Dropped& dropped) {
   const auto report = [&file](const std::vector<std::string>& names, const std::string& what) {
-    if (!names.empty()) {
-      warn("{}: {} photos {}; dropped ({}{})", file.string(), names.size(), what, names[0],
-           names.size() > 1 ? ", ..." : "");
-    }
+    if (!names.empty()) warn("{}: {} {} ({})", file.string(), names.size(), what, firstOf(names));
   };
-  report(dropped.outside, "have paths that leave the folder");
-  report(dropped.poses, "have a pose that is not a number or not a rotation and a translation");
-  report(dropped.lenses, "have a lens that cannot be used: " + dropped.lensReason);
+  report(dropped.outside, "photos have paths that leave the folder; dropped");
+  report(dropped.poses,
+         "photos have a pose that is not a number, farther out than 1e12, or not a rotation and a "
+         "translation; dropped");
+  report(dropped.lenses, "photos have a lens that cannot be used: " + dropped.lensReason + "; dropped");
+  report(dropped.masks, "masks have paths that leave the folder: those photos train unmasked");
+  report(dropped.depths, "depth maps have paths that leave the folder; ignored");
+}
+
+// What the file says and nothing here follows: one line of each kind.
+void reportKeys(const fs::path& file, const TransformsFile& transforms) {
+  constexpr size_t kNamed = 10;
+  if (const auto& keys = transforms.unknownKeys; !keys.empty()) {
+    std::string names;
+    size_t named = 0;
+    for (auto key = keys.begin(); key != keys.end() && named < kNamed; ++key, ++named) {
+      names += fmt::format("{}{:.60}", named > 0 ? ", " : "", *key);
+    }
+    if (keys.size() > kNamed) names += fmt::format(" and {} more", keys.size() - kNamed);
+    warn("{}: ignored, as unknown to tessera: {}", file.string(), names);
+  }
+  for (const auto& [key, consequence] : transforms.unmetKeys) {
+    warn("{}: {} is not followed: {}", file.string(), key, consequence);
+  }
+  if (!transforms.isOurs && !transforms.appliedTrouble.empty()) {
+    warn("{}: {}; ignored, so depth maps may have the wrong scale, and camera paths made for the source another place",
+         file.string(), transforms.appliedTrouble);
+  }
+}
+
+// "./images/a.jpg" and "images\\a.jpg" are images/a.jpg.
+std::string normalPath(std::string written) {
+  std::replace(written.begin(), written.end(), '\\', '/');
+  return fs::path(written).lexically_normal().generic_string();
+}
+
+// The split of each frame by the lists of names (a later list wins: what is to be held out is), none where no list has
+// it. A list that fits no frame at all would hold out nothing: it goes into `error`.
+std::vector<std::optional<Split>> splitsOfFrames(const fs::path& file, const TransformsFile& transforms,
+                                                 std::optional<Error>& error) {
+  std::vector<std::optional<Split>> splits(transforms.frames.size());
+  std::unordered_map<std::string, std::vector<size_t>> framesOfPath;
+  for (size_t i = 0; i < splits.size(); ++i) framesOfPath[normalPath(transforms.frames[i].file)].push_back(i);
+  for (const SplitList& list : transforms.splitLists) {
+    std::vector<std::string> strangers;
+    for (const std::string& name : list.names) {
+      const auto frames = framesOfPath.find(normalPath(name));
+      if (frames == framesOfPath.end()) {
+        strangers.push_back(name);
+      } else {
+        for (const size_t i : frames->second) splits[i] = list.split;
+      }
+    }
+    if (strangers.empty()) continue;
+    if (strangers.size() == list.names.size()) {
+      error = Error(file.string(), list.key, "names no frame of this file (" + firstOf(strangers) + ")",
+                    "write its names as file_path has them, or split anew with --holdout every:8");
+    } else {
+      warn("{}: {}: {} of {} names are of no frame ({})", file.string(), list.key, strangers.size(), list.names.size(),
+           firstOf(strangers));
+    }
+  }
+  // Where only the held-out frames are listed, the others are plainly meant to train.
+  const bool listsTraining =
+      std::any_of(transforms.splitLists.begin(), transforms.splitLists.end(),
+                  [](const SplitList& list) { return list.split == Split::train && !list.names.empty(); });
+  std::vector<std::string> unlisted;
+  for (size_t i = 0; listsTraining && !error && i < splits.size(); ++i) {
+    if (!splits[i]) unlisted.push_back(transforms.frames[i].file);
+  }
+  if (!unlisted.empty()) {
+    warn("{}: {} frames are in no list of a split; they train ({})", file.string(), unlisted.size(), firstOf(unlisted));
+  }
+  return splits;
 }
 
 // Adds one frame; false when it is dropped.
@@ -138,7 +217,11 @@ bool addFrame(const fs::path& root, const TransformsFile& transforms, const Tran
   }
   bool inverted = false;
   if (!frame.mask.empty()) {
-    if (const auto mask = resolvePhoto(root, frame.mask)) photo.mask = *mask;
+    if (const auto mask = resolvePhoto(root, frame.mask)) {
+      photo.mask = *mask;
+    } else {
+      dropped.masks.push_back(frame.mask);
+    }
   } else if (!transforms.isOurs) {
     const fs::path dynamic = photo.image.parent_path() / ("dynamic_mask_" + photo.image.stem().string() + ".png");
     if (isFile(dynamic)) {
@@ -147,7 +230,11 @@ bool addFrame(const fs::path& root, const TransformsFile& transforms, const Tran
     }
   }
   if (!frame.depth.empty()) {
-    if (const auto depth = resolvePhoto(root, frame.depth)) photo.depth = *depth;
+    if (const auto depth = resolvePhoto(root, frame.depth)) {
+      photo.depth = *depth;
+    } else {
+      dropped.depths.push_back(frame.depth);
+    }
     photo.depthUnit = frame.depthUnit > 0                ? frame.depthUnit
                       : transforms.integerDepthScale > 0 ? static_cast<float>(transforms.integerDepthScale)
                                                          : static_cast<float>(0.001 * transforms.appliedScale);
@@ -156,11 +243,9 @@ bool addFrame(const fs::path& root, const TransformsFile& transforms, const Tran
       !frame.name.empty() ? frame.name : photo.image.lexically_relative(fs::weakly_canonical(root)).generic_string();
   photo.exposure = frame.exposure;
   photo.gps = frame.gps;
-  if (const auto split = transforms.splits.find(frame.file); split != transforms.splits.end()) {
-    photo.split = split->second;
-  }
   capture.photos.push_back(std::move(photo));
   source.maskIsInverted.push_back(inverted);
+  source.exrUnit.push_back(transforms.isOurs ? 1 : transforms.appliedScale);
   return true;
 }
 
@@ -176,36 +261,48 @@ std::vector<fs::path> findTransforms(const fs::path& source) {
   return files;
 }
 
+TransformsFile loadTransforms(const fs::path& file) {
+  std::string reason;
+  auto transforms = decodeTransforms(readTextFile(file), reason);
+  if (!transforms) throw Error(file.string(), "", reason, "mend the file or export it again");
+  return std::move(*transforms);
+}
+
 SourceCapture readTransforms(const std::vector<fs::path>& files) {
   SourceCapture source;
   source.knowsUp = true;
   Capture& capture = source.capture;
   for (const fs::path& file : files) {
-    std::string reason;
-    const auto transforms = decodeTransforms(readTextFile(file), reason);
-    if (!transforms) throw Error(file.string(), "", reason, "mend the file or export it again");
-    if (transforms->isOurs) {
+    const TransformsFile transforms = loadTransforms(file);
+    reportKeys(file, transforms);
+    if (transforms.isOurs) {
       source.isOurs = true;
-      capture.cameras = transforms->cameras;
-      capture.geo = transforms->geo;
-      capture.sourceFromWorld = transforms->sourceFromWorld;
+      capture.cameras = transforms.cameras;
+      capture.geo = transforms.geo;
+      capture.sourceFromWorld = transforms.sourceFromWorld;
     } else {
-      Mat4d scaled = transforms->appliedTransform;
-      scaled.topRows<3>() *= transforms->appliedScale;
-      if (scaled.allFinite() && std::abs(scaled.determinant()) > 1e-12) capture.sourceFromWorld = scaled.inverse();
+      Mat4d worldFromSource = transforms.appliedTransform;
+      worldFromSource.topRows<3>() *= transforms.appliedScale;
+      capture.sourceFromWorld = worldFromSource.inverse();
     }
-    readPoints(file, *transforms, capture);
-    const auto split = files.size() > 1 ? splitOfName(file) : std::nullopt;  // one alone is a whole capture
-    source.hasOwnSplit = source.hasOwnSplit || split || !transforms->splits.empty();
+    readPoints(file, transforms, capture);
+    std::vector<std::optional<Split>> splits;
+    if (const auto split = files.size() > 1 ? splitOfName(file) : std::nullopt) {  // one alone is a whole capture
+      splits.assign(transforms.frames.size(), split);
+      source.hasOwnSplit = true;
+    } else {
+      splits = splitsOfFrames(file, transforms, source.splitError);
+      for (const SplitList& list : transforms.splitLists) source.hasOwnSplit |= !list.names.empty();
+    }
     Dropped dropped;
     std::vector<int> photoOfFrame;
-    for (const TransformsFrame& frame : transforms->frames) {
-      const bool kept = addFrame(file.parent_path(), *transforms, frame, source, dropped);
+    for (size_t i = 0; i < transforms.frames.size(); ++i) {
+      const bool kept = addFrame(file.parent_path(), transforms, transforms.frames[i], source, dropped);
       photoOfFrame.push_back(kept ? static_cast<int>(capture.photos.size()) - 1 : -1);
-      if (kept && split) capture.photos.back().split = *split;
+      if (kept) capture.photos.back().split = splits[i].value_or(Split::train);
     }
     reportDropped(file, dropped);
-    readObservations(file, *transforms, photoOfFrame, capture);
+    readObservations(file, transforms, photoOfFrame, capture);
   }
   return source;
 }

@@ -26,6 +26,24 @@ Camera cameraOf(const std::string& keys, int width = 100, int height = 80) {
   return camera.value_or(Camera{});
 }
 
+// A source of the frames, which name a.png, b.png, ... in `folder`, and what was said while it was read.
+struct Read {
+  SourceCapture source;
+  std::string warnings;
+  bool warned(const std::string& text) const { return warnings.find(text) != std::string::npos; }
+};
+
+Read readSource(const TemporaryFolder& folder, const std::string& keys, const std::vector<std::string>& frames) {
+  for (const char* name : {"a.png", "b.png", "c.png", "d.png"}) writePng(folder / name, gradientPicture(8, 8));
+  std::string json = "{\"fl_x\":9" + keys + ",\"frames\":[";
+  for (size_t i = 0; i < frames.size(); ++i) json += (i > 0 ? "," : "") + frames[i];
+  writeFileAtomically(folder / "transforms.json", json + "]}");
+  testing::internal::CaptureStderr();
+  Read read{readTransforms(findTransforms(folder.path())), ""};
+  read.warnings = testing::internal::GetCapturedStderr();
+  return read;
+}
+
 std::string lensTrouble(const std::string& keys) {
   std::string reason;
   const auto file = decodeTransforms("{" + keys + ",\"frames\":[" + frame("a") + "]}", reason);
@@ -64,6 +82,10 @@ TEST(Transforms, RefusesLensesThatItWouldDrawWrongly) {
   EXPECT_NE(lensTrouble(R"("k1":0.1)").find("no focal length"), std::string::npos);
   EXPECT_NE(lensTrouble(R"("fl_x":70,"k4":0.1)").find("k4"), std::string::npos);
   EXPECT_NE(lensTrouble(R"("fl_x":70,"camera_model":"EQUIRECTANGULAR")").find("EQUIRECTANGULAR"), std::string::npos);
+  EXPECT_NE(lensTrouble(R"("fl_x":70,"is_fisheye":true,"ftheta_p0":0,"ftheta_p1":1)").find("FTHETA"),
+            std::string::npos);
+  EXPECT_NE(lensTrouble(R"("fl_x":70,"latlong":true)").find("LATLONG"), std::string::npos);
+  EXPECT_EQ(cameraOf(R"("fl_x":70,"latlong":false)").lens, LensModel::pinhole);
 }
 
 TEST(Transforms, LetsAFrameSpeakOverTheFile) {
@@ -104,6 +126,90 @@ TEST(Transforms, DropsPosesThatAreNoPosesAndPathsThatLeave) {
   EXPECT_EQ(source.capture.photos.size(), 1u);
   EXPECT_NE(warnings.find("3 photos have a pose"), std::string::npos) << warnings;
   EXPECT_NE(warnings.find("2 photos have paths that leave the folder"), std::string::npos) << warnings;
+}
+
+TEST(Transforms, DropsPosesThatAreNumbersButNoPlaces) {
+  const TemporaryFolder folder;
+  const Read read = readSource(folder, "",
+                               {frame("a.png", "[[1,0,0,1e12],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"),
+                                frame("b.png", "[[1,0,0,0],[0,1,0,-1.1e12],[0,0,1,0],[0,0,0,1]]"),
+                                frame("c.png", "[[1,0,0,0],[0,1,0,0],[0,0,1,1e300],[0,0,0,1]]")});
+  ASSERT_EQ(read.source.capture.photos.size(), 1u);
+  EXPECT_EQ(read.source.capture.photos[0].name, "a.png");
+  EXPECT_TRUE(read.warned("2 photos have a pose")) << read.warnings;
+}
+
+TEST(Transforms, SaysWhichMasksAndDepthMapsLeaveTheFolder) {
+  const TemporaryFolder folder;
+  const Read read = readSource(folder, "",
+                               {frame("a.png", kIdentity, R"(,"mask_path":"../m.png","depth_file_path":"/d.exr")"),
+                                frame("b.png", kIdentity, R"(,"mask_path":"/etc/m.png")"), frame("c.png")});
+  ASSERT_EQ(read.source.capture.photos.size(), 3u);
+  EXPECT_TRUE(read.source.capture.photos[1].mask.empty());
+  EXPECT_TRUE(
+      read.warned("2 masks have paths that leave the folder: those photos train unmasked (../m.png, /etc/m.png)"))
+      << read.warnings;
+  EXPECT_TRUE(read.warned("1 depth maps have paths that leave the folder; ignored (/d.exr)")) << read.warnings;
+}
+
+TEST(Transforms, FindsTheNamesOfSplitsHoweverTheirPathsAreWritten) {
+  const TemporaryFolder folder;
+  const Read read = readSource(
+      folder, R"(,"train_filenames":["./d.png"],"val_filenames":["x/../c.png"],"test_filenames":["a.png",".\\b.png"])",
+      {frame("./a.png"), frame("b.png"), frame("c.png"), frame("d.png")});
+  std::vector<Split> splits;
+  for (const Photo& photo : read.source.capture.photos) splits.push_back(photo.split);
+  EXPECT_EQ(splits, (std::vector<Split>{Split::test, Split::test, Split::validation, Split::train}));
+  EXPECT_TRUE(read.source.hasOwnSplit);
+  EXPECT_FALSE(read.source.splitError.has_value());
+  EXPECT_EQ(read.warnings, "");
+}
+
+TEST(Transforms, SaysWhichNamesOfSplitsFitNoFrameAndWhichFramesNoList) {
+  const TemporaryFolder folder;
+  const Read read =
+      readSource(folder, R"(,"train_filenames":["a.png"],"test_filenames":["b.png","e.png","images/b.png"])",
+                 {frame("a.png"), frame("b.png"), frame("c.png"), frame("d.png")});
+  EXPECT_TRUE(read.warned("test_filenames: 2 of 3 names are of no frame (e.png, images/b.png)")) << read.warnings;
+  EXPECT_TRUE(read.warned("2 frames are in no list of a split; they train (c.png, d.png)")) << read.warnings;
+  EXPECT_FALSE(read.source.splitError.has_value());
+  EXPECT_EQ(read.source.capture.photos.at(1).split, Split::test);
+  // Where only the held-out ones are named, the others are known to train.
+  EXPECT_EQ(readSource(folder, R"(,"test_filenames":["b.png"])", {frame("a.png"), frame("b.png")}).warnings, "");
+}
+
+TEST(Transforms, DoesNotTakeAListThatFitsNoFrameForASplit) {
+  const TemporaryFolder folder;
+  const Read read = readSource(folder, R"(,"train_filenames":["a.png"],"test_filenames":["images/b.png"])",
+                               {frame("a.png"), frame("b.png")});
+  ASSERT_TRUE(read.source.splitError.has_value());
+  EXPECT_EQ(read.source.splitError->place(), "test_filenames");
+  EXPECT_NE(read.source.splitError->reason().find("images/b.png"), std::string::npos);
+}
+
+TEST(Transforms, NamesTheKeysThatItDoesNotKnowOnceEach) {
+  const TemporaryFolder folder;
+  const std::string more = R"(,"blur":1,"colmap_im_id":3,"sharpness":2,"rotation":0.1)";
+  const Read few = readSource(
+      folder, R"(,"aabb_scale":4,"scale":1,"offset":[0,0,0],"near":0,"far":9,"k5":0,"camera_angle_y":1,"wind":"west")",
+      {frame("a.png", kIdentity, more), frame("b.png", kIdentity, more)});
+  EXPECT_TRUE(few.warned("transforms.json: ignored, as unknown to tessera: blur, wind\n")) << few.warnings;
+  EXPECT_EQ(few.warnings.find("blur"), few.warnings.rfind("blur"));
+  std::string many;
+  for (char c = 'a'; c <= 'm'; ++c) many += std::string(",\"key_") + c + "\":0";
+  EXPECT_TRUE(readSource(folder, many, {frame("a.png")}).warned("key_i, key_j and 3 more\n"));
+}
+
+TEST(Transforms, SaysWhatComesOfKeysThatItDoesNotFollow) {
+  const TemporaryFolder folder;
+  const Read read =
+      readSource(folder, R"(,"rolling_shutter":[0,0,0.02,0],"from_na":true)",
+                 {frame("a.png", kIdentity, R"(,"time":0.0)"), frame("b.png", kIdentity, R"(,"time":0.5)")});
+  EXPECT_TRUE(read.warned("rolling_shutter is not followed: every photo counts as taken in one moment"));
+  EXPECT_TRUE(read.warned("from_na is not followed: poses are read with OpenGL axes"));
+  EXPECT_TRUE(read.warned("time is not followed: everything counts as standing still"));
+  EXPECT_EQ(
+      readSource(folder, R"(,"rolling_shutter":[0,0,0,0],"from_na":false,"time":null)", {frame("a.png")}).warnings, "");
 }
 
 TEST(Transforms, TurnsOpenGlAxesIntoOurs) {
@@ -160,6 +266,39 @@ TEST(Transforms, KeepsTheWorldThatAppliedTransformLedTo) {
   EXPECT_FLOAT_EQ(photo.depthUnit, 0.002f);
   const Vec3d inSource = (source.capture.sourceFromWorld * Vec3d(5, 6, 7).homogeneous()).head<3>();
   EXPECT_NEAR((inSource - Vec3d(2.5, -3.5, 3)).norm(), 0, 1e-12);
+}
+
+TEST(Transforms, UndoesAppliedScalesOfAnySize) {
+  const TemporaryFolder folder;
+  for (const double scale : {1e-11, 1e-5, 1e5}) {
+    const std::string keys = R"(,"applied_transform":[[0,1,0,1],[1,0,0,2],[0,0,-1,3]],"applied_scale":)";
+    const Read read = readSource(folder, keys + std::to_string(scale * 1e11) + "e-11", {frame("a.png")});
+    // World x = scale × (source y + 1).
+    const Vec3d inSource = (read.source.capture.sourceFromWorld * Vec3d(5 * scale, 0, 0).homogeneous()).head<3>();
+    EXPECT_NEAR((inSource - Vec3d(-2, 4, 3)).norm(), 0, 1e-9) << scale;
+    EXPECT_EQ(read.warnings, "");
+  }
+  // The transform may hold the scale itself.
+  const Read read =
+      readSource(folder, R"(,"applied_transform":[[1e-5,0,0,0],[0,1e-5,0,0],[0,0,1e-5,0]])", {frame("a.png")});
+  EXPECT_NEAR(read.source.capture.sourceFromWorld(1, 1), 1e5, 1e-6);
+  EXPECT_EQ(read.warnings, "");
+}
+
+TEST(Transforms, SaysWhenAppliedTransformsCannotBeUndone) {
+  const TemporaryFolder folder;
+  for (const char* matrix : {"[[1,0,0,0],[0,1,0,0],[0,0,0,0]]", "[[1,0,0,0],[0,1,0,0],[0,0,1,NaN]]", "[1,2,3]",
+                             "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,0]]", "[[1,2,0,0],[2,4,0,0],[0,0,1,0]]"}) {
+    const Read read =
+        readSource(folder, R"(,"applied_scale":2,"applied_transform":)" + std::string(matrix), {frame("a.png")});
+    EXPECT_TRUE(read.warned("applied_transform is not a 3 x 4 matrix that can be inverted; ignored")) << matrix;
+    EXPECT_EQ(read.source.capture.sourceFromWorld(0, 0), 0.5) << matrix;
+  }
+  for (const char* scale : {"0", "-1", "1e-200", "1e300", "\"2\"", "NaN"}) {
+    const Read read = readSource(folder, R"(,"applied_scale":)" + std::string(scale), {frame("a.png")});
+    EXPECT_EQ(read.warned("applied_scale is not a number"), std::string(scale) != "NaN") << scale;
+    EXPECT_EQ(read.source.capture.sourceFromWorld, Mat4d::Identity()) << scale;
+  }
 }
 
 // Everything that a capture can hold, with numbers that decimals cannot write in few digits.
@@ -243,7 +382,8 @@ TEST(Captures, SpeakNerfstudiosWordsForOneCamera) {
   ASSERT_TRUE(file.has_value()) << reason;
   EXPECT_FALSE(file->isOurs);
   EXPECT_EQ(cameraFromIntrinsics(file->frames[0].intrinsics, 8, 6, reason), capture.cameras[0]);
-  EXPECT_EQ(file->splits.at("images/2.png"), Split::test);
+  ASSERT_EQ(file->splitLists.size(), 3u);
+  EXPECT_EQ(file->splitLists[2].names, std::vector<std::string>{"images/2.png"});
   EXPECT_EQ(file->pointFile, "points.ply");
 }
 
@@ -261,6 +401,17 @@ TEST(Captures, AreNotReadFromFoldersThatAreNone) {
   } catch (const Error& error) {
     EXPECT_EQ(error.subject(), capture.photos[2].image.string());
   }
+}
+
+TEST(Captures, RefuseListsOfSplitsThatFitNoPhoto) {
+  const TemporaryFolder folder;
+  writeCapture(fullCapture(folder.path()));
+  std::string text = readTextFile(folder / "transforms.json");
+  const size_t list = text.find("\"test_filenames\"");
+  text.replace(text.find("images/2", list), 8, "images/7");
+  writeFileAtomically(folder / "transforms.json", text);
+  EXPECT_THROW(readCapture(folder.path()), Error);
+  EXPECT_TRUE(isCapture(folder.path()));
 }
 
 TEST(Captures, RefuseObservationsOfPhotosThatDoNotExist) {

@@ -64,6 +64,7 @@ int main(int count, char** arguments) {
   write("transforms_json/a",
         std::string(
             R"({"camera_angle_x":0.7,"w":64,"h":48,"k1":0.1,"ply_file_path":"p.ply","test_filenames":["a.png"],)"
+            R"("applied_scale":2,"applied_transform":[[0,1,0,0],[1,0,0,0],[0,0,-1,0]],"rolling_shutter":[0,0,1],"x":1,)"
             R"("frames":[{"file_path":"a.png","transform_matrix":[[1,0,0,1],[0,1,0,2],[0,0,NaN,3],[0,0,0,1]]}]})"));
   write(
       "transforms_json/b",
