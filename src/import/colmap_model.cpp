@@ -15,11 +15,6 @@ namespace {
 // Models that are special cases of another, and one that is not a lens with a focal length.
 constexpr int kSimpleFisheye = 14, kFisheye = 15, kEquirectangular = 17;
 constexpr uint64_t kMaxSide = 1 << 20;
-constexpr double kFarthest = 1e12;  // what lies beyond is no place, and its square or product may not be a number
-
-bool isPlace(const Vec3d& x) {
-  return (x.array().abs() < kFarthest).all();  // false for NaN too
-}
 
 std::optional<Camera> checkedCamera(LensModel lens, uint64_t width, uint64_t height, std::span<const double> parameters,
                                     std::string& reason) {

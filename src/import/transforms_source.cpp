@@ -15,13 +15,6 @@
 namespace tessera {
 namespace {
 
-// A place farther from the origin is none, though it is a number.
-constexpr double kFarthest = 1e12;
-
-bool isPlace(const Vec3d& x) {
-  return x.allFinite() && x.cwiseAbs().maxCoeff() <= kFarthest;
-}
-
 bool isFile(const fs::path& path) {
   std::error_code status;
   return fs::is_regular_file(path, status);

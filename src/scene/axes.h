@@ -18,6 +18,12 @@ using Vec3f = Eigen::Vector3f;
 using Mat3d = Eigen::Matrix3d;
 using Mat4d = Eigen::Matrix4d;
 
+// Coordinates that files may hold. What lies beyond is no place, though it is a number: products of such overflow.
+inline constexpr double kFarthest = 1e12;
+inline bool isPlace(const Vec3d& x) {
+  return (x.array().abs() <= kFarthest).all();  // false for NaN too
+}
+
 struct Pose {
   Mat3d rotation = Mat3d::Identity();  // columns: the camera's right, down and forward in the world
   Vec3d translation = Vec3d::Zero();   // the camera's centre in the world

@@ -17,7 +17,6 @@ using nlohmann::ordered_json;
 
 constexpr int kLargestSide = 16384;
 constexpr double kRotationTolerance = 1e-2;  // of RᵀR against the identity; files round to few digits
-constexpr double kFarthest = 1e12;
 
 std::optional<double> finiteNumber(const json& object, const char* key, double absent) {
   const auto found = object.find(key);
