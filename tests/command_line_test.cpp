@@ -153,13 +153,17 @@ TEST_F(CommandLine, SaysItsVersion) {
 
 TEST_F(CommandLine, EndsWithTwoWhenItIsUsedWrongly) {
   usageErrorOf({});
-  usageErrorOf({"fly"});
+  EXPECT_TRUE(contains(usageErrorOf({"fly"}), "'fly'"));
   usageErrorOf({"train"});
   usageErrorOf({"train", city()});
   usageErrorOf({"train", city(), at("m"), "--stops", "3"});
   usageErrorOf({"train", city(), at("m"), "--steps", "many"});
   usageErrorOf({"train", city(), at("m"), "--steps", "3", "--minutes", "1"});
-  usageErrorOf({"train", city(), at("m"), "--minutes", "-1"});
+  for (const char* minutes : {"-1", "0", "nan", "inf", "1e300", "long"}) {
+    usageErrorOf({"train", city(), at("m"), "--minutes", minutes});
+  }
+  for (const char* steps : {"-5", "0", "1.5"}) usageErrorOf({"train", city(), at("m"), "--steps", steps});
+  usageErrorOf({"train", city(), at("m"), "--steps", "3", "--checkpoint-seconds", "-1"});
   usageErrorOf({"train", city(), at("m"), "--method", "guess"});
   usageErrorOf({"train", city(), at("m"), "--threads", "-3"});
   usageErrorOf({"eval", model(), city(), "--split", "best"});
@@ -196,6 +200,10 @@ TEST_F(CommandLine, ExplainsWhatIsWrongWithAFolder) {
   EXPECT_TRUE(contains(failureOf({"eval", model(), at("missing")}), at("missing")));
   EXPECT_TRUE(contains(failureOf({"render", at("missing"), at("out1"), "--views", city()}), at("missing")));
   EXPECT_TRUE(contains(failureOf({"render", model(), at("out1"), "--path", at("missing.json")}), "missing.json"));
+  EXPECT_TRUE(contains(failureOf(trainArguments(city(), {"--steps", "3"})), "holds a capture"));
+  EXPECT_TRUE(contains(failureOf({"import", city(), at("out1"), "--holdout", "every:1"}), "every:1"));
+  EXPECT_TRUE(contains(failureOf({"import", city(), at("out1"), "--holdout", "list:" + at("none.txt")}), "none.txt"));
+  EXPECT_FALSE(fs::exists(at("out1")));
   EXPECT_FALSE(fs::exists(at("out1") + "/transforms.json"));
 }
 
@@ -212,6 +220,8 @@ TEST_F(CommandLine, ExplainsWhatIsWrongWithSettings) {
   EXPECT_TRUE(contains(failure("rate=fast"), "rate wants a number"));
   EXPECT_TRUE(contains(failure("rate"), "rate"));
   EXPECT_TRUE(contains(failure("loss=hinge"), "hinge"));
+  EXPECT_TRUE(contains(failureOf({"train", city(), at("unset"), "--steps", "1", "--seed", "99999999999999999999"}),
+                       "seed wants a whole number"));
   writeFileAtomically(folder_ / "wrong.toml", "rate = 1\nwidht = 64\n");
   const std::string file = failureOf({"train", city(), at("unset"), "--config", at("wrong.toml")});
   EXPECT_TRUE(contains(file, "wrong.toml: line 2")) << file;

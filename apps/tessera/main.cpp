@@ -62,6 +62,11 @@ int main(int argc, char** argv) {
   tessera::addInfoVerb(app);
   tessera::addBenchVerb(app);
   try {
+    const auto isMeant = [&](const CLI::App* verb) { return verb->get_name() == argv[1]; };
+    if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(isMeant).empty()) {
+      std::fprintf(stderr, "tessera: there is no verb '%s'; tessera --help lists them\n", argv[1]);
+      return 2;
+    }
     app.parse(argc, argv);
     return 0;
   } catch (const CLI::ParseError& error) {
@@ -70,8 +75,8 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "tessera: error: %s\n", error.what());
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr,
-                 "tessera: error: memory: this machine has not enough; lower --set samples_per_pass or "
-                 "photo_budget_mib\n");
+                 "tessera: error: memory: this machine has not enough; lower --set grid_log2_size, "
+                 "samples_per_pass or photo_budget_mib\n");
   } catch (const std::exception& error) {
     std::fprintf(stderr, "tessera: error: internal: %s; please report it\n", error.what());
   }

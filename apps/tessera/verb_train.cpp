@@ -8,12 +8,26 @@
 #include "representations/field/train_field.h"
 
 namespace tessera {
+namespace {
+
+// As CLI::Range, but false for what is not a number.
+CLI::Validator amount(double low, double high) {
+  return CLI::Validator(
+      [low, high](const std::string& text) {
+        double value = 0;
+        const bool within = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
+        return within ? std::string() : fmt::format("{} is not from {} to {}", text, low, high);
+      },
+      fmt::format("FLOAT in [{} - {}]", low, high));
+}
+
+}  // namespace
 
 void addTrainVerb(CLI::App& app) {
   struct Flags {
     std::string method = "field", configFile;
     std::vector<std::string> settings;
-    int64_t seed = 0;
+    std::string seed;
     DeviceOptions device;
     std::string capture, model;
     TrainFieldOptions options;
@@ -27,25 +41,28 @@ void addTrainVerb(CLI::App& app) {
   verb->add_option("capture", flags->capture, "capture folder")->required();
   verb->add_option("model", flags->model, "model folder to write")->required();
   verb->add_option("--method", flags->method, "representation")->capture_default_str()->check(CLI::IsMember({"field"}));
-  CLI::Option* steps = verb->add_option("--steps", flags->options.loop.steps, "training steps")->capture_default_str();
+  CLI::Option* steps = verb->add_option("--steps", flags->options.loop.steps, "training steps")
+                           ->capture_default_str()
+                           ->check(CLI::Range(int64_t{1}, int64_t{1} << 40));
   verb->add_option("--minutes", flags->options.loop.minutes, "as many steps as fit; fixed once, early")
-      ->check(CLI::PositiveNumber)
+      ->check(amount(1e-3, 1e7))
       ->excludes(steps);
   verb->add_flag("--resume", flags->options.loop.resume, "go on with the model that is in the folder");
-  CLI::Option* seed = verb->add_option("--seed", flags->seed, "of everything random")->capture_default_str();
+  verb->add_option("--seed", flags->seed, "of everything random, a whole number; the same as --set seed=...");
   verb->add_option("--config", flags->configFile, "settings file (TOML)")->check(CLI::ExistingFile);
   verb->add_option("--set", flags->settings, "key=value, as often as wanted");
   verb->add_option("--checkpoint-seconds", flags->options.loop.checkpointSeconds, "time between checkpoints")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(amount(0, 1e9));
   verb->add_flag("--json", flags->json, "print the result as one JSON object");
   addDeviceFlags(*verb, flags->device);
   flags->options.loop.steps = 10000;
-  verb->callback([flags, seed] {
+  verb->callback([flags] {
     FieldConfig& config = flags->options.config;
     if (flags->options.loop.resume) config = resumedFieldConfig(flags->model);
     if (!flags->configFile.empty()) configFromToml(config.fields(), flags->configFile);
     for (const std::string& setting : flags->settings) setConfigField(config.fields(), setting);
-    if (seed->count() > 0) config.seed = flags->seed;
+    if (!flags->seed.empty()) setConfigField(config.fields(), "seed=" + flags->seed);
     if (flags->options.loop.resume) requireSameConfig(flags->model, config);
     catchInterrupts();
     flags->options.loop.stopRequested = interrupted;

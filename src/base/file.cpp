@@ -34,7 +34,7 @@ Container readWhole(const fs::path& path) {
 [[noreturn]] void failWriting(const fs::path& path, const fs::path& partial) {
   const std::string reason = std::strerror(errno);
   std::error_code ignored;
-  fs::remove(partial, ignored);
+  if (partial != path) fs::remove(partial, ignored);
   throw Error(path.string(), "", "could not be written: " + reason, "check free space and permissions");
 }
 
@@ -50,8 +50,11 @@ std::string readTextFile(const fs::path& path) {
 void writeFileAtomically(const fs::path& path, std::span<const std::byte> bytes, bool durable) {
   std::error_code status;
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), status);
+  // A pipe or a device (/dev/stdout) is written to; nothing is put in its place.
+  const bool isStream =
+      fs::exists(path, status) && !fs::is_regular_file(path, status) && !fs::is_directory(path, status);
   fs::path partial = path;
-  partial += ".partial-" + std::to_string(::getpid());
+  if (!isStream) partial += ".partial-" + std::to_string(::getpid());
   const int file = ::open(partial.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (file < 0) failWriting(path, partial);
   size_t written = 0;
@@ -66,13 +69,14 @@ void writeFileAtomically(const fs::path& path, std::span<const std::byte> bytes,
     }
     written += static_cast<size_t>(count);
   }
-  if (durable && ::fsync(file) != 0) {
+  if (durable && !isStream && ::fsync(file) != 0) {
     const int reason = errno;
     ::close(file);
     errno = reason;
     failWriting(path, partial);
   }
-  if (::close(file) != 0 || ::rename(partial.c_str(), path.c_str()) != 0) failWriting(path, partial);
+  if (::close(file) != 0) failWriting(path, partial);
+  if (!isStream && ::rename(partial.c_str(), path.c_str()) != 0) failWriting(path, partial);
 }
 
 void writeFileAtomically(const fs::path& path, std::string_view text, bool durable) {

@@ -19,7 +19,8 @@ Bytes readFile(const fs::path& path);
 std::string readTextFile(const fs::path& path);
 
 // Writes `path` + ".partial-<pid>" and renames it over `path`, so that a reader (or a kill) sees the old file or the
-// new one, never a piece. With `durable` the bytes reach the disk before the rename. Parent folders are made.
+// new one, never a piece. With `durable` the bytes reach the disk before the rename. Parent folders are made. What is
+// there and no file, a pipe or a device, is written to and stays what it is.
 void writeFileAtomically(const fs::path& path, std::span<const std::byte> bytes, bool durable = false);
 void writeFileAtomically(const fs::path& path, std::string_view text, bool durable = false);
 

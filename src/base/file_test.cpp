@@ -1,14 +1,22 @@
 #include "base/file.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <fstream>
+#include <thread>
 
 #include "base/error.h"
 
 namespace tessera {
 namespace {
+
+std::string readWholePipe(const fs::path& pipe) {
+  std::ifstream in(pipe);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
 
 class File : public testing::Test {
  protected:
@@ -45,6 +53,22 @@ TEST_F(File, KeepsTheOldContentWhenItCannotReplaceIt) {
   EXPECT_THROW(writeFileAtomically(root_ / "taken", std::string_view("x")), Error);
   EXPECT_TRUE(fs::is_directory(root_ / "taken"));
   EXPECT_EQ(std::distance(fs::directory_iterator(root_), fs::directory_iterator()), 1);
+}
+
+TEST_F(File, WritesIntoPipesAndDevicesInsteadOfReplacingThem) {
+  const fs::path pipe = root_ / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  std::string read;
+  std::thread reader([&] { read = readWholePipe(pipe); });
+  writeFileAtomically(pipe, "through");
+  reader.join();
+  EXPECT_EQ(read, "through");
+  EXPECT_TRUE(fs::is_fifo(pipe));
+
+  const fs::path device = root_ / "device";
+  fs::create_symlink("/dev/full", device);
+  EXPECT_THROW(writeFileAtomically(device, "too much"), Error);
+  EXPECT_TRUE(fs::is_character_file(device));
 }
 
 TEST_F(File, NamesThePathItCannotRead) {

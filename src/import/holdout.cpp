@@ -58,21 +58,36 @@ void holdOutList(const fs::path& file, std::vector<Photo>& photos) {
        firstOf(strangers));
 }
 
+// N of every:N.
+size_t stepOf(const std::string& rule) {
+  size_t step = 0;
+  const char* end = rule.data() + rule.size();
+  const auto [last, error] = std::from_chars(rule.data() + 6, end, step);
+  if (error != std::errc() || last != end || step < 2) throw Error("--holdout", rule, "is not a step", kRemedy);
+  return step;
+}
+
 }  // namespace
 
+void checkHoldOut(const std::string& rule) {
+  if (rule == "auto" || rule == "none") return;
+  if (rule.starts_with("every:")) {
+    stepOf(rule);
+  } else if (rule.starts_with("list:")) {
+    readTextFile(rule.substr(5));
+  } else {
+    throw Error("--holdout", rule, "is not a rule", kRemedy);
+  }
+}
+
 void holdOut(const std::string& rule, std::vector<Photo>& photos) {
+  checkHoldOut(rule);
   for (Photo& photo : photos) photo.split = Split::train;
   if (rule == "none") return;
   if (rule.starts_with("every:")) {
-    size_t step = 0;
-    const char* end = rule.data() + rule.size();
-    const auto [last, error] = std::from_chars(rule.data() + 6, end, step);
-    if (error != std::errc() || last != end || step < 2) throw Error("--holdout", rule, "is not a step", kRemedy);
-    for (size_t i = 0; i < photos.size(); i += step) photos[i].split = Split::test;
-  } else if (rule.starts_with("list:")) {
-    holdOutList(rule.substr(5), photos);
+    for (size_t i = 0, step = stepOf(rule); i < photos.size(); i += step) photos[i].split = Split::test;
   } else {
-    throw Error("--holdout", rule, "is not a rule", kRemedy);
+    holdOutList(rule.substr(5), photos);
   }
   for (const Photo& photo : photos) {
     if (photo.split == Split::train) return;

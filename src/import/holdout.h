@@ -8,6 +8,10 @@
 
 namespace tessera {
 
+// Throws Error for what is neither "auto" nor a rule of holdOut, and for a list that cannot be read: before the work of
+// importing, not after.
+void checkHoldOut(const std::string& rule);
+
 // Sets Photo::split of `photos`, which stand in natural name order.
 //   every:N    photo 0, N, 2N, ... are test, the others train
 //   list:FILE  the photos named in FILE, one a line (path, file name, or name without extension), are test

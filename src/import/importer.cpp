@@ -271,6 +271,7 @@ Capture importCapture(const fs::path& sourcePath, const fs::path& out, const Imp
   if (fs::weakly_canonical(sourcePath) == fs::weakly_canonical(out)) {
     throw Error(out.string(), "", "is the source itself", "name another folder to write to");
   }
+  checkHoldOut(options.holdout);
   ThreadPool pool(options.threads);
   SourceCapture source = readSource(sourcePath);
   if (options.holdout == "auto" && source.splitError) throw *source.splitError;

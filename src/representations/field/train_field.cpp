@@ -34,6 +34,9 @@ void settlePhotoBudget(FieldConfig& config, const Capture& capture, int64_t usab
 }
 
 TrainingResult trainField(Device& device, const Capture& capture, const fs::path& model, TrainFieldOptions options) {
+  if (fs::exists(model / "transforms.json")) {
+    throw Error(model.string(), "", "holds a capture or photos", "name another folder for the model");
+  }
   const ModelFolder folder(model);
   options.loop.method = "field";
   const bool goingOn = options.loop.resume && folder.manifest().has_value();
