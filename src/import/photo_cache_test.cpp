@@ -99,7 +99,7 @@ TEST_F(PhotoCacheTest, PrefetchesInTheBackground) {
 TEST_F(PhotoCacheTest, SaysWhichFileIsDamagedAndGoesOn) {
   make(2);
   fs::resize_file(capture_.photos[0].image, 60);
-  PhotoCache cache(capture_, 2 * kPhotoBytes);
+  PhotoCache cache(capture_, kPhotoBytes);  // whatever a failure kept would leave no room
   for (int attempt = 0; attempt < 2; ++attempt) {
     cache.prefetch(0);
     try {
@@ -109,7 +109,8 @@ TEST_F(PhotoCacheTest, SaysWhichFileIsDamagedAndGoesOn) {
       EXPECT_EQ(error.subject(), capture_.photos[0].image.string());
     }
   }
-  EXPECT_NO_THROW(cache.get(1));
+  const auto whole = cache.get(1);  // held: a prefetch of the damaged one that comes late finds no room
+  EXPECT_EQ(whole->image.pixels, gradientPicture(kSide, kSide, 3, 1).pixels);
   EXPECT_EQ(cache.counts().bytes, kPhotoBytes);
 }
 
