@@ -181,15 +181,22 @@ alignas(64) constexpr float kUpper[3][16] = {{0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1
                                              {0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 1, 1, 1, 1},
                                              {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1}};
 
+HWY_INLINE bool sameCell(const Corners& corners, int s, int t) {
+  return ((corners.cell[0][s] ^ corners.cell[0][t]) | (corners.cell[1][s] ^ corners.cell[1][t]) |
+          (corners.cell[2][s] ^ corners.cell[2][t])) == 0;
+}
+
+// Adds the corner gradients of sample s's cell to the table.
 template <bool kWhole>
-HWY_INLINE void flushCell(float* HWY_RESTRICT table, const uint32_t* index, const float* sum, TableRange range) {
+HWY_INLINE void flushCell(float* HWY_RESTRICT table, const Corners& corners, int s, const float* HWY_RESTRICT sum,
+                          TableRange range) {
   const hn::FixedTag<float, 2> pair;
   if constexpr (kWhole) {
     // Neighbours in x are never the same entry, so two corners can be added at once.
     const hn::FixedTag<float, 4> four;
     for (int c = 0; c < 8; c += 2) {
-      float* low = table + 2 * size_t{index[c]};
-      float* high = table + 2 * size_t{index[c + 1]};
+      float* low = table + 2 * size_t{corners.index[c][s]};
+      float* high = table + 2 * size_t{corners.index[c + 1][s]};
       const auto both =
           hn::Add(hn::Combine(four, hn::Load(pair, high), hn::Load(pair, low)), hn::Load(four, sum + 2 * c));
       hn::Store(hn::LowerHalf(pair, both), pair, low);
@@ -198,8 +205,9 @@ HWY_INLINE void flushCell(float* HWY_RESTRICT table, const uint32_t* index, cons
     return;
   }
   for (int c = 0; c < 8; ++c) {
-    if (!kWhole && (index[c] < range.begin || index[c] >= range.end)) continue;
-    float* to = table + 2 * size_t{index[c]};
+    const uint32_t index = corners.index[c][s];
+    if (index < range.begin || index >= range.end) continue;
+    float* to = table + 2 * size_t{index};
     hn::Store(hn::Add(hn::Load(pair, to), hn::Load(pair, sum + 2 * c)), pair, to);
   }
 }
@@ -213,12 +221,8 @@ void backwardPairs(const HashGridBackward& a, const HashGridLevel& level, const 
   const float* positions = hostPointer(a.positions);
   Corners corners;
   alignas(64) float padded[3 * kGroup];
-  alignas(64) float sum[16];
-  uint32_t heldIndex[8] = {};
-  uint32_t held[3] = {~0u, 0, 0};
   hn::Vec<Sixteen> total[kVectors], sign[3][kVectors], base[3][kVectors];
   for (int v = 0; v < kVectors; ++v) {
-    total[v] = hn::Zero(d);
     for (int axis = 0; axis < 3; ++axis) {  // weight along an axis = base + sign · fraction
       const auto upper = hn::Load(d, kUpper[axis] + v * kLanes);
       sign[axis][v] = hn::Sub(hn::Add(upper, upper), hn::Set(d, 1.0f));
@@ -233,20 +237,19 @@ void backwardPairs(const HashGridBackward& a, const HashGridLevel& level, const 
         for (int s = 0; s < kGroup; ++s) hwy::Prefetch(table + 2 * size_t{corners.index[c][s]});
       }
     }
+    int held = -1;  // the sample whose cell `total` belongs to
+    const auto flush = [&] {
+      alignas(64) float sum[16];
+      for (int v = 0; v < kVectors; ++v) hn::Store(total[v], d, sum + v * kLanes);
+      flushCell<kWhole>(table, corners, held, sum, range);
+    };
     for (int s = 0; s < rows; ++s) {
       uint64_t word;
       std::memcpy(&word, gradients + 2 * (first + s), 8);
       if ((word & 0x7fffffff7fffffffull) == 0) continue;  // behind a surface
-      const uint32_t x = corners.cell[0][s], y = corners.cell[1][s], z = corners.cell[2][s];
-      if (((x ^ held[0]) | (y ^ held[1]) | (z ^ held[2])) != 0) {
-        if (held[0] != ~0u) {
-          for (int v = 0; v < kVectors; ++v) hn::Store(total[v], d, sum + v * kLanes);
-          flushCell<kWhole>(table, heldIndex, sum, range);
-        }
-        held[0] = x;
-        held[1] = y;
-        held[2] = z;
-        for (int c = 0; c < 8; ++c) heldIndex[c] = corners.index[c][s];
+      if (held < 0 || !sameCell(corners, held, s)) {
+        if (held >= 0) flush();
+        held = s;
         for (int v = 0; v < kVectors; ++v) total[v] = hn::Zero(d);
       }
       const auto g = hn::BitCast(d, hn::Set(hn::Repartition<uint64_t, Sixteen>(), word));
@@ -258,10 +261,7 @@ void backwardPairs(const HashGridBackward& a, const HashGridLevel& level, const 
         total[v] = hn::MulAdd(hn::Mul(hn::Mul(wx, wy), wz), g, total[v]);
       }
     }
-  }
-  if (held[0] != ~0u) {
-    for (int v = 0; v < kVectors; ++v) hn::Store(total[v], d, sum + v * kLanes);
-    flushCell<kWhole>(table, heldIndex, sum, range);
+    if (held >= 0) flush();
   }
 }
 

@@ -116,7 +116,7 @@ HWY_INLINE void productTile(const NumbersOf<kStride>& x, int row, const float* H
   }
   const size_t firstRow = x.row(row);
   if constexpr (kShuffles && V <= 2 && kStride > 2) {
-    for (int k = 0; k < depth; k += 4) {  // depths are multiples of 16
+    for (int k = 0; k < depth; k += 4) {  // depths are multiples of 4
       Vector vectors[4][V];
       for (int i = 0; i < 4; ++i) {
         for (int v = 0; v < V; ++v) vectors[i][v] = hn::LoadU(d, b + (k + i) * bRow + v * lanes);
@@ -317,12 +317,12 @@ Numbers blockNumbers(const Matrix<const float>& matrix, const float* data, size_
   return {data + first * matrix.rowStride, matrix.rowStride, matrix.groupStride, matrix.groupWidth};
 }
 
-void sigmoidBlock(float* block, int count) {
+void sigmoidRow(float* row, int columns) {
   const Float d;
   const Vector one = hn::Set(d, 1.0f);
-  for (int i = 0; i < count; i += static_cast<int>(hn::Lanes(d))) {
-    const Vector x = hn::Load(d, block + i);
-    hn::Store(hn::Div(one, hn::Add(one, hn::Exp(d, hn::Neg(x)))), d, block + i);
+  for (int i = 0; i < columns; i += static_cast<int>(hn::Lanes(d))) {
+    const Vector x = hn::LoadU(d, row + i);
+    hn::StoreU(hn::Div(one, hn::Add(one, hn::Exp(d, hn::Neg(x)))), d, row + i);
   }
 }
 
@@ -340,9 +340,14 @@ void forwardBlock(const MlpForward& a, const float* transposed, size_t n, size_t
     x = rowMajor(h, shape.width);
   }
   const int last = shape.hiddenLayers, outputs = shape.layerOutputs(last);
-  product<Finish::none>(x, transposed + shape.weightOffset(last), shape.width, outputs, buffers.output, outputs);
-  if (shape.activation == OutputActivation::sigmoid) sigmoidBlock(buffers.output, kRows * outputs);
-  unpackRows(buffers.output, outputs, a.output, hostPointer(a.output.data), first, rows);
+  const bool inPlace = rows == kRows && a.output.columns == static_cast<uint32_t>(outputs);
+  float* y = inPlace ? hostPointer(a.output.data) + first * a.output.rowStride : buffers.output;
+  const size_t yRow = inPlace ? a.output.rowStride : outputs;
+  product<Finish::none>(x, transposed + shape.weightOffset(last), shape.width, outputs, y, yRow);
+  if (shape.activation == OutputActivation::sigmoid) {
+    for (int r = 0; r < kRows; ++r) sigmoidRow(y + r * yRow, outputs);
+  }
+  if (!inPlace) unpackRows(y, outputs, a.output, hostPointer(a.output.data), first, rows);
 }
 
 // dY of a block: the given gradient through the output activation, zero beyond the real rows and columns.
@@ -383,9 +388,11 @@ void backwardBlock(const MlpBackward& a, size_t n, size_t first, float* weightGr
       std::memset(buffers.hidden[0] + rows * width, 0, sizeof(float) * (kRows - rows) * width);
       h = buffers.hidden[0];
     }
+    // The columns that pad the last layer are zero: most of them need not be multiplied.
+    const int real = l == shape.hiddenLayers ? (shape.outputs + 3) / 4 * 4 : outputs;
     float* dh = buffers.gradient[l % 2];
-    outer(upstream, outputs, h, width, width, weightGradients + shape.weightOffset(l));
-    product<Finish::maskByActivation>(upstream, weights + shape.weightOffset(l), outputs, width, dh, width, h, width);
+    outer(upstream, real, h, width, width, weightGradients + shape.weightOffset(l));
+    product<Finish::maskByActivation>(upstream, weights + shape.weightOffset(l), real, width, dh, width, h, width);
     dy = dh;
   }
   // Gradients of the first layer as [inputs][outputs], unlike all others: the input need not be rows then.
@@ -397,6 +404,16 @@ void backwardBlock(const MlpBackward& a, size_t n, size_t first, float* weightGr
   unpackRows(dx, inputs, a.inputGradients, hostPointer(a.inputGradients.data), first, rows);
 }
 
+// first[i] += first[i + stride] + first[i + 2 stride] + ...: `parts` rows, in their order; count a multiple of 16.
+void sumOfParts(float* first, size_t parts, size_t stride, size_t count) {
+  const Float d;
+  for (size_t i = 0; i < count; i += hn::Lanes(d)) {
+    Vector sum = hn::LoadU(d, first + i);
+    for (size_t part = 1; part < parts; ++part) sum = hn::Add(sum, hn::LoadU(d, first + part * stride + i));
+    hn::StoreU(sum, d, first + i);
+  }
+}
+
 }  // namespace tessera::cpu::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -405,6 +422,7 @@ namespace tessera::cpu {
 
 HWY_EXPORT(forwardBlock);
 HWY_EXPORT(backwardBlock);
+HWY_EXPORT(sumOfParts);
 
 namespace {
 
@@ -434,6 +452,13 @@ BlockBuffers& threadBuffers() {
   return *buffers;
 }
 
+// Kept from call to call: fresh pages each time would cost a third of what a batch of 8192 samples takes.
+float* partialGradients(size_t count) {
+  thread_local std::vector<float> partial;
+  if (partial.size() < count) partial.resize(count);
+  return partial.data();
+}
+
 }  // namespace
 
 void run(Context& context, const MlpForward& a) {
@@ -456,20 +481,29 @@ void run(Context& context, const MlpBackward& a) {
   const size_t blocks = (n + kRows - 1) / kRows, parameters = a.shape.parameters();
   if (n == 0) return;
   const size_t parts = std::min<size_t>(kParts, blocks);
-  std::vector<float> partial(parts * parameters);
+  float* partial = partialGradients(parts * parameters);
   const auto block = HWY_DYNAMIC_DISPATCH(backwardBlock);
-  context.pool.run(parts, [&](size_t part, int) {
+  context.pool.run(parts, [&](size_t task, int) {
+    const size_t part = parts - 1 - task;  // what forward did last may still be in the cache
+    float* gradients = partial + part * parameters;
+    std::memset(gradients, 0, sizeof(float) * parameters);
     for (size_t b = part * blocks / parts; b < (part + 1) * blocks / parts; ++b) {
-      block(a, n, b * kRows, partial.data() + part * parameters, threadBuffers());
+      block(a, n, b * kRows, gradients, threadBuffers());
     }
   });
+  const auto sumParts = HWY_DYNAMIC_DISPATCH(sumOfParts);
   float* sum = hostPointer(a.weightGradients);
-  const size_t inputs = a.shape.layerInputs(0), outputs = a.shape.layerOutputs(0), firstLayer = inputs * outputs;
-  context.pool.forRanges(parameters, 1024, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      float total = 0;
-      for (size_t part = 0; part < parts; ++part) total += partial[part * parameters + i];
-      sum[i < firstLayer ? i % outputs * inputs + i / outputs : i] += total;  // see backwardBlock
+  context.pool.run(a.shape.layers(), [&](size_t l, int) {
+    const size_t inputs = a.shape.layerInputs(l), outputs = a.shape.layerOutputs(l), first = a.shape.weightOffset(l);
+    sumParts(partial + first, parts, parameters, inputs * outputs);
+    const float* from = partial + first;
+    float* to = sum + first;
+    if (l > 0) {
+      for (size_t i = 0; i < inputs * outputs; ++i) to[i] += from[i];
+    } else {  // [inputs][outputs], see backwardBlock
+      for (size_t o = 0; o < outputs; ++o) {
+        for (size_t i = 0; i < inputs; ++i) to[o * inputs + i] += from[i * outputs + o];
+      }
     }
   });
 }
