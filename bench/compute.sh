@@ -1,13 +1,21 @@
 #!/usr/bin/env bash
-# Every operation's rate beside the machine's own limit, and the whole training step. Wants a quiet machine.
-#   [THREADS=0] bench/compute.sh
+# Every operation's rate beside the machine's own limit, and the whole training step. Several rounds: of each operation and
+# of each limit the best counts, for on a shared machine others disturb now the one, now the other.
+#   [THREADS=0] [ROUNDS=5] bench/compute.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
-{
-  alone "$tessera" bench compute --threads "${THREADS:-0}" --json "$out/compute.json"
-  alone "$tessera" bench train --threads "${THREADS:-0}" --json "$out/train.json"
-} | tee "$out/compute.txt"
+rounds=()
+for round in $(seq "${ROUNDS:-5}"); do
+  rounds+=("$out/compute.$round.json")
+  alone "$tessera" bench compute --threads "${THREADS:-0}" --json "${rounds[-1]}" | tee "$out/compute.txt"
+done
+jq -s '{device: .[0].device, rounds: length, flops_per_second: map(.flops_per_second) | max,
+  operations: map(.operations[]) | group_by([.operation, .shape])
+    | map(.[0] + {seconds: map(.seconds) | min, rate: map(.rate) | max, limit: map(.limit) | max})
+    | map(.share = if .limit then .rate / .limit else null end)}' "${rounds[@]}" > "$out/compute.json"
+rm "${rounds[@]}"
+alone "$tessera" bench train --threads "${THREADS:-0}" --json "$out/train.json" | tee -a "$out/compute.txt"
 verdict "training step, M samples/s" "$(jq '.samples_per_second / 1e6 * 1000 | round / 1000' "$out/train.json")" '>=' 0.5
 # row OPERATION SHAPE: its share of the limit in percent.
 row() { jq --arg o "$1" --arg s "$2" '.operations[] | select(.operation == $o and .shape == $s).share * 1000 | round / 10' "$out/compute.json"; }
