@@ -13,7 +13,9 @@ namespace tessera {
 enum class Extinction { opacity, density, logDensity };
 
 // colour = Σ w c + T · background, depth = Σ w t, opacity = 1 - T. A ray stops after the sample that takes T below
-// `minTransmittance`; later samples get weight zero, and T counts on as it stands there.
+// `minTransmittance`; later samples get weight zero, and T counts on as it stands there. Colours have `colours.columns`
+// columns: 3, or more where features are composited with them, and none where only weights are wanted (no `colours`, no
+// `colour`). Only opacity and weights are always written.
 struct CompositeForward {
   Extinction extinction = Extinction::logDensity;
   float minTransmittance = 1e-4f;
@@ -21,12 +23,12 @@ struct CompositeForward {
   Slice<const uint32_t> firstSample;  // [rays + 1]
   Matrix<const float> x;              // 1 column: opacity, density or log density
   Slice<const float> steps;           // [samples]; not read for opacity
-  Slice<const float> distances;       // [samples]
-  Matrix<const float> colours;        // [samples], 3 columns
-  Slice<const float> background;      // optional, [rays][3]; else black
-  Slice<float> colour;                // [rays][3]
+  Slice<const float> distances;       // [samples]; with depth
+  Matrix<const float> colours;        // optional, [samples], 1 to 16 columns
+  Slice<const float> background;      // optional, [rays][columns]; else black
+  Slice<float> colour;                // [rays][columns]; with colours
   Slice<float> opacity;               // [rays]
-  Slice<float> depth;                 // [rays]
+  Slice<float> depth;                 // optional, [rays]
   Slice<float> weights;               // [samples]
 };
 
@@ -42,15 +44,16 @@ struct CompositeBackward {
   Slice<const uint32_t> firstSample;
   Matrix<const float> x;
   Slice<const float> steps;
-  Slice<const float> distances;
-  Matrix<const float> colours;
+  Slice<const float> distances;            // read with rayDepthGradients or fullGradientDistance
+  Matrix<const float> colours;             // optional
   Slice<const float> background;           // optional
-  Slice<const float> rayColourGradients;   // [rays][3]
+  Slice<const float> rayColourGradients;   // [rays][columns]; with colours
   Slice<const float> rayOpacityGradients;  // optional, [rays]
   Slice<const float> rayDepthGradients;    // optional, [rays]
   Slice<const float> weightGradients;      // optional, [samples]: of any other function of the weights (distortion)
+  bool addToXGradients = false;            // instead of overwriting them
   Slice<float> xGradients;                 // [samples]
-  Matrix<float> colourGradients;           // [samples], 3 columns
+  Matrix<float> colourGradients;           // [samples], as colours; with colours
 };
 
 }  // namespace tessera

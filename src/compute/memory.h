@@ -67,10 +67,12 @@ class Array {
 };
 
 // How many elements an operation works on. Sizes that only the device knows stay in a device counter: the operation
-// works on min(counter[0], capacity). Without a counter it works on `capacity`. Buffers hold `capacity` elements.
+// works on min(counter[0], capacity). Without a counter it works on `capacity`. Buffers hold `capacity` elements. Where
+// an operation says that it takes part of the rows, it works on rows [first[0], min(counter[0], capacity)) alone.
 struct Count {
   uint32_t capacity = 0;
   Slice<const uint32_t> counter;  // optional, 1 element
+  Slice<const uint32_t> first;    // optional, 1 element
 };
 
 // A matrix of `columns` float columns, one row a sample, in one of two layouts:
