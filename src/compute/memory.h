@@ -71,8 +71,8 @@ class Array {
 // an operation says that it takes part of the rows, it works on rows [first[0], min(counter[0], capacity)) alone.
 struct Count {
   uint32_t capacity = 0;
-  Slice<const uint32_t> counter;  // optional, 1 element
-  Slice<const uint32_t> first;    // optional, 1 element
+  Slice<const uint32_t> counter = {};  // optional, 1 element
+  Slice<const uint32_t> first = {};    // optional, 1 element
 };
 
 // A matrix of `columns` float columns, one row a sample, in one of two layouts:
