@@ -17,10 +17,11 @@ using SumPointer = uint64_t;     // floats that several invocations add to
 
 struct CountArguments {
   UintPointer counter;  // optional
+  UintPointer first;    // optional
   uint capacity;
   uint unused;
 };
-TESSERA_SIZE(CountArguments, 16);
+TESSERA_SIZE(CountArguments, 24);
 
 struct MatrixArguments {
   FloatPointer data;
@@ -50,7 +51,7 @@ struct HashGridForwardArguments {
   MatrixArguments encoded;
   LevelArguments levels[TESSERA_MAX_LEVELS];
 };
-TESSERA_SIZE(HashGridForwardArguments, 56 + 24 * TESSERA_MAX_LEVELS);
+TESSERA_SIZE(HashGridForwardArguments, 64 + 24 * TESSERA_MAX_LEVELS);
 
 struct HashGridBackwardArguments {
   CountArguments samples;
@@ -63,7 +64,7 @@ struct HashGridBackwardArguments {
   uint unused;
   LevelArguments levels[TESSERA_MAX_LEVELS];
 };
-TESSERA_SIZE(HashGridBackwardArguments, 80 + 24 * TESSERA_MAX_LEVELS);
+TESSERA_SIZE(HashGridBackwardArguments, 88 + 24 * TESSERA_MAX_LEVELS);
 
 // Sizes are padded to multiples of 16 where they say so; the weights lie as MlpShape says.
 struct MlpForwardArguments {
@@ -77,7 +78,7 @@ struct MlpForwardArguments {
   uint hiddenLayers;
   uint sigmoidOutput;
 };
-TESSERA_SIZE(MlpForwardArguments, 96);
+TESSERA_SIZE(MlpForwardArguments, 104);
 
 struct MlpBackwardArguments {
   CountArguments samples;
@@ -94,7 +95,7 @@ struct MlpBackwardArguments {
   uint hiddenLayers;
   uint sigmoidOutput;
 };
-TESSERA_SIZE(MlpBackwardArguments, 144);
+TESSERA_SIZE(MlpBackwardArguments, 152);
 
 // gradients[o][i] += Σ_samples after[sample][o] · before[sample][i]: the weights of one layer.
 struct MlpWeightGradientsArguments {
@@ -105,7 +106,7 @@ struct MlpWeightGradientsArguments {
   uint rows;
   uint columns;
 };
-TESSERA_SIZE(MlpWeightGradientsArguments, 64);
+TESSERA_SIZE(MlpWeightGradientsArguments, 72);
 
 struct AdamArguments {
   FloatPointer parameters;

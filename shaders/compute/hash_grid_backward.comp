@@ -14,7 +14,7 @@ void main() {
   const LevelArguments level = arguments.values.levels[levelIndex];
   MatrixArguments encoded = arguments.values.encodedGradients;
 
-  FOR_EACH(sampleIndex, countOf(arguments.values.samples)) {
+  FOR_EACH_ROW(sampleIndex, arguments.values.samples) {
     float gradient[kFeatures];
     bool any = false;
     [[unroll]] for (uint f = 0; f < kFeatures; ++f) {

@@ -14,7 +14,7 @@ void main() {
   FloatPointer table = arguments.values.table;
   MatrixArguments encoded = arguments.values.encoded;
 
-  FOR_EACH(sampleIndex, countOf(arguments.values.samples)) {
+  FOR_EACH_ROW(sampleIndex, arguments.values.samples) {
     const Cell cell = cellOf(positionOf(arguments.values.positions, sampleIndex), level);
     float mixed[kFeatures];
     [[unroll]] for (uint f = 0; f < kFeatures; ++f) mixed[f] = 0;

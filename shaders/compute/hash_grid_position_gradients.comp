@@ -31,7 +31,7 @@ vec3 slopeInLevel(vec3 position, uint sampleIndex, uint levelIndex) {
 
 void main() {
   FloatPointer gradients = arguments.values.positionGradients;
-  FOR_EACH(sampleIndex, countOf(arguments.values.samples)) {
+  FOR_EACH_ROW(sampleIndex, arguments.values.samples) {
     const vec3 position = positionOf(arguments.values.positions, sampleIndex);
     vec3 sum = vec3(0);
     for (uint l = 0; l < arguments.values.levelCount; ++l) sum += slopeInLevel(position, sampleIndex, l);

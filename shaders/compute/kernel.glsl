@@ -1,5 +1,6 @@
 // What every kernel starts with: pointers, the shared argument structs, and how to read them.
-// Defines: FloatPointer, UintPointer, KERNEL_ARGUMENTS(), WANTED(), FOR_EACH(), countOf(), elementOf().
+// Defines: FloatPointer, UintPointer, KERNEL_ARGUMENTS(), WANTED(), FOR_EACH(), FOR_EACH_ROW(), firstOf(), endOf(),
+// elementOf().
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 #extension GL_EXT_control_flow_attributes : require
@@ -25,10 +26,17 @@ layout(buffer_reference, std430, buffer_reference_align = 4) buffer UintPointer 
   for (uint index = gl_GlobalInvocationID.x; index < (count);      \
        index += gl_NumWorkGroups.x * gl_WorkGroupSize.x)
 
-uint countOf(CountArguments count) {
+// Rows [firstOf, endOf) are what an operation works on.
+uint endOf(CountArguments count) {
   if (!WANTED(count.counter)) return count.capacity;
   return min(count.counter.values[0], count.capacity);
 }
+uint firstOf(CountArguments count) { return WANTED(count.first) ? count.first.values[0] : 0; }
+
+// Every row of a count, shared out likewise.
+#define FOR_EACH_ROW(row, count)                                                                     \
+  for (uint row = firstOf(count) + gl_GlobalInvocationID.x, row##End = endOf(count); row < row##End; \
+       row += gl_NumWorkGroups.x * gl_WorkGroupSize.x)
 
 // The index of an element of a matrix, in either layout.
 uint elementOf(MatrixArguments m, uint row, uint column) {

@@ -69,6 +69,6 @@ void backward(MlpBackwardArguments a, uint firstSample, uint samples) {
 }
 
 void main() {
-  const uint samples = countOf(arguments.values.samples);
-  FOR_EACH_BLOCK(firstSample, samples) backward(arguments.values, firstSample, samples);
+  const uint begin = firstOf(arguments.values.samples), samples = endOf(arguments.values.samples);
+  FOR_EACH_BLOCK(firstSample, begin, samples) backward(arguments.values, firstSample, samples);
 }

@@ -64,6 +64,6 @@ void forward(MlpForwardArguments a, uint firstSample, uint samples) {
 }
 
 void main() {
-  const uint samples = countOf(arguments.values.samples);
-  FOR_EACH_BLOCK(firstSample, samples) forward(arguments.values, firstSample, samples);
+  const uint begin = firstOf(arguments.values.samples), samples = endOf(arguments.values.samples);
+  FOR_EACH_BLOCK(firstSample, begin, samples) forward(arguments.values, firstSample, samples);
 }

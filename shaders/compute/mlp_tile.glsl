@@ -24,9 +24,9 @@ float sums[kRows * kColumns];
 uint stateRow(uint r) { return r * kRowGroups + gl_LocalInvocationIndex % kRowGroups; }
 uint stateColumn(uint c) { return gl_LocalInvocationIndex / kRowGroups * kColumns + c; }
 
-// Every block's first sample, shared out among the workgroups.
-#define FOR_EACH_BLOCK(firstSample, samples)                                  \
-  for (uint firstSample = gl_WorkGroupID.x * kBlock; firstSample < (samples); \
+// The first sample of every block of samples [begin, end), shared out among the workgroups.
+#define FOR_EACH_BLOCK(firstSample, begin, end)                                     \
+  for (uint firstSample = (begin) + gl_WorkGroupID.x * kBlock; firstSample < (end); \
        firstSample += gl_NumWorkGroups.x * kBlock)
 
 void clearSums() {

@@ -16,7 +16,7 @@ shared float beforeTile[kDepth * kTile];
 
 void main() {
   MlpWeightGradientsArguments a = arguments.values;
-  const uint samples = countOf(a.samples);
+  const uint samples = endOf(a.samples);
   const uint firstColumn = gl_WorkGroupID.x * kTile;
   const uint firstRow = gl_WorkGroupID.y * kTile;
   const uint tileColumn = gl_LocalInvocationIndex % 8;
@@ -24,7 +24,7 @@ void main() {
 
   float sums[16];
   [[unroll]] for (uint i = 0; i < 16; ++i) sums[i] = 0;
-  for (uint first = gl_WorkGroupID.z * kDepth; first < samples; first += gl_NumWorkGroups.z * kDepth) {
+  for (uint first = firstOf(a.samples) + gl_WorkGroupID.z * kDepth; first < samples; first += gl_NumWorkGroups.z * kDepth) {
     barrier();
     for (uint i = gl_LocalInvocationIndex; i < kDepth * kTile; i += kThreads) {
       const uint index = first + i / kTile;

@@ -19,6 +19,7 @@
 #include "compute/mlp.h"
 #include "compute/occupancy.h"
 #include "compute/rays.h"
+#include "compute/virtual_grid.h"
 
 namespace tessera {
 
@@ -39,6 +40,9 @@ namespace tessera {
   X(GatherRows)                 \
   X(OccupancyPoints)            \
   X(OccupancyUpdate)            \
+  X(DistinctTexels)             \
+  X(VirtualGridForward)         \
+  X(VirtualGridBackward)        \
   X(CompositeForward)           \
   X(CompositeBackward)          \
   X(ColourLoss)                 \

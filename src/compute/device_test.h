@@ -41,6 +41,7 @@ inline constexpr int64_t kNoCounter = -1;
 struct Size {
   uint32_t capacity = 0;
   int64_t counter = kNoCounter;
+  uint32_t first = 0;  // above 0: Count::first
   uint32_t used() const {
     return counter == kNoCounter || counter > capacity ? capacity : static_cast<uint32_t>(counter);
   }
@@ -49,6 +50,9 @@ std::string toString(const Size& size);
 
 // Nothing, one, counters below, at zero and above the capacity, no multiples of vector widths, many tasks.
 inline constexpr Size kSizes[] = {{0}, {1}, {5, 0}, {37}, {64, 50}, {130, 1000}, {1061}};
+// Of operations that take part of the rows.
+inline constexpr Size kRowSizes[] = {
+    {0}, {1}, {5, 0}, {37}, {64, 50}, {130, 1000}, {1061}, {64, 50, 17}, {1061, 1000, 333}, {64, 20, 30}};
 inline constexpr Size kSmallSizes[] = {{1}, {5, 0}, {37}, {130, 67}};
 
 enum class Layout { plain, strided, grouped };  // grouped: two columns a plane

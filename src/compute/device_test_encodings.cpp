@@ -56,7 +56,7 @@ OperationTests testsOf<HashGridForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is HashGridBackward";
   for (const NamedGrid& named : grids())
-    for (const Size& size : kSizes)
+    for (const Size& size : kRowSizes)
       tests.cases.push_back({named.name + ", samples " + toString(size), [=](Stage& stage) {
                                const HashGrid& grid = named.grid;
                                const size_t rows = size.capacity + (size.capacity > 0 ? stage.random.below(4) : 0);
@@ -72,7 +72,7 @@ template <>
 OperationTests testsOf<HashGridBackward>() {
   OperationTests tests;
   for (const NamedGrid& named : grids())
-    for (const Size& size : kSizes)
+    for (const Size& size : kRowSizes)
       for (bool withPositions : {false, true})
         tests.cases.push_back(
             {fmt::format("{}, samples {}{}", named.name, toString(size), withPositions ? ", position gradients" : ""),

@@ -62,7 +62,7 @@ OperationTests testsOf<MlpForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is MlpBackward";
   for (const NetworkCase& network : networks())
-    for (const Size& size : kSizes)
+    for (const Size& size : kRowSizes)
       for (bool keep : {false, true})
         tests.cases.push_back(
             {fmt::format("{}, samples {}{}", network.name(), toString(size),
@@ -83,7 +83,7 @@ template <>
 OperationTests testsOf<MlpBackward>() {
   OperationTests tests;
   for (const NetworkCase& network : networks())
-    for (const Size& size : kSizes)
+    for (const Size& size : kRowSizes)
       for (int optional = 0; optional < 4; ++optional) {
         const bool withFirst = optional & 1, withInput = optional & 2;
         tests.cases.push_back(

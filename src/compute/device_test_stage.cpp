@@ -47,6 +47,7 @@ std::vector<uint32_t> Random::firstSamples(size_t rays, uint32_t most) {
 
 std::string toString(const Size& size) {
   if (size.counter == kNoCounter) return fmt::format("{}", size.capacity);
+  if (size.first > 0) return fmt::format("from {} to counter {} of {}", size.first, size.counter, size.capacity);
   return fmt::format("counter {} of {}", size.counter, size.capacity);
 }
 
@@ -54,6 +55,7 @@ Count Stage::count(const Size& size) {
   Count count;
   count.capacity = size.capacity;
   if (size.counter != kNoCounter) count.counter = input(std::vector<uint32_t>{static_cast<uint32_t>(size.counter)});
+  if (size.first > 0) count.first = input(std::vector<uint32_t>{size.first});
   return count;
 }
 

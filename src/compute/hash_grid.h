@@ -47,6 +47,7 @@ inline uint32_t hashGridIndex(const HashGridLevel& level, uint32_t x, uint32_t y
   return (x + level.resolution * (y + level.resolution * z)) % level.entries;
 }
 
+// Both take part of the rows (Count::first).
 struct HashGridForward {
   const HashGrid& grid;
   Count samples;

@@ -1,6 +1,7 @@
 // Memory that the processor can address: what the reference and the cpu device allocate.
 #pragma once
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <new>
@@ -37,10 +38,21 @@ T* hostPointer(const Slice<T>& slice) {
   return reinterpret_cast<T*>(static_cast<HostMemory*>(slice.memory)->data()) + slice.first;
 }
 
+// Rows [begin, end) that an operation works on.
+struct HostRows {
+  uint32_t begin = 0, end = 0;
+  uint32_t count() const { return end - begin; }
+};
+inline HostRows hostRows(const Count& count) {
+  HostRows rows{0, count.capacity};
+  if (count.counter) rows.end = std::min(*hostPointer(count.counter), count.capacity);
+  if (count.first) rows.begin = std::min(*hostPointer(count.first), rows.end);
+  return rows;
+}
+// For operations that always begin at row 0.
 inline uint32_t hostCount(const Count& count) {
-  if (!count.counter) return count.capacity;
-  const uint32_t wanted = *hostPointer(count.counter);
-  return wanted < count.capacity ? wanted : count.capacity;
+  CHECK(!count.first);
+  return hostRows(count).end;
 }
 
 }  // namespace tessera

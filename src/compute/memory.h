@@ -117,6 +117,13 @@ struct Matrix {
     return groupWidth == 0 ? row * rowStride + column
                            : column / groupWidth * groupStride + row * rowStride + column % groupWidth;
   }
+  // Rows [first, …) of a matrix.
+  Matrix rowsFrom(size_t firstRow) const {
+    Matrix m = *this;
+    m.data = data.part(firstRow * rowStride, data.count - firstRow * rowStride);
+    return m;
+  }
+
   explicit operator bool() const { return static_cast<bool>(data); }
 };
 

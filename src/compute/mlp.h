@@ -29,6 +29,7 @@ struct MlpShape {
   size_t activationsPerSample() const { return static_cast<size_t>(width) * hiddenLayers; }
 };
 
+// Both take part of the rows (Count::first).
 struct MlpForward {
   const MlpShape& shape;
   Count samples;

@@ -3,12 +3,14 @@
 // read.
 #pragma once
 
+#include <array>
+
 #include "compute/memory.h"
 
 namespace tessera {
 
 // Of one block; positions and texels in [0,1]³ of its domain. Texel i of R lies at (i + ½) / R; a sample at p has
-// lookup coordinate u = p R - ½, texels floor(u) and floor(u) + 1, each clamped to [0, R - 1].
+// lookup coordinate u = p R - ½ (exact, in double), texels floor(u) and floor(u) + 1, each clamped to [0, R - 1].
 //   voxels      8 texels of voxels³
 //   planes      plane a holds the two other axes b < c: 4 texels of planes²; there the coordinate along a is ½ / planes
 // Numbers of texels: voxel (x, y, z) is x + V (y + V z); plane a's texel (b, c) is V³ + a P² + b + P c.
@@ -24,6 +26,8 @@ struct VirtualGrid {
 
   uint32_t texels() const { return voxels * voxels * voxels + 3 * planes * planes; }
   uint32_t words() const { return (texels() + 31) / 32; }
+  uint32_t planeTexel(int plane, uint32_t b, uint32_t c) const;
+  std::array<float, 3> texelPosition(uint32_t texel) const;
 };
 
 // Which texels a batch needs, block after block and in order of their numbers. With shareTexels off: every corner of

@@ -214,7 +214,7 @@ HWY_INLINE void flushCell(float* HWY_RESTRICT table, const Corners& corners, int
 
 template <bool kWhole>
 void backwardPairs(const HashGridBackward& a, const HashGridLevel& level, const float* gradients, float* table,
-                   size_t n, TableRange range) {
+                   HostRows samples, TableRange range) {
   const Sixteen d;
   constexpr int kLanes = static_cast<int>(hn::MaxLanes(Sixteen()));
   constexpr int kVectors = 16 / kLanes;
@@ -229,9 +229,10 @@ void backwardPairs(const HashGridBackward& a, const HashGridLevel& level, const 
       base[axis][v] = hn::Sub(hn::Set(d, 1.0f), upper);
     }
   }
-  for (size_t first = 0; first < n; first += kGroup) {
-    cornersOfGroup(level, groupPositions(positions, first, n, padded), corners);
-    const int rows = static_cast<int>(std::min<size_t>(kGroup, n - first));
+  const size_t end = samples.end;
+  for (size_t first = samples.begin; first < end; first += kGroup) {
+    cornersOfGroup(level, groupPositions(positions, first, end, padded), corners);
+    const int rows = static_cast<int>(std::min<size_t>(kGroup, end - first));
     if (kWhole && level.entries > kEntriesOfFirstCache) {
       for (int c = 0; c < 8; c += 2) {  // the neighbour in x is mostly in the same line
         for (int s = 0; s < kGroup; ++s) hwy::Prefetch(table + 2 * size_t{corners.index[c][s]});
@@ -265,16 +266,17 @@ void backwardPairs(const HashGridBackward& a, const HashGridLevel& level, const 
   }
 }
 
-void backwardAny(const HashGridBackward& a, const HashGridLevel& level, const float* gradients, float* table, size_t n,
-                 TableRange range) {
+void backwardAny(const HashGridBackward& a, const HashGridLevel& level, const float* gradients, float* table,
+                 HostRows samples, TableRange range) {
   const int features = a.grid.features;
   const float* positions = hostPointer(a.positions);
   Corners corners;
   alignas(64) float padded[3 * kGroup];
-  for (size_t first = 0; first < n; first += kGroup) {
-    cornersOfGroup(level, groupPositions(positions, first, n, padded), corners);
+  const size_t end = samples.end;
+  for (size_t first = samples.begin; first < end; first += kGroup) {
+    cornersOfGroup(level, groupPositions(positions, first, end, padded), corners);
     weightsOfGroup(corners);
-    const int rows = static_cast<int>(std::min<size_t>(kGroup, n - first));
+    const int rows = static_cast<int>(std::min<size_t>(kGroup, end - first));
     for (int s = 0; s < rows; ++s) {
       for (int c = 0; c < 8; ++c) {
         const uint32_t index = corners.index[c][s];
@@ -287,16 +289,16 @@ void backwardAny(const HashGridBackward& a, const HashGridLevel& level, const fl
   }
 }
 
-void backwardLevel(const HashGridBackward& a, size_t l, size_t n, TableRange range) {
+void backwardLevel(const HashGridBackward& a, size_t l, HostRows samples, TableRange range) {
   const HashGridLevel& level = a.grid.levels[l];
   const float* gradients = hostPointer(a.encodedGradients.data) + l * a.encodedGradients.groupStride;
   float* table = hostPointer(a.tableGradients) + level.firstEntry * a.grid.features;
   if (a.grid.features != 2) {
-    backwardAny(a, level, gradients, table, n, range);
+    backwardAny(a, level, gradients, table, samples, range);
   } else if (range.begin == 0 && range.end >= level.entries) {
-    backwardPairs<true>(a, level, gradients, table, n, range);
+    backwardPairs<true>(a, level, gradients, table, samples, range);
   } else {
-    backwardPairs<false>(a, level, gradients, table, n, range);
+    backwardPairs<false>(a, level, gradients, table, samples, range);
   }
 }
 
@@ -348,20 +350,22 @@ HWY_EXPORT(backwardLevel);
 HWY_EXPORT(backwardPositions);
 
 void run(Context& context, const HashGridForward& a) {
-  const size_t n = hostCount(a.samples), levels = a.grid.levels.size();
+  const HostRows rows = hostRows(a.samples);
+  const size_t n = rows.count(), levels = a.grid.levels.size();
   if (n == 0) return;
   constexpr size_t kRange = 4096;  // a multiple of kGroup
   const size_t ranges = (n + kRange - 1) / kRange;
   const auto range = HWY_DYNAMIC_DISPATCH(forwardRange);
   context.pool.run(levels * ranges, [&](size_t task, int) {
     const size_t first = task % ranges * kRange;
-    range(a, task / ranges, first, std::min(n, first + kRange));
+    range(a, task / ranges, rows.begin + first, rows.begin + std::min(n, first + kRange));
   });
 }
 
 void run(Context& context, const HashGridBackward& a) {
-  const size_t n = hostCount(a.samples), levels = a.grid.levels.size();
-  if (n == 0) return;
+  const HostRows rows = hostRows(a.samples);
+  const size_t levels = a.grid.levels.size();
+  if (rows.count() == 0) return;
   if (a.tableGradients) {
     // Each entry's additions happen in sample order whatever the split, so the split may follow the threads.
     const size_t splits = std::max<size_t>(1, 2 * context.pool.threads() / levels);
@@ -369,13 +373,14 @@ void run(Context& context, const HashGridBackward& a) {
     context.pool.run(levels * splits, [&](size_t task, int) {
       const size_t l = levels - 1 - task / splits, part = task % splits;  // the costly fine levels first
       const uint64_t entries = a.grid.levels[l].entries;
-      level(a, l, n,
+      level(a, l, rows,
             {static_cast<uint32_t>(entries * part / splits), static_cast<uint32_t>(entries * (part + 1) / splits)});
     });
   }
   if (a.positionGradients) {
     const auto positions = HWY_DYNAMIC_DISPATCH(backwardPositions);
-    context.pool.forRanges(n, 1024, [&](size_t begin, size_t end) { positions(a, begin, end); });
+    context.pool.forRanges(rows.count(), 1024,
+                           [&](size_t begin, size_t end) { positions(a, rows.begin + begin, rows.begin + end); });
   }
 }
 

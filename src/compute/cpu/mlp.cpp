@@ -465,21 +465,21 @@ void run(Context& context, const MlpForward& a) {
   checkShape(a.shape);
   CHECK(a.output.groupWidth == 0u);
   CHECK(a.output.columns <= static_cast<uint32_t>(a.shape.outputs));
-  const size_t n = hostCount(a.samples);
-  if (n == 0) return;
-  const size_t blocks = (n + kRows - 1) / kRows;
+  const HostRows rows = hostRows(a.samples);
+  if (rows.count() == 0) return;
+  const size_t blocks = (rows.count() + kRows - 1) / kRows;
   const std::vector<float> transposed = transposeLayers(a.shape, hostPointer(a.weights));
   const auto block = HWY_DYNAMIC_DISPATCH(forwardBlock);
   context.pool.forRanges(blocks, 2, [&](size_t begin, size_t end) {
-    for (size_t b = begin; b < end; ++b) block(a, transposed.data(), n, b * kRows, threadBuffers());
+    for (size_t b = begin; b < end; ++b) block(a, transposed.data(), rows.end, rows.begin + b * kRows, threadBuffers());
   });
 }
 
 void run(Context& context, const MlpBackward& a) {
   checkShape(a.shape);
-  const size_t n = hostCount(a.samples);
-  const size_t blocks = (n + kRows - 1) / kRows, parameters = a.shape.parameters();
-  if (n == 0) return;
+  const HostRows rows = hostRows(a.samples);
+  const size_t blocks = (rows.count() + kRows - 1) / kRows, parameters = a.shape.parameters();
+  if (rows.count() == 0) return;
   const size_t parts = std::min<size_t>(kParts, blocks);
   float* partial = partialGradients(parts * parameters);
   const auto block = HWY_DYNAMIC_DISPATCH(backwardBlock);
@@ -488,7 +488,7 @@ void run(Context& context, const MlpBackward& a) {
     float* gradients = partial + part * parameters;
     std::memset(gradients, 0, sizeof(float) * parameters);
     for (size_t b = part * blocks / parts; b < (part + 1) * blocks / parts; ++b) {
-      block(a, n, b * kRows, gradients, threadBuffers());
+      block(a, rows.end, rows.begin + b * kRows, gradients, threadBuffers());
     }
   });
   const auto sumParts = HWY_DYNAMIC_DISPATCH(sumOfParts);

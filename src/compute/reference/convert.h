@@ -14,6 +14,12 @@ inline Doubles doubles(const Slice<const float>& slice, size_t count) {
   return Doubles(from, from + count);
 }
 
+// Rows of a slice of `columns` numbers a row.
+inline Doubles doublesOfRows(const Slice<const float>& slice, size_t columns, const HostRows& rows) {
+  if (!slice) return {};
+  return doubles(slice.part(columns * rows.begin, columns * rows.count()), columns * rows.count());
+}
+
 inline Indices indices(const Slice<const uint32_t>& slice, size_t count) {
   if (!slice) return {};
   CHECK(count <= slice.count);
@@ -37,6 +43,10 @@ inline void store(const Slice<float>& slice, View values) {
   if (!slice) return;
   CHECK(values.size() <= slice.count);
   for (size_t i = 0; i < values.size(); ++i) hostPointer(slice)[i] = static_cast<float>(values[i]);
+}
+
+inline void storeRows(const Slice<float>& slice, size_t columns, const HostRows& rows, View values) {
+  if (slice) store(slice.part(columns * rows.begin, columns * rows.count()), values);
 }
 
 inline void add(const Slice<float>& slice, View values) {

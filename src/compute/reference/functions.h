@@ -15,6 +15,7 @@
 #include "compute/mlp.h"
 #include "compute/occupancy.h"
 #include "compute/rays.h"
+#include "compute/virtual_grid.h"
 
 namespace tessera::reference {
 
@@ -99,6 +100,15 @@ struct RayGradients {
 RayGradients compositeRayBackward(Extinction extinction, double minTransmittance, const RaySamples& samples,
                                   const Point& colourGradient, double opacityGradient, double depthGradient,
                                   View weightGradients);
+
+// virtual_grid.cpp
+struct VirtualCorner {
+  uint32_t texel = 0;
+  double weight = 0;
+};
+std::array<VirtualCorner, VirtualGrid::kCorners> virtualCorners(const VirtualGrid& grid, const Point& position);
+// Log density, 3 diffuse, 4 features of a sample whose corners have these attributes, [corners][8].
+Doubles virtualSample(const VirtualGrid& grid, std::span<const VirtualCorner> corners, View attributes);
 
 // losses.cpp
 struct ValueAndSlope {

@@ -77,18 +77,19 @@ HashGridGradients hashGridBackward(const HashGrid& grid, View positions, View ta
 }
 
 void run(const HashGridForward& a) {
-  const size_t samples = hostCount(a.samples);
+  const HostRows rows = hostRows(a.samples);
   CHECK(a.encoded.columns == a.grid.columns());
-  store(a.encoded, hashGridForward(a.grid, doubles(a.positions, 3 * samples), doubles(a.table, a.grid.parameters())));
+  store(a.encoded.rowsFrom(rows.begin),
+        hashGridForward(a.grid, doublesOfRows(a.positions, 3, rows), doubles(a.table, a.grid.parameters())));
 }
 
 void run(const HashGridBackward& a) {
-  const size_t samples = hostCount(a.samples);
+  const HostRows rows = hostRows(a.samples);
   const Doubles table = a.positionGradients ? doubles(a.table, a.grid.parameters()) : Doubles();
-  const HashGridGradients gradients =
-      hashGridBackward(a.grid, doubles(a.positions, 3 * samples), table, doubles(a.encodedGradients, samples));
+  const HashGridGradients gradients = hashGridBackward(a.grid, doublesOfRows(a.positions, 3, rows), table,
+                                                       doubles(a.encodedGradients.rowsFrom(rows.begin), rows.count()));
   add(a.tableGradients, gradients.table);
-  store(a.positionGradients, gradients.positions);
+  storeRows(a.positionGradients, 3, rows, gradients.positions);
 }
 
 }  // namespace tessera::reference

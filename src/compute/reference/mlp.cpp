@@ -71,40 +71,42 @@ MlpGradients mlpBackward(const MlpShape& shape, size_t samples, View input, View
 }
 
 void run(const MlpForward& a) {
-  const size_t samples = hostCount(a.samples);
-  const size_t width = a.shape.width;
+  const HostRows rows = hostRows(a.samples);
+  const size_t samples = rows.count(), width = a.shape.width;
   CHECK(a.input.columns == static_cast<uint32_t>(a.shape.inputs));
   CHECK(a.output.columns <= static_cast<uint32_t>(a.shape.outputs));
-  const MlpResult result =
-      mlpForward(a.shape, samples, doubles(a.input, samples), doubles(a.weights, a.shape.parameters()));
+  const MlpResult result = mlpForward(a.shape, samples, doubles(a.input.rowsFrom(rows.begin), samples),
+                                      doubles(a.weights, a.shape.parameters()));
   Doubles wanted;
   for (size_t s = 0; s < samples; ++s) {
     const auto row = result.output.begin() + static_cast<ptrdiff_t>(s * a.shape.outputs);
     wanted.insert(wanted.end(), row, row + a.output.columns);
   }
-  store(a.output, wanted);
-  for (int l = 0; a.activations && l < a.shape.hiddenLayers; ++l)
-    store(a.activations.part(l * a.samples.capacity * width, samples * width),
+  store(a.output.rowsFrom(rows.begin), wanted);
+  for (size_t l = 0; a.activations && l < static_cast<size_t>(a.shape.hiddenLayers); ++l)
+    store(a.activations.part((l * a.samples.capacity + rows.begin) * width, samples * width),
           View(result.activations).subspan(l * samples * width, samples * width));
 }
 
 void run(const MlpBackward& a) {
-  const size_t samples = hostCount(a.samples);
-  const size_t width = a.shape.width;
+  const HostRows rows = hostRows(a.samples);
+  const size_t samples = rows.count(), width = a.shape.width;
   Doubles activations;
-  for (int l = 0; l < a.shape.hiddenLayers; ++l) {
-    const Doubles layer = doubles(a.activations.part(l * a.samples.capacity * width, samples * width), samples * width);
+  for (size_t l = 0; l < static_cast<size_t>(a.shape.hiddenLayers); ++l) {
+    const size_t first = (l * a.samples.capacity + rows.begin) * width;
+    const Doubles layer = doubles(a.activations.part(first, samples * width), samples * width);
     activations.insert(activations.end(), layer.begin(), layer.end());
   }
-  Doubles outputGradients = doubles(a.outputGradients, samples);
-  const Doubles first = doubles(a.firstOutputGradients, samples);
+  Doubles outputGradients = doubles(a.outputGradients.rowsFrom(rows.begin), samples);
+  const Doubles first = doublesOfRows(a.firstOutputGradients, 1, rows);
   for (size_t s = 0; s < first.size(); ++s) outputGradients[s * a.shape.outputs] += first[s];
-  const Doubles output = a.shape.activation == OutputActivation::none ? Doubles() : doubles(a.output, samples);
+  const Doubles output =
+      a.shape.activation == OutputActivation::none ? Doubles() : doubles(a.output.rowsFrom(rows.begin), samples);
   const MlpGradients gradients =
-      mlpBackward(a.shape, samples, doubles(a.input, samples), doubles(a.weights, a.shape.parameters()), output,
-                  activations, outputGradients);
+      mlpBackward(a.shape, samples, doubles(a.input.rowsFrom(rows.begin), samples),
+                  doubles(a.weights, a.shape.parameters()), output, activations, outputGradients);
   add(a.weightGradients, gradients.weights);
-  store(a.inputGradients, gradients.input);
+  if (a.inputGradients) store(a.inputGradients.rowsFrom(rows.begin), gradients.input);
 }
 
 }  // namespace tessera::reference

@@ -91,7 +91,7 @@ uint64_t VulkanDevice::scratch(size_t floats) {
 }
 
 arguments::CountArguments countArguments(const Count& count) {
-  return {deviceAddress(count.counter), count.capacity, 0};
+  return {deviceAddress(count.counter), deviceAddress(count.first), count.capacity, 0};
 }
 
 arguments::MatrixArguments matrixArguments(const Matrix<const float>& matrix, size_t rows) {
