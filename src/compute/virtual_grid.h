@@ -47,24 +47,24 @@ struct DistinctTexels {
 };
 
 // Samples from texels: per attribute Σ over corners of weight · dequantised value (features -7 + 14 q, density -14 + 28
-// q, q = round(255 a) / 255), the four sources (voxels and three planes) summed; then log density = min(sum - 1, 15),
-// colours = sigmoid(sum). Texels beyond the capacity count as q = ½. With minAlpha > 0 a sample with 1 - exp(-σ ·
-// runtimeStep) < minAlpha gets log density kCulled: renderers do not see it either.
+// q, q = floor(255 a + ½) / 255 in double), the four sources (voxels and three planes) summed; then log density =
+// min(sum - 1, 15), colours = sigmoid(sum). Texels beyond the capacity count as q = ½. With minAlpha > 0 a sample with
+// 1 - exp(-σ · runtimeStep) < minAlpha gets log density kCulled: renderers do not see it either.
 struct VirtualGridForward {
   const VirtualGrid& grid;
   Count samples;
   Slice<const uint32_t> blockOfSample;
   Slice<const float> positions;
   Slice<const uint32_t> marks, ranks;  // of DistinctTexels; not with shareTexels off
-  uint32_t texelCapacity = 0;
-  Slice<const float> attributes;  // [texelCapacity][8], in [0,1]
+  Count texels;                        // of DistinctTexels: the counter is its firstTexel[blocks]
+  Slice<const float> attributes;       // [texels][8], in [0,1]
   float minAlpha = 0;
   Slice<const float> runtimeSteps;  // [samples]; with minAlpha
   Slice<float> logDensities;        // [samples]
   Slice<float> colours;             // [samples][7]: diffuse, features
 };
 
-// Overwrites attributeGradients of all rows below min(firstTexel[blocks], texelCapacity). Rounding is passed straight
+// Overwrites attributeGradients of all rows below the count of texels. Rounding is passed straight
 // through; culled samples pass nothing, nor does the density where it is held at 15.
 struct VirtualGridBackward {
   const VirtualGrid& grid;
@@ -73,10 +73,10 @@ struct VirtualGridBackward {
   Slice<const uint32_t> blockOfSample;
   Slice<const float> positions;
   Slice<const uint32_t> marks, ranks, firstTexel;
-  uint32_t texelCapacity = 0;
+  Count texels;
   Slice<const float> logDensities, colours;                 // as forward wrote them
   Slice<const float> logDensityGradients, colourGradients;  // [samples], [samples][7]
-  Slice<float> attributeGradients;                          // [texelCapacity][8]
+  Slice<float> attributeGradients;                          // [texels][8]
 };
 
 }  // namespace tessera

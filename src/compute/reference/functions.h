@@ -107,7 +107,8 @@ struct VirtualCorner {
   double weight = 0;
 };
 std::array<VirtualCorner, VirtualGrid::kCorners> virtualCorners(const VirtualGrid& grid, const Point& position);
-// Log density, 3 diffuse, 4 features of a sample whose corners have these attributes, [corners][8].
+double quantised(const VirtualGrid& grid, double attribute);
+// Log density, 3 diffuse, 4 features of a sample whose corners have these (quantised) attributes, [corners][8].
 Doubles virtualSample(const VirtualGrid& grid, std::span<const VirtualCorner> corners, View attributes);
 
 // losses.cpp

@@ -42,8 +42,7 @@ std::array<VirtualCorner, VirtualGrid::kCorners> virtualCorners(const VirtualGri
   for (int c = 0; c < 8; ++c) {
     const int upper[3] = {c & 1, c >> 1 & 1, c >> 2};
     const uint32_t texel =
-        voxel[0].texel[upper[0]] +
-        grid.voxels * (voxel[1].texel[upper[1]] + grid.voxels * voxel[2].texel[upper[2]]);
+        voxel[0].texel[upper[0]] + grid.voxels * (voxel[1].texel[upper[1]] + grid.voxels * voxel[2].texel[upper[2]]);
     corners[next++] = {texel,
                        weightOf(voxel[0], upper[0]) * weightOf(voxel[1], upper[1]) * weightOf(voxel[2], upper[2])};
   }
@@ -91,13 +90,15 @@ double rangeOf(const VirtualGrid& grid, size_t attribute) {
 
 }  // namespace
 
+double quantised(const VirtualGrid& grid, double attribute) {
+  return grid.quantise ? std::floor(255 * attribute + 0.5) / 255 : attribute;
+}
+
 Doubles virtualSample(const VirtualGrid& grid, std::span<const VirtualCorner> corners, View attributes) {
   Doubles sums(VirtualGrid::kAttributes);
   for (size_t k = 0; k < corners.size(); ++k)
     for (size_t f = 0; f < sums.size(); ++f) {
-      const double a = attributes[k * sums.size() + f];
-      const double q = grid.quantise ? std::floor(255 * a + 0.5) / 255 : a;
-      sums[f] += corners[k].weight * rangeOf(grid, f) * (2 * q - 1);
+      sums[f] += corners[k].weight * rangeOf(grid, f) * (2 * attributes[k * sums.size() + f] - 1);
     }
   Doubles out = {std::min(sums[0] - 1, 15.0)};
   for (size_t f = 1; f < sums.size(); ++f) out.push_back(1 / (1 + std::exp(-sums[f])));
@@ -148,6 +149,7 @@ void run(const VirtualGridForward& a) {
   const Doubles attributes = doubles(a.attributes, a.attributes.count);
   const Doubles steps = a.minAlpha > 0 ? doubles(a.runtimeSteps, samples.count()) : Doubles();
   constexpr size_t kWidth = VirtualGrid::kAttributes;
+  const size_t texels = a.texels.capacity;
   Doubles logDensities, colours;
   for (size_t s = 0; s < samples.count(); ++s) {
     const auto corners = samples.corners(s);
@@ -155,7 +157,7 @@ void run(const VirtualGridForward& a) {
     for (size_t k = 0; k < corners.size(); ++k) {
       const size_t row = samples.row(s, k, corners[k].texel);
       for (size_t f = 0; f < kWidth; ++f)
-        ofCorners.push_back(row < a.texelCapacity ? attributes[row * kWidth + f] : 0.5);
+        ofCorners.push_back(row < texels ? quantised(a.grid, attributes[row * kWidth + f]) : 0.5);
     }
     Doubles sample = virtualSample(a.grid, corners, ofCorners);
     if (a.minAlpha > 0 && -std::expm1(-std::exp(sample[0]) * steps[s]) < a.minAlpha) sample[0] = VirtualGrid::kCulled;
@@ -173,7 +175,7 @@ void run(const VirtualGridBackward& a) {
   constexpr size_t kWidth = VirtualGrid::kAttributes, kColours = kWidth - 1;
   const Doubles colours = doubles(a.colours, kColours * samples.count()),
                 colourGradients = doubles(a.colourGradients, kColours * samples.count());
-  const size_t rows = std::min(hostPointer(a.firstTexel)[a.blocks], a.texelCapacity);
+  const size_t rows = hostCount(a.texels);
   Doubles gradients(rows * kWidth);
   for (size_t s = 0; s < samples.count(); ++s) {
     const auto corners = samples.corners(s);
