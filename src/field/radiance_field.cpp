@@ -1,32 +1,11 @@
 #include "field/radiance_field.h"
 
-#include <cmath>
-
-#include "base/random.h"
+#include "field/initial_values.h"
 
 namespace tessera {
 namespace {
 
 constexpr int kGeometryFeatures = 16;
-
-std::vector<float> uniformTable(size_t count, uint64_t seed) {
-  const RandomStream random(seed, 0x7ab1e);
-  std::vector<float> values(count);
-  for (size_t i = 0; i < count; ++i) values[i] = (2 * random.uniform(i) - 1) * 1e-4f;
-  return values;
-}
-
-std::vector<float> xavier(const MlpShape& shape, uint64_t seed, uint64_t stream) {
-  const RandomStream random(seed, stream);
-  std::vector<float> values(shape.parameters());
-  size_t i = 0;
-  for (int l = 0; l < shape.layers(); ++l) {
-    const size_t end = i + static_cast<size_t>(shape.layerInputs(l)) * shape.layerOutputs(l);
-    const float bound = std::sqrt(6.0f / static_cast<float>(shape.layerInputs(l) + shape.layerOutputs(l)));
-    for (; i < end; ++i) values[i] = (2 * random.uniform(i) - 1) * bound;
-  }
-  return values;
-}
 
 }  // namespace
 
@@ -47,9 +26,9 @@ RadianceFieldShape makeRadianceFieldShape(const HashGridOptions& grid, int width
 RadianceField::RadianceField(Device& device, RadianceFieldShape shape, uint64_t seed)
     : device_(device),
       shape_(std::move(shape)),
-      table_(device, "table", uniformTable(shape_.grid.parameters(), seed)),
-      density_(device, "density", xavier(shape_.density, seed, 0xde)),
-      colour_(device, "colour", xavier(shape_.colour, seed, 0xc0)) {}
+      table_(device, "table", initialTable(shape_.grid.parameters(), seed)),
+      density_(device, "density", initialWeights(shape_.density, seed, 0xde)),
+      colour_(device, "colour", initialWeights(shape_.colour, seed, 0xc0)) {}
 
 void RadianceField::reserve(uint32_t samples) {
   if (samples <= capacity_) return;

@@ -50,21 +50,19 @@ std::optional<ModelManifest> ModelFolder::manifest() const {
   return manifest;
 }
 
-void ModelFolder::commit(const ModelManifest& state, const Bytes& block, int keep) const {
-  const std::string name = fmt::format("blocks/0/step-{}.safetensors", state.step);
-  writeFileAtomically(root_ / name, block, true);
-  const json manifest = {
-      {"method", state.method}, {"step", state.step}, {"planned_steps", state.plannedSteps}, {"files", {name}}};
-  writeFileAtomically(root_ / "manifest.json", manifest.dump(2) + "\n", true);
+namespace {
+
+// Removes checkpoints but the last `keep` up to `step`, and what a killed run left behind.
+void removeOld(const fs::path& folder, int64_t step, int keep) {
   std::vector<std::pair<int64_t, fs::path>> old;
-  for (const fs::directory_entry& entry : fs::directory_iterator(root_ / "blocks/0")) {
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     const std::string file = entry.path().filename().string();
     if (file.starts_with("step-") && file.ends_with(".safetensors")) {
-      const int64_t step = std::atoll(file.c_str() + 5);
-      if (step > state.step) {
+      const int64_t itsStep = std::atoll(file.c_str() + 5);
+      if (itsStep > step) {
         fs::remove(entry.path());  // of a run that was killed before its manifest
       } else {
-        old.emplace_back(step, entry.path());
+        old.emplace_back(itsStep, entry.path());
       }
     } else if (file.find(".partial-") != std::string::npos) {
       fs::remove(entry.path());  // of a run that was killed while writing
@@ -72,6 +70,22 @@ void ModelFolder::commit(const ModelManifest& state, const Bytes& block, int kee
   }
   std::sort(old.begin(), old.end());
   for (size_t i = 0; i + static_cast<size_t>(keep) < old.size(); ++i) fs::remove(old[i].second);
+}
+
+}  // namespace
+
+void ModelFolder::commit(const ModelManifest& state, uint32_t parts, const std::function<Bytes(uint32_t)>& save,
+                         int keep) const {
+  json names = json::array();
+  for (uint32_t part = 0; part < parts; ++part) {
+    const std::string name = fmt::format("blocks/{}/step-{}.safetensors", part, state.step);
+    writeFileAtomically(root_ / name, save(part), true);
+    names.push_back(name);
+  }
+  const json manifest = {
+      {"method", state.method}, {"step", state.step}, {"planned_steps", state.plannedSteps}, {"files", names}};
+  writeFileAtomically(root_ / "manifest.json", manifest.dump(2) + "\n", true);
+  for (uint32_t part = 0; part < parts; ++part) removeOld(root_ / "blocks" / std::to_string(part), state.step, keep);
 }
 
 void ModelFolder::writePlacement(const ModelPlacement& placement, const std::string& method) const {

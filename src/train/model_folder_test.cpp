@@ -45,7 +45,7 @@ TEST(ModelFolder, HoldsNoModelWhileThereIsNoManifest) {
 TEST(ModelFolder, ComesBackAsCommitted) {
   const TestFolder folder;
   const ModelFolder model(folder / "new/model");
-  model.commit({"field", 120, 500, {}}, block(100, 7));
+  model.commit({"field", 120, 500, {}}, 1, [](uint32_t) { return block(100, 7); });
   const auto manifest = model.manifest();
   ASSERT_TRUE(manifest);
   EXPECT_EQ(manifest->method, "field");
@@ -58,16 +58,16 @@ TEST(ModelFolder, ComesBackAsCommitted) {
 TEST(ModelFolder, KeepsTheLastCheckpointsOnly) {
   const TestFolder folder;
   const ModelFolder model(folder.path());
-  for (const int64_t step : {8, 9, 10, 100}) model.commit({"field", step, 100, {}}, block(10, 1));
+  for (const int64_t step : {8, 9, 10, 100}) model.commit({"field", step, 100, {}}, 1, [](uint32_t) { return block(10, 1); });
   EXPECT_EQ(blockFiles(folder.path()), (std::vector<std::string>{"step-10.safetensors", "step-100.safetensors"}));
-  model.commit({"field", 101, 200, {}}, block(10, 1), 1);
+  model.commit({"field", 101, 200, {}}, 1, [](uint32_t) { return block(10, 1); }, 1);
   EXPECT_EQ(blockFiles(folder.path()), (std::vector<std::string>{"step-101.safetensors"}));
 }
 
 TEST(ModelFolder, KilledWhileWritingABlockIsTheModelItWas) {
   const TestFolder folder;
   const ModelFolder model(folder.path());
-  model.commit({"field", 10, 100, {}}, block(100, 1));
+  model.commit({"field", 10, 100, {}}, 1, [](uint32_t) { return block(100, 1); });
   // A block that was being written, and one that was written before its manifest.
   writeFileAtomically(folder / "blocks/0/step-20.safetensors.partial-123", "half");
   writeFileAtomically(folder / "blocks/0/step-20.safetensors", "whole");
@@ -77,7 +77,7 @@ TEST(ModelFolder, KilledWhileWritingABlockIsTheModelItWas) {
   EXPECT_EQ(manifest->step, 10);
   EXPECT_EQ(readFile(folder.path() / manifest->files[0]), block(100, 1));
   // The next commit clears up.
-  model.commit({"field", 20, 100, {}}, block(100, 2));
+  model.commit({"field", 20, 100, {}}, 1, [](uint32_t) { return block(100, 2); });
   EXPECT_EQ(model.manifest()->step, 20);
   EXPECT_EQ(readFile(folder / "blocks/0/step-20.safetensors"), block(100, 2));
   EXPECT_EQ(blockFiles(folder.path()), (std::vector<std::string>{"step-10.safetensors", "step-20.safetensors"}));
@@ -87,9 +87,9 @@ TEST(ModelFolder, NeverRemovesTheBlockThatItsManifestNames) {
   const TestFolder folder;
   const ModelFolder model(folder.path());
   // What a longer run left behind must not crowd out what is written now.
-  for (const int64_t step : {500, 600}) model.commit({"field", step, 600, {}}, block(10, 1));
+  for (const int64_t step : {500, 600}) model.commit({"field", step, 600, {}}, 1, [](uint32_t) { return block(10, 1); });
   fs::remove(folder / "manifest.json");
-  model.commit({"field", 5, 600, {}}, block(10, 2));
+  model.commit({"field", 5, 600, {}}, 1, [](uint32_t) { return block(10, 2); });
   ASSERT_TRUE(model.manifest());
   EXPECT_EQ(readFile(folder.path() / model.manifest()->files[0]), block(10, 2));
 }
@@ -97,7 +97,7 @@ TEST(ModelFolder, NeverRemovesTheBlockThatItsManifestNames) {
 TEST(ModelFolder, SaysSoWhenABlockIsMissing) {
   const TestFolder folder;
   const ModelFolder model(folder.path());
-  model.commit({"field", 10, 100, {}}, block(100, 1));
+  model.commit({"field", 10, 100, {}}, 1, [](uint32_t) { return block(100, 1); });
   fs::remove(folder / "blocks/0/step-10.safetensors");
   const std::string error = errorOf([&] { model.manifest(); });
   EXPECT_TRUE(contains(error, "manifest.json")) << error;

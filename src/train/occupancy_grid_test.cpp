@@ -88,8 +88,8 @@ TEST(OccupancyGrid, ForgetsWhatHasBecomeEmpty) {
   ASSERT_EQ(grid.occupiedFraction(), 0.5);
   const std::vector<float> empty(kCells, -20.0f);
   for (uint64_t update = 1; update < 200; ++update) {
-    grid.update([&](Count, Slice<const float>, Matrix<float> to) { device->write(to.data, std::span(empty)); }, kCells, 0,
-                update, 1 << 16);
+    grid.update([&](Count, Slice<const float>, Matrix<float> to) { device->write(to.data, std::span(empty)); }, kCells,
+                0, update, 1 << 16);
   }
   const std::vector<float> values = grid.values();
   for (const float value : values) EXPECT_LT(value, 0.01f);

@@ -26,7 +26,7 @@ SceneFrame frameOfPoints(const Capture& capture) {
     low[axis] = percentile(values, 0.02);
     high[axis] = percentile(values, 0.98);
   }
-  return {(low + high) / 2, 2 / std::max(1e-9, (high - low).maxCoeff())};
+  return {(low + high) / 2, 2 / std::max(1e-9, (high - low).maxCoeff()), Mat3d::Identity()};
 }
 
 // All photos but those few that would shrink the scene of all others to a speck.
@@ -93,8 +93,9 @@ RayCamera makeRayCamera(const Camera& camera, const Pose& worldFromCamera, const
   RayCamera made;
   made.lens = static_cast<int32_t>(camera.lens);
   for (int i = 0; i < 16; ++i) made.parameters[i] = static_cast<float>(camera.parameters[i]);
+  const Mat3d sceneFromCamera = frame.rotation * worldFromCamera.rotation;
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) made.rotation[3 * i + j] = static_cast<float>(worldFromCamera.rotation(i, j));
+    for (int j = 0; j < 3; ++j) made.rotation[3 * i + j] = static_cast<float>(sceneFromCamera(i, j));
   }
   const Vec3d centre = frame.sceneFromWorld(worldFromCamera.translation);
   for (int i = 0; i < 3; ++i) made.centre[i] = static_cast<float>(centre[i]);

@@ -22,7 +22,7 @@ double psnrOf(double squaredError) {
 // Means since the last line of metrics.
 struct Window {
   int64_t steps = 0;
-  double loss = 0, squaredError = 0, rays = 0, samples = 0, marched = 0, since = 0;
+  double loss = 0, squaredError = 0, rays = 0, samples = 0, marched = 0, texels = 0, since = 0;
 
   void add(const StepReport& report) {
     ++steps;
@@ -31,6 +31,7 @@ struct Window {
     rays += report.rays;
     samples += report.samples;
     marched += report.marched;
+    texels += report.texels;
   }
 };
 
@@ -43,6 +44,7 @@ nlohmann::json metricsLine(int64_t step, double seconds, const Window& window) {
           {"rays_per_second", window.rays / span},
           {"samples_per_second", window.samples / span},
           {"marched_per_second", window.marched / span},
+          {"texels_per_second", window.texels / span},
           {"steps_per_second", window.steps / span},
           {"peak_rss_bytes", peakResidentBytes()}};
 }
@@ -66,9 +68,15 @@ Start startingPoint(Trainee& trainee, const ModelFolder& folder, const TrainingL
       throw Error(folder.root().string(), "manifest.json", "was trained with --method " + found->method,
                   "resume with that method");
     }
-    CHECK(found->files.size() == 1u);
-    const fs::path file = folder.root() / found->files[0];
-    trainee.restore(file, readSafetensors(file));
+    if (found->files.size() != trainee.parts()) {
+      throw Error(folder.root().string(), "manifest.json",
+                  fmt::format("names {} checkpoints where the model has {} parts", found->files.size(), trainee.parts()),
+                  "restore the file or train again");
+    }
+    for (uint32_t part = 0; part < trainee.parts(); ++part) {
+      const fs::path file = folder.root() / found->files[part];
+      trainee.restore(part, file, readSafetensors(file));
+    }
     state = *found;
     folder.cutMetrics(state.step);
   } else {
@@ -85,6 +93,20 @@ Start startingPoint(Trainee& trainee, const ModelFolder& folder, const TrainingL
 
 }  // namespace
 
+void requireFormat(const fs::path& path, const Safetensors& state, const std::string& format,
+                   const std::string& method) {
+  const auto found = state.metadata.find("format");
+  if (found != state.metadata.end() && found->second == format) return;
+  throw Error(path.string(), "", "is not a checkpoint of --method " + method, "train again");
+}
+
+void warnOfOtherDevice(const fs::path& path, const Safetensors& state, const std::string& target) {
+  const auto device = state.metadata.find("device");
+  if (device == state.metadata.end() || device->second == target) return;
+  warn("{} was trained on {}; going on with {} gives as good a model, but not the same bits", path.string(),
+       device->second, target);
+}
+
 TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const TrainingLoopOptions& options) {
   using Clock = std::chrono::steady_clock;
   auto [state, planMadeAt] = startingPoint(trainee, folder, options);
@@ -100,14 +122,14 @@ TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const Tr
   if (options.progress) progress.emplace("training", state.plannedSteps, "steps");
 
   const auto save = [&] {
-    folder.commit(state, trainee.save());
+    folder.commit(state, trainee.parts(), [&](uint32_t part) { return trainee.save(part); });
     savedAt = seconds();
   };
   const auto unfinished = [&] { return state.plannedSteps == 0 || state.step < state.plannedSteps; };
   while (unfinished() && !options.stopRequested()) {
     const StepReport report = trainee.step(state.step, state.step < planMadeAt ? 0 : state.plannedSteps);
     if (!std::isfinite(report.loss)) {
-      throw Error(folder.root().string(), fmt::format("step {}, block 0", state.step), "the loss is not a number",
+      throw Error(folder.root().string(), fmt::format("step {}", state.step), "the loss is not a number",
                   "train into another folder with a lower --set rate=..., and report it with the capture");
     }
     window.add(report);

@@ -14,6 +14,7 @@ struct StepReport {
   uint32_t rays = 0;
   uint32_t samples = 0;  // that networks were trained on
   uint32_t marched = 0;  // whose density was looked up to find those
+  uint32_t texels = 0;   // of virtual grids that the networks were evaluated at; 0 where there are none
 };
 
 // One representation in training. The state after a step is a function of the capture, the settings and the step alone.
@@ -22,10 +23,16 @@ class Trainee {
   virtual ~Trainee() = default;
   // `plannedSteps` 0: not known yet.
   virtual StepReport step(int64_t step, int64_t plannedSteps) = 0;
-  // Everything that later steps depend on, as a safetensors file; and back. `path` is for errors.
-  virtual Bytes save() = 0;
-  virtual void restore(const fs::path& path, const Safetensors& state) = 0;
+  // Everything that later steps depend on, as one safetensors file a part (a block); and back. `path` is for errors.
+  virtual uint32_t parts() const { return 1; }
+  virtual Bytes save(uint32_t part) = 0;
+  virtual void restore(uint32_t part, const fs::path& path, const Safetensors& state) = 0;
 };
+
+// Throws Error when a checkpoint says that it is of another kind; warns when it was trained on another device, which is as good,
+// but not the same bits.
+void requireFormat(const fs::path& path, const Safetensors& state, const std::string& format, const std::string& method);
+void warnOfOtherDevice(const fs::path& path, const Safetensors& state, const std::string& target);
 
 struct TrainingLoopOptions {
   std::string method;

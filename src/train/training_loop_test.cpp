@@ -32,12 +32,12 @@ class FakeTrainee : public Trainee {
     report.marched = 200;
     return report;
   }
-  Bytes save() override {
+  Bytes save(uint32_t) override {
     ++saves;
     const std::vector<uint64_t> values = {state};
     return encodeSafetensors({{"state", {TensorType::i64, {1}, std::as_bytes(std::span(values))}}});
   }
-  void restore(const fs::path& path, const Safetensors& file) override {
+  void restore(uint32_t, const fs::path& path, const Safetensors& file) override {
     state = file.require(path, "state", TensorType::i64).as<uint64_t>()[0];
     ++restores;
   }
@@ -179,7 +179,7 @@ TEST_F(TrainingLoop, ForgetsMetricsOfStepsThatItDoesAgain) {
 }
 
 TEST_F(TrainingLoop, ForgetsMetricsOfARunThatNeverSaved) {
-  folder_.commit({"fake", 1, 1, {}}, {});
+  folder_.commit({"fake", 1, 1, {}}, 1, [](uint32_t) { return Bytes(); });
   fs::remove(folder_.root() / "manifest.json");
   folder_.appendMetrics({{"step", 1}});
   FakeTrainee trainee;

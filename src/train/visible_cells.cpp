@@ -100,7 +100,7 @@ std::vector<bool> visibleCells(const Capture& capture, const SceneFrame& frame, 
           const Vec3d u = (Vec3d(x, y, static_cast<double>(z)) + (offset + Vec3d::Ones()) / 2) / blocks;
           Vec3d inScene;
           if (!sceneFromGrid(space, u, &inScene)) continue;
-          const Vec3d inWorld = inScene / frame.scale + frame.centre;
+          const Vec3d inWorld = frame.worldFromScene(inScene);
           for (size_t i = 0; i < views.size() && !visible; ++i) {
             const size_t candidate = (last + i) % views.size();
             visible = sees(views[candidate], inWorld);

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "base/random.h"
+#include "train/colour_loss.h"
 #include "train/schedule.h"
 #include "train/visible_cells.h"
 
@@ -16,47 +17,28 @@ constexpr uint32_t kRoomPerWanted = 2;  // for passes that see more than the las
 constexpr uint32_t kRoomPerRay = 8;     // so that the first round of marching fits
 constexpr uint32_t kLosses = 4;         // of a pass: colour loss, squared error, distortion, depth
 constexpr float kMinTransmittance = 1e-4f;
-constexpr double kMostPixelsOff = 2;  // an observation farther from its point's image teaches nothing
 
-ColourLossKind lossKind(const std::string& name) {
-  if (name == "mse") return ColourLossKind::mse;
-  if (name == "huber") return ColourLossKind::huber;
-  if (name == "charbonnier") return ColourLossKind::charbonnier;
-  throw Error("--set loss=" + name, "", "there is no such colour loss", "use huber, mse or charbonnier");
-}
-
-std::vector<RayCamera> rayCameras(const Capture& capture, const SceneFrame& frame) {
-  std::vector<RayCamera> cameras;
-  for (const Photo& photo : capture.photos) {
-    cameras.push_back(makeRayCamera(capture.cameras[photo.camera], photo.worldFromCamera, frame));
-  }
-  return cameras;
-}
-
-std::vector<int> trainingPhotos(const Capture& capture) {
-  std::vector<int> photos = capture.photosIn(Split::train);
-  if (photos.empty()) {
-    throw Error(capture.root.string(), "transforms.json", "no photo is marked for training",
-                "import again with another --holdout");
-  }
-  return photos;
+PhotoRays::Settings raySettings(const FieldConfig& config) {
+  PhotoRays::Settings settings;
+  settings.seed = static_cast<uint64_t>(config.seed);
+  settings.mostRays = static_cast<uint32_t>(config.mostRays);
+  settings.photoBudgetMiB = config.photoBudgetMiB;
+  settings.stepsPerPhoto = config.stepsPerPhoto;
+  settings.randomBackground = config.randomBackground;
+  settings.knownShare = config.depth > 0 ? config.knownShare : 0;
+  return settings;
 }
 
 }  // namespace
 
 FieldTrainer::FieldTrainer(Device& device, const Capture& capture, const FieldConfig& config, const SceneFrame& frame)
     : device_(device),
-      capture_(capture),
       config_(config),
       model_(device, config, frame),
-      photos_(capture, trainingPhotos(capture),
-              {static_cast<size_t>(config.photoBudgetMiB * 1048576), config.stepsPerPhoto,
-               static_cast<uint64_t>(config.seed)}),
-      known_(knownDistances(capture, frame, kMostPixelsOff)),
+      photoRays_(device, capture, frame, raySettings(config)),
       rays_(static_cast<uint32_t>(config.firstRays)),
-      cameras_(device.arrayOf(rayCameras(capture, frame))),
-      exposures_(device, "exposures", std::vector<float>(capture.photos.size() * 3)) {
-  lossKind(config.loss);
+      exposures_(device, capture) {
+  colourLossKind(config.loss);
   const std::vector<bool> visible = visibleCells(capture, frame, model_.space());
   if (std::find(visible.begin(), visible.end(), true) == visible.end()) {
     throw Error(capture.root.string(), "transforms.json", "no training photo sees any of the scene",
@@ -71,15 +53,8 @@ FieldTrainer::FieldTrainer(Device& device, const Capture& capture, const FieldCo
       std::max({kRoomPerWanted * perPass, std::min(kRoomPerRay * raysPerPass, 4 * perPass), FieldConfig::kMostSteps});
   seen_ = RaySamples(device, raysPerPass, samples);
   counters_ = device.array<uint32_t>(size_t{passes_} * RaySamples::kCounters);
-  photoOfRay_ = device.array<uint32_t>(rays);
-  for (Array<float>* perRay : {&weights_, &jitter_, &distances_, &opacity_, &depth_, &opacityGradients_}) {
-    *perRay = device.array<float>(rays);
-  }
-  pixels_ = device.array<float>(size_t{rays} * 2);
-  for (Array<float>* perRay :
-       {&targets_, &backgrounds_, &origins_, &directions_, &colour_, &exposed_, &colourGradients_}) {
-    *perRay = device.array<float>(size_t{rays} * 3);
-  }
+  for (Array<float>* perRay : {&opacity_, &depth_, &opacityGradients_}) *perRay = device.array<float>(rays);
+  for (Array<float>* perRay : {&colour_, &exposed_, &colourGradients_}) *perRay = device.array<float>(size_t{rays} * 3);
   losses_ = device.array<float>(size_t{passes_} * kLosses);
   for (Array<float>* perSample : {&sampleWeights_, &weightGradients_, &logDensityGradients_}) {
     *perSample = device.array<float>(samples);
@@ -99,23 +74,9 @@ void FieldTrainer::refreshOccupancy(int64_t step) {
   }
 }
 
-void FieldTrainer::uploadRays() {
-  device_.write(photoOfRay_.all(), std::span<const uint32_t>(batch_.photoOfRay));
-  device_.write(pixels_.all(), std::span<const float>(batch_.pixels));
-  device_.write(targets_.all(), std::span<const float>(batch_.targets));
-  device_.write(backgrounds_.all(), std::span<const float>(batch_.backgrounds));
-  device_.write(weights_.all(), std::span<const float>(batch_.weights));
-  device_.write(jitter_.all(), std::span<const float>(batch_.jitter));
-  device_.write(distances_.all(), std::span<const float>(batch_.distances));
-  device_.run(GenerateRays{{rays_, {}}, cameras_, photoOfRay_, pixels_, origins_, directions_});
-}
-
 StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
   refreshOccupancy(step);
-  const double knownShare = config_.depth > 0 ? config_.knownShare : 0;
-  drawRays(photos_.at(step), known_, {static_cast<uint64_t>(config_.seed), config_.randomBackground, knownShare}, step,
-           rays_, batch_);
-  uploadRays();
+  photoRays_.draw(step, rays_);
   const auto raysBefore = [&](uint32_t pass) { return static_cast<uint32_t>(uint64_t{rays_} * pass / passes_); };
   for (uint32_t pass = 0; pass < passes_; ++pass) {
     addGradients(pass, raysBefore(pass), raysBefore(pass + 1) - raysBefore(pass));
@@ -135,7 +96,7 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
     const float* loss = &losses[size_t{pass} * kLosses];
     report.loss += loss[0] + loss[2] + loss[3];
     squares += loss[1];
-    for (uint32_t ray = 0; ray < counter[1]; ++ray) weight += batch_.weights[raysBefore(pass) + ray];
+    for (uint32_t ray = 0; ray < counter[1]; ++ray) weight += photoRays_.batch().weights[raysBefore(pass) + ray];
   }
   report.squaredError = squares / std::max(1.0, 3 * weight);
 
@@ -151,11 +112,14 @@ void FieldTrainer::addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCo
   const auto ofRays = [&](auto& array, uint32_t columns) {
     return array.part(size_t{firstRay} * columns, size_t{rayCount} * columns);
   };
-  const Slice<const float> directions = ofRays(directions_, 3);
-  const Slice<const uint32_t> photoOfRay = ofRays(photoOfRay_, 1);
+  const Slice<const float> directions = photoRays_.directions(firstRay, rayCount);
+  const Slice<const float> backgrounds = photoRays_.backgrounds(firstRay, rayCount);
+  const Slice<const uint32_t> photoOfRay = photoRays_.photoOfRay(firstRay, rayCount);
   const Slice<float> losses = losses_.part(size_t{pass} * kLosses, kLosses);
   seen_.counters = counters_.part(size_t{pass} * RaySamples::kCounters, RaySamples::kCounters);
-  model_.sample({rayCount, ofRays(origins_, 3), directions, ofRays(jitter_, 1), {}}, kMinTransmittance, seen_);
+  model_.sample(
+      {rayCount, photoRays_.origins(firstRay, rayCount), directions, photoRays_.jitter(firstRay, rayCount), {}},
+      kMinTransmittance, seen_);
   const Count samples = seen_.samples(), rays = seen_.finished(rayCount);
   RadianceField& field = model_.field();
   const RadianceField::Output output = field.forward(samples, seen_.positions, directions, seen_.rayOfSample, true);
@@ -173,22 +137,22 @@ void FieldTrainer::addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCo
   composite.depth = ofRays(depth_, 1);
   composite.weights = sampleWeights_;
   device_.run(composite);
-  device_.run(ExposureForward{rays, composite.colour, composite.opacity, ofRays(backgrounds_, 3), photoOfRay,
-                              exposures_.values, ofRays(exposed_, 3)});
+  device_.run(ExposureForward{rays, composite.colour, composite.opacity, backgrounds, photoOfRay, exposures_.logGains(),
+                              ofRays(exposed_, 3)});
 
   ColourLoss loss;
-  loss.kind = lossKind(config_.loss);
+  loss.kind = colourLossKind(config_.loss);
   loss.parameter = static_cast<float>(config_.lossParameter);
   loss.scale = 1.0f / (3.0f * static_cast<float>(rays_));
   loss.rays = rays;
   loss.predicted = ofRays(exposed_, 3);
-  loss.target = ofRays(targets_, 3);
-  loss.weights = ofRays(weights_, 1);
+  loss.target = photoRays_.targets(firstRay, rayCount);
+  loss.weights = photoRays_.weights(firstRay, rayCount);
   loss.loss = losses.part(0, 2);
   loss.gradients = ofRays(colourGradients_, 3);
   device_.run(loss);
-  device_.run(ExposureBackward{rays, composite.colour, ofRays(backgrounds_, 3), photoOfRay, exposures_.values,
-                               loss.gradients, loss.gradients, ofRays(opacityGradients_, 1), exposures_.gradients});
+  device_.run(ExposureBackward{rays, composite.colour, backgrounds, photoOfRay, exposures_.logGains(), loss.gradients,
+                               loss.gradients, ofRays(opacityGradients_, 1), exposures_.gradients()});
   DistortionLoss distortion;
   distortion.scale = static_cast<float>(config_.distortion) / static_cast<float>(rays_);
   distortion.rays = rays;
@@ -207,7 +171,7 @@ void FieldTrainer::addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCo
     depth.firstSample = seen_.firstSample;
     depth.weights = sampleWeights_;
     depth.distances = seen_.distances;
-    depth.known = ofRays(distances_, 1);
+    depth.known = photoRays_.distances(firstRay, rayCount);
     depth.loss = losses.part(3, 1);
     depth.weightGradients = weightGradients_;
     device_.run(depth);
@@ -245,50 +209,22 @@ void FieldTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
   adam.l2 = static_cast<float>(config_.networkL2);
   model_.field().densityNetwork().step(device_, adam);
   model_.field().colourNetwork().step(device_, adam);
-  if (!config_.exposure) {
-    device_.fillZero(exposures_.gradients.all());
-    return;
-  }
-  Adam exposure;
-  exposure.rate = static_cast<float>(config_.exposureRate * adam.rate / config_.rate);
-  exposure.skipZeroGradients = true;
-  exposures_.step(device_, exposure);
-  if (step % 16 == 15) centreExposures();
+  exposures_.step(step, static_cast<float>(config_.exposureRate * adam.rate / config_.rate), config_.exposure);
 }
 
-// Only differences between photos can be told: the mean gain of each channel stays zero, which is what evaluation uses.
-void FieldTrainer::centreExposures() {
-  std::vector<float> gains = device_.read(exposures_.values.all());
-  const std::vector<int> photos = capture_.photosIn(Split::train);
-  for (int channel = 0; channel < 3; ++channel) {
-    double mean = 0;
-    for (const int photo : photos) mean += gains[3 * photo + channel];
-    mean /= static_cast<double>(photos.size());
-    for (const int photo : photos) gains[3 * photo + channel] -= static_cast<float>(mean);
-  }
-  device_.write(exposures_.values.all(), std::span<const float>(gains));
-}
-
-Bytes FieldTrainer::save() {
+Bytes FieldTrainer::save(uint32_t) {
   TensorSet tensors;
   model_.save(tensors, true);
-  tensors.add(device_, exposures_, true);
+  exposures_.save(tensors);
   tensors.add("rays", std::vector<uint32_t>{rays_});
   return tensors.encode({{"format", "tessera field 1"}, {"device", device_.target()}});
 }
 
-void FieldTrainer::restore(const fs::path& path, const Safetensors& state) {
-  const auto format = state.metadata.find("format");
-  if (format == state.metadata.end() || format->second != "tessera field 1") {
-    throw Error(path.string(), "", "is not a checkpoint of --method field", "train again");
-  }
-  const auto device = state.metadata.find("device");
-  if (device != state.metadata.end() && device->second != device_.target()) {
-    warn("{} was trained on {}; going on with {} gives as good a model, but not the same bits", path.string(),
-         device->second, device_.target());
-  }
+void FieldTrainer::restore(uint32_t, const fs::path& path, const Safetensors& state) {
+  requireFormat(path, state, "tessera field 1", "field");
+  warnOfOtherDevice(path, state, device_.target());
   model_.restore(path, state);
-  loadGroup(device_, path, state, exposures_);
+  exposures_.restore(path, state);
   const TensorView& rays = state.require(path, "rays", TensorType::u32);
   if (rays.elements() != 1) throw Error(path.string(), "tensor rays", "is not one number", "train again");
   rays_ = std::clamp(rays.as<uint32_t>()[0], 1u, static_cast<uint32_t>(config_.mostRays));

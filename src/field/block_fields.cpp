@@ -1,0 +1,81 @@
+#include "field/block_fields.h"
+
+#include "base/random.h"
+#include "field/initial_values.h"
+
+namespace tessera {
+
+BlockFieldShape makeBlockFieldShape(const HashGridOptions& grid, int width, int hiddenLayers, int outputs,
+                                    OutputActivation activation) {
+  BlockFieldShape shape{HashGrid(grid), {}};
+  shape.network.inputs = static_cast<int>(shape.grid.columns());
+  shape.network.width = width;
+  shape.network.hiddenLayers = hiddenLayers;
+  shape.network.outputs = outputs;
+  shape.network.activation = activation;
+  return shape;
+}
+
+BlockFieldBatch::BlockFieldBatch(Device& device, const BlockFieldShape& shape, uint32_t rows, bool forBackward)
+    : capacity(rows) {
+  const size_t n = rows;
+  const size_t encodings = Matrix<float>::rowsOfPlane(n) * shape.grid.columns();
+  encoded = device.array<float>(encodings);
+  outputs = device.array<float>(n * static_cast<size_t>(shape.network.outputs));
+  if (!forBackward) return;
+  encodedGradients = device.array<float>(encodings);
+  activations = device.array<float>(n * shape.network.activationsPerSample());
+  outputGradients = device.array<float>(n * static_cast<size_t>(shape.network.outputs));
+}
+
+BlockFields::BlockFields(Device& device, std::string name, BlockFieldShape shape, uint32_t blocks, uint64_t seed)
+    : device_(device), shape_(std::move(shape)) {
+  for (uint32_t block = 0; block < blocks; ++block) {
+    const uint64_t own = mix64(seed ^ (uint64_t{block} << 32));
+    tables_.emplace_back(device, name + ".table", initialTable(shape_.grid.parameters(), own));
+    networks_.emplace_back(device, name + ".network", initialWeights(shape_.network, own, 0xb10c));
+  }
+}
+
+Matrix<float> BlockFields::byLevel(Array<float>& encodings, uint32_t capacity) const {
+  return Matrix<float>::grouped(encodings, shape_.grid.columns(), static_cast<uint32_t>(shape_.grid.features),
+                                Matrix<float>::rowsOfPlane(capacity));
+}
+
+Count BlockFields::rowsOf(const BlockFieldBatch& batch, uint32_t block) {
+  return {batch.capacity, batch.firstOfBlock.part(block + 1, 1), batch.firstOfBlock.part(block, 1)};
+}
+
+void BlockFields::forward(BlockFieldBatch& batch, bool forBackward) {
+  const Matrix<float> encoded = byLevel(batch.encoded, batch.capacity);
+  for (uint32_t block = 0; block < blocks(); ++block) {
+    const Count rows = rowsOf(batch, block);
+    device_.run(HashGridForward{shape_.grid, rows, batch.positions, tables_[block].values, encoded});
+    device_.run(MlpForward{shape_.network, rows, encoded, networks_[block].values,
+                           Matrix<float>(batch.outputs, static_cast<uint32_t>(shape_.network.outputs)),
+                           forBackward ? batch.activations.all() : Slice<float>()});
+  }
+}
+
+void BlockFields::backward(BlockFieldBatch& batch) {
+  const uint32_t outputs = static_cast<uint32_t>(shape_.network.outputs);
+  const Matrix<float> encoded = byLevel(batch.encoded, batch.capacity);
+  const Matrix<float> encodedGradients = byLevel(batch.encodedGradients, batch.capacity);
+  for (uint32_t block = 0; block < blocks(); ++block) {
+    const Count rows = rowsOf(batch, block);
+    device_.run(MlpBackward{shape_.network,
+                            rows,
+                            encoded,
+                            networks_[block].values,
+                            Matrix<float>(batch.outputs, outputs),
+                            batch.activations,
+                            Matrix<float>(batch.outputGradients, outputs),
+                            {},
+                            networks_[block].gradients,
+                            encodedGradients});
+    device_.run(HashGridBackward{
+        shape_.grid, rows, batch.positions, tables_[block].values, encodedGradients, tables_[block].gradients, {}});
+  }
+}
+
+}  // namespace tessera

@@ -1,0 +1,88 @@
+#include "representations/volume/volume_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/random.h"
+
+namespace tessera {
+namespace {
+
+Device& able(Device& device, const VolumeConfig& config) {
+  config.check();
+  requireAllOperations(device);
+  return device;
+}
+
+// Xavier weights, biases 0. The last bias is low, so that diffuse colours come first.
+std::vector<float> initialDeferred(uint32_t blocks, uint64_t seed) {
+  constexpr float kLastBias = -2;
+  constexpr uint32_t kSizes[] = {DeferredNetwork::kInputs, DeferredNetwork::kHidden, DeferredNetwork::kHidden, 3};
+  const RandomStream random(seed, 0xdefe);
+  std::vector<float> values(size_t{blocks} * DeferredNetwork::kParameters);
+  for (uint32_t block = 0; block < blocks; ++block) {
+    for (int layer = 0; layer < 3; ++layer) {
+      const uint32_t inputs = kSizes[layer], outputs = kSizes[layer + 1];
+      const size_t first = size_t{block} * DeferredNetwork::kParameters + DeferredNetwork::kWeights[layer];
+      const float bound = std::sqrt(6.0f / static_cast<float>(inputs + outputs));
+      for (size_t i = 0; i < size_t{inputs} * outputs; ++i) {
+        values[first + i] = (2 * random.uniform(first + i) - 1) * bound;
+      }
+      if (layer == 2)
+        std::fill_n(values.begin() + static_cast<ptrdiff_t>(first + size_t{inputs} * outputs), 3, kLastBias);
+    }
+  }
+  return values;
+}
+
+}  // namespace
+
+SceneFrame sceneFrameOf(const BlockGrid& grid) {
+  SceneFrame frame;
+  frame.centre = grid.inWorld({0, 0, (grid.bottom + grid.top) / 2});
+  frame.rotation = grid.gridFromWorld;
+  frame.scale = 2 / grid.edge;
+  return frame;
+}
+
+BlockSpace blockSpaceOf(const BlockGrid& grid, const VolumeConfig& config) {
+  BlockSpace space;
+  space.columns = static_cast<uint32_t>(grid.columns);
+  space.rows = static_cast<uint32_t>(grid.rows);
+  space.top = static_cast<float>((grid.top - grid.bottom) / grid.edge);
+  space.bottom = -space.top;
+  space.near = static_cast<float>(config.near);
+  space.surround = config.surroundKind();
+  return space;
+}
+
+VolumeModel::VolumeModel(Device& device, const VolumeConfig& config, const BlockGrid& grid)
+    : device_(able(device, config)),
+      config_(config),
+      grid_(grid),
+      frame_(sceneFrameOf(grid)),
+      space_(blockSpaceOf(grid, config)),
+      virtualGrid_(config.virtualGrid()),
+      attributes_(device, "attributes", config.attributeShape(), space_.blocks(),
+                  mix64(static_cast<uint64_t>(config.seed))),
+      proposals_(device, "proposals", config.proposalShape(), space_.blocks(),
+                 mix64(static_cast<uint64_t>(config.seed) + 1)),
+      deferred_(device, "deferred", initialDeferred(space_.blocks(), static_cast<uint64_t>(config.seed))) {}
+
+void VolumeModel::save(uint32_t block, TensorSet& tensors, bool withMoments) {
+  for (const ParameterGroup* group :
+       {&attributes_.table(block), &attributes_.network(block), &proposals_.table(block), &proposals_.network(block)}) {
+    tensors.add(device_, *group, withMoments);
+  }
+  if (block == 0) tensors.add(device_, deferred_, withMoments);
+}
+
+void VolumeModel::restore(uint32_t block, const fs::path& path, const Safetensors& file) {
+  for (ParameterGroup* group :
+       {&attributes_.table(block), &attributes_.network(block), &proposals_.table(block), &proposals_.network(block)}) {
+    loadGroup(device_, path, file, *group);
+  }
+  if (block == 0) loadGroup(device_, path, file, deferred_);
+}
+
+}  // namespace tessera

@@ -1,0 +1,190 @@
+#include "representations/volume/volume_trainer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/log.h"
+#include "base/random.h"
+#include "train/colour_loss.h"
+#include "train/schedule.h"
+
+namespace tessera {
+namespace {
+
+constexpr uint32_t kRoomPerWanted = 2;  // for steps that need more texels than the last one did
+constexpr uint32_t kLosses = 3;         // colour loss, squared error, S3IM
+constexpr uint32_t kGroup = 16;         // rays come in groups of so many, as S3IM wants them
+constexpr const char* kFormat = "tessera volume 1";
+
+PhotoRays::Settings raySettings(const VolumeConfig& config) {
+  PhotoRays::Settings settings;
+  settings.seed = static_cast<uint64_t>(config.seed);
+  settings.mostRays = static_cast<uint32_t>(config.mostRays);
+  settings.photoBudgetMiB = config.photoBudgetMiB;
+  settings.stepsPerPhoto = config.stepsPerPhoto;
+  settings.randomBackground = config.randomBackground;
+  settings.jitters = VolumePass::kRounds + 1;
+  return settings;
+}
+
+VolumePass::Room roomFor(const VolumeConfig& config) {
+  VolumePass::Room room;
+  room.rays = static_cast<uint32_t>(config.mostRays);
+  room.texels = kRoomPerWanted * static_cast<uint32_t>(config.texelsPerStep);
+  room.points = static_cast<uint32_t>(config.sparsityPoints);
+  room.training = true;
+  return room;
+}
+
+}  // namespace
+
+float cullThreshold(const VolumeConfig& config, double progress) {
+  if (progress < config.cullBegin) return 0;
+  const double way = std::min(1.0, (progress - config.cullBegin) / std::max(1e-9, config.cullEnd - config.cullBegin));
+  return static_cast<float>(config.cullFirst * std::pow(config.cullLast / config.cullFirst, way));
+}
+
+VolumeTrainer::VolumeTrainer(Device& device, const Capture& capture, const VolumeConfig& config, const BlockGrid& grid)
+    : device_(device),
+      config_(config),
+      model_(device, config, grid),
+      pass_(model_, roomFor(config)),
+      photoRays_(device, capture, model_.frame(), raySettings(config)),
+      exposures_(device, capture),
+      rays_(static_cast<uint32_t>(config.firstRays) / kGroup * kGroup) {
+  colourLossKind(config.loss);
+  const size_t rays = static_cast<size_t>(config.mostRays);
+  for (Array<float>* three : {&exposed_, &colourGradients_}) *three = device.array<float>(3 * rays);
+  opacityGradients_ = device.array<float>(rays);
+  losses_ = device.array<float>(kLosses);
+}
+
+VolumePass::LossScales VolumeTrainer::lossScales(double progress) const {
+  const double ramp = config_.rampShare > 0 ? std::min(1.0, progress / config_.rampShare) : 1;
+  const double perRay = 1.0 / rays_;
+  VolumePass::LossScales scales;
+  scales.interlevel = static_cast<float>(config_.interlevel * perRay);
+  scales.distortion = static_cast<float>(config_.distortion * ramp * perRay);
+  scales.opacity = static_cast<float>(config_.opacity * ramp * perRay);
+  scales.sparsity = static_cast<float>(config_.sparsity * ramp / std::max(1, config_.sparsityPoints));
+  return scales;
+}
+
+StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
+  // While the number of steps is not known, it is early.
+  const double progress = plannedSteps > 0 ? static_cast<double>(step) / static_cast<double>(plannedSteps) : 0;
+  photoRays_.draw(step, rays_);
+  const VolumeRays rays{rays_, photoRays_.origins(0, rays_), photoRays_.directions(0, rays_), photoRays_.jitters(), {}};
+  VolumePass::Options options;
+  options.anneal = static_cast<float>(std::min(1.0, (static_cast<double>(step) + 1) / 500));
+  options.minAlpha = cullThreshold(config_, progress);
+  options.seed = mix64(static_cast<uint64_t>(config_.seed) ^ (static_cast<uint64_t>(step) << 20));
+  options.keepProposals = step < config_.proposalWarmUp || step % config_.proposalEvery == 0;
+  pass_.forward(rays, options);
+  addColourGradients(step);
+  pass_.backward(rays, colourGradients_, opacityGradients_, lossScales(progress));
+  updateParameters(step, plannedSteps, options.keepProposals);
+
+  // The step is over: its counters may be read.
+  const std::vector<float> losses = device_.read(losses_.all()), inner = device_.read(pass_.losses());
+  StepReport report;
+  report.rays = rays_;
+  report.samples = device_.read(pass_.firstSample().part(rays_, 1))[0];
+  report.marched = rays_ * static_cast<uint32_t>(config_.firstIntervals + config_.secondIntervals);
+  report.loss = losses[0] + losses[2];
+  for (const float loss : inner) report.loss += loss;
+  double weight = 0;
+  for (const float w : photoRays_.batch().weights) weight += w;
+  report.squaredError = losses[1] / std::max(1.0, 3 * weight);
+  const double texels = std::max(1u, pass_.texelsWanted());
+  report.texels = static_cast<uint32_t>(texels);
+
+  // Texels grow more slowly than rays, so half of the way is enough.
+  const double wanted = rays_ * std::sqrt(config_.texelsPerStep / texels);
+  rays_ = static_cast<uint32_t>(std::clamp<double>(std::floor(wanted / kGroup), 1, config_.mostRays / kGroup)) * kGroup;
+  return report;
+}
+
+void VolumeTrainer::addColourGradients(int64_t step) {
+  const Count rays{rays_};
+  const Slice<const uint32_t> photoOfRay = photoRays_.photoOfRay(0, rays_);
+  const Slice<const float> backgrounds = photoRays_.backgrounds(0, rays_);
+  device_.run(ExposureForward{rays, pass_.colour(), pass_.opacity(), backgrounds, photoOfRay, exposures_.logGains(),
+                              exposed_});
+  ColourLoss loss;
+  loss.kind = colourLossKind(config_.loss);
+  loss.parameter = static_cast<float>(config_.lossParameter);
+  loss.scale = 1.0f / (3.0f * static_cast<float>(rays_));
+  loss.rays = rays;
+  loss.predicted = exposed_;
+  loss.target = photoRays_.targets(0, rays_);
+  loss.weights = photoRays_.weights(0, rays_);
+  loss.loss = losses_.part(0, 2);
+  loss.gradients = colourGradients_;
+  device_.run(loss);
+  if (config_.s3im > 0) {
+    S3imLoss similarity;
+    similarity.scale = static_cast<float>(config_.s3im);
+    similarity.rays = rays;
+    similarity.seed = mix64(static_cast<uint64_t>(config_.seed) + static_cast<uint64_t>(step));
+    similarity.predicted = exposed_;
+    similarity.target = loss.target;
+    similarity.weights = loss.weights;
+    similarity.loss = losses_.part(2, 1);
+    similarity.gradients = colourGradients_;
+    device_.run(similarity);
+  }
+  device_.run(ExposureBackward{rays, pass_.colour(), backgrounds, photoOfRay, exposures_.logGains(), colourGradients_,
+                               colourGradients_, opacityGradients_, exposures_.gradients()});
+}
+
+void VolumeTrainer::updateParameters(int64_t step, int64_t plannedSteps, bool proposals) {
+  RateSchedule schedule;
+  schedule.rate = config_.rate;
+  schedule.finalFactor = config_.finalRateFactor;
+  schedule.constantFraction = config_.constantRateShare;
+  const float rate = static_cast<float>(schedule.at(step, plannedSteps));
+  Adam table;
+  table.rate = rate;
+  table.skipZeroGradients = true;
+  table.l2 = static_cast<float>(config_.tableL2);
+  Adam network;
+  network.rate = rate;
+  network.skipZeroGradients = true;  // of blocks that no ray of the step came to
+  network.l2 = static_cast<float>(config_.networkL2);
+  for (uint32_t block = 0; block < model_.space().blocks(); ++block) {
+    model_.attributes().table(block).step(device_, table);
+    model_.attributes().network(block).step(device_, network);
+    if (!proposals) continue;
+    model_.proposals().table(block).step(device_, table);
+    model_.proposals().network(block).step(device_, network);
+  }
+  network.rate = rate * static_cast<float>(config_.deferredRateFactor);
+  model_.deferred().step(device_, network);
+  exposures_.step(step, static_cast<float>(config_.exposureRate / config_.rate) * rate, config_.exposure);
+}
+
+Bytes VolumeTrainer::save(uint32_t part) {
+  TensorSet tensors;
+  model_.save(part, tensors, true);
+  if (part == 0) {
+    exposures_.save(tensors);
+    tensors.add("rays", std::vector<uint32_t>{rays_});
+  }
+  return tensors.encode({{"format", kFormat}, {"device", device_.target()}, {"block", std::to_string(part)}});
+}
+
+void VolumeTrainer::restore(uint32_t part, const fs::path& path, const Safetensors& state) {
+  requireFormat(path, state, kFormat, "volume");
+  model_.restore(part, path, state);
+  if (part != 0) return;
+  warnOfOtherDevice(path, state, device_.target());
+  exposures_.restore(path, state);
+  const TensorView& rays = state.require(path, "rays", TensorType::u32);
+  if (rays.elements() != 1) throw Error(path.string(), "tensor rays", "is not one number", "train again");
+  const uint32_t groups = rays.as<uint32_t>()[0] / kGroup;
+  rays_ = std::clamp(groups, 1u, static_cast<uint32_t>(config_.mostRays) / kGroup) * kGroup;
+}
+
+}  // namespace tessera

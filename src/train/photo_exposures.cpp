@@ -1,0 +1,33 @@
+#include "train/photo_exposures.h"
+
+namespace tessera {
+
+PhotoExposures::PhotoExposures(Device& device, const Capture& capture)
+    : device_(device),
+      trainingPhotos_(capture.photosIn(Split::train)),
+      group_(device, "exposures", std::vector<float>(capture.photos.size() * 3)) {}
+
+void PhotoExposures::step(int64_t step, float rate, bool train) {
+  if (!train) {
+    device_.fillZero(group_.gradients.all());
+    return;
+  }
+  Adam adam;
+  adam.rate = rate;
+  adam.skipZeroGradients = true;
+  group_.step(device_, adam);
+  if (step % 16 == 15) centre();
+}
+
+void PhotoExposures::centre() {
+  std::vector<float> gains = device_.read(group_.values.all());
+  for (int channel = 0; channel < 3; ++channel) {
+    double mean = 0;
+    for (const int photo : trainingPhotos_) mean += gains[3 * photo + channel];
+    mean /= static_cast<double>(trainingPhotos_.size());
+    for (const int photo : trainingPhotos_) gains[3 * photo + channel] -= static_cast<float>(mean);
+  }
+  device_.write(group_.values.all(), std::span<const float>(gains));
+}
+
+}  // namespace tessera

@@ -1,0 +1,30 @@
+// An exposure for each photo, trained along: a gain per colour channel (log2). Only differences between photos can be
+// told, so their mean over the training photos is held at zero, which is what evaluation uses.
+#pragma once
+
+#include "field/parameters.h"
+#include "scene/capture.h"
+
+namespace tessera {
+
+class PhotoExposures {
+ public:
+  PhotoExposures(Device& device, const Capture& capture);
+
+  Slice<const float> logGains() const { return group_.values; }  // [photos][3]
+  Slice<float> gradients() { return group_.gradients; }
+  // One step of Adam; without `train` gradients are dropped.
+  void step(int64_t step, float rate, bool train);
+
+  void save(TensorSet& tensors) { tensors.add(device_, group_, true); }
+  void restore(const fs::path& path, const Safetensors& file) { loadGroup(device_, path, file, group_); }
+
+ private:
+  void centre();
+
+  Device& device_;
+  std::vector<int> trainingPhotos_;
+  ParameterGroup group_;
+};
+
+}  // namespace tessera

@@ -1,0 +1,70 @@
+#include "train/photo_rays.h"
+
+#include <cmath>
+
+#include "base/error.h"
+
+namespace tessera {
+namespace {
+
+constexpr double kMostPixelsOff = 2;  // an observation farther from its point's image teaches nothing
+constexpr float kGoldenRatio = 0.61803399f;
+
+std::vector<RayCamera> rayCameras(const Capture& capture, const SceneFrame& frame) {
+  std::vector<RayCamera> cameras;
+  for (const Photo& photo : capture.photos) {
+    cameras.push_back(makeRayCamera(capture.cameras[photo.camera], photo.worldFromCamera, frame));
+  }
+  return cameras;
+}
+
+std::vector<int> trainingPhotos(const Capture& capture) {
+  std::vector<int> photos = capture.photosIn(Split::train);
+  if (photos.empty()) {
+    throw Error(capture.root.string(), "transforms.json", "no photo is marked for training",
+                "import again with another --holdout");
+  }
+  return photos;
+}
+
+}  // namespace
+
+PhotoRays::PhotoRays(Device& device, const Capture& capture, const SceneFrame& frame, const Settings& settings)
+    : device_(device),
+      settings_(settings),
+      photos_(capture, trainingPhotos(capture),
+              {static_cast<size_t>(settings.photoBudgetMiB * 1048576), settings.stepsPerPhoto, settings.seed}),
+      known_(knownDistances(capture, frame, kMostPixelsOff)),
+      cameras_(device.arrayOf(rayCameras(capture, frame))),
+      photoOfRay_(device.array<uint32_t>(settings.mostRays)) {
+  const size_t rays = settings.mostRays;
+  for (Array<float>* one : {&weights_, &distances_}) *one = device.array<float>(rays);
+  jitter_ = device.array<float>(rays * settings.jitters);
+  pixels_ = device.array<float>(2 * rays);
+  for (Array<float>* three : {&targets_, &backgrounds_, &origins_, &directions_})
+    *three = device.array<float>(3 * rays);
+}
+
+void PhotoRays::draw(int64_t step, uint32_t rays) {
+  CHECK(rays <= settings_.mostRays);
+  drawRays(photos_.at(step), known_, {settings_.seed, settings_.randomBackground, settings_.knownShare}, step, rays,
+           batch_);
+  count_ = rays;
+  device_.write(photoOfRay_.all(), std::span<const uint32_t>(batch_.photoOfRay));
+  device_.write(pixels_.all(), std::span<const float>(batch_.pixels));
+  device_.write(targets_.all(), std::span<const float>(batch_.targets));
+  device_.write(backgrounds_.all(), std::span<const float>(batch_.backgrounds));
+  device_.write(weights_.all(), std::span<const float>(batch_.weights));
+  device_.write(distances_.all(), std::span<const float>(batch_.distances));
+  std::vector<float> jitter;
+  for (uint32_t k = 0; k < settings_.jitters; ++k) {
+    for (const float first : batch_.jitter) {
+      const float turned = first + kGoldenRatio * static_cast<float>(k);
+      jitter.push_back(turned - std::floor(turned));
+    }
+  }
+  device_.write(jitter_.all(), std::span<const float>(jitter));
+  device_.run(GenerateRays{{rays, {}}, cameras_, photoOfRay_, pixels_, origins_, directions_});
+}
+
+}  // namespace tessera

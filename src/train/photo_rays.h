@@ -1,0 +1,60 @@
+// The rays of one training step, on the device: through which pixels of which photos, and what they should see.
+#pragma once
+
+#include "compute/device.h"
+#include "train/photo_window.h"
+#include "train/ray_batch.h"
+#include "train/scene_frame.h"
+
+namespace tessera {
+
+class PhotoRays {
+ public:
+  struct Settings {
+    uint64_t seed = 0;
+    uint32_t mostRays = 1 << 14;
+    double photoBudgetMiB = 0;  // of decoded photos; 0: no limit
+    int stepsPerPhoto = 2;
+    bool randomBackground = true;
+    double knownShare = 0;  // of the rays, through sparse points
+    uint32_t jitters =
+        1;  // numbers a ray; the first is RayBatch's, the others differ from it by multiples of the golden ratio
+  };
+  // Trains on the capture's training photos; Error when there are none. Keeps references to `device` and `capture`.
+  PhotoRays(Device& device, const Capture& capture, const SceneFrame& frame, const Settings& settings);
+
+  // A function of seed, step and number of rays.
+  void draw(int64_t step, uint32_t rays);
+
+  const RayBatch& batch() const { return batch_; }
+  uint32_t count() const { return count_; }
+  // Rays [first, first + rays) of the step.
+  Slice<const uint32_t> photoOfRay(uint32_t first, uint32_t rays) const { return photoOfRay_.part(first, rays); }
+  Slice<const float> targets(uint32_t first, uint32_t rays) const { return three(targets_, first, rays); }
+  Slice<const float> backgrounds(uint32_t first, uint32_t rays) const { return three(backgrounds_, first, rays); }
+  Slice<const float> weights(uint32_t first, uint32_t rays) const { return weights_.part(first, rays); }
+  Slice<const float> distances(uint32_t first, uint32_t rays) const { return distances_.part(first, rays); }
+  Slice<const float> origins(uint32_t first, uint32_t rays) const { return three(origins_, first, rays); }
+  Slice<const float> directions(uint32_t first, uint32_t rays) const { return three(directions_, first, rays); }
+  Slice<const float> jitter(uint32_t first, uint32_t rays) const { return jitter_.part(first, rays); }
+  Slice<const float> jitters() const {
+    return jitter_.part(0, size_t{count_} * settings_.jitters);
+  }  // [jitters][count]
+
+ private:
+  static Slice<const float> three(const Array<float>& array, uint32_t first, uint32_t rays) {
+    return array.part(size_t{3} * first, size_t{3} * rays);
+  }
+
+  Device& device_;
+  Settings settings_;
+  PhotoWindow photos_;
+  std::vector<std::vector<KnownDistance>> known_;  // [photo]
+  RayBatch batch_;
+  uint32_t count_ = 0;
+  Array<RayCamera> cameras_;
+  Array<uint32_t> photoOfRay_;
+  Array<float> pixels_, targets_, backgrounds_, weights_, jitter_, distances_, origins_, directions_;
+};
+
+}  // namespace tessera
