@@ -1,6 +1,8 @@
 // Between the float buffers of the host and the plain double arrays of functions.h.
 #pragma once
 
+#include <algorithm>
+
 #include "compute/host_memory.h"
 #include "compute/reference/functions.h"
 
@@ -37,6 +39,12 @@ inline void store(const Slice<float>& slice, View values) {
   if (!slice) return;
   CHECK(values.size() <= slice.count);
   for (size_t i = 0; i < values.size(); ++i) hostPointer(slice)[i] = static_cast<float>(values[i]);
+}
+
+inline void store(const Slice<uint32_t>& slice, Indices values) {
+  if (!slice) return;
+  CHECK(values.size() <= slice.count);
+  std::copy(values.begin(), values.end(), hostPointer(slice));
 }
 
 inline void add(const Slice<float>& slice, View values) {
