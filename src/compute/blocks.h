@@ -9,8 +9,7 @@ namespace tessera {
 //   none     nothing is there
 //   border   blocks at the border own the half-strips and quadrants outside and are contracted (the paper)
 //   own      one more block, contracted, owns it; the blocks keep their whole resolution for the region. It is seen
-//   behind the
-//            region only: rays begin where they enter the box
+//            behind the region only: rays begin where they enter the box
 enum class Surround { none, border, own };
 
 // Scene units: half a block's edge is 1, the origin is the middle of all blocks. The box is [-columns, columns] ×
@@ -25,10 +24,9 @@ struct BlockSpace {
   uint32_t cells() const { return columns * rows; }
   uint32_t blocks() const { return cells() + (surround == Surround::own ? 1 : 0); }  // the surround is the last
 
-  // Local coordinates are q = (x - centre) / scale per axis: of a cell scale 1 about its middle (i.e. (2i + 1 -
-  // columns, 2j + 1
-  // - rows, 0)); of the surround scale (columns, rows, 1) about the origin. A bounded block's domain is [-1,1]³ and
-  // holds q; a contracted one's is [-2,2]³ and holds scene/contraction.h of q.
+  // Local coordinates are q = (x - centre) / scale per axis: of a cell scale 1 about its middle, (2i + 1 - columns,
+  // 2j + 1 - rows, 0); of the surround scale (columns, rows, 1) about the origin. A bounded block's domain is [-1,1]³
+  // and holds q; a contracted one's is [-2,2]³ and holds scene/contraction.h of q.
   struct Placement {
     float centre[3] = {0, 0, 0}, scale[3] = {1, 1, 1};
     bool contracted = false;
@@ -43,6 +41,7 @@ struct BlockSpace {
   // box and s in (3/4, 1] linear in 1/t from there to kFarthest; without, s is linear over the box.
   static constexpr double kBoxShare = 0.75, kFarthest = 1e6;
   double distanceAt(double s, double near, double far) const;
+  double shareAt(double t, double near, double far) const;  // s, its inverse
 };
 
 // Where rays enter and leave the box, and their first fence posts. Range: [max(near, entry), exit]; where that is empty
@@ -62,11 +61,11 @@ struct EnterScene {
 // Intervals between fence posts become samples at their middles (in t). Rows are written from `firstRow` on, ray after
 // ray, front to back. With `split`, intervals are cut where the ray passes from one block to another: at every distance
 // where its x or y is that of an inner cell wall, and with an own surround where it leaves the box (range[1]), if that
-// lies strictly inside an interval; so no sample straddles two blocks. The samples of a ray in one block are then a
-// segment. A sample belongs to the block of its middle. Positions are in [0,1]³ over the block's domain; a sample
-// outside the domain of a bounded block (no surround) keeps its row with step 0 and its position clamped. Ends beyond
-// `farOfRay` are cut off there: steps shrink, to 0 behind it; middles stay. Work in double; a ray without direction has
-// steps 0.
+// lies strictly inside an interval (in s); so no sample straddles two blocks. The samples of a ray in one block are
+// then a segment. A sample belongs to the block of its middle. Positions are in [0,1]³ over the block's domain; a
+// sample outside the domain of a bounded block (above or below an inner cell of a grid whose border is contracted)
+// keeps its row with step 0 and its position clamped. Ends beyond `farOfRay` are cut off there: steps shrink, to 0
+// behind it; middles stay. Work in double; a ray without direction is not cut, its steps and runtime steps are 0.
 struct BlockSamples {
   const BlockSpace& space;
   Count rays;
@@ -82,14 +81,13 @@ struct BlockSamples {
   Slice<uint32_t> rowCount;     // [1]: firstRow + samples made
   // Per sample:
   Slice<uint32_t> blockOfSample;
-  Slice<float> positions;  // [rows][3]
-  Slice<float> distances;  // t of the middle
-  Slice<float> steps;      // length in t
-  Slice<float> middles;    // optional: the mean of both ends in s
-  Slice<float> widths;     // optional: length in s
-  Slice<float>
-      runtimeSteps;  // optional: length in t of a renderer's step here along the ray: one texel of the domain, which is
-                     // 2 halfDomain / texels; by scene/contraction.h's contractDirection where contracted
+  Slice<float> positions;     // [rows][3]
+  Slice<float> distances;     // t of the middle
+  Slice<float> steps;         // length in t
+  Slice<float> middles;       // optional: the mean of both ends in s
+  Slice<float> widths;        // optional: length in s
+  Slice<float> runtimeSteps;  // optional: length in t of a renderer's step here along the ray: one texel of the domain,
+                              // which is 2 halfDomain / texels; by contractDirection where contracted
   uint32_t texels = 0;
   // With `split`, room for mostSegments(rays):
   Slice<uint32_t> firstSegment;          // [rays + 1]
@@ -99,13 +97,16 @@ struct BlockSamples {
 
   uint32_t mostCuts() const { return space.columns + space.rows - 2 + (space.surround == Surround::own ? 1 : 0); }
   uint32_t mostSamples(uint32_t rayCount) const { return rayCount * (intervals + (split ? mostCuts() : 0)); }
-  uint32_t mostSegments(uint32_t rayCount) const { return rayCount * (mostCuts() + 1); }
+  // One more with an own surround: rounding may put a short first interval before the box.
+  uint32_t mostSegments(uint32_t rayCount) const {
+    return rayCount * (mostCuts() + 1 + (space.surround == Surround::own ? 1 : 0));
+  }
 };
 
 // Random points for the sparsity loss: point p draws from RandomStream(seed, 0x5ba) at index 8 p + purpose. It lies in
 // block blocks[below(0)], evenly in its domain (purposes 1, 2, 3: x, y, z; a bounded block's z between bottom and top),
-// with a runtime step along a direction that is even over the sphere of local coordinates' scene units: z = 2 u4 - 1,
-// angle 2π u5.
+// with a runtime step along a direction that is even over the sphere, in scene units: z = 2 u4 - 1, angle 2π u5. For
+// that step contracted coordinates stay 1 / kFarthest away from ±2, where it has no end.
 struct BlockPoints {
   const BlockSpace& space;
   uint32_t points = 0;

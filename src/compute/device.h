@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "compute/adam.h"
+#include "compute/blocks.h"
 #include "compute/composite.h"
 #include "compute/encodings.h"
 #include "compute/hash_grid.h"
@@ -18,6 +19,7 @@
 #include "compute/memory.h"
 #include "compute/mlp.h"
 #include "compute/occupancy.h"
+#include "compute/proposals.h"
 #include "compute/rays.h"
 #include "compute/virtual_grid.h"
 
@@ -43,6 +45,13 @@ namespace tessera {
   X(DistinctTexels)             \
   X(VirtualGridForward)         \
   X(VirtualGridBackward)        \
+  X(EnterScene)                 \
+  X(BlockSamples)               \
+  X(BlockPoints)                \
+  X(GroupByBlock)               \
+  X(ScatterRows)                \
+  X(ResampleFences)             \
+  X(InterlevelLoss)             \
   X(CompositeForward)           \
   X(CompositeBackward)          \
   X(ColourLoss)                 \

@@ -111,6 +111,7 @@ Roofline measureRoofline(const RooflineOptions& options) {
   measureNetworks(recorder);
   measureHashGrids(recorder, grid);
   measureSampleStreams(recorder);
+  measureBlockStreams(recorder);
   measureParameterStreams(recorder);
   result.rows = recorder.takeRows();
   return result;

@@ -46,6 +46,7 @@ class RooflineRecorder {
 void measureNetworks(RooflineRecorder& recorder);
 void measureHashGrids(RooflineRecorder& recorder, const HashGrid& grid);
 void measureSampleStreams(RooflineRecorder& recorder);     // encodings, marching, compaction, compositing
+void measureBlockStreams(RooflineRecorder& recorder);      // sampling through blocks and proposals
 void measureParameterStreams(RooflineRecorder& recorder);  // losses, exposure, occupancy, Adam
 
 }  // namespace tessera

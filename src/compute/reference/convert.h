@@ -1,6 +1,8 @@
 // Between the float buffers of the host and the plain double arrays of functions.h.
 #pragma once
 
+#include <algorithm>
+
 #include "compute/host_memory.h"
 #include "compute/reference/functions.h"
 
@@ -47,6 +49,12 @@ inline void store(const Slice<float>& slice, View values) {
 
 inline void storeRows(const Slice<float>& slice, size_t columns, const HostRows& rows, View values) {
   if (slice) store(slice.part(columns * rows.begin, columns * rows.count()), values);
+}
+
+inline void store(const Slice<uint32_t>& slice, Indices values) {
+  if (!slice) return;
+  CHECK(values.size() <= slice.count);
+  std::copy(values.begin(), values.end(), hostPointer(slice));
 }
 
 inline void add(const Slice<float>& slice, View values) {

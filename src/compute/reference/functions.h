@@ -5,15 +5,18 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
 #include "compute/adam.h"
+#include "compute/blocks.h"
 #include "compute/composite.h"
 #include "compute/hash_grid.h"
 #include "compute/losses.h"
 #include "compute/mlp.h"
 #include "compute/occupancy.h"
+#include "compute/proposals.h"
 #include "compute/rays.h"
 #include "compute/virtual_grid.h"
 
@@ -22,6 +25,11 @@ namespace tessera::reference {
 using Doubles = std::vector<double>;
 using View = std::span<const double>;
 using Indices = std::span<const uint32_t>;
+
+struct LossAndGradients {
+  double loss = 0;
+  Doubles gradients;
+};
 
 // hash_grid.cpp
 Doubles hashGridForward(const HashGrid& grid, View positions, View table);  // [n][columns]
@@ -81,6 +89,36 @@ double marchStepAtCell(const MarchSpace& space, uint32_t cell);
 void occupancyUpdate(const MarchSpace& space, double decay, double threshold, Indices cells, View logDensity,
                      std::span<double> grid, std::span<uint32_t> occupancy);
 
+// blocks.cpp: one ray, one point
+std::array<double, 2> rangeInScene(const BlockSpace& space, const Point& origin, const Point& direction);
+Doubles firstFences(uint32_t intervals, double jitter);
+struct FencedRay {
+  Point origin{}, direction{};
+  double near = 0, far = 0;  // the range
+  double farthest = std::numeric_limits<double>::infinity();
+  Doubles fences;  // in s
+};
+struct BlockSample {
+  uint32_t block = 0;
+  Point position{};
+  double distance = 0, step = 0;
+  double middle = 0, width = 0;  // in s
+  double runtimeStep = 0;
+};
+// `texels` 0: no runtime steps.
+std::vector<BlockSample> blockSamples(const BlockSpace& space, const FencedRay& ray, bool split, uint32_t texels);
+struct BlockPoint {
+  uint32_t block = 0;
+  Point position{};
+  double runtimeStep = 0;
+};
+BlockPoint blockPoint(const BlockSpace& space, Indices blocks, uint32_t texels, uint64_t seed, uint32_t point);
+
+// proposals.cpp: one ray
+Doubles resampledFences(View fences, View weights, uint32_t after, double anneal, double padding, double jitter);
+// One ray of InterlevelLoss, unscaled; gradients of `weights`, those of the proposal.
+LossAndGradients interlevelLossOfRay(View fences, View weights, View middles, View widths, View sampleWeights);
+
 // composite.cpp: one ray
 struct RaySamples {
   View x, steps, distances, colours;  // [n], [n], [n], [n][3]
@@ -117,10 +155,6 @@ struct ValueAndSlope {
 };
 ValueAndSlope colourLoss(ColourLossKind kind, double parameter, double residual);
 double warpDistance(double t);  // MERF's g
-struct LossAndGradients {
-  double loss = 0;
-  Doubles gradients;
-};
 // On normalised fence posts directly: bin i is [fences[i], fences[i+1]]. By the double sum.
 LossAndGradients distortionOfFences(View fences, View weights);
 // One ray of DistortionLoss, unscaled; intervals need not touch.

@@ -7,36 +7,17 @@
 #include "compute/reference/convert.h"
 #include "compute/reference/functions.h"
 #include "compute/reference/operations.h"
+#include "scene/contraction.h"
 #include "scene/lens.h"
 
 namespace tessera::reference {
-namespace {
-
-int longestAxis(const Point& x) {
-  int axis = 0;
-  for (int a = 1; a < 3; ++a)
-    if (std::abs(x[a]) > std::abs(x[axis])) axis = a;
-  return axis;
-}
-
-}  // namespace
 
 Point contract(const Point& x) {
-  const int axis = longestAxis(x);
-  const double m = std::abs(x[axis]);
-  if (m <= 1) return x;
-  Point y = {x[0] / m, x[1] / m, x[2] / m};
-  y[axis] = std::copysign(2 - 1 / m, x[axis]);
-  return y;
+  return tessera::contract<double>(x);
 }
 
 Point uncontract(const Point& y) {
-  const int axis = longestAxis(y);
-  if (std::abs(y[axis]) <= 1) return y;
-  const double m = 1 / (2 - std::abs(y[axis]));
-  Point x = {y[0] * m, y[1] * m, y[2] * m};
-  x[axis] = std::copysign(m, y[axis]);
-  return x;
+  return tessera::uncontract<double>(y);
 }
 
 Point gridFromScene(const MarchSpace& space, const Point& x) {

@@ -95,12 +95,12 @@ TEST(FieldTrainer, MakesTheSameBytesOnAnyNumberOfThreads) {
   for (const int samplesPerPass : {8192, 1000}) {  // one pass, and nine of which some have no ray at first
     config.samplesPerPass = samplesPerPass;
     config.firstRays = samplesPerPass == 1000 ? 4 : 512;
-    const Bytes one = TrainedCube(scene, config, 80, 1).trainer->save();
-    EXPECT_EQ(one, TrainedCube(scene, config, 80, 2).trainer->save());
-    EXPECT_EQ(one, TrainedCube(scene, config, 80, 5).trainer->save());
+    const Bytes one = TrainedCube(scene, config, 80, 1).trainer->save(0);
+    EXPECT_EQ(one, TrainedCube(scene, config, 80, 2).trainer->save(0));
+    EXPECT_EQ(one, TrainedCube(scene, config, 80, 5).trainer->save(0));
     FieldConfig other = config;
     other.seed = 1;
-    EXPECT_NE(one, TrainedCube(scene, other, 80, 2).trainer->save());
+    EXPECT_NE(one, TrainedCube(scene, other, 80, 2).trainer->save(0));
   }
 }
 
@@ -134,12 +134,12 @@ TEST(FieldTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
       if (!state.empty()) {
         const auto file = decodeSafetensors(state);
         ASSERT_TRUE(file);
-        part.trainer->restore("state", *file);
+        part.trainer->restore(0, "state", *file);
       }
       for (; step < until; ++step) part.trainer->step(step, kSteps);
-      state = part.trainer->save();
+      state = part.trainer->save(0);
     }
-    EXPECT_EQ(state, unbroken.trainer->save());
+    EXPECT_EQ(state, unbroken.trainer->save(0));
   }
 }
 
@@ -154,7 +154,7 @@ TEST(FieldTrainer, DrawsFewerRaysWhenTheyDoNotFit) {
   const StepReport first = trained.trainer->step(0, 0);
   EXPECT_GT(first.rays, 0u);
   EXPECT_LT(first.rays, 4096u);
-  const auto file = decodeSafetensors(trained.trainer->save());
+  const auto file = decodeSafetensors(trained.trainer->save(0));
   ASSERT_TRUE(file);
   EXPECT_LT(file->require("state", "rays", TensorType::u32).as<uint32_t>()[0], first.rays + 8);
 }
@@ -196,7 +196,7 @@ TEST(FieldTrainer, TrainsOnAllPhotosWhenFewFitTheBudget) {
   config.stepsPerPhoto = 1;
   config.exposure = true;  // each photo's exposure counts its steps
   TrainedCube trained(scene, config, 200);
-  const auto file = decodeSafetensors(trained.trainer->save());
+  const auto file = decodeSafetensors(trained.trainer->save(0));
   ASSERT_TRUE(file);
   const auto counts = file->require("state", "exposures.count", TensorType::u32).as<uint32_t>();
   for (size_t i = 0; i < scene.capture().photos.size(); ++i) {
@@ -232,7 +232,7 @@ TEST(FieldTrainer, RecoversTheExposuresOfPhotos) {
   config.exposure = true;
   config.exposureRate = 8e-3;
   TrainedCube trained(scene, config, 400);
-  const auto file = decodeSafetensors(trained.trainer->save());
+  const auto file = decodeSafetensors(trained.trainer->save(0));
   ASSERT_TRUE(file);
   const auto gains = file->require("state", "exposures", TensorType::f32).as<float>();
   const std::vector<int> photos = scene.capture().photosIn(Split::train);
@@ -254,7 +254,7 @@ TEST(FieldTrainer, LeavesExposuresAloneWhenToldTo) {
   FieldConfig config = cubeConfig();
   config.exposure = false;
   TrainedCube trained(scene, config, 20);
-  const auto file = decodeSafetensors(trained.trainer->save());
+  const auto file = decodeSafetensors(trained.trainer->save(0));
   ASSERT_TRUE(file);
   for (const float gain : file->require("state", "exposures", TensorType::f32).as<float>()) EXPECT_EQ(gain, 0);
 }
@@ -281,7 +281,7 @@ TEST(FieldTrainer, RefusesWhatItCannotTrain) {
 TEST(FieldTrainer, RefusesCheckpointsThatAreNotItsOwn) {
   const CubeScene scene;
   TrainedCube trained(scene, cubeConfig(), 2);
-  const Bytes bytes = trained.trainer->save();
+  const Bytes bytes = trained.trainer->save(0);
   for (int change = 0; change < 3; ++change) {
     FieldConfig config = cubeConfig();
     if (change == 0) config.gridLog2Size = 12;
@@ -290,18 +290,18 @@ TEST(FieldTrainer, RefusesCheckpointsThatAreNotItsOwn) {
     TrainedCube other(scene, config, 0);
     const auto file = decodeSafetensors(bytes);
     ASSERT_TRUE(file);
-    const std::string error = errorOf([&] { other.trainer->restore("some/step-2.safetensors", *file); });
+    const std::string error = errorOf([&] { other.trainer->restore(0, "some/step-2.safetensors", *file); });
     EXPECT_NE(error.find("some/step-2.safetensors"), std::string::npos) << change << ": " << error;
   }
   CubeScene::Options more;
   more.photos = 49;
   const CubeScene larger(more);
   TrainedCube another(larger, cubeConfig(), 0);
-  EXPECT_NE(errorOf([&] { another.trainer->restore("s", *decodeSafetensors(bytes)); }), "no error");
+  EXPECT_NE(errorOf([&] { another.trainer->restore(0, "s", *decodeSafetensors(bytes)); }), "no error");
   const std::vector<float> zero = {0};
   const auto foreign =
       decodeSafetensors(encodeSafetensors({{"table", {TensorType::f32, {1}, std::as_bytes(std::span(zero))}}}));
-  EXPECT_NE(errorOf([&] { another.trainer->restore("s", *foreign); }).find("--method field"), std::string::npos);
+  EXPECT_NE(errorOf([&] { another.trainer->restore(0, "s", *foreign); }).find("--method field"), std::string::npos);
 }
 
 }  // namespace

@@ -1,0 +1,53 @@
+#include "compute/blocks.h"
+
+#include <cmath>
+
+namespace tessera {
+namespace {
+
+// Of [-count, count] cut into `count` cells.
+uint32_t clampedCell(double x, uint32_t count) {
+  const double cell = (x + count) / 2;
+  if (!(cell > 0)) return 0;
+  return cell < count ? static_cast<uint32_t>(cell) : count - 1;
+}
+
+}  // namespace
+
+BlockSpace::Placement BlockSpace::placement(uint32_t block) const {
+  CHECK(block < blocks());
+  Placement made;
+  if (block == cells()) {
+    made.scale[0] = static_cast<float>(columns);
+    made.scale[1] = static_cast<float>(rows);
+    made.contracted = true;
+    return made;
+  }
+  const uint32_t i = block % columns, j = block / columns;
+  made.centre[0] = static_cast<float>(2 * i + 1) - static_cast<float>(columns);
+  made.centre[1] = static_cast<float>(2 * j + 1) - static_cast<float>(rows);
+  const bool atBorder = i == 0 || j == 0 || i + 1 == columns || j + 1 == rows;
+  made.contracted = surround == Surround::border && atBorder;
+  return made;
+}
+
+uint32_t BlockSpace::blockAt(double x, double y, double z) const {
+  const bool inBox = std::abs(x) <= columns && std::abs(y) <= rows && z >= bottom && z <= top;
+  if (surround == Surround::own && !inBox) return cells();
+  return clampedCell(x, columns) + columns * clampedCell(y, rows);
+}
+
+double BlockSpace::distanceAt(double s, double near, double far) const {
+  if (surround == Surround::none) return near + s * (far - near);
+  if (s <= kBoxShare) return near + s / kBoxShare * (far - near);
+  const double u = (s - kBoxShare) / (1 - kBoxShare);
+  return 1 / ((1 - u) / far + u / kFarthest);
+}
+
+double BlockSpace::shareAt(double t, double near, double far) const {
+  if (surround == Surround::none) return (t - near) / (far - near);
+  if (t <= far) return kBoxShare * ((t - near) / (far - near));
+  return kBoxShare + (1 - kBoxShare) * ((1 / far - 1 / t) / (1 / far - 1 / kFarthest));
+}
+
+}  // namespace tessera

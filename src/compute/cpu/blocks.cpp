@@ -1,0 +1,393 @@
+#include "compute/blocks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "base/random.h"
+#include "compute/cpu/kernels.h"
+#include "compute/host_memory.h"
+#include "scene/contraction.h"
+
+namespace tessera::cpu {
+namespace {
+
+constexpr size_t kRaysPerTask = 64;
+constexpr size_t kRowsPerTask = 4096;
+
+// A BlockSpace with what each sample needs of it.
+class Blocks {
+ public:
+  struct Place {
+    double centre[3], inverseScale[3], half, texel;
+    bool contracted;
+  };
+
+  Blocks(const BlockSpace& space, uint32_t texels)
+      : space(space), width_(space.columns), depth_(space.rows), own_(space.surround == Surround::own) {
+    for (uint32_t block = 0; block < space.blocks(); ++block) {
+      const BlockSpace::Placement placement = space.placement(block);
+      Place& place = places_.emplace_back();
+      for (int a = 0; a < 3; ++a) {
+        place.centre[a] = placement.centre[a];
+        place.inverseScale[a] = 1.0 / placement.scale[a];
+      }
+      place.half = placement.halfDomain();
+      place.texel = texels > 0 ? 2 * place.half / texels : 0;
+      place.contracted = placement.contracted;
+    }
+  }
+
+  uint32_t at(double x, double y, double z) const {
+    const bool inBox = std::abs(x) <= width_ && std::abs(y) <= depth_ && z >= space.bottom && z <= space.top;
+    if (own_ && !inBox) return space.cells();
+    const double i = (x + width_) / 2, j = (y + depth_) / 2;
+    const uint32_t column = i > 0 ? static_cast<uint32_t>(static_cast<int32_t>(std::min(i, width_ - 1))) : 0;
+    const uint32_t row = j > 0 ? static_cast<uint32_t>(static_cast<int32_t>(std::min(j, depth_ - 1))) : 0;
+    return column + space.columns * row;
+  }
+  const Place& place(uint32_t block) const { return places_[block]; }
+
+  const BlockSpace& space;
+
+ private:
+  double width_, depth_;
+  bool own_;
+  std::vector<Place> places_;
+};
+
+double lengthOf(const Triple<double>& x) {
+  return std::sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
+}
+
+float runtimeStepAt(const Blocks::Place& place, const Triple<double>& q, const double direction[3]) {
+  Triple<double> along;
+  for (int a = 0; a < 3; ++a) along[a] = direction[a] * place.inverseScale[a];
+  if (place.contracted) along = contractDirection(q, along);
+  const double speed = lengthOf(along);
+  return speed > 0 ? static_cast<float>(place.texel / speed) : 0;
+}
+
+struct Ray {
+  double origin[3], direction[3], near, far, farthest;
+  const float* fences;
+
+  Ray(const BlockSamples& a, size_t ray) : fences(hostPointer(a.fences) + ray * (a.intervals + size_t{1})) {
+    for (int axis = 0; axis < 3; ++axis) {
+      origin[axis] = hostPointer(a.origins)[3 * ray + axis];
+      direction[axis] = hostPointer(a.directions)[3 * ray + axis];
+    }
+    near = hostPointer(a.range)[2 * ray];
+    far = hostPointer(a.range)[2 * ray + 1];
+    farthest = a.farOfRay ? hostPointer(a.farOfRay)[ray] : std::numeric_limits<double>::infinity();
+  }
+  bool exists() const { return direction[0] != 0 || direction[1] != 0 || direction[2] != 0; }
+};
+
+// A wall that a ray passes within one of its intervals.
+struct Cut {
+  double s, t;
+  uint32_t interval;
+};
+
+// Front to back, each place once.
+void findCuts(const BlockSamples& a, const Ray& ray, std::vector<Cut>& cuts) {
+  cuts.clear();
+  if (!a.split || !ray.exists()) return;
+  const float* const end = ray.fences + a.intervals + 1;
+  const auto consider = [&](double t) {
+    const double s = a.space.shareAt(t, ray.near, ray.far);
+    const float* const next = std::upper_bound(ray.fences, end, s);
+    if (next == ray.fences || next == end || next[-1] == s) return;
+    const auto place =
+        std::lower_bound(cuts.begin(), cuts.end(), s, [](const Cut& cut, double b) { return cut.s < b; });
+    if (place != cuts.end() && place->s == s) return;
+    cuts.insert(place, {s, t, static_cast<uint32_t>(next - 1 - ray.fences)});
+  };
+  for (int axis : {0, 1}) {
+    const int cells = static_cast<int>(axis == 0 ? a.space.columns : a.space.rows);
+    const double o = ray.origin[axis], d = ray.direction[axis];
+    if (d == 0) continue;
+    for (int wall = 2 - cells; wall < cells; wall += 2) {
+      const double t = (wall - o) / d;
+      if (t > 0) consider(t);
+    }
+  }
+  if (a.space.surround == Surround::own) consider(ray.far);
+}
+
+// Both ends of each of a ray's intervals, cuts among them: s and t have one element more than there are samples.
+uint32_t findEnds(const BlockSamples& a, const Ray& ray, const std::vector<Cut>& cuts, double* s, double* t) {
+  constexpr double kShare = BlockSpace::kBoxShare;
+  const uint32_t posts = a.intervals + 1, samples = a.intervals + static_cast<uint32_t>(cuts.size());
+  // Each post moves back by the cuts in front of it.
+  uint32_t done = 0;
+  for (size_t c = 0; c <= cuts.size(); ++c) {
+    const uint32_t stop = c < cuts.size() ? cuts[c].interval + 1 : posts;
+    for (; done < stop; ++done) s[done + c] = ray.fences[done];
+    if (c == cuts.size()) break;
+    s[done + c] = cuts[c].s;
+  }
+  // As BlockSpace::distanceAt, in two loops without a branch.
+  const double length = ray.far - ray.near;
+  if (a.space.surround == Surround::none) {
+    for (uint32_t i = 0; i <= samples; ++i) t[i] = ray.near + s[i] * length;
+  } else {
+    const auto inBox = static_cast<uint32_t>(std::upper_bound(s, s + samples + 1, kShare) - s);
+    for (uint32_t i = 0; i < inBox; ++i) t[i] = ray.near + s[i] / kShare * length;
+    for (uint32_t i = inBox; i <= samples; ++i) {
+      const double u = (s[i] - kShare) / (1 - kShare);
+      t[i] = 1 / ((1 - u) / ray.far + u / BlockSpace::kFarthest);
+    }
+  }
+  for (size_t c = 0; c < cuts.size(); ++c) t[cuts[c].interval + 1 + c] = cuts[c].t;  // exactly
+  return samples;
+}
+
+// Writes the rows of one ray; returns how many segments they are.
+uint32_t writeSamples(const BlockSamples& a, const Blocks& blocks, const Ray& ray, const double* s, const double* t,
+                      uint32_t samples, size_t row) {
+  uint32_t* const blockOfSample = hostPointer(a.blockOfSample) + row;
+  float* const positions = hostPointer(a.positions) + 3 * row;
+  float* const distances = hostPointer(a.distances) + row;
+  float* const steps = hostPointer(a.steps) + row;
+  float* const middles = a.middles ? hostPointer(a.middles) + row : nullptr;
+  float* const widths = a.widths ? hostPointer(a.widths) + row : nullptr;
+  float* const runtimeSteps = a.runtimeSteps ? hostPointer(a.runtimeSteps) + row : nullptr;
+  const double farthest = ray.exists() ? ray.farthest : 0;  // no step passes it
+  for (uint32_t i = 0; i < samples; ++i) {
+    distances[i] = static_cast<float>((t[i] + t[i + 1]) / 2);
+    const double step = std::min(t[i + 1], farthest) - std::min(t[i], farthest);
+    steps[i] = static_cast<float>(std::max(0.0, step));
+  }
+  for (uint32_t i = 0; middles && i < samples; ++i) middles[i] = static_cast<float>((s[i] + s[i + 1]) / 2);
+  for (uint32_t i = 0; widths && i < samples; ++i) widths[i] = static_cast<float>(s[i + 1] - s[i]);
+  uint32_t segments = 0, before = std::numeric_limits<uint32_t>::max();
+  const Blocks::Place* place = nullptr;
+  float texelStep = 0;  // of a bounded block: the same all along the ray
+  for (uint32_t i = 0; i < samples; ++i) {
+    const double middle = (t[i] + t[i + 1]) / 2;
+    const double x[3] = {ray.origin[0] + middle * ray.direction[0], ray.origin[1] + middle * ray.direction[1],
+                         ray.origin[2] + middle * ray.direction[2]};
+    const uint32_t block = blocks.at(x[0], x[1], x[2]);
+    if (block != before) {
+      before = block;
+      ++segments;
+      place = &blocks.place(block);
+      if (runtimeSteps && !place->contracted) texelStep = runtimeStepAt(*place, {}, ray.direction);
+    }
+    blockOfSample[i] = block;
+    Triple<double> q;
+    for (int axis = 0; axis < 3; ++axis) q[axis] = (x[axis] - place->centre[axis]) * place->inverseScale[axis];
+    if (place->contracted) {
+      if (runtimeSteps) runtimeSteps[i] = runtimeStepAt(*place, q, ray.direction);
+      q = contract(q);
+    } else {
+      if (runtimeSteps) runtimeSteps[i] = texelStep;
+      const double farthestOut = std::max(std::max(std::abs(q[0]), std::abs(q[1])), std::abs(q[2]));
+      if (farthestOut > 1) steps[i] = 0;
+    }
+    const double scale = 0.5 / place->half;
+    for (int axis = 0; axis < 3; ++axis) {
+      positions[3 * i + axis] = static_cast<float>(std::min(1.0, std::max(0.0, q[axis] * scale + 0.5)));
+    }
+  }
+  return segments;
+}
+
+// Counts in offsets[1 .. n] to running ends, from `start` on.
+void countsToOffsets(uint32_t* offsets, size_t n, uint32_t start) {
+  offsets[0] = start;
+  for (size_t i = 0; i < n; ++i) offsets[i + 1] += offsets[i];
+}
+
+// The segments of all rays, where `firstSegment` already says how many each has.
+void writeSegments(Context& context, const BlockSamples& a, size_t rays) {
+  const uint32_t* firstSample = hostPointer(a.firstSample);
+  const uint32_t* firstSegment = hostPointer(a.firstSegment);
+  const uint32_t* blockOfSample = hostPointer(a.blockOfSample);
+  uint32_t* firstSampleOfSegment = hostPointer(a.firstSampleOfSegment);
+  uint32_t* blockOfSegment = hostPointer(a.blockOfSegment);
+  uint32_t* rayOfSegment = hostPointer(a.rayOfSegment);
+  *hostPointer(a.segmentCount) = firstSegment[rays];
+  firstSampleOfSegment[firstSegment[rays]] = firstSample[rays];
+  context.pool.forRanges(rays, 4 * kRaysPerTask, [&](size_t begin, size_t end) {
+    for (size_t ray = begin; ray < end; ++ray) {
+      uint32_t segment = firstSegment[ray];
+      for (uint32_t i = firstSample[ray]; i < firstSample[ray + 1]; ++i) {
+        if (i > firstSample[ray] && blockOfSample[i] == blockOfSample[i - 1]) continue;
+        firstSampleOfSegment[segment] = i;
+        blockOfSegment[segment] = blockOfSample[i];
+        rayOfSegment[segment++] = static_cast<uint32_t>(ray);
+      }
+    }
+  });
+}
+
+}  // namespace
+
+void run(Context& context, const EnterScene& a) {
+  const BlockSpace& space = a.space;
+  const float* origins = hostPointer(a.origins);
+  const float* directions = hostPointer(a.directions);
+  const float* jitter = hostPointer(a.jitter);
+  float* range = hostPointer(a.range);
+  float* fences = hostPointer(a.fences);
+  const double low[3] = {-1.0 * space.columns, -1.0 * space.rows, space.bottom};
+  const double high[3] = {1.0 * space.columns, 1.0 * space.rows, space.top};
+  const double perInterval = 1.0 / a.intervals;
+  context.pool.forRanges(hostCount(a.rays), kRaysPerTask, [&](size_t begin, size_t end) {
+    for (size_t ray = begin; ray < end; ++ray) {
+      const float* o = origins + 3 * ray;
+      const float* d = directions + 3 * ray;
+      const bool exists = d[0] != 0 || d[1] != 0 || d[2] != 0;
+      double enter = space.near, leave = exists ? std::numeric_limits<double>::infinity() : 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        if (d[axis] == 0) {
+          if (o[axis] < low[axis] || o[axis] > high[axis]) leave = 0;
+          continue;
+        }
+        const double toLow = (low[axis] - o[axis]) / d[axis], toHigh = (high[axis] - o[axis]) / d[axis];
+        enter = std::max(enter, std::min(toLow, toHigh));
+        leave = std::min(leave, std::max(toLow, toHigh));
+      }
+      if (!(enter < leave)) {
+        enter = leave = space.near;
+        if (exists && space.surround != Surround::none) leave = enter + 1 + lengthOf({o[0], o[1], o[2]});
+      }
+      range[2 * ray] = static_cast<float>(enter);
+      range[2 * ray + 1] = static_cast<float>(leave);
+      float* const posts = fences + ray * (a.intervals + size_t{1});
+      const double offset = (jitter ? jitter[ray] : 0.5) - 0.5;
+      for (uint32_t i = 1; i < a.intervals; ++i) posts[i] = static_cast<float>((i + offset) * perInterval);
+      posts[0] = 0;
+      posts[a.intervals] = 1;
+    }
+  });
+}
+
+void run(Context& context, const BlockSamples& a) {
+  const size_t rays = hostCount(a.rays), tasks = (rays + kRaysPerTask - 1) / kRaysPerTask;
+  const size_t mostEnds = size_t{a.mostSamples(1)} + 1;
+  const Blocks blocks(a.space, a.texels);
+  uint32_t* firstSample = hostPointer(a.firstSample);
+  uint32_t* firstSegment = hostPointer(a.firstSegment);
+  const auto forRays = [&](size_t task, const auto& visit) {
+    for (size_t ray = task * kRaysPerTask; ray < std::min(rays, (task + 1) * kRaysPerTask); ++ray) visit(ray);
+  };
+  context.pool.run(tasks, [&](size_t task, int) {
+    std::vector<Cut> cuts;
+    cuts.reserve(a.mostCuts());
+    forRays(task, [&](size_t ray) {
+      findCuts(a, Ray(a, ray), cuts);
+      firstSample[ray + 1] = a.intervals + static_cast<uint32_t>(cuts.size());  // a count for now
+    });
+  });
+  countsToOffsets(firstSample, rays, a.firstRow);
+  *hostPointer(a.rowCount) = firstSample[rays];
+  context.pool.run(tasks, [&](size_t task, int) {
+    std::vector<Cut> cuts;
+    cuts.reserve(a.mostCuts());
+    std::vector<double> ends(2 * mostEnds);  // of one ray: in s, then in t
+    forRays(task, [&](size_t index) {
+      const Ray ray(a, index);
+      findCuts(a, ray, cuts);
+      double *const s = ends.data(), *const t = s + mostEnds;
+      const uint32_t samples = findEnds(a, ray, cuts, s, t);
+      const uint32_t segments = writeSamples(a, blocks, ray, s, t, samples, firstSample[index]);
+      if (a.split) firstSegment[index + 1] = segments;
+    });
+  });
+  if (!a.split) return;
+  countsToOffsets(firstSegment, rays, 0);
+  writeSegments(context, a, rays);
+}
+
+void run(Context& context, const BlockPoints& a) {
+  const Blocks blocks(a.space, a.texels);
+  const uint32_t* chosen = hostPointer(a.blocks);
+  uint32_t* blockOfSample = hostPointer(a.blockOfSample);
+  float* positions = hostPointer(a.positions);
+  float* runtimeSteps = hostPointer(a.runtimeSteps);
+  const RandomStream random(a.seed, 0x5ba);
+  if (a.points > 0) CHECK(a.blocks.count > 0u);
+  context.pool.forRanges(a.points, kRowsPerTask, [&](size_t begin, size_t end) {
+    for (size_t p = begin; p < end; ++p) {
+      const uint64_t first = 8 * uint64_t{p};
+      const uint32_t block = chosen[random.below(first, static_cast<uint32_t>(a.blocks.count))];
+      const Blocks::Place& place = blocks.place(block);
+      blockOfSample[p] = block;
+      Triple<double> y;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double u = random.uniform(first + 1 + axis);
+        y[axis] = place.half * (2 * u - 1);
+        if (axis == 2 && !place.contracted) {
+          y[axis] = a.space.bottom + u * (static_cast<double>(a.space.top) - a.space.bottom);
+        }
+        positions[3 * p + axis] = static_cast<float>(y[axis] * (0.5 / place.half) + 0.5);
+      }
+      const double z = 2.0 * random.uniform(first + 4) - 1, angle = 2 * std::numbers::pi * random.uniform(first + 5);
+      const double across = std::sqrt(1 - z * z);
+      const double direction[3] = {across * std::cos(angle), across * std::sin(angle), z};
+      const double most = place.half - 1 / BlockSpace::kFarthest;
+      for (double& coordinate : y) coordinate = std::clamp(coordinate, -most, most);
+      runtimeSteps[p] = runtimeStepAt(place, place.contracted ? uncontract(y) : y, direction);
+    }
+  });
+}
+
+void run(Context& context, const GroupByBlock& a) {
+  const uint32_t* blockOfSample = hostPointer(a.blockOfSample);
+  uint32_t* firstOfBlock = hostPointer(a.firstOfBlock);
+  uint32_t* source = hostPointer(a.source);
+  const size_t samples = hostCount(a.samples), tasks = (samples + kRowsPerTask - 1) / kRowsPerTask;
+  std::vector<uint32_t> places(tasks * a.blocks);  // [tasks][blocks]: counts, then where a task's rows begin
+  context.pool.run(tasks, [&](size_t task, int) {
+    uint32_t* const counts = places.data() + task * a.blocks;
+    const size_t begin = task * kRowsPerTask, end = std::min(samples, begin + kRowsPerTask);
+    uint32_t last = 0;
+    for (size_t row = begin; row < end; ++row) last = std::max(last, blockOfSample[row]);
+    CHECK(last < a.blocks);
+    for (size_t row = begin; row < end; ++row) ++counts[blockOfSample[row]];
+  });
+  uint32_t sum = 0;
+  for (uint32_t block = 0; block < a.blocks; ++block) {
+    firstOfBlock[block] = sum;
+    for (size_t task = 0; task < tasks; ++task) {
+      const uint32_t count = places[task * a.blocks + block];
+      places[task * a.blocks + block] = sum;
+      sum += count;
+    }
+  }
+  firstOfBlock[a.blocks] = sum;
+  context.pool.run(tasks, [&](size_t task, int) {
+    uint32_t* const next = places.data() + task * a.blocks;
+    for (size_t row = task * kRowsPerTask; row < std::min(samples, (task + 1) * kRowsPerTask); ++row) {
+      source[next[blockOfSample[row]]++] = static_cast<uint32_t>(row);
+    }
+  });
+}
+
+void run(Context& context, const ScatterRows& a) {
+  const uint32_t* source = hostPointer(a.source);
+  const float* input = hostPointer(a.input.data);
+  float* output = hostPointer(a.output.data);
+  CHECK(a.input.columns == a.output.columns);
+  CHECK(a.input.groupWidth == a.output.groupWidth);
+  const uint32_t group = a.input.groupWidth ? a.input.groupWidth : a.input.columns;
+  const size_t groups = a.input.columns / group, rows = hostCount(a.rows);
+  const size_t ranges = (rows + kRowsPerTask - 1) / kRowsPerTask;
+  context.pool.run(groups * ranges, [&](size_t task, int) {
+    const size_t g = task / ranges, begin = task % ranges * kRowsPerTask, end = std::min(rows, begin + kRowsPerTask);
+    const float* const from = input + g * a.input.groupStride;
+    float* const to = output + g * a.output.groupStride;
+    for (size_t i = begin; i < end; ++i) {
+      std::memcpy(to + size_t{source[i]} * a.output.rowStride, from + i * a.input.rowStride, group * sizeof(float));
+    }
+  });
+}
+
+}  // namespace tessera::cpu
