@@ -82,11 +82,12 @@ void occupancyUpdate(const MarchSpace& space, double decay, double threshold, In
 
 // composite.cpp: one ray
 struct RaySamples {
-  View x, steps, distances, colours;  // [n], [n], [n], [n][3]
-  Point background{};
+  View x, steps, distances, colours;  // [n], [n], [n] or empty, [n][columns]
+  Doubles background = {};            // [columns]; empty: black
+  size_t columns = 3;
 };
 struct RayColour {
-  Point colour{};
+  Doubles colour;
   double opacity = 0, depth = 0;
   Doubles weights;
 };
@@ -97,7 +98,7 @@ struct RayGradients {
 };
 // `weightGradients` may be empty.
 RayGradients compositeRayBackward(Extinction extinction, double minTransmittance, const RaySamples& samples,
-                                  const Point& colourGradient, double opacityGradient, double depthGradient,
+                                  const Doubles& colourGradient, double opacityGradient, double depthGradient,
                                   View weightGradients);
 
 // losses.cpp
