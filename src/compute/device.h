@@ -12,6 +12,7 @@
 
 #include "compute/adam.h"
 #include "compute/composite.h"
+#include "compute/deferred.h"
 #include "compute/encodings.h"
 #include "compute/hash_grid.h"
 #include "compute/losses.h"
@@ -41,9 +42,16 @@ namespace tessera {
   X(OccupancyUpdate)            \
   X(CompositeForward)           \
   X(CompositeBackward)          \
+  X(DeferredForward)            \
+  X(DeferredBackward)           \
+  X(BlendForward)               \
+  X(BlendBackward)              \
   X(ColourLoss)                 \
   X(DistortionLoss)             \
   X(DepthLoss)                  \
+  X(S3imLoss)                   \
+  X(OpacityLoss)                \
+  X(SparsityLoss)               \
   X(ExposureForward)            \
   X(ExposureBackward)           \
   X(Adam)

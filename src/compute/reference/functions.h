@@ -10,6 +10,7 @@
 
 #include "compute/adam.h"
 #include "compute/composite.h"
+#include "compute/deferred.h"
 #include "compute/hash_grid.h"
 #include "compute/losses.h"
 #include "compute/mlp.h"
@@ -101,6 +102,27 @@ RayGradients compositeRayBackward(Extinction extinction, double minTransmittance
                                   const Doubles& colourGradient, double opacityGradient, double depthGradient,
                                   View weightGradients);
 
+// deferred.cpp: one segment of a ray, then the segments of one ray
+Point deferredForward(View network, View composited, const double direction[3]);
+struct DeferredGradients {
+  Doubles network, composited;
+};
+DeferredGradients deferredBackward(View network, View composited, const double direction[3], const Point& gradient);
+
+struct RaySegments {
+  View composited, specular, opacities, depths;  // [n][7], [n][3], [n], [n] or empty
+};
+struct BlendedRay {
+  Point colour{};
+  double opacity = 0, depth = 0;
+};
+BlendedRay blendRay(bool literal, const RaySegments& segments);
+struct BlendGradients {
+  Doubles composited, specular, opacities;
+};
+BlendGradients blendRayBackward(bool literal, const RaySegments& segments, const Point& colourGradient,
+                                double opacityGradient);
+
 // losses.cpp
 struct ValueAndSlope {
   double value = 0, slope = 0;
@@ -114,9 +136,17 @@ struct LossAndGradients {
 // On normalised fence posts directly: bin i is [fences[i], fences[i+1]]. By the double sum.
 LossAndGradients distortionOfFences(View fences, View weights);
 // One ray of DistortionLoss, unscaled; intervals need not touch.
-LossAndGradients distortionOfRay(View weights, View distances, View steps);
+LossAndGradients distortionOfRay(View weights, View distances, View steps, bool normalised = false);
 // One ray of DepthLoss, unscaled.
 LossAndGradients depthLossOfRay(double known, double tolerance, View weights, View distances);
+// The order in which S3imLoss takes `rays` rays for its patch of that number.
+std::vector<uint32_t> s3imOrder(uint32_t rays, uint32_t patch, uint64_t seed);
+// One channel of a group of 16; gradient with respect to x.
+LossAndGradients ssimOfGroup(const double x[16], const double y[16]);
+// All rays, unscaled; `weights` may be empty.
+LossAndGradients s3imLoss(View predicted, View target, View weights, uint32_t patches, uint64_t seed);
+ValueAndSlope opacityLoss(double opacity);
+ValueAndSlope sparsityLoss(double logDensity, double runtimeStep);
 
 // adam.cpp
 struct AdamState {
