@@ -13,6 +13,7 @@
 #include "compute/adam.h"
 #include "compute/blocks.h"
 #include "compute/composite.h"
+#include "compute/deferred.h"
 #include "compute/encodings.h"
 #include "compute/hash_grid.h"
 #include "compute/losses.h"
@@ -54,9 +55,16 @@ namespace tessera {
   X(InterlevelLoss)             \
   X(CompositeForward)           \
   X(CompositeBackward)          \
+  X(DeferredForward)            \
+  X(DeferredBackward)           \
+  X(BlendForward)               \
+  X(BlendBackward)              \
   X(ColourLoss)                 \
   X(DistortionLoss)             \
   X(DepthLoss)                  \
+  X(S3imLoss)                   \
+  X(OpacityLoss)                \
+  X(SparsityLoss)               \
   X(ExposureForward)            \
   X(ExposureBackward)           \
   X(Adam)

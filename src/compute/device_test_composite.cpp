@@ -9,6 +9,8 @@ namespace tessera::device_test {
 namespace {
 
 constexpr Extinction kExtinctions[] = {Extinction::opacity, Extinction::density, Extinction::logDensity};
+// None, every number with a kernel of its own, some without, the most.
+constexpr uint32_t kColumns[] = {0, 1, 3, 5, 7, 8, 16};
 constexpr const char* kExtinctionNames[] = {"opacity", "density", "log density"};
 
 // Rays that stay clear, that end in the middle, and that meet something wholly opaque.
@@ -35,15 +37,18 @@ std::vector<float> randomExtinctions(Random& random, Extinction extinction, cons
 }
 
 struct Scene {
+  uint32_t columns;
   std::vector<uint32_t> first;
   std::vector<float> x, steps, distances, colours, background;
 
-  Scene(Random& random, Extinction extinction, size_t rays, uint32_t mostSamples)
-      : first(random.firstSamples(rays, mostSamples)), x(randomExtinctions(random, extinction, first)) {
+  Scene(Random& random, Extinction extinction, size_t rays, uint32_t mostSamples, uint32_t ofColours = 3)
+      : columns(ofColours),
+        first(random.firstSamples(rays, mostSamples)),
+        x(randomExtinctions(random, extinction, first)) {
     steps = random.floats(x.size(), 0.005f, 0.1f);
     distances = random.floats(x.size(), 0.1f, 5);
-    colours = random.floats(3 * x.size(), 0, 1);
-    background = random.floats(3 * rays, 0, 1);
+    colours = random.floats(columns * x.size(), 0, 1);
+    background = random.floats(columns * rays, 0, 1);
   }
 };
 
@@ -58,8 +63,8 @@ void setInputs(Stage& stage, const Scene& scene, Extinction extinction, const Si
   a.x = stage.matrixOf(scene.x, 1, layout);
   if (extinction != Extinction::opacity) a.steps = stage.input(scene.steps);
   a.distances = stage.input(scene.distances);
-  a.colours = stage.matrixOf(scene.colours, 3, layout);
-  if (withBackground) a.background = stage.input(scene.background);
+  if (scene.columns > 0) a.colours = stage.matrixOf(scene.colours, scene.columns, layout);
+  if (withBackground && scene.columns > 0) a.background = stage.input(scene.background);
 }
 
 }  // namespace
@@ -84,6 +89,22 @@ OperationTests testsOf<CompositeForward>() {
                                  a.weights = stage.output("weights", scene.x.size());
                                  stage.device.run(a);
                                }});
+  for (uint32_t columns : kColumns)
+    for (bool depth : {false, true})
+      tests.cases.push_back(
+          {fmt::format("{} columns{}", columns, depth ? ", depth, strided, background" : ""), [=](Stage& stage) {
+             const Size size{37};
+             const Extinction extinction = Extinction::logDensity;
+             const Scene scene(stage.random, extinction, size.capacity, 50, columns);
+             CompositeForward a;
+             setInputs(stage, scene, extinction, size, depth ? Layout::strided : Layout::plain, depth, a);
+             if (!depth) a.distances = {};
+             if (columns > 0) a.colour = stage.output("colour", columns * size.capacity);
+             a.opacity = stage.output("opacity", size.capacity);
+             if (depth) a.depth = stage.output("depth", size.capacity);
+             a.weights = stage.output("weights", scene.x.size());
+             stage.device.run(a);
+           }});
   return tests;
 }
 
@@ -111,28 +132,60 @@ OperationTests testsOf<CompositeBackward>() {
                                  stage.device.run(a);
                                }});
       }
-  for (Extinction extinction : kExtinctions)
-    for (bool everything : {false, true})
+  for (uint32_t columns : kColumns)
+    for (int optional = 0; optional < 4; ++optional)
+      tests.cases.push_back(
+          {fmt::format("{} columns, optional arguments {:02b}", columns, optional), [=](Stage& stage) {
+             const Size size{37};
+             const Scene scene(stage.random, Extinction::logDensity, size.capacity, 50, columns);
+             const Layout layout = optional & 1 ? Layout::strided : Layout::plain;
+             CompositeBackward a;
+             setInputs(stage, scene, Extinction::logDensity, size, layout, optional & 1, a);
+             if (columns > 0) {
+               a.rayColourGradients = stage.randomInput(columns * size.capacity, -1, 1);
+               a.colourGradients = stage.outputMatrix("colourGradients", scene.x.size(), columns, layout);
+             }
+             a.rayOpacityGradients = stage.randomInput(size.capacity, -1, 1);
+             a.weightGradients = stage.randomInput(scene.x.size(), -1, 1);
+             if (optional & 1) a.fullGradientDistance = 2;
+             a.addToXGradients = optional & 2;
+             a.xGradients = a.addToXGradients ? stage.output("xGradients", stage.random.floats(scene.x.size(), -1, 1))
+                                              : stage.output("xGradients", scene.x.size());
+             stage.device.run(a);
+           }});
+  struct Shape {
+    Extinction extinction;
+    uint32_t columns;
+  };
+  std::vector<Shape> shapes;
+  for (Extinction extinction : kExtinctions) shapes.push_back({extinction, 3});
+  for (uint32_t columns : kColumns) shapes.push_back({Extinction::logDensity, columns});
+  for (const auto& [extinction, columns] : shapes)
+    for (bool everything : {false, true}) {
+      if (columns == 0 && !everything) continue;  // nothing to have a gradient
       tests.gradients.push_back(
-          {fmt::format("{}{}", kExtinctionNames[static_cast<int>(extinction)], everything ? ", everything" : ""),
-           [=](Stage& stage) {
+          {fmt::format("{}, {} columns{}", kExtinctionNames[static_cast<int>(extinction)], columns,
+                       everything ? ", everything" : ""),
+           [=, extinction = extinction, columns = columns](Stage& stage) {
              const Size size{9};
-             const Scene scene(stage.random, extinction, size.capacity, 12);
+             const Scene scene(stage.random, extinction, size.capacity, 12, columns);
              const size_t rays = size.capacity, samples = scene.x.size();
-             const std::vector<float> colour = stage.random.floats(3 * rays, -1, 1);
+             const std::vector<float> colour = stage.random.floats(columns * rays, -1, 1);
              const std::vector<float> opacity = stage.random.floats(rays, -1, 1);
              const std::vector<float> depth = stage.random.floats(rays, -1, 1);
              const std::vector<float> weights = stage.random.floats(samples, -1, 1);
              CompositeBackward a;
              setInputs(stage, scene, extinction, size, Layout::plain, everything, a);
-             a.rayColourGradients = stage.input(colour);
+             if (columns > 0) {
+               a.rayColourGradients = stage.input(colour);
+               a.colourGradients = stage.outputMatrix("colourGradients", samples, columns, Layout::plain);
+             }
              if (everything) {
                a.rayOpacityGradients = stage.input(opacity);
                a.rayDepthGradients = stage.input(depth);
                a.weightGradients = stage.input(weights);
              }
              a.xGradients = stage.output("xGradients", samples);
-             a.colourGradients = stage.outputMatrix("colourGradients", samples, 3, Layout::plain);
              stage.device.run(a);
 
              const Doubles steps = toDoubles(scene.steps), distances = toDoubles(scene.distances);
@@ -142,11 +195,12 @@ OperationTests testsOf<CompositeBackward>() {
                  const size_t first = scene.first[r], count = scene.first[r + 1] - first;
                  reference::RaySamples ray{x.subspan(first, count), View(steps).subspan(first, count),
                                            View(distances).subspan(first, count),
-                                           colours.subspan(3 * first, 3 * count)};
+                                           colours.subspan(columns * first, columns * count)};
+                 ray.columns = columns;
                  if (everything)
-                   for (int c = 0; c < 3; ++c) ray.background[c] = scene.background[3 * r + c];
+                   for (size_t c = 0; c < columns; ++c) ray.background.push_back(scene.background[columns * r + c]);
                  const reference::RayColour out = reference::compositeRay(extinction, a.minTransmittance, ray);
-                 for (int c = 0; c < 3; ++c) sum += colour[3 * r + c] * out.colour[c];
+                 for (size_t c = 0; c < columns; ++c) sum += colour[columns * r + c] * out.colour[c];
                  if (!everything) continue;
                  sum += opacity[r] * out.opacity + depth[r] * out.depth;
                  for (size_t i = 0; i < count; ++i) sum += weights[first + i] * out.weights[i];
@@ -154,12 +208,16 @@ OperationTests testsOf<CompositeBackward>() {
                return sum;
              };
              const Doubles x = toDoubles(scene.x), c = toDoubles(scene.colours);
-             return std::vector<GradientPair>{
+             std::vector<GradientPair> pairs = {
                  {"x", stage.device.read(a.xGradients),
-                  centralDifferences([&](View moved) { return loss(moved, c); }, x, 1e-6, firstIndices(samples))},
-                 {"colours", stage.device.read(a.colourGradients.data),
-                  centralDifferences([&](View moved) { return loss(x, moved); }, c, 1e-4, firstIndices(3 * samples))}};
+                  centralDifferences([&](View moved) { return loss(moved, c); }, x, 1e-6, firstIndices(samples))}};
+             if (columns > 0)
+               pairs.push_back({"colours", stage.device.read(a.colourGradients.data),
+                                centralDifferences([&](View moved) { return loss(x, moved); }, c, 1e-4,
+                                                   firstIndices(columns * samples))});
+             return pairs;
            }});
+    }
   return tests;
 }
 

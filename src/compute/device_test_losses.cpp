@@ -15,6 +15,13 @@ float parameterOf(ColourLossKind kind) {
   return kind == ColourLossKind::huber ? 0.1f : 1e-3f;
 }
 
+// Every third ray is taken out.
+std::vector<float> weightsOfRays(Random& random, size_t rays) {
+  std::vector<float> weights = random.floats(rays, 0, 2);
+  for (size_t i = 0; i < weights.size(); i += 3) weights[i] = 0;
+  return weights;
+}
+
 }  // namespace
 
 template <>
@@ -26,8 +33,7 @@ OperationTests testsOf<ColourLoss>() {
         tests.cases.push_back({fmt::format("{}, rays {}{}", kKindNames[static_cast<int>(kind)], toString(size),
                                            weighted ? ", weights" : ""),
                                [=](Stage& stage) {
-                                 std::vector<float> weights = stage.random.floats(size.capacity, 0, 2);
-                                 for (size_t i = 0; i < weights.size(); i += 3) weights[i] = 0;
+                                 const std::vector<float> weights = weightsOfRays(stage.random, size.capacity);
                                  ColourLoss a;
                                  a.kind = kind;
                                  a.parameter = parameterOf(kind);
@@ -75,46 +81,53 @@ template <>
 OperationTests testsOf<DistortionLoss>() {
   OperationTests tests;
   for (const Size& size : kSizes)
-    tests.cases.push_back({"rays " + toString(size), [=](Stage& stage) {
-                             const std::vector<uint32_t> first = stage.random.firstSamples(size.capacity, 40);
-                             std::vector<float> distances;  // increasing along a ray, across the seam of the warp at 1
-                             for (uint32_t ray = 0; ray < size.capacity; ++ray)
-                               for (uint32_t i = 0; i < first[ray + 1] - first[ray]; ++i)
-                                 distances.push_back(0.2f + 0.05f * static_cast<float>(i) +
-                                                     stage.random.uniform(0, 0.04f));
-                             DistortionLoss a;
-                             a.scale = 0.01f;
-                             a.rays = stage.count(size);
-                             a.firstSample = stage.input(first);
-                             a.weights = stage.randomInput(first.back(), 0, 0.1f);
-                             a.distances = stage.input(distances);
-                             a.steps = stage.randomInput(first.back(), 0.01f, 0.05f);
-                             a.loss = stage.output("loss", 1, 1e-4);
-                             a.weightGradients = stage.output("weightGradients", first.back(), 1e-4);
-                             stage.device.run(a);
-                           }});
-  tests.gradients.push_back(
-      {"one ray", [=](Stage& stage) {
-         const uint32_t samples = 14;
-         const std::vector<float> weights = stage.random.floats(samples, 0, 0.2f);
-         const std::vector<float> steps = stage.random.floats(samples, 0.01f, 0.1f);
-         std::vector<float> distances;
-         for (uint32_t i = 0; i < samples; ++i) distances.push_back(0.3f + 0.12f * static_cast<float>(i));
-         DistortionLoss a;
-         a.scale = 1.5f;
-         a.rays.capacity = 1;
-         a.firstSample = stage.input(std::vector<uint32_t>{0, samples});
-         a.weights = stage.input(weights);
-         a.distances = stage.input(distances);
-         a.steps = stage.input(steps);
-         a.loss = stage.output("loss", 1);
-         a.weightGradients = stage.output("weightGradients", samples);
-         stage.device.run(a);
-         const Doubles t = toDoubles(distances), dt = toDoubles(steps);
-         const auto loss = [&](View w) { return a.scale * reference::distortionOfRay(w, t, dt).loss; };
-         return std::vector<GradientPair>{{"weights", stage.device.read(a.weightGradients),
-                                           centralDifferences(loss, toDoubles(weights), 1e-5, firstIndices(samples))}};
-       }});
+    for (bool normalised : {false, true})
+      tests.cases.push_back(
+          {fmt::format("rays {}{}", toString(size), normalised ? ", normalised" : ""), [=](Stage& stage) {
+             const std::vector<uint32_t> first = stage.random.firstSamples(size.capacity, 40);
+             std::vector<float> distances;  // increasing along a ray, across the seam of the warp at 1
+             for (uint32_t ray = 0; ray < size.capacity; ++ray)
+               for (uint32_t i = 0; i < first[ray + 1] - first[ray]; ++i)
+                 distances.push_back(0.2f + 0.05f * static_cast<float>(i) + stage.random.uniform(0, 0.04f));
+             DistortionLoss a;
+             a.scale = 0.01f;
+             a.normalised = normalised;
+             a.rays = stage.count(size);
+             a.firstSample = stage.input(first);
+             a.weights = stage.randomInput(first.back(), 0, 0.1f);
+             a.distances = stage.input(distances);
+             a.steps = stage.randomInput(first.back(), 0.01f, 0.05f);
+             a.loss = stage.output("loss", 1, 1e-4);
+             a.weightGradients = stage.output("weightGradients", first.back(), 1e-4);
+             stage.device.run(a);
+           }});
+  for (bool normalised : {false, true})
+    tests.gradients.push_back({normalised ? "one ray, normalised" : "one ray", [=](Stage& stage) {
+                                 const uint32_t samples = 14;
+                                 const std::vector<float> weights = stage.random.floats(samples, 0, 0.2f);
+                                 const std::vector<float> steps = stage.random.floats(samples, 0.01f, 0.1f);
+                                 std::vector<float> distances;
+                                 for (uint32_t i = 0; i < samples; ++i)
+                                   distances.push_back(0.3f + 0.12f * static_cast<float>(i));
+                                 DistortionLoss a;
+                                 a.scale = 1.5f;
+                                 a.normalised = normalised;
+                                 a.rays.capacity = 1;
+                                 a.firstSample = stage.input(std::vector<uint32_t>{0, samples});
+                                 a.weights = stage.input(weights);
+                                 a.distances = stage.input(distances);
+                                 a.steps = stage.input(steps);
+                                 a.loss = stage.output("loss", 1);
+                                 a.weightGradients = stage.output("weightGradients", samples);
+                                 stage.device.run(a);
+                                 const Doubles t = toDoubles(distances), dt = toDoubles(steps);
+                                 const auto loss = [&](View w) {
+                                   return a.scale * reference::distortionOfRay(w, t, dt, normalised).loss;
+                                 };
+                                 return std::vector<GradientPair>{
+                                     {"weights", stage.device.read(a.weightGradients),
+                                      centralDifferences(loss, toDoubles(weights), 1e-5, firstIndices(samples))}};
+                               }});
   return tests;
 }
 
@@ -163,6 +176,140 @@ OperationTests testsOf<DepthLoss>() {
          return std::vector<GradientPair>{{"weights", stage.device.read(a.weightGradients),
                                            centralDifferences(loss, toDoubles(weights), 1e-5, firstIndices(17))}};
        }});
+  return tests;
+}
+
+template <>
+OperationTests testsOf<S3imLoss>() {
+  OperationTests tests;
+  for (const Size& size : kSizes)
+    for (bool weighted : {false, true})
+      tests.cases.push_back({fmt::format("rays {}{}", toString(size), weighted ? ", weights" : ""), [=](Stage& stage) {
+                               S3imLoss a;
+                               a.scale = 0.7f;
+                               a.rays = stage.count(size);
+                               a.patches = size.capacity == 130 ? 1 : 10;
+                               a.seed = 1234567890123 + size.capacity;
+                               a.predicted = stage.randomInput(3 * size.capacity, 0, 1);
+                               a.target = stage.randomInput(3 * size.capacity, 0, 1);
+                               if (weighted) a.weights = stage.input(weightsOfRays(stage.random, size.capacity));
+                               a.loss = stage.output("loss", 1);
+                               a.gradients =
+                                   stage.output("gradients", stage.random.floats(3 * size.capacity, 0, 1e-3f));
+                               stage.device.run(a);
+                             }});
+  for (bool alike : {false, true})
+    tests.gradients.push_back({alike ? "nearly alike" : "unlike", [=](Stage& stage) {
+                                 const uint32_t rays = 53;
+                                 const std::vector<float> target = stage.random.floats(3 * rays, 0, 1);
+                                 std::vector<float> predicted = stage.random.floats(3 * rays, 0, 1);
+                                 if (alike)
+                                   for (size_t i = 0; i < predicted.size(); ++i)
+                                     predicted[i] = target[i] + 0.1f * (predicted[i] - 0.5f);
+                                 const std::vector<float> weights = weightsOfRays(stage.random, rays);
+                                 S3imLoss a;
+                                 a.scale = 0.3f;
+                                 a.rays.capacity = rays;
+                                 a.patches = 3;
+                                 a.seed = 9;
+                                 a.predicted = stage.input(predicted);
+                                 a.target = stage.input(target);
+                                 a.weights = stage.input(weights);
+                                 a.loss = stage.output("loss", 1);
+                                 a.gradients = stage.input(std::vector<float>(3 * rays));
+                                 stage.device.run(a);
+                                 // A ray of weight 0 is alike whatever it is, so what moves there is not `predicted`
+                                 // alone.
+                                 const Doubles y = toDoubles(target), w = toDoubles(weights),
+                                               kept = toDoubles(predicted);
+                                 const auto loss = [&](View x) {
+                                   Doubles moved(x.begin(), x.end()), beside = y;
+                                   for (size_t i = 0; i < moved.size(); ++i)
+                                     if (w[i / 3] == 0) beside[i] = moved[i] = kept[i];
+                                   return a.scale * reference::s3imLoss(moved, beside, {}, a.patches, a.seed).loss;
+                                 };
+                                 return std::vector<GradientPair>{{"predicted", stage.device.read(a.gradients),
+                                                                   centralDifferences(loss, toDoubles(predicted), 1e-6,
+                                                                                      firstIndices(predicted.size()))}};
+                               }});
+  return tests;
+}
+
+template <>
+OperationTests testsOf<OpacityLoss>() {
+  OperationTests tests;
+  for (const Size& size : kSizes)
+    tests.cases.push_back({"segments " + toString(size), [=](Stage& stage) {
+                             std::vector<float> opacities = stage.random.floats(size.capacity, 0, 1);
+                             for (size_t i = 0; i < opacities.size(); i += 5) {
+                               constexpr float kEdges[] = {0, 1, 1e-6f, 1 - 0x1p-24f, 2e-5f, 1 - 2e-5f};
+                               opacities[i] = kEdges[stage.random.below(6)];
+                             }
+                             OpacityLoss a;
+                             a.scale = 0.7f;
+                             a.segments = stage.count(size);
+                             a.opacities = stage.input(opacities);
+                             a.loss = stage.output("loss", 1);
+                             a.opacityGradients =
+                                 stage.output("opacityGradients", stage.random.floats(size.capacity, -1, 1));
+                             stage.device.run(a);
+                           }});
+  tests.gradients.push_back({"from clear to opaque", [=](Stage& stage) {
+                               const std::vector<float> opacities = stage.random.floats(31, 0.02f, 0.98f);
+                               OpacityLoss a;
+                               a.scale = 0.3f;
+                               a.segments.capacity = 31;
+                               a.opacities = stage.input(opacities);
+                               a.loss = stage.output("loss", 1);
+                               a.opacityGradients = stage.input(std::vector<float>(31));
+                               stage.device.run(a);
+                               const auto loss = [&](View moved) {
+                                 double sum = 0;
+                                 for (double opacity : moved) sum += a.scale * reference::opacityLoss(opacity).value;
+                                 return sum;
+                               };
+                               return std::vector<GradientPair>{
+                                   {"opacities", stage.device.read(a.opacityGradients),
+                                    centralDifferences(loss, toDoubles(opacities), 1e-6, firstIndices(31))}};
+                             }});
+  return tests;
+}
+
+template <>
+OperationTests testsOf<SparsityLoss>() {
+  OperationTests tests;
+  for (const Size& size : kSizes)
+    tests.cases.push_back({"points " + toString(size), [=](Stage& stage) {
+                             SparsityLoss a;
+                             a.scale = 0.7f;
+                             a.points = stage.count(size);
+                             a.logDensities = stage.randomInput(size.capacity, -25, 25);
+                             a.runtimeSteps = stage.randomInput(size.capacity, 1e-4f, 1e-2f);
+                             a.loss = stage.output("loss", 1);
+                             a.gradients = stage.output("gradients", size.capacity);
+                             stage.device.run(a);
+                           }});
+  tests.gradients.push_back({"from clear to opaque", [=](Stage& stage) {
+                               const std::vector<float> logDensities = stage.random.floats(31, -4, 9);
+                               const std::vector<float> steps = stage.random.floats(31, 1e-3f, 1e-2f);
+                               SparsityLoss a;
+                               a.scale = 0.3f;
+                               a.points.capacity = 31;
+                               a.logDensities = stage.input(logDensities);
+                               a.runtimeSteps = stage.input(steps);
+                               a.loss = stage.output("loss", 1);
+                               a.gradients = stage.output("gradients", 31);
+                               stage.device.run(a);
+                               const auto loss = [&](View moved) {
+                                 double sum = 0;
+                                 for (size_t i = 0; i < moved.size(); ++i)
+                                   sum += a.scale * reference::sparsityLoss(moved[i], steps[i]).value;
+                                 return sum;
+                               };
+                               return std::vector<GradientPair>{
+                                   {"logDensities", stage.device.read(a.gradients),
+                                    centralDifferences(loss, toDoubles(logDensities), 1e-5, firstIndices(31))}};
+                             }});
   return tests;
 }
 

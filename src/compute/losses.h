@@ -60,7 +60,7 @@ struct DepthLoss {
 // a 4×4 picture with separable weights .136465, .265797, .331941, .265797 (a Gaussian of σ = 1.5 about index 2). Per
 // group and channel SSIM with C1 = 1e-4, C2 = 9e-4; loss = scale · (1 - mean over patches, groups and channels). With
 // stride = kernel, as in the paper, that is its loss but for the border. Rays of weight 0 count as equal: predicted is
-// taken for both.
+// taken for both, and they get no gradient; all other weights are alike. Fewer than 16 rays have no loss.
 struct S3imLoss {
   float scale = 1;
   Count rays;
@@ -74,7 +74,7 @@ struct S3imLoss {
 };
 
 // City-on-Web, eq. 6: pulls the opacity of each block along a ray to 0 or 1. loss = scale · Σ -(α ln α + (1 - α) ln(1 -
-// α)), α clamped to [1e-5, 1 - 1e-5] in value and gradient.
+// α)), α clamped to [1e-5, 1 - 1e-5] in value and gradient: beyond, the gradient stays what it is at the bound.
 struct OpacityLoss {
   float scale = 1;
   Count segments;

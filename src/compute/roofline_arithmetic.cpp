@@ -1,4 +1,4 @@
-// The rows of the two operations that training spends its time in.
+// The rows of networks and hash grids, which training spends its time in.
 
 #include <fmt/format.h>
 
@@ -44,6 +44,42 @@ void measureNetwork(RooflineRecorder& recorder, const Network& network, const st
   recorder.measure(Operation::kMlpBackward, {"Mlp both", where, 3 * flops, "FLOP", limit}, [&] {
     device.run(forward);
     device.run(backward);
+  });
+}
+
+// Segments of rays that meet two of four blocks each.
+void measureDeferred(RooflineRecorder& recorder, uint32_t n) {
+  constexpr uint32_t kNetworks = 4;
+  Device& device = recorder.device();
+  std::vector<uint32_t> networks(n), rays(n);
+  std::vector<float> directions(size_t{3} * (n / 2 + 1));
+  for (uint32_t s = 0; s < n; ++s) {
+    networks[s] = (s / 64 + s % 2) % kNetworks;
+    rays[s] = s / 2;
+  }
+  for (size_t i = 0; i < directions.size(); i += 3) directions[i + i / 3 % 3] = 1;
+  Array<uint32_t> networkOfSegment = device.arrayOf(networks), rayOfSegment = device.arrayOf(rays);
+  Array<float> direction = device.arrayOf(directions), composited = recorder.randomFloats(size_t{n} * 7, 0, 1);
+  Array<float> weights = recorder.randomFloats(size_t{kNetworks} * DeferredNetwork::kParameters, -0.3f, 0.3f);
+  Array<float> specular = device.array<float>(size_t{n} * 3);
+  Array<float> upstream = recorder.randomFloats(size_t{n} * 3, -1, 1);
+  Array<float> compositedGradients = device.array<float>(size_t{n} * 7);
+  Array<float> weightGradients = device.array<float>(weights.size());
+  const double flops = 2.0 * DeferredNetwork::kParameters * n, limit = recorder.limits().flops;
+  const std::string where = fmt::format("deferred 34-16-16-3, {} segments", n);
+  recorder.measure(Operation::kDeferredForward, {"DeferredForward", where, flops, "FLOP", limit}, [&] {
+    device.run(DeferredForward{{n, {}}, composited, networkOfSegment, rayOfSegment, direction, weights, specular});
+  });
+  recorder.measure(Operation::kDeferredBackward, {"DeferredBackward", where, 2 * flops, "FLOP", limit}, [&] {
+    device.run(DeferredBackward{{n, {}},
+                                composited,
+                                networkOfSegment,
+                                rayOfSegment,
+                                direction,
+                                weights,
+                                upstream,
+                                compositedGradients,
+                                weightGradients});
   });
 }
 
@@ -93,6 +129,7 @@ void measureNetworks(RooflineRecorder& recorder) {
     }
     measureNetwork(recorder, {{32, 64, 1, 16, OutputActivation::none}, true}, "density 32-64-16", n);
     measureNetwork(recorder, {{32, 64, 2, 3, OutputActivation::sigmoid}, false}, "colour 32-64-64-3", n);
+    measureDeferred(recorder, n);
   }
 }
 

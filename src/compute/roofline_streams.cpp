@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <numeric>
 
 #include "compute/roofline_recorder.h"
@@ -147,6 +148,34 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
       });
 }
 
+// Two segments a ray.
+void measureBlending(RooflineRecorder& recorder, uint32_t segments) {
+  Device& device = recorder.device();
+  const uint32_t rays = segments / 2;
+  segments = 2 * rays;
+  std::vector<uint32_t> first(rays + 1);
+  for (uint32_t r = 0; r <= rays; ++r) first[r] = 2 * r;
+  Array<uint32_t> firstSegment = device.arrayOf(first);
+  Array<float> composited = recorder.randomFloats(size_t{segments} * 7, 0, 1),
+               colour = device.array<float>(size_t{rays} * 3);
+  Array<float> specular = recorder.randomFloats(size_t{segments} * 3, 0, 1), opacity = device.array<float>(rays);
+  Array<float> alpha = recorder.randomFloats(segments, 0.1f, 0.9f), depth = device.array<float>(rays);
+  Array<float> dComposited = device.array<float>(composited.size()), dSpecular = device.array<float>(specular.size());
+  Array<float> dAlpha = device.array<float>(segments), loss = device.array<float>(1);
+  const std::string shape = fmt::format("{}, 2 a ray", shapeOf(segments, "segments"));
+  recorder.measureStream(Operation::kBlendForward, shape, segments * 48.0 + rays * 24.0, [&] {
+    device.run(
+        BlendForward{false, {rays, {}}, firstSegment, composited, specular, alpha, alpha, colour, opacity, depth});
+  });
+  recorder.measureStream(Operation::kBlendBackward, shape, segments * 88.0 + rays * 16.0, [&] {
+    device.run(BlendBackward{
+        false, {rays, {}}, firstSegment, composited, specular, alpha, colour, {}, dComposited, dSpecular, dAlpha});
+  });
+  recorder.measureStream(Operation::kOpacityLoss, shapeOf(segments, "segments"), segments * 12.0, [&] {
+    device.run(OpacityLoss{1, {segments, {}}, alpha, loss, dAlpha});
+  });
+}
+
 // Cells of a hollow ball, a sixth of the region of interest across and two cells thick.
 std::vector<uint32_t> shellOccupancy(const MarchSpace& space) {
   const int size = space.gridResolution;
@@ -232,6 +261,14 @@ void measureLosses(RooflineRecorder& recorder, uint32_t rays) {
   recorder.measureStream(Operation::kColourLoss, shape, rays * 40.0, [&] {
     device.run(ColourLoss{ColourLossKind::huber, 0.1f, 1, {rays, {}}, predicted, target, weights, loss, out});
   });
+  // As many as a training step has: each patch walks all over them.
+  const uint32_t batch = std::min(rays, 16384u);
+  recorder.measureStream(Operation::kS3imLoss, fmt::format("{} rays, 10 patches", batch), batch * 52.0, [&] {
+    device.run(S3imLoss{1, {batch, {}}, 10, 1, predicted, target, weights, loss.part(0, 1), out});
+  });
+  recorder.measureStream(Operation::kSparsityLoss, shapeOf(rays, "points"), rays * 12.0, [&] {
+    device.run(SparsityLoss{1, {rays, {}}, predicted.part(0, rays), target.part(0, rays), loss.part(0, 1), out});
+  });
   recorder.measureStream(Operation::kExposureForward, shape, rays * 28.0, [&] {
     device.run(ExposureForward{{rays, {}}, predicted, {}, {}, photoOfRay, gains, out});
   });
@@ -284,6 +321,7 @@ void measureSampleStreams(RooflineRecorder& recorder) {
   Lines lines(recorder, recorder.options().streamed);
   measureEncodings(recorder, lines);
   measureCompositing(recorder, lines);
+  measureBlending(recorder, recorder.options().streamed / 8);
   measureRays(recorder, recorder.options().streamed);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "compute/cpu/kernels.h"
 #include "compute/host_memory.h"
@@ -10,6 +11,7 @@ namespace tessera::cpu {
 namespace {
 
 constexpr size_t kRaysPerTask = 64;
+constexpr int kMostColumns = 16;
 
 float opacityOf(Extinction extinction, float x, float step) {
   switch (extinction) {
@@ -23,9 +25,31 @@ float opacityOf(Extinction extinction, float x, float step) {
   return 0;
 }
 
-}  // namespace
+template <int kColumns>
+struct Columns {
+  static constexpr int value = kColumns;
+};
 
-void run(Context& context, const CompositeForward& a) {
+// call(Columns<columns>()) where that many are known to matter, else call(Columns<-1>()).
+template <class Call>
+void withColumns(uint32_t columns, const Call& call) {
+  CHECK(columns <= static_cast<uint32_t>(kMostColumns));
+  switch (columns) {
+    case 0:
+      return call(Columns<0>());
+    case 3:
+      return call(Columns<3>());
+    case 7:
+      return call(Columns<7>());
+    case 8:
+      return call(Columns<8>());
+    default:
+      return call(Columns<-1>());
+  }
+}
+
+template <int kColumns>
+void forward(Context& context, const CompositeForward& a) {
   const uint32_t* firstSample = hostPointer(a.firstSample);
   const float* x = hostPointer(a.x.data);
   const float* steps = hostPointer(a.steps);
@@ -36,17 +60,20 @@ void run(Context& context, const CompositeForward& a) {
   float* opacity = hostPointer(a.opacity);
   float* depth = hostPointer(a.depth);
   float* weights = hostPointer(a.weights);
+  const int columns = kColumns < 0 ? static_cast<int>(a.colours.columns) : kColumns;
   context.pool.forRanges(hostCount(a.rays), kRaysPerTask, [&](size_t begin, size_t end) {
     for (size_t ray = begin; ray < end; ++ray) {
-      float transmittance = 1, sum[3] = {0, 0, 0}, far = 0;
+      float transmittance = 1, sum[kColumns > 0 ? kColumns : kMostColumns] = {}, far = 0;
       const uint32_t last = firstSample[ray + 1];
       uint32_t i = firstSample[ray];
       for (; i < last; ++i) {
         const float alpha = opacityOf(a.extinction, x[a.x.offset(i, 0)], steps ? steps[i] : 0);
         const float weight = transmittance * alpha;
-        const float* c = colours + a.colours.offset(i, 0);
-        for (int k = 0; k < 3; ++k) sum[k] += weight * c[k];
-        far += weight * distances[i];
+        if constexpr (kColumns != 0) {
+          const float* c = colours + a.colours.offset(i, 0);
+          for (int k = 0; k < columns; ++k) sum[k] += weight * c[k];
+        }
+        if (depth) far += weight * distances[i];
         weights[i] = weight;
         transmittance *= 1 - alpha;
         if (transmittance < a.minTransmittance) {
@@ -55,16 +82,25 @@ void run(Context& context, const CompositeForward& a) {
         }
       }
       for (; i < last; ++i) weights[i] = 0;
-      for (int k = 0; k < 3; ++k) {
-        colour[3 * ray + k] = sum[k] + (background ? transmittance * background[3 * ray + k] : 0);
+      for (int k = 0; k < columns; ++k) {
+        colour[columns * ray + k] = sum[k] + (background ? transmittance * background[columns * ray + k] : 0);
       }
       opacity[ray] = 1 - transmittance;
-      depth[ray] = far;
+      if (depth) depth[ray] = far;
     }
   });
 }
 
-void run(Context& context, const CompositeBackward& a) {
+// Room for one number a sample of one ray, kept by each thread.
+template <int kWhich>
+float* numbersOfRay(size_t samples) {
+  thread_local std::vector<float> room;
+  if (room.size() < samples) room.resize(samples + samples / 2);
+  return room.data();
+}
+
+template <int kColumns>
+void backward(Context& context, const CompositeBackward& a) {
   const uint32_t* firstSample = hostPointer(a.firstSample);
   const float* x = hostPointer(a.x.data);
   const float* steps = hostPointer(a.steps);
@@ -77,65 +113,81 @@ void run(Context& context, const CompositeBackward& a) {
   const float* weightGradients = hostPointer(a.weightGradients);
   float* xGradients = hostPointer(a.xGradients);
   float* colourGradients = hostPointer(a.colourGradients.data);
+  const int columns = kColumns < 0 ? static_cast<int>(a.colours.columns) : kColumns;
+  const float fullDistance = a.fullGradientDistance;
+  const bool add = a.addToXGradients;
   context.pool.forRanges(hostCount(a.rays), kRaysPerTask, [&](size_t begin, size_t end) {
     for (size_t ray = begin; ray < end; ++ray) {
       const uint32_t first = firstSample[ray], last = firstSample[ray + 1];
-      // Forward again: opacities, and the transmittance before each sample, kept where the gradients will go.
+      // Forward again: opacities, and the transmittance before each sample, kept where the gradients will go if nothing
+      // is there yet.
+      float* alphas = add ? numbersOfRay<0>(last - first) : xGradients + first;
+      float* transmittances = kColumns == 0 ? numbersOfRay<1>(last - first) : nullptr;
+      const auto before = [&](uint32_t i) -> float& {
+        return kColumns == 0 ? transmittances[i - first] : colourGradients[a.colourGradients.offset(i, 0)];
+      };
       uint32_t stop = first;
       float transmittance = 1;
       while (stop < last) {
         const float alpha = opacityOf(a.extinction, x[a.x.offset(stop, 0)], steps ? steps[stop] : 0);
-        xGradients[stop] = alpha;
-        colourGradients[a.colourGradients.offset(stop, 0)] = transmittance;
+        alphas[stop - first] = alpha;
+        before(stop) = transmittance;
         transmittance *= 1 - alpha;
         ++stop;
         if (transmittance < a.minTransmittance) break;
       }
-      const float* g = colourOfRay + 3 * ray;
+      const float* g = colourOfRay + columns * ray;
       // R: what a unit of light arriving from behind would change the loss by; opacity = 1 - T.
       float rear = opacityOfRay ? -opacityOfRay[ray] : 0;
       if (background) {
-        for (int k = 0; k < 3; ++k) rear += g[k] * background[3 * ray + k];
+        for (int k = 0; k < columns; ++k) rear += g[k] * background[columns * ray + k];
       }
       for (uint32_t i = stop; i-- > first;) {
-        const float alpha = xGradients[i];
-        float* dc = colourGradients + a.colourGradients.offset(i, 0);
-        const float before = dc[0], weight = before * alpha;
-        const float* c = colours + a.colours.offset(i, 0);
+        const float alpha = alphas[i - first], reaching = before(i);
         float value = weightGradients ? weightGradients[i] : 0;
         if (depthOfRay) value += depthOfRay[ray] * distances[i];
-        for (int k = 0; k < 3; ++k) {
-          value += g[k] * c[k];
-          dc[k] = weight * g[k];
-        }
-        const float perOpacity = before * (value - rear);  // ∂L/∂α
-        rear = alpha * value + (1 - alpha) * rear;
-        switch (a.extinction) {
-          case Extinction::opacity:
-            xGradients[i] = perOpacity;
-            break;
-          case Extinction::density:
-            xGradients[i] = perOpacity * (1 - alpha) * steps[i];
-            break;
-          case Extinction::logDensity: {
-            const float clamped = std::exp(std::clamp(x[a.x.offset(i, 0)], -15.0f, 15.0f));
-            xGradients[i] = perOpacity * (1 - alpha) * steps[i] * clamped;
-            break;
+        if constexpr (kColumns != 0) {
+          const float weight = reaching * alpha;
+          const float* c = colours + a.colours.offset(i, 0);
+          float* dc = colourGradients + a.colourGradients.offset(i, 0);
+          for (int k = 0; k < columns; ++k) {
+            value += g[k] * c[k];
+            dc[k] = weight * g[k];
           }
         }
-        if (a.fullGradientDistance > 0 && distances[i] < a.fullGradientDistance) {
-          const float nearness = distances[i] / a.fullGradientDistance, scale = nearness * nearness;
-          xGradients[i] *= scale;
-          for (int k = 0; k < 3; ++k) dc[k] *= scale;
+        float slope = reaching * (value - rear);  // ∂L/∂α
+        rear = alpha * value + (1 - alpha) * rear;
+        if (a.extinction == Extinction::density) {
+          slope = slope * (1 - alpha) * steps[i];
+        } else if (a.extinction == Extinction::logDensity) {
+          slope = slope * (1 - alpha) * steps[i] * std::exp(std::clamp(x[a.x.offset(i, 0)], -15.0f, 15.0f));
         }
+        if (fullDistance > 0 && distances[i] < fullDistance) {
+          const float nearness = distances[i] / fullDistance, scale = nearness * nearness;
+          slope *= scale;
+          if constexpr (kColumns != 0) {
+            float* dc = colourGradients + a.colourGradients.offset(i, 0);
+            for (int k = 0; k < columns; ++k) dc[k] *= scale;
+          }
+        }
+        xGradients[i] = add ? xGradients[i] + slope : slope;
       }
       for (uint32_t i = stop; i < last; ++i) {
-        xGradients[i] = 0;
-        float* dc = colourGradients + a.colourGradients.offset(i, 0);
-        dc[0] = dc[1] = dc[2] = 0;
+        if (!add) xGradients[i] = 0;
+        if constexpr (kColumns != 0) std::fill_n(colourGradients + a.colourGradients.offset(i, 0), columns, 0.0f);
       }
     }
   });
+}
+
+}  // namespace
+
+void run(Context& context, const CompositeForward& a) {
+  withColumns(a.colours.columns, [&](auto columns) { forward<decltype(columns)::value>(context, a); });
+}
+
+void run(Context& context, const CompositeBackward& a) {
+  withColumns(a.colours.columns, [&](auto columns) { backward<decltype(columns)::value>(context, a); });
 }
 
 }  // namespace tessera::cpu

@@ -23,26 +23,27 @@ double opacityOf(Extinction extinction, double x, double step) {
 
 RayColour compositeRay(Extinction extinction, double minTransmittance, const RaySamples& samples) {
   RayColour ray;
+  ray.colour.resize(samples.columns);
   ray.weights.resize(samples.x.size());
   double transmittance = 1;
   for (size_t i = 0; i < samples.x.size() && transmittance >= minTransmittance; ++i) {
     const double alpha = opacityOf(extinction, samples.x[i], samples.steps.empty() ? 0 : samples.steps[i]);
     const double weight = transmittance * alpha;
     ray.weights[i] = weight;
-    for (int c = 0; c < 3; ++c) ray.colour[c] += weight * samples.colours[3 * i + c];
-    ray.depth += weight * samples.distances[i];
+    for (size_t c = 0; c < samples.columns; ++c) ray.colour[c] += weight * samples.colours[samples.columns * i + c];
+    if (!samples.distances.empty()) ray.depth += weight * samples.distances[i];
     transmittance *= 1 - alpha;
   }
-  for (int c = 0; c < 3; ++c) ray.colour[c] += transmittance * samples.background[c];
+  for (size_t c = 0; c < samples.background.size(); ++c) ray.colour[c] += transmittance * samples.background[c];
   ray.opacity = 1 - transmittance;
   return ray;
 }
 
 RayGradients compositeRayBackward(Extinction extinction, double minTransmittance, const RaySamples& samples,
-                                  const Point& colourGradient, double opacityGradient, double depthGradient,
+                                  const Doubles& colourGradient, double opacityGradient, double depthGradient,
                                   View weightGradients) {
-  const size_t all = samples.x.size();
-  RayGradients gradients{Doubles(all), Doubles(3 * all)};
+  const size_t all = samples.x.size(), columns = samples.columns;
+  RayGradients gradients{Doubles(all), Doubles(columns * all)};
   Doubles alphas, before;  // opacity of each sample, transmittance in front of it
   double transmittance = 1;
   while (alphas.size() < all && transmittance >= minTransmittance) {
@@ -53,13 +54,13 @@ RayGradients compositeRayBackward(Extinction extinction, double minTransmittance
   }
   // What one unit of light arriving from behind sample i is worth to the loss. Opacity is 1 - T.
   double rear = -opacityGradient;
-  for (int c = 0; c < 3; ++c) rear += colourGradient[c] * samples.background[c];
+  for (size_t c = 0; c < samples.background.size(); ++c) rear += colourGradient[c] * samples.background[c];
   for (size_t i = alphas.size(); i-- > 0;) {
     double worth = weightGradients.empty() ? 0 : weightGradients[i];  // ∂L/∂w_i
     if (depthGradient != 0) worth += depthGradient * samples.distances[i];
-    for (int c = 0; c < 3; ++c) {
-      worth += colourGradient[c] * samples.colours[3 * i + c];
-      gradients.colours[3 * i + c] = before[i] * alphas[i] * colourGradient[c];
+    for (size_t c = 0; c < columns; ++c) {
+      worth += colourGradient[c] * samples.colours[columns * i + c];
+      gradients.colours[columns * i + c] = before[i] * alphas[i] * colourGradient[c];
     }
     double slope = 1;  // ∂α/∂x
     if (extinction == Extinction::density) slope = (1 - alphas[i]) * samples.steps[i];
@@ -77,6 +78,7 @@ namespace {
 struct AllSamples {
   Indices firstSample;
   Doubles x, steps, distances, colours, background;
+  size_t columns;
 
   template <class Arguments>
   explicit AllSamples(const Arguments& a) {
@@ -86,8 +88,10 @@ struct AllSamples {
     x = doubles(a.x, samples);
     if (a.extinction != Extinction::opacity) steps = doubles(a.steps, samples);
     distances = doubles(a.distances, samples);
+    columns = a.colours.columns;
+    CHECK(columns <= 16u);
     colours = doubles(a.colours, samples);
-    background = doubles(a.background, 3 * rays);
+    background = doubles(a.background, columns * rays);
   }
   RaySamples ofRay(size_t ray) const {
     const size_t first = firstSample[ray], count = firstSample[ray + 1] - first;
@@ -95,10 +99,13 @@ struct AllSamples {
     samples.x = View(x).subspan(first, count);
     if (!steps.empty()) samples.steps = View(steps).subspan(first, count);
     if (!distances.empty()) samples.distances = View(distances).subspan(first, count);
-    samples.colours = View(colours).subspan(3 * first, 3 * count);
-    if (!background.empty())
-      samples.background = {background[3 * ray], background[3 * ray + 1], background[3 * ray + 2]};
+    samples.columns = columns;
+    samples.colours = View(colours).subspan(columns * first, columns * count);
+    if (!background.empty()) samples.background = row(background, ray);
     return samples;
+  }
+  Doubles row(const Doubles& values, size_t ray) const {  // of [rays][columns]
+    return Doubles(values.begin() + columns * ray, values.begin() + columns * (ray + 1));
   }
 };
 
@@ -123,16 +130,16 @@ void run(const CompositeForward& a) {
 void run(const CompositeBackward& a) {
   const size_t rays = hostCount(a.rays);
   const AllSamples all(a);
-  const Doubles colourGradients = doubles(a.rayColourGradients, 3 * rays);
+  const size_t columns = all.columns;
+  const Doubles colourGradients = doubles(a.rayColourGradients, columns * rays);
   const Doubles opacityGradients = doubles(a.rayOpacityGradients, rays);
   const Doubles depthGradients = doubles(a.rayDepthGradients, rays);
   const Doubles weightGradients = doubles(a.weightGradients, all.firstSample[rays]);
-  Doubles x(all.firstSample[rays]), colours(3 * x.size());
+  Doubles x(all.firstSample[rays]), colours(columns * x.size());
   for (size_t r = 0; r < rays; ++r) {
     const size_t first = all.firstSample[r], count = all.firstSample[r + 1] - first;
     const RayGradients ray = compositeRayBackward(
-        a.extinction, a.minTransmittance, all.ofRay(r),
-        {colourGradients[3 * r], colourGradients[3 * r + 1], colourGradients[3 * r + 2]},
+        a.extinction, a.minTransmittance, all.ofRay(r), all.row(colourGradients, r),
         opacityGradients.empty() ? 0 : opacityGradients[r], depthGradients.empty() ? 0 : depthGradients[r],
         weightGradients.empty() ? View() : View(weightGradients).subspan(first, count));
     for (size_t i = 0; i < count; ++i) {
@@ -142,10 +149,13 @@ void run(const CompositeBackward& a) {
         scale = std::min(1.0, nearness * nearness);
       }
       x[first + i] = ray.x[i] * scale;
-      for (size_t c = 0; c < 3; ++c) colours[3 * (first + i) + c] = ray.colours[3 * i + c] * scale;
+      for (size_t c = 0; c < columns; ++c) colours[columns * (first + i) + c] = ray.colours[columns * i + c] * scale;
     }
   }
-  store(a.xGradients, x);
+  if (a.addToXGradients)
+    add(a.xGradients, x);
+  else
+    store(a.xGradients, x);
   store(a.colourGradients, colours);
 }
 

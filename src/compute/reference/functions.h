@@ -12,6 +12,7 @@
 #include "compute/adam.h"
 #include "compute/blocks.h"
 #include "compute/composite.h"
+#include "compute/deferred.h"
 #include "compute/hash_grid.h"
 #include "compute/losses.h"
 #include "compute/mlp.h"
@@ -121,11 +122,12 @@ LossAndGradients interlevelLossOfRay(View fences, View weights, View middles, Vi
 
 // composite.cpp: one ray
 struct RaySamples {
-  View x, steps, distances, colours;  // [n], [n], [n], [n][3]
-  Point background{};
+  View x, steps, distances, colours;  // [n], [n], [n] or empty, [n][columns]
+  Doubles background = {};            // [columns]; empty: black
+  size_t columns = 3;
 };
 struct RayColour {
-  Point colour{};
+  Doubles colour;
   double opacity = 0, depth = 0;
   Doubles weights;
 };
@@ -136,7 +138,7 @@ struct RayGradients {
 };
 // `weightGradients` may be empty.
 RayGradients compositeRayBackward(Extinction extinction, double minTransmittance, const RaySamples& samples,
-                                  const Point& colourGradient, double opacityGradient, double depthGradient,
+                                  const Doubles& colourGradient, double opacityGradient, double depthGradient,
                                   View weightGradients);
 
 // virtual_grid.cpp
@@ -148,6 +150,26 @@ std::array<VirtualCorner, VirtualGrid::kCorners> virtualCorners(const VirtualGri
 double quantised(const VirtualGrid& grid, double attribute);
 // Log density, 3 diffuse, 4 features of a sample whose corners have these (quantised) attributes, [corners][8].
 Doubles virtualSample(const VirtualGrid& grid, std::span<const VirtualCorner> corners, View attributes);
+// deferred.cpp: one segment of a ray, then the segments of one ray
+Point deferredForward(View network, View composited, const double direction[3]);
+struct DeferredGradients {
+  Doubles network, composited;
+};
+DeferredGradients deferredBackward(View network, View composited, const double direction[3], const Point& gradient);
+
+struct RaySegments {
+  View composited, specular, opacities, depths;  // [n][7], [n][3], [n], [n] or empty
+};
+struct BlendedRay {
+  Point colour{};
+  double opacity = 0, depth = 0;
+};
+BlendedRay blendRay(bool literal, const RaySegments& segments);
+struct BlendGradients {
+  Doubles composited, specular, opacities;
+};
+BlendGradients blendRayBackward(bool literal, const RaySegments& segments, const Point& colourGradient,
+                                double opacityGradient);
 
 // losses.cpp
 struct ValueAndSlope {
@@ -158,9 +180,17 @@ double warpDistance(double t);  // MERF's g
 // On normalised fence posts directly: bin i is [fences[i], fences[i+1]]. By the double sum.
 LossAndGradients distortionOfFences(View fences, View weights);
 // One ray of DistortionLoss, unscaled; intervals need not touch.
-LossAndGradients distortionOfRay(View weights, View distances, View steps);
+LossAndGradients distortionOfRay(View weights, View distances, View steps, bool normalised = false);
 // One ray of DepthLoss, unscaled.
 LossAndGradients depthLossOfRay(double known, double tolerance, View weights, View distances);
+// The order in which S3imLoss takes `rays` rays for its patch of that number.
+std::vector<uint32_t> s3imOrder(uint32_t rays, uint32_t patch, uint64_t seed);
+// One channel of a group of 16; gradient with respect to x.
+LossAndGradients ssimOfGroup(const double x[16], const double y[16]);
+// All rays, unscaled; `weights` may be empty.
+LossAndGradients s3imLoss(View predicted, View target, View weights, uint32_t patches, uint64_t seed);
+ValueAndSlope opacityLoss(double opacity);
+ValueAndSlope sparsityLoss(double logDensity, double runtimeStep);
 
 // adam.cpp
 struct AdamState {

@@ -1,7 +1,10 @@
 #include "compute/losses.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
+#include "base/random.h"
 #include "compute/reference/convert.h"
 #include "compute/reference/functions.h"
 #include "compute/reference/operations.h"
@@ -51,11 +54,12 @@ LossAndGradients distortionOfFences(View fences, View weights) {
   return distortionOfBins(weights, fences.first(weights.size()), fences.subspan(1));
 }
 
-LossAndGradients distortionOfRay(View weights, View distances, View steps) {
+LossAndGradients distortionOfRay(View weights, View distances, View steps, bool normalised) {
   Doubles from, to;
   for (size_t i = 0; i < weights.size(); ++i) {
-    from.push_back(warpDistance(distances[i] - steps[i] / 2));
-    to.push_back(warpDistance(distances[i] + steps[i] / 2));
+    const double begin = distances[i] - steps[i] / 2, end = distances[i] + steps[i] / 2;
+    from.push_back(normalised ? begin : warpDistance(begin));
+    to.push_back(normalised ? end : warpDistance(end));
   }
   return distortionOfBins(weights, from, to);
 }
@@ -70,6 +74,74 @@ LossAndGradients depthLossOfRay(double known, double tolerance, View weights, Vi
     result.gradients[i] = r - 1;
   }
   return result;
+}
+
+std::vector<uint32_t> s3imOrder(uint32_t rays, uint32_t patch, uint64_t seed) {
+  std::vector<uint32_t> order(rays);
+  std::iota(order.begin(), order.end(), 0u);
+  if (patch == 0) return order;
+  const RandomStream random(mix64(seed) + patch, 0x531);
+  for (uint32_t i = rays; i-- > 1;) std::swap(order[i], order[random.below(i, i + 1)]);
+  return order;
+}
+
+LossAndGradients ssimOfGroup(const double x[16], const double y[16]) {
+  constexpr double kTaps[4] = {.136465, .265797, .331941, .265797}, kC1 = 1e-4, kC2 = 9e-4;
+  const auto weight = [&](int p) { return kTaps[p / 4] * kTaps[p % 4]; };
+  double meanX = 0, meanY = 0, squares = 0, products = 0;
+  for (int p = 0; p < 16; ++p) {
+    meanX += weight(p) * x[p];
+    meanY += weight(p) * y[p];
+  }
+  for (int p = 0; p < 16; ++p) {
+    squares += weight(p) * ((x[p] - meanX) * (x[p] - meanX) + (y[p] - meanY) * (y[p] - meanY));
+    products += weight(p) * (x[p] - meanX) * (y[p] - meanY);
+  }
+  const double a1 = 2 * meanX * meanY + kC1, a2 = 2 * products + kC2;
+  const double b1 = meanX * meanX + meanY * meanY + kC1, b2 = squares + kC2;
+  LossAndGradients similarity{a1 * a2 / (b1 * b2), Doubles(16)};
+  for (int p = 0; p < 16; ++p)
+    similarity.gradients[p] =
+        2 * weight(p) *
+        ((meanY * a2 + a1 * (y[p] - meanY)) / (b1 * b2) - similarity.loss * (meanX / b1 + (x[p] - meanX) / b2));
+  return similarity;
+}
+
+LossAndGradients s3imLoss(View predicted, View target, View weights, uint32_t patches, uint64_t seed) {
+  const uint32_t rays = static_cast<uint32_t>(predicted.size() / 3), groups = rays / 16;
+  LossAndGradients result{0, Doubles(predicted.size())};
+  if (patches == 0 || groups == 0) return result;
+  const double share = 1.0 / (3.0 * patches * groups);
+  for (uint32_t patch = 0; patch < patches; ++patch) {
+    const std::vector<uint32_t> order = s3imOrder(rays, patch, seed);
+    for (uint32_t group = 0; group < groups; ++group)
+      for (uint32_t c = 0; c < 3; ++c) {
+        double x[16], y[16];
+        for (uint32_t p = 0; p < 16; ++p) {
+          const uint32_t ray = order[16 * group + p];
+          x[p] = predicted[3 * ray + c];
+          y[p] = !weights.empty() && weights[ray] == 0 ? x[p] : target[3 * ray + c];
+        }
+        const LossAndGradients similarity = ssimOfGroup(x, y);
+        result.loss += share * (1 - similarity.loss);
+        for (uint32_t p = 0; p < 16; ++p) {
+          const uint32_t ray = order[16 * group + p];
+          if (weights.empty() || weights[ray] != 0) result.gradients[3 * ray + c] -= share * similarity.gradients[p];
+        }
+      }
+  }
+  return result;
+}
+
+ValueAndSlope opacityLoss(double opacity) {
+  const double alpha = std::clamp(opacity, 1e-5, 1 - 1e-5);
+  return {-(alpha * std::log(alpha) + (1 - alpha) * std::log(1 - alpha)), std::log((1 - alpha) / alpha)};
+}
+
+ValueAndSlope sparsityLoss(double logDensity, double runtimeStep) {
+  const double opticalDepth = std::exp(logDensity) * runtimeStep;
+  return {-std::expm1(-opticalDepth),
+          std::exp(-opticalDepth) * runtimeStep * std::exp(std::clamp(logDensity, -15.0, 15.0))};
 }
 
 void run(const ColourLoss& a) {
@@ -97,8 +169,9 @@ void run(const DistortionLoss& a) {
   Doubles loss(1), gradients;
   for (size_t r = 0; r < rays; ++r) {
     const size_t first = firstSample[r], count = firstSample[r + 1] - first;
-    const LossAndGradients ray = distortionOfRay(
-        View(weights).subspan(first, count), View(distances).subspan(first, count), View(steps).subspan(first, count));
+    const LossAndGradients ray =
+        distortionOfRay(View(weights).subspan(first, count), View(distances).subspan(first, count),
+                        View(steps).subspan(first, count), a.normalised);
     loss[0] += a.scale * ray.loss;
     for (double g : ray.gradients) gradients.push_back(a.scale * g);
   }
@@ -122,6 +195,39 @@ void run(const DepthLoss& a) {
   }
   store(a.loss, loss);
   add(a.weightGradients, gradients);
+}
+
+void run(const S3imLoss& a) {
+  const size_t rays = hostCount(a.rays);
+  LossAndGradients all = s3imLoss(doubles(a.predicted, 3 * rays), doubles(a.target, 3 * rays), doubles(a.weights, rays),
+                                  a.patches, a.seed);
+  for (double& g : all.gradients) g *= a.scale;
+  store(a.loss, Doubles{a.scale * all.loss});
+  add(a.gradients, all.gradients);
+}
+
+void run(const OpacityLoss& a) {
+  Doubles loss(1), gradients;
+  for (double opacity : doubles(a.opacities, hostCount(a.segments))) {
+    const ValueAndSlope f = opacityLoss(opacity);
+    loss[0] += a.scale * f.value;
+    gradients.push_back(a.scale * f.slope);
+  }
+  store(a.loss, loss);
+  add(a.opacityGradients, gradients);
+}
+
+void run(const SparsityLoss& a) {
+  const size_t points = hostCount(a.points);
+  const Doubles logDensities = doubles(a.logDensities, points), steps = doubles(a.runtimeSteps, points);
+  Doubles loss(1), gradients;
+  for (size_t i = 0; i < points; ++i) {
+    const ValueAndSlope f = sparsityLoss(logDensities[i], steps[i]);
+    loss[0] += a.scale * f.value;
+    gradients.push_back(a.scale * f.slope);
+  }
+  store(a.loss, loss);
+  store(a.gradients, gradients);
 }
 
 void run(const ExposureForward& a) {

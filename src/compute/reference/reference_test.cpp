@@ -135,6 +135,45 @@ TEST(Composite, StopsBehindTheSampleThatTakesTransmittanceBelowTheLeast) {
   EXPECT_EQ(compositeRayBackward(Extinction::opacity, 0.1, samples, {1, 1, 1}, 0, 0, {}).x[2], 0);
 }
 
+TEST(DeferredNetwork, HasItsWeightsByLayerOutputAndInputAndThenBiases) {
+  Doubles network(DeferredNetwork::kParameters);
+  const auto weight = [&](uint32_t layer, uint32_t inputs, uint32_t output, uint32_t input) -> double& {
+    return network[DeferredNetwork::kWeights[layer] + output * inputs + input];
+  };
+  weight(0, 34, 5, 2) = 2;         // composited
+  weight(0, 34, 5, 7) = 0.5;       // direction x
+  weight(0, 34, 5, 10 + 3) = -1;   // sin 2x
+  weight(0, 34, 5, 22 + 11) = 3;   // cos 8z
+  weight(0, 34, 0, 34 * 16) = .1;  // bias of the first unit
+  weight(1, 16, 3, 5) = 0.7;
+  weight(1, 16, 4, 0) = -1;  // held at zero
+  weight(2, 16, 1, 3) = 0.4;
+  weight(2, 16, 1, 4) = 100;
+  network.back() = -0.2;  // bias of blue
+  const Doubles composited = {0, 0, 0.6, 0, 0, 0, 0};
+  const double direction[3] = {0.6, 0, 0.8};
+  const double unit = 2 * 0.6 + 0.5 * 0.6 - std::sin(1.2) + 3 * std::cos(6.4);
+  const Point colour = deferredForward(network, composited, direction);
+  EXPECT_NEAR(colour[0], 0.5, 1e-15);
+  EXPECT_NEAR(colour[1], 1 / (1 + std::exp(-0.4 * 0.7 * unit)), 1e-14);
+  EXPECT_NEAR(colour[2], 1 / (1 + std::exp(0.2)), 1e-15);
+  const DeferredGradients gradients = deferredBackward(network, composited, direction, {0, 1, 0});
+  EXPECT_NEAR(gradients.composited[2], colour[1] * (1 - colour[1]) * 0.4 * 0.7 * 2, 1e-14);
+}
+
+TEST(Blending, LetsTheGatedSpecularColourOfABlockThroughByItsOpacity) {
+  const Doubles composited = {.1, .2, .3, 0, 0, 0, 0, .4, .5, .6, 0, 0, 0, 0}, specular = {1, 0, 0, 0, 1, 0};
+  const Doubles opacities = {.25, .5}, depths = {1, 4};
+  const RaySegments segments{composited, specular, opacities, depths};
+  const BlendedRay gated = blendRay(false, segments), printed = blendRay(true, segments);
+  EXPECT_NEAR(gated.colour[0], .1 + .25 + .75 * .4, 1e-15);
+  EXPECT_NEAR(gated.colour[1], .2 + .75 * (.5 + .5), 1e-15);
+  EXPECT_NEAR(printed.colour[0], .1 + 1 + .75 * .4, 1e-15);
+  EXPECT_NEAR(printed.colour[1], .2 + .75 * (.5 + 1), 1e-15);
+  EXPECT_NEAR(gated.opacity, 1 - .75 * .5, 1e-15);
+  EXPECT_NEAR(gated.depth, 1 + .75 * 4, 1e-15);
+}
+
 TEST(ColourLoss, HasTheValuesOfItsFormulas) {
   EXPECT_NEAR(colourLoss(ColourLossKind::charbonnier, 1e-3, 0.001).value, 0.0014142136, 1e-10);
   EXPECT_NEAR(colourLoss(ColourLossKind::charbonnier, 1e-3, 0.1).value, 0.1000050, 1e-7);
@@ -165,6 +204,45 @@ TEST(Distortion, OfARayIsThatOfItsWarpedFences) {
   EXPECT_NEAR(distortionOfRay(weights, distances, steps).loss, distortionOfFences(fences, weights).loss, 1e-14);
   EXPECT_EQ(warpDistance(1), 0.5);
   EXPECT_EQ(warpDistance(4), 0.875);
+}
+
+TEST(Distortion, OnNormalisedDistancesIsThatOfTheFencesThemselves) {
+  const Doubles fences = {0, .1, .3, .35, .7, 1}, weights = {.05, .2, .4, .1, .05};
+  Doubles distances, steps;
+  for (size_t i = 0; i < weights.size(); ++i) {
+    distances.push_back((fences[i] + fences[i + 1]) / 2);
+    steps.push_back(fences[i + 1] - fences[i]);
+  }
+  EXPECT_NEAR(distortionOfRay(weights, distances, steps, true).loss, 0.1158333, 1e-7);
+  EXPECT_LT(distortionOfRay(weights, distances, steps).loss, 0.1);
+}
+
+TEST(S3im, TakesRaysInTheirOwnOrderFirstAndThenInOthers) {
+  EXPECT_EQ(s3imOrder(5, 0, 7), (std::vector<uint32_t>{0, 1, 2, 3, 4}));
+  const std::vector<uint32_t> first = s3imOrder(100, 0, 7), second = s3imOrder(100, 1, 7);
+  EXPECT_TRUE(std::is_permutation(second.begin(), second.end(), first.begin()));
+  EXPECT_NE(second, first);
+  EXPECT_NE(second, s3imOrder(100, 2, 7));
+  EXPECT_NE(second, s3imOrder(100, 1, 8));
+  EXPECT_EQ(second, s3imOrder(100, 1, 7));
+}
+
+TEST(S3im, ComparesMeansWhereNothingVaries) {
+  double x[16], y[16];
+  std::fill_n(x, 16, 0.3);
+  std::fill_n(y, 16, 0.6);
+  EXPECT_NEAR(ssimOfGroup(x, y).loss, (2 * 0.3 * 0.6 + 1e-4) / (0.3 * 0.3 + 0.6 * 0.6 + 1e-4), 1e-6);
+}
+
+TEST(S3im, IsTheMeanOverGroupsAndChannels) {
+  Doubles x(3 * 40), y(3 * 40);  // two groups; the last eight rays are left over
+  for (size_t i = 0; i < x.size(); ++i) {
+    x[i] = i < 3 * 16 && i % 3 == 1 ? 0.3 : 0.6;
+    y[i] = i < 3 * 32 ? 0.6 : 0;
+  }
+  const double similarity = (2 * 0.3 * 0.6 + 1e-4) / (0.3 * 0.3 + 0.6 * 0.6 + 1e-4);
+  EXPECT_NEAR(s3imLoss(x, y, {}, 1, 0).loss, (1 - similarity) / 6, 1e-6);
+  EXPECT_EQ(s3imLoss(View(x).first(45), View(y).first(45), {}, 3, 0).loss, 0) << "fewer than 16 rays";
 }
 
 TEST(March, MakesPreciselyTheLatticePointsInOccupiedCells) {
