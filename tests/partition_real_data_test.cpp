@@ -40,7 +40,6 @@ TEST_F(PartitionOfRealData, BrightonBeachIsAGeoreferencedFieldUnderAFlight) {
   if (!beach) GTEST_SKIP() << "TESSERA_SHARED_DATA/brighton_beach is not there";
   const Capture capture = importCapture(*beach, folder_ / "capture", {.downscale = 8});
   const Partition partition = partitionCapture(capture, {.blocks = {false, 2, 2}, .enough = {3, 4096}});
-  for (const std::string& note : partition.notes) SCOPED_TRACE(note);
 
   // 40 m above take-off; the beach is not flat.
   double flight = 0;

@@ -2,7 +2,6 @@
 
 #include <Eigen/Dense>
 #include <GeographicLib/LocalCartesian.hpp>
-#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -40,8 +39,7 @@ std::optional<std::string> blocksAsGeoJson(const Capture& capture, const Partiti
       ring.push_back({rounded(capture.geo->longitude + east), rounded(place.latitude)});
     }
     const CellCoverage& has = partition.coverage[static_cast<size_t>(cell)];
-    const bool thin = std::any_of(partition.thin.begin(), partition.thin.end(),
-                                  [cell](const ThinCell& other) { return other.cell == cell; });
+    const bool thin = partition.isThin(cell);
     features.push_back({{"type", "Feature"},
                         {"id", cell},
                         {"geometry", {{"type", "Polygon"}, {"coordinates", ordered_json::array({ring})}}},

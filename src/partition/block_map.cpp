@@ -15,7 +15,7 @@ namespace {
 
 // Of the picture, in its pixels.
 constexpr double kMapSide = 800, kMargin = 40, kHeader = 84, kFooter = 92;
-constexpr double kLeastWidth = 640;
+constexpr double kLeastWidth = 720;
 constexpr double kLargestText = 17, kSmallestText = 7;
 
 constexpr char kStyle[] = R"css(
@@ -96,8 +96,7 @@ std::string cellsSvg(const Frame& frame, const Partition& partition) {
   std::string svg, labels;
   for (int cell = 0; cell < grid.cells(); ++cell) {
     const CellCoverage& has = partition.coverage[static_cast<size_t>(cell)];
-    const bool thin = std::any_of(partition.thin.begin(), partition.thin.end(),
-                                  [cell](const ThinCell& other) { return other.cell == cell; });
+    const bool thin = partition.isThin(cell);
     const Vec2d middle = frame.at(grid.centre(cell)), corner = middle - Vec2d::Constant(side / 2);
     const std::string name = fmt::format("{}, {}", cell % grid.columns, cell / grid.columns);
     const std::string box =
@@ -159,7 +158,8 @@ std::string legendSvg(double x, double y, bool hull, bool thin) {
   };
   entry("<circle class=\"camera\" cx=\"11\" r=\"3\"/>", "training photo", 124);
   entry("<circle class=\"other\" cx=\"11\" r=\"3\"/>", "held-out photo", 124);
-  if (hull) entry("<path class=\"hull\" d=\"M0 0 h21\"/>", "seen on the ground", 150);
+  entry("<rect y=\"-7\" width=\"20\" height=\"14\" fill=\"url(#shades)\"/>", "more pixels", 108);
+  if (hull) entry("<path class=\"hull\" d=\"M0 0 h21\"/>", "seen on the ground", 160);
   if (thin) entry("<rect class=\"thin\" y=\"-7\" width=\"20\" height=\"14\" fill=\"url(#hatch)\"/>", "too little", 84);
   return svg + "</g>\n";
 }
@@ -204,15 +204,17 @@ std::string blockMapSvg(const Capture& capture, const Partition& partition) {
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" viewBox=\"0 0 {0:.0f} {1:.0f}\">"
       "\n<style>{2}</style>\n<defs><pattern id=\"hatch\" width=\"8\" height=\"8\" patternUnits=\"userSpaceOnUse\" "
       "patternTransform=\"rotate(45)\"><path d=\"M0 0 V8\" stroke=\"#b3261e\" stroke-opacity=\"0.55\" "
-      "stroke-width=\"2.5\"/></pattern></defs>\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
-      frame.width(), frame.height(), kStyle);
+      "stroke-width=\"2.5\"/></pattern><linearGradient id=\"shades\"><stop stop-color=\"{3}\"/><stop offset=\"1\" "
+      "stop-color=\"{4}\"/></linearGradient></defs>\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
+      frame.width(), frame.height(), kStyle, shade(0), shade(1));
   svg += fmt::format(
       "<text x=\"{0:.0f}\" y=\"36\" font-size=\"21\" font-weight=\"650\">{1} × {2} blocks of {3}</text>\n"
-      "<text class=\"quiet\" x=\"{0:.0f}\" y=\"58\" font-size=\"13\">{4} training photos, a pixel on the ground is {5} "
+      "<text class=\"quiet\" x=\"{0:.0f}\" y=\"58\" font-size=\"13\">{4} training photos, a pixel {7} is {5} "
       "wide{6}</text>\n",
       kMargin, grid.columns, grid.rows, unit.say(grid.edge), capture.photosIn(Split::train).size(),
       unit.say(partition.region.groundPixel),
-      partition.thin.empty() ? "" : fmt::format("; {} with too little to train from", partition.thin.size()));
+      partition.thin.empty() ? "" : fmt::format("; {} blocks have too little to train from", partition.thin.size()),
+      partition.region.looksAtGround ? "on the ground" : "amid them");
   svg += cells;
   if (capture.geo) {
     const Vec3d north = grid.gridFromWorld * capture.geo->enuFromWorld.block<1, 3>(1, 0).transpose();

@@ -69,7 +69,7 @@ TEST(BlockMap, MarksThinCells) {
   partition.thin = {{4, "sentence"}};
   const std::string svg = blockMapSvg(capture, partition);
   EXPECT_EQ(countOf(svg, "class=\"thin\" x"), 1u);
-  EXPECT_NE(svg.find("1 with too little"), std::string::npos);
+  EXPECT_NE(svg.find("1 blocks have too little"), std::string::npos);
 }
 
 TEST(BlockMap, PointsNorth) {

@@ -2,9 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "base/error.h"
 
 namespace tessera {
+
+bool Partition::isThin(int cell) const {
+  const auto found = std::lower_bound(thin.begin(), thin.end(), cell,
+                                      [](const ThinCell& other, int wanted) { return other.cell < wanted; });
+  return found != thin.end() && found->cell == cell;
+}
 
 Partition partitionCapture(const Capture& capture, const PartitionOptions& options) {
   if (capture.photosIn(Split::train).empty()) {

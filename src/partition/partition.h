@@ -20,8 +20,10 @@ struct Partition {
   Heights heights;
   DecidedBy decidedBy = DecidedBy::request;
   std::vector<CellCoverage> coverage;  // one entry a cell
-  std::vector<ThinCell> thin;          // to be warned of before training
+  std::vector<ThinCell> thin;          // to be warned of before training; by cell
   std::vector<std::string> notes;      // for people: how ground, region and blocks were found
+
+  bool isThin(int cell) const;
 };
 
 // A function of the capture's training photos, points and geo reference, and of the options, alone. Throws Error when

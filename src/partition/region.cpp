@@ -34,9 +34,9 @@ double pixelWidth(const Quad& quad, const Vec2d& pixels) {
 }
 
 // Where a ray meets the ground steeply enough.
-std::optional<Vec2d> meetsGround(const Vec3d& originInGround, const Vec3d& direction) {
+std::optional<Vec2d> meetsGround(const Vec3d& originInGround, const Vec3d& direction, double leastSlope) {
   const double fall = -direction.z();
-  if (!(originInGround.z() > 0) || !(fall >= std::sin(kLeastSlope * std::numbers::pi / 180))) return std::nullopt;
+  if (!(originInGround.z() > 0) || !(fall >= std::sin(leastSlope * std::numbers::pi / 180))) return std::nullopt;
   return Vec2d((originInGround + originInGround.z() / fall * direction).head<2>());
 }
 
@@ -46,15 +46,16 @@ struct Footprint {
   bool axisMeets = false;  // of the optical axis
 };
 
-Footprint footprintOf(const Camera& camera, const RayFan& fan, const Pose& worldFromCamera, const Ground& ground) {
+Footprint footprintOf(const Camera& camera, const RayFan& fan, const Pose& worldFromCamera, const Ground& ground,
+                      double leastSlope) {
   const Mat3d groundFromCamera = ground.groundFromWorld * worldFromCamera.rotation;
   const Vec3d origin = ground.inGround(worldFromCamera.translation);
   Footprint footprint;
-  footprint.axisMeets = meetsGround(origin, groundFromCamera.col(2)).has_value();
+  footprint.axisMeets = meetsGround(origin, groundFromCamera.col(2), kLeastAxisSlope).has_value();
   std::vector<std::optional<Vec2d>> hits;
   for (const std::optional<Vec3d>& direction : fan.directionsInCamera) {
     const Vec3d turned = direction ? Vec3d(groundFromCamera * *direction) : Vec3d::Zero();
-    hits.push_back(meetsGround(origin, turned));
+    hits.push_back(meetsGround(origin, turned, leastSlope));
   }
   const Vec2d pixels(static_cast<double>(camera.width) / kFanColumns, static_cast<double>(camera.height) / kFanRows);
   std::vector<double> widths;
@@ -194,17 +195,19 @@ Region findRegion(const Capture& capture, const Ground& ground) {
   CHECK(photos.size() > 0u);
   std::vector<RayFan> fans;
   for (const Camera& camera : capture.cameras) fans.push_back(raysThroughCorners(camera, kFanColumns, kFanRows));
-  std::vector<Footprint> footprints;
-  size_t looking = 0, quads = 0;
-  for (const int photo : photos) {
-    const int camera = capture.photos[photo].camera;
-    footprints.push_back(footprintOf(capture.cameras[camera], fans[static_cast<size_t>(camera)],
-                                     capture.photos[photo].worldFromCamera, ground));
-    looking += footprints.back().axisMeets;
-    quads += footprints.back().quads.size();
+  for (const double leastSlope : {kLeastSlope, kLeastSlope / 2}) {
+    std::vector<Footprint> footprints;
+    size_t looking = 0, showing = 0;
+    for (const int photo : photos) {
+      const int camera = capture.photos[photo].camera;
+      footprints.push_back(footprintOf(capture.cameras[camera], fans[static_cast<size_t>(camera)],
+                                       capture.photos[photo].worldFromCamera, ground, leastSlope));
+      looking += footprints.back().axisMeets;
+      showing += !footprints.back().quads.empty();
+    }
+    if (2 * looking >= photos.size() && 2 * showing >= photos.size()) return regionOfPhotos(footprints);
   }
-  const bool looksAtGround = 2 * looking >= photos.size() && quads > 0;
-  return looksAtGround ? regionOfPhotos(footprints) : regionAmongThings(capture, photos, ground);
+  return regionAmongThings(capture, photos, ground);
 }
 
 }  // namespace tessera

@@ -60,7 +60,7 @@ TEST(Region, FollowsAGroundThatIsTiltedAndHigh) {
 
 TEST(Region, EndsBeforeTheHorizon) {
   Capture capture = emptyCapture();
-  // Rows from 23° above to 97° below the horizon, 60° in the middle column... straight ahead 37° down.
+  // 37° down in the middle, level at the upper border.
   for (int i = 0; i < 3; ++i) {
     addPhoto(capture, lookingAt({0, 0, 100}, {0, 100 / std::tan(37 * kDegree), 0}, Vec3d::UnitZ()));
   }
@@ -70,6 +70,17 @@ TEST(Region, EndsBeforeTheHorizon) {
   for (const Vec2d& corner : region.hull) most = std::max(most, corner.norm());
   EXPECT_LE(most, farthest + 2 * blur(2 * farthest));
   EXPECT_GT(most, 0.8 * farthest);
+}
+
+TEST(Region, OfFlatPhotosReachesFartherThanOfSteepOnes) {
+  Capture capture = emptyCapture();
+  capture.cameras[0].parameters = {2000, 2000, 200, 150};  // ± 4.3°
+  for (int i = 0; i < 4; ++i) {
+    addPhoto(capture, lookingAt({0, 0, 100}, {0, 100 / std::tan(22 * kDegree), 0}, Vec3d::UnitZ()));
+  }
+  const Region region = findRegion(capture, Ground{});
+  EXPECT_TRUE(region.looksAtGround);
+  EXPECT_NEAR(region.rectangle.centre.y(), (100 / std::tan(17.7 * kDegree) + 100 / std::tan(26.3 * kDegree)) / 2, 2);
 }
 
 TEST(Region, CountsWhatAFisheyeShowsInsideItsCircle) {
