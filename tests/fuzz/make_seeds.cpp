@@ -72,6 +72,9 @@ int main(int count, char** arguments) {
                   R"(24,0.9]}],"geo":{"latitude":1,"enu_from_world":[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}},)"
                   R"("frames":[{"file_path":"a","transform_matrix":[[1,0,0,1],[0,1,0,2],[0,0,1,3]],)"
                   R"("tessera":{"camera":0,"gps":{"latitude":1,"longitude":2}}}]})"));
+  write("block_grid/a",
+        std::string(R"({"origin":[1,2,3],"grid_from_world":[0,1,0,-1,0,0,0,0,1],"edge":40.5,"columns":3,)"
+                    R"("rows":2,"bottom":-9,"top":9.5})"));
   write("ply/a", encodePly(std::vector<SparsePoint>(2)));
   write("ply/b", std::string("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty "
                              "double z\nproperty uchar red\nproperty float nx\nend_header\n1 2e3 -3 40 nan\n"));

@@ -1,0 +1,42 @@
+#include "partition/partition.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/error.h"
+
+namespace tessera {
+
+bool Partition::isThin(int cell) const {
+  const auto found = std::lower_bound(thin.begin(), thin.end(), cell,
+                                      [](const ThinCell& other, int wanted) { return other.cell < wanted; });
+  return found != thin.end() && found->cell == cell;
+}
+
+Partition partitionCapture(const Capture& capture, const PartitionOptions& options) {
+  if (capture.photosIn(Split::train).empty()) {
+    throw Error(capture.root.string(), "", "has no training photos to cut blocks from",
+                "import it again with another --holdout");
+  }
+  Partition partition;
+  partition.ground = findGround(capture);
+  partition.region = findRegion(capture, partition.ground);
+  partition.heights = findHeights(capture, partition.ground, partition.region);
+  const BlockLayout layout =
+      layOutBlocks(partition.ground, partition.region, partition.heights, options.blocks, options.limits);
+  partition.grid = layout.grid;
+  partition.decidedBy = layout.decidedBy;
+  partition.coverage =
+      countCoverage(capture, partition.grid, partition.ground, partition.region.looksAtGround, options.depthOf);
+  partition.thin = thinCells(partition.grid, partition.coverage, options.enough);
+  const Rectangle& area = partition.region.rectangle;
+  partition.notes = {
+      "ground: " + partition.ground.how,
+      fmt::format("region: {:.4g} x {:.4g}, from {:.3g} below the ground to {:.3g} above it; {}", area.width,
+                  area.depth, -partition.heights.bottom, partition.heights.top, partition.region.how),
+      "blocks: " + layout.how};
+  return partition;
+}
+
+}  // namespace tessera

@@ -1,0 +1,25 @@
+// Draws a volume model as it trains: by proposals, with the networks evaluated at texels. The picture that baking is held against.
+#pragma once
+
+#include "representations/volume/volume_pass.h"
+#include "scene/view_renderer.h"
+
+namespace tessera {
+
+class VolumeModelRenderer final : public ViewRenderer {
+ public:
+  // Samples whose renderer's step is less opaque than `minAlpha` are culled, as baking does. Keeps a reference to `model`.
+  VolumeModelRenderer(VolumeModel& model, float minAlpha);
+
+  RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
+  std::string device() const override;
+
+ private:
+  VolumeModel& model_;
+  float minAlpha_;
+  VolumePass pass_;
+  Array<uint32_t> cameraOfRay_;
+  Array<float> pixels_, origins_, directions_, far_;
+};
+
+}  // namespace tessera
