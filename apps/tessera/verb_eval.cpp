@@ -1,13 +1,12 @@
 #include <fmt/format.h>
 
+#include "apps/tessera/drawable.h"
 #include "apps/tessera/verbs.h"
 #include "base/error.h"
 #include "base/log.h"
 #include "base/progress.h"
 #include "eval/report.h"
 #include "import/capture_reader.h"
-#include "representations/field/field_renderer.h"
-#include "train/model_folder.h"
 
 namespace tessera {
 
@@ -35,16 +34,14 @@ void addEvalVerb(CLI::App& app) {
   verb->callback([flags] {
     const Capture capture = readCapture(flags->capture);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
-    const std::unique_ptr<FieldModel> model = loadFieldModel(*device, flags->model);
+    const std::unique_ptr<Drawable> drawable = openDrawable(*device, flags->model);
     EvaluateOptions options;
     options.split = *splitFromName(flags->split);
-    const ModelFolder folder(flags->model);
-    requireSameWorld(folder, capture);
-    if (const auto known = trainedOnAmong(folder, capture, options.split);
+    drawable->requireWorldOf(capture);
+    if (const auto known = drawable->trainedOnAmong(capture, options.split);
         options.split != Split::train && !known.empty()) {
       warn("{} of the views were trained on ('{}' first): the numbers flatter the model", known.size(), known.front());
     }
-    FieldRenderer renderer(*model);
     options.fitExposure = flags->exposure == "fitted";
     options.lpipsWeights = flags->lpips;
     options.imagesDir = flags->images;
@@ -58,7 +55,7 @@ void addEvalVerb(CLI::App& app) {
       builder.add(result, pictures);
       progress.update(++done, fmt::format("{:.2f} dB", result.psnr));
     };
-    const EvaluationReport report = evaluate(renderer, capture, options);
+    const EvaluationReport report = evaluate(drawable->renderer(), capture, options);
     progress.finish();
     const fs::path page = flags->report.empty() ? fs::path(flags->model) / "report.html" : fs::path(flags->report);
     builder.write(page, report);

@@ -7,7 +7,8 @@
 #include "import/capture_reader.h"
 #include "import/importer.h"
 #include "representations/field/train_field.h"
-#include "train/model_folder.h"
+#include "representations/volume/train_volume.h"
+#include "train/run_folder.h"
 
 namespace tessera {
 namespace {
@@ -39,15 +40,29 @@ ordered_json describeModel(const fs::path& folder) {
   const ModelFolder model(folder);
   const std::optional<ModelManifest> manifest = model.manifest();
   const ModelPlacement placement = model.readPlacement();
-  FieldConfig config = resumedFieldConfig(folder);
   ordered_json info = {{"kind", "model"},
                        {"method", manifest ? manifest->method : "field"},
                        {"step", manifest ? manifest->step : 0},
                        {"planned_steps", manifest ? manifest->plannedSteps : 0},
-                       {"capture", placement.capture.string()},
-                       {"parameters", config.shape().grid.parameters() + config.shape().density.parameters() +
-                                          config.shape().colour.parameters()}};
-  for (const ConfigField& field : config.fields()) info["config"][std::string(field.name)] = configValueText(field);
+                       {"capture", placement.capture.string()}};
+  const auto describeConfig = [&](const std::vector<ConfigField>& fields) {
+    for (const ConfigField& field : fields) info["config"][std::string(field.name)] = configValueText(field);
+  };
+  if (info["method"] == "volume") {
+    VolumeConfig config = savedConfig<VolumeConfig>(folder);
+    const BlockFieldShape attributes = config.attributeShape(), proposals = config.proposalShape();
+    info["blocks"] = {{"columns", placement.grid ? placement.grid->columns : 0},
+                      {"rows", placement.grid ? placement.grid->rows : 0},
+                      {"edge", placement.grid ? placement.grid->edge : 0}};
+    info["parameters_per_block"] = attributes.grid.parameters() + attributes.network.parameters() +
+                                   proposals.grid.parameters() + proposals.network.parameters();
+    describeConfig(config.fields());
+    return info;
+  }
+  FieldConfig config = savedConfig<FieldConfig>(folder);
+  info["parameters"] =
+      config.shape().grid.parameters() + config.shape().density.parameters() + config.shape().colour.parameters();
+  describeConfig(config.fields());
   return info;
 }
 

@@ -1,12 +1,11 @@
 #include <fmt/format.h>
 
+#include "apps/tessera/drawable.h"
 #include "apps/tessera/verbs.h"
 #include "base/progress.h"
 #include "eval/evaluate.h"
 #include "eval/render_views.h"
 #include "import/capture_reader.h"
-#include "representations/field/field_renderer.h"
-#include "train/model_folder.h"
 
 namespace tessera {
 namespace {
@@ -52,22 +51,21 @@ void addRenderVerb(CLI::App& app) {
     if (flags->views.empty() && flags->path.empty()) throw CLI::RequiredError("--views or --path");
     RenderViewsOptions options;
     parseSize(flags->size, options);
+    const std::unique_ptr<Device> device = makeDevice(flags->device);
+    const std::unique_ptr<Drawable> drawable = openDrawable(*device, flags->model);
     std::vector<NamedView> views;
     if (!flags->path.empty()) {
       const CameraPath path = readCameraPath(flags->path, flags->dataparserTransforms);
-      views = viewsOfPath(path, ModelFolder(flags->model).readPlacement().sourceFromWorld);
+      views = viewsOfPath(path, drawable->sourceFromWorld());
       options.framesPerSecond = path.framesPerSecond;
     } else {
       const Capture capture = readCapture(flags->views);
-      requireSameWorld(ModelFolder(flags->model), capture);
+      drawable->requireWorldOf(capture);
       views = viewsOfCapture(capture, splitFromName(flags->split));  // all: no split
     }
-    const std::unique_ptr<Device> device = makeDevice(flags->device);
-    const std::unique_ptr<FieldModel> model = loadFieldModel(*device, flags->model);
-    FieldRenderer renderer(*model);
     Progress progress("rendering", static_cast<int64_t>(views.size()), "frames");
     options.onView = [&progress](size_t done) { progress.update(static_cast<int64_t>(done)); };
-    renderViews(renderer, views, flags->out, options);
+    renderViews(drawable->renderer(), views, flags->out, options);
     progress.finish();
     fmt::print("{}: {} frames\n", flags->out, views.size());
   });

@@ -6,6 +6,8 @@
 #include "base/log.h"
 #include "import/capture_reader.h"
 #include "representations/field/train_field.h"
+#include "representations/volume/train_volume.h"
+#include "train/run_folder.h"
 
 namespace tessera {
 namespace {
@@ -21,53 +23,83 @@ CLI::Validator amount(double low, double high) {
       fmt::format("FLOAT in [{} - {}]", low, high));
 }
 
+struct TrainFlags {
+  std::string method = "field", configFile, blocks = "auto";
+  std::vector<std::string> settings;
+  std::string seed;
+  DeviceOptions device;
+  std::string capture, model;
+  TrainingLoopOptions loop;
+  bool json = false;
+};
+
+// Settings in the order of their strength: defaults (of a preset), the run that is resumed, --config, --set.
+template <class Config>
+Config chosenConfig(const TrainFlags& flags, Config config) {
+  if (flags.loop.resume && ModelFolder(flags.model).manifest()) config = savedConfig<Config>(flags.model);
+  if (!flags.configFile.empty()) configFromToml(config.fields(), flags.configFile);
+  for (const std::string& setting : flags.settings) setConfigField(config.fields(), setting);
+  if (!flags.seed.empty()) setConfigField(config.fields(), "seed=" + flags.seed);
+  if (flags.loop.resume) requireSameConfig(flags.model, config);
+  return config;
+}
+
+VolumeConfig volumeDefaults(const TrainFlags& flags) {
+  VolumeConfig config;
+  constexpr std::string_view kPreset = "preset=";
+  for (const std::string& setting : flags.settings) {
+    if (setting.starts_with(kPreset)) config = VolumeConfig::ofPreset(setting.substr(kPreset.size()));
+  }
+  return config;
+}
+
+TrainingResult train(Device& device, const TrainFlags& flags) {
+  const Capture capture = readCapture(flags.capture);
+  if (flags.method == "field")
+    return trainField(device, capture, flags.model, {chosenConfig(flags, FieldConfig()), flags.loop});
+  const std::optional<BlockCount> blocks = parseBlockCount(flags.blocks);
+  if (!blocks) throw CLI::ValidationError("--blocks", "'" + flags.blocks + "' is neither auto nor of the form 2x2");
+  return trainVolume(device, capture, flags.model, {chosenConfig(flags, volumeDefaults(flags)), flags.loop, *blocks});
+}
+
 }  // namespace
 
 void addTrainVerb(CLI::App& app) {
-  struct Flags {
-    std::string method = "field", configFile;
-    std::vector<std::string> settings;
-    std::string seed;
-    DeviceOptions device;
-    std::string capture, model;
-    TrainFieldOptions options;
-    bool json = false;
-  };
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<TrainFlags>();
   CLI::App* verb = app.add_subcommand("train", "a capture to a model");
-  FieldConfig defaults;
-  verb->footer("Settings for --set and --config, with their defaults:\n" + configToToml(defaults.fields()) +
-               "\nExample:\n  tessera train fox.capture fox.model --method field --minutes 10");
+  verb->footer("Settings of --method field for --set and --config, with their defaults:\n" +
+               configToToml(FieldConfig().fields()) + "\nSettings of --method volume:\n" +
+               configToToml(VolumeConfig().fields()) +
+               "\nExamples:\n  tessera train fox.capture fox.model --method field --minutes 10\n"
+               "  tessera train city.capture city.model --method volume --blocks 2x2 --minutes 15");
   verb->add_option("capture", flags->capture, "capture folder")->required();
   verb->add_option("model", flags->model, "model folder to write")->required();
-  verb->add_option("--method", flags->method, "representation")->capture_default_str()->check(CLI::IsMember({"field"}));
-  CLI::Option* steps = verb->add_option("--steps", flags->options.loop.steps, "training steps")
+  verb->add_option("--method", flags->method, "representation")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"field", "volume"}));
+  CLI::Option* steps = verb->add_option("--steps", flags->loop.steps, "training steps")
                            ->capture_default_str()
                            ->check(CLI::Range(int64_t{1}, int64_t{1} << 40));
-  verb->add_option("--minutes", flags->options.loop.minutes, "as many steps as fit; fixed once, early")
+  verb->add_option("--minutes", flags->loop.minutes, "as many steps as fit; fixed once, early")
       ->check(amount(1e-3, 1e7))
       ->excludes(steps);
-  verb->add_flag("--resume", flags->options.loop.resume, "go on with the model that is in the folder");
+  verb->add_flag("--resume", flags->loop.resume, "go on with the model that is in the folder");
+  verb->add_option("--blocks", flags->blocks, "of --method volume: auto, or so many along x and y, as 3x2")
+      ->capture_default_str();
   verb->add_option("--seed", flags->seed, "of everything random, a whole number; the same as --set seed=...");
   verb->add_option("--config", flags->configFile, "settings file (TOML)")->check(CLI::ExistingFile);
   verb->add_option("--set", flags->settings, "key=value, as often as wanted");
-  verb->add_option("--checkpoint-seconds", flags->options.loop.checkpointSeconds, "time between checkpoints")
+  verb->add_option("--checkpoint-seconds", flags->loop.checkpointSeconds, "time between checkpoints")
       ->capture_default_str()
       ->check(amount(0, 1e9));
   verb->add_flag("--json", flags->json, "print the result as one JSON object");
   addDeviceFlags(*verb, flags->device);
-  flags->options.loop.steps = 10000;
+  flags->loop.steps = 10000;
   verb->callback([flags] {
-    FieldConfig& config = flags->options.config;
-    if (flags->options.loop.resume) config = resumedFieldConfig(flags->model);
-    if (!flags->configFile.empty()) configFromToml(config.fields(), flags->configFile);
-    for (const std::string& setting : flags->settings) setConfigField(config.fields(), setting);
-    if (!flags->seed.empty()) setConfigField(config.fields(), "seed=" + flags->seed);
-    if (flags->options.loop.resume) requireSameConfig(flags->model, config);
     catchInterrupts();
-    flags->options.loop.stopRequested = interrupted;
+    flags->loop.stopRequested = interrupted;
     const std::unique_ptr<Device> device = makeDevice(flags->device);
-    const TrainingResult result = trainField(*device, readCapture(flags->capture), flags->model, flags->options);
+    const TrainingResult result = train(*device, *flags);
     if (flags->json) {
       fmt::print(
           "{{\"step\": {}, \"planned_steps\": {}, \"finished\": {}, \"seconds\": {:.3f}, \"psnr\": {:.4f}, "

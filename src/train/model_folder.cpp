@@ -8,6 +8,7 @@
 #include <unordered_set>
 
 #include "base/error.h"
+#include "scene/block_grid_json.h"
 
 namespace tessera {
 namespace {
@@ -92,14 +93,22 @@ void ModelFolder::writePlacement(const ModelPlacement& placement, const std::str
   const Vec3d& centre = placement.frame.centre;
   json sourceFromWorld = json::array();
   for (int i = 0; i < 16; ++i) sourceFromWorld.push_back(placement.sourceFromWorld(i / 4, i % 4));
-  const json text = {
-      {"method", method},
-      {"capture", fs::absolute(placement.capture).lexically_normal().string()},
-      {"source_from_world", sourceFromWorld},
-      {"trained_on", placement.trainedOn},
-      {"blocks",
-       json::array(
-           {{{"id", "0"}, {"centre", {centre.x(), centre.y(), centre.z()}}, {"scale", placement.frame.scale}}})}};
+  json blocks =
+      json::array({{{"id", "0"}, {"centre", {centre.x(), centre.y(), centre.z()}}, {"scale", placement.frame.scale}}});
+  if (placement.grid) {
+    blocks.clear();
+    for (int cell = 0; cell < placement.grid->cells(); ++cell) {
+      const Vec2d inGrid = placement.grid->centre(cell);
+      const Vec3d inWorld = placement.grid->inWorld({inGrid.x(), inGrid.y(), 0});
+      blocks.push_back({{"id", std::to_string(cell)}, {"centre", {inWorld.x(), inWorld.y(), inWorld.z()}}});
+    }
+  }
+  json text = {{"method", method},
+               {"capture", fs::absolute(placement.capture).lexically_normal().string()},
+               {"source_from_world", sourceFromWorld},
+               {"trained_on", placement.trainedOn},
+               {"blocks", blocks}};
+  if (placement.grid) text["grid"] = blockGridToJson(*placement.grid);
   writeFileAtomically(root_ / "blocks.json", text.dump(2) + "\n");
 }
 
@@ -107,14 +116,20 @@ ModelPlacement ModelFolder::readPlacement() const {
   const fs::path path = root_ / "blocks.json";
   const json parsed = parseJson(path);
   try {
-    const json& block = parsed.at("blocks").at(0);
     ModelPlacement placement;
-    for (int axis = 0; axis < 3; ++axis) {
-      placement.frame.centre[axis] = block.at("centre").at(axis).get<double>();
+    if (parsed.contains("grid")) {
+      placement.grid = blockGridFromJson(parsed["grid"]);
+      if (!placement.grid)
+        throw Error(path.string(), "grid", "is no grid of blocks", "restore the file or train again");
+    } else {
+      const json& block = parsed.at("blocks").at(0);
+      for (int axis = 0; axis < 3; ++axis) {
+        placement.frame.centre[axis] = block.at("centre").at(axis).get<double>();
+      }
+      placement.frame.scale = block.at("scale").get<double>();
     }
     for (int i = 0; i < 16; ++i)
       placement.sourceFromWorld(i / 4, i % 4) = parsed.at("source_from_world").at(i).get<double>();
-    placement.frame.scale = block.at("scale").get<double>();
     placement.capture = parsed.at("capture").get<std::string>();
     placement.trainedOn = parsed.at("trained_on").get<std::vector<std::string>>();
     return placement;

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "base/file.h"
+#include "scene/block_grid.h"
 #include "train/scene_frame.h"
 
 namespace tessera {
@@ -28,6 +29,7 @@ struct StepPlan {
 
 struct ModelPlacement {
   SceneFrame frame;
+  std::optional<BlockGrid> grid;              // of models of several blocks; their frame follows from it
   Mat4d sourceFromWorld = Mat4d::Identity();  // of the capture: camera paths speak of the source's world
   fs::path capture;
   std::vector<std::string> trainedOn;  // names of photos, in the capture's order
@@ -43,8 +45,8 @@ class ModelFolder {
 
   // Nothing when there is no manifest; Error when there is one that cannot be understood or names a missing file.
   std::optional<ModelManifest> manifest() const;
-  // Writes the checkpoints one after another (`save` gives each part's bytes), then the manifest, then removes older checkpoints
-  // but the last `keep`.
+  // Writes the checkpoints one after another (`save` gives each part's bytes), then the manifest, then removes older
+  // checkpoints but the last `keep`.
   void commit(const ModelManifest& state, uint32_t parts, const std::function<Bytes(uint32_t part)>& save,
               int keep = 2) const;
 

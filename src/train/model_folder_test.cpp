@@ -58,9 +58,11 @@ TEST(ModelFolder, ComesBackAsCommitted) {
 TEST(ModelFolder, KeepsTheLastCheckpointsOnly) {
   const TestFolder folder;
   const ModelFolder model(folder.path());
-  for (const int64_t step : {8, 9, 10, 100}) model.commit({"field", step, 100, {}}, 1, [](uint32_t) { return block(10, 1); });
+  for (const int64_t step : {8, 9, 10, 100})
+    model.commit({"field", step, 100, {}}, 1, [](uint32_t) { return block(10, 1); });
   EXPECT_EQ(blockFiles(folder.path()), (std::vector<std::string>{"step-10.safetensors", "step-100.safetensors"}));
-  model.commit({"field", 101, 200, {}}, 1, [](uint32_t) { return block(10, 1); }, 1);
+  model.commit(
+      {"field", 101, 200, {}}, 1, [](uint32_t) { return block(10, 1); }, 1);
   EXPECT_EQ(blockFiles(folder.path()), (std::vector<std::string>{"step-101.safetensors"}));
 }
 
@@ -87,7 +89,8 @@ TEST(ModelFolder, NeverRemovesTheBlockThatItsManifestNames) {
   const TestFolder folder;
   const ModelFolder model(folder.path());
   // What a longer run left behind must not crowd out what is written now.
-  for (const int64_t step : {500, 600}) model.commit({"field", step, 600, {}}, 1, [](uint32_t) { return block(10, 1); });
+  for (const int64_t step : {500, 600})
+    model.commit({"field", step, 600, {}}, 1, [](uint32_t) { return block(10, 1); });
   fs::remove(folder / "manifest.json");
   model.commit({"field", 5, 600, {}}, 1, [](uint32_t) { return block(10, 2); });
   ASSERT_TRUE(model.manifest());

@@ -69,9 +69,10 @@ Start startingPoint(Trainee& trainee, const ModelFolder& folder, const TrainingL
                   "resume with that method");
     }
     if (found->files.size() != trainee.parts()) {
-      throw Error(folder.root().string(), "manifest.json",
-                  fmt::format("names {} checkpoints where the model has {} parts", found->files.size(), trainee.parts()),
-                  "restore the file or train again");
+      throw Error(
+          folder.root().string(), "manifest.json",
+          fmt::format("names {} checkpoints where the model has {} parts", found->files.size(), trainee.parts()),
+          "restore the file or train again");
     }
     for (uint32_t part = 0; part < trainee.parts(); ++part) {
       const fs::path file = folder.root() / found->files[part];

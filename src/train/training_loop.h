@@ -29,9 +29,10 @@ class Trainee {
   virtual void restore(uint32_t part, const fs::path& path, const Safetensors& state) = 0;
 };
 
-// Throws Error when a checkpoint says that it is of another kind; warns when it was trained on another device, which is as good,
-// but not the same bits.
-void requireFormat(const fs::path& path, const Safetensors& state, const std::string& format, const std::string& method);
+// Throws Error when a checkpoint says that it is of another kind; warns when it was trained on another device, which is
+// as good, but not the same bits.
+void requireFormat(const fs::path& path, const Safetensors& state, const std::string& format,
+                   const std::string& method);
 void warnOfOtherDevice(const fs::path& path, const Safetensors& state, const std::string& target);
 
 struct TrainingLoopOptions {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "train/model_folder.h"
+#include "train/run_folder.h"
 
 namespace tessera {
 namespace {
@@ -145,15 +145,11 @@ void FieldModel::restore(const fs::path& path, const Safetensors& file) {
 
 std::unique_ptr<FieldModel> loadFieldModel(Device& device, const fs::path& folder) {
   const ModelFolder model(folder);
-  const std::optional<ModelManifest> manifest = model.manifest();
-  if (!manifest) {
-    throw Error(folder.string(), "manifest.json", "there is none: this is no trained model",
-                "train one with: tessera train CAPTURE " + folder.string() + " --method field");
-  }
+  const ModelManifest manifest = requireManifest(model, "field");
   FieldConfig config;
   configFromToml(config.fields(), model.configPath());
   auto made = std::make_unique<FieldModel>(device, config, model.readPlacement().frame);
-  const fs::path file = folder / manifest->files.at(0);
+  const fs::path file = folder / manifest.files.at(0);
   made->restore(file, readSafetensors(file));
   return made;
 }

@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "representations/field/cube_scene.h"
 #include "representations/field/field_renderer.h"
+#include "train/run_folder.h"
 
 namespace tessera {
 namespace {
@@ -28,7 +29,7 @@ TEST(TrainField, EndsWithTheSameBytesHoweverOftenItIsStopped) {
   trainField(*device, scene.capture(), scene / "unbroken", options(60));
   for (const int64_t stopAfter : {1, 7, 8, 30, 100}) {
     TrainFieldOptions some = options(60, true);
-    some.config = resumedFieldConfig(scene / "broken");
+    some.config = savedConfig<FieldConfig>(scene / "broken");
     if (stopAfter == 1) some.config = cubeConfig();
     int64_t asked = 0;
     some.loop.stopRequested = [&] { return asked++ >= stopAfter; };
@@ -45,7 +46,7 @@ TEST(TrainField, LeavesAFolderThatRepeatsAndDraws) {
   TrainFieldOptions some = options(12);
   some.config.seed = 42;
   trainField(*device, scene.capture(), scene / "model", some);
-  FieldConfig found = resumedFieldConfig(scene / "model");
+  FieldConfig found = savedConfig<FieldConfig>(scene / "model");
   EXPECT_EQ(configToToml(found.fields()), configToToml(some.config.fields()));
   // Drawn from the folder as by the model that was trained.
   const std::unique_ptr<FieldModel> loaded = loadFieldModel(*device, scene / "model");
@@ -98,15 +99,11 @@ TEST(TrainField, GivesPhotosHalfOfTheMemoryWhereAllDoNotFit) {
   const std::vector<int> photos = scene.capture().photosIn(Split::train);
   const int64_t all = static_cast<int64_t>(photos.size()) * CubeScene::kWidth * CubeScene::kHeight * 4;
   ASSERT_EQ(decodedBytes(scene.capture(), photos), static_cast<size_t>(all));
-  FieldConfig config;
-  settlePhotoBudget(config, scene.capture(), 2 * all);
-  EXPECT_EQ(config.photoBudgetMiB, 0);
-  settlePhotoBudget(config, scene.capture(), 2 * all - 2);
-  EXPECT_GT(config.photoBudgetMiB, 0);
-  EXPECT_LE(config.photoBudgetMiB * 1048576, static_cast<double>(all) - 1);
-  config.photoBudgetMiB = 0.5;
-  settlePhotoBudget(config, scene.capture(), 1000);
-  EXPECT_EQ(config.photoBudgetMiB, 0.5);
+  EXPECT_EQ(settledPhotoBudget(0, scene.capture(), 2 * all), 0);
+  const double half = settledPhotoBudget(0, scene.capture(), 2 * all - 2);
+  EXPECT_GT(half, 0);
+  EXPECT_LE(half * 1048576, static_cast<double>(all) - 1);
+  EXPECT_EQ(settledPhotoBudget(0.5, scene.capture(), 1000), 0.5);
 }
 
 TEST(TrainField, NamesACheckpointThatIsBroken) {

@@ -1,4 +1,5 @@
-// Draws a volume model as it trains: by proposals, with the networks evaluated at texels. The picture that baking is held against.
+// Draws a volume model as it trains: by proposals, with the networks evaluated at texels. The picture that baking is
+// held against.
 #pragma once
 
 #include "representations/volume/volume_pass.h"
@@ -8,7 +9,8 @@ namespace tessera {
 
 class VolumeModelRenderer final : public ViewRenderer {
  public:
-  // Samples whose renderer's step is less opaque than `minAlpha` are culled, as baking does. Keeps a reference to `model`.
+  // Samples whose renderer's step is less opaque than `minAlpha` are culled, as baking does. Keeps a reference to
+  // `model`.
   VolumeModelRenderer(VolumeModel& model, float minAlpha);
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;

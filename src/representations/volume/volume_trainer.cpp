@@ -110,8 +110,8 @@ void VolumeTrainer::addColourGradients(int64_t step) {
   const Count rays{rays_};
   const Slice<const uint32_t> photoOfRay = photoRays_.photoOfRay(0, rays_);
   const Slice<const float> backgrounds = photoRays_.backgrounds(0, rays_);
-  device_.run(ExposureForward{rays, pass_.colour(), pass_.opacity(), backgrounds, photoOfRay, exposures_.logGains(),
-                              exposed_});
+  device_.run(
+      ExposureForward{rays, pass_.colour(), pass_.opacity(), backgrounds, photoOfRay, exposures_.logGains(), exposed_});
   ColourLoss loss;
   loss.kind = colourLossKind(config_.loss);
   loss.parameter = static_cast<float>(config_.lossParameter);

@@ -1,0 +1,26 @@
+// What a MODEL|SCENE argument names: something that can be drawn.
+#pragma once
+
+#include <memory>
+
+#include "base/file.h"
+#include "compute/device.h"
+#include "scene/capture.h"
+#include "scene/view_renderer.h"
+
+namespace tessera {
+
+class Drawable {
+ public:
+  virtual ~Drawable() = default;
+  virtual ViewRenderer& renderer() = 0;
+  virtual Mat4d sourceFromWorld() const = 0;
+  // Throws Error when the capture's world is another one.
+  virtual void requireWorldOf(const Capture& capture) const = 0;
+  virtual std::vector<std::string> trainedOnAmong(const Capture& capture, Split split) const = 0;
+};
+
+// Throws Error when the folder holds neither. Keeps a reference to `device`.
+std::unique_ptr<Drawable> openDrawable(Device& device, const fs::path& folder);
+
+}  // namespace tessera

@@ -1,0 +1,60 @@
+#include "train/run_folder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/log.h"
+#include "train/photo_window.h"
+
+namespace tessera {
+
+void refuseCaptureFolder(const fs::path& model) {
+  if (!fs::exists(model / "transforms.json")) return;
+  throw Error(model.string(), "", "holds a capture or photos", "name another folder for the model");
+}
+
+// The rest of what a run is made of stands in blocks.json (which capture) and manifest.json (how many steps).
+std::string howToRepeat(const Device& device, const TrainingLoopOptions& loop) {
+  return fmt::format(
+      "# tessera train CAPTURE MODEL --method {} --config THIS_FILE --steps {}\n"
+      "# CAPTURE: see blocks.json. Computed on {}.\n\n",
+      loop.method, loop.minutes > 0 ? "PLANNED_STEPS_OF_manifest.json" : std::to_string(loop.steps), device.target());
+}
+
+double settledPhotoBudget(double wanted, const Capture& capture, int64_t usableMemory) {
+  constexpr double kMiB = 1048576;
+  if (wanted > 0) return wanted;
+  const double most = static_cast<double>(usableMemory) / 2;
+  const double all = static_cast<double>(decodedBytes(capture, capture.photosIn(Split::train)));
+  if (all <= most) return 0;
+  const double budget = std::max(0.001, std::floor(most / kMiB * 1000) / 1000);
+  inform("the training photos take {:.0f} MiB decoded, more than half of the memory there is: photo_budget_mib is {}",
+         all / kMiB, budget);
+  return budget;
+}
+
+ModelManifest requireManifest(const ModelFolder& folder, const std::string& method) {
+  const std::optional<ModelManifest> manifest = folder.manifest();
+  if (!manifest) {
+    throw Error(folder.root().string(), "manifest.json", "there is none: this is no trained model",
+                "train one with: tessera train CAPTURE " + folder.root().string() + " --method " + method);
+  }
+  if (manifest->method == method) return *manifest;
+  throw Error(folder.root().string(), "manifest.json",
+              "is of --method " + manifest->method + ", where " + method + " is wanted", "name another model");
+}
+
+void requireSameSettings(const fs::path& model, const std::vector<ConfigField>& saved,
+                         const std::vector<ConfigField>& now) {
+  for (size_t i = 0; i < now.size(); ++i) {
+    const std::string was = configValueText(saved[i]), is = configValueText(now[i]);
+    if (was == is) continue;
+    throw Error(model.string(), "config.toml", fmt::format("the run has {}={}, not {}", now[i].name, was, is),
+                "resume without that setting, or train into another folder");
+  }
+}
+
+}  // namespace tessera
