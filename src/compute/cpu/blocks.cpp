@@ -18,6 +18,13 @@ namespace {
 constexpr size_t kRaysPerTask = 64;
 constexpr size_t kRowsPerTask = 4096;
 
+// Where the middles of a ray's samples are in the scene, and room for another number of each.
+struct Middles {
+  std::vector<double> x, y, z, squares;
+
+  explicit Middles(size_t most) : x(most), y(most), z(most), squares(most) {}
+};
+
 // A BlockSpace with what each sample needs of it.
 class Blocks {
  public:
@@ -26,8 +33,7 @@ class Blocks {
     bool contracted;
   };
 
-  Blocks(const BlockSpace& space, uint32_t texels)
-      : space(space), width_(space.columns), depth_(space.rows), own_(space.surround == Surround::own) {
+  Blocks(const BlockSpace& space, uint32_t texels) : space_(space) {
     for (uint32_t block = 0; block < space.blocks(); ++block) {
       const BlockSpace::Placement placement = space.placement(block);
       Place& place = places_.emplace_back();
@@ -41,35 +47,56 @@ class Blocks {
     }
   }
 
-  uint32_t at(double x, double y, double z) const {
-    const bool inBox = std::abs(x) <= width_ && std::abs(y) <= depth_ && z >= space.bottom && z <= space.top;
-    if (own_ && !inBox) return space.cells();
-    const double i = (x + width_) / 2, j = (y + depth_) / 2;
-    const uint32_t column = i > 0 ? static_cast<uint32_t>(static_cast<int32_t>(std::min(i, width_ - 1))) : 0;
-    const uint32_t row = j > 0 ? static_cast<uint32_t>(static_cast<int32_t>(std::min(j, depth_ - 1))) : 0;
-    return column + space.columns * row;
+  // As BlockSpace::blockAt, for `count` points.
+  void find(const Middles& at, uint32_t count, uint32_t* block) const {
+    const double *const xs = at.x.data(), *const ys = at.y.data(), *const zs = at.z.data();
+    const double width = space_.columns, depth = space_.rows, bottom = space_.bottom, top = space_.top;
+    const int32_t columns = static_cast<int32_t>(space_.columns), cells = static_cast<int32_t>(space_.cells());
+    const bool inside = space_.surround != Surround::own;
+    for (uint32_t i = 0; i < count; ++i) {
+      const double x = xs[i], y = ys[i], z = zs[i];
+      const bool inBox = (std::abs(x) <= width) & (std::abs(y) <= depth) & (z >= bottom) & (z <= top);
+      const auto column = static_cast<int32_t>(std::max(0.0, std::min((x + width) / 2, width - 1)));
+      const auto row = static_cast<int32_t>(std::max(0.0, std::min((y + depth) / 2, depth - 1)));
+      const int32_t cell = column + columns * row;
+      block[i] = static_cast<uint32_t>(inside | inBox ? cell : cells);
+    }
   }
   const Place& place(uint32_t block) const { return places_[block]; }
 
-  const BlockSpace& space;
-
  private:
-  double width_, depth_;
-  bool own_;
+  const BlockSpace& space_;
   std::vector<Place> places_;
 };
 
-double lengthOf(const Triple<double>& x) {
-  return std::sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
-}
+// scene/contraction.h again for millions of samples: selections only, which compilers turn into vectors.
+struct Contraction {
+  double x, y, z;              // contracted
+  double inverse;              // 1 / max(1, m)
+  double signX, signY, signZ;  // of the coordinate, for the farthest one outside the cube; else 0
 
-float runtimeStepAt(const Blocks::Place& place, const Triple<double>& q, const double direction[3]) {
-  Triple<double> along;
-  for (int a = 0; a < 3; ++a) along[a] = direction[a] * place.inverseScale[a];
-  if (place.contracted) along = contractDirection(q, along);
-  const double speed = lengthOf(along);
-  return speed > 0 ? static_cast<float>(place.texel / speed) : 0;
-}
+  Contraction(double qx, double qy, double qz) {
+    const double ax = std::abs(qx), ay = std::abs(qy), az = std::abs(qz), m = std::max(ax, std::max(ay, az));
+    const double one = m > 1 ? 1.0 : 0.0;
+    inverse = 1 / std::max(1.0, m);
+    const double oneY = ax == m ? 0.0 : one, oneZ = ay == m ? 0.0 : oneY;
+    signX = std::copysign(ax == m ? one : 0.0, qx);
+    signY = std::copysign(ay == m ? oneY : 0.0, qy);
+    signZ = std::copysign(oneZ, qz);
+    // Of the farthest q · inverse is ±1.
+    const double more = 1 - inverse;
+    x = qx * inverse + signX * more;
+    y = qy * inverse + signY * more;
+    z = qz * inverse + signZ * more;
+  }
+  // The squared length of contractDirection(q, d): with m growing by g, (d - q g / m) / m, which vanishes along the
+  // farthest axis, and g / m² there.
+  double squareSpeed(double qx, double qy, double qz, double dx, double dy, double dz) const {
+    const double radial = (signX * dx + signY * dy + signZ * dz) * (inverse * inverse);
+    const double vx = dx * inverse - qx * radial, vy = dy * inverse - qy * radial, vz = dz * inverse - qz * radial;
+    return vx * vx + vy * vy + vz * vz + radial * radial;
+  }
+};
 
 struct Ray {
   double origin[3], direction[3], near, far, farthest;
@@ -147,9 +174,70 @@ uint32_t findEnds(const BlockSamples& a, const Ray& ray, const std::vector<Cut>&
   return samples;
 }
 
+void findMiddles(const Ray& ray, const double* t, uint32_t samples, Middles& at, float* __restrict distances,
+                 float* __restrict steps) {
+  double* __restrict xs = at.x.data();
+  double* __restrict ys = at.y.data();
+  double* __restrict zs = at.z.data();
+  const double ox = ray.origin[0], oy = ray.origin[1], oz = ray.origin[2];
+  const double dx = ray.direction[0], dy = ray.direction[1], dz = ray.direction[2];
+  const double farthest = ray.exists() ? ray.farthest : 0;  // no step passes it
+  for (uint32_t i = 0; i < samples; ++i) {
+    const double middle = (t[i] + t[i + 1]) / 2;
+    xs[i] = ox + middle * dx;
+    ys[i] = oy + middle * dy;
+    zs[i] = oz + middle * dz;
+    distances[i] = static_cast<float>(middle);
+    steps[i] = static_cast<float>(std::max(0.0, std::min(t[i + 1], farthest) - std::min(t[i], farthest)));
+  }
+}
+
+// Rows of one ray in one bounded block: row i is that of middle `first + i`.
+void writeBounded(const Blocks::Place& place, const Middles& at, uint32_t first, uint32_t count,
+                  float* __restrict positions, float* __restrict steps) {
+  const double *const xs = at.x.data() + first, *const ys = at.y.data() + first, *const zs = at.z.data() + first;
+  const double cx = place.centre[0], cy = place.centre[1], cz = place.centre[2];
+  for (uint32_t i = 0; i < count; ++i) {
+    const double x = xs[i] - cx, y = ys[i] - cy, z = zs[i] - cz;
+    const double m = std::max(std::abs(x), std::max(std::abs(y), std::abs(z)));
+    steps[i] = m > 1 ? 0 : steps[i];
+    positions[3 * i] = static_cast<float>(std::min(1.0, std::max(0.0, x * 0.5 + 0.5)));
+    positions[3 * i + 1] = static_cast<float>(std::min(1.0, std::max(0.0, y * 0.5 + 0.5)));
+    positions[3 * i + 2] = static_cast<float>(std::min(1.0, std::max(0.0, z * 0.5 + 0.5)));
+  }
+}
+
+// In one contracted block; `along` is the direction in its local coordinates. Leaves the contracted middles in `at`.
+void writeContracted(const Blocks::Place& place, Middles& at, uint32_t first, uint32_t count, const double along[3],
+                     float* __restrict positions, float* __restrict runtimeSteps) {
+  double* __restrict xs = at.x.data() + first;
+  double* __restrict ys = at.y.data() + first;
+  double* __restrict zs = at.z.data() + first;
+  double* __restrict squares = at.squares.data() + first;
+  const double cx = place.centre[0], cy = place.centre[1], cz = place.centre[2];
+  const double sx = place.inverseScale[0], sy = place.inverseScale[1], sz = place.inverseScale[2];
+  const double dx = along[0], dy = along[1], dz = along[2], texel = place.texel;
+  for (uint32_t i = 0; i < count; ++i) {
+    const double x = (xs[i] - cx) * sx, y = (ys[i] - cy) * sy, z = (zs[i] - cz) * sz;
+    const Contraction contraction(x, y, z);
+    squares[i] = contraction.squareSpeed(x, y, z, dx, dy, dz);
+    xs[i] = contraction.x;
+    ys[i] = contraction.y;
+    zs[i] = contraction.z;
+  }
+  if (runtimeSteps) {
+    for (uint32_t i = 0; i < count; ++i) runtimeSteps[i] = static_cast<float>(texel / std::sqrt(squares[i]));
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    positions[3 * i] = static_cast<float>(xs[i] * 0.25 + 0.5);
+    positions[3 * i + 1] = static_cast<float>(ys[i] * 0.25 + 0.5);
+    positions[3 * i + 2] = static_cast<float>(zs[i] * 0.25 + 0.5);
+  }
+}
+
 // Writes the rows of one ray; returns how many segments they are.
 uint32_t writeSamples(const BlockSamples& a, const Blocks& blocks, const Ray& ray, const double* s, const double* t,
-                      uint32_t samples, size_t row) {
+                      uint32_t samples, size_t row, Middles& at) {
   uint32_t* const blockOfSample = hostPointer(a.blockOfSample) + row;
   float* const positions = hostPointer(a.positions) + 3 * row;
   float* const distances = hostPointer(a.distances) + row;
@@ -157,42 +245,27 @@ uint32_t writeSamples(const BlockSamples& a, const Blocks& blocks, const Ray& ra
   float* const middles = a.middles ? hostPointer(a.middles) + row : nullptr;
   float* const widths = a.widths ? hostPointer(a.widths) + row : nullptr;
   float* const runtimeSteps = a.runtimeSteps ? hostPointer(a.runtimeSteps) + row : nullptr;
-  const double farthest = ray.exists() ? ray.farthest : 0;  // no step passes it
-  for (uint32_t i = 0; i < samples; ++i) {
-    distances[i] = static_cast<float>((t[i] + t[i + 1]) / 2);
-    const double step = std::min(t[i + 1], farthest) - std::min(t[i], farthest);
-    steps[i] = static_cast<float>(std::max(0.0, step));
-  }
+  findMiddles(ray, t, samples, at, distances, steps);
   for (uint32_t i = 0; middles && i < samples; ++i) middles[i] = static_cast<float>((s[i] + s[i + 1]) / 2);
   for (uint32_t i = 0; widths && i < samples; ++i) widths[i] = static_cast<float>(s[i + 1] - s[i]);
-  uint32_t segments = 0, before = std::numeric_limits<uint32_t>::max();
-  const Blocks::Place* place = nullptr;
-  float texelStep = 0;  // of a bounded block: the same all along the ray
-  for (uint32_t i = 0; i < samples; ++i) {
-    const double middle = (t[i] + t[i + 1]) / 2;
-    const double x[3] = {ray.origin[0] + middle * ray.direction[0], ray.origin[1] + middle * ray.direction[1],
-                         ray.origin[2] + middle * ray.direction[2]};
-    const uint32_t block = blocks.at(x[0], x[1], x[2]);
-    if (block != before) {
-      before = block;
-      ++segments;
-      place = &blocks.place(block);
-      if (runtimeSteps && !place->contracted) texelStep = runtimeStepAt(*place, {}, ray.direction);
-    }
-    blockOfSample[i] = block;
-    Triple<double> q;
-    for (int axis = 0; axis < 3; ++axis) q[axis] = (x[axis] - place->centre[axis]) * place->inverseScale[axis];
-    if (place->contracted) {
-      if (runtimeSteps) runtimeSteps[i] = runtimeStepAt(*place, q, ray.direction);
-      q = contract(q);
+  blocks.find(at, samples, blockOfSample);
+  uint32_t segments = 0;
+  for (uint32_t first = 0, end = 0; first < samples; first = end) {
+    const uint32_t block = blockOfSample[first];
+    while (end < samples && blockOfSample[end] == block) ++end;
+    ++segments;
+    const Blocks::Place& place = blocks.place(block);
+    double along[3];  // the direction in local coordinates
+    for (int axis = 0; axis < 3; ++axis) along[axis] = ray.direction[axis] * place.inverseScale[axis];
+    if (place.contracted) {
+      writeContracted(place, at, first, end - first, along, positions + 3 * first,
+                      runtimeSteps ? runtimeSteps + first : nullptr);
     } else {
-      if (runtimeSteps) runtimeSteps[i] = texelStep;
-      const double farthestOut = std::max(std::max(std::abs(q[0]), std::abs(q[1])), std::abs(q[2]));
-      if (farthestOut > 1) steps[i] = 0;
+      writeBounded(place, at, first, end - first, positions + 3 * first, steps + first);
     }
-    const double scale = 0.5 / place->half;
-    for (int axis = 0; axis < 3; ++axis) {
-      positions[3 * i + axis] = static_cast<float>(std::min(1.0, std::max(0.0, q[axis] * scale + 0.5)));
+    if (runtimeSteps && !(place.contracted && ray.exists())) {
+      const double speed = std::sqrt(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
+      std::fill(runtimeSteps + first, runtimeSteps + end, speed > 0 ? static_cast<float>(place.texel / speed) : 0);
     }
   }
   return segments;
@@ -256,7 +329,7 @@ void run(Context& context, const EnterScene& a) {
       }
       if (!(enter < leave)) {
         enter = leave = space.near;
-        if (exists && space.surround != Surround::none) leave = enter + 1 + lengthOf({o[0], o[1], o[2]});
+        if (exists && space.surround != Surround::none) leave = enter + 1 + std::hypot(o[0], o[1], o[2]);
       }
       range[2 * ray] = static_cast<float>(enter);
       range[2 * ray + 1] = static_cast<float>(leave);
@@ -292,12 +365,13 @@ void run(Context& context, const BlockSamples& a) {
     std::vector<Cut> cuts;
     cuts.reserve(a.mostCuts());
     std::vector<double> ends(2 * mostEnds);  // of one ray: in s, then in t
+    Middles middles(mostEnds);
     forRays(task, [&](size_t index) {
       const Ray ray(a, index);
       findCuts(a, ray, cuts);
       double *const s = ends.data(), *const t = s + mostEnds;
       const uint32_t samples = findEnds(a, ray, cuts, s, t);
-      const uint32_t segments = writeSamples(a, blocks, ray, s, t, samples, firstSample[index]);
+      const uint32_t segments = writeSamples(a, blocks, ray, s, t, samples, firstSample[index], middles);
       if (a.split) firstSegment[index + 1] = segments;
     });
   });
@@ -331,10 +405,16 @@ void run(Context& context, const BlockPoints& a) {
       }
       const double z = 2.0 * random.uniform(first + 4) - 1, angle = 2 * std::numbers::pi * random.uniform(first + 5);
       const double across = std::sqrt(1 - z * z);
-      const double direction[3] = {across * std::cos(angle), across * std::sin(angle), z};
-      const double most = place.half - 1 / BlockSpace::kFarthest;
-      for (double& coordinate : y) coordinate = std::clamp(coordinate, -most, most);
-      runtimeSteps[p] = runtimeStepAt(place, place.contracted ? uncontract(y) : y, direction);
+      double along[3] = {across * std::cos(angle), across * std::sin(angle), z};
+      for (int axis = 0; axis < 3; ++axis) along[axis] *= place.inverseScale[axis];
+      double speed = std::sqrt(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
+      if (place.contracted) {
+        const double most = place.half - 1 / BlockSpace::kFarthest;
+        for (double& coordinate : y) coordinate = std::clamp(coordinate, -most, most);
+        const Triple<double> q = uncontract(y);
+        speed = std::sqrt(Contraction(q[0], q[1], q[2]).squareSpeed(q[0], q[1], q[2], along[0], along[1], along[2]));
+      }
+      runtimeSteps[p] = static_cast<float>(place.texel / speed);
     }
   });
 }

@@ -25,15 +25,22 @@ double annealedShares(const float* weights, uint32_t count, float anneal, float*
   return std::accumulate(share, share + count, 0.0);
 }
 
-// From the posts cumulative[0] = 0 ... cumulative[before] = 1 of `fences` to those at (i + jitter) / (after + 1).
-void invert(const ResampleFences& a, const float* fences, const double* cumulative, double jitter, float* resampled) {
-  const double perPost = 1 / (a.after + 1.0);
+// From the posts cumulative[0] = 0 ... cumulative[before] = 1 of `fences` to those at (i + jitter) / (after + 1). The
+// bin of a new post is the last that begins at or before it: each bin signs the first post after its begin, and posts
+// take the last signature so far. That is without a branch that nobody could predict. `bins` has room for after + 2.
+void invert(const ResampleFences& a, const float* fences, const double* cumulative, double jitter, uint32_t* bins,
+            float* resampled) {
+  const double posts = a.after + 1.0, perPost = 1 / posts;
+  std::fill(bins, bins + a.after + 2, 0);
+  for (uint32_t j = 1; j < a.before; ++j) {
+    const double place = std::ceil(cumulative[j] * posts - jitter);  // in (-1, after + 1]
+    bins[static_cast<uint32_t>(static_cast<int32_t>(std::max(0.0, place)))] = j;
+  }
   uint32_t bin = 0;
   for (uint32_t i = 0; i <= a.after; ++i) {
-    const double u = (i + jitter) * perPost;
-    while (bin + 1 < a.before && cumulative[bin + 1] <= u) ++bin;
-    const double width = cumulative[bin + 1] - cumulative[bin];
-    const double along = width > 0 ? std::min(1.0, (u - cumulative[bin]) / width) : 0;
+    bin = std::max(bin, bins[i]);
+    const double begin = cumulative[bin], width = cumulative[bin + 1] - begin, into = (i + jitter) * perPost - begin;
+    const double along = width > 0 ? std::min(1.0, std::max(0.0, into / width)) : 0;
     resampled[i] = static_cast<float>(fences[bin] + along * (static_cast<double>(fences[bin + 1]) - fences[bin]));
   }
 }
@@ -85,6 +92,7 @@ void run(Context& context, const ResampleFences& a) {
   context.pool.run(tasks, [&](size_t task, int) {
     std::vector<float> share(a.before);
     std::vector<double> cumulative(a.before + size_t{1});
+    std::vector<uint32_t> bins(a.after + size_t{2});
     for (size_t ray = task * kRaysPerTask; ray < std::min(rays, (task + 1) * kRaysPerTask); ++ray) {
       const double sum = annealedShares(weights + ray * a.before, a.before, a.anneal, share.data());
       const double even = 1.0 / a.before, least = sum > 0 ? a.padding * even : even;
@@ -95,7 +103,7 @@ void run(Context& context, const ResampleFences& a) {
         cumulative[j] = std::min(1.0, reached);
       }
       cumulative[a.before] = 1;
-      invert(a, fences + ray * (a.before + size_t{1}), cumulative.data(), jitter ? jitter[ray] : 0.5,
+      invert(a, fences + ray * (a.before + size_t{1}), cumulative.data(), jitter ? jitter[ray] : 0.5, bins.data(),
              resampled + ray * (a.after + size_t{1}));
     }
   });
