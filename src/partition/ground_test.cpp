@@ -25,6 +25,12 @@ TEST(Ground, IsTheFloorUnderHouses) {
   EXPECT_NEAR(ground.inGround({30, 30, 3}).z(), 0, 0.3);
 }
 
+TEST(Ground, IsTheFloorEvenWhereAFlatRoofHasMorePoints) {
+  Capture capture = flightOverHouses();
+  addPoints(capture, 3500, {-50, -50, 14.9}, {60, 60, 15.1}, 99);  // a warehouse
+  EXPECT_NEAR(findGround(capture).inGround({30, 30, 3}).z(), 0, 0.3);
+}
+
 TEST(Ground, IsFoundWhereItIsTilted) {
   for (const double degrees : {5.0, 12.0, 25.0}) {
     Capture capture = flightOverHouses();
