@@ -1,0 +1,31 @@
+// tileset.json: 3D Tiles 1.1 with our extension TESSERA_scene (docs/tile-format.md).
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "tiles/tileset.h"
+
+namespace tessera {
+
+inline constexpr int kSceneVersion = 1;
+
+struct TilesetLimits {
+  size_t textBytes = size_t{256} << 20;
+  uint32_t tiles = 1 << 20, depth = 64;
+  uint32_t contentsOfTile = 64, resources = 1 << 16;
+};
+
+// The same tileset gives the same text. CHECKs that it breaks no rule.
+std::string encodeTileset(const Tileset& tileset);
+
+// Untrusted text: nothing, and why in `reason`, where it is not JSON, has another version, breaks a rule of the format,
+// or is larger than the limits. All that it holds is finite, every index and uri is good: uris are relative, of plain
+// characters, and cannot leave the folder (links on the disk apart: scene_folder.h looks at those).
+std::optional<Tileset> decodeTileset(std::string_view text, std::string& reason, const TilesetLimits& limits = {});
+
+// Letters, digits, `.`, `_`, `-` between single slashes, no part beginning with a dot, 255 characters at most.
+bool isPlainUri(std::string_view uri);
+
+}  // namespace tessera
