@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "scene/block_grid.h"
@@ -42,8 +43,8 @@ struct SceneBox {  // scene units, along the scene's axes
 struct CellRange {
   std::array<uint32_t, 2> first = {0, 0}, end = {1, 1};
 
+  uint64_t cells() const { return uint64_t{end[0] - first[0]} * (end[1] - first[1]); }
   bool contains(const CellRange& other) const;
-  bool overlaps(const CellRange& other) const;
   bool operator==(const CellRange&) const = default;
 };
 
@@ -55,11 +56,12 @@ struct SharedResource {
 };
 
 struct TileContent {
-  std::string uri;  // relative to the folder of tileset.json
-  // All of it lies inside. Contents of one tile do not overlap, the surround apart; it is the tile's box by default. Of
-  // the surround it is the far box, which holds the scene's.
-  SceneBox box;
-  // What lies outside the scene's box: only ever in the root, never replaced by children, never culled, always
+  std::string uri;  // relative to the folder of tileset.json; ends in .glb
+  // What it stands for: the tile's, or with several contents a piece of it. They lie on a grid as children do, so that
+  // they too have an order (contents of `mesh` need none, and may overlap).
+  CellRange cells;
+  SceneBox box;  // all of it lies inside; of the surround the far box, which holds the scene's
+  // What lies outside the scene's box: one at most, in the root; never replaced by children, never culled, always
   // resident, drawn behind everything else.
   bool surround = false;
   std::vector<uint32_t> resources;  // of Tileset::resources, that it cannot be drawn without
@@ -68,13 +70,16 @@ struct TileContent {
 
 struct Tile {
   uint32_t level = 0;  // 0 is the finest; a child's is lower than its parent's
-  CellRange cells;     // what it stands for: it is drawn instead of all tiles below it
-  // Its contents and those below it lie inside, the surround apart. At most what its cells have, between the scene's
-  // bottom and top; less where the upper part is empty.
+  CellRange cells;     // what it stands for; its children's together are the same
+  // Its contents and those below it lie inside, the surround apart. It keeps to its cells' walls, those at the border
+  // of the grid apart (blocks there may own what lies outside), and may be lower than they are.
   SceneBox box;
-  double geometricError = 0;          // metres: the edge of a plane's texel (`volume`); no more than its parent's
-  std::vector<uint32_t> children;     // of Tileset::tiles, each after its parent; none for a leaf
-  std::vector<TileContent> contents;  // a tile with none (the surround apart) cannot stand for its children
+  double geometricError = 0;       // metres: the edge of a plane's texel (`volume`); no more than its parent's
+  std::vector<uint32_t> children;  // of Tileset::tiles, each after its parent; none for a leaf
+  // One with none (the surround apart) and with children cannot stand for them. A leaf with none is empty.
+  std::vector<TileContent> contents;
+
+  bool isDrawable() const;  // stands for all below it
 };
 
 struct Tileset {
@@ -106,10 +111,20 @@ struct Tileset {
   Similarity tileFromScene() const;  // metres, if the scene has a scale
   Mat4d rootTransform() const;       // of the tile frame: to ECEF where georeferenced, else the identity
 
-  // Indices of `candidates`' tiles (children of one tile, or a single one), front to back for every ray from
-  // `xInScene`: by the number of cells between their range and the (clamped) cell of x, along both axes together.
-  std::vector<uint32_t> frontToBack(const std::vector<uint32_t>& candidates, const Vec3d& xInScene) const;
+  std::array<uint32_t, 2> cellAt(const Vec3d& xInScene) const;  // clamped to the border
 };
+
+// Cells between the cell and the range, along both axes together; 0 inside. Ranges on a grid (children of a tile), in
+// the order of this, are front to back for every ray from the cell: a ray that passes from one to the next moves away
+// from it along one axis and keeps the range of the other.
+uint32_t cellsBetween(const std::array<uint32_t, 2>& cell, const CellRange& range);
+
+// The children of a tile, front to back for every ray from `xInScene`; the first in the list first among equals (no ray
+// meets both). A cut of the tree is ordered by doing so from the root downwards.
+std::vector<uint32_t> childrenFrontToBack(const Tileset& tileset, uint32_t tile, const Vec3d& xInScene);
+
+// The coarsest tiles that stand for the whole scene: the root, or what lies below it where that is not drawable.
+std::vector<uint32_t> coarsestCover(const Tileset& tileset);
 
 // Scene units from a block grid's: columns, rows, bottom, top and worldFromScene.
 void placeOn(Tileset& tileset, const BlockGrid& grid);

@@ -12,8 +12,8 @@ namespace tessera {
 inline constexpr int kSceneVersion = 1;
 
 struct TilesetLimits {
-  size_t textBytes = size_t{256} << 20;
-  uint32_t tiles = 1 << 20, depth = 64;
+  size_t textBytes = size_t{16} << 20;
+  uint32_t tiles = 1 << 16, depth = 64;
   uint32_t contentsOfTile = 64, resources = 1 << 16;
 };
 
@@ -24,6 +24,12 @@ std::string encodeTileset(const Tileset& tileset);
 // or is larger than the limits. All that it holds is finite, every index and uri is good: uris are relative, of plain
 // characters, and cannot leave the folder (links on the disk apart: scene_folder.h looks at those).
 std::optional<Tileset> decodeTileset(std::string_view text, std::string& reason, const TilesetLimits& limits = {});
+
+// A tile's box and those of its contents: what stands on disk as its bounding volume, which in 3D Tiles holds the far
+// box of a surround too.
+SceneBox enclosingBox(const Tile& tile);
+// In the tile frame: centre, then half the edges along x, y, z.
+std::array<double, 12> boundingBoxNumbers(const Tileset& tileset, const SceneBox& box);
 
 // Letters, digits, `.`, `_`, `-` between single slashes, no part beginning with a dot, 255 characters at most.
 bool isPlainUri(std::string_view uri);
