@@ -1,56 +1,65 @@
 #include "tiles/occupancy_pyramid.h"
 
 #include <algorithm>
-#include <array>
 
 #include "base/check.h"
 
 namespace tessera {
 namespace {
 
-// The least of max(|i - j|, line[j]) over j on one side: `line` front to back. Of two candidates a newer one is better
-// for good when its value is no larger, and from there on where the older one's step has reached the newer one's value:
-// so the queue's values grow, and its head is the best.
-class OneSide {
+// One sweep through the grid, in the order of cells or against it: each cell is at most one farther than any of the 13
+// neighbours that came before it. Rows are taken whole, so that all but the neighbour in the row itself is SIMD.
+class Sweep {
  public:
-  explicit OneSide(size_t length) : queue_(length) {}
+  Sweep(uint32_t cells, bool forwards) : cells_(cells), forwards_(forwards), least_(cells + 2), candidate_(cells) {}
 
-  template <class Line>
-  void run(size_t length, const Line& at, std::vector<uint8_t>& least) {
-    size_t head = 0, end = 0;
-    for (size_t i = 0; i < length; ++i) {
-      const size_t value = at(i);
-      while (end > head && queue_[end - 1].value >= value) --end;
-      queue_[end++] = {i, value};
-      while (end - head >= 2 && i - queue_[head].place >= queue_[head + 1].value) ++head;
-      const size_t best = std::max(i - queue_[head].place, queue_[head].value);
-      least[i] = static_cast<uint8_t>(std::min<size_t>(best, kFarthestDistance));
+  void run(std::vector<uint8_t>& distances) {
+    const int count = static_cast<int>(cells_), back = forwards_ ? -1 : 1;
+    for (int i = 0; i < count; ++i) {
+      const int z = forwards_ ? i : count - 1 - i;
+      for (int j = 0; j < count; ++j) {
+        const int y = forwards_ ? j : count - 1 - j;
+        std::fill(least_.begin(), least_.end(), kFarthestDistance);
+        takeRow(distances, y + back, z);
+        for (int dy = -1; dy <= 1; ++dy) takeRow(distances, y + dy, z + back);
+        finishRow(distances.data() + rowStart(y, z));
+      }
     }
   }
 
  private:
-  struct Candidate {
-    size_t place, value;
-  };
-  std::vector<Candidate> queue_;
-};
+  size_t rowStart(int y, int z) const { return cells_ * (static_cast<size_t>(y) + cells_ * static_cast<size_t>(z)); }
 
-// In place, over the line that begins at `first`.
-struct LineTransform {
-  size_t length;
-  OneSide side;
-  std::vector<uint8_t> forward, backward;
-
-  explicit LineTransform(size_t lineLength)
-      : length(lineLength), side(lineLength), forward(lineLength), backward(lineLength) {}
-
-  void run(uint8_t* first, size_t stride) {
-    side.run(
-        length, [&](size_t i) { return first[i * stride]; }, forward);
-    side.run(
-        length, [&](size_t i) { return first[(length - 1 - i) * stride]; }, backward);
-    for (size_t i = 0; i < length; ++i) first[i * stride] = std::min(forward[i], backward[length - 1 - i]);
+  void takeRow(const std::vector<uint8_t>& distances, int y, int z) {
+    const int count = static_cast<int>(cells_);
+    if (y < 0 || z < 0 || y >= count || z >= count) return;
+    const uint8_t* row = distances.data() + rowStart(y, z);
+    uint8_t* least = least_.data() + 1;
+    for (size_t x = 0; x < cells_; ++x) least[x] = std::min(least[x], row[x]);
   }
+
+  void finishRow(uint8_t* row) {
+    const uint8_t* least = least_.data();
+    for (size_t x = 0; x < cells_; ++x) {
+      const uint8_t near = std::min(least[x], std::min(least[x + 1], least[x + 2]));
+      candidate_[x] = std::min(row[x], oneMore(near));
+    }
+    uint8_t before = kFarthestDistance;
+    for (size_t i = 0; i < cells_; ++i) {
+      const size_t x = forwards_ ? i : cells_ - 1 - i;
+      before = std::min(candidate_[x], oneMore(before));
+      row[x] = before;
+    }
+  }
+
+  static uint8_t oneMore(uint8_t distance) {
+    return static_cast<uint8_t>(distance + (distance < kFarthestDistance ? 1 : 0));
+  }
+
+  size_t cells_;
+  bool forwards_;
+  std::vector<uint8_t> least_;      // of the rows before, with one more at each end
+  std::vector<uint8_t> candidate_;  // all neighbours but the one in the row
 };
 
 }  // namespace
@@ -91,19 +100,12 @@ OccupancyPyramid pyramidFromDistances(std::span<const uint8_t> distances, uint32
 }
 
 std::vector<uint8_t> chebyshevDistances(const OccupancyBits& occupied) {
-  const size_t cells = occupied.cells;
   std::vector<uint8_t> distances(occupied.count(), kFarthestDistance);
   for (size_t i = 0; i < distances.size(); ++i) {
     if (occupied.at(i)) distances[i] = 0;
   }
-  LineTransform transform(cells);
-  const std::array<size_t, 3> strides = {1, cells, cells * cells};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const size_t b = strides[(axis + 1) % 3], c = strides[(axis + 2) % 3];
-    for (size_t i = 0; i < cells; ++i) {
-      for (size_t j = 0; j < cells; ++j) transform.run(distances.data() + i * b + j * c, strides[axis]);
-    }
-  }
+  Sweep(occupied.cells, true).run(distances);
+  Sweep(occupied.cells, false).run(distances);
   return distances;
 }
 

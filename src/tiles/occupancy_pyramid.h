@@ -38,8 +38,9 @@ OccupancyPyramid pyramidFromOccupancy(OccupancyBits finest);
 OccupancyPyramid pyramidFromDistances(std::span<const uint8_t> distances, uint32_t cells);
 
 // [cells³], x fastest: how many cells away the nearest occupied one is, diagonal steps counting one (Chebyshev); exact
-// up to kFarthestDistance, which also stands where there is none. All cells nearer than that number are empty. Exact
-// and separable: along each axis in turn the least of max(step, distance so far), in time linear in the cells.
+// up to kFarthestDistance, which also stands where there is none. All cells nearer than that number are empty.
+// Source: Rosenfeld and Pfaltz, "Distance functions on digital pictures", 1968; two sweeps suffice, because the steps
+// of a shortest way may be taken in any order: first those that the first sweep follows, then the others.
 std::vector<uint8_t> chebyshevDistances(const OccupancyBits& occupied);
 
 }  // namespace tessera
