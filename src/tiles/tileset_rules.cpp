@@ -161,6 +161,19 @@ Broken ruleOfChildren(const Tileset& tileset, const Tile& tile) {
   return std::nullopt;
 }
 
+// Each tile but the root is the child of one that stands before it.
+bool isTree(const Tileset& tileset) {
+  std::vector<bool> hasParent(tileset.tiles.size());
+  hasParent[0] = true;
+  for (size_t i = 0; i < tileset.tiles.size(); ++i) {
+    for (const uint32_t child : tileset.tiles[i].children) {
+      if (child <= i || child >= tileset.tiles.size() || hasParent[child]) return false;
+      hasParent[child] = true;
+    }
+  }
+  return std::find(hasParent.begin(), hasParent.end(), false) == hasParent.end();
+}
+
 }  // namespace
 
 std::optional<std::string> brokenRule(const Tileset& tileset) {
@@ -172,16 +185,11 @@ std::optional<std::string> brokenRule(const Tileset& tileset) {
     return "the tileset's geometric error is below its root's";
   }
   if (!(tileset.root().cells == tileset.allCells())) return "the root does not stand for all cells";
-  std::vector<uint8_t> hasParent(tileset.tiles.size());
-  for (size_t i = 0; i < tileset.tiles.size(); ++i) {
-    for (const uint32_t child : tileset.tiles[i].children) {
-      if (child <= i || child >= tileset.tiles.size() || hasParent[child]++) return "the tiles are no tree";
+  if (!isTree(tileset)) return "the tiles are no tree";
+  for (const auto ruleOf : {ruleOfTile, ruleOfChildren}) {
+    for (size_t i = 0; i < tileset.tiles.size(); ++i) {
+      if (const auto broken = ruleOf(tileset, tileset.tiles[i])) return fmt::format("tile {}: {}", i, *broken);
     }
-    if (i > 0 && !hasParent[i]) return "the tiles are no tree";
-    const Tile& tile = tileset.tiles[i];
-    auto broken = ruleOfTile(tileset, tile);
-    if (!broken) broken = ruleOfChildren(tileset, tile);
-    if (broken) return fmt::format("tile {}: {}", i, *broken);
   }
   return std::nullopt;
 }
