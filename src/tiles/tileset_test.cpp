@@ -167,7 +167,7 @@ TEST(Tileset, NamesTheRuleThatIsBroken) {
   names("tile 0: a child is not of a finer level", [](Tileset& t) { t.tiles[1].level = 1; });
   names("tile 0: a child's box leaves its own", [](Tileset& t) { t.tiles[1].box.low.z() -= 1; });
   names("tile 0: a child's geometric error is above its own", [](Tileset& t) { t.tiles[1].geometricError = 1; });
-  names("tile 0: its children do not lie on a grid", [](Tileset& t) { t.tiles[1].cells = t.tiles[2].cells; });
+  names("tile 0: its children do not lie on a grid", [](Tileset& t) { t.tiles[1] = t.tiles[2]; });
   names("tile 0: its children do not lie on a grid", [](Tileset& t) {
     t.tiles[1].cells.end[0] = 2;
     t.tiles[1].box.high.x() = 0;
