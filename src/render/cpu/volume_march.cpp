@@ -17,7 +17,7 @@ const char* targetName() {
   return hwy::TargetName(HWY_TARGET);
 }
 
-// The 8 attributes of a texel are 8 bytes in a row: one vector of floats, or two of four.
+// The 8 attributes of a texel: one vector, or two.
 using Tag = hn::CappedTag<float, 8>;
 using Vector = hn::Vec<Tag>;
 constexpr size_t kLanes = hn::MaxLanes(Tag()), kVectors = 8 / kLanes;
@@ -26,27 +26,72 @@ struct Attributes {
   Vector v[kVectors];
 };
 
-HWY_ATTR HWY_INLINE Attributes allOf(float value) {
-  Attributes result;
-  for (size_t i = 0; i < kVectors; ++i) result.v[i] = hn::Set(Tag(), value);
-  return result;
-}
-
 HWY_ATTR HWY_INLINE Attributes load(const float* from) {
   Attributes result;
   for (size_t i = 0; i < kVectors; ++i) result.v[i] = hn::LoadU(Tag(), from + i * kLanes);
   return result;
 }
 
-HWY_ATTR HWY_INLINE void addTexel(const uint8_t* texel, float weight, Attributes& sum) {
-  const Tag d;
-  const hn::Rebind<int32_t, Tag> integers;
-  const hn::Rebind<uint8_t, Tag> bytes;
+// Those of two texels side by side along a row: 16 bytes in a row.
+using PairTag = hn::CappedTag<float, 16>;
+constexpr size_t kPairLanes = hn::MaxLanes(PairTag()), kPairVectors = 16 / kPairLanes;
+
+struct Pair {
+  hn::Vec<PairTag> v[kPairVectors];
+};
+
+HWY_ATTR HWY_INLINE Pair loadPair(const uint8_t* texel, float weight) {
+  const PairTag d;
+  const hn::Rebind<int32_t, PairTag> integers;
+  const hn::Rebind<uint8_t, PairTag> bytes;
   const auto w = hn::Set(d, weight);
-  for (size_t i = 0; i < kVectors; ++i) {
-    const auto value = hn::ConvertTo(d, hn::PromoteTo(integers, hn::LoadU(bytes, texel + i * kLanes)));
+  Pair pair;
+  for (size_t i = 0; i < kPairVectors; ++i) {
+    pair.v[i] = hn::Mul(w, hn::ConvertTo(d, hn::PromoteTo(integers, hn::LoadU(bytes, texel + i * kPairLanes))));
+  }
+  return pair;
+}
+
+HWY_ATTR HWY_INLINE void addPair(const uint8_t* texel, float weight, Pair& sum) {
+  const PairTag d;
+  const hn::Rebind<int32_t, PairTag> integers;
+  const hn::Rebind<uint8_t, PairTag> bytes;
+  const auto w = hn::Set(d, weight);
+  for (size_t i = 0; i < kPairVectors; ++i) {
+    const auto value = hn::ConvertTo(d, hn::PromoteTo(integers, hn::LoadU(bytes, texel + i * kPairLanes)));
     sum.v[i] = hn::MulAdd(w, value, sum.v[i]);
   }
+}
+
+// The first texel of each pair by 1 - fraction, the second by fraction; all four added up.
+HWY_ATTR HWY_INLINE Attributes mix(const Pair pairs[4], const float fractions[4]) {
+  Attributes sum;
+#if HWY_MAX_BYTES >= 64
+  const PairTag d;
+  const Tag half;
+  const auto first = hn::FirstN(d, 8);
+  hn::Vec<PairTag> both = hn::Zero(d);
+  for (int i = 0; i < 4; ++i) {
+    const auto weight = hn::IfThenElse(first, hn::Set(d, 1 - fractions[i]), hn::Set(d, fractions[i]));
+    both = hn::MulAdd(weight, pairs[i].v[0], both);
+  }
+  sum.v[0] = hn::Add(hn::LowerHalf(half, both), hn::UpperHalf(half, both));
+#else
+  const Tag d;
+  for (size_t k = 0; k < kVectors; ++k) {
+    sum.v[k] = hn::Zero(d);
+    for (int i = 0; i < 4; ++i) {
+      sum.v[k] = hn::MulAdd(hn::Set(d, 1 - fractions[i]), pairs[i].v[k], sum.v[k]);
+      sum.v[k] = hn::MulAdd(hn::Set(d, fractions[i]), pairs[i].v[k + kVectors], sum.v[k]);
+    }
+  }
+#endif
+  return sum;
+}
+
+// 1 - exp(-x), to a float's digits for small x too.
+HWY_ATTR HWY_INLINE float opacityOf(float x) {
+  return x < 0.01f ? x * (1 - x * (0.5f - x * (1.0f / 6))) : 1 - std::exp(-x);
 }
 
 // A place among texels along one axis: between `index` and the next, at `fraction` of the way.
@@ -59,16 +104,6 @@ HWY_ATTR HWY_INLINE Lookup planeLookup(float x, uint32_t texels) {
   const float u = std::min(std::max(x - 0.5f, 0.0f), static_cast<float>(texels - 1));
   const uint32_t index = std::min(static_cast<uint32_t>(u), texels - 2);  // so that there is a next one
   return {index, u - static_cast<float>(index)};
-}
-
-// rows: the bytes from a texel to the next row. Texels of a row stand side by side.
-HWY_ATTR HWY_INLINE void addBilinear(const uint8_t* texel, size_t rows, float x, float y, float weight,
-                                     Attributes& sum) {
-  const float upper = weight * y, lower = weight - upper;
-  addTexel(texel, lower - lower * x, sum);
-  addTexel(texel + VolumePart::kAttributes, lower * x, sum);
-  addTexel(texel + rows, upper - upper * x, sum);
-  addTexel(texel + rows + VolumePart::kAttributes, upper * x, sum);
 }
 
 struct Marcher {
@@ -121,22 +156,25 @@ struct Marcher {
       fraction[a] = u[a] - static_cast<float>(index);
       voxel += (index - VolumePart::kMacroblock * block[a]) * kStrides[a];
     }
-    Attributes upper = allOf(0), planes[3] = {allOf(0), allOf(0), allOf(0)};  // apart: sums wait for nothing
-    sum = allOf(0);
-    addBilinear(voxel, kRow, fraction[0], fraction[1], 1 - fraction[2], sum);
-    addBilinear(voxel + kSlice, kRow, fraction[0], fraction[1], fraction[2], upper);
+    // Rows are mixed first, then along the rows.
+    const float y = fraction[1], z = fraction[2];
+    Pair pairs[4];
+    float fractions[4] = {fraction[0]};
+    pairs[0] = loadPair(voxel, (1 - y) * (1 - z));
+    addPair(voxel + kRow, y * (1 - z), pairs[0]);
+    addPair(voxel + kSlice, (1 - y) * z, pairs[0]);
+    addPair(voxel + kSlice + kRow, y * z, pairs[0]);
     Lookup at[3];
     for (int a = 0; a < 3; ++a) at[a] = planeLookup(x[a], part.planes);
     const size_t row = size_t{part.planes} * VolumePart::kAttributes;
     for (int a = 0; a < 3; ++a) {
       const int b = a == 0 ? 1 : 0, c = a == 2 ? 1 : 2;
       const uint8_t* texel = part.planeBytes[a].data() + at[c].index * row + at[b].index * VolumePart::kAttributes;
-      addBilinear(texel, row, at[b].fraction, at[c].fraction, 1, planes[a]);
+      pairs[a + 1] = loadPair(texel, 1 - at[c].fraction);
+      addPair(texel + row, at[c].fraction, pairs[a + 1]);
+      fractions[a + 1] = at[b].fraction;
     }
-    for (size_t i = 0; i < kVectors; ++i) {
-      sum.v[i] =
-          hn::Add(hn::Add(sum.v[i], upper.v[i]), hn::Add(planes[0].v[i], hn::Add(planes[1].v[i], planes[2].v[i])));
-    }
+    sum = mix(pairs, fractions);
     return true;
   }
 };
@@ -191,7 +229,7 @@ HWY_ATTR void marchVolume(const VolumeMarch& march, ContentComposite& composite,
       }
       const bool straight = s.growth == 0;
       const double length = straight ? (to - from) * s.square / s.rate : s.distanceBetween(from, to);
-      const float opacity = -std::expm1(-hn::GetLane(exponent.v[0]) * static_cast<float>(length));
+      const float opacity = opacityOf(hn::GetLane(exponent.v[0]) * static_cast<float>(length));
       const float distance = static_cast<float>(s.distanceAt(tau));
       if (march.trace != nullptr) march.trace->push_back({number, step, opacity, distance});
       const float weight = transmittance * opacity;

@@ -1,6 +1,7 @@
 #include "render/cpu/volume_march.h"
 
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 
 #include "render/cpu/reference_volume.h"
 #include "render/made_volume.h"
@@ -41,7 +42,7 @@ void forRandomRays(int rays, const Check& check) {
   }
 }
 
-TEST(VolumeMarch, IsWhatTheDefinitionSays) {
+void expectWhatTheDefinitionSays() {
   int compared = 0;
   double opacities = 0;
   forRandomRays(150, [&](const VolumeContent& content, const SceneRay& ray, const RayRange& range) {
@@ -61,6 +62,19 @@ TEST(VolumeMarch, IsWhatTheDefinitionSays) {
   EXPECT_GT(compared, 150);
   EXPECT_GT(opacities / compared, 0.2);
   EXPECT_LT(opacities / compared, 0.99);
+}
+
+TEST(VolumeMarch, IsWhatTheDefinitionSaysWithEveryInstructionSet) {
+  int targets = 0;
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    SCOPED_TRACE(renderSimdTarget());
+    EXPECT_STREQ(renderSimdTarget(), hwy::TargetName(target));
+    expectWhatTheDefinitionSays();
+    ++targets;
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  EXPECT_GE(targets, 1);
 }
 
 TEST(VolumeMarch, EvaluatesTheVerySameSamplesWithAndWithoutSkipping) {
