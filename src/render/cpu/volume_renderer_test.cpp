@@ -28,8 +28,8 @@ struct Place {
         for (double x = node.low.x(); x < node.high.x(); x += 2) {
           VolumePart part;
           placeCell(part, static_cast<float>(x + 1), static_cast<float>(y + 1));
-          part.voxels = node.level == 0 ? 32 : 16;
-          part.planes = node.level == 0 ? 64 : 32;
+          part.voxels = 32 >> node.level;
+          part.planes = 64 >> node.level;
           makeVolume(part, smoothVolume(static_cast<uint64_t>(7 * (x + 8) + y + 8), 0.4));
           parts.push_back(std::move(part));
         }
