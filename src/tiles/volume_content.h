@@ -63,4 +63,18 @@ struct VolumeContent {
   std::vector<VolumePart> parts;  // one; several where blocks are merged
 };
 
+// What a content takes in memory: its texels, indices, distances and weights. Renderers' budgets count this.
+inline uint64_t bytesInMemory(const VolumeContent& content) {
+  uint64_t bytes = sizeof(VolumeContent);
+  for (const DenseLayer& layer : content.network) {
+    bytes += sizeof(DenseLayer) + sizeof(float) * (layer.weights.size() + layer.biases.size());
+  }
+  for (const VolumePart& part : content.parts) {
+    bytes += sizeof(VolumePart) + sizeof(uint32_t) * part.macroblocks.size() + part.voxelBytes.size() +
+             part.distances.size();
+    for (const std::vector<uint8_t>& plane : part.planeBytes) bytes += plane.size();
+  }
+  return bytes;
+}
+
 }  // namespace tessera

@@ -1,0 +1,41 @@
+// A ray through the domain of one part of a content: straight pieces, measured in texels of the planes. A bounded part
+// has one; a contracted one as many as the ray meets regions of the contraction, at most five (City-on-Web, section
+// 4.4; MERF, section 4.1).
+#pragma once
+
+#include <array>
+
+#include "render/volume_frame.h"
+#include "tiles/volume_content.h"
+
+namespace tessera {
+
+// The place after τ texels is start + τ direction, in texels from the lower corner of the domain, so that the domain is
+// [0, planes]³. Within a region the contraction is a projective map, and so is the distance as a function of τ.
+struct VolumeSegment {
+  std::array<float, 3> start, direction;  // the direction has length 1
+  float length = 0;                       // texels
+  // The distance along the ray, scene units: entry + square τ / (rate - growth τ).
+  double entry = 0, square = 1, rate = 1, growth = 0;
+
+  double distanceAt(double tau) const { return entry + square * tau / (rate - growth * tau); }
+  // distanceAt(to) - distanceAt(from), without the loss of digits.
+  double distanceBetween(double from, double to) const {
+    return square * rate * (to - from) / ((rate - growth * from) * (rate - growth * to));
+  }
+};
+
+struct VolumePath {
+  // A ray meets at most five regions. Along the border of two, rounding may tell them apart at random: then more.
+  static constexpr int kMostSegments = 13;
+  std::array<VolumeSegment, kMostSegments> segments;
+  int count = 0;
+};
+
+// Where the ray is in what a part owns and in its domain. Not for the surround, which owns what lies behind the box.
+RayRange ownedRange(const VolumePart& part, const SceneRay& ray, const RayRange& range);
+
+// `range` is finite, and for a bounded part within its domain.
+VolumePath volumePath(const VolumePart& part, const SceneRay& ray, const RayRange& range);
+
+}  // namespace tessera

@@ -1,0 +1,85 @@
+#include "render/cpu/volume_renderer.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace tessera {
+
+VolumeRenderer::VolumeRenderer(const VolumeFrame& frame, TileTree tree, TileCache::Loader loader,
+                               const VolumeRendererSettings& settings)
+    : frame_(frame),
+      tree_(std::move(tree)),
+      settings_(settings),
+      cache_(tree_, settings.budgetBytes, std::move(loader)),
+      selector_(tree_, settings.selection),
+      pool_(settings.threads) {}
+
+std::string VolumeRenderer::device() const {
+  return fmt::format("cpu {}, {} threads", renderSimdTarget(), pool_.threads());
+}
+
+// Each round loads the most urgent request that there is room for. What a round draws is kept by the next, so the cut
+// only ever comes nearer to what the view asks for.
+void VolumeRenderer::loadFor(const TileView& view) {
+  for (bool changed = true; changed;) {
+    selection_ = selector_.select(view, [this](int tile) { return cache_.holds(tile); });
+    std::vector<int> kept;
+    for (const SelectedTile& selected : selection_.cut) {
+      if (selected.visible) kept.push_back(selected.tile);
+    }
+    changed = false;
+    for (const TileRequest& request : selection_.requests) {
+      std::vector<int> keptBeside = kept;
+      keptBeside.insert(keptBeside.end(), request.beside.begin(), request.beside.end());
+      if (cache_.load(request.tiles, keptBeside)) {
+        changed = true;
+        break;
+      }
+    }
+  }
+}
+
+RenderedView VolumeRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
+  loadFor(tileView(camera, worldFromCamera, frame_));
+  VolumeDrawing drawing{frame_, {}, nullptr, settings_.march};
+  for (const SelectedTile& selected : selection_.cut) {
+    if (selected.visible) drawing.frontToBack.push_back(cache_.find(selected.tile));
+  }
+  if (tree_.surround >= 0) drawing.surround = cache_.find(tree_.surround);
+  return drawVolume(drawing, camera, worldFromCamera, opaqueDepth, pool_, &counts_);
+}
+
+TileTree flatTileTree(const std::vector<VolumeContent>& contents, const VolumeContent* surround) {
+  TileTree tree;
+  TileNode root;
+  root.hasContent = false;
+  root.level = 1;
+  root.low = Vec3d::Constant(INFINITY);
+  root.high = Vec3d::Constant(-INFINITY);
+  tree.tiles.push_back(root);
+  for (const VolumeContent& content : contents) {
+    TileNode node;
+    node.parent = 0;
+    node.low = Vec3d::Constant(INFINITY);
+    node.high = Vec3d::Constant(-INFINITY);
+    for (const VolumePart& part : content.parts) {
+      node.low = node.low.cwiseMin(Eigen::Map<const Vec3f>(part.low.data()).cast<double>());
+      node.high = node.high.cwiseMax(Eigen::Map<const Vec3f>(part.high.data()).cast<double>());
+    }
+    node.contentBytes = bytesInMemory(content);
+    tree.tiles[0].low = tree.tiles[0].low.cwiseMin(node.low);
+    tree.tiles[0].high = tree.tiles[0].high.cwiseMax(node.high);
+    tree.tiles[0].children.push_back(static_cast<int>(tree.tiles.size()));
+    tree.tiles.push_back(node);
+  }
+  if (surround != nullptr) {
+    tree.surround = static_cast<int>(tree.tiles.size());
+    TileNode node;
+    node.contentBytes = bytesInMemory(*surround);
+    tree.tiles.push_back(node);
+  }
+  return tree;
+}
+
+}  // namespace tessera

@@ -1,0 +1,52 @@
+// Draws `volume` scenes on the processor: the oracle that every other renderer of them is held against.
+//
+// A picture is drawn from the cut that the view asks for, loaded as far as the budget goes before it is drawn.
+#pragma once
+
+#include "render/cpu/draw_volume.h"
+#include "render/tile_cache.h"
+#include "render/tile_selection.h"
+
+namespace tessera {
+
+struct VolumeRendererSettings {
+  MarchSettings march;
+  SelectionSettings selection;
+  uint64_t budgetBytes = uint64_t{1} << 30;
+  int threads = 0;  // 0: as many as the machine has
+  Eigen::Array3f background = Eigen::Array3f::Zero();
+};
+
+class VolumeRenderer final : public ViewRenderer {
+ public:
+  // `loader` gives a tile's content. Throws Error where the coarsest level does not fit into the budget, and in
+  // render() what the loader throws.
+  VolumeRenderer(const VolumeFrame& frame, TileTree tree, TileCache::Loader loader,
+                 const VolumeRendererSettings& settings);
+
+  RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
+  std::string device() const override;
+  Eigen::Array3f background() const override { return settings_.background; }
+
+  const Selection& selection() const { return selection_; }  // of the last picture
+  const TileCacheStatistics& cacheStatistics() const { return cache_.statistics(); }
+  const MarchCounts& marchCounts() const { return counts_; }  // of all pictures
+
+ private:
+  void loadFor(const TileView& view);
+
+  VolumeFrame frame_;
+  TileTree tree_;
+  VolumeRendererSettings settings_;
+  TileCache cache_;
+  TileSelector selector_;
+  ThreadPool pool_;
+  Selection selection_;
+  MarchCounts counts_;
+};
+
+// A tree of contents side by side, without levels: a tile without content over one tile for each, in their order. Their
+// boxes are what their parts own and must be cells of a grid.
+TileTree flatTileTree(const std::vector<VolumeContent>& contents, const VolumeContent* surround = nullptr);
+
+}  // namespace tessera

@@ -1,0 +1,210 @@
+#include "render/cpu/volume_renderer.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "base/error.h"
+#include "render/made_tree.h"
+#include "render/made_volume.h"
+
+namespace tessera {
+namespace {
+
+// 4×4 cells of smooth random texels; the levels above are as coarse as their place, with parts for each cell below.
+struct Place {
+  TileTree tree = madeTree(4, 4);
+  std::vector<VolumeContent> contents;
+  VolumeFrame frame;
+  uint64_t allBytes = 0, coarsestBytes = 0, finestBytes = 0;
+
+  Place() {
+    frame.low = Vec3d(-4, -4, -1);
+    frame.high = Vec3d(4, 4, 1);
+    for (size_t i = 0; i < tree.tiles.size(); ++i) {
+      TileNode& node = tree.tiles[i];
+      std::vector<VolumePart> parts;
+      for (double y = node.low.y(); y < node.high.y(); y += 2) {
+        for (double x = node.low.x(); x < node.high.x(); x += 2) {
+          VolumePart part;
+          placeCell(part, static_cast<float>(x + 1), static_cast<float>(y + 1));
+          part.voxels = 32 >> node.level;
+          part.planes = 64 >> node.level;
+          makeVolume(part, smoothVolume(static_cast<uint64_t>(7 * (x + 8) + y + 8), 0.4));
+          parts.push_back(std::move(part));
+        }
+      }
+      contents.push_back(contentOf(std::move(parts), randomNetwork(i)));
+      node.geometricError = 2.0 / 64 * (1 << node.level);
+      node.contentBytes = bytesInMemory(contents.back());
+      allBytes += node.contentBytes;
+      if (node.parent < 0) coarsestBytes = node.contentBytes;
+      if (node.level == 0) finestBytes += node.contentBytes;
+    }
+    VolumePart around;
+    around.contracted = around.surround = true;
+    around.scale = {4, 4, 1};
+    around.voxels = 32;
+    around.planes = 64;
+    makeVolume(around, smoothVolume(1000, 0.2));
+    contents.push_back(contentOf({around}, randomNetwork(1000)));
+    tree.surround = static_cast<int>(tree.tiles.size());
+    tree.tiles.push_back({});
+    tree.tiles.back().contentBytes = bytesInMemory(contents.back());
+    allBytes += tree.tiles.back().contentBytes;
+    coarsestBytes += tree.tiles.back().contentBytes;
+  }
+
+  TileCache::Loader loader() const {
+    return [this](int tile) { return contents[tile]; };
+  }
+};
+
+const Place& place() {
+  static const Place made;
+  return made;
+}
+
+VolumeRendererSettings settingsWith(uint64_t budget) {
+  VolumeRendererSettings settings;
+  settings.budgetBytes = budget;
+  settings.threads = 1;
+  return settings;
+}
+
+Camera camera() {
+  Camera camera;
+  camera.width = 64;
+  camera.height = 48;
+  camera.parameters = {60, 60, 32, 24};
+  return camera;
+}
+
+// A flight over and through the place.
+Pose poseAt(int step) {
+  const double angle = 0.021 * step;
+  const Vec3d eye(5 * std::cos(angle), 4 * std::sin(1.7 * angle), 1.2 + std::sin(0.9 * angle));
+  const Vec3d target(2 * std::sin(angle), std::cos(2 * angle), -0.5);
+  Pose pose;
+  const Vec3d forward = (target - eye).normalized(), right = forward.cross(Vec3d::UnitZ()).normalized();
+  pose.rotation.col(0) = right;
+  pose.rotation.col(1) = forward.cross(right);
+  pose.rotation.col(2) = forward;
+  pose.translation = eye;
+  return pose;
+}
+
+TEST(VolumeRenderer, NeverExceedsAQuarterOfTheFinestLevelAndNeverLacksTheCoarsest) {
+  const uint64_t budget = place().finestBytes / 4;
+  ASSERT_LT(place().coarsestBytes, budget);
+  VolumeRendererSettings settings = settingsWith(budget);
+  settings.selection.mostPixels = 0.2;  // of a small picture
+  VolumeRenderer renderer(place().frame, place().tree, place().loader(), settings);
+  std::set<int> drawn;
+  for (int step = 0; step < 600; ++step) {
+    renderer.render(camera().scaledTo(16, 12), poseAt(step), nullptr);
+    for (const SelectedTile& selected : renderer.selection().cut) {
+      if (selected.visible) drawn.insert(selected.tile);
+    }
+    ASSERT_FALSE(renderer.selection().cut.empty());
+    ASSERT_LE(renderer.cacheStatistics().mostBytes, budget);
+  }
+  EXPECT_GT(renderer.cacheStatistics().evictions, 0u);
+  EXPECT_GT(drawn.size(), 6u);
+}
+
+TEST(VolumeRenderer, DrawsTheSamePictureAsWithoutABudgetWhereWhatIsWantedFits) {
+  // What 1.5 pixels ask for does not fit; what 16 ask for does.
+  for (const double pixels : {16.0, 1.5}) {
+    VolumeRendererSettings settings = settingsWith(place().allBytes), tight = settingsWith(place().finestBytes / 3);
+    settings.selection.mostPixels = tight.selection.mostPixels = pixels;
+    VolumeRenderer unbounded(place().frame, place().tree, place().loader(), settings);
+    VolumeRenderer bounded(place().frame, place().tree, place().loader(), tight);
+    int same = 0, frames = 0;
+    for (int step = 0; step < 600; step += 20, ++frames) {
+      const RenderedView a = unbounded.render(camera(), poseAt(step), nullptr);
+      const RenderedView b = bounded.render(camera(), poseAt(step), nullptr);
+      EXPECT_TRUE(unbounded.selection().requests.empty());
+      if (!bounded.selection().requests.empty()) continue;
+      ++same;
+      EXPECT_EQ(a.colour.pixels, b.colour.pixels) << step;
+      EXPECT_EQ(a.depth.pixels, b.depth.pixels) << step;
+    }
+    if (pixels > 10) {
+      EXPECT_GT(same, frames / 2);
+    } else {
+      EXPECT_LT(same, frames / 2);
+    }
+    EXPECT_LE(bounded.cacheStatistics().mostBytes, tight.budgetBytes);
+    EXPECT_EQ(unbounded.cacheStatistics().evictions, 0u);
+  }
+}
+
+TEST(VolumeRenderer, DrawsTheFinestLevelWhereNoErrorIsAllowed) {
+  VolumeRendererSettings settings = settingsWith(place().allBytes);
+  settings.selection.mostPixels = 0;
+  VolumeRenderer renderer(place().frame, place().tree, place().loader(), settings);
+  const RenderedView view = renderer.render(camera(), poseAt(0), nullptr);
+  std::vector<VolumeContent> finest;
+  for (size_t i = 0; i < place().tree.tiles.size(); ++i) {
+    if (place().tree.tiles[i].level == 0 && static_cast<int>(i) != place().tree.surround) {
+      finest.push_back(place().contents[i]);
+    }
+  }
+  ASSERT_EQ(finest.size(), 16u);
+  const VolumeContent& surround = place().contents.back();
+  const auto loader = [&](int tile) { return tile == 17 ? surround : finest[tile - 1]; };
+  VolumeRenderer flat(place().frame, flatTileTree(finest, &surround), loader, settings);
+  const RenderedView expected = flat.render(camera(), poseAt(0), nullptr);
+  EXPECT_EQ(view.colour.pixels, expected.colour.pixels);
+  EXPECT_EQ(view.opacity.pixels, expected.opacity.pixels);
+  double opacity = 0;
+  for (const float value : view.opacity.pixels) opacity += value;
+  EXPECT_GT(opacity / static_cast<double>(view.opacity.pixels.size()), 0.3);
+}
+
+TEST(VolumeRenderer, OrdersMixedLevelsAsEachRayMeetsThem) {
+  VolumeRendererSettings settings = settingsWith(place().allBytes);
+  settings.selection.mostPixels = 1;
+  VolumeRenderer renderer(place().frame, place().tree, place().loader(), settings);
+  bool mixed = false;
+  for (int step = 0; step < 600; step += 7) {
+    renderer.render(camera().scaledTo(16, 12), poseAt(step), nullptr);
+    std::set<int> levels;
+    for (int pixel = 0; pixel < 20; ++pixel) {
+      const Vec3d d = *camera().directionInCamera(Vec2d(3.2 * pixel, 2.4 * pixel));
+      double last = -1;
+      for (const SelectedTile& selected : renderer.selection().cut) {
+        const TileNode& node = place().tree.tiles[selected.tile];
+        levels.insert(node.level);
+        const RayRange range =
+            clipToBox({poseAt(step).translation, poseAt(step).rotation * d}, node.low, node.high, {0, 1e6});
+        if (range.far - range.near < 1e-9) continue;
+        EXPECT_GE(range.near, last - 1e-9);
+        last = range.near;
+      }
+    }
+    mixed |= levels.size() > 1;
+  }
+  EXPECT_TRUE(mixed);
+}
+
+TEST(VolumeRenderer, SaysWhatDrewAndWhatABudgetIsTooSmallFor) {
+  VolumeRenderer renderer(place().frame, place().tree, place().loader(), settingsWith(place().coarsestBytes));
+  EXPECT_EQ(renderer.device().find("cpu "), 0u);
+  EXPECT_NE(renderer.device().find("1 threads"), std::string::npos);
+  EXPECT_THROW(VolumeRenderer(place().frame, place().tree, place().loader(), settingsWith(place().coarsestBytes - 1)),
+               Error);
+}
+
+TEST(VolumeRenderer, IsTheSameEveryTime) {
+  VolumeRenderer renderer(place().frame, place().tree, place().loader(), settingsWith(place().allBytes));
+  const RenderedView first = renderer.render(camera(), poseAt(3), nullptr);
+  renderer.render(camera(), poseAt(4), nullptr);
+  const RenderedView again = renderer.render(camera(), poseAt(3), nullptr);
+  EXPECT_EQ(first.colour.pixels, again.colour.pixels);
+  EXPECT_EQ(first.depth.pixels, again.depth.pixels);
+}
+
+}  // namespace
+}  // namespace tessera

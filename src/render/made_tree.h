@@ -1,0 +1,42 @@
+// For tests: a tree over square cells of edge 2 amid the origin, 2×2 of them merged into one at each level.
+#pragma once
+
+#include <map>
+
+#include "render/tile_tree.h"
+
+namespace tessera {
+
+// Columns and rows need not be powers of two: what lies at the border has fewer children. A content takes `bytes`.
+inline TileTree madeTree(int columns, int rows, uint64_t bytes = 100) {
+  int levels = 0;
+  while ((1 << levels) < std::max(columns, rows)) ++levels;
+  TileTree tree;
+  std::map<std::pair<int, int>, int> above;  // tiles of the level above, by column and row
+  for (int level = levels; level >= 0; --level) {
+    std::map<std::pair<int, int>, int> here;
+    const int edge = 1 << level;
+    for (int j = 0; j * edge < rows; ++j) {
+      for (int i = 0; i * edge < columns; ++i) {
+        TileNode node;
+        node.level = level;
+        node.low = Vec3d(2 * i * edge - columns, 2 * j * edge - rows, -1);
+        node.high =
+            Vec3d(2 * std::min(columns, (i + 1) * edge) - columns, 2 * std::min(rows, (j + 1) * edge) - rows, 1);
+        node.geometricError = 2.0 / 512 * edge;
+        node.contentBytes = bytes;
+        const int number = static_cast<int>(tree.tiles.size());
+        if (level < levels) {
+          node.parent = above.at({i / 2, j / 2});
+          tree.tiles[node.parent].children.push_back(number);
+        }
+        tree.tiles.push_back(node);
+        here[{i, j}] = number;
+      }
+    }
+    above = here;
+  }
+  return tree;
+}
+
+}  // namespace tessera

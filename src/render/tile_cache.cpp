@@ -1,0 +1,91 @@
+#include "render/tile_cache.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/check.h"
+#include "base/error.h"
+
+namespace tessera {
+
+TileCache::TileCache(const TileTree& tree, uint64_t budgetBytes, Loader loader)
+    : tree_(tree), budget_(budgetBytes), loader_(std::move(loader)) {
+  tree.check();
+  std::vector<int> pinned = tree.coarsest();
+  if (tree.surround >= 0) pinned.push_back(tree.surround);
+  uint64_t bytes = 0;
+  for (const int tile : pinned) bytes += tree.tiles[tile].contentBytes;
+  if (bytes > budget_) {
+    throw Error("scene", "",
+                fmt::format("its coarsest level takes {} bytes of memory, the budget is {}", bytes, budget_),
+                fmt::format("allow at least {} bytes", bytes));
+  }
+  for (const int tile : pinned) insert(tile, true);
+}
+
+const VolumeContent* TileCache::find(int tile) {
+  const auto found = contents_.find(tile);
+  if (found == contents_.end()) return nullptr;
+  ++statistics_.hits;
+  uses_.splice(uses_.begin(), uses_, found->second.use);
+  return &found->second.content;
+}
+
+bool TileCache::load(std::span<const int> tiles, std::span<const int> kept) {
+  uint64_t wanted = 0;
+  for (const int tile : tiles) {
+    if (!holds(tile)) wanted += tree_.tiles[tile].contentBytes;
+  }
+  const auto stays = [&](int tile) {
+    return contents_.at(tile).pinned || std::find(kept.begin(), kept.end(), tile) != kept.end() ||
+           std::find(tiles.begin(), tiles.end(), tile) != tiles.end();
+  };
+  uint64_t held = statistics_.bytes;
+  std::vector<int> going;
+  for (auto use = uses_.rbegin(); use != uses_.rend() && held + wanted > budget_; ++use) {
+    if (stays(*use)) continue;
+    going.push_back(*use);
+    held -= contents_.at(*use).bytes;
+  }
+  if (held + wanted > budget_) {
+    ++statistics_.refusals;
+    return false;
+  }
+  for (const int tile : going) evict(tile);
+  for (const int tile : tiles) {
+    if (!holds(tile)) insert(tile, false);
+  }
+  return true;
+}
+
+void TileCache::insert(int tile, bool pinned) {
+  const uint64_t allowed = tree_.tiles[tile].contentBytes;
+  Entry entry;
+  entry.content = loader_(tile);
+  entry.bytes = bytesInMemory(entry.content);
+  entry.pinned = pinned;
+  if (entry.bytes > allowed) {
+    throw Error(fmt::format("content of tile {}", tile), "",
+                fmt::format("takes {} bytes of memory, its tileset says {}", entry.bytes, allowed),
+                "bake the scene again");
+  }
+  uses_.push_front(tile);
+  entry.use = uses_.begin();
+  statistics_.bytes += entry.bytes;
+  statistics_.mostBytes = std::max(statistics_.mostBytes, statistics_.bytes);
+  ++statistics_.loads;
+  const bool inserted = contents_.emplace(tile, std::move(entry)).second;
+  CHECK(inserted == true);
+  CHECK(statistics_.bytes <= budget_);
+}
+
+void TileCache::evict(int tile) {
+  const auto found = contents_.find(tile);
+  statistics_.bytes -= found->second.bytes;
+  ++statistics_.evictions;
+  uses_.erase(found->second.use);
+  contents_.erase(found);
+}
+
+}  // namespace tessera

@@ -1,0 +1,57 @@
+// Contents in memory, never more than a number of bytes of them. What must always be there (the coarsest level, the
+// surround) is loaded first and stays; of the rest, what has not been used for longest goes first.
+#pragma once
+
+#include <functional>
+#include <list>
+#include <span>
+#include <unordered_map>
+
+#include "render/tile_tree.h"
+#include "tiles/volume_content.h"
+
+namespace tessera {
+
+struct TileCacheStatistics {
+  uint64_t bytes = 0, mostBytes = 0;  // held now, and at most so far
+  uint64_t hits = 0, loads = 0, evictions = 0;
+  uint64_t refusals = 0;  // of requests for which there was no room
+};
+
+class TileCache {
+ public:
+  using Loader = std::function<VolumeContent(int tile)>;
+
+  // Loads what must stay. Throws Error where that alone is more than `budgetBytes`. Keeps a reference to `tree`.
+  TileCache(const TileTree& tree, uint64_t budgetBytes, Loader loader);
+
+  bool holds(int tile) const { return contents_.contains(tile); }
+  // Null where it is not in memory. Counts as a use; the content stays where it is until it is evicted.
+  const VolumeContent* find(int tile);
+
+  // Loads those that are missing, all or, where there is no room for all, none; evicts what is neither among them nor
+  // in `kept`. Throws Error where a content is larger than its tile says.
+  bool load(std::span<const int> tiles, std::span<const int> kept);
+
+  uint64_t budgetBytes() const { return budget_; }
+  const TileCacheStatistics& statistics() const { return statistics_; }
+
+ private:
+  struct Entry {
+    VolumeContent content;
+    uint64_t bytes = 0;
+    bool pinned = false;
+    std::list<int>::iterator use;
+  };
+  void insert(int tile, bool pinned);
+  void evict(int tile);
+
+  const TileTree& tree_;
+  uint64_t budget_;
+  Loader loader_;
+  std::unordered_map<int, Entry> contents_;
+  std::list<int> uses_;  // the latest first
+  TileCacheStatistics statistics_;
+};
+
+}  // namespace tessera

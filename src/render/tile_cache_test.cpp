@@ -1,0 +1,145 @@
+#include "render/tile_cache.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "base/error.h"
+#include "base/random.h"
+#include "render/made_tree.h"
+
+namespace tessera {
+namespace {
+
+// A content of exactly so many bytes.
+VolumeContent contentOfBytes(uint64_t bytes) {
+  VolumeContent content;
+  content.parts.resize(1);
+  content.parts[0].voxelBytes.resize(bytes - bytesInMemory(content));
+  return content;
+}
+
+constexpr uint64_t kBytes = 2000;
+
+TEST(TileCache, CountsAllThatAContentHolds) {
+  VolumeContent content;
+  const uint64_t before = bytesInMemory(content);
+  content.network = {{34, 3, std::vector<float>(102), std::vector<float>(3)}};
+  EXPECT_EQ(bytesInMemory(content) - before, sizeof(DenseLayer) + 4 * 105);
+  const uint64_t withNetwork = bytesInMemory(content);
+  content.parts.resize(1);
+  content.parts[0].macroblocks.resize(64);
+  content.parts[0].voxelBytes.resize(5832);
+  content.parts[0].planeBytes[2].resize(1000);
+  content.parts[0].distances.resize(512);
+  EXPECT_EQ(bytesInMemory(content) - withNetwork, sizeof(VolumePart) + 256 + 5832 + 1000 + 512);
+}
+
+TEST(TileCache, NeverHoldsMoreThanItsBudgetUnderRandomAccess) {
+  const TileTree tree = madeTree(4, 4, kBytes);
+  const RandomStream random(1, 1);
+  for (const uint64_t budget : {kBytes, 3 * kBytes, 7 * kBytes + 5, 100 * kBytes}) {
+    uint64_t loads = 0;
+    TileCache cache(tree, budget, [&](int) {
+      ++loads;
+      return contentOfBytes(kBytes);
+    });
+    uint64_t found = 0;
+    for (uint64_t i = 0; i < 3000; ++i) {
+      std::vector<int> tiles, kept;
+      for (uint64_t k = 0; k <= random.below(10 * i, 4); ++k) {
+        const int tile = static_cast<int>(random.below(10 * i + 1 + k, 21));
+        if (std::find(tiles.begin(), tiles.end(), tile) == tiles.end()) tiles.push_back(tile);
+      }
+      for (uint64_t k = 0; k < 2; ++k) {
+        const int tile = static_cast<int>(random.below(10 * i + 7 + k, 21));
+        if (cache.holds(tile)) kept.push_back(tile);
+      }
+      const std::set<int> all = [&] {
+        std::set<int> union_ = {0};
+        union_.insert(tiles.begin(), tiles.end());
+        union_.insert(kept.begin(), kept.end());
+        return union_;
+      }();
+      const bool loaded = cache.load(tiles, kept);
+      EXPECT_EQ(loaded, all.size() * kBytes <= budget ||
+                            std::all_of(tiles.begin(), tiles.end(), [&](int tile) { return cache.holds(tile); }));
+      for (const int tile : kept) EXPECT_TRUE(cache.holds(tile));
+      if (loaded) {
+        for (const int tile : tiles) found += cache.find(tile) != nullptr;
+      }
+      ASSERT_TRUE(cache.holds(0));  // the coarsest level
+      ASSERT_LE(cache.statistics().bytes, budget);
+      ASSERT_LE(cache.statistics().mostBytes, budget);
+    }
+    EXPECT_EQ(cache.statistics().loads, loads);
+    EXPECT_EQ(cache.statistics().hits, found);
+    EXPECT_EQ(cache.statistics().loads - cache.statistics().evictions, cache.statistics().bytes / kBytes);
+    if (budget == 100 * kBytes) {
+      EXPECT_EQ(loads, 21u);
+    }
+    if (budget == kBytes) {
+      EXPECT_EQ(loads, 1u);
+    }
+  }
+}
+
+TEST(TileCache, EvictsWhatHasNotBeenUsedForLongest) {
+  const TileTree tree = madeTree(4, 4, kBytes);
+  TileCache cache(tree, 4 * kBytes, [](int) { return contentOfBytes(kBytes); });
+  EXPECT_TRUE(cache.load(std::vector<int>{1, 2, 3}, {}));
+  cache.find(1);
+  EXPECT_TRUE(cache.load(std::vector<int>{4}, {}));
+  EXPECT_FALSE(cache.holds(2));
+  EXPECT_TRUE(cache.load(std::vector<int>{5}, std::vector<int>{3}));
+  EXPECT_TRUE(cache.holds(3));
+  EXPECT_FALSE(cache.holds(1));
+  EXPECT_EQ(cache.find(1), nullptr);
+}
+
+TEST(TileCache, LoadsAllOfARequestOrNothing) {
+  const TileTree tree = madeTree(4, 4, kBytes);
+  TileCache cache(tree, 4 * kBytes, [](int) { return contentOfBytes(kBytes); });
+  EXPECT_TRUE(cache.load(std::vector<int>{1, 2}, {}));
+  EXPECT_FALSE(cache.load(std::vector<int>{3, 4, 5, 6}, {}));
+  EXPECT_FALSE(cache.load(std::vector<int>{3, 4}, std::vector<int>{1, 2}));
+  EXPECT_TRUE(cache.holds(1));
+  EXPECT_TRUE(cache.holds(2));
+  EXPECT_FALSE(cache.holds(3));
+  EXPECT_EQ(cache.statistics().refusals, 2u);
+  EXPECT_EQ(cache.statistics().evictions, 0u);
+}
+
+TEST(TileCache, SaysHowMuchTheCoarsestLevelAndTheSurroundNeed) {
+  TileTree tree = madeTree(2, 2, kBytes);
+  tree.surround = static_cast<int>(tree.tiles.size());
+  tree.tiles.push_back({});
+  tree.tiles.back().contentBytes = kBytes;
+  int loads = 0;
+  const auto loader = [&](int) {
+    ++loads;
+    return contentOfBytes(kBytes);
+  };
+  try {
+    TileCache(tree, 2 * kBytes - 1, loader);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("4000 bytes"), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(loads, 0);
+  const TileCache cache(tree, 2 * kBytes, loader);
+  EXPECT_TRUE(cache.holds(tree.surround));
+  EXPECT_TRUE(cache.holds(0));
+}
+
+TEST(TileCache, RefusesAContentThatIsLargerThanItsTileSays) {
+  const TileTree tree = madeTree(2, 2, kBytes);
+  TileCache cache(tree, 100 * kBytes, [](int tile) { return contentOfBytes(kBytes + (tile == 2 ? 1 : 0)); });
+  EXPECT_THROW(cache.load(std::vector<int>{1, 2}, {}), Error);
+  EXPECT_TRUE(cache.holds(1));
+  EXPECT_FALSE(cache.holds(2));
+  EXPECT_EQ(cache.statistics().bytes, 2 * kBytes);
+}
+
+}  // namespace
+}  // namespace tessera

@@ -1,0 +1,135 @@
+#include "render/tile_selection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/check.h"
+
+namespace tessera {
+
+bool TileView::sees(const TileNode& tile) const {
+  if (!window) return true;
+  // Outside of one plane through the eye with all corners; corners exactly on it count as inside.
+  bool outside[5] = {true, true, true, true, true};
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3d x(corner & 1 ? tile.high.x() : tile.low.x(), corner & 2 ? tile.high.y() : tile.low.y(),
+                  corner & 4 ? tile.high.z() : tile.low.z());
+    const Vec3d c = cameraFromScene * (x - eye);
+    outside[4] &= c.z() < 0;
+    for (const int axis : {0, 1}) {
+      outside[2 * axis] &= c[axis] < window->low[axis] * c.z();
+      outside[2 * axis + 1] &= c[axis] > window->high[axis] * c.z();
+    }
+  }
+  return std::none_of(outside, outside + 5, [](bool o) { return o; });
+}
+
+double TileView::distance(const TileNode& tile) const {
+  return std::max(nearest, (eye - eye.cwiseMax(tile.low).cwiseMin(tile.high)).norm());
+}
+
+double TileView::errorInPixels(const TileNode& tile) const {
+  return tile.geometricError * focal / distance(tile);
+}
+
+TileView tileView(const Camera& camera, const Pose& worldFromCamera, const VolumeFrame& frame) {
+  TileView view;
+  view.eye = frame.inScene(worldFromCamera.translation);
+  view.cameraFromScene = worldFromCamera.rotation.transpose() * frame.rotation;
+  view.focal = std::max(camera.focalX(), camera.focalY());
+  view.pixels = static_cast<double>(camera.width) * camera.height;
+  view.nearest = frame.near;
+  if (lensSeesBehind(camera.lens)) return view;
+  // A lens is a continuous map without folds: the border of the picture encloses it in x/z and y/z too.
+  TileView::Window window{{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
+  const auto add = [&](double x, double y) {
+    const std::optional<Vec3d> d = camera.directionInCamera(Vec2d(x, y));
+    if (!d || d->z() <= 1e-3) return false;
+    for (const int axis : {0, 1}) {
+      window.low[axis] = std::min(window.low[axis], (*d)[axis] / d->z());
+      window.high[axis] = std::max(window.high[axis], (*d)[axis] / d->z());
+    }
+    return true;
+  };
+  for (int x = 0; x <= camera.width; ++x) {
+    if (!add(x, 0) || !add(x, camera.height)) return view;
+  }
+  for (int y = 0; y <= camera.height; ++y) {
+    if (!add(0, y) || !add(camera.width, y)) return view;
+  }
+  view.window = window;
+  return view;
+}
+
+struct TileSelector::Pass {
+  const TileView& view;
+  const std::function<bool(int)>& loaded;
+  Selection selection;
+
+  void request(std::vector<int> tiles, std::vector<int> beside, const TileNode& instead, double mostPixels) {
+    const double radius = 0.5 * (instead.high - instead.low).norm(), distance = view.distance(instead);
+    const double onScreen = radius * view.focal / std::max(radius, distance);
+    const double area = std::min(view.pixels, std::numbers::pi * onScreen * onScreen);
+    selection.requests.push_back({std::move(tiles), std::move(beside),
+                                  area * view.errorInPixels(instead) / std::max(mostPixels, 1e-3), distance});
+  }
+};
+
+TileSelector::TileSelector(const TileTree& tree, SelectionSettings settings)
+    : tree_(tree), settings_(settings), replaced_(tree.tiles.size()) {
+  tree.check();
+  CHECK(settings.hysteresis >= 1.0);
+}
+
+// Adds tiles to the cut that cover this one; false where there are none in memory.
+bool TileSelector::cover(Pass& pass, int tile) {
+  const TileNode& node = tree_.tiles[tile];
+  if (!pass.view.sees(node)) {
+    pass.selection.cut.push_back({tile, false});
+    return true;
+  }
+  if (!node.hasContent) {
+    replaced_[tile] = true;
+  } else if (node.children.empty() || node.level <= settings_.finestLevel) {
+    replaced_[tile] = false;
+  } else {
+    const double threshold = settings_.mostPixels / (replaced_[tile] ? settings_.hysteresis : 1);
+    replaced_[tile] = pass.view.errorInPixels(node) > threshold;
+  }
+  const bool replaced = replaced_[tile], loaded = node.hasContent && pass.loaded(tile);
+  if (!node.children.empty() && (replaced || !loaded)) {
+    Selection& made = pass.selection;
+    const size_t cutBefore = made.cut.size(), requestsBefore = made.requests.size();
+    std::vector<int> missing;
+    for (const int child : tree_.childrenFrontToBack(tile, pass.view.eye)) {
+      if (!cover(pass, child)) missing.push_back(child);
+    }
+    if (missing.empty()) {
+      if (!replaced) pass.request({tile}, {}, node, settings_.mostPixels);  // finer than need be
+      return true;
+    }
+    std::vector<int> beside;
+    for (size_t i = cutBefore; i < made.cut.size(); ++i) {
+      if (made.cut[i].visible) beside.push_back(made.cut[i].tile);
+    }
+    made.cut.resize(cutBefore);
+    made.requests.resize(requestsBefore);
+    if (loaded) pass.request(std::move(missing), std::move(beside), node, settings_.mostPixels);
+  }
+  if (loaded) pass.selection.cut.push_back({tile, true});
+  return loaded;
+}
+
+Selection TileSelector::select(const TileView& view, const std::function<bool(int)>& loaded) {
+  for (const int tile : tree_.coarsest()) CHECK(loaded(tile) == true);
+  Pass pass{view, loaded, {}};
+  CHECK(cover(pass, 0) == true);
+  std::stable_sort(pass.selection.requests.begin(), pass.selection.requests.end(),
+                   [](const TileRequest& a, const TileRequest& b) {
+                     return a.priority != b.priority ? a.priority > b.priority : a.distance < b.distance;
+                   });
+  return std::move(pass.selection);
+}
+
+}  // namespace tessera

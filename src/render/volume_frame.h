@@ -1,0 +1,49 @@
+// Where a `volume` scene stands, and rays in it. Scene units: those of tiles/volume_content.h.
+#pragma once
+
+#include <algorithm>
+
+#include "scene/axes.h"
+
+namespace tessera {
+
+struct VolumeFrame {
+  // A similarity: x in the world is translation + scale · rotation · x in the scene.
+  Mat3d rotation = Mat3d::Identity();
+  double scale = 1;  // world units of one scene unit
+  Vec3d translation = Vec3d::Zero();
+  Vec3d low = {-1, -1, -1}, high = {1, 1, 1};  // the scene's box, scene units; the surround owns what lies outside
+  double near = 0.05;                          // scene units: no sample nearer to a camera
+
+  static constexpr double kSceneEnd = 1e6;  // scene units: no sample beyond
+
+  Vec3d inScene(const Vec3d& xInWorld) const { return rotation.transpose() * (xInWorld - translation) / scale; }
+};
+
+// Scene units; the direction has length 1.
+struct SceneRay {
+  Vec3d origin = Vec3d::Zero(), direction = Vec3d::UnitZ();
+};
+
+// Distances along a ray.
+struct RayRange {
+  double near = 0, far = 0;
+  bool empty() const { return !(near < far); }
+};
+
+// The part of `range` where the ray is in a box, whose sides may be infinite.
+inline RayRange clipToBox(const SceneRay& ray, const Vec3d& low, const Vec3d& high, RayRange range) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double o = ray.origin[axis], d = ray.direction[axis];
+    if (d == 0) {
+      if (o < low[axis] || o >= high[axis]) return {range.near, range.near};
+      continue;
+    }
+    const double a = (low[axis] - o) / d, b = (high[axis] - o) / d;
+    range.near = std::max(range.near, std::min(a, b));
+    range.far = std::min(range.far, std::max(a, b));
+  }
+  return range;
+}
+
+}  // namespace tessera
