@@ -1,9 +1,11 @@
 #include "apps/tessera/drawable.h"
 
 #include "base/error.h"
+#include "render/cpu/open_volume_scene.h"
 #include "representations/field/field_renderer.h"
 #include "representations/volume/train_volume.h"
 #include "representations/volume/volume_model_renderer.h"
+#include "tiles/scene_folder.h"
 
 namespace tessera {
 namespace {
@@ -28,9 +30,35 @@ class DrawableModel final : public Drawable {
   std::unique_ptr<Renderer> renderer_;
 };
 
+class DrawableScene final : public Drawable {
+ public:
+  explicit DrawableScene(const fs::path& folder, int threads) : folder_(folder), tileset_(readTileset(folder)) {
+    VolumeRendererSettings settings;
+    settings.selection.mostPixels = 0;  // the finest everywhere
+    settings.threads = threads;
+    renderer_ = openVolumeScene(folder, tileset_, settings);
+  }
+
+  ViewRenderer& renderer() override { return *renderer_; }
+  Mat4d sourceFromWorld() const override { return tileset_.sourceFromWorld; }
+  void requireWorldOf(const Capture& capture) const override {
+    if ((capture.sourceFromWorld - tileset_.sourceFromWorld).norm() <= 1e-9 * tileset_.sourceFromWorld.norm()) return;
+    throw Error(capture.root.string(), "transforms.json",
+                "its world is not the one of " + folder_.string() + ", which was baked from '" + tileset_.name + "'",
+                "use that capture");
+  }
+  std::vector<std::string> trainedOnAmong(const Capture&, Split) const override { return {}; }  // scenes do not say
+
+ private:
+  fs::path folder_;
+  Tileset tileset_;
+  std::unique_ptr<VolumeRenderer> renderer_;
+};
+
 }  // namespace
 
-std::unique_ptr<Drawable> openDrawable(Device& device, const fs::path& folder) {
+std::unique_ptr<Drawable> openDrawable(Device& device, const fs::path& folder, int threads) {
+  if (fs::exists(folder / "tileset.json")) return std::make_unique<DrawableScene>(folder, threads);
   const std::optional<ModelManifest> manifest = ModelFolder(folder).manifest();
   if (!manifest || manifest->method == "field") {
     auto model = loadFieldModel(device, folder);

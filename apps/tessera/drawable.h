@@ -21,6 +21,6 @@ class Drawable {
 };
 
 // Throws Error when the folder holds neither. Keeps a reference to `device`.
-std::unique_ptr<Drawable> openDrawable(Device& device, const fs::path& folder);
+std::unique_ptr<Drawable> openDrawable(Device& device, const fs::path& folder, int threads = 0);
 
 }  // namespace tessera

@@ -57,6 +57,7 @@ int main(int argc, char** argv) {
   tessera::addSynthVerb(app);
   tessera::addImportVerb(app);
   tessera::addTrainVerb(app);
+  tessera::addBakeVerb(app);
   tessera::addEvalVerb(app);
   tessera::addRenderVerb(app);
   tessera::addInfoVerb(app);

@@ -34,7 +34,7 @@ void addEvalVerb(CLI::App& app) {
   verb->callback([flags] {
     const Capture capture = readCapture(flags->capture);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
-    const std::unique_ptr<Drawable> drawable = openDrawable(*device, flags->model);
+    const std::unique_ptr<Drawable> drawable = openDrawable(*device, flags->model, flags->device.threads);
     EvaluateOptions options;
     options.split = *splitFromName(flags->split);
     drawable->requireWorldOf(capture);

@@ -52,7 +52,7 @@ void addRenderVerb(CLI::App& app) {
     RenderViewsOptions options;
     parseSize(flags->size, options);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
-    const std::unique_ptr<Drawable> drawable = openDrawable(*device, flags->model);
+    const std::unique_ptr<Drawable> drawable = openDrawable(*device, flags->model, flags->device.threads);
     std::vector<NamedView> views;
     if (!flags->path.empty()) {
       const CameraPath path = readCameraPath(flags->path, flags->dataparserTransforms);

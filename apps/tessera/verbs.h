@@ -16,6 +16,7 @@ namespace tessera {
 void addSynthVerb(CLI::App& app);
 void addImportVerb(CLI::App& app);
 void addTrainVerb(CLI::App& app);
+void addBakeVerb(CLI::App& app);
 void addEvalVerb(CLI::App& app);
 void addRenderVerb(CLI::App& app);
 void addInfoVerb(CLI::App& app);

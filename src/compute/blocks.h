@@ -46,7 +46,8 @@ struct BlockSpace {
 
 // Where rays enter and leave the box, and their first fence posts. Range: [max(near, entry), exit]; where that is empty
 // [near, near + 1 + distance of the origin to the ray's own origin] with a surround, [near, near] without. Fences: 0,
-// (i + jitter - ½) / intervals for i in (0, intervals), 1.
+// (i + jitter - ½) / intervals for i in (0, intervals), 1. `near` is the space's, or the ray's own where that is
+// farther.
 struct EnterScene {
   const BlockSpace& space;
   Count rays;
@@ -54,6 +55,7 @@ struct EnterScene {
   Slice<const float> origins;     // [rays][3]
   Slice<const float> directions;  // [rays][3], unit; zero: no ray, range [near, near]
   Slice<const float> jitter;      // optional, [rays], in [0,1); else ½
+  Slice<const float> nearOfRay;   // optional, [rays]
   Slice<float> range;             // [rays][2]
   Slice<float> fences;            // [rays][intervals + 1]
 };

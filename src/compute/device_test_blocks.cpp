@@ -127,7 +127,8 @@ OperationTests testsOf<EnterScene>() {
     for (const Size& size : kSizes)
       for (bool jittered : {false, true})
         tests.cases.push_back(
-            {fmt::format("{}, rays {}{}", named.name, toString(size), jittered ? ", jitter" : ""), [=](Stage& stage) {
+            {fmt::format("{}, rays {}{}", named.name, toString(size), jittered ? ", jitter, near" : ""),
+             [=](Stage& stage) {
                const uint32_t intervals = jittered ? 17 : 1;
                const Rays views(stage.random, named.space, size.capacity);
                EnterScene a{named.space};
@@ -136,6 +137,7 @@ OperationTests testsOf<EnterScene>() {
                a.origins = stage.input(views.origins);
                a.directions = stage.input(views.directions);
                if (jittered) a.jitter = stage.randomInput(size.capacity, 0, 1);
+               if (jittered) a.nearOfRay = stage.randomInput(size.capacity, 0, 4);
                a.range = stage.output("range", 2 * size.capacity, 1e-6);
                a.fences = stage.output("fences", (intervals + 1) * size.capacity, 1e-6);
                stage.device.run(a);

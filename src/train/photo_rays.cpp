@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "train/visible_cells.h"
 
 namespace tessera {
 namespace {
@@ -39,6 +40,12 @@ PhotoRays::PhotoRays(Device& device, const Capture& capture, const SceneFrame& f
       photoOfRay_(device.array<uint32_t>(settings.mostRays)) {
   const size_t rays = settings.mostRays;
   for (Array<float>* one : {&weights_, &distances_}) *one = device.array<float>(rays);
+  if (settings.freeSpace) {
+    nears_ = device.array<float>(rays);
+    for (const double depth : nearestContent(capture)) {
+      nearOfPhoto_.push_back(static_cast<float>(kNearShare * depth * frame.scale));
+    }
+  }
   jitter_ = device.array<float>(rays * settings.jitters);
   pixels_ = device.array<float>(2 * rays);
   for (Array<float>* three : {&targets_, &backgrounds_, &origins_, &directions_})
@@ -56,6 +63,11 @@ void PhotoRays::draw(int64_t step, uint32_t rays) {
   device_.write(backgrounds_.all(), std::span<const float>(batch_.backgrounds));
   device_.write(weights_.all(), std::span<const float>(batch_.weights));
   device_.write(distances_.all(), std::span<const float>(batch_.distances));
+  if (settings_.freeSpace) {
+    std::vector<float> nears;
+    for (const uint32_t photo : batch_.photoOfRay) nears.push_back(nearOfPhoto_[photo]);
+    device_.write(nears_.all(), std::span<const float>(nears));
+  }
   std::vector<float> jitter;
   for (uint32_t k = 0; k < settings_.jitters; ++k) {
     for (const float first : batch_.jitter) {

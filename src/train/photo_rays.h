@@ -17,8 +17,9 @@ class PhotoRays {
     int stepsPerPhoto = 2;
     bool randomBackground = true;
     double knownShare = 0;  // of the rays, through sparse points
-    uint32_t jitters =
-        1;  // numbers a ray; the first is RayBatch's, the others differ from it by multiples of the golden ratio
+    bool freeSpace = false;  // also how far rays go through nothing
+    // Numbers a ray; the first is RayBatch's, the others differ from it by multiples of the golden ratio.
+    uint32_t jitters = 1;
   };
   // Trains on the capture's training photos; Error when there are none. Keeps references to `device` and `capture`.
   PhotoRays(Device& device, const Capture& capture, const SceneFrame& frame, const Settings& settings);
@@ -34,12 +35,13 @@ class PhotoRays {
   Slice<const float> backgrounds(uint32_t first, uint32_t rays) const { return three(backgrounds_, first, rays); }
   Slice<const float> weights(uint32_t first, uint32_t rays) const { return weights_.part(first, rays); }
   Slice<const float> distances(uint32_t first, uint32_t rays) const { return distances_.part(first, rays); }
+  // Before that no point was seen in the ray's photo (nearestContent), scene units; with `freeSpace`.
+  Slice<const float> nears(uint32_t first, uint32_t rays) const { return nears_.part(first, rays); }
   Slice<const float> origins(uint32_t first, uint32_t rays) const { return three(origins_, first, rays); }
   Slice<const float> directions(uint32_t first, uint32_t rays) const { return three(directions_, first, rays); }
   Slice<const float> jitter(uint32_t first, uint32_t rays) const { return jitter_.part(first, rays); }
-  Slice<const float> jitters() const {
-    return jitter_.part(0, size_t{count_} * settings_.jitters);
-  }  // [jitters][count]
+  // [jitters][count]
+  Slice<const float> jitters() const { return jitter_.part(0, size_t{count_} * settings_.jitters); }
 
  private:
   static Slice<const float> three(const Array<float>& array, uint32_t first, uint32_t rays) {
@@ -50,11 +52,12 @@ class PhotoRays {
   Settings settings_;
   PhotoWindow photos_;
   std::vector<std::vector<KnownDistance>> known_;  // [photo]
+  std::vector<float> nearOfPhoto_;                 // with freeSpace
   RayBatch batch_;
   uint32_t count_ = 0;
   Array<RayCamera> cameras_;
   Array<uint32_t> photoOfRay_;
-  Array<float> pixels_, targets_, backgrounds_, weights_, jitter_, distances_, origins_, directions_;
+  Array<float> pixels_, targets_, backgrounds_, weights_, jitter_, distances_, nears_, origins_, directions_;
 };
 
 }  // namespace tessera

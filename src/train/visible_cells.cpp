@@ -11,8 +11,7 @@ namespace {
 constexpr int kBlock = 2;               // cells are judged in blocks of 2³
 constexpr size_t kEnough = 20;          // observations of a photo
 constexpr double kNearestShare = 0.02;  // of the observations are taken for outliers
-constexpr double kNearShare = 0.8;
-constexpr double kSlack = 0.25;  // of the width: other views look a little past what photos show
+constexpr double kSlack = 0.25;         // of the width: other views look a little past what photos show
 
 // Scene position of a point given in grid coordinates. Nothing for what no point of the scene maps to.
 bool sceneFromGrid(const MarchSpace& space, const Vec3d& u, Vec3d* x) {

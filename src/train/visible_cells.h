@@ -8,6 +8,8 @@
 
 namespace tessera {
 
+inline constexpr double kNearShare = 0.8;
+
 // One entry a cell, in the order of MarchRays::occupancy. A cell is visible when a training photo has it in its picture
 // no nearer than the photo's nearest content: with sparse points, kNearShare of the depth of the nearest ones observed
 // (the free space below drones and in front of cameras then stays free); else the march's near.

@@ -307,6 +307,7 @@ void run(Context& context, const EnterScene& a) {
   const float* origins = hostPointer(a.origins);
   const float* directions = hostPointer(a.directions);
   const float* jitter = hostPointer(a.jitter);
+  const float* nearOfRay = hostPointer(a.nearOfRay);
   float* range = hostPointer(a.range);
   float* fences = hostPointer(a.fences);
   const double low[3] = {-1.0 * space.columns, -1.0 * space.rows, space.bottom};
@@ -317,7 +318,8 @@ void run(Context& context, const EnterScene& a) {
       const float* o = origins + 3 * ray;
       const float* d = directions + 3 * ray;
       const bool exists = d[0] != 0 || d[1] != 0 || d[2] != 0;
-      double enter = space.near, leave = exists ? std::numeric_limits<double>::infinity() : 0;
+      const double near = nearOfRay ? std::max(space.near, nearOfRay[ray]) : space.near;
+      double enter = near, leave = exists ? std::numeric_limits<double>::infinity() : 0;
       for (int axis = 0; axis < 3; ++axis) {
         if (d[axis] == 0) {
           if (o[axis] < low[axis] || o[axis] > high[axis]) leave = 0;
@@ -328,7 +330,7 @@ void run(Context& context, const EnterScene& a) {
         leave = std::min(leave, std::max(toLow, toHigh));
       }
       if (!(enter < leave)) {
-        enter = leave = space.near;
+        enter = leave = near;
         if (exists && space.surround != Surround::none) leave = enter + 1 + std::hypot(o[0], o[1], o[2]);
       }
       range[2 * ray] = static_cast<float>(enter);

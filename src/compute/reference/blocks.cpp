@@ -61,8 +61,9 @@ std::vector<Post> postsOf(const BlockSpace& space, const FencedRay& ray, bool sp
 
 }  // namespace
 
-std::array<double, 2> rangeInScene(const BlockSpace& space, const Point& origin, const Point& direction) {
-  const double near = space.near;
+std::array<double, 2> rangeInScene(const BlockSpace& space, const Point& origin, const Point& direction,
+                                   double nearOfRay) {
+  const double near = std::max<double>(space.near, nearOfRay);
   if (direction == Point{}) return {near, near};
   const double low[3] = {-1.0 * space.columns, -1.0 * space.rows, space.bottom};
   const double high[3] = {1.0 * space.columns, 1.0 * space.rows, space.top};
@@ -141,11 +142,12 @@ BlockPoint blockPoint(const BlockSpace& space, Indices blocks, uint32_t texels, 
 void run(const EnterScene& a) {
   const size_t rays = hostCount(a.rays);
   const Doubles origins = doubles(a.origins, 3 * rays), directions = doubles(a.directions, 3 * rays);
-  const Doubles jitter = doubles(a.jitter, rays);
+  const Doubles jitter = doubles(a.jitter, rays), nears = doubles(a.nearOfRay, rays);
   Doubles range, fences;
   for (size_t r = 0; r < rays; ++r) {
-    const auto ofRay = rangeInScene(a.space, {origins[3 * r], origins[3 * r + 1], origins[3 * r + 2]},
-                                    {directions[3 * r], directions[3 * r + 1], directions[3 * r + 2]});
+    const auto ofRay =
+        rangeInScene(a.space, {origins[3 * r], origins[3 * r + 1], origins[3 * r + 2]},
+                     {directions[3 * r], directions[3 * r + 1], directions[3 * r + 2]}, nears.empty() ? 0 : nears[r]);
     range.insert(range.end(), ofRay.begin(), ofRay.end());
     const Doubles first = firstFences(a.intervals, jitter.empty() ? 0.5 : jitter[r]);
     fences.insert(fences.end(), first.begin(), first.end());

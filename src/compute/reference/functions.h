@@ -91,7 +91,8 @@ void occupancyUpdate(const MarchSpace& space, double decay, double threshold, In
                      std::span<double> grid, std::span<uint32_t> occupancy);
 
 // blocks.cpp: one ray, one point
-std::array<double, 2> rangeInScene(const BlockSpace& space, const Point& origin, const Point& direction);
+std::array<double, 2> rangeInScene(const BlockSpace& space, const Point& origin, const Point& direction,
+                                   double near = 0);
 Doubles firstFences(uint32_t intervals, double jitter);
 struct FencedRay {
   Point origin{}, direction{};

@@ -110,6 +110,10 @@ std::vector<ConfigField> VolumeConfig::fields() {
       {"cull_first", "opacity of a renderer's step below which it is culled, at first", &cullFirst},
       {"cull_last", "in the end, and when baked", &cullLast},
       {"literal_eq3", "the deferred network's colour whole, as printed, not times the block's opacity", &literalEq3},
+      {"full_gradient_distance",
+       "samples nearer to the camera learn more slowly, or fog gathers there; in halves of a block",
+       &fullGradientDistance},
+      {"free_space", "nothing stands before the nearest sparse points that a photo shows", &freeSpace},
       {"exposure", "fit an exposure to each photo", &exposure},
       {"random_background", "train against random colours behind the scene", &randomBackground},
   };
@@ -160,6 +164,7 @@ void VolumeConfig::check() const {
   within("sparsity", sparsity, 0, kHuge);
   within("opacity", opacity, 0, kHuge);
   within("ramp_share", rampShare, 0, 1);
+  within("full_gradient_distance", fullGradientDistance, 0, kHuge);
   within("sparsity_points", sparsityPoints, 0, 1 << 24);
   within("cull_begin", cullBegin, 0, 1);
   within("cull_end", cullEnd, cullBegin, 1);

@@ -39,11 +39,11 @@ struct VolumeConfig {
   // Losses
   std::string loss = "charbonnier";
   double lossParameter = 1e-3, s3im = 0.2, interlevel = 1, distortion = 0.01, sparsity = 0.01, opacity = 1e-3;
-  double rampShare = 0.1;
+  double rampShare = 0.1, fullGradientDistance = 1;
   int sparsityPoints = 4096;
   double cullBegin = 0.4, cullEnd = 0.8, cullFirst = 5e-4, cullLast = 5e-3;
   bool literalEq3 = false;
-  bool exposure = true, randomBackground = true;
+  bool exposure = true, randomBackground = true, freeSpace = true;
 
   std::vector<ConfigField> fields();
   // Throws Error naming the first setting that no model can be made of.

@@ -60,7 +60,7 @@ RenderedView VolumeModelRenderer::render(const Camera& camera, const Pose& world
       return directions[3 * ray] * forward[2] + directions[3 * ray + 1] * forward[5] +
              directions[3 * ray + 2] * forward[8];
     };
-    VolumeRays volumeRays{rays, origins_, directions_, {}, {}};
+    VolumeRays volumeRays{rays, origins_, directions_, {}, {}, {}};
     if (opaqueDepth != nullptr) {
       far.clear();
       for (size_t ray = 0; ray < rays; ++ray) {

@@ -98,6 +98,7 @@ void VolumePass::forward(const VolumeRays& rays, const Options& options) {
                          rays.origins,
                          rays.directions,
                          jitterOf(rays, 0),
+                         rays.near,
                          range_,
                          round_[0].fences});
   for (uint32_t round = 0; round < rounds(); ++round) propose(rays, round, options);
@@ -289,6 +290,8 @@ void VolumePass::backwardThroughBlocks(const VolumeRays& rays, Slice<const float
   ofBlocks.colours = Matrix<float>(colours_, kColours);
   ofBlocks.rayColourGradients = compositedGradients_;
   ofBlocks.rayOpacityGradients = segmentOpacityGradients_;
+  ofBlocks.fullGradientDistance = static_cast<float>(model_.config().fullGradientDistance);
+  ofBlocks.distances = distances_;
   ofBlocks.xGradients = logDensityGradients_;
   ofBlocks.colourGradients = Matrix<float>(colourGradients_, kColours);
   device_.run(ofBlocks);

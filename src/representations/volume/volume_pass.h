@@ -13,6 +13,7 @@ struct VolumeRays {
   Slice<const float> origins, directions;  // [count][3], scene units
   Slice<const float> jitter;               // optional, [kRounds + 1][count], in [0,1)
   Slice<const float> far;                  // optional, [count]: rays end there
+  Slice<const float> near;                 // optional, [count]: and begin there
 };
 
 class VolumePass {

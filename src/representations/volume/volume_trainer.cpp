@@ -24,6 +24,7 @@ PhotoRays::Settings raySettings(const VolumeConfig& config) {
   settings.photoBudgetMiB = config.photoBudgetMiB;
   settings.stepsPerPhoto = config.stepsPerPhoto;
   settings.randomBackground = config.randomBackground;
+  settings.freeSpace = config.freeSpace;
   settings.jitters = VolumePass::kRounds + 1;
   return settings;
 }
@@ -75,7 +76,12 @@ StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
   // While the number of steps is not known, it is early.
   const double progress = plannedSteps > 0 ? static_cast<double>(step) / static_cast<double>(plannedSteps) : 0;
   photoRays_.draw(step, rays_);
-  const VolumeRays rays{rays_, photoRays_.origins(0, rays_), photoRays_.directions(0, rays_), photoRays_.jitters(), {}};
+  const VolumeRays rays{rays_,
+                        photoRays_.origins(0, rays_),
+                        photoRays_.directions(0, rays_),
+                        photoRays_.jitters(),
+                        {},
+                        config_.freeSpace ? photoRays_.nears(0, rays_) : Slice<const float>()};
   VolumePass::Options options;
   options.anneal = static_cast<float>(std::min(1.0, (static_cast<double>(step) + 1) / 500));
   options.minAlpha = cullThreshold(config_, progress);

@@ -1,0 +1,55 @@
+#include <fmt/format.h>
+
+#include "apps/tessera/verbs.h"
+#include "base/error.h"
+#include "base/progress.h"
+#include "import/capture_reader.h"
+#include "representations/volume/bake_volume.h"
+#include "representations/volume/train_volume.h"
+
+namespace tessera {
+
+void addBakeVerb(CLI::App& app) {
+  struct Flags {
+    std::string model, scene, capture;
+    BakeVolumeOptions options;
+    DeviceOptions device;
+    bool json = false;
+  };
+  auto flags = std::make_shared<Flags>();
+  CLI::App* verb = app.add_subcommand("bake", "a trained model to a scene of tiles");
+  verb->footer("Example:\n  tessera bake city.model city.scene");
+  verb->add_option("model", flags->model, "model folder, of --method volume")->required();
+  verb->add_option("scene", flags->scene, "scene folder to write")->required();
+  verb->add_option("--capture", flags->capture, "what the model was trained on; default: where it was then");
+  verb->add_option("--stride", flags->options.stride,
+                   "look at every so manieth pixel of rows and columns to find what is seen")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 64));
+  verb->add_option("--effort", flags->options.effort, "of compression")->capture_default_str()->check(CLI::Range(0, 9));
+  verb->add_flag("--json", flags->json, "print the result as one JSON object");
+  addDeviceFlags(*verb, flags->device);
+  verb->callback([flags] {
+    const ModelFolder folder(flags->model);
+    const std::unique_ptr<Device> device = makeDevice(flags->device);
+    const std::unique_ptr<VolumeModel> model = loadVolumeModel(*device, flags->model);
+    const Capture capture =
+        readCapture(flags->capture.empty() ? folder.readPlacement().capture.string() : flags->capture);
+    requireSameWorld(folder, capture);
+    flags->options.minAlpha = model->config().cullLast;
+    Progress progress("baking", static_cast<int64_t>(capture.photosIn(Split::train).size()), "photos");
+    flags->options.onPhoto = [&](int64_t done, int64_t) { progress.update(done); };
+    const BakedVolume baked = bakeVolume(*model, capture, flags->scene, flags->options);
+    progress.finish();
+    if (flags->json) {
+      fmt::print("{{\"bytes_on_disk\": {}, \"bytes_in_memory\": {}, \"macroblocks\": {}, \"tiles\": {}}}\n",
+                 baked.bytesOnDisk, baked.bytesInMemory, baked.macroblocks, baked.tileset.tiles.size());
+      return;
+    }
+    fmt::print("{}: {:.1f} MB on disk, {:.1f} MB in memory, {} macroblocks\n", flags->scene,
+               static_cast<double>(baked.bytesOnDisk) / 1e6, static_cast<double>(baked.bytesInMemory) / 1e6,
+               baked.macroblocks);
+  });
+}
+
+}  // namespace tessera

@@ -1,0 +1,319 @@
+#include "representations/volume/bake_volume.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "representations/volume/alive_texels.h"
+#include "representations/volume/volume_pass.h"
+#include "tiles/scene_folder.h"
+#include "tiles/volume_payload.h"
+
+namespace tessera {
+namespace {
+
+constexpr uint32_t kRays = 2048;                // of one piece of a photo
+constexpr uint32_t kTexels = 1 << 16;           // evaluated together
+constexpr double kReachOfPlanes = 12.0 / 2048;  // texels beside needed ones are kept too (MERF: 12 of 2048)
+
+VolumePass::Room roomForRays(const VolumeModel& model) {
+  BlockSamples most{model.space()};
+  most.intervals = static_cast<uint32_t>(model.config().samples);
+  most.split = true;
+  VolumePass::Room room;
+  room.rays = kRays;
+  room.texels = VirtualGrid::kCorners * most.mostSamples(kRays);
+  return room;
+}
+
+// Pixels of a photo, every `stride`th, as rays on the device.
+class PhotoPixels {
+ public:
+  PhotoPixels(Device& device, const RayCamera& camera, int width, int height, int stride)
+      : device_(device), width_(width), height_(height), stride_(stride) {
+    cameras_ = device.arrayOf(std::vector<RayCamera>{camera});
+    cameraOfRay_ = device.array<uint32_t>(kRays);
+    pixels_ = device.array<float>(kRays * 2);
+    for (Array<float>* three : {&origins_, &directions_}) *three = device.array<float>(kRays * 3);
+  }
+  size_t count() const { return size_t{columns()} * ((height_ + stride_ - 1) / stride_); }
+  VolumeRays rays(size_t first) {
+    const uint32_t count = static_cast<uint32_t>(std::min<size_t>(kRays, this->count() - first));
+    std::vector<float> pixels;
+    for (size_t i = first; i < first + count; ++i) {
+      pixels.push_back(static_cast<float>(i % columns() * stride_) + 0.5f);
+      pixels.push_back(static_cast<float>(i / columns() * stride_) + 0.5f);
+    }
+    device_.write(pixels_.all(), std::span<const float>(pixels));
+    device_.run(GenerateRays{{count}, cameras_, cameraOfRay_, pixels_, origins_, directions_});
+    return {count, origins_, directions_, {}, {}, {}};
+  }
+
+ private:
+  size_t columns() const { return static_cast<size_t>((width_ + stride_ - 1) / stride_); }
+
+  Device& device_;
+  int width_, height_, stride_;
+  Array<RayCamera> cameras_;
+  Array<uint32_t> cameraOfRay_;
+  Array<float> pixels_, origins_, directions_;
+};
+
+// Evaluates one block's attributes at positions, as bytes.
+class TexelBaker {
+ public:
+  TexelBaker(VolumeModel& model, uint32_t block) : model_(model), device_(model.device()) {
+    const uint32_t blocks = model.space().blocks();
+    batch_ = BlockFieldBatch(device_, model.attributes().shape(), kTexels, false);
+    positions_ = device_.array<float>(size_t{3} * kTexels);
+    firstOfBlock_ = device_.array<uint32_t>(blocks + 1);
+    batch_.positions = positions_;
+    batch_.firstOfBlock = firstOfBlock_;
+    first_.assign(blocks + 1, 0);
+    block_ = block;
+  }
+  // [positions][8]
+  std::vector<uint8_t> bytes(const std::vector<float>& positions) {
+    std::vector<uint8_t> all;
+    all.reserve(positions.size() / 3 * VirtualGrid::kAttributes);
+    for (size_t first = 0; first < positions.size() / 3; first += kTexels) {
+      const size_t count = std::min<size_t>(kTexels, positions.size() / 3 - first);
+      device_.write(positions_.all(), std::span<const float>(positions).subspan(3 * first, 3 * count));
+      std::fill(first_.begin() + block_ + 1, first_.end(), static_cast<uint32_t>(count));
+      device_.write(firstOfBlock_.all(), std::span<const uint32_t>(first_));
+      model_.attributes().forward(batch_, false);
+      for (const float a : device_.read(batch_.outputs.part(0, count * VirtualGrid::kAttributes))) {
+        all.push_back(static_cast<uint8_t>(255 * static_cast<double>(a) + 0.5));  // as VirtualGridForward
+      }
+    }
+    return all;
+  }
+
+ private:
+  VolumeModel& model_;
+  Device& device_;
+  uint32_t block_ = 0;
+  BlockFieldBatch batch_;
+  Array<float> positions_;
+  Array<uint32_t> firstOfBlock_;
+  std::vector<uint32_t> first_;
+};
+
+void appendPosition(const VirtualGrid& grid, uint32_t texel, std::vector<float>& positions) {
+  const std::array<float, 3> position = grid.texelPosition(texel);
+  positions.insert(positions.end(), position.begin(), position.end());
+}
+
+void bakeVoxels(const VirtualGrid& grid, const AliveTexels& alive, TexelBaker& baker, VolumePart& part) {
+  const uint32_t blocks = grid.voxels / VolumePart::kMacroblock;
+  const std::vector<bool> wanted = alive.macroblocks();
+  part.macroblocks.assign(wanted.size(), VolumePart::kEmpty);
+  uint32_t stored = 0;
+  for (size_t b = 0; b < wanted.size(); ++b) {
+    if (!wanted[b]) continue;
+    part.macroblocks[b] = stored++;
+    const uint32_t origin[3] = {static_cast<uint32_t>(b % blocks) * VolumePart::kMacroblock,
+                                static_cast<uint32_t>(b / blocks % blocks) * VolumePart::kMacroblock,
+                                static_cast<uint32_t>(b / blocks / blocks) * VolumePart::kMacroblock};
+    std::vector<float> positions;
+    for (uint32_t z = 0; z < VolumePart::kStoredEdge; ++z) {
+      for (uint32_t y = 0; y < VolumePart::kStoredEdge; ++y) {
+        for (uint32_t x = 0; x < VolumePart::kStoredEdge; ++x) {
+          const uint32_t last = grid.voxels - 1;
+          const uint32_t i = std::min(origin[0] + x, last), j = std::min(origin[1] + y, last),
+                         k = std::min(origin[2] + z, last);
+          appendPosition(grid, i + grid.voxels * (j + grid.voxels * k), positions);
+        }
+      }
+    }
+    const std::vector<uint8_t> bytes = baker.bytes(positions);
+    part.voxelBytes.insert(part.voxelBytes.end(), bytes.begin(), bytes.end());
+  }
+}
+
+void bakePlanes(const VirtualGrid& grid, const AliveTexels& alive, TexelBaker& baker, VolumePart& part) {
+  const uint32_t reach = static_cast<uint32_t>(std::ceil(kReachOfPlanes * grid.planes));
+  const size_t texels = size_t{grid.planes} * grid.planes;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::vector<bool> wanted = alive.plane(axis, reach);
+    std::vector<float> positions;
+    for (uint32_t c = 0; c < grid.planes; ++c) {
+      for (uint32_t b = 0; b < grid.planes; ++b) {
+        if (wanted[size_t{c} * grid.planes + b]) appendPosition(grid, grid.planeTexel(axis, b, c), positions);
+      }
+    }
+    const std::vector<uint8_t> bytes = baker.bytes(positions);
+    std::vector<uint8_t>& plane = part.planeBytes[axis];
+    plane.assign(texels * VolumePart::kAttributes, 0);
+    size_t next = 0;
+    for (size_t t = 0; t < texels; ++t) {
+      if (!wanted[t]) continue;
+      std::copy_n(bytes.begin() + static_cast<ptrdiff_t>(next * VolumePart::kAttributes), VolumePart::kAttributes,
+                  plane.begin() + static_cast<ptrdiff_t>(t * VolumePart::kAttributes));
+      ++next;
+    }
+  }
+}
+
+std::vector<DenseLayer> networkOf(VolumeModel& model, uint32_t block) {
+  constexpr uint32_t kSizes[] = {DeferredNetwork::kInputs, DeferredNetwork::kHidden, DeferredNetwork::kHidden, 3};
+  const std::vector<float> all = model.device().read(
+      model.deferred().values.part(size_t{block} * DeferredNetwork::kParameters, DeferredNetwork::kParameters));
+  std::vector<DenseLayer> layers;
+  for (int l = 0; l < 3; ++l) {
+    DenseLayer layer{kSizes[l], kSizes[l + 1], {}, {}};
+    const auto weights = all.begin() + DeferredNetwork::kWeights[l];
+    const auto biases = weights + layer.inputs * layer.outputs;
+    layer.weights.assign(weights, biases);
+    layer.biases.assign(biases, biases + layer.outputs);
+    layers.push_back(std::move(layer));
+  }
+  return layers;
+}
+
+// The tree of a scene without levels: its blocks side by side, and the surround.
+Tileset flatTileset(const VolumeModel& model, const Capture& capture) {
+  Tileset tileset;
+  tileset.representation = Representation::volume;
+  tileset.name = fs::weakly_canonical(capture.root).filename().string();
+  tileset.sourceFromWorld = capture.sourceFromWorld;
+  tileset.georeference = capture.geo;
+  tileset.near = model.space().near;
+  placeOn(tileset, model.grid());
+  Tile root;
+  root.level = model.space().cells() > 1 ? 1 : 0;
+  root.cells = tileset.allCells();
+  root.box = tileset.box();
+  tileset.tiles.push_back(root);
+  return tileset;
+}
+
+}  // namespace
+
+std::vector<AliveTexels> findAliveTexels(VolumeModel& model, const Capture& capture, const BakeVolumeOptions& options) {
+  Device& device = model.device();
+  std::vector<AliveTexels> alive(model.space().blocks(), AliveTexels(model.virtualGrid()));
+  VolumePass pass(model, roomForRays(model));
+  VolumePass::Options drawing;
+  drawing.minAlpha = static_cast<float>(options.minAlpha);
+  const std::vector<int> photos = capture.photosIn(Split::train);
+  int64_t done = 0;
+  for (const int photo : photos) {
+    const Camera& camera = capture.cameras[capture.photos[photo].camera];
+    PhotoPixels pixels(device, makeRayCamera(camera, capture.photos[photo].worldFromCamera, model.frame()),
+                       camera.width, camera.height, options.stride);
+    for (size_t first = 0; first < pixels.count(); first += kRays) {
+      const VolumeRays rays = pixels.rays(first);
+      pass.forward(rays, drawing);
+      const uint32_t samples = device.read(pass.firstSample().part(rays.count, 1))[0];
+      const std::vector<float> weights = device.read(pass.weights().part(0, samples));
+      const std::vector<float> logDensities = device.read(pass.logDensities().part(0, samples));
+      const std::vector<float> steps = device.read(pass.runtimeSteps().part(0, samples));
+      const std::vector<float> positions = device.read(pass.positions().part(0, size_t{3} * samples));
+      const std::vector<uint32_t> blocks = device.read(pass.blockOfSample().part(0, samples));
+      for (uint32_t s = 0; s < samples; ++s) {
+        if (!(weights[s] > options.minWeight)) continue;
+        if (!(-std::expm1(-std::exp(logDensities[s]) * steps[s]) > options.minAlpha)) continue;
+        alive[blocks[s]].mark(&positions[size_t{3} * s]);
+      }
+    }
+    options.onPhoto(++done, static_cast<int64_t>(photos.size()));
+  }
+  return alive;
+}
+
+VolumeContent bakeBlock(VolumeModel& model, uint32_t block, const AliveTexels& alive) {
+  const VirtualGrid& grid = model.virtualGrid();
+  const BlockSpace& space = model.space();
+  VolumeContent content;
+  content.featureRange = grid.featureRange;
+  content.densityRange = grid.densityRange;
+  content.network = networkOf(model, block);
+  VolumePart part;
+  const BlockSpace::Placement placement = space.placement(block);
+  std::copy_n(placement.centre, 3, part.centre.begin());
+  std::copy_n(placement.scale, 3, part.scale.begin());
+  part.contracted = placement.contracted;
+  part.surround = block >= space.cells();
+  constexpr float kFar = static_cast<float>(BlockSpace::kFarthest);
+  if (part.surround) {
+    part.low = {-kFar, -kFar, -kFar};
+    part.high = {kFar, kFar, kFar};
+  } else {
+    const uint32_t i = block % space.columns, j = block / space.columns;
+    const auto low = [](uint32_t k, uint32_t count) {
+      return 2.0f * static_cast<float>(k) - static_cast<float>(count);
+    };
+    part.low = {low(i, space.columns), low(j, space.rows), space.bottom};
+    part.high = {low(i + 1, space.columns), low(j + 1, space.rows), space.top};
+    if (part.contracted) {
+      if (i == 0) part.low[0] = -kFar;
+      if (j == 0) part.low[1] = -kFar;
+      if (i + 1 == space.columns) part.high[0] = kFar;
+      if (j + 1 == space.rows) part.high[1] = kFar;
+      part.low[2] = -kFar;
+      part.high[2] = kFar;
+    }
+  }
+  part.voxels = grid.voxels;
+  part.planes = grid.planes;
+  TexelBaker baker(model, block);
+  bakeVoxels(grid, alive, baker, part);
+  bakePlanes(grid, alive, baker, part);
+  part.distances = chebyshevDistances(alive.occupancy(grid.planes / VolumePart::kDistanceCell));
+  content.parts.push_back(std::move(part));
+  return content;
+}
+
+BakedVolume bakeVolume(VolumeModel& model, const Capture& capture, const fs::path& scene,
+                       const BakeVolumeOptions& options) {
+  const std::vector<AliveTexels> alive = findAliveTexels(model, capture, options);
+  const BlockSpace& space = model.space();
+  const SceneFolderWriter folder(scene);
+  BakedVolume baked;
+  Tileset& tileset = baked.tileset;
+  tileset = flatTileset(model, capture);
+  const double metres = tileset.tileFromScene().scale;
+  const double texel = 2.0 / model.virtualGrid().planes * metres;
+  const bool oneBlock = space.cells() == 1;
+  for (uint32_t block = 0; block < space.blocks(); ++block) {
+    const VolumeContent content = bakeBlock(model, block, alive[block]);
+    const bool surround = block >= space.cells();
+    const std::string name =
+        surround ? "surround" : fmt::format("block_{}_{}", block % space.columns, block / space.columns);
+    const Bytes bytes = encodeVolume(content, options.effort);
+    TileContent entry;
+    entry.uri = folder.addContent(0, name, bytes);
+    entry.bytes = bytes.size();
+    entry.memoryBytes = bytesInMemory(content);
+    entry.surround = surround;
+    baked.bytesOnDisk += bytes.size();
+    baked.bytesInMemory += entry.memoryBytes;
+    baked.macroblocks += content.parts[0].storedMacroblocks();
+    const VolumePart& part = content.parts[0];
+    entry.box = {Vec3d(part.low[0], part.low[1], part.low[2]), Vec3d(part.high[0], part.high[1], part.high[2])};
+    if (surround || oneBlock) {
+      entry.cells = tileset.allCells();
+      tileset.tiles[0].contents.push_back(entry);
+      continue;
+    }
+    entry.cells = {{block % space.columns, block / space.columns},
+                   {block % space.columns + 1, block / space.columns + 1}};
+    Tile tile;
+    tile.level = 0;
+    tile.cells = entry.cells;
+    tile.box = entry.box;
+    tile.geometricError = texel;
+    tile.contents.push_back(entry);
+    tileset.tiles[0].children.push_back(static_cast<uint32_t>(tileset.tiles.size()));
+    tileset.tiles.push_back(tile);
+  }
+  tileset.tiles[0].geometricError = oneBlock ? texel : metres;
+  tileset.levels = oneBlock ? 1 : 2;
+  tileset.geometricError = metres * std::max(space.columns, space.rows);
+  folder.commit(tileset);
+  return baked;
+}
+
+}  // namespace tessera
