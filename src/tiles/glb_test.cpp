@@ -67,6 +67,13 @@ TEST(Glb, RefusesWhatIsNotExact) {
   refuses("a chunk beyond the end", [](Bytes& file) { put(file, 24, 12); });
   refuses("a chunk beyond 32 bits", [](Bytes& file) { put(file, 24, 0xfffffffcu); });
   refuses("a chunk of odd length", [](Bytes& file) { put(file, 24, 6); });
+  refuses("chunks of odd lengths that fill the file", [](Bytes& file) {
+    file.resize(48);
+    put(file, 8, 48);
+    put(file, 24, 6);
+    put(file, 38, 2);
+    put(file, 42, 0x54414857);
+  });
   refuses("bytes before JSON", [](Bytes& file) { put(file, 16, 0x004e4942); });
   refuses("JSON twice", [](Bytes& file) { put(file, 28, 0x4e4f534a); });
   refuses("a gap too small for a chunk", [](Bytes& file) { put(file, 24, 4); });

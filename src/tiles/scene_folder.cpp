@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cctype>
+#include <regex>
 #include <set>
 
 #include "base/check.h"
@@ -38,13 +39,20 @@ std::set<std::string> urisOf(const Tileset& tileset) {
   return uris;
 }
 
-// Files that no tileset names, or that a killed run left half written.
+// Ends in -<digest>.<extension>, as all names given here do, or is such a file half written.
+bool isOurs(const std::string& file) {
+  static const std::regex kName("[A-Za-z0-9_]+-[0-9a-f]{16}\\.[A-Za-z0-9_]+(\\.partial-[0-9]+)?");
+  return std::regex_match(file, kName);
+}
+
+// Files of ours that the tileset does not name: of an older scene, or of a run that was killed.
 void removeOthers(const fs::path& root, const std::set<std::string>& uris) {
   for (const char* folder : {"tiles", "resources"}) {
     std::error_code status;
     std::vector<fs::path> others;
     for (const auto& entry : fs::recursive_directory_iterator(root / folder, status)) {
-      if (entry.is_regular_file(status) && !uris.contains(entry.path().lexically_relative(root).generic_string())) {
+      if (entry.is_regular_file(status) && isOurs(entry.path().filename().string()) &&
+          !uris.contains(entry.path().lexically_relative(root).generic_string())) {
         others.push_back(entry.path());
       }
     }

@@ -18,7 +18,8 @@ class SceneFolderWriter {
   std::string addResource(const std::string& name, const std::string& extension,
                           std::span<const std::byte> bytes) const;
 
-  // Writes tileset.json, then removes the files in tiles/ and resources/ that it does not name. Throws Error when a
+  // Writes tileset.json, then removes the files in tiles/ and resources/ that have such names and that it does not
+  // speak of. Throws Error when a
   // file that it names is not there.
   void commit(const Tileset& tileset) const;
 

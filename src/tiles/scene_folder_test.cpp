@@ -67,6 +67,16 @@ TEST_F(SceneFolder, IsTheOldSceneUntilTheNewOneIsWhole) {
   EXPECT_EQ(files(), count);  // nothing is left of the old one
 }
 
+TEST_F(SceneFolder, RemovesWhatAKilledRunLeftAndNothingOfOthers) {
+  writeFileAtomically(root_ / "tiles/L0/x-0123456789abcdef.glb.partial-77", std::string_view("half"));
+  writeFileAtomically(root_ / "tiles/L0/x-0123456789abcdef.glb", std::string_view("never named"));
+  writeFileAtomically(root_ / "tiles/holiday.jpg", std::string_view("theirs"));
+  SceneFolderWriter(root_).commit(bake("a"));
+  EXPECT_FALSE(fs::exists(root_ / "tiles/L0/x-0123456789abcdef.glb.partial-77"));
+  EXPECT_FALSE(fs::exists(root_ / "tiles/L0/x-0123456789abcdef.glb"));
+  EXPECT_TRUE(fs::exists(root_ / "tiles/holiday.jpg"));
+}
+
 TEST_F(SceneFolder, KeepsTheBytesOfContentsThatStayTheSame) {
   const Tileset before = bake("same"), after = bake("same");
   EXPECT_EQ(encodeTileset(before), encodeTileset(after));

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <functional>
 #include <limits>
@@ -316,6 +317,11 @@ TEST_F(VolumeRefusal, OfMoreMemoryThanAllowedBeforeItIsTaken) {
 TEST_F(VolumeRefusal, OfPicturesThatHoldSomethingElse) {
   refusesBytes("part 0: its occupied cells", [](json& asset, Bytes& bytes) {  // 27 cells: bits beyond them
     replace(asset, bytes, part(asset)["occupied"], ImageU8(256, 1, 3, 255));
+  });
+  refusesBytes("part 0: its occupied cells", [](json& asset, Bytes& bytes) {  // the last byte holds three cells
+    ImageU8 beyond(256, 1, 3);
+    std::fill_n(beyond.at(3, 0), 3, uint8_t{8});
+    replace(asset, bytes, part(asset)["occupied"], beyond);
   });
   refusesBytes("part 0: its occupied cells", [](json& asset, Bytes& bytes) {
     ImageU8 coloured(256, 1, 3);
