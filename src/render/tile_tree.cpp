@@ -48,10 +48,13 @@ std::vector<int> TileTree::childrenFrontToBack(int tile, const Vec3d& eye) const
 
 std::vector<int> TileTree::coarsest() const {
   std::vector<int> found;
+  std::vector<char> covered(tiles.size());  // by a content of the tile or above it
   for (size_t i = 0; i < tiles.size(); ++i) {
     const TileNode& node = tiles[i];
-    if (static_cast<int>(i) == surround || !node.hasContent) continue;
-    if (node.parent < 0 || !tiles[node.parent].hasContent) found.push_back(static_cast<int>(i));
+    if (static_cast<int>(i) == surround) continue;
+    const bool above = node.parent >= 0 && covered[node.parent];
+    if (node.hasContent && !above) found.push_back(static_cast<int>(i));
+    covered[i] = above || node.hasContent;
   }
   return found;
 }
@@ -63,12 +66,10 @@ void TileTree::check() const {
     const TileNode& node = tiles[i];
     CHECK(node.parent < static_cast<int>(i));
     CHECK((node.parent >= 0 || i == 0 || static_cast<int>(i) == surround) == true);
-    CHECK((node.hasContent || !node.children.empty()) == true);
     for (const int child : node.children) {
       CHECK(child > static_cast<int>(i));
       CHECK(child < static_cast<int>(tiles.size()));
       CHECK(tiles[child].parent == static_cast<int>(i));
-      CHECK((node.hasContent && !tiles[child].hasContent) == false);
     }
   }
 }

@@ -16,7 +16,7 @@ struct TileNode {
   Vec3d low = Vec3d::Zero(), high = Vec3d::Zero();  // box
   double geometricError = 0;                        // of its content: a texel of the planes
   int level = 0;                                    // 0 is the finest
-  bool hasContent = true;                           // tiles without stand above all contents
+  bool hasContent = true;                           // without: its children's stand for it; a leaf is empty
   uint64_t contentBytes = 0;                        // in memory (bytesInMemory)
 };
 

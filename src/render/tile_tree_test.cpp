@@ -75,6 +75,9 @@ TEST(TileTree, HasTheTopmostContentsForItsCoarsest) {
   EXPECT_EQ(tree.coarsest(), (std::vector<int>{0}));
   tree.tiles[0].hasContent = false;
   EXPECT_EQ(tree.coarsest(), tree.tiles[0].children);
+  tree.tiles[0].hasContent = true;
+  tree.tiles[tree.tiles[0].children[1]].hasContent = false;
+  EXPECT_EQ(tree.coarsest(), (std::vector<int>{0}));
 }
 
 }  // namespace
