@@ -7,8 +7,8 @@
 
 namespace tessera {
 
-// Columns and rows need not be powers of two: what lies at the border has fewer children. A content takes `bytes`.
-inline TileTree madeTree(int columns, int rows, uint64_t bytes = 100) {
+// Columns and rows need not be powers of two: what lies at the border has fewer children.
+inline TileTree madeTree(int columns, int rows) {
   int levels = 0;
   while ((1 << levels) < std::max(columns, rows)) ++levels;
   TileTree tree;
@@ -24,7 +24,6 @@ inline TileTree madeTree(int columns, int rows, uint64_t bytes = 100) {
         node.high =
             Vec3d(2 * std::min(columns, (i + 1) * edge) - columns, 2 * std::min(rows, (j + 1) * edge) - rows, 1);
         node.geometricError = 2.0 / 512 * edge;
-        node.contentBytes = bytes;
         const int number = static_cast<int>(tree.tiles.size());
         if (level < levels) {
           node.parent = above.at({i / 2, j / 2});

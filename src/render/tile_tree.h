@@ -1,8 +1,7 @@
-// The tiles of a scene as a renderer needs them: where they are, how coarse, how large in memory. Plain data, made from
+// The tiles of a scene as a renderer needs them: where they are, how coarse. Plain data, made from
 // the tileset on disk; lengths in scene units (render/volume_frame.h).
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "scene/axes.h"
@@ -17,7 +16,6 @@ struct TileNode {
   double geometricError = 0;                        // of its content: a texel of the planes
   int level = 0;                                    // 0 is the finest
   bool hasContent = true;                           // without: its children's stand for it; a leaf is empty
-  uint64_t contentBytes = 0;                        // in memory (bytesInMemory)
 };
 
 struct TileTree {
