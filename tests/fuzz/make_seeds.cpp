@@ -6,6 +6,10 @@
 #include "base/image_io.h"
 #include "base/safetensors.h"
 #include "scene/ply.h"
+#include "tiles/glb.h"
+#include "tiles/test_support.h"
+#include "tiles/tileset_json.h"
+#include "tiles/volume_payload.h"
 
 using namespace tessera;
 
@@ -48,6 +52,23 @@ std::string exif() {
   out += std::string("\x02\0\x01\0\x02\0\x02\0\0\0N\0\0\0\x02\0\x05\0\x03\0\0\0\x38\0\0\0\0\0\0\0", 30);
   for (uint32_t value : {50u, 1u, 30u, 1u, 0u, 1u}) out += packed(value);
   return out;
+}
+
+// A volume of one macroblock with few different bytes: libFuzzer is given 16 KiB.
+VolumeContent volume(uint32_t parts) {
+  VolumeContent content = tiles_test::madeContent(1, parts);
+  for (VolumePart& part : content.parts) {
+    part.voxels = part.planes = 8;
+    part.macroblocks = {0};
+    part.voxelBytes.assign(VolumePart::kMacroblockBytes, 100);
+    for (auto& plane : part.planeBytes) plane.assign(8 * 8 * VolumePart::kAttributes, 50);
+    part.distances = {0};
+  }
+  return content;
+}
+
+std::string textOf(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 }  // namespace
@@ -94,5 +115,13 @@ int main(int count, char** arguments) {
             R"([{"camera_to_world":[1,0,0,1,0,1,0,2,0,0,1,3,0,0,0,1],"fov":50,"aspect":1.3}]})"));
   write("dataparser_transforms/a",
         std::string(R"({"transform":[[0,1,0,0.3],[1,0,0,-0.1],[0,0,-1,-0.08]],"scale":0.125})"));
+  write("tileset/a", encodeTileset(tiles_test::madeTileset(1)));
+  write("tileset/b", encodeTileset(tiles_test::madeTileset(2, false)));
+  for (uint32_t parts : {1u, 2u}) {
+    const Bytes file = encodeVolume(volume(parts));
+    const auto glb = decodeGlb(file);
+    write("volume_payload/whole" + std::to_string(parts), file);
+    write("volume_payload/cut" + std::to_string(parts), sized(std::string(glb->json)) + textOf(glb->bytes));
+  }
   return 0;
 }

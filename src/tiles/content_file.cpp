@@ -1,0 +1,102 @@
+#include "tiles/content_file.h"
+
+#include <fmt/format.h>
+
+#include "base/check.h"
+#include "tiles/glb.h"
+#include "tiles/json_fields.h"
+
+namespace tessera {
+namespace {
+
+using namespace json_fields;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kExtension = "TESSERA_content";
+constexpr size_t kMostViews = size_t{1} << 16;
+
+bool uses(const json& asset, const char* extension) {
+  const json* used = arrayOf(asset, "extensionsUsed");
+  return used && std::find(used->begin(), used->end(), extension) != used->end();
+}
+
+// The one buffer is the file's own bytes, which may be padded by up to three.
+std::optional<std::span<const std::byte>> bufferOf(const json& asset, std::span<const std::byte> bytes) {
+  const json* buffers = arrayOf(asset, "buffers");
+  if (!buffers || buffers->size() != 1 || fieldOf((*buffers)[0], "uri")) return std::nullopt;
+  const auto length = unsignedOf((*buffers)[0], "byteLength");
+  if (!length || *length > bytes.size() || bytes.size() - *length > 3) return std::nullopt;
+  return bytes.first(*length);
+}
+
+bool readViews(const json& asset, std::span<const std::byte> bytes, ContentFile& file) {
+  const auto buffer = bufferOf(asset, bytes);
+  const json* views = arrayOf(asset, "bufferViews");
+  if (!buffer || !views || views->size() > kMostViews) return false;
+  for (const json& view : *views) {
+    const auto length = unsignedOf(view, "byteLength");
+    const auto offset = fieldOf(view, "byteOffset") ? unsignedOf(view, "byteOffset") : std::optional<uint32_t>(0);
+    if (unsignedOf(view, "buffer") != 0u || !length || !offset) return false;
+    if (*offset > buffer->size() || *length > buffer->size() - *offset) return false;
+    file.views.push_back(buffer->subspan(*offset, *length));
+  }
+  return true;
+}
+
+}  // namespace
+
+Json ContentFileWriter::add(std::span<const std::byte> bytes, const char* mimeType) {
+  bytes_.resize((bytes_.size() + 3) / 4 * 4);
+  views_.push_back({{"buffer", 0}, {"byteOffset", bytes_.size()}, {"byteLength", bytes.size()}});
+  bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+  return {{"bufferView", views_.size() - 1}, {"mimeType", mimeType}};
+}
+
+Bytes ContentFileWriter::finish(Representation representation, const Json& ours) {
+  CHECK(!views_.empty());
+  Json extension = {{"version", kContentVersion}, {"representation", nameOf(representation)}};
+  extension.update(ours);
+  const Json asset = {{"asset", {{"version", "2.0"}, {"generator", "tessera"}}},
+                      {"extensionsUsed", {kExtension}},
+                      {"scene", 0},
+                      {"scenes", {Json::object()}},
+                      {"buffers", {{{"byteLength", bytes_.size()}}}},
+                      {"bufferViews", views_},
+                      {"extensions", {{kExtension, std::move(extension)}}}};
+  return encodeGlb(asset.dump(), bytes_);
+}
+
+std::optional<std::span<const std::byte>> ContentFile::viewOf(const json& object, const char* mimeType) const {
+  const auto index = unsignedOf(object, "bufferView");
+  if (!index || *index >= views.size() || !isString(object, "mimeType", mimeType)) return std::nullopt;
+  return views[*index];
+}
+
+std::optional<ContentFile> decodeContentFile(std::span<const std::byte> file, Representation representation,
+                                             std::string& reason) {
+  const auto fail = [&reason](std::string why) {
+    reason = std::move(why);
+    return std::nullopt;
+  };
+  const auto glb = decodeGlb(file);
+  if (!glb) return fail("is not a binary glTF file of version 2, or is cut short");
+  if (glb->json.size() > kMostContentJson) return fail("its JSON is larger than any content's should be");
+  const json asset = json::parse(glb->json, nullptr, false);
+  const json* header = fieldOf(asset, "asset");
+  if (!header || !isString(*header, "version", "2.0")) return fail("its JSON is not that of a glTF 2.0 asset");
+  const json* extensions = fieldOf(asset, "extensions");
+  const json* ours = extensions ? fieldOf(*extensions, kExtension) : nullptr;
+  if (!ours || !uses(asset, kExtension)) return fail("has no extension TESSERA_content");
+  const auto version = unsignedOf(*ours, "version");
+  if (!version) return fail("does not say which version it is of");
+  if (*version != kContentVersion) return fail(fmt::format("is of version {}; {} is known", *version, kContentVersion));
+  if (!isString(*ours, "representation", nameOf(representation))) {
+    return fail(fmt::format("is not of the representation {}", nameOf(representation)));
+  }
+  ContentFile result;
+  if (!readViews(asset, glb->bytes, result)) return fail("its buffer views do not lie within its bytes");
+  result.ours = *ours;
+  return result;
+}
+
+}  // namespace tessera

@@ -1,0 +1,47 @@
+// What contents of every representation have in common: a .glb that is a valid glTF 2.0 asset (with an empty scene
+// where there is nothing that other programs could draw), whose extension TESSERA_content describes a payload that lies
+// in buffer views. docs/tile-format.md, section 5. For this room's own files: it shows JSON.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+#include "tiles/tileset.h"
+
+namespace tessera {
+
+inline constexpr int kContentVersion = 1;
+inline constexpr size_t kMostContentJson = size_t{8} << 20;  // bytes
+inline constexpr const char* kWebP = "image/webp";
+inline constexpr const char* kRawBytes = "application/octet-stream";
+
+class ContentFileWriter {
+ public:
+  // {"bufferView": n, "mimeType": ...}: how the extension names it.
+  nlohmann::ordered_json add(std::span<const std::byte> bytes, const char* mimeType);
+  // `ours`: the extension's members after version and representation.
+  Bytes finish(Representation representation, const nlohmann::ordered_json& ours);
+
+ private:
+  Bytes bytes_;
+  nlohmann::ordered_json views_ = nlohmann::ordered_json::array();
+};
+
+struct ContentFile {
+  nlohmann::json ours;                            // the extension
+  std::vector<std::span<const std::byte>> views;  // borrowed from the file
+
+  // The view that an object names (as ContentFileWriter::add writes it), if its mimeType is this one.
+  std::optional<std::span<const std::byte>> viewOf(const nlohmann::json& object, const char* mimeType) const;
+};
+
+// Untrusted bytes: nothing, and why, where the container, the asset, its buffer views or the extension's version and
+// representation are not as they should be.
+std::optional<ContentFile> decodeContentFile(std::span<const std::byte> file, Representation representation,
+                                             std::string& reason);
+
+}  // namespace tessera

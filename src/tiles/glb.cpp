@@ -1,0 +1,73 @@
+#include "tiles/glb.h"
+
+#include <cstring>
+
+#include "base/check.h"
+
+namespace tessera {
+namespace {
+
+constexpr uint32_t kMagic = 0x46546c67, kVersion = 2;                  // "glTF"
+constexpr uint32_t kJsonChunk = 0x4e4f534a, kBytesChunk = 0x004e4942;  // "JSON", "BIN\0"
+constexpr size_t kHeader = 12, kChunkHeader = 8;
+
+void put32(std::byte* at, uint32_t value) {
+  for (int i = 0; i < 4; ++i) at[i] = static_cast<std::byte>(value >> (8 * i));
+}
+
+uint32_t get32(std::span<const std::byte> bytes, size_t at) {
+  uint32_t value = 0;
+  for (size_t i = 4; i-- > 0;) value = value << 8 | static_cast<uint32_t>(bytes[at + i]);
+  return value;
+}
+
+size_t padded(size_t length) {
+  return (length + 3) / 4 * 4;
+}
+
+}  // namespace
+
+Bytes encodeGlb(std::string_view json, std::span<const std::byte> bytes) {
+  const size_t jsonLength = padded(json.size()), bytesLength = padded(bytes.size());
+  const size_t total = kHeader + kChunkHeader + jsonLength + (bytes.empty() ? 0 : kChunkHeader + bytesLength);
+  CHECK(total <= kLargestGlb);
+  Bytes file(total);
+  put32(file.data(), kMagic);
+  put32(file.data() + 4, kVersion);
+  put32(file.data() + 8, static_cast<uint32_t>(total));
+  std::byte* at = file.data() + kHeader;
+  put32(at, static_cast<uint32_t>(jsonLength));
+  put32(at + 4, kJsonChunk);
+  at += kChunkHeader;
+  std::memset(at, ' ', jsonLength);
+  if (!json.empty()) std::memcpy(at, json.data(), json.size());
+  at += jsonLength;
+  if (bytes.empty()) return file;
+  put32(at, static_cast<uint32_t>(bytesLength));
+  put32(at + 4, kBytesChunk);
+  std::memcpy(at + kChunkHeader, bytes.data(), bytes.size());
+  return file;
+}
+
+std::optional<GlbView> decodeGlb(std::span<const std::byte> file) {
+  if (file.size() < kHeader || file.size() % 4 != 0) return std::nullopt;
+  if (get32(file, 0) != kMagic || get32(file, 4) != kVersion || get32(file, 8) != file.size()) return std::nullopt;
+  GlbView view;
+  size_t chunk = 0;
+  for (size_t at = kHeader; at < file.size(); ++chunk) {
+    if (file.size() - at < kChunkHeader) return std::nullopt;
+    const uint32_t length = get32(file, at), type = get32(file, at + 4);
+    at += kChunkHeader;
+    if (length % 4 != 0 || length > file.size() - at) return std::nullopt;
+    const std::span<const std::byte> content = file.subspan(at, length);
+    at += length;
+    if ((chunk == 0) != (type == kJsonChunk)) return std::nullopt;  // the first, and only the first
+    if (type == kBytesChunk && chunk != 1) return std::nullopt;     // the second or none
+    if (chunk == 0) view.json = {reinterpret_cast<const char*>(content.data()), content.size()};
+    if (type == kBytesChunk) view.bytes = content;
+  }
+  if (chunk == 0) return std::nullopt;
+  return view;
+}
+
+}  // namespace tessera

@@ -1,0 +1,113 @@
+#include "tiles/scene_folder.h"
+
+#include <fmt/format.h>
+
+#include <cctype>
+#include <regex>
+#include <set>
+
+#include "base/check.h"
+#include "base/error.h"
+#include "base/random.h"
+#include "tiles/tileset_json.h"
+
+namespace tessera {
+namespace {
+
+// 64 bits suffice against chance; it is no defence against forgery.
+std::string digestOf(std::span<const std::byte> bytes) {
+  uint64_t digest = mix64(bytes.size());
+  for (size_t at = 0; at < bytes.size(); at += 8) {
+    uint64_t word = 0;
+    for (size_t i = 0; i < 8 && at + i < bytes.size(); ++i) word |= static_cast<uint64_t>(bytes[at + i]) << (8 * i);
+    digest = mix64(digest ^ word);
+  }
+  return fmt::format("{:016x}", digest);
+}
+
+void checkName(const std::string& name) {
+  CHECK(!name.empty());
+  for (const char c : name) CHECK((std::isalnum(static_cast<unsigned char>(c)) || c == '_'));
+}
+
+std::set<std::string> urisOf(const Tileset& tileset) {
+  std::set<std::string> uris;
+  for (const SharedResource& resource : tileset.resources) uris.insert(resource.uri);
+  for (const Tile& tile : tileset.tiles) {
+    for (const TileContent& content : tile.contents) uris.insert(content.uri);
+  }
+  return uris;
+}
+
+// Ends in -<digest>.<extension>, as all names given here do, or is such a file half written.
+bool isOurs(const std::string& file) {
+  static const std::regex kName("[A-Za-z0-9_]+-[0-9a-f]{16}\\.[A-Za-z0-9_]+(\\.partial-[0-9]+)?");
+  return std::regex_match(file, kName);
+}
+
+// Files of ours that the tileset does not name: of an older scene, or of a run that was killed.
+void removeOthers(const fs::path& root, const std::set<std::string>& uris) {
+  for (const char* folder : {"tiles", "resources"}) {
+    std::error_code status;
+    std::vector<fs::path> others;
+    for (const auto& entry : fs::recursive_directory_iterator(root / folder, status)) {
+      if (entry.is_regular_file(status) && isOurs(entry.path().filename().string()) &&
+          !uris.contains(entry.path().lexically_relative(root).generic_string())) {
+        others.push_back(entry.path());
+      }
+    }
+    for (const fs::path& other : others) fs::remove(other, status);
+  }
+}
+
+void requireFiles(const fs::path& root, const Tileset& tileset) {
+  for (const std::string& uri : urisOf(tileset)) {
+    std::error_code status;
+    if (!fs::is_regular_file(contentPath(root, uri), status)) {
+      throw Error((root / "tileset.json").string(), uri, "there is no such file in the scene", "bake the scene again");
+    }
+  }
+}
+
+}  // namespace
+
+std::string SceneFolderWriter::addContent(uint32_t level, const std::string& name,
+                                          std::span<const std::byte> bytes) const {
+  checkName(name);
+  const std::string uri = fmt::format("tiles/L{}/{}-{}.glb", level, name, digestOf(bytes));
+  writeFileAtomically(root_ / uri, bytes, true);
+  return uri;
+}
+
+std::string SceneFolderWriter::addResource(const std::string& name, const std::string& extension,
+                                           std::span<const std::byte> bytes) const {
+  checkName(name);
+  checkName(extension);
+  const std::string uri = fmt::format("resources/{}-{}.{}", name, digestOf(bytes), extension);
+  writeFileAtomically(root_ / uri, bytes, true);
+  return uri;
+}
+
+void SceneFolderWriter::commit(const Tileset& tileset) const {
+  const std::string text = encodeTileset(tileset);
+  requireFiles(root_, tileset);
+  writeFileAtomically(root_ / "tileset.json", text, true);
+  removeOthers(root_, urisOf(tileset));
+}
+
+Tileset readTileset(const fs::path& folder) {
+  const fs::path path = folder / "tileset.json";
+  std::string reason;
+  auto tileset = decodeTileset(readTextFile(path), reason);
+  if (!tileset) throw Error(path.string(), "", reason, "bake the scene again");
+  requireFiles(folder, *tileset);
+  return std::move(*tileset);
+}
+
+fs::path contentPath(const fs::path& folder, const std::string& uri) {
+  auto path = isPlainUri(uri) ? resolveInside(folder, uri) : std::nullopt;
+  if (!path) throw Error(folder.string(), uri, "leads out of the scene's folder", "bake the scene again");
+  return std::move(*path);
+}
+
+}  // namespace tessera

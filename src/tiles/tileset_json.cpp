@@ -1,0 +1,147 @@
+#include "tiles/tileset_json.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "base/check.h"
+
+namespace tessera {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kExtension = "TESSERA_scene";
+
+template <class Derived>
+std::vector<double> numbersOf(const Eigen::MatrixBase<Derived>& matrix) {  // column after column
+  std::vector<double> numbers;
+  for (Eigen::Index c = 0; c < matrix.cols(); ++c) {
+    for (Eigen::Index r = 0; r < matrix.rows(); ++r) numbers.push_back(matrix(r, c));
+  }
+  return numbers;
+}
+
+Json cellsOf(const CellRange& range) {
+  return {range.first[0], range.first[1], range.end[0], range.end[1]};
+}
+
+void addBox(Json& object, const SceneBox& box) {
+  object["low"] = numbersOf(box.low);
+  object["high"] = numbersOf(box.high);
+}
+
+Json volumeOf(const Tileset& tileset, const SceneBox& box) {
+  return {{"box", boundingBoxNumbers(tileset, box)}};
+}
+
+Json contentOf(const Tileset& tileset, const Tile& tile, const TileContent& content) {
+  Json ours = Json::object();
+  if (content.surround) {
+    ours["surround"] = true;
+  } else if (!(content.cells == tile.cells)) {
+    ours["cells"] = cellsOf(content.cells);
+  }
+  addBox(ours, content.box);
+  if (!content.resources.empty()) ours["resources"] = content.resources;
+  if (content.bytes > 0) ours["bytes"] = content.bytes;
+  return {{"uri", content.uri},
+          {"boundingVolume", volumeOf(tileset, content.box)},
+          {"extensions", {{kExtension, std::move(ours)}}}};
+}
+
+// Levels fall from parent to child, so the depth is bounded.
+Json tileOf(const Tileset& tileset, const Tile& tile, bool isRoot) {
+  Json json;
+  if (isRoot && tileset.georeference) json["transform"] = numbersOf(tileset.rootTransform());
+  json["boundingVolume"] = volumeOf(tileset, enclosingBox(tile));
+  json["geometricError"] = tile.geometricError;
+  if (isRoot) json["refine"] = "REPLACE";
+  Json contents = Json::array();
+  for (const TileContent& content : tile.contents) contents.push_back(contentOf(tileset, tile, content));
+  if (contents.size() == 1) {
+    json["content"] = std::move(contents[0]);
+  } else if (!contents.empty()) {
+    json["contents"] = std::move(contents);
+  }
+  Json& ours = json["extensions"][kExtension];
+  ours = {{"level", tile.level}, {"cells", cellsOf(tile.cells)}};
+  addBox(ours, tile.box);
+  for (const uint32_t child : tile.children) json["children"].push_back(tileOf(tileset, tileset.tiles[child], false));
+  return json;
+}
+
+Json sceneOf(const Tileset& tileset) {
+  Json scene = {{"version", kSceneVersion},
+                {"representation", nameOf(tileset.representation)},
+                {"name", tileset.name},
+                {"worldFromScene",
+                 {{"rotation", numbersOf(tileset.worldFromScene.rotation)},
+                  {"scale", tileset.worldFromScene.scale},
+                  {"translation", numbersOf(tileset.worldFromScene.translation)}}},
+                {"sourceFromWorld", numbersOf(tileset.sourceFromWorld)},
+                {"grid", {{"columns", tileset.columns}, {"rows", tileset.rows}}},
+                {"near", tileset.near},
+                {"background", tileset.background},
+                {"levels", tileset.levels}};
+  addBox(scene["grid"], tileset.box());
+  if (const auto& geo = tileset.georeference) {
+    scene["georeference"] = {{"latitude", geo->latitude},
+                             {"longitude", geo->longitude},
+                             {"altitude", geo->altitude},
+                             {"enuFromWorld", numbersOf(geo->enuFromWorld)}};
+  }
+  for (const SharedResource& resource : tileset.resources) {
+    Json entry = {{"uri", resource.uri}, {"mimeType", resource.mimeType}};
+    if (resource.bytes > 0) entry["bytes"] = resource.bytes;
+    scene["resources"].push_back(std::move(entry));
+  }
+  return scene;
+}
+
+}  // namespace
+
+SceneBox enclosingBox(const Tile& tile) {
+  SceneBox box = tile.box;
+  for (const TileContent& content : tile.contents) {
+    box.low = box.low.cwiseMin(content.box.low);
+    box.high = box.high.cwiseMax(content.box.high);
+  }
+  return box;
+}
+
+std::array<double, 12> boundingBoxNumbers(const Tileset& tileset, const SceneBox& box) {
+  const Similarity tileFromScene = tileset.tileFromScene();
+  const Vec3d centre = tileFromScene * (0.5 * (box.low + box.high));
+  const Mat3d halfAxes = tileFromScene.scale * tileFromScene.rotation * (0.5 * (box.high - box.low)).asDiagonal();
+  std::array<double, 12> numbers;
+  std::copy(centre.data(), centre.data() + 3, numbers.begin());
+  std::copy(halfAxes.data(), halfAxes.data() + 9, numbers.begin() + 3);
+  return numbers;
+}
+
+std::string encodeTileset(const Tileset& tileset) {
+  const auto broken = brokenRule(tileset);
+  CHECK(broken.value_or("") == "");
+  const Json file = {{"asset", {{"version", "1.1"}, {"generator", "tessera"}}},
+                     {"extensionsUsed", {kExtension}},
+                     {"extensions", {{kExtension, sceneOf(tileset)}}},
+                     {"geometricError", tileset.geometricError},
+                     {"root", tileOf(tileset, tileset.root(), true)}};
+  return file.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+bool isPlainUri(std::string_view uri) {
+  if (uri.empty() || uri.size() > 255) return false;
+  bool startsPart = true;
+  for (const char c : uri) {
+    const bool isName = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    if (startsPart && (c == '.' || c == '/')) return false;
+    if (!isName && c != '.' && c != '_' && c != '-' && c != '/') return false;
+    startsPart = c == '/';
+  }
+  return !startsPart;
+}
+
+}  // namespace tessera

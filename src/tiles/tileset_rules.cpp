@@ -1,0 +1,197 @@
+// The rules that a tileset keeps, written or read (docs/tile-format.md, section 3).
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "tiles/tileset.h"
+#include "tiles/tileset_json.h"
+
+namespace tessera {
+namespace {
+
+using Broken = std::optional<std::string>;
+
+constexpr double kFarthestInScene = 1e7;
+constexpr uint32_t kMostCells = 4096;  // along an axis
+constexpr uint32_t kMostLevels = 64;
+
+bool isRotation(const Mat3d& rotation) {
+  return rotation.allFinite() && rotation.cwiseAbs().maxCoeff() < 2 &&
+         (rotation.transpose() * rotation - Mat3d::Identity()).cwiseAbs().maxCoeff() < 1e-6 &&
+         rotation.determinant() > 0;
+}
+
+bool isScale(double scale) {
+  return scale > 1 / kFarthest && scale < kFarthest;  // false for NaN too
+}
+
+bool isAffine(const Mat4d& matrix) {
+  return (matrix.array().abs() <= kFarthest).all() && matrix.row(3) == Eigen::RowVector4d(0, 0, 0, 1);
+}
+
+bool isSimilarity(const Mat4d& matrix) {
+  if (!isAffine(matrix)) return false;
+  const Mat3d linear = matrix.topLeftCorner<3, 3>();
+  const double scale = linear.col(0).norm();
+  return isScale(scale) && isRotation(linear / scale);
+}
+
+bool isBox(const SceneBox& box) {
+  return (box.low.array() >= -kFarthestInScene).all() && (box.high.array() <= kFarthestInScene).all() &&
+         (box.low.array() < box.high.array()).all();
+}
+
+bool isRange(const CellRange& range) {
+  return range.first[0] < range.end[0] && range.first[1] < range.end[1];
+}
+
+// Ranges that lie on a grid: along an axis two of them are the same or apart, and no two are the same along both.
+bool lieOnGrid(const std::vector<CellRange>& ranges) {
+  for (size_t axis = 0; axis < 2; ++axis) {
+    std::vector<std::pair<uint32_t, uint32_t>> sides;
+    for (const CellRange& range : ranges) sides.emplace_back(range.first[axis], range.end[axis]);
+    std::sort(sides.begin(), sides.end());
+    for (size_t i = 1; i < sides.size(); ++i) {
+      if (sides[i] != sides[i - 1] && sides[i].first < sides[i - 1].second) return false;
+    }
+  }
+  std::set<std::array<uint32_t, 2>> corners;
+  for (const CellRange& range : ranges) {
+    if (!corners.insert(range.first).second) return false;
+  }
+  return true;
+}
+
+Broken ruleOfFrames(const Tileset& tileset) {
+  if (!isRotation(tileset.worldFromScene.rotation)) return "worldFromScene's rotation is none";
+  if (!isScale(tileset.worldFromScene.scale)) return "worldFromScene's scale is not above zero";
+  if (!isPlace(tileset.worldFromScene.translation)) return "worldFromScene's translation is no place";
+  if (!isAffine(tileset.sourceFromWorld)) return "sourceFromWorld is not affine";
+  if (tileset.columns < 1 || tileset.columns > kMostCells || tileset.rows < 1 || tileset.rows > kMostCells) {
+    return "the grid's columns or rows are out of bounds";
+  }
+  if (!(tileset.bottom >= -1 && tileset.bottom < tileset.top && tileset.top <= 1)) {
+    return "the grid's heights are not within -1 and 1";
+  }
+  if (!(tileset.near >= 0 && tileset.near <= 1)) return "near is not between 0 and 1";
+  for (const float channel : tileset.background) {
+    if (!(channel >= 0 && channel <= 1)) return "the background is no colour";
+  }
+  if (const auto& geo = tileset.georeference) {
+    if (!(std::abs(geo->latitude) <= 90 && std::abs(geo->longitude) <= 180 && std::abs(geo->altitude) <= 1e5)) {
+      return "the georeference is no place on the Earth";
+    }
+    if (!isSimilarity(geo->enuFromWorld)) return "the georeference's enuFromWorld is no similarity";
+  }
+  return std::nullopt;
+}
+
+Broken ruleOfResources(const Tileset& tileset) {
+  std::set<std::string> seen;
+  for (const SharedResource& resource : tileset.resources) {
+    if (!isPlainUri(resource.uri)) return "the uri of a shared resource is not plain";
+    if (!seen.insert(resource.uri).second) return "a shared resource is listed twice";
+    if (resource.mimeType.empty() || resource.mimeType.size() > 127) return "a shared resource has no mimeType";
+  }
+  return std::nullopt;
+}
+
+Broken ruleOfContents(const Tileset& tileset, const Tile& tile, bool isRoot) {
+  std::vector<CellRange> ranges;
+  size_t surrounds = 0;
+  for (const TileContent& content : tile.contents) {
+    if (!isPlainUri(content.uri) || !content.uri.ends_with(".glb"))
+      return "a content's uri is not a plain one of a .glb";
+    if (!isBox(content.box)) return "a content's box is none";
+    std::set<uint32_t> resources;
+    for (const uint32_t resource : content.resources) {
+      if (resource >= tileset.resources.size()) return "a content needs a shared resource that is not listed";
+      if (!resources.insert(resource).second) return "a content needs a shared resource twice";
+    }
+    if (content.surround) {
+      if (!isRoot || ++surrounds > 1) return "a surround is not the only one, in the root";
+      if (!content.box.contains(tileset.box())) return "the surround's box does not hold the scene's";
+      continue;
+    }
+    if (!tile.box.contains(content.box)) return "a content's box leaves its tile's";
+    if (!isRange(content.cells) || !tile.cells.contains(content.cells)) return "a content's cells leave its tile's";
+    ranges.push_back(content.cells);
+  }
+  if (tileset.representation != Representation::mesh && !lieOnGrid(ranges)) return "contents of a tile have no order";
+  return std::nullopt;
+}
+
+// Inner walls hold; at the border of the grid a tile may own what lies outside.
+bool keepsToCells(const Tileset& tileset, const Tile& tile) {
+  const SceneBox walls = tileset.boxOf(tile.cells);
+  const std::array<uint32_t, 2> counts = {tileset.columns, tileset.rows};
+  for (size_t axis = 0; axis < 2; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    if (tile.cells.first[axis] > 0 && tile.box.low[a] < walls.low[a]) return false;
+    if (tile.cells.end[axis] < counts[axis] && tile.box.high[a] > walls.high[a]) return false;
+  }
+  return true;
+}
+
+Broken ruleOfTile(const Tileset& tileset, const Tile& tile) {
+  if (tile.level >= tileset.levels) return "its level is not below the scene's number of levels";
+  if (!isRange(tile.cells) || !tileset.allCells().contains(tile.cells)) return "its cells are not of the grid";
+  if (!isBox(tile.box)) return "its box is none";
+  if (!keepsToCells(tileset, tile)) return "its box leaves its cells";
+  if (!(tile.geometricError >= 0 && tile.geometricError <= kFarthest)) return "its geometric error is no length";
+  return ruleOfContents(tileset, tile, &tile == &tileset.root());
+}
+
+Broken ruleOfChildren(const Tileset& tileset, const Tile& tile) {
+  std::vector<CellRange> ranges;
+  uint64_t cells = 0;
+  for (const uint32_t index : tile.children) {
+    const Tile& child = tileset.tiles[index];
+    if (child.level >= tile.level) return "a child is not of a finer level";
+    if (!tile.cells.contains(child.cells)) return "a child's cells leave its own";
+    if (!tile.box.contains(child.box)) return "a child's box leaves its own";
+    if (child.geometricError > tile.geometricError) return "a child's geometric error is above its own";
+    ranges.push_back(child.cells);
+    cells += child.cells.cells();
+  }
+  if (!lieOnGrid(ranges)) return "its children do not lie on a grid";
+  if (!tile.children.empty() && cells != tile.cells.cells()) return "its children leave cells out";
+  return std::nullopt;
+}
+
+// Each tile but the root is the child of one that stands before it.
+bool isTree(const Tileset& tileset) {
+  std::vector<bool> hasParent(tileset.tiles.size());
+  hasParent[0] = true;
+  for (size_t i = 0; i < tileset.tiles.size(); ++i) {
+    for (const uint32_t child : tileset.tiles[i].children) {
+      if (child <= i || child >= tileset.tiles.size() || hasParent[child]) return false;
+      hasParent[child] = true;
+    }
+  }
+  return std::find(hasParent.begin(), hasParent.end(), false) == hasParent.end();
+}
+
+}  // namespace
+
+std::optional<std::string> brokenRule(const Tileset& tileset) {
+  if (tileset.tiles.empty()) return "there is no tile";
+  if (tileset.levels < 1 || tileset.levels > kMostLevels) return "the number of levels is out of bounds";
+  if (auto broken = ruleOfFrames(tileset)) return broken;
+  if (auto broken = ruleOfResources(tileset)) return broken;
+  if (!(tileset.geometricError >= tileset.root().geometricError && tileset.geometricError <= kFarthest)) {
+    return "the tileset's geometric error is below its root's";
+  }
+  if (!(tileset.root().cells == tileset.allCells())) return "the root does not stand for all cells";
+  if (!isTree(tileset)) return "the tiles are no tree";
+  for (const auto ruleOf : {ruleOfTile, ruleOfChildren}) {
+    for (size_t i = 0; i < tileset.tiles.size(); ++i) {
+      if (const auto broken = ruleOf(tileset, tileset.tiles[i])) return fmt::format("tile {}: {}", i, *broken);
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace tessera

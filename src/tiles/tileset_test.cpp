@@ -1,0 +1,202 @@
+#include "tiles/tileset.h"
+
+#include <gtest/gtest.h>
+
+#include <GeographicLib/Geocentric.hpp>
+#include <GeographicLib/LocalCartesian.hpp>
+#include <cstdlib>
+#include <functional>
+
+#include "tiles/test_support.h"
+
+namespace tessera {
+namespace {
+
+using tiles_test::madeTileset;
+
+TEST(Tileset, StandsOnItsBlockGrid) {
+  BlockGrid grid;
+  grid.originInWorld = {10, 20, 3};
+  grid.gridFromWorld << 0.8, 0.6, 0, -0.6, 0.8, 0, 0, 0, 1;
+  grid.edge = 30;
+  grid.columns = 3;
+  grid.rows = 2;
+  grid.bottom = -6;
+  grid.top = 12;
+  Tileset tileset;
+  placeOn(tileset, grid);
+  const Vec3d corner = tileset.worldFromScene * Vec3d(-3, -2, tileset.top);
+  EXPECT_LT((corner - grid.inWorld({-45, -30, 12})).norm(), 1e-9);
+  EXPECT_LT((tileset.worldFromScene.undo(corner) - Vec3d(-3, -2, tileset.top)).norm(), 1e-12);
+  const BlockGrid again = tileset.blockGrid();
+  EXPECT_EQ(again.originInWorld, grid.originInWorld);
+  EXPECT_EQ(again.gridFromWorld, grid.gridFromWorld);
+  EXPECT_EQ(again.edge, grid.edge);
+  EXPECT_EQ(again.columns, 3);
+  EXPECT_EQ(again.rows, 2);
+  EXPECT_DOUBLE_EQ(again.bottom, grid.bottom);
+  EXPECT_DOUBLE_EQ(again.top, grid.top);
+}
+
+TEST(Tileset, ItsCellsAreTheGridsCells) {
+  const Tileset tileset = madeTileset();
+  const BlockGrid grid = tileset.blockGrid();
+  for (double x = -5; x <= 5; x += 0.37) {
+    for (double y = -5; y <= 5; y += 0.41) {
+      const Vec3d inGrid = grid.inGrid(tileset.worldFromScene * Vec3d(x, y, 0));
+      const auto cell = tileset.cellAt({x, y, 0});
+      EXPECT_EQ(static_cast<int>(cell[0] + tileset.columns * cell[1]), grid.cellAt(inGrid.head<2>())) << x << " " << y;
+    }
+  }
+}
+
+TEST(Tileset, TheRootTransformPutsItOnTheEarth) {
+  const Tileset tileset = madeTileset();
+  const Vec3d xInScene(0.3, -1.2, 0.5), xInWorld = tileset.worldFromScene * xInScene;
+  const Vec3d enu = (tileset.georeference->enuFromWorld * xInWorld.homogeneous()).head<3>();
+  EXPECT_LT((tileset.tileFromScene() * xInScene - enu).norm(), 1e-9);
+  const auto& geo = *tileset.georeference;
+  double latitude, longitude, height;
+  GeographicLib::LocalCartesian(geo.latitude, geo.longitude, geo.altitude)
+      .Reverse(enu.x(), enu.y(), enu.z(), latitude, longitude, height);
+  Vec3d ecef;
+  GeographicLib::Geocentric::WGS84().Forward(latitude, longitude, height, ecef.x(), ecef.y(), ecef.z());
+  EXPECT_LT(((tileset.rootTransform() * enu.homogeneous()).head<3>() - ecef).norm(), 1e-6);
+  EXPECT_EQ(madeTileset(3, false).rootTransform(), Mat4d::Identity());
+}
+
+// Where the ray from o along d is in each tile of a cut, by dense sampling.
+TEST(Tileset, ChildrenAreFrontToBackForEveryRay) {
+  // Three columns and two rows of ranges of unequal width, as merging an odd grid leaves them.
+  Tileset tileset = madeTileset(5);
+  Tile& root = tileset.tiles[0];
+  root.children.clear();
+  tileset.tiles.resize(1);
+  for (const auto& [j0, j1] : {std::pair{0u, 1u}, {1u, 2u}}) {
+    for (const auto& [i0, i1] : {std::pair{0u, 2u}, {2u, 4u}, {4u, 5u}}) {
+      Tile child;
+      child.cells = {{i0, j0}, {i1, j1}};
+      child.box = tileset.boxOf(child.cells);
+      tileset.tiles[0].children.push_back(static_cast<uint32_t>(tileset.tiles.size()));
+      tileset.tiles.push_back(child);
+    }
+  }
+  ASSERT_EQ(brokenRule(tileset), std::nullopt);
+  const RandomStream random(5, 5);
+  size_t changes = 0;
+  for (uint64_t ray = 0; ray < 500; ++ray) {
+    const auto draw = [&](uint64_t k) { return 2 * random.uniformDouble(8 * ray + k) - 1; };
+    const Vec3d origin(8 * draw(0), 5 * draw(1), draw(2)), direction(draw(3), draw(4), draw(5));
+    const auto order = childrenFrontToBack(tileset, 0, origin);
+    size_t last = 0;
+    for (double t = 0; t < 40; t += 0.01) {
+      const auto cell = tileset.cellAt(origin + t * direction);
+      size_t place = 0;
+      while (!tileset.tiles[order[place]].cells.contains({cell, {cell[0] + 1, cell[1] + 1}})) ++place;
+      EXPECT_GE(place, last) << "ray " << ray;
+      changes += place != last;
+      last = place;
+    }
+  }
+  EXPECT_GT(changes, 500u);
+}
+
+TEST(Tileset, TheCoarsestCoverLiesBelowARootThatCannotStandForIt) {
+  Tileset tileset = madeTileset(2);
+  EXPECT_EQ(coarsestCover(tileset), std::vector<uint32_t>{0});
+  tileset.tiles[0].contents.erase(tileset.tiles[0].contents.begin());  // the surround is left
+  EXPECT_EQ(brokenRule(tileset), std::nullopt);
+  EXPECT_EQ(coarsestCover(tileset), (std::vector<uint32_t>{1, 2, 3, 4}));
+}
+
+TEST(Tileset, AllowsChainsAndSeveralContents) {
+  Tileset tileset = madeTileset(2);
+  tileset.levels = 3;
+  Tile top = tileset.tiles[0];  // over the same cells
+  top.level = 2;
+  top.children = {1};
+  tileset.tiles[0].contents.pop_back();
+  for (uint32_t& child : tileset.tiles[0].children) ++child;
+  tileset.tiles.insert(tileset.tiles.begin(), top);
+  EXPECT_EQ(brokenRule(tileset), std::nullopt);
+  TileContent west = tileset.tiles[1].contents[0], east = west;
+  west.cells = {{0, 0}, {1, 2}};
+  east.cells = {{1, 0}, {2, 2}};
+  tileset.tiles[1].contents = {west, east};
+  EXPECT_EQ(brokenRule(tileset), std::nullopt);
+  tileset.tiles[1].contents[1].cells = west.cells;
+  EXPECT_EQ(brokenRule(tileset), "tile 1: contents of a tile have no order");
+  tileset.representation = Representation::mesh;
+  EXPECT_EQ(brokenRule(tileset), std::nullopt);
+}
+
+TEST(Tileset, NamesTheRuleThatIsBroken) {
+  const auto names = [](const char* rule, const std::function<void(Tileset&)>& spoil) {
+    Tileset tileset = madeTileset();
+    ASSERT_EQ(brokenRule(tileset), std::nullopt);
+    spoil(tileset);
+    EXPECT_EQ(brokenRule(tileset).value_or("none"), rule);
+  };
+  names("there is no tile", [](Tileset& t) { t.tiles.clear(); });
+  names("the number of levels is out of bounds", [](Tileset& t) { t.levels = 65; });
+  names("worldFromScene's rotation is none", [](Tileset& t) { t.worldFromScene.rotation.col(0) *= -1; });
+  names("worldFromScene's scale is not above zero", [](Tileset& t) { t.worldFromScene.scale = 0; });
+  names("worldFromScene's translation is no place", [](Tileset& t) { t.worldFromScene.translation.x() = 1e13; });
+  names("sourceFromWorld is not affine", [](Tileset& t) { t.sourceFromWorld(3, 0) = 1; });
+  names("the grid's columns or rows are out of bounds", [](Tileset& t) { t.columns = 0; });
+  names("the grid's heights are not within -1 and 1", [](Tileset& t) { t.bottom = t.top; });
+  names("near is not between 0 and 1", [](Tileset& t) { t.near = -1; });
+  names("the background is no colour", [](Tileset& t) { t.background[1] = 1.5f; });
+  names("the georeference is no place on the Earth", [](Tileset& t) { t.georeference->latitude = 91; });
+  names("the georeference's enuFromWorld is no similarity",
+        [](Tileset& t) { t.georeference->enuFromWorld(0, 0) *= 2; });
+  names("the uri of a shared resource is not plain", [](Tileset& t) { t.resources[0].uri = "../a"; });
+  names("a shared resource is listed twice", [](Tileset& t) { t.resources.push_back(t.resources[0]); });
+  names("a shared resource has no mimeType", [](Tileset& t) { t.resources[0].mimeType.clear(); });
+  names("the tileset's geometric error is below its root's", [](Tileset& t) { t.geometricError = 0.1; });
+  names("the root does not stand for all cells", [](Tileset& t) { t.tiles[0].cells.end[0] = 2; });
+  names("the tiles are no tree", [](Tileset& t) { t.tiles[1].children = {1}; });
+  names("the tiles are no tree", [](Tileset& t) { t.tiles[1].children = {2}; });
+  names("the tiles are no tree", [](Tileset& t) { t.tiles[0].children.pop_back(); });
+  names("the tiles are no tree", [](Tileset& t) { t.tiles[0].children.push_back(99); });
+  names("tile 0: its level is not below the scene's number of levels", [](Tileset& t) { t.tiles[0].level = 2; });
+  names("tile 2: its cells are not of the grid", [](Tileset& t) { t.tiles[2].cells.end[0] = 4; });
+  names("tile 1: its box is none", [](Tileset& t) { t.tiles[1].box.low.x() = NAN; });
+  names("tile 1: its box leaves its cells", [](Tileset& t) { t.tiles[1].box.high.x() += 0.1; });
+  names("tile 1: its geometric error is no length", [](Tileset& t) { t.tiles[1].geometricError = -1; });
+  names("tile 0: a child is not of a finer level", [](Tileset& t) { t.tiles[1].level = 1; });
+  names("tile 0: a child's box leaves its own", [](Tileset& t) { t.tiles[1].box.low.z() -= 1; });
+  names("tile 0: a child's geometric error is above its own", [](Tileset& t) { t.tiles[1].geometricError = 1; });
+  names("tile 0: its children do not lie on a grid", [](Tileset& t) { t.tiles[1] = t.tiles[2]; });
+  names("tile 0: its children do not lie on a grid", [](Tileset& t) {
+    t.tiles[1].cells.end[0] = 2;
+    t.tiles[1].box.high.x() = 0;
+  });
+  names("tile 0: its children leave cells out", [](Tileset& t) {
+    t.tiles[0].children.pop_back();
+    t.tiles.pop_back();
+  });
+  names("tile 0: a content's uri is not a plain one of a .glb",
+        [](Tileset& t) { t.tiles[0].contents[0].uri = "a.b3dm"; });
+  names("tile 0: a content's box is none", [](Tileset& t) { t.tiles[0].contents[0].box.high.y() = -5; });
+  names("tile 0: a content's box leaves its tile's", [](Tileset& t) { t.tiles[0].contents[0].box.high.y() = 5; });
+  names("tile 1: a content's cells leave its tile's", [](Tileset& t) { t.tiles[1].contents[0].cells.end[0] = 2; });
+  names("tile 0: a content needs a shared resource that is not listed", [](Tileset& t) { t.resources.clear(); });
+  names("tile 0: a content needs a shared resource twice", [](Tileset& t) {
+    t.tiles[0].contents[0].resources = {0, 0};
+  });
+  names("tile 1: a surround is not the only one, in the root",
+        [](Tileset& t) { t.tiles[1].contents[0].surround = true; });
+  names("tile 0: the surround's box does not hold the scene's",
+        [](Tileset& t) { t.tiles[0].contents[1].box.high.z() = 0; });
+}
+
+TEST(Tileset, KnowsRepresentationsByName) {
+  for (const auto one : {Representation::mesh, Representation::volume, Representation::hash}) {
+    EXPECT_EQ(representationOf(nameOf(one)), one);
+  }
+  EXPECT_EQ(representationOf("field"), std::nullopt);
+}
+
+}  // namespace
+}  // namespace tessera

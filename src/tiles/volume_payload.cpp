@@ -1,0 +1,104 @@
+#include "tiles/volume_payload.h"
+
+#include <bit>
+#include <cstring>
+
+#include "base/check.h"
+#include "tiles/content_file.h"
+#include "tiles/lossless_image.h"
+#include "tiles/volume_pictures.h"
+
+namespace tessera {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+void append(Bytes& bytes, const std::vector<float>& numbers) {
+  static_assert(std::endian::native == std::endian::little);
+  const auto raw = std::as_bytes(std::span(numbers));
+  bytes.insert(bytes.end(), raw.begin(), raw.end());
+}
+
+class VolumeWriter {
+ public:
+  VolumeWriter(const VolumeContent& content, int effort) : content_(content), effort_(effort) {}
+
+  Bytes write() {
+    Json ours = {{"featureRange", content_.featureRange},
+                 {"densityRange", content_.densityRange},
+                 {"network", network()},
+                 {"parts", Json::array()}};
+    for (const VolumePart& part : content_.parts) ours["parts"].push_back(partOf(part));
+    return file_.finish(Representation::volume, ours);
+  }
+
+ private:
+  Json network() {
+    Bytes bytes;
+    Json layers = Json::array();
+    for (const DenseLayer& layer : content_.network) {
+      layers.push_back({layer.inputs, layer.outputs});
+      append(bytes, layer.weights);
+      append(bytes, layer.biases);
+    }
+    Json json = {{"layers", std::move(layers)}};
+    json.update(file_.add(bytes, kRawBytes));
+    return json;
+  }
+
+  Json partOf(const VolumePart& part) {
+    Json json = {{"centre", part.centre},     {"scale", part.scale},  {"contracted", part.contracted},
+                 {"surround", part.surround}, {"low", part.low},      {"high", part.high},
+                 {"voxels", part.voxels},     {"planes", part.planes}};
+    json["macroblocks"] = macroblocks(part);
+    for (const std::vector<uint8_t>& plane : part.planeBytes) {
+      json["planeTexels"].push_back(pictures(picturesOfPlane(plane, part.planes)));
+    }
+    const uint32_t cells = part.planes / VolumePart::kDistanceCell;
+    json["occupied"] = picture(pictureOfBits(occupancyFromDistances(part.distances, cells)));
+    return json;
+  }
+
+  // Their places say their numbers, so that none can be wrong: stored in the order of places.
+  Json macroblocks(const VolumePart& part) {
+    OccupancyBits alive(part.voxels / VolumePart::kMacroblock);
+    std::vector<uint8_t> inOrder;
+    inOrder.reserve(part.voxelBytes.size());
+    for (size_t place = 0; place < part.macroblocks.size(); ++place) {
+      if (part.macroblocks[place] == VolumePart::kEmpty) continue;
+      alive.set(place);
+      const uint8_t* block = part.voxelBytes.data() + size_t{part.macroblocks[place]} * VolumePart::kMacroblockBytes;
+      inOrder.insert(inOrder.end(), block, block + VolumePart::kMacroblockBytes);
+    }
+    const uint32_t stored = part.storedMacroblocks();
+    Json json = {{"stored", stored}, {"alive", picture(pictureOfBits(alive))}};
+    if (stored > 0) json["texels"] = pictures(picturesOfMacroblocks(inOrder, stored));
+    return json;
+  }
+
+  Json pictures(const TexelPictures& three) {
+    Json json = Json::array();
+    for (const ImageU8& one : three) json.push_back(picture(one));
+    return json;
+  }
+
+  Json picture(const ImageU8& image) { return file_.add(encodeLossless(image, effort_), kWebP); }
+
+  const VolumeContent& content_;
+  int effort_;
+  ContentFileWriter file_;
+};
+
+}  // namespace
+
+Bytes encodeVolume(const VolumeContent& content, int effort) {
+  const auto broken = brokenRule(content);
+  CHECK(broken.value_or("") == "");
+  for (const VolumePart& part : content.parts) {
+    const uint32_t cells = part.planes / VolumePart::kDistanceCell;
+    CHECK((part.distances == chebyshevDistances(occupancyFromDistances(part.distances, cells))));
+  }
+  return VolumeWriter(content, effort).write();
+}
+
+}  // namespace tessera

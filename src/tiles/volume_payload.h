@@ -1,0 +1,38 @@
+// One content of a `volume` scene as a file, and back. docs/tile-format.md, section 6.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+
+#include "base/file.h"
+#include "tiles/volume_content.h"
+
+namespace tessera {
+
+inline constexpr uint32_t kMostVoxels = 1024, kMostPlanes = 4096;  // along an axis
+inline constexpr uint32_t kMostStored = 606 * 606;                 // macroblocks in a picture of 16383 pixels a side
+inline constexpr uint32_t kMostLayers = 8, kMostLayerWidth = 256;  // of the network
+inline constexpr float kFarthestInScene = 1e7f;                    // scene units
+
+struct VolumeLimits {
+  uint64_t bytes = uint64_t{1} << 30;  // of the content in memory; decoding takes up to a third more for a moment
+  uint32_t parts = 1024;
+};
+
+// Why the content is none: the first rule of the format that it breaks, for people. Nothing when it is one. Whether
+// distances are the right ones is not looked at: files do not hold them.
+std::optional<std::string> brokenRule(const VolumeContent& content);
+
+// A .glb. The same content gives the same bytes with the same libwebp. CHECKs that it breaks no rule, and that
+// distances are chebyshevDistances of their zeros. Macroblocks come back numbered in the order of their places.
+// `effort` as in lossless_image.h.
+Bytes encodeVolume(const VolumeContent& content, int effort = 6);
+
+// Untrusted bytes: nothing, and why in `reason`, where a size, an index, a number or the whole is not as the format has
+// it, or where the content would take more memory than the limit; that is known before it is taken.
+std::optional<VolumeContent> decodeVolume(std::span<const std::byte> file, std::string& reason,
+                                          const VolumeLimits& limits = {});
+VolumeContent readVolume(const fs::path& path, const VolumeLimits& limits = {});  // throws Error naming the path
+
+}  // namespace tessera

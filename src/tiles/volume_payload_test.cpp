@@ -1,0 +1,360 @@
+#include "tiles/volume_payload.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "tiles/content_file.h"
+#include "tiles/glb.h"
+#include "tiles/lossless_image.h"
+#include "tiles/test_support.h"
+#include "tiles/volume_pictures.h"
+
+namespace tessera {
+namespace {
+
+using nlohmann::json;
+using tiles_test::madeContent;
+using tiles_test::madePart;
+
+void expectSame(const VolumeContent& a, const VolumeContent& b) {
+  EXPECT_EQ(a.featureRange, b.featureRange);
+  EXPECT_EQ(a.densityRange, b.densityRange);
+  ASSERT_EQ(a.network.size(), b.network.size());
+  for (size_t i = 0; i < a.network.size(); ++i) {
+    EXPECT_EQ(a.network[i].inputs, b.network[i].inputs);
+    EXPECT_EQ(a.network[i].weights, b.network[i].weights);
+    EXPECT_EQ(a.network[i].biases, b.network[i].biases);
+  }
+  ASSERT_EQ(a.parts.size(), b.parts.size());
+  for (size_t i = 0; i < a.parts.size(); ++i) {
+    const VolumePart &one = a.parts[i], &other = b.parts[i];
+    EXPECT_EQ(one.centre, other.centre);
+    EXPECT_EQ(one.scale, other.scale);
+    EXPECT_EQ(one.low, other.low);
+    EXPECT_EQ(one.high, other.high);
+    EXPECT_EQ(one.contracted, other.contracted);
+    EXPECT_EQ(one.surround, other.surround);
+    EXPECT_EQ(one.voxels, other.voxels);
+    EXPECT_EQ(one.planes, other.planes);
+    EXPECT_EQ(one.macroblocks, other.macroblocks);
+    EXPECT_EQ(one.voxelBytes, other.voxelBytes);
+    EXPECT_EQ(one.planeBytes, other.planeBytes);
+    EXPECT_EQ(one.distances, other.distances);
+  }
+}
+
+std::optional<VolumeContent> roundTrip(const VolumeContent& content) {
+  std::string reason;
+  auto again = decodeVolume(encodeVolume(content, 1), reason);
+  EXPECT_TRUE(again) << reason;
+  return again;
+}
+
+TEST(VolumePayload, GivesBackWhatWasWritten) {
+  for (uint64_t seed = 0; seed < 6; ++seed) {
+    VolumeContent content = madeContent(seed, 1 + seed % 3);
+    content.densityRange = 10.1f;
+    const auto again = roundTrip(content);
+    ASSERT_TRUE(again);
+    expectSame(content, *again);
+  }
+}
+
+TEST(VolumePayload, GivesBackSurroundsAndOddNumbers) {
+  VolumeContent content = madeContent(7);
+  VolumePart& part = content.parts[0];
+  part.contracted = part.surround = true;
+  part.centre = {0.1f, 1e-30f, -3};
+  part.scale = {3, 2, 1};
+  part.low = {-1e6f, -1e6f, -1e6f};
+  part.high = {1e6f, 1e6f, 1e6f};
+  content.network[0].weights[3] = -0.0f;
+  content.network[2].biases[1] = std::numeric_limits<float>::denorm_min();
+  const auto again = roundTrip(content);
+  ASSERT_TRUE(again);
+  expectSame(content, *again);
+}
+
+TEST(VolumePayload, GivesBackAPartWithoutMacroblocksAndOneWithAll) {
+  for (const bool empty : {true, false}) {
+    VolumeContent content = madeContent(8);
+    VolumePart& part = content.parts[0];
+    if (empty) {
+      part.macroblocks.assign(8, VolumePart::kEmpty);
+      part.voxelBytes.clear();
+    } else {
+      for (uint32_t i = 0; i < 8; ++i) part.macroblocks[i] = i;
+      part.voxelBytes.resize(8 * VolumePart::kMacroblockBytes, 77);
+    }
+    const auto again = roundTrip(content);
+    ASSERT_TRUE(again);
+    expectSame(content, *again);
+  }
+}
+
+TEST(VolumePayload, RenumbersMacroblocksInTheOrderOfTheirPlaces) {
+  const VolumeContent content = madeContent(9);
+  VolumeContent shuffled = content;
+  VolumePart& part = shuffled.parts[0];
+  const uint32_t stored = part.storedMacroblocks();
+  ASSERT_GE(stored, 2u);
+  for (uint32_t& number : part.macroblocks) {
+    if (number != VolumePart::kEmpty) number = stored - 1 - number;
+  }
+  for (uint32_t i = 0; i < stored; ++i) {
+    std::memcpy(part.voxelBytes.data() + i * VolumePart::kMacroblockBytes,
+                content.parts[0].voxelBytes.data() + (stored - 1 - i) * VolumePart::kMacroblockBytes,
+                VolumePart::kMacroblockBytes);
+  }
+  const auto again = roundTrip(shuffled);
+  ASSERT_TRUE(again);
+  expectSame(content, *again);
+}
+
+TEST(VolumePayload, GivesTheSameBytesAgain) {
+  EXPECT_EQ(encodeVolume(madeContent(3)), encodeVolume(madeContent(3)));
+}
+
+TEST(VolumePayload, IsAnAssetWithAnEmptySceneForOthers) {
+  const Bytes file = encodeVolume(madeContent(1));
+  const json asset = json::parse(decodeGlb(file)->json);
+  EXPECT_EQ(asset["asset"]["version"], "2.0");
+  EXPECT_EQ(asset["extensionsUsed"], json::array({"TESSERA_content"}));
+  EXPECT_FALSE(asset.contains("extensionsRequired"));
+  EXPECT_EQ(asset["scenes"], json::array({json::object()}));
+  for (const json& view : asset["bufferViews"]) EXPECT_EQ(view["byteOffset"].get<size_t>() % 4, 0u);
+}
+
+TEST(VolumePayload, PutsAttributesAndSlicesWhereTheFormatSays) {
+  const VolumePart part = madePart(5);
+  const auto pictures = picturesOfMacroblocks(part.voxelBytes, part.storedMacroblocks());
+  // Five to nine macroblocks: three beside one another. Block 4, slice 5, row 7, column 2: tile (1, 1), slice (2, 1).
+  ASSERT_EQ(sizeOfMacroblocks(5).width, 81u);
+  ASSERT_EQ(sizeOfMacroblocks(5).height, 54u);
+  ASSERT_GE(part.storedMacroblocks(), 5u);
+  ASSERT_LE(part.storedMacroblocks(), 9u);
+  const uint8_t* texel = part.voxelBytes.data() + (((4 * 9 + 5) * 9 + 7) * 9 + 2) * 8;
+  const int x = 1 * 27 + 2 * 9 + 2, y = 1 * 27 + 1 * 9 + 7;
+  EXPECT_EQ(pictures[0].at(x, y)[0], texel[1]);
+  EXPECT_EQ(pictures[0].at(x, y)[2], texel[3]);
+  EXPECT_EQ(pictures[1].at(x, y)[1], texel[5]);
+  EXPECT_EQ(pictures[2].at(x, y)[0], texel[0]);
+  EXPECT_EQ(pictures[2].at(x, y)[1], texel[7]);
+  EXPECT_EQ(pictures[2].at(x, y)[2], 0);
+  const auto plane = picturesOfPlane(part.planeBytes[1], part.planes);
+  EXPECT_EQ(plane[0].at(5, 20)[1], part.planeBytes[1][(20 * 24 + 5) * 8 + 2]);
+}
+
+TEST(VolumePayload, BitsFillPicturesThatWebPCanHold) {
+  EXPECT_EQ(sizeOfBits(8).width, 256u);
+  EXPECT_EQ(sizeOfBits(8).height, 1u);
+  EXPECT_EQ(sizeOfBits(8 * 256 + 1).height, 2u);
+  const uint64_t cells = kMostPlanes / VolumePart::kDistanceCell;
+  const PictureSize largest = sizeOfBits(cells * cells * cells);
+  EXPECT_LE(largest.width, static_cast<uint32_t>(kLargestLosslessSide));
+  EXPECT_LE(largest.height, static_cast<uint32_t>(kLargestLosslessSide));
+  EXPECT_GE(uint64_t{largest.width} * largest.height * 8, cells * cells * cells);
+  EXPECT_LE(sizeOfMacroblocks(kMostStored).width, static_cast<uint32_t>(kLargestLosslessSide));
+}
+
+TEST(VolumePayload, NamesTheRuleThatIsBroken) {
+  const auto names = [](const char* rule, const std::function<void(VolumeContent&)>& spoil) {
+    VolumeContent content = madeContent(2, 2);
+    ASSERT_EQ(brokenRule(content), std::nullopt);
+    spoil(content);
+    EXPECT_EQ(brokenRule(content).value_or("none"), rule);
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  names("a range is out of bounds", [](VolumeContent& c) { c.featureRange = 0; });
+  names("a range is out of bounds", [&](VolumeContent& c) { c.densityRange = nan; });
+  names("the network has no layers, or too many", [](VolumeContent& c) { c.network.clear(); });
+  names("the network's layers do not follow one another", [](VolumeContent& c) { c.network[1].inputs = 15; });
+  names("the network's layers have not the numbers that they need",
+        [](VolumeContent& c) { c.network[1].weights.pop_back(); });
+  names("the network holds a number that is not finite", [&](VolumeContent& c) { c.network[1].biases[0] = nan; });
+  names("the network does not end in a colour", [](VolumeContent& c) { c.network.pop_back(); });
+  names("there is no part", [](VolumeContent& c) { c.parts.clear(); });
+  names("part 0: its number of voxels is out of bounds", [](VolumeContent& c) { c.parts[0].voxels = 12; });
+  names("part 0: its number of plane texels is out of bounds", [](VolumeContent& c) { c.parts[0].planes = 4104; });
+  names("part 1: its centre or scale is out of bounds", [&](VolumeContent& c) { c.parts[1].centre[2] = nan; });
+  names("part 1: its centre or scale is out of bounds", [](VolumeContent& c) { c.parts[1].scale[2] = 0; });
+  names("part 1: its box is none", [](VolumeContent& c) { c.parts[1].low[1] = 1; });
+  names("part 0: it is bounded, but its box leaves its domain", [](VolumeContent& c) { c.parts[0].low[0] = -1.1f; });
+  names("part 0: a surround is not contracted", [](VolumeContent& c) { c.parts[0].surround = true; });
+  names("a surround is not alone", [](VolumeContent& c) { c.parts[0].surround = c.parts[0].contracted = true; });
+  names("parts 0 and 1 overlap", [](VolumeContent& c) {
+    c.parts[0].high[0] = 1.5f;
+    c.parts[0].contracted = true;
+  });
+  names("part 0: its voxels are no whole macroblocks", [](VolumeContent& c) { c.parts[0].voxelBytes.pop_back(); });
+  names("part 0: its macroblock numbers are not those of its grid",
+        [](VolumeContent& c) { c.parts[0].macroblocks.pop_back(); });
+  const auto firstStored = [](VolumeContent& c) -> uint32_t& {
+    for (uint32_t& number : c.parts[0].macroblocks) {
+      if (number != VolumePart::kEmpty) return number;
+    }
+    return c.parts[0].macroblocks[0];
+  };
+  names("part 0: the number of a macroblock is out of range", [&](VolumeContent& c) { firstStored(c) = 8; });
+  names("part 0: a macroblock is used twice", [&](VolumeContent& c) { firstStored(c) = 1; });
+  names("part 0: a macroblock is never used", [&](VolumeContent& c) { firstStored(c) = VolumePart::kEmpty; });
+  names("part 0: a plane has not its texels", [](VolumeContent& c) { c.parts[0].planeBytes[2].pop_back(); });
+  names("part 0: its distances are not those of its cells", [](VolumeContent& c) { c.parts[0].distances.pop_back(); });
+}
+
+class VolumeRefusal : public testing::Test {
+ protected:
+  static json& ours(json& asset) { return asset["extensions"]["TESSERA_content"]; }
+  static json& part(json& asset) { return ours(asset)["parts"][0]; }
+
+  void refuses(const std::string& why, const std::function<void(json&)>& spoil, const VolumeLimits& limits = {}) {
+    refusesBytes(
+        why, [&](json& asset, Bytes&) { spoil(asset); }, limits);
+  }
+  void refusesBytes(const std::string& why, const std::function<void(json&, Bytes&)>& spoil,
+                    const VolumeLimits& limits = {}) {
+    const Bytes file = encodeVolume(madeContent(5), 1);
+    const auto view = decodeGlb(file);
+    json asset = json::parse(view->json);
+    Bytes bytes(view->bytes.begin(), view->bytes.end());
+    spoil(asset, bytes);
+    std::string reason;
+    EXPECT_FALSE(decodeVolume(encodeGlb(asset.dump(), bytes), reason, limits)) << why;
+    EXPECT_EQ(reason.substr(0, why.size()), why);
+  }
+  // Another picture in place of the one that `entry` names.
+  static void replace(json& asset, Bytes& bytes, json& entry, const ImageU8& image) {
+    const Bytes encoded = encodeLossless(image, 1);
+    bytes.resize((bytes.size() + 3) / 4 * 4);
+    asset["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", bytes.size()}, {"byteLength", encoded.size()}});
+    entry["bufferView"] = asset["bufferViews"].size() - 1;
+    bytes.insert(bytes.end(), encoded.begin(), encoded.end());
+    asset["buffers"][0]["byteLength"] = bytes.size();
+  }
+};
+
+TEST_F(VolumeRefusal, OfWhatIsNoContent) {
+  std::string reason;
+  EXPECT_FALSE(decodeVolume({}, reason));
+  EXPECT_EQ(reason, "is not a binary glTF file of version 2, or is cut short");
+  refuses("its JSON is not that", [](json& asset) { asset = json::array(); });
+  refuses("its JSON is not that", [](json& asset) { asset["asset"]["version"] = "1.0"; });
+  refuses("has no extension", [](json& asset) { asset.erase("extensions"); });
+  refuses("has no extension", [](json& asset) { asset["extensionsUsed"] = {"KHR_x"}; });
+  refuses("is of version 7; 1 is known", [](json& asset) { ours(asset)["version"] = 7; });
+  refuses("does not say which version", [](json& asset) { ours(asset).erase("version"); });
+  refuses("is not of the representation volume", [](json& asset) { ours(asset)["representation"] = "hash"; });
+}
+
+TEST_F(VolumeRefusal, OfBufferViewsThatLeaveTheFile) {
+  const std::string why = "its buffer views do not lie";
+  refuses(why, [](json& asset) { asset["bufferViews"][1]["byteOffset"] = 0xffffffffu; });
+  refuses(why, [](json& asset) { asset["bufferViews"][1]["byteLength"] = 1u << 30; });
+  refuses(why, [](json& asset) { asset["bufferViews"][1]["byteLength"] = -1; });
+  refuses(why, [](json& asset) { asset["bufferViews"][1]["buffer"] = 1; });
+  refuses(why, [](json& asset) { asset["buffers"][0]["uri"] = "other.bin"; });
+  refuses(why, [](json& asset) { asset["buffers"][0]["byteLength"] = 1u << 30; });
+  refuses(why, [](json& asset) { asset["buffers"].push_back({{"byteLength", 1}}); });
+  refuses("part 0: its planes", [](json& asset) { part(asset)["planeTexels"][0][0]["bufferView"] = 9999; });
+  refuses("part 0: its planes", [](json& asset) { part(asset)["planeTexels"][0][0]["mimeType"] = "image/png"; });
+}
+
+TEST_F(VolumeRefusal, OfNetworksThatDoNotFit) {
+  refuses("has no network", [](json& asset) { ours(asset).erase("network"); });
+  refuses("has no network", [](json& asset) { ours(asset)["network"]["layers"] = json(std::vector<json>(9)); });
+  refuses("the network has fewer", [](json& asset) { ours(asset)["network"]["layers"][0] = {256, 256}; });
+  refuses("a layer of the network is out", [](json& asset) { ours(asset)["network"]["layers"][0] = {34, 1 << 30}; });
+  refuses("a layer of the network has no two", [](json& asset) { ours(asset)["network"]["layers"][0] = {34}; });
+  refuses("the network has more", [](json& asset) { ours(asset)["network"]["layers"].erase(2); });
+  refusesBytes("the network holds a number that is not finite", [](json& asset, Bytes& bytes) {
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const size_t view = ours(asset)["network"]["bufferView"];
+    std::memcpy(bytes.data() + asset["bufferViews"][view]["byteOffset"].get<size_t>() + 40, &nan, 4);
+  });
+}
+
+TEST_F(VolumeRefusal, OfHeadersThatLie) {
+  refuses("has no ranges", [](json& asset) { ours(asset)["featureRange"] = "7"; });
+  refuses("has no parts", [](json& asset) { ours(asset)["parts"] = json::array(); });
+  refuses("part 0: its header", [](json& asset) { part(asset)["voxels"] = 0; });
+  refuses("part 0: its header", [](json& asset) { part(asset)["voxels"] = 17; });
+  refuses("part 0: its header", [](json& asset) { part(asset)["planes"] = 4104; });
+  refuses("part 0: its header", [](json& asset) { part(asset)["contracted"] = 1; });
+  refuses("part 0: its header", [](json& asset) { part(asset)["centre"] = {1, 2}; });
+  refuses("part 0: its header", [](json& asset) { part(asset)["macroblocks"]["stored"] = kMostStored + 1; });
+  refuses("part 0: its centre or scale", [](json& asset) { part(asset)["scale"][1] = 1e300; });
+  refuses("part 0: its macroblocks", [](json& asset) { part(asset)["macroblocks"]["stored"] = 1; });
+  refuses("part 0: its macroblocks", [](json& asset) { part(asset)["voxels"] = 512; });
+  refuses("part 0: its macroblocks", [](json& asset) { part(asset)["macroblocks"].erase("texels"); });
+  refuses("part 0: its planes", [](json& asset) { part(asset)["planes"] = 32; });
+  refuses("part 0: its planes", [](json& asset) { part(asset)["planeTexels"].erase(2); });
+  refuses("part 0: its occupied cells", [](json& asset) { part(asset).erase("occupied"); });
+}
+
+TEST_F(VolumeRefusal, OfMoreMemoryThanAllowedBeforeItIsTaken) {
+  VolumeLimits limits;
+  limits.bytes = 20000;
+  refuses(
+      "takes more than 20000 bytes of memory", [](json&) {}, limits);
+  refuses("takes more than 1073741824 bytes of memory", [](json& asset) {
+    const json one = part(asset);
+    for (int i = 0; i < 5; ++i) {
+      ours(asset)["parts"].push_back(one);
+      ours(asset)["parts"].back()["planes"] = 4096;
+    }
+  });
+  limits = {};
+  limits.parts = 1;
+  refuses(
+      "has no parts, or too many", [](json& asset) { ours(asset)["parts"].push_back(part(asset)); }, limits);
+}
+
+TEST_F(VolumeRefusal, OfPicturesThatHoldSomethingElse) {
+  refusesBytes("part 0: its occupied cells", [](json& asset, Bytes& bytes) {  // 27 cells: bits beyond them
+    replace(asset, bytes, part(asset)["occupied"], ImageU8(256, 1, 3, 255));
+  });
+  refusesBytes("part 0: its occupied cells", [](json& asset, Bytes& bytes) {  // the last byte holds three cells
+    ImageU8 beyond(256, 1, 3);
+    std::fill_n(beyond.at(3, 0), 3, uint8_t{8});
+    replace(asset, bytes, part(asset)["occupied"], beyond);
+  });
+  refusesBytes("part 0: its occupied cells", [](json& asset, Bytes& bytes) {
+    ImageU8 coloured(256, 1, 3);
+    coloured.pixels[0] = 1;
+    replace(asset, bytes, part(asset)["occupied"], coloured);
+  });
+  refusesBytes("part 0: its macroblocks", [](json& asset, Bytes& bytes) {  // more alive than stored
+    ImageU8 all(256, 1, 3);
+    for (int c = 0; c < 3; ++c) all.pixels[static_cast<size_t>(c)] = 255;
+    replace(asset, bytes, part(asset)["macroblocks"]["alive"], all);
+  });
+  refusesBytes("part 0: its planes", [](json& asset, Bytes& bytes) {  // blue of the last picture is no attribute
+    replace(asset, bytes, part(asset)["planeTexels"][1][2], ImageU8(24, 24, 3, 1));
+  });
+}
+
+TEST_F(VolumeRefusal, OfEveryCutAndNoOtherHarm) {
+  const Bytes file = encodeVolume(madeContent(6), 1);
+  std::string reason;
+  const RandomStream random(4, 4);
+  for (uint64_t trial = 0; trial < 200; ++trial) {
+    Bytes spoilt = file;
+    if (trial % 2 == 0) {
+      spoilt.resize(random.below(2 * trial, static_cast<uint32_t>(file.size())));
+      EXPECT_FALSE(decodeVolume(spoilt, reason));
+    } else {
+      spoilt[random.below(2 * trial, static_cast<uint32_t>(file.size()))] ^=
+          std::byte(1 + random.below(2 * trial + 1, 255));
+      const bool isAccepted = decodeVolume(spoilt, reason).has_value();
+      EXPECT_EQ(isAccepted, reason.empty());
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tessera

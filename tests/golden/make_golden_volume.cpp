@@ -1,0 +1,48 @@
+// Writes the golden scene into DIR, with sums.json: what readers in every language are tested against. Run again only
+// when the format changes, and say so in the commit.
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "golden/golden_volume.h"
+#include "tiles/scene_folder.h"
+#include "tiles/volume_payload.h"
+
+using namespace tessera;
+
+int main(int count, char** arguments) {
+  if (count != 2) return 2;
+  try {
+    const fs::path root = arguments[1];
+    const SceneFolderWriter writer(root);
+    golden::Scene scene = golden::makeScene();
+    Tileset& tileset = scene.tileset;
+    nlohmann::ordered_json sums;
+    const auto write = [&](TileContent& content, uint32_t level, const std::string& name) {
+      const Bytes bytes = encodeVolume(scene.contents.at(name), 9);
+      content.uri = writer.addContent(level, name, bytes);
+      content.bytes = bytes.size();
+      for (const VolumePart& part : scene.contents.at(name).parts) {
+        const golden::Sums one = golden::sumsOf(part);
+        sums[content.uri].push_back({{"stored", one.stored},
+                                     {"firstStored", one.firstStored},
+                                     {"occupied", one.occupied},
+                                     {"distances", one.distances},
+                                     {"voxels", one.voxels},
+                                     {"voxelsOrdered", one.voxelsOrdered},
+                                     {"planes", one.planes},
+                                     {"planesOrdered", one.planesOrdered}});
+      }
+    };
+    write(tileset.tiles[0].contents[0], 1, "all");
+    write(tileset.tiles[0].contents[1], 1, "surround");
+    write(tileset.tiles[1].contents[0], 0, "0_0");
+    write(tileset.tiles[2].contents[0], 0, "1_0");
+    writer.commit(tileset);
+    writeFileAtomically(root / "sums.json", sums.dump(1) + "\n");
+  } catch (const Error& error) {
+    std::fprintf(stderr, "tessera: error: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
