@@ -72,6 +72,14 @@ TileTree flatTileTree(const std::vector<VolumeContent>& contents, bool withSurro
     tree.tiles[0].children.push_back(static_cast<int>(tree.tiles.size()));
     tree.tiles.push_back(node);
   }
+  TileNode& whole = tree.tiles[0];
+  tree.columns = static_cast<int>(std::lround(0.5 * (whole.high.x() - whole.low.x())));
+  tree.rows = static_cast<int>(std::lround(0.5 * (whole.high.y() - whole.low.y())));
+  for (TileNode& node : tree.tiles) {
+    const auto cell = [](double x, double from) { return static_cast<int>(std::lround(0.5 * (x - from))); };
+    node.cells = {cell(node.low.x(), whole.low.x()), cell(node.low.y(), whole.low.y()),
+                  cell(node.high.x(), whole.low.x()), cell(node.high.y(), whole.low.y())};
+  }
   if (withSurround) {
     tree.surround = static_cast<int>(tree.tiles.size());
     tree.tiles.emplace_back();
