@@ -1,7 +1,8 @@
 #include "apps/tessera/drawable.h"
 
 #include "base/error.h"
-#include "render/cpu/open_volume_scene.h"
+#include "render/cpu/volume_renderer.h"
+#include "render/volume_scene.h"
 #include "representations/field/field_renderer.h"
 #include "representations/volume/train_volume.h"
 #include "representations/volume/volume_model_renderer.h"
@@ -32,11 +33,13 @@ class DrawableModel final : public Drawable {
 
 class DrawableScene final : public Drawable {
  public:
-  explicit DrawableScene(const fs::path& folder, int threads) : folder_(folder), tileset_(readTileset(folder)) {
+  DrawableScene(const fs::path& folder, int threads) : folder_(folder), tileset_(readTileset(folder)) {
     VolumeRendererSettings settings;
     settings.selection.mostPixels = 0;  // the finest everywhere
     settings.threads = threads;
-    renderer_ = openVolumeScene(folder, tileset_, settings);
+    VolumeScene scene = openVolumeScene(folder);
+    settings.background = Eigen::Array3f(scene.background[0], scene.background[1], scene.background[2]);
+    renderer_ = std::make_unique<VolumeRenderer>(scene.frame, std::move(scene.tree), std::move(scene.source), settings);
   }
 
   ViewRenderer& renderer() override { return *renderer_; }

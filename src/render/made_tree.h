@@ -7,11 +7,13 @@
 
 namespace tessera {
 
-// Columns and rows need not be powers of two: what lies at the border has fewer children. A content takes `bytes`.
-inline TileTree madeTree(int columns, int rows, uint64_t bytes = 100) {
+// Columns and rows need not be powers of two: what lies at the border has fewer children.
+inline TileTree madeTree(int columns, int rows) {
   int levels = 0;
   while ((1 << levels) < std::max(columns, rows)) ++levels;
   TileTree tree;
+  tree.columns = columns;
+  tree.rows = rows;
   std::map<std::pair<int, int>, int> above;  // tiles of the level above, by column and row
   for (int level = levels; level >= 0; --level) {
     std::map<std::pair<int, int>, int> here;
@@ -20,11 +22,10 @@ inline TileTree madeTree(int columns, int rows, uint64_t bytes = 100) {
       for (int i = 0; i * edge < columns; ++i) {
         TileNode node;
         node.level = level;
-        node.low = Vec3d(2 * i * edge - columns, 2 * j * edge - rows, -1);
-        node.high =
-            Vec3d(2 * std::min(columns, (i + 1) * edge) - columns, 2 * std::min(rows, (j + 1) * edge) - rows, 1);
+        node.cells = {i * edge, j * edge, std::min(columns, (i + 1) * edge), std::min(rows, (j + 1) * edge)};
+        node.low = Vec3d(2 * node.cells.i0 - columns, 2 * node.cells.j0 - rows, -1);
+        node.high = Vec3d(2 * node.cells.i1 - columns, 2 * node.cells.j1 - rows, 1);
         node.geometricError = 2.0 / 512 * edge;
-        node.contentBytes = bytes;
         const int number = static_cast<int>(tree.tiles.size());
         if (level < levels) {
           node.parent = above.at({i / 2, j / 2});

@@ -24,7 +24,7 @@ struct MadeVolume {
 };
 
 // Chebyshev distances to the cells that hold something, of n³: how often they must grow by one cell to get there.
-inline std::vector<uint8_t> chebyshevDistances(std::vector<bool> holds, int n) {
+inline std::vector<uint8_t> madeDistances(std::vector<bool> holds, int n) {
   const int most = std::min(n, 255);
   std::vector<uint8_t> distances(holds.size(), static_cast<uint8_t>(most));
   for (int distance = 0; distance < most; ++distance) {
@@ -53,7 +53,7 @@ inline void makeVolume(VolumePart& part, const MadeVolume& made) {
       for (uint32_t x = 0; x < cells; ++x) holds.push_back(made.mayHoldSomething({x, y, z}));
     }
   }
-  part.distances = chebyshevDistances(holds, static_cast<int>(cells));
+  part.distances = madeDistances(holds, static_cast<int>(cells));
   // The cells where samples of a macroblock can lie: from half a voxel behind its first to half behind the next one's.
   const auto cellRange = [&](uint32_t block, uint32_t& first, uint32_t& last) {
     const double perVoxel = static_cast<double>(cells) / part.voxels;

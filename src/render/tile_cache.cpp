@@ -9,13 +9,13 @@
 
 namespace tessera {
 
-TileCache::TileCache(const TileTree& tree, uint64_t budgetBytes, Loader loader)
-    : tree_(tree), budget_(budgetBytes), loader_(std::move(loader)) {
+TileCache::TileCache(const TileTree& tree, uint64_t budgetBytes, TileSource source)
+    : budget_(budgetBytes), source_(std::move(source)) {
   tree.check();
   std::vector<int> pinned = tree.coarsest();
   if (tree.surround >= 0) pinned.push_back(tree.surround);
   uint64_t bytes = 0;
-  for (const int tile : pinned) bytes += tree.tiles[tile].contentBytes;
+  for (const int tile : pinned) bytes += bytesOf(tile);
   if (bytes > budget_) {
     throw Error("scene", "",
                 fmt::format("its coarsest level takes {} bytes of memory, the budget is {}", bytes, budget_),
@@ -35,7 +35,7 @@ const VolumeContent* TileCache::find(int tile) {
 bool TileCache::load(std::span<const int> tiles, std::span<const int> kept) {
   uint64_t wanted = 0;
   for (const int tile : tiles) {
-    if (!holds(tile)) wanted += tree_.tiles[tile].contentBytes;
+    if (!holds(tile)) wanted += bytesOf(tile);
   }
   const auto stays = [&](int tile) {
     return contents_.at(tile).pinned || std::find(kept.begin(), kept.end(), tile) != kept.end() ||
@@ -59,16 +59,22 @@ bool TileCache::load(std::span<const int> tiles, std::span<const int> kept) {
   return true;
 }
 
+uint64_t TileCache::bytesOf(int tile) {
+  const auto known = bytes_.find(tile);
+  if (known != bytes_.end()) return known->second;
+  return bytes_[tile] = source_.bytes(tile);
+}
+
 void TileCache::insert(int tile, bool pinned) {
-  const uint64_t allowed = tree_.tiles[tile].contentBytes;
+  const uint64_t allowed = bytesOf(tile);
   Entry entry;
-  entry.content = loader_(tile);
+  entry.content = source_.load(tile);
   entry.bytes = bytesInMemory(entry.content);
   entry.pinned = pinned;
   if (entry.bytes > allowed) {
     throw Error(fmt::format("content of tile {}", tile), "",
-                fmt::format("takes {} bytes of memory, its tileset says {}", entry.bytes, allowed),
-                "bake the scene again");
+                fmt::format("takes {} bytes of memory, its file said {}", entry.bytes, allowed),
+                "leave a scene alone while it is drawn");
   }
   uses_.push_front(tile);
   entry.use = uses_.begin();

@@ -18,19 +18,23 @@ struct TileCacheStatistics {
   uint64_t refusals = 0;  // of requests for which there was no room
 };
 
+// Where contents come from. Both may throw Error.
+struct TileSource {
+  std::function<uint64_t(int tile)> bytes;  // that it takes in memory (bytesInMemory), found out without loading it
+  std::function<VolumeContent(int tile)> load;
+};
+
 class TileCache {
  public:
-  using Loader = std::function<VolumeContent(int tile)>;
-
-  // Loads what must stay. Throws Error where that alone is more than `budgetBytes`. Keeps a reference to `tree`.
-  TileCache(const TileTree& tree, uint64_t budgetBytes, Loader loader);
+  // Loads what must stay. Throws Error where that alone is more than `budgetBytes`.
+  TileCache(const TileTree& tree, uint64_t budgetBytes, TileSource source);
 
   bool holds(int tile) const { return contents_.contains(tile); }
   // Null where it is not in memory. Counts as a use; the content stays where it is until it is evicted.
   const VolumeContent* find(int tile);
 
   // Loads those that are missing, all or, where there is no room for all, none; evicts what is neither among them nor
-  // in `kept`. Throws Error where a content is larger than its tile says.
+  // in `kept`. Throws Error where a content is larger than its source said.
   bool load(std::span<const int> tiles, std::span<const int> kept);
 
   uint64_t budgetBytes() const { return budget_; }
@@ -43,12 +47,13 @@ class TileCache {
     bool pinned = false;
     std::list<int>::iterator use;
   };
+  uint64_t bytesOf(int tile);
   void insert(int tile, bool pinned);
   void evict(int tile);
 
-  const TileTree& tree_;
   uint64_t budget_;
-  Loader loader_;
+  TileSource source_;
+  std::unordered_map<int, uint64_t> bytes_;  // as far as known
   std::unordered_map<int, Entry> contents_;
   std::list<int> uses_;  // the latest first
   TileCacheStatistics statistics_;

@@ -21,6 +21,10 @@ VolumeContent contentOfBytes(uint64_t bytes) {
 
 constexpr uint64_t kBytes = 2000;
 
+TileSource sourceOf(std::function<VolumeContent(int)> load) {
+  return {[](int) { return kBytes; }, std::move(load)};
+}
+
 TEST(TileCache, CountsAllThatAContentHolds) {
   VolumeContent content;
   const uint64_t before = bytesInMemory(content);
@@ -36,14 +40,14 @@ TEST(TileCache, CountsAllThatAContentHolds) {
 }
 
 TEST(TileCache, NeverHoldsMoreThanItsBudgetUnderRandomAccess) {
-  const TileTree tree = madeTree(4, 4, kBytes);
+  const TileTree tree = madeTree(4, 4);
   const RandomStream random(1, 1);
   for (const uint64_t budget : {kBytes, 3 * kBytes, 7 * kBytes + 5, 100 * kBytes}) {
     uint64_t loads = 0;
-    TileCache cache(tree, budget, [&](int) {
-      ++loads;
-      return contentOfBytes(kBytes);
-    });
+    TileCache cache(tree, budget, sourceOf([&](int) {
+                      ++loads;
+                      return contentOfBytes(kBytes);
+                    }));
     uint64_t found = 0;
     for (uint64_t i = 0; i < 3000; ++i) {
       std::vector<int> tiles, kept;
@@ -85,8 +89,8 @@ TEST(TileCache, NeverHoldsMoreThanItsBudgetUnderRandomAccess) {
 }
 
 TEST(TileCache, EvictsWhatHasNotBeenUsedForLongest) {
-  const TileTree tree = madeTree(4, 4, kBytes);
-  TileCache cache(tree, 4 * kBytes, [](int) { return contentOfBytes(kBytes); });
+  const TileTree tree = madeTree(4, 4);
+  TileCache cache(tree, 4 * kBytes, sourceOf([](int) { return contentOfBytes(kBytes); }));
   EXPECT_TRUE(cache.load(std::vector<int>{1, 2, 3}, {}));
   cache.find(1);
   EXPECT_TRUE(cache.load(std::vector<int>{4}, {}));
@@ -98,8 +102,8 @@ TEST(TileCache, EvictsWhatHasNotBeenUsedForLongest) {
 }
 
 TEST(TileCache, LoadsAllOfARequestOrNothing) {
-  const TileTree tree = madeTree(4, 4, kBytes);
-  TileCache cache(tree, 4 * kBytes, [](int) { return contentOfBytes(kBytes); });
+  const TileTree tree = madeTree(4, 4);
+  TileCache cache(tree, 4 * kBytes, sourceOf([](int) { return contentOfBytes(kBytes); }));
   EXPECT_TRUE(cache.load(std::vector<int>{1, 2}, {}));
   EXPECT_FALSE(cache.load(std::vector<int>{3, 4, 5, 6}, {}));
   EXPECT_FALSE(cache.load(std::vector<int>{3, 4}, std::vector<int>{1, 2}));
@@ -111,30 +115,29 @@ TEST(TileCache, LoadsAllOfARequestOrNothing) {
 }
 
 TEST(TileCache, SaysHowMuchTheCoarsestLevelAndTheSurroundNeed) {
-  TileTree tree = madeTree(2, 2, kBytes);
+  TileTree tree = madeTree(2, 2);
   tree.surround = static_cast<int>(tree.tiles.size());
   tree.tiles.push_back({});
-  tree.tiles.back().contentBytes = kBytes;
   int loads = 0;
-  const auto loader = [&](int) {
+  const TileSource source = sourceOf([&](int) {
     ++loads;
     return contentOfBytes(kBytes);
-  };
+  });
   try {
-    TileCache(tree, 2 * kBytes - 1, loader);
+    TileCache(tree, 2 * kBytes - 1, source);
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("4000 bytes"), std::string::npos) << error.what();
   }
   EXPECT_EQ(loads, 0);
-  const TileCache cache(tree, 2 * kBytes, loader);
+  const TileCache cache(tree, 2 * kBytes, source);
   EXPECT_TRUE(cache.holds(tree.surround));
   EXPECT_TRUE(cache.holds(0));
 }
 
-TEST(TileCache, RefusesAContentThatIsLargerThanItsTileSays) {
-  const TileTree tree = madeTree(2, 2, kBytes);
-  TileCache cache(tree, 100 * kBytes, [](int tile) { return contentOfBytes(kBytes + (tile == 2 ? 1 : 0)); });
+TEST(TileCache, RefusesAContentThatIsLargerThanItsSourceSaid) {
+  const TileTree tree = madeTree(2, 2);
+  TileCache cache(tree, 100 * kBytes, sourceOf([](int tile) { return contentOfBytes(kBytes + (tile == 2 ? 1 : 0)); }));
   EXPECT_THROW(cache.load(std::vector<int>{1, 2}, {}), Error);
   EXPECT_TRUE(cache.holds(1));
   EXPECT_FALSE(cache.holds(2));

@@ -82,10 +82,10 @@ TileSelector::TileSelector(const TileTree& tree, SelectionSettings settings)
   CHECK(settings.hysteresis >= 1.0);
 }
 
-// Adds tiles to the cut that cover this one; false where there are none in memory.
-bool TileSelector::cover(Pass& pass, int tile) {
+// Adds tiles to the cut that cover this one. Where there are none in memory: false, and adds those that would do.
+bool TileSelector::cover(Pass& pass, int tile, std::vector<int>& missing) {
   const TileNode& node = tree_.tiles[tile];
-  if (!pass.view.sees(node)) {
+  if (!pass.view.sees(node) || (!node.hasContent && node.children.empty())) {
     pass.selection.cut.push_back({tile, false});
     return true;
   }
@@ -101,13 +101,18 @@ bool TileSelector::cover(Pass& pass, int tile) {
   if (!node.children.empty() && (replaced || !loaded)) {
     Selection& made = pass.selection;
     const size_t cutBefore = made.cut.size(), requestsBefore = made.requests.size();
-    std::vector<int> missing;
+    std::vector<int> missingBelow;
+    bool covered = true;
     for (const int child : tree_.childrenFrontToBack(tile, pass.view.eye)) {
-      if (!cover(pass, child)) missing.push_back(child);
+      covered &= cover(pass, child, missingBelow);
     }
-    if (missing.empty()) {
+    if (covered) {
       if (!replaced) pass.request({tile}, {}, node, settings_.mostPixels);  // finer than need be
       return true;
+    }
+    if (!node.hasContent) {
+      missing.insert(missing.end(), missingBelow.begin(), missingBelow.end());
+      return false;  // what covers other children stays in the cut for whoever asks what to keep
     }
     std::vector<int> beside;
     for (size_t i = cutBefore; i < made.cut.size(); ++i) {
@@ -115,16 +120,21 @@ bool TileSelector::cover(Pass& pass, int tile) {
     }
     made.cut.resize(cutBefore);
     made.requests.resize(requestsBefore);
-    if (loaded) pass.request(std::move(missing), std::move(beside), node, settings_.mostPixels);
+    if (loaded) pass.request(std::move(missingBelow), std::move(beside), node, settings_.mostPixels);
   }
-  if (loaded) pass.selection.cut.push_back({tile, true});
+  if (loaded) {
+    pass.selection.cut.push_back({tile, true});
+  } else {
+    missing.push_back(tile);
+  }
   return loaded;
 }
 
 Selection TileSelector::select(const TileView& view, const std::function<bool(int)>& loaded) {
   for (const int tile : tree_.coarsest()) CHECK(loaded(tile) == true);
   Pass pass{view, loaded, {}};
-  CHECK(cover(pass, 0) == true);
+  std::vector<int> missing;
+  CHECK(cover(pass, 0, missing) == true);
   std::stable_sort(pass.selection.requests.begin(), pass.selection.requests.end(),
                    [](const TileRequest& a, const TileRequest& b) {
                      return a.priority != b.priority ? a.priority > b.priority : a.distance < b.distance;

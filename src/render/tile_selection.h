@@ -43,7 +43,7 @@ TileView tileView(const Camera& camera, const Pose& worldFromCamera, const Volum
 
 struct SelectedTile {
   int tile = 0;
-  bool visible = true;  // what is not need not be in memory
+  bool visible = true;  // what is not, or has no content, need not be in memory
 };
 
 // Tiles that must be loaded together for the cut to change.
@@ -69,7 +69,7 @@ class TileSelector {
 
  private:
   struct Pass;
-  bool cover(Pass& pass, int tile);
+  bool cover(Pass& pass, int tile, std::vector<int>& missing);
 
   const TileTree& tree_;
   SelectionSettings settings_;

@@ -55,9 +55,12 @@ const auto kAll = [](int) { return true; };
 
 TEST(TileSelection, IsAPartitionOfTheRootForAllCamerasAndWhateverIsLoaded) {
   for (const auto& [columns, rows] : {std::pair(8, 8), std::pair(5, 3), std::pair(1, 1)}) {
-    const TileTree tree = madeTree(columns, rows);
-    TileSelector selector(tree, {});
+    TileTree tree = madeTree(columns, rows);
     const RandomStream random(1, 1);
+    for (size_t tile = 1; tile < tree.tiles.size(); ++tile) {  // some stand for nothing, or for what is below
+      tree.tiles[tile].hasContent = random.uniform(tile) < 0.85f;
+    }
+    TileSelector selector(tree, {});
     std::set<size_t> sizes;
     for (uint64_t i = 0; i < 600; ++i) {
       const auto loaded = [&](int tile) { return tile == 0 || i % 3 == 0 || random.uniform(1000 * i + tile) < 0.7; };
@@ -66,11 +69,15 @@ TEST(TileSelection, IsAPartitionOfTheRootForAllCamerasAndWhateverIsLoaded) {
       for (const SelectedTile& selected : selection.cut) {
         if (selected.visible) {
           EXPECT_TRUE(loaded(selected.tile));
+          EXPECT_TRUE(tree.tiles[selected.tile].hasContent);
         }
       }
       for (const TileRequest& request : selection.requests) {
         EXPECT_FALSE(request.tiles.empty());
-        for (const int tile : request.tiles) EXPECT_FALSE(loaded(tile));
+        for (const int tile : request.tiles) {
+          EXPECT_FALSE(loaded(tile));
+          EXPECT_TRUE(tree.tiles[tile].hasContent);
+        }
       }
       sizes.insert(selection.cut.size());
     }
@@ -188,6 +195,23 @@ TEST(TileSelection, StopsAtTheFinestLevelThatIsAllowed) {
       selector.select(tileView(smallCamera(), lookingAt(Vec3d(0, 0, 30), Vec3d(0, 0, 0)), {}), kAll);
   EXPECT_EQ(selection.cut.size(), 4u);
   for (const SelectedTile& selected : selection.cut) EXPECT_EQ(tree.tiles[selected.tile].level, 1);
+}
+
+TEST(TileSelection, AsksForWhatIsBelowATileWithoutContent) {
+  TileTree tree = madeTree(4, 4);
+  const int middle = tree.tiles[0].children[0];
+  tree.tiles[middle].hasContent = false;
+  const int empty = tree.tiles[middle].children[3];
+  tree.tiles[empty].hasContent = false;
+  TileSelector selector(tree, {});
+  const TileView view = tileView(smallCamera(), lookingAt(Vec3d(0, 0, 4.5), Vec3d(0, 0, 0)), {});
+  const Selection selection = selector.select(view, [&](int tile) { return tree.tiles[tile].parent <= 0; });
+  EXPECT_EQ(selection.cut.size(), 1u);
+  ASSERT_FALSE(selection.requests.empty());
+  const std::vector<int>& tiles = selection.requests[0].tiles;
+  EXPECT_EQ(std::set<int>(tiles.begin(), tiles.end()),
+            std::set<int>(tree.tiles[middle].children.begin(), tree.tiles[middle].children.end() - 1));
+  EXPECT_EQ(selection.requests[0].beside.size(), 3u);
 }
 
 TEST(TileSelection, DrawsFinerTilesThanAskedForRatherThanNone) {

@@ -22,6 +22,7 @@ TEST(TileTree, OrdersTilesAsEveryRayFromTheEyeCrossesThem) {
   TileTree flat = madeTree(8, 8);  // the same leaves, all children of one root
   {
     TileTree tree;
+    tree.columns = tree.rows = 8;
     tree.tiles.push_back(flat.tiles[0]);
     tree.tiles[0].children.clear();
     for (const TileNode& node : flat.tiles) {
@@ -55,19 +56,21 @@ TEST(TileTree, OrdersTilesAsEveryRayFromTheEyeCrossesThem) {
   EXPECT_GT(crossings, 5000u);
 }
 
-TEST(TileTree, OrdersColumnsOfDifferentWidths) {
+TEST(TileTree, OrdersColumnsOfDifferentWidthsWhateverTheirBoxes) {
   TileTree tree;
+  tree.columns = 10;
   tree.tiles.resize(4);
-  tree.tiles[0] = {-1, {1, 2, 3}, Vec3d(0, 0, 0), Vec3d(10, 1, 1)};
-  const double starts[] = {6, 0, 5}, ends[] = {10, 5, 6};
+  tree.tiles[0].children = {1, 2, 3};
+  tree.tiles[0].cells = {0, 0, 10, 1};
+  const int first[] = {6, 0, 5}, end[] = {10, 5, 6};
   for (int i = 0; i < 3; ++i) {
     tree.tiles[i + 1].parent = 0;
-    tree.tiles[i + 1].low = Vec3d(starts[i], 0, 0);
-    tree.tiles[i + 1].high = Vec3d(ends[i], 1, 1);
+    tree.tiles[i + 1].cells = {first[i], 0, end[i], 1};
   }
-  EXPECT_EQ(tree.childrenFrontToBack(0, Vec3d(-5, 0, 0)), (std::vector<int>{2, 3, 1}));
-  EXPECT_EQ(tree.childrenFrontToBack(0, Vec3d(15, 0, 0)), (std::vector<int>{1, 3, 2}));
-  EXPECT_EQ(tree.childrenFrontToBack(0, Vec3d(5.5, 0, 0)), (std::vector<int>{3, 1, 2}));
+  tree.check();
+  EXPECT_EQ(tree.childrenFrontToBack(0, Vec3d(-50, 0, 0)), (std::vector<int>{2, 3, 1}));
+  EXPECT_EQ(tree.childrenFrontToBack(0, Vec3d(50, 0, 0)), (std::vector<int>{1, 3, 2}));
+  EXPECT_EQ(tree.childrenFrontToBack(0, Vec3d(1, 0, 0)), (std::vector<int>{3, 1, 2}));  // in cell 5
 }
 
 TEST(TileTree, HasTheTopmostContentsForItsCoarsest) {
@@ -75,6 +78,9 @@ TEST(TileTree, HasTheTopmostContentsForItsCoarsest) {
   EXPECT_EQ(tree.coarsest(), (std::vector<int>{0}));
   tree.tiles[0].hasContent = false;
   EXPECT_EQ(tree.coarsest(), tree.tiles[0].children);
+  tree.tiles[0].hasContent = true;
+  tree.tiles[tree.tiles[0].children[1]].hasContent = false;
+  EXPECT_EQ(tree.coarsest(), (std::vector<int>{0}));
 }
 
 }  // namespace

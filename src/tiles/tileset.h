@@ -66,7 +66,6 @@ struct TileContent {
   bool surround = false;
   std::vector<uint32_t> resources;  // of Tileset::resources, that it cannot be drawn without
   uint64_t bytes = 0;               // of the file, 0 when not known; a hint
-  uint64_t memoryBytes = 0;         // of the content in memory, 0 when not known; a promise not to take more
 };
 
 struct Tile {

@@ -46,7 +46,6 @@ Json contentOf(const Tileset& tileset, const Tile& tile, const TileContent& cont
   addBox(ours, content.box);
   if (!content.resources.empty()) ours["resources"] = content.resources;
   if (content.bytes > 0) ours["bytes"] = content.bytes;
-  if (content.memoryBytes > 0) ours["memoryBytes"] = content.memoryBytes;
   return {{"uri", content.uri},
           {"boundingVolume", volumeOf(tileset, content.box)},
           {"extensions", {{kExtension, std::move(ours)}}}};

@@ -46,8 +46,8 @@ std::optional<CellRange> cellsOf(const json& object) {
 }
 
 // Sizes are hints; one that is no number is none.
-uint64_t bytesOf(const json& object, const char* name = "bytes") {
-  const json* field = fieldOf(object, name);
+uint64_t bytesOf(const json& object) {
+  const json* field = fieldOf(object, "bytes");
   return field ? unsignedFrom(*field, uint64_t{1} << 53).value_or(0) : 0;
 }
 
@@ -228,7 +228,6 @@ class TilesetReader {
     content.box = *box;
     content.surround = flagOf(*ours, "surround").value_or(false);
     content.bytes = bytesOf(*ours);
-    content.memoryBytes = bytesOf(*ours, "memoryBytes");
     content.cells = tile.cells;
     if (fieldOf(*ours, "cells")) {
       const auto cells = cellsOf(*ours);

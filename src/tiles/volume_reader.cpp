@@ -68,6 +68,13 @@ class VolumeReader {
     return std::move(content_);
   }
 
+  std::optional<uint64_t> readBytes() {
+    if (!readRanges() || !readNetwork() || !readHeaders()) return std::nullopt;
+    uint64_t bytes = bytesInMemory(content_);
+    for (const PartHeader& header : headers_) bytes += sizeof(VolumePart) + header.bytes();
+    return bytes;
+  }
+
  private:
   bool fail(const std::string& reason) {
     if (reason_.empty()) reason_ = reason;
@@ -216,6 +223,13 @@ std::optional<VolumeContent> decodeVolume(std::span<const std::byte> file, std::
   const auto content = decodeContentFile(file, Representation::volume, reason);
   if (!content) return std::nullopt;
   return VolumeReader(*content, reason, limits).read();
+}
+
+std::optional<uint64_t> decodedBytes(std::span<const std::byte> file, std::string& reason, const VolumeLimits& limits) {
+  reason.clear();
+  const auto content = decodeContentFile(file, Representation::volume, reason);
+  if (!content) return std::nullopt;
+  return VolumeReader(*content, reason, limits).readBytes();
 }
 
 VolumeContent readVolume(const fs::path& path, const VolumeLimits& limits) {

@@ -44,7 +44,9 @@ ContentComposite VolumeRayCaster::march(const Placed& placed, const SceneRay& ra
 BlendedRay VolumeRayCaster::cast(const SceneRay& ray, double far, MarchCounts& counts) {
   const VolumeFrame& frame = drawing_.frame;
   BlendedRay blended;
-  const RayRange whole{frame.near, std::min(far, VolumeFrame::kSceneEnd)};
+  // Nothing is met in front of the box.
+  const RayRange box = clipToBox(ray, frame.low, frame.high, {frame.near, INFINITY});
+  const RayRange whole{box.empty() ? frame.near : box.near, std::min(far, VolumeFrame::kSceneEnd)};
   if (whole.empty()) return blended;
   const std::array<float, 27> direction = encodeDirection(ray.direction);
   const auto add = [&](const Placed& placed) {
@@ -66,8 +68,7 @@ BlendedRay VolumeRayCaster::cast(const SceneRay& ray, double far, MarchCounts& c
     if (!parts_.empty()) add(placed);
   }
   if (!surround_.empty() && blended.transmittance >= drawing_.march.minTransmittance) {
-    const RayRange box = clipToBox(ray, frame.low, frame.high, {frame.near, INFINITY});
-    const RayRange behind{box.empty() ? whole.near : box.far, whole.far};
+    const RayRange behind{box.empty() ? frame.near : box.far, whole.far};
     parts_.assign(1, {&surround_[0].content->parts[0], behind});
     if (!behind.empty()) add(surround_[0]);
   }

@@ -259,6 +259,29 @@ TEST(DrawVolume, SeesTheSurroundOnlyBehindTheBox) {
   EXPECT_GT(alone, 500);
 }
 
+TEST(DrawVolume, SeesBlocksThatOwnWhatLiesOutsideFromWhereTheBoxIsEntered) {
+  VolumePart part;
+  part.contracted = true;
+  part.low = {0, -INFINITY, -INFINITY};
+  part.high = {INFINITY, INFINITY, INFINITY};
+  part.voxels = 32;
+  part.planes = 64;
+  makeSolid(
+      part, [](const Vec3d&) { return true; }, [](const Vec3d&) { return Vec3d(0.1, 0.2, 0.8); });
+  const VolumeContent border = contentOf({part});
+  VolumeDrawing drawing{{}, {&border}, nullptr, {}};
+  VolumeRayCaster caster(drawing);
+  MarchCounts counts;
+  const auto depthOf = [&](const Vec3d& origin, const Vec3d& target) {
+    const BlendedRay ray = caster.cast({origin, (target - origin).normalized()}, INFINITY, counts);
+    return ray.depth / (1 - ray.transmittance);
+  };
+  EXPECT_NEAR(depthOf(Vec3d(5, 0, 0), Vec3d(0, 0, 0)), 4, 0.1);           // the box, though it owns what is in front
+  EXPECT_NEAR(depthOf(Vec3d(0.5, 0.1, 0), Vec3d(5, 0.1, 0)), 0.05, 0.1);  // from within
+  EXPECT_NEAR(depthOf(Vec3d(-5, 3, 0), Vec3d(5, 3, 0)), 5, 0.3);          // past the box: what it owns
+  EXPECT_NEAR(depthOf(Vec3d(-0.5, 0, 0), Vec3d(0.5, 0, 0)), 0.5, 0.1);
+}
+
 TEST(DrawVolume, EndsAtOpaqueThings) {
   const RenderedView free = drawn(village().drawing());
   ImageF opaque(camera().width, camera().height, 1, INFINITY);

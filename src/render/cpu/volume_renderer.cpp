@@ -6,12 +6,12 @@
 
 namespace tessera {
 
-VolumeRenderer::VolumeRenderer(const VolumeFrame& frame, TileTree tree, TileCache::Loader loader,
+VolumeRenderer::VolumeRenderer(const VolumeFrame& frame, TileTree tree, TileSource source,
                                const VolumeRendererSettings& settings)
     : frame_(frame),
       tree_(std::move(tree)),
       settings_(settings),
-      cache_(tree_, settings.budgetBytes, std::move(loader)),
+      cache_(tree_, settings.budgetBytes, std::move(source)),
       selector_(tree_, settings.selection),
       pool_(settings.threads) {}
 
@@ -50,7 +50,7 @@ RenderedView VolumeRenderer::render(const Camera& camera, const Pose& worldFromC
   return drawVolume(drawing, camera, worldFromCamera, opaqueDepth, pool_, &counts_);
 }
 
-TileTree flatTileTree(const std::vector<VolumeContent>& contents, const VolumeContent* surround) {
+TileTree flatTileTree(const std::vector<VolumeContent>& contents, bool withSurround) {
   TileTree tree;
   TileNode root;
   root.hasContent = false;
@@ -67,17 +67,22 @@ TileTree flatTileTree(const std::vector<VolumeContent>& contents, const VolumeCo
       node.low = node.low.cwiseMin(Eigen::Map<const Vec3f>(part.low.data()).cast<double>());
       node.high = node.high.cwiseMax(Eigen::Map<const Vec3f>(part.high.data()).cast<double>());
     }
-    node.contentBytes = bytesInMemory(content);
     tree.tiles[0].low = tree.tiles[0].low.cwiseMin(node.low);
     tree.tiles[0].high = tree.tiles[0].high.cwiseMax(node.high);
     tree.tiles[0].children.push_back(static_cast<int>(tree.tiles.size()));
     tree.tiles.push_back(node);
   }
-  if (surround != nullptr) {
+  TileNode& whole = tree.tiles[0];
+  tree.columns = static_cast<int>(std::lround(0.5 * (whole.high.x() - whole.low.x())));
+  tree.rows = static_cast<int>(std::lround(0.5 * (whole.high.y() - whole.low.y())));
+  for (TileNode& node : tree.tiles) {
+    const auto cell = [](double x, double from) { return static_cast<int>(std::lround(0.5 * (x - from))); };
+    node.cells = {cell(node.low.x(), whole.low.x()), cell(node.low.y(), whole.low.y()),
+                  cell(node.high.x(), whole.low.x()), cell(node.high.y(), whole.low.y())};
+  }
+  if (withSurround) {
     tree.surround = static_cast<int>(tree.tiles.size());
-    TileNode node;
-    node.contentBytes = bytesInMemory(*surround);
-    tree.tiles.push_back(node);
+    tree.tiles.emplace_back();
   }
   return tree;
 }

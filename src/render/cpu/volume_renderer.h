@@ -19,10 +19,9 @@ struct VolumeRendererSettings {
 
 class VolumeRenderer final : public ViewRenderer {
  public:
-  // `loader` gives a tile's content. Throws Error where the coarsest level does not fit into the budget, and in
-  // render() what the loader throws.
-  VolumeRenderer(const VolumeFrame& frame, TileTree tree, TileCache::Loader loader,
-                 const VolumeRendererSettings& settings);
+  // Throws Error where the coarsest level does not fit into the budget, and in
+  // render() what the source throws.
+  VolumeRenderer(const VolumeFrame& frame, TileTree tree, TileSource source, const VolumeRendererSettings& settings);
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
   std::string device() const override;
@@ -45,8 +44,8 @@ class VolumeRenderer final : public ViewRenderer {
   MarchCounts counts_;
 };
 
-// A tree of contents side by side, without levels: a tile without content over one tile for each, in their order. Their
-// boxes are what their parts own and must be cells of a grid.
-TileTree flatTileTree(const std::vector<VolumeContent>& contents, const VolumeContent* surround = nullptr);
+// A tree of contents side by side, without levels: a tile without content over one tile for each, in their order, and
+// one for the surround, the last. Their boxes are what their parts own and must be cells (of edge 2) amid the origin.
+TileTree flatTileTree(const std::vector<VolumeContent>& contents, bool withSurround = false);
 
 }  // namespace tessera

@@ -36,10 +36,10 @@ struct Place {
       }
       contents.push_back(contentOf(std::move(parts), randomNetwork(i)));
       node.geometricError = 2.0 / 64 * (1 << node.level);
-      node.contentBytes = bytesInMemory(contents.back());
-      allBytes += node.contentBytes;
-      if (node.parent < 0) coarsestBytes = node.contentBytes;
-      if (node.level == 0) finestBytes += node.contentBytes;
+      const uint64_t bytes = bytesInMemory(contents.back());
+      allBytes += bytes;
+      if (node.parent < 0) coarsestBytes = bytes;
+      if (node.level == 0) finestBytes += bytes;
     }
     VolumePart around;
     around.contracted = around.surround = true;
@@ -50,13 +50,12 @@ struct Place {
     contents.push_back(contentOf({around}, randomNetwork(1000)));
     tree.surround = static_cast<int>(tree.tiles.size());
     tree.tiles.push_back({});
-    tree.tiles.back().contentBytes = bytesInMemory(contents.back());
-    allBytes += tree.tiles.back().contentBytes;
-    coarsestBytes += tree.tiles.back().contentBytes;
+    allBytes += bytesInMemory(contents.back());
+    coarsestBytes += bytesInMemory(contents.back());
   }
 
-  TileCache::Loader loader() const {
-    return [this](int tile) { return contents[tile]; };
+  TileSource source() const {
+    return {[this](int tile) { return bytesInMemory(contents[tile]); }, [this](int tile) { return contents[tile]; }};
   }
 };
 
@@ -99,7 +98,7 @@ TEST(VolumeRenderer, NeverExceedsAQuarterOfTheFinestLevelAndNeverLacksTheCoarses
   ASSERT_LT(place().coarsestBytes, budget);
   VolumeRendererSettings settings = settingsWith(budget);
   settings.selection.mostPixels = 0.2;  // of a small picture
-  VolumeRenderer renderer(place().frame, place().tree, place().loader(), settings);
+  VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
   std::set<int> drawn;
   for (int step = 0; step < 600; ++step) {
     renderer.render(camera().scaledTo(16, 12), poseAt(step), nullptr);
@@ -118,8 +117,8 @@ TEST(VolumeRenderer, DrawsTheSamePictureAsWithoutABudgetWhereWhatIsWantedFits) {
   for (const double pixels : {16.0, 1.5}) {
     VolumeRendererSettings settings = settingsWith(place().allBytes), tight = settingsWith(place().finestBytes / 3);
     settings.selection.mostPixels = tight.selection.mostPixels = pixels;
-    VolumeRenderer unbounded(place().frame, place().tree, place().loader(), settings);
-    VolumeRenderer bounded(place().frame, place().tree, place().loader(), tight);
+    VolumeRenderer unbounded(place().frame, place().tree, place().source(), settings);
+    VolumeRenderer bounded(place().frame, place().tree, place().source(), tight);
     int same = 0, frames = 0;
     for (int step = 0; step < 600; step += 20, ++frames) {
       const RenderedView a = unbounded.render(camera(), poseAt(step), nullptr);
@@ -143,7 +142,7 @@ TEST(VolumeRenderer, DrawsTheSamePictureAsWithoutABudgetWhereWhatIsWantedFits) {
 TEST(VolumeRenderer, DrawsTheFinestLevelWhereNoErrorIsAllowed) {
   VolumeRendererSettings settings = settingsWith(place().allBytes);
   settings.selection.mostPixels = 0;
-  VolumeRenderer renderer(place().frame, place().tree, place().loader(), settings);
+  VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
   const RenderedView view = renderer.render(camera(), poseAt(0), nullptr);
   std::vector<VolumeContent> finest;
   for (size_t i = 0; i < place().tree.tiles.size(); ++i) {
@@ -153,8 +152,9 @@ TEST(VolumeRenderer, DrawsTheFinestLevelWhereNoErrorIsAllowed) {
   }
   ASSERT_EQ(finest.size(), 16u);
   const VolumeContent& surround = place().contents.back();
-  const auto loader = [&](int tile) { return tile == 17 ? surround : finest[tile - 1]; };
-  VolumeRenderer flat(place().frame, flatTileTree(finest, &surround), loader, settings);
+  const auto contentAt = [&](int tile) -> const VolumeContent& { return tile == 17 ? surround : finest[tile - 1]; };
+  const TileSource source{[&](int tile) { return bytesInMemory(contentAt(tile)); }, contentAt};
+  VolumeRenderer flat(place().frame, flatTileTree(finest, true), source, settings);
   const RenderedView expected = flat.render(camera(), poseAt(0), nullptr);
   EXPECT_EQ(view.colour.pixels, expected.colour.pixels);
   EXPECT_EQ(view.opacity.pixels, expected.opacity.pixels);
@@ -166,7 +166,7 @@ TEST(VolumeRenderer, DrawsTheFinestLevelWhereNoErrorIsAllowed) {
 TEST(VolumeRenderer, OrdersMixedLevelsAsEachRayMeetsThem) {
   VolumeRendererSettings settings = settingsWith(place().allBytes);
   settings.selection.mostPixels = 1;
-  VolumeRenderer renderer(place().frame, place().tree, place().loader(), settings);
+  VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
   bool mixed = false;
   for (int step = 0; step < 600; step += 7) {
     renderer.render(camera().scaledTo(16, 12), poseAt(step), nullptr);
@@ -190,15 +190,15 @@ TEST(VolumeRenderer, OrdersMixedLevelsAsEachRayMeetsThem) {
 }
 
 TEST(VolumeRenderer, SaysWhatDrewAndWhatABudgetIsTooSmallFor) {
-  VolumeRenderer renderer(place().frame, place().tree, place().loader(), settingsWith(place().coarsestBytes));
+  VolumeRenderer renderer(place().frame, place().tree, place().source(), settingsWith(place().coarsestBytes));
   EXPECT_EQ(renderer.device().find("cpu "), 0u);
   EXPECT_NE(renderer.device().find("1 threads"), std::string::npos);
-  EXPECT_THROW(VolumeRenderer(place().frame, place().tree, place().loader(), settingsWith(place().coarsestBytes - 1)),
+  EXPECT_THROW(VolumeRenderer(place().frame, place().tree, place().source(), settingsWith(place().coarsestBytes - 1)),
                Error);
 }
 
 TEST(VolumeRenderer, IsTheSameEveryTime) {
-  VolumeRenderer renderer(place().frame, place().tree, place().loader(), settingsWith(place().allBytes));
+  VolumeRenderer renderer(place().frame, place().tree, place().source(), settingsWith(place().allBytes));
   const RenderedView first = renderer.render(camera(), poseAt(3), nullptr);
   renderer.render(camera(), poseAt(4), nullptr);
   const RenderedView again = renderer.render(camera(), poseAt(3), nullptr);

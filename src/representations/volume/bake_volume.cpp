@@ -286,10 +286,9 @@ BakedVolume bakeVolume(VolumeModel& model, const Capture& capture, const fs::pat
     TileContent entry;
     entry.uri = folder.addContent(0, name, bytes);
     entry.bytes = bytes.size();
-    entry.memoryBytes = bytesInMemory(content);
     entry.surround = surround;
     baked.bytesOnDisk += bytes.size();
-    baked.bytesInMemory += entry.memoryBytes;
+    baked.bytesInMemory += bytesInMemory(content);
     baked.macroblocks += content.parts[0].storedMacroblocks();
     const VolumePart& part = content.parts[0];
     entry.box = {Vec3d(part.low[0], part.low[1], part.low[2]), Vec3d(part.high[0], part.high[1], part.high[2])};

@@ -1,0 +1,74 @@
+#include "render/volume_scene.h"
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "tiles/scene_folder.h"
+#include "tiles/volume_payload.h"
+
+namespace tessera {
+
+VolumeFrame frameOf(const Tileset& tileset) {
+  VolumeFrame frame;
+  frame.rotation = tileset.worldFromScene.rotation;
+  frame.scale = tileset.worldFromScene.scale;
+  frame.translation = tileset.worldFromScene.translation;
+  frame.low = tileset.box().low;
+  frame.high = tileset.box().high;
+  frame.near = tileset.near;
+  return frame;
+}
+
+VolumeScene openVolumeScene(const fs::path& folder) {
+  const Tileset tileset = readTileset(folder);
+  const auto unsuitable = [&](const std::string& where, const std::string& why) {
+    return Error((folder / "tileset.json").string(), where, why, "draw it with a viewer that knows it");
+  };
+  if (tileset.representation != Representation::volume) {
+    throw unsuitable("", fmt::format("is a scene of {}, not of volume", nameOf(tileset.representation)));
+  }
+  VolumeScene scene;
+  scene.frame = frameOf(tileset);
+  scene.background = tileset.background;
+  scene.tree.columns = static_cast<int>(tileset.columns);
+  scene.tree.rows = static_cast<int>(tileset.rows);
+  const double metres = tileset.tileFromScene().scale;  // of one scene unit
+  std::vector<fs::path> files(tileset.tiles.size());
+  fs::path surround;
+  for (size_t i = 0; i < tileset.tiles.size(); ++i) {
+    const Tile& tile = tileset.tiles[i];
+    TileNode node;
+    node.cells = {static_cast<int>(tile.cells.first[0]), static_cast<int>(tile.cells.first[1]),
+                  static_cast<int>(tile.cells.end[0]), static_cast<int>(tile.cells.end[1])};
+    node.low = tile.box.low;
+    node.high = tile.box.high;
+    node.geometricError = tile.geometricError / metres;
+    node.level = static_cast<int>(tile.level);
+    node.children.assign(tile.children.begin(), tile.children.end());
+    node.hasContent = false;
+    for (const TileContent& content : tile.contents) {
+      if (!content.surround && node.hasContent) throw unsuitable(fmt::format("tile {}", i), "has several contents");
+      node.hasContent |= !content.surround;
+      (content.surround ? surround : files[i]) = contentPath(folder, content.uri);
+    }
+    scene.tree.tiles.push_back(std::move(node));
+  }
+  for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
+    for (const int child : scene.tree.tiles[i].children) scene.tree.tiles[child].parent = static_cast<int>(i);
+  }
+  if (!surround.empty()) {
+    scene.tree.surround = static_cast<int>(files.size());
+    scene.tree.tiles.emplace_back();
+    files.push_back(surround);
+  }
+  scene.source.bytes = [files](int tile) {
+    std::string reason;
+    const auto bytes = decodedBytes(readFile(files[tile]), reason);
+    if (!bytes) throw Error(files[tile].string(), "", reason, "copy the scene again, or bake it again");
+    return *bytes;
+  };
+  scene.source.load = [files](int tile) { return readVolume(files[tile]); };
+  return scene;
+}
+
+}  // namespace tessera

@@ -1,0 +1,23 @@
+// A `volume` scene's folder as renderers need it: the frame, the tree, and where contents come from.
+#pragma once
+
+#include "base/file.h"
+#include "render/tile_cache.h"
+#include "render/volume_frame.h"
+#include "tiles/tileset.h"
+
+namespace tessera {
+
+struct VolumeScene {
+  VolumeFrame frame;
+  TileTree tree;      // tiles are numbered as those of tileset.json; the surround, if there is one, comes last
+  TileSource source;  // reads files when asked
+  std::array<float, 3> background = {0, 0, 0};
+};
+
+// Throws Error where the folder holds no scene, one of another representation, or a tile with several contents.
+VolumeScene openVolumeScene(const fs::path& folder);
+
+VolumeFrame frameOf(const Tileset& tileset);
+
+}  // namespace tessera
