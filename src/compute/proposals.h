@@ -6,10 +6,10 @@
 
 namespace tessera {
 
-// New fence posts where the old histogram has weight. Per ray: p_j ∝ (1 - padding) · w_j^anneal / Σ w^anneal + padding
+// New fence posts where the old histogram has weight. Per ray: p_j = (1 - padding) · w_j^anneal / Σ w^anneal + padding
 // / before (with Σ = 0: evenly over the intervals), the cumulative sum clamped to exactly 0 and 1 at its ends; the new
-// posts are its piecewise linear inverse at u_i = (i + jitter) / (after + 1), i in [0, after]. Positions have no
-// gradient.
+// posts are its piecewise linear inverse at u_i = (i + jitter - ½) / after. The first and the last are those of before:
+// no part of a ray goes unseen, or what it holds would never be learned. Positions have no gradient.
 struct ResampleFences {
   Count rays;
   uint32_t before = 64, after = 32;  // intervals

@@ -69,7 +69,7 @@ TEST_P(Proposals, AreResampledEvenlyWhereWeightsAreEqualOrNone) {
     for (float anneal : {1.0f, 0.3f}) {
       const std::vector<float> fences = resampled(evenFences(64), std::vector<float>(64, weight), 32, anneal);
       ASSERT_EQ(fences.size(), 33u);
-      for (size_t i = 0; i < fences.size(); ++i) EXPECT_NEAR(fences[i], (static_cast<double>(i) + 0.5) / 33, 1e-6);
+      for (size_t i = 0; i < fences.size(); ++i) EXPECT_NEAR(fences[i], static_cast<double>(i) / 32, 1e-6);
     }
 }
 
@@ -80,11 +80,11 @@ TEST_P(Proposals, PutNearlyAllFencesIntoTheOneHeavyBin) {
     const std::vector<float> fences = resampled(evenFences(64), weights, 300);
     const float from = static_cast<float>(heavy) / 64, to = from + 1.0f / 64;
     const auto within = std::count_if(fences.begin(), fences.end(), [&](float s) { return s >= from && s <= to; });
-    EXPECT_NEAR(static_cast<double>(within), 0.99 * 301, 3);
-    EXPECT_LT(within, 301) << "padding looks elsewhere, too";
+    EXPECT_NEAR(static_cast<double>(within), 0.99 * 301, 4);
+    EXPECT_LT(within, 299) << "padding looks elsewhere, too";
     const std::vector<float> all = resampled(evenFences(64), weights, 300, 1, 0);
-    EXPECT_GE(all.front(), from);
-    EXPECT_LE(all.back(), to);
+    EXPECT_GE(all[1], from);
+    EXPECT_LE(all[299], to);
   }
 }
 
@@ -98,8 +98,8 @@ TEST_P(Proposals, KeepFencesSortedAndWithinTheRay) {
     for (float& weight : weights) weight = weight < 0.5f ? 0 : weight * weight * weight;
     const std::vector<float> made = resampled(fences, weights, 48, n % 2 == 0 ? 1.0f : 0.5f, n % 3 == 0 ? 0 : 0.01f);
     EXPECT_TRUE(std::is_sorted(made.begin(), made.end()));
-    EXPECT_GE(made.front(), 0);
-    EXPECT_LE(made.back(), 1);
+    EXPECT_EQ(made.front(), 0) << "the whole ray is seen";
+    EXPECT_EQ(made.back(), 1);
   }
 }
 
@@ -107,11 +107,9 @@ TEST_P(Proposals, AreAnnealedTowardsEvenness) {
   std::vector<float> weights(4, 0.01f);
   weights[1] = 0.16f;
   // Shares of sqrt(w): 1, 4, 1, 1 of 7.
-  const std::vector<float> fences = resampled(evenFences(4), weights, 6, 0.5f, 0);
-  EXPECT_NEAR(fences[0], 0.125, 1e-6);
-  for (int i = 1; i <= 4; ++i) EXPECT_NEAR(fences[i], 0.25 + 0.25 * (i - 0.5) / 4, 1e-6);
-  EXPECT_NEAR(fences[5], 0.625, 1e-6);
-  EXPECT_NEAR(fences[6], 0.875, 1e-6);
+  const std::vector<float> fences = resampled(evenFences(4), weights, 7, 0.5f, 0);
+  for (int i = 1; i <= 5; ++i) EXPECT_NEAR(fences[i], 0.25 + 0.25 * (i - 1) / 4, 1e-6);
+  EXPECT_NEAR(fences[6], 0.75, 1e-6);
 }
 
 TEST_P(Proposals, AreBlamedForWhatTheyDoNotBound) {

@@ -67,6 +67,17 @@ double RooflineRecorder::streamLimit(double bytes) {
   return rate;
 }
 
+double RooflineRecorder::gatherLimit(size_t bytes) {
+  if (!pool_) return 0;
+  const size_t table = std::clamp(std::bit_ceil(bytes), size_t{1} << 14, size_t{1} << 28);
+  for (const MachineLimits::Gather& gather : limits_.gathers) {
+    if (gather.tableBytes == table) return gather.lookups;
+  }
+  const double rate = std::max(cpu::gatherRate(*pool_, table, 1), cpu::gatherRate(*pool_, table, 1));
+  limits_.gathers.push_back({table, rate});
+  return rate;
+}
+
 Array<float> RooflineRecorder::randomFloats(size_t count, float low, float high) {
   const RandomStream random(1, ++arrays_);
   std::vector<float> values(count);
@@ -112,6 +123,7 @@ Roofline measureRoofline(const RooflineOptions& options) {
   measureHashGrids(recorder, grid);
   measureSampleStreams(recorder);
   measureBlockStreams(recorder);
+  measureVirtualGrid(recorder);
   measureParameterStreams(recorder);
   result.rows = recorder.takeRows();
   return result;

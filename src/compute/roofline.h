@@ -4,6 +4,9 @@
 //   networks       2 · parameters · samples forward (a multiply and an add a weight), twice that backward (the gradient
 //                  of the weights and that of the inputs); padding of inputs and outputs is not counted
 //   hash grid      8 corners · levels · samples lookups, forward (read) as backward (read, add, write)
+//   virtual grid   20 corners · samples lookups; the limit is the gather rate of a table of the texels that it uses
+//   (bits to
+//                  find them, bytes forward, floats backward)
 //   all others     bytes of their arguments, each array once however often a kernel passes over it; the limit is a copy
 //                  of the same footprint (to the next power of two)
 //

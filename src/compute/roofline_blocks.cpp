@@ -124,7 +124,7 @@ void measureBlockStreams(RooflineRecorder& recorder) {
   Array<float> fences = device.array<float>(size_t{rays} * (kIntervals + 1));
   const std::string shape = fmt::format("{} rays, {} intervals", rays, kIntervals);
   const double perRay = 24 + 8 + 4 * (kIntervals + 1);
-  const EnterScene enter{space, {rays}, kIntervals, views.origins, views.directions, {}, range, fences};
+  const EnterScene enter{space, {rays}, kIntervals, views.origins, views.directions, {}, {}, range, fences};
   recorder.measureStream(Operation::kEnterScene, shape, rays * perRay, [&] { device.run(enter); });
   if (!device.supports(Operation::kEnterScene) || !device.supports(Operation::kBlockSamples)) return;
 

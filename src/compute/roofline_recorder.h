@@ -30,6 +30,9 @@ class RooflineRecorder {
   const MachineLimits& limits() const { return limits_; }
   std::vector<RooflineRow> takeRows() { return std::move(rows_); }
 
+  // 8-byte loads per second at random places of a table of so many bytes; 0 where it is not measured.
+  double gatherLimit(size_t bytes);
+
   Array<float> randomFloats(size_t count, float low, float high);
 
  private:
@@ -45,8 +48,9 @@ class RooflineRecorder {
 
 void measureNetworks(RooflineRecorder& recorder);
 void measureHashGrids(RooflineRecorder& recorder, const HashGrid& grid);
-void measureSampleStreams(RooflineRecorder& recorder);     // encodings, marching, compaction, compositing
-void measureBlockStreams(RooflineRecorder& recorder);      // sampling through blocks and proposals
+void measureSampleStreams(RooflineRecorder& recorder);  // encodings, marching, compaction, compositing
+void measureBlockStreams(RooflineRecorder& recorder);   // sampling through blocks and proposals
+void measureVirtualGrid(RooflineRecorder& recorder);
 void measureParameterStreams(RooflineRecorder& recorder);  // losses, exposure, occupancy, Adam
 
 }  // namespace tessera

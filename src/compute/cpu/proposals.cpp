@@ -30,16 +30,19 @@ double annealedShares(const float* weights, uint32_t count, float anneal, float*
 // take the last signature so far. That is without a branch that nobody could predict. `bins` has room for after + 2.
 void invert(const ResampleFences& a, const float* fences, const double* cumulative, double jitter, uint32_t* bins,
             float* resampled) {
-  const double posts = a.after + 1.0, perPost = 1 / posts;
+  const double posts = a.after, perPost = 1 / posts, offset = jitter - 0.5;
   std::fill(bins, bins + a.after + 2, 0);
   for (uint32_t j = 1; j < a.before; ++j) {
-    const double place = std::ceil(cumulative[j] * posts - jitter);  // in (-1, after + 1]
+    const double place = std::ceil(cumulative[j] * posts - offset);  // in (-1, after + 1]
     bins[static_cast<uint32_t>(static_cast<int32_t>(std::max(0.0, place)))] = j;
   }
   uint32_t bin = 0;
-  for (uint32_t i = 0; i <= a.after; ++i) {
+  resampled[0] = fences[0];
+  resampled[a.after] = fences[a.before];
+  bin = bins[0];
+  for (uint32_t i = 1; i < a.after; ++i) {
     bin = std::max(bin, bins[i]);
-    const double begin = cumulative[bin], width = cumulative[bin + 1] - begin, into = (i + jitter) * perPost - begin;
+    const double begin = cumulative[bin], width = cumulative[bin + 1] - begin, into = (i + offset) * perPost - begin;
     const double along = width > 0 ? std::min(1.0, std::max(0.0, into / width)) : 0;
     resampled[i] = static_cast<float>(fences[bin] + along * (static_cast<double>(fences[bin + 1]) - fences[bin]));
   }

@@ -21,15 +21,16 @@ Doubles resampledFences(View fences, View weights, uint32_t after, double anneal
     cumulative.push_back(std::min(1.0, cumulative.back() + p));
   }
   cumulative.back() = 1;
-  Doubles resampled;
-  for (uint32_t i = 0; i <= after; ++i) {
-    const double u = (i + jitter) / (after + 1.0);
+  Doubles resampled{fences.front()};
+  for (uint32_t i = 1; i < after; ++i) {
+    const double u = (i + jitter - 0.5) / after;
     // The last bin that begins at or before u.
     const auto next = std::upper_bound(cumulative.begin(), cumulative.end() - 1, u);
     const size_t bin = static_cast<size_t>(next - cumulative.begin()) - 1;
     const double along = (u - cumulative[bin]) / (cumulative[bin + 1] - cumulative[bin]);
     resampled.push_back(fences[bin] + along * (fences[bin + 1] - fences[bin]));
   }
+  resampled.push_back(fences.back());
   return resampled;
 }
 

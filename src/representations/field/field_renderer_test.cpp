@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "base/error.h"
-#include "representations/field/cube_scene.h"
+#include "representations/field/trained_cube.h"
 
 namespace tessera {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "representations/field/cube_scene.h"
 #include "representations/field/field_renderer.h"
+#include "representations/field/trained_cube.h"
 
 namespace tessera {
 namespace {

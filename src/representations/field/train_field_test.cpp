@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "representations/field/cube_scene.h"
 #include "representations/field/field_renderer.h"
+#include "representations/field/trained_cube.h"
 #include "train/run_folder.h"
 
 namespace tessera {

@@ -29,7 +29,7 @@ struct VolumeConfig {
   int proposalEvery = 4, proposalWarmUp = 256;
   // Batches
   int64_t seed = 0;
-  int texelsPerStep = 1 << 18;
+  int texelsPerStep = 1 << 19;
   int firstRays = 1024, mostRays = 1 << 14;
   double photoBudgetMiB = 0;
   int stepsPerPhoto = 2;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/error.h"
 #include "base/random.h"
 
 namespace tessera {
@@ -67,7 +68,11 @@ VolumeModel::VolumeModel(Device& device, const VolumeConfig& config, const Block
                   mix64(static_cast<uint64_t>(config.seed))),
       proposals_(device, "proposals", config.proposalShape(), space_.blocks(),
                  mix64(static_cast<uint64_t>(config.seed) + 1)),
-      deferred_(device, "deferred", initialDeferred(space_.blocks(), static_cast<uint64_t>(config.seed))) {}
+      deferred_(device, "deferred", initialDeferred(space_.blocks(), static_cast<uint64_t>(config.seed))) {
+  if (config.shareTexels || space_.blocks() == 1) return;
+  throw Error("--set share_texels=false", "", "is for models of one block",
+              "leave it at true, or use --blocks 1x1 and --set surround=border");
+}
 
 void VolumeModel::save(uint32_t block, TensorSet& tensors, bool withMoments) {
   for (const ParameterGroup* group :

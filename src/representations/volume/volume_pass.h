@@ -46,6 +46,7 @@ class VolumePass {
   Slice<const float> positions() const { return positions_; }
   Slice<const float> weights() const { return weights_; }  // over the whole ray
   Slice<const float> logDensities() const { return logDensities_; }
+  Slice<const float> colours() const { return colours_; }  // [7]: diffuse, features
   Slice<const float> runtimeSteps() const { return runtimeSteps_; }
   uint32_t texelsWanted();  // waits; may be above the room there is
 

@@ -12,7 +12,7 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kRoomPerWanted = 2;  // for steps that need more texels than the last one did
+constexpr double kRoomPerWanted = 1.5;  // for steps that need more texels than the last one did
 constexpr uint32_t kLosses = 3;         // colour loss, squared error, S3IM
 constexpr uint32_t kGroup = 16;         // rays come in groups of so many, as S3IM wants them
 constexpr const char* kFormat = "tessera volume 1";
@@ -32,7 +32,7 @@ PhotoRays::Settings raySettings(const VolumeConfig& config) {
 VolumePass::Room roomFor(const VolumeConfig& config) {
   VolumePass::Room room;
   room.rays = static_cast<uint32_t>(config.mostRays);
-  room.texels = kRoomPerWanted * static_cast<uint32_t>(config.texelsPerStep);
+  room.texels = static_cast<uint32_t>(kRoomPerWanted * config.texelsPerStep);
   room.points = static_cast<uint32_t>(config.sparsityPoints);
   room.training = true;
   return room;

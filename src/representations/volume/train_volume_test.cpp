@@ -1,0 +1,80 @@
+#include "representations/volume/train_volume.h"
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "representations/volume/volume_cube.h"
+#include "train/run_folder.h"
+
+namespace tessera {
+namespace {
+
+TrainVolumeOptions options(int64_t steps, bool resume = false) {
+  TrainVolumeOptions made;
+  made.config = smallVolumeConfig();
+  made.loop.steps = steps;
+  made.loop.resume = resume;
+  made.loop.progress = false;
+  made.blocks = *parseBlockCount("2x1");
+  return made;
+}
+
+std::vector<Bytes> checkpoints(const fs::path& model) {
+  std::vector<Bytes> parts;
+  const ModelManifest manifest = *ModelFolder(model).manifest();
+  for (const std::string& file : manifest.files) parts.push_back(readFile(model / file));
+  return parts;
+}
+
+TEST(TrainVolume, WritesAFolderThatCanBeDrawnAndRepeated) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  const TrainingResult result = trainVolume(*device, scene.capture(), scene / "model", options(5));
+  EXPECT_TRUE(result.finished);
+  for (const char* file : {"config.toml", "blocks.json", "blocks.svg", "manifest.json", "metrics.jsonl"}) {
+    EXPECT_TRUE(fs::exists(scene / "model" / file)) << file;
+  }
+  EXPECT_EQ(checkpoints(scene / "model").size(), 2u) << "one a block";
+  const std::unique_ptr<VolumeModel> model = loadVolumeModel(*device, scene / "model");
+  EXPECT_EQ(model->grid().columns, 2);
+  EXPECT_EQ(model->grid().rows, 1);
+  EXPECT_EQ(model->config().voxels, smallVolumeConfig().voxels);
+}
+
+TEST(TrainVolume, GoesOnWhereItWasStopped) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  trainVolume(*device, scene.capture(), scene / "unbroken", options(12));
+  TrainVolumeOptions stopped = options(12);
+  int64_t asked = 0;
+  stopped.loop.stopRequested = [&] { return ++asked > 5; };
+  EXPECT_FALSE(trainVolume(*device, scene.capture(), scene / "model", stopped).finished);
+  EXPECT_THROW(trainVolume(*device, scene.capture(), scene / "model", options(12)), Error) << "without resume";
+  EXPECT_TRUE(trainVolume(*device, scene.capture(), scene / "model", options(12, true)).finished);
+  EXPECT_EQ(checkpoints(scene / "model"), checkpoints(scene / "unbroken"));
+}
+
+TEST(TrainVolume, SaysWhatIsWrongWithAFolder) {
+  CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  EXPECT_THROW(loadVolumeModel(*device, scene / "nowhere"), Error);
+  writeFileAtomically(scene / "capture/transforms.json", "{}");
+  EXPECT_THROW(trainVolume(*device, scene.capture(), scene / "capture", options(2)), Error);
+  trainVolume(*device, scene.capture(), scene / "model", options(2));
+  scene.capture().photos[0].split = Split::test;
+  EXPECT_THROW(trainVolume(*device, scene.capture(), scene / "model", options(4, true)), Error) << "other photos";
+  scene.capture().photos[0].split = Split::train;
+  const fs::path file = scene / "model" / ModelFolder(scene / "model").manifest()->files.at(1);
+  fs::resize_file(file, fs::file_size(file) / 2);
+  EXPECT_THROW(loadVolumeModel(*device, scene / "model"), Error) << "a block that is cut short";
+}
+
+TEST(TrainVolume, CountsWhatABlockTakes) {
+  const VolumeConfig cpu, paper = VolumeConfig::ofPreset("paper");
+  EXPECT_GT(trainingBytesPerBlock(cpu), 5e6);
+  EXPECT_LT(trainingBytesPerBlock(cpu), 100e6);
+  EXPECT_GT(trainingBytesPerBlock(paper), 5 * trainingBytesPerBlock(cpu));
+}
+
+}  // namespace
+}  // namespace tessera
