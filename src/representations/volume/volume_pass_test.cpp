@@ -39,12 +39,13 @@ struct Scene {
     room.texels = 20 * 20 * kRays;
     room.training = true;
     pass = std::make_unique<VolumePass>(*model, room);
-    std::vector<float> from = randomFloats(1, 3 * kRays, -1, 1), along = randomFloats(2, 3 * kRays, -1, 1);
+    // From above, at places in the blocks.
+    std::vector<float> from = randomFloats(1, 3 * kRays, -2, 2), along = randomFloats(2, 3 * kRays, -1, 1);
     for (uint32_t r = 0; r < kRays; ++r) {
-      from[3 * r + 2] = 3;
-      along[3 * r + 2] = -1;
+      from[3 * r + 2] = 2;
+      for (size_t i = size_t{3} * r; i < size_t{3} * r + 3; ++i) along[i] -= from[i];
       const float length = std::hypot(along[3 * r], along[3 * r + 1], along[3 * r + 2]);
-      for (int a = 0; a < 3; ++a) along[3 * r + static_cast<uint32_t>(a)] /= length;
+      for (size_t i = size_t{3} * r; i < size_t{3} * r + 3; ++i) along[i] /= length;
     }
     origins = device->arrayOf(from);
     directions = device->arrayOf(along);
