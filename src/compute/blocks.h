@@ -91,11 +91,13 @@ struct BlockSamples {
   Slice<float> runtimeSteps;  // optional: length in t of a renderer's step here along the ray: one texel of the domain,
                               // which is 2 halfDomain / texels; by contractDirection where contracted
   uint32_t texels = 0;
-  // With `split`, room for mostSegments(rays):
+  // With `split`, room for mostSegments(rays). Optional, [blocks]: blocks that are composited together have the same number,
+  // and a segment is a run of one group; else each block is its own.
+  Slice<const uint32_t> groupOfBlock;
   Slice<uint32_t> firstSegment;          // [rays + 1]
   Slice<uint32_t> segmentCount;          // [1]
   Slice<uint32_t> firstSampleOfSegment;  // [segments + 1]: absolute rows
-  Slice<uint32_t> blockOfSegment, rayOfSegment;
+  Slice<uint32_t> groupOfSegment, rayOfSegment;
 
   uint32_t mostCuts() const { return space.columns + space.rows - 2 + (space.surround == Surround::own ? 1 : 0); }
   uint32_t mostSamples(uint32_t rayCount) const { return rayCount * (intervals + (split ? mostCuts() : 0)); }

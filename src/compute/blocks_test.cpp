@@ -103,7 +103,7 @@ struct Sampled {
   uint32_t rays, intervals;
   bool split;
   std::vector<float> origins, directions, range, fences, farOfRay;
-  std::vector<uint32_t> firstSample, block, firstSegment, firstOfSegment, blockOfSegment, rayOfSegment;
+  std::vector<uint32_t> firstSample, block, firstSegment, firstOfSegment, groupOfSegment, rayOfSegment;
   std::vector<float> positions, distances, steps, middles, widths, runtimeSteps;
   uint32_t segments = 0;
 
@@ -156,7 +156,7 @@ struct Sampled {
       a.firstSegment = stage.outputWords("firstSegment", rays + 1);
       a.segmentCount = stage.outputWords("segmentCount", 1);
       a.firstSampleOfSegment = stage.outputWords("firstSampleOfSegment", most + 1);
-      a.blockOfSegment = stage.outputWords("blockOfSegment", most);
+      a.groupOfSegment = stage.outputWords("groupOfSegment", most);
       a.rayOfSegment = stage.outputWords("rayOfSegment", most);
     }
     stage.device.run(a);
@@ -180,7 +180,7 @@ struct Sampled {
     keep(firstSegment, a.firstSegment, rays + 1);
     segments = stage.device.read(a.segmentCount)[0];
     keep(firstOfSegment, a.firstSampleOfSegment, segments + 1);
-    keep(blockOfSegment, a.blockOfSegment, segments);
+    keep(groupOfSegment, a.groupOfSegment, segments);
     keep(rayOfSegment, a.rayOfSegment, segments);
   }
 
@@ -306,8 +306,8 @@ TEST_P(BlockSampling, MakesSegmentsTheLongestRunsOfOneBlockInFrontToBackOrder) {
         EXPECT_EQ(s.rayOfSegment[segment], r);
         ASSERT_LT(s.firstOfSegment[segment], s.firstOfSegment[segment + 1]);
         for (uint32_t i = s.firstOfSegment[segment]; i < s.firstOfSegment[segment + 1]; ++i)
-          EXPECT_EQ(s.block[i], s.blockOfSegment[segment]);
-        const int block = static_cast<int>(s.blockOfSegment[segment]);
+          EXPECT_EQ(s.block[i], s.groupOfSegment[segment]);
+        const int block = static_cast<int>(s.groupOfSegment[segment]);
         places.push_back(std::find(order.begin(), order.end(), block) - order.begin());  // the surround: after all
       }
       for (size_t i = 1; i < places.size(); ++i)

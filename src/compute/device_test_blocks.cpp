@@ -106,10 +106,15 @@ void runBlockSamples(Stage& stage, const BlockSpace& space, const Size& size, co
     a.texels = 64;
   }
   if (options.split) {
+    if (options.everything) {
+      std::vector<uint32_t> groups(space.blocks());
+      for (uint32_t block = 0; block < space.blocks(); ++block) groups[block] = block / 2;
+      a.groupOfBlock = stage.input(groups);
+    }
     a.firstSegment = stage.outputWords("firstSegment", rays + 1);
     a.segmentCount = stage.outputWords("segmentCount", 1);
     a.firstSampleOfSegment = stage.outputWords("firstSampleOfSegment", a.mostSegments(rays) + 1);
-    a.blockOfSegment = stage.outputWords("blockOfSegment", a.mostSegments(rays));
+    a.groupOfSegment = stage.outputWords("groupOfSegment", a.mostSegments(rays));
     a.rayOfSegment = stage.outputWords("rayOfSegment", a.mostSegments(rays));
   }
   stage.device.run(a);

@@ -33,7 +33,7 @@ struct Rays {
 
 // What BlockSamples writes.
 struct Samples {
-  Array<uint32_t> firstSample, counters, blocks, firstSegment, firstOfSegment, blockOfSegment, rayOfSegment;
+  Array<uint32_t> firstSample, counters, blocks, firstSegment, firstOfSegment, groupOfSegment, rayOfSegment;
   Array<float> positions, distances, steps, middles, widths, runtimeSteps;
 
   Samples(Device& device, const BlockSamples& a, uint32_t rays)
@@ -42,7 +42,7 @@ struct Samples {
         blocks(device.array<uint32_t>(a.mostSamples(rays))),
         firstSegment(device.array<uint32_t>(rays + 1)),
         firstOfSegment(device.array<uint32_t>(a.mostSegments(rays) + 1)),
-        blockOfSegment(device.array<uint32_t>(a.mostSegments(rays))),
+        groupOfSegment(device.array<uint32_t>(a.mostSegments(rays))),
         rayOfSegment(device.array<uint32_t>(a.mostSegments(rays))),
         positions(device.array<float>(size_t{a.mostSamples(rays)} * 3)),
         distances(device.array<float>(a.mostSamples(rays))),
@@ -66,7 +66,7 @@ struct Samples {
     a.firstSegment = firstSegment;
     a.segmentCount = counters.part(1, 1);
     a.firstSampleOfSegment = firstOfSegment;
-    a.blockOfSegment = blockOfSegment;
+    a.groupOfSegment = groupOfSegment;
     a.rayOfSegment = rayOfSegment;
   }
 };

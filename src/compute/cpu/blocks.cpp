@@ -235,9 +235,10 @@ void writeContracted(const Blocks::Place& place, Middles& at, uint32_t first, ui
   }
 }
 
-// Writes the rows of one ray; returns how many segments they are.
+// Writes the rows of one ray; returns how many segments they are. `groups`: optional.
 uint32_t writeSamples(const BlockSamples& a, const Blocks& blocks, const Ray& ray, const double* s, const double* t,
                       uint32_t samples, size_t row, Middles& at) {
+  const uint32_t* const groups = hostPointer(a.groupOfBlock);
   uint32_t* const blockOfSample = hostPointer(a.blockOfSample) + row;
   float* const positions = hostPointer(a.positions) + 3 * row;
   float* const distances = hostPointer(a.distances) + row;
@@ -249,11 +250,12 @@ uint32_t writeSamples(const BlockSamples& a, const Blocks& blocks, const Ray& ra
   for (uint32_t i = 0; middles && i < samples; ++i) middles[i] = static_cast<float>((s[i] + s[i + 1]) / 2);
   for (uint32_t i = 0; widths && i < samples; ++i) widths[i] = static_cast<float>(s[i + 1] - s[i]);
   blocks.find(at, samples, blockOfSample);
-  uint32_t segments = 0;
+  uint32_t segments = 0, lastGroup = 0;
   for (uint32_t first = 0, end = 0; first < samples; first = end) {
-    const uint32_t block = blockOfSample[first];
+    const uint32_t block = blockOfSample[first], group = groups ? groups[block] : block;
     while (end < samples && blockOfSample[end] == block) ++end;
-    ++segments;
+    segments += first == 0 || group != lastGroup;
+    lastGroup = group;
     const Blocks::Place& place = blocks.place(block);
     double along[3];  // the direction in local coordinates
     for (int axis = 0; axis < 3; ++axis) along[axis] = ray.direction[axis] * place.inverseScale[axis];
@@ -282,8 +284,10 @@ void writeSegments(Context& context, const BlockSamples& a, size_t rays) {
   const uint32_t* firstSample = hostPointer(a.firstSample);
   const uint32_t* firstSegment = hostPointer(a.firstSegment);
   const uint32_t* blockOfSample = hostPointer(a.blockOfSample);
+  const uint32_t* groups = hostPointer(a.groupOfBlock);
+  const auto groupOf = [&](uint32_t sample) { return groups ? groups[blockOfSample[sample]] : blockOfSample[sample]; };
   uint32_t* firstSampleOfSegment = hostPointer(a.firstSampleOfSegment);
-  uint32_t* blockOfSegment = hostPointer(a.blockOfSegment);
+  uint32_t* groupOfSegment = hostPointer(a.groupOfSegment);
   uint32_t* rayOfSegment = hostPointer(a.rayOfSegment);
   *hostPointer(a.segmentCount) = firstSegment[rays];
   firstSampleOfSegment[firstSegment[rays]] = firstSample[rays];
@@ -291,9 +295,9 @@ void writeSegments(Context& context, const BlockSamples& a, size_t rays) {
     for (size_t ray = begin; ray < end; ++ray) {
       uint32_t segment = firstSegment[ray];
       for (uint32_t i = firstSample[ray]; i < firstSample[ray + 1]; ++i) {
-        if (i > firstSample[ray] && blockOfSample[i] == blockOfSample[i - 1]) continue;
+        if (i > firstSample[ray] && groupOf(i) == groupOf(i - 1)) continue;
         firstSampleOfSegment[segment] = i;
-        blockOfSegment[segment] = blockOfSample[i];
+        groupOfSegment[segment] = groupOf(i);
         rayOfSegment[segment++] = static_cast<uint32_t>(ray);
       }
     }

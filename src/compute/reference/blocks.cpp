@@ -161,8 +161,9 @@ void run(const BlockSamples& a) {
   const Doubles origins = doubles(a.origins, 3 * rays), directions = doubles(a.directions, 3 * rays);
   const Doubles range = doubles(a.range, 2 * rays), farOfRay = doubles(a.farOfRay, rays);
   const Doubles fences = doubles(a.fences, posts * rays);
+  const Indices groups = indices(a.groupOfBlock, a.groupOfBlock.count);
   Doubles positions, distances, steps, middles, widths, runtimeSteps;
-  std::vector<uint32_t> firstSample{a.firstRow}, blocks, firstSegment{0}, firstSampleOfSegment, blockOfSegment,
+  std::vector<uint32_t> firstSample{a.firstRow}, blocks, firstSegment{0}, firstSampleOfSegment, groupOfSegment,
       rayOfSegment;
   for (size_t r = 0; r < rays; ++r) {
     FencedRay ray{{origins[3 * r], origins[3 * r + 1], origins[3 * r + 2]},
@@ -173,9 +174,10 @@ void run(const BlockSamples& a) {
     ray.fences.assign(fences.begin() + r * posts, fences.begin() + (r + 1) * posts);
     bool first = true;
     for (const BlockSample& sample : blockSamples(a.space, ray, a.split, a.texels)) {
-      if (first || sample.block != blocks.back()) {
+      const uint32_t group = groups.empty() ? sample.block : groups[sample.block];
+      if (first || group != groupOfSegment.back()) {
         firstSampleOfSegment.push_back(a.firstRow + static_cast<uint32_t>(blocks.size()));
-        blockOfSegment.push_back(sample.block);
+        groupOfSegment.push_back(group);
         rayOfSegment.push_back(static_cast<uint32_t>(r));
       }
       first = false;
@@ -188,7 +190,7 @@ void run(const BlockSamples& a) {
       runtimeSteps.push_back(sample.runtimeStep);
     }
     firstSample.push_back(a.firstRow + static_cast<uint32_t>(blocks.size()));
-    firstSegment.push_back(static_cast<uint32_t>(blockOfSegment.size()));
+    firstSegment.push_back(static_cast<uint32_t>(groupOfSegment.size()));
   }
   firstSampleOfSegment.push_back(firstSample.back());
   const size_t made = blocks.size();
@@ -208,7 +210,7 @@ void run(const BlockSamples& a) {
   store(a.firstSegment, firstSegment);
   *hostPointer(a.segmentCount) = firstSegment.back();
   store(a.firstSampleOfSegment, firstSampleOfSegment);
-  store(a.blockOfSegment, blockOfSegment);
+  store(a.groupOfSegment, groupOfSegment);
   store(a.rayOfSegment, rayOfSegment);
 }
 

@@ -60,7 +60,7 @@ VolumePass::VolumePass(VolumeModel& model, const Room& room) : model_(model), de
   firstSegment_ = device_.array<uint32_t>(rays + 1);
   segmentCount_ = device_.array<uint32_t>(1);
   firstSampleOfSegment_ = device_.array<uint32_t>(segments + 1);
-  for (Array<uint32_t>* words : {&blockOfSegment_, &rayOfSegment_}) *words = device_.array<uint32_t>(segments);
+  for (Array<uint32_t>* words : {&groupOfSegment_, &rayOfSegment_}) *words = device_.array<uint32_t>(segments);
   if (model.virtualGrid().shareTexels) {
     for (Array<uint32_t>* words : {&marks_, &ranks_}) {
       *words = device_.array<uint32_t>(blocks * model.virtualGrid().words());
@@ -182,7 +182,7 @@ void VolumePass::locateSamples(const VolumeRays& rays) {
   locate.firstSegment = firstSegment_;
   locate.segmentCount = segmentCount_;
   locate.firstSampleOfSegment = firstSampleOfSegment_;
-  locate.blockOfSegment = blockOfSegment_;
+  locate.groupOfSegment = groupOfSegment_;
   locate.rayOfSegment = rayOfSegment_;
   device_.run(locate);
 }
@@ -236,7 +236,7 @@ void VolumePass::composite(const VolumeRays& rays) {
   ofBlocks.depth = segmentDepth_;
   ofBlocks.weights = segmentWeights_;
   device_.run(ofBlocks);
-  device_.run(DeferredForward{segments(), composited_, blockOfSegment_, rayOfSegment_, rays.directions,
+  device_.run(DeferredForward{segments(), composited_, groupOfSegment_, rayOfSegment_, rays.directions,
                               model_.deferred().values, specular_});
   device_.run(BlendForward{model_.config().literalEq3,
                            {rays.count},
@@ -278,7 +278,7 @@ void VolumePass::backwardThroughBlocks(const VolumeRays& rays, Slice<const float
   if (scales.opacity > 0) {
     device_.run(OpacityLoss{scales.opacity, segments(), segmentOpacity_, losses_.part(2, 1), segmentOpacityGradients_});
   }
-  device_.run(DeferredBackward{segments(), composited_, blockOfSegment_, rayOfSegment_, rays.directions,
+  device_.run(DeferredBackward{segments(), composited_, groupOfSegment_, rayOfSegment_, rays.directions,
                                model_.deferred().values, specularGradients_, compositedGradients_,
                                model_.deferred().gradients});
   CompositeBackward ofBlocks;

@@ -96,7 +96,7 @@ class VolumePass {
   // Samples
   Array<uint32_t> firstSample_, rowCount_, blockOfSample_;
   Array<float> positions_, distances_, steps_, middles_, widths_, runtimeSteps_;
-  Array<uint32_t> firstSegment_, segmentCount_, firstSampleOfSegment_, blockOfSegment_, rayOfSegment_;
+  Array<uint32_t> firstSegment_, segmentCount_, firstSampleOfSegment_, groupOfSegment_, rayOfSegment_;
   Array<uint32_t> marks_, ranks_, firstTexel_;
   Array<float> texelPositions_;
   BlockFieldBatch texels_;
