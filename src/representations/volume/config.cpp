@@ -59,6 +59,7 @@ std::vector<ConfigField> VolumeConfig::fields() {
       {"surround",
        "what lies outside the region: own (a block of its own), border (the border blocks', as in the paper), none",
        &surround},
+      {"level", "of detail: 0 is the finest; set by training for those above", &level},
       {"near", "no sample nearer to a camera, in halves of a block", &near},
       {"voxels", "voxels along an edge of a block", &voxels},
       {"planes", "texels along an edge of a block's planes", &planes},
@@ -115,6 +116,9 @@ std::vector<ConfigField> VolumeConfig::fields() {
        "samples nearer to the camera learn more slowly, or fog gathers there; in halves of a block",
        &fullGradientDistance},
       {"free_space", "nothing stands before the nearest sparse points that a photo shows", &freeSpace},
+      {"level_share", "steps of each coarser level of detail, as a share of the finest's; 0: there are none", &levelShare},
+      {"frozen_share", "share of a coarser level's steps in which only its deferred networks are trained", &frozenShare},
+      {"level_rate_factor", "learning rate of a coarser level's fields, relative", &levelRateFactor},
       {"exposure", "fit an exposure to each photo", &exposure},
       {"random_background", "train against random colours behind the scene", &randomBackground},
   };
@@ -124,6 +128,10 @@ void VolumeConfig::check() const {
   constexpr double kTiny = 1e-12, kHuge = 1e12;
   surroundKind();
   within("near", near, 0, kHuge);
+  within("level", level, 0, 16);
+  within("level_share", levelShare, 0, 10);
+  within("frozen_share", frozenShare, 0, 1);
+  within("level_rate_factor", levelRateFactor, 0, kHuge);
   within("voxels", voxels, 8, 1024);
   within("planes", planes, 8, 8192);
   multipleOfEight("voxels", voxels);

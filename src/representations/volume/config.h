@@ -15,6 +15,7 @@ struct VolumeConfig {
   // Scene
   std::string surround = "own";
   double near = 0.05;
+  int level = 0;  // of detail; those above 0 are made from the one below, see train_volume.h
   // Virtual grid
   int voxels = 128, planes = 512;
   double featureRange = 7, densityRange = 14;
@@ -43,6 +44,8 @@ struct VolumeConfig {
   int sparsityPoints = 4096;
   double cullBegin = 0.4, cullEnd = 0.8, cullFirst = 5e-4, cullLast = 5e-3;
   bool literalEq3 = false;
+  // Levels of detail
+  double levelShare = 0.4, frozenShare = 0.25, levelRateFactor = 0.1;
   bool exposure = true, randomBackground = true, freeSpace = true;
 
   std::vector<ConfigField> fields();

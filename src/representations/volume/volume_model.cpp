@@ -16,15 +16,15 @@ Device& able(Device& device, const VolumeConfig& config) {
 }
 
 // Xavier weights, biases 0. The last bias is low, so that diffuse colours come first.
-std::vector<float> initialDeferred(uint32_t blocks, uint64_t seed) {
+std::vector<float> initialDeferred(uint32_t networks, uint64_t seed) {
   constexpr float kLastBias = -2;
   constexpr uint32_t kSizes[] = {DeferredNetwork::kInputs, DeferredNetwork::kHidden, DeferredNetwork::kHidden, 3};
   const RandomStream random(seed, 0xdefe);
-  std::vector<float> values(size_t{blocks} * DeferredNetwork::kParameters);
-  for (uint32_t block = 0; block < blocks; ++block) {
+  std::vector<float> values(size_t{networks} * DeferredNetwork::kParameters);
+  for (uint32_t network = 0; network < networks; ++network) {
     for (int layer = 0; layer < 3; ++layer) {
       const uint32_t inputs = kSizes[layer], outputs = kSizes[layer + 1];
-      const size_t first = size_t{block} * DeferredNetwork::kParameters + DeferredNetwork::kWeights[layer];
+      const size_t first = size_t{network} * DeferredNetwork::kParameters + DeferredNetwork::kWeights[layer];
       const float bound = std::sqrt(6.0f / static_cast<float>(inputs + outputs));
       for (size_t i = 0; i < size_t{inputs} * outputs; ++i) {
         values[first + i] = (2 * random.uniform(first + i) - 1) * bound;
@@ -64,14 +64,30 @@ VolumeModel::VolumeModel(Device& device, const VolumeConfig& config, const Block
       frame_(sceneFrameOf(grid)),
       space_(blockSpaceOf(grid, config)),
       virtualGrid_(config.virtualGrid()),
+      groups_(groupsOfLevel(space_.columns, space_.rows, static_cast<uint32_t>(config.level),
+                            space_.blocks() > space_.cells())),
+      groupOfBlock_(device.arrayOf(groups_.groupOfBlock)),
       attributes_(device, "attributes", config.attributeShape(), space_.blocks(),
                   mix64(static_cast<uint64_t>(config.seed))),
       proposals_(device, "proposals", config.proposalShape(), space_.blocks(),
                  mix64(static_cast<uint64_t>(config.seed) + 1)),
-      deferred_(device, "deferred", initialDeferred(space_.blocks(), static_cast<uint64_t>(config.seed))) {
+      deferred_(device, "deferred", initialDeferred(groups_.groups(), static_cast<uint64_t>(config.seed))) {
   if (config.shareTexels || space_.blocks() == 1) return;
   throw Error("--set share_texels=false", "", "is for models of one block",
               "leave it at true, or use --blocks 1x1 and --set surround=border");
+}
+
+void VolumeModel::copyFields(VolumeModel& from) {
+  const auto copy = [&](ParameterGroup& to, ParameterGroup& of) {
+    device_.write(to.values.all(), std::span<const float>(from.device_.read(of.values.all())));
+  };
+  CHECK(from.space_.blocks() == space_.blocks());
+  for (uint32_t block = 0; block < space_.blocks(); ++block) {
+    copy(attributes_.table(block), from.attributes_.table(block));
+    copy(attributes_.network(block), from.attributes_.network(block));
+    copy(proposals_.table(block), from.proposals_.table(block));
+    copy(proposals_.network(block), from.proposals_.network(block));
+  }
 }
 
 void VolumeModel::save(uint32_t block, TensorSet& tensors, bool withMoments) {

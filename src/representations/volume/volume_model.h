@@ -5,6 +5,7 @@
 #include "compute/deferred.h"
 #include "field/block_fields.h"
 #include "representations/volume/config.h"
+#include "representations/volume/levels.h"
 #include "scene/block_grid.h"
 #include "train/scene_frame.h"
 
@@ -24,11 +25,18 @@ class VolumeModel {
   const SceneFrame& frame() const { return frame_; }
   const BlockSpace& space() const { return space_; }
   const VirtualGrid& virtualGrid() const { return virtualGrid_; }
+  // Until the next call, everything is seen through this grid: a coarser level begins with that of the one below.
+  void lookThrough(const VirtualGrid& grid) { virtualGrid_ = grid; }
+  const LevelGroups& groups() const { return groups_; }  // which blocks are composited and shaded together
+  Slice<const uint32_t> groupOfBlock() const { return groupOfBlock_; }
   BlockFields& attributes() { return attributes_; }
   BlockFields& proposals() { return proposals_; }
-  ParameterGroup& deferred() { return deferred_; }  // [blocks][DeferredNetwork::kParameters]
+  ParameterGroup& deferred() { return deferred_; }  // [groups][DeferredNetwork::kParameters]
 
-  // Of one block; the deferred networks of all stand with block 0.
+  // Values of the other's attribute and proposal fields; of the same blocks, with the same settings of fields.
+  void copyFields(VolumeModel& from);
+
+  // Of one block; the deferred networks of all groups stand with block 0.
   void save(uint32_t block, TensorSet& tensors, bool withMoments);
   void restore(uint32_t block, const fs::path& path, const Safetensors& file);
 
@@ -39,6 +47,8 @@ class VolumeModel {
   SceneFrame frame_;
   BlockSpace space_;
   VirtualGrid virtualGrid_;
+  LevelGroups groups_;
+  Array<uint32_t> groupOfBlock_;
   BlockFields attributes_, proposals_;
   ParameterGroup deferred_;
 };

@@ -1,5 +1,6 @@
 #include "representations/volume/volume_pass.h"
 
+#include <algorithm>
 #include <numeric>
 
 namespace tessera {
@@ -63,7 +64,7 @@ VolumePass::VolumePass(VolumeModel& model, const Room& room) : model_(model), de
   for (Array<uint32_t>* words : {&groupOfSegment_, &rayOfSegment_}) *words = device_.array<uint32_t>(segments);
   if (model.virtualGrid().shareTexels) {
     for (Array<uint32_t>* words : {&marks_, &ranks_}) {
-      *words = device_.array<uint32_t>(blocks * model.virtualGrid().words());
+      *words = device_.array<uint32_t>(blocks * std::max(model.virtualGrid().words(), room.mostWords));
     }
   }
   firstTexel_ = device_.array<uint32_t>(blocks + 1);
@@ -92,6 +93,7 @@ Slice<const float> VolumePass::jitterOf(const VolumeRays& rays, uint32_t round) 
 void VolumePass::forward(const VolumeRays& rays, const Options& options) {
   CHECK(rays.count <= room_.rays);
   keptProposals_ = options.keepProposals;
+  keptAttributes_ = options.keepAttributes;
   device_.run(EnterScene{model_.space(),
                          {rays.count},
                          round_[0].intervals,
@@ -179,6 +181,7 @@ void VolumePass::locateSamples(const VolumeRays& rays) {
   locate.widths = widths_;
   locate.runtimeSteps = runtimeSteps_;
   locate.texels = model_.virtualGrid().planes;
+  locate.groupOfBlock = model_.groupOfBlock();
   locate.firstSegment = firstSegment_;
   locate.segmentCount = segmentCount_;
   locate.firstSampleOfSegment = firstSampleOfSegment_;
@@ -200,7 +203,7 @@ void VolumePass::evaluateTexels(const Options& options) {
   distinct.firstTexel = firstTexel_;
   distinct.texelPositions = texelPositions_;
   device_.run(distinct);
-  model_.attributes().forward(texels_, room_.training);
+  model_.attributes().forward(texels_, room_.training && options.keepAttributes);
   VirtualGridForward mix{model_.virtualGrid()};
   mix.samples = rows();
   mix.blockOfSample = blockOfSample_;
@@ -258,7 +261,7 @@ void VolumePass::backward(const VolumeRays& rays, Slice<const float> colourGradi
                           Slice<const float> opacityGradients, const LossScales& scales) {
   device_.fillZero(losses_.all());
   backwardThroughBlocks(rays, colourGradients, opacityGradients, scales);
-  backwardThroughTexels(scales);
+  if (keptAttributes_) backwardThroughTexels(scales);
   if (keptProposals_) backwardThroughProposals(rays, scales);
 }
 

@@ -22,6 +22,7 @@ class VolumePass {
 
   struct Room {
     uint32_t rays = 0, texels = 0;
+    uint32_t mostWords = 0;  // of virtual grids that the model will look through, where finer than its own
     uint32_t points = 0;  // random ones, for the sparsity loss; their rows come before those of rays
     bool training = false;
   };
@@ -33,6 +34,7 @@ class VolumePass {
     float minAlpha = 0;  // samples below are culled
     uint64_t seed = 0;   // of random points
     bool keepProposals = false;
+    bool keepAttributes = true;  // else only deferred networks can be trained
   };
   void forward(const VolumeRays& rays, const Options& options);
 
@@ -87,7 +89,7 @@ class VolumePass {
   Device& device_;
   Room room_;
   uint32_t rowCapacity_ = 0, segmentCapacity_ = 0;
-  bool keptProposals_ = false;
+  bool keptProposals_ = false, keptAttributes_ = true;
   Array<float> range_;
   Round round_[kRounds];
   Array<float> fences_;  // of the samples

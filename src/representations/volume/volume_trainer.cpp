@@ -29,12 +29,21 @@ PhotoRays::Settings raySettings(const VolumeConfig& config) {
   return settings;
 }
 
+// Of the level below.
+VirtualGrid finerGrid(const VolumeConfig& config) {
+  VirtualGrid grid = config.virtualGrid();
+  grid.voxels *= 2;
+  grid.planes *= 2;
+  return grid;
+}
+
 VolumePass::Room roomFor(const VolumeConfig& config) {
   VolumePass::Room room;
   room.rays = static_cast<uint32_t>(config.mostRays);
   room.texels = static_cast<uint32_t>(kRoomPerWanted * config.texelsPerStep);
   room.points = static_cast<uint32_t>(config.sparsityPoints);
   room.training = true;
+  if (config.level > 0) room.mostWords = finerGrid(config).words();
   return room;
 }
 
@@ -86,11 +95,18 @@ StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
   options.anneal = static_cast<float>(std::min(1.0, (static_cast<double>(step) + 1) / 500));
   options.minAlpha = cullThreshold(config_, progress);
   options.seed = mix64(static_cast<uint64_t>(config_.seed) ^ (static_cast<uint64_t>(step) << 20));
-  options.keepProposals = step < config_.proposalWarmUp || step % config_.proposalEvery == 0;
+  const bool frozen = isFrozen(progress);
+  options.keepAttributes = !frozen;
+  options.keepProposals = !frozen && (step < config_.proposalWarmUp || step % config_.proposalEvery == 0);
+  if (config_.level > 0) {
+    options.anneal = 1;
+    options.minAlpha = static_cast<float>(config_.cullLast);
+    model_.lookThrough(frozen ? finerGrid(config_) : config_.virtualGrid());
+  }
   pass_.forward(rays, options);
   addColourGradients(step);
   pass_.backward(rays, colourGradients_, opacityGradients_, lossScales(progress));
-  updateParameters(step, plannedSteps, options.keepProposals);
+  updateParameters(step, plannedSteps, options);
 
   // The step is over: its counters may be read.
   const std::vector<float> losses = device_.read(losses_.all()), inner = device_.read(pass_.losses());
@@ -145,24 +161,25 @@ void VolumeTrainer::addColourGradients(int64_t step) {
                                colourGradients_, opacityGradients_, exposures_.gradients()});
 }
 
-void VolumeTrainer::updateParameters(int64_t step, int64_t plannedSteps, bool proposals) {
+void VolumeTrainer::updateParameters(int64_t step, int64_t plannedSteps, const VolumePass::Options& kept) {
   RateSchedule schedule;
   schedule.rate = config_.rate;
   schedule.finalFactor = config_.finalRateFactor;
   schedule.constantFraction = config_.constantRateShare;
   const float rate = static_cast<float>(schedule.at(step, plannedSteps));
+  const float ofFields = config_.level > 0 ? rate * static_cast<float>(config_.levelRateFactor) : rate;
   Adam table;
-  table.rate = rate;
+  table.rate = ofFields;
   table.skipZeroGradients = true;
   table.l2 = static_cast<float>(config_.tableL2);
   Adam network;
-  network.rate = rate;
+  network.rate = ofFields;
   network.skipZeroGradients = true;  // of blocks that no ray of the step came to
   network.l2 = static_cast<float>(config_.networkL2);
-  for (uint32_t block = 0; block < model_.space().blocks(); ++block) {
+  for (uint32_t block = 0; kept.keepAttributes && block < model_.space().blocks(); ++block) {
     model_.attributes().table(block).step(device_, table);
     model_.attributes().network(block).step(device_, network);
-    if (!proposals) continue;
+    if (!kept.keepProposals) continue;
     model_.proposals().table(block).step(device_, table);
     model_.proposals().network(block).step(device_, network);
   }

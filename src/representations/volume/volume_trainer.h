@@ -24,7 +24,9 @@ class VolumeTrainer final : public Trainee {
  private:
   VolumePass::LossScales lossScales(double progress) const;
   void addColourGradients(int64_t step);
-  void updateParameters(int64_t step, int64_t plannedSteps, bool proposals);
+  // A coarser level's first steps: only deferred networks are trained, through the grid of the level below.
+  bool isFrozen(double progress) const { return config_.level > 0 && progress < config_.frozenShare; }
+  void updateParameters(int64_t step, int64_t plannedSteps, const VolumePass::Options& kept);
 
   Device& device_;
   VolumeConfig config_;
