@@ -1,11 +1,14 @@
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "apps/tessera/verbs.h"
 #include "base/error.h"
 #include "base/progress.h"
 #include "import/capture_reader.h"
 #include "representations/volume/bake_volume.h"
 #include "representations/volume/train_volume.h"
+#include "train/run_folder.h"
 
 namespace tessera {
 
@@ -32,23 +35,34 @@ void addBakeVerb(CLI::App& app) {
   verb->callback([flags] {
     const ModelFolder folder(flags->model);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
-    const std::unique_ptr<VolumeModel> model = loadVolumeModel(*device, flags->model);
+    const LevelModels models = [&](uint32_t level) {
+      return loadVolumeModel(*device, levelFolder(flags->model, level));
+    };
+    const uint32_t levels = trainedLevels(flags->model);
     const Capture capture =
         readCapture(flags->capture.empty() ? folder.readPlacement().capture.string() : flags->capture);
     requireSameWorld(folder, capture);
-    flags->options.minAlpha = model->config().cullLast;
-    Progress progress("baking", static_cast<int64_t>(capture.photosIn(Split::train).size()), "photos");
+    flags->options.minAlpha = savedConfig<VolumeConfig>(flags->model).cullLast;
+    Progress progress("baking", static_cast<int64_t>(levels * capture.photosIn(Split::train).size()), "photos");
     flags->options.onPhoto = [&](int64_t done, int64_t) { progress.update(done); };
-    const BakedVolume baked = bakeVolume(*model, capture, flags->scene, flags->options);
+    const BakedVolume baked = bakeVolume(models, levels, capture, flags->scene, flags->options);
     progress.finish();
     if (flags->json) {
-      fmt::print("{{\"bytes_on_disk\": {}, \"bytes_in_memory\": {}, \"macroblocks\": {}, \"tiles\": {}}}\n",
-                 baked.bytesOnDisk, baked.bytesInMemory, baked.macroblocks, baked.tileset.tiles.size());
+      nlohmann::ordered_json result = {{"tiles", baked.tileset.tiles.size()}};
+      for (const BakedLevel& level : baked.levels) {
+        result["levels"].push_back({{"bytes_on_disk", level.bytesOnDisk},
+                                    {"bytes_in_memory", level.bytesInMemory},
+                                    {"macroblocks", level.macroblocks}});
+      }
+      fmt::print("{}\n", result.dump(2));
       return;
     }
-    fmt::print("{}: {:.1f} MB on disk, {:.1f} MB in memory, {} macroblocks\n", flags->scene,
-               static_cast<double>(baked.bytesOnDisk) / 1e6, static_cast<double>(baked.bytesInMemory) / 1e6,
-               baked.macroblocks);
+    for (size_t level = 0; level < baked.levels.size(); ++level) {
+      const BakedLevel& of = baked.levels[level];
+      fmt::print("{}, level {}: {:.1f} MB on disk, {:.1f} MB in memory, {} macroblocks\n", flags->scene, level,
+                 static_cast<double>(of.bytesOnDisk) / 1e6, static_cast<double>(of.bytesInMemory) / 1e6,
+                 of.macroblocks);
+    }
   });
 }
 

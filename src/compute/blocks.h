@@ -91,8 +91,8 @@ struct BlockSamples {
   Slice<float> runtimeSteps;  // optional: length in t of a renderer's step here along the ray: one texel of the domain,
                               // which is 2 halfDomain / texels; by contractDirection where contracted
   uint32_t texels = 0;
-  // With `split`, room for mostSegments(rays). Optional, [blocks]: blocks that are composited together have the same number,
-  // and a segment is a run of one group; else each block is its own.
+  // With `split`, room for mostSegments(rays). Optional, [blocks]: blocks that are composited together have the same
+  // number, and a segment is a run of one group; else each block is its own.
   Slice<const uint32_t> groupOfBlock;
   Slice<uint32_t> firstSegment;          // [rays + 1]
   Slice<uint32_t> segmentCount;          // [1]

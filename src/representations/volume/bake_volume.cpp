@@ -1,14 +1,10 @@
 #include "representations/volume/bake_volume.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "representations/volume/alive_texels.h"
 #include "representations/volume/volume_pass.h"
-#include "tiles/scene_folder.h"
-#include "tiles/volume_payload.h"
 
 namespace tessera {
 namespace {
@@ -156,10 +152,10 @@ void bakePlanes(const VirtualGrid& grid, const AliveTexels& alive, TexelBaker& b
   }
 }
 
-std::vector<DenseLayer> networkOf(VolumeModel& model, uint32_t block) {
+std::vector<DenseLayer> networkOf(VolumeModel& model, uint32_t group) {
   constexpr uint32_t kSizes[] = {DeferredNetwork::kInputs, DeferredNetwork::kHidden, DeferredNetwork::kHidden, 3};
   const std::vector<float> all = model.device().read(
-      model.deferred().values.part(size_t{block} * DeferredNetwork::kParameters, DeferredNetwork::kParameters));
+      model.deferred().values.part(size_t{group} * DeferredNetwork::kParameters, DeferredNetwork::kParameters));
   std::vector<DenseLayer> layers;
   for (int l = 0; l < 3; ++l) {
     DenseLayer layer{kSizes[l], kSizes[l + 1], {}, {}};
@@ -170,23 +166,6 @@ std::vector<DenseLayer> networkOf(VolumeModel& model, uint32_t block) {
     layers.push_back(std::move(layer));
   }
   return layers;
-}
-
-// The tree of a scene without levels: its blocks side by side, and the surround.
-Tileset flatTileset(const VolumeModel& model, const Capture& capture) {
-  Tileset tileset;
-  tileset.representation = Representation::volume;
-  tileset.name = fs::weakly_canonical(capture.root).filename().string();
-  tileset.sourceFromWorld = capture.sourceFromWorld;
-  tileset.georeference = capture.geo;
-  tileset.near = model.space().near;
-  placeOn(tileset, model.grid());
-  Tile root;
-  root.level = model.space().cells() > 1 ? 1 : 0;
-  root.cells = tileset.allCells();
-  root.box = tileset.box();
-  tileset.tiles.push_back(root);
-  return tileset;
 }
 
 }  // namespace
@@ -223,13 +202,9 @@ std::vector<AliveTexels> findAliveTexels(VolumeModel& model, const Capture& capt
   return alive;
 }
 
-VolumeContent bakeBlock(VolumeModel& model, uint32_t block, const AliveTexels& alive) {
+VolumePart bakePart(VolumeModel& model, uint32_t block, const AliveTexels& alive) {
   const VirtualGrid& grid = model.virtualGrid();
   const BlockSpace& space = model.space();
-  VolumeContent content;
-  content.featureRange = grid.featureRange;
-  content.densityRange = grid.densityRange;
-  content.network = networkOf(model, block);
   VolumePart part;
   const BlockSpace::Placement placement = space.placement(block);
   std::copy_n(placement.centre, 3, part.centre.begin());
@@ -262,57 +237,18 @@ VolumeContent bakeBlock(VolumeModel& model, uint32_t block, const AliveTexels& a
   bakeVoxels(grid, alive, baker, part);
   bakePlanes(grid, alive, baker, part);
   part.distances = chebyshevDistances(alive.occupancy(grid.planes / VolumePart::kDistanceCell));
-  content.parts.push_back(std::move(part));
-  return content;
+  return part;
 }
 
-BakedVolume bakeVolume(VolumeModel& model, const Capture& capture, const fs::path& scene,
-                       const BakeVolumeOptions& options) {
-  const std::vector<AliveTexels> alive = findAliveTexels(model, capture, options);
-  const BlockSpace& space = model.space();
-  const SceneFolderWriter folder(scene);
-  BakedVolume baked;
-  Tileset& tileset = baked.tileset;
-  tileset = flatTileset(model, capture);
-  const double metres = tileset.tileFromScene().scale;
-  const double texel = 2.0 / model.virtualGrid().planes * metres;
-  const bool oneBlock = space.cells() == 1;
-  for (uint32_t block = 0; block < space.blocks(); ++block) {
-    const VolumeContent content = bakeBlock(model, block, alive[block]);
-    const bool surround = block >= space.cells();
-    const std::string name =
-        surround ? "surround" : fmt::format("block_{}_{}", block % space.columns, block / space.columns);
-    const Bytes bytes = encodeVolume(content, options.effort);
-    TileContent entry;
-    entry.uri = folder.addContent(0, name, bytes);
-    entry.bytes = bytes.size();
-    entry.surround = surround;
-    baked.bytesOnDisk += bytes.size();
-    baked.bytesInMemory += bytesInMemory(content);
-    baked.macroblocks += content.parts[0].storedMacroblocks();
-    const VolumePart& part = content.parts[0];
-    entry.box = {Vec3d(part.low[0], part.low[1], part.low[2]), Vec3d(part.high[0], part.high[1], part.high[2])};
-    if (surround || oneBlock) {
-      entry.cells = tileset.allCells();
-      tileset.tiles[0].contents.push_back(entry);
-      continue;
-    }
-    entry.cells = {{block % space.columns, block / space.columns},
-                   {block % space.columns + 1, block / space.columns + 1}};
-    Tile tile;
-    tile.level = 0;
-    tile.cells = entry.cells;
-    tile.box = entry.box;
-    tile.geometricError = texel;
-    tile.contents.push_back(entry);
-    tileset.tiles[0].children.push_back(static_cast<uint32_t>(tileset.tiles.size()));
-    tileset.tiles.push_back(tile);
+VolumeContent bakeGroup(VolumeModel& model, uint32_t group, const std::vector<AliveTexels>& alive) {
+  VolumeContent content;
+  content.featureRange = model.virtualGrid().featureRange;
+  content.densityRange = model.virtualGrid().densityRange;
+  content.network = networkOf(model, group);
+  for (uint32_t block = 0; block < model.space().blocks(); ++block) {
+    if (model.groups().groupOfBlock[block] == group) content.parts.push_back(bakePart(model, block, alive[block]));
   }
-  tileset.tiles[0].geometricError = oneBlock ? texel : metres;
-  tileset.levels = oneBlock ? 1 : 2;
-  tileset.geometricError = metres * std::max(space.columns, space.rows);
-  folder.commit(tileset);
-  return baked;
+  return content;
 }
 
 }  // namespace tessera

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 
 #include "representations/volume/alive_texels.h"
 #include "representations/volume/volume_model.h"
@@ -20,19 +21,29 @@ struct BakeVolumeOptions {
   std::function<void(int64_t done, int64_t all)> onPhoto = [](int64_t, int64_t) {};
 };
 
-struct BakedVolume {
-  Tileset tileset;
+struct BakedLevel {
   uint64_t bytesOnDisk = 0, bytesInMemory = 0;
   uint64_t macroblocks = 0;
 };
 
-// Writes the scene folder; tileset.json last. A function of model, capture and options. Throws Error when a file cannot
-// be written.
-BakedVolume bakeVolume(VolumeModel& model, const Capture& capture, const fs::path& scene,
+struct BakedVolume {
+  Tileset tileset;
+  std::vector<BakedLevel> levels;  // the finest first; the surround counts there
+};
+
+// Gives the model of a level, the finest (0) first. One is held at a time.
+using LevelModels = std::function<std::unique_ptr<VolumeModel>(uint32_t level)>;
+
+// Writes the scene folder; tileset.json last. A function of models, capture and options. Throws Error when a file
+// cannot be written.
+BakedVolume bakeVolume(const LevelModels& models, uint32_t levels, const Capture& capture, const fs::path& scene,
                        const BakeVolumeOptions& options);
 
 // The steps of it. What training photos see, [blocks].
 std::vector<AliveTexels> findAliveTexels(VolumeModel& model, const Capture& capture, const BakeVolumeOptions& options);
-VolumeContent bakeBlock(VolumeModel& model, uint32_t block, const AliveTexels& alive);
+// A block's texels.
+VolumePart bakePart(VolumeModel& model, uint32_t block, const AliveTexels& alive);
+// What is composited and shaded together: the blocks of one of the model's groups. `alive` by block.
+VolumeContent bakeGroup(VolumeModel& model, uint32_t group, const std::vector<AliveTexels>& alive);
 
 }  // namespace tessera

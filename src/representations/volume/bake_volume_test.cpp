@@ -25,6 +25,18 @@ std::unique_ptr<VolumeRenderer> openScene(const fs::path& folder) {
   return std::make_unique<VolumeRenderer>(scene.frame, std::move(scene.tree), std::move(scene.source), settings);
 }
 
+// A copy, as baking owns the models that it bakes.
+LevelModels onlyLevel(TrainedVolumeCube& trained) {
+  return [&](uint32_t) {
+    VolumeModel& from = trained.model();
+    auto made = std::make_unique<VolumeModel>(from.device(), from.config(), from.grid());
+    made->copyFields(from);
+    made->device().write(made->deferred().values.all(),
+                         std::span<const float>(from.device().read(from.deferred().values.all())));
+    return made;
+  };
+}
+
 // What docs/tile-format.md says a sample's eight sums are, from the bytes of a part.
 std::array<double, 8> sumsFromBytes(const VolumeContent& content, const VolumePart& part, const float p[3]) {
   const auto value = [&](uint8_t byte, size_t attribute) {
@@ -96,7 +108,9 @@ TEST(BakeVolume, StoresTheVeryNumbersThatTrainingSaw) {
     }
     alive.mark(&positions[size_t{3} * s]);
   }
-  const VolumeContent content = bakeBlock(model, block, alive);
+  std::vector<AliveTexels> ofBlocks(2, AliveTexels(grid));
+  ofBlocks[block] = alive;
+  const VolumeContent content = bakeGroup(model, block, ofBlocks);
 
   const Array<uint32_t> blocks = device.arrayOf(std::vector<uint32_t>(kSamples, block));
   const Array<float> at = device.arrayOf(positions);
@@ -147,7 +161,7 @@ TEST(BakeVolume, LooksAsTheModelThatItWasBakedFrom) {
     VolumeConfig config = smallVolumeConfig();
     config.surround = surround;
     TrainedVolumeCube trained(scene, config, cubeGrid(2), 300);
-    const BakedVolume baked = bakeVolume(trained.model(), scene.capture(), folder / surround, {});
+    const BakedVolume baked = bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / surround, {});
     EXPECT_EQ(baked.tileset.tiles.size(), 3u);
     VolumeModelRenderer model(trained.model(), static_cast<float>(config.cullLast));
     const std::unique_ptr<VolumeRenderer> tiles = openScene(folder / surround);
@@ -169,18 +183,18 @@ TEST(BakeVolume, WritesTheSameSceneAgain) {
   const CubeScene scene;
   const TestFolder folder;
   TrainedVolumeCube trained(scene, smallVolumeConfig(), cubeGrid(), 60);
-  const BakedVolume once = bakeVolume(trained.model(), scene.capture(), folder / "scene", {});
+  const BakedVolume once = bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / "scene", {});
   const std::string text = readTextFile(folder / "scene/tileset.json");
-  const BakedVolume again = bakeVolume(trained.model(), scene.capture(), folder / "scene", {});
+  const BakedVolume again = bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / "scene", {});
   EXPECT_EQ(readTextFile(folder / "scene/tileset.json"), text);
-  EXPECT_EQ(once.bytesOnDisk, again.bytesOnDisk);
+  EXPECT_EQ(once.levels.at(0).bytesOnDisk, again.levels.at(0).bytesOnDisk);
   EXPECT_EQ(readTileset(folder / "scene").tiles.size(), 1u) << "one block is its own root";
 }
 
 TEST(BakeVolume, KeepsNothingOfAModelThatHasSeenNothing) {
   const CubeScene scene;
   TrainedVolumeCube untrained(scene, smallVolumeConfig(), cubeGrid(), 0);
-  const VolumeContent content = bakeBlock(untrained.model(), 0, AliveTexels(untrained.model().virtualGrid()));
+  const VolumeContent content = bakeGroup(untrained.model(), 0, {AliveTexels(untrained.model().virtualGrid())});
   EXPECT_EQ(content.parts[0].storedMacroblocks(), 0u);
   EXPECT_FALSE(brokenRule(content));
   for (const uint8_t distance : content.parts[0].distances) EXPECT_EQ(distance, 255);

@@ -41,8 +41,8 @@ LevelGroups groupsOfLevel(uint32_t columns, uint32_t rows, uint32_t level, bool 
   }
   for (uint32_t j = 0; j < along; ++j) {
     for (uint32_t i = 0; i < across; ++i) {
-      made.cells.push_back({{i * steps.x, j * steps.y},
-                            {std::min((i + 1) * steps.x, columns), std::min((j + 1) * steps.y, rows)}});
+      made.cells.push_back(
+          {{i * steps.x, j * steps.y}, {std::min((i + 1) * steps.x, columns), std::min((j + 1) * steps.y, rows)}});
     }
   }
   if (withSurround) made.groupOfBlock.push_back(across * along);

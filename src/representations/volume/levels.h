@@ -12,8 +12,8 @@ struct CellGroup {
   std::array<uint32_t, 2> first = {0, 0}, end = {1, 1};
 };
 
-// Level 0 is the blocks themselves. Each next one merges 2 × 2 groups, and all there are when no more than kMostMerged remain:
-// 24 blocks come to 6 and then to 1, as in the paper.
+// Level 0 is the blocks themselves. Each next one merges 2 × 2 groups, and all there are when no more than kMostMerged
+// remain: 24 blocks come to 6 and then to 1, as in the paper.
 inline constexpr uint32_t kMostMerged = 8;
 
 // The level at which all is one; 0 for a single block.

@@ -1,5 +1,7 @@
 #include "representations/volume/train_volume.h"
 
+#include <algorithm>
+
 #include "base/error.h"
 #include "base/log.h"
 #include "base/memory.h"
@@ -36,6 +38,54 @@ double trainingBytesPerBlock(const VolumeConfig& config) {
   return kPerParameter * static_cast<double>(parameters) + 2.0 * sizeof(uint32_t) * config.virtualGrid().words();
 }
 
+fs::path levelFolder(const fs::path& model, uint32_t level) {
+  return level == 0 ? model : model / "levels" / std::to_string(level);
+}
+
+uint32_t trainedLevels(const fs::path& model) {
+  for (uint32_t levels = 1;; ++levels) {
+    const std::optional<ModelManifest> next = ModelFolder(levelFolder(model, levels)).manifest();
+    if (!next || next->step < next->plannedSteps) return levels;
+  }
+}
+
+VolumeConfig levelConfig(VolumeConfig finest, uint32_t level) {
+  finest.level = static_cast<int>(level);
+  finest.voxels = std::max(8, (finest.voxels >> level) / 8 * 8);
+  finest.planes = std::max(8, (finest.planes >> level) / 8 * 8);
+  return finest;
+}
+
+namespace {
+
+// Writes what a run is made of, unless a run is there already.
+void writeRun(Device& device, const ModelFolder& folder, const Capture& capture, const BlockGrid& grid,
+              VolumeConfig config, const TrainingLoopOptions& loop) {
+  if (folder.manifest()) return;
+  writeFileAtomically(folder.configPath(), howToRepeat(device, loop) + configToToml(config.fields()));
+  folder.writePlacement({{}, grid, capture.sourceFromWorld, capture.root, trainingNames(capture)}, loop.method);
+}
+
+// True when the level is trained to its end. A level that was begun goes on with the steps that it had planned.
+bool trainLevel(Device& device, const Capture& capture, const fs::path& model, uint32_t level, const BlockGrid& grid,
+                const VolumeConfig& finest, TrainingLoopOptions loop, int64_t steps) {
+  const ModelFolder folder(levelFolder(model, level));
+  const std::optional<ModelManifest> before = folder.manifest();
+  if (before && before->step >= before->plannedSteps) return true;
+  const VolumeConfig config = levelConfig(finest, level);
+  VolumeTrainer trainer(device, capture, config, grid);
+  if (!before) trainer.model().copyFields(*loadVolumeModel(device, levelFolder(model, level - 1)));
+  loop.minutes = 0;
+  loop.steps = before ? before->plannedSteps : steps;
+  loop.resume = true;
+  writeRun(device, folder, capture, grid, config, loop);
+  inform("level {}: {} blocks in {} models, {} steps", level, grid.cells(), trainer.model().groups().cells.size(),
+         loop.steps);
+  return runTraining(trainer, folder, loop).finished;
+}
+
+}  // namespace
+
 TrainingResult trainVolume(Device& device, const Capture& capture, const fs::path& model, TrainVolumeOptions options) {
   refuseCaptureFolder(model);
   const ModelFolder folder(model);
@@ -45,13 +95,20 @@ TrainingResult trainVolume(Device& device, const Capture& capture, const fs::pat
   options.config.photoBudgetMiB = settledPhotoBudget(options.config.photoBudgetMiB, capture, usableMemoryBytes());
   // A resumed run stands where the killed one stood, whatever has become of the capture's points since.
   const BlockGrid grid = goingOn ? requireGrid(folder) : cut(capture, model, options);
-  VolumeTrainer trainer(device, capture, options.config, grid);
-  if (!folder.manifest()) {
-    writeFileAtomically(folder.configPath(), howToRepeat(device, options.loop) + configToToml(options.config.fields()));
-    folder.writePlacement({{}, grid, capture.sourceFromWorld, capture.root, trainingNames(capture)},
-                          options.loop.method);
+  TrainingResult result;
+  {
+    VolumeTrainer trainer(device, capture, options.config, grid);
+    if (!goingOn && !folder.manifest()) fs::remove_all(model / "levels");  // of a run that is no more
+    writeRun(device, folder, capture, grid, options.config, options.loop);
+    result = runTraining(trainer, folder, options.loop);
   }
-  return runTraining(trainer, folder, options.loop);
+  const int64_t steps = static_cast<int64_t>(options.config.levelShare * static_cast<double>(result.plannedSteps));
+  if (!result.finished || steps < 1) return result;
+  const uint32_t top = topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
+  for (uint32_t level = 1; level <= top && result.finished; ++level) {
+    result.finished = trainLevel(device, capture, model, level, grid, options.config, options.loop, steps);
+  }
+  return result;
 }
 
 BlockGrid requireGrid(const ModelFolder& folder) {

@@ -13,8 +13,19 @@ struct TrainVolumeOptions {
 };
 
 // Cuts the capture into blocks (blocks.json, blocks.svg, blocks.geojson), warns of those that will not come out well,
-// trains, resumes, saves; see training_loop.h. Writes config.toml and blocks.json first.
+// trains, resumes, saves; see training_loop.h. Writes config.toml and blocks.json first. Then the coarser levels of
+// detail (City-on-Web, section 4.4), up to one that holds all: each begins with the fields of the one below, trains new
+// deferred networks for what it merges, then all together through virtual grids of half the resolution. The result
+// counts the finest level's steps; it is finished when all levels are.
 TrainingResult trainVolume(Device& device, const Capture& capture, const fs::path& model, TrainVolumeOptions options);
+
+// The folder of a level's model: the model's own for the finest, MODEL/levels/<level> for those above.
+fs::path levelFolder(const fs::path& model, uint32_t level);
+// Levels that are trained to their end, without a gap: at least 1, the finest.
+uint32_t trainedLevels(const fs::path& model);
+// The settings of a level, from those of the finest: half the resolution for each. Its fields, and how they are
+// sampled, are the same.
+VolumeConfig levelConfig(VolumeConfig finest, uint32_t level);
 
 // The grid of blocks.json; Error when there is none.
 BlockGrid requireGrid(const ModelFolder& folder);

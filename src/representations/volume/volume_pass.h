@@ -23,7 +23,7 @@ class VolumePass {
   struct Room {
     uint32_t rays = 0, texels = 0;
     uint32_t mostWords = 0;  // of virtual grids that the model will look through, where finer than its own
-    uint32_t points = 0;  // random ones, for the sparsity loss; their rows come before those of rays
+    uint32_t points = 0;     // random ones, for the sparsity loss; their rows come before those of rays
     bool training = false;
   };
   // Keeps a reference to `model`.
