@@ -84,6 +84,13 @@ TEST_F(VolumeCommandLine, GoesTheWholeWayFromACityToThePicturesOfAScene) {
     EXPECT_EQ(result.at("views").size(), 2u);
     EXPECT_TRUE(fs::exists(fs::path(what) / "report.html"));
   }
+  // Two blocks, and a level that holds both.
+  const Said coarse = run({"eval", scene(), at("city"), "--lod", "1", "--json", at("eval.json")});
+  EXPECT_EQ(coarse.exitCode, 0) << coarse.err;
+  EXPECT_GT(json::parse(readTextFile(at("eval.json"))).at("psnr").get<double>(), 8);
+  const Said none = run({"eval", scene(), at("city"), "--lod", "2"});
+  EXPECT_EQ(none.exitCode, 1);
+  EXPECT_TRUE(contains(none.err, "levels 0 to 1")) << none.err;
   const Said drawn = run({"render", scene(), at("pictures"), "--views", at("city"), "--size", "32x24"});
   EXPECT_EQ(drawn.exitCode, 0) << drawn.err;
   EXPECT_TRUE(fs::exists(fs::path(at("pictures")) / "images/photo_0000.png"));

@@ -1,5 +1,7 @@
 #include "apps/tessera/drawable.h"
 
+#include <fmt/format.h>
+
 #include "base/error.h"
 #include "render/cpu/volume_renderer.h"
 #include "render/volume_scene.h"
@@ -33,10 +35,16 @@ class DrawableModel final : public Drawable {
 
 class DrawableScene final : public Drawable {
  public:
-  DrawableScene(const fs::path& folder, int threads) : folder_(folder), tileset_(readTileset(folder)) {
+  DrawableScene(const fs::path& folder, const DrawableOptions& options)
+      : folder_(folder), tileset_(readTileset(folder)) {
     VolumeRendererSettings settings;
+    if (static_cast<uint32_t>(options.level) >= tileset_.levels) {
+      throw Error(folder.string(), fmt::format("--lod {}", options.level),
+                  fmt::format("the scene has levels 0 to {}", tileset_.levels - 1), "name one of those");
+    }
     settings.selection.mostPixels = 0;  // the finest everywhere
-    settings.threads = threads;
+    settings.selection.finestLevel = options.level;
+    settings.threads = options.threads;
     VolumeScene scene = openVolumeScene(folder);
     settings.background = Eigen::Array3f(scene.background[0], scene.background[1], scene.background[2]);
     renderer_ = std::make_unique<VolumeRenderer>(scene.frame, std::move(scene.tree), std::move(scene.source), settings);
@@ -60,8 +68,8 @@ class DrawableScene final : public Drawable {
 
 }  // namespace
 
-std::unique_ptr<Drawable> openDrawable(Device& device, const fs::path& folder, int threads) {
-  if (fs::exists(folder / "tileset.json")) return std::make_unique<DrawableScene>(folder, threads);
+std::unique_ptr<Drawable> openDrawable(Device& device, const fs::path& folder, const DrawableOptions& options) {
+  if (fs::exists(folder / "tileset.json")) return std::make_unique<DrawableScene>(folder, options);
   const std::optional<ModelManifest> manifest = ModelFolder(folder).manifest();
   if (!manifest || manifest->method == "field") {
     auto model = loadFieldModel(device, folder);

@@ -20,7 +20,12 @@ class Drawable {
   virtual std::vector<std::string> trainedOnAmong(const Capture& capture, Split split) const = 0;
 };
 
-// Throws Error when the folder holds neither. Keeps a reference to `device`.
-std::unique_ptr<Drawable> openDrawable(Device& device, const fs::path& folder, int threads = 0);
+struct DrawableOptions {
+  int threads = 0;  // of scenes; models have their device's
+  int level = 0;    // of detail of scenes: the finest to draw
+};
+
+// Throws Error when the folder holds neither, or the scene has no such level. Keeps a reference to `device`.
+std::unique_ptr<Drawable> openDrawable(Device& device, const fs::path& folder, const DrawableOptions& options);
 
 }  // namespace tessera

@@ -14,6 +14,7 @@ void addEvalVerb(CLI::App& app) {
   struct Flags {
     std::string model, capture, split = "test", exposure = "neutral", json, report, images, lpips;
     DeviceOptions device;
+    int level = 0;
   };
   auto flags = std::make_shared<Flags>();
   CLI::App* verb = app.add_subcommand("eval", "held-out photos against renderings: PSNR, SSIM, LPIPS, depth error");
@@ -30,11 +31,15 @@ void addEvalVerb(CLI::App& app) {
   verb->add_option("--report", flags->report, "write a self-contained report.html here; default MODEL/report.html");
   verb->add_option("--images", flags->images, "write each rendering and its error map as PNG into this folder");
   verb->add_option("--lpips", flags->lpips, "LPIPS weights (safetensors)");
+  verb->add_option("--lod", flags->level, "of a scene: the finest level of detail to draw")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 64));
   addDeviceFlags(*verb, flags->device);
   verb->callback([flags] {
     const Capture capture = readCapture(flags->capture);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
-    const std::unique_ptr<Drawable> drawable = openDrawable(*device, flags->model, flags->device.threads);
+    const std::unique_ptr<Drawable> drawable =
+        openDrawable(*device, flags->model, {flags->device.threads, flags->level});
     EvaluateOptions options;
     options.split = *splitFromName(flags->split);
     drawable->requireWorldOf(capture);

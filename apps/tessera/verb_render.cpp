@@ -13,6 +13,7 @@ namespace {
 struct RenderFlags {
   std::string model, out, views, path, dataparserTransforms, size, split = "test";
   DeviceOptions device;
+  int level = 0;
 };
 
 void parseSize(const std::string& size, RenderViewsOptions& options) {
@@ -46,13 +47,17 @@ void addRenderVerb(CLI::App& app) {
       ->capture_default_str()
       ->check(CLI::IsMember({"test", "validation", "train", "all"}));
   verb->add_option("--size", flags->size, "picture size, as 1280x720; default: the camera's own");
+  verb->add_option("--lod", flags->level, "of a scene: the finest level of detail to draw")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 64));
   addDeviceFlags(*verb, flags->device);
   verb->callback([flags] {
     if (flags->views.empty() && flags->path.empty()) throw CLI::RequiredError("--views or --path");
     RenderViewsOptions options;
     parseSize(flags->size, options);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
-    const std::unique_ptr<Drawable> drawable = openDrawable(*device, flags->model, flags->device.threads);
+    const std::unique_ptr<Drawable> drawable =
+        openDrawable(*device, flags->model, {flags->device.threads, flags->level});
     std::vector<NamedView> views;
     if (!flags->path.empty()) {
       const CameraPath path = readCameraPath(flags->path, flags->dataparserTransforms);

@@ -8,6 +8,7 @@
 #include "base/random.h"
 #include "render/cpu/volume_renderer.h"
 #include "render/volume_scene.h"
+#include "representations/volume/train_volume.h"
 #include "representations/volume/volume_cube.h"
 #include "representations/volume/volume_model_renderer.h"
 #include "tiles/scene_folder.h"
@@ -176,6 +177,42 @@ TEST(BakeVolume, LooksAsTheModelThatItWasBakedFrom) {
     }
     EXPECT_NEAR(ofTiles / static_cast<double>(photos.size()), ofModel / static_cast<double>(photos.size()), 0.5)
         << surround;
+  }
+}
+
+TEST(BakeVolume, PutsLevelsAboveOneAnother) {
+  const CubeScene scene;
+  const TestFolder folder;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  TrainVolumeOptions options;
+  options.config = smallVolumeConfig();
+  options.blocks = *parseBlockCount("2x2");
+  options.loop.steps = 30;
+  options.loop.progress = false;
+  trainVolume(*device, scene.capture(), folder / "model", options);
+  ASSERT_EQ(trainedLevels(folder / "model"), 2u);
+  const BakedVolume baked =
+      bakeVolume([&](uint32_t level) { return loadVolumeModel(*device, levelFolder(folder / "model", level)); }, 2,
+                 scene.capture(), folder / "scene", {});
+  ASSERT_EQ(baked.tileset.tiles.size(), 5u);
+  const Tile& root = baked.tileset.tiles[0];
+  EXPECT_EQ(root.children.size(), 4u);
+  EXPECT_EQ(root.level, 1u);
+  EXPECT_NEAR(root.geometricError, 2 * baked.tileset.tiles[1].geometricError, 1e-9);
+  const VolumeContent merged = readVolume(contentPath(folder / "scene", root.contents.at(0).uri));
+  EXPECT_EQ(merged.parts.size(), 4u) << "side by side, each with its own texels";
+  EXPECT_EQ(merged.parts[0].planes, 32u);
+  // Drawn at either level.
+  for (const int finest : {0, 1}) {
+    VolumeScene opened = openVolumeScene(folder / "scene");
+    VolumeRendererSettings settings;
+    settings.selection.mostPixels = 0;
+    settings.selection.finestLevel = finest;
+    VolumeRenderer renderer(opened.frame, std::move(opened.tree), std::move(opened.source), settings);
+    const RenderedView view =
+        renderer.render(scene.capture().cameras[0], scene.capture().photos[0].worldFromCamera, nullptr);
+    EXPECT_EQ(renderer.selection().cut.size(), finest == 0 ? 4u : 1u);
+    for (const float value : view.colour.pixels) ASSERT_TRUE(std::isfinite(value));
   }
 }
 

@@ -41,6 +41,45 @@ TEST(TrainVolume, WritesAFolderThatCanBeDrawnAndRepeated) {
   EXPECT_EQ(model->config().voxels, smallVolumeConfig().voxels);
 }
 
+TEST(TrainVolume, MakesCoarserLevelsAndLeavesTheFinestAlone) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  TrainVolumeOptions finest = options(10);
+  finest.config.levelShare = 0;
+  trainVolume(*device, scene.capture(), scene / "finest", finest);
+  EXPECT_EQ(trainedLevels(scene / "finest"), 1u);
+  TrainVolumeOptions all = options(10);
+  all.config.levelShare = 0.8;
+  EXPECT_TRUE(trainVolume(*device, scene.capture(), scene / "model", all).finished);
+  EXPECT_EQ(checkpoints(scene / "model"), checkpoints(scene / "finest"));
+  ASSERT_EQ(trainedLevels(scene / "model"), 2u) << "two blocks, and one that holds both";
+  const fs::path coarse = levelFolder(scene / "model", 1);
+  EXPECT_EQ(ModelFolder(coarse).manifest()->plannedSteps, 8);
+  const std::unique_ptr<VolumeModel> level = loadVolumeModel(*device, coarse);
+  EXPECT_EQ(level->groups().groups(), 1u);
+  EXPECT_EQ(level->virtualGrid().planes, static_cast<uint32_t>(smallVolumeConfig().planes) / 2);
+  const std::unique_ptr<VolumeModel> below = loadVolumeModel(*device, scene / "model");
+  EXPECT_NE(device->read(level->attributes().network(0).values.all()),
+            device->read(below->attributes().network(0).values.all()));
+}
+
+TEST(TrainVolume, GoesOnWithALevelThatWasStopped) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  TrainVolumeOptions whole = options(6);
+  whole.config.levelShare = 2;
+  trainVolume(*device, scene.capture(), scene / "unbroken", whole);
+  TrainVolumeOptions stopped = whole;
+  int64_t asked = 0;
+  stopped.loop.stopRequested = [&] { return ++asked > 11; };
+  EXPECT_FALSE(trainVolume(*device, scene.capture(), scene / "model", stopped).finished);
+  EXPECT_EQ(trainedLevels(scene / "model"), 1u);
+  TrainVolumeOptions resumed = whole;
+  resumed.loop.resume = true;
+  EXPECT_TRUE(trainVolume(*device, scene.capture(), scene / "model", resumed).finished);
+  EXPECT_EQ(checkpoints(levelFolder(scene / "model", 1)), checkpoints(levelFolder(scene / "unbroken", 1)));
+}
+
 TEST(TrainVolume, GoesOnWhereItWasStopped) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});

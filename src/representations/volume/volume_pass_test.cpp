@@ -154,6 +154,28 @@ TEST(VolumePass, CompositesBlocksAsOneVolumeWhereNothingDependsOnTheDirection) {
   EXPECT_GT(crossing, 5) << "rays that pass from block to block";
 }
 
+// Invariant 13: merged, with the same resolution and nothing that depends on the direction, blocks look as they do
+// apart.
+TEST(VolumePass, LooksTheSameMergedWhereNothingDependsOnTheDirection) {
+  VolumeConfig config = smallVolumeConfig();
+  Scene apart(config);
+  config.level = 1;
+  Scene merged(config);
+  merged.model->copyFields(*apart.model);
+  for (Scene* scene : {&apart, &merged}) {
+    std::vector<float> deferred(scene->model->deferred().values.size());
+    for (size_t network = 0; network < deferred.size() / DeferredNetwork::kParameters; ++network) {
+      for (size_t i = 1; i <= 3; ++i) deferred[(network + 1) * DeferredNetwork::kParameters - i] = -100;
+    }
+    scene->device->write(scene->model->deferred().values.all(), std::span<const float>(deferred));
+    scene->pass->forward(scene->rays(), {});
+  }
+  EXPECT_EQ(merged.model->deferred().values.size() * 2, apart.model->deferred().values.size());
+  const std::vector<float> one = apart.device->read(apart.pass->colour());
+  const std::vector<float> other = merged.device->read(merged.pass->colour());
+  for (size_t i = 0; i < one.size(); ++i) EXPECT_NEAR(one[i], other[i], 1e-5);
+}
+
 TEST(VolumePass, EndsRaysAtOpaqueThings) {
   Scene scene(smallVolumeConfig());
   VolumeRays rays = scene.rays();
