@@ -50,6 +50,7 @@ VolumePass::Room roomFor(const VolumeConfig& config) {
 }  // namespace
 
 float cullThreshold(const VolumeConfig& config, double progress) {
+  if (config.level > 0) return static_cast<float>(config.cullLast);  // the finest has come to it
   if (progress < config.cullBegin) return 0;
   const double way = std::min(1.0, (progress - config.cullBegin) / std::max(1e-9, config.cullEnd - config.cullBegin));
   return static_cast<float>(config.cullFirst * std::pow(config.cullLast / config.cullFirst, way));
@@ -100,7 +101,6 @@ StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
   options.keepProposals = !frozen && (step < config_.proposalWarmUp || step % config_.proposalEvery == 0);
   if (config_.level > 0) {
     options.anneal = 1;
-    options.minAlpha = static_cast<float>(config_.cullLast);
     model_.lookThrough(frozen ? finerGrid(config_) : config_.virtualGrid());
   }
   pass_.forward(rays, options);
