@@ -16,7 +16,7 @@ class PhotoRays {
     double photoBudgetMiB = 0;  // of decoded photos; 0: no limit
     int stepsPerPhoto = 2;
     bool randomBackground = true;
-    double knownShare = 0;  // of the rays, through sparse points
+    double knownShare = 0;   // of the rays, through sparse points
     bool freeSpace = false;  // also how far rays go through nothing
     // Numbers a ray; the first is RayBatch's, the others differ from it by multiples of the golden ratio.
     uint32_t jitters = 1;

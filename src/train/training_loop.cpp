@@ -130,7 +130,7 @@ TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const Tr
   while (unfinished() && !options.stopRequested()) {
     const StepReport report = trainee.step(state.step, state.step < planMadeAt ? 0 : state.plannedSteps);
     if (!std::isfinite(report.loss)) {
-      throw Error(folder.root().string(), fmt::format("step {}", state.step), "the loss is not a number",
+      throw Error(folder.root().string(), fmt::format("step {}, block {}", state.step, trainee.brokenPart()), "the loss is not a number",
                   "train into another folder with a lower --set rate=..., and report it with the capture");
     }
     window.add(report);

@@ -27,6 +27,8 @@ class Trainee {
   virtual uint32_t parts() const { return 1; }
   virtual Bytes save(uint32_t part) = 0;
   virtual void restore(uint32_t part, const fs::path& path, const Safetensors& state) = 0;
+  // Asked when a loss is not a number: the first part that holds something that is none; 0 where none does.
+  virtual uint32_t brokenPart() { return 0; }
 };
 
 // Throws Error when a checkpoint says that it is of another kind; warns when it was trained on another device, which is

@@ -198,6 +198,18 @@ Bytes VolumeTrainer::save(uint32_t part) {
   return tensors.encode({{"format", kFormat}, {"device", device_.target()}, {"block", std::to_string(part)}});
 }
 
+uint32_t VolumeTrainer::brokenPart() {
+  for (uint32_t block = 0; block < parts(); ++block) {
+    for (ParameterGroup* group : {&model_.attributes().network(block), &model_.attributes().table(block),
+                                  &model_.proposals().network(block), &model_.proposals().table(block)}) {
+      for (const float value : device_.read(group->values.all())) {
+        if (!std::isfinite(value)) return block;
+      }
+    }
+  }
+  return 0;
+}
+
 void VolumeTrainer::restore(uint32_t part, const fs::path& path, const Safetensors& state) {
   requireFormat(path, state, kFormat, "volume");
   model_.restore(part, path, state);

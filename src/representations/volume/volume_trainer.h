@@ -19,6 +19,8 @@ class VolumeTrainer final : public Trainee {
   Bytes save(uint32_t part) override;
   void restore(uint32_t part, const fs::path& path, const Safetensors& state) override;
 
+  uint32_t brokenPart() override;
+
   VolumeModel& model() { return model_; }
 
  private:

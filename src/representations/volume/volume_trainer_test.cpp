@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "base/error.h"
 #include "representations/volume/volume_cube.h"
@@ -74,6 +75,17 @@ TEST(VolumeTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
     state = part.saved();
   }
   EXPECT_EQ(state, unbroken.saved());
+}
+
+TEST(VolumeTrainer, NamesTheBlockThatIsBroken) {
+  const CubeScene scene;
+  TrainedVolumeCube trained(scene, smallVolumeConfig(), cubeGrid(2), 1);
+  EXPECT_EQ(trained.trainer->brokenPart(), 0u);
+  ParameterGroup& network = trained.model().attributes().network(1);
+  std::vector<float> values = trained.device->read(network.values.all());
+  values[5] = std::numeric_limits<float>::quiet_NaN();
+  trained.device->write(network.values.all(), std::span<const float>(values));
+  EXPECT_EQ(trained.trainer->brokenPart(), 1u);
 }
 
 TEST(VolumeTrainer, RefusesCheckpointsOfOtherKinds) {
