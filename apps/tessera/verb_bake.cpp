@@ -34,6 +34,7 @@ void addBakeVerb(CLI::App& app) {
   addDeviceFlags(*verb, flags->device);
   verb->callback([flags] {
     const ModelFolder folder(flags->model);
+    requireManifest(folder, "volume");
     const std::unique_ptr<Device> device = makeDevice(flags->device);
     const LevelModels models = [&](uint32_t level) {
       return loadVolumeModel(*device, levelFolder(flags->model, level));
