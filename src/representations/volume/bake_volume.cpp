@@ -9,8 +9,12 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kRays = 2048;                // of one piece of a photo
-constexpr uint32_t kTexels = 1 << 16;           // evaluated together
+constexpr uint32_t kRays = 2048;       // of one piece of a photo
+constexpr uint32_t kTexels = 1 << 16;  // evaluated together
+// Of the surround also what lies beside the photos is kept, as far as this share of their size: people turn their
+// heads, and what the model makes up there is better than a hole.
+constexpr double kBeside = 0.5;
+constexpr int kBesideStride = 3;
 constexpr double kReachOfPlanes = 12.0 / 2048;  // texels beside needed ones are kept too (MERF: 12 of 2048)
 
 VolumePass::Room roomForRays(const VolumeModel& model) {
@@ -23,23 +27,32 @@ VolumePass::Room roomForRays(const VolumeModel& model) {
   return room;
 }
 
-// Pixels of a photo, every `stride`th, as rays on the device.
+// Which pixels of a photo to look through.
+struct Lattice {
+  int firstX = 0, firstY = 0, endX = 0, endY = 0, stride = 1;
+
+  size_t columns() const { return static_cast<size_t>((endX - firstX + stride - 1) / stride); }
+  size_t rows() const { return static_cast<size_t>((endY - firstY + stride - 1) / stride); }
+  size_t count() const { return columns() * rows(); }
+};
+
+// Pixels as rays on the device, a piece at a time.
 class PhotoPixels {
  public:
-  PhotoPixels(Device& device, const RayCamera& camera, int width, int height, int stride)
-      : device_(device), width_(width), height_(height), stride_(stride) {
+  PhotoPixels(Device& device, const RayCamera& camera, const Lattice& lattice) : device_(device), lattice_(lattice) {
     cameras_ = device.arrayOf(std::vector<RayCamera>{camera});
     cameraOfRay_ = device.array<uint32_t>(kRays);
     pixels_ = device.array<float>(kRays * 2);
     for (Array<float>* three : {&origins_, &directions_}) *three = device.array<float>(kRays * 3);
   }
-  size_t count() const { return size_t{columns()} * ((height_ + stride_ - 1) / stride_); }
   VolumeRays rays(size_t first) {
-    const uint32_t count = static_cast<uint32_t>(std::min<size_t>(kRays, this->count() - first));
+    const uint32_t count = static_cast<uint32_t>(std::min<size_t>(kRays, lattice_.count() - first));
     std::vector<float> pixels;
     for (size_t i = first; i < first + count; ++i) {
-      pixels.push_back(static_cast<float>(i % columns() * stride_) + 0.5f);
-      pixels.push_back(static_cast<float>(i / columns() * stride_) + 0.5f);
+      const int x = lattice_.firstX + static_cast<int>(i % lattice_.columns()) * lattice_.stride;
+      const int y = lattice_.firstY + static_cast<int>(i / lattice_.columns()) * lattice_.stride;
+      pixels.push_back(static_cast<float>(x) + 0.5f);
+      pixels.push_back(static_cast<float>(y) + 0.5f);
     }
     device_.write(pixels_.all(), std::span<const float>(pixels));
     device_.run(GenerateRays{{count}, cameras_, cameraOfRay_, pixels_, origins_, directions_});
@@ -47,13 +60,46 @@ class PhotoPixels {
   }
 
  private:
-  size_t columns() const { return static_cast<size_t>((width_ + stride_ - 1) / stride_); }
-
   Device& device_;
-  int width_, height_, stride_;
+  Lattice lattice_;
   Array<RayCamera> cameras_;
   Array<uint32_t> cameraOfRay_;
   Array<float> pixels_, origins_, directions_;
+};
+
+// Marks what is seen through the pixels, of blocks from `firstBlock` on.
+class AliveFinder {
+ public:
+  AliveFinder(VolumeModel& model, const BakeVolumeOptions& options, std::vector<AliveTexels>& alive)
+      : model_(model), options_(options), alive_(alive), pass_(model, roomForRays(model)) {
+    drawing_.minAlpha = static_cast<float>(options.minAlpha);
+  }
+  void look(const RayCamera& camera, const Lattice& lattice, uint32_t firstBlock) {
+    Device& device = model_.device();
+    PhotoPixels pixels(device, camera, lattice);
+    for (size_t first = 0; first < lattice.count(); first += kRays) {
+      const VolumeRays rays = pixels.rays(first);
+      pass_.forward(rays, drawing_);
+      const uint32_t samples = device.read(pass_.firstSample().part(rays.count, 1))[0];
+      const std::vector<float> weights = device.read(pass_.weights().part(0, samples));
+      const std::vector<float> logDensities = device.read(pass_.logDensities().part(0, samples));
+      const std::vector<float> steps = device.read(pass_.runtimeSteps().part(0, samples));
+      const std::vector<float> positions = device.read(pass_.positions().part(0, size_t{3} * samples));
+      const std::vector<uint32_t> blocks = device.read(pass_.blockOfSample().part(0, samples));
+      for (uint32_t s = 0; s < samples; ++s) {
+        if (blocks[s] < firstBlock || !(weights[s] > options_.minWeight)) continue;
+        if (!(-std::expm1(-std::exp(logDensities[s]) * steps[s]) > options_.minAlpha)) continue;
+        alive_[blocks[s]].mark(&positions[size_t{3} * s]);
+      }
+    }
+  }
+
+ private:
+  VolumeModel& model_;
+  const BakeVolumeOptions& options_;
+  std::vector<AliveTexels>& alive_;
+  VolumePass pass_;
+  VolumePass::Options drawing_;
 };
 
 // Evaluates one block's attributes at positions, as bytes.
@@ -171,31 +217,20 @@ std::vector<DenseLayer> networkOf(VolumeModel& model, uint32_t group) {
 }  // namespace
 
 std::vector<AliveTexels> findAliveTexels(VolumeModel& model, const Capture& capture, const BakeVolumeOptions& options) {
-  Device& device = model.device();
   std::vector<AliveTexels> alive(model.space().blocks(), AliveTexels(model.virtualGrid()));
-  VolumePass pass(model, roomForRays(model));
-  VolumePass::Options drawing;
-  drawing.minAlpha = static_cast<float>(options.minAlpha);
+  AliveFinder finder(model, options, alive);
+  const bool surround = model.space().blocks() > model.space().cells();
   const std::vector<int> photos = capture.photosIn(Split::train);
   int64_t done = 0;
   for (const int photo : photos) {
     const Camera& camera = capture.cameras[capture.photos[photo].camera];
-    PhotoPixels pixels(device, makeRayCamera(camera, capture.photos[photo].worldFromCamera, model.frame()),
-                       camera.width, camera.height, options.stride);
-    for (size_t first = 0; first < pixels.count(); first += kRays) {
-      const VolumeRays rays = pixels.rays(first);
-      pass.forward(rays, drawing);
-      const uint32_t samples = device.read(pass.firstSample().part(rays.count, 1))[0];
-      const std::vector<float> weights = device.read(pass.weights().part(0, samples));
-      const std::vector<float> logDensities = device.read(pass.logDensities().part(0, samples));
-      const std::vector<float> steps = device.read(pass.runtimeSteps().part(0, samples));
-      const std::vector<float> positions = device.read(pass.positions().part(0, size_t{3} * samples));
-      const std::vector<uint32_t> blocks = device.read(pass.blockOfSample().part(0, samples));
-      for (uint32_t s = 0; s < samples; ++s) {
-        if (!(weights[s] > options.minWeight)) continue;
-        if (!(-std::expm1(-std::exp(logDensities[s]) * steps[s]) > options.minAlpha)) continue;
-        alive[blocks[s]].mark(&positions[size_t{3} * s]);
-      }
+    const RayCamera view = makeRayCamera(camera, capture.photos[photo].worldFromCamera, model.frame());
+    finder.look(view, {0, 0, camera.width, camera.height, options.stride}, 0);
+    if (surround) {
+      const int besideX = static_cast<int>(kBeside * camera.width), besideY = static_cast<int>(kBeside * camera.height);
+      finder.look(view,
+                  {-besideX, -besideY, camera.width + besideX, camera.height + besideY, kBesideStride * options.stride},
+                  model.space().cells());
     }
     options.onPhoto(++done, static_cast<int64_t>(photos.size()));
   }
