@@ -52,8 +52,8 @@ class VolumePass {
   Slice<const float> runtimeSteps() const { return runtimeSteps_; }
   uint32_t texelsWanted();  // waits; may be above the room there is
 
-  // Scales of the losses that live inside the model; the colour's gradients come from outside. Each divides by its own
-  // number of rays, segments or points.
+  // Weights of the losses that live inside the model, already divided by the number of rays or points; the colour's
+  // gradients come from outside.
   struct LossScales {
     float interlevel = 0, distortion = 0, sparsity = 0, opacity = 0;
   };
