@@ -1,29 +1,10 @@
 #include "representations/field/config.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
-#include <algorithm>
-
-#include "base/error.h"
+#include "base/config_checks.h"
 
 namespace tessera {
-namespace {
-
-// Also false for what is not a number.
-void within(const char* name, double value, double low, double high) {
-  if (value >= low && value <= high) return;
-  throw Error(fmt::format("--set {}={}", name, value), "", "is out of range",
-              fmt::format("use {} from {} to {}", name, low, high));
-}
-
-void oneOf(const char* name, int value, std::initializer_list<int> allowed) {
-  if (std::find(allowed.begin(), allowed.end(), value) != allowed.end()) return;
-  throw Error(fmt::format("--set {}={}", name, value), "", "is none of the sizes there are",
-              fmt::format("use one of {}", fmt::join(allowed, ", ")));
-}
-
-}  // namespace
 
 std::vector<ConfigField> FieldConfig::fields() {
   return {
@@ -76,24 +57,24 @@ std::vector<ConfigField> FieldConfig::fields() {
 
 void FieldConfig::check() const {
   constexpr double kTiny = 1e-12, kHuge = 1e12;
-  oneOf("grid_features", gridFeatures, {1, 2, 4, 8});
-  within("grid_levels", gridLevels, 1, 128 / gridFeatures);
-  within("grid_log2_size", gridLog2Size, 3, 28);
-  within("grid_base", gridBase, 2, 1 << 20);
-  within("grid_finest", gridFinest, gridBase, 1 << 20);
-  oneOf("width", width, {16, 32, 64, 128});
-  within("density_hidden", densityHidden, 1, 16);
-  within("colour_hidden", colourHidden, 1, 16);
-  within("occupancy_resolution", occupancyResolution, 4, 512);
+  requireOneOf("grid_features", gridFeatures, {1, 2, 4, 8});
+  requireWithin("grid_levels", gridLevels, 1, 128 / gridFeatures);
+  requireWithin("grid_log2_size", gridLog2Size, 3, 28);
+  requireWithin("grid_base", gridBase, 2, 1 << 20);
+  requireWithin("grid_finest", gridFinest, gridBase, 1 << 20);
+  requireOneOf("width", width, {16, 32, 64, 128});
+  requireWithin("density_hidden", densityHidden, 1, 16);
+  requireWithin("colour_hidden", colourHidden, 1, 16);
+  requireWithin("occupancy_resolution", occupancyResolution, 4, 512);
   if (occupancyResolution % 4 != 0) {
     throw Error(fmt::format("--set occupancy_resolution={}", occupancyResolution), "", "is no multiple of 4",
                 fmt::format("use occupancy_resolution={}", occupancyResolution / 4 * 4));
   }
-  within("roi_margin", roiMargin, 1e-6, 1e6);
-  within("near", near, 0, kHuge);
-  within("far", far, near, kHuge);
-  within("min_step", minStep, 1e-6, kHuge);
-  within("cone", cone, 0, 1);
+  requireWithin("roi_margin", roiMargin, 1e-6, 1e6);
+  requireWithin("near", near, 0, kHuge);
+  requireWithin("far", far, near, kHuge);
+  requireWithin("min_step", minStep, 1e-6, kHuge);
+  requireWithin("cone", cone, 0, 1);
   const MarchSpace marched = space();
   const double steps = marched.stepIndex(marched.far) - marched.stepIndex(marched.near);
   if (!(steps <= kMostSteps)) {
@@ -101,27 +82,27 @@ void FieldConfig::check() const {
                 fmt::format("a ray from near to far would take {:.0f} steps", steps),
                 fmt::format("use longer ones or a nearer far: at most {} steps", kMostSteps));
   }
-  within("samples_per_step", samplesPerStep, 64, 1 << 24);
-  within("samples_per_pass", samplesPerPass, 64, 1 << 24);
-  within("most_rays", mostRays, 64, 1 << 24);
-  within("first_rays", firstRays, 1, mostRays);
-  within("photo_budget_mib", photoBudgetMiB, 0, kHuge);
-  within("steps_per_photo", stepsPerPhoto, 1, 1 << 30);
-  within("occupancy_every", occupancyEvery, 1, 1 << 30);
-  within("occupancy_warm_up", occupancyWarmUp, 0, 1 << 30);
-  within("occupancy_share", occupancyShare, 0, 1);
-  within("rate", rate, kTiny, kHuge);
-  within("final_rate_factor", finalRateFactor, kTiny, kHuge);
-  within("constant_rate_share", constantRateShare, 0, 1);
-  within("network_l2", networkL2, 0, kHuge);
-  within("table_l2", tableL2, 0, kHuge);
-  within("exposure_rate", exposureRate, 0, kHuge);
-  within("loss_parameter", lossParameter, kTiny, kHuge);
-  within("distortion", distortion, 0, kHuge);
-  within("depth", depth, 0, kHuge);
-  within("depth_tolerance", depthTolerance, 0, 1);
-  within("known_share", knownShare, 0, 1);
-  within("full_gradient_distance", fullGradientDistance, 0, kHuge);
+  requireWithin("samples_per_step", samplesPerStep, 64, 1 << 24);
+  requireWithin("samples_per_pass", samplesPerPass, 64, 1 << 24);
+  requireWithin("most_rays", mostRays, 64, 1 << 24);
+  requireWithin("first_rays", firstRays, 1, mostRays);
+  requireWithin("photo_budget_mib", photoBudgetMiB, 0, kHuge);
+  requireWithin("steps_per_photo", stepsPerPhoto, 1, 1 << 30);
+  requireWithin("occupancy_every", occupancyEvery, 1, 1 << 30);
+  requireWithin("occupancy_warm_up", occupancyWarmUp, 0, 1 << 30);
+  requireWithin("occupancy_share", occupancyShare, 0, 1);
+  requireWithin("rate", rate, kTiny, kHuge);
+  requireWithin("final_rate_factor", finalRateFactor, kTiny, kHuge);
+  requireWithin("constant_rate_share", constantRateShare, 0, 1);
+  requireWithin("network_l2", networkL2, 0, kHuge);
+  requireWithin("table_l2", tableL2, 0, kHuge);
+  requireWithin("exposure_rate", exposureRate, 0, kHuge);
+  requireWithin("loss_parameter", lossParameter, kTiny, kHuge);
+  requireWithin("distortion", distortion, 0, kHuge);
+  requireWithin("depth", depth, 0, kHuge);
+  requireWithin("depth_tolerance", depthTolerance, 0, 1);
+  requireWithin("known_share", knownShare, 0, 1);
+  requireWithin("full_gradient_distance", fullGradientDistance, 0, kHuge);
 }
 
 RadianceFieldShape FieldConfig::shape() const {

@@ -1,27 +1,11 @@
 #include "representations/volume/config.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
-#include <algorithm>
-
-#include "base/error.h"
+#include "base/config_checks.h"
 
 namespace tessera {
 namespace {
-
-// Also false for what is not a number.
-void within(const char* name, double value, double low, double high) {
-  if (value >= low && value <= high) return;
-  throw Error(fmt::format("--set {}={}", name, value), "", "is out of range",
-              fmt::format("use {} from {} to {}", name, low, high));
-}
-
-void oneOf(const char* name, int value, std::initializer_list<int> allowed) {
-  if (std::find(allowed.begin(), allowed.end(), value) != allowed.end()) return;
-  throw Error(fmt::format("--set {}={}", name, value), "", "is none of the sizes there are",
-              fmt::format("use one of {}", fmt::join(allowed, ", ")));
-}
 
 void multipleOfEight(const char* name, int value) {
   if (value % 8 == 0) return;
@@ -129,58 +113,58 @@ std::vector<ConfigField> VolumeConfig::fields() {
 void VolumeConfig::check() const {
   constexpr double kTiny = 1e-12, kHuge = 1e12;
   surroundKind();
-  within("near", near, 0, kHuge);
-  within("level", level, 0, 16);
-  within("level_share", levelShare, 0, 10);
-  within("frozen_share", frozenShare, 0, 1);
-  within("level_rate_factor", levelRateFactor, 0, kHuge);
-  within("voxels", voxels, 8, 1024);
-  within("planes", planes, 8, 8192);
+  requireWithin("near", near, 0, kHuge);
+  requireWithin("level", level, 0, 16);
+  requireWithin("level_share", levelShare, 0, 10);
+  requireWithin("frozen_share", frozenShare, 0, 1);
+  requireWithin("level_rate_factor", levelRateFactor, 0, kHuge);
+  requireWithin("voxels", voxels, 8, 1024);
+  requireWithin("planes", planes, 8, 8192);
   multipleOfEight("voxels", voxels);
   multipleOfEight("planes", planes);
-  within("feature_range", featureRange, 0.1, 100);
-  within("density_range", densityRange, 0.1, 100);
-  within("grid_levels", gridLevels, 1, 64);
-  within("grid_log2_size", gridLog2Size, 3, 28);
-  within("grid_base", gridBase, 2, 1 << 20);
-  within("grid_finest", gridFinest, gridBase, 1 << 20);
-  oneOf("width", width, {16, 32, 64, 128});
-  within("hidden", hidden, 1, 16);
-  within("proposal_levels", proposalLevels, 1, 64);
-  within("proposal_log2_size", proposalLog2Size, 3, 28);
-  within("proposal_finest", proposalFinest, gridBase, 1 << 20);
-  oneOf("proposal_width", proposalWidth, {16, 32, 64, 128});
-  within("first_intervals", firstIntervals, 2, 1024);
-  within("second_intervals", secondIntervals, 0, 1024);
-  within("samples", samples, 2, 1024);
-  within("padding", padding, 0, 1);
-  within("proposal_every", proposalEvery, 1, 1 << 20);
-  within("proposal_warm_up", proposalWarmUp, 0, 1 << 30);
-  within("texels_per_step", texelsPerStep, 1024, 1 << 26);
-  within("most_rays", mostRays, 64, 1 << 20);
-  within("first_rays", firstRays, 16, mostRays);
-  within("photo_budget_mib", photoBudgetMiB, 0, kHuge);
-  within("steps_per_photo", stepsPerPhoto, 1, 1 << 30);
-  within("rate", rate, kTiny, kHuge);
-  within("final_rate_factor", finalRateFactor, kTiny, kHuge);
-  within("constant_rate_share", constantRateShare, 0, 1);
-  within("deferred_rate_factor", deferredRateFactor, 0, kHuge);
-  within("table_l2", tableL2, 0, kHuge);
-  within("network_l2", networkL2, 0, kHuge);
-  within("exposure_rate", exposureRate, 0, kHuge);
-  within("loss_parameter", lossParameter, kTiny, kHuge);
-  within("s3im", s3im, 0, kHuge);
-  within("interlevel", interlevel, kTiny, kHuge);
-  within("distortion", distortion, 0, kHuge);
-  within("sparsity", sparsity, 0, kHuge);
-  within("opacity", opacity, 0, kHuge);
-  within("ramp_share", rampShare, 0, 1);
-  within("full_gradient_distance", fullGradientDistance, 0, kHuge);
-  within("sparsity_points", sparsityPoints, 0, 1 << 24);
-  within("cull_begin", cullBegin, 0, 1);
-  within("cull_end", cullEnd, cullBegin, 1);
-  within("cull_first", cullFirst, kTiny, 1);
-  within("cull_last", cullLast, cullFirst, 1);
+  requireWithin("feature_range", featureRange, 0.1, 100);
+  requireWithin("density_range", densityRange, 0.1, 100);
+  requireWithin("grid_levels", gridLevels, 1, 64);
+  requireWithin("grid_log2_size", gridLog2Size, 3, 28);
+  requireWithin("grid_base", gridBase, 2, 1 << 20);
+  requireWithin("grid_finest", gridFinest, gridBase, 1 << 20);
+  requireOneOf("width", width, {16, 32, 64, 128});
+  requireWithin("hidden", hidden, 1, 16);
+  requireWithin("proposal_levels", proposalLevels, 1, 64);
+  requireWithin("proposal_log2_size", proposalLog2Size, 3, 28);
+  requireWithin("proposal_finest", proposalFinest, gridBase, 1 << 20);
+  requireOneOf("proposal_width", proposalWidth, {16, 32, 64, 128});
+  requireWithin("first_intervals", firstIntervals, 2, 1024);
+  requireWithin("second_intervals", secondIntervals, 0, 1024);
+  requireWithin("samples", samples, 2, 1024);
+  requireWithin("padding", padding, 0, 1);
+  requireWithin("proposal_every", proposalEvery, 1, 1 << 20);
+  requireWithin("proposal_warm_up", proposalWarmUp, 0, 1 << 30);
+  requireWithin("texels_per_step", texelsPerStep, 1024, 1 << 26);
+  requireWithin("most_rays", mostRays, 64, 1 << 20);
+  requireWithin("first_rays", firstRays, 16, mostRays);
+  requireWithin("photo_budget_mib", photoBudgetMiB, 0, kHuge);
+  requireWithin("steps_per_photo", stepsPerPhoto, 1, 1 << 30);
+  requireWithin("rate", rate, kTiny, kHuge);
+  requireWithin("final_rate_factor", finalRateFactor, kTiny, kHuge);
+  requireWithin("constant_rate_share", constantRateShare, 0, 1);
+  requireWithin("deferred_rate_factor", deferredRateFactor, 0, kHuge);
+  requireWithin("table_l2", tableL2, 0, kHuge);
+  requireWithin("network_l2", networkL2, 0, kHuge);
+  requireWithin("exposure_rate", exposureRate, 0, kHuge);
+  requireWithin("loss_parameter", lossParameter, kTiny, kHuge);
+  requireWithin("s3im", s3im, 0, kHuge);
+  requireWithin("interlevel", interlevel, kTiny, kHuge);
+  requireWithin("distortion", distortion, 0, kHuge);
+  requireWithin("sparsity", sparsity, 0, kHuge);
+  requireWithin("opacity", opacity, 0, kHuge);
+  requireWithin("ramp_share", rampShare, 0, 1);
+  requireWithin("full_gradient_distance", fullGradientDistance, 0, kHuge);
+  requireWithin("sparsity_points", sparsityPoints, 0, 1 << 24);
+  requireWithin("cull_begin", cullBegin, 0, 1);
+  requireWithin("cull_end", cullEnd, cullBegin, 1);
+  requireWithin("cull_first", cullFirst, kTiny, 1);
+  requireWithin("cull_last", cullLast, cullFirst, 1);
 }
 
 Surround VolumeConfig::surroundKind() const {
