@@ -26,7 +26,7 @@ CLI::Validator amount(double low, double high) {
 struct TrainFlags {
   std::string method = "field", configFile, blocks = "auto";
   std::vector<std::string> settings;
-  std::string seed;
+  std::string seed, residentBlocks;
   DeviceOptions device;
   std::string capture, model;
   TrainingLoopOptions loop;
@@ -40,6 +40,7 @@ Config chosenConfig(const TrainFlags& flags, Config config) {
   if (!flags.configFile.empty()) configFromToml(config.fields(), flags.configFile);
   for (const std::string& setting : flags.settings) setConfigField(config.fields(), setting);
   if (!flags.seed.empty()) setConfigField(config.fields(), "seed=" + flags.seed);
+  if (!flags.residentBlocks.empty()) setConfigField(config.fields(), "resident_blocks=" + flags.residentBlocks);
   if (flags.loop.resume) requireSameConfig(flags.model, config);
   return config;
 }
@@ -86,6 +87,10 @@ void addTrainVerb(CLI::App& app) {
   verb->add_flag("--resume", flags->loop.resume, "go on with the model that is in the folder");
   verb->add_option("--blocks", flags->blocks, "of --method volume: auto, or so many along x and y, as 3x2")
       ->capture_default_str();
+  verb->add_option("--resident-blocks", flags->residentBlocks,
+                   "of --method volume: so many blocks in memory at once, the others on disk; the same as --set "
+                   "resident_blocks=...")
+      ->check(CLI::Range(1, 1 << 20));
   verb->add_option("--seed", flags->seed, "of everything random, a whole number; the same as --set seed=...");
   verb->add_option("--config", flags->configFile, "settings file (TOML)")->check(CLI::ExistingFile);
   verb->add_option("--set", flags->settings, "key=value, as often as wanted");

@@ -18,6 +18,7 @@ float power(float base, uint exponent) {
 
 void main() {
   AdamArguments a = arguments.values;
+  if (WANTED(a.rows) && a.rows.values[0] == a.rows.values[1]) return;
   FOR_EACH(i, a.count) {
     float gradient = a.gradients.values[i];
     if (gradient == 0 && a.skipZeroGradients != 0) continue;

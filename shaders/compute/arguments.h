@@ -114,6 +114,7 @@ struct AdamArguments {
   FloatPointer firstMoments;
   FloatPointer secondMoments;
   UintPointer counts;
+  UintPointer rows;  // 0: none
   uint count;
   uint skipZeroGradients;
   float rate;
@@ -123,7 +124,7 @@ struct AdamArguments {
   float l2;
   uint unused;
 };
-TESSERA_SIZE(AdamArguments, 72);
+TESSERA_SIZE(AdamArguments, 80);
 
 #ifdef __cplusplus
 }  // namespace tessera::arguments

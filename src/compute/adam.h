@@ -15,6 +15,7 @@ struct Adam {
   float epsilon = 1e-15f;
   float l2 = 0;
   bool skipZeroGradients = false;  // for hash tables: no moment decay, no count
+  Slice<const uint32_t> rows;      // optional, [2]: where both are the same, no sample came here, and nothing is done
   Slice<float> parameters;         // [n]
   Slice<float> gradients;          // [n]; zero afterwards
   Slice<float> firstMoments;       // [n]

@@ -44,6 +44,10 @@ struct BlockSpace {
   double shareAt(double t, double near, double far) const;  // s, its inverse
 };
 
+// In tables from blocks to slots: the block is not in memory. A scene that is trained a few blocks at a time holds
+// those in slots; rows of samples then name slots.
+inline constexpr uint32_t kNoSlot = UINT32_MAX;
+
 // Where rays enter and leave the box, and their first fence posts. Range: [max(near, entry), exit]; where that is empty
 // [near, near + 1 + distance of the origin to the ray's own origin] with a surround, [near, near] without. Fences: 0,
 // (i + jitter - ½) / intervals for i in (0, intervals), 1. `near` is the space's, or the ray's own where that is
@@ -68,6 +72,8 @@ struct EnterScene {
 // sample outside the domain of a bounded block (above or below an inner cell of a grid whose border is contracted)
 // keeps its row with step 0 and its position clamped. Ends beyond `farOfRay` are cut off there: steps shrink, to 0
 // behind it; middles stay. Work in double; a ray without direction is not cut, its steps and runtime steps are 0.
+// With `slotOfBlock`, blocks are named by their slots in all that is written; a sample in a block without one keeps its
+// row with slot 0 and step 0.
 struct BlockSamples {
   const BlockSpace& space;
   Count rays;
@@ -91,8 +97,9 @@ struct BlockSamples {
   Slice<float> runtimeSteps;  // optional: length in t of a renderer's step here along the ray: one texel of the domain,
                               // which is 2 halfDomain / texels; by contractDirection where contracted
   uint32_t texels = 0;
-  // With `split`, room for mostSegments(rays). Optional, [blocks]: blocks that are composited together have the same
-  // number, and a segment is a run of one group; else each block is its own.
+  Slice<const uint32_t> slotOfBlock;  // optional, [blocks]: kNoSlot where there is none
+  // With `split`, room for mostSegments(rays). Optional, [blocks], or [slots]: those that are composited together have
+  // the same number, and a segment is a run of one group; else each is its own.
   Slice<const uint32_t> groupOfBlock;
   Slice<uint32_t> firstSegment;          // [rays + 1]
   Slice<uint32_t> segmentCount;          // [1]
@@ -115,11 +122,12 @@ struct BlockPoints {
   const BlockSpace& space;
   uint32_t points = 0;
   uint64_t seed = 0;
-  uint32_t texels = 0;            // as in BlockSamples
-  Slice<const uint32_t> blocks;   // to choose from
-  Slice<uint32_t> blockOfSample;  // [points]
-  Slice<float> positions;         // [points][3]
-  Slice<float> runtimeSteps;      // [points]
+  uint32_t texels = 0;                // as in BlockSamples
+  Slice<const uint32_t> blocks;       // to choose from
+  Slice<const uint32_t> slotOfBlock;  // optional, [blocks]; as in BlockSamples
+  Slice<uint32_t> blockOfSample;      // [points]
+  Slice<float> positions;             // [points][3]
+  Slice<float> runtimeSteps;          // [points]
 };
 
 // A stable sort of samples by block: source lists the rows of block 0 in order, then those of block 1, ...

@@ -104,6 +104,11 @@ void runBlockSamples(Stage& stage, const BlockSpace& space, const Size& size, co
     a.widths = stage.output("widths", rows, 1e-6);
     a.runtimeSteps = stage.output("runtimeSteps", rows, 1e-6);
     a.texels = 64;
+    // Every third block has no slot, the others have them from the last on.
+    std::vector<uint32_t> slots(space.blocks(), kNoSlot);
+    for (uint32_t block = 0; block < space.blocks(); ++block)
+      if (block % 3 != 1) slots[block] = space.blocks() - 1 - block;
+    a.slotOfBlock = stage.input(slots);
   }
   if (options.split) {
     if (options.everything) {
@@ -181,6 +186,8 @@ OperationTests testsOf<BlockPoints>() {
                                a.seed = stage.random.bits();
                                a.texels = 64;
                                a.blocks = stage.input(blocks);
+                               std::reverse(blocks.begin(), blocks.end());
+                               if (points == 9001) a.slotOfBlock = stage.input(blocks);
                                a.blockOfSample = stage.outputWords("blockOfSample", points);
                                a.positions = stage.output("positions", 3 * size_t{points}, 1e-6);
                                a.runtimeSteps = stage.output("runtimeSteps", points, 1e-6);

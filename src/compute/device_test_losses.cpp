@@ -421,6 +421,7 @@ OperationTests testsOf<Adam>() {
                                  Adam a;
                                  a.skipZeroGradients = skip;
                                  a.l2 = l2;
+                                 if (count == 1061) a.rows = stage.input(std::vector<uint32_t>{7, skip ? 7u : 8u});
                                  a.parameters = stage.output("parameters", stage.random.floats(count, -1, 1));
                                  a.gradients = stage.output("gradients", gradients);
                                  a.firstMoments = stage.output("firstMoments", stage.random.floats(count, -0.1f, 0.1f));

@@ -151,7 +151,7 @@ void measureBlockStreams(RooflineRecorder& recorder) {
   Array<uint32_t> chosen = device.arrayOf(std::vector<uint32_t>{0, 3, 6}), blocks = device.array<uint32_t>(points);
   Array<float> positions = device.array<float>(size_t{points} * 3), steps = device.array<float>(points);
   recorder.measureStream(Operation::kBlockPoints, fmt::format("{} points", points), points * 20.0, [&] {
-    device.run(BlockPoints{space, points, 1, 2048, chosen, blocks, positions, steps});
+    device.run(BlockPoints{space, points, 1, 2048, chosen, {}, blocks, positions, steps});
   });
 }
 

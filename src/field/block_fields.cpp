@@ -28,13 +28,31 @@ BlockFieldBatch::BlockFieldBatch(Device& device, const BlockFieldShape& shape, u
   outputGradients = device.array<float>(n * static_cast<size_t>(shape.network.outputs));
 }
 
-BlockFields::BlockFields(Device& device, std::string name, BlockFieldShape shape, uint32_t blocks, uint64_t seed)
-    : device_(device), shape_(std::move(shape)) {
-  for (uint32_t block = 0; block < blocks; ++block) {
-    const uint64_t own = mix64(seed ^ (uint64_t{block} << 32));
-    tables_.emplace_back(device, name + ".table", initialTable(shape_.grid.parameters(), own));
-    networks_.emplace_back(device, name + ".network", initialWeights(shape_.network, own, 0xb10c));
+BlockFields::BlockFields(Device& device, std::string name, BlockFieldShape shape, uint32_t slots, uint64_t seed,
+                         bool forTraining)
+    : device_(device), shape_(std::move(shape)), seed_(seed) {
+  for (uint32_t slot = 0; slot < slots; ++slot) {
+    tables_.emplace_back(device, name + ".table", firstTable(slot), forTraining);
+    networks_.emplace_back(device, name + ".network", firstNetwork(slot), forTraining);
   }
+}
+
+std::vector<float> BlockFields::firstTable(uint32_t block) const {
+  return initialTable(shape_.grid.parameters(), mix64(seed_ ^ (uint64_t{block} << 32)));
+}
+
+std::vector<float> BlockFields::firstNetwork(uint32_t block) const {
+  return initialWeights(shape_.network, mix64(seed_ ^ (uint64_t{block} << 32)), 0xb10c);
+}
+
+void BlockFields::begin(uint32_t slot, uint32_t block) {
+  tables_[slot].begin(device_, firstTable(block));
+  networks_[slot].begin(device_, firstNetwork(block));
+}
+
+void BlockFields::saveFirst(uint32_t block, TensorSet& tensors) const {
+  tensors.add(tables_.front().name, firstTable(block));
+  tensors.add(networks_.front().name, firstNetwork(block));
 }
 
 Matrix<float> BlockFields::byLevel(Array<float>& encodings, uint32_t capacity) const {
@@ -42,16 +60,16 @@ Matrix<float> BlockFields::byLevel(Array<float>& encodings, uint32_t capacity) c
                                 Matrix<float>::rowsOfPlane(capacity));
 }
 
-Count BlockFields::rowsOf(const BlockFieldBatch& batch, uint32_t block) {
-  return {batch.capacity, batch.firstOfBlock.part(block + 1, 1), batch.firstOfBlock.part(block, 1)};
+Count BlockFields::rowsOf(const BlockFieldBatch& batch, uint32_t slot) {
+  return {batch.capacity, batch.firstOfSlot.part(slot + 1, 1), batch.firstOfSlot.part(slot, 1)};
 }
 
 void BlockFields::forward(BlockFieldBatch& batch, bool forBackward) {
   const Matrix<float> encoded = byLevel(batch.encoded, batch.capacity);
-  for (uint32_t block = 0; block < blocks(); ++block) {
-    const Count rows = rowsOf(batch, block);
-    device_.run(HashGridForward{shape_.grid, rows, batch.positions, tables_[block].values, encoded});
-    device_.run(MlpForward{shape_.network, rows, encoded, networks_[block].values,
+  for (uint32_t slot = 0; slot < slots(); ++slot) {
+    const Count rows = rowsOf(batch, slot);
+    device_.run(HashGridForward{shape_.grid, rows, batch.positions, tables_[slot].values, encoded});
+    device_.run(MlpForward{shape_.network, rows, encoded, networks_[slot].values,
                            Matrix<float>(batch.outputs, static_cast<uint32_t>(shape_.network.outputs)),
                            forBackward ? batch.activations.all() : Slice<float>()});
   }
@@ -61,20 +79,20 @@ void BlockFields::backward(BlockFieldBatch& batch) {
   const uint32_t outputs = static_cast<uint32_t>(shape_.network.outputs);
   const Matrix<float> encoded = byLevel(batch.encoded, batch.capacity);
   const Matrix<float> encodedGradients = byLevel(batch.encodedGradients, batch.capacity);
-  for (uint32_t block = 0; block < blocks(); ++block) {
-    const Count rows = rowsOf(batch, block);
+  for (uint32_t slot = 0; slot < slots(); ++slot) {
+    const Count rows = rowsOf(batch, slot);
     device_.run(MlpBackward{shape_.network,
                             rows,
                             encoded,
-                            networks_[block].values,
+                            networks_[slot].values,
                             Matrix<float>(batch.outputs, outputs),
                             batch.activations,
                             Matrix<float>(batch.outputGradients, outputs),
                             {},
-                            networks_[block].gradients,
+                            networks_[slot].gradients,
                             encodedGradients});
     device_.run(HashGridBackward{
-        shape_.grid, rows, batch.positions, tables_[block].values, encodedGradients, tables_[block].gradients, {}});
+        shape_.grid, rows, batch.positions, tables_[slot].values, encodedGradients, tables_[slot].gradients, {}});
   }
 }
 

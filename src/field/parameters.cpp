@@ -6,13 +6,20 @@
 
 namespace tessera {
 
-ParameterGroup::ParameterGroup(Device& device, std::string groupName, const std::vector<float>& initial)
-    : name(std::move(groupName)),
-      values(device.arrayOf(initial)),
-      gradients(device.array<float>(initial.size())),
-      firstMoments(device.array<float>(initial.size())),
-      secondMoments(device.array<float>(initial.size())),
-      counts(device.array<uint32_t>(initial.size())) {}
+ParameterGroup::ParameterGroup(Device& device, std::string groupName, const std::vector<float>& initial,
+                               bool forTraining)
+    : name(std::move(groupName)), values(device.arrayOf(initial)) {
+  if (!forTraining) return;
+  for (Array<float>* each : {&gradients, &firstMoments, &secondMoments}) *each = device.array<float>(initial.size());
+  counts = device.array<uint32_t>(initial.size());
+}
+
+void ParameterGroup::begin(Device& device, const std::vector<float>& initial) {
+  CHECK(initial.size() == values.size());
+  device.write(values.all(), std::span<const float>(initial));
+  for (const Array<float>* each : {&gradients, &firstMoments, &secondMoments}) device.fillZero(each->all());
+  device.fillZero(counts.all());
+}
 
 void ParameterGroup::step(Device& device, Adam settings) {
   settings.parameters = values;
@@ -59,7 +66,7 @@ void loadArray(Device& device, const fs::path& path, const Safetensors& file, co
 
 void loadGroup(Device& device, const fs::path& path, const Safetensors& file, ParameterGroup& group) {
   loadArray(device, path, file, group.name, TensorType::f32, group.values);
-  if (!file.tensors.contains(group.name + ".m1")) return;
+  if (group.counts.size() == 0 || !file.tensors.contains(group.name + ".m1")) return;
   loadArray(device, path, file, group.name + ".m1", TensorType::f32, group.firstMoments);
   loadArray(device, path, file, group.name + ".m2", TensorType::f32, group.secondMoments);
   loadArray(device, path, file, group.name + ".count", TensorType::u32, group.counts);

@@ -17,7 +17,11 @@ struct ParameterGroup {
   Array<uint32_t> counts;
 
   ParameterGroup() = default;
-  ParameterGroup(Device& device, std::string groupName, const std::vector<float>& initial);
+  // Without `forTraining`, values alone.
+  ParameterGroup(Device& device, std::string groupName, const std::vector<float>& initial, bool forTraining = true);
+
+  // Anew from these, as if never trained.
+  void begin(Device& device, const std::vector<float>& initial);
 
   // One step with the accumulated gradients, which are zero afterwards.
   void step(Device& device, Adam settings);
@@ -29,6 +33,9 @@ class TensorSet {
   template <class T>
   void add(const std::string& name, const std::vector<T>& values) {
     addBytes(name, tensorTypeOf<T>(), std::as_bytes(std::span(values)), values.size());
+  }
+  void add(const std::string& name, const TensorView& tensor) {
+    addBytes(name, tensor.type, tensor.bytes, static_cast<size_t>(tensor.elements()));
   }
   void add(Device& device, const ParameterGroup& group, bool withMoments);
   Bytes encode(const std::map<std::string, std::string>& metadata) const;
@@ -52,7 +59,7 @@ class TensorSet {
 };
 
 // Fills a group from a file. Throws Error naming `path` when a tensor is missing or of another size; moments are
-// optional (a file for rendering has none).
+// optional (a file for rendering has none), and left out where the group has none.
 void loadGroup(Device& device, const fs::path& path, const Safetensors& file, ParameterGroup& group);
 
 }  // namespace tessera

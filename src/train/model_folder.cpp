@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <unordered_set>
 
+#include "base/check.h"
 #include "base/error.h"
 #include "scene/block_grid_json.h"
 
@@ -75,12 +76,21 @@ void removeOld(const fs::path& folder, int64_t step, int keep) {
 
 }  // namespace
 
-void ModelFolder::commit(const ModelManifest& state, uint32_t parts, const std::function<Bytes(uint32_t)>& save,
-                         int keep) const {
+void ModelFolder::commit(const ModelManifest& state, uint32_t parts,
+                         const std::function<std::optional<Bytes>(uint32_t)>& save, int keep) const {
+  std::optional<ModelManifest> before;
   json names = json::array();
   for (uint32_t part = 0; part < parts; ++part) {
+    const std::optional<Bytes> bytes = save(part);
+    if (!bytes) {
+      if (!before) before = manifest();
+      CHECK(before.has_value());
+      CHECK(part < before->files.size());
+      names.push_back(before->files[part]);
+      continue;
+    }
     const std::string name = fmt::format("blocks/{}/step-{}.safetensors", part, state.step);
-    writeFileAtomically(root_ / name, save(part), true);
+    writeFileAtomically(root_ / name, *bytes, true);
     names.push_back(name);
   }
   const json manifest = {

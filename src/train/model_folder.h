@@ -45,10 +45,10 @@ class ModelFolder {
 
   // Nothing when there is no manifest; Error when there is one that cannot be understood or names a missing file.
   std::optional<ModelManifest> manifest() const;
-  // Writes the checkpoints one after another (`save` gives each part's bytes), then the manifest, then removes older
-  // checkpoints but the last `keep`.
-  void commit(const ModelManifest& state, uint32_t parts, const std::function<Bytes(uint32_t part)>& save,
-              int keep = 2) const;
+  // Writes the checkpoints one after another (`save` gives each part's bytes, or nothing where the manifest's file
+  // still holds), then the manifest, then removes older checkpoints but the last `keep`.
+  void commit(const ModelManifest& state, uint32_t parts,
+              const std::function<std::optional<Bytes>(uint32_t part)>& save, int keep = 2) const;
 
   // blocks.json: where the model stands, and in whose world.
   void writePlacement(const ModelPlacement& placement, const std::string& method) const;

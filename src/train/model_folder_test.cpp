@@ -66,6 +66,22 @@ TEST(ModelFolder, KeepsTheLastCheckpointsOnly) {
   EXPECT_EQ(blockFiles(folder.path()), (std::vector<std::string>{"step-101.safetensors"}));
 }
 
+TEST(ModelFolder, KeepsTheFilesOfBlocksThatAreAsTheyWere) {
+  const TestFolder folder;
+  const ModelFolder model(folder.path());
+  for (const int64_t step : {5, 6, 7, 8}) {
+    model.commit({"volume", step, 9, {}}, 2, [&](uint32_t part) -> std::optional<Bytes> {
+      if (part == 1 && step > 5) return std::nullopt;
+      return block(10, static_cast<int>(step));
+    });
+  }
+  const auto manifest = model.manifest();
+  ASSERT_TRUE(manifest);
+  EXPECT_EQ(manifest->step, 8);
+  EXPECT_EQ(readFile(model.root() / manifest->files.at(0)), block(10, 8));
+  EXPECT_EQ(readFile(model.root() / manifest->files.at(1)), block(10, 5));
+}
+
 TEST(ModelFolder, KilledWhileWritingABlockIsTheModelItWas) {
   const TestFolder folder;
   const ModelFolder model(folder.path());

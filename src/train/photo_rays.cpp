@@ -54,7 +54,8 @@ PhotoRays::PhotoRays(Device& device, const Capture& capture, const SceneFrame& f
 
 void PhotoRays::draw(int64_t step, uint32_t rays) {
   CHECK(rays <= settings_.mostRays);
-  drawRays(photos_.at(step), known_, {settings_.seed, settings_.randomBackground, settings_.knownShare}, step, rays,
+  drawRays(photos_.at(step), known_,
+           {settings_.seed, settings_.randomBackground, settings_.knownShare, tiles_ ? &*tiles_ : nullptr}, step, rays,
            batch_);
   count_ = rays;
   device_.write(photoOfRay_.all(), std::span<const uint32_t>(batch_.photoOfRay));

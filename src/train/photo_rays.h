@@ -1,6 +1,8 @@
 // The rays of one training step, on the device: through which pixels of which photos, and what they should see.
 #pragma once
 
+#include <optional>
+
 #include "compute/device.h"
 #include "train/photo_window.h"
 #include "train/ray_batch.h"
@@ -24,8 +26,9 @@ class PhotoRays {
   // Trains on the capture's training photos; Error when there are none. Keeps references to `device` and `capture`.
   PhotoRays(Device& device, const Capture& capture, const SceneFrame& frame, const Settings& settings);
 
-  // A function of seed, step and number of rays.
+  // A function of seed, step, number of rays, and the tiles that they are drawn from (all of each photo without).
   void draw(int64_t step, uint32_t rays);
+  void drawFrom(std::vector<TileShares> tiles) { tiles_ = std::move(tiles); }  // [photo]
 
   const RayBatch& batch() const { return batch_; }
   uint32_t count() const { return count_; }
@@ -53,6 +56,7 @@ class PhotoRays {
   PhotoWindow photos_;
   std::vector<std::vector<KnownDistance>> known_;  // [photo]
   std::vector<float> nearOfPhoto_;                 // with freeSpace
+  std::optional<std::vector<TileShares>> tiles_;
   RayBatch batch_;
   uint32_t count_ = 0;
   Array<RayCamera> cameras_;

@@ -1,9 +1,51 @@
 #include "train/ray_batch.h"
 
+#include <algorithm>
+#include <optional>
+
 #include "base/check.h"
 #include "base/random.h"
 
 namespace tessera {
+
+namespace {
+
+// Draws a tile of a window's photos by its share.
+class TileDraw {
+ public:
+  TileDraw(const std::vector<PhotoWindow::Entry>& window, const std::vector<TileShares>& tiles) : tiles_(tiles) {
+    for (const PhotoWindow::Entry& entry : window) {
+      until_.push_back((until_.empty() ? 0 : until_.back()) + tiles[static_cast<size_t>(entry.photo)].total());
+      photos_.push_back(static_cast<size_t>(entry.photo));
+    }
+  }
+  bool isEmpty() const { return !(until_.back() > 0); }
+  struct Drawn {
+    size_t entry;
+    const PhotoTile* tile;
+  };
+  // `u` in [0,1).
+  Drawn at(double u) const {
+    const double wanted = u * until_.back();
+    const size_t entry = placeOf(until_, wanted);
+    const TileShares& ofPhoto = tiles_[photos_[entry]];
+    return {entry, &ofPhoto.tiles[placeOf(ofPhoto.until, wanted - (entry > 0 ? until_[entry - 1] : 0))]};
+  }
+
+ private:
+  static size_t placeOf(const std::vector<double>& until, double wanted) {
+    size_t place = static_cast<size_t>(std::upper_bound(until.begin(), until.end(), wanted) - until.begin());
+    place = std::min(place, until.size() - 1);
+    while (place > 0 && until[place] == until[place - 1]) --place;  // rounded beyond the last that has a share
+    return place;
+  }
+
+  const std::vector<TileShares>& tiles_;
+  std::vector<size_t> photos_;
+  std::vector<double> until_;  // [window]
+};
+
+}  // namespace
 
 void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<std::vector<KnownDistance>>& known,
               const RayBatchOptions& options, int64_t step, uint32_t rays, RayBatch& batch) {
@@ -17,6 +59,9 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
   batch.weights.resize(rays);
   batch.jitter.resize(rays);
   batch.distances.assign(rays, 0.0f);
+  std::optional<TileDraw> tiles;
+  if (options.tiles) tiles.emplace(window, *options.tiles);
+  const bool nothing = tiles && tiles->isEmpty();
   const RandomStream random(options.seed, 0x4a75 + (static_cast<uint64_t>(step) << 16));
   for (uint32_t ray = 0; ray < rays; ++ray) {
     uint64_t draw = kDrawsPerRay * ray;
@@ -26,12 +71,24 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
     draw += 3;
     const bool wantsKnown = random.uniform(draw++) < options.knownShare;
     for (int attempt = 0; attempt < kTries; ++attempt) {
-      const PhotoWindow::Entry& entry = window[random.below(draw++, static_cast<uint32_t>(window.size()))];
+      const PhotoTile* tile = nullptr;
+      size_t chosenEntry = 0;
+      if (tiles && !nothing) {
+        const TileDraw::Drawn drawn = tiles->at(random.uniformDouble(draw++));
+        chosenEntry = drawn.entry;
+        tile = drawn.tile;
+      } else {
+        chosenEntry = random.below(draw++, static_cast<uint32_t>(window.size()));
+      }
+      const PhotoWindow::Entry& entry = window[chosenEntry];
       const ImageU8& image = entry.decoded->image;
-      uint32_t x = random.below(draw++, static_cast<uint32_t>(image.width));
-      uint32_t y = random.below(draw++, static_cast<uint32_t>(image.height));
+      const uint32_t left = tile ? tile->left : 0, top = tile ? tile->top : 0;
+      const uint32_t right = tile ? tile->right : static_cast<uint32_t>(image.width);
+      const uint32_t bottom = tile ? tile->bottom : static_cast<uint32_t>(image.height);
+      uint32_t x = left + random.below(draw++, right - left);
+      uint32_t y = top + random.below(draw++, bottom - top);
       batch.distances[ray] = 0;
-      if (wantsKnown && !known.empty() && !known[entry.photo].empty()) {
+      if (!tiles && wantsKnown && !known.empty() && !known[entry.photo].empty()) {
         const std::vector<KnownDistance>& ofPhoto = known[entry.photo];
         const KnownDistance& chosen = ofPhoto[random.below(draw++, static_cast<uint32_t>(ofPhoto.size()))];
         if (chosen.x < static_cast<uint32_t>(image.width) && chosen.y < static_cast<uint32_t>(image.height)) {
@@ -42,7 +99,7 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
       }
       const bool masked =
           !entry.decoded->mask.empty() && *entry.decoded->mask.at(static_cast<int>(x), static_cast<int>(y)) < 128;
-      batch.weights[ray] = masked ? 0.0f : 1.0f;
+      batch.weights[ray] = masked || nothing ? 0.0f : 1.0f;
       if (masked && attempt + 1 < kTries) continue;
       batch.photoOfRay[ray] = static_cast<uint32_t>(entry.photo);
       batch.pixels[2 * size_t{ray}] = static_cast<float>(x) + 0.5f;

@@ -3,6 +3,7 @@
 
 #include "scene/capture.h"
 #include "train/known_distances.h"
+#include "train/photo_tiles.h"
 #include "train/photo_window.h"
 
 namespace tessera {
@@ -21,10 +22,12 @@ struct RayBatchOptions {
   uint64_t seed = 0;
   bool randomBackground = true;
   double knownShare = 0;  // of the rays go through pixels whose distance is known, in photos that have some
+  const std::vector<TileShares>* tiles = nullptr;  // [photo]: draw from these alone, and regard no known distances
 };
 
-// Uniform over the window's photos and their pixels; a function of window, seed and step. Masked pixels are drawn again
-// a few times before they are kept with weight zero.
+// Uniform over the window's photos and their pixels, or by the shares of tiles; a function of window, seed and step.
+// Masked pixels are drawn again a few times before they are kept with weight zero; where no photo of the window has a
+// tile, all rays have that weight.
 // `known` is by photo, and may be empty.
 void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<std::vector<KnownDistance>>& known,
               const RayBatchOptions& options, int64_t step, uint32_t rays, RayBatch& batch);

@@ -35,7 +35,7 @@ std::vector<PhotoWindow::Entry> twoPhotos() {
 
 RayBatch draw(const std::vector<PhotoWindow::Entry>& window, uint64_t seed, int64_t step, uint32_t rays = 2000) {
   RayBatch batch;
-  drawRays(window, {}, {seed, true, 0}, step, rays, batch);
+  drawRays(window, {}, {seed, true, 0, nullptr}, step, rays, batch);
   return batch;
 }
 
@@ -54,6 +54,40 @@ TEST(RayBatch, BeginsWithTheSameRaysHoweverManyAreWanted) {
   ASSERT_EQ(few.pixels.size(), 100u);
   EXPECT_TRUE(std::equal(few.pixels.begin(), few.pixels.end(), many.pixels.begin()));
   EXPECT_TRUE(std::equal(few.targets.begin(), few.targets.end(), many.targets.begin()));
+}
+
+TEST(RayBatch, DrawsFromTilesByTheirShares) {
+  std::vector<TileShares> tiles(10);
+  tiles[4] = {{{4, 0, 0, 2, 5}, {4, 5, 1, 7, 2}}, {1, 4}};
+  tiles[9] = {{{9, 3, 3, 4, 4}}, {4}};
+  RayBatchOptions options{1, true, 0.5, &tiles};
+  RayBatch batch;
+  constexpr uint32_t kMany = 8000;
+  drawRays(twoPhotos(), {}, options, 3, kMany, batch);
+  int counts[3] = {};
+  for (uint32_t ray = 0; ray < kMany; ++ray) {
+    const float x = batch.pixels[2 * ray], y = batch.pixels[2 * ray + 1];
+    EXPECT_EQ(batch.weights[ray], 1);
+    if (batch.photoOfRay[ray] == 9) {
+      EXPECT_TRUE(x == 3.5f && y == 3.5f);
+      ++counts[2];
+    } else if (x < 2) {
+      ++counts[0];
+    } else {
+      EXPECT_TRUE(x > 5 && y > 1 && y < 2);
+      ++counts[1];
+    }
+  }
+  EXPECT_NEAR(counts[0], kMany / 8, 150);
+  EXPECT_NEAR(counts[1], 3 * kMany / 8, 200);
+  EXPECT_NEAR(counts[2], kMany / 2, 200);
+}
+
+TEST(RayBatch, GivesRaysNoWeightWhereThePhotosHaveNoTile) {
+  const std::vector<TileShares> tiles(10);
+  RayBatch batch;
+  drawRays(twoPhotos(), {}, {1, true, 0, &tiles}, 3, 50, batch);
+  for (const float weight : batch.weights) EXPECT_EQ(weight, 0);
 }
 
 TEST(RayBatch, TakesColoursFromThePixelsItNames) {

@@ -123,14 +123,17 @@ TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const Tr
   if (options.progress) progress.emplace("training", state.plannedSteps, "steps");
 
   const auto save = [&] {
-    folder.commit(state, trainee.parts(), [&](uint32_t part) { return trainee.save(part); });
+    folder.commit(state, trainee.parts(), [&](uint32_t part) {
+      return trainee.isAsSaved(part) ? std::nullopt : std::optional<Bytes>(trainee.save(part));
+    });
     savedAt = seconds();
   };
   const auto unfinished = [&] { return state.plannedSteps == 0 || state.step < state.plannedSteps; };
   while (unfinished() && !options.stopRequested()) {
     const StepReport report = trainee.step(state.step, state.step < planMadeAt ? 0 : state.plannedSteps);
     if (!std::isfinite(report.loss)) {
-      throw Error(folder.root().string(), fmt::format("step {}, block {}", state.step, trainee.brokenPart()), "the loss is not a number",
+      throw Error(folder.root().string(), fmt::format("step {}, block {}", state.step, trainee.brokenPart()),
+                  "the loss is not a number",
                   "train into another folder with a lower --set rate=..., and report it with the capture");
     }
     window.add(report);

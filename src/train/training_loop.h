@@ -26,6 +26,7 @@ class Trainee {
   // Everything that later steps depend on, as one safetensors file a part (a block); and back. `path` is for errors.
   virtual uint32_t parts() const { return 1; }
   virtual Bytes save(uint32_t part) = 0;
+  virtual bool isAsSaved(uint32_t) const { return false; }  // nothing of it has changed since the last save or restore
   virtual void restore(uint32_t part, const fs::path& path, const Safetensors& state) = 0;
   // Asked when a loss is not a number: the first part that holds something that is none; 0 where none does.
   virtual uint32_t brokenPart() { return 0; }

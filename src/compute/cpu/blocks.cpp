@@ -239,6 +239,7 @@ void writeContracted(const Blocks::Place& place, Middles& at, uint32_t first, ui
 uint32_t writeSamples(const BlockSamples& a, const Blocks& blocks, const Ray& ray, const double* s, const double* t,
                       uint32_t samples, size_t row, Middles& at) {
   const uint32_t* const groups = hostPointer(a.groupOfBlock);
+  const uint32_t* const slots = hostPointer(a.slotOfBlock);
   uint32_t* const blockOfSample = hostPointer(a.blockOfSample) + row;
   float* const positions = hostPointer(a.positions) + 3 * row;
   float* const distances = hostPointer(a.distances) + row;
@@ -252,10 +253,8 @@ uint32_t writeSamples(const BlockSamples& a, const Blocks& blocks, const Ray& ra
   blocks.find(at, samples, blockOfSample);
   uint32_t segments = 0, lastGroup = 0;
   for (uint32_t first = 0, end = 0; first < samples; first = end) {
-    const uint32_t block = blockOfSample[first], group = groups ? groups[block] : block;
+    const uint32_t block = blockOfSample[first];
     while (end < samples && blockOfSample[end] == block) ++end;
-    segments += first == 0 || group != lastGroup;
-    lastGroup = group;
     const Blocks::Place& place = blocks.place(block);
     double along[3];  // the direction in local coordinates
     for (int axis = 0; axis < 3; ++axis) along[axis] = ray.direction[axis] * place.inverseScale[axis];
@@ -269,6 +268,16 @@ uint32_t writeSamples(const BlockSamples& a, const Blocks& blocks, const Ray& ra
       const double speed = std::sqrt(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
       std::fill(runtimeSteps + first, runtimeSteps + end, speed > 0 ? static_cast<float>(place.texel / speed) : 0);
     }
+    uint32_t name = block;
+    if (slots) {
+      const bool held = slots[block] != kNoSlot;
+      name = held ? slots[block] : 0;
+      std::fill(blockOfSample + first, blockOfSample + end, name);
+      if (!held) std::fill(steps + first, steps + end, 0.0f);
+    }
+    const uint32_t group = groups ? groups[name] : name;
+    segments += first == 0 || group != lastGroup;
+    lastGroup = group;
   }
   return segments;
 }
@@ -389,6 +398,7 @@ void run(Context& context, const BlockSamples& a) {
 void run(Context& context, const BlockPoints& a) {
   const Blocks blocks(a.space, a.texels);
   const uint32_t* chosen = hostPointer(a.blocks);
+  const uint32_t* slots = hostPointer(a.slotOfBlock);
   uint32_t* blockOfSample = hostPointer(a.blockOfSample);
   float* positions = hostPointer(a.positions);
   float* runtimeSteps = hostPointer(a.runtimeSteps);
@@ -399,7 +409,7 @@ void run(Context& context, const BlockPoints& a) {
       const uint64_t first = 8 * uint64_t{p};
       const uint32_t block = chosen[random.below(first, static_cast<uint32_t>(a.blocks.count))];
       const Blocks::Place& place = blocks.place(block);
-      blockOfSample[p] = block;
+      blockOfSample[p] = slots ? slots[block] : block;
       Triple<double> y;
       for (int axis = 0; axis < 3; ++axis) {
         const double u = random.uniform(first + 1 + axis);

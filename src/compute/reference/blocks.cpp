@@ -162,6 +162,7 @@ void run(const BlockSamples& a) {
   const Doubles range = doubles(a.range, 2 * rays), farOfRay = doubles(a.farOfRay, rays);
   const Doubles fences = doubles(a.fences, posts * rays);
   const Indices groups = indices(a.groupOfBlock, a.groupOfBlock.count);
+  const Indices slots = indices(a.slotOfBlock, a.slotOfBlock.count);
   Doubles positions, distances, steps, middles, widths, runtimeSteps;
   std::vector<uint32_t> firstSample{a.firstRow}, blocks, firstSegment{0}, firstSampleOfSegment, groupOfSegment,
       rayOfSegment;
@@ -173,7 +174,12 @@ void run(const BlockSamples& a) {
     if (!farOfRay.empty()) ray.farthest = farOfRay[r];
     ray.fences.assign(fences.begin() + r * posts, fences.begin() + (r + 1) * posts);
     bool first = true;
-    for (const BlockSample& sample : blockSamples(a.space, ray, a.split, a.texels)) {
+    for (BlockSample& sample : blockSamples(a.space, ray, a.split, a.texels)) {
+      if (!slots.empty()) {
+        const bool held = slots[sample.block] != kNoSlot;
+        sample.block = held ? slots[sample.block] : 0;
+        if (!held) sample.step = 0;
+      }
       const uint32_t group = groups.empty() ? sample.block : groups[sample.block];
       if (first || group != groupOfSegment.back()) {
         firstSampleOfSegment.push_back(a.firstRow + static_cast<uint32_t>(blocks.size()));
@@ -215,13 +221,13 @@ void run(const BlockSamples& a) {
 }
 
 void run(const BlockPoints& a) {
-  const Indices blocks = indices(a.blocks, a.blocks.count);
+  const Indices blocks = indices(a.blocks, a.blocks.count), slots = indices(a.slotOfBlock, a.slotOfBlock.count);
   if (a.points > 0) CHECK(a.blocks.count > 0u);
   std::vector<uint32_t> blockOfSample;
   Doubles positions, runtimeSteps;
   for (uint32_t p = 0; p < a.points; ++p) {
     const BlockPoint point = blockPoint(a.space, blocks, a.texels, a.seed, p);
-    blockOfSample.push_back(point.block);
+    blockOfSample.push_back(slots.empty() ? point.block : slots[point.block]);
     positions.insert(positions.end(), point.position.begin(), point.position.end());
     runtimeSteps.push_back(point.runtimeStep);
   }

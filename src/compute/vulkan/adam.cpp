@@ -18,6 +18,7 @@ void VulkanDevice::run(const Adam& options) {
   arguments.firstMoments = deviceAddress(options.firstMoments);
   arguments.secondMoments = deviceAddress(options.secondMoments);
   arguments.counts = deviceAddress(options.counts);
+  if (options.rows) arguments.rows = deviceAddress(options.rows);
   arguments.count = static_cast<uint32_t>(count);
   arguments.skipZeroGradients = options.skipZeroGradients;
   arguments.rate = options.rate;

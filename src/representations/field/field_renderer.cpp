@@ -1,7 +1,6 @@
 #include "representations/field/field_renderer.h"
 
 #include <algorithm>
-#include <limits>
 
 namespace tessera {
 namespace {
@@ -13,15 +12,13 @@ constexpr float kMinTransmittance = 1e-3f;
 
 }  // namespace
 
-FieldRenderer::FieldRenderer(FieldModel& model) : model_(model) {
+FieldRenderer::FieldRenderer(FieldModel& model) : model_(model), pictureRays_(model.device(), kRays) {
   Device& device = model.device();
   seen_ = RaySamples(device, kRays, kSamples);
   counters_ = device.array<uint32_t>(RaySamples::kCounters);
   seen_.counters = counters_;
-  cameraOfRay_ = device.array<uint32_t>(kRays);
-  pixels_ = device.array<float>(kRays * 2);
-  for (Array<float>* perRay : {&origins_, &directions_, &colour_}) *perRay = device.array<float>(kRays * 3);
-  for (Array<float>* perRay : {&far_, &opacity_, &depth_}) *perRay = device.array<float>(kRays);
+  colour_ = device.array<float>(kRays * 3);
+  for (Array<float>* perRay : {&opacity_, &depth_}) *perRay = device.array<float>(kRays);
   weights_ = device.array<float>(kSamples);
 }
 
@@ -31,45 +28,20 @@ std::string FieldRenderer::device() const {
 
 RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
   Device& device = model_.device();
-  const RayCamera rayCamera = makeRayCamera(camera, worldFromCamera, model_.frame());
-  const Array<RayCamera> cameras = device.arrayOf(std::vector<RayCamera>{rayCamera});
-  const float* forward = rayCamera.rotation;  // third column, at 2, 5, 8
-  const float scale = static_cast<float>(model_.frame().scale);
+  pictureRays_.begin(makeRayCamera(camera, worldFromCamera, model_.frame()), model_.frame(),
+                     PixelLattice::whole(camera), opaqueDepth);
   RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
                     ImageF(camera.width, camera.height, 1)};
   const size_t pixelCount = view.opacity.pixels.size();
-  std::vector<float> pixels, far;
   uint32_t wanted = 1024;  // rays of the next piece: as many as the last one's samples let expect
   for (size_t first = 0; first < pixelCount;) {
-    const uint32_t rays = static_cast<uint32_t>(std::min<size_t>(wanted, pixelCount - first));
-    pixels.clear();
-    for (size_t i = first; i < first + rays; ++i) {
-      pixels.push_back(static_cast<float>(i % camera.width) + 0.5f);
-      pixels.push_back(static_cast<float>(i / camera.width) + 0.5f);
-    }
-    device.write(pixels_.all(), std::span<const float>(pixels));
-    device.run(GenerateRays{{rays, {}}, cameras, cameraOfRay_, pixels_, origins_, directions_});
-    const std::vector<float> directions = device.read(directions_.all());
-    const auto cosine = [&](size_t ray) {
-      return directions[3 * ray] * forward[2] + directions[3 * ray + 1] * forward[5] +
-             directions[3 * ray + 2] * forward[8];
-    };
-    Slice<const float> farOfRay;
-    if (opaqueDepth != nullptr) {
-      far.clear();
-      for (size_t ray = 0; ray < rays; ++ray) {
-        const float depth = opaqueDepth->pixels[first + ray], along = cosine(ray);
-        far.push_back(along > 0 ? depth * scale / along : std::numeric_limits<float>::infinity());
-      }
-      device.write(far_.all(), std::span<const float>(far));
-      farOfRay = far_;
-    }
-    model_.sample({rays, origins_, directions_, {}, farOfRay}, kMinTransmittance, seen_);
+    const PictureRays::Piece piece = pictureRays_.piece(first, wanted);
+    model_.sample({piece.rays, piece.origins, piece.directions, {}, piece.far}, kMinTransmittance, seen_);
     const RadianceField::Output output =
-        model_.field().forward(seen_.samples(), seen_.positions, directions_, seen_.rayOfSample, false);
+        model_.field().forward(seen_.samples(), seen_.positions, piece.directions, seen_.rayOfSample, false);
     CompositeForward composite;
     composite.minTransmittance = kMinTransmittance;
-    composite.rays = seen_.finished(rays);
+    composite.rays = seen_.finished(piece.rays);
     composite.firstSample = seen_.firstSample;
     composite.x = output.logDensity;
     composite.steps = seen_.steps;
@@ -88,7 +60,8 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
     const std::vector<float> depth = device.read(depth_.part(0, finished));
     std::copy(colour.begin(), colour.end(), view.colour.pixels.begin() + static_cast<ptrdiff_t>(first * 3));
     std::copy(opacity.begin(), opacity.end(), view.opacity.pixels.begin() + static_cast<ptrdiff_t>(first));
-    for (uint32_t ray = 0; ray < finished; ++ray) view.depth.pixels[first + ray] = depth[ray] * cosine(ray) / scale;
+    for (uint32_t ray = 0; ray < finished; ++ray)
+      view.depth.pixels[first + ray] = pictureRays_.depthOf(ray, depth[ray]);
     first += finished;
     // Each round of marching has room for so many samples, and so has what is seen.
     const uint32_t fullest =

@@ -3,6 +3,7 @@
 
 #include "representations/field/field_model.h"
 #include "scene/view_renderer.h"
+#include "train/picture_rays.h"
 
 namespace tessera {
 
@@ -16,9 +17,10 @@ class FieldRenderer final : public ViewRenderer {
 
  private:
   FieldModel& model_;
+  PictureRays pictureRays_;
   RaySamples seen_;
-  Array<uint32_t> counters_, cameraOfRay_;
-  Array<float> pixels_, origins_, directions_, far_, colour_, opacity_, depth_, weights_;
+  Array<uint32_t> counters_;
+  Array<float> colour_, opacity_, depth_, weights_;
 };
 
 }  // namespace tessera

@@ -5,6 +5,7 @@
 
 #include "representations/volume/alive_texels.h"
 #include "representations/volume/volume_pass.h"
+#include "train/picture_rays.h"
 
 namespace tessera {
 namespace {
@@ -27,60 +28,24 @@ VolumePass::Room roomForRays(const VolumeModel& model) {
   return room;
 }
 
-// Which pixels of a photo to look through.
-struct Lattice {
-  int firstX = 0, firstY = 0, endX = 0, endY = 0, stride = 1;
-
-  size_t columns() const { return static_cast<size_t>((endX - firstX + stride - 1) / stride); }
-  size_t rows() const { return static_cast<size_t>((endY - firstY + stride - 1) / stride); }
-  size_t count() const { return columns() * rows(); }
-};
-
-// Pixels as rays on the device, a piece at a time.
-class PhotoPixels {
- public:
-  PhotoPixels(Device& device, const RayCamera& camera, const Lattice& lattice) : device_(device), lattice_(lattice) {
-    cameras_ = device.arrayOf(std::vector<RayCamera>{camera});
-    cameraOfRay_ = device.array<uint32_t>(kRays);
-    pixels_ = device.array<float>(kRays * 2);
-    for (Array<float>* three : {&origins_, &directions_}) *three = device.array<float>(kRays * 3);
-  }
-  VolumeRays rays(size_t first) {
-    const uint32_t count = static_cast<uint32_t>(std::min<size_t>(kRays, lattice_.count() - first));
-    std::vector<float> pixels;
-    for (size_t i = first; i < first + count; ++i) {
-      const int x = lattice_.firstX + static_cast<int>(i % lattice_.columns()) * lattice_.stride;
-      const int y = lattice_.firstY + static_cast<int>(i / lattice_.columns()) * lattice_.stride;
-      pixels.push_back(static_cast<float>(x) + 0.5f);
-      pixels.push_back(static_cast<float>(y) + 0.5f);
-    }
-    device_.write(pixels_.all(), std::span<const float>(pixels));
-    device_.run(GenerateRays{{count}, cameras_, cameraOfRay_, pixels_, origins_, directions_});
-    return {count, origins_, directions_, {}, {}, {}};
-  }
-
- private:
-  Device& device_;
-  Lattice lattice_;
-  Array<RayCamera> cameras_;
-  Array<uint32_t> cameraOfRay_;
-  Array<float> pixels_, origins_, directions_;
-};
-
 // Marks what is seen through the pixels, of blocks from `firstBlock` on.
 class AliveFinder {
  public:
   AliveFinder(VolumeModel& model, const BakeVolumeOptions& options, std::vector<AliveTexels>& alive)
-      : model_(model), options_(options), alive_(alive), pass_(model, roomForRays(model)) {
+      : model_(model),
+        options_(options),
+        alive_(alive),
+        pass_(model, roomForRays(model)),
+        pictureRays_(model.device(), kRays) {
     drawing_.minAlpha = static_cast<float>(options.minAlpha);
   }
-  void look(const RayCamera& camera, const Lattice& lattice, uint32_t firstBlock) {
+  void look(const RayCamera& camera, const PixelLattice& lattice, uint32_t firstBlock) {
     Device& device = model_.device();
-    PhotoPixels pixels(device, camera, lattice);
+    pictureRays_.begin(camera, model_.frame(), lattice);
     for (size_t first = 0; first < lattice.count(); first += kRays) {
-      const VolumeRays rays = pixels.rays(first);
-      pass_.forward(rays, drawing_);
-      const uint32_t samples = device.read(pass_.firstSample().part(rays.count, 1))[0];
+      const PictureRays::Piece piece = pictureRays_.piece(first, kRays);
+      pass_.forward({piece.rays, piece.origins, piece.directions, {}, {}, {}}, drawing_);
+      const uint32_t samples = device.read(pass_.firstSample().part(piece.rays, 1))[0];
       const std::vector<float> weights = device.read(pass_.weights().part(0, samples));
       const std::vector<float> logDensities = device.read(pass_.logDensities().part(0, samples));
       const std::vector<float> steps = device.read(pass_.runtimeSteps().part(0, samples));
@@ -99,6 +64,7 @@ class AliveFinder {
   const BakeVolumeOptions& options_;
   std::vector<AliveTexels>& alive_;
   VolumePass pass_;
+  PictureRays pictureRays_;
   VolumePass::Options drawing_;
 };
 
@@ -111,7 +77,7 @@ class TexelBaker {
     positions_ = device_.array<float>(size_t{3} * kTexels);
     firstOfBlock_ = device_.array<uint32_t>(blocks + 1);
     batch_.positions = positions_;
-    batch_.firstOfBlock = firstOfBlock_;
+    batch_.firstOfSlot = firstOfBlock_;
     first_.assign(blocks + 1, 0);
     block_ = block;
   }

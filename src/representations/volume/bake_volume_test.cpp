@@ -132,7 +132,7 @@ TEST(BakeVolume, StoresTheVeryNumbersThatTrainingSaw) {
   distinct.texelPositions = texelPositions;
   device.run(distinct);
   BlockFieldBatch batch(device, model.attributes().shape(), room, false);
-  batch.firstOfBlock = firstTexel;
+  batch.firstOfSlot = firstTexel;
   batch.positions = texelPositions;
   model.attributes().forward(batch, false);
   VirtualGridForward forward{grid};

@@ -69,6 +69,8 @@ std::vector<ConfigField> VolumeConfig::fields() {
       {"proposal_every", "steps between updates of the proposals after the warm-up", &proposalEvery},
       {"proposal_warm_up", "steps during which each updates the proposals", &proposalWarmUp},
       {"seed", "of everything random", &seed},
+      {"resident_blocks", "blocks that are in memory at once, besides a surround of its own; 0: all", &residentBlocks},
+      {"residency_steps", "steps in which all blocks get their turn, where not all are in memory", &residencySteps},
       {"texels_per_step", "texels that a step aims for; rays adapt", &texelsPerStep},
       {"first_rays", "rays of the first step", &firstRays},
       {"most_rays", "rays that a step never exceeds", &mostRays},
@@ -140,6 +142,8 @@ void VolumeConfig::check() const {
   requireWithin("padding", padding, 0, 1);
   requireWithin("proposal_every", proposalEvery, 1, 1 << 20);
   requireWithin("proposal_warm_up", proposalWarmUp, 0, 1 << 30);
+  requireWithin("resident_blocks", residentBlocks, 0, 1 << 20);
+  requireWithin("residency_steps", static_cast<double>(residencySteps), 1, 1e9);
   requireWithin("texels_per_step", texelsPerStep, 1024, 1 << 26);
   requireWithin("most_rays", mostRays, 64, 1 << 20);
   requireWithin("first_rays", firstRays, 16, mostRays);

@@ -30,6 +30,8 @@ struct VolumeConfig {
   int proposalEvery = 4, proposalWarmUp = 256;
   // Batches
   int64_t seed = 0;
+  int residentBlocks = 0;
+  int64_t residencySteps = 1000;
   int texelsPerStep = 1 << 19;
   int firstRays = 1024, mostRays = 1 << 14;
   double photoBudgetMiB = 0;

@@ -11,7 +11,9 @@
 namespace tessera {
 namespace {
 
-constexpr double kMemoryShare = 0.5;  // of the machine's, for blocks in training
+constexpr double kMemoryShare = 0.5;   // of the machine's, for blocks in training
+constexpr double kWorthSaying = 0.02;  // of the pixels are not trained on
+constexpr const char* kWaiting = "waiting";
 
 // Cuts the capture, draws the map, and says what people should know before hours of training.
 BlockGrid cut(const Capture& capture, const fs::path& model, const TrainVolumeOptions& options) {
@@ -58,6 +60,23 @@ VolumeConfig levelConfig(VolumeConfig finest, uint32_t level) {
 
 namespace {
 
+// With all that is allocated by now: what training adds are decoded photos, and a checkpoint of one block, twice.
+void sayWhatMemoryItTakes(VolumeTrainer& trainer, const Capture& capture, const VolumeConfig& config) {
+  constexpr double kMiB = 1048576;
+  const Residency* residency = trainer.residency();
+  if (!residency) return;
+  const double all = static_cast<double>(decodedBytes(capture, capture.photosIn(Split::train)));
+  const double photos = config.photoBudgetMiB > 0 ? std::min(all, config.photoBudgetMiB * kMiB) : all;
+  const double bytes = static_cast<double>(residentBytes()) + photos + 2 * trainingBytesPerBlock(config);
+  inform("memory: at most {:.0f} MiB, with {} of {} blocks at a time, {} stays in {} steps", bytes / kMiB,
+         config.residentBlocks, trainer.model().space().cells(), residency->stays().size(), residency->cycleSteps());
+  if (residency->unserved() < kWorthSaying) return;
+  warn(
+      "{:.0f} % of what the photos show is seen through more than {} blocks, or rare sets of them, and not trained on; "
+      "raise --resident-blocks",
+      100 * residency->unserved(), config.residentBlocks);
+}
+
 // Writes what a run is made of, unless a run is there already.
 void writeRun(Device& device, const ModelFolder& folder, const Capture& capture, const BlockGrid& grid,
               VolumeConfig config, const TrainingLoopOptions& loop) {
@@ -73,8 +92,8 @@ bool trainLevel(Device& device, const Capture& capture, const fs::path& model, u
   const std::optional<ModelManifest> before = folder.manifest();
   if (before && before->step >= before->plannedSteps) return true;
   const VolumeConfig config = levelConfig(finest, level);
-  VolumeTrainer trainer(device, capture, config, grid);
-  if (!before) trainer.model().copyFields(*loadVolumeModel(device, levelFolder(model, level - 1)));
+  VolumeTrainer trainer(device, capture, config, grid, folder.root() / kWaiting);
+  if (!before) trainer.beginFrom(levelFolder(model, level - 1));
   loop.minutes = 0;
   loop.steps = before ? before->plannedSteps : steps;
   loop.resume = true;
@@ -97,9 +116,10 @@ TrainingResult trainVolume(Device& device, const Capture& capture, const fs::pat
   const BlockGrid grid = goingOn ? requireGrid(folder) : cut(capture, model, options);
   TrainingResult result;
   {
-    VolumeTrainer trainer(device, capture, options.config, grid);
+    VolumeTrainer trainer(device, capture, options.config, grid, folder.root() / kWaiting);
     if (!goingOn && !folder.manifest()) fs::remove_all(model / "levels");  // of a run that is no more
     writeRun(device, folder, capture, grid, options.config, options.loop);
+    sayWhatMemoryItTakes(trainer, capture, options.config);
     result = runTraining(trainer, folder, options.loop);
   }
   const int64_t steps = static_cast<int64_t>(options.config.levelShare * static_cast<double>(result.plannedSteps));
@@ -122,11 +142,8 @@ std::unique_ptr<VolumeModel> loadVolumeModel(Device& device, const fs::path& fol
   const ModelManifest manifest = requireManifest(model, "volume");
   VolumeConfig config;
   configFromToml(config.fields(), model.configPath());
-  auto made = std::make_unique<VolumeModel>(device, config, requireGrid(model));
-  if (manifest.files.size() != made->space().blocks()) {
-    throw Error((folder / "manifest.json").string(), "files", "does not name one checkpoint a block",
-                "restore the file or train again");
-  }
+  auto made = std::make_unique<VolumeModel>(device, config, requireGrid(model), VolumeModel::Room{0, false});
+  requireOneFileABlock(folder, manifest, made->space().blocks());
   for (uint32_t block = 0; block < made->space().blocks(); ++block) {
     const fs::path file = folder / manifest.files[block];
     made->restore(block, file, readSafetensors(file));

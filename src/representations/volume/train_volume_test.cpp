@@ -63,6 +63,29 @@ TEST(TrainVolume, MakesCoarserLevelsAndLeavesTheFinestAlone) {
             device->read(below->attributes().network(0).values.all()));
 }
 
+TEST(TrainVolume, TrainsLevelsTooWithBlocksThatWait) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  TrainVolumeOptions few = options(10);
+  few.config.residentBlocks = 1;
+  few.config.residencySteps = 4;
+  few.config.levelShare = 0.8;
+  EXPECT_TRUE(trainVolume(*device, scene.capture(), scene / "model", few).finished);
+  // With a checkpoint after each step, those of waiting blocks stay what they are; the model is the same.
+  TrainVolumeOptions often = few;
+  often.loop.checkpointSeconds = 0;
+  trainVolume(*device, scene.capture(), scene / "often", often);
+  EXPECT_EQ(checkpoints(scene / "often"), checkpoints(scene / "model"));
+  EXPECT_EQ(trainedLevels(scene / "model"), 2u);
+  for (const uint32_t level : {0u, 1u}) {
+    const fs::path folder = levelFolder(scene / "model", level);
+    EXPECT_FALSE(fs::exists(folder / "waiting"));
+    const std::unique_ptr<VolumeModel> model = loadVolumeModel(*device, folder);
+    EXPECT_EQ(model->slots(), 2u) << "drawn whole";
+    EXPECT_EQ(model->attributes().table(0).counts.size(), 0u) << "without what only training needs";
+  }
+}
+
 TEST(TrainVolume, GoesOnWithALevelThatWasStopped) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});

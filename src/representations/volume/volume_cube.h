@@ -52,7 +52,7 @@ struct TrainedVolumeCube {
   TrainedVolumeCube(const CubeScene& scene, const VolumeConfig& config, const BlockGrid& grid, int64_t steps,
                     int threads = 2)
       : device(makeDevice({"cpu", threads})),
-        trainer(std::make_unique<VolumeTrainer>(*device, scene.capture(), config, grid)) {
+        trainer(std::make_unique<VolumeTrainer>(*device, scene.capture(), config, grid, scene / "waiting")) {
     for (int64_t step = 0; step < steps; ++step) last = trainer->step(step, steps);
   }
   VolumeModel& model() { return trainer->model(); }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 #include "base/error.h"
 #include "base/random.h"
@@ -36,6 +38,15 @@ std::vector<float> initialDeferred(uint32_t networks, uint64_t seed) {
   return values;
 }
 
+// `cells` of them, or all with 0; and a surround of its own.
+std::vector<uint32_t> firstBlocks(const BlockSpace& space, uint32_t cells) {
+  if (cells == 0) cells = space.cells();
+  std::vector<uint32_t> blocks(std::min(cells, space.cells()));
+  std::iota(blocks.begin(), blocks.end(), 0u);
+  if (space.blocks() > space.cells()) blocks.push_back(space.cells());
+  return blocks;
+}
+
 }  // namespace
 
 SceneFrame sceneFrameOf(const BlockGrid& grid) {
@@ -57,7 +68,13 @@ BlockSpace blockSpaceOf(const BlockGrid& grid, const VolumeConfig& config) {
   return space;
 }
 
-VolumeModel::VolumeModel(Device& device, const VolumeConfig& config, const BlockGrid& grid)
+void requireOneFileABlock(const fs::path& folder, const ModelManifest& manifest, uint32_t blocks) {
+  if (manifest.files.size() == blocks) return;
+  throw Error((folder / "manifest.json").string(), "files", "does not name one checkpoint a block",
+              "restore the file or train again");
+}
+
+VolumeModel::VolumeModel(Device& device, const VolumeConfig& config, const BlockGrid& grid, const Room& room)
     : device_(able(device, config)),
       config_(config),
       grid_(grid),
@@ -66,44 +83,99 @@ VolumeModel::VolumeModel(Device& device, const VolumeConfig& config, const Block
       virtualGrid_(config.virtualGrid()),
       groups_(groupsOfLevel(space_.columns, space_.rows, static_cast<uint32_t>(config.level),
                             space_.blocks() > space_.cells())),
-      groupOfBlock_(device.arrayOf(groups_.groupOfBlock)),
-      attributes_(device, "attributes", config.attributeShape(), space_.blocks(),
-                  mix64(static_cast<uint64_t>(config.seed))),
-      proposals_(device, "proposals", config.proposalShape(), space_.blocks(),
-                 mix64(static_cast<uint64_t>(config.seed) + 1)),
-      deferred_(device, "deferred", initialDeferred(groups_.groups(), static_cast<uint64_t>(config.seed))) {
+      blockOfSlot_(firstBlocks(space_, room.cells)),
+      slotOfBlock_(device.array<uint32_t>(space_.blocks())),
+      heldBlocks_(device.array<uint32_t>(slots())),
+      groupOfSlot_(device.array<uint32_t>(slots())),
+      attributes_(device, "attributes", config.attributeShape(), slots(), mix64(static_cast<uint64_t>(config.seed)),
+                  room.forTraining),
+      proposals_(device, "proposals", config.proposalShape(), slots(), mix64(static_cast<uint64_t>(config.seed) + 1),
+                 room.forTraining),
+      deferred_(device, "deferred", initialDeferred(groups_.groups(), static_cast<uint64_t>(config.seed)),
+                room.forTraining) {
+  nameSlots();
+  if (space_.blocks() > space_.cells() && !holdsAll()) {
+    attributes_.begin(slots() - 1, space_.cells());
+    proposals_.begin(slots() - 1, space_.cells());
+  }
   if (config.shareTexels || space_.blocks() == 1) return;
   throw Error("--set share_texels=false", "", "is for models of one block",
               "leave it at true, or use --blocks 1x1 and --set surround=border");
 }
 
+uint32_t VolumeModel::slotOf(uint32_t block) const {
+  const auto found = std::find(blockOfSlot_.begin(), blockOfSlot_.end(), block);
+  return found == blockOfSlot_.end() ? kNoSlot : static_cast<uint32_t>(found - blockOfSlot_.begin());
+}
+
+void VolumeModel::nameSlots() {
+  std::vector<uint32_t> slotOfBlock(space_.blocks(), kNoSlot), groupOfSlot;
+  for (uint32_t slot = 0; slot < slots(); ++slot) {
+    slotOfBlock.at(blockOfSlot_[slot]) = slot;
+    groupOfSlot.push_back(groups_.groupOfBlock[blockOfSlot_[slot]]);
+  }
+  device_.write(slotOfBlock_.all(), std::span<const uint32_t>(slotOfBlock));
+  device_.write(heldBlocks_.all(), std::span<const uint32_t>(blockOfSlot_));
+  device_.write(groupOfSlot_.all(), std::span<const uint32_t>(groupOfSlot));
+}
+
+void VolumeModel::hold(const std::vector<uint32_t>& blockOfSlot) {
+  CHECK(blockOfSlot.size() == blockOfSlot_.size());
+  const std::vector<uint32_t> before = std::exchange(blockOfSlot_, blockOfSlot);
+  for (uint32_t slot = 0; slot < slots(); ++slot) {
+    if (blockOfSlot[slot] == before[slot]) continue;
+    attributes_.begin(slot, blockOfSlot[slot]);
+    proposals_.begin(slot, blockOfSlot[slot]);
+  }
+  nameSlots();
+}
+
 void VolumeModel::copyFields(VolumeModel& from) {
+  CHECK(holdsAll());
+  CHECK(from.holdsAll());
+  CHECK(from.slots() == slots());
   const auto copy = [&](ParameterGroup& to, ParameterGroup& of) {
     device_.write(to.values.all(), std::span<const float>(from.device_.read(of.values.all())));
   };
-  CHECK(from.space_.blocks() == space_.blocks());
-  for (uint32_t block = 0; block < space_.blocks(); ++block) {
-    copy(attributes_.table(block), from.attributes_.table(block));
-    copy(attributes_.network(block), from.attributes_.network(block));
-    copy(proposals_.table(block), from.proposals_.table(block));
-    copy(proposals_.network(block), from.proposals_.network(block));
+  for (uint32_t slot = 0; slot < slots(); ++slot) {
+    copy(attributes_.table(slot), from.attributes_.table(slot));
+    copy(attributes_.network(slot), from.attributes_.network(slot));
+    copy(proposals_.table(slot), from.proposals_.table(slot));
+    copy(proposals_.network(slot), from.proposals_.network(slot));
   }
+}
+
+void VolumeModel::saveFields(uint32_t block, TensorSet& tensors, bool withMoments) {
+  const uint32_t slot = slotOf(block);
+  CHECK(slot != kNoSlot);
+  for (const ParameterGroup* group :
+       {&attributes_.table(slot), &attributes_.network(slot), &proposals_.table(slot), &proposals_.network(slot)}) {
+    tensors.add(device_, *group, withMoments);
+  }
+}
+
+void VolumeModel::restoreFields(uint32_t block, const fs::path& path, const Safetensors& file) {
+  const uint32_t slot = slotOf(block);
+  CHECK(slot != kNoSlot);
+  for (ParameterGroup* group :
+       {&attributes_.table(slot), &attributes_.network(slot), &proposals_.table(slot), &proposals_.network(slot)}) {
+    loadGroup(device_, path, file, *group);
+  }
+}
+
+void VolumeModel::saveFirstFields(uint32_t block, TensorSet& tensors) const {
+  attributes_.saveFirst(block, tensors);
+  proposals_.saveFirst(block, tensors);
 }
 
 void VolumeModel::save(uint32_t block, TensorSet& tensors, bool withMoments) {
-  for (const ParameterGroup* group :
-       {&attributes_.table(block), &attributes_.network(block), &proposals_.table(block), &proposals_.network(block)}) {
-    tensors.add(device_, *group, withMoments);
-  }
-  if (block == 0) tensors.add(device_, deferred_, withMoments);
+  saveFields(block, tensors, withMoments);
+  if (block == 0) saveDeferred(tensors, withMoments);
 }
 
 void VolumeModel::restore(uint32_t block, const fs::path& path, const Safetensors& file) {
-  for (ParameterGroup* group :
-       {&attributes_.table(block), &attributes_.network(block), &proposals_.table(block), &proposals_.network(block)}) {
-    loadGroup(device_, path, file, *group);
-  }
-  if (block == 0) loadGroup(device_, path, file, deferred_);
+  restoreFields(block, path, file);
+  if (block == 0) restoreDeferred(path, file);
 }
 
 }  // namespace tessera

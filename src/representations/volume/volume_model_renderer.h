@@ -4,6 +4,7 @@
 
 #include "representations/volume/volume_pass.h"
 #include "scene/view_renderer.h"
+#include "train/picture_rays.h"
 
 namespace tessera {
 
@@ -20,8 +21,7 @@ class VolumeModelRenderer final : public ViewRenderer {
   VolumeModel& model_;
   float minAlpha_;
   VolumePass pass_;
-  Array<uint32_t> cameraOfRay_;
-  Array<float> pixels_, origins_, directions_, far_;
+  PictureRays pictureRays_;
 };
 
 }  // namespace tessera

@@ -1,7 +1,6 @@
 #include "representations/volume/volume_pass.h"
 
 #include <algorithm>
-#include <numeric>
 
 namespace tessera {
 namespace {
@@ -13,7 +12,7 @@ constexpr uint32_t kAttributes = VirtualGrid::kAttributes, kColours = kAttribute
 VolumePass::VolumePass(VolumeModel& model, const Room& room) : model_(model), device_(model.device()), room_(room) {
   const VolumeConfig& config = model.config();
   const BlockSpace& space = model.space();
-  const size_t rays = room.rays, blocks = space.blocks();
+  const size_t rays = room.rays, slots = model.slots();
   const uint32_t intervals[kRounds] = {static_cast<uint32_t>(config.firstIntervals),
                                        static_cast<uint32_t>(config.secondIntervals)};
   range_ = device_.array<float>(2 * rays);
@@ -24,7 +23,7 @@ VolumePass::VolumePass(VolumeModel& model, const Room& room) : model_(model), de
     round.fences = device_.array<float>(rays * (intervals[r] + 1));
     round.firstSample = device_.array<uint32_t>(rays + 1);
     round.rowCount = device_.array<uint32_t>(1);
-    round.firstOfBlock = device_.array<uint32_t>(blocks + 1);
+    round.firstOfSlot = device_.array<uint32_t>(slots + 1);
     for (Array<uint32_t>* words : {&round.blockOfSample, &round.source}) *words = device_.array<uint32_t>(rows);
     for (Array<float>* three : {&round.positions, &round.groupedPositions}) *three = device_.array<float>(3 * rows);
     for (Array<float>* one : {&round.distances, &round.steps, &round.logDensities, &round.weights}) {
@@ -35,13 +34,10 @@ VolumePass::VolumePass(VolumeModel& model, const Room& room) : model_(model), de
       for (Array<float>* one : {&round.weightGradients, &round.gradients}) *one = device_.array<float>(rows);
     }
     round.batch = BlockFieldBatch(device_, model.proposals().shape(), static_cast<uint32_t>(rows), room.training);
-    round.batch.firstOfBlock = round.firstOfBlock;
+    round.batch.firstOfSlot = round.firstOfSlot;
     round.batch.positions = round.groupedPositions;
   }
   fences_ = device_.array<float>(rays * static_cast<size_t>(config.samples + 1));
-  std::vector<uint32_t> numbers(blocks);
-  std::iota(numbers.begin(), numbers.end(), 0u);
-  allBlocks_ = device_.arrayOf(numbers);
 
   BlockSamples most{space};
   most.intervals = static_cast<uint32_t>(config.samples);
@@ -64,13 +60,13 @@ VolumePass::VolumePass(VolumeModel& model, const Room& room) : model_(model), de
   for (Array<uint32_t>* words : {&groupOfSegment_, &rayOfSegment_}) *words = device_.array<uint32_t>(segments);
   if (model.virtualGrid().shareTexels) {
     for (Array<uint32_t>* words : {&marks_, &ranks_}) {
-      *words = device_.array<uint32_t>(blocks * std::max(model.virtualGrid().words(), room.mostWords));
+      *words = device_.array<uint32_t>(slots * std::max(model.virtualGrid().words(), room.mostWords));
     }
   }
-  firstTexel_ = device_.array<uint32_t>(blocks + 1);
+  firstTexel_ = device_.array<uint32_t>(slots + 1);
   texelPositions_ = device_.array<float>(size_t{3} * room.texels);
   texels_ = BlockFieldBatch(device_, model.attributes().shape(), room.texels, room.training);
-  texels_.firstOfBlock = firstTexel_;
+  texels_.firstOfSlot = firstTexel_;
   texels_.positions = texelPositions_;
   composited_ = device_.array<float>(kColours * segments);
   for (Array<float>* one : {&segmentOpacity_, &segmentDepth_}) *one = device_.array<float>(segments);
@@ -105,8 +101,8 @@ void VolumePass::forward(const VolumeRays& rays, const Options& options) {
                          round_[0].fences});
   for (uint32_t round = 0; round < rounds(); ++round) propose(rays, round, options);
   if (room_.points > 0) {
-    device_.run(BlockPoints{model_.space(), room_.points, options.seed, model_.virtualGrid().planes, allBlocks_,
-                            blockOfSample_, positions_, runtimeSteps_});
+    device_.run(BlockPoints{model_.space(), room_.points, options.seed, model_.virtualGrid().planes,
+                            model_.heldBlocks(), model_.slotOfBlock(), blockOfSample_, positions_, runtimeSteps_});
   }
   locateSamples(rays);
   evaluateTexels(options);
@@ -123,6 +119,7 @@ void VolumePass::propose(const VolumeRays& rays, uint32_t r, const Options& opti
   locate.range = range_;
   locate.farOfRay = rays.far;
   locate.fences = round.fences;
+  locate.slotOfBlock = model_.slotOfBlock();
   locate.firstSample = round.firstSample;
   locate.rowCount = round.rowCount;
   locate.blockOfSample = round.blockOfSample;
@@ -131,7 +128,7 @@ void VolumePass::propose(const VolumeRays& rays, uint32_t r, const Options& opti
   locate.steps = round.steps;
   device_.run(locate);
   const Count rows{rays.count * round.intervals};
-  device_.run(GroupByBlock{rows, model_.space().blocks(), round.blockOfSample, round.firstOfBlock, round.source});
+  device_.run(GroupByBlock{rows, model_.slots(), round.blockOfSample, round.firstOfSlot, round.source});
   device_.run(
       GatherRows{rows, round.source, Matrix<float>(round.positions, 3), Matrix<float>(round.groupedPositions, 3)});
   model_.proposals().forward(round.batch, options.keepProposals);
@@ -181,7 +178,8 @@ void VolumePass::locateSamples(const VolumeRays& rays) {
   locate.widths = widths_;
   locate.runtimeSteps = runtimeSteps_;
   locate.texels = model_.virtualGrid().planes;
-  locate.groupOfBlock = model_.groupOfBlock();
+  locate.slotOfBlock = model_.slotOfBlock();
+  locate.groupOfBlock = model_.groupOfSlot();
   locate.firstSegment = firstSegment_;
   locate.segmentCount = segmentCount_;
   locate.firstSampleOfSegment = firstSampleOfSegment_;
@@ -191,9 +189,9 @@ void VolumePass::locateSamples(const VolumeRays& rays) {
 }
 
 void VolumePass::evaluateTexels(const Options& options) {
-  const uint32_t blocks = model_.space().blocks();
+  const uint32_t slots = model_.slots();
   DistinctTexels distinct{model_.virtualGrid()};
-  distinct.blocks = blocks;
+  distinct.blocks = slots;
   distinct.samples = rows();
   distinct.blockOfSample = blockOfSample_;
   distinct.positions = positions_;
@@ -210,7 +208,7 @@ void VolumePass::evaluateTexels(const Options& options) {
   mix.positions = positions_;
   mix.marks = marks_;
   mix.ranks = ranks_;
-  mix.texels = {room_.texels, firstTexel_.part(blocks, 1)};
+  mix.texels = {room_.texels, firstTexel_.part(slots, 1)};
   mix.attributes = texels_.outputs;
   mix.minAlpha = options.minAlpha;
   mix.runtimeSteps = runtimeSteps_;
@@ -254,7 +252,7 @@ void VolumePass::composite(const VolumeRays& rays) {
 }
 
 uint32_t VolumePass::texelsWanted() {
-  return device_.read(firstTexel_.part(model_.space().blocks(), 1))[0];
+  return device_.read(firstTexel_.part(model_.slots(), 1))[0];
 }
 
 void VolumePass::backward(const VolumeRays& rays, Slice<const float> colourGradients,
@@ -333,16 +331,16 @@ void VolumePass::backwardThroughTexels(const LossScales& scales) {
     }
     device_.fillZero(colourGradients_.part(0, size_t{kColours} * room_.points));
   }
-  const uint32_t blocks = model_.space().blocks();
+  const uint32_t slots = model_.slots();
   VirtualGridBackward mix{model_.virtualGrid()};
-  mix.blocks = blocks;
+  mix.blocks = slots;
   mix.samples = rows();
   mix.blockOfSample = blockOfSample_;
   mix.positions = positions_;
   mix.marks = marks_;
   mix.ranks = ranks_;
   mix.firstTexel = firstTexel_;
-  mix.texels = {room_.texels, firstTexel_.part(blocks, 1)};
+  mix.texels = {room_.texels, firstTexel_.part(slots, 1)};
   mix.logDensities = logDensities_;
   mix.colours = colours_;
   mix.logDensityGradients = logDensityGradients_;

@@ -44,13 +44,15 @@ class VolumePass {
   Slice<const float> depth() const { return depth_; }      // [rays]: expected t, times opacity
   // Per sample; rows [firstSample[r], firstSample[r + 1]).
   Slice<const uint32_t> firstSample() const { return firstSample_; }
-  Slice<const uint32_t> blockOfSample() const { return blockOfSample_; }
+  Slice<const uint32_t> blockOfSample() const { return blockOfSample_; }  // the slot that holds it
   Slice<const float> positions() const { return positions_; }
   Slice<const float> weights() const { return weights_; }  // over the whole ray
   Slice<const float> logDensities() const { return logDensities_; }
   Slice<const float> colours() const { return colours_; }  // [7]: diffuse, features
   Slice<const float> runtimeSteps() const { return runtimeSteps_; }
   uint32_t texelsWanted();  // waits; may be above the room there is
+  // Of the texels that a slot's field was asked for; both the same when no sample came to its block.
+  Slice<const uint32_t> texelRows(uint32_t slot) const { return firstTexel_.part(slot, 2); }
 
   // Weights of the losses that live inside the model, already divided by the number of rays or points; the colour's
   // gradients come from outside.
@@ -67,7 +69,7 @@ class VolumePass {
   struct Round {
     uint32_t intervals = 0;
     Array<float> fences;  // [rays][intervals + 1]
-    Array<uint32_t> firstSample, rowCount, blockOfSample, firstOfBlock, source;
+    Array<uint32_t> firstSample, rowCount, blockOfSample, firstOfSlot, source;
     Array<float> positions, groupedPositions, distances, steps, logDensities, weights, opacity, weightGradients,
         gradients;
     BlockFieldBatch batch;
@@ -93,7 +95,6 @@ class VolumePass {
   Array<float> range_;
   Round round_[kRounds];
   Array<float> fences_;  // of the samples
-  Array<uint32_t> allBlocks_;
 
   // Samples
   Array<uint32_t> firstSample_, rowCount_, blockOfSample_;

@@ -7,6 +7,7 @@
 #include "base/log.h"
 #include "base/random.h"
 #include "train/colour_loss.h"
+#include "train/run_folder.h"
 #include "train/schedule.h"
 
 namespace tessera {
@@ -56,10 +57,11 @@ float cullThreshold(const VolumeConfig& config, double progress) {
   return static_cast<float>(config.cullFirst * std::pow(config.cullLast / config.cullFirst, way));
 }
 
-VolumeTrainer::VolumeTrainer(Device& device, const Capture& capture, const VolumeConfig& config, const BlockGrid& grid)
+VolumeTrainer::VolumeTrainer(Device& device, const Capture& capture, const VolumeConfig& config, const BlockGrid& grid,
+                             const fs::path& waiting)
     : device_(device),
       config_(config),
-      model_(device, config, grid),
+      model_(device, config, grid, {static_cast<uint32_t>(config.residentBlocks), true}),
       pass_(model_, roomFor(config)),
       photoRays_(device, capture, model_.frame(), raySettings(config)),
       exposures_(device, capture),
@@ -69,6 +71,40 @@ VolumeTrainer::VolumeTrainer(Device& device, const Capture& capture, const Volum
   for (Array<float>* three : {&exposed_, &colourGradients_}) *three = device.array<float>(3 * rays);
   opacityGradients_ = device.array<float>(rays);
   losses_ = device.array<float>(kLosses);
+  asSaved_.assign(parts(), false);
+  if (!model_.holdsAll()) planStays(capture, waiting);
+}
+
+void VolumeTrainer::planStays(const Capture& capture, const fs::path& waiting) {
+  CHECK(!waiting.empty());
+  waiting_.emplace(waiting);
+  photoCount_ = capture.photos.size();
+  tiles_ = tilePhotos(capture, model_.frame(), model_.space());
+  BlockSets sets{tiles_.sets, std::vector<double>(tiles_.sets.size())};
+  for (const uint32_t set : tiles_.setOfTile) ++sets.weights[set];
+  residency_.emplace(sets, Residency::Settings{model_.space().cells(), static_cast<uint32_t>(config_.residentBlocks),
+                                               config_.residencySteps, static_cast<uint64_t>(config_.seed)});
+}
+
+// Slots in the order of blocks, whatever was in memory before: a resumed run must not differ.
+void VolumeTrainer::moveIn(size_t stay) {
+  stay_ = stay;
+  const Residency::Stay& next = residency_->stays()[stay];
+  std::vector<uint32_t> blocks = next.blocks;
+  if (model_.space().blocks() > model_.space().cells()) blocks.push_back(model_.space().cells());
+  const std::vector<uint32_t> before = model_.blockOfSlot();
+  for (uint32_t slot = 0; slot < model_.slots(); ++slot) {
+    if (blocks[slot] == before[slot]) continue;
+    TensorSet fields;
+    model_.saveFields(before[slot], fields, true);
+    waiting_->put(before[slot], fields.encode({{"format", kFormat}}));
+  }
+  model_.hold(blocks);
+  for (uint32_t slot = 0; slot < model_.slots(); ++slot) {
+    if (blocks[slot] == before[slot] || !waiting_->holds(blocks[slot])) continue;
+    model_.restoreFields(blocks[slot], waiting_->fileOf(blocks[slot]), waiting_->get(blocks[slot]));
+  }
+  photoRays_.drawFrom(sharesOf(tiles_, next.shareOfSet, photoCount_));
 }
 
 VolumePass::LossScales VolumeTrainer::lossScales(double progress) const {
@@ -82,9 +118,33 @@ VolumePass::LossScales VolumeTrainer::lossScales(double progress) const {
   return scales;
 }
 
+VolumePass::Options VolumeTrainer::passOptions(int64_t step, double progress) const {
+  constexpr double kAnnealSteps = 500;
+  VolumePass::Options options;
+  options.minAlpha = cullThreshold(config_, progress);
+  options.seed = mix64(static_cast<uint64_t>(config_.seed) ^ (static_cast<uint64_t>(step) << 20));
+  options.keepAttributes = !isFrozen(progress);
+  bool warm = step >= config_.proposalWarmUp;
+  double annealed = (static_cast<double>(step) + 1) / kAnnealSteps;
+  if (residency_ && step < residency_->cycleSteps()) {  // the first time for all that is there
+    const Residency::Place place = residency_->at(step);
+    const double length = std::min(kAnnealSteps, static_cast<double>(residency_->stays()[place.stay].steps));
+    annealed = (static_cast<double>(place.stepsInto) + 1) / length;
+    warm = false;
+  }
+  if (config_.level > 0) annealed = 1;
+  options.anneal = static_cast<float>(std::min(1.0, annealed));
+  options.keepProposals = options.keepAttributes && (!warm || step % config_.proposalEvery == 0);
+  return options;
+}
+
 StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
   // While the number of steps is not known, it is early.
   const double progress = plannedSteps > 0 ? static_cast<double>(step) / static_cast<double>(plannedSteps) : 0;
+  if (residency_) {
+    const size_t stay = residency_->at(step).stay;
+    if (stay != stay_) moveIn(stay);
+  }
   photoRays_.draw(step, rays_);
   const VolumeRays rays{rays_,
                         photoRays_.origins(0, rays_),
@@ -92,21 +152,14 @@ StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
                         photoRays_.jitters(),
                         {},
                         config_.freeSpace ? photoRays_.nears(0, rays_) : Slice<const float>()};
-  VolumePass::Options options;
-  options.anneal = static_cast<float>(std::min(1.0, (static_cast<double>(step) + 1) / 500));
-  options.minAlpha = cullThreshold(config_, progress);
-  options.seed = mix64(static_cast<uint64_t>(config_.seed) ^ (static_cast<uint64_t>(step) << 20));
-  const bool frozen = isFrozen(progress);
-  options.keepAttributes = !frozen;
-  options.keepProposals = !frozen && (step < config_.proposalWarmUp || step % config_.proposalEvery == 0);
-  if (config_.level > 0) {
-    options.anneal = 1;
-    model_.lookThrough(frozen ? finerGrid(config_) : config_.virtualGrid());
-  }
+  const VolumePass::Options options = passOptions(step, progress);
+  if (config_.level > 0) model_.lookThrough(isFrozen(progress) ? finerGrid(config_) : config_.virtualGrid());
   pass_.forward(rays, options);
   addColourGradients(step);
   pass_.backward(rays, colourGradients_, opacityGradients_, lossScales(progress));
   updateParameters(step, plannedSteps, options);
+
+  for (const uint32_t block : model_.blockOfSlot()) asSaved_[block] = false;
 
   // The step is over: its counters may be read.
   const std::vector<float> losses = device_.read(losses_.all()), inner = device_.read(pass_.losses());
@@ -176,12 +229,14 @@ void VolumeTrainer::updateParameters(int64_t step, int64_t plannedSteps, const V
   network.rate = ofFields;
   network.skipZeroGradients = true;  // of blocks that no ray of the step came to
   network.l2 = static_cast<float>(config_.networkL2);
-  for (uint32_t block = 0; kept.keepAttributes && block < model_.space().blocks(); ++block) {
-    model_.attributes().table(block).step(device_, table);
-    model_.attributes().network(block).step(device_, network);
+  for (uint32_t slot = 0; kept.keepAttributes && slot < model_.slots(); ++slot) {
+    Adam ofTable = table, ofNetwork = network;
+    ofTable.rows = ofNetwork.rows = pass_.texelRows(slot);
+    model_.attributes().table(slot).step(device_, ofTable);
+    model_.attributes().network(slot).step(device_, ofNetwork);
     if (!kept.keepProposals) continue;
-    model_.proposals().table(block).step(device_, table);
-    model_.proposals().network(block).step(device_, network);
+    model_.proposals().table(slot).step(device_, table);
+    model_.proposals().network(slot).step(device_, network);
   }
   network.rate = rate * static_cast<float>(config_.deferredRateFactor);
   model_.deferred().step(device_, network);
@@ -190,30 +245,66 @@ void VolumeTrainer::updateParameters(int64_t step, int64_t plannedSteps, const V
 
 Bytes VolumeTrainer::save(uint32_t part) {
   TensorSet tensors;
-  model_.save(part, tensors, true);
+  if (model_.slotOf(part) != kNoSlot) {
+    model_.saveFields(part, tensors, true);
+  } else if (waiting_->holds(part)) {
+    const Safetensors file = waiting_->get(part);
+    for (const auto& [name, tensor] : file.tensors) tensors.add(name, tensor);
+  } else {
+    model_.saveFirstFields(part, tensors);
+  }
   if (part == 0) {
+    model_.saveDeferred(tensors, true);
     exposures_.save(tensors);
     tensors.add("rays", std::vector<uint32_t>{rays_});
   }
+  asSaved_[part] = true;
   return tensors.encode({{"format", kFormat}, {"device", device_.target()}, {"block", std::to_string(part)}});
 }
 
 uint32_t VolumeTrainer::brokenPart() {
-  for (uint32_t block = 0; block < parts(); ++block) {
-    for (ParameterGroup* group : {&model_.attributes().network(block), &model_.attributes().table(block),
-                                  &model_.proposals().network(block), &model_.proposals().table(block)}) {
+  for (uint32_t slot = 0; slot < model_.slots(); ++slot) {
+    for (ParameterGroup* group : {&model_.attributes().network(slot), &model_.attributes().table(slot),
+                                  &model_.proposals().network(slot), &model_.proposals().table(slot)}) {
       for (const float value : device_.read(group->values.all())) {
-        if (!std::isfinite(value)) return block;
+        if (!std::isfinite(value)) return model_.blockOfSlot()[slot];
       }
     }
   }
   return 0;
 }
 
+void VolumeTrainer::restoreBlock(uint32_t block, const fs::path& path, const Safetensors& state) {
+  if (model_.slotOf(block) != kNoSlot) {
+    model_.restoreFields(block, path, state);
+    return;
+  }
+  TensorSet fields;
+  for (const auto& [name, tensor] : state.tensors) {
+    if (name.starts_with("attributes.") || name.starts_with("proposals.")) fields.add(name, tensor);
+  }
+  waiting_->put(block, fields.encode({{"format", kFormat}}));
+}
+
+void VolumeTrainer::beginFrom(const fs::path& below) {
+  const ModelManifest manifest = requireManifest(ModelFolder(below), "volume");
+  requireOneFileABlock(below, manifest, parts());
+  for (uint32_t block = 0; block < parts(); ++block) {
+    const fs::path path = below / manifest.files[block];
+    Safetensors state = readSafetensors(path);
+    std::erase_if(state.tensors, [](const auto& tensor) {  // values alone
+      return tensor.first.ends_with(".m1") || tensor.first.ends_with(".m2") || tensor.first.ends_with(".count");
+    });
+    restoreBlock(block, path, state);
+  }
+}
+
 void VolumeTrainer::restore(uint32_t part, const fs::path& path, const Safetensors& state) {
   requireFormat(path, state, kFormat, "volume");
-  model_.restore(part, path, state);
+  restoreBlock(part, path, state);
+  asSaved_[part] = true;
   if (part != 0) return;
+  model_.restoreDeferred(path, state);
   warnOfOtherDevice(path, state, device_.target());
   exposures_.restore(path, state);
   const TensorView& rays = state.require(path, "rays", TensorType::u32);

@@ -2,28 +2,42 @@
 #pragma once
 
 #include "representations/volume/volume_pass.h"
+#include "representations/volume/waiting_blocks.h"
 #include "train/photo_exposures.h"
 #include "train/photo_rays.h"
+#include "train/residency.h"
 #include "train/training_loop.h"
 
 namespace tessera {
 
 class VolumeTrainer final : public Trainee {
  public:
-  // Keeps references to `device` and `capture`. Trains on the capture's training photos.
-  VolumeTrainer(Device& device, const Capture& capture, const VolumeConfig& config, const BlockGrid& grid);
+  // Keeps references to `device` and `capture`. Trains on the capture's training photos. Where only some of the blocks
+  // are to be in memory (residentBlocks), the others wait in files in `waiting`, a folder that is gone afterwards.
+  VolumeTrainer(Device& device, const Capture& capture, const VolumeConfig& config, const BlockGrid& grid,
+                const fs::path& waiting = {});
 
   StepReport step(int64_t step, int64_t plannedSteps) override;
   // One part a block; exposures and the like stand with block 0.
   uint32_t parts() const override { return model_.space().blocks(); }
   Bytes save(uint32_t part) override;
+  bool isAsSaved(uint32_t part) const override { return part > 0 && asSaved_[part]; }  // what all share stands with 0
   void restore(uint32_t part, const fs::path& path, const Safetensors& state) override;
 
   uint32_t brokenPart() override;
 
+  // A coarser level begins with the fields of the level below, as trained in that folder.
+  void beginFrom(const fs::path& below);
+  // Where not all blocks are in memory at once: which are at which step.
+  const Residency* residency() const { return residency_ ? &*residency_ : nullptr; }
+
   VolumeModel& model() { return model_; }
 
  private:
+  void planStays(const Capture& capture, const fs::path& waiting);
+  void moveIn(size_t stay);
+  void restoreBlock(uint32_t block, const fs::path& path, const Safetensors& state);
+  VolumePass::Options passOptions(int64_t step, double progress) const;
   VolumePass::LossScales lossScales(double progress) const;
   void addColourGradients(int64_t step);
   // A coarser level's first steps: only deferred networks are trained, through the grid of the level below.
@@ -36,7 +50,14 @@ class VolumeTrainer final : public Trainee {
   VolumePass pass_;
   PhotoRays photoRays_;
   PhotoExposures exposures_;
-  uint32_t rays_;  // of the next step
+  // Where not all blocks are in memory.
+  std::optional<WaitingBlocks> waiting_;
+  std::optional<Residency> residency_;
+  TiledPhotos tiles_;
+  size_t photoCount_ = 0;
+  std::optional<size_t> stay_;  // that the slots are filled for
+  std::vector<bool> asSaved_;   // [blocks]
+  uint32_t rays_;               // of the next step
   Array<float> exposed_, colourGradients_, opacityGradients_, losses_;
 };
 

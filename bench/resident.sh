@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# City-on-Web with four blocks in memory at a time against all of them: a city of 4x4 blocks, equal steps, so equal samples.
+# Held-out PSNR of both, and what the process took of memory against what it said that it would. Resumable: what is in
+# build/bench/resident is not made again.
+#   [STEPS=4000] [SIZE=400x300] bench/resident.sh
+set -euo pipefail
+source "$(dirname "$0")/setup.sh"
+need_tessera
+work=$out/resident
+steps=${STEPS:-4000}
+mkdir -p "$work"
+
+[ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 4x4 --size "${SIZE:-400x300}"
+# trained NAME ARGUMENTS...
+trained() {
+  local name=$1
+  shift
+  [ -e "$work/$name.done" ] && return
+  "$tessera" train "$work/city" "$work/$name" --method volume --blocks 4x4 --steps "$steps" --set level_share=0 --resume "$@" 2>&1 |
+    tee -a "$work/$name.log"
+  touch "$work/$name.done"
+}
+judged() {
+  [ -s "$work/$1.json" ] || "$tessera" eval "$work/$1" "$work/city" --json "$work/$1.json" --report "$work/$1.html" > /dev/null
+  jq -r '.psnr * 100 | round / 100' "$work/$1.json"
+}
+# MiB, and the samples of the lines of metrics, in millions.
+peak() { jq -s 'map(.peak_rss_bytes) | max / 1048576 | round' "$work/$1/metrics.jsonl"; }
+samples() {
+  jq -s '[.[0].seconds, (.[1:] | map(.seconds))[]] as $t
+    | [range(1; length) as $i | .[$i].samples_per_second * ([0, $t[$i] - $t[$i - 1]] | max)] | add / 1e6 | round' "$work/$1/metrics.jsonl"
+}
+
+trained all
+trained four --resident-blocks 4
+all=$(judged all) four=$(judged four)
+stated=$(grep -o 'memory: at most [0-9]* MiB' "$work/four.log" | head -1 | grep -o '[0-9]*')
+echo "city 4x4, $steps steps: all in memory $all dB, $(peak all) MiB, $(samples all) M samples; four at a time $four dB, $(peak four) MiB of $stated stated, $(samples four) M samples"
+verdict "city 4x4, all in memory less four at a time in dB" "$(awk -v a="$all" -v b="$four" 'BEGIN { print a - b }')" '<=' 0.3
+verdict "city 4x4, four at a time, memory in MiB" "$(peak four)" '<=' "$stated"
+finish

@@ -1,0 +1,55 @@
+#include "train/picture_rays.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace tessera {
+
+PictureRays::PictureRays(Device& device, uint32_t mostRays)
+    : device_(device),
+      mostRays_(mostRays),
+      camera_(device.array<RayCamera>(1)),
+      cameraOfRay_(device.array<uint32_t>(mostRays)),
+      pixels_(device.array<float>(size_t{2} * mostRays)),
+      origins_(device.array<float>(size_t{3} * mostRays)),
+      directions_(device.array<float>(size_t{3} * mostRays)),
+      far_(device.array<float>(mostRays)) {}
+
+void PictureRays::begin(const RayCamera& camera, const SceneFrame& frame, const PixelLattice& lattice,
+                        const ImageF* opaqueDepth) {
+  device_.write(camera_.all(), std::span<const RayCamera>(&camera, 1));
+  lattice_ = lattice;
+  opaqueDepth_ = opaqueDepth;
+  for (int axis = 0; axis < 3; ++axis) forward_[axis] = camera.rotation[3 * axis + 2];
+  scale_ = static_cast<float>(frame.scale);
+}
+
+float PictureRays::cosine(uint32_t ray) const {
+  const float* direction = &hostDirections_[size_t{3} * ray];
+  return direction[0] * forward_[0] + direction[1] * forward_[1] + direction[2] * forward_[2];
+}
+
+PictureRays::Piece PictureRays::piece(size_t first, uint32_t most) {
+  const uint32_t rays = static_cast<uint32_t>(std::min<size_t>(std::min(most, mostRays_), lattice_.count() - first));
+  std::vector<float> pixels, far;
+  for (size_t i = first; i < first + rays; ++i) {
+    const int x = lattice_.firstX + static_cast<int>(i % lattice_.columns()) * lattice_.stride;
+    const int y = lattice_.firstY + static_cast<int>(i / lattice_.columns()) * lattice_.stride;
+    pixels.push_back(static_cast<float>(x) + 0.5f);
+    pixels.push_back(static_cast<float>(y) + 0.5f);
+    if (opaqueDepth_) far.push_back(*opaqueDepth_->at(x, y));
+  }
+  device_.write(pixels_.all(), std::span<const float>(pixels));
+  device_.run(GenerateRays{{rays, {}}, camera_, cameraOfRay_, pixels_, origins_, directions_});
+  hostDirections_ = device_.read(directions_.part(0, size_t{3} * rays));
+  if (opaqueDepth_) {
+    for (uint32_t ray = 0; ray < rays; ++ray) {
+      const float along = cosine(ray);
+      far[ray] = along > 0 ? far[ray] * scale_ / along : std::numeric_limits<float>::infinity();
+    }
+    device_.write(far_.all(), std::span<const float>(far));
+  }
+  return {rays, origins_, directions_, opaqueDepth_ ? far_.all() : Slice<float>()};
+}
+
+}  // namespace tessera
