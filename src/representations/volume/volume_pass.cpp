@@ -37,10 +37,10 @@ VolumePass::VolumePass(VolumeModel& model, const Room& room) : model_(model), de
     round.batch.firstOfSlot = round.firstOfSlot;
     round.batch.positions = round.groupedPositions;
   }
-  fences_ = device_.array<float>(rays * static_cast<size_t>(config.samples + 1));
+  fences_ = device_.array<float>(rays * (samples() + size_t{1}));
 
   BlockSamples most{space};
-  most.intervals = static_cast<uint32_t>(config.samples);
+  most.intervals = samples();
   most.split = true;
   rowCapacity_ = room.points + most.mostSamples(room.rays);
   segmentCapacity_ = most.mostSegments(room.rays);
@@ -147,7 +147,7 @@ void VolumePass::propose(const VolumeRays& rays, uint32_t r, const Options& opti
   resample.rays = {rays.count};
   resample.before = round.intervals;
   const bool last = r + 1 == rounds();
-  resample.after = last ? static_cast<uint32_t>(model_.config().samples) : round_[r + 1].intervals;
+  resample.after = last ? samples() : round_[r + 1].intervals;
   resample.anneal = options.anneal;
   resample.padding = static_cast<float>(model_.config().padding);
   resample.fences = round.fences;
@@ -160,7 +160,7 @@ void VolumePass::propose(const VolumeRays& rays, uint32_t r, const Options& opti
 void VolumePass::locateSamples(const VolumeRays& rays) {
   BlockSamples locate{model_.space()};
   locate.rays = {rays.count};
-  locate.intervals = static_cast<uint32_t>(model_.config().samples);
+  locate.intervals = samples();
   locate.split = true;
   locate.firstRow = room_.points;
   locate.origins = rays.origins;

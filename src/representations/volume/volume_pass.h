@@ -23,6 +23,7 @@ class VolumePass {
   struct Room {
     uint32_t rays = 0, texels = 0;
     uint32_t mostWords = 0;  // of virtual grids that the model will look through, where finer than its own
+    uint32_t samples = 0;    // of a ray; 0: as many as in training
     uint32_t points = 0;     // random ones, for the sparsity loss; their rows come before those of rays
     bool training = false;
   };
@@ -83,6 +84,7 @@ class VolumePass {
   void backwardThroughTexels(const LossScales& scales);
   void backwardThroughProposals(const VolumeRays& rays, const LossScales& scales);
   Slice<const float> jitterOf(const VolumeRays& rays, uint32_t round) const;
+  uint32_t samples() const { return room_.samples > 0 ? room_.samples : static_cast<uint32_t>(model_.config().samples); }
   uint32_t rounds() const { return model_.config().secondIntervals > 0 ? 2 : 1; }
   Count rows() const { return {rowCapacity_, rowCount_}; }
   Count segments() const { return {segmentCapacity_, segmentCount_}; }
