@@ -143,7 +143,9 @@ TEST_F(VolumeCommandLine, ExportsASceneOfOneBlockForMerfsViewer) {
   std::vector<std::string> arguments = {"train", at("city"), at("one"), "--method", "volume",         "--blocks",
                                         "1x1",   "--steps",  "40",      "--set",    "surround=border"};
   for (const std::string& setting : kTiny) arguments.insert(arguments.end(), {"--set", setting});
-  ASSERT_EQ(run(arguments).exitCode, 0);
+  for (const char* setting : {"voxels=32", "planes=512"}) arguments.insert(arguments.end(), {"--set", setting});
+  const Said trained = run(arguments);
+  ASSERT_EQ(trained.exitCode, 0) << trained.err;
   ASSERT_EQ(run({"bake", at("one"), at("one.scene")}).exitCode, 0);
   const Said said = run({"export", at("one.scene"), at("one.merf"), "--format", "merf", "--json"});
   ASSERT_EQ(said.exitCode, 0) << said.err;

@@ -67,6 +67,14 @@ void requireMerfBlock(const VolumeContent& content, const fs::path& file) {
   if (part.storedMacroblocks() == 0) {
     throw Error(file.string(), "", "holds nothing that could be seen", "train longer, and bake again");
   }
+  // The viewer's three.js (r113) uploads rows of textures as multiples of 4 bytes; grids of others stay empty. The
+  // widths are ⌈planes / 128⌉ bytes of occupancy at the coarsest, and 3 bytes for each of voxels / 8 macroblocks.
+  if (part.planes % 512 != 0 || part.voxels % 32 != 0) {
+    throw Error(file.string(), "",
+                fmt::format("has {} voxels and planes of {} texels, and MERF's viewer can load multiples of 32 and 512",
+                            part.voxels, part.planes),
+                "train with --set voxels=128 --set planes=512, bake that, and export the scene");
+  }
 }
 
 class MerfFolder {

@@ -14,7 +14,8 @@ struct MerfExport {
 };
 
 // The folder `out` appears whole, in place of an older export. Throws Error where `scene` is no baked scene of one
-// contracted block, whose network is MERF's (34 → 16 → 16 → 3), or where `out` holds something else.
+// contracted block, whose network is MERF's (34 → 16 → 16 → 3) and whose planes and voxels are multiples of 512 and 32,
+// or where `out` holds something else.
 MerfExport exportMerf(const fs::path& scene, const fs::path& out);
 
 // The files of a content that has just that, into an existing folder. MERF's unit is the part's scale, its origin the

@@ -33,6 +33,26 @@ VolumeContent oneBlock(uint32_t voxels = 32, uint32_t planes = 64, double filled
   return contentOf({part}, randomNetwork(5));
 }
 
+// Of a resolution that the viewer can load, and quickly made.
+VolumeContent largeBlock() {
+  VolumePart part;
+  part.contracted = true;
+  part.scale = {2, 2, 2};
+  part.low = {-1e6f, -1e6f, -1e6f};
+  part.high = {1e6f, 1e6f, 1e6f};
+  part.voxels = 32;
+  part.planes = 512;
+  part.macroblocks.assign(64, VolumePart::kEmpty);
+  for (uint32_t m = 0; m < 32; ++m) part.macroblocks[2 * m] = m;
+  for (uint32_t i = 0; i < 32 * VolumePart::kMacroblockBytes; ++i) part.voxelBytes.push_back((i + i / 97) % 256);
+  for (size_t plane = 0; plane < 3; ++plane) {
+    part.planeBytes[plane].resize(size_t{512} * 512 * VolumePart::kAttributes);
+    for (size_t i = 0; i < part.planeBytes[plane].size(); ++i) part.planeBytes[plane][i] = (i / 4096 + plane) % 256;
+  }
+  part.distances.assign(64 * 64 * 64, 0);
+  return contentOf({part}, randomNetwork(5));
+}
+
 class Merf : public testing::Test {
  protected:
   void SetUp() override {
@@ -183,8 +203,7 @@ TEST_F(Merf, PutsMacroblocksIntoTheSmallestAtlasOfTheFewestSlices) {
 }
 
 TEST_F(Merf, TakesTheFolderOfAScene) {
-  VolumeContent content = oneBlock();
-  content.parts[0].scale = {2, 2, 2};
+  const VolumeContent content = largeBlock();
   fs::remove(root_ / "out");
   const MerfExport made = exportMerf(sceneOf(content), root_ / "out");
   EXPECT_EQ(made.macroblocks, content.parts[0].storedMacroblocks());
@@ -196,9 +215,11 @@ TEST_F(Merf, TakesTheFolderOfAScene) {
   }
   EXPECT_EQ(made.bytesOnDisk, bytes);
   EXPECT_EQ(files, 6 + 2 * made.slices + 1 + 5 + 1);
+  const MerfViewer viewer(root_ / "out");
   Agreement agreement;
-  compareAt(content, MerfViewer(root_ / "out"), {0.1, 0.2, 0.3}, agreement);
-  EXPECT_EQ(agreement.seen + agreement.passedOver, 1);
+  for (double x = -1.9; x < 2; x += 0.4) compareAt(content, viewer, {x, 0.1 - x / 3, x / 2}, agreement);
+  EXPECT_GT(agreement.seen, 0);
+  EXPECT_GT(agreement.passedOver, 0);
   // Once more over the older one, which had more slices.
   writeFileAtomically(root_ / "out/sparse_grid_features_999.png", std::string_view("old"));
   exportMerf(root_ / "scene", root_ / "out");
@@ -250,6 +271,7 @@ TEST_F(Merf, SaysWhyASceneCannotBeExportedAndWhatToTrain) {
   content.parts[0].macroblocks.assign(content.parts[0].macroblocks.size(), VolumePart::kEmpty);
   content.parts[0].voxelBytes.clear();
   refused(sceneOf(content), "holds nothing", "train longer");
+  refused(sceneOf(good), "has 32 voxels and planes of 64 texels", "--set voxels=128 --set planes=512");
 
   fs::create_directories(root_ / "model");
   writeFileAtomically(root_ / "model/blocks.json", std::string_view("{}"));
@@ -262,7 +284,7 @@ TEST_F(Merf, SaysWhyASceneCannotBeExportedAndWhatToTrain) {
 
 TEST_F(Merf, LeavesFoldersOfOthersAlone) {
   writeFileAtomically(root_ / "out/holiday.png", std::string_view("mine"));
-  const fs::path scene = sceneOf(oneBlock());
+  const fs::path scene = sceneOf(largeBlock());
   EXPECT_THROW(exportMerf(scene, root_ / "out"), Error);
   EXPECT_EQ(readTextFile(root_ / "out/holiday.png"), "mine");
 }
