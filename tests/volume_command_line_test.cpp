@@ -139,6 +139,40 @@ TEST_F(VolumeCommandLine, RefusesBlocksThatAreNone) {
   EXPECT_FALSE(fs::exists(at("never")));
 }
 
+TEST_F(VolumeCommandLine, ExportsASceneOfOneBlockForMerfsViewer) {
+  std::vector<std::string> arguments = {"train", at("city"), at("one"), "--method", "volume",         "--blocks",
+                                        "1x1",   "--steps",  "40",      "--set",    "surround=border"};
+  for (const std::string& setting : kTiny) arguments.insert(arguments.end(), {"--set", setting});
+  for (const char* setting : {"voxels=32", "planes=512"}) arguments.insert(arguments.end(), {"--set", setting});
+  const Said trained = run(arguments);
+  ASSERT_EQ(trained.exitCode, 0) << trained.err;
+  ASSERT_EQ(run({"bake", at("one"), at("one.scene")}).exitCode, 0);
+  const Said said = run({"export", at("one.scene"), at("one.merf"), "--format", "merf", "--json"});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  const json result = json::parse(said.out);
+  const fs::path folder = at("one.merf");
+  EXPECT_EQ(result.at("format"), "merf");
+  EXPECT_GT(result.at("macroblocks").get<int>(), 0);
+  EXPECT_EQ(json::parse(readTextFile(folder / "scene_params.json")).at("num_slices"), result.at("slices"));
+  for (const char* file : {"plane_features_2.png", "sparse_grid_features_008.png", "occupancy_grid_128.png"}) {
+    EXPECT_TRUE(fs::exists(folder / file)) << file;
+  }
+  const Said again = run({"export", at("one.scene"), at("one.merf"), "--format", "merf"});
+  EXPECT_EQ(again.exitCode, 0) << again.err;
+  EXPECT_TRUE(contains(again.out, "near=0.05")) << again.out;
+
+  EXPECT_EQ(run({"export", at("one.scene"), at("one.merf"), "--format", "vrml"}).exitCode, 2);
+  EXPECT_EQ(run({"export", at("one.scene"), at("one.merf")}).exitCode, 2);
+  const auto explained = [](const Said& refused, const std::string& part) {
+    EXPECT_EQ(refused.exitCode, 1) << refused.err;
+    EXPECT_TRUE(contains(refused.err, part)) << refused.err;
+  };
+  explained(run({"export", scene(), at("never"), "--format", "merf"}), "--blocks 1x1 --set surround=border");
+  explained(run({"export", at("one"), at("never"), "--format", "merf"}), "tessera bake");
+  explained(run({"export", at("one.scene"), at("city"), "--format", "merf"}), "would be lost");
+  EXPECT_FALSE(fs::exists(at("never")));
+}
+
 TEST_F(VolumeCommandLine, ExplainsWhatIsWrongWithModelsAndScenes) {
   const auto explained = [](const Said& said, const std::string& part) {
     EXPECT_EQ(said.exitCode, 1) << said.err;

@@ -60,6 +60,7 @@ int main(int argc, char** argv) {
   tessera::addBakeVerb(app);
   tessera::addEvalVerb(app);
   tessera::addRenderVerb(app);
+  tessera::addExportVerb(app);
   tessera::addInfoVerb(app);
   tessera::addBenchVerb(app);
   try {

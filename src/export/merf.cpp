@@ -1,0 +1,170 @@
+#include "export/merf.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <regex>
+
+#include "base/check.h"
+#include "base/error.h"
+#include "base/image_io.h"
+#include "export/merf_layout.h"
+#include "export/whole_folder.h"
+#include "tiles/scene_folder.h"
+#include "tiles/volume_payload.h"
+
+namespace tessera {
+namespace {
+
+constexpr const char* kTrainOneBlock =
+    "train with --method volume --blocks 1x1 --set surround=border, bake that, and export the scene";
+
+bool isOurs(const std::string& name) {
+  static const std::regex kNames(
+      "(plane_(rgb_and_density|features)_[0-2]|sparse_grid_(rgb_and_density|features)_[0-9]{3,4}|"
+      "sparse_grid_block_indices|occupancy_grid_(8|16|32|64|128))\\.png|scene_params\\.json");
+  return std::regex_match(name, kNames);
+}
+
+// The file of the only content of the finest level.
+fs::path onlyContent(const fs::path& scene, const Tileset& tileset) {
+  const auto unsuitable = [&](const std::string& why) {
+    return Error((scene / "tileset.json").string(), "", why, kTrainOneBlock);
+  };
+  if (tileset.representation != Representation::volume) {
+    throw unsuitable(
+        fmt::format("is a scene of {}, and MERF's viewer knows volume only", nameOf(tileset.representation)));
+  }
+  if (tileset.allCells().cells() != 1) {
+    throw unsuitable(fmt::format("has {} by {} blocks, and MERF's files hold one that owns all of space",
+                                 tileset.columns, tileset.rows));
+  }
+  for (const Tile& tile : tileset.tiles) {
+    for (const TileContent& content : tile.contents) {
+      if (content.surround) throw unsuitable("has a surround of its own, and MERF's files hold one block");
+    }
+  }
+  const Tile& finest = tileset.tiles.back();  // one below the other: there is one cell
+  if (finest.contents.size() != 1) throw unsuitable("has not one content, and MERF's files hold one block");
+  return contentPath(scene, finest.contents[0].uri);
+}
+
+void requireMerfBlock(const VolumeContent& content, const fs::path& file) {
+  const auto unsuitable = [&](const std::string& why) { return Error(file.string(), "", why, kTrainOneBlock); };
+  if (content.parts.size() != 1) throw unsuitable("is merged of several blocks, and MERF's files hold one");
+  const VolumePart& part = content.parts[0];
+  if (!part.contracted) throw unsuitable("is a block with bounds, and MERF's is contracted to hold all of space");
+  if (part.scale[0] != part.scale[1] || part.scale[0] != part.scale[2]) {
+    throw unsuitable("has not the same scale along all axes");
+  }
+  const auto hasShape = [&](size_t layer, uint32_t inputs, uint32_t outputs) {
+    return content.network[layer].inputs == inputs && content.network[layer].outputs == outputs;
+  };
+  if (content.network.size() != 3 || !hasShape(0, 34, 16) || !hasShape(1, 16, 16) || !hasShape(2, 16, 3)) {
+    throw unsuitable("has a network that is not 34, 16, 16, 3 wide, as MERF's viewer has it");
+  }
+  if (part.storedMacroblocks() == 0) {
+    throw Error(file.string(), "", "holds nothing that could be seen", "train longer, and bake again");
+  }
+  // The viewer's three.js (r113) uploads rows of textures as multiples of 4 bytes; grids of others stay empty. The
+  // widths are ⌈planes / 128⌉ bytes of occupancy at the coarsest, and 3 bytes for each of voxels / 8 macroblocks.
+  if (part.planes % 512 != 0 || part.voxels % 32 != 0) {
+    throw Error(file.string(), "",
+                fmt::format("has {} voxels and planes of {} texels, and MERF's viewer can load multiples of 32 and 512",
+                            part.voxels, part.planes),
+                "train with --set voxels=128 --set planes=512, bake that, and export the scene");
+  }
+}
+
+class MerfFolder {
+ public:
+  explicit MerfFolder(const fs::path& root) : root_(root) {}
+
+  void add(const std::string& name, const ImageU8& image) {
+    const Bytes bytes = encodePng(image);
+    writeFileAtomically(root_ / (name + ".png"), bytes);
+    bytes_ += bytes.size();
+  }
+  void add(const std::string& name, const nlohmann::ordered_json& json) {
+    const std::string text = json.dump();
+    writeFileAtomically(root_ / name, text);
+    bytes_ += text.size();
+  }
+  uint64_t bytes() const { return bytes_; }
+
+ private:
+  fs::path root_;
+  uint64_t bytes_ = 0;
+};
+
+nlohmann::ordered_json sceneParameters(const VolumeContent& content, const std::array<uint32_t, 3>& atlas) {
+  const VolumePart& part = content.parts[0];
+  // Densities are per scene unit, the viewer's per unit of its own, which is `scale` of them: exp(sum - 1) is to become
+  // `scale` times as large, and four ranges are added up.
+  const double denser = std::log(static_cast<double>(part.scale[0])) / 4;
+  nlohmann::ordered_json json = {{"triplane_resolution", part.planes},
+                                 {"triplane_voxel_size", 4.0 / part.planes},
+                                 {"sparse_grid_resolution", part.voxels},
+                                 {"sparse_grid_voxel_size", 4.0 / part.voxels},
+                                 {"range_features", {-content.featureRange, content.featureRange}},
+                                 {"range_density", {denser - content.densityRange, denser + content.densityRange}},
+                                 {"data_block_size", VolumePart::kMacroblock},
+                                 {"atlas_width", VolumePart::kStoredEdge * atlas[0]},
+                                 {"atlas_height", VolumePart::kStoredEdge * atlas[1]},
+                                 {"atlas_depth", VolumePart::kStoredEdge * atlas[2]},
+                                 {"num_slices", VolumePart::kStoredEdge * atlas[2]},
+                                 {"slice_depth", 1}};
+  const std::array<MerfLayer, 3> network = merfNetwork(content.network);
+  for (size_t l = 0; l < network.size(); ++l) {
+    json[fmt::format("{}_weights", l)] = network[l].weights;
+    json[fmt::format("{}_bias", l)] = network[l].biases;
+  }
+  return json;
+}
+
+}  // namespace
+
+MerfExport writeMerf(const VolumeContent& content, const fs::path& folder) {
+  CHECK(content.parts.size() == 1u);
+  const VolumePart& part = content.parts[0];
+  CHECK(part.contracted);
+  const std::array<uint32_t, 3> atlas = merfAtlas(part.storedMacroblocks());
+  MerfFolder files(folder);
+  MerfExport made;
+  made.macroblocks = part.storedMacroblocks();
+  made.slices = VolumePart::kStoredEdge * atlas[2];
+  for (const MerfPicture& picture : kMerfPictures) {
+    for (int plane = 0; plane < 3; ++plane) {
+      files.add(fmt::format("plane_{}_{}", picture.name, plane), merfPlane(part, plane, picture));
+    }
+    for (uint32_t slice = 0; slice < made.slices; ++slice) {
+      files.add(fmt::format("sparse_grid_{}_{:03}", picture.name, slice), merfAtlasSlice(part, atlas, slice, picture));
+    }
+  }
+  files.add("sparse_grid_block_indices", merfBlockIndices(part, atlas));
+  for (const uint32_t factor : kMerfOccupancyFactors) {
+    files.add(fmt::format("occupancy_grid_{}", factor), merfOccupancy(part, factor));
+  }
+  files.add("scene_params.json", sceneParameters(content, atlas));
+  made.bytesOnDisk = files.bytes();
+  return made;
+}
+
+MerfExport exportMerf(const fs::path& scene, const fs::path& out) {
+  if (!fs::exists(scene / "tileset.json") && fs::exists(scene / "blocks.json")) {
+    throw Error(scene.string(), "", "is a model; what MERF's files hold is made by baking",
+                "tessera bake it, and export the scene");
+  }
+  const Tileset tileset = readTileset(scene);
+  const fs::path file = onlyContent(scene, tileset);
+  const VolumeContent content = readVolume(file);
+  requireMerfBlock(content, file);
+  WholeFolder folder(out, isOurs);
+  MerfExport made = writeMerf(content, folder.path());
+  made.near = tileset.near / content.parts[0].scale[0];
+  folder.commit();
+  return made;
+}
+
+}  // namespace tessera
