@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "render/made_volume.h"
+#include "scene/block_grid.h"
 
 namespace tessera {
 namespace {
@@ -206,6 +209,95 @@ TEST(DrawVolume, DrawsPartsOfOneContentAsItDrawsThemApartWhereNetworksAreDark) {
   EXPECT_LT(largestDifference(apart.depth, together.depth), 1e-4);
 }
 
+// City-on-Web, equations 8 to 11, along random rays from anywhere: cells in the order of the grid (scene/block_grid.h),
+// each shaded by a network that says nothing, against all samples of the ray added up as those of one volume.
+TEST(DrawVolume, BlendsCellsWithoutNetworksToWhatOneVolumeWouldBe) {
+  BlockGrid grid;
+  grid.edge = 2;
+  grid.columns = 3;
+  grid.rows = 2;
+  std::vector<VolumeContent> cells;
+  std::vector<VolumePart> parts;
+  for (int cell = 0; cell < grid.cells(); ++cell) {
+    VolumePart part = smoothPart(static_cast<uint64_t>(20 + cell), false, 0.5);
+    placeCell(part, static_cast<float>(grid.centre(cell).x()), static_cast<float>(grid.centre(cell).y()), -0.75f);
+    parts.push_back(part);
+    cells.push_back(contentOf({part}));
+  }
+  const VolumeContent whole = contentOf(parts);
+  VolumeDrawing one;
+  one.frame.low = Vec3d(-3, -2, -0.75);
+  one.frame.high = Vec3d(3, 2, 1);
+  one.march.minTransmittance = 0;
+  one.frontToBack = {&whole};
+  VolumeRayCaster ofOne(one);
+  const RandomStream random(12, 1);
+  int crossing = 0;
+  double opacities = 0;
+  constexpr uint64_t kRays = 2000;
+  for (uint64_t i = 0; i < kRays; ++i) {
+    const auto value = [&](uint64_t k) { return 2 * random.uniformDouble(8 * i + k) - 1; };
+    const Vec3d origin = (i % 2 ? 1.0 : 2.0) * Vec3d(3 * value(0), 2 * value(1), value(2));
+    const Vec3d target(3 * value(3), 2 * value(4), 0.7 * value(5));
+    const SceneRay ray{origin, (target - origin).normalized()};
+    VolumeDrawing drawing = one;
+    drawing.frontToBack.clear();
+    for (const int cell : grid.frontToBack(origin.head<2>())) drawing.frontToBack.push_back(&cells[cell]);
+    MarchCounts counts, ofWhole;
+    const BlendedRay got = VolumeRayCaster(drawing).cast(ray, INFINITY, counts);
+    const BlendedRay expected = ofOne.cast(ray, INFINITY, ofWhole);
+    ASSERT_EQ(counts.samples, ofWhole.samples);
+    for (int c = 0; c < 3; ++c) ASSERT_NEAR(got.colour[c], expected.colour[c], 1e-5) << i;
+    ASSERT_NEAR(got.transmittance, expected.transmittance, 1e-5) << i;
+    ASSERT_NEAR(got.depth, expected.depth, 1e-5 * (1 + expected.depth)) << i;
+    int met = 0;
+    for (const VolumePart& part : parts) met += !ownedRange(part, ray, {0.05, 100}).empty();
+    crossing += met > 2;
+    opacities += 1 - expected.transmittance;
+  }
+  EXPECT_GT(crossing, 500);
+  EXPECT_GT(opacities / kRays, 0.2);
+  EXPECT_LT(opacities / kRays, 0.95);
+}
+
+// Invariant 13 of the specification: parts that are merged stay themselves, up to the wall between them.
+TEST(DrawVolume, ReadsOfEachPartNothingButItsOwnTexels) {
+  std::vector<VolumePart> parts;
+  for (const float x : {-1.0f, 1.0f}) {
+    VolumePart part = smoothPart(x < 0 ? 31 : 32, false, 1);
+    placeCell(part, x, 0);
+    parts.push_back(part);
+  }
+  const VolumeContent before = contentOf(parts, randomNetwork(1));
+  for (std::vector<uint8_t>* bytes : {&parts[1].voxelBytes, &parts[1].planeBytes[0], &parts[1].planeBytes[2]}) {
+    for (uint8_t& byte : *bytes) byte = static_cast<uint8_t>(255 - byte);
+  }
+  const VolumeContent after = contentOf(parts, randomNetwork(1));
+  VolumeFrame frame;
+  frame.low = Vec3d(-2, -1, -1);
+  frame.high = Vec3d(2, 1, 1);
+  const VolumeDrawing one{frame, {&before}, nullptr, {}}, other{frame, {&after}, nullptr, {}};
+  VolumeRayCaster casterOne(one), casterOther(other);
+  const RandomStream random(13, 1);
+  MarchCounts counts;
+  int different = 0;
+  for (uint64_t i = 0; i < 500; ++i) {
+    // Beside the wall, by a hundredth of a voxel and more.
+    const double x = (i % 2 ? 1 : -1) * std::exp2(-11.0 * random.uniformDouble(3 * i));
+    const Vec3d origin(x, 2 * random.uniformDouble(3 * i + 1) - 1, 2),
+        down(0, 2 * random.uniformDouble(3 * i + 2) - 1, -3);
+    const SceneRay ray{origin, down.normalized()};
+    const BlendedRay a = casterOne.cast(ray, INFINITY, counts), b = casterOther.cast(ray, INFINITY, counts);
+    if (x < 0) {
+      ASSERT_EQ(a.colour, b.colour) << x;
+      ASSERT_EQ(a.transmittance, b.transmittance) << x;
+    } else {
+      different += a.colour != b.colour;
+    }
+  }
+  EXPECT_GT(different, 200);
+}
+
 TEST(DrawVolume, SeesNothingOfAContentThatHoldsNothingWhateverItsNetwork) {
   VolumePart nothing;
   placeCell(nothing, -3, 0);
@@ -280,6 +372,46 @@ TEST(DrawVolume, SeesBlocksThatOwnWhatLiesOutsideFromWhereTheBoxIsEntered) {
   EXPECT_NEAR(depthOf(Vec3d(0.5, 0.1, 0), Vec3d(5, 0.1, 0)), 0.05, 0.1);  // from within
   EXPECT_NEAR(depthOf(Vec3d(-5, 3, 0), Vec3d(5, 3, 0)), 5, 0.3);          // past the box: what it owns
   EXPECT_NEAR(depthOf(Vec3d(-0.5, 0, 0), Vec3d(0.5, 0, 0)), 0.5, 0.1);
+}
+
+TEST(DrawVolume, SeesBlocksThatOwnWhatLiesOutsideBehindTheBoxToo) {
+  // Three blocks in a row: the outer ones hold a wall far outside and nothing else, the inner one nothing at all.
+  const auto wall = [](const Vec3d& x) { return std::abs(x.x()) > 8; };
+  std::vector<VolumeContent> contents;
+  for (const float x : {-2.0f, 0.0f, 2.0f}) {
+    VolumePart part;
+    placeCell(part, x, 0, -0.5f, 0.5f);
+    part.voxels = 64;
+    part.planes = 256;
+    if (x == 0) {
+      makeVolume(part, smoothVolume(1, 0));
+    } else {
+      part.contracted = true;
+      for (const int a : {1, 2}) {
+        part.low[a] = -1e6f;
+        part.high[a] = 1e6f;
+      }
+      (x < 0 ? part.low : part.high)[0] = x < 0 ? -1e6f : 1e6f;
+      makeSolid(part, wall, [](const Vec3d&) { return Vec3d(0.1, 0.2, 0.8); });
+    }
+    contents.push_back(contentOf({part}));
+  }
+  VolumeDrawing drawing;
+  drawing.frame.low = Vec3d(-3, -1, -0.5);
+  drawing.frame.high = Vec3d(3, 1, 0.5);
+  MarchCounts counts;
+  const auto wallSeen = [&](const Vec3d& origin, const Vec3d& direction) {
+    drawing.frontToBack = {&contents[0], &contents[1], &contents[2]};
+    if (origin.x() > 0) std::reverse(drawing.frontToBack.begin(), drawing.frontToBack.end());
+    const BlendedRay ray = VolumeRayCaster(drawing).cast({origin, direction.normalized()}, INFINITY, counts);
+    EXPECT_GT(1 - ray.transmittance, 0.99);
+    return (origin + ray.depth / (1 - ray.transmittance) * direction.normalized()).x();
+  };
+  EXPECT_NEAR(wallSeen(Vec3d(0, 0, 0), Vec3d(1, 0.1, 0.02)), 8, 1.5);       // from the block that holds nothing
+  EXPECT_NEAR(wallSeen(Vec3d(-2.5, 0, 0), Vec3d(1, 0.05, 0.02)), 8, 1.5);   // through all three
+  EXPECT_NEAR(wallSeen(Vec3d(2.5, 0, 0), Vec3d(-1, 0.05, 0.02)), -8, 1.5);  // and back
+  EXPECT_NEAR(wallSeen(Vec3d(2.5, 0.5, 4), Vec3d(1, 0.1, 0.1)), 8, 1.5);    // past the box
+  EXPECT_NEAR(wallSeen(Vec3d(-6, 0, 0), Vec3d(1, 0.01, 0.01)), 8, 1.5);     // not the wall behind the camera
 }
 
 TEST(DrawVolume, EndsAtOpaqueThings) {

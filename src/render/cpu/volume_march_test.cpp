@@ -137,6 +137,45 @@ TEST(VolumeMarch, SeesNothingWhereTheMacroblockIsEmptyWhateverThePlanesHold) {
   EXPECT_EQ(counts.steps, 64u);
 }
 
+// One step at a time, at places that floats hold exactly, up to the borders of the domain and across those of
+// macroblocks.
+TEST(VolumeMarch, MixesTexelsToTheDigitsOfFloats) {
+  VolumePart part = smoothPart(9, false, 1);
+  for (std::vector<uint8_t>& plane : part.planeBytes) {  // rough, so that no neighbour can stand for another
+    for (size_t i = 0; i < plane.size(); ++i) plane[i] = static_cast<uint8_t>(plane[i] - 16 + i / 8 * 37 % 32);
+  }
+  for (const float density : {14.0f, 9.0f}) {
+    VolumeContent content = contentOf({part});
+    content.densityRange = density;
+    const RandomStream random(6, 1);
+    const double texel = 2.0 / part.planes;
+    int seen = 0;
+    for (uint64_t i = 0; i < 3000; ++i) {
+      const int axis = static_cast<int>(random.below(8 * i, 3));
+      const uint32_t step = random.below(8 * i + 1, part.planes);
+      SceneRay ray{Vec3d::Zero(), Vec3d::Unit(axis)};
+      Triple<double> p;
+      for (int a = 0; a < 3; ++a) {
+        const uint32_t at =
+            random.below(8 * i + 2 + a, 4) == 0 ? 1024 * random.below(8 * i + 5, 2) : random.below(8 * i + 5 + a, 1024);
+        p[a] = a == axis ? (step + 0.5) / part.planes : at / 1024.0;
+        ray.origin[a] = a == axis ? -1 : 2 * p[a] - 1;
+      }
+      MarchCounts counts;
+      const ContentComposite got = marched(content, ray, {step * texel, (step + 1) * texel}, kToTheEnd, counts);
+      double sums[8];
+      const bool stored = referenceSums(content, part, p, sums);
+      ASSERT_EQ(counts.samples, stored ? 1u : 0u);
+      if (!stored) continue;
+      const double opacity = -std::expm1(-std::exp(std::min(sums[0] - 1, 15.0)) * texel);
+      ASSERT_NEAR(1 - got.transmittance, opacity, 2e-6);
+      for (int k = 0; k < 7; ++k) ASSERT_NEAR(got.values[k], opacity / (1 + std::exp(-sums[k + 1])), 2e-6) << k;
+      seen += opacity > 0.02 && opacity < 0.98;
+    }
+    EXPECT_GT(seen, 300) << density;
+  }
+}
+
 // With all four sources at one value, sums are four times it, also where lookups are clamped.
 TEST(VolumeMarch, SumsFourSourcesUpToTheBordersOfTheDomain) {
   VolumePart part;

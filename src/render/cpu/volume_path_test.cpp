@@ -58,27 +58,38 @@ TEST(VolumePath, FollowsTheContractionThroughAtMostFiveRegions) {
   EXPECT_EQ(most, 5);
 }
 
-TEST(VolumePath, MeetsTheRegionsThatDenseLookingFinds) {
+TEST(VolumePath, MeetsTheRegionsThatDenseLookingFindsInTheirOrder) {
   const VolumePart part = contractedPart();
   const RandomStream random(2, 1);
+  int regionsMet = 0;
   for (uint64_t i = 0; i < 300; ++i) {
     const SceneRay ray{randomVector(random, 2 * i, 8), randomVector(random, 2 * i + 1, 1).normalized()};
     const VolumePath path = volumePath(part, ray, {0.05, 60});
-    int regions = 0, previous = -1;
-    for (int look = 0; look <= 200000; ++look) {
-      const double t = 0.05 + look * (60 - 0.05) / 200000;
+    const auto regionAt = [&](double t) {
       Triple<double> q;
       for (int a = 0; a < 3; ++a) q[a] = (ray.origin[a] + t * ray.direction[a] - part.centre[a]) / part.scale[a];
       const int axis = farthestAxis(q);
-      const int region = std::abs(q[axis]) > 1 ? 2 * axis + (q[axis] > 0) : 6;
-      regions += region != previous;
-      previous = region;
+      return std::abs(q[axis]) > 1 ? 2 * axis + (q[axis] > 0) : 6;
+    };
+    std::vector<int> regions;  // of the pieces
+    for (int k = 0; k < path.count; ++k) {
+      const VolumeSegment& s = path.segments[k];
+      regions.push_back(regionAt(s.distanceAt(0.5 * s.length)));
+      if (k > 0) {
+        EXPECT_NE(regions[k], regions[k - 1]) << "one region in two pieces, ray " << i;
+      }
     }
-    int seen = 0;  // looking may miss the shortest
-    for (int k = 0; k < path.count; ++k) seen += path.segments[k].distanceBetween(0, path.segments[k].length) > 1e-3;
-    EXPECT_GE(path.count, regions) << i;
-    EXPECT_LE(seen, regions) << i;
+    int piece = 0;
+    for (int look = 0; look <= 20000; ++look) {
+      const double t = 0.05 + look * (60 - 0.05) / 20000;
+      while (piece + 1 < path.count && path.segments[piece + 1].entry <= t) ++piece;
+      const double next = piece + 1 < path.count ? path.segments[piece + 1].entry : INFINITY;
+      if (t - path.segments[piece].entry < 1e-9 || next - t < 1e-9) continue;  // to either side by rounding
+      ASSERT_EQ(regions[piece], regionAt(t)) << "ray " << i << " at " << t;
+    }
+    regionsMet += path.count;
   }
+  EXPECT_GT(regionsMet, 600);
 }
 
 TEST(VolumePath, IsOneStraightPieceInABoundedPart) {

@@ -65,6 +65,27 @@ TEST(AliveTexels, KeepTheOccupancyCellOfEverySample) {
   }
 }
 
+TEST(AliveTexels, KeepBothWhereSeveralTexelsShareABit) {
+  VirtualGrid grid;
+  grid.voxels = 128;
+  grid.planes = 2 * AliveTexels::kMostCells;
+  const uint32_t edge = grid.voxels / 8;
+  const std::vector<Point> seen = points(40);
+  AliveTexels alive(grid);
+  for (const Point& point : seen) alive.mark(point.at);
+  const std::vector<bool> macroblocks = alive.macroblocks();
+  const OccupancyBits cells = alive.occupancy(grid.planes / 8);
+  for (const Point& point : seen) {
+    uint32_t b[3], c[3];
+    for (int a = 0; a < 3; ++a) {
+      b[a] = clampedFloor(static_cast<double>(point.at[a]) * grid.voxels - 0.5, grid.voxels) / 8;
+      c[a] = clampedFloor(static_cast<double>(point.at[a]) * cells.cells, cells.cells);
+    }
+    EXPECT_TRUE(macroblocks[b[0] + edge * (b[1] + edge * b[2])]);
+    EXPECT_TRUE(cells.at(c[0], c[1], c[2]));
+  }
+}
+
 TEST(AliveTexels, KeepThePlanesTexelsAroundASampleAndAsFarAsTheyReach) {
   const VirtualGrid grid = smallGrid();
   AliveTexels alive(grid);

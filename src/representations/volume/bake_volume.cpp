@@ -230,6 +230,10 @@ VolumePart bakePart(VolumeModel& model, uint32_t block, const AliveTexels& alive
       if (j + 1 == space.rows) part.high[1] = kFar;
       part.low[2] = -kFar;
       part.high[2] = kFar;
+    } else if (space.surround == Surround::border) {
+      // Rays go on behind the box, and it was trained to the ends of its domain.
+      part.low[2] = -1;
+      part.high[2] = 1;
     }
   }
   part.voxels = grid.voxels;

@@ -146,12 +146,128 @@ TEST(BakeVolume, StoresTheVeryNumbersThatTrainingSaw) {
   forward.logDensities = logDensities;
   forward.colours = colours;
   device.run(forward);
-  const std::vector<float> trainedDensity = device.read(logDensities.all()),
-                           trainedColours = device.read(colours.all());
-  for (uint32_t s = 0; s < kSamples; ++s) {
-    const std::array<double, 8> sums = sumsFromBytes(content, content.parts[0], &positions[size_t{3} * s]);
-    EXPECT_NEAR(trainedDensity[s], std::min(sums[0] - 1, 15.0), 2e-5);
-    for (size_t f = 1; f < 8; ++f) EXPECT_NEAR(trainedColours[7 * s + f - 1], 1 / (1 + std::exp(-sums[f])), 1e-5);
+  // The same attributes mixed in double: what is left are the digits of floats.
+  const std::unique_ptr<Device> reference = makeDevice({"reference", 1});
+  const auto onReference = [&](const auto& array) { return reference->arrayOf(device.read(array.all())); };
+  const Array<uint32_t> exactBlocks = onReference(blocks), exactMarks = onReference(marks);
+  const Array<uint32_t> exactRanks = onReference(ranks);
+  const Array<float> exactAt = onReference(at), exactAttributes = onReference(batch.outputs);
+  Array<float> exactDensities = reference->array<float>(kSamples), exactColours = reference->array<float>(7 * kSamples);
+  VirtualGridForward exact{grid};
+  exact.samples = {kSamples};
+  exact.blockOfSample = exactBlocks;
+  exact.positions = exactAt;
+  exact.marks = exactMarks;
+  exact.ranks = exactRanks;
+  exact.texels = {room};
+  exact.attributes = exactAttributes;
+  exact.logDensities = exactDensities;
+  exact.colours = exactColours;
+  reference->run(exact);
+  const auto expectStored = [&](const std::vector<float>& density, const std::vector<float>& colour, double tolerance) {
+    for (uint32_t s = 0; s < kSamples; ++s) {
+      const std::array<double, 8> sums = sumsFromBytes(content, content.parts[0], &positions[size_t{3} * s]);
+      const double expected = std::min(sums[0] - 1, 15.0);
+      EXPECT_NEAR(density[s], expected, tolerance * std::max(1.0, std::abs(expected)));
+      for (size_t f = 1; f < 8; ++f) EXPECT_NEAR(colour[7 * s + f - 1], 1 / (1 + std::exp(-sums[f])), tolerance);
+    }
+  };
+  expectStored(device.read(logDensities.all()), device.read(colours.all()), 1e-5);
+  expectStored(reference->read(exactDensities.all()), reference->read(exactColours.all()), 1e-6);
+}
+
+// A sample between the last voxel of a macroblock and the first of the next needs no other macroblock.
+TEST(BakeVolume, RepeatsTheFirstTexelsOfTheNextMacroblock) {
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  VolumeModel model(*device, smallVolumeConfig(), cubeGrid());
+  const RandomStream random(6, 0xba4e);
+  std::vector<float> table(model.attributes().table(0).values.size());
+  for (size_t i = 0; i < table.size(); ++i) table[i] = 2 * random.uniform(1000 + i) - 1;
+  device->write(model.attributes().table(0).values.all(), std::span<const float>(table));
+  AliveTexels alive(model.virtualGrid());
+  for (uint64_t i = 0; i < 40; ++i) {
+    const float at[3] = {random.uniform(3 * i), random.uniform(3 * i + 1), random.uniform(3 * i + 2)};
+    alive.mark(at);
+  }
+  const VolumePart part = bakePart(model, 0, alive);
+  const uint32_t blocks = part.voxels / 8;
+  const uint8_t* bytes = part.voxelBytes.data();
+  const auto texel = [&](uint32_t stored, const std::array<uint32_t, 3>& at) {
+    return bytes + (stored * size_t{729} + at[0] + 9 * (at[1] + 9 * at[2])) * 8;
+  };
+  int pairs = 0, alike = 0, last = 0;
+  for (uint32_t b = 0; b < part.macroblocks.size(); ++b) {
+    if (part.macroblocks[b] == VolumePart::kEmpty) continue;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const uint32_t stride = axis == 0 ? 1 : axis == 1 ? blocks : blocks * blocks;
+      const bool isLast = b / stride % blocks == blocks - 1;
+      const uint32_t next = isLast ? b : b + stride;  // at the end of the grid the last texel once more
+      if (part.macroblocks[next] == VolumePart::kEmpty) continue;
+      ++(isLast ? last : pairs);
+      for (uint32_t i = 0; i < 81; ++i) {
+        std::array<uint32_t, 3> here = {i % 9, i % 9, i / 9}, there;
+        if (axis == 2) here[1] = i / 9;
+        there = here;
+        here[axis] = 8;
+        there[axis] = isLast ? 7 : 0;
+        ASSERT_TRUE(std::equal(texel(part.macroblocks[b], here), texel(part.macroblocks[b], here) + 8,
+                               texel(part.macroblocks[next], there)))
+            << "macroblock " << b << ", axis " << axis;
+        here[axis] = 7;
+        alike += !isLast && std::equal(texel(part.macroblocks[b], here), texel(part.macroblocks[b], here) + 8,
+                                       texel(part.macroblocks[next], there));
+      }
+    }
+  }
+  EXPECT_GT(pairs, 20);
+  EXPECT_GT(last, 5);
+  EXPECT_LT(alike, 81 * pairs / 2) << "texels that are all the same show nothing";
+}
+
+// Invariant 4 of the specification, of what is baked: a place has one owner, the block that was trained there.
+TEST(BakeVolume, GivesEveryPlaceToTheBlockThatWasTrainedThere) {
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  BlockGrid grid = cubeGrid(3);  // one block of nine is not at the border
+  grid.rows = 3;
+  grid.bottom = -0.3;  // a lower box than the blocks' domains
+  grid.top = 0.3;
+  for (const char* surround : {"none", "own", "border"}) {
+    VolumeConfig config = smallVolumeConfig();
+    config.surround = surround;
+    VolumeModel model(*device, config, grid);
+    const BlockSpace& space = model.space();
+    std::vector<VolumePart> parts;
+    for (uint32_t block = 0; block < space.blocks(); ++block) {
+      parts.push_back(bakePart(model, block, AliveTexels(model.virtualGrid())));
+    }
+    const RandomStream random(7, 0xba4e);
+    int inside = 0, beyond = 0;
+    for (uint64_t i = 0; i < 20000; ++i) {
+      double x[3];
+      for (uint64_t a = 0; a < 3; ++a) {
+        x[a] = (i % 2 ? 3.0 : 9.0) * (2 * random.uniformDouble(4 * i + a) - 1) * (a == 2 ? 0.5 : 1);
+      }
+      const bool inBox = std::abs(x[0]) < 3 && std::abs(x[1]) < 3 && x[2] > space.bottom && x[2] < space.top;
+      if (!inBox && space.surround == Surround::none) continue;  // rays end there
+      const uint32_t trained = space.blockAt(x[0], x[1], x[2]);
+      const BlockSpace::Placement placement = space.placement(trained);
+      std::vector<uint32_t> expected = {trained}, owners;
+      for (int a = 0; a < 3; ++a) {  // what lies outside of the domain of a bounded block is empty (compute/blocks.h)
+        const bool within = std::abs(x[a] - placement.centre[a]) <= placement.scale[a];
+        if (!placement.contracted && !within) expected.clear();
+      }
+      for (uint32_t block = 0; block < parts.size(); ++block) {
+        const VolumePart& part = parts[block];
+        if (part.surround && inBox) continue;  // it is seen outside of the box alone
+        bool owns = true;
+        for (int a = 0; a < 3; ++a) owns = owns && part.low[a] <= x[a] && x[a] < part.high[a];
+        if (owns) owners.push_back(block);
+      }
+      ASSERT_EQ(owners, expected) << surround << ": " << x[0] << " " << x[1] << " " << x[2];
+      ++(inBox ? inside : beyond);
+    }
+    EXPECT_GT(inside, 1000);
+    EXPECT_TRUE(beyond > 1000 || space.surround == Surround::none);
   }
 }
 
@@ -177,6 +293,30 @@ TEST(BakeVolume, LooksAsTheModelThatItWasBakedFrom) {
     }
     EXPECT_NEAR(ofTiles / static_cast<double>(photos.size()), ofModel / static_cast<double>(photos.size()), 0.5)
         << surround;
+  }
+}
+
+TEST(BakeVolume, LooksAsTheModelOutsideOfTheBoxToo) {
+  CubeScene::Options options;
+  options.room = true;  // walls far outside of the blocks
+  const CubeScene scene(options);
+  const TestFolder folder;
+  for (const char* surround : {"own", "border"}) {
+    VolumeConfig config = smallVolumeConfig();
+    config.surround = surround;
+    TrainedVolumeCube trained(scene, config, cubeGrid(2), 200);
+    bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / surround, {});
+    VolumeModelRenderer model(trained.model(), static_cast<float>(config.cullLast));
+    const std::unique_ptr<VolumeRenderer> tiles = openScene(folder / surround);
+    const Camera& camera = scene.capture().cameras[0];
+    for (const int photo : {0, 11}) {
+      const Pose& pose = scene.capture().photos[photo].worldFromCamera;
+      const RenderedView a = model.render(camera, pose, nullptr), b = tiles->render(camera, pose, nullptr);
+      EXPECT_GT(psnrOf(b, a), 27) << surround;
+      int far = 0;  // pixels of a wall
+      for (const float depth : b.depth.pixels) far += depth > 3;
+      EXPECT_GT(far, 150) << surround;
+    }
   }
 }
 

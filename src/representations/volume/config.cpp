@@ -121,7 +121,7 @@ void VolumeConfig::check() const {
   requireWithin("frozen_share", frozenShare, 0, 1);
   requireWithin("level_rate_factor", levelRateFactor, 0, kHuge);
   requireWithin("voxels", voxels, 8, 1024);
-  requireWithin("planes", planes, 8, 8192);
+  requireWithin("planes", planes, 8, 4096);
   multipleOfEight("voxels", voxels);
   multipleOfEight("planes", planes);
   requireWithin("feature_range", featureRange, 0.1, 100);

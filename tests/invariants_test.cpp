@@ -1,0 +1,50 @@
+// The tests that ARCHITECTURE.md names for the invariants of `volume` are there.
+#include <gtest/gtest.h>
+
+#include <regex>
+#include <set>
+
+#include "base/file.h"
+
+namespace tessera {
+namespace {
+
+const fs::path kProject = TESSERA_PROJECT;
+
+std::set<std::string> testsIn(const fs::path& folder) {
+  static const std::regex test(R"(\nTEST(?:_[FP])?\(\s*(\w+),\s*(\w+)\))");
+  std::set<std::string> names;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
+    const std::string file = entry.path().filename().string();
+    if (entry.path().extension() != ".cpp" || file.find("_test") == std::string::npos) continue;
+    const std::string text = readTextFile(entry.path());
+    for (auto match = std::sregex_iterator(text.begin(), text.end(), test); match != std::sregex_iterator(); ++match) {
+      names.insert((*match)[1].str() + "." + (*match)[2].str());
+    }
+  }
+  return names;
+}
+
+TEST(Invariants, AreEachProvedByTestsThatThereAre) {
+  const std::string text = readTextFile(kProject / "ARCHITECTURE.md");
+  const size_t from = text.find("\n## Invariants of `volume`\n");
+  ASSERT_NE(from, std::string::npos);
+  const std::string section = text.substr(from, text.find("\n## ", from + 1) - from);
+  std::set<std::string> tests = testsIn(kProject / "src");
+  tests.merge(testsIn(kProject / "tests"));
+  static const std::regex row(R"(\n\| (\d+) \|[^\n]*)"), name(R"(`(\w+\.\w+)`)");
+  int rows = 0;
+  for (auto each = std::sregex_iterator(section.begin(), section.end(), row); each != std::sregex_iterator(); ++each) {
+    EXPECT_EQ((*each)[1].str(), std::to_string(++rows));
+    const std::string line = each->str();
+    const auto first = std::sregex_iterator(line.begin(), line.end(), name);
+    EXPECT_NE(first, std::sregex_iterator()) << "row " << rows << " names no test";
+    for (auto test = first; test != std::sregex_iterator(); ++test) {
+      EXPECT_TRUE(tests.contains((*test)[1].str())) << "row " << rows << ": there is no test " << (*test)[1].str();
+    }
+  }
+  EXPECT_EQ(rows, 15);
+}
+
+}  // namespace
+}  // namespace tessera
