@@ -17,7 +17,7 @@ out=out/quickstart
 begin=$SECONDS
 "$tessera" synth city "$out/city" --blocks 2x2 --size 320x240 --samples 4
 if [ ! -e "$out/city.model/plan.json" ]; then rm -rf "$out/city.model"; fi
-"$tessera" train "$out/city" "$out/city.model" --method volume --blocks 2x2 --minutes 3 --resume
+"$tessera" train "$out/city" "$out/city.model" --method volume --blocks 2x2 --minutes 2 --resume
 "$tessera" bake "$out/city.model" "$out/city.scene"
 "$tessera" eval "$out/city.scene" "$out/city" --json "$out/result.json" --images "$out/images"
 echo
