@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# From a clean Debian 12 to a measured picture: installs packages, builds, makes a small city, trains a radiance field on
-# it and judges it on photos that it has not seen. Run again, it goes on where it was.
+# From a clean Debian 12 to a measured picture: installs packages, builds, makes a small city, trains a model of it in
+# blocks, bakes that into a scene of tiles, and judges the scene on photos that it has not seen. Run again, it goes on
+# where it was.
 #   ./quickstart.sh [--no-serve]      --no-serve stops before anything is shown in a browser (there is no viewer yet)
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -15,10 +16,12 @@ tessera=build/release/apps/tessera/tessera
 out=out/quickstart
 begin=$SECONDS
 "$tessera" synth city "$out/city" --blocks 2x2 --size 320x240 --samples 4
-if [ ! -e "$out/model/plan.json" ]; then rm -rf "$out/model"; fi
-"$tessera" train "$out/city" "$out/model" --method field --minutes 3 --resume
-"$tessera" eval "$out/model" "$out/city" --json "$out/result.json" --images "$out/images"
+if [ ! -e "$out/city.model/plan.json" ]; then rm -rf "$out/city.model"; fi
+"$tessera" train "$out/city" "$out/city.model" --method volume --blocks 2x2 --minutes 2 --resume
+"$tessera" bake "$out/city.model" "$out/city.scene"
+"$tessera" eval "$out/city.scene" "$out/city" --json "$out/result.json" --images "$out/images"
 echo
 echo "held-out views: $(grep -o '"psnr": *[0-9.]*' "$out/result.json" | head -1 | grep -o '[0-9.]*$') dB PSNR, after $((SECONDS - begin)) s"
-echo "report:         $PWD/$out/model/report.html"
+echo "scene:          $PWD/$out/city.scene"
+echo "report:         $PWD/$out/city.scene/report.html"
 echo "pictures:       $PWD/$out/images"

@@ -29,4 +29,10 @@ for samples in 65536 8192; do
     verdict "hash grid backward, $points, $samples samples, % of gather rate" "$(row HashGridBackward "$shape")" '>=' 50
   done
 done
+# The virtual grid, of which no bound is asked.
+jq -r '[.operations[] | select(.operation | IN("DistinctTexels", "VirtualGridForward", "VirtualGridBackward"))]
+  | (.[0].shape | split(" ")[0] | tonumber / 1e6) as $samples
+  | (.[] | "\(.operation), \(.shape): \($samples / .seconds * 100 | round / 100) M samples/s, "
+      + (if .share then "\(.share * 1000 | round / 10) % of the limit" else "no limit known" end)),
+    "virtual grid, all three: \($samples / (map(.seconds) | add) * 100 | round / 100) M samples/s"' "$out/compute.json"
 finish

@@ -125,8 +125,8 @@ fs::path CommandLine::folder_;
 
 TEST_F(CommandLine, HelpOfEveryVerbHasDefaultsAndAnExample) {
   const std::vector<std::vector<std::string>> verbs = {
-      {"synth", "city"}, {"import"},           {"train"},         {"eval"}, {"render"},
-      {"info"},          {"bench", "compute"}, {"bench", "train"}};
+      {"synth", "city"}, {"import"},           {"train"},          {"eval"},           {"render"},
+      {"info"},          {"bench", "compute"}, {"bench", "train"}, {"bench", "render"}};
   for (std::vector<std::string> verb : verbs) {
     std::string name = "tessera";
     for (const std::string& word : verb) name += " " + word;

@@ -102,6 +102,28 @@ TEST_F(VolumeCommandLine, GoesTheWholeWayFromACityToThePicturesOfAScene) {
   EXPECT_EQ(said.at("config").at("voxels"), "16");
 }
 
+TEST_F(VolumeCommandLine, MeasuresWhatSkippingSavesAndAFlightWithASmallCache) {
+  const Said said = run({"bench", "render", scene(), "--views", at("city"), "--flight", "--steps", "20", "--share", "4",
+                         "--json", at("bench.json")});
+  EXPECT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.out, "times fewer steps")) << said.out;
+  const json result = json::parse(readTextFile(at("bench.json")));
+  const json &skipping = result.at("skipping"), &cache = result.at("cache");
+  EXPECT_EQ(skipping.at("rays"), 2 * 48 * 36);
+  EXPECT_GT(skipping.at("skipping").at("samples"), 0);
+  EXPECT_EQ(skipping.at("skipping").at("samples"), skipping.at("whole").at("samples"));
+  EXPECT_LE(skipping.at("skipping").at("steps"), skipping.at("whole").at("steps"));
+  EXPECT_EQ(skipping.at("largest_difference"), 0);
+  EXPECT_EQ(cache.at("steps"), 20);
+  EXPECT_EQ(cache.at("all").at("budget_bytes"), cache.at("all_bytes"));
+  EXPECT_EQ(cache.at("all").at("steps_in_full"), 20);
+  EXPECT_EQ(cache.at("all").at("steps_unlike_unbounded"), 0);
+  const Said tooSmall = run({"bench", "render", scene(), "--flight", "--share", "0.01"});
+  EXPECT_EQ(tooSmall.exitCode, 1);
+  EXPECT_TRUE(contains(tooSmall.err, "coarsest level")) << tooSmall.err;
+  EXPECT_EQ(run({"bench", "render", scene()}).exitCode, 2);
+}
+
 TEST_F(VolumeCommandLine, EndsWithTheSameBytesHoweverOftenItIsKilled) {
   const std::string unbroken = at("unbroken"), killed = at("killed");
   ASSERT_EQ(run(trainArguments(unbroken, {"--steps", "60"})).exitCode, 0);

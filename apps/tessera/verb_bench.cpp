@@ -2,8 +2,12 @@
 
 #include <nlohmann/json.hpp>
 
+#include "apps/tessera/drawable.h"
 #include "apps/tessera/verbs.h"
 #include "compute/roofline.h"
+#include "eval/render_views.h"
+#include "import/capture_reader.h"
+#include "render/cpu/volume_benchmark.h"
 #include "representations/field/step_benchmark.h"
 
 namespace tessera {
@@ -42,9 +46,10 @@ void printRoofline(const Roofline& roofline) {
   }
   fmt::print(
       "\nBest of several runs each. Networks count 2 x weights x samples forward and twice that backward; the hash\n"
-      "grid 8 x levels x samples lookups against random gathers from tables of the same sizes; all others the bytes\n"
-      "of their arguments, each once, against a copy of the same size. Points on rays revisit what the cache still "
-      "holds and may pass the limit.\n");
+      "grid 8 x levels x samples lookups against random gathers from tables of the same sizes; the virtual grid 20 x\n"
+      "samples lookups against gathers or a copy of its arguments, whichever is slower; all others the bytes of their\n"
+      "arguments, each once, against a copy of the same size. Points on rays revisit what the cache still holds and\n"
+      "may pass the limit.\n");
 }
 
 ordered_json toJson(const Roofline& roofline) {
@@ -105,6 +110,123 @@ void writeJson(const std::string& file, const ordered_json& json) {
   }
 }
 
+void printSkipping(const SkippingBenchmark& b) {
+  const auto line = [&](const char* name, const SkippingBenchmark::Way& way) {
+    fmt::print("  {:<10} {:12d} steps  {:12d} samples  {:8.3f} M rays/s\n", name, way.counts.steps, way.counts.samples,
+               static_cast<double>(b.rays) / way.seconds / 1e6);
+  };
+  fmt::print("{}\nempty space, {} rays\n", b.device, b.rays);
+  line("skipped", b.skipping);
+  line("walked", b.whole);
+  fmt::print(
+      "  {:.1f} times fewer steps, pictures apart by at most {:.6f}\n",
+      static_cast<double>(b.whole.counts.steps) / static_cast<double>(std::max<uint64_t>(1, b.skipping.counts.steps)),
+      b.largestDifference);
+}
+
+ordered_json toJson(const SkippingBenchmark& b) {
+  const auto way = [&](const SkippingBenchmark::Way& w) -> ordered_json {
+    return {{"steps", w.counts.steps},
+            {"samples", w.counts.samples},
+            {"seconds", w.seconds},
+            {"rays_per_second", static_cast<double>(b.rays) / w.seconds}};
+  };
+  return {{"device", b.device},
+          {"rays", b.rays},
+          {"skipping", way(b.skipping)},
+          {"whole", way(b.whole)},
+          {"largest_difference", b.largestDifference}};
+}
+
+void printCache(const CacheBenchmark& b) {
+  constexpr double kMiB = 1 << 20;
+  const auto line = [&](const char* name, const CacheBenchmark::Run& run) {
+    fmt::print(
+        "  {:<8} {:9.2f} MiB allowed, {:9.2f} MiB held at most; {} loads, {} evictions, {} refusals\n"
+        "           steps over budget {}, without the coarsest level {}, with a cut that is none {};\n"
+        "           with all that the view asks for {}, of them unlike an unbounded cache's picture {}\n",
+        name, static_cast<double>(run.budgetBytes) / kMiB, static_cast<double>(run.mostBytes) / kMiB, run.loads,
+        run.evictions, run.refusals, run.stepsOverBudget, run.stepsWithoutCoarsest, run.stepsWithoutPartition,
+        run.stepsInFull, run.stepsUnlikeUnbounded);
+  };
+  fmt::print("cache, {} steps; the finest level takes {:.2f} MiB, all {:.2f} MiB\n", b.steps,
+             static_cast<double>(b.finestBytes) / kMiB, static_cast<double>(b.allBytes) / kMiB);
+  line("share", b.tight);
+  line("all", b.whole);
+}
+
+ordered_json toJson(const CacheBenchmark& b) {
+  const auto run = [](const CacheBenchmark::Run& r) -> ordered_json {
+    return {{"budget_bytes", r.budgetBytes},
+            {"most_bytes", r.mostBytes},
+            {"loads", r.loads},
+            {"evictions", r.evictions},
+            {"refusals", r.refusals},
+            {"steps_over_budget", r.stepsOverBudget},
+            {"steps_without_coarsest", r.stepsWithoutCoarsest},
+            {"steps_without_partition", r.stepsWithoutPartition},
+            {"steps_in_full", r.stepsInFull},
+            {"steps_unlike_unbounded", r.stepsUnlikeUnbounded}};
+  };
+  return {{"steps", b.steps},
+          {"finest_bytes", b.finestBytes},
+          {"all_bytes", b.allBytes},
+          {"share", run(b.tight)},
+          {"all", run(b.whole)}};
+}
+
+void addBenchRender(CLI::App& bench) {
+  struct Flags {
+    std::string scene, views, json;
+    bool flight = false;
+    CacheBenchmarkOptions cache;
+  };
+  auto flags = std::make_shared<Flags>();
+  CLI::App* verb = bench.add_subcommand("render", "what skipping empty space saves, and a flight with a small cache");
+  verb->footer(
+      "Examples:\n  tessera bench render city.scene --views city.capture\n"
+      "  tessera bench render city.scene --flight --share 0.25");
+  verb->add_option("scene", flags->scene, "scene folder")->required();
+  verb->add_option("--views", flags->views, "draw this capture's held-out views with and without skipping");
+  CLI::Option* flight =
+      verb->add_flag("--flight", flags->flight, "fly over all blocks, low and high, with a small cache");
+  verb->add_option("--steps", flags->cache.steps, "pictures of the flight")
+      ->capture_default_str()
+      ->check(CLI::Range(2, 1 << 20))
+      ->needs(flight);
+  verb->add_option("--share", flags->cache.finestShare,
+                   "the cache, as a share of what the finest level takes in memory")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1e3))
+      ->needs(flight);
+  verb->add_option("--json", flags->json, "write the result as one JSON object here; - prints it");
+  verb->add_option("--threads", flags->cache.threads, "processor threads; 0: all cores")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+  verb->callback([flags] {
+    if (flags->views.empty() && !flags->flight) throw CLI::RequiredError("--views or --flight");
+    const VolumeScene scene = openVolumeScene(flags->scene);
+    ordered_json json = ordered_json::object();
+    if (!flags->views.empty()) {
+      std::vector<BenchmarkView> views;
+      const Capture capture = readCapture(flags->views);
+      openDrawable(*makeDevice({}), flags->scene, {})->requireWorldOf(capture);
+      for (const NamedView& view : viewsOfCapture(capture, Split::test)) {
+        views.push_back({view.camera, view.worldFromCamera});
+      }
+      const SkippingBenchmark skipping = benchmarkSkipping(scene, views, flags->cache.threads);
+      if (flags->json != "-") printSkipping(skipping);
+      json["skipping"] = toJson(skipping);
+    }
+    if (flags->flight) {
+      const CacheBenchmark cache = benchmarkCache(scene, flags->cache);
+      if (flags->json != "-") printCache(cache);
+      json["cache"] = toJson(cache);
+    }
+    writeJson(flags->json, json);
+  });
+}
+
 void addBenchCompute(CLI::App& bench) {
   struct Flags {
     RooflineOptions options;
@@ -155,6 +277,7 @@ void addBenchVerb(CLI::App& app) {
   bench->require_subcommand(1);
   addBenchCompute(*bench);
   addBenchTrain(*bench);
+  addBenchRender(*bench);
 }
 
 }  // namespace tessera

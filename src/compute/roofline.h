@@ -4,9 +4,11 @@
 //   networks       2 · parameters · samples forward (a multiply and an add a weight), twice that backward (the gradient
 //                  of the weights and that of the inputs); padding of inputs and outputs is not counted
 //   hash grid      8 corners · levels · samples lookups, forward (read) as backward (read, add, write)
-//   virtual grid   20 corners · samples lookups; the limit is the gather rate of a table of the texels that it uses
-//   (bits to
-//                  find them, bytes forward, floats backward)
+//   virtual grid   20 corners · samples lookups; the limit is the lower of two rates: gathers from a table of what the
+//                  corners are looked up in (a bit each of all texels to find those needed, 8 bytes each of those
+//                  needed forward, 32 backward), and as many lookups as are done while the arguments are copied:
+//                  16 bytes a sample for where it is, 8 for every 32 texels (bits and ranks), then 12 a needed texel
+//                  (finding), 32 a needed texel and 32 a sample (forward), 32 and 64 (backward)
 //   all others     bytes of their arguments, each array once however often a kernel passes over it; the limit is a copy
 //                  of the same footprint (to the next power of two)
 //

@@ -32,12 +32,12 @@ class RooflineRecorder {
 
   // 8-byte loads per second at random places of a table of so many bytes; 0 where it is not measured.
   double gatherLimit(size_t bytes);
+  // Bytes per second, read and written, of a copy with this footprint; 0 where it is not measured.
+  double streamLimit(double bytes);
 
   Array<float> randomFloats(size_t count, float low, float high);
 
  private:
-  double streamLimit(double bytes);
-
   Device& device_;
   ThreadPool* pool_;
   const RooflineOptions& options_;

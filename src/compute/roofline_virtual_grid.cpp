@@ -53,13 +53,16 @@ void measureVirtualGrid(RooflineRecorder& recorder) {
   const uint32_t texels = device.read(firstTexel.all())[1];
   const double lookups = static_cast<double>(VirtualGrid::kCorners) * n;
   const std::string shape = fmt::format("{} samples, {} of {} texels", n, texels, grid.texels());
-  const auto measure = [&](Operation operation, size_t table, const std::function<void()>& run) {
-    recorder.measure(operation,
-                     {std::string(kOperationNames[static_cast<size_t>(operation)]), shape, lookups, "lookup",
-                      recorder.gatherLimit(table)},
-                     run);
+  // `table` is what the corners are looked up in, `bytes` what the arguments beside positions and blocks have. It takes
+  // at least as long as the slower of the lookups and of moving the arguments once.
+  const auto measure = [&](Operation operation, size_t table, double bytes, const std::function<void()>& run) {
+    const double moved = bytes + 16.0 * n;
+    const double limit = std::min(recorder.gatherLimit(table), lookups / moved * recorder.streamLimit(moved));
+    const std::string name(kOperationNames[static_cast<size_t>(operation)]);
+    recorder.measure(operation, {name, shape, lookups, "lookup", limit}, run);
   };
-  measure(Operation::kDistinctTexels, size_t{grid.words()} * 4, [&] { device.run(distinct); });
+  const double bits = 8.0 * grid.words(), attributeBytes = 4.0 * VirtualGrid::kAttributes;
+  measure(Operation::kDistinctTexels, size_t{grid.words()} * 4, bits + 12.0 * texels, [&] { device.run(distinct); });
 
   Array<float> attributes = recorder.randomFloats(size_t{VirtualGrid::kAttributes} * texels, 0, 1);
   Array<float> logDensities = device.array<float>(n), colours = device.array<float>(size_t{n} * 7);
@@ -73,7 +76,8 @@ void measureVirtualGrid(RooflineRecorder& recorder) {
   forward.attributes = attributes;
   forward.logDensities = logDensities;
   forward.colours = colours;
-  measure(Operation::kVirtualGridForward, size_t{texels} * VirtualGrid::kAttributes, [&] { device.run(forward); });
+  measure(Operation::kVirtualGridForward, size_t{texels} * VirtualGrid::kAttributes,
+          bits + attributeBytes * (texels + n), [&] { device.run(forward); });
 
   Array<float> densityGradients = recorder.randomFloats(n, -1, 1);
   Array<float> colourGradients = recorder.randomFloats(size_t{n} * 7, -1, 1);
@@ -92,7 +96,7 @@ void measureVirtualGrid(RooflineRecorder& recorder) {
   backward.colourGradients = colourGradients;
   backward.attributeGradients = attributeGradients;
   measure(Operation::kVirtualGridBackward, size_t{texels} * VirtualGrid::kAttributes * sizeof(float),
-          [&] { device.run(backward); });
+          bits + attributeBytes * (texels + 2.0 * n), [&] { device.run(backward); });
 }
 
 }  // namespace tessera

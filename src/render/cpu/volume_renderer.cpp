@@ -40,8 +40,12 @@ void VolumeRenderer::loadFor(const TileView& view) {
   }
 }
 
-RenderedView VolumeRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
+void VolumeRenderer::prepare(const Camera& camera, const Pose& worldFromCamera) {
   loadFor(tileView(camera, worldFromCamera, frame_));
+}
+
+RenderedView VolumeRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
+  prepare(camera, worldFromCamera);
   VolumeDrawing drawing{frame_, {}, nullptr, settings_.march};
   for (const SelectedTile& selected : selection_.cut) {
     if (selected.visible) drawing.frontToBack.push_back(cache_.find(selected.tile));

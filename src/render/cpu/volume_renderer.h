@@ -24,10 +24,13 @@ class VolumeRenderer final : public ViewRenderer {
   VolumeRenderer(const VolumeFrame& frame, TileTree tree, TileSource source, const VolumeRendererSettings& settings);
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
+  // Loads what the view asks for, as render() would.
+  void prepare(const Camera& camera, const Pose& worldFromCamera);
   std::string device() const override;
   Eigen::Array3f background() const override { return settings_.background; }
 
   const Selection& selection() const { return selection_; }  // of the last picture
+  const TileCache& cache() const { return cache_; }
   const TileCacheStatistics& cacheStatistics() const { return cache_.statistics(); }
   const MarchCounts& marchCounts() const { return counts_; }  // of all pictures
 

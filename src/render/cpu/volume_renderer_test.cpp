@@ -5,64 +5,10 @@
 #include <set>
 
 #include "base/error.h"
-#include "render/made_tree.h"
-#include "render/made_volume.h"
+#include "render/made_place.h"
 
 namespace tessera {
 namespace {
-
-// 4×4 cells of smooth random texels; the levels above are as coarse as their place, with parts for each cell below.
-struct Place {
-  TileTree tree = madeTree(4, 4);
-  std::vector<VolumeContent> contents;
-  VolumeFrame frame;
-  uint64_t allBytes = 0, coarsestBytes = 0, finestBytes = 0;
-
-  Place() {
-    frame.low = Vec3d(-4, -4, -1);
-    frame.high = Vec3d(4, 4, 1);
-    for (size_t i = 0; i < tree.tiles.size(); ++i) {
-      TileNode& node = tree.tiles[i];
-      std::vector<VolumePart> parts;
-      for (double y = node.low.y(); y < node.high.y(); y += 2) {
-        for (double x = node.low.x(); x < node.high.x(); x += 2) {
-          VolumePart part;
-          placeCell(part, static_cast<float>(x + 1), static_cast<float>(y + 1));
-          part.voxels = 32 >> node.level;
-          part.planes = 64 >> node.level;
-          makeVolume(part, smoothVolume(static_cast<uint64_t>(7 * (x + 8) + y + 8), 0.4));
-          parts.push_back(std::move(part));
-        }
-      }
-      contents.push_back(contentOf(std::move(parts), randomNetwork(i)));
-      node.geometricError = 2.0 / 64 * (1 << node.level);
-      const uint64_t bytes = bytesInMemory(contents.back());
-      allBytes += bytes;
-      if (node.parent < 0) coarsestBytes = bytes;
-      if (node.level == 0) finestBytes += bytes;
-    }
-    VolumePart around;
-    around.contracted = around.surround = true;
-    around.scale = {4, 4, 1};
-    around.voxels = 32;
-    around.planes = 64;
-    makeVolume(around, smoothVolume(1000, 0.2));
-    contents.push_back(contentOf({around}, randomNetwork(1000)));
-    tree.surround = static_cast<int>(tree.tiles.size());
-    tree.tiles.push_back({});
-    allBytes += bytesInMemory(contents.back());
-    coarsestBytes += bytesInMemory(contents.back());
-  }
-
-  TileSource source() const {
-    return {[this](int tile) { return bytesInMemory(contents[tile]); }, [this](int tile) { return contents[tile]; }};
-  }
-};
-
-const Place& place() {
-  static const Place made;
-  return made;
-}
 
 VolumeRendererSettings settingsWith(uint64_t budget) {
   VolumeRendererSettings settings;

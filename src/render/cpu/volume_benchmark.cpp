@@ -1,0 +1,188 @@
+#include "render/cpu/volume_benchmark.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+
+#include "base/check.h"
+
+namespace tessera {
+namespace {
+
+constexpr double kLow = 0.25;              // above the box, scene units
+constexpr double kHighInEdges = 2;         // of the scene's longer edge in blocks, in scene units: half blocks
+constexpr double kAhead = 30, kDown = 75;  // degrees below the horizon
+constexpr double kFullWidth = 1280;        // pixels: what CacheBenchmarkOptions::mostPixels speaks of
+
+VolumeRendererSettings settingsFor(const VolumeScene& scene, int threads) {
+  VolumeRendererSettings settings;
+  settings.threads = threads;
+  settings.background = Eigen::Array3f(scene.background[0], scene.background[1], scene.background[2]);
+  return settings;
+}
+
+RenderedView drawTimed(VolumeRenderer& renderer, const BenchmarkView& view, double& seconds) {
+  using Clock = std::chrono::steady_clock;
+  renderer.prepare(view.camera, view.worldFromCamera);
+  const auto start = Clock::now();
+  RenderedView drawn = renderer.render(view.camera, view.worldFromCamera, nullptr);
+  seconds += std::chrono::duration<double>(Clock::now() - start).count();
+  return drawn;
+}
+
+bool samePicture(const RenderedView& a, const RenderedView& b) {
+  return a.colour.pixels == b.colour.pixels && a.opacity.pixels == b.opacity.pixels && a.depth.pixels == b.depth.pixels;
+}
+
+// What the cache holds by what was loaded, not by its own books.
+class Watched {
+ public:
+  Watched(const VolumeScene& scene, const VolumeRendererSettings& settings)
+      : scene_(scene), bytes_(scene.tree.tiles.size()) {
+    const TileSource source{scene.source.bytes, [this](int tile) {
+                              VolumeContent content = scene_.source.load(tile);
+                              bytes_[tile] = bytesInMemory(content);
+                              return content;
+                            }};
+    run_.budgetBytes = settings.budgetBytes;
+    renderer_ = std::make_unique<VolumeRenderer>(scene.frame, scene.tree, source, settings);
+  }
+
+  RenderedView draw(const Camera& camera, const Pose& pose) {
+    RenderedView drawn = renderer_->render(camera, pose, nullptr);
+    const TileCache& cache = renderer_->cache();
+    uint64_t held = 0;
+    for (size_t tile = 0; tile < bytes_.size(); ++tile) {
+      if (cache.holds(static_cast<int>(tile))) held += bytes_[tile];
+    }
+    run_.stepsOverBudget += held > run_.budgetBytes || cache.statistics().mostBytes > run_.budgetBytes;
+    bool coarsest = scene_.tree.surround < 0 || cache.holds(scene_.tree.surround);
+    for (const int tile : scene_.tree.coarsest()) coarsest &= cache.holds(tile);
+    run_.stepsWithoutCoarsest += !coarsest;
+    const std::vector<SelectedTile>& cut = renderer_->selection().cut;
+    const bool inMemory =
+        std::all_of(cut.begin(), cut.end(), [&](const SelectedTile& s) { return !s.visible || cache.holds(s.tile); });
+    run_.stepsWithoutPartition += !inMemory || !isPartition(scene_.tree, cut);
+    return drawn;
+  }
+
+  void compare(const RenderedView& drawn, const RenderedView& unbounded) {
+    if (!renderer_->selection().requests.empty()) return;
+    ++run_.stepsInFull;
+    run_.stepsUnlikeUnbounded += !samePicture(drawn, unbounded);
+  }
+
+  CacheBenchmark::Run result() const {
+    CacheBenchmark::Run run = run_;
+    const TileCacheStatistics& statistics = renderer_->cacheStatistics();
+    run.mostBytes = statistics.mostBytes;
+    run.loads = statistics.loads;
+    run.evictions = statistics.evictions;
+    run.refusals = statistics.refusals;
+    return run;
+  }
+
+ private:
+  const VolumeScene& scene_;
+  std::vector<uint64_t> bytes_;
+  CacheBenchmark::Run run_;
+  std::unique_ptr<VolumeRenderer> renderer_;
+};
+
+Camera flightCamera(const CacheBenchmarkOptions& options) {
+  Camera camera;
+  camera.width = options.width;
+  camera.height = options.height;
+  const double focal = 0.8 * options.width;
+  camera.parameters = {focal, focal, 0.5 * options.width, 0.5 * options.height};
+  return camera;
+}
+
+}  // namespace
+
+SkippingBenchmark benchmarkSkipping(const VolumeScene& scene, const std::vector<BenchmarkView>& views, int threads) {
+  VolumeRendererSettings settings = settingsFor(scene, threads);
+  settings.selection.mostPixels = 0;
+  VolumeRenderer skipping(scene.frame, scene.tree, scene.source, settings);
+  settings.march.skipEmptySpace = false;
+  VolumeRenderer whole(scene.frame, scene.tree, scene.source, settings);
+  SkippingBenchmark result;
+  result.device = skipping.device();
+  for (const BenchmarkView& view : views) {
+    const RenderedView a = drawTimed(skipping, view, result.skipping.seconds);
+    const RenderedView b = drawTimed(whole, view, result.whole.seconds);
+    const ImageF pictureA = compositeOver(a, skipping.background()), pictureB = compositeOver(b, whole.background());
+    for (size_t i = 0; i < pictureA.pixels.size(); ++i) {
+      const double difference = std::abs(pictureA.pixels[i] - pictureB.pixels[i]);
+      result.largestDifference = std::max(result.largestDifference, difference);
+    }
+    result.rays += pictureA.pixelCount();
+  }
+  result.skipping.counts = skipping.marchCounts();
+  result.whole.counts = whole.marchCounts();
+  return result;
+}
+
+CacheBenchmark benchmarkCache(const VolumeScene& scene, const CacheBenchmarkOptions& options) {
+  CacheBenchmark result;
+  result.steps = options.steps;
+  for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
+    const int tile = static_cast<int>(i);
+    if (!scene.tree.tiles[i].hasContent) continue;
+    const uint64_t bytes = scene.source.bytes(tile);
+    result.allBytes += bytes;
+    if (tile != scene.tree.surround && scene.tree.tiles[i].level == 0) result.finestBytes += bytes;
+  }
+  VolumeRendererSettings settings = settingsFor(scene, options.threads);
+  settings.selection.mostPixels = options.mostPixels * options.width / kFullWidth;
+  settings.budgetBytes = static_cast<uint64_t>(options.finestShare * static_cast<double>(result.finestBytes));
+  Watched tight(scene, settings);
+  settings.budgetBytes = result.allBytes;
+  Watched whole(scene, settings);
+  settings.budgetBytes = std::numeric_limits<uint64_t>::max();
+  VolumeRenderer unbounded(scene.frame, scene.tree, scene.source, settings);
+  const Camera camera = flightCamera(options);
+  for (int step = 0; step < options.steps; ++step) {
+    const Pose pose = flightPose(scene.frame, scene.tree, static_cast<double>(step) / options.steps);
+    const RenderedView wanted = unbounded.render(camera, pose, nullptr);
+    CHECK(unbounded.selection().requests.empty() == true);
+    tight.compare(tight.draw(camera, pose), wanted);
+    whole.compare(whole.draw(camera, pose), wanted);
+  }
+  result.tight = tight.result();
+  result.whole = whole.result();
+  return result;
+}
+
+Pose flightPose(const VolumeFrame& frame, const TileTree& tree, double lap) {
+  const bool high = lap >= 0.5;
+  const double half = 2 * lap - (high ? 1 : 0), row = half * tree.rows;
+  const bool back = static_cast<int>(row) % 2 == 1;
+  const double across = row - std::floor(row), x = tree.columns * (2 * (back ? 1 - across : across) - 1);
+  const double rise = high ? half * kHighInEdges * std::max(tree.columns, tree.rows) : 0;
+  const Vec3d eye(x, tree.rows * (2 * half - 1), frame.high.z() + kLow + rise);
+  const double below = (high ? kDown : kAhead) * std::numbers::pi / 180;
+  const Vec3d forward((back ? -1 : 1) * std::cos(below), 0, -std::sin(below));
+  const Vec3d right = forward.cross(Vec3d::UnitZ()).normalized();
+  Mat3d sceneFromCamera;
+  sceneFromCamera.col(0) = right;
+  sceneFromCamera.col(1) = forward.cross(right);
+  sceneFromCamera.col(2) = forward;
+  return {frame.rotation * sceneFromCamera, frame.translation + frame.scale * (frame.rotation * eye)};
+}
+
+bool isPartition(const TileTree& tree, const std::vector<SelectedTile>& cut) {
+  std::vector<int> times(static_cast<size_t>(tree.columns) * tree.rows);
+  for (const SelectedTile& selected : cut) {
+    const TileCells& cells = tree.tiles[selected.tile].cells;
+    for (int j = cells.j0; j < cells.j1; ++j) {
+      for (int i = cells.i0; i < cells.i1; ++i) ++times[i + static_cast<size_t>(tree.columns) * j];
+    }
+  }
+  return std::all_of(times.begin(), times.end(), [](int count) { return count == 1; });
+}
+
+}  // namespace tessera
