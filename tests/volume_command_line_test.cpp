@@ -118,6 +118,15 @@ TEST_F(VolumeCommandLine, MeasuresWhatSkippingSavesAndAFlightWithASmallCache) {
   EXPECT_EQ(cache.at("all").at("budget_bytes"), cache.at("all_bytes"));
   EXPECT_EQ(cache.at("all").at("steps_in_full"), 20);
   EXPECT_EQ(cache.at("all").at("steps_unlike_unbounded"), 0);
+  // Not quite enough for all, and not even for the coarsest level.
+  const double mebibytes = cache.at("all_bytes").get<double>() / 1048576;
+  const Said coarser = run({"eval", scene(), at("city"), "--memory-mib", std::to_string(0.99 * mebibytes)});
+  EXPECT_EQ(coarser.exitCode, 0) << coarser.err;
+  EXPECT_TRUE(contains(coarser.err, "--memory-mib")) << coarser.err;
+  EXPECT_FALSE(contains(run({"eval", scene(), at("city")}).err, "--memory-mib"));
+  const Said none = run({"eval", scene(), at("city"), "--memory-mib", std::to_string(0.01 * mebibytes)});
+  EXPECT_EQ(none.exitCode, 1);
+  EXPECT_TRUE(contains(none.err, "allow at least")) << none.err;
   const Said tooSmall = run({"bench", "render", scene(), "--flight", "--share", "0.01"});
   EXPECT_EQ(tooSmall.exitCode, 1);
   EXPECT_TRUE(contains(tooSmall.err, "coarsest level")) << tooSmall.err;
@@ -136,6 +145,18 @@ TEST_F(VolumeCommandLine, EndsWithTheSameBytesHoweverOftenItIsKilled) {
   const Said last = run(trainArguments(killed, {"--steps", "60", "--resume"}));
   ASSERT_EQ(last.exitCode, 0) << last.err;
   EXPECT_EQ(checkpoints(killed), checkpoints(unbroken));
+}
+
+TEST_F(VolumeCommandLine, TrainsWithFewBlocksInMemoryAndSaysHowMuchThatTakes) {
+  const std::string few = at("few");
+  const Said said = run(trainArguments(few, {"--steps", "20", "--resident-blocks", "1", "--set", "residency_steps=8"}));
+  EXPECT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.err, "memory: at most")) << said.err;
+  EXPECT_FALSE(fs::exists(fs::path(few) / "waiting"));
+  EXPECT_EQ(run({"eval", few, at("city")}).exitCode, 0);
+  const Said field = run({"train", at("city"), at("field"), "--method", "field", "--resident-blocks", "1"});
+  EXPECT_NE(field.exitCode, 0);
+  EXPECT_TRUE(contains(field.err, "resident_blocks")) << field.err;
 }
 
 TEST_F(VolumeCommandLine, LeavesTheOldSceneWholeWhenBakingIsKilled) {

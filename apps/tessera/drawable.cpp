@@ -2,7 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "base/error.h"
+#include "base/log.h"
+#include "base/memory.h"
 #include "render/cpu/volume_renderer.h"
 #include "render/volume_scene.h"
 #include "representations/field/field_renderer.h"
@@ -33,6 +37,30 @@ class DrawableModel final : public Drawable {
   std::unique_ptr<Renderer> renderer_;
 };
 
+// Says once when a picture was drawn coarser than asked for.
+class SceneRenderer final : public ViewRenderer {
+ public:
+  SceneRenderer(const fs::path& folder, std::unique_ptr<VolumeRenderer> renderer, uint64_t budgetBytes)
+      : folder_(folder), renderer_(std::move(renderer)), budgetBytes_(budgetBytes) {}
+
+  RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override {
+    RenderedView view = renderer_->render(camera, worldFromCamera, opaqueDepth);
+    if (!renderer_->selection().requests.empty() && !std::exchange(warned_, true)) {
+      warn("{}: views do not fit into {:.4g} MiB at their finest level and are drawn coarser; raise --memory-mib",
+           folder_.string(), static_cast<double>(budgetBytes_) / 1048576);
+    }
+    return view;
+  }
+  std::string device() const override { return renderer_->device(); }
+  Eigen::Array3f background() const override { return renderer_->background(); }
+
+ private:
+  fs::path folder_;
+  std::unique_ptr<VolumeRenderer> renderer_;
+  uint64_t budgetBytes_;
+  bool warned_ = false;
+};
+
 class DrawableScene final : public Drawable {
  public:
   DrawableScene(const fs::path& folder, const DrawableOptions& options)
@@ -47,7 +75,11 @@ class DrawableScene final : public Drawable {
     settings.threads = options.threads;
     VolumeScene scene = openVolumeScene(folder);
     settings.background = Eigen::Array3f(scene.background[0], scene.background[1], scene.background[2]);
-    renderer_ = std::make_unique<VolumeRenderer>(scene.frame, std::move(scene.tree), std::move(scene.source), settings);
+    settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB > 0 ? options.memoryMiB * 1048576
+                                                                       : static_cast<double>(usableMemoryBytes()) / 2);
+    renderer_ = std::make_unique<SceneRenderer>(
+        folder, std::make_unique<VolumeRenderer>(scene.frame, std::move(scene.tree), std::move(scene.source), settings),
+        settings.budgetBytes);
   }
 
   ViewRenderer& renderer() override { return *renderer_; }
@@ -63,7 +95,7 @@ class DrawableScene final : public Drawable {
  private:
   fs::path folder_;
   Tileset tileset_;
-  std::unique_ptr<VolumeRenderer> renderer_;
+  std::unique_ptr<SceneRenderer> renderer_;
 };
 
 }  // namespace

@@ -21,11 +21,13 @@ class Drawable {
 };
 
 struct DrawableOptions {
-  int threads = 0;  // of scenes; models have their device's
-  int level = 0;    // of detail of scenes: the finest to draw
+  int threads = 0;       // of scenes; models have their device's
+  int level = 0;         // of detail of scenes: the finest to draw
+  double memoryMiB = 0;  // for the contents of scenes; 0: half of the machine's
 };
 
-// Throws Error when the folder holds neither, or the scene has no such level. Keeps a reference to `device`.
+// Throws Error when the folder holds neither, the scene has no such level, or its coarsest does not fit. Warns when a
+// picture was drawn coarser than asked for, as memory was short. Keeps a reference to `device`.
 std::unique_ptr<Drawable> openDrawable(Device& device, const fs::path& folder, const DrawableOptions& options);
 
 }  // namespace tessera

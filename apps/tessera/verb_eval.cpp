@@ -15,6 +15,7 @@ void addEvalVerb(CLI::App& app) {
     std::string model, capture, split = "test", exposure = "neutral", json, report, images, lpips;
     DeviceOptions device;
     int level = 0;
+    double memoryMiB = 0;
   };
   auto flags = std::make_shared<Flags>();
   CLI::App* verb = app.add_subcommand("eval", "held-out photos against renderings: PSNR, SSIM, LPIPS, depth error");
@@ -34,12 +35,15 @@ void addEvalVerb(CLI::App& app) {
   verb->add_option("--lod", flags->level, "of a scene: the finest level of detail to draw")
       ->capture_default_str()
       ->check(CLI::Range(0, 64));
+  verb->add_option("--memory-mib", flags->memoryMiB, "of a scene: memory for its contents; 0: half of the machine's")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1e9));
   addDeviceFlags(*verb, flags->device);
   verb->callback([flags] {
     const Capture capture = readCapture(flags->capture);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
     const std::unique_ptr<Drawable> drawable =
-        openDrawable(*device, flags->model, {flags->device.threads, flags->level});
+        openDrawable(*device, flags->model, {flags->device.threads, flags->level, flags->memoryMiB});
     EvaluateOptions options;
     options.split = *splitFromName(flags->split);
     drawable->requireWorldOf(capture);

@@ -14,6 +14,7 @@ struct RenderFlags {
   std::string model, out, views, path, dataparserTransforms, size, split = "test";
   DeviceOptions device;
   int level = 0;
+  double memoryMiB = 0;
 };
 
 void parseSize(const std::string& size, RenderViewsOptions& options) {
@@ -50,6 +51,9 @@ void addRenderVerb(CLI::App& app) {
   verb->add_option("--lod", flags->level, "of a scene: the finest level of detail to draw")
       ->capture_default_str()
       ->check(CLI::Range(0, 64));
+  verb->add_option("--memory-mib", flags->memoryMiB, "of a scene: memory for its contents; 0: half of the machine's")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1e9));
   addDeviceFlags(*verb, flags->device);
   verb->callback([flags] {
     if (flags->views.empty() && flags->path.empty()) throw CLI::RequiredError("--views or --path");
@@ -57,7 +61,7 @@ void addRenderVerb(CLI::App& app) {
     parseSize(flags->size, options);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
     const std::unique_ptr<Drawable> drawable =
-        openDrawable(*device, flags->model, {flags->device.threads, flags->level});
+        openDrawable(*device, flags->model, {flags->device.threads, flags->level, flags->memoryMiB});
     std::vector<NamedView> views;
     if (!flags->path.empty()) {
       const CameraPath path = readCameraPath(flags->path, flags->dataparserTransforms);

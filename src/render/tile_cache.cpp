@@ -19,7 +19,7 @@ TileCache::TileCache(const TileTree& tree, uint64_t budgetBytes, TileSource sour
   if (bytes > budget_) {
     throw Error("scene", "",
                 fmt::format("its coarsest level takes {} bytes of memory, the budget is {}", bytes, budget_),
-                fmt::format("allow at least {} bytes", bytes));
+                fmt::format("allow at least {:.4g} MiB", static_cast<double>(bytes) / 1048576 * 1.0001));
   }
   for (const int tile : pinned) insert(tile, true);
 }
