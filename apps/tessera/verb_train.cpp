@@ -24,7 +24,7 @@ CLI::Validator amount(double low, double high) {
 }
 
 struct TrainFlags {
-  std::string method = "field", configFile, blocks = "auto";
+  std::string method = "field", configFile, blocks = "auto", grid;
   std::vector<std::string> settings;
   std::string seed;
   DeviceOptions device;
@@ -55,11 +55,16 @@ VolumeConfig volumeDefaults(const TrainFlags& flags) {
 
 TrainingResult train(Device& device, const TrainFlags& flags) {
   const Capture capture = readCapture(flags.capture);
-  if (flags.method == "field")
+  if (flags.method == "field") {
+    if (!flags.grid.empty()) throw CLI::ValidationError("--grid", "is of --method volume");
     return trainField(device, capture, flags.model, {chosenConfig(flags, FieldConfig()), flags.loop});
+  }
   const std::optional<BlockCount> blocks = parseBlockCount(flags.blocks);
   if (!blocks) throw CLI::ValidationError("--blocks", "'" + flags.blocks + "' is neither auto nor of the form 2x2");
-  return trainVolume(device, capture, flags.model, {chosenConfig(flags, volumeDefaults(flags)), flags.loop, *blocks});
+  std::optional<BlockGrid> grid;
+  if (!flags.grid.empty()) grid = readGrid(flags.grid, capture);
+  return trainVolume(device, capture, flags.model,
+                     {chosenConfig(flags, volumeDefaults(flags)), flags.loop, *blocks, grid});
 }
 
 }  // namespace
@@ -84,8 +89,12 @@ void addTrainVerb(CLI::App& app) {
       ->check(amount(1e-3, 1e7))
       ->excludes(steps);
   verb->add_flag("--resume", flags->loop.resume, "go on with the model that is in the folder");
-  verb->add_option("--blocks", flags->blocks, "of --method volume: auto, or so many along x and y, as 3x2")
-      ->capture_default_str();
+  CLI::Option* blocks =
+      verb->add_option("--blocks", flags->blocks, "of --method volume: auto, or so many along x and y, as 3x2")
+          ->capture_default_str();
+  verb->add_option("--grid", flags->grid, "of --method volume: the blocks of this blocks.json, of another model")
+      ->check(CLI::ExistingFile)
+      ->excludes(blocks);
   verb->add_option("--seed", flags->seed, "of everything random, a whole number; the same as --set seed=...");
   verb->add_option("--config", flags->configFile, "settings file (TOML)")->check(CLI::ExistingFile);
   verb->add_option("--set", flags->settings, "key=value, as often as wanted");

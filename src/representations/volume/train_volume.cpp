@@ -1,11 +1,13 @@
 #include "representations/volume/train_volume.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/log.h"
 #include "base/memory.h"
 #include "partition/block_map.h"
+#include "scene/block_grid_json.h"
 #include "train/run_folder.h"
 
 namespace tessera {
@@ -17,6 +19,7 @@ constexpr double kMemoryShare = 0.5;  // of the machine's, for blocks in trainin
 BlockGrid cut(const Capture& capture, const fs::path& model, const TrainVolumeOptions& options) {
   PartitionOptions partitioning;
   partitioning.blocks = options.blocks;
+  partitioning.grid = options.grid;
   partitioning.limits.texelsPerEdge = options.config.planes;
   partitioning.limits.bytesPerBlock = trainingBytesPerBlock(options.config);
   partitioning.limits.memoryBudget = kMemoryShare * static_cast<double>(usableMemoryBytes());
@@ -62,7 +65,8 @@ namespace {
 void writeRun(Device& device, const ModelFolder& folder, const Capture& capture, const BlockGrid& grid,
               VolumeConfig config, const TrainingLoopOptions& loop) {
   if (folder.manifest()) return;
-  writeFileAtomically(folder.configPath(), howToRepeat(device, loop) + configToToml(config.fields()));
+  writeFileAtomically(folder.configPath(),
+                      howToRepeat(device, loop, " --grid blocks.json") + configToToml(config.fields()));
   folder.writePlacement({{}, grid, capture.sourceFromWorld, capture.root, trainingNames(capture)}, loop.method);
 }
 
@@ -84,6 +88,12 @@ bool trainLevel(Device& device, const Capture& capture, const fs::path& model, u
   return runTraining(trainer, folder, loop).finished;
 }
 
+void requireSameGrid(const ModelFolder& folder, const BlockGrid& has, const BlockGrid& wanted) {
+  if (blockGridToJson(has) == blockGridToJson(wanted)) return;
+  throw Error((folder.root() / "blocks.json").string(), "grid", "the run has other blocks than those of --grid",
+              "resume without --grid, or train into another folder");
+}
+
 }  // namespace
 
 TrainingResult trainVolume(Device& device, const Capture& capture, const fs::path& model, TrainVolumeOptions options) {
@@ -95,6 +105,7 @@ TrainingResult trainVolume(Device& device, const Capture& capture, const fs::pat
   options.config.photoBudgetMiB = settledPhotoBudget(options.config.photoBudgetMiB, capture, usableMemoryBytes());
   // A resumed run stands where the killed one stood, whatever has become of the capture's points since.
   const BlockGrid grid = goingOn ? requireGrid(folder) : cut(capture, model, options);
+  if (options.grid) requireSameGrid(folder, grid, *options.grid);
   TrainingResult result;
   {
     VolumeTrainer trainer(device, capture, options.config, grid);
