@@ -34,6 +34,28 @@ finish() { [ "$failures" -eq 0 ] || exit 1; }
 # The file that holds a model's state.
 checkpoint() { echo "$1/$(jq -r '.files[0]' "$1/manifest.json")"; }
 
+# What follows works in the folder $work and makes nothing again that is there.
+# trained MODEL CAPTURE ARGUMENTS...: goes on with one that was interrupted.
+trained() {
+  local model=$work/$1 capture=$work/$2
+  shift 2
+  [ -e "$model.done" ] && return
+  "$tessera" train "$capture" "$model" --resume "$@"
+  touch "$model.done"
+}
+# baked MODEL SCENE CAPTURE
+baked() {
+  [ -e "$work/$2/tileset.json" ] || "$tessera" bake "$work/$1" "$work/$2" --capture "$work/$3"
+}
+# judged WHAT CAPTURE: its held-out PSNR, from the file if it was judged before.
+judged() {
+  [ -s "$work/$1.json" ] ||
+    "$tessera" eval "$work/$1" "$work/$2" --json "$work/$1.json" --report "$work/$1.html" > /dev/null
+  jq -r '.psnr * 100 | round / 100' "$work/$1.json"
+}
+difference() { awk -v a="$1" -v b="$2" 'BEGIN { d = a - b; print d < 0 ? -d : d }'; }
+shortfall() { awk -v a="$1" -v b="$2" 'BEGIN { print a - b }'; }
+
 # photographs NAME DOWNSCALE BOUND: imports real photographs, trains for MINUTES with each of SEEDS, judges held-out views.
 photographs() {
   local name=$1 downscale=$2 bound=$3 seed psnr

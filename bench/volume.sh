@@ -9,26 +9,6 @@ work=$out/volume
 minutes=${MINUTES:-15}
 mkdir -p "$work"
 
-# trained MODEL CAPTURE ARGUMENTS...: unless it is there; goes on with one that was interrupted.
-trained() {
-  local model=$work/$1 capture=$work/$2
-  shift 2
-  [ -e "$model.done" ] && return
-  "$tessera" train "$capture" "$model" --resume "$@"
-  touch "$model.done"
-}
-baked() {
-  [ -e "$work/$2/tileset.json" ] || "$tessera" bake "$work/$1" "$work/$2" --capture "$work/$3"
-}
-# judged WHAT CAPTURE: its held-out PSNR, from the file if it was judged before.
-judged() {
-  [ -s "$work/$1.json" ] ||
-    "$tessera" eval "$work/$1" "$work/$2" --json "$work/$1.json" --report "$work/$1.html" > /dev/null
-  jq -r '.psnr * 100 | round / 100' "$work/$1.json"
-}
-difference() { awk -v a="$1" -v b="$2" 'BEGIN { d = a - b; print d < 0 ? -d : d }'; }
-shortfall() { awk -v a="$1" -v b="$2" 'BEGIN { print a - b }'; }
-
 city() {
   [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
   trained city-volume city --method volume --blocks 2x2 --minutes "$minutes"

@@ -100,6 +100,24 @@ TEST_F(VolumeCommandLine, GoesTheWholeWayFromACityToThePicturesOfAScene) {
   EXPECT_EQ(said.at("method"), "volume");
   EXPECT_EQ(said.at("blocks").at("columns"), 2);
   EXPECT_EQ(said.at("config").at("voxels"), "16");
+  const Said ofScene = run({"info", scene(), "--json"});
+  EXPECT_EQ(ofScene.exitCode, 0) << ofScene.err;
+  const json holds = json::parse(ofScene.out);
+  EXPECT_EQ(holds.at("kind"), "scene");
+  EXPECT_EQ(holds.at("level_0").at("contents"), 2);
+  EXPECT_EQ(holds.at("level_1").at("contents"), 1);
+  EXPECT_EQ(holds.at("surround").at("contents"), 1);
+  uintmax_t onDisk = 0;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(scene())) {
+    if (entry.path().extension() == ".glb") onDisk += entry.file_size();
+  }
+  const auto sum = [&](const char* what) {
+    int64_t bytes = 0;
+    for (const char* part : {"level_0", "level_1", "surround"}) bytes += holds.at(part).at(what).get<int64_t>();
+    return bytes;
+  };
+  EXPECT_EQ(sum("bytes_on_disk"), static_cast<int64_t>(onDisk));
+  EXPECT_GT(sum("bytes_in_memory"), static_cast<int64_t>(onDisk));
 }
 
 TEST_F(VolumeCommandLine, MeasuresWhatSkippingSavesAndAFlightWithASmallCache) {
@@ -179,6 +197,15 @@ TEST_F(VolumeCommandLine, RefusesBlocksThatAreNone) {
     EXPECT_EQ(said.exitCode, 2) << blocks << said.err;
     EXPECT_TRUE(contains(said.err, "--blocks")) << said.err;
   }
+  const std::string grid = (fs::path(model()) / "blocks.json").string();
+  const Said both = run({"train", at("city"), at("never"), "--method", "volume", "--blocks", "2x2", "--grid", grid});
+  EXPECT_EQ(both.exitCode, 2) << both.err;
+  const Said ofField = run({"train", at("city"), at("never"), "--method", "field", "--grid", grid});
+  EXPECT_EQ(ofField.exitCode, 2) << ofField.err;
+  EXPECT_TRUE(contains(ofField.err, "--grid")) << ofField.err;
+  const Said none = run({"train", at("city"), at("never"), "--method", "volume", "--grid", at("city/transforms.json")});
+  EXPECT_EQ(none.exitCode, 1) << none.err;
+  EXPECT_TRUE(contains(none.err, "holds no grid of blocks")) << none.err;
   EXPECT_FALSE(fs::exists(at("never")));
 }
 
@@ -214,6 +241,16 @@ TEST_F(VolumeCommandLine, ExportsASceneOfOneBlockForMerfsViewer) {
   explained(run({"export", at("one"), at("never"), "--format", "merf"}), "tessera bake");
   explained(run({"export", at("one.scene"), at("city"), "--format", "merf"}), "would be lost");
   EXPECT_FALSE(fs::exists(at("never")));
+}
+
+TEST_F(VolumeCommandLine, TrainsTheBlocksOfAnotherModel) {
+  std::vector<std::string> arguments = {
+      "train",   at("city"), at("again"), "--method", "volume", "--grid", (fs::path(model()) / "blocks.json").string(),
+      "--steps", "40"};
+  for (const std::string& setting : kTiny) arguments.insert(arguments.end(), {"--set", setting});
+  const Said said = run(arguments);
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_EQ(checkpoints(at("again")), checkpoints(model()));
 }
 
 TEST_F(VolumeCommandLine, ExplainsWhatIsWrongWithModelsAndScenes) {

@@ -6,8 +6,10 @@
 #include "base/error.h"
 #include "import/capture_reader.h"
 #include "import/importer.h"
+#include "render/volume_scene.h"
 #include "representations/field/train_field.h"
 #include "representations/volume/train_volume.h"
+#include "tiles/scene_folder.h"
 #include "train/run_folder.h"
 
 namespace tessera {
@@ -66,6 +68,40 @@ ordered_json describeModel(const fs::path& folder) {
   return info;
 }
 
+ordered_json sizeOf(uint64_t contents, uint64_t onDisk, uint64_t inMemory) {
+  return {{"contents", contents}, {"bytes_on_disk", onDisk}, {"bytes_in_memory", inMemory}};
+}
+
+ordered_json describeScene(const fs::path& folder) {
+  const Tileset tileset = readTileset(folder);
+  const VolumeScene scene = openVolumeScene(folder);
+  struct Sizes {
+    uint64_t contents = 0, onDisk = 0, inMemory = 0;
+  };
+  std::vector<Sizes> levels(tileset.levels);
+  Sizes surround;
+  for (size_t tile = 0; tile < tileset.tiles.size(); ++tile) {
+    for (const TileContent& content : tileset.tiles[tile].contents) {
+      Sizes& sizes = content.surround ? surround : levels[tileset.tiles[tile].level];
+      ++sizes.contents;
+      sizes.onDisk += fs::file_size(contentPath(folder, content.uri));
+      sizes.inMemory += scene.source.bytes(content.surround ? scene.tree.surround : static_cast<int>(tile));
+    }
+  }
+  ordered_json info = {
+      {"kind", "scene"},
+      {"representation", nameOf(tileset.representation)},
+      {"name", tileset.name},
+      {"blocks", {{"columns", tileset.columns}, {"rows", tileset.rows}, {"edge", tileset.blockGrid().edge}}}};
+  for (size_t level = 0; level < levels.size(); ++level) {
+    const Sizes& sizes = levels[level];
+    if (sizes.contents == 0) continue;  // a root that holds the others together
+    info[fmt::format("level_{}", level)] = sizeOf(sizes.contents, sizes.onDisk, sizes.inMemory);
+  }
+  if (surround.contents > 0) info["surround"] = sizeOf(surround.contents, surround.onDisk, surround.inMemory);
+  return info;
+}
+
 void printIndented(const ordered_json& info, int indent) {
   for (const auto& [key, value] : info.items()) {
     if (value.is_object()) {
@@ -85,22 +121,26 @@ void addInfoVerb(CLI::App& app) {
     bool json = false;
   };
   auto flags = std::make_shared<Flags>();
-  CLI::App* verb = app.add_subcommand("info", "what a folder is and holds: source, capture or model");
+  CLI::App* verb = app.add_subcommand("info", "what a folder is and holds: source, capture, model or scene");
   verb->footer("Example:\n  tessera info fox.model --json");
   verb->add_option("what", flags->what, "a folder")->required();
   verb->add_flag("--json", flags->json, "as one JSON object");
   verb->callback([flags] {
     const fs::path folder = flags->what;
-    if (!fs::is_directory(folder)) throw Error(flags->what, "", "is not a folder", "name a source, capture or model");
+    if (!fs::is_directory(folder))
+      throw Error(flags->what, "", "is not a folder", "name a source, capture, model or scene");
     ordered_json info;
     if (fs::exists(folder / "blocks.json")) {
       info = describeModel(folder);
+    } else if (fs::exists(folder / "tileset.json")) {
+      info = describeScene(folder);
     } else if (isCapture(folder)) {
       info = describeCapture(folder);
     } else {
       const std::string format = sourceFormat(folder);
       if (format.empty()) {
-        throw Error(flags->what, "", "holds nothing that tessera knows", "name a source, capture or model folder");
+        throw Error(flags->what, "", "holds nothing that tessera knows",
+                    "name a source, capture, model or scene folder");
       }
       info = {{"kind", "source"}, {"format", format}};
     }

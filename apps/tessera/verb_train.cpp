@@ -24,7 +24,7 @@ CLI::Validator amount(double low, double high) {
 }
 
 struct TrainFlags {
-  std::string method = "field", configFile, blocks = "auto";
+  std::string method = "field", configFile, blocks = "auto", grid;
   std::vector<std::string> settings;
   std::string seed, residentBlocks;
   DeviceOptions device;
@@ -56,11 +56,16 @@ VolumeConfig volumeDefaults(const TrainFlags& flags) {
 
 TrainingResult train(Device& device, const TrainFlags& flags) {
   const Capture capture = readCapture(flags.capture);
-  if (flags.method == "field")
+  if (flags.method == "field") {
+    if (!flags.grid.empty()) throw CLI::ValidationError("--grid", "is of --method volume");
     return trainField(device, capture, flags.model, {chosenConfig(flags, FieldConfig()), flags.loop});
+  }
   const std::optional<BlockCount> blocks = parseBlockCount(flags.blocks);
   if (!blocks) throw CLI::ValidationError("--blocks", "'" + flags.blocks + "' is neither auto nor of the form 2x2");
-  return trainVolume(device, capture, flags.model, {chosenConfig(flags, volumeDefaults(flags)), flags.loop, *blocks});
+  std::optional<BlockGrid> grid;
+  if (!flags.grid.empty()) grid = readGrid(flags.grid, capture);
+  return trainVolume(device, capture, flags.model,
+                     {chosenConfig(flags, volumeDefaults(flags)), flags.loop, *blocks, grid});
 }
 
 }  // namespace
@@ -85,8 +90,12 @@ void addTrainVerb(CLI::App& app) {
       ->check(amount(1e-3, 1e7))
       ->excludes(steps);
   verb->add_flag("--resume", flags->loop.resume, "go on with the model that is in the folder");
-  verb->add_option("--blocks", flags->blocks, "of --method volume: auto, or so many along x and y, as 3x2")
-      ->capture_default_str();
+  CLI::Option* blocks =
+      verb->add_option("--blocks", flags->blocks, "of --method volume: auto, or so many along x and y, as 3x2")
+          ->capture_default_str();
+  verb->add_option("--grid", flags->grid, "of --method volume: the blocks of this blocks.json, of another model")
+      ->check(CLI::ExistingFile)
+      ->excludes(blocks);
   verb->add_option("--resident-blocks", flags->residentBlocks,
                    "of --method volume: so many blocks in memory at once, the others on disk; the same as --set "
                    "resident_blocks=...")

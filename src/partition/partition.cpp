@@ -7,6 +7,14 @@
 #include "base/error.h"
 
 namespace tessera {
+namespace {
+
+BlockLayout givenLayout(const BlockGrid& grid) {
+  return {grid, DecidedBy::request,
+          fmt::format("{} x {} blocks, {:.4g} wide, as given", grid.columns, grid.rows, grid.edge)};
+}
+
+}  // namespace
 
 bool Partition::isThin(int cell) const {
   const auto found = std::lower_bound(thin.begin(), thin.end(), cell,
@@ -23,8 +31,9 @@ Partition partitionCapture(const Capture& capture, const PartitionOptions& optio
   partition.ground = findGround(capture);
   partition.region = findRegion(capture, partition.ground);
   partition.heights = findHeights(capture, partition.ground, partition.region);
-  const BlockLayout layout =
-      layOutBlocks(partition.ground, partition.region, partition.heights, options.blocks, options.limits);
+  const BlockLayout layout = options.grid ? givenLayout(*options.grid)
+                                          : layOutBlocks(partition.ground, partition.region, partition.heights,
+                                                         options.blocks, options.limits);
   partition.grid = layout.grid;
   partition.decidedBy = layout.decidedBy;
   partition.coverage =

@@ -1,6 +1,8 @@
 // A capture cut into blocks on the ground (City-on-Web, sections 3.1 and 4.1).
 #pragma once
 
+#include <optional>
+
 #include "partition/block_layout.h"
 #include "partition/coverage.h"
 
@@ -8,6 +10,7 @@ namespace tessera {
 
 struct PartitionOptions {
   BlockCount blocks;
+  std::optional<BlockGrid> grid;  // of these cells, whatever `blocks` and `limits` say
   BlockLimits limits;
   Sufficiency enough;
   DepthOf depthOf;  // optional: where rays end; see coverage.h

@@ -33,6 +33,21 @@ TEST(Partition, CutsATownIntoBlocksThatHoldIt) {
   }
 }
 
+TEST(Partition, TakesTheCellsThatAreGiven) {
+  BlockGrid grid = partitionCapture(town(), {.blocks = {false, 2, 2}}).grid;
+  const std::vector<CellCoverage> whole = partitionCapture(town(), {.grid = grid}).coverage;
+  const Vec2d corner = grid.centre(3);
+  grid.originInWorld = grid.inWorld({corner.x(), corner.y(), 0});
+  grid.columns = grid.rows = 1;
+  const Partition partition = partitionCapture(town(), {.blocks = {false, 5, 5}, .grid = grid});
+  EXPECT_EQ(partition.grid.originInWorld, grid.originInWorld);
+  EXPECT_EQ(partition.grid.edge, grid.edge);
+  ASSERT_EQ(partition.coverage.size(), 1u);
+  EXPECT_EQ(partition.coverage[0].pixels, whole[3].pixels);
+  EXPECT_GT(partition.coverage[0].pixelsBeyond, whole[3].pixelsBeyond) << "those of its neighbours";
+  EXPECT_NE(partition.notes[2].find("as given"), std::string::npos) << partition.notes[2];
+}
+
 TEST(Partition, IsTheSameTwice) {
   const Partition a = partitionCapture(town(), {}), b = partitionCapture(town(), {});
   EXPECT_EQ(a.grid.originInWorld, b.grid.originInWorld);

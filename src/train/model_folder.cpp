@@ -25,6 +25,16 @@ json parseJson(const fs::path& path) {
   return parsed;
 }
 
+Mat4d sourceFromWorldIn(const json& placement) {
+  Mat4d matrix;
+  for (int i = 0; i < 16; ++i) matrix(i / 4, i % 4) = placement.at("source_from_world").at(i).get<double>();
+  return matrix;
+}
+
+bool isSameWorld(const Mat4d& a, const Mat4d& b) {
+  return (a - b).norm() <= 1e-9 * b.norm();
+}
+
 }  // namespace
 
 std::optional<ModelManifest> ModelFolder::manifest() const {
@@ -138,8 +148,7 @@ ModelPlacement ModelFolder::readPlacement() const {
       }
       placement.frame.scale = block.at("scale").get<double>();
     }
-    for (int i = 0; i < 16; ++i)
-      placement.sourceFromWorld(i / 4, i % 4) = parsed.at("source_from_world").at(i).get<double>();
+    placement.sourceFromWorld = sourceFromWorldIn(parsed);
     placement.capture = parsed.at("capture").get<std::string>();
     placement.trainedOn = parsed.at("trained_on").get<std::vector<std::string>>();
     return placement;
@@ -187,10 +196,27 @@ void ModelFolder::cutMetrics(int64_t step) const {
   writeFileAtomically(metricsPath(), kept);
 }
 
+BlockGrid readGrid(const fs::path& file, const Capture& capture) {
+  constexpr const char* kRemedy = "name the blocks.json of a model of --method volume";
+  const json parsed = json::parse(readTextFile(file), nullptr, false);
+  if (!parsed.is_object() || !parsed.contains("grid"))
+    throw Error(file.string(), "grid", "the file holds no grid of blocks", kRemedy);
+  const std::optional<BlockGrid> grid = blockGridFromJson(parsed["grid"]);
+  if (!grid) throw Error(file.string(), "grid", "is no grid of blocks", kRemedy);
+  if (!parsed.contains("source_from_world")) return *grid;
+  try {
+    if (isSameWorld(capture.sourceFromWorld, sourceFromWorldIn(parsed))) return *grid;
+  } catch (const json::exception& error) {
+    throw Error(file.string(), "source_from_world", error.what(), kRemedy);
+  }
+  throw Error(file.string(), "source_from_world",
+              "its world is not the one of the capture " + capture.root.string() + ": the blocks would lie elsewhere",
+              "import both captures from the same source, or let the capture be cut by --blocks");
+}
+
 void requireSameWorld(const ModelFolder& model, const Capture& capture) {
   const ModelPlacement placement = model.readPlacement();
-  const double off = (capture.sourceFromWorld - placement.sourceFromWorld).norm();
-  if (off <= 1e-9 * placement.sourceFromWorld.norm()) return;
+  if (isSameWorld(capture.sourceFromWorld, placement.sourceFromWorld)) return;
   throw Error(capture.root.string(), "transforms.json",
               fmt::format("its world is not the one of {}, which was trained on {}", model.root().string(),
                           placement.capture.string()),

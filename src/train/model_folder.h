@@ -67,6 +67,10 @@ class ModelFolder {
   fs::path root_;
 };
 
+// The grid of a blocks.json, to cut `capture` by; any JSON object with such a grid will do. Throws Error when the file
+// holds none, or says that it lies in another world than the capture's (source_from_world).
+BlockGrid readGrid(const fs::path& file, const Capture& capture);
+
 // Throws Error when the capture's world is not the one that the model lies in: poses would mean other places.
 void requireSameWorld(const ModelFolder& model, const Capture& capture);
 // Throws Error also when the model was trained on other photos.

@@ -198,6 +198,38 @@ TEST(ModelFolder, RefusesPlacementsThatItCannotUnderstand) {
   }
 }
 
+TEST(ModelFolder, GivesItsGridToOthersOfTheSameWorld) {
+  const TestFolder folder;
+  const ModelFolder model(folder.path());
+  Capture capture;
+  capture.root = "flight";
+  capture.sourceFromWorld(0, 3) = 500000.25;
+  ModelPlacement placement;
+  placement.sourceFromWorld = capture.sourceFromWorld;
+  placement.grid = BlockGrid{{1.0 / 3, 2, 3}, Mat3d::Identity(), 7, 3, 2, -1, 2};
+  model.writePlacement(placement, "volume");
+  const fs::path file = folder / "blocks.json";
+  const BlockGrid grid = readGrid(file, capture);
+  EXPECT_EQ(grid.originInWorld, placement.grid->originInWorld);
+  EXPECT_EQ(grid.columns, 3);
+  EXPECT_EQ(grid.rows, 2);
+  capture.sourceFromWorld(0, 3) += 0.25;
+  EXPECT_TRUE(contains(errorOf([&] { readGrid(file, capture); }), "the capture flight"));
+
+  nlohmann::json alone = nlohmann::json::parse(readTextFile(file));
+  alone.erase("source_from_world");
+  writeFileAtomically(file, alone.dump());
+  EXPECT_EQ(readGrid(file, capture).edge, 7) << "it names no world";
+  alone["grid"]["edge"] = -7;
+  writeFileAtomically(file, alone.dump());
+  EXPECT_TRUE(contains(errorOf([&] { readGrid(file, capture); }), "is no grid of blocks"));
+  for (const char* text : {"", "[]", "{}", "no JSON", R"({"blocks": []})"}) {
+    writeFileAtomically(file, text);
+    EXPECT_TRUE(contains(errorOf([&] { readGrid(file, capture); }), "holds no grid of blocks")) << text;
+  }
+  EXPECT_TRUE(contains(errorOf([&] { readGrid(folder / "nowhere", capture); }), "nowhere"));
+}
+
 TEST(ModelFolder, RemembersItsPlan) {
   const TestFolder folder;
   const ModelFolder model(folder.path());

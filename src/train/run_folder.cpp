@@ -17,11 +17,12 @@ void refuseCaptureFolder(const fs::path& model) {
 }
 
 // The rest of what a run is made of stands in blocks.json (which capture) and manifest.json (how many steps).
-std::string howToRepeat(const Device& device, const TrainingLoopOptions& loop) {
+std::string howToRepeat(const Device& device, const TrainingLoopOptions& loop, const std::string& flags) {
   return fmt::format(
-      "# tessera train CAPTURE MODEL --method {} --config THIS_FILE --steps {}\n"
+      "# tessera train CAPTURE MODEL --method {}{} --config THIS_FILE --steps {}\n"
       "# CAPTURE: see blocks.json. Computed on {}.\n\n",
-      loop.method, loop.minutes > 0 ? "PLANNED_STEPS_OF_manifest.json" : std::to_string(loop.steps), device.target());
+      loop.method, flags, loop.minutes > 0 ? "PLANNED_STEPS_OF_manifest.json" : std::to_string(loop.steps),
+      device.target());
 }
 
 double settledPhotoBudget(double wanted, const Capture& capture, int64_t usableMemory) {

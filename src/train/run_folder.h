@@ -10,8 +10,8 @@ namespace tessera {
 // Throws Error when `model` holds a capture or photos: a model written there would be taken for part of it.
 void refuseCaptureFolder(const fs::path& model);
 
-// The first lines of config.toml.
-std::string howToRepeat(const Device& device, const TrainingLoopOptions& loop);
+// The first lines of config.toml. `flags`: more of them, as " --grid blocks.json".
+std::string howToRepeat(const Device& device, const TrainingLoopOptions& loop, const std::string& flags = {});
 
 // The photo budget in MiB to train with: `wanted` if it is set; else half of `usableMemory` (bytes) where all training
 // photos, decoded, would take more than that, which it says; else 0, no limit.

@@ -1,11 +1,13 @@
 #include "representations/volume/train_volume.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/log.h"
 #include "base/memory.h"
 #include "partition/block_map.h"
+#include "scene/block_grid_json.h"
 #include "train/run_folder.h"
 
 namespace tessera {
@@ -19,6 +21,7 @@ constexpr const char* kWaiting = "waiting";
 BlockGrid cut(const Capture& capture, const fs::path& model, const TrainVolumeOptions& options) {
   PartitionOptions partitioning;
   partitioning.blocks = options.blocks;
+  partitioning.grid = options.grid;
   partitioning.limits.texelsPerEdge = options.config.planes;
   partitioning.limits.bytesPerBlock = trainingBytesPerBlock(options.config);
   partitioning.limits.memoryBudget = kMemoryShare * static_cast<double>(usableMemoryBytes());
@@ -81,7 +84,8 @@ void sayWhatMemoryItTakes(VolumeTrainer& trainer, const Capture& capture, const 
 void writeRun(Device& device, const ModelFolder& folder, const Capture& capture, const BlockGrid& grid,
               VolumeConfig config, const TrainingLoopOptions& loop) {
   if (folder.manifest()) return;
-  writeFileAtomically(folder.configPath(), howToRepeat(device, loop) + configToToml(config.fields()));
+  writeFileAtomically(folder.configPath(),
+                      howToRepeat(device, loop, " --grid blocks.json") + configToToml(config.fields()));
   folder.writePlacement({{}, grid, capture.sourceFromWorld, capture.root, trainingNames(capture)}, loop.method);
 }
 
@@ -103,6 +107,12 @@ bool trainLevel(Device& device, const Capture& capture, const fs::path& model, u
   return runTraining(trainer, folder, loop).finished;
 }
 
+void requireSameGrid(const ModelFolder& folder, const BlockGrid& has, const BlockGrid& wanted) {
+  if (blockGridToJson(has) == blockGridToJson(wanted)) return;
+  throw Error((folder.root() / "blocks.json").string(), "grid", "the run has other blocks than those of --grid",
+              "resume without --grid, or train into another folder");
+}
+
 }  // namespace
 
 TrainingResult trainVolume(Device& device, const Capture& capture, const fs::path& model, TrainVolumeOptions options) {
@@ -114,6 +124,7 @@ TrainingResult trainVolume(Device& device, const Capture& capture, const fs::pat
   options.config.photoBudgetMiB = settledPhotoBudget(options.config.photoBudgetMiB, capture, usableMemoryBytes());
   // A resumed run stands where the killed one stood, whatever has become of the capture's points since.
   const BlockGrid grid = goingOn ? requireGrid(folder) : cut(capture, model, options);
+  if (options.grid) requireSameGrid(folder, grid, *options.grid);
   TrainingResult result;
   {
     VolumeTrainer trainer(device, capture, options.config, grid, folder.root() / kWaiting);

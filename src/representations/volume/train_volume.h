@@ -10,13 +10,15 @@ struct TrainVolumeOptions {
   VolumeConfig config;
   TrainingLoopOptions loop;
   BlockCount blocks;
+  std::optional<BlockGrid> grid;  // of these blocks, whatever `blocks` says
 };
 
-// Cuts the capture into blocks (blocks.json, blocks.svg, blocks.geojson), warns of those that will not come out well,
-// trains, resumes, saves; see training_loop.h. Writes config.toml and blocks.json first. Then the coarser levels of
-// detail (City-on-Web, section 4.4), up to one that holds all: each begins with the fields of the one below, trains new
-// deferred networks for what it merges, then all together through virtual grids of half the resolution. The result
-// counts the finest level's steps; it is finished when all levels are.
+// Cuts the capture into blocks, or takes those that are given (blocks.json, blocks.svg, blocks.geojson), warns of those
+// that will not come out well, trains, resumes, saves; see training_loop.h. Writes config.toml and blocks.json first.
+// Then the coarser levels of detail (City-on-Web, section 4.4), up to one that holds all: each begins with the fields
+// of the one below, trains new deferred networks for what it merges, then all together through virtual grids of half
+// the resolution. The result counts the finest level's steps; it is finished when all levels are. Throws Error when a
+// resumed run has other blocks than those that are given.
 TrainingResult trainVolume(Device& device, const Capture& capture, const fs::path& model, TrainVolumeOptions options);
 
 // The folder of a level's model: the model's own for the finest, MODEL/levels/<level> for those above.

@@ -116,6 +116,25 @@ TEST(TrainVolume, GoesOnWhereItWasStopped) {
   EXPECT_EQ(checkpoints(scene / "model"), checkpoints(scene / "unbroken"));
 }
 
+TEST(TrainVolume, TakesTheBlocksOfAnotherModel) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  trainVolume(*device, scene.capture(), scene / "first", options(3));
+  TrainVolumeOptions given = options(3);
+  given.blocks = *parseBlockCount("1x1");
+  given.grid = readGrid(scene / "first/blocks.json", scene.capture());
+  trainVolume(*device, scene.capture(), scene / "second", given);
+  EXPECT_EQ(checkpoints(scene / "second"), checkpoints(scene / "first"));
+  EXPECT_EQ(readTextFile(scene / "second/blocks.json"), readTextFile(scene / "first/blocks.json"));
+  EXPECT_TRUE(fs::exists(scene / "second/blocks.svg"));
+
+  TrainVolumeOptions others = options(3, true);
+  others.grid = given.grid;
+  EXPECT_TRUE(trainVolume(*device, scene.capture(), scene / "second", others).finished);
+  others.grid->edge *= 2;
+  EXPECT_THROW(trainVolume(*device, scene.capture(), scene / "second", others), Error) << "resumed with other blocks";
+}
+
 TEST(TrainVolume, SaysWhatIsWrongWithAFolder) {
   CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});

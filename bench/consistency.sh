@@ -1,0 +1,131 @@
+#!/usr/bin/env bash
+# City-on-Web's ablation (table 5) on the processor, in a made city of 2x2 blocks; all models take equal steps, and baked
+# scenes are judged.
+#   consistency  blocks trained together against blocks trained apart, each on all photos with a surround of its own, and
+#                merged. The merged model is given the surround of the joint one.
+#   resolution   four blocks against one block of their size together, with twice the resolution along each axis, tables
+#                four times as large, and every distance that settings measure in blocks halved.
+# Resumable: all is kept in build/bench/consistency, and what is there is not made again.
+#   [ROWS="consistency resolution"] [SEEDS="1 2 3"] [STEPS=2500] [CITY="--size 400x300"] bench/consistency.sh
+set -euo pipefail
+source "$(dirname "$0")/setup.sh"
+need_tessera
+programs=$(dirname "$tessera")/../../bench
+for program in merge_blocks border_error; do
+  [ -x "$programs/$program" ] || die "$programs/$program: not built; run: cmake --build --preset release"
+done
+work=$out/consistency
+seeds=${SEEDS:-1 2 3}
+settings="STEPS=${STEPS:-2500} CITY='${CITY:-}'"
+mkdir -p "$work"
+[ -e "$work/settings" ] || echo "$settings" > "$work/settings"
+[ "$(cat "$work/settings")" = "$settings" ] || die "$work was made with $(cat "$work/settings"): repeat those, or remove it"
+[ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2 ${CITY:-}
+
+# volume MODEL SEED ARGUMENTS...
+volume() {
+  local model=$1 seed=$2
+  shift 2
+  trained "$model" city --method volume --seed "$seed" --steps "${STEPS:-2500}" --set level_share=0 "$@"
+}
+joint() { volume "joint-$1" "$1" --blocks 2x2; }
+# grid NAME JQ: $work/NAME.json, the joint blocks changed. The capture decides them, whatever the seed.
+grid() { jq "$2" "$work/joint-${seeds%% *}/blocks.json" > "$work/$1.json"; }
+# scene MODEL: baked from it, and judged as a whole and along the joint blocks' walls.
+scene() {
+  baked "$1" "$1-scene" city
+  judged "$1-scene" city > /dev/null
+  [ -s "$work/$1-border.json" ] ||
+    "$programs/border_error" "$work/$1-scene" "$work/city" "$work/joint-${seeds%% *}/blocks.json" > "$work/border.partial"
+  [ -s "$work/$1-border.json" ] || mv "$work/border.partial" "$work/$1-border.json"
+}
+# value FILE EXPRESSION [DIGITS]
+value() { jq -r "$2 | . * pow(10; ${3:-3}) | round / pow(10; ${3:-3})" "$work/$1"; }
+border() {
+  local of=$1-border.json
+  echo "$1: $(value "$1-scene.json" .psnr 2) dB; mean squared error at walls $(value "$of" .border.mse 5)," \
+    "elsewhere in blocks $(value "$of" .interior.mse 5), ratio $(value "$of" .mse_ratio), of roots $(value "$of" .rmse_ratio)"
+}
+# interval NUMBERS...: mean and the ends of its 95 % interval (Student's t).
+interval() {
+  awk 'BEGIN {
+    split("12.706 4.303 3.182 2.776 2.571 2.447 2.365 2.306 2.262", t, " ")
+    n = ARGC - 1
+    for (i = 1; i <= n; ++i) sum += ARGV[i]
+    for (i = 1; i <= n; ++i) squares += (ARGV[i] - sum / n) ^ 2
+    half = n > 1 && n < 11 ? t[n - 1] * sqrt(squares / (n - 1) / n) : 99
+    printf "%.3f %.3f %.3f\n", sum / n, sum / n - half, sum / n + half
+  }' "$@"
+}
+
+consistency() {
+  local seed block apart gains="" ratios="" mean low high ratio
+  for seed in $seeds; do
+    joint "$seed"
+    apart=()
+    for block in 0 1 2 3; do
+      grid "block-$block" ".grid.origin = .blocks[$block].centre | .grid.columns = 1 | .grid.rows = 1"
+      volume "apart-$seed-$block" "$seed" --grid "$work/block-$block.json"
+      apart+=("$work/apart-$seed-$block")
+    done
+    [ -e "$work/merged-$seed/manifest.json" ] ||
+      "$programs/merge_blocks" "$work/joint-$seed" "$work/merged-$seed" "${apart[@]}"
+    scene "joint-$seed"
+    scene "merged-$seed"
+    border "joint-$seed"
+    border "merged-$seed"
+    gains+=" $(shortfall "$(jq .psnr "$work/joint-$seed-scene.json")" "$(jq .psnr "$work/merged-$seed-scene.json")")"
+    ratios+=" $(jq .rmse_ratio "$work/joint-$seed-border.json")"
+  done
+  read -r mean low high <<< "$(interval $gains)"
+  read -r ratio _ <<< "$(interval $ratios)"
+  echo "together less apart: $mean dB, 95 % interval $low to $high (seeds $seeds)"
+  verdict "blocks trained together less apart, held-out PSNR of the scenes in dB" "$mean" '>=' 0.3
+  verdict "the lower end of its 95 % interval" "$low" '>=' 0
+  verdict "trained together: error at walls as a share of that in the blocks, mean of seeds" "$ratio" '<=' 1.05
+}
+
+# seconds SCENE: a frame's, the median view (the first view loads the tiles).
+seconds() {
+  alone "$tessera" eval "$work/$1" "$work/city" --json "$work/seconds.json" --report "$work/seconds.html" > /dev/null
+  jq '[.views[].seconds] | sort | .[length / 2 | floor]' "$work/seconds.json"
+}
+# share FOUR ONE EXPRESSION: of what `info` says of the scenes.
+share() {
+  awk -v a="$(jq "$3" "$work/$1-info.json")" -v b="$(jq "$3" "$work/$2-info.json")" 'BEGIN { printf "%.3f\n", a / b }'
+}
+
+resolution() {
+  local seed=${seeds%% *} four one round fastest_four=1e9 fastest_one=1e9 what whole
+  four=joint-$seed one=whole-$seed
+  joint "$seed"
+  grid whole '.grid.edge *= 2 | .grid.columns = 1 | .grid.rows = 1'
+  volume "$one" "$seed" --grid "$work/whole.json" --set voxels=256 --set planes=1024 --set grid_log2_size=19 \
+    --set grid_finest=1024 --set proposal_log2_size=16 --set proposal_finest=256 --set near=0.025 \
+    --set full_gradient_distance=0.5
+  for what in "$four" "$one"; do
+    scene "$what"
+    border "$what"
+    "$tessera" info "$work/$what-scene" --json > "$work/$what-info.json"
+  done
+  for round in 1 2 3; do
+    fastest_four=$(awk -v a="$fastest_four" -v b="$(seconds "$four-scene")" 'BEGIN { print a < b ? a : b }')
+    fastest_one=$(awk -v a="$fastest_one" -v b="$(seconds "$one-scene")" 'BEGIN { print a < b ? a : b }')
+  done
+  for what in "$four" "$one"; do
+    echo "$what: $(jq -r '"blocks \(.level_0.bytes_in_memory) bytes in memory, \(.level_0.bytes_on_disk) on disk; " +
+      "surround \(.surround.bytes_in_memory) and \(.surround.bytes_on_disk)"' "$work/$what-info.json")"
+  done
+  verdict "four blocks less one of twice the resolution, held-out PSNR in dB" \
+    "$(shortfall "$(jq .psnr "$work/$four-scene.json")" "$(jq .psnr "$work/$one-scene.json")")" '>=' 0
+  whole=.bytes_in_memory
+  verdict "their memory as a share, without surrounds" "$(share "$four" "$one" .level_0$whole)" '<=' 1
+  verdict "with surrounds" "$(share "$four" "$one" ".level_0$whole + .surround$whole")" '<=' 1
+  verdict "their bytes on disk as a share, without surrounds" "$(share "$four" "$one" .level_0.bytes_on_disk)" '<=' 1
+  echo "a frame in $fastest_four s, of the one block in $fastest_one s"
+  verdict "their time a frame as a share" \
+    "$(awk -v a="$fastest_four" -v b="$fastest_one" 'BEGIN { printf "%.3f\n", a / b }')" '<=' 1
+}
+
+for row in ${ROWS:-consistency resolution}; do "$row"; done
+finish
