@@ -13,14 +13,14 @@ need_tessera
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# made BLOCKS SIZE ARGUMENTS...: $scene and $capture, of a city trained with these arguments.
+# made BLOCKS SIZE STRIDE ARGUMENTS...: $scene and $capture, of a city trained with these arguments, baked with that stride.
 made() {
-  local blocks=$1 size=$2
-  shift 2
+  local blocks=$1 size=$2 stride=$3
+  shift 3
   scene=$work/$blocks.scene capture=$work/$blocks.city
   "$tessera" synth city "$capture" --blocks "$blocks" --size "$size" --samples 1
   "$tessera" train "$capture" "$work/$blocks.model" --method volume --blocks "$blocks" "$@"
-  "$tessera" bake "$work/$blocks.model" "$scene" --stride 2 --effort 0
+  "$tessera" bake "$work/$blocks.model" "$scene" --stride "$stride" --effort 0
 }
 
 skipping() {
@@ -28,7 +28,7 @@ skipping() {
   if [ -n "${1:-}" ]; then
     scene=$1 capture=$2
   elif [ ! -e "$scene/tileset.json" ]; then
-    made 2x2 320x240 --minutes "${MINUTES:-4}" --set level_share=0
+    made 2x2 320x240 1 --minutes "${MINUTES:-4}" --set level_share=0
   fi
   alone "$tessera" bench render "$scene" --views "$capture" --json "$out/skipping.json"
   value() { jq "$1" "$out/skipping.json"; }
@@ -40,7 +40,7 @@ skipping() {
 }
 
 flight() {
-  if [ -n "${1:-}" ]; then scene=$1; else made 4x4 160x120 --steps 60; fi
+  if [ -n "${1:-}" ]; then scene=$1; else made 4x4 160x120 4 --steps 60; fi
   alone "$tessera" bench render "$scene" --flight --steps 600 --share 0.25 --json "$out/flight.json"
   value() { jq "$1" "$out/flight.json"; }
   verdict "cache, most held as a share of its budget" "$(value '.cache.share.most_bytes / .cache.share.budget_bytes * 1000 | round / 1000')" '<=' 1
