@@ -1,40 +1,61 @@
 #!/usr/bin/env bash
-# Drawing a scene of blocks on the processor. Skipping empty space: the very same samples, at least five times fewer steps,
-# the same picture to 1/255. A flight of 600 pictures over all blocks with a cache of a quarter of the finest level: never
-# over the budget, never without the coarsest level, and the picture that an unbounded cache gives wherever all that the
-# view asks for is there.
-#   [STEPS=2000] bench/rendering.sh [SCENE CAPTURE]     default: a city of 4x4 made here; STEPS train it
+# Drawing a scene of blocks on the processor.
+#   skipping  held-out views of a trained city of 2x2, with empty space skipped and without: the very same samples, at
+#             least five times fewer steps, the same picture to 1/255. Of bench/volume.sh where that has been run
+#   flight    600 pictures over all blocks of a city of 4x4, hardly trained, with a cache of a quarter of the finest level:
+#             never over the budget, never without the coarsest level, and wherever all that the view asks for is there,
+#             the picture that a cache without a budget gives
+#   [ROWS="skipping flight"] [MINUTES=4] bench/rendering.sh [SCENE CAPTURE]     both rows of this scene instead
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
-if [ $# -eq 0 ]; then
-  work=$(mktemp -d)
-  trap 'rm -rf "$work"' EXIT
-  scene=$work/scene capture=$work/city
-  "$tessera" synth city "$capture" --blocks 4x4 --size 160x120 --samples 1
-  "$tessera" train "$capture" "$work/model" --method volume --blocks 4x4 --steps "${STEPS:-2000}"
-  "$tessera" bake "$work/model" "$scene" --capture "$capture"
-else
-  [ $# -eq 2 ] || die "usage: bench/rendering.sh [SCENE CAPTURE]"
-  scene=$1 capture=$2
-fi
-alone "$tessera" bench render "$scene" --views "$capture" --flight --steps 600 --share 0.25 --json "$out/rendering.json"
+[ $# -eq 0 ] || [ $# -eq 2 ] || die "usage: bench/rendering.sh [SCENE CAPTURE]"
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
 
-value() { jq "$1" "$out/rendering.json"; }
-echo "rays per second, M: $(value '.skipping.skipping.rays_per_second / 1e4 | round / 100') with skipping," \
-  "$(value '.skipping.whole.rays_per_second / 1e4 | round / 100') without"
-verdict "samples evaluated without skipping more or fewer than with" \
-  "$(value '.skipping.whole.samples - .skipping.skipping.samples | fabs')" '<=' 0
-verdict "steps without skipping, times those with" "$(value '.skipping.whole.steps / .skipping.skipping.steps * 100 | round / 100')" '>=' 5
-verdict "pictures with and without skipping apart, in 1/255" "$(value '.skipping.largest_difference * 255')" '<=' 1
-verdict "cache, most bytes held as a share of the budget" "$(value '.cache.share.most_bytes / .cache.share.budget_bytes * 10000 | round / 10000')" '<=' 1
-for run in share all; do
-  verdict "cache of $run, steps over budget" "$(value ".cache.$run.steps_over_budget")" '<=' 0
-  verdict "cache of $run, steps without the coarsest level" "$(value ".cache.$run.steps_without_coarsest")" '<=' 0
-  verdict "cache of $run, steps whose cut is no partition" "$(value ".cache.$run.steps_without_partition")" '<=' 0
-  verdict "cache of $run, steps unlike an unbounded cache's of $(value ".cache.$run.steps_in_full") where all was there" \
-    "$(value ".cache.$run.steps_unlike_unbounded")" '<=' 0
-done
-verdict "cache of all, steps where all was there" "$(value .cache.all.steps_in_full)" '>=' "$(value .cache.steps)"
-verdict "cache of share, evictions" "$(value .cache.share.evictions)" '>=' 1
+# made BLOCKS SIZE STRIDE ARGUMENTS...: $scene and $capture, of a city trained with these arguments, baked with that stride.
+made() {
+  local blocks=$1 size=$2 stride=$3
+  shift 3
+  scene=$work/$blocks.scene capture=$work/$blocks.city
+  "$tessera" synth city "$capture" --blocks "$blocks" --size "$size" --samples 1
+  "$tessera" train "$capture" "$work/$blocks.model" --method volume --blocks "$blocks" "$@"
+  "$tessera" bake "$work/$blocks.model" "$scene" --stride "$stride" --effort 0
+}
+
+skipping() {
+  scene=$out/volume/city-scene capture=$out/volume/city
+  if [ -n "${1:-}" ]; then
+    scene=$1 capture=$2
+  elif [ ! -e "$scene/tileset.json" ]; then
+    made 2x2 320x240 1 --minutes "${MINUTES:-4}" --set level_share=0
+  fi
+  alone "$tessera" bench render "$scene" --views "$capture" --json "$out/skipping.json"
+  value() { jq "$1" "$out/skipping.json"; }
+  echo "rays per second, M: $(value '.skipping.skipping.rays_per_second / 1e3 | round / 1000') with skipping," \
+    "$(value '.skipping.whole.rays_per_second / 1e3 | round / 1000') without"
+  verdict "skipping, samples more or fewer than without" "$(value '.skipping.whole.samples - .skipping.skipping.samples | fabs')" '<=' 0
+  verdict "skipping, times fewer steps" "$(value '.skipping.whole.steps / .skipping.skipping.steps * 100 | round / 100')" '>=' 5
+  verdict "skipping, pictures apart by, in 1/255" "$(value '.skipping.largest_difference * 255')" '<=' 1
+}
+
+flight() {
+  if [ -n "${1:-}" ]; then scene=$1; else made 4x4 160x120 4 --steps 60; fi
+  alone "$tessera" bench render "$scene" --flight --steps 600 --share 0.25 --json "$out/flight.json"
+  value() { jq "$1" "$out/flight.json"; }
+  verdict "cache, most held as a share of its budget" "$(value '.cache.share.most_bytes / .cache.share.budget_bytes * 1000 | round / 1000')" '<=' 1
+  verdict "cache, evictions" "$(value .cache.share.evictions)" '>=' 1
+  verdict "cache for all, pictures with all that the view asks for" "$(value .cache.all.steps_in_full)" '>=' "$(value .cache.steps)"
+  local run name
+  for run in share all; do
+    name=$([ $run = share ] && echo cache || echo "cache for all")
+    verdict "$name, pictures over its budget" "$(value ".cache.$run.steps_over_budget")" '<=' 0
+    verdict "$name, pictures without the coarsest level" "$(value ".cache.$run.steps_without_coarsest")" '<=' 0
+    verdict "$name, pictures of a cut that is no partition" "$(value ".cache.$run.steps_without_partition")" '<=' 0
+    verdict "$name, unlike without a budget, of $(value ".cache.$run.steps_in_full") pictures where all was there" \
+      "$(value ".cache.$run.steps_unlike_unbounded")" '<=' 0
+  done
+}
+
+for row in ${ROWS:-skipping flight}; do "$row" "$@"; done
 finish
