@@ -56,7 +56,10 @@ struct VolumePart {
 };
 
 struct VolumeContent {
+  static constexpr uint32_t kMostStepsPerTexel = 8;
+
   float featureRange = 7, densityRange = 14;
+  uint32_t stepsPerTexel = 1;  // of a renderer, per texel of the planes
   // 34 → … → 3. Inputs: composited diffuse colour (3) and features (4) of all parts together, then of the direction d
   // of the ray (grid axes, unit) d, sin(2^k d) and cos(2^k d), k = 0 … 3, per k all three components, the sines first.
   std::vector<DenseLayer> network;

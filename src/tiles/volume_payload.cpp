@@ -28,6 +28,7 @@ class VolumeWriter {
                  {"densityRange", content_.densityRange},
                  {"network", network()},
                  {"parts", Json::array()}};
+    if (content_.stepsPerTexel != 1) ours["stepsPerTexel"] = content_.stepsPerTexel;
     for (const VolumePart& part : content_.parts) ours["parts"].push_back(partOf(part));
     return file_.finish(Representation::volume, ours);
   }

@@ -24,6 +24,7 @@ using tiles_test::madePart;
 void expectSame(const VolumeContent& a, const VolumeContent& b) {
   EXPECT_EQ(a.featureRange, b.featureRange);
   EXPECT_EQ(a.densityRange, b.densityRange);
+  EXPECT_EQ(a.stepsPerTexel, b.stepsPerTexel);
   ASSERT_EQ(a.network.size(), b.network.size());
   for (size_t i = 0; i < a.network.size(); ++i) {
     EXPECT_EQ(a.network[i].inputs, b.network[i].inputs);
@@ -172,6 +173,8 @@ TEST(VolumePayload, NamesTheRuleThatIsBroken) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   names("a range is out of bounds", [](VolumeContent& c) { c.featureRange = 0; });
   names("a range is out of bounds", [&](VolumeContent& c) { c.densityRange = nan; });
+  names("the steps per texel are out of bounds", [](VolumeContent& c) { c.stepsPerTexel = 0; });
+  names("the steps per texel are out of bounds", [](VolumeContent& c) { c.stepsPerTexel = 9; });
   names("the network has no layers, or too many", [](VolumeContent& c) { c.network.clear(); });
   names("the network's layers do not follow one another", [](VolumeContent& c) { c.network[1].inputs = 15; });
   names("the network's layers have not the numbers that they need",
@@ -280,6 +283,9 @@ TEST_F(VolumeRefusal, OfNetworksThatDoNotFit) {
 
 TEST_F(VolumeRefusal, OfHeadersThatLie) {
   refuses("has no ranges", [](json& asset) { ours(asset)["featureRange"] = "7"; });
+  refuses("its steps per texel are out of bounds", [](json& asset) { ours(asset)["stepsPerTexel"] = 9; });
+  refuses("its steps per texel are out of bounds", [](json& asset) { ours(asset)["stepsPerTexel"] = 1.5; });
+  refuses("the steps per texel are out of bounds", [](json& asset) { ours(asset)["stepsPerTexel"] = 0; });
   refuses("has no parts", [](json& asset) { ours(asset)["parts"] = json::array(); });
   refuses("part 0: its header", [](json& asset) { part(asset)["voxels"] = 0; });
   refuses("part 0: its header", [](json& asset) { part(asset)["voxels"] = 17; });

@@ -86,6 +86,11 @@ class VolumeReader {
     if (!features || !density) return fail("has no ranges to dequantise with");
     content_.featureRange = static_cast<float>(*features);
     content_.densityRange = static_cast<float>(*density);
+    if (const json* steps = fieldOf(file_.ours, "stepsPerTexel")) {
+      const auto number = unsignedFrom(*steps, VolumeContent::kMostStepsPerTexel);
+      if (!number) return fail("its steps per texel are out of bounds");
+      content_.stepsPerTexel = static_cast<uint32_t>(*number);
+    }
     return true;
   }
 

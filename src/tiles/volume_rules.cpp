@@ -102,6 +102,9 @@ std::optional<std::string> brokenRule(const VolumeContent& content) {
   for (const float range : {content.featureRange, content.densityRange}) {
     if (!(range > 0 && range <= kLargestRange)) return "a range is out of bounds";
   }
+  if (content.stepsPerTexel < 1 || content.stepsPerTexel > VolumeContent::kMostStepsPerTexel) {
+    return "the steps per texel are out of bounds";
+  }
   if (auto broken = ruleOfNetwork(content.network)) return broken;
   if (content.parts.empty()) return "there is no part";
   for (size_t i = 0; i < content.parts.size(); ++i) {

@@ -124,8 +124,9 @@ inline void referenceMarch(const VolumeContent& content, const VolumePart& part,
       }
       return dot / square;
     };
-    for (int step = 0; step * texel < length; ++step) {
-      const double from = step * texel, to = std::min(length, from + texel), tau = 0.5 * (from + to);
+    const double stepLength = texel / content.stepsPerTexel;
+    for (int step = 0; step * stepLength < length; ++step) {
+      const double from = step * stepLength, to = std::min(length, from + stepLength), tau = 0.5 * (from + to);
       const Triple<double> y = onPath(tau);
       double sums[8];
       if (!referenceSums(content, part,

@@ -196,6 +196,7 @@ HWY_ATTR void marchVolume(const VolumeMarch& march, ContentComposite& composite,
   const auto one = hn::Set(d, 1.0f);
   Attributes total = load(values);
   float transmittance = composite.transmittance, depth = composite.depth;
+  const float perTexel = static_cast<float>(march.content.stepsPerTexel), stepLength = 1 / perTexel;  // in texels
   uint64_t steps = 0, samples = 0;
   bool seen = transmittance * march.transmittanceBefore >= march.settings.minTransmittance;
   for (int number = 0; number < march.path.count && seen; ++number) {
@@ -203,10 +204,11 @@ HWY_ATTR void marchVolume(const VolumeMarch& march, ContentComposite& composite,
     float inverse[3];
     for (int a = 0; a < 3; ++a)
       inverse[a] = std::copysign(1 / std::max(std::abs(s.direction[a]), 1e-20f), s.direction[a]);
-    const uint32_t count = static_cast<uint32_t>(std::ceil(s.length));
+    const uint32_t count = static_cast<uint32_t>(std::ceil(s.length * perTexel));
     for (uint32_t i = 0; i < count;) {
       ++steps;
-      const float from = static_cast<float>(i), to = std::min(from + 1, s.length), tau = 0.5f * (from + to);
+      const float from = static_cast<float>(i) * stepLength, to = std::min(from + stepLength, s.length);
+      const float tau = 0.5f * (from + to);
       const float x[3] = {s.start[0] + tau * s.direction[0], s.start[1] + tau * s.direction[1],
                           s.start[2] + tau * s.direction[2]};
       int32_t cell[3];
@@ -214,7 +216,7 @@ HWY_ATTR void marchVolume(const VolumeMarch& march, ContentComposite& composite,
         ++i;
         if (march.settings.skipEmptySpace) {
           // The first step whose middle lies at the exit or behind.
-          const float next = std::ceil(marcher.exitOfCube(s, inverse, cell, distance) - 0.5f);
+          const float next = std::ceil(marcher.exitOfCube(s, inverse, cell, distance) * perTexel - 0.5f);
           if (next > static_cast<float>(i)) i = static_cast<uint32_t>(next);
         }
         continue;

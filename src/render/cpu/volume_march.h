@@ -1,9 +1,10 @@
 // Samples of one part of a content along a ray, composited (City-on-Web, section 4.2; MERF, section 4.4).
 //
-// Each straight piece of the path is cut, from its entry on, into steps of one texel of the planes, the last one
-// shorter; in the middle of each lies a sample. A sample is evaluated where the distance grid says that something may
-// be and the macroblock is stored. Skipping passes over steps in the empty cube around a cell at once, and lands on the
-// same steps: which samples are evaluated does not depend on it.
+// Each straight piece of the path is cut, from its entry on, into steps of one texel of the planes (or of the share
+// that the content's stepsPerTexel says), the last one shorter; in the middle of each lies a sample. A sample is
+// evaluated where the distance grid says that something may be and the macroblock is stored. Skipping passes over steps
+// in the empty cube around a cell at once, and lands on the same steps: which samples are evaluated does not depend on
+// it.
 #pragma once
 
 #include <vector>

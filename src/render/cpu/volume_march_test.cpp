@@ -31,6 +31,7 @@ void forRandomRays(int rays, const Check& check) {
   for (const bool contracted : {false, true}) {
     VolumeContent content = contentOf({smoothPart(contracted ? 5 : 4, contracted)});
     if (contracted) content.parts[0].scale = {2, 3, 1};
+    content.stepsPerTexel = contracted ? 1 : 3;
     const RandomStream random(3, contracted);
     for (uint64_t i = 0; i < static_cast<uint64_t>(rays); ++i) {
       const SceneRay ray{randomVector(random, 2 * i, contracted ? 6 : 2),

@@ -12,6 +12,9 @@ namespace {
 
 constexpr uint32_t kRays = 2048;       // of one piece of a photo
 constexpr uint32_t kTexels = 1 << 16;  // evaluated together
+// Steps of a texel are too long for the edges of roofs once texels are: a level 1 of 62 cm was 0.16 dB better for half
+// steps (a finest level of 31 cm, 0.03 dB), and they are still as long as those of the level below.
+constexpr uint32_t kStepsPerCoarseTexel = 2;
 // Of the surround also what lies beside the photos is kept, as far as this share of their size: people turn their
 // heads, and what the model makes up there is better than a hole.
 constexpr double kBeside = 0.5;
@@ -248,6 +251,7 @@ VolumePart bakePart(VolumeModel& model, uint32_t block, const AliveTexels& alive
 VolumeContent bakeGroup(VolumeModel& model, uint32_t group, const std::vector<AliveTexels>& alive) {
   VolumeContent content;
   content.featureRange = model.virtualGrid().featureRange;
+  if (model.config().level > 0) content.stepsPerTexel = kStepsPerCoarseTexel;
   content.densityRange = model.virtualGrid().densityRange;
   content.network = networkOf(model, group);
   for (uint32_t block = 0; block < model.space().blocks(); ++block) {
