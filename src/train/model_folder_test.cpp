@@ -206,6 +206,7 @@ TEST(ModelFolder, GivesItsGridToOthersOfTheSameWorld) {
   capture.sourceFromWorld(0, 3) = 500000.25;
   ModelPlacement placement;
   placement.sourceFromWorld = capture.sourceFromWorld;
+  placement.capture = capture.root;
   placement.grid = BlockGrid{{1.0 / 3, 2, 3}, Mat3d::Identity(), 7, 3, 2, -1, 2};
   model.writePlacement(placement, "volume");
   const fs::path file = folder / "blocks.json";
