@@ -11,31 +11,24 @@ steps=${STEPS:-4000}
 mkdir -p "$work"
 
 [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 4x4 --size "${SIZE:-400x300}"
-# trained NAME ARGUMENTS...
-trained() {
+# run NAME ARGUMENTS...: what it says is kept, as it says how much memory it will take.
+run() {
   local name=$1
   shift
-  [ -e "$work/$name.done" ] && return
-  "$tessera" train "$work/city" "$work/$name" --method volume --blocks 4x4 --steps "$steps" --set level_share=0 --resume "$@" 2>&1 |
-    tee -a "$work/$name.log"
-  touch "$work/$name.done"
+  trained "$name" city --method volume --blocks 4x4 --steps "$steps" --set level_share=0 "$@" 2>&1 | tee -a "$work/$name.log"
 }
-judged() {
-  [ -s "$work/$1.json" ] || "$tessera" eval "$work/$1" "$work/city" --json "$work/$1.json" --report "$work/$1.html" > /dev/null
-  jq -r '.psnr * 100 | round / 100' "$work/$1.json"
-}
-# MiB, and the samples of the lines of metrics, in millions.
+# Of a run's metrics: MiB, and samples in millions.
 peak() { jq -s 'map(.peak_rss_bytes) | max / 1048576 | round' "$work/$1/metrics.jsonl"; }
 samples() {
-  jq -s '[.[0].seconds, (.[1:] | map(.seconds))[]] as $t
-    | [range(1; length) as $i | .[$i].samples_per_second * ([0, $t[$i] - $t[$i - 1]] | max)] | add / 1e6 | round' "$work/$1/metrics.jsonl"
+  jq -s 'map(.seconds) as $t | [range(1; length) as $i | .[$i].samples_per_second * ([0, $t[$i] - $t[$i - 1]] | max)]
+    | (add // 0) / 1e6 | round' "$work/$1/metrics.jsonl"
 }
 
-trained all
-trained four --resident-blocks 4
-all=$(judged all) four=$(judged four)
+run all
+run four --resident-blocks 4
+all=$(judged all city) four=$(judged four city)
 stated=$(grep -o 'memory: at most [0-9]* MiB' "$work/four.log" | head -1 | grep -o '[0-9]*')
 echo "city 4x4, $steps steps: all in memory $all dB, $(peak all) MiB, $(samples all) M samples; four at a time $four dB, $(peak four) MiB of $stated stated, $(samples four) M samples"
-verdict "city 4x4, all in memory less four at a time in dB" "$(awk -v a="$all" -v b="$four" 'BEGIN { print a - b }')" '<=' 0.3
+verdict "city 4x4, all in memory less four at a time in dB" "$(shortfall "$all" "$four")" '<=' 0.3
 verdict "city 4x4, four at a time, memory in MiB" "$(peak four)" '<=' "$stated"
 finish
