@@ -47,11 +47,12 @@ trained() {
 baked() {
   [ -e "$work/$2/tileset.json" ] || "$tessera" bake "$work/$1" "$work/$2" --capture "$work/$3"
 }
-# judged WHAT CAPTURE: its held-out PSNR, from the file if it was judged before.
+# judged WHAT CAPTURE [LOD]: its held-out PSNR, from the file if it was judged before.
 judged() {
-  [ -s "$work/$1.json" ] ||
-    "$tessera" eval "$work/$1" "$work/$2" --json "$work/$1.json" --report "$work/$1.html" > /dev/null
-  jq -r '.psnr * 100 | round / 100' "$work/$1.json"
+  local name=$1${3:+-lod$3}
+  [ -s "$work/$name.json" ] ||
+    "$tessera" eval "$work/$1" "$work/$2" --json "$work/$name.json" --report "$work/$name.html" ${3:+--lod "$3"} > /dev/null
+  jq -r '.psnr * 100 | round / 100' "$work/$name.json"
 }
 difference() { awk -v a="$1" -v b="$2" 'BEGIN { d = a - b; print d < 0 ? -d : d }'; }
 shortfall() { awk -v a="$1" -v b="$2" 'BEGIN { print a - b }'; }

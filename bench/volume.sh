@@ -20,7 +20,12 @@ city() {
   verdict "city 2x2, held-out PSNR of the baked scene in dB" "$scene" '>=' 22
   verdict "city 2x2, field less the scene in dB" "$(shortfall "$field" "$scene")" '<=' 2
   verdict "city 2x2, scene and model apart by dB" "$(difference "$model" "$scene")" '<=' 0.15
+  "$tessera" info "$work/city-scene" --json > "$work/city-info.json"
+  verdict "city 2x2, memory of level 1 as a share of the finest's" "$(of_level_0 bytes_in_memory)" '<=' 0.3
+  verdict "city 2x2, bytes on disk of level 1 likewise" "$(of_level_0 bytes_on_disk)" '<=' 0.3
+  verdict "city 2x2, finest level less level 1 in dB" "$(shortfall "$scene" "$(judged city-scene city 1)")" '<=' 1
 }
+of_level_0() { jq -r ".level_1.$1 / .level_0.$1 * 1000 | round / 1000" "$work/city-info.json"; }
 
 beach() {
   local data=${TESSERA_SHARED_DATA:?names no folder; it must hold brighton_beach/}/brighton_beach model scene

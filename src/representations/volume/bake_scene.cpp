@@ -114,6 +114,7 @@ BakedVolume bakeVolume(const LevelModels& models, uint32_t levels, const Capture
   for (uint32_t level = 0; level < levels; ++level) {
     BakeVolumeOptions ofLevel = options;
     ofLevel.onPhoto = [&](int64_t done, int64_t) { options.onPhoto(level * photos + done, levels * photos); };
+    ofLevel.stride <<= level;  // as many rays through its larger texels
     const std::unique_ptr<VolumeModel> model = models(level);
     if (level == 0) tileset = emptyTileset(*model, capture, levels);
     made.push_back(bakeLevel(*model, capture, tileset, level, folder, ofLevel));

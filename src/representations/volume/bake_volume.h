@@ -16,7 +16,7 @@ struct BakeVolumeOptions {
   // What training photos see is kept: samples of their pixels whose weight in the picture and whose opacity over a
   // renderer's step are both above these.
   double minWeight = 0.005, minAlpha = 0.005;
-  int stride = 1;  // every so manieth pixel along rows and columns
+  int stride = 1;  // every so manieth pixel along rows and columns; of each coarser level twice as much
   int effort = 4;  // of compression, 0 to 9
   std::function<void(int64_t done, int64_t all)> onPhoto = [](int64_t, int64_t) {};
 };

@@ -327,13 +327,16 @@ TEST(BakeVolume, PutsLevelsAboveOneAnother) {
   TrainVolumeOptions options;
   options.config = smallVolumeConfig();
   options.blocks = *parseBlockCount("2x2");
-  options.loop.steps = 30;
+  options.loop.steps = 60;
+  options.config.levelShare = 0.5;
   options.loop.progress = false;
   trainVolume(*device, scene.capture(), folder / "model", options);
   ASSERT_EQ(trainedLevels(folder / "model"), 2u);
+  BakeVolumeOptions baking;
+  baking.stride = 8;
   const BakedVolume baked =
       bakeVolume([&](uint32_t level) { return loadVolumeModel(*device, levelFolder(folder / "model", level)); }, 2,
-                 scene.capture(), folder / "scene", {});
+                 scene.capture(), folder / "scene", baking);
   ASSERT_EQ(baked.tileset.tiles.size(), 5u);
   const Tile& root = baked.tileset.tiles[0];
   EXPECT_EQ(root.children.size(), 4u);
@@ -342,6 +345,15 @@ TEST(BakeVolume, PutsLevelsAboveOneAnother) {
   const VolumeContent merged = readVolume(contentPath(folder / "scene", root.contents.at(0).uri));
   EXPECT_EQ(merged.parts.size(), 4u) << "side by side, each with its own texels";
   EXPECT_EQ(merged.parts[0].planes, 32u);
+  // Looked at through half as many rows and columns: its texels are twice as large.
+  const std::unique_ptr<VolumeModel> coarse = loadVolumeModel(*device, levelFolder(folder / "model", 1));
+  const auto seenThroughEvery = [&](int stride) {
+    BakeVolumeOptions looking;
+    looking.stride = stride;
+    return bakePart(*coarse, 0, findAliveTexels(*coarse, scene.capture(), looking)[0]);
+  };
+  EXPECT_EQ(merged.parts[0].planeBytes, seenThroughEvery(16).planeBytes);
+  EXPECT_NE(merged.parts[0].planeBytes, seenThroughEvery(8).planeBytes);
   // Drawn at either level.
   for (const int finest : {0, 1}) {
     VolumeScene opened = openVolumeScene(folder / "scene");

@@ -107,6 +107,9 @@ std::vector<ConfigField> VolumeConfig::fields() {
       {"frozen_share", "share of a coarser level's steps in which only its deferred networks are trained",
        &frozenShare},
       {"level_rate_factor", "learning rate of a coarser level's fields, relative", &levelRateFactor},
+      {"level_padding",
+       "padding of coarser levels, if more: else what their proposals pass over is not seen before it is drawn",
+       &levelPadding},
       {"exposure", "fit an exposure to each photo", &exposure},
       {"random_background", "train against random colours behind the scene", &randomBackground},
   };
@@ -120,6 +123,7 @@ void VolumeConfig::check() const {
   requireWithin("level_share", levelShare, 0, 10);
   requireWithin("frozen_share", frozenShare, 0, 1);
   requireWithin("level_rate_factor", levelRateFactor, 0, kHuge);
+  requireWithin("level_padding", levelPadding, 0, 1);
   requireWithin("voxels", voxels, 8, 1024);
   requireWithin("planes", planes, 8, 4096);
   multipleOfEight("voxels", voxels);

@@ -47,7 +47,7 @@ struct VolumeConfig {
   double cullBegin = 0.4, cullEnd = 0.8, cullFirst = 5e-4, cullLast = 5e-3;
   bool literalEq3 = false;
   // Levels of detail
-  double levelShare = 0.4, frozenShare = 0.1, levelRateFactor = 0.5;
+  double levelShare = 0.2, frozenShare = 0.1, levelRateFactor = 0.5, levelPadding = 0.2;
   bool exposure = true, randomBackground = true, freeSpace = true;
 
   std::vector<ConfigField> fields();

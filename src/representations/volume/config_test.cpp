@@ -42,6 +42,7 @@ TEST(VolumeConfig, RefusesWhatNoModelCanBeMadeOf) {
       [](VolumeConfig& c) { c.samples = 1; },
       [](VolumeConfig& c) { c.firstRays = c.mostRays + 1; },
       [](VolumeConfig& c) { c.padding = 1.5; },
+      [](VolumeConfig& c) { c.levelPadding = -0.1; },
       [](VolumeConfig& c) { c.cullEnd = c.cullBegin / 2; },
       [](VolumeConfig& c) { c.rate = 0; },
       [](VolumeConfig& c) { c.gridFinest = 8; },

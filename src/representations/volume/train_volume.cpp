@@ -58,6 +58,8 @@ VolumeConfig levelConfig(VolumeConfig finest, uint32_t level) {
   finest.level = static_cast<int>(level);
   finest.voxels = std::max(8, (finest.voxels >> level) / 8 * 8);
   finest.planes = std::max(8, (finest.planes >> level) / 8 * 8);
+  // Its proposals begin as the finest level's, which pass over the fog that large texels make around surfaces.
+  finest.padding = std::max(finest.padding, finest.levelPadding);
   return finest;
 }
 

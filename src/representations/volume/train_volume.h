@@ -25,8 +25,8 @@ TrainingResult trainVolume(Device& device, const Capture& capture, const fs::pat
 fs::path levelFolder(const fs::path& model, uint32_t level);
 // Levels that are trained to their end, without a gap: at least 1, the finest.
 uint32_t trainedLevels(const fs::path& model);
-// The settings of a level, from those of the finest: half the resolution for each. Its fields, and how they are
-// sampled, are the same.
+// The settings of a level, from those of the finest: half the resolution for each, and its own padding. Its fields are
+// the same.
 VolumeConfig levelConfig(VolumeConfig finest, uint32_t level);
 
 // The grid of blocks.json; Error when there is none.
