@@ -39,19 +39,39 @@ void spread(std::vector<bool>& bits, size_t first, size_t count, size_t stride, 
 
 }  // namespace
 
-AliveTexels::AliveTexels(const VirtualGrid& grid) : grid_(grid), space_(std::min(grid.planes, kMostCells)) {
+AliveTexels::AliveTexels(const VirtualGrid& grid)
+    : grid_(grid),
+      cells_(std::min(grid.planes, kMostCells)),
+      bricksAlong_((cells_ + kBrickEdge - 1) / kBrickEdge),
+      brickAt_(size_t{bricksAlong_} * bricksAlong_ * bricksAlong_) {
   for (std::vector<bool>& plane : planes_) plane.resize(size_t{grid.planes} * grid.planes);
+}
+
+size_t AliveTexels::bytes() const {
+  return brickAt_.size() * sizeof(uint32_t) + bricks_.size() * sizeof(uint64_t) +
+         size_t{3} * grid_.planes * grid_.planes / 8;
+}
+
+void AliveTexels::markCell(uint32_t x, uint32_t y, uint32_t z) {
+  uint32_t& number =
+      brickAt_[x / kBrickEdge + size_t{bricksAlong_} * (y / kBrickEdge + size_t{bricksAlong_} * (z / kBrickEdge))];
+  if (number == 0) {
+    bricks_.resize(bricks_.size() + kWordsOfBrick);
+    number = static_cast<uint32_t>(bricks_.size() / kWordsOfBrick);
+  }
+  const uint32_t bit = x % kBrickEdge + kBrickEdge * (y % kBrickEdge + kBrickEdge * (z % kBrickEdge));
+  bricks_[size_t{number - 1} * kWordsOfBrick + bit / 64] |= uint64_t{1} << (bit % 64);
 }
 
 void AliveTexels::mark(const float position[3]) {
   Around cells[3], texels[3];
   for (int a = 0; a < 3; ++a) {
-    cells[a] = texelsAround(position[a], space_.cells);
+    cells[a] = texelsAround(position[a], cells_);
     texels[a] = texelsAround(position[a], grid_.planes);
   }
   for (int c = 0; c < 8; ++c) {
-    space_.set(space_.number(c & 1 ? cells[0].high : cells[0].low, c & 2 ? cells[1].high : cells[1].low,
-                             c & 4 ? cells[2].high : cells[2].low));
+    markCell(c & 1 ? cells[0].high : cells[0].low, c & 2 ? cells[1].high : cells[1].low,
+             c & 4 ? cells[2].high : cells[2].low);
   }
   for (int a = 0; a < 3; ++a) {
     const Around &b = texels[a == 0 ? 1 : 0], &c = texels[a == 2 ? 1 : 2];
@@ -87,14 +107,18 @@ std::vector<bool> AliveTexels::macroblocks() const {
 
 OccupancyBits AliveTexels::occupancy(uint32_t cells) const {
   OccupancyBits pooled(cells);
-  const uint32_t n = space_.cells;
-  for (size_t word = 0; word < space_.words.size(); ++word) {
-    if (space_.words[word] == 0) continue;
-    for (size_t number = word * 64; number < std::min(space_.count(), (word + 1) * 64); ++number) {
-      if (!space_.at(number)) continue;
-      const uint32_t x = static_cast<uint32_t>(number % n), y = static_cast<uint32_t>(number / n % n),
-                     z = static_cast<uint32_t>(number / n / n);
-      pooled.set(pooled.number(cellOfMiddle(x, n, cells), cellOfMiddle(y, n, cells), cellOfMiddle(z, n, cells)));
+  for (size_t at = 0; at < brickAt_.size(); ++at) {
+    if (brickAt_[at] == 0) continue;
+    const uint64_t* words = &bricks_[size_t{brickAt_[at] - 1} * kWordsOfBrick];
+    const uint32_t first[3] = {static_cast<uint32_t>(at % bricksAlong_) * kBrickEdge,
+                               static_cast<uint32_t>(at / bricksAlong_ % bricksAlong_) * kBrickEdge,
+                               static_cast<uint32_t>(at / bricksAlong_ / bricksAlong_) * kBrickEdge};
+    for (uint32_t bit = 0; bit < 64 * kWordsOfBrick; ++bit) {
+      if (!(words[bit / 64] >> (bit % 64) & 1)) continue;
+      const uint32_t x = first[0] + bit % kBrickEdge, y = first[1] + bit / kBrickEdge % kBrickEdge,
+                     z = first[2] + bit / kBrickEdge / kBrickEdge;
+      pooled.set(pooled.number(cellOfMiddle(x, cells_, cells), cellOfMiddle(y, cells_, cells),
+                               cellOfMiddle(z, cells_, cells)));
     }
   }
   return pooled;

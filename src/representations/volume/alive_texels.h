@@ -1,4 +1,7 @@
-// Where something visible stands in a block: what baking keeps (MERF, section 4.3; City-on-Web, section 4.5).
+// Where something visible stands in a block: what baking keeps (MERF, section 4.3; City-on-Web, section 4.5). A bit for
+// each texel of the three planes (planes of 512²: 96 KiB, 2048²: 1.5 MiB), and for space 512 bytes for each 16³ cells
+// in which anything is marked: about 1 MiB where there are surfaces, never more than 16. Baking keeps those of all
+// blocks.
 #pragma once
 
 #include <array>
@@ -25,9 +28,16 @@ class AliveTexels {
   // [planes²], row c, column b: texels that are needed, and those up to `reach` texels beside them.
   std::vector<bool> plane(int axis, uint32_t reach) const;
 
+  size_t bytes() const;  // that it takes
+
  private:
+  static constexpr uint32_t kBrickEdge = 16, kWordsOfBrick = kBrickEdge * kBrickEdge * kBrickEdge / 64;
+  void markCell(uint32_t x, uint32_t y, uint32_t z);
+
   VirtualGrid grid_;
-  OccupancyBits space_;
+  uint32_t cells_ = 0, bricksAlong_ = 0;
+  std::vector<uint32_t> brickAt_;  // [bricksAlong³], x fastest: 1 + its number, 0 where nothing is marked
+  std::vector<uint64_t> bricks_;   // [bricks][kWordsOfBrick], x fastest
   std::array<std::vector<bool>, 3> planes_;
 };
 

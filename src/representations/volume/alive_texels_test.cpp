@@ -113,6 +113,25 @@ TEST(AliveTexels, DoNotReachBeyondThePlanes) {
   EXPECT_FALSE(plane[size_t{1} * grid.planes - 1]) << "not on the other side";
 }
 
+TEST(AliveTexels, TakeMemoryWhereSomethingStands) {
+  VirtualGrid grid;
+  grid.voxels = 128;
+  grid.planes = 512;
+  AliveTexels alive(grid);
+  const size_t planes = 3 * 512 * 512 / 8, empty = alive.bytes();
+  EXPECT_LE(empty, planes + (256u << 10));
+  const float point[3] = {0.26f, 0.26f, 0.26f};
+  for (int i = 0; i < 3; ++i) alive.mark(point);
+  EXPECT_EQ(alive.bytes(), empty + 512);
+  for (uint32_t y = 0; y < 256; ++y) {
+    for (uint32_t x = 0; x < 256; ++x) {
+      const float ground[3] = {static_cast<float>(x) / 256, static_cast<float>(y) / 256, 0.51f};
+      alive.mark(ground);
+    }
+  }
+  EXPECT_LE(alive.bytes(), empty + (1u << 20)) << "a level ground";
+}
+
 TEST(AliveTexels, AreNoneWhereNothingWasSeen) {
   const AliveTexels alive(smallGrid());
   const std::vector<bool> macroblocks = alive.macroblocks();
