@@ -150,17 +150,17 @@ BlockGrid requireGrid(const ModelFolder& folder) {
   throw Error((folder.root() / "blocks.json").string(), "grid", "there is none", "restore the file or train again");
 }
 
-std::unique_ptr<VolumeModel> loadVolumeModel(Device& device, const fs::path& folder) {
+std::unique_ptr<VolumeModel> loadVolumeModel(Device& device, const fs::path& folder, uint32_t residentBlocks) {
   const ModelFolder model(folder);
   const ModelManifest manifest = requireManifest(model, "volume");
   VolumeConfig config;
   configFromToml(config.fields(), model.configPath());
-  auto made = std::make_unique<VolumeModel>(device, config, requireGrid(model), VolumeModel::Room{0, false});
+  auto made =
+      std::make_unique<VolumeModel>(device, config, requireGrid(model), VolumeModel::Room{residentBlocks, false});
   requireOneFileABlock(folder, manifest, made->space().blocks());
-  for (uint32_t block = 0; block < made->space().blocks(); ++block) {
-    const fs::path file = folder / manifest.files[block];
-    made->restore(block, file, readSafetensors(file));
-  }
+  std::vector<fs::path> files;
+  for (const std::string& file : manifest.files) files.push_back(folder / file);
+  made->readFrom(std::move(files));
   return made;
 }
 

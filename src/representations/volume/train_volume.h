@@ -32,8 +32,8 @@ VolumeConfig levelConfig(VolumeConfig finest, uint32_t level);
 // The grid of blocks.json; Error when there is none.
 BlockGrid requireGrid(const ModelFolder& folder);
 
-// A trained model for drawing, from its folder.
-std::unique_ptr<VolumeModel> loadVolumeModel(Device& device, const fs::path& folder);
+// A trained model for drawing, from its folder: with all blocks in memory, or so many at a time (VolumeModel::bring).
+std::unique_ptr<VolumeModel> loadVolumeModel(Device& device, const fs::path& folder, uint32_t residentBlocks = 0);
 
 // Bytes that a block takes while it is trained: parameters, moments, gradients.
 double trainingBytesPerBlock(const VolumeConfig& config);

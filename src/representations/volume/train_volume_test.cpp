@@ -86,6 +86,37 @@ TEST(TrainVolume, TrainsLevelsTooWithBlocksThatWait) {
   }
 }
 
+TEST(TrainVolume, LoadsFewBlocksAtATime) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  TrainVolumeOptions three = options(4);
+  three.blocks = *parseBlockCount("3x1");
+  three.config.surround = "own";
+  trainVolume(*device, scene.capture(), scene / "model", three);
+  const std::unique_ptr<VolumeModel> all = loadVolumeModel(*device, scene / "model");
+  const std::unique_ptr<VolumeModel> few = loadVolumeModel(*device, scene / "model", 2);
+  EXPECT_EQ(all->slots(), 4u);
+  ASSERT_EQ(few->slots(), 3u) << "and the surround";
+  EXPECT_EQ(device->read(few->deferred().values.all()), device->read(all->deferred().values.all()));
+  const auto expectSame = [&](uint32_t block) {
+    const uint32_t slot = few->slotOf(block);
+    ASSERT_NE(slot, kNoSlot) << block;
+    for (const auto fields : {&VolumeModel::attributes, &VolumeModel::proposals}) {
+      BlockFields &ofAll = ((*all).*fields)(), &ofFew = ((*few).*fields)();
+      EXPECT_EQ(device->read(ofFew.table(slot).values.all()), device->read(ofAll.table(block).values.all()));
+      EXPECT_EQ(device->read(ofFew.network(slot).values.all()), device->read(ofAll.network(block).values.all()));
+    }
+  };
+  for (const std::vector<uint32_t>& blocks : std::vector<std::vector<uint32_t>>{{0, 1}, {1, 2}, {0}, {2, 0}, {3, 1}}) {
+    few->bring(blocks);
+    for (const uint32_t block : blocks) expectSame(block);
+    expectSame(3);
+  }
+  few->bring({0, 1});
+  fs::remove(scene / "model" / ModelFolder(scene / "model").manifest()->files.at(2));
+  EXPECT_THROW(few->bring({2}), Error);
+}
+
 TEST(TrainVolume, GoesOnWithALevelThatWasStopped) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});

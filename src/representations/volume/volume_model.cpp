@@ -130,6 +130,33 @@ void VolumeModel::hold(const std::vector<uint32_t>& blockOfSlot) {
   nameSlots();
 }
 
+void VolumeModel::readFrom(std::vector<fs::path> files) {
+  CHECK(files.size() == space_.blocks());
+  files_ = std::move(files);
+  restoreDeferred(files_[0], readSafetensors(files_[0]));
+  for (const uint32_t block : blockOfSlot_) restoreFields(block, files_[block], readSafetensors(files_[block]));
+}
+
+void VolumeModel::bring(const std::vector<uint32_t>& blocks) {
+  std::vector<uint32_t> next = blockOfSlot_, missing;
+  for (const uint32_t block : blocks) {
+    if (slotOf(block) == kNoSlot) missing.push_back(block);
+  }
+  if (missing.empty()) return;
+  CHECK(files_.size() == space_.blocks());
+  size_t slot = 0;
+  for (const uint32_t block : missing) {
+    const auto stays = [&](uint32_t held) {
+      return held >= space_.cells() || std::find(blocks.begin(), blocks.end(), held) != blocks.end();
+    };
+    while (slot < next.size() && stays(next[slot])) ++slot;
+    CHECK(slot < next.size());
+    next[slot++] = block;
+  }
+  hold(next);
+  for (const uint32_t block : missing) restoreFields(block, files_[block], readSafetensors(files_[block]));
+}
+
 void VolumeModel::copyFields(VolumeModel& from) {
   CHECK(holdsAll());
   CHECK(from.holdsAll());

@@ -53,6 +53,11 @@ class VolumeModel {
   Slice<const uint32_t> groupOfSlot() const { return groupOfSlot_; }
   // From now on these blocks are in the slots. Those that were not begin as blocks do, until they are restored.
   void hold(const std::vector<uint32_t>& blockOfSlot);
+  // Of a trained model: its checkpoints, [blocks]. Those of the blocks that are in memory are read at once, the others
+  // when they are brought in, whole files one after another. Throws Error when one cannot be read.
+  void readFrom(std::vector<fs::path> files);
+  // From now on these blocks are in memory, no more than there are slots for, in whatever slots; others stay or leave.
+  void bring(const std::vector<uint32_t>& blocks);
 
   // Values of the other's attribute and proposal fields; of the same blocks, with the same settings of fields, all in
   // memory.
@@ -80,6 +85,7 @@ class VolumeModel {
   VirtualGrid virtualGrid_;
   LevelGroups groups_;
   std::vector<uint32_t> blockOfSlot_;
+  std::vector<fs::path> files_;
   Array<uint32_t> slotOfBlock_, heldBlocks_, groupOfSlot_;
   BlockFields attributes_, proposals_;
   ParameterGroup deferred_;
