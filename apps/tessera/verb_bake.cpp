@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "apps/tessera/verbs.h"
 #include "base/error.h"
@@ -16,6 +17,7 @@ void addBakeVerb(CLI::App& app) {
   struct Flags {
     std::string model, scene, capture;
     BakeVolumeOptions options;
+    std::optional<uint32_t> residentBlocks;
     DeviceOptions device;
     bool json = false;
   };
@@ -29,6 +31,10 @@ void addBakeVerb(CLI::App& app) {
                    "look at every so manieth pixel of rows and columns to find what is seen")
       ->capture_default_str()
       ->check(CLI::Range(1, 64));
+  verb->add_option("--resident-blocks", flags->residentBlocks,
+                   "blocks of the model in memory at once, besides a surround of its own; 0: all; default: as many as "
+                   "in training")
+      ->check(CLI::Range(0, 1 << 20));
   verb->add_option("--effort", flags->options.effort, "of compression")->capture_default_str()->check(CLI::Range(0, 9));
   verb->add_flag("--json", flags->json, "print the result as one JSON object");
   addDeviceFlags(*verb, flags->device);
@@ -36,14 +42,16 @@ void addBakeVerb(CLI::App& app) {
     const ModelFolder folder(flags->model);
     requireManifest(folder, "volume");
     const std::unique_ptr<Device> device = makeDevice(flags->device);
+    const VolumeConfig config = savedConfig<VolumeConfig>(flags->model);
+    const uint32_t resident = flags->residentBlocks.value_or(static_cast<uint32_t>(config.residentBlocks));
     const LevelModels models = [&](uint32_t level) {
-      return loadVolumeModel(*device, levelFolder(flags->model, level));
+      return loadVolumeModel(*device, levelFolder(flags->model, level), resident);
     };
     const uint32_t levels = trainedLevels(flags->model);
     const Capture capture =
         readCapture(flags->capture.empty() ? folder.readPlacement().capture.string() : flags->capture);
     requireSameWorld(folder, capture);
-    flags->options.minAlpha = savedConfig<VolumeConfig>(flags->model).cullLast;
+    flags->options.minAlpha = config.cullLast;
     Progress progress("baking", static_cast<int64_t>(levels * capture.photosIn(Split::train).size()), "photos");
     flags->options.onPhoto = [&](int64_t done, int64_t) { progress.update(done); };
     const BakedVolume baked = bakeVolume(models, levels, capture, flags->scene, flags->options);

@@ -39,17 +39,24 @@ PictureRays::Piece PictureRays::piece(size_t first, uint32_t most) {
     pixels.push_back(static_cast<float>(y) + 0.5f);
     if (opaqueDepth_) far.push_back(*opaqueDepth_->at(x, y));
   }
-  device_.write(pixels_.all(), std::span<const float>(pixels));
+  Piece made = through(pixels);
+  if (!opaqueDepth_) return made;
+  for (uint32_t ray = 0; ray < rays; ++ray) {
+    const float along = cosine(ray);
+    far[ray] = along > 0 ? far[ray] * scale_ / along : std::numeric_limits<float>::infinity();
+  }
+  device_.write(far_.all(), std::span<const float>(far));
+  made.far = far_;
+  return made;
+}
+
+PictureRays::Piece PictureRays::through(std::span<const float> pixels) {
+  const uint32_t rays = static_cast<uint32_t>(pixels.size() / 2);
+  CHECK(rays <= mostRays_);
+  device_.write(pixels_.all(), pixels);
   device_.run(GenerateRays{{rays, {}}, camera_, cameraOfRay_, pixels_, origins_, directions_});
   hostDirections_ = device_.read(directions_.part(0, size_t{3} * rays));
-  if (opaqueDepth_) {
-    for (uint32_t ray = 0; ray < rays; ++ray) {
-      const float along = cosine(ray);
-      far[ray] = along > 0 ? far[ray] * scale_ / along : std::numeric_limits<float>::infinity();
-    }
-    device_.write(far_.all(), std::span<const float>(far));
-  }
-  return {rays, origins_, directions_, opaqueDepth_ ? far_.all() : Slice<float>()};
+  return {rays, origins_, directions_, {}};
 }
 
 }  // namespace tessera

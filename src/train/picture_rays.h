@@ -35,6 +35,8 @@ class PictureRays {
   };
   // Pixels [first, first + most) of the lattice, or fewer. Valid until the next one.
   Piece piece(size_t first, uint32_t most);
+  // Rays through pixels of one's own choice, [rays][2], at most `mostRays`; no far. Valid until the next piece.
+  Piece through(std::span<const float> pixels);
   // Of a ray of the last piece: the z-depth in world units of what lies at that distance in scene units.
   float depthOf(uint32_t ray, float distance) const { return distance * cosine(ray) / scale_; }
 

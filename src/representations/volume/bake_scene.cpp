@@ -39,8 +39,17 @@ SceneBox boxOf(const VolumeContent& content) {
   return box;
 }
 
-LevelContents bakeLevel(VolumeModel& model, const Capture& capture, const Tileset& tileset, uint32_t level,
-                        const SceneFolderWriter& folder, const BakeVolumeOptions& options) {
+struct LevelToBake {
+  VolumeModel& model;
+  uint32_t level = 0;
+  const Capture& capture;
+  const Tileset& tileset;
+  const SceneFolderWriter& folder;
+  const BakeVolumeOptions& options;
+};
+
+LevelContents bakeLevel(const LevelToBake& of) {
+  const auto& [model, level, capture, tileset, folder, options] = of;
   const std::vector<AliveTexels> alive = findAliveTexels(model, capture, options);
   const std::vector<CellGroup>& cells = model.groups().cells;
   LevelContents made;
@@ -117,7 +126,7 @@ BakedVolume bakeVolume(const LevelModels& models, uint32_t levels, const Capture
     ofLevel.stride <<= level;  // as many rays through its larger texels
     const std::unique_ptr<VolumeModel> model = models(level);
     if (level == 0) tileset = emptyTileset(*model, capture, levels);
-    made.push_back(bakeLevel(*model, capture, tileset, level, folder, ofLevel));
+    made.push_back(bakeLevel({*model, level, capture, tileset, folder, ofLevel}));
     baked.levels.push_back(made.back().sizes);
   }
   const size_t top = levels - 1;

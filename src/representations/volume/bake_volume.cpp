@@ -3,86 +3,26 @@
 #include <algorithm>
 #include <cmath>
 
-#include "representations/volume/alive_texels.h"
-#include "representations/volume/volume_pass.h"
-#include "train/picture_rays.h"
-
 namespace tessera {
 namespace {
 
-constexpr uint32_t kRays = 2048;       // of one piece of a photo
 constexpr uint32_t kTexels = 1 << 16;  // evaluated together
 // Steps of a texel are too long for the edges of roofs once texels are: a level 1 of 62 cm was 0.16 dB better for half
 // steps (a finest level of 31 cm, 0.03 dB), and they are still as long as those of the level below.
 constexpr uint32_t kStepsPerCoarseTexel = 2;
-// Of the surround also what lies beside the photos is kept, as far as this share of their size: people turn their
-// heads, and what the model makes up there is better than a hole.
-constexpr double kBeside = 0.5;
-constexpr int kBesideStride = 3;
 constexpr double kReachOfPlanes = 12.0 / 2048;  // texels beside needed ones are kept too (MERF: 12 of 2048)
 
-VolumePass::Room roomForRays(const VolumeModel& model) {
-  BlockSamples most{model.space()};
-  most.intervals = static_cast<uint32_t>(model.config().samples);
-  most.split = true;
-  VolumePass::Room room;
-  room.rays = kRays;
-  room.texels = VirtualGrid::kCorners * most.mostSamples(kRays);
-  return room;
-}
-
-// Marks what is seen through the pixels, of blocks from `firstBlock` on.
-class AliveFinder {
- public:
-  AliveFinder(VolumeModel& model, const BakeVolumeOptions& options, std::vector<AliveTexels>& alive)
-      : model_(model),
-        options_(options),
-        alive_(alive),
-        pass_(model, roomForRays(model)),
-        pictureRays_(model.device(), kRays) {
-    drawing_.minAlpha = static_cast<float>(options.minAlpha);
-  }
-  void look(const RayCamera& camera, const PixelLattice& lattice, uint32_t firstBlock) {
-    Device& device = model_.device();
-    pictureRays_.begin(camera, model_.frame(), lattice);
-    for (size_t first = 0; first < lattice.count(); first += kRays) {
-      const PictureRays::Piece piece = pictureRays_.piece(first, kRays);
-      pass_.forward({piece.rays, piece.origins, piece.directions, {}, {}, {}}, drawing_);
-      const uint32_t samples = device.read(pass_.firstSample().part(piece.rays, 1))[0];
-      const std::vector<float> weights = device.read(pass_.weights().part(0, samples));
-      const std::vector<float> logDensities = device.read(pass_.logDensities().part(0, samples));
-      const std::vector<float> steps = device.read(pass_.runtimeSteps().part(0, samples));
-      const std::vector<float> positions = device.read(pass_.positions().part(0, size_t{3} * samples));
-      const std::vector<uint32_t> blocks = device.read(pass_.blockOfSample().part(0, samples));
-      for (uint32_t s = 0; s < samples; ++s) {
-        if (blocks[s] < firstBlock || !(weights[s] > options_.minWeight)) continue;
-        if (!(-std::expm1(-std::exp(logDensities[s]) * steps[s]) > options_.minAlpha)) continue;
-        alive_[blocks[s]].mark(&positions[size_t{3} * s]);
-      }
-    }
-  }
-
- private:
-  VolumeModel& model_;
-  const BakeVolumeOptions& options_;
-  std::vector<AliveTexels>& alive_;
-  VolumePass pass_;
-  PictureRays pictureRays_;
-  VolumePass::Options drawing_;
-};
-
-// Evaluates one block's attributes at positions, as bytes.
+// Evaluates the attributes of a block that is in memory at positions, as bytes.
 class TexelBaker {
  public:
-  TexelBaker(VolumeModel& model, uint32_t block) : model_(model), device_(model.device()) {
-    const uint32_t blocks = model.space().blocks();
+  TexelBaker(VolumeModel& model, uint32_t block) : model_(model), device_(model.device()), slot_(model.slotOf(block)) {
+    CHECK(slot_ != kNoSlot);
     batch_ = BlockFieldBatch(device_, model.attributes().shape(), kTexels, false);
     positions_ = device_.array<float>(size_t{3} * kTexels);
-    firstOfBlock_ = device_.array<uint32_t>(blocks + 1);
+    firstOfSlot_ = device_.array<uint32_t>(model.slots() + 1);
     batch_.positions = positions_;
-    batch_.firstOfSlot = firstOfBlock_;
-    first_.assign(blocks + 1, 0);
-    block_ = block;
+    batch_.firstOfSlot = firstOfSlot_;
+    first_.assign(model.slots() + 1, 0);
   }
   // [positions][8]
   std::vector<uint8_t> bytes(const std::vector<float>& positions) {
@@ -91,8 +31,8 @@ class TexelBaker {
     for (size_t first = 0; first < positions.size() / 3; first += kTexels) {
       const size_t count = std::min<size_t>(kTexels, positions.size() / 3 - first);
       device_.write(positions_.all(), std::span<const float>(positions).subspan(3 * first, 3 * count));
-      std::fill(first_.begin() + block_ + 1, first_.end(), static_cast<uint32_t>(count));
-      device_.write(firstOfBlock_.all(), std::span<const uint32_t>(first_));
+      std::fill(first_.begin() + slot_ + 1, first_.end(), static_cast<uint32_t>(count));
+      device_.write(firstOfSlot_.all(), std::span<const uint32_t>(first_));
       model_.attributes().forward(batch_, false);
       for (const float a : device_.read(batch_.outputs.part(0, count * VirtualGrid::kAttributes))) {
         all.push_back(static_cast<uint8_t>(255 * static_cast<double>(a) + 0.5));  // as VirtualGridForward
@@ -104,10 +44,10 @@ class TexelBaker {
  private:
   VolumeModel& model_;
   Device& device_;
-  uint32_t block_ = 0;
+  uint32_t slot_ = 0;
   BlockFieldBatch batch_;
   Array<float> positions_;
-  Array<uint32_t> firstOfBlock_;
+  Array<uint32_t> firstOfSlot_;
   std::vector<uint32_t> first_;
 };
 
@@ -185,27 +125,6 @@ std::vector<DenseLayer> networkOf(VolumeModel& model, uint32_t group) {
 
 }  // namespace
 
-std::vector<AliveTexels> findAliveTexels(VolumeModel& model, const Capture& capture, const BakeVolumeOptions& options) {
-  std::vector<AliveTexels> alive(model.space().blocks(), AliveTexels(model.virtualGrid()));
-  AliveFinder finder(model, options, alive);
-  const bool surround = model.space().blocks() > model.space().cells();
-  const std::vector<int> photos = capture.photosIn(Split::train);
-  int64_t done = 0;
-  for (const int photo : photos) {
-    const Camera& camera = capture.cameras[capture.photos[photo].camera];
-    const RayCamera view = makeRayCamera(camera, capture.photos[photo].worldFromCamera, model.frame());
-    finder.look(view, {0, 0, camera.width, camera.height, options.stride}, 0);
-    if (surround) {
-      const int besideX = static_cast<int>(kBeside * camera.width), besideY = static_cast<int>(kBeside * camera.height);
-      finder.look(view,
-                  {-besideX, -besideY, camera.width + besideX, camera.height + besideY, kBesideStride * options.stride},
-                  model.space().cells());
-    }
-    options.onPhoto(++done, static_cast<int64_t>(photos.size()));
-  }
-  return alive;
-}
-
 VolumePart bakePart(VolumeModel& model, uint32_t block, const AliveTexels& alive) {
   const VirtualGrid& grid = model.virtualGrid();
   const BlockSpace& space = model.space();
@@ -255,7 +174,9 @@ VolumeContent bakeGroup(VolumeModel& model, uint32_t group, const std::vector<Al
   content.densityRange = model.virtualGrid().densityRange;
   content.network = networkOf(model, group);
   for (uint32_t block = 0; block < model.space().blocks(); ++block) {
-    if (model.groups().groupOfBlock[block] == group) content.parts.push_back(bakePart(model, block, alive[block]));
+    if (model.groups().groupOfBlock[block] != group) continue;
+    model.bring({block});
+    content.parts.push_back(bakePart(model, block, alive[block]));
   }
   return content;
 }

@@ -1,4 +1,6 @@
-// `tessera bake`: a trained volume model to a scene of tiles.
+// `tessera bake`: a trained volume model to a scene of tiles. Of a model that holds few of its blocks at a time
+// (VolumeModel::bring) no more are ever in memory, and one checkpoint while it is read; of all blocks AliveTexels, of
+// which alive_texels.h says what they take; and the tile that is being written.
 #pragma once
 
 #include <functional>
@@ -18,6 +20,7 @@ struct BakeVolumeOptions {
   double minWeight = 0.005, minAlpha = 0.005;
   int stride = 1;  // every so manieth pixel along rows and columns; of each coarser level twice as much
   int effort = 4;  // of compression, 0 to 9
+  // Of a model that holds few blocks at a time, photos are done in parts.
   std::function<void(int64_t done, int64_t all)> onPhoto = [](int64_t, int64_t) {};
 };
 
@@ -39,11 +42,15 @@ using LevelModels = std::function<std::unique_ptr<VolumeModel>(uint32_t level)>;
 BakedVolume bakeVolume(const LevelModels& models, uint32_t levels, const Capture& capture, const fs::path& scene,
                        const BakeVolumeOptions& options);
 
-// The steps of it. What training photos see, [blocks].
+// The steps of it. What training photos see through the pixels that no mask leaves out, [blocks]. Where not all blocks
+// are in memory, stay by stay: see bake_stays.h, also for what is kept of pixels whose blocks do not fit together, of
+// which it warns; what the stay lacks behind the coarse depth of a pixel is air, as it was in training. Throws Error
+// when a mask cannot be read.
 std::vector<AliveTexels> findAliveTexels(VolumeModel& model, const Capture& capture, const BakeVolumeOptions& options);
-// A block's texels.
+// The texels of a block that is in memory.
 VolumePart bakePart(VolumeModel& model, uint32_t block, const AliveTexels& alive);
-// What is composited and shaded together: the blocks of one of the model's groups. `alive` by block.
+// What is composited and shaded together: the blocks of one of the model's groups, brought in one after another.
+// `alive` by block.
 VolumeContent bakeGroup(VolumeModel& model, uint32_t group, const std::vector<AliveTexels>& alive);
 
 }  // namespace tessera
