@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <csignal>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "tests/program.h"
@@ -177,17 +178,51 @@ TEST_F(VolumeCommandLine, TrainsWithFewBlocksInMemoryAndSaysHowMuchThatTakes) {
   EXPECT_TRUE(contains(field.err, "resident_blocks")) << field.err;
 }
 
+TEST_F(VolumeCommandLine, BakesWithFewBlocksInMemory) {
+  const Said said = run({"bake", model(), at("sparing"), "--resident-blocks", "1", "--json"});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.err, "raise --resident-blocks")) << said.err;
+  EXPECT_EQ(json::parse(said.out).at("tiles"), 3);
+  // As many as there are: the scene is the same.
+  ASSERT_EQ(run({"bake", model(), at("whole"), "--resident-blocks", "2"}).exitCode, 0);
+  const auto tileset = [](const std::string& of) { return readTextFile(fs::path(of) / "tileset.json"); };
+  EXPECT_EQ(tileset(at("whole")), tileset(scene()));
+  const auto psnr = [&](const std::string& of) {
+    EXPECT_EQ(run({"eval", of, at("city"), "--json", at("eval.json")}).exitCode, 0);
+    return json::parse(readTextFile(at("eval.json"))).at("psnr").get<double>();
+  };
+  EXPECT_NEAR(psnr(at("sparing")), psnr(scene()), 0.2);
+  EXPECT_EQ(run({"bake", model(), at("never"), "--resident-blocks", "-1"}).exitCode, 2);
+}
+
 TEST_F(VolumeCommandLine, LeavesTheOldSceneWholeWhenBakingIsKilled) {
-  const std::string rebaked = at("rebaked");
+  const std::string rebaked = at("rebaked"), other = at("other");
+  // Another model, with more to bake: there is time to kill it.
+  ASSERT_EQ(run(trainArguments(other, {"--steps", "30", "--set", "planes=512", "--set", "voxels=64"})).exitCode, 0);
   ASSERT_EQ(run({"bake", model(), rebaked}).exitCode, 0);
+  const auto tiles = [&] {
+    std::vector<fs::path> files;
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(fs::path(rebaked) / "tiles")) {
+      if (entry.path().extension() == ".glb") files.push_back(entry.path());
+    }
+    return files;
+  };
+  std::map<fs::path, Bytes> old;
+  for (const fs::path& file : tiles()) old[file] = readFile(file);
   const std::string before = readTextFile(fs::path(rebaked) / "tileset.json");
   {
-    Program program(folder_, {"bake", model(), rebaked});
+    Program program(folder_, {"bake", other, rebaked});
+    while (tiles().size() == old.size() && !program.ended()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     program.kill(SIGKILL);
-    program.wait();
+    ASSERT_EQ(program.wait().exitCode, 128 + SIGKILL) << "it was done before";
   }
   EXPECT_EQ(readTextFile(fs::path(rebaked) / "tileset.json"), before);
+  EXPECT_GT(tiles().size(), old.size()) << "with what was baked of the other";
+  for (const auto& [file, bytes] : old) EXPECT_EQ(readFile(file), bytes) << file;
   EXPECT_EQ(run({"eval", rebaked, at("city")}).exitCode, 0);
+  ASSERT_EQ(run({"bake", other, rebaked}).exitCode, 0);
+  EXPECT_NE(readTextFile(fs::path(rebaked) / "tileset.json"), before);
+  for (const auto& [file, bytes] : old) EXPECT_FALSE(fs::exists(file)) << "the old scene has gone";
 }
 
 TEST_F(VolumeCommandLine, RefusesBlocksThatAreNone) {
