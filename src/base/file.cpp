@@ -15,12 +15,18 @@ namespace tessera {
 namespace {
 
 template <class Container>
-Container readWhole(const fs::path& path) {
+Container readWhole(const fs::path& path, uint64_t mostBytes) {
   std::error_code status;
   if (fs::is_directory(path, status)) throw Error(path.string(), "", "is a folder, not a file", "name the file in it");
   std::ifstream in(path, std::ios::binary | std::ios::ate);
   if (!in) throw Error(path.string(), "", std::strerror(errno), "check the path and its permissions");
   const std::streamoff size = in.tellg();
+  if (size > 0 && static_cast<uint64_t>(size) > mostBytes) {
+    throw Error(path.string(), "",
+                "has " + std::to_string(size) + " bytes, where " + std::to_string(mostBytes) +
+                    " is the most that such a file may have",
+                "check that it is the right file");
+  }
   Container content;
   if (size > 0) {
     content.resize(static_cast<size_t>(size));
@@ -40,11 +46,11 @@ Container readWhole(const fs::path& path) {
 
 }  // namespace
 
-Bytes readFile(const fs::path& path) {
-  return readWhole<Bytes>(path);
+Bytes readFile(const fs::path& path, uint64_t mostBytes) {
+  return readWhole<Bytes>(path, mostBytes);
 }
-std::string readTextFile(const fs::path& path) {
-  return readWhole<std::string>(path);
+std::string readTextFile(const fs::path& path, uint64_t mostBytes) {
+  return readWhole<std::string>(path, mostBytes);
 }
 
 void writeFileAtomically(const fs::path& path, std::span<const std::byte> bytes, bool durable) {
