@@ -8,6 +8,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "base/error.h"
 #include "tiles/content_file.h"
 #include "tiles/glb.h"
 #include "tiles/lossless_image.h"
@@ -161,6 +162,38 @@ TEST(VolumePayload, BitsFillPicturesThatWebPCanHold) {
   EXPECT_LE(largest.height, static_cast<uint32_t>(kLargestLosslessSide));
   EXPECT_GE(uint64_t{largest.width} * largest.height * 8, cells * cells * cells);
   EXPECT_LE(sizeOfMacroblocks(kMostStored).width, static_cast<uint32_t>(kLargestLosslessSide));
+}
+
+TEST(VolumePayload, NamesTheSettingsThatMadeMoreThanReadersTake) {
+  const auto refuses = [](const std::string& why, const VolumeContent& content) {
+    try {
+      encodeVolume(content);
+      FAIL() << why;
+    } catch (const Error& error) {
+      EXPECT_NE(error.reason().find(why), std::string::npos) << error.what();
+      EXPECT_NE(error.remedy().find("--set"), std::string::npos) << error.what();
+    }
+  };
+  VolumeContent content = madeContent(2, 3);
+  for (VolumePart& part : content.parts) part.planes = 4096;  // texels are counted before they are looked at
+  refuses("readers take 1073741824 at most", content);
+  content = madeContent(2);
+  content.parts.resize(1025);
+  refuses("merges 1025 blocks", content);
+}
+
+TEST(VolumePayload, CountsTheTexelsThatItsPartsHold) {
+  const VolumeContent content = madeContent(3, 2);
+  VolumeContent without = content;
+  uint64_t texels = 0;
+  for (VolumePart& part : without.parts) {
+    texels += texelBytes(part, part.storedMacroblocks());
+    part.macroblocks.clear();
+    part.voxelBytes.clear();
+    part.distances.clear();
+    for (auto& plane : part.planeBytes) plane.clear();
+  }
+  EXPECT_EQ(texels, bytesInMemory(content) - bytesInMemory(without));
 }
 
 TEST(VolumePayload, NamesTheRuleThatIsBroken) {

@@ -40,11 +40,7 @@ struct PartHeader {
 
   uint32_t macroblockEdge() const { return part.voxels / VolumePart::kMacroblock; }
   uint32_t cells() const { return part.planes / VolumePart::kDistanceCell; }
-  uint64_t bytes() const {
-    const auto cube = [](uint64_t edge) { return edge * edge * edge; };
-    return 3 * VolumePart::kAttributes * uint64_t{part.planes} * part.planes + cube(cells()) +
-           uint64_t{stored} * VolumePart::kMacroblockBytes + 4 * cube(macroblockEdge());
-  }
+  uint64_t bytes() const { return texelBytes(part, stored); }
 };
 
 class VolumeReader {
@@ -239,9 +235,16 @@ std::optional<uint64_t> decodedBytes(std::span<const std::byte> file, std::strin
 
 VolumeContent readVolume(const fs::path& path, const VolumeLimits& limits) {
   std::string reason;
-  auto content = decodeVolume(readFile(path), reason, limits);
+  auto content = decodeVolume(readFile(path, limits.fileBytes), reason, limits);
   if (!content) throw Error(path.string(), "", reason, "copy the scene again, or bake it again");
   return std::move(*content);
+}
+
+uint64_t readDecodedBytes(const fs::path& path, const VolumeLimits& limits) {
+  std::string reason;
+  const auto bytes = decodedBytes(readFile(path, limits.fileBytes), reason, limits);
+  if (!bytes) throw Error(path.string(), "", reason, "copy the scene again, or bake it again");
+  return *bytes;
 }
 
 }  // namespace tessera
