@@ -100,6 +100,17 @@ TEST_F(File, RefusesWhatIsLargerThanAllowedBeforeItIsRead) {
   EXPECT_THROW(readFile(path, 999), Error);
 }
 
+TEST_F(File, ReadsTheStartOfAFileThatNoMemoryWouldHold) {
+  const fs::path path = root_ / "huge";
+  writeFileAtomically(path, std::string_view("text"));
+  EXPECT_EQ(readFileStart(path, 1000).size(), 4u);
+  fs::resize_file(path, uint64_t{1} << 43);
+  const Bytes start = readFileStart(path, 6);
+  EXPECT_EQ(std::string(reinterpret_cast<const char*>(start.data()), start.size()), std::string("text\0\0", 6));
+  EXPECT_TRUE(readFileStart(path, 0).empty());
+  EXPECT_THROW(readFileStart(root_ / "absent", 6), Error);
+}
+
 TEST_F(File, ResolvesWhatStaysInside) {
   const fs::path real = fs::canonical(root_);
   EXPECT_EQ(resolveInside(root_, "a/b.png"), real / "a/b.png");

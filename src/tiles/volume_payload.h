@@ -42,11 +42,9 @@ Bytes encodeVolume(const VolumeContent& content, int effort = 6);
 // it, or where the content would take more memory than the limit; that is known before it is taken.
 std::optional<VolumeContent> decodeVolume(std::span<const std::byte> file, std::string& reason,
                                           const VolumeLimits& limits = {});
-// What the decoded content takes in memory (bytesInMemory), by the headers alone.
-std::optional<uint64_t> decodedBytes(std::span<const std::byte> file, std::string& reason,
-                                     const VolumeLimits& limits = {});
-// The same of files; they throw Error naming the path.
+// The same of a file; throws Error naming it.
 VolumeContent readVolume(const fs::path& path, const VolumeLimits& limits = {});
+// What it will take in memory (bytesInMemory), by its headers alone: its texels are not read.
 uint64_t readDecodedBytes(const fs::path& path, const VolumeLimits& limits = {});
 
 }  // namespace tessera
