@@ -139,6 +139,26 @@ TEST_F(VolumeSceneThatLies, IsRefusedWhereAPartLeavesTheBoxOfItsContent) {
   EXPECT_EQ(openVolumeScene(folder_).source.load(2).parts.size(), 1u);
 }
 
+// The format allows them.
+TEST_F(VolumeSceneThatLies, IsRefusedWithSeveralContentsOfATileWhichAreNotDrawn) {
+  std::vector<TileContent>& contents = tileset_.tiles[0].contents;
+  contents.insert(contents.begin(), contents[0]);
+  for (size_t i = 0; i < 2; ++i) {
+    const uint32_t column = static_cast<uint32_t>(i);
+    contents[i] = tileset_.tiles[i + 1].contents[0];
+    contents[i].cells = {{column, 0}, {column + 1, 1}};
+  }
+  writeFileAtomically(folder_ / "tileset.json", encodeTileset(tileset_));
+  try {
+    openVolumeScene(folder_);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.subject(), (folder_ / "tileset.json").string());
+    EXPECT_EQ(error.place(), "tile 0");
+    EXPECT_EQ(error.remedy(), "give each a tile of its own");
+  }
+}
+
 TEST_F(VolumeSceneThatLies, IsNotReadWhereItsFilesAreLargerThanAnyShouldBe) {
   const VolumeScene scene = openVolumeScene(folder_);
   fs::resize_file(scene.source.file(1), (uint64_t{1} << 30) + 1);  // a hole
