@@ -120,6 +120,19 @@ TEST_F(VolumeCommandLine, GoesTheWholeWayFromACityToThePicturesOfAScene) {
   EXPECT_GT(sum("bytes_in_memory"), static_cast<int64_t>(onDisk));
 }
 
+TEST_F(VolumeCommandLine, DrawsNoLevelThatHoldsNothingButTheOthers) {
+  const Said trained = run(trainArguments(at("flat"), {"--steps", "10", "--set", "level_share=0"}));
+  ASSERT_EQ(trained.exitCode, 0) << trained.err;
+  ASSERT_EQ(run({"bake", at("flat"), at("flat.scene")}).exitCode, 0);
+  const json tileset = json::parse(readTextFile(fs::path(at("flat.scene")) / "tileset.json"));
+  EXPECT_EQ(tileset.at("extensions").at("TESSERA_scene").at("levels"), 2);  // the root is one
+  const Said said = run({"eval", at("flat.scene"), at("city"), "--lod", "1"});
+  EXPECT_EQ(said.exitCode, 1);
+  EXPECT_TRUE(contains(said.err, "flat.scene")) << said.err;
+  EXPECT_TRUE(contains(said.err, "has level 0 only")) << said.err;
+  EXPECT_EQ(run({"eval", at("flat.scene"), at("city"), "--lod", "0"}).exitCode, 0);
+}
+
 TEST_F(VolumeCommandLine, MeasuresWhatSkippingSavesAndAFlightWithASmallCache) {
   const Said said = run({"bench", "render", scene(), "--views", at("city"), "--flight", "--steps", "20", "--share", "4",
                          "--json", at("bench.json")});
