@@ -1,12 +1,14 @@
 #!/usr/bin/env bash
-# City-on-Web's ablation (table 5) on the processor, in a made city of 2x2 blocks; all models take equal steps, and baked
-# scenes are judged.
-#   consistency  blocks trained together against blocks trained apart, each on all photos with a surround of its own, and
-#                merged. The merged model is given the surround of the joint one.
+# City-on-Web's ablation (table 5) on the processor, in a made city of 2x2 blocks; all models take equal steps of equal
+# numbers of rays, and baked scenes are judged.
+#   consistency  blocks trained together against blocks trained apart, and merged: each with a surround of its own (which
+#                can stand behind its box only), and a quarter of the rays, all of them through it (and as
+#                many points of the sparsity loss a block: 4096 in five, 1638 in two). The merged model is
+#                given the surround of the joint one.
 #   resolution   four blocks against one block of their size together, with twice the resolution along each axis, tables
 #                four times as large, and every distance that settings measure in blocks halved.
 # Resumable: all is kept in build/bench/consistency, and what is there is not made again.
-#   [ROWS="consistency resolution"] [SEEDS="1 2 3"] [STEPS=2500] [CITY="--size 400x300"] bench/consistency.sh
+#   [ROWS="consistency resolution"] [SEEDS="1 2 3"] [STEPS=1500] [RAYS=4096] [CITY="--size 400x300"] bench/consistency.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
@@ -16,19 +18,21 @@ for program in merge_blocks border_error; do
 done
 work=$out/consistency
 seeds=${SEEDS:-1 2 3}
-settings="STEPS=${STEPS:-2500} CITY='${CITY:-}'"
+steps=${STEPS:-1500} rays=${RAYS:-4096}
+settings="STEPS=$steps RAYS=$rays CITY='${CITY:-}'"
 mkdir -p "$work"
 [ -e "$work/settings" ] || echo "$settings" > "$work/settings"
 [ "$(cat "$work/settings")" = "$settings" ] || die "$work was made with $(cat "$work/settings"): repeat those, or remove it"
 [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2 ${CITY:-}
 
-# volume MODEL SEED ARGUMENTS...
+# volume MODEL SEED RAYS ARGUMENTS...: with more room for texels than so many rays can want, so that their number stays.
 volume() {
-  local model=$1 seed=$2
-  shift 2
-  trained "$model" city --method volume --seed "$seed" --steps "${STEPS:-2500}" --set level_share=0 "$@"
+  local model=$1 seed=$2 number=$3
+  shift 3
+  trained "$model" city --method volume --seed "$seed" --steps "$steps" --set level_share=0 \
+    --set first_rays="$number" --set most_rays="$number" --set texels_per_step=$((512 * number)) "$@"
 }
-joint() { volume "joint-$1" "$1" --blocks 2x2; }
+joint() { volume "joint-$1" "$1" "$rays" --blocks 2x2; }
 # grid NAME JQ: $work/NAME.json, the joint blocks changed. The capture decides them, whatever the seed.
 grid() { jq "$2" "$work/joint-${seeds%% *}/blocks.json" > "$work/$1.json"; }
 # scene MODEL: baked from it, and judged as a whole and along the joint blocks' walls.
@@ -65,7 +69,8 @@ consistency() {
     apart=()
     for block in 0 1 2 3; do
       grid "block-$block" ".grid.origin = .blocks[$block].centre | .grid.columns = 1 | .grid.rows = 1"
-      volume "apart-$seed-$block" "$seed" --grid "$work/block-$block.json"
+      volume "apart-$seed-$block" "$seed" $((rays / 4)) --grid "$work/block-$block.json" --set blocks_only=true \
+        --set sparsity_points=1638
       apart+=("$work/apart-$seed-$block")
     done
     [ -e "$work/merged-$seed/manifest.json" ] ||
@@ -100,7 +105,7 @@ resolution() {
   four=joint-$seed one=whole-$seed
   joint "$seed"
   grid whole '.grid.edge *= 2 | .grid.columns = 1 | .grid.rows = 1'
-  volume "$one" "$seed" --grid "$work/whole.json" --set voxels=256 --set planes=1024 --set grid_log2_size=19 \
+  volume "$one" "$seed" "$rays" --grid "$work/whole.json" --set voxels=256 --set planes=1024 --set grid_log2_size=19 \
     --set grid_finest=1024 --set proposal_log2_size=16 --set proposal_finest=256 --set near=0.025 \
     --set full_gradient_distance=0.5
   for what in "$four" "$one"; do

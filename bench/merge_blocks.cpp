@@ -12,8 +12,8 @@
 namespace tessera {
 namespace {
 
-// Throws Error unless `apart` is cell `cell` of the joint model, with the same settings: local coordinates must mean
-// the same.
+// Throws Error unless `apart` is cell `cell` of the joint model, with the same settings but for how many rays and
+// points a step has: local coordinates must mean the same.
 void requireCell(const fs::path& folder, VolumeModel& apart, VolumeModel& joint, int cell) {
   const auto refuse = [&](const char* file, const std::string& why) {
     throw Error((folder / file).string(), "", why, "train it with --grid and the settings of the joint model");
@@ -27,6 +27,11 @@ void requireCell(const fs::path& folder, VolumeModel& apart, VolumeModel& joint,
     refuse("blocks.json", "is not block " + std::to_string(cell) + " alone");
   }
   VolumeConfig has = apart.config(), wants = joint.config();
+  for (const auto which : {&VolumeConfig::firstRays, &VolumeConfig::mostRays, &VolumeConfig::texelsPerStep,
+                           &VolumeConfig::sparsityPoints}) {
+    has.*which = wants.*which;
+  }
+  has.blocksOnly = wants.blocksOnly;
   if (configToToml(has.fields()) != configToToml(wants.fields())) {
     refuse("config.toml", "has other settings than the joint model");
   }

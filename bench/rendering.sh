@@ -5,22 +5,24 @@
 #   flight    600 pictures over all blocks of a city of 4x4, hardly trained, with a cache of a quarter of the finest level:
 #             never over the budget, never without the coarsest level, and wherever all that the view asks for is there,
 #             the picture that a cache without a budget gives
+# Resumable: captures, models and scenes stay in build/bench/rendering, and what is there is not made again.
 #   [ROWS="skipping flight"] [MINUTES=4] bench/rendering.sh [SCENE CAPTURE]     both rows of this scene instead
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
 [ $# -eq 0 ] || [ $# -eq 2 ] || die "usage: bench/rendering.sh [SCENE CAPTURE]"
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
+work=$out/rendering
+mkdir -p "$work"
 
 # made BLOCKS SIZE STRIDE ARGUMENTS...: $scene and $capture, of a city trained with these arguments, baked with that stride.
 made() {
   local blocks=$1 size=$2 stride=$3
   shift 3
   scene=$work/$blocks.scene capture=$work/$blocks.city
-  "$tessera" synth city "$capture" --blocks "$blocks" --size "$size" --samples 1
-  "$tessera" train "$capture" "$work/$blocks.model" --method volume --blocks "$blocks" "$@"
-  "$tessera" bake "$work/$blocks.model" "$scene" --stride "$stride" --effort 0
+  [ -e "$capture/transforms.json" ] ||
+    "$tessera" synth city "$capture" --blocks "$blocks" --size "$size" --samples 1
+  trained "$blocks.model" "$blocks.city" --method volume --blocks "$blocks" "$@"
+  [ -e "$scene/tileset.json" ] || "$tessera" bake "$work/$blocks.model" "$scene" --stride "$stride" --effort 0
 }
 
 skipping() {

@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <nlohmann/json.hpp>
 
+#include "render/cpu/draw_volume.h"
+#include "render/volume_scene.h"
 #include "tiles/scene_folder.h"
 #include "tiles/volume_payload.h"
 
@@ -35,8 +38,13 @@ std::string nameOfUri(const std::string& uri) {
 }
 
 void expectSame(const VolumeContent& a, const VolumeContent& b) {
+  EXPECT_EQ(a.featureRange, b.featureRange);
+  EXPECT_EQ(a.densityRange, b.densityRange);
+  EXPECT_EQ(a.stepsPerTexel, b.stepsPerTexel);
   ASSERT_EQ(a.network.size(), b.network.size());
   for (size_t i = 0; i < a.network.size(); ++i) {
+    EXPECT_EQ(a.network[i].inputs, b.network[i].inputs);
+    EXPECT_EQ(a.network[i].outputs, b.network[i].outputs);
     EXPECT_EQ(a.network[i].weights, b.network[i].weights);
     EXPECT_EQ(a.network[i].biases, b.network[i].biases);
   }
@@ -48,6 +56,8 @@ void expectSame(const VolumeContent& a, const VolumeContent& b) {
     EXPECT_EQ(a.parts[i].high, b.parts[i].high);
     EXPECT_EQ(a.parts[i].contracted, b.parts[i].contracted);
     EXPECT_EQ(a.parts[i].surround, b.parts[i].surround);
+    EXPECT_EQ(a.parts[i].voxels, b.parts[i].voxels);
+    EXPECT_EQ(a.parts[i].planes, b.parts[i].planes);
     EXPECT_EQ(a.parts[i].macroblocks, b.parts[i].macroblocks);
     EXPECT_EQ(a.parts[i].voxelBytes, b.parts[i].voxelBytes);
     EXPECT_EQ(a.parts[i].planeBytes, b.parts[i].planeBytes);
@@ -98,6 +108,49 @@ TEST(GoldenVolume, IsTheSameWhenItIsWrittenAgain) {
       expectSame(volume, *again);
     }
   }
+}
+
+// The oracle, which reckons in floats, against the definition.
+TEST(GoldenVolume, LooksAlongItsRaysAsTheDefinitionSays) {
+  const VolumeScene scene = openVolumeScene(kScene);
+  std::vector<VolumeContent> contents;
+  for (size_t i = 0; i < scene.tree.tiles.size(); ++i) contents.push_back(scene.source.load(static_cast<int>(i)));
+  const auto rays = nlohmann::json::parse(readTextFile(kScene / "rays.json"));
+  EXPECT_EQ(rays.size(), 60u);
+  std::map<std::string, int> kinds;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    const auto& ray = rays[i];
+    const auto vector = [&](const char* key) { return Vec3d(ray.at(key).at(0), ray.at(key).at(1), ray.at(key).at(2)); };
+    const SceneRay along{vector("origin"), vector("direction")};
+    VolumeDrawing drawing{scene.frame, {}, &contents[scene.tree.surround], {}};
+    drawing.march.minTransmittance = 0;
+    if (ray.at("level") == 1) {
+      drawing.frontToBack = {&contents[0]};
+    } else {
+      for (const int tile : scene.tree.childrenFrontToBack(0, along.origin)) {
+        drawing.frontToBack.push_back(&contents[tile]);
+      }
+    }
+    MarchCounts counts;
+    const BlendedRay seen = VolumeRayCaster(drawing).cast(along, INFINITY, counts);
+    const double opacity = ray.at("opacity"), distance = ray.at("distance");
+    const Vec3d colour = vector("colour");
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen.colour[c], colour[c], 1e-4) << "ray " << i;
+    EXPECT_NEAR(1 - seen.transmittance, opacity, 1e-4) << "ray " << i;
+    EXPECT_NEAR(seen.depth, distance, 1e-4 * (1 + distance)) << "ray " << i;
+    ++kinds[opacity > 0.99 ? "opaque" : "open"];
+    kinds["coarse"] += ray.at("level") == 1;
+    kinds["far"] += distance > 6;
+    drawing.frontToBack.resize(1);
+    drawing.surround = nullptr;
+    const float left = VolumeRayCaster(drawing).cast(along, INFINITY, counts).transmittance;
+    kinds["blended"] += left > 0.05f && left < 0.95f;
+  }
+  EXPECT_GE(kinds["opaque"], 20);
+  EXPECT_GE(kinds["open"], 4);
+  EXPECT_GE(kinds["coarse"], 16);
+  EXPECT_GE(kinds["far"], 10);
+  EXPECT_GE(kinds["blended"], 5);
 }
 
 // Samples along a vertical line through a building: there is something, and it is where it should be.

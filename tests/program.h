@@ -10,6 +10,7 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -87,9 +88,19 @@ inline bool isInPath(const std::string& name) {
   return false;
 }
 
-// Until the file is there, or the program has ended.
+// Until it is so, or the program has ended.
+template <class Condition>
+void waitUntil(Program& program, const Condition& isSo) {
+  while (!isSo() && !program.ended()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+}
 inline void waitForFile(Program& program, const fs::path& file) {
-  while (!fs::exists(file) && !program.ended()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  waitUntil(program, [&] { return fs::exists(file); });
+}
+
+// Of a model's last checkpoint; -1 where there is none.
+inline int64_t stepOf(const fs::path& model) {
+  const fs::path manifest = model / "manifest.json";
+  return fs::exists(manifest) ? nlohmann::json::parse(readTextFile(manifest)).at("step").get<int64_t>() : -1;
 }
 
 }  // namespace tessera

@@ -121,6 +121,19 @@ TEST_F(VolumeCommandLine, GoesTheWholeWayFromACityToThePicturesOfAScene) {
   EXPECT_GT(sum("bytes_in_memory"), static_cast<int64_t>(onDisk));
 }
 
+TEST_F(VolumeCommandLine, DrawsNoLevelThatHoldsNothingButTheOthers) {
+  const Said trained = run(trainArguments(at("flat"), {"--steps", "10", "--set", "level_share=0"}));
+  ASSERT_EQ(trained.exitCode, 0) << trained.err;
+  ASSERT_EQ(run({"bake", at("flat"), at("flat.scene")}).exitCode, 0);
+  const json tileset = json::parse(readTextFile(fs::path(at("flat.scene")) / "tileset.json"));
+  EXPECT_EQ(tileset.at("extensions").at("TESSERA_scene").at("levels"), 2);  // the root is one
+  const Said said = run({"eval", at("flat.scene"), at("city"), "--lod", "1"});
+  EXPECT_EQ(said.exitCode, 1);
+  EXPECT_TRUE(contains(said.err, "flat.scene")) << said.err;
+  EXPECT_TRUE(contains(said.err, "has level 0 only")) << said.err;
+  EXPECT_EQ(run({"eval", at("flat.scene"), at("city"), "--lod", "0"}).exitCode, 0);
+}
+
 TEST_F(VolumeCommandLine, MeasuresWhatSkippingSavesAndAFlightWithASmallCache) {
   const Said said = run({"bench", "render", scene(), "--views", at("city"), "--flight", "--steps", "20", "--share", "4",
                          "--json", at("bench.json")});
@@ -156,8 +169,9 @@ TEST_F(VolumeCommandLine, EndsWithTheSameBytesHoweverOftenItIsKilled) {
   const std::string unbroken = at("unbroken"), killed = at("killed");
   ASSERT_EQ(run(trainArguments(unbroken, {"--steps", "60"})).exitCode, 0);
   for (int times = 0; times < 3; ++times) {
+    const int64_t before = stepOf(killed);
     Program program(folder_, trainArguments(killed, {"--steps", "60", "--resume", "--checkpoint-seconds", "0"}));
-    waitForFile(program, fs::path(killed) / "manifest.json");
+    waitUntil(program, [&] { return stepOf(killed) > before + 2; });
     program.kill(SIGKILL);
     program.wait();
   }
@@ -225,8 +239,26 @@ TEST_F(VolumeCommandLine, LeavesTheOldSceneWholeWhenBakingIsKilled) {
   for (const auto& [file, bytes] : old) EXPECT_FALSE(fs::exists(file)) << "the old scene has gone";
 }
 
+TEST_F(VolumeCommandLine, TakesThePresetOfASettingsFile) {
+  const fs::path file = folder_ / "settings.toml";
+  writeFileAtomically(file, "preset = \"huge\"\n");
+  const Said said = run({"train", at("city"), at("never"), "--method", "volume", "--config", file.string()});
+  EXPECT_EQ(said.exitCode, 1);
+  EXPECT_TRUE(contains(said.err, "preset=huge")) << said.err;
+  writeFileAtomically(file, "preset = \"paper\"\n");
+  EXPECT_EQ(run(trainArguments(at("paper"), {"--steps", "1", "--config", file.string()})).exitCode, 0);
+  EXPECT_TRUE(contains(readTextFile(folder_ / "paper/config.toml"), "hidden = 3"));
+}
+
+TEST_F(VolumeCommandLine, PlansForTheMemoryThatItIsGiven) {
+  const Said said = run(trainArguments(at("planned"), {"--steps", "2", "--memory-mib", "1"}));
+  EXPECT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.err, "more than the 1 MiB there are")) << said.err;
+  EXPECT_FALSE(contains(run(trainArguments(at("planned"), {"--steps", "2", "--resume"})).err, "there are"));
+}
+
 TEST_F(VolumeCommandLine, RefusesBlocksThatAreNone) {
-  for (const char* blocks : {"2", "0x2", "2x", "-1x2", "many", "99999x99999"}) {
+  for (const char* blocks : {"2", "0x2", "2x", "-1x2", "many", "5000x1", "99999x99999"}) {
     std::vector<std::string> arguments = {"train", at("city"), at("never"), "--method", "volume", "--blocks", blocks};
     const Said said = run(arguments);
     EXPECT_EQ(said.exitCode, 2) << blocks << said.err;

@@ -66,9 +66,11 @@ class DrawableScene final : public Drawable {
   DrawableScene(const fs::path& folder, const DrawableOptions& options)
       : folder_(folder), tileset_(readTileset(folder)) {
     VolumeRendererSettings settings;
-    if (static_cast<uint32_t>(options.level) >= tileset_.levels) {
+    // Not the number of levels: a root that only holds the others together is one of them.
+    if (const uint32_t coarsest = coarsestLevel(tileset_); static_cast<uint32_t>(options.level) > coarsest) {
       throw Error(folder.string(), fmt::format("--lod {}", options.level),
-                  fmt::format("the scene has levels 0 to {}", tileset_.levels - 1), "name one of those");
+                  coarsest == 0 ? "the scene has level 0 only" : fmt::format("the scene has levels 0 to {}", coarsest),
+                  coarsest == 0 ? "leave it out" : "name one of those");
     }
     settings.selection.mostPixels = 0;  // the finest everywhere
     settings.selection.finestLevel = options.level;

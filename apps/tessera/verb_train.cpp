@@ -30,6 +30,7 @@ struct TrainFlags {
   DeviceOptions device;
   std::string capture, model;
   TrainingLoopOptions loop;
+  double memoryMiB = 0;
   bool json = false;
 };
 
@@ -47,6 +48,10 @@ Config chosenConfig(const TrainFlags& flags, Config config) {
 
 VolumeConfig volumeDefaults(const TrainFlags& flags) {
   VolumeConfig config;
+  if (!flags.configFile.empty()) {
+    configFromToml(config.fields(), flags.configFile);
+    config = VolumeConfig::ofPreset(config.preset);
+  }
   constexpr std::string_view kPreset = "preset=";
   for (const std::string& setting : flags.settings) {
     if (setting.starts_with(kPreset)) config = VolumeConfig::ofPreset(setting.substr(kPreset.size()));
@@ -58,6 +63,7 @@ TrainingResult train(Device& device, const TrainFlags& flags) {
   const Capture capture = readCapture(flags.capture);
   if (flags.method == "field") {
     if (!flags.grid.empty()) throw CLI::ValidationError("--grid", "is of --method volume");
+    if (flags.memoryMiB > 0) throw CLI::ValidationError("--memory-mib", "is of --method volume");
     return trainField(device, capture, flags.model, {chosenConfig(flags, FieldConfig()), flags.loop});
   }
   const std::optional<BlockCount> blocks = parseBlockCount(flags.blocks);
@@ -65,7 +71,7 @@ TrainingResult train(Device& device, const TrainFlags& flags) {
   std::optional<BlockGrid> grid;
   if (!flags.grid.empty()) grid = readGrid(flags.grid, capture);
   return trainVolume(device, capture, flags.model,
-                     {chosenConfig(flags, volumeDefaults(flags)), flags.loop, *blocks, grid});
+                     {chosenConfig(flags, volumeDefaults(flags)), flags.loop, *blocks, grid, flags.memoryMiB});
 }
 
 }  // namespace
@@ -84,7 +90,7 @@ void addTrainVerb(CLI::App& app) {
       ->capture_default_str()
       ->check(CLI::IsMember({"field", "volume"}));
   CLI::Option* steps = verb->add_option("--steps", flags->loop.steps, "training steps")
-                           ->capture_default_str()
+                           ->default_str(fmt::format("{}, or what the run that is resumed had planned", kDefaultSteps))
                            ->check(CLI::Range(int64_t{1}, int64_t{1} << 40));
   verb->add_option("--minutes", flags->loop.minutes, "as many steps as fit; fixed once, early")
       ->check(amount(1e-3, 1e7))
@@ -100,6 +106,9 @@ void addTrainVerb(CLI::App& app) {
                    "of --method volume: so many blocks in memory at once, the others on disk; the same as --set "
                    "resident_blocks=...")
       ->check(CLI::Range(1, 1 << 20));
+  verb->add_option("--memory-mib", flags->memoryMiB,
+                   "of --method volume: memory to plan blocks and photos for; default: what the machine has")
+      ->check(amount(1, 1e9));
   verb->add_option("--seed", flags->seed, "of everything random, a whole number; the same as --set seed=...");
   verb->add_option("--config", flags->configFile, "settings file (TOML)")->check(CLI::ExistingFile);
   verb->add_option("--set", flags->settings, "key=value, as often as wanted");
@@ -108,7 +117,6 @@ void addTrainVerb(CLI::App& app) {
       ->check(amount(0, 1e9));
   verb->add_flag("--json", flags->json, "print the result as one JSON object");
   addDeviceFlags(*verb, flags->device);
-  flags->loop.steps = 10000;
   verb->callback([flags] {
     catchInterrupts();
     flags->loop.stopRequested = interrupted;

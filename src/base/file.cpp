@@ -14,21 +14,39 @@
 namespace tessera {
 namespace {
 
-template <class Container>
-Container readWhole(const fs::path& path) {
+// Nothing is read yet; `size` is that of the file.
+std::ifstream openFile(const fs::path& path, uint64_t& size) {
   std::error_code status;
   if (fs::is_directory(path, status)) throw Error(path.string(), "", "is a folder, not a file", "name the file in it");
   std::ifstream in(path, std::ios::binary | std::ios::ate);
   if (!in) throw Error(path.string(), "", std::strerror(errno), "check the path and its permissions");
-  const std::streamoff size = in.tellg();
+  size = static_cast<uint64_t>(std::max(in.tellg(), std::streampos(0)));
+  in.seekg(0);
+  return in;
+}
+
+template <class Container>
+Container readBytes(std::ifstream& in, const fs::path& path, uint64_t bytes) {
   Container content;
-  if (size > 0) {
-    content.resize(static_cast<size_t>(size));
-    in.seekg(0);
-    in.read(reinterpret_cast<char*>(content.data()), size);
+  if (bytes > 0) {
+    content.resize(bytes);
+    in.read(reinterpret_cast<char*>(content.data()), static_cast<std::streamsize>(bytes));
   }
   if (!in) throw Error(path.string(), "", "could not be read to its end", "check the disk");
   return content;
+}
+
+template <class Container>
+Container readWhole(const fs::path& path, uint64_t mostBytes) {
+  uint64_t size = 0;
+  std::ifstream in = openFile(path, size);
+  if (size > mostBytes) {
+    throw Error(path.string(), "",
+                "has " + std::to_string(size) + " bytes, where " + std::to_string(mostBytes) +
+                    " is the most that such a file may have",
+                "check that it is the right file");
+  }
+  return readBytes<Container>(in, path, size);
 }
 
 [[noreturn]] void failWriting(const fs::path& path, const fs::path& partial) {
@@ -40,11 +58,17 @@ Container readWhole(const fs::path& path) {
 
 }  // namespace
 
-Bytes readFile(const fs::path& path) {
-  return readWhole<Bytes>(path);
+Bytes readFile(const fs::path& path, uint64_t mostBytes) {
+  return readWhole<Bytes>(path, mostBytes);
 }
-std::string readTextFile(const fs::path& path) {
-  return readWhole<std::string>(path);
+std::string readTextFile(const fs::path& path, uint64_t mostBytes) {
+  return readWhole<std::string>(path, mostBytes);
+}
+
+Bytes readFileStart(const fs::path& path, uint64_t bytes) {
+  uint64_t size = 0;
+  std::ifstream in = openFile(path, size);
+  return readBytes<Bytes>(in, path, std::min(size, bytes));
 }
 
 void writeFileAtomically(const fs::path& path, std::span<const std::byte> bytes, bool durable) {

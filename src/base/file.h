@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -14,9 +15,12 @@ namespace tessera {
 namespace fs = std::filesystem;
 using Bytes = std::vector<std::byte>;
 
-// The whole file. Throws Error naming the path when it cannot be read.
-Bytes readFile(const fs::path& path);
-std::string readTextFile(const fs::path& path);
+// The whole file. Throws Error naming the path when it cannot be read, or is larger than `mostBytes`: no memory is
+// taken for it then.
+Bytes readFile(const fs::path& path, uint64_t mostBytes = UINT64_MAX);
+std::string readTextFile(const fs::path& path, uint64_t mostBytes = UINT64_MAX);
+// Its first bytes: all where it has fewer. Throws Error likewise.
+Bytes readFileStart(const fs::path& path, uint64_t bytes);
 
 // Writes `path` + ".partial-<pid>" and renames it over `path`, so that a reader (or a kill) sees the old file or the
 // new one, never a piece. With `durable` the bytes reach the disk before the rename. Parent folders are made. What is

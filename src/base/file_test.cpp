@@ -82,6 +82,35 @@ TEST_F(File, NamesThePathItCannotRead) {
   EXPECT_THROW(readFile(root_), Error);
 }
 
+TEST_F(File, RefusesWhatIsLargerThanAllowedBeforeItIsRead) {
+  const fs::path path = root_ / "huge";
+  writeFileAtomically(path, std::string_view("text"));
+  fs::resize_file(path, uint64_t{1} << 43);  // a hole: no disk, but no machine's memory would hold it
+  try {
+    readFile(path, 1000);
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.subject(), path.string());
+    EXPECT_NE(error.reason().find("8796093022208 bytes"), std::string::npos) << error.what();
+    EXPECT_NE(error.reason().find(" 1000 "), std::string::npos) << error.what();
+  }
+  EXPECT_THROW(readTextFile(path, 1000), Error);
+  fs::resize_file(path, 1000);
+  EXPECT_EQ(readFile(path, 1000).size(), 1000u);
+  EXPECT_THROW(readFile(path, 999), Error);
+}
+
+TEST_F(File, ReadsTheStartOfAFileThatNoMemoryWouldHold) {
+  const fs::path path = root_ / "huge";
+  writeFileAtomically(path, std::string_view("text"));
+  EXPECT_EQ(readFileStart(path, 1000).size(), 4u);
+  fs::resize_file(path, uint64_t{1} << 43);
+  const Bytes start = readFileStart(path, 6);
+  EXPECT_EQ(std::string(reinterpret_cast<const char*>(start.data()), start.size()), std::string("text\0\0", 6));
+  EXPECT_TRUE(readFileStart(path, 0).empty());
+  EXPECT_THROW(readFileStart(root_ / "absent", 6), Error);
+}
+
 TEST_F(File, ResolvesWhatStaysInside) {
   const fs::path real = fs::canonical(root_);
   EXPECT_EQ(resolveInside(root_, "a/b.png"), real / "a/b.png");

@@ -1,6 +1,12 @@
 #include "export/whole_folder.h"
 
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
 #include <unistd.h>
+
+#include <cerrno>
+#include <charconv>
 
 #include "base/error.h"
 
@@ -9,6 +15,22 @@ namespace {
 
 Error couldNot(const fs::path& path, const std::error_code& status) {
   return Error(path.string(), "", "could not be written: " + status.message(), "check free space and permissions");
+}
+
+// What processes left behind that were killed while they wrote there.
+void removeLeftovers(const fs::path& place) {
+  const std::string prefix = place.filename().string() + ".partial-";
+  std::error_code ignored;
+  const fs::path parent = place.has_parent_path() ? place.parent_path() : fs::path(".");
+  for (const fs::directory_entry& entry : fs::directory_iterator(parent, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(prefix)) continue;
+    int process = 0;
+    const char* const end = name.data() + name.size();
+    const auto [read, error] = std::from_chars(name.data() + prefix.size(), end, process);
+    if (error != std::errc() || read != end || process <= 0) continue;
+    if (::kill(process, 0) != 0 && errno == ESRCH) fs::remove_all(entry.path(), ignored);
+  }
 }
 
 }  // namespace
@@ -29,6 +51,7 @@ WholeFolder::WholeFolder(const fs::path& place, const std::function<bool(const s
     }
     if (status) throw Error(place.string(), "", status.message(), "check its permissions");
   }
+  removeLeftovers(place_);
   fs::remove_all(beside_, status);
   fs::create_directories(beside_, status);
   if (status) throw couldNot(place, status);
@@ -40,18 +63,29 @@ WholeFolder::~WholeFolder() {
 }
 
 void WholeFolder::commit() {
-  std::error_code status, ignored;
-  fs::path old = place_;
-  old += ".old-" + std::to_string(::getpid());
-  const bool replaces = fs::exists(place_, status);
-  if (replaces) fs::rename(place_, old, status);
-  if (status) throw couldNot(place_, status);
-  fs::rename(beside_, place_, status);
-  if (status) {
-    if (replaces) fs::rename(old, place_, ignored);
-    throw couldNot(place_, status);
+  std::error_code status;
+  if (fs::exists(place_, status)) {
+    // At every moment one of the two stands there.
+    if (::renameat2(AT_FDCWD, beside_.c_str(), AT_FDCWD, place_.c_str(), RENAME_EXCHANGE) == 0) {
+      fs::remove_all(beside_, status);
+      return;
+    }
+    // Some file systems cannot.
+    fs::path old = beside_;
+    old.replace_filename(place_.filename().string() + ".old");
+    fs::remove_all(old, status);
+    fs::rename(place_, old, status);
+    if (!status) fs::rename(beside_, place_, status);
+    if (status) {
+      std::error_code ignored;
+      if (!fs::exists(place_, ignored)) fs::rename(old, place_, ignored);
+      throw couldNot(place_, status);
+    }
+    fs::remove_all(old, status);
+    return;
   }
-  fs::remove_all(old, ignored);
+  fs::rename(beside_, place_, status);
+  if (status) throw couldNot(place_, status);
 }
 
 }  // namespace tessera

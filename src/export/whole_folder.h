@@ -10,6 +10,7 @@ namespace tessera {
 
 class WholeFolder {
  public:
+  // Removes what was left beside `place` by processes that were killed.
   // Throws Error where `place` is something that may not be replaced: a file, or a folder that holds anything which is
   // not a file that `isOurs` by its name.
   WholeFolder(const fs::path& place, const std::function<bool(const std::string& name)>& isOurs);

@@ -59,6 +59,15 @@ TEST_F(WholeFolderOnDisk, TakesThePlaceOfAnOlderOne) {
   EXPECT_EQ(entries(), 1u);
 }
 
+TEST_F(WholeFolderOnDisk, RemovesWhatKilledProcessesLeftBeside) {
+  constexpr int kNobody = 1 << 30;  // above any process number
+  write("new.partial-" + std::to_string(kNobody) + "/part1", "1");
+  write("new.partial-" + std::to_string(::getppid()) + "/part1", "1");
+  write("new.partial-mine/part1", "1");
+  WholeFolder(root_ / "new", isOurs).commit();
+  EXPECT_EQ(entries(), 3u) << "the new one, one that is still written, and one that nobody knows";
+}
+
 TEST_F(WholeFolderOnDisk, RefusesAPlaceThatHoldsSomethingElse) {
   write("file", "x");
   write("mixed/part1", "1");

@@ -30,6 +30,11 @@ void ParameterGroup::step(Device& device, Adam settings) {
   device.run(settings);
 }
 
+bool ParameterGroup::allFinite(Device& device) const {
+  const std::vector<float> all = device.read(values.all());
+  return std::all_of(all.begin(), all.end(), [](float value) { return std::isfinite(value); });
+}
+
 void TensorSet::addBytes(const std::string& name, TensorType type, std::span<const std::byte> bytes, size_t elements) {
   tensors_[name] = {type, static_cast<int64_t>(elements), Bytes(bytes.begin(), bytes.end())};
 }

@@ -25,6 +25,8 @@ struct ParameterGroup {
 
   // One step with the accumulated gradients, which are zero afterwards.
   void step(Device& device, Adam settings);
+
+  bool allFinite(Device& device) const;  // of the values; waits
 };
 
 // Tensors by name, owning their bytes: what a checkpoint is made of.

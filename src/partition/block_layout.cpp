@@ -16,7 +16,7 @@ namespace {
 constexpr double kSlack = 1e-9;  // relative: what rounding may add to a whole number of cells
 
 int cellsAlong(double length, double edge) {
-  return static_cast<int>(std::clamp(std::ceil(length / edge * (1 - kSlack)), 1.0, static_cast<double>(kMostBlocks)));
+  return static_cast<int>(std::clamp(std::ceil(length / edge * (1 - kSlack)), 1.0, static_cast<double>(kMostAlong)));
 }
 
 double cellsFor(const Rectangle& region, double edge) {
@@ -50,7 +50,7 @@ std::optional<BlockCount> parseBlockCount(std::string_view text) {
   BlockCount count{false, 0, 0};
   const auto read = [](std::string_view digits, int& value) {
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    return error == std::errc() && end == digits.data() + digits.size() && value >= 1 && value <= kMostBlocks;
+    return error == std::errc() && end == digits.data() + digits.size() && value >= 1 && value <= kMostAlong;
   };
   if (!read(text.substr(0, times), count.columns) || !read(text.substr(times + 1), count.rows)) return std::nullopt;
   if (count.columns > kMostBlocks / count.rows) return std::nullopt;

@@ -16,7 +16,7 @@ struct BlockCount {
   int columns = 1, rows = 1;
 };
 
-// "auto" or "3x2"; nothing for anything else, and for more than kMostBlocks (scene/block_grid_json.h) in all.
+// "auto" or "3x2"; nothing for anything else, and for more than scene/block_grid_json.h allows.
 std::optional<BlockCount> parseBlockCount(std::string_view text);
 
 struct BlockLimits {

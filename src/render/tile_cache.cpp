@@ -17,7 +17,7 @@ TileCache::TileCache(const TileTree& tree, uint64_t budgetBytes, TileSource sour
   uint64_t bytes = 0;
   for (const int tile : pinned) bytes += bytesOf(tile);
   if (bytes > budget_) {
-    throw Error("scene", "",
+    throw Error(source_.folder, "",
                 fmt::format("its coarsest level takes {} bytes of memory, the budget is {}", bytes, budget_),
                 fmt::format("allow at least {:.4g} MiB", static_cast<double>(bytes) / 1048576 * 1.0001));
   }
@@ -72,8 +72,7 @@ void TileCache::insert(int tile, bool pinned) {
   entry.bytes = bytesInMemory(entry.content);
   entry.pinned = pinned;
   if (entry.bytes > allowed) {
-    throw Error(fmt::format("content of tile {}", tile), "",
-                fmt::format("takes {} bytes of memory, its file said {}", entry.bytes, allowed),
+    throw Error(source_.file(tile), "", fmt::format("takes {} bytes of memory, its file said {}", entry.bytes, allowed),
                 "leave a scene alone while it is drawn");
   }
   uses_.push_front(tile);

@@ -5,6 +5,7 @@
 #include <functional>
 #include <list>
 #include <span>
+#include <string>
 #include <unordered_map>
 
 #include "render/tile_tree.h"
@@ -18,15 +19,18 @@ struct TileCacheStatistics {
   uint64_t refusals = 0;  // of requests for which there was no room
 };
 
-// Where contents come from. Both may throw Error.
+// Where contents come from. `bytes` and `load` may throw Error.
 struct TileSource {
   std::function<uint64_t(int tile)> bytes;  // that it takes in memory (bytesInMemory), found out without loading it
   std::function<VolumeContent(int tile)> load;
+  // For errors: the folder, and the file of a content in it.
+  std::string folder = "scene";
+  std::function<std::string(int tile)> file = [](int tile) { return "content of tile " + std::to_string(tile); };
 };
 
 class TileCache {
  public:
-  // Loads what must stay. Throws Error where that alone is more than `budgetBytes`.
+  // Loads what must stay. Throws Error naming the folder where that alone is more than `budgetBytes`.
   TileCache(const TileTree& tree, uint64_t budgetBytes, TileSource source);
 
   bool holds(int tile) const { return contents_.contains(tile); }
@@ -34,7 +38,7 @@ class TileCache {
   const VolumeContent* find(int tile);
 
   // Loads those that are missing, all or, where there is no room for all, none; evicts what is neither among them nor
-  // in `kept`. Throws Error where a content is larger than its source said.
+  // in `kept`. Throws Error naming its file where a content is larger than its source said.
   bool load(std::span<const int> tiles, std::span<const int> kept);
 
   uint64_t budgetBytes() const { return budget_; }

@@ -123,10 +123,13 @@ TEST(TileCache, SaysHowMuchTheCoarsestLevelAndTheSurroundNeed) {
     ++loads;
     return contentOfBytes(kBytes);
   });
+  TileSource named = source;
+  named.folder = "site.scene";
   try {
-    TileCache(tree, 2 * kBytes - 1, source);
+    TileCache(tree, 2 * kBytes - 1, named);
     FAIL();
   } catch (const Error& error) {
+    EXPECT_EQ(error.subject(), "site.scene");
     EXPECT_NE(std::string(error.what()).find("4000 bytes"), std::string::npos) << error.what();
   }
   EXPECT_EQ(loads, 0);
@@ -137,8 +140,15 @@ TEST(TileCache, SaysHowMuchTheCoarsestLevelAndTheSurroundNeed) {
 
 TEST(TileCache, RefusesAContentThatIsLargerThanItsSourceSaid) {
   const TileTree tree = madeTree(2, 2);
-  TileCache cache(tree, 100 * kBytes, sourceOf([](int tile) { return contentOfBytes(kBytes + (tile == 2 ? 1 : 0)); }));
-  EXPECT_THROW(cache.load(std::vector<int>{1, 2}, {}), Error);
+  TileSource source = sourceOf([](int tile) { return contentOfBytes(kBytes + (tile == 2 ? 1 : 0)); });
+  source.file = [](int tile) { return std::to_string(tile) + ".glb"; };
+  TileCache cache(tree, 100 * kBytes, source);
+  try {
+    cache.load(std::vector<int>{1, 2}, {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.subject(), "2.glb");
+  }
   EXPECT_TRUE(cache.holds(1));
   EXPECT_FALSE(cache.holds(2));
   EXPECT_EQ(cache.statistics().bytes, 2 * kBytes);

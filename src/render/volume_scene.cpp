@@ -7,6 +7,24 @@
 #include "tiles/volume_payload.h"
 
 namespace tessera {
+namespace {
+
+struct PromisedFile {
+  fs::path path;
+  size_t tile = 0;  // of tileset.json
+  TileContent promised;
+
+  VolumeContent read() const {
+    VolumeContent content = readVolume(path);
+    if (const auto broken = brokenPromise(content, promised)) {
+      throw Error(path.string(), fmt::format("of tile {} in tileset.json", tile), *broken,
+                  "copy the scene again, or bake it again");
+    }
+    return content;
+  }
+};
+
+}  // namespace
 
 VolumeFrame frameOf(const Tileset& tileset) {
   VolumeFrame frame;
@@ -21,11 +39,10 @@ VolumeFrame frameOf(const Tileset& tileset) {
 
 VolumeScene openVolumeScene(const fs::path& folder) {
   const Tileset tileset = readTileset(folder);
-  const auto unsuitable = [&](const std::string& where, const std::string& why) {
-    return Error((folder / "tileset.json").string(), where, why, "draw it with a viewer that knows it");
-  };
   if (tileset.representation != Representation::volume) {
-    throw unsuitable("", fmt::format("is a scene of {}, not of volume", nameOf(tileset.representation)));
+    throw Error((folder / "tileset.json").string(), "",
+                fmt::format("is a scene of {}, not of volume", nameOf(tileset.representation)),
+                "draw it with a viewer that knows it");
   }
   VolumeScene scene;
   scene.frame = frameOf(tileset);
@@ -33,8 +50,8 @@ VolumeScene openVolumeScene(const fs::path& folder) {
   scene.tree.columns = static_cast<int>(tileset.columns);
   scene.tree.rows = static_cast<int>(tileset.rows);
   const double metres = tileset.tileFromScene().scale;  // of one scene unit
-  std::vector<fs::path> files(tileset.tiles.size());
-  fs::path surround;
+  std::vector<PromisedFile> files(tileset.tiles.size());
+  PromisedFile surround;
   for (size_t i = 0; i < tileset.tiles.size(); ++i) {
     const Tile& tile = tileset.tiles[i];
     TileNode node;
@@ -47,27 +64,28 @@ VolumeScene openVolumeScene(const fs::path& folder) {
     node.children.assign(tile.children.begin(), tile.children.end());
     node.hasContent = false;
     for (const TileContent& content : tile.contents) {
-      if (!content.surround && node.hasContent) throw unsuitable(fmt::format("tile {}", i), "has several contents");
+      if (!content.surround && node.hasContent) {
+        throw Error((folder / "tileset.json").string(), fmt::format("tile {}", i),
+                    "has several contents, which the format allows and this renderer does not draw",
+                    "give each a tile of its own");
+      }
       node.hasContent |= !content.surround;
-      (content.surround ? surround : files[i]) = contentPath(folder, content.uri);
+      (content.surround ? surround : files[i]) = {contentPath(folder, content.uri), i, content};
     }
     scene.tree.tiles.push_back(std::move(node));
   }
   for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
     for (const int child : scene.tree.tiles[i].children) scene.tree.tiles[child].parent = static_cast<int>(i);
   }
-  if (!surround.empty()) {
+  if (!surround.path.empty()) {
     scene.tree.surround = static_cast<int>(files.size());
     scene.tree.tiles.emplace_back();
     files.push_back(surround);
   }
-  scene.source.bytes = [files](int tile) {
-    std::string reason;
-    const auto bytes = decodedBytes(readFile(files[tile]), reason);
-    if (!bytes) throw Error(files[tile].string(), "", reason, "copy the scene again, or bake it again");
-    return *bytes;
-  };
-  scene.source.load = [files](int tile) { return readVolume(files[tile]); };
+  scene.source.bytes = [files](int tile) { return readDecodedBytes(files[tile].path); };
+  scene.source.load = [files](int tile) { return files[tile].read(); };
+  scene.source.folder = folder.string();
+  scene.source.file = [files](int tile) { return files[tile].path.string(); };
   return scene;
 }
 

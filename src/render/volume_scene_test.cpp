@@ -5,6 +5,8 @@
 
 #include "base/error.h"
 #include "render/cpu/volume_renderer.h"
+#include "tiles/scene_folder.h"
+#include "tiles/tileset_json.h"
 
 namespace tessera {
 namespace {
@@ -78,6 +80,115 @@ TEST(VolumeScene, IsCoarserFromAfar) {
   renderer.render(camera(), lookingAt(scene.frame, Vec3d(0, -300, 100), Vec3d::Zero()), nullptr);
   EXPECT_EQ(renderer.selection().cut.size(), 1u);
   EXPECT_EQ(renderer.cacheStatistics().loads, 2u);  // the root and the surround
+}
+
+// A copy of the scene whose tileset.json may lie.
+class VolumeSceneThatLies : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("tessera-lying-scene-" + std::to_string(::getpid()));
+    fs::remove_all(folder_);
+    fs::copy(kScene, folder_, fs::copy_options::recursive);
+    tileset_ = readTileset(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  // Loads the content of a tile, or the surround, and expects an error that names its file, its tile and the rule.
+  void refuses(bool surround, size_t tile, const std::string& rule) {
+    writeFileAtomically(folder_ / "tileset.json", encodeTileset(tileset_));
+    const VolumeScene scene = openVolumeScene(folder_);
+    const int node = surround ? scene.tree.surround : static_cast<int>(tile);
+    try {
+      scene.source.load(node);
+      FAIL() << rule;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.subject(), scene.source.file(node));
+      EXPECT_EQ(error.place(), "of tile " + std::to_string(tile) + " in tileset.json");
+      EXPECT_NE(error.reason().find(rule), std::string::npos) << error.what();
+      EXPECT_FALSE(error.remedy().empty());
+    }
+  }
+
+  fs::path folder_;
+  Tileset tileset_;
+};
+
+TEST_F(VolumeSceneThatLies, IsRefusedWhereAContentIsASurroundAndShouldBeNoneAndTheOtherWayRound) {
+  std::vector<TileContent>& contents = tileset_.tiles[0].contents;
+  ASSERT_TRUE(contents[1].surround);
+  std::swap(contents[0].uri, contents[1].uri);
+  refuses(false, 0, "part 0 is a surround, and tileset.json says that the content is none");
+  refuses(true, 0, "part 0 is no surround, and tileset.json says that the content is one");
+  // The renderer, which relies on it, says so instead of drawing.
+  const VolumeScene scene = openVolumeScene(folder_);
+  EXPECT_THROW(VolumeRenderer(scene.frame, scene.tree, scene.source, {}), Error);
+}
+
+TEST_F(VolumeSceneThatLies, IsRefusedWhereAPartLeavesTheBoxOfItsContent) {
+  tileset_.tiles[2].contents[0].box.high.z() -= 1e-5;
+  refuses(false, 2, "part 0 owns what lies outside of the content's box");
+  tileset_ = readTileset(kScene);
+  std::swap(tileset_.tiles[1].contents[0].uri, tileset_.tiles[2].contents[0].uri);
+  refuses(false, 1, "part 0 owns what lies outside of the content's box");
+  tileset_ = readTileset(kScene);
+  tileset_.tiles[0].contents[1].box.low.x() = -9999;
+  refuses(true, 0, "part 0 owns what lies outside of the content's box");
+  tileset_ = readTileset(kScene);
+  tileset_.tiles[2].contents[0].box.high.z() -= 1e-7;  // no more than rounding
+  writeFileAtomically(folder_ / "tileset.json", encodeTileset(tileset_));
+  EXPECT_EQ(openVolumeScene(folder_).source.load(2).parts.size(), 1u);
+}
+
+// The format allows them.
+TEST_F(VolumeSceneThatLies, IsRefusedWithSeveralContentsOfATileWhichAreNotDrawn) {
+  std::vector<TileContent>& contents = tileset_.tiles[0].contents;
+  contents.insert(contents.begin(), contents[0]);
+  for (size_t i = 0; i < 2; ++i) {
+    const uint32_t column = static_cast<uint32_t>(i);
+    contents[i] = tileset_.tiles[i + 1].contents[0];
+    contents[i].cells = {{column, 0}, {column + 1, 1}};
+  }
+  writeFileAtomically(folder_ / "tileset.json", encodeTileset(tileset_));
+  try {
+    openVolumeScene(folder_);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.subject(), (folder_ / "tileset.json").string());
+    EXPECT_EQ(error.place(), "tile 0");
+    EXPECT_EQ(error.remedy(), "give each a tile of its own");
+  }
+}
+
+TEST_F(VolumeSceneThatLies, IsNotReadWhereItsFilesAreLargerThanAnyShouldBe) {
+  const VolumeScene scene = openVolumeScene(folder_);
+  fs::resize_file(scene.source.file(1), (uint64_t{1} << 30) + 1);  // a hole
+  try {
+    scene.source.load(1);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.subject(), scene.source.file(1));
+    EXPECT_NE(error.reason().find("1073741824 is the most"), std::string::npos) << error.what();
+  }
+  fs::resize_file(folder_ / "tileset.json", (uint64_t{16} << 20) + 1);
+  try {
+    openVolumeScene(folder_);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.subject(), (folder_ / "tileset.json").string());
+    EXPECT_NE(error.reason().find("16777216 is the most"), std::string::npos) << error.what();
+  }
+}
+
+TEST(VolumeScene, NamesTheFolderWhoseCoarsestLevelDoesNotFit) {
+  const VolumeScene scene = openVolumeScene(kScene);
+  VolumeRendererSettings settings;
+  settings.budgetBytes = 1000;
+  try {
+    VolumeRenderer(scene.frame, scene.tree, scene.source, settings);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.subject(), kScene.string());
+  }
 }
 
 TEST(VolumeScene, SaysWhatIsMissing) {

@@ -22,7 +22,7 @@ std::optional<int> countIn(const json& object, const char* key) {
   const auto found = object.find(key);
   if (found == object.end() || !found->is_number_integer()) return std::nullopt;
   const auto value = numberIn(object, key);
-  return value && *value >= 1 && *value <= kMostBlocks ? std::optional(static_cast<int>(*value)) : std::nullopt;
+  return value && *value >= 1 && *value <= kMostAlong ? std::optional(static_cast<int>(*value)) : std::nullopt;
 }
 
 bool readNumbers(const json& object, const char* key, size_t count, double* out) {

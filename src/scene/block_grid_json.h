@@ -13,8 +13,8 @@ namespace tessera {
 nlohmann::json blockGridToJson(const BlockGrid& grid);
 
 // Nothing unless it is a grid that BlockGrid's comments allow: places and lengths within kFarthest, a rotation, at most
-// kMostBlocks cells, bottom below top.
-inline constexpr int kMostBlocks = 1 << 16;
+// so many cells, bottom below top.
+inline constexpr int kMostBlocks = 1 << 16, kMostAlong = 1 << 12;  // in all, and along each side
 std::optional<BlockGrid> blockGridFromJson(const nlohmann::json& value);
 
 }  // namespace tessera

@@ -72,16 +72,13 @@ std::optional<std::span<const std::byte>> ContentFile::viewOf(const json& object
   return views[*index];
 }
 
-std::optional<ContentFile> decodeContentFile(std::span<const std::byte> file, Representation representation,
-                                             std::string& reason) {
+std::optional<json> decodeContentAsset(std::string_view text, Representation representation, std::string& reason) {
   const auto fail = [&reason](std::string why) {
     reason = std::move(why);
     return std::nullopt;
   };
-  const auto glb = decodeGlb(file);
-  if (!glb) return fail("is not a binary glTF file of version 2, or is cut short");
-  if (glb->json.size() > kMostContentJson) return fail("its JSON is larger than any content's should be");
-  const json asset = json::parse(glb->json, nullptr, false);
+  if (text.size() > kMostContentJson) return fail("its JSON is larger than any content's should be");
+  json asset = json::parse(text, nullptr, false);
   const json* header = fieldOf(asset, "asset");
   if (!header || !isString(*header, "version", "2.0")) return fail("its JSON is not that of a glTF 2.0 asset");
   const json* extensions = fieldOf(asset, "extensions");
@@ -93,9 +90,28 @@ std::optional<ContentFile> decodeContentFile(std::span<const std::byte> file, Re
   if (!isString(*ours, "representation", nameOf(representation))) {
     return fail(fmt::format("is not of the representation {}", nameOf(representation)));
   }
+  return asset;
+}
+
+const json& contentExtensionOf(const json& asset) {
+  return asset.at("extensions").at(kExtension);
+}
+
+std::optional<ContentFile> decodeContentFile(std::span<const std::byte> file, Representation representation,
+                                             std::string& reason) {
+  const auto glb = decodeGlb(file);
+  if (!glb) {
+    reason = kNoGlb;
+    return std::nullopt;
+  }
+  const auto asset = decodeContentAsset(glb->json, representation, reason);
+  if (!asset) return std::nullopt;
   ContentFile result;
-  if (!readViews(asset, glb->bytes, result)) return fail("its buffer views do not lie within its bytes");
-  result.ours = *ours;
+  if (!readViews(*asset, glb->bytes, result)) {
+    reason = "its buffer views do not lie within its bytes";
+    return std::nullopt;
+  }
+  result.ours = contentExtensionOf(*asset);
   return result;
 }
 

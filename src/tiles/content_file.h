@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/file.h"
@@ -16,6 +17,7 @@ namespace tessera {
 
 inline constexpr int kContentVersion = 1;
 inline constexpr size_t kMostContentJson = size_t{8} << 20;  // bytes
+inline constexpr const char* kNoGlb = "is not a binary glTF file of version 2, or is cut short";
 inline constexpr const char* kWebP = "image/webp";
 inline constexpr const char* kRawBytes = "application/octet-stream";
 
@@ -38,6 +40,13 @@ struct ContentFile {
   // The view that an object names (as ContentFileWriter::add writes it), if its mimeType is this one.
   std::optional<std::span<const std::byte>> viewOf(const nlohmann::json& object, const char* mimeType) const;
 };
+
+// The asset that is a content's JSON. Untrusted: nothing, and why, where it is none or has not the extension, its
+// version and the representation as they should be.
+std::optional<nlohmann::json> decodeContentAsset(std::string_view text, Representation representation,
+                                                 std::string& reason);
+// The extension in it.
+const nlohmann::json& contentExtensionOf(const nlohmann::json& asset);
 
 // Untrusted bytes: nothing, and why, where the container, the asset, its buffer views or the extension's version and
 // representation are not as they should be.

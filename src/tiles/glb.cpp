@@ -10,6 +10,7 @@ namespace {
 constexpr uint32_t kMagic = 0x46546c67, kVersion = 2;                  // "glTF"
 constexpr uint32_t kJsonChunk = 0x4e4f534a, kBytesChunk = 0x004e4942;  // "JSON", "BIN\0"
 constexpr size_t kHeader = 12, kChunkHeader = 8;
+static_assert(kGlbStart == kHeader + kChunkHeader);
 
 void put32(std::byte* at, uint32_t value) {
   for (int i = 0; i < 4; ++i) at[i] = static_cast<std::byte>(value >> (8 * i));
@@ -47,6 +48,14 @@ Bytes encodeGlb(std::string_view json, std::span<const std::byte> bytes) {
   put32(at + 4, kBytesChunk);
   std::memcpy(at + kChunkHeader, bytes.data(), bytes.size());
   return file;
+}
+
+std::optional<uint32_t> jsonLengthOf(std::span<const std::byte> start, uint64_t fileBytes) {
+  if (start.size() < kGlbStart || fileBytes < kGlbStart || fileBytes % 4 != 0) return std::nullopt;
+  if (get32(start, 0) != kMagic || get32(start, 4) != kVersion || get32(start, 8) != fileBytes) return std::nullopt;
+  const uint32_t length = get32(start, kHeader);
+  if (get32(start, kHeader + 4) != kJsonChunk || length % 4 != 0 || length > fileBytes - kGlbStart) return std::nullopt;
+  return length;
 }
 
 std::optional<GlbView> decodeGlb(std::span<const std::byte> file) {

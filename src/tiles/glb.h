@@ -21,6 +21,10 @@ inline constexpr uint64_t kLargestGlb = 0xffffffffu;  // its lengths are 32 bits
 // Pads the JSON with spaces and the bytes with zeros, each to a multiple of 4. CHECKs that the whole fits kLargestGlb.
 Bytes encodeGlb(std::string_view json, std::span<const std::byte> bytes);
 
+inline constexpr size_t kGlbStart = 20;  // bytes before the JSON
+// The length of the JSON that follows, of a file of so many bytes; nothing where these cannot be the first of one.
+std::optional<uint32_t> jsonLengthOf(std::span<const std::byte> start, uint64_t fileBytes);
+
 // Nothing unless magic, version (2), total length (exact), order, types and alignment of the chunks are those of the
 // specification. Chunks of unknown types after the two are passed over, as it demands.
 std::optional<GlbView> decodeGlb(std::span<const std::byte> file);

@@ -86,5 +86,19 @@ TEST(Glb, RefusesWhatIsNotExact) {
   EXPECT_FALSE(decodeGlb(std::span(good).first(12)));
 }
 
+TEST(Glb, SaysByItsFirstBytesHowLongItsJsonIs) {
+  const Bytes file = encodeGlb("{\"a\": 1}", Bytes(5));
+  EXPECT_EQ(jsonLengthOf(file, file.size()), 8u);
+  EXPECT_EQ(jsonLengthOf(std::span(file).first(kGlbStart), file.size()), 8u);
+  EXPECT_EQ(jsonLengthOf(std::span(file).first(kGlbStart - 1), file.size()), std::nullopt);
+  EXPECT_EQ(jsonLengthOf(file, file.size() + 4), std::nullopt);
+  for (const auto& [at, value] : std::vector<std::pair<size_t, uint32_t>>{
+           {0, 0}, {4, 1}, {8, 4}, {12, 6}, {12, 0xfffffff0u}, {12, static_cast<uint32_t>(file.size())}, {16, 0}}) {
+    Bytes spoilt = file;
+    put(spoilt, at, value);
+    EXPECT_EQ(jsonLengthOf(spoilt, spoilt.size()), std::nullopt) << at << " " << value;
+  }
+}
+
 }  // namespace
 }  // namespace tessera

@@ -98,7 +98,8 @@ void SceneFolderWriter::commit(const Tileset& tileset) const {
 Tileset readTileset(const fs::path& folder) {
   const fs::path path = folder / "tileset.json";
   std::string reason;
-  auto tileset = decodeTileset(readTextFile(path), reason);
+  const TilesetLimits limits;
+  auto tileset = decodeTileset(readTextFile(path, limits.textBytes), reason, limits);
   if (!tileset) throw Error(path.string(), "", reason, "bake the scene again");
   requireFiles(folder, *tileset);
   return std::move(*tileset);

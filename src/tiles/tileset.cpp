@@ -19,9 +19,12 @@ bool CellRange::contains(const CellRange& other) const {
   return first[0] <= other.first[0] && first[1] <= other.first[1] && other.end[0] <= end[0] && other.end[1] <= end[1];
 }
 
+bool Tile::hasContents() const {
+  return std::any_of(contents.begin(), contents.end(), [](const auto& one) { return !one.surround; });
+}
+
 bool Tile::isDrawable() const {
-  return children.empty() ||
-         std::any_of(contents.begin(), contents.end(), [](const auto& one) { return !one.surround; });
+  return children.empty() || hasContents();
 }
 
 SceneBox Tileset::box() const {
@@ -112,6 +115,14 @@ std::vector<uint32_t> coarsestCover(const Tileset& tileset) {
     }
   }
   return cover;
+}
+
+uint32_t coarsestLevel(const Tileset& tileset) {
+  uint32_t level = 0;
+  for (const Tile& tile : tileset.tiles) {
+    if (tile.hasContents()) level = std::max(level, tile.level);
+  }
+  return level;
 }
 
 const char* nameOf(Representation representation) {

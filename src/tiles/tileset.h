@@ -79,7 +79,8 @@ struct Tile {
   // One with none (the surround apart) and with children cannot stand for them. A leaf with none is empty.
   std::vector<TileContent> contents;
 
-  bool isDrawable() const;  // stands for all below it
+  bool hasContents() const;  // the surround apart
+  bool isDrawable() const;   // stands for all below it
 };
 
 struct Tileset {
@@ -125,6 +126,9 @@ std::vector<uint32_t> childrenFrontToBack(const Tileset& tileset, uint32_t tile,
 
 // The coarsest tiles that stand for the whole scene: the root, or what lies below it where that is not drawable.
 std::vector<uint32_t> coarsestCover(const Tileset& tileset);
+
+// The highest level of a tile that has contents, the surround apart; 0 where there is none.
+uint32_t coarsestLevel(const Tileset& tileset);
 
 // Scene units from a block grid's: columns, rows, bottom, top and worldFromScene.
 void placeOn(Tileset& tileset, const BlockGrid& grid);

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/check.h"
+#include "base/error.h"
 
 namespace tessera {
 namespace {
@@ -100,6 +101,25 @@ Json sceneOf(const Tileset& tileset) {
   return scene;
 }
 
+Error tooLarge(const std::string& why) {
+  return {"tileset.json", "", why, "train with fewer --blocks"};
+}
+
+// What settings can cause. All else that would break a rule is a mistake of ours.
+void requireWritable(const Tileset& tileset) {
+  if (!(tileset.near >= 0 && tileset.near <= 1)) {
+    throw Error("tileset.json", fmt::format("near={}", tileset.near), "is not between 0 and 1, in halves of a block",
+                "train with --set near=0.05, or another that is");
+  }
+  if (tileset.columns > kMostCells || tileset.rows > kMostCells) {
+    throw tooLarge(fmt::format("would have {} by {} blocks, and at most {} fit along a side", tileset.columns,
+                               tileset.rows, kMostCells));
+  }
+  if (const TilesetLimits limits; tileset.tiles.size() > limits.tiles) {
+    throw tooLarge(fmt::format("would have {} tiles, and readers take {} at most", tileset.tiles.size(), limits.tiles));
+  }
+}
+
 }  // namespace
 
 SceneBox enclosingBox(const Tile& tile) {
@@ -122,6 +142,7 @@ std::array<double, 12> boundingBoxNumbers(const Tileset& tileset, const SceneBox
 }
 
 std::string encodeTileset(const Tileset& tileset) {
+  requireWritable(tileset);
   const auto broken = brokenRule(tileset);
   CHECK(broken.value_or("") == "");
   const Json file = {{"asset", {{"version", "1.1"}, {"generator", "tessera"}}},
@@ -129,7 +150,11 @@ std::string encodeTileset(const Tileset& tileset) {
                      {"extensions", {{kExtension, sceneOf(tileset)}}},
                      {"geometricError", tileset.geometricError},
                      {"root", tileOf(tileset, tileset.root(), true)}};
-  return file.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+  std::string text = file.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+  if (const TilesetLimits limits; text.size() > limits.textBytes) {
+    throw tooLarge(fmt::format("takes {} bytes, and readers take {} at most", text.size(), limits.textBytes));
+  }
+  return text;
 }
 
 bool isPlainUri(std::string_view uri) {

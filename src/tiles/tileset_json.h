@@ -11,13 +11,16 @@ namespace tessera {
 
 inline constexpr int kSceneVersion = 1;
 
+inline constexpr uint32_t kMostCells = 4096;  // of the grid, along an axis
+
 struct TilesetLimits {
   size_t textBytes = size_t{16} << 20;
   uint32_t tiles = 1 << 16, depth = 64;
   uint32_t contentsOfTile = 64, resources = 1 << 16;
 };
 
-// The same tileset gives the same text. CHECKs that it breaks no rule.
+// The same tileset gives the same text. Throws Error where it is more than readers take, or its `near` is out of
+// bounds: settings can cause that. CHECKs that it breaks no other rule.
 std::string encodeTileset(const Tileset& tileset);
 
 // Untrusted text: nothing, and why in `reason`, where it is not JSON, has another version, breaks a rule of the format,

@@ -5,6 +5,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "base/error.h"
 #include "tiles/test_support.h"
 
 namespace tessera {
@@ -73,6 +74,29 @@ TEST(TilesetJson, TheRootsVolumeHoldsTheSurround) {
   const auto box = file["root"]["boundingVolume"]["box"].get<std::vector<double>>();
   EXPECT_NEAR(Vec3d(box[3], box[4], box[5]).norm(), 1000 * 12.5, 1e-6);
   EXPECT_EQ(file["root"]["extensions"]["TESSERA_scene"]["high"], json::array({3.0, 2.0, 0.75}));
+}
+
+TEST(TilesetJson, NamesTheSettingThatMadeMoreThanReadersTake) {
+  const auto refuses = [](const std::string& why, const std::string& remedy, const std::function<void(Tileset&)>& set) {
+    Tileset tileset = madeTileset();
+    set(tileset);
+    try {
+      encodeTileset(tileset);
+      FAIL() << why;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.subject(), "tileset.json");
+      EXPECT_NE(std::string(error.what()).find(why), std::string::npos) << error.what();
+      EXPECT_NE(error.remedy().find(remedy), std::string::npos) << error.what();
+    }
+  };
+  refuses("near=1.5", "--set near", [](Tileset& tileset) { tileset.near = 1.5; });
+  refuses("5000 by 2 blocks", "--blocks", [](Tileset& tileset) { tileset.columns = 5000; });
+  refuses("2 by 5000 blocks", "--blocks", [](Tileset& tileset) {
+    tileset.columns = 2;
+    tileset.rows = 5000;
+  });
+  refuses("65537 tiles", "--blocks", [](Tileset& tileset) { tileset.tiles.resize(65537); });
+  refuses("16777216 at most", "--blocks", [](Tileset& tileset) { tileset.name = std::string(size_t{16} << 20, 'x'); });
 }
 
 TEST(TilesetJson, PassesOverWhatItDoesNotKnow) {

@@ -14,7 +14,6 @@ namespace {
 using Broken = std::optional<std::string>;
 
 constexpr double kFarthestInScene = 1e7;
-constexpr uint32_t kMostCells = 4096;  // along an axis
 constexpr uint32_t kMostLevels = 64;
 
 bool isRotation(const Mat3d& rotation) {

@@ -109,6 +109,14 @@ TEST(Tileset, TheCoarsestCoverLiesBelowARootThatCannotStandForIt) {
   EXPECT_EQ(coarsestCover(tileset), (std::vector<uint32_t>{1, 2, 3, 4}));
 }
 
+TEST(Tileset, ItsCoarsestLevelIsOneThatHasContentsOfItsOwn) {
+  Tileset tileset = madeTileset(2);
+  EXPECT_EQ(coarsestLevel(tileset), 1u);
+  tileset.tiles[0].contents.erase(tileset.tiles[0].contents.begin());  // the surround is left
+  EXPECT_EQ(coarsestLevel(tileset), 0u);
+  EXPECT_EQ(tileset.levels, 2u);
+}
+
 TEST(Tileset, AllowsChainsAndSeveralContents) {
   Tileset tileset = madeTileset(2);
   tileset.levels = 3;

@@ -1,9 +1,12 @@
 #include "tiles/volume_payload.h"
 
+#include <fmt/format.h>
+
 #include <bit>
 #include <cstring>
 
 #include "base/check.h"
+#include "base/error.h"
 #include "tiles/content_file.h"
 #include "tiles/lossless_image.h"
 #include "tiles/volume_pictures.h"
@@ -90,16 +93,39 @@ class VolumeWriter {
   ContentFileWriter file_;
 };
 
+Error tooLarge(const std::string& why) {
+  return {"a content that was to be written", "", why,
+          "train with lower --set voxels and planes, or with level_share=0"};
+}
+
+// What settings can cause. All else that would break a rule is a mistake of ours.
+void requireWritable(const VolumeContent& content) {
+  const VolumeLimits limits;
+  if (content.parts.size() > limits.parts) {
+    throw tooLarge(fmt::format("merges {} blocks, and readers take {} at most", content.parts.size(), limits.parts));
+  }
+  uint64_t bytes = 0;
+  for (const VolumePart& part : content.parts) bytes += texelBytes(part, part.storedMacroblocks());
+  if (bytes > limits.bytes) {
+    throw tooLarge(fmt::format("takes {} bytes of memory, and readers take {} at most", bytes, limits.bytes));
+  }
+}
+
 }  // namespace
 
 Bytes encodeVolume(const VolumeContent& content, int effort) {
+  requireWritable(content);
   const auto broken = brokenRule(content);
   CHECK(broken.value_or("") == "");
   for (const VolumePart& part : content.parts) {
     const uint32_t cells = part.planes / VolumePart::kDistanceCell;
     CHECK((part.distances == chebyshevDistances(occupancyFromDistances(part.distances, cells))));
   }
-  return VolumeWriter(content, effort).write();
+  Bytes file = VolumeWriter(content, effort).write();
+  if (const VolumeLimits limits; file.size() > limits.fileBytes) {
+    throw tooLarge(fmt::format("takes {} bytes on disk, and readers take {} at most", file.size(), limits.fileBytes));
+  }
+  return file;
 }
 
 }  // namespace tessera

@@ -1,6 +1,7 @@
 #include "tiles/volume_payload.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstring>
@@ -8,6 +9,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "base/error.h"
 #include "tiles/content_file.h"
 #include "tiles/glb.h"
 #include "tiles/lossless_image.h"
@@ -161,6 +163,86 @@ TEST(VolumePayload, BitsFillPicturesThatWebPCanHold) {
   EXPECT_LE(largest.height, static_cast<uint32_t>(kLargestLosslessSide));
   EXPECT_GE(uint64_t{largest.width} * largest.height * 8, cells * cells * cells);
   EXPECT_LE(sizeOfMacroblocks(kMostStored).width, static_cast<uint32_t>(kLargestLosslessSide));
+}
+
+TEST(VolumePayload, NamesTheSettingsThatMadeMoreThanReadersTake) {
+  const auto refuses = [](const std::string& why, const VolumeContent& content) {
+    try {
+      encodeVolume(content);
+      FAIL() << why;
+    } catch (const Error& error) {
+      EXPECT_NE(error.reason().find(why), std::string::npos) << error.what();
+      EXPECT_NE(error.remedy().find("--set"), std::string::npos) << error.what();
+    }
+  };
+  VolumeContent content = madeContent(2, 3);
+  for (VolumePart& part : content.parts) part.planes = 4096;  // texels are counted before they are looked at
+  refuses("readers take 1073741824 at most", content);
+  content = madeContent(2);
+  content.parts.resize(1025);
+  refuses("merges 1025 blocks", content);
+}
+
+class VolumeFile : public testing::Test {
+ protected:
+  ~VolumeFile() override { fs::remove(path_); }
+
+  // What is wrong with it, by its headers.
+  std::string refusal(std::span<const std::byte> bytes) {
+    writeFileAtomically(path_, bytes);
+    try {
+      readDecodedBytes(path_);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.subject(), path_.string());
+      return error.reason();
+    }
+    return "";
+  }
+
+  const fs::path path_ = fs::temp_directory_path() / ("tessera-volume-file-" + std::to_string(::getpid()) + ".glb");
+};
+
+TEST_F(VolumeFile, SaysWhatItTakesInMemoryWithoutATexelBeingRead) {
+  const VolumeContent content = madeContent(5, 2);
+  Bytes file = encodeVolume(content, 1);
+  writeFileAtomically(path_, file);
+  EXPECT_EQ(readDecodedBytes(path_), bytesInMemory(content));
+  EXPECT_EQ(bytesInMemory(readVolume(path_)), bytesInMemory(content));
+  std::fill(file.begin() + static_cast<ptrdiff_t>(kGlbStart + *jsonLengthOf(file, file.size())), file.end(),
+            std::byte{0});
+  writeFileAtomically(path_, file);
+  EXPECT_EQ(readDecodedBytes(path_), bytesInMemory(content));
+  EXPECT_THROW(readVolume(path_), Error);
+}
+
+TEST_F(VolumeFile, IsRefusedByHeadersThatLie) {
+  const Bytes file = encodeVolume(madeContent(5), 1);
+  EXPECT_EQ(refusal(file), "");
+  EXPECT_EQ(refusal({}), kNoGlb);
+  EXPECT_EQ(refusal(std::span(file).first(12)), kNoGlb);
+  EXPECT_EQ(refusal(std::span(file).first(file.size() / 8 * 4)), kNoGlb);
+  EXPECT_EQ(refusal(encodeGlb(std::string((size_t{8} << 20) + 1, ' '), {})),
+            "its JSON is larger than any content's should be");
+  EXPECT_EQ(refusal(encodeGlb("{}", {})), "its JSON is not that of a glTF 2.0 asset");
+  json asset = json::parse(decodeGlb(file)->json);
+  asset["extensions"]["TESSERA_content"]["parts"][0]["planes"] = 4104;
+  EXPECT_EQ(refusal(encodeGlb(asset.dump(), {})), "part 0: its header is not complete");
+  asset["extensions"]["TESSERA_content"]["network"]["layers"][0] = {34};
+  EXPECT_EQ(refusal(encodeGlb(asset.dump(), {})), "a layer of the network has no two sides");
+}
+
+TEST(VolumePayload, CountsTheTexelsThatItsPartsHold) {
+  const VolumeContent content = madeContent(3, 2);
+  VolumeContent without = content;
+  uint64_t texels = 0;
+  for (VolumePart& part : without.parts) {
+    texels += texelBytes(part, part.storedMacroblocks());
+    part.macroblocks.clear();
+    part.voxelBytes.clear();
+    part.distances.clear();
+    for (auto& plane : part.planeBytes) plane.clear();
+  }
+  EXPECT_EQ(texels, bytesInMemory(content) - bytesInMemory(without));
 }
 
 TEST(VolumePayload, NamesTheRuleThatIsBroken) {

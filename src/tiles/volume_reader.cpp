@@ -1,11 +1,13 @@
 // A volume's content, read: untrusted bytes.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 
 #include "base/error.h"
 #include "tiles/content_file.h"
+#include "tiles/glb.h"
 #include "tiles/json_fields.h"
 #include "tiles/lossless_image.h"
 #include "tiles/volume_payload.h"
@@ -40,11 +42,7 @@ struct PartHeader {
 
   uint32_t macroblockEdge() const { return part.voxels / VolumePart::kMacroblock; }
   uint32_t cells() const { return part.planes / VolumePart::kDistanceCell; }
-  uint64_t bytes() const {
-    const auto cube = [](uint64_t edge) { return edge * edge * edge; };
-    return 3 * VolumePart::kAttributes * uint64_t{part.planes} * part.planes + cube(cells()) +
-           uint64_t{stored} * VolumePart::kMacroblockBytes + 4 * cube(macroblockEdge());
-  }
+  uint64_t bytes() const { return texelBytes(part, stored); }
 };
 
 class VolumeReader {
@@ -53,7 +51,7 @@ class VolumeReader {
       : file_(file), reason_(reason), limits_(limits) {}
 
   std::optional<VolumeContent> read() {
-    if (!readRanges() || !readNetwork() || !readHeaders()) return std::nullopt;
+    if (!readRanges() || !readLayers() || !readNetwork() || !readHeaders()) return std::nullopt;
     for (size_t i = 0; i < headers_.size(); ++i) {
       if (!readTexels(headers_[i])) {
         fail(fmt::format("part {}: its {} are not what they should be", i, what_));
@@ -68,9 +66,13 @@ class VolumeReader {
     return std::move(content_);
   }
 
+  // Looks at no buffer view.
   std::optional<uint64_t> readBytes() {
-    if (!readRanges() || !readNetwork() || !readHeaders()) return std::nullopt;
+    if (!readRanges() || !readLayers() || !readHeaders()) return std::nullopt;
     uint64_t bytes = bytesInMemory(content_);
+    for (const DenseLayer& layer : content_.network) {
+      bytes += sizeof(float) * (uint64_t{layer.inputs} * layer.outputs + layer.outputs);
+    }
     for (const PartHeader& header : headers_) bytes += sizeof(VolumePart) + header.bytes();
     return bytes;
   }
@@ -94,11 +96,11 @@ class VolumeReader {
     return true;
   }
 
-  bool readNetwork() {
+  // What the layers are to hold.
+  bool readLayers() {
     const json* network = fieldOf(file_.ours, "network");
     const json* layers = network ? arrayOf(*network, "layers") : nullptr;
-    auto bytes = network ? file_.viewOf(*network, kRawBytes) : std::nullopt;
-    if (!layers || layers->size() > kMostLayers || !bytes) return fail("has no network");
+    if (!layers || layers->size() > kMostLayers) return fail("has no network");
     for (const json& sides : *layers) {
       if (!sides.is_array() || sides.size() != 2) return fail("a layer of the network has no two sides");
       const auto inputs = unsignedFrom(sides[0], kMostLayerWidth), outputs = unsignedFrom(sides[1], kMostLayerWidth);
@@ -106,10 +108,19 @@ class VolumeReader {
       DenseLayer layer;
       layer.inputs = static_cast<uint32_t>(*inputs);
       layer.outputs = static_cast<uint32_t>(*outputs);
-      if (!takeFloats(*bytes, *inputs * *outputs, layer.weights) || !takeFloats(*bytes, *outputs, layer.biases)) {
+      content_.network.push_back(std::move(layer));
+    }
+    return true;
+  }
+
+  bool readNetwork() {
+    auto bytes = file_.viewOf(*fieldOf(file_.ours, "network"), kRawBytes);
+    if (!bytes) return fail("has no network");
+    for (DenseLayer& layer : content_.network) {
+      if (!takeFloats(*bytes, size_t{layer.inputs} * layer.outputs, layer.weights) ||
+          !takeFloats(*bytes, layer.outputs, layer.biases)) {
         return fail("the network has fewer numbers than its layers need");
       }
-      content_.network.push_back(std::move(layer));
     }
     return bytes->empty() || fail("the network has more numbers than its layers need");
   }
@@ -220,6 +231,10 @@ class VolumeReader {
   VolumeContent content_;
 };
 
+Error noContent(const fs::path& path, const std::string& reason) {
+  return {path.string(), "", reason, "copy the scene again, or bake it again"};
+}
+
 }  // namespace
 
 std::optional<VolumeContent> decodeVolume(std::span<const std::byte> file, std::string& reason,
@@ -230,18 +245,28 @@ std::optional<VolumeContent> decodeVolume(std::span<const std::byte> file, std::
   return VolumeReader(*content, reason, limits).read();
 }
 
-std::optional<uint64_t> decodedBytes(std::span<const std::byte> file, std::string& reason, const VolumeLimits& limits) {
-  reason.clear();
-  const auto content = decodeContentFile(file, Representation::volume, reason);
-  if (!content) return std::nullopt;
-  return VolumeReader(*content, reason, limits).readBytes();
-}
-
 VolumeContent readVolume(const fs::path& path, const VolumeLimits& limits) {
   std::string reason;
-  auto content = decodeVolume(readFile(path), reason, limits);
-  if (!content) throw Error(path.string(), "", reason, "copy the scene again, or bake it again");
+  auto content = decodeVolume(readFile(path, limits.fileBytes), reason, limits);
+  if (!content) throw noContent(path, reason);
   return std::move(*content);
+}
+
+uint64_t readDecodedBytes(const fs::path& path, const VolumeLimits& limits) {
+  std::error_code status;
+  const auto length = jsonLengthOf(readFileStart(path, kGlbStart), fs::file_size(path, status));
+  if (!length) throw noContent(path, kNoGlb);
+  // A byte more than is allowed is enough to see that it is too much.
+  const Bytes start = readFileStart(path, kGlbStart + std::min<uint64_t>(*length, kMostContentJson + 1));
+  const std::string_view text(reinterpret_cast<const char*>(start.data()), start.size());
+  std::string reason;
+  ContentFile file;
+  if (const auto asset =
+          decodeContentAsset(text.substr(std::min(kGlbStart, text.size())), Representation::volume, reason)) {
+    file.ours = contentExtensionOf(*asset);
+    if (const auto bytes = VolumeReader(file, reason, limits).readBytes()) return *bytes;
+  }
+  throw noContent(path, reason);
 }
 
 }  // namespace tessera

@@ -98,6 +98,13 @@ bool overlap(const VolumePart& one, const VolumePart& other) {
 
 }  // namespace
 
+uint64_t texelBytes(const VolumePart& part, uint64_t storedMacroblocks) {
+  const auto cube = [](uint64_t edge) { return edge * edge * edge; };
+  return 3 * VolumePart::kAttributes * uint64_t{part.planes} * part.planes +
+         cube(part.planes / VolumePart::kDistanceCell) + storedMacroblocks * VolumePart::kMacroblockBytes +
+         sizeof(uint32_t) * cube(part.voxels / VolumePart::kMacroblock);
+}
+
 std::optional<std::string> brokenRule(const VolumeContent& content) {
   for (const float range : {content.featureRange, content.densityRange}) {
     if (!(range > 0 && range <= kLargestRange)) return "a range is out of bounds";
@@ -112,6 +119,25 @@ std::optional<std::string> brokenRule(const VolumeContent& content) {
     if (content.parts[i].surround && content.parts.size() > 1) return "a surround is not alone";
     for (size_t j = 0; j < i; ++j) {
       if (overlap(content.parts[i], content.parts[j])) return fmt::format("parts {} and {} overlap", j, i);
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> brokenPromise(const VolumeContent& content, const TileContent& promised) {
+  const SceneBox& box = promised.box;
+  const auto slack = [](double x) { return 1e-6 * std::max(1.0, std::abs(x)); };  // parts are rounded to floats
+  for (size_t i = 0; i < content.parts.size(); ++i) {
+    const VolumePart& part = content.parts[i];
+    if (part.surround != promised.surround) {
+      return fmt::format("part {} is {} surround, and tileset.json says that the content is {}", i,
+                         part.surround ? "a" : "no", promised.surround ? "one" : "none");
+    }
+    for (Eigen::Index a = 0; a < 3; ++a) {
+      const auto axis = static_cast<size_t>(a);
+      if (part.low[axis] < box.low[a] - slack(box.low[a]) || part.high[axis] > box.high[a] + slack(box.high[a])) {
+        return fmt::format("part {} owns what lies outside of the content's box in tileset.json", i);
+      }
     }
   }
   return std::nullopt;

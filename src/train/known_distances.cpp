@@ -1,5 +1,8 @@
 #include "train/known_distances.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace tessera {
 
 std::vector<std::vector<KnownDistance>> knownDistances(const Capture& capture, const SceneFrame& frame,
@@ -19,6 +22,37 @@ std::vector<std::vector<KnownDistance>> knownDistances(const Capture& capture, c
                                         static_cast<float>(offset.norm() * frame.scale)});
   }
   return known;
+}
+
+KnownDepths::KnownDepths(const Capture& capture, double mostPixelsOff) : photos_(capture.photos.size()) {
+  const std::vector<std::vector<KnownDistance>> known = knownDistances(capture, SceneFrame(), mostPixelsOff);
+  for (size_t k = 0; k < photos_.size(); ++k) {
+    if (known[k].empty()) continue;
+    const Camera& camera = capture.cameras[capture.photos[k].camera];
+    OfPhoto& photo = photos_[k];
+    photo.edge = static_cast<double>(std::max(camera.width, camera.height)) / kAcross;
+    photo.columns = static_cast<int>(std::ceil(camera.width / photo.edge));
+    photo.rows = static_cast<int>(std::ceil(camera.height / photo.edge));
+    std::vector<std::vector<float>> distances(static_cast<size_t>(photo.columns) * photo.rows);
+    for (const KnownDistance& each : known[k]) {
+      const size_t column = static_cast<size_t>(each.x / photo.edge), row = static_cast<size_t>(each.y / photo.edge);
+      distances[column + row * photo.columns].push_back(each.distance);
+    }
+    photo.medians.resize(distances.size());
+    for (size_t part = 0; part < distances.size(); ++part) {
+      if (distances[part].empty()) continue;
+      const auto middle = distances[part].begin() + static_cast<ptrdiff_t>(distances[part].size() / 2);
+      std::nth_element(distances[part].begin(), middle, distances[part].end());
+      photo.medians[part] = *middle;
+    }
+  }
+}
+
+double KnownDepths::operator()(int photo, const Vec2d& pixel) const {
+  const OfPhoto& known = photos_[photo];
+  const double column = std::floor(pixel.x() / known.edge), row = std::floor(pixel.y() / known.edge);
+  if (!(column >= 0 && row >= 0 && column < known.columns && row < known.rows)) return 0;
+  return known.medians[static_cast<size_t>(column) + static_cast<size_t>(row) * known.columns];
 }
 
 }  // namespace tessera

@@ -16,4 +16,22 @@ struct KnownDistance {
 std::vector<std::vector<KnownDistance>> knownDistances(const Capture& capture, const SceneFrame& frame,
                                                        double mostPixelsOff);
 
+// About how far the ray through a pixel of a training photo goes, in world units along it: the median of what is known
+// in its part of the photo (1/kAcross of its longer edge); 0 where nothing is.
+class KnownDepths {
+ public:
+  static constexpr int kAcross = 24;
+  // Copies what it needs of `capture`. `mostPixelsOff` as above.
+  KnownDepths(const Capture& capture, double mostPixelsOff);
+  double operator()(int photo, const Vec2d& pixel) const;
+
+ private:
+  struct OfPhoto {
+    double edge = 1;  // of a part, pixels
+    int columns = 0, rows = 0;
+    std::vector<float> medians;  // [rows][columns]
+  };
+  std::vector<OfPhoto> photos_;
+};
+
 }  // namespace tessera

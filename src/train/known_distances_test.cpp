@@ -60,5 +60,15 @@ TEST(KnownDistances, LeaveOutWhatCannotBeTrusted) {
   for (const auto& photo : knownDistances(capture, SceneFrame(), 2)) EXPECT_TRUE(photo.empty());
 }
 
+TEST(KnownDepths, AreTheMedianOfThePartOfThePhoto) {
+  Capture capture = threePhotos();
+  for (const double depth : {2.0, 3.0, 10.0}) observe(capture, 0, Vec3d(0, 0, depth), 50.5f, 40.5f);
+  const KnownDepths depths(capture, 2);
+  EXPECT_FLOAT_EQ(static_cast<float>(depths(0, {51.0, 41.0})), 3);
+  EXPECT_EQ(depths(0, {70.0, 41.0}), 0) << "nothing is known there";
+  EXPECT_EQ(depths(0, {-1.0, 500.0}), 0) << "beside the photo";
+  EXPECT_EQ(depths(1, {51.0, 41.0}), 0) << "not trained on";
+}
+
 }  // namespace
 }  // namespace tessera

@@ -16,6 +16,7 @@ class PhotoExposures {
   // One step of Adam; without `train` gradients are dropped.
   void step(int64_t step, float rate, bool train);
 
+  bool allFinite() const { return group_.allFinite(device_); }
   void save(TensorSet& tensors) { tensors.add(device_, group_, true); }
   void restore(const fs::path& path, const Safetensors& file) { loadGroup(device_, path, file, group_); }
 

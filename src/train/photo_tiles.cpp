@@ -64,15 +64,16 @@ std::vector<uint32_t> cellsBehind(const PhotoTile& tile, const Capture& capture,
   const Photo& photo = capture.photos[tile.photo];
   const Camera& camera = capture.cameras[photo.camera];
   const Vec3d origin = frame.sceneFromWorld(photo.worldFromCamera.translation);
-  const double left = tile.left, right = tile.right, top = tile.top, bottom = tile.bottom;
+  const Vec2d from(tile.left, tile.top), size(tile.right - tile.left, tile.bottom - tile.top);
   std::set<uint32_t> cells;
-  for (const Vec2d& pixel : {Vec2d(left, top), Vec2d(right, top), Vec2d(left, bottom), Vec2d(right, bottom),
-                             Vec2d((left + right) / 2, (top + bottom) / 2)}) {
-    const auto inCamera = camera.directionInCamera(pixel);
-    if (!inCamera) continue;
-    const Vec3d direction = frame.rotation * (photo.worldFromCamera.rotation * inCamera->normalized());
-    const std::vector<uint32_t> along = cellsAlong(space, origin, direction, depth);
-    cells.insert(along.begin(), along.end());
+  for (uint32_t j = 0; j < kRaysAcrossTile; ++j) {
+    for (uint32_t i = 0; i < kRaysAcrossTile; ++i) {
+      const auto inCamera = camera.directionInCamera(from + size.cwiseProduct(Vec2d(i, j)) / (kRaysAcrossTile - 1));
+      if (!inCamera) continue;
+      const Vec3d direction = frame.rotation * (photo.worldFromCamera.rotation * inCamera->normalized());
+      const std::vector<uint32_t> along = cellsAlong(space, origin, direction, depth);
+      cells.insert(along.begin(), along.end());
+    }
   }
   return {cells.begin(), cells.end()};
 }

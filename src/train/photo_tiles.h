@@ -24,9 +24,10 @@ struct TiledPhotos {
 std::vector<uint32_t> cellsAlong(const BlockSpace& space, const Vec3d& origin, const Vec3d& direction, double farthest);
 
 // Of the training photos: each is cut into at most kTilesAcross tiles along its longer edge, about square. A tile's
-// blocks are those of the rays through its corners and its middle, up to its coarse depth: kDepthSlack times the
-// farthest known distance in it and its neighbours where they hold kEnoughKnown, else where rays leave the box.
-inline constexpr uint32_t kTilesAcross = 32;
+// blocks are those of kRaysAcrossTile² rays spread over it to its very corners, up to its coarse depth: kDepthSlack
+// times the farthest known distance in it and its neighbours where they hold kEnoughKnown, else where rays leave the
+// box. (A ray between may still cut the corner of another block for a fraction of a tile's width.)
+inline constexpr uint32_t kTilesAcross = 32, kRaysAcrossTile = 5;
 inline constexpr double kDepthSlack = 1.2;
 inline constexpr size_t kEnoughKnown = 8;
 TiledPhotos tilePhotos(const Capture& capture, const SceneFrame& frame, const BlockSpace& space);

@@ -21,7 +21,8 @@ std::string howToRepeat(const Device& device, const TrainingLoopOptions& loop, c
   return fmt::format(
       "# tessera train CAPTURE MODEL --method {}{} --config THIS_FILE --steps {}\n"
       "# CAPTURE: see blocks.json. Computed on {}.\n\n",
-      loop.method, flags, loop.minutes > 0 ? "PLANNED_STEPS_OF_manifest.json" : std::to_string(loop.steps),
+      loop.method, flags,
+      loop.minutes > 0 ? "PLANNED_STEPS_OF_manifest.json" : std::to_string(loop.steps > 0 ? loop.steps : kDefaultSteps),
       device.target());
 }
 
@@ -32,7 +33,7 @@ double settledPhotoBudget(double wanted, const Capture& capture, int64_t usableM
   const double all = static_cast<double>(decodedBytes(capture, capture.photosIn(Split::train)));
   if (all <= most) return 0;
   const double budget = std::max(0.001, std::floor(most / kMiB * 1000) / 1000);
-  inform("the training photos take {:.0f} MiB decoded, more than half of the memory there is: photo_budget_mib is {}",
+  inform("the training photos take {:.0f} MiB decoded, more than their share of memory: photo_budget_mib is {}",
          all / kMiB, budget);
   return budget;
 }

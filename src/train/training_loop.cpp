@@ -58,11 +58,8 @@ struct Start {
 Start startingPoint(Trainee& trainee, const ModelFolder& folder, const TrainingLoopOptions& options) {
   ModelManifest state;
   state.method = options.method;
+  refuseTrainedModel(folder, options);
   const std::optional<ModelManifest> found = folder.manifest();
-  if (found && !options.resume) {
-    throw Error(folder.root().string(), "", fmt::format("already holds a model, trained for {} steps", found->step),
-                "pass --resume to go on with it, or name another folder");
-  }
   if (found) {
     if (found->method != options.method) {
       throw Error(folder.root().string(), "manifest.json", "was trained with --method " + found->method,
@@ -83,16 +80,28 @@ Start startingPoint(Trainee& trainee, const ModelFolder& folder, const TrainingL
   } else {
     folder.cutMetrics(-1);
   }
-  if (options.minutes > 0) {
-    const StepPlan plan = options.resume ? folder.readPlan().value_or(StepPlan()) : StepPlan();
+  if (options.steps > 0 && options.minutes <= 0) {
+    state.plannedSteps = options.steps;
+    return {state, 0};
+  }
+  const StepPlan plan = options.resume ? folder.readPlan().value_or(StepPlan()) : StepPlan();
+  if (options.minutes > 0 || plan.steps > 0) {
     state.plannedSteps = plan.steps;
     return {state, plan.madeAt};
   }
-  state.plannedSteps = options.steps;
+  if (state.plannedSteps == 0) state.plannedSteps = kDefaultSteps;
   return {state, 0};
 }
 
 }  // namespace
+
+void refuseTrainedModel(const ModelFolder& folder, const TrainingLoopOptions& options) {
+  if (options.resume) return;
+  const std::optional<ModelManifest> found = folder.manifest();
+  if (!found) return;
+  throw Error(folder.root().string(), "", fmt::format("already holds a model, trained for {} steps", found->step),
+              "pass --resume to go on with it, or name another folder");
+}
 
 void requireFormat(const fs::path& path, const Safetensors& state, const std::string& format,
                    const std::string& method) {
@@ -122,7 +131,15 @@ TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const Tr
   std::optional<Progress> progress;
   if (options.progress) progress.emplace("training", state.plannedSteps, "steps");
 
+  const auto notANumber = [&](const std::string& what) {
+    const std::optional<uint32_t> part = trainee.brokenPart();
+    return Error(folder.root().string(),
+                 part ? fmt::format("step {}, block {}", state.step, *part) : fmt::format("step {}", state.step),
+                 what + " is not a number",
+                 "train into another folder with a lower --set rate=..., and report it with the capture");
+  };
   const auto save = [&] {
+    if (trainee.brokenPart()) throw notANumber("a parameter");
     folder.commit(state, trainee.parts(), [&](uint32_t part) {
       return trainee.isAsSaved(part) ? std::nullopt : std::optional<Bytes>(trainee.save(part));
     });
@@ -131,11 +148,7 @@ TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const Tr
   const auto unfinished = [&] { return state.plannedSteps == 0 || state.step < state.plannedSteps; };
   while (unfinished() && !options.stopRequested()) {
     const StepReport report = trainee.step(state.step, state.step < planMadeAt ? 0 : state.plannedSteps);
-    if (!std::isfinite(report.loss)) {
-      throw Error(folder.root().string(), fmt::format("step {}, block {}", state.step, trainee.brokenPart()),
-                  "the loss is not a number",
-                  "train into another folder with a lower --set rate=..., and report it with the capture");
-    }
+    if (!std::isfinite(report.loss)) throw notANumber("the loss");
     window.add(report);
     totalSamples += report.samples;
     ++state.step;

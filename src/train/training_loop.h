@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "base/safetensors.h"
 #include "train/model_folder.h"
@@ -28,8 +29,9 @@ class Trainee {
   virtual Bytes save(uint32_t part) = 0;
   virtual bool isAsSaved(uint32_t) const { return false; }  // nothing of it has changed since the last save or restore
   virtual void restore(uint32_t part, const fs::path& path, const Safetensors& state) = 0;
-  // Asked when a loss is not a number: the first part that holds something that is none; 0 where none does.
-  virtual uint32_t brokenPart() { return 0; }
+  // The first part that holds something that is not a number, of what is in memory. Asked before a checkpoint, which
+  // must not replace a whole one, and when a loss is not a number.
+  virtual std::optional<uint32_t> brokenPart() { return std::nullopt; }
 };
 
 // Throws Error when a checkpoint says that it is of another kind; warns when it was trained on another device, which is
@@ -38,9 +40,11 @@ void requireFormat(const fs::path& path, const Safetensors& state, const std::st
                    const std::string& method);
 void warnOfOtherDevice(const fs::path& path, const Safetensors& state, const std::string& target);
 
+inline constexpr int64_t kDefaultSteps = 10000;
+
 struct TrainingLoopOptions {
   std::string method;
-  int64_t steps = 0;   // when no minutes are given
+  int64_t steps = 0;   // when no minutes are given; 0: what the run that is resumed had planned, else kDefaultSteps
   double minutes = 0;  // > 0: fixes the number of steps once, early
   double checkpointSeconds = 60;
   bool resume = false;
@@ -54,8 +58,11 @@ struct TrainingResult {
   double seconds = 0, psnr = 0, samplesPerSecond = 0;
 };
 
-// Trains until done, asked to stop, or killed. Throws Error at a loss that is not a number (with the step), and when
-// the folder holds a model and `resume` is off.
+// Throws Error when the folder holds a model and `resume` is off. Nothing has been touched then.
+void refuseTrainedModel(const ModelFolder& folder, const TrainingLoopOptions& options);
+
+// Trains until done, asked to stop, or killed. Throws Error at a loss or a parameter that is not a number (with the
+// step; the checkpoint before it stays), and as refuseTrainedModel does.
 TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const TrainingLoopOptions& options);
 
 }  // namespace tessera

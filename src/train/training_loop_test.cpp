@@ -42,7 +42,10 @@ class FakeTrainee : public Trainee {
     ++restores;
   }
 
+  std::optional<uint32_t> brokenPart() override { return broken; }
+
   uint64_t state = 1;
+  std::optional<uint32_t> broken;
   int saves = 0, restores = 0;
   std::vector<int64_t> steps, planned;
   int64_t nanAt = -1, dieAt = -1;
@@ -222,6 +225,7 @@ TEST_F(TrainingLoop, NamesTheStepWhoseLossIsNotANumberAndKeepsTheCheckpointBefor
   runTraining(first, folder_, options(3));
   const Bytes before = checkpoint(folder_);
   second.nanAt = 5;
+  second.broken = 0;
   try {
     runTraining(second, folder_, options(9, true));
     FAIL() << "no error";
@@ -231,6 +235,32 @@ TEST_F(TrainingLoop, NamesTheStepWhoseLossIsNotANumberAndKeepsTheCheckpointBefor
   }
   EXPECT_EQ(folder_.manifest()->step, 3);
   EXPECT_EQ(checkpoint(folder_), before);
+}
+
+TEST_F(TrainingLoop, KeepsTheCheckpointBeforeAParameterThatIsNotANumber) {
+  FakeTrainee first, second;
+  runTraining(first, folder_, options(3));
+  const Bytes before = checkpoint(folder_);
+  second.broken = 4;
+  try {
+    runTraining(second, folder_, options(5, true));
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_NE(error.place().find("step 5, block 4"), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(checkpoint(folder_), before);
+}
+
+TEST_F(TrainingLoop, KeepsWhatWasPlannedWhenResumedWithoutANumberOfSteps) {
+  FakeTrainee first, second, third;
+  TrainingLoopOptions some = options(20);
+  some.stopRequested = [&] { return first.steps.size() >= 5; };
+  runTraining(first, folder_, some);
+  EXPECT_EQ(runTraining(second, folder_, options(0, true)).plannedSteps, 20);
+  EXPECT_EQ(second.steps.size(), 15u);
+  folder_.writePlan({30, 4});  // of --minutes
+  EXPECT_EQ(runTraining(third, folder_, options(0, true)).plannedSteps, 30);
+  EXPECT_EQ(third.steps.size(), 10u);
 }
 
 TEST_F(TrainingLoop, SavesWhenItIsAskedToStop) {

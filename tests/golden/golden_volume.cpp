@@ -255,6 +255,7 @@ Scene makeScene() {
   scene.contents["0_0"] = contentOf(1, {blockPart(0, 32, 64)});
   scene.contents["1_0"] = contentOf(2, {blockPart(1, 32, 64)});
   scene.contents["all"] = contentOf(3, {blockPart(0, 16, 32), blockPart(1, 16, 32)});
+  scene.contents["all"].stepsPerTexel = 2;
   scene.contents["surround"] = contentOf(4, {surroundPart()});
   return scene;
 }

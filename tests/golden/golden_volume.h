@@ -1,5 +1,5 @@
 // The scene that is committed in tests/golden/volume, as a function: 2 × 1 blocks with smooth ground, a building each,
-// one merged level, a surround. Arithmetic only, so that every machine makes the same bytes.
+// one merged level with steps of half a texel, a surround. Arithmetic only, so that every machine makes the same bytes.
 #pragma once
 
 #include <map>
@@ -17,8 +17,8 @@ struct Scene {
 
 Scene makeScene();
 
-// What every reader has to come to, in C++ and in a browser; sums of whole numbers below 2^53. `ordered` is
-// Σ (i mod 251 + 1) · byte[i], which tells whether bytes stand where they should.
+// What every reader has to come to, in C++ and in a browser; sums of whole numbers below 2^53. docs/tile-format.md,
+// section 11.
 struct Sums {
   uint64_t stored = 0, firstStored = 0, occupied = 0, distances = 0;
   uint64_t voxels = 0, voxelsOrdered = 0;

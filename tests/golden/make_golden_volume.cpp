@@ -1,14 +1,36 @@
-// Writes the golden scene into DIR, with sums.json: what readers in every language are tested against. Run again only
-// when the format changes, and say so in the commit.
+// Writes the golden scene into DIR, with sums.json and rays.json: what readers and renderers in every language are
+// tested against. Run again only when the format changes, and say so in the commit.
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
-#include "golden/golden_volume.h"
+#include "golden/golden_rays.h"
 #include "tiles/scene_folder.h"
 #include "tiles/volume_payload.h"
 
 using namespace tessera;
+
+namespace {
+
+// One ray a line.
+std::string raysToJson(const std::vector<golden::ExpectedRay>& rays) {
+  const auto rounded = [](double x) { return std::round(1e9 * x) / 1e9; };
+  std::string text;
+  for (const golden::ExpectedRay& ray : rays) {
+    const nlohmann::ordered_json line = {
+        {"level", ray.level},
+        {"origin", {ray.origin.x(), ray.origin.y(), ray.origin.z()}},
+        {"direction", {ray.direction.x(), ray.direction.y(), ray.direction.z()}},
+        {"colour", {rounded(ray.colour[0]), rounded(ray.colour[1]), rounded(ray.colour[2])}},
+        {"opacity", rounded(ray.opacity)},
+        {"distance", rounded(ray.distance)}};
+    text += (text.empty() ? "[\n " : ",\n ") + line.dump();
+  }
+  return text + "\n]\n";
+}
+
+}  // namespace
 
 int main(int count, char** arguments) {
   if (count != 2) return 2;
@@ -40,6 +62,7 @@ int main(int count, char** arguments) {
     write(tileset.tiles[2].contents[0], 0, "1_0");
     writer.commit(tileset);
     writeFileAtomically(root / "sums.json", sums.dump(1) + "\n");
+    writeFileAtomically(root / "rays.json", raysToJson(golden::makeRays(scene)));
   } catch (const Error& error) {
     std::fprintf(stderr, "tessera: error: %s\n", error.what());
     return 1;

@@ -42,11 +42,12 @@ class Watched {
  public:
   Watched(const VolumeScene& scene, const VolumeRendererSettings& settings)
       : scene_(scene), bytes_(scene.tree.tiles.size()) {
-    const TileSource source{scene.source.bytes, [this](int tile) {
-                              VolumeContent content = scene_.source.load(tile);
-                              bytes_[tile] = bytesInMemory(content);
-                              return content;
-                            }};
+    TileSource source = scene.source;
+    source.load = [this](int tile) {
+      VolumeContent content = scene_.source.load(tile);
+      bytes_[tile] = bytesInMemory(content);
+      return content;
+    };
     run_.budgetBytes = settings.budgetBytes;
     renderer_ = std::make_unique<VolumeRenderer>(scene.frame, scene.tree, source, settings);
   }

@@ -47,8 +47,4 @@ class VolumeRenderer final : public ViewRenderer {
   MarchCounts counts_;
 };
 
-// A tree of contents side by side, without levels: a tile without content over one tile for each, in their order, and
-// one for the surround, the last. Their boxes are what their parts own and must be cells (of edge 2) amid the origin.
-TileTree flatTileTree(const std::vector<VolumeContent>& contents, bool withSurround = false);
-
 }  // namespace tessera

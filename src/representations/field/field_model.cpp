@@ -122,6 +122,11 @@ void FieldModel::refreshOccupancy(uint32_t uniform, uint32_t occupied, uint64_t 
                     uniform, occupied, seed, chunk);
 }
 
+bool FieldModel::allFinite() {
+  return field_.table().allFinite(device_) && field_.densityNetwork().allFinite(device_) &&
+         field_.colourNetwork().allFinite(device_);
+}
+
 void FieldModel::save(TensorSet& tensors, bool withMoments) {
   for (const ParameterGroup* group : {&field_.table(), &field_.densityNetwork(), &field_.colourNetwork()}) {
     tensors.add(device_, *group, withMoments);

@@ -47,6 +47,7 @@ class FieldModel {
   const SceneFrame& frame() const { return frame_; }
 
   // Parameters (with moments for training) and occupancy.
+  bool allFinite();
   void save(TensorSet& tensors, bool withMoments);
   void restore(const fs::path& path, const Safetensors& file);
 

@@ -220,6 +220,10 @@ Bytes FieldTrainer::save(uint32_t) {
   return tensors.encode({{"format", "tessera field 1"}, {"device", device_.target()}});
 }
 
+std::optional<uint32_t> FieldTrainer::brokenPart() {
+  return model_.allFinite() && exposures_.allFinite() ? std::nullopt : std::optional<uint32_t>(0);
+}
+
 void FieldTrainer::restore(uint32_t, const fs::path& path, const Safetensors& state) {
   requireFormat(path, state, "tessera field 1", "field");
   warnOfOtherDevice(path, state, device_.target());

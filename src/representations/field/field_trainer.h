@@ -16,6 +16,7 @@ class FieldTrainer final : public Trainee {
   StepReport step(int64_t step, int64_t plannedSteps) override;
   Bytes save(uint32_t part) override;
   void restore(uint32_t part, const fs::path& path, const Safetensors& state) override;
+  std::optional<uint32_t> brokenPart() override;
 
   FieldModel& model() { return model_; }
 

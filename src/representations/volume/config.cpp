@@ -44,6 +44,7 @@ std::vector<ConfigField> VolumeConfig::fields() {
        "what lies outside the region: own (a block of its own), border (the border blocks', as in the paper), none",
        &surround},
       {"level", "of detail: 0 is the finest; set by training for those above", &level},
+      {"finest_step", "of a coarser level: steps of the finest one when it was made; set by training", &finestStep},
       {"near", "no sample nearer to a camera, in halves of a block", &near},
       {"voxels", "voxels along an edge of a block", &voxels},
       {"planes", "texels along an edge of a block's planes", &planes},
@@ -102,6 +103,8 @@ std::vector<ConfigField> VolumeConfig::fields() {
        "samples nearer to the camera learn more slowly, or fog gathers there; in halves of a block",
        &fullGradientDistance},
       {"free_space", "nothing stands before the nearest sparse points that a photo shows", &freeSpace},
+      {"blocks_only", "no rays from parts of photos that see no block, as where --grid is a part of the place",
+       &blocksOnly},
       {"level_share", "steps of each coarser level of detail, as a share of the finest's; 0: there are none",
        &levelShare},
       {"frozen_share", "share of a coarser level's steps in which only its deferred networks are trained",
@@ -118,7 +121,8 @@ std::vector<ConfigField> VolumeConfig::fields() {
 void VolumeConfig::check() const {
   constexpr double kTiny = 1e-12, kHuge = 1e12;
   surroundKind();
-  requireWithin("near", near, 0, kHuge);
+  ofPreset(preset);
+  requireWithin("near", near, 0, 1);  // of tiles too, see docs/tile-format.md
   requireWithin("level", level, 0, 16);
   requireWithin("level_share", levelShare, 0, 10);
   requireWithin("frozen_share", frozenShare, 0, 1);

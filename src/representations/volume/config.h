@@ -15,7 +15,8 @@ struct VolumeConfig {
   // Scene
   std::string surround = "own";
   double near = 0.05;
-  int level = 0;  // of detail; those above 0 are made from the one below, see train_volume.h
+  int level = 0;           // of detail; those above 0 are made from the one below, see train_volume.h
+  int64_t finestStep = 0;  // of those above 0
   // Virtual grid
   int voxels = 128, planes = 512;
   double featureRange = 7, densityRange = 14;
@@ -48,7 +49,7 @@ struct VolumeConfig {
   bool literalEq3 = false;
   // Levels of detail
   double levelShare = 0.2, frozenShare = 0.1, levelRateFactor = 0.5, levelPadding = 0.2;
-  bool exposure = true, randomBackground = true, freeSpace = true;
+  bool exposure = true, randomBackground = true, freeSpace = true, blocksOnly = false;
 
   std::vector<ConfigField> fields();
   // Throws Error naming the first setting that no model can be made of.

@@ -36,6 +36,8 @@ TEST(VolumeConfig, ComesBackFromItsFile) {
 TEST(VolumeConfig, RefusesWhatNoModelCanBeMadeOf) {
   const std::function<void(VolumeConfig&)> wrongs[] = {
       [](VolumeConfig& c) { c.surround = "everywhere"; },
+      [](VolumeConfig& c) { c.preset = "huge"; },
+      [](VolumeConfig& c) { c.near = 1.5; },
       [](VolumeConfig& c) { c.voxels = 100; },
       [](VolumeConfig& c) { c.planes = 4; },
       [](VolumeConfig& c) { c.width = 48; },

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "tiles/volume_payload.h"
+
 namespace tessera {
 namespace {
 
@@ -25,11 +27,11 @@ Steps stepsOfLevel(uint32_t columns, uint32_t rows, uint32_t level) {
 }  // namespace
 
 uint32_t topLevel(uint32_t columns, uint32_t rows) {
-  uint32_t level = 0;
-  for (Steps steps; groupsAlong(columns, steps.x) * groupsAlong(rows, steps.y) > 1;) {
-    steps = stepsOfLevel(columns, rows, ++level);
+  for (uint32_t level = 0;; ++level) {
+    const Steps steps = stepsOfLevel(columns, rows, level), next = stepsOfLevel(columns, rows, level + 1);
+    if (groupsAlong(columns, steps.x) * groupsAlong(rows, steps.y) == 1) return level;
+    if (next.x * next.y > VolumeLimits().parts) return level;
   }
-  return level;
 }
 
 LevelGroups groupsOfLevel(uint32_t columns, uint32_t rows, uint32_t level, bool withSurround) {

@@ -22,6 +22,13 @@ TEST(Levels, MergeTwoByTwoUntilFewAreLeftThenAll) {
   EXPECT_EQ(groupsOfLevel(9, 9, 3, false).groups(), 4u);
 }
 
+TEST(Levels, EndWhereATileCannotHoldMoreBlocks) {
+  EXPECT_EQ(topLevel(32, 32), 5u);
+  EXPECT_EQ(groupsOfLevel(32, 32, 5, false).groups(), 1u);
+  EXPECT_EQ(topLevel(33, 33), 5u);
+  EXPECT_EQ(groupsOfLevel(33, 33, 5, false).groups(), 4u);
+}
+
 TEST(Levels, HoldEveryBlockOnceInRectanglesThatNest) {
   for (const auto& [columns, rows] : {std::pair{1u, 1u}, {2u, 3u}, {5u, 4u}, {7u, 1u}, {9u, 9u}}) {
     for (uint32_t level = 0; level <= topLevel(columns, rows); ++level) {

@@ -1,6 +1,9 @@
 #include "representations/volume/train_volume.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
@@ -8,24 +11,50 @@
 #include "base/memory.h"
 #include "partition/block_map.h"
 #include "scene/block_grid_json.h"
+#include "train/known_distances.h"
 #include "train/run_folder.h"
 
 namespace tessera {
 namespace {
 
-constexpr double kMemoryShare = 0.5;   // of the machine's, for blocks in training
+constexpr double kMiB = 1048576;
+// Of the memory that is planned for: for blocks in training, and for decoded photos. The rest is for what a step works
+// on.
+constexpr double kShareOfBlocks = 0.4, kShareOfPhotos = 0.4;
 constexpr double kWorthSaying = 0.02;  // of the pixels are not trained on
+constexpr double kMostPixelsOff = 2;   // of observations whose distance is believed
 constexpr const char* kWaiting = "waiting";
+
+double plannedMemory(const TrainVolumeOptions& options) {
+  return options.memoryMiB > 0 ? options.memoryMiB * kMiB : static_cast<double>(usableMemoryBytes());
+}
+
+BlockLimits limitsOf(const TrainVolumeOptions& options) {
+  BlockLimits limits;
+  limits.texelsPerEdge = options.config.planes;
+  limits.bytesPerBlock = trainingBytesPerBlock(options.config);
+  limits.memoryBudget = kShareOfBlocks * plannedMemory(options);
+  const int resident = options.config.residentBlocks;
+  if (resident == 0) return limits;
+  const double bytes = resident * limits.bytesPerBlock;
+  if (bytes > limits.memoryBudget) {
+    warn(
+        "{} blocks in memory at a time take {:.0f} MiB, more than the {:.0f} that are meant for them; lower "
+        "--resident-blocks",
+        resident, bytes / kMiB, limits.memoryBudget / kMiB);
+  }
+  limits.memoryBudget = std::numeric_limits<double>::infinity();  // however many there are
+  return limits;
+}
 
 // Cuts the capture, draws the map, and says what people should know before hours of training.
 BlockGrid cut(const Capture& capture, const fs::path& model, const TrainVolumeOptions& options) {
   PartitionOptions partitioning;
   partitioning.blocks = options.blocks;
   partitioning.grid = options.grid;
-  partitioning.limits.texelsPerEdge = options.config.planes;
-  partitioning.limits.bytesPerBlock = trainingBytesPerBlock(options.config);
-  partitioning.limits.memoryBudget = kMemoryShare * static_cast<double>(usableMemoryBytes());
+  partitioning.limits = limitsOf(options);
   partitioning.enough.pixels = int64_t{options.config.planes} * options.config.planes / 16;
+  partitioning.depthOf = KnownDepths(capture, kMostPixelsOff);
   const Partition partition = partitionCapture(capture, partitioning);
   for (const std::string& note : partition.notes) inform("{}", note);
   for (const ThinCell& thin : partition.thin) warn("{}", thin.warning);
@@ -47,15 +76,31 @@ fs::path levelFolder(const fs::path& model, uint32_t level) {
   return level == 0 ? model : model / "levels" / std::to_string(level);
 }
 
+namespace {
+
+// Else training has gone on since.
+bool isMadeFrom(const fs::path& level, int64_t finestStep) {
+  return savedConfig<VolumeConfig>(level).finestStep == finestStep;
+}
+
+}  // namespace
+
 uint32_t trainedLevels(const fs::path& model) {
+  const std::optional<ModelManifest> finest = ModelFolder(model).manifest();
   for (uint32_t levels = 1;; ++levels) {
-    const std::optional<ModelManifest> next = ModelFolder(levelFolder(model, levels)).manifest();
-    if (!next || next->step < next->plannedSteps) return levels;
+    const fs::path folder = levelFolder(model, levels);
+    const std::optional<ModelManifest> next = ModelFolder(folder).manifest();
+    if (!finest || !next || next->step < next->plannedSteps) return levels;
+    if (isMadeFrom(folder, finest->step)) continue;
+    warn("{}: made before the model had come to step {}; it is left out until: tessera train ... --resume",
+         folder.string(), finest->step);
+    return levels;
   }
 }
 
-VolumeConfig levelConfig(VolumeConfig finest, uint32_t level) {
+VolumeConfig levelConfig(VolumeConfig finest, uint32_t level, int64_t finestStep) {
   finest.level = static_cast<int>(level);
+  finest.finestStep = finestStep;
   finest.voxels = std::max(8, (finest.voxels >> level) / 8 * 8);
   finest.planes = std::max(8, (finest.planes >> level) / 8 * 8);
   // Its proposals begin as the finest level's, which pass over the fog that large texels make around surfaces.
@@ -66,45 +111,60 @@ VolumeConfig levelConfig(VolumeConfig finest, uint32_t level) {
 namespace {
 
 // With all that is allocated by now: what training adds are decoded photos, and a checkpoint of one block, twice.
-void sayWhatMemoryItTakes(VolumeTrainer& trainer, const Capture& capture, const VolumeConfig& config) {
-  constexpr double kMiB = 1048576;
-  const Residency* residency = trainer.residency();
-  if (!residency) return;
+void sayWhatMemoryItTakes(VolumeTrainer& trainer, const Capture& capture, const TrainVolumeOptions& options) {
+  const VolumeConfig& config = options.config;
   const double all = static_cast<double>(decodedBytes(capture, capture.photosIn(Split::train)));
   const double photos = config.photoBudgetMiB > 0 ? std::min(all, config.photoBudgetMiB * kMiB) : all;
   const double bytes = static_cast<double>(residentBytes()) + photos + 2 * trainingBytesPerBlock(config);
-  inform("memory: at most {:.0f} MiB, with {} of {} blocks at a time, {} stays in {} steps", bytes / kMiB,
-         config.residentBlocks, trainer.model().space().cells(), residency->stays().size(), residency->cycleSteps());
-  if (residency->unserved() < kWorthSaying) return;
+  const Residency* residency = trainer.residency();
+  inform("memory: at most {:.0f} MiB{}", bytes / kMiB,
+         residency ? fmt::format(", with {} of {} blocks at a time, {} stays in {} steps", config.residentBlocks,
+                                 trainer.model().space().cells(), residency->stays().size(), residency->cycleSteps())
+                   : "");
+  if (bytes > plannedMemory(options)) {
+    warn(
+        "that is more than the {:.0f} MiB there are; use --resident-blocks, or lower texels_per_step or "
+        "photo_budget_mib",
+        plannedMemory(options) / kMiB);
+  }
+  if (!residency || residency->unserved() < kWorthSaying) return;
   warn(
       "{:.0f} % of what the photos show is seen through more than {} blocks, or rare sets of them, and not trained on; "
       "raise --resident-blocks",
       100 * residency->unserved(), config.residentBlocks);
 }
 
+// What all levels are trained on.
+struct Training {
+  Device& device;
+  const Capture& capture;
+  const BlockGrid& grid;
+};
+
 // Writes what a run is made of, unless a run is there already.
-void writeRun(Device& device, const ModelFolder& folder, const Capture& capture, const BlockGrid& grid,
-              VolumeConfig config, const TrainingLoopOptions& loop) {
+void writeRun(const ModelFolder& folder, const Training& on, VolumeConfig config, const TrainingLoopOptions& loop) {
   if (folder.manifest()) return;
   writeFileAtomically(folder.configPath(),
-                      howToRepeat(device, loop, " --grid blocks.json") + configToToml(config.fields()));
-  folder.writePlacement({{}, grid, capture.sourceFromWorld, capture.root, trainingNames(capture)}, loop.method);
+                      howToRepeat(on.device, loop, " --grid blocks.json") + configToToml(config.fields()));
+  folder.writePlacement({{}, on.grid, on.capture.sourceFromWorld, on.capture.root, trainingNames(on.capture)},
+                        loop.method);
 }
 
-// True when the level is trained to its end. A level that was begun goes on with the steps that it had planned.
-bool trainLevel(Device& device, const Capture& capture, const fs::path& model, uint32_t level, const BlockGrid& grid,
-                const VolumeConfig& finest, TrainingLoopOptions loop, int64_t steps) {
+// `loop.steps` of the level that `config` is for, or those that it had planned when it was begun. True when it is
+// trained to its end.
+bool trainLevel(const fs::path& model, const Training& on, const VolumeConfig& config, TrainingLoopOptions loop) {
+  const uint32_t level = static_cast<uint32_t>(config.level);
   const ModelFolder folder(levelFolder(model, level));
+  if (folder.manifest() && !isMadeFrom(folder.root(), config.finestStep)) fs::remove_all(folder.root());
   const std::optional<ModelManifest> before = folder.manifest();
   if (before && before->step >= before->plannedSteps) return true;
-  const VolumeConfig config = levelConfig(finest, level);
-  VolumeTrainer trainer(device, capture, config, grid, folder.root() / kWaiting);
+  VolumeTrainer trainer(on.device, on.capture, config, on.grid, folder.root() / kWaiting);
   if (!before) trainer.beginFrom(levelFolder(model, level - 1));
   loop.minutes = 0;
-  loop.steps = before ? before->plannedSteps : steps;
+  if (before) loop.steps = before->plannedSteps;
   loop.resume = true;
-  writeRun(device, folder, capture, grid, config, loop);
-  inform("level {}: {} blocks in {} models, {} steps", level, grid.cells(), trainer.model().groups().cells.size(),
+  writeRun(folder, on, config, loop);
+  inform("level {}: {} blocks in {} models, {} steps", level, on.grid.cells(), trainer.model().groups().cells.size(),
          loop.steps);
   return runTraining(trainer, folder, loop).finished;
 }
@@ -121,25 +181,29 @@ TrainingResult trainVolume(Device& device, const Capture& capture, const fs::pat
   refuseCaptureFolder(model);
   const ModelFolder folder(model);
   options.loop.method = "volume";
-  const bool goingOn = options.loop.resume && folder.manifest().has_value();
+  refuseTrainedModel(folder, options.loop);
+  const bool goingOn = folder.manifest().has_value();
   if (goingOn) requireTrainedOn(folder, capture);
-  options.config.photoBudgetMiB = settledPhotoBudget(options.config.photoBudgetMiB, capture, usableMemoryBytes());
+  VolumeConfig& config = options.config;
+  config.photoBudgetMiB = settledPhotoBudget(config.photoBudgetMiB, capture,
+                                             static_cast<int64_t>(2 * kShareOfPhotos * plannedMemory(options)));
   // A resumed run stands where the killed one stood, whatever has become of the capture's points since.
   const BlockGrid grid = goingOn ? requireGrid(folder) : cut(capture, model, options);
   if (options.grid) requireSameGrid(folder, grid, *options.grid);
+  const Training on{device, capture, grid};
   TrainingResult result;
   {
-    VolumeTrainer trainer(device, capture, options.config, grid, folder.root() / kWaiting);
-    if (!goingOn && !folder.manifest()) fs::remove_all(model / "levels");  // of a run that is no more
-    writeRun(device, folder, capture, grid, options.config, options.loop);
-    sayWhatMemoryItTakes(trainer, capture, options.config);
+    VolumeTrainer trainer(device, capture, config, grid, folder.root() / kWaiting);
+    if (!goingOn) fs::remove_all(model / "levels");  // of a run that is no more
+    writeRun(folder, on, config, options.loop);
+    sayWhatMemoryItTakes(trainer, capture, options);
     result = runTraining(trainer, folder, options.loop);
   }
-  const int64_t steps = static_cast<int64_t>(options.config.levelShare * static_cast<double>(result.plannedSteps));
-  if (!result.finished || steps < 1) return result;
+  options.loop.steps = static_cast<int64_t>(config.levelShare * static_cast<double>(result.plannedSteps));
+  if (!result.finished || options.loop.steps < 1) return result;
   const uint32_t top = topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
   for (uint32_t level = 1; level <= top && result.finished; ++level) {
-    result.finished = trainLevel(device, capture, model, level, grid, options.config, options.loop, steps);
+    result.finished = trainLevel(model, on, levelConfig(config, level, result.step), options.loop);
   }
   return result;
 }

@@ -134,6 +134,39 @@ TEST(TrainVolume, GoesOnWithALevelThatWasStopped) {
   EXPECT_EQ(checkpoints(levelFolder(scene / "model", 1)), checkpoints(levelFolder(scene / "unbroken", 1)));
 }
 
+TEST(TrainVolume, MakesLevelsAnewWhereTheFinestHasGoneOn) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  const auto trained = [&](int64_t steps, bool resume) {
+    TrainVolumeOptions made = options(steps, resume);
+    made.config.levelShare = 0.5;
+    return made;
+  };
+  const fs::path model = scene / "model";
+  trainVolume(*device, scene.capture(), model, trained(8, false));
+  ASSERT_EQ(trainedLevels(model), 2u);
+  TrainVolumeOptions stopped = trained(12, true);
+  int64_t asked = 0;
+  stopped.loop.stopRequested = [&] { return ++asked > 2; };
+  EXPECT_FALSE(trainVolume(*device, scene.capture(), model, stopped).finished);
+  EXPECT_EQ(trainedLevels(model), 1u) << "made from the model as it was at step 8";
+  EXPECT_TRUE(trainVolume(*device, scene.capture(), model, trained(12, true)).finished);
+  EXPECT_EQ(trainedLevels(model), 2u);
+  EXPECT_EQ(savedConfig<VolumeConfig>(levelFolder(model, 1)).finestStep, 12);
+  EXPECT_EQ(ModelFolder(levelFolder(model, 1)).manifest()->plannedSteps, 6);
+}
+
+TEST(TrainVolume, LeavesAModelThatItRefusesAsItIs) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  trainVolume(*device, scene.capture(), scene / "model", options(3));
+  writeFileAtomically(scene / "model/blocks.svg", "mine");
+  fs::create_directories(scene / "model/waiting");
+  EXPECT_THROW(trainVolume(*device, scene.capture(), scene / "model", options(3)), Error);
+  EXPECT_EQ(readTextFile(scene / "model/blocks.svg"), "mine");
+  EXPECT_TRUE(fs::exists(scene / "model/waiting"));
+}
+
 TEST(TrainVolume, GoesOnWhereItWasStopped) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});

@@ -52,6 +52,7 @@ class VolumePass {
   Slice<const float> colours() const { return colours_; }  // [7]: diffuse, features
   Slice<const float> runtimeSteps() const { return runtimeSteps_; }
   uint32_t texelsWanted();  // waits; may be above the room there is
+  uint32_t roomForTexels() const { return room_.texels; }
   // Of the texels that a slot's field was asked for; both the same when no sample came to its block.
   Slice<const uint32_t> texelRows(uint32_t slot) const { return firstTexel_.part(slot, 2); }
 
@@ -84,7 +85,9 @@ class VolumePass {
   void backwardThroughTexels(const LossScales& scales);
   void backwardThroughProposals(const VolumeRays& rays, const LossScales& scales);
   Slice<const float> jitterOf(const VolumeRays& rays, uint32_t round) const;
-  uint32_t samples() const { return room_.samples > 0 ? room_.samples : static_cast<uint32_t>(model_.config().samples); }
+  uint32_t samples() const {
+    return room_.samples > 0 ? room_.samples : static_cast<uint32_t>(model_.config().samples);
+  }
   uint32_t rounds() const { return model_.config().secondIntervals > 0 ? 2 : 1; }
   Count rows() const { return {rowCapacity_, rowCount_}; }
   Count segments() const { return {segmentCapacity_, segmentCount_}; }

@@ -41,8 +41,8 @@ VirtualGrid finerGrid(const VolumeConfig& config) {
 VolumePass::Room roomFor(const VolumeConfig& config) {
   VolumePass::Room room;
   room.rays = static_cast<uint32_t>(config.mostRays);
-  room.texels = static_cast<uint32_t>(kRoomPerWanted * config.texelsPerStep);
   room.points = static_cast<uint32_t>(config.sparsityPoints);
+  room.texels = static_cast<uint32_t>(kRoomPerWanted * config.texelsPerStep) + VirtualGrid::kCorners * room.points;
   room.training = true;
   if (config.level > 0) room.mostWords = finerGrid(config).words();
   return room;
@@ -72,14 +72,26 @@ VolumeTrainer::VolumeTrainer(Device& device, const Capture& capture, const Volum
   opacityGradients_ = device.array<float>(rays);
   losses_ = device.array<float>(kLosses);
   asSaved_.assign(parts(), false);
-  if (!model_.holdsAll()) planStays(capture, waiting);
+  if (config.blocksOnly || !model_.holdsAll()) tiles_ = tilePhotos(capture, model_.frame(), model_.space());
+  photoCount_ = capture.photos.size();
+  if (!model_.holdsAll()) {
+    planStays(waiting);
+  } else if (config.blocksOnly) {
+    drawFrom(std::vector<double>(tiles_.sets.size(), 1));
+  }
 }
 
-void VolumeTrainer::planStays(const Capture& capture, const fs::path& waiting) {
+// Of each set's share, or less.
+void VolumeTrainer::drawFrom(std::vector<double> shareOfSet) {
+  for (size_t set = 0; config_.blocksOnly && set < shareOfSet.size(); ++set) {
+    if (tiles_.sets[set].empty()) shareOfSet[set] = 0;
+  }
+  photoRays_.drawFrom(sharesOf(tiles_, shareOfSet, photoCount_));
+}
+
+void VolumeTrainer::planStays(const fs::path& waiting) {
   CHECK(!waiting.empty());
   waiting_.emplace(waiting);
-  photoCount_ = capture.photos.size();
-  tiles_ = tilePhotos(capture, model_.frame(), model_.space());
   BlockSets sets{tiles_.sets, std::vector<double>(tiles_.sets.size())};
   for (const uint32_t set : tiles_.setOfTile) ++sets.weights[set];
   residency_.emplace(sets, Residency::Settings{model_.space().cells(), static_cast<uint32_t>(config_.residentBlocks),
@@ -104,7 +116,7 @@ void VolumeTrainer::moveIn(size_t stay) {
     if (blocks[slot] == before[slot] || !waiting_->holds(blocks[slot])) continue;
     model_.restoreFields(blocks[slot], waiting_->fileOf(blocks[slot]), waiting_->get(blocks[slot]));
   }
-  photoRays_.drawFrom(sharesOf(tiles_, next.shareOfSet, photoCount_));
+  drawFrom(next.shareOfSet);
 }
 
 VolumePass::LossScales VolumeTrainer::lossScales(double progress) const {
@@ -138,6 +150,24 @@ VolumePass::Options VolumeTrainer::passOptions(int64_t step, double progress) co
   return options;
 }
 
+// Where rays want more texels than there is room for, what has none is fog: then again with fewer rays.
+VolumeRays VolumeTrainer::forward(int64_t step, const VolumePass::Options& options) {
+  constexpr double kFewer = 0.9;  // texels grow more slowly than rays
+  for (;;) {
+    photoRays_.draw(step, rays_);
+    const VolumeRays rays{rays_,
+                          photoRays_.origins(0, rays_),
+                          photoRays_.directions(0, rays_),
+                          photoRays_.jitters(),
+                          {},
+                          config_.freeSpace ? photoRays_.nears(0, rays_) : Slice<const float>()};
+    pass_.forward(rays, options);
+    const double room = pass_.roomForTexels(), wanted = pass_.texelsWanted();
+    if (wanted <= room || rays_ == kGroup) return rays;
+    rays_ = std::max(1u, static_cast<uint32_t>(kFewer * room / wanted * rays_ / kGroup)) * kGroup;
+  }
+}
+
 StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
   // While the number of steps is not known, it is early.
   const double progress = plannedSteps > 0 ? static_cast<double>(step) / static_cast<double>(plannedSteps) : 0;
@@ -145,16 +175,9 @@ StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
     const size_t stay = residency_->at(step).stay;
     if (stay != stay_) moveIn(stay);
   }
-  photoRays_.draw(step, rays_);
-  const VolumeRays rays{rays_,
-                        photoRays_.origins(0, rays_),
-                        photoRays_.directions(0, rays_),
-                        photoRays_.jitters(),
-                        {},
-                        config_.freeSpace ? photoRays_.nears(0, rays_) : Slice<const float>()};
   const VolumePass::Options options = passOptions(step, progress);
   if (config_.level > 0) model_.lookThrough(isFrozen(progress) ? finerGrid(config_) : config_.virtualGrid());
-  pass_.forward(rays, options);
+  const VolumeRays rays = forward(step, options);
   addColourGradients(step);
   pass_.backward(rays, colourGradients_, opacityGradients_, lossScales(progress));
   updateParameters(step, plannedSteps, options);
@@ -262,16 +285,15 @@ Bytes VolumeTrainer::save(uint32_t part) {
   return tensors.encode({{"format", kFormat}, {"device", device_.target()}, {"block", std::to_string(part)}});
 }
 
-uint32_t VolumeTrainer::brokenPart() {
+std::optional<uint32_t> VolumeTrainer::brokenPart() {
   for (uint32_t slot = 0; slot < model_.slots(); ++slot) {
-    for (ParameterGroup* group : {&model_.attributes().network(slot), &model_.attributes().table(slot),
-                                  &model_.proposals().network(slot), &model_.proposals().table(slot)}) {
-      for (const float value : device_.read(group->values.all())) {
-        if (!std::isfinite(value)) return model_.blockOfSlot()[slot];
-      }
+    for (const ParameterGroup* group : {&model_.attributes().network(slot), &model_.attributes().table(slot),
+                                        &model_.proposals().network(slot), &model_.proposals().table(slot)}) {
+      if (!group->allFinite(device_)) return model_.blockOfSlot()[slot];
     }
   }
-  return 0;
+  if (!model_.deferred().allFinite(device_) || !exposures_.allFinite()) return 0;
+  return std::nullopt;
 }
 
 void VolumeTrainer::restoreBlock(uint32_t block, const fs::path& path, const Safetensors& state) {
@@ -296,6 +318,7 @@ void VolumeTrainer::beginFrom(const fs::path& below) {
       return tensor.first.ends_with(".m1") || tensor.first.ends_with(".m2") || tensor.first.ends_with(".count");
     });
     restoreBlock(block, path, state);
+    if (block == 0) exposures_.restore(path, state);
   }
 }
 

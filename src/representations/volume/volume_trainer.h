@@ -24,21 +24,24 @@ class VolumeTrainer final : public Trainee {
   bool isAsSaved(uint32_t part) const override { return part > 0 && asSaved_[part]; }  // what all share stands with 0
   void restore(uint32_t part, const fs::path& path, const Safetensors& state) override;
 
-  uint32_t brokenPart() override;
+  std::optional<uint32_t> brokenPart() override;
 
-  // A coarser level begins with the fields of the level below, as trained in that folder.
+  // A coarser level begins with the fields of the level below, as trained in that folder, and its photos' exposures.
   void beginFrom(const fs::path& below);
   // Where not all blocks are in memory at once: which are at which step.
   const Residency* residency() const { return residency_ ? &*residency_ : nullptr; }
 
   VolumeModel& model() { return model_; }
+  const PhotoRays& rays() const { return photoRays_; }  // of the last step
 
  private:
-  void planStays(const Capture& capture, const fs::path& waiting);
+  void planStays(const fs::path& waiting);
+  void drawFrom(std::vector<double> shareOfSet);
   void moveIn(size_t stay);
   void restoreBlock(uint32_t block, const fs::path& path, const Safetensors& state);
   VolumePass::Options passOptions(int64_t step, double progress) const;
   VolumePass::LossScales lossScales(double progress) const;
+  VolumeRays forward(int64_t step, const VolumePass::Options& options);
   void addColourGradients(int64_t step);
   // A coarser level's first steps: only deferred networks are trained, through the grid of the level below.
   bool isFrozen(double progress) const { return config_.level > 0 && progress < config_.frozenShare; }
@@ -50,11 +53,11 @@ class VolumeTrainer final : public Trainee {
   VolumePass pass_;
   PhotoRays photoRays_;
   PhotoExposures exposures_;
+  TiledPhotos tiles_;  // where rays come from some of them alone
+  size_t photoCount_ = 0;
   // Where not all blocks are in memory.
   std::optional<WaitingBlocks> waiting_;
   std::optional<Residency> residency_;
-  TiledPhotos tiles_;
-  size_t photoCount_ = 0;
   std::optional<size_t> stay_;  // that the slots are filled for
   std::vector<bool> asSaved_;   // [blocks]
   uint32_t rays_;               // of the next step

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "representations/volume/train_volume.h"
 #include "representations/volume/volume_cube.h"
 #include "representations/volume/volume_model_renderer.h"
 
@@ -109,6 +110,79 @@ TEST(VolumeTrainer, LearnsACubeWithHalfOfItsBlocksInMemory) {
   EXPECT_GT(heldOut(scene, whole), 20.5);
 }
 
+TEST(VolumeTrainer, TakesFewerRaysWhereTheyWantMoreTexelsThanThereIsRoomFor) {
+  const CubeScene scene;
+  VolumeConfig config = smallVolumeConfig();
+  config.texelsPerStep = 4096;
+  config.sparsityPoints = 16;
+  config.firstRays = config.mostRays;
+  TrainedVolumeCube trained(scene, config, cubeGrid(), 0);
+  const StepReport report = trained.trainer->step(0, 10);
+  EXPECT_LE(report.texels, 6144u + 16 * VirtualGrid::kCorners);
+  EXPECT_LT(report.rays, static_cast<uint32_t>(config.firstRays));
+  EXPECT_GE(report.rays, 16u);
+  // A function of the step alone.
+  TrainedVolumeCube again(scene, config, cubeGrid(), 0);
+  EXPECT_EQ(again.trainer->step(0, 10).rays, report.rays);
+  EXPECT_EQ(again.saved(), trained.saved());
+}
+
+TEST(VolumeTrainer, DrawsNoRaysThatSeeNoBlockWhenToldSo) {
+  const CubeScene scene;
+  BlockGrid part = cubeGrid();
+  part.edge /= 4;
+  part.bottom /= 4;
+  part.top /= 4;
+  const auto missing = [&](bool blocksOnly) {
+    VolumeConfig config = smallVolumeConfig();
+    config.blocksOnly = blocksOnly;
+    TrainedVolumeCube trained(scene, config, part, 0);
+    const SceneFrame frame = trained.model().frame();
+    const TiledPhotos tiles = tilePhotos(scene.capture(), frame, trained.model().space());
+    trained.trainer->step(0, 10);
+    int64_t without = 0;
+    const RayBatch& batch = trained.trainer->rays().batch();
+    for (size_t ray = 0; ray < batch.photoOfRay.size(); ++ray) {
+      for (size_t t = 0; t < tiles.tiles.size(); ++t) {
+        const PhotoTile& tile = tiles.tiles[t];
+        const float x = batch.pixels[2 * ray], y = batch.pixels[2 * ray + 1];
+        if (tile.photo != static_cast<int>(batch.photoOfRay[ray]) || x < tile.left || x >= tile.right || y < tile.top ||
+            y >= tile.bottom) {
+          continue;
+        }
+        without += tiles.sets[tiles.setOfTile[t]].empty();
+      }
+    }
+    return without;
+  };
+  EXPECT_GT(missing(false), 100);
+  EXPECT_EQ(missing(true), 0);
+}
+
+TEST(VolumeTrainer, BeginsALevelWithTheExposuresOfTheOneBelow) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  TrainVolumeOptions options;
+  options.config = smallVolumeConfig();
+  options.config.levelShare = 0;
+  options.config.exposure = true;
+  options.blocks = *parseBlockCount("2x1");
+  options.loop.steps = 40;
+  options.loop.progress = false;
+  trainVolume(*device, scene.capture(), scene / "model", options);
+  VolumeTrainer level(*device, scene.capture(), levelConfig(options.config, 1, 40),
+                      requireGrid(ModelFolder(scene / "model")));
+  level.beginFrom(scene / "model");
+  const fs::path file = scene / "model" / ModelFolder(scene / "model").manifest()->files[0];
+  const auto exposures = [](const Safetensors& state) {
+    const auto values = state.require("state", "exposures", TensorType::f32).as<float>();
+    return std::vector<float>(values.begin(), values.end());
+  };
+  const std::vector<float> below = exposures(readSafetensors(file));
+  EXPECT_NE(below, std::vector<float>(below.size(), 0.0f));
+  EXPECT_EQ(exposures(*decodeSafetensors(level.save(0))), below);
+}
+
 TEST(VolumeTrainer, LeavesWaitingBlocksAsTheyAre) {
   const CubeScene scene;
   VolumeConfig config = twoOfFour();
@@ -159,7 +233,7 @@ TEST(VolumeTrainer, GoesOnAfterRestoringWithBlocksThatWait) {
 TEST(VolumeTrainer, NamesTheBlockThatIsBroken) {
   const CubeScene scene;
   TrainedVolumeCube trained(scene, smallVolumeConfig(), cubeGrid(2), 1);
-  EXPECT_EQ(trained.trainer->brokenPart(), 0u);
+  EXPECT_EQ(trained.trainer->brokenPart(), std::nullopt);
   ParameterGroup& network = trained.model().attributes().network(1);
   std::vector<float> values = trained.device->read(network.values.all());
   values[5] = std::numeric_limits<float>::quiet_NaN();

@@ -1,0 +1,23 @@
+// Rays through the golden scene, and what they come to by the definition (docs/tile-format.md, sections 4 and 6), in
+// double: what renderers in every language are held against.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "golden/golden_volume.h"
+
+namespace tessera::golden {
+
+struct ExpectedRay {
+  uint32_t level = 0;                                        // the tiles of this level are drawn, and the surround
+  Vec3d origin = Vec3d::Zero(), direction = Vec3d::UnitZ();  // scene frame; of length 1
+  // Premultiplied, without the background; the distance in scene units.
+  std::array<double, 3> colour = {0, 0, 0};
+  double opacity = 0, distance = 0;
+};
+
+// From outside of the box, from inside, past it, just over what stands in it, and along its axes.
+std::vector<ExpectedRay> makeRays(const Scene& scene);
+
+}  // namespace tessera::golden
