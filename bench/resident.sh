@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
-# City-on-Web with four blocks in memory at a time against all of them: a city of 4x4 blocks, equal steps, so equal samples.
+# City-on-Web with four blocks in memory at a time against all of them: a city of 4x4 blocks, equal steps of equal numbers of
+# rays, so equal samples (left alone, steps take as many rays as come to so many texels: more where fewer blocks are there).
 # Held-out PSNR of both, and what the process took of memory against what it said that it would. Resumable: what is in
 # build/bench/resident is not made again.
-#   [STEPS=4000] [SIZE=400x300] bench/resident.sh
+#   [STEPS=4000] [RAYS=4096] [SIZE=400x300] bench/resident.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
 work=$out/resident
-steps=${STEPS:-4000}
+steps=${STEPS:-4000} rays=${RAYS:-4096}
 mkdir -p "$work"
 
 [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 4x4 --size "${SIZE:-400x300}"
@@ -15,7 +16,8 @@ mkdir -p "$work"
 run() {
   local name=$1
   shift
-  trained "$name" city --method volume --blocks 4x4 --steps "$steps" --set level_share=0 "$@" 2>&1 | tee -a "$work/$name.log"
+  trained "$name" city --method volume --blocks 4x4 --steps "$steps" --set level_share=0 --set first_rays="$rays" \
+    --set most_rays="$rays" --set texels_per_step=$((256 * rays)) "$@" 2>&1 | tee -a "$work/$name.log"
 }
 # Of a run's metrics: MiB, and samples in millions.
 peak() { jq -s 'map(.peak_rss_bytes) | max / 1048576 | round' "$work/$1/metrics.jsonl"; }
