@@ -21,6 +21,7 @@ constexpr double kMiB = 1048576;
 // Of the memory that is planned for: for blocks in training, and for decoded photos. The rest is for what a step works
 // on.
 constexpr double kShareOfBlocks = 0.4, kShareOfPhotos = 0.4;
+constexpr double kHeap = 1.02;         // what the C library keeps besides (1.002 was measured)
 constexpr double kWorthSaying = 0.02;  // of the pixels are not trained on
 constexpr double kMostPixelsOff = 2;   // of observations whose distance is believed
 constexpr const char* kWaiting = "waiting";
@@ -115,7 +116,7 @@ void sayWhatMemoryItTakes(VolumeTrainer& trainer, const Capture& capture, const 
   const VolumeConfig& config = options.config;
   const double all = static_cast<double>(decodedBytes(capture, capture.photosIn(Split::train)));
   const double photos = config.photoBudgetMiB > 0 ? std::min(all, config.photoBudgetMiB * kMiB) : all;
-  const double bytes = static_cast<double>(residentBytes()) + photos + 2 * trainingBytesPerBlock(config);
+  const double bytes = kHeap * (static_cast<double>(residentBytes()) + photos + 2 * trainingBytesPerBlock(config));
   const Residency* residency = trainer.residency();
   inform("memory: at most {:.0f} MiB{}", bytes / kMiB,
          residency ? fmt::format(", with {} of {} blocks at a time, {} stays in {} steps", config.residentBlocks,
