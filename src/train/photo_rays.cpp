@@ -1,6 +1,7 @@
 #include "train/photo_rays.h"
 
 #include <cmath>
+#include <limits>
 
 #include "base/error.h"
 #include "train/visible_cells.h"
@@ -39,9 +40,8 @@ PhotoRays::PhotoRays(Device& device, const Capture& capture, const SceneFrame& f
       cameras_(device.arrayOf(rayCameras(capture, frame))),
       photoOfRay_(device.array<uint32_t>(settings.mostRays)) {
   const size_t rays = settings.mostRays;
-  for (Array<float>* one : {&weights_, &distances_}) *one = device.array<float>(rays);
+  for (Array<float>* one : {&weights_, &distances_, &nears_, &fars_}) *one = device.array<float>(rays);
   if (settings.freeSpace) {
-    nears_ = device.array<float>(rays);
     for (const double depth : nearestContent(capture)) {
       nearOfPhoto_.push_back(static_cast<float>(kNearShare * depth * frame.scale));
     }
@@ -64,11 +64,7 @@ void PhotoRays::draw(int64_t step, uint32_t rays) {
   device_.write(backgrounds_.all(), std::span<const float>(batch_.backgrounds));
   device_.write(weights_.all(), std::span<const float>(batch_.weights));
   device_.write(distances_.all(), std::span<const float>(batch_.distances));
-  if (settings_.freeSpace) {
-    std::vector<float> nears;
-    for (const uint32_t photo : batch_.photoOfRay) nears.push_back(nearOfPhoto_[photo]);
-    device_.write(nears_.all(), std::span<const float>(nears));
-  }
+  limitRays();
   std::vector<float> jitter;
   for (uint32_t k = 0; k < settings_.jitters; ++k) {
     for (const float first : batch_.jitter) {
@@ -78,6 +74,20 @@ void PhotoRays::draw(int64_t step, uint32_t rays) {
   }
   device_.write(jitter_.all(), std::span<const float>(jitter));
   device_.run(GenerateRays{{rays, {}}, cameras_, photoOfRay_, pixels_, origins_, directions_});
+}
+
+void PhotoRays::limitRays() {
+  std::vector<float> nears(count_), fars(count_, std::numeric_limits<float>::infinity());
+  const float bracket = static_cast<float>(settings_.knownBracket);
+  for (uint32_t ray = 0; ray < count_; ++ray) {
+    if (settings_.freeSpace) nears[ray] = nearOfPhoto_[batch_.photoOfRay[ray]];
+    const float known = batch_.distances[ray];
+    if (known == 0 || bracket == 0) continue;
+    nears[ray] = (1 - bracket) * known;
+    fars[ray] = (1 + bracket) * known;
+  }
+  device_.write(nears_.all(), std::span<const float>(nears));
+  device_.write(fars_.all(), std::span<const float>(fars));
 }
 
 }  // namespace tessera

@@ -20,6 +20,9 @@ class PhotoRays {
     bool randomBackground = true;
     double knownShare = 0;   // of the rays, through sparse points
     bool freeSpace = false;  // also how far rays go through nothing
+    // Rays through sparse points begin and end as much before and behind them, as a share of their distance; 0: they
+    // are like others.
+    double knownBracket = 0;
     // Numbers a ray; the first is RayBatch's, the others differ from it by multiples of the golden ratio.
     uint32_t jitters = 1;
   };
@@ -38,8 +41,10 @@ class PhotoRays {
   Slice<const float> backgrounds(uint32_t first, uint32_t rays) const { return three(backgrounds_, first, rays); }
   Slice<const float> weights(uint32_t first, uint32_t rays) const { return weights_.part(first, rays); }
   Slice<const float> distances(uint32_t first, uint32_t rays) const { return distances_.part(first, rays); }
-  // Before that no point was seen in the ray's photo (nearestContent), scene units; with `freeSpace`.
+  // Where rays are to begin and end, scene units: before that no point was seen in the ray's photo (nearestContent),
+  // with `freeSpace`; or about the ray's sparse point, with `knownBracket`. Else 0 and infinity.
   Slice<const float> nears(uint32_t first, uint32_t rays) const { return nears_.part(first, rays); }
+  Slice<const float> fars(uint32_t first, uint32_t rays) const { return fars_.part(first, rays); }
   Slice<const float> origins(uint32_t first, uint32_t rays) const { return three(origins_, first, rays); }
   Slice<const float> directions(uint32_t first, uint32_t rays) const { return three(directions_, first, rays); }
   Slice<const float> jitter(uint32_t first, uint32_t rays) const { return jitter_.part(first, rays); }
@@ -47,6 +52,7 @@ class PhotoRays {
   Slice<const float> jitters() const { return jitter_.part(0, size_t{count_} * settings_.jitters); }
 
  private:
+  void limitRays();
   static Slice<const float> three(const Array<float>& array, uint32_t first, uint32_t rays) {
     return array.part(size_t{3} * first, size_t{3} * rays);
   }
@@ -61,7 +67,7 @@ class PhotoRays {
   uint32_t count_ = 0;
   Array<RayCamera> cameras_;
   Array<uint32_t> photoOfRay_;
-  Array<float> pixels_, targets_, backgrounds_, weights_, jitter_, distances_, nears_, origins_, directions_;
+  Array<float> pixels_, targets_, backgrounds_, weights_, jitter_, distances_, nears_, fars_, origins_, directions_;
 };
 
 }  // namespace tessera

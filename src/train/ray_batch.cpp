@@ -20,6 +20,12 @@ class TileDraw {
     }
   }
   bool isEmpty() const { return !(until_.back() > 0); }
+  bool holds(int photo, const KnownDistance& pixel) const {
+    const std::vector<PhotoTile>& tiles = tiles_[static_cast<size_t>(photo)].tiles;
+    return std::any_of(tiles.begin(), tiles.end(), [&](const PhotoTile& tile) {
+      return pixel.x >= tile.left && pixel.x < tile.right && pixel.y >= tile.top && pixel.y < tile.bottom;
+    });
+  }
   struct Drawn {
     size_t entry;
     const PhotoTile* tile;
@@ -50,7 +56,7 @@ class TileDraw {
 void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<std::vector<KnownDistance>>& known,
               const RayBatchOptions& options, int64_t step, uint32_t rays, RayBatch& batch) {
   CHECK(!window.empty());
-  constexpr int kTries = 4;
+  constexpr int kTries = 4, kPicks = 2;
   constexpr uint64_t kDrawsPerRay = 32;
   batch.photoOfRay.resize(rays);
   batch.pixels.resize(2 * size_t{rays});
@@ -88,14 +94,17 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
       uint32_t x = left + random.below(draw++, right - left);
       uint32_t y = top + random.below(draw++, bottom - top);
       batch.distances[ray] = 0;
-      if (!tiles && wantsKnown && !known.empty() && !known[entry.photo].empty()) {
+      const bool someKnown = wantsKnown && !nothing && !known.empty() && !known[entry.photo].empty();
+      for (int pick = 0; someKnown && pick < kPicks; ++pick) {
         const std::vector<KnownDistance>& ofPhoto = known[entry.photo];
         const KnownDistance& chosen = ofPhoto[random.below(draw++, static_cast<uint32_t>(ofPhoto.size()))];
+        if (tiles && !tiles->holds(entry.photo, chosen)) continue;
         if (chosen.x < static_cast<uint32_t>(image.width) && chosen.y < static_cast<uint32_t>(image.height)) {
           x = chosen.x;
           y = chosen.y;
           batch.distances[ray] = chosen.distance;
         }
+        break;
       }
       const bool masked =
           !entry.decoded->mask.empty() && *entry.decoded->mask.at(static_cast<int>(x), static_cast<int>(y)) < 128;

@@ -22,7 +22,7 @@ struct RayBatchOptions {
   uint64_t seed = 0;
   bool randomBackground = true;
   double knownShare = 0;  // of the rays go through pixels whose distance is known, in photos that have some
-  const std::vector<TileShares>* tiles = nullptr;  // [photo]: draw from these alone, and regard no known distances
+  const std::vector<TileShares>* tiles = nullptr;  // [photo]: draw from these alone
 };
 
 // Uniform over the window's photos and their pixels, or by the shares of tiles; a function of window, seed and step.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <set>
 
 namespace tessera {
@@ -172,6 +173,27 @@ TEST(RayBatch, DrawsAShareOfItsRaysWhereDistancesAreKnown) {
   EXPECT_NEAR(counts[1], 2000 * 0.25 / 3, 50);
   drawRays(twoPhotos(), known, {1, true, 0}, 0, 4000, batch);
   EXPECT_EQ(batch.distances, std::vector<float>(4000, 0.0f));
+}
+
+TEST(RayBatch, DrawsKnownPixelsFromTilesOnlyWhereItDrawsFromTiles) {
+  std::vector<std::vector<KnownDistance>> known(10);
+  known[4] = {{1, 2, 1.5f}, {6, 1, 2.5f}, {3, 3, 3.5f}};  // the last one is in no tile
+  known[9] = {{0, 0, 9.0f}};
+  std::vector<TileShares> tiles(10);
+  tiles[4] = {{{4, 0, 0, 2, 5}, {4, 5, 1, 7, 2}}, {1, 4}};
+  tiles[9] = {{{9, 3, 3, 4, 4}}, {4}};
+  RayBatch batch;
+  drawRays(twoPhotos(), known, {1, true, 0.5, &tiles}, 0, 4000, batch);
+  std::map<float, int> drawn;
+  for (size_t ray = 0; ray < batch.weights.size(); ++ray) {
+    ++drawn[batch.distances[ray]];
+    if (batch.distances[ray] == 0) continue;
+    EXPECT_EQ(batch.photoOfRay[ray], 4u);
+    EXPECT_EQ(batch.pixels[2 * ray], batch.distances[ray] == 1.5f ? 1.5f : 6.5f);
+  }
+  EXPECT_EQ(drawn.size(), 3u);
+  EXPECT_NEAR(drawn[1.5f], drawn[2.5f], 80);
+  EXPECT_GT(drawn[1.5f], 300);  // of about 1000 that want a known pixel of this photo
 }
 
 TEST(RayBatch, KnowsNoDistancesUnderMasks) {

@@ -103,6 +103,10 @@ std::vector<ConfigField> VolumeConfig::fields() {
       {"full_gradient_distance",
        "samples nearer to the camera learn more slowly, or fog gathers there; in halves of a block",
        &fullGradientDistance},
+      {"known_share", "share of the rays through sparse points, in captures that have some", &knownShare},
+      {"known_bracket",
+       "such rays begin and end this share of their distance before and behind the point: what they see stands there",
+       &knownBracket},
       {"free_space", "nothing stands before the nearest sparse points that a photo shows", &freeSpace},
       {"blocks_only", "no rays from parts of photos that see no block, as where --grid is a part of the place",
        &blocksOnly},
@@ -172,6 +176,8 @@ void VolumeConfig::check() const {
   requireWithin("sparsity", sparsity, 0, kHuge);
   requireWithin("opacity", opacity, 0, kHuge);
   requireWithin("ramp_share", rampShare, 0, 1);
+  requireWithin("known_share", knownShare, 0, 1);
+  requireWithin("known_bracket", knownBracket, 0, 1);
   requireWithin("full_gradient_distance", fullGradientDistance, 0, kHuge);
   requireWithin("sparsity_points", sparsityPoints, 0, 1 << 24);
   requireWithin("cull_begin", cullBegin, 0, 1);

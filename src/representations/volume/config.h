@@ -43,7 +43,7 @@ struct VolumeConfig {
   // Losses
   std::string loss = "charbonnier";
   double lossParameter = 1e-3, s3im = 0.2, interlevel = 1, distortion = 0.01, sparsity = 0.01, opacity = 1e-3;
-  double rampShare = 0.1, fullGradientDistance = 1;
+  double rampShare = 0.1, fullGradientDistance = 1, knownShare = 0.05, knownBracket = 0.03;
   int sparsityPoints = 4096;
   double cullBegin = 0.4, cullEnd = 0.8, cullFirst = 5e-4, cullLast = 5e-3;
   bool literalEq3 = false;

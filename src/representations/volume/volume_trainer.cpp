@@ -26,6 +26,8 @@ PhotoRays::Settings raySettings(const VolumeConfig& config) {
   settings.stepsPerPhoto = config.stepsPerPhoto;
   settings.randomBackground = config.randomBackground;
   settings.freeSpace = config.freeSpace;
+  settings.knownShare = config.knownShare;
+  settings.knownBracket = config.knownBracket;
   settings.jitters = VolumePass::kRounds + 1;
   return settings;
 }
@@ -119,8 +121,15 @@ void VolumeTrainer::moveIn(size_t stay) {
   drawFrom(next.shareOfSet);
 }
 
-VolumePass::LossScales VolumeTrainer::lossScales(double progress) const {
-  const double ramp = config_.rampShare > 0 ? std::min(1.0, progress / config_.rampShare) : 1;
+VolumePass::LossScales VolumeTrainer::lossScales(int64_t step, int64_t plannedSteps) const {
+  // Blocks must have seen something before they are asked to decide: those that wait get their first turn without.
+  const int64_t into = step - (residency_ ? residency_->cycleSteps() : 0);
+  double ramp = into < 0 ? 0 : 1;
+  if (into >= 0 && config_.rampShare > 0) {
+    ramp = plannedSteps == 0
+               ? 0
+               : std::min(1.0, static_cast<double>(into) / (config_.rampShare * static_cast<double>(plannedSteps)));
+  }
   const double perRay = 1.0 / rays_;
   VolumePass::LossScales scales;
   scales.interlevel = static_cast<float>(config_.interlevel * perRay);
@@ -159,8 +168,8 @@ VolumeRays VolumeTrainer::forward(int64_t step, const VolumePass::Options& optio
                           photoRays_.origins(0, rays_),
                           photoRays_.directions(0, rays_),
                           photoRays_.jitters(),
-                          {},
-                          config_.freeSpace ? photoRays_.nears(0, rays_) : Slice<const float>()};
+                          photoRays_.fars(0, rays_),
+                          photoRays_.nears(0, rays_)};
     pass_.forward(rays, options);
     const double room = pass_.roomForTexels(), wanted = pass_.texelsWanted();
     if (wanted <= room || rays_ == kGroup) return rays;
@@ -179,7 +188,7 @@ StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
   if (config_.level > 0) model_.lookThrough(isFrozen(progress) ? finerGrid(config_) : config_.virtualGrid());
   const VolumeRays rays = forward(step, options);
   addColourGradients(step);
-  pass_.backward(rays, colourGradients_, opacityGradients_, lossScales(progress));
+  pass_.backward(rays, colourGradients_, opacityGradients_, lossScales(step, plannedSteps));
   updateParameters(step, plannedSteps, options);
 
   for (const uint32_t block : model_.blockOfSlot()) asSaved_[block] = false;

@@ -40,7 +40,7 @@ class VolumeTrainer final : public Trainee {
   void moveIn(size_t stay);
   void restoreBlock(uint32_t block, const fs::path& path, const Safetensors& state);
   VolumePass::Options passOptions(int64_t step, double progress) const;
-  VolumePass::LossScales lossScales(double progress) const;
+  VolumePass::LossScales lossScales(int64_t step, int64_t plannedSteps) const;
   VolumeRays forward(int64_t step, const VolumePass::Options& options);
   void addColourGradients(int64_t step);
   // A coarser level's first steps: only deferred networks are trained, through the grid of the level below.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -45,6 +46,37 @@ TEST(VolumeTrainer, LearnsWhatLiesAroundTheRegionInTheSurround) {
     EXPECT_EQ(trained.model().space().blocks(), surround == std::string("own") ? 2u : 1u);
     EXPECT_GT(heldOut(scene, trained.model()), 20) << surround;
   }
+}
+
+// Median of how far depths are from the truth, of held-out views' pixels where something is.
+double depthError(const CubeScene& scene, VolumeModel& model) {
+  VolumeModelRenderer renderer(model, static_cast<float>(model.config().cullLast));
+  std::vector<float> errors;
+  for (const int photo : scene.capture().photosIn(Split::test)) {
+    const Camera& camera = scene.capture().cameras[0];
+    const Pose& pose = scene.capture().photos[photo].worldFromCamera;
+    const RenderedView seen = renderer.render(camera, pose, nullptr), truth = scene.truth(camera, pose);
+    for (size_t i = 0; i < truth.depth.pixels.size(); ++i)
+      errors.push_back(std::abs(seen.depth.pixels[i] - truth.depth.pixels[i]));
+  }
+  std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
+  return errors[errors.size() / 2];
+}
+
+TEST(VolumeTrainer, LearnsFromSparsePointsWhereThingsStand) {
+  CubeScene::Options options;
+  options.room = true;
+  options.observationsPerPhoto = 50;
+  const CubeScene scene(options);
+  VolumeConfig config = smallVolumeConfig();
+  config.surround = "own";
+  const auto errorWith = [&](double knownShare) {
+    config.knownShare = knownShare;
+    TrainedVolumeCube trained(scene, config, cubeGrid(2), 60);
+    return depthError(scene, trained.model());
+  };
+  const double without = errorWith(0), with = errorWith(0.1);
+  EXPECT_LT(with, 0.5 * without);
 }
 
 TEST(VolumeTrainer, MakesTheSameBytesOnAnyNumberOfThreads) {
@@ -108,6 +140,23 @@ TEST(VolumeTrainer, LearnsACubeWithHalfOfItsBlocksInMemory) {
   // Nearly half of what the photos show passes three or four blocks, and is not trained on: all in memory gives 23.5.
   EXPECT_NEAR(few.trainer->residency()->unserved(), 0.46, 0.1);
   EXPECT_GT(heldOut(scene, whole), 20.5);
+}
+
+// Asked before they have seen anything, they decide for being empty.
+TEST(VolumeTrainer, LetsBlocksThatWaitSeeSomethingBeforeTheyAreToDecide) {
+  const CubeScene scene;
+  VolumeConfig config = twoOfFour(), urged = config;
+  urged.rampShare = 0;
+  urged.opacity = urged.distortion = urged.sparsity = 1;
+  config.opacity = config.distortion = config.sparsity = 0;
+  TrainedVolumeCube calm(scene, config, fourBlocks(), 0), strict(scene, urged, fourBlocks(), 0);
+  const int64_t cycle = calm.trainer->residency()->cycleSteps();
+  for (int64_t step = 0; step <= cycle; ++step) {
+    EXPECT_EQ(calm.saved(), strict.saved()) << "before step " << step;
+    calm.trainer->step(step, 100);
+    strict.trainer->step(step, 100);
+  }
+  EXPECT_NE(calm.saved(), strict.saved());
 }
 
 TEST(VolumeTrainer, TakesFewerRaysWhereTheyWantMoreTexelsThanThereIsRoomFor) {
