@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "train/cube_scene.h"
 
@@ -20,7 +22,6 @@ CubeScene::Options withPoints() {
 
 struct Limits {
   std::vector<float> nears, fars, distances;
-  std::vector<uint32_t> photos;
 };
 
 Limits limitsOf(const CubeScene& scene, const PhotoRays::Settings& settings) {
@@ -29,8 +30,8 @@ Limits limitsOf(const CubeScene& scene, const PhotoRays::Settings& settings) {
   frame.scale = 0.5;
   PhotoRays rays(*device, scene.capture(), frame, settings);
   rays.draw(0, kRays);
-  return {device->read(rays.nears(0, kRays)), device->read(rays.fars(0, kRays)), device->read(rays.distances(0, kRays)),
-          device->read(rays.photoOfRay(0, kRays))};
+  return {device->read(rays.nears(0, kRays)), device->read(rays.fars(0, kRays)),
+          device->read(rays.distances(0, kRays))};
 }
 
 TEST(PhotoRays, HaveNoEndsUnlessToldSo) {
