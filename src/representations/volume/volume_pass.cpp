@@ -149,7 +149,7 @@ void VolumePass::propose(const VolumeRays& rays, uint32_t r, const Options& opti
   const bool last = r + 1 == rounds();
   resample.after = last ? samples() : round_[r + 1].intervals;
   resample.anneal = options.anneal;
-  resample.padding = static_cast<float>(model_.config().padding);
+  resample.padding = std::max(static_cast<float>(model_.config().padding), options.padding);
   resample.fences = round.fences;
   resample.weights = round.weights;
   resample.jitter = jitterOf(rays, r + 1);

@@ -32,6 +32,7 @@ class VolumePass {
 
   struct Options {
     float anneal = 1;    // of proposals
+    float padding = 0;   // of proposals, if more than the model's
     float minAlpha = 0;  // samples below are culled
     uint64_t seed = 0;   // of random points
     bool keepProposals = false;
