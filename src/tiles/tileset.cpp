@@ -52,11 +52,12 @@ BlockGrid Tileset::blockGrid() const {
 void placeOn(Tileset& tileset, const BlockGrid& grid) {
   CHECK(grid.columns >= 1);
   CHECK(grid.rows >= 1);
-  tileset.worldFromScene = {grid.gridFromWorld.transpose(), grid.edge / 2, grid.originInWorld};
+  const Vec3d middle(0, 0, (grid.bottom + grid.top) / 2);
+  tileset.worldFromScene = {grid.gridFromWorld.transpose(), grid.edge / 2, grid.inWorld(middle)};
   tileset.columns = static_cast<uint32_t>(grid.columns);
   tileset.rows = static_cast<uint32_t>(grid.rows);
-  tileset.bottom = grid.bottom / tileset.worldFromScene.scale;
-  tileset.top = grid.top / tileset.worldFromScene.scale;
+  tileset.top = (grid.top - grid.bottom) / grid.edge;
+  tileset.bottom = -tileset.top;
 }
 
 Similarity Tileset::tileFromScene() const {

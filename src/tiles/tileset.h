@@ -130,7 +130,8 @@ std::vector<uint32_t> coarsestCover(const Tileset& tileset);
 // The highest level of a tile that has contents, the surround apart; 0 where there is none.
 uint32_t coarsestLevel(const Tileset& tileset);
 
-// Scene units from a block grid's: columns, rows, bottom, top and worldFromScene.
+// Scene units from a block grid's: columns, rows, bottom, top and worldFromScene. The scene's origin is amid its
+// heights, wherever the grid's is.
 void placeOn(Tileset& tileset, const BlockGrid& grid);
 
 // Why the tileset is none: the first rule of docs/tile-format.md that it breaks, for people. Nothing when it is one.

@@ -29,13 +29,13 @@ TEST(Tileset, StandsOnItsBlockGrid) {
   EXPECT_LT((corner - grid.inWorld({-45, -30, 12})).norm(), 1e-9);
   EXPECT_LT((tileset.worldFromScene.undo(corner) - Vec3d(-3, -2, tileset.top)).norm(), 1e-12);
   const BlockGrid again = tileset.blockGrid();
-  EXPECT_EQ(again.originInWorld, grid.originInWorld);
+  EXPECT_EQ(again.originInWorld, grid.inWorld({0, 0, 3})) << "amid its heights";
   EXPECT_EQ(again.gridFromWorld, grid.gridFromWorld);
   EXPECT_EQ(again.edge, grid.edge);
   EXPECT_EQ(again.columns, 3);
   EXPECT_EQ(again.rows, 2);
-  EXPECT_DOUBLE_EQ(again.bottom, grid.bottom);
-  EXPECT_DOUBLE_EQ(again.top, grid.top);
+  EXPECT_DOUBLE_EQ(again.bottom, -9);
+  EXPECT_DOUBLE_EQ(again.top, 9);
 }
 
 TEST(Tileset, ItsCellsAreTheGridsCells) {

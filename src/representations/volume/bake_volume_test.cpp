@@ -277,7 +277,11 @@ TEST(BakeVolume, LooksAsTheModelThatItWasBakedFrom) {
   for (const char* surround : {"none", "own"}) {
     VolumeConfig config = smallVolumeConfig();
     config.surround = surround;
-    TrainedVolumeCube trained(scene, config, cubeGrid(2), 300);
+    BlockGrid grid = cubeGrid(2);  // as one's own may be: its origin is not amid the heights
+    grid.originInWorld.z() += grid.bottom;
+    grid.top -= grid.bottom;
+    grid.bottom = 0;
+    TrainedVolumeCube trained(scene, config, grid, 300);
     const BakedVolume baked = bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / surround, {});
     EXPECT_EQ(baked.tileset.tiles.size(), 3u);
     VolumeModelRenderer model(trained.model(), static_cast<float>(config.cullLast));
