@@ -38,8 +38,8 @@ Blocks nextStay(const BlockSets& sets, const std::vector<double>& wanted, uint32
   return held;
 }
 
-// The sets that must be served: all that can be, but the rarest.
-std::vector<bool> required(const BlockSets& sets, uint32_t resident) {
+// The sets that must be served: all that can be, but the rarest; of those again the heaviest with each block.
+std::vector<bool> required(const BlockSets& sets, uint32_t blocks, uint32_t resident) {
   std::vector<size_t> byWeight;
   double total = 0;
   for (size_t i = 0; i < sets.sets.size(); ++i) {
@@ -49,11 +49,15 @@ std::vector<bool> required(const BlockSets& sets, uint32_t resident) {
   }
   std::stable_sort(byWeight.begin(), byWeight.end(),
                    [&](size_t a, size_t b) { return sets.weights[a] > sets.weights[b]; });
-  std::vector<bool> required(sets.sets.size());
+  std::vector<bool> required(sets.sets.size()), served(blocks);
   double sum = 0;
   for (const size_t i : byWeight) {
-    required[i] = sum < (1 - Residency::kForgone) * total;
+    const bool bringsABlock =
+        std::any_of(sets.sets[i].begin(), sets.sets[i].end(), [&](uint32_t b) { return !served[b]; });
+    required[i] = sum < (1 - Residency::kForgone) * total || bringsABlock;
     sum += sets.weights[i];
+    if (!required[i]) continue;
+    for (const uint32_t block : sets.sets[i]) served[block] = true;
   }
   return required;
 }
@@ -64,7 +68,7 @@ Residency::Residency(const BlockSets& sets, const Settings& settings) : settings
   CHECK(sets.sets.size() == sets.weights.size());
   CHECK(settings.resident >= 1u);
   CHECK(settings.resident <= settings.blocks);
-  const std::vector<bool> must = required(sets, settings.resident);
+  const std::vector<bool> must = required(sets, settings.blocks, settings.resident);
   constexpr double kServed = 1e-3;  // what is served already, but fits as well
   std::vector<double> wanted = sets.weights;
   const auto isLeft = [&](size_t i) { return must[i] && wanted[i] == sets.weights[i] && sets.weights[i] > 0; };
@@ -110,9 +114,17 @@ Residency::Residency(const BlockSets& sets, const Settings& settings) : settings
   if (stays_.empty()) add(nextStay(sets, wanted, settings.blocks, settings.resident));
 
   double total = 0, served = 0;
+  std::vector<bool> seen(settings.blocks), comesUp(settings.blocks);
   for (size_t i = 0; i < sets.sets.size(); ++i) {
     total += sets.weights[i];
     if (servings[i] > 0) served += sets.weights[i];
+    for (const uint32_t block : sets.sets[i]) {
+      seen[block] = seen[block] || sets.weights[i] > 0;
+      comesUp[block] = comesUp[block] || servings[i] > 0;
+    }
+  }
+  for (uint32_t block = 0; block < settings.blocks; ++block) {
+    if (seen[block] && !comesUp[block]) neverServed_.push_back(block);
   }
   unserved_ = total > 0 ? 1 - served / total : 0;
   double ended = 0;

@@ -25,7 +25,7 @@ class Residency {
     uint64_t seed = 0;
   };
   // Sets of more blocks than may be in memory are never served; nor, unless it happens to fit, is the rarest of the
-  // rest, kForgone of the weight: each would ask for a stay of its own.
+  // rest, kForgone of the weight: each would ask for a stay of its own. But the heaviest with each block always is.
   Residency(const BlockSets& sets, const Settings& settings);
   static constexpr double kForgone = 0.01;
 
@@ -42,13 +42,15 @@ class Residency {
     int64_t stepsInto = 0;
   };
   Place at(int64_t step) const;
-  double unserved() const { return unserved_; }  // share of the weight
+  double unserved() const { return unserved_; }                              // share of the weight
+  const std::vector<uint32_t>& neverServed() const { return neverServed_; }  // blocks of sets that are all too large
 
  private:
   Settings settings_;
   std::vector<Stay> stays_;
   int64_t cycleSteps_ = 0;
   double unserved_ = 0;
+  std::vector<uint32_t> neverServed_;
 };
 
 }  // namespace tessera

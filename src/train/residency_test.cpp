@@ -54,6 +54,23 @@ TEST(Residency, ServesEverySetThatFitsAndSaysWhatDoesNot) {
   EXPECT_NEAR(Residency(sets, {16, 4, 1000, 1}).unserved(), 0.1, Residency::kForgone);
 }
 
+TEST(Residency, BringsEveryBlockThatASetThatFitsAsksForHoweverRare) {
+  BlockSets sets = city();
+  for (uint32_t block : {16u, 17u}) {
+    sets.sets.push_back({0, block});
+    sets.weights.push_back(1e-6);
+  }
+  sets.sets.push_back({0, 1, 2, 4, 18});  // too many
+  sets.weights.push_back(1);
+  const Residency residency(sets, {20, 4, 1000, 1});
+  const auto comesUp = [&](uint32_t block) {
+    return std::any_of(residency.stays().begin(), residency.stays().end(),
+                       [&](const Residency::Stay& stay) { return holds(stay.blocks, {block}); });
+  };
+  for (uint32_t block = 0; block < 18; ++block) EXPECT_TRUE(comesUp(block)) << block;
+  EXPECT_EQ(residency.neverServed(), std::vector<uint32_t>{18}) << "no ray sees number 19";
+}
+
 TEST(Residency, DrawsFromEverySetAsOftenAsItsWeightAsks) {
   const BlockSets sets = city();
   const Residency residency(sets, {16, 4, 100000, 1});

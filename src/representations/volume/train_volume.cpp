@@ -128,11 +128,31 @@ void sayWhatMemoryItTakes(VolumeTrainer& trainer, const Capture& capture, const 
         "photo_budget_mib",
         plannedMemory(options) / kMiB);
   }
-  if (!residency || residency->unserved() < kWorthSaying) return;
+  if (!residency) return;
+  const std::vector<uint32_t> never = residency->neverServed();
+  if (!never.empty()) {
+    const uint32_t columns = trainer.model().space().columns;
+    std::vector<std::string> names;
+    for (const uint32_t block : never) names.push_back(fmt::format("({}, {})", block % columns, block / columns));
+    warn(
+        "blocks {} are seen through more than {} blocks at a time wherever they are seen, and will hold nothing; raise "
+        "--resident-blocks",
+        fmt::join(names, ", "), config.residentBlocks);
+  }
+  if (residency->unserved() < kWorthSaying) return;
   warn(
       "{:.0f} % of what the photos show is seen through more than {} blocks, or rare sets of them, and not trained on; "
       "raise --resident-blocks",
       100 * residency->unserved(), config.residentBlocks);
+}
+
+void warnWhereBlocksMissTheirTurn(const VolumeTrainer& trainer, int64_t steps) {
+  const int64_t cycle = trainer.residency() ? trainer.residency()->cycleSteps() : 0;
+  if (steps >= cycle) return;
+  warn(
+      "all blocks get their turn in {} steps, and there are {}: some are trained too little, or not at all; train for "
+      "longer, raise --resident-blocks, or lower residency_steps",
+      cycle, steps);
 }
 
 // What all levels are trained on.
@@ -153,16 +173,17 @@ void writeRun(const ModelFolder& folder, const Training& on, VolumeConfig config
 
 // `loop.steps` of the level that `config` is for, or those that it had planned when it was begun. True when it is
 // trained to its end.
-bool trainLevel(const fs::path& model, const Training& on, const VolumeConfig& config, TrainingLoopOptions loop) {
+bool trainLevel(const fs::path& model, const Training& on, VolumeConfig config, TrainingLoopOptions loop) {
   const uint32_t level = static_cast<uint32_t>(config.level);
   const ModelFolder folder(levelFolder(model, level));
   if (folder.manifest() && !isMadeFrom(folder.root(), config.finestStep)) fs::remove_all(folder.root());
   const std::optional<ModelManifest> before = folder.manifest();
   if (before && before->step >= before->plannedSteps) return true;
-  VolumeTrainer trainer(on.device, on.capture, config, on.grid, folder.root() / kWaiting);
-  if (!before) trainer.beginFrom(levelFolder(model, level - 1));
   loop.minutes = 0;
   if (before) loop.steps = before->plannedSteps;
+  config.residencySteps = std::min(config.residencySteps, loop.steps);  // all blocks get their turn
+  VolumeTrainer trainer(on.device, on.capture, config, on.grid, folder.root() / kWaiting);
+  if (!before) trainer.beginFrom(levelFolder(model, level - 1));
   loop.resume = true;
   writeRun(folder, on, config, loop);
   inform("level {}: {} blocks in {} models, {} steps", level, on.grid.cells(), trainer.model().groups().cells.size(),
@@ -170,10 +191,20 @@ bool trainLevel(const fs::path& model, const Training& on, const VolumeConfig& c
   return runTraining(trainer, folder, loop).finished;
 }
 
-void requireSameGrid(const ModelFolder& folder, const BlockGrid& has, const BlockGrid& wanted) {
-  if (blockGridToJson(has) == blockGridToJson(wanted)) return;
-  throw Error((folder.root() / "blocks.json").string(), "grid", "the run has other blocks than those of --grid",
-              "resume without --grid, or train into another folder");
+// A run that goes on keeps its blocks.
+void requireSameGrid(const ModelFolder& folder, const BlockGrid& has, const TrainVolumeOptions& wanted) {
+  const auto other = [&](const std::string& flag, const std::string& why) {
+    return Error((folder.root() / "blocks.json").string(), "grid", why,
+                 fmt::format("resume without {}, or train into another folder", flag));
+  };
+  if (wanted.grid && blockGridToJson(has) != blockGridToJson(*wanted.grid)) {
+    throw other("--grid", "the run has other blocks than those of --grid");
+  }
+  const BlockCount& count = wanted.blocks;
+  if (!wanted.grid && !count.automatic && (count.columns != has.columns || count.rows != has.rows)) {
+    throw other("--blocks",
+                fmt::format("the run has {}x{} blocks, not {}x{}", has.columns, has.rows, count.columns, count.rows));
+  }
 }
 
 }  // namespace
@@ -190,7 +221,7 @@ TrainingResult trainVolume(Device& device, const Capture& capture, const fs::pat
                                              static_cast<int64_t>(2 * kShareOfPhotos * plannedMemory(options)));
   // A resumed run stands where the killed one stood, whatever has become of the capture's points since.
   const BlockGrid grid = goingOn ? requireGrid(folder) : cut(capture, model, options);
-  if (options.grid) requireSameGrid(folder, grid, *options.grid);
+  if (goingOn) requireSameGrid(folder, grid, options);
   const Training on{device, capture, grid};
   TrainingResult result;
   {
@@ -198,7 +229,10 @@ TrainingResult trainVolume(Device& device, const Capture& capture, const fs::pat
     if (!goingOn) fs::remove_all(model / "levels");  // of a run that is no more
     writeRun(folder, on, config, options.loop);
     sayWhatMemoryItTakes(trainer, capture, options);
+    const bool stepsAreKnown = options.loop.steps > 0 && !goingOn;  // else they are settled on the way
+    if (stepsAreKnown) warnWhereBlocksMissTheirTurn(trainer, options.loop.steps);
     result = runTraining(trainer, folder, options.loop);
+    if (!stepsAreKnown && result.finished) warnWhereBlocksMissTheirTurn(trainer, result.plannedSteps);
   }
   options.loop.steps = static_cast<int64_t>(config.levelShare * static_cast<double>(result.plannedSteps));
   if (!result.finished || options.loop.steps < 1) return result;

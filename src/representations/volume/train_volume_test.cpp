@@ -86,6 +86,43 @@ TEST(TrainVolume, TrainsLevelsTooWithBlocksThatWait) {
   }
 }
 
+TEST(TrainVolume, GoesOnWithTheBlocksThatItHasOrSaysThatTheyAreOthers) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  trainVolume(*device, scene.capture(), scene / "model", options(2));
+  const auto goesOnWith = [&](const char* blocks) {
+    TrainVolumeOptions more = options(3, true);
+    more.blocks = *parseBlockCount(blocks);
+    return trainVolume(*device, scene.capture(), scene / "model", more).finished;
+  };
+  try {
+    goesOnWith("3x1");
+    ADD_FAILURE() << "the blocks that were asked for are not there";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("the run has 2x1 blocks, not 3x1"), std::string::npos) << error.what();
+  }
+  EXPECT_TRUE(goesOnWith("auto"));
+  EXPECT_TRUE(goesOnWith("2x1"));
+}
+
+TEST(TrainVolume, WarnsWhereBlocksMissTheirTurnAndGivesItToThoseOfLevels) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  const auto warnings = [&](const char* model, int64_t residencySteps) {
+    TrainVolumeOptions few = options(10);
+    few.config.residentBlocks = 1;
+    few.config.residencySteps = residencySteps;
+    few.config.levelShare = 0.8;
+    testing::internal::CaptureStderr();
+    trainVolume(*device, scene.capture(), scene / model, few);
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_NE(warnings("short", 50).find("all blocks get their turn in 50 steps, and there are 10"), std::string::npos);
+  EXPECT_EQ(savedConfig<VolumeConfig>(levelFolder(scene / "short", 1)).residencySteps, 8) << "all that it has";
+  EXPECT_EQ(warnings("long", 4).find("get their turn"), std::string::npos);
+  EXPECT_EQ(savedConfig<VolumeConfig>(levelFolder(scene / "long", 1)).residencySteps, 4);
+}
+
 TEST(TrainVolume, LoadsFewBlocksAtATime) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});

@@ -32,7 +32,7 @@ PhotoRays::Settings raySettings(const VolumeConfig& config) {
   return settings;
 }
 
-// Of the level below.
+// Of the level below; nearly, where its size was rounded to whole macroblocks.
 VirtualGrid finerGrid(const VolumeConfig& config) {
   VirtualGrid grid = config.virtualGrid();
   grid.voxels *= 2;
@@ -123,7 +123,8 @@ void VolumeTrainer::moveIn(size_t stay) {
 
 VolumePass::LossScales VolumeTrainer::lossScales(int64_t step, int64_t plannedSteps) const {
   // Blocks must have seen something before they are asked to decide: those that wait get their first turn without.
-  const int64_t into = step - (residency_ ? residency_->cycleSteps() : 0);
+  const bool haveSeenNothing = residency_ && config_.level == 0;
+  const int64_t into = step - (haveSeenNothing ? residency_->cycleSteps() : 0);
   double ramp = into < 0 ? 0 : 1;
   if (into >= 0 && config_.rampShare > 0) {
     ramp = plannedSteps == 0

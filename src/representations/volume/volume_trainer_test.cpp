@@ -157,6 +157,15 @@ TEST(VolumeTrainer, LetsBlocksThatWaitSeeSomethingBeforeTheyAreToDecide) {
     strict.trainer->step(step, 100);
   }
   EXPECT_NE(calm.saved(), strict.saved());
+  // A coarser level has been copied from one that has seen everything.
+  for (VolumeConfig* level : {&config, &urged}) {
+    *level = levelConfig(*level, 1, cycle);
+    level->frozenShare = 0;
+  }
+  TrainedVolumeCube calmLevel(scene, config, fourBlocks(), 0), strictLevel(scene, urged, fourBlocks(), 0);
+  calmLevel.trainer->step(0, 100);
+  strictLevel.trainer->step(0, 100);
+  EXPECT_NE(calmLevel.saved(), strictLevel.saved());
 }
 
 TEST(VolumeTrainer, TakesFewerRaysWhereTheyWantMoreTexelsThanThereIsRoomFor) {
@@ -176,6 +185,25 @@ TEST(VolumeTrainer, TakesFewerRaysWhereTheyWantMoreTexelsThanThereIsRoomFor) {
   EXPECT_EQ(again.saved(), trained.saved());
 }
 
+// Of each ray of the last step: the blocks that are seen through its tile.
+std::vector<std::vector<uint32_t>> blocksOfRays(const CubeScene& scene, TrainedVolumeCube& trained) {
+  const TiledPhotos photos = tilePhotos(scene.capture(), trained.model().frame(), trained.model().space());
+  const RayBatch& batch = trained.trainer->rays().batch();
+  std::vector<std::vector<uint32_t>> blocks;
+  for (size_t ray = 0; ray < batch.photoOfRay.size(); ++ray) {
+    const float x = batch.pixels[2 * ray], y = batch.pixels[2 * ray + 1];
+    for (size_t t = 0; t < photos.tiles.size(); ++t) {
+      const PhotoTile& tile = photos.tiles[t];
+      const bool inside = static_cast<float>(tile.left) <= x && x < static_cast<float>(tile.right) &&
+                          static_cast<float>(tile.top) <= y && y < static_cast<float>(tile.bottom);
+      if (inside && tile.photo == static_cast<int>(batch.photoOfRay[ray])) {
+        blocks.push_back(photos.sets[photos.setOfTile[t]]);
+      }
+    }
+  }
+  return blocks;
+}
+
 TEST(VolumeTrainer, DrawsNoRaysThatSeeNoBlockWhenToldSo) {
   const CubeScene scene;
   BlockGrid part = cubeGrid();
@@ -186,26 +214,56 @@ TEST(VolumeTrainer, DrawsNoRaysThatSeeNoBlockWhenToldSo) {
     VolumeConfig config = smallVolumeConfig();
     config.blocksOnly = blocksOnly;
     TrainedVolumeCube trained(scene, config, part, 0);
-    const SceneFrame frame = trained.model().frame();
-    const TiledPhotos tiles = tilePhotos(scene.capture(), frame, trained.model().space());
     trained.trainer->step(0, 10);
-    int64_t without = 0;
-    const RayBatch& batch = trained.trainer->rays().batch();
-    for (size_t ray = 0; ray < batch.photoOfRay.size(); ++ray) {
-      for (size_t t = 0; t < tiles.tiles.size(); ++t) {
-        const PhotoTile& tile = tiles.tiles[t];
-        const float x = batch.pixels[2 * ray], y = batch.pixels[2 * ray + 1];
-        if (tile.photo != static_cast<int>(batch.photoOfRay[ray]) || x < tile.left || x >= tile.right || y < tile.top ||
-            y >= tile.bottom) {
-          continue;
-        }
-        without += tiles.sets[tiles.setOfTile[t]].empty();
-      }
-    }
-    return without;
+    const std::vector<std::vector<uint32_t>> blocks = blocksOfRays(scene, trained);
+    return std::count_if(blocks.begin(), blocks.end(), [](const auto& seen) { return seen.empty(); });
   };
   EXPECT_GT(missing(false), 100);
   EXPECT_EQ(missing(true), 0);
+}
+
+TEST(VolumeTrainer, DrawsNoRaysThatSeeABlockThatWaits) {
+  const CubeScene scene;
+  TrainedVolumeCube trained(scene, twoOfFour(), fourBlocks(), 0);
+  std::vector<int> raysOfBlock(4);
+  const int64_t cycle = trained.trainer->residency()->cycleSteps();
+  for (int64_t step = 0; step < cycle; ++step) {
+    const StepReport report = trained.trainer->step(step, 100);
+    const std::vector<uint32_t>& held = trained.model().blockOfSlot();
+    const std::vector<std::vector<uint32_t>> blocks = blocksOfRays(scene, trained);
+    ASSERT_GE(blocks.size(), report.rays);
+    for (const std::vector<uint32_t>& seen : blocks) {
+      for (const uint32_t block : seen) {
+        ASSERT_NE(std::find(held.begin(), held.end(), block), held.end()) << block << " in step " << step;
+        ++raysOfBlock[block];
+      }
+    }
+  }
+  for (const int rays : raysOfBlock) EXPECT_GT(rays, 100) << "each has its share";
+}
+
+TEST(VolumeTrainer, TrainsNothingButNetworksWhileALevelIsFrozen) {
+  const CubeScene scene;
+  VolumeConfig config = levelConfig(smallVolumeConfig(), 1, 0);
+  config.frozenShare = 0.5;
+  TrainedVolumeCube level(scene, config, cubeGrid(2), 0);
+  const auto fields = [&] {
+    std::vector<std::vector<float>> values;
+    for (uint32_t slot = 0; slot < level.model().slots(); ++slot) {
+      values.push_back(level.device->read(level.model().attributes().table(slot).values.all()));
+      values.push_back(level.device->read(level.model().attributes().network(slot).values.all()));
+      values.push_back(level.device->read(level.model().proposals().table(slot).values.all()));
+    }
+    return values;
+  };
+  const auto network = [&] { return level.device->read(level.model().deferred().values.all()); };
+  const auto fieldsBefore = fields();
+  const std::vector<float> networkBefore = network();
+  for (int64_t step = 0; step < 5; ++step) level.trainer->step(step, 10);
+  EXPECT_EQ(fields(), fieldsBefore);
+  EXPECT_NE(network(), networkBefore);
+  level.trainer->step(5, 10);
+  EXPECT_NE(fields(), fieldsBefore);
 }
 
 TEST(VolumeTrainer, BeginsALevelWithTheExposuresOfTheOneBelow) {
