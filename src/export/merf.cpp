@@ -27,8 +27,8 @@ bool isOurs(const std::string& name) {
   return std::regex_match(name, kNames);
 }
 
-// The file of the only content of the finest level.
-fs::path onlyContent(const fs::path& scene, const Tileset& tileset) {
+// The only content of the finest level; `file` is where it stands.
+VolumeContent readOnlyContent(const fs::path& scene, const Tileset& tileset, fs::path& file) {
   const auto unsuitable = [&](const std::string& why) {
     return Error((scene / "tileset.json").string(), "", why, kTrainOneBlock);
   };
@@ -47,7 +47,8 @@ fs::path onlyContent(const fs::path& scene, const Tileset& tileset) {
   }
   const Tile& finest = tileset.tiles.back();  // one below the other: there is one cell
   if (finest.contents.size() != 1) throw unsuitable("has not one content, and MERF's files hold one block");
-  return contentPath(scene, finest.contents[0].uri);
+  file = contentPath(scene, finest.contents[0].uri);
+  return readPromisedVolume(file, tileset.tiles.size() - 1, finest.contents[0]);
 }
 
 void requireMerfBlock(const VolumeContent& content, const fs::path& file) {
@@ -157,8 +158,8 @@ MerfExport exportMerf(const fs::path& scene, const fs::path& out) {
                 "tessera bake it, and export the scene");
   }
   const Tileset tileset = readTileset(scene);
-  const fs::path file = onlyContent(scene, tileset);
-  const VolumeContent content = readVolume(file);
+  fs::path file;
+  const VolumeContent content = readOnlyContent(scene, tileset, file);
   requireMerfBlock(content, file);
   WholeFolder folder(out, isOurs);
   MerfExport made = writeMerf(content, folder.path());

@@ -251,6 +251,9 @@ TEST_F(Merf, SaysWhyASceneCannotBeExportedAndWhatToTrain) {
   tileset.tiles[0].contents[1].surround = true;
   refused(sceneOf(good, tileset), "a surround of its own", train);
   tileset = tilesetOf(good);
+  tileset.tiles[0].contents[0].box.high[2] /= 2;
+  refused(sceneOf(good, tileset), "outside of the content's box", "copy the scene again");
+  tileset = tilesetOf(good);
   tileset.representation = Representation::mesh;
   refused(sceneOf(good, tileset), "is a scene of mesh", train);
 

@@ -13,15 +13,6 @@ struct PromisedFile {
   fs::path path;
   size_t tile = 0;  // of tileset.json
   TileContent promised;
-
-  VolumeContent read() const {
-    VolumeContent content = readVolume(path);
-    if (const auto broken = brokenPromise(content, promised)) {
-      throw Error(path.string(), fmt::format("of tile {} in tileset.json", tile), *broken,
-                  "copy the scene again, or bake it again");
-    }
-    return content;
-  }
 };
 
 }  // namespace
@@ -83,7 +74,10 @@ VolumeScene openVolumeScene(const fs::path& folder) {
     files.push_back(surround);
   }
   scene.source.bytes = [files](int tile) { return readDecodedBytes(files[tile].path); };
-  scene.source.load = [files](int tile) { return files[tile].read(); };
+  scene.source.load = [files](int tile) {
+    const PromisedFile& file = files[tile];
+    return readPromisedVolume(file.path, file.tile, file.promised);
+  };
   scene.source.folder = folder.string();
   scene.source.file = [files](int tile) { return files[tile].path.string(); };
   return scene;

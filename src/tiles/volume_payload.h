@@ -44,7 +44,10 @@ std::optional<VolumeContent> decodeVolume(std::span<const std::byte> file, std::
                                           const VolumeLimits& limits = {});
 // The same of a file; throws Error naming it.
 VolumeContent readVolume(const fs::path& path, const VolumeLimits& limits = {});
-// What it will take in memory (bytesInMemory), by its headers alone: its texels are not read.
+// And it must be the one that tile number `tile` of tileset.json speaks of.
+VolumeContent readPromisedVolume(const fs::path& path, size_t tile, const TileContent& promised);
+// What a content will take in memory (bytesInMemory), by the JSON of its container alone: its texels are not read.
+std::optional<uint64_t> decodedBytesOf(std::string_view json, std::string& reason, const VolumeLimits& limits = {});
 uint64_t readDecodedBytes(const fs::path& path, const VolumeLimits& limits = {});
 
 }  // namespace tessera

@@ -23,10 +23,17 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   limits.bytes = 1 << 22;
   limits.parts = 4;
   std::string reason;
+  // Which size a cache reckons with, by the headers alone.
+  std::optional<uint64_t> bytes;
+  if (const auto container = tessera::decodeGlb(file)) {
+    bytes = tessera::decodedBytesOf(container->json, reason, limits);
+    if (bytes.has_value() != reason.empty()) std::abort();
+  }
   const auto content = tessera::decodeVolume(file, reason, limits);
   if (content.has_value() != reason.empty()) std::abort();
   if (!content) return 0;
   if (tessera::brokenRule(*content)) std::abort();
+  if (bytes != tessera::bytesInMemory(*content)) std::abort();
   const auto again = tessera::decodeVolume(tessera::encodeVolume(*content, 0), reason, limits);
   if (!again || again->parts.size() != content->parts.size()) std::abort();
   for (size_t i = 0; i < again->parts.size(); ++i) {

@@ -252,6 +252,24 @@ VolumeContent readVolume(const fs::path& path, const VolumeLimits& limits) {
   return std::move(*content);
 }
 
+VolumeContent readPromisedVolume(const fs::path& path, size_t tile, const TileContent& promised) {
+  VolumeContent content = readVolume(path);
+  if (const auto broken = brokenPromise(content, promised)) {
+    throw Error(path.string(), fmt::format("of tile {} in tileset.json", tile), *broken,
+                "copy the scene again, or bake it again");
+  }
+  return content;
+}
+
+std::optional<uint64_t> decodedBytesOf(std::string_view json, std::string& reason, const VolumeLimits& limits) {
+  reason.clear();
+  ContentFile file;
+  const auto asset = decodeContentAsset(json, Representation::volume, reason);
+  if (!asset) return std::nullopt;
+  file.ours = contentExtensionOf(*asset);
+  return VolumeReader(file, reason, limits).readBytes();
+}
+
 uint64_t readDecodedBytes(const fs::path& path, const VolumeLimits& limits) {
   std::error_code status;
   const auto length = jsonLengthOf(readFileStart(path, kGlbStart), fs::file_size(path, status));
@@ -260,13 +278,9 @@ uint64_t readDecodedBytes(const fs::path& path, const VolumeLimits& limits) {
   const Bytes start = readFileStart(path, kGlbStart + std::min<uint64_t>(*length, kMostContentJson + 1));
   const std::string_view text(reinterpret_cast<const char*>(start.data()), start.size());
   std::string reason;
-  ContentFile file;
-  if (const auto asset =
-          decodeContentAsset(text.substr(std::min(kGlbStart, text.size())), Representation::volume, reason)) {
-    file.ours = contentExtensionOf(*asset);
-    if (const auto bytes = VolumeReader(file, reason, limits).readBytes()) return *bytes;
-  }
-  throw noContent(path, reason);
+  const auto bytes = decodedBytesOf(text.substr(std::min(kGlbStart, text.size())), reason, limits);
+  if (!bytes) throw noContent(path, reason);
+  return *bytes;
 }
 
 }  // namespace tessera
