@@ -125,7 +125,7 @@ fs::path CommandLine::folder_;
 
 TEST_F(CommandLine, HelpOfEveryVerbHasDefaultsAndAnExample) {
   const std::vector<std::vector<std::string>> verbs = {
-      {"synth", "city"}, {"import"},           {"train"},          {"eval"},           {"render"},
+      {"synth", "city"}, {"import"},           {"train"},          {"bake"},           {"eval"}, {"render"}, {"export"},
       {"info"},          {"bench", "compute"}, {"bench", "train"}, {"bench", "render"}};
   for (std::vector<std::string> verb : verbs) {
     std::string name = "tessera";

@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 
 #include "apps/tessera/verbs.h"
 #include "base/error.h"
@@ -49,7 +50,8 @@ int main(int argc, char** argv) {
   mallopt(M_MMAP_THRESHOLD, 1 << 19);
   CLI::App app(
       "tessera turns photographs of a large place into a neural scene.\n"
-      "  photos -import-> capture -train-> model -eval, render-> pictures");
+      "  photos -import-> capture -train-> model -bake-> scene\n"
+      "  model or scene -eval, render-> numbers, pictures");
   app.name("tessera");
   app.require_subcommand(1);
   app.option_defaults()->always_capture_default();
@@ -75,6 +77,10 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   } catch (const tessera::Error& error) {
     std::fprintf(stderr, "tessera: error: %s\n", error.what());
+  } catch (const std::filesystem::filesystem_error& error) {
+    const tessera::Error said(error.path1().string(), "", error.code().message(),
+                              "see that the disk is there and has room, and that the folder may be changed");
+    std::fprintf(stderr, "tessera: error: %s\n", said.what());
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr,
                  "tessera: error: memory: this machine has not enough; lower --set photo_budget_mib or grid_log2_size; "

@@ -20,7 +20,7 @@ void addEvalVerb(CLI::App& app) {
   auto flags = std::make_shared<Flags>();
   CLI::App* verb = app.add_subcommand("eval", "held-out photos against renderings: PSNR, SSIM, LPIPS, depth error");
   verb->footer("Example:\n  tessera eval fox.model fox.capture --report fox.html --json fox.json");
-  verb->add_option("model", flags->model, "model folder")->required();
+  verb->add_option("model", flags->model, "model or scene folder")->required();
   verb->add_option("capture", flags->capture, "capture folder")->required();
   verb->add_option("--split", flags->split, "which photos")
       ->capture_default_str()

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "base/log.h"
 #include "representations/volume/bake_volume.h"
 #include "tiles/scene_folder.h"
 #include "tiles/volume_payload.h"
@@ -125,7 +126,15 @@ BakedVolume bakeVolume(const LevelModels& models, uint32_t levels, const Capture
     ofLevel.onPhoto = [&](int64_t done, int64_t) { options.onPhoto(level * photos + done, levels * photos); };
     ofLevel.stride <<= level;  // as many rays through its larger texels
     const std::unique_ptr<VolumeModel> model = models(level);
-    if (level == 0) tileset = emptyTileset(*model, capture, levels);
+    if (level == 0) {
+      tileset = emptyTileset(*model, capture, levels);
+      if (model->config().literalEq3) {
+        warn(
+            "the model was trained with literal_eq3; scenes multiply the network's colour by the block's opacity, and "
+            "will "
+            "look different");
+      }
+    }
     made.push_back(bakeLevel({*model, level, capture, tileset, folder, ofLevel}));
     baked.levels.push_back(made.back().sizes);
   }

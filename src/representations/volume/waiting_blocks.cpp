@@ -18,7 +18,6 @@ fs::path WaitingBlocks::fileOf(uint32_t block) const {
 }
 
 void WaitingBlocks::put(uint32_t block, const Bytes& file) {
-  fs::create_directories(folder_);
   writeFileAtomically(fileOf(block), file);
   held_.insert(block);
 }
