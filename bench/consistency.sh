@@ -19,10 +19,7 @@ done
 work=$out/consistency
 seeds=${SEEDS:-1 2 3}
 steps=${STEPS:-1500} rays=${RAYS:-4096}
-settings="STEPS=$steps RAYS=$rays CITY='${CITY:-}'"
-mkdir -p "$work"
-[ -e "$work/settings" ] || echo "$settings" > "$work/settings"
-[ "$(cat "$work/settings")" = "$settings" ] || die "$work was made with $(cat "$work/settings"): repeat those, or remove it"
+settings "STEPS=$steps RAYS=$rays CITY='${CITY:-}'"
 [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2 ${CITY:-}
 
 # volume MODEL SEED RAYS ARGUMENTS...: with more room for texels than so many rays can want, so that their number stays.

@@ -11,8 +11,8 @@ set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
 [ $# -eq 0 ] || [ $# -eq 2 ] || die "usage: bench/rendering.sh [SCENE CAPTURE]"
-work=$out/rendering
-mkdir -p "$work"
+work=$out/rendering minutes=${MINUTES:-4}
+settings "MINUTES=$minutes"
 
 # made BLOCKS SIZE STRIDE ARGUMENTS...: $scene and $capture, of a city trained with these arguments, baked with that stride.
 made() {
@@ -30,7 +30,7 @@ skipping() {
   if [ -n "${1:-}" ]; then
     scene=$1 capture=$2
   elif [ ! -e "$scene/tileset.json" ]; then
-    made 2x2 320x240 1 --minutes "${MINUTES:-4}" --set level_share=0
+    made 2x2 320x240 1 --minutes "$minutes" --set level_share=0
   fi
   alone "$tessera" bench render "$scene" --views "$capture" --json "$out/skipping.json"
   value() { jq "$1" "$out/skipping.json"; }

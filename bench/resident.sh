@@ -8,10 +8,10 @@ set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
 work=$out/resident
-steps=${STEPS:-4000} rays=${RAYS:-4096}
-mkdir -p "$work"
+steps=${STEPS:-4000} rays=${RAYS:-4096} size=${SIZE:-400x300}
+settings "STEPS=$steps RAYS=$rays SIZE=$size"
 
-[ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 4x4 --size "${SIZE:-400x300}"
+[ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 4x4 --size "$size"
 # run NAME ARGUMENTS...: what it says is kept, as it says how much memory it will take.
 run() {
   local name=$1

@@ -35,6 +35,12 @@ finish() { [ "$failures" -eq 0 ] || exit 1; }
 checkpoint() { echo "$1/$(jq -r '.files[0]' "$1/manifest.json")"; }
 
 # What follows works in the folder $work and makes nothing again that is there.
+# settings TEXT: makes the folder, or sees that it was made with the same ones.
+settings() {
+  mkdir -p "$work"
+  [ -e "$work/settings" ] || echo "$1" > "$work/settings"
+  [ "$(cat "$work/settings")" = "$1" ] || die "$work was made with $(cat "$work/settings"): repeat those, or remove it"
+}
 # trained MODEL CAPTURE ARGUMENTS...: goes on with one that was interrupted.
 trained() {
   local model=$work/$1 capture=$work/$2

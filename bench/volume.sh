@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # City-on-Web on the processor: a city of 2x2 blocks and real nadir photographs, trained, baked and judged. Resumable: captures
-# and models stay in build/bench/volume, and what is there is not made again; remove a folder to repeat its row.
+# and models stay in build/bench/volume, and what is there is not made again; remove city* or beach* in it to repeat a row.
 #   [ROWS="city beach"] [MINUTES=15] [TESSERA_SHARED_DATA=DIR] bench/volume.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
 work=$out/volume
 minutes=${MINUTES:-15}
-mkdir -p "$work"
+settings "MINUTES=$minutes"
 
 city() {
   [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
