@@ -269,7 +269,8 @@ TEST(DrawVolume, ReadsOfEachPartNothingButItsOwnTexels) {
     parts.push_back(part);
   }
   const VolumeContent before = contentOf(parts, randomNetwork(1));
-  for (std::vector<uint8_t>* bytes : {&parts[1].voxelBytes, &parts[1].planeBytes[0], &parts[1].planeBytes[2]}) {
+  for (std::vector<uint8_t>* bytes :
+       {&parts[1].voxelBytes, &parts[1].planeBytes[0], &parts[1].planeBytes[1], &parts[1].planeBytes[2]}) {
     for (uint8_t& byte : *bytes) byte = static_cast<uint8_t>(255 - byte);
   }
   const VolumeContent after = contentOf(parts, randomNetwork(1));

@@ -1,5 +1,5 @@
-// Draws a volume model as it trains: by proposals, with the networks evaluated at texels. The picture that baking is
-// held against.
+// Draws a volume model: along the samples that proposals choose, as in training but more of them, with the networks
+// evaluated at texels. The picture that baking is held against.
 #pragma once
 
 #include "representations/volume/volume_pass.h"
