@@ -110,7 +110,10 @@ std::vector<ConfigField> VolumeConfig::fields() {
       {"free_space", "nothing stands before the nearest sparse points that a photo shows", &freeSpace},
       {"blocks_only", "no rays from parts of photos that see no block, as where --grid is a part of the place",
        &blocksOnly},
-      {"level_share", "steps of each coarser level of detail, as a share of the finest's; 0: there are none",
+      {"level_share",
+       "steps of the first coarser level of detail, as a share of the finest's; the next ones take twice as many, up "
+       "to as "
+       "many as the finest. 0: there are none",
        &levelShare},
       {"frozen_share", "share of a coarser level's steps in which only its deferred networks are trained",
        &frozenShare},

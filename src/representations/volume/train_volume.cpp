@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -107,6 +108,11 @@ VolumeConfig levelConfig(VolumeConfig finest, uint32_t level, int64_t finestStep
   // Its proposals begin as the finest level's, which pass over the fog that large texels make around surfaces.
   finest.padding = std::max(finest.padding, finest.levelPadding);
   return finest;
+}
+
+int64_t levelSteps(const VolumeConfig& finest, uint32_t level, int64_t finestSteps) {
+  const double share = std::min(1.0, std::ldexp(finest.levelShare, static_cast<int>(level) - 1));
+  return static_cast<int64_t>(std::max(share, finest.levelShare) * static_cast<double>(finestSteps));
 }
 
 namespace {
@@ -234,10 +240,10 @@ TrainingResult trainVolume(Device& device, const Capture& capture, const fs::pat
     result = runTraining(trainer, folder, options.loop);
     if (!stepsAreKnown && result.finished) warnWhereBlocksMissTheirTurn(trainer, result.plannedSteps);
   }
-  options.loop.steps = static_cast<int64_t>(config.levelShare * static_cast<double>(result.plannedSteps));
-  if (!result.finished || options.loop.steps < 1) return result;
   const uint32_t top = topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
   for (uint32_t level = 1; level <= top && result.finished; ++level) {
+    options.loop.steps = levelSteps(config, level, result.plannedSteps);
+    if (options.loop.steps < 1) break;
     result.finished = trainLevel(model, on, levelConfig(config, level, result.step), options.loop);
   }
   return result;

@@ -31,6 +31,9 @@ uint32_t trainedLevels(const fs::path& model);
 // The settings of a level, from those of the finest: half the resolution for each, and its own padding. Its fields are
 // the same.
 VolumeConfig levelConfig(VolumeConfig finest, uint32_t level, int64_t finestStep);
+// How long it is trained: level_share of the finest's steps for the first, then twice as many each, as the same rays
+// ask for fewer texels; no more than the finest's, or level_share of them.
+int64_t levelSteps(const VolumeConfig& finest, uint32_t level, int64_t finestSteps);
 
 // The grid of blocks.json; Error when there is none.
 BlockGrid requireGrid(const ModelFolder& folder);

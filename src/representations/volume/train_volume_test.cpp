@@ -63,6 +63,19 @@ TEST(TrainVolume, MakesCoarserLevelsAndLeavesTheFinestAlone) {
             device->read(below->attributes().network(0).values.all()));
 }
 
+TEST(TrainVolume, GivesEachCoarserLevelTwiceTheStepsUpToTheFinests) {
+  VolumeConfig config;
+  config.levelShare = 0.3;
+  EXPECT_EQ(levelSteps(config, 1, 1000), 300);
+  EXPECT_EQ(levelSteps(config, 2, 1000), 600);
+  EXPECT_EQ(levelSteps(config, 3, 1000), 1000);
+  EXPECT_EQ(levelSteps(config, 9, 1000), 1000);
+  config.levelShare = 2;
+  EXPECT_EQ(levelSteps(config, 1, 1000), 2000) << "or as many as are asked for";
+  config.levelShare = 0;
+  EXPECT_EQ(levelSteps(config, 2, 1000), 0);
+}
+
 TEST(TrainVolume, TrainsLevelsTooWithBlocksThatWait) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
