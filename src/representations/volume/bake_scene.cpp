@@ -131,7 +131,6 @@ BakedVolume bakeVolume(const LevelModels& models, uint32_t levels, const Capture
       if (model->config().literalEq3) {
         warn(
             "the model was trained with literal_eq3; scenes multiply the network's colour by the block's opacity, and "
-            "will "
             "look different");
       }
     }

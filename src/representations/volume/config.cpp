@@ -111,9 +111,8 @@ std::vector<ConfigField> VolumeConfig::fields() {
       {"blocks_only", "no rays from parts of photos that see no block, as where --grid is a part of the place",
        &blocksOnly},
       {"level_share",
-       "steps of the first coarser level of detail, as a share of the finest's; the next ones take twice as many, up "
-       "to as "
-       "many as the finest. 0: there are none",
+       "steps of the first coarser level of detail, as a share of the finest's, each next one taking twice as many, up "
+       "to the finest's; 0: there are none",
        &levelShare},
       {"frozen_share", "share of a coarser level's steps in which only its deferred networks are trained",
        &frozenShare},
