@@ -1,39 +1,14 @@
-// What the tests of this room share: a folder that goes away, and small pictures.
+// What the tests of this room share: small pictures, and where the real ones are.
 #pragma once
-
-#include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cstdlib>
 #include <optional>
 #include <string>
 
-#include "base/file.h"
 #include "base/image_io.h"
+#include "base/temporary_folder.h"
 
 namespace tessera {
-
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    std::string name =
-        std::string("tessera-") + test->test_suite_name() + "-" + test->name() + "-" + std::to_string(::getpid());
-    for (char& c : name) c = c == '/' ? '_' : c;
-    path_ = fs::weakly_canonical(fs::temp_directory_path()) / name;
-    fs::remove_all(path_);
-    fs::create_directories(path_);
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  const fs::path& path() const { return path_; }
-  fs::path operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  fs::path path_;
-};
 
 // A picture without two equal pixels in a row.
 inline ImageU8 gradientPicture(int width, int height, int channels = 3, int seed = 0) {

@@ -37,13 +37,13 @@ bool contains(const std::string& text, const std::string& part) {
 }
 
 TEST(ModelFolder, HoldsNoModelWhileThereIsNoManifest) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   EXPECT_FALSE(ModelFolder(folder.path()).manifest());
   EXPECT_FALSE(ModelFolder(folder / "nowhere").manifest());
 }
 
 TEST(ModelFolder, ComesBackAsCommitted) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const ModelFolder model(folder / "new/model");
   model.commit({"field", 120, 500, {}}, 1, [](uint32_t) { return block(100, 7); });
   const auto manifest = model.manifest();
@@ -56,7 +56,7 @@ TEST(ModelFolder, ComesBackAsCommitted) {
 }
 
 TEST(ModelFolder, KeepsTheLastCheckpointsOnly) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   for (const int64_t step : {8, 9, 10, 100})
     model.commit({"field", step, 100, {}}, 1, [](uint32_t) { return block(10, 1); });
@@ -67,7 +67,7 @@ TEST(ModelFolder, KeepsTheLastCheckpointsOnly) {
 }
 
 TEST(ModelFolder, KeepsTheFilesOfBlocksThatAreAsTheyWere) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   for (const int64_t step : {5, 6, 7, 8}) {
     model.commit({"volume", step, 9, {}}, 2, [&](uint32_t part) -> std::optional<Bytes> {
@@ -83,7 +83,7 @@ TEST(ModelFolder, KeepsTheFilesOfBlocksThatAreAsTheyWere) {
 }
 
 TEST(ModelFolder, KilledWhileWritingABlockIsTheModelItWas) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   model.commit({"field", 10, 100, {}}, 1, [](uint32_t) { return block(100, 1); });
   // A block that was being written, and one that was written before its manifest.
@@ -102,7 +102,7 @@ TEST(ModelFolder, KilledWhileWritingABlockIsTheModelItWas) {
 }
 
 TEST(ModelFolder, NeverRemovesTheBlockThatItsManifestNames) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   // What a longer run left behind must not crowd out what is written now.
   for (const int64_t step : {500, 600})
@@ -114,7 +114,7 @@ TEST(ModelFolder, NeverRemovesTheBlockThatItsManifestNames) {
 }
 
 TEST(ModelFolder, SaysSoWhenABlockIsMissing) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   model.commit({"field", 10, 100, {}}, 1, [](uint32_t) { return block(100, 1); });
   fs::remove(folder / "blocks/0/step-10.safetensors");
@@ -124,7 +124,7 @@ TEST(ModelFolder, SaysSoWhenABlockIsMissing) {
 }
 
 TEST(ModelFolder, RefusesManifestsThatItCannotUnderstand) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   writeFileAtomically(folder / "here.safetensors", "block");
   for (const char* text : {"", "{", "[]", "{}", R"({"method": "field", "step": 1, "planned_steps": 2})",
                            R"({"method": 3, "step": 1, "planned_steps": 2, "files": []})",
@@ -140,7 +140,7 @@ TEST(ModelFolder, RefusesManifestsThatItCannotUnderstand) {
 }
 
 TEST(ModelFolder, KnowsWhereInTheWorldItStands) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   ModelPlacement placement;
   placement.frame = {{1.0 / 3, -200.125, 3e-9}, 0.1 + 0.2};
@@ -157,7 +157,7 @@ TEST(ModelFolder, KnowsWhereInTheWorldItStands) {
 }
 
 TEST(ModelFolder, KnowsTheCaptureThatItWasTrainedOn) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   Capture capture;
   capture.root = "flight";
@@ -189,7 +189,7 @@ TEST(ModelFolder, KnowsTheCaptureThatItWasTrainedOn) {
 }
 
 TEST(ModelFolder, RefusesPlacementsThatItCannotUnderstand) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   EXPECT_TRUE(contains(errorOf([&] { model.readPlacement(); }), "blocks.json"));
   for (const char* text : {"", "{}", R"({"blocks": []})", R"({"blocks": [{"centre": [1, 2], "scale": 1}]})"}) {
@@ -199,7 +199,7 @@ TEST(ModelFolder, RefusesPlacementsThatItCannotUnderstand) {
 }
 
 TEST(ModelFolder, GivesItsGridToOthersOfTheSameWorld) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   Capture capture;
   capture.root = "flight";
@@ -232,7 +232,7 @@ TEST(ModelFolder, GivesItsGridToOthersOfTheSameWorld) {
 }
 
 TEST(ModelFolder, RemembersItsPlan) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   EXPECT_FALSE(model.readPlan());
   model.writePlan({123456789012, 345});
@@ -246,7 +246,7 @@ TEST(ModelFolder, RemembersItsPlan) {
 }
 
 TEST(ModelFolder, CutsMetricsBackToACheckpoint) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   model.cutMetrics(10);  // there are none: nothing to do
   EXPECT_FALSE(fs::exists(model.metricsPath()));

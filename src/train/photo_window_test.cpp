@@ -29,7 +29,7 @@ PhotoWindow::Settings budgetFor(size_t photos, uint64_t seed = 3) {
 }
 
 TEST(PhotoWindow, HoldsAllPhotosWhenThereIsNoBudgetOrAllFit) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const Capture capture = plainCapture(folder.path(), 6);
   for (const size_t budget : {size_t{0}, 6 * kPlainPhotoBytes}) {
     PhotoWindow window(capture, {1, 3, 5}, {budget, 2, 0});
@@ -40,7 +40,7 @@ TEST(PhotoWindow, HoldsAllPhotosWhenThereIsNoBudgetOrAllFit) {
 }
 
 TEST(PhotoWindow, HandsOutEachPhotoWithItsOwnPixels) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const Capture capture = plainCapture(folder.path(), 9);
   PhotoWindow window(capture, allOf(capture), budgetFor(3));
   EXPECT_FALSE(window.holdsAll());
@@ -53,7 +53,7 @@ TEST(PhotoWindow, HandsOutEachPhotoWithItsOwnPixels) {
 }
 
 TEST(PhotoWindow, NeverPassesTheBudget) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const Capture capture = plainCapture(folder.path(), 9);
   for (const size_t places : {size_t{1}, size_t{2}, size_t{5}}) {
     PhotoWindow window(capture, allOf(capture), budgetFor(places));
@@ -65,7 +65,7 @@ TEST(PhotoWindow, NeverPassesTheBudget) {
 }
 
 TEST(PhotoWindow, CountsAlphaAndMasksAgainstTheBudget) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   Capture capture = plainCapture(folder.path(), 8);
   for (Photo& photo : capture.photos) {
     writePng(photo.image, ImageU8(16, 12, 4, 200));
@@ -81,7 +81,7 @@ TEST(PhotoWindow, CountsAlphaAndMasksAgainstTheBudget) {
 }
 
 TEST(PhotoWindow, WorksWithOnePhotoWhenNotEvenOneFits) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const Capture capture = plainCapture(folder.path(), 4);
   PhotoWindow window(capture, allOf(capture), {kPlainPhotoBytes / 2, 2, 0});
   std::set<int> seen;
@@ -93,7 +93,7 @@ TEST(PhotoWindow, WorksWithOnePhotoWhenNotEvenOneFits) {
 }
 
 TEST(PhotoWindow, GivesEveryPhotoItsShare) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const Capture capture = plainCapture(folder.path(), 10);
   PhotoWindow window(capture, {0, 1, 2, 3, 5, 6, 7, 8}, budgetFor(3));
   std::map<int, int> steps;
@@ -106,7 +106,7 @@ TEST(PhotoWindow, GivesEveryPhotoItsShare) {
 }
 
 TEST(PhotoWindow, IsAFunctionOfSeedAndStep) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const Capture capture = plainCapture(folder.path(), 7);
   PhotoWindow walking(capture, allOf(capture), budgetFor(3)), other(capture, allOf(capture), budgetFor(3, 4));
   std::vector<std::vector<int>> walked;
@@ -123,7 +123,7 @@ TEST(PhotoWindow, IsAFunctionOfSeedAndStep) {
 }
 
 TEST(PhotoWindow, ExchangesOnePhotoAtATime) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const Capture capture = plainCapture(folder.path(), 7);
   PhotoWindow window(capture, allOf(capture), budgetFor(3));
   std::vector<int> last = photosIn(window.at(0));

@@ -1,36 +1,13 @@
-// What the tests of this room share: a folder that goes away, and captures of plain pictures.
+// What the tests of this room share: captures of plain pictures.
 #pragma once
-
-#include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <string>
 
-#include "base/file.h"
 #include "base/image_io.h"
+#include "base/temporary_folder.h"
 #include "scene/capture.h"
 
 namespace tessera {
-
-class TestFolder {
- public:
-  TestFolder() {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    path_ = fs::weakly_canonical(fs::temp_directory_path()) /
-            ("tessera-" + std::string(test->test_suite_name()) + "-" + test->name() + "-" + std::to_string(::getpid()));
-    fs::remove_all(path_);
-    fs::create_directories(path_);
-  }
-  ~TestFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  const fs::path& path() const { return path_; }
-  fs::path operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  fs::path path_;
-};
 
 // `count` photos of 16×12 pixels, each of one grey (8 × its index), in `folder`.
 inline Capture plainCapture(const fs::path& folder, int count) {

@@ -78,7 +78,7 @@ class TrainingLoop : public testing::Test {
     for (const char* name : {"model", "unbroken"}) fs::create_directories(temporary_ / name);
   }
 
-  const TestFolder temporary_;
+  const TemporaryFolder temporary_;
   const ModelFolder folder_{temporary_ / "model"};
 };
 

@@ -273,7 +273,7 @@ TEST(BakeVolume, GivesEveryPlaceToTheBlockThatWasTrainedThere) {
 
 TEST(BakeVolume, LooksAsTheModelThatItWasBakedFrom) {
   const CubeScene scene;
-  const TestFolder folder;
+  const TemporaryFolder folder;
   for (const char* surround : {"none", "own"}) {
     VolumeConfig config = smallVolumeConfig();
     config.surround = surround;
@@ -304,7 +304,7 @@ TEST(BakeVolume, LooksAsTheModelOutsideOfTheBoxToo) {
   CubeScene::Options options;
   options.room = true;  // walls far outside of the blocks
   const CubeScene scene(options);
-  const TestFolder folder;
+  const TemporaryFolder folder;
   for (const char* surround : {"own", "border"}) {
     VolumeConfig config = smallVolumeConfig();
     config.surround = surround;
@@ -326,7 +326,7 @@ TEST(BakeVolume, LooksAsTheModelOutsideOfTheBoxToo) {
 
 TEST(BakeVolume, PutsLevelsAboveOneAnother) {
   const CubeScene scene;
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   TrainVolumeOptions options;
   options.config = smallVolumeConfig();
@@ -374,7 +374,7 @@ TEST(BakeVolume, PutsLevelsAboveOneAnother) {
 
 TEST(BakeVolume, WritesTheSameSceneAgain) {
   const CubeScene scene;
-  const TestFolder folder;
+  const TemporaryFolder folder;
   TrainedVolumeCube trained(scene, smallVolumeConfig(), cubeGrid(), 60);
   const BakedVolume once = bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / "scene", {});
   const std::string text = readTextFile(folder / "scene/tileset.json");
