@@ -51,7 +51,8 @@ int main(int argc, char** argv) {
   CLI::App app(
       "tessera turns photographs of a large place into a neural scene.\n"
       "  photos -import-> capture -train-> model -bake-> scene\n"
-      "  model or scene -eval, render-> numbers, pictures");
+      "  model or scene -eval, render-> numbers, pictures\n"
+      "  scene -serve-> browser");
   app.name("tessera");
   app.require_subcommand(1);
   app.option_defaults()->always_capture_default();
@@ -62,6 +63,7 @@ int main(int argc, char** argv) {
   tessera::addBakeVerb(app);
   tessera::addEvalVerb(app);
   tessera::addRenderVerb(app);
+  tessera::addServeVerb(app);
   tessera::addExportVerb(app);
   tessera::addInfoVerb(app);
   tessera::addBenchVerb(app);

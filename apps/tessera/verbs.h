@@ -19,6 +19,7 @@ void addTrainVerb(CLI::App& app);
 void addBakeVerb(CLI::App& app);
 void addEvalVerb(CLI::App& app);
 void addRenderVerb(CLI::App& app);
+void addServeVerb(CLI::App& app);
 void addExportVerb(CLI::App& app);
 void addInfoVerb(CLI::App& app);
 void addBenchVerb(CLI::App& app);

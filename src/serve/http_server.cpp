@@ -1,0 +1,236 @@
+#include "serve/http_server.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <utility>  // Boost 1.74 forgets it
+// after utility
+#include <boost/asio.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <fstream>
+#include <list>
+#include <optional>
+
+#include "base/error.h"
+
+namespace tessera {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using asio::ip::tcp;
+
+constexpr size_t kMostHeader = 8192, kChunk = size_t{1} << 16;
+
+// As many sockets as the system lets a process have.
+void raiseFileLimit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+}  // namespace
+
+struct HttpServer::State {
+  State(const StaticSite& site, const HttpServerSettings& settings) : site(site), settings(settings) {}
+
+  void accept();
+
+  const StaticSite& site;
+  HttpServerSettings settings;
+  asio::io_context context{1};
+  tcp::acceptor acceptor{context};
+  asio::steady_timer poll{context}, acceptAgain{context};
+  std::list<std::shared_ptr<Connection>> connections;  // the one that was silent for longest first
+  std::atomic<size_t> count = 0;
+};
+
+class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
+ public:
+  Connection(tcp::socket socket, State& state) : stream_(std::move(socket)), state_(state) {}
+
+  void begin() {
+    place_ = state_.connections.insert(state_.connections.end(), shared_from_this());
+    state_.count = state_.connections.size();
+    read(state_.settings.requestTime);
+  }
+
+  void close() {
+    if (!open_) return;
+    open_ = false;
+    beast::error_code ignored;
+    stream_.socket().shutdown(tcp::socket::shutdown_both, ignored);
+    stream_.close();
+    state_.connections.erase(place_);  // may be the last to hold this
+    state_.count = state_.connections.size();
+  }
+
+ private:
+  void heard() { state_.connections.splice(state_.connections.end(), state_.connections, place_); }
+
+  void read(std::chrono::milliseconds time) {
+    parser_.emplace();
+    parser_->header_limit(kMostHeader);
+    parser_->body_limit(0);
+    stream_.expires_after(time);
+    http::async_read_header(stream_, buffer_, *parser_,
+                            [self = shared_from_this()](beast::error_code error, size_t) { self->onRequest(error); });
+  }
+
+  void onRequest(beast::error_code error) {
+    if (!open_) return;
+    if (error) {
+      // What is no HTTP is told so; who has gone or was silent for too long is not.
+      const bool malformed = error.category() == http::make_error_code(http::error::bad_method).category() &&
+                             error != http::error::end_of_stream && error != http::error::partial_message;
+      if (!malformed) return close();
+      SiteAnswer refused;
+      refused.status = error == http::error::header_limit ? 431 : 400;
+      refused.headers = {{"Content-Type", "text/plain; charset=utf-8"}};
+      refused.body = "this is no request that is understood\n";
+      refused.length = refused.body.size();
+      return send(std::move(refused), 11, false);
+    }
+    heard();
+    const auto& message = parser_->get();
+    const auto field = [&](http::field name) { return std::string(message[name]); };
+    SiteRequest request;
+    request.method = std::string(message.method_string());
+    request.target = std::string(message.target());
+    request.host = field(http::field::host);
+    request.range = field(http::field::range);
+    request.ifRange = field(http::field::if_range);
+    request.ifNoneMatch = field(http::field::if_none_match);
+    request.acceptEncoding = field(http::field::accept_encoding);
+    // What follows a request with a body would be taken for the next one.
+    const bool hasBody = message.has_content_length() ? field(http::field::content_length) != "0" : message.chunked();
+    send(state_.site.answer(request), message.version(), message.keep_alive() && !hasBody);
+  }
+
+  void send(SiteAnswer answer, unsigned version, bool keepAlive) {
+    answer_ = std::move(answer);
+    keepAlive_ = keepAlive;
+    if (!answer_.file.empty() && answer_.sendsBody) {
+      file_.open(answer_.file, std::ios::binary);
+      file_.seekg(static_cast<std::streamoff>(answer_.bytes.begin));
+      left_ = answer_.length;
+      if (!file_) return close();
+    }
+    header_ =
+        fmt::format("HTTP/{}.{} {} {}\r\n", version / 10, version % 10, answer_.status,
+                    std::string(http::obsolete_reason(http::int_to_status(static_cast<unsigned>(answer_.status)))));
+    for (const auto& [name, value] : answer_.headers) header_ += fmt::format("{}: {}\r\n", name, value);
+    if (answer_.status != 304) header_ += fmt::format("Content-Length: {}\r\n", answer_.length);
+    header_ += keepAlive_ ? "Connection: keep-alive\r\n\r\n" : "Connection: close\r\n\r\n";
+    std::array<asio::const_buffer, 2> buffers = {asio::buffer(header_), {}};
+    if (answer_.sendsBody && answer_.file.empty()) {
+      buffers[1] = asio::buffer(answer_.compressed ? *answer_.compressed : std::as_const(answer_.body));
+    }
+    stream_.expires_after(state_.settings.sendTime);
+    asio::async_write(stream_, buffers,
+                      [self = shared_from_this()](beast::error_code error, size_t) { self->onSent(error); });
+  }
+
+  void onSent(beast::error_code error) {
+    if (!open_) return;
+    if (error) return close();
+    heard();
+    if (left_ == 0) {
+      chunk_ = {};
+      file_ = {};
+      answer_ = {};
+      if (!keepAlive_) return close();
+      return read(state_.settings.idleTime);
+    }
+    chunk_.resize(kChunk);
+    const size_t wanted = std::min<uint64_t>(left_, kChunk);
+    if (!file_.read(chunk_.data(), static_cast<std::streamsize>(wanted))) return close();  // it has been cut off
+    left_ -= wanted;
+    stream_.expires_after(state_.settings.sendTime);
+    asio::async_write(stream_, asio::buffer(chunk_.data(), wanted),
+                      [self = shared_from_this()](beast::error_code failed, size_t) { self->onSent(failed); });
+  }
+
+  beast::tcp_stream stream_;
+  State& state_;
+  std::list<std::shared_ptr<Connection>>::iterator place_;
+  beast::flat_static_buffer<kMostHeader> buffer_;
+  std::optional<http::request_parser<http::empty_body>> parser_;
+  SiteAnswer answer_;
+  std::string header_;
+  std::ifstream file_;
+  std::vector<char> chunk_;
+  uint64_t left_ = 0;  // of the file
+  bool keepAlive_ = true, open_ = true;
+};
+
+void HttpServer::State::accept() {
+  acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
+    if (error == asio::error::operation_aborted) return;
+    if (error) {  // too many files, say: the oldest makes room, and there is time for it
+      if (!connections.empty()) connections.front()->close();
+      acceptAgain.expires_after(std::chrono::milliseconds(50));
+      acceptAgain.async_wait([this](beast::error_code cancelled) {
+        if (!cancelled) accept();
+      });
+      return;
+    }
+    beast::error_code ignored;
+    socket.set_option(tcp::no_delay(true), ignored);
+    if (connections.size() >= settings.mostConnections) connections.front()->close();
+    std::make_shared<Connection>(std::move(socket), *this)->begin();
+    accept();
+  });
+}
+
+HttpServer::HttpServer(const StaticSite& site, const HttpServerSettings& settings)
+    : state_(std::make_unique<State>(site, settings)) {
+  raiseFileLimit();
+  const std::string place = fmt::format("{}:{}", settings.address, settings.port);
+  beast::error_code error;
+  const auto address = asio::ip::make_address(settings.address, error);
+  if (error) throw Error(place, "", "is no address", "name one of this machine, as 127.0.0.1 or 0.0.0.0");
+  tcp::acceptor& acceptor = state_->acceptor;
+  const tcp::endpoint endpoint(address, settings.port);
+  acceptor.open(endpoint.protocol(), error);
+  if (!error) acceptor.set_option(asio::socket_base::reuse_address(true), error);
+  if (!error) acceptor.bind(endpoint, error);
+  if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
+  if (error) throw Error(place, "", "cannot be listened at: " + error.message(), "choose another --port or --address");
+}
+
+HttpServer::~HttpServer() = default;
+
+uint16_t HttpServer::port() const {
+  return state_->acceptor.local_endpoint().port();
+}
+
+size_t HttpServer::connections() const {
+  return state_->count;
+}
+
+void HttpServer::run(const std::function<bool()>& stopped) {
+  state_->accept();
+  std::function<void()> poll = [&] {
+    state_->poll.expires_after(std::chrono::milliseconds(200));
+    state_->poll.async_wait([&](beast::error_code error) {
+      if (error) return;
+      if (stopped()) return state_->context.stop();
+      poll();
+    });
+  };
+  if (stopped) poll();
+  state_->context.run();
+  beast::error_code ignored;
+  state_->acceptor.close(ignored);
+  while (!state_->connections.empty()) state_->connections.front()->close();
+}
+
+void HttpServer::stop() {
+  state_->context.stop();
+}
+
+}  // namespace tessera

@@ -1,0 +1,221 @@
+#include "serve/http_server.h"
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <thread>
+
+#include "base/error.h"
+#include "base/memory.h"
+#include "base/temporary_folder.h"
+
+namespace tessera {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+// A socket that goes away.
+class Client {
+ public:
+  explicit Client(uint16_t port) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    if (::connect(socket_, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) leave();
+  }
+  ~Client() { leave(); }
+  Client(Client&& other) noexcept : socket_(std::exchange(other.socket_, -1)) {}
+
+  bool isConnected() const { return socket_ >= 0; }
+  void send(const std::string& text) const { (void)::send(socket_, text.data(), text.size(), MSG_NOSIGNAL); }
+  void leave() {
+    if (socket_ >= 0) ::close(socket_);
+    socket_ = -1;
+  }
+
+  // Until the server closes, `bytes` are there, or the time is over.
+  std::string receive(size_t bytes = SIZE_MAX, std::chrono::milliseconds time = 5s) const {
+    std::string received;
+    const auto end = Clock::now() + time;
+    char chunk[65536];
+    while (received.size() < bytes) {
+      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now()).count();
+      pollfd waiting{socket_, POLLIN, 0};
+      if (left <= 0 || ::poll(&waiting, 1, static_cast<int>(left)) <= 0) break;
+      const ssize_t count = ::recv(socket_, chunk, std::min(sizeof chunk, bytes - received.size()), 0);
+      if (count <= 0) break;
+      received.append(chunk, static_cast<size_t>(count));
+    }
+    return received;
+  }
+  // Whether the server has closed by then.
+  bool isLeft(std::chrono::milliseconds time) const {
+    const auto end = Clock::now() + time;
+    while (Clock::now() < end) {
+      char byte;
+      pollfd waiting{socket_, POLLIN, 0};
+      if (::poll(&waiting, 1, 20) > 0 && ::recv(socket_, &byte, 1, 0) <= 0) return true;
+    }
+    return false;
+  }
+
+ private:
+  int socket_;
+};
+
+class HttpServerTest : public testing::Test {
+ protected:
+  HttpServerTest() {
+    for (size_t i = 0; i < 3000000; ++i) tile_.push_back(static_cast<char>(i * 7 + i / 251));
+    writeFileAtomically(folder_ / "tile.glb", tile_);
+    writeFileAtomically(folder_ / "small.txt", std::string_view("hello"));
+    site_.emplace(std::vector<SiteFolder>{{"", folder_.path()}}, std::vector<std::string>{});
+  }
+  ~HttpServerTest() override {
+    if (server_) server_->stop();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  void start(HttpServerSettings settings = {}) {
+    settings.port = 0;
+    server_.emplace(*site_, settings);
+    thread_ = std::thread([this] { server_->run(); });
+  }
+  Client client() const { return Client(server_->port()); }
+  std::string exchange(const std::string& request) const {
+    const Client one = client();
+    one.send(request);
+    return one.receive();
+  }
+  static std::string get(const std::string& target, const std::string& more = "Connection: close\r\n") {
+    return "GET " + target + " HTTP/1.1\r\nHost: localhost\r\n" + more + "\r\n";
+  }
+  static std::string bodyOf(const std::string& answer) {
+    const size_t end = answer.find("\r\n\r\n");
+    return end == std::string::npos ? "" : answer.substr(end + 4);
+  }
+
+  TemporaryFolder folder_;
+  std::string tile_;
+  std::optional<StaticSite> site_;
+  std::optional<HttpServer> server_;
+  std::thread thread_;
+};
+
+TEST_F(HttpServerTest, SendsFilesWholeAndInParts) {
+  start();
+  const std::string whole = exchange(get("/tile.glb"));
+  EXPECT_TRUE(whole.starts_with("HTTP/1.1 200 OK\r\n"));
+  EXPECT_NE(whole.find("Content-Length: 3000000\r\n"), std::string::npos);
+  EXPECT_EQ(bodyOf(whole), tile_);
+  const std::string part = exchange(get("/tile.glb", "Range: bytes=100000-299999\r\nConnection: close\r\n"));
+  EXPECT_TRUE(part.starts_with("HTTP/1.1 206 Partial Content\r\n"));
+  EXPECT_EQ(bodyOf(part), tile_.substr(100000, 200000));
+}
+
+TEST_F(HttpServerTest, AnswersRequestAfterRequestOfOneClient) {
+  start();
+  const Client one = client();
+  one.send(get("/small.txt", "") + get("/nothing", "") + "HEAD /tile.glb HTTP/1.1\r\nHost: x\r\n\r\n" +
+           get("/small.txt"));
+  const std::string all = one.receive();
+  EXPECT_TRUE(all.starts_with("HTTP/1.1 200 OK\r\n"));
+  EXPECT_NE(all.find("HTTP/1.1 404 Not Found\r\n"), std::string::npos);
+  EXPECT_NE(all.find("Content-Length: 3000000\r\n"), std::string::npos);
+  EXPECT_TRUE(all.ends_with("\r\n\r\nhello"));
+  EXPECT_LT(all.size(), 2000u) << "HEAD sends no body";
+}
+
+TEST_F(HttpServerTest, ServesAnHonestClientBesideManyThatStall) {
+  start();
+  const int64_t before = residentBytes();
+  std::vector<Client> stalled;
+  for (int i = 0; i < 500; ++i) {
+    stalled.push_back(client());
+    ASSERT_TRUE(stalled.back().isConnected());
+    const char* const kinds[] = {"", "GET /tile.glb HT", "GET /tile.glb HTTP/1.1\r\nHost: x\r\nX: "};
+    // The last kind asks and does not read.
+    stalled.back().send(i % 4 < 3 ? kinds[i % 4] : get("/tile.glb", ""));
+  }
+  for (int i = 0; i < 200 && server_->connections() < 500; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_EQ(server_->connections(), 500u);
+  for (int i = 0; i < 5; ++i) {
+    const auto begin = Clock::now();
+    EXPECT_EQ(bodyOf(exchange(get("/tile.glb"))), tile_);
+    EXPECT_LT(Clock::now() - begin, 1s);
+  }
+  EXPECT_LT(residentBytes() - before, int64_t{48} << 20);
+}
+
+TEST_F(HttpServerTest, EndsTheTurnOfClientsThatStall) {
+  HttpServerSettings settings;
+  settings.requestTime = settings.idleTime = settings.sendTime = 200ms;
+  start(settings);
+  const Client silent = client(), slow = client(), deaf = client(), idle = client();
+  slow.send("GET /tile.glb HTTP/1.1\r\n");
+  deaf.send(get("/tile.glb", ""));
+  idle.send(get("/small.txt", ""));
+  EXPECT_TRUE(silent.isLeft(3s));
+  EXPECT_TRUE(slow.isLeft(3s));
+  EXPECT_TRUE(idle.isLeft(3s));
+  for (int i = 0; i < 300 && server_->connections() > 0; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_EQ(server_->connections(), 0u);
+}
+
+TEST_F(HttpServerTest, OutlivesWhatIsNoRequest) {
+  start();
+  for (const std::string& request :
+       {std::string("\r\n\r\n"), std::string("GET\r\n\r\n"), std::string("GET / HTTP/9.9\r\n\r\n"),
+        std::string(100000, 'A'), std::string("GET / HTTP/1.1\r\nContent-Length: x\r\n\r\n"),
+        std::string("\0\1\2\3", 4) + "\r\n\r\n", "GET /" + std::string(20000, 'a') + " HTTP/1.1\r\n\r\n",
+        std::string("\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", 11)}) {
+    const Client one = client();
+    one.send(request);
+    const std::string answer = one.receive(SIZE_MAX, 500ms);
+    EXPECT_TRUE(answer.empty() || answer.starts_with("HTTP/1.1 4")) << answer.substr(0, 80);
+  }
+  // Cut off at every place.
+  const std::string request = get("/tile.glb", "Range: bytes=0-10\r\n");
+  for (size_t length = 0; length < request.size(); ++length) client().send(request.substr(0, length));
+  EXPECT_EQ(bodyOf(exchange(get("/small.txt"))), "hello");
+}
+
+TEST_F(HttpServerTest, DoesNotTakeABodyForTheNextRequest) {
+  start();
+  const std::string smuggled = get("/tile.glb", "");
+  const std::string answer = exchange(
+      "POST / HTTP/1.1\r\nHost: x\r\nContent-Length: " + std::to_string(smuggled.size()) + "\r\n\r\n" + smuggled);
+  EXPECT_EQ(answer.find("200 OK"), std::string::npos);
+  EXPECT_TRUE(answer.starts_with("HTTP/1.1 405 ") || answer.starts_with("HTTP/1.1 4")) << answer;
+}
+
+TEST_F(HttpServerTest, ClosesTheOldestWhereThereAreTooMany) {
+  HttpServerSettings settings;
+  settings.mostConnections = 3;
+  start(settings);
+  const Client first = client();
+  std::vector<Client> others;
+  for (int i = 0; i < 3; ++i) others.push_back(client());
+  EXPECT_TRUE(first.isLeft(3s));
+  others[2].send(get("/small.txt", ""));
+  EXPECT_TRUE(others[2].receive(1000, 300ms).ends_with("hello"));
+}
+
+TEST_F(HttpServerTest, SaysThatAnAddressIsTakenOrNone) {
+  start();
+  HttpServerSettings settings;
+  settings.port = server_->port();
+  EXPECT_THROW(HttpServer(*site_, settings), Error);
+  settings.address = "somewhere";
+  EXPECT_THROW(HttpServer(*site_, settings), Error);
+}
+
+}  // namespace
+}  // namespace tessera
