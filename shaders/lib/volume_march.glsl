@@ -1,0 +1,138 @@
+// One content of a `volume` scene along a ray: its samples, composited (docs/tile-format.md, section 6; City-on-Web,
+// section 4.2). Twin of src/render/cpu/volume_march.cpp.
+//
+// Reads: volume_path.glsl; PARTS, the number of parts; `content`, whose first 6 PARTS vectors are theirs (see partOf);
+//   sampler2DArray planesFirst, planesSecond (diffuse and density; features): a part's three planes in its corner of
+//   three layers; sampler3D voxelsFirst, voxelsSecond: an atlas of macroblocks of 9³; sampler3D macroblocks: where they
+//   are in it, bytes, the fourth 0 where none is; sampler3D distances: bytes; float featureRange, densityRange,
+//   stepsPerTexel, minTransmittance.
+// Defines: Part, partOf, ownedRange, Composite, marchPart.
+
+struct Part {
+  vec3 centre, scale;
+  vec3 low, high;  // what it owns
+  bool contracted;
+  float voxels, planes;  // texels along an axis
+  float layer;           // of its first plane
+  ivec3 macroblockOrigin, distanceOrigin;
+};
+
+Part partOf(int n) {
+  vec4 a = content[6 * n], b = content[6 * n + 1], c = content[6 * n + 2], d = content[6 * n + 3];
+  Part part;
+  part.centre = a.xyz;
+  part.voxels = a.w;
+  part.scale = b.xyz;
+  part.planes = b.w;
+  part.low = c.xyz;
+  part.contracted = c.w != 0.0;
+  part.high = d.xyz;
+  part.layer = d.w;
+  part.macroblockOrigin = ivec3(content[6 * n + 4].xyz);
+  part.distanceOrigin = ivec3(content[6 * n + 5].xyz);
+  return part;
+}
+
+// Where the ray is in a box, within `range` (x: from, y: to); nothing where not x < y.
+vec2 clipToBox(vec3 o, vec3 d, vec3 low, vec3 high, vec2 range) {
+  vec3 safe = mix(d, vec3(1e-20), lessThan(abs(d), vec3(1e-20)));
+  vec3 a = (low - o) / safe, b = (high - o) / safe;
+  vec3 near = min(a, b), far = max(a, b);
+  return vec2(max(max(range.x, near.x), max(near.y, near.z)), min(min(range.y, far.x), min(far.y, far.z)));
+}
+
+// And in what the part owns and in its domain.
+vec2 ownedRange(Part part, vec3 o, vec3 d, vec2 range) {
+  vec3 low = part.low, high = part.high;
+  if (!part.contracted) {
+    low = max(low, part.centre - part.scale);
+    high = min(high, part.centre + part.scale);
+  }
+  return clipToBox(o, d, low, high, range);
+}
+
+struct Composite {
+  vec3 diffuse;   // Σ w c
+  vec4 features;  // Σ w f
+  float transmittance;
+  float depth;  // Σ w t
+};
+
+// 1 - exp(-x), to a float's digits for small x too.
+float opacityOf(float x) {
+  return x < 0.01 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x);
+}
+
+void marchSegment(Part part, VolumeSegment s, inout Composite sum) {
+  float cells = part.planes / 8.0;
+  float margin = part.planes * 9.5e-7;  // positions are rounded by less
+  float stepLength = 1.0 / stepsPerTexel;
+  float voxelsPerTexel = part.voxels / part.planes;
+  vec3 inverse = sign(s.direction) / max(abs(s.direction), vec3(1e-20));
+  inverse = mix(inverse, vec3(1e20), equal(s.direction, vec3(0.0)));
+  vec3 atlas = vec3(textureSize(voxelsFirst, 0));
+  float widest = float(textureSize(planesFirst, 0).x);
+  float count = ceil(s.length * stepsPerTexel);
+  float i = 0.0;
+  // No segment is longer than its diagonal; a bound for drivers that want one.
+  for (int guard = 0; guard < 65536 && i < count; ++guard) {
+    float from = i * stepLength, to = min(from + stepLength, s.length);
+    float tau = 0.5 * (from + to);
+    vec3 x = s.start + tau * s.direction;
+    i += 1.0;
+    vec3 cell = clamp(floor(x / 8.0), 0.0, cells - 1.0);
+    float reach = floor(texelFetch(distances, part.distanceOrigin + ivec3(cell), 0).r * 255.0 + 0.5);
+    if (reach > 0.0) {
+      // The cube of cells nearer than that is empty: on to the first step whose middle lies behind it.
+      vec3 end = mix((cell - reach + 1.0) * 8.0 + margin, (cell + reach) * 8.0 - margin, greaterThan(inverse, vec3(0.0)));
+      vec3 exits = (end - s.start) * inverse;
+      float exit = min(min(exits.x, exits.y), min(exits.z, s.length));
+      i = max(i, ceil(exit * stepsPerTexel - 0.5));
+      continue;
+    }
+    vec3 u = clamp(x * voxelsPerTexel - 0.5, 0.0, part.voxels - 1.0);
+    vec3 block = floor(u / 8.0);
+    vec4 place = texelFetch(macroblocks, part.macroblockOrigin + ivec3(block), 0);
+    if (place.w == 0.0) continue;
+    vec3 voxel = (floor(place.xyz * 255.0 + 0.5) * 9.0 + (u - 8.0 * block) + 0.5) / atlas;
+    vec3 p = clamp(x, 0.5, part.planes - 0.5) / widest;
+    vec4 first = textureLod(voxelsFirst, voxel, 0.0) + textureLod(planesFirst, vec3(p.yz, part.layer), 0.0) +
+                 textureLod(planesFirst, vec3(p.xz, part.layer + 1.0), 0.0) +
+                 textureLod(planesFirst, vec3(p.xy, part.layer + 2.0), 0.0);
+    // A byte b of four sources stands for -R + 2R b / 255 each.
+    float density = exp(min(densityRange * (2.0 * first.a - 4.0) - 1.0, 15.0));
+    float opacity = opacityOf(density * distanceBetween(s, from, to));
+    float weight = sum.transmittance * opacity;
+    if (weight < 1e-6) continue;
+    vec4 second = textureLod(voxelsSecond, voxel, 0.0) + textureLod(planesSecond, vec3(p.yz, part.layer), 0.0) +
+                  textureLod(planesSecond, vec3(p.xz, part.layer + 1.0), 0.0) +
+                  textureLod(planesSecond, vec3(p.xy, part.layer + 2.0), 0.0);
+    sum.diffuse += weight / (1.0 + exp(featureRange * (4.0 - 2.0 * first.rgb)));
+    sum.features += weight / (1.0 + exp(featureRange * (4.0 - 2.0 * second)));
+    sum.depth += weight * distanceAt(s, tau);
+    sum.transmittance *= 1.0 - opacity;
+    if (sum.transmittance < minTransmittance) return;
+  }
+}
+
+// Goes on with `sum`, which holds the content's parts in front of this one.
+void marchPart(Part part, vec3 origin, vec3 direction, vec2 range, inout Composite sum) {
+  vec3 o = (origin - part.centre) / part.scale, d = direction / part.scale;
+  if (!part.contracted) {
+    marchSegment(part, volumeSegment(o, d, kCube, range.x, range.y, 1.0, part.planes), sum);
+    return;
+  }
+  int region = regionAt(o + range.x * d);
+  float t = range.x;
+  // At most five regions; where rays run along the border of two, some more pieces of no length.
+  for (int guard = 0; guard < 12 && t < range.y; ++guard) {
+    int next;
+    float exit = min(leaveRegion(o, d, region, next), range.y);
+    if (exit > t) {
+      marchSegment(part, volumeSegment(o, d, region, t, exit, 2.0, part.planes), sum);
+      if (sum.transmittance < minTransmittance) return;
+      t = exit;
+    }
+    region = next;
+  }
+}

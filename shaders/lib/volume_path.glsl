@@ -1,0 +1,95 @@
+// A ray through the domain of one part of a content: straight pieces, measured in texels of the planes
+// (docs/tile-format.md, section 6; City-on-Web, section 4.4; MERF, section 4.1). Twin of src/render/cpu/volume_path.cpp.
+//
+// Defines: VolumeSegment, distanceAt, distanceBetween, regionAt, leaveRegion, volumeSegment.
+
+// The place after τ texels is start + τ direction, in texels from the lower corner of the domain. Within a region the
+// contraction is a projective map, and so is the distance along the ray: entry + square τ / (rate - growth τ).
+struct VolumeSegment {
+  vec3 start;
+  vec3 direction;
+  float length;
+  float entry, square, rate, growth;
+};
+
+float distanceAt(VolumeSegment s, float tau) {
+  return s.entry + s.square * tau / (s.rate - s.growth * tau);
+}
+
+float distanceBetween(VolumeSegment s, float from, float to) {
+  return s.square * s.rate * (to - from) / ((s.rate - s.growth * from) * (s.rate - s.growth * to));
+}
+
+// The cube |x| <= 1 is region -1; where the largest coordinate is that of axis a, the region is 2a, or 2a + 1 where it
+// is positive.
+const int kCube = -1;
+
+int regionAt(vec3 x) {
+  vec3 m = abs(x);
+  int axis = m.y > m.x ? 1 : 0;
+  axis = m.z > m[axis] ? 2 : axis;
+  return m[axis] > 1.0 ? 2 * axis + (x[axis] > 0.0 ? 1 : 0) : kCube;
+}
+
+// Where a ray that is in a region leaves it, and which comes next. A region is what lies within a few planes, and the
+// ray is outside of one from where it crosses that on its way out.
+float leaveRegion(vec3 o, vec3 d, int region, out int next) {
+  float exit = 1e30;
+  next = kCube;
+  if (region == kCube) {
+    for (int a = 0; a < 3; ++a) {
+      float t = ((d[a] > 0.0 ? 1.0 : -1.0) - o[a]) / d[a];
+      if (d[a] != 0.0 && t < exit) {
+        exit = t;
+        next = 2 * a + (d[a] > 0.0 ? 1 : 0);
+      }
+    }
+    return exit;
+  }
+  int a = region >> 1;
+  float side = (region & 1) == 1 ? 1.0 : -1.0;
+  float m = side * o[a], growth = side * d[a];
+  if (growth < 0.0) exit = (1.0 - m) / growth;
+  for (int k = 1; k < 3; ++k) {
+    int b = (a + k) % 3;
+    for (float other = -1.0; other < 2.0; other += 2.0) {
+      float speed = other * d[b] - growth;  // at which the other coordinate overtakes
+      float t = (m - other * o[b]) / speed;
+      if (speed > 0.0 && t < exit) {
+        exit = t;
+        next = 2 * b + (other > 0.0 ? 1 : 0);
+      }
+    }
+  }
+  return exit;
+}
+
+// The piece of a ray (local coordinates; distances are those of the scene) from `near` to `far`, all in one region, in a
+// domain of [-half, half]³ with so many texels along an edge.
+VolumeSegment volumeSegment(vec3 o, vec3 d, int region, float near, float far, float halfDomain, float planes) {
+  VolumeSegment s;
+  vec3 y = o + near * d;
+  vec3 v = d;
+  float entryM = 1.0, exitM = 1.0, growth = 0.0;
+  if (region != kCube) {
+    int a = region >> 1;
+    float side = (region & 1) == 1 ? 1.0 : -1.0;
+    growth = side * d[a];
+    entryM = side * y[a];
+    exitM = side * (o[a] + far * d[a]);
+    y /= entryM;
+    y[a] = side * (2.0 - 1.0 / entryM);
+    v = side * (d * o[a] - o * d[a]);
+    v[a] = d[a];
+  }
+  float texels = planes / (2.0 * halfDomain);
+  float speed = length(v);
+  s.start = (y + halfDomain) * texels;
+  s.direction = v / speed;
+  s.length = texels * speed * (far - near) / (entryM * exitM);
+  s.entry = near;
+  s.square = entryM * entryM;
+  s.rate = speed * texels;
+  s.growth = growth * entryM;
+  return s;
+}

@@ -1,0 +1,57 @@
+// Workers that read contents.
+import { SceneError } from './scene-error';
+import type { VolumeLimits } from './tiles/decode-volume';
+import type { TileContent } from './tiles/tileset';
+import type { VolumeContent } from './tiles/volume-content';
+import type { DecodeAnswer, DecodeRequest } from './worker';
+
+interface Waiting {
+  resolve: (content: VolumeContent) => void;
+  reject: (error: SceneError) => void;
+}
+
+export class DecodePool {
+  private readonly workers: Worker[] = [];
+  private readonly waiting = new Map<number, Waiting>();
+  private next = 0;
+
+  constructor(readonly size = Math.max(1, Math.min(4, (navigator.hardwareConcurrency || 2) - 1))) {}
+
+  // The file is handed over: it is of no use afterwards.
+  decode(
+    file: Uint8Array<ArrayBuffer>, name: string, promised: Pick<TileContent, 'surround' | 'box'>, limits: VolumeLimits,
+  ): Promise<VolumeContent> {
+    const id = this.next++;
+    const worker = this.worker(id % this.size);
+    return new Promise((resolve, reject) => {
+      this.waiting.set(id, { resolve, reject });
+      worker.postMessage({ id, file, name, promised, limits } satisfies DecodeRequest, [file.buffer]);
+    });
+  }
+
+  dispose(): void {
+    for (const worker of this.workers) worker.terminate();
+    const gone = new SceneError('scene', '', 'was closed', 'open it again');
+    for (const { reject } of this.waiting.values()) reject(gone);
+    this.waiting.clear();
+  }
+
+  private worker(index: number): Worker {
+    const known = this.workers[index];
+    if (known) return known;
+    const worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' });
+    worker.onmessage = ({ data }: MessageEvent<DecodeAnswer>) => {
+      const waiting = this.waiting.get(data.id);
+      this.waiting.delete(data.id);
+      if ('content' in data) waiting?.resolve(data.content);
+      else waiting?.reject(new SceneError(data.error.what, data.error.place, data.error.reason, data.error.remedy));
+    };
+    worker.onerror = ({ message }) => {
+      const error = new SceneError('worker', '', message || 'could not be started', 'reload the page');
+      for (const { reject } of this.waiting.values()) reject(error);
+      this.waiting.clear();
+    };
+    this.workers[index] = worker;
+    return worker;
+  }
+}

@@ -1,0 +1,157 @@
+// Draws contents, front to back, into targets of their own: what the scene adds to each pixel, and how far away it is
+// (docs/tile-format.md, section 4).
+import * as THREE from 'three';
+import type { Box, Vec3 } from '../tiles/tileset';
+import { frontToBack as orderOf } from './box-order';
+import { volumeMaterial, viewUniforms, type MaterialOptions, type ViewUniforms } from './volume-material';
+import type { ContentTextures } from './content-textures';
+
+// A content that may be drawn.
+export interface DrawnContent {
+  textures: ContentTextures;
+  box: Box; // scene units
+  surround: boolean;
+  mesh: THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>;
+}
+
+export interface ScenePlace {
+  box: Box; // of the scene
+  near: number;
+}
+
+function setDefine(material: THREE.Material, name: string, isOn: boolean): void {
+  const defines = (material.defines ??= {}) as Record<string, string>;
+  if (name in defines === isOn) return;
+  if (isOn) defines[name] = '';
+  else delete defines[name];
+  material.needsUpdate = true;
+}
+
+// A triangle that fills the picture.
+export function screenTriangle(): THREE.BufferGeometry {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array([-1, -1, 0, 3, -1, 0, -1, 3, 0]), 3));
+  return geometry;
+}
+
+export class Compositor {
+  readonly view: ViewUniforms = viewUniforms();
+  readonly target: THREE.WebGLRenderTarget;
+  private readonly contents = new THREE.Scene();
+  private readonly cube = new THREE.BoxGeometry(1, 1, 1);
+  private readonly screen = screenTriangle();
+
+  // What the card can blend decides how the pictures are kept.
+  constructor(renderer: THREE.WebGLRenderer, place: ScenePlace) {
+    const has = (name: string) => renderer.extensions.has(name);
+    const canBlendHalves = has('EXT_color_buffer_half_float') || has('EXT_color_buffer_float');
+    this.target = new THREE.WebGLRenderTarget(1, 1, {
+      count: 2, type: canBlendHalves ? THREE.HalfFloatType : THREE.UnsignedByteType,
+      minFilter: THREE.LinearFilter, magFilter: THREE.LinearFilter, generateMipmaps: false, depthBuffer: true,
+    });
+    this.target.textures[1].minFilter = this.target.textures[1].magFilter = THREE.NearestFilter;
+    this.contents.matrixWorldAutoUpdate = false;
+    this.view.sceneLow.value.set(...place.box.low);
+    this.view.sceneHigh.value.set(...place.box.high);
+    this.view.sceneNear.value = place.near;
+  }
+
+  make(textures: ContentTextures, box: Box, surround: boolean): DrawnContent {
+    // What is contracted may own what lies beyond any box.
+    const everywhere = surround || textures.parts.some((part) => part.contracted);
+    const options: MaterialOptions = { surround, everywhere };
+    const mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>(
+      everywhere ? this.screen : this.cube, volumeMaterial(textures, this.view, options));
+    mesh.frustumCulled = false;
+    mesh.matrixAutoUpdate = mesh.matrixWorldAutoUpdate = false;
+    return { textures, box, surround, mesh };
+  }
+
+  remove(content: DrawnContent): void {
+    this.contents.remove(content.mesh);
+    content.mesh.material.uniformsGroups.forEach((group) => group.dispose());
+    content.mesh.material.dispose();
+    content.textures.dispose();
+  }
+
+  get bytes(): number {
+    const perPixel = this.target.texture.type === THREE.HalfFloatType ? 16 : 8;
+    return (perPixel + 4) * this.target.width * this.target.height;
+  }
+
+  resize({ x, y }: THREE.Vector2): void {
+    if (this.target.width !== x || this.target.height !== y) this.target.setSize(x, y);
+    this.view.resolution.value.set(x, y);
+  }
+
+  // `worldFromScene`: of three's world. Draws into `target`; rays end at the depth of what is opaque, if that is given.
+  draw(
+    renderer: THREE.WebGLRenderer, camera: THREE.Camera, worldFromScene: THREE.Matrix4, frontToBack: DrawnContent[],
+    opaqueDepth: THREE.Texture | null,
+  ): void {
+    this.setView(camera, worldFromScene);
+    this.view.opaqueDepth.value = opaqueDepth;
+    this.contents.clear();
+    const box = new THREE.Matrix4();
+    const eye = this.eye(camera, worldFromScene);
+    frontToBack.forEach(({ textures, mesh, box: { low, high } }, i) => {
+      if (textures.parts.length > 1) textures.orderParts(orderOf(textures.parts, eye));
+      const middle = (a: number) => (low[a] + high[a]) / 2;
+      box.makeScale(high[0] - low[0], high[1] - low[1], high[2] - low[2]).setPosition(middle(0), middle(1), middle(2));
+      mesh.matrixWorld.multiplyMatrices(worldFromScene, box);
+      mesh.renderOrder = i;
+      setDefine(mesh.material, 'OPAQUE', opaqueDepth !== null);
+      this.contents.add(mesh);
+    });
+    const before = renderer.getRenderTarget();
+    const autoClear = renderer.autoClear;
+    const clearColour = renderer.getClearColor(new THREE.Color());
+    const clearAlpha = renderer.getClearAlpha();
+    renderer.setRenderTarget(this.target);
+    renderer.setClearColor(0, 0);
+    renderer.autoClear = false;
+    renderer.clear();
+    renderer.render(this.contents, camera);
+    renderer.autoClear = autoClear;
+    renderer.setClearColor(clearColour, clearAlpha);
+    renderer.setRenderTarget(before);
+  }
+
+  dispose(): void {
+    this.target.dispose();
+    this.cube.dispose();
+    this.screen.dispose();
+  }
+
+  // Of a parallel projection, so far behind the picture that its rays come from there.
+  private eye(camera: THREE.Camera, worldFromScene: THREE.Matrix4): Vec3 {
+    const isPerspective = camera.projectionMatrix.elements[15] === 0;
+    const place = new THREE.Vector3().setFromMatrixPosition(camera.matrixWorld);
+    if (!isPerspective) place.addScaledVector(new THREE.Vector3().setFromMatrixColumn(camera.matrixWorld, 2), 1e7);
+    return place.applyMatrix4(worldFromScene.clone().invert()).toArray() as unknown as Vec3;
+  }
+
+  private setView(camera: THREE.Camera, worldFromScene: THREE.Matrix4): void {
+    const sceneFromCamera = worldFromScene.clone().invert().multiply(camera.matrixWorld);
+    const sceneFromClip = sceneFromCamera.clone().multiply(camera.projectionMatrixInverse);
+    this.view.sceneFromDepth.value.copy(sceneFromClip);
+    // Where the near plane is, which is linear in ndc for every pinhole and every parallel projection.
+    const at = (x: number, y: number) => new THREE.Vector3(x, y, -1).applyMatrix4(sceneFromClip);
+    const [middle, right, up] = [at(0, 0), at(1, 0), at(0, 1)];
+    const across = right.sub(middle);
+    const along = up.sub(middle);
+    const isPerspective = camera.projectionMatrix.elements[15] === 0;
+    const eye = new THREE.Vector3().setFromMatrixPosition(sceneFromCamera);
+    const zero = new THREE.Vector3();
+    const columns = (a: THREE.Vector3, b: THREE.Vector3, c: THREE.Vector3) =>
+      [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z];
+    if (isPerspective) {
+      this.view.origin.value.fromArray(columns(zero, zero, eye));
+      this.view.ray.value.fromArray(columns(across, along, middle.sub(eye)));
+    } else {
+      const forward = new THREE.Vector3().setFromMatrixColumn(sceneFromCamera, 2).negate();
+      this.view.origin.value.fromArray(columns(across, along, middle));
+      this.view.ray.value.fromArray(columns(zero, zero, forward));
+    }
+  }
+}

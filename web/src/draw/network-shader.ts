@@ -1,0 +1,44 @@
+// The deferred network of a content as GLSL and numbers (docs/tile-format.md, section 6). Its loops are written out:
+// shaders index arrays slowly, and vectors not at all.
+import type { DenseLayer } from '../tiles/volume-content';
+
+// Vectors of four: for each layer and each four outputs together, their biases, then their weights for each input.
+export function packNetwork(network: DenseLayer[]): Float32Array {
+  const packed: number[] = [];
+  for (const { inputs, outputs, weights, biases } of network) {
+    for (let first = 0; first < outputs; first += 4) {
+      const four = [first, first + 1, first + 2, first + 3];
+      for (const o of four) packed.push(o < outputs ? biases[o] : 0);
+      for (let i = 0; i < inputs; ++i) {
+        for (const o of four) packed.push(o < outputs ? weights[o * inputs + i] : 0);
+      }
+    }
+  }
+  return new Float32Array(packed);
+}
+
+// `vec3 deferred(vec3 diffuse, vec4 features, vec3 d)`; reads the packed vectors from content[begin] on. `widths` are
+// the layers' numbers of outputs.
+export function networkShader(widths: number[], begin: number): string {
+  const lines = ['vec3 deferred(vec3 diffuse, vec4 features, vec3 d) {', '  vec3 s0 = sin(d), c0 = cos(d);'];
+  for (let k = 1; k < 4; ++k) lines.push(`  vec3 s${k} = 2.0 * s${k - 1} * c${k - 1}, c${k} = 1.0 - 2.0 * s${k - 1} * s${k - 1};`);
+  const xyz = (name: string) => ['x', 'y', 'z'].map((axis) => `${name}.${axis}`);
+  let inputs = [
+    ...xyz('diffuse'), ...xyz('features'), 'features.w', ...xyz('d'),
+    ...['s0', 's1', 's2', 's3', 'c0', 'c1', 'c2', 'c3'].flatMap(xyz),
+  ];
+  let at = begin;
+  widths.forEach((width, layer) => {
+    const outputs: string[] = [];
+    for (let group = 0; 4 * group < width; ++group) {
+      const name = `h${layer}_${group}`;
+      lines.push(`  vec4 ${name} = content[${at++}];`);
+      for (const input of inputs) lines.push(`  ${name} += ${input} * content[${at++}];`);
+      if (layer + 1 < widths.length) lines.push(`  ${name} = max(${name}, 0.0);`);
+      outputs.push(...['x', 'y', 'z', 'w'].map((axis) => `${name}.${axis}`));
+    }
+    inputs = outputs.slice(0, width);
+  });
+  lines.push(`  return 1.0 / (1.0 + exp(-vec3(${inputs.join(', ')})));`, '}');
+  return lines.join('\n');
+}

@@ -1,0 +1,157 @@
+// The shader that draws one content: what it adds to each pixel, as colour, opacity and distance (docs/tile-format.md,
+// sections 4 and 6).
+import * as THREE from 'three';
+import marchSource from '../../../shaders/lib/volume_march.glsl?raw';
+import pathSource from '../../../shaders/lib/volume_path.glsl?raw';
+import { kVectorsOfPart, type ContentTextures } from './content-textures';
+import { networkShader } from './network-shader';
+
+// The same for all contents of a picture. Scene units; `ndc` runs from -1 to 1 across the picture.
+export interface ViewUniforms {
+  resolution: { value: THREE.Vector2 }; // pixels
+  origin: { value: THREE.Matrix3 }; // (ndc.x, ndc.y, 1) to where a ray begins
+  ray: { value: THREE.Matrix3 }; // and to its direction, of any length
+  sceneLow: { value: THREE.Vector3 };
+  sceneHigh: { value: THREE.Vector3 };
+  sceneNear: { value: number };
+  minTransmittance: { value: number }; // rays end where less would be seen; 0: never
+  opaqueDepth: { value: THREE.Texture | null }; // of the depth buffer of what stands in the scene
+  sceneFromDepth: { value: THREE.Matrix4 }; // (ndc.x, ndc.y, depth in [-1, 1], 1) to the scene
+}
+
+export function viewUniforms(): ViewUniforms {
+  return {
+    resolution: { value: new THREE.Vector2(1, 1) },
+    origin: { value: new THREE.Matrix3() },
+    ray: { value: new THREE.Matrix3() },
+    sceneLow: { value: new THREE.Vector3() },
+    sceneHigh: { value: new THREE.Vector3() },
+    sceneNear: { value: 0 },
+    minTransmittance: { value: 1 / 255 },
+    opaqueDepth: { value: null },
+    sceneFromDepth: { value: new THREE.Matrix4() },
+  };
+}
+
+const kVertexShader = `
+in vec3 position;
+uniform mat4 modelViewMatrix, projectionMatrix;
+void main() {
+#ifdef EVERYWHERE
+  gl_Position = vec4(position.xy, 0.0, 1.0);
+#else
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+  gl_Position.z = 0.0;  // no plane of the camera cuts it off
+#endif
+}`;
+
+const kFragmentHead = `
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp sampler3D;
+precision highp sampler2DArray;
+layout(location = 0) out vec4 colourAndOpacity;
+layout(location = 1) out vec4 distanceAndOpacity;
+layout(std140) uniform Content { vec4 content[VECTORS]; };
+uniform sampler2DArray planesFirst, planesSecond;
+uniform sampler3D voxelsFirst, voxelsSecond, macroblocks, distances;
+uniform sampler2D opaqueDepth;
+uniform float featureRange, densityRange, stepsPerTexel, minTransmittance, sceneNear;
+uniform vec2 resolution;
+uniform mat3 origin, ray;
+uniform mat4 sceneFromDepth;
+uniform vec3 sceneLow, sceneHigh;
+`;
+
+const kFragmentMain = `
+const float kSceneEnd = 1e6;
+
+// Where ordinary models end the ray.
+float opaqueDistance(vec2 ndc, vec3 o, vec3 d) {
+#ifdef OPAQUE
+  float depth = texture(opaqueDepth, 0.5 + 0.5 * ndc).r;
+  if (depth >= 1.0) return kSceneEnd;
+  vec4 x = sceneFromDepth * vec4(ndc, 2.0 * depth - 1.0, 1.0);
+  return dot(x.xyz / x.w - o, d);
+#else
+  return kSceneEnd;
+#endif
+}
+
+void main() {
+  vec2 ndc = 2.0 * gl_FragCoord.xy / resolution - 1.0;
+  vec3 o = origin * vec3(ndc, 1.0), d = normalize(ray * vec3(ndc, 1.0));
+  vec2 box = clipToBox(o, d, sceneLow, sceneHigh, vec2(sceneNear, 1e30));
+  bool meetsBox = box.x < box.y;
+  float far = min(kSceneEnd, opaqueDistance(ndc, o, d));
+  Composite sum = Composite(vec3(0.0), vec4(0.0), 1.0, 0.0);
+#ifdef SURROUND
+  vec2 behind = vec2(meetsBox ? box.y : sceneNear, far);
+  if (behind.x < behind.y) marchPart(partOf(0), o, d, behind, sum);
+#else
+  vec2 whole = vec2(meetsBox ? box.x : sceneNear, far);
+  for (int n = 0; n < PARTS; ++n) {
+    Part part = partOf(n);
+    vec2 owned = ownedRange(part, o, d, whole);
+    if (owned.x < owned.y) marchPart(part, o, d, owned, sum);
+    if (sum.transmittance < minTransmittance) break;
+  }
+#endif
+  float opacity = 1.0 - sum.transmittance;
+  if (opacity <= 0.0) discard;
+  vec3 specular = deferred(sum.diffuse, sum.features, d);
+  colourAndOpacity = vec4(sum.diffuse + opacity * specular, opacity);
+  distanceAndOpacity = vec4(sum.depth, 0.0, 0.0, opacity);
+}`;
+
+export interface MaterialOptions {
+  surround: boolean;
+  everywhere: boolean; // fills the picture, as it owns what lies beyond any box
+}
+
+// Contents of one shape (parts, widths of layers) share a program. Drawn front to back, blended under what is there.
+export function volumeMaterial(textures: ContentTextures, view: ViewUniforms, options: MaterialOptions): THREE.RawShaderMaterial {
+  const { parts, widths, numbers, ranges, stepsPerTexel } = textures;
+  const group = new THREE.UniformsGroup();
+  group.setName('Content');
+  group.add(new THREE.Uniform(numbers));
+  const defines: Record<string, number | string> = { PARTS: parts.length, VECTORS: numbers.length / 4 };
+  if (options.surround) defines.SURROUND = '';
+  if (options.everywhere) defines.EVERYWHERE = '';
+  const material = new THREE.RawShaderMaterial({
+    glslVersion: THREE.GLSL3,
+    vertexShader: kVertexShader,
+    fragmentShader: [
+      kFragmentHead, pathSource, marchSource, networkShader(widths, kVectorsOfPart * parts.length), kFragmentMain,
+    ].join('\n'),
+    defines,
+    uniforms: {
+      ...view,
+      planesFirst: { value: textures.planesFirst },
+      planesSecond: { value: textures.planesSecond },
+      voxelsFirst: { value: textures.voxelsFirst },
+      voxelsSecond: { value: textures.voxelsSecond },
+      macroblocks: { value: textures.macroblocks },
+      distances: { value: textures.distances },
+      featureRange: { value: ranges.features },
+      densityRange: { value: ranges.density },
+      stepsPerTexel: { value: stepsPerTexel },
+    },
+    side: options.everywhere ? THREE.DoubleSide : THREE.BackSide,
+    transparent: true,
+    depthWrite: false,
+    depthTest: true,
+    depthFunc: THREE.LessDepth,
+    blending: THREE.CustomBlending,
+    blendEquation: THREE.AddEquation,
+    blendSrc: THREE.OneMinusDstAlphaFactor,
+    blendDst: THREE.OneFactor,
+    blendSrcAlpha: THREE.OneMinusDstAlphaFactor,
+    blendDstAlpha: THREE.OneFactor,
+    premultipliedAlpha: true,
+    toneMapped: false,
+  });
+  material.uniformsGroups = [group];
+  return material;
+}

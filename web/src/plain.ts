@@ -1,0 +1,103 @@
+// A page with nothing around, for tests and measurements: they draw views of a scene through `window.plain`.
+import * as THREE from 'three';
+import { kYUpFromZUp, TesseraScene, type SceneOptions } from './scene';
+
+const canvas = document.querySelector('canvas')!;
+const renderer = new THREE.WebGLRenderer({ canvas, antialias: false, preserveDrawingBuffer: true });
+const gl = renderer.getContext() as WebGL2RenderingContext;
+const world = new THREE.Scene();
+const camera = new THREE.PerspectiveCamera();
+camera.matrixAutoUpdate = false;
+
+// A pinhole: camera to capture world, column after column, in OpenGL's axes; pixels.
+export interface View {
+  matrix: number[];
+  fx: number;
+  fy: number;
+  cx: number;
+  cy: number;
+  width: number;
+  height: number;
+}
+
+function look({ matrix, fx, fy, cx, cy, width, height }: View): void {
+  renderer.setSize(width, height, false);
+  camera.matrix.fromArray(matrix).premultiply(kYUpFromZUp);
+  const near = 0.1;
+  camera.projectionMatrix.makePerspective(
+    (-cx * near) / fx, ((width - cx) * near) / fx, (cy * near) / fy, (-(height - cy) * near) / fy, near, 1e4);
+  camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert();
+  camera.updateMatrixWorld(true);
+}
+
+// Waits for the card: pages that draw ahead of it leave it with pictures that nobody will see.
+function draw(city: TesseraScene): void {
+  city.update(camera, renderer);
+  renderer.render(world, camera);
+  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+}
+
+const plain = {
+  THREE, renderer, world, camera,
+  city: undefined as TesseraScene | undefined,
+  errors: [] as string[],
+
+  card(): string {
+    const info = gl.getExtension('WEBGL_debug_renderer_info');
+    return String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+  },
+
+  async open(url: string, options: SceneOptions = {}): Promise<void> {
+    this.city = await TesseraScene.load(url, options);
+    this.city.onError = (error) => this.errors.push(error.message);
+    world.background = this.city.background;
+    world.add(this.city);
+  },
+
+  close(): void {
+    this.city!.removeFromParent();
+    this.city!.dispose();
+  },
+
+  // Draws until nothing that the view asks for is still to come; milliseconds.
+  async settle(view: View, most = 60000): Promise<number> {
+    const begin = performance.now();
+    look(view);
+    for (let frames = 0; frames < 3 || !this.city!.idle; ++frames) {
+      if (performance.now() - begin > most) throw new Error('the view does not come to rest');
+      draw(this.city!);
+      await new Promise((resolve) => setTimeout(resolve, 0));
+    }
+    return performance.now() - begin;
+  },
+
+  // Draws a picture again and again; seconds for one, the best.
+  time(view: View, times: number): number {
+    look(view);
+    let best = Infinity;
+    for (let i = 0; i < times; ++i) {
+      const begin = performance.now();
+      draw(this.city!);
+      best = Math.min(best, (performance.now() - begin) / 1000);
+    }
+    return best;
+  },
+
+  // What is on the canvas: red, green and blue, rows from the top, as base64.
+  pixels(): string {
+    const { width, height } = canvas;
+    const read = new Uint8Array(4 * width * height);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, read);
+    let text = '';
+    for (let y = height - 1; y >= 0; --y) {
+      for (let x = 0; x < width; ++x) {
+        const at = 4 * (x + width * y);
+        text += String.fromCharCode(read[at], read[at + 1], read[at + 2]);
+      }
+    }
+    return btoa(text);
+  },
+};
+
+export type Plain = typeof plain;
+Object.assign(window, { plain });

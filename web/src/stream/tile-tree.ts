@@ -1,0 +1,72 @@
+// The tiles of a scene as a renderer needs them: where they are, how coarse, in which order. Lengths in scene units.
+// Twin of src/render/tile_tree.h.
+import { SceneError } from '../scene-error';
+import { metresPerUnit, type Cells, type TileContent, type Tileset, type Vec3 } from '../tiles/tileset';
+
+export interface TileNode {
+  parent: number;
+  children: number[];
+  cells: Cells;
+  low: Vec3; // box
+  high: Vec3;
+  geometricError: number; // of its content: a texel of the planes
+  level: number; // 0 is the finest
+  content?: TileContent; // none: its children's stand for it; a leaf is empty
+}
+
+export interface TileTree {
+  columns: number;
+  rows: number;
+  tiles: TileNode[]; // numbered as the tileset's; the root first
+  surround?: TileContent;
+}
+
+// Throws SceneError where a tile has several contents, which the format allows and this viewer does not draw.
+export function tileTree(tileset: Tileset, file: string): TileTree {
+  const metres = metresPerUnit(tileset);
+  const tiles = tileset.tiles.map((tile, index): TileNode => {
+    const contents = tile.contents.filter((content) => !content.surround);
+    if (contents.length > 1) {
+      throw new SceneError(file, `tile ${index}`, 'has several contents, which this viewer does not draw', 'give each a tile of its own');
+    }
+    const { parent, children, cells, box, level } = tile;
+    return {
+      parent, children, cells, low: box.low, high: box.high, level,
+      geometricError: tile.geometricError / metres, content: contents[0],
+    };
+  });
+  const surround = tileset.tiles[0].contents.find((content) => content.surround);
+  return { columns: tileset.columns, rows: tileset.rows, tiles, surround };
+}
+
+function cellAt(x: number, count: number): number {
+  return Math.min(Math.max(Math.floor(0.5 * (x + count)), 0), count - 1);
+}
+
+function cellsBetween(cell: number, first: number, end: number): number {
+  return Math.max(0, first - cell, cell - end + 1);
+}
+
+// In an order that is front to back for every ray from `eye`: by the number of cells between theirs and the eye's, along
+// both axes together, which grows along any ray.
+export function childrenFrontToBack(tree: TileTree, tile: number, eye: Vec3): number[] {
+  const i = cellAt(eye[0], tree.columns);
+  const j = cellAt(eye[1], tree.rows);
+  const distance = (child: number) => {
+    const { i0, i1, j0, j1 } = tree.tiles[child].cells;
+    return cellsBetween(i, i0, i1) + cellsBetween(j, j0, j1);
+  };
+  return [...tree.tiles[tile].children].sort((a, b) => distance(a) - distance(b) || a - b);
+}
+
+// The topmost contents: they cover all that the scene covers, and always stay in memory.
+export function coarsestTiles(tree: TileTree): number[] {
+  const found: number[] = [];
+  const covered: boolean[] = [];
+  tree.tiles.forEach((tile, index) => {
+    const above = tile.parent >= 0 && covered[tile.parent];
+    if (tile.content && !above) found.push(index);
+    covered[index] = above || tile.content !== undefined;
+  });
+  return found;
+}

@@ -1,0 +1,43 @@
+// What a camera sees of a scene, in its units. Twin of TileView in src/render/tile_selection.h.
+import type { Vec3 } from '../tiles/tileset';
+import type { TileNode } from './tile-tree';
+
+// A plane whose positive side is seen: a x + b y + c z + d >= 0.
+export type Plane = readonly [number, number, number, number];
+
+export class TileView {
+  // `planes` bound what is seen; `focal` in pixels, `pixels` those of the whole picture; distances below `nearest` count
+  // as that. A parallel projection has no eye: the same error everywhere, `focal` pixels for a scene unit.
+  constructor(
+    readonly eye: Vec3,
+    readonly planes: readonly Plane[],
+    readonly focal: number,
+    readonly pixels: number,
+    readonly nearest: number,
+    readonly parallel = false,
+  ) {}
+
+  // True for all that can be seen, and for little else.
+  sees({ low, high }: Pick<TileNode, 'low' | 'high'>): boolean {
+    return this.planes.every(([a, b, c, d]) => {
+      const farthest = a * (a > 0 ? high[0] : low[0]) + b * (b > 0 ? high[1] : low[1]) + c * (c > 0 ? high[2] : low[2]) + d;
+      return farthest >= 0;
+    });
+  }
+
+  distance({ low, high }: Pick<TileNode, 'low' | 'high'>): number {
+    const outside = (a: number) => Math.max(low[a] - this.eye[a], 0, this.eye[a] - high[a]);
+    return Math.max(this.nearest, Math.hypot(outside(0), outside(1), outside(2)));
+  }
+
+  errorInPixels(tile: TileNode): number {
+    return (tile.geometricError * this.focal) / (this.parallel ? 1 : this.distance(tile));
+  }
+
+  // Pixels that a tile may cover.
+  areaInPixels({ low, high }: Pick<TileNode, 'low' | 'high'>): number {
+    const radius = 0.5 * Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+    const onScreen = (radius * this.focal) / (this.parallel ? 1 : Math.max(radius, this.distance({ low, high })));
+    return Math.min(this.pixels, Math.PI * onScreen ** 2);
+  }
+}

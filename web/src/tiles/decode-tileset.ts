@@ -1,0 +1,240 @@
+// tileset.json, read: untrusted text.
+import { SceneError } from '../scene-error';
+import { arrayOf, fieldOf, flagOf, numberOf, numbersOf, stringOf, wholeFrom, wholeOf, type Json } from './json-fields';
+import { boundingBoxNumbers, type Box, type Cells, type Tile, type TileContent, type Tileset, type Vec3 } from './tileset';
+import { brokenRule } from './tileset-rules';
+
+export const kSceneVersion = 1;
+
+export interface TilesetLimits {
+  textLength: number;
+  tiles: number;
+  depth: number;
+  contentsOfTile: number;
+  resources: number;
+}
+
+const kLimits: TilesetLimits = { textLength: 1 << 24, tiles: 65536, depth: 64, contentsOfTile: 64, resources: 65536 };
+
+// Throws SceneError that names `file`, and the first rule that is broken.
+export function decodeTileset(text: string, file: string, limits = kLimits): Tileset {
+  return new TilesetReader(file, limits).read(text);
+}
+
+function oursOf(object: Json): Json {
+  return fieldOf(fieldOf(object, 'extensions'), 'TESSERA_scene');
+}
+
+function boxOf(object: Json): Box | undefined {
+  const low = numbersOf(object, 'low', 3);
+  const high = numbersOf(object, 'high', 3);
+  return low && high ? { low: low as unknown as Vec3, high: high as unknown as Vec3 } : undefined;
+}
+
+function cellsOf(object: Json): Cells | undefined {
+  const cells = arrayOf(object, 'cells');
+  if (cells?.length !== 4 || !cells.every((cell) => wholeFrom(cell) !== undefined)) return undefined;
+  const [i0, j0, i1, j1] = cells as number[];
+  return { i0, j0, i1, j1 };
+}
+
+// Sizes are hints; one that is no number is none.
+function bytesOf(object: Json): number {
+  return wholeOf(object, 'bytes', Number.MAX_SAFE_INTEGER) ?? 0;
+}
+
+class TilesetReader {
+  private readonly sources: Json[] = []; // of the tiles
+
+  constructor(
+    private readonly file: string,
+    private readonly limits: TilesetLimits,
+  ) {}
+
+  read(text: string): Tileset {
+    if (text.length > this.limits.textLength) this.fail('is larger than any tileset should be');
+    let file: Json;
+    try {
+      file = JSON.parse(text);
+    } catch {
+      this.fail('is not JSON');
+    }
+    this.readAsset(file);
+    const tileset = this.readScene(file);
+    this.readTree(this.needed(fieldOf(file, 'root'), 'has no root'), tileset);
+    const broken = brokenRule(tileset);
+    if (broken) this.fail(broken);
+    tileset.tiles.forEach((tile, index) => this.checkBoxes(tileset, tile, index));
+    return tileset;
+  }
+
+  private fail(reason: string, place = ''): never {
+    throw new SceneError(this.file, place, reason, 'copy the scene again, or bake it again');
+  }
+
+  private needed<T>(value: T | undefined, reason: string, place?: string): NonNullable<T> {
+    return value === undefined || value === null ? this.fail(reason, place) : value;
+  }
+
+  private readAsset(file: Json): void {
+    if (stringOf(fieldOf(file, 'asset'), 'version') !== '1.1') this.fail('is not 3D Tiles 1.1');
+    const required = fieldOf(file, 'extensionsRequired');
+    if (required !== undefined && !(Array.isArray(required) && required.length === 0)) {
+      this.fail('requires extensions that are not known');
+    }
+    const ours = this.needed(oursOf(file), 'has no extension TESSERA_scene');
+    const version = this.needed(wholeOf(ours, 'version'), 'does not say which version it is of');
+    if (version !== kSceneVersion) this.fail(`is of version ${version}; ${kSceneVersion} is known`);
+  }
+
+  private readScene(file: Json): Tileset {
+    const ours = oursOf(file);
+    const representation = stringOf(ours, 'representation');
+    if (representation !== 'mesh' && representation !== 'volume' && representation !== 'hash') {
+      this.fail('has no representation that is known');
+    }
+    const placement = fieldOf(ours, 'worldFromScene');
+    const noPlace = 'worldFromScene or sourceFromWorld lacks numbers';
+    const grid = fieldOf(ours, 'grid');
+    const incomplete = 'the grid, levels, near or background is not complete';
+    const tileset: Tileset = {
+      representation,
+      name: stringOf(ours, 'name') ?? '',
+      worldFromScene: {
+        rotation: this.needed(numbersOf(placement, 'rotation', 9), noPlace),
+        scale: this.needed(numberOf(placement, 'scale'), noPlace),
+        translation: this.needed(numbersOf(placement, 'translation', 3), noPlace) as unknown as Vec3,
+      },
+      sourceFromWorld: this.needed(numbersOf(ours, 'sourceFromWorld', 16), noPlace),
+      columns: this.needed(wholeOf(grid, 'columns'), incomplete),
+      rows: this.needed(wholeOf(grid, 'rows'), incomplete),
+      box: this.needed(boxOf(grid), incomplete),
+      near: this.needed(numberOf(ours, 'near'), incomplete),
+      background: this.needed(numbersOf(ours, 'background', 3), incomplete) as unknown as Vec3,
+      levels: this.needed(wholeOf(ours, 'levels'), incomplete),
+      geometricError: this.needed(numberOf(file, 'geometricError'), 'has no geometricError'),
+      resources: this.readResources(ours),
+      tiles: [],
+    };
+    const { low, high } = tileset.box;
+    const { columns, rows } = tileset;
+    if (low[0] !== -columns || low[1] !== -rows || high[0] !== columns || high[1] !== rows) {
+      this.fail("the grid's box is not that of its cells");
+    }
+    const geo = fieldOf(ours, 'georeference');
+    if (geo !== undefined) {
+      const lacks = 'the georeference lacks numbers';
+      tileset.georeference = {
+        latitude: this.needed(numberOf(geo, 'latitude'), lacks),
+        longitude: this.needed(numberOf(geo, 'longitude'), lacks),
+        altitude: this.needed(numberOf(geo, 'altitude'), lacks),
+        enuFromWorld: this.needed(numbersOf(geo, 'enuFromWorld', 16), lacks),
+      };
+    }
+    return tileset;
+  }
+
+  private readResources(ours: Json): Tileset['resources'] {
+    const resources = fieldOf(ours, 'resources');
+    if (resources === undefined) return [];
+    if (!Array.isArray(resources) || resources.length > this.limits.resources) this.fail('has too many shared resources');
+    return resources.map((resource) => ({
+      uri: this.needed(stringOf(resource, 'uri'), 'a shared resource has no uri'),
+      mimeType: this.needed(stringOf(resource, 'mimeType'), 'a shared resource has no mimeType'),
+      bytes: bytesOf(resource),
+    }));
+  }
+
+  // Level after level, so that no depth of nesting meets the stack.
+  private readTree(root: Json, tileset: Tileset): void {
+    const waiting: { source: Json; depth: number; parent: number }[] = [{ source: root, depth: 0, parent: -1 }];
+    for (let index = 0; index < waiting.length; ++index) {
+      const { source, depth, parent } = waiting[index];
+      const place = `tile ${index}`;
+      if (depth >= this.limits.depth) this.fail('the tree is too deep', place);
+      const tile = this.readTile(source, parent, place);
+      tile.contents = this.readContents(source, tile, place);
+      const children = fieldOf(source, 'children') ?? [];
+      if (!Array.isArray(children)) this.fail('its children are no list', place);
+      if (children.length > this.limits.tiles - waiting.length) this.fail('has too many tiles');
+      for (const child of children) {
+        tile.children.push(waiting.length);
+        waiting.push({ source: child, depth: depth + 1, parent: index });
+      }
+      tileset.tiles.push(tile);
+      this.sources.push(source);
+    }
+  }
+
+  private readTile(source: Json, parent: number, place: string): Tile {
+    const ours = this.needed(oursOf(source), 'has no extension TESSERA_scene', place);
+    const refine = fieldOf(source, 'refine');
+    if (refine !== 'REPLACE' && (parent === -1 || refine !== undefined)) this.fail('is not refined by REPLACE', place);
+    if (parent !== -1 && fieldOf(source, 'transform') !== undefined) {
+      this.fail('only the root may have a transform', place);
+    }
+    const missing = 'its level, cells, box or geometricError is missing';
+    return {
+      level: this.needed(wholeOf(ours, 'level'), missing, place),
+      cells: this.needed(cellsOf(ours), missing, place),
+      box: this.needed(boxOf(ours), missing, place),
+      geometricError: this.needed(numberOf(source, 'geometricError'), missing, place),
+      parent,
+      children: [],
+      contents: [],
+    };
+  }
+
+  private readContents(source: Json, tile: Tile, place: string): TileContent[] {
+    const one = fieldOf(source, 'content');
+    const several = fieldOf(source, 'contents');
+    if (one !== undefined && several !== undefined) this.fail('has both content and contents', place);
+    if (one !== undefined) return [this.readContent(one, tile, place)];
+    if (several === undefined) return [];
+    if (!Array.isArray(several) || several.length > this.limits.contentsOfTile) this.fail('has too many contents', place);
+    return several.map((content) => this.readContent(content, tile, place));
+  }
+
+  private readContent(source: Json, tile: Tile, place: string): TileContent {
+    const ours = oursOf(source);
+    const missing = 'a content has no uri or no box';
+    const resources = fieldOf(ours, 'resources') ?? [];
+    if (!Array.isArray(resources) || !resources.every((index) => wholeFrom(index) !== undefined)) {
+      this.fail("a content's resources are no list of numbers", place);
+    }
+    return {
+      uri: this.needed(stringOf(source, 'uri'), missing, place),
+      box: this.needed(boxOf(ours), missing, place),
+      cells:
+        fieldOf(ours, 'cells') === undefined ? tile.cells : this.needed(cellsOf(ours), "a content's cells are none", place),
+      surround: flagOf(ours, 'surround') ?? false,
+      resources: resources as number[],
+      bytes: bytesOf(ours),
+    };
+  }
+
+  // What other programs cull with has to be what ours do. The two differ by rounding alone.
+  private checkBoxes(tileset: Tileset, tile: Tile, index: number): void {
+    const place = `tile ${index}`;
+    const source = this.sources[index];
+    const all = [tile.box, ...tile.contents.map((content) => content.box)];
+    const enclosing: Box = {
+      low: [0, 1, 2].map((a) => Math.min(...all.map((box) => box.low[a]))) as unknown as Vec3,
+      high: [0, 1, 2].map((a) => Math.max(...all.map((box) => box.high[a]))) as unknown as Vec3,
+    };
+    if (!agrees(tileset, source, enclosing)) this.fail('its boundingVolume is not its box', place);
+    tile.contents.forEach((content, i) => {
+      const entry = fieldOf(source, 'content') ?? arrayOf(source, 'contents')![i];
+      if (fieldOf(entry, 'boundingVolume') !== undefined && !agrees(tileset, entry, content.box)) {
+        this.fail("a content's boundingVolume is not its box", place);
+      }
+    });
+  }
+}
+
+function agrees(tileset: Tileset, source: Json, box: Box): boolean {
+  const given = numbersOf(fieldOf(source, 'boundingVolume'), 'box', 12);
+  const expected = boundingBoxNumbers(tileset, box);
+  const slack = 1e-6 * Math.max(...expected.map(Math.abs));
+  return given !== undefined && given.every((number, i) => Math.abs(number - expected[i]) <= slack);
+}

@@ -1,0 +1,60 @@
+// How a content's parts share textures, before anything is allocated for them.
+import type { Vec3 } from './tileset';
+import { kDistanceCell, kMacroblock, kStoredEdge, type VolumePart } from './volume-content';
+
+export interface TextureLimits {
+  edge3D: number; // texels along an edge of a texture of three dimensions; WebGL2 promises 256
+  layers: number; // of an array; 256
+}
+
+export const kPromisedLimits: TextureLimits = { edge3D: 256, layers: 256 };
+
+export interface VolumeLayout {
+  planes: Vec3; // width, height, layers
+  voxels: Vec3; // texels of the atlas
+  atlas: Vec3; // the same in macroblocks
+  macroblocks: { size: Vec3; origins: Vec3[] };
+  distances: { size: Vec3; origins: Vec3[] };
+  bytes: number; // of all textures
+}
+
+// Undefined where the limits do not allow it.
+export function layOut(parts: VolumePart[], limits: TextureLimits): VolumeLayout | undefined {
+  const widest = Math.max(...parts.map((part) => part.planes));
+  const stored = parts.reduce((sum, part) => sum + part.stored, 0);
+  const atlas = atlasOf(stored, Math.floor(limits.edge3D / kStoredEdge));
+  const macroblocks = stack(parts.map((part) => part.voxels / kMacroblock), limits.edge3D);
+  const distances = stack(parts.map((part) => part.planes / kDistanceCell), limits.edge3D);
+  if (!atlas || !macroblocks || !distances || 3 * parts.length > limits.layers) return undefined;
+  const planes: Vec3 = [widest, widest, 3 * parts.length];
+  const voxels: Vec3 = [kStoredEdge * atlas[0], kStoredEdge * atlas[1], kStoredEdge * atlas[2]];
+  const count = (size: Vec3) => size[0] * size[1] * size[2];
+  const bytes = 8 * (count(planes) + count(voxels)) + 4 * count(macroblocks.size) + count(distances.size);
+  return { planes, voxels, atlas, macroblocks, distances, bytes };
+}
+
+// Nearly a cube, with little left over.
+function atlasOf(stored: number, most: number): Vec3 | undefined {
+  if (stored === 0) return [0, 0, 0];
+  if (stored > most ** 3) return undefined;
+  const near = Math.ceil(Math.cbrt(stored));
+  let best: Vec3 | undefined;
+  for (let x = near; x <= Math.min(most, near + 3); ++x) {
+    for (let y = Math.max(1, near - 2); y <= x; ++y) {
+      const z = Math.ceil(stored / (x * y));
+      if (z <= most && (!best || x * y * z < best[0] * best[1] * best[2])) best = [x, y, z];
+    }
+  }
+  return best;
+}
+
+// Cubes one above the other, and where that is too high, side by side.
+function stack(edges: number[], most: number): { size: Vec3; origins: Vec3[] } | undefined {
+  const edge = Math.max(...edges);
+  const high = Math.min(edges.length, Math.floor(most / edge));
+  if (high < 1) return undefined;
+  const wide = Math.ceil(edges.length / high);
+  if (wide * edge > most) return undefined;
+  const origins = edges.map((_, n): Vec3 => [Math.floor(n / high) * edge, 0, (n % high) * edge]);
+  return { size: [wide * edge, edge, high * edge], origins };
+}

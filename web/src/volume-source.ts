@@ -1,0 +1,77 @@
+// Where the contents of a `volume` scene come from: files of a server, read by workers, drawn by a compositor.
+import type * as THREE from 'three';
+import type { DecodePool } from './decode-pool';
+import type { Compositor, DrawnContent } from './draw/compositor';
+import { ContentTextures } from './draw/content-textures';
+import { SceneError } from './scene-error';
+import { kSurround, type TileSource } from './stream/tile-streamer';
+import type { TileTree } from './stream/tile-tree';
+import { kVolumeLimits, readVolumeHeader, type VolumeLimits } from './tiles/decode-volume';
+import type { TileContent } from './tiles/tileset';
+import type { VolumeContent } from './tiles/volume-content';
+
+export type ContentFile = Uint8Array<ArrayBuffer>;
+
+export class VolumeSource implements TileSource<ContentFile, VolumeContent, DrawnContent> {
+  private readonly limits: VolumeLimits;
+
+  constructor(
+    private readonly tree: TileTree,
+    private readonly base: string, // url of the folder
+    private readonly pool: DecodePool,
+    private readonly compositor: Compositor,
+    private readonly renderer: THREE.WebGLRenderer,
+  ) {
+    const gl = renderer.getContext() as WebGL2RenderingContext;
+    this.limits = {
+      ...kVolumeLimits,
+      edge3D: gl.getParameter(gl.MAX_3D_TEXTURE_SIZE) as number,
+      layers: gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS) as number,
+    };
+  }
+
+  async fetch(tile: number, signal: AbortSignal) {
+    const content = this.contentOf(tile);
+    const file = await fetchFile(new URL(content.uri, this.base).href, content.uri, signal);
+    const { layout } = readVolumeHeader(file, content.uri, content, this.limits);
+    return { file, fileBytes: file.length, cardBytes: layout.bytes };
+  }
+
+  decode(tile: number, file: ContentFile): Promise<VolumeContent> {
+    const { uri, surround, box } = this.contentOf(tile);
+    return this.pool.decode(file, uri, { surround, box }, this.limits);
+  }
+
+  allocate(tile: number, decoded: VolumeContent): DrawnContent {
+    const { box, surround } = this.contentOf(tile);
+    return this.compositor.make(new ContentTextures(decoded), box, surround);
+  }
+
+  upload(resident: DrawnContent): boolean {
+    return resident.textures.upload(this.renderer);
+  }
+
+  free(resident: DrawnContent): void {
+    this.compositor.remove(resident);
+  }
+
+  private contentOf(tile: number): TileContent {
+    return tile === kSurround ? this.tree.surround! : this.tree.tiles[tile].content!;
+  }
+}
+
+// Throws SceneError that names the file and says what the server, or the network, said.
+export async function fetchFile(url: string, name: string, signal?: AbortSignal): Promise<ContentFile> {
+  let answer: Response;
+  try {
+    answer = await fetch(url, { signal });
+  } catch (error) {
+    if (signal?.aborted) throw error;
+    throw new SceneError(name, '', 'could not be fetched', 'see that the server runs and the network is there');
+  }
+  if (!answer.ok) {
+    const remedy = answer.status === 404 ? 'reload the page, as the scene may have been baked again' : 'try again later';
+    throw new SceneError(name, '', `the server answered ${answer.status} ${answer.statusText}`.trim(), remedy);
+  }
+  return new Uint8Array(await answer.arrayBuffer());
+}

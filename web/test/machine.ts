@@ -1,0 +1,51 @@
+// What the tests in a browser stand on: the program, its server with real tiles, Debian's Chromium.
+import { spawn, spawnSync, type ChildProcess } from 'node:child_process';
+import { existsSync } from 'node:fs';
+import { fileURLToPath } from 'node:url';
+import { chromium, type Browser } from 'playwright-core';
+
+const root = fileURLToPath(new URL('../../', import.meta.url));
+export const program = process.env.TESSERA ?? `${root}build/release/apps/tessera/tessera`;
+export const goldenScene = `${root}tests/golden/volume`;
+const viewer = `${root}web/dist`;
+const chromiumPath = process.env.TESSERA_CHROMIUM ?? '/usr/bin/chromium';
+
+// Why there can be no tests here; undefined where there can. With TESSERA_REQUIRE_BROWSER it is an error.
+export function missing(): string | undefined {
+  const needed = [program, `${viewer}/plain.html`, chromiumPath].find((path) => !existsSync(path));
+  if (needed !== undefined && process.env.TESSERA_REQUIRE_BROWSER) throw new Error(`${needed} is missing`);
+  return needed;
+}
+
+export interface Server {
+  url: string;
+  close(): void;
+}
+
+export async function serve(scene: string): Promise<Server> {
+  const server: ChildProcess = spawn(program, ['serve', scene, '--viewer', viewer, '--port', '0']);
+  const url = await new Promise<string>((resolve, reject) => {
+    let said = '';
+    const hear = (text: Buffer) => {
+      said += text.toString();
+      const found = /http:\S+/.exec(said);
+      if (found) resolve(found[0]);
+    };
+    server.stdout!.on('data', hear);
+    server.stderr!.on('data', hear);
+    server.on('exit', () => reject(new Error(said)));
+  });
+  return { url, close: () => void server.kill('SIGKILL') };
+}
+
+// On a screen (Xvfb will do) by Mesa's OpenGL; without one by SwiftShader, which is slower.
+export function launch(): Promise<Browser> {
+  const onScreen = process.env.DISPLAY !== undefined;
+  const card = onScreen ? ['--use-angle=gl', '--ignore-gpu-blocklist'] : ['--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
+  return chromium.launch({ executablePath: chromiumPath, headless: !onScreen, args: ['--no-sandbox', ...card] });
+}
+
+export function run(...words: string[]): void {
+  const { status, stderr } = spawnSync(program, words, { encoding: 'utf8' });
+  if (status !== 0) throw new Error(stderr);
+}
