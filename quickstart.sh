@@ -1,16 +1,19 @@
 #!/usr/bin/env bash
 # From a clean Debian 12 to a measured picture: installs packages, builds, makes a small city, trains a model of it in
-# blocks, bakes that into a scene of tiles, and judges the scene on photos that it has not seen. Run again, it goes on
-# where it was.
-#   ./quickstart.sh [--no-serve]      --no-serve stops before anything is shown in a browser (there is no viewer yet)
+# blocks, bakes that into a scene of tiles, judges the scene on photos that it has not seen, and serves it to browsers.
+# Run again, it goes on where it was.
+#   ./quickstart.sh [--no-serve]      --no-serve stops before the scene is served
 set -euo pipefail
 cd "$(dirname "$0")"
+serve=yes
 for argument in "$@"; do
   [ "$argument" = --no-serve ] || { echo "usage: $0 [--no-serve]" >&2; exit 2; }
+  serve=no
 done
 
 tools/install-debian-packages.sh
 tools/build.sh release tessera
+tools/build-web.sh
 
 tessera=build/release/apps/tessera/tessera
 out=out/quickstart
@@ -25,3 +28,4 @@ echo "held-out views: $(grep -o '"psnr": *[0-9.]*' "$out/result.json" | head -1 
 echo "scene:          $PWD/$out/city.scene"
 echo "report:         $PWD/$out/city.scene/report.html"
 echo "pictures:       $PWD/$out/images"
+[ "$serve" = no ] || exec "$tessera" serve "$out/city.scene"

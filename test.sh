@@ -1,9 +1,13 @@
 #!/usr/bin/env bash
-# Builds and runs every test. Tests of real photographs skip by name unless TESSERA_SHARED_DATA names their folder.
+# Builds and runs every test, C++ and web. Tests of real photographs skip by name unless TESSERA_SHARED_DATA names their
+# folder.
 #   ./test.sh [PRESET]      release (default), dev, asan or tsan
 set -euo pipefail
 cd "$(dirname "$0")"
 preset=${1:-release}
-tools/install-debian-packages.sh
+tools/install-debian-packages.sh --browser
 tools/build.sh "$preset"
 ctest --preset "$preset" --parallel "$(nproc)" --output-on-failure
+tools/build-web.sh
+export TESSERA=$PWD/build/$preset/apps/tessera/tessera
+(cd web && xvfb-run -a npm test --silent)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs what building and testing tessera needs on Debian 12. As root, or with sudo. Nothing is done when all is there.
-#   tools/install-debian-packages.sh [--fuzz] [--bench]
+#   tools/install-debian-packages.sh [--browser] [--fuzz] [--bench]
 set -euo pipefail
 
 packages=(
@@ -9,15 +9,18 @@ packages=(
   libjpeg62-turbo-dev libspng-dev libwebp-dev libopenexr-dev libexif-dev
   libcli11-dev libfmt-dev libspdlog-dev nlohmann-json3-dev libtomlplusplus-dev
   libgeographiclib-dev
+  libboost-dev zlib1g-dev
   libvulkan-dev mesa-vulkan-drivers glslang-tools
   libgtest-dev
   ffmpeg
 )
+command -v npm > /dev/null || packages+=(nodejs npm)
 for argument in "$@"; do
   case "$argument" in
+    --browser) packages+=(chromium xvfb xauth) ;;
     --fuzz) packages+=(clang-14 libclang-rt-14-dev) ;;
     --bench) packages+=(jq libtorch-dev libopenblas0-pthread vulkan-tools) ;;
-    *) echo "usage: $0 [--fuzz] [--bench]" >&2; exit 2 ;;
+    *) echo "usage: $0 [--browser] [--fuzz] [--bench]" >&2; exit 2 ;;
   esac
 done
 
