@@ -34,9 +34,22 @@ export function screenTriangle(): THREE.BufferGeometry {
   return geometry;
 }
 
+// Puts the nearest depth where nothing of what comes next would be seen: it is not even begun there.
+const kHideShader = `
+uniform sampler2D colourAndOpacity;
+uniform float minTransmittance;
+void main() {
+  if (1.0 - texelFetch(colourAndOpacity, ivec2(gl_FragCoord.xy), 0).a >= minTransmittance) discard;
+  gl_FragColor = vec4(0.0);
+}`;
+
+const kContentsBetweenHiding = 4;
+
 export class Compositor {
   readonly view: ViewUniforms = viewUniforms();
   readonly target: THREE.WebGLRenderTarget;
+  private readonly depthAlone: THREE.WebGLRenderTarget; // the depth of `target`, so that its colours can be read meanwhile
+  private readonly hiding = new THREE.Scene();
   private readonly contents = new THREE.Scene();
   private readonly cube = new THREE.BoxGeometry(1, 1, 1);
   private readonly screen = screenTriangle();
@@ -45,10 +58,22 @@ export class Compositor {
   constructor(renderer: THREE.WebGLRenderer, place: ScenePlace) {
     const has = (name: string) => renderer.extensions.has(name);
     const canBlendHalves = has('EXT_color_buffer_half_float') || has('EXT_color_buffer_float');
+    const depthTexture = new THREE.DepthTexture(1, 1, THREE.UnsignedIntType);
+    const common = { generateMipmaps: false, depthBuffer: true, depthTexture };
     this.target = new THREE.WebGLRenderTarget(1, 1, {
-      count: 2, type: canBlendHalves ? THREE.HalfFloatType : THREE.UnsignedByteType,
-      minFilter: THREE.LinearFilter, magFilter: THREE.LinearFilter, generateMipmaps: false, depthBuffer: true,
+      ...common, count: 2, type: canBlendHalves ? THREE.HalfFloatType : THREE.UnsignedByteType,
+      minFilter: THREE.LinearFilter, magFilter: THREE.LinearFilter,
     });
+    this.depthAlone = new THREE.WebGLRenderTarget(1, 1, { ...common, format: THREE.RedFormat });
+    this.hiding.add(new THREE.Mesh(this.screen, new THREE.ShaderMaterial({
+      vertexShader: 'void main() { gl_Position = vec4(position.xy, -1.0, 1.0); }',
+      fragmentShader: kHideShader,
+      uniforms: {
+        colourAndOpacity: { value: this.target.textures[0] }, minTransmittance: this.view.minTransmittance,
+      },
+      depthFunc: THREE.AlwaysDepth, colorWrite: false,
+    })));
+    this.hiding.children[0].frustumCulled = false;
     this.target.textures[1].minFilter = this.target.textures[1].magFilter = THREE.NearestFilter;
     this.contents.matrixWorldAutoUpdate = false;
     this.view.sceneLow.value.set(...place.box.low);
@@ -68,7 +93,6 @@ export class Compositor {
   }
 
   remove(content: DrawnContent): void {
-    this.contents.remove(content.mesh);
     content.mesh.material.uniformsGroups.forEach((group) => group.dispose());
     content.mesh.material.dispose();
     content.textures.dispose();
@@ -76,11 +100,14 @@ export class Compositor {
 
   get bytes(): number {
     const perPixel = this.target.texture.type === THREE.HalfFloatType ? 16 : 8;
-    return (perPixel + 4) * this.target.width * this.target.height;
+    return (perPixel + 4 + 1) * this.target.width * this.target.height;
   }
 
   resize({ x, y }: THREE.Vector2): void {
-    if (this.target.width !== x || this.target.height !== y) this.target.setSize(x, y);
+    if (this.target.width !== x || this.target.height !== y) {
+      this.target.setSize(x, y);
+      this.depthAlone.setSize(x, y);
+    }
     this.view.resolution.value.set(x, y);
   }
 
@@ -91,18 +118,15 @@ export class Compositor {
   ): void {
     this.setView(camera, worldFromScene);
     this.view.opaqueDepth.value = opaqueDepth;
-    this.contents.clear();
     const box = new THREE.Matrix4();
     const eye = this.eye(camera, worldFromScene);
-    frontToBack.forEach(({ textures, mesh, box: { low, high } }, i) => {
+    for (const { textures, mesh, box: { low, high } } of frontToBack) {
       if (textures.parts.length > 1) textures.orderParts(orderOf(textures.parts, eye));
       const middle = (a: number) => (low[a] + high[a]) / 2;
       box.makeScale(high[0] - low[0], high[1] - low[1], high[2] - low[2]).setPosition(middle(0), middle(1), middle(2));
       mesh.matrixWorld.multiplyMatrices(worldFromScene, box);
-      mesh.renderOrder = i;
       setDefine(mesh.material, 'OPAQUE', opaqueDepth !== null);
-      this.contents.add(mesh);
-    });
+    }
     const before = renderer.getRenderTarget();
     const autoClear = renderer.autoClear;
     const clearColour = renderer.getClearColor(new THREE.Color());
@@ -111,14 +135,27 @@ export class Compositor {
     renderer.setClearColor(0, 0);
     renderer.autoClear = false;
     renderer.clear();
-    renderer.render(this.contents, camera);
+    const hides = this.view.minTransmittance.value > 0;
+    frontToBack.forEach((content, i) => {
+      if (hides && i > 0 && (content.surround || i % kContentsBetweenHiding === 0)) {
+        renderer.setRenderTarget(this.depthAlone);
+        renderer.render(this.hiding, camera);
+        renderer.setRenderTarget(this.target);
+      }
+      this.contents.children = [content.mesh];
+      renderer.render(this.contents, camera);
+    });
+    this.contents.children = [];
     renderer.autoClear = autoClear;
     renderer.setClearColor(clearColour, clearAlpha);
     renderer.setRenderTarget(before);
   }
 
   dispose(): void {
+    this.target.depthTexture?.dispose();
     this.target.dispose();
+    this.depthAlone.dispose();
+    (this.hiding.children[0] as THREE.Mesh<THREE.BufferGeometry, THREE.Material>).material.dispose();
     this.cube.dispose();
     this.screen.dispose();
   }
