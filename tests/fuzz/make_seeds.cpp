@@ -96,6 +96,8 @@ int main(int count, char** arguments) {
   write("block_grid/a",
         std::string(R"({"origin":[1,2,3],"grid_from_world":[0,1,0,-1,0,0,0,0,1],"edge":40.5,"columns":3,)"
                     R"("rows":2,"bottom":-9,"top":9.5})"));
+  write("http_request/a",
+        std::string("/scene/tiles/L0/a%20b.glb?v=1\nbytes=0-99\nbr, gzip;q=0.5\nW/\"a-b\", *\n[::1]:80"));
   write("ply/a", encodePly(std::vector<SparsePoint>(2)));
   write("ply/b", std::string("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty "
                              "double z\nproperty uchar red\nproperty float nx\nend_header\n1 2e3 -3 40 nan\n"));
