@@ -137,6 +137,14 @@ describe('a tile streamer', () => {
     expect(made.streamer.idle).toBe(true);
   });
 
+  it('comes to an end with a page that holds the files of one request', async () => {
+    const made = make(madeTree(8), 1e6, { pageBytes: 60, fetches: 2 });
+    const cut = await settle(made, near, 400);
+    expect(made.streamer.idle).toBe(true);
+    const generous = make(madeTree(8), 1e6);
+    expect(cut).toEqual(await settle(generous, near, 400));
+  });
+
   it('says that the coarsest level alone is too much', async () => {
     const made = make(madeTree(2), 60);
     const errors: SceneError[] = [];

@@ -22,7 +22,7 @@ export interface TileSource<Fetched, Decoded, Resident> {
 
 export interface StreamSettings {
   cardBytes: number; // of contents on the card, at most
-  pageBytes: number; // of files and texels in the page, at most, but for one content
+  pageBytes: number; // of files and texels in the page; what is fetched for the most urgent request may pass it
   fetches: number; // at once
   decodes: number;
   patience: number; // ms for which a request must last before it is fetched, and be gone before a fetch is given up
@@ -158,6 +158,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
       entry.lastWanted = now;
     }
     for (const [tile, entry] of this.entries) this.giveUpIfUnwanted(tile, entry, wanted, now);
+    this.forgetLessUrgent(requests);
     let fetches = this.count('fetching');
     for (const request of requests) {
       const entries = request.tiles.map((tile) => this.entry(tile));
@@ -170,7 +171,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
       request.tiles.forEach((tile, i) => {
         const entry = entries[i];
         const isPatient = entry.pinned || now - entry.wantedSince >= settings.patience;
-        const hasRoom = this.statistics.pageBytes < settings.pageBytes;
+        const hasRoom = this.statistics.pageBytes < settings.pageBytes || request === requests[0];
         if (entry.state !== 'absent' || !isPatient || !hasRoom || fetches >= settings.fetches) return;
         ++fetches;
         void this.fetch(tile, entry);
@@ -193,6 +194,16 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     entry.wantedSince = NaN;
     if (entry.state === 'fetching') entry.abort!.abort();
     if (entry.state === 'fetched') this.forget(entry);
+  }
+
+  // Where files that wait for others fill the page, those of the least urgent requests give way.
+  private forgetLessUrgent(requests: TileRequest[]): void {
+    for (let i = requests.length - 1; i > 0 && this.statistics.pageBytes >= this.settings.pageBytes; --i) {
+      for (const tile of requests[i].tiles) {
+        const entry = this.entry(tile);
+        if (entry.state === 'fetched' && !entry.reserved) this.forget(entry);
+      }
+    }
   }
 
   private missingBytes(tiles: number[]): number {
