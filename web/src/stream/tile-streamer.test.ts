@@ -138,7 +138,7 @@ describe('a tile streamer', () => {
   });
 
   it('comes to an end with a page that holds the files of one request', async () => {
-    const made = make(madeTree(8), 1e6, { pageBytes: 60, fetches: 2 });
+    const made = make(madeTree(8), 1e6, { pageBytes: 20, fetches: 1 });
     const cut = await settle(made, near, 400);
     expect(made.streamer.idle).toBe(true);
     const generous = make(madeTree(8), 1e6);

@@ -158,7 +158,6 @@ export class TileStreamer<Fetched, Decoded, Resident> {
       entry.lastWanted = now;
     }
     for (const [tile, entry] of this.entries) this.giveUpIfUnwanted(tile, entry, wanted, now);
-    this.forgetLessUrgent(requests);
     let fetches = this.count('fetching');
     for (const request of requests) {
       const entries = request.tiles.map((tile) => this.entry(tile));
@@ -194,16 +193,6 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     entry.wantedSince = NaN;
     if (entry.state === 'fetching') entry.abort!.abort();
     if (entry.state === 'fetched') this.forget(entry);
-  }
-
-  // Where files that wait for others fill the page, those of the least urgent requests give way.
-  private forgetLessUrgent(requests: TileRequest[]): void {
-    for (let i = requests.length - 1; i > 0 && this.statistics.pageBytes >= this.settings.pageBytes; --i) {
-      for (const tile of requests[i].tiles) {
-        const entry = this.entry(tile);
-        if (entry.state === 'fetched' && !entry.reserved) this.forget(entry);
-      }
-    }
   }
 
   private missingBytes(tiles: number[]): number {
