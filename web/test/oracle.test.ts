@@ -4,18 +4,13 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import type { Plain, View } from '../src/plain';
+import type { Plain } from '../src/plain';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import type { Tileset } from '../src/tiles/tileset';
 import { goldenScene, launch, missing, run, serve, type Server } from './machine';
+import { kFieldOfView, kHeight, kWidth, viewAt, type Place } from './views';
 
 declare const plain: Plain;
-
-const kWidth = 480;
-const kHeight = 270;
-const kFieldOfView = 60;
-
-type Place = readonly [number, number, number];
 
 // Places of the eye and what it looks at, scene units: inside, above, outside, straight down.
 const kLooks: [Place, Place][] = [
@@ -25,19 +20,6 @@ const kLooks: [Place, Place][] = [
   [[-0.7, 0.1, 3], [-0.69, 0.12, 0]],
   [[6, 3, 0.5], [0, 0, 0]],
 ];
-
-// Column after column: camera (x right, y up, z back) to the capture's world.
-function worldFromCamera(tileset: Tileset, [eye, target]: [Place, Place]): number[] {
-  const minus = (a: Place, b: Place): Place => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-  const cross = (a: Place, b: Place): Place => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-  const unit = (a: Place): Place => [a[0] / Math.hypot(...a), a[1] / Math.hypot(...a), a[2] / Math.hypot(...a)];
-  const back = unit(minus(eye, target));
-  const right = unit(cross([0, 0, 1], back));
-  const { rotation: r, scale, translation } = tileset.worldFromScene;
-  const turned = (a: Place) => [0, 1, 2].map((row) => r[row] * a[0] + r[3 + row] * a[1] + r[6 + row] * a[2]);
-  const place = turned(eye).map((x, row) => scale * x + translation[row]);
-  return [...turned(right), 0, ...turned(cross(back, right)), 0, ...turned(back), 0, ...place, 1];
-}
 
 // As a camera path of nerfstudio has it, in the world of the source of the photos; row after row.
 function cameraPath(tileset: Tileset, matrices: number[][]): string {
@@ -82,11 +64,7 @@ describe.skipIf(missing())('the browser', () => {
   let browser: Browser;
   let folder: string;
   const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json');
-  const matrices = kLooks.map((look) => worldFromCamera(tileset, look));
-  const focal = kHeight / 2 / Math.tan((kFieldOfView * Math.PI) / 360);
-  const views = matrices.map((matrix): View => ({
-    matrix, fx: focal, fy: focal, cx: kWidth / 2, cy: kHeight / 2, width: kWidth, height: kHeight,
-  }));
+  const views = kLooks.map(([eye, target]) => viewAt(tileset, eye, target));
 
   beforeAll(async () => {
     folder = mkdtempSync(join(tmpdir(), 'tessera-browser-'));
@@ -100,7 +78,7 @@ describe.skipIf(missing())('the browser', () => {
 
   it.each([0, 1])('draws what the processor draws: level %i', async (level) => {
     const path = join(folder, `path-${level}.json`);
-    writeFileSync(path, cameraPath(tileset, matrices));
+    writeFileSync(path, cameraPath(tileset, views.map(({ matrix }) => matrix)));
     run('render', goldenScene, join(folder, String(level)), '--path', path, '--lod', String(level));
     const page = await browser.newPage();
     const said: string[] = [];
