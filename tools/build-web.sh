@@ -3,8 +3,8 @@
 #   tools/build-web.sh [--packages-only]
 set -euo pipefail
 cd "$(dirname "$0")/../web"
-if [ ! node_modules/.package-lock.json -nt package-lock.json ]; then
+if ! cmp -s package-lock.json node_modules/.installed.json; then
   npm ci --no-audit --no-fund --loglevel=error
-  touch node_modules/.package-lock.json
+  cp package-lock.json node_modules/.installed.json
 fi
 [ "${1:-}" = --packages-only ] || npm run --silent build -- --logLevel warn

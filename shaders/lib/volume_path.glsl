@@ -1,7 +1,7 @@
 // A ray through the domain of one part of a content: straight pieces, measured in texels of the planes
 // (docs/tile-format.md, section 6; City-on-Web, section 4.4; MERF, section 4.1). Twin of src/render/cpu/volume_path.cpp.
 //
-// Defines: VolumeSegment, distanceAt, distanceBetween, regionAt, leaveRegion, volumeSegment.
+// Defines: VolumeSegment, rateAt, distanceAt, distanceBetween, regionAt, leaveRegion, volumeSegment.
 
 // The place after τ texels is start + τ direction, in texels from the lower corner of the domain. Within a region the
 // contraction is a projective map, and so is the distance along the ray: entry + square τ / (rate - growth τ).
@@ -12,12 +12,17 @@ struct VolumeSegment {
   float entry, square, rate, growth;
 };
 
+// rate - growth τ, which is above zero but for rounding.
+float rateAt(VolumeSegment s, float tau) {
+  return max(s.rate - s.growth * tau, 1e-7 * s.rate);
+}
+
 float distanceAt(VolumeSegment s, float tau) {
-  return s.entry + s.square * tau / (s.rate - s.growth * tau);
+  return s.entry + s.square * tau / rateAt(s, tau);
 }
 
 float distanceBetween(VolumeSegment s, float from, float to) {
-  return s.square * s.rate * (to - from) / ((s.rate - s.growth * from) * (s.rate - s.growth * to));
+  return s.square * s.rate * (to - from) / (rateAt(s, from) * rateAt(s, to));
 }
 
 // The cube |x| <= 1 is region -1; where the largest coordinate is that of axis a, the region is 2a, or 2a + 1 where it

@@ -64,8 +64,9 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     beast::error_code ignored;
     stream_.socket().shutdown(tcp::socket::shutdown_both, ignored);
     stream_.close();
-    state_.connections.erase(place_);  // may be the last to hold this
-    state_.count = state_.connections.size();
+    State& state = state_;
+    state.connections.erase(place_);  // may be the last to hold this
+    state.count = state.connections.size();
   }
 
  private:
@@ -106,7 +107,8 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     request.ifNoneMatch = field(http::field::if_none_match);
     request.acceptEncoding = field(http::field::accept_encoding);
     // What follows a request with a body would be taken for the next one.
-    const bool hasBody = message.has_content_length() ? field(http::field::content_length) != "0" : message.chunked();
+    const bool hasBody = message.count(http::field::transfer_encoding) > 0 ||
+                         (message.has_content_length() && field(http::field::content_length) != "0");
     send(state_.site.answer(request), message.version(), message.keep_alive() && !hasBody);
   }
 
@@ -127,7 +129,10 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     header_ += keepAlive_ ? "Connection: keep-alive\r\n\r\n" : "Connection: close\r\n\r\n";
     std::array<asio::const_buffer, 2> buffers = {asio::buffer(header_), {}};
     if (answer_.sendsBody && answer_.file.empty()) {
-      buffers[1] = asio::buffer(answer_.compressed ? *answer_.compressed : std::as_const(answer_.body));
+      if (answer_.compressed)
+        left_ = answer_.length;
+      else
+        buffers[1] = asio::buffer(std::as_const(answer_.body));
     }
     stream_.expires_after(state_.settings.sendTime);
     asio::async_write(stream_, buffers,
@@ -145,12 +150,18 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
       if (!keepAlive_) return close();
       return read(state_.settings.idleTime);
     }
-    chunk_.resize(kChunk);
     const size_t wanted = std::min<uint64_t>(left_, kChunk);
-    if (!file_.read(chunk_.data(), static_cast<std::streamsize>(wanted))) return close();  // it has been cut off
+    asio::const_buffer next;
+    if (answer_.compressed) {
+      next = asio::buffer(answer_.compressed->data() + (answer_.length - left_), wanted);
+    } else {
+      chunk_.resize(kChunk);
+      if (!file_.read(chunk_.data(), static_cast<std::streamsize>(wanted))) return close();  // it has been cut off
+      next = asio::buffer(chunk_.data(), wanted);
+    }
     left_ -= wanted;
     stream_.expires_after(state_.settings.sendTime);
-    asio::async_write(stream_, asio::buffer(chunk_.data(), wanted),
+    asio::async_write(stream_, next,
                       [self = shared_from_this()](beast::error_code failed, size_t) { self->onSent(failed); });
   }
 
@@ -163,7 +174,7 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
   std::string header_;
   std::ifstream file_;
   std::vector<char> chunk_;
-  uint64_t left_ = 0;  // of the file
+  uint64_t left_ = 0;  // of the file, or of what is compressed
   bool keepAlive_ = true, open_ = true;
 };
 

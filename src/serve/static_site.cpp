@@ -57,9 +57,11 @@ bool holdsDigest(const fs::path& file) {
   return digest.size() == 8 && file.parent_path().filename() == "assets";
 }
 
+// Without a part that begins with a dot on the way.
 bool isBelow(const fs::path& file, const fs::path& folder) {
   const auto [end, inFile] = std::mismatch(folder.begin(), folder.end(), file.begin(), file.end());
-  return end == folder.end() && inFile != file.end();
+  return end == folder.end() && inFile != file.end() &&
+         std::none_of(inFile, file.end(), [](const fs::path& part) { return part.string().starts_with('.'); });
 }
 
 SiteAnswer plain(int status, const std::string& reason) {

@@ -29,6 +29,7 @@ class StaticSiteTest : public testing::Test {
     fs::create_symlink(folder_.path() / "secret.txt", folder_.path() / "scene/link.txt");
     fs::create_directory_symlink(folder_.path(), folder_.path() / "scene/up");
     fs::create_symlink("tileset.json", folder_.path() / "scene/inner.json");
+    fs::create_symlink(".hidden", folder_.path() / "scene/shown.txt");
   }
 
   void write(const std::string& name, const std::string& text) {
@@ -68,6 +69,7 @@ TEST_F(StaticSiteTest, ServesNothingOutsideThem) {
                              "/scene/link.txt",
                              "/scene/up/secret.txt",
                              "/scene/.hidden",
+                             "/scene/shown.txt",
                              "/scene-beside/secret.txt",
                              "/scene",
                              "/scene/",

@@ -6,6 +6,7 @@ import type { VolumeContent } from './tiles/volume-content';
 import type { DecodeAnswer, DecodeRequest } from './worker';
 
 interface Waiting {
+  worker: Worker;
   resolve: (content: VolumeContent) => void;
   reject: (error: SceneError) => void;
 }
@@ -24,13 +25,14 @@ export class DecodePool {
     const id = this.next++;
     const worker = this.worker(id % this.size);
     return new Promise((resolve, reject) => {
-      this.waiting.set(id, { resolve, reject });
+      this.waiting.set(id, { worker, resolve, reject });
       worker.postMessage({ id, file, name, promised, limits } satisfies DecodeRequest, [file.buffer]);
     });
   }
 
   dispose(): void {
-    for (const worker of this.workers) worker.terminate();
+    for (const worker of this.workers) worker?.terminate();
+    this.workers.length = 0;
     const gone = new SceneError('scene', '', 'was closed', 'open it again');
     for (const { reject } of this.waiting.values()) reject(gone);
     this.waiting.clear();
@@ -46,11 +48,19 @@ export class DecodePool {
       if ('content' in data) waiting?.resolve(data.content);
       else waiting?.reject(new SceneError(data.error.what, data.error.place, data.error.reason, data.error.remedy));
     };
-    worker.onerror = ({ message }) => {
+    // The next content gets a new one.
+    const leave = (message: string) => {
+      worker.terminate();
+      delete this.workers[index];
       const error = new SceneError('worker', '', message || 'could not be started', 'reload the page');
-      for (const { reject } of this.waiting.values()) reject(error);
-      this.waiting.clear();
+      for (const [id, waiting] of this.waiting) {
+        if (waiting.worker !== worker) continue;
+        this.waiting.delete(id);
+        waiting.reject(error);
+      }
     };
+    worker.onerror = ({ message }) => leave(message);
+    worker.onmessageerror = () => leave('said what is not understood');
     this.workers[index] = worker;
     return worker;
   }

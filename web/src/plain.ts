@@ -59,6 +59,18 @@ const plain = {
     this.city!.dispose();
   },
 
+  // The card is taken away, and given back.
+  async loseCard(): Promise<void> {
+    const extension = gl.getExtension('WEBGL_lose_context')!;
+    const heard = (name: string) => new Promise((resolve) => canvas.addEventListener(name, resolve, { once: true }));
+    const lost = heard('webglcontextlost');
+    extension.loseContext();
+    await lost;
+    const restored = heard('webglcontextrestored');
+    setTimeout(() => extension.restoreContext(), 50);
+    await restored;
+  },
+
   // Draws until nothing that the view asks for is still to come; milliseconds.
   async settle(view: View, most = 60000): Promise<number> {
     const begin = performance.now();

@@ -24,6 +24,8 @@ import type { Tileset, Vec3 } from './tiles/tileset';
 import type { VolumeContent } from './tiles/volume-content';
 import { fetchFile, VolumeSource, type ContentFile } from './volume-source';
 
+const kTilesetBytes = 1 << 24;
+
 // Capture worlds are z up, three's are y up.
 export const kYUpFromZUp = new THREE.Matrix4().set(1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1);
 
@@ -55,12 +57,16 @@ export class TesseraScene extends THREE.Object3D {
   private mesh?: ReturnType<typeof cityMesh>;
   private drawn: number[] = [];
   private lastUpdate = 0;
+  private disposed = false;
+  private canvas?: EventTarget;
+  // What was on the card is gone: all is fetched anew when there is a card again.
+  private readonly onContextLost = () => this.leaveCard();
 
   // Throws SceneError where there is no scene, or one of another kind.
   static async load(url: string, options: SceneOptions = {}): Promise<TesseraScene> {
     const absolute = new URL(url, location.href);
     if (!absolute.pathname.endsWith('.json')) absolute.pathname = `${absolute.pathname.replace(/\/$/, '')}/tileset.json`;
-    const text = new TextDecoder().decode(await fetchFile(absolute.href, 'tileset.json'));
+    const text = new TextDecoder().decode(await fetchFile(absolute.href, 'tileset.json', kTilesetBytes));
     const tileset = decodeTileset(text, 'tileset.json');
     if (tileset.representation !== 'volume') {
       throw new SceneError('tileset.json', '', `is a scene of ${tileset.representation}, not of volume`, 'draw it with a viewer that knows it');
@@ -114,6 +120,7 @@ export class TesseraScene extends THREE.Object3D {
   }
 
   update(camera: THREE.Camera, renderer: THREE.WebGLRenderer): void {
+    if (this.disposed || renderer.getContext().isContextLost()) return;
     const { compositor, streamer, mesh } = this.prepare(renderer);
     this.updateWorldMatrix(true, false);
     camera.updateWorldMatrix(true, false);
@@ -146,16 +153,22 @@ export class TesseraScene extends THREE.Object3D {
   // Gives back all memory, of the card and of the page.
   override dispose(): void {
     super.dispose();
+    this.disposed = true;
+    this.leaveCard();
+    this.pool.dispose();
+  }
+
+  private leaveCard(): void {
     this.streamer?.dispose();
     this.compositor?.dispose();
     this.opaque.dispose();
-    this.pool.dispose();
     if (this.mesh) {
       this.remove(this.mesh);
       this.mesh.geometry.dispose();
       this.mesh.material.dispose();
     }
-    this.streamer = this.compositor = this.mesh = undefined;
+    this.canvas?.removeEventListener('webglcontextlost', this.onContextLost);
+    this.streamer = this.compositor = this.mesh = this.canvas = undefined;
   }
 
   // Milliseconds for uploads: a share of what a picture takes, so that slow machines do not wait for ever.
@@ -176,6 +189,8 @@ export class TesseraScene extends THREE.Object3D {
       this.streamer.onError = (error) => this.onError(error);
       this.mesh = cityMesh(this.compositor);
       this.add(this.mesh);
+      this.canvas = renderer.domElement;
+      this.canvas.addEventListener('webglcontextlost', this.onContextLost);
     }
     return { compositor: this.compositor, streamer: this.streamer, mesh: this.mesh };
   }
@@ -184,7 +199,14 @@ export class TesseraScene extends THREE.Object3D {
 // The camera as the selection needs it, in scene units.
 function tileView(tileset: Tileset, camera: THREE.Camera, worldFromScene: THREE.Matrix4, size: THREE.Vector2): TileView {
   const sceneFromCamera = worldFromScene.clone().invert().multiply(camera.matrixWorld);
-  const eye = new THREE.Vector3().setFromMatrixPosition(sceneFromCamera).toArray();
+  const projection = camera.projectionMatrix.elements;
+  const isParallel = projection[15] === 1;
+  // The eye of a parallel projection is so far behind the picture that its rays come from there.
+  const behind = isParallel ? 1e7 : 0;
+  const eye = new THREE.Vector3()
+    .setFromMatrixPosition(sceneFromCamera)
+    .addScaledVector(new THREE.Vector3().setFromMatrixColumn(sceneFromCamera, 2).normalize(), behind)
+    .toArray();
   const clipFromScene = camera.projectionMatrix.clone().multiply(sceneFromCamera.clone().invert()).elements;
   const row = (i: number): Plane => [clipFromScene[i], clipFromScene[4 + i], clipFromScene[8 + i], clipFromScene[12 + i]];
   const w = row(3);
@@ -192,8 +214,6 @@ function tileView(tileset: Tileset, camera: THREE.Camera, worldFromScene: THREE.
     const r = row(i);
     return [1, -1].map((sign): Plane => [w[0] + sign * r[0], w[1] + sign * r[1], w[2] + sign * r[2], w[3] + sign * r[3]]);
   });
-  const projection = camera.projectionMatrix.elements;
-  const isParallel = projection[15] === 1;
   // The near and far planes are not asked: rays know neither.
   const planes = isParallel ? sides : [w, ...sides];
   const scale = new THREE.Vector3().setFromMatrixScale(worldFromScene).x;

@@ -25,14 +25,16 @@ export class VolumeSource implements TileSource<ContentFile, VolumeContent, Draw
     const gl = renderer.getContext() as WebGL2RenderingContext;
     this.limits = {
       ...kVolumeLimits,
+      edge2D: gl.getParameter(gl.MAX_TEXTURE_SIZE) as number,
       edge3D: gl.getParameter(gl.MAX_3D_TEXTURE_SIZE) as number,
       layers: gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS) as number,
+      uniformBytes: gl.getParameter(gl.MAX_UNIFORM_BLOCK_SIZE) as number,
     };
   }
 
   async fetch(tile: number, signal: AbortSignal) {
     const content = this.contentOf(tile);
-    const file = await fetchFile(new URL(content.uri, this.base).href, content.uri, signal);
+    const file = await fetchFile(new URL(content.uri, this.base).href, content.uri, this.limits.fileBytes, signal);
     const { layout } = readVolumeHeader(file, content.uri, content, this.limits);
     return { file, fileBytes: file.length, cardBytes: layout.bytes };
   }
@@ -60,18 +62,36 @@ export class VolumeSource implements TileSource<ContentFile, VolumeContent, Draw
   }
 }
 
-// Throws SceneError that names the file and says what the server, or the network, said.
-export async function fetchFile(url: string, name: string, signal?: AbortSignal): Promise<ContentFile> {
-  let answer: Response;
+// Throws SceneError that names the file and says what the server, or the network, said; or that it is larger than `most`
+// bytes, before more than that has been kept.
+export async function fetchFile(url: string, name: string, most: number, signal?: AbortSignal): Promise<ContentFile> {
+  const tooLarge = new SceneError(name, '', 'is larger than any such file should be', 'copy the scene again, or bake it again');
   try {
-    answer = await fetch(url, { signal });
+    const answer = await fetch(url, { signal });
+    if (!answer.ok) {
+      const remedy = answer.status === 404 ? 'reload the page, as the scene may have been baked again' : 'try again later';
+      throw new SceneError(name, '', `the server answered ${answer.status} ${answer.statusText}`.trim(), remedy);
+    }
+    const pieces: Uint8Array[] = [];
+    let bytes = 0;
+    const reader = answer.body!.getReader();
+    for (let next = await reader.read(); !next.done; next = await reader.read()) {
+      bytes += next.value.length;
+      if (bytes > most) {
+        await reader.cancel();
+        throw tooLarge;
+      }
+      pieces.push(next.value);
+    }
+    const file = new Uint8Array(bytes);
+    let at = 0;
+    for (const piece of pieces) {
+      file.set(piece, at);
+      at += piece.length;
+    }
+    return file;
   } catch (error) {
-    if (signal?.aborted) throw error;
+    if (error instanceof SceneError || signal?.aborted) throw error;
     throw new SceneError(name, '', 'could not be fetched', 'see that the server runs and the network is there');
   }
-  if (!answer.ok) {
-    const remedy = answer.status === 404 ? 'reload the page, as the scene may have been baked again' : 'try again later';
-    throw new SceneError(name, '', `the server answered ${answer.status} ${answer.statusText}`.trim(), remedy);
-  }
-  return new Uint8Array(await answer.arrayBuffer());
 }

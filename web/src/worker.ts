@@ -22,13 +22,17 @@ let prepared: Promise<void> | undefined;
 
 async function prepare(): Promise<void> {
   const file = await fetch(decoderUrl);
+  if (!file.ok) throw new SceneError('viewer', '', `lacks a file: the server answered ${file.status}`, 'reload the page');
   return prepareDecoder(await WebAssembly.compile(await file.arrayBuffer()));
 }
 
 self.onmessage = async ({ data }: MessageEvent<DecodeRequest>) => {
   const { id, file, name, promised, limits } = data;
   try {
-    await (prepared ??= prepare());
+    await (prepared ??= prepare().catch((error: unknown) => {
+      prepared = undefined; // the next content tries again
+      throw error;
+    }));
     const content = decodeVolume(readVolumeHeader(file, name, promised, limits), name);
     const { planes, voxels, macroblocks, distances } = content;
     const buffers = [planes.first, planes.second, voxels.first, voxels.second, macroblocks.texels, distances.texels];

@@ -97,6 +97,11 @@ describe.skipIf(missing())('the browser', () => {
     }
     expect(await page.evaluate(() => plain.errors)).toEqual([]);
     expect(said).toEqual([]);
+    // Browsers take the card away now and then: all comes back.
+    const before = await page.evaluate(() => plain.pixels());
+    await page.evaluate(() => plain.loseCard());
+    await page.evaluate((view) => plain.settle(view), views[views.length - 1]);
+    expect(await page.evaluate(() => plain.pixels())).toBe(before);
     await page.close();
   });
 });

@@ -64,6 +64,7 @@ async function start(): Promise<void> {
   };
   let needed = true; // a picture, though nothing moves
   let wasWhole = false; // the last picture was
+  let wasMoving = false; // when it was drawn
   let before = performance.now();
   addEventListener('resize', resize);
   addEventListener('keydown', ({ key }) => {
@@ -79,7 +80,8 @@ async function start(): Promise<void> {
     before = now;
     controls.update();
     if (!isMoving && wasWhole && city.idle && !needed) return;
-    if (isMoving && !wasWhole) resolution.took(took);
+    if (isMoving && wasMoving) resolution.took(took);
+    wasMoving = isMoving;
     city.resolutionScale = resolution.scale(now);
     city.update(camera, renderer);
     renderer.render(world, camera);

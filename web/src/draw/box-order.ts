@@ -8,10 +8,11 @@ import type { Box, Vec3 } from '../tiles/tileset';
 function comesBefore(a: Box, b: Box, eye: Vec3): boolean {
   let before = false;
   for (let axis = 0; axis < 3; ++axis) {
-    if (a.high[axis] <= b.low[axis]) {
+    const slack = 2e-3 * Math.min(a.high[axis] - a.low[axis], b.high[axis] - b.low[axis]); // rounding of walls
+    if (a.high[axis] <= b.low[axis] + slack) {
       if (eye[axis] >= b.low[axis]) return false;
       before ||= eye[axis] <= a.high[axis];
-    } else if (b.high[axis] <= a.low[axis]) {
+    } else if (b.high[axis] <= a.low[axis] + slack) {
       if (eye[axis] <= b.high[axis]) return false;
       before ||= eye[axis] >= a.low[axis];
     }

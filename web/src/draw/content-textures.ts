@@ -1,7 +1,7 @@
 // A content on the graphics card: allocated at once, filled slice by slice, so that no frame waits for a whole block.
 import * as THREE from 'three';
 import type { Vec3 } from '../tiles/tileset';
-import type { VolumeContent, VolumePart } from '../tiles/volume-content';
+import { kVectorsOfPart, type VolumeContent, type VolumePart } from '../tiles/volume-content';
 import { packNetwork } from './network-shader';
 
 interface Slice {
@@ -16,7 +16,6 @@ interface Slice {
 }
 
 const kSliceBytes = 1 << 19;
-export const kVectorsOfPart = 6;
 
 export class ContentTextures {
   readonly planesFirst: THREE.DataArrayTexture;

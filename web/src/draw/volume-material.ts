@@ -3,7 +3,8 @@
 import * as THREE from 'three';
 import marchSource from '../../../shaders/lib/volume_march.glsl?raw';
 import pathSource from '../../../shaders/lib/volume_path.glsl?raw';
-import { kVectorsOfPart, type ContentTextures } from './content-textures';
+import { kVectorsOfPart } from '../tiles/volume-content';
+import type { ContentTextures } from './content-textures';
 import { networkShader } from './network-shader';
 
 // The same for all contents of a picture. Scene units; `ndc` runs from -1 to 1 across the picture.
@@ -102,7 +103,7 @@ void main() {
   if (opacity <= 0.0) discard;
   vec3 specular = deferred(sum.diffuse, sum.features, d);
   colourAndOpacity = vec4(sum.diffuse + opacity * specular, opacity);
-  distanceAndOpacity = vec4(sum.depth, 0.0, 0.0, opacity);
+  distanceAndOpacity = vec4(min(sum.depth, 60000.0), 0.0, 0.0, opacity);  // half floats end at 65504
 }`;
 
 export interface MaterialOptions {

@@ -73,7 +73,7 @@ const far = madeView([0, 0, 400], 0, -1.5);
 describe('a tile streamer', () => {
   it('draws the coarsest first, and the finer ones once all of them are there', async () => {
     const made = make(madeTree(2), 1000);
-    expect(made.streamer.update(near)).toEqual([]);
+    expect(made.streamer.update(near)).toEqual([{ tile: 0, visible: false }]);
     const cut = await settle(made, near);
     expect(made.streamer.complete).toBe(true);
     expect(made.streamer.idle).toBe(true);
@@ -173,6 +173,32 @@ describe('a tile streamer', () => {
     made.clock.now += 5000;
     await settle(made, far, 10);
     expect(made.streamer.complete).toBe(true);
+  });
+
+  it('draws the rest where one of the coarsest cannot be had, and that too when it can', async () => {
+    const made = make(madeTree(2), 1e6, {}, [0, kSurround]);
+    made.source.broken.add(kSurround);
+    const cut = await settle(made, near);
+    expect(cut.filter(({ visible }) => visible).every(({ tile }) => tile > 0)).toBe(true);
+    expect(made.streamer.residentOf(0)).toBeDefined();
+    expect(made.streamer.complete).toBe(true);
+    expect(made.streamer.idle).toBe(true);
+    made.source.broken.clear();
+    made.clock.now += 60000;
+    expect(made.streamer.idle).toBe(false);
+    await settle(made, near);
+    expect(made.streamer.residentOf(kSurround)).toBeDefined();
+    expect(made.streamer.errorOf(kSurround)).toBeUndefined();
+  });
+
+  it('gives way at once when the budget becomes smaller', async () => {
+    const made = make(madeTree(2), 1000);
+    await settle(made, near);
+    const before = made.source.onCard;
+    made.streamer.settings = { ...made.streamer.settings, cardBytes: before - 50 };
+    made.streamer.update(near);
+    expect(made.source.onCard).toBeLessThanOrEqual(before - 50);
+    expect(made.streamer.residentOf(0)).toBeDefined();
   });
 
   it('goes on without a tile that cannot be had', async () => {

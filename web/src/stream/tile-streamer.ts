@@ -72,6 +72,8 @@ export class TileStreamer<Fetched, Decoded, Resident> {
   private readonly uploads: number[] = [];
   private frame = 0;
   private disposed = false;
+  private toldOfBudget = false;
+  private nextRetry = Infinity;
   readonly statistics: StreamStatistics = {
     cardBytes: 0, mostCardBytes: 0, pageBytes: 0, fetchedBytes: 0, resident: 0, pending: 0, loads: 0, evictions: 0,
     refusals: 0, failures: 0,
@@ -100,13 +102,14 @@ export class TileStreamer<Fetched, Decoded, Resident> {
   }
 
   // All that is always there, is there.
+  // Or cannot be had.
   get complete(): boolean {
-    return this.pinned.every((tile) => this.residentOf(tile) !== undefined);
+    return this.pinned.every((tile) => this.residentOf(tile) !== undefined || this.errorOf(tile) !== undefined);
   }
 
-  // Nothing is on its way, and nothing would be if the view stayed as it is.
+  // Nothing is on its way, and nothing would be now if the view stayed as it is.
   get idle(): boolean {
-    return this.statistics.pending === 0;
+    return this.statistics.pending === 0 && this.now() < this.nextRetry;
   }
 
   // Once a frame: what to draw, front to back, and another step of what is on its way; `uploadFor` ms at most are spent
@@ -114,21 +117,19 @@ export class TileStreamer<Fetched, Decoded, Resident> {
   update(view: TileView, uploadFor = 4): SelectedTile[] {
     ++this.frame;
     this.uploadSlices(uploadFor);
+    this.keepToBudget();
     const now = this.now();
-    const loaded = (tile: number) => this.residentOf(tile) !== undefined;
-    if (!this.pinned.every((tile) => loaded(tile) || tile === kSurround)) {
-      this.load([{ tiles: this.pinned, beside: [], priority: 0, distance: 0 }], new Set(), now);
-      // Of the coarsest, those that are there are better than nothing.
-      return this.pinned.filter((tile) => tile !== kSurround && loaded(tile)).map((tile) => ({ tile, visible: true }));
-    }
-    const { cut, requests } = this.selector.select(view, loaded);
-    const kept = new Set(cut.filter(({ visible }) => visible).map(({ tile }) => tile));
+    const isThere = (tile: number) => this.residentOf(tile) !== undefined;
+    // The coarsest count as loaded, though some may be missing: of the others the picture is right all the same.
+    const { cut, requests } = this.selector.select(view, (tile) => isThere(tile) || this.entry(tile).pinned);
+    const drawn = cut.map(({ tile, visible }) => ({ tile, visible: visible && isThere(tile) }));
+    const kept = new Set(drawn.filter(({ visible }) => visible).map(({ tile }) => tile));
     for (const tile of kept) this.entry(tile).lastUsed = this.frame;
-    if (this.pinned.includes(kSurround) && !loaded(kSurround)) {
-      requests.unshift({ tiles: [kSurround], beside: [], priority: 0, distance: 0 });
-    }
-    this.load(requests, kept, now);
-    return cut;
+    const first = this.pinned
+      .filter((tile) => !isThere(tile))
+      .map((tile): TileRequest => ({ tiles: [tile], beside: [], priority: 0, distance: 0 }));
+    this.load(this.complete ? [...first, ...requests] : first, kept, now);
+    return drawn;
   }
 
   // Lets go of everything, and of what is still on its way when it comes.
@@ -159,6 +160,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     }
     for (const [tile, entry] of this.entries) this.giveUpIfUnwanted(tile, entry, wanted, now);
     let fetches = this.count('fetching');
+    let mayPass = true; // the page's bytes: the most urgent request that can be had
     for (const request of requests) {
       const entries = request.tiles.map((tile) => this.entry(tile));
       if (entries.some((entry) => entry.state === 'absent' && now < entry.retryAt)) continue;
@@ -170,11 +172,12 @@ export class TileStreamer<Fetched, Decoded, Resident> {
       request.tiles.forEach((tile, i) => {
         const entry = entries[i];
         const isPatient = entry.pinned || now - entry.wantedSince >= settings.patience;
-        const hasRoom = this.statistics.pageBytes < settings.pageBytes || request === requests[0];
+        const hasRoom = this.statistics.pageBytes < settings.pageBytes || mayPass;
         if (entry.state !== 'absent' || !isPatient || !hasRoom || fetches >= settings.fetches) return;
         ++fetches;
         void this.fetch(tile, entry);
       });
+      mayPass = false;
       this.admit(request, entries, kept);
     }
     this.startDecodes(requests);
@@ -212,6 +215,19 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     return bytes <= this.settings.cardBytes;
   }
 
+  // The budget may have become smaller: pictures of a larger window take their share of the card.
+  private keepToBudget(): void {
+    if (this.statistics.cardBytes <= this.settings.cardBytes) return;
+    const oldest = [...this.entries]
+      .filter(([tile, entry]) => this.isEvictable(tile, entry, new Set()))
+      .sort(([, a], [, b]) => a.lastUsed - b.lastUsed);
+    for (const [tile, entry] of oldest) {
+      if (this.statistics.cardBytes <= this.settings.cardBytes) return;
+      this.drop(tile, entry);
+      ++this.statistics.evictions;
+    }
+  }
+
   private isEvictable(tile: number, entry: Entry<Fetched, Resident>, staying: Set<number>): boolean {
     return entry.state === 'resident' && !entry.pinned && !staying.has(tile);
   }
@@ -239,18 +255,20 @@ export class TileStreamer<Fetched, Decoded, Resident> {
 
   private refuse(entries: Entry<Fetched, Resident>[]): void {
     ++this.statistics.refusals;
-    if (entries.some((entry) => entry.pinned)) this.failPinned(entries);
+    if (entries.some((entry) => entry.pinned)) this.failPinned();
     for (const entry of entries) if (entry.state === 'fetched' && !entry.reserved) this.forget(entry);
   }
 
-  private failPinned(entries: Entry<Fetched, Resident>[]): void {
+  private failPinned(): void {
+    const entries = this.pinned.map((tile) => this.entry(tile));
     const needed = entries.reduce((sum, entry) => sum + entry.cardBytes, 0);
     const mebibytes = (bytes: number) => Math.ceil(bytes / 2 ** 20);
     const error = new SceneError(
       'scene', '', `its coarsest level takes ${mebibytes(needed)} MiB on the graphics card, the budget is ${mebibytes(this.settings.cardBytes)} MiB`,
       'raise the budget, or bake more levels of detail');
-    if (!entries[0].error) this.onError(error, this.pinned[0]);
-    for (const entry of entries) entry.error = error;
+    if (!this.toldOfBudget) this.onError(error, this.pinned[0]);
+    this.toldOfBudget = true;
+    for (const entry of entries) if (entry.state !== 'resident') entry.error = error;
   }
 
   private async fetch(tile: number, entry: Entry<Fetched, Resident>): Promise<void> {
@@ -280,6 +298,8 @@ export class TileStreamer<Fetched, Decoded, Resident> {
       for (const tile of tiles) {
         const entry = this.entry(tile);
         if (entry.state !== 'fetched' || !entry.reserved || decodes >= this.settings.decodes) continue;
+        const hasRoom = this.statistics.pageBytes + entry.cardBytes <= this.settings.pageBytes;
+        if (!hasRoom && (decodes > 0 || this.uploads.length > 0)) continue;
         ++decodes;
         void this.decode(tile, entry);
       }
@@ -291,7 +311,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     this.statistics.pageBytes += entry.cardBytes; // texels take as much in the page until they are on the card
     try {
       const decoded = await this.source.decode(tile, entry.file!);
-      if (this.disposed) return;
+      if (this.disposed) throw new Error('disposed');
       entry.resident = this.source.allocate(tile, decoded);
       entry.state = 'uploading';
       this.uploads.push(tile);
@@ -316,6 +336,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
         this.uploads.shift();
         entry.state = 'resident';
         entry.failures = 0;
+        entry.error = undefined;
         entry.lastUsed = this.frame;
         entry.wantedSince = NaN;
         this.statistics.pageBytes -= entry.cardBytes;
@@ -363,7 +384,9 @@ export class TileStreamer<Fetched, Decoded, Resident> {
 
   private countPending(wanted: Set<number>, now: number): void {
     let pending = 0;
+    this.nextRetry = Infinity;
     for (const [tile, { state, retryAt, reserved, wantedSince }] of this.entries) {
+      if (state === 'absent' && wanted.has(tile) && retryAt > now) this.nextRetry = Math.min(this.nextRetry, retryAt);
       const comes = state === 'fetching' || state === 'decoding' || state === 'uploading' || (state === 'fetched' && reserved);
       const waits = state === 'absent' && wanted.has(tile) && now >= retryAt && now - wantedSince < this.settings.patience;
       if (comes || waits) ++pending;

@@ -5,7 +5,7 @@ import { arrayOf, fieldOf, flagOf, numberOf, numbersOf, stringOf, wholeFrom, who
 import { decodeLossless } from './lossless-image';
 import { chebyshevDistances, sizeOfBits, takeBits, type OccupancyBits } from './occupancy';
 import type { TileContent, Vec3 } from './tileset';
-import { kDistanceCell, kMacroblock, type Cubes, type DenseLayer, type TexelTextures, type VolumeContent, type VolumePart } from './volume-content';
+import { kDistanceCell, kMacroblock, vectorsOf, type Cubes, type DenseLayer, type TexelTextures, type VolumeContent, type VolumePart } from './volume-content';
 import { kPromisedLimits, layOut, type TextureLimits, type VolumeLayout } from './volume-layout';
 import { kTexelPictures, placeInAtlas, sizeOfMacroblocks, takeMacroblocks, takePlane } from './volume-pictures';
 import * as rules from './volume-rules';
@@ -62,7 +62,7 @@ class VolumeReader {
     if (glb.json.length > this.limits.jsonBytes) this.fail("its JSON is larger than any content's should be");
     let asset: Json;
     try {
-      asset = JSON.parse(glb.json);
+      asset = JSON.parse(new TextDecoder().decode(glb.json));
     } catch {
       this.fail('its JSON is none');
     }
@@ -82,6 +82,9 @@ class VolumeReader {
       rules.ruleOfRange(featureRange) ?? rules.ruleOfRange(densityRange) ?? rules.ruleOfNetwork(network) ??
       rules.ruleOfParts(parts) ?? (promised && rules.brokenPromise(parts, promised));
     if (broken) this.fail(broken);
+    if (16 * vectorsOf(parts.length, network) > this.limits.uniformBytes) {
+      this.fail('has more parts, or a larger network, than this graphics card takes', 'draw it on another machine');
+    }
     const layout = layOut(parts, this.limits);
     if (!layout) {
       this.fail('is more than this graphics card takes in one texture', 'draw a coarser level, or bake smaller blocks');

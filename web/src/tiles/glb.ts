@@ -1,8 +1,8 @@
 // The container of binary glTF 2.0, from outside: docs/tile-format.md, section 5.
 
 export interface Glb {
-  json: string;
-  bytes: Uint8Array; // of the binary chunk; a view of the file
+  json: Uint8Array; // both are views of the file
+  bytes: Uint8Array; // of the binary chunk
 }
 
 const kMagic = 0x46546c67; // "glTF"
@@ -17,7 +17,7 @@ export function decodeGlb(file: Uint8Array): Glb | undefined {
   const view = new DataView(file.buffer, file.byteOffset, file.byteLength);
   if (view.getUint32(0, true) !== kMagic || view.getUint32(4, true) !== 2) return undefined;
   if (view.getUint32(8, true) !== file.length) return undefined;
-  let json: string | undefined;
+  let json: Uint8Array | undefined;
   let bytes = new Uint8Array(0);
   let chunk = 0;
   for (let at = kHeader; at < file.length; ++chunk) {
@@ -30,7 +30,7 @@ export function decodeGlb(file: Uint8Array): Glb | undefined {
     at += length;
     if ((chunk === 0) !== (type === kJsonChunk)) return undefined;
     if (type === kBytesChunk && chunk !== 1) return undefined;
-    if (chunk === 0) json = new TextDecoder().decode(content);
+    if (chunk === 0) json = content;
     if (type === kBytesChunk) bytes = content;
   }
   return json === undefined ? undefined : { json, bytes };

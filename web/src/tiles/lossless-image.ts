@@ -2,14 +2,12 @@
 // drawn on a canvas and read back is altered by browsers that resist fingerprinting, and Node has no canvas.
 import createDecoder, { type WebPModule } from '@jsquash/webp/codec/dec/webp_dec.js';
 
-let decoder: Promise<WebPModule> | undefined;
 let module: WebPModule | undefined;
 
 // Must have been awaited once before decodeLossless. `wasm`: the compiled decoder (its file is found beside the module
 // where none is given, in browsers).
 export async function prepareDecoder(wasm?: WebAssembly.Module): Promise<void> {
-  decoder ??= makeDecoder(wasm);
-  module = await decoder;
+  module ??= await makeDecoder(wasm);
 }
 
 async function makeDecoder(wasm?: WebAssembly.Module): Promise<WebPModule> {
@@ -37,6 +35,7 @@ async function makeDecoder(wasm?: WebAssembly.Module): Promise<WebPModule> {
 const kRiff = 0x46464952; // "RIFF"
 const kWebP = 0x50424557; // "WEBP"
 const kExtended = 0x58385056; // "VP8X"
+const kLossy = 0x20385056; // "VP8 "
 const kLossless = 0x4c385056; // "VP8L"
 const kAlphaOrAnimation = 0x12;
 const kSignature = 0x2f;
@@ -50,6 +49,8 @@ export function losslessSize(file: Uint8Array): { width: number; height: number 
   for (let at = 12; at + 13 <= end;) {
     const type = view.getUint32(at, true);
     const length = view.getUint32(at + 4, true);
+    // Decoders take the first picture; only an extended header may stand before it, and what comes with that.
+    if (type === kLossy || (at === 12 && type !== kLossless && type !== kExtended)) return undefined;
     if (type === kLossless) {
       if (length < 5 || length > end - at - 8 || view.getUint8(at + 8) !== kSignature) return undefined;
       const bits = view.getUint32(at + 9, true); // 14 width - 1, 14 height - 1, alpha, 3 version

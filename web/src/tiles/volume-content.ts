@@ -56,6 +56,14 @@ export interface VolumeContent {
   distances: Cubes<Uint8Array>;
 }
 
+// Vectors of four numbers that shaders are given of a content: of each part, and of each four outputs of a layer
+// together their biases and a vector for each input.
+export const kVectorsOfPart = 6;
+
+export function vectorsOf(parts: number, network: Pick<DenseLayer, 'inputs' | 'outputs'>[]): number {
+  return network.reduce((sum, layer) => sum + Math.ceil(layer.outputs / 4) * (1 + layer.inputs), kVectorsOfPart * parts);
+}
+
 // What its textures take on the card.
 export function bytesOfTextures(content: VolumeContent): number {
   const { planes, voxels, macroblocks, distances } = content;

@@ -3,11 +3,13 @@ import type { Vec3 } from './tileset';
 import { kDistanceCell, kMacroblock, kStoredEdge, type VolumePart } from './volume-content';
 
 export interface TextureLimits {
+  edge2D: number; // texels along an edge of a layer; WebGL2 promises 2048
   edge3D: number; // texels along an edge of a texture of three dimensions; WebGL2 promises 256
   layers: number; // of an array; 256
+  uniformBytes: number; // of a block of uniforms; 16384
 }
 
-export const kPromisedLimits: TextureLimits = { edge3D: 256, layers: 256 };
+export const kPromisedLimits: TextureLimits = { edge2D: 2048, edge3D: 256, layers: 256, uniformBytes: 16384 };
 
 export interface VolumeLayout {
   planes: Vec3; // width, height, layers
@@ -25,7 +27,7 @@ export function layOut(parts: VolumePart[], limits: TextureLimits): VolumeLayout
   const atlas = atlasOf(stored, Math.floor(limits.edge3D / kStoredEdge));
   const macroblocks = stack(parts.map((part) => part.voxels / kMacroblock), limits.edge3D);
   const distances = stack(parts.map((part) => part.planes / kDistanceCell), limits.edge3D);
-  if (!atlas || !macroblocks || !distances || 3 * parts.length > limits.layers) return undefined;
+  if (!atlas || !macroblocks || !distances || 3 * parts.length > limits.layers || widest > limits.edge2D) return undefined;
   const planes: Vec3 = [widest, widest, 3 * parts.length];
   const voxels: Vec3 = [kStoredEdge * atlas[0], kStoredEdge * atlas[1], kStoredEdge * atlas[2]];
   const count = (size: Vec3) => size[0] * size[1] * size[2];
