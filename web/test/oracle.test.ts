@@ -2,13 +2,13 @@
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import type { Browser, Page } from 'playwright-core';
+import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Plain } from '../src/plain';
 import { decodeTileset } from '../src/tiles/decode-tileset';
-import type { Tileset } from '../src/tiles/tileset';
 import { goldenScene, launch, missing, run, serve, type Server } from './machine';
-import { kFieldOfView, kHeight, kWidth, viewAt, type Place } from './views';
+import { cameraPath, decodePng, psnr } from './pictures';
+import { viewAt, type Place } from './views';
 
 declare const plain: Plain;
 
@@ -20,44 +20,6 @@ const kLooks: [Place, Place][] = [
   [[-0.7, 0.1, 3], [-0.69, 0.12, 0]],
   [[6, 3, 0.5], [0, 0, 0]],
 ];
-
-// As a camera path of nerfstudio has it, in the world of the source of the photos; row after row.
-function cameraPath(tileset: Tileset, matrices: number[][]): string {
-  const s = tileset.sourceFromWorld;
-  const scale = Math.hypot(s[0], s[1], s[2]);
-  const camera_path = matrices.map((m) => {
-    const rows = [0, 1, 2].map((row) =>
-      [0, 1, 2, 3].map((column) => {
-        const sum = s[row] * m[4 * column] + s[4 + row] * m[4 * column + 1] + s[8 + row] * m[4 * column + 2];
-        return column < 3 ? sum / scale : sum + s[12 + row];
-      }),
-    );
-    return { camera_to_world: [...rows.flat(), 0, 0, 0, 1], fov: kFieldOfView, aspect: kWidth / kHeight };
-  });
-  return JSON.stringify({
-    camera_type: 'perspective', render_width: kWidth, render_height: kHeight, fps: matrices.length, seconds: 1, camera_path,
-  });
-}
-
-function psnr(a: Uint8Array, b: Uint8Array): number {
-  expect(a.length).toBe(b.length);
-  const squares = a.reduce((sum, value, i) => sum + (value - b[i]) ** 2, 0);
-  return 10 * Math.log10((255 ** 2 * a.length) / squares);
-}
-
-// Red, green and blue of a PNG, decoded by the browser.
-async function decodePng(page: Page, file: string): Promise<Uint8Array> {
-  const text = await page.evaluate(async (base64) => {
-    const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${base64}`)).blob());
-    const context = new OffscreenCanvas(image.width, image.height).getContext('2d')!;
-    context.drawImage(image, 0, 0);
-    const { data } = context.getImageData(0, 0, image.width, image.height);
-    let bytes = '';
-    for (let i = 0; i < data.length; ++i) if (i % 4 < 3) bytes += String.fromCharCode(data[i]);
-    return btoa(bytes);
-  }, readFileSync(file).toString('base64'));
-  return new Uint8Array(Buffer.from(text, 'base64'));
-}
 
 describe.skipIf(missing())('the browser', () => {
   let server: Server;

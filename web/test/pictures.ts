@@ -1,0 +1,43 @@
+// Pictures of the renderer on the processor, for comparison.
+import { readFileSync } from 'node:fs';
+import type { Page } from 'playwright-core';
+import type { Tileset } from '../src/tiles/tileset';
+import { kFieldOfView, kHeight, kWidth } from './views';
+
+// As a camera path of nerfstudio has it, in the world of the source of the photos; row after row.
+export function cameraPath(tileset: Tileset, matrices: number[][]): string {
+  const s = tileset.sourceFromWorld;
+  const scale = Math.hypot(s[0], s[1], s[2]);
+  const camera_path = matrices.map((m) => {
+    const rows = [0, 1, 2].map((row) =>
+      [0, 1, 2, 3].map((column) => {
+        const sum = s[row] * m[4 * column] + s[4 + row] * m[4 * column + 1] + s[8 + row] * m[4 * column + 2];
+        return column < 3 ? sum / scale : sum + s[12 + row];
+      }),
+    );
+    return { camera_to_world: [...rows.flat(), 0, 0, 0, 1], fov: kFieldOfView, aspect: kWidth / kHeight };
+  });
+  return JSON.stringify({
+    camera_type: 'perspective', render_width: kWidth, render_height: kHeight, fps: matrices.length, seconds: 1, camera_path,
+  });
+}
+
+export function psnr(a: Uint8Array, b: Uint8Array): number {
+  if (a.length !== b.length) throw new Error('pictures of different sizes');
+  const squares = a.reduce((sum, value, i) => sum + (value - b[i]) ** 2, 0);
+  return 10 * Math.log10((255 ** 2 * a.length) / squares);
+}
+
+// Red, green and blue of a PNG, decoded by the browser.
+export async function decodePng(page: Page, file: string): Promise<Uint8Array> {
+  const text = await page.evaluate(async (base64) => {
+    const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${base64}`)).blob());
+    const context = new OffscreenCanvas(image.width, image.height).getContext('2d')!;
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width, image.height);
+    let bytes = '';
+    for (let i = 0; i < data.length; ++i) if (i % 4 < 3) bytes += String.fromCharCode(data[i]);
+    return btoa(bytes);
+  }, readFileSync(file).toString('base64'));
+  return new Uint8Array(Buffer.from(text, 'base64'));
+}
