@@ -104,7 +104,7 @@ export class TesseraScene extends THREE.Object3D {
     return new THREE.Color().setRGB(...this.tileset.background, THREE.SRGBColorSpace);
   }
 
-  // The coarsest level and the surround are there.
+  // The coarsest level and the surround are there, or cannot be had.
   get complete(): boolean {
     return this.streamer?.complete ?? false;
   }

@@ -101,8 +101,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     return this.entries.get(tile)?.error;
   }
 
-  // All that is always there, is there.
-  // Or cannot be had.
+  // All that is to be there always is, or cannot be had.
   get complete(): boolean {
     return this.pinned.every((tile) => this.residentOf(tile) !== undefined || this.errorOf(tile) !== undefined);
   }

@@ -63,11 +63,3 @@ export const kVectorsOfPart = 6;
 export function vectorsOf(parts: number, network: Pick<DenseLayer, 'inputs' | 'outputs'>[]): number {
   return network.reduce((sum, layer) => sum + Math.ceil(layer.outputs / 4) * (1 + layer.inputs), kVectorsOfPart * parts);
 }
-
-// What its textures take on the card.
-export function bytesOfTextures(content: VolumeContent): number {
-  const { planes, voxels, macroblocks, distances } = content;
-  return (
-    2 * (planes.first.length + voxels.first.length) + macroblocks.texels.length + distances.texels.length
-  );
-}
