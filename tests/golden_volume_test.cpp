@@ -80,8 +80,8 @@ TEST(GoldenVolume, IsReadToTheExpectedSums) {
       ++contents;
     }
   }
-  EXPECT_EQ(contents, 4u);
-  EXPECT_EQ(expected.size(), 4u);
+  EXPECT_EQ(contents, 5u);
+  EXPECT_EQ(expected.size(), 5u);
 }
 
 TEST(GoldenVolume, HoldsWhatItWasMadeFrom) {
@@ -122,7 +122,8 @@ TEST(GoldenVolume, LooksAlongItsRaysAsTheDefinitionSays) {
     const auto& ray = rays[i];
     const auto vector = [&](const char* key) { return Vec3d(ray.at(key).at(0), ray.at(key).at(1), ray.at(key).at(2)); };
     const SceneRay along{vector("origin"), vector("direction")};
-    VolumeDrawing drawing{scene.frame, {}, &contents[scene.tree.surround], {}};
+    const int coarse = scene.tree.surround, fine = scene.tree.tiles[coarse].children.at(0);
+    VolumeDrawing drawing{scene.frame, {}, &contents[ray.at("level") == 1 ? coarse : fine], {}};
     drawing.march.minTransmittance = 0;
     if (ray.at("level") == 1) {
       drawing.frontToBack = {&contents[0]};

@@ -78,27 +78,33 @@ ordered_json describeScene(const fs::path& folder) {
   struct Sizes {
     uint64_t contents = 0, onDisk = 0, inMemory = 0;
   };
-  std::vector<Sizes> levels(tileset.levels);
-  Sizes surround;
+  std::vector<Sizes> levels(tileset.levels), surrounds(tileset.levels);
   for (size_t tile = 0; tile < tileset.tiles.size(); ++tile) {
     for (const TileContent& content : tileset.tiles[tile].contents) {
-      Sizes& sizes = content.surround ? surround : levels[tileset.tiles[tile].level];
+      Sizes& sizes = content.surround ? surrounds[content.level] : levels[tileset.tiles[tile].level];
       ++sizes.contents;
       sizes.onDisk += fs::file_size(contentPath(folder, content.uri));
-      sizes.inMemory += scene.source.bytes(content.surround ? scene.tree.surround : static_cast<int>(tile));
     }
+  }
+  for (size_t tile = 0; tile < scene.tree.tiles.size(); ++tile) {
+    const TileNode& node = scene.tree.tiles[tile];
+    Sizes& sizes = (node.isSurround ? surrounds : levels)[static_cast<size_t>(node.level)];
+    if (node.hasContent) sizes.inMemory += scene.source.bytes(static_cast<int>(tile));
   }
   ordered_json info = {
       {"kind", "scene"},
       {"representation", nameOf(tileset.representation)},
       {"name", tileset.name},
       {"blocks", {{"columns", tileset.columns}, {"rows", tileset.rows}, {"edge", tileset.blockGrid().edge}}}};
-  for (size_t level = 0; level < levels.size(); ++level) {
-    const Sizes& sizes = levels[level];
-    if (sizes.contents == 0) continue;  // a root that holds the others together
-    info[fmt::format("level_{}", level)] = sizeOf(sizes.contents, sizes.onDisk, sizes.inMemory);
-  }
-  if (surround.contents > 0) info["surround"] = sizeOf(surround.contents, surround.onDisk, surround.inMemory);
+  const auto describe = [&](const char* what, const std::vector<Sizes>& all) {
+    for (size_t level = 0; level < all.size(); ++level) {
+      const Sizes& sizes = all[level];
+      if (sizes.contents == 0) continue;  // a root that holds the others together
+      info[fmt::format("{}_{}", what, level)] = sizeOf(sizes.contents, sizes.onDisk, sizes.inMemory);
+    }
+  };
+  describe("level", levels);
+  describe("surround", surrounds);
   return info;
 }
 

@@ -46,7 +46,7 @@ struct Place {
     makeVolume(around, smoothVolume(1000, 0.2));
     contents.push_back(contentOf({around}, randomNetwork(1000)));
     tree.surround = static_cast<int>(tree.tiles.size());
-    tree.tiles.push_back({});
+    tree.tiles.emplace_back().isSurround = true;
     allBytes += bytesInMemory(contents.back());
     coarsestBytes += bytesInMemory(contents.back());
   }

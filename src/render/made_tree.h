@@ -77,7 +77,7 @@ inline TileTree flatTileTree(const std::vector<VolumeContent>& contents, bool wi
   }
   if (withSurround) {
     tree.surround = static_cast<int>(tree.tiles.size());
-    tree.tiles.emplace_back();
+    tree.tiles.emplace_back().isSurround = true;
   }
   return tree;
 }

@@ -117,7 +117,7 @@ TEST(TileCache, LoadsAllOfARequestOrNothing) {
 TEST(TileCache, SaysHowMuchTheCoarsestLevelAndTheSurroundNeed) {
   TileTree tree = madeTree(2, 2);
   tree.surround = static_cast<int>(tree.tiles.size());
-  tree.tiles.push_back({});
+  tree.tiles.emplace_back().isSurround = true;
   int loads = 0;
   const TileSource source = sourceOf([&](int) {
     ++loads;

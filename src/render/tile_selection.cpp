@@ -9,7 +9,7 @@
 namespace tessera {
 
 bool TileView::sees(const TileNode& tile) const {
-  if (!window) return true;
+  if (!window || tile.isSurround) return true;
   // Outside of one plane through the eye with all corners; corners exactly on it count as inside.
   bool outside[5] = {true, true, true, true, true};
   for (int corner = 0; corner < 8; ++corner) {
@@ -26,11 +26,21 @@ bool TileView::sees(const TileNode& tile) const {
 }
 
 double TileView::distance(const TileNode& tile) const {
+  if (tile.isSurround) {
+    return std::max(nearest, std::min((eye - tile.low).head<2>().minCoeff(), (tile.high - eye).head<2>().minCoeff()));
+  }
   return std::max(nearest, (eye - eye.cwiseMax(tile.low).cwiseMin(tile.high)).norm());
 }
 
 double TileView::errorInPixels(const TileNode& tile) const {
   return tile.geometricError * focal / distance(tile);
+}
+
+double TileView::areaInPixels(const TileNode& tile) const {
+  if (tile.isSurround) return pixels;
+  const double radius = 0.5 * (tile.high - tile.low).norm();
+  const double onScreen = radius * focal / std::max(radius, distance(tile));
+  return std::min(pixels, std::numbers::pi * onScreen * onScreen);
 }
 
 TileView tileView(const Camera& camera, const Pose& worldFromCamera, const VolumeFrame& frame) {
@@ -68,11 +78,9 @@ struct TileSelector::Pass {
   Selection selection;
 
   void request(std::vector<int> tiles, std::vector<int> beside, const TileNode& instead, double mostPixels) {
-    const double radius = 0.5 * (instead.high - instead.low).norm(), distance = view.distance(instead);
-    const double onScreen = radius * view.focal / std::max(radius, distance);
-    const double area = std::min(view.pixels, std::numbers::pi * onScreen * onScreen);
-    selection.requests.push_back({std::move(tiles), std::move(beside),
-                                  area * view.errorInPixels(instead) / std::max(mostPixels, 1e-3), distance});
+    const double error = view.errorInPixels(instead) / std::max(mostPixels, 1e-3);
+    selection.requests.push_back(
+        {std::move(tiles), std::move(beside), view.areaInPixels(instead) * error, view.distance(instead)});
   }
 };
 
@@ -135,6 +143,11 @@ Selection TileSelector::select(const TileView& view, const std::function<bool(in
   Pass pass{view, loaded, {}};
   std::vector<int> missing;
   CHECK(cover(pass, 0, missing) == true);
+  if (tree_.surround >= 0) {
+    CHECK(cover(pass, tree_.surround, missing) == true);
+    pass.selection.surround = pass.selection.cut.back().tile;
+    pass.selection.cut.pop_back();
+  }
   std::stable_sort(pass.selection.requests.begin(), pass.selection.requests.end(),
                    [](const TileRequest& a, const TileRequest& b) {
                      return a.priority != b.priority ? a.priority > b.priority : a.distance < b.distance;

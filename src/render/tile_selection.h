@@ -35,8 +35,11 @@ struct TileView {
   std::optional<Window> window;
 
   bool sees(const TileNode& tile) const;  // true for all that can be seen, and for little else
+  // Of the surround, to what is nearest of it beyond the sides of the scene's box: what lies above is sky, and the
+  // ground hides what lies below.
   double distance(const TileNode& tile) const;
   double errorInPixels(const TileNode& tile) const;
+  double areaInPixels(const TileNode& tile) const;  // that it may cover
 };
 
 TileView tileView(const Camera& camera, const Pose& worldFromCamera, const VolumeFrame& frame);
@@ -56,6 +59,7 @@ struct TileRequest {
 
 struct Selection {
   std::vector<SelectedTile> cut;      // front to back for every ray of the view
+  int surround = -1;                  // the one to draw behind them
   std::vector<TileRequest> requests;  // the most urgent first
 };
 
@@ -64,7 +68,7 @@ class TileSelector {
   // Keeps a reference to `tree`.
   TileSelector(const TileTree& tree, SelectionSettings settings);
 
-  // `loaded` says which contents are in memory; the coarsest always are.
+  // `loaded` says which contents are in memory; the coarsest, also of the surround, always are.
   Selection select(const TileView& view, const std::function<bool(int)>& loaded);
 
  private:

@@ -53,6 +53,55 @@ bool isPartition(const TileTree& tree, const std::vector<SelectedTile>& cut) {
 
 const auto kAll = [](int) { return true; };
 
+// A tree with a coarse and a fine surround. Returns their numbers.
+std::pair<int, int> addSurrounds(TileTree& tree) {
+  const int coarse = static_cast<int>(tree.tiles.size());
+  TileNode node;
+  node.isSurround = true;
+  node.low = Vec3d(-tree.columns, -tree.rows, -1);
+  node.high = Vec3d(tree.columns, tree.rows, 1);
+  node.level = 1;
+  node.geometricError = 4.0 * tree.columns / 256;
+  node.children = {coarse + 1};
+  tree.tiles.push_back(node);
+  node.level = 0;
+  node.parent = coarse;
+  node.children.clear();
+  node.geometricError /= 2;
+  tree.tiles.push_back(node);
+  tree.surround = coarse;
+  return {coarse, coarse + 1};
+}
+
+TEST(TileSelection, DrawsTheCoarseSurroundUntilTheFineOneIsThere) {
+  TileTree tree = madeTree(2, 2);
+  const auto [coarse, fine] = addSurrounds(tree);
+  TileSelector selector(tree, {});
+  // At the border of the box it fills the picture, and its texels are large.
+  const TileView view = tileView(smallCamera(), lookingAt(Vec3d(1.9, 0, 0), Vec3d(10, 0, 0)), {});
+  const Selection before = selector.select(view, [fine = fine](int tile) { return tile != fine; });
+  EXPECT_EQ(before.surround, coarse);
+  ASSERT_EQ(before.requests.size(), 1u);
+  EXPECT_EQ(before.requests[0].tiles, std::vector<int>{fine});
+  const Selection after = selector.select(view, kAll);
+  EXPECT_EQ(after.surround, fine);
+  EXPECT_TRUE(after.requests.empty());
+}
+
+TEST(TileSelection, AsksForNoFinerSurroundThanIsSeen) {
+  TileTree tree = madeTree(64, 64);
+  const auto [coarse, fine] = addSurrounds(tree);
+  for (const auto& [x, pixels, expected] : {std::tuple(0.0, 20.0, coarse), std::tuple(63.5, 20.0, fine),
+                                            std::tuple(0.0, 1.0, fine), std::tuple(500.0, 20.0, fine)}) {
+    TileSelector selector(tree, {pixels, 1.2, 0});
+    const TileView view = tileView(smallCamera(), lookingAt(Vec3d(x, 0, 0), Vec3d(1000, 0, 0)), {});
+    EXPECT_EQ(selector.select(view, kAll).surround, expected) << x << ", " << pixels << " pixels";
+  }
+  TileSelector limited(tree, {0, 1.2, 1});
+  const TileView view = tileView(smallCamera(), lookingAt(Vec3d(63, 0, 0), Vec3d(1000, 0, 0)), {});
+  EXPECT_EQ(limited.select(view, kAll).surround, coarse);
+}
+
 TEST(TileSelection, IsAPartitionOfTheRootForAllCamerasAndWhateverIsLoaded) {
   for (const auto& [columns, rows] : {std::pair(8, 8), std::pair(5, 3), std::pair(1, 1)}) {
     TileTree tree = madeTree(columns, rows);

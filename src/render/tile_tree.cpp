@@ -37,7 +37,7 @@ std::vector<int> TileTree::coarsest() const {
   std::vector<char> covered(tiles.size());  // by a content of the tile or above it
   for (size_t i = 0; i < tiles.size(); ++i) {
     const TileNode& node = tiles[i];
-    if (static_cast<int>(i) == surround) continue;
+    if (node.isSurround) continue;
     const bool above = node.parent >= 0 && covered[node.parent];
     if (node.hasContent && !above) found.push_back(static_cast<int>(i));
     covered[i] = above || node.hasContent;
@@ -48,6 +48,7 @@ std::vector<int> TileTree::coarsest() const {
 void TileTree::check() const {
   CHECK(tiles.empty() == false);
   CHECK(surround < static_cast<int>(tiles.size()));
+  CHECK((surround < 0 || tiles[surround].isSurround) == true);
   for (size_t i = 0; i < tiles.size(); ++i) {
     const TileNode& node = tiles[i];
     CHECK(node.parent < static_cast<int>(i));

@@ -23,18 +23,20 @@ struct TileNode {
   double geometricError = 0;                        // of its content: a texel of the planes
   int level = 0;                                    // 0 is the finest
   bool hasContent = true;                           // without: its children's stand for it; a leaf is empty
+  bool isSurround = false;                          // stands for what is outside of its box, the scene's
 };
 
 struct TileTree {
   // Cell (i, j) holds x in [2i - columns, 2i + 2 - columns], y likewise.
   int columns = 1, rows = 1;
   std::vector<TileNode> tiles;  // the root first, parents before their children
-  int surround = -1;            // one of `tiles` that stands outside the tree, if there is one
+  // One of `tiles` that stands outside the tree, if there is one: the coarsest. The next finer one is its only child.
+  int surround = -1;
 
   // In an order that is front to back for every ray from `eye`: by the number of cells between theirs and the eye's
   // (clamped), along both axes together, which grows along any ray.
   std::vector<int> childrenFrontToBack(int tile, const Vec3d& eye) const;
-  // The topmost contents: they cover all that the scene covers, and always stay in memory.
+  // The topmost contents, the surround apart: they cover all that the scene covers, and always stay in memory.
   std::vector<int> coarsest() const;
   // Aborts where the tree is not as said above.
   void check() const;

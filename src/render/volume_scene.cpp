@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <functional>
+#include <map>
+
 #include "base/error.h"
 #include "tiles/scene_folder.h"
 #include "tiles/volume_payload.h"
@@ -42,7 +45,7 @@ VolumeScene openVolumeScene(const fs::path& folder) {
   scene.tree.rows = static_cast<int>(tileset.rows);
   const double metres = tileset.tileFromScene().scale;  // of one scene unit
   std::vector<PromisedFile> files(tileset.tiles.size());
-  PromisedFile surround;
+  std::map<uint32_t, PromisedFile, std::greater<>> surrounds;  // by level, the coarsest first
   for (size_t i = 0; i < tileset.tiles.size(); ++i) {
     const Tile& tile = tileset.tiles[i];
     TileNode node;
@@ -61,17 +64,29 @@ VolumeScene openVolumeScene(const fs::path& folder) {
                     "give each a tile of its own");
       }
       node.hasContent |= !content.surround;
-      (content.surround ? surround : files[i]) = {contentPath(folder, content.uri), i, content};
+      (content.surround ? surrounds[content.level] : files[i]) = {contentPath(folder, content.uri), i, content};
     }
     scene.tree.tiles.push_back(std::move(node));
   }
   for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
     for (const int child : scene.tree.tiles[i].children) scene.tree.tiles[child].parent = static_cast<int>(i);
   }
-  if (!surround.path.empty()) {
-    scene.tree.surround = static_cast<int>(files.size());
-    scene.tree.tiles.emplace_back();
-    files.push_back(surround);
+  for (const auto& [level, file] : surrounds) {
+    TileNode node;
+    node.isSurround = true;
+    node.low = scene.frame.low;
+    node.high = scene.frame.high;
+    node.level = static_cast<int>(level);
+    node.geometricError = file.promised.geometricError / metres;
+    const int number = static_cast<int>(files.size());
+    if (scene.tree.surround < 0) {
+      scene.tree.surround = number;
+    } else {
+      node.parent = number - 1;
+      scene.tree.tiles.back().children = {number};
+    }
+    scene.tree.tiles.push_back(std::move(node));
+    files.push_back(file);
   }
   scene.source.bytes = [files](int tile) { return readDecodedBytes(files[tile].path); };
   scene.source.load = [files](int tile) {

@@ -10,7 +10,7 @@ namespace tessera {
 
 struct VolumeScene {
   VolumeFrame frame;
-  TileTree tree;      // tiles are numbered as those of tileset.json; the surround, if there is one, comes last
+  TileTree tree;      // tiles are numbered as those of tileset.json; surrounds come last, the finest at the end
   TileSource source;  // reads files when asked
   std::array<float, 3> background = {0, 0, 0};
 };

@@ -43,9 +43,16 @@ TEST(VolumeScene, KnowsWhatContentsTakeInMemoryBeforeTheyAreLoaded) {
     EXPECT_EQ(scene.source.bytes(tile), bytesInMemory(scene.source.load(tile)));
     ++contents;
   }
-  EXPECT_EQ(contents, 4);  // two blocks, one level above, the surround
+  EXPECT_EQ(contents, 5);  // two blocks, one level above, two surrounds
   ASSERT_GE(scene.tree.surround, 0);
-  EXPECT_TRUE(scene.source.load(scene.tree.surround).parts[0].surround);
+  const TileNode& coarse = scene.tree.tiles[scene.tree.surround];
+  ASSERT_EQ(coarse.children.size(), 1u);
+  const int fine = coarse.children[0];
+  EXPECT_EQ(coarse.level, 1);
+  EXPECT_EQ(scene.tree.tiles[fine].level, 0);
+  EXPECT_DOUBLE_EQ(coarse.geometricError, 2 * scene.tree.tiles[fine].geometricError);
+  EXPECT_TRUE(scene.source.load(fine).parts[0].surround);
+  EXPECT_EQ(scene.source.load(fine).parts[0].planes, 2 * scene.source.load(scene.tree.surround).parts[0].planes);
 }
 
 TEST(VolumeScene, IsDrawnFromDiskAsFromMemory) {
@@ -60,10 +67,10 @@ TEST(VolumeScene, IsDrawnFromDiskAsFromMemory) {
   std::vector<VolumeContent> finest;
   for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
     const TileNode& node = scene.tree.tiles[i];
-    if (node.parent >= 0 && node.children.empty()) finest.push_back(scene.source.load(static_cast<int>(i)));
+    if (!node.isSurround && node.children.empty()) finest.push_back(scene.source.load(static_cast<int>(i)));
   }
   ASSERT_EQ(finest.size(), 2u);
-  const VolumeContent surround = scene.source.load(scene.tree.surround);
+  const VolumeContent surround = scene.source.load(scene.tree.tiles[scene.tree.surround].children.at(0));
   VolumeDrawing drawing{scene.frame, {&finest[0], &finest[1]}, &surround, {}};  // the first is nearer
   ThreadPool pool(1);
   const RenderedView expected = drawVolume(drawing, camera(), pose, nullptr, pool);
@@ -79,7 +86,25 @@ TEST(VolumeScene, IsCoarserFromAfar) {
   VolumeRenderer renderer(scene.frame, scene.tree, scene.source, {});
   renderer.render(camera(), lookingAt(scene.frame, Vec3d(0, -300, 100), Vec3d::Zero()), nullptr);
   EXPECT_EQ(renderer.selection().cut.size(), 1u);
-  EXPECT_EQ(renderer.cacheStatistics().loads, 2u);  // the root and the surround
+  const int coarse = scene.tree.surround, fine = scene.tree.tiles[coarse].children.at(0);
+  EXPECT_TRUE(renderer.cache().holds(coarse));
+  EXPECT_EQ(renderer.selection().surround, fine);   // where the camera stands in it
+  EXPECT_EQ(renderer.cacheStatistics().loads, 3u);  // the root and the surrounds
+}
+
+TEST(VolumeScene, HasTheSurroundOfTheLevelThatIsAskedFor) {
+  const VolumeScene scene = openVolumeScene(kScene);
+  VolumeRendererSettings settings;
+  settings.selection.mostPixels = 0;
+  const int coarse = scene.tree.surround, fine = scene.tree.tiles[coarse].children.at(0);
+  for (const auto& [level, expected] : {std::pair(1, coarse), std::pair(0, fine)}) {
+    settings.selection.finestLevel = level;
+    VolumeRenderer renderer(scene.frame, scene.tree, scene.source, settings);
+    const Pose pose = lookingAt(scene.frame, Vec3d(-3, -3, 2), Vec3d(0, 0, -0.3));
+    const RenderedView view = renderer.render(camera(), pose, nullptr);
+    EXPECT_EQ(renderer.selection().surround, expected);
+    EXPECT_EQ(renderer.cache().holds(fine), level == 0);
+  }
 }
 
 // A copy of the scene whose tileset.json may lie.
@@ -97,7 +122,7 @@ class VolumeSceneThatLies : public testing::Test {
   void refuses(bool surround, size_t tile, const std::string& rule) {
     writeFileAtomically(folder_ / "tileset.json", encodeTileset(tileset_));
     const VolumeScene scene = openVolumeScene(folder_);
-    const int node = surround ? scene.tree.surround : static_cast<int>(tile);
+    const int node = surround ? scene.tree.tiles[scene.tree.surround].children.at(0) : static_cast<int>(tile);
     try {
       scene.source.load(node);
       FAIL() << rule;

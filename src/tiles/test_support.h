@@ -55,7 +55,7 @@ inline VolumeContent madeContent(uint64_t seed, uint32_t parts = 1) {
   return content;
 }
 
-// Columns × 2 cells, each a leaf; all of them below one root, with a surround.
+// Columns × 2 cells, each a leaf; all of them below one root, with two surrounds.
 inline Tileset madeTileset(uint32_t columns = 3, bool georeferenced = true) {
   Tileset tileset;
   tileset.name = "made";
@@ -82,10 +82,10 @@ inline Tileset madeTileset(uint32_t columns = 3, bool georeferenced = true) {
   root.cells = tileset.allCells();
   root.box = tileset.box();
   root.geometricError = 0.5;
-  root.contents.resize(2);
-  root.contents[0] = {"tiles/L1/all-00.glb", root.cells, root.box, false, {0}, 1234};
-  root.contents[1] = {"tiles/L1/surround-00.glb", root.cells, {}, true, {}, 0};
-  root.contents[1].box = {Vec3d::Constant(-1000), Vec3d::Constant(1000)};
+  const SceneBox far = {Vec3d::Constant(-1000), Vec3d::Constant(1000)};
+  root.contents.push_back({"tiles/L1/all-00.glb", root.cells, root.box, false, {0}, 1234});
+  root.contents.push_back({"tiles/L1/surround-00.glb", root.cells, far, true, {}, 0, 1, 3.5});
+  root.contents.push_back({"tiles/L0/surround-00.glb", root.cells, far, true, {}, 0, 0, 1.75});
   tileset.tiles.push_back(root);
   for (uint32_t j = 0; j < tileset.rows; ++j) {
     for (uint32_t i = 0; i < columns; ++i) {

@@ -61,11 +61,14 @@ struct TileContent {
   // they too have an order (contents of `mesh` need none, and may overlap).
   CellRange cells;
   SceneBox box;  // all of it lies inside; of the surround the far box, which holds the scene's
-  // What lies outside the scene's box: one at most, in the root; never replaced by children, never culled, always
-  // resident, drawn behind everything else.
+  // What lies outside the scene's box: in the root, one of a level at most. One of them is drawn, behind everything
+  // else; never culled.
   bool surround = false;
   std::vector<uint32_t> resources;  // of Tileset::resources, that it cannot be drawn without
   uint64_t bytes = 0;               // of the file, 0 when not known; a hint
+  // Of a surround, as a tile has them. Its texels are smallest at the scene's box; the error is theirs there.
+  uint32_t level = 0;
+  double geometricError = 0;
 };
 
 struct Tile {

@@ -41,6 +41,8 @@ Json contentOf(const Tileset& tileset, const Tile& tile, const TileContent& cont
   Json ours = Json::object();
   if (content.surround) {
     ours["surround"] = true;
+    ours["level"] = content.level;
+    ours["geometricError"] = content.geometricError;
   } else if (!(content.cells == tile.cells)) {
     ours["cells"] = cellsOf(content.cells);
   }

@@ -30,6 +30,8 @@ void expectSame(const Tileset& a, const Tileset& b) {
     for (size_t c = 0; c < one.contents.size(); ++c) {
       EXPECT_EQ(one.contents[c].uri, other.contents[c].uri);
       EXPECT_EQ(one.contents[c].surround, other.contents[c].surround);
+      EXPECT_EQ(one.contents[c].level, other.contents[c].level);
+      EXPECT_EQ(one.contents[c].geometricError, other.contents[c].geometricError);
       EXPECT_EQ(one.contents[c].resources, other.contents[c].resources);
       EXPECT_EQ(one.contents[c].bytes, other.contents[c].bytes);
       EXPECT_EQ(one.contents[c].cells, other.contents[c].cells);
@@ -59,7 +61,7 @@ TEST(TilesetJson, IsThreeDTilesThatOthersRead) {
   EXPECT_FALSE(file.contains("extensionsRequired"));
   EXPECT_EQ(file["root"]["transform"].size(), 16u);
   EXPECT_NEAR(file["root"]["transform"][12].get<double>(), 4035000, 10000);  // column-major: the origin at the end
-  EXPECT_EQ(file["root"]["contents"].size(), 2u);
+  EXPECT_EQ(file["root"]["contents"].size(), 3u);
   const json& child = file["root"]["children"][0];
   EXPECT_TRUE(child.contains("content"));
   EXPECT_FALSE(child.contains("transform"));

@@ -229,6 +229,7 @@ class TilesetReader {
     content.surround = flagOf(*ours, "surround").value_or(false);
     content.bytes = bytesOf(*ours);
     content.cells = tile.cells;
+    if (content.surround && !readSurround(*ours, content)) return fail(place + "a surround's level or error is none");
     if (fieldOf(*ours, "cells")) {
       const auto cells = cellsOf(*ours);
       if (!cells) return fail(place + "a content's cells are none");
@@ -243,6 +244,21 @@ class TilesetReader {
       }
     }
     tile.contents.push_back(std::move(content));
+    return true;
+  }
+
+  bool readSurround(const json& ours, TileContent& content) {
+    const json *level = fieldOf(ours, "level"), *error = fieldOf(ours, "geometricError");
+    if (level) {
+      const auto number = unsignedFrom(*level, UINT32_MAX);
+      if (!number) return false;
+      content.level = static_cast<uint32_t>(*number);
+    }
+    if (error) {
+      const auto metres = numberOf(ours, "geometricError");
+      if (!metres) return false;
+      content.geometricError = *metres;
+    }
     return true;
   }
 

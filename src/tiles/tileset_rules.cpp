@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "tiles/tileset.h"
@@ -40,6 +41,10 @@ bool isSimilarity(const Mat4d& matrix) {
 bool isBox(const SceneBox& box) {
   return (box.low.array() >= -kFarthestInScene).all() && (box.high.array() <= kFarthestInScene).all() &&
          (box.low.array() < box.high.array()).all();
+}
+
+bool isError(double metres) {
+  return metres >= 0 && metres <= kFarthest;
 }
 
 bool isRange(const CellRange& range) {
@@ -97,9 +102,26 @@ Broken ruleOfResources(const Tileset& tileset) {
   return std::nullopt;
 }
 
+// The surrounds of the root: finer ones have smaller texels.
+Broken ruleOfSurrounds(const Tileset& tileset) {
+  std::map<uint32_t, double> errors;
+  for (const TileContent& content : tileset.root().contents) {
+    if (!content.surround) continue;
+    if (!content.box.contains(tileset.box())) return "the surround's box does not hold the scene's";
+    if (content.level >= tileset.levels) return "a surround's level is not below the scene's number of levels";
+    if (!isError(content.geometricError)) return "a surround's geometric error is no length";
+    if (!errors.emplace(content.level, content.geometricError).second) return "two surrounds are of one level";
+  }
+  double finer = 0;
+  for (const auto& [level, error] : errors) {
+    if (error < finer) return "a surround's geometric error is below a finer one's";
+    finer = error;
+  }
+  return std::nullopt;
+}
+
 Broken ruleOfContents(const Tileset& tileset, const Tile& tile, bool isRoot) {
   std::vector<CellRange> ranges;
-  size_t surrounds = 0;
   for (const TileContent& content : tile.contents) {
     if (!isPlainUri(content.uri) || !content.uri.ends_with(".glb"))
       return "a content's uri is not a plain one of a .glb";
@@ -110,8 +132,7 @@ Broken ruleOfContents(const Tileset& tileset, const Tile& tile, bool isRoot) {
       if (!resources.insert(resource).second) return "a content needs a shared resource twice";
     }
     if (content.surround) {
-      if (!isRoot || ++surrounds > 1) return "a surround is not the only one, in the root";
-      if (!content.box.contains(tileset.box())) return "the surround's box does not hold the scene's";
+      if (!isRoot) return "a surround is not in the root";
       continue;
     }
     if (!tile.box.contains(content.box)) return "a content's box leaves its tile's";
@@ -119,7 +140,7 @@ Broken ruleOfContents(const Tileset& tileset, const Tile& tile, bool isRoot) {
     ranges.push_back(content.cells);
   }
   if (tileset.representation != Representation::mesh && !lieOnGrid(ranges)) return "contents of a tile have no order";
-  return std::nullopt;
+  return isRoot ? ruleOfSurrounds(tileset) : std::nullopt;
 }
 
 // Inner walls hold; at the border of the grid a tile may own what lies outside.
@@ -139,7 +160,7 @@ Broken ruleOfTile(const Tileset& tileset, const Tile& tile) {
   if (!isRange(tile.cells) || !tileset.allCells().contains(tile.cells)) return "its cells are not of the grid";
   if (!isBox(tile.box)) return "its box is none";
   if (!keepsToCells(tileset, tile)) return "its box leaves its cells";
-  if (!(tile.geometricError >= 0 && tile.geometricError <= kFarthest)) return "its geometric error is no length";
+  if (!isError(tile.geometricError)) return "its geometric error is no length";
   return ruleOfContents(tileset, tile, &tile == &tileset.root());
 }
 

@@ -104,7 +104,7 @@ TEST(Tileset, ChildrenAreFrontToBackForEveryRay) {
 TEST(Tileset, TheCoarsestCoverLiesBelowARootThatCannotStandForIt) {
   Tileset tileset = madeTileset(2);
   EXPECT_EQ(coarsestCover(tileset), std::vector<uint32_t>{0});
-  tileset.tiles[0].contents.erase(tileset.tiles[0].contents.begin());  // the surround is left
+  tileset.tiles[0].contents.erase(tileset.tiles[0].contents.begin());  // the surrounds are left
   EXPECT_EQ(brokenRule(tileset), std::nullopt);
   EXPECT_EQ(coarsestCover(tileset), (std::vector<uint32_t>{1, 2, 3, 4}));
 }
@@ -112,7 +112,7 @@ TEST(Tileset, TheCoarsestCoverLiesBelowARootThatCannotStandForIt) {
 TEST(Tileset, ItsCoarsestLevelIsOneThatHasContentsOfItsOwn) {
   Tileset tileset = madeTileset(2);
   EXPECT_EQ(coarsestLevel(tileset), 1u);
-  tileset.tiles[0].contents.erase(tileset.tiles[0].contents.begin());  // the surround is left
+  tileset.tiles[0].contents.erase(tileset.tiles[0].contents.begin());  // the surrounds are left
   EXPECT_EQ(coarsestLevel(tileset), 0u);
   EXPECT_EQ(tileset.levels, 2u);
 }
@@ -123,7 +123,7 @@ TEST(Tileset, AllowsChainsAndSeveralContents) {
   Tile top = tileset.tiles[0];  // over the same cells
   top.level = 2;
   top.children = {1};
-  tileset.tiles[0].contents.pop_back();
+  tileset.tiles[0].contents.resize(1);
   for (uint32_t& child : tileset.tiles[0].children) ++child;
   tileset.tiles.insert(tileset.tiles.begin(), top);
   EXPECT_EQ(brokenRule(tileset), std::nullopt);
@@ -193,8 +193,15 @@ TEST(Tileset, NamesTheRuleThatIsBroken) {
   names("tile 0: a content needs a shared resource twice", [](Tileset& t) {
     t.tiles[0].contents[0].resources = {0, 0};
   });
-  names("tile 1: a surround is not the only one, in the root",
-        [](Tileset& t) { t.tiles[1].contents[0].surround = true; });
+  names("tile 1: a surround is not in the root", [](Tileset& t) { t.tiles[1].contents[0].surround = true; });
+  names("tile 0: two surrounds are of one level",
+        [](Tileset& t) { t.tiles[0].contents[2].level = t.tiles[0].contents[1].level; });
+  names("tile 0: a surround's level is not below the scene's number of levels",
+        [](Tileset& t) { t.tiles[0].contents[1].level = 2; });
+  names("tile 0: a surround's geometric error is no length",
+        [](Tileset& t) { t.tiles[0].contents[1].geometricError = NAN; });
+  names("tile 0: a surround's geometric error is below a finer one's",
+        [](Tileset& t) { t.tiles[0].contents[1].geometricError = 1; });
   names("tile 0: the surround's box does not hold the scene's",
         [](Tileset& t) { t.tiles[0].contents[1].box.high.z() = 0; });
 }

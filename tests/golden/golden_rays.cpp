@@ -78,7 +78,7 @@ void look(const Scene& scene, ExpectedRay& ray) {
     std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) { return a.range.near < b.range.near; });
     blend(content, pieces, ray, transmittance);
   }
-  const VolumeContent& surround = scene.contents.at("surround");
+  const VolumeContent& surround = scene.contents.at(ray.level == 1 ? "coarse_surround" : "surround");
   blend(surround, {{surround.parts.data(), {box.empty() ? scene.tileset.near : box.far, kSceneEnd}}}, ray,
         transmittance);
   ray.opacity = 1 - transmittance;

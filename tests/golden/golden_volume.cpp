@@ -199,10 +199,10 @@ VolumePart blockPart(uint32_t column, uint32_t voxels, uint32_t planes) {
   return part;
 }
 
-VolumePart surroundPart() {
+VolumePart surroundPart(uint32_t voxels, uint32_t planes) {
   VolumePart part;
-  part.voxels = 32;
-  part.planes = 64;
+  part.voxels = voxels;
+  part.planes = planes;
   part.scale = {kColumns, kRows, 1};
   part.contracted = part.surround = true;
   part.low = {-1e4f, -1e4f, -1e4f};
@@ -250,13 +250,19 @@ Scene makeScene() {
   surround.cells = tileset.allCells();
   surround.surround = true;
   surround.box = {Vec3d::Constant(-1e4), Vec3d::Constant(1e4)};
+  surround.geometricError = 2 * kColumns * texel;  // where its texels are smallest, as its domain is twice its cube
+  tileset.tiles[0].contents.push_back(surround);
+  surround.level = 1;
+  surround.geometricError *= 2;
   tileset.tiles[0].contents.push_back(surround);
 
   scene.contents["0_0"] = contentOf(1, {blockPart(0, 32, 64)});
   scene.contents["1_0"] = contentOf(2, {blockPart(1, 32, 64)});
   scene.contents["all"] = contentOf(3, {blockPart(0, 16, 32), blockPart(1, 16, 32)});
   scene.contents["all"].stepsPerTexel = 2;
-  scene.contents["surround"] = contentOf(4, {surroundPart()});
+  scene.contents["surround"] = contentOf(4, {surroundPart(32, 64)});
+  scene.contents["coarse_surround"] = contentOf(5, {surroundPart(16, 32)});
+  scene.contents["coarse_surround"].stepsPerTexel = 2;
   return scene;
 }
 

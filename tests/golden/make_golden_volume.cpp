@@ -57,7 +57,8 @@ int main(int count, char** arguments) {
       }
     };
     write(tileset.tiles[0].contents[0], 1, "all");
-    write(tileset.tiles[0].contents[1], 1, "surround");
+    write(tileset.tiles[0].contents[1], 0, "surround");
+    write(tileset.tiles[0].contents[2], 1, "coarse_surround");
     write(tileset.tiles[1].contents[0], 0, "0_0");
     write(tileset.tiles[2].contents[0], 0, "1_0");
     writer.commit(tileset);

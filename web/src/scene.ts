@@ -18,7 +18,7 @@ import { SceneError } from './scene-error';
 import { TileSelector, kSelectionSettings, type SelectionSettings } from './stream/tile-selector';
 import { coarsestTiles, tileTree, type TileTree } from './stream/tile-tree';
 import { TileView, type Plane } from './stream/tile-view';
-import { kStreamSettings, kSurround, TileStreamer, type StreamSettings, type StreamStatistics } from './stream/tile-streamer';
+import { kStreamSettings, TileStreamer, type StreamSettings, type StreamStatistics } from './stream/tile-streamer';
 import { decodeTileset } from './tiles/decode-tileset';
 import type { Tileset, Vec3 } from './tiles/tileset';
 import type { VolumeContent } from './tiles/volume-content';
@@ -129,13 +129,13 @@ export class TesseraScene extends THREE.Object3D {
     const depth = this.opaque.draw(renderer, camera, this, size);
     compositor.resize(size);
     streamer.settings = { ...this.stream, cardBytes: this.stream.cardBytes - compositor.bytes - this.opaque.bytes };
-    const cut = streamer.update(tileView(this.tileset, camera, worldFromScene, size), this.uploadTime());
+    const { cut, surround } = streamer.update(tileView(this.tileset, camera, worldFromScene, size), this.uploadTime());
     const frontToBack = cut
       .filter(({ visible }) => visible)
       .map(({ tile }) => streamer.residentOf(tile))
       .filter((content) => content !== undefined);
-    const surround = streamer.residentOf(kSurround);
-    if (surround) frontToBack.push(surround);
+    const behind = streamer.residentOf(surround);
+    if (behind) frontToBack.push(behind);
     this.drawn = new Array<number>(this.tileset.levels).fill(0);
     for (const { tile, visible } of cut) if (visible) ++this.drawn[this.tree.tiles[tile].level];
     compositor.view.minTransmittance.value = this.minTransmittance;
@@ -184,7 +184,7 @@ export class TesseraScene extends THREE.Object3D {
     if (!this.compositor || !this.streamer || !this.mesh) {
       this.compositor = new Compositor(renderer, this.tileset);
       const source = new VolumeSource(this.tree, this.url, this.pool, this.compositor, renderer);
-      const pinned = [...coarsestTiles(this.tree), ...(this.tree.surround ? [kSurround] : [])];
+      const pinned = [...coarsestTiles(this.tree), ...(this.tree.surround >= 0 ? [this.tree.surround] : [])];
       this.streamer = new TileStreamer(new TileSelector(this.tree, this.selection), source, pinned, this.stream);
       this.streamer.onError = (error) => this.onError(error);
       this.mesh = cityMesh(this.compositor);

@@ -4,7 +4,7 @@ import type { DecodePool } from './decode-pool';
 import type { Compositor, DrawnContent } from './draw/compositor';
 import { ContentTextures } from './draw/content-textures';
 import { SceneError } from './scene-error';
-import { kSurround, type TileSource } from './stream/tile-streamer';
+import type { TileSource } from './stream/tile-streamer';
 import type { TileTree } from './stream/tile-tree';
 import { kVolumeLimits, readVolumeHeader, type VolumeLimits } from './tiles/decode-volume';
 import type { TileContent } from './tiles/tileset';
@@ -58,7 +58,7 @@ export class VolumeSource implements TileSource<ContentFile, VolumeContent, Draw
   }
 
   private contentOf(tile: number): TileContent {
-    return tile === kSurround ? this.tree.surround! : this.tree.tiles[tile].content!;
+    return this.tree.tiles[tile].content!;
   }
 }
 

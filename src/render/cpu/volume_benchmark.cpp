@@ -135,7 +135,7 @@ CacheBenchmark benchmarkCache(const VolumeScene& scene, const CacheBenchmarkOpti
     if (!scene.tree.tiles[i].hasContent) continue;
     const uint64_t bytes = scene.source.bytes(tile);
     result.allBytes += bytes;
-    if (tile != scene.tree.surround && scene.tree.tiles[i].level == 0) result.finestBytes += bytes;
+    if (!scene.tree.tiles[i].isSurround && scene.tree.tiles[i].level == 0) result.finestBytes += bytes;
   }
   VolumeRendererSettings settings = settingsFor(scene, options.threads);
   settings.selection.mostPixels = options.mostPixels * options.width / kFullWidth;

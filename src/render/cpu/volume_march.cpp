@@ -127,7 +127,7 @@ struct Marcher {
   // Where the ray leaves the cube of cells nearer than `distance` to `cell`.
   HWY_ATTR HWY_INLINE float exitOfCube(const VolumeSegment& s, const float inverse[3], const int32_t cell[3],
                                        uint32_t distance) const {
-    float exit = s.length;
+    float exit = static_cast<float>(s.length);
     for (int a = 0; a < 3; ++a) {
       const int32_t reach = static_cast<int32_t>(distance), edge = VolumePart::kDistanceCell;
       const float end = inverse[a] > 0 ? static_cast<float>((cell[a] + reach) * edge) - margin
@@ -207,8 +207,9 @@ HWY_ATTR void marchVolume(const VolumeMarch& march, ContentComposite& composite,
     const uint32_t count = static_cast<uint32_t>(std::ceil(s.length * perTexel));
     for (uint32_t i = 0; i < count;) {
       ++steps;
-      const float from = static_cast<float>(i) * stepLength, to = std::min(from + stepLength, s.length);
-      const float tau = 0.5f * (from + to);
+      const float from = static_cast<float>(i) * stepLength;
+      const double to = std::min(static_cast<double>(from + stepLength), s.length);
+      const float tau = 0.5f * (from + static_cast<float>(to));
       const float x[3] = {s.start[0] + tau * s.direction[0], s.start[1] + tau * s.direction[1],
                           s.start[2] + tau * s.direction[2]};
       int32_t cell[3];

@@ -61,7 +61,7 @@ VolumeSegment segment(const VolumePart& part, const LocalRay& ray, const Region&
     result.start[a] = static_cast<float>((y[a] + half) * texels);
     result.direction[a] = static_cast<float>(v[a] / speed);
   }
-  result.length = static_cast<float>(texels * speed * (range.far - range.near) / (entryM * exitM));
+  result.length = texels * speed * (range.far - range.near) / (entryM * exitM);
   result.entry = range.near;
   result.square = entryM * entryM;
   result.rate = speed * texels;

@@ -14,7 +14,7 @@ namespace tessera {
 // [0, planes]³. Within a region the contraction is a projective map, and so is the distance as a function of τ.
 struct VolumeSegment {
   std::array<float, 3> start, direction;  // the direction has length 1
-  float length = 0;                       // texels
+  double length = 0;                      // texels; floats would misplace an end that is very far away
   // The distance along the ray, scene units: entry + square τ / (rate - growth τ).
   double entry = 0, square = 1, rate = 1, growth = 0;
 

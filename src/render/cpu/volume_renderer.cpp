@@ -22,7 +22,7 @@ std::string VolumeRenderer::device() const {
 void VolumeRenderer::loadFor(const TileView& view) {
   for (bool changed = true; changed;) {
     selection_ = selector_.select(view, [this](int tile) { return cache_.holds(tile); });
-    std::vector<int> kept;
+    std::vector<int> kept = {selection_.surround};
     for (const SelectedTile& selected : selection_.cut) {
       if (selected.visible) kept.push_back(selected.tile);
     }
@@ -48,7 +48,7 @@ RenderedView VolumeRenderer::render(const Camera& camera, const Pose& worldFromC
   for (const SelectedTile& selected : selection_.cut) {
     if (selected.visible) drawing.frontToBack.push_back(cache_.find(selected.tile));
   }
-  if (tree_.surround >= 0) drawing.surround = cache_.find(tree_.surround);
+  if (selection_.surround >= 0) drawing.surround = cache_.find(selection_.surround);
   return drawVolume(drawing, camera, worldFromCamera, opaqueDepth, pool_, &counts_);
 }
 

@@ -57,7 +57,6 @@ LevelContents bakeLevel(const LevelToBake& of) {
   made.texel = 2.0 / model.virtualGrid().planes;
   for (uint32_t group = 0; group < model.groups().groups(); ++group) {
     const bool surround = group >= cells.size();
-    if (surround && level > 0) continue;  // the finest one is always there
     const VolumeContent content = bakeGroup(model, group, alive);
     const std::string name =
         surround ? "surround" : fmt::format("block_{}_{}", cells[group].first[0], cells[group].first[1]);
@@ -72,6 +71,10 @@ LevelContents bakeLevel(const LevelToBake& of) {
     made.sizes.bytesInMemory += bytesInMemory(content);
     for (const VolumePart& part : content.parts) made.sizes.macroblocks += part.storedMacroblocks();
     if (surround) {
+      const std::array<float, 3>& scale = content.parts[0].scale;
+      entry.level = level;
+      entry.geometricError = *std::max_element(scale.begin(), scale.end()) * 4.0 / model.virtualGrid().planes *
+                             tileset.tileFromScene().scale;
       made.surround = entry;
     } else {
       made.contents.push_back(entry);
@@ -147,7 +150,9 @@ BakedVolume bakeVolume(const LevelModels& models, uint32_t levels, const Capture
       tileset.tiles[0].children.push_back(child);
     }
   }
-  if (made[0].surround) tileset.tiles[0].contents.push_back(*made[0].surround);
+  for (const LevelContents& level : made) {
+    if (level.surround) tileset.tiles[0].contents.push_back(*level.surround);
+  }
   tileset.geometricError = tileset.tileFromScene().scale * std::max(tileset.columns, tileset.rows);
   folder.commit(tileset);
   return baked;

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { madeTree, madeView, randomNumbers } from '../testing/made-tree';
+import { addSurrounds, madeTree, madeView, randomNumbers } from '../testing/made-tree';
 import { TileSelector, type SelectedTile } from './tile-selector';
 import { childrenFrontToBack, coarsestTiles, type TileTree } from './tile-tree';
 
@@ -102,6 +102,35 @@ describe('a selection', () => {
         before = near;
       }
     }
+  });
+});
+
+describe('the surround', () => {
+  const atTheWall = madeView([1.9, 0, 0], 0, 0);
+
+  it('is the coarse one until the fine one is there', () => {
+    const tree = madeTree(2);
+    const { coarse, fine } = addSurrounds(tree);
+    const selector = new TileSelector(tree);
+    const before = selector.select(atTheWall, (tile) => tile !== fine);
+    expect(before.surround).toBe(coarse);
+    expect(before.requests.map(({ tiles }) => tiles)).toEqual([[fine]]);
+    const after = selector.select(atTheWall, () => true);
+    expect(after.surround).toBe(fine);
+    expect(after.requests).toEqual([]);
+  });
+
+  it('is no finer than is seen', () => {
+    const tree = madeTree(64);
+    const { coarse, fine } = addSurrounds(tree);
+    const chosen = (x: number, mostPixels: number, finestLevel = 0) =>
+      new TileSelector(tree, { mostPixels, hysteresis: 1.2, finestLevel }).select(madeView([x, 0, 0], 0, 0), () => true).surround;
+    expect([chosen(0, 20), chosen(63.5, 20), chosen(0, 1), chosen(500, 20), chosen(63, 0, 1)]).toEqual(
+      [coarse, fine, fine, fine, coarse]);
+  });
+
+  it('is none where there is none', () => {
+    expect(new TileSelector(madeTree(2)).select(atTheWall, () => true).surround).toBe(-1);
   });
 });
 

@@ -29,6 +29,7 @@ export interface TileRequest {
 
 export interface Selection {
   cut: SelectedTile[]; // front to back for every ray of the view
+  surround: number; // the one to draw behind them, -1 where there is none
   requests: TileRequest[]; // the most urgent first
 }
 
@@ -47,8 +48,10 @@ export class TileSelector {
     const pass = { view, loaded, cut: [], requests: [] } satisfies Pass;
     this.cover(pass, 0, []);
     const { cut, requests } = pass as Pass;
+    let surround = -1;
+    if (this.tree.surround >= 0 && this.cover(pass, this.tree.surround, [])) surround = cut.pop()!.tile;
     requests.sort((a, b) => b.priority - a.priority || a.distance - b.distance);
-    return { cut, requests };
+    return { cut, surround, requests };
   }
 
   // Adds tiles to the cut that cover this one. Where there are none in memory: false, and adds those that would do.

@@ -1,9 +1,9 @@
 import { describe, expect, it } from 'vitest';
 import { SceneError } from '../scene-error';
-import { madeTree, madeView, randomNumbers } from '../testing/made-tree';
+import { addSurrounds, madeTree, madeView, randomNumbers } from '../testing/made-tree';
 import { TileSelector } from './tile-selector';
 import type { TileTree } from './tile-tree';
-import { kStreamSettings, kSurround, TileStreamer, type StreamSettings, type TileSource } from './tile-streamer';
+import { kStreamSettings, TileStreamer, type StreamSettings, type TileSource } from './tile-streamer';
 
 // A network and a card that count; time stands still but where a test lets it pass.
 class FakeSource implements TileSource<number, number, { tile: number; slices: number }> {
@@ -46,7 +46,7 @@ class FakeSource implements TileSource<number, number, { tile: number; slices: n
 }
 
 function make(tree: TileTree, cardBytes: number, settings: Partial<StreamSettings> = {}, pinned = [0]) {
-  const source = new FakeSource((tile) => (tile === kSurround ? 50 : 100));
+  const source = new FakeSource((tile) => (tile === tree.surround ? 50 : 100));
   const clock = { now: 0 };
   const streamer = new TileStreamer(
     new TileSelector(tree), source, pinned, { ...kStreamSettings, cardBytes, ...settings }, () => clock.now);
@@ -73,8 +73,8 @@ const far = madeView([0, 0, 400], 0, -1.5);
 describe('a tile streamer', () => {
   it('draws the coarsest first, and the finer ones once all of them are there', async () => {
     const made = make(madeTree(2), 1000);
-    expect(made.streamer.update(near)).toEqual([{ tile: 0, visible: false }]);
-    const cut = await settle(made, near);
+    expect(made.streamer.update(near)).toEqual({ cut: [{ tile: 0, visible: false }], surround: -1 });
+    const { cut } = await settle(made, near);
     expect(made.streamer.complete).toBe(true);
     expect(made.streamer.idle).toBe(true);
     expect(cut.filter(({ visible }) => visible).every(({ tile }) => tile > 0)).toBe(true);
@@ -84,8 +84,9 @@ describe('a tile streamer', () => {
 
   it('never passes its budget, never lacks the coarsest, and gives everything back', async () => {
     const tree = madeTree(8);
+    const { coarse } = addSurrounds(tree);
     const random = randomNumbers(11);
-    const made = make(tree, 900, { patience: 0 }, [0, kSurround]);
+    const made = make(tree, 900, { patience: 0 }, [0, coarse]);
     made.source.latency = () => 1 + Math.floor(random() * 30);
     await settle(made, far, 40);
     let view = far;
@@ -94,9 +95,9 @@ describe('a tile streamer', () => {
         view = madeView([(random() - 0.5) * 16, (random() - 0.5) * 16, random() * 4], random() * 7, -random());
       }
       made.clock.now += 16;
-      const cut = made.streamer.update(view);
+      const { cut } = made.streamer.update(view);
       expect(made.streamer.residentOf(0)).toBeDefined();
-      expect(made.streamer.residentOf(kSurround)).toBeDefined();
+      expect(made.streamer.residentOf(coarse)).toBeDefined();
       for (const { tile, visible } of cut) expect(!visible || made.streamer.residentOf(tile) !== undefined).toBe(true);
       expect(made.source.onCard).toBeLessThanOrEqual(made.streamer.statistics.cardBytes);
       expect(made.streamer.statistics.cardBytes).toBeLessThanOrEqual(900);
@@ -139,10 +140,10 @@ describe('a tile streamer', () => {
 
   it('comes to an end with a page that holds the files of one request', async () => {
     const made = make(madeTree(8), 1e6, { pageBytes: 20, fetches: 1 });
-    const cut = await settle(made, near, 400);
+    const { cut } = await settle(made, near, 400);
     expect(made.streamer.idle).toBe(true);
     const generous = make(madeTree(8), 1e6);
-    expect(cut).toEqual(await settle(generous, near, 400));
+    expect(cut).toEqual((await settle(generous, near, 400)).cut);
   });
 
   it('says that the coarsest level alone is too much', async () => {
@@ -176,9 +177,11 @@ describe('a tile streamer', () => {
   });
 
   it('draws the rest where one of the coarsest cannot be had, and that too when it can', async () => {
-    const made = make(madeTree(2), 1e6, {}, [0, kSurround]);
-    made.source.broken.add(kSurround);
-    const cut = await settle(made, near);
+    const tree = madeTree(2);
+    const { coarse, fine } = addSurrounds(tree);
+    const made = make(tree, 1e6, {}, [0, coarse]);
+    made.source.broken.add(coarse).add(fine);
+    const { cut } = await settle(made, near);
     expect(cut.filter(({ visible }) => visible).every(({ tile }) => tile > 0)).toBe(true);
     expect(made.streamer.residentOf(0)).toBeDefined();
     expect(made.streamer.complete).toBe(true);
@@ -187,8 +190,8 @@ describe('a tile streamer', () => {
     made.clock.now += 60000;
     expect(made.streamer.idle).toBe(false);
     await settle(made, near);
-    expect(made.streamer.residentOf(kSurround)).toBeDefined();
-    expect(made.streamer.errorOf(kSurround)).toBeUndefined();
+    expect(made.streamer.residentOf(coarse)).toBeDefined();
+    expect(made.streamer.errorOf(coarse)).toBeUndefined();
   });
 
   it('gives way at once when the budget becomes smaller', async () => {
@@ -206,7 +209,7 @@ describe('a tile streamer', () => {
     const made = make(tree, 1e6);
     const child = tree.tiles[0].children.find((one) => near.sees(tree.tiles[one]))!;
     made.source.broken.add(child);
-    const cut = await settle(made, near);
+    const { cut } = await settle(made, near);
     expect(made.streamer.errorOf(child)?.message).toContain('was not found');
     expect(cut.filter(({ visible }) => visible).length).toBeGreaterThan(0);
   });

@@ -5,10 +5,8 @@
 // those that must come with it) → decoding (in a worker) → uploading (slice by slice) → resident. The coarsest tiles and
 // the surround come first and stay. Of the others, what has not been drawn for longest goes first.
 import { SceneError } from '../scene-error';
-import type { SelectedTile, TileRequest, TileSelector } from './tile-selector';
+import type { Selection, TileRequest, TileSelector } from './tile-selector';
 import type { TileView } from './tile-view';
-
-export const kSurround = -1; // its number, beside those of tiles
 
 // Where contents come from, and what becomes of them. `Fetched` is a file, `Decoded` its texels, `Resident` what is drawn.
 export interface TileSource<Fetched, Decoded, Resident> {
@@ -81,7 +79,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
   // Of tiles that cannot be had; told once each.
   onError: (error: SceneError, tile: number) => void = () => {};
 
-  // `pinned`: the coarsest tiles, and kSurround where there is one.
+  // `pinned`: the coarsest tiles, of the surround too.
   constructor(
     private readonly selector: TileSelector,
     private readonly source: TileSource<Fetched, Decoded, Resident>,
@@ -111,24 +109,25 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     return this.statistics.pending === 0 && this.now() < this.nextRetry;
   }
 
-  // Once a frame: what to draw, front to back, and another step of what is on its way; `uploadFor` ms at most are spent
-  // on uploads (but one slice a frame is always taken).
-  update(view: TileView, uploadFor = 4): SelectedTile[] {
+  // Once a frame: what to draw, front to back, and behind it; and another step of what is on its way. `uploadFor` ms at
+  // most are spent on uploads (but one slice a frame is always taken).
+  update(view: TileView, uploadFor = 4): Pick<Selection, 'cut' | 'surround'> {
     ++this.frame;
     this.uploadSlices(uploadFor);
     this.keepToBudget();
     const now = this.now();
     const isThere = (tile: number) => this.residentOf(tile) !== undefined;
     // The coarsest count as loaded, though some may be missing: of the others the picture is right all the same.
-    const { cut, requests } = this.selector.select(view, (tile) => isThere(tile) || this.entry(tile).pinned);
+    const { cut, surround, requests } = this.selector.select(view, (tile) => isThere(tile) || this.entry(tile).pinned);
     const drawn = cut.map(({ tile, visible }) => ({ tile, visible: visible && isThere(tile) }));
     const kept = new Set(drawn.filter(({ visible }) => visible).map(({ tile }) => tile));
+    if (surround >= 0) kept.add(surround);
     for (const tile of kept) this.entry(tile).lastUsed = this.frame;
     const first = this.pinned
       .filter((tile) => !isThere(tile))
       .map((tile): TileRequest => ({ tiles: [tile], beside: [], priority: 0, distance: 0 }));
     this.load(this.complete ? [...first, ...requests] : first, kept, now);
-    return drawn;
+    return { cut: drawn, surround };
   }
 
   // Lets go of everything, and of what is still on its way when it comes.

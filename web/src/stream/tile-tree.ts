@@ -12,13 +12,14 @@ export interface TileNode {
   geometricError: number; // of its content: a texel of the planes
   level: number; // 0 is the finest
   content?: TileContent; // none: its children's stand for it; a leaf is empty
+  isSurround: boolean; // stands for what is outside of its box, the scene's
 }
 
 export interface TileTree {
   columns: number;
   rows: number;
-  tiles: TileNode[]; // numbered as the tileset's; the root first
-  surround?: TileContent;
+  tiles: TileNode[]; // numbered as the tileset's, the root first; then surrounds, the coarsest first
+  surround: number; // the coarsest of them, each with the next finer one as its only child; -1 where there is none
 }
 
 // Throws SceneError where a tile has several contents, which the format allows and this viewer does not draw.
@@ -32,11 +33,19 @@ export function tileTree(tileset: Tileset, file: string): TileTree {
     const { parent, children, cells, box, level } = tile;
     return {
       parent, children, cells, low: box.low, high: box.high, level,
-      geometricError: tile.geometricError / metres, content: contents[0],
+      geometricError: tile.geometricError / metres, content: contents[0], isSurround: false,
     };
   });
-  const surround = tileset.tiles[0].contents.find((content) => content.surround);
-  return { columns: tileset.columns, rows: tileset.rows, tiles, surround };
+  const surrounds = tileset.tiles[0].contents.filter((content) => content.surround).sort((a, b) => b.level - a.level);
+  const first = tiles.length;
+  surrounds.forEach((content, i) =>
+    tiles.push({
+      parent: i === 0 ? -1 : first + i - 1, children: i + 1 < surrounds.length ? [first + i + 1] : [],
+      cells: content.cells, low: tileset.box.low, high: tileset.box.high, level: content.level,
+      geometricError: content.geometricError / metres, content, isSurround: true,
+    }),
+  );
+  return { columns: tileset.columns, rows: tileset.rows, tiles, surround: surrounds.length > 0 ? first : -1 };
 }
 
 function cellAt(x: number, count: number): number {
@@ -59,11 +68,12 @@ export function childrenFrontToBack(tree: TileTree, tile: number, eye: Vec3): nu
   return [...tree.tiles[tile].children].sort((a, b) => distance(a) - distance(b) || a - b);
 }
 
-// The topmost contents: they cover all that the scene covers, and always stay in memory.
+// The topmost contents, the surround apart: they cover all that the scene covers, and always stay in memory.
 export function coarsestTiles(tree: TileTree): number[] {
   const found: number[] = [];
   const covered: boolean[] = [];
   tree.tiles.forEach((tile, index) => {
+    if (tile.isSurround) return;
     const above = tile.parent >= 0 && covered[tile.parent];
     if (tile.content && !above) found.push(index);
     covered[index] = above || tile.content !== undefined;

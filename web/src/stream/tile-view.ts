@@ -5,6 +5,8 @@ import type { TileNode } from './tile-tree';
 // A plane whose positive side is seen: a x + b y + c z + d >= 0.
 export type Plane = readonly [number, number, number, number];
 
+type Place = Pick<TileNode, 'low' | 'high' | 'isSurround'>;
+
 export class TileView {
   // `planes` bound what is seen; `focal` in pixels, `pixels` those of the whole picture; distances below `nearest` count
   // as that. A parallel projection has no eye: the same error everywhere, `focal` pixels for a scene unit.
@@ -18,14 +20,20 @@ export class TileView {
   ) {}
 
   // True for all that can be seen, and for little else.
-  sees({ low, high }: Pick<TileNode, 'low' | 'high'>): boolean {
-    return this.planes.every(([a, b, c, d]) => {
+  sees({ low, high, isSurround }: Place): boolean {
+    return isSurround || this.planes.every(([a, b, c, d]) => {
       const farthest = a * (a > 0 ? high[0] : low[0]) + b * (b > 0 ? high[1] : low[1]) + c * (c > 0 ? high[2] : low[2]) + d;
       return farthest >= 0;
     });
   }
 
-  distance({ low, high }: Pick<TileNode, 'low' | 'high'>): number {
+  // Of the surround, to what is nearest of it beyond the sides of the scene's box: what lies above is sky, and the ground
+  // hides what lies below.
+  distance({ low, high, isSurround }: Place): number {
+    if (isSurround) {
+      const inside = (a: number) => Math.min(this.eye[a] - low[a], high[a] - this.eye[a]);
+      return Math.max(this.nearest, Math.min(inside(0), inside(1)));
+    }
     const outside = (a: number) => Math.max(low[a] - this.eye[a], 0, this.eye[a] - high[a]);
     return Math.max(this.nearest, Math.hypot(outside(0), outside(1), outside(2)));
   }
@@ -35,9 +43,10 @@ export class TileView {
   }
 
   // Pixels that a tile may cover.
-  areaInPixels({ low, high }: Pick<TileNode, 'low' | 'high'>): number {
+  areaInPixels({ low, high, isSurround }: Place): number {
+    if (isSurround) return this.pixels;
     const radius = 0.5 * Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
-    const onScreen = (radius * this.focal) / (this.parallel ? 1 : Math.max(radius, this.distance({ low, high })));
+    const onScreen = (radius * this.focal) / (this.parallel ? 1 : Math.max(radius, this.distance({ low, high, isSurround })));
     return Math.min(this.pixels, Math.PI * onScreen ** 2);
   }
 }

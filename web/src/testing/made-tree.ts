@@ -13,10 +13,10 @@ export function madeTree(edge: number): TileTree {
     const number = tiles.length;
     const node: TileNode = {
       parent, children: [], cells: { i0, j0, i1, j1 }, low: [2 * i0 - edge, 2 * j0 - edge, -1],
-      high: [2 * i1 - edge, 2 * j1 - edge, 0.5], geometricError: 2 ** level / 128, level,
+      high: [2 * i1 - edge, 2 * j1 - edge, 0.5], geometricError: 2 ** level / 128, level, isSurround: false,
       content: {
         uri: `tiles/${number}.glb`, cells: { i0, j0, i1, j1 }, box: { low: [0, 0, 0], high: [1, 1, 1] }, surround: false,
-        resources: [], bytes: 0,
+        resources: [], bytes: 0, level: 0, geometricError: 0,
       },
     };
     tiles.push(node);
@@ -27,7 +27,21 @@ export function madeTree(edge: number): TileTree {
     return number;
   };
   add(0, 0, 2 ** levels, levels, -1);
-  return { columns: edge, rows: edge, tiles };
+  return { columns: edge, rows: edge, tiles, surround: -1 };
+}
+
+// With a coarse and a fine surround, the last two.
+export function addSurrounds(tree: TileTree): { coarse: number; fine: number } {
+  const { columns, rows, tiles } = tree;
+  const coarse = tiles.length;
+  const fine = coarse + 1;
+  const node: TileNode = {
+    ...tiles[0], parent: -1, children: [fine], low: [-columns, -rows, -1], high: [columns, rows, 1],
+    geometricError: (4 * columns) / 256, level: 1, isSurround: true,
+  };
+  tiles.push(node, { ...node, parent: coarse, children: [], geometricError: node.geometricError / 2, level: 0 });
+  tree.surround = coarse;
+  return { coarse, fine };
 }
 
 // Numbers below 1, the same for the same seed.

@@ -26,7 +26,8 @@ describe('decodeTileset', () => {
     expect(tileset.tiles).toHaveLength(3);
     expect(tileset.tiles[0].children).toEqual([1, 2]);
     expect(tileset.tiles.map(({ parent }) => parent)).toEqual([-1, 0, 0]);
-    expect(tileset.tiles[0].contents.filter(({ surround }) => surround)).toHaveLength(1);
+    const surrounds = tileset.tiles[0].contents.filter(({ surround }) => surround);
+    expect(surrounds.map(({ level, geometricError }) => [level, geometricError])).toEqual([[0, 3.125], [1, 6.25]]);
     expect(tileset.georeference).toBeDefined();
     expect(metresPerUnit(tileset)).toBeGreaterThan(0);
   });
@@ -70,7 +71,13 @@ describe('decodeTileset', () => {
     ["a content's uri", (file) => (file.root.children[0].content.uri = '../a.glb')],
     ["a content's uri", (file) => (file.root.children[0].content.uri = 'http://x/a.glb')],
     ["a content's box leaves", (file) => (ours(file.root.children[0].content).high[2] = 5)],
-    ['a surround is not the only one', (file) => (ours(file.root.children[0].content).surround = true)],
+    ['a surround is not in the root', (file) => (ours(file.root.children[0].content).surround = true)],
+    ['two surrounds are of one level', (file) => (ours(file.root.contents[2]).level = 0)],
+    ["a surround's level is not below", (file) => (ours(file.root.contents[2]).level = 2)],
+    ["a surround's level or error is none", (file) => (ours(file.root.contents[2]).level = -1)],
+    ["a surround's level or error is none", (file) => (ours(file.root.contents[2]).geometricError = 'large')],
+    ["a surround's geometric error is no length", (file) => (ours(file.root.contents[2]).geometricError = -1)],
+    ["a surround's geometric error is below a finer one's", (file) => (ours(file.root.contents[2]).geometricError = 1)],
     ['has both content and contents', (file) => (file.root.children[0].contents = [])],
     ['its boundingVolume is not its box', (file) => (file.root.boundingVolume.box[0] += 10)],
     ['a shared resource that is not listed', (file) => (ours(file.root.children[0].content).resources = [0])],

@@ -202,14 +202,19 @@ class TilesetReader {
     if (!Array.isArray(resources) || !resources.every((index) => wholeFrom(index) !== undefined)) {
       this.fail("a content's resources are no list of numbers", place);
     }
+    const surround = flagOf(ours, 'surround') ?? false;
+    const ofSurround = (key: string, read: (object: Json, key: string) => number | undefined) =>
+      surround && fieldOf(ours, key) !== undefined ? this.needed(read(ours, key), "a surround's level or error is none", place) : 0;
     return {
       uri: this.needed(stringOf(source, 'uri'), missing, place),
       box: this.needed(boxOf(ours), missing, place),
       cells:
         fieldOf(ours, 'cells') === undefined ? tile.cells : this.needed(cellsOf(ours), "a content's cells are none", place),
-      surround: flagOf(ours, 'surround') ?? false,
+      surround,
       resources: resources as number[],
       bytes: bytesOf(ours),
+      level: ofSurround('level', wholeOf),
+      geometricError: ofSurround('geometricError', numberOf),
     };
   }
 

@@ -48,6 +48,10 @@ function isBox({ low, high }: Box): boolean {
   return [0, 1, 2].every((a) => low[a] >= -kFarthestInScene && high[a] <= kFarthestInScene && low[a] < high[a]);
 }
 
+function isError(metres: number): boolean {
+  return metres >= 0 && metres <= kFarthest;
+}
+
 function isRange(cells: Cells): boolean {
   return cells.i0 < cells.i1 && cells.j0 < cells.j1;
 }
@@ -108,9 +112,21 @@ function ruleOfResources(tileset: Tileset): Broken {
   return undefined;
 }
 
+// The surrounds of the root: finer ones have smaller texels.
+function ruleOfSurrounds(tileset: Tileset): Broken {
+  const surrounds = tileset.tiles[0].contents.filter(({ surround }) => surround).sort((a, b) => a.level - b.level);
+  for (const [i, { box, level, geometricError }] of surrounds.entries()) {
+    if (!holdsBox(box, tileset.box)) return "the surround's box does not hold the scene's";
+    if (level >= tileset.levels) return "a surround's level is not below the scene's number of levels";
+    if (!isError(geometricError)) return "a surround's geometric error is no length";
+    if (i > 0 && level === surrounds[i - 1].level) return 'two surrounds are of one level';
+    if (i > 0 && geometricError < surrounds[i - 1].geometricError) return "a surround's geometric error is below a finer one's";
+  }
+  return undefined;
+}
+
 function ruleOfContents(tileset: Tileset, tile: Tile): Broken {
   const ranges: Cells[] = [];
-  let surrounds = 0;
   for (const content of tile.contents) {
     if (!isPlainUri(content.uri) || !content.uri.endsWith('.glb')) return "a content's uri is not a plain one of a .glb";
     if (!isBox(content.box)) return "a content's box is none";
@@ -119,8 +135,7 @@ function ruleOfContents(tileset: Tileset, tile: Tile): Broken {
     }
     if (new Set(content.resources).size !== content.resources.length) return 'a content needs a shared resource twice';
     if (content.surround) {
-      if (tile.parent !== -1 || ++surrounds > 1) return 'a surround is not the only one, in the root';
-      if (!holdsBox(content.box, tileset.box)) return "the surround's box does not hold the scene's";
+      if (tile.parent !== -1) return 'a surround is not in the root';
       continue;
     }
     if (!holdsBox(tile.box, content.box)) return "a content's box leaves its tile's";
@@ -128,7 +143,7 @@ function ruleOfContents(tileset: Tileset, tile: Tile): Broken {
     ranges.push(content.cells);
   }
   if (tileset.representation !== 'mesh' && !lieOnGrid(ranges)) return 'contents of a tile have no order';
-  return undefined;
+  return tile.parent === -1 ? ruleOfSurrounds(tileset) : undefined;
 }
 
 // Inner walls hold; at the border of the grid a tile may own what lies outside.
@@ -149,7 +164,7 @@ function ruleOfTile(tileset: Tileset, tile: Tile): Broken {
   if (!isRange(tile.cells) || !holdsCells(all, tile.cells)) return 'its cells are not of the grid';
   if (!isBox(tile.box)) return 'its box is none';
   if (!keepsToCells(tileset, tile)) return 'its box leaves its cells';
-  if (!(tile.geometricError >= 0 && tile.geometricError <= kFarthest)) return 'its geometric error is no length';
+  if (!isError(tile.geometricError)) return 'its geometric error is no length';
   return ruleOfContents(tileset, tile);
 }
 

@@ -26,6 +26,9 @@ export interface TileContent {
   surround: boolean;
   resources: number[]; // of Tileset.resources
   bytes: number; // of the file, 0 where not known; a hint
+  // Of a surround, as a tile has them. Its texels are smallest at the scene's box; the error is theirs there, in metres.
+  level: number;
+  geometricError: number;
 }
 
 export interface Tile {
