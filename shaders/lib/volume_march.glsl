@@ -55,7 +55,8 @@ struct Composite {
   vec3 diffuse;   // Σ w c
   vec4 features;  // Σ w f
   float transmittance;
-  float depth;  // Σ w t
+  float depth;   // Σ w t
+  float median;  // the distance at which half is hidden; 0 before
 };
 
 // 1 - exp(-x), to a float's digits for small x too.
@@ -109,7 +110,9 @@ void marchSegment(Part part, VolumeSegment s, inout Composite sum) {
                   textureLod(planesSecond, vec3(p.xy, part.layer + 2.0), 0.0);
     sum.diffuse += weight / (1.0 + exp(featureRange * (4.0 - 2.0 * first.rgb)));
     sum.features += weight / (1.0 + exp(featureRange * (4.0 - 2.0 * second)));
-    sum.depth += weight * distanceAt(s, tau);
+    float distance = distanceAt(s, tau);
+    sum.depth += weight * distance;
+    if (sum.transmittance >= 0.5 && sum.transmittance - weight < 0.5) sum.median = distance;
     sum.transmittance *= 1.0 - opacity;
     if (sum.transmittance < minTransmittance) return;
   }

@@ -18,6 +18,11 @@ export class DecodePool {
 
   constructor(readonly size = Math.max(1, Math.min(4, (navigator.hardwareConcurrency || 2) - 1))) {}
 
+  // Starts so many workers, which make themselves ready.
+  start(count: number): void {
+    for (let i = 0; i < Math.min(count, this.size); ++i) this.worker(i);
+  }
+
   // The file is handed over: it is of no use afterwards.
   decode(
     file: Uint8Array<ArrayBuffer>, name: string, promised: Pick<TileContent, 'surround' | 'box'>, limits: VolumeLimits,

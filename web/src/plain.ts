@@ -95,6 +95,26 @@ const plain = {
     return best;
   },
 
+  // A red box in the world; scene units.
+  addBox(low: number[], high: number[]): void {
+    const box = new THREE.Box3(new THREE.Vector3(...low), new THREE.Vector3(...high));
+    const mesh = new THREE.Mesh(
+      new THREE.BoxGeometry(...box.getSize(new THREE.Vector3()).toArray()), new THREE.MeshBasicMaterial({ color: 0xff0000 }));
+    mesh.name = 'box';
+    this.city!.updateMatrixWorld();
+    mesh.applyMatrix4(new THREE.Matrix4().makeTranslation(box.getCenter(new THREE.Vector3())));
+    mesh.applyMatrix4(this.city!.localFromScene);
+    mesh.applyMatrix4(this.city!.matrixWorld);
+    world.add(mesh);
+  },
+
+  removeBox(): void {
+    const box = world.getObjectByName('box') as THREE.Mesh<THREE.BufferGeometry, THREE.Material>;
+    box.removeFromParent();
+    box.geometry.dispose();
+    box.material.dispose();
+  },
+
   // What is on the canvas: red, green and blue, rows from the top, as base64.
   pixels(): string {
     const { width, height } = canvas;

@@ -12,7 +12,8 @@
 import * as THREE from 'three';
 import { DecodePool } from './decode-pool';
 import { cityMesh } from './draw/city-mesh';
-import { Compositor, type DrawnContent } from './draw/compositor';
+import { Compositor, setDefine, type DrawnContent } from './draw/compositor';
+import { kDisplayModes, type DisplayMode } from './draw/display-modes';
 import { OpaqueDepth } from './draw/opaque-depth';
 import { SceneError } from './scene-error';
 import { TileSelector, kSelectionSettings, type SelectionSettings } from './stream/tile-selector';
@@ -46,11 +47,11 @@ export class TesseraScene extends THREE.Object3D {
   readonly selection: SelectionSettings;
   readonly stream: StreamSettings;
   resolutionScale = 1; // pixels of the scene beside those of the canvas, along an edge
+  display: DisplayMode = 'colour';
   minTransmittance = 1 / 255; // rays end where less would be seen; 0: never
   // Of tiles that cannot be had, and of a budget that is too small; told once each.
   onError: (error: SceneError) => void = () => {};
   private readonly tree: TileTree;
-  private readonly pool = new DecodePool();
   private readonly opaque = new OpaqueDepth();
   private compositor?: Compositor;
   private streamer?: Streamer;
@@ -64,20 +65,21 @@ export class TesseraScene extends THREE.Object3D {
 
   // Throws SceneError where there is no scene, or one of another kind.
   static async load(url: string, options: SceneOptions = {}): Promise<TesseraScene> {
-    const absolute = new URL(url, location.href);
-    if (!absolute.pathname.endsWith('.json')) absolute.pathname = `${absolute.pathname.replace(/\/$/, '')}/tileset.json`;
-    const text = new TextDecoder().decode(await fetchFile(absolute.href, 'tileset.json', kTilesetBytes));
-    const tileset = decodeTileset(text, 'tileset.json');
-    if (tileset.representation !== 'volume') {
-      throw new SceneError('tileset.json', '', `is a scene of ${tileset.representation}, not of volume`, 'draw it with a viewer that knows it');
+    const pool = new DecodePool();
+    pool.start(options.stream?.decodes ?? kStreamSettings.decodes);
+    try {
+      return new TesseraScene(...(await openTileset(url)), options, pool);
+    } catch (error) {
+      pool.dispose();
+      throw error;
     }
-    return new TesseraScene(tileset, absolute.href, options);
   }
 
   private constructor(
     readonly tileset: Tileset,
     readonly url: string,
     options: SceneOptions,
+    private readonly pool: DecodePool,
   ) {
     super();
     this.name = tileset.name;
@@ -139,14 +141,12 @@ export class TesseraScene extends THREE.Object3D {
     this.drawn = new Array<number>(this.tileset.levels).fill(0);
     for (const { tile, visible } of cut) if (visible) ++this.drawn[this.tree.tiles[tile].level];
     compositor.view.minTransmittance.value = this.minTransmittance;
+    compositor.view.display.value = kDisplayModes.indexOf(this.display);
     compositor.draw(renderer, camera, worldFromScene, frontToBack, depth);
     mesh.material.uniforms.clipFromScene.value
       .multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
       .multiply(worldFromScene);
-    if ((mesh.material.defines!.OPAQUE !== undefined) !== (depth !== null)) {
-      mesh.material.defines = depth ? { OPAQUE: '' } : {};
-      mesh.material.needsUpdate = true;
-    }
+    setDefine(mesh.material, 'OPAQUE', depth !== null);
     mesh.visible = frontToBack.length > 0;
   }
 
@@ -171,12 +171,13 @@ export class TesseraScene extends THREE.Object3D {
     this.streamer = this.compositor = this.mesh = this.canvas = undefined;
   }
 
-  // Milliseconds for uploads: a share of what a picture takes, so that slow machines do not wait for ever.
+  // Milliseconds for uploads: a share of what a picture takes, so that slow machines do not wait for ever; more of them
+  // while there is nothing to be seen anyway.
   private uploadTime(): number {
     const now = performance.now();
     const since = now - this.lastUpdate;
     this.lastUpdate = now;
-    return Math.min(Math.max(0.2 * since, 3), 200);
+    return Math.min(Math.max(0.2 * since, this.complete ? 3 : 30), 200);
   }
 
   // What needs to know the graphics card.
@@ -194,6 +195,18 @@ export class TesseraScene extends THREE.Object3D {
     }
     return { compositor: this.compositor, streamer: this.streamer, mesh: this.mesh };
   }
+}
+
+// The tileset, and the url that it was found under.
+async function openTileset(url: string): Promise<[Tileset, string]> {
+  const absolute = new URL(url, location.href);
+  if (!absolute.pathname.endsWith('.json')) absolute.pathname = `${absolute.pathname.replace(/\/$/, '')}/tileset.json`;
+  const text = new TextDecoder().decode(await fetchFile(absolute.href, 'tileset.json', kTilesetBytes));
+  const tileset = decodeTileset(text, 'tileset.json');
+  if (tileset.representation !== 'volume') {
+    throw new SceneError('tileset.json', '', `is a scene of ${tileset.representation}, not of volume`, 'draw it with a viewer that knows it');
+  }
+  return [tileset, absolute.href];
 }
 
 // The camera as the selection needs it, in scene units.

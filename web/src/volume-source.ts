@@ -4,7 +4,7 @@ import type { DecodePool } from './decode-pool';
 import type { Compositor, DrawnContent } from './draw/compositor';
 import { ContentTextures } from './draw/content-textures';
 import { SceneError } from './scene-error';
-import type { TileSource } from './stream/tile-streamer';
+import type { TileSource, UploadStep } from './stream/tile-streamer';
 import type { TileTree } from './stream/tile-tree';
 import { kVolumeLimits, readVolumeHeader, type VolumeLimits } from './tiles/decode-volume';
 import type { TileContent } from './tiles/tileset';
@@ -45,12 +45,14 @@ export class VolumeSource implements TileSource<ContentFile, VolumeContent, Draw
   }
 
   allocate(tile: number, decoded: VolumeContent): DrawnContent {
-    const { box, surround } = this.contentOf(tile);
-    return this.compositor.make(new ContentTextures(decoded), box, surround);
+    const made = this.compositor.make(new ContentTextures(decoded), this.contentOf(tile), tile, this.tree.tiles[tile].level);
+    this.compositor.compile(this.renderer, made);
+    return made;
   }
 
-  upload(resident: DrawnContent): boolean {
-    return resident.textures.upload(this.renderer);
+  upload(resident: DrawnContent): UploadStep {
+    if (!resident.textures.upload(this.renderer)) return 'more';
+    return this.compositor.isCompiled(this.renderer, resident) ? 'done' : 'wait';
   }
 
   free(resident: DrawnContent): void {

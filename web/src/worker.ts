@@ -26,13 +26,19 @@ async function prepare(): Promise<void> {
   return prepareDecoder(await WebAssembly.compile(await file.arrayBuffer()));
 }
 
+function ready(): Promise<void> {
+  return (prepared ??= prepare().catch((error: unknown) => {
+    prepared = undefined; // the next content tries again
+    throw error;
+  }));
+}
+
+ready().catch(() => {}); // while the first files are fetched
+
 self.onmessage = async ({ data }: MessageEvent<DecodeRequest>) => {
   const { id, file, name, promised, limits } = data;
   try {
-    await (prepared ??= prepare().catch((error: unknown) => {
-      prepared = undefined; // the next content tries again
-      throw error;
-    }));
+    await ready();
     const content = decodeVolume(readVolumeHeader(file, name, promised, limits), name);
     const { planes, voxels, macroblocks, distances } = content;
     const buffers = [planes.first, planes.second, voxels.first, voxels.second, macroblocks.texels, distances.texels];

@@ -3,6 +3,7 @@
 import * as THREE from 'three';
 import type { Compositor } from './compositor';
 import { screenTriangle } from './compositor';
+import { kDisplayConstants } from './display-modes';
 
 const kVertexShader = `
 void main() {
@@ -15,6 +16,13 @@ uniform vec2 pictureSize;
 uniform mat3 origin, ray;
 uniform mat4 clipFromScene;
 uniform sampler2D opaqueDepth;
+uniform int display;
+// From near, 0, over three more to far, 1.
+vec3 colourOfDistance(float x) {
+  vec3 colour = mix(vec3(1.0, 0.93, 0.7), vec3(0.96, 0.55, 0.25), clamp(3.0 * x, 0.0, 1.0));
+  colour = mix(colour, vec3(0.62, 0.16, 0.42), clamp(3.0 * x - 1.0, 0.0, 1.0));
+  return mix(colour, vec3(0.08, 0.07, 0.3), clamp(3.0 * x - 2.0, 0.0, 1.0));
+}
 void main() {
   vec2 place = gl_FragCoord.xy / pictureSize;
   vec4 colour = texture2D(colourAndOpacity, place);
@@ -24,11 +32,17 @@ void main() {
   opaque = texture2D(opaqueDepth, place).r;
 #endif
   gl_FragDepth = opaque;
-  if (far.a > 0.5) {
+  if (far.a > 0.99) {  // half of what is behind is hidden
     vec2 ndc = 2.0 * place - 1.0;
-    vec3 x = origin * vec3(ndc, 1.0) + far.r / far.a * normalize(ray * vec3(ndc, 1.0));
+    float surface = far.r / far.a;
+#ifdef DISTANCES_OF_BYTES
+    surface /= max(1.0 - surface, 1e-3);
+#endif
+    vec3 x = origin * vec3(ndc, 1.0) + surface * normalize(ray * vec3(ndc, 1.0));
     vec4 clip = clipFromScene * vec4(x, 1.0);
     gl_FragDepth = min(opaque, clamp(0.5 + 0.5 * clip.z / clip.w, 0.0, 1.0));
+    // Seven doublings from a tenth of half a block's edge.
+    if (display == kShowDepth) colour.rgb = colour.a * colourOfDistance(clamp(log2(surface / 0.1) / 7.0, 0.0, 1.0));
   }
   // Premultiplied, in the colours of the photos: three converts what a canvas does not take as it is.
   gl_FragColor = vec4(colour.a > 0.0 ? sRGBTransferEOTF(vec4(colour.rgb / colour.a, 1.0)).rgb : vec3(0.0), 1.0);
@@ -36,10 +50,10 @@ void main() {
   gl_FragColor = vec4(gl_FragColor.rgb * colour.a, colour.a);
 }`;
 
-export function cityMesh({ view, target }: Compositor): THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial> {
+export function cityMesh({ view, target, distancesOfBytes }: Compositor): THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial> {
   const material = new THREE.ShaderMaterial({
     vertexShader: kVertexShader,
-    fragmentShader: kFragmentShader,
+    fragmentShader: `${kDisplayConstants}\n${kFragmentShader}`,
     uniforms: {
       colourAndOpacity: { value: target.textures[0] },
       distanceAndOpacity: { value: target.textures[1] },
@@ -48,7 +62,9 @@ export function cityMesh({ view, target }: Compositor): THREE.Mesh<THREE.BufferG
       origin: view.origin,
       ray: view.ray,
       opaqueDepth: view.opaqueDepth,
+      display: view.display,
     },
+    defines: distancesOfBytes ? { DISTANCES_OF_BYTES: '' } : {},
     transparent: true, // after what is opaque
     depthFunc: THREE.AlwaysDepth,
     blending: THREE.CustomBlending,

@@ -1,8 +1,9 @@
 // Draws contents, front to back, into targets of their own: what the scene adds to each pixel, and how far away it is
 // (docs/tile-format.md, section 4).
 import * as THREE from 'three';
-import type { Box, Vec3 } from '../tiles/tileset';
+import type { Box, TileContent, Vec3 } from '../tiles/tileset';
 import { frontToBack as orderOf } from './box-order';
+import { colourOfBlock, colourOfLevel } from './display-modes';
 import { volumeMaterial, viewUniforms, type MaterialOptions, type ViewUniforms } from './volume-material';
 import type { ContentTextures } from './content-textures';
 
@@ -19,7 +20,7 @@ export interface ScenePlace {
   near: number;
 }
 
-function setDefine(material: THREE.Material, name: string, isOn: boolean): void {
+export function setDefine(material: THREE.Material, name: string, isOn: boolean): void {
   const defines = (material.defines ??= {}) as Record<string, string>;
   if (name in defines === isOn) return;
   if (isOn) defines[name] = '';
@@ -47,17 +48,20 @@ const kContentsBetweenHiding = 4;
 
 export class Compositor {
   readonly view: ViewUniforms = viewUniforms();
-  readonly target: THREE.WebGLRenderTarget;
+  readonly target: THREE.WebGLRenderTarget; // what the scene adds, with its opacity; how far its surface is
+  readonly distancesOfBytes: boolean;
   private readonly depthAlone: THREE.WebGLRenderTarget; // the depth of `target`, so that its colours can be read meanwhile
   private readonly hiding = new THREE.Scene();
   private readonly contents = new THREE.Scene();
   private readonly cube = new THREE.BoxGeometry(1, 1, 1);
   private readonly screen = screenTriangle();
+  private readonly anyCamera = new THREE.Camera();
 
   // What the card can blend decides how the pictures are kept.
   constructor(renderer: THREE.WebGLRenderer, place: ScenePlace) {
     const has = (name: string) => renderer.extensions.has(name);
     const canBlendHalves = has('EXT_color_buffer_half_float') || has('EXT_color_buffer_float');
+    this.distancesOfBytes = !canBlendHalves;
     const depthTexture = new THREE.DepthTexture(1, 1, THREE.UnsignedIntType);
     const common = { generateMipmaps: false, depthBuffer: true, depthTexture };
     this.target = new THREE.WebGLRenderTarget(1, 1, {
@@ -81,15 +85,30 @@ export class Compositor {
     this.view.sceneNear.value = place.near;
   }
 
-  make(textures: ContentTextures, box: Box, surround: boolean): DrawnContent {
+  // `number` and `level` are the tile's, for display modes.
+  make(textures: ContentTextures, { box, surround }: Pick<TileContent, 'box' | 'surround'>, number: number, level: number): DrawnContent {
     // What is contracted may own what lies beyond any box.
     const everywhere = surround || textures.parts.some((part) => part.contracted);
-    const options: MaterialOptions = { surround, everywhere };
+    const options: MaterialOptions = {
+      surround, everywhere, distancesOfBytes: this.distancesOfBytes, colourOfBlock: colourOfBlock(number),
+      colourOfLevel: colourOfLevel(level),
+    };
     const mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>(
       everywhere ? this.screen : this.cube, volumeMaterial(textures, this.view, options));
     mesh.frustumCulled = false;
     mesh.matrixAutoUpdate = mesh.matrixWorldAutoUpdate = false;
     return { textures, box, surround, mesh };
+  }
+
+  // Has the driver begin with the content's program, which it may do beside other work.
+  compile(renderer: THREE.WebGLRenderer, { mesh }: DrawnContent): void {
+    setDefine(mesh.material, 'OPAQUE', this.view.opaqueDepth.value !== null);
+    renderer.compile(mesh, this.anyCamera);
+  }
+
+  isCompiled(renderer: THREE.WebGLRenderer, { mesh }: DrawnContent): boolean {
+    const { currentProgram } = renderer.properties.get(mesh.material) as { currentProgram?: { isReady(): boolean } };
+    return currentProgram?.isReady() ?? true;
   }
 
   remove(content: DrawnContent): void {

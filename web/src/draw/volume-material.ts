@@ -5,6 +5,7 @@ import marchSource from '../../../shaders/lib/volume_march.glsl?raw';
 import pathSource from '../../../shaders/lib/volume_path.glsl?raw';
 import { kVectorsOfPart } from '../tiles/volume-content';
 import type { ContentTextures } from './content-textures';
+import { kDisplayConstants } from './display-modes';
 import { networkShader } from './network-shader';
 
 // The same for all contents of a picture. Scene units; `ndc` runs from -1 to 1 across the picture.
@@ -18,6 +19,7 @@ export interface ViewUniforms {
   minTransmittance: { value: number }; // rays end where less would be seen; 0: never
   opaqueDepth: { value: THREE.Texture | null }; // of the depth buffer of what stands in the scene
   sceneFromDepth: { value: THREE.Matrix4 }; // (ndc.x, ndc.y, depth in [-1, 1], 1) to the scene
+  display: { value: number }; // of kDisplayModes
 }
 
 export function viewUniforms(): ViewUniforms {
@@ -31,6 +33,7 @@ export function viewUniforms(): ViewUniforms {
     minTransmittance: { value: 1 / 255 },
     opaqueDepth: { value: null },
     sceneFromDepth: { value: new THREE.Matrix4() },
+    display: { value: 0 },
   };
 }
 
@@ -62,7 +65,8 @@ uniform float featureRange, densityRange, stepsPerTexel, minTransmittance, scene
 uniform vec2 resolution;
 uniform mat3 origin, ray;
 uniform mat4 sceneFromDepth;
-uniform vec3 sceneLow, sceneHigh;
+uniform vec3 sceneLow, sceneHigh, colourOfBlock, colourOfLevel;
+uniform int display;
 `;
 
 const kFragmentMain = `
@@ -86,7 +90,7 @@ void main() {
   vec2 box = clipToBox(o, d, sceneLow, sceneHigh, vec2(sceneNear, 1e30));
   bool meetsBox = box.x < box.y;
   float far = min(kSceneEnd, opaqueDistance(ndc, o, d));
-  Composite sum = Composite(vec3(0.0), vec4(0.0), 1.0, 0.0);
+  Composite sum = Composite(vec3(0.0), vec4(0.0), 1.0, 0.0, 0.0);
 #ifdef SURROUND
   vec2 behind = vec2(meetsBox ? box.y : sceneNear, far);
   if (behind.x < behind.y) marchPart(partOf(0), o, d, behind, sum);
@@ -102,13 +106,32 @@ void main() {
   float opacity = 1.0 - sum.transmittance;
   if (opacity <= 0.0) discard;
   vec3 specular = deferred(sum.diffuse, sum.features, d);
-  colourAndOpacity = vec4(sum.diffuse + opacity * specular, opacity);
-  distanceAndOpacity = vec4(min(sum.depth, 60000.0), 0.0, 0.0, opacity);  // half floats end at 65504
+  vec3 colour = sum.diffuse + opacity * specular;
+  if (display == kShowDiffuse) colour = sum.diffuse;
+  if (display == kShowSpecular) colour = opacity * specular;
+  if (display == kShowFeatures) colour = sum.features.rgb;
+  if (display == kShowBlocks || display == kShowLevels) {
+    vec3 tint = display == kShowBlocks ? colourOfBlock : colourOfLevel;
+    colour = tint * (0.35 * opacity + 0.65 * dot(colour, vec3(0.3, 0.6, 0.1)));
+  }
+  colourAndOpacity = vec4(colour, opacity);
+  // What hides half is where the surface is, whatever shines through it from far behind: nothing behind is mixed in.
+  float surface = sum.median > 0.0 ? sum.median : sum.depth / opacity;
+  float hides = min(2.0 * opacity, 1.0);
+#ifdef DISTANCES_OF_BYTES
+  surface /= surface + 1.0;
+#else
+  surface = min(surface, 60000.0);  // half floats end at 65504
+#endif
+  distanceAndOpacity = vec4(surface * hides, 0.0, 0.0, hides);
 }`;
 
 export interface MaterialOptions {
   surround: boolean;
   everywhere: boolean; // fills the picture, as it owns what lies beyond any box
+  distancesOfBytes: boolean; // the target's are, from 0 for no distance to 255 for the farthest
+  colourOfBlock: THREE.Color; // for display modes
+  colourOfLevel: THREE.Color;
 }
 
 // Contents of one shape (parts, widths of layers) share a program. Drawn front to back, blended under what is there.
@@ -120,11 +143,12 @@ export function volumeMaterial(textures: ContentTextures, view: ViewUniforms, op
   const defines: Record<string, number | string> = { PARTS: parts.length, VECTORS: numbers.length / 4 };
   if (options.surround) defines.SURROUND = '';
   if (options.everywhere) defines.EVERYWHERE = '';
+  if (options.distancesOfBytes) defines.DISTANCES_OF_BYTES = '';
   const material = new THREE.RawShaderMaterial({
     glslVersion: THREE.GLSL3,
     vertexShader: kVertexShader,
     fragmentShader: [
-      kFragmentHead, pathSource, marchSource, networkShader(widths, kVectorsOfPart * parts.length), kFragmentMain,
+      kFragmentHead, kDisplayConstants, pathSource, marchSource, networkShader(widths, kVectorsOfPart * parts.length), kFragmentMain,
     ].join('\n'),
     defines,
     uniforms: {
@@ -138,6 +162,8 @@ export function volumeMaterial(textures: ContentTextures, view: ViewUniforms, op
       featureRange: { value: ranges.features },
       densityRange: { value: ranges.density },
       stepsPerTexel: { value: stepsPerTexel },
+      colourOfBlock: { value: options.colourOfBlock },
+      colourOfLevel: { value: options.colourOfLevel },
     },
     side: options.everywhere ? THREE.DoubleSide : THREE.BackSide,
     transparent: true,

@@ -3,7 +3,7 @@ import { SceneError } from '../scene-error';
 import { addSurrounds, madeTree, madeView, randomNumbers } from '../testing/made-tree';
 import { TileSelector } from './tile-selector';
 import type { TileTree } from './tile-tree';
-import { kStreamSettings, TileStreamer, type StreamSettings, type TileSource } from './tile-streamer';
+import { kStreamSettings, TileStreamer, type StreamSettings, type TileSource, type UploadStep } from './tile-streamer';
 
 // A network and a card that count; time stands still but where a test lets it pass.
 class FakeSource implements TileSource<number, number, { tile: number; slices: number }> {
@@ -37,8 +37,8 @@ class FakeSource implements TileSource<number, number, { tile: number; slices: n
     this.mostOnCard = Math.max(this.mostOnCard, this.onCard);
     return { tile, slices: 2 };
   }
-  upload(resident: { tile: number; slices: number }) {
-    return --resident.slices === 0;
+  upload(resident: { tile: number; slices: number }): UploadStep {
+    return --resident.slices === 0 ? 'done' : 'more';
   }
   free({ tile }: { tile: number }) {
     this.onCard -= this.bytes(tile);

@@ -8,13 +8,15 @@ import { SceneError } from '../scene-error';
 import type { Selection, TileRequest, TileSelector } from './tile-selector';
 import type { TileView } from './tile-view';
 
+export type UploadStep = 'more' | 'wait' | 'done';
+
 // Where contents come from, and what becomes of them. `Fetched` is a file, `Decoded` its texels, `Resident` what is drawn.
 export interface TileSource<Fetched, Decoded, Resident> {
   fetch(tile: number, signal: AbortSignal): Promise<{ file: Fetched; fileBytes: number; cardBytes: number }>;
   decode(tile: number, file: Fetched): Promise<Decoded>;
   allocate(tile: number, decoded: Decoded): Resident;
-  // Takes the next slice to the card; true when all of it is there.
-  upload(resident: Resident): boolean;
+  // Takes the next slice to the card, and says what comes next: another; to wait for the card; or that it can be drawn.
+  upload(resident: Resident): UploadStep;
   free(resident: Resident): void;
 }
 
@@ -330,7 +332,9 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     while (this.uploads.length > 0) {
       const tile = this.uploads[0];
       const entry = this.entry(tile);
-      if (this.source.upload(entry.resident!)) {
+      const step = this.source.upload(entry.resident!);
+      if (step === 'wait') return;
+      if (step === 'done') {
         this.uploads.shift();
         entry.state = 'resident';
         entry.failures = 0;

@@ -1,0 +1,91 @@
+// Ordinary models in the scene: what is in front hides what is behind, both ways. By pixels.
+import { readFileSync } from 'node:fs';
+import type { Browser, Page } from 'playwright-core';
+import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import type { Plain, View } from '../src/plain';
+import { decodeTileset } from '../src/tiles/decode-tileset';
+import { goldenScene, launch, missing, serve, type Server } from './machine';
+import { viewAt, type Place } from './views';
+
+declare const plain: Plain;
+
+// In the golden scene a building stands at |x + 1| < 0.4, |y| < 0.3, up to z = 0.45.
+const kRoof = 0.45;
+const kFacade = -0.3;
+
+describe.skipIf(missing())('a model in the scene', () => {
+  let server: Server;
+  let browser: Browser;
+  let page: Page;
+  const said: string[] = [];
+  const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json');
+  const atFacade = viewAt(tileset, [-1, -2.2, 0.3], [-1, 0, 0.1]);
+
+  beforeAll(async () => {
+    [server, browser] = await Promise.all([serve(goldenScene), launch()]);
+    page = await browser.newPage();
+    page.on('console', (message) => message.type() === 'error' && said.push(message.text()));
+    page.on('pageerror', (error) => said.push(error.message));
+    await page.goto(`${server.url}plain.html`);
+    await page.waitForFunction(() => 'plain' in window);
+    await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
+  });
+  afterAll(async () => {
+    await browser?.close();
+    server?.close();
+    expect(said).toEqual([]);
+  });
+
+  async function picture(view: View): Promise<Uint8Array> {
+    await page.evaluate((one) => plain.settle(one), view);
+    return new Uint8Array(Buffer.from(await page.evaluate(() => plain.pixels()), 'base64'));
+  }
+
+  // Of the pixels that a box covers: how many are its colour, and how many are as they are without it.
+  async function draw(view: View, low: Place, high: Place): Promise<{ covered: number; red: number; same: number }> {
+    const without = await picture(view);
+    await page.evaluate(([from, to]) => plain.addBox([...from], [...to]), [low, high] as const);
+    const together = await picture(view);
+    await page.evaluate(() => (plain.city!.visible = false));
+    const alone = await picture(view);
+    await page.evaluate(() => {
+      plain.city!.visible = true;
+      plain.removeBox();
+    });
+    const counts = { covered: 0, red: 0, same: 0 };
+    for (let at = 0; at < alone.length; at += 3) {
+      if (alone[at] < 250 || alone[at + 1] > 5) continue;
+      ++counts.covered;
+      if (together[at] > 235 && together[at + 1] < 20) ++counts.red;
+      if ([0, 1, 2].every((c) => Math.abs(together[at + c] - without[at + c]) <= 8)) ++counts.same;
+    }
+    expect(counts.covered).toBeGreaterThan(500);
+    return counts;
+  }
+
+  it('hides the facade that it stands in front of', async () => {
+    const { covered, red } = await draw(atFacade, [-1.15, kFacade - 0.4, 0], [-0.85, kFacade - 0.2, 0.3]);
+    expect(red / covered).toBeGreaterThan(0.99);
+  });
+
+  it('is hidden by the facade that it stands behind, in the building or beyond it', async () => {
+    for (const y of [-0.1, 0.5]) {
+      const { covered, same } = await draw(atFacade, [-1.15, y, -0.1], [-0.85, y + 0.15, 0.2]);
+      expect(same / covered).toBeGreaterThan(0.99);
+    }
+  });
+
+  it('is seen as far as it looks over the roof', async () => {
+    const level = viewAt(tileset, [-1, -2.2, kRoof + 0.001], [-1, 0, kRoof + 0.001]);
+    const { covered, red, same } = await draw(level, [-1.15, 0.5, kRoof - 0.2], [-0.85, 0.6, kRoof + 0.2]);
+    expect(red / covered).toBeGreaterThan(0.42);
+    expect(red / covered).toBeLessThan(0.52);
+    expect(same / covered).toBeGreaterThan(0.33); // between them the roof's edge, soft by a voxel: a sixth of the height
+  });
+
+  it('is drawn where there is nothing of the scene behind', async () => {
+    const up = viewAt(tileset, [-1, -2.2, 0.3], [-1, 0, 3]);
+    const { covered, red } = await draw(up, [-1.3, -0.3, 1.9], [-0.7, -0.2, 2.5]);
+    expect(red / covered).toBeGreaterThan(0.99);
+  });
+});
