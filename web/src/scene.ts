@@ -150,6 +150,14 @@ export class TesseraScene extends THREE.Object3D {
     mesh.visible = frontToBack.length > 0;
   }
 
+  // The place of the world, in the last picture, at `at` (from -1 to 1 across it, upwards); of the scene alone. Nothing
+  // where there is nothing, or what is there hides less than half of what is behind.
+  pick(at: THREE.Vector2, renderer: THREE.WebGLRenderer): THREE.Vector3 | undefined {
+    if (!this.compositor || this.drawn.length === 0) return undefined;
+    const inScene = this.compositor.surfaceAt(renderer, at);
+    return inScene?.applyMatrix4(this.localFromScene).applyMatrix4(this.matrixWorld);
+  }
+
   // Gives back all memory, of the card and of the page.
   override dispose(): void {
     super.dispose();

@@ -3,6 +3,8 @@
 const kSteps = [0.25, 0.375, 0.5, 0.75, 1]; // few, as targets are made anew for each
 
 export class Resolution {
+  // A share that somebody has chosen, whether the camera moves or not.
+  fixed?: number;
   private step = kSteps.length - 1;
   private lastMove = -Infinity;
   private measured = 0; // ms of a picture, at the step's resolution
@@ -21,8 +23,13 @@ export class Resolution {
     return now - this.lastMove > this.rest;
   }
 
+  // When the camera rests.
+  get whole(): number {
+    return this.fixed ?? 1;
+  }
+
   scale(now: number): number {
-    return this.isResting(now) ? 1 : kSteps[this.step];
+    return this.fixed ?? (this.isResting(now) ? 1 : kSteps[this.step]);
   }
 
   // What a picture drawn while the camera moved took.

@@ -170,6 +170,20 @@ export class Compositor {
     renderer.setRenderTarget(before);
   }
 
+  // Where the surface is in the last picture, scene units; `at` runs from -1 to 1 across it, upwards.
+  surfaceAt(renderer: THREE.WebGLRenderer, at: THREE.Vector2): THREE.Vector3 | undefined {
+    const { width, height } = this.target;
+    const pixel = (x: number, size: number) => Math.min(Math.max(Math.floor((0.5 + 0.5 * x) * size), 0), size - 1);
+    const read = this.distancesOfBytes ? new Uint8Array(4) : new Uint16Array(4);
+    renderer.readRenderTargetPixels(this.target, pixel(at.x, width), pixel(at.y, height), 1, 1, read, undefined, 1);
+    const [value, , , hides] = this.distancesOfBytes ? [...read].map((x) => x / 255) : [...read].map(THREE.DataUtils.fromHalfFloat);
+    if (hides <= 0.99) return undefined;
+    const distance = this.distancesOfBytes ? value / hides / Math.max(1 - value / hides, 1e-3) : value / hides;
+    const inPicture = new THREE.Vector3(at.x, at.y, 1);
+    const direction = inPicture.clone().applyMatrix3(this.view.ray.value).normalize();
+    return inPicture.applyMatrix3(this.view.origin.value).addScaledVector(direction, distance);
+  }
+
   dispose(): void {
     this.target.depthTexture?.dispose();
     this.target.dispose();

@@ -1,0 +1,36 @@
+// Keys that do something, and what they do, for the help.
+
+export interface Shortcut {
+  keys: string; // for people: "H", "W A S D"
+  what: string;
+}
+
+export class Shortcuts {
+  readonly list: Shortcut[] = [];
+  private readonly actions = new Map<string, () => void>();
+
+  constructor() {
+    addEventListener('keydown', (event) => {
+      if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
+      const action = this.actions.get(event.key.toLowerCase());
+      if (!action) return;
+      event.preventDefault();
+      action();
+    });
+  }
+
+  // `key` as KeyboardEvent.key has it, in small letters.
+  add(key: string, what: string, action: () => void): void {
+    this.actions.set(key, action);
+    this.describe(key.length === 1 ? key.toUpperCase() : `${key.charAt(0).toUpperCase()}${key.slice(1)}`, what);
+  }
+
+  // Of what is heard elsewhere: held keys, the mouse.
+  describe(keys: string, what: string): void {
+    this.list.push({ keys, what });
+  }
+}
+
+export function isTyping(target: EventTarget | null): boolean {
+  return target instanceof HTMLElement && target.matches('input:not([type=range], [type=checkbox]), textarea, select, [contenteditable]');
+}

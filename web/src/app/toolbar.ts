@@ -1,0 +1,63 @@
+// The buttons at the side, and the panels that they open, one at a time.
+import { element } from './element';
+import { icon, type IconName } from './icons';
+import type { Shortcuts } from './shortcuts';
+
+export interface Tool {
+  name: string; // for people: the button's label, the panel's heading
+  key?: string; // that opens it too
+  icon: IconName;
+  panel?: HTMLElement; // without: the button does something at once
+  opened?(): void;
+  closed?(): void;
+}
+
+export class Toolbar {
+  private readonly bar = element('div', 'glass toolbar');
+  private readonly panels = new Map<Tool, { button: HTMLButtonElement; panel: HTMLElement }>();
+  private current?: Tool;
+
+  constructor(
+    private readonly parent: HTMLElement,
+    private readonly shortcuts: Shortcuts,
+  ) {
+    this.bar.setAttribute('role', 'toolbar');
+    parent.append(this.bar);
+    shortcuts.add('escape', 'Close what is open', () => this.open(undefined));
+  }
+
+  add(tool: Tool): HTMLButtonElement {
+    const button = element('button', '', icon(tool.icon));
+    button.title = tool.key ? `${tool.name} (${tool.key.toUpperCase()})` : tool.name;
+    button.setAttribute('aria-label', tool.name);
+    button.addEventListener('click', () => this.toggle(tool));
+    this.bar.append(button);
+    if (tool.key) this.shortcuts.add(tool.key, tool.name, () => this.toggle(tool));
+    if (!tool.panel) return button;
+    const close = element('button', 'plain', icon('close'));
+    close.setAttribute('aria-label', 'Close');
+    close.addEventListener('click', () => this.open(undefined));
+    const panel = element('section', 'glass side', element('header', '', element('h2', '', tool.name), close), tool.panel);
+    panel.hidden = true;
+    this.parent.append(panel);
+    this.panels.set(tool, { button, panel });
+    return button;
+  }
+
+  toggle(tool: Tool): void {
+    if (!tool.panel) tool.opened?.();
+    else this.open(this.current === tool ? undefined : tool);
+  }
+
+  open(tool: Tool | undefined): void {
+    if (tool === this.current) return;
+    const before = this.current;
+    this.current = tool;
+    for (const [one, { button, panel }] of this.panels) {
+      panel.hidden = one !== tool;
+      button.classList.toggle('on', one === tool);
+    }
+    before?.closed?.();
+    tool?.opened?.();
+  }
+}

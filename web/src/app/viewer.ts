@@ -1,0 +1,132 @@
+// A scene on a canvas: the world it stands in, the camera, and when a picture is drawn. What the tools of the application
+// share.
+import * as THREE from 'three';
+import { TesseraScene } from '../scene';
+import { SceneError } from '../scene-error';
+import { Navigation } from './navigation';
+import { Resolution } from './resolution';
+
+export interface Frame {
+  milliseconds: number; // since the last one
+  resolutionScale: number;
+}
+
+export class Viewer {
+  readonly world = new THREE.Scene();
+  readonly camera = new THREE.PerspectiveCamera(50);
+  readonly navigation: Navigation;
+  readonly resolution = new Resolution();
+  // Called after each picture.
+  readonly onFrame = new Set<(frame: Frame) => void>();
+  // Called where somebody clicked, or tapped, without dragging; the first that answers true takes it.
+  readonly onClick: ((event: PointerEvent) => boolean)[] = [];
+  private needed = true; // a picture, though nothing moves
+  private held = false;
+
+  // The city is in the world, at the origin.
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    readonly renderer: THREE.WebGLRenderer,
+    readonly city: TesseraScene,
+  ) {
+    this.world.background = city.background;
+    this.world.add(city);
+    this.navigation = new Navigation(this.camera, canvas, city.bounds, (event) => this.pickAt(event));
+    this.navigation.showAll();
+    addEventListener('resize', () => this.resize());
+    this.watchClicks();
+    this.resize();
+    this.run();
+  }
+
+  // Somebody has changed what is to be seen.
+  needPicture(): void {
+    this.needed = true;
+  }
+
+  // Where the pointer is in the picture: from -1 to 1 across it, upwards.
+  pointerAt({ clientX, clientY }: { clientX: number; clientY: number }): THREE.Vector2 {
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    return new THREE.Vector2((2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height);
+  }
+
+  // The place of the world under the pointer: of the city, or of a model in front of it.
+  pickAt(event: { clientX: number; clientY: number }): THREE.Vector3 | undefined {
+    const at = this.pointerAt(event);
+    const raycaster = new THREE.Raycaster();
+    raycaster.setFromCamera(at, this.camera);
+    const hit = raycaster.intersectObjects(this.world.children.filter((child) => child !== this.city && !child.userData.isTool))[0];
+    const place = this.city.pick(at, this.renderer);
+    if (!hit || (place && place.distanceTo(this.camera.position) < hit.distance)) return place;
+    return hit.point;
+  }
+
+  // Has the loop wait while somebody else draws.
+  async whileHeld<T>(work: () => Promise<T>): Promise<T> {
+    this.held = true;
+    try {
+      return await work();
+    } finally {
+      this.held = false;
+      this.needPicture();
+    }
+  }
+
+  private resize(): void {
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(innerWidth, innerHeight, false);
+    this.camera.aspect = innerWidth / innerHeight;
+    this.camera.updateProjectionMatrix();
+    this.needPicture();
+  }
+
+  private run(): void {
+    let wasWhole = false; // the last picture was
+    let wasMoving = false; // when it was drawn
+    let before = performance.now();
+    this.renderer.setAnimationLoop(() => {
+      const now = performance.now();
+      const milliseconds = now - before;
+      before = now;
+      if (this.held) return;
+      if (this.navigation.update(milliseconds / 1000)) this.resolution.moved(now);
+      const isMoving = !this.resolution.isResting(now);
+      if (!isMoving && wasWhole && this.city.idle && !this.needed) return;
+      if (isMoving && wasMoving) this.resolution.took(milliseconds);
+      wasMoving = isMoving;
+      this.needed = false;
+      this.city.resolutionScale = this.resolution.scale(now);
+      this.draw();
+      wasWhole = this.city.resolutionScale === this.resolution.whole;
+      for (const tell of this.onFrame) tell({ milliseconds, resolutionScale: this.city.resolutionScale });
+    });
+  }
+
+  draw(): void {
+    this.city.update(this.camera, this.renderer);
+    this.renderer.render(this.world, this.camera);
+  }
+
+  private watchClicks(): void {
+    const kSlack = 5; // pixels
+    let down: { x: number; y: number; id: number } | undefined;
+    this.canvas.addEventListener('pointerdown', ({ clientX: x, clientY: y, pointerId: id, button, isPrimary }) => {
+      down = button === 0 && isPrimary ? { x, y, id } : undefined;
+    });
+    this.canvas.addEventListener('pointerup', (event) => {
+      const isClick =
+        down?.id === event.pointerId && Math.hypot(event.clientX - down.x, event.clientY - down.y) < kSlack;
+      down = undefined;
+      if (isClick) this.onClick.some((take) => take(event));
+    });
+  }
+}
+
+// Throws SceneError where the browser cannot draw.
+export function makeRenderer(canvas: HTMLCanvasElement): THREE.WebGLRenderer {
+  try {
+    return new THREE.WebGLRenderer({ canvas, antialias: false, powerPreference: 'high-performance' });
+  } catch {
+    throw new SceneError('browser', '', 'has no WebGL 2', 'allow hardware acceleration in its settings, or use another');
+  }
+}
