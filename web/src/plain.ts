@@ -1,6 +1,7 @@
 // A page with nothing around, for tests and measurements: they draw views of a scene through `window.plain`.
 import * as THREE from 'three';
-import { kYUpFromZUp, TesseraScene, type SceneOptions } from './scene';
+import { kYUpFromZUp } from './axes';
+import { TesseraScene, type SceneOptions } from './scene';
 
 const canvas = document.querySelector('canvas')!;
 const renderer = new THREE.WebGLRenderer({ canvas, antialias: false, preserveDrawingBuffer: true });

@@ -10,6 +10,7 @@
 // the same world hide; `render` then shows it among them. Its own frame is the capture's, turned from z up to y up, in
 // metres where the capture has a scale.
 import * as THREE from 'three';
+import { kYUpFromZUp } from './axes';
 import { DecodePool } from './decode-pool';
 import { cityMesh } from './draw/city-mesh';
 import { Compositor, setDefine, type DrawnContent } from './draw/compositor';
@@ -26,9 +27,6 @@ import type { VolumeContent } from './tiles/volume-content';
 import { fetchFile, VolumeSource, type ContentFile } from './volume-source';
 
 const kTilesetBytes = 1 << 24;
-
-// Capture worlds are z up, three's are y up.
-export const kYUpFromZUp = new THREE.Matrix4().set(1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1);
 
 export interface SceneOptions {
   selection?: Partial<SelectionSettings>;

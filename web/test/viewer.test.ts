@@ -1,10 +1,12 @@
 // The viewer as people open it.
-import { cpSync, mkdtempSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
+import { cpSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import { goldenScene, launch, missing, serve } from './machine';
+import { decodeTileset } from '../src/tiles/decode-tileset';
+import { goldenScene, launch, missing, run, serve } from './machine';
+import { decodePng, psnr } from './pictures';
 
 describe.skipIf(missing())('the viewer', () => {
   let browser: Browser;
@@ -45,6 +47,48 @@ describe.skipIf(missing())('the viewer', () => {
       expect(picture.length).toBeGreaterThan(20000);
       await page.keyboard.press('i');
       await page.waitForFunction(() => document.querySelector('.statistics')?.textContent?.includes('Graphics card'));
+      expect(said).toEqual([]);
+    });
+  });
+
+  it('passes a view on by its address, and draws it at any size and along a path as the processor does', async () => {
+    const tileset = decodeTileset(readFileSync(join(goldenScene, 'tileset.json'), 'utf8'), 'tileset.json');
+    await open(goldenScene, async (page, said) => {
+      // Above the block on the left, to the other one; in the capture's world.
+      const places = [[-1.8, -1.6, 0.9], [0.8, 0.2, -0.4]].map(([x, y, z]) => {
+        const { rotation: r, scale, translation: t } = tileset.worldFromScene;
+        return [0, 1, 2].map((row) => scale * (r[row] * x + r[3 + row] * y + r[6 + row] * z) + t[row]).join(',');
+      });
+      const address = `${page.url()}#eye=${places[0]}&target=${places[1]}&fov=60`;
+      await page.goto('about:blank');
+      await page.goto(address);
+      await page.waitForSelector('.loading.done', { state: 'attached' });
+      const saved = async (click: string) => {
+        const [file] = await Promise.all([page.waitForEvent('download'), page.click(`text=${click}`)]);
+        const path = join(folder, file.suggestedFilename());
+        await file.saveAs(path);
+        return path;
+      };
+      await page.keyboard.press('b');
+      await page.click('text=Keep this view');
+      await page.keyboard.press('w', { delay: 300 });
+      await page.click('text=Keep this view');
+      const cameraPath = JSON.parse(readFileSync(await saved('Save camera path'), 'utf8')) as { camera_path: unknown[]; fps: number };
+      expect(cameraPath.camera_path).toHaveLength(91);
+      await page.click('text=View 1');
+      await page.waitForTimeout(1500);
+      expect(new URL(page.url()).hash).toContain('eye=');
+      await page.keyboard.press('p');
+      await page.fill('[aria-label=Width]', '1200');
+      await page.fill('[aria-label=Height]', '300');
+      const picture = await decodePng(page, await saved('Save picture'));
+      const path = join(folder, 'path.json');
+      writeFileSync(path, JSON.stringify({
+        ...cameraPath, render_width: 1200, render_height: 300, fps: 1, seconds: 1,
+        camera_path: [{ ...(cameraPath.camera_path[0] as object), aspect: 4 }],
+      }));
+      run('render', goldenScene, join(folder, 'oracle'), '--path', path);
+      expect(psnr(picture, await decodePng(page, join(folder, 'oracle', '00000.png')))).toBeGreaterThan(38);
       expect(said).toEqual([]);
     });
   });

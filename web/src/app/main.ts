@@ -1,10 +1,15 @@
 // The viewer: a page that shows the scene which its address names (?scene=, else the folder scene beside it).
 import { TesseraScene } from '../scene';
 import { SceneError } from '../scene-error';
+import { addBookmarks } from './bookmarks';
+import { addHelp } from './help';
 import { addNavigationTools } from './navigation-tools';
 import { ErrorPanel, LoadingPanel, StatisticsPanel } from './panels';
+import { addScreenshot } from './screenshot';
+import { addSettings } from './settings';
 import { Shortcuts } from './shortcuts';
 import { Toolbar } from './toolbar';
+import { formatView, parseView } from './view-address';
 import { makeRenderer, Viewer } from './viewer';
 import './style.css';
 
@@ -28,15 +33,39 @@ async function start(): Promise<void> {
   const shortcuts = new Shortcuts();
   const toolbar = new Toolbar(document.body, shortcuts);
   addNavigationTools(viewer, toolbar, shortcuts);
+  addBookmarks(viewer, toolbar);
+  addScreenshot(viewer, toolbar);
+  addSettings(viewer, toolbar);
   toolbar.add({ name: 'Numbers', key: 'i', icon: 'chart', opened: () => {
     statistics.toggle();
     viewer.needPicture();
   } });
+  addHelp(toolbar, shortcuts);
+  keepViewInAddress(viewer);
   viewer.onFrame.add(({ milliseconds, resolutionScale }) => {
     const numbers = city.statistics;
     if (!numbers) return;
     loading.show(city.name, numbers, city.idle);
     statistics.show(numbers, milliseconds, resolutionScale);
+  });
+}
+
+// The address always holds the view, so that it can be passed on; and a view that it holds is shown.
+function keepViewInAddress(viewer: Viewer): void {
+  const show = () => {
+    const view = parseView(location.hash);
+    if (view) viewer.view = view;
+  };
+  show();
+  addEventListener('hashchange', show);
+  let waiting: ReturnType<typeof setTimeout> | undefined;
+  let written = formatView(viewer.view);
+  viewer.onFrame.add(() => {
+    const now = formatView(viewer.view);
+    if (now === written) return;
+    written = now;
+    clearTimeout(waiting);
+    waiting = setTimeout(() => history.replaceState(null, '', `#${now}`), 400); // browsers allow few changes a second
   });
 }
 

@@ -8,6 +8,13 @@ const kNames: Record<NavigationMode, string> = { map: 'Move over the map', orbit
 const kKeys: Record<NavigationMode, string> = { map: '1', orbit: '2', fly: '3' };
 
 export function addNavigationTools({ navigation }: Viewer, toolbar: Toolbar, shortcuts: Shortcuts): void {
+  shortcuts.describe('Drag', 'Move, turn or look, as the mode says');
+  shortcuts.describe('Right drag, two fingers', 'Turn; around a place: move');
+  shortcuts.describe('Wheel, pinch', 'Nearer, farther; flying: slower, faster');
+  shortcuts.describe('Double click', 'Go there');
+  shortcuts.describe('WASD, arrows', 'Move; with Shift faster');
+  shortcuts.describe('Q, E', 'Down, up');
+  shortcuts.describe('Gamepad', 'Sticks move and look, triggers go down and up');
   toolbar.add({ name: 'Show all', key: 'h', icon: 'home', opened: () => navigation.flyHome() });
   const buttons = new Map<NavigationMode, HTMLButtonElement>();
   for (const mode of kModes) {
@@ -16,11 +23,4 @@ export function addNavigationTools({ navigation }: Viewer, toolbar: Toolbar, sho
   }
   navigation.onModeChange = (mode) => buttons.forEach((button, one) => button.classList.toggle('on', one === mode));
   navigation.onModeChange(navigation.mode);
-  shortcuts.describe('W A S D, arrows', 'Move; with Shift faster');
-  shortcuts.describe('Q E', 'Down, up');
-  shortcuts.describe('Drag', 'Move the map, turn around a place, or look about, as the mode says');
-  shortcuts.describe('Right drag, two fingers', 'Turn; around a place: move');
-  shortcuts.describe('Wheel, pinch', 'Nearer and farther; when flying, slower and faster');
-  shortcuts.describe('Double click', 'Go to that place');
-  shortcuts.describe('Gamepad', 'Sticks move and look, triggers go down and up');
 }

@@ -5,6 +5,7 @@ import { TesseraScene } from '../scene';
 import { SceneError } from '../scene-error';
 import { Navigation } from './navigation';
 import { Resolution } from './resolution';
+import type { View } from './view-address';
 
 export interface Frame {
   milliseconds: number; // since the last one
@@ -39,6 +40,21 @@ export class Viewer {
     this.run();
   }
 
+  get view(): View {
+    return { ...this.navigation.look, fov: this.camera.fov };
+  }
+
+  // At once; flyTo takes its time.
+  set view({ eye, target, fov }: View) {
+    this.setLens(fov);
+    this.navigation.look = { eye, target };
+  }
+
+  flyTo({ eye, target, fov }: View): void {
+    this.setLens(fov);
+    this.navigation.flyTo({ eye, target });
+  }
+
   // Somebody has changed what is to be seen.
   needPicture(): void {
     this.needed = true;
@@ -70,6 +86,12 @@ export class Viewer {
       this.held = false;
       this.needPicture();
     }
+  }
+
+  private setLens(fov: number): void {
+    this.camera.fov = fov;
+    this.camera.updateProjectionMatrix();
+    this.needPicture();
   }
 
   private resize(): void {

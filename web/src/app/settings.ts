@@ -1,0 +1,58 @@
+// What is drawn, and how well.
+import { kDisplayModes, type DisplayMode } from '../draw/display-modes';
+import { element } from './element';
+import type { Toolbar } from './toolbar';
+import type { Viewer } from './viewer';
+
+const kModeNames: Record<DisplayMode, string> = {
+  colour: 'Colour', diffuse: 'Without reflections', specular: 'Reflections alone', features: 'Features', depth: 'Distance',
+  blocks: 'Blocks', levels: 'Levels of detail',
+};
+
+const kResolutions: [string, number | undefined][] = [
+  ['As fast as needed', undefined], ['100 %', 1], ['75 %', 0.75], ['50 %', 0.5], ['25 %', 0.25],
+];
+
+export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
+  const { city, camera, resolution } = viewer;
+  const changed = <T>(change: (value: T) => void) => (value: T) => {
+    change(value);
+    viewer.needPicture();
+  };
+  const levels = Array.from({ length: city.tileset.levels }, (_, level): [string, number] => [level === 0 ? 'All' : `Level ${level} and coarser`, level]);
+  const panel = element(
+    'div', '',
+    choice('Show', kDisplayModes.map((mode): [string, DisplayMode] => [kModeNames[mode], mode]),
+      changed((mode) => (city.display = mode))),
+    slider('Error at most', 0, 3, Math.log2(2 * city.selection.mostPixels), 0.25, (x) => `${(2 ** x / 2).toPrecision(2)} px`,
+      changed((x) => (city.selection.mostPixels = 2 ** x / 2))),
+    ...(levels.length > 1 ? [choice('Detail', levels, changed((level) => (city.selection.finestLevel = level)))] : []),
+    choice('Pixels', kResolutions, changed((share) => (resolution.fixed = share))),
+    slider('Graphics memory', 6, 13, Math.log2(city.stream.cardBytes / 2 ** 20), 0.5, (x) => `${Math.round(2 ** x)} MiB`,
+      changed((x) => (city.stream.cardBytes = 2 ** x * 2 ** 20))),
+    slider('Field of view', 15, 100, camera.fov, 1, (x) => `${x}°`, changed((x) => {
+      camera.fov = x;
+      camera.updateProjectionMatrix();
+    })),
+  );
+  toolbar.add({ name: 'Settings', key: 'c', icon: 'sliders', panel });
+}
+
+function slider(
+  name: string, least: number, most: number, value: number, step: number, say: (value: number) => string, change: (value: number) => void,
+): HTMLLabelElement {
+  const input = element('input');
+  Object.assign(input, { type: 'range', min: String(least), max: String(most), step: String(step), value: String(value) });
+  const output = element('output', '', say(value));
+  input.addEventListener('input', () => {
+    output.textContent = say(input.valueAsNumber);
+    change(input.valueAsNumber);
+  });
+  return element('label', '', name, output, input);
+}
+
+function choice<T>(name: string, choices: [string, T][], change: (value: T) => void): HTMLLabelElement {
+  const select = element('select', '', ...choices.map(([text]) => element('option', '', text)));
+  select.addEventListener('change', () => change(choices[select.selectedIndex][1]));
+  return element('label', '', name, select);
+}
