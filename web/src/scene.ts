@@ -134,7 +134,8 @@ export class TesseraScene extends THREE.Object3D {
       .filter(({ visible }) => visible)
       .map(({ tile }) => streamer.residentOf(tile))
       .filter((content) => content !== undefined);
-    const behind = streamer.residentOf(surround);
+    // What it surrounds comes first: on slow machines a picture of it alone would only take time.
+    const behind = streamer.complete ? streamer.residentOf(surround) : undefined;
     if (behind) frontToBack.push(behind);
     this.drawn = new Array<number>(this.tileset.levels).fill(0);
     for (const { tile, visible } of cut) if (visible) ++this.drawn[this.tree.tiles[tile].level];

@@ -35,7 +35,8 @@ export class VolumeSource implements TileSource<ContentFile, VolumeContent, Draw
   async fetch(tile: number, signal: AbortSignal) {
     const content = this.contentOf(tile);
     const file = await fetchFile(new URL(content.uri, this.base).href, content.uri, this.limits.fileBytes, signal);
-    const { layout } = readVolumeHeader(file, content.uri, content, this.limits);
+    const { layout, parts, network } = readVolumeHeader(file, content.uri, content, this.limits);
+    this.compositor.prepare(this.renderer, parts, network, content.surround);
     return { file, fileBytes: file.length, cardBytes: layout.bytes };
   }
 

@@ -2,9 +2,10 @@
 // (docs/tile-format.md, section 4).
 import * as THREE from 'three';
 import type { Box, TileContent, Vec3 } from '../tiles/tileset';
+import type { DenseLayer, VolumePart } from '../tiles/volume-content';
 import { frontToBack as orderOf } from './box-order';
 import { colourOfBlock, colourOfLevel } from './display-modes';
-import { volumeMaterial, viewUniforms, type MaterialOptions, type ViewUniforms } from './volume-material';
+import { programMaterial, volumeMaterial, viewUniforms, type ProgramShape, type ViewUniforms } from './volume-material';
 import type { ContentTextures } from './content-textures';
 
 // A content that may be drawn.
@@ -56,6 +57,7 @@ export class Compositor {
   private readonly cube = new THREE.BoxGeometry(1, 1, 1);
   private readonly screen = screenTriangle();
   private readonly anyCamera = new THREE.Camera();
+  private readonly prepared = new Map<string, THREE.Material>(); // hold programs, by their shape
 
   // What the card can blend decides how the pictures are kept.
   constructor(renderer: THREE.WebGLRenderer, place: ScenePlace) {
@@ -85,22 +87,28 @@ export class Compositor {
     this.view.sceneNear.value = place.near;
   }
 
+  // Has the driver begin with the program of such a content, beside other work.
+  prepare(renderer: THREE.WebGLRenderer, parts: VolumePart[], network: DenseLayer[], surround: boolean): void {
+    const shape = this.shapeOf(parts, network.map((layer) => layer.outputs), surround);
+    const key = JSON.stringify(shape);
+    if (this.prepared.has(key)) return;
+    const material = programMaterial(shape);
+    this.prepared.set(key, material);
+    setDefine(material, 'OPAQUE', this.view.opaqueDepth.value !== null);
+    renderer.compile(new THREE.Mesh(this.screen, material), this.anyCamera);
+  }
+
   // `number` and `level` are the tile's, for display modes.
   make(textures: ContentTextures, { box, surround }: Pick<TileContent, 'box' | 'surround'>, number: number, level: number): DrawnContent {
-    // What is contracted may own what lies beyond any box.
-    const everywhere = surround || textures.parts.some((part) => part.contracted);
-    const options: MaterialOptions = {
-      surround, everywhere, distancesOfBytes: this.distancesOfBytes, colourOfBlock: colourOfBlock(number),
-      colourOfLevel: colourOfLevel(level),
-    };
+    const shape = this.shapeOf(textures.parts, textures.widths, surround);
+    const material = volumeMaterial(textures, this.view, shape, { block: colourOfBlock(number), level: colourOfLevel(level) });
     const mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>(
-      everywhere ? this.screen : this.cube, volumeMaterial(textures, this.view, options));
+      shape.everywhere ? this.screen : this.cube, material);
     mesh.frustumCulled = false;
     mesh.matrixAutoUpdate = mesh.matrixWorldAutoUpdate = false;
     return { textures, box, surround, mesh };
   }
 
-  // Has the driver begin with the content's program, which it may do beside other work.
   compile(renderer: THREE.WebGLRenderer, { mesh }: DrawnContent): void {
     setDefine(mesh.material, 'OPAQUE', this.view.opaqueDepth.value !== null);
     renderer.compile(mesh, this.anyCamera);
@@ -191,6 +199,14 @@ export class Compositor {
     (this.hiding.children[0] as THREE.Mesh<THREE.BufferGeometry, THREE.Material>).material.dispose();
     this.cube.dispose();
     this.screen.dispose();
+    for (const material of this.prepared.values()) material.dispose();
+    this.prepared.clear();
+  }
+
+  private shapeOf(parts: VolumePart[], widths: number[], surround: boolean): ProgramShape {
+    // What is contracted may own what lies beyond any box.
+    const everywhere = surround || parts.some((part) => part.contracted);
+    return { parts: parts.length, widths, surround, everywhere, distancesOfBytes: this.distancesOfBytes };
   }
 
   // Of a parallel projection, so far behind the picture that its rays come from there.

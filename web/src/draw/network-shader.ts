@@ -17,6 +17,13 @@ export function packNetwork(network: DenseLayer[]): Float32Array {
   return new Float32Array(packed);
 }
 
+const kNetworkInputs = 34;
+
+// How many vectors that makes.
+export function vectorsOfNetwork(widths: number[]): number {
+  return widths.reduce((sum, width, layer) => sum + Math.ceil(width / 4) * (1 + (widths[layer - 1] ?? kNetworkInputs)), 0);
+}
+
 // `vec3 deferred(vec3 diffuse, vec4 features, vec3 d)`; reads the packed vectors from content[begin] on. `widths` are
 // the layers' numbers of outputs.
 export function networkShader(widths: number[], begin: number): string {

@@ -6,7 +6,7 @@ import pathSource from '../../../shaders/lib/volume_path.glsl?raw';
 import { kVectorsOfPart } from '../tiles/volume-content';
 import type { ContentTextures } from './content-textures';
 import { kDisplayConstants } from './display-modes';
-import { networkShader } from './network-shader';
+import { networkShader, vectorsOfNetwork } from './network-shader';
 
 // The same for all contents of a picture. Scene units; `ndc` runs from -1 to 1 across the picture.
 export interface ViewUniforms {
@@ -126,46 +126,29 @@ void main() {
   distanceAndOpacity = vec4(surface * hides, 0.0, 0.0, hides);
 }`;
 
-export interface MaterialOptions {
+// What a program depends on.
+export interface ProgramShape {
+  parts: number;
+  widths: number[]; // outputs of the network's layers
   surround: boolean;
   everywhere: boolean; // fills the picture, as it owns what lies beyond any box
   distancesOfBytes: boolean; // the target's are, from 0 for no distance to 255 for the farthest
-  colourOfBlock: THREE.Color; // for display modes
-  colourOfLevel: THREE.Color;
 }
 
-// Contents of one shape (parts, widths of layers) share a program. Drawn front to back, blended under what is there.
-export function volumeMaterial(textures: ContentTextures, view: ViewUniforms, options: MaterialOptions): THREE.RawShaderMaterial {
-  const { parts, widths, numbers, ranges, stepsPerTexel } = textures;
-  const group = new THREE.UniformsGroup();
-  group.setName('Content');
-  group.add(new THREE.Uniform(numbers));
-  const defines: Record<string, number | string> = { PARTS: parts.length, VECTORS: numbers.length / 4 };
-  if (options.surround) defines.SURROUND = '';
-  if (options.everywhere) defines.EVERYWHERE = '';
-  if (options.distancesOfBytes) defines.DISTANCES_OF_BYTES = '';
-  const material = new THREE.RawShaderMaterial({
+// Without uniforms: so that the driver may begin with a program before its content is there.
+export function programMaterial(shape: ProgramShape): THREE.RawShaderMaterial {
+  const { parts, widths } = shape;
+  const ofParts = kVectorsOfPart * parts;
+  const defines: Record<string, number | string> = { PARTS: parts, VECTORS: ofParts + vectorsOfNetwork(widths) };
+  if (shape.surround) defines.SURROUND = '';
+  if (shape.everywhere) defines.EVERYWHERE = '';
+  if (shape.distancesOfBytes) defines.DISTANCES_OF_BYTES = '';
+  return new THREE.RawShaderMaterial({
     glslVersion: THREE.GLSL3,
     vertexShader: kVertexShader,
-    fragmentShader: [
-      kFragmentHead, kDisplayConstants, pathSource, marchSource, networkShader(widths, kVectorsOfPart * parts.length), kFragmentMain,
-    ].join('\n'),
+    fragmentShader: [kFragmentHead, kDisplayConstants, pathSource, marchSource, networkShader(widths, ofParts), kFragmentMain].join('\n'),
     defines,
-    uniforms: {
-      ...view,
-      planesFirst: { value: textures.planesFirst },
-      planesSecond: { value: textures.planesSecond },
-      voxelsFirst: { value: textures.voxelsFirst },
-      voxelsSecond: { value: textures.voxelsSecond },
-      macroblocks: { value: textures.macroblocks },
-      distances: { value: textures.distances },
-      featureRange: { value: ranges.features },
-      densityRange: { value: ranges.density },
-      stepsPerTexel: { value: stepsPerTexel },
-      colourOfBlock: { value: options.colourOfBlock },
-      colourOfLevel: { value: options.colourOfLevel },
-    },
-    side: options.everywhere ? THREE.DoubleSide : THREE.BackSide,
+    side: shape.everywhere ? THREE.DoubleSide : THREE.BackSide,
     transparent: true,
     depthWrite: false,
     depthTest: true,
@@ -179,6 +162,30 @@ export function volumeMaterial(textures: ContentTextures, view: ViewUniforms, op
     premultipliedAlpha: true,
     toneMapped: false,
   });
+}
+
+// Contents of one shape share a program. Drawn front to back, blended under what is there.
+export function volumeMaterial(
+  textures: ContentTextures, view: ViewUniforms, shape: ProgramShape, colours: { block: THREE.Color; level: THREE.Color },
+): THREE.RawShaderMaterial {
+  const material = programMaterial(shape);
+  const group = new THREE.UniformsGroup();
+  group.setName('Content');
+  group.add(new THREE.Uniform(textures.numbers));
+  material.uniforms = {
+    ...view,
+    planesFirst: { value: textures.planesFirst },
+    planesSecond: { value: textures.planesSecond },
+    voxelsFirst: { value: textures.voxelsFirst },
+    voxelsSecond: { value: textures.voxelsSecond },
+    macroblocks: { value: textures.macroblocks },
+    distances: { value: textures.distances },
+    featureRange: { value: textures.ranges.features },
+    densityRange: { value: textures.ranges.density },
+    stepsPerTexel: { value: textures.stepsPerTexel },
+    colourOfBlock: { value: colours.block },
+    colourOfLevel: { value: colours.level },
+  };
   material.uniformsGroups = [group];
   return material;
 }
