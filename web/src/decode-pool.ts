@@ -1,4 +1,5 @@
 // Workers that read contents.
+import { makeWorker } from './make-worker';
 import { SceneError } from './scene-error';
 import type { VolumeLimits } from './tiles/decode-volume';
 import type { TileContent } from './tiles/tileset';
@@ -46,7 +47,7 @@ export class DecodePool {
   private worker(index: number): Worker {
     const known = this.workers[index];
     if (known) return known;
-    const worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' });
+    const worker = makeWorker();
     worker.onmessage = ({ data }: MessageEvent<DecodeAnswer>) => {
       const waiting = this.waiting.get(data.id);
       this.waiting.delete(data.id);

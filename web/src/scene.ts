@@ -17,6 +17,7 @@ import { Compositor, setDefine, type DrawnContent } from './draw/compositor';
 import { kDisplayModes, type DisplayMode } from './draw/display-modes';
 import { OpaqueDepth } from './draw/opaque-depth';
 import { SceneError } from './scene-error';
+import { ServedFiles, type ContentFile, type SceneFiles } from './scene-files';
 import { TileSelector, kSelectionSettings, type SelectionSettings } from './stream/tile-selector';
 import { coarsestTiles, tileTree, type TileTree } from './stream/tile-tree';
 import { TileView, type Plane } from './stream/tile-view';
@@ -24,7 +25,7 @@ import { kStreamSettings, TileStreamer, type StreamSettings, type StreamStatisti
 import { decodeTileset } from './tiles/decode-tileset';
 import type { Tileset, Vec3 } from './tiles/tileset';
 import type { VolumeContent } from './tiles/volume-content';
-import { fetchFile, VolumeSource, type ContentFile } from './volume-source';
+import { VolumeSource } from './volume-source';
 
 const kTilesetBytes = 1 << 24;
 
@@ -61,12 +62,14 @@ export class TesseraScene extends THREE.Object3D {
   // What was on the card is gone: all is fetched anew when there is a card again.
   private readonly onContextLost = () => this.leaveCard();
 
-  // Throws SceneError where there is no scene, or one of another kind.
-  static async load(url: string, options: SceneOptions = {}): Promise<TesseraScene> {
+  // From the address of a scene's folder (or of the tileset.json in it), or other files. Throws SceneError where there is
+  // no scene, or one of another kind.
+  static async load(from: string | SceneFiles, options: SceneOptions = {}): Promise<TesseraScene> {
+    const files = typeof from === 'string' ? new ServedFiles(from) : from;
     const pool = new DecodePool();
     pool.start(options.stream?.decodes ?? kStreamSettings.decodes);
     try {
-      return new TesseraScene(...(await openTileset(url)), options, pool);
+      return new TesseraScene(await openTileset(files), files, options, pool);
     } catch (error) {
       pool.dispose();
       throw error;
@@ -75,7 +78,7 @@ export class TesseraScene extends THREE.Object3D {
 
   private constructor(
     readonly tileset: Tileset,
-    readonly url: string,
+    readonly files: SceneFiles,
     options: SceneOptions,
     private readonly pool: DecodePool,
   ) {
@@ -191,7 +194,7 @@ export class TesseraScene extends THREE.Object3D {
   private prepare(renderer: THREE.WebGLRenderer) {
     if (!this.compositor || !this.streamer || !this.mesh) {
       this.compositor = new Compositor(renderer, this.tileset);
-      const source = new VolumeSource(this.tree, this.url, this.pool, this.compositor, renderer);
+      const source = new VolumeSource(this.tree, this.files, this.pool, this.compositor, renderer);
       const pinned = [...coarsestTiles(this.tree), ...(this.tree.surround >= 0 ? [this.tree.surround] : [])];
       this.streamer = new TileStreamer(new TileSelector(this.tree, this.selection), source, pinned, this.stream);
       this.streamer.onError = (error) => this.onError(error);
@@ -204,16 +207,13 @@ export class TesseraScene extends THREE.Object3D {
   }
 }
 
-// The tileset, and the url that it was found under.
-async function openTileset(url: string): Promise<[Tileset, string]> {
-  const absolute = new URL(url, location.href);
-  if (!absolute.pathname.endsWith('.json')) absolute.pathname = `${absolute.pathname.replace(/\/$/, '')}/tileset.json`;
-  const text = new TextDecoder().decode(await fetchFile(absolute.href, 'tileset.json', kTilesetBytes));
+async function openTileset(files: SceneFiles): Promise<Tileset> {
+  const text = new TextDecoder().decode(await files.read('tileset.json', kTilesetBytes));
   const tileset = decodeTileset(text, 'tileset.json');
   if (tileset.representation !== 'volume') {
     throw new SceneError('tileset.json', '', `is a scene of ${tileset.representation}, not of volume`, 'draw it with a viewer that knows it');
   }
-  return [tileset, absolute.href];
+  return tileset;
 }
 
 // The camera as the selection needs it, in scene units.

@@ -7,7 +7,7 @@ import { chromium, type Browser } from 'playwright-core';
 const root = fileURLToPath(new URL('../../', import.meta.url));
 export const program = process.env.TESSERA ?? `${root}build/release/apps/tessera/tessera`;
 export const goldenScene = `${root}tests/golden/volume`;
-const viewer = `${root}web/dist`;
+export const viewer = `${root}web/dist`;
 const chromiumPath = process.env.TESSERA_CHROMIUM ?? '/usr/bin/chromium';
 
 // Why there can be no tests here; undefined where there can. With TESSERA_REQUIRE_BROWSER it is an error.

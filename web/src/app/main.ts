@@ -1,7 +1,9 @@
 // The viewer: a page that shows the scene which its address names (?scene=, else the folder scene beside it).
 import { TesseraScene } from '../scene';
 import { SceneError } from '../scene-error';
+import { ChosenFiles } from '../scene-files';
 import { addBookmarks } from './bookmarks';
+import { element } from './element';
 import { addHelp } from './help';
 import { addNavigationTools } from './navigation-tools';
 import { ErrorPanel, LoadingPanel, StatisticsPanel } from './panels';
@@ -25,8 +27,7 @@ function fail(error: unknown): void {
 
 async function start(): Promise<void> {
   const renderer = makeRenderer(canvas);
-  const url = new URLSearchParams(location.search).get('scene') ?? 'scene/tileset.json';
-  const city = await TesseraScene.load(url);
+  const city = await TesseraScene.load(location.protocol === 'file:' ? await chooseScene() : sceneOfAddress());
   city.onError = fail;
   document.title = city.name === '' ? 'tessera' : `${city.name} · tessera`;
   const viewer = new Viewer(canvas, renderer, city);
@@ -48,6 +49,32 @@ async function start(): Promise<void> {
     loading.show(city.name, numbers, city.idle);
     statistics.show(numbers, milliseconds, resolutionScale);
   });
+}
+
+function sceneOfAddress(): string {
+  return new URLSearchParams(location.search).get('scene') ?? 'scene/tileset.json';
+}
+
+// A page that was not served may read nothing but what somebody chooses.
+async function chooseScene(): Promise<ChosenFiles> {
+  loading.hide();
+  const input = element('input');
+  Object.assign(input, { type: 'file', webkitdirectory: true, multiple: true });
+  const panel = element(
+    'div', 'glass choose', element('h1', '', 'tessera'), element('p', '', 'Choose the folder of a scene. Nothing leaves this computer.'),
+    element('label', 'button', 'Choose folder', input));
+  document.body.append(panel);
+  for (;;) {
+    const files = await new Promise<File[]>((resolve) => (input.onchange = () => resolve([...input.files!])));
+    try {
+      const chosen = new ChosenFiles(files);
+      panel.remove();
+      errors.hide();
+      return chosen;
+    } catch (error) {
+      fail(error);
+    }
+  }
 }
 
 // The address always holds the view, so that it can be passed on; and a view that it holds is shown.

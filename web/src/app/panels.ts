@@ -49,6 +49,10 @@ export class ErrorPanel {
     parent.append(this.panel);
   }
 
+  hide(): void {
+    this.panel.hidden = true;
+  }
+
   show({ what, place, reason, remedy }: SceneError): void {
     const sentence = (text: string) => `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
     this.what.textContent = place === '' ? what : `${what}, ${place}`;
