@@ -109,6 +109,19 @@ const plain = {
     world.add(mesh);
   },
 
+  // Red cubes in the capture's world: their middles, and half an edge each.
+  addCubes(cubes: { middle: number[]; half: number }[]): void {
+    const mesh = new THREE.InstancedMesh(
+      new THREE.BoxGeometry(2, 2, 2), new THREE.MeshBasicMaterial({ color: 0xff0000 }), cubes.length);
+    mesh.name = 'box';
+    mesh.frustumCulled = false;
+    cubes.forEach(({ middle, half }, i) =>
+      mesh.setMatrixAt(i, new THREE.Matrix4().makeScale(half, half, half).setPosition(...(middle as [number, number, number]))));
+    mesh.applyMatrix4(kYUpFromZUp);
+    world.add(mesh);
+  },
+
+  // What addBox or addCubes has added.
   removeBox(): void {
     const box = world.getObjectByName('box') as THREE.Mesh<THREE.BufferGeometry, THREE.Material>;
     box.removeFromParent();

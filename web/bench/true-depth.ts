@@ -1,0 +1,60 @@
+// What a made capture knows of its photos: how far away everything is.
+import { readFileSync } from 'node:fs';
+import * as THREE from 'three';
+import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
+import type { View } from '../src/plain';
+
+export interface SeenPlace {
+  place: number[]; // in the capture's world
+  eye: number[];
+  pixel: [number, number]; // of the view, from the upper left
+}
+
+const kStride = 24; // pixels of the photo between places
+const kFlat = 0.02; // neighbours differ by no more of their depth: edges of things may be a pixel off
+
+// Places that a photo shows, as seen by a pinhole where the photo was taken. `lens` is OpenCV's: fx fy cx cy k1 k2 p1 p2.
+// Depth is along the camera's axis, in world units.
+export function placesOfDepth(file: string, lens: number[], view: View): SeenPlace[] {
+  const bytes = readFileSync(file);
+  // The reader takes one channel of brightness, not one of depth: it is told that it is one.
+  const name = bytes.indexOf('channels\0chlist\0') + 20;
+  if (bytes.toString('latin1', name, name + 2) !== 'Z\0') throw new Error(`${file} is no depth map`);
+  bytes.write('Y', name);
+  const loader = new EXRLoader();
+  loader.setDataType(THREE.FloatType);
+  const { data, width, height } = loader.parse(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length) as ArrayBuffer) as {
+    data: Float32Array; width: number; height: number;
+  };
+  const channels = data.length / (width * height);
+  const depthAt = (x: number, y: number) => data[channels * (x + width * (height - 1 - y))]; // rows from below
+  const matrix = new THREE.Matrix4().fromArray(view.matrix);
+  const eye = new THREE.Vector3().setFromMatrixPosition(matrix);
+  const places: SeenPlace[] = [];
+  for (let y = kStride; y < height - kStride; y += kStride) {
+    for (let x = kStride; x < width - kStride; x += kStride) {
+      const depth = depthAt(x, y);
+      const around = [[-2, 0], [2, 0], [0, -2], [0, 2]].map(([dx, dy]) => depthAt(x + dx, y + dy));
+      if (!(depth > 0 && depth < 1e4) || around.some((other) => !(Math.abs(other - depth) < kFlat * depth))) continue;
+      const [u, v] = undistorted(x + 0.5, y + 0.5, lens);
+      const pixel: [number, number] = [Math.floor(view.cx + view.fx * u), Math.floor(view.cy + view.fy * v)];
+      if (pixel[0] < 0 || pixel[1] < 0 || pixel[0] >= view.width || pixel[1] >= view.height) continue;
+      const place = new THREE.Vector3(u * depth, -v * depth, -depth).applyMatrix4(matrix);
+      places.push({ place: place.toArray(), eye: eye.toArray(), pixel });
+    }
+  }
+  return places;
+}
+
+// Where the ray of a pixel meets the plane at depth 1, downwards; by iteration, as the distortion is small.
+function undistorted(x: number, y: number, [fx, fy, cx, cy, k1, k2, p1, p2]: number[]): [number, number] {
+  const [a, b] = [(x - cx) / fx, (y - cy) / fy];
+  let [u, v] = [a, b];
+  for (let i = 0; i < 20; ++i) {
+    const r = u * u + v * v;
+    const radial = 1 + k1 * r + k2 * r * r;
+    const [du, dv] = [2 * p1 * u * v + p2 * (r + 2 * u * u), p1 * (r + 2 * v * v) + 2 * p2 * u * v];
+    [u, v] = [(a - du) / radial, (b - dv) / radial];
+  }
+  return [u, v];
+}
