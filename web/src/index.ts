@@ -1,0 +1,9 @@
+// The library: a scene as an object of three.js.
+export { kYUpFromZUp } from './axes';
+export { kDisplayModes, type DisplayMode } from './draw/display-modes';
+export { TesseraScene, type SceneOptions, type SceneStatistics } from './scene';
+export { SceneError } from './scene-error';
+export { ChosenFiles, ServedFiles, type SceneFiles } from './scene-files';
+export type { SelectionSettings } from './stream/tile-selector';
+export type { StreamSettings } from './stream/tile-streamer';
+export type { Georeference, Tileset } from './tiles/tileset';
