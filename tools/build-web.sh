@@ -7,4 +7,4 @@ if ! cmp -s package-lock.json node_modules/.installed.json; then
   npm ci --no-audit --no-fund --loglevel=error
   cp package-lock.json node_modules/.installed.json
 fi
-[ "${1:-}" = --packages-only ] || npm run --silent build -- --logLevel warn
+[ "${1:-}" = --packages-only ] || npm run --silent build
