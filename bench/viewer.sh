@@ -16,4 +16,5 @@ FINEST_BYTES=$("$tessera" info "$LARGE_SCENE" --json | jq .level_0.bytes_in_memo
 export FINEST_BYTES
 tools/install-debian-packages.sh --browser
 tools/build-web.sh
-cd web && xvfb-run -a npx vitest run --config vitest.bench.config.ts --disable-console-intercept 2>&1 | tee "../$out/viewer.txt"
+cd web && xvfb-run -a npx vitest run bench/viewer.ts --config vitest.bench.config.ts --disable-console-intercept 2>&1 |
+  tee "../$out/viewer.txt"

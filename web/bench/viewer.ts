@@ -4,55 +4,24 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import type { Plain, View } from '../src/plain';
+import type { Plain } from '../src/plain';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { countCardMemory, type CardMemory } from '../test/card-memory';
 import { launch, run, serve, type Server } from '../test/machine';
-import { cameraPath, decodePng, psnr } from '../test/pictures';
+import { cameraPath, capturedViews, decodePng, psnr } from '../test/pictures';
+import { kWidth, viewAt } from '../test/views';
 import { placesOfDepth } from './true-depth';
-import { kFieldOfView, kHeight, kWidth, viewAt } from '../test/views';
+import { needed, verdict } from './verdict';
 
 declare const plain: Plain;
 declare const cardMemory: CardMemory;
 
-const needed = (name: string) => process.env[name] ?? expect.fail(`${name} names no folder`);
 const small = needed('SMALL_SCENE'); // 2x2 blocks
 const smallCapture = needed('SMALL_CAPTURE');
 const large = needed('LARGE_SCENE'); // 4x4 blocks, two coarser levels
 
-function verdict(what: string, value: number, how: '>=' | '<=', bound: number): void {
-  const holds = how === '>=' ? value >= bound : value <= bound;
-  console.log(`${what}: ${Number(value.toPrecision(5))} (wanted ${how} ${bound}) ${holds ? 'ok' : 'FAILED'}`);
-  expect.soft(holds, what).toBe(true);
-}
-
 function tilesetOf(scene: string) {
   return decodeTileset(readFileSync(join(scene, 'tileset.json'), 'utf8'), 'tileset.json');
-}
-
-interface Frame {
-  file_path: string;
-  depth_file_path: string;
-  transform_matrix: number[][];
-}
-
-// Ten held-out photos, and pinholes at their places; where fewer are held out, the first of the others too.
-function heldOut(): { view: View; frame: Frame; lens: number[] }[] {
-  const capture = JSON.parse(readFileSync(join(smallCapture, 'transforms.json'), 'utf8')) as {
-    test_filenames: string[];
-    train_filenames: string[];
-    frames: Frame[];
-    tessera: { cameras: { parameters: number[] }[] };
-  };
-  const names = [...capture.test_filenames, ...capture.train_filenames].slice(0, 10);
-  const focal = kHeight / 2 / Math.tan((kFieldOfView * Math.PI) / 360);
-  return names.map((name) => {
-    const frame = capture.frames.find((one) => one.file_path === name)!;
-    const rows = frame.transform_matrix;
-    const matrix = [0, 1, 2, 3].flatMap((column) => [0, 1, 2, 3].map((row) => rows[row]?.[column] ?? (column === 3 ? 1 : 0)));
-    const view = { matrix, fx: focal, fy: focal, cx: kWidth / 2, cy: kHeight / 2, width: kWidth, height: kHeight };
-    return { view, frame, lens: capture.tessera.cameras[0].parameters };
-  });
 }
 
 // Bytes of all files of a scene.
@@ -95,7 +64,7 @@ describe('the viewer', () => {
 
   it('draws held-out views as the processor does', async () => {
     const tileset = tilesetOf(small);
-    const views = heldOut().map(({ view }) => view);
+    const views = capturedViews(smallCapture, 10).map(({ view }) => view);
     const path = join(folder, 'path.json');
     writeFileSync(path, cameraPath(tileset, views.map(({ matrix }) => matrix)));
     run('render', small, join(folder, 'oracle'), '--path', path);
@@ -121,8 +90,8 @@ describe('the viewer', () => {
     const page = await open(small);
     await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
     const counts = { places: 0, inFront: 0, behind: 0 };
-    for (const { view, frame, lens } of heldOut()) {
-      const places = placesOfDepth(join(smallCapture, frame.depth_file_path), lens, view);
+    for (const { view, lens, depthFile } of capturedViews(smallCapture, 10)) {
+      const places = placesOfDepth(join(smallCapture, depthFile), lens, view);
       counts.places += places.length;
       for (const [kind, factor] of [['inFront', 0.95], ['behind', 1.05]] as const) {
         const cubes = places.map(({ place, eye }) => {

@@ -1,6 +1,8 @@
 // Pictures of the renderer on the processor, for comparison.
 import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
 import type { Page } from 'playwright-core';
+import type { View } from '../src/plain';
 import type { Tileset } from '../src/tiles/tileset';
 import { kFieldOfView, kHeight, kWidth } from './views';
 
@@ -19,6 +21,30 @@ export function cameraPath(tileset: Tileset, matrices: number[][]): string {
   });
   return JSON.stringify({
     camera_type: 'perspective', render_width: kWidth, render_height: kHeight, fps: matrices.length, seconds: 1, camera_path,
+  });
+}
+
+// A photo, as the tests' pinhole sees the same place.
+export interface CapturedView {
+  view: View;
+  lens: number[]; // the photo's own: OpenCV's fx fy cx cy k1 k2 p1 p2
+  depthFile: string; // in the capture
+}
+
+// Held-out photos of a capture; where fewer are held out, the first of the others too.
+export function capturedViews(capture: string, count: number): CapturedView[] {
+  const { test_filenames, train_filenames, frames, tessera } = JSON.parse(readFileSync(join(capture, 'transforms.json'), 'utf8')) as {
+    test_filenames: string[];
+    train_filenames: string[];
+    frames: { file_path: string; depth_file_path: string; transform_matrix: number[][] }[];
+    tessera: { cameras: { parameters: number[] }[] };
+  };
+  const focal = kHeight / 2 / Math.tan((kFieldOfView * Math.PI) / 360);
+  return [...test_filenames, ...train_filenames].slice(0, count).map((name) => {
+    const { transform_matrix: rows, depth_file_path: depthFile } = frames.find((frame) => frame.file_path === name)!;
+    const matrix = [0, 1, 2, 3].flatMap((column) => [0, 1, 2, 3].map((row) => rows[row]?.[column] ?? (column === 3 ? 1 : 0)));
+    const view = { matrix, fx: focal, fy: focal, cx: kWidth / 2, cy: kHeight / 2, width: kWidth, height: kHeight };
+    return { view, lens: tessera.cameras[0].parameters, depthFile };
   });
 }
 

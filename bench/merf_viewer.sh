@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# A frame of the viewer against one of MERF's own, both in Debian's Chromium by Mesa's OpenGL on the processor: one block of
+# a city, trained, baked and exported for it, from twenty pinholes at 480x270. Resumable, as volume.sh is; pictures of both
+# lie in build/bench/merf_viewer/pictures. MERF_VIEWER is the folder merf/webviewer of google-research, with what its README
+# says to download into third_party.
+#   MERF_VIEWER=DIR [MINUTES=10] bench/merf_viewer.sh
+set -euo pipefail
+source "$(dirname "$0")/setup.sh"
+need_tessera
+: "${MERF_VIEWER:?names no folder; it must be merf/webviewer of https://github.com/google-research/google-research}"
+MERF_VIEWER=$(realpath "$MERF_VIEWER")
+for file in index.html fragment.glsl; do
+  [ -e "$MERF_VIEWER/$file" ] || die "$MERF_VIEWER: has no $file; it must be merf/webviewer of google-research"
+done
+for file in three.js OrbitControls.js PointerLockControls.js zlib.js png.js stats.min.js; do
+  [ -e "$MERF_VIEWER/third_party/$file" ] || die "$MERF_VIEWER/third_party: has no $file; merf/README.md says from where"
+done
+export MERF_VIEWER
+work=$out/merf_viewer
+minutes=${MINUTES:-10}
+settings "MINUTES=$minutes"
+[ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
+trained model city --method volume --blocks 1x1 --set surround=border --minutes "$minutes"
+baked model scene city
+MERF_NEAR=$("$tessera" export "$work/scene" "$work/export" --format merf --json | jq .near)
+TESSERA=$(realpath "$tessera")
+export MERF_NEAR TESSERA MERF_WORK=$PWD/$work
+tools/install-debian-packages.sh --browser
+tools/build-web.sh
+cd web && xvfb-run -a npx vitest run bench/merf.ts --config vitest.bench.config.ts --disable-console-intercept 2>&1 |
+  tee "../$out/merf_viewer.txt"

@@ -1,0 +1,174 @@
+// The viewer beside MERF's own (google-research, merf/webviewer), in one browser: bench/merf_viewer.sh. The same block, the
+// same pinholes, a ray for every pixel of 480×270 in every frame; both (MERF's with `quality=high`) take steps of one texel
+// of the planes until 1/255 is left of a ray. Frames are taken by turns, and each ends when the card has finished it.
+import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import type { Browser, Page } from 'playwright-core';
+import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import type { Plain, View } from '../src/plain';
+import { decodeTileset } from '../src/tiles/decode-tileset';
+import { launch, serve, type Server } from '../test/machine';
+import { capturedViews, psnr } from '../test/pictures';
+import { kFieldOfView, kHeight, kWidth, viewAt } from '../test/views';
+import { needed, verdict } from './verdict';
+
+declare const plain: Plain;
+// Globals of MERF's viewer (three.js r113).
+declare let gCamera: { matrixWorld: { fromArray(numbers: number[]): void } };
+declare let gRenderer: { getContext(): WebGL2RenderingContext };
+declare let gLowResTexture: { width: number; height: number };
+declare let gLoadedTextures: number, gNumTextures: number;
+declare function renderProgressively(): void;
+
+const viewer = needed('MERF_VIEWER');
+const work = needed('MERF_WORK'); // capture, scene, what was exported of it
+const scene = join(work, 'scene');
+const pictures = join(work, 'pictures');
+const near = needed('MERF_NEAR');
+
+const kRounds = 5;
+const kFrames = 2; // a round, and one before that does not count
+const kHost = 'http://merf.viewer';
+
+const median = (numbers: number[]) => [...numbers].sort((a, b) => a - b)[numbers.length >> 1];
+
+describe('the viewer beside that of MERF', () => {
+  const tileset = decodeTileset(readFileSync(join(scene, 'tileset.json'), 'utf8'), 'tileset.json');
+  let browser: Browser;
+  let server: Server;
+  let ours: Page;
+  let theirs: Page;
+  const said: string[] = [];
+
+  beforeAll(async () => {
+    mkdirSync(pictures, { recursive: true });
+    [browser, server] = await Promise.all([launch(), serve(scene)]);
+    ours = await newPage();
+    theirs = await newPage();
+  });
+  afterAll(async () => {
+    await browser.close();
+    server.close();
+  });
+
+  async function newPage(): Promise<Page> {
+    const page = await browser.newPage();
+    page.on('console', (message) => message.type() === 'error' && said.push(message.text()));
+    page.on('pageerror', (error) => said.push(error.message));
+    return page;
+  }
+
+  async function openTheirs(): Promise<void> {
+    await theirs.route(`${kHost}/**`, (route) => {
+      const path = decodeURIComponent(new URL(route.request().url()).pathname);
+      if (path === '/favicon.ico') return route.fulfill({ status: 204 });
+      return route.fulfill({ path: path.startsWith('/block/') ? join(work, 'export', path.slice(7)) : join(viewer, path) });
+    });
+    const loaded = theirs.waitForEvent('console', (message) => message.text().startsWith('Successfully loaded scene'));
+    await theirs.goto(
+      `${kHost}/index.html?dir=block&quality=high&near=${near}&s=${kWidth},${kHeight}&vfovy=${kFieldOfView}`);
+    await loaded;
+    await theirs.waitForFunction(() => gLoadedTextures >= gNumTextures);
+    await theirs.waitForLoadState('networkidle');
+    // From here on it draws when it is told to.
+    await theirs.evaluate(() => void (window.requestAnimationFrame = () => 0));
+  }
+
+  // Its space is y up: (y, z, x) of the scene, whose one block is its cube (src/export/merf_layout.h).
+  function merfFromCamera({ matrix }: View): number[] {
+    const { rotation: r, scale, translation: t } = tileset.worldFromScene;
+    const turned = (v: number[]) => {
+      const [x, y, z] = [0, 1, 2].map((row) => r[3 * row] * v[0] + r[3 * row + 1] * v[1] + r[3 * row + 2] * v[2]);
+      return [y, z, x];
+    };
+    const column = (n: number) => matrix.slice(4 * n, 4 * n + 3);
+    const place = turned(column(3).map((x, row) => (x - t[row]) / scale));
+    return [...turned(column(0)), 0, ...turned(column(1)), 0, ...turned(column(2)), 0, ...place, 1];
+  }
+
+  // Seconds of each frame.
+  const timeTheirs = (view: View, count: number): Promise<number[]> =>
+    theirs.evaluate(({ matrix, frames }) => {
+      gCamera.matrixWorld.fromArray(matrix);
+      const gl = gRenderer.getContext();
+      return Array.from({ length: frames }, () => {
+        const begin = performance.now();
+        renderProgressively();
+        gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+        return (performance.now() - begin) / 1000;
+      });
+    }, { matrix: merfFromCamera(view), frames: count });
+
+  // Red, green and blue, rows from the top, as base64; the mean of many frames, which are shifted by half a pixel each.
+  const pixelsOfTheirs = (): Promise<string> =>
+    theirs.evaluate(() => {
+      for (let i = 0; i < 16; ++i) renderProgressively();
+      const gl = gRenderer.getContext();
+      const { drawingBufferWidth: width, drawingBufferHeight: height } = gl;
+      const read = new Uint8Array(4 * width * height);
+      gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, read);
+      let text = '';
+      for (let y = height - 1; y >= 0; --y) {
+        for (let x = 0; x < width; ++x) text += String.fromCharCode(...read.subarray(4 * (x + width * y), 4 * (x + width * y) + 3));
+      }
+      return btoa(text);
+    });
+
+  async function compare(what: string, views: View[]): Promise<void> {
+    const ratios: number[] = [];
+    const alike: number[] = [];
+    const rows: string[] = [];
+    for (const [i, view] of views.entries()) {
+      await ours.bringToFront();
+      await ours.evaluate((one) => plain.settle(one), view);
+      const [a, b]: number[][] = [[], []];
+      for (let round = 0; round < kRounds; ++round) {
+        a.push(...(await ours.evaluate(([one, count]) => plain.times(one, count), [view, 1 + kFrames] as const)).slice(1));
+        b.push(...(await timeTheirs(view, 1 + kFrames)).slice(1));
+      }
+      const [mine, its] = [await ours.evaluate(() => plain.pixels()), await pixelsOfTheirs()].map((text) => Buffer.from(text, 'base64'));
+      for (const [name, pixels] of [['ours', mine], ['merf', its]] as const) {
+        writeFileSync(join(pictures, `${what.replaceAll(' ', '-')}-${i}-${name}.ppm`), Buffer.concat([Buffer.from(`P6 ${kWidth} ${kHeight} 255\n`), pixels]));
+      }
+      const ratio = median(b) / median(a);
+      ratios.push(ratio);
+      const times = [Math.min(...a), median(a), Math.min(...b), median(b)].map((t) => t.toFixed(3));
+      alike.push(psnr(mine, its));
+      rows.push(
+        `${i}: ours ${times[0]} s (median ${times[1]}), MERF's ${times[2]} s (${times[3]}), of medians ` +
+        `${ratio.toFixed(2)} times; pictures ${alike[i].toFixed(1)} dB apart`);
+    }
+    console.log([what, ...rows].join('\n'));
+    verdict(`${what}: MERF's frame as a multiple of ours, the least`, Math.min(...ratios), '>=', 1);
+    verdict(`${what}: the median`, median(ratios), '>=', 1.5);
+    verdict(`${what}: pictures alike, the worst, in dB`, Math.min(...alike), '>=', 20);
+  }
+
+  it('draws a frame as soon', async () => {
+    await theirs.bringToFront();
+    await openTheirs();
+    await ours.bringToFront();
+    await ours.goto(`${server.url}plain.html`);
+    await ours.waitForFunction(() => 'plain' in window);
+    console.log(`drawn by ${await ours.evaluate(() => plain.card())}`);
+    await ours.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
+    await ours.evaluate(() => void (plain.world.background = new plain.THREE.Color(1, 1, 1))); // MERF's is white
+    // Inside of the scene's box rays begin at the camera in both.
+    const { low, high } = tileset.box;
+    const height = low[2] + 0.8 * (high[2] - low[2]);
+    const circle = Array.from({ length: 10 }, (_, i) => {
+      const at = (turn: number) => [0.7 * Math.cos(turn), 0.7 * Math.sin(turn)] as const;
+      return viewAt(tileset, [...at((i / 10) * 2 * Math.PI), height], [...at(((i + 2.5) / 10) * 2 * Math.PI), low[2]]);
+    });
+    await ours.evaluate((view) => plain.settle(view), circle[0]);
+    const sizes = [
+      await ours.evaluate(() => [plain.renderer.domElement.width, plain.renderer.domElement.height]),
+      await theirs.evaluate(() => [gRenderer.getContext().drawingBufferWidth, gRenderer.getContext().drawingBufferHeight]),
+      await theirs.evaluate(() => [gLowResTexture.width, gLowResTexture.height]),
+    ];
+    expect(sizes).toEqual([[kWidth, kHeight], [kWidth, kHeight], [kWidth, kHeight]]);
+    await compare('ten views inside the block', circle);
+    await compare('ten held-out views', capturedViews(join(work, 'city'), 10).map(({ view }) => view));
+    expect(said).toEqual([]);
+  });
+});
