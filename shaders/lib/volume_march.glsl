@@ -75,67 +75,72 @@ void marchSegment(Part part, VolumeSegment s, inout Composite sum) {
   float widest = float(textureSize(planesFirst, 0).x);
   float count = ceil(s.length * stepsPerTexel);
   float i = 0.0;
-  // No segment is longer than its diagonal; a bound for drivers that want one.
-  for (int guard = 0; guard < 65536 && i < count; ++guard) {
-    float from = i * stepLength, to = min(from + stepLength, s.length);
-    float tau = 0.5 * (from + to);
-    vec3 x = s.start + tau * s.direction;
-    i += 1.0;
-    vec3 cell = clamp(floor(x / 8.0), 0.0, cells - 1.0);
-    float reach = floor(texelFetch(distances, part.distanceOrigin + ivec3(cell), 0).r * 255.0 + 0.5);
-    if (reach > 0.0) {
+  int guard = 0;  // no segment is longer than its diagonal; a bound for drivers that want one
+  do {
+    // On to a step that may show something, in a loop of its own: what takes several rays together (Mesa on a processor:
+    // always) does for all of them whatever stands in a loop that one has not left.
+    float from, to, tau;
+    vec3 x;
+    do {
+      from = i * stepLength, to = min(from + stepLength, s.length);
+      tau = 0.5 * (from + to);
+      x = s.start + tau * s.direction;
+      vec3 cell = clamp(floor(x / 8.0), 0.0, cells - 1.0);
+      float reach = floor(texelFetch(distances, part.distanceOrigin + ivec3(cell), 0).r * 255.0 + 0.5);
+      if (reach == 0.0) break;
       // The cube of cells nearer than that is empty: on to the first step whose middle lies behind it.
       vec3 end = mix((cell - reach + 1.0) * 8.0 + margin, (cell + reach) * 8.0 - margin, greaterThan(inverse, vec3(0.0)));
       vec3 exits = (end - s.start) * inverse;
       float exit = min(min(exits.x, exits.y), min(exits.z, s.length));
-      i = max(i, ceil(exit * stepsPerTexel - 0.5));
-      continue;
-    }
+      i = max(i + 1.0, ceil(exit * stepsPerTexel - 0.5));
+    } while (i < count && ++guard < 65536);
+    if (i >= count) return;
+    i += 1.0;
     vec3 u = clamp(x * voxelsPerTexel - 0.5, 0.0, part.voxels - 1.0);
     vec3 block = floor(u / 8.0);
     vec4 place = texelFetch(macroblocks, part.macroblockOrigin + ivec3(block), 0);
-    if (place.w == 0.0) continue;
     vec3 voxel = (floor(place.xyz * 255.0 + 0.5) * 9.0 + (u - 8.0 * block) + 0.5) / atlas;
     vec3 p = clamp(x, 0.5, part.planes - 0.5) / widest;
-    vec4 first = textureLod(voxelsFirst, voxel, 0.0) + textureLod(planesFirst, vec3(p.yz, part.layer), 0.0) +
-                 textureLod(planesFirst, vec3(p.xz, part.layer + 1.0), 0.0) +
-                 textureLod(planesFirst, vec3(p.xy, part.layer + 2.0), 0.0);
-    // A byte b of four sources stands for -R + 2R b / 255 each.
-    float density = exp(min(densityRange * (2.0 * first.a - 4.0) - 1.0, 15.0));
-    float opacity = opacityOf(density * distanceBetween(s, from, to));
-    float weight = sum.transmittance * opacity;
-    if (weight < 1e-6) continue;
-    vec4 second = textureLod(voxelsSecond, voxel, 0.0) + textureLod(planesSecond, vec3(p.yz, part.layer), 0.0) +
-                  textureLod(planesSecond, vec3(p.xz, part.layer + 1.0), 0.0) +
-                  textureLod(planesSecond, vec3(p.xy, part.layer + 2.0), 0.0);
-    sum.diffuse += weight / (1.0 + exp(featureRange * (4.0 - 2.0 * first.rgb)));
-    sum.features += weight / (1.0 + exp(featureRange * (4.0 - 2.0 * second)));
-    float distance = distanceAt(s, tau);
-    sum.depth += weight * distance;
-    if (sum.transmittance >= 0.5 && sum.transmittance - weight < 0.5) sum.median = distance;
-    sum.transmittance *= 1.0 - opacity;
-    if (sum.transmittance < minTransmittance) return;
-  }
+    float weight = 0.0, opacity = 0.0;
+    vec4 first = vec4(0.0);
+    if (place.w != 0.0) {
+      first = textureLod(voxelsFirst, voxel, 0.0) + textureLod(planesFirst, vec3(p.yz, part.layer), 0.0) +
+              textureLod(planesFirst, vec3(p.xz, part.layer + 1.0), 0.0) +
+              textureLod(planesFirst, vec3(p.xy, part.layer + 2.0), 0.0);
+      // A byte b of four sources stands for -R + 2R b / 255 each.
+      float density = exp(min(densityRange * (2.0 * first.a - 4.0) - 1.0, 15.0));
+      opacity = opacityOf(density * distanceBetween(s, from, to));
+      weight = sum.transmittance * opacity;
+    }
+    if (weight >= 1e-6) {
+      vec4 second = textureLod(voxelsSecond, voxel, 0.0) + textureLod(planesSecond, vec3(p.yz, part.layer), 0.0) +
+                    textureLod(planesSecond, vec3(p.xz, part.layer + 1.0), 0.0) +
+                    textureLod(planesSecond, vec3(p.xy, part.layer + 2.0), 0.0);
+      sum.diffuse += weight / (1.0 + exp(featureRange * (4.0 - 2.0 * first.rgb)));
+      sum.features += weight / (1.0 + exp(featureRange * (4.0 - 2.0 * second)));
+      float distance = distanceAt(s, tau);
+      sum.depth += weight * distance;
+      if (sum.transmittance >= 0.5 && sum.transmittance - weight < 0.5) sum.median = distance;
+      sum.transmittance *= 1.0 - opacity;
+    }
+  } while (i < count && sum.transmittance >= minTransmittance && ++guard < 65536);
 }
 
 // Goes on with `sum`, which holds the content's parts in front of this one.
 void marchPart(Part part, vec3 origin, vec3 direction, vec2 range, inout Composite sum) {
   vec3 o = (origin - part.centre) / part.scale, d = direction / part.scale;
-  if (!part.contracted) {
-    marchSegment(part, volumeSegment(o, d, kCube, range.x, range.y, 1.0, part.planes), sum);
-    return;
-  }
-  int region = regionAt(o + range.x * d);
+  float halfDomain = part.contracted ? 2.0 : 1.0;
+  int region = part.contracted ? regionAt(o + range.x * d) : kCube;
   float t = range.x;
-  // At most five regions; where rays run along the border of two, some more pieces of no length.
-  for (int guard = 0; guard < 12 && t < range.y; ++guard) {
-    int next;
-    float exit = min(leaveRegion(o, d, region, next), range.y);
+  int guard = 0;  // at most five regions; where rays run along the border of two, some more pieces of no length
+  do {
+    int next = region;
+    float exit = part.contracted ? min(leaveRegion(o, d, region, next), range.y) : range.y;
     if (exit > t) {
-      marchSegment(part, volumeSegment(o, d, region, t, exit, 2.0, part.planes), sum);
+      marchSegment(part, volumeSegment(o, d, region, t, exit, halfDomain, part.planes), sum);
       if (sum.transmittance < minTransmittance) return;
       t = exit;
     }
     region = next;
-  }
+  } while (t < range.y && ++guard < 12);
 }
