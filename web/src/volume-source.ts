@@ -5,13 +5,18 @@ import type { Compositor, DrawnContent } from './draw/compositor';
 import { ContentTextures } from './draw/content-textures';
 import type { ContentFile, SceneFiles } from './scene-files';
 import type { TileSource, UploadStep } from './stream/tile-streamer';
-import type { TileTree } from './stream/tile-tree';
+import { coarsestTiles, type TileTree } from './stream/tile-tree';
 import { kVolumeLimits, readVolumeHeader, type VolumeLimits } from './tiles/decode-volume';
 import type { TileContent } from './tiles/tileset';
 import type { VolumeContent } from './tiles/volume-content';
 
+// What is drawn for long, the coarsest tiles and surrounds, has its network written into a program of its own, which is faster
+// than to read it from a buffer. What comes and goes shares programs, as compiling takes long.
+const kOwnPrograms = 4; // of tiles
+
 export class VolumeSource implements TileSource<ContentFile, VolumeContent, DrawnContent> {
   private readonly limits: VolumeLimits;
+  private readonly ownProgram: Set<number>;
 
   constructor(
     private readonly tree: TileTree,
@@ -20,6 +25,9 @@ export class VolumeSource implements TileSource<ContentFile, VolumeContent, Draw
     private readonly compositor: Compositor,
     private readonly renderer: THREE.WebGLRenderer,
   ) {
+    const surrounds = [...tree.tiles.keys()].filter((tile) => tree.tiles[tile].isSurround);
+    const coarsest = coarsestTiles(tree);
+    this.ownProgram = new Set([...surrounds, ...(coarsest.length <= kOwnPrograms ? coarsest : [])]);
     const gl = renderer.getContext() as WebGL2RenderingContext;
     this.limits = {
       ...kVolumeLimits,
@@ -34,7 +42,7 @@ export class VolumeSource implements TileSource<ContentFile, VolumeContent, Draw
     const content = this.contentOf(tile);
     const file = await this.files.read(content.uri, this.limits.fileBytes, signal);
     const { layout, parts, network } = readVolumeHeader(file, content.uri, content, this.limits);
-    this.compositor.prepare(this.renderer, parts, network, content.surround);
+    this.compositor.prepare(this.renderer, parts, network, content.surround, this.ownProgram.has(tile));
     return { file, fileBytes: file.length, cardBytes: layout.bytes };
   }
 
@@ -44,7 +52,8 @@ export class VolumeSource implements TileSource<ContentFile, VolumeContent, Draw
   }
 
   allocate(tile: number, decoded: VolumeContent): DrawnContent {
-    const made = this.compositor.make(new ContentTextures(decoded), this.contentOf(tile), tile, this.tree.tiles[tile].level);
+    const made = this.compositor.make(
+      new ContentTextures(decoded), this.contentOf(tile), tile, this.tree.tiles[tile].level, this.ownProgram.has(tile));
     this.compositor.compile(this.renderer, made);
     return made;
   }

@@ -5,6 +5,7 @@ import type { Box, TileContent, Vec3 } from '../tiles/tileset';
 import type { DenseLayer, VolumePart } from '../tiles/volume-content';
 import { frontToBack as orderOf } from './box-order';
 import { colourOfBlock, colourOfLevel } from './display-modes';
+import { packNetwork } from './network-shader';
 import { programMaterial, volumeMaterial, viewUniforms, type ProgramShape, type ViewUniforms } from './volume-material';
 import type { ContentTextures } from './content-textures';
 
@@ -88,9 +89,9 @@ export class Compositor {
   }
 
   // Has the driver begin with the program of such a content, beside other work.
-  prepare(renderer: THREE.WebGLRenderer, parts: VolumePart[], network: DenseLayer[], surround: boolean): void {
-    const shape = this.shapeOf(parts, network.map((layer) => layer.outputs), surround);
-    const key = JSON.stringify(shape);
+  prepare(renderer: THREE.WebGLRenderer, parts: VolumePart[], network: DenseLayer[], surround: boolean, ownProgram: boolean): void {
+    const shape = this.shapeOf(parts, network.map((layer) => layer.outputs), surround, ownProgram ? packNetwork(network) : undefined);
+    const key = JSON.stringify({ ...shape, network: shape.network && [...shape.network] });
     if (this.prepared.has(key)) return;
     const material = programMaterial(shape);
     this.prepared.set(key, material);
@@ -98,9 +99,11 @@ export class Compositor {
     renderer.compile(new THREE.Mesh(this.screen, material), this.anyCamera);
   }
 
-  // `number` and `level` are the tile's, for display modes.
-  make(textures: ContentTextures, { box, surround }: Pick<TileContent, 'box' | 'surround'>, number: number, level: number): DrawnContent {
-    const shape = this.shapeOf(textures.parts, textures.widths, surround);
+  // `number` and `level` are the tile's, for display modes; `ownProgram` is for what is drawn for long.
+  make(
+    textures: ContentTextures, { box, surround }: Pick<TileContent, 'box' | 'surround'>, number: number, level: number, ownProgram: boolean,
+  ): DrawnContent {
+    const shape = this.shapeOf(textures.parts, textures.widths, surround, ownProgram ? textures.network : undefined);
     const material = volumeMaterial(textures, this.view, shape, { block: colourOfBlock(number), level: colourOfLevel(level) });
     const mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>(
       shape.everywhere ? this.screen : this.cube, material);
@@ -203,10 +206,11 @@ export class Compositor {
     this.prepared.clear();
   }
 
-  private shapeOf(parts: VolumePart[], widths: number[], surround: boolean): ProgramShape {
+  private shapeOf(parts: VolumePart[], widths: number[], surround: boolean, packed: Float32Array | undefined): ProgramShape {
     // What is contracted may own what lies beyond any box.
     const everywhere = surround || parts.some((part) => part.contracted);
-    return { parts: parts.length, widths, surround, everywhere, distancesOfBytes: this.distancesOfBytes };
+    const network = packed?.every(Number.isFinite) ? packed : undefined;
+    return { parts: parts.length, widths, surround, everywhere, distancesOfBytes: this.distancesOfBytes, network };
   }
 
   // Of a parallel projection, so far behind the picture that its rays come from there.

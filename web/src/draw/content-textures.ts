@@ -26,6 +26,7 @@ export class ContentTextures {
   readonly distances: THREE.Data3DTexture;
   readonly numbers: Float32Array; // parts and network: `content` of shaders/lib/volume_march.glsl
   readonly widths: number[]; // outputs of the network's layers
+  readonly network: Float32Array; // packed: the end of `numbers`
   readonly parts: VolumePart[];
   readonly ranges: { features: number; density: number };
   readonly stepsPerTexel: number;
@@ -46,10 +47,10 @@ export class ContentTextures {
     this.macroblocks = this.add(cube(macroblocks.size), macroblocks.texels, false);
     this.distances = this.add(cube(distances.size), distances.texels, false, true);
     this.widths = content.network.map((layer) => layer.outputs);
-    const network = packNetwork(content.network);
+    this.network = packNetwork(content.network);
     const ofParts = 4 * kVectorsOfPart * this.parts.length;
-    this.numbers = new Float32Array(ofParts + network.length);
-    this.numbers.set(network, ofParts);
+    this.numbers = new Float32Array(ofParts + this.network.length);
+    this.numbers.set(this.network, ofParts);
     this.orderParts(this.parts.map((_, n) => n));
   }
 

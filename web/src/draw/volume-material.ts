@@ -6,7 +6,7 @@ import pathSource from '../../../shaders/lib/volume_path.glsl?raw';
 import { kVectorsOfPart } from '../tiles/volume-content';
 import type { ContentTextures } from './content-textures';
 import { kDisplayConstants } from './display-modes';
-import { networkShader, vectorsOfNetwork } from './network-shader';
+import { networkShader, vectorsOfNetwork, writtenVector } from './network-shader';
 
 // The same for all contents of a picture. Scene units; `ndc` runs from -1 to 1 across the picture.
 export interface ViewUniforms {
@@ -133,12 +133,14 @@ export interface ProgramShape {
   surround: boolean;
   everywhere: boolean; // fills the picture, as it owns what lies beyond any box
   distancesOfBytes: boolean; // the target's are, from 0 for no distance to 255 for the farthest
+  network?: Float32Array; // packed; written into the program, which then is of one content alone
 }
 
 // Without uniforms: so that the driver may begin with a program before its content is there.
 export function programMaterial(shape: ProgramShape): THREE.RawShaderMaterial {
-  const { parts, widths } = shape;
+  const { parts, widths, network } = shape;
   const ofParts = kVectorsOfPart * parts;
+  const vector = (n: number) => (network ? writtenVector(network, n) : `content[${ofParts + n}]`);
   const defines: Record<string, number | string> = { PARTS: parts, VECTORS: ofParts + vectorsOfNetwork(widths) };
   if (shape.surround) defines.SURROUND = '';
   if (shape.everywhere) defines.EVERYWHERE = '';
@@ -146,7 +148,7 @@ export function programMaterial(shape: ProgramShape): THREE.RawShaderMaterial {
   return new THREE.RawShaderMaterial({
     glslVersion: THREE.GLSL3,
     vertexShader: kVertexShader,
-    fragmentShader: [kFragmentHead, kDisplayConstants, pathSource, marchSource, networkShader(widths, ofParts), kFragmentMain].join('\n'),
+    fragmentShader: [kFragmentHead, kDisplayConstants, pathSource, marchSource, networkShader(widths, vector), kFragmentMain].join('\n'),
     defines,
     side: shape.everywhere ? THREE.DoubleSide : THREE.BackSide,
     transparent: true,
@@ -164,7 +166,7 @@ export function programMaterial(shape: ProgramShape): THREE.RawShaderMaterial {
   });
 }
 
-// Contents of one shape share a program. Drawn front to back, blended under what is there.
+// Contents of one shape share a program, if they have none of their own. Drawn front to back, blended under what is there.
 export function volumeMaterial(
   textures: ContentTextures, view: ViewUniforms, shape: ProgramShape, colours: { block: THREE.Color; level: THREE.Color },
 ): THREE.RawShaderMaterial {

@@ -1,0 +1,20 @@
+import { describe, expect, it } from 'vitest';
+import { networkShader, packNetwork, writtenVector } from './network-shader';
+
+describe('the network as GLSL', () => {
+  it('has its numbers written as floats that are read as they were', () => {
+    const numbers = new Float32Array([1, -0.1, 1e-30, 3.4028234663852886e38, 0, 123456789, 0.3, -7]);
+    const found = [0, 1].flatMap((n) => [...writtenVector(numbers, n).matchAll(/-?\d+(\.\d+)?(e[+-]\d+)?/g)].slice(1));
+    expect(found.map(([text]) => Math.fround(Number(text)))).toEqual([...numbers]);
+    for (const [text] of found) expect(text).toMatch(/[.e]/); // GLSL takes no whole number for a float
+  });
+
+  it('asks for each of its vectors once, in their order', () => {
+    const layer = (inputs: number, outputs: number) =>
+      ({ inputs, outputs, weights: new Float32Array(inputs * outputs), biases: new Float32Array(outputs) });
+    const network = [layer(34, 16), layer(16, 3)];
+    const asked: number[] = [];
+    networkShader([16, 3], (n) => `v${asked.push(n)}`);
+    expect(asked).toEqual([...new Array(packNetwork(network).length / 4).keys()]);
+  });
+});
