@@ -8,7 +8,6 @@
 #include <boost/asio.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
-#include <fstream>
 #include <list>
 #include <optional>
 
@@ -115,12 +114,8 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
   void send(SiteAnswer answer, unsigned version, bool keepAlive) {
     answer_ = std::move(answer);
     keepAlive_ = keepAlive;
-    if (!answer_.file.empty() && answer_.sendsBody) {
-      file_.open(answer_.file, std::ios::binary);
-      file_.seekg(static_cast<std::streamoff>(answer_.bytes.begin));
-      left_ = answer_.length;
-      if (!file_) return close();
-    }
+    if (!answer_.sendsBody) answer_.file = nullptr;
+    if (answer_.file) left_ = answer_.length;
     header_ =
         fmt::format("HTTP/{}.{} {} {}\r\n", version / 10, version % 10, answer_.status,
                     std::string(http::obsolete_reason(http::int_to_status(static_cast<unsigned>(answer_.status)))));
@@ -128,7 +123,7 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     if (answer_.status != 304) header_ += fmt::format("Content-Length: {}\r\n", answer_.length);
     header_ += keepAlive_ ? "Connection: keep-alive\r\n\r\n" : "Connection: close\r\n\r\n";
     std::array<asio::const_buffer, 2> buffers = {asio::buffer(header_), {}};
-    if (answer_.sendsBody && answer_.file.empty()) {
+    if (answer_.sendsBody && !answer_.file) {
       if (answer_.compressed)
         left_ = answer_.length;
       else
@@ -145,7 +140,6 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     heard();
     if (left_ == 0) {
       chunk_ = {};
-      file_ = {};
       answer_ = {};
       if (!keepAlive_) return close();
       return read(state_.settings.idleTime);
@@ -155,9 +149,9 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     if (answer_.compressed) {
       next = asio::buffer(answer_.compressed->data() + (answer_.length - left_), wanted);
     } else {
-      chunk_.resize(kChunk);
-      if (!file_.read(chunk_.data(), static_cast<std::streamsize>(wanted))) return close();  // it has been cut off
-      next = asio::buffer(chunk_.data(), wanted);
+      chunk_.resize(wanted);
+      if (!answer_.file->read(answer_.bytes.end - left_, chunk_)) return close();  // it has been cut off
+      next = asio::buffer(chunk_);
     }
     left_ -= wanted;
     stream_.expires_after(state_.settings.sendTime);
@@ -172,7 +166,6 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
   std::optional<http::request_parser<http::empty_body>> parser_;
   SiteAnswer answer_;
   std::string header_;
-  std::ifstream file_;
   std::vector<char> chunk_;
   uint64_t left_ = 0;  // of the file, or of what is compressed
   bool keepAlive_ = true, open_ = true;

@@ -1,7 +1,6 @@
 #include "serve/static_site.h"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -57,13 +56,6 @@ bool holdsDigest(const fs::path& file) {
   return digest.size() == 8 && file.parent_path().filename() == "assets";
 }
 
-// Without a part that begins with a dot on the way.
-bool isBelow(const fs::path& file, const fs::path& folder) {
-  const auto [end, inFile] = std::mismatch(folder.begin(), folder.end(), file.begin(), file.end());
-  return end == folder.end() && inFile != file.end() &&
-         std::none_of(inFile, file.end(), [](const fs::path& part) { return part.string().starts_with('.'); });
-}
-
 SiteAnswer plain(int status, const std::string& reason) {
   SiteAnswer answer;
   answer.status = status;
@@ -77,8 +69,11 @@ SiteAnswer plain(int status, const std::string& reason) {
 
 StaticSite::StaticSite(std::vector<SiteFolder> folders, std::vector<std::string> hosts)
     : folders_(std::move(folders)), hosts_(std::move(hosts)) {
+  std::error_code status;
+  if (!fs::is_directory("/proc/self/fd", status)) {
+    throw Error("/proc", "", "is not there, and says what a file is that was opened", "mount it");
+  }
   for (SiteFolder& one : folders_) {
-    std::error_code status;
     const fs::path canonical = fs::canonical(one.folder, status);
     if (status || !fs::is_directory(canonical)) {
       throw Error(one.folder.string(), "", "is no folder", "name one that is there");
@@ -91,47 +86,42 @@ StaticSite::StaticSite(std::vector<SiteFolder> folders, std::vector<std::string>
 }
 
 // The path has been looked at already (pathOfTarget); links may still lead out.
-std::optional<fs::path> StaticSite::fileAt(const std::string& path) const {
+SiteFile::Opening StaticSite::fileAt(const std::string& path) const {
   for (const SiteFolder& one : folders_) {
     const std::string prefix = one.name.empty() ? "/" : "/" + one.name + "/";
     if (!path.starts_with(prefix)) continue;
     std::string rest = path.substr(prefix.size());
     if (rest.empty() && one.name.empty()) rest = "index.html";
-    std::error_code status;
-    const fs::path file = fs::canonical(one.folder / rest, status);
-    if (status || !isBelow(file, one.folder) || !fs::is_regular_file(file, status)) return std::nullopt;
-    return file;
+    return SiteFile::open(one.folder, rest);
   }
-  return std::nullopt;
+  return {};
 }
 
-std::shared_ptr<const std::string> StaticSite::compressedOf(const fs::path& file, const std::string& tag) const {
+std::shared_ptr<const std::string> StaticSite::compressedOf(const SiteFile& file) const {
   {
     const std::lock_guard lock(mutex_);
-    if (const auto found = compressed_.find(file); found != compressed_.end() && found->second.tag == tag) {
+    if (const auto found = compressed_.find(file.path());
+        found != compressed_.end() && found->second.tag == file.tag()) {
       return found->second.bytes;
     }
   }
   std::shared_ptr<std::string> bytes = std::make_shared<std::string>();
-  try {
-    const Bytes read = readFile(file, kLargestCompressed);
-    z_stream stream{};
-    if (deflateInit2(&stream, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK) return nullptr;  // + 16: gzip
-    bytes->resize(deflateBound(&stream, read.size()));
-    stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(read.data()));
-    stream.avail_in = static_cast<uInt>(read.size());
-    stream.next_out = reinterpret_cast<Bytef*>(bytes->data());
-    stream.avail_out = static_cast<uInt>(bytes->size());
-    const bool done = deflate(&stream, Z_FINISH) == Z_STREAM_END;
-    bytes->resize(stream.total_out);
-    deflateEnd(&stream);
-    if (!done) return nullptr;
-  } catch (const Error&) {
-    return nullptr;
-  }
+  std::string read(file.bytes(), '\0');
+  if (!file.read(0, read)) return nullptr;
+  z_stream stream{};
+  if (deflateInit2(&stream, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK) return nullptr;  // + 16: gzip
+  bytes->resize(deflateBound(&stream, read.size()));
+  stream.next_in = reinterpret_cast<Bytef*>(read.data());
+  stream.avail_in = static_cast<uInt>(read.size());
+  stream.next_out = reinterpret_cast<Bytef*>(bytes->data());
+  stream.avail_out = static_cast<uInt>(bytes->size());
+  const bool done = deflate(&stream, Z_FINISH) == Z_STREAM_END;
+  bytes->resize(stream.total_out);
+  deflateEnd(&stream);
+  if (!done) return nullptr;
   const std::lock_guard lock(mutex_);
   if (compressed_.size() >= kMostCompressed) compressed_.clear();
-  compressed_[file] = {tag, bytes};
+  compressed_[file.path()] = {file.tag(), bytes};
   return bytes;
 }
 
@@ -154,20 +144,21 @@ SiteAnswer StaticSite::answer(const SiteRequest& request) const {
     return finish(std::move(refused));
   }
   const auto path = pathOfTarget(request.target);
-  const auto file = path ? fileAt(*path) : std::nullopt;
-  struct stat status;
-  if (!file || ::stat(file->c_str(), &status) != 0) return finish(plain(404, "there is no such file"));
-  const auto bytes = static_cast<uint64_t>(status.st_size);
-  const Kind kind = kindOf(*file);
-  std::string tag = fmt::format("\"{:x}-{:x}.{:x}\"", bytes, status.st_mtim.tv_sec, status.st_mtim.tv_nsec);
+  const SiteFile::Opening opening = path ? fileAt(*path) : SiteFile::Opening();
+  if (opening.isBusy) return finish(plain(503, "too many files are open"));
+  const auto& file = opening.file;
+  if (!file) return finish(plain(404, "there is no such file"));
+  const uint64_t bytes = file->bytes();
+  const Kind kind = kindOf(file->path());
+  std::string tag = file->tag();
   answer.headers = {{"Content-Type", kind.type},
-                    {"Cache-Control", holdsDigest(*file) ? "public, max-age=31536000, immutable" : "no-cache"},
+                    {"Cache-Control", holdsDigest(file->path()) ? "public, max-age=31536000, immutable" : "no-cache"},
                     {"Accept-Ranges", "bytes"}};
   const bool compressible = kind.isText && bytes >= kSmallestCompressed && bytes <= kLargestCompressed;
   if (compressible) answer.headers.emplace_back("Vary", "Accept-Encoding");
   const bool asksForPart = !request.range.empty() && (request.ifRange.empty() || request.ifRange == tag);
   if (compressible && !asksForPart && acceptsGzip(request.acceptEncoding)) {
-    answer.compressed = compressedOf(*file, tag);
+    answer.compressed = compressedOf(*file);
     if (answer.compressed) {
       tag.insert(tag.size() - 1, "-gzip");
       answer.headers.emplace_back("Content-Encoding", "gzip");
@@ -183,7 +174,7 @@ SiteAnswer StaticSite::answer(const SiteRequest& request) const {
     answer.length = answer.compressed->size();
     return finish(std::move(answer));
   }
-  answer.file = *file;
+  answer.file = file;
   answer.bytes = {0, bytes};
   const RangeRequest range = asksForPart ? rangeOf(request.range, bytes) : RangeRequest{};
   if (range.kind == RangeRequest::none) {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "base/file.h"
 #include "serve/http_request.h"
+#include "serve/site_file.h"
 
 namespace tessera {
 
@@ -29,19 +29,20 @@ struct SiteAnswer {
   std::vector<std::pair<std::string, std::string>> headers;  // but those of the connection
   std::string body;                                          // where it is no file
   std::shared_ptr<const std::string> compressed;             // or this
-  fs::path file;                                             // or bytes of this one, if it is not empty
+  std::shared_ptr<const SiteFile> file;                      // or bytes of this one
   ByteRange bytes;
   uint64_t length = 0;    // of the body, whether it is sent or not
   bool sendsBody = true;  // false for HEAD
 };
 
-// Files alone: no listing of folders, nothing that begins with a dot, nothing outside the folders, by links either.
-// Files whose name holds a digest of their bytes (tiles/scene_folder.h) may be kept by clients forever; of others they
-// must ask whether they have changed.
+// Files alone: no listing of folders, nothing that begins with a dot, nothing outside the folders, by links either. A
+// file is opened once, and what is opened is looked at: an answer holds to it whatever happens to its path. Files whose
+// name holds a digest of their bytes (tiles/scene_folder.h) may be kept by clients forever; of others they must ask
+// whether they have changed.
 class StaticSite {
  public:
   // Hosts: what clients may call the server; any where there is none. (Against pages of other sites that have their
-  // name resolved to this machine.) Throws Error where a folder is none.
+  // name resolved to this machine.) Throws Error where a folder is none, or /proc is not there.
   StaticSite(std::vector<SiteFolder> folders, std::vector<std::string> hosts);
 
   SiteAnswer answer(const SiteRequest& request) const;
@@ -51,8 +52,8 @@ class StaticSite {
     std::string tag;
     std::shared_ptr<const std::string> bytes;
   };
-  std::optional<fs::path> fileAt(const std::string& path) const;
-  std::shared_ptr<const std::string> compressedOf(const fs::path& file, const std::string& tag) const;
+  SiteFile::Opening fileAt(const std::string& path) const;
+  std::shared_ptr<const std::string> compressedOf(const SiteFile& file) const;
 
   std::vector<SiteFolder> folders_;
   std::vector<std::string> hosts_;

@@ -51,8 +51,8 @@ TEST_F(StaticSiteTest, ServesFilesOfItsFolders) {
   const SiteAnswer index = get("/");
   EXPECT_EQ(index.status, 200);
   EXPECT_EQ(headerOf(index, "Content-Type"), "text/html; charset=utf-8");
-  EXPECT_EQ(index.file.filename(), "index.html");
-  EXPECT_EQ(get("/scene/tileset.json?x").file.filename(), "tileset.json");
+  EXPECT_EQ(index.file->path().filename(), "index.html");
+  EXPECT_EQ(get("/scene/tileset.json?x").file->path().filename(), "tileset.json");
   EXPECT_EQ(get("/scene/inner.json").status, 200) << "a link that stays inside";
   EXPECT_EQ(headerOf(get("/scene/tiles/L0/a-0123456789abcdef.glb"), "Content-Type"), "model/gltf-binary");
 }
@@ -86,7 +86,7 @@ TEST_F(StaticSiteTest, ServesNothingOutsideThem) {
                              "/scene/nothing.glb"}) {
     const SiteAnswer answer = get(target);
     EXPECT_EQ(answer.status, 404) << target;
-    EXPECT_TRUE(answer.file.empty()) << target;
+    EXPECT_FALSE(answer.file) << target;
     EXPECT_EQ(answer.body.find("secret"), std::string::npos) << target;
   }
 }
@@ -104,7 +104,7 @@ TEST_F(StaticSiteTest, SaysThatNothingHasChangedUntilItHas) {
   const std::string tag = headerOf(site.answer({.target = "/scene/tileset.json"}), "ETag");
   const SiteAnswer same = site.answer({.target = "/scene/tileset.json", .ifNoneMatch = tag});
   EXPECT_EQ(same.status, 304);
-  EXPECT_TRUE(same.file.empty());
+  EXPECT_FALSE(same.file);
   EXPECT_EQ(headerOf(same, "ETag"), tag);
   write("scene/tileset.json", "{}");
   EXPECT_EQ(site.answer({.target = "/scene/tileset.json", .ifNoneMatch = tag}).status, 200);
