@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "serve/compressor.h"
 
 namespace tessera {
 namespace {
@@ -22,6 +23,7 @@ namespace http = beast::http;
 using asio::ip::tcp;
 
 constexpr size_t kMostHeader = 8192, kChunk = size_t{1} << 16;
+constexpr size_t kMostCompressed = size_t{32} << 20;  // bytes of text, kept
 
 // As many sockets as the system lets a process have.
 void raiseFileLimit() {
@@ -45,6 +47,7 @@ struct HttpServer::State {
   asio::steady_timer poll{context}, acceptAgain{context};
   std::list<std::shared_ptr<Connection>> connections;  // the one that was silent for longest first
   std::atomic<size_t> count = 0;
+  Compressor compressor{kMostCompressed};  // ends before what it calls
 };
 
 class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
@@ -113,22 +116,33 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
 
   void send(SiteAnswer answer, unsigned version, bool keepAlive) {
     answer_ = std::move(answer);
+    version_ = version;
     keepAlive_ = keepAlive;
-    if (!answer_.sendsBody) answer_.file = nullptr;
-    if (answer_.file) left_ = answer_.length;
+    if (!answer_.isGzipped) return sendHeader();
+    state_.compressor.compress(answer_.file, [self = shared_from_this()](const Compressor::Body& body) mutable {
+      asio::io_context& context = self->state_.context;  // whose thread is to be the one that lets go of the connection
+      asio::post(context, [self = std::move(self), body] { self->onCompressed(body); });
+    });
+  }
+
+  void onCompressed(const Compressor::Body& body) {
+    if (!open_) return;
+    if (!body) return close();  // it has been cut off
+    compressed_ = body;
+    answer_.length = body->size();
+    sendHeader();
+  }
+
+  void sendHeader() {
     header_ =
-        fmt::format("HTTP/{}.{} {} {}\r\n", version / 10, version % 10, answer_.status,
+        fmt::format("HTTP/{}.{} {} {}\r\n", version_ / 10, version_ % 10, answer_.status,
                     std::string(http::obsolete_reason(http::int_to_status(static_cast<unsigned>(answer_.status)))));
     for (const auto& [name, value] : answer_.headers) header_ += fmt::format("{}: {}\r\n", name, value);
     if (answer_.status != 304) header_ += fmt::format("Content-Length: {}\r\n", answer_.length);
     header_ += keepAlive_ ? "Connection: keep-alive\r\n\r\n" : "Connection: close\r\n\r\n";
     std::array<asio::const_buffer, 2> buffers = {asio::buffer(header_), {}};
-    if (answer_.sendsBody && !answer_.file) {
-      if (answer_.compressed)
-        left_ = answer_.length;
-      else
-        buffers[1] = asio::buffer(std::as_const(answer_.body));
-    }
+    if (answer_.sendsBody && answer_.file) left_ = answer_.length;
+    if (answer_.sendsBody && !answer_.file) buffers[1] = asio::buffer(std::as_const(answer_.body));
     stream_.expires_after(state_.settings.sendTime);
     asio::async_write(stream_, buffers,
                       [self = shared_from_this()](beast::error_code error, size_t) { self->onSent(error); });
@@ -141,13 +155,14 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     if (left_ == 0) {
       chunk_ = {};
       answer_ = {};
+      compressed_ = nullptr;
       if (!keepAlive_) return close();
       return read(state_.settings.idleTime);
     }
     const size_t wanted = std::min<uint64_t>(left_, kChunk);
     asio::const_buffer next;
-    if (answer_.compressed) {
-      next = asio::buffer(answer_.compressed->data() + (answer_.length - left_), wanted);
+    if (compressed_) {
+      next = asio::buffer(compressed_->data() + (answer_.length - left_), wanted);
     } else {
       chunk_.resize(wanted);
       if (!answer_.file->read(answer_.bytes.end - left_, chunk_)) return close();  // it has been cut off
@@ -165,9 +180,11 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
   beast::flat_static_buffer<kMostHeader> buffer_;
   std::optional<http::request_parser<http::empty_body>> parser_;
   SiteAnswer answer_;
+  Compressor::Body compressed_;
   std::string header_;
   std::vector<char> chunk_;
   uint64_t left_ = 0;  // of the file, or of what is compressed
+  unsigned version_ = 11;
   bool keepAlive_ = true, open_ = true;
 };
 

@@ -154,6 +154,27 @@ TEST_F(HttpServerTest, ServesAnHonestClientBesideManyThatStall) {
   EXPECT_LT(residentBytes() - before, int64_t{48} << 20);
 }
 
+TEST_F(HttpServerTest, AnswersOthersWhileItCompresses) {
+  std::string text;  // as much as is compressed at all, and hard to compress
+  for (uint32_t i = 0, seed = 1; i < uint32_t{16} << 20; ++i) {
+    text.push_back("0123456789abcdef"[(seed = seed * 1664525 + 1013904223) >> 28]);
+  }
+  writeFileAtomically(folder_ / "large.json", text);
+  start();
+  const Client waiting = client(), alsoWaiting = client();
+  for (const Client* one : {&waiting, &alsoWaiting}) {
+    one->send(get("/large.json", "Accept-Encoding: gzip\r\nConnection: close\r\n"));
+  }
+  std::this_thread::sleep_for(50ms);
+  EXPECT_EQ(bodyOf(exchange(get("/small.txt"))), "hello");
+  EXPECT_EQ(waiting.receive(1, 1ms), "") << "the compressed file came first";
+  const std::string answer = waiting.receive(SIZE_MAX, 60s);
+  EXPECT_TRUE(answer.starts_with("HTTP/1.1 200 OK\r\n"));
+  EXPECT_NE(answer.find("Content-Length: " + std::to_string(bodyOf(answer).size()) + "\r\n"), std::string::npos);
+  EXPECT_TRUE(bodyOf(answer).starts_with("\x1f\x8b"));
+  EXPECT_EQ(alsoWaiting.receive(SIZE_MAX, 60s), answer);
+}
+
 TEST_F(HttpServerTest, EndsTheTurnOfClientsThatStall) {
   HttpServerSettings settings;
   settings.requestTime = settings.idleTime = settings.sendTime = 200ms;

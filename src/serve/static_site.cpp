@@ -1,7 +1,6 @@
 #include "serve/static_site.h"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <algorithm>
 
@@ -11,7 +10,6 @@ namespace tessera {
 namespace {
 
 constexpr uint64_t kLargestCompressed = uint64_t{16} << 20, kSmallestCompressed = 1024;
-constexpr size_t kMostCompressed = 64;  // files in memory
 
 struct Kind {
   const char* extension;
@@ -97,34 +95,6 @@ SiteFile::Opening StaticSite::fileAt(const std::string& path) const {
   return {};
 }
 
-std::shared_ptr<const std::string> StaticSite::compressedOf(const SiteFile& file) const {
-  {
-    const std::lock_guard lock(mutex_);
-    if (const auto found = compressed_.find(file.path());
-        found != compressed_.end() && found->second.tag == file.tag()) {
-      return found->second.bytes;
-    }
-  }
-  std::shared_ptr<std::string> bytes = std::make_shared<std::string>();
-  std::string read(file.bytes(), '\0');
-  if (!file.read(0, read)) return nullptr;
-  z_stream stream{};
-  if (deflateInit2(&stream, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK) return nullptr;  // + 16: gzip
-  bytes->resize(deflateBound(&stream, read.size()));
-  stream.next_in = reinterpret_cast<Bytef*>(read.data());
-  stream.avail_in = static_cast<uInt>(read.size());
-  stream.next_out = reinterpret_cast<Bytef*>(bytes->data());
-  stream.avail_out = static_cast<uInt>(bytes->size());
-  const bool done = deflate(&stream, Z_FINISH) == Z_STREAM_END;
-  bytes->resize(stream.total_out);
-  deflateEnd(&stream);
-  if (!done) return nullptr;
-  const std::lock_guard lock(mutex_);
-  if (compressed_.size() >= kMostCompressed) compressed_.clear();
-  compressed_[file.path()] = {file.tag(), bytes};
-  return bytes;
-}
-
 SiteAnswer StaticSite::answer(const SiteRequest& request) const {
   SiteAnswer answer;
   const auto finish = [&](SiteAnswer done) {
@@ -157,25 +127,20 @@ SiteAnswer StaticSite::answer(const SiteRequest& request) const {
   const bool compressible = kind.isText && bytes >= kSmallestCompressed && bytes <= kLargestCompressed;
   if (compressible) answer.headers.emplace_back("Vary", "Accept-Encoding");
   const bool asksForPart = !request.range.empty() && (request.ifRange.empty() || request.ifRange == tag);
-  if (compressible && !asksForPart && acceptsGzip(request.acceptEncoding)) {
-    answer.compressed = compressedOf(*file);
-    if (answer.compressed) {
-      tag.insert(tag.size() - 1, "-gzip");
-      answer.headers.emplace_back("Content-Encoding", "gzip");
-    }
+  answer.isGzipped = compressible && !asksForPart && acceptsGzip(request.acceptEncoding);
+  if (answer.isGzipped) {
+    tag.insert(tag.size() - 1, "-gzip");
+    answer.headers.emplace_back("Content-Encoding", "gzip");
   }
   answer.headers.emplace_back("ETag", tag);
   if (!request.ifNoneMatch.empty() && matchesTag(request.ifNoneMatch, tag)) {
     answer.status = 304;
-    answer.compressed = nullptr;
-    return finish(std::move(answer));
-  }
-  if (answer.compressed) {
-    answer.length = answer.compressed->size();
+    answer.isGzipped = false;
     return finish(std::move(answer));
   }
   answer.file = file;
   answer.bytes = {0, bytes};
+  if (answer.isGzipped) return finish(std::move(answer));
   const RangeRequest range = asksForPart ? rangeOf(request.range, bytes) : RangeRequest{};
   if (range.kind == RangeRequest::none) {
     SiteAnswer outside = plain(416, "the file has no such bytes");

@@ -1,10 +1,7 @@
 // Folders as a web site: what to answer to a request for a file in one of them. Knows nothing of sockets.
 #pragma once
 
-#include <map>
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,11 +25,11 @@ struct SiteAnswer {
   int status = 200;
   std::vector<std::pair<std::string, std::string>> headers;  // but those of the connection
   std::string body;                                          // where it is no file
-  std::shared_ptr<const std::string> compressed;             // or this
   std::shared_ptr<const SiteFile> file;                      // or bytes of this one
   ByteRange bytes;
-  uint64_t length = 0;    // of the body, whether it is sent or not
-  bool sendsBody = true;  // false for HEAD
+  bool isGzipped = false;  // or all of it, compressed (compressor.h): then its length is not known yet
+  uint64_t length = 0;     // of the body, whether it is sent or not
+  bool sendsBody = true;   // false for HEAD
 };
 
 // Files alone: no listing of folders, nothing that begins with a dot, nothing outside the folders, by links either. A
@@ -48,17 +45,10 @@ class StaticSite {
   SiteAnswer answer(const SiteRequest& request) const;
 
  private:
-  struct Compressed {
-    std::string tag;
-    std::shared_ptr<const std::string> bytes;
-  };
   SiteFile::Opening fileAt(const std::string& path) const;
-  std::shared_ptr<const std::string> compressedOf(const SiteFile& file) const;
 
   std::vector<SiteFolder> folders_;
   std::vector<std::string> hosts_;
-  mutable std::mutex mutex_;
-  mutable std::map<fs::path, Compressed> compressed_;  // a few small files of text
 };
 
 }  // namespace tessera
