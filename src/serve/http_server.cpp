@@ -24,6 +24,7 @@ using asio::ip::tcp;
 
 constexpr size_t kMostHeader = 8192, kChunk = size_t{1} << 16;
 constexpr size_t kMostCompressed = size_t{32} << 20;  // bytes of text, kept
+constexpr size_t kMostDiscarded = size_t{1} << 20;
 
 // As many sockets as the system lets a process have.
 void raiseFileLimit() {
@@ -77,7 +78,7 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
   void read(std::chrono::milliseconds time) {
     parser_.emplace();
     parser_->header_limit(kMostHeader);
-    parser_->body_limit(0);
+    parser_->body_limit(UINT64_MAX);  // none is read
     stream_.expires_after(time);
     http::async_read_header(stream_, buffer_, *parser_,
                             [self = shared_from_this()](beast::error_code error, size_t) { self->onRequest(error); });
@@ -156,7 +157,7 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
       chunk_ = {};
       answer_ = {};
       compressed_ = nullptr;
-      if (!keepAlive_) return close();
+      if (!keepAlive_) return linger();
       return read(state_.settings.idleTime);
     }
     const size_t wanted = std::min<uint64_t>(left_, kChunk);
@@ -174,6 +175,27 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
                       [self = shared_from_this()](beast::error_code failed, size_t) { self->onSent(failed); });
   }
 
+  // Where a socket is closed before all that has come is read, the system tells the client of an error, and it may not
+  // come to read the answer.
+  void linger() {
+    beast::error_code error;
+    stream_.socket().shutdown(tcp::socket::shutdown_send, error);
+    if (error) return close();
+    stream_.expires_after(state_.settings.lingerTime);
+    discard();
+  }
+
+  void discard() {
+    buffer_.clear();
+    stream_.async_read_some(buffer_.prepare(kMostHeader),
+                            [self = shared_from_this()](beast::error_code error, size_t bytes) {
+                              if (!self->open_) return;
+                              self->discarded_ += bytes;
+                              if (error || self->discarded_ > kMostDiscarded) return self->close();
+                              self->discard();
+                            });
+  }
+
   beast::tcp_stream stream_;
   State& state_;
   std::list<std::shared_ptr<Connection>>::iterator place_;
@@ -184,6 +206,7 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
   std::string header_;
   std::vector<char> chunk_;
   uint64_t left_ = 0;  // of the file, or of what is compressed
+  size_t discarded_ = 0;
   unsigned version_ = 11;
   bool keepAlive_ = true, open_ = true;
 };

@@ -19,6 +19,7 @@ struct HttpServerSettings {
   std::chrono::milliseconds requestTime{15000};  // for a whole request to come
   std::chrono::milliseconds idleTime{60000};     // between requests
   std::chrono::milliseconds sendTime{30000};     // for a client to take the next 64 KiB
+  std::chrono::milliseconds lingerTime{2000};    // for a client to hear the last answer, while what it sends is read
 };
 
 class HttpServer {
