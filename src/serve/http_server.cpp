@@ -1,6 +1,7 @@
 #include "serve/http_server.h"
 
 #include <fmt/format.h>
+#include <netinet/tcp.h>
 #include <sys/resource.h>
 
 #include <utility>  // Boost 1.74 forgets it
@@ -24,6 +25,7 @@ using asio::ip::tcp;
 
 constexpr size_t kMostHeader = 8192, kChunk = size_t{1} << 16;
 constexpr size_t kMostCompressed = size_t{32} << 20;  // bytes of text, kept
+constexpr int kMostUnsent = 1 << 17;                  // bytes that the system holds back for one client
 constexpr size_t kMostDiscarded = size_t{1} << 20;
 
 // As many sockets as the system lets a process have.
@@ -224,6 +226,8 @@ void HttpServer::State::accept() {
     }
     beast::error_code ignored;
     socket.set_option(tcp::no_delay(true), ignored);
+    // The system would take megabytes from us for each client that does not read.
+    ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kMostUnsent, sizeof kMostUnsent);
     if (connections.size() >= settings.mostConnections) connections.front()->close();
     std::make_shared<Connection>(std::move(socket), *this)->begin();
     accept();

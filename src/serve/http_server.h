@@ -1,4 +1,5 @@
-// HTTP/1.1 over TCP, asynchronous: a client that stalls costs a socket and a small buffer, and its turn ends.
+// HTTP/1.1 over TCP, asynchronous: a client that stalls costs a socket and small buffers, here and in the system, and
+// its turn ends.
 #pragma once
 
 #include <atomic>

@@ -2,8 +2,10 @@
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <linux/sockios.h>
 #include <netinet/in.h>
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -23,7 +25,8 @@ using Clock = std::chrono::steady_clock;
 // A socket that goes away.
 class Client {
  public:
-  explicit Client(uint16_t port) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+  explicit Client(uint16_t port, int receiveBytes = 0) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    if (receiveBytes > 0) ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &receiveBytes, sizeof receiveBytes);
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_port = htons(port);
@@ -43,6 +46,21 @@ class Client {
     socket_ = -1;
   }
 
+  // Bytes that the system holds for this client and could not send yet, where the server is this process.
+  int unsent() const {
+    sockaddr_in own{}, peer{};
+    socklen_t size = sizeof own;
+    ::getsockname(socket_, reinterpret_cast<sockaddr*>(&own), &size);
+    for (int other = 0; other < 1024; ++other) {
+      size = sizeof peer;
+      int bytes = 0;
+      if (::getpeername(other, reinterpret_cast<sockaddr*>(&peer), &size) == 0 && peer.sin_port == own.sin_port &&
+          ::ioctl(other, SIOCOUTQNSD, &bytes) == 0) {
+        return bytes;
+      }
+    }
+    return -1;
+  }
   // Until the server closes, `bytes` are there, or the time is over.
   std::string receive(size_t bytes = SIZE_MAX, std::chrono::milliseconds time = 5s) const {
     std::string received;
@@ -160,6 +178,21 @@ TEST_F(HttpServerTest, ServesAnHonestClientBesideManyThatStall) {
     EXPECT_LT(Clock::now() - begin, 1s);
   }
   EXPECT_LT(residentBytes() - before, int64_t{48} << 20);
+}
+
+TEST_F(HttpServerTest, HandsTheSystemNoMoreThanItCanSendSoon) {
+  start();
+  const Client deaf(server_->port(), 4096);
+  deaf.send(get("/tile.glb", ""));
+  int unsent = 0;
+  for (int i = 0; i < 50 && unsent < 1000; ++i) {
+    std::this_thread::sleep_for(10ms);
+    unsent = deaf.unsent();
+  }
+  std::this_thread::sleep_for(100ms);
+  unsent = deaf.unsent();
+  EXPECT_GT(unsent, 1000);
+  EXPECT_LT(unsent, 300000);
 }
 
 TEST_F(HttpServerTest, AnswersOthersWhileItCompresses) {
