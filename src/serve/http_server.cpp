@@ -93,15 +93,13 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
       const bool malformed = error.category() == http::make_error_code(http::error::bad_method).category() &&
                              error != http::error::end_of_stream && error != http::error::partial_message;
       if (!malformed) return close();
-      SiteAnswer refused;
-      refused.status = error == http::error::header_limit ? 431 : 400;
-      refused.headers = {{"Content-Type", "text/plain; charset=utf-8"}};
-      refused.body = "this is no request that is understood\n";
-      refused.length = refused.body.size();
-      return send(std::move(refused), 11, false);
+      return refuse(error == http::error::header_limit ? 431 : 400);
     }
     heard();
     const auto& message = parser_->get();
+    // RFC 9112, section 3.2. Of two, who stands between may have gone by the other.
+    const size_t hosts = message.count(http::field::host);
+    if (hosts > 1 || (hosts == 0 && message.version() == 11)) return refuse(400);
     const auto field = [&](http::field name) { return std::string(message[name]); };
     SiteRequest request;
     request.method = std::string(message.method_string());
@@ -115,6 +113,15 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     const bool hasBody = message.count(http::field::transfer_encoding) > 0 ||
                          (message.has_content_length() && field(http::field::content_length) != "0");
     send(state_.site.answer(request), message.version(), message.keep_alive() && !hasBody);
+  }
+
+  void refuse(int status) {
+    SiteAnswer refused;
+    refused.status = status;
+    refused.headers = {{"Content-Type", "text/plain; charset=utf-8"}};
+    refused.body = "this is no request that is understood\n";
+    refused.length = refused.body.size();
+    send(std::move(refused), 11, false);
   }
 
   void send(SiteAnswer answer, unsigned version, bool keepAlive) {

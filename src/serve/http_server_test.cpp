@@ -249,6 +249,28 @@ TEST_F(HttpServerTest, OutlivesWhatIsNoRequest) {
   EXPECT_EQ(bodyOf(exchange(get("/small.txt"))), "hello");
 }
 
+TEST_F(HttpServerTest, WantsOneHost) {
+  start();
+  EXPECT_TRUE(exchange("GET /small.txt HTTP/1.1\r\n\r\n").starts_with("HTTP/1.1 400 "));
+  EXPECT_TRUE(exchange(get("/small.txt", "Host: b\r\n")).starts_with("HTTP/1.1 400 "));
+  EXPECT_TRUE(exchange("GET /small.txt HTTP/1.0\r\n\r\n").starts_with("HTTP/1.0 200 "));
+}
+
+TEST_F(HttpServerTest, SendsWhatItOpenedWhateverBecomesOfThePath) {
+  start();
+  const Client one(server_->port(), 4096), other(server_->port(), 4096);
+  one.send(get("/tile.glb"));
+  EXPECT_TRUE(one.receive(100).starts_with("HTTP/1.1 200 "));
+  writeFileAtomically(folder_ / "tile.glb", std::string(100, 'x'));
+  EXPECT_TRUE(one.receive(SIZE_MAX, 20s).ends_with(tile_.substr(1000)));
+  writeFileAtomically(folder_ / "tile.glb", tile_);
+  other.send(get("/tile.glb"));
+  EXPECT_TRUE(other.receive(100).starts_with("HTTP/1.1 200 "));
+  fs::resize_file(folder_ / "tile.glb", 1000000);
+  EXPECT_LE(other.receive(SIZE_MAX, 20s).size(), 1000300u) << "an answer that ends early";
+  EXPECT_TRUE(other.isAtEnd());
+}
+
 TEST_F(HttpServerTest, DoesNotTakeABodyForTheNextRequest) {
   start();
   const std::string smuggled = get("/tile.glb", "");
