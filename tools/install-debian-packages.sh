@@ -19,7 +19,7 @@ for argument in "$@"; do
   case "$argument" in
     --browser) packages+=(chromium xvfb xauth) ;;
     --fuzz) packages+=(clang-14 libclang-rt-14-dev) ;;
-    --bench) packages+=(jq libtorch-dev libopenblas0-pthread vulkan-tools) ;;
+    --bench) packages+=(jq python3 libtorch-dev libopenblas0-pthread vulkan-tools) ;;
     *) echo "usage: $0 [--browser] [--fuzz] [--bench]" >&2; exit 2 ;;
   esac
 done
