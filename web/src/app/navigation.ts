@@ -126,7 +126,8 @@ export class Navigation {
   private overview(): Look {
     const target = this.bounds.getCenter(new THREE.Vector3());
     target.y = this.bounds.min.y;
-    return { eye: new THREE.Vector3(0, 0.75, 0.8).multiplyScalar(this.radius).add(target), target };
+    const away = this.radius * Math.max(1, 1 / this.camera.aspect);
+    return { eye: new THREE.Vector3(0, 0.75, 0.8).multiplyScalar(away).add(target), target };
   }
 
   private flyOn(): void {

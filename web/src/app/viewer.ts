@@ -33,10 +33,10 @@ export class Viewer {
     this.world.background = city.background;
     this.world.add(city);
     this.navigation = new Navigation(this.camera, canvas, city.bounds, (event) => this.pickAt(event));
-    this.navigation.showAll();
     addEventListener('resize', () => this.resize());
-    this.watchClicks();
     this.resize();
+    this.navigation.showAll();
+    this.watchClicks();
     this.run();
   }
 
