@@ -1,6 +1,7 @@
 // The viewer: a page that shows the scene which its address names (?scene=, else the folder scene beside it).
 import { TesseraScene } from '../scene';
 import { SceneError } from '../scene-error';
+import { addMeasuring } from './measuring';
 import { ChosenFiles } from '../scene-files';
 import { addBookmarks } from './bookmarks';
 import { element } from './element';
@@ -34,6 +35,7 @@ async function start(): Promise<void> {
   const shortcuts = new Shortcuts();
   const toolbar = new Toolbar(document.body, shortcuts);
   addNavigationTools(viewer, toolbar, shortcuts);
+  addMeasuring(viewer, toolbar, shortcuts);
   addBookmarks(viewer, toolbar);
   addScreenshot(viewer, toolbar);
   addSettings(viewer, toolbar);

@@ -21,6 +21,7 @@ type Pick = (event: { clientX: number; clientY: number }) => THREE.Vector3 | und
 export class Navigation {
   readonly orbit: OrbitControls;
   onModeChange: (mode: NavigationMode) => void = () => {};
+  isPointing = false; // a tool takes clicks: a double click goes nowhere, and the pointer stays free
   private current: NavigationMode = 'map';
   private readonly keys = new Set<string>();
   private flight?: { from: Look; to: Look; begin: number };
@@ -188,12 +189,13 @@ export class Navigation {
     addEventListener('keyup', ({ code }) => this.keys.delete(code));
     addEventListener('blur', () => this.keys.clear());
     this.canvas.addEventListener('dblclick', (event) => {
+      if (this.isPointing) return;
       const place = this.pick(event);
       if (place && this.current !== 'fly') this.focus(place);
     });
     this.canvas.addEventListener('pointerdown', ({ pointerId, pointerType }) => {
       if (this.current !== 'fly') return;
-      if (pointerType === 'mouse' && document.pointerLockElement !== this.canvas) {
+      if (pointerType === 'mouse' && !this.isPointing && document.pointerLockElement !== this.canvas) {
         // Where the pointer cannot be locked, dragging turns all the same.
         void Promise.resolve(this.canvas.requestPointerLock()).catch(() => {});
       }
