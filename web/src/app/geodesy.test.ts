@@ -67,6 +67,8 @@ describe('the frame of the ground', () => {
     expectClose(turned.inGround([10, 8, 0]), [100 + 10 * cos, 200 + 10 * sin, 7], 1e-12);
     expect(turned.unitsPerMetre).toBeCloseTo(2, 12);
     expectClose(turned.up, [0, 2, 0], 1e-12);
+    const tilted = new GroundFrame({ latitude: 0, longitude: 0, altitude: 0, enuFromWorld: [1.6, 0, 1.2, 0, 0, 2, 0, 0, -1.2, 0, 1.6, 0, 1, 2, 3, 1] });
+    expectClose(tilted.inGround(tilted.up), [1, 2, 4], 1e-12);
   });
 
   it('says where places of the viewer are', () => {

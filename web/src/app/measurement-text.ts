@@ -12,7 +12,7 @@ export interface Label {
   at: Vec3;
   text: string;
   isMinor?: boolean;
-  isAbove?: boolean; // the place, which has a dot
+  stands?: 'above' | 'beside'; // of the place, so that a dot or a short line can be seen
 }
 
 export function placeRows(place: Vec3, frame: GroundFrame): Row[] {
@@ -67,17 +67,17 @@ export function labelsOf(measurement: Measurement, frame: GroundFrame): Label[] 
   const { kind, places } = measurement;
   const text = headline(measurement, frame);
   if (text === '') return [];
-  if (kind === 'place') return [{ at: places[0], text, isAbove: true }];
+  if (kind === 'place') return [{ at: places[0], text, stands: 'above' }];
   if (kind === 'area') return [{ at: middle(places), text }];
   if (kind === 'height') {
     const foot = corner(places, frame);
     const top = frame.height(places[1]) > frame.height(places[0]) ? places[1] : places[0];
-    return [{ at: middle([foot, top]), text }];
+    return [{ at: middle([foot, top]), text, stands: 'beside' }];
   }
   if (places.length === 2) return [{ at: middle(places), text }];
   const { segments } = lineFigures(places, frame);
   const minor = segments.map((value, i) => ({ at: middle([places[i], places[i + 1]]), text: frame.length(value), isMinor: true }));
-  return [...minor, { at: places[places.length - 1], text: `Σ ${text}`, isAbove: true }];
+  return [...minor, { at: places[places.length - 1], text: `Σ ${text}`, stands: 'above' }];
 }
 
 // GeoJSON (RFC 7946) where the capture is on the Earth; else what it is in the capture's own axes and units.

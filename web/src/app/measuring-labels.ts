@@ -7,6 +7,8 @@ import type { Label } from './measurement-text';
 
 const kSvg = 'http://www.w3.org/2000/svg';
 
+const kStands = { on: '-50%, -50%', above: '-50%, calc(-100% - 9px)', beside: '10px, -50%' };
+
 export interface Band {
   from: readonly Vec3[]; // lines go from each of these
   x: number; // to here, pixels of the canvas
@@ -44,12 +46,11 @@ export class MeasuringLabels {
 
   // After the camera has moved.
   place(): void {
-    for (const { at, node, isAbove } of this.placed) {
+    for (const { at, node, stands } of this.placed) {
       const pixel = this.pixelOf(at);
       node.hidden = !pixel;
       if (!pixel) continue;
-      const beside = isAbove ? '-50%, calc(-100% - 9px)' : '-50%, -50%';
-      node.style.transform = `translate(${pixel.x.toFixed(1)}px, ${pixel.y.toFixed(1)}px) translate(${beside})`;
+      node.style.transform = `translate(${pixel.x.toFixed(1)}px, ${pixel.y.toFixed(1)}px) translate(${kStands[stands ?? 'on']})`;
     }
     this.placeBand();
   }
@@ -74,6 +75,10 @@ export class MeasuringLabels {
     this.bandText.hidden = begins.length === 0 || !band?.text;
     if (!band) return;
     this.bandText.textContent = band.text;
-    this.bandText.style.transform = `translate(${band.x + 14}px, ${band.y + 12}px)`;
+    // Below and right of the pointer, as long as that is on the canvas.
+    const { offsetWidth: width, offsetHeight: height } = this.bandText;
+    const x = Math.min(band.x + 14, this.canvas.clientWidth - width - 4);
+    const y = band.y + 12 + height > this.canvas.clientHeight - 4 ? band.y - 12 - height : band.y + 12;
+    this.bandText.style.transform = `translate(${x}px, ${y}px)`;
   }
 }

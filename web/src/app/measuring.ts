@@ -162,9 +162,13 @@ export class Measuring {
 
   private show(): void {
     const begun: Measurement[] = this.places.length > 0 ? [{ kind: this.kind, places: this.places }] : [];
-    const all = [...this.kept, ...begun];
-    this.marks.show(all, this.frame);
-    this.labels.show(all.flatMap((one) => labelsOf(one, this.frame)));
+    // An area is open until it is ended; the band closes it.
+    const open: Measurement[] = begun.map(({ places }) => ({ kind: this.kind === 'area' ? 'distance' : this.kind, places }));
+    this.marks.show([...this.kept, ...open], this.frame);
+    const labels = this.kept.flatMap((one) => labelsOf(one, this.frame));
+    // What is begun has its figure at the pointer.
+    const segments = begun.flatMap((one) => labelsOf(one, this.frame)).filter(({ isMinor }) => isMinor);
+    this.labels.show([...labels, ...segments]);
     this.panel.showKind(this.kind, kHints[this.kind]);
     this.panel.showKept(this.kept.map((one) => ({
       name: kKindNames[one.kind], figure: headline(one, this.frame), isChosen: one === this.chosen && begun.length === 0,
