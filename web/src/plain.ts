@@ -126,10 +126,10 @@ const plain = {
 
   // What addBox or addCubes has added.
   removeBox(): void {
-    const box = world.getObjectByName('box') as THREE.Mesh<THREE.BufferGeometry, THREE.Material>;
+    const box = world.getObjectByName('box') as THREE.Mesh;
     box.removeFromParent();
     box.geometry.dispose();
-    box.material.dispose();
+    for (const material of [box.material].flat()) material.dispose();
   },
 
   // What is on the canvas: red, green and blue, rows from the top, as base64.

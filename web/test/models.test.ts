@@ -1,6 +1,7 @@
 // Ordinary models in the scene: what is in front hides what is behind, both ways. By pixels.
 import { readFileSync } from 'node:fs';
 import type { Browser, Page } from 'playwright-core';
+import type { Material, Mesh } from 'three';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Plain, View } from '../src/plain';
 import { decodeTileset } from '../src/tiles/decode-tileset';
@@ -42,16 +43,23 @@ describe.skipIf(missing())('a model in the scene', () => {
   }
 
   // Of the pixels that a box covers: how many are its colour, and how many are as they are without it.
-  async function draw(view: View, low: Place, high: Place): Promise<{ covered: number; red: number; same: number }> {
+  // `change` is done to the box before it is drawn with the scene.
+  async function draw(
+    view: View, low: Place, high: Place, change: (box: Mesh) => void = () => {},
+  ): Promise<{ covered: number; red: number; same: number }> {
     const without = await picture(view);
-    await page.evaluate(([from, to]) => plain.addBox([...from], [...to]), [low, high] as const);
-    const together = await picture(view);
-    await page.evaluate(() => (plain.city!.visible = false));
+    await page.evaluate(([from, to]) => {
+      plain.addBox([...from], [...to]);
+      plain.city!.visible = false;
+    }, [low, high] as const);
     const alone = await picture(view);
-    await page.evaluate(() => {
+    await page.evaluate((done) => {
       plain.city!.visible = true;
-      plain.removeBox();
-    });
+      const box = plain.world.getObjectByName('box');
+      (new Function('box', `(${done})(box)`) as (box: unknown) => void)(box);
+    }, change.toString());
+    const together = await picture(view);
+    await page.evaluate(() => plain.removeBox());
     const counts = { covered: 0, red: 0, same: 0 };
     for (let at = 0; at < alone.length; at += 3) {
       if (alone[at] < 250 || alone[at + 1] > 5) continue;
@@ -87,5 +95,33 @@ describe.skipIf(missing())('a model in the scene', () => {
     const up = viewAt(tileset, [-1, -2.2, 0.3], [-1, 0, 3]);
     const { covered, red } = await draw(up, [-1.3, -0.3, 1.9], [-0.7, -0.2, 2.5]);
     expect(red / covered).toBeGreaterThan(0.99);
+  });
+
+  it('hides and is hidden as a part of the scene, too', async () => {
+    const join = (box: Mesh) => void plain.city!.attach(box);
+    const before = await draw(atFacade, [-1.15, kFacade - 0.4, 0], [-0.85, kFacade - 0.2, 0.3], join);
+    expect(before.red / before.covered).toBeGreaterThan(0.99);
+    const behind = await draw(atFacade, [-1.15, -0.1, -0.1], [-0.85, 0.05, 0.2], join);
+    expect(behind.same / behind.covered).toBeGreaterThan(0.99);
+  });
+
+  it('hides with the opaque one of its materials', async () => {
+    const { covered, red } = await draw(atFacade, [-1.15, kFacade - 0.4, 0], [-0.85, kFacade - 0.2, 0.3], (box) => {
+      const opaque = box.material as Material;
+      const glass = opaque.clone();
+      glass.transparent = true;
+      box.material = [glass, opaque, glass, opaque, glass, opaque]; // of the sides; it is the fourth that is seen
+    });
+    expect(red / covered).toBeGreaterThan(0.99);
+  });
+
+  it('hides nothing while what holds it is invisible', async () => {
+    const { covered, same } = await draw(atFacade, [-1.15, kFacade - 0.4, 0], [-0.85, kFacade - 0.2, 0.3], (box) => {
+      const holder = new plain.THREE.Group();
+      holder.visible = false;
+      plain.world.add(holder);
+      holder.attach(box);
+    });
+    expect(same / covered).toBeGreaterThan(0.99);
   });
 });

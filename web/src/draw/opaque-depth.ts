@@ -1,4 +1,4 @@
-// The depth of what is opaque in a world, the scene apart: rays end there.
+// The depth of what is opaque in a world: rays end there. The scene's own picture lets light through, and so is no part of it.
 import * as THREE from 'three';
 
 export class OpaqueDepth {
@@ -9,34 +9,33 @@ export class OpaqueDepth {
     return this.target ? 8 * this.target.width * this.target.height : 0;
   }
 
-  // Null where there is nothing opaque. `scene` and what it holds is left out; the world is what it stands in.
+  // Null where there is nothing opaque in the world that `scene` stands in.
   draw(renderer: THREE.WebGLRenderer, camera: THREE.Camera, scene: THREE.Object3D, size: THREE.Vector2): THREE.Texture | null {
     let world: THREE.Object3D = scene;
     while (world.parent) world = world.parent;
-    const hidden: THREE.Object3D[] = [];
+    const seeThrough = new Set<THREE.Material>();
     let found = false;
     const look = (object: THREE.Object3D) => {
-      if (object === scene || !object.visible) return;
-      const drawable = object as THREE.Mesh;
-      if (drawable.material !== undefined && object.layers.test(camera.layers)) {
-        const materials = Array.isArray(drawable.material) ? drawable.material : [drawable.material];
-        // What lets light through, or writes no depth, ends no ray.
-        if (materials.every((material) => !material.transparent && material.depthWrite && material.visible)) found = true;
-        else hidden.push(object);
+      if (!object.visible) return; // nor is what it holds
+      const { material } = object as THREE.Mesh;
+      if (material !== undefined && object.layers.test(camera.layers)) {
+        for (const one of Array.isArray(material) ? material : [material]) {
+          if (!one.visible) continue;
+          // What lets light through, or writes no depth, ends no ray; what else the object is made of may.
+          if (one.transparent || !one.depthWrite) seeThrough.add(one);
+          else found = true;
+        }
       }
       for (const child of object.children) look(child);
     };
-    if (world !== scene) look(world);
+    look(world);
     if (!found) {
       this.dispose();
       return null;
     }
     this.target ??= this.make();
     if (this.target.width !== size.x || this.target.height !== size.y) this.target.setSize(size.x, size.y);
-    const wasVisible = scene.visible;
-    scene.visible = false;
-    const masks = hidden.map((object) => object.layers.mask); // not `visible`: children may be opaque
-    for (const object of hidden) object.layers.disableAll();
+    for (const material of seeThrough) material.visible = false;
     const background = (world as THREE.Scene).background;
     if (background) (world as THREE.Scene).background = null;
     const before = renderer.getRenderTarget();
@@ -48,8 +47,7 @@ export class OpaqueDepth {
     renderer.setRenderTarget(before);
     Object.assign(renderer.shadowMap, { autoUpdate, needsUpdate });
     if (background) (world as THREE.Scene).background = background;
-    hidden.forEach((object, i) => (object.layers.mask = masks[i]));
-    scene.visible = wasVisible;
+    for (const material of seeThrough) material.visible = true;
     return this.target.depthTexture;
   }
 
