@@ -55,7 +55,11 @@ export function psnr(a: Uint8Array, b: Uint8Array): number {
 }
 
 // Red, green and blue of a PNG, decoded by the browser.
-export async function decodePng(page: Page, file: string): Promise<Uint8Array> {
+export function decodePng(page: Page, file: string): Promise<Uint8Array> {
+  return decodePixels(page, readFileSync(file));
+}
+
+export async function decodePixels(page: Page, png: Buffer): Promise<Uint8Array> {
   const text = await page.evaluate(async (base64) => {
     const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${base64}`)).blob());
     const context = new OffscreenCanvas(image.width, image.height).getContext('2d')!;
@@ -64,6 +68,6 @@ export async function decodePng(page: Page, file: string): Promise<Uint8Array> {
     let bytes = '';
     for (let i = 0; i < data.length; ++i) if (i % 4 < 3) bytes += String.fromCharCode(data[i]);
     return btoa(bytes);
-  }, readFileSync(file).toString('base64'));
+  }, png.toString('base64'));
   return new Uint8Array(Buffer.from(text, 'base64'));
 }

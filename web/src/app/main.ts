@@ -1,11 +1,12 @@
 // The viewer: a page that shows the scene which its address names (?scene=, else the folder scene beside it).
 import { TesseraScene } from '../scene';
 import { SceneError } from '../scene-error';
-import { addMeasuring } from './measuring';
 import { ChosenFiles } from '../scene-files';
 import { addBookmarks } from './bookmarks';
 import { element } from './element';
 import { addHelp } from './help';
+import { addMeasuring } from './measuring';
+import { addModels } from './models-tool';
 import { addNavigationTools } from './navigation-tools';
 import { ErrorPanel, LoadingPanel, StatisticsPanel } from './panels';
 import { addScreenshot } from './screenshot';
@@ -36,6 +37,7 @@ async function start(): Promise<void> {
   const toolbar = new Toolbar(document.body, shortcuts);
   addNavigationTools(viewer, toolbar, shortcuts);
   addMeasuring(viewer, toolbar, shortcuts);
+  addModels(viewer, toolbar, shortcuts, fail);
   addBookmarks(viewer, toolbar);
   addScreenshot(viewer, toolbar);
   addSettings(viewer, toolbar);

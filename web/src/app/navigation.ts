@@ -27,6 +27,7 @@ export class Navigation {
   private flight?: { from: Look; to: Look; begin: number };
   private moved = false;
   private speed: number; // metres a second, when flying
+  private held = false; // by a tool that drags something
   private looking?: number; // the pointer that turns the view when flying
 
   constructor(
@@ -47,6 +48,12 @@ export class Navigation {
     this.speed = this.radius / 8;
     this.listen();
     this.mode = 'map';
+  }
+
+  // Whether dragging moves the camera: not while a tool drags something.
+  set enabled(enabled: boolean) {
+    this.held = !enabled;
+    this.orbit.enabled = enabled && this.current !== 'fly';
   }
 
   get mode(): NavigationMode {
@@ -194,7 +201,7 @@ export class Navigation {
       if (place && this.current !== 'fly') this.focus(place);
     });
     this.canvas.addEventListener('pointerdown', ({ pointerId, pointerType }) => {
-      if (this.current !== 'fly') return;
+      if (this.current !== 'fly' || this.held) return;
       if (pointerType === 'mouse' && !this.isPointing && document.pointerLockElement !== this.canvas) {
         // Where the pointer cannot be locked, dragging turns all the same.
         void Promise.resolve(this.canvas.requestPointerLock()).catch(() => {});

@@ -71,7 +71,7 @@ export class Viewer {
     const at = this.pointerAt(event);
     const raycaster = new THREE.Raycaster();
     raycaster.setFromCamera(at, this.camera);
-    const hit = raycaster.intersectObjects(this.world.children.filter((child) => child !== this.city && !child.userData.isTool))[0];
+    const hit = raycaster.intersectObjects(this.world.children.filter((child) => child !== this.city && child.visible && !child.userData.isTool))[0];
     const place = this.city.pick(at, this.renderer);
     if (!hit || (place && place.distanceTo(this.camera.position) < hit.distance)) return place;
     return hit.point;

@@ -1,0 +1,202 @@
+// Models that people drop onto the viewer, and the world that they save. By pixels.
+import { readFileSync } from 'node:fs';
+import type { Browser, Page } from 'playwright-core';
+import { afterAll, beforeAll, beforeEach, describe, expect, it } from 'vitest';
+import { madeGlb } from '../src/testing/made-glb';
+import { goldenScene, launch, missing, serve, type Server } from './machine';
+import { decodePixels } from './pictures';
+
+interface Given {
+  name: string;
+  bytes: Uint8Array;
+}
+
+const kMiddle = { x: 300, y: 135 }; // beside the panel
+const cube: Given = { name: 'red cube.glb', bytes: madeGlb({ edge: 10 }) };
+
+describe.skipIf(missing())('a model that is dropped', () => {
+  let server: Server;
+  let browser: Browser;
+  let page: Page;
+  let said: string[];
+  let asked: string[];
+
+  beforeAll(async () => {
+    [server, browser] = await Promise.all([serve(goldenScene), launch()]);
+  });
+  afterAll(async () => {
+    await browser?.close();
+    server?.close();
+  });
+  beforeEach(async () => {
+    await page?.close();
+    page = await browser.newPage({ viewport: { width: 480, height: 270 } });
+    said = [];
+    asked = [];
+    page.on('console', (message) => message.type() === 'error' && said.push(message.text()));
+    page.on('pageerror', (error) => said.push(error.message));
+    page.on('request', (request) => asked.push(request.url()));
+    await reload();
+  });
+
+  async function reload(): Promise<void> {
+    await page.goto(server.url);
+    await page.waitForSelector('.loading.done', { state: 'attached' });
+  }
+
+  async function drop(...files: Given[]): Promise<void> {
+    await dropAt(kMiddle, ...files);
+  }
+
+  async function dropAt(place: { x: number; y: number }, ...files: Given[]): Promise<void> {
+    const texts = files.map(({ name, bytes }) => ({ name, base64: Buffer.from(bytes).toString('base64') }));
+    await page.evaluate(async ([all, { x, y }]) => {
+      const dataTransfer = new DataTransfer();
+      for (const { name, base64 } of all) {
+        dataTransfer.items.add(new File([Uint8Array.from(atob(base64), (one) => one.charCodeAt(0))], name));
+      }
+      const canvas = document.querySelector('#view')!;
+      for (const kind of ['dragover', 'drop']) {
+        canvas.dispatchEvent(new DragEvent(kind, { dataTransfer, clientX: x, clientY: y, bubbles: true, cancelable: true }));
+      }
+    }, [texts, place] as const);
+  }
+
+  const listed = (names: string[]) =>
+    page.waitForFunction((all) => [...document.querySelectorAll('.models .name')].map((one) => one.textContent).join() === all, names.join());
+
+  // Nothing selected, nothing open; how many of its pixels are red.
+  async function picture(): Promise<{ pixels: Uint8Array; red: number }> {
+    await page.keyboard.press('Escape');
+    await page.mouse.move(470, 260);
+    await page.waitForTimeout(1500);
+    const pixels = await decodePixels(page, await page.screenshot());
+    let red = 0;
+    for (let at = 0; at < pixels.length; at += 3) if (pixels[at] > 200 && pixels[at + 1] < 40 && pixels[at + 2] < 40) ++red;
+    return { pixels, red };
+  }
+
+  async function errorText(): Promise<string> {
+    await page.waitForSelector('.error', { state: 'visible' });
+    return (await page.textContent('.error'))!;
+  }
+
+  async function save(button: string): Promise<Given> {
+    const [download] = await Promise.all([page.waitForEvent('download'), page.click(`.models button:text-is("${button}")`)]);
+    expect(download.suggestedFilename()).toBe('world.json');
+    return { name: 'world.json', bytes: readFileSync(await download.path()) };
+  }
+
+  it('stands in the picture, and again after it was saved and opened', async () => {
+    expect((await picture()).red).toBe(0);
+    await drop(cube);
+    await listed(['red cube']);
+    expect(await page.textContent('.models .details')).toContain('10.0 × 10.0 × 10.0 m');
+    const alone = await save('Save');
+    const whole = await save('Save with models');
+    const { models } = JSON.parse(Buffer.from(alone.bytes).toString()) as { models: { rotation: number[]; scale: number[] }[] };
+    expect(models).toMatchObject([{ name: 'red cube', files: ['red cube.glb'], rotation: [0, 0, 0, 1], scale: [1, 1, 1], visible: true }]);
+    const before = await picture();
+    expect(before.red).toBeGreaterThan(500);
+
+    for (const files of [[alone, cube], [whole]]) {
+      await reload();
+      await drop(...files);
+      await listed(['red cube']);
+      const after = await picture();
+      const changed = after.pixels.filter((value, i) => Math.abs(value - before.pixels[i]) > 8).length;
+      expect(changed).toBeLessThan(30);
+    }
+    expect(said).toEqual([]);
+  });
+
+  it('is hidden, moved by numbers, copied and deleted', async () => {
+    await page.keyboard.press('o');
+    await page.setInputFiles('.models input[type=file]', { name: cube.name, mimeType: '', buffer: Buffer.from(cube.bytes) });
+    await listed(['red cube']);
+    const { red } = await picture();
+    await page.keyboard.press('o');
+    await page.click('.models [aria-label^=Hide]');
+    expect((await picture()).red).toBe(0);
+    await page.keyboard.press('o');
+    await page.click('.models [aria-label^=Show]');
+    await page.click('.models .name');
+    await page.fill('.field:has-text("Scale") input', '0.5');
+    await page.keyboard.press('Enter');
+    const smaller = await picture();
+    expect(smaller.red / red).toBeGreaterThan(0.1);
+    expect(smaller.red / red).toBeLessThan(0.5);
+    await page.keyboard.press('o');
+    await page.click('.models [aria-label^=Duplicate]');
+    await listed(['red cube', 'red cube 2']);
+    expect((await picture()).red).toBeGreaterThan(1.5 * smaller.red);
+    await page.keyboard.press('o');
+    await page.click('.models [aria-label^=Delete]');
+    await page.click('.models [aria-label^=Delete]');
+    await listed([]);
+    expect((await picture()).red).toBe(0);
+    expect(said).toEqual([]);
+  });
+
+  it('is selected by a click, and moved by its handles while the camera stays', async () => {
+    await dropAt({ x: 420, y: 150 }, cube);
+    await listed(['red cube']);
+    const before = await picture();
+    await page.mouse.click(420, 145);
+    await page.waitForSelector('.models li.on');
+    const places = () => page.$$eval('.models .three:nth-of-type(2) input', (all) => all.map((one) => (one as HTMLInputElement).valueAsNumber));
+    const [x, y, z] = await places();
+    await page.mouse.move(430, 150);
+    await page.waitForTimeout(500);
+    await page.mouse.move(440, 150);
+    await page.mouse.down();
+    await page.mouse.move(450, 150, { steps: 4 });
+    await page.mouse.up();
+    await page.waitForSelector('.models li.on');
+    const [movedX, ...others] = await places();
+    expect(movedX).toBeGreaterThan(x + 1);
+    expect(others).toEqual([y, z]);
+    const after = await picture();
+    expect(after.red).toBeGreaterThan(0);
+    const above = 3 * 480 * 60; // the rows over the model
+    expect(after.pixels.subarray(0, above).filter((value, i) => Math.abs(value - before.pixels[i]) > 8).length).toBeLessThan(30);
+    await page.mouse.click(420, 250);
+    expect(await page.isVisible('.models li.on')).toBe(false);
+    expect(said).toEqual([]);
+  });
+
+  it('is named when it is broken, and the page lives', async () => {
+    await drop({ name: 'x.glb', bytes: Buffer.from('garbage') });
+    expect(await errorText()).toMatch(/x\.glb.*Is no glTF file/);
+    for (const kind of ['fbx', 'obj']) {
+      await page.click('.error button');
+      await drop({ name: `x.${kind}`, bytes: Buffer.from('garbage') });
+      expect(await errorText()).toContain(`x.${kind}`);
+    }
+    await page.click('.error button');
+    await drop({ name: 'world.json', bytes: Buffer.from('{"kind":"tessera world","version":1,"models":[{}]}') });
+    expect(await errorText()).toContain('world.json, models[0].files');
+    await page.click('.error button');
+    await drop(cube);
+    await listed(['red cube']);
+    expect((await picture()).red).toBeGreaterThan(500);
+    expect(said).toEqual([]);
+  });
+
+  it('fetches nothing', async () => {
+    const change = (gltf: any) => (gltf.images = [{ uri: `${server.url}nothing.png` }]);
+    await drop({ name: 'asks.glb', bytes: madeGlb({ edge: 10, change }) });
+    expect(await errorText()).toContain('nothing.png, and nothing is fetched');
+    await page.click('.error button');
+    const text = `mtllib a.mtl\nusemtl red\nv 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n`;
+    const mtl = `newmtl red\nKd 1 0 0\nmap_Kd ${server.url}nothing.png\n`;
+    await drop({ name: 'a.obj', bytes: Buffer.from(text) }, { name: 'a.mtl', bytes: Buffer.from(mtl) });
+    expect(await errorText()).toContain('nothing.png, and nothing is fetched');
+    await page.click('.error button');
+    await drop({ name: 'a.obj', bytes: Buffer.from(text) }, { name: 'a.mtl', bytes: Buffer.from(mtl.replace(server.url, '')) });
+    expect(await errorText()).toMatch(/a\.obj.*Is shown without nothing\.png/);
+    await listed(['a']);
+    expect(asked.filter((url) => url.includes('nothing'))).toEqual([]);
+    expect(said).toEqual([]);
+  });
+});
