@@ -183,6 +183,35 @@ describe.skipIf(missing())('a model that is dropped', () => {
     expect(said).toEqual([]);
   });
 
+  it('has its own size and its textures, whatever wrote it', async () => {
+    const fbx = [
+      '; FBX 7.3.0 project file', 'FBXHeaderExtension:  {', '\tFBXHeaderVersion: 1003', '\tFBXVersion: 7300', '}',
+      'GlobalSettings:  {', '\tVersion: 1000', '\tProperties70:  {',
+      '\t\tP: "UpAxis", "int", "Integer", "",1', '\t\tP: "UnitScaleFactor", "double", "Number", "",1', '\t}', '}',
+      'Objects:  {',
+      '\tGeometry: 1, "Geometry::tri", "Mesh" {', '\t\tVertices: *9 {', '\t\t\ta: 0,0,0,1000,0,0,0,2000,0', '\t\t}',
+      '\t\tPolygonVertexIndex: *3 {', '\t\t\ta: 0,1,-3', '\t\t}', '\t}',
+      '\tModel: 2, "Model::tri", "Mesh" {', '\t\tVersion: 232', '\t}', '}',
+      'Connections:  {', '\tC: "OO",1,2', '\tC: "OO",2,0', '}', '',
+    ].join('\n');
+    await drop({ name: 'sign.fbx', bytes: Buffer.from(fbx) });
+    await listed(['sign']);
+    expect(await page.textContent('.models .details')).toContain('10.0 × 0.00 × 20.0 m');
+    await page.click('.models [aria-label^=Delete]');
+
+    const obj = 'mtllib paint.mtl\nusemtl red\nv -9 0 -9\nv 9 0 -9\nv -9 0 9\nv 9 9 9\nvt 0 0\nf 1/1 3/1 2/1\nf 2/1 3/1 4/1\n';
+    const png = 'iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC';
+    await drop(
+      { name: 'roof.obj', bytes: Buffer.from(obj) }, { name: 'Red.PNG', bytes: Buffer.from(png, 'base64') },
+      { name: 'paint.mtl', bytes: Buffer.from('newmtl red\nKd 1 1 1\nKe 1 0 0\nmap_Kd maps\\red.png\n') });
+    await listed(['roof']);
+    const { models } = JSON.parse(Buffer.from((await save('Save')).bytes).toString()) as { models: { files: string[] }[] };
+    expect(models[0].files).toEqual(['roof.obj', 'paint.mtl', 'Red.PNG']);
+    expect((await picture()).red).toBeGreaterThan(500);
+    expect(await page.isVisible('.error')).toBe(false);
+    expect(said).toEqual([]);
+  });
+
   it('fetches nothing', async () => {
     const change = (gltf: any) => (gltf.images = [{ uri: `${server.url}nothing.png` }]);
     await drop({ name: 'asks.glb', bytes: madeGlb({ edge: 10, change }) });

@@ -6,6 +6,7 @@ import { findFile, isOfNetwork, kindOf, nameOf, type ModelFile } from './model-f
 import { prepareModel } from './model-materials';
 
 export const kModelBytes = 512 * 1024 * 1024; // of a file
+const kDepth = 256; // of objects in objects
 const kNoFile = 'data:,';
 
 export interface LoadedModel {
@@ -26,6 +27,7 @@ export async function loadModel(main: ModelFile, files: readonly ModelFile[]): P
     if (companions.refused) {
       throw new SceneError(name, '', `asks for ${companions.refused.slice(0, 200)}, and nothing is fetched for a model`, 'put its textures beside it, and drop all together');
     }
+    if (depthOf(object) > kDepth) throw new SceneError(name, '', 'is nested too deep', 'export it again, with fewer groups in groups');
     const box = prepareModel(object);
     const size = box.getSize(new THREE.Vector3());
     if (box.isEmpty()) throw new SceneError(name, '', 'holds nothing to draw', 'export it again, with its meshes');
@@ -97,6 +99,10 @@ async function materialsOf(text: string, companions: Companions) {
   const materials = new MTLLoader(companions.manager).parse(texts.map((one) => new TextDecoder().decode(one)).join('\n'), '');
   materials.preload();
   return materials;
+}
+
+function depthOf({ children }: THREE.Object3D): number {
+  return 1 + children.reduce((most, child) => Math.max(most, depthOf(child)), 0);
 }
 
 // The files that a model names, as urls of this page for three's loaders; nothing else has one.

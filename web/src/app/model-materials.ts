@@ -12,6 +12,7 @@ export function prepareModel(object: THREE.Object3D): THREE.Box3 {
   };
   object.traverse((one) => {
     if ((one as THREE.Light).isLight || (one as THREE.Camera).isCamera) others.push(one);
+    if (one.name === '') one.name = one.uuid; // animations know it by that, and copies have another
     const mesh = one as THREE.SkinnedMesh;
     if (mesh.material) mesh.material = Array.isArray(mesh.material) ? mesh.material.map(replace) : replace(mesh.material);
     if (mesh.skeleton) mesh.frustumCulled = false; // its sphere is of the pose at rest

@@ -42,8 +42,9 @@ export function addModels(viewer: Viewer, toolbar: Toolbar, shortcuts: Shortcuts
   panel.fileSize = () => megabytes(bytesOfModels(models));
 
   const take = async (files: ModelFile[], place: THREE.Vector3) => {
-    const world = files.find(({ path }) => kindOf(path) === 'json');
     const mains = files.filter(isModel);
+    // Models may have JSON files of their own beside them.
+    const world = files.find(({ path }) => kindOf(path) === 'json' && (mains.length === 0 || /^world\b/i.test(nameOf(path))));
     if (files.length === 0) return;
     toolbar.open(tool);
     if (world) {
@@ -76,7 +77,7 @@ export function addModels(viewer: Viewer, toolbar: Toolbar, shortcuts: Shortcuts
     const middle = { clientX: left + width / 2, clientY: top + height / 2 };
     return (event && viewer.pickAt(event)) ?? viewer.pickAt(middle) ?? viewer.navigation.look.target;
   };
-  const drop = new DropTarget(document.body, 'Drop it where it shall stand', (files, event) => receive(files, event));
+  const drop = new DropTarget(document.body, 'Drop it where it should stand', (files, event) => receive(files, event));
   const receive = (files: ModelFile[], event?: DragEvent) => {
     const place = placeFor(event);
     void drop.during('Reading', take(files, place)).catch(fail);
