@@ -160,8 +160,15 @@ describe.skipIf(missing())('a model that is dropped', () => {
     expect(after.red).toBeGreaterThan(0);
     const above = 3 * 480 * 60; // the rows over the model
     expect(after.pixels.subarray(0, above).filter((value, i) => Math.abs(value - before.pixels[i]) > 8).length).toBeLessThan(30);
-    await page.mouse.click(420, 250);
+    await page.mouse.click(460, 250);
     expect(await page.isVisible('.models li.on')).toBe(false);
+    await page.keyboard.press('o');
+    await page.click('.models .name');
+    await page.click('.models button:text-is("Put on a place…")');
+    await page.mouse.click(400, 200);
+    await page.waitForSelector('.models button:text-is("Put on a place…")');
+    const [putX] = await places();
+    expect(putX).toBeLessThan(movedX - 1);
     expect(said).toEqual([]);
   });
 

@@ -110,7 +110,10 @@ export function addModels(viewer: Viewer, toolbar: Toolbar, shortcuts: Shortcuts
   shortcuts.add('delete', 'Delete the selected model', () => models.selected && models.remove(models.selected));
   viewer.onClick.push((event) => {
     if (placed) {
+      const { visible } = placed;
+      placed.visible = false; // not onto itself
       const place = viewer.pickAt(event);
+      placed.visible = visible;
       if (!place) return true;
       placed.position.copy(place);
       askForPlace(undefined);
