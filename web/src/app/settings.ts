@@ -1,7 +1,7 @@
 // What is drawn, and how well.
 import { kDisplayModes, type DisplayMode } from '../draw/display-modes';
-import { element } from './element';
-import type { Toolbar } from './toolbar';
+import { element } from './page/element';
+import type { Toolbar } from './page/toolbar';
 import type { Viewer } from './viewer';
 
 const kModeNames: Record<DisplayMode, string> = {

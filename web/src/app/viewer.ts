@@ -3,9 +3,9 @@
 import * as THREE from 'three';
 import { TesseraScene } from '../scene';
 import { SceneError } from '../scene-error';
-import { Navigation } from './navigation';
-import { Resolution } from './resolution';
-import type { View } from './view-address';
+import { Navigation } from './moving/navigation';
+import { Resolution } from './moving/resolution';
+import type { View } from './views/view-address';
 
 export interface Frame {
   milliseconds: number; // since the last one

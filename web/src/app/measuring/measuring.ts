@@ -1,0 +1,235 @@
+// The measuring tool: places are clicked, lines and figures stand in the picture, and what is done is kept in a list.
+import type { Vec3 } from '../../tiles/tileset';
+import { GroundFrame } from './geodesy';
+import { kLeastPlaces, kMostPlaces, type Kind, type Measurement } from './measurement';
+import { fileOf, headline, kKindNames, labelsOf, placeNumbers, placeRows, rowsOf } from './measurement-text';
+import { MeasuringLabels } from './measuring-labels';
+import { MeasuringMarks } from './measuring-marks';
+import { MeasuringPanel } from './measuring-panel';
+import { copyText, download } from '../page/page-files';
+import { isTyping, type Shortcuts } from '../page/shortcuts';
+import type { Toolbar } from '../page/toolbar';
+import type { Viewer } from '../viewer';
+
+const kNear = 7; // pixels within which a click is on a place
+const kAgain = 400; // ms within which a click on the same pixels is half of a double click
+
+const kHints: Record<Kind, string> = {
+  place: 'Click on a place.',
+  distance: 'Click along it; double click ends.',
+  height: 'Click below, then above.',
+  area: 'Click around it; double click ends.',
+};
+
+interface Pointer {
+  clientX: number;
+  clientY: number;
+}
+
+export function addMeasuring(viewer: Viewer, toolbar: Toolbar, shortcuts: Shortcuts): Measuring {
+  const measuring = new Measuring(viewer);
+  const { element: panel } = measuring.panel;
+  toolbar.add({
+    name: 'Measure', key: 'm', icon: 'ruler', panel,
+    opened: () => measuring.open(),
+    closed: () => measuring.close(),
+  });
+  shortcuts.describe('Backspace', 'Take back the last place, when measuring');
+  shortcuts.describe('Enter', 'End what is being measured');
+  return measuring;
+}
+
+export class Measuring {
+  readonly panel: MeasuringPanel;
+  private readonly frame: GroundFrame;
+  private readonly marks = new MeasuringMarks();
+  private readonly labels: MeasuringLabels;
+  private readonly kept: Measurement[] = [];
+  private chosen?: Measurement; // whose figures are shown while nothing is begun
+  private kind: Kind = 'distance';
+  private places: Vec3[] = []; // of what is begun
+  private lastPlace?: Vec3;
+  private lastClick = { time: -Infinity, clientX: 0, clientY: 0 };
+  private pointer?: Pointer; // over the picture, while something is begun
+  private awaited = 0; // the animation frame that will look under the pointer
+  private isOpen = false;
+
+  constructor(private readonly viewer: Viewer) {
+    this.frame = new GroundFrame(viewer.city.tileset.georeference);
+    this.labels = new MeasuringLabels(viewer.canvas, viewer.camera);
+    this.panel = new MeasuringPanel(
+      this.frame.isGeoreferenced ? '' : 'This capture has no scale: lengths are in its own units, not in metres.');
+    this.panel.onKind = (kind) => this.choose(kind);
+    this.panel.onCopy = () => void this.copy();
+    this.panel.onChoose = (index) => {
+      this.chosen = this.kept[index];
+      this.show();
+    };
+    this.panel.onDelete = (index) => {
+      const [gone] = this.kept.splice(index, 1);
+      if (this.chosen === gone) this.chosen = undefined;
+      this.show();
+    };
+    this.panel.onDeleteAll = () => {
+      this.kept.length = 0;
+      this.chosen = undefined;
+      this.show();
+    };
+    this.panel.onDownload = () => this.download();
+    this.labels.layer.hidden = true;
+    viewer.onClick.push((event) => this.isOpen && this.take(event));
+    viewer.onFrame.add(() => this.isOpen && this.labels.place());
+    this.listen();
+    this.show();
+  }
+
+  open(): void {
+    this.isOpen = true;
+    this.viewer.navigation.isPointing = true;
+    if (document.pointerLockElement === this.viewer.canvas) document.exitPointerLock();
+    this.viewer.canvas.classList.add('pointing');
+    this.labels.layer.hidden = false;
+    this.viewer.world.add(this.marks.group);
+    this.show();
+  }
+
+  // What is kept is there again when the tool is opened again.
+  close(): void {
+    this.endOrDrop();
+    this.isOpen = false;
+    this.pointer = undefined;
+    this.viewer.navigation.isPointing = false;
+    this.viewer.canvas.classList.remove('pointing');
+    this.labels.layer.hidden = true;
+    this.viewer.world.remove(this.marks.group);
+    this.viewer.needPicture();
+  }
+
+  private choose(kind: Kind): void {
+    this.endOrDrop();
+    this.kind = kind;
+    this.show();
+  }
+
+  // Always true: no other tool has this click.
+  private take(event: PointerEvent): true {
+    const before = this.lastClick;
+    this.lastClick = { time: event.timeStamp, clientX: event.clientX, clientY: event.clientY };
+    const isAgain = event.timeStamp - before.time < kAgain && isNear(event, before);
+    if (isAgain || this.isOnAnEnd(event)) {
+      this.end();
+      return true;
+    }
+    const place = this.viewer.pickAt(event)?.toArray();
+    if (!place) return true;
+    this.lastPlace = place;
+    this.panel.showPlace(placeRows(place, this.frame));
+    this.places.push(place);
+    if (this.places.length === kMostPlaces[this.kind]) this.end();
+    else this.show();
+    return true;
+  }
+
+  // Whether a click on the last place, or around an area on the first, ends it.
+  private isOnAnEnd({ clientX, clientY }: Pointer): boolean {
+    if (this.places.length < kLeastPlaces[this.kind]) return false;
+    const { left, top } = this.viewer.canvas.getBoundingClientRect();
+    const ends = this.kind === 'area' ? [this.places[0], this.places.at(-1)!] : [this.places.at(-1)!];
+    return ends.some((place) => {
+      const pixel = this.labels.pixelOf(place);
+      return pixel !== undefined && Math.hypot(clientX - left - pixel.x, clientY - top - pixel.y) < kNear;
+    });
+  }
+
+  // Keeps what is begun, if it is enough.
+  private end(): void {
+    if (this.places.length < kLeastPlaces[this.kind]) return;
+    this.chosen = { kind: this.kind, places: this.places };
+    this.kept.push(this.chosen);
+    this.places = [];
+    this.show();
+  }
+
+  private endOrDrop(): void {
+    this.end();
+    this.places = [];
+  }
+
+  private takeBack(): void {
+    this.places.pop();
+    this.show();
+  }
+
+  private show(): void {
+    const begun: Measurement[] = this.places.length > 0 ? [{ kind: this.kind, places: this.places }] : [];
+    // An area is open until it is ended; the band closes it.
+    const open: Measurement[] = begun.map(({ places }) => ({ kind: this.kind === 'area' ? 'distance' : this.kind, places }));
+    this.marks.show([...this.kept, ...open], this.frame);
+    const labels = this.kept.flatMap((one) => labelsOf(one, this.frame));
+    // What is begun has its figure at the pointer.
+    const segments = begun.flatMap((one) => labelsOf(one, this.frame)).filter(({ isMinor }) => isMinor);
+    this.labels.show([...labels, ...segments]);
+    this.panel.showKind(this.kind, kHints[this.kind]);
+    this.panel.showKept(this.kept.map((one) => ({
+      name: kKindNames[one.kind], figure: headline(one, this.frame), isChosen: one === this.chosen && begun.length === 0,
+    })));
+    this.pointer = undefined; // until it moves
+    this.showBand();
+    this.viewer.needPicture();
+  }
+
+  // From the last place to the pointer, with the figures as they would be; looks into the picture.
+  private showBand(): void {
+    const { pointer, places, kind } = this;
+    const under = pointer && this.viewer.pickAt(pointer)?.toArray();
+    const wouldBe: Measurement = { kind, places: under ? [...places, under] : places };
+    if (places.length > 0) this.panel.showFigures(rowsOf(wouldBe, this.frame));
+    else this.panel.showFigures(this.chosen ? rowsOf(this.chosen, this.frame) : []);
+    if (!under) {
+      this.labels.showBand(undefined);
+      return;
+    }
+    const { left, top } = this.viewer.canvas.getBoundingClientRect();
+    const from = [places[places.length - 1], ...(kind === 'area' && places.length > 1 ? [places[0]] : [])];
+    this.labels.showBand({ from, x: pointer.clientX - left, y: pointer.clientY - top, text: headline(wouldBe, this.frame) });
+  }
+
+  private listen(): void {
+    addEventListener('keydown', (event) => {
+      if (!this.isOpen || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
+      if (event.key === 'Backspace') this.takeBack();
+      else if (event.key === 'Enter' && !(event.target instanceof HTMLButtonElement)) this.end();
+      else return;
+      event.preventDefault();
+    });
+    const { canvas } = this.viewer;
+    canvas.addEventListener('pointermove', ({ clientX, clientY, buttons, pointerType }) => {
+      if (this.places.length === 0) return;
+      // While the view is dragged, and under fingers, there is no band.
+      this.follow(buttons !== 0 || pointerType === 'touch' ? undefined : { clientX, clientY });
+    });
+    canvas.addEventListener('pointerleave', () => this.follow(undefined));
+  }
+
+  private follow(pointer: Pointer | undefined): void {
+    this.pointer = pointer;
+    // The picture is read back once a frame at most.
+    this.awaited ||= requestAnimationFrame(() => {
+      this.awaited = 0;
+      this.showBand();
+    });
+  }
+
+  private async copy(): Promise<void> {
+    if (this.lastPlace) this.panel.showCopied(await copyText(placeNumbers(this.lastPlace, this.frame)));
+  }
+
+  private download(): void {
+    const { extension, text } = fileOf(this.kept, this.frame);
+    download(`${this.viewer.city.name || 'scene'}-measurements.${extension}`, text);
+  }
+}
+
+function isNear(a: Pointer, b: Pointer): boolean {
+  return Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY) < kNear;
+}

@@ -1,0 +1,85 @@
+// Handles that move, turn and scale a model. While they are dragged, the camera stays.
+import type * as THREE from 'three';
+import type { TransformControls } from 'three/addons/controls/TransformControls.js';
+import type { Viewer } from '../viewer';
+
+export const kGizmoModes = { translate: 'Move', rotate: 'Turn', scale: 'Scale' } as const;
+export type GizmoMode = keyof typeof kGizmoModes;
+
+export class ModelGizmo {
+  onModeChange: () => void = () => {};
+  private controls?: Promise<TransformControls>;
+  private object?: THREE.Object3D;
+  private current: GizmoMode = 'translate';
+  private pressed = false; // the pointer went down on a handle
+
+  constructor(private readonly viewer: Viewer, private readonly moved: () => void) {}
+
+  get mode(): GizmoMode {
+    return this.current;
+  }
+
+  set mode(mode: GizmoMode) {
+    this.current = mode;
+    void this.controls?.then((controls) => (controls.mode = mode));
+    this.onModeChange();
+  }
+
+  nextMode(): void {
+    const modes = Object.keys(kGizmoModes) as GizmoMode[];
+    this.mode = modes[(modes.indexOf(this.mode) + 1) % modes.length];
+  }
+
+  // Whether a click that comes now was one on a handle.
+  takesClick(): boolean {
+    return this.pressed;
+  }
+
+  attach(object: THREE.Object3D | undefined): void {
+    if (object === this.object) return;
+    this.object = object;
+    if (object) this.controls ??= this.make();
+    void this.controls?.then((controls) => {
+      if (this.object) controls.attach(this.object);
+      else controls.detach();
+      this.viewer.needPicture();
+    });
+  }
+
+  private async make(): Promise<TransformControls> {
+    const { TransformControls } = await import('three/addons/controls/TransformControls.js');
+    const { camera, canvas, navigation, world } = this.viewer;
+    const controls = new TransformControls(camera, canvas);
+    controls.mode = this.current;
+    controls.size = 0.8;
+    controls.showE = controls.showXYZE = false;
+    controls.setColors(0xe0675e, 0x6199ee, 0x83c46c, 0xffe08a); // as in a world of z up: the vertical is blue
+    const helper = controls.getHelper();
+    helper.userData.isTool = true;
+    world.add(helper);
+    controls.addEventListener('change', () => this.viewer.needPicture());
+    controls.addEventListener('objectChange', () => {
+      if (controls.mode === 'scale' && this.object) scaleAlike(this.object, before);
+      this.viewer.resolution.moved(performance.now());
+      this.moved();
+    });
+    let before = { x: 1, y: 1, z: 1 };
+    controls.addEventListener('mouseDown', () => (before = this.object!.scale.clone()));
+    // Before the navigation hears of it.
+    canvas.addEventListener('pointerdown', (event) => {
+      const { x, y } = this.viewer.pointerAt(event);
+      controls.pointerHover({ x, y, button: event.button } as PointerEvent);
+      this.pressed = controls.axis !== null && event.button === 0;
+      if (this.pressed) navigation.enabled = false;
+    }, { capture: true });
+    for (const over of ['pointerup', 'pointercancel']) addEventListener(over, () => (navigation.enabled = true));
+    return controls;
+  }
+}
+
+// By what one of its axes was scaled most.
+function scaleAlike({ scale }: THREE.Object3D, before: { x: number; y: number; z: number }): void {
+  const factors = (['x', 'y', 'z'] as const).map((axis) => Math.max(scale[axis] / before[axis], 0.01));
+  const factor = factors.reduce((most, one) => (Math.abs(Math.log(one)) > Math.abs(Math.log(most)) ? one : most));
+  scale.copy(before).multiplyScalar(factor);
+}

@@ -1,0 +1,162 @@
+// The list of models, and where the selected one stands, in numbers.
+import * as THREE from 'three';
+import { element } from '../page/element';
+import { icon, type IconName } from '../page/icons';
+import { kGizmoModes, type GizmoMode, type ModelGizmo } from './model-gizmo';
+import { placeOf, setPlace } from './model-place';
+import type { Models, PlacedModel } from './models';
+
+export interface ModelActions {
+  add(): void;
+  save(withFiles: boolean): void;
+  place(model: PlacedModel): void; // asks for a place in the city
+}
+
+export class ModelsPanel {
+  readonly body = element('div', 'models');
+  // What the models' files take, in words; empty where there is nothing to save.
+  fileSize: () => string = () => '';
+  private readonly hint = element('p', 'faint', 'Drop a model onto the city: glTF, OBJ or FBX, with its textures, or a saved world.');
+  private readonly list = element('ul');
+  private readonly details = element('div', 'details');
+  private readonly place = ['x', 'y', 'z, up'].map((axis, i) => this.field(axis, 0.1, 2, (to) => this.setPosition(i, to)));
+  private readonly turn = this.field('Turn, degrees', 1, 1, (to) => this.setTurn(to));
+  private readonly scale = this.field('Scale', 0.1, 4, (to) => this.setScale(to));
+  private readonly size = element('p', 'faint');
+  private readonly modes = new Map<GizmoMode, HTMLButtonElement>();
+  private readonly plays = element('input');
+  private readonly playing = element('label', 'line', 'Play its animation', this.plays);
+  private readonly put = element('button', '', 'Put on a place…');
+  private readonly save = element('button', '', 'Save');
+  private readonly saveAll = element('button', '', 'Save with models');
+
+  constructor(private readonly models: Models, private readonly gizmo: ModelGizmo, actions: ModelActions) {
+    const modes = element('div', 'choice');
+    for (const [mode, name] of Object.entries(kGizmoModes) as [GizmoMode, string][]) {
+      const button = element('button', '', name);
+      button.title = `${name} (T: the next)`;
+      button.addEventListener('click', () => (gizmo.mode = mode));
+      this.modes.set(mode, button);
+      modes.append(button);
+    }
+    gizmo.onModeChange = () => this.showMode();
+    this.plays.type = 'checkbox';
+    this.plays.addEventListener('change', () => this.change((model) => (model.plays = this.plays.checked)));
+    this.put.addEventListener('click', () => models.selected && actions.place(models.selected));
+    const three = element('div', 'three', ...this.place.map(({ label }) => label));
+    const two = element('div', 'three', this.turn.label, this.scale.label);
+    this.details.append(modes, three, two, this.size, this.playing, element('div', 'row', this.put));
+    const add = element('button', '', 'Add…');
+    add.addEventListener('click', () => actions.add());
+    this.save.addEventListener('click', () => actions.save(false));
+    this.saveAll.addEventListener('click', () => actions.save(true));
+    this.body.append(this.hint, this.list, this.details, element('div', 'row', add, this.save, this.saveAll));
+    models.onChange.add(() => this.show());
+    this.showMode();
+    this.show();
+  }
+
+  // While it is asked for a place.
+  asks(isAsking: boolean): void {
+    this.put.textContent = isAsking ? 'Click a place in the city' : 'Put on a place…';
+    this.put.classList.toggle('on', isAsking);
+  }
+
+  private shown: string = '';
+
+  private show(): void {
+    const { list, selected } = this.models;
+    // The list is made anew only where it differs, so that a button keeps the keyboard's focus.
+    const now = JSON.stringify(list.map((model) => [model.id, model.name, model.visible, model === selected]));
+    if (now !== this.shown) this.list.replaceChildren(...list.map((model) => this.row(model)));
+    this.shown = now;
+    this.hint.hidden = list.length > 0;
+    this.list.hidden = list.length === 0;
+    this.save.hidden = this.saveAll.hidden = list.length === 0;
+    this.saveAll.title = this.fileSize();
+    this.details.hidden = !selected;
+    if (!selected) return;
+    const { position } = placeOf(selected, new THREE.Vector3());
+    this.place.forEach(({ set }, i) => set(position[i]));
+    this.turn.set(THREE.MathUtils.radToDeg(eulerOf(selected).y));
+    this.scale.set(selected.scale.x);
+    const { size } = selected.source;
+    const metres = (length: number) => (length < 10 ? length.toFixed(2) : length.toFixed(1));
+    this.size.textContent = [size.x * selected.scale.x, size.z * selected.scale.z, size.y * selected.scale.y].map(metres).join(' × ') + ' m';
+    this.playing.hidden = !selected.mixer;
+    this.plays.checked = selected.plays;
+  }
+
+  private showMode(): void {
+    this.modes.forEach((button, mode) => button.classList.toggle('on', mode === this.gizmo.mode));
+  }
+
+  private row(model: PlacedModel): HTMLElement {
+    const { models } = this;
+    const name = element('button', 'plain name', model.name);
+    name.addEventListener('click', () => models.select(model === models.selected ? undefined : model));
+    const button = (what: string, picture: IconName, act: () => void) => {
+      const made = element('button', 'plain', icon(picture));
+      made.title = what;
+      made.setAttribute('aria-label', `${what}: ${model.name}`);
+      made.addEventListener('click', act);
+      return made;
+    };
+    const show = button(model.visible ? 'Hide' : 'Show', 'eye', () => {
+      model.visible = !model.visible;
+      models.changed();
+    });
+    const row = element('li', model === models.selected ? 'on' : '', name, show,
+      button('Duplicate', 'copy', () => models.duplicate(model)), button('Delete', 'bin', () => models.remove(model)));
+    row.classList.toggle('off', !model.visible);
+    return row;
+  }
+
+  private field(name: string, step: number, digits: number, change: (to: number) => void) {
+    const input = element('input');
+    input.type = 'number';
+    input.step = String(step);
+    input.addEventListener('input', () => {
+      if (Number.isFinite(input.valueAsNumber) && Math.abs(input.valueAsNumber) < 1e7) change(input.valueAsNumber);
+    });
+    input.addEventListener('keydown', ({ key }) => {
+      if (key === 'Enter' || key === 'Escape') input.blur();
+    });
+    input.addEventListener('blur', () => this.show());
+    const set = (value: number) => {
+      if (document.activeElement !== input) input.value = String(Number(value.toFixed(digits)) + 0);
+    };
+    return { label: element('label', 'field', name, input), set };
+  }
+
+  private change(how: (model: PlacedModel) => void): void {
+    if (!this.models.selected) return;
+    how(this.models.selected);
+    this.models.changed();
+  }
+
+  private setPosition(axis: number, to: number): void {
+    this.change((model) => {
+      const place = placeOf(model, new THREE.Vector3());
+      place.position[axis] = to;
+      setPlace(model, new THREE.Vector3(), place);
+    });
+  }
+
+  private setTurn(degrees: number): void {
+    this.change((model) => {
+      const euler = eulerOf(model);
+      euler.y = THREE.MathUtils.degToRad(degrees);
+      model.quaternion.setFromEuler(euler);
+    });
+  }
+
+  private setScale(to: number): void {
+    if (to >= 1e-6) this.change((model) => model.scale.multiplyScalar(to / model.scale.x));
+  }
+}
+
+// About the vertical first.
+function eulerOf({ quaternion }: THREE.Object3D): THREE.Euler {
+  return new THREE.Euler().setFromQuaternion(quaternion, 'YXZ');
+}

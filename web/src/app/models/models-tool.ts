@@ -1,0 +1,125 @@
+// Models in the city: dropped, moved, saved.
+import * as THREE from 'three';
+import { SceneError } from '../../scene-error';
+import { DropTarget } from '../page/drop-target';
+import { element } from '../page/element';
+import { loadModel } from './load-model';
+import { ModelGizmo } from './model-gizmo';
+import { isModel, kAccepted, kindOf, nameOf, type ModelFile } from './model-files';
+import { Models, type PlacedModel } from './models';
+import { ModelsPanel } from './models-panel';
+import { megabytes } from '../page/panels';
+import { bytesOfModels, openWorld, saveWorld } from './saved-world';
+import type { Shortcuts } from '../page/shortcuts';
+import type { Tool, Toolbar } from '../page/toolbar';
+import { download } from '../page/page-files';
+import type { Viewer } from '../viewer';
+import { kWorldName } from './world-file';
+
+export function addModels(viewer: Viewer, toolbar: Toolbar, shortcuts: Shortcuts, fail: (error: unknown) => void): void {
+  const { canvas, city } = viewer;
+  const models = new Models(viewer);
+  const gizmo = new ModelGizmo(viewer, () => models.changed());
+  let placed: PlacedModel | undefined; // by the next click
+
+  const askForPlace = (model: PlacedModel | undefined) => {
+    placed = model;
+    canvas.style.cursor = model ? 'crosshair' : '';
+    panel.asks(model !== undefined);
+  };
+  const save = async (withFiles: boolean) => {
+    download(kWorldName, await saveWorld(models, city, withFiles));
+  };
+  const panel = new ModelsPanel(models, gizmo, {
+    add: () => picker.click(),
+    save: (withFiles) => void save(withFiles).catch(fail),
+    place: (model) => askForPlace(placed ? undefined : model),
+  });
+  panel.fileSize = () => megabytes(bytesOfModels(models));
+
+  const take = async (files: ModelFile[], place: THREE.Vector3) => {
+    const mains = files.filter(isModel);
+    // Models may have JSON files of their own beside them.
+    const world = files.find(({ path }) => kindOf(path) === 'json' && (mains.length === 0 || /^world\b/i.test(nameOf(path))));
+    if (files.length === 0) return;
+    toolbar.open(tool);
+    if (world) {
+      const note = await openWorld(world, files, models, city);
+      if (note) fail(note);
+      return;
+    }
+    if (mains.length === 0) {
+      throw new SceneError(nameOf(files[0].path), '', 'is no model', 'drop glTF, GLB, OBJ or FBX');
+    }
+    for (const main of mains) {
+      await addModel(main, files, place).catch(fail);
+    }
+  };
+  // The next one goes beside it.
+  const addModel = async (main: ModelFile, files: ModelFile[], place: THREE.Vector3) => {
+    const loaded = await loadModel(main, files);
+    const model = models.add(Models.sourceOf(loaded));
+    model.position.copy(place);
+    place.x += models.widthOf(model);
+    models.select(model);
+    models.changed();
+    if (loaded.lacking.length === 0) return;
+    const names = `${loaded.lacking.slice(0, 3).join(', ')}${loaded.lacking.length > 3 ? ' and others' : ''}`;
+    throw new SceneError(nameOf(main.path), '', `is shown without ${names.slice(0, 200)}`, 'drop the model together with its textures, or their folder');
+  };
+  // Under the pointer; else in the middle of the picture; else where the camera looks.
+  const placeFor = (event?: DragEvent) => {
+    const { left, top, width, height } = canvas.getBoundingClientRect();
+    const middle = { clientX: left + width / 2, clientY: top + height / 2 };
+    return (event && viewer.pickAt(event)) ?? viewer.pickAt(middle) ?? viewer.navigation.look.target;
+  };
+  const drop = new DropTarget(document.body, 'Drop it where it should stand', (files, event) => receive(files, event));
+  const receive = (files: ModelFile[], event?: DragEvent) => {
+    const place = placeFor(event);
+    void drop.during('Reading', take(files, place)).catch(fail);
+  };
+
+  const picker = element('input');
+  picker.type = 'file';
+  picker.multiple = true;
+  picker.accept = kAccepted;
+  picker.hidden = true;
+  picker.addEventListener('change', () => {
+    receive([...picker.files!].map((file) => ({ path: file.name, file })));
+    picker.value = '';
+  });
+  panel.body.append(picker);
+
+  models.onChange.add(() => {
+    gizmo.attach(models.selected?.visible ? models.selected : undefined);
+    if (placed && !models.list.includes(placed)) askForPlace(undefined);
+  });
+  const tool: Tool = {
+    name: 'Models', key: 'o', icon: 'cube', panel: panel.body,
+    closed: () => {
+      askForPlace(undefined);
+      models.select(undefined);
+    },
+  };
+  toolbar.add(tool);
+  shortcuts.add('t', 'Move, turn or scale the selected model', () => models.selected && gizmo.nextMode());
+  shortcuts.add('delete', 'Delete the selected model', () => models.selected && models.remove(models.selected));
+  viewer.onClick.push((event) => {
+    if (placed) {
+      const { visible } = placed;
+      placed.visible = false; // not onto itself
+      const place = viewer.pickAt(event);
+      placed.visible = visible;
+      if (!place) return true;
+      placed.position.copy(place);
+      askForPlace(undefined);
+      models.changed();
+      return true;
+    }
+    if (gizmo.takesClick()) return true;
+    const model = models.at(event);
+    if (model) toolbar.open(tool);
+    models.select(model);
+    return model !== undefined;
+  });
+}

@@ -1,0 +1,230 @@
+// How people move: over a map, around a place, or flying; with mouse, fingers, keys or a gamepad. Lengths in metres, y up.
+import * as THREE from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { padMotion, type Motion } from './gamepad';
+import { isTyping } from '../page/shortcuts';
+
+export const kModes = ['map', 'orbit', 'fly'] as const;
+export type NavigationMode = (typeof kModes)[number];
+
+export interface Look {
+  eye: THREE.Vector3;
+  target: THREE.Vector3;
+}
+
+const kFlight = 500; // ms to another view
+const kLookSpeed = 0.0025; // radians for a pixel
+const kTurnSpeed = 1.6; // radians a second, of a gamepad
+
+type Pick = (event: { clientX: number; clientY: number }) => THREE.Vector3 | undefined;
+
+export class Navigation {
+  readonly orbit: OrbitControls;
+  onModeChange: (mode: NavigationMode) => void = () => {};
+  isPointing = false; // a tool takes clicks: a double click goes nowhere, and the pointer stays free
+  private current: NavigationMode = 'map';
+  private readonly keys = new Set<string>();
+  private flight?: { from: Look; to: Look; begin: number };
+  private moved = false;
+  private speed: number; // metres a second, when flying
+  private held = false; // by a tool that drags something
+  private looking?: number; // the pointer that turns the view when flying
+
+  constructor(
+    readonly camera: THREE.PerspectiveCamera,
+    private readonly canvas: HTMLCanvasElement,
+    private readonly bounds: THREE.Box3,
+    private readonly pick: Pick,
+  ) {
+    this.orbit = new OrbitControls(camera, canvas);
+    this.orbit.enableDamping = true;
+    this.orbit.zoomToCursor = true;
+    this.orbit.addEventListener('change', () => (this.moved = true));
+    this.orbit.addEventListener('start', () => (this.flight = undefined));
+    this.orbit.maxDistance = 6 * this.radius;
+    this.orbit.minDistance = this.radius / 400;
+    camera.near = this.radius / 1e4;
+    camera.far = this.radius * 100;
+    this.speed = this.radius / 8;
+    this.listen();
+    this.mode = 'map';
+  }
+
+  // Whether dragging moves the camera: not while a tool drags something.
+  set enabled(enabled: boolean) {
+    this.held = !enabled;
+    this.orbit.enabled = enabled && this.current !== 'fly';
+  }
+
+  get mode(): NavigationMode {
+    return this.current;
+  }
+
+  set mode(mode: NavigationMode) {
+    if (this.current === 'fly' && mode !== 'fly') {
+      if (document.pointerLockElement === this.canvas) document.exitPointerLock();
+      // Around what was looked at, as far away as the last target was.
+      const ahead = this.camera.getWorldDirection(new THREE.Vector3());
+      const distance = Math.min(this.camera.position.distanceTo(this.orbit.target), this.radius);
+      this.orbit.target.copy(this.camera.position).addScaledVector(ahead, Math.max(distance, this.orbit.minDistance));
+    }
+    this.current = mode;
+    const isMap = mode === 'map';
+    this.orbit.enabled = mode !== 'fly';
+    this.orbit.screenSpacePanning = !isMap;
+    this.orbit.maxPolarAngle = isMap ? 0.495 * Math.PI : Math.PI;
+    const { PAN, ROTATE, DOLLY } = THREE.MOUSE;
+    this.orbit.mouseButtons = isMap ? { LEFT: PAN, MIDDLE: DOLLY, RIGHT: ROTATE } : { LEFT: ROTATE, MIDDLE: DOLLY, RIGHT: PAN };
+    this.orbit.touches = isMap
+      ? { ONE: THREE.TOUCH.PAN, TWO: THREE.TOUCH.DOLLY_ROTATE }
+      : { ONE: THREE.TOUCH.ROTATE, TWO: THREE.TOUCH.DOLLY_PAN };
+    this.onModeChange(mode);
+  }
+
+  get look(): Look {
+    return { eye: this.camera.position.clone(), target: this.orbit.target.clone() };
+  }
+
+  // At once.
+  set look({ eye, target }: Look) {
+    this.flight = undefined;
+    this.camera.position.copy(eye);
+    this.orbit.target.copy(target);
+    this.camera.lookAt(target);
+    this.orbit.update();
+    this.moved = true;
+  }
+
+  flyTo(to: Look): void {
+    this.flight = { from: this.look, to: { eye: to.eye.clone(), target: to.target.clone() }, begin: performance.now() };
+  }
+
+  // Above and beside the middle, so that all of the scene is in view.
+  showAll(): void {
+    this.look = this.overview();
+  }
+
+  flyHome(): void {
+    this.flyTo(this.overview());
+  }
+
+  // Comes nearer to a place, from where the camera is.
+  focus(place: THREE.Vector3): void {
+    const away = this.camera.position.clone().sub(place).multiplyScalar(0.4);
+    away.setLength(Math.max(away.length(), 2 * this.orbit.minDistance));
+    this.flyTo({ eye: place.clone().add(away), target: place });
+  }
+
+  // Once a frame. True where the camera has moved.
+  update(seconds: number): boolean {
+    this.flyOn();
+    this.move(this.keyMotion(), seconds);
+    this.move(padMotion(), seconds);
+    if (this.orbit.enabled && !this.flight) this.orbit.update();
+    const moved = this.moved;
+    this.moved = false;
+    return moved;
+  }
+
+  private get radius(): number {
+    const size = this.bounds.getSize(new THREE.Vector3());
+    return 0.5 * Math.hypot(size.x, size.z);
+  }
+
+  private overview(): Look {
+    const target = this.bounds.getCenter(new THREE.Vector3());
+    target.y = this.bounds.min.y;
+    const away = this.radius * Math.max(1, 1 / this.camera.aspect);
+    return { eye: new THREE.Vector3(0, 0.75, 0.8).multiplyScalar(away).add(target), target };
+  }
+
+  private flyOn(): void {
+    if (!this.flight) return;
+    const { from, to, begin } = this.flight;
+    const passed = Math.min((performance.now() - begin) / kFlight, 1);
+    const smooth = passed * passed * (3 - 2 * passed);
+    this.camera.position.lerpVectors(from.eye, to.eye, smooth);
+    this.orbit.target.lerpVectors(from.target, to.target, smooth);
+    this.camera.lookAt(this.orbit.target);
+    this.moved = true;
+    if (passed === 1) this.flight = undefined;
+  }
+
+  private keyMotion(): Motion {
+    const held = (...codes: string[]) => (codes.some((code) => this.keys.has(code)) ? 1 : 0);
+    return {
+      right: held('KeyD', 'ArrowRight') - held('KeyA', 'ArrowLeft'),
+      up: held('KeyE', 'PageUp') - held('KeyQ', 'PageDown'),
+      forward: held('KeyW', 'ArrowUp') - held('KeyS', 'ArrowDown'),
+      yaw: 0, pitch: 0, fast: held('ShiftLeft', 'ShiftRight') === 1,
+    };
+  }
+
+  private move({ right, up, forward, yaw, pitch, fast }: Motion, seconds: number): void {
+    if (right === 0 && up === 0 && forward === 0 && yaw === 0 && pitch === 0) return;
+    this.flight = undefined;
+    const ahead = this.camera.getWorldDirection(new THREE.Vector3());
+    const side = new THREE.Vector3().crossVectors(ahead, this.camera.up).normalize();
+    if (this.current !== 'fly') ahead.crossVectors(this.camera.up, side).normalize(); // over the ground
+    const speed = this.current === 'fly' ? this.speed : 0.8 * this.camera.position.distanceTo(this.orbit.target);
+    const way = ahead.multiplyScalar(forward).addScaledVector(side, right).addScaledVector(this.camera.up, up);
+    way.multiplyScalar(speed * (fast ? 4 : 1) * Math.min(seconds, 0.1));
+    this.camera.position.add(way);
+    this.orbit.target.add(way);
+    this.turn(yaw * kTurnSpeed * seconds, pitch * kTurnSpeed * seconds);
+    this.moved = true;
+  }
+
+  // Turns where the camera stands; radians, to the left and upwards.
+  private turn(yaw: number, pitch: number): void {
+    if (yaw === 0 && pitch === 0) return;
+    const euler = new THREE.Euler().setFromQuaternion(this.camera.quaternion, 'YXZ');
+    euler.y += yaw;
+    euler.x = Math.min(Math.max(euler.x + pitch, -1.55), 1.55);
+    euler.z = 0;
+    this.camera.quaternion.setFromEuler(euler);
+    const distance = this.camera.position.distanceTo(this.orbit.target);
+    this.orbit.target.copy(this.camera.position).addScaledVector(this.camera.getWorldDirection(new THREE.Vector3()), distance);
+    this.moved = true;
+  }
+
+  private listen(): void {
+    addEventListener('keydown', ({ code, target, ctrlKey, metaKey, altKey }) => {
+      if (ctrlKey || metaKey || altKey || isTyping(target)) return;
+      this.keys.add(code);
+    });
+    addEventListener('keyup', ({ code }) => this.keys.delete(code));
+    addEventListener('blur', () => this.keys.clear());
+    this.canvas.addEventListener('dblclick', (event) => {
+      if (this.isPointing) return;
+      const place = this.pick(event);
+      if (place && this.current !== 'fly') this.focus(place);
+    });
+    this.canvas.addEventListener('pointerdown', ({ pointerId, pointerType }) => {
+      if (this.current !== 'fly' || this.held) return;
+      if (pointerType === 'mouse' && !this.isPointing && document.pointerLockElement !== this.canvas) {
+        // Where the pointer cannot be locked, dragging turns all the same.
+        void Promise.resolve(this.canvas.requestPointerLock()).catch(() => {});
+      }
+      this.looking ??= pointerId;
+    });
+    const stop = ({ pointerId }: PointerEvent) => {
+      if (this.looking === pointerId) this.looking = undefined;
+    };
+    addEventListener('pointerup', stop);
+    addEventListener('pointercancel', stop);
+    this.canvas.addEventListener('pointermove', ({ movementX, movementY, pointerId }) => {
+      const isLocked = document.pointerLockElement === this.canvas;
+      if (this.current !== 'fly' || (!isLocked && this.looking !== pointerId)) return;
+      // A locked pointer drags the view's direction, others drag the picture.
+      const sign = isLocked ? -1 : 1;
+      this.turn(sign * movementX * kLookSpeed, sign * movementY * kLookSpeed);
+    });
+    this.canvas.addEventListener('wheel', (event) => {
+      if (this.current !== 'fly') return;
+      event.preventDefault();
+      const factor = event.deltaY < 0 ? 1.2 : 1 / 1.2;
+      this.speed = Math.min(Math.max(this.speed * factor, this.radius / 1000), 10 * this.radius);
+    }, { passive: false });
+  }
+}

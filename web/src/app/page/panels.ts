@@ -1,0 +1,91 @@
+// What stands over the picture: how far loading is, what went wrong, numbers.
+import type { SceneError } from '../../scene-error';
+import type { SceneStatistics } from '../../scene';
+import { element } from './element';
+
+export function megabytes(bytes: number): string {
+  return bytes < 1e6 ? `${Math.round(bytes / 1e3)} kB` : `${(bytes / 1e6).toFixed(bytes < 1e7 ? 1 : 0)} MB`;
+}
+
+export class LoadingPanel {
+  private readonly name = element('span');
+  private readonly bytes = element('span', 'bytes');
+  private readonly bar = element('i');
+  private readonly panel = element(
+    'div', 'glass loading', element('div', 'name', this.name, this.bytes), element('div', 'bar', this.bar));
+  private most = 1; // tiles on their way since the last rest
+
+  constructor(parent: HTMLElement) {
+    this.name.textContent = 'Opening the scene';
+    this.panel.setAttribute('role', 'status');
+    parent.append(this.panel);
+  }
+
+  show(name: string, { fetchedBytes, pending }: SceneStatistics, idle: boolean): void {
+    this.most = idle ? 1 : Math.max(this.most, pending);
+    this.name.textContent = name === '' ? 'Loading' : name;
+    this.bytes.textContent = megabytes(fetchedBytes);
+    this.bar.style.width = `${idle ? 100 : Math.round(100 * (1 - pending / (this.most + 1)))}%`;
+    this.panel.classList.toggle('done', idle);
+  }
+
+  hide(): void {
+    this.panel.classList.add('done');
+  }
+}
+
+export class ErrorPanel {
+  private readonly what = element('h2');
+  private readonly reason = element('p');
+  private readonly remedy = element('p');
+  private readonly panel: HTMLElement;
+
+  constructor(parent: HTMLElement) {
+    const close = element('button', '', 'Close');
+    close.addEventListener('click', () => (this.panel.hidden = true));
+    this.panel = element('div', 'glass error', close, this.what, this.reason, this.remedy);
+    this.panel.setAttribute('role', 'alert');
+    this.panel.hidden = true;
+    parent.append(this.panel);
+  }
+
+  hide(): void {
+    this.panel.hidden = true;
+  }
+
+  show({ what, place, reason, remedy }: SceneError): void {
+    const sentence = (text: string) => `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
+    this.what.textContent = place === '' ? what : `${what}, ${place}`;
+    this.reason.textContent = sentence(reason);
+    this.remedy.textContent = sentence(remedy);
+    this.panel.hidden = false;
+  }
+}
+
+export class StatisticsPanel {
+  private readonly list = element('dl');
+  private readonly panel = element('div', 'glass statistics', this.list);
+
+  constructor(parent: HTMLElement) {
+    this.panel.hidden = true;
+    parent.append(this.panel);
+  }
+
+  toggle(): void {
+    this.panel.hidden = !this.panel.hidden;
+  }
+
+  show(statistics: SceneStatistics, milliseconds: number, resolutionScale: number): void {
+    if (this.panel.hidden) return;
+    const rows: [string, string][] = [
+      ['Frame', `${milliseconds.toFixed(milliseconds < 10 ? 1 : 0)} ms`],
+      ['Resolution', `${Math.round(100 * resolutionScale)} %`],
+      ['Graphics card', megabytes(statistics.cardBytes + statistics.targetBytes)],
+      ['Page', megabytes(statistics.pageBytes)],
+      ['Fetched', megabytes(statistics.fetchedBytes)],
+      ['On their way', String(statistics.pending)],
+      ...statistics.drawn.map((count, level): [string, string] => [`Blocks of level ${level}`, String(count)]),
+    ];
+    this.list.replaceChildren(...rows.flatMap(([name, value]) => [element('dt', '', name), element('dd', '', value)]));
+  }
+}

@@ -1,0 +1,105 @@
+// A picture of any size, drawn piece by piece with all that the view asks for.
+import * as THREE from 'three';
+import { download, fileName } from '../page/page-files';
+import { element } from '../page/element';
+import type { Toolbar } from '../page/toolbar';
+import type { Viewer } from '../viewer';
+
+const kPiece = 1024; // pixels along an edge
+const kLargest = 16384; // that canvases take
+const kWait = 60000; // ms for tiles to come
+
+// Pieces of a picture, so that none is larger than `edge`: left, top, width, height.
+export function piecesOf(width: number, height: number, edge = kPiece): [number, number, number, number][] {
+  const pieces: [number, number, number, number][] = [];
+  for (let top = 0; top < height; top += edge) {
+    for (let left = 0; left < width; left += edge) {
+      pieces.push([left, top, Math.min(edge, width - left), Math.min(edge, height - top)]);
+    }
+  }
+  return pieces;
+}
+
+// The view as it is, with so many pixels; wider or narrower about the same middle. `tell` hears the share that is done.
+export function takePicture(viewer: Viewer, width: number, height: number, tell: (share: number) => void): Promise<Blob> {
+  return viewer.whileHeld(async () => {
+    const { renderer, camera, city } = viewer;
+    const picture = document.createElement('canvas');
+    picture.width = width;
+    picture.height = height;
+    const context = picture.getContext('2d')!;
+    const size = renderer.getSize(new THREE.Vector2());
+    const ratio = renderer.getPixelRatio();
+    const { aspect } = camera;
+    const scale = city.resolutionScale;
+    camera.aspect = width / height;
+    city.resolutionScale = 1;
+    renderer.setPixelRatio(1);
+    try {
+      const pieces = piecesOf(width, height);
+      for (const [i, [left, top, wide, high]] of pieces.entries()) {
+        camera.setViewOffset(width, height, left, top, wide, high);
+        renderer.setSize(wide, high, false);
+        const begin = performance.now();
+        viewer.draw();
+        while (!city.idle && performance.now() - begin < kWait) {
+          await new Promise((resolve) => setTimeout(resolve, 10));
+          viewer.draw();
+        }
+        context.drawImage(renderer.domElement, left, top);
+        tell((i + 1) / pieces.length);
+        await new Promise((resolve) => setTimeout(resolve, 0));
+      }
+    } finally {
+      camera.clearViewOffset();
+      camera.aspect = aspect;
+      camera.updateProjectionMatrix();
+      city.resolutionScale = scale;
+      renderer.setPixelRatio(ratio);
+      renderer.setSize(size.x, size.y, false);
+    }
+    const blob = await new Promise<Blob | null>((resolve) => picture.toBlob(resolve, 'image/png'));
+    if (!blob) throw new Error(`the browser has no memory for a picture of ${width} by ${height}`);
+    return blob;
+  });
+}
+
+export function addScreenshot(viewer: Viewer, toolbar: Toolbar): void {
+  const side = (name: string) => {
+    const input = element('input');
+    Object.assign(input, { type: 'number', min: '16', max: String(kLargest), step: '1', required: true });
+    input.setAttribute('aria-label', name);
+    return input;
+  };
+  const [width, height] = [side('Width'), side('Height')];
+  const take = element('button', '', 'Save picture');
+  const said = element('p', 'faint');
+  const presets = element('div', 'row');
+  const choose = (w: number, h: number) => {
+    width.valueAsNumber = w;
+    height.valueAsNumber = h;
+  };
+  for (const [name, w, h] of [['Window', 0, 0], ['Full HD', 1920, 1080], ['4K', 3840, 2160], ['8K', 7680, 4320]] as const) {
+    const button = element('button', '', name);
+    button.addEventListener('click', () => (w > 0 ? choose(w, h) : choose(innerWidth, innerHeight)));
+    presets.append(button);
+  }
+  choose(1920, 1080);
+  take.addEventListener('click', async () => {
+    if (!width.reportValidity() || !height.reportValidity()) return;
+    take.disabled = true;
+    try {
+      const picture = await takePicture(viewer, width.valueAsNumber, height.valueAsNumber, (share) => {
+        said.textContent = `${Math.round(100 * share)} %`;
+      });
+      download(fileName(viewer.city.name, 'png'), picture);
+      said.textContent = '';
+    } catch (error) {
+      said.textContent = String(error instanceof Error ? error.message : error);
+    } finally {
+      take.disabled = false;
+    }
+  });
+  const panel = element('div', '', presets, element('div', 'row', width, '×', height), element('div', 'row', take), said);
+  toolbar.add({ name: 'Picture', key: 'p', icon: 'camera', panel });
+}

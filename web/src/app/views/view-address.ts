@@ -1,0 +1,34 @@
+// A view as the address of the page holds it: #eye=x,y,z&target=x,y,z&fov=degrees, in the capture's world (z up).
+import * as THREE from 'three';
+import { kYUpFromZUp } from '../../axes';
+import type { Look } from '../moving/navigation';
+
+export interface View extends Look {
+  fov: number; // degrees, of the height
+}
+
+const zUpFromYUp = kYUpFromZUp.clone().invert();
+
+function text(place: THREE.Vector3): string {
+  return place.clone().applyMatrix4(zUpFromYUp).toArray().map((x) => String(Number(x.toFixed(3)))).join(',');
+}
+
+function place(given: string | null): THREE.Vector3 | undefined {
+  const numbers = (given ?? '').split(',').map((part) => (part.trim() === '' ? NaN : Number(part)));
+  if (numbers.length !== 3 || !numbers.every((x) => Math.abs(x) < 1e9)) return undefined;
+  return new THREE.Vector3().fromArray(numbers).applyMatrix4(kYUpFromZUp);
+}
+
+export function formatView({ eye, target, fov }: View): string {
+  return `eye=${text(eye)}&target=${text(target)}&fov=${Number(fov.toFixed(2))}`;
+}
+
+// Undefined where the text holds no view.
+export function parseView(given: string): View | undefined {
+  const words = new URLSearchParams(given.replace(/^#/, ''));
+  const eye = place(words.get('eye'));
+  const target = place(words.get('target'));
+  if (!eye || !target || eye.distanceTo(target) < 1e-6) return undefined;
+  const fov = Number(words.get('fov') ?? 50);
+  return { eye, target, fov: fov >= 5 && fov <= 120 ? fov : 50 };
+}
