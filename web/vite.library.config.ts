@@ -1,16 +1,9 @@
 // The library as one module, dist/tessera.js; three.js is the user's own.
-import { defineConfig } from 'vite';
-import { fileURLToPath } from 'node:url';
+import { mergeConfig, type UserConfig } from 'vite';
+import { inlined } from './vite.inline';
 
-export default defineConfig({
-  resolve: {
-    alias: [{ find: './make-worker', replacement: fileURLToPath(new URL('src/make-worker-inline.ts', import.meta.url)) }],
-  },
-  worker: { format: 'iife' },
+export default mergeConfig<UserConfig, UserConfig>(inlined, {
   build: {
-    target: 'es2022',
-    assetsInlineLimit: Number.MAX_SAFE_INTEGER,
-    emptyOutDir: false,
     lib: { entry: 'src/index.ts', formats: ['es'], fileName: 'tessera' },
     rollupOptions: { external: [/^three($|\/)/] },
   },

@@ -1,7 +1,7 @@
 // The viewer as one file, dist/offline.html, which works without a server: browsers load no modules, workers or other
 // files beside a page that was opened from a disk.
-import { fileURLToPath } from 'node:url';
-import { defineConfig, type Plugin } from 'vite';
+import { mergeConfig, type Plugin, type UserConfig } from 'vite';
+import { inlined } from './vite.inline';
 
 // Scripts and styles go into the page, the script as an ordinary one at its end.
 const asOneFile: Plugin = {
@@ -26,18 +26,11 @@ const asOneFile: Plugin = {
   },
 };
 
-export default defineConfig({
+export default mergeConfig<UserConfig, UserConfig>(inlined, {
   base: './',
   plugins: [asOneFile],
-  resolve: {
-    alias: [{ find: './make-worker', replacement: fileURLToPath(new URL('src/make-worker-inline.ts', import.meta.url)) }],
-  },
-  worker: { format: 'iife' },
   build: {
-    target: 'es2022',
-    assetsInlineLimit: Number.MAX_SAFE_INTEGER,
     chunkSizeWarningLimit: 4000,
-    emptyOutDir: false,
     rollupOptions: { input: 'index.html', output: { format: 'iife', inlineDynamicImports: true } },
   },
 });
