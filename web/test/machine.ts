@@ -38,11 +38,13 @@ export async function serve(scene: string): Promise<Server> {
   return { url, close: () => void server.kill('SIGKILL') };
 }
 
+export type Card = 'opengl' | 'swiftshader';
+
 // On a screen (Xvfb will do) by Mesa's OpenGL; without one by SwiftShader, which is slower.
-export function launch(): Promise<Browser> {
-  const onScreen = process.env.DISPLAY !== undefined;
-  const card = onScreen ? ['--use-angle=gl', '--ignore-gpu-blocklist'] : ['--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
-  return chromium.launch({ executablePath: chromiumPath, headless: !onScreen, args: ['--no-sandbox', ...card] });
+export function launch(card: Card = process.env.DISPLAY === undefined ? 'swiftshader' : 'opengl'): Promise<Browser> {
+  const isOnScreen = card === 'opengl';
+  const flags = isOnScreen ? ['--use-angle=gl', '--ignore-gpu-blocklist'] : ['--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
+  return chromium.launch({ executablePath: chromiumPath, headless: !isOnScreen, args: ['--no-sandbox', ...flags] });
 }
 
 export function run(...words: string[]): void {

@@ -2,7 +2,7 @@
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import type { Browser } from 'playwright-core';
+import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Plain } from '../src/plain';
 import { decodeTileset } from '../src/tiles/decode-tileset';
@@ -21,28 +21,37 @@ const kLooks: [Place, Place][] = [
   [[6, 3, 0.5], [0, 0, 0]],
 ];
 
+function cardOf(page: Page): Promise<string> {
+  return page.evaluate(() => {
+    const gl = document.createElement('canvas').getContext('webgl2')!;
+    return String(gl.getParameter(gl.getExtension('WEBGL_debug_renderer_info')!.UNMASKED_RENDERER_WEBGL));
+  });
+}
+
 describe.skipIf(missing())('the browser', () => {
   let server: Server;
   let browser: Browser;
+  let swiftShader: Browser;
   let folder: string;
   const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json');
   const views = kLooks.map(([eye, target]) => viewAt(tileset, eye, target));
 
   beforeAll(async () => {
     folder = mkdtempSync(join(tmpdir(), 'tessera-browser-'));
-    [server, browser] = await Promise.all([serve(goldenScene), launch()]);
+    [server, browser, swiftShader] = await Promise.all([serve(goldenScene), launch(), launch('swiftshader')]);
   });
   afterAll(async () => {
-    await browser?.close();
+    await Promise.all([browser?.close(), swiftShader?.close()]);
     server?.close();
     rmSync(folder, { recursive: true });
   });
 
-  it.each([0, 1])('draws what the processor draws: level %i', async (level) => {
+  it.each([['default', 0], ['default', 1], ['swiftshader', 0]])('draws what the processor draws: %s card, level %i', async (card, level) => {
     const path = join(folder, `path-${level}.json`);
     writeFileSync(path, cameraPath(tileset, views.map(({ matrix }) => matrix)));
     run('render', goldenScene, join(folder, String(level)), '--path', path, '--lod', String(level));
-    const page = await browser.newPage();
+    const page = await (card === 'default' ? browser : swiftShader).newPage();
+    if (card === 'swiftshader') expect(await cardOf(page)).toContain('SwiftShader');
     const said: string[] = [];
     page.on('console', (message) => message.type() === 'error' && said.push(message.text()));
     page.on('pageerror', (error) => said.push(error.message));
