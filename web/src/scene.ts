@@ -13,7 +13,7 @@ import * as THREE from 'three';
 import { kYUpFromZUp } from './axes';
 import { DecodePool } from './decode-pool';
 import { cityMesh } from './draw/city-mesh';
-import { Compositor, setDefine, type DrawnContent } from './draw/compositor';
+import { Compositor, type DrawnContent } from './draw/compositor';
 import { kDisplayModes, type DisplayMode } from './draw/display-modes';
 import { OpaqueDepth } from './draw/opaque-depth';
 import { SceneError } from './scene-error';
@@ -148,7 +148,6 @@ export class TesseraScene extends THREE.Object3D {
     mesh.material.uniforms.clipFromScene.value
       .multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
       .multiply(worldFromScene);
-    setDefine(mesh.material, 'OPAQUE', depth !== null);
     mesh.visible = frontToBack.length > 0;
   }
 

@@ -48,6 +48,16 @@ export function capturedViews(capture: string, count: number): CapturedView[] {
   });
 }
 
+// How many colours the middle of the page's picture has; one where nothing is drawn.
+export async function coloursOf(page: Page): Promise<number> {
+  const { width, height } = page.viewportSize()!;
+  const clip = { x: width / 4, y: height / 4, width: width / 2, height: height / 4 };
+  const pixels = await decodePixels(page, await page.screenshot({ clip }));
+  const colours = new Set<number>();
+  for (let at = 0; at < pixels.length; at += 3) colours.add(pixels[at] | (pixels[at + 1] << 8) | (pixels[at + 2] << 16));
+  return colours.size;
+}
+
 export function psnr(a: Uint8Array, b: Uint8Array): number {
   if (a.length !== b.length) throw new Error('pictures of different sizes');
   const squares = a.reduce((sum, value, i) => sum + (value - b[i]) ** 2, 0);

@@ -6,7 +6,7 @@ import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenScene, launch, missing, run, serve } from './machine';
-import { decodePng, psnr } from './pictures';
+import { coloursOf, decodePng, psnr } from './pictures';
 
 describe.skipIf(missing())('the viewer', () => {
   let browser: Browser;
@@ -42,9 +42,7 @@ describe.skipIf(missing())('the viewer', () => {
       await page.waitForSelector('.loading.done', { state: 'attached' });
       expect(await page.title()).toBe('golden · tessera');
       expect(await page.isVisible('.error')).toBe(false);
-      const picture = await page.screenshot();
-      // A blank picture compresses to a few hundred bytes.
-      expect(picture.length).toBeGreaterThan(20000);
+      expect(await coloursOf(page)).toBeGreaterThan(200);
       await page.keyboard.press('i');
       await page.waitForFunction(() => document.querySelector('.statistics')?.textContent?.includes('Graphics card'));
       expect(said).toEqual([]);
@@ -93,6 +91,40 @@ describe.skipIf(missing())('the viewer', () => {
     });
   });
 
+  it('keeps a view that looks upwards, and how one moves', async () => {
+    await open(goldenScene, async (page, said) => {
+      const hash = '#eye=10,-60,4&target=10,-20,19&fov=60&mode=fly';
+      const address = page.url();
+      for (const [given, expected] of [[hash, hash], [hash.replace('fly', 'map'), hash.replace('fly', 'orbit')]]) {
+        await page.goto('about:blank');
+        await page.goto(`${address}${given}`);
+        await page.waitForSelector('.loading.done', { state: 'attached' });
+        await page.keyboard.press('i'); // another picture
+        await page.waitForTimeout(1200);
+        expect(new URL(page.url()).hash).toBe(expected);
+      }
+      expect(said).toEqual([]);
+    });
+  });
+
+  it('goes on when the graphics card was taken away', async () => {
+    await open(goldenScene, async (page, said) => {
+      await page.waitForSelector('.loading.done', { state: 'attached' });
+      const before = await coloursOf(page);
+      expect(before).toBeGreaterThan(200);
+      await page.evaluate(async () => {
+        const canvas = document.querySelector<HTMLCanvasElement>('#view')!;
+        const extension = canvas.getContext('webgl2')!.getExtension('WEBGL_lose_context')!;
+        const restored = new Promise((resolve) => canvas.addEventListener('webglcontextrestored', resolve, { once: true }));
+        canvas.addEventListener('webglcontextlost', () => setTimeout(() => extension.restoreContext(), 100), { once: true });
+        extension.loseContext();
+        await restored;
+      });
+      await expect.poll(() => coloursOf(page), { timeout: 20000 }).toBeGreaterThan(0.9 * before);
+      expect(said).toEqual([]);
+    });
+  });
+
   it('says what is wrong with a tile that lies, and shows the rest', async () => {
     const scene = join(folder, 'lying');
     cpSync(goldenScene, scene, { recursive: true });
@@ -105,8 +137,7 @@ describe.skipIf(missing())('the viewer', () => {
       expect(text).toContain(`${tiles}/${name}`);
       expect(text).toContain('Is no binary glTF 2.0 file.');
       expect(text).toContain('Copy the scene again, or bake it again.');
-      const picture = await page.screenshot();
-      expect(picture.length).toBeGreaterThan(20000);
+      expect(await coloursOf(page)).toBeGreaterThan(200);
     });
   });
 

@@ -7,6 +7,7 @@ import { element } from './page/element';
 import { addHelp } from './page/help';
 import { addMeasuring } from './measuring/measuring';
 import { addModels } from './models/models-tool';
+import { kModes } from './moving/navigation';
 import { addNavigationTools } from './moving/navigation-tools';
 import { ErrorPanel, LoadingPanel, StatisticsPanel } from './page/panels';
 import { addScreenshot } from './views/screenshot';
@@ -29,7 +30,7 @@ function fail(error: unknown): void {
 
 async function start(): Promise<void> {
   const renderer = makeRenderer(canvas);
-  const city = await TesseraScene.load(location.protocol === 'file:' ? await chooseScene() : sceneOfAddress());
+  const city = location.protocol === 'file:' ? await chooseScene() : await TesseraScene.load(sceneOfAddress());
   city.onError = fail;
   document.title = city.name === '' ? 'tessera' : `${city.name} · tessera`;
   const viewer = new Viewer(canvas, renderer, city);
@@ -47,11 +48,11 @@ async function start(): Promise<void> {
   } });
   addHelp(toolbar, shortcuts);
   keepViewInAddress(viewer);
-  viewer.onFrame.add(({ milliseconds, resolutionScale }) => {
+  viewer.onFrame.add((frame) => {
     const numbers = city.statistics;
     if (!numbers) return;
     loading.show(city.name, numbers, city.idle);
-    statistics.show(numbers, milliseconds, resolutionScale);
+    statistics.show(numbers, frame);
   });
 }
 
@@ -60,7 +61,7 @@ function sceneOfAddress(): string {
 }
 
 // A page that was not served may read nothing but what somebody chooses.
-async function chooseScene(): Promise<ChosenFiles> {
+async function chooseScene(): Promise<TesseraScene> {
   loading.hide();
   const input = element('input');
   Object.assign(input, { type: 'file', webkitdirectory: true, multiple: true });
@@ -70,11 +71,12 @@ async function chooseScene(): Promise<ChosenFiles> {
   document.body.append(panel);
   for (;;) {
     const files = await new Promise<File[]>((resolve) => (input.onchange = () => resolve([...input.files!])));
+    input.value = ''; // so that the same folder can be chosen again
     try {
-      const chosen = new ChosenFiles(files);
+      const city = await TesseraScene.load(new ChosenFiles(files));
       panel.remove();
       errors.hide();
-      return chosen;
+      return city;
     } catch (error) {
       fail(error);
     }
@@ -85,14 +87,18 @@ async function chooseScene(): Promise<ChosenFiles> {
 function keepViewInAddress(viewer: Viewer): void {
   const show = () => {
     const view = parseView(location.hash);
-    if (view) viewer.view = view;
+    if (!view) return;
+    const mode = kModes.find((one) => one === new URLSearchParams(location.hash.slice(1)).get('mode'));
+    if (mode) viewer.navigation.mode = mode;
+    viewer.view = view;
   };
+  const address = () => `${formatView(viewer.view)}&mode=${viewer.navigation.mode}`;
   show();
   addEventListener('hashchange', show);
   let waiting: ReturnType<typeof setTimeout> | undefined;
-  let written = formatView(viewer.view);
+  let written = '';
   viewer.onFrame.add(() => {
-    const now = formatView(viewer.view);
+    const now = address();
     if (now === written) return;
     written = now;
     clearTimeout(waiting);

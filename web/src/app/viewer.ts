@@ -5,10 +5,12 @@ import { TesseraScene } from '../scene';
 import { SceneError } from '../scene-error';
 import { Navigation } from './moving/navigation';
 import { Resolution } from './moving/resolution';
+import { GpuTimer } from './page/gpu-timer';
 import type { View } from './views/view-address';
 
 export interface Frame {
   milliseconds: number; // since the last one
+  gpuMilliseconds?: number; // that the graphics card drew a picture shortly before, where it tells
   resolutionScale: number;
 }
 
@@ -77,14 +79,16 @@ export class Viewer {
     return hit.point;
   }
 
-  // Has the loop wait while somebody else draws.
+  // Has the loop wait, and the camera stay, while somebody else draws.
   async whileHeld<T>(work: () => Promise<T>): Promise<T> {
     this.held = true;
+    this.navigation.enabled = false;
     try {
       return await work();
     } finally {
       this.held = false;
-      this.needPicture();
+      this.navigation.enabled = true;
+      this.resize(); // of which nothing was to be heard meanwhile
     }
   }
 
@@ -95,6 +99,7 @@ export class Viewer {
   }
 
   private resize(): void {
+    if (this.held) return;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(innerWidth, innerHeight, false);
     this.camera.aspect = innerWidth / innerHeight;
@@ -106,6 +111,7 @@ export class Viewer {
     let wasWhole = false; // the last picture was
     let wasMoving = false; // when it was drawn
     let before = performance.now();
+    const timer = new GpuTimer(this.renderer);
     this.renderer.setAnimationLoop(() => {
       const now = performance.now();
       const milliseconds = now - before;
@@ -118,9 +124,10 @@ export class Viewer {
       wasMoving = isMoving;
       this.needed = false;
       this.city.resolutionScale = this.resolution.scale(now);
-      this.draw();
+      timer.measure(() => this.draw());
       wasWhole = this.city.resolutionScale === this.resolution.whole;
-      for (const tell of this.onFrame) tell({ milliseconds, resolutionScale: this.city.resolutionScale });
+      const frame = { milliseconds, gpuMilliseconds: timer.milliseconds, resolutionScale: this.city.resolutionScale };
+      for (const tell of this.onFrame) tell(frame);
     });
   }
 
@@ -139,7 +146,9 @@ export class Viewer {
       const isClick =
         down?.id === event.pointerId && Math.hypot(event.clientX - down.x, event.clientY - down.y) < kSlack;
       down = undefined;
-      if (isClick) this.onClick.some((take) => take(event));
+      // In flight a click with the mouse takes hold of the pointer, which then is nowhere.
+      const isForFlight = this.navigation.mode === 'fly' && event.pointerType === 'mouse' && !this.navigation.isPointing;
+      if (isClick && !isForFlight) this.onClick.some((take) => take(event));
     });
   }
 }

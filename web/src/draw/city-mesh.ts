@@ -12,7 +12,7 @@ void main() {
 
 const kFragmentShader = `
 uniform sampler2D colourAndOpacity, distanceAndOpacity;
-uniform vec2 pictureSize;
+uniform vec2 pictureCorner, pictureSize;
 uniform mat3 origin, ray;
 uniform mat4 clipFromScene;
 uniform sampler2D opaqueDepth;
@@ -24,13 +24,10 @@ vec3 colourOfDistance(float x) {
   return mix(colour, vec3(0.08, 0.07, 0.3), clamp(3.0 * x - 2.0, 0.0, 1.0));
 }
 void main() {
-  vec2 place = gl_FragCoord.xy / pictureSize;
+  vec2 place = (gl_FragCoord.xy - pictureCorner) / pictureSize;
   vec4 colour = texture2D(colourAndOpacity, place);
   vec4 far = texture2D(distanceAndOpacity, place);
-  float opaque = 1.0;
-#ifdef OPAQUE
-  opaque = texture2D(opaqueDepth, place).r;
-#endif
+  float opaque = texture2D(opaqueDepth, place).r;
   gl_FragDepth = opaque;
   if (far.a > 0.99) {  // half of what is behind is hidden
     vec2 ndc = 2.0 * place - 1.0;
@@ -57,6 +54,7 @@ export function cityMesh({ view, target, distancesOfBytes }: Compositor): THREE.
     uniforms: {
       colourAndOpacity: { value: target.textures[0] },
       distanceAndOpacity: { value: target.textures[1] },
+      pictureCorner: { value: new THREE.Vector2() },
       pictureSize: { value: new THREE.Vector2(1, 1) },
       clipFromScene: { value: new THREE.Matrix4() },
       origin: view.origin,
@@ -81,6 +79,7 @@ export function cityMesh({ view, target, distancesOfBytes }: Compositor): THREE.
   mesh.raycast = () => {};
   mesh.onBeforeRender = (renderer) => {
     renderer.getCurrentViewport(viewport);
+    material.uniforms.pictureCorner.value.set(viewport.x, viewport.y);
     material.uniforms.pictureSize.value.set(viewport.z, viewport.w);
   };
   return mesh;

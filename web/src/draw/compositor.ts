@@ -22,12 +22,11 @@ export interface ScenePlace {
   near: number;
 }
 
-export function setDefine(material: THREE.Material, name: string, isOn: boolean): void {
-  const defines = (material.defines ??= {}) as Record<string, string>;
-  if (name in defines === isOn) return;
-  if (isOn) defines[name] = '';
-  else delete defines[name];
-  material.needsUpdate = true;
+// One texel, so that programs need not differ where there is nothing opaque.
+function farthestDepth(): THREE.DataTexture {
+  const texture = new THREE.DataTexture(new Uint8Array([255]), 1, 1, THREE.RedFormat);
+  texture.needsUpdate = true;
+  return texture;
 }
 
 // A triangle that fills the picture.
@@ -52,12 +51,14 @@ export class Compositor {
   readonly view: ViewUniforms = viewUniforms();
   readonly target: THREE.WebGLRenderTarget; // what the scene adds, with its opacity; how far its surface is
   readonly distancesOfBytes: boolean;
+  private readonly bytesPerPixel: number; // of both pictures
   private readonly depthAlone: THREE.WebGLRenderTarget; // the depth of `target`, so that its colours can be read meanwhile
   private readonly hiding = new THREE.Scene();
   private readonly contents = new THREE.Scene();
   private readonly cube = new THREE.BoxGeometry(1, 1, 1);
   private readonly screen = screenTriangle();
   private readonly anyCamera = new THREE.Camera();
+  private readonly nothingOpaque = farthestDepth();
   private readonly prepared = new Map<string, THREE.Material>(); // hold programs, by their shape
 
   // What the card can blend decides how the pictures are kept.
@@ -65,6 +66,7 @@ export class Compositor {
     const has = (name: string) => renderer.extensions.has(name);
     const canBlendHalves = has('EXT_color_buffer_half_float') || has('EXT_color_buffer_float');
     this.distancesOfBytes = !canBlendHalves;
+    this.bytesPerPixel = canBlendHalves ? 16 : 8;
     const depthTexture = new THREE.DepthTexture(1, 1, THREE.UnsignedIntType);
     const common = { generateMipmaps: false, depthBuffer: true, depthTexture };
     this.target = new THREE.WebGLRenderTarget(1, 1, {
@@ -82,6 +84,11 @@ export class Compositor {
     })));
     this.hiding.children[0].frustumCulled = false;
     this.target.textures[1].minFilter = this.target.textures[1].magFilter = THREE.NearestFilter;
+    // Half floats tell distances apart by a two-thousandth: places that are measured want more.
+    if (has('EXT_color_buffer_float') && has('EXT_float_blend')) {
+      this.target.textures[1].type = THREE.FloatType;
+      this.bytesPerPixel = 8 + 16;
+    }
     this.contents.matrixWorldAutoUpdate = false;
     this.view.sceneLow.value.set(...place.box.low);
     this.view.sceneHigh.value.set(...place.box.high);
@@ -95,7 +102,6 @@ export class Compositor {
     if (this.prepared.has(key)) return;
     const material = programMaterial(shape);
     this.prepared.set(key, material);
-    setDefine(material, 'OPAQUE', this.view.opaqueDepth.value !== null);
     renderer.compile(new THREE.Mesh(this.screen, material), this.anyCamera);
   }
 
@@ -113,7 +119,6 @@ export class Compositor {
   }
 
   compile(renderer: THREE.WebGLRenderer, { mesh }: DrawnContent): void {
-    setDefine(mesh.material, 'OPAQUE', this.view.opaqueDepth.value !== null);
     renderer.compile(mesh, this.anyCamera);
   }
 
@@ -129,8 +134,7 @@ export class Compositor {
   }
 
   get bytes(): number {
-    const perPixel = this.target.texture.type === THREE.HalfFloatType ? 16 : 8;
-    return (perPixel + 4 + 1) * this.target.width * this.target.height;
+    return (this.bytesPerPixel + 4 + 1) * this.target.width * this.target.height;
   }
 
   resize({ x, y }: THREE.Vector2): void {
@@ -147,7 +151,7 @@ export class Compositor {
     opaqueDepth: THREE.Texture | null,
   ): void {
     this.setView(camera, worldFromScene);
-    this.view.opaqueDepth.value = opaqueDepth;
+    this.view.opaqueDepth.value = opaqueDepth ?? this.nothingOpaque;
     const box = new THREE.Matrix4();
     const eye = this.eye(camera, worldFromScene);
     for (const { textures, mesh, box: { low, high } } of frontToBack) {
@@ -155,7 +159,6 @@ export class Compositor {
       const middle = (a: number) => (low[a] + high[a]) / 2;
       box.makeScale(high[0] - low[0], high[1] - low[1], high[2] - low[2]).setPosition(middle(0), middle(1), middle(2));
       mesh.matrixWorld.multiplyMatrices(worldFromScene, box);
-      setDefine(mesh.material, 'OPAQUE', opaqueDepth !== null);
     }
     const before = renderer.getRenderTarget();
     const autoClear = renderer.autoClear;
@@ -185,9 +188,11 @@ export class Compositor {
   surfaceAt(renderer: THREE.WebGLRenderer, at: THREE.Vector2): THREE.Vector3 | undefined {
     const { width, height } = this.target;
     const pixel = (x: number, size: number) => Math.min(Math.max(Math.floor((0.5 + 0.5 * x) * size), 0), size - 1);
-    const read = this.distancesOfBytes ? new Uint8Array(4) : new Uint16Array(4);
+    const { type } = this.target.textures[1];
+    const read = type === THREE.FloatType ? new Float32Array(4) : type === THREE.HalfFloatType ? new Uint16Array(4) : new Uint8Array(4);
     renderer.readRenderTargetPixels(this.target, pixel(at.x, width), pixel(at.y, height), 1, 1, read, undefined, 1);
-    const [value, , , hides] = this.distancesOfBytes ? [...read].map((x) => x / 255) : [...read].map(THREE.DataUtils.fromHalfFloat);
+    const [value, , , hides] = [...read].map(
+      (x) => (type === THREE.FloatType ? x : type === THREE.HalfFloatType ? THREE.DataUtils.fromHalfFloat(x) : x / 255));
     if (hides <= 0.99) return undefined;
     const distance = this.distancesOfBytes ? value / hides / Math.max(1 - value / hides, 1e-3) : value / hides;
     const inPicture = new THREE.Vector3(at.x, at.y, 1);
@@ -202,6 +207,7 @@ export class Compositor {
     (this.hiding.children[0] as THREE.Mesh<THREE.BufferGeometry, THREE.Material>).material.dispose();
     this.cube.dispose();
     this.screen.dispose();
+    this.nothingOpaque.dispose();
     for (const material of this.prepared.values()) material.dispose();
     this.prepared.clear();
   }

@@ -17,7 +17,7 @@ export interface ViewUniforms {
   sceneHigh: { value: THREE.Vector3 };
   sceneNear: { value: number };
   minTransmittance: { value: number }; // rays end where less would be seen; 0: never
-  opaqueDepth: { value: THREE.Texture | null }; // of the depth buffer of what stands in the scene
+  opaqueDepth: { value: THREE.Texture | null }; // of the depth buffer of what stands in the scene; 1 everywhere where nothing does
   sceneFromDepth: { value: THREE.Matrix4 }; // (ndc.x, ndc.y, depth in [-1, 1], 1) to the scene
   display: { value: number }; // of kDisplayModes
 }
@@ -74,14 +74,10 @@ const float kSceneEnd = 1e6;
 
 // Where ordinary models end the ray.
 float opaqueDistance(vec2 ndc, vec3 o, vec3 d) {
-#ifdef OPAQUE
   float depth = texture(opaqueDepth, 0.5 + 0.5 * ndc).r;
   if (depth >= 1.0) return kSceneEnd;
   vec4 x = sceneFromDepth * vec4(ndc, 2.0 * depth - 1.0, 1.0);
   return dot(x.xyz / x.w - o, d);
-#else
-  return kSceneEnd;
-#endif
 }
 
 void main() {
@@ -115,9 +111,9 @@ void main() {
     colour = tint * (0.35 * opacity + 0.65 * dot(colour, vec3(0.3, 0.6, 0.1)));
   }
   colourAndOpacity = vec4(colour, opacity);
-  // What hides half is where the surface is, whatever shines through it from far behind: nothing behind is mixed in.
+  // What hides half is where the surface is, whatever shines through it from far behind, and whatever haze is before it.
   float surface = sum.median > 0.0 ? sum.median : sum.depth / opacity;
-  float hides = min(2.0 * opacity, 1.0);
+  float hides = clamp(4.0 * opacity - 1.0, 0.0, 1.0);
 #ifdef DISTANCES_OF_BYTES
   surface /= surface + 1.0;
 #else

@@ -6,7 +6,7 @@ import { fileOf, headline, kKindNames, labelsOf, placeNumbers, placeRows, rowsOf
 import { MeasuringLabels } from './measuring-labels';
 import { MeasuringMarks } from './measuring-marks';
 import { MeasuringPanel } from './measuring-panel';
-import { copyText, download } from '../page/page-files';
+import { copyText, download, fileName } from '../page/page-files';
 import { isTyping, type Shortcuts } from '../page/shortcuts';
 import type { Toolbar } from '../page/toolbar';
 import type { Viewer } from '../viewer';
@@ -226,7 +226,7 @@ export class Measuring {
 
   private download(): void {
     const { extension, text } = fileOf(this.kept, this.frame);
-    download(`${this.viewer.city.name || 'scene'}-measurements.${extension}`, text);
+    download(fileName(`${this.viewer.city.name}-measurements`, extension), text);
   }
 }
 

@@ -5,7 +5,8 @@ import { findFile, isOfNetwork, nameOf, type ModelFile } from './model-files';
 
 const kMagic = 0x46546c67; // "glTF"
 const kJsonChunk = 0x4e4f534a; // "JSON"
-const kMostElements = 1 << 26; // of accessors without data
+const kMostNumbers = 1 << 26; // that take more memory than they have bytes in the file: without data, or packed
+const kComponents: Record<string, number> = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4, MAT2: 4, MAT3: 9, MAT4: 16 };
 
 const kRemedies: Record<string, string> = {
   KHR_draco_mesh_compression: 'export it without Draco compression',
@@ -46,8 +47,11 @@ export function checkGltf(bytes: Uint8Array, main: ModelFile, files: readonly Mo
   if (hasCycle(gltf)) fail('has a node that holds itself', 'export it again', 'nodes');
   const claimed = (arrayOf(gltf, 'accessors') ?? [])
     .filter((one) => fieldOf(one, 'bufferView') === undefined)
-    .reduce((sum: number, one) => sum + (wholeOf(one, 'count') ?? 0), 0);
-  if (claimed > kMostElements) fail('claims more numbers than it has', 'export it again', 'accessors');
+    .reduce((sum: number, one) => sum + (wholeOf(one, 'count') ?? 0) * (kComponents[stringOf(one, 'type') ?? ''] ?? 16), 0);
+  const unpacked = (arrayOf(gltf, 'bufferViews') ?? [])
+    .map((one) => fieldOf(fieldOf(one, 'extensions'), 'EXT_meshopt_compression'))
+    .reduce((sum: number, one) => sum + (wholeOf(one, 'count') ?? 0) * (wholeOf(one, 'byteStride') ?? 0), 0);
+  if (claimed + unpacked / 4 > kMostNumbers) fail('claims more numbers than it has', 'export it again', 'accessors');
   return { needsMeshopt: used.some((one) => one.endsWith('_meshopt_compression')) };
 }
 

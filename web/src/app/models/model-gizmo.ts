@@ -38,12 +38,15 @@ export class ModelGizmo {
   attach(object: THREE.Object3D | undefined): void {
     if (object === this.object) return;
     this.object = object;
-    if (object) this.controls ??= this.make();
+    if (object) {
+      this.controls ??= this.make();
+      this.controls.catch(() => (this.controls = undefined)); // the next one tries again
+    }
     void this.controls?.then((controls) => {
       if (this.object) controls.attach(this.object);
       else controls.detach();
       this.viewer.needPicture();
-    });
+    }, () => {});
   }
 
   private async make(): Promise<TransformControls> {

@@ -8,8 +8,11 @@ export function addLight(world: THREE.Scene, renderer: THREE.WebGLRenderer): voi
   const sun = new THREE.DirectionalLight(0xfff4e4, 1.35);
   sun.position.set(0.5, 1, 0.35);
   world.add(new THREE.HemisphereLight(kSky, kGround, 0.4), sun);
+  let target: THREE.WebGLRenderTarget | undefined;
   const reflect = () => {
-    world.environment = surroundings(renderer);
+    target?.dispose();
+    target = surroundings(renderer);
+    world.environment = target.texture;
     world.environmentIntensity = 0.6;
   };
   reflect();
@@ -17,7 +20,7 @@ export function addLight(world: THREE.Scene, renderer: THREE.WebGLRenderer): voi
 }
 
 // What metal shines with: the same sky and ground.
-function surroundings(renderer: THREE.WebGLRenderer): THREE.Texture {
+function surroundings(renderer: THREE.WebGLRenderer): THREE.WebGLRenderTarget {
   const sphere = new THREE.SphereGeometry(10, 16, 32);
   const heights = sphere.getAttribute('position');
   const colours = new THREE.BufferAttribute(new Float32Array(3 * heights.count), 3);
@@ -29,9 +32,9 @@ function surroundings(renderer: THREE.WebGLRenderer): THREE.Texture {
   sphere.setAttribute('color', colours);
   const material = new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.BackSide });
   const maker = new THREE.PMREMGenerator(renderer);
-  const { texture } = maker.fromScene(new THREE.Scene().add(new THREE.Mesh(sphere, material)), 0.02);
+  const target = maker.fromScene(new THREE.Scene().add(new THREE.Mesh(sphere, material)), 0.02);
   maker.dispose();
   sphere.dispose();
   material.dispose();
-  return texture;
+  return target;
 }

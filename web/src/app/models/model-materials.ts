@@ -17,7 +17,17 @@ export function prepareModel(object: THREE.Object3D): THREE.Box3 {
     if (mesh.material) mesh.material = Array.isArray(mesh.material) ? mesh.material.map(replace) : replace(mesh.material);
     if (mesh.skeleton) mesh.frustumCulled = false; // its sphere is of the pose at rest
   });
-  for (const one of others) one.removeFromParent();
+  for (const one of others) {
+    // What hangs on it stays where it is.
+    const holder = new THREE.Group();
+    holder.name = one.name;
+    holder.position.copy(one.position);
+    holder.quaternion.copy(one.quaternion);
+    holder.scale.copy(one.scale);
+    one.parent?.add(holder);
+    holder.add(...one.children);
+    one.removeFromParent();
+  }
   object.updateMatrixWorld(true);
   return new THREE.Box3().setFromObject(object);
 }
@@ -25,7 +35,7 @@ export function prepareModel(object: THREE.Object3D): THREE.Box3 {
 function prepareMaterial(material: THREE.Material): THREE.Material {
   const fields = material as unknown as Record<string, unknown>;
   for (const [key, value] of Object.entries(fields)) {
-    if (value instanceof THREE.Texture && !value.image) fields[key] = null; // it did not come
+    if (value instanceof THREE.Texture && (!value.image || (value.image as { data?: unknown }).data === null)) fields[key] = null; // it did not come
   }
   const { isMeshPhongMaterial, isMeshLambertMaterial } = fields;
   if (isMeshPhongMaterial || isMeshLambertMaterial) return standardOf(material as THREE.MeshPhongMaterial);

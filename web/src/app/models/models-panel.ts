@@ -2,6 +2,7 @@
 import * as THREE from 'three';
 import { element } from '../page/element';
 import { icon, type IconName } from '../page/icons';
+import type { GroundFrame } from '../measuring/geodesy';
 import { kGizmoModes, type GizmoMode, type ModelGizmo } from './model-gizmo';
 import { placeOf, setPlace } from './model-place';
 import type { Models, PlacedModel } from './models';
@@ -30,7 +31,9 @@ export class ModelsPanel {
   private readonly save = element('button', '', 'Save');
   private readonly saveAll = element('button', '', 'Save with models');
 
-  constructor(private readonly models: Models, private readonly gizmo: ModelGizmo, actions: ModelActions) {
+  constructor(
+    private readonly models: Models, private readonly gizmo: ModelGizmo, private readonly ground: GroundFrame, actions: ModelActions,
+  ) {
     const modes = element('div', 'choice');
     for (const [mode, name] of Object.entries(kGizmoModes) as [GizmoMode, string][]) {
       const button = element('button', '', name);
@@ -81,8 +84,12 @@ export class ModelsPanel {
     this.turn.set(THREE.MathUtils.radToDeg(eulerOf(selected).y));
     this.scale.set(selected.scale.x);
     const { size } = selected.source;
-    const metres = (length: number) => (length < 10 ? length.toFixed(2) : length.toFixed(1));
-    this.size.textContent = [size.x * selected.scale.x, size.z * selected.scale.z, size.y * selected.scale.y].map(metres).join(' × ') + ' m';
+    const metres = (inWorld: number) => {
+      const length = inWorld / this.ground.unitsPerMetre;
+      return length < 10 ? length.toFixed(2) : length.toFixed(1);
+    };
+    this.size.textContent = [size.x * selected.scale.x, size.z * selected.scale.z, size.y * selected.scale.y].map(metres).join(' × ') +
+      (this.ground.isGeoreferenced ? ' m' : ' units');
     this.playing.hidden = !selected.mixer;
     this.plays.checked = selected.plays;
   }

@@ -12,6 +12,7 @@ import { megabytes } from '../page/panels';
 import { bytesOfModels, openWorld, saveWorld } from './saved-world';
 import type { Shortcuts } from '../page/shortcuts';
 import type { Tool, Toolbar } from '../page/toolbar';
+import { GroundFrame } from '../measuring/geodesy';
 import { download } from '../page/page-files';
 import type { Viewer } from '../viewer';
 import { kWorldName } from './world-file';
@@ -25,12 +26,13 @@ export function addModels(viewer: Viewer, toolbar: Toolbar, shortcuts: Shortcuts
   const askForPlace = (model: PlacedModel | undefined) => {
     placed = model;
     canvas.style.cursor = model ? 'crosshair' : '';
+    viewer.navigation.isPointing = model !== undefined;
     panel.asks(model !== undefined);
   };
   const save = async (withFiles: boolean) => {
     download(kWorldName, await saveWorld(models, city, withFiles));
   };
-  const panel = new ModelsPanel(models, gizmo, {
+  const panel = new ModelsPanel(models, gizmo, new GroundFrame(city.tileset.georeference), {
     add: () => picker.click(),
     save: (withFiles) => void save(withFiles).catch(fail),
     place: (model) => askForPlace(placed ? undefined : model),
@@ -107,9 +109,11 @@ export function addModels(viewer: Viewer, toolbar: Toolbar, shortcuts: Shortcuts
   viewer.onClick.push((event) => {
     if (placed) {
       const { visible } = placed;
-      placed.visible = false; // not onto itself
+      placed.visible = false; // not onto itself: nor is it to end the rays of the picture that is looked into
+      viewer.draw();
       const place = viewer.pickAt(event);
       placed.visible = visible;
+      viewer.needPicture();
       if (!place) return true;
       placed.position.copy(place);
       askForPlace(undefined);

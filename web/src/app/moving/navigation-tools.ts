@@ -21,6 +21,9 @@ export function addNavigationTools({ navigation }: Viewer, toolbar: Toolbar, sho
     const button = toolbar.add({ name: kNames[mode], key: kKeys[mode], icon: mode, opened: () => (navigation.mode = mode) });
     buttons.set(mode, button);
   }
-  navigation.onModeChange = (mode) => buttons.forEach((button, one) => button.classList.toggle('on', one === mode));
+  navigation.onModeChange = (mode) => buttons.forEach((button, one) => {
+    button.classList.toggle('on', one === mode);
+    button.setAttribute('aria-pressed', String(one === mode));
+  });
   navigation.onModeChange(navigation.mode);
 }

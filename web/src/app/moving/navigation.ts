@@ -3,6 +3,7 @@ import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { padMotion, type Motion } from './gamepad';
 import { isTyping } from '../page/shortcuts';
+import { TwoFingers } from './two-fingers';
 
 export const kModes = ['map', 'orbit', 'fly'] as const;
 export type NavigationMode = (typeof kModes)[number];
@@ -13,6 +14,8 @@ export interface Look {
 }
 
 const kFlight = 500; // ms to another view
+const kMapAngle = 0.495 * Math.PI; // from straight down: no farther on the map
+const kFingerSpeed = 0.01; // seconds of flight for a pixel
 const kLookSpeed = 0.0025; // radians for a pixel
 const kTurnSpeed = 1.6; // radians a second, of a gamepad
 
@@ -70,9 +73,9 @@ export class Navigation {
     }
     this.current = mode;
     const isMap = mode === 'map';
-    this.orbit.enabled = mode !== 'fly';
+    this.orbit.enabled = mode !== 'fly' && !this.held;
     this.orbit.screenSpacePanning = !isMap;
-    this.orbit.maxPolarAngle = isMap ? 0.495 * Math.PI : Math.PI;
+    this.orbit.maxPolarAngle = isMap ? kMapAngle : Math.PI;
     const { PAN, ROTATE, DOLLY } = THREE.MOUSE;
     this.orbit.mouseButtons = isMap ? { LEFT: PAN, MIDDLE: DOLLY, RIGHT: ROTATE } : { LEFT: ROTATE, MIDDLE: DOLLY, RIGHT: PAN };
     this.orbit.touches = isMap
@@ -85,9 +88,10 @@ export class Navigation {
     return { eye: this.camera.position.clone(), target: this.orbit.target.clone() };
   }
 
-  // At once.
+  // At once. Where one looks upwards over the map, one turns around a place instead.
   set look({ eye, target }: Look) {
     this.flight = undefined;
+    this.leaveMapFor({ eye, target });
     this.camera.position.copy(eye);
     this.orbit.target.copy(target);
     this.camera.lookAt(target);
@@ -96,7 +100,13 @@ export class Navigation {
   }
 
   flyTo(to: Look): void {
+    this.leaveMapFor(to);
     this.flight = { from: this.look, to: { eye: to.eye.clone(), target: to.target.clone() }, begin: performance.now() };
+  }
+
+  private leaveMapFor({ eye, target }: Look): void {
+    const up = eye.clone().sub(target).normalize().y;
+    if (this.current === 'map' && up < Math.cos(kMapAngle)) this.mode = 'orbit';
   }
 
   // Above and beside the middle, so that all of the scene is in view.
@@ -118,8 +128,10 @@ export class Navigation {
   // Once a frame. True where the camera has moved.
   update(seconds: number): boolean {
     this.flyOn();
-    this.move(this.keyMotion(), seconds);
-    this.move(padMotion(), seconds);
+    if (!this.held) {
+      this.move(this.keyMotion(), seconds);
+      this.move(padMotion(), seconds);
+    }
     if (this.orbit.enabled && !this.flight) this.orbit.update();
     const moved = this.moved;
     this.moved = false;
@@ -162,16 +174,22 @@ export class Navigation {
 
   private move({ right, up, forward, yaw, pitch, fast }: Motion, seconds: number): void {
     if (right === 0 && up === 0 && forward === 0 && yaw === 0 && pitch === 0) return;
+    const time = (fast ? 4 : 1) * Math.min(seconds, 0.1);
+    this.go(right * time, up * time, forward * time);
+    this.turn(yaw * kTurnSpeed * seconds, pitch * kTurnSpeed * seconds);
+  }
+
+  // So many seconds at full speed in each direction.
+  private go(right: number, up: number, forward: number): void {
     this.flight = undefined;
     const ahead = this.camera.getWorldDirection(new THREE.Vector3());
     const side = new THREE.Vector3().crossVectors(ahead, this.camera.up).normalize();
     if (this.current !== 'fly') ahead.crossVectors(this.camera.up, side).normalize(); // over the ground
     const speed = this.current === 'fly' ? this.speed : 0.8 * this.camera.position.distanceTo(this.orbit.target);
     const way = ahead.multiplyScalar(forward).addScaledVector(side, right).addScaledVector(this.camera.up, up);
-    way.multiplyScalar(speed * (fast ? 4 : 1) * Math.min(seconds, 0.1));
+    way.multiplyScalar(speed);
     this.camera.position.add(way);
     this.orbit.target.add(way);
-    this.turn(yaw * kTurnSpeed * seconds, pitch * kTurnSpeed * seconds);
     this.moved = true;
   }
 
@@ -190,7 +208,8 @@ export class Navigation {
 
   private listen(): void {
     addEventListener('keydown', ({ code, target, ctrlKey, metaKey, altKey }) => {
-      if (ctrlKey || metaKey || altKey || isTyping(target)) return;
+      // Arrows are a slider's own.
+      if (ctrlKey || metaKey || altKey || isTyping(target) || target instanceof HTMLInputElement) return;
       this.keys.add(code);
     });
     addEventListener('keyup', ({ code }) => this.keys.delete(code));
@@ -208,6 +227,11 @@ export class Navigation {
       }
       this.looking ??= pointerId;
     });
+    // Two fingers drag the place where one stands, and pull themselves forward.
+    const fingers = new TwoFingers(this.canvas, (right, down, apart) => {
+      if (this.current !== 'fly' || this.held) return;
+      this.go(-right * kFingerSpeed, down * kFingerSpeed, apart * kFingerSpeed);
+    });
     const stop = ({ pointerId }: PointerEvent) => {
       if (this.looking === pointerId) this.looking = undefined;
     };
@@ -215,7 +239,7 @@ export class Navigation {
     addEventListener('pointercancel', stop);
     this.canvas.addEventListener('pointermove', ({ movementX, movementY, pointerId }) => {
       const isLocked = document.pointerLockElement === this.canvas;
-      if (this.current !== 'fly' || (!isLocked && this.looking !== pointerId)) return;
+      if (this.current !== 'fly' || this.held || fingers.areDown || (!isLocked && this.looking !== pointerId)) return;
       // A locked pointer drags the view's direction, others drag the picture.
       const sign = isLocked ? -1 : 1;
       this.turn(sign * movementX * kLookSpeed, sign * movementY * kLookSpeed);

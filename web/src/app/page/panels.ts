@@ -1,6 +1,7 @@
 // What stands over the picture: how far loading is, what went wrong, numbers.
 import type { SceneError } from '../../scene-error';
 import type { SceneStatistics } from '../../scene';
+import type { Frame } from '../viewer';
 import { element } from './element';
 
 export function megabytes(bytes: number): string {
@@ -38,12 +39,14 @@ export class ErrorPanel {
   private readonly what = element('h2');
   private readonly reason = element('p');
   private readonly remedy = element('p');
+  private readonly more = element('p');
+  private count = 0;
   private readonly panel: HTMLElement;
 
   constructor(parent: HTMLElement) {
     const close = element('button', '', 'Close');
     close.addEventListener('click', () => (this.panel.hidden = true));
-    this.panel = element('div', 'glass error', close, this.what, this.reason, this.remedy);
+    this.panel = element('div', 'glass error', close, this.what, this.reason, this.remedy, this.more);
     this.panel.setAttribute('role', 'alert');
     this.panel.hidden = true;
     parent.append(this.panel);
@@ -53,13 +56,20 @@ export class ErrorPanel {
     this.panel.hidden = true;
   }
 
+  // The last of those that came since it was closed.
   show({ what, place, reason, remedy }: SceneError): void {
+    this.count = this.panel.hidden ? 1 : this.count + 1;
+    this.more.textContent = this.count > 1 ? `And ${this.count - 1} more.` : '';
     const sentence = (text: string) => `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
     this.what.textContent = place === '' ? what : `${what}, ${place}`;
     this.reason.textContent = sentence(reason);
     this.remedy.textContent = sentence(remedy);
     this.panel.hidden = false;
   }
+}
+
+function inDigits(x: number): string {
+  return x.toFixed(x < 10 ? 1 : 0);
 }
 
 export class StatisticsPanel {
@@ -75,10 +85,11 @@ export class StatisticsPanel {
     this.panel.hidden = !this.panel.hidden;
   }
 
-  show(statistics: SceneStatistics, milliseconds: number, resolutionScale: number): void {
+  show(statistics: SceneStatistics, { milliseconds, gpuMilliseconds, resolutionScale }: Frame): void {
     if (this.panel.hidden) return;
     const rows: [string, string][] = [
-      ['Frame', `${milliseconds.toFixed(milliseconds < 10 ? 1 : 0)} ms`],
+      ['Frame', `${inDigits(milliseconds)} ms, ${inDigits(1000 / milliseconds)} fps`],
+      ['Drawing', gpuMilliseconds === undefined ? 'not told' : `${inDigits(gpuMilliseconds)} ms`],
       ['Resolution', `${Math.round(100 * resolutionScale)} %`],
       ['Graphics card', megabytes(statistics.cardBytes + statistics.targetBytes)],
       ['Page', megabytes(statistics.pageBytes)],

@@ -40,6 +40,7 @@ export class Toolbar {
     const panel = element('section', 'glass side', element('header', '', element('h2', '', tool.name), close), tool.panel);
     panel.hidden = true;
     this.parent.append(panel);
+    button.setAttribute('aria-expanded', 'false');
     this.panels.set(tool, { button, panel });
     return button;
   }
@@ -56,7 +57,10 @@ export class Toolbar {
     for (const [one, { button, panel }] of this.panels) {
       panel.hidden = one !== tool;
       button.classList.toggle('on', one === tool);
+      button.setAttribute('aria-expanded', String(one === tool));
     }
+    // Who closed it by a key goes on where it was opened.
+    if (before && !tool && this.panels.get(before)!.panel.contains(document.activeElement)) this.panels.get(before)!.button.focus();
     before?.closed?.();
     tool?.opened?.();
   }

@@ -35,7 +35,7 @@ export function writeBookmarks(bookmarks: Bookmark[]): string {
 
 export function addBookmarks(viewer: Viewer, toolbar: Toolbar): void {
   const { city } = viewer;
-  const key = `tessera bookmarks ${city.files.name}`;
+  const key = `tessera bookmarks ${city.files.name} ${city.name}`;
   let bookmarks = readBookmarks(read(key));
   const list = element('ul');
   const keep = element('button', '', 'Keep this view');

@@ -1,7 +1,7 @@
 // A flight along views, as nerfstudio's viewer writes it (camera_path.json): `tessera render SCENE OUT --path FILE` draws
 // it. In the world of the source of the photos, z up; cameras look along -z.
 import * as THREE from 'three';
-import { kYUpFromZUp } from '../../axes';
+import { kZUpFromYUp } from '../../axes';
 import type { Tileset } from '../../tiles/tileset';
 import type { View } from './view-address';
 
@@ -13,8 +13,6 @@ export interface PathOptions {
 }
 
 export const kPathOptions: PathOptions = { width: 1920, height: 1080, fps: 30, secondsBetween: 3 };
-
-const zUpFromYUp = kYUpFromZUp.clone().invert();
 
 // Through all views, smoothly; at rest at neither end.
 export function viewsAlong(views: View[], { fps, secondsBetween }: PathOptions): View[] {
@@ -34,7 +32,7 @@ export function viewsAlong(views: View[], { fps, secondsBetween }: PathOptions):
 // Camera to the source's world, column after column; `fromCapture` is the tileset's sourceFromWorld.
 function sourceFromCamera({ eye, target }: View, fromCapture: THREE.Matrix4): THREE.Matrix4 {
   const matrix = new THREE.Matrix4().lookAt(eye, target, new THREE.Vector3(0, 1, 0)).setPosition(eye);
-  matrix.premultiply(zUpFromYUp).premultiply(fromCapture);
+  matrix.premultiply(kZUpFromYUp).premultiply(fromCapture);
   const [at, turn, scale] = [new THREE.Vector3(), new THREE.Quaternion(), new THREE.Vector3()];
   matrix.decompose(at, turn, scale);
   return matrix.compose(at, turn, new THREE.Vector3(1, 1, 1)); // a pose has no scale

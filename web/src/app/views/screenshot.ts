@@ -1,5 +1,4 @@
 // A picture of any size, drawn piece by piece with all that the view asks for.
-import * as THREE from 'three';
 import { download, fileName } from '../page/page-files';
 import { element } from '../page/element';
 import type { Toolbar } from '../page/toolbar';
@@ -20,7 +19,7 @@ export function piecesOf(width: number, height: number, edge = kPiece): [number,
   return pieces;
 }
 
-// The view as it is, with so many pixels; wider or narrower about the same middle. `tell` hears the share that is done.
+// The view as it is, with so many pixels; wider or narrower about the same middle. Rejects where not all of it can be drawn. `tell` hears the share that is done.
 export function takePicture(viewer: Viewer, width: number, height: number, tell: (share: number) => void): Promise<Blob> {
   return viewer.whileHeld(async () => {
     const { renderer, camera, city } = viewer;
@@ -28,8 +27,6 @@ export function takePicture(viewer: Viewer, width: number, height: number, tell:
     picture.width = width;
     picture.height = height;
     const context = picture.getContext('2d')!;
-    const size = renderer.getSize(new THREE.Vector2());
-    const ratio = renderer.getPixelRatio();
     const { aspect } = camera;
     const scale = city.resolutionScale;
     camera.aspect = width / height;
@@ -42,7 +39,9 @@ export function takePicture(viewer: Viewer, width: number, height: number, tell:
         renderer.setSize(wide, high, false);
         const begin = performance.now();
         viewer.draw();
-        while (!city.idle && performance.now() - begin < kWait) {
+        while (!city.idle) {
+          if (renderer.getContext().isContextLost()) throw new Error('the browser took the graphics card away; try again');
+          if (performance.now() - begin > kWait) throw new Error('its tiles do not come; try again later');
           await new Promise((resolve) => setTimeout(resolve, 10));
           viewer.draw();
         }
@@ -55,8 +54,6 @@ export function takePicture(viewer: Viewer, width: number, height: number, tell:
       camera.aspect = aspect;
       camera.updateProjectionMatrix();
       city.resolutionScale = scale;
-      renderer.setPixelRatio(ratio);
-      renderer.setSize(size.x, size.y, false);
     }
     const blob = await new Promise<Blob | null>((resolve) => picture.toBlob(resolve, 'image/png'));
     if (!blob) throw new Error(`the browser has no memory for a picture of ${width} by ${height}`);

@@ -1,16 +1,14 @@
 // A view as the address of the page holds it: #eye=x,y,z&target=x,y,z&fov=degrees, in the capture's world (z up).
 import * as THREE from 'three';
-import { kYUpFromZUp } from '../../axes';
+import { kYUpFromZUp, kZUpFromYUp } from '../../axes';
 import type { Look } from '../moving/navigation';
 
 export interface View extends Look {
   fov: number; // degrees, of the height
 }
 
-const zUpFromYUp = kYUpFromZUp.clone().invert();
-
 function text(place: THREE.Vector3): string {
-  return place.clone().applyMatrix4(zUpFromYUp).toArray().map((x) => String(Number(x.toFixed(3)))).join(',');
+  return place.clone().applyMatrix4(kZUpFromYUp).toArray().map((x) => String(Number(x.toPrecision(9)))).join(',');
 }
 
 function place(given: string | null): THREE.Vector3 | undefined {
