@@ -116,13 +116,13 @@ resolution() {
   done
   for what in "$four" "$one"; do
     echo "$what: $(jq -r '"blocks \(.level_0.bytes_in_memory) bytes in memory, \(.level_0.bytes_on_disk) on disk; " +
-      "surround \(.surround.bytes_in_memory) and \(.surround.bytes_on_disk)"' "$work/$what-info.json")"
+      "surround \(.surround_0.bytes_in_memory) and \(.surround_0.bytes_on_disk)"' "$work/$what-info.json")"
   done
   verdict "four blocks less one of twice the resolution, held-out PSNR in dB" \
     "$(shortfall "$(jq .psnr "$work/$four-scene.json")" "$(jq .psnr "$work/$one-scene.json")")" '>=' 0
   whole=.bytes_in_memory
   verdict "their memory as a share, without surrounds" "$(share "$four" "$one" .level_0$whole)" '<=' 1
-  verdict "with surrounds" "$(share "$four" "$one" ".level_0$whole + .surround$whole")" '<=' 1
+  verdict "with surrounds" "$(share "$four" "$one" ".level_0$whole + .surround_0$whole")" '<=' 1
   verdict "their bytes on disk as a share, without surrounds" "$(share "$four" "$one" .level_0.bytes_on_disk)" '<=' 1
   echo "a frame in $fastest_four s, of the one block in $fastest_one s"
   verdict "their time a frame as a share" \
