@@ -142,7 +142,7 @@ TEST(GoldenVolume, LooksAlongItsRaysAsTheDefinitionSays) {
     ++kinds[opacity > 0.99 ? "opaque" : "open"];
     kinds["coarse"] += ray.at("level") == 1;
     kinds["far"] += distance > 6;
-    drawing.frontToBack.resize(1);
+    drawing.frontToBack.erase(drawing.frontToBack.begin() + 1, drawing.frontToBack.end());
     drawing.surround = nullptr;
     const float left = VolumeRayCaster(drawing).cast(along, INFINITY, counts).transmittance;
     kinds["blended"] += left > 0.05f && left < 0.95f;

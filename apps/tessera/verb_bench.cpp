@@ -5,6 +5,7 @@
 #include "apps/tessera/drawable.h"
 #include "apps/tessera/verbs.h"
 #include "compute/roofline.h"
+#include "eval/psnr.h"
 #include "eval/render_views.h"
 #include "import/capture_reader.h"
 #include "render/cpu/volume_benchmark.h"
@@ -142,12 +143,13 @@ void printCache(const CacheBenchmark& b) {
   constexpr double kMiB = 1 << 20;
   const auto line = [&](const char* name, const CacheBenchmark::Run& run) {
     fmt::print(
-        "  {:<8} {:9.2f} MiB allowed, {:9.2f} MiB held at most; {} loads, {} evictions, {} refusals\n"
+        "  {:<8} {:9.2f} MiB allowed, {:9.2f} MiB held at most; {} loads, {} evictions, {} blocks refused\n"
         "           steps over budget {}, without the coarsest level {}, with a cut that is none {};\n"
-        "           with all that the view asks for {}, of them unlike an unbounded cache's picture {}\n",
+        "           with all that the view asks for {}, of them unlike an unbounded cache's picture {};\n"
+        "           blocks of the finest level {:.2f} a step; {:.2f} dB from an unbounded cache's pictures\n",
         name, static_cast<double>(run.budgetBytes) / kMiB, static_cast<double>(run.mostBytes) / kMiB, run.loads,
-        run.evictions, run.refusals, run.stepsOverBudget, run.stepsWithoutCoarsest, run.stepsWithoutPartition,
-        run.stepsInFull, run.stepsUnlikeUnbounded);
+        run.evictions, run.refused, run.stepsOverBudget, run.stepsWithoutCoarsest, run.stepsWithoutPartition,
+        run.stepsInFull, run.stepsUnlikeUnbounded, run.tilesOfLevel0, psnrFromMeanSquaredError(run.meanSquaredError));
   };
   fmt::print("cache, {} steps; the finest level takes {:.2f} MiB, all {:.2f} MiB\n", b.steps,
              static_cast<double>(b.finestBytes) / kMiB, static_cast<double>(b.allBytes) / kMiB);
@@ -161,12 +163,14 @@ ordered_json toJson(const CacheBenchmark& b) {
             {"most_bytes", r.mostBytes},
             {"loads", r.loads},
             {"evictions", r.evictions},
-            {"refusals", r.refusals},
+            {"refused", r.refused},
             {"steps_over_budget", r.stepsOverBudget},
             {"steps_without_coarsest", r.stepsWithoutCoarsest},
             {"steps_without_partition", r.stepsWithoutPartition},
             {"steps_in_full", r.stepsInFull},
-            {"steps_unlike_unbounded", r.stepsUnlikeUnbounded}};
+            {"steps_unlike_unbounded", r.stepsUnlikeUnbounded},
+            {"finest_blocks_a_step", r.tilesOfLevel0},
+            {"mean_squared_error", r.meanSquaredError}};
   };
   return {{"steps", b.steps},
           {"finest_bytes", b.finestBytes},

@@ -32,31 +32,19 @@ const VolumeContent* TileCache::find(int tile) {
   return &found->second.content;
 }
 
-bool TileCache::load(std::span<const int> tiles, std::span<const int> kept) {
-  uint64_t wanted = 0;
-  for (const int tile : tiles) {
-    if (!holds(tile)) wanted += bytesOf(tile);
-  }
+void TileCache::load(std::span<const int> tiles) {
   const auto stays = [&](int tile) {
-    return contents_.at(tile).pinned || std::find(kept.begin(), kept.end(), tile) != kept.end() ||
-           std::find(tiles.begin(), tiles.end(), tile) != tiles.end();
+    return contents_.at(tile).pinned || std::find(tiles.begin(), tiles.end(), tile) != tiles.end();
   };
-  uint64_t held = statistics_.bytes;
-  std::vector<int> going;
-  for (auto use = uses_.rbegin(); use != uses_.rend() && held + wanted > budget_; ++use) {
-    if (stays(*use)) continue;
-    going.push_back(*use);
-    held -= contents_.at(*use).bytes;
-  }
-  if (held + wanted > budget_) {
-    ++statistics_.refusals;
-    return false;
-  }
-  for (const int tile : going) evict(tile);
   for (const int tile : tiles) {
-    if (!holds(tile)) insert(tile, false);
+    if (holds(tile)) continue;
+    while (statistics_.bytes + bytesOf(tile) > budget_) {
+      const auto oldest = std::find_if_not(uses_.rbegin(), uses_.rend(), stays);
+      CHECK((oldest != uses_.rend()) == true);
+      evict(*oldest);
+    }
+    insert(tile, false);
   }
-  return true;
 }
 
 uint64_t TileCache::bytesOf(int tile) {

@@ -16,7 +16,6 @@ namespace tessera {
 struct TileCacheStatistics {
   uint64_t bytes = 0, mostBytes = 0;  // held now, and at most so far
   uint64_t hits = 0, loads = 0, evictions = 0;
-  uint64_t refusals = 0;  // of requests for which there was no room
 };
 
 // Where contents come from. `bytes` and `load` may throw Error.
@@ -37,10 +36,13 @@ class TileCache {
   // Null where it is not in memory. Counts as a use; the content stays where it is until it is evicted.
   const VolumeContent* find(int tile);
 
-  // Loads those that are missing, all or, where there is no room for all, none; evicts what is neither among them nor
-  // in `kept`. Throws Error naming its file where a content is larger than its source said.
-  bool load(std::span<const int> tiles, std::span<const int> kept);
+  // Loads those that are missing, in their order; evicts others where there is need of their room. All of `tiles` must
+  // fit into the budget beside what must stay. Throws Error naming its file where a content is larger than its source
+  // said.
+  void load(std::span<const int> tiles);
 
+  // That a tile takes in memory, known without loading it. Throws what the source throws.
+  uint64_t bytesOf(int tile);
   uint64_t budgetBytes() const { return budget_; }
   const TileCacheStatistics& statistics() const { return statistics_; }
 
@@ -51,7 +53,6 @@ class TileCache {
     bool pinned = false;
     std::list<int>::iterator use;
   };
-  uint64_t bytesOf(int tile);
   void insert(int tile, bool pinned);
   void evict(int tile);
 

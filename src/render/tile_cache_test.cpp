@@ -50,28 +50,14 @@ TEST(TileCache, NeverHoldsMoreThanItsBudgetUnderRandomAccess) {
                     }));
     uint64_t found = 0;
     for (uint64_t i = 0; i < 3000; ++i) {
-      std::vector<int> tiles, kept;
-      for (uint64_t k = 0; k <= random.below(10 * i, 4); ++k) {
-        const int tile = static_cast<int>(random.below(10 * i + 1 + k, 21));
+      std::vector<int> tiles;
+      for (uint64_t k = 0; k <= random.below(10 * i, 4) && (tiles.size() + 2) * kBytes <= budget; ++k) {
+        const int tile = 1 + static_cast<int>(random.below(10 * i + 1 + k, 20));
         if (std::find(tiles.begin(), tiles.end(), tile) == tiles.end()) tiles.push_back(tile);
       }
-      for (uint64_t k = 0; k < 2; ++k) {
-        const int tile = static_cast<int>(random.below(10 * i + 7 + k, 21));
-        if (cache.holds(tile)) kept.push_back(tile);
-      }
-      const std::set<int> all = [&] {
-        std::set<int> union_ = {0};
-        union_.insert(tiles.begin(), tiles.end());
-        union_.insert(kept.begin(), kept.end());
-        return union_;
-      }();
-      const bool loaded = cache.load(tiles, kept);
-      EXPECT_EQ(loaded, all.size() * kBytes <= budget ||
-                            std::all_of(tiles.begin(), tiles.end(), [&](int tile) { return cache.holds(tile); }));
-      for (const int tile : kept) EXPECT_TRUE(cache.holds(tile));
-      if (loaded) {
-        for (const int tile : tiles) found += cache.find(tile) != nullptr;
-      }
+      cache.load(tiles);
+      for (const int tile : tiles) found += cache.find(tile) != nullptr;
+      ASSERT_TRUE(std::all_of(tiles.begin(), tiles.end(), [&](int tile) { return cache.holds(tile); }));
       ASSERT_TRUE(cache.holds(0));  // the coarsest level
       ASSERT_LE(cache.statistics().bytes, budget);
       ASSERT_LE(cache.statistics().mostBytes, budget);
@@ -88,30 +74,19 @@ TEST(TileCache, NeverHoldsMoreThanItsBudgetUnderRandomAccess) {
   }
 }
 
-TEST(TileCache, EvictsWhatHasNotBeenUsedForLongest) {
+TEST(TileCache, EvictsWhatHasNotBeenUsedForLongestAndNothingWithoutNeed) {
   const TileTree tree = madeTree(4, 4);
   TileCache cache(tree, 4 * kBytes, sourceOf([](int) { return contentOfBytes(kBytes); }));
-  EXPECT_TRUE(cache.load(std::vector<int>{1, 2, 3}, {}));
+  cache.load(std::vector<int>{1, 2, 3});
+  cache.load({});
+  EXPECT_EQ(cache.statistics().evictions, 0u);
   cache.find(1);
-  EXPECT_TRUE(cache.load(std::vector<int>{4}, {}));
+  cache.load(std::vector<int>{4});
   EXPECT_FALSE(cache.holds(2));
-  EXPECT_TRUE(cache.load(std::vector<int>{5}, std::vector<int>{3}));
+  cache.load(std::vector<int>{5, 3});
   EXPECT_TRUE(cache.holds(3));
   EXPECT_FALSE(cache.holds(1));
   EXPECT_EQ(cache.find(1), nullptr);
-}
-
-TEST(TileCache, LoadsAllOfARequestOrNothing) {
-  const TileTree tree = madeTree(4, 4);
-  TileCache cache(tree, 4 * kBytes, sourceOf([](int) { return contentOfBytes(kBytes); }));
-  EXPECT_TRUE(cache.load(std::vector<int>{1, 2}, {}));
-  EXPECT_FALSE(cache.load(std::vector<int>{3, 4, 5, 6}, {}));
-  EXPECT_FALSE(cache.load(std::vector<int>{3, 4}, std::vector<int>{1, 2}));
-  EXPECT_TRUE(cache.holds(1));
-  EXPECT_TRUE(cache.holds(2));
-  EXPECT_FALSE(cache.holds(3));
-  EXPECT_EQ(cache.statistics().refusals, 2u);
-  EXPECT_EQ(cache.statistics().evictions, 0u);
 }
 
 TEST(TileCache, SaysHowMuchTheCoarsestLevelAndTheSurroundNeed) {
@@ -144,7 +119,7 @@ TEST(TileCache, RefusesAContentThatIsLargerThanItsSourceSaid) {
   source.file = [](int tile) { return std::to_string(tile) + ".glb"; };
   TileCache cache(tree, 100 * kBytes, source);
   try {
-    cache.load(std::vector<int>{1, 2}, {});
+    cache.load(std::vector<int>{1, 2});
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.subject(), "2.glb");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <queue>
 
 #include "base/check.h"
 
@@ -37,11 +38,27 @@ double TileView::errorInPixels(const TileNode& tile) const {
 }
 
 double TileView::areaInPixels(const TileNode& tile) const {
-  if (tile.isSurround) return pixels;
+  if (tile.isSurround) return surroundPixels;
   const double radius = 0.5 * (tile.high - tile.low).norm();
   const double onScreen = radius * focal / std::max(radius, distance(tile));
   return std::min(pixels, std::numbers::pi * onScreen * onScreen);
 }
+
+namespace {
+
+// How much of the picture looks out of the box.
+double shareOfSurround(const Camera& camera, const TileView& view, const VolumeFrame& frame) {
+  constexpr int kAcross = 12;
+  int shows = 0;
+  for (int i = 0; i < kAcross * kAcross; ++i) {
+    const Vec2d at((i % kAcross + 0.5) * camera.width / kAcross, (i / kAcross + 0.5) * camera.height / kAcross);
+    const std::optional<Vec3d> d = camera.directionInCamera(at);
+    shows += d && showsSurround({view.eye, view.cameraFromScene.transpose() * *d}, frame.low, frame.high);
+  }
+  return static_cast<double>(shows) / (kAcross * kAcross);
+}
+
+}  // namespace
 
 TileView tileView(const Camera& camera, const Pose& worldFromCamera, const VolumeFrame& frame) {
   TileView view;
@@ -50,6 +67,7 @@ TileView tileView(const Camera& camera, const Pose& worldFromCamera, const Volum
   view.focal = std::max(camera.focalX(), camera.focalY());
   view.pixels = static_cast<double>(camera.width) * camera.height;
   view.nearest = frame.near;
+  view.surroundPixels = view.pixels * shareOfSurround(camera, view, frame);
   if (lensSeesBehind(camera.lens)) return view;
   // A lens is a continuous map without folds: the border of the picture encloses it in x/z and y/z too.
   TileView::Window window{{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
@@ -72,87 +90,114 @@ TileView tileView(const Camera& camera, const Pose& worldFromCamera, const Volum
   return view;
 }
 
+bool showsSurround(const SceneRay& ray, const Vec3d& low, const Vec3d& high) {
+  const RayRange inside = clipToBox(ray, low, high, {0, INFINITY});
+  if (inside.empty()) return true;
+  const double upwards = ray.direction.z();
+  return upwards == 0 || ((upwards > 0 ? high : low).z() - ray.origin.z()) / upwards > inside.far;
+}
+
 struct TileSelector::Pass {
   const TileView& view;
-  const std::function<bool(int)>& loaded;
-  Selection selection;
-
-  void request(std::vector<int> tiles, std::vector<int> beside, const TileNode& instead, double mostPixels) {
-    const double error = view.errorInPixels(instead) / std::max(mostPixels, 1e-3);
-    selection.requests.push_back(
-        {std::move(tiles), std::move(beside), view.areaInPixels(instead) * error, view.distance(instead)});
-  }
+  const std::function<bool(int)>& holds;
+  std::vector<SelectedTile> tiles;
 };
 
 TileSelector::TileSelector(const TileTree& tree, SelectionSettings settings)
-    : tree_(tree), settings_(settings), replaced_(tree.tiles.size()) {
+    : tree_(tree), settings_(settings), pinned_(tree.coarsest()), replaced_(tree.tiles.size()) {
   tree.check();
   CHECK(settings.hysteresis >= 1.0);
+  if (tree.surround >= 0) pinned_.push_back(tree.surround);
 }
 
-// Adds tiles to the cut that cover this one. Where there are none in memory: false, and adds those that would do.
-bool TileSelector::cover(Pass& pass, int tile, std::vector<int>& missing) {
+TileChoice TileSelector::choose(const TileView& view, const TileMemory& memory) {
+  struct Candidate {
+    int tile;
+    double priority, distance;
+    bool operator<(const Candidate& other) const {  // less urgent
+      if (priority != other.priority) return priority < other.priority;
+      return distance != other.distance ? distance > other.distance : tile > other.tile;
+    }
+  };
+  std::priority_queue<Candidate> open;
+  // Urgent is what covers much of the picture and is far coarser there than asked for.
+  const std::function<void(int, double)> addBelow = [&](int tile, double error) {
+    for (const int child : tree_.tiles[tile].children) {
+      const TileNode& node = tree_.tiles[child];
+      if (!view.sees(node)) continue;
+      if (!node.hasContent) {
+        addBelow(child, error);
+        continue;
+      }
+      const double held = memory.holds(child) ? settings_.hysteresis * settings_.hysteresis : 1;
+      open.push({child, view.areaInPixels(node) * error * held, view.distance(node)});
+    }
+  };
+  const auto refine = [&](int tile) {
+    if (!isReplaced(view, tile)) return;
+    addBelow(tile, view.errorInPixels(tree_.tiles[tile]) / std::max(settings_.mostPixels, 1e-3));
+  };
+  TileChoice choice;
+  uint64_t bytes = 0;
+  for (const int tile : pinned_) {
+    bytes += memory.bytes(tile);
+    if (view.sees(tree_.tiles[tile])) refine(tile);
+  }
+  while (!open.empty()) {
+    const int tile = open.top().tile;
+    open.pop();
+    if (bytes + memory.bytes(tile) > memory.budget) {
+      ++choice.refused;
+      continue;
+    }
+    bytes += memory.bytes(tile);
+    choice.wanted.push_back(tile);
+    refine(tile);
+  }
+  return choice;
+}
+
+// Adds tiles to the cut that cover this one; `above` is the next content above it that is in memory.
+void TileSelector::cover(Pass& pass, int tile, int above) {
   const TileNode& node = tree_.tiles[tile];
   if (!pass.view.sees(node) || (!node.hasContent && node.children.empty())) {
-    pass.selection.cut.push_back({tile, false});
-    return true;
+    pass.tiles.push_back({tile, -1, false});
+    return;
   }
-  if (!node.hasContent) {
-    replaced_[tile] = true;
-  } else if (node.children.empty() || node.level <= settings_.finestLevel) {
-    replaced_[tile] = false;
-  } else {
-    const double threshold = settings_.mostPixels / (replaced_[tile] ? settings_.hysteresis : 1);
-    replaced_[tile] = pass.view.errorInPixels(node) > threshold;
+  const bool isHeld = node.hasContent && pass.holds(tile);
+  const int content = isHeld ? tile : above;
+  if (!node.children.empty() && (!isHeld || isReplaced(pass.view, tile))) {
+    const size_t before = pass.tiles.size();
+    for (const int child : tree_.childrenFrontToBack(tile, pass.view.eye)) cover(pass, child, content);
+    const auto first = pass.tiles.begin() + static_cast<std::ptrdiff_t>(before), end = pass.tiles.end();
+    const bool anyVisible = std::any_of(first, end, [](const SelectedTile& one) { return one.visible; });
+    const auto isFiner = [&](const SelectedTile& one) { return one.visible && one.content != content; };
+    if (!anyVisible || std::any_of(first, end, isFiner)) return;
+    pass.tiles.resize(before);  // nothing finer is there
   }
-  const bool replaced = replaced_[tile], loaded = node.hasContent && pass.loaded(tile);
-  if (!node.children.empty() && (replaced || !loaded)) {
-    Selection& made = pass.selection;
-    const size_t cutBefore = made.cut.size(), requestsBefore = made.requests.size();
-    std::vector<int> missingBelow;
-    bool covered = true;
-    for (const int child : tree_.childrenFrontToBack(tile, pass.view.eye)) {
-      covered &= cover(pass, child, missingBelow);
-    }
-    if (covered) {
-      if (!replaced) pass.request({tile}, {}, node, settings_.mostPixels);  // finer than need be
-      return true;
-    }
-    if (!node.hasContent) {
-      missing.insert(missing.end(), missingBelow.begin(), missingBelow.end());
-      return false;  // what covers other children stays in the cut for whoever asks what to keep
-    }
-    std::vector<int> beside;
-    for (size_t i = cutBefore; i < made.cut.size(); ++i) {
-      if (made.cut[i].visible) beside.push_back(made.cut[i].tile);
-    }
-    made.cut.resize(cutBefore);
-    made.requests.resize(requestsBefore);
-    if (loaded) pass.request(std::move(missingBelow), std::move(beside), node, settings_.mostPixels);
-  }
-  if (loaded) {
-    pass.selection.cut.push_back({tile, true});
-  } else {
-    missing.push_back(tile);
-  }
-  return loaded;
+  pass.tiles.push_back({tile, content, content >= 0});
 }
 
-Selection TileSelector::select(const TileView& view, const std::function<bool(int)>& loaded) {
-  for (const int tile : tree_.coarsest()) CHECK(loaded(tile) == true);
-  Pass pass{view, loaded, {}};
-  std::vector<int> missing;
-  CHECK(cover(pass, 0, missing) == true);
+bool TileSelector::isReplaced(const TileView& view, int tile) {
+  const TileNode& node = tree_.tiles[tile];
+  const double threshold = settings_.mostPixels / (replaced_[tile] ? settings_.hysteresis : 1);
+  const bool canBe = !node.children.empty() && node.level > settings_.finestLevel;
+  replaced_[tile] = canBe && view.errorInPixels(node) > threshold;
+  return replaced_[tile] != 0;
+}
+
+TileCut TileSelector::cut(const TileView& view, const std::function<bool(int)>& holds) {
+  for (const int tile : pinned_) CHECK(holds(tile) == true);
+  TileCut cut;
+  Pass pass{view, holds, {}};
   if (tree_.surround >= 0) {
-    CHECK(cover(pass, tree_.surround, missing) == true);
-    pass.selection.surround = pass.selection.cut.back().tile;
-    pass.selection.cut.pop_back();
+    cover(pass, tree_.surround, -1);
+    cut.surround = pass.tiles.front().content;
+    pass.tiles.clear();
   }
-  std::stable_sort(pass.selection.requests.begin(), pass.selection.requests.end(),
-                   [](const TileRequest& a, const TileRequest& b) {
-                     return a.priority != b.priority ? a.priority > b.priority : a.distance < b.distance;
-                   });
-  return std::move(pass.selection);
+  cover(pass, 0, -1);
+  cut.tiles = std::move(pass.tiles);
+  return cut;
 }
 
 }  // namespace tessera

@@ -1,8 +1,12 @@
-// Which tiles to draw (City-on-Web, section 4.5; algorithms' section 9): a cut through the tree, whose tiles together
-// cover what the root covers, each place once.
+// Which tiles to draw, and which to have in memory for it (City-on-Web, section 4.5; algorithms' section 9).
 //
-// A tile is replaced by its children while its error, projected, is above a number of pixels, and all of them that can
-// be seen are in memory. Once it is to be replaced, it stays so until the error is smaller by `hysteresis`.
+// The picture is a cut through the tree: tiles that together cover what the root covers, each place once. A tile is
+// replaced by its children while its error, projected, is above a number of pixels; once it is, it stays so until the
+// error is smaller by `hysteresis`. Where a tile of the cut is not in memory, what is above it is drawn, in that tile's
+// cells.
+//
+// What is wanted in memory is chosen anew for each view: the most urgent first, as far as the budget goes. What is
+// above a wanted tile is wanted too, so that whatever comes into view is drawn by that at once.
 #pragma once
 
 #include <functional>
@@ -17,8 +21,8 @@ namespace tessera {
 
 struct SelectionSettings {
   double mostPixels = 1.5;  // of geometric error; 0: the finest everywhere
-  double hysteresis = 1.2;
-  int finestLevel = 0;  // tiles of this level and finer are never replaced
+  double hysteresis = 1.2;  // also what is in memory is so much more urgent
+  int finestLevel = 0;      // tiles of this level and finer are never replaced
 };
 
 // What a camera sees of a scene, in its units.
@@ -27,6 +31,7 @@ struct TileView {
   Mat3d cameraFromScene = Mat3d::Identity();  // a rotation
   double focal = 1;                           // pixels
   double pixels = 1;                          // of the whole picture
+  double surroundPixels = 1;                  // those in which the surround is looked at
   double nearest = 0.05;                      // distances below count as this
   // The picture in x/z and y/z; nothing where the lens may see anywhere.
   struct Window {
@@ -44,23 +49,31 @@ struct TileView {
 
 TileView tileView(const Camera& camera, const Pose& worldFromCamera, const VolumeFrame& frame);
 
+// Whether a ray shows what matters of the surround: it misses the scene's box, or leaves it through a side. What lies
+// above is sky, and the ground hides what lies below.
+bool showsSurround(const SceneRay& ray, const Vec3d& low, const Vec3d& high);
+
+// What there is to choose from.
+struct TileMemory {
+  uint64_t budget = 0;                  // bytes
+  std::function<bool(int tile)> holds;  // the coarsest, also of the surround, always
+  std::function<uint64_t(int tile)> bytes;
+};
+
 struct SelectedTile {
-  int tile = 0;
-  bool visible = true;  // what is not, or has no content, need not be in memory
+  int tile = 0;      // in whose cells is drawn
+  int content = -1;  // the tile's, or of one above it
+  bool visible = true;
 };
 
-// Tiles that must be loaded together for the cut to change.
-struct TileRequest {
-  std::vector<int> tiles;
-  std::vector<int> beside;  // in memory, and drawn with them: not to be evicted for them
-  double priority = 0;      // the area on the screen of what they would replace × its error in units of mostPixels
-  double distance = 0;
+struct TileCut {
+  std::vector<SelectedTile> tiles;  // front to back for every ray of the view
+  int surround = -1;                // the one to draw behind them
 };
 
-struct Selection {
-  std::vector<SelectedTile> cut;      // front to back for every ray of the view
-  int surround = -1;                  // the one to draw behind them
-  std::vector<TileRequest> requests;  // the most urgent first
+struct TileChoice {
+  std::vector<int> wanted;  // to be in memory, beside the coarsest; the most urgent first
+  int refused = 0;          // tiles for which the budget has no room
 };
 
 class TileSelector {
@@ -68,15 +81,19 @@ class TileSelector {
   // Keeps a reference to `tree`.
   TileSelector(const TileTree& tree, SelectionSettings settings);
 
-  // `loaded` says which contents are in memory; the coarsest, also of the surround, always are.
-  Selection select(const TileView& view, const std::function<bool(int)>& loaded);
+  // What to have in memory for a view.
+  TileChoice choose(const TileView& view, const TileMemory& memory);
+  // `holds` says which contents are in memory; the coarsest, also of the surround, always are.
+  TileCut cut(const TileView& view, const std::function<bool(int)>& holds);
 
  private:
   struct Pass;
-  bool cover(Pass& pass, int tile, std::vector<int>& missing);
+  void cover(Pass& pass, int tile, int above);
+  bool isReplaced(const TileView& view, int tile);
 
   const TileTree& tree_;
   SelectionSettings settings_;
+  std::vector<int> pinned_;     // the coarsest, of the surround too
   std::vector<char> replaced_;  // tiles that were to be replaced when last seen
 };
 

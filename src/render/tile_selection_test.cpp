@@ -53,6 +53,9 @@ bool isPartition(const TileTree& tree, const std::vector<SelectedTile>& cut) {
 
 const auto kAll = [](int) { return true; };
 
+// Room for everything, of which nothing is there.
+const TileMemory kRoom = {UINT64_MAX, [](int) { return false; }, [](int) { return uint64_t{1}; }};
+
 // A tree with a coarse and a fine surround. Returns their numbers.
 std::pair<int, int> addSurrounds(TileTree& tree) {
   const int coarse = static_cast<int>(tree.tiles.size());
@@ -79,13 +82,24 @@ TEST(TileSelection, DrawsTheCoarseSurroundUntilTheFineOneIsThere) {
   TileSelector selector(tree, {});
   // At the border of the box it fills the picture, and its texels are large.
   const TileView view = tileView(smallCamera(), lookingAt(Vec3d(1.9, 0, 0), Vec3d(10, 0, 0)), {});
-  const Selection before = selector.select(view, [fine = fine](int tile) { return tile != fine; });
-  EXPECT_EQ(before.surround, coarse);
-  ASSERT_EQ(before.requests.size(), 1u);
-  EXPECT_EQ(before.requests[0].tiles, std::vector<int>{fine});
-  const Selection after = selector.select(view, kAll);
-  EXPECT_EQ(after.surround, fine);
-  EXPECT_TRUE(after.requests.empty());
+  EXPECT_EQ(selector.cut(view, [fine = fine](int tile) { return tile != fine; }).surround, coarse);
+  EXPECT_EQ(selector.choose(view, kRoom).wanted.at(0), fine);
+  EXPECT_EQ(selector.cut(view, kAll).surround, fine);
+}
+
+TEST(TileSelection, CountsOfTheSurroundWhatIsSeenOfIt) {
+  VolumeFrame frame;
+  frame.low = Vec3d(-8, -8, -0.5);
+  frame.high = Vec3d(8, 8, 0.5);
+  const auto share = [&](const Vec3d& eye, const Vec3d& target) {
+    const TileView view = tileView(smallCamera(), lookingAt(eye, target), frame);
+    return view.surroundPixels / view.pixels;
+  };
+  EXPECT_EQ(share(Vec3d(0, 0, 0.4), Vec3d(0, 0, -1)), 0);         // the ground alone
+  EXPECT_EQ(share(Vec3d(0, 0, 0), Vec3d(0, 0, 1)), 0);            // the sky alone
+  EXPECT_EQ(share(Vec3d(9, 0, 0), Vec3d(20, 0, 0)), 1);           // away from all
+  EXPECT_GT(share(Vec3d(0, 0, 40), Vec3d(0, 0, 0)), 0.4);         // the box amid it
+  EXPECT_NEAR(share(Vec3d(0, 0, 0), Vec3d(1, 0, 0)), 0.17, 0.1);  // a band along the horizon
 }
 
 TEST(TileSelection, AsksForNoFinerSurroundThanIsSeen) {
@@ -95,11 +109,11 @@ TEST(TileSelection, AsksForNoFinerSurroundThanIsSeen) {
                                             std::tuple(0.0, 1.0, fine), std::tuple(500.0, 20.0, fine)}) {
     TileSelector selector(tree, {pixels, 1.2, 0});
     const TileView view = tileView(smallCamera(), lookingAt(Vec3d(x, 0, 0), Vec3d(1000, 0, 0)), {});
-    EXPECT_EQ(selector.select(view, kAll).surround, expected) << x << ", " << pixels << " pixels";
+    EXPECT_EQ(selector.cut(view, kAll).surround, expected) << x << ", " << pixels << " pixels";
   }
   TileSelector limited(tree, {0, 1.2, 1});
   const TileView view = tileView(smallCamera(), lookingAt(Vec3d(63, 0, 0), Vec3d(1000, 0, 0)), {});
-  EXPECT_EQ(limited.select(view, kAll).surround, coarse);
+  EXPECT_EQ(limited.cut(view, kAll).surround, coarse);
 }
 
 TEST(TileSelection, IsAPartitionOfTheRootForAllCamerasAndWhateverIsLoaded) {
@@ -113,22 +127,17 @@ TEST(TileSelection, IsAPartitionOfTheRootForAllCamerasAndWhateverIsLoaded) {
     std::set<size_t> sizes;
     for (uint64_t i = 0; i < 600; ++i) {
       const auto loaded = [&](int tile) { return tile == 0 || i % 3 == 0 || random.uniform(1000 * i + tile) < 0.7; };
-      const Selection selection = selector.select(tileView(smallCamera(), randomPose(random, i), {}), loaded);
-      ASSERT_TRUE(isPartition(tree, selection.cut)) << i;
-      for (const SelectedTile& selected : selection.cut) {
-        if (selected.visible) {
-          EXPECT_TRUE(loaded(selected.tile));
-          EXPECT_TRUE(tree.tiles[selected.tile].hasContent);
-        }
+      const TileCut cut = selector.cut(tileView(smallCamera(), randomPose(random, i), {}), loaded);
+      ASSERT_TRUE(isPartition(tree, cut.tiles)) << i;
+      for (const SelectedTile& selected : cut.tiles) {
+        if (!selected.visible) continue;
+        EXPECT_TRUE(loaded(selected.content));
+        EXPECT_TRUE(tree.tiles[selected.content].hasContent);
+        int above = selected.tile;
+        while (above != selected.content && above >= 0) above = tree.tiles[above].parent;
+        EXPECT_EQ(above, selected.content);
       }
-      for (const TileRequest& request : selection.requests) {
-        EXPECT_FALSE(request.tiles.empty());
-        for (const int tile : request.tiles) {
-          EXPECT_FALSE(loaded(tile));
-          EXPECT_TRUE(tree.tiles[tile].hasContent);
-        }
-      }
-      sizes.insert(selection.cut.size());
+      sizes.insert(cut.tiles.size());
     }
     if (columns == 8) {
       EXPECT_GT(sizes.size(), 5u);
@@ -143,9 +152,8 @@ TEST(TileSelection, IsAsFineAsAskedForWhereAllIsLoaded) {
   for (uint64_t i = 0; i < 200; ++i) {
     TileSelector selector(tree, {});
     const TileView view = tileView(smallCamera(), randomPose(random, i), {});
-    const Selection selection = selector.select(view, kAll);
-    EXPECT_TRUE(selection.requests.empty());
-    for (const SelectedTile& selected : selection.cut) {
+    const TileCut cut = selector.cut(view, kAll);
+    for (const SelectedTile& selected : cut.tiles) {
       if (!selected.visible) continue;
       const TileNode& node = tree.tiles[selected.tile];
       levels.insert(node.level);
@@ -160,28 +168,81 @@ TEST(TileSelection, IsAsFineAsAskedForWhereAllIsLoaded) {
   EXPECT_GE(levels.size(), 3u);
 }
 
-TEST(TileSelection, AsksForTheMostUrgentFirstAndThenForNothing) {
+TEST(TileSelection, WantsAllThatTheCutNeedsWhereThereIsRoom) {
   const TileTree tree = madeTree(8, 8);
-  TileSelector selector(tree, {});
   const TileView view = tileView(smallCamera(), lookingAt(Vec3d(-7, -7, 1.5), Vec3d(0, 0, 0)), {});
-  std::set<int> loaded = {0};
-  const auto isLoaded = [&](int tile) { return loaded.contains(tile); };
-  int rounds = 0;
-  for (;; ++rounds) {
-    const Selection selection = selector.select(view, isLoaded);
-    if (selection.requests.empty()) break;
-    for (size_t i = 0; i + 1 < selection.requests.size(); ++i) {
-      EXPECT_GE(selection.requests[i].priority, selection.requests[i + 1].priority);
-    }
-    loaded.insert(selection.requests[0].tiles.begin(), selection.requests[0].tiles.end());
-    ASSERT_LT(rounds, 100);
+  TileSelector selector(tree, {});
+  const TileChoice choice = selector.choose(view, kRoom);
+  EXPECT_EQ(choice.refused, 0);
+  std::set<int> wanted(choice.wanted.begin(), choice.wanted.end());
+  EXPECT_EQ(wanted.size(), choice.wanted.size());
+  EXPECT_LT(wanted.size(), tree.tiles.size() - 1);  // what cannot be seen is not
+  wanted.insert(0);
+  const TileCut all = selector.cut(view, kAll),
+                now = selector.cut(view, [&](int tile) { return wanted.contains(tile); });
+  ASSERT_EQ(now.tiles.size(), all.tiles.size());
+  for (size_t i = 0; i < now.tiles.size(); ++i) {
+    EXPECT_EQ(now.tiles[i].tile, all.tiles[i].tile);
+    EXPECT_EQ(now.tiles[i].content, all.tiles[i].content);
   }
-  EXPECT_GE(rounds, 3);
-  TileSelector fresh(tree, {});
-  const Selection all = fresh.select(view, kAll), now = selector.select(view, isLoaded);
-  ASSERT_EQ(now.cut.size(), all.cut.size());
-  for (size_t i = 0; i < now.cut.size(); ++i) EXPECT_EQ(now.cut[i].tile, all.cut[i].tile);
-  EXPECT_LT(loaded.size(), tree.tiles.size());  // what cannot be seen was not asked for
+}
+
+TEST(TileSelection, WantsTheMostUrgentThatThereIsRoomForAndAllThatIsAboveIt) {
+  TileTree tree = madeTree(8, 8);
+  addSurrounds(tree);
+  const RandomStream random(4, 1);
+  int refused = 0;
+  for (uint64_t i = 0; i < 200; ++i) {
+    TileMemory memory = kRoom;
+    memory.bytes = [&](int tile) { return 50 + random.below(static_cast<uint64_t>(tile), 100); };
+    memory.budget = 300 + random.below(1000 + i, 3000);
+    uint64_t bytes = memory.bytes(0) + memory.bytes(tree.surround);
+    TileSelector selector(tree, {});
+    const TileView view = tileView(smallCamera(), randomPose(random, i), {});
+    const TileChoice choice = selector.choose(view, memory);
+    std::set<int> before = {0, tree.surround};
+    for (const int tile : choice.wanted) {
+      EXPECT_TRUE(before.contains(tree.tiles[tile].parent));
+      EXPECT_TRUE(before.insert(tile).second);
+      bytes += memory.bytes(tile);
+    }
+    EXPECT_LE(bytes, memory.budget);
+    refused += choice.refused;
+    memory.budget = UINT64_MAX;
+    const TileChoice all = TileSelector(tree, {}).choose(view, memory);
+    EXPECT_EQ(all.refused, 0);
+    EXPECT_EQ(choice.refused == 0, all.wanted == choice.wanted);
+  }
+  EXPECT_GT(refused, 100);
+}
+
+TEST(TileSelection, PrefersWhatIsThereWhereAnotherTileIsHardlyMoreUrgent) {
+  const TileTree tree = madeTree(2, 2);
+  TileSelector selector(tree, {.mostPixels = 0});
+  const auto choose = [&](double x, int held) {
+    const TileMemory memory{2, [held](int tile) { return tile == held; }, kRoom.bytes};
+    const TileView view = tileView(smallCamera(), lookingAt(Vec3d(x, 0.01, 4), Vec3d(x, 0, 0)), {});
+    const TileChoice choice = selector.choose(view, memory);
+    return choice.wanted.at(0);
+  };
+  const int left = choose(-0.1, -1), right = choose(0.1, -1);
+  EXPECT_NE(left, right);
+  EXPECT_EQ(choose(0.1, left), left);
+  EXPECT_EQ(choose(2.5, left), right);
+}
+
+TEST(TileSelection, DrawsATileAsSoonAsItIsThereAndWhatIsAboveInTheCellsOfTheOthers) {
+  const TileTree tree = madeTree(2, 2);
+  TileSelector selector(tree, {.mostPixels = 0});
+  const TileView view = tileView(smallCamera(), lookingAt(Vec3d(0, 0, 8), Vec3d(0, 0, 0)), {});
+  const int there = tree.tiles[0].children[2];
+  const TileCut cut = selector.cut(view, [&](int tile) { return tile == 0 || tile == there; });
+  EXPECT_TRUE(isPartition(tree, cut.tiles));
+  EXPECT_EQ(cut.tiles.size(), 4u);
+  for (const SelectedTile& selected : cut.tiles) EXPECT_EQ(selected.content, selected.tile == there ? there : 0);
+  const TileCut without = selector.cut(view, [](int tile) { return tile == 0; });
+  ASSERT_EQ(without.tiles.size(), 1u);
+  EXPECT_EQ(without.tiles[0].content, 0);
 }
 
 TEST(TileSelection, DoesNotFlickerWhereTheErrorSwingsByLessThanTheHysteresis) {
@@ -190,7 +251,7 @@ TEST(TileSelection, DoesNotFlickerWhereTheErrorSwingsByLessThanTheHysteresis) {
   const auto replacedAt = [&](double error) {  // of the root, in pixels
     const double distance = tree.tiles[0].geometricError * 500 / error;
     const Pose pose = lookingAt(Vec3d(0, 0, 1 + distance), Vec3d(0, 0, 0));
-    return selector.select(tileView(smallCamera(), pose, {}), kAll).cut.size() > 1;
+    return selector.cut(tileView(smallCamera(), pose, {}), kAll).tiles.size() > 1;
   };
   EXPECT_FALSE(replacedAt(1.4));
   for (int i = 0; i < 10; ++i) EXPECT_FALSE(replacedAt(1.49 - 0.2 * (i % 2)));
@@ -240,13 +301,12 @@ TEST(TileSelection, SeesEveryTileThatAnyPixelLooksAt) {
 TEST(TileSelection, StopsAtTheFinestLevelThatIsAllowed) {
   const TileTree tree = madeTree(4, 4);
   TileSelector selector(tree, {.mostPixels = 0, .finestLevel = 1});
-  const Selection selection =
-      selector.select(tileView(smallCamera(), lookingAt(Vec3d(0, 0, 30), Vec3d(0, 0, 0)), {}), kAll);
-  EXPECT_EQ(selection.cut.size(), 4u);
-  for (const SelectedTile& selected : selection.cut) EXPECT_EQ(tree.tiles[selected.tile].level, 1);
+  const TileCut cut = selector.cut(tileView(smallCamera(), lookingAt(Vec3d(0, 0, 30), Vec3d(0, 0, 0)), {}), kAll);
+  EXPECT_EQ(cut.tiles.size(), 4u);
+  for (const SelectedTile& selected : cut.tiles) EXPECT_EQ(tree.tiles[selected.tile].level, 1);
 }
 
-TEST(TileSelection, AsksForWhatIsBelowATileWithoutContent) {
+TEST(TileSelection, WantsWhatIsBelowATileWithoutContent) {
   TileTree tree = madeTree(4, 4);
   const int middle = tree.tiles[0].children[0];
   tree.tiles[middle].hasContent = false;
@@ -254,13 +314,15 @@ TEST(TileSelection, AsksForWhatIsBelowATileWithoutContent) {
   tree.tiles[empty].hasContent = false;
   TileSelector selector(tree, {});
   const TileView view = tileView(smallCamera(), lookingAt(Vec3d(0, 0, 4.5), Vec3d(0, 0, 0)), {});
-  const Selection selection = selector.select(view, [&](int tile) { return tree.tiles[tile].parent <= 0; });
-  EXPECT_EQ(selection.cut.size(), 1u);
-  ASSERT_FALSE(selection.requests.empty());
-  const std::vector<int>& tiles = selection.requests[0].tiles;
-  EXPECT_EQ(std::set<int>(tiles.begin(), tiles.end()),
-            std::set<int>(tree.tiles[middle].children.begin(), tree.tiles[middle].children.end() - 1));
-  EXPECT_EQ(selection.requests[0].beside.size(), 3u);
+  const TileChoice choice = selector.choose(view, kRoom);
+  const std::set<int> wanted(choice.wanted.begin(), choice.wanted.end());
+  EXPECT_FALSE(wanted.contains(middle));
+  EXPECT_FALSE(wanted.contains(empty));
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(wanted.contains(tree.tiles[middle].children[i]));
+  // Until they are there, the root stands for them.
+  const TileCut cut = selector.cut(view, [&](int tile) { return tree.tiles[tile].parent <= 0; });
+  EXPECT_TRUE(isPartition(tree, cut.tiles));
+  EXPECT_EQ(std::count_if(cut.tiles.begin(), cut.tiles.end(), [](const SelectedTile& s) { return s.content == 0; }), 1);
 }
 
 TEST(TileSelection, DrawsFinerTilesThanAskedForRatherThanNone) {
@@ -270,13 +332,13 @@ TEST(TileSelection, DrawsFinerTilesThanAskedForRatherThanNone) {
   const TileView near = tileView(smallCamera(), lookingAt(Vec3d(-2, -2, 6), Vec3d(-2, -2, 0)), {});
   ASSERT_LE(near.errorInPixels(tree.tiles[middle]), 1.5);
   ASSERT_GT(near.errorInPixels(tree.tiles[0]), 1.5);
-  const Selection selection = selector.select(near, [&](int tile) { return tile != middle; });
-  EXPECT_TRUE(isPartition(tree, selection.cut));
+  const TileCut made = selector.cut(near, [&](int tile) { return tile != middle; });
+  EXPECT_TRUE(isPartition(tree, made.tiles));
   std::set<int> cut;
-  for (const SelectedTile& selected : selection.cut) cut.insert(selected.tile);
+  for (const SelectedTile& selected : made.tiles) cut.insert(selected.content);
   for (const int child : tree.tiles[middle].children) EXPECT_TRUE(cut.contains(child));
-  ASSERT_EQ(selection.requests.size(), 1u);
-  EXPECT_EQ(selection.requests[0].tiles, (std::vector<int>{middle}));
+  const TileChoice choice = selector.choose(near, kRoom);
+  EXPECT_NE(std::find(choice.wanted.begin(), choice.wanted.end(), middle), choice.wanted.end());
 }
 
 }  // namespace

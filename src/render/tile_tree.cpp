@@ -45,6 +45,15 @@ std::vector<int> TileTree::coarsest() const {
   return found;
 }
 
+TileBox TileTree::boxOfCells(int tile) const {
+  const TileCells& cells = tiles[tile].cells;
+  const auto wall = [](int cell, int count, double outside) {
+    return cell == 0 || cell == count ? outside : 2.0 * cell - count;
+  };
+  return {Vec3d(wall(cells.i0, columns, -INFINITY), wall(cells.j0, rows, -INFINITY), -INFINITY),
+          Vec3d(wall(cells.i1, columns, INFINITY), wall(cells.j1, rows, INFINITY), INFINITY)};
+}
+
 void TileTree::check() const {
   CHECK(tiles.empty() == false);
   CHECK(surround < static_cast<int>(tiles.size()));

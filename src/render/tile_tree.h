@@ -26,6 +26,10 @@ struct TileNode {
   bool isSurround = false;                          // stands for what is outside of its box, the scene's
 };
 
+struct TileBox {
+  Vec3d low, high;
+};
+
 struct TileTree {
   // Cell (i, j) holds x in [2i - columns, 2i + 2 - columns], y likewise.
   int columns = 1, rows = 1;
@@ -38,6 +42,8 @@ struct TileTree {
   std::vector<int> childrenFrontToBack(int tile, const Vec3d& eye) const;
   // The topmost contents, the surround apart: they cover all that the scene covers, and always stay in memory.
   std::vector<int> coarsest() const;
+  // What is drawn of a content in a tile's cells: to its height, and beyond the scene's box at the border.
+  TileBox boxOfCells(int tile) const;
   // Aborts where the tree is not as said above.
   void check() const;
 };

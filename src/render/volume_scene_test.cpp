@@ -85,10 +85,10 @@ TEST(VolumeScene, IsCoarserFromAfar) {
   const VolumeScene scene = openVolumeScene(kScene);
   VolumeRenderer renderer(scene.frame, scene.tree, scene.source, {});
   renderer.render(camera(), lookingAt(scene.frame, Vec3d(0, -300, 100), Vec3d::Zero()), nullptr);
-  EXPECT_EQ(renderer.selection().cut.size(), 1u);
+  EXPECT_EQ(renderer.cut().tiles.size(), 1u);
   const int coarse = scene.tree.surround, fine = scene.tree.tiles[coarse].children.at(0);
   EXPECT_TRUE(renderer.cache().holds(coarse));
-  EXPECT_EQ(renderer.selection().surround, fine);   // where the camera stands in it
+  EXPECT_EQ(renderer.cut().surround, fine);         // where the camera stands in it
   EXPECT_EQ(renderer.cacheStatistics().loads, 3u);  // the root and the surrounds
 }
 
@@ -102,7 +102,7 @@ TEST(VolumeScene, HasTheSurroundOfTheLevelThatIsAskedFor) {
     VolumeRenderer renderer(scene.frame, scene.tree, scene.source, settings);
     const Pose pose = lookingAt(scene.frame, Vec3d(-3, -3, 2), Vec3d(0, 0, -0.3));
     const RenderedView view = renderer.render(camera(), pose, nullptr);
-    EXPECT_EQ(renderer.selection().surround, expected);
+    EXPECT_EQ(renderer.cut().surround, expected);
     EXPECT_EQ(renderer.cache().holds(fine), level == 0);
   }
 }

@@ -13,17 +13,17 @@ import * as THREE from 'three';
 import { kYUpFromZUp } from './axes';
 import { DecodePool } from './decode-pool';
 import { cityMesh } from './draw/city-mesh';
-import { Compositor, type DrawnContent } from './draw/compositor';
+import { Compositor, type DrawnContent, type DrawnPart } from './draw/compositor';
 import { kDisplayModes, type DisplayMode } from './draw/display-modes';
 import { OpaqueDepth } from './draw/opaque-depth';
 import { SceneError } from './scene-error';
 import { ServedFiles, type ContentFile, type SceneFiles } from './scene-files';
 import { TileSelector, kSelectionSettings, type SelectionSettings } from './stream/tile-selector';
-import { coarsestTiles, tileTree, type TileTree } from './stream/tile-tree';
-import { TileView, type Plane } from './stream/tile-view';
+import { boxOfCells, tileTree, type TileTree } from './stream/tile-tree';
+import { showsSurround, TileView, type Plane } from './stream/tile-view';
 import { kStreamSettings, TileStreamer, type StreamSettings, type StreamStatistics } from './stream/tile-streamer';
 import { decodeTileset } from './tiles/decode-tileset';
-import type { Tileset, Vec3 } from './tiles/tileset';
+import type { Box, Tileset, Vec3 } from './tiles/tileset';
 import type { VolumeContent } from './tiles/volume-content';
 import { VolumeSource } from './volume-source';
 
@@ -132,16 +132,16 @@ export class TesseraScene extends THREE.Object3D {
     const depth = this.opaque.draw(renderer, camera, this, size);
     compositor.resize(size);
     streamer.settings = { ...this.stream, cardBytes: this.stream.cardBytes - compositor.bytes - this.opaque.bytes };
-    const { cut, surround } = streamer.update(tileView(this.tileset, camera, worldFromScene, size), this.uploadTime());
-    const frontToBack = cut
-      .filter(({ visible }) => visible)
-      .map(({ tile }) => streamer.residentOf(tile))
-      .filter((content) => content !== undefined);
+    const { tiles, surround } = streamer.update(tileView(this.tileset, camera, worldFromScene, size), this.uploadTime());
+    const visible = tiles.filter((one) => one.visible);
+    const frontToBack = visible.map(({ tile, content }): DrawnPart => ({
+      content: streamer.residentOf(content)!, within: tile === content ? undefined : boxOfCells(this.tree, tile),
+    }));
     // What it surrounds comes first: on slow machines a picture of it alone would only take time.
     const behind = streamer.complete ? streamer.residentOf(surround) : undefined;
-    if (behind) frontToBack.push(behind);
+    if (behind) frontToBack.push({ content: behind });
     this.drawn = new Array<number>(this.tileset.levels).fill(0);
-    for (const { tile, visible } of cut) if (visible) ++this.drawn[this.tree.tiles[tile].level];
+    for (const content of new Set(visible.map((one) => one.content))) ++this.drawn[this.tree.tiles[content].level];
     compositor.view.minTransmittance.value = this.minTransmittance;
     compositor.view.display.value = kDisplayModes.indexOf(this.display);
     compositor.draw(renderer, camera, worldFromScene, frontToBack, depth);
@@ -194,8 +194,7 @@ export class TesseraScene extends THREE.Object3D {
     if (!this.compositor || !this.streamer || !this.mesh) {
       this.compositor = new Compositor(renderer, this.tileset);
       const source = new VolumeSource(this.tree, this.files, this.pool, this.compositor, renderer);
-      const pinned = [...coarsestTiles(this.tree), ...(this.tree.surround >= 0 ? [this.tree.surround] : [])];
-      this.streamer = new TileStreamer(new TileSelector(this.tree, this.selection), source, pinned, this.stream);
+      this.streamer = new TileStreamer(new TileSelector(this.tree, this.selection), source, this.stream);
       this.streamer.onError = (error) => this.onError(error);
       this.mesh = cityMesh(this.compositor);
       this.add(this.mesh);
@@ -237,5 +236,21 @@ function tileView(tileset: Tileset, camera: THREE.Camera, worldFromScene: THREE.
   const planes = isParallel ? sides : [w, ...sides];
   const scale = new THREE.Vector3().setFromMatrixScale(worldFromScene).x;
   const focal = 0.5 * Math.max(projection[0] * size.x, projection[5] * size.y) * (isParallel ? scale : 1);
-  return new TileView(eye as unknown as Vec3, planes, focal, size.x * size.y, tileset.near, isParallel);
+  const surroundPixels = size.x * size.y * shareOfSurround(tileset.box, camera, sceneFromCamera);
+  return new TileView(eye as unknown as Vec3, planes, focal, size.x * size.y, tileset.near, isParallel, surroundPixels);
+}
+
+// How much of the picture looks out of the box.
+function shareOfSurround(box: Box, { projectionMatrixInverse }: THREE.Camera, sceneFromCamera: THREE.Matrix4): number {
+  const kAcross = 12;
+  const at = (x: number, y: number, z: number) =>
+    new THREE.Vector3(x, y, z).applyMatrix4(projectionMatrixInverse).applyMatrix4(sceneFromCamera);
+  let shows = 0;
+  for (let i = 0; i < kAcross ** 2; ++i) {
+    const x = ((i % kAcross) + 0.5) * (2 / kAcross) - 1;
+    const y = (Math.floor(i / kAcross) + 0.5) * (2 / kAcross) - 1;
+    const near = at(x, y, -1);
+    shows += showsSurround(near.toArray(), at(x, y, 0).sub(near).toArray(), box) ? 1 : 0;
+  }
+  return shows / kAcross ** 2;
 }

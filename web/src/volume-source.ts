@@ -38,12 +38,16 @@ export class VolumeSource implements TileSource<ContentFile, VolumeContent, Draw
     };
   }
 
+  promisedBytes(tile: number): number {
+    return this.contentOf(tile).bytes;
+  }
+
   async fetch(tile: number, signal: AbortSignal) {
     const content = this.contentOf(tile);
     const file = await this.files.read(content.uri, this.limits.fileBytes, signal);
-    const { layout, parts, network } = readVolumeHeader(file, content.uri, content, this.limits);
+    const { cardBytes, parts, network } = readVolumeHeader(file, content.uri, content, this.limits);
     this.compositor.prepare(this.renderer, parts, network, content.surround, this.ownProgram.has(tile));
-    return { file, fileBytes: file.length, cardBytes: layout.bytes };
+    return { file, fileBytes: file.length, cardBytes };
   }
 
   decode(tile: number, file: ContentFile): Promise<VolumeContent> {

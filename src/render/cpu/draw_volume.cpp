@@ -23,7 +23,11 @@ VolumeRayCaster::VolumeRayCaster(const VolumeDrawing& drawing) : drawing_(drawin
     }
     return placed;
   };
-  for (const VolumeContent* content : drawing.frontToBack) placed_.push_back(place(*content));
+  for (const DrawnVolume& drawn : drawing.frontToBack) {
+    Placed& placed = placed_.emplace_back(place(*drawn.content));
+    placed.low = placed.low.cwiseMax(drawn.low);
+    placed.high = placed.high.cwiseMin(drawn.high);
+  }
   if (drawing.surround != nullptr) {
     CHECK(drawing.surround->parts.size() == 1u);
     surround_.push_back(place(*drawing.surround));

@@ -1,6 +1,7 @@
 // A picture of contents in memory: the definition of what a `volume` scene looks like, on the processor.
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "base/threads.h"
@@ -9,10 +10,21 @@
 
 namespace tessera {
 
+// Of a content, the part in a box, whose sides may be infinite.
+struct DrawnVolume {
+  const VolumeContent* content;
+  Vec3d low, high;  // scene units
+
+  DrawnVolume(const VolumeContent* content)  // NOLINT(google-explicit-constructor): all of it
+      : DrawnVolume(content, Vec3d::Constant(-INFINITY), Vec3d::Constant(INFINITY)) {}
+  DrawnVolume(const VolumeContent* content, const Vec3d& low, const Vec3d& high)
+      : content(content), low(low), high(high) {}
+};
+
 struct VolumeDrawing {
   VolumeFrame frame;
   // In an order that is front to back for every ray of the camera (render/tile_tree.h).
-  std::vector<const VolumeContent*> frontToBack;
+  std::vector<DrawnVolume> frontToBack;
   // Optional: seen behind the frame's box, or alone by rays that miss it.
   const VolumeContent* surround = nullptr;
   MarchSettings march;
@@ -34,7 +46,7 @@ class VolumeRayCaster {
   struct Placed {
     const VolumeContent* content;
     DeferredShader shader;
-    Vec3d low, high;  // of all its parts
+    Vec3d low, high;  // of all its parts, as far as they are drawn
   };
   struct PartRange {
     const VolumePart* part;

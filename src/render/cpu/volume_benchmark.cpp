@@ -37,6 +37,12 @@ bool samePicture(const RenderedView& a, const RenderedView& b) {
   return a.colour.pixels == b.colour.pixels && a.opacity.pixels == b.opacity.pixels && a.depth.pixels == b.depth.pixels;
 }
 
+double meanSquare(const ImageF& a, const ImageF& b) {
+  double sum = 0;
+  for (size_t i = 0; i < a.pixels.size(); ++i) sum += (a.pixels[i] - b.pixels[i]) * (a.pixels[i] - b.pixels[i]);
+  return sum / static_cast<double>(a.pixels.size());
+}
+
 // What the cache holds by what was loaded, not by its own books.
 class Watched {
  public:
@@ -63,15 +69,21 @@ class Watched {
     bool coarsest = scene_.tree.surround < 0 || cache.holds(scene_.tree.surround);
     for (const int tile : scene_.tree.coarsest()) coarsest &= cache.holds(tile);
     run_.stepsWithoutCoarsest += !coarsest;
-    const std::vector<SelectedTile>& cut = renderer_->selection().cut;
-    const bool inMemory =
-        std::all_of(cut.begin(), cut.end(), [&](const SelectedTile& s) { return !s.visible || cache.holds(s.tile); });
+    const std::vector<SelectedTile>& cut = renderer_->cut().tiles;
+    const bool inMemory = std::all_of(cut.begin(), cut.end(),
+                                      [&](const SelectedTile& s) { return !s.visible || cache.holds(s.content); });
     run_.stepsWithoutPartition += !inMemory || !isPartition(scene_.tree, cut);
     return drawn;
   }
 
   void compare(const RenderedView& drawn, const RenderedView& unbounded) {
-    if (!renderer_->selection().requests.empty()) return;
+    ++steps_;
+    run_.refused += static_cast<uint64_t>(renderer_->choice().refused);
+    for (const SelectedTile& one : renderer_->cut().tiles) {
+      tilesOfLevel0_ += one.visible && scene_.tree.tiles[one.content].level == 0;
+    }
+    errors_ += meanSquare(drawn.colour, unbounded.colour);
+    if (renderer_->choice().refused > 0) return;
     ++run_.stepsInFull;
     run_.stepsUnlikeUnbounded += !samePicture(drawn, unbounded);
   }
@@ -82,7 +94,8 @@ class Watched {
     run.mostBytes = statistics.mostBytes;
     run.loads = statistics.loads;
     run.evictions = statistics.evictions;
-    run.refusals = statistics.refusals;
+    run.meanSquaredError = errors_ / steps_;
+    run.tilesOfLevel0 = static_cast<double>(tilesOfLevel0_) / steps_;
     return run;
   }
 
@@ -90,6 +103,8 @@ class Watched {
   const VolumeScene& scene_;
   std::vector<uint64_t> bytes_;
   CacheBenchmark::Run run_;
+  int steps_ = 0, tilesOfLevel0_ = 0;
+  double errors_ = 0;
   std::unique_ptr<VolumeRenderer> renderer_;
 };
 
@@ -149,7 +164,7 @@ CacheBenchmark benchmarkCache(const VolumeScene& scene, const CacheBenchmarkOpti
   for (int step = 0; step < options.steps; ++step) {
     const Pose pose = flightPose(scene.frame, scene.tree, static_cast<double>(step) / options.steps);
     const RenderedView wanted = unbounded.render(camera, pose, nullptr);
-    CHECK(unbounded.selection().requests.empty() == true);
+    CHECK(unbounded.choice().refused == 0);
     tight.compare(tight.draw(camera, pose), wanted);
     whole.compare(whole.draw(camera, pose), wanted);
   }

@@ -40,11 +40,14 @@ struct CacheBenchmark {
   struct Run {
     uint64_t budgetBytes = 0;
     uint64_t mostBytes = 0;  // held at any moment
-    uint64_t loads = 0, evictions = 0, refusals = 0;
+    uint64_t loads = 0, evictions = 0;
+    uint64_t refused = 0;  // tiles that a view asked for without there being room, of all views
     int stepsOverBudget = 0, stepsWithoutCoarsest = 0;
     int stepsWithoutPartition = 0;  // the cut left a cell out, or held one twice, or a tile that is not in memory
     int stepsInFull = 0;            // all that the view asked for was there
     int stepsUnlikeUnbounded = 0;   // of them, where a bit of the picture was not the same as without a budget
+    double meanSquaredError = 0;    // of all pictures' colours, from those without a budget
+    double tilesOfLevel0 = 0;       // drawn in a picture, on average
   };
   uint64_t finestBytes = 0, allBytes = 0;
   int steps = 0;

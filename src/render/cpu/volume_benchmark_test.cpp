@@ -67,7 +67,11 @@ TEST(VolumeBenchmark, FliesThroughAQuarterOfTheFinestLevel) {
     EXPECT_GT(run.mostBytes, place().coarsestBytes);
   }
   EXPECT_GT(result.tight.evictions, 0u);
-  EXPECT_GT(result.tight.refusals, 0u);
+  EXPECT_GT(result.tight.refused, 0u);
+  EXPECT_GT(result.tight.meanSquaredError, 0);
+  EXPECT_GT(result.tight.tilesOfLevel0, 0.2);
+  EXPECT_LT(result.tight.tilesOfLevel0, result.whole.tilesOfLevel0);
+  EXPECT_EQ(result.whole.meanSquaredError, 0);
   EXPECT_GT(result.tight.stepsInFull, 0);
   EXPECT_LT(result.tight.stepsInFull, result.steps);
   EXPECT_EQ(result.whole.evictions, 0u);
@@ -109,7 +113,7 @@ TEST(VolumeBenchmark, TellsAPartitionFromWhatIsNone) {
   const auto cutOf = [&](int level) {
     std::vector<SelectedTile> cut;
     for (size_t i = 0; i < tree.tiles.size(); ++i) {
-      if (tree.tiles[i].level == level) cut.push_back({static_cast<int>(i), true});
+      if (tree.tiles[i].level == level) cut.push_back({static_cast<int>(i), static_cast<int>(i), true});
     }
     return cut;
   };

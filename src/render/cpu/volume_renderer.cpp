@@ -17,25 +17,11 @@ std::string VolumeRenderer::device() const {
   return fmt::format("cpu {}, {} threads", renderSimdTarget(), pool_.threads());
 }
 
-// Each round loads the most urgent request that there is room for. What a round draws is kept by the next, so the cut
-// only ever comes nearer to what the view asks for.
 void VolumeRenderer::loadFor(const TileView& view) {
-  for (bool changed = true; changed;) {
-    selection_ = selector_.select(view, [this](int tile) { return cache_.holds(tile); });
-    std::vector<int> kept = {selection_.surround};
-    for (const SelectedTile& selected : selection_.cut) {
-      if (selected.visible) kept.push_back(selected.tile);
-    }
-    changed = false;
-    for (const TileRequest& request : selection_.requests) {
-      std::vector<int> keptBeside = kept;
-      keptBeside.insert(keptBeside.end(), request.beside.begin(), request.beside.end());
-      if (cache_.load(request.tiles, keptBeside)) {
-        changed = true;
-        break;
-      }
-    }
-  }
+  const auto holds = [this](int tile) { return cache_.holds(tile); };
+  choice_ = selector_.choose(view, {cache_.budgetBytes(), holds, [this](int tile) { return cache_.bytesOf(tile); }});
+  cache_.load(choice_.wanted);
+  cut_ = selector_.cut(view, holds);
 }
 
 void VolumeRenderer::prepare(const Camera& camera, const Pose& worldFromCamera) {
@@ -45,10 +31,15 @@ void VolumeRenderer::prepare(const Camera& camera, const Pose& worldFromCamera) 
 RenderedView VolumeRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
   prepare(camera, worldFromCamera);
   VolumeDrawing drawing{frame_, {}, nullptr, settings_.march};
-  for (const SelectedTile& selected : selection_.cut) {
-    if (selected.visible) drawing.frontToBack.push_back(cache_.find(selected.tile));
+  for (const SelectedTile& selected : cut_.tiles) {
+    if (!selected.visible) continue;
+    DrawnVolume& drawn = drawing.frontToBack.emplace_back(cache_.find(selected.content));
+    if (selected.content == selected.tile) continue;
+    const TileBox cells = tree_.boxOfCells(selected.tile);
+    drawn.low = cells.low;
+    drawn.high = cells.high;
   }
-  if (selection_.surround >= 0) drawing.surround = cache_.find(selection_.surround);
+  if (cut_.surround >= 0) drawing.surround = cache_.find(cut_.surround);
   return drawVolume(drawing, camera, worldFromCamera, opaqueDepth, pool_, &counts_);
 }
 

@@ -29,7 +29,8 @@ class VolumeRenderer final : public ViewRenderer {
   std::string device() const override;
   Eigen::Array3f background() const override { return settings_.background; }
 
-  const Selection& selection() const { return selection_; }  // of the last picture
+  const TileCut& cut() const { return cut_; }  // of the last picture
+  const TileChoice& choice() const { return choice_; }
   const TileCache& cache() const { return cache_; }
   const TileCacheStatistics& cacheStatistics() const { return cache_.statistics(); }
   const MarchCounts& marchCounts() const { return counts_; }  // of all pictures
@@ -43,7 +44,8 @@ class VolumeRenderer final : public ViewRenderer {
   TileCache cache_;
   TileSelector selector_;
   ThreadPool pool_;
-  Selection selection_;
+  TileChoice choice_;
+  TileCut cut_;
   MarchCounts counts_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <set>
 
 #include "base/error.h"
@@ -48,10 +49,10 @@ TEST(VolumeRenderer, NeverExceedsAQuarterOfTheFinestLevelAndNeverLacksTheCoarses
   std::set<int> drawn;
   for (int step = 0; step < 600; ++step) {
     renderer.render(camera().scaledTo(16, 12), poseAt(step), nullptr);
-    for (const SelectedTile& selected : renderer.selection().cut) {
-      if (selected.visible) drawn.insert(selected.tile);
+    for (const SelectedTile& selected : renderer.cut().tiles) {
+      if (selected.visible) drawn.insert(selected.content);
     }
-    ASSERT_FALSE(renderer.selection().cut.empty());
+    ASSERT_FALSE(renderer.cut().tiles.empty());
     ASSERT_LE(renderer.cacheStatistics().mostBytes, budget);
   }
   EXPECT_GT(renderer.cacheStatistics().evictions, 0u);
@@ -69,8 +70,8 @@ TEST(VolumeRenderer, DrawsTheSamePictureAsWithoutABudgetWhereWhatIsWantedFits) {
     for (int step = 0; step < 600; step += 20, ++frames) {
       const RenderedView a = unbounded.render(camera(), poseAt(step), nullptr);
       const RenderedView b = bounded.render(camera(), poseAt(step), nullptr);
-      EXPECT_TRUE(unbounded.selection().requests.empty());
-      if (!bounded.selection().requests.empty()) continue;
+      EXPECT_EQ(unbounded.choice().refused, 0);
+      if (bounded.choice().refused > 0) continue;
       ++same;
       EXPECT_EQ(a.colour.pixels, b.colour.pixels) << step;
       EXPECT_EQ(a.depth.pixels, b.depth.pixels) << step;
@@ -83,6 +84,43 @@ TEST(VolumeRenderer, DrawsTheSamePictureAsWithoutABudgetWhereWhatIsWantedFits) {
     EXPECT_LE(bounded.cacheStatistics().mostBytes, tight.budgetBytes);
     EXPECT_EQ(unbounded.cacheStatistics().evictions, 0u);
   }
+}
+
+// Each pixel whose ray meets one tile of the cut shows that tile's content, as if nothing else were there.
+TEST(VolumeRenderer, DrawsWhatIsAboveAMissingTileInItsCellsAlone) {
+  VolumeRendererSettings settings = settingsWith(place().finestBytes / 3);
+  settings.selection.mostPixels = 0;
+  VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
+  int pixels = 0, instead = 0;
+  for (int step = 0; step < 600; step += 50) {
+    const RenderedView view = renderer.render(camera(), poseAt(step), nullptr);
+    EXPECT_GT(renderer.choice().refused, 0);
+    std::map<int, RenderedView> alone;
+    for (const SelectedTile& one : renderer.cut().tiles) {
+      if (!one.visible || alone.contains(one.content)) continue;
+      ThreadPool pool(1);
+      const VolumeDrawing drawing{place().frame, {&place().contents[one.content]}, &place().contents.back(), {}};
+      alone.emplace(one.content, drawVolume(drawing, camera(), poseAt(step), nullptr, pool));
+    }
+    for (int y = 0; y < camera().height; ++y) {
+      for (int x = 0; x < camera().width; ++x) {
+        const Vec3d d = poseAt(step).rotation * *camera().directionInCamera(Vec2d(x + 0.5, y + 0.5));
+        std::vector<SelectedTile> met;
+        for (const SelectedTile& one : renderer.cut().tiles) {
+          const TileNode& node = place().tree.tiles[one.tile];
+          const SceneRay ray{poseAt(step).translation, d.normalized()};
+          if (one.visible && !clipToBox(ray, node.low, node.high, {1e-9, 1e6}).empty()) met.push_back(one);
+        }
+        if (met.size() != 1) continue;
+        const RenderedView& expected = alone.at(met[0].content);
+        ++pixels;
+        instead += met[0].content != met[0].tile;
+        for (int c = 0; c < 3; ++c) ASSERT_NEAR(view.colour.at(x, y)[c], expected.colour.at(x, y)[c], 1e-5) << step;
+      }
+    }
+  }
+  EXPECT_GT(instead, 500);
+  EXPECT_GT(pixels - instead, 500);
 }
 
 TEST(VolumeRenderer, DrawsTheFinestLevelWhereNoErrorIsAllowed) {
@@ -120,7 +158,7 @@ TEST(VolumeRenderer, OrdersMixedLevelsAsEachRayMeetsThem) {
     for (int pixel = 0; pixel < 20; ++pixel) {
       const Vec3d d = *camera().directionInCamera(Vec2d(3.2 * pixel, 2.4 * pixel));
       double last = -1;
-      for (const SelectedTile& selected : renderer.selection().cut) {
+      for (const SelectedTile& selected : renderer.cut().tiles) {
         const TileNode& node = place().tree.tiles[selected.tile];
         levels.insert(node.level);
         const RayRange range =

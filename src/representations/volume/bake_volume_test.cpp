@@ -367,7 +367,7 @@ TEST(BakeVolume, PutsLevelsAboveOneAnother) {
     VolumeRenderer renderer(opened.frame, std::move(opened.tree), std::move(opened.source), settings);
     const RenderedView view =
         renderer.render(scene.capture().cameras[0], scene.capture().photos[0].worldFromCamera, nullptr);
-    EXPECT_EQ(renderer.selection().cut.size(), finest == 0 ? 4u : 1u);
+    EXPECT_EQ(renderer.cut().tiles.size(), finest == 0 ? 4u : 1u);
     for (const float value : view.colour.pixels) ASSERT_TRUE(std::isfinite(value));
   }
 }

@@ -17,6 +17,12 @@ export interface DrawnContent {
   mesh: THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>;
 }
 
+// Of a content, the part in a box; all of it where there is none.
+export interface DrawnPart {
+  content: DrawnContent;
+  within?: Box;
+}
+
 export interface ScenePlace {
   box: Box; // of the scene
   near: number;
@@ -36,6 +42,11 @@ export function screenTriangle(): THREE.BufferGeometry {
   return geometry;
 }
 
+function bytesOfGeometry({ attributes, index }: THREE.BufferGeometry): number {
+  const buffers = [...Object.values(attributes), ...(index ? [index] : [])];
+  return buffers.reduce((sum, { array }) => sum + array.byteLength, 0);
+}
+
 // Puts the nearest depth where nothing of what comes next would be seen: it is not even begun there.
 const kHideShader = `
 uniform sampler2D colourAndOpacity;
@@ -46,6 +57,7 @@ void main() {
 }`;
 
 const kContentsBetweenHiding = 4;
+const kEverywhere: Box = { low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
 
 export class Compositor {
   readonly view: ViewUniforms = viewUniforms();
@@ -133,8 +145,10 @@ export class Compositor {
     content.textures.dispose();
   }
 
+  // Of the card, without contents.
   get bytes(): number {
-    return (this.bytesPerPixel + 4 + 1) * this.target.width * this.target.height;
+    const pixels = this.target.width * this.target.height;
+    return (this.bytesPerPixel + 4 + 1) * pixels + bytesOfGeometry(this.cube) + bytesOfGeometry(this.screen) + 4;
   }
 
   resize({ x, y }: THREE.Vector2): void {
@@ -147,18 +161,14 @@ export class Compositor {
 
   // `worldFromScene`: of three's world. Draws into `target`; rays end at the depth of what is opaque, if that is given.
   draw(
-    renderer: THREE.WebGLRenderer, camera: THREE.Camera, worldFromScene: THREE.Matrix4, frontToBack: DrawnContent[],
+    renderer: THREE.WebGLRenderer, camera: THREE.Camera, worldFromScene: THREE.Matrix4, frontToBack: DrawnPart[],
     opaqueDepth: THREE.Texture | null,
   ): void {
     this.setView(camera, worldFromScene);
     this.view.opaqueDepth.value = opaqueDepth ?? this.nothingOpaque;
-    const box = new THREE.Matrix4();
     const eye = this.eye(camera, worldFromScene);
-    for (const { textures, mesh, box: { low, high } } of frontToBack) {
+    for (const { textures } of new Set(frontToBack.map(({ content }) => content))) {
       if (textures.parts.length > 1) textures.orderParts(orderOf(textures.parts, eye));
-      const middle = (a: number) => (low[a] + high[a]) / 2;
-      box.makeScale(high[0] - low[0], high[1] - low[1], high[2] - low[2]).setPosition(middle(0), middle(1), middle(2));
-      mesh.matrixWorld.multiplyMatrices(worldFromScene, box);
     }
     const before = renderer.getRenderTarget();
     const autoClear = renderer.autoClear;
@@ -169,12 +179,13 @@ export class Compositor {
     renderer.autoClear = false;
     renderer.clear();
     const hides = this.view.minTransmittance.value > 0;
-    frontToBack.forEach((content, i) => {
+    frontToBack.forEach(({ content, within = kEverywhere }, i) => {
       if (hides && i > 0 && (content.surround || i % kContentsBetweenHiding === 0)) {
         renderer.setRenderTarget(this.depthAlone);
         renderer.render(this.hiding, camera);
         renderer.setRenderTarget(this.target);
       }
+      this.place(content, within, worldFromScene);
       this.contents.children = [content.mesh];
       renderer.render(this.contents, camera);
     });
@@ -217,6 +228,13 @@ export class Compositor {
     const everywhere = surround || parts.some((part) => part.contracted);
     const network = packed?.every(Number.isFinite) ? packed : undefined;
     return { parts: parts.length, widths, surround, everywhere, distancesOfBytes: this.distancesOfBytes, network };
+  }
+
+  private place({ mesh, box }: DrawnContent, within: Box, worldFromScene: THREE.Matrix4): void {
+    const low = new THREE.Vector3(...box.low).max(this.view.withinLow.value.set(...within.low));
+    const high = new THREE.Vector3(...box.high).min(this.view.withinHigh.value.set(...within.high));
+    const middle = low.clone().add(high).multiplyScalar(0.5);
+    mesh.matrixWorld.makeScale(high.x - low.x, high.y - low.y, high.z - low.z).setPosition(middle).premultiply(worldFromScene);
   }
 
   // Of a parallel projection, so far behind the picture that its rays come from there.

@@ -16,6 +16,8 @@ export interface ViewUniforms {
   sceneLow: { value: THREE.Vector3 };
   sceneHigh: { value: THREE.Vector3 };
   sceneNear: { value: number };
+  withinLow: { value: THREE.Vector3 }; // of the content that comes next, where it is drawn; not of surrounds
+  withinHigh: { value: THREE.Vector3 };
   minTransmittance: { value: number }; // rays end where less would be seen; 0: never
   opaqueDepth: { value: THREE.Texture | null }; // of the depth buffer of what stands in the scene; 1 everywhere where nothing does
   sceneFromDepth: { value: THREE.Matrix4 }; // (ndc.x, ndc.y, depth in [-1, 1], 1) to the scene
@@ -30,6 +32,8 @@ export function viewUniforms(): ViewUniforms {
     sceneLow: { value: new THREE.Vector3() },
     sceneHigh: { value: new THREE.Vector3() },
     sceneNear: { value: 0 },
+    withinLow: { value: new THREE.Vector3() },
+    withinHigh: { value: new THREE.Vector3() },
     minTransmittance: { value: 1 / 255 },
     opaqueDepth: { value: null },
     sceneFromDepth: { value: new THREE.Matrix4() },
@@ -65,7 +69,7 @@ uniform float featureRange, densityRange, stepsPerTexel, minTransmittance, scene
 uniform vec2 resolution;
 uniform mat3 origin, ray;
 uniform mat4 sceneFromDepth;
-uniform vec3 sceneLow, sceneHigh, colourOfBlock, colourOfLevel;
+uniform vec3 sceneLow, sceneHigh, withinLow, withinHigh, colourOfBlock, colourOfLevel;
 uniform int display;
 `;
 
@@ -91,7 +95,7 @@ void main() {
   vec2 behind = vec2(meetsBox ? box.y : sceneNear, far);
   if (behind.x < behind.y) marchPart(partOf(0), o, d, behind, sum);
 #else
-  vec2 whole = vec2(meetsBox ? box.x : sceneNear, far);
+  vec2 whole = clipToBox(o, d, withinLow, withinHigh, vec2(meetsBox ? box.x : sceneNear, far));
   for (int n = 0; n < PARTS; ++n) {
     Part part = partOf(n);
     vec2 owned = ownedRange(part, o, d, whole);

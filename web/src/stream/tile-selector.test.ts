@@ -13,8 +13,15 @@ function timesCovered(tree: TileTree, cut: SelectedTile[]): number[] {
   return times;
 }
 
+// Whether a content stands above a tile, or is its own.
+function isWithin(tree: TileTree, tile: number, content: number): boolean {
+  return tile === content || (tile >= 0 && isWithin(tree, tree.tiles[tile].parent, content));
+}
+
 const high = madeView([0, 0, 40], 0, -1.5);
 const low = madeView([-3.5, -3.5, 1], 0.8, -0.4);
+
+const everything = { budget: Infinity, holds: () => false, bytesOf: () => 1, canBeHad: () => true };
 
 describe('a selection', () => {
   it('stands for each place once, whatever the view and whatever is loaded', () => {
@@ -26,46 +33,91 @@ describe('a selection', () => {
         const spread = () => (random() - 0.5) * 3 * edge;
         const view = madeView([spread(), spread(), random() * 8], random() * 7, -random() * 1.5);
         const there = tree.tiles.map((_, index) => index === 0 || random() < 0.7);
-        const { cut, requests } = selector.select(view, (tile) => there[tile]);
-        expect(timesCovered(tree, cut).every((times) => times === 1)).toBe(true);
-        for (const { tile, visible } of cut) expect(!visible || there[tile]).toBe(true);
-        for (const { tiles, beside } of requests) {
-          expect(tiles.length).toBeGreaterThan(0);
-          expect(tiles.some((tile) => there[tile])).toBe(false);
-          expect(beside.every((tile) => there[tile])).toBe(true);
+        const { tiles } = selector.cut(view, (tile) => there[tile]);
+        expect(timesCovered(tree, tiles).every((times) => times === 1)).toBe(true);
+        for (const { tile, content, visible } of tiles) {
+          if (!visible) continue;
+          expect(there[content]).toBe(true);
+          expect(isWithin(tree, tile, content)).toBe(true);
         }
       }
     }
   });
 
-  it('shows the root from far away and asks for nothing', () => {
-    const { cut, requests } = new TileSelector(madeTree(4)).select(madeView([0, 0, 400], 0, -1.5), () => true);
-    expect(cut).toEqual([{ tile: 0, visible: true }]);
-    expect(requests).toEqual([]);
+  it('shows the root from far away and wants nothing', () => {
+    const selector = new TileSelector(madeTree(4));
+    const view = madeView([0, 0, 400], 0, -1.5);
+    expect(selector.cut(view, () => true).tiles).toEqual([{ tile: 0, content: 0, visible: true }]);
+    expect(selector.choose(view, everything)).toEqual({ wanted: [], refused: 0 });
   });
 
-  it('asks for all children in view at once, and goes on with the tile until they are there', () => {
+  it('draws each finer tile as soon as it is there, and the coarser one in the cells of the others', () => {
     const tree = madeTree(2);
-    const { cut, requests } = new TileSelector(tree).select(low, (tile) => tile === 0);
-    expect(cut).toEqual([{ tile: 0, visible: true }]);
-    expect(requests).toHaveLength(1);
-    expect([...requests[0].tiles].sort()).toEqual(tree.tiles[0].children.filter((child) => low.sees(tree.tiles[child])));
+    const selector = new TileSelector(tree);
+    expect(selector.cut(low, (tile) => tile === 0).tiles).toEqual([{ tile: 0, content: 0, visible: true }]);
+    const seen = tree.tiles[0].children.filter((child) => low.sees(tree.tiles[child]));
+    expect([...selector.choose(low, everything).wanted].sort()).toEqual(seen);
+    const [first, ...others] = seen;
+    const { tiles } = selector.cut(low, (tile) => tile === 0 || tile === first);
+    const visible = tiles.filter((one) => one.visible);
+    expect(visible.find(({ tile }) => tile === first)!.content).toBe(first);
+    expect(visible.filter(({ content }) => content === 0).map(({ tile }) => tile).sort()).toEqual(others);
   });
 
   it('draws finer tiles where they are there and the coarser one is not', () => {
+    const tree = madeTree(4);
+    const there = new Set([0, ...tree.tiles[0].children, ...tree.tiles[1].children]);
+    there.delete(1);
+    const far = madeView([0, 0, 60], 0, -1.57);
+    const selector = new TileSelector(tree, { mostPixels: 0.1, hysteresis: 1, finestLevel: 0 });
+    const { tiles } = selector.cut(far, (tile) => there.has(tile));
+    expect(tiles.map(({ tile }) => tile).sort()).toEqual([...there].filter((tile) => tile > 0).sort());
+    const { wanted } = selector.choose(far, everything);
+    expect([...wanted].sort()).toEqual([...tree.tiles[0].children].sort());
+  });
+
+  it('wants with each tile those above it, the most urgent first, and never more than there is room for', () => {
+    const random = randomNumbers(5);
+    const tree = madeTree(8);
+    let refusals = 0;
+    for (let round = 0; round < 200; ++round) {
+      const selector = new TileSelector(tree);
+      const view = madeView([(random() - 0.5) * 16, (random() - 0.5) * 16, random() * 3], random() * 7, -random());
+      const bytes = tree.tiles.map(() => 1 + random());
+      const budget = 1 + 30 * random();
+      const { wanted, refused } = selector.choose(view, { ...everything, budget, bytesOf: (tile) => bytes[tile] });
+      expect(wanted.reduce((sum, tile) => sum + bytes[tile], bytes[0])).toBeLessThanOrEqual(Math.max(budget, bytes[0]));
+      wanted.forEach((tile, i) => {
+        const { parent } = tree.tiles[tile];
+        expect(parent === 0 || wanted.slice(0, i).includes(parent)).toBe(true);
+      });
+      const larger = new TileSelector(tree).choose(view, { ...everything, bytesOf: (tile) => bytes[tile] });
+      expect(larger.refused).toBe(0);
+      expect(refused === 0).toBe(larger.wanted.length === wanted.length);
+      refusals += refused;
+    }
+    expect(refusals).toBeGreaterThan(100);
+  });
+
+  it('prefers what is there already, where another tile is hardly more urgent', () => {
     const tree = madeTree(2);
-    const there = new Set(tree.tiles[0].children);
-    const far = madeView([0, 0, 400], 0, -1.5);
-    const { cut, requests } = new TileSelector(tree).select(far, (tile) => there.has(tile));
-    expect(cut.map(({ tile }) => tile).sort()).toEqual([...there].sort());
-    expect(requests.map(({ tiles }) => tiles)).toEqual([[0]]);
+    const selector = new TileSelector(tree, { mostPixels: 0, hysteresis: 1.2, finestLevel: 0 });
+    const choose = (x: number, held: number[]) => {
+      const room = { ...everything, budget: 2, holds: (tile: number) => held.includes(tile) };
+      return selector.choose(madeView([x, 0.01, 2.5], 0, -1.57), room).wanted;
+    };
+    const [left] = choose(-0.1, []);
+    const [right] = choose(0.1, []);
+    expect(left).not.toBe(right);
+    expect(choose(0.1, [left])).toEqual([left]);
+    expect(choose(1.9, [left])).toEqual([right]);
   });
 
   it('does not flicker where the error is about the threshold', () => {
     const tree = madeTree(2);
     const selector = new TileSelector(tree);
     const height = (2 / 128) * (300 / 1.5) + 0.5; // where the root's error is the threshold
-    const cutAt = (z: number) => selector.select(madeView([0, 0, z], 0, -1.5), () => true).cut.length;
+    const cutAt = (z: number) => selector.cut(madeView([0, 0, z], 0, -1.5), () => true).tiles.length;
     expect(cutAt(height * 1.05)).toBe(1);
     expect(cutAt(height * 0.95)).toBe(4);
     expect(cutAt(height * 1.05)).toBe(4);
@@ -75,8 +127,8 @@ describe('a selection', () => {
   it('lets nothing be finer than asked for', () => {
     const tree = madeTree(4);
     const selector = new TileSelector(tree, { mostPixels: 0, hysteresis: 1.2, finestLevel: 1 });
-    const { cut } = selector.select(high, () => true);
-    expect(new Set(cut.map(({ tile }) => tree.tiles[tile].level))).toEqual(new Set([1]));
+    const { tiles } = selector.cut(high, () => true);
+    expect(new Set(tiles.map(({ tile }) => tree.tiles[tile].level))).toEqual(new Set([1]));
   });
 
   it('is front to back for every ray of the view', () => {
@@ -87,7 +139,7 @@ describe('a selection', () => {
       const selector = new TileSelector(tree, { mostPixels: random() * 20, hysteresis: 1, finestLevel: 0 });
       const everywhere = madeView(eye, 0, 0);
       const view = Object.assign(Object.create(everywhere), { sees: () => true }) as typeof everywhere;
-      const cut = selector.select(view, () => true).cut.map(({ tile }) => tree.tiles[tile]);
+      const cut = selector.cut(view, () => true).tiles.map(({ tile }) => tree.tiles[tile]);
       const angle = random() * 7;
       let before = -Infinity;
       for (const { low: from, high: to } of cut) {
@@ -112,25 +164,22 @@ describe('the surround', () => {
     const tree = madeTree(2);
     const { coarse, fine } = addSurrounds(tree);
     const selector = new TileSelector(tree);
-    const before = selector.select(atTheWall, (tile) => tile !== fine);
-    expect(before.surround).toBe(coarse);
-    expect(before.requests.map(({ tiles }) => tiles)).toEqual([[fine]]);
-    const after = selector.select(atTheWall, () => true);
-    expect(after.surround).toBe(fine);
-    expect(after.requests).toEqual([]);
+    expect(selector.cut(atTheWall, (tile) => tile !== fine).surround).toBe(coarse);
+    expect(selector.choose(atTheWall, everything).wanted).toContain(fine);
+    expect(selector.cut(atTheWall, () => true).surround).toBe(fine);
   });
 
   it('is no finer than is seen', () => {
     const tree = madeTree(64);
     const { coarse, fine } = addSurrounds(tree);
     const chosen = (x: number, mostPixels: number, finestLevel = 0) =>
-      new TileSelector(tree, { mostPixels, hysteresis: 1.2, finestLevel }).select(madeView([x, 0, 0], 0, 0), () => true).surround;
+      new TileSelector(tree, { mostPixels, hysteresis: 1.2, finestLevel }).cut(madeView([x, 0, 0], 0, 0), () => true).surround;
     expect([chosen(0, 20), chosen(63.5, 20), chosen(0, 1), chosen(500, 20), chosen(63, 0, 1)]).toEqual(
       [coarse, fine, fine, fine, coarse]);
   });
 
   it('is none where there is none', () => {
-    expect(new TileSelector(madeTree(2)).select(atTheWall, () => true).surround).toBe(-1);
+    expect(new TileSelector(madeTree(2)).cut(atTheWall, () => true).surround).toBe(-1);
   });
 });
 

@@ -1,39 +1,48 @@
-// Which tiles to draw (City-on-Web, section 4.5): a cut through the tree, whose tiles together cover what the root
-// covers, each place once. Twin of src/render/tile_selection.h.
+// Which tiles to draw, and which to have in memory for it (City-on-Web, section 4.5). Twin of src/render/tile_selection.h.
 //
-// A tile is replaced by its children while its error, projected, is above a number of pixels, and all of them that can
-// be seen are in memory. Once it is to be replaced, it stays so until the error is smaller by `hysteresis`.
-import { childrenFrontToBack, type TileNode, type TileTree } from './tile-tree';
+// The picture is a cut through the tree: tiles that together cover what the root covers, each place once. A tile is
+// replaced by its children while its error, projected, is above a number of pixels; once it is, it stays so until the error
+// is smaller by `hysteresis`. Where a tile of the cut is not in memory, what is above it is drawn, in that tile's cells.
+//
+// What is wanted in memory is chosen anew for each view: the most urgent first, as far as the budget goes. What is above
+// a wanted tile is wanted too, so that whatever comes into view is drawn by that at once.
+import { childrenFrontToBack, coarsestTiles, type TileNode, type TileTree } from './tile-tree';
 import type { TileView } from './tile-view';
 
 export interface SelectionSettings {
   mostPixels: number; // of geometric error; 0: the finest everywhere
-  hysteresis: number;
+  hysteresis: number; // also what is in memory is so much more urgent
   finestLevel: number; // tiles of this level and finer are never replaced
 }
 
 export const kSelectionSettings: SelectionSettings = { mostPixels: 1.5, hysteresis: 1.2, finestLevel: 0 };
 
+// What there is to choose from.
+export interface TileMemory {
+  budget: number; // bytes
+  holds(tile: number): boolean;
+  bytesOf(tile: number): number; // that it takes, as far as is known
+  canBeHad(tile: number): boolean;
+}
+
 export interface SelectedTile {
-  tile: number;
-  visible: boolean; // what is not, or has no content, need not be in memory
+  tile: number; // in whose cells is drawn
+  content: number; // the tile's, or of one above it; -1 where there is none
+  visible: boolean;
 }
 
-// Tiles that must be loaded together for the cut to change.
-export interface TileRequest {
-  tiles: number[];
-  beside: number[]; // in memory, and drawn with them: not to be evicted for them
-  priority: number; // the area on the screen of what they would replace × its error in units of mostPixels
-  distance: number;
-}
-
-export interface Selection {
-  cut: SelectedTile[]; // front to back for every ray of the view
+export interface Cut {
+  tiles: SelectedTile[]; // front to back for every ray of the view
   surround: number; // the one to draw behind them, -1 where there is none
-  requests: TileRequest[]; // the most urgent first
+}
+
+export interface Choice {
+  wanted: number[]; // to be in memory, beside the coarsest; the most urgent first
+  refused: number; // tiles for which the budget has no room
 }
 
 export class TileSelector {
+  readonly pinned: readonly number[]; // the coarsest, of the surround too: are to be in memory always
   private readonly replaced: boolean[]; // tiles that were to be replaced when last seen
 
   constructor(
@@ -41,72 +50,101 @@ export class TileSelector {
     public settings: SelectionSettings = { ...kSelectionSettings },
   ) {
     this.replaced = tree.tiles.map(() => false);
+    this.pinned = [...coarsestTiles(tree), ...(tree.surround >= 0 ? [tree.surround] : [])];
   }
 
-  // `loaded` says which contents are in memory; the coarsest must be for the cut to cover everything.
-  select(view: TileView, loaded: (tile: number) => boolean): Selection {
-    const pass = { view, loaded, cut: [], requests: [] } satisfies Pass;
-    this.cover(pass, 0, []);
-    const { cut, requests } = pass as Pass;
-    let surround = -1;
-    if (this.tree.surround >= 0 && this.cover(pass, this.tree.surround, [])) surround = cut.pop()!.tile;
-    requests.sort((a, b) => b.priority - a.priority || a.distance - b.distance);
-    return { cut, surround, requests };
+  // `holds`: which contents can be drawn. The coarsest must be for the cut to cover everything.
+  cut(view: TileView, holds: (tile: number) => boolean): Cut {
+    const tiles: SelectedTile[] = [];
+    const behind: SelectedTile[] = [];
+    this.cover({ view, holds, tiles }, 0, -1);
+    if (this.tree.surround >= 0) this.cover({ view, holds, tiles: behind }, this.tree.surround, -1);
+    return { tiles, surround: behind[0]?.content ?? -1 };
   }
 
-  // Adds tiles to the cut that cover this one. Where there are none in memory: false, and adds those that would do.
-  private cover(pass: Pass, tile: number, missing: number[]): boolean {
-    const { tree, settings } = this;
-    const node = tree.tiles[tile];
-    if (!pass.view.sees(node) || (!node.content && node.children.length === 0)) {
-      pass.cut.push({ tile, visible: false });
-      return true;
-    }
-    if (!node.content) {
-      this.replaced[tile] = true;
-    } else if (node.children.length === 0 || node.level <= settings.finestLevel) {
-      this.replaced[tile] = false;
-    } else {
-      const threshold = settings.mostPixels / (this.replaced[tile] ? settings.hysteresis : 1);
-      this.replaced[tile] = pass.view.errorInPixels(node) > threshold;
-    }
-    const replaced = this.replaced[tile];
-    const loaded = node.content !== undefined && pass.loaded(tile);
-    if (node.children.length > 0 && (replaced || !loaded)) {
-      const cutBefore = pass.cut.length;
-      const requestsBefore = pass.requests.length;
-      const missingBelow: number[] = [];
-      let covered = true;
-      for (const child of childrenFrontToBack(tree, tile, pass.view.eye)) {
-        covered = this.cover(pass, child, missingBelow) && covered;
+  // What to have in memory for a view.
+  choose(view: TileView, memory: TileMemory): Choice {
+    const open: Candidate[] = [];
+    // Urgent is what covers much of the picture and is far coarser there than asked for.
+    const addBelow = (tile: number, instead: TileNode) => {
+      for (const child of this.tree.tiles[tile].children) {
+        const node = this.tree.tiles[child];
+        if (!view.sees(node)) continue;
+        if (!node.content) {
+          addBelow(child, instead);
+          continue;
+        }
+        const error = view.errorInPixels(instead) / Math.max(this.settings.mostPixels, 1e-3);
+        const held = memory.holds(child) ? this.settings.hysteresis ** 2 : 1;
+        open.push({ tile: child, priority: view.areaInPixels(node) * error * held, distance: view.distance(node) });
       }
-      if (covered) {
-        if (!replaced) this.request(pass, [tile], [], node); // finer than need be
-        return true;
-      }
-      if (!node.content) {
-        missing.push(...missingBelow);
-        return false; // what covers other children stays in the cut for whoever asks what to keep
-      }
-      const beside = pass.cut.slice(cutBefore).filter(({ visible }) => visible).map((one) => one.tile);
-      pass.cut.length = cutBefore;
-      pass.requests.length = requestsBefore;
-      if (loaded) this.request(pass, missingBelow, beside, node);
+    };
+    let bytes = 0;
+    for (const tile of this.pinned) {
+      const node = this.tree.tiles[tile];
+      bytes += memory.bytesOf(tile);
+      if (view.sees(node) && this.isReplaced(view, tile)) addBelow(tile, node);
     }
-    if (loaded) pass.cut.push({ tile, visible: true });
-    else missing.push(tile);
-    return loaded;
+    const wanted: number[] = [];
+    let refused = 0;
+    while (open.length > 0) {
+      const next = open.reduce((first, one, i) => (isBefore(one, open[first]) ? i : first), 0);
+      const { tile } = open[next];
+      open[next] = open[open.length - 1];
+      open.pop();
+      if (!memory.canBeHad(tile)) continue;
+      if (bytes + memory.bytesOf(tile) > memory.budget) {
+        ++refused;
+        continue;
+      }
+      bytes += memory.bytesOf(tile);
+      wanted.push(tile);
+      if (this.isReplaced(view, tile)) addBelow(tile, this.tree.tiles[tile]);
+    }
+    return { wanted, refused };
   }
 
-  private request({ view, requests }: Pass, tiles: number[], beside: number[], instead: TileNode): void {
-    const error = view.errorInPixels(instead) / Math.max(this.settings.mostPixels, 1e-3);
-    requests.push({ tiles, beside, priority: view.areaInPixels(instead) * error, distance: view.distance(instead) });
+  // Adds tiles to the cut that cover this one; `above` is the next content above it that can be drawn.
+  private cover(pass: Pass, tile: number, above: number): void {
+    const { view, holds, tiles } = pass;
+    const node = this.tree.tiles[tile];
+    if (!view.sees(node) || (!node.content && node.children.length === 0)) {
+      tiles.push({ tile, content: -1, visible: false });
+      return;
+    }
+    const isHeld = node.content !== undefined && holds(tile);
+    const content = isHeld ? tile : above;
+    if (node.children.length > 0 && (!isHeld || this.isReplaced(view, tile))) {
+      const before = tiles.length;
+      for (const child of childrenFrontToBack(this.tree, tile, view.eye)) this.cover(pass, child, content);
+      const drawn = tiles.slice(before).filter(({ visible }) => visible);
+      if (drawn.length === 0 || drawn.some((one) => one.content !== content)) return;
+      tiles.length = before; // nothing finer is there
+    }
+    tiles.push({ tile, content, visible: content >= 0 });
   }
+
+  private isReplaced(view: TileView, tile: number): boolean {
+    const { settings } = this;
+    const node = this.tree.tiles[tile];
+    if (node.children.length === 0 || node.level <= settings.finestLevel) return (this.replaced[tile] = false);
+    const threshold = settings.mostPixels / (this.replaced[tile] ? settings.hysteresis : 1);
+    return (this.replaced[tile] = view.errorInPixels(node) > threshold);
+  }
+}
+
+interface Candidate {
+  tile: number;
+  priority: number;
+  distance: number;
+}
+
+function isBefore(a: Candidate, b: Candidate): boolean {
+  return a.priority !== b.priority ? a.priority > b.priority : a.distance !== b.distance ? a.distance < b.distance : a.tile < b.tile;
 }
 
 interface Pass {
   view: TileView;
-  loaded: (tile: number) => boolean;
-  cut: SelectedTile[];
-  requests: TileRequest[];
+  holds: (tile: number) => boolean;
+  tiles: SelectedTile[];
 }

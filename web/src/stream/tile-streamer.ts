@@ -1,17 +1,19 @@
 // Keeps what a view needs on the graphics card, within a number of bytes that is never passed: what a content takes is
 // known, and room made for it, before any of it is allocated.
 //
-// A tile's way: absent → fetching (its file) → fetched (its size on the card is known; it waits for room, together with
-// those that must come with it) → decoding (in a worker) → uploading (slice by slice) → resident. The coarsest tiles and
-// the surround come first and stay. Of the others, what has not been drawn for longest goes first.
+// A tile's way: absent → fetching (its file) → fetched (its size on the card is known; it waits for room) → decoding (in a
+// worker) → uploading (slice by slice) → resident. The coarsest tiles and the surround come first and stay. Of the others
+// those go that the selector does not want any more, when there is need of their room: what has not been drawn for longest
+// first, and at last what is drawn, which then is drawn coarser.
 import { SceneError } from '../scene-error';
-import type { Selection, TileRequest, TileSelector } from './tile-selector';
+import type { Cut, TileSelector } from './tile-selector';
 import type { TileView } from './tile-view';
 
 export type UploadStep = 'more' | 'wait' | 'done';
 
 // Where contents come from, and what becomes of them. `Fetched` is a file, `Decoded` its texels, `Resident` what is drawn.
 export interface TileSource<Fetched, Decoded, Resident> {
+  promisedBytes(tile: number): number; // of its file; 0 where nobody knows
   fetch(tile: number, signal: AbortSignal): Promise<{ file: Fetched; fileBytes: number; cardBytes: number }>;
   decode(tile: number, file: Fetched): Promise<Decoded>;
   allocate(tile: number, decoded: Decoded): Resident;
@@ -22,10 +24,10 @@ export interface TileSource<Fetched, Decoded, Resident> {
 
 export interface StreamSettings {
   cardBytes: number; // of contents on the card, at most
-  pageBytes: number; // of files and texels in the page; what is fetched for the most urgent request may pass it
+  pageBytes: number; // of files and texels in the page; what is most urgent may pass it
   fetches: number; // at once
   decodes: number;
-  patience: number; // ms for which a request must last before it is fetched, and be gone before a fetch is given up
+  patience: number; // ms for which a tile must be wanted before it is fetched, and unwanted before a fetch is given up
   firstRetry: number; // ms after the first failure; twice as long after each next
   lastRetry: number;
 }
@@ -47,7 +49,7 @@ interface Entry<Fetched, Resident> {
   file?: Fetched;
   fileBytes: number; // in the page
   cardBytes: number; // 0: not known yet
-  reserved: boolean; // cardBytes count
+  reserved: boolean; // cardBytes count: it is on the card, or will be
   resident?: Resident;
   failures: number;
   retryAt: number;
@@ -63,7 +65,7 @@ export interface StreamStatistics {
   pending: number; // on their way
   loads: number;
   evictions: number;
-  refusals: number; // of requests for which there was no room
+  refused: number; // that the last view asked for, and the budget has no room for
   failures: number;
 }
 
@@ -74,22 +76,21 @@ export class TileStreamer<Fetched, Decoded, Resident> {
   private disposed = false;
   private toldOfBudget = false;
   private nextRetry = Infinity;
+  private readonly known = { tiles: 0, promisedBytes: 0, cardBytes: 0 }; // of those whose size on the card is known
   readonly statistics: StreamStatistics = {
     cardBytes: 0, mostCardBytes: 0, pageBytes: 0, fetchedBytes: 0, resident: 0, pending: 0, loads: 0, evictions: 0,
-    refusals: 0, failures: 0,
+    refused: 0, failures: 0,
   };
   // Of tiles that cannot be had; told once each.
   onError: (error: SceneError, tile: number) => void = () => {};
 
-  // `pinned`: the coarsest tiles, of the surround too.
   constructor(
     private readonly selector: TileSelector,
     private readonly source: TileSource<Fetched, Decoded, Resident>,
-    private readonly pinned: number[],
     public settings: StreamSettings = { ...kStreamSettings },
     private readonly now: () => number = () => performance.now(),
   ) {
-    for (const tile of pinned) this.entry(tile).pinned = true;
+    for (const tile of selector.pinned) this.entry(tile).pinned = true;
   }
 
   residentOf(tile: number): Resident | undefined {
@@ -103,7 +104,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
 
   // All that is to be there always is, or cannot be had.
   get complete(): boolean {
-    return this.pinned.every((tile) => this.residentOf(tile) !== undefined || this.errorOf(tile) !== undefined);
+    return this.selector.pinned.every((tile) => this.residentOf(tile) !== undefined || this.errorOf(tile) !== undefined);
   }
 
   // Nothing is on its way, and nothing would be now if the view stayed as it is.
@@ -113,23 +114,29 @@ export class TileStreamer<Fetched, Decoded, Resident> {
 
   // Once a frame: what to draw, front to back, and behind it; and another step of what is on its way. `uploadFor` ms at
   // most are spent on uploads (but one slice a frame is always taken).
-  update(view: TileView, uploadFor = 4): Pick<Selection, 'cut' | 'surround'> {
+  update(view: TileView, uploadFor = 4): Cut {
     ++this.frame;
     this.uploadSlices(uploadFor);
     this.keepToBudget();
     const now = this.now();
-    const isThere = (tile: number) => this.residentOf(tile) !== undefined;
-    // The coarsest count as loaded, though some may be missing: of the others the picture is right all the same.
-    const { cut, surround, requests } = this.selector.select(view, (tile) => isThere(tile) || this.entry(tile).pinned);
-    const drawn = cut.map(({ tile, visible }) => ({ tile, visible: visible && isThere(tile) }));
-    const kept = new Set(drawn.filter(({ visible }) => visible).map(({ tile }) => tile));
-    if (surround >= 0) kept.add(surround);
-    for (const tile of kept) this.entry(tile).lastUsed = this.frame;
-    const first = this.pinned
-      .filter((tile) => !isThere(tile))
-      .map((tile): TileRequest => ({ tiles: [tile], beside: [], priority: 0, distance: 0 }));
-    this.load(this.complete ? [...first, ...requests] : first, kept, now);
-    return { cut: drawn, surround };
+    this.nextRetry = Infinity;
+    const { wanted, refused } = this.selector.choose(view, {
+      budget: this.settings.cardBytes,
+      holds: (tile) => this.entry(tile).reserved,
+      bytesOf: (tile) => this.bytesOf(tile),
+      canBeHad: (tile) => this.canBeHad(tile, now),
+    });
+    this.statistics.refused = refused;
+    const isTooMuch = this.pinnedBytes() > this.settings.cardBytes;
+    if (isTooMuch) this.failPinned();
+    const missing = isTooMuch ? [] : this.selector.pinned.filter((tile) => !this.residentOf(tile) && this.canBeHad(tile, now));
+    this.load(this.complete ? [...missing, ...wanted] : missing, now);
+    // The coarsest count as there, though some may be missing: of the others the picture is right all the same.
+    const { tiles, surround } = this.selector.cut(view, (tile) => this.entry(tile).pinned || this.residentOf(tile) !== undefined);
+    const drawn = tiles.map((one) => ({ ...one, visible: one.visible && this.residentOf(one.content) !== undefined }));
+    for (const { content, visible } of drawn) if (visible) this.entry(content).lastUsed = this.frame;
+    if (surround >= 0) this.entry(surround).lastUsed = this.frame;
+    return { tiles: drawn, surround };
   }
 
   // Lets go of everything, and of what is still on its way when it comes.
@@ -150,38 +157,47 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     return entry;
   }
 
-  private load(requests: TileRequest[], kept: Set<number>, now: number): void {
-    const { settings } = this;
-    const wanted = new Set(requests.flatMap(({ tiles }) => tiles));
+  private load(wanted: number[], now: number): void {
+    const isWanted = new Set(wanted);
     for (const tile of wanted) {
       const entry = this.entry(tile);
       if (Number.isNaN(entry.wantedSince)) entry.wantedSince = now;
       entry.lastWanted = now;
     }
-    for (const [tile, entry] of this.entries) this.giveUpIfUnwanted(tile, entry, wanted, now);
+    for (const [tile, entry] of this.entries) this.giveUpIfUnwanted(tile, entry, isWanted, now);
     let fetches = this.count('fetching');
-    let mayPass = true; // the page's bytes: the most urgent request that can be had
-    for (const request of requests) {
-      const entries = request.tiles.map((tile) => this.entry(tile));
-      if (entries.some((entry) => entry.state === 'absent' && now < entry.retryAt)) continue;
-      // Where sizes are known and do not fit, nothing is fetched again.
-      if (entries.every((entry) => entry.cardBytes > 0) && !this.couldFit(request, kept)) {
-        this.refuse(entries);
-        continue;
-      }
-      request.tiles.forEach((tile, i) => {
-        const entry = entries[i];
-        const isPatient = entry.pinned || now - entry.wantedSince >= settings.patience;
-        const hasRoom = this.statistics.pageBytes < settings.pageBytes || mayPass;
-        if (entry.state !== 'absent' || !isPatient || !hasRoom || fetches >= settings.fetches) return;
+    let mayPass = true; // the page's bytes: what is most urgent
+    for (const tile of wanted) {
+      const entry = this.entry(tile);
+      if (entry.state === 'resident') continue;
+      const isPatient = entry.pinned || now - entry.wantedSince >= this.settings.patience;
+      const hasRoom = mayPass || this.statistics.pageBytes + this.source.promisedBytes(tile) <= this.settings.pageBytes;
+      mayPass = false;
+      if (entry.state === 'absent' && isPatient && hasRoom && fetches < this.settings.fetches) {
         ++fetches;
         void this.fetch(tile, entry);
-      });
-      mayPass = false;
-      this.admit(request, entries, kept);
+      }
+      if (entry.state === 'fetched' && !entry.reserved) this.admit(entry, isWanted);
     }
-    this.startDecodes(requests);
-    this.countPending(wanted, now);
+    this.startDecodes(wanted);
+    this.countPending(isWanted, now);
+  }
+
+  // Of the card, as far as is known; else as for the others, whose files are as well packed.
+  private bytesOf(tile: number): number {
+    const { cardBytes } = this.entry(tile);
+    if (cardBytes > 0 || this.known.tiles === 0) return cardBytes;
+    const promised = this.source.promisedBytes(tile);
+    if (promised > 0 && this.known.promisedBytes > 0) return (promised * this.known.cardBytes) / this.known.promisedBytes;
+    return this.known.cardBytes / this.known.tiles;
+  }
+
+  // Not what is to be tried again later.
+  private canBeHad(tile: number, now: number): boolean {
+    const { state, retryAt } = this.entry(tile);
+    if (state !== 'absent' || now >= retryAt) return true;
+    this.nextRetry = Math.min(this.nextRetry, retryAt);
+    return false;
   }
 
   private count(state: State): number {
@@ -198,111 +214,101 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     if (entry.state === 'fetched') this.forget(entry);
   }
 
-  private missingBytes(tiles: number[]): number {
-    return tiles.reduce((sum, tile) => {
-      const entry = this.entry(tile);
-      return sum + (entry.reserved ? 0 : entry.cardBytes);
-    }, 0);
-  }
-
-  // Whether there is room, or may be made.
-  private couldFit({ tiles, beside }: TileRequest, kept: Set<number>): boolean {
-    const staying = new Set([...tiles, ...beside, ...kept]);
-    let bytes = this.missingBytes(tiles);
-    for (const [tile, entry] of this.entries) {
-      if (entry.reserved && !this.isEvictable(tile, entry, staying)) bytes += entry.cardBytes;
-    }
-    return bytes <= this.settings.cardBytes;
-  }
-
   // The budget may have become smaller: pictures of a larger window take their share of the card.
   private keepToBudget(): void {
     if (this.statistics.cardBytes <= this.settings.cardBytes) return;
-    const oldest = [...this.entries]
-      .filter(([tile, entry]) => this.isEvictable(tile, entry, new Set()))
+    this.evict(this.unwanted(new Set()));
+  }
+
+  // What could go, what has not been drawn for longest first.
+  private unwanted(wanted: Set<number>): [number, Entry<Fetched, Resident>][] {
+    return [...this.entries]
+      .filter(([tile, { state, pinned }]) => state === 'resident' && !pinned && !wanted.has(tile))
       .sort(([, a], [, b]) => a.lastUsed - b.lastUsed);
-    for (const [tile, entry] of oldest) {
-      if (this.statistics.cardBytes <= this.settings.cardBytes) return;
+  }
+
+  // Until the budget has room for `bytes` more, or nothing is left.
+  private evict(going: [number, Entry<Fetched, Resident>][], bytes = 0): void {
+    for (const [tile, entry] of going) {
+      if (this.statistics.cardBytes + bytes <= this.settings.cardBytes) return;
       this.drop(tile, entry);
       ++this.statistics.evictions;
     }
   }
 
-  private isEvictable(tile: number, entry: Entry<Fetched, Resident>, staying: Set<number>): boolean {
-    return entry.state === 'resident' && !entry.pinned && !staying.has(tile);
-  }
-
-  // When all files of a request are there, room is made for all of it; that it can be is known.
-  private admit(request: TileRequest, entries: Entry<Fetched, Resident>[], kept: Set<number>): void {
-    if (entries.some((entry) => entry.state === 'absent' || entry.state === 'fetching')) return;
-    if (entries.every((entry) => entry.reserved)) return;
-    const staying = new Set([...request.tiles, ...request.beside, ...kept]);
-    const oldest = [...this.entries]
-      .filter(([tile, entry]) => this.isEvictable(tile, entry, staying))
-      .sort(([, a], [, b]) => a.lastUsed - b.lastUsed);
-    while (this.statistics.cardBytes + this.missingBytes(request.tiles) > this.settings.cardBytes) {
-      const [tile, entry] = oldest.shift()!;
-      this.drop(tile, entry);
-      ++this.statistics.evictions;
-    }
-    for (const entry of entries) {
-      if (entry.reserved) continue;
-      entry.reserved = true;
-      this.statistics.cardBytes += entry.cardBytes;
-    }
+  // Makes room for it, now that its size is known; or waits, for what is on its way and not wanted any more.
+  private admit(entry: Entry<Fetched, Resident>, wanted: Set<number>): void {
+    const going = this.unwanted(wanted);
+    const free = going.reduce((sum, [, { cardBytes }]) => sum + cardBytes, this.settings.cardBytes - this.statistics.cardBytes);
+    if (entry.cardBytes > free) return;
+    this.evict(going, entry.cardBytes);
+    entry.reserved = true;
+    this.statistics.cardBytes += entry.cardBytes;
     this.statistics.mostCardBytes = Math.max(this.statistics.mostCardBytes, this.statistics.cardBytes);
   }
 
-  private refuse(entries: Entry<Fetched, Resident>[]): void {
-    ++this.statistics.refusals;
-    if (entries.some((entry) => entry.pinned)) this.failPinned();
-    for (const entry of entries) if (entry.state === 'fetched' && !entry.reserved) this.forget(entry);
+  private pinnedBytes(): number {
+    return this.selector.pinned.reduce((sum, tile) => sum + this.entry(tile).cardBytes, 0);
   }
 
   private failPinned(): void {
-    const entries = this.pinned.map((tile) => this.entry(tile));
-    const needed = entries.reduce((sum, entry) => sum + entry.cardBytes, 0);
     const mebibytes = (bytes: number) => Math.ceil(bytes / 2 ** 20);
     const error = new SceneError(
-      'scene', '', `its coarsest level takes ${mebibytes(needed)} MiB on the graphics card, the budget is ${mebibytes(this.settings.cardBytes)} MiB`,
+      'scene', '',
+      `its coarsest level takes ${mebibytes(this.pinnedBytes())} MiB on the graphics card, the budget is ${mebibytes(this.settings.cardBytes)} MiB`,
       'raise the budget, or bake more levels of detail');
-    if (!this.toldOfBudget) this.onError(error, this.pinned[0]);
+    if (!this.toldOfBudget) this.onError(error, this.selector.pinned[0]);
     this.toldOfBudget = true;
-    for (const entry of entries) if (entry.state !== 'resident') entry.error = error;
+    for (const tile of this.selector.pinned) {
+      const entry = this.entry(tile);
+      if (entry.state !== 'resident') entry.error = error;
+      if (entry.state === 'fetched' && !entry.reserved) this.forget(entry);
+    }
   }
 
   private async fetch(tile: number, entry: Entry<Fetched, Resident>): Promise<void> {
     entry.state = 'fetching';
     entry.abort = new AbortController();
     const { signal } = entry.abort;
+    this.holdInPage(entry, this.source.promisedBytes(tile));
     try {
       const { file, fileBytes, cardBytes } = await this.source.fetch(tile, signal);
       if (this.disposed || signal.aborted) return;
+      if (entry.cardBytes === 0) this.learn(tile, cardBytes);
       entry.file = file;
-      entry.fileBytes = fileBytes;
       entry.cardBytes = cardBytes;
       entry.state = 'fetched';
-      this.statistics.pageBytes += fileBytes;
+      this.holdInPage(entry, fileBytes);
       this.statistics.fetchedBytes += fileBytes;
     } catch (error) {
       if (!signal.aborted && !this.disposed) this.fail(tile, entry, error);
     } finally {
       entry.abort = undefined;
-      if (entry.state === 'fetching') entry.state = 'absent';
+      if (entry.state === 'fetching') this.forget(entry);
     }
   }
 
-  private startDecodes(requests: TileRequest[]): void {
+  private learn(tile: number, cardBytes: number): void {
+    const promised = this.source.promisedBytes(tile);
+    ++this.known.tiles;
+    this.known.promisedBytes += promised;
+    this.known.cardBytes += cardBytes;
+  }
+
+  private holdInPage(entry: Entry<Fetched, Resident>, fileBytes: number): void {
+    this.statistics.pageBytes += fileBytes - entry.fileBytes;
+    entry.fileBytes = fileBytes;
+  }
+
+  private startDecodes(wanted: number[]): void {
     let decodes = this.count('decoding');
-    for (const { tiles } of requests) {
-      for (const tile of tiles) {
-        const entry = this.entry(tile);
-        if (entry.state !== 'fetched' || !entry.reserved || decodes >= this.settings.decodes) continue;
-        const hasRoom = this.statistics.pageBytes + entry.cardBytes <= this.settings.pageBytes;
-        if (!hasRoom && (decodes > 0 || this.uploads.length > 0)) continue;
-        ++decodes;
-        void this.decode(tile, entry);
-      }
+    for (const tile of wanted) {
+      const entry = this.entry(tile);
+      if (entry.state !== 'fetched' || !entry.reserved || decodes >= this.settings.decodes) continue;
+      const hasRoom = this.statistics.pageBytes + entry.cardBytes <= this.settings.pageBytes;
+      if (!hasRoom && (decodes > 0 || this.uploads.length > 0)) continue;
+      ++decodes;
+      void this.decode(tile, entry);
     }
   }
 
@@ -321,8 +327,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
       this.release(entry);
       entry.state = 'absent';
     } finally {
-      this.statistics.pageBytes -= entry.fileBytes;
-      entry.fileBytes = 0;
+      this.holdInPage(entry, 0);
       entry.file = undefined;
     }
   }
@@ -359,8 +364,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
 
   // A file that is not needed after all.
   private forget(entry: Entry<Fetched, Resident>): void {
-    this.statistics.pageBytes -= entry.fileBytes;
-    entry.fileBytes = 0;
+    this.holdInPage(entry, 0);
     entry.file = undefined;
     entry.state = 'absent';
     this.release(entry);
@@ -386,11 +390,9 @@ export class TileStreamer<Fetched, Decoded, Resident> {
 
   private countPending(wanted: Set<number>, now: number): void {
     let pending = 0;
-    this.nextRetry = Infinity;
-    for (const [tile, { state, retryAt, reserved, wantedSince }] of this.entries) {
-      if (state === 'absent' && wanted.has(tile) && retryAt > now) this.nextRetry = Math.min(this.nextRetry, retryAt);
+    for (const [tile, { state, reserved, retryAt }] of this.entries) {
       const comes = state === 'fetching' || state === 'decoding' || state === 'uploading' || (state === 'fetched' && reserved);
-      const waits = state === 'absent' && wanted.has(tile) && now >= retryAt && now - wantedSince < this.settings.patience;
+      const waits = wanted.has(tile) && state !== 'resident' && now >= retryAt;
       if (comes || waits) ++pending;
     }
     this.statistics.pending = pending;

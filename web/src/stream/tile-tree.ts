@@ -1,7 +1,7 @@
 // The tiles of a scene as a renderer needs them: where they are, how coarse, in which order. Lengths in scene units.
 // Twin of src/render/tile_tree.h.
 import { SceneError } from '../scene-error';
-import { metresPerUnit, type Cells, type TileContent, type Tileset, type Vec3 } from '../tiles/tileset';
+import { metresPerUnit, type Box, type Cells, type TileContent, type Tileset, type Vec3 } from '../tiles/tileset';
 
 export interface TileNode {
   parent: number;
@@ -79,4 +79,14 @@ export function coarsestTiles(tree: TileTree): number[] {
     covered[index] = above || tile.content !== undefined;
   });
   return found;
+}
+
+// What is drawn of a content in a tile's cells: to its height, and beyond the scene's box at the border.
+export function boxOfCells({ columns, rows, tiles }: TileTree, tile: number): Box {
+  const { i0, i1, j0, j1 } = tiles[tile].cells;
+  const far = 1e9;
+  return {
+    low: [i0 === 0 ? -far : 2 * i0 - columns, j0 === 0 ? -far : 2 * j0 - rows, -far],
+    high: [i1 === columns ? far : 2 * i1 - columns, j1 === rows ? far : 2 * j1 - rows, far],
+  };
 }

@@ -1,5 +1,5 @@
 // What a camera sees of a scene, in its units. Twin of TileView in src/render/tile_selection.h.
-import type { Vec3 } from '../tiles/tileset';
+import type { Box, Vec3 } from '../tiles/tileset';
 import type { TileNode } from './tile-tree';
 
 // A plane whose positive side is seen: a x + b y + c z + d >= 0.
@@ -10,6 +10,7 @@ type Place = Pick<TileNode, 'low' | 'high' | 'isSurround'>;
 export class TileView {
   // `planes` bound what is seen; `focal` in pixels, `pixels` those of the whole picture; distances below `nearest` count
   // as that. A parallel projection has no eye: the same error everywhere, `focal` pixels for a scene unit.
+  // `surroundPixels`: those in which the surround is looked at.
   constructor(
     readonly eye: Vec3,
     readonly planes: readonly Plane[],
@@ -17,6 +18,7 @@ export class TileView {
     readonly pixels: number,
     readonly nearest: number,
     readonly parallel = false,
+    readonly surroundPixels = pixels,
   ) {}
 
   // True for all that can be seen, and for little else.
@@ -44,9 +46,19 @@ export class TileView {
 
   // Pixels that a tile may cover.
   areaInPixels({ low, high, isSurround }: Place): number {
-    if (isSurround) return this.pixels;
+    if (isSurround) return this.surroundPixels;
     const radius = 0.5 * Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
     const onScreen = (radius * this.focal) / (this.parallel ? 1 : Math.max(radius, this.distance({ low, high, isSurround })));
     return Math.min(this.pixels, Math.PI * onScreen ** 2);
   }
+}
+
+// Whether a ray shows what matters of the surround: it misses the scene's box, or leaves it through a side. What lies above
+// is sky, and the ground hides what lies below.
+export function showsSurround(eye: Vec3, direction: Vec3, { low, high }: Box): boolean {
+  const near = [0, 1, 2].map((a) => ((direction[a] > 0 ? low[a] : high[a]) - eye[a]) / direction[a]);
+  const far = [0, 1, 2].map((a) => ((direction[a] > 0 ? high[a] : low[a]) - eye[a]) / direction[a]);
+  const exit = Math.min(...far.map((t) => (Number.isNaN(t) ? Infinity : t)));
+  const entry = Math.max(0, ...near.map((t) => (Number.isNaN(t) ? 0 : t)));
+  return exit <= entry || far[2] > exit;
 }

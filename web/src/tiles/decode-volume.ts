@@ -26,7 +26,8 @@ export const kVolumeLimits: VolumeLimits = {
 // What a content says of itself; nothing has been allocated for its texels. `file` is a view of what was given.
 export interface VolumeHeader {
   parts: VolumePart[];
-  layout: VolumeLayout; // layout.bytes: what its textures will take
+  layout: VolumeLayout;
+  cardBytes: number; // that its textures and its numbers will take on the graphics card
   featureRange: number;
   densityRange: number;
   stepsPerTexel: number;
@@ -82,7 +83,8 @@ class VolumeReader {
       rules.ruleOfRange(featureRange) ?? rules.ruleOfRange(densityRange) ?? rules.ruleOfNetwork(network) ??
       rules.ruleOfParts(parts) ?? (promised && rules.brokenPromise(parts, promised));
     if (broken) this.fail(broken);
-    if (16 * vectorsOf(parts.length, network) > this.limits.uniformBytes) {
+    const uniformBytes = 16 * vectorsOf(parts.length, network);
+    if (uniformBytes > this.limits.uniformBytes) {
       this.fail('has more parts, or a larger network, than this graphics card takes', 'draw it on another machine');
     }
     const layout = layOut(parts, this.limits);
@@ -90,7 +92,8 @@ class VolumeReader {
       this.fail('is more than this graphics card takes in one texture', 'draw a coarser level, or bake smaller blocks');
     }
     if (layout.bytes > this.limits.bytes) this.fail(`takes more than ${this.limits.bytes} bytes of memory`);
-    return { parts, layout, featureRange, densityRange, stepsPerTexel, sources, network, views };
+    const cardBytes = layout.bytes + uniformBytes;
+    return { parts, layout, cardBytes, featureRange, densityRange, stepsPerTexel, sources, network, views };
   }
 
   readTexels(header: VolumeHeader): VolumeContent {

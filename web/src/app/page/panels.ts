@@ -95,6 +95,7 @@ export class StatisticsPanel {
       ['Page', megabytes(statistics.pageBytes)],
       ['Fetched', megabytes(statistics.fetchedBytes)],
       ['On their way', String(statistics.pending)],
+      ...(statistics.refused > 0 ? [['No room for', `${statistics.refused} blocks`] satisfies [string, string]] : []),
       ...statistics.drawn.map((count, level): [string, string] => [`Blocks of level ${level}`, String(count)]),
     ];
     this.list.replaceChildren(...rows.flatMap(([name, value]) => [element('dt', '', name), element('dd', '', value)]));
