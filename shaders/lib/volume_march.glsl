@@ -3,8 +3,8 @@
 //
 // Reads: volume_path.glsl; PARTS, the number of parts; `content`, whose first 6 PARTS vectors are theirs (see partOf);
 //   sampler2DArray planesFirst, planesSecond (diffuse and density; features): a part's three planes in its corner of
-//   three layers; sampler3D voxelsFirst, voxelsSecond: an atlas of macroblocks of 9³; sampler3D macroblocks: where they
-//   are in it, bytes, the fourth 0 where none is; sampler3D distances: bytes; float featureRange, densityRange,
+//   three layers; vec4 voxelFirst(vec3), voxelSecond(vec3): texels of an atlas of macroblocks of 9³, the middle of the first at
+//   0.5; sampler3D macroblocks: where they are in it, bytes, the fourth 0 where none is; sampler3D distances: bytes; float featureRange, densityRange,
 //   stepsPerTexel, minTransmittance.
 // Defines: Part, partOf, ownedRange, Composite, marchPart.
 
@@ -71,7 +71,6 @@ void marchSegment(Part part, VolumeSegment s, inout Composite sum) {
   float voxelsPerTexel = part.voxels / part.planes;
   vec3 inverse = sign(s.direction) / max(abs(s.direction), vec3(1e-20));
   inverse = mix(inverse, vec3(1e20), equal(s.direction, vec3(0.0)));
-  vec3 atlas = vec3(textureSize(voxelsFirst, 0));
   float widest = float(textureSize(planesFirst, 0).x);
   float count = ceil(s.length * stepsPerTexel);
   float i = 0.0;
@@ -99,12 +98,12 @@ void marchSegment(Part part, VolumeSegment s, inout Composite sum) {
     vec3 u = clamp(x * voxelsPerTexel - 0.5, 0.0, part.voxels - 1.0);
     vec3 block = floor(u / 8.0);
     vec4 place = texelFetch(macroblocks, part.macroblockOrigin + ivec3(block), 0);
-    vec3 voxel = (floor(place.xyz * 255.0 + 0.5) * 9.0 + (u - 8.0 * block) + 0.5) / atlas;
+    vec3 voxel = floor(place.xyz * 255.0 + 0.5) * 9.0 + (u - 8.0 * block) + 0.5;
     vec3 p = clamp(x, 0.5, part.planes - 0.5) / widest;
     float weight = 0.0, opacity = 0.0;
     vec4 first = vec4(0.0);
     if (place.w != 0.0) {
-      first = textureLod(voxelsFirst, voxel, 0.0) + textureLod(planesFirst, vec3(p.yz, part.layer), 0.0) +
+      first = voxelFirst(voxel) + textureLod(planesFirst, vec3(p.yz, part.layer), 0.0) +
               textureLod(planesFirst, vec3(p.xz, part.layer + 1.0), 0.0) +
               textureLod(planesFirst, vec3(p.xy, part.layer + 2.0), 0.0);
       // A byte b of four sources stands for -R + 2R b / 255 each.
@@ -113,7 +112,7 @@ void marchSegment(Part part, VolumeSegment s, inout Composite sum) {
       weight = sum.transmittance * opacity;
     }
     if (weight >= 1e-6) {
-      vec4 second = textureLod(voxelsSecond, voxel, 0.0) + textureLod(planesSecond, vec3(p.yz, part.layer), 0.0) +
+      vec4 second = voxelSecond(voxel) + textureLod(planesSecond, vec3(p.yz, part.layer), 0.0) +
                     textureLod(planesSecond, vec3(p.xz, part.layer + 1.0), 0.0) +
                     textureLod(planesSecond, vec3(p.xy, part.layer + 2.0), 0.0);
       sum.diffuse += weight / (1.0 + exp(featureRange * (4.0 - 2.0 * first.rgb)));

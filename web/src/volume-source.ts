@@ -45,9 +45,9 @@ export class VolumeSource implements TileSource<ContentFile, VolumeContent, Draw
   async fetch(tile: number, signal: AbortSignal) {
     const content = this.contentOf(tile);
     const file = await this.files.read(content.uri, this.limits.fileBytes, signal);
-    const { cardBytes, parts, network } = readVolumeHeader(file, content.uri, content, this.limits);
-    this.compositor.prepare(this.renderer, parts, network, content.surround, this.ownProgram.has(tile));
-    return { file, fileBytes: file.length, cardBytes };
+    const header = readVolumeHeader(file, content.uri, content, this.limits);
+    this.compositor.prepare(this.renderer, header, content.surround, this.ownProgram.has(tile));
+    return { file, fileBytes: file.length, cardBytes: header.cardBytes };
   }
 
   decode(tile: number, file: ContentFile): Promise<VolumeContent> {

@@ -2,12 +2,13 @@
 // (docs/tile-format.md, section 4).
 import * as THREE from 'three';
 import type { Box, TileContent, Vec3 } from '../tiles/tileset';
-import type { DenseLayer, VolumePart } from '../tiles/volume-content';
+import type { VolumeHeader } from '../tiles/decode-volume';
+import type { VolumePart } from '../tiles/volume-content';
 import { frontToBack as orderOf } from './box-order';
 import { colourOfBlock, colourOfLevel } from './display-modes';
 import { packNetwork } from './network-shader';
 import { programMaterial, volumeMaterial, viewUniforms, type ProgramShape, type ViewUniforms } from './volume-material';
-import type { ContentTextures } from './content-textures';
+import { atlasesOf, type ContentTextures } from './content-textures';
 
 // A content that may be drawn.
 export interface DrawnContent {
@@ -108,8 +109,13 @@ export class Compositor {
   }
 
   // Has the driver begin with the program of such a content, beside other work.
-  prepare(renderer: THREE.WebGLRenderer, parts: VolumePart[], network: DenseLayer[], surround: boolean, ownProgram: boolean): void {
-    const shape = this.shapeOf(parts, network.map((layer) => layer.outputs), surround, ownProgram ? packNetwork(network) : undefined);
+  prepare(
+    renderer: THREE.WebGLRenderer, { parts, network, layout: { voxels, atlasDepth } }: Pick<VolumeHeader, 'parts' | 'network' | 'layout'>,
+    surround: boolean, ownProgram: boolean,
+  ): void {
+    const widths = network.map((layer) => layer.outputs);
+    const atlases = atlasesOf(voxels[2], atlasDepth);
+    const shape = this.shapeOf({ parts, widths, atlases, network: ownProgram ? packNetwork(network) : undefined }, surround);
     const key = JSON.stringify({ ...shape, network: shape.network && [...shape.network] });
     if (this.prepared.has(key)) return;
     const material = programMaterial(shape);
@@ -121,7 +127,9 @@ export class Compositor {
   make(
     textures: ContentTextures, { box, surround }: Pick<TileContent, 'box' | 'surround'>, number: number, level: number, ownProgram: boolean,
   ): DrawnContent {
-    const shape = this.shapeOf(textures.parts, textures.widths, surround, ownProgram ? textures.network : undefined);
+    const { parts, widths, voxelsFirst, network } = textures;
+    const shape = this.shapeOf(
+      { parts, widths, atlases: voxelsFirst.length, network: ownProgram ? network : undefined }, surround);
     const material = volumeMaterial(textures, this.view, shape, { block: colourOfBlock(number), level: colourOfLevel(level) });
     const mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>(
       shape.everywhere ? this.screen : this.cube, material);
@@ -223,11 +231,15 @@ export class Compositor {
     this.prepared.clear();
   }
 
-  private shapeOf(parts: VolumePart[], widths: number[], surround: boolean, packed: Float32Array | undefined): ProgramShape {
+  private shapeOf(
+    { parts, widths, atlases, network }: Pick<ProgramShape, 'widths' | 'atlases' | 'network'> & { parts: VolumePart[] }, surround: boolean,
+  ): ProgramShape {
     // What is contracted may own what lies beyond any box.
     const everywhere = surround || parts.some((part) => part.contracted);
-    const network = packed?.every(Number.isFinite) ? packed : undefined;
-    return { parts: parts.length, widths, surround, everywhere, distancesOfBytes: this.distancesOfBytes, network };
+    return {
+      parts: parts.length, atlases, widths, surround, everywhere, distancesOfBytes: this.distancesOfBytes,
+      network: network?.every(Number.isFinite) ? network : undefined,
+    };
   }
 
   private place({ mesh, box }: DrawnContent, within: Box, worldFromScene: THREE.Matrix4): void {

@@ -20,8 +20,8 @@ const kSliceBytes = 1 << 19;
 export class ContentTextures {
   readonly planesFirst: THREE.DataArrayTexture;
   readonly planesSecond: THREE.DataArrayTexture;
-  readonly voxelsFirst: THREE.Data3DTexture;
-  readonly voxelsSecond: THREE.Data3DTexture;
+  readonly voxelsFirst: THREE.Data3DTexture[]; // one above the other
+  readonly voxelsSecond: THREE.Data3DTexture[];
   readonly macroblocks: THREE.Data3DTexture;
   readonly distances: THREE.Data3DTexture;
   readonly numbers: Float32Array; // parts and network: `content` of shaders/lib/volume_march.glsl
@@ -35,15 +35,15 @@ export class ContentTextures {
 
   // Keeps the texels until they are on the card, and no longer.
   constructor(content: VolumeContent) {
-    const { planes, voxels, macroblocks, distances } = content;
+    const { planes, voxels, atlasDepth, macroblocks, distances } = content;
     this.parts = content.parts;
     this.ranges = { features: content.featureRange, density: content.densityRange };
     this.stepsPerTexel = content.stepsPerTexel;
     this.origins = { macroblocks: macroblocks.origins, distances: distances.origins };
     this.planesFirst = this.add(new THREE.DataArrayTexture(null, ...planes.size), planes.first, true);
     this.planesSecond = this.add(new THREE.DataArrayTexture(null, ...planes.size), planes.second, true);
-    this.voxelsFirst = this.add(cube(voxels.size), voxels.first, true);
-    this.voxelsSecond = this.add(cube(voxels.size), voxels.second, true);
+    this.voxelsFirst = this.addAtlas(voxels.size, atlasDepth, voxels.first);
+    this.voxelsSecond = this.addAtlas(voxels.size, atlasDepth, voxels.second);
     this.macroblocks = this.add(cube(macroblocks.size), macroblocks.texels, false);
     this.distances = this.add(cube(distances.size), distances.texels, false, true);
     this.widths = content.network.map((layer) => layer.outputs);
@@ -93,7 +93,7 @@ export class ContentTextures {
   dispose(): void {
     this.slices.length = 0;
     const { planesFirst, planesSecond, voxelsFirst, voxelsSecond, macroblocks, distances } = this;
-    for (const texture of [planesFirst, planesSecond, voxelsFirst, voxelsSecond, macroblocks, distances]) texture.dispose();
+    for (const texture of [planesFirst, planesSecond, ...voxelsFirst, ...voxelsSecond, macroblocks, distances]) texture.dispose();
   }
 
   private add<T extends THREE.Data3DTexture | THREE.DataArrayTexture>(
@@ -110,6 +110,14 @@ export class ContentTextures {
     texture.needsUpdate = true;
     this.cut(texture, texels, oneByte ? 1 : 4);
     return texture;
+  }
+
+  private addAtlas([width, height, depth]: Vec3, most: number, texels: Uint8Array): THREE.Data3DTexture[] {
+    const layer = 4 * width * height;
+    return Array.from({ length: atlasesOf(depth, most) }, (_, n) => {
+      const [from, to] = [n * most, Math.min((n + 1) * most, depth)];
+      return this.add(cube([width, height, to - from]), texels.subarray(from * layer, to * layer), true);
+    });
   }
 
   private cut(texture: Slice['texture'], texels: Uint8Array, bytes: number): void {
@@ -140,6 +148,11 @@ export class ContentTextures {
       }
     }
   }
+}
+
+// Textures that an atlas of such a depth is cut into.
+export function atlasesOf(depth: number, most: number): number {
+  return Math.max(1, Math.ceil(depth / most));
 }
 
 // A texture must have texels; one without is never looked into.

@@ -63,7 +63,7 @@ layout(location = 0) out vec4 colourAndOpacity;
 layout(location = 1) out vec4 distanceAndOpacity;
 layout(std140) uniform Content { vec4 content[VECTORS]; };
 uniform sampler2DArray planesFirst, planesSecond;
-uniform sampler3D voxelsFirst, voxelsSecond, macroblocks, distances;
+uniform sampler3D macroblocks, distances;
 uniform sampler2D opaqueDepth;
 uniform float featureRange, densityRange, stepsPerTexel, minTransmittance, sceneNear;
 uniform vec2 resolution;
@@ -126,9 +126,28 @@ void main() {
   distanceAndOpacity = vec4(surface * hides, 0.0, 0.0, hides);
 }`;
 
+// Defines voxelFirst and voxelSecond: texels of an atlas that may be cut into several textures, one above the other. No
+// sample lies between two of them, as macroblocks have their apron.
+function atlasShader(atlases: number): string {
+  const numbers = [...Array(atlases).keys()];
+  const look = (which: string) => {
+    const last = numbers.length - 1;
+    const lines = numbers.map((n) => {
+      const found = `return textureLod(voxels${which}${n}, x * inTexture[${n}], 0.0);`;
+      return n === last ? found : `if (x.z < atlasDepth) ${found}\n  x.z -= atlasDepth;`;
+    });
+    return `vec4 voxel${which}(vec3 x) {\n  ${lines.join('\n  ')}\n}`;
+  };
+  return [
+    `uniform vec3 inTexture[${atlases}];  // of a texel: 1 / size\nuniform float atlasDepth;`,
+    ...numbers.map((n) => `uniform sampler3D voxelsFirst${n}, voxelsSecond${n};`), look('First'), look('Second'),
+  ].join('\n');
+}
+
 // What a program depends on.
 export interface ProgramShape {
   parts: number;
+  atlases: number; // textures that the atlas of voxels is cut into
   widths: number[]; // outputs of the network's layers
   surround: boolean;
   everywhere: boolean; // fills the picture, as it owns what lies beyond any box
@@ -148,7 +167,7 @@ export function programMaterial(shape: ProgramShape): THREE.RawShaderMaterial {
   return new THREE.RawShaderMaterial({
     glslVersion: THREE.GLSL3,
     vertexShader: kVertexShader,
-    fragmentShader: [kFragmentHead, kDisplayConstants, pathSource, marchSource, networkShader(widths, vector), kFragmentMain].join('\n'),
+    fragmentShader: [kFragmentHead, kDisplayConstants, atlasShader(shape.atlases), pathSource, marchSource, networkShader(widths, vector), kFragmentMain].join('\n'),
     defines,
     side: shape.everywhere ? THREE.DoubleSide : THREE.BackSide,
     transparent: true,
@@ -178,8 +197,12 @@ export function volumeMaterial(
     ...view,
     planesFirst: { value: textures.planesFirst },
     planesSecond: { value: textures.planesSecond },
-    voxelsFirst: { value: textures.voxelsFirst },
-    voxelsSecond: { value: textures.voxelsSecond },
+    inTexture: {
+      value: textures.voxelsFirst.map(({ image: { width, height, depth } }) => new THREE.Vector3(1 / width, 1 / height, 1 / depth)),
+    },
+    atlasDepth: { value: textures.voxelsFirst[0].image.depth },
+    ...Object.fromEntries(textures.voxelsFirst.map((value, n) => [`voxelsFirst${n}`, { value }])),
+    ...Object.fromEntries(textures.voxelsSecond.map((value, n) => [`voxelsSecond${n}`, { value }])),
     macroblocks: { value: textures.macroblocks },
     distances: { value: textures.distances },
     featureRange: { value: textures.ranges.features },

@@ -121,7 +121,7 @@ class VolumeReader {
       if (!occupied) this.fail(of('occupied cells'));
       putCube(chebyshevDistances(occupied), occupied.edge, distances, n);
     });
-    return { featureRange, densityRange, stepsPerTexel, network, parts, planes, voxels, macroblocks, distances };
+    return { featureRange, densityRange, stepsPerTexel, network, parts, planes, voxels, atlasDepth: layout.atlasDepth, macroblocks, distances };
   }
 
   private fail(reason: string, remedy = 'copy the scene again, or bake it again'): never {

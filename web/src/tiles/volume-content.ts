@@ -50,6 +50,7 @@ export interface VolumeContent {
   parts: VolumePart[];
   planes: TexelTextures; // layer after layer; a part with fewer texels than the largest lies in the corner of its layers
   voxels: TexelTextures; // an atlas of macroblocks of 9³; no texels where no part stores any
+  atlasDepth: number; // texels of the atlas that one texture has, at most
   // Where a macroblock lies in the atlas, in macroblocks: [z][y][x][4], the fourth 1 where it is stored, else all 0.
   macroblocks: Cubes<Uint8Array>;
   // Of each cell how many cells away the nearest occupied one is, in any direction, 255 at most.

@@ -15,16 +15,20 @@ export interface VolumeLayout {
   planes: Vec3; // width, height, layers
   voxels: Vec3; // texels of the atlas
   atlas: Vec3; // the same in macroblocks
+  atlasDepth: number; // texels of it that one texture has, at most: it may be cut into several
   macroblocks: { size: Vec3; origins: Vec3[] };
   distances: { size: Vec3; origins: Vec3[] };
   bytes: number; // of all textures
 }
 
+const kMostAtlases = 4; // with two textures each, and five others, no more than the sixteen that a shader may have
+
 // Undefined where the limits do not allow it.
 export function layOut(parts: VolumePart[], limits: TextureLimits): VolumeLayout | undefined {
   const widest = Math.max(...parts.map((part) => part.planes));
   const stored = parts.reduce((sum, part) => sum + part.stored, 0);
-  const atlas = atlasOf(stored, Math.floor(limits.edge3D / kStoredEdge));
+  const most = Math.floor(limits.edge3D / kStoredEdge);
+  const atlas = atlasOf(stored, most);
   const macroblocks = stack(parts.map((part) => part.voxels / kMacroblock), limits.edge3D);
   const distances = stack(parts.map((part) => part.planes / kDistanceCell), limits.edge3D);
   if (!atlas || !macroblocks || !distances || 3 * parts.length > limits.layers || widest > limits.edge2D) return undefined;
@@ -32,13 +36,16 @@ export function layOut(parts: VolumePart[], limits: TextureLimits): VolumeLayout
   const voxels: Vec3 = [kStoredEdge * atlas[0], kStoredEdge * atlas[1], kStoredEdge * atlas[2]];
   const count = (size: Vec3) => size[0] * size[1] * size[2];
   const bytes = 8 * (count(planes) + count(voxels)) + 4 * count(macroblocks.size) + count(distances.size);
-  return { planes, voxels, atlas, macroblocks, distances, bytes };
+  return { planes, voxels, atlas, atlasDepth: kStoredEdge * most, macroblocks, distances, bytes };
 }
 
-// Nearly a cube, with little left over.
+// Nearly a cube, with little left over; where that is too large, higher than wide. Places are bytes.
 function atlasOf(stored: number, most: number): Vec3 | undefined {
   if (stored === 0) return [0, 0, 0];
-  if (stored > most ** 3) return undefined;
+  if (stored > most ** 3) {
+    const high = Math.ceil(stored / most ** 2);
+    return high <= Math.min(kMostAtlases * most, 256) ? [most, most, high] : undefined;
+  }
   const near = Math.ceil(Math.cbrt(stored));
   let best: Vec3 | undefined;
   for (let x = near; x <= Math.min(most, near + 3); ++x) {
