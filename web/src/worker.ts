@@ -44,6 +44,7 @@ self.onmessage = async ({ data }: MessageEvent<DecodeRequest>) => {
     const buffers = [planes.first, planes.second, voxels.first, voxels.second, macroblocks.texels, distances.texels];
     self.postMessage({ id, content } satisfies DecodeAnswer, { transfer: buffers.map((bytes) => bytes.buffer as ArrayBuffer) });
   } catch (error) {
+    prepared = undefined; // the decoder may be of no more use
     const { what, place, reason, remedy } =
       error instanceof SceneError ? error : new SceneError(name, '', String(error), 'reload the page');
     self.postMessage({ id, error: { what, place, reason, remedy } } satisfies DecodeAnswer);

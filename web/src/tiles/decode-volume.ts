@@ -2,7 +2,7 @@
 import { SceneError } from '../scene-error';
 import { decodeGlb } from './glb';
 import { arrayOf, fieldOf, flagOf, numberOf, numbersOf, stringOf, wholeFrom, wholeOf, type Json } from './json-fields';
-import { decodeLossless } from './lossless-image';
+import { DecoderFailure, decodeLossless } from './lossless-image';
 import { chebyshevDistances, sizeOfBits, takeBits, type OccupancyBits } from './occupancy';
 import type { TileContent, Vec3 } from './tileset';
 import { kDistanceCell, kMacroblock, vectorsOf, type Cubes, type DenseLayer, type TexelTextures, type VolumeContent, type VolumePart } from './volume-content';
@@ -233,7 +233,12 @@ class VolumeReader {
 
   private readPicture(header: VolumeHeader, source: Json, width: number, height: number): Uint8ClampedArray | undefined {
     const bytes = viewOf(header.views, source, 'image/webp');
-    return bytes && decodeLossless(bytes, width, height);
+    try {
+      return bytes && decodeLossless(bytes, width, height);
+    } catch (error) {
+      if (!(error instanceof DecoderFailure)) throw error;
+      this.fail('is more than the decoder of pictures has memory for', 'close other pages, or copy the scene again');
+    }
   }
 }
 

@@ -4,6 +4,9 @@ import createDecoder, { type WebPModule } from '@jsquash/webp/codec/dec/webp_dec
 
 let module: WebPModule | undefined;
 
+// It has no word for memory that ran out but to trap.
+export class DecoderFailure extends Error {}
+
 // Must have been awaited once before decodeLossless. `wasm`: the compiled decoder (its file is found beside the module
 // where none is given, in browsers).
 export async function prepareDecoder(wasm?: WebAssembly.Module): Promise<void> {
@@ -64,7 +67,8 @@ export function losslessSize(file: Uint8Array): { width: number; height: number 
 }
 
 // Pixels of 4 bytes, the fourth 255, row after row; undefined where the file is no such picture of exactly this size,
-// which is seen before pixels are allocated.
+// which is seen before pixels are allocated. Throws DecoderFailure where the decoder itself gives up, and must then be
+// prepared again.
 export function decodeLossless(file: Uint8Array, width: number, height: number): Uint8ClampedArray | undefined {
   if (module === undefined) throw new Error('prepareDecoder has not been awaited');
   const size = losslessSize(file);
@@ -73,6 +77,7 @@ export function decodeLossless(file: Uint8Array, width: number, height: number):
     const picture = module.decode(file as Uint8Array<ArrayBuffer>);
     return picture?.width === width && picture.height === height ? picture.data : undefined;
   } catch {
-    return undefined;
+    module = undefined; // whose memory may be in any state
+    throw new DecoderFailure();
   }
 }

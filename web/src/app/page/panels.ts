@@ -39,8 +39,10 @@ export class ErrorPanel {
   private readonly what = element('h2');
   private readonly reason = element('p');
   private readonly remedy = element('p');
-  private readonly more = element('p');
-  private count = 0;
+  private readonly count = element('summary');
+  private readonly others = element('ul');
+  private readonly more = element('details', '', this.count, this.others);
+  private shown: SceneError[] = []; // since it was closed, the last one first
   private readonly panel: HTMLElement;
 
   constructor(parent: HTMLElement) {
@@ -56,16 +58,24 @@ export class ErrorPanel {
     this.panel.hidden = true;
   }
 
-  // The last of those that came since it was closed.
-  show({ what, place, reason, remedy }: SceneError): void {
-    this.count = this.panel.hidden ? 1 : this.count + 1;
-    this.more.textContent = this.count > 1 ? `And ${this.count - 1} more.` : '';
+  // The last one, and those that came before it since it was closed.
+  show(error: SceneError): void {
+    const kMost = 50;
+    this.shown = [error, ...(this.panel.hidden ? [] : this.shown)].slice(0, kMost);
     const sentence = (text: string) => `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
-    this.what.textContent = place === '' ? what : `${what}, ${place}`;
-    this.reason.textContent = sentence(reason);
-    this.remedy.textContent = sentence(remedy);
+    this.what.textContent = titleOf(error);
+    this.reason.textContent = sentence(error.reason);
+    this.remedy.textContent = sentence(error.remedy);
+    const others = this.shown.slice(1);
+    this.more.hidden = others.length === 0;
+    this.count.textContent = `And ${others.length} more`;
+    this.others.replaceChildren(...others.map((one) => element('li', '', `${titleOf(one)}: ${one.reason}`)));
     this.panel.hidden = false;
   }
+}
+
+function titleOf({ what, place }: SceneError): string {
+  return place === '' ? what : `${what}, ${place}`;
 }
 
 function inDigits(x: number): string {
