@@ -4,7 +4,7 @@
 // A tile is replaced by its children while its error, projected, is above a number of pixels, and all of them that can
 // be seen are in memory. Once it is to be replaced, it stays so until the error is smaller by `hysteresis`.
 import { childrenFrontToBack, type TileNode, type TileTree } from './tile-tree';
-import type { TileView } from './tile-view';
+import type { SelectionView } from './tile-view';
 
 export interface SelectionSettings {
   mostPixels: number; // of geometric error; 0: the finest everywhere
@@ -44,7 +44,7 @@ export class TileSelector {
   }
 
   // `loaded` says which contents are in memory; the coarsest must be for the cut to cover everything.
-  select(view: TileView, loaded: (tile: number) => boolean): Selection {
+  select(view: SelectionView, loaded: (tile: number) => boolean): Selection {
     const pass = { view, loaded, cut: [], requests: [] } satisfies Pass;
     this.cover(pass, 0, []);
     const { cut, requests } = pass as Pass;
@@ -105,7 +105,7 @@ export class TileSelector {
 }
 
 interface Pass {
-  view: TileView;
+  view: SelectionView;
   loaded: (tile: number) => boolean;
   cut: SelectedTile[];
   requests: TileRequest[];

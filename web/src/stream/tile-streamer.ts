@@ -6,7 +6,7 @@
 // the surround come first and stay. Of the others, what has not been drawn for longest goes first.
 import { SceneError } from '../scene-error';
 import type { Selection, TileRequest, TileSelector } from './tile-selector';
-import type { TileView } from './tile-view';
+import type { SelectionView } from './tile-view';
 
 export type UploadStep = 'more' | 'wait' | 'done';
 
@@ -113,7 +113,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
 
   // Once a frame: what to draw, front to back, and behind it; and another step of what is on its way. `uploadFor` ms at
   // most are spent on uploads (but one slice a frame is always taken).
-  update(view: TileView, uploadFor = 4): Pick<Selection, 'cut' | 'surround'> {
+  update(view: SelectionView, uploadFor = 4): Pick<Selection, 'cut' | 'surround'> {
     ++this.frame;
     this.uploadSlices(uploadFor);
     this.keepToBudget();

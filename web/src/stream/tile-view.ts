@@ -50,3 +50,18 @@ export class TileView {
     return Math.min(this.pixels, Math.PI * onScreen ** 2);
   }
 }
+
+// What the selection asks of a view.
+export type SelectionView = Pick<TileView, 'eye' | 'sees' | 'distance' | 'errorInPixels' | 'areaInPixels'>;
+
+// Several views at once, of a headset's two eyes say: of all that any of them sees, as much as the one that needs most.
+export function jointView(views: readonly TileView[]): SelectionView {
+  const most = (of: (view: TileView) => number) => Math.max(...views.map(of));
+  return {
+    eye: views[0].eye,
+    sees: (place) => views.some((view) => view.sees(place)),
+    distance: (place) => -most((view) => -view.distance(place)),
+    errorInPixels: (tile) => most((view) => view.errorInPixels(tile)),
+    areaInPixels: (place) => most((view) => view.areaInPixels(place)),
+  };
+}
