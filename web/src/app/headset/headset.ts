@@ -101,7 +101,7 @@ export class Headset implements Mover {
     } catch (error) {
       renderer.xr.enabled = false;
       await session?.end().catch(() => {});
-      this.viewer.takeOver(); // of what three has left half done
+      if (!this.viewer.isHeld) this.viewer.takeOver(); // of what three has left half done
       const reason = `does not show the scene (${error instanceof Error ? error.message : String(error)})`;
       throw new SceneError('headset', '', reason, 'put it on, allow the page to use it, and try again');
     }
