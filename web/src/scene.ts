@@ -16,14 +16,15 @@ import { cityMesh } from './draw/city-mesh';
 import { Compositor, type DrawnContent, type DrawnPart } from './draw/compositor';
 import { kDisplayModes, type DisplayMode } from './draw/display-modes';
 import { OpaqueDepth } from './draw/opaque-depth';
+import { isParallel, picturesOf, type Picture } from './draw/picture';
 import { SceneError } from './scene-error';
 import { ServedFiles, type ContentFile, type SceneFiles } from './scene-files';
 import { TileSelector, kSelectionSettings, type SelectionSettings } from './stream/tile-selector';
-import { boxOfCells, tileTree, type TileTree } from './stream/tile-tree';
-import { showsSurround, TileView, type Plane } from './stream/tile-view';
+import { boxOfCells, cutFrontToBack, tileTree, type TileTree } from './stream/tile-tree';
+import { jointView, showsSurround, TileView, type Plane } from './stream/tile-view';
 import { kStreamSettings, TileStreamer, type StreamSettings, type StreamStatistics } from './stream/tile-streamer';
 import { decodeTileset } from './tiles/decode-tileset';
-import type { Box, Tileset, Vec3 } from './tiles/tileset';
+import type { Box, Tileset } from './tiles/tileset';
 import type { VolumeContent } from './tiles/volume-content';
 import { VolumeSource } from './volume-source';
 
@@ -122,40 +123,47 @@ export class TesseraScene extends THREE.Object3D {
     return { ...this.streamer.statistics, targetBytes: this.compositor.bytes + this.opaque.bytes, drawn: this.drawn };
   }
 
+  // Of an ArrayCamera, and of a headset while it presents, a picture for each of its cameras; all are streamed for at once.
   update(camera: THREE.Camera, renderer: THREE.WebGLRenderer): void {
     if (this.disposed || renderer.getContext().isContextLost()) return;
     const { compositor, streamer, mesh } = this.prepare(renderer);
     this.updateWorldMatrix(true, false);
     camera.updateWorldMatrix(true, false);
     const worldFromScene = this.matrixWorld.clone().multiply(this.localFromScene);
-    const size = renderer.getDrawingBufferSize(new THREE.Vector2()).multiplyScalar(this.resolutionScale).round().max(new THREE.Vector2(1, 1));
-    const depth = this.opaque.draw(renderer, camera, this, size);
+    const { size, pictures } = picturesOf(camera, renderer, worldFromScene, this.resolutionScale);
+    if (pictures.length === 0) return;
+    const depth = this.opaque.draw(renderer, pictures, this, size);
     compositor.resize(size);
     streamer.settings = { ...this.stream, cardBytes: this.stream.cardBytes - compositor.bytes - this.opaque.bytes };
-    const { tiles, surround } = streamer.update(tileView(this.tileset, camera, worldFromScene, size), this.uploadTime());
-    const visible = tiles.filter((one) => one.visible);
-    const frontToBack = visible.map(({ tile, content }): DrawnPart => ({
-      content: streamer.residentOf(content)!, within: tile === content ? undefined : boxOfCells(this.tree, tile),
-    }));
+    const views = pictures.map((picture) => tileView(this.tileset, picture, worldFromScene));
+    const { tiles, surround } = streamer.update(jointView(views), this.uploadTime());
+    const cut = new Set(tiles.map(({ tile }) => tile));
+    const contentOf = new Map(tiles.filter(({ visible }) => visible).map(({ tile, content }) => [tile, content]));
     // What it surrounds comes first: on slow machines a picture of it alone would only take time.
     const behind = streamer.complete ? streamer.residentOf(surround) : undefined;
-    if (behind) frontToBack.push({ content: behind });
+    const contents = views.map((view): DrawnPart[] => {
+      const parts = cutFrontToBack(this.tree, cut, view.eye).flatMap((tile): DrawnPart[] => {
+        const content = contentOf.get(tile);
+        if (content === undefined || !view.sees(this.tree.tiles[tile])) return [];
+        return [{ content: streamer.residentOf(content)!, within: tile === content ? undefined : boxOfCells(this.tree, tile) }];
+      });
+      return behind ? [...parts, { content: behind }] : parts;
+    });
     this.drawn = new Array<number>(this.tileset.levels).fill(0);
-    for (const content of new Set(visible.map((one) => one.content))) ++this.drawn[this.tree.tiles[content].level];
+    for (const content of new Set(contentOf.values())) ++this.drawn[this.tree.tiles[content].level];
     compositor.view.minTransmittance.value = this.minTransmittance;
     compositor.view.display.value = kDisplayModes.indexOf(this.display);
-    compositor.draw(renderer, camera, worldFromScene, frontToBack, depth);
-    mesh.material.uniforms.clipFromScene.value
-      .multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
-      .multiply(worldFromScene);
-    mesh.visible = frontToBack.length > 0;
+    compositor.draw(renderer, pictures, worldFromScene, contents, depth);
+    mesh.visible = contents.some((ofOne) => ofOne.length > 0);
   }
 
   // The place of the world, in the last picture, at `at` (from -1 to 1 across it, upwards); of the scene alone. Nothing
-  // where there is nothing, or what is there hides less than half of what is behind.
-  pick(at: THREE.Vector2, renderer: THREE.WebGLRenderer): THREE.Vector3 | undefined {
-    if (!this.compositor || this.drawn.length === 0) return undefined;
-    const inScene = this.compositor.surfaceAt(renderer, at);
+  // where there is nothing, or what is there hides less than half of what is behind. Of several cameras, `eye` is the number
+  // of the one whose picture it is.
+  pick(at: THREE.Vector2, renderer: THREE.WebGLRenderer, eye = 0): THREE.Vector3 | undefined {
+    const picture = this.compositor?.pictures[eye];
+    if (!picture) return undefined;
+    const inScene = this.compositor!.surfaceAt(renderer, picture, at);
     return inScene?.applyMatrix4(this.localFromScene).applyMatrix4(this.matrixWorld);
   }
 
@@ -214,43 +222,33 @@ async function openTileset(files: SceneFiles): Promise<Tileset> {
   return tileset;
 }
 
-// The camera as the selection needs it, in scene units.
-function tileView(tileset: Tileset, camera: THREE.Camera, worldFromScene: THREE.Matrix4, size: THREE.Vector2): TileView {
-  const sceneFromCamera = worldFromScene.clone().invert().multiply(camera.matrixWorld);
-  const projection = camera.projectionMatrix.elements;
-  const isParallel = projection[15] === 1;
-  // The eye of a parallel projection is so far behind the picture that its rays come from there.
-  const behind = isParallel ? 1e7 : 0;
-  const eye = new THREE.Vector3()
-    .setFromMatrixPosition(sceneFromCamera)
-    .addScaledVector(new THREE.Vector3().setFromMatrixColumn(sceneFromCamera, 2).normalize(), behind)
-    .toArray();
-  const clipFromScene = camera.projectionMatrix.clone().multiply(sceneFromCamera.clone().invert()).elements;
-  const row = (i: number): Plane => [clipFromScene[i], clipFromScene[4 + i], clipFromScene[8 + i], clipFromScene[12 + i]];
+// A picture as the selection needs it, in scene units.
+function tileView({ near, box }: Tileset, picture: Picture, worldFromScene: THREE.Matrix4): TileView {
+  const { camera, part, eye, clipFromScene: { elements } } = picture;
+  const row = (i: number): Plane => [elements[i], elements[4 + i], elements[8 + i], elements[12 + i]];
   const w = row(3);
   const sides = [0, 1].flatMap((i) => {
     const r = row(i);
     return [1, -1].map((sign): Plane => [w[0] + sign * r[0], w[1] + sign * r[1], w[2] + sign * r[2], w[3] + sign * r[3]]);
   });
+  const parallel = isParallel(camera);
   // The near and far planes are not asked: rays know neither.
-  const planes = isParallel ? sides : [w, ...sides];
+  const planes = parallel ? sides : [w, ...sides];
+  const projection = camera.projectionMatrix.elements;
   const scale = new THREE.Vector3().setFromMatrixScale(worldFromScene).x;
-  const focal = 0.5 * Math.max(projection[0] * size.x, projection[5] * size.y) * (isParallel ? scale : 1);
-  const surroundPixels = size.x * size.y * shareOfSurround(tileset.box, camera, sceneFromCamera);
-  return new TileView(eye as unknown as Vec3, planes, focal, size.x * size.y, tileset.near, isParallel, surroundPixels);
+  const focal = 0.5 * Math.max(projection[0] * part.z, projection[5] * part.w) * (parallel ? scale : 1);
+  const pixels = part.z * part.w;
+  return new TileView(eye, planes, focal, pixels, near, parallel, pixels * shareOfSurround(box, picture));
 }
 
 // How much of the picture looks out of the box.
-function shareOfSurround(box: Box, { projectionMatrixInverse }: THREE.Camera, sceneFromCamera: THREE.Matrix4): number {
+function shareOfSurround(box: Box, { origin, ray }: Picture): number {
   const kAcross = 12;
-  const at = (x: number, y: number, z: number) =>
-    new THREE.Vector3(x, y, z).applyMatrix4(projectionMatrixInverse).applyMatrix4(sceneFromCamera);
   let shows = 0;
   for (let i = 0; i < kAcross ** 2; ++i) {
-    const x = ((i % kAcross) + 0.5) * (2 / kAcross) - 1;
-    const y = (Math.floor(i / kAcross) + 0.5) * (2 / kAcross) - 1;
-    const near = at(x, y, -1);
-    shows += showsSurround(near.toArray(), at(x, y, 0).sub(near).toArray(), box) ? 1 : 0;
+    const at = new THREE.Vector3((2 * ((i % kAcross) + 0.5)) / kAcross - 1, (2 * (Math.floor(i / kAcross) + 0.5)) / kAcross - 1, 1);
+    const direction = at.clone().applyMatrix3(ray);
+    shows += showsSurround(at.applyMatrix3(origin).toArray(), direction.toArray(), box) ? 1 : 0;
   }
   return shows / kAcross ** 2;
 }

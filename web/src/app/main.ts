@@ -5,6 +5,7 @@ import { ChosenFiles } from '../scene-files';
 import { addBookmarks } from './views/bookmarks';
 import { element } from './page/element';
 import { addHelp } from './page/help';
+import { addHeadset } from './headset/headset-tool';
 import { addMeasuring } from './measuring/measuring';
 import { addModels } from './models/models-tool';
 import { kModes } from './moving/navigation';
@@ -47,6 +48,7 @@ async function start(): Promise<void> {
     viewer.needPicture();
   } });
   addHelp(toolbar, shortcuts);
+  void addHeadset(viewer, toolbar, shortcuts, fail); // others do not wait for what may take long
   keepViewInAddress(viewer);
   viewer.onFrame.add((frame) => {
     const numbers = city.statistics;

@@ -3,8 +3,8 @@
 import * as THREE from 'three';
 import { TesseraScene } from '../scene';
 import { SceneError } from '../scene-error';
-import { Navigation } from './moving/navigation';
-import { Resolution } from './moving/resolution';
+import { Navigation, type Look } from './moving/navigation';
+import { Resolution, type Pace } from './moving/resolution';
 import { GpuTimer } from './page/gpu-timer';
 import type { View } from './views/view-address';
 
@@ -12,6 +12,13 @@ export interface Frame {
   milliseconds: number; // since the last one
   gpuMilliseconds?: number; // that the graphics card drew a picture shortly before, where it tells
   resolutionScale: number;
+}
+
+// Moves the camera.
+export interface Mover {
+  look: Look; // set: at once
+  flyTo(look: Look): void;
+  update(seconds: number): boolean; // once a frame; true where the camera has moved
 }
 
 export class Viewer {
@@ -23,6 +30,7 @@ export class Viewer {
   readonly onFrame = new Set<(frame: Frame) => void>();
   // Called where somebody clicked, or tapped, without dragging; the first that answers true takes it.
   readonly onClick: ((event: PointerEvent) => boolean)[] = [];
+  private mover: Mover;
   private needed = true; // a picture, though nothing moves
   private held = false;
 
@@ -35,6 +43,7 @@ export class Viewer {
     this.world.background = city.background;
     this.world.add(city);
     this.navigation = new Navigation(this.camera, canvas, city.bounds, (event) => this.pickAt(event));
+    this.mover = this.navigation;
     addEventListener('resize', () => this.resize());
     this.resize();
     this.navigation.showAll();
@@ -43,18 +52,26 @@ export class Viewer {
   }
 
   get view(): View {
-    return { ...this.navigation.look, fov: this.camera.fov };
+    return { ...this.mover.look, fov: this.camera.fov };
   }
 
   // At once; flyTo takes its time.
   set view({ eye, target, fov }: View) {
     this.setLens(fov);
-    this.navigation.look = { eye, target };
+    this.mover.look = { eye, target };
   }
 
   flyTo({ eye, target, fov }: View): void {
     this.setLens(fov);
-    this.navigation.flyTo({ eye, target });
+    this.mover.flyTo({ eye, target });
+  }
+
+  // Has something else than mouse and keys move the camera, at a pace of its own; without: them again.
+  takeOver(mover: Mover = this.navigation, pace?: Pace): void {
+    this.mover = mover;
+    this.navigation.enabled = mover === this.navigation;
+    this.resolution.pace = pace;
+    this.resize(); // of which nothing was to be heard meanwhile
   }
 
   // Somebody has changed what is to be seen.
@@ -75,12 +92,13 @@ export class Viewer {
     raycaster.setFromCamera(at, this.camera);
     const hit = raycaster.intersectObjects(this.world.children.filter((child) => child !== this.city && child.visible && !child.userData.isTool))[0];
     const place = this.city.pick(at, this.renderer);
-    if (!hit || (place && place.distanceTo(this.camera.position) < hit.distance)) return place;
+    if (!hit || (place && place.distanceTo(this.camera.getWorldPosition(new THREE.Vector3())) < hit.distance)) return place;
     return hit.point;
   }
 
   // Has the loop wait, and the camera stay, while somebody else draws.
   async whileHeld<T>(work: () => Promise<T>): Promise<T> {
+    if (this.renderer.xr.isPresenting) throw new Error('a headset shows the scene; leave it first');
     this.held = true;
     this.navigation.enabled = false;
     try {
@@ -92,6 +110,10 @@ export class Viewer {
     }
   }
 
+  get isHeld(): boolean {
+    return this.held;
+  }
+
   private setLens(fov: number): void {
     this.camera.fov = fov;
     this.camera.updateProjectionMatrix();
@@ -99,7 +121,7 @@ export class Viewer {
   }
 
   private resize(): void {
-    if (this.held) return;
+    if (this.held || this.renderer.xr.isPresenting) return;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(innerWidth, innerHeight, false);
     this.camera.aspect = innerWidth / innerHeight;
@@ -117,7 +139,7 @@ export class Viewer {
       const milliseconds = now - before;
       before = now;
       if (this.held) return;
-      if (this.navigation.update(milliseconds / 1000)) this.resolution.moved(now);
+      if (this.mover.update(milliseconds / 1000)) this.resolution.moved(now);
       const isMoving = !this.resolution.isResting(now);
       if (!isMoving && wasWhole && this.city.idle && !this.needed) return;
       if (isMoving && wasMoving) this.resolution.took(milliseconds);

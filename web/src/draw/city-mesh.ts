@@ -12,7 +12,8 @@ void main() {
 
 const kFragmentShader = `
 uniform sampler2D colourAndOpacity, distanceAndOpacity;
-uniform vec2 pictureCorner, pictureSize;
+uniform vec4 viewport, part;
+uniform vec2 resolution;
 uniform mat3 origin, ray;
 uniform mat4 clipFromScene;
 uniform sampler2D opaqueDepth;
@@ -24,13 +25,15 @@ vec3 colourOfDistance(float x) {
   return mix(colour, vec3(0.08, 0.07, 0.3), clamp(3.0 * x - 2.0, 0.0, 1.0));
 }
 void main() {
-  vec2 place = (gl_FragCoord.xy - pictureCorner) / pictureSize;
+  vec2 inPicture = (gl_FragCoord.xy - viewport.xy) / viewport.zw;
+  // What is mixed of texels is of this picture alone.
+  vec2 place = clamp(part.xy + inPicture * part.zw, part.xy + 0.5, part.xy + part.zw - 0.5) / resolution;
   vec4 colour = texture2D(colourAndOpacity, place);
   vec4 far = texture2D(distanceAndOpacity, place);
   float opaque = texture2D(opaqueDepth, place).r;
   gl_FragDepth = opaque;
   if (far.a > 0.99) {  // half of what is behind is hidden
-    vec2 ndc = 2.0 * place - 1.0;
+    vec2 ndc = 2.0 * inPicture - 1.0;
     float surface = far.r / far.a;
 #ifdef DISTANCES_OF_BYTES
     surface /= max(1.0 - surface, 1e-3);
@@ -47,18 +50,20 @@ void main() {
   gl_FragColor = vec4(gl_FragColor.rgb * colour.a, colour.a);
 }`;
 
-export function cityMesh({ view, target, distancesOfBytes }: Compositor): THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial> {
+export function cityMesh(compositor: Compositor): THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial> {
+  const { view, target, distancesOfBytes } = compositor;
   const material = new THREE.ShaderMaterial({
     vertexShader: kVertexShader,
     fragmentShader: `${kDisplayConstants}\n${kFragmentShader}`,
     uniforms: {
       colourAndOpacity: { value: target.textures[0] },
       distanceAndOpacity: { value: target.textures[1] },
-      pictureCorner: { value: new THREE.Vector2() },
-      pictureSize: { value: new THREE.Vector2(1, 1) },
+      viewport: { value: new THREE.Vector4() }, // of what three draws into
+      part: { value: new THREE.Vector4() },
       clipFromScene: { value: new THREE.Matrix4() },
-      origin: view.origin,
-      ray: view.ray,
+      origin: { value: new THREE.Matrix3() },
+      ray: { value: new THREE.Matrix3() },
+      resolution: view.resolution,
       opaqueDepth: view.opaqueDepth,
       display: view.display,
     },
@@ -75,14 +80,16 @@ export function cityMesh({ view, target, distancesOfBytes }: Compositor): THREE.
   const mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial>(screenTriangle(), material);
   mesh.name = 'scene';
   mesh.frustumCulled = false;
+  mesh.visible = false; // until there is a picture
   mesh.renderOrder = -1e9; // the first of what is transparent
   mesh.raycast = () => {};
-  mesh.onBeforeRender = (renderer) => {
-    renderer.getCurrentViewport(viewport);
-    material.uniforms.pictureCorner.value.set(viewport.x, viewport.y);
-    material.uniforms.pictureSize.value.set(viewport.z, viewport.w);
+  // Other cameras than those that it was drawn for are shown the first picture.
+  mesh.onBeforeRender = (renderer, _, camera) => {
+    const { uniforms } = material;
+    renderer.getCurrentViewport(uniforms.viewport.value);
+    const { part, origin, ray, clipFromScene } = compositor.pictures.find((one) => one.camera === camera) ?? compositor.pictures[0];
+    for (const [name, value] of Object.entries({ part, origin, ray, clipFromScene })) uniforms[name].value = value;
+    material.uniformsNeedUpdate = true; // for each camera, not once a picture
   };
   return mesh;
 }
-
-const viewport = new THREE.Vector4();

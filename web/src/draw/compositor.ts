@@ -1,12 +1,13 @@
 // Draws contents, front to back, into targets of their own: what the scene adds to each pixel, and how far away it is
 // (docs/tile-format.md, section 4).
 import * as THREE from 'three';
-import type { Box, TileContent, Vec3 } from '../tiles/tileset';
+import type { Box, TileContent } from '../tiles/tileset';
 import type { VolumeHeader } from '../tiles/decode-volume';
 import type { VolumePart } from '../tiles/volume-content';
 import { frontToBack as orderOf } from './box-order';
 import { colourOfBlock, colourOfLevel } from './display-modes';
 import { packNetwork } from './network-shader';
+import { drawAsTheyStand, type Picture } from './picture';
 import { programMaterial, volumeMaterial, viewUniforms, type ProgramShape, type ViewUniforms } from './volume-material';
 import { atlasesOf, type ContentTextures } from './content-textures';
 
@@ -63,6 +64,7 @@ const kEverywhere: Box = { low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
 export class Compositor {
   readonly view: ViewUniforms = viewUniforms();
   readonly target: THREE.WebGLRenderTarget; // what the scene adds, with its opacity; how far its surface is
+  pictures: Picture[] = []; // that are in the target
   readonly distancesOfBytes: boolean;
   private readonly bytesPerPixel: number; // of both pictures
   private readonly depthAlone: THREE.WebGLRenderTarget; // the depth of `target`, so that its colours can be read meanwhile
@@ -167,17 +169,14 @@ export class Compositor {
     this.view.resolution.value.set(x, y);
   }
 
-  // `worldFromScene`: of three's world. Draws into `target`; rays end at the depth of what is opaque, if that is given.
+  // `worldFromScene`: of three's world; contents of each picture, front to back. Draws into `target`; rays end at the depth
+  // of what is opaque, if that is given.
   draw(
-    renderer: THREE.WebGLRenderer, camera: THREE.Camera, worldFromScene: THREE.Matrix4, frontToBack: DrawnPart[],
+    renderer: THREE.WebGLRenderer, pictures: Picture[], worldFromScene: THREE.Matrix4, contents: DrawnPart[][],
     opaqueDepth: THREE.Texture | null,
   ): void {
-    this.setView(camera, worldFromScene);
+    this.pictures = pictures;
     this.view.opaqueDepth.value = opaqueDepth ?? this.nothingOpaque;
-    const eye = this.eye(camera, worldFromScene);
-    for (const { textures } of new Set(frontToBack.map(({ content }) => content))) {
-      if (textures.parts.length > 1) textures.orderParts(orderOf(textures.parts, eye));
-    }
     const before = renderer.getRenderTarget();
     const autoClear = renderer.autoClear;
     const clearColour = renderer.getClearColor(new THREE.Color());
@@ -186,37 +185,26 @@ export class Compositor {
     renderer.setClearColor(0, 0);
     renderer.autoClear = false;
     renderer.clear();
-    const hides = this.view.minTransmittance.value > 0;
-    frontToBack.forEach(({ content, within = kEverywhere }, i) => {
-      if (hides && i > 0 && (content.surround || i % kContentsBetweenHiding === 0)) {
-        renderer.setRenderTarget(this.depthAlone);
-        renderer.render(this.hiding, camera);
-        renderer.setRenderTarget(this.target);
-      }
-      this.place(content, within, worldFromScene);
-      this.contents.children = [content.mesh];
-      renderer.render(this.contents, camera);
-    });
-    this.contents.children = [];
+    drawAsTheyStand(renderer, pictures, () =>
+      pictures.forEach((picture, i) => this.drawOne(renderer, picture, worldFromScene, contents[i])));
     renderer.autoClear = autoClear;
     renderer.setClearColor(clearColour, clearAlpha);
     renderer.setRenderTarget(before);
   }
 
-  // Where the surface is in the last picture, scene units; `at` runs from -1 to 1 across it, upwards.
-  surfaceAt(renderer: THREE.WebGLRenderer, at: THREE.Vector2): THREE.Vector3 | undefined {
-    const { width, height } = this.target;
+  // Where the surface is in a picture, scene units; `at` runs from -1 to 1 across it, upwards.
+  surfaceAt(renderer: THREE.WebGLRenderer, { part, origin, ray }: Picture, at: THREE.Vector2): THREE.Vector3 | undefined {
     const pixel = (x: number, size: number) => Math.min(Math.max(Math.floor((0.5 + 0.5 * x) * size), 0), size - 1);
     const { type } = this.target.textures[1];
     const read = type === THREE.FloatType ? new Float32Array(4) : type === THREE.HalfFloatType ? new Uint16Array(4) : new Uint8Array(4);
-    renderer.readRenderTargetPixels(this.target, pixel(at.x, width), pixel(at.y, height), 1, 1, read, undefined, 1);
+    renderer.readRenderTargetPixels(this.target, part.x + pixel(at.x, part.z), part.y + pixel(at.y, part.w), 1, 1, read, undefined, 1);
     const [value, , , hides] = [...read].map(
       (x) => (type === THREE.FloatType ? x : type === THREE.HalfFloatType ? THREE.DataUtils.fromHalfFloat(x) : x / 255));
     if (hides <= 0.99) return undefined;
     const distance = this.distancesOfBytes ? value / hides / Math.max(1 - value / hides, 1e-3) : value / hides;
     const inPicture = new THREE.Vector3(at.x, at.y, 1);
-    const direction = inPicture.clone().applyMatrix3(this.view.ray.value).normalize();
-    return inPicture.applyMatrix3(this.view.origin.value).addScaledVector(direction, distance);
+    const direction = inPicture.clone().applyMatrix3(ray).normalize();
+    return inPicture.applyMatrix3(origin).addScaledVector(direction, distance);
   }
 
   dispose(): void {
@@ -249,35 +237,31 @@ export class Compositor {
     mesh.matrixWorld.makeScale(high.x - low.x, high.y - low.y, high.z - low.z).setPosition(middle).premultiply(worldFromScene);
   }
 
-  // Of a parallel projection, so far behind the picture that its rays come from there.
-  private eye(camera: THREE.Camera, worldFromScene: THREE.Matrix4): Vec3 {
-    const isPerspective = camera.projectionMatrix.elements[15] === 0;
-    const place = new THREE.Vector3().setFromMatrixPosition(camera.matrixWorld);
-    if (!isPerspective) place.addScaledVector(new THREE.Vector3().setFromMatrixColumn(camera.matrixWorld, 2), 1e7);
-    return place.applyMatrix4(worldFromScene.clone().invert()).toArray() as unknown as Vec3;
-  }
-
-  private setView(camera: THREE.Camera, worldFromScene: THREE.Matrix4): void {
-    const sceneFromCamera = worldFromScene.clone().invert().multiply(camera.matrixWorld);
-    const sceneFromClip = sceneFromCamera.clone().multiply(camera.projectionMatrixInverse);
-    this.view.sceneFromDepth.value.copy(sceneFromClip);
-    // Where the near plane is, which is linear in ndc for every pinhole and every parallel projection.
-    const at = (x: number, y: number) => new THREE.Vector3(x, y, -1).applyMatrix4(sceneFromClip);
-    const [middle, right, up] = [at(0, 0), at(1, 0), at(0, 1)];
-    const across = right.sub(middle);
-    const along = up.sub(middle);
-    const isPerspective = camera.projectionMatrix.elements[15] === 0;
-    const eye = new THREE.Vector3().setFromMatrixPosition(sceneFromCamera);
-    const zero = new THREE.Vector3();
-    const columns = (a: THREE.Vector3, b: THREE.Vector3, c: THREE.Vector3) =>
-      [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z];
-    if (isPerspective) {
-      this.view.origin.value.fromArray(columns(zero, zero, eye));
-      this.view.ray.value.fromArray(columns(across, along, middle.sub(eye)));
-    } else {
-      const forward = new THREE.Vector3().setFromMatrixColumn(sceneFromCamera, 2).negate();
-      this.view.origin.value.fromArray(columns(across, along, middle));
-      this.view.ray.value.fromArray(columns(zero, zero, forward));
+  private drawOne(
+    renderer: THREE.WebGLRenderer, { camera, part, eye, origin, ray, sceneFromClip }: Picture, worldFromScene: THREE.Matrix4,
+    frontToBack: DrawnPart[],
+  ): void {
+    this.view.part.value = part;
+    this.view.origin.value = origin;
+    this.view.ray.value = ray;
+    this.view.sceneFromClip.value = sceneFromClip;
+    for (const { textures } of new Set(frontToBack.map(({ content }) => content))) {
+      if (textures.parts.length > 1) textures.orderParts(orderOf(textures.parts, eye));
     }
+    this.target.viewport.copy(part);
+    this.depthAlone.viewport.copy(part);
+    renderer.setRenderTarget(this.target);
+    const hides = this.view.minTransmittance.value > 0;
+    frontToBack.forEach(({ content, within = kEverywhere }, i) => {
+      if (hides && i > 0 && (content.surround || i % kContentsBetweenHiding === 0)) {
+        renderer.setRenderTarget(this.depthAlone);
+        renderer.render(this.hiding, camera);
+        renderer.setRenderTarget(this.target);
+      }
+      this.place(content, within, worldFromScene);
+      this.contents.children = [content.mesh];
+      renderer.render(this.contents, camera);
+    });
+    this.contents.children = [];
   }
 }

@@ -1,5 +1,6 @@
 // The depth of what is opaque in a world, drawn with its own materials, whose cut-outs and displacements count: rays end there. The scene's own picture lets light through, and so is no part of it.
 import * as THREE from 'three';
+import { drawAsTheyStand, type Picture } from './picture';
 
 export class OpaqueDepth {
   private target?: THREE.WebGLRenderTarget;
@@ -10,15 +11,17 @@ export class OpaqueDepth {
   }
 
   // Null where there is nothing opaque in the world that `scene` stands in.
-  draw(renderer: THREE.WebGLRenderer, camera: THREE.Camera, scene: THREE.Object3D, size: THREE.Vector2): THREE.Texture | null {
+  draw(renderer: THREE.WebGLRenderer, pictures: Pick<Picture, 'camera' | 'part'>[], scene: THREE.Object3D, size: THREE.Vector2): THREE.Texture | null {
     let world: THREE.Object3D = scene;
     while (world.parent) world = world.parent;
     const seeThrough = new Set<THREE.Material>();
+    const layers = new THREE.Layers();
+    layers.mask = pictures.reduce((mask, { camera }) => mask | camera.layers.mask, 0);
     let found = false;
     const look = (object: THREE.Object3D) => {
       if (!object.visible) return; // nor is what it holds
       const { material } = object as THREE.Mesh;
-      if (material !== undefined && object.layers.test(camera.layers)) {
+      if (material !== undefined && object.layers.test(layers)) {
         for (const one of Array.isArray(material) ? material : [material]) {
           if (!one.visible) continue;
           // What lets light through, or writes no depth, ends no ray; what else the object is made of may.
@@ -33,22 +36,31 @@ export class OpaqueDepth {
       this.dispose();
       return null;
     }
-    this.target ??= this.make();
-    if (this.target.width !== size.x || this.target.height !== size.y) this.target.setSize(size.x, size.y);
+    const target = (this.target ??= this.make());
+    if (target.width !== size.x || target.height !== size.y) target.setSize(size.x, size.y);
     for (const material of seeThrough) material.visible = false;
     const background = (world as THREE.Scene).background;
     if (background) (world as THREE.Scene).background = null;
     const before = renderer.getRenderTarget();
+    const { autoClear } = renderer;
     const { autoUpdate, needsUpdate } = renderer.shadowMap;
     renderer.shadowMap.autoUpdate = renderer.shadowMap.needsUpdate = false;
-    renderer.setRenderTarget(this.target);
+    renderer.setRenderTarget(target);
     renderer.clear();
-    renderer.render(world, camera);
+    renderer.autoClear = false;
+    drawAsTheyStand(renderer, pictures, () => {
+      for (const { camera, part } of pictures) {
+        target.viewport.copy(part);
+        renderer.setRenderTarget(target);
+        renderer.render(world, camera);
+      }
+    });
+    renderer.autoClear = autoClear;
     renderer.setRenderTarget(before);
     Object.assign(renderer.shadowMap, { autoUpdate, needsUpdate });
     if (background) (world as THREE.Scene).background = background;
     for (const material of seeThrough) material.visible = true;
-    return this.target.depthTexture;
+    return target.depthTexture;
   }
 
   dispose(): void {

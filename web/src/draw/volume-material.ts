@@ -8,11 +8,12 @@ import type { ContentTextures } from './content-textures';
 import { kDisplayConstants } from './display-modes';
 import { networkShader, vectorsOfNetwork, writtenVector } from './network-shader';
 
-// The same for all contents of a picture. Scene units; `ndc` runs from -1 to 1 across the picture.
+// The same for all contents of a picture. Scene units; `part`, `origin`, `ray` and `sceneFromClip` are those of Picture.
 export interface ViewUniforms {
-  resolution: { value: THREE.Vector2 }; // pixels
-  origin: { value: THREE.Matrix3 }; // (ndc.x, ndc.y, 1) to where a ray begins
-  ray: { value: THREE.Matrix3 }; // and to its direction, of any length
+  resolution: { value: THREE.Vector2 }; // pixels of the target
+  part: { value: THREE.Vector4 };
+  origin: { value: THREE.Matrix3 };
+  ray: { value: THREE.Matrix3 };
   sceneLow: { value: THREE.Vector3 };
   sceneHigh: { value: THREE.Vector3 };
   sceneNear: { value: number };
@@ -20,13 +21,14 @@ export interface ViewUniforms {
   withinHigh: { value: THREE.Vector3 };
   minTransmittance: { value: number }; // rays end where less would be seen; 0: never
   opaqueDepth: { value: THREE.Texture | null }; // of the depth buffer of what stands in the scene; 1 everywhere where nothing does
-  sceneFromDepth: { value: THREE.Matrix4 }; // (ndc.x, ndc.y, depth in [-1, 1], 1) to the scene
+  sceneFromClip: { value: THREE.Matrix4 };
   display: { value: number }; // of kDisplayModes
 }
 
 export function viewUniforms(): ViewUniforms {
   return {
     resolution: { value: new THREE.Vector2(1, 1) },
+    part: { value: new THREE.Vector4(0, 0, 1, 1) },
     origin: { value: new THREE.Matrix3() },
     ray: { value: new THREE.Matrix3() },
     sceneLow: { value: new THREE.Vector3() },
@@ -36,7 +38,7 @@ export function viewUniforms(): ViewUniforms {
     withinHigh: { value: new THREE.Vector3() },
     minTransmittance: { value: 1 / 255 },
     opaqueDepth: { value: null },
-    sceneFromDepth: { value: new THREE.Matrix4() },
+    sceneFromClip: { value: new THREE.Matrix4() },
     display: { value: 0 },
   };
 }
@@ -67,8 +69,9 @@ uniform sampler3D macroblocks, distances;
 uniform sampler2D opaqueDepth;
 uniform float featureRange, densityRange, stepsPerTexel, minTransmittance, sceneNear;
 uniform vec2 resolution;
+uniform vec4 part;
 uniform mat3 origin, ray;
-uniform mat4 sceneFromDepth;
+uniform mat4 sceneFromClip;
 uniform vec3 sceneLow, sceneHigh, withinLow, withinHigh, colourOfBlock, colourOfLevel;
 uniform int display;
 `;
@@ -78,14 +81,14 @@ const float kSceneEnd = 1e6;
 
 // Where ordinary models end the ray.
 float opaqueDistance(vec2 ndc, vec3 o, vec3 d) {
-  float depth = texture(opaqueDepth, 0.5 + 0.5 * ndc).r;
+  float depth = texture(opaqueDepth, gl_FragCoord.xy / resolution).r;
   if (depth >= 1.0) return kSceneEnd;
-  vec4 x = sceneFromDepth * vec4(ndc, 2.0 * depth - 1.0, 1.0);
+  vec4 x = sceneFromClip * vec4(ndc, 2.0 * depth - 1.0, 1.0);
   return dot(x.xyz / x.w - o, d);
 }
 
 void main() {
-  vec2 ndc = 2.0 * gl_FragCoord.xy / resolution - 1.0;
+  vec2 ndc = 2.0 * (gl_FragCoord.xy - part.xy) / part.zw - 1.0;
   vec3 o = origin * vec3(ndc, 1.0), d = normalize(ray * vec3(ndc, 1.0));
   vec2 box = clipToBox(o, d, sceneLow, sceneHigh, vec2(sceneNear, 1e30));
   bool meetsBox = box.x < box.y;

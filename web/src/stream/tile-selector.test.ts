@@ -1,7 +1,8 @@
 import { describe, expect, it } from 'vitest';
 import { addSurrounds, madeTree, madeView, randomNumbers } from '../testing/made-tree';
 import { TileSelector, type SelectedTile } from './tile-selector';
-import { childrenFrontToBack, coarsestTiles, type TileTree } from './tile-tree';
+import { childrenFrontToBack, coarsestTiles, cutFrontToBack, type TileTree } from './tile-tree';
+import { jointView } from './tile-view';
 
 // How many tiles of a cut stand for each cell.
 function timesCovered(tree: TileTree, cut: SelectedTile[]): number[] {
@@ -41,6 +42,37 @@ describe('a selection', () => {
           expect(isWithin(tree, tile, content)).toBe(true);
         }
       }
+    }
+  });
+
+  it('has for two eyes all that either of them sees, as fine as either needs it', () => {
+    const tree = madeTree(8);
+    const eyes = [madeView([-0.1, -3.5, 1], 0.8, -0.4), madeView([0.1, -3.5, 1], 2.4, -0.4)];
+    const both = new TileSelector(tree).cut(jointView(eyes), () => true).tiles;
+    expect(timesCovered(tree, both).every((times) => times === 1)).toBe(true);
+    const levels = (cut: SelectedTile[]) => {
+      const found = new Array<number>(64).fill(9);
+      for (const { tile, visible } of cut) {
+        const { level, cells: { i0, j0, i1, j1 } } = tree.tiles[tile];
+        for (let j = j0; visible && j < j1; ++j) for (let i = i0; i < i1; ++i) found[i + 8 * j] = level;
+      }
+      return found;
+    };
+    const together = levels(both);
+    for (const eye of eyes) {
+      const alone = new TileSelector(tree).cut(eye, () => true).tiles;
+      levels(alone).forEach((level, cell) => expect(together[cell]).toBeLessThanOrEqual(level));
+    }
+    expect(both.some(({ visible }) => !visible)).toBe(true);
+  });
+
+  it('comes in the order of each eye', () => {
+    const random = randomNumbers(5);
+    const tree = madeTree(8);
+    for (let round = 0; round < 100; ++round) {
+      const view = madeView([random() * 16 - 8, random() * 16 - 8, random() * 4], random() * 7, -random());
+      const cut = new TileSelector(tree).cut(view, () => true).tiles.map(({ tile }) => tile);
+      expect(cutFrontToBack(tree, new Set([...cut].reverse()), view.eye)).toEqual(cut);
     }
   });
 

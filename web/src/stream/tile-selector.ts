@@ -7,7 +7,7 @@
 // What is wanted in memory is chosen anew for each view: the most urgent first, as far as the budget goes. What is above
 // a wanted tile is wanted too, so that whatever comes into view is drawn by that at once.
 import { childrenFrontToBack, coarsestTiles, type TileNode, type TileTree } from './tile-tree';
-import type { TileView } from './tile-view';
+import type { SelectionView } from './tile-view';
 
 export interface SelectionSettings {
   mostPixels: number; // of geometric error; 0: the finest everywhere
@@ -54,7 +54,7 @@ export class TileSelector {
   }
 
   // `holds`: which contents can be drawn. The coarsest must be for the cut to cover everything.
-  cut(view: TileView, holds: (tile: number) => boolean): Cut {
+  cut(view: SelectionView, holds: (tile: number) => boolean): Cut {
     const tiles: SelectedTile[] = [];
     const behind: SelectedTile[] = [];
     this.cover({ view, holds, tiles }, 0, -1);
@@ -63,7 +63,7 @@ export class TileSelector {
   }
 
   // What to have in memory for a view.
-  choose(view: TileView, memory: TileMemory): Choice {
+  choose(view: SelectionView, memory: TileMemory): Choice {
     const open: Candidate[] = [];
     // Urgent is what covers much of the picture and is far coarser there than asked for.
     const addBelow = (tile: number, instead: TileNode) => {
@@ -124,7 +124,7 @@ export class TileSelector {
     tiles.push({ tile, content, visible: content >= 0 });
   }
 
-  private isReplaced(view: TileView, tile: number): boolean {
+  private isReplaced(view: SelectionView, tile: number): boolean {
     const { settings } = this;
     const node = this.tree.tiles[tile];
     if (node.children.length === 0 || node.level <= settings.finestLevel) return (this.replaced[tile] = false);
@@ -144,7 +144,7 @@ function isBefore(a: Candidate, b: Candidate): boolean {
 }
 
 interface Pass {
-  view: TileView;
+  view: SelectionView;
   holds: (tile: number) => boolean;
   tiles: SelectedTile[];
 }

@@ -7,7 +7,7 @@
 // first, and at last what is drawn, which then is drawn coarser.
 import { SceneError } from '../scene-error';
 import type { Cut, TileSelector } from './tile-selector';
-import type { TileView } from './tile-view';
+import type { SelectionView } from './tile-view';
 
 export type UploadStep = 'more' | 'wait' | 'done';
 
@@ -114,7 +114,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
 
   // Once a frame: what to draw, front to back, and behind it; and another step of what is on its way. `uploadFor` ms at
   // most are spent on uploads (but one slice a frame is always taken).
-  update(view: TileView, uploadFor = 4): Cut {
+  update(view: SelectionView, uploadFor = 4): Cut {
     ++this.frame;
     this.uploadSlices(uploadFor);
     this.keepToBudget();

@@ -68,6 +68,11 @@ export function childrenFrontToBack(tree: TileTree, tile: number, eye: Vec3): nu
   return [...tree.tiles[tile].children].sort((a, b) => distance(a) - distance(b) || a - b);
 }
 
+// Tiles of a cut, from one of its tiles or one above them on, front to back for every ray from `eye`.
+export function cutFrontToBack(tree: TileTree, cut: ReadonlySet<number>, eye: Vec3, from = 0): number[] {
+  return cut.has(from) ? [from] : childrenFrontToBack(tree, from, eye).flatMap((child) => cutFrontToBack(tree, cut, eye, child));
+}
+
 // The topmost contents, the surround apart: they cover all that the scene covers, and always stay in memory.
 export function coarsestTiles(tree: TileTree): number[] {
   const found: number[] = [];

@@ -62,3 +62,18 @@ export function showsSurround(eye: Vec3, direction: Vec3, { low, high }: Box): b
   const entry = Math.max(0, ...near.map((t) => (Number.isNaN(t) ? 0 : t)));
   return exit <= entry || far[2] > exit;
 }
+
+// What the selection asks of a view.
+export type SelectionView = Pick<TileView, 'eye' | 'sees' | 'distance' | 'errorInPixels' | 'areaInPixels'>;
+
+// Several views at once, of a headset's two eyes say: of all that any of them sees, as much as the one that needs most.
+export function jointView(views: readonly TileView[]): SelectionView {
+  const most = (of: (view: TileView) => number) => Math.max(...views.map(of));
+  return {
+    eye: views[0].eye,
+    sees: (place) => views.some((view) => view.sees(place)),
+    distance: (place) => -most((view) => -view.distance(place)),
+    errorInPixels: (tile) => most((view) => view.errorInPixels(tile)),
+    areaInPixels: (place) => most((view) => view.areaInPixels(place)),
+  };
+}

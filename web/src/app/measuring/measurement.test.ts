@@ -126,8 +126,9 @@ describe('marks in the world', () => {
     marks.show(all, lake);
     expect(marks.group.children.length).toBeGreaterThan(3);
     world.add(city, marks.group);
+    const picture = { camera: new THREE.PerspectiveCamera(), part: new THREE.Vector4(0, 0, 8, 8) };
     const noRenderer = undefined as unknown as THREE.WebGLRenderer; // nobody draws anything
-    expect(new OpaqueDepth().draw(noRenderer, new THREE.PerspectiveCamera(), city, new THREE.Vector2(8, 8))).toBeNull();
+    expect(new OpaqueDepth().draw(noRenderer, [picture], city, new THREE.Vector2(8, 8))).toBeNull();
   });
 
   it('give back what is on the card', () => {

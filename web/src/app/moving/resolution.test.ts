@@ -28,4 +28,27 @@ describe('the resolution', () => {
     expect(resolution.scale(100)).toBe(0.25);
     expect(resolution.scale(400)).toBe(1);
   });
+
+  // A headset that shows a picture every 14 ms, or every 28 ms where it takes longer.
+  function inHeadset(milliseconds: number, pictures: number): number[] {
+    const resolution = new Resolution();
+    resolution.pace = { target: 18, patience: 50, share: 0.5 };
+    return Array.from({ length: pictures }, (_, now) => {
+      resolution.moved(now);
+      const scale = resolution.scale(now);
+      resolution.took(14 * Math.ceil((milliseconds * scale ** 2) / 14));
+      return scale;
+    });
+  }
+
+  it('is tried out where pictures never come sooner than they are shown', () => {
+    const quick = inHeadset(10, 500);
+    expect(quick[0]).toBe(0.5);
+    expect(quick[499]).toBe(1);
+    const slow = inHeadset(20, 3000);
+    expect(Math.max(...slow)).toBe(1);
+    // Ever more seldom.
+    expect(slow.slice(1000).filter((scale) => scale === 1).length).toBeLessThan(40);
+    expect(slow.slice(1000).filter((scale) => scale === 0.75).length).toBeGreaterThan(1900);
+  });
 });
