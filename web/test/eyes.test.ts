@@ -111,6 +111,7 @@ describe.skipIf(missing())('two cameras', () => {
       await picture(views);
       return page.evaluate(() => plain.city!.statistics!.targetBytes);
     };
-    expect(await bytes(atFacade)).toBe(2 * (await bytes(atFacade[0])));
+    const ofOne = await bytes(atFacade[0]);
+    expect(Math.abs((await bytes(atFacade)) / ofOne - 2)).toBeLessThan(0.001); // what else they need is little
   });
 });

@@ -29,6 +29,19 @@ describe('the resolution', () => {
     expect(resolution.scale(400)).toBe(1);
   });
 
+  it('rises again after a while of slow pictures, though a screen shows none sooner than every 17 ms', () => {
+    const resolution = new Resolution(40, 300);
+    const draw = (pictures: number, milliseconds: number) => {
+      for (let now = 0; now < pictures; ++now) {
+        resolution.moved(now);
+        resolution.took(Math.max(16.7, milliseconds * resolution.scale(now) ** 2));
+      }
+      return resolution.scale(pictures);
+    };
+    expect(draw(20, 2000)).toBe(0.25);
+    expect(draw(1000, 10)).toBe(1);
+  });
+
   // A headset that shows a picture every 14 ms, or every 28 ms where it takes longer.
   function inHeadset(milliseconds: number, pictures: number): number[] {
     const resolution = new Resolution();

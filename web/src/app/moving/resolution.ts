@@ -10,6 +10,7 @@ export interface Pace {
   share: number; // of the pixels, to begin with
 }
 
+const kPatience = 120; // pictures
 const kLongestWait = 16; // times the patience
 const kUnmeasured = 3; // pictures after more pixels are tried: of targets that are made anew
 
@@ -22,6 +23,7 @@ export class Resolution {
   private wait: number; // pictures, of patience
   private inTime = 0; // pictures, since the last step
   private unmeasured = 0;
+  private tried = false; // the step was
   private current: Pace;
 
   // `target` as of a pace; `rest`: ms after which the camera rests.
@@ -42,7 +44,7 @@ export class Resolution {
   }
 
   private get ownPace(): Pace {
-    return { target: this.target, patience: Infinity, share: 1 };
+    return { target: this.target, patience: kPatience, share: 1 };
   }
 
   moved(now: number): void {
@@ -74,7 +76,8 @@ export class Resolution {
     ++this.inTime;
     if (this.measured > target && this.step > 0) {
       this.change(this.step - 1);
-      this.wait = Math.min(2 * this.wait, kLongestWait * patience);
+      if (this.tried) this.wait = Math.min(2 * this.wait, kLongestWait * patience);
+      this.tried = false;
     } else if (this.step + 1 < kSteps.length) {
       if (expected(this.step + 1) < 0.7 * target) this.change(this.step + 1);
       else if (this.inTime > this.wait) this.tryMore();
@@ -89,6 +92,7 @@ export class Resolution {
 
   private tryMore(): void {
     this.change(this.step + 1);
+    this.tried = true;
     this.measured = 0;
     this.unmeasured = kUnmeasured;
   }
