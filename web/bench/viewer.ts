@@ -20,6 +20,12 @@ const small = needed('SMALL_SCENE'); // 2x2 blocks
 const smallCapture = needed('SMALL_CAPTURE');
 const large = needed('LARGE_SCENE'); // 4x4 blocks, two coarser levels
 
+const kNetworks = [
+  { name: 'loopback', megabits: 0, latency: 0 },
+  { name: '500 Mbit/s, 10 ms', megabits: 500, latency: 10 },
+  { name: '20 Mbit/s, 60 ms, as of a telephone', megabits: 20, latency: 60 },
+];
+
 function tilesetOf(scene: string) {
   return decodeTileset(readFileSync(join(scene, 'tileset.json'), 'utf8'), 'tileset.json');
 }
@@ -116,9 +122,16 @@ describe('the viewer', () => {
     verdict('cubes behind it that are not, as a share', counts.behind / counts.places, '>=', 0.95);
   });
 
-  it('shows the first picture of a large scene soon', async () => {
+  it.each(kNetworks)('shows the first picture of a large scene soon: $name', async ({ name, megabits, latency }) => {
     const tileset = tilesetOf(large);
     const page = await open(large);
+    if (megabits) {
+      const bytesASecond = (megabits * 1e6) / 8;
+      const session = await page.context().newCDPSession(page);
+      await session.send('Network.emulateNetworkConditions', {
+        offline: false, latency, downloadThroughput: bytesASecond, uploadThroughput: bytesASecond,
+      });
+    }
     const view = viewAt(tileset, [0, -tileset.rows * 2, tileset.rows * 2], [0, 0, 0]);
     const { seconds, bytes } = await page.evaluate(async (one) => {
       const begin = performance.now();
@@ -129,7 +142,8 @@ describe('the viewer', () => {
     const total = bytesOnDisk(large);
     const text = statSync(join(large, 'tileset.json')).size;
     await close(page);
-    console.log(`${bytes} bytes of contents and ${text} of tileset.json, of ${total}, in ${seconds.toFixed(2)} s`);
+    console.log(`${name}: ${bytes} bytes of contents and ${text} of tileset.json, of ${total}, in ${seconds.toFixed(2)} s`);
+    if (megabits) return; // told, not judged
     verdict('coarsest level with its surround and tileset.json, as a share of the bytes', (bytes + text) / total, '<=', 0.06);
     verdict('seconds to the first complete picture', seconds, '<=', 2);
   });
