@@ -8,11 +8,11 @@
 //
 // `update` streams in what the camera asks for and draws the scene into targets of its own, up to what opaque objects of
 // the same world hide; `render` then shows it among them. Its own frame is the capture's, turned from z up to y up, in
-// metres where the capture has a scale.
+// metres where the capture has a scale. Where several stand in one world, see scenes.ts.
 import * as THREE from 'three';
 import { kYUpFromZUp } from './axes';
 import { DecodePool } from './decode-pool';
-import { cityMesh } from './draw/city-mesh';
+import { cityMesh, kFirstRenderOrder } from './draw/city-mesh';
 import { Compositor, type DrawnContent } from './draw/compositor';
 import { kDisplayModes, type DisplayMode } from './draw/display-modes';
 import { OpaqueDepth } from './draw/opaque-depth';
@@ -39,6 +39,12 @@ export interface SceneStatistics extends StreamStatistics {
   drawn: number[]; // tiles of each level in the last picture
 }
 
+// What other scenes of the same world are to this one (scenes.ts).
+export interface Neighbours {
+  behind: readonly TesseraScene[]; // drawn already: their surfaces end its rays
+  boxes: readonly THREE.Matrix4[]; // in which its surround is not drawn, as `hidden` has them
+}
+
 type Streamer = TileStreamer<ContentFile, VolumeContent, DrawnContent>;
 
 export class TesseraScene extends THREE.Object3D {
@@ -48,6 +54,11 @@ export class TesseraScene extends THREE.Object3D {
   resolutionScale = 1; // pixels of the scene beside those of the canvas, along an edge
   display: DisplayMode = 'colour';
   minTransmittance = 1 / 255; // rays end where less would be seen; 0: never
+  // Boxes in which nothing of it is drawn, at most kMostHiddenBoxes: from the cube of edge 1 about the origin to this
+  // object's frame.
+  hidden: THREE.Matrix4[] = [];
+  showsSurround = true; // false: nothing outside of `bounds` is drawn
+  neighbours: Neighbours = { behind: [], boxes: [] };
   // Of tiles that cannot be had, and of a budget that is too small; told once each.
   onError: (error: SceneError) => void = () => {};
   private readonly tree: TileTree;
@@ -129,7 +140,8 @@ export class TesseraScene extends THREE.Object3D {
     camera.updateWorldMatrix(true, false);
     const worldFromScene = this.matrixWorld.clone().multiply(this.localFromScene);
     const size = renderer.getDrawingBufferSize(new THREE.Vector2()).multiplyScalar(this.resolutionScale).round().max(new THREE.Vector2(1, 1));
-    const depth = this.opaque.draw(renderer, camera, this, size);
+    const surfaces = this.neighbours.behind.map((scene) => scene.mesh).filter((one) => one !== undefined);
+    const depth = this.opaque.draw(renderer, camera, this, size, new Set(surfaces));
     compositor.resize(size);
     streamer.settings = { ...this.stream, cardBytes: this.stream.cardBytes - compositor.bytes - this.opaque.bytes };
     const { cut, surround } = streamer.update(tileView(this.tileset, camera, worldFromScene, size), this.uploadTime());
@@ -138,13 +150,18 @@ export class TesseraScene extends THREE.Object3D {
       .map(({ tile }) => streamer.residentOf(tile))
       .filter((content) => content !== undefined);
     // What it surrounds comes first: on slow machines a picture of it alone would only take time.
-    const behind = streamer.complete ? streamer.residentOf(surround) : undefined;
+    const behind = streamer.complete && this.showsSurround ? streamer.residentOf(surround) : undefined;
     if (behind) frontToBack.push(behind);
     this.drawn = new Array<number>(this.tileset.levels).fill(0);
     for (const { tile, visible } of cut) if (visible) ++this.drawn[this.tree.tiles[tile].level];
     compositor.view.minTransmittance.value = this.minTransmittance;
     compositor.view.display.value = kDisplayModes.indexOf(this.display);
+    const sceneFromLocal = this.localFromScene.clone().invert();
+    const inScene = (boxes: readonly THREE.Matrix4[]) => boxes.map((box) => sceneFromLocal.clone().multiply(box));
+    compositor.hide(inScene(this.hidden), inScene(this.neighbours.boxes));
+    compositor.view.withinBox.value = !this.showsSurround;
     compositor.draw(renderer, camera, worldFromScene, frontToBack, depth);
+    mesh.renderOrder = kFirstRenderOrder + this.neighbours.behind.length;
     mesh.material.uniforms.clipFromScene.value
       .multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
       .multiply(worldFromScene);

@@ -5,6 +5,8 @@ import type { Compositor } from './compositor';
 import { screenTriangle } from './compositor';
 import { kDisplayConstants } from './display-modes';
 
+export const kFirstRenderOrder = -1e9; // of what is transparent
+
 const kVertexShader = `
 void main() {
   gl_Position = vec4(position.xy, 0.0, 1.0);
@@ -75,7 +77,7 @@ export function cityMesh({ view, target, distancesOfBytes }: Compositor): THREE.
   const mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial>(screenTriangle(), material);
   mesh.name = 'scene';
   mesh.frustumCulled = false;
-  mesh.renderOrder = -1e9; // the first of what is transparent
+  mesh.renderOrder = kFirstRenderOrder;
   mesh.raycast = () => {};
   mesh.onBeforeRender = (renderer) => {
     renderer.getCurrentViewport(viewport);

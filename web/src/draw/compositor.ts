@@ -6,7 +6,8 @@ import type { DenseLayer, VolumePart } from '../tiles/volume-content';
 import { frontToBack as orderOf } from './box-order';
 import { colourOfBlock, colourOfLevel } from './display-modes';
 import { packNetwork } from './network-shader';
-import { programMaterial, volumeMaterial, viewUniforms, type ProgramShape, type ViewUniforms } from './volume-material';
+import { kMostHiddenBoxes, programMaterial, volumeMaterial, viewUniforms, type ProgramShape, type ViewUniforms } from './volume-material';
+import { SceneError } from '../scene-error';
 import type { ContentTextures } from './content-textures';
 
 // A content that may be drawn.
@@ -143,6 +144,20 @@ export class Compositor {
       this.depthAlone.setSize(x, y);
     }
     this.view.resolution.value.set(x, y);
+  }
+
+  // Boxes in which nothing is drawn, and such in which nothing of the surround is: from the cube of edge 1 about the
+  // origin to the scene. Throws SceneError where they are too many; those without a volume hide nothing.
+  hide(boxes: readonly THREE.Matrix4[], ofSurround: readonly THREE.Matrix4[]): void {
+    if (boxes.length > kMostHiddenBoxes) {
+      throw new SceneError('scene', 'hidden', `are ${boxes.length} boxes, and ${kMostHiddenBoxes} can be hidden`, 'hide fewer, larger ones');
+    }
+    const { boxFromScene, hiddenBoxes, hiddenBoxesOfSurround } = this.view;
+    const whole = (box: THREE.Matrix4) => box.determinant() !== 0;
+    const all = [...boxes.filter(whole), ...ofSurround.filter(whole).slice(0, kMostHiddenBoxes)];
+    all.forEach((box, n) => boxFromScene.value[n].copy(box).invert());
+    hiddenBoxes.value = boxes.filter(whole).length;
+    hiddenBoxesOfSurround.value = all.length;
   }
 
   // `worldFromScene`: of three's world. Draws into `target`; rays end at the depth of what is opaque, if that is given.
