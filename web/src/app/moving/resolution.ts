@@ -1,38 +1,69 @@
-// How many pixels of the scene to draw: as many as the machine can while the camera moves, all of them when it rests.
+// How many pixels of the scene to draw: as many as the machine can while the camera moves; all of them when it rests, and
+// while only models move as many as still make a picture of a scene at rest with something moving in it.
 
 const kSteps = [0.25, 0.375, 0.5, 0.75, 1]; // few, as targets are made anew for each
+
+export type Pace = 'move' | 'play' | 'rest';
 
 export class Resolution {
   // A share that somebody has chosen, whether the camera moves or not.
   fixed?: number;
-  private step = kSteps.length - 1;
+  private readonly moving: Measured;
+  private readonly playing: Measured;
   private lastMove = -Infinity;
-  private measured = 0; // ms of a picture, at the step's resolution
+  private lastPlay = -Infinity;
 
-  // `target`: ms that a picture may take while the camera moves; `rest`: ms after which it rests.
-  constructor(
-    private readonly target = 40,
-    private readonly rest = 300,
-  ) {}
+  // `target`, `playTarget`: ms that a picture may take while the camera moves, and while models alone do; `rest`: ms after
+  // which it rests.
+  constructor(target = 40, playTarget = 100, private readonly rest = 300) {
+    this.moving = new Measured(target);
+    this.playing = new Measured(playTarget);
+  }
 
   moved(now: number): void {
     this.lastMove = now;
   }
 
-  isResting(now: number): boolean {
-    return now - this.lastMove > this.rest;
+  // A model moves by itself.
+  played(now: number): void {
+    this.lastPlay = now;
   }
 
-  // When the camera rests.
+  pace(now: number): Pace {
+    if (now - this.lastMove <= this.rest) return 'move';
+    return now - this.lastPlay <= this.rest ? 'play' : 'rest';
+  }
+
+  // When all rests.
   get whole(): number {
     return this.fixed ?? 1;
   }
 
   scale(now: number): number {
-    return this.fixed ?? (this.isResting(now) ? 1 : kSteps[this.step]);
+    const pace = this.pace(now);
+    return this.fixed ?? (pace === 'rest' ? 1 : this.of(pace).scale);
   }
 
-  // What a picture drawn while the camera moved took.
+  // What a picture took that was drawn at that pace.
+  took(milliseconds: number, pace: Pace): void {
+    if (pace !== 'rest') this.of(pace).took(milliseconds);
+  }
+
+  private of(pace: 'move' | 'play'): Measured {
+    return pace === 'move' ? this.moving : this.playing;
+  }
+}
+
+class Measured {
+  private step = kSteps.length - 1;
+  private measured = 0; // ms of a picture, at the step's resolution
+
+  constructor(private readonly target: number) {}
+
+  get scale(): number {
+    return kSteps[this.step];
+  }
+
   took(milliseconds: number): void {
     this.measured = this.measured === 0 ? milliseconds : 0.6 * this.measured + 0.4 * milliseconds;
     const expected = (step: number) => this.measured * (kSteps[step] / kSteps[this.step]) ** 2;
