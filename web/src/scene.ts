@@ -158,8 +158,7 @@ export class TesseraScene extends THREE.Object3D {
     compositor.view.display.value = kDisplayModes.indexOf(this.display);
     const sceneFromLocal = this.localFromScene.clone().invert();
     const inScene = (boxes: readonly THREE.Matrix4[]) => boxes.map((box) => sceneFromLocal.clone().multiply(box));
-    compositor.hide(inScene(this.hidden), inScene(this.neighbours.boxes));
-    compositor.view.withinBox.value = !this.showsSurround;
+    compositor.hide(inScene(this.hidden), inScene(this.neighbours.boxes), !this.showsSurround);
     compositor.draw(renderer, camera, worldFromScene, frontToBack, depth);
     mesh.renderOrder = kFirstRenderOrder + this.neighbours.behind.length;
     mesh.material.uniforms.clipFromScene.value

@@ -60,6 +60,7 @@ export class Compositor {
   private readonly screen = screenTriangle();
   private readonly anyCamera = new THREE.Camera();
   private readonly nothingOpaque = farthestDepth();
+  private cuts = false; // from the first hidden box on, so that programs are not made anew for each
   private readonly prepared = new Map<string, THREE.Material>(); // hold programs, by their shape
 
   // What the card can blend decides how the pictures are kept.
@@ -147,8 +148,9 @@ export class Compositor {
   }
 
   // Boxes in which nothing is drawn, and such in which nothing of the surround is: from the cube of edge 1 about the
-  // origin to the scene. Throws SceneError where they are too many; those without a volume hide nothing.
-  hide(boxes: readonly THREE.Matrix4[], ofSurround: readonly THREE.Matrix4[]): void {
+  // origin to the scene. `withinBox`: nor is anything outside of the scene's box. Throws SceneError where they are too
+  // many; those without a volume hide nothing.
+  hide(boxes: readonly THREE.Matrix4[], ofSurround: readonly THREE.Matrix4[], withinBox: boolean): void {
     if (boxes.length > kMostHiddenBoxes) {
       throw new SceneError('scene', 'hidden', `are ${boxes.length} boxes, and ${kMostHiddenBoxes} can be hidden`, 'hide fewer, larger ones');
     }
@@ -158,6 +160,8 @@ export class Compositor {
     all.forEach((box, n) => boxFromScene.value[n].copy(box).invert());
     hiddenBoxes.value = boxes.filter(whole).length;
     hiddenBoxesOfSurround.value = all.length;
+    this.view.withinBox.value = withinBox;
+    this.cuts ||= all.length > 0 || withinBox;
   }
 
   // `worldFromScene`: of three's world. Draws into `target`; rays end at the depth of what is opaque, if that is given.
@@ -170,6 +174,10 @@ export class Compositor {
     const box = new THREE.Matrix4();
     const eye = this.eye(camera, worldFromScene);
     for (const { textures, mesh, box: { low, high } } of frontToBack) {
+      if (this.cuts && !('CUTS' in mesh.material.defines)) {
+        mesh.material.defines.CUTS = '';
+        mesh.material.needsUpdate = true;
+      }
       if (textures.parts.length > 1) textures.orderParts(orderOf(textures.parts, eye));
       const middle = (a: number) => (low[a] + high[a]) / 2;
       box.makeScale(high[0] - low[0], high[1] - low[1], high[2] - low[2]).setPosition(middle(0), middle(1), middle(2));
@@ -231,7 +239,7 @@ export class Compositor {
     // What is contracted may own what lies beyond any box.
     const everywhere = surround || parts.some((part) => part.contracted);
     const network = packed?.every(Number.isFinite) ? packed : undefined;
-    return { parts: parts.length, widths, surround, everywhere, distancesOfBytes: this.distancesOfBytes, network };
+    return { parts: parts.length, widths, surround, everywhere, distancesOfBytes: this.distancesOfBytes, cuts: this.cuts, network };
   }
 
   // Of a parallel projection, so far behind the picture that its rays come from there.

@@ -76,9 +76,14 @@ uniform vec2 resolution;
 uniform mat3 origin, ray;
 uniform mat4 sceneFromDepth;
 uniform vec3 sceneLow, sceneHigh, colourOfBlock, colourOfLevel;
-uniform int display, hiddenBoxes;
+uniform int display;
+#ifdef CUTS
+uniform int hiddenBoxes;
 uniform mat4 boxFromScene[${2 * kMostHiddenBoxes}];
 uniform bool withinBox;
+#else
+const bool withinBox = false;
+#endif
 `;
 
 const kFragmentMain = `
@@ -93,7 +98,8 @@ float opaqueDistance(vec2 ndc, vec3 o, vec3 d) {
 }
 
 // What of range lies in no hidden box, piece by piece. Boxes are cut out of rays, where lengths are those of the scene
-// whatever is contracted; a ray without any is marched in one piece, at no cost.
+// whatever is contracted.
+#ifdef CUTS
 void marchShown(Part part, vec3 o, vec3 d, vec2 range, inout Composite sum) {
   float t = range.x;
   int guard = 0;
@@ -112,6 +118,9 @@ void marchShown(Part part, vec3 o, vec3 d, vec2 range, inout Composite sum) {
     t = exit;
   } while (t < range.y && sum.transmittance >= minTransmittance && ++guard < ${4 * kMostHiddenBoxes + 1});
 }
+#else
+#define marchShown marchPart
+#endif
 
 void main() {
   vec2 ndc = 2.0 * gl_FragCoord.xy / resolution - 1.0;
@@ -163,6 +172,7 @@ export interface ProgramShape {
   surround: boolean;
   everywhere: boolean; // fills the picture, as it owns what lies beyond any box
   distancesOfBytes: boolean; // the target's are, from 0 for no distance to 255 for the farthest
+  cuts: boolean; // knows hidden boxes, which costs a hundredth even where there are none
   network?: Float32Array; // packed; written into the program, which then is of one content alone
 }
 
@@ -175,6 +185,7 @@ export function programMaterial(shape: ProgramShape): THREE.RawShaderMaterial {
   if (shape.surround) defines.SURROUND = '';
   if (shape.everywhere) defines.EVERYWHERE = '';
   if (shape.distancesOfBytes) defines.DISTANCES_OF_BYTES = '';
+  if (shape.cuts) defines.CUTS = '';
   return new THREE.RawShaderMaterial({
     glslVersion: THREE.GLSL3,
     vertexShader: kVertexShader,

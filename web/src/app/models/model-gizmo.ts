@@ -68,7 +68,10 @@ export class ModelGizmo {
     world.add(helper);
     controls.addEventListener('change', () => this.viewer.needPicture());
     controls.addEventListener('objectChange', () => {
-      if (controls.mode === 'scale' && this.object && !this.isBox) scaleAlike(this.object, before);
+      if (controls.mode === 'scale' && this.object) {
+        if (this.isBox) this.object.scale.set(...sizesOf(this.object));
+        else scaleAlike(this.object, before);
+      }
       this.viewer.resolution.moved(performance.now());
       this.moved();
     });
@@ -84,6 +87,11 @@ export class ModelGizmo {
     for (const over of ['pointerup', 'pointercancel']) addEventListener(over, () => (navigation.enabled = true));
     return controls;
   }
+}
+
+// Of a box that is not turned inside out.
+function sizesOf({ scale }: THREE.Object3D): [number, number, number] {
+  return scale.toArray().map((x) => Math.max(Math.abs(x), 1e-3)) as [number, number, number];
 }
 
 // By what one of its axes was scaled most.

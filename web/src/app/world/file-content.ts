@@ -7,6 +7,7 @@ const known = new WeakMap<Blob, Promise<string>>();
 export function contentOf(file: Blob): Promise<string> {
   const found = known.get(file) ?? digestOf(file);
   known.set(file, found);
+  found.catch(() => known.delete(file));
   return found;
 }
 

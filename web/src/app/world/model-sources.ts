@@ -44,11 +44,22 @@ export async function fileOfContent(
   return findFile(path, '', files);
 }
 
+// Throws SceneError that names the file that cannot be read any more.
+export function contentsOf(files: readonly ModelFile[]): Promise<string[]> {
+  return Promise.all(files.map(({ path, file }) => contentOf(file).catch(() => {
+    throw unreadable(path);
+  })));
+}
+
 export function base64Of({ path, file }: ModelFile): Promise<string> {
   return new Promise((resolve, reject) => {
     const reader = new FileReader();
     reader.onload = () => resolve((reader.result as string).replace(/^[^,]*,/, ''));
-    reader.onerror = () => reject(new SceneError(nameOf(path), '', 'could not be read', 'see that it is still there, and drop it again'));
+    reader.onerror = () => reject(unreadable(path));
     reader.readAsDataURL(file);
   });
+}
+
+function unreadable(path: string): SceneError {
+  return new SceneError(nameOf(path), '', 'could not be read', 'see that it is still there, and drop it again');
 }

@@ -10,7 +10,7 @@ export const kEmbeddedBytes = 128 * 1000 * 1000; // of all models that one file 
 export const kWorldBytes = 1.4 * kEmbeddedBytes; // of the file itself
 const kKind = 'tessera world';
 const kVersion = 2;
-const kMost = { scenes: 16, models: 1000, hidden: 8, bookmarks: 200 };
+export const kMost = { scenes: 16, models: 1000, hidden: 8, bookmarks: 200 };
 const kMostFiles = 1000; // of a model
 const kFarthest = 1e7; // metres
 

@@ -12,10 +12,9 @@ import { megabytes } from '../page/panels';
 import type { Bookmarks } from '../views/bookmarks';
 import { formatView, parseView } from '../views/view-address';
 import type { Viewer } from '../viewer';
-import { contentOf } from './file-content';
-import { base64Of, bytesOf, fileOfContent, namesOf } from './model-sources';
+import { base64Of, bytesOf, contentsOf, fileOfContent, namesOf } from './model-sources';
 import { addressFrom, addressOfFile, resolved } from './world-address';
-import { decodeWorld, encodeWorld, kEmbeddedBytes, kWorldBytes, kWorldName, mainScene, type World, type WorldModel, type WorldScene } from './world-file';
+import { decodeWorld, encodeWorld, kEmbeddedBytes, kMost, kWorldBytes, kWorldName, mainScene, type World, type WorldModel, type WorldScene } from './world-file';
 
 // A world.json, and where it is: relative addresses in it are seen from there.
 export interface NamedWorld {
@@ -29,7 +28,7 @@ export async function fetchWorld(url: string): Promise<NamedWorld> {
   const address = resolved(url, location.href);
   if (address === undefined) throw new SceneError(kWorldName, '', 'has no address of http or https', 'name another in ?world=');
   const name = nameOf(new URL(address).pathname) || kWorldName;
-  const bytes = await fetchFile(address, name, kWorldBytes);
+  const bytes = await fetchNamed(address, name, kWorldBytes, 'see that the address is right');
   return { world: decodeWorld(new TextDecoder().decode(bytes), name), name, address };
 }
 
@@ -40,9 +39,10 @@ export function addressOfMain({ world, name, address }: NamedWorld): string {
 }
 
 function addressOfScene({ url }: WorldScene, place: string, name: string, address: string): string {
-  const found = url === '' ? undefined : resolved(url, address);
+  if (url === '') throw new SceneError(name, `${place}.url`, 'is missing', 'write the address of its tileset.json there');
+  const found = resolved(url, address);
   if (found !== undefined) return found;
-  throw new SceneError(name, `${place}.url`, 'is missing', 'write the address of its tileset.json there');
+  throw new SceneError(name, `${place}.url`, 'is relative, and nobody knows to what', 'open the world by its address');
 }
 
 export class Worlds {
@@ -70,7 +70,7 @@ export class Worlds {
     for (const model of list) {
       const own = model.source.files;
       models.push({
-        name: model.name, files: own.map((file) => names.get(file)!), contents: await Promise.all(own.map(({ file }) => contentOf(file))),
+        name: model.name, files: own.map((file) => names.get(file)!), contents: await contentsOf(own),
         ...placeOf(model, model.source.base), visible: model.visible, plays: model.plays,
       });
     }
@@ -78,7 +78,7 @@ export class Worlds {
       scenes: [...this.viewer.scenes.map((scene) => this.sceneOf(scene)), ...this.absent.scenes],
       models: [...models, ...this.absent.models],
       hidden: this.hidden.list.map(({ part }) => part),
-      bookmarks: this.bookmarks.list.map(({ name, view }) => ({ name, view: formatView(view) })),
+      bookmarks: this.bookmarks.list.slice(0, kMost.bookmarks).map(({ name, view }) => ({ name: name || 'View', view: formatView(view) })),
     }, files);
     return new Blob([text], { type: 'application/json' });
   }
@@ -200,7 +200,15 @@ export class Worlds {
 async function fetched(path: string, address: string | undefined): Promise<ModelFile | undefined> {
   const url = address === undefined && !/^https?:/i.test(path) ? undefined : addressOfFile(path, address ?? location.href);
   if (url === undefined) return undefined;
-  return { path, file: new Blob([await fetchFile(url, path, kModelBytes)]) };
+  return { path, file: new Blob([await fetchNamed(url, path, kModelBytes, 'put it where the world says')]) };
+}
+
+async function fetchNamed(url: string, name: string, most: number, remedy: string): Promise<Uint8Array<ArrayBuffer>> {
+  try {
+    return await fetchFile(url, name, most);
+  } catch (error) {
+    throw error instanceof SceneError ? new SceneError(error.what, error.place, error.reason, remedy) : error;
+  }
 }
 
 function isOf(scene: TesseraScene, { url }: WorldScene, address: string): boolean {
