@@ -93,7 +93,8 @@ export function addModels(
     receive([...picker.files!].map((file) => ({ path: file.name, file })));
     picker.value = '';
   });
-  panel.body.append(sceneList(viewer), picker);
+  panel.body.prepend(sceneList(viewer));
+  panel.body.append(picker);
 
   models.onChange.add(() => {
     gizmo.attach(models.selected?.visible ? models.selected : undefined);

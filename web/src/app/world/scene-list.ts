@@ -5,9 +5,10 @@ import type { Viewer } from '../viewer';
 
 export function sceneList(viewer: Viewer): HTMLElement {
   const list = element('ul', 'scenes');
+  const body = element('div', '', element('p', 'faint', 'Scenes'), list);
   const show = () => {
     const several = viewer.scenes.length > 1 ? viewer.scenes : [];
-    list.hidden = several.length === 0;
+    body.hidden = several.length === 0;
     list.replaceChildren(...several.map((scene) => {
       const name = scene.name === '' ? 'Scene' : scene.name;
       const row = element('li', '', element('span', 'name', name), iconButton(scene.visible ? 'Hide' : 'Show', name, 'eye', () => {
@@ -20,5 +21,5 @@ export function sceneList(viewer: Viewer): HTMLElement {
   };
   viewer.onScenes.add(show);
   show();
-  return element('div', '', list);
+  return body;
 }
