@@ -1,4 +1,5 @@
 // A world that tessera serve gives, and what people add to it. By pixels.
+import { spawnSync } from 'node:child_process';
 import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -7,7 +8,6 @@ import { afterAll, beforeAll, beforeEach, describe, expect, it } from 'vitest';
 import { madeGlb } from '../src/testing/made-glb';
 import { goldenScene, launch, missing, program, serve, viewer, type Server } from './machine';
 import { decodePixels } from './pictures';
-import { spawnSync } from 'node:child_process';
 
 const kView = 'eye=10,-120,70&target=10,-20,5&fov=50';
 const upright = [0, 0, 0, 1];
@@ -71,7 +71,6 @@ describe.skipIf(missing())('a world that is served', () => {
     await page.mouse.move(630, 390);
     await page.waitForTimeout(1500);
     await page.waitForSelector('.loading.done', { state: 'attached' });
-    if (process.env.SHOTS) await page.screenshot({ path: join(process.env.SHOTS, `${Date.now()}.png`) });
     return decodePixels(page, await page.screenshot());
   }
 
@@ -130,6 +129,7 @@ describe.skipIf(missing())('a world that is served', () => {
     await open(`#${kView}`, 'with gaps.json');
     await page.waitForSelector('.error', { state: 'visible' });
     expect(await page.textContent('.error')).toMatch(/lost\.glb.*404.*And 1 more/);
+    await page.click('.error button');
     await page.keyboard.press('o');
     const saved = await save();
     expect(saved.scenes.map(({ name }) => name)).toEqual(['golden', 'Old town', 'Gone']);
@@ -156,7 +156,6 @@ describe.skipIf(missing())('a world that is served', () => {
     await page.waitForSelector('.hiding li.on');
     await page.fill('.hiding .field:has-text("Height") input', '60');
     await page.fill('.hiding .field:has-text("Turn") input', '30');
-    if (process.env.SHOTS) await page.waitForTimeout(2000), await page.screenshot({ path: join(process.env.SHOTS, 'hiding.png') });
     const without = await picture();
     expect(changed(whole, without)).toBeGreaterThan(300);
     await page.keyboard.press('o');

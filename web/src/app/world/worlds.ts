@@ -121,7 +121,7 @@ export class Worlds {
           scenes.set(saved, scene);
         } catch (error) {
           absent.scenes.push(saved);
-          lacks(error instanceof SceneError ? new SceneError(named.name, `scenes[${i}]`, `cannot be opened: ${error.message}`, error.remedy) : error);
+          lacks(error instanceof SceneError ? new SceneError(named.name, `scenes[${i}]`, `cannot be opened: ${error.reason}`, error.remedy) : error);
         }
       }
       const held = [...world.files].map(([path, bytes]): ModelFile => ({ path, file: new Blob([bytes]) }));
