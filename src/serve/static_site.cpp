@@ -65,8 +65,8 @@ SiteAnswer plain(int status, const std::string& reason) {
 
 }  // namespace
 
-StaticSite::StaticSite(std::vector<SiteFolder> folders, std::vector<std::string> hosts)
-    : folders_(std::move(folders)), hosts_(std::move(hosts)) {
+StaticSite::StaticSite(std::vector<SiteFolder> folders, std::vector<std::string> hosts, std::string start)
+    : folders_(std::move(folders)), hosts_(std::move(hosts)), start_(std::move(start)) {
   std::error_code status;
   if (!fs::is_directory("/proc/self/fd", status)) {
     throw Error("/proc", "", "is not there, and says what a file is that was opened", "mount it");
@@ -112,6 +112,11 @@ SiteAnswer StaticSite::answer(const SiteRequest& request) const {
     SiteAnswer refused = plain(405, "files can be read, and nothing else");
     refused.headers.emplace_back("Allow", "GET, HEAD");
     return finish(std::move(refused));
+  }
+  if (!start_.empty() && request.target == "/") {
+    SiteAnswer onward = plain(302, "go on to " + start_);
+    onward.headers.emplace_back("Location", start_);
+    return finish(std::move(onward));
   }
   const auto path = pathOfTarget(request.target);
   const SiteFile::Opening opening = path ? fileAt(*path) : SiteFile::Opening();

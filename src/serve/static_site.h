@@ -39,8 +39,9 @@ struct SiteAnswer {
 class StaticSite {
  public:
   // Hosts: what clients may call the server; any where there is none. (Against pages of other sites that have their
-  // name resolved to this machine.) Throws Error where a folder is none, or /proc is not there.
-  StaticSite(std::vector<SiteFolder> folders, std::vector<std::string> hosts);
+  // name resolved to this machine.) Who asks for "/" without a query is sent on to `start`, if there is one. Throws
+  // Error where a folder is none, or /proc is not there.
+  StaticSite(std::vector<SiteFolder> folders, std::vector<std::string> hosts, std::string start = "");
 
   SiteAnswer answer(const SiteRequest& request) const;
 
@@ -49,6 +50,7 @@ class StaticSite {
 
   std::vector<SiteFolder> folders_;
   std::vector<std::string> hosts_;
+  std::string start_;
 };
 
 }  // namespace tessera

@@ -165,6 +165,17 @@ TEST_F(StaticSiteTest, AnswersToItsOwnNamesOnly) {
   }
 }
 
+TEST_F(StaticSiteTest, SendsWhoComesToItsStart) {
+  const StaticSite site({{"", folder_.path() / "viewer"}}, {}, "?world=world/world.json");
+  const SiteAnswer onward = site.answer({.target = "/"});
+  EXPECT_EQ(onward.status, 302);
+  EXPECT_EQ(headerOf(onward, "Location"), "?world=world/world.json");
+  EXPECT_EQ(headerOf(onward, "Cache-Control"), "no-store");
+  EXPECT_EQ(site.answer({.target = "/?world=world/world.json"}).status, 200);
+  EXPECT_EQ(site.answer({.target = "/index.html"}).status, 200);
+  EXPECT_EQ(get("/").status, 200) << "which has none";
+}
+
 TEST_F(StaticSiteTest, RefusesAFolderThatIsNone) {
   EXPECT_THROW(StaticSite({{"", folder_.path() / "nothing"}}, {}), Error);
   EXPECT_THROW(StaticSite({{"", folder_.path() / "secret.txt"}}, {}), Error);

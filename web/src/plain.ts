@@ -2,6 +2,7 @@
 import * as THREE from 'three';
 import { kYUpFromZUp } from './axes';
 import { TesseraScene, type SceneOptions } from './scene';
+import { updateScenes } from './scenes';
 
 const canvas = document.querySelector('canvas')!;
 const renderer = new THREE.WebGLRenderer({ canvas, antialias: false, preserveDrawingBuffer: true });
@@ -52,7 +53,8 @@ function setCamera(camera: THREE.PerspectiveCamera, { matrix, fx, fy, cx, cy, wi
 
 // Waits for the card: pages that draw ahead of it leave it with pictures that nobody will see.
 function draw(city: TesseraScene, camera: THREE.Camera): void {
-  city.update(camera, renderer);
+  if (plain.beside) updateScenes([city, plain.beside], camera, renderer);
+  else city.update(camera, renderer);
   renderer.render(world, camera);
   gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
 }
@@ -60,6 +62,7 @@ function draw(city: TesseraScene, camera: THREE.Camera): void {
 const plain = {
   THREE, renderer, world, camera,
   city: undefined as TesseraScene | undefined,
+  beside: undefined as TesseraScene | undefined, // another one
   errors: [] as string[],
 
   card(): string {
@@ -72,6 +75,14 @@ const plain = {
     this.city.onError = (error) => this.errors.push(error.message);
     world.background = this.city.background;
     world.add(this.city);
+  },
+
+  // Another one in the same world, so far from the first; in the capture's world.
+  async openBeside(url: string, away: number[], options: SceneOptions = {}): Promise<void> {
+    this.beside = await TesseraScene.load(url, options);
+    this.beside.showsSurround = false;
+    this.beside.position.fromArray(away).applyMatrix4(kYUpFromZUp);
+    world.add(this.beside);
   },
 
   close(): void {
@@ -94,8 +105,10 @@ const plain = {
   // Draws until nothing that the view asks for is still to come; milliseconds.
   async settle(view: View | View[], most = 60000): Promise<number> {
     const begin = performance.now();
+    const scenes = this.beside ? [this.city!, this.beside].filter(({ visible }) => visible) : [this.city!];
+    const isBusy = () => scenes.some(({ idle }) => !idle);
     const looking = look(view);
-    for (let frames = 0; frames < 3 || !this.city!.idle; ++frames) {
+    for (let frames = 0; frames < 3 || isBusy(); ++frames) {
       if (performance.now() - begin > most) throw new Error('the view does not come to rest');
       draw(this.city!, looking);
       await new Promise((resolve) => setTimeout(resolve, 0));
@@ -129,6 +142,22 @@ const plain = {
     mesh.applyMatrix4(this.city!.localFromScene);
     mesh.applyMatrix4(this.city!.matrixWorld);
     world.add(mesh);
+  },
+
+  // Nothing of the scene is drawn in these boxes; scene units.
+  hide(boxes: { low: number[]; high: number[] }[]): void {
+    this.city!.hidden = boxes.map(({ low, high }) => {
+      const box = new THREE.Box3(new THREE.Vector3(...low), new THREE.Vector3(...high));
+      const size = box.getSize(new THREE.Vector3());
+      const inScene = new THREE.Matrix4().makeScale(size.x, size.y, size.z).setPosition(box.getCenter(new THREE.Vector3()));
+      return this.city!.localFromScene.clone().multiply(inScene);
+    });
+  },
+
+  // What `pick` finds in the last picture, from -1 to 1 across it; scene units.
+  surfaceAt(x: number, y: number): number[] | undefined {
+    const place = this.city!.pick(new THREE.Vector2(x, y), renderer);
+    return place && this.city!.worldToLocal(place).applyMatrix4(this.city!.localFromScene.clone().invert()).toArray();
   },
 
   // Red cubes in the capture's world: their middles, and half an edge each.

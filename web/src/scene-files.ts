@@ -67,7 +67,7 @@ export class ChosenFiles implements SceneFiles {
 
 // Throws SceneError that names the file and says what the server, or the network, said; or that it is larger than `most`
 // bytes, before more than that has been kept.
-async function fetchFile(url: string, name: string, most: number, signal?: AbortSignal): Promise<ContentFile> {
+export async function fetchFile(url: string, name: string, most: number, signal?: AbortSignal): Promise<ContentFile> {
   try {
     const answer = await fetch(url, { signal });
     if (!answer.ok) {

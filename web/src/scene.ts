@@ -8,11 +8,11 @@
 //
 // `update` streams in what the camera asks for and draws the scene into targets of its own, up to what opaque objects of
 // the same world hide; `render` then shows it among them. Its own frame is the capture's, turned from z up to y up, in
-// metres where the capture has a scale.
+// metres where the capture has a scale. Where several stand in one world, see scenes.ts.
 import * as THREE from 'three';
 import { kYUpFromZUp } from './axes';
 import { DecodePool } from './decode-pool';
-import { cityMesh } from './draw/city-mesh';
+import { cityMesh, kFirstRenderOrder } from './draw/city-mesh';
 import { Compositor, type DrawnContent, type DrawnPart } from './draw/compositor';
 import { kDisplayModes, type DisplayMode } from './draw/display-modes';
 import { OpaqueDepth } from './draw/opaque-depth';
@@ -40,6 +40,12 @@ export interface SceneStatistics extends StreamStatistics {
   drawn: number[]; // tiles of each level in the last picture
 }
 
+// What other scenes of the same world are to this one (scenes.ts).
+export interface Neighbours {
+  behind: readonly TesseraScene[]; // drawn already: their surfaces end its rays
+  boxes: readonly THREE.Matrix4[]; // in which its surround is not drawn, as `hidden` has them
+}
+
 type Streamer = TileStreamer<ContentFile, VolumeContent, DrawnContent>;
 
 export class TesseraScene extends THREE.Object3D {
@@ -49,6 +55,11 @@ export class TesseraScene extends THREE.Object3D {
   resolutionScale = 1; // pixels of the scene beside those of the canvas, along an edge
   display: DisplayMode = 'colour';
   minTransmittance = 1 / 255; // rays end where less would be seen; 0: never
+  // Boxes in which nothing of it is drawn, at most kMostHiddenBoxes: from the cube of edge 1 about the origin to this
+  // object's frame.
+  hidden: THREE.Matrix4[] = [];
+  showsSurround = true; // false: nothing outside of `bounds` is drawn
+  neighbours: Neighbours = { behind: [], boxes: [] };
   // Of tiles that cannot be had, and of a budget that is too small; told once each.
   onError: (error: SceneError) => void = () => {};
   private readonly tree: TileTree;
@@ -132,7 +143,8 @@ export class TesseraScene extends THREE.Object3D {
     const worldFromScene = this.matrixWorld.clone().multiply(this.localFromScene);
     const { size, pictures } = picturesOf(camera, renderer, worldFromScene, this.resolutionScale);
     if (pictures.length === 0) return;
-    const depth = this.opaque.draw(renderer, pictures, this, size);
+    const surfaces = this.neighbours.behind.map((scene) => scene.mesh).filter((one) => one !== undefined);
+    const depth = this.opaque.draw(renderer, pictures, this, size, new Set(surfaces));
     compositor.resize(size);
     streamer.settings = { ...this.stream, cardBytes: this.stream.cardBytes - compositor.bytes - this.opaque.bytes };
     const views = pictures.map((picture) => tileView(this.tileset, picture, worldFromScene));
@@ -140,7 +152,7 @@ export class TesseraScene extends THREE.Object3D {
     const cut = new Set(tiles.map(({ tile }) => tile));
     const contentOf = new Map(tiles.filter(({ visible }) => visible).map(({ tile, content }) => [tile, content]));
     // What it surrounds comes first: on slow machines a picture of it alone would only take time.
-    const behind = streamer.complete ? streamer.residentOf(surround) : undefined;
+    const behind = streamer.complete && this.showsSurround ? streamer.residentOf(surround) : undefined;
     const contents = views.map((view): DrawnPart[] => {
       const parts = cutFrontToBack(this.tree, cut, view.eye).flatMap((tile): DrawnPart[] => {
         const content = contentOf.get(tile);
@@ -153,7 +165,11 @@ export class TesseraScene extends THREE.Object3D {
     for (const content of new Set(contentOf.values())) ++this.drawn[this.tree.tiles[content].level];
     compositor.view.minTransmittance.value = this.minTransmittance;
     compositor.view.display.value = kDisplayModes.indexOf(this.display);
+    const sceneFromLocal = this.localFromScene.clone().invert();
+    const inScene = (boxes: readonly THREE.Matrix4[]) => boxes.map((box) => sceneFromLocal.clone().multiply(box));
+    compositor.hide(inScene(this.hidden), inScene(this.neighbours.boxes), !this.showsSurround);
     compositor.draw(renderer, pictures, worldFromScene, contents, depth);
+    mesh.renderOrder = kFirstRenderOrder + this.neighbours.behind.length;
     mesh.visible = contents.some((ofOne) => ofOne.length > 0);
   }
 

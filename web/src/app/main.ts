@@ -1,12 +1,16 @@
-// The viewer: a page that shows the scene which its address names (?scene=, else the folder scene beside it).
+// The viewer: a page that shows the world or the scene which its address names (?world=, ?scene=, else the folder scene
+// beside it).
 import { TesseraScene } from '../scene';
 import { SceneError } from '../scene-error';
 import { ChosenFiles } from '../scene-files';
-import { addBookmarks } from './views/bookmarks';
+import { addHiding } from './hiding/hiding-tool';
+import { HiddenParts } from './hiding/hidden-parts';
+import { addBookmarks, bookmarksOf } from './views/bookmarks';
 import { element } from './page/element';
 import { addHelp } from './page/help';
 import { addHeadset } from './headset/headset-tool';
 import { addMeasuring } from './measuring/measuring';
+import { Models } from './models/models';
 import { addModels } from './models/models-tool';
 import { kModes } from './moving/navigation';
 import { addNavigationTools } from './moving/navigation-tools';
@@ -17,6 +21,7 @@ import { Shortcuts } from './page/shortcuts';
 import { Toolbar } from './page/toolbar';
 import { formatView, parseView } from './views/view-address';
 import { makeRenderer, Viewer } from './viewer';
+import { addressOfMain, fetchWorld, Worlds } from './world/worlds';
 import './page/style.css';
 
 const canvas = document.querySelector<HTMLCanvasElement>('#view')!;
@@ -31,7 +36,10 @@ function fail(error: unknown): void {
 
 async function start(): Promise<void> {
   const renderer = makeRenderer(canvas);
-  const city = location.protocol === 'file:' ? await chooseScene() : await TesseraScene.load(sceneOfAddress());
+  const asked = new URLSearchParams(location.search).get('world');
+  const world = asked === null || location.protocol === 'file:' ? undefined : await fetchWorld(asked);
+  const address = world ? addressOfMain(world) : sceneOfAddress();
+  const city = location.protocol === 'file:' ? await chooseScene() : await TesseraScene.load(address);
   city.onError = fail;
   document.title = city.name === '' ? 'tessera' : `${city.name} · tessera`;
   const viewer = new Viewer(canvas, renderer, city);
@@ -39,8 +47,11 @@ async function start(): Promise<void> {
   const toolbar = new Toolbar(document.body, shortcuts);
   addNavigationTools(viewer, toolbar, shortcuts);
   addMeasuring(viewer, toolbar, shortcuts);
-  addModels(viewer, toolbar, shortcuts, fail);
-  addBookmarks(viewer, toolbar);
+  const [models, hidden, bookmarks] = [new Models(viewer), new HiddenParts(viewer), bookmarksOf(viewer)];
+  const worlds = new Worlds(viewer, models, hidden, bookmarks);
+  addModels(viewer, models, worlds, toolbar, shortcuts, fail);
+  addHiding(viewer, hidden, toolbar, shortcuts);
+  addBookmarks(viewer, bookmarks, toolbar);
   addScreenshot(viewer, toolbar);
   addSettings(viewer, toolbar);
   toolbar.add({ name: 'Numbers', key: 'i', icon: 'chart', opened: () => {
@@ -51,11 +62,12 @@ async function start(): Promise<void> {
   void addHeadset(viewer, toolbar, shortcuts, fail); // others do not wait for what may take long
   keepViewInAddress(viewer);
   viewer.onFrame.add((frame) => {
-    const numbers = city.statistics;
+    const numbers = viewer.statistics;
     if (!numbers) return;
-    loading.show(city.name, numbers, city.idle);
+    loading.show(city.name, numbers, viewer.idle);
     statistics.show(numbers, frame);
   });
+  if (world) await worlds.open(world, fail);
 }
 
 function sceneOfAddress(): string {

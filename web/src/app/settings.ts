@@ -14,7 +14,7 @@ const kResolutions: [string, number | undefined][] = [
 ];
 
 export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
-  const { city, camera, resolution } = viewer;
+  const { city, scenes, camera, resolution } = viewer;
   const changed = <T>(change: (value: T) => void) => (value: T) => {
     change(value);
     viewer.needPicture();
@@ -23,13 +23,13 @@ export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
   const panel = element(
     'div', '',
     choice('Show', kDisplayModes.map((mode): [string, DisplayMode] => [kModeNames[mode], mode]),
-      changed((mode) => (city.display = mode))),
+      changed((mode) => scenes.forEach((scene) => (scene.display = mode)))),
     slider('Error at most', 0, 3, Math.log2(2 * city.selection.mostPixels), 0.25, (x) => `${(2 ** x / 2).toPrecision(2)} px`,
-      changed((x) => (city.selection.mostPixels = 2 ** x / 2))),
-    ...(levels.length > 1 ? [choice('Detail', levels, changed((level) => (city.selection.finestLevel = level)))] : []),
+      changed((x) => scenes.forEach(({ selection }) => (selection.mostPixels = 2 ** x / 2)))),
+    ...(levels.length > 1 ? [choice('Detail', levels, changed((level) => scenes.forEach(({ selection }) => (selection.finestLevel = level))))] : []),
     choice('Pixels', kResolutions, changed((share) => (resolution.fixed = share))),
     slider('Graphics memory', 6, 13, Math.log2(city.stream.cardBytes / 2 ** 20), 0.5, (x) => `${Math.round(2 ** x)} MiB`,
-      changed((x) => (city.stream.cardBytes = 2 ** x * 2 ** 20))),
+      changed((x) => (viewer.cardBytes = 2 ** x * 2 ** 20))),
     slider('Field of view', 15, 100, camera.fov, 1, (x) => `${x}°`, changed((x) => {
       camera.fov = x;
       camera.updateProjectionMatrix();

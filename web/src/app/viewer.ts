@@ -1,8 +1,9 @@
-// A scene on a canvas: the world it stands in, the camera, and when a picture is drawn. What the tools of the application
+// Scenes on a canvas: the world they stand in, the camera, and when a picture is drawn. What the tools of the application
 // share.
 import * as THREE from 'three';
-import { TesseraScene } from '../scene';
+import type { SceneStatistics, TesseraScene } from '../scene';
 import { SceneError } from '../scene-error';
+import { updateScenes } from '../scenes';
 import { Navigation, type Look } from './moving/navigation';
 import { Resolution, type Pace } from './moving/resolution';
 import { GpuTimer } from './page/gpu-timer';
@@ -30,11 +31,14 @@ export class Viewer {
   readonly onFrame = new Set<(frame: Frame) => void>();
   // Called where somebody clicked, or tapped, without dragging; the first that answers true takes it.
   readonly onClick: ((event: PointerEvent) => boolean)[] = [];
+  readonly scenes: TesseraScene[]; // the city first
+  readonly onScenes = new Set<() => void>(); // of the list, of what is visible
+  private cardBudget: number;
   private mover: Mover;
   private needed = true; // a picture, though nothing moves
   private held = false;
 
-  // The city is in the world, at the origin.
+  // The city is in the world, at the origin; its frame is that of all that stands there.
   constructor(
     readonly canvas: HTMLCanvasElement,
     readonly renderer: THREE.WebGLRenderer,
@@ -42,6 +46,8 @@ export class Viewer {
   ) {
     this.world.background = city.background;
     this.world.add(city);
+    this.scenes = [city];
+    this.cardBudget = city.stream.cardBytes;
     this.navigation = new Navigation(this.camera, canvas, city.bounds, (event) => this.pickAt(event));
     this.mover = this.navigation;
     addEventListener('resize', () => this.resize());
@@ -74,6 +80,62 @@ export class Viewer {
     this.resize(); // of which nothing was to be heard meanwhile
   }
 
+  // Another one beside the city, which is drawn in the same way, up to the box of what was captured.
+  addScene(scene: TesseraScene): void {
+    const { city } = this;
+    Object.assign(scene.selection, city.selection);
+    Object.assign(scene, { display: city.display, onError: city.onError, resolutionScale: city.resolutionScale, showsSurround: false });
+    this.scenes.push(scene);
+    this.world.add(scene);
+    this.changedScenes();
+  }
+
+  // Not the city. Gives its memory back.
+  removeScene(scene: TesseraScene): void {
+    this.scenes.splice(this.scenes.indexOf(scene), 1);
+    scene.removeFromParent();
+    scene.dispose();
+    this.changedScenes();
+  }
+
+  changedScenes(): void {
+    this.cardBytes = this.cardBudget;
+    const bounds = new THREE.Box3();
+    for (const scene of this.scenes) {
+      scene.updateWorldMatrix(true, false);
+      bounds.union(scene.bounds.applyMatrix4(scene.matrixWorld));
+    }
+    this.navigation.bounds = bounds;
+    for (const tell of this.onScenes) tell();
+    this.needPicture();
+  }
+
+  // Of the graphics card, for all scenes together. Each has as much of it.
+  set cardBytes(bytes: number) {
+    this.cardBudget = bytes;
+    for (const scene of this.scenes) scene.stream.cardBytes = bytes / this.scenes.length;
+  }
+
+  set resolutionScale(scale: number) {
+    for (const scene of this.scenes) scene.resolutionScale = scale;
+  }
+
+  // Nothing that the last view asked for is still to come.
+  get idle(): boolean {
+    return this.scenes.every(({ visible, idle }) => !visible || idle);
+  }
+
+  // Of all scenes together.
+  get statistics(): SceneStatistics | undefined {
+    const all = this.scenes.map(({ statistics }) => statistics).filter((one) => one !== undefined);
+    if (all.length === 0) return undefined;
+    return all.reduce((sum, one) => {
+      const drawn = Array.from({ length: Math.max(sum.drawn.length, one.drawn.length) }, (_, i) => (sum.drawn[i] ?? 0) + (one.drawn[i] ?? 0));
+      const added = Object.entries(one).map(([key, value]) => [key, (sum[key as keyof SceneStatistics] as number) + (value as number)]);
+      return { ...(Object.fromEntries(added) as SceneStatistics), drawn };
+    });
+  }
+
   // Somebody has changed what is to be seen.
   needPicture(): void {
     this.needed = true;
@@ -85,15 +147,28 @@ export class Viewer {
     return new THREE.Vector2((2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height);
   }
 
-  // The place of the world under the pointer: of the city, or of a model in front of it.
+  // The place of the world under the pointer: of a scene, or of a model in front of it.
   pickAt(event: { clientX: number; clientY: number }): THREE.Vector3 | undefined {
     const at = this.pointerAt(event);
     const raycaster = new THREE.Raycaster();
     raycaster.setFromCamera(at, this.camera);
-    const hit = raycaster.intersectObjects(this.world.children.filter((child) => child !== this.city && child.visible && !child.userData.isTool))[0];
-    const place = this.city.pick(at, this.renderer);
-    if (!hit || (place && place.distanceTo(this.camera.getWorldPosition(new THREE.Vector3())) < hit.distance)) return place;
+    const isOther = (child: THREE.Object3D) => !(this.scenes as THREE.Object3D[]).includes(child) && child.visible && !child.userData.isTool;
+    const hit = raycaster.intersectObjects(this.world.children.filter(isOther))[0];
+    const place = this.pickScenes(at);
+    if (!hit || (place && place.distanceTo(this.eye) < hit.distance)) return place;
     return hit.point;
+  }
+
+  // Of the scenes alone: the nearest; `at` runs from -1 to 1 across the picture.
+  pickScenes(at: THREE.Vector2): THREE.Vector3 | undefined {
+    const distance = (place: THREE.Vector3) => place.distanceTo(this.eye);
+    const places = this.scenes.map((scene) => (scene.visible ? scene.pick(at, this.renderer) : undefined));
+    return places.filter((place) => place !== undefined).sort((a, b) => distance(a) - distance(b))[0];
+  }
+
+  // Of the world, whatever group the camera is in.
+  get eye(): THREE.Vector3 {
+    return this.camera.getWorldPosition(new THREE.Vector3());
   }
 
   // Has the loop wait, and the camera stay, while somebody else draws.
@@ -131,30 +206,30 @@ export class Viewer {
 
   private run(): void {
     let wasWhole = false; // the last picture was
-    let wasMoving = false; // when it was drawn
-    let before = performance.now();
+    let motion = this.resolution.motion(0); // when it was drawn
+    let last = performance.now();
     const timer = new GpuTimer(this.renderer);
     this.renderer.setAnimationLoop(() => {
       const now = performance.now();
-      const milliseconds = now - before;
-      before = now;
+      const milliseconds = now - last;
+      last = now;
       if (this.held) return;
       if (this.mover.update(milliseconds / 1000)) this.resolution.moved(now);
-      const isMoving = !this.resolution.isResting(now);
-      if (!isMoving && wasWhole && this.city.idle && !this.needed) return;
-      if (isMoving && wasMoving) this.resolution.took(milliseconds);
-      wasMoving = isMoving;
+      const before = motion;
+      motion = this.resolution.motion(now);
+      if (motion === 'rest' && wasWhole && this.idle && !this.needed) return;
+      if (motion === before) this.resolution.took(milliseconds, motion);
       this.needed = false;
-      this.city.resolutionScale = this.resolution.scale(now);
+      const resolutionScale = (this.resolutionScale = this.resolution.scale(now));
       timer.measure(() => this.draw());
-      wasWhole = this.city.resolutionScale === this.resolution.whole;
-      const frame = { milliseconds, gpuMilliseconds: timer.milliseconds, resolutionScale: this.city.resolutionScale };
+      wasWhole = resolutionScale === this.resolution.whole;
+      const frame = { milliseconds, gpuMilliseconds: timer.milliseconds, resolutionScale };
       for (const tell of this.onFrame) tell(frame);
     });
   }
 
   draw(): void {
-    this.city.update(this.camera, this.renderer);
+    updateScenes(this.scenes, this.camera, this.renderer);
     this.renderer.render(this.world, this.camera);
   }
 

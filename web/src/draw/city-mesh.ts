@@ -5,6 +5,8 @@ import type { Compositor } from './compositor';
 import { screenTriangle } from './compositor';
 import { kDisplayConstants } from './display-modes';
 
+export const kFirstRenderOrder = -1e9; // of what is transparent
+
 const kVertexShader = `
 void main() {
   gl_Position = vec4(position.xy, 0.0, 1.0);
@@ -81,7 +83,7 @@ export function cityMesh(compositor: Compositor): THREE.Mesh<THREE.BufferGeometr
   mesh.name = 'scene';
   mesh.frustumCulled = false;
   mesh.visible = false; // until there is a picture
-  mesh.renderOrder = -1e9; // the first of what is transparent
+  mesh.renderOrder = kFirstRenderOrder;
   mesh.raycast = () => {};
   // Other cameras than those that it was drawn for are shown the first picture.
   mesh.onBeforeRender = (renderer, _, camera) => {

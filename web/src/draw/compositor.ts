@@ -8,7 +8,8 @@ import { frontToBack as orderOf } from './box-order';
 import { colourOfBlock, colourOfLevel } from './display-modes';
 import { packNetwork } from './network-shader';
 import { drawAsTheyStand, type Picture } from './picture';
-import { programMaterial, volumeMaterial, viewUniforms, type ProgramShape, type ViewUniforms } from './volume-material';
+import { kMostHiddenBoxes, programMaterial, volumeMaterial, viewUniforms, type ProgramShape, type ViewUniforms } from './volume-material';
+import { SceneError } from '../scene-error';
 import { atlasesOf, type ContentTextures } from './content-textures';
 
 // A content that may be drawn.
@@ -74,6 +75,7 @@ export class Compositor {
   private readonly screen = screenTriangle();
   private readonly anyCamera = new THREE.Camera();
   private readonly nothingOpaque = farthestDepth();
+  private cuts = false; // from the first hidden box on, so that programs are not made anew for each
   private readonly prepared = new Map<string, THREE.Material>(); // hold programs, by their shape
 
   // What the card can blend decides how the pictures are kept.
@@ -169,6 +171,23 @@ export class Compositor {
     this.view.resolution.value.set(x, y);
   }
 
+  // Boxes in which nothing is drawn, and such in which nothing of the surround is: from the cube of edge 1 about the
+  // origin to the scene. `withinBox`: nor is anything outside of the scene's box. Throws SceneError where they are too
+  // many; those without a volume hide nothing.
+  hide(boxes: readonly THREE.Matrix4[], ofSurround: readonly THREE.Matrix4[], withinBox: boolean): void {
+    if (boxes.length > kMostHiddenBoxes) {
+      throw new SceneError('scene', 'hidden', `are ${boxes.length} boxes, and ${kMostHiddenBoxes} can be hidden`, 'hide fewer, larger ones');
+    }
+    const { boxFromScene, hiddenBoxes, hiddenBoxesOfSurround } = this.view;
+    const whole = (box: THREE.Matrix4) => box.determinant() !== 0;
+    const all = [...boxes.filter(whole), ...ofSurround.filter(whole).slice(0, kMostHiddenBoxes)];
+    all.forEach((box, n) => boxFromScene.value[n].copy(box).invert());
+    hiddenBoxes.value = boxes.filter(whole).length;
+    hiddenBoxesOfSurround.value = all.length;
+    this.view.withinBox.value = withinBox;
+    this.cuts ||= all.length > 0 || withinBox;
+  }
+
   // `worldFromScene`: of three's world; contents of each picture, front to back. Draws into `target`; rays end at the depth
   // of what is opaque, if that is given.
   draw(
@@ -177,6 +196,11 @@ export class Compositor {
   ): void {
     this.pictures = pictures;
     this.view.opaqueDepth.value = opaqueDepth ?? this.nothingOpaque;
+    for (const { mesh: { material } } of new Set(contents.flat().map(({ content }) => content))) {
+      if (!this.cuts || 'CUTS' in material.defines) continue;
+      material.defines.CUTS = '';
+      material.needsUpdate = true;
+    }
     const before = renderer.getRenderTarget();
     const autoClear = renderer.autoClear;
     const clearColour = renderer.getClearColor(new THREE.Color());
@@ -225,7 +249,7 @@ export class Compositor {
     // What is contracted may own what lies beyond any box.
     const everywhere = surround || parts.some((part) => part.contracted);
     return {
-      parts: parts.length, atlases, widths, surround, everywhere, distancesOfBytes: this.distancesOfBytes,
+      parts: parts.length, atlases, widths, surround, everywhere, distancesOfBytes: this.distancesOfBytes, cuts: this.cuts,
       network: network?.every(Number.isFinite) ? network : undefined,
     };
   }

@@ -10,8 +10,12 @@ export class OpaqueDepth {
     return this.target ? 8 * this.target.width * this.target.height : 0;
   }
 
-  // Null where there is nothing opaque in the world that `scene` stands in.
-  draw(renderer: THREE.WebGLRenderer, pictures: Pick<Picture, 'camera' | 'part'>[], scene: THREE.Object3D, size: THREE.Vector2): THREE.Texture | null {
+  // Null where there is nothing opaque in the world that `scene` stands in. `surfaces`: objects that let light through
+  // and end rays all the same, by the depth that they write.
+  draw(
+    renderer: THREE.WebGLRenderer, pictures: Pick<Picture, 'camera' | 'part'>[], scene: THREE.Object3D, size: THREE.Vector2,
+    surfaces: ReadonlySet<THREE.Object3D> = new Set(),
+  ): THREE.Texture | null {
     let world: THREE.Object3D = scene;
     while (world.parent) world = world.parent;
     const seeThrough = new Set<THREE.Material>();
@@ -25,7 +29,7 @@ export class OpaqueDepth {
         for (const one of Array.isArray(material) ? material : [material]) {
           if (!one.visible) continue;
           // What lets light through, or writes no depth, ends no ray; what else the object is made of may.
-          if (one.transparent || !one.depthWrite) seeThrough.add(one);
+          if (!surfaces.has(object) && (one.transparent || !one.depthWrite)) seeThrough.add(one);
           else found = true;
         }
       }

@@ -23,7 +23,13 @@ export interface ViewUniforms {
   opaqueDepth: { value: THREE.Texture | null }; // of the depth buffer of what stands in the scene; 1 everywhere where nothing does
   sceneFromClip: { value: THREE.Matrix4 };
   display: { value: number }; // of kDisplayModes
+  boxFromScene: { value: THREE.Matrix4[] }; // of boxes in which nothing is drawn, |x| <= 1/2 in each
+  hiddenBoxes: { value: number }; // so many of them for what is no surround
+  hiddenBoxesOfSurround: { value: number }; // and for the surround
+  withinBox: { value: boolean }; // nothing is drawn outside of the scene's box
 }
+
+export const kMostHiddenBoxes = 8; // of somebody's, and as many in the surround alone
 
 export function viewUniforms(): ViewUniforms {
   return {
@@ -40,6 +46,10 @@ export function viewUniforms(): ViewUniforms {
     opaqueDepth: { value: null },
     sceneFromClip: { value: new THREE.Matrix4() },
     display: { value: 0 },
+    boxFromScene: { value: Array.from({ length: 2 * kMostHiddenBoxes }, () => new THREE.Matrix4()) },
+    hiddenBoxes: { value: 0 },
+    hiddenBoxesOfSurround: { value: 0 },
+    withinBox: { value: false },
   };
 }
 
@@ -74,6 +84,13 @@ uniform mat3 origin, ray;
 uniform mat4 sceneFromClip;
 uniform vec3 sceneLow, sceneHigh, withinLow, withinHigh, colourOfBlock, colourOfLevel;
 uniform int display;
+#ifdef CUTS
+uniform int hiddenBoxes;
+uniform mat4 boxFromScene[${2 * kMostHiddenBoxes}];
+uniform bool withinBox;
+#else
+const bool withinBox = false;
+#endif
 `;
 
 const kFragmentMain = `
@@ -87,22 +104,48 @@ float opaqueDistance(vec2 ndc, vec3 o, vec3 d) {
   return dot(x.xyz / x.w - o, d);
 }
 
+// What of range lies in no hidden box, piece by piece. Boxes are cut out of rays, where lengths are those of the scene
+// whatever is contracted.
+#ifdef CUTS
+void marchShown(Part part, vec3 o, vec3 d, vec2 range, inout Composite sum) {
+  float t = range.x;
+  int guard = 0;
+  do {
+    float exit = t, next = range.y;  // of the boxes that t lies in; the first that comes
+    for (int n = 0; n < hiddenBoxes; ++n) {
+      vec2 hidden = clipToBox((boxFromScene[n] * vec4(o, 1.0)).xyz, mat3(boxFromScene[n]) * d, vec3(-0.5), vec3(0.5), range);
+      if (hidden.x >= hidden.y || hidden.y <= t) continue;
+      if (hidden.x <= t) exit = max(exit, hidden.y);
+      else next = min(next, hidden.x);
+    }
+    if (exit == t) {
+      marchPart(part, o, d, vec2(t, next), sum);
+      exit = next;
+    }
+    t = exit;
+  } while (t < range.y && sum.transmittance >= minTransmittance && ++guard < ${4 * kMostHiddenBoxes + 1});
+}
+#else
+#define marchShown marchPart
+#endif
+
 void main() {
   vec2 ndc = 2.0 * (gl_FragCoord.xy - part.xy) / part.zw - 1.0;
   vec3 o = origin * vec3(ndc, 1.0), d = normalize(ray * vec3(ndc, 1.0));
   vec2 box = clipToBox(o, d, sceneLow, sceneHigh, vec2(sceneNear, 1e30));
   bool meetsBox = box.x < box.y;
-  float far = min(kSceneEnd, opaqueDistance(ndc, o, d));
+  if (withinBox && !meetsBox) discard;
+  float far = min(withinBox ? box.y : kSceneEnd, opaqueDistance(ndc, o, d));
   Composite sum = Composite(vec3(0.0), vec4(0.0), 1.0, 0.0, 0.0);
 #ifdef SURROUND
   vec2 behind = vec2(meetsBox ? box.y : sceneNear, far);
-  if (behind.x < behind.y) marchPart(partOf(0), o, d, behind, sum);
+  if (behind.x < behind.y) marchShown(partOf(0), o, d, behind, sum);
 #else
   vec2 whole = clipToBox(o, d, withinLow, withinHigh, vec2(meetsBox ? box.x : sceneNear, far));
   for (int n = 0; n < PARTS; ++n) {
     Part part = partOf(n);
     vec2 owned = ownedRange(part, o, d, whole);
-    if (owned.x < owned.y) marchPart(part, o, d, owned, sum);
+    if (owned.x < owned.y) marchShown(part, o, d, owned, sum);
     if (sum.transmittance < minTransmittance) break;
   }
 #endif
@@ -155,6 +198,7 @@ export interface ProgramShape {
   surround: boolean;
   everywhere: boolean; // fills the picture, as it owns what lies beyond any box
   distancesOfBytes: boolean; // the target's are, from 0 for no distance to 255 for the farthest
+  cuts: boolean; // knows hidden boxes, which costs a hundredth even where there are none
   network?: Float32Array; // packed; written into the program, which then is of one content alone
 }
 
@@ -167,6 +211,7 @@ export function programMaterial(shape: ProgramShape): THREE.RawShaderMaterial {
   if (shape.surround) defines.SURROUND = '';
   if (shape.everywhere) defines.EVERYWHERE = '';
   if (shape.distancesOfBytes) defines.DISTANCES_OF_BYTES = '';
+  if (shape.cuts) defines.CUTS = '';
   return new THREE.RawShaderMaterial({
     glslVersion: THREE.GLSL3,
     vertexShader: kVertexShader,
@@ -198,6 +243,7 @@ export function volumeMaterial(
   group.add(new THREE.Uniform(textures.numbers));
   material.uniforms = {
     ...view,
+    hiddenBoxes: shape.surround ? view.hiddenBoxesOfSurround : view.hiddenBoxes,
     planesFirst: { value: textures.planesFirst },
     planesSecond: { value: textures.planesSecond },
     inTexture: {

@@ -1,4 +1,4 @@
-// Handles that move, turn and scale a model. While they are dragged, the camera stays.
+// Handles that move, turn and scale a model, or a box. While they are dragged, the camera stays.
 import type * as THREE from 'three';
 import type { TransformControls } from 'three/addons/controls/TransformControls.js';
 import type { Viewer } from '../viewer';
@@ -13,7 +13,8 @@ export class ModelGizmo {
   private current: GizmoMode = 'translate';
   private pressed = false; // the pointer went down on a handle
 
-  constructor(private readonly viewer: Viewer, private readonly moved: () => void) {}
+  // `isBox`: each axis is scaled by itself, and it turns about the vertical alone.
+  constructor(private readonly viewer: Viewer, private readonly moved: () => void, private readonly isBox = false) {}
 
   get mode(): GizmoMode {
     return this.current;
@@ -21,7 +22,7 @@ export class ModelGizmo {
 
   set mode(mode: GizmoMode) {
     this.current = mode;
-    void this.controls?.then((controls) => (controls.mode = mode));
+    void this.controls?.then((controls) => this.setMode(controls));
     this.onModeChange();
   }
 
@@ -49,11 +50,16 @@ export class ModelGizmo {
     }, () => {});
   }
 
+  private setMode(controls: TransformControls): void {
+    controls.mode = this.current;
+    controls.showX = controls.showZ = !this.isBox || this.current !== 'rotate';
+  }
+
   private async make(): Promise<TransformControls> {
     const { TransformControls } = await import('three/addons/controls/TransformControls.js');
     const { camera, canvas, navigation, world } = this.viewer;
     const controls = new TransformControls(camera, canvas);
-    controls.mode = this.current;
+    this.setMode(controls);
     controls.size = 0.8;
     controls.showE = controls.showXYZE = false;
     controls.setColors(0xe0675e, 0x6199ee, 0x83c46c, 0xffe08a); // as in a world of z up: the vertical is blue
@@ -62,7 +68,10 @@ export class ModelGizmo {
     world.add(helper);
     controls.addEventListener('change', () => this.viewer.needPicture());
     controls.addEventListener('objectChange', () => {
-      if (controls.mode === 'scale' && this.object) scaleAlike(this.object, before);
+      if (controls.mode === 'scale' && this.object) {
+        if (this.isBox) this.object.scale.set(...sizesOf(this.object));
+        else scaleAlike(this.object, before);
+      }
       this.viewer.resolution.moved(performance.now());
       this.moved();
     });
@@ -78,6 +87,11 @@ export class ModelGizmo {
     for (const over of ['pointerup', 'pointercancel']) addEventListener(over, () => (navigation.enabled = true));
     return controls;
   }
+}
+
+// Of a box that is not turned inside out.
+function sizesOf({ scale }: THREE.Object3D): [number, number, number] {
+  return scale.toArray().map((x) => Math.max(Math.abs(x), 1e-3)) as [number, number, number];
 }
 
 // By what one of its axes was scaled most.

@@ -1,7 +1,7 @@
 // Where a model stands, as world.json has it: in the capture's world, z up, of the model's own origin.
 import * as THREE from 'three';
 import { kYUpFromZUp } from '../../axes';
-import type { WorldModel } from './world-file';
+import type { WorldModel } from '../world/world-file';
 
 export type Place = Pick<WorldModel, 'position' | 'rotation' | 'scale'>;
 

@@ -1,7 +1,7 @@
 // The list of models, and where the selected one stands, in numbers.
 import * as THREE from 'three';
 import { element } from '../page/element';
-import { icon, type IconName } from '../page/icons';
+import { iconButton, numberField } from '../page/fields';
 import type { GroundFrame } from '../measuring/geodesy';
 import { kGizmoModes, type GizmoMode, type ModelGizmo } from './model-gizmo';
 import { placeOf, setPlace } from './model-place';
@@ -14,15 +14,15 @@ export interface ModelActions {
 }
 
 export class ModelsPanel {
-  readonly body = element('div', 'models');
-  // What the models' files take, in words; empty where there is nothing to save.
+  readonly body = element('div', 'models listed');
+  // What the models' files take, in words.
   fileSize: () => string = () => '';
   private readonly hint = element('p', 'faint', 'Drop a model onto the city: glTF, OBJ or FBX, with its textures, or a saved world.');
   private readonly list = element('ul');
   private readonly details = element('div', 'details');
-  private readonly place = ['x', 'y', 'z, up'].map((axis, i) => this.field(axis, 0.1, 2, (to) => this.setPosition(i, to)));
-  private readonly turn = this.field('Turn, degrees', 1, 1, (to) => this.setTurn(to));
-  private readonly scale = this.field('Scale', 0.1, 4, (to) => this.setScale(to));
+  private readonly place = ['x', 'y', 'z, up'].map((axis, i) => numberField(axis, 0.1, 2, (to) => this.setPosition(i, to), () => this.show()));
+  private readonly turn = numberField('Turn, degrees', 1, 1, (to) => this.setTurn(to), () => this.show());
+  private readonly scale = numberField('Scale', 0.1, 4, (to) => this.setScale(to), () => this.show());
   private readonly size = element('p', 'faint');
   private readonly modes = new Map<GizmoMode, HTMLButtonElement>();
   private readonly plays = element('input');
@@ -53,6 +53,7 @@ export class ModelsPanel {
     add.addEventListener('click', () => actions.add());
     this.save.addEventListener('click', () => actions.save(false));
     this.saveAll.addEventListener('click', () => actions.save(true));
+    this.save.title = 'world.json: scenes, models, hidden parts and views';
     this.body.append(this.hint, this.list, this.details, element('div', 'row', add, this.save, this.saveAll));
     models.onChange.add(() => this.show());
     this.showMode();
@@ -75,7 +76,7 @@ export class ModelsPanel {
     this.shown = now;
     this.hint.hidden = list.length > 0;
     this.list.hidden = list.length === 0;
-    this.save.hidden = this.saveAll.hidden = list.length === 0;
+    this.saveAll.hidden = list.length === 0;
     this.saveAll.title = this.fileSize();
     this.details.hidden = !selected;
     if (!selected) return;
@@ -102,38 +103,15 @@ export class ModelsPanel {
     const { models } = this;
     const name = element('button', 'plain name', model.name);
     name.addEventListener('click', () => models.select(model === models.selected ? undefined : model));
-    const button = (what: string, picture: IconName, act: () => void) => {
-      const made = element('button', 'plain', icon(picture));
-      made.title = what;
-      made.setAttribute('aria-label', `${what}: ${model.name}`);
-      made.addEventListener('click', act);
-      return made;
-    };
-    const show = button(model.visible ? 'Hide' : 'Show', 'eye', () => {
+    const show = iconButton(model.visible ? 'Hide' : 'Show', model.name, 'eye', () => {
       model.visible = !model.visible;
       models.changed();
     });
     const row = element('li', model === models.selected ? 'on' : '', name, show,
-      button('Duplicate', 'copy', () => models.duplicate(model)), button('Delete', 'bin', () => models.remove(model)));
+      iconButton('Duplicate', model.name, 'copy', () => models.duplicate(model)),
+      iconButton('Delete', model.name, 'bin', () => models.remove(model)));
     row.classList.toggle('off', !model.visible);
     return row;
-  }
-
-  private field(name: string, step: number, digits: number, change: (to: number) => void) {
-    const input = element('input');
-    input.type = 'number';
-    input.step = String(step);
-    input.addEventListener('input', () => {
-      if (Number.isFinite(input.valueAsNumber) && Math.abs(input.valueAsNumber) < 1e7) change(input.valueAsNumber);
-    });
-    input.addEventListener('keydown', ({ key }) => {
-      if (key === 'Enter' || key === 'Escape') input.blur();
-    });
-    input.addEventListener('blur', () => this.show());
-    const set = (value: number) => {
-      if (document.activeElement !== input) input.value = String(Number(value.toFixed(digits)) + 0);
-    };
-    return { label: element('label', 'field', name, input), set };
   }
 
   private change(how: (model: PlacedModel) => void): void {

@@ -9,17 +9,20 @@ import { isModel, kAccepted, kindOf, nameOf, type ModelFile } from './model-file
 import { Models, type PlacedModel } from './models';
 import { ModelsPanel } from './models-panel';
 import { megabytes } from '../page/panels';
-import { bytesOfModels, openWorld, saveWorld } from './saved-world';
+import { bytesOf } from '../world/model-sources';
 import type { Shortcuts } from '../page/shortcuts';
 import type { Tool, Toolbar } from '../page/toolbar';
 import { GroundFrame } from '../measuring/geodesy';
 import { download } from '../page/page-files';
 import type { Viewer } from '../viewer';
-import { kWorldName } from './world-file';
+import { kWorldName } from '../world/world-file';
+import { sceneList } from '../world/scene-list';
+import type { Worlds } from '../world/worlds';
 
-export function addModels(viewer: Viewer, toolbar: Toolbar, shortcuts: Shortcuts, fail: (error: unknown) => void): void {
+export function addModels(
+  viewer: Viewer, models: Models, worlds: Worlds, toolbar: Toolbar, shortcuts: Shortcuts, fail: (error: unknown) => void,
+): void {
   const { canvas, city } = viewer;
-  const models = new Models(viewer);
   const gizmo = new ModelGizmo(viewer, () => models.changed());
   let placed: PlacedModel | undefined; // by the next click
 
@@ -30,14 +33,14 @@ export function addModels(viewer: Viewer, toolbar: Toolbar, shortcuts: Shortcuts
     panel.asks(model !== undefined);
   };
   const save = async (withFiles: boolean) => {
-    download(kWorldName, await saveWorld(models, city, withFiles));
+    download(kWorldName, await worlds.save(withFiles));
   };
   const panel = new ModelsPanel(models, gizmo, new GroundFrame(city.tileset.georeference), {
     add: () => picker.click(),
     save: (withFiles) => void save(withFiles).catch(fail),
     place: (model) => askForPlace(placed ? undefined : model),
   });
-  panel.fileSize = () => megabytes(bytesOfModels(models));
+  panel.fileSize = () => megabytes(bytesOf(models.list));
 
   const take = async (files: ModelFile[], place: THREE.Vector3) => {
     const mains = files.filter(isModel);
@@ -46,7 +49,7 @@ export function addModels(viewer: Viewer, toolbar: Toolbar, shortcuts: Shortcuts
     if (files.length === 0) return;
     toolbar.open(tool);
     if (world) {
-      const note = await openWorld(world, files, models, city);
+      const note = await worlds.openFile(world, files);
       if (note) fail(note);
       return;
     }
@@ -90,6 +93,7 @@ export function addModels(viewer: Viewer, toolbar: Toolbar, shortcuts: Shortcuts
     receive([...picker.files!].map((file) => ({ path: file.name, file })));
     picker.value = '';
   });
+  panel.body.prepend(sceneList(viewer));
   panel.body.append(picker);
 
   models.onChange.add(() => {

@@ -107,8 +107,8 @@ export class Models {
     raycaster.setFromCamera(at, this.viewer.camera);
     const [hit] = raycaster.intersectObjects(this.list.filter(({ visible }) => visible));
     if (!hit) return undefined;
-    const place = this.viewer.city.pick(at, this.viewer.renderer);
-    if (place && place.distanceTo(this.viewer.camera.position) < 0.98 * hit.distance) return undefined;
+    const place = this.viewer.pickScenes(at);
+    if (place && place.distanceTo(this.viewer.eye) < 0.98 * hit.distance) return undefined;
     let object: THREE.Object3D | null = hit.object;
     while (object && !(object as PlacedModel).isPlacedModel) object = object.parent;
     return object as PlacedModel;
@@ -123,7 +123,8 @@ export class Models {
     return share > 1 || share < 1 / 2000 ? 0.1 / share : 1;
   }
 
-  private freeName(name: string): string {
+  // Which no other has.
+  freeName(name: string): string {
     const plain = name.replace(/ \d+$/, '');
     const names = new Set(this.list.map((model) => model.name));
     let free = names.has(name) ? '' : name;
@@ -135,7 +136,7 @@ export class Models {
     const playing = this.list.filter(({ visible, plays, mixer }) => visible && plays && mixer);
     if (playing.length === 0) return;
     for (const { mixer } of playing) mixer!.update(seconds);
-    this.viewer.resolution.moved(performance.now());
+    this.viewer.resolution.played(performance.now());
     this.viewer.needPicture();
   }
 }

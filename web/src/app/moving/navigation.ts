@@ -36,7 +36,7 @@ export class Navigation {
   constructor(
     readonly camera: THREE.PerspectiveCamera,
     private readonly canvas: HTMLCanvasElement,
-    private readonly bounds: THREE.Box3,
+    private box: THREE.Box3,
     private readonly pick: Pick,
   ) {
     this.orbit = new OrbitControls(camera, canvas);
@@ -44,13 +44,20 @@ export class Navigation {
     this.orbit.zoomToCursor = true;
     this.orbit.addEventListener('change', () => (this.moved = true));
     this.orbit.addEventListener('start', () => (this.flight = undefined));
-    this.orbit.maxDistance = 6 * this.radius;
-    this.orbit.minDistance = this.radius / 400;
-    camera.near = this.radius / 1e4;
-    camera.far = this.radius * 100;
+    this.bounds = box;
     this.speed = this.radius / 8;
     this.listen();
     this.mode = 'map';
+  }
+
+  // Of what there is to be seen.
+  set bounds(box: THREE.Box3) {
+    this.box = box;
+    this.orbit.maxDistance = 6 * this.radius;
+    this.orbit.minDistance = this.radius / 400;
+    this.camera.near = this.radius / 1e4;
+    this.camera.far = this.radius * 100;
+    this.camera.updateProjectionMatrix();
   }
 
   // Whether dragging moves the camera: not while a tool drags something.
@@ -139,13 +146,13 @@ export class Navigation {
   }
 
   private get radius(): number {
-    const size = this.bounds.getSize(new THREE.Vector3());
+    const size = this.box.getSize(new THREE.Vector3());
     return 0.5 * Math.hypot(size.x, size.z);
   }
 
   private overview(): Look {
-    const target = this.bounds.getCenter(new THREE.Vector3());
-    target.y = this.bounds.min.y;
+    const target = this.box.getCenter(new THREE.Vector3());
+    target.y = this.box.min.y;
     const away = this.radius * Math.max(1, 1 / this.camera.aspect);
     return { eye: new THREE.Vector3(0, 0.75, 0.8).multiplyScalar(away).add(target), target };
   }

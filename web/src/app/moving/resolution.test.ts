@@ -1,12 +1,13 @@
 import { describe, expect, it } from 'vitest';
 import { Resolution } from './resolution';
 
-// A machine that takes so long for a whole picture: the scale after some pictures while the camera moves.
-function settled(milliseconds: number): number {
-  const resolution = new Resolution(40, 300);
+// A machine that takes so long for a whole picture: the scale after some pictures while the camera moves, or models do.
+function settled(milliseconds: number, motion: 'move' | 'play' = 'move'): number {
+  const resolution = new Resolution(40, 100, 300);
   for (let now = 0; now < 100; ++now) {
-    resolution.moved(now);
-    resolution.took(milliseconds * resolution.scale(now) ** 2);
+    if (motion === 'move') resolution.moved(now);
+    else resolution.played(now);
+    resolution.took(milliseconds * resolution.scale(now) ** 2, motion);
   }
   return resolution.scale(100);
 }
@@ -20,21 +21,39 @@ describe('the resolution', () => {
   });
 
   it('is whole when the camera rests', () => {
-    const resolution = new Resolution(40, 300);
+    const resolution = new Resolution(40, 100, 300);
     for (let now = 0; now < 10; ++now) {
       resolution.moved(now);
-      resolution.took(1000);
+      resolution.took(1000, 'move');
     }
     expect(resolution.scale(100)).toBe(0.25);
     expect(resolution.scale(400)).toBe(1);
   });
 
+  it('is higher while models alone move, and not lowered by what the camera did before', () => {
+    expect(settled(60, 'play')).toBe(1);
+    expect(settled(130, 'play')).toBe(0.75);
+    expect(settled(1e4, 'play')).toBe(0.25);
+    const resolution = new Resolution(40, 100, 300);
+    for (let now = 0; now < 10; ++now) {
+      resolution.moved(now);
+      resolution.played(now);
+      resolution.took(60, resolution.motion(now));
+    }
+    expect(resolution.motion(100)).toBe('move');
+    expect(resolution.scale(100)).toBeLessThan(1);
+    resolution.played(400);
+    expect(resolution.motion(400)).toBe('play');
+    expect(resolution.scale(400)).toBe(1);
+    expect(resolution.motion(800)).toBe('rest');
+  });
+
   it('rises again after a while of slow pictures, though a screen shows none sooner than every 17 ms', () => {
-    const resolution = new Resolution(40, 300);
+    const resolution = new Resolution(40, 100, 300);
     const draw = (pictures: number, milliseconds: number) => {
       for (let now = 0; now < pictures; ++now) {
         resolution.moved(now);
-        resolution.took(Math.max(16.7, milliseconds * resolution.scale(now) ** 2));
+        resolution.took(Math.max(16.7, milliseconds * resolution.scale(now) ** 2), 'move');
       }
       return resolution.scale(pictures);
     };
@@ -49,7 +68,7 @@ describe('the resolution', () => {
     return Array.from({ length: pictures }, (_, now) => {
       resolution.moved(now);
       const scale = resolution.scale(now);
-      resolution.took(14 * Math.ceil((milliseconds * scale ** 2) / 14));
+      resolution.took(14 * Math.ceil((milliseconds * scale ** 2) / 14), 'move');
       return scale;
     });
   }

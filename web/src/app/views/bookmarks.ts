@@ -1,4 +1,4 @@
-// Views to come back to, kept by the browser for each scene; and a camera path along them.
+// Views to come back to, kept by the browser for each scene and in worlds; and a camera path along them.
 import { cameraPath } from './camera-path';
 import { download, fileName } from '../page/page-files';
 import { element } from '../page/element';
@@ -7,7 +7,7 @@ import type { Toolbar } from '../page/toolbar';
 import { formatView, parseView, type View } from './view-address';
 import type { Viewer } from '../viewer';
 
-interface Bookmark {
+export interface Bookmark {
   name: string;
   view: View;
 }
@@ -33,39 +33,82 @@ export function writeBookmarks(bookmarks: Bookmark[]): string {
   return JSON.stringify(bookmarks.map(({ name, view }) => ({ name, view: formatView(view) })));
 }
 
-export function addBookmarks(viewer: Viewer, toolbar: Toolbar): void {
+// The views of this browser, for this scene, and those of the world that is open.
+export class Bookmarks {
+  readonly onChange = new Set<() => void>();
+  private kept: Bookmark[];
+  private ofWorld: Bookmark[] = [];
+
+  constructor(private readonly key: string) {
+    this.kept = readBookmarks(read(key));
+  }
+
+  // Those of the world first; none twice.
+  get list(): Bookmark[] {
+    const texts = new Set(this.ofWorld.map(textOf));
+    return [...this.ofWorld, ...this.kept.filter((one) => !texts.has(textOf(one)))];
+  }
+
+  isOfWorld(bookmark: Bookmark): boolean {
+    return this.ofWorld.includes(bookmark);
+  }
+
+  keep(view: View): void {
+    const last = this.list.map(({ name }) => Number(/^View (\d+)$/.exec(name)?.[1] ?? 0));
+    this.change([...this.kept, { name: `View ${Math.max(0, ...last) + 1}`, view }].slice(-kMost), this.ofWorld);
+  }
+
+  remove(bookmark: Bookmark): void {
+    const others = (all: Bookmark[]) => all.filter((one) => textOf(one) !== textOf(bookmark));
+    this.change(others(this.kept), others(this.ofWorld));
+  }
+
+  // In place of those of another world.
+  showWorld(bookmarks: Bookmark[]): void {
+    this.change(this.kept, bookmarks);
+  }
+
+  private change(kept: Bookmark[], ofWorld: Bookmark[]): void {
+    this.kept = kept;
+    this.ofWorld = ofWorld;
+    write(this.key, writeBookmarks(kept));
+    for (const tell of this.onChange) tell();
+  }
+}
+
+function textOf(bookmark: Bookmark): string {
+  return writeBookmarks([bookmark]);
+}
+
+export function bookmarksOf({ city }: Viewer): Bookmarks {
+  return new Bookmarks(`tessera bookmarks ${city.files.name} ${city.name}`);
+}
+
+export function addBookmarks(viewer: Viewer, bookmarks: Bookmarks, toolbar: Toolbar): void {
   const { city } = viewer;
-  const key = `tessera bookmarks ${city.files.name} ${city.name}`;
-  let bookmarks = readBookmarks(read(key));
   const list = element('ul');
   const keep = element('button', '', 'Keep this view');
   const path = element('button', '', 'Save camera path');
   path.title = 'A flight through these views, for tessera render --path or nerfstudio';
-  const hint = element('p', 'faint', 'Kept in this browser.');
-  const panel = element('div', '', list, element('div', 'row', keep, path), hint);
+  const hint = element('p', 'faint', 'Kept in this browser, and in a world that is saved.');
+  const panel = element('div', 'views', list, element('div', 'row', keep, path), hint);
 
-  const change = (next: Bookmark[]) => {
-    bookmarks = next;
-    write(key, writeBookmarks(bookmarks));
-    show();
-  };
   const show = () => {
-    path.disabled = bookmarks.length < 2;
-    list.replaceChildren(...bookmarks.map((bookmark) => {
+    path.disabled = bookmarks.list.length < 2;
+    list.replaceChildren(...bookmarks.list.map((bookmark) => {
       const go = element('button', 'link', bookmark.name);
       go.addEventListener('click', () => viewer.flyTo(bookmark.view));
       const remove = element('button', 'plain', icon('close'));
       remove.setAttribute('aria-label', `Remove ${bookmark.name}`);
-      remove.addEventListener('click', () => change(bookmarks.filter((one) => one !== bookmark)));
-      return element('li', '', go, remove);
+      remove.addEventListener('click', () => bookmarks.remove(bookmark));
+      const ofWorld = bookmarks.isOfWorld(bookmark) ? [element('span', 'faint', 'world')] : [];
+      return element('li', '', go, ...ofWorld, remove);
     }));
   };
-  keep.addEventListener('click', () => {
-    const last = bookmarks.map(({ name }) => Number(/^View (\d+)$/.exec(name)?.[1] ?? 0));
-    change([...bookmarks, { name: `View ${Math.max(0, ...last) + 1}`, view: viewer.view }].slice(-kMost));
-  });
+  bookmarks.onChange.add(show);
+  keep.addEventListener('click', () => bookmarks.keep(viewer.view));
   path.addEventListener('click', () =>
-    download(fileName(`${city.name}-camera-path`, 'json'), cameraPath(bookmarks.map(({ view }) => view), city.tileset)));
+    download(fileName(`${city.name}-camera-path`, 'json'), cameraPath(bookmarks.list.map(({ view }) => view), city.tileset)));
   show();
   toolbar.add({ name: 'Views', key: 'b', icon: 'bookmark', panel });
 }

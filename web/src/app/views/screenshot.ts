@@ -22,15 +22,14 @@ export function piecesOf(width: number, height: number, edge = kPiece): [number,
 // The view as it is, with so many pixels; wider or narrower about the same middle. Rejects where not all of it can be drawn. `tell` hears the share that is done.
 export function takePicture(viewer: Viewer, width: number, height: number, tell: (share: number) => void): Promise<Blob> {
   return viewer.whileHeld(async () => {
-    const { renderer, camera, city } = viewer;
+    const { renderer, camera } = viewer;
     const picture = document.createElement('canvas');
     picture.width = width;
     picture.height = height;
     const context = picture.getContext('2d')!;
     const { aspect } = camera;
-    const scale = city.resolutionScale;
     camera.aspect = width / height;
-    city.resolutionScale = 1;
+    viewer.resolutionScale = 1;
     renderer.setPixelRatio(1);
     try {
       const pieces = piecesOf(width, height);
@@ -39,7 +38,7 @@ export function takePicture(viewer: Viewer, width: number, height: number, tell:
         renderer.setSize(wide, high, false);
         const begin = performance.now();
         viewer.draw();
-        while (!city.idle) {
+        while (!viewer.idle) {
           if (renderer.getContext().isContextLost()) throw new Error('the browser took the graphics card away; try again');
           if (performance.now() - begin > kWait) throw new Error('its tiles do not come; try again later');
           await new Promise((resolve) => setTimeout(resolve, 10));
@@ -53,7 +52,6 @@ export function takePicture(viewer: Viewer, width: number, height: number, tell:
       camera.clearViewOffset();
       camera.aspect = aspect;
       camera.updateProjectionMatrix();
-      city.resolutionScale = scale;
     }
     const blob = await new Promise<Blob | null>((resolve) => picture.toBlob(resolve, 'image/png'));
     if (!blob) throw new Error(`the browser has no memory for a picture of ${width} by ${height}`);

@@ -1,0 +1,96 @@
+#include "serve/world_file.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "base/temporary_folder.h"
+
+namespace tessera {
+namespace {
+
+class WorldFileTest : public testing::Test {
+ protected:
+  WorldFileTest() {
+    write("site/world.json", worldOf("old town.scene"));
+    write("site/old town.scene/tileset.json", "{}");
+    write("site/deep/tileset.json", "{}");
+    write("site/.hidden/tileset.json", "{}");
+    write("beside/tileset.json", "{}");
+    fs::create_directory_symlink(folder_.path() / "beside", folder_.path() / "site/link");
+    fs::create_directory_symlink("deep", folder_.path() / "site/inner");
+  }
+
+  static std::string worldOf(const std::string& url) {
+    return fmt::format(R"({{"kind":"tessera world","version":2,"scenes":[{{"url":"deep/"}},{{"url":"{}"}}]}})", url);
+  }
+  void write(const std::string& name, const std::string& text) {
+    const fs::path path = folder_.path() / name;
+    fs::create_directories(path.parent_path());
+    writeFileAtomically(path, text);
+  }
+  fs::path at(const std::string& name) const { return folder_.path() / name; }
+  // What it says of a world of that text; empty where nothing is wrong.
+  std::string said(const std::string& text) {
+    write("site/world.json", text);
+    try {
+      requireScenesBeside(at("site/world.json"));
+      return "";
+    } catch (const Error& error) {
+      return error.place() + ": " + error.reason();
+    }
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(WorldFileTest, IsAJsonFileOrThatOfAFolderThatIsNoScene) {
+  EXPECT_EQ(worldFileAt(at("site")), at("site/world.json"));
+  EXPECT_EQ(worldFileAt(at("site/world.json")), at("site/world.json"));
+  EXPECT_EQ(worldFileAt(at("site/deep")), std::nullopt);
+  EXPECT_EQ(worldFileAt(at("nothing")), std::nullopt);
+  write("site/deep/world.json", "{}");
+  EXPECT_EQ(worldFileAt(at("site/deep")), std::nullopt) << "a scene first of all";
+  EXPECT_EQ(worldFileAt(at("site/deep/world.json")), at("site/deep/world.json"));
+}
+
+TEST_F(WorldFileTest, MayNameScenesInItsFolderAndThoseOfOtherServers) {
+  for (const char* url : {"old town.scene", "old%20town.scene/", "deep/tileset.json", "./deep", "a/../deep", "inner",
+                          "deep?x#y", "https://example.com/garden.scene/", "//example.com/garden.scene", ""}) {
+    EXPECT_EQ(said(worldOf(url)), "") << url;
+  }
+  write("site/tileset.json", "{}");
+  EXPECT_EQ(said(worldOf(".")), "");
+  EXPECT_EQ(said(worldOf("tileset.json")), "");
+}
+
+TEST_F(WorldFileTest, MayNameNoneOutsideOfIt) {
+  for (const char* url : {"../beside", "../beside/tileset.json", "/deep", "deep/../../beside", "%2e%2e/beside", "link",
+                          "..%2fbeside", ".hidden", "deep%00", "%", "deep\\\\..\\\\..\\\\beside"}) {
+    const std::string answer = said(worldOf(url));
+    EXPECT_TRUE(answer.starts_with("scenes[1].url: '")) << url << ": " << answer;
+    EXPECT_NE(answer.find(" does not lie in '" + fs::canonical(at("site")).string() + "'"), std::string::npos)
+        << answer;
+  }
+  EXPECT_EQ(said(worldOf("nothing")),
+            "scenes[1].url: there is no 'nothing/tileset.json' in '" + fs::canonical(at("site")).string() + "'");
+  EXPECT_NE(said(R"({"kind":"tessera world","version":1,"scene":{"url":"../beside"}})"), "");
+}
+
+TEST_F(WorldFileTest, IsReadNoFartherThanThat) {
+  EXPECT_EQ(said(R"({"kind":"tessera world","scenes":[{"url":"deep"},3,{"url":4}],"models":7,"files":{"a":"b"}})"), "");
+  EXPECT_EQ(said(R"({"kind":"tessera world","scenes":"deep"})"), "");
+  EXPECT_EQ(said("{"), ": is not JSON");
+  EXPECT_EQ(said("[]"), ": is not JSON");
+  EXPECT_EQ(said("{}"), ": is no world of the viewer");
+  EXPECT_EQ(said(R"({"asset":{"version":"1.1"}})"), ": is no world of the viewer");
+  EXPECT_EQ(said(std::string(100000, '[')), ": is not JSON");
+}
+
+TEST_F(WorldFileTest, IsNamedToTheViewer) {
+  EXPECT_EQ(viewerOfWorld("world.json"), "?world=world/world.json");
+  EXPECT_EQ(viewerOfWorld("my 50%.json"), "?world=world/my%252050%2525.json");
+}
+
+}  // namespace
+}  // namespace tessera

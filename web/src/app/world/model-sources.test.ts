@@ -1,0 +1,29 @@
+import { describe, expect, it } from 'vitest';
+import { contentOf } from './file-content';
+import { fileOfContent, namesOf } from './model-sources';
+
+const file = (path: string, text: string) => ({ path, file: new Blob([text]) });
+
+describe('files of models', () => {
+  it('of one name have names of their own in a world', () => {
+    const [a, b, c] = [file('car.gltf', 'a'), file('Car.gltf', 'b'), file('car.gltf', 'c')];
+    const shared = file('wheel.bin', 'w');
+    const names = namesOf(new Set([{ files: [a, shared] }, { files: [b, shared] }, { files: [c] }]));
+    expect([...names.values()]).toEqual(['car.gltf', 'wheel.bin', '2/Car.gltf', '3/car.gltf']);
+  });
+
+  it('of one name are told apart by what they hold', async () => {
+    const all = [file('car.glb', 'red'), file('car.glb', 'two'), file('a.png', 'two')];
+    for (const one of all.slice(0, 2)) expect(await fileOfContent('3/car.glb', await contentOf(one.file), true, all)).toBe(one);
+    expect(await fileOfContent('car.glb', '3-0', true, all)).toBe(all[0]); // it has been changed since
+    expect(await fileOfContent('car.glb', undefined, true, all)).toBe(all[0]);
+    expect(await fileOfContent('bus.glb', await contentOf(all[0].file), true, all)).toBeUndefined();
+    expect(await fileOfContent('a.png', await contentOf(all[2].file), true, all)).toBeUndefined();
+  });
+
+  it('have digests that see each byte', async () => {
+    const digests = await Promise.all(['', 'a', 'b', 'ab', 'ba', 'aa'].map((text) => contentOf(new Blob([text]))));
+    expect(new Set(digests).size).toBe(6);
+    expect(await contentOf(new Blob(['ab']))).toBe(digests[3]);
+  });
+});

@@ -1,0 +1,217 @@
+// What stands in the page as a world.json, and a world.json as what stands in the page.
+import * as THREE from 'three';
+import { TesseraScene } from '../../scene';
+import { SceneError } from '../../scene-error';
+import { fetchFile } from '../../scene-files';
+import type { HiddenParts } from '../hiding/hidden-parts';
+import { kModelBytes, loadModel } from '../models/load-model';
+import { nameOf, type ModelFile } from '../models/model-files';
+import { placeOf, setPlace } from '../models/model-place';
+import { Models, type ModelSource } from '../models/models';
+import { megabytes } from '../page/panels';
+import type { Bookmarks } from '../views/bookmarks';
+import { formatView, parseView } from '../views/view-address';
+import type { Viewer } from '../viewer';
+import { base64Of, bytesOf, contentsOf, fileOfContent, namesOf } from './model-sources';
+import { addressFrom, addressOfFile, resolved } from './world-address';
+import { decodeWorld, encodeWorld, kEmbeddedBytes, kMost, kWorldBytes, kWorldName, mainScene, type World, type WorldModel, type WorldScene } from './world-file';
+
+// A world.json, and where it is: relative addresses in it are seen from there.
+export interface NamedWorld {
+  world: World;
+  name: string;
+  address: string;
+}
+
+// Throws SceneError.
+export async function fetchWorld(url: string): Promise<NamedWorld> {
+  const address = resolved(url, location.href);
+  if (address === undefined) throw new SceneError(kWorldName, '', 'has no address of http or https', 'name another in ?world=');
+  const name = nameOf(new URL(address).pathname) || kWorldName;
+  const bytes = await fetchNamed(address, name, kWorldBytes, 'see that the address is right');
+  return { world: decodeWorld(new TextDecoder().decode(bytes), name), name, address };
+}
+
+// The address of the scene in whose world all stands. Throws SceneError where it says none.
+export function addressOfMain({ world, name, address }: NamedWorld): string {
+  const main = mainScene(world);
+  return addressOfScene(main, `scenes[${world.scenes.indexOf(main)}]`, name, address);
+}
+
+function addressOfScene({ url }: WorldScene, place: string, name: string, address: string): string {
+  if (url === '') throw new SceneError(name, `${place}.url`, 'is missing', 'write the address of its tileset.json there');
+  const found = resolved(url, address);
+  if (found !== undefined) return found;
+  throw new SceneError(name, `${place}.url`, 'is relative, and nobody knows to what', 'open the world by its address');
+}
+
+export class Worlds {
+  private address = location.href; // that relative addresses are seen from
+  private absent: Pick<World, 'scenes' | 'models'> = { scenes: [], models: [] }; // could not be had, and are saved all the same
+
+  constructor(
+    private readonly viewer: Viewer,
+    private readonly models: Models,
+    private readonly hidden: HiddenParts,
+    private readonly bookmarks: Bookmarks,
+  ) {}
+
+  // world.json. Throws SceneError where it cannot hold the models' files.
+  async save(withFiles: boolean): Promise<Blob> {
+    const { list } = this.models;
+    const bytes = bytesOf(list);
+    if (withFiles && bytes > kEmbeddedBytes) {
+      throw new SceneError(kWorldName, '', `cannot hold ${megabytes(bytes)} of models, only ${megabytes(kEmbeddedBytes)}`, 'save it without them');
+    }
+    const names = namesOf(new Set(list.map(({ source }) => source)));
+    const files = new Map<string, string>();
+    if (withFiles) for (const [file, name] of names) files.set(name, await base64Of(file));
+    const models: WorldModel[] = [];
+    for (const model of list) {
+      const own = model.source.files;
+      models.push({
+        name: model.name, files: own.map((file) => names.get(file)!), contents: await contentsOf(own),
+        ...placeOf(model, model.source.base), visible: model.visible, plays: model.plays,
+      });
+    }
+    const text = encodeWorld({
+      scenes: [...this.viewer.scenes.map((scene) => this.sceneOf(scene)), ...this.absent.scenes],
+      models: [...models, ...this.absent.models],
+      hidden: this.hidden.list.map(({ part }) => part),
+      bookmarks: this.bookmarks.list.slice(0, kMost.bookmarks).map(({ name, view }) => ({ name: name || 'View', view: formatView(view) })),
+    }, files);
+    return new Blob([text], { type: 'application/json' });
+  }
+
+  // One that was dropped, with the files that came with it. Throws SceneError, and then all stays as it is. Answers with
+  // what people should know.
+  async openFile(given: ModelFile, files: readonly ModelFile[]): Promise<SceneError | undefined> {
+    const name = nameOf(given.path);
+    if (given.file.size > kWorldBytes) throw new SceneError(name, '', `is larger than ${megabytes(kWorldBytes)}`, 'save it without its models');
+    const world = decodeWorld(await given.file.text(), name);
+    const { city } = this.viewer;
+    await this.show({ world, name, address: this.address }, files, false, (error) => {
+      throw error;
+    });
+    const main = mainScene(world);
+    if (main.name === city.name) return undefined;
+    return new SceneError(name, '', `is of the scene ${main.name.slice(0, 100)}, and this is ${city.name}`, 'open it in its own scene, if the models stand in odd places');
+  }
+
+  // One that was fetched, whose main scene is the city. What cannot be had is told of, and the rest is shown.
+  open(fetched: NamedWorld, tell: (error: unknown) => void): Promise<void> {
+    this.address = fetched.address;
+    return this.show(fetched, [], true, tell);
+  }
+
+  private async show(named: NamedWorld, files: readonly ModelFile[], mayFetch: boolean, lacks: (error: unknown) => void): Promise<void> {
+    const { world } = named;
+    const main = mainScene(world);
+    const absent: Worlds['absent'] = { scenes: [], models: [] };
+    const scenes = new Map<WorldScene, TesseraScene>([[main, this.viewer.city]]);
+    const sources = new Map<string, ModelSource | undefined>();
+    const fresh: TesseraScene[] = [];
+    try {
+      for (const [i, saved] of world.scenes.entries()) {
+        if (saved === main) continue;
+        const shown = this.viewer.scenes.find((scene) => scene !== this.viewer.city && ![...scenes.values()].includes(scene) && isOf(scene, saved, named.address));
+        try {
+          const scene = shown ?? (await TesseraScene.load(addressOfScene(saved, `scenes[${i}]`, named.name, named.address)));
+          if (!shown) fresh.push(scene);
+          scenes.set(saved, scene);
+        } catch (error) {
+          absent.scenes.push(saved);
+          lacks(error instanceof SceneError ? new SceneError(named.name, `scenes[${i}]`, `cannot be opened: ${error.reason}`, error.remedy) : error);
+        }
+      }
+      const held = [...world.files].map(([path, bytes]): ModelFile => ({ path, file: new Blob([bytes]) }));
+      const all = [...held, ...files, ...this.models.list.flatMap(({ source }) => source.files)];
+      for (const [i, saved] of world.models.entries()) {
+        const key = saved.files.join('\n');
+        if (sources.has(key)) continue;
+        sources.set(key, undefined);
+        try {
+          sources.set(key, await this.sourceOf(saved, all, mayFetch ? named.address : undefined, named.name, `models[${i}]`));
+        } catch (error) {
+          lacks(error);
+        }
+      }
+    } catch (error) {
+      for (const scene of fresh) scene.dispose();
+      throw error;
+    }
+    this.showScenes(scenes, fresh);
+    for (const model of [...this.models.list]) this.models.remove(model);
+    for (const saved of world.models) {
+      const source = sources.get(saved.files.join('\n'));
+      if (!source) {
+        absent.models.push(saved);
+        continue;
+      }
+      const model = this.models.add(source, this.models.freeName(saved.name));
+      setPlace(model, model.source.base, saved);
+      model.visible = saved.visible;
+      model.plays = saved.plays;
+    }
+    this.absent = absent;
+    this.models.changed();
+    this.hidden.show(world.hidden);
+    this.bookmarks.showWorld(world.bookmarks.map(({ name, view }) => ({ name, view: parseView(view)! })));
+  }
+
+  private showScenes(scenes: ReadonlyMap<WorldScene, TesseraScene>, fresh: readonly TesseraScene[]): void {
+    const { viewer } = this;
+    const kept = new Set(scenes.values());
+    for (const scene of [...viewer.scenes]) if (!kept.has(scene)) viewer.removeScene(scene);
+    for (const [saved, scene] of scenes) {
+      scene.visible = saved.visible;
+      if (scene === viewer.city) continue;
+      if (saved.name !== '') scene.name = saved.name;
+      const { scale, ...place } = saved.place ?? { position: [0, 0, 0], rotation: [0, 0, 0, 1], scale: 1 };
+      setPlace(scene, new THREE.Vector3(), { ...place, scale: [scale, scale, scale] });
+      if (fresh.includes(scene)) viewer.addScene(scene);
+    }
+    viewer.changedScenes();
+  }
+
+  private sceneOf(scene: TesseraScene): WorldScene {
+    const { position, rotation, scale: [scale] } = placeOf(scene, new THREE.Vector3());
+    return {
+      name: scene.name, url: addressFrom(this.address, scene.files.name), visible: scene.visible,
+      ...(scene !== this.viewer.city && { place: { position, rotation, scale } }),
+    };
+  }
+
+  // Of files that are in the world, came with it, are in use, or lie where the world says, if it has an address.
+  private async sourceOf(saved: WorldModel, all: readonly ModelFile[], address: string | undefined, name: string, place: string): Promise<ModelSource> {
+    const own: ModelFile[] = [];
+    for (const [i, path] of saved.files.entries()) {
+      const found = (await fileOfContent(path, saved.contents[i], i === 0, all)) ?? (await fetched(path, address));
+      if (!found && i === 0) {
+        throw new SceneError(name, place, `needs ${path.slice(0, 200)}`, 'drop the models together with it');
+      }
+      if (found) own.push(found);
+    }
+    return Models.sourceOf(await loadModel(own[0], [...own, ...all]));
+  }
+}
+
+// Nothing where it says no whole address, and nobody knows what it is relative to. Throws SceneError where it is not there.
+async function fetched(path: string, address: string | undefined): Promise<ModelFile | undefined> {
+  const url = address === undefined && !/^https?:/i.test(path) ? undefined : addressOfFile(path, address ?? location.href);
+  if (url === undefined) return undefined;
+  return { path, file: new Blob([await fetchNamed(url, path, kModelBytes, 'put it where the world says')]) };
+}
+
+async function fetchNamed(url: string, name: string, most: number, remedy: string): Promise<Uint8Array<ArrayBuffer>> {
+  try {
+    return await fetchFile(url, name, most);
+  } catch (error) {
+    throw error instanceof SceneError ? new SceneError(error.what, error.place, error.reason, remedy) : error;
+  }
+}
+
+function isOf(scene: TesseraScene, { url }: WorldScene, address: string): boolean {
+  const found = url === '' ? undefined : resolved(url, address);
+  return found !== undefined && new URL('.', scene.files.name).href === new URL('.', found.endsWith('.json') ? found : `${found.replace(/\/$/, '')}/`).href;
+}

@@ -1,0 +1,37 @@
+// Several scenes in one world, instead of `update` of each: the farthest first, so that each is blended over those behind
+// it, and its rays end at their surfaces, so that where they interlock each opaque part hides what is behind it. Where
+// soft parts of several overlap, they are blended in the order of the scenes, not of the parts.
+import * as THREE from 'three';
+import type { TesseraScene } from './scene';
+
+export function updateScenes(scenes: readonly TesseraScene[], camera: THREE.Camera, renderer: THREE.WebGLRenderer): void {
+  camera.updateWorldMatrix(true, false);
+  const eye = new THREE.Vector3().setFromMatrixPosition(camera.matrixWorld);
+  const farthestFirst = scenes
+    .filter((scene) => scene.visible)
+    .map((scene) => ({ scene, distance: distanceTo(scene, eye) }))
+    .sort((a, b) => b.distance - a.distance);
+  const behind: TesseraScene[] = [];
+  for (const { scene } of farthestFirst) {
+    const worldToLocal = scene.matrixWorld.clone().invert();
+    // What was captured there is better than what the surround makes of it.
+    const boxes = farthestFirst
+      .filter((other) => other.scene !== scene)
+      .map((other) => worldToLocal.clone().multiply(other.scene.matrixWorld).multiply(boxOf(other.scene)));
+    scene.neighbours = { behind: [...behind], boxes };
+    scene.update(camera, renderer);
+    behind.push(scene);
+  }
+}
+
+// From the cube of edge 1 to the scene's object.
+function boxOf({ tileset, localFromScene }: TesseraScene): THREE.Matrix4 {
+  const box = new THREE.Box3(new THREE.Vector3(...tileset.box.low), new THREE.Vector3(...tileset.box.high));
+  const size = box.getSize(new THREE.Vector3());
+  return localFromScene.clone().multiply(new THREE.Matrix4().makeScale(size.x, size.y, size.z).setPosition(box.getCenter(new THREE.Vector3())));
+}
+
+function distanceTo(scene: TesseraScene, eye: THREE.Vector3): number {
+  scene.updateWorldMatrix(true, false);
+  return scene.bounds.applyMatrix4(scene.matrixWorld).distanceToPoint(eye);
+}
