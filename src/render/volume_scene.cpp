@@ -64,7 +64,8 @@ VolumeScene openVolumeScene(const fs::path& folder) {
                     "give each a tile of its own");
       }
       node.hasContent |= !content.surround;
-      (content.surround ? surrounds[content.level] : files[i]) = {contentPath(folder, content.uri), i, content};
+      PromisedFile& file = content.surround ? surrounds[content.level] : files[i];
+      file = {contentPath(folder, content.uri), i, content};
     }
     scene.tree.tiles.push_back(std::move(node));
   }
