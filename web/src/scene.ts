@@ -16,15 +16,16 @@ import { cityMesh, kFirstRenderOrder } from './draw/city-mesh';
 import { Compositor, type DrawnContent, type DrawnPart } from './draw/compositor';
 import { kDisplayModes, type DisplayMode } from './draw/display-modes';
 import { OpaqueDepth } from './draw/opaque-depth';
-import { isParallel, picturesOf, type Picture } from './draw/picture';
+import { picturesOf } from './draw/picture';
+import { tileView } from './picture-view';
 import { SceneError } from './scene-error';
 import { ServedFiles, type ContentFile, type SceneFiles } from './scene-files';
 import { TileSelector, kSelectionSettings, type SelectionSettings } from './stream/tile-selector';
 import { boxOfCells, cutFrontToBack, tileTree, type TileTree } from './stream/tile-tree';
-import { jointView, showsSurround, TileView, type Plane } from './stream/tile-view';
+import { jointView } from './stream/tile-view';
 import { kStreamSettings, TileStreamer, type StreamSettings, type StreamStatistics } from './stream/tile-streamer';
 import { decodeTileset } from './tiles/decode-tileset';
-import type { Box, Tileset } from './tiles/tileset';
+import type { Tileset } from './tiles/tileset';
 import type { VolumeContent } from './tiles/volume-content';
 import { VolumeSource } from './volume-source';
 
@@ -236,35 +237,4 @@ async function openTileset(files: SceneFiles): Promise<Tileset> {
     throw new SceneError('tileset.json', '', `is a scene of ${tileset.representation}, not of volume`, 'draw it with a viewer that knows it');
   }
   return tileset;
-}
-
-// A picture as the selection needs it, in scene units.
-function tileView({ near, box }: Tileset, picture: Picture, worldFromScene: THREE.Matrix4): TileView {
-  const { camera, part, eye, clipFromScene: { elements } } = picture;
-  const row = (i: number): Plane => [elements[i], elements[4 + i], elements[8 + i], elements[12 + i]];
-  const w = row(3);
-  const sides = [0, 1].flatMap((i) => {
-    const r = row(i);
-    return [1, -1].map((sign): Plane => [w[0] + sign * r[0], w[1] + sign * r[1], w[2] + sign * r[2], w[3] + sign * r[3]]);
-  });
-  const parallel = isParallel(camera);
-  // The near and far planes are not asked: rays know neither.
-  const planes = parallel ? sides : [w, ...sides];
-  const projection = camera.projectionMatrix.elements;
-  const scale = new THREE.Vector3().setFromMatrixScale(worldFromScene).x;
-  const focal = 0.5 * Math.max(projection[0] * part.z, projection[5] * part.w) * (parallel ? scale : 1);
-  const pixels = part.z * part.w;
-  return new TileView(eye, planes, focal, pixels, near, parallel, pixels * shareOfSurround(box, picture));
-}
-
-// How much of the picture looks out of the box.
-function shareOfSurround(box: Box, { origin, ray }: Picture): number {
-  const kAcross = 12;
-  let shows = 0;
-  for (let i = 0; i < kAcross ** 2; ++i) {
-    const at = new THREE.Vector3((2 * ((i % kAcross) + 0.5)) / kAcross - 1, (2 * (Math.floor(i / kAcross) + 0.5)) / kAcross - 1, 1);
-    const direction = at.clone().applyMatrix3(ray);
-    shows += showsSurround(at.applyMatrix3(origin).toArray(), direction.toArray(), box) ? 1 : 0;
-  }
-  return shows / kAcross ** 2;
 }

@@ -252,10 +252,10 @@ export class TileStreamer<Fetched, Decoded, Resident> {
   }
 
   private failPinned(): void {
-    const mebibytes = (bytes: number) => Math.ceil(bytes / 2 ** 20);
+    const mebibytes = (bytes: number) => Math.max(0, bytes / 2 ** 20).toFixed(1);
     const error = new SceneError(
       'scene', '',
-      `its coarsest level takes ${mebibytes(this.pinnedBytes())} MiB on the graphics card, the budget is ${mebibytes(this.settings.cardBytes)} MiB`,
+      `its coarsest level takes ${mebibytes(this.pinnedBytes())} MiB on the graphics card, the budget leaves ${mebibytes(this.settings.cardBytes)} MiB for it`,
       'raise the budget, or bake more levels of detail');
     if (!this.toldOfBudget) this.onError(error, this.selector.pinned[0]);
     this.toldOfBudget = true;

@@ -1,0 +1,118 @@
+#include "golden/golden_selection.h"
+
+#include <set>
+
+#include "base/random.h"
+#include "render/made_tree.h"
+#include "render/tile_selection.h"
+
+namespace tessera::golden {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr int kViews = 120;
+
+ordered_json toJson(const Vec3d& x) {
+  return {x.x(), x.y(), x.z()};
+}
+
+// Columns and rows that are no powers of two, tiles without content, and two surrounds.
+TileTree tree() {
+  TileTree tree = madeTree(6, 5);
+  for (size_t i = 5; i < tree.tiles.size(); i += 9) tree.tiles[i].hasContent = false;
+  TileNode around;
+  around.isSurround = true;
+  around.low = tree.tiles[0].low;
+  around.high = tree.tiles[0].high;
+  around.level = 1;
+  around.geometricError = 0.08;
+  tree.surround = static_cast<int>(tree.tiles.size());
+  around.children = {tree.surround + 1};
+  tree.tiles.push_back(around);
+  around.parent = tree.surround;
+  around.children.clear();
+  around.level = 0;
+  around.geometricError /= 2;
+  tree.tiles.push_back(around);
+  return tree;
+}
+
+ordered_json toJson(const TileTree& tree) {
+  ordered_json tiles = ordered_json::array();
+  for (const TileNode& node : tree.tiles) {
+    const TileCells& cells = node.cells;
+    tiles.push_back({{"parent", node.parent},
+                     {"children", node.children},
+                     {"cells", {cells.i0, cells.j0, cells.i1, cells.j1}},
+                     {"low", toJson(node.low)},
+                     {"high", toJson(node.high)},
+                     {"geometricError", node.geometricError},
+                     {"level", node.level},
+                     {"hasContent", node.hasContent},
+                     {"isSurround", node.isSurround}});
+  }
+  return {{"columns", tree.columns}, {"rows", tree.rows}, {"surround", tree.surround}, {"tiles", tiles}};
+}
+
+}  // namespace
+
+ordered_json makeSelections() {
+  const TileTree made = tree();
+  VolumeFrame frame;
+  frame.low = made.tiles[0].low;
+  frame.high = made.tiles[0].high;
+  const auto bytes = [](int tile) { return static_cast<uint64_t>(100 + 37 * tile % 61); };
+  TileSelector selector(made, {});  // one for all: what was replaced before counts
+  const RandomStream random(17, 1);
+  ordered_json views = ordered_json::array();
+  for (uint64_t i = 0; i < kViews; ++i) {
+    const auto value = [&](uint64_t k) { return 2 * random.uniformDouble(200 * i + k) - 1; };
+    Camera camera;
+    camera.width = 480;
+    camera.height = 270;
+    const double focal = 300 + 100 * value(0);
+    camera.parameters = {focal, focal, 240, 135};
+    Pose pose;
+    pose.translation = Vec3d(8 * value(1), 7 * value(2), 0.1 + 4 * std::abs(value(3)));
+    const Vec3d forward = (Vec3d(5 * value(4), 4 * value(5), 0.3 * value(6)) - pose.translation).normalized();
+    pose.rotation.col(0) = forward.cross(Vec3d::UnitZ()).normalized();
+    pose.rotation.col(1) = forward.cross(pose.rotation.col(0));
+    pose.rotation.col(2) = forward;
+    std::set<int> held = {0, made.surround};
+    for (size_t tile = 1; tile < made.tiles.size(); ++tile) {
+      if (made.tiles[tile].hasContent && value(10 + tile) > 0) held.insert(static_cast<int>(tile));
+    }
+    const auto holds = [&](int tile) { return held.contains(tile); };
+    const uint64_t budget = 300 + random.below(200 * i + 9, 4000);
+    const TileView view = tileView(camera, pose, frame);
+    const TileChoice choice = selector.choose(view, {budget, holds, bytes});
+    const TileCut cut = selector.cut(view, holds);
+    ordered_json tiles = ordered_json::array();
+    for (const SelectedTile& one : cut.tiles) {
+      if (one.visible) tiles.push_back({one.tile, one.content});
+    }
+    views.push_back({{"camera",
+                      {{"focal", focal},
+                       {"width", camera.width},
+                       {"height", camera.height},
+                       {"eye", toJson(pose.translation)},
+                       {"right", toJson(pose.rotation.col(0))},
+                       {"down", toJson(pose.rotation.col(1))},
+                       {"forward", toJson(pose.rotation.col(2))}}},
+                     {"held", held},
+                     {"budget", budget},
+                     {"wanted", choice.wanted},
+                     {"refused", choice.refused},
+                     {"cut", tiles},
+                     {"surround", cut.surround}});
+  }
+  ordered_json sizes = ordered_json::array();
+  for (size_t tile = 0; tile < made.tiles.size(); ++tile) sizes.push_back(bytes(static_cast<int>(tile)));
+  return {{"frame", {{"near", frame.near}, {"low", toJson(frame.low)}, {"high", toJson(frame.high)}}},
+          {"tree", toJson(made)},
+          {"bytes", sizes},
+          {"views", views}};
+}
+
+}  // namespace tessera::golden

@@ -1,0 +1,29 @@
+// What was chosen when selection.json was written is chosen still; web/src/stream holds its twin to the same file.
+#include "golden/golden_selection.h"
+
+#include <gtest/gtest.h>
+
+#include "base/file.h"
+
+namespace tessera {
+namespace {
+
+TEST(GoldenSelection, IsWhatTheSelectorChooses) {
+  const auto expected = nlohmann::ordered_json::parse(readTextFile(TESSERA_GOLDEN_SELECTION));
+  const auto made = nlohmann::ordered_json::parse(golden::makeSelections().dump());
+  ASSERT_EQ(made["views"].size(), expected["views"].size());
+  int refused = 0, instead = 0;
+  for (size_t i = 0; i < made["views"].size(); ++i) {
+    for (const char* key : {"wanted", "refused", "cut", "surround"}) {
+      EXPECT_EQ(made["views"][i][key], expected["views"][i][key]) << "view " << i << ", " << key;
+    }
+    refused += expected["views"][i]["refused"].get<int>() > 0;
+    for (const auto& one : expected["views"][i]["cut"]) instead += one[0] != one[1];
+  }
+  EXPECT_GT(refused, 20);
+  EXPECT_GT(instead, 20);
+  EXPECT_EQ(made["tree"], expected["tree"]);
+}
+
+}  // namespace
+}  // namespace tessera
