@@ -148,6 +148,7 @@ TileChoice TileSelector::choose(const TileView& view, const TileMemory& memory) 
     open.pop();
     if (bytes + memory.bytes(tile) > memory.budget) {
       ++choice.refused;
+      if (isReplaced(view, tile)) lookBelow(view, tile);
       continue;
     }
     bytes += memory.bytes(tile);
@@ -155,6 +156,14 @@ TileChoice TileSelector::choose(const TileView& view, const TileMemory& memory) 
     refine(tile);
   }
   return choice;
+}
+
+// So that what was to be replaced does not depend on the budget.
+void TileSelector::lookBelow(const TileView& view, int tile) {
+  for (const int child : tree_.tiles[tile].children) {
+    const TileNode& node = tree_.tiles[child];
+    if (view.sees(node) && (!node.hasContent || isReplaced(view, child))) lookBelow(view, child);
+  }
 }
 
 // Adds tiles to the cut that cover this one; `above` is the next content above it that is in memory.

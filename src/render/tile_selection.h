@@ -90,6 +90,7 @@ class TileSelector {
   struct Pass;
   void cover(Pass& pass, int tile, int above);
   bool isReplaced(const TileView& view, int tile);
+  void lookBelow(const TileView& view, int tile);
 
   const TileTree& tree_;
   SelectionSettings settings_;

@@ -47,6 +47,8 @@ export interface Neighbours {
   boxes: readonly THREE.Matrix4[]; // in which its surround is not drawn, as `hidden` has them
 }
 
+export type { StreamSettings };
+
 type Streamer = TileStreamer<ContentFile, VolumeContent, DrawnContent>;
 
 export class TesseraScene extends THREE.Object3D {
@@ -54,6 +56,7 @@ export class TesseraScene extends THREE.Object3D {
   readonly selection: SelectionSettings;
   readonly stream: StreamSettings;
   resolutionScale = 1; // pixels of the scene beside those of the canvas, along an edge
+  largestResolutionScale = 1; // for which room is kept on the card, so that tiles need not go when it is reached
   display: DisplayMode = 'colour';
   minTransmittance = 1 / 255; // rays end where less would be seen; 0: never
   // Boxes in which nothing of it is drawn, at most kMostHiddenBoxes: from the cube of edge 1 about the origin to this
@@ -147,7 +150,8 @@ export class TesseraScene extends THREE.Object3D {
     const surfaces = this.neighbours.behind.map((scene) => scene.mesh).filter((one) => one !== undefined);
     const depth = this.opaque.draw(renderer, pictures, this, size, new Set(surfaces));
     compositor.resize(size);
-    streamer.settings = { ...this.stream, cardBytes: this.stream.cardBytes - compositor.bytes - this.opaque.bytes };
+    const enlarged = Math.max(1, this.largestResolutionScale / this.resolutionScale) ** 2;
+    streamer.settings = { ...this.stream, cardBytes: this.stream.cardBytes - enlarged * (compositor.bytes + this.opaque.bytes) };
     const views = pictures.map((picture) => tileView(this.tileset, picture, worldFromScene));
     const { tiles, surround } = streamer.update(jointView(views), this.uploadTime());
     const cut = new Set(tiles.map(({ tile }) => tile));
@@ -192,7 +196,8 @@ export class TesseraScene extends THREE.Object3D {
     this.pool.dispose();
   }
 
-  private leaveCard(): void {
+  // Gives back the memory of the card, and of what was fetched; the next update fetches it anew.
+  leaveCard(): void {
     this.streamer?.dispose();
     this.compositor?.dispose();
     this.opaque.dispose();

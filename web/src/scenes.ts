@@ -5,8 +5,7 @@ import * as THREE from 'three';
 import type { TesseraScene } from './scene';
 
 export function updateScenes(scenes: readonly TesseraScene[], camera: THREE.Camera, renderer: THREE.WebGLRenderer): void {
-  camera.updateWorldMatrix(true, false);
-  const eye = new THREE.Vector3().setFromMatrixPosition(camera.matrixWorld);
+  const eye = eyeOf(camera);
   const farthestFirst = scenes
     .filter((scene) => scene.visible)
     .map((scene) => ({ scene, distance: distanceTo(scene, eye) }))
@@ -14,14 +13,23 @@ export function updateScenes(scenes: readonly TesseraScene[], camera: THREE.Came
   const behind: TesseraScene[] = [];
   for (const { scene } of farthestFirst) {
     const worldToLocal = scene.matrixWorld.clone().invert();
-    // What was captured there is better than what the surround makes of it.
-    const boxes = farthestFirst
-      .filter((other) => other.scene !== scene)
+    // What was captured there, and can be seen, is better than what the surround makes of it. The nearest first.
+    const boxes = [...farthestFirst]
+      .reverse()
+      .filter((other) => other.scene !== scene && other.scene.complete && (other.scene.statistics?.resident ?? 0) > 0)
       .map((other) => worldToLocal.clone().multiply(other.scene.matrixWorld).multiply(boxOf(other.scene)));
     scene.neighbours = { behind: [...behind], boxes };
     scene.update(camera, renderer);
     behind.push(scene);
   }
+}
+
+// Of several cameras, amid them: three does not ask where an ArrayCamera itself is.
+function eyeOf(camera: THREE.Camera): THREE.Vector3 {
+  camera.updateWorldMatrix(true, false);
+  const cameras = camera instanceof THREE.ArrayCamera ? camera.cameras : [camera];
+  const sum = cameras.reduce((all, one) => all.add(new THREE.Vector3().setFromMatrixPosition(one.matrixWorld)), new THREE.Vector3());
+  return sum.divideScalar(cameras.length);
 }
 
 // From the cube of edge 1 to the scene's object.

@@ -2,7 +2,7 @@
 import decoderUrl from '@jsquash/webp/codec/dec/webp_dec.wasm?url';
 import { SceneError } from './scene-error';
 import { decodeVolume, readVolumeHeader, type VolumeLimits } from './tiles/decode-volume';
-import { prepareDecoder } from './tiles/lossless-image';
+import { isDecoderPrepared, prepareDecoder } from './tiles/lossless-image';
 import type { TileContent } from './tiles/tileset';
 import type { VolumeContent } from './tiles/volume-content';
 
@@ -39,12 +39,15 @@ self.onmessage = async ({ data }: MessageEvent<DecodeRequest>) => {
   const { id, file, name, promised, limits } = data;
   try {
     await ready();
+    if (!isDecoderPrepared()) {
+      prepared = undefined; // it gave up meanwhile
+      await ready();
+    }
     const content = decodeVolume(readVolumeHeader(file, name, promised, limits), name);
     const { planes, voxels, macroblocks, distances } = content;
     const buffers = [planes.first, planes.second, voxels.first, voxels.second, macroblocks.texels, distances.texels];
     self.postMessage({ id, content } satisfies DecodeAnswer, { transfer: buffers.map((bytes) => bytes.buffer as ArrayBuffer) });
   } catch (error) {
-    prepared = undefined; // the decoder may be of no more use
     const { what, place, reason, remedy } =
       error instanceof SceneError ? error : new SceneError(name, '', String(error), 'reload the page');
     self.postMessage({ id, error: { what, place, reason, remedy } } satisfies DecodeAnswer);

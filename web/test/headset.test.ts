@@ -165,7 +165,7 @@ describe.skipIf(missing())('with a headset', () => {
       expect(gone[2]).toBeCloseTo(0, 3);
       const along = (column: number) => middle[4 * column] * gone[0] + middle[4 * column + 1] * gone[1];
       expect(Math.atan2(along(0), -along(2))).toBeCloseTo(Math.PI / 6, 2);
-      await page.keyboard.press('x'); // as the button, which the emulator stands before
+      await page.keyboard.press('v'); // as the button, which the emulator stands before
       await expect.poll(() => where('fov'), { timeout: 10000 }).toEqual([60]);
       expect(near(await where('eye'), there)).toBeLessThan(1e-3);
       expect(await page.getAttribute('[aria-label=Headset]', 'aria-pressed')).toBe('false');

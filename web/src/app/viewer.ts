@@ -1,7 +1,7 @@
 // Scenes on a canvas: the world they stand in, the camera, and when a picture is drawn. What the tools of the application
 // share.
 import * as THREE from 'three';
-import type { SceneStatistics, TesseraScene } from '../scene';
+import type { SceneStatistics, StreamSettings, TesseraScene } from '../scene';
 import { SceneError } from '../scene-error';
 import { updateScenes } from '../scenes';
 import { Navigation, type Look } from './moving/navigation';
@@ -22,6 +22,8 @@ export interface Mover {
   update(seconds: number): boolean; // once a frame; true where the camera has moved
 }
 
+const kBytesPerPixel = 37; // of a scene's pictures, and of the depth of what is opaque
+
 export class Viewer {
   readonly world = new THREE.Scene();
   readonly camera = new THREE.PerspectiveCamera(50);
@@ -33,6 +35,7 @@ export class Viewer {
   readonly onClick: ((event: PointerEvent) => boolean)[] = [];
   readonly scenes: TesseraScene[]; // the city first
   readonly onScenes = new Set<() => void>(); // of the list, of what is visible
+  private readonly stream: StreamSettings; // of all scenes together
   private cardBudget: number;
   private mover: Mover;
   private needed = true; // a picture, though nothing moves
@@ -47,6 +50,7 @@ export class Viewer {
     this.world.background = city.background;
     this.world.add(city);
     this.scenes = [city];
+    this.stream = { ...city.stream };
     this.cardBudget = city.stream.cardBytes;
     this.navigation = new Navigation(this.camera, canvas, city.bounds, (event) => this.pickAt(event));
     this.mover = this.navigation;
@@ -99,30 +103,49 @@ export class Viewer {
   }
 
   changedScenes(): void {
-    this.cardBytes = this.cardBudget;
     const bounds = new THREE.Box3();
-    for (const scene of this.scenes) {
+    for (const scene of this.scenes) if (!scene.visible) scene.leaveCard();
+    for (const scene of this.visibleScenes) {
       scene.updateWorldMatrix(true, false);
       bounds.union(scene.bounds.applyMatrix4(scene.matrixWorld));
     }
-    this.navigation.bounds = bounds;
+    if (!bounds.isEmpty()) this.navigation.bounds = bounds;
     for (const tell of this.onScenes) tell();
     this.needPicture();
   }
 
-  // Of the graphics card, for all scenes together. Each has as much of it.
+  // Of the graphics card, for all scenes together.
   set cardBytes(bytes: number) {
     this.cardBudget = bytes;
-    for (const scene of this.scenes) scene.stream.cardBytes = bytes / this.scenes.length;
+    this.needPicture();
   }
 
-  set resolutionScale(scale: number) {
-    for (const scene of this.scenes) scene.resolutionScale = scale;
+  private get visibleScenes(): TesseraScene[] {
+    return this.scenes.filter(({ visible }) => visible);
+  }
+
+  // Each scene has pictures of its own; all of them get no more than half of the card.
+  private get mostScale(): number {
+    const { x, y } = this.renderer.getDrawingBufferSize(new THREE.Vector2());
+    return Math.min(1, Math.sqrt((0.5 * this.cardBudget) / (kBytesPerPixel * x * y * Math.max(1, this.visibleScenes.length))));
+  }
+
+  // Of all scenes, which share the card, the page and the network.
+  set resolutionScale(resolutionScale: number) {
+    const scenes = this.visibleScenes;
+    const { pageBytes, fetches } = this.stream;
+    for (const scene of scenes) {
+      scene.resolutionScale = resolutionScale;
+      scene.largestResolutionScale = Math.min(this.resolution.whole, this.mostScale);
+      scene.stream.cardBytes = this.cardBudget / scenes.length;
+      scene.stream.pageBytes = pageBytes / scenes.length;
+      scene.stream.fetches = Math.max(1, Math.floor(fetches / scenes.length));
+    }
   }
 
   // Nothing that the last view asked for is still to come.
   get idle(): boolean {
-    return this.scenes.every(({ visible, idle }) => !visible || idle);
+    return this.visibleScenes.every(({ idle }) => idle);
   }
 
   // Of all scenes together.
@@ -220,9 +243,10 @@ export class Viewer {
       if (motion === 'rest' && wasWhole && this.idle && !this.needed) return;
       if (motion === before) this.resolution.took(milliseconds, motion);
       this.needed = false;
-      const resolutionScale = (this.resolutionScale = this.resolution.scale(now));
+      const resolutionScale = Math.min(this.resolution.scale(now), this.mostScale);
+      this.resolutionScale = resolutionScale;
       timer.measure(() => this.draw());
-      wasWhole = resolutionScale === this.resolution.whole;
+      wasWhole = resolutionScale === Math.min(this.resolution.whole, this.mostScale);
       const frame = { milliseconds, gpuMilliseconds: timer.milliseconds, resolutionScale };
       for (const tell of this.onFrame) tell(frame);
     });

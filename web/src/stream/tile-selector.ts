@@ -76,7 +76,7 @@ export class TileSelector {
         }
         const error = view.errorInPixels(instead) / Math.max(this.settings.mostPixels, 1e-3);
         const held = memory.holds(child) ? this.settings.hysteresis ** 2 : 1;
-        open.push({ tile: child, priority: view.areaInPixels(node) * error * held, distance: view.distance(node) });
+        open.push({ tile: child, instead, priority: view.areaInPixels(node) * error * held, distance: view.distance(node) });
       }
     };
     let bytes = 0;
@@ -89,19 +89,32 @@ export class TileSelector {
     let refused = 0;
     while (open.length > 0) {
       const next = open.reduce((first, one, i) => (isBefore(one, open[first]) ? i : first), 0);
-      const { tile } = open[next];
+      const { tile, instead } = open[next];
       open[next] = open[open.length - 1];
       open.pop();
-      if (!memory.canBeHad(tile)) continue;
+      const isReplaced = this.isReplaced(view, tile);
+      if (!memory.canBeHad(tile)) {
+        if (isReplaced) addBelow(tile, instead);
+        continue;
+      }
       if (bytes + memory.bytesOf(tile) > memory.budget) {
         ++refused;
+        if (isReplaced) this.lookBelow(view, tile);
         continue;
       }
       bytes += memory.bytesOf(tile);
       wanted.push(tile);
-      if (this.isReplaced(view, tile)) addBelow(tile, this.tree.tiles[tile]);
+      if (isReplaced) addBelow(tile, this.tree.tiles[tile]);
     }
     return { wanted, refused };
+  }
+
+  // So that what was to be replaced does not depend on the budget.
+  private lookBelow(view: SelectionView, tile: number): void {
+    for (const child of this.tree.tiles[tile].children) {
+      const node = this.tree.tiles[child];
+      if (view.sees(node) && (!node.content || this.isReplaced(view, child))) this.lookBelow(view, child);
+    }
   }
 
   // Adds tiles to the cut that cover this one; `above` is the next content above it that can be drawn.
@@ -135,6 +148,7 @@ export class TileSelector {
 
 interface Candidate {
   tile: number;
+  instead: TileNode; // the content above it
   priority: number;
   distance: number;
 }

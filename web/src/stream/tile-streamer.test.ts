@@ -74,7 +74,7 @@ const near = madeView([0, 0, 1], 0.3, -0.3);
 const far = madeView([0, 0, 400], 0, -1.5);
 
 describe('a tile streamer', () => {
-  it('draws the coarsest first, and the finer ones once all of them are there', async () => {
+  it('draws the coarsest first, and then the finer ones', async () => {
     const made = make(madeTree(2), 1000);
     expect(made.streamer.update(near)).toEqual({ tiles: [{ tile: 0, content: 0, visible: false }], surround: -1 });
     const cut = await settle(made, near);
@@ -141,7 +141,7 @@ describe('a tile streamer', () => {
     expect(made.streamer.idle).toBe(true);
   });
 
-  it('comes to an end with a page that holds the files of one request', async () => {
+  it('comes to an end with a page that holds a single file', async () => {
     const made = make(madeTree(8), 1e6, { pageBytes: 20, fetches: 1 });
     const cut = await settle(made, near, 400);
     expect(made.streamer.idle).toBe(true);
@@ -207,13 +207,51 @@ describe('a tile streamer', () => {
     expect(made.streamer.residentOf(0)).toBeDefined();
   });
 
-  it('goes on without a tile that cannot be had', async () => {
+  it('goes on without a tile that cannot be had, with what lies below it', async () => {
     const tree = madeTree(4);
     const made = make(tree, 1e6);
     const child = tree.tiles[0].children.find((one) => near.sees(tree.tiles[one]))!;
     made.source.broken.add(child);
     const cut = await settle(made, near);
     expect(made.streamer.errorOf(child)?.message).toContain('was not found');
-    expect(cut.filter(({ visible }) => visible).length).toBeGreaterThan(0);
+    const below = tree.tiles[child].children.filter((one) => near.sees(tree.tiles[one]));
+    expect(below.length).toBeGreaterThan(0);
+    for (const one of below) expect(cut.find(({ tile }) => tile === one)).toEqual({ tile: one, content: one, visible: true });
+  });
+
+  it('keeps what is most urgent when the budget becomes smaller, and fetches none of it again', async () => {
+    const tree = madeTree(8);
+    const made = make(tree, 1e6);
+    await settle(made, near, 200);
+    const { settings } = made.streamer;
+    const large = made.streamer.statistics.cardBytes;
+    for (let round = 0; round < 3; ++round) {
+      made.source.fetches.length = 0;
+      made.streamer.settings = { ...settings, cardBytes: large - 300 };
+      await settle(made, near, 60);
+      expect(made.source.onCard).toBeLessThanOrEqual(large - 300);
+      expect(made.source.fetches).toEqual([]);
+      made.streamer.settings = { ...settings, cardBytes: large };
+      await settle(made, near, 60);
+      expect(made.source.fetches.length).toBe(3);
+    }
+  });
+
+  it('keeps to its budget whatever files promise, and comes to rest', async () => {
+    const random = randomNumbers(23);
+    for (let round = 0; round < 30; ++round) {
+      const made = make(madeTree(8), 300 + 2000 * random());
+      const wrong = new Map<number, number>();
+      made.source.promisedBytes = (tile) => {
+        if (!wrong.has(tile)) wrong.set(tile, random() < 0.3 ? 0 : 1000 * random() ** 3);
+        return wrong.get(tile)!;
+      };
+      await settle(made, madeView([(random() - 0.5) * 12, (random() - 0.5) * 12, 1], random() * 7, -0.5), 150);
+      expect(made.source.mostOnCard).toBeLessThanOrEqual(made.streamer.settings.cardBytes);
+      expect(made.streamer.idle).toBe(true);
+      const times = new Map<number, number>();
+      for (const tile of made.source.fetches) times.set(tile, (times.get(tile) ?? 0) + 1);
+      expect(Math.max(...times.values())).toBeLessThanOrEqual(4); // sizes are learned
+    }
   });
 });

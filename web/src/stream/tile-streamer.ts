@@ -117,7 +117,6 @@ export class TileStreamer<Fetched, Decoded, Resident> {
   update(view: SelectionView, uploadFor = 4): Cut {
     ++this.frame;
     this.uploadSlices(uploadFor);
-    this.keepToBudget();
     const now = this.now();
     this.nextRetry = Infinity;
     const { wanted, refused } = this.selector.choose(view, {
@@ -127,8 +126,10 @@ export class TileStreamer<Fetched, Decoded, Resident> {
       canBeHad: (tile) => this.canBeHad(tile, now),
     });
     this.statistics.refused = refused;
+    this.keepToBudget(wanted);
     const isTooMuch = this.pinnedBytes() > this.settings.cardBytes;
     if (isTooMuch) this.failPinned();
+    else this.toldOfBudget = false;
     const missing = isTooMuch ? [] : this.selector.pinned.filter((tile) => !this.residentOf(tile) && this.canBeHad(tile, now));
     this.load(this.complete ? [...missing, ...wanted] : missing, now);
     // The coarsest count as there, though some may be missing: of the others the picture is right all the same.
@@ -214,10 +215,13 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     if (entry.state === 'fetched') this.forget(entry);
   }
 
-  // The budget may have become smaller: pictures of a larger window take their share of the card.
-  private keepToBudget(): void {
+  // The budget may have become smaller: pictures of a larger window take their share of the card. Of what is wanted, the
+  // least urgent goes; there is need of that only while something is on its way that is not.
+  private keepToBudget(wanted: number[]): void {
     if (this.statistics.cardBytes <= this.settings.cardBytes) return;
-    this.evict(this.unwanted(new Set()));
+    const isWanted = new Set(wanted);
+    const least = wanted.map((tile) => [tile, this.entry(tile)] as const).filter(([, { state }]) => state === 'resident').reverse();
+    this.evict([...this.unwanted(isWanted), ...least]);
   }
 
   // What could go, what has not been drawn for longest first.
@@ -228,7 +232,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
   }
 
   // Until the budget has room for `bytes` more, or nothing is left.
-  private evict(going: [number, Entry<Fetched, Resident>][], bytes = 0): void {
+  private evict(going: readonly (readonly [number, Entry<Fetched, Resident>])[], bytes = 0): void {
     for (const [tile, entry] of going) {
       if (this.statistics.cardBytes + bytes <= this.settings.cardBytes) return;
       this.drop(tile, entry);
@@ -256,8 +260,9 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     const error = new SceneError(
       'scene', '',
       `its coarsest level takes ${mebibytes(this.pinnedBytes())} MiB on the graphics card, the budget leaves ${mebibytes(this.settings.cardBytes)} MiB for it`,
-      'raise the budget, or bake more levels of detail');
-    if (!this.toldOfBudget) this.onError(error, this.selector.pinned[0]);
+      'raise the budget, draw fewer pixels, or bake more levels of detail');
+    const isMissing = this.selector.pinned.some((tile) => !this.residentOf(tile));
+    if (isMissing && !this.toldOfBudget) this.onError(error, this.selector.pinned[0]);
     this.toldOfBudget = true;
     for (const tile of this.selector.pinned) {
       const entry = this.entry(tile);

@@ -13,6 +13,10 @@ export async function prepareDecoder(wasm?: WebAssembly.Module): Promise<void> {
   module ??= await makeDecoder(wasm);
 }
 
+export function isDecoderPrepared(): boolean {
+  return module !== undefined;
+}
+
 async function makeDecoder(wasm?: WebAssembly.Module): Promise<WebPModule> {
   // The decoder hands its pixels over in one of these, which Node lacks.
   const scope = globalThis as { ImageData?: unknown };

@@ -9,7 +9,7 @@ export async function addHeadset(viewer: Viewer, toolbar: Toolbar, shortcuts: Sh
   if (!isThere) return;
   const headset = new Headset(viewer);
   const button = toolbar.add({
-    name: 'Headset', key: 'x', icon: 'headset', opened: () => void (headset.isOn ? headset.leave() : headset.enter()).catch(fail),
+    name: 'Headset', key: 'v', icon: 'headset', opened: () => void (headset.isOn ? headset.leave() : headset.enter()).catch(fail),
   });
   headset.onChange = (isOn) => {
     button.classList.toggle('on', isOn);

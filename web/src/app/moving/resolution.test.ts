@@ -61,6 +61,15 @@ describe('the resolution', () => {
     expect(draw(1000, 10)).toBe(1);
   });
 
+  it('is not raised where pictures take too long at the least of it', () => {
+    const resolution = new Resolution(40, 100, 300);
+    for (let now = 0; now < 1000; ++now) {
+      resolution.moved(now);
+      resolution.took(200, 'move');
+    }
+    expect(resolution.scale(1000)).toBe(0.25);
+  });
+
   // A headset that shows a picture every 14 ms, or every 28 ms where it takes longer.
   function inHeadset(milliseconds: number, pictures: number): number[] {
     const resolution = new Resolution();

@@ -104,12 +104,16 @@ class Measured {
     const { target, patience } = this.pace;
     this.measured = this.measured === 0 ? milliseconds : 0.6 * this.measured + 0.4 * milliseconds;
     const expected = (step: number) => this.measured * (kSteps[step] / kSteps[this.step]) ** 2;
-    ++this.inTime;
-    if (this.measured > target && this.step > 0) {
+    if (this.measured > target) {
+      this.inTime = 0;
+      if (this.step === 0) return;
       this.change(this.step - 1);
       if (this.tried) this.wait = Math.min(2 * this.wait, kLongestWait * patience);
       this.tried = false;
-    } else if (this.step + 1 < kSteps.length) {
+      return;
+    }
+    if (++this.inTime > this.wait) this.tried = false; // it has stood the trial
+    if (this.step + 1 < kSteps.length) {
       if (expected(this.step + 1) < 0.7 * target) this.change(this.step + 1);
       else if (this.inTime > this.wait) this.tryMore();
     }

@@ -21,6 +21,7 @@ export class Shortcuts {
 
   // `key` as KeyboardEvent.key has it, in small letters.
   add(key: string, what: string, action: () => void): void {
+    if (this.actions.has(key)) throw new Error(`two actions for the key ${key}`);
     this.actions.set(key, action);
     this.describe(key.length === 1 ? key.toUpperCase() : `${key.charAt(0).toUpperCase()}${key.slice(1)}`, what);
   }
