@@ -3,9 +3,9 @@
 //
 // Reads: volume_path.glsl; PARTS, the number of parts; `content`, whose first 6 PARTS vectors are theirs (see partOf);
 //   sampler2DArray planesFirst, planesSecond (diffuse and density; features): a part's three planes in its corner of
-//   three layers; vec4 voxelFirst(vec3), voxelSecond(vec3): texels of an atlas of macroblocks of 9³, the middle of the first at
-//   0.5; sampler3D macroblocks: where they are in it, bytes, the fourth 0 where none is; sampler3D distances: bytes; float featureRange, densityRange,
-//   stepsPerTexel, minTransmittance.
+//   three layers; vec4 voxelFirst(vec3), voxelSecond(vec3): texels of an atlas of macroblocks of 9³, the middle of the
+//   first at 0.5; sampler3D macroblocks: where they are in it, bytes, the fourth 0 where none is; sampler3D distances:
+//   bytes; float featureRange, densityRange, stepsPerTexel, minTransmittance.
 // Defines: Part, partOf, ownedRange, Composite, marchPart.
 
 struct Part {

@@ -1,4 +1,5 @@
-// The depth of what is opaque in a world, drawn with its own materials, whose cut-outs and displacements count: rays end there. The scene's own picture lets light through, and so is no part of it.
+// The depth of what is opaque in a world, drawn with its own materials, whose cut-outs and displacements count: rays end
+// there. The scene's own picture lets light through, and so is no part of it.
 import * as THREE from 'three';
 import { drawAsTheyStand, type Picture } from './picture';
 
