@@ -12,7 +12,7 @@ import { megabytes } from '../page/panels';
 import type { Bookmarks } from '../views/bookmarks';
 import { formatView, parseView } from '../views/view-address';
 import type { Viewer } from '../viewer';
-import { base64Of, bytesOf, contentsOf, fileOfContent, namesOf } from './model-sources';
+import { base64Of, bytesOf, contentsOf, fileOfContent, keyOf, namesOf } from './model-sources';
 import { addressFrom, addressOfFile, resolved } from './world-address';
 import { decodeWorld, encodeWorld, kEmbeddedBytes, kMost, kWorldBytes, kWorldName, mainScene, type World, type WorldModel, type WorldScene } from './world-file';
 
@@ -63,7 +63,7 @@ export class Worlds {
     if (withFiles && bytes > kEmbeddedBytes) {
       throw new SceneError(kWorldName, '', `cannot hold ${megabytes(bytes)} of models, only ${megabytes(kEmbeddedBytes)}`, 'save it without them');
     }
-    const names = namesOf(new Set(list.map(({ source }) => source)));
+    const names = await namesOf(new Set(list.map(({ source }) => source)), this.absent.models);
     const files = new Map<string, string>();
     if (withFiles) for (const [file, name] of names) files.set(name, await base64Of(file));
     const models: WorldModel[] = [];
@@ -127,7 +127,7 @@ export class Worlds {
       const held = [...world.files].map(([path, bytes]): ModelFile => ({ path, file: new Blob([bytes]) }));
       const all = [...held, ...files, ...this.models.list.flatMap(({ source }) => source.files)];
       for (const [i, saved] of world.models.entries()) {
-        const key = saved.files.join('\n');
+        const key = keyOf(saved);
         if (sources.has(key)) continue;
         sources.set(key, undefined);
         try {
@@ -143,7 +143,7 @@ export class Worlds {
     this.showScenes(scenes, fresh);
     for (const model of [...this.models.list]) this.models.remove(model);
     for (const saved of world.models) {
-      const source = sources.get(saved.files.join('\n'));
+      const source = sources.get(keyOf(saved));
       if (!source) {
         absent.models.push(saved);
         continue;

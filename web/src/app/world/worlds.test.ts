@@ -1,0 +1,47 @@
+import * as THREE from 'three';
+import { beforeEach, describe, expect, it, vi } from 'vitest';
+import { madeGlb } from '../../testing/made-glb';
+import type { HiddenParts } from '../hiding/hidden-parts';
+import { Models, type ModelSource } from '../models/models';
+import type { Bookmarks } from '../views/bookmarks';
+import type { Viewer } from '../viewer';
+import { contentOf } from './file-content';
+import { Worlds } from './worlds';
+
+vi.stubGlobal('location', { href: 'https://a/' });
+// What needs a graphics card.
+vi.mock('../../scene', () => ({ TesseraScene: {} }));
+vi.mock('../models/model-light', () => ({ addLight: () => {} }));
+
+const file = (path: string, content: BlobPart) => ({ path, file: new Blob([content]) });
+const place = { position: [0, 0, 0], rotation: [0, 0, 0, 1], scale: [1, 1, 1] };
+const model = (path: string, contents: string[] = []) => ({ name: path, files: [path], contents, ...place });
+const worldOf = (models: unknown[], more = {}) =>
+  file('world.json', JSON.stringify({ kind: 'tessera world', version: 2, scenes: [{ name: 'city', url: 'city.scene' }], models, ...more }));
+
+describe('Worlds', () => {
+  let models: Models;
+  let worlds: Worlds;
+  let changes: number;
+  let city: THREE.Object3D;
+
+  beforeEach(() => {
+    city = Object.assign(new THREE.Object3D(), {
+      name: 'city', files: { name: 'https://a/city.scene/tileset.json' }, tileset: {}, bounds: new THREE.Box3().setFromCenterAndSize(new THREE.Vector3(), new THREE.Vector3(9, 9, 9)),
+    });
+    const viewer = { city, scenes: [city], world: new THREE.Scene(), onFrame: new Set(), needPicture: () => {}, changedScenes: () => {} } as unknown as Viewer;
+    models = new Models(viewer);
+    changes = 0;
+    models.onChange.add(() => ++changes);
+    worlds = new Worlds(viewer, models, { list: [], show: () => {} } as unknown as HiddenParts, { list: [], showWorld: () => {} } as unknown as Bookmarks);
+  });
+
+  const widths = () => models.list.map(({ source }: { source: ModelSource }) => source.size.x);
+
+  it('show of models whose files have one name each its own', async () => {
+    const cubes = [1, 2].map((edge) => file('cube.glb', madeGlb({ edge })));
+    const contents = await Promise.all(cubes.map((cube) => contentOf(cube.file)));
+    await worlds.openFile(worldOf(contents.map((content) => model('cube.glb', [content]))), cubes);
+    expect(widths()).toEqual([1, 2]);
+  });
+});
