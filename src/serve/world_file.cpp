@@ -97,7 +97,12 @@ void requireScenesBeside(const fs::path& worldFile) {
   };
   if (world.contains("scene")) require(world["scene"], "scene.url");
   if (!world.contains("scenes") || !world["scenes"].is_array()) return;
-  for (size_t i = 0; i < world["scenes"].size(); ++i) require(world["scenes"][i], fmt::format("scenes[{}].url", i));
+  for (size_t i = 0; i < world["scenes"].size(); ++i) {
+    const json& scene = world["scenes"][i];
+    const std::string place = fmt::format("scenes[{}]", i);
+    if (!scene.is_object()) throw Error(worldFile.string(), place, "is no object", "save it in the viewer again");
+    require(scene, place + ".url");
+  }
 }
 
 std::string viewerOfWorld(const std::string& name) {

@@ -78,8 +78,12 @@ TEST_F(WorldFileTest, MayNameNoneOutsideOfIt) {
 }
 
 TEST_F(WorldFileTest, IsReadNoFartherThanThat) {
-  EXPECT_EQ(said(R"({"kind":"tessera world","scenes":[{"url":"deep"},3,{"url":4}],"models":7,"files":{"a":"b"}})"), "");
+  EXPECT_EQ(said(R"({"kind":"tessera world","scenes":[{"url":"deep"},{"url":4}],"models":7,"files":{"a":"b"}})"), "");
   EXPECT_EQ(said(R"({"kind":"tessera world","scenes":"deep"})"), "");
+  for (const char* scene : {"3", "null", "[]", "\"deep\""}) {
+    EXPECT_EQ(said(fmt::format(R"({{"kind":"tessera world","scenes":[{{"url":"deep"}},{}]}})", scene)),
+              "scenes[1]: is no object");
+  }
   EXPECT_EQ(said("{"), ": is not JSON");
   EXPECT_EQ(said("[]"), ": is not JSON");
   EXPECT_EQ(said("{}"), ": is no world of the viewer");

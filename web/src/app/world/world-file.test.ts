@@ -78,6 +78,7 @@ describe('decodeWorld', () => {
     expect(said((file) => (file.scenes = []))).toContain('scenes: has none');
     expect(said((file) => delete file.scenes)).toContain('scenes: is no list');
     expect(said((file) => (file.scenes = Array.from({ length: 17 }, () => file.scenes[1])))).toContain('scenes: are more than 16');
+    for (const none of [5, null, 'a', [], [{ url: 'a' }]]) expect(said((file) => file.scenes.push(none))).toContain('scenes[2]: is no object');
     expect(said((file) => (file.scenes[0].scale = [1, 1, 1]))).toContain('scenes[0].scale: is no number');
     expect(said((file) => (file.scenes[0].scale = 0))).toContain('scenes[0].scale: is not above 0.000001');
     expect(said((file) => (file.scenes[0].rotation = [1, 1, 1, 1]))).toContain('scenes[0].rotation: is no rotation');

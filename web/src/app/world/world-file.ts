@@ -107,6 +107,7 @@ function firstScene(scene: Json): WorldScene {
 }
 
 function sceneOf(scene: Json, fail: Fail): WorldScene {
+  if (typeof scene !== 'object' || scene === null || Array.isArray(scene)) return fail('', 'is no object');
   const url = stringOf(scene, 'url') ?? '';
   if (url.length > kNameLength || (url !== '' && !isAddress(url))) return fail('.url', 'is no address of http or https, nor a relative one');
   const name = stringOf(scene, 'name') ?? '';
