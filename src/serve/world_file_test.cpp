@@ -98,6 +98,16 @@ TEST_F(WorldFileTest, IsOneThatIsGivenToBrowsers) {
   EXPECT_TRUE(saidOf("site/hidden.json").starts_with(link)) << saidOf("site/hidden.json");
 }
 
+TEST_F(WorldFileTest, SaysNothingToTheTerminal) {
+  write("site/world.json", worldOf("\\u001b[2J\\u009b"));
+  try {
+    requireScenesBeside(at("site/world.json"));
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("'\\x1b[2J\\u009b' does not lie in"), std::string::npos) << error.what();
+  }
+}
+
 TEST_F(WorldFileTest, IsReadNoFartherThanThat) {
   EXPECT_EQ(said(R"({"kind":"tessera world","scenes":[{"url":"deep"},{"url":4}],"models":7,"files":{"a":"b"}})"), "");
   EXPECT_EQ(said(R"({"kind":"tessera world","scenes":"deep"})"), "");
