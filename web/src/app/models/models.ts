@@ -5,6 +5,7 @@ import type { LoadedModel } from './load-model';
 import { kindOf, nameOf } from './model-files';
 import { addLight } from './model-light';
 import type { Viewer } from '../viewer';
+import { kNameLength, scaleWithin } from '../world/world-fields';
 
 // What several models may be copies of.
 export interface ModelSource extends LoadedModel {
@@ -118,13 +119,14 @@ export class Models {
   // given a tenth of its size.
   private ownScale({ size }: ModelSource): number {
     const { tileset, bounds } = this.viewer.city;
-    if (tileset.georeference) return 1 / Math.hypot(...tileset.georeference.enuFromWorld.slice(0, 3));
+    if (tileset.georeference) return scaleWithin(1 / Math.hypot(...tileset.georeference.enuFromWorld.slice(0, 3)));
     const share = size.length() / bounds.getSize(new THREE.Vector3()).length();
-    return share > 1 || share < 1 / 2000 ? 0.1 / share : 1;
+    return share > 1 || share < 1 / 2000 ? scaleWithin(0.1 / share) : 1;
   }
 
   // Which no other has.
-  freeName(name: string): string {
+  freeName(given: string): string {
+    const name = given.slice(0, kNameLength - 10) || 'Model';
     const plain = name.replace(/ \d+$/, '');
     const names = new Set(this.list.map((model) => model.name));
     let free = names.has(name) ? '' : name;

@@ -3,7 +3,7 @@ import { SceneError } from '../../scene-error';
 import { arrayOf, fieldOf, flagOf, stringOf, type Json } from '../../tiles/json-fields';
 import { parseView } from '../views/view-address';
 import { isAddress, isFileAddress } from './world-address';
-import { checkedName, kNameLength, numberWithin, numbersWithin, quaternionOf, scalesOf, type Fail, type Four, type Three } from './world-fields';
+import { checkedName, kFarthest, kNameLength, numberWithin, numbersWithin, quaternionOf, scalesOf, type Fail, type Four, type Three } from './world-fields';
 
 export const kWorldName = 'world.json';
 export const kEmbeddedBytes = 128 * 1000 * 1000; // of all models that one file may hold
@@ -12,7 +12,6 @@ const kKind = 'tessera world';
 const kVersion = 2;
 export const kMost = { scenes: 16, models: 1000, hidden: 8, bookmarks: 200 };
 const kMostFiles = 1000; // of a model
-const kFarthest = 1e7; // metres
 
 export interface WorldScene {
   name: string;
@@ -66,6 +65,19 @@ export function encodeWorld({ scenes, models, hidden, bookmarks }: Omit<World, '
     ...(held.length > 0 ? [`"files":{${lines(held)}}`] : []),
   ];
   return `{${fields.join(',\n')}}\n`;
+}
+
+// world.json. Throws SceneError where it could not be opened again.
+export function savedWorld(world: Omit<World, 'files'>, files: ReadonlyMap<string, string>): Blob {
+  try {
+    decodeWorld(encodeWorld(world, new Map([...files.keys()].map((name) => [name, '']))), kWorldName);
+  } catch (error) {
+    if (!(error instanceof SceneError)) throw error;
+    throw new SceneError(kWorldName, error.place, `${error.reason}, so that it could not be opened again`, 'change that, and save again');
+  }
+  const blob = new Blob([encodeWorld(world, files)], { type: 'application/json' });
+  if (blob.size <= kWorldBytes) return blob;
+  throw new SceneError(kWorldName, '', `would be larger than ${kWorldBytes / 1e6} MB`, 'save it without its models');
 }
 
 // Throws SceneError that names `file`, and where in it the first thing is wrong.

@@ -2,10 +2,12 @@ import * as THREE from 'three';
 import { beforeEach, describe, expect, it, vi } from 'vitest';
 import { madeGlb } from '../../testing/made-glb';
 import type { HiddenParts } from '../hiding/hidden-parts';
+import { loadModel } from '../models/load-model';
 import { Models, type ModelSource } from '../models/models';
 import type { Bookmarks } from '../views/bookmarks';
 import type { Viewer } from '../viewer';
 import { contentOf } from './file-content';
+import { decodeWorld } from './world-file';
 import { Worlds } from './worlds';
 
 vi.stubGlobal('location', { href: 'https://a/' });
@@ -43,5 +45,26 @@ describe('Worlds', () => {
     const contents = await Promise.all(cubes.map((cube) => contentOf(cube.file)));
     await worlds.openFile(worldOf(contents.map((content) => model('cube.glb', [content]))), cubes);
     expect(widths()).toEqual([1, 2]);
+  });
+
+  it('are saved so that they can be opened again', async () => {
+    const [nameless, other] = ['.glb', 'x.glb'].map((path) => file(path, madeGlb({ edge: 2 })));
+    for (const main of [nameless, nameless, other]) models.add(Models.sourceOf(await loadModel(main, [main])));
+    expect(models.list.map(({ name }) => name)).toEqual(['Model', 'Model 2', 'x']);
+    expect(models.freeName('x'.repeat(1000)).length).toBeLessThan(1000);
+    const { models: saved } = decodeWorld(await (await worlds.save(false)).text(), 'a');
+    expect(saved.map(({ name }) => name)).toEqual(['Model', 'Model 2', 'x']);
+  });
+
+  it('are not saved where they could not be opened again', async () => {
+    const cube = file('cube.glb', madeGlb({ edge: 2 }));
+    const model = models.add(Models.sourceOf(await loadModel(cube, [cube])));
+    model.scale.x = 2e6;
+    await expect(worlds.save(false)).rejects.toThrow(
+      'world.json: models[0].scale: has a number beyond 1000000, so that it could not be opened again; change that, and save again');
+    model.scale.x = 1;
+    await worlds.save(false);
+    for (let i = 0; i < 1000; ++i) models.list.push(model);
+    await expect(worlds.save(false)).rejects.toThrow('world.json: models: are more than 1000, so that');
   });
 });

@@ -14,7 +14,8 @@ import { formatView, parseView } from '../views/view-address';
 import type { Viewer } from '../viewer';
 import { base64Of, bytesOf, contentsOf, fileOfContent, keyOf, namesOf } from './model-sources';
 import { addressFrom, addressOfFile, resolved } from './world-address';
-import { decodeWorld, encodeWorld, kEmbeddedBytes, kMost, kWorldBytes, kWorldName, mainScene, type World, type WorldModel, type WorldScene } from './world-file';
+import { kNameLength } from './world-fields';
+import { decodeWorld, kEmbeddedBytes, kMost, kWorldBytes, kWorldName, mainScene, savedWorld, type World, type WorldModel, type WorldScene } from './world-file';
 
 // A world.json, and where it is: relative addresses in it are seen from there.
 export interface NamedWorld {
@@ -56,7 +57,7 @@ export class Worlds {
     private readonly bookmarks: Bookmarks,
   ) {}
 
-  // world.json. Throws SceneError where it cannot hold the models' files.
+  // world.json. Throws SceneError where it cannot hold the models' files, or could not be opened again.
   async save(withFiles: boolean): Promise<Blob> {
     const { list } = this.models;
     const bytes = bytesOf(list);
@@ -74,13 +75,13 @@ export class Worlds {
         ...placeOf(model, model.source.base), visible: model.visible, plays: model.plays,
       });
     }
-    const text = encodeWorld({
+    return savedWorld({
       scenes: [...this.viewer.scenes.map((scene) => this.sceneOf(scene)), ...this.absent.scenes],
       models: [...models, ...this.absent.models],
       hidden: this.hidden.list.map(({ part }) => part),
-      bookmarks: this.bookmarks.list.slice(0, kMost.bookmarks).map(({ name, view }) => ({ name: name || 'View', view: formatView(view) })),
+      bookmarks: this.bookmarks.list.map(({ name, view }) => ({ name: name || 'View', view: formatView(view) }))
+        .filter(({ view }) => parseView(view)).slice(0, kMost.bookmarks),
     }, files);
-    return new Blob([text], { type: 'application/json' });
   }
 
   // One that was dropped, with the files that came with it. Throws SceneError, and then all stays as it is. Answers with
@@ -177,7 +178,7 @@ export class Worlds {
   private sceneOf(scene: TesseraScene): WorldScene {
     const { position, rotation, scale: [scale] } = placeOf(scene, new THREE.Vector3());
     return {
-      name: scene.name, url: addressFrom(this.address, scene.files.name), visible: scene.visible,
+      name: scene.name.slice(0, kNameLength), url: addressFrom(this.address, scene.files.name), visible: scene.visible,
       ...(scene !== this.viewer.city && { place: { position, rotation, scale } }),
     };
   }
