@@ -47,6 +47,28 @@ describe('Worlds', () => {
     expect(widths()).toEqual([1, 2]);
   });
 
+  it('are opened one after the other', async () => {
+    const cube = (edge: number) => file('cube.glb', madeGlb({ edge }));
+    const slow = cube(1);
+    let read = () => {};
+    const reading = new Promise<void>((resolve) => (read = resolve));
+    slow.file.arrayBuffer = async () => {
+      await reading;
+      return Blob.prototype.arrayBuffer.call(slow.file);
+    };
+    const first = worlds.openFile(worldOf([model('cube.glb')]), [slow]);
+    const broken = worlds.openFile(worldOf([model('lost.glb')]), []);
+    const last = worlds.openFile(worldOf([model('cube.glb')], { bookmarks: [] }), [cube(2)]);
+    await new Promise((resolve) => setTimeout(resolve, 50));
+    expect(widths()).toEqual([]);
+    read();
+    await first;
+    expect(widths()).toEqual([1]);
+    await expect(broken).rejects.toThrow('needs lost.glb');
+    await last;
+    expect(widths()).toEqual([2]);
+  });
+
   it('are saved so that they can be opened again', async () => {
     const [nameless, other] = ['.glb', 'x.glb'].map((path) => file(path, madeGlb({ edge: 2 })));
     for (const main of [nameless, nameless, other]) models.add(Models.sourceOf(await loadModel(main, [main])));

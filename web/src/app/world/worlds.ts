@@ -49,6 +49,7 @@ function addressOfScene({ url }: WorldScene, place: string, name: string, addres
 export class Worlds {
   private address = location.href; // that relative addresses are seen from
   private absent: Pick<World, 'scenes' | 'models'> = { scenes: [], models: [] }; // could not be had, and are saved all the same
+  private last = Promise.resolve(); // that was to be opened
 
   constructor(
     private readonly viewer: Viewer,
@@ -91,9 +92,9 @@ export class Worlds {
     if (given.file.size > kWorldBytes) throw new SceneError(name, '', `is larger than ${megabytes(kWorldBytes)}`, 'save it without its models');
     const world = decodeWorld(await given.file.text(), name);
     const { city } = this.viewer;
-    await this.show({ world, name, address: this.address }, files, false, (error) => {
+    await this.inTurn(() => this.show({ world, name, address: this.address }, files, false, (error) => {
       throw error;
-    });
+    }));
     const main = mainScene(world);
     if (main.name === city.name) return undefined;
     return new SceneError(name, '', `is of the scene ${main.name.slice(0, 100)}, and this is ${city.name}`, 'open it in its own scene, if the models stand in odd places');
@@ -101,8 +102,17 @@ export class Worlds {
 
   // One that was fetched, whose main scene is the city. What cannot be had is told of, and the rest is shown.
   open(fetched: NamedWorld, tell: (error: unknown) => void): Promise<void> {
-    this.address = fetched.address;
-    return this.show(fetched, [], true, tell);
+    return this.inTurn(() => {
+      this.address = fetched.address;
+      return this.show(fetched, [], true, tell);
+    });
+  }
+
+  // After those that were to be opened before.
+  private inTurn(open: () => Promise<void>): Promise<void> {
+    const opened = this.last.then(open);
+    this.last = opened.catch(() => {}); // it is told of by who opens it
+    return opened;
   }
 
   private async show(named: NamedWorld, files: readonly ModelFile[], mayFetch: boolean, lacks: (error: unknown) => void): Promise<void> {
