@@ -35,6 +35,7 @@ export class Models {
   readonly list: PlacedModel[] = [];
   readonly onChange = new Set<() => void>(); // of the list, of what is selected, of a place
   private chosen?: PlacedModel;
+  private isChanging = false; // and tells when it is done
   private isLit = false;
 
   constructor(private readonly viewer: Viewer) {
@@ -51,7 +52,19 @@ export class Models {
     this.changed();
   }
 
+  // Tells once of all that `change` does.
+  changeAll(change: () => void): void {
+    this.isChanging = true;
+    try {
+      change();
+    } finally {
+      this.isChanging = false;
+      this.changed();
+    }
+  }
+
   changed(): void {
+    if (this.isChanging) return;
     this.viewer.needPicture();
     for (const tell of this.onChange) tell();
   }

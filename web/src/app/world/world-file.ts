@@ -12,6 +12,7 @@ const kKind = 'tessera world';
 const kVersion = 2;
 export const kMost = { scenes: 16, models: 1000, hidden: 8, bookmarks: 200 };
 const kMostFiles = 1000; // of a model
+export const kMostFilesHeld = 4000; // of all models
 
 export interface WorldScene {
   name: string;
@@ -178,7 +179,7 @@ function filesOf(files: Json, fail: (place: string, reason: string) => never): W
   let bytes = 0;
   for (const [name, text] of Object.entries(files)) {
     const place = `files[${JSON.stringify(name.slice(0, 100))}]`;
-    if (name === '' || name.length > kNameLength || read.size === kMost.models * 4) fail(place, 'is one file too many, or has no name');
+    if (name === '' || name.length > kNameLength || read.size === kMostFilesHeld) fail(place, 'is one file too many, or has no name');
     if (typeof text !== 'string') return fail(place, 'is no text');
     const content = bytesOfBase64(text) ?? fail(place, 'is no base64');
     bytes += content.length;

@@ -45,6 +45,9 @@ describe('Worlds', () => {
     const contents = await Promise.all(cubes.map((cube) => contentOf(cube.file)));
     await worlds.openFile(worldOf(contents.map((content) => model('cube.glb', [content]))), cubes);
     expect(widths()).toEqual([1, 2]);
+    expect(changes).toBe(1);
+    await worlds.openFile(worldOf(contents.map((content) => model('cube.glb', [content]))), []);
+    expect(changes).toBe(2);
   });
 
   it('are opened one after the other', async () => {

@@ -2,9 +2,8 @@
 import * as THREE from 'three';
 import { TesseraScene } from '../../scene';
 import { SceneError } from '../../scene-error';
-import { fetchFile } from '../../scene-files';
 import type { HiddenParts } from '../hiding/hidden-parts';
-import { kModelBytes, loadModel } from '../models/load-model';
+import { loadModel } from '../models/load-model';
 import { nameOf, type ModelFile } from '../models/model-files';
 import { placeOf, setPlace } from '../models/model-place';
 import { Models, type ModelSource } from '../models/models';
@@ -12,8 +11,9 @@ import { megabytes } from '../page/panels';
 import type { Bookmarks } from '../views/bookmarks';
 import { formatView, parseView } from '../views/view-address';
 import type { Viewer } from '../viewer';
+import { FetchedFiles, fetchNamed } from './fetched-files';
 import { base64Of, bytesOf, contentsOf, fileOfContent, keyOf, namesOf } from './model-sources';
-import { addressFrom, addressOfFile, resolved } from './world-address';
+import { addressFrom, resolved } from './world-address';
 import { kNameLength } from './world-fields';
 import { decodeWorld, kEmbeddedBytes, kMost, kWorldBytes, kWorldName, mainScene, savedWorld, type World, type WorldModel, type WorldScene } from './world-file';
 
@@ -137,12 +137,13 @@ export class Worlds {
       }
       const held = [...world.files].map(([path, bytes]): ModelFile => ({ path, file: new Blob([bytes]) }));
       const all = [...held, ...files, ...this.models.list.flatMap(({ source }) => source.files)];
+      const fetched = new FetchedFiles(named.name, mayFetch ? named.address : undefined);
       for (const [i, saved] of world.models.entries()) {
         const key = keyOf(saved);
         if (sources.has(key)) continue;
         sources.set(key, undefined);
         try {
-          sources.set(key, await this.sourceOf(saved, all, mayFetch ? named.address : undefined, named.name, `models[${i}]`));
+          sources.set(key, await this.sourceOf(saved, all, fetched, named.name, `models[${i}]`));
         } catch (error) {
           lacks(error);
         }
@@ -152,22 +153,24 @@ export class Worlds {
       throw error;
     }
     this.showScenes(scenes, fresh);
-    for (const model of [...this.models.list]) this.models.remove(model);
-    for (const saved of world.models) {
-      const source = sources.get(keyOf(saved));
-      if (!source) {
-        absent.models.push(saved);
-        continue;
+    this.models.changeAll(() => {
+      for (const model of [...this.models.list]) this.models.remove(model);
+      for (const saved of world.models) {
+        const source = sources.get(keyOf(saved));
+        if (source) this.place(source, saved);
+        else absent.models.push(saved);
       }
-      const model = this.models.add(source, this.models.freeName(saved.name));
-      setPlace(model, model.source.base, saved);
-      model.visible = saved.visible;
-      model.plays = saved.plays;
-    }
+    });
     this.absent = absent;
-    this.models.changed();
     this.hidden.show(world.hidden);
     this.bookmarks.showWorld(world.bookmarks.map(({ name, view }) => ({ name, view: parseView(view)! })));
+  }
+
+  private place(source: ModelSource, saved: WorldModel): void {
+    const model = this.models.add(source, this.models.freeName(saved.name));
+    setPlace(model, model.source.base, saved);
+    model.visible = saved.visible;
+    model.plays = saved.plays;
   }
 
   private showScenes(scenes: ReadonlyMap<WorldScene, TesseraScene>, fresh: readonly TesseraScene[]): void {
@@ -194,31 +197,16 @@ export class Worlds {
   }
 
   // Of files that are in the world, came with it, are in use, or lie where the world says, if it has an address.
-  private async sourceOf(saved: WorldModel, all: readonly ModelFile[], address: string | undefined, name: string, place: string): Promise<ModelSource> {
+  private async sourceOf(saved: WorldModel, all: readonly ModelFile[], fetched: FetchedFiles, name: string, place: string): Promise<ModelSource> {
     const own: ModelFile[] = [];
     for (const [i, path] of saved.files.entries()) {
-      const found = (await fileOfContent(path, saved.contents[i], i === 0, all)) ?? (await fetched(path, address));
+      const found = (await fileOfContent(path, saved.contents[i], i === 0, all)) ?? (await fetched.file(path, place));
       if (!found && i === 0) {
         throw new SceneError(name, place, `needs ${path.slice(0, 200)}`, 'drop the models together with it');
       }
       if (found) own.push(found);
     }
     return Models.sourceOf(await loadModel(own[0], [...own, ...all]));
-  }
-}
-
-// Nothing where it says no whole address, and nobody knows what it is relative to. Throws SceneError where it is not there.
-async function fetched(path: string, address: string | undefined): Promise<ModelFile | undefined> {
-  const url = address === undefined && !/^https?:/i.test(path) ? undefined : addressOfFile(path, address ?? location.href);
-  if (url === undefined) return undefined;
-  return { path, file: new Blob([await fetchNamed(url, path, kModelBytes, 'put it where the world says')]) };
-}
-
-async function fetchNamed(url: string, name: string, most: number, remedy: string): Promise<Uint8Array<ArrayBuffer>> {
-  try {
-    return await fetchFile(url, name, most);
-  } catch (error) {
-    throw error instanceof SceneError ? new SceneError(error.what, error.place, error.reason, remedy) : error;
   }
 }
 
