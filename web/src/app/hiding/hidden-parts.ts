@@ -1,7 +1,7 @@
 // Boxes in which nothing of the scenes is drawn, and which one is selected.
 import * as THREE from 'three';
 import { kYUpFromZUp, kZUpFromYUp } from '../../axes';
-import { kMostHiddenBoxes } from '../../draw/volume-material';
+import { kMostHiddenBoxes } from '../../draw/hidden-boxes';
 import { scaleWithin } from '../world/world-fields';
 import type { HiddenPart } from '../world/world-file';
 import type { Viewer } from '../viewer';

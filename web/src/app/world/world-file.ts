@@ -1,4 +1,5 @@
 // world.json: which scenes, models, hidden parts and views make a world (docs/world-format.md). Untrusted text.
+import { kMostHiddenBoxes } from '../../draw/hidden-boxes';
 import { SceneError } from '../../scene-error';
 import { arrayOf, fieldOf, flagOf, stringOf, type Json } from '../../tiles/json-fields';
 import { parseView } from '../views/view-address';
@@ -10,7 +11,7 @@ export const kEmbeddedBytes = 128 * 1000 * 1000; // of all models that one file 
 export const kWorldBytes = 1.4 * kEmbeddedBytes; // of the file itself
 const kKind = 'tessera world';
 const kVersion = 2;
-export const kMost = { scenes: 16, models: 1000, hidden: 8, bookmarks: 200 };
+export const kMost = { scenes: 16, models: 1000, hidden: kMostHiddenBoxes, bookmarks: 200 };
 const kMostFiles = 1000; // of a model
 export const kMostFilesHeld = 4000; // of all models
 
