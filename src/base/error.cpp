@@ -1,9 +1,31 @@
 #include "base/error.h"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 namespace tessera {
 namespace {
+
+// One line that does nothing to a terminal, whatever a file name, a library or what was read put into it. UTF-8.
+std::string shown(const std::string& text) {
+  std::string shown;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const auto next = static_cast<unsigned char>(i + 1 < text.size() ? text[i + 1] : 0);
+    if (byte == '\n' || byte == '\r') {
+      shown += ' ';
+    } else if (byte < 0x20 || byte == 0x7f) {
+      shown += fmt::format("\\x{:02x}", byte);
+    } else if (byte == 0xc2 && next >= 0x80 && next < 0xa0) {  // the control characters of Latin-1
+      shown += fmt::format("\\u{:04x}", next);
+      ++i;
+    } else {
+      shown += text[i];
+    }
+  }
+  return shown;
+}
 
 std::string sentence(const std::string& what, const std::string& where, const std::string& why,
                      const std::string& remedy) {
@@ -11,10 +33,7 @@ std::string sentence(const std::string& what, const std::string& where, const st
   if (!where.empty()) text += ": " + where;
   text += ": " + why;
   if (!remedy.empty()) text += "; " + remedy;
-  for (char& c : text) {
-    if (c == '\n' || c == '\r') c = ' ';  // one line, whatever a file name or a library put into it
-  }
-  return text;
+  return shown(text);
 }
 
 }  // namespace

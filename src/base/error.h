@@ -6,7 +6,7 @@
 
 namespace tessera {
 
-// Printed as `tessera: error: what: where: why; remedy`.
+// Printed as `tessera: error: what: where: why; remedy`, in one line, control characters as \x1b.
 //   what    the thing that failed, usually a path
 //   where   the place inside it (line, byte, key); may be empty
 //   why     what is wrong there

@@ -22,5 +22,13 @@ TEST(Error, StaysOnOneLineWhateverTheFileIsCalled) {
   EXPECT_STREQ(Error("a\nb", "", "c\r", "d").what(), "a b: c ; d");
 }
 
+TEST(Error, ShowsControlCharactersAsTextThatATerminalDoesNotObey) {
+  EXPECT_STREQ(Error("a\x1b[2J", std::string("\0", 1), "\x7f\t\xc2\x9b", "\xc2").what(),
+               "a\\x1b[2J: \\x00: \\x7f\\x09\\u009b; \xc2");
+  EXPECT_STREQ(Error("\xc2\xa0\xc3\xa4\xe2\x82\xac", "", "b", "").what(), "\xc2\xa0\xc3\xa4\xe2\x82\xac: b")
+      << "letters of other alphabets stay";
+  EXPECT_EQ(Error("a\x1b", "", "b", "").subject(), "a\x1b");
+}
+
 }  // namespace
 }  // namespace tessera

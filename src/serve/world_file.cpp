@@ -49,12 +49,7 @@ json readWorld(const fs::path& file) {
   return world;
 }
 
-// Not empty where it says one.
-std::string urlOf(const json& scene) {
-  if (!scene.is_object() || !scene.contains("url") || !scene["url"].is_string()) return "";
-  return scene["url"].get<std::string>();
-}
-
+// Percent-encoded, whatever it holds.
 std::string encoded(const std::string& text) {
   std::string code;
   for (const char c : text) {
@@ -66,6 +61,27 @@ std::string encoded(const std::string& text) {
     }
   }
   return code;
+}
+
+// Throws Error where a server of the folder would not give the world itself away.
+void requireServed(const fs::path& worldFile, const fs::path& folder) {
+  const std::string name = worldFile.filename().string();
+  if (!pathOfTarget("/" + encoded(name))) {
+    throw Error(worldFile.string(), "", "has a name by which nothing is served",
+                "give it one that does not begin with a dot, and has no backslash or control character");
+  }
+  if (!SiteFile::open(folder, name).file) {
+    throw Error(
+        worldFile.string(), "",
+        fmt::format("is a link to a file outside of '{}', or to a hidden one, which is not served", folder.string()),
+        "copy it there, or name the file that it leads to");
+  }
+}
+
+// Not empty where it says one.
+std::string urlOf(const json& scene) {
+  if (!scene.is_object() || !scene.contains("url") || !scene["url"].is_string()) return "";
+  return scene["url"].get<std::string>();
 }
 
 }  // namespace
@@ -81,6 +97,7 @@ std::optional<fs::path> worldFileAt(const fs::path& path) {
 void requireScenesBeside(const fs::path& worldFile) {
   const json world = readWorld(worldFile);
   const fs::path folder = fs::canonical(fs::absolute(worldFile).parent_path());
+  requireServed(worldFile, folder);
   const auto require = [&](const json& scene, const std::string& place) {
     const std::string url = urlOf(scene);
     if (url.empty() || isElsewhere(url)) return;
@@ -97,7 +114,12 @@ void requireScenesBeside(const fs::path& worldFile) {
   };
   if (world.contains("scene")) require(world["scene"], "scene.url");
   if (!world.contains("scenes") || !world["scenes"].is_array()) return;
-  for (size_t i = 0; i < world["scenes"].size(); ++i) require(world["scenes"][i], fmt::format("scenes[{}].url", i));
+  for (size_t i = 0; i < world["scenes"].size(); ++i) {
+    const json& scene = world["scenes"][i];
+    const std::string place = fmt::format("scenes[{}]", i);
+    if (!scene.is_object()) throw Error(worldFile.string(), place, "is no object", "save it in the viewer again");
+    require(scene, place + ".url");
+  }
 }
 
 std::string viewerOfWorld(const std::string& name) {

@@ -11,8 +11,8 @@ namespace tessera {
 // What `path` names: a JSON file, or world.json in a folder that is no scene. Nothing where it is neither.
 std::optional<fs::path> worldFileAt(const fs::path& path);
 
-// Throws Error where it is no world, or one of its scenes has a relative address that leads to none that a server of
-// its folder would give away. What else is in it is the viewer's to look at.
+// Throws Error where it is no world, where a server of its folder would not give it away, or one of its scenes has a
+// relative address that leads to none that this server would. What else is in it is the viewer's to look at.
 void requireScenesBeside(const fs::path& worldFile);
 
 // The address of a page below "/", so that the viewer there opens "/world/" + name.

@@ -33,8 +33,11 @@ class WorldFileTest : public testing::Test {
   // What it says of a world of that text; empty where nothing is wrong.
   std::string said(const std::string& text) {
     write("site/world.json", text);
+    return saidOf("site/world.json");
+  }
+  std::string saidOf(const std::string& name) const {
     try {
-      requireScenesBeside(at("site/world.json"));
+      requireScenesBeside(at(name));
       return "";
     } catch (const Error& error) {
       return error.place() + ": " + error.reason();
@@ -77,9 +80,41 @@ TEST_F(WorldFileTest, MayNameNoneOutsideOfIt) {
   EXPECT_NE(said(R"({"kind":"tessera world","version":1,"scene":{"url":"../beside"}})"), "");
 }
 
+TEST_F(WorldFileTest, IsOneThatIsGivenToBrowsers) {
+  write("beside/world.json", R"({"kind":"tessera world","scenes":[]})");
+  for (const char* name : {".world.json", "a\\b.json", "a\nb.json"}) {
+    write(std::string("site/") + name, worldOf("deep"));
+    EXPECT_EQ(saidOf(std::string("site/") + name), ": has a name by which nothing is served") << name;
+  }
+  write("site/a 50%.json", worldOf("deep"));
+  EXPECT_EQ(saidOf("site/a 50%.json"), "");
+  fs::create_symlink(at("beside/world.json"), at("site/out.json"));
+  const std::string link = ": is a link to a file outside of '" + fs::canonical(at("site")).string() + "', or";
+  EXPECT_TRUE(saidOf("site/out.json").starts_with(link)) << saidOf("site/out.json");
+  fs::create_symlink("deep/inner.json", at("site/in.json"));
+  write("site/deep/inner.json", worldOf("deep"));
+  EXPECT_EQ(saidOf("site/in.json"), "");
+  fs::create_symlink(".world.json", at("site/hidden.json"));
+  EXPECT_TRUE(saidOf("site/hidden.json").starts_with(link)) << saidOf("site/hidden.json");
+}
+
+TEST_F(WorldFileTest, SaysNothingToTheTerminal) {
+  write("site/world.json", worldOf("\\u001b[2J\\u009b"));
+  try {
+    requireScenesBeside(at("site/world.json"));
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("'\\x1b[2J\\u009b' does not lie in"), std::string::npos) << error.what();
+  }
+}
+
 TEST_F(WorldFileTest, IsReadNoFartherThanThat) {
-  EXPECT_EQ(said(R"({"kind":"tessera world","scenes":[{"url":"deep"},3,{"url":4}],"models":7,"files":{"a":"b"}})"), "");
+  EXPECT_EQ(said(R"({"kind":"tessera world","scenes":[{"url":"deep"},{"url":4}],"models":7,"files":{"a":"b"}})"), "");
   EXPECT_EQ(said(R"({"kind":"tessera world","scenes":"deep"})"), "");
+  for (const char* scene : {"3", "null", "[]", "\"deep\""}) {
+    EXPECT_EQ(said(fmt::format(R"({{"kind":"tessera world","scenes":[{{"url":"deep"}},{}]}})", scene)),
+              "scenes[1]: is no object");
+  }
   EXPECT_EQ(said("{"), ": is not JSON");
   EXPECT_EQ(said("[]"), ": is not JSON");
   EXPECT_EQ(said("{}"), ": is no world of the viewer");

@@ -3,7 +3,7 @@ export { kYUpFromZUp } from './axes';
 export { kDisplayModes, type DisplayMode } from './draw/display-modes';
 export { TesseraScene, type SceneOptions, type SceneStatistics } from './scene';
 export { updateScenes } from './scenes';
-export { kMostHiddenBoxes } from './draw/volume-material';
+export { kMostHiddenBoxes } from './draw/hidden-boxes';
 export { SceneError } from './scene-error';
 export { ChosenFiles, ServedFiles, type SceneFiles } from './scene-files';
 export type { SelectionSettings } from './stream/tile-selector';

@@ -10,8 +10,10 @@ export interface SceneFiles {
   read(uri: string, most: number, signal?: AbortSignal): Promise<ContentFile>;
 }
 
-function tooLarge(name: string): SceneError {
-  return new SceneError(name, '', 'is larger than any such file should be', 'copy the scene again, or bake it again');
+export class TooLarge extends SceneError {
+  constructor(name: string, remedy = 'copy the scene again, or bake it again') {
+    super(name, '', 'is larger than any such file should be', remedy);
+  }
 }
 
 export class ServedFiles implements SceneFiles {
@@ -53,7 +55,7 @@ export class ChosenFiles implements SceneFiles {
   async read(uri: string, most: number, signal?: AbortSignal): Promise<ContentFile> {
     const file = this.files.get(uri);
     if (!file) throw new SceneError(uri, '', 'is not in the folder', 'copy the scene again');
-    if (file.size > most) throw tooLarge(uri);
+    if (file.size > most) throw new TooLarge(uri);
     try {
       const bytes = new Uint8Array(await file.arrayBuffer());
       signal?.throwIfAborted();
@@ -81,7 +83,7 @@ export async function fetchFile(url: string, name: string, most: number, signal?
       bytes += next.value.length;
       if (bytes > most) {
         await reader.cancel();
-        throw tooLarge(name);
+        throw new TooLarge(name);
       }
       pieces.push(next.value);
     }

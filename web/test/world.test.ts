@@ -43,6 +43,8 @@ describe.skipIf(missing())('a world that is served', () => {
     const lost = { ...world.models[0], name: 'lost', files: ['lost.glb'] };
     const gone = { ...world.scenes[0], url: 'https://localhost:1/gone.scene', name: 'Gone' };
     writeFileSync(join(folder, 'with gaps.json'), JSON.stringify({ ...world, scenes: [...world.scenes, gone], models: [...world.models, lost] }));
+    const dark = { ...world, scenes: [{ ...world.scenes[1], visible: false }], models: [], hidden: [] };
+    writeFileSync(join(folder, 'dark.json'), JSON.stringify(dark));
     [server, browser] = await Promise.all([serve(folder), launch()]);
   });
   afterAll(async () => {
@@ -134,6 +136,17 @@ describe.skipIf(missing())('a world that is served', () => {
     const saved = await save();
     expect(saved.scenes.map(({ name }) => name)).toEqual(['golden', 'Old town', 'Gone']);
     expect(saved.models.map(({ name }) => name)).toEqual(['cube', 'cube 2', 'lost']);
+  });
+
+  it('that shows no scene at first is not waited for, and its scene can be shown', async () => {
+    await page.goto(`${server.url}?world=world/dark.json#${kView}`);
+    await page.waitForSelector('.loading.done', { state: 'attached' });
+    await page.keyboard.press('o');
+    const dark = await picture();
+    await page.keyboard.press('o');
+    await page.click('.scenes [aria-label="Show: golden"]');
+    expect(changed(dark, await picture())).toBeGreaterThan(2000);
+    expect(said).toEqual([]);
   });
 
   it('stays as it is where another one cannot be opened', async () => {

@@ -63,6 +63,7 @@ async function start(): Promise<void> {
   keepViewInAddress(viewer);
   viewer.onFrame.add((frame) => {
     const numbers = viewer.statistics;
+    if (!viewer.scenes.some(({ visible }) => visible)) loading.hide();
     if (!numbers) return;
     loading.show(city.name, numbers, viewer.idle);
     statistics.show(numbers, frame);

@@ -6,9 +6,10 @@ import type { VolumeHeader } from '../tiles/decode-volume';
 import type { VolumePart } from '../tiles/volume-content';
 import { frontToBack as orderOf } from './box-order';
 import { colourOfBlock, colourOfLevel } from './display-modes';
+import { kMostHiddenBoxes } from './hidden-boxes';
 import { packNetwork } from './network-shader';
 import { drawAsTheyStand, type Picture } from './picture';
-import { kMostHiddenBoxes, programMaterial, volumeMaterial, viewUniforms, type ProgramShape, type ViewUniforms } from './volume-material';
+import { programMaterial, volumeMaterial, viewUniforms, type ProgramShape, type ViewUniforms } from './volume-material';
 import { SceneError } from '../scene-error';
 import { atlasesOf, type ContentTextures } from './content-textures';
 

@@ -6,6 +6,7 @@ import pathSource from '../../../shaders/lib/volume_path.glsl?raw';
 import { kVectorsOfPart } from '../tiles/volume-content';
 import type { ContentTextures } from './content-textures';
 import { kDisplayConstants } from './display-modes';
+import { kMostHiddenBoxes } from './hidden-boxes';
 import { networkShader, vectorsOfNetwork, writtenVector } from './network-shader';
 
 // The same for all contents of a picture. Scene units; `part`, `origin`, `ray` and `sceneFromClip` are those of Picture.
@@ -28,8 +29,6 @@ export interface ViewUniforms {
   hiddenBoxesOfSurround: { value: number }; // and for the surround
   withinBox: { value: boolean }; // nothing is drawn outside of the scene's box
 }
-
-export const kMostHiddenBoxes = 8; // of somebody's, and as many in the surround alone
 
 export function viewUniforms(): ViewUniforms {
   return {

@@ -1,7 +1,8 @@
 // Boxes in which nothing of the scenes is drawn, and which one is selected.
 import * as THREE from 'three';
 import { kYUpFromZUp, kZUpFromYUp } from '../../axes';
-import { kMostHiddenBoxes } from '../../draw/volume-material';
+import { kMostHiddenBoxes } from '../../draw/hidden-boxes';
+import { scaleWithin } from '../world/world-fields';
 import type { HiddenPart } from '../world/world-file';
 import type { Viewer } from '../viewer';
 
@@ -86,7 +87,7 @@ export class HiddenParts {
     const size = this.viewer.city.bounds.getSize(new THREE.Vector3());
     const box = this.add(new HiddenBox(this.freeName()));
     box.position.copy(place);
-    box.scale.setScalar(0.05 * Math.hypot(size.x, size.z));
+    box.scale.setScalar(scaleWithin(0.05 * Math.hypot(size.x, size.z)));
     this.select(box);
     return box;
   }

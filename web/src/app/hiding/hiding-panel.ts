@@ -3,6 +3,7 @@ import * as THREE from 'three';
 import { kGizmoModes, type GizmoMode, type ModelGizmo } from '../models/model-gizmo';
 import { element } from '../page/element';
 import { iconButton, numberField } from '../page/fields';
+import { scaleWithin } from '../world/world-fields';
 import type { HiddenPart } from '../world/world-file';
 import type { HiddenBox, HiddenParts } from './hidden-parts';
 
@@ -14,7 +15,7 @@ export class HidingPanel {
   private readonly list = element('ul');
   private readonly details = element('div', 'details');
   private readonly middle = kAxes.map((axis, i) => this.field(axis, (part, to) => (part.middle[i] = to)));
-  private readonly size = ['Length', 'Width', 'Height'].map((name, i) => this.field(name, (part, to) => (part.size[i] = Math.max(to, 1e-3))));
+  private readonly size = ['Length', 'Width', 'Height'].map((name, i) => this.field(name, (part, to) => (part.size[i] = scaleWithin(Math.max(to, 1e-3)))));
   private readonly turn = this.field('Turn, degrees', (part, to) => (part.turn = THREE.MathUtils.degToRad(to)));
   private readonly modes = new Map<GizmoMode, HTMLButtonElement>();
   private readonly add = element('button', '', '');

@@ -2,6 +2,7 @@
 import type * as THREE from 'three';
 import type { TransformControls } from 'three/addons/controls/TransformControls.js';
 import type { Viewer } from '../viewer';
+import { kFarthest, scaledWithin, scaleWithin } from '../world/world-fields';
 
 export const kGizmoModes = { translate: 'Move', rotate: 'Turn', scale: 'Scale' } as const;
 export type GizmoMode = keyof typeof kGizmoModes;
@@ -72,6 +73,7 @@ export class ModelGizmo {
         if (this.isBox) this.object.scale.set(...sizesOf(this.object));
         else scaleAlike(this.object, before);
       }
+      this.object?.position.clampScalar(-kFarthest, kFarthest);
       this.viewer.resolution.moved(performance.now());
       this.moved();
     });
@@ -91,12 +93,12 @@ export class ModelGizmo {
 
 // Of a box that is not turned inside out.
 function sizesOf({ scale }: THREE.Object3D): [number, number, number] {
-  return scale.toArray().map((x) => Math.max(Math.abs(x), 1e-3)) as [number, number, number];
+  return scale.toArray().map((x) => scaleWithin(Math.max(Math.abs(x), 1e-3))) as [number, number, number];
 }
 
 // By what one of its axes was scaled most.
 function scaleAlike({ scale }: THREE.Object3D, before: { x: number; y: number; z: number }): void {
   const factors = (['x', 'y', 'z'] as const).map((axis) => Math.max(scale[axis] / before[axis], 0.01));
   const factor = factors.reduce((most, one) => (Math.abs(Math.log(one)) > Math.abs(Math.log(most)) ? one : most));
-  scale.copy(before).multiplyScalar(factor);
+  scale.fromArray(scaledWithin([before.x, before.y, before.z], factor));
 }

@@ -4,6 +4,7 @@ import { element } from '../page/element';
 import { iconButton, numberField } from '../page/fields';
 import type { GroundFrame } from '../measuring/geodesy';
 import { kGizmoModes, type GizmoMode, type ModelGizmo } from './model-gizmo';
+import { scaledWithin } from '../world/world-fields';
 import { placeOf, setPlace } from './model-place';
 import type { Models, PlacedModel } from './models';
 
@@ -137,7 +138,7 @@ export class ModelsPanel {
   }
 
   private setScale(to: number): void {
-    if (to >= 1e-6) this.change((model) => model.scale.multiplyScalar(to / model.scale.x));
+    if (to > 0) this.change(({ scale }) => scale.fromArray(scaledWithin(scale.toArray(), to / scale.x)));
   }
 }
 

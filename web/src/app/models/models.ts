@@ -5,6 +5,7 @@ import type { LoadedModel } from './load-model';
 import { kindOf, nameOf } from './model-files';
 import { addLight } from './model-light';
 import type { Viewer } from '../viewer';
+import { kNameLength, scaleWithin } from '../world/world-fields';
 
 // What several models may be copies of.
 export interface ModelSource extends LoadedModel {
@@ -34,6 +35,7 @@ export class Models {
   readonly list: PlacedModel[] = [];
   readonly onChange = new Set<() => void>(); // of the list, of what is selected, of a place
   private chosen?: PlacedModel;
+  private isChanging = false; // and tells when it is done
   private isLit = false;
 
   constructor(private readonly viewer: Viewer) {
@@ -50,7 +52,19 @@ export class Models {
     this.changed();
   }
 
+  // Tells once of all that `change` does.
+  changeAll(change: () => void): void {
+    this.isChanging = true;
+    try {
+      change();
+    } finally {
+      this.isChanging = false;
+      this.changed();
+    }
+  }
+
   changed(): void {
+    if (this.isChanging) return;
     this.viewer.needPicture();
     for (const tell of this.onChange) tell();
   }
@@ -118,13 +132,14 @@ export class Models {
   // given a tenth of its size.
   private ownScale({ size }: ModelSource): number {
     const { tileset, bounds } = this.viewer.city;
-    if (tileset.georeference) return 1 / Math.hypot(...tileset.georeference.enuFromWorld.slice(0, 3));
+    if (tileset.georeference) return scaleWithin(1 / Math.hypot(...tileset.georeference.enuFromWorld.slice(0, 3)));
     const share = size.length() / bounds.getSize(new THREE.Vector3()).length();
-    return share > 1 || share < 1 / 2000 ? 0.1 / share : 1;
+    return share > 1 || share < 1 / 2000 ? scaleWithin(0.1 / share) : 1;
   }
 
   // Which no other has.
-  freeName(name: string): string {
+  freeName(given: string): string {
+    const name = given.slice(0, kNameLength - 10) || 'Model';
     const plain = name.replace(/ \d+$/, '');
     const names = new Set(this.list.map((model) => model.name));
     let free = names.has(name) ? '' : name;

@@ -6,20 +6,19 @@ import { icon } from '../page/icons';
 import type { Toolbar } from '../page/toolbar';
 import { formatView, parseView, type View } from './view-address';
 import type { Viewer } from '../viewer';
+import { kMost } from '../world/world-file';
 
 export interface Bookmark {
   name: string;
   view: View;
 }
 
-const kMost = 200;
-
 // What was kept: text of this program, or of nobody knows whom.
 export function readBookmarks(text: string | null): Bookmark[] {
   try {
     const kept = JSON.parse(text ?? '[]') as unknown;
     if (!Array.isArray(kept)) return [];
-    return kept.slice(0, kMost).flatMap((one: unknown) => {
+    return kept.slice(0, kMost.bookmarks).flatMap((one: unknown) => {
       const { name, view } = (one ?? {}) as { name?: unknown; view?: unknown };
       const found = typeof view === 'string' ? parseView(view) : undefined;
       return found ? [{ name: typeof name === 'string' ? name.slice(0, 80) : 'View', view: found }] : [];
@@ -55,7 +54,7 @@ export class Bookmarks {
 
   keep(view: View): void {
     const last = this.list.map(({ name }) => Number(/^View (\d+)$/.exec(name)?.[1] ?? 0));
-    this.change([...this.kept, { name: `View ${Math.max(0, ...last) + 1}`, view }].slice(-kMost), this.ofWorld);
+    this.change([...this.kept, { name: `View ${Math.max(0, ...last) + 1}`, view }].slice(-kMost.bookmarks), this.ofWorld);
   }
 
   remove(bookmark: Bookmark): void {

@@ -1,15 +1,32 @@
 import { describe, expect, it } from 'vitest';
 import { contentOf } from './file-content';
-import { fileOfContent, namesOf } from './model-sources';
+import { fileOfContent, keyOf, namesOf } from './model-sources';
 
 const file = (path: string, text: string) => ({ path, file: new Blob([text]) });
 
 describe('files of models', () => {
-  it('of one name have names of their own in a world', () => {
+  it('of one name have names of their own in a world', async () => {
     const [a, b, c] = [file('car.gltf', 'a'), file('Car.gltf', 'b'), file('car.gltf', 'c')];
     const shared = file('wheel.bin', 'w');
-    const names = namesOf(new Set([{ files: [a, shared] }, { files: [b, shared] }, { files: [c] }]));
+    const names = await namesOf(new Set([{ files: [a, shared] }, { files: [b, shared] }, { files: [c] }]));
     expect([...names.values()]).toEqual(['car.gltf', 'wheel.bin', '2/Car.gltf', '3/car.gltf']);
+  });
+
+  it('leave the names of models that could not be had to these', async () => {
+    const [car, wheel] = [file('car.gltf', 'a'), file('wheel.bin', 'w')];
+    const named = async (files: string[], contents: string[]) => [...(await namesOf(new Set([{ files: [car, wheel] }]), [{ files, contents }])).values()];
+    expect(await named(['Car.gltf'], ['1-0'])).toEqual(['2/car.gltf', '2/wheel.bin']);
+    expect(await named(['car.gltf'], [])).toEqual(['2/car.gltf', '2/wheel.bin']);
+    expect(await named(['bus.gltf', 'wheel.bin'], ['1-0', '1-0'])).toEqual(['2/car.gltf', '2/wheel.bin']);
+    // The very file, or one that both name.
+    expect(await named(['bus.gltf', 'wheel.bin'], ['1-0', await contentOf(wheel.file)])).toEqual(['car.gltf', 'wheel.bin']);
+    expect(await named(['bus.gltf', 'wheel.bin'], [])).toEqual(['car.gltf', 'wheel.bin']);
+  });
+
+  it('of one name that hold something else are of another model', () => {
+    const keys = [['a', 'b'], ['a\nb']].flatMap((files) => [[], ['1-0'], ['1-1']].map((contents) => keyOf({ files, contents })));
+    expect(new Set(keys).size).toBe(6);
+    expect(keyOf({ files: ['a', 'b'], contents: ['1-0'] })).toBe(keys[1]);
   });
 
   it('of one name are told apart by what they hold', async () => {

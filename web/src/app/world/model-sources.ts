@@ -3,6 +3,7 @@ import { SceneError } from '../../scene-error';
 import { findFile, isModel, nameOf, type ModelFile } from '../models/model-files';
 import type { ModelSource, PlacedModel } from '../models/models';
 import { contentOf } from './file-content';
+import type { WorldModel } from './world-file';
 
 // Of the files that the models came from.
 export function bytesOf(list: readonly PlacedModel[]): number {
@@ -10,22 +11,51 @@ export function bytesOf(list: readonly PlacedModel[]): number {
   return [...files].reduce((sum, { file }) => sum + file.size, 0);
 }
 
-// As they came; in a folder with a number, where another source has a file of that name.
-export function namesOf(sources: ReadonlySet<Pick<ModelSource, 'files'>>): Map<ModelFile, string> {
+type NamedFiles = Pick<WorldModel, 'files' | 'contents'>;
+
+// The same for models of the same files.
+export function keyOf({ files, contents }: NamedFiles): string {
+  return JSON.stringify([files, contents]);
+}
+
+// As they came; in a folder with a number, where another source has a file of that name, or one of `absent` another
+// file. Throws SceneError that names the file that cannot be read any more.
+export async function namesOf(
+  sources: ReadonlySet<Pick<ModelSource, 'files'>>, absent: readonly NamedFiles[] = [],
+): Promise<Map<ModelFile, string>> {
   const names = new Map<ModelFile, string>();
   const taken = new Set<string>();
-  const isFree = (name: string) => !taken.has(name.toLowerCase()); // as findFile compares them
+  const ofAbsent = takenBy(absent);
   for (const { files } of sources) {
     const fresh = files.filter((file) => !names.has(file));
+    const contents = await contentsOf(fresh);
     const inFolder = (number: number) => (path: string) => (number === 1 ? path : `${number}/${path}`);
     let number = 1;
-    while (!fresh.every(({ path }) => isFree(inFolder(number)(path)))) ++number;
+    const isFree = ({ path }: ModelFile, i: number) => {
+      const name = inFolder(number)(path).toLowerCase(); // as findFile compares them
+      return !taken.has(name) && [...(ofAbsent.get(name) ?? [])].every((content) => content === contents[i]);
+    };
+    while (!fresh.every(isFree)) ++number;
     for (const file of fresh) {
       names.set(file, inFolder(number)(file.path));
       taken.add(names.get(file)!.toLowerCase());
     }
   }
   return names;
+}
+
+// What is in files of those names, where it is known. Of what a model needs beside its own file, and nobody knows, it is
+// the name that counts.
+function takenBy(absent: readonly NamedFiles[]): Map<string, Set<string | undefined>> {
+  const taken = new Map<string, Set<string | undefined>>();
+  for (const { files, contents } of absent) {
+    for (const [i, name] of files.entries()) {
+      if (i > 0 && contents[i] === undefined) continue;
+      const key = name.toLowerCase();
+      taken.set(key, (taken.get(key) ?? new Set()).add(contents[i]));
+    }
+  }
+  return taken;
 }
 
 // The one that holds what is meant, if anybody knows that; else the one of that name.

@@ -1,15 +1,19 @@
-// The scenes of a world, where there are several: which of them are shown.
+// The scenes of a world, where there are several or one is not shown: which of them are.
 import { element } from '../page/element';
 import { iconButton } from '../page/fields';
 import type { Viewer } from '../viewer';
+
+export function listedScenes<T extends { visible: boolean }>(scenes: readonly T[]): readonly T[] {
+  return scenes.length > 1 || scenes.some(({ visible }) => !visible) ? scenes : [];
+}
 
 export function sceneList(viewer: Viewer): HTMLElement {
   const list = element('ul', 'scenes');
   const body = element('div', '', element('p', 'faint', 'Scenes'), list);
   const show = () => {
-    const several = viewer.scenes.length > 1 ? viewer.scenes : [];
-    body.hidden = several.length === 0;
-    list.replaceChildren(...several.map((scene) => {
+    const listed = listedScenes(viewer.scenes);
+    body.hidden = listed.length === 0;
+    list.replaceChildren(...listed.map((scene) => {
       const name = scene.name === '' ? 'Scene' : scene.name;
       const row = element('li', '', element('span', 'name', name), iconButton(scene.visible ? 'Hide' : 'Show', name, 'eye', () => {
         scene.visible = !scene.visible;

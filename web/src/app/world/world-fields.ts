@@ -6,7 +6,19 @@ export type Three = [number, number, number];
 export type Four = [number, number, number, number];
 
 export const kNameLength = 1000;
+export const kFarthest = 1e7; // metres
 const kScales = { least: 1e-6, most: 1e6 };
+
+// The nearest scale, or size, that a world may hold.
+export function scaleWithin(x: number): number {
+  return Math.min(Math.max(x, kScales.least), kScales.most);
+}
+
+// Times `factor`, or as near to that as a world may hold them in the same proportions.
+export function scaledWithin(scales: readonly number[], factor: number): number[] {
+  const nearest = Math.min(Math.max(factor, kScales.least / Math.min(...scales)), kScales.most / Math.max(...scales));
+  return scales.map((x) => scaleWithin(x * nearest));
+}
 
 export function numbersWithin(object: Json, key: string, count: number, most: number, fail: Fail): number[] {
   const read = numbersOf(object, key, count) ?? fail(`.${key}`, `is not ${count} numbers`);

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { SceneError } from '../../scene-error';
-import { decodeWorld, encodeWorld, type World } from './world-file';
+import { decodeWorld, encodeWorld, savedWorld, type World } from './world-file';
 
 const world: Omit<World, 'files'> = {
   scenes: [
@@ -78,6 +78,7 @@ describe('decodeWorld', () => {
     expect(said((file) => (file.scenes = []))).toContain('scenes: has none');
     expect(said((file) => delete file.scenes)).toContain('scenes: is no list');
     expect(said((file) => (file.scenes = Array.from({ length: 17 }, () => file.scenes[1])))).toContain('scenes: are more than 16');
+    for (const none of [5, null, 'a', [], [{ url: 'a' }]]) expect(said((file) => file.scenes.push(none))).toContain('scenes[2]: is no object');
     expect(said((file) => (file.scenes[0].scale = [1, 1, 1]))).toContain('scenes[0].scale: is no number');
     expect(said((file) => (file.scenes[0].scale = 0))).toContain('scenes[0].scale: is not above 0.000001');
     expect(said((file) => (file.scenes[0].rotation = [1, 1, 1, 1]))).toContain('scenes[0].rotation: is no rotation');
@@ -123,5 +124,16 @@ describe('decodeWorld', () => {
     expect(said((file) => (file.files['tree.glb'] = '*'))).toContain('files["tree.glb"]: is no base64');
     expect(said((file) => (file.files['tree.glb'] = 5))).toContain('files["tree.glb"]: is no text');
     expect(said((file) => (file.files = ['a']))).toContain('files: is no object');
+  });
+});
+
+describe('savedWorld', () => {
+  it('is what can be opened again, and nothing else', async () => {
+    expect(await savedWorld(world, new Map([['tree.glb', btoa('abc')], ['__proto__', btoa('x')]])).text()).toBe(text);
+    const change = (one: Partial<World>, files = new Map<string, string>()) => () => savedWorld({ ...world, ...one }, files);
+    expect(change({ hidden: [{ ...world.hidden[0], size: [1, 2e6, 1] }] })).toThrow('world.json: hidden[0].size: has a number beyond');
+    expect(change({ models: [{ ...world.models[0], name: '' }] })).toThrow('models[0].name: is missing, or too long, so that it could not be opened again; change that');
+    expect(change({}, new Map(Array.from({ length: 4001 }, (_, i) => [String(i), ''])))).toThrow('is one file too many');
+    expect(change({}, new Map([['a', 'A'.repeat(1.4 * 128e6)]]))).toThrow('would be larger than 179.2 MB; save it without its models');
   });
 });

@@ -1,18 +1,19 @@
 // world.json: which scenes, models, hidden parts and views make a world (docs/world-format.md). Untrusted text.
+import { kMostHiddenBoxes } from '../../draw/hidden-boxes';
 import { SceneError } from '../../scene-error';
 import { arrayOf, fieldOf, flagOf, stringOf, type Json } from '../../tiles/json-fields';
 import { parseView } from '../views/view-address';
 import { isAddress, isFileAddress } from './world-address';
-import { checkedName, kNameLength, numberWithin, numbersWithin, quaternionOf, scalesOf, type Fail, type Four, type Three } from './world-fields';
+import { checkedName, kFarthest, kNameLength, numberWithin, numbersWithin, quaternionOf, scalesOf, type Fail, type Four, type Three } from './world-fields';
 
 export const kWorldName = 'world.json';
 export const kEmbeddedBytes = 128 * 1000 * 1000; // of all models that one file may hold
 export const kWorldBytes = 1.4 * kEmbeddedBytes; // of the file itself
 const kKind = 'tessera world';
 const kVersion = 2;
-export const kMost = { scenes: 16, models: 1000, hidden: 8, bookmarks: 200 };
+export const kMost = { scenes: 16, models: 1000, hidden: kMostHiddenBoxes, bookmarks: 200 };
 const kMostFiles = 1000; // of a model
-const kFarthest = 1e7; // metres
+export const kMostFilesHeld = 4000; // of all models
 
 export interface WorldScene {
   name: string;
@@ -68,6 +69,19 @@ export function encodeWorld({ scenes, models, hidden, bookmarks }: Omit<World, '
   return `{${fields.join(',\n')}}\n`;
 }
 
+// world.json. Throws SceneError where it could not be opened again.
+export function savedWorld(world: Omit<World, 'files'>, files: ReadonlyMap<string, string>): Blob {
+  try {
+    decodeWorld(encodeWorld(world, new Map([...files.keys()].map((name) => [name, '']))), kWorldName);
+  } catch (error) {
+    if (!(error instanceof SceneError)) throw error;
+    throw new SceneError(kWorldName, error.place, `${error.reason}, so that it could not be opened again`, 'change that, and save again');
+  }
+  const blob = new Blob([encodeWorld(world, files)], { type: 'application/json' });
+  if (blob.size <= kWorldBytes) return blob;
+  throw new SceneError(kWorldName, '', `would be larger than ${kWorldBytes / 1e6} MB`, 'save it without its models');
+}
+
 // Throws SceneError that names `file`, and where in it the first thing is wrong.
 export function decodeWorld(text: string, file: string): World {
   const fail = (place: string, reason: string, remedy = 'save it again'): never => {
@@ -107,6 +121,7 @@ function firstScene(scene: Json): WorldScene {
 }
 
 function sceneOf(scene: Json, fail: Fail): WorldScene {
+  if (typeof scene !== 'object' || scene === null || Array.isArray(scene)) return fail('', 'is no object');
   const url = stringOf(scene, 'url') ?? '';
   if (url.length > kNameLength || (url !== '' && !isAddress(url))) return fail('.url', 'is no address of http or https, nor a relative one');
   const name = stringOf(scene, 'name') ?? '';
@@ -165,7 +180,7 @@ function filesOf(files: Json, fail: (place: string, reason: string) => never): W
   let bytes = 0;
   for (const [name, text] of Object.entries(files)) {
     const place = `files[${JSON.stringify(name.slice(0, 100))}]`;
-    if (name === '' || name.length > kNameLength || read.size === kMost.models * 4) fail(place, 'is one file too many, or has no name');
+    if (name === '' || name.length > kNameLength || read.size === kMostFilesHeld) fail(place, 'is one file too many, or has no name');
     if (typeof text !== 'string') return fail(place, 'is no text');
     const content = bytesOfBase64(text) ?? fail(place, 'is no base64');
     bytes += content.length;

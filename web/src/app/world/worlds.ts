@@ -2,9 +2,8 @@
 import * as THREE from 'three';
 import { TesseraScene } from '../../scene';
 import { SceneError } from '../../scene-error';
-import { fetchFile } from '../../scene-files';
 import type { HiddenParts } from '../hiding/hidden-parts';
-import { kModelBytes, loadModel } from '../models/load-model';
+import { loadModel } from '../models/load-model';
 import { nameOf, type ModelFile } from '../models/model-files';
 import { placeOf, setPlace } from '../models/model-place';
 import { Models, type ModelSource } from '../models/models';
@@ -12,9 +11,11 @@ import { megabytes } from '../page/panels';
 import type { Bookmarks } from '../views/bookmarks';
 import { formatView, parseView } from '../views/view-address';
 import type { Viewer } from '../viewer';
-import { base64Of, bytesOf, contentsOf, fileOfContent, namesOf } from './model-sources';
-import { addressFrom, addressOfFile, resolved } from './world-address';
-import { decodeWorld, encodeWorld, kEmbeddedBytes, kMost, kWorldBytes, kWorldName, mainScene, type World, type WorldModel, type WorldScene } from './world-file';
+import { FetchedFiles, fetchNamed } from './fetched-files';
+import { base64Of, bytesOf, contentsOf, fileOfContent, keyOf, namesOf } from './model-sources';
+import { addressFrom, resolved } from './world-address';
+import { kNameLength } from './world-fields';
+import { decodeWorld, kEmbeddedBytes, kMost, kWorldBytes, kWorldName, mainScene, savedWorld, type World, type WorldModel, type WorldScene } from './world-file';
 
 // A world.json, and where it is: relative addresses in it are seen from there.
 export interface NamedWorld {
@@ -48,6 +49,7 @@ function addressOfScene({ url }: WorldScene, place: string, name: string, addres
 export class Worlds {
   private address = location.href; // that relative addresses are seen from
   private absent: Pick<World, 'scenes' | 'models'> = { scenes: [], models: [] }; // could not be had, and are saved all the same
+  private last = Promise.resolve(); // that was to be opened
 
   constructor(
     private readonly viewer: Viewer,
@@ -56,14 +58,14 @@ export class Worlds {
     private readonly bookmarks: Bookmarks,
   ) {}
 
-  // world.json. Throws SceneError where it cannot hold the models' files.
+  // world.json. Throws SceneError where it cannot hold the models' files, or could not be opened again.
   async save(withFiles: boolean): Promise<Blob> {
     const { list } = this.models;
     const bytes = bytesOf(list);
     if (withFiles && bytes > kEmbeddedBytes) {
       throw new SceneError(kWorldName, '', `cannot hold ${megabytes(bytes)} of models, only ${megabytes(kEmbeddedBytes)}`, 'save it without them');
     }
-    const names = namesOf(new Set(list.map(({ source }) => source)));
+    const names = await namesOf(new Set(list.map(({ source }) => source)), this.absent.models);
     const files = new Map<string, string>();
     if (withFiles) for (const [file, name] of names) files.set(name, await base64Of(file));
     const models: WorldModel[] = [];
@@ -74,13 +76,13 @@ export class Worlds {
         ...placeOf(model, model.source.base), visible: model.visible, plays: model.plays,
       });
     }
-    const text = encodeWorld({
+    return savedWorld({
       scenes: [...this.viewer.scenes.map((scene) => this.sceneOf(scene)), ...this.absent.scenes],
       models: [...models, ...this.absent.models],
       hidden: this.hidden.list.map(({ part }) => part),
-      bookmarks: this.bookmarks.list.slice(0, kMost.bookmarks).map(({ name, view }) => ({ name: name || 'View', view: formatView(view) })),
+      bookmarks: this.bookmarks.list.map(({ name, view }) => ({ name: name || 'View', view: formatView(view) }))
+        .filter(({ view }) => parseView(view)).slice(0, kMost.bookmarks),
     }, files);
-    return new Blob([text], { type: 'application/json' });
   }
 
   // One that was dropped, with the files that came with it. Throws SceneError, and then all stays as it is. Answers with
@@ -90,9 +92,9 @@ export class Worlds {
     if (given.file.size > kWorldBytes) throw new SceneError(name, '', `is larger than ${megabytes(kWorldBytes)}`, 'save it without its models');
     const world = decodeWorld(await given.file.text(), name);
     const { city } = this.viewer;
-    await this.show({ world, name, address: this.address }, files, false, (error) => {
+    await this.inTurn(() => this.show({ world, name, address: this.address }, files, false, (error) => {
       throw error;
-    });
+    }));
     const main = mainScene(world);
     if (main.name === city.name) return undefined;
     return new SceneError(name, '', `is of the scene ${main.name.slice(0, 100)}, and this is ${city.name}`, 'open it in its own scene, if the models stand in odd places');
@@ -100,8 +102,17 @@ export class Worlds {
 
   // One that was fetched, whose main scene is the city. What cannot be had is told of, and the rest is shown.
   open(fetched: NamedWorld, tell: (error: unknown) => void): Promise<void> {
-    this.address = fetched.address;
-    return this.show(fetched, [], true, tell);
+    return this.inTurn(() => {
+      this.address = fetched.address;
+      return this.show(fetched, [], true, tell);
+    });
+  }
+
+  // After those that were to be opened before.
+  private inTurn(open: () => Promise<void>): Promise<void> {
+    const opened = this.last.then(open);
+    this.last = opened.catch(() => {}); // it is told of by who opens it
+    return opened;
   }
 
   private async show(named: NamedWorld, files: readonly ModelFile[], mayFetch: boolean, lacks: (error: unknown) => void): Promise<void> {
@@ -126,12 +137,13 @@ export class Worlds {
       }
       const held = [...world.files].map(([path, bytes]): ModelFile => ({ path, file: new Blob([bytes]) }));
       const all = [...held, ...files, ...this.models.list.flatMap(({ source }) => source.files)];
+      const fetched = new FetchedFiles(named.name, mayFetch ? named.address : undefined);
       for (const [i, saved] of world.models.entries()) {
-        const key = saved.files.join('\n');
+        const key = keyOf(saved);
         if (sources.has(key)) continue;
         sources.set(key, undefined);
         try {
-          sources.set(key, await this.sourceOf(saved, all, mayFetch ? named.address : undefined, named.name, `models[${i}]`));
+          sources.set(key, await this.sourceOf(saved, all, fetched, named.name, `models[${i}]`));
         } catch (error) {
           lacks(error);
         }
@@ -141,22 +153,24 @@ export class Worlds {
       throw error;
     }
     this.showScenes(scenes, fresh);
-    for (const model of [...this.models.list]) this.models.remove(model);
-    for (const saved of world.models) {
-      const source = sources.get(saved.files.join('\n'));
-      if (!source) {
-        absent.models.push(saved);
-        continue;
+    this.models.changeAll(() => {
+      for (const model of [...this.models.list]) this.models.remove(model);
+      for (const saved of world.models) {
+        const source = sources.get(keyOf(saved));
+        if (source) this.place(source, saved);
+        else absent.models.push(saved);
       }
-      const model = this.models.add(source, this.models.freeName(saved.name));
-      setPlace(model, model.source.base, saved);
-      model.visible = saved.visible;
-      model.plays = saved.plays;
-    }
+    });
     this.absent = absent;
-    this.models.changed();
     this.hidden.show(world.hidden);
     this.bookmarks.showWorld(world.bookmarks.map(({ name, view }) => ({ name, view: parseView(view)! })));
+  }
+
+  private place(source: ModelSource, saved: WorldModel): void {
+    const model = this.models.add(source, this.models.freeName(saved.name));
+    setPlace(model, model.source.base, saved);
+    model.visible = saved.visible;
+    model.plays = saved.plays;
   }
 
   private showScenes(scenes: ReadonlyMap<WorldScene, TesseraScene>, fresh: readonly TesseraScene[]): void {
@@ -177,37 +191,22 @@ export class Worlds {
   private sceneOf(scene: TesseraScene): WorldScene {
     const { position, rotation, scale: [scale] } = placeOf(scene, new THREE.Vector3());
     return {
-      name: scene.name, url: addressFrom(this.address, scene.files.name), visible: scene.visible,
+      name: scene.name.slice(0, kNameLength), url: addressFrom(this.address, scene.files.name), visible: scene.visible,
       ...(scene !== this.viewer.city && { place: { position, rotation, scale } }),
     };
   }
 
   // Of files that are in the world, came with it, are in use, or lie where the world says, if it has an address.
-  private async sourceOf(saved: WorldModel, all: readonly ModelFile[], address: string | undefined, name: string, place: string): Promise<ModelSource> {
+  private async sourceOf(saved: WorldModel, all: readonly ModelFile[], fetched: FetchedFiles, name: string, place: string): Promise<ModelSource> {
     const own: ModelFile[] = [];
     for (const [i, path] of saved.files.entries()) {
-      const found = (await fileOfContent(path, saved.contents[i], i === 0, all)) ?? (await fetched(path, address));
+      const found = (await fileOfContent(path, saved.contents[i], i === 0, all)) ?? (await fetched.file(path, place));
       if (!found && i === 0) {
         throw new SceneError(name, place, `needs ${path.slice(0, 200)}`, 'drop the models together with it');
       }
       if (found) own.push(found);
     }
     return Models.sourceOf(await loadModel(own[0], [...own, ...all]));
-  }
-}
-
-// Nothing where it says no whole address, and nobody knows what it is relative to. Throws SceneError where it is not there.
-async function fetched(path: string, address: string | undefined): Promise<ModelFile | undefined> {
-  const url = address === undefined && !/^https?:/i.test(path) ? undefined : addressOfFile(path, address ?? location.href);
-  if (url === undefined) return undefined;
-  return { path, file: new Blob([await fetchNamed(url, path, kModelBytes, 'put it where the world says')]) };
-}
-
-async function fetchNamed(url: string, name: string, most: number, remedy: string): Promise<Uint8Array<ArrayBuffer>> {
-  try {
-    return await fetchFile(url, name, most);
-  } catch (error) {
-    throw error instanceof SceneError ? new SceneError(error.what, error.place, error.reason, remedy) : error;
   }
 }
 
