@@ -35,8 +35,9 @@ function eyeOf(camera: THREE.Camera): THREE.Vector3 {
 // From the cube of edge 1 to the scene's object.
 function boxOf({ tileset, localFromScene }: TesseraScene): THREE.Matrix4 {
   const box = new THREE.Box3(new THREE.Vector3(...tileset.box.low), new THREE.Vector3(...tileset.box.high));
-  const size = box.getSize(new THREE.Vector3());
-  return localFromScene.clone().multiply(new THREE.Matrix4().makeScale(size.x, size.y, size.z).setPosition(box.getCenter(new THREE.Vector3())));
+  const { x, y, z } = box.getSize(new THREE.Vector3());
+  const sceneFromCube = new THREE.Matrix4().makeScale(x, y, z).setPosition(box.getCenter(new THREE.Vector3()));
+  return localFromScene.clone().multiply(sceneFromCube);
 }
 
 function distanceTo(scene: TesseraScene, eye: THREE.Vector3): number {

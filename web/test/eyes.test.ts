@@ -6,6 +6,7 @@ import type { Plain, View } from '../src/plain';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenScene, launch, missing, serve, type Server } from './machine';
 import { psnr } from './pictures';
+import { openPlain } from './plain-page';
 import { viewAt, type Place } from './views';
 
 declare const plain: Plain;
@@ -22,11 +23,7 @@ describe.skipIf(missing())('two cameras', () => {
 
   beforeAll(async () => {
     [server, browser] = await Promise.all([serve(goldenScene), launch()]);
-    page = await browser.newPage();
-    page.on('console', (message) => message.type() === 'error' && said.push(message.text()));
-    page.on('pageerror', (error) => said.push(error.message));
-    await page.goto(`${server.url}plain.html`);
-    await page.waitForFunction(() => 'plain' in window);
+    page = await openPlain(browser, server, said);
     await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
   });
   afterAll(async () => {

@@ -6,6 +6,7 @@ import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Plain, View } from '../src/plain';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenScene, launch, missing, serve, type Server } from './machine';
+import { openPlain } from './plain-page';
 import { viewAt, type Place } from './views';
 
 declare const plain: Plain;
@@ -24,11 +25,7 @@ describe.skipIf(missing())('a model in the scene', () => {
 
   beforeAll(async () => {
     [server, browser] = await Promise.all([serve(goldenScene), launch()]);
-    page = await browser.newPage();
-    page.on('console', (message) => message.type() === 'error' && said.push(message.text()));
-    page.on('pageerror', (error) => said.push(error.message));
-    await page.goto(`${server.url}plain.html`);
-    await page.waitForFunction(() => 'plain' in window);
+    page = await openPlain(browser, server, said);
     await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
   });
   afterAll(async () => {

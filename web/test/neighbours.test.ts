@@ -5,6 +5,7 @@ import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from
 import type { Plain, View } from '../src/plain';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenScene, launch, missing, serve, type Server } from './machine';
+import { openPlain } from './plain-page';
 import { viewAt } from './views';
 
 declare const plain: Plain;
@@ -28,11 +29,7 @@ describe.skipIf(missing())('in one world', () => {
     expect(said).toEqual([]);
   });
   beforeEach(async () => {
-    page = await browser.newPage();
-    page.on('console', (message) => message.type() === 'error' && said.push(message.text()));
-    page.on('pageerror', (error) => said.push(error.message));
-    await page.goto(`${server.url}plain.html`);
-    await page.waitForFunction(() => 'plain' in window);
+    page = await openPlain(browser, server, said);
     await page.evaluate((one) => plain.open('scene/tileset.json', one), options);
   });
   afterEach(() => page.close());

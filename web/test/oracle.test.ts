@@ -8,6 +8,7 @@ import type { Plain } from '../src/plain';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenScene, launch, missing, run, serve, type Server } from './machine';
 import { cameraPath, decodePng, psnr } from './pictures';
+import { openPlain } from './plain-page';
 import { viewAt, type Place } from './views';
 
 declare const plain: Plain;
@@ -58,14 +59,10 @@ describe.skipIf(missing())('the browser', () => {
     const path = join(folder, `path-${level}.json`);
     writeFileSync(path, cameraPath(tileset, views.map(({ matrix }) => matrix)));
     run('render', goldenScene, join(folder, String(level)), '--path', path, '--lod', String(level));
-    const page = await (card === 'swiftshader' ? swiftShader : browser).newPage();
-    if (card === 'small') await page.addInitScript(takeSmallTextures);
-    if (card === 'swiftshader') expect(await cardOf(page)).toContain('SwiftShader');
     const said: string[] = [];
-    page.on('console', (message) => message.type() === 'error' && said.push(message.text()));
-    page.on('pageerror', (error) => said.push(error.message));
-    await page.goto(`${server.url}plain.html`);
-    await page.waitForFunction(() => 'plain' in window);
+    const page = await openPlain(
+      card === 'swiftshader' ? swiftShader : browser, server, said, card === 'small' ? takeSmallTextures : undefined);
+    if (card === 'swiftshader') expect(await cardOf(page)).toContain('SwiftShader');
     await page.evaluate(
       (finestLevel) => plain.open('scene/tileset.json', { selection: { mostPixels: 0, finestLevel } }), level);
     for (const [i, view] of views.entries()) {
