@@ -29,7 +29,9 @@ export class ServedFiles implements SceneFiles {
   read(uri: string, most: number, signal?: AbortSignal): Promise<ContentFile> {
     // Whatever the tileset is called on that server.
     const url = uri === 'tileset.json' ? this.name : new URL(uri, this.name).href;
-    return fetchFile(url, uri, most, signal);
+    return uri === 'tileset.json'
+      ? fetchFile(url, url, most, signal, 'see that the address is that of a scene')
+      : fetchFile(url, uri, most, signal);
   }
 }
 
@@ -68,12 +70,14 @@ export class ChosenFiles implements SceneFiles {
 }
 
 // Throws SceneError that names the file and says what the server, or the network, said; or that it is larger than `most`
-// bytes, before more than that has been kept.
-export async function fetchFile(url: string, name: string, most: number, signal?: AbortSignal): Promise<ContentFile> {
+// bytes, before more than that has been kept. `ifMissing`: the remedy where there is no such file.
+export async function fetchFile(
+  url: string, name: string, most: number, signal?: AbortSignal, ifMissing = 'reload the page, as the scene may have been baked again',
+): Promise<ContentFile> {
   try {
     const answer = await fetch(url, { signal });
     if (!answer.ok) {
-      const remedy = answer.status === 404 ? 'reload the page, as the scene may have been baked again' : 'try again later';
+      const remedy = answer.status === 404 ? ifMissing : 'try again later';
       throw new SceneError(name, '', `the server answered ${answer.status} ${answer.statusText}`.trim(), remedy);
     }
     const pieces: Uint8Array[] = [];

@@ -16,7 +16,7 @@ import { cityMesh, kFirstRenderOrder } from './draw/city-mesh';
 import { Compositor, type DrawnContent, type DrawnPart } from './draw/compositor';
 import { kDisplayModes, type DisplayMode } from './draw/display-modes';
 import { OpaqueDepth } from './draw/opaque-depth';
-import { picturesOf } from './draw/picture';
+import { picturesOf, type Picture } from './draw/picture';
 import { tileView } from './picture-view';
 import { SceneError } from './scene-error';
 import { ServedFiles, type ContentFile, type SceneFiles } from './scene-files';
@@ -30,6 +30,7 @@ import type { VolumeContent } from './tiles/volume-content';
 import { VolumeSource } from './volume-source';
 
 const kTilesetBytes = 1 << 24;
+const kPrefetchTime = 30; // ms for uploads, while nothing is drawn
 
 export interface SceneOptions {
   selection?: Partial<SelectionSettings>;
@@ -50,6 +51,16 @@ export interface Neighbours {
 export type { StreamSettings };
 
 type Streamer = TileStreamer<ContentFile, VolumeContent, DrawnContent>;
+
+// From where, and what draws it.
+interface Look {
+  size: THREE.Vector2; // of the pictures, in pixels
+  pictures: Picture[];
+  worldFromScene: THREE.Matrix4;
+  compositor: Compositor;
+  streamer: Streamer;
+  mesh: ReturnType<typeof cityMesh>;
+}
 
 export class TesseraScene extends THREE.Object3D {
   readonly localFromScene = new THREE.Matrix4(); // of this object, from the scene's units
@@ -140,20 +151,12 @@ export class TesseraScene extends THREE.Object3D {
 
   // Of an ArrayCamera, and of a headset while it presents, a picture for each of its cameras; all are streamed for at once.
   update(camera: THREE.Camera, renderer: THREE.WebGLRenderer): void {
-    if (this.disposed || renderer.getContext().isContextLost()) return;
-    const { compositor, streamer, mesh } = this.prepare(renderer);
-    this.updateWorldMatrix(true, false);
-    camera.updateWorldMatrix(true, false);
-    const worldFromScene = this.matrixWorld.clone().multiply(this.localFromScene);
-    const { size, pictures } = picturesOf(camera, renderer, worldFromScene, this.resolutionScale);
-    if (pictures.length === 0) return;
+    const look = this.look(camera, renderer);
+    if (!look) return;
+    const { size, pictures, worldFromScene, compositor, streamer, mesh } = look;
     const surfaces = this.neighbours.behind.map((scene) => scene.mesh).filter((one) => one !== undefined);
     const depth = this.opaque.draw(renderer, pictures, this, size, new Set(surfaces));
-    compositor.resize(size);
-    const enlarged = Math.max(1, this.largestResolutionScale / this.resolutionScale) ** 2;
-    streamer.settings = { ...this.stream, cardBytes: this.stream.cardBytes - enlarged * (compositor.bytes + this.opaque.bytes) };
-    const views = pictures.map((picture) => tileView(this.tileset, picture, worldFromScene));
-    const { tiles, surround } = streamer.update(jointView(views), this.uploadTime());
+    const { views, tiles, surround } = this.ask(look, this.uploadTime());
     const cut = new Set(tiles.map(({ tile }) => tile));
     const contentOf = new Map(tiles.filter(({ visible }) => visible).map(({ tile, content }) => [tile, content]));
     // What it surrounds comes first: on slow machines a picture of it alone would only take time.
@@ -176,6 +179,12 @@ export class TesseraScene extends THREE.Object3D {
     compositor.draw(renderer, pictures, worldFromScene, contents, depth);
     mesh.renderOrder = kFirstRenderOrder + this.neighbours.behind.length;
     mesh.visible = contents.some((ofOne) => ofOne.length > 0);
+  }
+
+  // Streams in what `update` would draw, and draws nothing: for who waits until it is `idle`, and then wants one picture.
+  prefetch(camera: THREE.Camera, renderer: THREE.WebGLRenderer): void {
+    const look = this.look(camera, renderer);
+    if (look) this.ask(look, kPrefetchTime);
   }
 
   // The place of the world, in the last picture, at `at` (from -1 to 1 across it, upwards); of the scene alone. Nothing
@@ -208,6 +217,26 @@ export class TesseraScene extends THREE.Object3D {
     }
     this.canvas?.removeEventListener('webglcontextlost', this.onContextLost);
     this.streamer = this.compositor = this.mesh = this.canvas = undefined;
+  }
+
+  // Nothing where nothing can be drawn.
+  private look(camera: THREE.Camera, renderer: THREE.WebGLRenderer): Look | undefined {
+    if (this.disposed || renderer.getContext().isContextLost()) return undefined;
+    const prepared = this.prepare(renderer);
+    this.updateWorldMatrix(true, false);
+    camera.updateWorldMatrix(true, false);
+    const worldFromScene = this.matrixWorld.clone().multiply(this.localFromScene);
+    const { size, pictures } = picturesOf(camera, renderer, worldFromScene, this.resolutionScale);
+    return pictures.length === 0 ? undefined : { size, pictures, worldFromScene, ...prepared };
+  }
+
+  // What to draw of what is there; and another step of what is on its way.
+  private ask({ size, pictures, worldFromScene, compositor, streamer }: Look, uploadFor: number) {
+    compositor.resize(size);
+    const enlarged = Math.max(1, this.largestResolutionScale / this.resolutionScale) ** 2;
+    streamer.settings = { ...this.stream, cardBytes: this.stream.cardBytes - enlarged * (compositor.bytes + this.opaque.bytes) };
+    const views = pictures.map((picture) => tileView(this.tileset, picture, worldFromScene));
+    return { views, ...streamer.update(jointView(views), uploadFor) };
   }
 
   // Milliseconds for uploads: a share of what a picture takes, so that slow machines do not wait for ever; more of them

@@ -40,6 +40,8 @@ describe.skipIf(missing())('the library', () => {
     await page.goto(`http://127.0.0.1:${port}/example/index.html?scene=/garden`);
     await expect.poll(() => coloursOf(page), { timeout: 30000 }).toBeGreaterThan(200);
     expect(said).toEqual([]);
+    await page.goto(`http://127.0.0.1:${port}/example/index.html?scene=/nothing`);
+    await expect.poll(() => page.textContent('body')).toContain('/nothing/tileset.json: the server answered 404');
     await page.close();
   });
 });

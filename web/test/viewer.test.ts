@@ -91,6 +91,28 @@ describe.skipIf(missing())('the viewer', () => {
     });
   });
 
+  it('says how far a large picture is, shows what was to be seen meanwhile, and lets it be', async () => {
+    await open(goldenScene, async (page, said) => {
+      await page.waitForSelector('.loading.done', { state: 'attached' });
+      await page.keyboard.press('p');
+      await page.waitForTimeout(1500);
+      const besidePanel = () => page.screenshot({ clip: { x: 380, y: 20, width: 95, height: 230 } });
+      const before = await besidePanel();
+      await page.fill('[aria-label=Width]', '4000');
+      await page.fill('[aria-label=Height]', '2000');
+      await page.click('text=Save picture');
+      await page.waitForSelector('text=/Part [2-9] of 32/');
+      expect(before.equals(await besidePanel())).toBe(true);
+      await page.click('text=Cancel');
+      await page.waitForSelector('text=Save picture', { state: 'visible' });
+      await page.waitForSelector('.still', { state: 'detached' });
+      expect(await page.isVisible('.error')).toBe(false);
+      await page.waitForTimeout(1500);
+      expect(before.equals(await besidePanel())).toBe(true);
+      expect(said).toEqual([]);
+    });
+  });
+
   it('keeps a view that looks upwards, and how one moves', async () => {
     await open(goldenScene, async (page, said) => {
       const hash = '#eye=10,-60,4&target=10,-20,19&fov=60&mode=fly';

@@ -149,11 +149,11 @@ describe.skipIf(missing())('a world that is served', () => {
     expect(said).toEqual([]);
   });
 
-  it('stays as it is where another one cannot be opened', async () => {
+  it('stays as it is where another one cannot be read', async () => {
     await open();
-    await drop(JSON.stringify({ ...world, models: [{ ...world.models[0], files: ['lost.glb'] }], hidden: [] }));
+    await drop(JSON.stringify({ ...world, models: [{ ...world.models[0], files: [] }], hidden: [] }));
     await page.waitForSelector('.error', { state: 'visible' });
-    expect(await page.textContent('.error')).toContain('Needs lost.glb');
+    expect(await page.textContent('.error')).toContain('Names no files');
     expect(await page.locator('.models > ul .name').count()).toBe(2);
     expect(await page.locator('.hiding .name').count()).toBe(1);
   });

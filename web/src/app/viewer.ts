@@ -194,18 +194,36 @@ export class Viewer {
     return this.camera.getWorldPosition(new THREE.Vector3());
   }
 
-  // Has the loop wait, and the camera stay, while somebody else draws.
+  // Has the loop wait, and the camera and what is seen stay, while somebody else draws.
   async whileHeld<T>(work: () => Promise<T>): Promise<T> {
     if (this.renderer.xr.isPresenting) throw new Error('a headset shows the scene; leave it first');
     this.held = true;
     this.navigation.enabled = false;
+    const still = this.still();
     try {
       return await work();
     } finally {
       this.held = false;
       this.navigation.enabled = true;
       this.resize(); // of which nothing was to be heard meanwhile
+      const drawn = () => {
+        still.remove();
+        this.onFrame.delete(drawn);
+      };
+      this.onFrame.add(drawn);
     }
+  }
+
+  // The picture as it is, over the canvas.
+  private still(): HTMLCanvasElement {
+    const still = document.createElement('canvas');
+    still.className = 'still';
+    still.width = this.canvas.width;
+    still.height = this.canvas.height;
+    this.draw(); // of the one before, browsers keep nothing
+    still.getContext('2d')!.drawImage(this.canvas, 0, 0);
+    this.canvas.after(still);
+    return still;
   }
 
   get isHeld(): boolean {
@@ -250,6 +268,11 @@ export class Viewer {
       const frame = { milliseconds, gpuMilliseconds: timer.milliseconds, resolutionScale };
       for (const tell of this.onFrame) tell(frame);
     });
+  }
+
+  // Streams in what a picture would show, without drawing it.
+  prefetch(): void {
+    for (const scene of this.visibleScenes) scene.prefetch(this.camera, this.renderer);
   }
 
   draw(): void {

@@ -23,6 +23,14 @@ describe('loadModel', () => {
     expect([files, lacking]).toEqual([[main], []]);
   });
 
+  it('tells of materials that did not come with it', async () => {
+    const triangle = 'mtllib red.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n';
+    const [main, library] = [given('a/x.obj', triangle), given('a/red.mtl', 'newmtl red\nKd 1 0 0\n')];
+    expect((await loadModel(main, [main])).lacking).toEqual(['red.mtl']);
+    expect((await loadModel(main, [main, library])).lacking).toEqual([]);
+    expect((await loadModel(main, [main, { ...library, path: 'a/other.mtl' }])).lacking).toEqual([]);
+  });
+
   it('names the file that is broken, and what is wrong', async () => {
     vi.spyOn(console, 'error').mockImplementation(() => {});
     expect(await said('a/x.fbx', 'garbage')).toBe('x.fbx: cannot be read: Unknown format; export it again, as GLB if you can');

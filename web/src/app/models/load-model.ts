@@ -14,7 +14,7 @@ export interface LoadedModel {
   box: THREE.Box3;
   clips: THREE.AnimationClip[];
   files: ModelFile[]; // the model's own first, then those it needs
-  lacking: string[]; // textures that did not come with it
+  lacking: string[]; // textures and materials that did not come with it
 }
 
 // Throws SceneError that names the file.
@@ -89,10 +89,11 @@ async function read(main: ModelFile, companions: Companions): Promise<{ object: 
 
 // Of the libraries that an OBJ file names; of the only one, if it names another.
 async function materialsOf(text: string, companions: Companions) {
-  const named = [...text.matchAll(/^\s*mtllib\s+(.+?)\s*$/gm)].map(([, name]) => companions.find(name));
+  const names = [...text.matchAll(/^\s*mtllib\s+(.+?)\s*$/gm)].map(([, name]) => name);
   const all = companions.files.filter(({ path }) => kindOf(path) === 'mtl');
-  const libraries = [...new Set(named.filter((one) => one !== undefined))];
-  if (libraries.length === 0 && named.length > 0 && all.length === 1) libraries.push(companions.use(all[0]));
+  const libraries = [...new Set(names.map((name) => companions.find(name)).filter((one) => one !== undefined))];
+  if (libraries.length === 0 && names.length > 0 && all.length === 1) libraries.push(companions.use(all[0]));
+  else for (const name of names) if (!companions.find(name)) companions.lack(name);
   if (libraries.length === 0) return undefined;
   const { MTLLoader } = await import('three/addons/loaders/MTLLoader.js');
   const texts = await Promise.all(libraries.map(bytesOf));
@@ -135,6 +136,10 @@ class Companions {
     return file;
   }
 
+  lack(uri: string): void {
+    this.lacking.add(nameOf(uri.replaceAll('\\', '/')));
+  }
+
   allCame(): Promise<void> {
     return this.loading ? new Promise((resolve) => (this.onRest = resolve)) : Promise.resolve();
   }
@@ -151,7 +156,7 @@ class Companions {
     }
     const found = this.find(uri);
     if (!found || found.file.size > kModelBytes) {
-      this.lacking.add(nameOf(uri.replaceAll('\\', '/')));
+      this.lack(uri);
       return kNoFile;
     }
     const url = this.urls.get(found) ?? URL.createObjectURL(found.file);

@@ -49,8 +49,7 @@ export function addModels(
     if (files.length === 0) return;
     toolbar.open(tool);
     if (world) {
-      const note = await worlds.openFile(world, files);
-      if (note) fail(note);
+      await worlds.openFile(world, files, fail);
       return;
     }
     if (mains.length === 0) {
@@ -70,7 +69,7 @@ export function addModels(
     models.changed();
     if (loaded.lacking.length === 0) return;
     const names = `${loaded.lacking.slice(0, 3).join(', ')}${loaded.lacking.length > 3 ? ' and others' : ''}`;
-    throw new SceneError(nameOf(main.path), '', `is shown without ${names.slice(0, 200)}`, 'drop the model together with its textures, or their folder');
+    throw new SceneError(nameOf(main.path), '', `is shown without ${names.slice(0, 200)}`, 'drop it together with its textures and materials, or their folder');
   };
   // Under the pointer; else in the middle of the picture; else where the camera looks.
   const placeFor = (event?: DragEvent) => {

@@ -4,9 +4,15 @@ import { element } from '../page/element';
 import type { Toolbar } from '../page/toolbar';
 import type { Viewer } from '../viewer';
 
-const kPiece = 1024; // pixels along an edge
+const kPiece = 512; // pixels along an edge
 const kLargest = 16384; // that canvases take
-const kWait = 60000; // ms for tiles to come
+const kWait = 60000; // ms in which no tile comes
+
+export interface Progress {
+  piece: number; // from 0
+  pieces: number;
+  pending: number; // tiles that this piece waits for
+}
 
 // Pieces of a picture, so that none is larger than `edge`: left, top, width, height.
 export function piecesOf(width: number, height: number, edge = kPiece): [number, number, number, number][] {
@@ -19,8 +25,11 @@ export function piecesOf(width: number, height: number, edge = kPiece): [number,
   return pieces;
 }
 
-// The view as it is, with so many pixels; wider or narrower about the same middle. Rejects where not all of it can be drawn. `tell` hears the share that is done.
-export function takePicture(viewer: Viewer, width: number, height: number, tell: (share: number) => void): Promise<Blob> {
+// The view as it is, with so many pixels; wider or narrower about the same middle. Rejects where not all of it can be
+// drawn, and where `signal` ends it.
+export function takePicture(
+  viewer: Viewer, width: number, height: number, tell: (progress: Progress) => void, signal: AbortSignal,
+): Promise<Blob> {
   return viewer.whileHeld(async () => {
     const { renderer, camera } = viewer;
     const picture = document.createElement('canvas');
@@ -33,20 +42,14 @@ export function takePicture(viewer: Viewer, width: number, height: number, tell:
     renderer.setPixelRatio(1);
     try {
       const pieces = piecesOf(width, height);
-      for (const [i, [left, top, wide, high]] of pieces.entries()) {
+      for (const [piece, [left, top, wide, high]] of pieces.entries()) {
         camera.setViewOffset(width, height, left, top, wide, high);
         renderer.setSize(wide, high, false);
-        const begin = performance.now();
-        viewer.draw();
-        while (!viewer.idle) {
-          if (renderer.getContext().isContextLost()) throw new Error('the browser took the graphics card away; try again');
-          if (performance.now() - begin > kWait) throw new Error('its tiles do not come; try again later');
-          await new Promise((resolve) => setTimeout(resolve, 10));
+        do {
+          await allTiles(viewer, signal, (pending) => tell({ piece, pieces: pieces.length, pending }));
           viewer.draw();
-        }
+        } while (!viewer.idle); // what is drawn takes room of its own
         context.drawImage(renderer.domElement, left, top);
-        tell((i + 1) / pieces.length);
-        await new Promise((resolve) => setTimeout(resolve, 0));
       }
     } finally {
       camera.clearViewOffset();
@@ -59,6 +62,24 @@ export function takePicture(viewer: Viewer, width: number, height: number, tell:
   });
 }
 
+// Waits until all that the camera asks for is there.
+async function allTiles(viewer: Viewer, signal: AbortSignal, tell: (pending: number) => void): Promise<void> {
+  let loads = -1;
+  let lastLoad = 0;
+  for (;;) {
+    viewer.prefetch();
+    tell(viewer.statistics?.pending ?? 0);
+    await new Promise((resolve) => setTimeout(resolve, 10));
+    signal.throwIfAborted();
+    if (viewer.renderer.getContext().isContextLost()) throw new Error('the browser took the graphics card away; try again');
+    if (viewer.idle) return;
+    const now = performance.now();
+    if (viewer.statistics?.loads !== loads) lastLoad = now;
+    else if (now - lastLoad > kWait) throw new Error('its tiles do not come; try again later');
+    loads = viewer.statistics?.loads ?? 0;
+  }
+}
+
 export function addScreenshot(viewer: Viewer, toolbar: Toolbar): void {
   const side = (name: string) => {
     const input = element('input');
@@ -68,7 +89,14 @@ export function addScreenshot(viewer: Viewer, toolbar: Toolbar): void {
   };
   const [width, height] = [side('Width'), side('Height')];
   const take = element('button', '', 'Save picture');
+  const cancel = element('button', '', 'Cancel');
+  const isTaking = (is: boolean) => {
+    take.hidden = is;
+    cancel.hidden = !is;
+  };
+  isTaking(false);
   const said = element('p', 'faint');
+  said.setAttribute('role', 'status');
   const presets = element('div', 'row');
   const choose = (w: number, h: number) => {
     width.valueAsNumber = w;
@@ -82,19 +110,22 @@ export function addScreenshot(viewer: Viewer, toolbar: Toolbar): void {
   choose(1920, 1080);
   take.addEventListener('click', async () => {
     if (!width.reportValidity() || !height.reportValidity()) return;
-    take.disabled = true;
+    const ending = new AbortController();
+    cancel.onclick = () => ending.abort();
+    isTaking(true);
+    cancel.focus();
     try {
-      const picture = await takePicture(viewer, width.valueAsNumber, height.valueAsNumber, (share) => {
-        said.textContent = `${Math.round(100 * share)} %`;
-      });
+      const picture = await takePicture(viewer, width.valueAsNumber, height.valueAsNumber, ({ piece, pieces, pending }) => {
+        said.textContent = `Part ${piece + 1} of ${pieces}${pending > 0 ? `, ${pending} blocks to come` : ''}`;
+      }, ending.signal);
       download(fileName(viewer.city.name, 'png'), picture);
       said.textContent = '';
     } catch (error) {
-      said.textContent = String(error instanceof Error ? error.message : error);
+      said.textContent = ending.signal.aborted ? '' : String(error instanceof Error ? error.message : error);
     } finally {
-      take.disabled = false;
+      isTaking(false);
     }
   });
-  const panel = element('div', '', presets, element('div', 'row', width, '×', height), element('div', 'row', take), said);
+  const panel = element('div', '', presets, element('div', 'row', width, '×', height), element('div', 'row', take, cancel), said);
   toolbar.add({ name: 'Picture', key: 'p', icon: 'camera', panel });
 }

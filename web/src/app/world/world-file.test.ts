@@ -65,7 +65,7 @@ describe('decodeWorld', () => {
   it('lets addresses through that are of http, of https or relative, and no others', () => {
     for (const url of ['a', '../a/', '/a', '//b/a', 'HTTPS://b/a', '?a']) expect(said((file) => (file.scenes[0].url = url))).toBe('');
     for (const url of ['javascript:alert(1)', 'data:,a', 'file:///a', 'blob:http://a/b', ' ftp://a', 'http://', 'x'.repeat(1001)]) {
-      expect(said((file) => (file.scenes[0].url = url))).toBe('world.json: scenes[0].url: is no address of http or https, nor a relative one; save it again');
+      expect(said((file) => (file.scenes[0].url = url))).toBe('world.json: scenes[0].url: is no address of http or https, nor a relative one; correct it, or save it again');
     }
     for (const name of ['javascript:alert(1)', 'data:,a', '//b/a.glb', '\\\\b\\a.glb', 'http://']) {
       expect(said((file) => (file.models[0].files[1] = name))).toContain('models[0].files: has a name that is none');
@@ -96,7 +96,7 @@ describe('decodeWorld', () => {
   });
 
   it('names the file and the place of what is wrong', () => {
-    expect(saidOf('{')).toBe('world.json: is not JSON; save it again');
+    expect(saidOf('{')).toMatch(/^world.json: is not JSON: .*; correct it, or save it again$/);
     for (const other of ['null', '[]', '3', '{"version":1,"models":[]}']) expect(saidOf(other)).toContain('is no world of this viewer');
     expect(said((file) => (file.version = 3))).toContain('world.json: version: is not 2, nor 1; open it with a newer viewer');
     expect(said((file) => (file.models = {}))).toContain('models: is no list');

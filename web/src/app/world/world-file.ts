@@ -84,15 +84,15 @@ export function savedWorld(world: Omit<World, 'files'>, files: ReadonlyMap<strin
 
 // Throws SceneError that names `file`, and where in it the first thing is wrong.
 export function decodeWorld(text: string, file: string): World {
-  const fail = (place: string, reason: string, remedy = 'save it again'): never => {
+  const fail = (place: string, reason: string, remedy = 'correct it, or save it again'): never => {
     throw new SceneError(file, place, reason, remedy);
   };
   if (text.length > kWorldBytes) fail('', `is larger than ${kWorldBytes / 1e6} MB`, 'save it without its models');
   let world: Json;
   try {
     world = JSON.parse(text);
-  } catch {
-    return fail('', 'is not JSON');
+  } catch (error) {
+    return fail('', `is not JSON: ${(error as Error).message.slice(0, 200)}`); // with the place, in most browsers
   }
   if (stringOf(world, 'kind') !== kKind) fail('', 'is no world of this viewer', 'choose one that was saved here');
   const version = fieldOf(world, 'version');

@@ -3,6 +3,7 @@ import { beforeEach, describe, expect, it, vi } from 'vitest';
 import { madeGlb } from '../../testing/made-glb';
 import type { HiddenParts } from '../hiding/hidden-parts';
 import { loadModel } from '../models/load-model';
+import type { ModelFile } from '../models/model-files';
 import { Models, type ModelSource } from '../models/models';
 import type { Bookmarks } from '../views/bookmarks';
 import type { Viewer } from '../viewer';
@@ -33,20 +34,22 @@ describe('Worlds', () => {
     });
     const viewer = { city, scenes: [city], world: new THREE.Scene(), onFrame: new Set(), needPicture: () => {}, changedScenes: () => {} } as unknown as Viewer;
     models = new Models(viewer);
-    changes = 0;
+    changes = told.length = 0;
     models.onChange.add(() => ++changes);
     worlds = new Worlds(viewer, models, { list: [], show: () => {} } as unknown as HiddenParts, { list: [], showWorld: () => {} } as unknown as Bookmarks);
   });
 
+  const told: string[] = [];
+  const open = (world: ModelFile, files: ModelFile[]) => worlds.openFile(world, files, (error) => told.push(String(error)));
   const widths = () => models.list.map(({ source }: { source: ModelSource }) => source.size.x);
 
   it('show of models whose files have one name each its own', async () => {
     const cubes = [1, 2].map((edge) => file('cube.glb', madeGlb({ edge })));
     const contents = await Promise.all(cubes.map((cube) => contentOf(cube.file)));
-    await worlds.openFile(worldOf(contents.map((content) => model('cube.glb', [content]))), cubes);
+    await open(worldOf(contents.map((content) => model('cube.glb', [content]))), cubes);
     expect(widths()).toEqual([1, 2]);
     expect(changes).toBe(1);
-    await worlds.openFile(worldOf(contents.map((content) => model('cube.glb', [content]))), []);
+    await open(worldOf(contents.map((content) => model('cube.glb', [content]))), []);
     expect(changes).toBe(2);
   });
 
@@ -59,17 +62,28 @@ describe('Worlds', () => {
       await reading;
       return Blob.prototype.arrayBuffer.call(slow.file);
     };
-    const first = worlds.openFile(worldOf([model('cube.glb')]), [slow]);
-    const broken = worlds.openFile(worldOf([model('lost.glb')]), []);
-    const last = worlds.openFile(worldOf([model('cube.glb')], { bookmarks: [] }), [cube(2)]);
+    const first = open(worldOf([model('cube.glb')]), [slow]);
+    const lacking = open(worldOf([model('lost.glb')]), []);
+    const last = open(worldOf([model('cube.glb')], { bookmarks: [] }), [cube(2)]);
     await new Promise((resolve) => setTimeout(resolve, 50));
     expect(widths()).toEqual([]);
     read();
     await first;
     expect(widths()).toEqual([1]);
-    await expect(broken).rejects.toThrow('needs lost.glb');
+    await lacking;
+    expect(told).toHaveLength(1);
+    expect(widths()).toEqual([]);
     await last;
     expect(widths()).toEqual([2]);
+  });
+
+  it('are shown without what is lacking, which is told of and saved all the same', async () => {
+    const cube = file('cube.glb', madeGlb({ edge: 2 }));
+    await open(worldOf([model('lost.glb'), model('cube.glb')]), [cube]);
+    expect(widths()).toEqual([2]);
+    expect(told).toEqual(['SceneError: world.json: models[0]: needs lost.glb; drop it together with world.json']);
+    const { models: saved } = decodeWorld(await (await worlds.save(false)).text(), 'a');
+    expect(saved.map(({ name }) => name)).toEqual(['cube.glb', 'lost.glb']);
   });
 
   it('are saved so that they can be opened again', async () => {

@@ -85,19 +85,17 @@ export class Worlds {
     }, files);
   }
 
-  // One that was dropped, with the files that came with it. Throws SceneError, and then all stays as it is. Answers with
-  // what people should know.
-  async openFile(given: ModelFile, files: readonly ModelFile[]): Promise<SceneError | undefined> {
+  // One that was dropped, with the files that came with it. Throws SceneError where it cannot be read, and then all stays as
+  // it is. What cannot be had is told of, and the rest is shown.
+  async openFile(given: ModelFile, files: readonly ModelFile[], tell: (error: unknown) => void): Promise<void> {
     const name = nameOf(given.path);
     if (given.file.size > kWorldBytes) throw new SceneError(name, '', `is larger than ${megabytes(kWorldBytes)}`, 'save it without its models');
     const world = decodeWorld(await given.file.text(), name);
     const { city } = this.viewer;
-    await this.inTurn(() => this.show({ world, name, address: this.address }, files, false, (error) => {
-      throw error;
-    }));
+    await this.inTurn(() => this.show({ world, name, address: this.address }, files, false, tell));
     const main = mainScene(world);
-    if (main.name === city.name) return undefined;
-    return new SceneError(name, '', `is of the scene ${main.name.slice(0, 100)}, and this is ${city.name}`, 'open it in its own scene, if the models stand in odd places');
+    if (main.name === city.name) return;
+    tell(new SceneError(name, '', `is of the scene ${main.name.slice(0, 100)}, and this is ${city.name}`, 'open it in its own scene, if the models stand in odd places'));
   }
 
   // One that was fetched, whose main scene is the city. What cannot be had is told of, and the rest is shown.
@@ -202,7 +200,7 @@ export class Worlds {
     for (const [i, path] of saved.files.entries()) {
       const found = (await fileOfContent(path, saved.contents[i], i === 0, all)) ?? (await fetched.file(path, place));
       if (!found && i === 0) {
-        throw new SceneError(name, place, `needs ${path.slice(0, 200)}`, 'drop the models together with it');
+        throw new SceneError(name, place, `needs ${path.slice(0, 200)}`, `drop it together with ${name}`);
       }
       if (found) own.push(found);
     }
