@@ -5,7 +5,6 @@
 #   ./quickstart.sh [--no-serve]      --no-serve stops before the scene is served
 set -euo pipefail
 cd "$(dirname "$0")"
-trap 'exit 130' INT TERM  # a training that is stopped ends well, and is not to be baked
 serve=yes
 for argument in "$@"; do
   [ "$argument" = --no-serve ] || { echo "usage: $0 [--no-serve]" >&2; exit 2; }

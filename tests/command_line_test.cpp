@@ -207,6 +207,62 @@ TEST_F(CommandLine, ExplainsWhatIsWrongWithAFolder) {
   EXPECT_FALSE(fs::exists(at("out1") + "/transforms.json"));
 }
 
+TEST_F(CommandLine, SaysWhatAFolderIsThatCannotBeServedAndWhatToDo) {
+  const auto says = [](const std::string& what, const std::string& answer) {
+    EXPECT_EQ(failureOf({"serve", what}), "tessera: error: " + what + ": " + answer + "\n");
+  };
+  const std::string another = "; name the folder of a scene, or the world.json of a world";
+  says(at("missing"), "there is no such file or folder" + another);
+  says(at("missing.json"), "there is no such file or folder" + another);
+  fs::create_directories(at("bare"));
+  says(at("bare"), "holds neither a scene (tileset.json) nor a world (world.json)" + another);
+  writeFileAtomically(at("a.txt"), std::string_view("text"));
+  says(at("a.txt"), "is neither the folder of a scene nor a world.json" + another);
+
+  json source = json::parse(readTextFile(fs::path(city()) / "transforms.json"));
+  source.erase("tessera");
+  writeFileAtomically(at("source/transforms.json"), source.dump());
+  says(at("source"),
+       "holds photos that are not imported yet, no scene; import, train and bake them first: tessera import " +
+           at("source") +
+           " CAPTURE, then tessera train CAPTURE MODEL --method volume, then tessera bake "
+           "MODEL SCENE");
+  says(city(), "is a capture, not a scene; train and bake it first: tessera train " + city() +
+                   " MODEL --method volume, then tessera bake MODEL SCENE");
+  says(model(),
+       "is a model of --method field, of which no scene can be baked; train one with --method volume, and bake that");
+  const std::string volume = at("volume.model");
+  writeFileAtomically(volume + "/blocks.json", std::string_view("{}"));
+  says(volume,
+       "is a model that is not trained yet, not a scene; train it, then bake it: tessera bake " + volume + " SCENE");
+  writeFileAtomically(volume + "/manifest.json",
+                      std::string_view(R"({"method":"volume","step":1,"planned_steps":1,"files":["blocks.json"]})"));
+  says(volume, "is a model, not a scene; bake it first: tessera bake " + volume + " SCENE");
+}
+
+TEST_F(CommandLine, SaysWhichPortsThereAre) {
+  for (const char* port : {"99999", "65536", "-1", "x", "8.5", "80x", "99999999999999999999"}) {
+    const std::string line = usageErrorOf({"serve", at("missing"), "--port", port});
+    EXPECT_TRUE(contains(line, std::string("--port: '") + port + "' is no port")) << line;
+    EXPECT_TRUE(contains(line, "from 0 to 65535")) << line;
+  }
+  for (const char* port : {"0", "65535"}) failureOf({"serve", at("missing"), "--port", port});
+}
+
+TEST_F(CommandLine, ServesUntilItIsInterrupted) {
+  fs::create_directories(at("site/scene"));
+  writeFileAtomically(at("site/index.html"), std::string_view("viewer"));
+  writeFileAtomically(at("site/scene/tileset.json"), std::string_view("{}"));
+  const std::string world = at("site/world.json");
+  writeFileAtomically(world, std::string_view(R"({"kind":"tessera world","version":2,"scenes":[{"url":"scene"}]})"));
+  Program program(folder_, {"serve", world, "--port", "0", "--viewer", at("site")});
+  waitUntil(program, [&] { return contains(program.said(), "Ctrl-C"); });
+  program.kill(SIGINT);
+  const Said said = program.wait();
+  EXPECT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.out, world + ": open http://127.0.0.1:")) << said.out;
+}
+
 TEST_F(CommandLine, RecognisesAPlainFolderOfPhotosAndSaysWhatToDo) {
   for (int i = 0; i < 3; ++i) writePng(folder_ / "plain" / (std::to_string(i) + ".png"), ImageU8(8, 6, 3, 90));
   EXPECT_TRUE(contains(failureOf({"import", at("plain"), at("out2")}), "colmap"));
@@ -460,7 +516,7 @@ TEST_F(CommandLine, EndsWithTheSameBytesHoweverOftenItIsKilled) {
   EXPECT_EQ(checkpoint(at("killed")), checkpoint(at("unbroken")));
 }
 
-TEST_F(CommandLine, SavesAndLeavesInPeaceWhenItIsInterrupted) {
+TEST_F(CommandLine, SavesAndTellsWhenItIsInterrupted) {
   for (const int signal : {SIGINT, SIGTERM}) {
     const std::string name = at("interrupted-" + std::to_string(signal));
     Program program(folder_, trainArguments(name, {"--steps", "100000000"}));
@@ -468,8 +524,9 @@ TEST_F(CommandLine, SavesAndLeavesInPeaceWhenItIsInterrupted) {
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     program.kill(signal);
     const Said said = program.wait();
-    EXPECT_EQ(said.exitCode, 0) << said.err;
-    EXPECT_TRUE(contains(said.out, "--resume")) << said.out;
+    EXPECT_EQ(said.exitCode, 128 + signal) << said.err;
+    EXPECT_TRUE(contains(said.out, "stopped on request; go on with --resume")) << said.out;
+    EXPECT_FALSE(contains(said.err, "error")) << said.err;
     const json manifest = json::parse(readTextFile(fs::path(name) / "manifest.json"));
     EXPECT_EQ(manifest.at("planned_steps"), 100000000);
     EXPECT_FALSE(checkpoint(name).empty());

@@ -63,6 +63,9 @@ class Program {
            info.si_pid == process_;
   }
 
+  // On its standard output, until now.
+  std::string said() const { return readTextFile(out_); }
+
   Said wait() {
     int status = 0;
     EXPECT_EQ(waitpid(process_, &status, 0), process_);

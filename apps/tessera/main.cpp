@@ -14,20 +14,24 @@
 namespace tessera {
 namespace {
 
-volatile std::sig_atomic_t interrupts = 0;
+volatile std::sig_atomic_t firstSignal = 0;
 
 void onInterrupt(int signal) {
-  interrupts = interrupts + 1;
-  if (interrupts > 1) {
+  if (firstSignal != 0) {
     std::signal(signal, SIG_DFL);
     std::raise(signal);
   }
+  firstSignal = signal;
 }
 
 }  // namespace
 
 bool interrupted() {
-  return interrupts > 0;
+  return firstSignal != 0;
+}
+
+int interruptedStatus() {
+  return 128 + firstSignal;
 }
 
 void catchInterrupts() {
@@ -75,6 +79,8 @@ int main(int argc, char** argv) {
     }
     app.parse(argc, argv);
     return 0;
+  } catch (const CLI::RuntimeError& ended) {
+    return ended.get_exit_code();  // as the verb wants it
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   } catch (const tessera::Error& error) {

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "apps/tessera/folder_kind.h"
 #include "apps/tessera/verbs.h"
 #include "base/error.h"
 #include "import/capture_reader.h"
@@ -108,6 +109,22 @@ ordered_json describeScene(const fs::path& folder) {
   return info;
 }
 
+ordered_json describe(const fs::path& folder) {
+  switch (kindOfFolder(folder)) {
+    case FolderKind::source:
+      return {{"kind", "source"}, {"format", sourceFormat(folder)}};
+    case FolderKind::capture:
+      return describeCapture(folder);
+    case FolderKind::model:
+      return describeModel(folder);
+    case FolderKind::scene:
+      return describeScene(folder);
+    case FolderKind::other:
+      break;
+  }
+  throw Error(folder.string(), "", "holds nothing that tessera knows", "name a source, capture, model or scene folder");
+}
+
 void printIndented(const ordered_json& info, int indent) {
   for (const auto& [key, value] : info.items()) {
     if (value.is_object()) {
@@ -135,21 +152,7 @@ void addInfoVerb(CLI::App& app) {
     const fs::path folder = flags->what;
     if (!fs::is_directory(folder))
       throw Error(flags->what, "", "is not a folder", "name a source, capture, model or scene");
-    ordered_json info;
-    if (fs::exists(folder / "blocks.json")) {
-      info = describeModel(folder);
-    } else if (fs::exists(folder / "tileset.json")) {
-      info = describeScene(folder);
-    } else if (isCapture(folder)) {
-      info = describeCapture(folder);
-    } else {
-      const std::string format = sourceFormat(folder);
-      if (format.empty()) {
-        throw Error(flags->what, "", "holds nothing that tessera knows",
-                    "name a source, capture, model or scene folder");
-      }
-      info = {{"kind", "source"}, {"format", format}};
-    }
+    const ordered_json info = describe(folder);
     if (flags->json) {
       fmt::print("{}\n", info.dump(2));
     } else {

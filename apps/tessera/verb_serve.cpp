@@ -1,16 +1,63 @@
 #include <fmt/format.h>
 
+#include "apps/tessera/folder_kind.h"
 #include "apps/tessera/verbs.h"
 #include "base/error.h"
 #include "serve/http_server.h"
 #include "serve/world_file.h"
 #include "tiles/scene_folder.h"
+#include "train/model_folder.h"
 
 namespace tessera {
 namespace {
 
 bool isLoopback(const std::string& address) {
   return address.starts_with("127.") || address == "::1";
+}
+
+bool isMissing(const fs::path& path) {
+  std::error_code status;
+  return fs::status(path, status).type() == fs::file_type::not_found;
+}
+
+// Throws Error that says what the path names instead of a scene, and what makes a scene of that.
+void requireScene(const fs::path& path) {
+  if (!isMissing(path / "tileset.json")) return;
+  const std::string name = path.string(), another = "name the folder of a scene, or the world.json of a world";
+  if (isMissing(path)) throw Error(name, "", "there is no such file or folder", another);
+  if (!fs::is_directory(path)) throw Error(name, "", "is neither the folder of a scene nor a world.json", another);
+  const std::string intoScene = " MODEL --method volume, then tessera bake MODEL SCENE";
+  switch (kindOfFolder(path)) {
+    case FolderKind::scene:
+      return;
+    case FolderKind::source:
+      throw Error(name, "", "holds photos that are not imported yet, no scene",
+                  "import, train and bake them first: tessera import " + name + " CAPTURE, then tessera train CAPTURE" +
+                      intoScene);
+    case FolderKind::capture:
+      throw Error(name, "", "is a capture, not a scene", "train and bake it first: tessera train " + name + intoScene);
+    case FolderKind::model: {
+      const auto manifest = ModelFolder(path).manifest();
+      if (!manifest) {
+        throw Error(name, "", "is a model that is not trained yet, not a scene",
+                    "train it, then bake it: tessera bake " + name + " SCENE");
+      }
+      if (manifest->method != "volume") {
+        throw Error(name, "", "is a model of --method " + manifest->method + ", of which no scene can be baked",
+                    "train one with --method volume, and bake that");
+      }
+      throw Error(name, "", "is a model, not a scene", "bake it first: tessera bake " + name + " SCENE");
+    }
+    case FolderKind::other:
+      throw Error(name, "", "holds neither a scene (tileset.json) nor a world (world.json)", another);
+  }
+}
+
+// Of --port. CLI would not say which there are.
+std::string portError(const std::string& text) {
+  int port = 0;
+  const bool isPort = CLI::detail::lexical_cast(text, port) && port >= 0 && port <= 65535;
+  return isPort ? "" : fmt::format("'{}' is no port: they are whole numbers from 0 to 65535", text);
 }
 
 // What is served beside the viewer.
@@ -23,9 +70,10 @@ struct Served {
 // Throws Error where there is neither a scene nor a world, or one that cannot be served.
 Served openServed(const fs::path& path) {
   if (const auto world = worldFileAt(path)) {
-    requireScenesBeside(*world);
+    requireWorld(*world);
     return {world->string(), {"world", fs::absolute(*world).parent_path()}, viewerOfWorld(world->filename().string())};
   }
+  requireScene(path);
   const Tileset tileset = readTileset(path);
   return {tileset.name.empty() ? path.string() : tileset.name, {"scene", path}, ""};
 }
@@ -42,7 +90,9 @@ void addServeVerb(CLI::App& app) {
   verb->footer("Example:\n  tessera serve garden.scene --port 8080\n  tessera serve worlds/world.json");
   verb->add_option("scene", flags->scene, "scene folder; or world.json of the viewer, or the folder that it lies in")
       ->required();
-  verb->add_option("--port", flags->server.port, "0: one that is free")->capture_default_str();
+  verb->add_option("--port", flags->server.port, "0: one that is free")
+      ->capture_default_str()
+      ->check(CLI::Validator(portError, "0 to 65535"));
   verb->add_option("--address", flags->server.address, "of this machine; 0.0.0.0: for everyone who can reach it")
       ->capture_default_str();
   verb->add_option("--viewer", flags->viewer, "folder of the viewer's files (tools/build-web.sh makes it)")
@@ -57,11 +107,11 @@ void addServeVerb(CLI::App& app) {
     if (isLoopback(flags->server.address)) hosts = {"localhost", "127.0.0.1", "::1", flags->server.address};
     const StaticSite site({{"", flags->viewer}, served.folder}, hosts, served.start);
     HttpServer server(site, flags->server);
+    catchInterrupts();
     const bool isV6 = flags->server.address.find(':') != std::string::npos;
     fmt::print("{}: open http://{}:{}/ (Ctrl-C ends)\n", served.name,
                isV6 ? "[" + flags->server.address + "]" : flags->server.address, server.port());
     std::fflush(stdout);
-    catchInterrupts();
     server.run(interrupted);
   });
 }

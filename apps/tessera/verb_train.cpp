@@ -134,6 +134,8 @@ void addTrainVerb(CLI::App& app) {
                  result.samplesPerSecond / 1e6, device->name());
       if (!result.finished) fmt::print("stopped on request; go on with --resume\n");
     }
+    // Whoever is to bake it next is told.
+    if (!result.finished) throw CLI::RuntimeError(interruptedStatus());
   });
 }
 

@@ -26,6 +26,8 @@ void addBenchVerb(CLI::App& app);
 
 // True once SIGINT or SIGTERM has come; a second one ends the process at once.
 bool interrupted();
+// What a verb that was interrupted before its end ends with, as CLI::RuntimeError: 130 for SIGINT, 143 for SIGTERM.
+int interruptedStatus();
 void catchInterrupts();
 
 // Flags shared by verbs that compute.

@@ -247,14 +247,22 @@ HttpServer::HttpServer(const StaticSite& site, const HttpServerSettings& setting
   const std::string place = fmt::format("{}:{}", settings.address, settings.port);
   beast::error_code error;
   const auto address = asio::ip::make_address(settings.address, error);
-  if (error) throw Error(place, "", "is no address", "name one of this machine, as 127.0.0.1 or 0.0.0.0");
+  const auto refuse = [&](const std::string& reason, const std::string& remedy) {
+    throw Error(place, "", reason, remedy);
+  };
+  const char* another = "name one with --address, as 127.0.0.1, or 0.0.0.0 for all that it has";
+  if (error) refuse("is no IP address", another);
   tcp::acceptor& acceptor = state_->acceptor;
   const tcp::endpoint endpoint(address, settings.port);
   acceptor.open(endpoint.protocol(), error);
   if (!error) acceptor.set_option(asio::socket_base::reuse_address(true), error);
   if (!error) acceptor.bind(endpoint, error);
   if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
-  if (error) throw Error(place, "", "cannot be listened at: " + error.message(), "choose another --port or --address");
+  if (error == asio::error::address_in_use) {
+    refuse("is in use by another program", "choose another --port, or 0 for one that is free");
+  }
+  if (error == beast::errc::address_not_available) refuse("is no address of this machine", another);
+  if (error) refuse("cannot be listened at: " + error.message(), "choose another --port or --address");
 }
 
 HttpServer::~HttpServer() = default;

@@ -335,9 +335,20 @@ TEST_F(HttpServerTest, SaysThatAnAddressIsTakenOrNone) {
   start();
   HttpServerSettings settings;
   settings.port = server_->port();
-  EXPECT_THROW(HttpServer(*site_, settings), Error);
+  const auto said = [&]() -> std::string {
+    try {
+      HttpServer server(*site_, settings);
+      return "";
+    } catch (const Error& error) {
+      return error.reason() + "; " + error.remedy();
+    }
+  };
+  EXPECT_EQ(said(), "is in use by another program; choose another --port, or 0 for one that is free");
+  const std::string another = "; name one with --address, as 127.0.0.1, or 0.0.0.0 for all that it has";
+  settings.address = "192.0.2.1";  // of documentation alone
+  EXPECT_EQ(said(), "is no address of this machine" + another);
   settings.address = "somewhere";
-  EXPECT_THROW(HttpServer(*site_, settings), Error);
+  EXPECT_EQ(said(), "is no IP address" + another);
 }
 
 }  // namespace

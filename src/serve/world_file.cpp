@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cctype>
 #include <nlohmann/json.hpp>
 
@@ -15,6 +16,8 @@ namespace {
 using nlohmann::json;
 
 constexpr uint64_t kMostBytes = 180'000'000;  // with the models that it holds
+constexpr size_t kMostScenes = 16;
+constexpr const char* kCorrect = "correct it, or save it in the viewer again";
 
 // Of a whole address, or one of another server.
 bool isElsewhere(const std::string& url) {
@@ -37,14 +40,39 @@ std::optional<std::string> pathOfScene(const std::string& url) {
   return path->substr(1);
 }
 
+// Where the last of so many bytes stands. A letter of several bytes is one column.
+std::string placeIn(const std::string& text, size_t bytes) {
+  const std::string before = text.substr(0, bytes > 0 ? bytes - 1 : 0);
+  const auto lines = std::count(before.begin(), before.end(), '\n');
+  const size_t lineBegin = before.rfind('\n') + 1;  // 0 where there is none
+  const auto letters = std::count_if(before.begin() + static_cast<std::ptrdiff_t>(lineBegin), before.end(),
+                                     [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; });
+  return fmt::format("line {}, column {}", lines + 1, letters + 1);
+}
+
+// Null where it has none.
+const json& fieldOf(const json& object, const char* key) {
+  static const json kNone;
+  const auto found = object.find(key);
+  return found == object.end() ? kNone : *found;
+}
+
 json readWorld(const fs::path& file) {
   const auto withoutFiles = [](int depth, json::parse_event_t event, json& parsed) {
     return !(depth == 1 && event == json::parse_event_t::key && parsed == "files");
   };
-  json world = json::parse(readTextFile(file, kMostBytes), withoutFiles, false);
-  if (!world.is_object()) throw Error(file.string(), "", "is not JSON", "save it in the viewer again");
-  if (!world.contains("kind") || world["kind"] != "tessera world") {
-    throw Error(file.string(), "", "is no world of the viewer", "name a world.json that it has saved, or a scene");
+  const std::string text = readTextFile(file, kMostBytes);
+  json world;
+  try {
+    world = json::parse(text, withoutFiles);
+  } catch (const json::parse_error& error) {
+    throw Error(file.string(), placeIn(text, error.byte), "is not JSON", kCorrect);
+  } catch (const json::out_of_range&) {
+    throw Error(file.string(), "", "holds a number that is too large", kCorrect);
+  }
+  if (fieldOf(world, "kind") != "tessera world") {
+    throw Error(file.string(), "kind", "is not 'tessera world'",
+                "correct it, or name another world, or the folder of a scene");
   }
   return world;
 }
@@ -78,10 +106,54 @@ void requireServed(const fs::path& worldFile, const fs::path& folder) {
   }
 }
 
+bool areNumbers(const json& value, size_t count) {
+  return value.is_array() && value.size() == count &&
+         std::all_of(value.begin(), value.end(), [](const json& one) { return one.is_number(); });
+}
+
+// Whether it stands somewhere else than in the world of the main scene. Throws Error where it does not say where.
+bool isPlaced(const json& scene, const fs::path& file, const std::string& place) {
+  const auto require = [&](const char* key, bool isRight, const char* reason) {
+    if (!isRight) throw Error(file.string(), place + "." + key, reason, kCorrect);
+  };
+  const auto has = [&](const char* key) { return scene.contains(key); };
+  require("position", !has("position") || areNumbers(scene["position"], 3), "is not 3 numbers");
+  require("rotation", !has("rotation") || areNumbers(scene["rotation"], 4), "is not 4 numbers");
+  require("scale", !has("scale") || scene["scale"].is_number(), "is no number");
+  return has("position") || has("rotation") || has("scale");
+}
+
+// By their places in the file. Throws Error where the viewer would not open them.
+std::vector<std::pair<std::string, const json*>> scenesOf(const json& world, const fs::path& file) {
+  const json &version = fieldOf(world, "version"), &list = fieldOf(world, "scenes");
+  if (version == 1) return {{"scene", &fieldOf(world, "scene")}};
+  const auto refuse = [&](const std::string& place, const std::string& reason, const std::string& remedy) {
+    throw Error(file.string(), place, reason, remedy);
+  };
+  if (version != 2) refuse("version", "is not 2, nor 1", "correct it, or use a newer tessera");
+  if (!list.is_array() || list.empty()) {
+    refuse("scenes", list.is_array() ? "is empty" : "is missing, or no list",
+           R"(name one at least: [{"url": "garden.scene"}])");
+  }
+  if (list.size() > kMostScenes) refuse("scenes", fmt::format("are more than {}", kMostScenes), "keep fewer");
+  std::vector<std::pair<std::string, const json*>> scenes;
+  bool hasMain = false;
+  for (const json& scene : list) {
+    const std::string place = fmt::format("scenes[{}]", scenes.size());
+    if (!scene.is_object()) refuse(place, "is no object", kCorrect);
+    if (!isPlaced(scene, file, place)) hasMain = true;
+    scenes.emplace_back(place, &scene);
+  }
+  if (!hasMain) {
+    refuse("scenes", "has none in whose world the others stand", "leave out position, rotation and scale of one");
+  }
+  return scenes;
+}
+
 // Not empty where it says one.
 std::string urlOf(const json& scene) {
-  if (!scene.is_object() || !scene.contains("url") || !scene["url"].is_string()) return "";
-  return scene["url"].get<std::string>();
+  const json& url = fieldOf(scene, "url");
+  return url.is_string() ? url.get<std::string>() : "";
 }
 
 }  // namespace
@@ -94,31 +166,22 @@ std::optional<fs::path> worldFileAt(const fs::path& path) {
   return std::nullopt;
 }
 
-void requireScenesBeside(const fs::path& worldFile) {
+void requireWorld(const fs::path& worldFile) {
   const json world = readWorld(worldFile);
   const fs::path folder = fs::canonical(fs::absolute(worldFile).parent_path());
   requireServed(worldFile, folder);
-  const auto require = [&](const json& scene, const std::string& place) {
-    const std::string url = urlOf(scene);
-    if (url.empty() || isElsewhere(url)) return;
+  for (const auto& [place, scene] : scenesOf(world, worldFile)) {
+    const std::string url = urlOf(*scene);
+    if (url.empty() || isElsewhere(url)) continue;
     const auto path = pathOfScene(url);
-    const auto file = path ? SiteFile::open(folder, *path).file : nullptr;
-    if (file) return;
+    if (path && SiteFile::open(folder, *path).file) continue;
     std::error_code status;
     const bool isMissing = path && !fs::exists(folder / *path, status);
-    throw Error(worldFile.string(), place,
+    throw Error(worldFile.string(), place + ".url",
                 isMissing ? fmt::format("there is no '{}' in '{}'", *path, folder.string())
                           : fmt::format("'{}' does not lie in '{}', and nothing else is served", url, folder.string()),
                 isMissing ? "correct the address, or put the scene there"
                           : "put the scene into that folder, or world.json into one above both");
-  };
-  if (world.contains("scene")) require(world["scene"], "scene.url");
-  if (!world.contains("scenes") || !world["scenes"].is_array()) return;
-  for (size_t i = 0; i < world["scenes"].size(); ++i) {
-    const json& scene = world["scenes"][i];
-    const std::string place = fmt::format("scenes[{}]", i);
-    if (!scene.is_object()) throw Error(worldFile.string(), place, "is no object", "save it in the viewer again");
-    require(scene, place + ".url");
   }
 }
 

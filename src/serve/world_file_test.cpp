@@ -37,7 +37,7 @@ class WorldFileTest : public testing::Test {
   }
   std::string saidOf(const std::string& name) const {
     try {
-      requireScenesBeside(at(name));
+      requireWorld(at(name));
       return "";
     } catch (const Error& error) {
       return error.place() + ": " + error.reason();
@@ -77,11 +77,11 @@ TEST_F(WorldFileTest, MayNameNoneOutsideOfIt) {
   }
   EXPECT_EQ(said(worldOf("nothing")),
             "scenes[1].url: there is no 'nothing/tileset.json' in '" + fs::canonical(at("site")).string() + "'");
-  EXPECT_NE(said(R"({"kind":"tessera world","version":1,"scene":{"url":"../beside"}})"), "");
+  EXPECT_TRUE(said(R"({"kind":"tessera world","version":1,"scene":{"url":"../beside"}})").starts_with("scene.url: '"));
 }
 
 TEST_F(WorldFileTest, IsOneThatIsGivenToBrowsers) {
-  write("beside/world.json", R"({"kind":"tessera world","scenes":[]})");
+  write("beside/world.json", worldOf("deep"));
   for (const char* name : {".world.json", "a\\b.json", "a\nb.json"}) {
     write(std::string("site/") + name, worldOf("deep"));
     EXPECT_EQ(saidOf(std::string("site/") + name), ": has a name by which nothing is served") << name;
@@ -101,25 +101,93 @@ TEST_F(WorldFileTest, IsOneThatIsGivenToBrowsers) {
 TEST_F(WorldFileTest, SaysNothingToTheTerminal) {
   write("site/world.json", worldOf("\\u001b[2J\\u009b"));
   try {
-    requireScenesBeside(at("site/world.json"));
+    requireWorld(at("site/world.json"));
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("'\\x1b[2J\\u009b' does not lie in"), std::string::npos) << error.what();
   }
 }
 
-TEST_F(WorldFileTest, IsReadNoFartherThanThat) {
-  EXPECT_EQ(said(R"({"kind":"tessera world","scenes":[{"url":"deep"},{"url":4}],"models":7,"files":{"a":"b"}})"), "");
-  EXPECT_EQ(said(R"({"kind":"tessera world","scenes":"deep"})"), "");
-  for (const char* scene : {"3", "null", "[]", "\"deep\""}) {
-    EXPECT_EQ(said(fmt::format(R"({{"kind":"tessera world","scenes":[{{"url":"deep"}},{}]}})", scene)),
-              "scenes[1]: is no object");
+TEST_F(WorldFileTest, SaysWhereItIsNotJson) {
+  const auto reason = [](const std::string& place) { return place + ": is not JSON"; };
+  EXPECT_EQ(said(""), reason("line 1, column 1"));
+  EXPECT_EQ(said("{"), reason("line 1, column 2"));
+  EXPECT_EQ(said("{\n"), reason("line 2, column 1"));
+  EXPECT_EQ(said("{\n  \"kind\": \"tessera world\",\n  \"scenes\": [{\"url\": \"deep\"},]\n}\n"),
+            reason("line 3, column 30"));
+  EXPECT_EQ(said("{\n  \"name\": \"Köln ☀\" 3}"), reason("line 2, column 20")) << "letters, not bytes";
+  EXPECT_EQ(said(std::string(100000, '[')), reason("line 1, column 100001"));
+  EXPECT_EQ(said(R"({"position": [1e999]})"), ": holds a number that is too large");
+}
+
+TEST_F(WorldFileTest, HasTheKindAndAVersionThatTheViewerKnows) {
+  for (const char* text : {"[]", "7", "{}", R"({"asset":{"version":"1.1"}})", R"({"kind":"world"})"}) {
+    EXPECT_EQ(said(text), "kind: is not 'tessera world'") << text;
   }
-  EXPECT_EQ(said("{"), ": is not JSON");
-  EXPECT_EQ(said("[]"), ": is not JSON");
-  EXPECT_EQ(said("{}"), ": is no world of the viewer");
-  EXPECT_EQ(said(R"({"asset":{"version":"1.1"}})"), ": is no world of the viewer");
-  EXPECT_EQ(said(std::string(100000, '[')), ": is not JSON");
+  const auto ofVersion = [&](const std::string& version) {
+    return said(R"({"kind":"tessera world","scenes":[{"url":"deep"}],"version":)" + version + "}");
+  };
+  for (const char* version : {"1", "2", "2.0"}) EXPECT_EQ(ofVersion(version), "") << version;
+  for (const char* version : {"0", "3", "1.5", "\"2\"", "null", "true", "[2]"}) {
+    EXPECT_EQ(ofVersion(version), "version: is not 2, nor 1") << version;
+  }
+  EXPECT_EQ(said(R"({"kind":"tessera world","scenes":[{"url":"deep"}]})"), "version: is not 2, nor 1");
+}
+
+TEST_F(WorldFileTest, HasScenesOfWhichOneIsTheMainOne) {
+  const auto ofScenes = [&](const std::string& scenes) {
+    return said(R"({"kind":"tessera world","version":2,"scenes":)" + scenes + "}");
+  };
+  const std::string deep = R"({"url":"deep"})";
+  EXPECT_EQ(said(R"({"kind":"tessera world","version":2,"scene":{"url":"deep"}})"), "scenes: is missing, or no list");
+  for (const char* scenes : {"\"deep\"", "null", "{}"}) EXPECT_EQ(ofScenes(scenes), "scenes: is missing, or no list");
+  EXPECT_EQ(ofScenes("[]"), "scenes: is empty");
+  for (const char* scene : {"3", "null", "[]", "\"deep\""}) {
+    EXPECT_EQ(ofScenes("[" + deep + "," + scene + "]"), "scenes[1]: is no object");
+  }
+  std::string sixteen = deep;
+  for (int i = 1; i < 16; ++i) sixteen += "," + deep;
+  EXPECT_EQ(ofScenes("[" + sixteen + "]"), "");
+  EXPECT_EQ(ofScenes("[" + sixteen + "," + deep + "]"), "scenes: are more than 16");
+
+  const std::string noMain = "scenes: has none in whose world the others stand";
+  for (const char* place : {R"("position":[0,0,0])", R"("rotation":[0,0,0,1])", R"("scale":1)"}) {
+    const std::string placed = std::string(R"({"url":"deep",)") + place + "}";
+    EXPECT_EQ(ofScenes("[" + placed + "]"), noMain);
+    EXPECT_EQ(ofScenes("[" + placed + "," + deep + "]"), "");
+  }
+}
+
+TEST_F(WorldFileTest, SaysWhereItsScenesStandInNumbers) {
+  const auto ofPlace = [&](const std::string& place) {
+    return said(R"({"kind":"tessera world","version":2,"scenes":[{"url":"deep"},{"url":"deep",)" + place + "}]}");
+  };
+  EXPECT_EQ(ofPlace(R"("position":[1,-2.5,3e2],"rotation":[0,0,0,1],"scale":2)"), "");
+  for (const char* value : {"[1,2]", "[1,2,3,4]", "[1,2,\"3\"]", "[1,2,null]", "5", "null", "{}"}) {
+    EXPECT_EQ(ofPlace(std::string(R"("position":)") + value), "scenes[1].position: is not 3 numbers") << value;
+  }
+  EXPECT_EQ(ofPlace(R"("rotation":[0,0,1])"), "scenes[1].rotation: is not 4 numbers");
+  EXPECT_EQ(ofPlace(R"("scale":[1,1,1])"), "scenes[1].scale: is no number");
+}
+
+TEST_F(WorldFileTest, IsReadNoFartherThanThat) {
+  const std::string begin = R"({"kind":"tessera world","version":2,"scenes":[{"url":"deep"},{"url":4}],)";
+  EXPECT_EQ(said(begin + R"("models":7,"files":{"a":"b"}})"), "");
+  EXPECT_EQ(said(begin + R"("scene":{"url":"../beside"}})"), "");
+  const std::string deepest = std::string(100000, '[') + std::string(100000, ']');
+  EXPECT_EQ(said(R"({"kind":"tessera world","version":2,"scenes":[{"url":)" + deepest + "}]}"), "");
+}
+
+TEST_F(WorldFileTest, IsToBeCorrectedOrSavedAgain) {
+  for (const char* text : {"{", R"({"kind":"tessera world","version":2,"scenes":[{"url":"deep"},3]})"}) {
+    write("site/world.json", text);
+    try {
+      requireWorld(at("site/world.json"));
+      ADD_FAILURE() << text;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.remedy(), "correct it, or save it in the viewer again");
+    }
+  }
 }
 
 TEST_F(WorldFileTest, IsNamedToTheViewer) {
