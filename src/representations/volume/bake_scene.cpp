@@ -19,13 +19,15 @@ struct LevelContents {
   BakedLevel sizes;
 };
 
-Tileset emptyTileset(const VolumeModel& model, const Capture& capture, uint32_t levels) {
+Tileset emptyTileset(const VolumeModel& model, const Capture& capture, uint32_t levels,
+                     const std::array<float, 3>& background) {
   Tileset tileset;
   tileset.representation = Representation::volume;
   tileset.name = fs::weakly_canonical(capture.root).filename().string();
   tileset.sourceFromWorld = capture.sourceFromWorld;
   tileset.georeference = capture.geo;
   tileset.near = model.space().near;
+  tileset.background = background;
   tileset.levels = levels;
   placeOn(tileset, model.grid());
   return tileset;
@@ -130,7 +132,7 @@ BakedVolume bakeVolume(const LevelModels& models, uint32_t levels, const Capture
     ofLevel.stride <<= level;  // as many rays through its larger texels
     const std::unique_ptr<VolumeModel> model = models(level);
     if (level == 0) {
-      tileset = emptyTileset(*model, capture, levels);
+      tileset = emptyTileset(*model, capture, levels, options.background);
       if (model->config().literalEq3) {
         warn(
             "the model was trained with literal_eq3; scenes multiply the network's colour by the block's opacity, and "

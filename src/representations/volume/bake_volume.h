@@ -3,6 +3,7 @@
 // which alive_texels.h says what they take; and the tile that is being written.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 
@@ -18,6 +19,7 @@ struct BakeVolumeOptions {
   // What training photos see is kept: samples of their pixels whose weight in the picture and whose opacity over a
   // renderer's step are both above these.
   double minWeight = 0.005, minAlpha = 0.005;
+  std::array<float, 3> background = {0.74f, 0.8f, 0.86f};  // of the scene, where no photo looked: a hazy sky
   int stride = 1;  // every so manieth pixel along rows and columns; of each coarser level twice as much
   int effort = 4;  // of compression, 0 to 9
   // Of a model that holds few blocks at a time, photos are done in parts.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "base/error.h"
 #include "base/image_io.h"
@@ -18,10 +19,12 @@ namespace {
 
 constexpr uint32_t kRays = 2048;  // of one piece of a photo
 // Of the surround also what lies beside the photos is kept, as far as this share of their size: people turn their
-// heads, and what the model makes up there is better than a hole.
+// heads, and what the model makes up there is better than a hole. Not what lies higher than any photo looks: that is
+// sky, and what the model makes up there is noise.
 constexpr double kBeside = 0.5;
 constexpr int kBesideStride = 3;
 constexpr uint32_t kBesideTilesAcross = 32;
+constexpr int kPixelsAlongEdge = 64;   // that are asked how high a photo looks
 constexpr double kWorthSaying = 0.02;  // of the tiles are looked through in several stays
 
 VolumePass::Room roomForRays(const VolumeModel& model) {
@@ -40,6 +43,41 @@ struct Looking {
   bool onlyBeside = false;  // not through pixels within the photo
 };
 
+// In the scene, of unit length.
+std::optional<Vec3d> directionOf(const Vec2d& pixel, const Camera& camera, const Pose& pose, const SceneFrame& frame) {
+  const auto inCamera = camera.directionInCamera(pixel);
+  if (!inCamera) return std::nullopt;
+  return frame.rotation * (pose.rotation * inCamera->normalized());
+}
+
+// How high a pixel looks: the sine of the angle with the horizon.
+double riseOf(const Vec2d& pixel, const Camera& camera, const Pose& pose, const SceneFrame& frame) {
+  const auto direction = directionOf(pixel, camera, pose, frame);
+  return direction ? direction->z() : -1;
+}
+
+// Of all pixels of all photos.
+double highestRise(const Capture& capture, const SceneFrame& frame) {
+  double highest = -1;
+  for (const int photo : capture.photosIn(Split::train)) {
+    const Camera& camera = capture.cameras[capture.photos[photo].camera];
+    const int w = camera.width, h = camera.height;
+    const auto look = [&](int x, int y) {
+      const Vec2d middle(x + 0.5, y + 0.5);
+      highest = std::max(highest, riseOf(middle, camera, capture.photos[photo].worldFromCamera, frame));
+    };
+    look(w / 2, h / 2);  // where the edges do not look highest, it is about here
+    const int stride = std::max(1, std::max(w, h) / kPixelsAlongEdge);
+    for (int x = 0; x < w + stride; x += stride) {
+      for (const int y : {0, h - 1}) look(std::min(x, w - 1), y);
+    }
+    for (int y = 0; y < h + stride; y += stride) {
+      for (const int x : {0, w - 1}) look(x, std::min(y, h - 1));
+    }
+  }
+  return highest;
+}
+
 // Nothing where the photo has no mask.
 ImageU8 maskOf(const Photo& photo, const Camera& camera) {
   if (photo.mask.empty()) return {};
@@ -54,9 +92,11 @@ ImageU8 maskOf(const Photo& photo, const Camera& camera) {
 
 class AliveFinder {
  public:
-  AliveFinder(VolumeModel& model, const BakeVolumeOptions& options, std::vector<AliveTexels>& alive)
+  AliveFinder(VolumeModel& model, const Capture& capture, const BakeVolumeOptions& options,
+              std::vector<AliveTexels>& alive)
       : model_(model),
         options_(options),
+        highestRise_(highestRise(capture, model.frame())),
         alive_(alive),
         pass_(model, roomForRays(model)),
         pictureRays_(model.device(), kRays) {
@@ -64,8 +104,8 @@ class AliveFinder {
   }
   void beginPhoto(const Photo& photo, const Camera& camera) {
     mask_ = maskOf(photo, camera);
-    width_ = camera.width;
-    height_ = camera.height;
+    photo_ = &photo;
+    camera_ = &camera;
     pictureRays_.begin(makeRayCamera(camera, photo.worldFromCamera, model_.frame()), model_.frame(), {});
   }
   // Marks what is seen through those pixels of the photo that its mask does not leave out.
@@ -88,8 +128,8 @@ class AliveFinder {
 
  private:
   bool isWanted(int x, int y, const Looking& looking) const {
-    const bool within = x >= 0 && y >= 0 && x < width_ && y < height_;
-    if (!within) return true;
+    const bool within = x >= 0 && y >= 0 && x < camera_->width && y < camera_->height;
+    if (!within) return riseOf({x + 0.5, y + 0.5}, *camera_, photo_->worldFromCamera, model_.frame()) <= highestRise_;
     return !looking.onlyBeside && (mask_.pixels.empty() || *mask_.at(x, y) >= 128);  // as ray_batch.cpp
   }
   void mark(const std::vector<float>& pixels, uint32_t firstBlock) {
@@ -112,12 +152,14 @@ class AliveFinder {
 
   VolumeModel& model_;
   const BakeVolumeOptions& options_;
+  double highestRise_;
   std::vector<AliveTexels>& alive_;
   VolumePass pass_;
   PictureRays pictureRays_;
   VolumePass::Options drawing_;
   ImageU8 mask_;
-  int width_ = 0, height_ = 0;
+  const Photo* photo_ = nullptr;
+  const Camera* camera_ = nullptr;
 };
 
 PixelLattice latticeWithin(const Camera& camera, int stride) {
@@ -181,12 +223,9 @@ std::vector<uint32_t> staysBeside(const Capture& capture, int photo, const Volum
   std::vector<uint32_t> made;
   for (const PhotoTile& tile : tilesBeside(camera, photo)) {
     const Vec2d middle(whole.firstX + (tile.left + tile.right) / 2.0, whole.firstY + (tile.top + tile.bottom) / 2.0);
-    const auto inCamera = camera.directionInCamera(middle);
+    const auto direction = directionOf(middle, camera, pose, model.frame());
     std::vector<uint32_t> blocks;
-    if (inCamera) {
-      const Vec3d direction = model.frame().rotation * (pose.rotation * inCamera->normalized());
-      blocks = cellsAlong(model.space(), origin, direction, std::numeric_limits<double>::infinity());
-    }
+    if (direction) blocks = cellsAlong(model.space(), origin, *direction, std::numeric_limits<double>::infinity());
     made.push_back(stays.bestFor(blocks));
   }
   return made;
@@ -258,7 +297,7 @@ class StayByStay {
 
 std::vector<AliveTexels> findAliveTexels(VolumeModel& model, const Capture& capture, const BakeVolumeOptions& options) {
   std::vector<AliveTexels> alive(model.space().blocks(), AliveTexels(model.virtualGrid()));
-  AliveFinder finder(model, options, alive);
+  AliveFinder finder(model, capture, options, alive);
   if (model.holdsAll()) {
     lookThroughWholePhotos(model, capture, options, finder);
     return alive;

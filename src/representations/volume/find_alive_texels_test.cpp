@@ -70,7 +70,8 @@ BlockGrid fourBlocks() {
   return grid;
 }
 
-// The definition: through every pixel, and beside the photos every third for the surround, all at once.
+// The definition: through every pixel, and beside the photos every third for the surround, but not higher than photos
+// look; all at once.
 TEST(FindAliveTexels, FindsWhatThePixelsOfAllPhotosShow) {
   const CubeScene scene;
   VolumeConfig config = smallVolumeConfig();
@@ -88,10 +89,23 @@ TEST(FindAliveTexels, FindsWhatThePixelsOfAllPhotosShow) {
   PictureRays pictureRays(device, kRays);
   VolumePass::Options drawing;
   drawing.minAlpha = static_cast<float>(options.minAlpha);
+  const int w = CubeScene::kWidth, h = CubeScene::kHeight;
+  const auto viewOf = [&](int photo) {
+    return makeRayCamera(scene.capture().cameras[0], scene.capture().photos[photo].worldFromCamera, model.frame());
+  };
+  float highest = -1;
   for (const int photo : scene.capture().photosIn(Split::train)) {
-    const RayCamera view =
-        makeRayCamera(scene.capture().cameras[0], scene.capture().photos[photo].worldFromCamera, model.frame());
-    const int w = CubeScene::kWidth, h = CubeScene::kHeight;
+    const PixelLattice lattice{0, 0, w, h, 1};
+    pictureRays.begin(viewOf(photo), model.frame(), lattice);
+    for (size_t first = 0; first < lattice.count(); first += kRays) {
+      const PictureRays::Piece piece = pictureRays.piece(first, kRays);
+      const std::vector<float> directions = device.read(piece.directions.part(0, size_t{3} * piece.rays));
+      for (uint32_t ray = 0; ray < piece.rays; ++ray) highest = std::max(highest, directions[3 * ray + 2]);
+    }
+  }
+  int64_t tooHigh = 0;
+  for (const int photo : scene.capture().photosIn(Split::train)) {
+    const RayCamera view = viewOf(photo);
     for (const bool beside : {false, true}) {
       const PixelLattice lattice =
           beside ? PixelLattice{-w / 2, -h / 2, w + w / 2, h + h / 2, 6} : PixelLattice{0, 0, w, h, 2};
@@ -103,14 +117,21 @@ TEST(FindAliveTexels, FindsWhatThePixelsOfAllPhotosShow) {
                                     block = device.read(pass.blockOfSample());
         const std::vector<float> weight = device.read(pass.weights()), logDensity = device.read(pass.logDensities());
         const std::vector<float> step = device.read(pass.runtimeSteps()), position = device.read(pass.positions());
-        for (uint32_t s = 0; s < firstSample[piece.rays]; ++s) {
+        const std::vector<float> directions = device.read(piece.directions.part(0, size_t{3} * piece.rays));
+        for (uint32_t s = 0, ray = 0; s < firstSample[piece.rays]; ++s) {
+          while (s >= firstSample[ray + 1]) ++ray;
           if (beside && block[s] != 2) continue;
+          if (beside && directions[3 * ray + 2] > highest) {
+            ++tooHigh;
+            continue;
+          }
           const double alpha = -std::expm1(-std::exp(logDensity[s]) * step[s]);
           if (weight[s] > options.minWeight && alpha > options.minAlpha) alive[block[s]].mark(&position[3 * s]);
         }
       }
     }
   }
+  EXPECT_GT(tooHigh, 0);
   const std::vector<Bits> expected = bitsOf(alive);
   for (const Bits& bits : expected) EXPECT_GT(bits.count(), 200);
   EXPECT_EQ(bitsOf(findAliveTexels(model, scene.capture(), options)), expected);
