@@ -42,7 +42,7 @@ export class HidingPanel {
 
   // While it is asked for a place.
   asks(isAsking: boolean): void {
-    this.add.textContent = isAsking ? 'Click a place in the city' : 'Hide a part…';
+    this.add.textContent = isAsking ? 'Choose a place in the city' : 'Hide a part…';
     this.add.classList.toggle('on', isAsking);
   }
 

@@ -63,7 +63,7 @@ export class ModelsPanel {
 
   // While it is asked for a place.
   asks(isAsking: boolean): void {
-    this.put.textContent = isAsking ? 'Click a place in the city' : 'Put on a place…';
+    this.put.textContent = isAsking ? 'Choose a place in the city' : 'Put on a place…';
     this.put.classList.toggle('on', isAsking);
   }
 
