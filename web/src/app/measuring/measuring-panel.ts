@@ -1,6 +1,6 @@
 // What the measuring tool says and asks.
 import { element } from '../page/element';
-import { icon } from '../page/icons';
+import { iconButton, replaceRows, showPressed } from '../page/fields';
 import { kKinds, type Kind } from './measurement';
 import { kKindNames, type Row } from './measurement-text';
 
@@ -63,10 +63,7 @@ export class MeasuringPanel {
 
   // `isEnough`: what is begun can be ended.
   showTask(kind: Kind, hint: string, isBegun: boolean, isEnough: boolean): void {
-    this.kinds.forEach((one, name) => {
-      one.classList.toggle('on', name === kind);
-      one.setAttribute('aria-pressed', String(name === kind));
-    });
+    showPressed(this.kinds, kind);
     this.hint.textContent = hint;
     // A button that goes leaves the keyboard's focus to what is there.
     const { activeElement } = document;
@@ -92,13 +89,11 @@ export class MeasuringPanel {
 
   showKept(kept: readonly Kept[]): void {
     this.listPart.hidden = kept.length === 0;
-    this.list.replaceChildren(...kept.map(({ name, figure, isChosen }, i) => {
+    replaceRows(this.list, kept.map(({ name, figure, isChosen }, i) => {
       const choose = element('button', isChosen ? 'one on' : 'one', element('span', '', name), element('span', 'figure', figure));
       choose.addEventListener('click', () => this.onChoose(i));
-      const remove = element('button', 'plain', icon('close'));
-      remove.setAttribute('aria-label', `Delete ${name} ${figure}`);
-      remove.addEventListener('click', () => this.onDelete(i));
-      return element('li', '', choose, remove);
+      choose.setAttribute('aria-pressed', String(isChosen));
+      return element('li', '', choose, iconButton('Delete', `${name} ${figure}`, 'close', () => this.onDelete(i)));
     }));
   }
 }
