@@ -104,7 +104,7 @@ describe.skipIf(missing())('a model that is dropped', () => {
       await drop(...files);
       await listed(['red cube']);
       const after = await picture();
-      const isBesideToolbar = (i: number) => Math.floor(i / 3) % 480 >= 80; // which shows what has the focus
+      const isBesideToolbar = (i: number) => Math.floor(i / 3) % 480 >= 150; // which shows what has the focus
       const changed = after.pixels.filter((value, i) => isBesideToolbar(i) && Math.abs(value - before.pixels[i]) > 8).length;
       expect(changed).toBeLessThan(30);
     }

@@ -9,7 +9,7 @@ import { decodeTileset } from '../src/tiles/decode-tileset';
 import type { Vec3 } from '../src/tiles/tileset';
 import { goldenScene, launch, missing, serve } from './machine';
 
-const kSize = { width: 1000, height: 250 }; // the panel hides nothing of what is clicked
+const kSize = { width: 1200, height: 250 }; // the panel hides nothing of what is clicked
 const tileset = decodeTileset(readFileSync(join(goldenScene, 'tileset.json'), 'utf8'), 'tileset.json');
 const metres = tileset.worldFromScene.scale; // of a scene unit
 const kVoxel = metres / 16;

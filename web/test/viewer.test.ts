@@ -45,6 +45,12 @@ describe.skipIf(missing())('the viewer', () => {
       expect(await coloursOf(page)).toBeGreaterThan(200);
       await page.keyboard.press('i');
       await page.waitForFunction(() => document.querySelector('.statistics')?.textContent?.includes('Graphics card'));
+      const frame = page.locator('.statistics dd').first();
+      await expect.poll(() => frame.textContent()).toBe('at rest');
+      await page.keyboard.down('w');
+      await expect.poll(() => frame.textContent()).toMatch(/^[\d.]+ ms, [\d.]+ fps$/);
+      await page.keyboard.up('w');
+      await expect.poll(() => frame.textContent(), { timeout: 20000 }).toBe('at rest');
       expect(said).toEqual([]);
     });
   });

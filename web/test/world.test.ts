@@ -76,7 +76,7 @@ describe.skipIf(missing())('a world that is served', () => {
     return decodePixels(page, await page.screenshot());
   }
 
-  const isBesideToolbar = (pixel: number) => pixel % 640 >= 80; // which shows what has the focus
+  const isBesideToolbar = (pixel: number) => pixel % 640 >= 110; // which shows what has the focus
   function changed(a: Uint8Array, b: Uint8Array): number {
     return Array.from({ length: a.length / 3 }, (_, pixel) => pixel)
       .filter((pixel) => isBesideToolbar(pixel) && [0, 1, 2].some((c) => Math.abs(a[3 * pixel + c] - b[3 * pixel + c]) > 8)).length;

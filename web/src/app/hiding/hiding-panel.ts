@@ -2,8 +2,8 @@
 import * as THREE from 'three';
 import { kGizmoModes, type GizmoMode, type ModelGizmo } from '../models/model-gizmo';
 import { element } from '../page/element';
-import { iconButton, numberField } from '../page/fields';
-import { scaleWithin } from '../world/world-fields';
+import { iconButton, nameField, numberField, replaceRows, showPressed } from '../page/fields';
+import { kNameLength, scaleWithin } from '../world/world-fields';
 import type { HiddenPart } from '../world/world-file';
 import type { HiddenBox, HiddenParts } from './hidden-parts';
 
@@ -14,6 +14,7 @@ export class HidingPanel {
   private readonly hint = element('p', 'faint', 'What lies in a box of these is not drawn. Models are.');
   private readonly list = element('ul');
   private readonly details = element('div', 'details');
+  private readonly name = nameField(kNameLength, (to) => this.change((part) => (part.name = to)), () => this.show());
   private readonly middle = kAxes.map((axis, i) => this.field(axis, (part, to) => (part.middle[i] = to)));
   private readonly size = ['Length', 'Width', 'Height'].map((name, i) => this.field(name, (part, to) => (part.size[i] = scaleWithin(Math.max(to, 1e-3)))));
   private readonly turn = this.field('Turn, degrees', (part, to) => (part.turn = THREE.MathUtils.degToRad(to)));
@@ -31,7 +32,7 @@ export class HidingPanel {
     }
     gizmo.onModeChange = () => this.showMode();
     const three = (fields: typeof this.middle) => element('div', 'three', ...fields.map(({ label }) => label));
-    this.details.append(modes, three(this.middle), three(this.size), three([this.turn]));
+    this.details.append(this.name.label, modes, three(this.middle), three(this.size), three([this.turn]));
     this.add.addEventListener('click', askForPlace);
     this.body.append(this.hint, this.list, this.details, element('div', 'row', this.add));
     parts.onChange.add(() => this.show());
@@ -42,34 +43,36 @@ export class HidingPanel {
 
   // While it is asked for a place.
   asks(isAsking: boolean): void {
-    this.add.textContent = isAsking ? 'Click a place in the city' : 'Hide a part…';
+    this.add.textContent = isAsking ? 'Choose a place in the city' : 'Hide a part…';
     this.add.classList.toggle('on', isAsking);
   }
 
   private show(): void {
     const { list, selected, isFull } = this.parts;
-    // The list is made anew only where it differs, so that a button keeps the keyboard's focus.
+    // The list is made anew only where it differs, so that a button that is pressed meanwhile stays.
     const now = JSON.stringify(list.map((box) => [box.id, box.name, box.hides, box === selected]));
-    if (now !== this.shown) this.list.replaceChildren(...list.map((box) => this.row(box)));
+    if (now !== this.shown) replaceRows(this.list, list.map((box) => this.row(box)));
     this.shown = now;
     this.list.hidden = list.length === 0;
     this.add.disabled = isFull;
     this.add.title = isFull ? 'There can be no more of them' : '';
     this.details.hidden = !selected;
     if (!selected) return;
-    const { middle, size, turn } = selected.part;
+    const { name, middle, size, turn } = selected.part;
+    this.name.set(name);
     this.middle.forEach(({ set }, i) => set(middle[i]));
     this.size.forEach(({ set }, i) => set(size[i]));
     this.turn.set(THREE.MathUtils.radToDeg(turn));
   }
 
   private showMode(): void {
-    this.modes.forEach((button, mode) => button.classList.toggle('on', mode === this.gizmo.mode));
+    showPressed(this.modes, this.gizmo.mode);
   }
 
   private row(box: HiddenBox): HTMLElement {
     const { parts } = this;
     const name = element('button', 'plain name', box.name);
+    name.setAttribute('aria-pressed', String(box === parts.selected));
     name.addEventListener('click', () => parts.select(box === parts.selected ? undefined : box));
     const row = element('li', box === parts.selected ? 'on' : '', name,
       iconButton(box.hides ? 'Show' : 'Hide', box.name, 'eye', () => {
@@ -82,13 +85,15 @@ export class HidingPanel {
   }
 
   private field(name: string, change: (part: HiddenPart, to: number) => void) {
-    return numberField(name, 0.1, 2, (to) => {
-      const { selected } = this.parts;
-      if (!selected) return;
-      const { part } = selected;
-      change(part, to);
-      selected.part = part;
-      this.parts.changed();
-    }, () => this.show());
+    return numberField(name, 0.1, 2, (to) => this.change((part) => change(part, to)), () => this.show());
+  }
+
+  private change(how: (part: HiddenPart) => void): void {
+    const { selected } = this.parts;
+    if (!selected) return;
+    const { part } = selected;
+    how(part);
+    selected.part = part;
+    this.parts.changed();
   }
 }

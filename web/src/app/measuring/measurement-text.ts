@@ -5,6 +5,19 @@ import { areaFigures, corner, lineFigures, middle, type Kind, type Measurement }
 
 export const kKindNames: Record<Kind, string> = { place: 'Place', distance: 'Distance', height: 'Height', area: 'Area' };
 
+// What to do next.
+export function hintOf(kind: Kind, isTouch: boolean): string {
+  const click = isTouch ? 'Tap' : 'Click';
+  const end = isTouch ? 'Done ends' : 'double click ends';
+  const hints: Record<Kind, string> = {
+    place: `${click} on a place.`,
+    distance: `${click} along it; ${end}.`,
+    height: `${click} below, then above.`,
+    area: `${click} around it; ${end}.`,
+  };
+  return hints[kind];
+}
+
 export type Row = [name: string, value: string];
 
 // A label in the world.

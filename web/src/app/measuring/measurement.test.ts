@@ -4,7 +4,7 @@ import { OpaqueDepth } from '../../draw/opaque-depth';
 import type { Vec3 } from '../../tiles/tileset';
 import { GroundFrame } from './geodesy';
 import { areaFigures, areaVector, corner, lineFigures, onPlane, type Measurement } from './measurement';
-import { fileOf, headline, labelsOf, rowsOf } from './measurement-text';
+import { fileOf, headline, hintOf, labelsOf, rowsOf } from './measurement-text';
 import { MeasuringMarks } from './measuring-marks';
 
 const identity = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
@@ -111,6 +111,14 @@ describe('what is said of measurements', () => {
     const { extension, text } = fileOf([line], nowhere);
     expect(extension).toBe('json');
     expect(JSON.parse(text).measurements[0]).toMatchObject({ kind: 'distance', length: 8, places: [[0, 0, 0], [0, 0, 3], [4, 0, 0]] });
+  });
+});
+
+describe('what to do next', () => {
+  it('is said for what people point with', () => {
+    expect(hintOf('distance', false)).toBe('Click along it; double click ends.');
+    expect(hintOf('area', true)).toBe('Tap around it; Done ends.');
+    expect(hintOf('place', true)).toBe('Tap on a place.');
   });
 });
 

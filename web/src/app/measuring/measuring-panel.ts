@@ -1,6 +1,6 @@
 // What the measuring tool says and asks.
 import { element } from '../page/element';
-import { icon } from '../page/icons';
+import { iconButton, replaceRows, showPressed } from '../page/fields';
 import { kKinds, type Kind } from './measurement';
 import { kKindNames, type Row } from './measurement-text';
 
@@ -24,6 +24,8 @@ function button(text: string, onClick: () => void): HTMLButtonElement {
 export class MeasuringPanel {
   readonly element: HTMLElement;
   onKind: (kind: Kind) => void = () => {};
+  onDone: () => void = () => {};
+  onUndo: () => void = () => {};
   onCopy: () => void = () => {};
   onChoose: (index: number) => void = () => {};
   onDelete: (index: number) => void = () => {};
@@ -31,6 +33,9 @@ export class MeasuringPanel {
   onDownload: () => void = () => {};
   private readonly kinds = new Map<Kind, HTMLButtonElement>();
   private readonly hint = element('p', 'faint');
+  private readonly undo = button('Undo', () => this.onUndo());
+  private readonly done = button('Done', () => this.onDone());
+  private readonly steps = element('div', 'steps', this.undo, this.done);
   private readonly figures = element('dl', 'figures');
   private readonly place = element('dl');
   private readonly copy = button('Copy', () => this.onCopy());
@@ -41,22 +46,31 @@ export class MeasuringPanel {
   // `units`: what lengths are in, where they are not metres.
   constructor(units: string) {
     for (const kind of kKinds) this.kinds.set(kind, button(kKindNames[kind], () => this.onKind(kind)));
+    this.undo.title = 'Take back the last place (Backspace)';
+    this.done.title = 'End it (Enter)';
+    const choice = element('div', 'choice', ...this.kinds.values());
+    choice.setAttribute('role', 'group');
+    choice.setAttribute('aria-label', 'What to measure');
     const download = button('Download', () => this.onDownload());
     const deleteAll = button('Delete all', () => this.onDeleteAll());
     this.listPart = element('div', 'part', element('h3', '', 'Kept'), this.list, element('div', 'row', download, deleteAll));
     this.element = element(
-      'div', 'measure', element('div', 'choice', ...this.kinds.values()), this.hint, this.figures, this.placePart, this.listPart);
+      'div', 'measure', choice, element('div', 'task', this.hint, this.steps), this.figures, this.placePart, this.listPart);
     if (units !== '') this.element.append(element('p', 'faint part', units));
     this.showPlace([]);
     this.showKept([]);
   }
 
-  showKind(kind: Kind, hint: string): void {
-    this.kinds.forEach((one, name) => {
-      one.classList.toggle('on', name === kind);
-      one.setAttribute('aria-pressed', String(name === kind));
-    });
+  // `isEnough`: what is begun can be ended.
+  showTask(kind: Kind, hint: string, isBegun: boolean, isEnough: boolean): void {
+    showPressed(this.kinds, kind);
     this.hint.textContent = hint;
+    // A button that goes leaves the keyboard's focus to what is there.
+    const { activeElement } = document;
+    const goes = (activeElement === this.undo && !isBegun) || (activeElement === this.done && !isEnough);
+    this.done.disabled = !isEnough;
+    this.steps.hidden = !isBegun;
+    if (goes) (isBegun ? this.undo : this.kinds.get(kind)!).focus();
   }
 
   showFigures(rows: readonly Row[]): void {
@@ -75,13 +89,11 @@ export class MeasuringPanel {
 
   showKept(kept: readonly Kept[]): void {
     this.listPart.hidden = kept.length === 0;
-    this.list.replaceChildren(...kept.map(({ name, figure, isChosen }, i) => {
+    replaceRows(this.list, kept.map(({ name, figure, isChosen }, i) => {
       const choose = element('button', isChosen ? 'one on' : 'one', element('span', '', name), element('span', 'figure', figure));
       choose.addEventListener('click', () => this.onChoose(i));
-      const remove = element('button', 'plain', icon('close'));
-      remove.setAttribute('aria-label', `Delete ${name} ${figure}`);
-      remove.addEventListener('click', () => this.onDelete(i));
-      return element('li', '', choose, remove);
+      choose.setAttribute('aria-pressed', String(isChosen));
+      return element('li', '', choose, iconButton('Delete', `${name} ${figure}`, 'close', () => this.onDelete(i)));
     }));
   }
 }

@@ -2,24 +2,18 @@
 import type { Vec3 } from '../../tiles/tileset';
 import { GroundFrame } from './geodesy';
 import { kLeastPlaces, kMostPlaces, type Kind, type Measurement } from './measurement';
-import { fileOf, headline, kKindNames, labelsOf, placeNumbers, placeRows, rowsOf } from './measurement-text';
+import { fileOf, headline, hintOf, kKindNames, labelsOf, placeNumbers, placeRows, rowsOf } from './measurement-text';
 import { MeasuringLabels } from './measuring-labels';
 import { MeasuringMarks } from './measuring-marks';
 import { MeasuringPanel } from './measuring-panel';
 import { copyText, download, fileName } from '../page/page-files';
+import { pointsByTouch } from '../page/pointing';
 import { isTyping, type Shortcuts } from '../page/shortcuts';
 import type { Toolbar } from '../page/toolbar';
 import type { Viewer } from '../viewer';
 
 const kNear = 7; // pixels within which a click is on a place
 const kAgain = 400; // ms within which a click on the same pixels is half of a double click
-
-const kHints: Record<Kind, string> = {
-  place: 'Click on a place.',
-  distance: 'Click along it; double click ends.',
-  height: 'Click below, then above.',
-  area: 'Click around it; double click ends.',
-};
 
 interface Pointer {
   clientX: number;
@@ -60,6 +54,8 @@ export class Measuring {
     this.panel = new MeasuringPanel(
       this.frame.isGeoreferenced ? '' : 'This capture has no scale: lengths are in its own units, not in metres.');
     this.panel.onKind = (kind) => this.choose(kind);
+    this.panel.onDone = () => this.end();
+    this.panel.onUndo = () => this.takeBack();
     this.panel.onCopy = () => void this.copy();
     this.panel.onChoose = (index) => {
       this.chosen = this.kept[index];
@@ -132,7 +128,7 @@ export class Measuring {
 
   // Whether a click on the last place, or around an area on the first, ends it.
   private isOnAnEnd({ clientX, clientY }: Pointer): boolean {
-    if (this.places.length < kLeastPlaces[this.kind]) return false;
+    if (!this.isEnough) return false;
     const { left, top } = this.viewer.canvas.getBoundingClientRect();
     const ends = this.kind === 'area' ? [this.places[0], this.places.at(-1)!] : [this.places.at(-1)!];
     return ends.some((place) => {
@@ -141,9 +137,14 @@ export class Measuring {
     });
   }
 
+  // What is begun can be ended.
+  private get isEnough(): boolean {
+    return this.places.length >= kLeastPlaces[this.kind];
+  }
+
   // Keeps what is begun, if it is enough.
   private end(): void {
-    if (this.places.length < kLeastPlaces[this.kind]) return;
+    if (!this.isEnough) return;
     this.chosen = { kind: this.kind, places: this.places };
     this.kept.push(this.chosen);
     this.places = [];
@@ -169,7 +170,7 @@ export class Measuring {
     // What is begun has its figure at the pointer.
     const segments = begun.flatMap((one) => labelsOf(one, this.frame)).filter(({ isMinor }) => isMinor);
     this.labels.show([...labels, ...segments]);
-    this.panel.showKind(this.kind, kHints[this.kind]);
+    this.panel.showTask(this.kind, hintOf(this.kind, pointsByTouch()), begun.length > 0, this.isEnough);
     this.panel.showKept(this.kept.map((one) => ({
       name: kKindNames[one.kind], figure: headline(one, this.frame), isChosen: one === this.chosen && begun.length === 0,
     })));

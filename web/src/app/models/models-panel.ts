@@ -1,10 +1,10 @@
 // The list of models, and where the selected one stands, in numbers.
 import * as THREE from 'three';
 import { element } from '../page/element';
-import { iconButton, numberField } from '../page/fields';
+import { iconButton, nameField, numberField, replaceRows, showPressed } from '../page/fields';
 import type { GroundFrame } from '../measuring/geodesy';
 import { kGizmoModes, type GizmoMode, type ModelGizmo } from './model-gizmo';
-import { scaledWithin } from '../world/world-fields';
+import { kNameLength, scaledWithin } from '../world/world-fields';
 import { placeOf, setPlace } from './model-place';
 import type { Models, PlacedModel } from './models';
 
@@ -21,6 +21,7 @@ export class ModelsPanel {
   private readonly hint = element('p', 'faint', 'Drop a model onto the city: glTF, OBJ or FBX, with its textures, or a saved world.');
   private readonly list = element('ul');
   private readonly details = element('div', 'details');
+  private readonly name = nameField(kNameLength, (to) => this.change((model) => (model.name = to)), () => this.show());
   private readonly place = ['x', 'y', 'z, up'].map((axis, i) => numberField(axis, 0.1, 2, (to) => this.setPosition(i, to), () => this.show()));
   private readonly turn = numberField('Turn, degrees', 1, 1, (to) => this.setTurn(to), () => this.show());
   private readonly scale = numberField('Scale', 0.1, 4, (to) => this.setScale(to), () => this.show());
@@ -49,7 +50,7 @@ export class ModelsPanel {
     this.put.addEventListener('click', () => models.selected && actions.place(models.selected));
     const three = element('div', 'three', ...this.place.map(({ label }) => label));
     const two = element('div', 'three', this.turn.label, this.scale.label);
-    this.details.append(modes, three, two, this.size, this.playing, element('div', 'row', this.put));
+    this.details.append(this.name.label, modes, three, two, this.size, this.playing, element('div', 'row', this.put));
     const add = element('button', '', 'Add…');
     add.addEventListener('click', () => actions.add());
     this.save.addEventListener('click', () => actions.save(false));
@@ -63,7 +64,7 @@ export class ModelsPanel {
 
   // While it is asked for a place.
   asks(isAsking: boolean): void {
-    this.put.textContent = isAsking ? 'Click a place in the city' : 'Put on a place…';
+    this.put.textContent = isAsking ? 'Choose a place in the city' : 'Put on a place…';
     this.put.classList.toggle('on', isAsking);
   }
 
@@ -71,9 +72,9 @@ export class ModelsPanel {
 
   private show(): void {
     const { list, selected } = this.models;
-    // The list is made anew only where it differs, so that a button keeps the keyboard's focus.
+    // The list is made anew only where it differs, so that a button that is pressed meanwhile stays.
     const now = JSON.stringify(list.map((model) => [model.id, model.name, model.visible, model === selected]));
-    if (now !== this.shown) this.list.replaceChildren(...list.map((model) => this.row(model)));
+    if (now !== this.shown) replaceRows(this.list, list.map((model) => this.row(model)));
     this.shown = now;
     this.hint.hidden = list.length > 0;
     this.list.hidden = list.length === 0;
@@ -81,6 +82,7 @@ export class ModelsPanel {
     this.saveAll.title = this.fileSize();
     this.details.hidden = !selected;
     if (!selected) return;
+    this.name.set(selected.name);
     const { position } = placeOf(selected, new THREE.Vector3());
     this.place.forEach(({ set }, i) => set(position[i]));
     this.turn.set(THREE.MathUtils.radToDeg(eulerOf(selected).y));
@@ -97,12 +99,13 @@ export class ModelsPanel {
   }
 
   private showMode(): void {
-    this.modes.forEach((button, mode) => button.classList.toggle('on', mode === this.gizmo.mode));
+    showPressed(this.modes, this.gizmo.mode);
   }
 
   private row(model: PlacedModel): HTMLElement {
     const { models } = this;
     const name = element('button', 'plain name', model.name);
+    name.setAttribute('aria-pressed', String(model === models.selected));
     name.addEventListener('click', () => models.select(model === models.selected ? undefined : model));
     const show = iconButton(model.visible ? 'Hide' : 'Show', model.name, 'eye', () => {
       model.visible = !model.visible;

@@ -1,4 +1,5 @@
 // Buttons for how people move.
+import { showPressed } from '../page/fields';
 import { kModes, type NavigationMode } from './navigation';
 import type { Shortcuts } from '../page/shortcuts';
 import type { Toolbar } from '../page/toolbar';
@@ -21,9 +22,6 @@ export function addNavigationTools({ navigation }: Viewer, toolbar: Toolbar, sho
     const button = toolbar.add({ name: kNames[mode], key: kKeys[mode], icon: mode, opened: () => (navigation.mode = mode) });
     buttons.set(mode, button);
   }
-  navigation.onModeChange = (mode) => buttons.forEach((button, one) => {
-    button.classList.toggle('on', one === mode);
-    button.setAttribute('aria-pressed', String(one === mode));
-  });
+  navigation.onModeChange = (mode) => showPressed(buttons, mode);
   navigation.onModeChange(navigation.mode);
 }

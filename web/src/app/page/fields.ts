@@ -1,28 +1,47 @@
-// Parts of panels: numbers to type, small buttons in rows of a list, one of several.
+// Parts of panels: numbers and names to type, small buttons in rows of a list.
 import { element } from './element';
 import { icon, type IconName } from './icons';
 
 const kLargest = 1e7;
 
-export interface NumberField {
+export interface Field<T> {
   label: HTMLLabelElement;
-  set(value: number): void; // but while it is typed into
+  set(value: T): void; // but while it is typed into
 }
 
 // `done`: it has been left, and may hold what is no number.
-export function numberField(name: string, step: number, digits: number, change: (to: number) => void, done: () => void): NumberField {
+export function numberField(name: string, step: number, digits: number, change: (to: number) => void, done: () => void): Field<number> {
   const input = element('input');
   input.type = 'number';
   input.step = String(step);
   input.addEventListener('input', () => {
     if (Number.isFinite(input.valueAsNumber) && Math.abs(input.valueAsNumber) < kLargest) change(input.valueAsNumber);
   });
-  input.addEventListener('keydown', ({ key }) => {
-    if (key === 'Enter' || key === 'Escape') input.blur();
+  return field(name, input, (value) => String(Number(value.toFixed(digits)) + 0), done);
+}
+
+// A name of so many letters. What is typed holds at once; where nothing is left, and after Escape, the one before does.
+export function nameField(most: number, change: (to: string) => void, done: () => void): Field<string> {
+  const input = element('input');
+  input.maxLength = most;
+  input.autocomplete = 'off';
+  let before = '';
+  input.addEventListener('focus', () => (before = input.value));
+  input.addEventListener('input', () => change(input.value.trim() || before));
+  input.addEventListener('keydown', ({ key, isComposing }) => {
+    if (key === 'Escape' && !isComposing) change(before);
+  });
+  return field('Name', input, (value) => value, done);
+}
+
+// Enter and Escape leave it.
+function field<T>(name: string, input: HTMLInputElement, textOf: (value: T) => string, done: () => void): Field<T> {
+  input.addEventListener('keydown', ({ key, isComposing }) => {
+    if ((key === 'Enter' || key === 'Escape') && !isComposing) input.blur();
   });
   input.addEventListener('blur', done);
-  const set = (value: number) => {
-    if (document.activeElement !== input) input.value = String(Number(value.toFixed(digits)) + 0);
+  const set = (value: T) => {
+    if (document.activeElement !== input) input.value = textOf(value);
   };
   return { label: element('label', 'field', name, input), set };
 }
@@ -34,4 +53,22 @@ export function iconButton(what: string, of: string, picture: IconName, act: () 
   made.setAttribute('aria-label', `${what}: ${of}`);
   made.addEventListener('click', act);
   return made;
+}
+
+// Which one of several buttons is pressed.
+export function showPressed<T>(buttons: ReadonlyMap<T, HTMLButtonElement>, pressed: T): void {
+  buttons.forEach((button, one) => {
+    button.classList.toggle('on', one === pressed);
+    button.setAttribute('aria-pressed', String(one === pressed));
+  });
+}
+
+// The rows of a list, made anew: the keyboard's focus stays in its row, on the same button.
+export function replaceRows(list: HTMLElement, rows: readonly HTMLElement[]): void {
+  const buttons = (row: Element) => [...row.querySelectorAll('button')];
+  const { activeElement } = document;
+  const row = [...list.children].findIndex((one) => one.contains(activeElement));
+  const button = row < 0 ? -1 : buttons(list.children[row]).indexOf(activeElement as HTMLButtonElement);
+  list.replaceChildren(...rows);
+  if (button >= 0 && rows.length > 0) buttons(rows[Math.min(row, rows.length - 1)])[button]?.focus();
 }

@@ -3,6 +3,7 @@ import type { SceneError } from '../../scene-error';
 import type { SceneStatistics } from '../../scene';
 import type { Frame } from '../viewer';
 import { element } from './element';
+import { FrameRate, inDigits } from './frame-rate';
 
 export function megabytes(bytes: number): string {
   return bytes < 1e6 ? `${Math.round(bytes / 1e3)} kB` : `${(bytes / 1e6).toFixed(bytes < 1e7 ? 1 : 0)} MB`;
@@ -78,17 +79,16 @@ function titleOf({ what, place }: SceneError): string {
   return place === '' ? what : `${what}, ${place}`;
 }
 
-function inDigits(x: number): string {
-  return x.toFixed(x < 10 ? 1 : 0);
-}
-
 export class StatisticsPanel {
   private readonly list = element('dl');
+  private readonly frame = element('dd', '', 'at rest');
+  private readonly rate = new FrameRate((text) => (this.frame.textContent = text));
   private readonly panel = element('div', 'glass statistics', this.list);
 
   constructor(parent: HTMLElement) {
     this.panel.hidden = true;
     parent.append(this.panel);
+    document.addEventListener('visibilitychange', () => this.rate.rest()); // there are no animation frames out of sight
   }
 
   toggle(): void {
@@ -97,8 +97,8 @@ export class StatisticsPanel {
 
   show(statistics: SceneStatistics, { milliseconds, gpuMilliseconds, resolutionScale }: Frame): void {
     if (this.panel.hidden) return;
+    this.rate.drew(milliseconds);
     const rows: [string, string][] = [
-      ['Frame', `${inDigits(milliseconds)} ms, ${inDigits(1000 / milliseconds)} fps`],
       ['Drawing', gpuMilliseconds === undefined ? 'not told' : `${inDigits(gpuMilliseconds)} ms`],
       ['Resolution', `${Math.round(100 * resolutionScale)} %`],
       ['Graphics card', megabytes(statistics.cardBytes + statistics.targetBytes)],
@@ -108,6 +108,7 @@ export class StatisticsPanel {
       ...(statistics.refused > 0 ? [['No room for', `${statistics.refused} blocks`] satisfies [string, string]] : []),
       ...statistics.drawn.map((count, level): [string, string] => [`Blocks of level ${level}`, String(count)]),
     ];
-    this.list.replaceChildren(...rows.flatMap(([name, value]) => [element('dt', '', name), element('dd', '', value)]));
+    const list = rows.flatMap(([name, value]) => [element('dt', '', name), element('dd', '', value)]);
+    this.list.replaceChildren(element('dt', '', 'Frame'), this.frame, ...list);
   }
 }

@@ -22,6 +22,7 @@ export class Toolbar {
     private readonly shortcuts: Shortcuts,
   ) {
     this.bar.setAttribute('role', 'toolbar');
+    this.bar.setAttribute('aria-label', 'Tools');
     parent.append(this.bar);
     shortcuts.add('escape', 'Close what is open', () => this.open(undefined));
   }
@@ -38,6 +39,7 @@ export class Toolbar {
     close.setAttribute('aria-label', 'Close');
     close.addEventListener('click', () => this.open(undefined));
     const panel = element('section', 'glass side', element('header', '', element('h2', '', tool.name), close), tool.panel);
+    panel.setAttribute('aria-label', tool.name);
     panel.hidden = true;
     this.parent.append(panel);
     button.setAttribute('aria-expanded', 'false');

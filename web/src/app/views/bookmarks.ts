@@ -2,11 +2,13 @@
 import { cameraPath } from './camera-path';
 import { download, fileName } from '../page/page-files';
 import { element } from '../page/element';
-import { icon } from '../page/icons';
+import { iconButton, nameField, replaceRows } from '../page/fields';
 import type { Toolbar } from '../page/toolbar';
 import { formatView, parseView, type View } from './view-address';
 import type { Viewer } from '../viewer';
 import { kMost } from '../world/world-file';
+
+const kLetters = 80; // of a name
 
 export interface Bookmark {
   name: string;
@@ -21,7 +23,7 @@ export function readBookmarks(text: string | null): Bookmark[] {
     return kept.slice(0, kMost.bookmarks).flatMap((one: unknown) => {
       const { name, view } = (one ?? {}) as { name?: unknown; view?: unknown };
       const found = typeof view === 'string' ? parseView(view) : undefined;
-      return found ? [{ name: typeof name === 'string' ? name.slice(0, 80) : 'View', view: found }] : [];
+      return found ? [{ name: typeof name === 'string' ? name.slice(0, kLetters) : 'View', view: found }] : [];
     });
   } catch {
     return [];
@@ -34,9 +36,10 @@ export function writeBookmarks(bookmarks: Bookmark[]): string {
 
 // The views of this browser, for this scene, and those of the world that is open.
 export class Bookmarks {
-  readonly onChange = new Set<() => void>();
+  readonly onChange = new Set<() => void>(); // of the list, of what is selected
   private kept: Bookmark[];
   private ofWorld: Bookmark[] = [];
+  private chosen: Bookmark[] = []; // and what is the same of this browser, which is not listed
 
   constructor(private readonly key: string) {
     this.kept = readBookmarks(read(key));
@@ -52,9 +55,28 @@ export class Bookmarks {
     return this.ofWorld.includes(bookmark);
   }
 
+  get selected(): Bookmark | undefined {
+    return this.list.find((one) => this.chosen.includes(one));
+  }
+
+  select(bookmark: Bookmark | undefined): void {
+    const same = this.kept.filter((one) => bookmark && this.isOfWorld(bookmark) && textOf(one) === textOf(bookmark));
+    this.chosen = bookmark ? [bookmark, ...same] : [];
+    this.changed();
+  }
+
+  // The selected one.
+  rename(name: string): void {
+    for (const one of this.chosen) one.name = name.slice(0, kLetters);
+    this.change(this.kept, this.ofWorld);
+  }
+
+  // And selects it.
   keep(view: View): void {
     const last = this.list.map(({ name }) => Number(/^View (\d+)$/.exec(name)?.[1] ?? 0));
-    this.change([...this.kept, { name: `View ${Math.max(0, ...last) + 1}`, view }].slice(-kMost.bookmarks), this.ofWorld);
+    const bookmark = { name: `View ${Math.max(0, ...last) + 1}`, view };
+    this.chosen = [bookmark];
+    this.change([...this.kept, bookmark].slice(-kMost.bookmarks), this.ofWorld);
   }
 
   remove(bookmark: Bookmark): void {
@@ -71,6 +93,10 @@ export class Bookmarks {
     this.kept = kept;
     this.ofWorld = ofWorld;
     write(this.key, writeBookmarks(kept));
+    this.changed();
+  }
+
+  private changed(): void {
     for (const tell of this.onChange) tell();
   }
 }
@@ -90,26 +116,35 @@ export function addBookmarks(viewer: Viewer, bookmarks: Bookmarks, toolbar: Tool
   const path = element('button', '', 'Save camera path');
   path.title = 'A flight through these views, for tessera render --path or nerfstudio';
   const hint = element('p', 'faint', 'Kept in this browser, and in a world that is saved.');
-  const panel = element('div', 'views', list, element('div', 'row', keep, path), hint);
+  const name = nameField(kLetters, (to) => bookmarks.rename(to), () => showName());
+  const details = element('div', 'details', name.label);
+  const panel = element('div', 'views listed', element('div', 'row', keep, path), list, details, hint);
 
+  const row = (bookmark: Bookmark) => {
+    const isSelected = bookmark === bookmarks.selected;
+    const go = element('button', 'plain name', bookmark.name);
+    go.setAttribute('aria-current', String(isSelected));
+    go.addEventListener('click', () => {
+      bookmarks.select(bookmark);
+      viewer.flyTo(bookmark.view);
+    });
+    const ofWorld = bookmarks.isOfWorld(bookmark) ? [element('span', 'faint', 'world')] : [];
+    const remove = iconButton('Remove', bookmark.name, 'close', () => bookmarks.remove(bookmark));
+    return element('li', isSelected ? 'on' : '', go, ...ofWorld, remove);
+  };
+  const showName = () => name.set(bookmarks.selected?.name ?? '');
   const show = () => {
     path.disabled = bookmarks.list.length < 2;
-    list.replaceChildren(...bookmarks.list.map((bookmark) => {
-      const go = element('button', 'link', bookmark.name);
-      go.addEventListener('click', () => viewer.flyTo(bookmark.view));
-      const remove = element('button', 'plain', icon('close'));
-      remove.setAttribute('aria-label', `Remove ${bookmark.name}`);
-      remove.addEventListener('click', () => bookmarks.remove(bookmark));
-      const ofWorld = bookmarks.isOfWorld(bookmark) ? [element('span', 'faint', 'world')] : [];
-      return element('li', '', go, ...ofWorld, remove);
-    }));
+    replaceRows(list, bookmarks.list.map(row));
+    details.hidden = !bookmarks.selected;
+    showName();
   };
   bookmarks.onChange.add(show);
   keep.addEventListener('click', () => bookmarks.keep(viewer.view));
   path.addEventListener('click', () =>
     download(fileName(`${city.name}-camera-path`, 'json'), cameraPath(bookmarks.list.map(({ view }) => view), city.tileset)));
   show();
-  toolbar.add({ name: 'Views', key: 'b', icon: 'bookmark', panel });
+  toolbar.add({ name: 'Views', key: 'b', icon: 'bookmark', panel, closed: () => bookmarks.select(undefined) });
 }
 
 // The browser may keep nothing for pages (private windows, full disks).
