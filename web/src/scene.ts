@@ -30,6 +30,7 @@ import type { VolumeContent } from './tiles/volume-content';
 import { VolumeSource } from './volume-source';
 
 const kTilesetBytes = 1 << 24;
+const kFarAway = 1e30; // scene units
 const kPrefetchTime = 30; // ms for uploads, while nothing is drawn
 
 export interface SceneOptions {
@@ -74,6 +75,8 @@ export class TesseraScene extends THREE.Object3D {
   // object's frame.
   hidden: THREE.Matrix4[] = [];
   showsSurround = true; // false: nothing outside of `bounds` is drawn
+  // How far one sees beyond `bounds`, in diagonals of these: what lies farther fades into what is behind.
+  visibility = Infinity;
   neighbours: Neighbours = { behind: [], boxes: [] };
   // Of tiles that cannot be had, and of a budget that is too small; told once each.
   onError: (error: SceneError) => void = () => {};
@@ -125,8 +128,12 @@ export class TesseraScene extends THREE.Object3D {
 
   // The box of what was captured, in this object's frame.
   get bounds(): THREE.Box3 {
+    return this.boxInScene.applyMatrix4(this.localFromScene);
+  }
+
+  private get boxInScene(): THREE.Box3 {
     const { low, high } = this.tileset.box;
-    return new THREE.Box3(new THREE.Vector3(...low), new THREE.Vector3(...high)).applyMatrix4(this.localFromScene);
+    return new THREE.Box3(new THREE.Vector3(...low), new THREE.Vector3(...high));
   }
 
   // What is behind everything.
@@ -177,6 +184,8 @@ export class TesseraScene extends THREE.Object3D {
     const inScene = (boxes: readonly THREE.Matrix4[]) => boxes.map((box) => sceneFromLocal.clone().multiply(box));
     compositor.hide(inScene(this.hidden), inScene(this.neighbours.boxes), !this.showsSurround);
     compositor.draw(renderer, pictures, worldFromScene, contents, depth);
+    const diagonal = this.boxInScene.getSize(new THREE.Vector3()).length();
+    mesh.material.uniforms.visibility.value = Math.min(this.visibility * diagonal, kFarAway);
     mesh.renderOrder = kFirstRenderOrder + this.neighbours.behind.length;
     mesh.visible = contents.some((ofOne) => ofOne.length > 0);
   }
@@ -255,7 +264,7 @@ export class TesseraScene extends THREE.Object3D {
       const source = new VolumeSource(this.tree, this.files, this.pool, this.compositor, renderer);
       this.streamer = new TileStreamer(new TileSelector(this.tree, this.selection), source, this.stream);
       this.streamer.onError = (error) => this.onError(error);
-      this.mesh = cityMesh(this.compositor);
+      this.mesh = cityMesh(this.compositor, this.boxInScene);
       this.add(this.mesh);
       this.canvas = renderer.domElement;
       this.canvas.addEventListener('webglcontextlost', this.onContextLost);

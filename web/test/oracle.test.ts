@@ -81,4 +81,23 @@ describe.skipIf(missing())('the browser', () => {
     expect(await page.evaluate(() => plain.pixels())).toBe(before);
     await page.close();
   });
+
+  it('lets what lies far beyond what was captured fade into what is behind', async () => {
+    const said: string[] = [];
+    const page = await openPlain(browser, server, said);
+    await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
+    const look = async (change: () => void) => {
+      await page.evaluate(change);
+      await page.evaluate((view) => plain.settle(view), views[0]);
+      return new Uint8Array(Buffer.from(await page.evaluate(() => plain.pixels()), 'base64'));
+    };
+    const whole = await look(() => {});
+    const faded = await look(() => (plain.city!.visibility = 1e-3));
+    const alone = await look(() => (plain.city!.showsSurround = false));
+    const changed = (a: Uint8Array, b: Uint8Array) => a.filter((value, i) => Math.abs(value - b[i]) > 4).length / a.length;
+    expect(changed(whole, alone)).toBeGreaterThan(0.1);
+    expect(changed(faded, alone)).toBeLessThan(0.05);
+    expect(said).toEqual([]);
+    await page.close();
+  });
 });

@@ -73,6 +73,8 @@ describe.skipIf(missing())('the viewer', () => {
         await file.saveAs(path);
         return path;
       };
+      await page.keyboard.press('c');
+      await page.getByLabel('Beyond what was captured').selectOption('As it was made up');
       await page.keyboard.press('b');
       await page.click('text=Keep this view');
       await page.keyboard.press('w', { delay: 300 });

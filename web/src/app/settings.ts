@@ -27,6 +27,8 @@ export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
     slider('Error at most', 0, 3, Math.log2(2 * city.selection.mostPixels), 0.25, (x) => `${(2 ** x / 2).toPrecision(2)} px`,
       changed((x) => scenes.forEach(({ selection }) => (selection.mostPixels = 2 ** x / 2)))),
     ...(levels.length > 1 ? [choice('Detail', levels, changed((level) => scenes.forEach(({ selection }) => (selection.finestLevel = level))))] : []),
+    choice('Beyond what was captured', [['Fades into haze', city.visibility], ['As it was made up', Infinity]],
+      changed((visibility) => (city.visibility = visibility))),
     choice('Pixels', kResolutions, changed((share) => (resolution.fixed = share))),
     slider('Graphics memory', 6, 13, Math.log2(city.stream.cardBytes / 2 ** 20), 0.5, (x) => `${Math.round(2 ** x)} MiB`,
       changed((x) => (viewer.cardBytes = 2 ** x * 2 ** 20))),

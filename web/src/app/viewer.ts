@@ -22,6 +22,7 @@ export interface Mover {
   update(seconds: number): boolean; // once a frame; true where the camera has moved
 }
 
+const kVisibility = 1; // diagonals of what was captured
 const kBytesPerPixel = 37; // of a scene's pictures, and of the depth of what is opaque
 
 export class Viewer {
@@ -50,6 +51,7 @@ export class Viewer {
     this.world.background = city.background;
     this.world.add(city);
     this.scenes = [city];
+    city.visibility = kVisibility;
     this.stream = { ...city.stream };
     this.cardBudget = city.stream.cardBytes;
     this.navigation = new Navigation(this.camera, canvas, city.bounds, (event) => this.pickAt(event));
@@ -281,14 +283,14 @@ export class Viewer {
   }
 
   private watchClicks(): void {
-    const kSlack = 5; // pixels
+    const slack = (pointerType: string) => (pointerType === 'mouse' ? 5 : 10); // pixels
     let down: { x: number; y: number; id: number } | undefined;
     this.canvas.addEventListener('pointerdown', ({ clientX: x, clientY: y, pointerId: id, button, isPrimary }) => {
       down = button === 0 && isPrimary ? { x, y, id } : undefined;
     });
     this.canvas.addEventListener('pointerup', (event) => {
       const isClick =
-        down?.id === event.pointerId && Math.hypot(event.clientX - down.x, event.clientY - down.y) < kSlack;
+        down?.id === event.pointerId && Math.hypot(event.clientX - down.x, event.clientY - down.y) < slack(event.pointerType);
       down = undefined;
       // In flight a click with the mouse takes hold of the pointer, which then is nowhere.
       const isForFlight = this.navigation.mode === 'fly' && event.pointerType === 'mouse' && !this.navigation.isPointing;
