@@ -1,6 +1,6 @@
 // The scenes of a world, where there are several or one is not shown: which of them are.
 import { element } from '../page/element';
-import { iconButton } from '../page/fields';
+import { iconButton, replaceRows } from '../page/fields';
 import type { Viewer } from '../viewer';
 
 export function listedScenes<T extends { visible: boolean }>(scenes: readonly T[]): readonly T[] {
@@ -13,7 +13,7 @@ export function sceneList(viewer: Viewer): HTMLElement {
   const show = () => {
     const listed = listedScenes(viewer.scenes);
     body.hidden = listed.length === 0;
-    list.replaceChildren(...listed.map((scene) => {
+    replaceRows(list, listed.map((scene) => {
       const name = scene.name === '' ? 'Scene' : scene.name;
       const row = element('li', '', element('span', 'name', name), iconButton(scene.visible ? 'Hide' : 'Show', name, 'eye', () => {
         scene.visible = !scene.visible;
