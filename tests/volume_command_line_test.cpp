@@ -1,6 +1,7 @@
 // The program as people use it on large places: blocks, tiles, and what it says when something is wrong with them.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <csignal>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -209,6 +210,20 @@ TEST_F(VolumeCommandLine, BakesWithFewBlocksInMemory) {
   };
   EXPECT_NEAR(psnr(at("sparing")), psnr(scene()), 0.2);
   EXPECT_EQ(run({"bake", model(), at("never"), "--resident-blocks", "-1"}).exitCode, 2);
+}
+
+TEST_F(VolumeCommandLine, BakesAHazySkyOrTheBackgroundThatIsAskedFor) {
+  const auto background = [](const std::string& scene) {
+    const json tileset = json::parse(readTextFile(fs::path(scene) / "tileset.json"));
+    return tileset.at("extensions").at("TESSERA_scene").at("background").get<std::array<float, 3>>();
+  };
+  EXPECT_EQ(background(scene()), (std::array<float, 3>{0.74f, 0.8f, 0.86f}));
+  const Said said = run({"bake", model(), at("dusk"), "--stride", "16", "--background", "0.1", "0.25", "0.5"});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_EQ(background(at("dusk")), (std::array<float, 3>{0.1f, 0.25f, 0.5f}));
+  for (const char* wrong : {"1.5", "-1", "x"}) {
+    EXPECT_EQ(run({"bake", model(), at("never"), "--background", "0", "0", wrong}).exitCode, 2) << wrong;
+  }
 }
 
 TEST_F(VolumeCommandLine, LeavesTheOldSceneWholeWhenBakingIsKilled) {

@@ -35,9 +35,8 @@ void addBakeVerb(CLI::App& app) {
                    "blocks of the model in memory at once, besides a surround of its own; 0: all; default: as many as "
                    "in training")
       ->check(CLI::Range(0, 1 << 20));
-  verb->add_option("--background", flags->options.background, "red, green and blue where no photo looked")
-      ->capture_default_str()
-      ->expected(3)
+  verb->add_option("--background", flags->options.background,
+                   "red, green and blue where no photo looked; default: a hazy sky")
       ->check(CLI::Range(0.0, 1.0));
   verb->add_option("--effort", flags->options.effort, "of compression")->capture_default_str()->check(CLI::Range(0, 9));
   verb->add_flag("--json", flags->json, "print the result as one JSON object");

@@ -17,6 +17,7 @@ import { Compositor, type DrawnContent, type DrawnPart } from './draw/compositor
 import { kDisplayModes, type DisplayMode } from './draw/display-modes';
 import { OpaqueDepth } from './draw/opaque-depth';
 import { picturesOf, type Picture } from './draw/picture';
+import { kFarAway } from './draw/volume-material';
 import { tileView } from './picture-view';
 import { SceneError } from './scene-error';
 import { ServedFiles, type ContentFile, type SceneFiles } from './scene-files';
@@ -30,7 +31,7 @@ import type { VolumeContent } from './tiles/volume-content';
 import { VolumeSource } from './volume-source';
 
 const kTilesetBytes = 1 << 24;
-const kFarAway = 1e30; // scene units
+const kNearby = 1e-6; // scene units
 const kPrefetchTime = 30; // ms for uploads, while nothing is drawn
 
 export interface SceneOptions {
@@ -128,12 +129,8 @@ export class TesseraScene extends THREE.Object3D {
 
   // The box of what was captured, in this object's frame.
   get bounds(): THREE.Box3 {
-    return this.boxInScene.applyMatrix4(this.localFromScene);
-  }
-
-  private get boxInScene(): THREE.Box3 {
     const { low, high } = this.tileset.box;
-    return new THREE.Box3(new THREE.Vector3(...low), new THREE.Vector3(...high));
+    return new THREE.Box3(new THREE.Vector3(...low), new THREE.Vector3(...high)).applyMatrix4(this.localFromScene);
   }
 
   // What is behind everything.
@@ -179,13 +176,14 @@ export class TesseraScene extends THREE.Object3D {
     this.drawn = new Array<number>(this.tileset.levels).fill(0);
     for (const content of new Set(contentOf.values())) ++this.drawn[this.tree.tiles[content].level];
     compositor.view.minTransmittance.value = this.minTransmittance;
+    const { low, high } = this.tileset.box;
+    const diagonal = Math.hypot(...high.map((x, axis) => x - low[axis]));
+    compositor.view.visibility.value = Math.min(Math.max(this.visibility * diagonal, kNearby), kFarAway);
     compositor.view.display.value = kDisplayModes.indexOf(this.display);
     const sceneFromLocal = this.localFromScene.clone().invert();
     const inScene = (boxes: readonly THREE.Matrix4[]) => boxes.map((box) => sceneFromLocal.clone().multiply(box));
     compositor.hide(inScene(this.hidden), inScene(this.neighbours.boxes), !this.showsSurround);
     compositor.draw(renderer, pictures, worldFromScene, contents, depth);
-    const diagonal = this.boxInScene.getSize(new THREE.Vector3()).length();
-    mesh.material.uniforms.visibility.value = Math.min(this.visibility * diagonal, kFarAway);
     mesh.renderOrder = kFirstRenderOrder + this.neighbours.behind.length;
     mesh.visible = contents.some((ofOne) => ofOne.length > 0);
   }
@@ -264,7 +262,7 @@ export class TesseraScene extends THREE.Object3D {
       const source = new VolumeSource(this.tree, this.files, this.pool, this.compositor, renderer);
       this.streamer = new TileStreamer(new TileSelector(this.tree, this.selection), source, this.stream);
       this.streamer.onError = (error) => this.onError(error);
-      this.mesh = cityMesh(this.compositor, this.boxInScene);
+      this.mesh = cityMesh(this.compositor);
       this.add(this.mesh);
       this.canvas = renderer.domElement;
       this.canvas.addEventListener('webglcontextlost', this.onContextLost);

@@ -19,15 +19,17 @@ struct LevelContents {
   BakedLevel sizes;
 };
 
+constexpr std::array<float, 3> kHazySky = {0.74f, 0.8f, 0.86f}, kBlack = {0, 0, 0};
+
 Tileset emptyTileset(const VolumeModel& model, const Capture& capture, uint32_t levels,
-                     const std::array<float, 3>& background) {
+                     const BakeVolumeOptions& options) {
   Tileset tileset;
   tileset.representation = Representation::volume;
   tileset.name = fs::weakly_canonical(capture.root).filename().string();
   tileset.sourceFromWorld = capture.sourceFromWorld;
   tileset.georeference = capture.geo;
   tileset.near = model.space().near;
-  tileset.background = background;
+  tileset.background = options.background.value_or(model.config().randomBackground ? kHazySky : kBlack);
   tileset.levels = levels;
   placeOn(tileset, model.grid());
   return tileset;
@@ -132,7 +134,7 @@ BakedVolume bakeVolume(const LevelModels& models, uint32_t levels, const Capture
     ofLevel.stride <<= level;  // as many rays through its larger texels
     const std::unique_ptr<VolumeModel> model = models(level);
     if (level == 0) {
-      tileset = emptyTileset(*model, capture, levels, options.background);
+      tileset = emptyTileset(*model, capture, levels, options);
       if (model->config().literalEq3) {
         warn(
             "the model was trained with literal_eq3; scenes multiply the network's colour by the block's opacity, and "

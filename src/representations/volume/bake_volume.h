@@ -6,6 +6,7 @@
 #include <array>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "representations/volume/alive_texels.h"
 #include "representations/volume/volume_model.h"
@@ -19,7 +20,8 @@ struct BakeVolumeOptions {
   // What training photos see is kept: samples of their pixels whose weight in the picture and whose opacity over a
   // renderer's step are both above these.
   double minWeight = 0.005, minAlpha = 0.005;
-  std::array<float, 3> background = {0.74f, 0.8f, 0.86f};  // of the scene, where no photo looked: a hazy sky
+  // Of the scene, where no photo looked. Without: a hazy sky; black where training had nothing else behind the photos.
+  std::optional<std::array<float, 3>> background;
   int stride = 1;  // every so manieth pixel along rows and columns; of each coarser level twice as much
   int effort = 4;  // of compression, 0 to 9
   // Of a model that holds few blocks at a time, photos are done in parts.

@@ -62,11 +62,14 @@ double highestRise(const Capture& capture, const SceneFrame& frame) {
   for (const int photo : capture.photosIn(Split::train)) {
     const Camera& camera = capture.cameras[capture.photos[photo].camera];
     const int w = camera.width, h = camera.height;
+    const Pose& pose = capture.photos[photo].worldFromCamera;
     const auto look = [&](int x, int y) {
       const Vec2d middle(x + 0.5, y + 0.5);
-      highest = std::max(highest, riseOf(middle, camera, capture.photos[photo].worldFromCamera, frame));
+      highest = std::max(highest, riseOf(middle, camera, pose, frame));
     };
-    look(w / 2, h / 2);  // where the edges do not look highest, it is about here
+    const Vec3d up = pose.rotation.transpose() * (frame.rotation.transpose() * Vec3d::UnitZ());
+    const auto zenith = camera.pixelFromCamera(up);
+    if (zenith && zenith->x() >= 0 && zenith->y() >= 0 && zenith->x() <= w && zenith->y() <= h) return 1;
     const int stride = std::max(1, std::max(w, h) / kPixelsAlongEdge);
     for (int x = 0; x < w + stride; x += stride) {
       for (const int y : {0, h - 1}) look(std::min(x, w - 1), y);

@@ -67,13 +67,15 @@ export class Viewer {
     return { ...this.mover.look, fov: this.camera.fov };
   }
 
-  // At once; flyTo takes its time.
+  // At once; flyTo takes its time. Neither does anything while somebody else draws.
   set view({ eye, target, fov }: View) {
+    if (this.held) return;
     this.setLens(fov);
     this.mover.look = { eye, target };
   }
 
   flyTo({ eye, target, fov }: View): void {
+    if (this.held) return;
     this.setLens(fov);
     this.mover.flyTo({ eye, target });
   }
@@ -199,9 +201,9 @@ export class Viewer {
   // Has the loop wait, and the camera and what is seen stay, while somebody else draws.
   async whileHeld<T>(work: () => Promise<T>): Promise<T> {
     if (this.renderer.xr.isPresenting) throw new Error('a headset shows the scene; leave it first');
+    const still = this.still();
     this.held = true;
     this.navigation.enabled = false;
-    const still = this.still();
     try {
       return await work();
     } finally {

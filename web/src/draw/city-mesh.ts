@@ -20,8 +20,6 @@ uniform mat3 origin, ray;
 uniform mat4 clipFromScene;
 uniform sampler2D opaqueDepth;
 uniform int display;
-uniform vec3 boxMiddle, boxHalf;
-uniform float visibility;
 // From near, 0, over three more to far, 1.
 vec3 colourOfDistance(float x) {
   vec3 colour = mix(vec3(1.0, 0.93, 0.7), vec3(0.96, 0.55, 0.25), clamp(3.0 * x, 0.0, 1.0));
@@ -45,8 +43,6 @@ void main() {
     vec3 x = origin * vec3(ndc, 1.0) + surface * normalize(ray * vec3(ndc, 1.0));
     vec4 clip = clipFromScene * vec4(x, 1.0);
     gl_FragDepth = min(opaque, clamp(0.5 + 0.5 * clip.z / clip.w, 0.0, 1.0));
-    float outside = length(max(abs(x - boxMiddle) - boxHalf, 0.0));
-    colour *= 1.0 - smoothstep(0.1 * visibility, visibility, outside);
     // Seven doublings from a tenth of half a block's edge.
     if (display == kShowDepth) colour.rgb = colour.a * colourOfDistance(clamp(log2(surface / 0.1) / 7.0, 0.0, 1.0));
   }
@@ -56,8 +52,7 @@ void main() {
   gl_FragColor = vec4(gl_FragColor.rgb * colour.a, colour.a);
 }`;
 
-// `box`: of what was captured, in the scene's units.
-export function cityMesh(compositor: Compositor, box: THREE.Box3): THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial> {
+export function cityMesh(compositor: Compositor): THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial> {
   const { view, target, distancesOfBytes } = compositor;
   const material = new THREE.ShaderMaterial({
     vertexShader: kVertexShader,
@@ -73,9 +68,6 @@ export function cityMesh(compositor: Compositor, box: THREE.Box3): THREE.Mesh<TH
       resolution: view.resolution,
       opaqueDepth: view.opaqueDepth,
       display: view.display,
-      boxMiddle: { value: box.getCenter(new THREE.Vector3()) },
-      boxHalf: { value: box.getSize(new THREE.Vector3()).multiplyScalar(0.5) },
-      visibility: { value: 1e30 }, // scene units beyond the box
     },
     defines: distancesOfBytes ? { DISTANCES_OF_BYTES: '' } : {},
     transparent: true, // after what is opaque

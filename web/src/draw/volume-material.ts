@@ -9,6 +9,8 @@ import { kDisplayConstants } from './display-modes';
 import { kMostHiddenBoxes } from './hidden-boxes';
 import { networkShader, vectorsOfNetwork, writtenVector } from './network-shader';
 
+export const kFarAway = 1e30; // scene units
+
 // The same for all contents of a picture. Scene units; `part`, `origin`, `ray` and `sceneFromClip` are those of Picture.
 export interface ViewUniforms {
   resolution: { value: THREE.Vector2 }; // pixels of the target
@@ -18,6 +20,7 @@ export interface ViewUniforms {
   sceneLow: { value: THREE.Vector3 };
   sceneHigh: { value: THREE.Vector3 };
   sceneNear: { value: number };
+  visibility: { value: number }; // how far beyond the scene's box anything is seen, above 0
   withinLow: { value: THREE.Vector3 }; // of the content that comes next, where it is drawn; not of surrounds
   withinHigh: { value: THREE.Vector3 };
   minTransmittance: { value: number }; // rays end where less would be seen; 0: never
@@ -39,6 +42,7 @@ export function viewUniforms(): ViewUniforms {
     sceneLow: { value: new THREE.Vector3() },
     sceneHigh: { value: new THREE.Vector3() },
     sceneNear: { value: 0 },
+    visibility: { value: kFarAway },
     withinLow: { value: new THREE.Vector3() },
     withinHigh: { value: new THREE.Vector3() },
     minTransmittance: { value: 1 / 255 },
@@ -76,7 +80,7 @@ layout(std140) uniform Content { vec4 content[VECTORS]; };
 uniform sampler2DArray planesFirst, planesSecond;
 uniform sampler3D macroblocks, distances;
 uniform sampler2D opaqueDepth;
-uniform float featureRange, densityRange, stepsPerTexel, minTransmittance, sceneNear;
+uniform float featureRange, densityRange, stepsPerTexel, minTransmittance, sceneNear, visibility;
 uniform vec2 resolution;
 uniform vec4 part;
 uniform mat3 origin, ray;
@@ -159,9 +163,15 @@ void main() {
     vec3 tint = display == kShowBlocks ? colourOfBlock : colourOfLevel;
     colour = tint * (0.35 * opacity + 0.65 * dot(colour, vec3(0.3, 0.6, 0.1)));
   }
-  colourAndOpacity = vec4(colour, opacity);
   // What hides half is where the surface is, whatever shines through it from far behind, and whatever haze is before it.
   float surface = sum.median > 0.0 ? sum.median : sum.depth / opacity;
+#ifdef EVERYWHERE
+  vec3 x = o + surface * d;
+  float seen = 1.0 - smoothstep(0.1 * visibility, visibility, length(max(max(sceneLow - x, x - sceneHigh), 0.0)));
+  colour *= seen;
+  opacity *= seen;
+#endif
+  colourAndOpacity = vec4(colour, opacity);
   float hides = clamp(4.0 * opacity - 1.0, 0.0, 1.0);
 #ifdef DISTANCES_OF_BYTES
   surface /= surface + 1.0;

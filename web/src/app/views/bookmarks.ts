@@ -45,10 +45,10 @@ export class Bookmarks {
     this.kept = readBookmarks(read(key));
   }
 
-  // Those of the world first; none twice.
+  // Those of the world first; none twice, but for one that becomes the same while its name is typed.
   get list(): Bookmark[] {
     const texts = new Set(this.ofWorld.map(textOf));
-    return [...this.ofWorld, ...this.kept.filter((one) => !texts.has(textOf(one)))];
+    return [...this.ofWorld, ...this.kept.filter((one) => one === this.chosen[0] || !texts.has(textOf(one)))];
   }
 
   isOfWorld(bookmark: Bookmark): boolean {

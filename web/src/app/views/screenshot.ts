@@ -25,8 +25,8 @@ export function piecesOf(width: number, height: number, edge = kPiece): [number,
   return pieces;
 }
 
-// The view as it is, with so many pixels; wider or narrower about the same middle. Rejects where not all of it can be
-// drawn, and where `signal` ends it.
+// The view as it is, with so many pixels; wider or narrower about the same middle. Tiles that
+// cannot be had are lacking, as on the screen. Rejects where it cannot be drawn, and where `signal` ends it.
 export function takePicture(
   viewer: Viewer, width: number, height: number, tell: (progress: Progress) => void, signal: AbortSignal,
 ): Promise<Blob> {
@@ -48,6 +48,7 @@ export function takePicture(
         do {
           await allTiles(viewer, signal, (pending) => tell({ piece, pieces: pieces.length, pending }));
           viewer.draw();
+          signal.throwIfAborted();
         } while (!viewer.idle); // what is drawn takes room of its own
         context.drawImage(renderer.domElement, left, top);
       }
@@ -57,6 +58,7 @@ export function takePicture(
       camera.updateProjectionMatrix();
     }
     const blob = await new Promise<Blob | null>((resolve) => picture.toBlob(resolve, 'image/png'));
+    signal.throwIfAborted();
     if (!blob) throw new Error(`the browser has no memory for a picture of ${width} by ${height}`);
     return blob;
   });
@@ -111,7 +113,8 @@ export function addScreenshot(viewer: Viewer, toolbar: Toolbar): void {
   take.addEventListener('click', async () => {
     if (!width.reportValidity() || !height.reportValidity()) return;
     const ending = new AbortController();
-    cancel.onclick = () => ending.abort();
+    // Not the second half of a double click that began it.
+    cancel.onclick = ({ detail }) => detail < 2 && ending.abort();
     isTaking(true);
     cancel.focus();
     try {
@@ -123,7 +126,9 @@ export function addScreenshot(viewer: Viewer, toolbar: Toolbar): void {
     } catch (error) {
       said.textContent = ending.signal.aborted ? '' : String(error instanceof Error ? error.message : error);
     } finally {
+      const hadFocus = document.activeElement === cancel;
       isTaking(false);
+      if (hadFocus) take.focus();
     }
   });
   const panel = element('div', '', presets, element('div', 'row', width, '×', height), element('div', 'row', take, cancel), said);
