@@ -111,9 +111,11 @@ describe.skipIf(missing())('the viewer', () => {
       await page.click('text=Save picture');
       await page.waitForSelector('text=/Part [2-9] of 32/');
       expect(before.equals(await besidePanel())).toBe(true);
+      expect(await page.locator('.toolbar').evaluate(({ inert }: HTMLElement) => inert)).toBe(true);
       await page.click('text=Cancel');
       await page.waitForSelector('text=Save picture', { state: 'visible' });
       await page.waitForSelector('.still', { state: 'detached' });
+      expect(await page.locator('.toolbar').evaluate(({ inert }: HTMLElement) => inert)).toBe(false);
       expect(await page.isVisible('.error')).toBe(false);
       await page.waitForTimeout(1500);
       expect(before.equals(await besidePanel())).toBe(true);

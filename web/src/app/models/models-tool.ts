@@ -79,6 +79,10 @@ export function addModels(
   };
   const drop = new DropTarget(document.body, 'Drop it where it should stand', (files, event) => receive(files, event));
   const receive = (files: ModelFile[], event?: DragEvent) => {
+    if (viewer.isHeld) {
+      fail(new SceneError('viewer', '', 'is drawing a picture', 'wait for it, or cancel it'));
+      return;
+    }
     const place = placeFor(event);
     void drop.during('Reading', take(files, place)).catch(fail);
   };

@@ -95,6 +95,8 @@ export function addScreenshot(viewer: Viewer, toolbar: Toolbar): void {
   const isTaking = (is: boolean) => {
     take.hidden = is;
     cancel.hidden = !is;
+    // All pieces are to be of one view and one world.
+    for (const other of document.querySelectorAll<HTMLElement>('.toolbar, .side')) other.inert = is && !other.contains(cancel);
   };
   isTaking(false);
   const said = element('p', 'faint');
