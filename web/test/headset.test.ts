@@ -145,6 +145,7 @@ describe.skipIf(missing())('with a headset', () => {
       await page.waitForSelector('.loading.done', { state: 'attached' });
       await page.keyboard.press('c');
       await page.selectOption('label:has-text("Pixels") select', '100 %');
+      await page.selectOption('label:has-text("Beyond what was captured") select', 'As it was made up');
       await page.fill('label:has-text("Error at most") input', '0');
       await page.click('[aria-label=Headset]');
       await page.waitForFunction(() => headset.activeSession !== undefined);
