@@ -1,6 +1,8 @@
 #include "compute/blocks.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace tessera {
 namespace {
@@ -29,6 +31,23 @@ BlockSpace::Placement BlockSpace::placement(uint32_t block) const {
   const bool atBorder = i == 0 || j == 0 || i + 1 == columns || j + 1 == rows;
   made.contracted = surround == Surround::border && atBorder;
   return made;
+}
+
+BlockSpace::Range BlockSpace::rangeInBox(const std::array<double, 3>& origin, const std::array<double, 3>& direction,
+                                         double near) const {
+  const double low[3] = {-1.0 * columns, -1.0 * rows, bottom}, high[3] = {1.0 * columns, 1.0 * rows, top};
+  Range range{near, std::numeric_limits<double>::infinity()};
+  for (int axis = 0; axis < 3; ++axis) {
+    const double o = origin[axis], d = direction[axis];
+    if (d == 0) {
+      if (o < low[axis] || o > high[axis]) range.far = 0;
+      continue;
+    }
+    const double toLow = (low[axis] - o) / d, toHigh = (high[axis] - o) / d;
+    range.near = std::max(range.near, std::min(toLow, toHigh));
+    range.far = std::min(range.far, std::max(toLow, toHigh));
+  }
+  return range;
 }
 
 uint32_t BlockSpace::blockAt(double x, double y, double z) const {

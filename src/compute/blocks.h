@@ -1,6 +1,8 @@
 // A scene cut into square blocks on the ground (City-on-Web, section 4.1), and samples along rays through it.
 #pragma once
 
+#include <array>
+
 #include "compute/memory.h"
 
 namespace tessera {
@@ -33,6 +35,13 @@ struct BlockSpace {
     float halfDomain() const { return contracted ? 2.0f : 1.0f; }
   };
   Placement placement(uint32_t block) const;
+
+  // Where a ray is in the box, from `near` on.
+  struct Range {
+    double near = 0, far = 0;
+    bool empty() const { return !(near < far); }
+  };
+  Range rangeInBox(const std::array<double, 3>& origin, const std::array<double, 3>& direction, double near) const;
 
   // The cell of x and y, clamped; with an own surround that one for every point outside the box.
   uint32_t blockAt(double x, double y, double z) const;

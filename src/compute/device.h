@@ -11,11 +11,14 @@
 #include <vector>
 
 #include "compute/adam.h"
+#include "compute/attention.h"
+#include "compute/block_march.h"
 #include "compute/blocks.h"
 #include "compute/composite.h"
 #include "compute/deferred.h"
 #include "compute/encodings.h"
 #include "compute/hash_grid.h"
+#include "compute/lattice.h"
 #include "compute/losses.h"
 #include "compute/memory.h"
 #include "compute/mlp.h"
@@ -46,7 +49,12 @@ namespace tessera {
   X(DistinctTexels)             \
   X(VirtualGridForward)         \
   X(VirtualGridBackward)        \
+  X(LatticeForward)             \
+  X(LatticeBackward)            \
+  X(AttentionForward)           \
+  X(AttentionBackward)          \
   X(EnterScene)                 \
+  X(MarchBlocks)                \
   X(BlockSamples)               \
   X(BlockPoints)                \
   X(GroupByBlock)               \
@@ -59,6 +67,9 @@ namespace tessera {
   X(DeferredBackward)           \
   X(BlendForward)               \
   X(BlendBackward)              \
+  X(ShadeForward)               \
+  X(ShadeBackward)              \
+  X(AddColumns)                 \
   X(ColourLoss)                 \
   X(DistortionLoss)             \
   X(DepthLoss)                  \

@@ -6,49 +6,10 @@
 #include <numeric>
 
 #include "compute/device_test.h"
+#include "compute/test_block_rays.h"
 
 namespace tessera::device_test {
 namespace {
-
-struct NamedSpace {
-  std::string name;
-  BlockSpace space;
-};
-
-std::vector<NamedSpace> spaces() {
-  return {
-      {"1 × 1", {.columns = 1, .rows = 1, .near = 0, .surround = Surround::none}},
-      {"1 × 1, own surround", {.columns = 1, .rows = 1, .bottom = -0.5f, .top = 0.4f, .surround = Surround::own}},
-      {"3 × 2", {.columns = 3, .rows = 2, .bottom = -0.7f, .top = 0.9f, .surround = Surround::none}},
-      {"4 × 3, contracted border", {.columns = 4, .rows = 3, .near = 0.2f, .surround = Surround::border}},
-      {"3 × 2, own surround", {.columns = 3, .rows = 2, .bottom = -0.3f, .top = 0.8f, .surround = Surround::own}},
-  };
-}
-
-// Inside, above, and far beside the box; in all directions, along axes, and none.
-struct Rays {
-  std::vector<float> origins, directions;
-
-  Rays(Random& random, const BlockSpace& space, size_t rays)
-      : origins(random.floats(3 * rays, -1, 1)), directions(random.directions(rays)) {
-    for (size_t r = 0; r < rays; ++r) {
-      float* const o = origins.data() + 3 * r;
-      float* const d = directions.data() + 3 * r;
-      const float reach = r % 5 == 1 ? 3.0f : 1.0f;
-      o[0] *= reach * static_cast<float>(space.columns);
-      o[1] *= reach * static_cast<float>(space.rows);
-      if (r % 3 == 1) o[2] += 2;
-      if (r % 3 == 1 && d[2] > 0) d[2] = -d[2];
-      if (r % 7 == 3)
-        for (int a = 0; a < 3; ++a) d[a] = a == static_cast<int>(r / 7 % 3) ? (r % 2 ? 1.0f : -1.0f) : 0.0f;
-      if (r % 11 == 5) d[0] = d[1] = d[2] = 0;
-    }
-  }
-  reference::Point origin(size_t r) const { return {origins[3 * r], origins[3 * r + 1], origins[3 * r + 2]}; }
-  reference::Point direction(size_t r) const {
-    return {directions[3 * r], directions[3 * r + 1], directions[3 * r + 2]};
-  }
-};
 
 // Evenly from 0 to 1; or anywhere, some of them twice, as resampling leaves them.
 std::vector<float> makeFences(Random& random, size_t rays, uint32_t intervals, bool even) {
@@ -77,7 +38,7 @@ struct SampleOptions {
 
 void runBlockSamples(Stage& stage, const BlockSpace& space, const Size& size, const SampleOptions& options) {
   const uint32_t rays = size.capacity, intervals = options.everything ? 24 : 7;
-  const Rays views(stage.random, space, rays);
+  const BlockRays views(stage.random, space, rays);
   std::vector<float> range;
   for (size_t r = 0; r < rays; ++r)
     for (double end : reference::rangeInScene(space, views.origin(r), views.direction(r)))
@@ -133,14 +94,14 @@ template <>
 OperationTests testsOf<EnterScene>() {
   OperationTests tests;
   tests.noGradient = "cameras and fence posts are fixed";
-  for (const NamedSpace& named : spaces())
+  for (const NamedBlockSpace& named : blockSpaces())
     for (const Size& size : kSizes)
       for (bool jittered : {false, true})
         tests.cases.push_back(
             {fmt::format("{}, rays {}{}", named.name, toString(size), jittered ? ", jitter, near" : ""),
              [=](Stage& stage) {
                const uint32_t intervals = jittered ? 17 : 1;
-               const Rays views(stage.random, named.space, size.capacity);
+               const BlockRays views(stage.random, named.space, size.capacity);
                EnterScene a{named.space};
                a.rays = stage.count(size);
                a.intervals = intervals;
@@ -159,7 +120,7 @@ template <>
 OperationTests testsOf<BlockSamples>() {
   OperationTests tests;
   tests.noGradient = "cameras and fence posts are fixed";
-  for (const NamedSpace& named : spaces())
+  for (const NamedBlockSpace& named : blockSpaces())
     for (const Size& size : kSizes)
       for (bool split : {false, true})
         for (bool everything : {false, true})
@@ -175,7 +136,7 @@ template <>
 OperationTests testsOf<BlockPoints>() {
   OperationTests tests;
   tests.noGradient = "it only chooses where to look";
-  for (const NamedSpace& named : spaces())
+  for (const NamedBlockSpace& named : blockSpaces())
     for (uint32_t points : {0u, 1u, 1061u, 9001u})
       tests.cases.push_back({fmt::format("{}, {} points", named.name, points), [=](Stage& stage) {
                                std::vector<uint32_t> blocks(named.space.blocks());

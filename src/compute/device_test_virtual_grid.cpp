@@ -4,11 +4,12 @@
 #include <algorithm>
 
 #include "compute/device_test.h"
+#include "compute/test_texel_batch.h"
 
 namespace tessera::device_test {
 namespace {
 
-constexpr uint32_t kBlocks = 3, kCorners = VirtualGrid::kCorners, kWidth = VirtualGrid::kAttributes;
+constexpr uint32_t kBlocks = TexelBatch::kBlocks, kCorners = VirtualGrid::kCorners, kWidth = VirtualGrid::kAttributes;
 
 // Small grids: few texels to share, and more words than a bit each. One resolution is odd, and no power of two.
 std::vector<VirtualGrid> grids() {
@@ -30,58 +31,23 @@ std::string nameOf(const VirtualGrid& grid) {
                      grid.shareTexels ? "" : ", each corner");
 }
 
-// Samples inside and on the border of their blocks, and the texels that they need, as DistinctTexels finds them.
-struct Batch {
-  std::vector<uint32_t> blocks, marks, ranks, first;
-  std::vector<float> positions;
-  uint32_t texels = 0;
-
-  Batch(Stage& stage, const VirtualGrid& grid, const Size& size) {
-    blocks = stage.random.wordsBelow(size.capacity, kBlocks);
-    for (uint32_t& block : blocks) block = block == 1 ? 2 : block;  // one that nothing touches
-    positions = stage.random.floats(size_t{3} * size.capacity, 0, 1);
-    for (size_t i = 0; i < positions.size(); i += 17) positions[i] = i % 2 ? 0.0f : 1.0f;
-    Device& reference = *deviceNamed("reference");
-    Stage own(reference, 1);
-    DistinctTexels a{grid};
-    a.blocks = kBlocks;
-    a.samples = own.count(size);
-    a.blockOfSample = own.input(blocks);
-    a.positions = own.input(positions);
-    a.marks = own.input(std::vector<uint32_t>(kBlocks * grid.words()));
-    a.ranks = own.input(std::vector<uint32_t>(kBlocks * grid.words()));
-    a.firstTexel = own.input(std::vector<uint32_t>(kBlocks + 1));
-    reference.run(a);
-    marks = reference.read(a.marks);
-    ranks = reference.read(a.ranks);
-    first = reference.read(a.firstTexel);
-    texels = first.back();
-  }
-
-  template <class Arguments>
-  void set(Stage& stage, const Size& size, Arguments& a) const {
-    a.samples = stage.count(size);
-    a.blockOfSample = stage.input(blocks);
-    a.positions = stage.input(positions);
-    if (a.grid.shareTexels) {
-      a.marks = stage.input(marks);
-      a.ranks = stage.input(ranks);
-    }
-  }
-};
-
 }  // namespace
 
 template <>
 OperationTests testsOf<DistinctTexels>() {
   OperationTests tests;
   tests.noGradient = "it chooses texels";
-  for (const VirtualGrid& grid : grids())
+  std::vector<VirtualGrid> all = grids();
+  for (VirtualGrid grid : grids()) {
+    grid.planes = 0;
+    all.push_back(grid);
+  }
+  for (const VirtualGrid& grid : all)
     for (const Size& size : kSizes)
       for (bool tight : {false, true})
         tests.cases.push_back({fmt::format("{}, samples {}{}", nameOf(grid), toString(size), tight ? ", no room" : ""),
                                [=](Stage& stage) {
-                                 const Batch batch(stage, grid, size);
+                                 const TexelBatch batch(stage, grid, size);
                                  DistinctTexels a{grid};
                                  a.blocks = kBlocks;
                                  a.samples = stage.count(size);
@@ -109,7 +75,7 @@ OperationTests testsOf<VirtualGridForward>() {
         tests.cases.push_back(
             {fmt::format("{}, samples {}{}", nameOf(grid), toString(size), culled ? ", culled, no room" : ""),
              [=](Stage& stage) {
-               const Batch batch(stage, grid, size);
+               const TexelBatch batch(stage, grid, size);
                VirtualGridForward a{grid};
                batch.set(stage, size, a);
                a.texels = stage.count({culled ? batch.texels / 2 : batch.texels + 5, batch.texels});
@@ -134,7 +100,7 @@ OperationTests testsOf<VirtualGridBackward>() {
         tests.cases.push_back(
             {fmt::format("{}, samples {}{}", nameOf(grid), toString(size), tight ? ", no room" : ""),
              [=](Stage& stage) {
-               const Batch batch(stage, grid, size);
+               const TexelBatch batch(stage, grid, size);
                VirtualGridBackward a{grid};
                batch.set(stage, size, a);
                a.blocks = kBlocks;
@@ -161,7 +127,7 @@ OperationTests testsOf<VirtualGridBackward>() {
     tests.gradients.push_back(
         {nameOf(grid), [=](Stage& stage) {
            const Size size{7};
-           const Batch batch(stage, grid, size);
+           const TexelBatch batch(stage, grid, size);
            const std::vector<float> attributes = stage.random.floats(size_t{kWidth} * batch.texels, 0.4f, 0.6f);
            const std::vector<float> upstream = stage.random.floats(kWidth * size.capacity, -1, 1);
            const auto sampleAt = [&](View moved, size_t s) {

@@ -12,7 +12,8 @@ namespace tessera {
 // Of one block; positions and texels in [0,1]³ of its domain. Texel i of R lies at (i + ½) / R; a sample at p has
 // lookup coordinate u = p R - ½ (exact, in double), texels floor(u) and floor(u) + 1, each clamped to [0, R - 1].
 //   voxels      8 texels of voxels³
-//   planes      plane a holds the two other axes b < c: 4 texels of planes²; there the coordinate along a is ½ / planes
+//   planes      (0: there are none) plane a holds the two other axes b < c: 4 texels of planes²; there the coordinate
+//   along a is ½ / planes
 // Numbers of texels: voxel (x, y, z) is x + V (y + V z); plane a's texel (b, c) is V³ + a P² + b + P c.
 struct VirtualGrid {
   uint32_t voxels = 128, planes = 512;
@@ -24,6 +25,8 @@ struct VirtualGrid {
   static constexpr uint32_t kCorners = 20;    // 8 of voxels, then 4 of planes 0, 1, 2
   static constexpr float kCulled = -1e30f;    // log density of a sample that a renderer would not see
 
+  uint32_t sources() const { return planes > 0 ? 4 : 1; }
+  uint32_t corners() const { return planes > 0 ? kCorners : 8; }
   uint32_t texels() const { return voxels * voxels * voxels + 3 * planes * planes; }
   uint32_t words() const { return (texels() + 31) / 32; }
   uint32_t planeTexel(int plane, uint32_t b, uint32_t c) const;
@@ -31,7 +34,7 @@ struct VirtualGrid {
 };
 
 // Which texels a batch needs, block after block and in order of their numbers. With shareTexels off: every corner of
-// every sample (8 of voxels, then 4 of each plane, the lower neighbour of the first axis first), as row kCorners ·
+// every sample (8 of voxels, then 4 of each plane, the lower neighbour of the first axis first), as row corners() ·
 // sample + corner; marks and ranks are not used, and firstTexel is all zeros and, at [blocks], the number of corners.
 struct DistinctTexels {
   const VirtualGrid& grid;
@@ -46,10 +49,10 @@ struct DistinctTexels {
   Slice<float> texelPositions;  // [texelCapacity][3]; rows beyond the capacity are left out
 };
 
-// Samples from texels: per attribute Σ over corners of weight · dequantised value (features -7 + 14 q, density -14 + 28
-// q, q = floor(255 a + ½) / 255 in double), the four sources (voxels and three planes) summed; then log density =
-// min(sum - 1, 15), colours = sigmoid(sum). Texels beyond the capacity count as q = ½. With minAlpha > 0 a sample with
-// 1 - exp(-σ · runtimeStep) < minAlpha gets log density kCulled: renderers do not see it either.
+// Samples from the texels of voxels and planes: per attribute Σ over corners of weight · dequantised value (features -7
+// + 14 q, density -14 + 28 q, q = floor(255 a + ½) / 255 in double), the four sources (voxels and three planes) summed;
+// then log density = min(sum - 1, 15), colours = sigmoid(sum). Texels beyond the capacity count as q = ½. With minAlpha
+// > 0 a sample with 1 - exp(-σ · runtimeStep) < minAlpha gets log density kCulled: renderers do not see it either.
 struct VirtualGridForward {
   const VirtualGrid& grid;
   Count samples;

@@ -323,8 +323,6 @@ void run(Context& context, const EnterScene& a) {
   const float* nearOfRay = hostPointer(a.nearOfRay);
   float* range = hostPointer(a.range);
   float* fences = hostPointer(a.fences);
-  const double low[3] = {-1.0 * space.columns, -1.0 * space.rows, space.bottom};
-  const double high[3] = {1.0 * space.columns, 1.0 * space.rows, space.top};
   const double perInterval = 1.0 / a.intervals;
   context.pool.forRanges(hostCount(a.rays), kRaysPerTask, [&](size_t begin, size_t end) {
     for (size_t ray = begin; ray < end; ++ray) {
@@ -332,15 +330,11 @@ void run(Context& context, const EnterScene& a) {
       const float* d = directions + 3 * ray;
       const bool exists = d[0] != 0 || d[1] != 0 || d[2] != 0;
       const double near = nearOfRay ? std::max(space.near, nearOfRay[ray]) : space.near;
-      double enter = near, leave = exists ? std::numeric_limits<double>::infinity() : 0;
-      for (int axis = 0; axis < 3; ++axis) {
-        if (d[axis] == 0) {
-          if (o[axis] < low[axis] || o[axis] > high[axis]) leave = 0;
-          continue;
-        }
-        const double toLow = (low[axis] - o[axis]) / d[axis], toHigh = (high[axis] - o[axis]) / d[axis];
-        enter = std::max(enter, std::min(toLow, toHigh));
-        leave = std::min(leave, std::max(toLow, toHigh));
+      double enter = near, leave = near;
+      if (exists) {
+        const BlockSpace::Range box = space.rangeInBox({o[0], o[1], o[2]}, {d[0], d[1], d[2]}, near);
+        enter = box.near;
+        leave = box.far;
       }
       if (!(enter < leave)) {
         enter = leave = near;

@@ -132,6 +132,26 @@ HWY_INLINE void mixPairs(const float* HWY_RESTRICT table, const Corners& corners
   }
 }
 
+// Four or eight features an entry: at most 32 bytes, in one vector or few.
+template <size_t kFeatures>
+HWY_INLINE void mixWide(const float* HWY_RESTRICT table, const Corners& corners, float* HWY_RESTRICT out) {
+  const hn::CappedTag<float, kFeatures> d;
+  constexpr size_t kLanes = hn::MaxLanes(decltype(d)()), kVectors = kFeatures / kLanes;
+  for (int c = 0; c < 8; ++c) {
+    for (int s = 0; s < kGroup; ++s) hwy::Prefetch(table + kFeatures * corners.index[c][s]);
+  }
+  for (int s = 0; s < kGroup; ++s) {
+    hn::Vec<decltype(d)> sum[kVectors];
+    for (size_t v = 0; v < kVectors; ++v) sum[v] = hn::Zero(d);
+    for (int c = 0; c < 8; ++c) {
+      const auto w = hn::Set(d, corners.weight[c][s]);
+      const float* entry = table + kFeatures * corners.index[c][s];
+      for (size_t v = 0; v < kVectors; ++v) sum[v] = hn::MulAdd(w, hn::LoadU(d, entry + v * kLanes), sum[v]);
+    }
+    for (size_t v = 0; v < kVectors; ++v) hn::StoreU(sum[v], d, out + kFeatures * s + v * kLanes);
+  }
+}
+
 void mixAny(const float* table, const Corners& corners, int features, float* out) {
   for (int s = 0; s < kGroup; ++s) {
     for (int f = 0; f < features; ++f) {
@@ -166,6 +186,10 @@ void forwardRange(const HashGridForward& a, size_t l, size_t begin, size_t end) 
     float* to = rows == kGroup ? out + first * features : tail;
     if (features == 2) {
       mixPairs(table, corners, to);
+    } else if (features == 4) {
+      mixWide<4>(table, corners, to);
+    } else if (features == 8) {
+      mixWide<8>(table, corners, to);
     } else {
       mixAny(table, corners, features, to);
     }
@@ -266,6 +290,43 @@ void backwardPairs(const HashGridBackward& a, const HashGridLevel& level, const 
   }
 }
 
+template <size_t kFeatures>
+void backwardWide(const HashGridBackward& a, const HashGridLevel& level, const float* gradients, float* table,
+                  HostRows samples, TableRange range) {
+  const hn::CappedTag<float, kFeatures> d;
+  constexpr size_t kLanes = hn::MaxLanes(decltype(d)()), kVectors = kFeatures / kLanes;
+  const float* positions = hostPointer(a.positions);
+  Corners corners;
+  alignas(64) float padded[3 * kGroup];
+  const size_t end = samples.end;
+  for (size_t first = samples.begin; first < end; first += kGroup) {
+    cornersOfGroup(level, groupPositions(positions, first, end, padded), corners);
+    weightsOfGroup(corners);
+    for (int c = 0; c < 8; ++c) {
+      for (int s = 0; s < kGroup; ++s) hwy::Prefetch(table + kFeatures * corners.index[c][s]);
+    }
+    const int rows = static_cast<int>(std::min<size_t>(kGroup, end - first));
+    for (int s = 0; s < rows; ++s) {
+      hn::Vec<decltype(d)> g[kVectors];
+      bool any = false;  // nothing behind a surface
+      for (size_t v = 0; v < kVectors; ++v) {
+        g[v] = hn::LoadU(d, gradients + kFeatures * (first + s) + v * kLanes);
+        any |= !hn::AllTrue(d, hn::Eq(g[v], hn::Zero(d)));
+      }
+      if (!any) continue;
+      for (int c = 0; c < 8; ++c) {
+        const uint32_t index = corners.index[c][s];
+        if (index < range.begin || index >= range.end) continue;
+        const auto w = hn::Set(d, corners.weight[c][s]);
+        float* entry = table + kFeatures * index;
+        for (size_t v = 0; v < kVectors; ++v, entry += kLanes) {
+          hn::StoreU(hn::MulAdd(w, g[v], hn::LoadU(d, entry)), d, entry);
+        }
+      }
+    }
+  }
+}
+
 void backwardAny(const HashGridBackward& a, const HashGridLevel& level, const float* gradients, float* table,
                  HostRows samples, TableRange range) {
   const int features = a.grid.features;
@@ -293,7 +354,11 @@ void backwardLevel(const HashGridBackward& a, size_t l, HostRows samples, TableR
   const HashGridLevel& level = a.grid.levels[l];
   const float* gradients = hostPointer(a.encodedGradients.data) + l * a.encodedGradients.groupStride;
   float* table = hostPointer(a.tableGradients) + level.firstEntry * a.grid.features;
-  if (a.grid.features != 2) {
+  if (a.grid.features == 4) {
+    backwardWide<4>(a, level, gradients, table, samples, range);
+  } else if (a.grid.features == 8) {
+    backwardWide<8>(a, level, gradients, table, samples, range);
+  } else if (a.grid.features != 2) {
     backwardAny(a, level, gradients, table, samples, range);
   } else if (range.begin == 0 && range.end >= level.entries) {
     backwardPairs<true>(a, level, gradients, table, samples, range);

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "compute/cpu/kernels.h"
+#include "compute/cpu/virtual_texels.h"
 #include "compute/host_memory.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -32,41 +33,6 @@ namespace tessera::cpu {
 inline constexpr uint32_t kSources = 4;  // voxels, then planes 0, 1, 2
 inline constexpr size_t kGroup = 16;     // samples whose corners are looked up together
 inline constexpr uint32_t kWidth = VirtualGrid::kAttributes, kColours = kWidth - 1;
-
-// The two texels along one axis and the share of the upper one.
-struct TexelPair {
-  uint32_t low, high;
-  float share;
-};
-
-inline TexelPair texelPair(float position, uint32_t resolution) {
-  const double u = static_cast<double>(position) * resolution - 0.5;
-  const double floor = std::floor(u);
-  const int32_t low = static_cast<int32_t>(floor), last = static_cast<int32_t>(resolution) - 1;
-  return {static_cast<uint32_t>(std::clamp(low, 0, last)), static_cast<uint32_t>(std::clamp(low + 1, 0, last)),
-          static_cast<float>(u - floor)};
-}
-
-struct SourceCorners {  // of one source: 8 of voxels, 4 of a plane
-  uint32_t texel[8];
-  float weight[8];
-};
-
-inline void voxelCorners(const VirtualGrid& grid, const float* position, SourceCorners& corners) {
-  const TexelPair x = texelPair(position[0], grid.voxels), y = texelPair(position[1], grid.voxels),
-                  z = texelPair(position[2], grid.voxels);
-  const uint32_t v = grid.voxels;
-  const uint32_t line[4] = {v * (y.low + v * z.low), v * (y.high + v * z.low), v * (y.low + v * z.high),
-                            v * (y.high + v * z.high)};
-  const float across[4] = {(1 - y.share) * (1 - z.share), y.share * (1 - z.share), (1 - y.share) * z.share,
-                           y.share * z.share};
-  for (int k = 0; k < 4; ++k) {
-    corners.texel[2 * k] = x.low + line[k];
-    corners.texel[2 * k + 1] = x.high + line[k];
-    corners.weight[2 * k] = (1 - x.share) * across[k];
-    corners.weight[2 * k + 1] = x.share * across[k];
-  }
-}
 
 inline void planeCorners(const VirtualGrid& grid, int plane, const float* position, SourceCorners& corners) {
   const TexelPair b = texelPair(position[plane == 0 ? 1 : 0], grid.planes),
@@ -95,24 +61,6 @@ inline void sourceCorners(const VirtualGrid& grid, uint32_t source, const float*
   } else {
     planeCorners(grid, static_cast<int>(source) - 1, position, corners);
   }
-}
-
-// Texel to row.
-struct Rows {
-  const uint32_t* marks = nullptr;  // null: every corner has a row of its own
-  const uint32_t* ranks = nullptr;
-  size_t words = 0;
-
-  size_t word(uint32_t block, uint32_t texel) const { return block * words + texel / 32; }
-  uint32_t row(size_t word, uint32_t texel) const {
-    return ranks[word] + static_cast<uint32_t>(std::popcount(marks[word] & ((1u << texel % 32) - 1)));
-  }
-};
-
-template <class Arguments>
-Rows rowsOf(const Arguments& a) {
-  if (!a.grid.shareTexels) return {};
-  return {hostPointer(a.marks), hostPointer(a.ranks), a.grid.words()};
 }
 
 // Attributes as they are mixed: bytes where they are quantised (an eighth of a line of the cache a texel), else floats.
@@ -345,7 +293,7 @@ void markSamples(const DistinctTexels& a, size_t begin, size_t end) {
   };
   for (size_t s = begin; s < end; ++s) {
     uint32_t* ofBlock = marks + blocks[s] * words;
-    for (uint32_t source = 0; source < kSources; ++source) {
+    for (uint32_t source = 0; source < a.grid.sources(); ++source) {
       SourceCorners corners;
       sourceCorners(a.grid, source, positions + 3 * s, corners);
       for (uint32_t k = 0; k < cornersOfSource(source); ++k) mark(ofBlock, corners.texel[k]);
@@ -363,11 +311,11 @@ void placeEveryCorner(Context& context, const DistinctTexels& a, size_t samples)
   const float* positions = hostPointer(a.positions);
   context.pool.forRanges(samples, kSamplesPerTask, [&](size_t begin, size_t end) {
     for (size_t s = begin; s < end; ++s) {
-      for (uint32_t source = 0; source < kSources; ++source) {
+      for (uint32_t source = 0; source < a.grid.sources(); ++source) {
         SourceCorners corners;
         sourceCorners(a.grid, source, positions + 3 * s, corners);
         for (uint32_t k = 0; k < cornersOfSource(source); ++k) {
-          placeTexel(a, s * VirtualGrid::kCorners + firstCorner(source) + k, corners.texel[k]);
+          placeTexel(a, s * a.grid.corners() + firstCorner(source) + k, corners.texel[k]);
         }
       }
     }
@@ -382,7 +330,7 @@ void run(Context& context, const DistinctTexels& a) {
   std::fill(first, first + a.blocks + 1, 0u);
   if (!a.grid.shareTexels) {
     placeEveryCorner(context, a, samples);
-    first[a.blocks] = static_cast<uint32_t>(samples * VirtualGrid::kCorners);
+    first[a.blocks] = static_cast<uint32_t>(samples * a.grid.corners());
     return;
   }
   uint32_t* marks = hostPointer(a.marks);

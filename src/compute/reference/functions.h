@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "compute/adam.h"
+#include "compute/attention.h"
+#include "compute/block_march.h"
 #include "compute/blocks.h"
 #include "compute/composite.h"
 #include "compute/deferred.h"
@@ -116,6 +118,16 @@ struct BlockPoint {
 };
 BlockPoint blockPoint(const BlockSpace& space, Indices blocks, uint32_t texels, uint64_t seed, uint32_t point);
 
+// block_march.cpp: all intervals of one ray, whether anything is there or not
+struct BlockInterval {
+  uint32_t block = 0;
+  Point position{};
+  double distance = 0, step = 0;
+  double middle = 0, width = 0;
+};
+std::vector<BlockInterval> blockIntervals(const BlockSpace& space, double share, const Point& origin,
+                                          const Point& direction, double jitter, double near, double far);
+
 // proposals.cpp: one ray
 Doubles resampledFences(View fences, View weights, uint32_t after, double anneal, double padding, double jitter);
 // One ray of InterlevelLoss, unscaled; gradients of `weights`, those of the proposal.
@@ -147,10 +159,16 @@ struct VirtualCorner {
   uint32_t texel = 0;
   double weight = 0;
 };
-std::array<VirtualCorner, VirtualGrid::kCorners> virtualCorners(const VirtualGrid& grid, const Point& position);
+std::vector<VirtualCorner> virtualCorners(const VirtualGrid& grid, const Point& position);
+// Where DistinctTexels has put a corner of a sample.
+size_t virtualRow(const VirtualGrid& grid, Indices marks, Indices ranks, uint32_t block, size_t sample, size_t corner,
+                  uint32_t texel);
 double quantised(const VirtualGrid& grid, double attribute);
 // Log density, 3 diffuse, 4 features of a sample whose corners have these (quantised) attributes, [corners][8].
 Doubles virtualSample(const VirtualGrid& grid, std::span<const VirtualCorner> corners, View attributes);
+// attention.cpp: one sample; its log density without a bound
+Doubles fusedFeatures(const AttentionShape& shape, View coarse, View fine, View logits);
+Point shadedColour(const double diffuse[3], const double specular[3], double opacity);
 // deferred.cpp: one segment of a ray, then the segments of one ray
 Point deferredForward(View network, View composited, const double direction[3]);
 struct DeferredGradients {

@@ -31,30 +31,36 @@ double weightOf(const Pair& pair, int upper) {
 
 }  // namespace
 
-std::array<VirtualCorner, VirtualGrid::kCorners> virtualCorners(const VirtualGrid& grid, const Point& position) {
-  std::array<VirtualCorner, VirtualGrid::kCorners> corners;
+std::vector<VirtualCorner> virtualCorners(const VirtualGrid& grid, const Point& position) {
+  std::vector<VirtualCorner> corners;
   Pair voxel[3], plane[3];
   for (int a = 0; a < 3; ++a) {
     voxel[a] = pairAt(position[a], grid.voxels);
-    plane[a] = pairAt(position[a], grid.planes);
+    if (grid.planes > 0) plane[a] = pairAt(position[a], grid.planes);
   }
-  size_t next = 0;
   for (int c = 0; c < 8; ++c) {
     const int upper[3] = {c & 1, c >> 1 & 1, c >> 2};
     const uint32_t texel =
         voxel[0].texel[upper[0]] + grid.voxels * (voxel[1].texel[upper[1]] + grid.voxels * voxel[2].texel[upper[2]]);
-    corners[next++] = {texel,
-                       weightOf(voxel[0], upper[0]) * weightOf(voxel[1], upper[1]) * weightOf(voxel[2], upper[2])};
+    corners.push_back(
+        {texel, weightOf(voxel[0], upper[0]) * weightOf(voxel[1], upper[1]) * weightOf(voxel[2], upper[2])});
   }
-  for (int a = 0; a < 3; ++a) {
+  for (int a = 0; a < 3 && grid.planes > 0; ++a) {
     const Pair &b = plane[a == 0 ? 1 : 0], &c = plane[a == 2 ? 1 : 2];
     for (int k = 0; k < 4; ++k) {
       const int upperB = k & 1, upperC = k >> 1;
-      corners[next++] = {grid.planeTexel(a, b.texel[upperB], c.texel[upperC]),
-                         weightOf(b, upperB) * weightOf(c, upperC)};
+      corners.push_back(
+          {grid.planeTexel(a, b.texel[upperB], c.texel[upperC]), weightOf(b, upperB) * weightOf(c, upperC)});
     }
   }
   return corners;
+}
+
+size_t virtualRow(const VirtualGrid& grid, Indices marks, Indices ranks, uint32_t block, size_t sample, size_t corner,
+                  uint32_t texel) {
+  if (!grid.shareTexels) return sample * grid.corners() + corner;
+  const size_t word = size_t{block} * grid.words() + texel / 32;
+  return ranks[word] + static_cast<size_t>(std::popcount(marks[word] & ((1u << texel % 32) - 1)));
 }
 
 namespace {
@@ -74,13 +80,11 @@ struct Samples {
     ranks = indices(a.ranks, a.ranks.count);
   }
   size_t count() const { return blocks.size(); }
-  std::array<VirtualCorner, VirtualGrid::kCorners> corners(size_t sample) const {
+  std::vector<VirtualCorner> corners(size_t sample) const {
     return virtualCorners(grid, {positions[3 * sample], positions[3 * sample + 1], positions[3 * sample + 2]});
   }
   size_t row(size_t sample, size_t corner, uint32_t texel) const {
-    if (!grid.shareTexels) return sample * VirtualGrid::kCorners + corner;
-    const size_t word = size_t{blocks[sample]} * grid.words() + texel / 32;
-    return ranks[word] + static_cast<size_t>(std::popcount(marks[word] & ((1u << texel % 32) - 1)));
+    return virtualRow(grid, marks, ranks, blocks[sample], sample, corner, texel);
   }
 };
 
@@ -122,8 +126,8 @@ void run(const DistinctTexels& a) {
   };
   if (!grid.shareTexels) {
     for (size_t s = 0; s < samples; ++s)
-      for (size_t k = 0; k < VirtualGrid::kCorners; ++k) place(s * VirtualGrid::kCorners + k, cornersOf(s)[k].texel);
-    first[a.blocks] = static_cast<uint32_t>(samples * VirtualGrid::kCorners);
+      for (size_t k = 0; k < grid.corners(); ++k) place(s * grid.corners() + k, cornersOf(s)[k].texel);
+    first[a.blocks] = static_cast<uint32_t>(samples * grid.corners());
     return;
   }
   uint32_t* marks = hostPointer(a.marks);

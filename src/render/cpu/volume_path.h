@@ -1,17 +1,16 @@
-// A ray through the domain of one part of a content: straight pieces, measured in texels of the planes. A bounded part
-// has one; a contracted one as many as the ray meets regions of the contraction, at most five (City-on-Web, section
-// 4.4; MERF, section 4.1).
+// A ray through the domain of one part of a content (scene/domain_path.h), measured in texels of the planes.
 #pragma once
 
 #include <array>
 
 #include "render/volume_frame.h"
+#include "scene/domain_path.h"
 #include "tiles/volume_content.h"
 
 namespace tessera {
 
 // The place after τ texels is start + τ direction, in texels from the lower corner of the domain, so that the domain is
-// [0, planes]³. Within a region the contraction is a projective map, and so is the distance as a function of τ.
+// [0, planes]³.
 struct VolumeSegment {
   std::array<float, 3> start, direction;  // the direction has length 1
   double length = 0;                      // texels; floats would misplace an end that is very far away
@@ -26,9 +25,7 @@ struct VolumeSegment {
 };
 
 struct VolumePath {
-  // A ray meets at most five regions. Along the border of two, rounding may tell them apart at random: then more.
-  static constexpr int kMostSegments = 13;
-  std::array<VolumeSegment, kMostSegments> segments;
+  std::array<VolumeSegment, DomainPath::kMostSegments> segments;
   int count = 0;
 };
 

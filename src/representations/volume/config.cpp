@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/config_checks.h"
+#include "train/block_frame.h"
 
 namespace tessera {
 namespace {
@@ -189,10 +190,7 @@ void VolumeConfig::check() const {
 }
 
 Surround VolumeConfig::surroundKind() const {
-  if (surround == "own") return Surround::own;
-  if (surround == "border") return Surround::border;
-  if (surround == "none") return Surround::none;
-  throw Error("--set surround=" + surround, "", "there is no such surround", "use own, border or none");
+  return surroundNamed(surround);
 }
 
 VirtualGrid VolumeConfig::virtualGrid() const {

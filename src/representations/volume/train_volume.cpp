@@ -249,12 +249,6 @@ TrainingResult trainVolume(Device& device, const Capture& capture, const fs::pat
   return result;
 }
 
-BlockGrid requireGrid(const ModelFolder& folder) {
-  const std::optional<BlockGrid> grid = folder.readPlacement().grid;
-  if (grid) return *grid;
-  throw Error((folder.root() / "blocks.json").string(), "grid", "there is none", "restore the file or train again");
-}
-
 std::unique_ptr<VolumeModel> loadVolumeModel(Device& device, const fs::path& folder, uint32_t residentBlocks) {
   const ModelFolder model(folder);
   const ModelManifest manifest = requireManifest(model, "volume");

@@ -35,9 +35,6 @@ VolumeConfig levelConfig(VolumeConfig finest, uint32_t level, int64_t finestStep
 // ask for fewer texels; no more than the finest's, or level_share of them.
 int64_t levelSteps(const VolumeConfig& finest, uint32_t level, int64_t finestSteps);
 
-// The grid of blocks.json; Error when there is none.
-BlockGrid requireGrid(const ModelFolder& folder);
-
 // A trained model for drawing, from its folder: with all blocks in memory, or so many at a time (VolumeModel::bring).
 std::unique_ptr<VolumeModel> loadVolumeModel(Device& device, const fs::path& folder, uint32_t residentBlocks = 0);
 

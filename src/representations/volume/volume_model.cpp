@@ -49,37 +49,12 @@ std::vector<uint32_t> firstBlocks(const BlockSpace& space, uint32_t cells) {
 
 }  // namespace
 
-SceneFrame sceneFrameOf(const BlockGrid& grid) {
-  SceneFrame frame;
-  frame.centre = grid.inWorld({0, 0, (grid.bottom + grid.top) / 2});
-  frame.rotation = grid.gridFromWorld;
-  frame.scale = 2 / grid.edge;
-  return frame;
-}
-
-BlockSpace blockSpaceOf(const BlockGrid& grid, const VolumeConfig& config) {
-  BlockSpace space;
-  space.columns = static_cast<uint32_t>(grid.columns);
-  space.rows = static_cast<uint32_t>(grid.rows);
-  space.top = static_cast<float>((grid.top - grid.bottom) / grid.edge);
-  space.bottom = -space.top;
-  space.near = static_cast<float>(config.near);
-  space.surround = config.surroundKind();
-  return space;
-}
-
-void requireOneFileABlock(const fs::path& folder, const ModelManifest& manifest, uint32_t blocks) {
-  if (manifest.files.size() == blocks) return;
-  throw Error((folder / "manifest.json").string(), "files", "does not name one checkpoint a block",
-              "restore the file or train again");
-}
-
 VolumeModel::VolumeModel(Device& device, const VolumeConfig& config, const BlockGrid& grid, const Room& room)
     : device_(able(device, config)),
       config_(config),
       grid_(grid),
       frame_(sceneFrameOf(grid)),
-      space_(blockSpaceOf(grid, config)),
+      space_(blockSpaceOf(grid, config.near, config.surroundKind())),
       virtualGrid_(config.virtualGrid()),
       groups_(groupsOfLevel(space_.columns, space_.rows, static_cast<uint32_t>(config.level),
                             space_.blocks() > space_.cells())),

@@ -7,16 +7,10 @@
 #include "representations/volume/config.h"
 #include "representations/volume/levels.h"
 #include "scene/block_grid.h"
+#include "train/block_frame.h"
 #include "train/model_folder.h"
 
 namespace tessera {
-
-// Scene units of BlockSpace: half a block's edge is 1, the origin amid all blocks at half the scene's height.
-SceneFrame sceneFrameOf(const BlockGrid& grid);
-BlockSpace blockSpaceOf(const BlockGrid& grid, const VolumeConfig& config);
-
-// Throws Error when the manifest of a model's folder does not name one checkpoint a block.
-void requireOneFileABlock(const fs::path& folder, const ModelManifest& manifest, uint32_t blocks);
 
 class VolumeModel {
  public:
