@@ -10,6 +10,7 @@
 #include "render/cpu/volume_renderer.h"
 #include "render/volume_scene.h"
 #include "representations/field/field_renderer.h"
+#include "representations/hash/hash_model_renderer.h"
 #include "representations/volume/train_volume.h"
 #include "representations/volume/volume_model_renderer.h"
 #include "tiles/scene_folder.h"
@@ -117,6 +118,11 @@ std::unique_ptr<Drawable> openDrawable(Device& device, const fs::path& folder, c
     auto renderer = std::make_unique<VolumeModelRenderer>(*model, cullThreshold(model->config(), progress));
     return std::make_unique<DrawableModel<VolumeModel, VolumeModelRenderer>>(folder, std::move(model),
                                                                              std::move(renderer));
+  }
+  if (manifest->method == "hash") {
+    auto model = loadHashModel(device, folder);
+    auto renderer = std::make_unique<HashModelRenderer>(*model);
+    return std::make_unique<DrawableModel<HashModel, HashModelRenderer>>(folder, std::move(model), std::move(renderer));
   }
   throw Error((folder / "manifest.json").string(), "method", "'" + manifest->method + "' is none that tessera knows",
               "restore the file, or use a newer tessera");

@@ -6,6 +6,7 @@
 #include "base/log.h"
 #include "import/capture_reader.h"
 #include "representations/field/train_field.h"
+#include "representations/hash/train_hash.h"
 #include "representations/volume/train_volume.h"
 #include "train/run_folder.h"
 
@@ -46,15 +47,17 @@ Config chosenConfig(const TrainFlags& flags, Config config) {
   return config;
 }
 
-VolumeConfig volumeDefaults(const TrainFlags& flags) {
-  VolumeConfig config;
+// Of the preset that is asked for.
+template <class Config>
+Config presetDefaults(const TrainFlags& flags) {
+  Config config;
   if (!flags.configFile.empty()) {
     configFromToml(config.fields(), flags.configFile);
-    config = VolumeConfig::ofPreset(config.preset);
+    config = Config::ofPreset(config.preset);
   }
   constexpr std::string_view kPreset = "preset=";
   for (const std::string& setting : flags.settings) {
-    if (setting.starts_with(kPreset)) config = VolumeConfig::ofPreset(setting.substr(kPreset.size()));
+    if (setting.starts_with(kPreset)) config = Config::ofPreset(setting.substr(kPreset.size()));
   }
   return config;
 }
@@ -62,16 +65,23 @@ VolumeConfig volumeDefaults(const TrainFlags& flags) {
 TrainingResult train(Device& device, const TrainFlags& flags) {
   const Capture capture = readCapture(flags.capture);
   if (flags.method == "field") {
-    if (!flags.grid.empty()) throw CLI::ValidationError("--grid", "is of --method volume");
-    if (flags.memoryMiB > 0) throw CLI::ValidationError("--memory-mib", "is of --method volume");
+    if (!flags.grid.empty()) throw CLI::ValidationError("--grid", "is of --method volume and hash");
+    if (flags.memoryMiB > 0) throw CLI::ValidationError("--memory-mib", "is of --method volume and hash");
     return trainField(device, capture, flags.model, {chosenConfig(flags, FieldConfig()), flags.loop});
   }
   const std::optional<BlockCount> blocks = parseBlockCount(flags.blocks);
   if (!blocks) throw CLI::ValidationError("--blocks", "'" + flags.blocks + "' is neither auto nor of the form 2x2");
   std::optional<BlockGrid> grid;
   if (!flags.grid.empty()) grid = readGrid(flags.grid, capture);
-  return trainVolume(device, capture, flags.model,
-                     {chosenConfig(flags, volumeDefaults(flags)), flags.loop, *blocks, grid, flags.memoryMiB});
+  if (flags.method == "hash") {
+    if (!flags.residentBlocks.empty()) throw CLI::ValidationError("--resident-blocks", "is of --method volume");
+    return trainHash(
+        device, capture, flags.model,
+        {chosenConfig(flags, presetDefaults<HashConfig>(flags)), flags.loop, *blocks, grid, flags.memoryMiB});
+  }
+  return trainVolume(
+      device, capture, flags.model,
+      {chosenConfig(flags, presetDefaults<VolumeConfig>(flags)), flags.loop, *blocks, grid, flags.memoryMiB});
 }
 
 }  // namespace
@@ -81,14 +91,15 @@ void addTrainVerb(CLI::App& app) {
   CLI::App* verb = app.add_subcommand("train", "a capture to a model");
   verb->footer("Settings of --method field for --set and --config, with their defaults:\n" +
                configToToml(FieldConfig().fields()) + "\nSettings of --method volume:\n" +
-               configToToml(VolumeConfig().fields()) +
+               configToToml(VolumeConfig().fields()) + "\nSettings of --method hash:\n" +
+               configToToml(HashConfig().fields()) +
                "\nExamples:\n  tessera train fox.capture fox.model --method field --minutes 10\n"
                "  tessera train city.capture city.model --method volume --blocks 2x2 --minutes 15");
   verb->add_option("capture", flags->capture, "capture folder")->required();
   verb->add_option("model", flags->model, "model folder to write")->required();
   verb->add_option("--method", flags->method, "representation")
       ->capture_default_str()
-      ->check(CLI::IsMember({"field", "volume"}));
+      ->check(CLI::IsMember({"field", "volume", "hash"}));
   CLI::Option* steps = verb->add_option("--steps", flags->loop.steps, "training steps")
                            ->default_str(fmt::format("{}, or what the run that is resumed had planned", kDefaultSteps))
                            ->check(CLI::Range(int64_t{1}, int64_t{1} << 40));
@@ -97,9 +108,10 @@ void addTrainVerb(CLI::App& app) {
       ->excludes(steps);
   verb->add_flag("--resume", flags->loop.resume, "go on with the model that is in the folder");
   CLI::Option* blocks =
-      verb->add_option("--blocks", flags->blocks, "of --method volume: auto, or so many along x and y, as 3x2")
+      verb->add_option("--blocks", flags->blocks, "of --method volume and hash: auto, or so many along x and y, as 3x2")
           ->capture_default_str();
-  verb->add_option("--grid", flags->grid, "of --method volume: the blocks of this blocks.json, of another model")
+  verb->add_option("--grid", flags->grid,
+                   "of --method volume and hash: the blocks of this blocks.json, of another model")
       ->check(CLI::ExistingFile)
       ->excludes(blocks);
   verb->add_option("--resident-blocks", flags->residentBlocks,
@@ -107,7 +119,7 @@ void addTrainVerb(CLI::App& app) {
                    "resident_blocks=...")
       ->check(CLI::Range(1, 1 << 20));
   verb->add_option("--memory-mib", flags->memoryMiB,
-                   "of --method volume: memory to plan blocks and photos for; default: what the machine has")
+                   "of --method volume and hash: memory to plan blocks and photos for; default: what the machine has")
       ->check(amount(1, 1e9));
   verb->add_option("--seed", flags->seed, "of everything random, a whole number; the same as --set seed=...");
   verb->add_option("--config", flags->configFile, "settings file (TOML)")->check(CLI::ExistingFile);

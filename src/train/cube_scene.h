@@ -10,6 +10,7 @@
 
 #include "base/image_io.h"
 #include "base/random.h"
+#include "scene/block_grid.h"
 #include "scene/capture.h"
 #include "scene/view_renderer.h"
 
@@ -192,6 +193,17 @@ inline double psnrOf(const RenderedView& view, const RenderedView& truth, int fr
     }
   }
   return -10 * std::log10(sum / static_cast<double>(count));
+}
+
+// About the cube, which has half a side of 0.5: one block, or two that meet in its middle.
+inline BlockGrid cubeGrid(int columns = 1) {
+  BlockGrid grid;
+  grid.originInWorld = CubeScene::centre();
+  grid.edge = 1.4;
+  grid.columns = columns;
+  grid.bottom = -0.7;
+  grid.top = 0.7;
+  return grid;
 }
 
 }  // namespace tessera

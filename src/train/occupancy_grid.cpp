@@ -5,12 +5,19 @@
 
 namespace tessera {
 
-OccupancyGrid::OccupancyGrid(Device& device, const MarchSpace& space)
+OccupancyGrid::OccupancyGrid(Device& device, const MarchSpace& space, Slice<uint32_t> bits)
     : device_(device),
       space_(space),
       cells_(static_cast<uint32_t>(space.gridResolution * space.gridResolution * space.gridResolution)),
       grid_(device.array<float>(cells_)),
-      bits_(device.arrayOf(std::vector<uint32_t>(cells_ / 32, ~0u))) {}
+      keptBits_(bits) {
+  if (!keptBits_) {
+    ownBits_ = device.array<uint32_t>(cells_ / 32);
+    keptBits_ = ownBits_;
+  }
+  const std::vector<uint32_t> all(cells_ / 32, ~0u);
+  device_.write(keptBits_, std::span<const uint32_t>(all));
+}
 
 void OccupancyGrid::exclude(const std::vector<bool>& visible) {
   CHECK(visible.size() == cells_);
@@ -41,7 +48,7 @@ void OccupancyGrid::update(const LogDensity& logDensity, uint32_t uniform, uint3
   for (uint32_t first = 0; first < points; first += chunk) {
     const uint32_t count = std::min(chunk, points - first);
     const Slice<float> positions = positions_.part(0, size_t{count} * 3);
-    device_.run(OccupancyPoints{space_, uniform, occupied, seed, candidates_, bits_, chosen_.part(first, count),
+    device_.run(OccupancyPoints{space_, uniform, occupied, seed, candidates_, bits(), chosen_.part(first, count),
                                 positions, first});
     logDensity({count, {}}, positions, Matrix<float>(logDensities_.part(first, count), 1));
   }
@@ -50,7 +57,7 @@ void OccupancyGrid::update(const LogDensity& logDensity, uint32_t uniform, uint3
   update.cells = chosen_;
   update.logDensity = Matrix<const float>(logDensities_, 1);
   update.grid = grid_;
-  update.occupancy = bits_;
+  update.occupancy = keptBits_;
   device_.run(update);
 }
 
@@ -62,9 +69,9 @@ double OccupancyGrid::occupiedFraction() {
 
 void OccupancyGrid::restore(std::span<const float> values, std::span<const uint32_t> bits) {
   CHECK(values.size() == grid_.size());
-  CHECK(bits.size() == bits_.size());
+  CHECK(bits.size() == keptBits_.count);
   device_.write(grid_.all(), values);
-  device_.write(bits_.all(), bits);
+  device_.write(keptBits_, bits);
 }
 
 }  // namespace tessera

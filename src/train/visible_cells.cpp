@@ -13,8 +13,8 @@ constexpr size_t kEnough = 20;          // observations of a photo
 constexpr double kNearestShare = 0.02;  // of the observations are taken for outliers
 constexpr double kSlack = 0.25;         // of the width: other views look a little past what photos show
 
-// Scene position of a point given in grid coordinates. Nothing for what no point of the scene maps to.
-bool sceneFromGrid(const MarchSpace& space, const Vec3d& u, Vec3d* x) {
+// The place in the block of a point given in grid coordinates. Nothing for what no point of the scene maps to.
+bool blockFromGrid(const MarchSpace& space, const Vec3d& u, Vec3d* x) {
   if (!space.contracted) {
     *x = 2 * u - Vec3d::Ones();
     return true;
@@ -75,7 +75,9 @@ std::vector<double> nearestContent(const Capture& capture) {
   return nearest;
 }
 
-std::vector<bool> visibleCells(const Capture& capture, const SceneFrame& frame, const MarchSpace& space) {
+std::vector<bool> visibleCells(const Capture& capture, const SceneFrame& frame, const MarchSpace& space,
+                               const BlockDomain& block) {
+  const Vec3d centre(block.centre.data()), scale(block.scale.data());
   const std::vector<double> nearest = nearestContent(capture);
   std::vector<View> views;
   for (const int photo : capture.photosIn(Split::train)) {
@@ -97,9 +99,9 @@ std::vector<bool> visibleCells(const Capture& capture, const SceneFrame& frame, 
           const Vec3d offset((corner & 1 ? 1 : -1) * reach, (corner & 2 ? 1 : -1) * reach,
                              (corner & 4 ? 1 : -1) * reach);
           const Vec3d u = (Vec3d(x, y, static_cast<double>(z)) + (offset + Vec3d::Ones()) / 2) / blocks;
-          Vec3d inScene;
-          if (!sceneFromGrid(space, u, &inScene)) continue;
-          const Vec3d inWorld = frame.worldFromScene(inScene);
+          Vec3d inBlock;
+          if (!blockFromGrid(space, u, &inBlock)) continue;
+          const Vec3d inWorld = frame.worldFromScene(centre + scale.cwiseProduct(inBlock));
           for (size_t i = 0; i < views.size() && !visible; ++i) {
             const size_t candidate = (last + i) % views.size();
             visible = sees(views[candidate], inWorld);

@@ -10,8 +10,6 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "base/memory.h"
-#include "partition/block_map.h"
-#include "scene/block_grid_json.h"
 #include "train/known_distances.h"
 #include "train/run_folder.h"
 
@@ -49,19 +47,14 @@ BlockLimits limitsOf(const TrainVolumeOptions& options) {
   return limits;
 }
 
-// Cuts the capture, draws the map, and says what people should know before hours of training.
-BlockGrid cut(const Capture& capture, const fs::path& model, const TrainVolumeOptions& options) {
+PartitionOptions partitioningFor(const Capture& capture, const TrainVolumeOptions& options) {
   PartitionOptions partitioning;
   partitioning.blocks = options.blocks;
   partitioning.grid = options.grid;
   partitioning.limits = limitsOf(options);
   partitioning.enough.pixels = int64_t{options.config.planes} * options.config.planes / 16;
   partitioning.depthOf = KnownDepths(capture, kMostPixelsOff);
-  const Partition partition = partitionCapture(capture, partitioning);
-  for (const std::string& note : partition.notes) inform("{}", note);
-  for (const ThinCell& thin : partition.thin) warn("{}", thin.warning);
-  writeBlockMap(model, capture, partition);
-  return partition.grid;
+  return partitioning;
 }
 
 }  // namespace
@@ -197,22 +190,6 @@ bool trainLevel(const fs::path& model, const Training& on, VolumeConfig config, 
   return runTraining(trainer, folder, loop).finished;
 }
 
-// A run that goes on keeps its blocks.
-void requireSameGrid(const ModelFolder& folder, const BlockGrid& has, const TrainVolumeOptions& wanted) {
-  const auto other = [&](const std::string& flag, const std::string& why) {
-    return Error((folder.root() / "blocks.json").string(), "grid", why,
-                 fmt::format("resume without {}, or train into another folder", flag));
-  };
-  if (wanted.grid && blockGridToJson(has) != blockGridToJson(*wanted.grid)) {
-    throw other("--grid", "the run has other blocks than those of --grid");
-  }
-  const BlockCount& count = wanted.blocks;
-  if (!wanted.grid && !count.automatic && (count.columns != has.columns || count.rows != has.rows)) {
-    throw other("--blocks",
-                fmt::format("the run has {}x{} blocks, not {}x{}", has.columns, has.rows, count.columns, count.rows));
-  }
-}
-
 }  // namespace
 
 TrainingResult trainVolume(Device& device, const Capture& capture, const fs::path& model, TrainVolumeOptions options) {
@@ -226,8 +203,8 @@ TrainingResult trainVolume(Device& device, const Capture& capture, const fs::pat
   config.photoBudgetMiB = settledPhotoBudget(config.photoBudgetMiB, capture,
                                              static_cast<int64_t>(2 * kShareOfPhotos * plannedMemory(options)));
   // A resumed run stands where the killed one stood, whatever has become of the capture's points since.
-  const BlockGrid grid = goingOn ? requireGrid(folder) : cut(capture, model, options);
-  if (goingOn) requireSameGrid(folder, grid, options);
+  const BlockGrid grid = goingOn ? requireGrid(folder) : cutBlocks(capture, model, partitioningFor(capture, options));
+  if (goingOn) requireSameBlocks(model / "blocks.json", grid, options.blocks, options.grid);
   const Training on{device, capture, grid};
   TrainingResult result;
   {

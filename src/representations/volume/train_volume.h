@@ -1,7 +1,7 @@
 // `tessera train --method volume`: a capture to a model folder.
 #pragma once
 
-#include "partition/partition.h"
+#include "partition/cut_blocks.h"
 #include "representations/volume/volume_trainer.h"
 
 namespace tessera {

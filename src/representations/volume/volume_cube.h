@@ -6,17 +6,6 @@
 
 namespace tessera {
 
-// About the cube, which has half a side of 0.5: one block, or two that meet in its middle.
-inline BlockGrid cubeGrid(int columns = 1) {
-  BlockGrid grid;
-  grid.originInWorld = CubeScene::centre();
-  grid.edge = 1.4;
-  grid.columns = columns;
-  grid.bottom = -0.7;
-  grid.top = 0.7;
-  return grid;
-}
-
 // Small enough for seconds, large enough to learn the cube.
 inline VolumeConfig smallVolumeConfig() {
   VolumeConfig config;

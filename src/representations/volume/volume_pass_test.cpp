@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/random.h"
+#include "field/expect_gradients.h"
 #include "representations/volume/volume_cube.h"
 
 namespace tessera {
@@ -75,26 +76,7 @@ TEST(VolumePass, HasTheGradientsOfItsPictureInEveryParameter) {
     const uint32_t last = model.space().blocks() - 1;
     for (ParameterGroup* group : {&model.attributes().network(0), &model.attributes().network(last), &model.deferred(),
                                   &model.attributes().table(1)}) {
-      const std::vector<float> gradients = scene.device->read(group->gradients.all());
-      std::vector<float> values = scene.device->read(group->values.all());
-      // Those that matter most: small ones drown in the rounding of floats.
-      std::vector<size_t> order(gradients.size());
-      for (size_t i = 0; i < order.size(); ++i) order[i] = i;
-      std::partial_sort(order.begin(), order.begin() + 6, order.end(),
-                        [&](size_t a, size_t b) { return std::abs(gradients[a]) > std::abs(gradients[b]); });
-      const double largest = std::abs(gradients[order[0]]);
-      ASSERT_GT(largest, 1e-3) << group->name;
-      for (size_t k = 0; k < 6; ++k) {
-        const float before = values[order[k]], h = 2e-3f;
-        const auto lossAt = [&](float value) {
-          values[order[k]] = value;
-          scene.device->write(group->values.all(), std::span<const float>(values));
-          return scene.loss(colour, opacity);
-        };
-        const double slope = (lossAt(before + h) - lossAt(before - h)) / (2.0 * h);
-        lossAt(before);
-        EXPECT_NEAR(gradients[order[k]], slope, 0.03 * largest) << group->name << ", parameter " << order[k];
-      }
+      expectGradientsOfDifferences(*scene.device, *group, [&] { return scene.loss(colour, opacity); });
     }
   }
 }

@@ -1,0 +1,69 @@
+// Every setting of the `hash` representation (NGP-RT): flag (`--set`), default, help and the line in config.toml.
+#pragma once
+
+#include "base/config.h"
+#include "compute/attention.h"
+#include "compute/block_march.h"
+#include "compute/virtual_grid.h"
+#include "field/block_fields.h"
+
+namespace tessera {
+
+struct HashConfig {
+  // `cpu`, the defaults below; `paper`, what the paper uses on a large graphics card.
+  std::string preset = "cpu";
+
+  // Scene
+  std::string surround = "own", background = "random";
+  double near = 0.05;
+  // Coarse features and attention
+  int lattice = 128;
+  int coarseLevels = 6, coarseFeatures = 4, coarseLog2Size = 17, coarseBase = 16;
+  int width = 64, hidden = 1;
+  // Fine features
+  int levels = 3, fineLog2Size = 17;
+  std::string aggregation = "attention", attention = "separate";
+  bool attentionVaries = true;
+  // What depends on the direction
+  int directionWidth = 64, directionHidden = 2;
+  // Marching
+  double step = 0.866;
+  int occupancyResolution = 128;
+  // Batches
+  int64_t seed = 0;
+  int samplesPerStep = 1 << 16, texelsPerStep = 3 << 16;
+  int firstRays = 512, mostRays = 8000;
+  double photoBudgetMiB = 0;
+  int stepsPerPhoto = 2;
+  // Occupancy
+  int occupancyEvery = 16, occupancyWarmUp = 256;
+  double occupancyShare = 0.0625;
+  // Optimiser
+  double rate = 1e-2, fineRateFactor = 1, finalRateFactor = 0.03, constantRateShare = 0.4, networkL2 = 1e-6,
+         exposureRate = 1e-3;
+  // Losses
+  std::string loss = "huber";
+  double lossParameter = 0.1, distortion = 0.01, rampShare = 0.5, fullGradientDistance = 1;
+  double depth = 0.03, depthTolerance = 0.01, knownShare = 0.125;
+  // The length of steps follows the number of samples that rays have.
+  double fewestSamples = 3, shortestStep = 0.2217, stepChange = 1e-3;
+  bool exposure = true;
+
+  std::vector<ConfigField> fields();
+  // Throws Error naming the first setting that no model can be made of.
+  void check() const;
+  // Throws Error when there is no such preset.
+  static HashConfig ofPreset(const std::string& name);
+
+  Surround surroundKind() const;
+  AttentionShape attentionShape() const;
+  bool mixesByNetwork() const { return aggregation == "mlp"; }
+  VirtualGrid latticeGrid() const;      // of voxels alone
+  BlockFieldShape coarseShape() const;  // → LatticeForward::kColumns
+  HashGrid fineGrid() const;            // one level of 8 features after another
+  MlpShape mixShape() const;            // with mixesByNetwork: lattice columns and fine levels → 8
+  MlpShape directionShape() const;      // 3 diffuse, 4 features, 16 harmonics → 3
+  float longestStep() const { return static_cast<float>(step / lattice); }  // of the width of a domain
+};
+
+}  // namespace tessera

@@ -1,0 +1,72 @@
+#include "representations/hash/config.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "base/error.h"
+#include "base/file.h"
+
+namespace tessera {
+namespace {
+
+TEST(HashConfig, HasPresetsThatCanBeTrained) {
+  for (const char* name : {"cpu", "paper"}) {
+    HashConfig config = HashConfig::ofPreset(name);
+    EXPECT_NO_THROW(config.check());
+    EXPECT_EQ(config.preset, name);
+  }
+  EXPECT_THROW(HashConfig::ofPreset("gpu"), Error);
+}
+
+TEST(HashConfig, OfThePaperHasThePapersTables) {
+  const HashConfig paper = HashConfig::ofPreset("paper");
+  const HashGrid coarse = paper.coarseShape().grid, fine = paper.fineGrid();
+  // Invariant 1: 16 to 512 in six levels of four features, of which the finest three are hashed.
+  EXPECT_EQ(coarse.columns(), 24u);
+  EXPECT_EQ(coarse.entries(), 6590464u);
+  ASSERT_EQ(fine.levels.size(), 2u);
+  EXPECT_EQ(fine.levels[0].resolution, 1024u);
+  EXPECT_EQ(fine.levels[1].resolution, 2048u);
+  // Invariant 2: a fiftieth of the lattice of 8 features and 4 weights, and the fine tables, are 99.3 million numbers.
+  EXPECT_EQ(fine.parameters(), size_t{2} * 8 << 22);
+  EXPECT_NEAR(12 * 0.02 * std::pow(512, 3) + static_cast<double>(fine.parameters()), 99.32e6, 0.01e6);
+  // Invariant 3: half the diagonal of an edge of the lattice, which is 4 / 512 long.
+  EXPECT_NEAR(paper.longestStep() * 4, 2 * std::sqrt(3) / 512, 1e-6);
+}
+
+TEST(HashConfig, ComesBackFromItsFile) {
+  HashConfig config = HashConfig::ofPreset("paper"), read;
+  config.surround = "none";
+  config.depth = 0.25;
+  const fs::path path = fs::temp_directory_path() / "tessera-hash-config.toml";
+  writeFileAtomically(path, configToToml(config.fields()));
+  configFromToml(read.fields(), path);
+  fs::remove(path);
+  const std::vector<ConfigField> before = config.fields(), after = read.fields();
+  for (size_t i = 0; i < before.size(); ++i) EXPECT_EQ(configValueText(before[i]), configValueText(after[i]));
+}
+
+TEST(HashConfig, RefusesWhatNoModelCanBeMadeOf) {
+  const std::function<void(HashConfig&)> wrongs[] = {
+      [](HashConfig& c) { c.surround = "everywhere"; },
+      [](HashConfig& c) { c.preset = "huge"; },
+      [](HashConfig& c) { c.near = 1.5; },
+      [](HashConfig& c) { c.levels = 5; },
+      [](HashConfig& c) { c.aggregation = "vote"; },
+      [](HashConfig& c) { c.attention = "none"; },
+      [](HashConfig& c) { c.background = "white"; },
+      [](HashConfig& c) { c.width = 48; },
+      [](HashConfig& c) { c.occupancyResolution = 30; },
+      [](HashConfig& c) { c.coarseBase = 4096; },
+  };
+  for (const auto& wrong : wrongs) {
+    HashConfig config;
+    wrong(config);
+    EXPECT_THROW(config.check(), Error);
+  }
+}
+
+}  // namespace
+}  // namespace tessera

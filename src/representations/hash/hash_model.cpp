@@ -1,0 +1,257 @@
+#include "representations/hash/hash_model.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/random.h"
+#include "field/initial_values.h"
+#include "train/run_folder.h"
+
+namespace tessera {
+namespace {
+
+// Samples of a ray that a round makes: few at first, for most rays end early.
+constexpr uint32_t kMostOfRound[HashSamples::kRounds] = {8, 16, 32, 64, 128, 0xffffffffu};
+
+Device& able(Device& device, const HashConfig& config) {
+  config.check();
+  requireAllOperations(device);
+  return device;
+}
+
+// The same bits as numbers, for operations that only move them.
+Slice<float> asFloats(const Slice<uint32_t>& words) {
+  return {words.memory, words.first, words.count};
+}
+
+}  // namespace
+
+HashSamples::HashSamples(Device& device, uint32_t rays, uint32_t samples)
+    : firstSample(device.array<uint32_t>(rays + size_t{1})),
+      rayOfSample(device.array<uint32_t>(samples)),
+      slotOfSample(device.array<uint32_t>(samples)),
+      positions(device.array<float>(size_t{samples} * 3)) {
+  for (Array<float>* each : {&distances, &steps, &middles, &widths}) *each = device.array<float>(samples);
+}
+
+HashModel::HashModel(Device& device, const HashConfig& config, const BlockGrid& grid, bool forTraining)
+    : device_(able(device, config)),
+      config_(config),
+      grid_(grid),
+      frame_(sceneFrameOf(grid)),
+      space_(blockSpaceOf(grid, config.near, config.surroundKind())),
+      fields_(device, config, space_.blocks(), forTraining),
+      direction_(device, "direction.network",
+                 initialWeights(config.directionShape(), mix64(static_cast<uint64_t>(config.seed) + 2), 0xd1),
+                 forTraining),
+      seen_(space_.blocks(), true) {
+  const size_t cells = static_cast<size_t>(config.occupancyResolution), words = cells * cells * cells / 32;
+  occupied_ = device.array<uint32_t>(words * space_.blocks());
+  for (uint32_t block = 0; block < space_.blocks(); ++block) {
+    occupancy_.emplace_back(device, occupancySpace(block), occupied_.part(block * words, words));
+  }
+}
+
+MarchSpace HashModel::occupancySpace(uint32_t block) const {
+  const BlockSpace::Placement placement = space_.placement(block);
+  MarchSpace space;
+  space.contracted = placement.contracted;
+  space.gridResolution = config_.occupancyResolution;
+  space.near = space_.near;
+  // A step's length in the scene grows outside the cube, across the rays from it as fast as the distance.
+  space.minStep = config_.longestStep() * 2 * placement.halfDomain() * placement.scale[0];
+  space.cone = placement.contracted ? space.minStep : 0;
+  return space;
+}
+
+void HashModel::reserve(uint32_t rays, uint32_t samples, uint32_t texels) {
+  fields_.reserve(samples, texels);
+  if (nextInterval_.size() < rays || !roundFirst_.size()) {
+    nextInterval_ = device_.array<uint32_t>(rays);
+    opticalDepth_ = device_.array<float>(rays);
+    roundFirst_ = device_.array<uint32_t>(size_t{HashSamples::kRounds} * (rays + size_t{1}));
+  }
+  if (source_.size() < samples) {
+    const size_t all = size_t{HashSamples::kRounds} * samples;
+    source_ = device_.array<uint32_t>(samples);
+    for (Array<uint32_t>* words : {&slots_, &rays_}) *words = device_.array<uint32_t>(all);
+    positions_ = device_.array<float>(all * 3);
+    for (Array<float>* one : {&distances_, &steps_, &middles_, &widths_, &logDensities_}) {
+      *one = device_.array<float>(all);
+    }
+  }
+}
+
+void HashModel::sample(const Rays& rays, float minTransmittance, HashSamples& seen) {
+  const uint32_t capacity = static_cast<uint32_t>(seen.distances.size());
+  CHECK(source_.size() >= capacity);
+  CHECK(rays.count < seen.firstSample.size());
+  const float mostOpticalDepth = -std::log(minTransmittance);
+  const size_t firstsOfRound = rays.count + size_t{1};
+  device_.fillZero(nextInterval_.part(0, rays.count));
+  device_.fillZero(opticalDepth_.part(0, rays.count));
+  for (uint32_t round = 0; round < HashSamples::kRounds; ++round) {
+    const auto ofRound = [&](auto& array, uint32_t columns) {
+      return array.part(size_t{round} * capacity * columns, size_t{capacity} * columns);
+    };
+    MarchBlocks march{space_};
+    march.cells = static_cast<uint32_t>(config_.occupancyResolution);
+    march.step = static_cast<float>(stepScale_) * config_.longestStep();
+    march.rays = {rays.count};
+    march.sampleCapacity = capacity;
+    march.most = kMostOfRound[round];
+    march.mostOpticalDepth = mostOpticalDepth;
+    march.origins = rays.origins;
+    march.directions = rays.directions;
+    march.jitter = rays.jitter;
+    march.nearOfRay = rays.near;
+    march.farOfRay = rays.far;
+    march.occupancy = occupied_;
+    march.opticalDepth = opticalDepth_;
+    march.nextInterval = nextInterval_;
+    march.firstSample = roundFirst_.part(round * firstsOfRound, firstsOfRound);
+    march.sampleCount = seen.counters.part(2 + round, 1);
+    march.rayOfSample = ofRound(rays_, 1);
+    march.slotOfSample = ofRound(slots_, 1);
+    march.positions = ofRound(positions_, 3);
+    march.distances = ofRound(distances_, 1);
+    march.steps = ofRound(steps_, 1);
+    march.middles = ofRound(middles_, 1);
+    march.widths = ofRound(widths_, 1);
+    device_.run(march);
+    const Count made{capacity, march.sampleCount};
+    const Matrix<const float> features = fields_.forward({made, march.slotOfSample, march.positions}, false);
+    const Matrix<float> logDensities(ofRound(logDensities_, 1), 1);
+    device_.fillZero(logDensities.data);
+    device_.run(AddColumns{made, Matrix<const float>(features.data, 1, features.rowStride), logDensities});
+    device_.run(OpticalDepth{march.rays, march.firstSample, logDensities, march.steps, opticalDepth_});
+  }
+
+  CompactSamples compact;
+  compact.rays = {rays.count};
+  compact.rounds = HashSamples::kRounds;
+  compact.sampleCapacity = compact.keptCapacity = capacity;
+  compact.mostOpticalDepth = mostOpticalDepth;
+  compact.firstSample = roundFirst_;
+  compact.nextStep = nextInterval_;
+  compact.logDensity = Matrix<float>(logDensities_, 1);
+  compact.steps = steps_;
+  compact.keptFirstSample = seen.firstSample;
+  compact.keptCount = seen.counters.part(0, 1);
+  compact.finishedRays = seen.counters.part(1, 1);
+  compact.source = source_;
+  compact.rayOfSample = seen.rayOfSample;
+  device_.run(compact);
+  const auto gather = [&](const Slice<float>& from, const Slice<float>& to, uint32_t columns) {
+    device_.run(GatherRows{seen.samples(), source_, Matrix<float>(from, columns), Matrix<float>(to, columns)});
+  };
+  gather(asFloats(slots_), asFloats(seen.slotOfSample), 1);
+  gather(positions_, seen.positions, 3);
+  gather(distances_, seen.distances, 1);
+  gather(steps_, seen.steps, 1);
+  gather(middles_, seen.middles, 1);
+  gather(widths_, seen.widths, 1);
+}
+
+void HashModel::adaptStep(double samplesPerRay) {
+  const double change = config_.stepChange;
+  stepScale_ = samplesPerRay >= config_.fewestSamples ? std::min(1.0, (1 + change) * stepScale_)
+                                                      : std::max(config_.shortestStep, (1 - change) * stepScale_);
+}
+
+void HashModel::exclude(uint32_t block, const std::vector<bool>& visible) {
+  if (std::find(visible.begin(), visible.end(), true) != visible.end()) {
+    occupancy_[block].exclude(visible);
+    return;
+  }
+  seen_[block] = false;
+  const std::vector<float> values(visible.size(), -1);
+  const std::vector<uint32_t> bits(visible.size() / 32);
+  occupancy_[block].restore(values, bits);
+}
+
+void HashModel::refreshOccupancy(bool everything, uint64_t seed) {
+  const uint32_t chunk = static_cast<uint32_t>(std::max<size_t>(source_.size(), 1 << 12));
+  if (slotOfPoint_.size() < chunk) slotOfPoint_ = device_.array<uint32_t>(chunk);
+  for (uint32_t block = 0; block < space_.blocks(); ++block) {
+    if (!seen_[block]) continue;
+    const uint32_t cells = occupancy_[block].visibleCells();
+    const uint32_t share = static_cast<uint32_t>(std::ceil(cells * config_.occupancyShare));
+    const std::vector<uint32_t> slots(chunk, block);
+    device_.write(slotOfPoint_.all(), std::span<const uint32_t>(slots));
+    const auto logDensity = [&](Count count, Slice<const float> positions, Matrix<float> logDensities) {
+      const Matrix<const float> features = fields_.forward({count, slotOfPoint_, positions}, false);
+      device_.fillZero(logDensities.data);
+      device_.run(AddColumns{count, Matrix<const float>(features.data, 1, features.rowStride), logDensities});
+    };
+    const uint64_t ofBlock = mix64(seed ^ (uint64_t{block} << 48));
+    occupancy_[block].update(logDensity, everything ? cells : share, everything ? 0 : share, ofBlock, chunk);
+  }
+}
+
+double HashModel::occupiedFraction() {
+  double sum = 0;
+  for (OccupancyGrid& occupancy : occupancy_) sum += occupancy.occupiedFraction();
+  return sum / static_cast<double>(occupancy_.size());
+}
+
+std::vector<ParameterGroup*> HashModel::sharedGroups() {
+  std::vector<ParameterGroup*> groups = fields_.sharedGroups();
+  groups.push_back(&direction_);
+  return groups;
+}
+
+void HashModel::save(uint32_t block, TensorSet& tensors, bool withMoments) {
+  for (const ParameterGroup* group : fields_.groupsOf(block)) tensors.add(device_, *group, withMoments);
+  tensors.add("occupancy.values", occupancy_[block].values());
+  tensors.add("occupancy.bits", occupancy_[block].bitWords());
+  if (block != 0) return;
+  for (const ParameterGroup* group : sharedGroups()) tensors.add(device_, *group, withMoments);
+  tensors.add("step_scale", std::vector<double>{stepScale_});
+}
+
+void HashModel::restore(uint32_t block, const fs::path& path, const Safetensors& file) {
+  for (ParameterGroup* group : fields_.groupsOf(block)) loadGroup(device_, path, file, *group);
+  const auto values = file.require(path, "occupancy.values", TensorType::f32).as<float>();
+  const auto bits = file.require(path, "occupancy.bits", TensorType::u32).as<uint32_t>();
+  OccupancyGrid& occupancy = occupancy_[block];
+  if (values.size() != occupancy.cells() || bits.size() != occupancy.cells() / 32) {
+    throw Error(path.string(), "tensor occupancy.values", "has another resolution than the settings",
+                "the file belongs to another config.toml");
+  }
+  occupancy.restore(values, bits);
+  if (block != 0) return;
+  for (ParameterGroup* group : sharedGroups()) loadGroup(device_, path, file, *group);
+  const TensorView& scale = file.require(path, "step_scale", TensorType::f64);
+  if (scale.elements() != 1 || !(scale.as<double>()[0] > 0) || scale.as<double>()[0] > 1) {
+    throw Error(path.string(), "tensor step_scale", "is not one number above 0 and up to 1", "train again");
+  }
+  stepScale_ = scale.as<double>()[0];
+}
+
+bool HashModel::allFinite(uint32_t block) {
+  for (const ParameterGroup* group : fields_.groupsOf(block)) {
+    if (!group->allFinite(device_)) return false;
+  }
+  if (block != 0) return true;
+  const std::vector<ParameterGroup*> shared = sharedGroups();
+  return std::all_of(shared.begin(), shared.end(), [&](ParameterGroup* group) { return group->allFinite(device_); });
+}
+
+std::unique_ptr<HashModel> loadHashModel(Device& device, const fs::path& folder) {
+  const ModelFolder model(folder);
+  const ModelManifest manifest = requireManifest(model, "hash");
+  HashConfig config;
+  configFromToml(config.fields(), model.configPath());
+  auto made = std::make_unique<HashModel>(device, config, requireGrid(model), false);
+  requireOneFileABlock(folder, manifest, made->space().blocks());
+  for (uint32_t block = 0; block < made->space().blocks(); ++block) {
+    const fs::path file = folder / manifest.files[block];
+    made->restore(block, file, readSafetensors(file));
+  }
+  return made;
+}
+
+}  // namespace tessera

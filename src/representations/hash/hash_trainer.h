@@ -1,0 +1,45 @@
+// One training step of the `hash` representation: rays → samples → features → picture → losses → gradients → Adam.
+#pragma once
+
+#include "representations/hash/hash_pass.h"
+#include "train/photo_exposures.h"
+#include "train/photo_rays.h"
+#include "train/training_loop.h"
+
+namespace tessera {
+
+class HashTrainer final : public Trainee {
+ public:
+  // Keeps references to `device` and `capture`. Trains on the capture's training photos.
+  HashTrainer(Device& device, const Capture& capture, const HashConfig& config, const BlockGrid& grid);
+
+  StepReport step(int64_t step, int64_t plannedSteps) override;
+  // One part a block; what all share stands with block 0.
+  uint32_t parts() const override { return model_.space().blocks(); }
+  Bytes save(uint32_t part) override;
+  void restore(uint32_t part, const fs::path& path, const Safetensors& state) override;
+  std::optional<uint32_t> brokenPart() override;
+
+  HashModel& model() { return model_; }
+
+ private:
+  void refreshOccupancy(int64_t step);
+  HashModel::Rays drawRays(int64_t step);
+  void addGradients(const HashModel::Rays& rays, int64_t step, int64_t plannedSteps);
+  void updateParameters(int64_t step, int64_t plannedSteps);
+
+  Device& device_;
+  HashConfig config_;
+  HashModel model_;
+  HashPass pass_;
+  PhotoRays photoRays_;
+  PhotoExposures exposures_;
+  uint32_t rays_;  // of the next step
+  Array<float> exposed_, colourGradients_, opacityGradients_, losses_;
+};
+
+// The weight of the distortion loss, `step` into training: from 0 it rises to the config's (section 5 of the
+// specification's schedules).
+double distortionWeight(const HashConfig& config, int64_t step, int64_t plannedSteps);
+
+}  // namespace tessera

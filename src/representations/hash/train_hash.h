@@ -1,0 +1,24 @@
+// `tessera train --method hash`: a capture to a model folder.
+#pragma once
+
+#include "partition/cut_blocks.h"
+#include "representations/hash/hash_trainer.h"
+
+namespace tessera {
+
+struct TrainHashOptions {
+  HashConfig config;
+  TrainingLoopOptions loop;
+  BlockCount blocks;
+  std::optional<BlockGrid> grid;  // of these blocks, whatever `blocks` says
+  double memoryMiB = 0;           // to plan blocks and photos for; 0: what the machine has
+};
+
+// Cuts the capture into blocks, or takes those that are given (blocks.json, blocks.svg, blocks.geojson), warns of those
+// that will not come out well, trains, resumes, saves; see training_loop.h. Writes config.toml and blocks.json first.
+TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options);
+
+// What training keeps of one block.
+double trainingBytesPerBlock(const HashConfig& config);
+
+}  // namespace tessera
