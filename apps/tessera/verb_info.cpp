@@ -9,6 +9,7 @@
 #include "import/importer.h"
 #include "render/volume_scene.h"
 #include "representations/field/train_field.h"
+#include "representations/hash/config.h"
 #include "representations/volume/train_volume.h"
 #include "tiles/scene_folder.h"
 #include "train/run_folder.h"
@@ -51,20 +52,34 @@ ordered_json describeModel(const fs::path& folder) {
   const auto describeConfig = [&](const std::vector<ConfigField>& fields) {
     for (const ConfigField& field : fields) info["config"][std::string(field.name)] = configValueText(field);
   };
-  if (info["method"] == "volume") {
-    VolumeConfig config = savedConfig<VolumeConfig>(folder);
-    const BlockFieldShape attributes = config.attributeShape(), proposals = config.proposalShape();
+  const auto describeBlocks = [&] {
     info["blocks"] = {{"columns", placement.grid ? placement.grid->columns : 0},
                       {"rows", placement.grid ? placement.grid->rows : 0},
                       {"edge", placement.grid ? placement.grid->edge : 0}};
+  };
+  if (info["method"] == "volume") {
+    VolumeConfig config = savedConfig<VolumeConfig>(folder);
+    const BlockFieldShape attributes = config.attributeShape(), proposals = config.proposalShape();
+    describeBlocks();
     info["parameters_per_block"] = attributes.grid.parameters() + attributes.network.parameters() +
                                    proposals.grid.parameters() + proposals.network.parameters();
+    describeConfig(config.fields());
+    return info;
+  }
+  if (info["method"] == "hash") {
+    HashConfig config = savedConfig<HashConfig>(folder);
+    const BlockFieldShape coarse = config.coarseShape();
+    describeBlocks();
+    info["parameters_per_block"] =
+        coarse.grid.parameters() + coarse.network.parameters() + config.fineGrid().parameters();
+    info["multiply_accumulates_per_sample"] = config.multiplyAccumulates();
     describeConfig(config.fields());
     return info;
   }
   FieldConfig config = savedConfig<FieldConfig>(folder);
   info["parameters"] =
       config.shape().grid.parameters() + config.shape().density.parameters() + config.shape().colour.parameters();
+  info["multiply_accumulates_per_sample"] = multiplyAccumulates(config.shape());
   describeConfig(config.fields());
   return info;
 }

@@ -29,6 +29,13 @@ struct MlpShape {
   size_t activationsPerSample() const { return static_cast<size_t>(width) * hiddenLayers; }
 };
 
+// Of one sample, without the padding.
+inline size_t multiplyAccumulatesOf(const MlpShape& shape) {
+  const size_t width = static_cast<size_t>(shape.width);
+  return width * (static_cast<size_t>(shape.inputs) + static_cast<size_t>(shape.outputs)) +
+         width * width * static_cast<size_t>(shape.hiddenLayers - 1);
+}
+
 // Both take part of the rows (Count::first).
 struct MlpForward {
   const MlpShape& shape;

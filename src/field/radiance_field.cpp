@@ -23,6 +23,10 @@ RadianceFieldShape makeRadianceFieldShape(const HashGridOptions& grid, int width
   return shape;
 }
 
+size_t multiplyAccumulates(const RadianceFieldShape& shape) {
+  return 8 * shape.grid.columns() + multiplyAccumulatesOf(shape.density) + multiplyAccumulatesOf(shape.colour);
+}
+
 RadianceField::RadianceField(Device& device, RadianceFieldShape shape, uint64_t seed)
     : device_(device),
       shape_(std::move(shape)),

@@ -14,6 +14,9 @@ struct RadianceFieldShape {
   int harmonicsDegree = 4;
 };
 
+// Of one sample: entries, and both networks.
+size_t multiplyAccumulates(const RadianceFieldShape& shape);
+
 RadianceFieldShape makeRadianceFieldShape(const HashGridOptions& grid, int width, int densityHidden, int colourHidden);
 
 class RadianceField {

@@ -57,8 +57,12 @@ void packRows(const Matrix<const float>& matrix, const float* data, size_t first
       std::memcpy(block + r * width, data + (first + r) * matrix.rowStride, sizeof(float) * columns);
     }
   } else {
-    for (int r = 0; r < rows; ++r) {
-      for (int c = 0; c < columns; ++c) block[r * width + c] = data[matrix.offset(first + r, c)];
+    const int group = static_cast<int>(matrix.groupWidth);
+    for (int c = 0; c < columns; c += group) {
+      const float* from = data + matrix.offset(first, c);
+      for (int r = 0; r < rows; ++r) {
+        std::memcpy(block + r * width + c, from + r * matrix.rowStride, sizeof(float) * std::min(group, columns - c));
+      }
     }
   }
   if (columns < width) {
@@ -97,8 +101,12 @@ void unpackRows(const float* block, int width, const Matrix<float>& matrix, floa
       std::memcpy(data + (first + r) * matrix.rowStride, block + r * width, sizeof(float) * columns);
     }
   } else {
-    for (int r = 0; r < rows; ++r) {
-      for (int c = 0; c < columns; ++c) data[matrix.offset(first + r, c)] = block[r * width + c];
+    const int group = static_cast<int>(matrix.groupWidth);
+    for (int c = 0; c < columns; c += group) {
+      float* to = data + matrix.offset(first, c);
+      for (int r = 0; r < rows; ++r) {
+        std::memcpy(to + r * matrix.rowStride, block + r * width + c, sizeof(float) * std::min(group, columns - c));
+      }
     }
   }
 }

@@ -184,6 +184,18 @@ TEST(ColourLoss, HasTheValuesOfItsFormulas) {
   EXPECT_EQ(colourLoss(ColourLossKind::mse, 0, 0.5).slope, 1);
 }
 
+TEST(ColourLoss, OfHuberHasNoKink) {
+  for (const double delta : {0.1, 1.0}) {
+    for (const double sign : {-1.0, 1.0}) {
+      const ValueAndSlope inside = colourLoss(ColourLossKind::huber, delta, sign * delta * (1 - 1e-9)),
+                          outside = colourLoss(ColourLossKind::huber, delta, sign * delta * (1 + 1e-9));
+      EXPECT_NEAR(inside.value, outside.value, 1e-8);
+      EXPECT_NEAR(inside.slope, outside.slope, 1e-8);
+      EXPECT_NEAR(outside.slope, sign, 1e-12);
+    }
+  }
+}
+
 TEST(Distortion, HasTheValuesOfItsTable) {
   const Doubles fences = {0, .1, .3, .35, .7, 1}, weights = {.05, .2, .4, .1, .05};
   const Doubles slopes = {.458333, .271667, .183333, .393333, .835};

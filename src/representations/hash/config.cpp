@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "base/config_checks.h"
 #include "compute/lattice.h"
 #include "train/block_frame.h"
@@ -16,6 +18,10 @@ HashConfig HashConfig::ofPreset(const std::string& name) {
   config.surround = "border";
   config.background = "learned";
   config.lattice = 512;
+  config.coarseLevels = 6;
+  config.step = 0.5 * std::sqrt(3.0);  // half of a voxel's diagonal
+  config.fineRateFactor = 1;
+  config.rampShare = 0.5;
   config.coarseLog2Size = 21;
   config.levels = 2;
   config.fineLog2Size = 22;
@@ -210,6 +216,18 @@ MlpShape HashConfig::directionShape() const {
   shape.hiddenLayers = directionHidden;
   shape.outputs = 3;
   return shape;
+}
+
+size_t HashConfig::multiplyAccumulates() const {
+  constexpr size_t kCorners = 8, kFeatures = AttentionShape::kFeatures;
+  const AttentionShape shape = attentionShape();
+  const size_t fine = kFeatures * shape.levels;
+  if (mixesByNetwork()) {
+    const MlpShape mix = mixShape();
+    return kCorners * (LatticeForward::kColumns + fine) + multiplyAccumulatesOf(mix);
+  }
+  const bool weighed = shape.weights != AttentionWeights::none;
+  return kCorners * (kFeatures + (shape.varies ? shape.logits() : 0) + fine) + (weighed ? fine : 0);
 }
 
 }  // namespace tessera

@@ -18,16 +18,16 @@ struct HashConfig {
   double near = 0.05;
   // Coarse features and attention
   int lattice = 128;
-  int coarseLevels = 6, coarseFeatures = 4, coarseLog2Size = 17, coarseBase = 16;
+  int coarseLevels = 8, coarseFeatures = 4, coarseLog2Size = 17, coarseBase = 16;
   int width = 64, hidden = 1;
   // Fine features
-  int levels = 3, fineLog2Size = 17;
+  int levels = 4, fineLog2Size = 18;
   std::string aggregation = "attention", attention = "separate";
   bool attentionVaries = true;
   // What depends on the direction
   int directionWidth = 64, directionHidden = 2;
   // Marching
-  double step = 0.866;
+  double step = 0.5;
   int occupancyResolution = 128;
   // Batches
   int64_t seed = 0;
@@ -39,11 +39,11 @@ struct HashConfig {
   int occupancyEvery = 16, occupancyWarmUp = 256;
   double occupancyShare = 0.0625;
   // Optimiser
-  double rate = 1e-2, fineRateFactor = 1, finalRateFactor = 0.03, constantRateShare = 0.4, networkL2 = 1e-6,
+  double rate = 1e-2, fineRateFactor = 5, finalRateFactor = 0.03, constantRateShare = 0.4, networkL2 = 1e-6,
          exposureRate = 1e-3;
   // Losses
   std::string loss = "huber";
-  double lossParameter = 0.1, distortion = 0.01, rampShare = 0.5, fullGradientDistance = 1;
+  double lossParameter = 0.1, distortion = 0.01, rampShare = 0, fullGradientDistance = 0.25;
   double depth = 0.03, depthTolerance = 0.01, knownShare = 0.125;
   // The length of steps follows the number of samples that rays have.
   double fewestSamples = 3, shortestStep = 0.2217, stepChange = 1e-3;
@@ -63,6 +63,8 @@ struct HashConfig {
   HashGrid fineGrid() const;            // one level of 8 features after another
   MlpShape mixShape() const;            // with mixesByNetwork: lattice columns and fine levels → 8
   MlpShape directionShape() const;      // 3 diffuse, 4 features, 16 harmonics → 3
+  // Of a renderer for one sample: corners, entries and weights; and the mixing network, where there is one.
+  size_t multiplyAccumulates() const;
   float longestStep() const { return static_cast<float>(step / lattice); }  // of the width of a domain
 };
 

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "field/radiance_field.h"
 
 namespace tessera {
 namespace {
@@ -34,6 +35,15 @@ TEST(HashConfig, OfThePaperHasThePapersTables) {
   EXPECT_NEAR(12 * 0.02 * std::pow(512, 3) + static_cast<double>(fine.parameters()), 99.32e6, 0.01e6);
   // Invariant 3: half the diagonal of an edge of the lattice, which is 4 / 512 long.
   EXPECT_NEAR(paper.longestStep() * 4, 2 * std::sqrt(3) / 512, 1e-6);
+}
+
+// Section 14 of the specification, and the paper's "over 90 %".
+TEST(HashConfig, TakesATenthOfTheArithmeticOfANetworkForEachSample) {
+  const HashConfig paper = HashConfig::ofPreset("paper"), cpu;
+  EXPECT_EQ(paper.multiplyAccumulates(), 8u * 12 + 2 * 8 * 8 + 2 * 8);
+  const size_t field = multiplyAccumulates(makeRadianceFieldShape({}, 64, 1, 2));
+  EXPECT_LT(paper.multiplyAccumulates(), 0.1 * static_cast<double>(field));
+  EXPECT_LT(cpu.multiplyAccumulates(), 0.1 * static_cast<double>(field));
 }
 
 TEST(HashConfig, ComesBackFromItsFile) {

@@ -1,0 +1,107 @@
+// The program as people use it with `--method hash`.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/program.h"
+
+namespace tessera {
+namespace {
+
+using nlohmann::json;
+
+// Settings that make a model in a moment.
+const std::vector<std::string> kTiny = {"lattice=16",
+                                        "coarse_levels=3",
+                                        "coarse_log2_size=10",
+                                        "width=16",
+                                        "levels=2",
+                                        "fine_log2_size=10",
+                                        "direction_width=16",
+                                        "occupancy_resolution=16",
+                                        "samples_per_step=4096",
+                                        "first_rays=64",
+                                        "most_rays=512"};
+
+class HashCommandLine : public testing::Test {
+ protected:
+  // One city for all tests.
+  static void SetUpTestSuite() {
+    folder_ = fs::weakly_canonical(fs::temp_directory_path()) / ("tessera-hash-line-" + std::to_string(::getpid()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    const Said said = run({"synth", "city", at("city"), "--blocks", "1x1", "--photos", "10", "--size", "48x36",
+                           "--samples", "1", "--seed", "3"});
+    ASSERT_EQ(said.exitCode, 0) << said.err;
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder_); }
+
+  static Said run(const std::vector<std::string>& arguments) { return Program(folder_, arguments).wait(); }
+  static std::string at(const std::string& name) { return (folder_ / name).string(); }
+
+  static std::vector<std::string> trainArguments(const std::string& model, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"train", at("city"), model, "--method", "hash", "--blocks", "2x1"};
+    for (const std::string& setting : kTiny) arguments.insert(arguments.end(), {"--set", setting});
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+  static std::vector<Bytes> checkpoints(const std::string& model) {
+    const json manifest = json::parse(readTextFile(fs::path(model) / "manifest.json"));
+    std::vector<Bytes> files;
+    for (const json& file : manifest.at("files")) files.push_back(readFile(fs::path(model) / file.get<std::string>()));
+    return files;
+  }
+  static inline fs::path folder_;
+};
+
+TEST_F(HashCommandLine, GoesFromACityToPicturesAndNumbers) {
+  const std::string model = at("model");
+  const Said trained = run(trainArguments(model, {"--steps", "40"}));
+  ASSERT_EQ(trained.exitCode, 0) << trained.err;
+  for (const char* file : {"blocks.svg", "blocks.geojson", "blocks.json", "config.toml"}) {
+    EXPECT_TRUE(fs::exists(fs::path(model) / file)) << file;
+  }
+  EXPECT_EQ(checkpoints(model).size(), 3u) << "two blocks and the surround";
+  const Said judged = run({"eval", model, at("city"), "--json", at("numbers.json")});
+  ASSERT_EQ(judged.exitCode, 0) << judged.err;
+  EXPECT_GT(json::parse(readTextFile(at("numbers.json"))).at("psnr").get<double>(), 10);
+  const Said drawn = run({"render", model, at("pictures"), "--views", at("city"), "--size", "24x18"});
+  EXPECT_EQ(drawn.exitCode, 0) << drawn.err;
+  const Said told = run({"info", model, "--json"});
+  ASSERT_EQ(told.exitCode, 0) << told.err;
+  const json info = json::parse(told.out);
+  EXPECT_EQ(info.at("method"), "hash");
+  EXPECT_EQ(info.at("blocks").at("columns"), 2);
+  EXPECT_EQ(info.at("multiply_accumulates_per_sample"), 8 * 12 + 2 * 8 * 8 + 2 * 8);
+  const Said baked = run({"bake", model, at("scene")});
+  EXPECT_EQ(baked.exitCode, 1);
+  EXPECT_NE(baked.err.find("hash"), std::string::npos) << baked.err;
+}
+
+TEST_F(HashCommandLine, GoesOnWithTheModelThatIsThere) {
+  const std::string model = at("goes-on");
+  ASSERT_EQ(run(trainArguments(model, {"--steps", "12"})).exitCode, 0);
+  const auto step = [&] { return json::parse(readTextFile(fs::path(model) / "manifest.json")).at("step"); };
+  EXPECT_EQ(step(), 12);
+  const Said resumed = run({"train", at("city"), model, "--method", "hash", "--steps", "30", "--resume"});
+  ASSERT_EQ(resumed.exitCode, 0) << resumed.err;
+  EXPECT_EQ(step(), 30);
+  const Said other =
+      run({"train", at("city"), model, "--method", "hash", "--blocks", "1x1", "--steps", "40", "--resume"});
+  EXPECT_EQ(other.exitCode, 1);
+  EXPECT_NE(other.err.find("2x1"), std::string::npos) << other.err;
+  EXPECT_EQ(step(), 30);
+}
+
+TEST_F(HashCommandLine, RefusesWhatIsOfOtherMethods) {
+  const Said resident = run(trainArguments(at("nothing"), {"--steps", "3", "--resident-blocks", "1"}));
+  EXPECT_NE(resident.exitCode, 0);
+  EXPECT_NE(resident.err.find("--resident-blocks"), std::string::npos) << resident.err;
+  const Said wrong = run(trainArguments(at("nothing"), {"--steps", "3", "--set", "aggregation=vote"}));
+  EXPECT_EQ(wrong.exitCode, 1);
+  EXPECT_NE(wrong.err.find("attention, sum, mlp"), std::string::npos) << wrong.err;
+  EXPECT_FALSE(fs::exists(at("nothing") + "/manifest.json"));
+}
+
+}  // namespace
+}  // namespace tessera
