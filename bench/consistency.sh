@@ -47,18 +47,6 @@ border() {
   echo "$1: $(value "$1-scene.json" .psnr 2) dB; mean squared error at walls $(value "$of" .border.mse 5)," \
     "elsewhere in blocks $(value "$of" .interior.mse 5), ratio $(value "$of" .mse_ratio), of roots $(value "$of" .rmse_ratio)"
 }
-# interval NUMBERS...: mean and the ends of its 95 % interval (Student's t).
-interval() {
-  awk 'BEGIN {
-    split("12.706 4.303 3.182 2.776 2.571 2.447 2.365 2.306 2.262", t, " ")
-    n = ARGC - 1
-    for (i = 1; i <= n; ++i) sum += ARGV[i]
-    for (i = 1; i <= n; ++i) squares += (ARGV[i] - sum / n) ^ 2
-    half = n > 1 && n < 11 ? t[n - 1] * sqrt(squares / (n - 1) / n) : 99
-    printf "%.3f %.3f %.3f\n", sum / n, sum / n - half, sum / n + half
-  }' "$@"
-}
-
 consistency() {
   local seed block apart gains="" ratios="" mean low high ratio
   for seed in $seeds; do

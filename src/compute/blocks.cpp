@@ -33,6 +33,27 @@ BlockSpace::Placement BlockSpace::placement(uint32_t block) const {
   return made;
 }
 
+BlockSpace::Box BlockSpace::owned(uint32_t block) const {
+  constexpr float kFar = static_cast<float>(kFarthest);
+  if (block >= cells()) return {{-kFar, -kFar, -kFar}, {kFar, kFar, kFar}};
+  const uint32_t i = block % columns, j = block / columns;
+  const auto wall = [](uint32_t k, uint32_t count) { return 2.0f * static_cast<float>(k) - static_cast<float>(count); };
+  Box box{{wall(i, columns), wall(j, rows), bottom}, {wall(i + 1, columns), wall(j + 1, rows), top}};
+  if (placement(block).contracted) {
+    if (i == 0) box.low[0] = -kFar;
+    if (j == 0) box.low[1] = -kFar;
+    if (i + 1 == columns) box.high[0] = kFar;
+    if (j + 1 == rows) box.high[1] = kFar;
+    box.low[2] = -kFar;
+    box.high[2] = kFar;
+  } else if (surround == Surround::border) {
+    // Rays go on behind the box, and it was trained to the ends of its domain.
+    box.low[2] = -1;
+    box.high[2] = 1;
+  }
+  return box;
+}
+
 BlockSpace::Range BlockSpace::rangeInBox(const std::array<double, 3>& origin, const std::array<double, 3>& direction,
                                          double near) const {
   const double low[3] = {-1.0 * columns, -1.0 * rows, bottom}, high[3] = {1.0 * columns, 1.0 * rows, top};

@@ -36,6 +36,12 @@ struct BlockSpace {
   };
   Placement placement(uint32_t block) const;
 
+  // What a block owns, to kFarthest where that has no end: of the surround all, as it is seen behind the box only.
+  struct Box {
+    std::array<float, 3> low, high;
+  };
+  Box owned(uint32_t block) const;
+
   // Where a ray is in the box, from `near` on.
   struct Range {
     double near = 0, far = 0;

@@ -134,30 +134,9 @@ VolumePart bakePart(VolumeModel& model, uint32_t block, const AliveTexels& alive
   std::copy_n(placement.scale, 3, part.scale.begin());
   part.contracted = placement.contracted;
   part.surround = block >= space.cells();
-  constexpr float kFar = static_cast<float>(BlockSpace::kFarthest);
-  if (part.surround) {
-    part.low = {-kFar, -kFar, -kFar};
-    part.high = {kFar, kFar, kFar};
-  } else {
-    const uint32_t i = block % space.columns, j = block / space.columns;
-    const auto low = [](uint32_t k, uint32_t count) {
-      return 2.0f * static_cast<float>(k) - static_cast<float>(count);
-    };
-    part.low = {low(i, space.columns), low(j, space.rows), space.bottom};
-    part.high = {low(i + 1, space.columns), low(j + 1, space.rows), space.top};
-    if (part.contracted) {
-      if (i == 0) part.low[0] = -kFar;
-      if (j == 0) part.low[1] = -kFar;
-      if (i + 1 == space.columns) part.high[0] = kFar;
-      if (j + 1 == space.rows) part.high[1] = kFar;
-      part.low[2] = -kFar;
-      part.high[2] = kFar;
-    } else if (space.surround == Surround::border) {
-      // Rays go on behind the box, and it was trained to the ends of its domain.
-      part.low[2] = -1;
-      part.high[2] = 1;
-    }
-  }
+  const BlockSpace::Box owned = space.owned(block);
+  part.low = owned.low;
+  part.high = owned.high;
   part.voxels = grid.voxels;
   part.planes = grid.planes;
   TexelBaker baker(model, block);

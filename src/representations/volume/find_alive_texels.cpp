@@ -7,11 +7,11 @@
 #include <optional>
 
 #include "base/error.h"
-#include "base/image_io.h"
 #include "base/log.h"
 #include "representations/volume/bake_stays.h"
 #include "representations/volume/bake_volume.h"
 #include "representations/volume/volume_pass.h"
+#include "train/photo_sight.h"
 #include "train/picture_rays.h"
 
 namespace tessera {
@@ -24,7 +24,6 @@ constexpr uint32_t kRays = 2048;  // of one piece of a photo
 constexpr double kBeside = 0.5;
 constexpr int kBesideStride = 3;
 constexpr uint32_t kBesideTilesAcross = 32;
-constexpr int kPixelsAlongEdge = 64;   // that are asked how high a photo looks
 constexpr double kWorthSaying = 0.02;  // of the tiles are looked through in several stays
 
 VolumePass::Room roomForRays(const VolumeModel& model) {
@@ -42,56 +41,6 @@ struct Looking {
   uint32_t firstBlock = 0;  // and those after it
   bool onlyBeside = false;  // not through pixels within the photo
 };
-
-// In the scene, of unit length.
-std::optional<Vec3d> directionOf(const Vec2d& pixel, const Camera& camera, const Pose& pose, const SceneFrame& frame) {
-  const auto inCamera = camera.directionInCamera(pixel);
-  if (!inCamera) return std::nullopt;
-  return frame.rotation * (pose.rotation * inCamera->normalized());
-}
-
-// How high a pixel looks: the sine of the angle with the horizon.
-double riseOf(const Vec2d& pixel, const Camera& camera, const Pose& pose, const SceneFrame& frame) {
-  const auto direction = directionOf(pixel, camera, pose, frame);
-  return direction ? direction->z() : -1;
-}
-
-// Of all pixels of all photos.
-double highestRise(const Capture& capture, const SceneFrame& frame) {
-  double highest = -1;
-  for (const int photo : capture.photosIn(Split::train)) {
-    const Camera& camera = capture.cameras[capture.photos[photo].camera];
-    const int w = camera.width, h = camera.height;
-    const Pose& pose = capture.photos[photo].worldFromCamera;
-    const auto look = [&](int x, int y) {
-      const Vec2d middle(x + 0.5, y + 0.5);
-      highest = std::max(highest, riseOf(middle, camera, pose, frame));
-    };
-    const Vec3d up = pose.rotation.transpose() * (frame.rotation.transpose() * Vec3d::UnitZ());
-    const auto zenith = camera.pixelFromCamera(up);
-    if (zenith && zenith->x() >= 0 && zenith->y() >= 0 && zenith->x() <= w && zenith->y() <= h) return 1;
-    const int stride = std::max(1, std::max(w, h) / kPixelsAlongEdge);
-    for (int x = 0; x < w + stride; x += stride) {
-      for (const int y : {0, h - 1}) look(std::min(x, w - 1), y);
-    }
-    for (int y = 0; y < h + stride; y += stride) {
-      for (const int x : {0, w - 1}) look(x, std::min(y, h - 1));
-    }
-  }
-  return highest;
-}
-
-// Nothing where the photo has no mask.
-ImageU8 maskOf(const Photo& photo, const Camera& camera) {
-  if (photo.mask.empty()) return {};
-  const DecodedImage decoded = readImage(photo.mask);
-  if (decoded.truncated) throw Error(photo.mask.string(), "", "ends early", "import the photos again");
-  if (decoded.image.width == camera.width && decoded.image.height == camera.height) return decoded.image;
-  throw Error(photo.mask.string(), "",
-              fmt::format("is {}x{}, its photo's camera {}x{}", decoded.image.width, decoded.image.height, camera.width,
-                          camera.height),
-              "import the photos again");
-}
 
 class AliveFinder {
  public:

@@ -1,0 +1,79 @@
+// One content of a `hash` scene in memory (NGP-RT): the baked features of one block, or of several merged into one
+// coarser level, and the network that turns what a ray adds up to into a colour.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "tiles/occupancy_pyramid.h"
+#include "tiles/volume_content.h"
+
+namespace tessera {
+
+// What a byte stands for: evenly from `low` (0) to `high` (255).
+struct ByteRange {
+  float low = 0, high = 1;
+  float scale() const { return (high - low) / 255; }
+  float valueOf(uint8_t byte) const { return low + scale() * static_cast<float>(byte); }
+  uint8_t byteOf(float value) const {  // the nearest
+    const float byte = high > low ? (value - low) / scale() + 0.5f : 0.0f;
+    return static_cast<uint8_t>(byte < 0 ? 0 : byte > 255 ? 255 : byte);
+  }
+};
+
+// One level of explicit features: a table in instant-ngp's convention. A sample at p in [0,1]³ of the domain lies at
+// (resolution - 1) p + ½ among lattice points; entries of a point: dense (x + r (y + r z), modulo entries) where
+// `hashed` is false, else x xor (y · 2654435761) xor (z · 805459861), modulo entries, a power of two.
+struct HashTable {
+  uint32_t resolution = 0, entries = 0;
+  bool hashed = false;
+  std::vector<uint8_t> bytes;       // [entries][8]
+  std::array<ByteRange, 8> ranges;  // of each feature
+};
+
+// Scene units, domains and what a part owns are those of VolumePart.
+struct HashPart {
+  static constexpr uint32_t kFeatures = 8;  // logarithm of density, diffuse r g b, 4 features
+  static constexpr uint32_t kMacroblock = 8, kStoredEdge = 9, kEmpty = 0xffffffffu;
+  static constexpr uint32_t kCorners = kStoredEdge * kStoredEdge * kStoredEdge;  // stored of a macroblock
+
+  std::array<float, 3> centre = {0, 0, 0}, scale = {1, 1, 1};
+  bool contracted = false;
+  std::array<float, 3> low = {-1, -1, -1}, high = {1, 1, 1};
+  bool surround = false;
+
+  // Coarse features, and logits where weights vary, at `lattice`³ corners, corner i at (i + ½) / lattice of the domain;
+  // stored in macroblocks as VolumePart's voxels are, [stored][9][9][9][columns].
+  uint32_t lattice = 128;         // a multiple of 8
+  uint32_t columns = kFeatures;   // or twice as many where there are logits; what is left over means nothing
+  std::vector<ByteRange> ranges;  // [columns]
+  std::vector<uint32_t> macroblocks;
+  std::vector<uint8_t> cornerBytes;
+  std::vector<HashTable> tables;  // fine levels
+
+  // Where anything is seen, cells³ of the domain; levels[0] is the finest. All corners that samples there mix are
+  // stored.
+  OccupancyPyramid occupied;
+  // Of levels[1], occupancyDistances: what a ray may pass over.
+  std::vector<uint8_t> distances;
+
+  uint32_t cells() const { return occupied.levels.front().cells; }
+  float halfDomain() const { return contracted ? 2.0f : 1.0f; }
+};
+
+// What weighs a fine level: nothing, one logit of a sigmoid, or one for density and one for colours.
+enum class LevelWeights { none, shared, separate };
+
+struct HashContent {
+  LevelWeights weights = LevelWeights::separate;
+  std::vector<float> logits;  // where they are the same everywhere; else parts have them in their columns
+  float step = 0;             // of a ray, as a share of the width of a domain
+  bool isWhole = false;       // rays that end nowhere show what the network says of their direction
+  // 23 → … → 3 without a sigmoid, biases zero or not. Inputs: composited diffuse colour (3) and features (4), then 16
+  // spherical harmonics of the ray's direction.
+  std::vector<DenseLayer> network;
+  std::vector<HashPart> parts;
+};
+
+}  // namespace tessera
