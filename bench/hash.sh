@@ -59,9 +59,9 @@ ablation() {
     echo "$capture: attention less the network $mean dB, 95 % interval $low to $high (seeds $seeds)"
     verdict "$capture: attention less a network for each sample, held-out PSNR in dB" "$mean" '>=' -0.4
   done
-  if [ ! -e "$work/fox-field/manifest.json" ]; then "$tessera" train "$work/fox" "$work/fox-field-tiny" --steps 1; fi
   local field=fox-field
-  [ -e "$work/$field/manifest.json" ] || field=fox-field-tiny
+  [ -e "$work/$field/manifest.json" ] || field=fox-field-begun
+  [ -e "$work/$field/manifest.json" ] || trained "$field" fox --method field --steps 1
   echo "multiply-accumulates a sample: attention $(arithmetic "fox-attention-${seeds%% *}")," \
     "mlp $(arithmetic "fox-mlp-${seeds%% *}"), field $(arithmetic "$field")"
   verdict "attention's arithmetic as a share of field's" \

@@ -91,6 +91,9 @@ TEST_F(HashCommandLine, GoesOnWithTheModelThatIsThere) {
   EXPECT_EQ(other.exitCode, 1);
   EXPECT_NE(other.err.find("2x1"), std::string::npos) << other.err;
   EXPECT_EQ(step(), 30);
+  const Said method = run({"train", at("city"), model, "--steps", "40", "--resume"});
+  EXPECT_EQ(method.exitCode, 1);
+  EXPECT_NE(method.err.find("resume with --method hash"), std::string::npos) << method.err;
 }
 
 TEST_F(HashCommandLine, RefusesWhatIsOfOtherMethods) {

@@ -91,7 +91,8 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "tessera: error: %s\n", said.what());
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr,
-                 "tessera: error: memory: this machine has not enough; lower --set photo_budget_mib or grid_log2_size; "
+                 "tessera: error: memory: this machine has not enough; lower --set photo_budget_mib, grid_log2_size or "
+                 "fine_log2_size; "
                  "of field samples_per_pass; of volume texels_per_step, or keep few blocks with --resident-blocks\n");
   } catch (const std::exception& error) {
     std::fprintf(stderr, "tessera: error: internal: %s; please report it\n", error.what());

@@ -62,7 +62,17 @@ Config presetDefaults(const TrainFlags& flags) {
   return config;
 }
 
+// Its settings would not even be understood.
+void requireSameMethod(const TrainFlags& flags) {
+  const auto manifest = flags.loop.resume ? ModelFolder(flags.model).manifest() : std::nullopt;
+  if (!manifest || manifest->method == flags.method) return;
+  throw Error((fs::path(flags.model) / "manifest.json").string(), "method",
+              fmt::format("the run is of --method {}, not {}", manifest->method, flags.method),
+              fmt::format("resume with --method {}", manifest->method));
+}
+
 TrainingResult train(Device& device, const TrainFlags& flags) {
+  requireSameMethod(flags);
   const Capture capture = readCapture(flags.capture);
   if (flags.method == "field") {
     if (!flags.grid.empty()) throw CLI::ValidationError("--grid", "is of --method volume and hash");

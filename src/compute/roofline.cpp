@@ -124,6 +124,7 @@ Roofline measureRoofline(const RooflineOptions& options) {
   measureSampleStreams(recorder);
   measureBlockStreams(recorder);
   measureVirtualGrid(recorder);
+  measureAttention(recorder);
   measureParameterStreams(recorder);
   result.rows = recorder.takeRows();
   return result;

@@ -15,8 +15,9 @@ namespace tessera {
 namespace {
 
 constexpr uint32_t kRays = 2048, kSamples = 1 << 16;  // of one piece of a photo
-constexpr float kMinTransmittance = 2e-3f;            // as pictures are drawn
-constexpr uint32_t kTexels = 1 << 16;                 // evaluated together
+static_assert(kSamples >= HashModel::kMostSteps);
+constexpr float kMinTransmittance = 2e-3f;  // as pictures are drawn
+constexpr uint32_t kTexels = 1 << 16;       // evaluated together
 
 // Looks at a model through photos, and marks where it sees something.
 class SeenFinder {

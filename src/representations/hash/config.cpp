@@ -22,11 +22,13 @@ HashConfig HashConfig::ofPreset(const std::string& name) {
   config.step = 0.5 * std::sqrt(3.0);  // half of a voxel's diagonal
   config.fineRateFactor = 1;
   config.rampShare = 0.5;
+  config.networkL2 = config.depth = config.knownShare = config.fullGradientDistance = 0;
+  config.exposure = false;
   config.coarseLog2Size = 21;
   config.levels = 2;
   config.fineLog2Size = 22;
   config.samplesPerStep = 1 << 20;
-  config.texelsPerStep = 1 << 22;
+  config.texelsPerStep = 1 << 21;
   return config;
 }
 
@@ -116,6 +118,10 @@ void HashConfig::check() const {
   oneOf("attention", attention, {"separate", "shared"});
   requireWithin("near", near, 0, 1);
   requireWithin("lattice", lattice, 8, 1024);
+  if (lattice % 8 != 0) {
+    throw Error(fmt::format("--set lattice={}", lattice), "", "is no multiple of 8",
+                fmt::format("use lattice={}", (lattice + 4) / 8 * 8));
+  }
   requireWithin("coarse_base", coarseBase, 2, lattice);
   requireOneOf("coarse_features", coarseFeatures, {1, 2, 4, 8});
   requireWithin("coarse_levels", coarseLevels, 1, 128 / coarseFeatures);

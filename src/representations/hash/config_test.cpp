@@ -62,6 +62,7 @@ TEST(HashConfig, RefusesWhatNoModelCanBeMadeOf) {
   const std::function<void(HashConfig&)> wrongs[] = {
       [](HashConfig& c) { c.surround = "everywhere"; },
       [](HashConfig& c) { c.preset = "huge"; },
+      [](HashConfig& c) { c.lattice = 100; },
       [](HashConfig& c) { c.near = 1.5; },
       [](HashConfig& c) { c.levels = 5; },
       [](HashConfig& c) { c.aggregation = "vote"; },

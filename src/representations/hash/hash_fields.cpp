@@ -120,7 +120,7 @@ Matrix<const float> HashFields::forward(const Samples& samples, bool forBackward
   mix.positions = samples.positions;
   mix.marks = marks_;
   mix.ranks = ranks_;
-  mix.texels = {texels_.capacity, firstTexel_.part(slots(), 1)};
+  mix.texels = {texels_.capacity, texelCounter()};
   mix.values = texels_.outputs;
   mix.mixed = coarseOf(encoded_);
   device_.run(mix);
@@ -168,7 +168,7 @@ void HashFields::backward(const Samples& samples, Slice<const float> logDensityG
   mix.marks = marks_;
   mix.ranks = ranks_;
   mix.firstTexel = firstTexel_;
-  mix.texels = {texels_.capacity, firstTexel_.part(slots(), 1)};
+  mix.texels = {texels_.capacity, texelCounter()};
   mix.mixedGradients = coarseOf(encodedGradients_);
   mix.valueGradients = texels_.outputGradients;
   device_.run(mix);
@@ -176,7 +176,7 @@ void HashFields::backward(const Samples& samples, Slice<const float> logDensityG
 }
 
 uint32_t HashFields::texelsWanted() {
-  return device_.read(firstTexel_.part(slots(), 1))[0];
+  return device_.read(texelCounter())[0];
 }
 
 void HashFields::step(const Rates& rates) {

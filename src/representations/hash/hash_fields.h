@@ -31,6 +31,7 @@ class HashFields {
 
   // Of the last forward; waits. Where it is above roomForTexels, what was beyond counted as nothing.
   uint32_t texelsWanted();
+  Slice<const uint32_t> texelCounter() const { return firstTexel_.part(slots(), 1); }
 
   struct Rates {
     Adam table, fine, network;

@@ -1,8 +1,11 @@
 #include "representations/hash/hash_model.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <type_traits>
 
 #include "base/error.h"
 #include "base/random.h"
@@ -15,6 +18,8 @@ namespace {
 // Samples of a ray that a round makes: few at first, for most rays end early.
 constexpr uint32_t kMostOfRound[HashSamples::kRounds] = {8, 16, 32, 64, 128, 0xffffffffu};
 
+constexpr uint32_t kLeastChunk = 1 << 12;  // points of the occupancy that are looked at together
+
 Device& able(Device& device, const HashConfig& config) {
   config.check();
   requireAllOperations(device);
@@ -22,8 +27,10 @@ Device& able(Device& device, const HashConfig& config) {
 }
 
 // The same bits as numbers, for operations that only move them.
-Slice<float> asFloats(const Slice<uint32_t>& words) {
-  return {words.memory, words.first, words.count};
+template <class Word>
+auto asFloats(const Slice<Word>& words) {
+  using Float = std::conditional_t<std::is_const_v<Word>, const float, float>;
+  return Slice<Float>(words.memory, words.first, words.count);
 }
 
 }  // namespace
@@ -47,6 +54,15 @@ HashModel::HashModel(Device& device, const HashConfig& config, const BlockGrid& 
                  initialWeights(config.directionShape(), mix64(static_cast<uint64_t>(config.seed) + 2), 0xd1),
                  forTraining),
       seen_(space_.blocks(), true) {
+  // In widths of a domain: the diagonal of the box, and a contracted block from end to end.
+  const double widths = std::hypot(space_.columns, space_.rows, 1) + 4;
+  const double steps = widths / (config.longestStep() * config.shortestStep);
+  if (!(steps <= kMostSteps)) {
+    throw Error(
+        fmt::format("--set step={} shortest_step={} lattice={}", config.step, config.shortestStep, config.lattice), "",
+        fmt::format("a ray could take {:.0f} steps", steps),
+        fmt::format("use longer ones: at most {} steps", kMostSteps));
+  }
   const size_t cells = static_cast<size_t>(config.occupancyResolution), words = cells * cells * cells / 32;
   occupied_ = device.array<uint32_t>(words * space_.blocks());
   for (uint32_t block = 0; block < space_.blocks(); ++block) {
@@ -67,7 +83,8 @@ MarchSpace HashModel::occupancySpace(uint32_t block) const {
 }
 
 void HashModel::reserve(uint32_t rays, uint32_t samples, uint32_t texels) {
-  fields_.reserve(samples, texels);
+  fields_.reserve(samples, std::max(texels, 8 * std::min(samples, kLeastChunk)));
+  if (!zero_.size()) zero_ = device_.array<uint32_t>(1);
   if (nextInterval_.size() < rays || !roundFirst_.size()) {
     nextInterval_ = device_.array<uint32_t>(rays);
     opticalDepth_ = device_.array<float>(rays);
@@ -127,6 +144,10 @@ void HashModel::sample(const Rays& rays, float minTransmittance, HashSamples& se
     device_.fillZero(logDensities.data);
     device_.run(AddColumns{made, Matrix<const float>(features.data, 1, features.rowStride), logDensities});
     device_.run(OpticalDepth{march.rays, march.firstSample, logDensities, march.steps, opticalDepth_});
+    device_.run(GatherRows{{1},
+                           zero_,
+                           Matrix<const float>(asFloats(fields_.texelCounter()), 1),
+                           Matrix<float>(asFloats(seen.counters.part(2 + HashSamples::kRounds + round, 1)), 1)});
   }
 
   CompactSamples compact;
@@ -147,7 +168,7 @@ void HashModel::sample(const Rays& rays, float minTransmittance, HashSamples& se
   const auto gather = [&](const Slice<float>& from, const Slice<float>& to, uint32_t columns) {
     device_.run(GatherRows{seen.samples(), source_, Matrix<float>(from, columns), Matrix<float>(to, columns)});
   };
-  gather(asFloats(slots_), asFloats(seen.slotOfSample), 1);
+  gather(asFloats(slots_.all()), asFloats(seen.slotOfSample.all()), 1);
   gather(positions_, seen.positions, 3);
   gather(distances_, seen.distances, 1);
   gather(steps_, seen.steps, 1);
@@ -173,7 +194,9 @@ void HashModel::exclude(uint32_t block, const std::vector<bool>& visible) {
 }
 
 void HashModel::refreshOccupancy(bool everything, uint64_t seed) {
-  const uint32_t chunk = static_cast<uint32_t>(std::max<size_t>(source_.size(), 1 << 12));
+  // As many points as have room for all of their corners: what has none would count as fog.
+  const uint32_t chunk = std::min(static_cast<uint32_t>(source_.size()), fields_.roomForTexels() / 8);
+  CHECK(chunk >= 1u);
   if (slotOfPoint_.size() < chunk) slotOfPoint_ = device_.array<uint32_t>(chunk);
   for (uint32_t block = 0; block < space_.blocks(); ++block) {
     if (!seen_[block]) continue;

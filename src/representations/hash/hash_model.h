@@ -17,7 +17,8 @@ struct HashSamples {
   Slice<uint32_t> counters;                                   // [kCounters]; whoever samples says where
 
   static constexpr uint32_t kRounds = 6;
-  static constexpr uint32_t kCounters = 2 + kRounds;  // samples, finished rays, densities looked up in each round
+  // Samples, finished rays, of each round the densities looked up and the corners that they wanted.
+  static constexpr uint32_t kCounters = 2 + 2 * kRounds;
 
   HashSamples() = default;
   HashSamples(Device& device, uint32_t rays, uint32_t samples);
@@ -29,6 +30,8 @@ struct HashSamples {
 
 class HashModel {
  public:
+  static constexpr uint32_t kMostSteps = 1 << 16;  // that a ray may take at most
+  // Throws Error where rays through so many blocks could take more.
   HashModel(Device& device, const HashConfig& config, const BlockGrid& grid, bool forTraining = true);
 
   Device& device() { return device_; }
@@ -85,7 +88,7 @@ class HashModel {
   double stepScale_ = 1;
 
   // Of marching, all rounds.
-  Array<uint32_t> nextInterval_, roundFirst_, source_, slots_, rays_;
+  Array<uint32_t> nextInterval_, roundFirst_, source_, slots_, rays_, zero_;
   Array<float> opticalDepth_, positions_, distances_, steps_, middles_, widths_, logDensities_;
   Array<uint32_t> slotOfPoint_;  // of occupancy's points
 };

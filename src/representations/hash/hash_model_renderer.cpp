@@ -8,6 +8,7 @@ namespace {
 
 constexpr uint32_t kRays = 4096;        // of one piece of the picture, at most
 constexpr uint32_t kSamples = 1 << 16;  // rays that do not fit are taken up by the next piece
+static_assert(kSamples >= HashModel::kMostSteps);
 constexpr float kMinTransmittance = 2e-3f;
 
 // Room for every corner of every sample: no picture lacks any.
@@ -50,12 +51,13 @@ RenderedView HashModelRenderer::render(const Camera& camera, const Pose& worldFr
       const float share = learned && !whole ? opacity[ray] : 1;
       for (size_t c = 0; c < 3; ++c) view.colour.pixels[3 * pixel + c] = share * colour[3 * ray + c];
       view.opacity.pixels[pixel] = whole ? 1 : opacity[ray];
-      view.depth.pixels[pixel] = pictureRays_.depthOf(ray, depth[ray]);
+      const float seenDepth = whole ? depth[ray] / std::max(opacity[ray], 1e-6f) : depth[ray];
+      view.depth.pixels[pixel] = pictureRays_.depthOf(ray, seenDepth);
     }
     first += finished;
     // Each round of marching has room for so many samples, and so has what is seen.
     const uint32_t fullest =
-        std::max(counters[0], *std::max_element(counters.begin() + 2, counters.begin() + HashSamples::kCounters));
+        std::max(counters[0], *std::max_element(counters.begin() + 2, counters.begin() + 2 + HashSamples::kRounds));
     const double fitting = 0.9 * kSamples / std::max(1.0, fullest / (1.0 * finished));
     wanted = static_cast<uint32_t>(std::clamp(fitting, 64.0, static_cast<double>(kRays)));
   }

@@ -1,5 +1,7 @@
 #include "representations/hash/hash_pass.h"
 
+#include <algorithm>
+
 namespace tessera {
 
 HashPass::HashPass(HashModel& model, const Room& room)
@@ -56,6 +58,11 @@ void HashPass::shade(const HashModel::Rays& rays) {
                          Matrix<float>(specular_, 3), room_.training ? activations_.all() : Slice<float>()});
   device_.run(ShadeForward{isWhole(), count, Matrix<float>(composited_, kColours).columnRange(0, 3),
                            Matrix<float>(specular_, 3), opacity_, colour_});
+}
+
+uint32_t HashPass::texelsWanted() {
+  const std::vector<uint32_t> all = counters();
+  return std::max(model_.fields().texelsWanted(), *std::max_element(all.begin() + 2 + HashSamples::kRounds, all.end()));
 }
 
 void HashPass::backward(const HashModel::Rays& rays, Slice<const float> colourGradients, Slice<float> opacityGradients,

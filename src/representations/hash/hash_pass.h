@@ -26,6 +26,9 @@ class HashPass {
   Count finished(const HashModel::Rays& rays) const { return seen_.finished(rays.count); }
   // Waits: samples, finished rays, and what each round looked up.
   std::vector<uint32_t> counters() { return device_.read(counters_.all()); }
+  // Waits: corners of lattices, at most, of the rounds of marching and of what is seen. Where it is above the fields'
+  // room, some counted as nothing.
+  uint32_t texelsWanted();
 
   // Of the losses on samples' weights, already divided by the number of rays; the colour's gradients come from outside.
   struct LossScales {

@@ -31,7 +31,7 @@ PhotoRays::Settings raySettings(const HashConfig& config) {
 HashPass::Room roomFor(const HashConfig& config) {
   HashPass::Room room;
   room.rays = static_cast<uint32_t>(config.mostRays);
-  room.samples = static_cast<uint32_t>(kRoomPerWanted * config.samplesPerStep);
+  room.samples = std::max(static_cast<uint32_t>(kRoomPerWanted * config.samplesPerStep), HashModel::kMostSteps);
   room.texels = static_cast<uint32_t>(kRoomPerWanted * config.texelsPerStep);
   room.training = true;
   return room;
@@ -89,7 +89,7 @@ HashModel::Rays HashTrainer::drawRays(int64_t step) {
                                photoRays_.nears(0, rays_),
                                photoRays_.fars(0, rays_)};
     pass_.forward(rays, kMinTransmittance);
-    const double room = model_.fields().roomForTexels(), wanted = model_.fields().texelsWanted();
+    const double room = model_.fields().roomForTexels(), wanted = pass_.texelsWanted();
     if (wanted <= room || rays_ == 1) return rays;
     rays_ = std::max(1u, static_cast<uint32_t>(0.9 * room / wanted * rays_));
   }
@@ -112,7 +112,7 @@ StepReport HashTrainer::step(int64_t step, int64_t plannedSteps) {
   double weight = 0;
   for (uint32_t ray = 0; ray < report.rays; ++ray) weight += photoRays_.batch().weights[ray];
   report.squaredError = losses[1] / std::max(1.0, 3 * weight);
-  report.texels = model_.fields().texelsWanted();
+  report.texels = pass_.texelsWanted();
   const double perRay = static_cast<double>(report.samples) / std::max(1u, report.rays);
   model_.adaptStep(perRay);
 

@@ -42,6 +42,7 @@ double trainingBytesPerBlock(const HashConfig& config) {
 }
 
 TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options) {
+  options.config.check();
   refuseCaptureFolder(model);
   const ModelFolder folder(model);
   options.loop.method = "hash";

@@ -193,6 +193,7 @@ bool trainLevel(const fs::path& model, const Training& on, VolumeConfig config, 
 }  // namespace
 
 TrainingResult trainVolume(Device& device, const Capture& capture, const fs::path& model, TrainVolumeOptions options) {
+  options.config.check();
   refuseCaptureFolder(model);
   const ModelFolder folder(model);
   options.loop.method = "volume";
