@@ -6,8 +6,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "render/cpu/draw_volume.h"
-#include "render/volume_scene.h"
+#include "render/cpu/draw_scene.h"
+#include "render/tile_scene.h"
+#include "tiles/read_content.h"
 #include "tiles/scene_folder.h"
 #include "tiles/volume_payload.h"
 
@@ -71,7 +72,7 @@ TEST(GoldenVolume, IsReadToTheExpectedSums) {
   size_t contents = 0;
   for (const Tile& tile : tileset.tiles) {
     for (const TileContent& content : tile.contents) {
-      const VolumeContent volume = readVolume(contentPath(kScene, content.uri));
+      const VolumeContent volume = readContent<VolumeContent>(contentPath(kScene, content.uri));
       const auto& sums = expected.at(content.uri);
       ASSERT_EQ(volume.parts.size(), sums.size());
       for (size_t i = 0; i < sums.size(); ++i) {
@@ -93,7 +94,8 @@ TEST(GoldenVolume, HoldsWhatItWasMadeFrom) {
   EXPECT_EQ(tileset.georeference->latitude, scene.tileset.georeference->latitude);
   for (const Tile& tile : tileset.tiles) {
     for (const TileContent& content : tile.contents) {
-      expectSame(readVolume(contentPath(kScene, content.uri)), scene.contents.at(nameOfUri(content.uri)));
+      expectSame(readContent<VolumeContent>(contentPath(kScene, content.uri)),
+                 scene.contents.at(nameOfUri(content.uri)));
     }
   }
 }
@@ -101,7 +103,7 @@ TEST(GoldenVolume, HoldsWhatItWasMadeFrom) {
 TEST(GoldenVolume, IsTheSameWhenItIsWrittenAgain) {
   for (const Tile& tile : readTileset(kScene).tiles) {
     for (const TileContent& content : tile.contents) {
-      const VolumeContent volume = readVolume(contentPath(kScene, content.uri));
+      const VolumeContent volume = readContent<VolumeContent>(contentPath(kScene, content.uri));
       std::string reason;
       const auto again = decodeVolume(encodeVolume(volume), reason);
       ASSERT_TRUE(again) << reason;
@@ -112,7 +114,7 @@ TEST(GoldenVolume, IsTheSameWhenItIsWrittenAgain) {
 
 // The oracle, which reckons in floats, against the definition.
 TEST(GoldenVolume, LooksAlongItsRaysAsTheDefinitionSays) {
-  const VolumeScene scene = openVolumeScene(kScene);
+  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(kScene);
   std::vector<VolumeContent> contents;
   for (size_t i = 0; i < scene.tree.tiles.size(); ++i) contents.push_back(scene.source.load(static_cast<int>(i)));
   const auto rays = nlohmann::json::parse(readTextFile(kScene / "rays.json"));
@@ -123,7 +125,7 @@ TEST(GoldenVolume, LooksAlongItsRaysAsTheDefinitionSays) {
     const auto vector = [&](const char* key) { return Vec3d(ray.at(key).at(0), ray.at(key).at(1), ray.at(key).at(2)); };
     const SceneRay along{vector("origin"), vector("direction")};
     const int coarse = scene.tree.surround, fine = scene.tree.tiles[coarse].children.at(0);
-    VolumeDrawing drawing{scene.frame, {}, &contents[ray.at("level") == 1 ? coarse : fine], {}};
+    SceneDrawing<VolumeContent> drawing{scene.frame, {}, &contents[ray.at("level") == 1 ? coarse : fine], {}};
     drawing.march.minTransmittance = 0;
     if (ray.at("level") == 1) {
       drawing.frontToBack = {&contents[0]};
@@ -133,7 +135,7 @@ TEST(GoldenVolume, LooksAlongItsRaysAsTheDefinitionSays) {
       }
     }
     MarchCounts counts;
-    const BlendedRay seen = VolumeRayCaster(drawing).cast(along, INFINITY, counts);
+    const DrawnPixel seen = RayCaster<VolumeContent>(drawing).cast(along, INFINITY, counts);
     const double opacity = ray.at("opacity"), distance = ray.at("distance");
     const Vec3d colour = vector("colour");
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen.colour[c], colour[c], 1e-4) << "ray " << i;
@@ -144,7 +146,7 @@ TEST(GoldenVolume, LooksAlongItsRaysAsTheDefinitionSays) {
     kinds["far"] += distance > 6;
     drawing.frontToBack.erase(drawing.frontToBack.begin() + 1, drawing.frontToBack.end());
     drawing.surround = nullptr;
-    const float left = VolumeRayCaster(drawing).cast(along, INFINITY, counts).transmittance;
+    const float left = RayCaster<VolumeContent>(drawing).cast(along, INFINITY, counts).transmittance;
     kinds["blended"] += left > 0.05f && left < 0.95f;
   }
   EXPECT_GE(kinds["opaque"], 20);

@@ -7,8 +7,8 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "base/memory.h"
-#include "render/cpu/volume_renderer.h"
-#include "render/volume_scene.h"
+#include "render/cpu/scene_renderer.h"
+#include "render/tile_scene.h"
 #include "representations/field/field_renderer.h"
 #include "representations/hash/hash_model_renderer.h"
 #include "representations/volume/train_volume.h"
@@ -39,34 +39,44 @@ class DrawableModel final : public Drawable {
 };
 
 // Says once when a picture was drawn coarser than asked for.
-class SceneRenderer final : public ViewRenderer {
+template <class Content>
+class WarningRenderer final : public ViewRenderer {
  public:
-  SceneRenderer(const fs::path& folder, std::unique_ptr<VolumeRenderer> renderer, uint64_t budgetBytes)
-      : folder_(folder), renderer_(std::move(renderer)), budgetBytes_(budgetBytes) {}
+  WarningRenderer(const fs::path& folder, TileScene<Content> scene, const SceneRendererSettings& settings)
+      : folder_(folder),
+        renderer_(scene.frame, std::move(scene.tree), std::move(scene.source), settings),
+        budgetBytes_(settings.budgetBytes) {}
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override {
-    RenderedView view = renderer_->render(camera, worldFromCamera, opaqueDepth);
-    if (renderer_->choice().refused > 0 && !std::exchange(warned_, true)) {
+    RenderedView view = renderer_.render(camera, worldFromCamera, opaqueDepth);
+    if (renderer_.choice().refused > 0 && !std::exchange(warned_, true)) {
       warn("{}: views do not fit into {:.4g} MiB at their finest level and are drawn coarser; raise --memory-mib",
            folder_.string(), static_cast<double>(budgetBytes_) / 1048576);
     }
     return view;
   }
-  std::string device() const override { return renderer_->device(); }
-  Eigen::Array3f background() const override { return renderer_->background(); }
+  std::string device() const override { return renderer_.device(); }
+  Eigen::Array3f background() const override { return renderer_.background(); }
 
  private:
   fs::path folder_;
-  std::unique_ptr<VolumeRenderer> renderer_;
+  SceneRenderer<Content> renderer_;
   uint64_t budgetBytes_;
   bool warned_ = false;
 };
+
+template <class Content>
+std::unique_ptr<ViewRenderer> rendererOf(const fs::path& folder, SceneRendererSettings settings) {
+  TileScene<Content> scene = openTileScene<Content>(folder);
+  settings.background = Eigen::Array3f(scene.background[0], scene.background[1], scene.background[2]);
+  return std::make_unique<WarningRenderer<Content>>(folder, std::move(scene), settings);
+}
 
 class DrawableScene final : public Drawable {
  public:
   DrawableScene(const fs::path& folder, const DrawableOptions& options)
       : folder_(folder), tileset_(readTileset(folder)) {
-    VolumeRendererSettings settings;
+    SceneRendererSettings settings;
     // Not the number of levels: a root that only holds the others together is one of them.
     if (const uint32_t coarsest = coarsestLevel(tileset_); static_cast<uint32_t>(options.level) > coarsest) {
       throw Error(folder.string(), fmt::format("--lod {}", options.level),
@@ -76,13 +86,10 @@ class DrawableScene final : public Drawable {
     settings.selection.mostPixels = 0;  // the finest everywhere
     settings.selection.finestLevel = options.level;
     settings.threads = options.threads;
-    VolumeScene scene = openVolumeScene(folder);
-    settings.background = Eigen::Array3f(scene.background[0], scene.background[1], scene.background[2]);
     settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB > 0 ? options.memoryMiB * 1048576
                                                                        : static_cast<double>(usableMemoryBytes()) / 2);
-    renderer_ = std::make_unique<SceneRenderer>(
-        folder, std::make_unique<VolumeRenderer>(scene.frame, std::move(scene.tree), std::move(scene.source), settings),
-        settings.budgetBytes);
+    renderer_ = tileset_.representation == Representation::hash ? rendererOf<HashContent>(folder, settings)
+                                                                : rendererOf<VolumeContent>(folder, settings);
   }
 
   ViewRenderer& renderer() override { return *renderer_; }
@@ -98,7 +105,7 @@ class DrawableScene final : public Drawable {
  private:
   fs::path folder_;
   Tileset tileset_;
-  std::unique_ptr<SceneRenderer> renderer_;
+  std::unique_ptr<ViewRenderer> renderer_;
 };
 
 }  // namespace

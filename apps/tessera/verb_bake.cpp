@@ -7,8 +7,10 @@
 #include "base/error.h"
 #include "base/progress.h"
 #include "import/capture_reader.h"
+#include "representations/hash/bake_hash.h"
 #include "representations/volume/bake_volume.h"
 #include "representations/volume/train_volume.h"
+#include "tiles/hash_payload.h"
 #include "train/run_folder.h"
 
 namespace tessera {
@@ -16,7 +18,7 @@ namespace tessera {
 void addBakeVerb(CLI::App& app) {
   struct Flags {
     std::string model, scene, capture;
-    BakeVolumeOptions options;
+    BakeHashOptions options;
     std::optional<uint32_t> residentBlocks;
     DeviceOptions device;
     bool json = false;
@@ -24,7 +26,7 @@ void addBakeVerb(CLI::App& app) {
   auto flags = std::make_shared<Flags>();
   CLI::App* verb = app.add_subcommand("bake", "a trained model to a scene of tiles");
   verb->footer("Example:\n  tessera bake city.model city.scene");
-  verb->add_option("model", flags->model, "model folder, of --method volume")->required();
+  verb->add_option("model", flags->model, "model folder, of --method volume or hash")->required();
   verb->add_option("scene", flags->scene, "scene folder to write")->required();
   verb->add_option("--capture", flags->capture, "what the model was trained on; default: where it was then");
   verb->add_option("--stride", flags->options.stride,
@@ -38,26 +40,42 @@ void addBakeVerb(CLI::App& app) {
   verb->add_option("--background", flags->options.background,
                    "red, green and blue where no photo looked; default: a hazy sky")
       ->check(CLI::Range(0.0, 1.0));
+  verb->add_option("--cells", flags->options.cells,
+                   "of hash: cells of a block's occupancy along an edge, a multiple of 8; 0: the default")
+      ->capture_default_str()
+      ->check(CLI::Range(0u, kMostOccupancyCells));
+  verb->add_option("--dilation", flags->options.dilation, "of hash: cells around those that are seen are kept, too")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 8));
   verb->add_option("--effort", flags->options.effort, "of compression")->capture_default_str()->check(CLI::Range(0, 9));
   verb->add_flag("--json", flags->json, "print the result as one JSON object");
   addDeviceFlags(*verb, flags->device);
   verb->callback([flags] {
     const ModelFolder folder(flags->model);
-    requireManifest(folder, "volume");
+    const std::string method = requireManifest(folder).method;
     const std::unique_ptr<Device> device = makeDevice(flags->device);
-    const VolumeConfig config = savedConfig<VolumeConfig>(flags->model);
-    const uint32_t resident = flags->residentBlocks.value_or(static_cast<uint32_t>(config.residentBlocks));
-    const LevelModels models = [&](uint32_t level) {
-      return loadVolumeModel(*device, levelFolder(flags->model, level), resident);
-    };
-    const uint32_t levels = trainedLevels(flags->model);
     const Capture capture =
         readCapture(flags->capture.empty() ? folder.readPlacement().capture.string() : flags->capture);
     requireSameWorld(folder, capture);
-    flags->options.minAlpha = config.cullLast;
+    const uint32_t levels = method == "volume" ? trainedLevels(flags->model) : 1;
     Progress progress("baking", static_cast<int64_t>(levels * capture.photosIn(Split::train).size()), "photos");
     flags->options.onPhoto = [&](int64_t done, int64_t) { progress.update(done); };
-    const BakedVolume baked = bakeVolume(models, levels, capture, flags->scene, flags->options);
+    BakedScene baked;
+    if (method == "volume") {
+      const VolumeConfig config = savedConfig<VolumeConfig>(flags->model);
+      const uint32_t resident = flags->residentBlocks.value_or(static_cast<uint32_t>(config.residentBlocks));
+      const LevelModels models = [&](uint32_t level) {
+        return loadVolumeModel(*device, levelFolder(flags->model, level), resident);
+      };
+      flags->options.minAlpha = config.cullLast;
+      baked = bakeVolume(models, levels, capture, flags->scene, flags->options);
+    } else if (method == "hash") {
+      const HashLevelModels models = [&](uint32_t) { return loadHashModel(*device, flags->model); };
+      baked = bakeHash(models, levels, capture, flags->scene, flags->options);
+    } else {
+      throw Error(flags->model, "", "is a model of " + method + ", which is not baked",
+                  "train with --method volume or hash");
+    }
     progress.finish();
     if (flags->json) {
       nlohmann::ordered_json result = {{"tiles", baked.tileset.tiles.size()}};

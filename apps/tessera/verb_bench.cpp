@@ -8,8 +8,10 @@
 #include "eval/psnr.h"
 #include "eval/render_views.h"
 #include "import/capture_reader.h"
-#include "render/cpu/volume_benchmark.h"
+#include "render/cpu/scene_benchmark.h"
+#include "render/tile_scene.h"
 #include "representations/field/step_benchmark.h"
+#include "tiles/scene_folder.h"
 
 namespace tessera {
 namespace {
@@ -118,6 +120,7 @@ void printSkipping(const SkippingBenchmark& b) {
   };
   fmt::print("{}\nempty space, {} rays\n", b.device, b.rays);
   line("skipped", b.skipping);
+  if (b.byCells) line("by cells", *b.byCells);
   line("walked", b.whole);
   fmt::print(
       "  {:.1f} times fewer steps, pictures apart by at most {:.6f}\n",
@@ -132,11 +135,9 @@ ordered_json toJson(const SkippingBenchmark& b) {
             {"seconds", w.seconds},
             {"rays_per_second", static_cast<double>(b.rays) / w.seconds}};
   };
-  return {{"device", b.device},
-          {"rays", b.rays},
-          {"skipping", way(b.skipping)},
-          {"whole", way(b.whole)},
-          {"largest_difference", b.largestDifference}};
+  return {{"device", b.device},          {"rays", b.rays},
+          {"skipping", way(b.skipping)}, {"by_cells", b.byCells ? way(*b.byCells) : ordered_json()},
+          {"whole", way(b.whole)},       {"largest_difference", b.largestDifference}};
 }
 
 void printCache(const CacheBenchmark& b) {
@@ -179,6 +180,24 @@ ordered_json toJson(const CacheBenchmark& b) {
           {"all", run(b.whole)}};
 }
 
+template <class Content>
+ordered_json measureScene(const fs::path& folder, const std::vector<BenchmarkView>& views,
+                          const std::optional<CacheBenchmarkOptions>& flight, int threads, bool print) {
+  const TileScene<Content> scene = openTileScene<Content>(folder);
+  ordered_json json = ordered_json::object();
+  if (!views.empty()) {
+    const SkippingBenchmark skipping = benchmarkSkipping(scene, views, threads);
+    if (print) printSkipping(skipping);
+    json["skipping"] = toJson(skipping);
+  }
+  if (flight) {
+    const CacheBenchmark cache = benchmarkCache(scene, *flight);
+    if (print) printCache(cache);
+    json["cache"] = toJson(cache);
+  }
+  return json;
+}
+
 void addBenchRender(CLI::App& bench) {
   struct Flags {
     std::string scene, views, json;
@@ -209,24 +228,18 @@ void addBenchRender(CLI::App& bench) {
       ->check(CLI::Range(0, 1024));
   verb->callback([flags] {
     if (flags->views.empty() && !flags->flight) throw CLI::RequiredError("--views or --flight");
-    const VolumeScene scene = openVolumeScene(flags->scene);
-    ordered_json json = ordered_json::object();
+    std::vector<BenchmarkView> views;
     if (!flags->views.empty()) {
-      std::vector<BenchmarkView> views;
       const Capture capture = readCapture(flags->views);
       openDrawable(*makeDevice({}), flags->scene, {})->requireWorldOf(capture);
       for (const NamedView& view : viewsOfCapture(capture, Split::test)) {
         views.push_back({view.camera, view.worldFromCamera});
       }
-      const SkippingBenchmark skipping = benchmarkSkipping(scene, views, flags->cache.threads);
-      if (flags->json != "-") printSkipping(skipping);
-      json["skipping"] = toJson(skipping);
     }
-    if (flags->flight) {
-      const CacheBenchmark cache = benchmarkCache(scene, flags->cache);
-      if (flags->json != "-") printCache(cache);
-      json["cache"] = toJson(cache);
-    }
+    const std::optional<CacheBenchmarkOptions> cache = flags->flight ? std::optional(flags->cache) : std::nullopt;
+    const bool hash = readTileset(flags->scene).representation == Representation::hash;
+    const auto measure = hash ? measureScene<HashContent> : measureScene<VolumeContent>;
+    const ordered_json json = measure(flags->scene, views, cache, flags->cache.threads, flags->json != "-");
     writeJson(flags->json, json);
   });
 }

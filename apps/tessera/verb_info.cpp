@@ -7,10 +7,10 @@
 #include "base/error.h"
 #include "import/capture_reader.h"
 #include "import/importer.h"
-#include "render/volume_scene.h"
 #include "representations/field/train_field.h"
 #include "representations/hash/config.h"
 #include "representations/volume/train_volume.h"
+#include "tiles/read_content.h"
 #include "tiles/scene_folder.h"
 #include "train/run_folder.h"
 
@@ -90,7 +90,6 @@ ordered_json sizeOf(uint64_t contents, uint64_t onDisk, uint64_t inMemory) {
 
 ordered_json describeScene(const fs::path& folder) {
   const Tileset tileset = readTileset(folder);
-  const VolumeScene scene = openVolumeScene(folder);
   struct Sizes {
     uint64_t contents = 0, onDisk = 0, inMemory = 0;
   };
@@ -99,13 +98,10 @@ ordered_json describeScene(const fs::path& folder) {
     for (const TileContent& content : tileset.tiles[tile].contents) {
       Sizes& sizes = content.surround ? surrounds[content.level] : levels[tileset.tiles[tile].level];
       ++sizes.contents;
-      sizes.onDisk += fs::file_size(contentPath(folder, content.uri));
+      const fs::path file = contentPath(folder, content.uri);
+      sizes.onDisk += fs::file_size(file);
+      sizes.inMemory += readDecodedBytes(file, tileset.representation);
     }
-  }
-  for (size_t tile = 0; tile < scene.tree.tiles.size(); ++tile) {
-    const TileNode& node = scene.tree.tiles[tile];
-    Sizes& sizes = (node.isSurround ? surrounds : levels)[static_cast<size_t>(node.level)];
-    if (node.hasContent) sizes.inMemory += scene.source.bytes(static_cast<int>(tile));
   }
   ordered_json info = {
       {"kind", "scene"},

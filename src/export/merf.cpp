@@ -11,8 +11,8 @@
 #include "base/image_io.h"
 #include "export/merf_layout.h"
 #include "export/whole_folder.h"
+#include "tiles/read_content.h"
 #include "tiles/scene_folder.h"
-#include "tiles/volume_payload.h"
 
 namespace tessera {
 namespace {
@@ -48,7 +48,7 @@ VolumeContent readOnlyContent(const fs::path& scene, const Tileset& tileset, fs:
   const Tile& finest = tileset.tiles.back();  // one below the other: there is one cell
   if (finest.contents.size() != 1) throw unsuitable("has not one content, and MERF's files hold one block");
   file = contentPath(scene, finest.contents[0].uri);
-  return readPromisedVolume(file, tileset.tiles.size() - 1, finest.contents[0]);
+  return readPromisedContent<VolumeContent>(file, tileset.tiles.size() - 1, finest.contents[0]);
 }
 
 void requireMerfBlock(const VolumeContent& content, const fs::path& file) {

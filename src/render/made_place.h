@@ -4,7 +4,7 @@
 #include "render/made_tree.h"
 #include "render/made_volume.h"
 #include "render/tile_cache.h"
-#include "render/volume_frame.h"
+#include "render/tile_frame.h"
 
 namespace tessera {
 
@@ -12,7 +12,7 @@ namespace tessera {
 struct Place {
   TileTree tree = madeTree(4, 4);
   std::vector<VolumeContent> contents;
-  VolumeFrame frame;
+  TileFrame frame;
   uint64_t allBytes = 0, coarsestBytes = 0, finestBytes = 0;
 
   Place() {
@@ -51,7 +51,7 @@ struct Place {
     coarsestBytes += bytesInMemory(contents.back());
   }
 
-  TileSource source() const {
+  TileSource<VolumeContent> source() const {
     return {[this](int tile) { return bytesInMemory(contents[tile]); }, [this](int tile) { return contents[tile]; }};
   }
 };

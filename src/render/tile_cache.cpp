@@ -6,10 +6,13 @@
 
 #include "base/check.h"
 #include "base/error.h"
+#include "tiles/hash_content.h"
+#include "tiles/volume_content.h"
 
 namespace tessera {
 
-TileCache::TileCache(const TileTree& tree, uint64_t budgetBytes, TileSource source)
+template <class Content>
+TileCache<Content>::TileCache(const TileTree& tree, uint64_t budgetBytes, TileSource<Content> source)
     : budget_(budgetBytes), source_(std::move(source)) {
   tree.check();
   std::vector<int> pinned = tree.coarsest();
@@ -24,7 +27,8 @@ TileCache::TileCache(const TileTree& tree, uint64_t budgetBytes, TileSource sour
   for (const int tile : pinned) insert(tile, true);
 }
 
-const VolumeContent* TileCache::find(int tile) {
+template <class Content>
+const Content* TileCache<Content>::find(int tile) {
   const auto found = contents_.find(tile);
   if (found == contents_.end()) return nullptr;
   ++statistics_.hits;
@@ -32,7 +36,8 @@ const VolumeContent* TileCache::find(int tile) {
   return &found->second.content;
 }
 
-void TileCache::load(std::span<const int> tiles) {
+template <class Content>
+void TileCache<Content>::load(std::span<const int> tiles) {
   const auto stays = [&](int tile) {
     return contents_.at(tile).pinned || std::find(tiles.begin(), tiles.end(), tile) != tiles.end();
   };
@@ -47,13 +52,15 @@ void TileCache::load(std::span<const int> tiles) {
   }
 }
 
-uint64_t TileCache::bytesOf(int tile) {
+template <class Content>
+uint64_t TileCache<Content>::bytesOf(int tile) {
   const auto known = bytes_.find(tile);
   if (known != bytes_.end()) return known->second;
   return bytes_[tile] = source_.bytes(tile);
 }
 
-void TileCache::insert(int tile, bool pinned) {
+template <class Content>
+void TileCache<Content>::insert(int tile, bool pinned) {
   const uint64_t allowed = bytesOf(tile);
   Entry entry;
   entry.content = source_.load(tile);
@@ -73,12 +80,16 @@ void TileCache::insert(int tile, bool pinned) {
   CHECK(statistics_.bytes <= budget_);
 }
 
-void TileCache::evict(int tile) {
+template <class Content>
+void TileCache<Content>::evict(int tile) {
   const auto found = contents_.find(tile);
   statistics_.bytes -= found->second.bytes;
   ++statistics_.evictions;
   uses_.erase(found->second.use);
   contents_.erase(found);
 }
+
+template class TileCache<VolumeContent>;
+template class TileCache<HashContent>;
 
 }  // namespace tessera

@@ -21,7 +21,7 @@ VolumeContent contentOfBytes(uint64_t bytes) {
 
 constexpr uint64_t kBytes = 2000;
 
-TileSource sourceOf(std::function<VolumeContent(int)> load) {
+TileSource<VolumeContent> sourceOf(std::function<VolumeContent(int)> load) {
   return {[](int) { return kBytes; }, std::move(load)};
 }
 
@@ -44,10 +44,10 @@ TEST(TileCache, NeverHoldsMoreThanItsBudgetUnderRandomAccess) {
   const RandomStream random(1, 1);
   for (const uint64_t budget : {kBytes, 3 * kBytes, 7 * kBytes + 5, 100 * kBytes}) {
     uint64_t loads = 0;
-    TileCache cache(tree, budget, sourceOf([&](int) {
-                      ++loads;
-                      return contentOfBytes(kBytes);
-                    }));
+    TileCache<VolumeContent> cache(tree, budget, sourceOf([&](int) {
+                                     ++loads;
+                                     return contentOfBytes(kBytes);
+                                   }));
     uint64_t found = 0;
     for (uint64_t i = 0; i < 3000; ++i) {
       std::vector<int> tiles;
@@ -76,7 +76,7 @@ TEST(TileCache, NeverHoldsMoreThanItsBudgetUnderRandomAccess) {
 
 TEST(TileCache, EvictsWhatHasNotBeenUsedForLongestAndNothingWithoutNeed) {
   const TileTree tree = madeTree(4, 4);
-  TileCache cache(tree, 4 * kBytes, sourceOf([](int) { return contentOfBytes(kBytes); }));
+  TileCache<VolumeContent> cache(tree, 4 * kBytes, sourceOf([](int) { return contentOfBytes(kBytes); }));
   cache.load(std::vector<int>{1, 2, 3});
   cache.load({});
   EXPECT_EQ(cache.statistics().evictions, 0u);
@@ -94,11 +94,11 @@ TEST(TileCache, SaysHowMuchTheCoarsestLevelAndTheSurroundNeed) {
   tree.surround = static_cast<int>(tree.tiles.size());
   tree.tiles.emplace_back().isSurround = true;
   int loads = 0;
-  const TileSource source = sourceOf([&](int) {
+  const TileSource<VolumeContent> source = sourceOf([&](int) {
     ++loads;
     return contentOfBytes(kBytes);
   });
-  TileSource named = source;
+  TileSource<VolumeContent> named = source;
   named.folder = "site.scene";
   try {
     TileCache(tree, 2 * kBytes - 1, named);
@@ -108,16 +108,16 @@ TEST(TileCache, SaysHowMuchTheCoarsestLevelAndTheSurroundNeed) {
     EXPECT_NE(std::string(error.what()).find("4000 bytes"), std::string::npos) << error.what();
   }
   EXPECT_EQ(loads, 0);
-  const TileCache cache(tree, 2 * kBytes, source);
+  const TileCache<VolumeContent> cache(tree, 2 * kBytes, source);
   EXPECT_TRUE(cache.holds(tree.surround));
   EXPECT_TRUE(cache.holds(0));
 }
 
 TEST(TileCache, RefusesAContentThatIsLargerThanItsSourceSaid) {
   const TileTree tree = madeTree(2, 2);
-  TileSource source = sourceOf([](int tile) { return contentOfBytes(kBytes + (tile == 2 ? 1 : 0)); });
+  TileSource<VolumeContent> source = sourceOf([](int tile) { return contentOfBytes(kBytes + (tile == 2 ? 1 : 0)); });
   source.file = [](int tile) { return std::to_string(tile) + ".glb"; };
-  TileCache cache(tree, 100 * kBytes, source);
+  TileCache<VolumeContent> cache(tree, 100 * kBytes, source);
   try {
     cache.load(std::vector<int>{1, 2});
     FAIL();

@@ -47,7 +47,7 @@ double TileView::areaInPixels(const TileNode& tile) const {
 namespace {
 
 // How much of the picture looks out of the box.
-double shareOfSurround(const Camera& camera, const TileView& view, const VolumeFrame& frame) {
+double shareOfSurround(const Camera& camera, const TileView& view, const TileFrame& frame) {
   constexpr int kAcross = 12;
   int shows = 0;
   for (int i = 0; i < kAcross * kAcross; ++i) {
@@ -60,7 +60,7 @@ double shareOfSurround(const Camera& camera, const TileView& view, const VolumeF
 
 }  // namespace
 
-TileView tileView(const Camera& camera, const Pose& worldFromCamera, const VolumeFrame& frame) {
+TileView tileView(const Camera& camera, const Pose& worldFromCamera, const TileFrame& frame) {
   TileView view;
   view.eye = frame.inScene(worldFromCamera.translation);
   view.cameraFromScene = worldFromCamera.rotation.transpose() * frame.rotation;

@@ -13,8 +13,8 @@
 #include <optional>
 #include <vector>
 
+#include "render/tile_frame.h"
 #include "render/tile_tree.h"
-#include "render/volume_frame.h"
 #include "scene/camera.h"
 
 namespace tessera {
@@ -47,7 +47,7 @@ struct TileView {
   double areaInPixels(const TileNode& tile) const;  // that it may cover
 };
 
-TileView tileView(const Camera& camera, const Pose& worldFromCamera, const VolumeFrame& frame);
+TileView tileView(const Camera& camera, const Pose& worldFromCamera, const TileFrame& frame);
 
 // Whether a ray shows what matters of the surround: it misses the scene's box, or leaves it through a side. What lies
 // above is sky, and the ground hides what lies below.

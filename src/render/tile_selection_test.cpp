@@ -88,7 +88,7 @@ TEST(TileSelection, DrawsTheCoarseSurroundUntilTheFineOneIsThere) {
 }
 
 TEST(TileSelection, CountsOfTheSurroundWhatIsSeenOfIt) {
-  VolumeFrame frame;
+  TileFrame frame;
   frame.low = Vec3d(-8, -8, -0.5);
   frame.high = Vec3d(8, 8, 0.5);
   const auto share = [&](const Vec3d& eye, const Vec3d& target) {
@@ -270,7 +270,7 @@ TEST(TileSelection, SeesEveryTileThatAnyPixelLooksAt) {
   Camera fisheye = smallCamera();
   fisheye.lens = LensModel::openCvFisheye;
   fisheye.parameters = {250, 250, 320, 240, 0.01, 0, 0, 0};
-  VolumeFrame frame;  // turned, moved, in metres
+  TileFrame frame;  // turned, moved, in metres
   frame.rotation = Eigen::AngleAxisd(0.7, Vec3d::UnitZ()).toRotationMatrix();
   frame.scale = 30;
   frame.translation = Vec3d(100, -50, 20);

@@ -1,5 +1,5 @@
 // The tiles of a scene as a renderer needs them: where they are, how coarse. Plain data, made from the tileset on disk;
-// lengths in scene units (render/volume_frame.h).
+// lengths in scene units (render/tile_frame.h).
 #pragma once
 
 #include <vector>

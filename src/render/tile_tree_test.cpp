@@ -6,7 +6,7 @@
 
 #include "base/random.h"
 #include "render/made_tree.h"
-#include "render/volume_frame.h"
+#include "render/tile_frame.h"
 
 namespace tessera {
 namespace {

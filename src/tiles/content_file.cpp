@@ -43,6 +43,27 @@ bool readViews(const json& asset, std::span<const std::byte> bytes, ContentFile&
   return true;
 }
 
+std::optional<json> decodeAsset(std::string_view text, Representation representation, std::string& reason) {
+  const auto fail = [&reason](std::string why) {
+    reason = std::move(why);
+    return std::nullopt;
+  };
+  if (text.size() > kMostContentJson) return fail("its JSON is larger than any content's should be");
+  json asset = json::parse(text, nullptr, false);
+  const json* header = fieldOf(asset, "asset");
+  if (!header || !isString(*header, "version", "2.0")) return fail("its JSON is not that of a glTF 2.0 asset");
+  const json* extensions = fieldOf(asset, "extensions");
+  const json* ours = extensions ? fieldOf(*extensions, kExtension) : nullptr;
+  if (!ours || !uses(asset, kExtension)) return fail("has no extension TESSERA_content");
+  const auto version = unsignedOf(*ours, "version");
+  if (!version) return fail("does not say which version it is of");
+  if (*version != kContentVersion) return fail(fmt::format("is of version {}; {} is known", *version, kContentVersion));
+  if (!isString(*ours, "representation", nameOf(representation))) {
+    return fail(fmt::format("is not of the representation {}", nameOf(representation)));
+  }
+  return asset;
+}
+
 }  // namespace
 
 Json ContentFileWriter::add(std::span<const std::byte> bytes, const char* mimeType) {
@@ -72,29 +93,13 @@ std::optional<std::span<const std::byte>> ContentFile::viewOf(const json& object
   return views[*index];
 }
 
-std::optional<json> decodeContentAsset(std::string_view text, Representation representation, std::string& reason) {
-  const auto fail = [&reason](std::string why) {
-    reason = std::move(why);
-    return std::nullopt;
-  };
-  if (text.size() > kMostContentJson) return fail("its JSON is larger than any content's should be");
-  json asset = json::parse(text, nullptr, false);
-  const json* header = fieldOf(asset, "asset");
-  if (!header || !isString(*header, "version", "2.0")) return fail("its JSON is not that of a glTF 2.0 asset");
-  const json* extensions = fieldOf(asset, "extensions");
-  const json* ours = extensions ? fieldOf(*extensions, kExtension) : nullptr;
-  if (!ours || !uses(asset, kExtension)) return fail("has no extension TESSERA_content");
-  const auto version = unsignedOf(*ours, "version");
-  if (!version) return fail("does not say which version it is of");
-  if (*version != kContentVersion) return fail(fmt::format("is of version {}; {} is known", *version, kContentVersion));
-  if (!isString(*ours, "representation", nameOf(representation))) {
-    return fail(fmt::format("is not of the representation {}", nameOf(representation)));
-  }
-  return asset;
-}
-
-const json& contentExtensionOf(const json& asset) {
-  return asset.at("extensions").at(kExtension);
+std::optional<ContentFile> decodeContentHeader(std::string_view text, Representation representation,
+                                               std::string& reason) {
+  const auto asset = decodeAsset(text, representation, reason);
+  if (!asset) return std::nullopt;
+  ContentFile result;
+  result.ours = asset->at("extensions").at(kExtension);
+  return result;
 }
 
 std::optional<ContentFile> decodeContentFile(std::span<const std::byte> file, Representation representation,
@@ -104,14 +109,14 @@ std::optional<ContentFile> decodeContentFile(std::span<const std::byte> file, Re
     reason = kNoGlb;
     return std::nullopt;
   }
-  const auto asset = decodeContentAsset(glb->json, representation, reason);
+  const auto asset = decodeAsset(glb->json, representation, reason);
   if (!asset) return std::nullopt;
   ContentFile result;
   if (!readViews(*asset, glb->bytes, result)) {
     reason = "its buffer views do not lie within its bytes";
     return std::nullopt;
   }
-  result.ours = contentExtensionOf(*asset);
+  result.ours = asset->at("extensions").at(kExtension);
   return result;
 }
 

@@ -41,12 +41,10 @@ struct ContentFile {
   std::optional<std::span<const std::byte>> viewOf(const nlohmann::json& object, const char* mimeType) const;
 };
 
-// The asset that is a content's JSON. Untrusted: nothing, and why, where it is none or has not the extension, its
-// version and the representation as they should be.
-std::optional<nlohmann::json> decodeContentAsset(std::string_view text, Representation representation,
-                                                 std::string& reason);
-// The extension in it.
-const nlohmann::json& contentExtensionOf(const nlohmann::json& asset);
+// By the JSON of a container alone, without its buffer views. Untrusted: nothing, and why, where it is no asset or has
+// not the extension, its version and the representation as they should be.
+std::optional<ContentFile> decodeContentHeader(std::string_view text, Representation representation,
+                                               std::string& reason);
 
 // Untrusted bytes: nothing, and why, where the container, the asset, its buffer views or the extension's version and
 // representation are not as they should be.

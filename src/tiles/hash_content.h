@@ -4,16 +4,19 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <string_view>
 #include <vector>
 
+#include "tiles/content.h"
 #include "tiles/occupancy_pyramid.h"
-#include "tiles/volume_content.h"
 
 namespace tessera {
 
 // What a byte stands for: evenly from `low` (0) to `high` (255).
 struct ByteRange {
   float low = 0, high = 1;
+  bool operator==(const ByteRange&) const = default;
   float scale() const { return (high - low) / 255; }
   float valueOf(uint8_t byte) const { return low + scale() * static_cast<float>(byte); }
   uint8_t byteOf(float value) const {  // the nearest
@@ -32,48 +35,62 @@ struct HashTable {
   std::array<ByteRange, 8> ranges;  // of each feature
 };
 
-// Scene units, domains and what a part owns are those of VolumePart.
-struct HashPart {
+struct HashPart : ContentPart {
   static constexpr uint32_t kFeatures = 8;  // logarithm of density, diffuse r g b, 4 features
-  static constexpr uint32_t kMacroblock = 8, kStoredEdge = 9, kEmpty = 0xffffffffu;
-  static constexpr uint32_t kCorners = kStoredEdge * kStoredEdge * kStoredEdge;  // stored of a macroblock
+  static constexpr float kMostLogDensity = 15;
+  static constexpr double kLongestStep = 1e3;    // that counts, scene units: what lies outermost is endlessly long
+  static constexpr uint32_t kOccupancyUnit = 8;  // of which cells along an edge are a multiple
 
-  std::array<float, 3> centre = {0, 0, 0}, scale = {1, 1, 1};
-  bool contracted = false;
-  std::array<float, 3> low = {-1, -1, -1}, high = {1, 1, 1};
-  bool surround = false;
-
-  // Coarse features, and logits where weights vary, at `lattice`³ corners, corner i at (i + ½) / lattice of the domain;
-  // stored in macroblocks as VolumePart's voxels are, [stored][9][9][9][columns].
+  // Coarse features, and logits where weights vary, at `lattice`³ corners, corner i at (i + ½) / lattice of the domain,
+  // in macroblocks: [stored][9][9][9][columns].
   uint32_t lattice = 128;         // a multiple of 8
   uint32_t columns = kFeatures;   // or twice as many where there are logits; what is left over means nothing
   std::vector<ByteRange> ranges;  // [columns]
-  std::vector<uint32_t> macroblocks;
   std::vector<uint8_t> cornerBytes;
   std::vector<HashTable> tables;  // fine levels
 
   // Where anything is seen, cells³ of the domain; levels[0] is the finest. All corners that samples there mix are
   // stored.
   OccupancyPyramid occupied;
-  // Of levels[1], occupancyDistances: what a ray may pass over.
-  std::vector<uint8_t> distances;
+  // octantDistances of occupied.levels[distanceLevel(cells())]: what a ray may pass over.
+  std::vector<uint32_t> distances;
+
+  // The finest level that has no more than these cells along an edge.
+  static constexpr uint32_t kMostDistanceCells = 128;
+  static size_t distanceLevel(uint32_t cells);
 
   uint32_t cells() const { return occupied.levels.front().cells; }
-  float halfDomain() const { return contracted ? 2.0f : 1.0f; }
+  uint32_t storedMacroblocks() const {
+    return static_cast<uint32_t>(cornerBytes.size() / (size_t{kStoredTexels} * columns));
+  }
 };
 
 // What weighs a fine level: nothing, one logit of a sigmoid, or one for density and one for colours.
 enum class LevelWeights { none, shared, separate };
+const char* nameOf(LevelWeights weights);
+std::optional<LevelWeights> levelWeightsFrom(std::string_view name);
 
 struct HashContent {
   LevelWeights weights = LevelWeights::separate;
-  std::vector<float> logits;  // where they are the same everywhere; else parts have them in their columns
-  float step = 0;             // of a ray, as a share of the width of a domain
-  bool isWhole = false;       // rays that end nowhere show what the network says of their direction
+  // Where they are the same everywhere; else parts have them in their columns. [levels], or [levels][2].
+  std::vector<float> logits;
+  float step = 0;        // of a ray, as a share of the width of a domain
+  bool isWhole = false;  // rays that end nowhere show what the network says of their direction
   // 23 → … → 3 without a sigmoid, biases zero or not. Inputs: composited diffuse colour (3) and features (4), then 16
   // spherical harmonics of the ray's direction.
   std::vector<DenseLayer> network;
   std::vector<HashPart> parts;
+
+  uint32_t logitsOfLevel() const { return weights == LevelWeights::none ? 0 : weights == LevelWeights::shared ? 1 : 2; }
+  // Of a part.
+  uint32_t columns() const {
+    return weights == LevelWeights::none || !logits.empty() ? HashPart::kFeatures : 2 * HashPart::kFeatures;
+  }
 };
+
+// What a part takes in memory that has so many macroblocks, and cells along an edge, all else being there or not.
+uint64_t hashPartBytes(const HashPart& part, uint64_t storedMacroblocks, uint32_t cells);
+// What a content takes in memory. Renderers' budgets count this.
+uint64_t bytesInMemory(const HashContent& content);
 
 }  // namespace tessera

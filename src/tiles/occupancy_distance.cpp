@@ -2,76 +2,46 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <utility>
 
 namespace tessera {
-namespace {
 
-constexpr uint32_t kNone = 0xffffffffu;  // no occupied cell in this row, plane or grid
-
-// min over q of values[q] + (p - q)², for every p of a line: the lower envelope of parabolas.
-class Envelope {
- public:
-  explicit Envelope(size_t length) : apex_(length), from_(length + 1), value_(length) {}
-
-  // `stride` apart, in place.
-  void run(uint32_t* line, size_t length, size_t stride) {
-    size_t count = 0;
-    for (size_t q = 0; q < length; ++q) {
-      value_[q] = line[q * stride];
-      if (value_[q] == kNone) continue;
-      while (count > 0) {
-        const double meets = meeting(apex_[count - 1], q);
-        if (meets > from_[count - 1]) {
-          from_[count] = meets;
-          break;
-        }
-        --count;
-      }
-      if (count == 0) from_[0] = -1;
-      apex_[count++] = q;
-    }
-    if (count == 0) return;
-    size_t lowest = 0;
-    for (size_t p = 0; p < length; ++p) {
-      while (lowest + 1 < count && from_[lowest + 1] < static_cast<double>(p)) ++lowest;
-      const size_t q = apex_[lowest], apart = p > q ? p - q : q - p;
-      line[p * stride] = static_cast<uint32_t>(value_[q] + apart * apart);
-    }
-  }
-
- private:
-  // Where the parabola of a later q becomes the lower one.
-  double meeting(size_t before, size_t q) const {
-    const auto height = [&](size_t i) { return static_cast<double>(value_[i]) + static_cast<double>(i * i); };
-    return (height(q) - height(before)) / (2 * static_cast<double>(q - before));
-  }
-
-  std::vector<size_t> apex_;
-  std::vector<double> from_;  // the first place where it is the lowest
-  std::vector<uint32_t> value_;
-};
-
-}  // namespace
-
-std::vector<uint8_t> naiveOccupancyDistances(const OccupancyBits& occupied) {
+std::vector<uint32_t> octantDistances(const OccupancyBits& occupied) {
   const size_t n = occupied.cells;
-  std::vector<uint32_t> squares(occupied.count(), kNone);
-  for (size_t i = 0; i < squares.size(); ++i) {
-    if (occupied.at(i)) squares[i] = 0;
-  }
-  Envelope envelope(n);
-  for (size_t j = 0; j < n * n; ++j) envelope.run(&squares[j * n], n, 1);
-  for (size_t z = 0; z < n; ++z) {
-    for (size_t x = 0; x < n; ++x) envelope.run(&squares[x + n * n * z], n, n);
-  }
-  for (size_t i = 0; i < n * n; ++i) envelope.run(&squares[i], n, n * n);
-  std::vector<uint8_t> distances(squares.size());
-  for (size_t i = 0; i < distances.size(); ++i) {
-    // Roots of whole numbers this small are exact where they are whole.
-    const double root = squares[i] == kNone ? kFarthestDistance : std::sqrt(static_cast<double>(squares[i]));
-    distances[i] = static_cast<uint8_t>(std::min<double>(root, kFarthestDistance));
+  std::vector<uint32_t> distances(occupied.count(), 0);
+  for (uint32_t octant = 0; octant < 8; ++octant) {
+    const uint32_t shift = 4 * octant;
+    // The first cells of a sweep are those at the far end.
+    const auto ordered = [n](size_t i, bool up) { return up ? n - 1 - i : i; };
+    const bool up[3] = {(octant & 1) != 0, (octant & 2) != 0, (octant & 4) != 0};
+    for (size_t k = 0; k < n; ++k) {
+      for (size_t j = 0; j < n; ++j) {
+        const size_t row = n * (ordered(j, up[1]) + n * ordered(k, up[2]));
+        // Rows whose cells are next along y, z and both.
+        const ptrdiff_t y = up[1] ? static_cast<ptrdiff_t>(n) : -static_cast<ptrdiff_t>(n);
+        const ptrdiff_t z = up[2] ? static_cast<ptrdiff_t>(n * n) : -static_cast<ptrdiff_t>(n * n);
+        // Of the three rows beside this one, the least at a place; and the same one place further.
+        const auto beside = [&](size_t cell) {
+          uint32_t least = kFarthestOctantDistance;
+          const auto look = [&](ptrdiff_t offset) {
+            const size_t number = static_cast<size_t>(static_cast<ptrdiff_t>(cell) + offset);
+            least = std::min(least, distances[number] >> shift & 15);
+          };
+          if (j > 0) look(y);
+          if (k > 0) look(z);
+          if (j > 0 && k > 0) look(y + z);
+          return least;
+        };
+        uint32_t next = kFarthestOctantDistance;  // the least of the four cells one place further along x
+        for (size_t i = 0; i < n; ++i) {
+          const size_t cell = row + ordered(i, up[0]);
+          const uint32_t here = beside(cell);
+          const uint32_t free = occupied.at(cell) ? 0 : std::min(kFarthestOctantDistance, 1 + std::min(here, next));
+          distances[cell] |= free << shift;
+          next = std::min(here, free);
+        }
+      }
+    }
   }
   return distances;
 }
@@ -93,10 +63,6 @@ OccupancyBits dilated(const OccupancyBits& occupied) {
     }
   }
   return grown;
-}
-
-std::vector<uint8_t> occupancyDistances(const OccupancyBits& occupied) {
-  return naiveOccupancyDistances(dilated(occupied));
 }
 
 }  // namespace tessera

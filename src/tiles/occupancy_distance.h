@@ -1,4 +1,5 @@
-// How far nothing is, as a ray of any direction needs it: NGP-RT's occupancy distance grid (section 4.3, eq. 9).
+// How far nothing is, for rays of each octant of directions: what stands here for NGP-RT's occupancy distance grid
+// (section 4.3, eq. 9).
 #pragma once
 
 #include <cstdint>
@@ -8,19 +9,21 @@
 
 namespace tessera {
 
-// [cells³], x fastest, in edges of a cell: from any place in a cell one may go so far in any direction without coming
-// into an occupied one. That is the distance between the boxes of the two cells, sqrt(Σ_a max(|c_a - o_a| - 1, 0)²) for
-// the nearest o, rounded down; at most 255, which also stands where nothing is occupied. 0 in occupied cells and beside
-// them.
+// [cells³], x fastest. Of each octant o of directions (bit a of o: along axis a upwards), the four bits from 4 o on are
+// the number k of cells along an edge of the largest empty cube that begins at the cell and lies in that direction: a
+// ray from anywhere in the cell meets nothing before it leaves the cube. At most 15; 0 in occupied cells. What lies
+// beyond the grid counts as empty.
 //
-// It is the distance between the middles of cells, rounded down, after occupied ones have been made to reach one cell
-// further in all 26 directions; that in turn is exact: three passes of lower envelopes (Felzenszwalb and Huttenlocher,
-// "Distance transforms of sampled functions", 2012) over whole numbers.
-std::vector<uint8_t> occupancyDistances(const OccupancyBits& occupied);
+// The paper's grid says how far nothing is in whichever direction, and so little to a ray that moves away from a wall.
+// The cube of its own octant holds all of the ball that the ray may pass through.
+//
+// k is one more than the least of the seven next cells': dynamic programming, one sweep for each octant.
+std::vector<uint32_t> octantDistances(const OccupancyBits& occupied);
+inline constexpr uint32_t kFarthestOctantDistance = 15;
 
-// The paper's, between the middles of cells: up to √3 too far, so that what is occupied may be passed over. For
-// comparison.
-std::vector<uint8_t> naiveOccupancyDistances(const OccupancyBits& occupied);
+inline uint32_t octantDistance(uint32_t word, uint32_t octant) {
+  return word >> (4 * octant) & 15;
+}
 
 // Occupied ones and their 26 neighbours.
 OccupancyBits dilated(const OccupancyBits& occupied);

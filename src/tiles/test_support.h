@@ -4,7 +4,8 @@
 #include <string>
 
 #include "base/random.h"
-#include "tiles/occupancy_pyramid.h"
+#include "tiles/hash_content.h"
+#include "tiles/occupancy_distance.h"
 #include "tiles/tileset.h"
 #include "tiles/volume_content.h"
 
@@ -36,22 +37,97 @@ inline VolumePart madePart(uint64_t seed, uint32_t voxels = 16, uint32_t planes 
   return part;
 }
 
-inline VolumeContent madeContent(uint64_t seed, uint32_t parts = 1) {
+inline std::vector<DenseLayer> madeNetwork(uint64_t seed, std::vector<uint32_t> widths) {
   const RandomStream random(seed, 0xc0);
-  VolumeContent content;
   uint64_t next = 0;
-  for (const auto& [inputs, outputs] : {std::pair{34u, 16u}, {16u, 16u}, {16u, 3u}}) {
-    DenseLayer layer{inputs, outputs, {}, {}};
-    for (uint32_t i = 0; i < inputs * outputs; ++i) layer.weights.push_back(random.uniform(next++) - 0.5f);
-    for (uint32_t i = 0; i < outputs; ++i) layer.biases.push_back(random.uniform(next++) - 0.5f);
-    content.network.push_back(std::move(layer));
+  std::vector<DenseLayer> network;
+  for (size_t i = 0; i + 1 < widths.size(); ++i) {
+    DenseLayer layer{widths[i], widths[i + 1], {}, {}};
+    for (uint32_t k = 0; k < layer.inputs * layer.outputs; ++k) {
+      layer.weights.push_back(random.uniform(next++) - 0.5f);
+    }
+    for (uint32_t k = 0; k < layer.outputs; ++k) layer.biases.push_back(random.uniform(next++) - 0.5f);
+    network.push_back(std::move(layer));
   }
+  return network;
+}
+
+// Side by side along x, cells of edge 2.
+template <class Part>
+void placeInRow(std::vector<Part>& parts) {
+  for (size_t i = 0; i < parts.size(); ++i) {
+    parts[i].centre[0] = 2.0f * static_cast<float>(i);
+    parts[i].low[0] = parts[i].centre[0] - 1;
+    parts[i].high[0] = parts[i].centre[0] + 1;
+  }
+}
+
+inline VolumeContent madeContent(uint64_t seed, uint32_t parts = 1) {
+  VolumeContent content;
+  content.network = madeNetwork(seed, {34, 16, 16, 3});
+  for (uint32_t i = 0; i < parts; ++i) content.parts.push_back(madePart(seed + 100 * i));
+  placeInRow(content.parts);
+  return content;
+}
+
+struct MadeHash {
+  uint32_t lattice = 16, cells = 16, levels = 2, entries = 512;
+  LevelWeights weights = LevelWeights::separate;
+  bool varies = true;
+};
+
+inline HashPart madeHashPart(uint64_t seed, const MadeHash& made, uint32_t columns) {
+  const RandomStream random(seed, 0x4a54);
+  uint64_t next = 0;
+  HashPart part;
+  part.lattice = made.lattice;
+  part.columns = columns;
+  const auto range = [&] {
+    const float low = random.uniform(next++) - 1;
+    return ByteRange{low, low + 2 * random.uniform(next++)};
+  };
+  for (uint32_t c = 0; c < columns; ++c) part.ranges.push_back(range());
+  const uint32_t edge = made.lattice / HashPart::kMacroblock;
+  part.macroblocks.assign(size_t{edge} * edge * edge, HashPart::kEmpty);
+  uint32_t stored = 0;
+  for (uint32_t& number : part.macroblocks) {
+    if (random.below(next++, 3) > 0) number = stored++;
+  }
+  const auto bytes = [&](size_t count) {
+    std::vector<uint8_t> all(count);
+    for (uint8_t& byte : all) byte = static_cast<uint8_t>(random.below(next++, 256));
+    return all;
+  };
+  part.cornerBytes = bytes(size_t{stored} * HashPart::kStoredTexels * columns);
+  for (uint32_t l = 0; l < made.levels; ++l) {
+    HashTable table;
+    table.resolution = l == 0 ? 8 : made.lattice << l;
+    table.entries = made.entries;
+    table.hashed = l > 0;
+    for (ByteRange& one : table.ranges) one = range();
+    table.bytes = bytes(size_t{table.entries} * HashPart::kFeatures);
+    part.tables.push_back(std::move(table));
+  }
+  OccupancyBits occupied(made.cells);
+  for (size_t i = 0; i < occupied.count(); ++i) {
+    if (random.below(next++, 20) == 0) occupied.set(i);
+  }
+  part.occupied = pyramidFromOccupancy(std::move(occupied));
+  part.distances = octantDistances(part.occupied.levels[HashPart::distanceLevel(part.cells())]);
+  return part;
+}
+
+// Random, every rule of the format kept.
+inline HashContent madeHashContent(uint64_t seed, uint32_t parts = 1, const MadeHash& made = {}) {
+  HashContent content;
+  content.weights = made.weights;
+  content.step = 0.01f;
+  content.network = madeNetwork(seed, {23, 16, 16, 3});
+  if (!made.varies) content.logits.assign(size_t{made.levels} * content.logitsOfLevel(), 0.25f);
   for (uint32_t i = 0; i < parts; ++i) {
-    content.parts.push_back(madePart(seed + 100 * i));
-    content.parts[i].centre[0] = 2.0f * static_cast<float>(i);
-    content.parts[i].low[0] = content.parts[i].centre[0] - 1;
-    content.parts[i].high[0] = content.parts[i].centre[0] + 1;
+    content.parts.push_back(madeHashPart(seed + 100 * i, made, content.columns()));
   }
+  placeInRow(content.parts);
   return content;
 }
 

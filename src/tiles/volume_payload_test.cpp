@@ -13,8 +13,9 @@
 #include "tiles/content_file.h"
 #include "tiles/glb.h"
 #include "tiles/lossless_image.h"
+#include "tiles/read_content.h"
 #include "tiles/test_support.h"
-#include "tiles/volume_pictures.h"
+#include "tiles/texel_pictures.h"
 
 namespace tessera {
 namespace {
@@ -149,7 +150,7 @@ TEST(VolumePayload, PutsAttributesAndSlicesWhereTheFormatSays) {
   EXPECT_EQ(pictures[2].at(x, y)[0], texel[0]);
   EXPECT_EQ(pictures[2].at(x, y)[1], texel[7]);
   EXPECT_EQ(pictures[2].at(x, y)[2], 0);
-  const auto plane = picturesOfPlane(part.planeBytes[1], part.planes);
+  const auto plane = picturesOfTexels(part.planeBytes[1], {part.planes, part.planes});
   EXPECT_EQ(plane[0].at(5, 20)[1], part.planeBytes[1][(20 * 24 + 5) * 8 + 2]);
 }
 
@@ -191,7 +192,7 @@ class VolumeFile : public testing::Test {
   std::string refusal(std::span<const std::byte> bytes) {
     writeFileAtomically(path_, bytes);
     try {
-      readDecodedBytes(path_);
+      readDecodedBytes<VolumeContent>(path_);
     } catch (const Error& error) {
       EXPECT_EQ(error.subject(), path_.string());
       return error.reason();
@@ -206,13 +207,13 @@ TEST_F(VolumeFile, SaysWhatItTakesInMemoryWithoutATexelBeingRead) {
   const VolumeContent content = madeContent(5, 2);
   Bytes file = encodeVolume(content, 1);
   writeFileAtomically(path_, file);
-  EXPECT_EQ(readDecodedBytes(path_), bytesInMemory(content));
-  EXPECT_EQ(bytesInMemory(readVolume(path_)), bytesInMemory(content));
+  EXPECT_EQ(readDecodedBytes<VolumeContent>(path_), bytesInMemory(content));
+  EXPECT_EQ(bytesInMemory(readContent<VolumeContent>(path_)), bytesInMemory(content));
   std::fill(file.begin() + static_cast<ptrdiff_t>(kGlbStart + *jsonLengthOf(file, file.size())), file.end(),
             std::byte{0});
   writeFileAtomically(path_, file);
-  EXPECT_EQ(readDecodedBytes(path_), bytesInMemory(content));
-  EXPECT_THROW(readVolume(path_), Error);
+  EXPECT_EQ(readDecodedBytes<VolumeContent>(path_), bytesInMemory(content));
+  EXPECT_THROW(readContent<VolumeContent>(path_), Error);
 }
 
 TEST_F(VolumeFile, IsRefusedByHeadersThatLie) {
@@ -297,12 +298,12 @@ class VolumeRefusal : public testing::Test {
   static json& ours(json& asset) { return asset["extensions"]["TESSERA_content"]; }
   static json& part(json& asset) { return ours(asset)["parts"][0]; }
 
-  void refuses(const std::string& why, const std::function<void(json&)>& spoil, const VolumeLimits& limits = {}) {
+  void refuses(const std::string& why, const std::function<void(json&)>& spoil, const ContentLimits& limits = {}) {
     refusesBytes(
         why, [&](json& asset, Bytes&) { spoil(asset); }, limits);
   }
   void refusesBytes(const std::string& why, const std::function<void(json&, Bytes&)>& spoil,
-                    const VolumeLimits& limits = {}) {
+                    const ContentLimits& limits = {}) {
     const Bytes file = encodeVolume(madeContent(5), 1);
     const auto view = decodeGlb(file);
     json asset = json::parse(view->json);
@@ -385,7 +386,7 @@ TEST_F(VolumeRefusal, OfHeadersThatLie) {
 }
 
 TEST_F(VolumeRefusal, OfMoreMemoryThanAllowedBeforeItIsTaken) {
-  VolumeLimits limits;
+  ContentLimits limits;
   limits.bytes = 20000;
   refuses(
       "takes more than 20000 bytes of memory", [](json&) {}, limits);

@@ -60,4 +60,15 @@ ImageU8 maskOf(const Photo& photo, const Camera& camera) {
               "import the photos again");
 }
 
+void PhotoPixels::begin(const Photo& photo, const Camera& camera) {
+  mask_ = maskOf(photo, camera);
+  photo_ = &photo;
+  camera_ = &camera;
+}
+
+bool PhotoPixels::count(int x, int y) const {
+  if (within(x, y)) return mask_.pixels.empty() || *mask_.at(x, y) >= 128;  // as ray_batch.cpp
+  return riseOf({x + 0.5, y + 0.5}, *camera_, photo_->worldFromCamera, frame_) <= highestRise_;
+}
+
 }  // namespace tessera

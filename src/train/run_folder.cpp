@@ -38,15 +38,18 @@ double settledPhotoBudget(double wanted, const Capture& capture, int64_t usableM
   return budget;
 }
 
-ModelManifest requireManifest(const ModelFolder& folder, const std::string& method) {
+ModelManifest requireManifest(const ModelFolder& folder) {
   const std::optional<ModelManifest> manifest = folder.manifest();
-  if (!manifest) {
-    throw Error(folder.root().string(), "manifest.json", "there is none: this is no trained model",
-                "train one with: tessera train CAPTURE " + folder.root().string() + " --method " + method);
-  }
-  if (manifest->method == method) return *manifest;
+  if (manifest) return *manifest;
+  throw Error(folder.root().string(), "manifest.json", "there is none: this is no trained model",
+              "train one with: tessera train CAPTURE " + folder.root().string());
+}
+
+ModelManifest requireManifest(const ModelFolder& folder, const std::string& method) {
+  ModelManifest manifest = requireManifest(folder);
+  if (manifest.method == method) return manifest;
   throw Error(folder.root().string(), "manifest.json",
-              "is of --method " + manifest->method + ", where " + method + " is wanted", "name another model");
+              "is of --method " + manifest.method + ", where " + method + " is wanted", "name another model");
 }
 
 void requireSameSettings(const fs::path& model, const std::vector<ConfigField>& saved,

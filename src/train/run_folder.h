@@ -17,7 +17,8 @@ std::string howToRepeat(const Device& device, const TrainingLoopOptions& loop, c
 // photos, decoded, would take more than that, which it says; else 0, no limit.
 double settledPhotoBudget(double wanted, const Capture& capture, int64_t usableMemory);
 
-// The manifest of a trained model. Throws Error when there is none, or it is another method's.
+// The manifest of a trained model. Throws Error when there is none; and, of a method, when it is another one's.
+ModelManifest requireManifest(const ModelFolder& folder);
 ModelManifest requireManifest(const ModelFolder& folder, const std::string& method);
 
 // The settings of the run that `model` holds; the defaults when it holds none.

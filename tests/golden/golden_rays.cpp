@@ -10,7 +10,7 @@ namespace tessera::golden {
 namespace {
 
 constexpr uint64_t kRaysOfKind = 12, kKinds = 5;
-constexpr double kSceneEnd = VolumeFrame::kSceneEnd;
+constexpr double kSceneEnd = TileFrame::kSceneEnd;
 
 // The deferred network, as section 6 has it.
 std::array<double, 3> shade(const std::vector<DenseLayer>& network, const ReferenceComposite& composite,

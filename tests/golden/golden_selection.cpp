@@ -59,7 +59,7 @@ ordered_json toJson(const TileTree& tree) {
 
 ordered_json makeSelections() {
   const TileTree made = tree();
-  VolumeFrame frame;
+  TileFrame frame;
   frame.low = made.tiles[0].low;
   frame.high = made.tiles[0].high;
   const auto bytes = [](int tile) { return static_cast<uint64_t>(100 + 37 * tile % 61); };

@@ -1,9 +1,8 @@
-#include "render/cpu/draw_volume.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "render/cpu/draw_scene.h"
 #include "render/made_volume.h"
 #include "scene/block_grid.h"
 
@@ -35,7 +34,7 @@ bool isSolid(const Vec3d& x) {
 struct Village {
   std::vector<VolumeContent> blocks;  // two, side by side along x
   VolumeContent surround;
-  VolumeFrame frame;
+  TileFrame frame;
 
   Village() {
     frame.low = Vec3d(-2, -1, -1);
@@ -58,7 +57,7 @@ struct Village {
     surround = contentOf({around});
   }
 
-  VolumeDrawing drawing(bool withSurround = true) const {
+  SceneDrawing<VolumeContent> drawing(bool withSurround = true) const {
     return {frame, {&blocks[0], &blocks[1]}, withSurround ? &surround : nullptr, {}};
   }
 };
@@ -87,10 +86,10 @@ Pose pose(const Vec3d& eye = Vec3d(-3.2, -2.4, 1.6), const Vec3d& target = Vec3d
   return pose;
 }
 
-RenderedView drawn(const VolumeDrawing& drawing, const ImageF* opaque = nullptr, int threads = 1,
+RenderedView drawn(const SceneDrawing<VolumeContent>& drawing, const ImageF* opaque = nullptr, int threads = 1,
                    MarchCounts* counts = nullptr) {
   ThreadPool pool(threads);
-  return drawVolume(drawing, camera(), pose(), opaque, pool, counts);
+  return drawScene(drawing, camera(), pose(), opaque, pool, counts);
 }
 
 double largestDifference(const ImageF& a, const ImageF& b) {
@@ -160,7 +159,7 @@ TEST(DrawVolume, DrawsAHouseOnTheGroundAsGeometrySays) {
 }
 
 TEST(DrawVolume, DrawsTheSameWithAndWithoutSkippingInFarFewerSteps) {
-  VolumeDrawing drawing = village().drawing();
+  SceneDrawing<VolumeContent> drawing = village().drawing();
   MarchCounts few, all;
   const RenderedView a = drawn(drawing, nullptr, 1, &few);
   drawing.march.skipEmptySpace = false;
@@ -179,7 +178,7 @@ TEST(DrawVolume, DoesNotDependOnTheNumberOfThreads) {
 }
 
 TEST(DrawVolume, StandsInTheWorldWhereTheFrameSays) {
-  VolumeDrawing drawing = village().drawing();
+  SceneDrawing<VolumeContent> drawing = village().drawing();
   const RenderedView plain = drawn(drawing);
   drawing.frame.rotation = (Eigen::AngleAxisd(1.1, Vec3d::UnitZ()) * Eigen::AngleAxisd(0.2, Vec3d::UnitX())).matrix();
   drawing.frame.scale = 40;
@@ -187,7 +186,7 @@ TEST(DrawVolume, StandsInTheWorldWhereTheFrameSays) {
   const Pose inWorld{drawing.frame.rotation * pose().rotation,
                      40 * (drawing.frame.rotation * pose().translation) + drawing.frame.translation};
   ThreadPool pool(1);
-  const RenderedView moved = drawVolume(drawing, camera(), inWorld, nullptr, pool);
+  const RenderedView moved = drawScene(drawing, camera(), inWorld, nullptr, pool);
   int different = 0;
   for (size_t i = 0; i < plain.opacity.pixels.size(); ++i) {
     different += std::abs(moved.colour.pixels[3 * i] - plain.colour.pixels[3 * i]) > 1e-3;
@@ -199,7 +198,7 @@ TEST(DrawVolume, StandsInTheWorldWhereTheFrameSays) {
 TEST(DrawVolume, DrawsPartsOfOneContentAsItDrawsThemApartWhereNetworksAreDark) {
   const Village& made = village();
   const VolumeContent merged = contentOf({made.blocks[1].parts[0], made.blocks[0].parts[0]});  // in whatever order
-  VolumeDrawing drawing = made.drawing();
+  SceneDrawing<VolumeContent> drawing = made.drawing();
   drawing.march.minTransmittance = 0;
   const RenderedView apart = drawn(drawing);
   drawing.frontToBack = {&merged};
@@ -225,12 +224,12 @@ TEST(DrawVolume, BlendsCellsWithoutNetworksToWhatOneVolumeWouldBe) {
     cells.push_back(contentOf({part}));
   }
   const VolumeContent whole = contentOf(parts);
-  VolumeDrawing one;
+  SceneDrawing<VolumeContent> one;
   one.frame.low = Vec3d(-3, -2, -0.75);
   one.frame.high = Vec3d(3, 2, 1);
   one.march.minTransmittance = 0;
   one.frontToBack = {&whole};
-  VolumeRayCaster ofOne(one);
+  RayCaster<VolumeContent> ofOne(one);
   const RandomStream random(12, 1);
   int crossing = 0;
   double opacities = 0;
@@ -240,12 +239,12 @@ TEST(DrawVolume, BlendsCellsWithoutNetworksToWhatOneVolumeWouldBe) {
     const Vec3d origin = (i % 2 ? 1.0 : 2.0) * Vec3d(3 * value(0), 2 * value(1), value(2));
     const Vec3d target(3 * value(3), 2 * value(4), 0.7 * value(5));
     const SceneRay ray{origin, (target - origin).normalized()};
-    VolumeDrawing drawing = one;
+    SceneDrawing<VolumeContent> drawing = one;
     drawing.frontToBack.clear();
     for (const int cell : grid.frontToBack(origin.head<2>())) drawing.frontToBack.push_back(&cells[cell]);
     MarchCounts counts, ofWhole;
-    const BlendedRay got = VolumeRayCaster(drawing).cast(ray, INFINITY, counts);
-    const BlendedRay expected = ofOne.cast(ray, INFINITY, ofWhole);
+    const DrawnPixel got = RayCaster<VolumeContent>(drawing).cast(ray, INFINITY, counts);
+    const DrawnPixel expected = ofOne.cast(ray, INFINITY, ofWhole);
     ASSERT_EQ(counts.samples, ofWhole.samples);
     for (int c = 0; c < 3; ++c) ASSERT_NEAR(got.colour[c], expected.colour[c], 1e-5) << i;
     ASSERT_NEAR(got.transmittance, expected.transmittance, 1e-5) << i;
@@ -274,11 +273,11 @@ TEST(DrawVolume, ReadsOfEachPartNothingButItsOwnTexels) {
     for (uint8_t& byte : *bytes) byte = static_cast<uint8_t>(255 - byte);
   }
   const VolumeContent after = contentOf(parts, randomNetwork(1));
-  VolumeFrame frame;
+  TileFrame frame;
   frame.low = Vec3d(-2, -1, -1);
   frame.high = Vec3d(2, 1, 1);
-  const VolumeDrawing one{frame, {&before}, nullptr, {}}, other{frame, {&after}, nullptr, {}};
-  VolumeRayCaster casterOne(one), casterOther(other);
+  const SceneDrawing<VolumeContent> one{frame, {&before}, nullptr, {}}, other{frame, {&after}, nullptr, {}};
+  RayCaster<VolumeContent> casterOne(one), casterOther(other);
   const RandomStream random(13, 1);
   MarchCounts counts;
   int different = 0;
@@ -288,7 +287,7 @@ TEST(DrawVolume, ReadsOfEachPartNothingButItsOwnTexels) {
     const Vec3d origin(x, 2 * random.uniformDouble(3 * i + 1) - 1, 2),
         down(0, 2 * random.uniformDouble(3 * i + 2) - 1, -3);
     const SceneRay ray{origin, down.normalized()};
-    const BlendedRay a = casterOne.cast(ray, INFINITY, counts), b = casterOther.cast(ray, INFINITY, counts);
+    const DrawnPixel a = casterOne.cast(ray, INFINITY, counts), b = casterOther.cast(ray, INFINITY, counts);
     if (x < 0) {
       ASSERT_EQ(a.colour, b.colour) << x;
       ASSERT_EQ(a.transmittance, b.transmittance) << x;
@@ -306,7 +305,7 @@ TEST(DrawVolume, SeesNothingOfAContentThatHoldsNothingWhateverItsNetwork) {
   nothing.planes = 64;
   makeVolume(nothing, smoothVolume(1, 0));
   const VolumeContent empty = contentOf({nothing}, randomNetwork(1));
-  VolumeDrawing drawing = village().drawing();
+  SceneDrawing<VolumeContent> drawing = village().drawing();
   const RenderedView without = drawn(drawing);
   drawing.frontToBack.insert(drawing.frontToBack.begin(), &empty);
   const RenderedView with = drawn(drawing);
@@ -325,7 +324,7 @@ TEST(DrawVolume, SeesTheSurroundOnlyBehindTheBox) {
   part.planes = 64;
   makeSolid(
       part, [](const Vec3d&) { return true; }, [](const Vec3d&) { return Vec3d(0.1, 0.2, 0.8); });
-  VolumeDrawing drawing = village().drawing(false);
+  SceneDrawing<VolumeContent> drawing = village().drawing(false);
   const RenderedView without = drawn(drawing);
   drawing.surround = &fog;
   const RenderedView with = drawn(drawing);
@@ -362,11 +361,11 @@ TEST(DrawVolume, SeesBlocksThatOwnWhatLiesOutsideFromWhereTheBoxIsEntered) {
   makeSolid(
       part, [](const Vec3d&) { return true; }, [](const Vec3d&) { return Vec3d(0.1, 0.2, 0.8); });
   const VolumeContent border = contentOf({part});
-  VolumeDrawing drawing{{}, {&border}, nullptr, {}};
-  VolumeRayCaster caster(drawing);
+  SceneDrawing<VolumeContent> drawing{{}, {&border}, nullptr, {}};
+  RayCaster<VolumeContent> caster(drawing);
   MarchCounts counts;
   const auto depthOf = [&](const Vec3d& origin, const Vec3d& target) {
-    const BlendedRay ray = caster.cast({origin, (target - origin).normalized()}, INFINITY, counts);
+    const DrawnPixel ray = caster.cast({origin, (target - origin).normalized()}, INFINITY, counts);
     return ray.depth / (1 - ray.transmittance);
   };
   EXPECT_NEAR(depthOf(Vec3d(5, 0, 0), Vec3d(0, 0, 0)), 4, 0.1);           // the box, though it owns what is in front
@@ -397,14 +396,14 @@ TEST(DrawVolume, SeesBlocksThatOwnWhatLiesOutsideBehindTheBoxToo) {
     }
     contents.push_back(contentOf({part}));
   }
-  VolumeDrawing drawing;
+  SceneDrawing<VolumeContent> drawing;
   drawing.frame.low = Vec3d(-3, -1, -0.5);
   drawing.frame.high = Vec3d(3, 1, 0.5);
   MarchCounts counts;
   const auto wallSeen = [&](const Vec3d& origin, const Vec3d& direction) {
     drawing.frontToBack = {&contents[0], &contents[1], &contents[2]};
     if (origin.x() > 0) std::reverse(drawing.frontToBack.begin(), drawing.frontToBack.end());
-    const BlendedRay ray = VolumeRayCaster(drawing).cast({origin, direction.normalized()}, INFINITY, counts);
+    const DrawnPixel ray = RayCaster<VolumeContent>(drawing).cast({origin, direction.normalized()}, INFINITY, counts);
     EXPECT_GT(1 - ray.transmittance, 0.99);
     return (origin + ray.depth / (1 - ray.transmittance) * direction.normalized()).x();
   };
@@ -442,7 +441,7 @@ TEST(DrawVolume, DrawsNothingBeyondTheLens) {
   fisheye.parameters = {20, 20, 120, 90, -0.1, 0, 0, 0};
   ASSERT_FALSE(fisheye.directionInCamera(Vec2d(0.5, 0.5)));
   ThreadPool pool(1);
-  const RenderedView view = drawVolume(village().drawing(), fisheye, pose(), nullptr, pool);
+  const RenderedView view = drawScene(village().drawing(), fisheye, pose(), nullptr, pool);
   EXPECT_EQ(*view.opacity.at(0, 0), 0);
   EXPECT_GT(*view.opacity.at(120, 90), 0.9);
   for (const float value : view.depth.pixels) EXPECT_TRUE(std::isfinite(value));

@@ -2,25 +2,24 @@
 //
 // Each straight piece of the path is cut, from its entry on, into steps of one length in the domain, the last one
 // shorter; in the middle of each lies a sample, as in training (MarchBlocks). A sample is evaluated where the finest
-// occupancy says that something is. Where it says no, the ray leaves the largest empty cell that holds the place, or
-// goes as far as the distance grid says, whichever is farther; always by whole steps, so which samples are evaluated
-// does not depend on it.
+// occupancy says that something is. Where it says no, the ray leaves the empty cube of its octant (octantDistances), or
+// else the largest empty cell that holds the place; always by whole steps, so which samples are evaluated does not
+// depend on it.
 #pragma once
 
 #include <vector>
 
+#include "render/cpu/hash_features.h"
 #include "render/cpu/march.h"
 #include "scene/domain_path.h"
-#include "tiles/hash_content.h"
 
 namespace tessera {
 
 struct HashMarch {
-  const HashContent& content;
-  const HashPart& part;  // of `content`
+  const HashFeatures& features;
+  double step;  // HashContent::step
   const DomainPath& path;
   MarchSettings settings;
-  bool useDistances = true;
   float transmittanceBefore = 1;               // of all other contents in front of this one
   std::vector<uint64_t>* evaluated = nullptr;  // optional: piece << 32 | step of each sample is added
 
@@ -28,9 +27,5 @@ struct HashMarch {
   // are sums before any activation.
   void run(ContentComposite& composite, MarchCounts& counts) const;
 };
-
-// The features of a place in [0,1]³ of a part's domain, all eight; nothing is looked up whether it is occupied. False
-// where its corners are not stored.
-bool hashFeatures(const HashContent& content, const HashPart& part, const float place[3], float features[8]);
 
 }  // namespace tessera

@@ -8,6 +8,7 @@ namespace tessera {
 struct MarchSettings {
   bool skipEmptySpace = true;
   float minTransmittance = 1.0f / 255;  // rays end where less than this would be seen; 0: never
+  bool useDistances = true;             // of `hash`, to skip by: beside the levels of the occupancy
 };
 
 // Adds up over calls.

@@ -2,7 +2,7 @@
 // contracting, lengths by uncontracting, each of the 20 texels by its formula.
 #pragma once
 
-#include "render/volume_frame.h"
+#include "render/tile_frame.h"
 #include "scene/contraction.h"
 #include "tiles/volume_content.h"
 

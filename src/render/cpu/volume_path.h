@@ -3,8 +3,7 @@
 
 #include <array>
 
-#include "render/volume_frame.h"
-#include "scene/domain_path.h"
+#include "render/cpu/part_path.h"
 #include "tiles/volume_content.h"
 
 namespace tessera {
@@ -28,9 +27,6 @@ struct VolumePath {
   std::array<VolumeSegment, DomainPath::kMostSegments> segments;
   int count = 0;
 };
-
-// Where the ray is in what a part owns and in its domain. Not for the surround, which owns what lies behind the box.
-RayRange ownedRange(const VolumePart& part, const SceneRay& ray, const RayRange& range);
 
 // `range` is finite, and for a bounded part within its domain.
 VolumePath volumePath(const VolumePart& part, const SceneRay& ray, const RayRange& range);

@@ -1,18 +1,17 @@
-#include "render/cpu/volume_renderer.h"
-
 #include <gtest/gtest.h>
 
 #include <map>
 #include <set>
 
 #include "base/error.h"
+#include "render/cpu/scene_renderer.h"
 #include "render/made_place.h"
 
 namespace tessera {
 namespace {
 
-VolumeRendererSettings settingsWith(uint64_t budget) {
-  VolumeRendererSettings settings;
+SceneRendererSettings settingsWith(uint64_t budget) {
+  SceneRendererSettings settings;
   settings.budgetBytes = budget;
   settings.threads = 1;
   return settings;
@@ -43,7 +42,7 @@ Pose poseAt(int step) {
 TEST(VolumeRenderer, NeverExceedsAQuarterOfTheFinestLevelAndNeverLacksTheCoarsest) {
   const uint64_t budget = place().finestBytes / 4;
   ASSERT_LT(place().coarsestBytes, budget);
-  VolumeRendererSettings settings = settingsWith(budget);
+  SceneRendererSettings settings = settingsWith(budget);
   settings.selection.mostPixels = 0.2;  // of a small picture
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
   std::set<int> drawn;
@@ -62,7 +61,7 @@ TEST(VolumeRenderer, NeverExceedsAQuarterOfTheFinestLevelAndNeverLacksTheCoarses
 TEST(VolumeRenderer, DrawsTheSamePictureAsWithoutABudgetWhereWhatIsWantedFits) {
   // What 1.5 pixels ask for does not fit; what 16 ask for does.
   for (const double pixels : {16.0, 1.5}) {
-    VolumeRendererSettings settings = settingsWith(place().allBytes), tight = settingsWith(place().finestBytes / 3);
+    SceneRendererSettings settings = settingsWith(place().allBytes), tight = settingsWith(place().finestBytes / 3);
     settings.selection.mostPixels = tight.selection.mostPixels = pixels;
     VolumeRenderer unbounded(place().frame, place().tree, place().source(), settings);
     VolumeRenderer bounded(place().frame, place().tree, place().source(), tight);
@@ -88,7 +87,7 @@ TEST(VolumeRenderer, DrawsTheSamePictureAsWithoutABudgetWhereWhatIsWantedFits) {
 
 // Each pixel whose ray meets one tile of the cut shows that tile's content, as if nothing else were there.
 TEST(VolumeRenderer, DrawsWhatIsAboveAMissingTileInItsCellsAlone) {
-  VolumeRendererSettings settings = settingsWith(place().finestBytes / 3);
+  SceneRendererSettings settings = settingsWith(place().finestBytes / 3);
   settings.selection.mostPixels = 0;
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
   int pixels = 0, instead = 0;
@@ -99,8 +98,9 @@ TEST(VolumeRenderer, DrawsWhatIsAboveAMissingTileInItsCellsAlone) {
     for (const SelectedTile& one : renderer.cut().tiles) {
       if (!one.visible || alone.contains(one.content)) continue;
       ThreadPool pool(1);
-      const VolumeDrawing drawing{place().frame, {&place().contents[one.content]}, &place().contents.back(), {}};
-      alone.emplace(one.content, drawVolume(drawing, camera(), poseAt(step), nullptr, pool));
+      const SceneDrawing<VolumeContent> drawing{
+          place().frame, {&place().contents[one.content]}, &place().contents.back(), {}};
+      alone.emplace(one.content, drawScene(drawing, camera(), poseAt(step), nullptr, pool));
     }
     for (int y = 0; y < camera().height; ++y) {
       for (int x = 0; x < camera().width; ++x) {
@@ -124,7 +124,7 @@ TEST(VolumeRenderer, DrawsWhatIsAboveAMissingTileInItsCellsAlone) {
 }
 
 TEST(VolumeRenderer, DrawsTheFinestLevelWhereNoErrorIsAllowed) {
-  VolumeRendererSettings settings = settingsWith(place().allBytes);
+  SceneRendererSettings settings = settingsWith(place().allBytes);
   settings.selection.mostPixels = 0;
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
   const RenderedView view = renderer.render(camera(), poseAt(0), nullptr);
@@ -137,7 +137,7 @@ TEST(VolumeRenderer, DrawsTheFinestLevelWhereNoErrorIsAllowed) {
   ASSERT_EQ(finest.size(), 16u);
   const VolumeContent& surround = place().contents.back();
   const auto contentAt = [&](int tile) -> const VolumeContent& { return tile == 17 ? surround : finest[tile - 1]; };
-  const TileSource source{[&](int tile) { return bytesInMemory(contentAt(tile)); }, contentAt};
+  const TileSource<VolumeContent> source{[&](int tile) { return bytesInMemory(contentAt(tile)); }, contentAt};
   VolumeRenderer flat(place().frame, flatTileTree(finest, true), source, settings);
   const RenderedView expected = flat.render(camera(), poseAt(0), nullptr);
   EXPECT_EQ(view.colour.pixels, expected.colour.pixels);
@@ -148,7 +148,7 @@ TEST(VolumeRenderer, DrawsTheFinestLevelWhereNoErrorIsAllowed) {
 }
 
 TEST(VolumeRenderer, OrdersMixedLevelsAsEachRayMeetsThem) {
-  VolumeRendererSettings settings = settingsWith(place().allBytes);
+  SceneRendererSettings settings = settingsWith(place().allBytes);
   settings.selection.mostPixels = 1;
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
   bool mixed = false;

@@ -1,50 +1,9 @@
 #include "render/cpu/volume_shading.h"
 
+#include <algorithm>
 #include <cmath>
-#include <cstring>
 
-#include "base/check.h"
-
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "render/cpu/volume_shading.cpp"
-#include <hwy/foreach_target.h>
-// after foreach_target
-#include <hwy/highway.h>
-
-HWY_BEFORE_NAMESPACE();
-namespace tessera::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-// Overwrites `values`, which holds the inputs, with the outputs before the sigmoid.
-HWY_ATTR void evaluateLayers(const std::vector<DeferredShader::Layer>& layers, float* values) {
-  const hn::CappedTag<float, 8> d;
-  const size_t lanes = hn::Lanes(d);
-  alignas(64) float outputs[DeferredShader::kMostWidth];
-  for (size_t number = 0; number < layers.size(); ++number) {
-    const DeferredShader::Layer& layer = layers[number];
-    const auto least = hn::Set(d, number + 1 < layers.size() ? 0.0f : -INFINITY);
-    for (size_t o = 0; o < layer.outputs; o += lanes) {
-      const float* weights = layer.weights.data() + o;
-      auto even = hn::LoadU(d, layer.biases.data() + o), odd = hn::Zero(d);
-      size_t i = 0;
-      for (; i + 1 < layer.inputs; i += 2, weights += 2 * layer.outputs) {
-        even = hn::MulAdd(hn::Set(d, values[i]), hn::LoadU(d, weights), even);
-        odd = hn::MulAdd(hn::Set(d, values[i + 1]), hn::LoadU(d, weights + layer.outputs), odd);
-      }
-      if (i < layer.inputs) even = hn::MulAdd(hn::Set(d, values[i]), hn::LoadU(d, weights), even);
-      hn::StoreU(hn::Max(hn::Add(even, odd), least), d, outputs + o);
-    }
-    std::memcpy(values, outputs, layer.outputs * sizeof(float));
-  }
-}
-
-}  // namespace tessera::HWY_NAMESPACE
-HWY_AFTER_NAMESPACE();
-
-#if HWY_ONCE
 namespace tessera {
-
-HWY_EXPORT(evaluateLayers);
 
 std::array<float, 27> encodeDirection(const Vec3d& direction) {
   std::array<float, 27> encoded;
@@ -62,35 +21,12 @@ std::array<float, 27> encodeDirection(const Vec3d& direction) {
   return encoded;
 }
 
-DeferredShader::DeferredShader(const std::vector<DenseLayer>& network) {
-  CHECK(network.empty() == false);
-  CHECK(network.front().inputs == kInputs);
-  CHECK(network.back().outputs == kOutputs);
-  uint32_t width = kInputs;
-  for (const DenseLayer& layer : network) {
-    CHECK(layer.inputs == width);
-    CHECK(layer.outputs <= kMostWidth);
-    CHECK(layer.weights.size() == size_t{layer.inputs} * layer.outputs);
-    CHECK(layer.biases.size() == layer.outputs);
-    width = layer.outputs;
-    Layer laid{layer.inputs, (layer.outputs + 7) / 8 * 8, {}, layer.biases};
-    laid.biases.resize(laid.outputs);
-    laid.weights.resize(size_t{laid.inputs} * laid.outputs);
-    for (uint32_t o = 0; o < layer.outputs; ++o) {
-      for (uint32_t i = 0; i < layer.inputs; ++i) {
-        laid.weights[size_t{i} * laid.outputs + o] = layer.weights[size_t{o} * layer.inputs + i];
-      }
-    }
-    layers_.push_back(std::move(laid));
-  }
-}
-
 std::array<float, 3> DeferredShader::shade(const ContentComposite& composite,
                                            const std::array<float, 27>& direction) const {
-  alignas(64) float values[kMostWidth];
+  alignas(64) float values[DenseNetwork::kMostWidth];
   std::copy(composite.values, composite.values + ContentComposite::kValues, values);
   std::copy(direction.begin(), direction.end(), values + ContentComposite::kValues);
-  HWY_DYNAMIC_DISPATCH(evaluateLayers)(layers_, values);
+  network_.run(values);
   std::array<float, 3> colour;
   for (int c = 0; c < 3; ++c) colour[c] = 1 / (1 + std::exp(-values[c]));
   return colour;
@@ -106,5 +42,19 @@ void BlendedRay::add(const ContentComposite& composite, const DeferredShader& sh
   transmittance *= composite.transmittance;
 }
 
+VolumeShading::VolumeShading(const std::vector<const VolumeContent*>& contents, const MarchSettings& settings)
+    : settings_(settings) {
+  for (const VolumeContent* content : contents) shaders_.emplace_back(content->network);
+}
+
+void VolumeShading::begin(const Vec3d& direction) {
+  ray_ = {};
+  direction_ = encodeDirection(direction);
+}
+
+void VolumeShading::march(const VolumeContent& content, const VolumePart& part, const SceneRay& ray,
+                          const RayRange& range, ContentComposite& composite, MarchCounts& counts) const {
+  VolumeMarch{content, part, volumePath(part, ray, range), settings_, ray_.transmittance}.run(composite, counts);
+}
+
 }  // namespace tessera
-#endif

@@ -4,6 +4,8 @@
 #include <array>
 #include <vector>
 
+#include "render/cpu/dense_network.h"
+#include "render/cpu/shading.h"
 #include "render/cpu/volume_march.h"
 
 namespace tessera {
@@ -11,36 +13,49 @@ namespace tessera {
 // A unit direction d in scene axes as networks take it: d, sin(2^k d) for k = 0 … 3, cos(2^k d) likewise.
 std::array<float, 27> encodeDirection(const Vec3d& direction);
 
-// A network with its weights laid out for vectors over the outputs.
 class DeferredShader {
  public:
-  static constexpr uint32_t kInputs = 34, kOutputs = 3, kMostWidth = 256;
+  static constexpr uint32_t kInputs = 34, kOutputs = 3;
 
-  // `network` is 34 → … → 3, no layer wider than kMostWidth. Keeps nothing of it.
-  explicit DeferredShader(const std::vector<DenseLayer>& network);
+  // `network` is 34 → … → 3. Keeps nothing of it.
+  explicit DeferredShader(const std::vector<DenseLayer>& network) : network_(network, kInputs, kOutputs) {}
 
   // Φ, in [0,1].
   std::array<float, 3> shade(const ContentComposite& composite, const std::array<float, 27>& direction) const;
 
-  struct Layer {
-    uint32_t inputs = 0, outputs = 0;  // the outputs rounded up to whole vectors
-    std::vector<float> weights;        // [inputs][outputs]
-    std::vector<float> biases;         // [outputs]
-  };
-  const std::vector<Layer>& layers() const { return layers_; }
-
  private:
-  std::vector<Layer> layers_;
+  DenseNetwork network_;
 };
 
 // Contents along a ray, blended front to back: C = Σ_k T_k (C_d^k + α^k Φ^k), T_k = Π_{j<k} (1 - α^j). A content that
 // holds nothing (α = 0) adds nothing.
-struct BlendedRay {
-  std::array<float, 3> colour = {0, 0, 0};
-  float transmittance = 1;
-  float depth = 0;  // scene units along the ray, premultiplied
-
+struct BlendedRay : DrawnPixel {
   void add(const ContentComposite& composite, const DeferredShader& shader, const std::array<float, 27>& direction);
+};
+
+// Every content has its own network, which is run once a ray.
+class VolumeShading {
+ public:
+  VolumeShading(const std::vector<const VolumeContent*>& contents, const MarchSettings& settings);
+
+  void begin(const Vec3d& direction);
+  float transmittance() const { return ray_.transmittance; }
+  void march(const VolumeContent& content, const VolumePart& part, const SceneRay& ray, const RayRange& range,
+             ContentComposite& composite, MarchCounts& counts) const;
+  void add(const ContentComposite& composite, size_t content) { ray_.add(composite, shaders_[content], direction_); }
+  void end(DrawnPixel& pixel) const { pixel = ray_; }
+  void finish() {}
+
+ private:
+  std::vector<DeferredShader> shaders_;
+  MarchSettings settings_;
+  BlendedRay ray_;
+  std::array<float, 27> direction_ = {};
+};
+
+template <>
+struct Shading<VolumeContent> {
+  using Type = VolumeShading;
 };
 
 }  // namespace tessera

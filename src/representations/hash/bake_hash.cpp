@@ -1,6 +1,7 @@
 #include "representations/hash/bake_hash.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "base/error.h"
@@ -22,31 +23,45 @@ constexpr uint32_t kTexels = 1 << 16;       // evaluated together
 // Looks at a model through photos, and marks where it sees something.
 class SeenFinder {
  public:
-  SeenFinder(HashModel& model, const BakeHashOptions& options, std::vector<OccupancyBits>& seen)
+  SeenFinder(HashModel& model, const Capture& capture, const BakeHashOptions& options, std::vector<OccupancyBits>& seen)
       : model_(model),
         options_(options),
         seen_(seen),
+        photoPixels_(capture, model.frame()),
         pass_(model, {kRays, kSamples, 8 * kSamples, false}),
         pictureRays_(model.device(), kRays) {}
 
   void look(const Photo& photo, const Camera& camera) {
-    const ImageU8 mask = maskOf(photo, camera);
+    photoPixels_.begin(photo, camera);
     pictureRays_.begin(makeRayCamera(camera, photo.worldFromCamera, model_.frame()), model_.frame(), {});
-    std::vector<float> pixels;
-    for (int y = 0; y < camera.height; y += options_.stride) {
-      for (int x = 0; x < camera.width; x += options_.stride) {
-        if (!mask.pixels.empty() && *mask.at(x, y) < 128) continue;  // as ray_batch.cpp
-        pixels.push_back(static_cast<float>(x) + 0.5f);
-        pixels.push_back(static_cast<float>(y) + 0.5f);
-        if (pixels.size() == size_t{2} * kRays) mark(pixels);
-      }
-    }
-    if (!pixels.empty()) mark(pixels);
+    const uint32_t surround = model_.space().cells();
+    lookThrough({0, 0, camera.width, camera.height, options_.stride}, 0);
+    if (model_.space().blocks() == surround) return;
+    const int x = static_cast<int>(kBesidePhotos * camera.width), y = static_cast<int>(kBesidePhotos * camera.height);
+    lookThrough({-x, -y, camera.width + x, camera.height + y, kBesideStride * options_.stride}, surround);
   }
 
  private:
+  struct Lattice {
+    int left, top, right, bottom, stride;
+  };
+
+  // Marks what is seen of a block and those after it.
+  void lookThrough(const Lattice& lattice, uint32_t firstBlock) {
+    std::vector<float> pixels;
+    for (int y = lattice.top; y < lattice.bottom; y += lattice.stride) {
+      for (int x = lattice.left; x < lattice.right; x += lattice.stride) {
+        if ((firstBlock > 0 && photoPixels_.within(x, y)) || !photoPixels_.count(x, y)) continue;
+        pixels.push_back(static_cast<float>(x) + 0.5f);
+        pixels.push_back(static_cast<float>(y) + 0.5f);
+        if (pixels.size() == size_t{2} * kRays) mark(pixels, firstBlock);
+      }
+    }
+    if (!pixels.empty()) mark(pixels, firstBlock);
+  }
+
   // Empties `pixels`. Rays that did not fit into one pass go through the next.
-  void mark(std::vector<float>& pixels) {
+  void mark(std::vector<float>& pixels, uint32_t firstBlock) {
     Device& device = model_.device();
     while (!pixels.empty()) {
       const PictureRays::Piece piece = pictureRays_.through(pixels);
@@ -64,7 +79,7 @@ class SeenFinder {
         for (uint32_t s = first[ray]; s < first[ray + 1]; ++s) {
           const float alpha = weights[s] / std::max(transmittance, 1e-9f);
           transmittance -= weights[s];
-          if (weights[s] > options_.minWeight && alpha > options_.minAlpha)
+          if (blocks[s] >= firstBlock && weights[s] > options_.minWeight && alpha > options_.minAlpha)
             markCell(seen_[blocks[s]], &positions[3 * s]);
         }
       }
@@ -84,6 +99,7 @@ class SeenFinder {
   HashModel& model_;
   const BakeHashOptions& options_;
   std::vector<OccupancyBits>& seen_;
+  PhotoPixels photoPixels_;
   HashPass pass_;
   PictureRays pictureRays_;
 };
@@ -165,7 +181,7 @@ void bakeCorners(HashModel& model, uint32_t block, const OccupancyBits& seen, Ha
     if (!wanted[b]) continue;
     part.macroblocks[b] = stored++;
     const uint32_t origin[3] = {b % blocks * 8, b / blocks % blocks * 8, b / blocks / blocks * 8};
-    for (uint32_t i = 0; i < HashPart::kCorners; ++i) {
+    for (uint32_t i = 0; i < HashPart::kStoredTexels; ++i) {
       const uint32_t x = std::min(origin[0] + i % 9, last), y = std::min(origin[1] + i / 9 % 9, last),
                      z = std::min(origin[2] + i / 81, last);
       corners.push_back(x + part.lattice * (y + part.lattice * z));
@@ -183,15 +199,46 @@ void bakeCorners(HashModel& model, uint32_t block, const OccupancyBits& seen, Ha
   }
 }
 
-void bakeTables(HashModel& model, uint32_t block, HashPart& part) {
+// Entries that a sample in a seen cell may read; nothing where nearly all are.
+std::vector<bool> readEntries(const HashGridLevel& level, const OccupancyBits& seen) {
+  constexpr uint64_t kNearlyAll = 4;  // so many look-ups an entry leave out one in fifty
+  const double edge = static_cast<double>(level.resolution - 1) / seen.cells;  // of a cell, in points
+  const uint64_t points = static_cast<uint64_t>(std::ceil(edge)) + 2;
+  uint64_t cells = 0;
+  for (const uint64_t word : seen.words) cells += static_cast<uint64_t>(std::popcount(word));
+  if (cells * points * points * points >= kNearlyAll * level.entries) return {};
+  std::vector<bool> read(level.entries);
+  for (size_t number = 0; number < seen.count(); ++number) {
+    if (!seen.at(number)) continue;
+    const size_t n = seen.cells, cell[3] = {number % n, number / n % n, number / n / n};
+    uint32_t first[3], last[3];
+    for (int a = 0; a < 3; ++a) {  // with a margin for the rounding of floats
+      const double low = static_cast<double>(cell[a]) * edge + 0.5, high = low + edge;
+      first[a] = static_cast<uint32_t>(std::max(0.0, low - 1e-3));
+      last[a] = static_cast<uint32_t>(high + 1e-3) + 1;
+    }
+    for (uint32_t z = first[2]; z <= last[2]; ++z) {
+      for (uint32_t y = first[1]; y <= last[1]; ++y) {
+        for (uint32_t x = first[0]; x <= last[0]; ++x) read[hashGridIndex(level, x, y, z)] = true;
+      }
+    }
+  }
+  return read;
+}
+
+void bakeTables(HashModel& model, uint32_t block, const OccupancyBits& seen, HashPart& part) {
   const HashGrid& grid = model.fields().fineGrid();
   for (const HashGridLevel& level : grid.levels) {
     HashTable table;
     table.resolution = level.resolution;
     table.entries = level.entries;
     table.hashed = level.hashed;
-    const std::vector<float> values = model.device().read(model.fields().fine(block).values.part(
+    std::vector<float> values = model.device().read(model.fields().fine(block).values.part(
         level.firstEntry * HashPart::kFeatures, size_t{level.entries} * HashPart::kFeatures));
+    const std::vector<bool> read = readEntries(level, seen);
+    for (size_t i = 0; i < values.size() && !read.empty(); ++i) {
+      if (!read[i / HashPart::kFeatures]) values[i] = 0;  // what is never read compresses to nothing
+    }
     for (uint32_t f = 0; f < HashPart::kFeatures; ++f) table.ranges[f] = rangeOf(values, f, HashPart::kFeatures);
     table.bytes.reserve(values.size());
     for (size_t i = 0; i < values.size(); ++i) {
@@ -225,7 +272,7 @@ std::vector<DenseLayer> networkOf(HashModel& model) {
 std::vector<OccupancyBits> findSeenCells(HashModel& model, const Capture& capture, const BakeHashOptions& options) {
   const uint32_t cells = options.cells > 0 ? options.cells : model.fields().lattice().voxels;
   std::vector<OccupancyBits> seen(model.space().blocks(), OccupancyBits(cells));
-  SeenFinder finder(model, options, seen);
+  SeenFinder finder(model, capture, options, seen);
   const std::vector<int> photos = capture.photosIn(Split::train);
   int64_t done = 0;
   for (const int photo : photos) {
@@ -250,13 +297,14 @@ HashPart bakeHashPart(HashModel& model, uint32_t block, const OccupancyBits& see
   part.high = owned.high;
   part.surround = block >= space.cells();
   bakeCorners(model, block, seen, part);
-  bakeTables(model, block, part);
+  bakeTables(model, block, seen, part);
   part.occupied = pyramidFromOccupancy(seen);
-  if (part.occupied.levels.size() > 1) part.distances = occupancyDistances(part.occupied.levels[1]);
+  part.distances = octantDistances(part.occupied.levels[HashPart::distanceLevel(part.cells())]);
   return part;
 }
 
-HashContent bakeHashBlock(HashModel& model, uint32_t block, const OccupancyBits& seen) {
+HashContent bakeHashGroup(HashModel& model, const std::vector<uint32_t>& blocks,
+                          const std::vector<OccupancyBits>& seen) {
   if (model.config().mixesByNetwork()) {
     throw Error("--set aggregation=mlp", "", "a network for each sample cannot be baked", "train with attention");
   }
@@ -271,7 +319,7 @@ HashContent bakeHashBlock(HashModel& model, uint32_t block, const OccupancyBits&
   content.step = static_cast<float>(model.stepScale()) * model.config().longestStep();
   content.isWhole = model.config().background == "learned";
   content.network = networkOf(model);
-  content.parts.push_back(bakeHashPart(model, block, seen));
+  for (const uint32_t block : blocks) content.parts.push_back(bakeHashPart(model, block, seen[block]));
   return content;
 }
 

@@ -27,8 +27,16 @@ struct Baked {
     options.cells = cells;
     return options;
   }
-  HashContent block(uint32_t number) { return bakeHashBlock(trained.model(), number, seen[number]); }
+  HashContent block(uint32_t number) { return bakeHashGroup(trained.model(), {number}, seen); }
 };
+
+bool looksUp(const HashContent& content, const HashPart& part, const float place[3], float features[8]) {
+  const HashFeatures at(content, part);
+  HashFeatures::Lookup lookup;
+  if (!at.find(place, lookup)) return false;
+  at.mix(lookup, features);
+  return true;
+}
 
 size_t countOf(const OccupancyBits& bits) {
   size_t count = 0;
@@ -76,7 +84,7 @@ TEST(BakeHash, HoldsTheFeaturesOfTheModelWhereverAnythingIsSeen) {
         device.read(fields.forward({{count}, slots, at}, false).data.part(0, size_t{8} * count));
     for (uint32_t s = 0; s < count; ++s) {
       float features[8];
-      ASSERT_TRUE(hashFeatures(content, part, &positions[3 * s], features)) << s;
+      ASSERT_TRUE(looksUp(content, part, &positions[3 * s], features)) << s;
       for (uint32_t f = 0; f < 8; ++f) {
         // Half a step of each byte; of a logit a quarter of that times what it weighs.
         double most = 0.5 * part.ranges[f].scale();
@@ -104,6 +112,7 @@ TEST(BakeHash, MarchesTheVerySameSamplesHoweverEmptySpaceIsPassedOver) {
       HashContent content = baked.block(block);
       content.step = 1.0f / 400;  // shorter than a cell
       const HashPart& part = content.parts[0];
+      const HashFeatures features(content, part);
       const BlockDomain domain = domainOf(baked.trained.model().space().placement(block));
       const RandomStream random(7, block);
       for (uint64_t ray = 0; ray < 200; ++ray) {
@@ -125,8 +134,7 @@ TEST(BakeHash, MarchesTheVerySameSamplesHoweverEmptySpaceIsPassedOver) {
         ContentComposite composites[3];
         MarchCounts* const counts[3] = {&all, &byCells, &byDistances};
         for (int way = 0; way < 3; ++way) {
-          HashMarch march{content, part, path, {way > 0, 0}};
-          march.useDistances = way == 2;
+          HashMarch march{features, content.step, path, {way > 0, 0, way == 2}};
           march.evaluated = &sets[way];
           march.run(composites[way], *counts[way]);
         }
@@ -166,7 +174,7 @@ TEST(BakeHash, StoresAllCornersOfEverySeenCell) {
             i < 4 ? static_cast<float>(i >> (a % 2) & 1) * 0.99999f : random.uniform(24 * number + 3 * i + a);
         place[a] = std::min((static_cast<float>(cell[a]) + within) / static_cast<float>(n), 1.0f);
       }
-      ASSERT_TRUE(hashFeatures(content, part, place, features)) << number;
+      ASSERT_TRUE(looksUp(content, part, place, features)) << number;
     }
     for (size_t level = 1; level < part.occupied.levels.size(); ++level) {
       ASSERT_TRUE(part.occupied.levels[level].at(static_cast<uint32_t>(cell[0] >> level),
@@ -181,7 +189,7 @@ TEST(BakeHash, RefusesModelsThatMixByANetwork) {
   config.aggregation = "mlp";
   const CubeScene scene;
   TrainedHashCube trained(scene, config, cubeGrid(), 0);
-  EXPECT_THROW(bakeHashBlock(trained.model(), 0, OccupancyBits(16)), Error);
+  EXPECT_THROW(bakeHashGroup(trained.model(), {0}, {OccupancyBits(16)}), Error);
 }
 
 }  // namespace

@@ -3,54 +3,31 @@
 // which alive_texels.h says what they take; and the tile that is being written.
 #pragma once
 
-#include <array>
 #include <functional>
 #include <memory>
-#include <optional>
 
+#include "bake/bake_options.h"
+#include "bake/scene_writer.h"
 #include "representations/volume/alive_texels.h"
 #include "representations/volume/volume_model.h"
 #include "scene/capture.h"
-#include "tiles/tileset.h"
 #include "tiles/volume_content.h"
 
 namespace tessera {
-
-struct BakeVolumeOptions {
-  // What training photos see is kept: samples of their pixels whose weight in the picture and whose opacity over a
-  // renderer's step are both above these.
-  double minWeight = 0.005, minAlpha = 0.005;
-  // Of the scene, where no photo looked. Without: a hazy sky; black where training had nothing else behind the photos.
-  std::optional<std::array<float, 3>> background;
-  int stride = 1;  // every so manieth pixel along rows and columns; of each coarser level twice as much
-  int effort = 4;  // of compression, 0 to 9
-  // Of a model that holds few blocks at a time, photos are done in parts.
-  std::function<void(int64_t done, int64_t all)> onPhoto = [](int64_t, int64_t) {};
-};
-
-struct BakedLevel {
-  uint64_t bytesOnDisk = 0, bytesInMemory = 0;
-  uint64_t macroblocks = 0;
-};
-
-struct BakedVolume {
-  Tileset tileset;
-  std::vector<BakedLevel> levels;  // the finest first; the surround counts there
-};
 
 // Gives the model of a level, the finest (0) first. One is held at a time.
 using LevelModels = std::function<std::unique_ptr<VolumeModel>(uint32_t level)>;
 
 // Writes the scene folder; tileset.json last. A function of models, capture and options. Throws Error when a file
 // cannot be written.
-BakedVolume bakeVolume(const LevelModels& models, uint32_t levels, const Capture& capture, const fs::path& scene,
-                       const BakeVolumeOptions& options);
+BakedScene bakeVolume(const LevelModels& models, uint32_t levels, const Capture& capture, const fs::path& scene,
+                      const BakeOptions& options);
 
 // The steps of it. What training photos see through the pixels that no mask leaves out, [blocks]. Where not all blocks
 // are in memory, stay by stay: see bake_stays.h, also for what is kept of pixels whose blocks do not fit together, of
 // which it warns; what the stay lacks behind the coarse depth of a pixel is air, as it was in training. Throws Error
 // when a mask cannot be read.
-std::vector<AliveTexels> findAliveTexels(VolumeModel& model, const Capture& capture, const BakeVolumeOptions& options);
+std::vector<AliveTexels> findAliveTexels(VolumeModel& model, const Capture& capture, const BakeOptions& options);
 // The texels of a block that is in memory.
 VolumePart bakePart(VolumeModel& model, uint32_t block, const AliveTexels& alive);
 // What is composited and shaded together: the blocks of one of the model's groups, brought in one after another.

@@ -6,11 +6,12 @@
 #include <cmath>
 
 #include "base/random.h"
-#include "render/cpu/volume_renderer.h"
-#include "render/volume_scene.h"
+#include "render/cpu/scene_renderer.h"
+#include "render/tile_scene.h"
 #include "representations/volume/train_volume.h"
 #include "representations/volume/volume_cube.h"
 #include "representations/volume/volume_model_renderer.h"
+#include "tiles/read_content.h"
 #include "tiles/scene_folder.h"
 #include "tiles/volume_payload.h"
 #include "train/test_support.h"
@@ -19,8 +20,8 @@ namespace tessera {
 namespace {
 
 std::unique_ptr<VolumeRenderer> openScene(const fs::path& folder) {
-  VolumeScene scene = openVolumeScene(folder);
-  VolumeRendererSettings settings;
+  TileScene<VolumeContent> scene = openTileScene<VolumeContent>(folder);
+  SceneRendererSettings settings;
   settings.selection.mostPixels = 0;
   settings.threads = 2;
   return std::make_unique<VolumeRenderer>(scene.frame, std::move(scene.tree), std::move(scene.source), settings);
@@ -282,7 +283,7 @@ TEST(BakeVolume, LooksAsTheModelThatItWasBakedFrom) {
     grid.top -= grid.bottom;
     grid.bottom = 0;
     TrainedVolumeCube trained(scene, config, grid, 300);
-    const BakedVolume baked = bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / surround, {});
+    const BakedScene baked = bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / surround, {});
     EXPECT_EQ(baked.tileset.tiles.size(), 3u);
     VolumeModelRenderer model(trained.model(), static_cast<float>(config.cullLast));
     const std::unique_ptr<VolumeRenderer> tiles = openScene(folder / surround);
@@ -336,9 +337,9 @@ TEST(BakeVolume, PutsLevelsAboveOneAnother) {
   options.loop.progress = false;
   trainVolume(*device, scene.capture(), folder / "model", options);
   ASSERT_EQ(trainedLevels(folder / "model"), 2u);
-  BakeVolumeOptions baking;
+  BakeOptions baking;
   baking.stride = 8;
-  const BakedVolume baked =
+  const BakedScene baked =
       bakeVolume([&](uint32_t level) { return loadVolumeModel(*device, levelFolder(folder / "model", level)); }, 2,
                  scene.capture(), folder / "scene", baking);
   ASSERT_EQ(baked.tileset.tiles.size(), 5u);
@@ -346,13 +347,13 @@ TEST(BakeVolume, PutsLevelsAboveOneAnother) {
   EXPECT_EQ(root.children.size(), 4u);
   EXPECT_EQ(root.level, 1u);
   EXPECT_NEAR(root.geometricError, 2 * baked.tileset.tiles[1].geometricError, 1e-9);
-  const VolumeContent merged = readVolume(contentPath(folder / "scene", root.contents.at(0).uri));
+  const VolumeContent merged = readContent<VolumeContent>(contentPath(folder / "scene", root.contents.at(0).uri));
   EXPECT_EQ(merged.parts.size(), 4u) << "side by side, each with its own texels";
   EXPECT_EQ(merged.parts[0].planes, 32u);
   // Looked at through half as many rows and columns: its texels are twice as large.
   const std::unique_ptr<VolumeModel> coarse = loadVolumeModel(*device, levelFolder(folder / "model", 1));
   const auto seenThroughEvery = [&](int stride) {
-    BakeVolumeOptions looking;
+    BakeOptions looking;
     looking.stride = stride;
     return bakePart(*coarse, 0, findAliveTexels(*coarse, scene.capture(), looking)[0]);
   };
@@ -360,8 +361,8 @@ TEST(BakeVolume, PutsLevelsAboveOneAnother) {
   EXPECT_NE(merged.parts[0].planeBytes, seenThroughEvery(8).planeBytes);
   // Drawn at either level.
   for (const int finest : {0, 1}) {
-    VolumeScene opened = openVolumeScene(folder / "scene");
-    VolumeRendererSettings settings;
+    TileScene<VolumeContent> opened = openTileScene<VolumeContent>(folder / "scene");
+    SceneRendererSettings settings;
     settings.selection.mostPixels = 0;
     settings.selection.finestLevel = finest;
     VolumeRenderer renderer(opened.frame, std::move(opened.tree), std::move(opened.source), settings);
@@ -376,9 +377,9 @@ TEST(BakeVolume, WritesTheSameSceneAgain) {
   const CubeScene scene;
   const TemporaryFolder folder;
   TrainedVolumeCube trained(scene, smallVolumeConfig(), cubeGrid(), 60);
-  const BakedVolume once = bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / "scene", {});
+  const BakedScene once = bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / "scene", {});
   const std::string text = readTextFile(folder / "scene/tileset.json");
-  const BakedVolume again = bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / "scene", {});
+  const BakedScene again = bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / "scene", {});
   EXPECT_EQ(readTextFile(folder / "scene/tileset.json"), text);
   EXPECT_EQ(once.levels.at(0).bytesOnDisk, again.levels.at(0).bytesOnDisk);
   EXPECT_EQ(readTileset(folder / "scene").tiles.size(), 1u) << "one block is its own root";

@@ -18,11 +18,6 @@ namespace tessera {
 namespace {
 
 constexpr uint32_t kRays = 2048;  // of one piece of a photo
-// Of the surround also what lies beside the photos is kept, as far as this share of their size: people turn their
-// heads, and what the model makes up there is better than a hole. Not what lies higher than any photo looks: that is
-// sky, and what the model makes up there is noise.
-constexpr double kBeside = 0.5;
-constexpr int kBesideStride = 3;
 constexpr uint32_t kBesideTilesAcross = 32;
 constexpr double kWorthSaying = 0.02;  // of the tiles are looked through in several stays
 
@@ -44,20 +39,17 @@ struct Looking {
 
 class AliveFinder {
  public:
-  AliveFinder(VolumeModel& model, const Capture& capture, const BakeVolumeOptions& options,
-              std::vector<AliveTexels>& alive)
+  AliveFinder(VolumeModel& model, const Capture& capture, const BakeOptions& options, std::vector<AliveTexels>& alive)
       : model_(model),
         options_(options),
-        highestRise_(highestRise(capture, model.frame())),
+        pixels_(capture, model.frame()),
         alive_(alive),
         pass_(model, roomForRays(model)),
         pictureRays_(model.device(), kRays) {
     drawing_.minAlpha = static_cast<float>(options.minAlpha);
   }
   void beginPhoto(const Photo& photo, const Camera& camera) {
-    mask_ = maskOf(photo, camera);
-    photo_ = &photo;
-    camera_ = &camera;
+    pixels_.begin(photo, camera);
     pictureRays_.begin(makeRayCamera(camera, photo.worldFromCamera, model_.frame()), model_.frame(), {});
   }
   // Marks what is seen through those pixels of the photo that its mask does not leave out.
@@ -80,9 +72,7 @@ class AliveFinder {
 
  private:
   bool isWanted(int x, int y, const Looking& looking) const {
-    const bool within = x >= 0 && y >= 0 && x < camera_->width && y < camera_->height;
-    if (!within) return riseOf({x + 0.5, y + 0.5}, *camera_, photo_->worldFromCamera, model_.frame()) <= highestRise_;
-    return !looking.onlyBeside && (mask_.pixels.empty() || *mask_.at(x, y) >= 128);  // as ray_batch.cpp
+    return !(looking.onlyBeside && pixels_.within(x, y)) && pixels_.count(x, y);
   }
   void mark(const std::vector<float>& pixels, uint32_t firstBlock) {
     Device& device = model_.device();
@@ -103,15 +93,12 @@ class AliveFinder {
   }
 
   VolumeModel& model_;
-  const BakeVolumeOptions& options_;
-  double highestRise_;
+  const BakeOptions& options_;
+  PhotoPixels pixels_;
   std::vector<AliveTexels>& alive_;
   VolumePass pass_;
   PictureRays pictureRays_;
   VolumePass::Options drawing_;
-  ImageU8 mask_;
-  const Photo* photo_ = nullptr;
-  const Camera* camera_ = nullptr;
 };
 
 PixelLattice latticeWithin(const Camera& camera, int stride) {
@@ -119,7 +106,7 @@ PixelLattice latticeWithin(const Camera& camera, int stride) {
 }
 
 PixelLattice latticeBeside(const Camera& camera, int stride) {
-  const int x = static_cast<int>(kBeside * camera.width), y = static_cast<int>(kBeside * camera.height);
+  const int x = static_cast<int>(kBesidePhotos * camera.width), y = static_cast<int>(kBesidePhotos * camera.height);
   return {-x, -y, camera.width + x, camera.height + y, kBesideStride * stride};
 }
 
@@ -133,7 +120,7 @@ PixelLattice partOf(const PixelLattice& whole, const PhotoTile& tile) {
           whole.firstY + static_cast<int>(tile.bottom), whole.stride};
 }
 
-void lookThroughWholePhotos(VolumeModel& model, const Capture& capture, const BakeVolumeOptions& options,
+void lookThroughWholePhotos(VolumeModel& model, const Capture& capture, const BakeOptions& options,
                             AliveFinder& finder) {
   const bool surround = model.space().blocks() > model.space().cells();
   const std::vector<int> photos = capture.photosIn(Split::train);
@@ -185,7 +172,7 @@ std::vector<uint32_t> staysBeside(const Capture& capture, int photo, const Volum
 
 class StayByStay {
  public:
-  StayByStay(VolumeModel& model, const Capture& capture, const BakeVolumeOptions& options)
+  StayByStay(VolumeModel& model, const Capture& capture, const BakeOptions& options)
       : model_(model),
         capture_(capture),
         options_(options),
@@ -236,7 +223,7 @@ class StayByStay {
 
   VolumeModel& model_;
   const Capture& capture_;
-  const BakeVolumeOptions& options_;
+  const BakeOptions& options_;
   bool surround_;
   TiledPhotos tiled_;
   BakeStays stays_;
@@ -247,7 +234,7 @@ class StayByStay {
 
 }  // namespace
 
-std::vector<AliveTexels> findAliveTexels(VolumeModel& model, const Capture& capture, const BakeVolumeOptions& options) {
+std::vector<AliveTexels> findAliveTexels(VolumeModel& model, const Capture& capture, const BakeOptions& options) {
   std::vector<AliveTexels> alive(model.space().blocks(), AliveTexels(model.virtualGrid()));
   AliveFinder finder(model, capture, options, alive);
   if (model.holdsAll()) {

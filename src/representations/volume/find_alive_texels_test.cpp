@@ -6,8 +6,8 @@
 #include <set>
 
 #include "base/error.h"
-#include "render/cpu/volume_renderer.h"
-#include "render/volume_scene.h"
+#include "render/cpu/scene_renderer.h"
+#include "render/tile_scene.h"
 #include "representations/volume/bake_volume.h"
 #include "representations/volume/train_volume.h"
 #include "representations/volume/volume_cube.h"
@@ -44,8 +44,8 @@ std::vector<Bits> bitsOf(const std::vector<AliveTexels>& alive) {
   return bits;
 }
 
-BakeVolumeOptions everyPixels(int stride) {
-  BakeVolumeOptions options;
+BakeOptions everyPixels(int stride) {
+  BakeOptions options;
   options.stride = stride;
   return options;
 }
@@ -79,7 +79,7 @@ TEST(FindAliveTexels, FindsWhatThePixelsOfAllPhotosShow) {
   TrainedVolumeCube trained(scene, config, cubeGrid(2), 100);
   VolumeModel& model = trained.model();
   Device& device = model.device();
-  const BakeVolumeOptions options = everyPixels(2);
+  const BakeOptions options = everyPixels(2);
   std::vector<AliveTexels> alive(3, AliveTexels(model.virtualGrid()));
   const uint32_t kRays = 500;
   VolumePass::Room room;
@@ -195,7 +195,7 @@ TEST(FindAliveTexels, IsTheSameWithFewBlocksWhereAllThatAPixelSeesAreThere) {
     EXPECT_GT(expected[2].count(), 100);
     const std::unique_ptr<VolumeModel> few = loadVolumeModel(*device, scene / "model", 2);
     int64_t done = 0;
-    BakeVolumeOptions options = everyPixels(stride);
+    BakeOptions options = everyPixels(stride);
     options.onPhoto = [&](int64_t now, int64_t photos) {
       EXPECT_GE(now, done);
       EXPECT_EQ(photos, 5);
@@ -247,7 +247,7 @@ TEST(BakeVolume, NeverHasMoreBlocksInMemoryThanItMay) {
   const auto bake = [&](uint32_t resident, const std::string& to) {
     VolumeModel* model = nullptr;
     std::set<uint32_t> held;
-    BakeVolumeOptions options = everyPixels(2);
+    BakeOptions options = everyPixels(2);
     options.onPhoto = [&](int64_t, int64_t) {
       EXPECT_EQ(model->attributes().slots(), (resident == 0 ? 4 : resident) + 1);
       EXPECT_EQ(model->proposals().slots(), model->attributes().slots());
@@ -268,8 +268,8 @@ TEST(BakeVolume, NeverHasMoreBlocksInMemoryThanItMay) {
   EXPECT_EQ(bake(4, "scene"), all);
   bake(1, "few");
   const auto psnr = [&](const std::string& of) {
-    VolumeScene opened = openVolumeScene(scene / of);
-    VolumeRendererSettings settings;
+    TileScene<VolumeContent> opened = openTileScene<VolumeContent>(scene / of);
+    SceneRendererSettings settings;
     settings.selection.mostPixels = 0;
     VolumeRenderer renderer(opened.frame, std::move(opened.tree), std::move(opened.source), settings);
     const Camera& camera = scene.capture().cameras[0];

@@ -2,10 +2,10 @@
 // stand.
 #pragma once
 
+#include "bake/levels.h"
 #include "compute/deferred.h"
 #include "field/block_fields.h"
 #include "representations/volume/config.h"
-#include "representations/volume/levels.h"
 #include "scene/block_grid.h"
 #include "train/block_frame.h"
 #include "train/model_folder.h"

@@ -1,4 +1,4 @@
-#include "representations/volume/levels.h"
+#include "bake/levels.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Where a `volume` scene stands, and rays in it. Scene units: those of tiles/volume_content.h.
+// Where a scene of tiles stands, and rays in it. Scene units: those of tiles/content.h.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace tessera {
 
-struct VolumeFrame {
+struct TileFrame {
   // A similarity: x in the world is translation + scale · rotation · x in the scene.
   Mat3d rotation = Mat3d::Identity();
   double scale = 1;  // world units of one scene unit

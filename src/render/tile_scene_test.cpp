@@ -1,10 +1,10 @@
-#include "render/volume_scene.h"
+#include "render/tile_scene.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include "base/error.h"
-#include "render/cpu/volume_renderer.h"
+#include "render/cpu/scene_renderer.h"
 #include "tiles/scene_folder.h"
 #include "tiles/tileset_json.h"
 
@@ -22,7 +22,7 @@ Camera camera() {
 }
 
 // In the world, from a place in the scene.
-Pose lookingAt(const VolumeFrame& frame, const Vec3d& eye, const Vec3d& target) {
+Pose lookingAt(const TileFrame& frame, const Vec3d& eye, const Vec3d& target) {
   Pose pose;
   const Vec3d forward = (target - eye).normalized(), right = forward.cross(Vec3d::UnitZ()).normalized();
   pose.rotation.col(0) = right;
@@ -33,8 +33,8 @@ Pose lookingAt(const VolumeFrame& frame, const Vec3d& eye, const Vec3d& target) 
   return pose;
 }
 
-TEST(VolumeScene, KnowsWhatContentsTakeInMemoryBeforeTheyAreLoaded) {
-  const VolumeScene scene = openVolumeScene(kScene);
+TEST(TileScene, KnowsWhatContentsTakeInMemoryBeforeTheyAreLoaded) {
+  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(kScene);
   scene.tree.check();
   int contents = 0;
   for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
@@ -55,9 +55,9 @@ TEST(VolumeScene, KnowsWhatContentsTakeInMemoryBeforeTheyAreLoaded) {
   EXPECT_EQ(scene.source.load(fine).parts[0].planes, 2 * scene.source.load(scene.tree.surround).parts[0].planes);
 }
 
-TEST(VolumeScene, IsDrawnFromDiskAsFromMemory) {
-  const VolumeScene scene = openVolumeScene(kScene);
-  VolumeRendererSettings settings;
+TEST(TileScene, IsDrawnFromDiskAsFromMemory) {
+  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(kScene);
+  SceneRendererSettings settings;
   settings.threads = 1;
   settings.selection.mostPixels = 0;
   VolumeRenderer renderer(scene.frame, scene.tree, scene.source, settings);
@@ -71,9 +71,9 @@ TEST(VolumeScene, IsDrawnFromDiskAsFromMemory) {
   }
   ASSERT_EQ(finest.size(), 2u);
   const VolumeContent surround = scene.source.load(scene.tree.tiles[scene.tree.surround].children.at(0));
-  VolumeDrawing drawing{scene.frame, {&finest[0], &finest[1]}, &surround, {}};  // the first is nearer
+  SceneDrawing<VolumeContent> drawing{scene.frame, {&finest[0], &finest[1]}, &surround, {}};  // the first is nearer
   ThreadPool pool(1);
-  const RenderedView expected = drawVolume(drawing, camera(), pose, nullptr, pool);
+  const RenderedView expected = drawScene(drawing, camera(), pose, nullptr, pool);
   EXPECT_EQ(view.colour.pixels, expected.colour.pixels);
   EXPECT_EQ(view.depth.pixels, expected.depth.pixels);
   double opacity = 0;
@@ -81,8 +81,8 @@ TEST(VolumeScene, IsDrawnFromDiskAsFromMemory) {
   EXPECT_GT(opacity / static_cast<double>(view.opacity.pixels.size()), 0.3);
 }
 
-TEST(VolumeScene, IsCoarserFromAfar) {
-  const VolumeScene scene = openVolumeScene(kScene);
+TEST(TileScene, IsCoarserFromAfar) {
+  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(kScene);
   VolumeRenderer renderer(scene.frame, scene.tree, scene.source, {});
   renderer.render(camera(), lookingAt(scene.frame, Vec3d(0, -300, 100), Vec3d::Zero()), nullptr);
   EXPECT_EQ(renderer.cut().tiles.size(), 1u);
@@ -92,9 +92,9 @@ TEST(VolumeScene, IsCoarserFromAfar) {
   EXPECT_EQ(renderer.cacheStatistics().loads, 3u);  // the root and the surrounds
 }
 
-TEST(VolumeScene, HasTheSurroundOfTheLevelThatIsAskedFor) {
-  const VolumeScene scene = openVolumeScene(kScene);
-  VolumeRendererSettings settings;
+TEST(TileScene, HasTheSurroundOfTheLevelThatIsAskedFor) {
+  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(kScene);
+  SceneRendererSettings settings;
   settings.selection.mostPixels = 0;
   const int coarse = scene.tree.surround, fine = scene.tree.tiles[coarse].children.at(0);
   for (const auto& [level, expected] : {std::pair(1, coarse), std::pair(0, fine)}) {
@@ -121,7 +121,7 @@ class VolumeSceneThatLies : public testing::Test {
   // Loads the content of a tile, or the surround, and expects an error that names its file, its tile and the rule.
   void refuses(bool surround, size_t tile, const std::string& rule) {
     writeFileAtomically(folder_ / "tileset.json", encodeTileset(tileset_));
-    const VolumeScene scene = openVolumeScene(folder_);
+    const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(folder_);
     const int node = surround ? scene.tree.tiles[scene.tree.surround].children.at(0) : static_cast<int>(tile);
     try {
       scene.source.load(node);
@@ -145,7 +145,7 @@ TEST_F(VolumeSceneThatLies, IsRefusedWhereAContentIsASurroundAndShouldBeNoneAndT
   refuses(false, 0, "part 0 is a surround, and tileset.json says that the content is none");
   refuses(true, 0, "part 0 is no surround, and tileset.json says that the content is one");
   // The renderer, which relies on it, says so instead of drawing.
-  const VolumeScene scene = openVolumeScene(folder_);
+  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(folder_);
   EXPECT_THROW(VolumeRenderer(scene.frame, scene.tree, scene.source, {}), Error);
 }
 
@@ -161,7 +161,7 @@ TEST_F(VolumeSceneThatLies, IsRefusedWhereAPartLeavesTheBoxOfItsContent) {
   tileset_ = readTileset(kScene);
   tileset_.tiles[2].contents[0].box.high.z() -= 1e-7;  // no more than rounding
   writeFileAtomically(folder_ / "tileset.json", encodeTileset(tileset_));
-  EXPECT_EQ(openVolumeScene(folder_).source.load(2).parts.size(), 1u);
+  EXPECT_EQ(openTileScene<VolumeContent>(folder_).source.load(2).parts.size(), 1u);
 }
 
 // The format allows them.
@@ -175,7 +175,7 @@ TEST_F(VolumeSceneThatLies, IsRefusedWithSeveralContentsOfATileWhichAreNotDrawn)
   }
   writeFileAtomically(folder_ / "tileset.json", encodeTileset(tileset_));
   try {
-    openVolumeScene(folder_);
+    openTileScene<VolumeContent>(folder_);
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.subject(), (folder_ / "tileset.json").string());
@@ -185,7 +185,7 @@ TEST_F(VolumeSceneThatLies, IsRefusedWithSeveralContentsOfATileWhichAreNotDrawn)
 }
 
 TEST_F(VolumeSceneThatLies, IsNotReadWhereItsFilesAreLargerThanAnyShouldBe) {
-  const VolumeScene scene = openVolumeScene(folder_);
+  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(folder_);
   fs::resize_file(scene.source.file(1), (uint64_t{1} << 30) + 1);  // a hole
   try {
     scene.source.load(1);
@@ -196,7 +196,7 @@ TEST_F(VolumeSceneThatLies, IsNotReadWhereItsFilesAreLargerThanAnyShouldBe) {
   }
   fs::resize_file(folder_ / "tileset.json", (uint64_t{16} << 20) + 1);
   try {
-    openVolumeScene(folder_);
+    openTileScene<VolumeContent>(folder_);
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.subject(), (folder_ / "tileset.json").string());
@@ -204,9 +204,9 @@ TEST_F(VolumeSceneThatLies, IsNotReadWhereItsFilesAreLargerThanAnyShouldBe) {
   }
 }
 
-TEST(VolumeScene, NamesTheFolderWhoseCoarsestLevelDoesNotFit) {
-  const VolumeScene scene = openVolumeScene(kScene);
-  VolumeRendererSettings settings;
+TEST(TileScene, NamesTheFolderWhoseCoarsestLevelDoesNotFit) {
+  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(kScene);
+  SceneRendererSettings settings;
   settings.budgetBytes = 1000;
   try {
     VolumeRenderer(scene.frame, scene.tree, scene.source, settings);
@@ -216,9 +216,9 @@ TEST(VolumeScene, NamesTheFolderWhoseCoarsestLevelDoesNotFit) {
   }
 }
 
-TEST(VolumeScene, SaysWhatIsMissing) {
+TEST(TileScene, SaysWhatIsMissing) {
   try {
-    openVolumeScene("/nowhere/scene");
+    openTileScene<VolumeContent>("/nowhere/scene");
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("/nowhere/scene"), std::string::npos);

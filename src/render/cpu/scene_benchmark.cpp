@@ -1,4 +1,4 @@
-#include "render/cpu/volume_benchmark.h"
+#include "render/cpu/scene_benchmark.h"
 
 #include <algorithm>
 #include <chrono>
@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <type_traits>
 
 #include "base/check.h"
 
@@ -17,14 +18,16 @@ constexpr double kHighInEdges = 2;         // of the scene's longer edge in bloc
 constexpr double kAhead = 30, kDown = 75;  // degrees below the horizon
 constexpr double kFullWidth = 1280;        // pixels: what CacheBenchmarkOptions::mostPixels speaks of
 
-VolumeRendererSettings settingsFor(const VolumeScene& scene, int threads) {
-  VolumeRendererSettings settings;
+template <class Content>
+SceneRendererSettings settingsFor(const TileScene<Content>& scene, int threads) {
+  SceneRendererSettings settings;
   settings.threads = threads;
   settings.background = Eigen::Array3f(scene.background[0], scene.background[1], scene.background[2]);
   return settings;
 }
 
-RenderedView drawTimed(VolumeRenderer& renderer, const BenchmarkView& view, double& seconds) {
+template <class Content>
+RenderedView drawTimed(SceneRenderer<Content>& renderer, const BenchmarkView& view, double& seconds) {
   using Clock = std::chrono::steady_clock;
   renderer.prepare(view.camera, view.worldFromCamera);
   const auto start = Clock::now();
@@ -44,23 +47,24 @@ double meanSquare(const ImageF& a, const ImageF& b) {
 }
 
 // What the cache holds by what was loaded, not by its own books.
+template <class Content>
 class Watched {
  public:
-  Watched(const VolumeScene& scene, const VolumeRendererSettings& settings)
+  Watched(const TileScene<Content>& scene, const SceneRendererSettings& settings)
       : scene_(scene), bytes_(scene.tree.tiles.size()) {
-    TileSource source = scene.source;
+    TileSource<Content> source = scene.source;
     source.load = [this](int tile) {
-      VolumeContent content = scene_.source.load(tile);
+      Content content = scene_.source.load(tile);
       bytes_[tile] = bytesInMemory(content);
       return content;
     };
     run_.budgetBytes = settings.budgetBytes;
-    renderer_ = std::make_unique<VolumeRenderer>(scene.frame, scene.tree, source, settings);
+    renderer_ = std::make_unique<SceneRenderer<Content>>(scene.frame, scene.tree, source, settings);
   }
 
   RenderedView draw(const Camera& camera, const Pose& pose) {
     RenderedView drawn = renderer_->render(camera, pose, nullptr);
-    const TileCache& cache = renderer_->cache();
+    const TileCache<Content>& cache = renderer_->cache();
     uint64_t held = 0;
     for (size_t tile = 0; tile < bytes_.size(); ++tile) {
       if (cache.holds(static_cast<int>(tile))) held += bytes_[tile];
@@ -100,12 +104,12 @@ class Watched {
   }
 
  private:
-  const VolumeScene& scene_;
+  const TileScene<Content>& scene_;
   std::vector<uint64_t> bytes_;
   CacheBenchmark::Run run_;
   int steps_ = 0, tilesOfLevel0_ = 0;
   double errors_ = 0;
-  std::unique_ptr<VolumeRenderer> renderer_;
+  std::unique_ptr<SceneRenderer<Content>> renderer_;
 };
 
 Camera flightCamera(const CacheBenchmarkOptions& options) {
@@ -119,30 +123,41 @@ Camera flightCamera(const CacheBenchmarkOptions& options) {
 
 }  // namespace
 
-SkippingBenchmark benchmarkSkipping(const VolumeScene& scene, const std::vector<BenchmarkView>& views, int threads) {
-  VolumeRendererSettings settings = settingsFor(scene, threads);
+template <class Content>
+SkippingBenchmark benchmarkSkipping(const TileScene<Content>& scene, const std::vector<BenchmarkView>& views,
+                                    int threads) {
+  SceneRendererSettings settings = settingsFor(scene, threads);
   settings.selection.mostPixels = 0;
-  VolumeRenderer skipping(scene.frame, scene.tree, scene.source, settings);
+  SceneRenderer<Content> skipping(scene.frame, scene.tree, scene.source, settings);
+  settings.march.useDistances = false;
+  std::optional<SceneRenderer<Content>> byCells;
+  if constexpr (std::is_same_v<Content, HashContent>) byCells.emplace(scene.frame, scene.tree, scene.source, settings);
   settings.march.skipEmptySpace = false;
-  VolumeRenderer whole(scene.frame, scene.tree, scene.source, settings);
+  SceneRenderer<Content> whole(scene.frame, scene.tree, scene.source, settings);
   SkippingBenchmark result;
   result.device = skipping.device();
+  if (byCells) result.byCells.emplace();
   for (const BenchmarkView& view : views) {
-    const RenderedView a = drawTimed(skipping, view, result.skipping.seconds);
-    const RenderedView b = drawTimed(whole, view, result.whole.seconds);
-    const ImageF pictureA = compositeOver(a, skipping.background()), pictureB = compositeOver(b, whole.background());
-    for (size_t i = 0; i < pictureA.pixels.size(); ++i) {
-      const double difference = std::abs(pictureA.pixels[i] - pictureB.pixels[i]);
-      result.largestDifference = std::max(result.largestDifference, difference);
-    }
-    result.rays += pictureA.pixelCount();
+    const ImageF picture = compositeOver(drawTimed(skipping, view, result.skipping.seconds), skipping.background());
+    const auto compare = [&](SceneRenderer<Content>& other, double& seconds) {
+      const ImageF drawn = compositeOver(drawTimed(other, view, seconds), other.background());
+      for (size_t i = 0; i < picture.pixels.size(); ++i) {
+        const double difference = std::abs(picture.pixels[i] - drawn.pixels[i]);
+        result.largestDifference = std::max(result.largestDifference, difference);
+      }
+    };
+    if (byCells) compare(*byCells, result.byCells->seconds);
+    compare(whole, result.whole.seconds);
+    result.rays += picture.pixelCount();
   }
   result.skipping.counts = skipping.marchCounts();
+  if (byCells) result.byCells->counts = byCells->marchCounts();
   result.whole.counts = whole.marchCounts();
   return result;
 }
 
-CacheBenchmark benchmarkCache(const VolumeScene& scene, const CacheBenchmarkOptions& options) {
+template <class Content>
+CacheBenchmark benchmarkCache(const TileScene<Content>& scene, const CacheBenchmarkOptions& options) {
   CacheBenchmark result;
   result.steps = options.steps;
   for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
@@ -152,14 +167,14 @@ CacheBenchmark benchmarkCache(const VolumeScene& scene, const CacheBenchmarkOpti
     result.allBytes += bytes;
     if (!scene.tree.tiles[i].isSurround && scene.tree.tiles[i].level == 0) result.finestBytes += bytes;
   }
-  VolumeRendererSettings settings = settingsFor(scene, options.threads);
+  SceneRendererSettings settings = settingsFor(scene, options.threads);
   settings.selection.mostPixels = options.mostPixels * options.width / kFullWidth;
   settings.budgetBytes = static_cast<uint64_t>(options.finestShare * static_cast<double>(result.finestBytes));
-  Watched tight(scene, settings);
+  Watched<Content> tight(scene, settings);
   settings.budgetBytes = result.allBytes;
-  Watched whole(scene, settings);
+  Watched<Content> whole(scene, settings);
   settings.budgetBytes = std::numeric_limits<uint64_t>::max();
-  VolumeRenderer unbounded(scene.frame, scene.tree, scene.source, settings);
+  SceneRenderer<Content> unbounded(scene.frame, scene.tree, scene.source, settings);
   const Camera camera = flightCamera(options);
   for (int step = 0; step < options.steps; ++step) {
     const Pose pose = flightPose(scene.frame, scene.tree, static_cast<double>(step) / options.steps);
@@ -173,7 +188,12 @@ CacheBenchmark benchmarkCache(const VolumeScene& scene, const CacheBenchmarkOpti
   return result;
 }
 
-Pose flightPose(const VolumeFrame& frame, const TileTree& tree, double lap) {
+template SkippingBenchmark benchmarkSkipping(const TileScene<VolumeContent>&, const std::vector<BenchmarkView>&, int);
+template SkippingBenchmark benchmarkSkipping(const TileScene<HashContent>&, const std::vector<BenchmarkView>&, int);
+template CacheBenchmark benchmarkCache(const TileScene<VolumeContent>&, const CacheBenchmarkOptions&);
+template CacheBenchmark benchmarkCache(const TileScene<HashContent>&, const CacheBenchmarkOptions&);
+
+Pose flightPose(const TileFrame& frame, const TileTree& tree, double lap) {
   const bool high = lap >= 0.5;
   const double half = 2 * lap - (high ? 1 : 0), row = half * tree.rows;
   const bool back = static_cast<int>(row) % 2 == 1;

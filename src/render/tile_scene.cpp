@@ -1,4 +1,4 @@
-#include "render/volume_scene.h"
+#include "render/tile_scene.h"
 
 #include <fmt/format.h>
 
@@ -6,8 +6,10 @@
 #include <map>
 
 #include "base/error.h"
+#include "tiles/hash_content.h"
+#include "tiles/read_content.h"
 #include "tiles/scene_folder.h"
-#include "tiles/volume_payload.h"
+#include "tiles/volume_content.h"
 
 namespace tessera {
 namespace {
@@ -20,8 +22,8 @@ struct PromisedFile {
 
 }  // namespace
 
-VolumeFrame frameOf(const Tileset& tileset) {
-  VolumeFrame frame;
+TileFrame frameOf(const Tileset& tileset) {
+  TileFrame frame;
   frame.rotation = tileset.worldFromScene.rotation;
   frame.scale = tileset.worldFromScene.scale;
   frame.translation = tileset.worldFromScene.translation;
@@ -31,14 +33,16 @@ VolumeFrame frameOf(const Tileset& tileset) {
   return frame;
 }
 
-VolumeScene openVolumeScene(const fs::path& folder) {
+template <class Content>
+TileScene<Content> openTileScene(const fs::path& folder) {
   const Tileset tileset = readTileset(folder);
-  if (tileset.representation != Representation::volume) {
-    throw Error((folder / "tileset.json").string(), "",
-                fmt::format("is a scene of {}, not of volume", nameOf(tileset.representation)),
-                "draw it with a viewer that knows it");
+  if (tileset.representation != representationOf<Content>()) {
+    throw Error(
+        (folder / "tileset.json").string(), "",
+        fmt::format("is a scene of {}, not of {}", nameOf(tileset.representation), nameOf(representationOf<Content>())),
+        "draw it with a viewer that knows it");
   }
-  VolumeScene scene;
+  TileScene<Content> scene;
   scene.frame = frameOf(tileset);
   scene.background = tileset.background;
   scene.tree.columns = static_cast<int>(tileset.columns);
@@ -89,14 +93,17 @@ VolumeScene openVolumeScene(const fs::path& folder) {
     scene.tree.tiles.push_back(std::move(node));
     files.push_back(file);
   }
-  scene.source.bytes = [files](int tile) { return readDecodedBytes(files[tile].path); };
+  scene.source.bytes = [files](int tile) { return readDecodedBytes<Content>(files[tile].path); };
   scene.source.load = [files](int tile) {
     const PromisedFile& file = files[tile];
-    return readPromisedVolume(file.path, file.tile, file.promised);
+    return readPromisedContent<Content>(file.path, file.tile, file.promised);
   };
   scene.source.folder = folder.string();
   scene.source.file = [files](int tile) { return files[tile].path.string(); };
   return scene;
 }
+
+template TileScene<VolumeContent> openTileScene(const fs::path&);
+template TileScene<HashContent> openTileScene(const fs::path&);
 
 }  // namespace tessera

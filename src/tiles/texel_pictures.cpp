@@ -1,4 +1,4 @@
-#include "tiles/volume_pictures.h"
+#include "tiles/texel_pictures.h"
 
 #include <algorithm>
 
@@ -8,8 +8,7 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kAttributes = VolumePart::kAttributes;
-constexpr uint32_t kEdge = VolumePart::kStoredEdge, kSlicesBeside = 3, kTile = kEdge * kSlicesBeside;
+constexpr uint32_t kEdge = ContentPart::kStoredEdge, kSlicesBeside = 3, kTile = kEdge * kSlicesBeside;
 
 void putTexel(const uint8_t* texel, size_t which, uint8_t* pixel) {
   for (size_t c = 0; c < 3; ++c) {
@@ -36,7 +35,7 @@ uint32_t tilesBeside(uint32_t stored) {
   return columns;
 }
 
-// visit(texel, x, y): texels in the order of VolumePart::voxelBytes, and their pixels.
+// visit(texel, x, y): texels in the order of macroblocks, and their pixels.
 template <class Visit>
 void forEachVoxel(uint32_t stored, const Visit& visit) {
   const uint32_t columns = tilesBeside(stored);
@@ -63,32 +62,36 @@ PictureSize sizeOfMacroblocks(uint32_t stored) {
   return {columns * kTile, columns == 0 ? 0 : (stored + columns - 1) / columns * kTile};
 }
 
-PictureSize sizeOfBits(uint64_t bits) {
-  const uint64_t bytes = (bits + 7) / 8;
+PictureSize sizeOfList(uint64_t pixels) {
   uint64_t width = 256;
-  while ((bytes + width - 1) / width > kLargestLosslessSide) width *= 2;
-  return {static_cast<uint32_t>(width), static_cast<uint32_t>((bytes + width - 1) / width)};
+  while ((pixels + width - 1) / width > kLargestLosslessSide) width *= 2;
+  return {static_cast<uint32_t>(width), static_cast<uint32_t>((pixels + width - 1) / width)};
 }
 
-TexelPictures picturesOfPlane(std::span<const uint8_t> texels, uint32_t planes) {
-  CHECK(texels.size() == size_t{planes} * planes * kAttributes);
+PictureSize sizeOfBits(uint64_t bits) {
+  return sizeOfList((bits + 7) / 8);
+}
+
+TexelPictures picturesOfTexels(std::span<const uint8_t> texels, const PictureSize& size) {
   TexelPictures pictures;
+  const size_t count = texels.size() / kTexelBytes;
   for (size_t which = 0; which < kTexelPictures; ++which) {
-    pictures[which] = blank({planes, planes});
-    for (size_t i = 0; i < pictures[which].pixelCount(); ++i) {
-      putTexel(texels.data() + i * kAttributes, which, pictures[which].pixels.data() + 3 * i);
+    pictures[which] = blank(size);
+    CHECK(count <= pictures[which].pixelCount());
+    for (size_t i = 0; i < count; ++i) {
+      putTexel(texels.data() + i * kTexelBytes, which, pictures[which].pixels.data() + 3 * i);
     }
   }
   return pictures;
 }
 
 TexelPictures picturesOfMacroblocks(std::span<const uint8_t> voxels, uint32_t stored) {
-  CHECK(voxels.size() == size_t{stored} * VolumePart::kMacroblockBytes);
+  CHECK(voxels.size() == size_t{stored} * ContentPart::kStoredTexels * kTexelBytes);
   TexelPictures pictures;
   for (size_t which = 0; which < kTexelPictures; ++which) {
     pictures[which] = blank(sizeOfMacroblocks(stored));
     forEachVoxel(stored, [&](size_t texel, int x, int y) {
-      putTexel(voxels.data() + texel * kAttributes, which, pictures[which].at(x, y));
+      putTexel(voxels.data() + texel * kTexelBytes, which, pictures[which].at(x, y));
     });
   }
   return pictures;
@@ -103,19 +106,21 @@ ImageU8 pictureOfBits(const OccupancyBits& bits) {
   return picture;
 }
 
-bool takePlane(const ImageU8& picture, size_t which, std::span<uint8_t> texels) {
-  CHECK(texels.size() == picture.pixelCount() * kAttributes);
-  for (size_t i = 0; i < picture.pixelCount(); ++i) {
-    if (!takeTexel(picture.pixels.data() + 3 * i, which, texels.data() + i * kAttributes)) return false;
+bool takeTexels(const ImageU8& picture, size_t which, std::span<uint8_t> texels) {
+  const size_t count = texels.size() / kTexelBytes;
+  CHECK(count <= picture.pixelCount());
+  for (size_t i = 0; i < count; ++i) {
+    if (!takeTexel(picture.pixels.data() + 3 * i, which, texels.data() + i * kTexelBytes)) return false;
   }
-  return true;
+  const auto rest = picture.pixels.begin() + static_cast<ptrdiff_t>(3 * count);
+  return std::all_of(rest, picture.pixels.end(), [](uint8_t byte) { return byte == 0; });
 }
 
 bool takeMacroblocks(const ImageU8& picture, size_t which, uint32_t stored, std::span<uint8_t> voxels) {
-  CHECK(voxels.size() == size_t{stored} * VolumePart::kMacroblockBytes);
+  CHECK(voxels.size() == size_t{stored} * ContentPart::kStoredTexels * kTexelBytes);
   bool fits = true;
   forEachVoxel(stored, [&](size_t texel, int x, int y) {
-    fits = takeTexel(picture.at(x, y), which, voxels.data() + texel * kAttributes) && fits;
+    fits = takeTexel(picture.at(x, y), which, voxels.data() + texel * kTexelBytes) && fits;
   });
   return fits;
 }

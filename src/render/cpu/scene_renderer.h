@@ -1,15 +1,16 @@
-// Draws `volume` scenes on the processor: the oracle that every other renderer of them is held against.
+// Draws scenes of `volume` and of `hash` on the processor: the oracle that every other renderer of them is held
+// against.
 //
 // A picture is drawn from the cut that the view asks for, loaded as far as the budget goes before it is drawn.
 #pragma once
 
-#include "render/cpu/draw_volume.h"
+#include "render/cpu/draw_scene.h"
 #include "render/tile_cache.h"
 #include "render/tile_selection.h"
 
 namespace tessera {
 
-struct VolumeRendererSettings {
+struct SceneRendererSettings {
   MarchSettings march;
   SelectionSettings selection;
   uint64_t budgetBytes = uint64_t{1} << 30;
@@ -17,11 +18,14 @@ struct VolumeRendererSettings {
   Eigen::Array3f background = Eigen::Array3f::Zero();
 };
 
-class VolumeRenderer final : public ViewRenderer {
+// Content: VolumeContent or HashContent.
+template <class Content>
+class SceneRenderer final : public ViewRenderer {
  public:
   // Throws Error where the coarsest level does not fit into the budget, and in
   // render() what the source throws.
-  VolumeRenderer(const VolumeFrame& frame, TileTree tree, TileSource source, const VolumeRendererSettings& settings);
+  SceneRenderer(const TileFrame& frame, TileTree tree, TileSource<Content> source,
+                const SceneRendererSettings& settings);
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
   // Loads what the view asks for, as render() would.
@@ -31,22 +35,25 @@ class VolumeRenderer final : public ViewRenderer {
 
   const TileCut& cut() const { return cut_; }  // of the last picture
   const TileChoice& choice() const { return choice_; }
-  const TileCache& cache() const { return cache_; }
+  const TileCache<Content>& cache() const { return cache_; }
   const TileCacheStatistics& cacheStatistics() const { return cache_.statistics(); }
   const MarchCounts& marchCounts() const { return counts_; }  // of all pictures
 
  private:
   void loadFor(const TileView& view);
 
-  VolumeFrame frame_;
+  TileFrame frame_;
   TileTree tree_;
-  VolumeRendererSettings settings_;
-  TileCache cache_;
+  SceneRendererSettings settings_;
+  TileCache<Content> cache_;
   TileSelector selector_;
   ThreadPool pool_;
   TileChoice choice_;
   TileCut cut_;
   MarchCounts counts_;
 };
+
+using VolumeRenderer = SceneRenderer<VolumeContent>;
+using HashRenderer = SceneRenderer<HashContent>;
 
 }  // namespace tessera

@@ -1,8 +1,8 @@
-#include "representations/volume/levels.h"
+#include "bake/levels.h"
 
 #include <algorithm>
 
-#include "tiles/volume_payload.h"
+#include "tiles/content.h"
 
 namespace tessera {
 namespace {
@@ -30,7 +30,7 @@ uint32_t topLevel(uint32_t columns, uint32_t rows) {
   for (uint32_t level = 0;; ++level) {
     const Steps steps = stepsOfLevel(columns, rows, level), next = stepsOfLevel(columns, rows, level + 1);
     if (groupsAlong(columns, steps.x) * groupsAlong(rows, steps.y) == 1) return level;
-    if (next.x * next.y > VolumeLimits().parts) return level;
+    if (next.x * next.y > ContentLimits().parts) return level;
   }
 }
 

@@ -1,4 +1,4 @@
-#include "render/cpu/volume_benchmark.h"
+#include "render/cpu/scene_benchmark.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 namespace tessera {
 namespace {
 
-VolumeScene scene() {
-  VolumeScene scene;
+TileScene<VolumeContent> scene() {
+  TileScene<VolumeContent> scene;
   scene.frame = place().frame;
   scene.frame.rotation = Eigen::AngleAxisd(0.4, Vec3d::UnitZ()).toRotationMatrix();
   scene.frame.scale = 25;
@@ -22,8 +22,8 @@ VolumeScene scene() {
   return scene;
 }
 
-TEST(VolumeBenchmark, CountsTheSameSamplesInFewerSteps) {
-  const VolumeScene made = scene();
+TEST(SceneBenchmark, CountsTheSameSamplesInFewerSteps) {
+  const TileScene<VolumeContent> made = scene();
   BenchmarkView view;
   view.camera.width = 24;
   view.camera.height = 16;
@@ -52,7 +52,7 @@ CacheBenchmarkOptions smallPictures() {
   return options;
 }
 
-TEST(VolumeBenchmark, FliesThroughAQuarterOfTheFinestLevel) {
+TEST(SceneBenchmark, FliesThroughAQuarterOfTheFinestLevel) {
   const CacheBenchmark result = benchmarkCache(scene(), smallPictures());
   EXPECT_EQ(result.finestBytes, place().finestBytes);
   EXPECT_EQ(result.allBytes, place().allBytes);
@@ -78,14 +78,14 @@ TEST(VolumeBenchmark, FliesThroughAQuarterOfTheFinestLevel) {
   EXPECT_EQ(result.whole.stepsInFull, result.steps);
 }
 
-TEST(VolumeBenchmark, RefusesABudgetBelowTheCoarsestLevel) {
+TEST(SceneBenchmark, RefusesABudgetBelowTheCoarsestLevel) {
   CacheBenchmarkOptions options = smallPictures();
   options.finestShare = 0.9 * static_cast<double>(place().coarsestBytes) / static_cast<double>(place().finestBytes);
   EXPECT_THROW(benchmarkCache(scene(), options), Error);
 }
 
-TEST(VolumeBenchmark, FliesOverEveryCellLowAndHigh) {
-  const VolumeScene made = scene();
+TEST(SceneBenchmark, FliesOverEveryCellLowAndHigh) {
+  const TileScene<VolumeContent> made = scene();
   std::set<std::pair<int, int>> low, high;
   double top = 0;
   for (int step = 0; step < 600; ++step) {
@@ -108,7 +108,7 @@ TEST(VolumeBenchmark, FliesOverEveryCellLowAndHigh) {
   EXPECT_GT(top, 8);
 }
 
-TEST(VolumeBenchmark, TellsAPartitionFromWhatIsNone) {
+TEST(SceneBenchmark, TellsAPartitionFromWhatIsNone) {
   const TileTree tree = madeTree(4, 4);
   const auto cutOf = [&](int level) {
     std::vector<SelectedTile> cut;

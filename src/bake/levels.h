@@ -17,7 +17,7 @@ struct CellGroup {
 inline constexpr uint32_t kMostMerged = 8;
 
 // The level at which all is one; 0 for a single block. Where one tile cannot hold as many blocks
-// (VolumeLimits::parts), the highest level whose tiles can.
+// (ContentLimits::parts), the highest level whose tiles can.
 uint32_t topLevel(uint32_t columns, uint32_t rows);
 
 struct LevelGroups {

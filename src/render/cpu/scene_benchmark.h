@@ -1,8 +1,10 @@
 // What skipping empty space saves, and what a cache smaller than the scene costs, measured on a baked scene.
 #pragma once
 
-#include "render/cpu/volume_renderer.h"
-#include "render/volume_scene.h"
+#include <optional>
+
+#include "render/cpu/scene_renderer.h"
+#include "render/tile_scene.h"
 
 namespace tessera {
 
@@ -11,7 +13,7 @@ struct BenchmarkView {
   Pose worldFromCamera;
 };
 
-// The same views of the finest level, drawn with empty space skipped and without.
+// The same views of the finest level, drawn with empty space skipped and without. All ways draw the same picture.
 struct SkippingBenchmark {
   struct Way {
     MarchCounts counts;
@@ -20,18 +22,21 @@ struct SkippingBenchmark {
   std::string device;
   uint64_t rays = 0;
   Way skipping, whole;
+  std::optional<Way> byCells;    // of `hash`: with the levels of the occupancy, without the grid of distances
   double largestDifference = 0;  // of any value of a pixel's colour, which is in [0,1]
 };
 
-// `threads`: as VolumeRendererSettings.
-SkippingBenchmark benchmarkSkipping(const VolumeScene& scene, const std::vector<BenchmarkView>& views, int threads);
+// `threads`: as SceneRendererSettings.
+template <class Content>
+SkippingBenchmark benchmarkSkipping(const TileScene<Content>& scene, const std::vector<BenchmarkView>& views,
+                                    int threads);
 
 struct CacheBenchmarkOptions {
   int steps = 600;
   int width = 96, height = 64;  // of the pictures
   double finestShare = 0.25;    // the budget, as a share of what the finest level takes in memory
   double mostPixels = 1.5;      // of geometric error, were the pictures 1280 wide: as many tiles as people would need
-  int threads = 0;              // as VolumeRendererSettings
+  int threads = 0;              // as SceneRendererSettings
 };
 
 // A flight over every block, low and then ever higher, drawn three times at each step: with the budget, with one that
@@ -55,12 +60,13 @@ struct CacheBenchmark {
 };
 
 // Throws Error where the coarsest level and the surround do not fit into the budget.
-CacheBenchmark benchmarkCache(const VolumeScene& scene, const CacheBenchmarkOptions& options);
+template <class Content>
+CacheBenchmark benchmarkCache(const TileScene<Content>& scene, const CacheBenchmarkOptions& options);
 
 // The flight, at `lap` in [0,1): along the rows of cells forth and back, so that each is flown over. In the first half
 // of it a quarter of a half block above the box and looking ahead; in the second rising to twice the scene's edge and
 // looking down.
-Pose flightPose(const VolumeFrame& frame, const TileTree& tree, double lap);
+Pose flightPose(const TileFrame& frame, const TileTree& tree, double lap);
 
 // Does the cut stand for each cell exactly once?
 bool isPartition(const TileTree& tree, const std::vector<SelectedTile>& cut);

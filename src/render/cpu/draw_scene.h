@@ -1,0 +1,78 @@
+// A picture of contents in memory: the definition of what scenes of `volume` and of `hash` look like, on the processor.
+#pragma once
+
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "base/threads.h"
+#include "render/cpu/hash_shading.h"
+#include "render/cpu/volume_shading.h"
+#include "render/tile_frame.h"
+#include "scene/view_renderer.h"
+
+namespace tessera {
+
+// Of a content, the part in a box, whose sides may be infinite. Content: VolumeContent or HashContent.
+template <class Content>
+struct DrawnContent {
+  const Content* content;
+  Vec3d low, high;  // scene units
+
+  DrawnContent(const Content* content)  // NOLINT(google-explicit-constructor): all of it
+      : DrawnContent(content, Vec3d::Constant(-INFINITY), Vec3d::Constant(INFINITY)) {}
+  DrawnContent(const Content* content, const Vec3d& low, const Vec3d& high) : content(content), low(low), high(high) {}
+};
+
+template <class Content>
+struct SceneDrawing {
+  TileFrame frame;
+  // In an order that is front to back for every ray of the camera (render/tile_tree.h).
+  std::vector<DrawnContent<Content>> frontToBack;
+  // Optional: seen behind the frame's box, or alone by rays that miss it.
+  const Content* surround = nullptr;
+  MarchSettings march;
+};
+
+// As ViewRenderer::render. The picture does not depend on the number of threads. `counts`: optional, added to.
+template <class Content>
+RenderedView drawScene(const SceneDrawing<Content>& drawing, const Camera& camera, const Pose& worldFromCamera,
+                       const ImageF* opaqueDepth, ThreadPool& pool, MarchCounts* counts = nullptr);
+
+// A ray that ends at a distance in scene units.
+struct BoundedRay {
+  SceneRay ray;
+  double far = INFINITY;
+};
+
+// Rays through a drawing, which must outlive this. Not for several threads at a time.
+template <class Content>
+class RayCaster {
+ public:
+  explicit RayCaster(const SceneDrawing<Content>& drawing);
+
+  // pixels: [rays].
+  void cast(std::span<const BoundedRay> rays, std::span<DrawnPixel> pixels, MarchCounts& counts);
+  DrawnPixel cast(const SceneRay& ray, double far, MarchCounts& counts);
+
+ private:
+  using Part = typename decltype(Content::parts)::value_type;
+  struct Placed {
+    const Content* content;
+    size_t number;    // of the shading's contents
+    Vec3d low, high;  // of all its parts, as far as they are drawn
+  };
+  struct PartRange {
+    const Part* part;
+    RayRange range;
+  };
+  void castOne(const BoundedRay& ray, MarchCounts& counts);
+  void add(const Placed& placed, const SceneRay& ray, MarchCounts& counts);
+
+  const SceneDrawing<Content>& drawing_;
+  std::vector<Placed> placed_, surround_;
+  ShadingOf<Content> shading_;
+  std::vector<PartRange> parts_;  // of one ray and content
+};
+
+}  // namespace tessera

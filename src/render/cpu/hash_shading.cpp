@@ -1,0 +1,85 @@
+#include "render/cpu/hash_shading.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tessera {
+
+std::array<float, 16> harmonicsOf(const Vec3d& direction) {
+  const float x = static_cast<float>(direction[0]), y = static_cast<float>(direction[1]),
+              z = static_cast<float>(direction[2]);
+  return {0.28209479177387814f,
+          -0.48860251190291987f * y,
+          0.48860251190291987f * z,
+          -0.48860251190291987f * x,
+          1.0925484305920792f * x * y,
+          -1.0925484305920792f * y * z,
+          0.94617469575755997f * z * z - 0.31539156525251999f,
+          -1.0925484305920792f * x * z,
+          0.54627421529603959f * (x * x - y * y),
+          0.59004358992664352f * y * (y * y - 3 * x * x),
+          2.8906114426405538f * x * y * z,
+          0.45704579946446572f * y * (1 - 5 * z * z),
+          0.37317633259011546f * z * (5 * z * z - 3),
+          0.45704579946446572f * x * (1 - 5 * z * z),
+          1.4453057213202769f * z * (x * x - y * y),
+          0.59004358992664352f * x * (3 * y * y - x * x)};
+}
+
+HashShading::HashShading(const std::vector<const HashContent*>& contents, const MarchSettings& settings)
+    : settings_(settings) {
+  for (const HashContent* content : contents) {
+    networks_.emplace_back(content->network, kInputs, kOutputs);
+    isWhole_ |= content->isWhole;
+    for (const HashPart& part : content->parts) features_.emplace(&part, HashFeatures(*content, part));
+  }
+}
+
+void HashShading::begin(const Vec3d& direction) {
+  sums_ = {};
+  direction_ = direction;
+  heaviest_ = 0;
+  heaviestWeight_ = 0;
+}
+
+void HashShading::march(const HashContent& content, const HashPart& part, const SceneRay& ray, const RayRange& range,
+                        ContentComposite& composite, MarchCounts& counts) const {
+  const DomainPath path = partPath(part, ray, range);
+  HashMarch{features_.at(&part), content.step, path, settings_, sums_.transmittance}.run(composite, counts);
+}
+
+void HashShading::add(const ContentComposite& composite, size_t content) {
+  const float weight = sums_.transmittance * (1 - composite.transmittance);
+  if (weight > heaviestWeight_) {
+    heaviestWeight_ = weight;
+    heaviest_ = content;
+  }
+  for (int k = 0; k < ContentComposite::kValues; ++k) sums_.values[k] += sums_.transmittance * composite.values[k];
+  sums_.depth += sums_.transmittance * composite.depth;
+  sums_.transmittance *= composite.transmittance;
+}
+
+void HashShading::end(DrawnPixel& pixel) {
+  pixel = {{0, 0, 0}, sums_.transmittance, sums_.depth};
+  if (!networks_.empty() && (isWhole_ || sums_.transmittance < 1)) {
+    waiting_.push_back({&pixel, sums_, direction_, heaviest_});
+  }
+}
+
+void HashShading::finish() {
+  alignas(64) float values[DenseNetwork::kMostWidth];
+  for (const Waiting& ray : waiting_) {
+    std::copy_n(ray.sums.values, ContentComposite::kValues, values);
+    const std::array<float, 16> harmonics = harmonicsOf(ray.direction);
+    std::copy(harmonics.begin(), harmonics.end(), values + ContentComposite::kValues);
+    networks_[ray.network].run(values);
+    DrawnPixel& pixel = *ray.pixel;
+    if (isWhole_) pixel.transmittance = 0;
+    for (int c = 0; c < 3; ++c) {
+      pixel.colour[c] = (1 - pixel.transmittance) / (1 + std::exp(-(ray.sums.values[c] + values[c])));
+    }
+  }
+  waiting_.clear();
+}
+
+}  // namespace tessera

@@ -1,0 +1,59 @@
+// The colour of what a ray's samples add up to, in all contents together (NGP-RT, eq. 5): sums of features know no
+// contents, so that what is cut into blocks looks as it did uncut. Blending finished colours would not: a sigmoid of a
+// sum is no sum of sigmoids.
+#pragma once
+
+#include <unordered_map>
+#include <vector>
+
+#include "render/cpu/dense_network.h"
+#include "render/cpu/hash_march.h"
+#include "render/cpu/shading.h"
+
+namespace tessera {
+
+// The first 16 real spherical harmonics of a unit direction, in the order and with the signs of tiny-cuda-nn.
+std::array<float, 16> harmonicsOf(const Vec3d& direction);
+
+// C_d = Σ_k T_k C_d^k, F likewise, T_k = Π_{j<k} (1 - α^j). Once a ray, the network of the content whose T_k α^k is
+// largest says z = C_d + ψ(C_d, F, harmonics); the colour is (1 - T) sigmoid(z), or sigmoid(z) and opaque where
+// contents are whole. Networks are run for many rays at a time.
+class HashShading {
+ public:
+  static constexpr uint32_t kInputs = 23, kOutputs = 3;
+
+  HashShading(const std::vector<const HashContent*>& contents, const MarchSettings& settings);
+
+  void begin(const Vec3d& direction);
+  float transmittance() const { return sums_.transmittance; }
+  void march(const HashContent& content, const HashPart& part, const SceneRay& ray, const RayRange& range,
+             ContentComposite& composite, MarchCounts& counts) const;
+  void add(const ContentComposite& composite, size_t content);
+  void end(DrawnPixel& pixel);
+  void finish();
+
+ private:
+  struct Waiting {
+    DrawnPixel* pixel;
+    ContentComposite sums;
+    Vec3d direction;
+    size_t network;
+  };
+
+  std::vector<DenseNetwork> networks_;
+  std::unordered_map<const HashPart*, HashFeatures> features_;
+  bool isWhole_ = false;
+  MarchSettings settings_;
+  ContentComposite sums_;
+  Vec3d direction_ = Vec3d::UnitZ();
+  size_t heaviest_ = 0;
+  float heaviestWeight_ = 0;
+  std::vector<Waiting> waiting_;
+};
+
+template <>
+struct Shading<HashContent> {
+  using Type = HashShading;
+};
+
+}  // namespace tessera

@@ -1,0 +1,26 @@
+// A scene's folder as renderers need it: the frame, the tree, and where contents come from.
+#pragma once
+
+#include "base/file.h"
+#include "render/tile_cache.h"
+#include "render/tile_frame.h"
+#include "tiles/tileset.h"
+
+namespace tessera {
+
+// Of contents that are VolumeContent or HashContent.
+template <class Content>
+struct TileScene {
+  TileFrame frame;
+  TileTree tree;  // tiles are numbered as those of tileset.json; surrounds come last, the finest at the end
+  TileSource<Content> source;  // reads files when asked
+  std::array<float, 3> background = {0, 0, 0};
+};
+
+// Throws Error where the folder holds no scene, one of another representation, or a tile with several contents.
+template <class Content>
+TileScene<Content> openTileScene(const fs::path& folder);
+
+TileFrame frameOf(const Tileset& tileset);
+
+}  // namespace tessera
