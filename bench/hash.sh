@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
 # NGP-RT's models (`--method hash`) on the processor: hand-held photographs (fox at 270x480) and a made city of 2x2 blocks.
 #   photographs  ten minutes on fox, and ten of `field`: at most 1 dB below it
+#   scene        what fox's model becomes: held-out PSNR, size, points of rays with and without the distances, frames per
+#                second beside `field`
 #   ablation     the paper's table 3, equal steps, held-out PSNR of seeds: attention (separate, from place to place) against
 #                the sum of levels and against a network for each sample; multiply-accumulates of each
 # Resumable: all is kept in build/bench/hash, and what is there is not made again.
-#   TESSERA_SHARED_DATA=DIR [ROWS="photographs ablation"] [SEEDS="1 2 3"] [STEPS=1500] [MINUTES=10] bench/hash.sh
+#   TESSERA_SHARED_DATA=DIR [ROWS="photographs scene ablation"] [SEEDS="1 2 3"] [STEPS=1500] [MINUTES=10] bench/hash.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
@@ -27,6 +29,36 @@ photographs() {
   hash=$(judged fox-hash fox) field=$(judged fox-field fox)
   echo "fox, $minutes minutes: $hash dB, field $field dB"
   verdict "hash less field at equal time, held-out PSNR in dB" "$(shortfall "$hash" "$field")" '>=' -1
+}
+
+# jq's EXPRESSION of what a bench of the scene said.
+said() { jq -r "$2" "$work/$1.json"; }
+
+scene() {
+  baked fox-hash fox.scene fox
+  local model seen bytes parameters
+  model=$(jq .psnr "$work/fox-hash.json") seen=$(judged fox.scene fox > /dev/null; jq .psnr "$work/fox.scene.json")
+  verdict "the model less its scene, held-out PSNR in dB" "$(shortfall "$model" "$seen")" '<=' 0.1
+  verdict "field less the scene, held-out PSNR in dB" "$(shortfall "$(jq .psnr "$work/fox-field.json")" "$seen")" '<=' 0.4
+  bytes=$("$tessera" info "$work/fox.scene" --json | jq .level_0.bytes_on_disk)
+  parameters=$("$tessera" info "$work/fox-hash" --json | jq .parameters_per_block)
+  echo "fox.scene: $bytes bytes, its model $parameters numbers"
+  verdict "bytes of the scene as a share of the model's numbers at four bytes" \
+    "$(awk -v b="$bytes" -v p="$parameters" 'BEGIN { print b / (4 * p) }')" '<=' 0.3
+  alone "$tessera" bench render "$work/fox.scene" --views "$work/fox" --json "$work/skipping.json"
+  local counts='.skipping | (.by_cells.steps - .skipping.steps)'
+  echo "marching points a ray: $(said skipping '.skipping | .by_cells.steps / .rays') by occupancy alone," \
+    "$(said skipping '.skipping | .skipping.steps / .rays') with distances; samples" \
+    "$(said skipping '.skipping | .skipping.samples / .rays')"
+  verdict "samples with distances less those without" "$(said skipping '.skipping | .skipping.samples - .by_cells.samples')" '<=' 0
+  verdict "samples without distances less those with" "$(said skipping '.skipping | .by_cells.samples - .skipping.samples')" '<=' 0
+  verdict "points saved as a share of all" "$(said skipping "$counts / .by_cells.steps")" '>=' 0.4
+  verdict "points saved as a share of those in empty space" \
+    "$(said skipping "$counts / (.by_cells.steps - .by_cells.samples)")" '>=' 0.4
+  verdict "rays a second with distances against without" \
+    "$(said skipping '.skipping | .skipping.rays_per_second / .by_cells.rays_per_second')" '>=' 1.02
+  alone "$tessera" bench render "$work/fox.scene" --views "$work/fox" --against "$work/fox-field" --json "$work/against.json"
+  verdict "frames a second against field's" "$(said against .against.times)" '>=' 4
 }
 
 arithmetic() { "$tessera" info "$work/$1" --json | jq .multiply_accumulates_per_sample; }
@@ -68,5 +100,5 @@ ablation() {
     "$(awk -v a="$(arithmetic "fox-attention-${seeds%% *}")" -v b="$(arithmetic "$field")" 'BEGIN { print a / b }')" '<=' 0.1
 }
 
-for row in ${ROWS:-photographs ablation}; do "$row"; done
+for row in ${ROWS:-photographs scene ablation}; do "$row"; done
 finish

@@ -74,8 +74,28 @@ TEST_F(HashCommandLine, GoesFromACityToPicturesAndNumbers) {
   EXPECT_EQ(info.at("blocks").at("columns"), 2);
   EXPECT_EQ(info.at("multiply_accumulates_per_sample"), 8 * 12 + 2 * 8 * 8 + 2 * 8);
   const Said baked = run({"bake", model, at("scene")});
-  EXPECT_EQ(baked.exitCode, 1);
-  EXPECT_NE(baked.err.find("hash"), std::string::npos) << baked.err;
+  ASSERT_EQ(baked.exitCode, 0) << baked.err;
+  const Said scene = run({"info", at("scene"), "--json"});
+  ASSERT_EQ(scene.exitCode, 0) << scene.err;
+  EXPECT_EQ(json::parse(scene.out).at("representation"), "hash");
+  EXPECT_EQ(json::parse(scene.out).at("level_0").at("contents"), 2);
+  EXPECT_EQ(json::parse(scene.out).at("surround_0").at("contents"), 1);
+  const Said judgedScene = run({"eval", at("scene"), at("city"), "--json", at("scene.json")});
+  ASSERT_EQ(judgedScene.exitCode, 0) << judgedScene.err;
+  EXPECT_NEAR(json::parse(readTextFile(at("scene.json"))).at("psnr").get<double>(),
+              json::parse(readTextFile(at("numbers.json"))).at("psnr").get<double>(), 1);
+  const Said drawnScene = run({"render", at("scene"), at("more"), "--views", at("city"), "--size", "24x18"});
+  EXPECT_EQ(drawnScene.exitCode, 0) << drawnScene.err;
+  const Said measured = run({"bench", "render", at("scene"), "--views", at("city"), "--json", "-"});
+  ASSERT_EQ(measured.exitCode, 0) << measured.err;
+  const json skipping = json::parse(measured.out).at("skipping");
+  EXPECT_EQ(skipping.at("skipping").at("samples"), skipping.at("whole").at("samples"));
+  EXPECT_EQ(skipping.at("by_cells").at("samples"), skipping.at("whole").at("samples"));
+  EXPECT_EQ(skipping.at("largest_difference"), 0);
+  const Said odd = run({"bake", model, at("odd"), "--cells", "12"});
+  EXPECT_EQ(odd.exitCode, 1);
+  EXPECT_NE(odd.err.find("multiple of 8"), std::string::npos) << odd.err;
+  EXPECT_FALSE(fs::exists(at("odd")));
 }
 
 TEST_F(HashCommandLine, GoesOnWithTheModelThatIsThere) {

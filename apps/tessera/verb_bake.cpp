@@ -40,8 +40,9 @@ void addBakeVerb(CLI::App& app) {
   verb->add_option("--background", flags->options.background,
                    "red, green and blue where no photo looked; default: a hazy sky")
       ->check(CLI::Range(0.0, 1.0));
-  verb->add_option("--cells", flags->options.cells,
-                   "of hash: cells of a block's occupancy along an edge, a multiple of 8; 0: the default")
+  verb->add_option(
+          "--cells", flags->options.cells,
+          "of hash: cells of a block's occupancy along an edge, a multiple of 8; 0: twice the lattice's, or 256")
       ->capture_default_str()
       ->check(CLI::Range(0u, kMostOccupancyCells));
   verb->add_option("--dilation", flags->options.dilation, "of hash: cells around those that are seen are kept, too")
@@ -70,6 +71,9 @@ void addBakeVerb(CLI::App& app) {
       flags->options.minAlpha = config.cullLast;
       baked = bakeVolume(models, levels, capture, flags->scene, flags->options);
     } else if (method == "hash") {
+      if (flags->options.cells % HashPart::kOccupancyUnit != 0) {
+        throw Error(fmt::format("--cells {}", flags->options.cells), "", "is no multiple of 8", "name one");
+      }
       const HashLevelModels models = [&](uint32_t) { return loadHashModel(*device, flags->model); };
       baked = bakeHash(models, levels, capture, flags->scene, flags->options);
     } else {

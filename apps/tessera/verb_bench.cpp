@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <chrono>
 #include <nlohmann/json.hpp>
 
 #include "apps/tessera/drawable.h"
@@ -10,8 +11,11 @@
 #include "import/capture_reader.h"
 #include "render/cpu/scene_benchmark.h"
 #include "render/tile_scene.h"
+#include "representations/field/field_renderer.h"
 #include "representations/field/step_benchmark.h"
+#include "representations/field/train_field.h"
 #include "tiles/scene_folder.h"
+#include "train/run_folder.h"
 
 namespace tessera {
 namespace {
@@ -180,19 +184,88 @@ ordered_json toJson(const CacheBenchmark& b) {
           {"all", run(b.whole)}};
 }
 
+struct DrawnViews {
+  double seconds = 0;
+  uint64_t rays = 0, samples = 0;
+  double samplesPerRay() const { return static_cast<double>(samples) / static_cast<double>(rays); }
+};
+
+// A scene beside a `field` model, view after view in turn, rays ending alike.
 template <class Content>
-ordered_json measureScene(const fs::path& folder, const std::vector<BenchmarkView>& views,
-                          const std::optional<CacheBenchmarkOptions>& flight, int threads, bool print) {
-  const TileScene<Content> scene = openTileScene<Content>(folder);
+ordered_json measureAgainst(const TileScene<Content>& scene, const fs::path& field,
+                            const std::vector<BenchmarkView>& views, int threads, bool print) {
+  requireManifest(ModelFolder(field), "field");
+  const std::unique_ptr<Device> device = makeDevice({"cpu", threads});
+  const std::unique_ptr<FieldModel> model = loadFieldModel(*device, field);
+  FieldRenderer other(*model);
+  SceneRendererSettings settings;
+  settings.threads = threads;
+  settings.selection.mostPixels = 0;
+  settings.march.minTransmittance = FieldRenderer::kMinTransmittance;
+  SceneRenderer<Content> renderer(scene.frame, scene.tree, scene.source, settings);
+  constexpr int kRounds = 3;
+  DrawnViews ours, theirs;
+  std::vector<double> ratios;
+  const auto draw = [](ViewRenderer& how, const BenchmarkView& view) {
+    const auto start = std::chrono::steady_clock::now();
+    how.render(view.camera, view.worldFromCamera, nullptr);
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
+  for (int round = 0; round < kRounds; ++round) {
+    double seconds[2] = {0, 0};
+    for (const BenchmarkView& view : views) {
+      renderer.prepare(view.camera, view.worldFromCamera);
+      seconds[0] += draw(renderer, view);
+      seconds[1] += draw(other, view);
+      ours.rays += static_cast<uint64_t>(view.camera.width) * static_cast<uint64_t>(view.camera.height);
+    }
+    ours.seconds += seconds[0];
+    theirs.seconds += seconds[1];
+    ratios.push_back(seconds[1] / seconds[0]);
+  }
+  theirs.rays = ours.rays;
+  ours.samples = renderer.marchCounts().samples;
+  theirs.samples = other.samplesEvaluated();
+  const double frames = kRounds * static_cast<double>(views.size());
+  const double least = *std::min_element(ratios.begin(), ratios.end()), all = theirs.seconds / ours.seconds;
+  if (print) {
+    fmt::print("{}\n  scene {:7.2f} frames/s, {:5.1f} samples a ray\n  field {:7.2f} frames/s, {:5.1f} samples a ray\n",
+               renderer.device(), frames / ours.seconds, ours.samplesPerRay(), frames / theirs.seconds,
+               theirs.samplesPerRay());
+    fmt::print("  {:.2f} times as many frames, at least {:.2f} in each of {} rounds\n", all, least, kRounds);
+  }
+  return {{"device", renderer.device()},
+          {"frames_per_second", frames / ours.seconds},
+          {"samples_per_ray", ours.samplesPerRay()},
+          {"field_frames_per_second", frames / theirs.seconds},
+          {"field_samples_per_ray", theirs.samplesPerRay()},
+          {"times", all},
+          {"least_times", least}};
+}
+
+struct SceneMeasurement {
+  fs::path scene;
+  std::vector<BenchmarkView> views;
+  std::optional<CacheBenchmarkOptions> flight;
+  fs::path against;
+  int threads = 0;
+  bool print = true;
+};
+
+template <class Content>
+ordered_json measureScene(const SceneMeasurement& what) {
+  const TileScene<Content> scene = openTileScene<Content>(what.scene);
   ordered_json json = ordered_json::object();
-  if (!views.empty()) {
-    const SkippingBenchmark skipping = benchmarkSkipping(scene, views, threads);
-    if (print) printSkipping(skipping);
+  if (!what.against.empty()) {
+    json["against"] = measureAgainst(scene, what.against, what.views, what.threads, what.print);
+  } else if (!what.views.empty()) {
+    const SkippingBenchmark skipping = benchmarkSkipping(scene, what.views, what.threads);
+    if (what.print) printSkipping(skipping);
     json["skipping"] = toJson(skipping);
   }
-  if (flight) {
-    const CacheBenchmark cache = benchmarkCache(scene, *flight);
-    if (print) printCache(cache);
+  if (what.flight) {
+    const CacheBenchmark cache = benchmarkCache(scene, *what.flight);
+    if (what.print) printCache(cache);
     json["cache"] = toJson(cache);
   }
   return json;
@@ -200,7 +273,7 @@ ordered_json measureScene(const fs::path& folder, const std::vector<BenchmarkVie
 
 void addBenchRender(CLI::App& bench) {
   struct Flags {
-    std::string scene, views, json;
+    std::string scene, views, against, json;
     bool flight = false;
     CacheBenchmarkOptions cache;
   };
@@ -210,7 +283,9 @@ void addBenchRender(CLI::App& bench) {
       "Examples:\n  tessera bench render city.scene --views city.capture\n"
       "  tessera bench render city.scene --flight --share 0.25");
   verb->add_option("scene", flags->scene, "scene folder")->required();
-  verb->add_option("--views", flags->views, "draw this capture's held-out views with and without skipping");
+  CLI::Option* ofViews =
+      verb->add_option("--views", flags->views, "draw this capture's held-out views with and without skipping");
+  verb->add_option("--against", flags->against, "or beside this model, of --method field, in turn")->needs(ofViews);
   CLI::Option* flight =
       verb->add_flag("--flight", flags->flight, "fly over all blocks, low and high, with a small cache");
   verb->add_option("--steps", flags->cache.steps, "pictures of the flight")
@@ -237,9 +312,9 @@ void addBenchRender(CLI::App& bench) {
       }
     }
     const std::optional<CacheBenchmarkOptions> cache = flags->flight ? std::optional(flags->cache) : std::nullopt;
+    const SceneMeasurement what{flags->scene, views, cache, flags->against, flags->cache.threads, flags->json != "-"};
     const bool hash = readTileset(flags->scene).representation == Representation::hash;
-    const auto measure = hash ? measureScene<HashContent> : measureScene<VolumeContent>;
-    const ordered_json json = measure(flags->scene, views, cache, flags->cache.threads, flags->json != "-");
+    const ordered_json json = hash ? measureScene<HashContent>(what) : measureScene<VolumeContent>(what);
     writeJson(flags->json, json);
   });
 }

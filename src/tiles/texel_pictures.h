@@ -1,5 +1,5 @@
 // Texels of eight bytes as pictures and back. Each picture holds up to three of the eight as red, green, blue.
-// docs/tile-format.md, section 5.
+// docs/tile-format.md, section 6.
 #pragma once
 
 #include <array>

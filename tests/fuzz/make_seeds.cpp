@@ -1,4 +1,5 @@
 // Writes a few small valid inputs for every fuzzer into DIR/<fuzzer>/: libFuzzer grows the rest.
+#include <algorithm>
 #include <cstring>
 #include <string>
 
@@ -7,6 +8,7 @@
 #include "base/safetensors.h"
 #include "scene/ply.h"
 #include "tiles/glb.h"
+#include "tiles/hash_payload.h"
 #include "tiles/test_support.h"
 #include "tiles/tileset_json.h"
 #include "tiles/volume_payload.h"
@@ -127,6 +129,17 @@ int main(int count, char** arguments) {
     const auto glb = decodeGlb(file);
     write("volume_payload/whole" + std::to_string(parts), file);
     write("volume_payload/cut" + std::to_string(parts), sized(std::string(glb->json)) + textOf(glb->bytes));
+  }
+  for (uint32_t parts : {1u, 2u}) {
+    tiles_test::MadeHash made;
+    made.lattice = made.cells = 8;
+    made.levels = 1;
+    HashContent content = tiles_test::madeHashContent(1, parts, made);
+    for (HashPart& part : content.parts) std::fill(part.cornerBytes.begin(), part.cornerBytes.end(), uint8_t{100});
+    const Bytes file = encodeHash(content);
+    const auto glb = decodeGlb(file);
+    write("hash_payload/whole" + std::to_string(parts), file);
+    write("hash_payload/cut" + std::to_string(parts), sized(std::string(glb->json)) + textOf(glb->bytes));
   }
   return 0;
 }

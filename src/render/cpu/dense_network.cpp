@@ -37,6 +37,46 @@ HWY_ATTR void evaluateLayers(const std::vector<DenseNetwork::Layer>& layers, flo
   }
 }
 
+HWY_ATTR void evaluatePacket(const std::vector<DenseNetwork::Layer>& layers, float* values) {
+  constexpr size_t kPacket = DenseNetwork::kPacket, kOutputs = 8;  // a layer's outputs are a multiple of
+  const hn::CappedTag<float, kPacket> d;
+  const size_t lanes = hn::Lanes(d);
+  alignas(64) float outputs[DenseNetwork::kMostWidth * kPacket];
+  for (size_t number = 0; number < layers.size(); ++number) {
+    const DenseNetwork::Layer& layer = layers[number];
+    const auto least = hn::Set(d, number + 1 < layers.size() ? 0.0f : -INFINITY);
+    for (size_t o = 0; o < layer.outputs; o += kOutputs) {
+      for (size_t column = 0; column < kPacket; column += lanes) {
+        const float *weights = layer.weights.data() + o, *biases = layer.biases.data() + o;
+        auto s0 = hn::Set(d, biases[0]), s1 = hn::Set(d, biases[1]), s2 = hn::Set(d, biases[2]),
+             s3 = hn::Set(d, biases[3]), s4 = hn::Set(d, biases[4]), s5 = hn::Set(d, biases[5]),
+             s6 = hn::Set(d, biases[6]), s7 = hn::Set(d, biases[7]);
+        for (size_t i = 0; i < layer.inputs; ++i, weights += layer.outputs) {
+          const auto x = hn::Load(d, values + i * kPacket + column);
+          s0 = hn::MulAdd(hn::Set(d, weights[0]), x, s0);
+          s1 = hn::MulAdd(hn::Set(d, weights[1]), x, s1);
+          s2 = hn::MulAdd(hn::Set(d, weights[2]), x, s2);
+          s3 = hn::MulAdd(hn::Set(d, weights[3]), x, s3);
+          s4 = hn::MulAdd(hn::Set(d, weights[4]), x, s4);
+          s5 = hn::MulAdd(hn::Set(d, weights[5]), x, s5);
+          s6 = hn::MulAdd(hn::Set(d, weights[6]), x, s6);
+          s7 = hn::MulAdd(hn::Set(d, weights[7]), x, s7);
+        }
+        float* to = outputs + o * kPacket + column;
+        hn::Store(hn::Max(s0, least), d, to);
+        hn::Store(hn::Max(s1, least), d, to + kPacket);
+        hn::Store(hn::Max(s2, least), d, to + 2 * kPacket);
+        hn::Store(hn::Max(s3, least), d, to + 3 * kPacket);
+        hn::Store(hn::Max(s4, least), d, to + 4 * kPacket);
+        hn::Store(hn::Max(s5, least), d, to + 5 * kPacket);
+        hn::Store(hn::Max(s6, least), d, to + 6 * kPacket);
+        hn::Store(hn::Max(s7, least), d, to + 7 * kPacket);
+      }
+    }
+    std::memcpy(values, outputs, layer.outputs * kPacket * sizeof(float));
+  }
+}
+
 }  // namespace tessera::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -44,6 +84,7 @@ HWY_AFTER_NAMESPACE();
 namespace tessera {
 
 HWY_EXPORT(evaluateLayers);
+HWY_EXPORT(evaluatePacket);
 
 DenseNetwork::DenseNetwork(const std::vector<DenseLayer>& network, uint32_t inputs, uint32_t outputs) {
   CHECK(network.empty() == false);
@@ -70,6 +111,10 @@ DenseNetwork::DenseNetwork(const std::vector<DenseLayer>& network, uint32_t inpu
 
 void DenseNetwork::run(float* values) const {
   HWY_DYNAMIC_DISPATCH(evaluateLayers)(layers_, values);
+}
+
+void DenseNetwork::runPacket(float* values) const {
+  HWY_DYNAMIC_DISPATCH(evaluatePacket)(layers_, values);
 }
 
 }  // namespace tessera

@@ -1,6 +1,7 @@
 // A content's network, run on the processor.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "tiles/content.h"
@@ -17,6 +18,9 @@ class DenseNetwork {
 
   // Overwrites `values` [kMostWidth], which holds the inputs, with the outputs; nothing is applied to these.
   void run(float* values) const;
+  // The same for kPacket columns of values side by side: [kMostWidth][kPacket], aligned to 64 bytes.
+  void runPacket(float* values) const;
+  static constexpr size_t kPacket = 16;
 
   struct Layer {
     uint32_t inputs = 0, outputs = 0;  // the outputs rounded up to whole vectors

@@ -103,9 +103,28 @@ DrawnPixel RayCaster<Content>::cast(const SceneRay& ray, double far, MarchCounts
   return pixel;
 }
 
+void PixelDirections::update(const Camera& camera, ThreadPool& pool) {
+  if (!directions_.empty() && camera == camera_) return;
+  camera_ = camera;
+  directions_.assign(static_cast<size_t>(camera.width) * camera.height, Vec3f::Zero());
+  pool.run(static_cast<size_t>(camera.height), [&](size_t y, int) {
+    for (int x = 0; x < camera.width; ++x) {
+      const auto direction = camera.directionInCamera(Vec2d(x + 0.5, static_cast<double>(y) + 0.5));
+      if (direction) directions_[y * static_cast<size_t>(camera.width) + x] = direction->cast<float>();
+    }
+  });
+}
+
 template <class Content>
 RenderedView drawScene(const SceneDrawing<Content>& drawing, const Camera& camera, const Pose& worldFromCamera,
                        const ImageF* opaqueDepth, ThreadPool& pool, MarchCounts* counts) {
+  return drawScene(drawing, PixelDirections(camera, pool), worldFromCamera, opaqueDepth, pool, counts);
+}
+
+template <class Content>
+RenderedView drawScene(const SceneDrawing<Content>& drawing, const PixelDirections& directions,
+                       const Pose& worldFromCamera, const ImageF* opaqueDepth, ThreadPool& pool, MarchCounts* counts) {
+  const Camera& camera = directions.camera();
   const TileFrame& frame = drawing.frame;
   RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
                     ImageF(camera.width, camera.height, 1)};
@@ -124,13 +143,13 @@ RenderedView drawScene(const SceneDrawing<Content>& drawing, const Camera& camer
     std::vector<BoundedRay> rays;
     for (int y = top; y < std::min(top + kTile, camera.height); ++y) {
       for (int x = left; x < std::min(left + kTile, camera.width); ++x) {
-        const std::optional<Vec3d> inCamera = camera.directionInCamera(Vec2d(x + 0.5, y + 0.5));
-        if (!inCamera) continue;  // beyond the lens: nothing
-        const double cosine = inCamera->z();
+        const Vec3d inCamera = directions.at(x, y).cast<double>();
+        if (inCamera.isZero()) continue;  // beyond the lens: nothing
+        const double cosine = inCamera.z();
         double far = INFINITY;
         if (opaqueDepth != nullptr && cosine > 0) far = *opaqueDepth->at(x, y) / (cosine * frame.scale);
         pixels.push_back({x, y, cosine});
-        rays.push_back({{origin, (sceneFromCamera * *inCamera).normalized()}, far});
+        rays.push_back({{origin, (sceneFromCamera * inCamera).normalized()}, far});
       }
     }
     std::vector<DrawnPixel> drawn(rays.size());
@@ -156,7 +175,11 @@ RenderedView drawScene(const SceneDrawing<Content>& drawing, const Camera& camer
 
 template class RayCaster<VolumeContent>;
 template class RayCaster<HashContent>;
+template RenderedView drawScene(const SceneDrawing<VolumeContent>&, const PixelDirections&, const Pose&, const ImageF*,
+                                ThreadPool&, MarchCounts*);
 template RenderedView drawScene(const SceneDrawing<VolumeContent>&, const Camera&, const Pose&, const ImageF*,
+                                ThreadPool&, MarchCounts*);
+template RenderedView drawScene(const SceneDrawing<HashContent>&, const PixelDirections&, const Pose&, const ImageF*,
                                 ThreadPool&, MarchCounts*);
 template RenderedView drawScene(const SceneDrawing<HashContent>&, const Camera&, const Pose&, const ImageF*,
                                 ThreadPool&, MarchCounts*);

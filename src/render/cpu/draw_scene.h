@@ -34,7 +34,26 @@ struct SceneDrawing {
   MarchSettings march;
 };
 
+// Which way the pixels of a camera look, in its axes. Asking a lens is dear: kept while the camera stays the same.
+class PixelDirections {
+ public:
+  PixelDirections() = default;
+  PixelDirections(const Camera& camera, ThreadPool& pool) { update(camera, pool); }
+  void update(const Camera& camera, ThreadPool& pool);
+
+  const Camera& camera() const { return camera_; }
+  // Of length 1; zero where the lens sees nothing.
+  const Vec3f& at(int x, int y) const { return directions_[static_cast<size_t>(y) * camera_.width + x]; }
+
+ private:
+  Camera camera_;
+  std::vector<Vec3f> directions_;
+};
+
 // As ViewRenderer::render. The picture does not depend on the number of threads. `counts`: optional, added to.
+template <class Content>
+RenderedView drawScene(const SceneDrawing<Content>& drawing, const PixelDirections& pixels, const Pose& worldFromCamera,
+                       const ImageF* opaqueDepth, ThreadPool& pool, MarchCounts* counts = nullptr);
 template <class Content>
 RenderedView drawScene(const SceneDrawing<Content>& drawing, const Camera& camera, const Pose& worldFromCamera,
                        const ImageF* opaqueDepth, ThreadPool& pool, MarchCounts* counts = nullptr);

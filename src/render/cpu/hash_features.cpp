@@ -65,7 +65,14 @@ HWY_ATTR HWY_INLINE Eight dequantised(const float* low, const float* step, const
   return values;
 }
 
-HWY_ATTR HWY_INLINE void cornerWeights(const float fraction[3], float weights[8]) {
+// Corner k of eight is bit 0 of k further along x, bit 1 along y, bit 2 along z.
+constexpr uint32_t kPrimeY = 2654435761u, kPrimeZ = 805459861u;  // instant-ngp's
+alignas(32) constexpr uint32_t kHashX[8] = {0, 1, 0, 1, 0, 1, 0, 1};
+alignas(32) constexpr uint32_t kHashY[8] = {0, 0, kPrimeY, kPrimeY, 0, 0, kPrimeY, kPrimeY};
+alignas(32) constexpr uint32_t kHashZ[8] = {0, 0, 0, 0, kPrimeZ, kPrimeZ, kPrimeZ, kPrimeZ};
+
+// Of a trilinear mix, by corner.
+HWY_ATTR HWY_INLINE void cornerWeights(const float fraction[3], float* weights) {
   const float x = fraction[0], y = fraction[1], z = fraction[2];
   const float low[4] = {(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y};
   for (int k = 0; k < 4; ++k) {
@@ -103,10 +110,13 @@ HWY_ATTR bool findPlace(const HashFeatures::Layout& layout, const HashPart& part
     }
     uint32_t* entry = lookup.entry[l];
     if (table.hashed) {
-      const uint32_t x[2] = {index[0], index[0] + 1};
-      const uint32_t y[2] = {index[1] * 2654435761u, (index[1] + 1) * 2654435761u};
-      const uint32_t z[2] = {index[2] * 805459861u, (index[2] + 1) * 805459861u};
-      for (uint32_t k = 0; k < 8; ++k) entry[k] = (x[k & 1] ^ y[k >> 1 & 1] ^ z[k >> 2]) & table.mask;
+      const hn::RebindToUnsigned<Tag> d;
+      const auto x = hn::Set(d, index[0]), y = hn::Set(d, index[1] * kPrimeY), z = hn::Set(d, index[2] * kPrimeZ);
+      const auto mask = hn::Set(d, table.mask);
+      for (size_t i = 0; i < 8; i += kLanes) {
+        const auto xy = hn::Xor(hn::Add(x, hn::Load(d, kHashX + i)), hn::Add(y, hn::Load(d, kHashY + i)));
+        hn::Store(hn::And(hn::Xor(xy, hn::Add(z, hn::Load(d, kHashZ + i))), mask), d, entry + i);
+      }
     } else {
       for (uint32_t k = 0; k < 8; ++k) {
         const uint32_t x = index[0] + (k & 1), y = index[1] + (k >> 1 & 1), z = index[2] + (k >> 2);
@@ -120,7 +130,7 @@ HWY_ATTR bool findPlace(const HashFeatures::Layout& layout, const HashPart& part
 
 HWY_ATTR void mixPlace(const HashFeatures::Layout& layout, const HashFeatures::Lookup& lookup, float features[8]) {
   const Tag d;
-  float weight[8];
+  alignas(32) float weight[8];
   cornerWeights(lookup.cornerFraction, weight);
   Eight low = zero(), high = zero();
   for (size_t k = 0; k < 8; ++k) {

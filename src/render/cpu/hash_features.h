@@ -20,7 +20,7 @@ class HashFeatures {
     float cornerFraction[3];
     const uint8_t* corner;  // the lowest of eight
     float fraction[kMostTables][3];
-    uint32_t entry[kMostTables][8];
+    alignas(32) uint32_t entry[kMostTables][8];
   };
   // `place` in [0,1]³ of the part's domain. False where its corners are not stored. Begins to fetch the bytes.
   bool find(const float place[3], Lookup& lookup) const;

@@ -67,17 +67,36 @@ void HashShading::end(DrawnPixel& pixel) {
 }
 
 void HashShading::finish() {
-  alignas(64) float values[DenseNetwork::kMostWidth];
-  for (const Waiting& ray : waiting_) {
-    std::copy_n(ray.sums.values, ContentComposite::kValues, values);
-    const std::array<float, 16> harmonics = harmonicsOf(ray.direction);
-    std::copy(harmonics.begin(), harmonics.end(), values + ContentComposite::kValues);
-    networks_[ray.network].run(values);
-    DrawnPixel& pixel = *ray.pixel;
-    if (isWhole_) pixel.transmittance = 0;
-    for (int c = 0; c < 3; ++c) {
-      pixel.colour[c] = (1 - pixel.transmittance) / (1 + std::exp(-(ray.sums.values[c] + values[c])));
+  constexpr size_t kPacket = DenseNetwork::kPacket;
+  alignas(64) float values[DenseNetwork::kMostWidth * kPacket];
+  // Rays of one network side by side, however they came.
+  std::stable_sort(waiting_.begin(), waiting_.end(),
+                   [](const Waiting& a, const Waiting& b) { return a.network < b.network; });
+  for (size_t first = 0; first < waiting_.size();) {
+    const size_t network = waiting_[first].network;
+    size_t count = 0;
+    for (; count < kPacket && first + count < waiting_.size() && waiting_[first + count].network == network; ++count) {
+      const Waiting& ray = waiting_[first + count];
+      const std::array<float, 16> harmonics = harmonicsOf(ray.direction);
+      for (size_t k = 0; k < ContentComposite::kValues; ++k) values[k * kPacket + count] = ray.sums.values[k];
+      for (size_t k = 0; k < harmonics.size(); ++k) {
+        values[(ContentComposite::kValues + k) * kPacket + count] = harmonics[k];
+      }
     }
+    for (size_t column = count; column < kPacket; ++column) {
+      for (size_t k = 0; k < kInputs; ++k) values[k * kPacket + column] = 0;
+    }
+    networks_[network].runPacket(values);
+    for (size_t column = 0; column < count; ++column) {
+      const Waiting& ray = waiting_[first + column];
+      DrawnPixel& pixel = *ray.pixel;
+      if (isWhole_) pixel.transmittance = 0;
+      for (size_t c = 0; c < kOutputs; ++c) {
+        const float z = ray.sums.values[c] + values[c * kPacket + column];
+        pixel.colour[c] = (1 - pixel.transmittance) / (1 + std::exp(-z));
+      }
+    }
+    first += count;
   }
   waiting_.clear();
 }

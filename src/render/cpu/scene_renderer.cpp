@@ -46,7 +46,8 @@ RenderedView SceneRenderer<Content>::render(const Camera& camera, const Pose& wo
     drawn.high = cells.high;
   }
   if (cut_.surround >= 0) drawing.surround = cache_.find(cut_.surround);
-  return drawScene(drawing, camera, worldFromCamera, opaqueDepth, pool_, &counts_);
+  directions_.update(camera, pool_);
+  return drawScene(drawing, directions_, worldFromCamera, opaqueDepth, pool_, &counts_);
 }
 
 template class SceneRenderer<VolumeContent>;

@@ -50,6 +50,7 @@ class SceneRenderer final : public ViewRenderer {
   ThreadPool pool_;
   TileChoice choice_;
   TileCut cut_;
+  PixelDirections directions_;
   MarchCounts counts_;
 };
 

@@ -8,7 +8,6 @@ namespace {
 constexpr uint32_t kRays = 4096;        // of one piece of the picture, at most
 constexpr uint32_t kSamples = 1 << 16;  // rays that do not fit are taken up by the next piece
 static_assert(kSamples >= FieldConfig::kMostSteps);
-constexpr float kMinTransmittance = 1e-3f;
 
 }  // namespace
 
@@ -63,6 +62,7 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
     for (uint32_t ray = 0; ray < finished; ++ray)
       view.depth.pixels[first + ray] = pictureRays_.depthOf(ray, depth[ray]);
     first += finished;
+    samples_ += counters[0];
     // Each round of marching has room for so many samples, and so has what is seen.
     const uint32_t fullest =
         std::max(counters[0], *std::max_element(counters.begin() + 2, counters.begin() + RaySamples::kCounters));

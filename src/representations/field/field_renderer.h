@@ -15,8 +15,12 @@ class FieldRenderer final : public ViewRenderer {
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
   std::string device() const override;
 
+  static constexpr float kMinTransmittance = 1e-3f;       // rays end where less would be seen
+  uint64_t samplesEvaluated() const { return samples_; }  // of all pictures
+
  private:
   FieldModel& model_;
+  uint64_t samples_ = 0;
   PictureRays pictureRays_;
   RaySamples seen_;
   Array<uint32_t> counters_;

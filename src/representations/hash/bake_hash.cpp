@@ -1,5 +1,7 @@
 #include "representations/hash/bake_hash.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -8,6 +10,7 @@
 #include "compute/block_path.h"
 #include "compute/lattice.h"
 #include "representations/hash/hash_pass.h"
+#include "tiles/hash_payload.h"
 #include "tiles/occupancy_distance.h"
 #include "train/photo_sight.h"
 #include "train/picture_rays.h"
@@ -19,6 +22,9 @@ constexpr uint32_t kRays = 2048, kSamples = 1 << 16;  // of one piece of a photo
 static_assert(kSamples >= HashModel::kMostSteps);
 constexpr float kMinTransmittance = 2e-3f;  // as pictures are drawn
 constexpr uint32_t kTexels = 1 << 16;       // evaluated together
+// Of a block's occupancy along an edge, unless the lattice is finer. The finer, the fewer samples: half the size takes
+// three of ten away.
+constexpr uint32_t kMostCells = 256;
 
 // Looks at a model through photos, and marks where it sees something.
 class SeenFinder {
@@ -114,6 +120,13 @@ ByteRange rangeOf(const std::vector<float>& values, size_t first, size_t stride)
   return range;
 }
 
+// Throws Error where a training went astray.
+void requireWritable(const ByteRange& range) {
+  if (range.low >= -kLargestFeature && range.high <= kLargestFeature) return;
+  throw Error("the model", "", fmt::format("holds features from {} to {}", range.low, range.high),
+              "train it again with a lower --set rate");
+}
+
 // Macroblocks of which samples in seen cells mix corners.
 std::vector<bool> macroblocksOf(const OccupancyBits& seen, uint32_t lattice) {
   const uint32_t blocks = lattice / HashPart::kMacroblock;
@@ -190,7 +203,10 @@ void bakeCorners(HashModel& model, uint32_t block, const OccupancyBits& seen, Ha
   const std::vector<float> values = cornerValues(model, block, corners);
   constexpr size_t kColumns = LatticeForward::kColumns;
   part.ranges.resize(part.columns);
-  for (uint32_t c = 0; c < used; ++c) part.ranges[c] = rangeOf(values, c, kColumns);
+  for (uint32_t c = 0; c < used; ++c) {
+    part.ranges[c] = rangeOf(values, c, kColumns);
+    requireWritable(part.ranges[c]);
+  }
   part.cornerBytes.assign(corners.size() * part.columns, 0);
   for (size_t i = 0; i < corners.size(); ++i) {
     for (uint32_t c = 0; c < used; ++c) {
@@ -239,7 +255,10 @@ void bakeTables(HashModel& model, uint32_t block, const OccupancyBits& seen, Has
     for (size_t i = 0; i < values.size() && !read.empty(); ++i) {
       if (!read[i / HashPart::kFeatures]) values[i] = 0;  // what is never read compresses to nothing
     }
-    for (uint32_t f = 0; f < HashPart::kFeatures; ++f) table.ranges[f] = rangeOf(values, f, HashPart::kFeatures);
+    for (uint32_t f = 0; f < HashPart::kFeatures; ++f) {
+      table.ranges[f] = rangeOf(values, f, HashPart::kFeatures);
+      requireWritable(table.ranges[f]);
+    }
     table.bytes.reserve(values.size());
     for (size_t i = 0; i < values.size(); ++i) {
       table.bytes.push_back(table.ranges[i % HashPart::kFeatures].byteOf(values[i]));
@@ -270,7 +289,8 @@ std::vector<DenseLayer> networkOf(HashModel& model) {
 }  // namespace
 
 std::vector<OccupancyBits> findSeenCells(HashModel& model, const Capture& capture, const BakeHashOptions& options) {
-  const uint32_t cells = options.cells > 0 ? options.cells : model.fields().lattice().voxels;
+  const uint32_t lattice = model.fields().lattice().voxels;
+  const uint32_t cells = options.cells > 0 ? options.cells : std::max(lattice, std::min(2 * lattice, kMostCells));
   std::vector<OccupancyBits> seen(model.space().blocks(), OccupancyBits(cells));
   SeenFinder finder(model, capture, options, seen);
   const std::vector<int> photos = capture.photosIn(Split::train);

@@ -13,8 +13,9 @@
 namespace tessera {
 
 struct BakeHashOptions : BakeOptions {
-  int dilation = 1;    // cells around those that are seen are kept, too
-  uint32_t cells = 0;  // of a block's occupancy along an edge, a multiple of 8; 0: as many as the lattice has corners
+  int dilation = 1;  // cells around those that are seen are kept, too
+  // Of a block's occupancy along an edge, a multiple of 8; 0: twice as many as the lattice has corners, if 256 suffice.
+  uint32_t cells = 0;
 };
 
 // Gives the model of a level, the finest (0) first. One is held at a time.

@@ -1,6 +1,7 @@
 #include "representations/hash/bake_hash.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 
@@ -8,7 +9,10 @@
 #include "base/random.h"
 #include "compute/block_path.h"
 #include "render/cpu/hash_march.h"
+#include "render/cpu/scene_renderer.h"
+#include "render/tile_scene.h"
 #include "representations/hash/hash_cube.h"
+#include "representations/hash/hash_model_renderer.h"
 
 namespace tessera {
 namespace {
@@ -181,6 +185,111 @@ TEST(BakeHash, StoresAllCornersOfEverySeenCell) {
                                                  static_cast<uint32_t>(cell[1] >> level),
                                                  static_cast<uint32_t>(cell[2] >> level)));
     }
+  }
+}
+
+HashLevelModels onlyModel(TrainedHashCube& trained, const fs::path& folder) {
+  // Baking holds a model of its own.
+  return [&trained, folder](uint32_t) {
+    auto model = std::make_unique<HashModel>(*trained.device, trained.model().config(), trained.model().grid(), false);
+    for (uint32_t part = 0; part < trained.trainer->parts(); ++part) {
+      const fs::path path = folder / ("part" + std::to_string(part));
+      writeFileAtomically(path, trained.trainer->save(part));
+      model->restore(part, path, readSafetensors(path));
+    }
+    return model;
+  };
+}
+
+class BakedScenes : public testing::Test {
+ protected:
+  BakedScenes() : folder_(fs::temp_directory_path() / ("tessera-bake-hash-" + std::to_string(::getpid()))) {
+    fs::create_directories(folder_);
+  }
+  ~BakedScenes() override { fs::remove_all(folder_); }
+  const fs::path folder_;
+};
+
+double psnrOf(const ImageF& a, const ImageF& b) {
+  double sum = 0;
+  for (size_t i = 0; i < a.pixels.size(); ++i) sum += std::pow(a.pixels[i] - b.pixels[i], 2);
+  return -10 * std::log10(sum / static_cast<double>(a.pixels.size()));
+}
+
+TEST_F(BakedScenes, LookAsTheirModelsDo) {
+  for (const char* surround : {"none", "own", "border"}) {
+    for (const char* background : {"random", "learned"}) {
+      if (std::string(background) == "learned" && std::string(surround) != "border") continue;
+      HashConfig config = smallHashConfig();
+      config.surround = surround;
+      config.background = background;
+      const CubeScene scene;
+      TrainedHashCube trained(scene, config, cubeGrid(std::string(surround) == "border" ? 1 : 2), 150);
+      const fs::path where = folder_ / (std::string(surround) + background);
+      const BakedScene baked = bakeHash(onlyModel(trained, folder_), 1, scene.capture(), where, {});
+      EXPECT_EQ(baked.levels.size(), 1u);
+      TileScene<HashContent> opened = openTileScene<HashContent>(where);
+      SceneRendererSettings settings;
+      settings.threads = 2;
+      settings.selection.mostPixels = 0;
+      settings.march.minTransmittance = 2e-3f;
+      HashRenderer tiles(opened.frame, std::move(opened.tree), std::move(opened.source), settings);
+      HashModelRenderer model(trained.model());
+      const Capture& capture = scene.capture();
+      for (const size_t photo : {size_t{0}, capture.photos.size() / 2}) {
+        const Camera& camera = capture.cameras[static_cast<size_t>(capture.photos[photo].camera)];
+        const Pose& pose = capture.photos[photo].worldFromCamera;
+        const RenderedView a = tiles.render(camera, pose, nullptr), b = model.render(camera, pose, nullptr);
+        EXPECT_GT(psnrOf(a.colour, b.colour), 38) << surround << " " << background << " " << photo;
+        EXPECT_GT(psnrOf(a.opacity, b.opacity), 35) << surround << " " << background << " " << photo;
+      }
+    }
+  }
+}
+
+TEST_F(BakedScenes, AreTheSameBytesAgain) {
+  const CubeScene scene;
+  TrainedHashCube trained(scene, smallHashConfig(), cubeGrid(2), 40);
+  const BakedScene once = bakeHash(onlyModel(trained, folder_), 1, scene.capture(), folder_ / "scene", {});
+  const BakedScene again = bakeHash(onlyModel(trained, folder_), 1, scene.capture(), folder_ / "scene", {});
+  ASSERT_EQ(once.tileset.tiles.size(), again.tileset.tiles.size());
+  for (size_t tile = 0; tile < once.tileset.tiles.size(); ++tile) {
+    for (size_t i = 0; i < once.tileset.tiles[tile].contents.size(); ++i) {
+      EXPECT_EQ(once.tileset.tiles[tile].contents[i].uri, again.tileset.tiles[tile].contents[i].uri);
+    }
+  }
+}
+
+// What no photo sees is 0, and compresses; what one sees is all there.
+TEST(BakeHash, LeavesOutEntriesThatNoSeenSampleReads) {
+  HashConfig config = smallHashConfig();
+  config.fineLog2Size = 16;
+  Baked baked(config);
+  OccupancyBits one(32);
+  one.set(one.number(9, 20, 13));
+  std::vector<OccupancyBits> seen(baked.seen.size(), one);
+  const HashContent content = bakeHashGroup(baked.trained.model(), {0}, seen);
+  const HashContent whole = baked.block(0);
+  for (size_t l = 0; l < content.parts[0].tables.size(); ++l) {
+    const HashTable& table = content.parts[0].tables[l];
+    size_t kept = 0;
+    for (uint32_t entry = 0; entry < table.entries; ++entry) {
+      bool any = false;
+      for (size_t f = 0; f < 8; ++f) any |= table.bytes[8 * entry + f] != table.ranges[f].byteOf(0);
+      kept += any;
+    }
+    const double edge = (table.resolution - 1) / 32.0;
+    EXPECT_GT(kept, 0u);
+    EXPECT_LE(static_cast<double>(kept), std::pow(std::ceil(edge) + 2, 3));
+  }
+  const RandomStream random(8, 8);
+  for (uint64_t i = 0; i < 200; ++i) {
+    const float place[3] = {(9 + random.uniform(3 * i)) / 32, (20 + random.uniform(3 * i + 1)) / 32,
+                            (13 + random.uniform(3 * i + 2)) / 32};
+    float few[8], all[8];
+    ASSERT_TRUE(looksUp(content, content.parts[0], place, few));
+    if (!looksUp(whole, whole.parts[0], place, all)) continue;
+    for (size_t f = 0; f < 8; ++f) ASSERT_NEAR(few[f], all[f], 0.1) << f;
   }
 }
 
