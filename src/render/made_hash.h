@@ -43,8 +43,9 @@ inline void makeHash(HashPart& part, const MadeHashPart& made, const MadeFeature
       for (int a = 0; a < 3; ++a) place[a] = -half + 2 * half * (corner[a] + 0.5) / made.lattice;
       const std::array<float, 8> values = features(place);
       for (size_t f = 0; f < 8; ++f) part.cornerBytes.push_back(part.ranges[f].byteOf(values[f]));
-      for (uint32_t f = 0; f < 8; ++f) {
-        part.cornerBytes.push_back(static_cast<uint8_t>(random.below(uint64_t{8} * b * 729 + 8 * i + f, 256)));
+      const uint64_t number = corner[0] + uint64_t{made.lattice} * (corner[1] + uint64_t{made.lattice} * corner[2]);
+      for (uint64_t f = 0; f < 8; ++f) {
+        part.cornerBytes.push_back(static_cast<uint8_t>(random.below(8 * number + f, 256)));
       }
     }
   }

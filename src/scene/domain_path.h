@@ -3,6 +3,8 @@
 // section 4.1).
 #pragma once
 
+#include <algorithm>
+
 #include "scene/contraction.h"
 
 namespace tessera {
@@ -34,6 +36,15 @@ struct DomainPath {
   static constexpr int kMostSegments = 13;
   std::array<DomainSegment, kMostSegments> segments;
   int count = 0;
+
+  DomainPath() = default;
+  // Of the segments only those that there are: mostly one of many.
+  DomainPath(const DomainPath& other) { *this = other; }
+  DomainPath& operator=(const DomainPath& other) {
+    count = other.count;
+    std::copy_n(other.segments.begin(), count, segments.begin());
+    return *this;
+  }
 };
 
 // The ray origin + t direction (scene units) for t from near to far, both finite; nothing unless near < far. Of a

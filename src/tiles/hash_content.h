@@ -56,7 +56,7 @@ struct HashPart : ContentPart {
   std::vector<uint32_t> distances;
 
   // The finest level that has no more than these cells along an edge.
-  static constexpr uint32_t kMostDistanceCells = 64;
+  static constexpr uint32_t kMostDistanceCells = 128;
   static size_t distanceLevel(uint32_t cells);
 
   uint32_t cells() const { return occupied.levels.front().cells; }

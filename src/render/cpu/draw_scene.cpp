@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/check.h"
 
@@ -9,6 +10,14 @@ namespace tessera {
 namespace {
 
 constexpr int kTile = 16;  // pixels along an edge of what one task draws: neighbours read the same texels
+
+// A packet of rays is a square of pixels.
+std::pair<int, int> pixelOfTile(int number, int left, int top) {
+  constexpr int kEdge = 4;
+  static_assert(kEdge * kEdge == kRayLanes);
+  const int square = number / (kEdge * kEdge), within = number % (kEdge * kEdge), across = kTile / kEdge;
+  return {left + square % across * kEdge + within % kEdge, top + square / across * kEdge + within / kEdge};
+}
 
 template <class Content>
 std::vector<const Content*> contentsOf(const SceneDrawing<Content>& drawing) {
@@ -46,51 +55,86 @@ RayCaster<Content>::RayCaster(const SceneDrawing<Content>& drawing)
 }
 
 template <class Content>
-void RayCaster<Content>::add(const Placed& placed, const SceneRay& ray, MarchCounts& counts) {
-  ContentComposite composite;
-  for (const PartRange& part : parts_) {
-    if (composite.transmittance * shading_.transmittance() < drawing_.march.minTransmittance) break;
-    shading_.march(*placed.content, *part.part, ray, part.range, composite, counts);
+void RayCaster<Content>::add(const Placed& placed, size_t lanes, MarchCounts& counts) {
+  std::array<PartRay, kRayLanes> rays;
+  for (size_t i = 0; i < lanes; ++i) lanes_[i].composite = {};
+  // Part after part of each ray; those of several rays that are the same, together.
+  for (size_t turn = 0;; ++turn) {
+    std::array<const Part*, kRayLanes> next = {};
+    bool any = false;
+    for (size_t i = 0; i < lanes; ++i) {
+      const Lane& lane = lanes_[i];
+      const bool seen = lane.composite.transmittance * shading_.transmittance(i) >= drawing_.march.minTransmittance;
+      if (turn < lane.parts.size() && seen) next[i] = lane.parts[turn].part;
+      any |= next[i] != nullptr;
+    }
+    if (!any) break;
+    for (size_t i = 0; i < lanes; ++i) {
+      const Part* part = next[i];
+      if (part == nullptr) continue;
+      size_t count = 0;
+      for (size_t j = i; j < lanes; ++j) {
+        if (next[j] != part) continue;
+        next[j] = nullptr;
+        rays[count++] = {j, lanes_[j].ray, lanes_[j].parts[turn].range, &lanes_[j].composite};
+      }
+      shading_.march(*placed.content, *part, std::span(rays).first(count), counts);
+    }
   }
-  shading_.add(composite, placed.number);
+  for (size_t i = 0; i < lanes; ++i) {
+    if (!lanes_[i].parts.empty()) shading_.add(i, lanes_[i].composite, placed.number);
+  }
 }
 
 template <class Content>
-void RayCaster<Content>::castOne(const BoundedRay& bounded, MarchCounts& counts) {
+void RayCaster<Content>::castPacket(std::span<const BoundedRay> rays, MarchCounts& counts) {
   const TileFrame& frame = drawing_.frame;
-  const SceneRay& ray = bounded.ray;
-  // Nothing is met in front of the box.
-  const RayRange box = clipToBox(ray, frame.low, frame.high, {frame.near, INFINITY});
-  const RayRange whole{box.empty() ? frame.near : box.near, std::min(bounded.far, TileFrame::kSceneEnd)};
-  if (whole.empty()) return;
-  for (const Placed& placed : placed_) {
-    if (shading_.transmittance() < drawing_.march.minTransmittance) return;
-    const RayRange range = clipToBox(ray, placed.low, placed.high, whole);
-    if (range.empty()) continue;
-    parts_.clear();
-    for (const Part& part : placed.content->parts) {
-      const RayRange owned = ownedRange(part, ray, range);
-      if (!owned.empty()) parts_.push_back({&part, owned});
-    }
-    // Convex and apart: in the order in which the ray enters them.
-    std::sort(parts_.begin(), parts_.end(),
-              [](const PartRange& a, const PartRange& b) { return a.range.near < b.range.near; });
-    if (!parts_.empty()) add(placed, ray, counts);
+  for (size_t i = 0; i < rays.size(); ++i) {
+    Lane& lane = lanes_[i];
+    lane.ray = &rays[i].ray;
+    shading_.begin(i, lane.ray->direction);
+    // Nothing is met in front of the box.
+    const RayRange box = clipToBox(*lane.ray, frame.low, frame.high, {frame.near, INFINITY});
+    lane.whole = {box.empty() ? frame.near : box.near, std::min(rays[i].far, TileFrame::kSceneEnd)};
+    lane.behind = {box.empty() ? frame.near : box.far, lane.whole.far};
   }
-  if (!surround_.empty() && shading_.transmittance() >= drawing_.march.minTransmittance) {
-    const RayRange behind{box.empty() ? frame.near : box.far, whole.far};
-    parts_.assign(1, {&surround_[0].content->parts[0], behind});
-    if (!behind.empty()) add(surround_[0], ray, counts);
+  for (const Placed& placed : placed_) {
+    bool any = false;
+    for (size_t i = 0; i < rays.size(); ++i) {
+      Lane& lane = lanes_[i];
+      lane.parts.clear();
+      if (lane.whole.empty() || !seesOn(i)) continue;
+      const RayRange range = clipToBox(*lane.ray, placed.low, placed.high, lane.whole);
+      if (range.empty()) continue;
+      for (const Part& part : placed.content->parts) {
+        const RayRange owned = ownedRange(part, *lane.ray, range);
+        if (!owned.empty()) lane.parts.push_back({&part, owned});
+      }
+      // Convex and apart: in the order in which the ray enters them.
+      std::sort(lane.parts.begin(), lane.parts.end(),
+                [](const PartRange& a, const PartRange& b) { return a.range.near < b.range.near; });
+      any |= !lane.parts.empty();
+    }
+    if (any) add(placed, rays.size(), counts);
+  }
+  for (const Placed& placed : surround_) {
+    for (size_t i = 0; i < rays.size(); ++i) {
+      Lane& lane = lanes_[i];
+      lane.parts.clear();
+      if (lane.whole.empty() || lane.behind.empty() || !seesOn(i)) continue;
+      lane.parts.push_back({&placed.content->parts[0], lane.behind});
+    }
+    add(placed, rays.size(), counts);
   }
 }
 
 template <class Content>
 void RayCaster<Content>::cast(std::span<const BoundedRay> rays, std::span<DrawnPixel> pixels, MarchCounts& counts) {
   CHECK(rays.size() == pixels.size());
-  for (size_t i = 0; i < rays.size(); ++i) {
-    shading_.begin(rays[i].ray.direction);
-    castOne(rays[i], counts);
-    shading_.end(pixels[i]);
+  for (size_t first = 0; first < rays.size(); first += kRayLanes) {
+    const size_t count = std::min(kRayLanes, rays.size() - first);
+    castPacket(rays.subspan(first, count), counts);
+    for (size_t i = 0; i < count; ++i) shading_.end(i, pixels[first + i]);
   }
   shading_.finish();
 }
@@ -141,8 +185,9 @@ RenderedView drawScene(const SceneDrawing<Content>& drawing, const PixelDirectio
     const int left = static_cast<int>(task) % columns * kTile, top = static_cast<int>(task) / columns * kTile;
     std::vector<Pixel> pixels;
     std::vector<BoundedRay> rays;
-    for (int y = top; y < std::min(top + kTile, camera.height); ++y) {
-      for (int x = left; x < std::min(left + kTile, camera.width); ++x) {
+    for (int number = 0; number < kTile * kTile; ++number) {
+      const auto [x, y] = pixelOfTile(number, left, top);
+      if (x < camera.width && y < camera.height) {
         const Vec3d inCamera = directions.at(x, y).cast<double>();
         if (inCamera.isZero()) continue;  // beyond the lens: nothing
         const double cosine = inCamera.z();

@@ -1,6 +1,7 @@
 // A picture of contents in memory: the definition of what scenes of `volume` and of `hash` look like, on the processor.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <span>
 #include <vector>
@@ -85,13 +86,22 @@ class RayCaster {
     const Part* part;
     RayRange range;
   };
-  void castOne(const BoundedRay& ray, MarchCounts& counts);
-  void add(const Placed& placed, const SceneRay& ray, MarchCounts& counts);
+  struct Lane {
+    const SceneRay* ray;
+    RayRange whole;                // that anything may be met in
+    RayRange behind;               // that the surround is met in
+    std::vector<PartRange> parts;  // of one content, in the order in which the ray enters them
+    ContentComposite composite;    // of one content
+  };
+  void castPacket(std::span<const BoundedRay> rays, MarchCounts& counts);
+  // Takes all lanes through their parts of a content.
+  void add(const Placed& placed, size_t lanes, MarchCounts& counts);
+  bool seesOn(size_t lane) const { return shading_.transmittance(lane) >= drawing_.march.minTransmittance; }
 
   const SceneDrawing<Content>& drawing_;
   std::vector<Placed> placed_, surround_;
   ShadingOf<Content> shading_;
-  std::vector<PartRange> parts_;  // of one ray and content
+  std::array<Lane, kRayLanes> lanes_;
 };
 
 }  // namespace tessera

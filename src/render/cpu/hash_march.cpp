@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <new>
 
 #include "tiles/occupancy_distance.h"
 
@@ -9,6 +11,7 @@
 #define HWY_TARGET_INCLUDE "render/cpu/hash_march.cpp"
 #include <hwy/foreach_target.h>
 // after foreach_target
+#include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -19,11 +22,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 // x, y and z of one place; the fourth lane means nothing.
 using Tag = hn::FixedTag<float, 4>;
 using Vec = hn::Vec<Tag>;
-
-// 1 - exp(-x), to a float's digits for small x too.
-HWY_INLINE float opacityOf(float x) {
-  return x < 0.01f ? x * (1 - x * (0.5f - x * (1.0f / 6))) : 1 - std::exp(-x);
-}
 
 HWY_ATTR HWY_INLINE Vec loaded(const double x[3], double factor, double offset) {
   alignas(16) float lanes[4];
@@ -47,12 +45,15 @@ struct Cell {
 // place without coming to anything.
 class Piece {
  public:
+  Piece() = default;
   HWY_ATTR Piece(const HashPart& part, const DomainSegment& s, bool useDistances)
-      : part_(part),
-        levels_(part.occupied.levels),
-        useDistances_(useDistances),
-        distanceLevel_(HashPart::distanceLevel(part.cells())) {
-    while (coarsest_ + 1 < levels_.size() && levels_[coarsest_ + 1].cells >= kCoarsestCells) ++coarsest_;
+      : levels_(part.occupied.levels.data()),
+        distances_(useDistances ? part.distances.data() : nullptr),
+        coarsest_(HashPart::distanceLevel(part.cells())) {
+    if (!useDistances) {
+      coarsest_ = 0;
+      while (coarsest_ + 1 < part.occupied.levels.size() && levels_[coarsest_ + 1].cells >= kCoarsestCells) ++coarsest_;
+    }
     const double toCells = part.cells() / (2.0 * part.halfDomain());
     start_ = loaded(s.start.data(), toCells, part.halfDomain() * toCells);
     direction_ = loaded(s.direction.data(), toCells, 0);
@@ -73,15 +74,15 @@ class Piece {
   // The place at a length, in cells, within the domain.
   HWY_ATTR HWY_INLINE Vec at(float length) const {
     const Tag d;
-    const Vec most = hn::Set(d, static_cast<float>(part_.cells()) * (1 - 6e-8f));
+    const Vec most = hn::Set(d, static_cast<float>(levels_->cells) * (1 - 6e-8f));
     return hn::Min(hn::Max(hn::MulAdd(direction_, hn::Set(d, length), start_), hn::Zero(d)), most);
   }
 
   // The length up to which nothing is; negative where the cell is occupied.
   HWY_ATTR HWY_INLINE float emptyUpTo(const Cell& cell) const {
-    size_t level = useDistances_ ? distanceLevel_ : coarsest_;
-    if (useDistances_) {
-      const uint32_t free = octantDistance(part_.distances[cell.numberIn(levels_[level], level)], octant_);
+    size_t level = coarsest_;
+    if (distances_ != nullptr) {
+      const uint32_t free = octantDistance(distances_[cell.numberIn(levels_[level], level)], octant_);
       if (free > 0) return leaves(cell, level, free);
       if (level == 0) return -1;
       --level;
@@ -109,87 +110,142 @@ class Piece {
     const auto inCells = hn::MulSub(face, hn::Set(d, static_cast<float>(1u << level)), slack);
     alignas(16) float along[4];
     hn::Store(hn::Mul(hn::Sub(inCells, start_), inverse_), d, along);
-    return std::min(std::min(along[0], along[1]), along[2]);
+    return std::max(0.0f, std::min(std::min(along[0], along[1]), along[2]));  // below 0 says that something is there
   }
 
-  const HashPart& part_;
-  const std::vector<OccupancyBits>& levels_;
-  bool useDistances_;
-  size_t distanceLevel_, coarsest_ = 0;
+  const OccupancyBits* levels_ = nullptr;
+  const uint32_t* distances_ = nullptr;  // of levels_[coarsest_]; null: unused
+  size_t coarsest_ = 0;                  // level that is looked into
   uint32_t octant_ = 0;
   Vec start_, direction_, inverse_, up_, sign_;
 };
 
-// A sample that has been found, whose bytes are being fetched.
-struct FoundSample {
-  HashFeatures::Lookup lookup;
-  float length = 0, distance = 0;
-};
+// One ray on its way from sample to sample.
+class Traveller {
+ public:
+  HWY_ATTR Traveller(const HashMarch& march, HashRay& ray)
+      : march_(march), ray_(ray), least_(march.settings.minTransmittance / ray.transmittanceBefore) {
+    length_ = march.step * 2 * part().halfDomain();
+    enter();
+  }
 
-HWY_ATTR void marchHash(const HashMarch& march, ContentComposite& composite, MarchCounts& counts) {
-  const Tag d;
-  const hn::RebindToSigned<Tag> integers;
-  const auto& [features, step, path, settings, transmittanceBefore, evaluated] = march;
-  const HashPart& part = features.part();
-  const OccupancyBits& occupied = part.occupied.levels.front();
-  const double length = step * 2 * part.halfDomain();
-  const float perLength = static_cast<float>(1 / length);
-  const Vec toUnit = hn::Set(d, 1 / static_cast<float>(occupied.cells));
-  FoundSample found[2];
-  int waiting = -1;  // which of them
-  const float least = settings.minTransmittance / transmittanceBefore;
-  const auto seen = [&] { return composite.transmittance >= least; };
-  const auto evaluate = [&](const FoundSample& sample) {
-    float values[HashPart::kFeatures];
-    features.mix(sample.lookup, values);
-    const float opacity = opacityOf(std::exp(std::min(values[0], HashPart::kMostLogDensity)) * sample.length);
-    const float weight = composite.transmittance * opacity;
-    for (uint32_t f = 1; f < HashPart::kFeatures; ++f) composite.values[f - 1] += weight * values[f];
-    composite.depth += weight * sample.distance;
-    composite.transmittance *= 1 - opacity;
-    ++counts.samples;
-  };
-  for (int number = 0; number < path.count && seen(); ++number) {
-    const DomainSegment& s = path.segments[static_cast<size_t>(number)];
-    const Piece piece(part, s, settings.useDistances);
-    const uint64_t steps = static_cast<uint64_t>(std::ceil(std::min(s.length / length, 1e15)));
-    for (uint64_t i = 0; i < steps;) {
-      const double begin = static_cast<double>(i) * length,
-                   end = std::min(s.length, static_cast<double>(i + 1) * length);
-      const double middle = 0.5 * (begin + end);
-      const Vec at = piece.at(static_cast<float>(middle));
-      Cell cell;
-      hn::Store(hn::ConvertTo(integers, at), integers, cell.at);
-      ++counts.steps;
-      if (!settings.skipEmptySpace) {
-        if (!occupied.at(cell.numberIn(occupied, 0))) {
-          ++i;
+  bool seesOn() const { return ray_.composite.transmittance >= least_; }
+
+  // The next sample, whose bytes are then being fetched; false where there is none.
+  HWY_ATTR bool find(MarchCounts& counts) {
+    const Tag d;
+    const hn::RebindToSigned<Tag> integers;
+    const OccupancyBits& occupied = part().occupied.levels.front();
+    const float perLength = static_cast<float>(1 / length_);
+    for (; number_ < ray_.path.count; ++number_, enter()) {
+      const DomainSegment& s = ray_.path.segments[static_cast<size_t>(number_)];
+      while (step_ < steps_) {
+        const double begin = static_cast<double>(step_) * length_;
+        const double end = std::min(s.length, static_cast<double>(step_ + 1) * length_);
+        const double middle = 0.5 * (begin + end);
+        const Vec at = piece_.at(static_cast<float>(middle));
+        Cell cell;
+        hn::Store(hn::ConvertTo(integers, at), integers, cell.at);
+        ++counts.steps;
+        const uint64_t step = step_++;
+        if (!march_.settings.skipEmptySpace) {
+          if (!occupied.at(cell.numberIn(occupied, 0))) continue;
+        } else if (const float empty = piece_.emptyUpTo(cell); empty >= 0) {
+          // The first step whose middle lies there or beyond.
+          const float next = std::ceil(empty * perLength - 0.5f);
+          if (next > static_cast<float>(step_)) step_ = static_cast<uint64_t>(std::min(next, 1e15f));
           continue;
         }
-      } else if (const float empty = piece.emptyUpTo(cell); empty >= 0) {
-        // The first step whose middle lies there or beyond.
-        ++i;
-        const float next = std::ceil(empty * perLength - 0.5f);
-        if (next > static_cast<float>(i)) i = static_cast<uint64_t>(std::min(next, 1e15f));
-        continue;
+        alignas(16) float place[4];
+        hn::Store(hn::Mul(at, hn::Set(d, 1 / static_cast<float>(occupied.cells))), d, place);
+        if (!march_.features.find(place, lookup_)) continue;
+        sampleLength_ = static_cast<float>(std::min(s.distanceBetween(begin, end), HashPart::kLongestStep));
+        sampleDistance_ = static_cast<float>(s.distanceAt(middle));
+        if (ray_.evaluated != nullptr) ray_.evaluated->push_back(static_cast<uint64_t>(number_) << 32 | step);
+        return true;
       }
-      const uint64_t sample = i++;
-      alignas(16) float place[4];
-      hn::Store(hn::Mul(at, toUnit), d, place);
-      FoundSample& now = found[waiting == 0 ? 1 : 0];
-      if (!features.find(place, now.lookup)) continue;
-      now.length = static_cast<float>(std::min(s.distanceBetween(begin, end), HashPart::kLongestStep));
-      now.distance = static_cast<float>(s.distanceAt(middle));
-      // What was found before is mixed while this one's bytes come.
-      if (waiting >= 0) {
-        evaluate(found[waiting]);
-        if (!seen()) return;
+    }
+    return false;
+  }
+
+  const HashFeatures::Lookup& lookup() const { return lookup_; }
+  float sampleLength() const { return sampleLength_; }
+
+  // Adds the sample that was found.
+  HWY_ATTR HWY_INLINE void add(const float features[HashPart::kFeatures], float opacity) {
+    ContentComposite& composite = ray_.composite;
+    const float weight = composite.transmittance * opacity;
+    for (uint32_t f = 1; f < HashPart::kFeatures; ++f) composite.values[f - 1] += weight * features[f];
+    composite.depth += weight * sampleDistance_;
+    composite.transmittance *= 1 - opacity;
+  }
+
+ private:
+  const HashPart& part() const { return march_.features.part(); }
+  HWY_ATTR void enter() {
+    if (number_ >= ray_.path.count) return;
+    const DomainSegment& s = ray_.path.segments[static_cast<size_t>(number_)];
+    piece_ = Piece(part(), s, march_.settings.useDistances);
+    step_ = 0;
+    steps_ = static_cast<uint64_t>(std::ceil(std::min(s.length / length_, 1e15)));
+  }
+
+  const HashMarch& march_;
+  HashRay& ray_;
+  float least_;
+  double length_;  // of a step, in the domain
+  int number_ = 0;
+  Piece piece_;
+  uint64_t step_ = 0, steps_ = 0;
+  HashFeatures::Lookup lookup_;
+  float sampleLength_ = 0, sampleDistance_ = 0;
+};
+
+constexpr size_t kTogether = 8;  // rays
+
+// 1 - exp(-x) where the logarithm of density and the length of a step are these; to a float's digits for small x too.
+HWY_ATTR void opacitiesOf(const float* logDensity, const float* length, float* opacity) {
+  const hn::CappedTag<float, kTogether> d;
+  for (size_t i = 0; i < kTogether; i += hn::Lanes(d)) {
+    const auto density = hn::Exp(d, hn::Min(hn::Load(d, logDensity + i), hn::Set(d, HashPart::kMostLogDensity)));
+    const auto x = hn::Mul(density, hn::Load(d, length + i));
+    const auto small =
+        hn::Mul(x, hn::NegMulAdd(x, hn::NegMulAdd(x, hn::Set(d, 1.0f / 6), hn::Set(d, 0.5f)), hn::Set(d, 1.0f)));
+    const auto large = hn::Sub(hn::Set(d, 1.0f), hn::Exp(d, hn::Neg(x)));
+    hn::Store(hn::IfThenElse(hn::Lt(x, hn::Set(d, 0.01f)), small, large), d, opacity + i);
+  }
+}
+
+HWY_ATTR void marchHash(const HashMarch& march, std::span<HashRay* const> rays, MarchCounts& counts) {
+  alignas(64) float logDensity[kTogether] = {}, length[kTogether] = {}, opacity[kTogether];
+  float features[kTogether][HashPart::kFeatures];
+  for (size_t first = 0; first < rays.size(); first += kTogether) {
+    alignas(64) std::byte room[kTogether][sizeof(Traveller)];
+    Traveller* active[kTogether];
+    size_t count = 0;
+    for (size_t i = first; i < std::min(first + kTogether, rays.size()); ++i) {
+      Traveller* traveller = new (room[i - first]) Traveller(march, *rays[i]);
+      if (traveller->seesOn()) active[count++] = traveller;
+    }
+    while (count > 0) {
+      size_t found = 0;
+      for (size_t i = 0; i < count; ++i) {
+        if (active[i]->find(counts)) active[found++] = active[i];
       }
-      waiting = waiting == 0 ? 1 : 0;
-      if (evaluated != nullptr) evaluated->push_back(static_cast<uint64_t>(number) << 32 | sample);
+      counts.samples += found;
+      for (size_t i = 0; i < found; ++i) {
+        march.features.mix(active[i]->lookup(), features[i]);
+        logDensity[i] = features[i][0];
+        length[i] = active[i]->sampleLength();
+      }
+      opacitiesOf(logDensity, length, opacity);
+      count = 0;
+      for (size_t i = 0; i < found; ++i) {
+        active[i]->add(features[i], opacity[i]);
+        if (active[i]->seesOn()) active[count++] = active[i];
+      }
     }
   }
-  if (waiting >= 0) evaluate(found[waiting]);
 }
 
 }  // namespace tessera::HWY_NAMESPACE
@@ -200,8 +256,8 @@ namespace tessera {
 
 HWY_EXPORT(marchHash);
 
-void HashMarch::run(ContentComposite& composite, MarchCounts& counts) const {
-  HWY_DYNAMIC_DISPATCH(marchHash)(*this, composite, counts);
+void HashMarch::run(std::span<HashRay* const> rays, MarchCounts& counts) const {
+  HWY_DYNAMIC_DISPATCH(marchHash)(*this, rays, counts);
 }
 
 }  // namespace tessera

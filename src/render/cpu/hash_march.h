@@ -7,6 +7,7 @@
 // depend on it.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "render/cpu/hash_features.h"
@@ -15,17 +16,22 @@
 
 namespace tessera {
 
+struct HashRay {
+  DomainPath path;
+  float transmittanceBefore = 1;               // of all other contents in front of this one
+  ContentComposite composite;                  // what lies in front of this part; is gone on with
+  std::vector<uint64_t>* evaluated = nullptr;  // optional: piece << 32 | step of each sample is added
+};
+
+// Of a composite's values, diffuse colour and features are sums before any activation.
 struct HashMarch {
   const HashFeatures& features;
   double step;  // HashContent::step
-  const DomainPath& path;
   MarchSettings settings;
-  float transmittanceBefore = 1;               // of all other contents in front of this one
-  std::vector<uint64_t>* evaluated = nullptr;  // optional: piece << 32 | step of each sample is added
 
-  // Goes on with `composite`, which holds what lies in front of this part. Of its values, diffuse colour and features
-  // are sums before any activation.
-  void run(ContentComposite& composite, MarchCounts& counts) const;
+  // Rays take turns: each finds its next sample and asks for its bytes; then all samples are mixed. So none waits for
+  // memory, and the processor always has several things to do. Rays do not depend on their company.
+  void run(std::span<HashRay* const> rays, MarchCounts& counts) const;
 };
 
 }  // namespace tessera

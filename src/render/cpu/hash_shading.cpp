@@ -35,34 +35,38 @@ HashShading::HashShading(const std::vector<const HashContent*>& contents, const 
   }
 }
 
-void HashShading::begin(const Vec3d& direction) {
-  sums_ = {};
-  direction_ = direction;
-  heaviest_ = 0;
-  heaviestWeight_ = 0;
-}
-
-void HashShading::march(const HashContent& content, const HashPart& part, const SceneRay& ray, const RayRange& range,
-                        ContentComposite& composite, MarchCounts& counts) const {
-  const DomainPath path = partPath(part, ray, range);
-  HashMarch{features_.at(&part), content.step, path, settings_, sums_.transmittance}.run(composite, counts);
-}
-
-void HashShading::add(const ContentComposite& composite, size_t content) {
-  const float weight = sums_.transmittance * (1 - composite.transmittance);
-  if (weight > heaviestWeight_) {
-    heaviestWeight_ = weight;
-    heaviest_ = content;
+void HashShading::march(const HashContent& content, const HashPart& part, std::span<const PartRay> rays,
+                        MarchCounts& counts) {
+  std::array<HashRay*, kRayLanes> all;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    rays_[i].path = partPath(part, *rays[i].ray, rays[i].range);
+    rays_[i].transmittanceBefore = transmittance(rays[i].lane);
+    rays_[i].composite = *rays[i].composite;
+    all[i] = &rays_[i];
   }
-  for (int k = 0; k < ContentComposite::kValues; ++k) sums_.values[k] += sums_.transmittance * composite.values[k];
-  sums_.depth += sums_.transmittance * composite.depth;
-  sums_.transmittance *= composite.transmittance;
+  HashMarch{features_.at(&part), content.step, settings_}.run(std::span(all).first(rays.size()), counts);
+  for (size_t i = 0; i < rays.size(); ++i) *rays[i].composite = rays_[i].composite;
 }
 
-void HashShading::end(DrawnPixel& pixel) {
-  pixel = {{0, 0, 0}, sums_.transmittance, sums_.depth};
-  if (!networks_.empty() && (isWhole_ || sums_.transmittance < 1)) {
-    waiting_.push_back({&pixel, sums_, direction_, heaviest_});
+void HashShading::add(size_t number, const ContentComposite& composite, size_t content) {
+  Lane& lane = lanes_[number];
+  const float weight = lane.sums.transmittance * (1 - composite.transmittance);
+  if (weight > lane.weight) {
+    lane.weight = weight;
+    lane.heaviest = content;
+  }
+  for (int k = 0; k < ContentComposite::kValues; ++k) {
+    lane.sums.values[k] += lane.sums.transmittance * composite.values[k];
+  }
+  lane.sums.depth += lane.sums.transmittance * composite.depth;
+  lane.sums.transmittance *= composite.transmittance;
+}
+
+void HashShading::end(size_t number, DrawnPixel& pixel) {
+  const Lane& lane = lanes_[number];
+  pixel = {{0, 0, 0}, lane.sums.transmittance, lane.sums.depth};
+  if (!networks_.empty() && (isWhole_ || lane.sums.transmittance < 1)) {
+    waiting_.push_back({&pixel, lane.sums, lane.direction, lane.heaviest});
   }
 }
 

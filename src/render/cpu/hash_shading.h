@@ -3,6 +3,8 @@
 // sum is no sum of sigmoids.
 #pragma once
 
+#include <array>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -24,15 +26,20 @@ class HashShading {
 
   HashShading(const std::vector<const HashContent*>& contents, const MarchSettings& settings);
 
-  void begin(const Vec3d& direction);
-  float transmittance() const { return sums_.transmittance; }
-  void march(const HashContent& content, const HashPart& part, const SceneRay& ray, const RayRange& range,
-             ContentComposite& composite, MarchCounts& counts) const;
-  void add(const ContentComposite& composite, size_t content);
-  void end(DrawnPixel& pixel);
+  void begin(size_t lane, const Vec3d& direction) { lanes_[lane] = {{}, direction, 0, 0}; }
+  float transmittance(size_t lane) const { return lanes_[lane].sums.transmittance; }
+  void march(const HashContent& content, const HashPart& part, std::span<const PartRay> rays, MarchCounts& counts);
+  void add(size_t lane, const ContentComposite& composite, size_t content);
+  void end(size_t lane, DrawnPixel& pixel);
   void finish();
 
  private:
+  struct Lane {
+    ContentComposite sums;
+    Vec3d direction = Vec3d::UnitZ();
+    size_t heaviest = 0;  // content
+    float weight = 0;     // its
+  };
   struct Waiting {
     DrawnPixel* pixel;
     ContentComposite sums;
@@ -44,10 +51,8 @@ class HashShading {
   std::unordered_map<const HashPart*, HashFeatures> features_;
   bool isWhole_ = false;
   MarchSettings settings_;
-  ContentComposite sums_;
-  Vec3d direction_ = Vec3d::UnitZ();
-  size_t heaviest_ = 0;
-  float heaviestWeight_ = 0;
+  std::array<Lane, kRayLanes> lanes_;
+  std::array<HashRay, kRayLanes> rays_;  // through one part
   std::vector<Waiting> waiting_;
 };
 

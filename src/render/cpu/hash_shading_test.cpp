@@ -41,9 +41,9 @@ ContentComposite compositeOf(std::span<const Sample> samples) {
 DrawnPixel shade(const std::vector<const HashContent*>& contents, const std::vector<ContentComposite>& composites) {
   HashShading shading(contents, {});
   DrawnPixel pixel;
-  shading.begin(kDirection);
-  for (size_t i = 0; i < composites.size(); ++i) shading.add(composites[i], i);
-  shading.end(pixel);
+  shading.begin(3, kDirection);
+  for (size_t i = 0; i < composites.size(); ++i) shading.add(3, composites[i], i);
+  shading.end(3, pixel);
   shading.finish();
   return pixel;
 }

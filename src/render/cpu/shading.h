@@ -15,13 +15,24 @@ struct DrawnPixel {
   float depth = 0;  // scene units along the ray, premultiplied
 };
 
-// Shading<Content>::Type is made of the contents of a drawing, and is asked for one ray after another:
-//   begin(direction)              a unit vector, scene axes
-//   transmittance()               of what has been added so far
-//   march(content, part, …)       goes on with a content's composite, whose parts in front of this one it holds
-//   add(composite, number)        of a content, front to back; contents have the numbers of their places in the drawing
-//   end(pixel)                    the pixel may get its colour as late as in finish()
-//   finish()                      after a number of rays
+// Rays that are cast together have the numbers of their lanes.
+inline constexpr size_t kRayLanes = 16;
+
+// A ray through one part of a content.
+struct PartRay {
+  size_t lane;
+  const SceneRay* ray;
+  RayRange range;
+  ContentComposite* composite;  // what the content's parts in front of this one hold; is gone on with
+};
+
+// Shading<Content>::Type is made of the contents of a drawing, and is asked for one packet of rays after another:
+//   begin(lane, direction)       a unit vector, scene axes
+//   transmittance(lane)          of what has been added so far
+//   march(content, part, rays, counts)
+//   add(lane, composite, number) of a content, front to back; contents have the numbers of their places in the drawing
+//   end(lane, pixel)             the pixel may get its colour as late as in finish()
+//   finish()                     after a number of packets
 template <class Content>
 struct Shading;
 template <class Content>

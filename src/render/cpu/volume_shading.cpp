@@ -47,14 +47,16 @@ VolumeShading::VolumeShading(const std::vector<const VolumeContent*>& contents, 
   for (const VolumeContent* content : contents) shaders_.emplace_back(content->network);
 }
 
-void VolumeShading::begin(const Vec3d& direction) {
-  ray_ = {};
-  direction_ = encodeDirection(direction);
+void VolumeShading::begin(size_t lane, const Vec3d& direction) {
+  lanes_[lane] = {{}, encodeDirection(direction)};
 }
 
-void VolumeShading::march(const VolumeContent& content, const VolumePart& part, const SceneRay& ray,
-                          const RayRange& range, ContentComposite& composite, MarchCounts& counts) const {
-  VolumeMarch{content, part, volumePath(part, ray, range), settings_, ray_.transmittance}.run(composite, counts);
+void VolumeShading::march(const VolumeContent& content, const VolumePart& part, std::span<const PartRay> rays,
+                          MarchCounts& counts) const {
+  for (const PartRay& ray : rays) {
+    const VolumePath path = volumePath(part, *ray.ray, ray.range);
+    VolumeMarch{content, part, path, settings_, transmittance(ray.lane)}.run(*ray.composite, counts);
+  }
 }
 
 }  // namespace tessera

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "render/cpu/dense_network.h"
@@ -38,19 +39,24 @@ class VolumeShading {
  public:
   VolumeShading(const std::vector<const VolumeContent*>& contents, const MarchSettings& settings);
 
-  void begin(const Vec3d& direction);
-  float transmittance() const { return ray_.transmittance; }
-  void march(const VolumeContent& content, const VolumePart& part, const SceneRay& ray, const RayRange& range,
-             ContentComposite& composite, MarchCounts& counts) const;
-  void add(const ContentComposite& composite, size_t content) { ray_.add(composite, shaders_[content], direction_); }
-  void end(DrawnPixel& pixel) const { pixel = ray_; }
+  void begin(size_t lane, const Vec3d& direction);
+  float transmittance(size_t lane) const { return lanes_[lane].ray.transmittance; }
+  void march(const VolumeContent& content, const VolumePart& part, std::span<const PartRay> rays,
+             MarchCounts& counts) const;
+  void add(size_t lane, const ContentComposite& composite, size_t content) {
+    lanes_[lane].ray.add(composite, shaders_[content], lanes_[lane].direction);
+  }
+  void end(size_t lane, DrawnPixel& pixel) const { pixel = lanes_[lane].ray; }
   void finish() {}
 
  private:
+  struct Lane {
+    BlendedRay ray;
+    std::array<float, 27> direction = {};
+  };
   std::vector<DeferredShader> shaders_;
   MarchSettings settings_;
-  BlendedRay ray_;
-  std::array<float, 27> direction_ = {};
+  std::array<Lane, kRayLanes> lanes_;
 };
 
 template <>

@@ -138,9 +138,10 @@ TEST(BakeHash, MarchesTheVerySameSamplesHoweverEmptySpaceIsPassedOver) {
         ContentComposite composites[3];
         MarchCounts* const counts[3] = {&all, &byCells, &byDistances};
         for (int way = 0; way < 3; ++way) {
-          HashMarch march{features, content.step, path, {way > 0, 0, way == 2}};
-          march.evaluated = &sets[way];
-          march.run(composites[way], *counts[way]);
+          HashRay one{path, 1, {}, &sets[way]};
+          HashRay* const rays[] = {&one};
+          HashMarch{features, content.step, {way > 0, 0, way == 2}}.run(rays, *counts[way]);
+          composites[way] = one.composite;
         }
         ASSERT_EQ(sets[1], sets[0]) << block << " " << ray;
         ASSERT_EQ(sets[2], sets[0]) << block << " " << ray;

@@ -1,0 +1,168 @@
+#include "render/cpu/hash_march.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "render/cpu/part_path.h"
+#include "render/made_hash.h"
+
+namespace tessera {
+namespace {
+
+constexpr uint32_t kCells = 256;  // finer than the grid of distances
+
+HashContent scattered(bool contracted) {
+  HashPart part;
+  part.contracted = contracted;
+  const RandomStream random(2, 2);
+  uint64_t next = 0;
+  makeHash(part, {16, kCells, 0, [&](const Vec3d&) { return random.below(next++, 1000) == 0; }}, smoothFeatures);
+  HashContent content = hashContentOf({part}, madeHashNetwork(1));
+  content.step = 1.0f / 400;
+  return content;
+}
+
+struct Way {
+  MarchCounts counts;
+  std::vector<uint64_t> samples;
+  ContentComposite composite;
+};
+
+Way march(const HashContent& content, const HashFeatures& features, const SceneRay& ray, const RayRange& range,
+          const MarchSettings& settings) {
+  Way way;
+  HashRay one{partPath(content.parts[0], ray, range), 1, {}, &way.samples};
+  HashRay* const rays[] = {&one};
+  HashMarch{features, content.step, settings}.run(rays, way.counts);
+  way.composite = one.composite;
+  return way;
+}
+
+// Rays that begin a hair from a cell's face, or run along an axis, are those whose next face rounding may put behind
+// them.
+TEST(HashMarch, MakesTheVerySameSamplesFromFacesAndAlongAxes) {
+  const RandomStream random(4, 4);
+  size_t samples = 0;
+  MarchCounts all, byCells, byDistances;
+  for (const bool contracted : {false, true}) {
+    const HashContent content = scattered(contracted);
+    const HashFeatures features(content, content.parts[0]);
+    const double half = content.parts[0].halfDomain();
+    for (uint64_t number = 0; number < 3000; ++number) {
+      SceneRay ray;
+      for (uint64_t a = 0; a < 3; ++a) {
+        const auto axis = static_cast<Eigen::Index>(a);
+        const double face = random.below(8 * number + a, kCells) / static_cast<double>(kCells) * 2 * half - half;
+        ray.origin[axis] = std::clamp(face, -0.99, 0.99) + 1e-5 * (random.uniformDouble(8 * number + a + 3) - 0.5);
+        ray.direction[axis] = random.uniformDouble((uint64_t{1} << 40) + 8 * number + a) - 0.5;
+      }
+      if (number % 3 == 0) ray.direction = Vec3d::Unit(static_cast<Eigen::Index>(number / 3 % 3));
+      if (number % 6 == 0) ray.direction = -ray.direction;
+      ray.direction.normalize();
+      const RayRange range = contracted ? RayRange{0, 50} : ownedRange(content.parts[0], ray, RayRange{0, 50});
+      const Way slow = march(content, features, ray, range, {false, 0, false});
+      const Way cells = march(content, features, ray, range, {true, 0, false});
+      const Way fast = march(content, features, ray, range, {true, 0, true});
+      ASSERT_EQ(cells.samples, slow.samples) << number;
+      ASSERT_EQ(fast.samples, slow.samples) << number;
+      ASSERT_EQ(fast.composite.transmittance, slow.composite.transmittance) << number;
+      samples += slow.samples.size();
+      all.steps += slow.counts.steps;
+      byCells.steps += cells.counts.steps;
+      byDistances.steps += fast.counts.steps;
+    }
+  }
+  EXPECT_GT(samples, 1000u);
+  EXPECT_LT(byCells.steps, all.steps / 2);
+  EXPECT_LT(byDistances.steps, byCells.steps / 2);
+}
+
+TEST(HashMarch, OfARayDoesNotDependOnItsCompany) {
+  const HashContent content = scattered(false);
+  const HashFeatures features(content, content.parts[0]);
+  std::vector<HashRay> rays(40);
+  std::vector<HashRay*> all;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    const SceneRay ray{Vec3d(-0.9, 0.04 * static_cast<double>(i) - 0.8, 0.1), Vec3d(1, 0.1, 0.05).normalized()};
+    rays[i].path = partPath(content.parts[0], ray, ownedRange(content.parts[0], ray, {0, 5}));
+    all.push_back(&rays[i]);
+  }
+  std::vector<HashRay> alone = rays;
+  MarchCounts together, apart;
+  const HashMarch march{features, content.step, {}};
+  march.run(all, together);
+  for (HashRay& ray : alone) {
+    HashRay* const one[] = {&ray};
+    march.run(one, apart);
+  }
+  EXPECT_EQ(together.steps, apart.steps);
+  EXPECT_EQ(together.samples, apart.samples);
+  for (size_t i = 0; i < rays.size(); ++i) {
+    EXPECT_EQ(rays[i].composite.transmittance, alone[i].composite.transmittance);
+    EXPECT_EQ(rays[i].composite.depth, alone[i].composite.depth);
+    for (int k = 0; k < 7; ++k) EXPECT_EQ(rays[i].composite.values[k], alone[i].composite.values[k]);
+  }
+}
+
+// By the definition: samples in the middles of steps, mixed and added up in double precision.
+TEST(HashMarch, IsWhatTheDefinitionSays) {
+  HashPart part;
+  makeHash(part, {16, 32, 0.5f}, smoothFeatures);
+  const HashContent content = hashContentOf({part}, madeHashNetwork(1));
+  const HashFeatures features(content, part);
+  const SceneRay ray{Vec3d(-0.7, -0.6, 0.4), Vec3d(1, 0.7, -0.5).normalized()};
+  const RayRange range = ownedRange(part, ray, {0.05, 10});
+  const Way way = march(content, features, ray, range, {true, 0, true});
+  const double length = 2.0 * content.step;
+  double transmittance = 1, sums[8] = {};
+  size_t samples = 0;
+  for (size_t i = 0; static_cast<double>(i) * length < range.far - range.near; ++i) {
+    const double begin = range.near + static_cast<double>(i) * length, end = std::min(begin + length, range.far);
+    const Vec3d at = ray.origin + 0.5 * (begin + end) * ray.direction;
+    const auto corner = [&](size_t x, size_t y, size_t z, size_t column) {
+      const size_t block = x / 8 + 2 * (y / 8 + 2 * (z / 8));
+      return static_cast<double>(part.cornerBytes[16 * (729 * block + x % 8 + 9 * (y % 8 + 9 * (z % 8))) + column]);
+    };
+    double u[3], table[3], values[16] = {}, fine[8] = {};
+    for (int a = 0; a < 3; ++a) {
+      const double p = (at[a] + 1) / 2;
+      u[a] = std::clamp(p * 16 - 0.5, 0.0, 15.0);
+      table[a] = p * 31 + 0.5;
+    }
+    for (size_t k = 0; k < 8; ++k) {
+      double w = 1, v = 1;
+      size_t lower[3];
+      uint32_t point[3];
+      for (size_t a = 0; a < 3; ++a) {
+        const double f = u[a] - std::floor(u[a]), g = table[a] - std::floor(table[a]);
+        const size_t up = k >> a & 1;
+        w *= up ? f : 1 - f;
+        v *= up ? g : 1 - g;
+        lower[a] = std::min<size_t>(static_cast<size_t>(u[a]) + up, 15);
+        point[a] = static_cast<uint32_t>(table[a]) + static_cast<uint32_t>(up);
+      }
+      for (size_t c = 0; c < 16; ++c) values[c] += w * corner(lower[0], lower[1], lower[2], c);
+      const uint32_t entry = (point[0] ^ point[1] * 2654435761u ^ point[2] * 805459861u) % part.tables[0].entries;
+      for (size_t f = 0; f < 8; ++f) fine[f] += v * part.tables[0].bytes[8 * entry + f];
+    }
+    for (size_t c = 0; c < 16; ++c) {
+      values[c] = part.ranges[c].low + (part.ranges[c].high - part.ranges[c].low) / 255.0 * values[c];
+    }
+    for (size_t f = 0; f < 8; ++f) {
+      fine[f] = part.tables[0].ranges[f].low +
+                (part.tables[0].ranges[f].high - part.tables[0].ranges[f].low) / 255.0 * fine[f];
+      values[f] += fine[f] / (1 + std::exp(-values[f == 0 ? 8 : 9]));
+    }
+    const double alpha = 1 - std::exp(-std::exp(std::min(values[0], 15.0)) * (end - begin));
+    for (size_t f = 1; f < 8; ++f) sums[f] += transmittance * alpha * values[f];
+    transmittance *= 1 - alpha;
+    ++samples;
+  }
+  EXPECT_EQ(way.counts.samples, samples);
+  EXPECT_NEAR(way.composite.transmittance, transmittance, 1e-5);
+  for (size_t f = 1; f < 8; ++f) EXPECT_NEAR(way.composite.values[f - 1], sums[f], 1e-4);
+}
+
+}  // namespace
+}  // namespace tessera
