@@ -79,7 +79,7 @@ ablation() {
     for seed in $seeds; do
       for way in attention sum mlp; do
         trained "$capture-$way-$seed" "$capture" --method hash ${blocks[$capture]} ${ways[$way]} --steps "$steps" \
-          --seed "$seed"
+          --seed "$seed" --set level_share=0
         echo "$capture, $way, seed $seed: $(judged "$capture-$way-$seed" "$capture") dB"
       done
     done

@@ -80,6 +80,7 @@ TEST_F(HashCommandLine, GoesFromACityToPicturesAndNumbers) {
   EXPECT_EQ(json::parse(scene.out).at("representation"), "hash");
   EXPECT_EQ(json::parse(scene.out).at("level_0").at("contents"), 2);
   EXPECT_EQ(json::parse(scene.out).at("surround_0").at("contents"), 1);
+  EXPECT_EQ(json::parse(scene.out).at("level_1").at("contents"), 1) << "both blocks, coarser";
   const Said judgedScene = run({"eval", at("scene"), at("city"), "--json", at("scene.json")});
   ASSERT_EQ(judgedScene.exitCode, 0) << judgedScene.err;
   EXPECT_NEAR(json::parse(readTextFile(at("scene.json"))).at("psnr").get<double>(),

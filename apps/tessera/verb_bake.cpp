@@ -11,6 +11,7 @@
 #include "representations/volume/bake_volume.h"
 #include "representations/volume/train_volume.h"
 #include "tiles/hash_payload.h"
+#include "train/level_folders.h"
 #include "train/run_folder.h"
 
 namespace tessera {
@@ -58,7 +59,8 @@ void addBakeVerb(CLI::App& app) {
     const Capture capture =
         readCapture(flags->capture.empty() ? folder.readPlacement().capture.string() : flags->capture);
     requireSameWorld(folder, capture);
-    const uint32_t levels = method == "volume" ? trainedLevels(flags->model) : 1;
+    const uint32_t levels =
+        method == "hash" ? trainedLevels<HashConfig>(flags->model) : trainedLevels<VolumeConfig>(flags->model);
     Progress progress("baking", static_cast<int64_t>(levels * capture.photosIn(Split::train).size()), "photos");
     flags->options.onPhoto = [&](int64_t done, int64_t) { progress.update(done); };
     BakedScene baked;
@@ -74,7 +76,9 @@ void addBakeVerb(CLI::App& app) {
       if (flags->options.cells % HashPart::kOccupancyUnit != 0) {
         throw Error(fmt::format("--cells {}", flags->options.cells), "", "is no multiple of 8", "name one");
       }
-      const HashLevelModels models = [&](uint32_t) { return loadHashModel(*device, flags->model); };
+      const HashLevelModels models = [&](uint32_t level) {
+        return loadHashModel(*device, levelFolder(flags->model, level));
+      };
       baked = bakeHash(models, levels, capture, flags->scene, flags->options);
     } else {
       throw Error(flags->model, "", "is a model of " + method + ", which is not baked",

@@ -337,6 +337,12 @@ HashContent bakeHashGroup(HashModel& model, const std::vector<uint32_t>& blocks,
     content.logits = model.device().read(model.fields().logits().values.all());
   }
   content.step = static_cast<float>(model.stepScale()) * model.config().longestStep();
+  if (content.step < kShortestHashStep || content.step > kLongestHashStep) {
+    throw Error(fmt::format("--set step={}", model.config().step), "",
+                fmt::format("rays take steps of {} of a block, where scenes have {} to {}", content.step,
+                            kShortestHashStep, kLongestHashStep),
+                "train with another one");
+  }
   content.isWhole = model.config().background == "learned";
   content.network = networkOf(model);
   for (const uint32_t block : blocks) content.parts.push_back(bakeHashPart(model, block, seen[block]));

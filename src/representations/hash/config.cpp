@@ -35,6 +35,8 @@ HashConfig HashConfig::ofPreset(const std::string& name) {
 std::vector<ConfigField> HashConfig::fields() {
   return {
       {"preset", "the defaults of all others: cpu, or paper (large graphics cards)", &preset},
+      {"level", "of detail: 0 is the finest; set by training for those above", &level},
+      {"finest_step", "of a coarser level: steps of the finest one when it was made; set by training", &finestStep},
       {"surround",
        "what lies outside the region: own (a block of its own), border (the border blocks'; with one block, as in the "
        "paper), none",
@@ -89,6 +91,10 @@ std::vector<ConfigField> HashConfig::fields() {
       {"depth", "weight of the depth loss, on rays through sparse points", &depth},
       {"depth_tolerance", "of sparse points' distances, relative", &depthTolerance},
       {"known_share", "share of the rays through sparse points, in captures that have some", &knownShare},
+      {"level_share",
+       "steps of the first coarser level of detail, as a share of the finest's, each next one taking twice as many, up "
+       "to the finest's; 0: no coarser levels",
+       &levelShare},
       {"fewest_samples", "with fewer for each ray on average, steps become shorter", &fewestSamples},
       {"shortest_step", "of a ray, relative to the longest", &shortestStep},
       {"step_change", "by which share the length of steps changes from one training step to the next", &stepChange},
@@ -116,6 +122,8 @@ void HashConfig::check() const {
   oneOf("background", background, {"random", "learned"});
   oneOf("aggregation", aggregation, {"attention", "sum", "mlp"});
   oneOf("attention", attention, {"separate", "shared"});
+  requireWithin("level", level, 0, 16);
+  requireWithin("level_share", levelShare, 0, 10);
   requireWithin("near", near, 0, 1);
   requireWithin("lattice", lattice, 8, 1024);
   if (lattice % 8 != 0) {
@@ -129,7 +137,7 @@ void HashConfig::check() const {
   requireOneOf("width", width, {16, 32, 64, 128});
   requireWithin("hidden", hidden, 1, 16);
   requireWithin("levels", levels, 1, static_cast<int>(AttentionShape::kMostLevels));
-  requireWithin("fine_log2_size", fineLog2Size, 3, 26);
+  requireWithin("fine_log2_size", fineLog2Size, 3, 24);
   requireOneOf("direction_width", directionWidth, {16, 32, 64, 128});
   requireWithin("direction_hidden", directionHidden, 1, 16);
   requireWithin("step", step, 0.01, 100);

@@ -13,6 +13,10 @@ struct HashConfig {
   // `cpu`, the defaults below; `paper`, what the paper uses on a large graphics card.
   std::string preset = "cpu";
 
+  // Set by training
+  int level = 0;           // of detail; see train_hash.h
+  int64_t finestStep = 0;  // of a coarser level: the finest one's step when it was made
+
   // Scene
   std::string surround = "own", background = "random";
   double near = 0.05;
@@ -45,6 +49,8 @@ struct HashConfig {
   std::string loss = "huber";
   double lossParameter = 0.1, distortion = 0.01, rampShare = 0, fullGradientDistance = 0.25;
   double depth = 0.03, depthTolerance = 0.01, knownShare = 0.125;
+  // Coarser levels of detail
+  double levelShare = 0.2;
   // The length of steps follows the number of samples that rays have.
   double fewestSamples = 3, shortestStep = 0.2217, stepChange = 1e-3;
   bool exposure = true;

@@ -1,10 +1,13 @@
 #include "representations/hash/train_hash.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "bake/levels.h"
+#include "base/log.h"
 #include "base/memory.h"
 #include "train/known_distances.h"
-#include "train/run_folder.h"
+#include "train/level_folders.h"
 
 namespace tessera {
 namespace {
@@ -41,6 +44,59 @@ double trainingBytesPerBlock(const HashConfig& config) {
          cells * (sizeof(float) + sizeof(uint32_t));
 }
 
+HashConfig levelConfig(HashConfig finest, uint32_t level, int64_t finestStep) {
+  const int by = static_cast<int>(level);
+  finest.level = by;
+  finest.finestStep = finestStep;
+  finest.lattice = std::max(8, (finest.lattice >> by) / 8 * 8);
+  finest.coarseBase = std::min(finest.coarseBase, finest.lattice);
+  finest.levels = std::max(1, finest.levels - by);
+  finest.fineLog2Size = std::max(8, finest.fineLog2Size - 2 * by);
+  finest.occupancyResolution = std::max(16, (finest.occupancyResolution >> by) / 4 * 4);
+  return finest;
+}
+
+namespace {
+
+// What all levels are trained on.
+struct Training {
+  Device& device;
+  const Capture& capture;
+  const BlockGrid& grid;
+};
+
+TrainingResult trainLevel(const ModelFolder& folder, const Training& on, HashConfig config,
+                          const TrainingLoopOptions& loop) {
+  HashTrainer trainer(on.device, on.capture, config, on.grid);
+  if (!folder.manifest()) {
+    writeFileAtomically(folder.configPath(),
+                        howToRepeat(on.device, loop, " --grid blocks.json") + configToToml(config.fields()));
+    folder.writePlacement({{}, on.grid, on.capture.sourceFromWorld, on.capture.root, trainingNames(on.capture)},
+                          loop.method);
+  }
+  return runTraining(trainer, folder, loop);
+}
+
+// `loop.steps` of the level that `config` is for, or those that it had planned when it was begun. True when it is
+// trained to its end.
+bool trainCoarserLevel(const fs::path& model, const Training& on, const HashConfig& config, TrainingLoopOptions loop) {
+  const uint32_t level = static_cast<uint32_t>(config.level);
+  const ModelFolder folder(levelFolder(model, level));
+  if (folder.manifest() && savedConfig<HashConfig>(folder.root()).finestStep != config.finestStep) {
+    fs::remove_all(folder.root());
+  }
+  if (const std::optional<ModelManifest> before = folder.manifest()) {
+    if (before->step >= before->plannedSteps) return true;
+    loop.steps = before->plannedSteps;
+  }
+  const LevelGroups groups =
+      groupsOfLevel(static_cast<uint32_t>(on.grid.columns), static_cast<uint32_t>(on.grid.rows), level, false);
+  inform("level {}: {} blocks in {} tiles, {} steps", level, on.grid.cells(), groups.cells.size(), loop.steps);
+  return trainLevel(folder, on, config, loop).finished;
+}
+
+}  // namespace
+
 TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options) {
   options.config.check();
   refuseCaptureFolder(model);
@@ -55,14 +111,18 @@ TrainingResult trainHash(Device& device, const Capture& capture, const fs::path&
   // A resumed run stands where the killed one stood, whatever has become of the capture's points since.
   const BlockGrid grid = goingOn ? requireGrid(folder) : cutBlocks(capture, model, partitioningFor(capture, options));
   if (goingOn) requireSameBlocks(model / "blocks.json", grid, options.blocks, options.grid);
-  HashTrainer trainer(device, capture, config, grid);
-  if (!goingOn) {
-    writeFileAtomically(folder.configPath(),
-                        howToRepeat(device, options.loop, " --grid blocks.json") + configToToml(config.fields()));
-    folder.writePlacement({{}, grid, capture.sourceFromWorld, capture.root, trainingNames(capture)},
-                          options.loop.method);
+  if (!goingOn) fs::remove_all(model / "levels");  // of a run that is no more
+  TrainingResult result = trainLevel(folder, {device, capture, grid}, config, options.loop);
+  const uint32_t top = topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
+  for (uint32_t level = 1; level <= top && result.finished; ++level) {
+    TrainingLoopOptions loop = options.loop;
+    loop.minutes = 0;
+    loop.resume = true;
+    loop.steps = levelSteps(config.levelShare, level, result.plannedSteps);
+    if (loop.steps < 1) break;
+    result.finished = trainCoarserLevel(model, {device, capture, grid}, levelConfig(config, level, result.step), loop);
   }
-  return runTraining(trainer, folder, options.loop);
+  return result;
 }
 
 }  // namespace tessera

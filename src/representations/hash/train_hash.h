@@ -16,7 +16,13 @@ struct TrainHashOptions {
 
 // Cuts the capture into blocks, or takes those that are given (blocks.json, blocks.svg, blocks.geojson), warns of those
 // that will not come out well, trains, resumes, saves; see training_loop.h. Writes config.toml and blocks.json first.
+// Then coarser levels of detail of the same blocks, up to one whose tiles hold all; where the finest has been trained
+// on since, they are made anew. The result counts the finest level's steps; it is finished when all levels are.
 TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options);
+
+// The settings of a level, from those of the finest: half the lattice, one fine level fewer, and tables of a quarter of
+// the entries for each.
+HashConfig levelConfig(HashConfig finest, uint32_t level, int64_t finestStep);
 
 // What training keeps of one block.
 double trainingBytesPerBlock(const HashConfig& config);

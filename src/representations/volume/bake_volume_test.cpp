@@ -14,6 +14,7 @@
 #include "tiles/read_content.h"
 #include "tiles/scene_folder.h"
 #include "tiles/volume_payload.h"
+#include "train/level_folders.h"
 #include "train/test_support.h"
 
 namespace tessera {
@@ -336,7 +337,7 @@ TEST(BakeVolume, PutsLevelsAboveOneAnother) {
   options.config.levelShare = 0.5;
   options.loop.progress = false;
   trainVolume(*device, scene.capture(), folder / "model", options);
-  ASSERT_EQ(trainedLevels(folder / "model"), 2u);
+  ASSERT_EQ(trainedLevels<VolumeConfig>(folder / "model"), 2u);
   BakeOptions baking;
   baking.stride = 8;
   const BakedScene baked =

@@ -12,6 +12,7 @@
 #include "representations/volume/train_volume.h"
 #include "representations/volume/volume_cube.h"
 #include "tiles/scene_folder.h"
+#include "train/level_folders.h"
 #include "train/picture_rays.h"
 
 namespace tessera {
@@ -243,7 +244,7 @@ TEST(BakeVolume, NeverHasMoreBlocksInMemoryThanItMay) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   train(*device, scene, fourBlocks(), "own");
-  ASSERT_EQ(trainedLevels(scene / "model"), 2u);
+  ASSERT_EQ(trainedLevels<VolumeConfig>(scene / "model"), 2u);
   const auto bake = [&](uint32_t resident, const std::string& to) {
     VolumeModel* model = nullptr;
     std::set<uint32_t> held;

@@ -11,7 +11,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "train/known_distances.h"
-#include "train/run_folder.h"
+#include "train/level_folders.h"
 
 namespace tessera {
 namespace {
@@ -67,32 +67,6 @@ double trainingBytesPerBlock(const VolumeConfig& config) {
   return kPerParameter * static_cast<double>(parameters) + 2.0 * sizeof(uint32_t) * config.virtualGrid().words();
 }
 
-fs::path levelFolder(const fs::path& model, uint32_t level) {
-  return level == 0 ? model : model / "levels" / std::to_string(level);
-}
-
-namespace {
-
-// Else training has gone on since.
-bool isMadeFrom(const fs::path& level, int64_t finestStep) {
-  return savedConfig<VolumeConfig>(level).finestStep == finestStep;
-}
-
-}  // namespace
-
-uint32_t trainedLevels(const fs::path& model) {
-  const std::optional<ModelManifest> finest = ModelFolder(model).manifest();
-  for (uint32_t levels = 1;; ++levels) {
-    const fs::path folder = levelFolder(model, levels);
-    const std::optional<ModelManifest> next = ModelFolder(folder).manifest();
-    if (!finest || !next || next->step < next->plannedSteps) return levels;
-    if (isMadeFrom(folder, finest->step)) continue;
-    warn("{}: made before the model had come to step {}; it is left out until: tessera train ... --resume",
-         folder.string(), finest->step);
-    return levels;
-  }
-}
-
 VolumeConfig levelConfig(VolumeConfig finest, uint32_t level, int64_t finestStep) {
   finest.level = static_cast<int>(level);
   finest.finestStep = finestStep;
@@ -101,11 +75,6 @@ VolumeConfig levelConfig(VolumeConfig finest, uint32_t level, int64_t finestStep
   // Its proposals begin as the finest level's, which pass over the fog that large texels make around surfaces.
   finest.padding = std::max(finest.padding, finest.levelPadding);
   return finest;
-}
-
-int64_t levelSteps(const VolumeConfig& finest, uint32_t level, int64_t finestSteps) {
-  const double share = std::min(1.0, std::ldexp(finest.levelShare, static_cast<int>(level) - 1));
-  return static_cast<int64_t>(std::max(share, finest.levelShare) * static_cast<double>(finestSteps));
 }
 
 namespace {
@@ -175,7 +144,9 @@ void writeRun(const ModelFolder& folder, const Training& on, VolumeConfig config
 bool trainLevel(const fs::path& model, const Training& on, VolumeConfig config, TrainingLoopOptions loop) {
   const uint32_t level = static_cast<uint32_t>(config.level);
   const ModelFolder folder(levelFolder(model, level));
-  if (folder.manifest() && !isMadeFrom(folder.root(), config.finestStep)) fs::remove_all(folder.root());
+  if (folder.manifest() && savedConfig<VolumeConfig>(folder.root()).finestStep != config.finestStep) {
+    fs::remove_all(folder.root());
+  }
   const std::optional<ModelManifest> before = folder.manifest();
   if (before && before->step >= before->plannedSteps) return true;
   loop.minutes = 0;
@@ -220,7 +191,7 @@ TrainingResult trainVolume(Device& device, const Capture& capture, const fs::pat
   }
   const uint32_t top = topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
   for (uint32_t level = 1; level <= top && result.finished; ++level) {
-    options.loop.steps = levelSteps(config, level, result.plannedSteps);
+    options.loop.steps = levelSteps(config.levelShare, level, result.plannedSteps);
     if (options.loop.steps < 1) break;
     result.finished = trainLevel(model, on, levelConfig(config, level, result.step), options.loop);
   }

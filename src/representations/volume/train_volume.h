@@ -23,18 +23,9 @@ struct TrainVolumeOptions {
 // given.
 TrainingResult trainVolume(Device& device, const Capture& capture, const fs::path& model, TrainVolumeOptions options);
 
-// The folder of a level's model: the model's own for the finest, MODEL/levels/<level> for those above.
-fs::path levelFolder(const fs::path& model, uint32_t level);
-// Levels that are trained to their end, without a gap: at least 1, the finest. Warns of one that was made before the
-// finest came to where it is; it counts as not trained.
-uint32_t trainedLevels(const fs::path& model);
 // The settings of a level, from those of the finest: half the resolution for each, and its own padding. Its fields are
 // the same.
 VolumeConfig levelConfig(VolumeConfig finest, uint32_t level, int64_t finestStep);
-// How long it is trained: level_share of the finest's steps for the first, then twice as many each, as the same rays
-// ask for fewer texels; no more than the finest's, or level_share of them.
-int64_t levelSteps(const VolumeConfig& finest, uint32_t level, int64_t finestSteps);
-
 // A trained model for drawing, from its folder: with all blocks in memory, or so many at a time (VolumeModel::bring).
 std::unique_ptr<VolumeModel> loadVolumeModel(Device& device, const fs::path& folder, uint32_t residentBlocks = 0);
 

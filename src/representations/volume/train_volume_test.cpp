@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "representations/volume/volume_cube.h"
+#include "train/level_folders.h"
 #include "train/run_folder.h"
 
 namespace tessera {
@@ -47,12 +48,12 @@ TEST(TrainVolume, MakesCoarserLevelsAndLeavesTheFinestAlone) {
   TrainVolumeOptions finest = options(10);
   finest.config.levelShare = 0;
   trainVolume(*device, scene.capture(), scene / "finest", finest);
-  EXPECT_EQ(trainedLevels(scene / "finest"), 1u);
+  EXPECT_EQ(trainedLevels<VolumeConfig>(scene / "finest"), 1u);
   TrainVolumeOptions all = options(10);
   all.config.levelShare = 0.8;
   EXPECT_TRUE(trainVolume(*device, scene.capture(), scene / "model", all).finished);
   EXPECT_EQ(checkpoints(scene / "model"), checkpoints(scene / "finest"));
-  ASSERT_EQ(trainedLevels(scene / "model"), 2u) << "two blocks, and one that holds both";
+  ASSERT_EQ(trainedLevels<VolumeConfig>(scene / "model"), 2u) << "two blocks, and one that holds both";
   const fs::path coarse = levelFolder(scene / "model", 1);
   EXPECT_EQ(ModelFolder(coarse).manifest()->plannedSteps, 8);
   const std::unique_ptr<VolumeModel> level = loadVolumeModel(*device, coarse);
@@ -66,14 +67,14 @@ TEST(TrainVolume, MakesCoarserLevelsAndLeavesTheFinestAlone) {
 TEST(TrainVolume, GivesEachCoarserLevelTwiceTheStepsUpToTheFinests) {
   VolumeConfig config;
   config.levelShare = 0.3;
-  EXPECT_EQ(levelSteps(config, 1, 1000), 300);
-  EXPECT_EQ(levelSteps(config, 2, 1000), 600);
-  EXPECT_EQ(levelSteps(config, 3, 1000), 1000);
-  EXPECT_EQ(levelSteps(config, 9, 1000), 1000);
+  EXPECT_EQ(levelSteps(config.levelShare, 1, 1000), 300);
+  EXPECT_EQ(levelSteps(config.levelShare, 2, 1000), 600);
+  EXPECT_EQ(levelSteps(config.levelShare, 3, 1000), 1000);
+  EXPECT_EQ(levelSteps(config.levelShare, 9, 1000), 1000);
   config.levelShare = 2;
-  EXPECT_EQ(levelSteps(config, 1, 1000), 2000) << "or as many as are asked for";
+  EXPECT_EQ(levelSteps(config.levelShare, 1, 1000), 2000) << "or as many as are asked for";
   config.levelShare = 0;
-  EXPECT_EQ(levelSteps(config, 2, 1000), 0);
+  EXPECT_EQ(levelSteps(config.levelShare, 2, 1000), 0);
 }
 
 TEST(TrainVolume, TrainsLevelsTooWithBlocksThatWait) {
@@ -89,7 +90,7 @@ TEST(TrainVolume, TrainsLevelsTooWithBlocksThatWait) {
   often.loop.checkpointSeconds = 0;
   trainVolume(*device, scene.capture(), scene / "often", often);
   EXPECT_EQ(checkpoints(scene / "often"), checkpoints(scene / "model"));
-  EXPECT_EQ(trainedLevels(scene / "model"), 2u);
+  EXPECT_EQ(trainedLevels<VolumeConfig>(scene / "model"), 2u);
   for (const uint32_t level : {0u, 1u}) {
     const fs::path folder = levelFolder(scene / "model", level);
     EXPECT_FALSE(fs::exists(folder / "waiting"));
@@ -177,7 +178,7 @@ TEST(TrainVolume, GoesOnWithALevelThatWasStopped) {
   int64_t asked = 0;
   stopped.loop.stopRequested = [&] { return ++asked > 11; };
   EXPECT_FALSE(trainVolume(*device, scene.capture(), scene / "model", stopped).finished);
-  EXPECT_EQ(trainedLevels(scene / "model"), 1u);
+  EXPECT_EQ(trainedLevels<VolumeConfig>(scene / "model"), 1u);
   TrainVolumeOptions resumed = whole;
   resumed.loop.resume = true;
   EXPECT_TRUE(trainVolume(*device, scene.capture(), scene / "model", resumed).finished);
@@ -194,14 +195,14 @@ TEST(TrainVolume, MakesLevelsAnewWhereTheFinestHasGoneOn) {
   };
   const fs::path model = scene / "model";
   trainVolume(*device, scene.capture(), model, trained(8, false));
-  ASSERT_EQ(trainedLevels(model), 2u);
+  ASSERT_EQ(trainedLevels<VolumeConfig>(model), 2u);
   TrainVolumeOptions stopped = trained(12, true);
   int64_t asked = 0;
   stopped.loop.stopRequested = [&] { return ++asked > 2; };
   EXPECT_FALSE(trainVolume(*device, scene.capture(), model, stopped).finished);
-  EXPECT_EQ(trainedLevels(model), 1u) << "made from the model as it was at step 8";
+  EXPECT_EQ(trainedLevels<VolumeConfig>(model), 1u) << "made from the model as it was at step 8";
   EXPECT_TRUE(trainVolume(*device, scene.capture(), model, trained(12, true)).finished);
-  EXPECT_EQ(trainedLevels(model), 2u);
+  EXPECT_EQ(trainedLevels<VolumeConfig>(model), 2u);
   EXPECT_EQ(savedConfig<VolumeConfig>(levelFolder(model, 1)).finestStep, 12);
   EXPECT_EQ(ModelFolder(levelFolder(model, 1)).manifest()->plannedSteps, 6);
 }
