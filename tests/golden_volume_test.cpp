@@ -17,8 +17,8 @@ namespace {
 
 const fs::path kScene = TESSERA_GOLDEN_VOLUME;
 
-golden::Sums sumsFrom(const nlohmann::json& json) {
-  golden::Sums sums;
+golden::VolumeSums sumsFrom(const nlohmann::json& json) {
+  golden::VolumeSums sums;
   sums.stored = json.at("stored");
   sums.firstStored = json.at("firstStored");
   sums.occupied = json.at("occupied");
@@ -86,7 +86,7 @@ TEST(GoldenVolume, IsReadToTheExpectedSums) {
 }
 
 TEST(GoldenVolume, HoldsWhatItWasMadeFrom) {
-  const golden::Scene scene = golden::makeScene();
+  const golden::Scene<VolumeContent> scene = golden::makeVolumeScene();
   const Tileset tileset = readTileset(kScene);
   EXPECT_EQ(tileset.worldFromScene.matrix(), scene.tileset.worldFromScene.matrix());
   EXPECT_EQ(tileset.sourceFromWorld, scene.tileset.sourceFromWorld);
@@ -158,7 +158,7 @@ TEST(GoldenVolume, LooksAlongItsRaysAsTheDefinitionSays) {
 
 // Samples along a vertical line through a building: there is something, and it is where it should be.
 TEST(GoldenVolume, HasOccupiedCellsAtItsRoofs) {
-  const golden::Scene scene = golden::makeScene();
+  const golden::Scene<VolumeContent> scene = golden::makeVolumeScene();
   const VolumePart& part = scene.contents.at("0_0").parts[0];
   const uint32_t cells = part.planes / VolumePart::kDistanceCell;
   const auto at = [&](double x, double y, double z) {  // local, in [-1,1]

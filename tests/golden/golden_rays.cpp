@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/random.h"
+#include "render/cpu/reference_hash.h"
 #include "render/cpu/reference_volume.h"
 
 namespace tessera::golden {
@@ -11,6 +12,22 @@ namespace {
 
 constexpr uint64_t kRaysOfKind = 12, kKinds = 5;
 constexpr double kSceneEnd = TileFrame::kSceneEnd;
+
+// Nothing is applied to the outputs.
+std::vector<double> runNetwork(const std::vector<DenseLayer>& network, std::vector<double> values) {
+  for (size_t layer = 0; layer < network.size(); ++layer) {
+    std::vector<double> outputs;
+    for (uint32_t o = 0; o < network[layer].outputs; ++o) {
+      double sum = network[layer].biases[o];
+      for (uint32_t i = 0; i < network[layer].inputs; ++i) {
+        sum += static_cast<double>(network[layer].weights[size_t{o} * network[layer].inputs + i]) * values[i];
+      }
+      outputs.push_back(layer + 1 < network.size() ? std::max(sum, 0.0) : sum);
+    }
+    values = std::move(outputs);
+  }
+  return values;
+}
 
 // The deferred network, as section 6 has it.
 std::array<double, 3> shade(const std::vector<DenseLayer>& network, const ReferenceComposite& composite,
@@ -25,68 +42,130 @@ std::array<double, 3> shade(const std::vector<DenseLayer>& network, const Refere
       }
     }
   }
-  for (size_t layer = 0; layer < network.size(); ++layer) {
-    std::vector<double> outputs;
-    for (uint32_t o = 0; o < network[layer].outputs; ++o) {
-      double sum = network[layer].biases[o];
-      for (uint32_t i = 0; i < network[layer].inputs; ++i) {
-        sum += network[layer].weights[size_t{o} * network[layer].inputs + i] * values[i];
-      }
-      outputs.push_back(layer + 1 < network.size() ? std::max(sum, 0.0) : 1 / (1 + std::exp(-sum)));
-    }
-    values = std::move(outputs);
-  }
+  values = runNetwork(network, values);
+  for (double& value : values) value = 1 / (1 + std::exp(-value));
   return {values[0], values[1], values[2]};
 }
 
+template <class Part>
 struct Piece {
-  const VolumePart* part;
+  const Part* part;
   RayRange range;
 };
 
-// Adds a content to what the ray has met before it, of which `transmittance` is left.
-void blend(const VolumeContent& content, const std::vector<Piece>& pieces, ExpectedRay& ray, double& transmittance) {
+template <class Content>
+ReferenceComposite compositeOf(const Content& content, const auto& pieces, const ExpectedRay& ray) {
   ReferenceComposite composite;
-  for (const Piece& piece : pieces) {
+  for (const auto& piece : pieces) {
     referenceMarch(content, *piece.part, {ray.origin, ray.direction}, piece.range, composite);
   }
-  if (composite.samples == 0) return;
-  const std::array<double, 3> specular = shade(content.network, composite, ray.direction);
-  for (size_t c = 0; c < 3; ++c) {
-    ray.colour[c] += transmittance * (composite.values[c] + (1 - composite.transmittance) * specular[c]);
-  }
-  ray.distance += transmittance * composite.depth;
-  transmittance *= composite.transmittance;
+  return composite;
 }
 
-void look(const Scene& scene, ExpectedRay& ray) {
+// Volumes: each content is shaded by its own network, and colours are blended.
+class VolumeBlend {
+ public:
+  explicit VolumeBlend(ExpectedRay& ray) : ray_(ray) {}
+  void add(const VolumeContent& content, const ReferenceComposite& composite) {
+    if (composite.samples == 0) return;
+    const std::array<double, 3> specular = shade(content.network, composite, ray_.direction);
+    for (size_t c = 0; c < 3; ++c) {
+      ray_.colour[c] += transmittance_ * (composite.values[c] + (1 - composite.transmittance) * specular[c]);
+    }
+    ray_.distance += transmittance_ * composite.depth;
+    transmittance_ *= composite.transmittance;
+  }
+  void end() { ray_.opacity = 1 - transmittance_; }
+
+ private:
+  ExpectedRay& ray_;
+  double transmittance_ = 1;
+};
+
+// Sums of all contents, and once the network of the one that is seen most.
+class HashBlend {
+ public:
+  explicit HashBlend(ExpectedRay& ray) : ray_(ray) {}
+  void add(const HashContent& content, const ReferenceComposite& composite) {
+    const double weight = sums_.transmittance * (1 - composite.transmittance);
+    if (weight > most_) {
+      most_ = weight;
+      network_ = &content.network;
+    }
+    for (int k = 0; k < 7; ++k) sums_.values[k] += sums_.transmittance * composite.values[k];
+    ray_.distance += sums_.transmittance * composite.depth;
+    sums_.transmittance *= composite.transmittance;
+  }
+  void end() {
+    ray_.opacity = 1 - sums_.transmittance;
+    if (network_ == nullptr) return;
+    std::vector<double> values(sums_.values, sums_.values + 7);
+    for (const double harmonic : harmonics(ray_.direction)) values.push_back(harmonic);
+    values = runNetwork(*network_, values);
+    for (size_t c = 0; c < 3; ++c) ray_.colour[c] = ray_.opacity / (1 + std::exp(-(sums_.values[c] + values[c])));
+  }
+
+ private:
+  // Real spherical harmonics by their formulas, in tiny-cuda-nn's order: by degree l, and in it m from -l to l.
+  static std::vector<double> harmonics(const Vec3d& d) {
+    const double x = d.x(), y = d.y(), z = d.z(), pi = std::acos(-1.0);
+    const double a1 = std::sqrt(3 / (4 * pi)), a2 = std::sqrt(15 / (4 * pi)), a3 = std::sqrt(35 / (32 * pi)),
+                 b3 = std::sqrt(105 / (4 * pi)), c3 = std::sqrt(21 / (32 * pi));
+    return {std::sqrt(1 / (4 * pi)),
+            -a1 * y,
+            a1 * z,
+            -a1 * x,
+            a2 * x * y,
+            -a2 * y * z,
+            std::sqrt(5 / (16 * pi)) * (3 * z * z - 1),
+            -a2 * x * z,
+            a2 / 2 * (x * x - y * y),
+            -a3 * y * (3 * x * x - y * y),
+            b3 * x * y * z,
+            -c3 * y * (5 * z * z - 1),
+            std::sqrt(7 / (16 * pi)) * z * (5 * z * z - 3),
+            -c3 * x * (5 * z * z - 1),
+            b3 / 2 * z * (x * x - y * y),
+            -a3 * x * (x * x - 3 * y * y)};
+  }
+
+  ExpectedRay& ray_;
+  ReferenceComposite sums_;
+  double most_ = 0;
+  const std::vector<DenseLayer>* network_ = nullptr;
+};
+
+template <class Content, class Blend>
+void look(const Scene<Content>& scene, ExpectedRay& ray) {
+  using Part = typename decltype(Content::parts)::value_type;
   const SceneRay along{ray.origin, ray.direction};
   const SceneBox bounds = scene.tileset.box();
   const RayRange box = clipToBox(along, bounds.low, bounds.high, {scene.tileset.near, INFINITY});
   std::vector<std::string> names = {"0_0", "1_0"};  // the camera's cell first
   if (ray.origin.x() >= 0) std::swap(names[0], names[1]);
   if (ray.level == 1) names = {"all"};
-  double transmittance = 1;
+  Blend blend(ray);
   for (const std::string& name : names) {
-    const VolumeContent& content = scene.contents.at(name);
-    std::vector<Piece> pieces;
-    for (const VolumePart& part : content.parts) {
+    const Content& content = scene.contents.at(name);
+    std::vector<Piece<Part>> pieces;
+    for (const Part& part : content.parts) {
       const Vec3d low(part.low[0], part.low[1], part.low[2]), high(part.high[0], part.high[1], part.high[2]);
       const RayRange range = clipToBox(along, low, high, box);
       if (!box.empty() && !range.empty()) pieces.push_back({&part, range});
     }
-    std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) { return a.range.near < b.range.near; });
-    blend(content, pieces, ray, transmittance);
+    std::sort(pieces.begin(), pieces.end(),
+              [](const Piece<Part>& a, const Piece<Part>& b) { return a.range.near < b.range.near; });
+    blend.add(content, compositeOf(content, pieces, ray));
   }
-  const VolumeContent& surround = scene.contents.at(ray.level == 1 ? "coarse_surround" : "surround");
-  blend(surround, {{surround.parts.data(), {box.empty() ? scene.tileset.near : box.far, kSceneEnd}}}, ray,
-        transmittance);
-  ray.opacity = 1 - transmittance;
+  const Content& surround = scene.contents.at(ray.level == 1 ? "coarse_surround" : "surround");
+  const std::vector<Piece<Part>> behind = {
+      {surround.parts.data(), {box.empty() ? scene.tileset.near : box.far, kSceneEnd}}};
+  blend.add(surround, compositeOf(surround, behind, ray));
+  blend.end();
 }
 
-}  // namespace
-
-std::vector<ExpectedRay> makeRays(const Scene& scene) {
+template <class Content, class Blend>
+std::vector<ExpectedRay> raysThrough(const Scene<Content>& scene) {
   const RandomStream random(2024, 70);
   std::vector<ExpectedRay> rays;
   for (uint64_t i = 0; i < kKinds * kRaysOfKind; ++i) {
@@ -123,10 +202,20 @@ std::vector<ExpectedRay> makeRays(const Scene& scene) {
         target[static_cast<Eigen::Index>(i % 3)] = 0;
     }
     ray.direction = (target - ray.origin).normalized();
-    look(scene, ray);
+    look<Content, Blend>(scene, ray);
     rays.push_back(ray);
   }
   return rays;
+}
+
+}  // namespace
+
+std::vector<ExpectedRay> makeRays(const Scene<VolumeContent>& scene) {
+  return raysThrough<VolumeContent, VolumeBlend>(scene);
+}
+
+std::vector<ExpectedRay> makeRays(const Scene<HashContent>& scene) {
+  return raysThrough<HashContent, HashBlend>(scene);
 }
 
 }  // namespace tessera::golden

@@ -1,11 +1,13 @@
-// Rays through the golden scene, and what they come to by the definition (docs/tile-format.md, sections 4 and 6), in
-// double: what renderers in every language are held against.
+// Rays through the golden scenes, and what they come to by the definition (docs/tile-format.md, sections 4, 6 and 7),
+// in double: what renderers in every language are held against.
 #pragma once
 
 #include <array>
 #include <vector>
 
-#include "golden/golden_volume.h"
+#include "golden/golden_landscape.h"
+#include "tiles/hash_content.h"
+#include "tiles/volume_content.h"
 
 namespace tessera::golden {
 
@@ -18,6 +20,7 @@ struct ExpectedRay {
 };
 
 // From outside of the box, from inside, past it, just over what stands in it, and along its axes.
-std::vector<ExpectedRay> makeRays(const Scene& scene);
+std::vector<ExpectedRay> makeRays(const Scene<VolumeContent>& scene);
+std::vector<ExpectedRay> makeRays(const Scene<HashContent>& scene);
 
 }  // namespace tessera::golden

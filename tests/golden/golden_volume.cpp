@@ -4,50 +4,13 @@
 #include <cmath>
 
 #include "base/random.h"
-#include "scene/contraction.h"
 #include "tiles/occupancy_pyramid.h"
 
 namespace tessera::golden {
 namespace {
 
-constexpr uint32_t kColumns = 2, kRows = 1;
-constexpr double kBottom = -0.75, kTop = 0.75;
-
-// Smooth, in [-1,1]: random values at whole numbers, mixed.
-double noise(uint64_t stream, double x, double y) {
-  const double i = std::floor(x), j = std::floor(y);
-  const auto smooth = [](double t) { return t * t * (3 - 2 * t); };
-  const double u = smooth(x - i), v = smooth(y - j);
-  const RandomStream random(2024, stream);
-  const auto at = [&](double a, double b) {
-    const auto index = static_cast<uint64_t>(static_cast<int64_t>(a) + 4096) * 8192 +
-                       static_cast<uint64_t>(static_cast<int64_t>(b) + 4096);
-    return 2 * random.uniformDouble(index) - 1;
-  };
-  return (1 - v) * ((1 - u) * at(i, j) + u * at(i + 1, j)) + v * ((1 - u) * at(i, j + 1) + u * at(i + 1, j + 1));
-}
-
-// The height of what stands at x, y: rolling ground, and one building in each block.
-double heightAt(double x, double y) {
-  const double fromMiddle = std::abs(std::abs(x) - 1);
-  if (fromMiddle < 0.4 && std::abs(y) < 0.3 && std::abs(x) < 2) return x < 0 ? 0.45 : 0.1;
-  return -0.45 + 0.12 * noise(1, 1.5 * x, 1.5 * y);
-}
-
 uint8_t quantised(double value, double range) {
   return static_cast<uint8_t>(std::clamp(std::floor(255 * (value + range) / (2 * range) + 0.5), 0.0, 255.0));
-}
-
-Triple<double> inScene(const VolumePart& part, const Triple<double>& inDomain) {
-  const Triple<double> q = part.contracted ? uncontract(inDomain) : inDomain;
-  return {part.centre[0] + part.scale[0] * q[0], part.centre[1] + part.scale[1] * q[1],
-          part.centre[2] + part.scale[2] * q[2]};
-}
-
-// A texel's coordinate along an axis of the domain.
-double middle(const VolumePart& part, uint32_t index, uint32_t count) {
-  const double h = part.halfDomain();
-  return -h + 2 * h * (index + 0.5) / count;
 }
 
 class PartMaker {
@@ -193,9 +156,7 @@ VolumePart blockPart(uint32_t column, uint32_t voxels, uint32_t planes) {
   VolumePart part;
   part.voxels = voxels;
   part.planes = planes;
-  part.centre = {2.0f * static_cast<float>(column) + 1 - static_cast<float>(kColumns), 0, 0};
-  part.low = {part.centre[0] - 1, -1, static_cast<float>(kBottom)};
-  part.high = {part.centre[0] + 1, 1, static_cast<float>(kTop)};
+  placeBlock(part, column);
   return part;
 }
 
@@ -203,59 +164,15 @@ VolumePart surroundPart(uint32_t voxels, uint32_t planes) {
   VolumePart part;
   part.voxels = voxels;
   part.planes = planes;
-  part.scale = {kColumns, kRows, 1};
-  part.contracted = part.surround = true;
-  part.low = {-1e4f, -1e4f, -1e4f};
-  part.high = {1e4f, 1e4f, 1e4f};
+  placeSurround(part);
   return part;
-}
-
-Tile tileOf(const Tileset& tileset, uint32_t level, const CellRange& cells) {
-  Tile tile;
-  tile.level = level;
-  tile.cells = cells;
-  tile.box = tileset.boxOf(cells);
-  tile.contents.resize(1);
-  tile.contents[0].cells = cells;
-  tile.contents[0].box = tile.box;
-  return tile;
 }
 
 }  // namespace
 
-Scene makeScene() {
-  Scene scene;
-  Tileset& tileset = scene.tileset;
-  tileset.name = "golden";
-  tileset.worldFromScene.rotation << 0.8, -0.6, 0, 0.6, 0.8, 0, 0, 0, 1;
-  tileset.worldFromScene.scale = 25;
-  tileset.worldFromScene.translation = {10, -20, 5};
-  tileset.sourceFromWorld.topLeftCorner<3, 3>() *= 0.5;
-  tileset.sourceFromWorld.topRightCorner<3, 1>() = Vec3d(1, 2, 3);
-  tileset.georeference = GeoFrame{50.8225, -0.1372, 12, Mat4d::Identity()};
-  tileset.columns = kColumns;
-  tileset.rows = kRows;
-  tileset.bottom = kBottom;
-  tileset.top = kTop;
-  tileset.background = {0.5f, 0.625f, 0.75f};
-  tileset.levels = 2;
-  const double texel = 25 * 2.0 / 64;  // metres
-  tileset.geometricError = 100;
-  tileset.tiles = {tileOf(tileset, 1, tileset.allCells()), tileOf(tileset, 0, {{0, 0}, {1, 1}}),
-                   tileOf(tileset, 0, {{1, 0}, {2, 1}})};
-  tileset.tiles[0].geometricError = 2 * texel;
-  tileset.tiles[1].geometricError = tileset.tiles[2].geometricError = texel;
-  tileset.tiles[0].children = {1, 2};
-  TileContent surround;
-  surround.cells = tileset.allCells();
-  surround.surround = true;
-  surround.box = {Vec3d::Constant(-1e4), Vec3d::Constant(1e4)};
-  surround.geometricError = 2 * kColumns * texel;  // where its texels are smallest, as its domain is twice its cube
-  tileset.tiles[0].contents.push_back(surround);
-  surround.level = 1;
-  surround.geometricError *= 2;
-  tileset.tiles[0].contents.push_back(surround);
-
+Scene<VolumeContent> makeVolumeScene() {
+  Scene<VolumeContent> scene;
+  scene.tileset = landscapeTileset(Representation::volume, 64);
   scene.contents["0_0"] = contentOf(1, {blockPart(0, 32, 64)});
   scene.contents["1_0"] = contentOf(2, {blockPart(1, 32, 64)});
   scene.contents["all"] = contentOf(3, {blockPart(0, 16, 32), blockPart(1, 16, 32)});
@@ -266,14 +183,14 @@ Scene makeScene() {
   return scene;
 }
 
-Sums sumsOf(const VolumePart& part) {
+VolumeSums sumsOf(const VolumePart& part) {
   const auto add = [](const std::vector<uint8_t>& bytes, uint64_t& sum, uint64_t& ordered) {
     for (size_t i = 0; i < bytes.size(); ++i) {
       sum += bytes[i];
       ordered += (i % 251 + 1) * bytes[i];
     }
   };
-  Sums sums;
+  VolumeSums sums;
   sums.stored = part.storedMacroblocks();
   const auto first = std::find(part.macroblocks.begin(), part.macroblocks.end(), 0u);
   sums.firstStored = static_cast<uint64_t>(first - part.macroblocks.begin());

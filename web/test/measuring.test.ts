@@ -1,4 +1,4 @@
-// Measuring, as people do it, on the golden scene, whose heights are known (tests/golden/golden_volume.cpp).
+// Measuring, as people do it, on the golden scene, whose heights are known (tests/golden/golden_landscape.cpp).
 import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';

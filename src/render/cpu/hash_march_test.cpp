@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "render/cpu/part_path.h"
+#include "render/cpu/reference_hash.h"
 #include "render/made_hash.h"
 
 namespace tessera {
@@ -105,63 +106,23 @@ TEST(HashMarch, OfARayDoesNotDependOnItsCompany) {
   }
 }
 
-// By the definition: samples in the middles of steps, mixed and added up in double precision.
 TEST(HashMarch, IsWhatTheDefinitionSays) {
-  HashPart part;
-  makeHash(part, {16, 32, 0.5f}, smoothFeatures);
-  const HashContent content = hashContentOf({part}, madeHashNetwork(1));
-  const HashFeatures features(content, part);
-  const SceneRay ray{Vec3d(-0.7, -0.6, 0.4), Vec3d(1, 0.7, -0.5).normalized()};
-  const RayRange range = ownedRange(part, ray, {0.05, 10});
-  const Way way = march(content, features, ray, range, {true, 0, true});
-  const double length = 2.0 * content.step;
-  double transmittance = 1, sums[8] = {};
-  size_t samples = 0;
-  for (size_t i = 0; static_cast<double>(i) * length < range.far - range.near; ++i) {
-    const double begin = range.near + static_cast<double>(i) * length, end = std::min(begin + length, range.far);
-    const Vec3d at = ray.origin + 0.5 * (begin + end) * ray.direction;
-    const auto corner = [&](size_t x, size_t y, size_t z, size_t column) {
-      const size_t block = x / 8 + 2 * (y / 8 + 2 * (z / 8));
-      return static_cast<double>(part.cornerBytes[16 * (729 * block + x % 8 + 9 * (y % 8 + 9 * (z % 8))) + column]);
-    };
-    double u[3], table[3], values[16] = {}, fine[8] = {};
-    for (int a = 0; a < 3; ++a) {
-      const double p = (at[a] + 1) / 2;
-      u[a] = std::clamp(p * 16 - 0.5, 0.0, 15.0);
-      table[a] = p * 31 + 0.5;
-    }
-    for (size_t k = 0; k < 8; ++k) {
-      double w = 1, v = 1;
-      size_t lower[3];
-      uint32_t point[3];
-      for (size_t a = 0; a < 3; ++a) {
-        const double f = u[a] - std::floor(u[a]), g = table[a] - std::floor(table[a]);
-        const size_t up = k >> a & 1;
-        w *= up ? f : 1 - f;
-        v *= up ? g : 1 - g;
-        lower[a] = std::min<size_t>(static_cast<size_t>(u[a]) + up, 15);
-        point[a] = static_cast<uint32_t>(table[a]) + static_cast<uint32_t>(up);
-      }
-      for (size_t c = 0; c < 16; ++c) values[c] += w * corner(lower[0], lower[1], lower[2], c);
-      const uint32_t entry = (point[0] ^ point[1] * 2654435761u ^ point[2] * 805459861u) % part.tables[0].entries;
-      for (size_t f = 0; f < 8; ++f) fine[f] += v * part.tables[0].bytes[8 * entry + f];
-    }
-    for (size_t c = 0; c < 16; ++c) {
-      values[c] = part.ranges[c].low + (part.ranges[c].high - part.ranges[c].low) / 255.0 * values[c];
-    }
-    for (size_t f = 0; f < 8; ++f) {
-      fine[f] = part.tables[0].ranges[f].low +
-                (part.tables[0].ranges[f].high - part.tables[0].ranges[f].low) / 255.0 * fine[f];
-      values[f] += fine[f] / (1 + std::exp(-values[f == 0 ? 8 : 9]));
-    }
-    const double alpha = 1 - std::exp(-std::exp(std::min(values[0], 15.0)) * (end - begin));
-    for (size_t f = 1; f < 8; ++f) sums[f] += transmittance * alpha * values[f];
-    transmittance *= 1 - alpha;
-    ++samples;
+  for (const bool contracted : {false, true}) {
+    HashPart part;
+    part.contracted = contracted;
+    makeHash(part, {16, 32, 0.5f}, smoothFeatures);
+    const HashContent content = hashContentOf({part}, madeHashNetwork(1));
+    const HashFeatures features(content, content.parts[0]);
+    const SceneRay ray{Vec3d(-0.7, -0.6, 0.4), Vec3d(1, 0.7, -0.5).normalized()};
+    const RayRange range = contracted ? RayRange{0.05, 30} : ownedRange(part, ray, {0.05, 10});
+    const Way way = march(content, features, ray, range, {true, 0, true});
+    ReferenceComposite expected;
+    referenceMarch(content, part, ray, range, expected);
+    EXPECT_EQ(way.counts.samples, static_cast<uint64_t>(expected.samples));
+    EXPECT_NEAR(way.composite.transmittance, expected.transmittance, 1e-5);
+    EXPECT_NEAR(way.composite.depth, expected.depth, 1e-4);
+    for (int k = 0; k < 7; ++k) EXPECT_NEAR(way.composite.values[k], expected.values[k], 1e-4);
   }
-  EXPECT_EQ(way.counts.samples, samples);
-  EXPECT_NEAR(way.composite.transmittance, transmittance, 1e-5);
-  for (size_t f = 1; f < 8; ++f) EXPECT_NEAR(way.composite.values[f - 1], sums[f], 1e-4);
 }
 
 }  // namespace

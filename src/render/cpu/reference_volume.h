@@ -1,18 +1,10 @@
-// For tests: one part marched by the definition, in double, slowly: regions of the contraction by looking, places by
-// contracting, lengths by uncontracting, each of the 20 texels by its formula.
+// For tests: one part of a volume marched by the definition, in double, slowly: each of the 20 texels by its formula.
 #pragma once
 
-#include "render/tile_frame.h"
-#include "scene/contraction.h"
+#include "render/cpu/reference_path.h"
 #include "tiles/volume_content.h"
 
 namespace tessera {
-
-struct ReferenceComposite {
-  double values[7] = {};
-  double transmittance = 1, depth = 0;
-  int samples = 0;
-};
 
 // Sums of dequantised attributes at a place of the domain scaled to [0,1]³; false where nothing is stored.
 inline bool referenceSums(const VolumeContent& content, const VolumePart& part, const Triple<double>& p,
@@ -67,79 +59,16 @@ inline bool referenceSums(const VolumeContent& content, const VolumePart& part, 
 
 inline void referenceMarch(const VolumeContent& content, const VolumePart& part, const SceneRay& ray, RayRange range,
                            ReferenceComposite& out) {
-  Triple<double> o, d;
-  for (int a = 0; a < 3; ++a) {
-    o[a] = (ray.origin[a] - part.centre[a]) / part.scale[a];
-    d[a] = ray.direction[a] / part.scale[a];
-  }
-  const auto at = [&](double t) { return Triple<double>{o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]}; };
-  const auto regionAt = [&](double t) {
-    const Triple<double> x = at(t);
-    const int axis = farthestAxis(x);
-    if (!part.contracted || std::abs(x[axis]) <= 1) return 0;
-    return x[axis] > 0 ? axis + 1 : -axis - 1;
-  };
-  // Regions by dense sampling, their ends by bisection. Reciprocal beyond 10, as distances reach far.
-  std::vector<double> ends = {range.near};
-  const int looks = 20000;
-  double previous = range.near;
-  for (int i = 1; i <= looks; ++i) {
-    const double s = static_cast<double>(i) / looks, span = range.far - range.near;
-    const double t = range.near + span * s / (1 + (1 - s) * span / 4);
-    if (part.contracted && regionAt(t) != regionAt(previous)) {
-      double low = previous, high = t;
-      for (int k = 0; k < 80; ++k) {
-        const double middle = 0.5 * (low + high);
-        (regionAt(middle) == regionAt(previous) ? low : high) = middle;
-      }
-      ends.push_back(low);
-      ends.push_back(high);
-    }
-    previous = t;
-  }
-  ends.push_back(range.far);
-  const auto place = [&](double t) { return part.contracted ? contract(at(t)) : at(t); };
-  const double half = part.halfDomain(), texel = 2 * half / part.planes;
-  for (size_t i = 0; i + 1 < ends.size(); i += 2) {
-    const Triple<double> begin = place(ends[i]), end = place(ends[i + 1]);
-    Triple<double> along;
-    double length = 0;
-    for (int a = 0; a < 3; ++a) {
-      along[a] = end[a] - begin[a];
-      length += along[a] * along[a];
-    }
-    length = std::sqrt(length);
-    const auto onPath = [&](double tau) {
-      Triple<double> y;
-      for (int a = 0; a < 3; ++a) y[a] = begin[a] + tau / length * along[a];
-      return y;
-    };
-    const auto distanceAt = [&](double tau) {
-      if (tau >= length) return ends[i + 1];
-      const Triple<double> x = part.contracted ? uncontract(onPath(tau)) : onPath(tau);
-      double dot = 0, square = 0;
-      for (int a = 0; a < 3; ++a) {
-        dot += (x[a] - o[a]) * d[a];
-        square += d[a] * d[a];
-      }
-      return dot / square;
-    };
-    const double stepLength = texel / content.stepsPerTexel;
-    for (int step = 0; step * stepLength < length; ++step) {
-      const double from = step * stepLength, to = std::min(length, from + stepLength), tau = 0.5 * (from + to);
-      const Triple<double> y = onPath(tau);
-      double sums[8];
-      if (!referenceSums(content, part,
-                         {(y[0] + half) / (2 * half), (y[1] + half) / (2 * half), (y[2] + half) / (2 * half)}, sums)) {
-        continue;
-      }
-      ++out.samples;
-      const double alpha = -std::expm1(-std::exp(std::min(sums[0] - 1, 15.0)) * (distanceAt(to) - distanceAt(from)));
-      for (int k = 0; k < 7; ++k) out.values[k] += out.transmittance * alpha / (1 + std::exp(-sums[k + 1]));
-      out.depth += out.transmittance * alpha * distanceAt(tau);
-      out.transmittance *= 1 - alpha;
-    }
-  }
+  const double step = 2.0 * part.halfDomain() / part.planes / content.stepsPerTexel;
+  referenceWalk(part, step, ray, range, [&](const Triple<double>& p, double from, double to, double middle) {
+    double sums[8];
+    if (!referenceSums(content, part, p, sums)) return;
+    ++out.samples;
+    const double alpha = -std::expm1(-std::exp(std::min(sums[0] - 1, 15.0)) * (to - from));
+    for (int k = 0; k < 7; ++k) out.values[k] += out.transmittance * alpha / (1 + std::exp(-sums[k + 1]));
+    out.depth += out.transmittance * alpha * middle;
+    out.transmittance *= 1 - alpha;
+  });
 }
 
 }  // namespace tessera

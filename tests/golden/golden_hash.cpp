@@ -1,0 +1,197 @@
+#include "golden/golden_hash.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "base/random.h"
+#include "tiles/occupancy_distance.h"
+
+namespace tessera::golden {
+namespace {
+
+// The logarithm of density, then seven sums of colours and features.
+std::array<double, 8> featuresAt(const Triple<double>& p) {
+  std::array<double, 8> features;
+  features[0] = std::clamp(-60 * (p[2] - heightAt(p[0], p[1])), -12.0, 6.0);
+  for (uint64_t a = 0; a < 7; ++a) features[a + 1] = 2 * noise(20 + a, 2 * p[0] + p[2], 2 * p[1]);
+  return features;
+}
+
+struct Sizes {
+  uint32_t lattice, cells;
+  std::vector<HashTable> tables;  // without bytes
+};
+
+const Sizes kFine = {32, 32, {{12, 1728, false, {}, {}}, {48, 1024, true, {}, {}}}};
+const Sizes kCoarse = {16, 16, {{24, 512, true, {}, {}}, {32, 512, true, {}, {}}}};
+
+class PartMaker {
+ public:
+  PartMaker(HashPart& part, const Sizes& sizes, uint32_t columns, uint64_t seed)
+      : part_(part), sizes_(sizes), random_(seed, 11) {
+    part_.lattice = sizes.lattice;
+    part_.columns = columns;
+  }
+
+  void make() {
+    makeRanges();
+    makeCorners();
+    makeTables();
+    makeOccupied();
+  }
+
+ private:
+  void makeRanges() {
+    part_.ranges.assign(part_.columns, {-4, 4});
+    part_.ranges[0] = {-12.5f, 6.25f};
+    for (size_t f = 1; f < 8; ++f) part_.ranges[f] = {-2, 2.5f};
+  }
+
+  double logDensity(uint32_t x, uint32_t y, uint32_t z) const {
+    return featuresAt(placeOfTexel(part_, {x, y, z}, part_.lattice))[0];
+  }
+
+  // Whether anything is dense among the corners from `first` to `last` along each axis, clamped.
+  bool isAnythingIn(const Triple<uint32_t>& first, const Triple<uint32_t>& last) const {
+    const uint32_t most = part_.lattice - 1;
+    bool dense = false, hollow = false;
+    for (uint32_t z = first[2]; z <= std::min(last[2], most); ++z) {
+      for (uint32_t y = first[1]; y <= std::min(last[1], most); ++y) {
+        for (uint32_t x = first[0]; x <= std::min(last[0], most); ++x) {
+          dense = dense || logDensity(x, y, z) > -6;
+          hollow = hollow || logDensity(x, y, z) < 3;
+        }
+      }
+    }
+    return dense && (hollow || first[2] == 0);  // what lies deep below is never seen
+  }
+
+  void makeCorners() {
+    constexpr uint32_t kEdge = HashPart::kMacroblock;
+    const uint32_t edge = part_.lattice / kEdge, most = part_.lattice - 1;
+    uint32_t stored = 0;
+    for (uint32_t b = 0; b < edge * edge * edge; ++b) {
+      const Triple<uint32_t> first = {kEdge * (b % edge), kEdge * (b / edge % edge), kEdge * (b / edge / edge)};
+      const bool wanted = isAnythingIn(first, {first[0] + kEdge, first[1] + kEdge, first[2] + kEdge});
+      part_.macroblocks.push_back(wanted ? stored++ : HashPart::kEmpty);
+      for (uint32_t i = 0; wanted && i < HashPart::kStoredTexels; ++i) {
+        const Triple<uint32_t> corner = {std::min(first[0] + i % 9, most), std::min(first[1] + i / 9 % 9, most),
+                                         std::min(first[2] + i / 81, most)};
+        const Triple<double> p = placeOfTexel(part_, corner, part_.lattice);
+        const std::array<double, 8> features = featuresAt(p);
+        for (size_t f = 0; f < 8; ++f) {
+          part_.cornerBytes.push_back(part_.ranges[f].byteOf(static_cast<float>(features[f])));
+        }
+        for (uint64_t c = 8; c < part_.columns; ++c) {
+          const double logit = 3 * noise(60 + c, 3 * p[0] - p[2], 3 * p[1]);
+          part_.cornerBytes.push_back(part_.ranges[c].byteOf(static_cast<float>(logit)));
+        }
+      }
+    }
+  }
+
+  void makeTables() {
+    uint64_t next = 0;
+    for (HashTable table : sizes_.tables) {
+      table.ranges.fill({-1.25f, 1});
+      table.ranges[0] = {-0.5f, 0.75f};
+      for (uint32_t i = 0; i < 8 * table.entries; ++i) {
+        table.bytes.push_back(static_cast<uint8_t>(random_.below(next++, 256)));
+      }
+      part_.tables.push_back(std::move(table));
+    }
+  }
+
+  // A cell may hold something where a corner that is mixed into a sample in it is dense, and not only hidden ones.
+  void makeOccupied() {
+    OccupancyBits occupied(sizes_.cells);
+    const uint32_t side = part_.lattice / sizes_.cells;
+    const auto below = [&](uint32_t index) { return index == 0 ? 0 : side * index - 1; };
+    for (uint32_t z = 0; z < sizes_.cells; ++z) {
+      for (uint32_t y = 0; y < sizes_.cells; ++y) {
+        for (uint32_t x = 0; x < sizes_.cells; ++x) {
+          if (isAnythingIn({below(x), below(y), below(z)}, {side * (x + 1), side * (y + 1), side * (z + 1)})) {
+            occupied.set(occupied.number(x, y, z));
+          }
+        }
+      }
+    }
+    part_.occupied = pyramidFromOccupancy(std::move(occupied));
+    part_.distances = octantDistances(part_.occupied.levels[HashPart::distanceLevel(sizes_.cells)]);
+  }
+
+  HashPart& part_;
+  const Sizes& sizes_;
+  RandomStream random_;
+};
+
+HashContent contentOf(uint64_t seed, LevelWeights weights, bool varies, const Sizes& sizes,
+                      const std::vector<HashPart>& parts) {
+  HashContent content;
+  content.weights = weights;
+  content.step = 1.0f / static_cast<float>(2 * sizes.lattice);
+  const RandomStream random(seed, 7);
+  uint64_t next = 0;
+  for (const auto& [inputs, outputs] : {std::pair{23u, 16u}, {16u, 16u}, {16u, 3u}}) {
+    DenseLayer layer{inputs, outputs, {}, {}};
+    for (uint32_t i = 0; i < inputs * outputs; ++i) layer.weights.push_back(random.uniform(next++) - 0.5f);
+    for (uint32_t i = 0; i < outputs; ++i) layer.biases.push_back(random.uniform(next++) - 0.5f);
+    content.network.push_back(std::move(layer));
+  }
+  for (size_t i = 0; !varies && i < sizes.tables.size() * content.logitsOfLevel(); ++i) {
+    content.logits.push_back(2 * random.uniform(next++) - 1);
+  }
+  content.parts = parts;
+  for (HashPart& part : content.parts) PartMaker(part, sizes, content.columns(), seed).make();
+  return content;
+}
+
+HashPart blockPart(uint32_t column) {
+  HashPart part;
+  placeBlock(part, column);
+  return part;
+}
+
+HashPart surroundPart() {
+  HashPart part;
+  placeSurround(part);
+  return part;
+}
+
+}  // namespace
+
+Scene<HashContent> makeHashScene() {
+  Scene<HashContent> scene;
+  scene.tileset = landscapeTileset(Representation::hash, 64);
+  scene.contents["0_0"] = contentOf(1, LevelWeights::separate, true, kFine, {blockPart(0)});
+  scene.contents["1_0"] = contentOf(2, LevelWeights::shared, true, kFine, {blockPart(1)});
+  scene.contents["all"] = contentOf(3, LevelWeights::separate, false, kCoarse, {blockPart(0), blockPart(1)});
+  scene.contents["surround"] = contentOf(4, LevelWeights::separate, true, kFine, {surroundPart()});
+  scene.contents["coarse_surround"] = contentOf(5, LevelWeights::none, false, kCoarse, {surroundPart()});
+  return scene;
+}
+
+HashSums sumsOf(const HashPart& part) {
+  const auto add = [](const std::vector<uint8_t>& bytes, uint64_t& sum, uint64_t& ordered) {
+    for (size_t i = 0; i < bytes.size(); ++i) {
+      sum += bytes[i];
+      ordered += (i % 251 + 1) * bytes[i];
+    }
+  };
+  HashSums sums;
+  sums.stored = part.storedMacroblocks();
+  const auto first = std::find(part.macroblocks.begin(), part.macroblocks.end(), 0u);
+  sums.firstStored = static_cast<uint64_t>(first - part.macroblocks.begin());
+  for (const uint64_t word : part.occupied.levels[0].words) sums.occupied += static_cast<uint64_t>(std::popcount(word));
+  for (const uint32_t word : part.distances) {
+    for (uint32_t octant = 0; octant < 8; ++octant) sums.distances += octantDistance(word, octant);
+  }
+  add(part.cornerBytes, sums.corners, sums.cornersOrdered);
+  for (const HashTable& table : part.tables) {
+    add(table.bytes, sums.tables.emplace_back(), sums.tablesOrdered.emplace_back());
+  }
+  return sums;
+}
+
+}  // namespace tessera::golden

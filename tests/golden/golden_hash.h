@@ -1,0 +1,21 @@
+// The scene that is committed in tests/golden/hash, as a function. Its blocks differ in what weighs their levels.
+#pragma once
+
+#include "golden/golden_landscape.h"
+#include "tiles/hash_content.h"
+
+namespace tessera::golden {
+
+Scene<HashContent> makeHashScene();
+
+// What every reader has to come to: docs/tile-format.md, section 11.
+struct HashSums {
+  uint64_t stored = 0, firstStored = 0, occupied = 0, distances = 0;
+  uint64_t corners = 0, cornersOrdered = 0;
+  std::vector<uint64_t> tables, tablesOrdered;
+
+  bool operator==(const HashSums&) const = default;
+};
+HashSums sumsOf(const HashPart& part);
+
+}  // namespace tessera::golden
