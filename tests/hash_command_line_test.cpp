@@ -94,7 +94,7 @@ TEST_F(HashCommandLine, GoesFromACityToPicturesAndNumbers) {
   EXPECT_EQ(skipping.at("by_cells").at("samples"), skipping.at("whole").at("samples"));
   EXPECT_EQ(skipping.at("largest_difference"), 0);
   const Said odd = run({"bake", model, at("odd"), "--cells", "12"});
-  EXPECT_EQ(odd.exitCode, 1);
+  EXPECT_EQ(odd.exitCode, 2);
   EXPECT_NE(odd.err.find("multiple of 8"), std::string::npos) << odd.err;
   EXPECT_FALSE(fs::exists(at("odd")));
 }

@@ -35,7 +35,8 @@ void addBakeVerb(CLI::App& app) {
       ->capture_default_str()
       ->check(CLI::Range(1, 64));
   verb->add_option("--resident-blocks", flags->residentBlocks,
-                   "blocks of the model in memory at once, besides a surround of its own; 0: all; default: as many as "
+                   "of volume: blocks of the model in memory at once, besides a surround of its own; 0: all; default: "
+                   "as many as "
                    "in training")
       ->check(CLI::Range(0, 1 << 20));
   verb->add_option("--background", flags->options.background,
@@ -45,7 +46,12 @@ void addBakeVerb(CLI::App& app) {
           "--cells", flags->options.cells,
           "of hash: cells of a block's occupancy along an edge, a multiple of 8; 0: twice the lattice's, or 256")
       ->capture_default_str()
-      ->check(CLI::Range(0u, kMostOccupancyCells));
+      ->check(CLI::Range(0u, kMostOccupancyCells))
+      ->check(CLI::Validator(
+          [](const std::string& text) {
+            return std::stoul(text) % HashPart::kOccupancyUnit == 0 ? "" : text + " is no multiple of 8";
+          },
+          "a multiple of 8"));
   verb->add_option("--dilation", flags->options.dilation, "of hash: cells around those that are seen are kept, too")
       ->capture_default_str()
       ->check(CLI::Range(0, 8));
@@ -55,6 +61,13 @@ void addBakeVerb(CLI::App& app) {
   verb->callback([flags] {
     const ModelFolder folder(flags->model);
     const std::string method = requireManifest(folder).method;
+    if (method != "volume" && method != "hash") {
+      throw Error(flags->model, "", "is a model of " + method + ", which is not baked",
+                  "train with --method volume or hash");
+    }
+    if (method == "hash" && flags->residentBlocks) {
+      throw Error("--resident-blocks", "", "is for models of --method volume", "leave it out");
+    }
     const std::unique_ptr<Device> device = makeDevice(flags->device);
     const Capture capture =
         readCapture(flags->capture.empty() ? folder.readPlacement().capture.string() : flags->capture);
@@ -72,17 +85,11 @@ void addBakeVerb(CLI::App& app) {
       };
       flags->options.minAlpha = config.cullLast;
       baked = bakeVolume(models, levels, capture, flags->scene, flags->options);
-    } else if (method == "hash") {
-      if (flags->options.cells % HashPart::kOccupancyUnit != 0) {
-        throw Error(fmt::format("--cells {}", flags->options.cells), "", "is no multiple of 8", "name one");
-      }
+    } else {
       const HashLevelModels models = [&](uint32_t level) {
         return loadHashModel(*device, levelFolder(flags->model, level));
       };
       baked = bakeHash(models, levels, capture, flags->scene, flags->options);
-    } else {
-      throw Error(flags->model, "", "is a model of " + method + ", which is not baked",
-                  "train with --method volume or hash");
     }
     progress.finish();
     if (flags->json) {

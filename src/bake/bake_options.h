@@ -12,7 +12,8 @@ struct BakeOptions {
   // What training photos see is kept: samples of their pixels whose weight in the picture and whose opacity over a
   // renderer's step are both above these (MERF's).
   double minWeight = 0.005, minAlpha = 0.005;
-  // Of the scene, where no photo looked. Without: a hazy sky; black where training had nothing else behind the photos.
+  // Of the scene, where no photo looked. Without: a hazy sky; of `volume` black where training had nothing else behind
+  // the photos.
   std::optional<std::array<float, 3>> background;
   int stride = 1;  // every so manieth pixel along rows and columns; of each coarser level twice as much
   int effort = 4;  // of compression, 0 to 9

@@ -20,7 +20,7 @@ struct TileNode {
   std::vector<int> children;
   TileCells cells;                                  // what it stands for
   Vec3d low = Vec3d::Zero(), high = Vec3d::Zero();  // box
-  double geometricError = 0;                        // of its content: a texel of the planes
+  double geometricError = 0;                        // of its content: its finest texel
   int level = 0;                                    // 0 is the finest
   bool hasContent = true;                           // without: its children's stand for it; a leaf is empty
   bool isSurround = false;                          // stands for what is outside of its box, the scene's

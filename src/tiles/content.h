@@ -41,7 +41,7 @@ struct ContentPart {
 // What readers allow.
 struct ContentLimits {
   uint64_t fileBytes = uint64_t{1} << 30;
-  uint64_t bytes = uint64_t{1} << 30;  // of the content in memory; decoding takes up to a third more for a moment
+  uint64_t bytes = uint64_t{1} << 30;  // of the content in memory; decoding takes up to two thirds more for a moment
   uint32_t parts = 1024;
 };
 

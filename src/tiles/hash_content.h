@@ -37,6 +37,7 @@ struct HashTable {
 
 struct HashPart : ContentPart {
   static constexpr uint32_t kFeatures = 8;  // logarithm of density, diffuse r g b, 4 features
+  static constexpr uint32_t kMostTables = 8;
   static constexpr float kMostLogDensity = 15;
   static constexpr double kLongestStep = 1e3;    // that counts, scene units: what lies outermost is endlessly long
   static constexpr uint32_t kOccupancyUnit = 8;  // of which cells along an edge are a multiple

@@ -7,7 +7,8 @@
 namespace tessera {
 namespace {
 
-constexpr const char* kRemedy = "train with a lower --set lattice, levels or fine_log2_size";
+constexpr const char* kRemedy =
+    "train with a lower --set lattice, levels or fine_log2_size, or bake with fewer --cells";
 
 class HashWriter : ContentWriter {
  public:

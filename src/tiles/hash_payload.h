@@ -11,8 +11,10 @@
 
 namespace tessera {
 
-inline constexpr uint32_t kMostLattice = 1024, kMostOccupancyCells = 1024;  // along an axis
-inline constexpr uint32_t kMostTables = 8, kMostTableResolution = 1 << 16, kMostTableEntries = 1 << 24;
+// Along an axis; the bits of 1024³ cells are no picture that WebP can hold.
+inline constexpr uint32_t kMostLattice = 1024, kMostOccupancyCells = 1016;
+inline constexpr uint32_t kMostTables = HashPart::kMostTables, kMostTableResolution = 1 << 16,
+                          kMostTableEntries = 1 << 24;
 inline constexpr float kLargestFeature = 1e6f, kLargestLogit = 1e6f;
 inline constexpr float kShortestHashStep = 1.0f / 32768, kLongestHashStep = 0.125f;  // shares of a domain's width
 

@@ -150,6 +150,14 @@ TEST(HashPayload, CountsTheBytesThatItsPartsHold) {
   EXPECT_EQ(hashPartBytes(part, part.storedMacroblocks(), part.cells()), bytes);
 }
 
+TEST(HashPayload, HasPicturesThatWebPCanHoldUpToItsBounds) {
+  const uint64_t cells = kMostOccupancyCells;
+  for (const PictureSize& size : {sizeOfBits(cells * cells * cells), sizeOfList(kMostTableEntries)}) {
+    EXPECT_LE(size.width, static_cast<uint32_t>(kLargestLosslessSide));
+    EXPECT_LE(size.height, static_cast<uint32_t>(kLargestLosslessSide));
+  }
+}
+
 TEST(HashPayload, NamesTheRuleThatIsBroken) {
   const auto names = [](const char* rule, const std::function<void(HashContent&)>& spoil) {
     HashContent content = madeHashContent(2, 2);
@@ -234,7 +242,7 @@ TEST_F(HashRefusal, OfHeadersThatLie) {
   refuses(header, [](json& asset) { part(asset)["lattice"] = 17; });
   refuses(header, [](json& asset) { part(asset)["lattice"] = 2048; });
   refuses(header, [](json& asset) { part(asset)["cells"] = 0; });
-  refuses(header, [](json& asset) { part(asset)["cells"] = 1032; });
+  refuses(header, [](json& asset) { part(asset)["cells"] = 1024; });
   refuses(header, [](json& asset) { part(asset)["ranges"].erase(3); });
   refuses(header, [](json& asset) { part(asset)["ranges"][3] = {1}; });
   refuses(header, [](json& asset) { part(asset)["tables"] = json::array(); });

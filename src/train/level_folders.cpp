@@ -11,6 +11,11 @@ fs::path levelFolder(const fs::path& model, uint32_t level) {
   return level == 0 ? model : model / "levels" / std::to_string(level);
 }
 
+void removeLevel(const fs::path& folder) {
+  fs::remove(folder / "manifest.json");
+  fs::remove_all(folder);
+}
+
 int64_t levelSteps(double share, uint32_t level, int64_t finestSteps) {
   const double ofFinest = std::min(1.0, std::ldexp(share, static_cast<int>(level) - 1));
   return static_cast<int64_t>(std::max(ofFinest, share) * static_cast<double>(finestSteps));

@@ -9,6 +9,9 @@ namespace tessera {
 // The model's own for the finest (0), MODEL/levels/<level> for those above.
 fs::path levelFolder(const fs::path& model, uint32_t level);
 
+// Whatever it holds. Its manifest goes first: killed in between, it is no model that lacks files.
+void removeLevel(const fs::path& folder);
+
 // How long a level is trained: `share` of the finest's steps for the first, then twice as many each, as the same rays
 // ask for fewer texels; no more than the finest's, or `share` of them.
 int64_t levelSteps(double share, uint32_t level, int64_t finestSteps);

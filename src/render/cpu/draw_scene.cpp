@@ -24,7 +24,13 @@ std::vector<const Content*> contentsOf(const SceneDrawing<Content>& drawing) {
   std::vector<const Content*> contents;
   for (const DrawnContent<Content>& drawn : drawing.frontToBack) contents.push_back(drawn.content);
   if (drawing.surround != nullptr) contents.push_back(drawing.surround);
-  return contents;
+  if (drawing.ofNothing != nullptr) contents.push_back(drawing.ofNothing);
+  // A content may be drawn in the cells of several tiles. Each has one number; the last speaks where nothing is met.
+  std::vector<const Content*> once;
+  for (auto content = contents.rbegin(); content != contents.rend(); ++content) {
+    if (std::find(once.begin(), once.end(), *content) == once.end()) once.insert(once.begin(), *content);
+  }
+  return once;
 }
 
 }  // namespace
@@ -32,9 +38,10 @@ std::vector<const Content*> contentsOf(const SceneDrawing<Content>& drawing) {
 template <class Content>
 RayCaster<Content>::RayCaster(const SceneDrawing<Content>& drawing)
     : drawing_(drawing), shading_(contentsOf(drawing), drawing.march) {
-  size_t number = 0;
-  const auto place = [&number](const Content& content) {
-    Placed placed{&content, number++, Vec3d::Constant(INFINITY), Vec3d::Constant(-INFINITY)};
+  const std::vector<const Content*> numbered = contentsOf(drawing);
+  const auto place = [&numbered](const Content& content) {
+    const auto number = std::find(numbered.begin(), numbered.end(), &content) - numbered.begin();
+    Placed placed{&content, static_cast<size_t>(number), Vec3d::Constant(INFINITY), Vec3d::Constant(-INFINITY)};
     for (const Part& part : content.parts) {
       for (int a = 0; a < 3; ++a) {
         placed.low[a] = std::min<double>(placed.low[a], part.low[a]);
@@ -92,7 +99,7 @@ void RayCaster<Content>::castPacket(std::span<const BoundedRay> rays, MarchCount
   for (size_t i = 0; i < rays.size(); ++i) {
     Lane& lane = lanes_[i];
     lane.ray = &rays[i].ray;
-    shading_.begin(i, lane.ray->direction);
+    shading_.begin(i, rays[i]);
     // Nothing is met in front of the box.
     const RayRange box = clipToBox(*lane.ray, frame.low, frame.high, {frame.near, INFINITY});
     lane.whole = {box.empty() ? frame.near : box.near, std::min(rays[i].far, TileFrame::kSceneEnd)};

@@ -33,6 +33,9 @@ struct SceneDrawing {
   // Optional: seen behind the frame's box, or alone by rays that miss it.
   const Content* surround = nullptr;
   MarchSettings march;
+  // Optional, of `hash`: whose network speaks for rays that meet nothing, where contents are whole. Without: the
+  // surround's, or the last one's.
+  const Content* ofNothing = nullptr;
 };
 
 // Which way the pixels of a camera look, in its axes. Asking a lens is dear: kept while the camera stays the same.
@@ -58,12 +61,6 @@ RenderedView drawScene(const SceneDrawing<Content>& drawing, const PixelDirectio
 template <class Content>
 RenderedView drawScene(const SceneDrawing<Content>& drawing, const Camera& camera, const Pose& worldFromCamera,
                        const ImageF* opaqueDepth, ThreadPool& pool, MarchCounts* counts = nullptr);
-
-// A ray that ends at a distance in scene units.
-struct BoundedRay {
-  SceneRay ray;
-  double far = INFINITY;
-};
 
 // Rays through a drawing, which must outlive this. Not for several threads at a time.
 template <class Content>

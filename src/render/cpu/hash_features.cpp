@@ -145,7 +145,8 @@ HWY_ATTR void mixPlace(const HashFeatures::Layout& layout, const HashFeatures::L
     const Eight logits = dequantised(layout.low.data() + 8, layout.step.data() + 8, high);
     Eight ones;
     for (size_t i = 0; i < kVectors; ++i) {
-      ones.v[i] = hn::Div(hn::Set(d, 1.0f), hn::Add(hn::Set(d, 1.0f), hn::Exp(d, hn::Neg(logits.v[i]))));
+      const auto logit = hn::Max(logits.v[i], hn::Set(d, -80.0f));  // beyond, Exp is not defined
+      ones.v[i] = hn::Div(hn::Set(d, 1.0f), hn::Add(hn::Set(d, 1.0f), hn::Exp(d, hn::Neg(logit))));
     }
     store(ones, sigmoids);
     levelWeights = sigmoids;

@@ -14,7 +14,7 @@ class HashFeatures {
  public:
   HashFeatures(const HashContent& content, const HashPart& part);
 
-  static constexpr uint32_t kMostTables = 8;
+  static constexpr uint32_t kMostTables = HashPart::kMostTables;
   // Where a place's bytes lie: to be fetched ahead of being mixed.
   struct Lookup {
     float cornerFraction[3];

@@ -96,7 +96,7 @@ class Piece {
 
  private:
   static constexpr uint32_t kCoarsestCells = 32;  // of the occupancy's levels that are looked into
-  // Finest cells: more than what places are rounded by.
+  // Finest cells: more than what places are rounded by, up to 1024 cells along an edge.
   static constexpr float kSlack = 1e-3f;
 
   // A cube of so many cells of a level along an edge that begins at the cell and lies in the piece's octant.

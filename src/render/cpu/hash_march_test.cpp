@@ -79,6 +79,53 @@ TEST(HashMarch, MakesTheVerySameSamplesFromFacesAndAlongAxes) {
   EXPECT_LT(byDistances.steps, byCells.steps / 2);
 }
 
+TEST(HashMarch, MakesTheVerySameSamplesOfGridsThatAreNoPowersOfTwo) {
+  const RandomStream random(6, 6);
+  for (const uint32_t cells : {24u, 40u, 200u}) {
+    HashPart part;
+    part.contracted = true;
+    uint64_t next = 0;
+    makeHash(part, {24, cells, 0, [&](const Vec3d&) { return random.below(next++, 100) == 0; }}, smoothFeatures);
+    HashContent content = hashContentOf({part}, madeHashNetwork(1));
+    content.step = 1.0f / 300;
+    const HashFeatures features(content, content.parts[0]);
+    size_t samples = 0;
+    for (uint64_t number = 0; number < 500; ++number) {
+      SceneRay ray;
+      for (uint64_t a = 0; a < 3; ++a) {
+        ray.origin[static_cast<Eigen::Index>(a)] = 4 * random.uniformDouble((uint64_t{1} << 40) + 6 * number + a) - 2;
+        ray.direction[static_cast<Eigen::Index>(a)] = random.uniformDouble((uint64_t{1} << 41) + 6 * number + a) - 0.5;
+      }
+      ray.direction.normalize();
+      const Way slow = march(content, features, ray, {0, 1e6}, {false, 0, false});
+      ASSERT_EQ(march(content, features, ray, {0, 1e6}, {true, 0, false}).samples, slow.samples) << cells;
+      ASSERT_EQ(march(content, features, ray, {0, 1e6}, {true, 0, true}).samples, slow.samples) << cells;
+      samples += slow.samples.size();
+    }
+    EXPECT_GT(samples, 500u) << cells;
+  }
+}
+
+// Weights of nothing and of all, wherever they stand.
+TEST(HashFeatures, WeighLevelsByLogitsOfAnySize) {
+  for (const float logit : {-1e6f, -200.0f, -178.0f, -90.0f, 90.0f, 200.0f, 1e6f}) {
+    HashPart part;
+    makeHash(part, {16, 32, 0.5f}, smoothFeatures);
+    for (size_t c = 8; c < 16; ++c) part.ranges[c] = {logit, logit};
+    HashContent varying = hashContentOf({part}, madeHashNetwork(1));
+    HashContent constant = varying;
+    constant.logits = {logit, logit};
+    const HashFeatures a(varying, varying.parts[0]), b(constant, varying.parts[0]);
+    const float place[3] = {0.3f, 0.6f, 0.55f};
+    HashFeatures::Lookup lookup;
+    float one[8], other[8];
+    ASSERT_TRUE(a.find(place, lookup));
+    a.mix(lookup, one);
+    b.mix(lookup, other);
+    for (int f = 0; f < 8; ++f) EXPECT_NEAR(one[f], other[f], 1e-5) << logit;
+  }
+}
+
 TEST(HashMarch, OfARayDoesNotDependOnItsCompany) {
   const HashContent content = scattered(false);
   const HashFeatures features(content, content.parts[0]);

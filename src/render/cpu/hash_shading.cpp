@@ -35,6 +35,14 @@ HashShading::HashShading(const std::vector<const HashContent*>& contents, const 
   }
 }
 
+void HashShading::begin(size_t number, const BoundedRay& ray) {
+  Lane& lane = lanes_[number];
+  lane.sums = {};
+  lane.direction = ray.ray.direction;
+  lane.isOpen = !std::isfinite(ray.far);
+  lane.weights.clear();
+}
+
 void HashShading::march(const HashContent& content, const HashPart& part, std::span<const PartRay> rays,
                         MarchCounts& counts) {
   std::array<HashRay*, kRayLanes> all;
@@ -51,9 +59,12 @@ void HashShading::march(const HashContent& content, const HashPart& part, std::s
 void HashShading::add(size_t number, const ContentComposite& composite, size_t content) {
   Lane& lane = lanes_[number];
   const float weight = lane.sums.transmittance * (1 - composite.transmittance);
-  if (weight > lane.weight) {
-    lane.weight = weight;
-    lane.heaviest = content;
+  const auto known = std::find_if(lane.weights.begin(), lane.weights.end(),
+                                  [content](const auto& one) { return one.first == content; });
+  if (known != lane.weights.end()) {
+    known->second += weight;
+  } else if (weight > 0) {
+    lane.weights.emplace_back(content, weight);
   }
   for (int k = 0; k < ContentComposite::kValues; ++k) {
     lane.sums.values[k] += lane.sums.transmittance * composite.values[k];
@@ -65,9 +76,12 @@ void HashShading::add(size_t number, const ContentComposite& composite, size_t c
 void HashShading::end(size_t number, DrawnPixel& pixel) {
   const Lane& lane = lanes_[number];
   pixel = {{0, 0, 0}, lane.sums.transmittance, lane.sums.depth};
-  if (!networks_.empty() && (isWhole_ || lane.sums.transmittance < 1)) {
-    waiting_.push_back({&pixel, lane.sums, lane.direction, lane.heaviest});
-  }
+  const bool whole = isWhole_ && lane.isOpen;
+  if (networks_.empty() || (!whole && lane.sums.transmittance >= 1)) return;
+  const auto heaviest = std::max_element(lane.weights.begin(), lane.weights.end(),
+                                         [](const auto& a, const auto& b) { return a.second < b.second; });
+  const size_t network = heaviest == lane.weights.end() ? networks_.size() - 1 : heaviest->first;
+  waiting_.push_back({&pixel, lane.sums, lane.direction, network, whole});
 }
 
 void HashShading::finish() {
@@ -94,7 +108,10 @@ void HashShading::finish() {
     for (size_t column = 0; column < count; ++column) {
       const Waiting& ray = waiting_[first + column];
       DrawnPixel& pixel = *ray.pixel;
-      if (isWhole_) pixel.transmittance = 0;
+      if (ray.whole) {
+        pixel.depth /= std::max(1 - pixel.transmittance, 1e-6f);  // of an opaque pixel
+        pixel.transmittance = 0;
+      }
       for (size_t c = 0; c < kOutputs; ++c) {
         const float z = ray.sums.values[c] + values[c * kPacket + column];
         pixel.colour[c] = (1 - pixel.transmittance) / (1 + std::exp(-z));

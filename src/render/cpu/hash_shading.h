@@ -6,6 +6,7 @@
 #include <array>
 #include <span>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "render/cpu/dense_network.h"
@@ -19,14 +20,15 @@ std::array<float, 16> harmonicsOf(const Vec3d& direction);
 
 // C_d = Σ_k T_k C_d^k, F likewise, T_k = Π_{j<k} (1 - α^j). Once a ray, the network of the content whose T_k α^k is
 // largest says z = C_d + ψ(C_d, F, harmonics); the colour is (1 - T) sigmoid(z), or sigmoid(z) and opaque where
-// contents are whole. Networks are run for many rays at a time.
+// contents are whole, unless something else stands at the ray's end. Where nothing is met, the last content's network
+// speaks. Networks are run for many rays at a time.
 class HashShading {
  public:
   static constexpr uint32_t kInputs = 23, kOutputs = 3;
 
   HashShading(const std::vector<const HashContent*>& contents, const MarchSettings& settings);
 
-  void begin(size_t lane, const Vec3d& direction) { lanes_[lane] = {{}, direction, 0, 0}; }
+  void begin(size_t lane, const BoundedRay& ray);
   float transmittance(size_t lane) const { return lanes_[lane].sums.transmittance; }
   void march(const HashContent& content, const HashPart& part, std::span<const PartRay> rays, MarchCounts& counts);
   void add(size_t lane, const ContentComposite& composite, size_t content);
@@ -37,14 +39,15 @@ class HashShading {
   struct Lane {
     ContentComposite sums;
     Vec3d direction = Vec3d::UnitZ();
-    size_t heaviest = 0;  // content
-    float weight = 0;     // its
+    bool isOpen = true;                             // nothing else is known to be at its end
+    std::vector<std::pair<size_t, float>> weights;  // of contents that have been met
   };
   struct Waiting {
     DrawnPixel* pixel;
     ContentComposite sums;
     Vec3d direction;
     size_t network;
+    bool whole;
   };
 
   std::vector<DenseNetwork> networks_;

@@ -38,11 +38,12 @@ ContentComposite compositeOf(std::span<const Sample> samples) {
   return composite;
 }
 
-DrawnPixel shade(const std::vector<const HashContent*>& contents, const std::vector<ContentComposite>& composites) {
+DrawnPixel shade(const std::vector<const HashContent*>& contents, const std::vector<ContentComposite>& composites,
+                 double far = INFINITY, std::vector<size_t> numbers = {}) {
   HashShading shading(contents, {});
   DrawnPixel pixel;
-  shading.begin(3, kDirection);
-  for (size_t i = 0; i < composites.size(); ++i) shading.add(3, composites[i], i);
+  shading.begin(3, {{Vec3d::Zero(), kDirection}, far});
+  for (size_t i = 0; i < composites.size(); ++i) shading.add(3, composites[i], numbers.empty() ? i : numbers[i]);
   shading.end(3, pixel);
   shading.finish();
   return pixel;
@@ -119,6 +120,42 @@ TEST(HashShading, OfNothingInAWholeSceneIsWhatTheNetworkSaysOfTheDirection) {
   std::copy(harmonics.begin(), harmonics.end(), values + 7);
   DenseNetwork(content.network, 23, 3).run(values);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(pixel.colour[c], 1 / (1 + std::exp(-values[c])), 1e-6);
+}
+
+TEST(HashShading, OfAWholeSceneLetsWhatStandsInItBeSeen) {
+  const std::vector<Sample> samples = randomSamples(5);
+  HashContent part, whole;
+  part.network = whole.network = madeHashNetwork(1);
+  whole.isWhole = true;
+  const ContentComposite thin = compositeOf(samples);
+  ASSERT_GT(thin.transmittance, 0.2f);
+  expectNear(shade({&whole}, {thin}, 7), shade({&part}, {thin}, 7), 1e-6);
+  const DrawnPixel open = shade({&whole}, {thin}), closed = shade({&part}, {thin});
+  EXPECT_EQ(open.transmittance, 0);
+  EXPECT_NEAR(open.depth, closed.depth / (1 - closed.transmittance), 1e-4) << "of an opaque pixel";
+  for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(open.colour[c], closed.colour[c] / (1 - closed.transmittance), 1e-5);
+}
+
+TEST(HashShading, OfNothingInAWholeSceneIsWhatItsLastContentSays) {
+  HashContent near, far;
+  near.isWhole = far.isWhole = true;
+  near.network = madeHashNetwork(1);
+  far.network = madeHashNetwork(2);
+  expectNear(shade({&near, &far}, {}), shade({&far}, {}), 0);
+}
+
+TEST(HashShading, AddsUpWhatOneContentShowsInSeveralTiles) {
+  const std::vector<Sample> samples = randomSamples(9);
+  const std::span<const Sample> all(samples);
+  HashContent one, other;
+  one.network = madeHashNetwork(1);
+  other.network = madeHashNetwork(2);
+  const std::vector<ContentComposite> pieces = {compositeOf(all.first(3)), compositeOf(all.subspan(3, 4)),
+                                                compositeOf(all.subspan(7))};
+  const float first = 1 - pieces[0].transmittance, second = pieces[0].transmittance * (1 - pieces[1].transmittance),
+              third = pieces[0].transmittance * pieces[1].transmittance * (1 - pieces[2].transmittance);
+  ASSERT_GT(first + third, second);
+  expectNear(shade({&one, &other}, pieces, INFINITY, {0, 1, 0}), shade({&one, &one, &one}, pieces), 1e-6);
 }
 
 TEST(HashShading, TakesTheNetworkOfTheContentThatIsSeenMost) {

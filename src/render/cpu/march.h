@@ -13,7 +13,7 @@ struct MarchSettings {
 
 // Adds up over calls.
 struct MarchCounts {
-  uint64_t steps = 0;    // places where the distance grid was read
+  uint64_t steps = 0;    // places that were looked at
   uint64_t samples = 0;  // of them evaluated
 };
 

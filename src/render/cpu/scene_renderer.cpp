@@ -46,6 +46,9 @@ RenderedView SceneRenderer<Content>::render(const Camera& camera, const Pose& wo
     drawn.high = cells.high;
   }
   if (cut_.surround >= 0) drawing.surround = cache_.find(cut_.surround);
+  if (const std::vector<int> coarsest = tree_.coarsest(); drawing.surround == nullptr && !coarsest.empty()) {
+    drawing.ofNothing = cache_.find(coarsest.front());  // always there, whatever is in view
+  }
   directions_.update(camera, pool_);
   return drawScene(drawing, directions_, worldFromCamera, opaqueDepth, pool_, &counts_);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 
 #include "render/cpu/march.h"
 #include "render/cpu/part_path.h"
@@ -13,6 +14,12 @@ struct DrawnPixel {
   std::array<float, 3> colour = {0, 0, 0};  // premultiplied
   float transmittance = 1;
   float depth = 0;  // scene units along the ray, premultiplied
+};
+
+// A ray that ends at a distance in scene units, where something else stands if it is finite.
+struct BoundedRay {
+  SceneRay ray;
+  double far = INFINITY;
 };
 
 // Rays that are cast together have the numbers of their lanes.
@@ -27,7 +34,7 @@ struct PartRay {
 };
 
 // Shading<Content>::Type is made of the contents of a drawing, and is asked for one packet of rays after another:
-//   begin(lane, direction)       a unit vector, scene axes
+//   begin(lane, ray)             whether something else is known to be at its end
 //   transmittance(lane)          of what has been added so far
 //   march(content, part, rays, counts)
 //   add(lane, composite, number) of a content, front to back; contents have the numbers of their places in the drawing

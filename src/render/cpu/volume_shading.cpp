@@ -47,8 +47,8 @@ VolumeShading::VolumeShading(const std::vector<const VolumeContent*>& contents, 
   for (const VolumeContent* content : contents) shaders_.emplace_back(content->network);
 }
 
-void VolumeShading::begin(size_t lane, const Vec3d& direction) {
-  lanes_[lane] = {{}, encodeDirection(direction)};
+void VolumeShading::begin(size_t lane, const BoundedRay& ray) {
+  lanes_[lane] = {{}, encodeDirection(ray.ray.direction)};
 }
 
 void VolumeShading::march(const VolumeContent& content, const VolumePart& part, std::span<const PartRay> rays,

@@ -39,7 +39,7 @@ class VolumeShading {
  public:
   VolumeShading(const std::vector<const VolumeContent*>& contents, const MarchSettings& settings);
 
-  void begin(size_t lane, const Vec3d& direction);
+  void begin(size_t lane, const BoundedRay& ray);
   float transmittance(size_t lane) const { return lanes_[lane].ray.transmittance; }
   void march(const VolumeContent& content, const VolumePart& part, std::span<const PartRay> rays,
              MarchCounts& counts) const;

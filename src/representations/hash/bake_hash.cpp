@@ -20,7 +20,7 @@ namespace {
 
 constexpr uint32_t kRays = 2048, kSamples = 1 << 16;  // of one piece of a photo
 static_assert(kSamples >= HashModel::kMostSteps);
-constexpr float kMinTransmittance = 2e-3f;  // as pictures are drawn
+constexpr float kMinTransmittance = 2e-3f;  // the paper's
 constexpr uint32_t kTexels = 1 << 16;       // evaluated together
 // Of a block's occupancy along an edge, unless the lattice is finer. The finer, the fewer samples: half the size takes
 // three of ten away.
@@ -140,10 +140,12 @@ std::vector<bool> macroblocksOf(const OccupancyBits& seen, uint32_t lattice) {
     const size_t n = seen.cells;
     const double low[3] = {static_cast<double>(number % n), static_cast<double>(number / n % n),
                            static_cast<double>(number / n / n)};
-    for (uint32_t z = blockOf(low[2]); z <= blockOf(low[2] + 1); ++z) {
-      for (uint32_t y = blockOf(low[1]); y <= blockOf(low[1] + 1); ++y) {
-        for (uint32_t x = blockOf(low[0]); x <= blockOf(low[0] + 1); ++x)
-          wanted[x + blocks * (y + size_t{blocks} * z)] = true;
+    constexpr double kMargin = 1e-3;  // for the rounding of floats
+    const auto first = [&](int a) { return blockOf(low[a] - kMargin); };
+    const auto last = [&](int a) { return blockOf(low[a] + 1 + kMargin); };
+    for (uint32_t z = first(2); z <= last(2); ++z) {
+      for (uint32_t y = first(1); y <= last(1); ++y) {
+        for (uint32_t x = first(0); x <= last(0); ++x) wanted[x + blocks * (y + size_t{blocks} * z)] = true;
       }
     }
   }
@@ -290,7 +292,9 @@ std::vector<DenseLayer> networkOf(HashModel& model) {
 
 std::vector<OccupancyBits> findSeenCells(HashModel& model, const Capture& capture, const BakeHashOptions& options) {
   const uint32_t lattice = model.fields().lattice().voxels;
-  const uint32_t cells = options.cells > 0 ? options.cells : std::max(lattice, std::min(2 * lattice, kMostCells));
+  const uint32_t cells = options.cells > 0
+                             ? options.cells
+                             : std::min(std::max(lattice, std::min(2 * lattice, kMostCells)), kMostOccupancyCells);
   std::vector<OccupancyBits> seen(model.space().blocks(), OccupancyBits(cells));
   SeenFinder finder(model, capture, options, seen);
   const std::vector<int> photos = capture.photosIn(Split::train);

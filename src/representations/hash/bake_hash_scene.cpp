@@ -1,4 +1,5 @@
 // Models of all levels to a tree of tiles on disk.
+#include <algorithm>
 #include <optional>
 
 #include "representations/hash/bake_hash.h"
@@ -40,6 +41,10 @@ BakedScene bakeHash(const HashLevelModels& models, uint32_t levels, const Captur
     BakeHashOptions ofLevel = options;
     ofLevel.onPhoto = [&](int64_t done, int64_t) { options.onPhoto(level * photos + done, levels * photos); };
     ofLevel.stride <<= level;
+    if (options.cells > 0) {
+      ofLevel.cells = std::max(HashPart::kOccupancyUnit,
+                               (options.cells >> level) / HashPart::kOccupancyUnit * HashPart::kOccupancyUnit);
+    }
     const std::unique_ptr<HashModel> model = models(level);
     if (level == 0) {
       scene.emplace(folder, capture, model->grid(),

@@ -1,11 +1,15 @@
 #include "representations/hash/train_hash.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "bake/levels.h"
+#include "base/error.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "tiles/hash_payload.h"
 #include "train/known_distances.h"
 #include "train/level_folders.h"
 
@@ -51,12 +55,24 @@ HashConfig levelConfig(HashConfig finest, uint32_t level, int64_t finestStep) {
   finest.lattice = std::max(8, (finest.lattice >> by) / 8 * 8);
   finest.coarseBase = std::min(finest.coarseBase, finest.lattice);
   finest.levels = std::max(1, finest.levels - by);
-  finest.fineLog2Size = std::max(8, finest.fineLog2Size - 2 * by);
-  finest.occupancyResolution = std::max(16, (finest.occupancyResolution >> by) / 4 * 4);
+  finest.fineLog2Size = std::min(finest.fineLog2Size, std::max(8, finest.fineLog2Size - 2 * by));
+  finest.occupancyResolution =
+      std::min(finest.occupancyResolution, std::max(16, (finest.occupancyResolution >> by) / 4 * 4));
   return finest;
 }
 
 namespace {
+
+// Throws Error where a level could not be baked, before anything is trained.
+void requireStepsOfScenes(const HashConfig& config) {
+  const double longest = config.longestStep(), shortest = config.shortestStep * longest;
+  if (longest <= kLongestHashStep && shortest >= kShortestHashStep) return;
+  throw Error(fmt::format("--set step={}", config.step), "",
+              fmt::format("at level {}, with {} corners along an edge, rays take steps of {:.3g} to {:.3g} of a block, "
+                          "where scenes have {:.3g} to {:.3g}",
+                          config.level, config.lattice, shortest, longest, kShortestHashStep, kLongestHashStep),
+              "use another one, or level_share=0");
+}
 
 // What all levels are trained on.
 struct Training {
@@ -83,7 +99,7 @@ bool trainCoarserLevel(const fs::path& model, const Training& on, const HashConf
   const uint32_t level = static_cast<uint32_t>(config.level);
   const ModelFolder folder(levelFolder(model, level));
   if (folder.manifest() && savedConfig<HashConfig>(folder.root()).finestStep != config.finestStep) {
-    fs::remove_all(folder.root());
+    removeLevel(folder.root());
   }
   if (const std::optional<ModelManifest> before = folder.manifest()) {
     if (before->step >= before->plannedSteps) return true;
@@ -111,9 +127,11 @@ TrainingResult trainHash(Device& device, const Capture& capture, const fs::path&
   // A resumed run stands where the killed one stood, whatever has become of the capture's points since.
   const BlockGrid grid = goingOn ? requireGrid(folder) : cutBlocks(capture, model, partitioningFor(capture, options));
   if (goingOn) requireSameBlocks(model / "blocks.json", grid, options.blocks, options.grid);
+  const uint32_t top =
+      config.levelShare > 0 ? topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows)) : 0;
+  for (uint32_t level = 0; level <= top; ++level) requireStepsOfScenes(levelConfig(config, level, 0));
   if (!goingOn) fs::remove_all(model / "levels");  // of a run that is no more
   TrainingResult result = trainLevel(folder, {device, capture, grid}, config, options.loop);
-  const uint32_t top = topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
   for (uint32_t level = 1; level <= top && result.finished; ++level) {
     TrainingLoopOptions loop = options.loop;
     loop.minutes = 0;

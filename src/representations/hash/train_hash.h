@@ -21,7 +21,7 @@ struct TrainHashOptions {
 TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options);
 
 // The settings of a level, from those of the finest: half the lattice, one fine level fewer, and tables of a quarter of
-// the entries for each.
+// the entries for each, as far as there is anything left to take away.
 HashConfig levelConfig(HashConfig finest, uint32_t level, int64_t finestStep);
 
 // What training keeps of one block.

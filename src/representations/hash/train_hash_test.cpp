@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/error.h"
 #include "render/cpu/scene_renderer.h"
 #include "render/tile_scene.h"
 #include "representations/hash/bake_hash.h"
@@ -94,6 +95,28 @@ TEST_F(HashTraining, MakesCoarserLevelsAnewWhenTheFinestHasGoneOn) {
   train(options(40, true));
   EXPECT_EQ(trainedLevels<HashConfig>(model), 2u);
   EXPECT_EQ(savedConfig<HashConfig>(levelFolder(model, 1)).finestStep, 40);
+}
+
+// Killed while a level was being made, or taken away.
+TEST_F(HashTraining, MakesALevelThatIsNotWhole) {
+  train(options(20));
+  const fs::path level = levelFolder(scene_ / "model", 1);
+  const Bytes unbroken = readFile(level / ModelFolder(level).manifest()->files[0]);
+  fs::remove(level / "manifest.json");
+  fs::remove_all(level / "blocks");
+  EXPECT_EQ(trainedLevels<HashConfig>(scene_ / "model"), 1u);
+  train(options(20, true));
+  ASSERT_EQ(trainedLevels<HashConfig>(scene_ / "model"), 2u);
+  EXPECT_EQ(readFile(level / ModelFolder(level).manifest()->files[0]), unbroken);
+}
+
+TEST_F(HashTraining, RefusesStepsThatNoSceneHasBeforeItTrains) {
+  TrainHashOptions wide = options(20);
+  wide.config.step = 3;  // of 32 corners; of 16 too long
+  EXPECT_THROW(train(wide), Error);
+  EXPECT_FALSE(fs::exists(scene_ / "model" / "manifest.json"));
+  wide.config.levelShare = 0;
+  train(wide);
 }
 
 TEST_F(HashTraining, LeavesCoarserLevelsOutWhereNoneAreWanted) {

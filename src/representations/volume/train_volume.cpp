@@ -145,7 +145,7 @@ bool trainLevel(const fs::path& model, const Training& on, VolumeConfig config, 
   const uint32_t level = static_cast<uint32_t>(config.level);
   const ModelFolder folder(levelFolder(model, level));
   if (folder.manifest() && savedConfig<VolumeConfig>(folder.root()).finestStep != config.finestStep) {
-    fs::remove_all(folder.root());
+    removeLevel(folder.root());
   }
   const std::optional<ModelManifest> before = folder.manifest();
   if (before && before->step >= before->plannedSteps) return true;
