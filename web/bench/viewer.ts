@@ -1,15 +1,15 @@
 // The viewer in a browser, measured: bench/viewer.sh. Each row prints its figures, and fails where a bound is missed.
-import { mkdtempSync, readdirSync, readFileSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import { mkdtempSync, readdirSync, rmSync, statSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Plain } from '../src/plain';
-import { decodeTileset } from '../src/tiles/decode-tileset';
 import { countCardMemory, type CardMemory } from '../test/card-memory';
-import { launch, run, serve, type Server } from '../test/machine';
-import { cameraPath, capturedViews, decodePng, psnr } from '../test/pictures';
+import { launch, serve, type Server } from '../test/machine';
+import { capturedViews } from '../test/pictures';
 import { kWidth, viewAt } from '../test/views';
+import { againstOracle, tell, tilesetOf } from './against-oracle';
 import { placesOfDepth } from './true-depth';
 import { needed, verdict } from './verdict';
 
@@ -25,10 +25,6 @@ const kNetworks = [
   { name: '500 Mbit/s, 10 ms', megabits: 500, latency: 10 },
   { name: '20 Mbit/s, 60 ms, as of a telephone', megabits: 20, latency: 60 },
 ];
-
-function tilesetOf(scene: string) {
-  return decodeTileset(readFileSync(join(scene, 'tileset.json'), 'utf8'), 'tileset.json');
-}
 
 // Bytes of all files of a scene.
 function bytesOnDisk(scene: string): number {
@@ -69,25 +65,11 @@ describe('the viewer', () => {
   }
 
   it('draws held-out views as the processor does', async () => {
-    const tileset = tilesetOf(small);
-    const views = capturedViews(smallCapture, 10).map(({ view }) => view);
-    const path = join(folder, 'path.json');
-    writeFileSync(path, cameraPath(tileset, views.map(({ matrix }) => matrix)));
-    run('render', small, join(folder, 'oracle'), '--path', path);
     const page = await open(small);
     console.log(`drawn by ${await page.evaluate(() => plain.card())}`);
-    await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
-    const decibels: number[] = [];
-    const seconds: number[] = [];
-    for (const [i, view] of views.entries()) {
-      await page.evaluate((one) => plain.settle(one), view);
-      const pixels = new Uint8Array(Buffer.from(await page.evaluate(() => plain.pixels()), 'base64'));
-      decibels.push(psnr(pixels, await decodePng(page, join(folder, 'oracle', `0000${i}.png`))));
-      seconds.push(await page.evaluate((one) => plain.time(one, 3), view));
-    }
+    const { decibels, seconds } = await againstOracle(page, small, smallCapture, folder);
     await close(page);
-    console.log(`PSNR against the oracle: ${decibels.map((value) => value.toFixed(1)).join(', ')} dB`);
-    console.log(`a frame: ${seconds.map((value) => value.toFixed(2)).join(', ')} s`);
+    tell(decibels, seconds);
     verdict('ten held-out views, the worst, in dB', Math.min(...decibels), '>=', 38);
   });
 

@@ -1,14 +1,14 @@
 // Workers that read contents.
 import { makeWorker } from './make-worker';
 import { SceneError } from './scene-error';
-import type { VolumeLimits } from './tiles/decode-volume';
+import type { ContentLimits } from './tiles/content';
+import type { Content, KnownRepresentation } from './tiles/decode-content';
 import type { TileContent } from './tiles/tileset';
-import type { VolumeContent } from './tiles/volume-content';
 import type { DecodeAnswer, DecodeRequest } from './worker';
 
 interface Waiting {
   worker: Worker;
-  resolve: (content: VolumeContent) => void;
+  resolve: (content: Content) => void;
   reject: (error: SceneError) => void;
 }
 
@@ -26,13 +26,14 @@ export class DecodePool {
 
   // The file is handed over: it is of no use afterwards.
   decode(
-    file: Uint8Array<ArrayBuffer>, name: string, promised: Pick<TileContent, 'surround' | 'box'>, limits: VolumeLimits,
-  ): Promise<VolumeContent> {
+    representation: KnownRepresentation, file: Uint8Array<ArrayBuffer>, name: string, promised: Pick<TileContent, 'surround' | 'box'>,
+    limits: ContentLimits,
+  ): Promise<Content> {
     const id = this.next++;
     const worker = this.worker(id % this.size);
     return new Promise((resolve, reject) => {
       this.waiting.set(id, { worker, resolve, reject });
-      worker.postMessage({ id, file, name, promised, limits } satisfies DecodeRequest, [file.buffer]);
+      worker.postMessage({ id, representation, file, name, promised, limits } satisfies DecodeRequest, [file.buffer]);
     });
   }
 

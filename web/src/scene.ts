@@ -11,13 +11,14 @@
 // metres where the capture has a scale. Where several stand in one world, see scenes.ts.
 import * as THREE from 'three';
 import { kYUpFromZUp } from './axes';
+import { ContentSource } from './content-source';
 import { DecodePool } from './decode-pool';
 import { cityMesh, kFirstRenderOrder } from './draw/city-mesh';
 import { Compositor, type DrawnContent, type DrawnPart } from './draw/compositor';
-import { kDisplayModes, type DisplayMode } from './draw/display-modes';
+import { kFarAway } from './draw/content-program';
+import type { DisplayMode } from './draw/display-modes';
 import { OpaqueDepth } from './draw/opaque-depth';
 import { picturesOf, type Picture } from './draw/picture';
-import { kFarAway } from './draw/volume-material';
 import { tileView } from './picture-view';
 import { SceneError } from './scene-error';
 import { ServedFiles, type ContentFile, type SceneFiles } from './scene-files';
@@ -25,10 +26,9 @@ import { TileSelector, kSelectionSettings, type SelectionSettings } from './stre
 import { boxOfCells, cutFrontToBack, tileTree, type TileTree } from './stream/tile-tree';
 import { jointView } from './stream/tile-view';
 import { kStreamSettings, TileStreamer, type StreamSettings, type StreamStatistics } from './stream/tile-streamer';
+import { isKnown, type Content, type KnownRepresentation } from './tiles/decode-content';
 import { decodeTileset } from './tiles/decode-tileset';
 import type { Tileset } from './tiles/tileset';
-import type { VolumeContent } from './tiles/volume-content';
-import { VolumeSource } from './volume-source';
 
 const kTilesetBytes = 1 << 24;
 const kNearby = 1e-6; // scene units
@@ -51,8 +51,9 @@ export interface Neighbours {
 }
 
 export type { StreamSettings };
+export type KnownTileset = Tileset & { representation: KnownRepresentation };
 
-type Streamer = TileStreamer<ContentFile, VolumeContent, DrawnContent>;
+type Streamer = TileStreamer<ContentFile, Content, DrawnContent>;
 
 // From where, and what draws it.
 interface Look {
@@ -71,6 +72,7 @@ export class TesseraScene extends THREE.Object3D {
   resolutionScale = 1; // pixels of the scene beside those of the canvas, along an edge
   largestResolutionScale = 1; // for which room is kept on the card, so that tiles need not go when it is reached
   display: DisplayMode = 'colour';
+  featureLevel = 1; // of `hash`, which display modes show: 0, the coarse features, to 8
   minTransmittance = 1 / 255; // rays end where less would be seen; 0: never
   // Boxes in which nothing of it is drawn, at most kMostHiddenBoxes: from the cube of edge 1 about the origin to this
   // object's frame.
@@ -108,7 +110,7 @@ export class TesseraScene extends THREE.Object3D {
   }
 
   private constructor(
-    readonly tileset: Tileset,
+    readonly tileset: KnownTileset,
     readonly files: SceneFiles,
     options: SceneOptions,
     private readonly pool: DecodePool,
@@ -148,6 +150,11 @@ export class TesseraScene extends THREE.Object3D {
     return this.complete && (this.streamer?.idle ?? false);
   }
 
+  // Of `hash`: the most fine levels of features that any content has which has come so far.
+  get featureLevels(): number {
+    return this.compositor?.featureLevels ?? 0;
+  }
+
   get statistics(): SceneStatistics | undefined {
     if (!this.streamer || !this.compositor) return undefined;
     return { ...this.streamer.statistics, targetBytes: this.compositor.bytes + this.opaque.bytes, drawn: this.drawn };
@@ -179,7 +186,9 @@ export class TesseraScene extends THREE.Object3D {
     const { low, high } = this.tileset.box;
     const diagonal = Math.hypot(...high.map((x, axis) => x - low[axis]));
     compositor.view.visibility.value = Math.min(Math.max(this.visibility * diagonal, kNearby), kFarAway);
-    compositor.view.display.value = kDisplayModes.indexOf(this.display);
+    compositor.show(this.display, this.featureLevel);
+    // Something else may stand behind, though nothing that ends rays does.
+    compositor.endsRays = this.showsSurround && this.visibility === Infinity && this.neighbours.behind.length === 0;
     const sceneFromLocal = this.localFromScene.clone().invert();
     const inScene = (boxes: readonly THREE.Matrix4[]) => boxes.map((box) => sceneFromLocal.clone().multiply(box));
     compositor.hide(inScene(this.hidden), inScene(this.neighbours.boxes), !this.showsSurround);
@@ -259,7 +268,7 @@ export class TesseraScene extends THREE.Object3D {
   private prepare(renderer: THREE.WebGLRenderer) {
     if (!this.compositor || !this.streamer || !this.mesh) {
       this.compositor = new Compositor(renderer, this.tileset);
-      const source = new VolumeSource(this.tree, this.files, this.pool, this.compositor, renderer);
+      const source = new ContentSource(this.tileset.representation, this.tree, this.files, this.pool, this.compositor, renderer);
       this.streamer = new TileStreamer(new TileSelector(this.tree, this.selection), source, this.stream);
       this.streamer.onError = (error) => this.onError(error);
       this.mesh = cityMesh(this.compositor);
@@ -271,11 +280,12 @@ export class TesseraScene extends THREE.Object3D {
   }
 }
 
-async function openTileset(files: SceneFiles): Promise<Tileset> {
+async function openTileset(files: SceneFiles): Promise<KnownTileset> {
   const text = new TextDecoder().decode(await files.read('tileset.json', kTilesetBytes));
   const tileset = decodeTileset(text, 'tileset.json');
-  if (tileset.representation !== 'volume') {
-    throw new SceneError('tileset.json', '', `is a scene of ${tileset.representation}, not of volume`, 'draw it with a viewer that knows it');
+  const { representation } = tileset;
+  if (!isKnown(representation)) {
+    throw new SceneError('tileset.json', '', `is a scene of ${representation}, not of volume or hash`, 'draw it with a viewer that knows it');
   }
-  return tileset;
+  return { ...tileset, representation };
 }

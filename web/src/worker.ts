@@ -1,21 +1,22 @@
 // Reads contents away from the page's own thread.
 import decoderUrl from '@jsquash/webp/codec/dec/webp_dec.wasm?url';
 import { SceneError } from './scene-error';
-import { decodeVolume, readVolumeHeader, type VolumeLimits } from './tiles/decode-volume';
+import type { ContentLimits } from './tiles/content';
+import { buffersOf, decodeContent, readContentHeader, type Content, type KnownRepresentation } from './tiles/decode-content';
 import { isDecoderPrepared, prepareDecoder } from './tiles/lossless-image';
 import type { TileContent } from './tiles/tileset';
-import type { VolumeContent } from './tiles/volume-content';
 
 export interface DecodeRequest {
   id: number;
+  representation: KnownRepresentation;
   file: Uint8Array<ArrayBuffer>;
   name: string;
   promised: Pick<TileContent, 'surround' | 'box'>;
-  limits: VolumeLimits;
+  limits: ContentLimits;
 }
 
 export type DecodeAnswer =
-  | { id: number; content: VolumeContent }
+  | { id: number; content: Content }
   | { id: number; error: { what: string; place: string; reason: string; remedy: string } };
 
 let prepared: Promise<void> | undefined;
@@ -36,17 +37,15 @@ function ready(): Promise<void> {
 ready().catch(() => {}); // while the first files are fetched
 
 self.onmessage = async ({ data }: MessageEvent<DecodeRequest>) => {
-  const { id, file, name, promised, limits } = data;
+  const { id, representation, file, name, promised, limits } = data;
   try {
     await ready();
     if (!isDecoderPrepared()) {
       prepared = undefined; // it gave up meanwhile
       await ready();
     }
-    const content = decodeVolume(readVolumeHeader(file, name, promised, limits), name);
-    const { planes, voxels, macroblocks, distances } = content;
-    const buffers = [planes.first, planes.second, voxels.first, voxels.second, macroblocks.texels, distances.texels];
-    self.postMessage({ id, content } satisfies DecodeAnswer, { transfer: buffers.map((bytes) => bytes.buffer as ArrayBuffer) });
+    const content = decodeContent(readContentHeader(representation, file, name, promised, limits), name);
+    self.postMessage({ id, content } satisfies DecodeAnswer, { transfer: buffersOf(content) });
   } catch (error) {
     const { what, place, reason, remedy } =
       error instanceof SceneError ? error : new SceneError(name, '', String(error), 'reload the page');

@@ -7,6 +7,7 @@ import { chromium, type Browser } from 'playwright-core';
 const root = fileURLToPath(new URL('../../', import.meta.url));
 export const program = process.env.TESSERA ?? `${root}build/release/apps/tessera/tessera`;
 export const goldenScene = `${root}tests/golden/volume`;
+export const goldenHash = `${root}tests/golden/hash`;
 export const viewer = `${root}web/dist`;
 const chromiumPath = process.env.TESSERA_CHROMIUM ?? '/usr/bin/chromium';
 

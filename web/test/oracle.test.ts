@@ -6,7 +6,7 @@ import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Plain } from '../src/plain';
 import { decodeTileset } from '../src/tiles/decode-tileset';
-import { goldenScene, launch, missing, run, serve, type Server } from './machine';
+import { goldenHash, goldenScene, launch, missing, run, serve, type Server } from './machine';
 import { cameraPath, decodePng, psnr } from './pictures';
 import { openPlain } from './plain-page';
 import { viewAt, type Place } from './views';
@@ -33,12 +33,16 @@ function cardOf(page: Page): Promise<string> {
 function takeSmallTextures(): void {
   const { getParameter } = WebGL2RenderingContext.prototype;
   WebGL2RenderingContext.prototype.getParameter = function (name: number) {
-    return name === this.MAX_3D_TEXTURE_SIZE ? 27 : (getParameter.call(this, name) as unknown);
+    return name === this.MAX_3D_TEXTURE_SIZE ? 32 : (getParameter.call(this, name) as unknown);
   };
 }
 
+// Two of the golden scenes, which stand for the same landscape.
+const kScenes = { volume: goldenScene, hash: goldenHash };
+type Golden = keyof typeof kScenes;
+
 describe.skipIf(missing())('the browser', () => {
-  let server: Server;
+  let servers: Record<Golden, Server>;
   let browser: Browser;
   let swiftShader: Browser;
   let folder: string;
@@ -47,28 +51,34 @@ describe.skipIf(missing())('the browser', () => {
 
   beforeAll(async () => {
     folder = mkdtempSync(join(tmpdir(), 'tessera-browser-'));
-    [server, browser, swiftShader] = await Promise.all([serve(goldenScene), launch(), launch('swiftshader')]);
+    const [volume, hash] = await Promise.all([serve(goldenScene), serve(goldenHash)]);
+    servers = { volume, hash };
+    [browser, swiftShader] = await Promise.all([launch(), launch('swiftshader')]);
   });
   afterAll(async () => {
     await Promise.all([browser?.close(), swiftShader?.close()]);
-    server?.close();
+    for (const server of Object.values(servers ?? {})) server.close();
     rmSync(folder, { recursive: true });
   });
 
-  it.each([['default', 0], ['default', 1], ['swiftshader', 0], ['small', 0]])('draws what the processor draws: %s card, level %i', async (card, level) => {
-    const path = join(folder, `path-${level}.json`);
+  it.each<[Golden, string, number]>([
+    ['volume', 'default', 0], ['volume', 'default', 1], ['volume', 'swiftshader', 0], ['volume', 'small', 0],
+    ['hash', 'default', 0], ['hash', 'default', 1], ['hash', 'swiftshader', 0], ['hash', 'small', 0],
+  ])('draws what the processor draws of %s: %s card, level %i', async (representation, card, level) => {
+    const name = `${representation}-${level}`;
+    const path = join(folder, `path-${name}.json`);
     writeFileSync(path, cameraPath(tileset, views.map(({ matrix }) => matrix)));
-    run('render', goldenScene, join(folder, String(level)), '--path', path, '--lod', String(level));
+    run('render', kScenes[representation], join(folder, name), '--path', path, '--lod', String(level));
     const said: string[] = [];
     const page = await openPlain(
-      card === 'swiftshader' ? swiftShader : browser, server, said, card === 'small' ? takeSmallTextures : undefined);
+      card === 'swiftshader' ? swiftShader : browser, servers[representation], said, card === 'small' ? takeSmallTextures : undefined);
     if (card === 'swiftshader') expect(await cardOf(page)).toContain('SwiftShader');
     await page.evaluate(
       (finestLevel) => plain.open('scene/tileset.json', { selection: { mostPixels: 0, finestLevel } }), level);
     for (const [i, view] of views.entries()) {
       await page.evaluate((one) => plain.settle(one), view);
       const pixels = new Uint8Array(Buffer.from(await page.evaluate(() => plain.pixels()), 'base64'));
-      const expected = await decodePng(page, join(folder, String(level), `0000${i}.png`));
+      const expected = await decodePng(page, join(folder, name, `0000${i}.png`));
       expect(new Set(expected).size).toBeGreaterThan(20); // something is to be seen
       expect(psnr(pixels, expected)).toBeGreaterThan(38);
     }
@@ -84,7 +94,7 @@ describe.skipIf(missing())('the browser', () => {
 
   it('lets what lies far beyond what was captured fade into what is behind', async () => {
     const said: string[] = [];
-    const page = await openPlain(browser, server, said);
+    const page = await openPlain(browser, servers.volume, said);
     await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
     const look = async (change: () => void) => {
       await page.evaluate(change);

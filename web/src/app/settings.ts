@@ -1,12 +1,14 @@
 // What is drawn, and how well.
-import { kDisplayModes, type DisplayMode } from '../draw/display-modes';
+import { displayModesOf, isOfFeatureLevel, type DisplayMode } from '../draw/display-modes';
+import { kMostTables } from '../tiles/hash-content';
 import { element } from './page/element';
 import type { Toolbar } from './page/toolbar';
 import type { Viewer } from './viewer';
 
 const kModeNames: Record<DisplayMode, string> = {
   colour: 'Colour', diffuse: 'Without reflections', specular: 'Reflections alone', features: 'Features', depth: 'Distance',
-  blocks: 'Blocks', levels: 'Levels of detail',
+  blocks: 'Blocks', levels: 'Levels of detail', contribution: 'Colour of a hash level', attention: 'Attention to colour',
+  densityAttention: 'Attention to density',
 };
 
 const kResolutions: [string, number | undefined][] = [
@@ -20,10 +22,15 @@ export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
     viewer.needPicture();
   };
   const levels = Array.from({ length: city.tileset.levels }, (_, level): [string, number] => [level === 0 ? 'All' : `Level ${level} and coarser`, level]);
+  const featureLevel = featureLevelOf(viewer, changed((level) => scenes.forEach((scene) => (scene.featureLevel = level))));
   const panel = element(
     'div', '',
-    choice('Show', kDisplayModes.map((mode): [string, DisplayMode] => [kModeNames[mode], mode]),
-      changed((mode) => scenes.forEach((scene) => (scene.display = mode)))),
+    choice('Show', displayModesOf(city.tileset.representation).map((mode): [string, DisplayMode] => [kModeNames[mode], mode]),
+      changed((mode) => {
+        scenes.forEach((scene) => (scene.display = mode));
+        featureLevel.show(mode);
+      })),
+    featureLevel.label,
     slider('Error at most', 0, 3, Math.log2(2 * city.selection.mostPixels), 0.25, (x) => `${(2 ** x / 2).toPrecision(2)} px`,
       changed((x) => scenes.forEach(({ selection }) => (selection.mostPixels = 2 ** x / 2)))),
     ...(levels.length > 1 ? [choice('Detail', levels, changed((level) => scenes.forEach(({ selection }) => (selection.finestLevel = level))))] : []),
@@ -38,6 +45,20 @@ export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
     })),
   );
   toolbar.add({ name: 'Settings', key: 'c', icon: 'sliders', panel });
+}
+
+// Which level of features such modes show.
+function featureLevelOf({ city }: Viewer, change: (level: number) => void) {
+  const fine = Array.from({ length: kMostTables }, (_, i): [string, number] => [`Level ${i + 1}`, i + 1]);
+  const label = choice('Hash level', [...fine, ['The coarse features', 0] as [string, number]], change);
+  const options = [...label.querySelectorAll('option')];
+  const show = (mode: DisplayMode) => {
+    label.hidden = !isOfFeatureLevel(mode);
+    fine.forEach(([, level], i) => (options[i].hidden = level > city.featureLevels));
+    options[fine.length].hidden = mode !== 'contribution'; // nothing weighs them
+  };
+  show('colour');
+  return { label, show };
 }
 
 function slider(

@@ -53,12 +53,12 @@ void main() {
 }`;
 
 export function cityMesh(compositor: Compositor): THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial> {
-  const { view, target, distancesOfBytes } = compositor;
+  const { view, target, colour, distancesOfBytes } = compositor;
   const material = new THREE.ShaderMaterial({
     vertexShader: kVertexShader,
     fragmentShader: `${kDisplayConstants}\n${kFragmentShader}`,
     uniforms: {
-      colourAndOpacity: { value: target.textures[0] },
+      colourAndOpacity: { value: colour },
       distanceAndOpacity: { value: target.textures[1] },
       viewport: { value: new THREE.Vector4() }, // of what three draws into
       part: { value: new THREE.Vector4() },

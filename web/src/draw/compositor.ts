@@ -1,17 +1,21 @@
 // Draws contents, front to back, into targets of their own: what the scene adds to each pixel, and how far away it is
 // (docs/tile-format.md, section 4).
 import * as THREE from 'three';
-import type { Box, TileContent } from '../tiles/tileset';
-import type { VolumeHeader } from '../tiles/decode-volume';
-import type { VolumePart } from '../tiles/volume-content';
-import { frontToBack as orderOf } from './box-order';
-import { colourOfBlock, colourOfLevel } from './display-modes';
-import { kMostHiddenBoxes } from './hidden-boxes';
-import { packNetwork } from './network-shader';
-import { drawAsTheyStand, type Picture } from './picture';
-import { programMaterial, volumeMaterial, viewUniforms, type ProgramShape, type ViewUniforms } from './volume-material';
 import { SceneError } from '../scene-error';
-import { atlasesOf, type ContentTextures } from './content-textures';
+import type { ContentPart } from '../tiles/content';
+import type { Content, ContentHeader } from '../tiles/decode-content';
+import type { Box, TileContent, Tileset } from '../tiles/tileset';
+import { frontToBack as orderOf } from './box-order';
+import { contentMaterial, keyOf, programMaterial, viewUniforms, type ProgramPieces, type ProgramPlace, type ViewUniforms } from './content-program';
+import type { ContentTextures } from './content-textures';
+import { colourOfBlock, colourOfLevel, kDisplayModes, type DisplayMode } from './display-modes';
+import { hashPieces, networksOf } from './hash-program';
+import { HashTextures } from './hash-textures';
+import { kMostHiddenBoxes } from './hidden-boxes';
+import { NetworkPass, type DrawnNetwork, type NetworkOrder } from './network-pass';
+import { drawAsTheyStand, type Picture } from './picture';
+import { volumePieces } from './volume-program';
+import { VolumeTextures } from './volume-textures';
 
 // A content that may be drawn.
 export interface DrawnContent {
@@ -19,6 +23,9 @@ export interface DrawnContent {
   box: Box; // scene units
   surround: boolean;
   mesh: THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>;
+  network?: DrawnNetwork; // of `hash`: what makes colours when all contents are drawn
+  whole: boolean; // rays that end nowhere are opaque
+  level: number;
 }
 
 // Of a content, the part in a box; all of it where there is none.
@@ -27,10 +34,8 @@ export interface DrawnPart {
   within?: Box;
 }
 
-export interface ScenePlace {
-  box: Box; // of the scene
-  near: number;
-}
+// What of a scene decides how it is drawn.
+export type DrawnScene = Pick<Tileset, 'box' | 'near' | 'representation' | 'levels'>;
 
 // One texel, so that programs need not differ where there is nothing opaque.
 function farthestDepth(): THREE.DataTexture {
@@ -61,14 +66,19 @@ void main() {
 }`;
 
 const kContentsBetweenHiding = 4;
+const kPicturesOfVolume = 2;
+const kSumsOfHash = 4;
 const kEverywhere: Box = { low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
 
 export class Compositor {
   readonly view: ViewUniforms = viewUniforms();
-  readonly target: THREE.WebGLRenderTarget; // what the scene adds, with its opacity; how far its surface is
+  // 0: what the scene adds, or sums of which that is made, with opacity; 1: how far its surface is; of `hash` further sums.
+  readonly target: THREE.WebGLRenderTarget;
   pictures: Picture[] = []; // that are in the target
+  endsRays = true; // rays that end nowhere in scenes that say so are opaque
+  featureLevels = 0; // of `hash`: the most fine levels of any content that has been prepared
   readonly distancesOfBytes: boolean;
-  private readonly bytesPerPixel: number; // of both pictures
+  private readonly bytesPerPixel: number; // of all pictures
   private readonly depthAlone: THREE.WebGLRenderTarget; // the depth of `target`, so that its colours can be read meanwhile
   private readonly hiding = new THREE.Scene();
   private readonly contents = new THREE.Scene();
@@ -76,20 +86,30 @@ export class Compositor {
   private readonly screen = screenTriangle();
   private readonly anyCamera = new THREE.Camera();
   private readonly nothingOpaque = farthestDepth();
+  private readonly weightTargets: number; // beyond the first
+  private readonly networks?: NetworkPass; // of `hash`
   private cuts = false; // from the first hidden box on, so that programs are not made anew for each
-  private readonly prepared = new Map<string, THREE.Material>(); // hold programs, by their shape
+  private readonly prepared = new Map<string, THREE.Material>(); // hold programs, by their keys
 
-  // What the card can blend decides how the pictures are kept.
-  constructor(renderer: THREE.WebGLRenderer, place: ScenePlace) {
+  // What the card can blend decides how the pictures are kept. Throws SceneError where that is too little.
+  constructor(renderer: THREE.WebGLRenderer, scene: DrawnScene) {
     const has = (name: string) => renderer.extensions.has(name);
     const canBlendHalves = has('EXT_color_buffer_half_float') || has('EXT_color_buffer_float');
+    const isHash = scene.representation === 'hash';
+    if (isHash && !canBlendHalves) {
+      throw new SceneError('graphics card', '', 'cannot blend half floats, which scenes of hash need', 'draw it on another machine');
+    }
     this.distancesOfBytes = !canBlendHalves;
-    this.bytesPerPixel = canBlendHalves ? 16 : 8;
+    const gl = renderer.getContext() as WebGL2RenderingContext;
+    const most = Math.min(gl.getParameter(gl.MAX_DRAW_BUFFERS) as number, gl.getParameter(gl.MAX_COLOR_ATTACHMENTS) as number);
+    this.weightTargets = isHash ? Math.min(Math.max(Math.ceil(scene.levels / networksOf(0)) - 1, 0), most - kSumsOfHash) : 0;
+    const count = isHash ? kSumsOfHash + this.weightTargets : kPicturesOfVolume;
+    this.bytesPerPixel = (canBlendHalves ? 8 : 4) * count;
     const depthTexture = new THREE.DepthTexture(1, 1, THREE.UnsignedIntType);
     const common = { generateMipmaps: false, depthBuffer: true, depthTexture };
+    const filter = isHash ? THREE.NearestFilter : THREE.LinearFilter;
     this.target = new THREE.WebGLRenderTarget(1, 1, {
-      ...common, count: 2, type: canBlendHalves ? THREE.HalfFloatType : THREE.UnsignedByteType,
-      minFilter: THREE.LinearFilter, magFilter: THREE.LinearFilter,
+      ...common, count, type: canBlendHalves ? THREE.HalfFloatType : THREE.UnsignedByteType, minFilter: filter, magFilter: filter,
     });
     this.depthAlone = new THREE.WebGLRenderTarget(1, 1, { ...common, format: THREE.RedFormat });
     this.hiding.add(new THREE.Mesh(this.screen, new THREE.ShaderMaterial({
@@ -105,51 +125,64 @@ export class Compositor {
     // Half floats tell distances apart by a two-thousandth: places that are measured want more.
     if (has('EXT_color_buffer_float') && has('EXT_float_blend')) {
       this.target.textures[1].type = THREE.FloatType;
-      this.bytesPerPixel = 8 + 16;
+      this.bytesPerPixel += 8;
     }
+    if (isHash) this.networks = new NetworkPass(this.target, this.screen, this.view, this.weightTargets);
     this.contents.matrixWorldAutoUpdate = false;
-    this.view.sceneLow.value.set(...place.box.low);
-    this.view.sceneHigh.value.set(...place.box.high);
-    this.view.sceneNear.value = place.near;
+    this.view.sceneLow.value.set(...scene.box.low);
+    this.view.sceneHigh.value.set(...scene.box.high);
+    this.view.sceneNear.value = scene.near;
   }
 
-  // Has the driver begin with the program of such a content, beside other work.
-  prepare(
-    renderer: THREE.WebGLRenderer, { parts, network, layout: { voxels, atlasDepth } }: Pick<VolumeHeader, 'parts' | 'network' | 'layout'>,
-    surround: boolean, ownProgram: boolean,
-  ): void {
-    const widths = network.map((layer) => layer.outputs);
-    const atlases = atlasesOf(voxels[2], atlasDepth);
-    const shape = this.shapeOf({ parts, widths, atlases, network: ownProgram ? packNetwork(network) : undefined }, surround);
-    const key = JSON.stringify({ ...shape, network: shape.network && [...shape.network] });
+  // What the scene adds to each pixel, with its opacity.
+  get colour(): THREE.Texture {
+    return (this.networks?.target ?? this.target).textures[0];
+  }
+
+  // Has the driver begin with the programs of such a content, beside other work.
+  prepare(renderer: THREE.WebGLRenderer, header: ContentHeader, surround: boolean, ownProgram: boolean): void {
+    if (header.representation === 'hash') {
+      this.featureLevels = Math.max(this.featureLevels, header.parts[0].tables.length);
+      renderer.compile(this.networks!.networkOf(header.network).mesh, this.anyCamera);
+    }
+    const pieces = this.piecesOf(header, ownProgram);
+    const place = this.placeOf(header.parts, surround);
+    const key = keyOf(pieces, place);
     if (this.prepared.has(key)) return;
-    const material = programMaterial(shape);
+    const material = programMaterial(pieces, place);
     this.prepared.set(key, material);
     renderer.compile(new THREE.Mesh(this.screen, material), this.anyCamera);
   }
 
   // `number` and `level` are the tile's, for display modes; `ownProgram` is for what is drawn for long.
   make(
-    textures: ContentTextures, { box, surround }: Pick<TileContent, 'box' | 'surround'>, number: number, level: number, ownProgram: boolean,
+    content: Content, { box, surround }: Pick<TileContent, 'box' | 'surround'>, number: number, level: number, ownProgram: boolean,
   ): DrawnContent {
-    const { parts, widths, voxelsFirst, network } = textures;
-    const shape = this.shapeOf(
-      { parts, widths, atlases: voxelsFirst.length, network: ownProgram ? network : undefined }, surround);
-    const material = volumeMaterial(textures, this.view, shape, { block: colourOfBlock(number), level: colourOfLevel(level) });
+    const place = this.placeOf(content.parts, surround);
+    const isHash = content.representation === 'hash';
+    const textures = isHash ? new HashTextures(content) : new VolumeTextures(content);
+    const colours = { block: colourOfBlock(number), level: colourOfLevel(level) };
+    const material = contentMaterial(textures, this.view, this.piecesOf(content, ownProgram), place, colours);
     const mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>(
-      shape.everywhere ? this.screen : this.cube, material);
+      place.everywhere ? this.screen : this.cube, material);
     mesh.frustumCulled = false;
     mesh.matrixAutoUpdate = mesh.matrixWorldAutoUpdate = false;
-    return { textures, box, surround, mesh };
+    if (!isHash) return { textures, box, surround, mesh, whole: false, level };
+    material.uniforms.network = { value: 0 };
+    return { textures, box, surround, mesh, network: this.networks!.networkOf(content.network), whole: content.settings.whole, level };
   }
 
-  compile(renderer: THREE.WebGLRenderer, { mesh }: DrawnContent): void {
+  compile(renderer: THREE.WebGLRenderer, { mesh, network }: DrawnContent): void {
     renderer.compile(mesh, this.anyCamera);
+    if (network) renderer.compile(network.mesh, this.anyCamera);
   }
 
-  isCompiled(renderer: THREE.WebGLRenderer, { mesh }: DrawnContent): boolean {
-    const { currentProgram } = renderer.properties.get(mesh.material) as { currentProgram?: { isReady(): boolean } };
-    return currentProgram?.isReady() ?? true;
+  isCompiled(renderer: THREE.WebGLRenderer, { mesh, network }: DrawnContent): boolean {
+    const isReady = (material: THREE.Material) => {
+      const { currentProgram } = renderer.properties.get(material) as { currentProgram?: { isReady(): boolean } };
+      return currentProgram?.isReady() ?? true;
+    };
+    return isReady(mesh.material) && (!network || isReady(network.mesh.material));
   }
 
   remove(content: DrawnContent): void {
@@ -161,15 +194,25 @@ export class Compositor {
   // Of the card, without contents.
   get bytes(): number {
     const pixels = this.target.width * this.target.height;
-    return (this.bytesPerPixel + 4 + 1) * pixels + bytesOfGeometry(this.cube) + bytesOfGeometry(this.screen) + 4;
+    return (this.bytesPerPixel + 4 + 1) * pixels + (this.networks?.bytes ?? 0) + bytesOfGeometry(this.cube) + bytesOfGeometry(this.screen) + 4;
   }
 
   resize({ x, y }: THREE.Vector2): void {
     if (this.target.width !== x || this.target.height !== y) {
       this.target.setSize(x, y);
       this.depthAlone.setSize(x, y);
+      this.networks?.resize(x, y);
     }
     this.view.resolution.value.set(x, y);
+  }
+
+  // `level` of features, 0 the coarse ones, where the mode shows one.
+  show(mode: DisplayMode, level: number): void {
+    const { display, shares, attention } = this.view;
+    display.value = kDisplayModes.indexOf(mode);
+    shares.value.forEach((_, l) => (shares.value[l] = mode === 'contribution' && l !== level ? 0 : 1));
+    const fine = Math.max(level, 1); // nothing weighs the coarse ones
+    attention.value = mode === 'attention' ? 2 * fine : mode === 'densityAttention' ? 2 * fine - 1 : 0;
   }
 
   // Boxes in which nothing is drawn, and such in which nothing of the surround is: from the cube of edge 1 about the
@@ -206,10 +249,12 @@ export class Compositor {
     const autoClear = renderer.autoClear;
     const clearColour = renderer.getClearColor(new THREE.Color());
     const clearAlpha = renderer.getClearAlpha();
-    renderer.setRenderTarget(this.target);
     renderer.setClearColor(0, 0);
     renderer.autoClear = false;
-    renderer.clear();
+    for (const target of [this.target, ...(this.networks ? [this.networks.target] : [])]) {
+      renderer.setRenderTarget(target);
+      renderer.clear();
+    }
     drawAsTheyStand(renderer, pictures, () =>
       pictures.forEach((picture, i) => this.drawOne(renderer, picture, worldFromScene, contents[i])));
     renderer.autoClear = autoClear;
@@ -236,6 +281,7 @@ export class Compositor {
     this.target.depthTexture?.dispose();
     this.target.dispose();
     this.depthAlone.dispose();
+    this.networks?.dispose();
     (this.hiding.children[0] as THREE.Mesh<THREE.BufferGeometry, THREE.Material>).material.dispose();
     this.cube.dispose();
     this.screen.dispose();
@@ -244,15 +290,26 @@ export class Compositor {
     this.prepared.clear();
   }
 
-  private shapeOf(
-    { parts, widths, atlases, network }: Pick<ProgramShape, 'widths' | 'atlases' | 'network'> & { parts: VolumePart[] }, surround: boolean,
-  ): ProgramShape {
+  private piecesOf(content: ContentHeader | Content, ownProgram: boolean): ProgramPieces {
+    return content.representation === 'hash' ? hashPieces(content, this.weightTargets) : volumePieces(content, ownProgram);
+  }
+
+  private placeOf(parts: ContentPart[], surround: boolean): ProgramPlace {
     // What is contracted may own what lies beyond any box.
     const everywhere = surround || parts.some((part) => part.contracted);
-    return {
-      parts: parts.length, atlases, widths, surround, everywhere, distancesOfBytes: this.distancesOfBytes, cuts: this.cuts,
-      network: network?.every(Number.isFinite) ? network : undefined,
-    };
+    return { surround, everywhere, distancesOfBytes: this.distancesOfBytes, cuts: this.cuts };
+  }
+
+  // Which number each network has in a picture. The surround's, or else that of the coarsest content, speaks for rays that
+  // nothing meets.
+  private networksOf(frontToBack: DrawnPart[]): NetworkOrder {
+    const found = new Set(frontToBack.map(({ content }) => content.network!));
+    const networks = [...found].slice(0, networksOf(this.weightTargets));
+    const numberOf = ({ network }: DrawnContent) => Math.max(0, networks.indexOf(network!)); // more are not told apart
+    for (const { content } of frontToBack) content.mesh.material.uniforms.network.value = numberOf(content);
+    const whole = this.endsRays && frontToBack.some(({ content }) => content.whole);
+    const coarser = (a: DrawnPart, b: DrawnPart) => (b.content.surround || (!a.content.surround && b.content.level > a.content.level) ? b : a);
+    return { networks, whole, behind: frontToBack.length > 0 ? numberOf(frontToBack.reduce(coarser).content) : 0 };
   }
 
   private place({ mesh, box }: DrawnContent, within: Box, worldFromScene: THREE.Matrix4): void {
@@ -263,9 +320,9 @@ export class Compositor {
   }
 
   private drawOne(
-    renderer: THREE.WebGLRenderer, { camera, part, eye, origin, ray, sceneFromClip }: Picture, worldFromScene: THREE.Matrix4,
-    frontToBack: DrawnPart[],
+    renderer: THREE.WebGLRenderer, picture: Picture, worldFromScene: THREE.Matrix4, frontToBack: DrawnPart[],
   ): void {
+    const { camera, part, eye, origin, ray, sceneFromClip } = picture;
     this.view.part.value = part;
     this.view.origin.value = origin;
     this.view.ray.value = ray;
@@ -276,6 +333,7 @@ export class Compositor {
     this.target.viewport.copy(part);
     this.depthAlone.viewport.copy(part);
     renderer.setRenderTarget(this.target);
+    const networks = this.networks && this.networksOf(frontToBack);
     const hides = this.view.minTransmittance.value > 0;
     frontToBack.forEach(({ content, within = kEverywhere }, i) => {
       if (hides && i > 0 && (content.surround || i % kContentsBetweenHiding === 0)) {
@@ -288,5 +346,6 @@ export class Compositor {
       renderer.render(this.contents, camera);
     });
     this.contents.children = [];
+    if (networks) this.networks!.draw(renderer, picture, networks);
   }
 }

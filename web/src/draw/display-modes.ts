@@ -1,8 +1,23 @@
 // What of the scene is shown.
 import * as THREE from 'three';
+import type { Representation } from '../tiles/tileset';
 
-export const kDisplayModes = ['colour', 'diffuse', 'specular', 'features', 'depth', 'blocks', 'levels'] as const;
+export const kDisplayModes = [
+  'colour', 'diffuse', 'specular', 'features', 'depth', 'blocks', 'levels', 'contribution', 'attention', 'densityAttention',
+] as const;
 export type DisplayMode = (typeof kDisplayModes)[number];
+
+// Those that show one of the levels of features that scenes of `hash` have (NGP-RT, figures 6 and S2): what it alone gives to the
+// colour, and what it is weighed with, for colours and for density.
+const kOfFeatureLevel: readonly DisplayMode[] = ['contribution', 'attention', 'densityAttention'];
+
+export function isOfFeatureLevel(mode: DisplayMode): boolean {
+  return kOfFeatureLevel.includes(mode);
+}
+
+export function displayModesOf(representation: Representation): DisplayMode[] {
+  return kDisplayModes.filter((mode) => representation === 'hash' || !isOfFeatureLevel(mode));
+}
 
 // `const int kShowDiffuse = 1; …` for shaders.
 export const kDisplayConstants = kDisplayModes

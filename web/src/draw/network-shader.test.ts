@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import { networkShader, packNetwork, writtenVector } from './network-shader';
+import { networkVectors, packNetwork } from '../tiles/network';
+import { layersShader, writtenVector } from './network-shader';
 
 describe('the network as GLSL', () => {
   it('has its numbers written as floats that are read as they were', () => {
@@ -14,7 +15,8 @@ describe('the network as GLSL', () => {
       ({ inputs, outputs, weights: new Float32Array(inputs * outputs), biases: new Float32Array(outputs) });
     const network = [layer(34, 16), layer(16, 3)];
     const asked: number[] = [];
-    networkShader([16, 3], (n) => `v${asked.push(n)}`);
+    layersShader([...new Array(34).keys()].map(String), network, (n) => `v${asked.push(n)}`);
     expect(asked).toEqual([...new Array(packNetwork(network).length / 4).keys()]);
+    expect(networkVectors(network)).toBe(asked.length);
   });
 });

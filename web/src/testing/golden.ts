@@ -1,16 +1,20 @@
-// The golden scene (docs/tile-format.md, section 11), for tests in Node.
+// The golden scenes (docs/tile-format.md, section 11), for tests in Node.
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { prepareDecoder } from '../tiles/lossless-image';
 
-const folder = new URL('../../../tests/golden/volume/', import.meta.url);
+export type Golden = 'volume' | 'hash';
 
-export function goldenFile(path: string): Uint8Array {
-  return new Uint8Array(readFileSync(new URL(path, folder)));
+function placeOf(path: string, scene: Golden): URL {
+  return new URL(`../../../tests/golden/${scene}/${path}`, import.meta.url);
 }
 
-export function goldenText(path: string): string {
-  return readFileSync(new URL(path, folder), 'utf8');
+export function goldenFile(path: string, scene: Golden = 'volume'): Uint8Array {
+  return new Uint8Array(readFileSync(placeOf(path, scene)));
+}
+
+export function goldenText(path: string, scene: Golden = 'volume'): string {
+  return readFileSync(placeOf(path, scene), 'utf8');
 }
 
 export async function prepareDecoderInNode(): Promise<void> {

@@ -1,43 +1,38 @@
 // Grids of bits, and how far it is to the next one that is set: docs/tile-format.md, section 6.
 
-// A grid of edge³ cells, (x, y, z) being number x + edge (y + edge z); one byte each, 0 or 1.
+// A grid of edge³ cells, (x, y, z) being number n = x + edge (y + edge z), which is bit n % 8 of byte n / 8.
 export interface OccupancyBits {
   edge: number;
-  bits: Uint8Array;
+  bytes: Uint8Array;
 }
 
 export const kFarthestDistance = 255;
 
-// The size of the picture that holds so many bits.
-export function sizeOfBits(bits: number): { width: number; height: number } {
-  const bytes = Math.ceil(bits / 8);
-  let width = 256;
-  while (Math.ceil(bytes / width) > 16383) width *= 2;
-  return { width, height: Math.ceil(bytes / width) };
-}
-
 // From pixels of 4 bytes: undefined where a pixel is not grey, or a bit outside the grid is set.
 export function takeBits(pixels: Uint8ClampedArray, edge: number): OccupancyBits | undefined {
   const count = edge ** 3;
-  const bits = new Uint8Array(count);
+  const bytes = new Uint8Array(Math.ceil(count / 8));
   for (let byte = 0; byte < pixels.length / 4; ++byte) {
     const value = pixels[4 * byte];
     if (pixels[4 * byte + 1] !== value || pixels[4 * byte + 2] !== value) return undefined;
     if (value === 0) continue;
-    const first = 8 * byte;
-    if (first >= count || (count - first < 8 && value >> (count - first) !== 0)) return undefined;
-    for (let bit = 0; bit < 8; ++bit) {
-      if ((value >> bit) & 1) bits[first + bit] = 1;
-    }
+    const left = count - 8 * byte;
+    if (left <= 0 || (left < 8 && value >> left !== 0)) return undefined;
+    bytes[byte] = value;
   }
-  return { edge, bits };
+  return { edge, bytes };
+}
+
+export function isSet({ bytes }: OccupancyBits, cell: number): boolean {
+  return ((bytes[cell >> 3] >> (cell & 7)) & 1) === 1;
 }
 
 // Of each cell the Chebyshev distance in cells to the nearest one that is set, 255 at most; 255 where none is. Two
 // sweeps: each cell is at most one farther than any of the 13 neighbours that a sweep has been to.
-export function chebyshevDistances({ edge, bits }: OccupancyBits): Uint8Array {
-  const distances = new Uint8Array(bits.length);
-  for (let i = 0; i < bits.length; ++i) distances[i] = bits[i] === 1 ? 0 : kFarthestDistance;
+export function chebyshevDistances(occupied: OccupancyBits): Uint8Array {
+  const { edge } = occupied;
+  const distances = new Uint8Array(edge ** 3);
+  for (let i = 0; i < distances.length; ++i) distances[i] = isSet(occupied, i) ? 0 : kFarthestDistance;
   sweep(distances, edge, false);
   sweep(distances, edge, true);
   return distances;

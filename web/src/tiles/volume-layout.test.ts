@@ -1,6 +1,8 @@
 import { describe, expect, it } from 'vitest';
+import { kPromisedLimits } from './content';
+import { texturesOf } from './content-layout';
 import type { VolumePart } from './volume-content';
-import { kPromisedLimits, layOut } from './volume-layout';
+import { layOut } from './volume-layout';
 
 function partWith(stored: number): VolumePart {
   return {
@@ -11,17 +13,17 @@ function partWith(stored: number): VolumePart {
 
 describe('the layout of a content', () => {
   it('has one texture for its voxels where they fit into one', () => {
-    const { atlas, atlasDepth, voxels } = layOut([partWith(28 ** 3)], kPromisedLimits)!;
-    expect(atlas).toEqual([28, 28, 28]);
-    expect(voxels[2]).toBeLessThanOrEqual(atlasDepth);
-    expect(atlasDepth).toBeLessThanOrEqual(kPromisedLimits.edge3D);
+    const { voxels } = layOut([partWith(28 ** 3)], kPromisedLimits)!;
+    expect(voxels.blocks).toEqual([28, 28, 28]);
+    expect(texturesOf(voxels)).toBe(1);
+    expect(voxels.depth).toBeLessThanOrEqual(kPromisedLimits.edge3D);
   });
 
   it('has several, one above the other, where the card takes no larger one', () => {
-    const { atlas, atlasDepth, voxels } = layOut([partWith(28 ** 3), partWith(1)], kPromisedLimits)!;
-    expect(atlas).toEqual([28, 28, 29]);
-    expect(Math.ceil(voxels[2] / atlasDepth)).toBe(2);
-    expect(layOut([partWith(4 * 28 ** 3)], kPromisedLimits)!.voxels[2]).toBe(4 * atlasDepth);
+    const { voxels } = layOut([partWith(28 ** 3), partWith(1)], kPromisedLimits)!;
+    expect(voxels.blocks).toEqual([28, 28, 29]);
+    expect(texturesOf(voxels)).toBe(2);
+    expect(texturesOf(layOut([partWith(4 * 28 ** 3)], kPromisedLimits)!.voxels)).toBe(4);
   });
 
   it('is none where a shader could not look into all of them', () => {

@@ -1,86 +1,19 @@
 // The rules that a volume's content keeps: docs/tile-format.md, section 6. The first that is broken, for people.
-import type { TileContent } from './tileset';
-import { kFarthestInScene } from './tileset-rules';
-import type { DenseLayer, VolumePart } from './volume-content';
-
-type Broken = string | undefined;
+import { ruleOfMacroblocks, ruleOfPlace, type Broken } from './content-rules';
+import type { VolumePart } from './volume-content';
 
 export const kMostVoxels = 1024; // along an axis
 export const kMostPlanes = 4096;
-export const kMostStored = 606 * 606; // macroblocks in a picture of 16383 pixels a side
-export const kMostLayers = 8;
-export const kMostLayerWidth = 256;
 export const kMostStepsPerTexel = 8;
 const kLargestRange = 100;
-const kInputs = 34;
-const kOutputs = 3;
-const kAxes = [0, 1, 2];
-
-export function ruleOfNetwork(network: DenseLayer[]): Broken {
-  if (network.length < 1) return 'the network has no layers';
-  let width = kInputs;
-  for (const layer of network) {
-    if (layer.inputs !== width || layer.outputs < 1) return "the network's layers do not follow one another";
-    width = layer.outputs;
-    if (![...layer.weights, ...layer.biases].every(Number.isFinite)) {
-      return 'the network holds a number that is not finite';
-    }
-  }
-  return width === kOutputs ? undefined : 'the network does not end in a colour';
-}
+export const kVolumeInputs = 34; // of the network
 
 export function ruleOfRange(range: number): Broken {
   return range > 0 && range <= kLargestRange ? undefined : 'a range is out of bounds';
 }
 
-// A bounded part owns nothing outside its domain, but for rounding.
 export function ruleOfPart(part: VolumePart): Broken {
   if (part.voxels % 8 !== 0 || part.voxels < 1) return 'its number of voxels is out of bounds';
   if (part.planes % 8 !== 0 || part.planes < 1) return 'its number of plane texels is out of bounds';
-  if (part.stored > (part.voxels / 8) ** 3) return 'it stores more macroblocks than its grid has';
-  for (const a of kAxes) {
-    const [centre, scale, low, high] = [part.centre[a], part.scale[a], part.low[a], part.high[a]];
-    if (!(Math.abs(centre) <= kFarthestInScene) || !(scale >= 1e-6 && scale <= kFarthestInScene)) {
-      return 'its centre or scale is out of bounds';
-    }
-    if (!(low >= -kFarthestInScene && low < high && high <= kFarthestInScene)) return 'its box is none';
-    const slack = 1e-3 * scale;
-    if (!part.contracted && (low < centre - scale - slack || high > centre + scale + slack)) {
-      return 'it is bounded, but its box leaves its domain';
-    }
-  }
-  return part.surround && !part.contracted ? 'a surround is not contracted' : undefined;
-}
-
-export function ruleOfParts(parts: VolumePart[]): Broken {
-  for (const [i, one] of parts.entries()) {
-    const broken = ruleOfPart(one);
-    if (broken) return `part ${i}: ${broken}`;
-    if (one.surround && parts.length > 1) return 'a surround is not alone';
-    const other = parts.findIndex((part, j) => j < i && overlap(part, one));
-    if (other !== -1) return `parts ${other} and ${i} overlap`;
-  }
-  return undefined;
-}
-
-function overlap(one: VolumePart, other: VolumePart): boolean {
-  return kAxes.every((a) => {
-    const slack = 1e-3 * Math.min(one.scale[a], other.scale[a]);
-    return one.high[a] > other.low[a] + slack && other.high[a] > one.low[a] + slack;
-  });
-}
-
-// Why the content is not the one that tileset.json speaks of.
-export function brokenPromise(parts: VolumePart[], promised: Pick<TileContent, 'surround' | 'box'>): Broken {
-  const slack = (x: number) => 1e-6 * Math.max(1, Math.abs(x)); // parts are rounded to floats
-  for (const [i, part] of parts.entries()) {
-    if (part.surround !== promised.surround) {
-      return `part ${i} is ${part.surround ? 'a' : 'no'} surround, and tileset.json says that the content is ${promised.surround ? 'one' : 'none'}`;
-    }
-    const { low, high } = promised.box;
-    if (kAxes.some((a) => part.low[a] < low[a] - slack(low[a]) || part.high[a] > high[a] + slack(high[a]))) {
-      return `part ${i} owns what lies outside of the content's box in tileset.json`;
-    }
-  }
-  return undefined;
+  return ruleOfMacroblocks(part, part.voxels) ?? ruleOfPlace(part);
 }

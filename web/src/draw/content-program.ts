@@ -1,13 +1,13 @@
-// The shader that draws one content: what it adds to each pixel, as colour, opacity and distance (docs/tile-format.md,
-// sections 4 and 6).
+// The shader that draws one content: what it adds to each pixel, and how far away that is (docs/tile-format.md, section 4). What
+// depends on the representation is in volume-program.ts and hash-program.ts.
 import * as THREE from 'three';
-import marchSource from '../../../shaders/lib/volume_march.glsl?raw';
-import pathSource from '../../../shaders/lib/volume_path.glsl?raw';
-import { kVectorsOfPart } from '../tiles/volume-content';
+import marchPartSource from '../../../shaders/lib/march_part.glsl?raw';
+import pathSource from '../../../shaders/lib/domain_path.glsl?raw';
+import placeSource from '../../../shaders/lib/part_place.glsl?raw';
+import { kMostTables } from '../tiles/hash-content';
 import type { ContentTextures } from './content-textures';
 import { kDisplayConstants } from './display-modes';
 import { kMostHiddenBoxes } from './hidden-boxes';
-import { networkShader, vectorsOfNetwork, writtenVector } from './network-shader';
 
 export const kFarAway = 1e30; // scene units
 
@@ -27,6 +27,8 @@ export interface ViewUniforms {
   opaqueDepth: { value: THREE.Texture | null }; // of the depth buffer of what stands in the scene; 1 everywhere where nothing does
   sceneFromClip: { value: THREE.Matrix4 };
   display: { value: number }; // of kDisplayModes
+  shares: { value: number[] }; // of `hash`: of the coarse features and of each level, what is shown of their colours
+  attention: { value: number }; // and whose weights are shown instead, as shaders/lib/hash_march.glsl has it
   boxFromScene: { value: THREE.Matrix4[] }; // of boxes in which nothing is drawn, |x| <= 1/2 in each
   hiddenBoxes: { value: number }; // so many of them for what is no surround
   hiddenBoxesOfSurround: { value: number }; // and for the surround
@@ -49,6 +51,8 @@ export function viewUniforms(): ViewUniforms {
     opaqueDepth: { value: null },
     sceneFromClip: { value: new THREE.Matrix4() },
     display: { value: 0 },
+    shares: { value: new Array<number>(kMostTables + 1).fill(1) },
+    attention: { value: 0 },
     boxFromScene: { value: Array.from({ length: 2 * kMostHiddenBoxes }, () => new THREE.Matrix4()) },
     hiddenBoxes: { value: 0 },
     hiddenBoxesOfSurround: { value: 0 },
@@ -74,13 +78,12 @@ precision highp int;
 precision highp sampler2D;
 precision highp sampler3D;
 precision highp sampler2DArray;
-layout(location = 0) out vec4 colourAndOpacity;
+precision highp usampler3D;
+precision highp usampler2DArray;
 layout(location = 1) out vec4 distanceAndOpacity;
 layout(std140) uniform Content { vec4 content[VECTORS]; };
-uniform sampler2DArray planesFirst, planesSecond;
-uniform sampler3D macroblocks, distances;
 uniform sampler2D opaqueDepth;
-uniform float featureRange, densityRange, stepsPerTexel, minTransmittance, sceneNear, visibility;
+uniform float minTransmittance, sceneNear, visibility;
 uniform vec2 resolution;
 uniform vec4 part;
 uniform mat3 origin, ray;
@@ -147,32 +150,22 @@ void main() {
   vec2 whole = clipToBox(o, d, withinLow, withinHigh, vec2(meetsBox ? box.x : sceneNear, far));
   for (int n = 0; n < PARTS; ++n) {
     Part part = partOf(n);
-    vec2 owned = ownedRange(part, o, d, whole);
+    vec2 owned = ownedRange(part.place, o, d, whole);
     if (owned.x < owned.y) marchShown(part, o, d, owned, sum);
     if (sum.transmittance < minTransmittance) break;
   }
 #endif
   float opacity = 1.0 - sum.transmittance;
   if (opacity <= 0.0) discard;
-  vec3 specular = deferred(sum.diffuse, sum.features, d);
-  vec3 colour = sum.diffuse + opacity * specular;
-  if (display == kShowDiffuse) colour = sum.diffuse;
-  if (display == kShowSpecular) colour = opacity * specular;
-  if (display == kShowFeatures) colour = sum.features.rgb;
-  if (display == kShowBlocks || display == kShowLevels) {
-    vec3 tint = display == kShowBlocks ? colourOfBlock : colourOfLevel;
-    colour = tint * (0.35 * opacity + 0.65 * dot(colour, vec3(0.3, 0.6, 0.1)));
-  }
   // What hides half is where the surface is, whatever shines through it from far behind, and whatever haze is before it.
   float surface = sum.median > 0.0 ? sum.median : sum.depth / opacity;
+  float seen = 1.0;
 #ifdef EVERYWHERE
   vec3 x = o + surface * d;
-  float seen = 1.0 - smoothstep(0.1 * visibility, visibility, length(max(max(sceneLow - x, x - sceneHigh), 0.0)));
-  colour *= seen;
-  opacity *= seen;
+  seen = 1.0 - smoothstep(0.1 * visibility, visibility, length(max(max(sceneLow - x, x - sceneHigh), 0.0)));
 #endif
-  colourAndOpacity = vec4(colour, opacity);
-  float hides = clamp(4.0 * opacity - 1.0, 0.0, 1.0);
+  writeContent(sum, d, opacity, seen);
+  float hides = clamp(4.0 * seen * opacity - 1.0, 0.0, 1.0);
 #ifdef DISTANCES_OF_BYTES
   surface /= surface + 1.0;
 #else
@@ -181,52 +174,42 @@ void main() {
   distanceAndOpacity = vec4(surface * hides, 0.0, 0.0, hides);
 }`;
 
-// Defines voxelFirst and voxelSecond: texels of an atlas that may be cut into several textures, one above the other. No
-// sample lies between two of them, as macroblocks have their apron.
-function atlasShader(atlases: number): string {
-  const numbers = [...Array(atlases).keys()];
-  const look = (which: string) => {
-    const last = numbers.length - 1;
-    const lines = numbers.map((n) => {
-      const found = `return textureLod(voxels${which}${n}, x * inTexture[${n}], 0.0);`;
-      return n === last ? found : `if (x.z < atlasDepth) ${found}\n  x.z -= atlasDepth;`;
-    });
-    return `vec4 voxel${which}(vec3 x) {\n  ${lines.join('\n  ')}\n}`;
-  };
-  return [
-    `uniform vec3 inTexture[${atlases}];  // of a texel: 1 / size\nuniform float atlasDepth;`,
-    ...numbers.map((n) => `uniform sampler3D voxelsFirst${n}, voxelsSecond${n};`), look('First'), look('Second'),
-  ].join('\n');
-}
-
-// What a program depends on.
-export interface ProgramShape {
-  parts: number;
-  atlases: number; // textures that the atlas of voxels is cut into
-  widths: number[]; // outputs of the network's layers
+// What a program depends on beside the content.
+export interface ProgramPlace {
   surround: boolean;
   everywhere: boolean; // fills the picture, as it owns what lies beyond any box
   distancesOfBytes: boolean; // the target's are, from 0 for no distance to 255 for the farthest
   cuts: boolean; // knows hidden boxes, which costs a hundredth even where there are none
-  network?: Float32Array; // packed; written into the program, which then is of one content alone
+}
+
+// What of a representation goes into a program.
+export interface ProgramPieces {
+  parts: number;
+  vectors: number; // of `content`
+  defines: Record<string, number | string>;
+  // Declares outputs at locations but 1 and uniforms, and defines Part, partOf, marchSegment (shaders/lib) and
+  // `void writeContent(Composite sum, vec3 d, float opacity, float seen)`: what is seen of a ray's sum.
+  source: string;
+}
+
+// The same for all contents that share a program.
+export function keyOf(pieces: ProgramPieces, place: ProgramPlace): string {
+  return JSON.stringify([pieces, place]);
 }
 
 // Without uniforms: so that the driver may begin with a program before its content is there.
-export function programMaterial(shape: ProgramShape): THREE.RawShaderMaterial {
-  const { parts, widths, network } = shape;
-  const ofParts = kVectorsOfPart * parts;
-  const vector = (n: number) => (network ? writtenVector(network, n) : `content[${ofParts + n}]`);
-  const defines: Record<string, number | string> = { PARTS: parts, VECTORS: ofParts + vectorsOfNetwork(widths) };
-  if (shape.surround) defines.SURROUND = '';
-  if (shape.everywhere) defines.EVERYWHERE = '';
-  if (shape.distancesOfBytes) defines.DISTANCES_OF_BYTES = '';
-  if (shape.cuts) defines.CUTS = '';
+export function programMaterial(pieces: ProgramPieces, place: ProgramPlace): THREE.RawShaderMaterial {
+  const defines: Record<string, number | string> = { ...pieces.defines, PARTS: pieces.parts, VECTORS: pieces.vectors };
+  if (place.surround) defines.SURROUND = '';
+  if (place.everywhere) defines.EVERYWHERE = '';
+  if (place.distancesOfBytes) defines.DISTANCES_OF_BYTES = '';
+  if (place.cuts) defines.CUTS = '';
   return new THREE.RawShaderMaterial({
     glslVersion: THREE.GLSL3,
     vertexShader: kVertexShader,
-    fragmentShader: [kFragmentHead, kDisplayConstants, atlasShader(shape.atlases), pathSource, marchSource, networkShader(widths, vector), kFragmentMain].join('\n'),
+    fragmentShader: [kFragmentHead, kDisplayConstants, pathSource, placeSource, pieces.source, marchPartSource, kFragmentMain].join('\n'),
     defines,
-    side: shape.everywhere ? THREE.DoubleSide : THREE.BackSide,
+    side: place.everywhere ? THREE.DoubleSide : THREE.BackSide,
     transparent: true,
     depthWrite: false,
     depthTest: true,
@@ -243,29 +226,17 @@ export function programMaterial(shape: ProgramShape): THREE.RawShaderMaterial {
 }
 
 // Contents of one shape share a program, if they have none of their own. Drawn front to back, blended under what is there.
-export function volumeMaterial(
-  textures: ContentTextures, view: ViewUniforms, shape: ProgramShape, colours: { block: THREE.Color; level: THREE.Color },
+export function contentMaterial(
+  textures: ContentTextures, view: ViewUniforms, pieces: ProgramPieces, place: ProgramPlace, colours: { block: THREE.Color; level: THREE.Color },
 ): THREE.RawShaderMaterial {
-  const material = programMaterial(shape);
+  const material = programMaterial(pieces, place);
   const group = new THREE.UniformsGroup();
   group.setName('Content');
   group.add(new THREE.Uniform(textures.numbers));
   material.uniforms = {
     ...view,
-    hiddenBoxes: shape.surround ? view.hiddenBoxesOfSurround : view.hiddenBoxes,
-    planesFirst: { value: textures.planesFirst },
-    planesSecond: { value: textures.planesSecond },
-    inTexture: {
-      value: textures.voxelsFirst.map(({ image: { width, height, depth } }) => new THREE.Vector3(1 / width, 1 / height, 1 / depth)),
-    },
-    atlasDepth: { value: textures.voxelsFirst[0].image.depth },
-    ...Object.fromEntries(textures.voxelsFirst.map((value, n) => [`voxelsFirst${n}`, { value }])),
-    ...Object.fromEntries(textures.voxelsSecond.map((value, n) => [`voxelsSecond${n}`, { value }])),
-    macroblocks: { value: textures.macroblocks },
-    distances: { value: textures.distances },
-    featureRange: { value: textures.ranges.features },
-    densityRange: { value: textures.ranges.density },
-    stepsPerTexel: { value: textures.stepsPerTexel },
+    ...textures.uniforms(),
+    hiddenBoxes: place.surround ? view.hiddenBoxesOfSurround : view.hiddenBoxes,
     colourOfBlock: { value: colours.block },
     colourOfLevel: { value: colours.level },
   };

@@ -1,22 +1,29 @@
 // Where the texels of pictures go: docs/tile-format.md, section 6. Pixels have 4 bytes.
+import { kAttributes, kStoredEdge, type TexelTextures } from './content';
 import type { Vec3 } from './tileset';
-import { kStoredEdge, type TexelTextures } from './volume-content';
 
 const kSlicesBeside = 3;
 const kTile = kStoredEdge * kSlicesBeside;
 
-// The three pictures of the same texels, in order: which byte of which texture red, green and blue become. What has no
-// place must be 0.
-const kPlaces: readonly (readonly (readonly ['first' | 'second', number] | undefined)[])[] = [
-  [['first', 0], ['first', 1], ['first', 2]],
-  [['second', 0], ['second', 1], ['second', 2]],
-  [['first', 3], ['second', 3], undefined],
-];
-export const kTexelPictures = kPlaces.length;
+// The three pictures of the same texels, in order: the attributes that red, green and blue are. What is none must be 0.
+const kAttributesOf: readonly (readonly [number, number, number | undefined])[] = [[1, 2, 3], [4, 5, 6], [0, 7, undefined]];
+export const kTexelPictures = kAttributesOf.length;
 
-export function sizeOfMacroblocks(stored: number): { width: number; height: number } {
+export interface PictureSize {
+  width: number;
+  height: number;
+}
+
+export function sizeOfMacroblocks(stored: number): PictureSize {
   const columns = Math.ceil(Math.sqrt(stored));
   return { width: kTile * columns, height: columns === 0 ? 0 : kTile * Math.ceil(stored / columns) };
+}
+
+// Of so many pixels one after another.
+export function sizeOfList(pixels: number): PictureSize {
+  let width = 256;
+  while (Math.ceil(pixels / width) > 16383) width *= 2;
+  return { width, height: Math.ceil(pixels / width) };
 }
 
 // `edge` texels along both sides, into the corner of a layer. False where a byte that means nothing is not 0.
@@ -55,21 +62,41 @@ export function takeMacroblocks(
   });
 }
 
+// Texels one after another, all attributes of one together: [texels][8], from number `begin` on.
+export function takeList(pixels: Uint8ClampedArray, which: number, texels: number, attributes: Uint8Array, begin: number): boolean {
+  const [r, g, b] = kAttributesOf[which];
+  for (let n = 0; n < texels; ++n) {
+    const at = kAttributes * (begin + n);
+    attributes[at + r] = pixels[4 * n];
+    attributes[at + g] = pixels[4 * n + 1];
+    if (b !== undefined) attributes[at + b] = pixels[4 * n + 2];
+    else if (pixels[4 * n + 2] !== 0) return false;
+  }
+  for (let at = 4 * texels; at < pixels.length; at += 4) {
+    if (pixels[at] !== 0 || pixels[at + 1] !== 0 || pixels[at + 2] !== 0) return false;
+  }
+  return true;
+}
+
 // Of macroblock number n, in macroblocks.
 export function placeInAtlas(n: number, atlas: Vec3): Vec3 {
   return [n % atlas[0], Math.floor(n / atlas[0]) % atlas[1], Math.floor(n / (atlas[0] * atlas[1]))];
+}
+
+// Which byte of which texture an attribute is.
+function placeOf(textures: TexelTextures, attribute: number): [Uint8Array, number] {
+  if (attribute >= 4) return [textures.second, attribute - 4];
+  return [textures.first, attribute === 0 ? 3 : attribute - 1];
 }
 
 function takeTexels(
   pixels: Uint8ClampedArray, which: number, textures: TexelTextures,
   visit: (put: (pixel: number, texel: number) => void) => void,
 ): boolean {
-  const [red, green, blue] = kPlaces[which];
-  const bytesOf = (place: typeof red) => (place ? textures[place[0]] : undefined);
-  const reds = bytesOf(red)!;
-  const greens = bytesOf(green)!;
-  const blues = bytesOf(blue);
-  const [r, g, b] = [red![1], green![1], blue?.[1] ?? 0];
+  const [red, green, blue] = kAttributesOf[which];
+  const [reds, r] = placeOf(textures, red);
+  const [greens, g] = placeOf(textures, green);
+  const [blues, b] = blue === undefined ? [undefined, 0] : placeOf(textures, blue);
   let left = 0; // what stands where nothing may
   visit((pixel, texel) => {
     reds[4 * texel + r] = pixels[4 * pixel];

@@ -1,11 +1,11 @@
-// A ray through the domain of one part of a content: straight pieces, measured in texels of the planes
-// (docs/tile-format.md, section 6; City-on-Web, section 4.4; MERF, section 4.1). Twin of src/render/cpu/volume_path.cpp.
+// A ray through the domain of one part of a content: straight pieces, measured in texels of some grid that fills the domain
+// (docs/tile-format.md, section 6; City-on-Web, section 4.4; MERF, section 4.1). Twin of src/scene/domain_path.cpp.
 //
-// Defines: VolumeSegment, rateAt, distanceAt, distanceBetween, regionAt, leaveRegion, volumeSegment.
+// Defines: DomainSegment, rateAt, distanceAt, distanceBetween, regionAt, leaveRegion, domainSegment.
 
 // The place after τ texels is start + τ direction, in texels from the lower corner of the domain. Within a region the
 // contraction is a projective map, and so is the distance along the ray: entry + square τ / (rate - growth τ).
-struct VolumeSegment {
+struct DomainSegment {
   vec3 start;
   vec3 direction;
   float length;
@@ -13,15 +13,15 @@ struct VolumeSegment {
 };
 
 // rate - growth τ, which is above zero but for rounding.
-float rateAt(VolumeSegment s, float tau) {
+float rateAt(DomainSegment s, float tau) {
   return max(s.rate - s.growth * tau, 1e-7 * s.rate);
 }
 
-float distanceAt(VolumeSegment s, float tau) {
+float distanceAt(DomainSegment s, float tau) {
   return s.entry + s.square * tau / rateAt(s, tau);
 }
 
-float distanceBetween(VolumeSegment s, float from, float to) {
+float distanceBetween(DomainSegment s, float from, float to) {
   return s.square * s.rate * (to - from) / (rateAt(s, from) * rateAt(s, to));
 }
 
@@ -71,8 +71,8 @@ float leaveRegion(vec3 o, vec3 d, int region, out int next) {
 
 // The piece of a ray (local coordinates; distances are those of the scene) from `near` to `far`, all in one region, in a
 // domain of [-half, half]³ with so many texels along an edge.
-VolumeSegment volumeSegment(vec3 o, vec3 d, int region, float near, float far, float halfDomain, float planes) {
-  VolumeSegment s;
+DomainSegment domainSegment(vec3 o, vec3 d, int region, float near, float far, float halfDomain, float texels) {
+  DomainSegment s;
   vec3 y = o + near * d;
   vec3 v = d;
   float entryM = 1.0, exitM = 1.0, growth = 0.0;
@@ -87,14 +87,14 @@ VolumeSegment volumeSegment(vec3 o, vec3 d, int region, float near, float far, f
     v = side * (d * o[a] - o * d[a]);
     v[a] = d[a];
   }
-  float texels = planes / (2.0 * halfDomain);
+  float perUnit = texels / (2.0 * halfDomain);
   float speed = length(v);
-  s.start = (y + halfDomain) * texels;
+  s.start = (y + halfDomain) * perUnit;
   s.direction = v / speed;
-  s.length = texels * speed * (far - near) / (entryM * exitM);
+  s.length = perUnit * speed * (far - near) / (entryM * exitM);
   s.entry = near;
   s.square = entryM * entryM;
-  s.rate = speed * texels;
+  s.rate = speed * perUnit;
   s.growth = growth * entryM;
   return s;
 }

@@ -1,0 +1,166 @@
+// One content of a `hash` scene along a ray: its samples, composited (docs/tile-format.md, section 7; NGP-RT, section 4.3).
+// Twin of src/render/cpu/hash_march.cpp and hash_features.cpp.
+//
+// Reads: domain_path.glsl, part_place.glsl; TABLES, fine levels of a part; VARYING, defined where weights differ from place
+//   to place; SHARED, defined where one logit weighs all of a level; VECTORS_OF_PART; `content`: the parts' vectors (see
+//   partOf); vec4 corners0First(vec3), corners0Second(vec3), and where VARYING corners1First and corners1Second: texels of
+//   an atlas of macroblocks of 9³ corners, of columns 1 2 3 0, 4 5 6 7 and so on, the middle of the first at 0.5; sampler3D
+//   macroblocks: where they are in it, bytes, the fourth 0 where none is; usampler3D distances: cells of each octant, four bits each;
+//   usampler3D occupied: bits of 2 × 2 × 2 finest cells; usampler2DArray tables: entries, two words each, 2048 a row, 2048 rows a
+//   layer; vec2 levelWeights[TABLES], where not VARYING: of density, of all else; float shares[TABLES + 1] or more: of the coarse features'
+//   and each level's diffuse colour and features, 1 but for display; int attention: the level whose weights of density (1 +
+//   2 l) or of all else (2 + 2 l) stand for features, 0 for none; float stepLength: share of the domain's width; float
+//   minTransmittance.
+// Defines: Part, partOf, marchSegment.
+
+const float kLongestStep = 1e3;     // that counts, scene units
+const float kMostLogDensity = 15.0;
+const float kCellSlack = 1e-3;      // finest cells: more than what places are rounded by
+const int kPlaceVectors = 6, kTableVectors = 5;
+
+struct Part {
+  Place place;
+  float texels;   // finest cells along an axis
+  float lattice;  // corners along an axis
+  int level;      // of the distances: so often are finest cells halved
+  ivec3 macroblockOrigin, distanceOrigin, occupiedOrigin;
+  int ranges;     // its vector where those of its columns begin
+};
+
+Part partOf(int n) {
+  int at = VECTORS_OF_PART * n;
+  vec4 a = content[at], b = content[at + 1], c = content[at + 2], d = content[at + 3], e = content[at + 4], f = content[at + 5];
+  ivec3 occupiedOrigin = ivec3(e.w, 0, f.w);
+  return Part(placeOf(a, b, c, d), b.w, a.w, int(d.w), ivec3(e.xyz), ivec3(f.xyz), occupiedOrigin, at + kPlaceVectors);
+}
+
+// Bytes of an entry: diffuse colour and density, features.
+void unpackEntry(uvec2 words, out vec4 first, out vec4 second) {
+  first = vec4(uvec4(words.x >> 8, words.x >> 16, words.x >> 24, words.x) & 255u);
+  second = vec4(uvec4(words.y, words.y >> 8, words.y >> 16, words.y >> 24) & 255u);
+}
+
+// A fine level at p in [0,1]³ of the domain; its vectors begin at `at`.
+void mixTable(int at, vec3 p, out vec4 first, out vec4 second) {
+  vec4 head = content[at];  // resolution, entries, hashed, first row
+  vec3 scaled = (head.x - 1.0) * p + 0.5;
+  vec3 lower = floor(scaled), upper = scaled - lower;
+  uvec3 c = uvec3(lower);
+  uint resolution = uint(head.x), entries = uint(head.y), firstRow = uint(head.w);
+  // What the lower and the upper sides add to the number of an entry.
+  uvec2 x = uvec2(c.x, c.x + 1u), y = uvec2(c.y, c.y + 1u), z = uvec2(c.z, c.z + 1u);
+  bool hashed = head.z != 0.0;
+  y *= hashed ? 2654435761u : resolution;
+  z *= hashed ? 805459861u : resolution * resolution;
+  first = vec4(0.0);
+  second = vec4(0.0);
+  for (int k = 0; k < 8; ++k) {
+    int i = k & 1, j = (k >> 1) & 1, l = k >> 2;
+    uint entry = hashed ? (x[i] ^ y[j] ^ z[l]) & (entries - 1u) : (x[i] + y[j] + z[l]) % entries;
+    uint row = firstRow + (entry >> 11);
+    vec4 one, other;
+    unpackEntry(texelFetch(tables, ivec3(entry & 2047u, row & 2047u, row >> 11), 0).rg, one, other);
+    float weight = (i == 1 ? upper.x : 1.0 - upper.x) * (j == 1 ? upper.y : 1.0 - upper.y) * (l == 1 ? upper.z : 1.0 - upper.z);
+    first += weight * one;
+    second += weight * other;
+  }
+  first = content[at + 1] + content[at + 2] * first;
+  second = content[at + 3] + content[at + 4] * second;
+}
+
+#ifdef VARYING
+// Of density and of all else, of a level; columns stand in the order 1 2 3 0, 4 5 6 7.
+vec2 weightsOf(int level, vec4 first, vec4 second) {
+#ifdef SHARED
+  float logit = level < 4 ? first[(level + 3) & 3] : second[level & 3];
+  vec2 logits = vec2(logit);
+#else
+  vec2 logits = level == 0 ? first.wx : level == 1 ? first.yz : level == 2 ? second.xy : second.zw;
+#endif
+  return 1.0 / (1.0 + exp(-logits));
+}
+#endif
+
+// Where macroblocks have a corner; `first` is diffuse colour and the logarithm of density, before any activation.
+void featuresAt(Part part, vec3 p, vec3 corner, out vec4 first, out vec4 second) {
+  int ranges = part.ranges;
+  vec4 coarse = content[ranges] + content[ranges + 1] * corners0First(corner);
+  vec4 coarseFeatures = content[ranges + 2] + content[ranges + 3] * corners0Second(corner);
+  first = vec4(shares[0] * coarse.rgb, coarse.a);
+  second = shares[0] * coarseFeatures;
+#ifdef VARYING
+  vec4 logitsFirst = content[ranges + 4] + content[ranges + 5] * corners1First(corner);
+  vec4 logitsSecond = content[ranges + 6] + content[ranges + 7] * corners1Second(corner);
+  int table = ranges + 8;
+#else
+  int table = ranges + 4;
+#endif
+  float shown = 0.0;
+  for (int level = 0; level < TABLES; ++level, table += kTableVectors) {
+#ifdef VARYING
+    vec2 weights = weightsOf(level, logitsFirst, logitsSecond);
+#else
+    vec2 weights = levelWeights[level];
+#endif
+    vec4 fine, fineFeatures;
+    mixTable(table, p, fine, fineFeatures);
+    float share = shares[level + 1] * weights.y;
+    first += vec4(vec3(share), weights.x) * fine;
+    second += share * fineFeatures;
+    if (attention == 1 + 2 * level) shown = weights.x;
+    if (attention == 2 + 2 * level) shown = weights.y;
+  }
+  if (attention > 0) second.rgb = vec3(shown);
+}
+
+void marchSegment(Part part, DomainSegment s, inout Composite sum) {
+  float cells = part.texels;
+  float step = stepLength * cells;
+  vec3 up = vec3(greaterThan(s.direction, vec3(0.0)));
+  vec3 inverse = mix(1.0 / s.direction, vec3(-1e20), equal(s.direction, vec3(0.0)));  // the octant is that below
+  uint shift = 4u * uint(up.x + 2.0 * up.y + 4.0 * up.z);
+  float coarse = float(1 << part.level);
+  float count = ceil(s.length / step);
+  float i = 0.0;
+  int guard = 0;  // no segment is longer than its diagonal; a bound for drivers that want one
+  do {
+    // On to a step that may show something, in a loop of its own: what takes several rays together (Mesa on a processor:
+    // always) does for all of them whatever stands in a loop that one has not left.
+    float from, to, tau;
+    vec3 x;
+    do {
+      from = i * step, to = min(from + step, s.length);
+      tau = 0.5 * (from + to);
+      x = clamp(s.start + tau * s.direction, 0.0, cells * 0.9999999);
+      ivec3 cell = ivec3(x);
+      float edge = coarse;  // of what is empty's cells
+      float free = float((texelFetch(distances, part.distanceOrigin + (cell >> part.level), 0).r >> shift) & 15u);
+      if (free == 0.0) {
+        if (part.level == 0) break;
+        uint eight = texelFetch(occupied, part.occupiedOrigin + (cell >> 1), 0).r;
+        ivec3 odd = cell & 1;
+        if (((eight >> uint(odd.x + 2 * odd.y + 4 * odd.z)) & 1u) != 0u) break;
+        free = 1.0;
+        edge = eight == 0u ? 2.0 : 1.0;
+      }
+      // A cube of so many cells is empty that begins here and lies where the ray goes: on to the first step whose middle
+      // lies behind it.
+      vec3 end = (floor(x / edge) + mix(vec3(1.0 - free), vec3(free), up)) * edge + mix(vec3(kCellSlack), vec3(-kCellSlack), up);
+      vec3 exits = (end - s.start) * inverse;
+      float exit = min(min(exits.x, exits.y), min(exits.z, s.length));
+      i = max(i + 1.0, ceil(exit / step - 0.5));
+    } while (i < count && ++guard < 65536);
+    if (i >= count) return;
+    i += 1.0;
+    vec3 p = x / cells;
+    vec3 u = clamp(p * part.lattice - 0.5, 0.0, part.lattice - 1.0);
+    vec3 block = floor(u / 8.0);
+    vec4 place = texelFetch(macroblocks, part.macroblockOrigin + ivec3(block), 0);
+    if (place.w != 0.0) {
+      vec4 first, second;
+      featuresAt(part, p, floor(place.xyz * 255.0 + 0.5) * 9.0 + (u - 8.0 * block) + 0.5, first, second);
+      float opacity = opacityOf(exp(min(first.a, kMostLogDensity)) * min(distanceBetween(s, from, to), kLongestStep));
+      addTo(sum, first.rgb, second, opacity, distanceAt(s, tau));
+    }
+  } while (i < count && sum.transmittance >= minTransmittance && ++guard < 65536);
+}

@@ -1,0 +1,25 @@
+// A ray through one part of a content, piece by piece.
+//
+// Reads: domain_path.glsl, part_place.glsl; a march's Part, which has a place and the `texels` along its domain that pieces
+//   are measured in, and marchSegment; float minTransmittance.
+// Defines: marchPart.
+
+// Goes on with `sum`, which holds the content's parts in front of this one.
+void marchPart(Part part, vec3 origin, vec3 direction, vec2 range, inout Composite sum) {
+  vec3 o = (origin - part.place.centre) / part.place.scale, d = direction / part.place.scale;
+  bool contracted = part.place.contracted;
+  float halfDomain = contracted ? 2.0 : 1.0;
+  int region = contracted ? regionAt(o + range.x * d) : kCube;
+  float t = range.x;
+  int guard = 0;  // at most five regions; where rays run along the border of two, some more pieces of no length
+  do {
+    int next = region;
+    float exit = contracted ? min(leaveRegion(o, d, region, next), range.y) : range.y;
+    if (exit > t) {
+      marchSegment(part, domainSegment(o, d, region, t, exit, halfDomain, part.texels), sum);
+      if (sum.transmittance < minTransmittance) return;
+      t = exit;
+    }
+    region = next;
+  } while (t < range.y && ++guard < 12);
+}

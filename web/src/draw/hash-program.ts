@@ -1,0 +1,69 @@
+// What of a `hash` scene goes into the shader that draws a content: its march. What it writes are sums, of which
+// network-pass.ts makes colours when those of all contents are there (docs/tile-format.md, section 7).
+import marchSource from '../../../shaders/lib/hash_march.glsl?raw';
+import { kAttributes } from '../tiles/content';
+import { columnsOf, kMostTables, vectorsOfPart, type HashPart, type HashSettings } from '../tiles/hash-content';
+import type { ProgramPieces } from './content-program';
+import { atlasShader } from './content-textures';
+import { kCornerAtlases } from './hash-textures';
+
+// Networks that a picture tells apart: those beyond are taken for the last of them.
+export const kWeightsOfTarget = 3; // numbers of a target beside its opacity
+export function networksOf(weightTargets: number): number {
+  return kWeightsOfTarget * (1 + weightTargets);
+}
+
+// Targets: sums of diffuse colour, distances, of three features, of the fourth and the weights of networks 1 and 2, and of three
+// more in each further one. What weighs network 0 is the rest of the opacity.
+function outputs(weightTargets: number): string {
+  const more = [...Array(weightTargets).keys()];
+  return [
+    'layout(location = 0) out vec4 diffuseAndOpacity;',
+    'layout(location = 2) out vec4 featuresAndOpacity;',
+    'layout(location = 3) out vec4 weightsAndOpacity;',
+    ...more.map((n) => `layout(location = ${4 + n}) out vec4 weights${n}AndOpacity;`),
+    'uniform int network;  // the content\'s',
+    'vec3 weightOf(int first) {',
+    '  return vec3(equal(ivec3(first, first + 1, first + 2), ivec3(network)));',
+    '}',
+    'void writeWeights(float feature, float opacity) {',
+    '  weightsAndOpacity = vec4(feature, opacity * weightOf(1).xy, opacity);',
+    ...more.map((n) => `  weights${n}AndOpacity = opacity * vec4(weightOf(${kWeightsOfTarget * (n + 1)}), 1.0);`),
+    '}',
+  ].join('\n');
+}
+
+const kUniforms = `
+uniform sampler3D macroblocks;
+uniform usampler3D distances, occupied;
+uniform usampler2DArray tables;
+uniform vec2 levelWeights[TABLES];
+uniform float shares[${kMostTables + 1}], stepLength;
+uniform int attention;
+`;
+
+const kWrite = `
+void writeContent(Composite sum, vec3 d, float opacity, float seen) {
+  vec4 features = sum.features;
+  if (display == kShowBlocks) features.rgb = opacity * colourOfBlock;
+  if (display == kShowLevels) features.rgb = opacity * colourOfLevel;
+  const float most = 60000.0;  // half floats end at 65504
+  diffuseAndOpacity = seen * vec4(clamp(sum.diffuse, -most, most), opacity);
+  features = seen * clamp(features, -most, most);
+  featuresAndOpacity = vec4(features.xyz, seen * opacity);
+  writeWeights(features.w, seen * opacity);
+}`;
+
+export function hashPieces(
+  { parts, settings, atlases }: { parts: HashPart[]; settings: HashSettings; atlases: number }, weightTargets: number,
+): ProgramPieces {
+  const columns = columnsOf(settings);
+  const tables = parts[0].tables.length;
+  const vectorsOfOne = vectorsOfPart(columns, tables);
+  const defines: Record<string, number | string> = { TABLES: tables, VECTORS_OF_PART: vectorsOfOne };
+  if (columns > kAttributes) defines.VARYING = '';
+  if (settings.weights === 'shared') defines.SHARED = '';
+  const names = kCornerAtlases.slice(0, columns / kAttributes).flat();
+  const source = [outputs(weightTargets), kUniforms, atlasShader(names, atlases), marchSource, kWrite].join('\n');
+  return { parts: parts.length, vectors: vectorsOfOne * parts.length, defines, source };
+}

@@ -1,0 +1,58 @@
+// What of a `volume` scene goes into the shader that draws a content: its march, and its network, which is run for each content
+// (docs/tile-format.md, section 6).
+import marchSource from '../../../shaders/lib/volume_march.glsl?raw';
+import type { DenseLayer } from '../tiles/content';
+import { networkVectors, packNetwork } from '../tiles/network';
+import { kVectorsOfPart, type VolumePart } from '../tiles/volume-content';
+import type { ProgramPieces } from './content-program';
+import { atlasShader } from './content-textures';
+import { layersShader, writtenVector } from './network-shader';
+import { kVoxelAtlases } from './volume-textures';
+
+const kUniforms = `
+layout(location = 0) out vec4 colourAndOpacity;
+uniform sampler2DArray planesFirst, planesSecond;
+uniform sampler3D macroblocks, distances;
+uniform float featureRange, densityRange, stepsPerTexel;
+`;
+
+const kWrite = `
+void writeContent(Composite sum, vec3 d, float opacity, float seen) {
+  vec3 specular = deferred(sum.diffuse, sum.features, d);
+  vec3 colour = sum.diffuse + opacity * specular;
+  if (display == kShowDiffuse) colour = sum.diffuse;
+  if (display == kShowSpecular) colour = opacity * specular;
+  if (display == kShowFeatures) colour = sum.features.rgb;
+  if (display == kShowBlocks || display == kShowLevels) {
+    vec3 tint = display == kShowBlocks ? colourOfBlock : colourOfLevel;
+    colour = tint * (0.35 * opacity + 0.65 * dot(colour, vec3(0.3, 0.6, 0.1)));
+  }
+  colourAndOpacity = seen * vec4(colour, opacity);
+}`;
+
+// `vec3 deferred(vec3 diffuse, vec4 features, vec3 d)`, as layersShader has it.
+export function deferredShader(network: Pick<DenseLayer, 'inputs' | 'outputs'>[], vector: (n: number) => string): string {
+  const harmonics = [1, 2, 3].map((k) =>
+    `  vec3 s${k} = 2.0 * s${k - 1} * c${k - 1}, c${k} = 1.0 - 2.0 * s${k - 1} * s${k - 1};`);
+  const xyz = (name: string) => ['x', 'y', 'z'].map((axis) => `${name}.${axis}`);
+  const inputs = [
+    ...xyz('diffuse'), ...xyz('features'), 'features.w', ...xyz('d'),
+    ...['s0', 's1', 's2', 's3', 'c0', 'c1', 'c2', 'c3'].flatMap(xyz),
+  ];
+  const { lines, outputs } = layersShader(inputs, network, vector);
+  return [
+    'vec3 deferred(vec3 diffuse, vec4 features, vec3 d) {', '  vec3 s0 = sin(d), c0 = cos(d);', ...harmonics, ...lines,
+    `  return 1.0 / (1.0 + exp(-vec3(${outputs.join(', ')})));`, '}',
+  ].join('\n');
+}
+
+// `ownNetwork`: written into the program, which then is of one content alone.
+export function volumePieces(
+  { parts, network, atlases }: { parts: VolumePart[]; network: DenseLayer[]; atlases: number }, ownNetwork: boolean,
+): ProgramPieces {
+  const ofParts = kVectorsOfPart * parts.length;
+  const packed = packNetwork(network);
+  const vector = (n: number) => (ownNetwork ? writtenVector(packed, n) : `content[${ofParts + n}]`);
+  const source = [kUniforms, atlasShader(kVoxelAtlases, atlases), marchSource, deferredShader(network, vector), kWrite].join('\n');
+  return { parts: parts.length, vectors: ofParts + networkVectors(network), defines: {}, source };
+}

@@ -1,0 +1,170 @@
+// A hash content, read: untrusted bytes. docs/tile-format.md, sections 5, 7 and 10.
+import { count, emptyTextures, kAttributes, kContentLimits, putCube, type ContentLimits, type Cubes, type DenseLayer } from './content';
+import { texturesOf } from './content-layout';
+import { ContentReader } from './content-reader';
+import { brokenPromise, ruleOfNetwork, ruleOfParts } from './content-rules';
+import {
+  columnsOf, distanceLevel, kEntriesOfRow, kLevelWeights, kMostTables, vectorsOfPart, type ByteRange, type EntryList, type HashContent,
+  type HashPart, type HashSettings, type HashTable, type LevelWeights,
+} from './hash-content';
+import { layOutHash, type HashLayout } from './hash-layout';
+import * as rules from './hash-rules';
+import { arrayOf, fieldOf, flagOf, numberFrom, numberOf, stringOf, wholeOf, type Json } from './json-fields';
+import { networkVectors } from './network';
+import type { OccupancyBits } from './occupancy';
+import { eightsOf, halved, octantDistances, type Cells } from './octant-distances';
+import { sizeOfList, takeList } from './texel-pictures';
+import type { TileContent } from './tileset';
+
+// What a content says of itself; nothing has been allocated for its texels.
+export interface HashHeader {
+  representation: 'hash';
+  settings: HashSettings;
+  parts: HashPart[];
+  layout: HashLayout;
+  atlases: number; // of the layout's corners
+  cardBytes: number; // that its textures and its numbers will take on the graphics card
+  sources: Json[]; // of the parts
+  network: DenseLayer[];
+  views: Uint8Array[];
+}
+
+export const kMostNetworkVectors = 4096; // which are written into a shader
+
+// Both throw SceneError that names `name` and the first rule that is broken; `promised` is what tileset.json says of
+// the content. The decoder of pictures must be prepared (lossless-image.ts).
+export function readHashHeader(
+  file: Uint8Array, name: string, promised?: Pick<TileContent, 'surround' | 'box'>, limits = kContentLimits,
+): HashHeader {
+  return new HashReader(name, limits).readHeader(file, promised);
+}
+
+export function decodeHash(header: HashHeader, name: string): HashContent {
+  return new HashReader(name, kContentLimits).readTexels(header);
+}
+
+class HashReader extends ContentReader {
+  constructor(name: string, limits: ContentLimits) {
+    super(name, limits);
+  }
+
+  readHeader(file: Uint8Array, promised?: Pick<TileContent, 'surround' | 'box'>): HashHeader {
+    const { ours, views } = this.readFile(file, 'hash');
+    const settings = this.readSettings(ours);
+    const columns = columnsOf(settings);
+    const sources = this.partsOf(ours);
+    const parts = sources.map((source, i) => readPart(source, columns, this.readPlace(source)) ?? this.fail(`part ${i}: its header is not complete`));
+    const network = this.readNetwork(fieldOf(ours, 'network'), views);
+    const tables = parts[0].tables.length;
+    const broken =
+      rules.ruleOfSettings(settings, tables) ?? ruleOfNetwork(network, rules.kHashInputs) ??
+      ruleOfParts(parts, (part) => rules.ruleOfPart(part, tables)) ?? (promised && brokenPromise(parts, promised));
+    if (broken) this.fail(broken);
+    if (networkVectors(network) > kMostNetworkVectors) {
+      this.fail('has a larger network than this viewer takes', 'draw it with tessera render');
+    }
+    const uniformBytes = 16 * vectorsOfPart(columns, tables) * parts.length;
+    const layout = this.laidOut(layOutHash(parts, columns, this.limits), uniformBytes);
+    const cardBytes = layout.bytes + uniformBytes;
+    const atlases = texturesOf(layout.corners);
+    return { representation: 'hash', settings, parts, layout, atlases, cardBytes, sources, network, views };
+  }
+
+  readTexels(header: HashHeader): HashContent {
+    const { settings, parts, layout, atlases, network, views } = header;
+    const corners = Array.from({ length: columnsOf(settings) / kAttributes }, () => emptyTextures(layout.corners.size));
+    const macroblocks: Cubes<Uint8Array> = { ...layout.macroblocks, texels: new Uint8Array(4 * count(layout.macroblocks.size)) };
+    const distances: Cubes<Uint32Array> = { ...layout.distances, texels: new Uint32Array(count(layout.distances.size)) };
+    const occupied: Cubes<Uint8Array> = { ...layout.occupied, texels: new Uint8Array(count(layout.occupied.size)) };
+    const { rows, layers } = layout.tables;
+    const bytes = new Uint8Array(kAttributes * kEntriesOfRow * rows * layers);
+    let begin = 0; // of the part's macroblocks in the atlas
+    parts.forEach((part, n) => {
+      const source = header.sources[n];
+      const of = (what: string) => `part ${n}: its ${what} are not what they should be`;
+      const { blocks } = layout.corners;
+      if (!this.readMacroblocks(views, source, part.lattice, part.stored, blocks, begin, macroblocks, n, corners)) {
+        this.fail(of('macroblocks'));
+      }
+      begin += part.stored;
+      part.tables.forEach(({ entries }, level) => {
+        const first = kEntriesOfRow * layout.tables.rowOf[n][level];
+        const pictures = fieldOf(arrayOf(source, 'tables')![level], 'texels');
+        const taken = this.takePictures(views, pictures, sizeOfList(entries),
+          (pixels, which) => takeList(pixels, which, entries, bytes, first));
+        if (!taken) this.fail(of('tables'));
+      });
+      const bits = this.readBits(views, fieldOf(source, 'occupied'), part.cells);
+      if (!bits) this.fail(of('occupied cells'));
+      const eights = eightsOf(bits);
+      putCube(eights.cells, eights.edge, occupied, n);
+      const coarse = cellsOfDistances(bits, eights);
+      putCube(octantDistances(coarse), coarse.edge, distances, n);
+    });
+    const tables: EntryList = { ...layout.tables, words: new Uint32Array(bytes.buffer) };
+    return {
+      representation: 'hash', settings, network, parts, corners, atlases, atlasDepth: layout.corners.depth, macroblocks, distances,
+      occupied, tables,
+    };
+  }
+
+  private readSettings(ours: Json): HashSettings {
+    const weights = stringOf(ours, 'weights') as LevelWeights;
+    const step = numberOf(ours, 'step');
+    const whole = flagOf(ours, 'whole');
+    if (!kLevelWeights.includes(weights) || step === undefined || whole === undefined) {
+      this.fail('does not say what weighs its levels, how long its steps are, or whether it is whole');
+    }
+    const settings: HashSettings = { weights, step: Math.fround(step), whole };
+    if (fieldOf(ours, 'logits') === undefined) return settings;
+    const logits = arrayOf(ours, 'logits') ?? [];
+    if (logits.length < 1 || logits.length > 2 * kMostTables) this.fail('its logits are none, or too many');
+    settings.logits = logits.map((logit) => Math.fround(numberFrom(logit) ?? this.fail('a logit is no number')));
+    return settings;
+  }
+}
+
+// Where the finest level has more cells than distances are kept for, a coarser one.
+function cellsOfDistances(bits: OccupancyBits, eights: Cells): Cells {
+  const level = distanceLevel(bits.edge);
+  if (level === 0) {
+    const cells = new Uint8Array(bits.edge ** 3);
+    for (let n = 0; n < cells.length; ++n) cells[n] = (bits.bytes[n >> 3] >> (n & 7)) & 1;
+    return { edge: bits.edge, cells };
+  }
+  let cells = eights; // itself the next level
+  for (let l = 1; l < level; ++l) cells = halved(cells);
+  return cells;
+}
+
+// Undefined where something is missing.
+function readPart(source: Json, columns: number, place: ReturnType<ContentReader['readPlace']>): HashPart | undefined {
+  const lattice = wholeOf(source, 'lattice', rules.kMostLattice);
+  const cells = wholeOf(source, 'cells', rules.kMostOccupancyCells);
+  const ranges = readRanges(source, columns);
+  const sources = arrayOf(source, 'tables') ?? [];
+  if (!place || lattice === undefined || cells === undefined || !ranges) return undefined;
+  if (sources.length < 1 || sources.length > kMostTables) return undefined;
+  const tables = sources.map(readTable);
+  return tables.includes(undefined) ? undefined : { ...place, lattice, cells, ranges, tables: tables as HashTable[] };
+}
+
+function readTable(source: Json): HashTable | undefined {
+  const resolution = wholeOf(source, 'resolution', rules.kMostTableResolution);
+  const entries = wholeOf(source, 'entries', rules.kMostTableEntries);
+  const hashed = flagOf(source, 'hashed');
+  const ranges = readRanges(source, kAttributes);
+  if (resolution === undefined || entries === undefined || hashed === undefined || !ranges) return undefined;
+  return { resolution, entries, hashed, ranges };
+}
+
+function readRanges(source: Json, count: number): ByteRange[] | undefined {
+  const pairs = arrayOf(source, 'ranges');
+  if (pairs?.length !== count) return undefined;
+  const ranges = pairs.map((pair) => {
+    const [low, high] = Array.isArray(pair) && pair.length === 2 ? pair.map(numberFrom) : [];
+    return low === undefined || high === undefined ? undefined : { low: Math.fround(low), high: Math.fround(high) };
+  });
+  return ranges.includes(undefined) ? undefined : (ranges as ByteRange[]);
+}
+
