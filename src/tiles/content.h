@@ -13,6 +13,8 @@ struct DenseLayer {
   uint32_t inputs = 0, outputs = 0;
   std::vector<float> weights;  // [outputs][inputs]
   std::vector<float> biases;   // [outputs]
+
+  bool operator==(const DenseLayer&) const = default;
 };
 
 // Scene units: those of tileset.json's extension, where half a finest block's edge is 1. Local coordinates are q = (x -

@@ -82,26 +82,30 @@ class VolumeBlend {
   double transmittance_ = 1;
 };
 
-// Sums of all contents, and once the network of the one that is seen most.
+// Sums of all contents, and once the network of those that are seen most.
 class HashBlend {
  public:
   explicit HashBlend(ExpectedRay& ray) : ray_(ray) {}
   void add(const HashContent& content, const ReferenceComposite& composite) {
+    const auto known = std::find_if(networks_.begin(), networks_.end(),
+                                    [&](const auto& one) { return *one.first == content.network; });
     const double weight = sums_.transmittance * (1 - composite.transmittance);
-    if (weight > most_) {
-      most_ = weight;
-      network_ = &content.network;
-    }
+    if (known != networks_.end())
+      known->second += weight;
+    else
+      networks_.emplace_back(&content.network, weight);
     for (int k = 0; k < 7; ++k) sums_.values[k] += sums_.transmittance * composite.values[k];
     ray_.distance += sums_.transmittance * composite.depth;
     sums_.transmittance *= composite.transmittance;
   }
   void end() {
     ray_.opacity = 1 - sums_.transmittance;
-    if (network_ == nullptr) return;
+    if (ray_.opacity <= 0) return;
+    const auto heaviest = std::max_element(networks_.begin(), networks_.end(),
+                                           [](const auto& a, const auto& b) { return a.second < b.second; });
     std::vector<double> values(sums_.values, sums_.values + 7);
     for (const double harmonic : harmonics(ray_.direction)) values.push_back(harmonic);
-    values = runNetwork(*network_, values);
+    values = runNetwork(*heaviest->first, values);
     for (size_t c = 0; c < 3; ++c) ray_.colour[c] = ray_.opacity / (1 + std::exp(-(sums_.values[c] + values[c])));
   }
 
@@ -131,8 +135,7 @@ class HashBlend {
 
   ExpectedRay& ray_;
   ReferenceComposite sums_;
-  double most_ = 0;
-  const std::vector<DenseLayer>* network_ = nullptr;
+  std::vector<std::pair<const std::vector<DenseLayer>*, double>> networks_;  // and how much is seen of each
 };
 
 template <class Content, class Blend>

@@ -28,8 +28,15 @@ std::array<float, 16> harmonicsOf(const Vec3d& direction) {
 
 HashShading::HashShading(const std::vector<const HashContent*>& contents, const MarchSettings& settings)
     : settings_(settings) {
+  std::vector<const std::vector<DenseLayer>*> known;
   for (const HashContent* content : contents) {
-    networks_.emplace_back(content->network, kInputs, kOutputs);
+    const auto same = std::find_if(known.begin(), known.end(),
+                                   [content](const auto* network) { return *network == content->network; });
+    networkOfContent_.push_back(static_cast<size_t>(same - known.begin()));
+    if (same == known.end()) {
+      known.push_back(&content->network);
+      networks_.emplace_back(content->network, kInputs, kOutputs);
+    }
     isWhole_ |= content->isWhole;
     for (const HashPart& part : content->parts) features_.emplace(&part, HashFeatures(*content, part));
   }
@@ -59,12 +66,13 @@ void HashShading::march(const HashContent& content, const HashPart& part, std::s
 void HashShading::add(size_t number, const ContentComposite& composite, size_t content) {
   Lane& lane = lanes_[number];
   const float weight = lane.sums.transmittance * (1 - composite.transmittance);
+  const size_t network = networkOfContent_[content];
   const auto known = std::find_if(lane.weights.begin(), lane.weights.end(),
-                                  [content](const auto& one) { return one.first == content; });
+                                  [network](const auto& one) { return one.first == network; });
   if (known != lane.weights.end()) {
     known->second += weight;
   } else if (weight > 0) {
-    lane.weights.emplace_back(content, weight);
+    lane.weights.emplace_back(network, weight);
   }
   for (int k = 0; k < ContentComposite::kValues; ++k) {
     lane.sums.values[k] += lane.sums.transmittance * composite.values[k];
@@ -80,7 +88,7 @@ void HashShading::end(size_t number, DrawnPixel& pixel) {
   if (networks_.empty() || (!whole && lane.sums.transmittance >= 1)) return;
   const auto heaviest = std::max_element(lane.weights.begin(), lane.weights.end(),
                                          [](const auto& a, const auto& b) { return a.second < b.second; });
-  const size_t network = heaviest == lane.weights.end() ? networks_.size() - 1 : heaviest->first;
+  const size_t network = heaviest == lane.weights.end() ? networkOfContent_.back() : heaviest->first;
   waiting_.push_back({&pixel, lane.sums, lane.direction, network, whole});
 }
 

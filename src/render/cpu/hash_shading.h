@@ -18,10 +18,11 @@ namespace tessera {
 // The first 16 real spherical harmonics of a unit direction, in the order and with the signs of tiny-cuda-nn.
 std::array<float, 16> harmonicsOf(const Vec3d& direction);
 
-// C_d = Σ_k T_k C_d^k, F likewise, T_k = Π_{j<k} (1 - α^j). Once a ray, the network of the content whose T_k α^k is
-// largest says z = C_d + ψ(C_d, F, harmonics); the colour is (1 - T) sigmoid(z), or sigmoid(z) and opaque where
-// contents are whole, unless something else stands at the ray's end. Where nothing is met, the last content's network
-// speaks. Networks are run for many rays at a time.
+// C_d = Σ_k T_k C_d^k, F likewise, T_k = Π_{j<k} (1 - α^j). Once a ray, the network of those contents whose T_k α^k add
+// up to most (contents with the same numbers have the same network: those of a level) says z = C_d + ψ(C_d, F,
+// harmonics); the colour is (1 - T) sigmoid(z), or sigmoid(z) and opaque where contents are whole, unless something
+// else stands at the ray's end. Where nothing is met, the last content's network speaks. Networks are run for many rays
+// at a time.
 class HashShading {
  public:
   static constexpr uint32_t kInputs = 23, kOutputs = 3;
@@ -40,7 +41,7 @@ class HashShading {
     ContentComposite sums;
     Vec3d direction = Vec3d::UnitZ();
     bool isOpen = true;                             // nothing else is known to be at its end
-    std::vector<std::pair<size_t, float>> weights;  // of contents that have been met
+    std::vector<std::pair<size_t, float>> weights;  // of networks that have been met
   };
   struct Waiting {
     DrawnPixel* pixel;
@@ -50,7 +51,8 @@ class HashShading {
     bool whole;
   };
 
-  std::vector<DenseNetwork> networks_;
+  std::vector<DenseNetwork> networks_;    // each once
+  std::vector<size_t> networkOfContent_;  // its number, of each content
   std::unordered_map<const HashPart*, HashFeatures> features_;
   bool isWhole_ = false;
   MarchSettings settings_;

@@ -171,6 +171,21 @@ TEST(HashShading, TakesTheNetworkOfTheContentThatIsSeenMost) {
   expectNear(shade({&one, &other}, {thick, thin}), shade({&one, &one}, {thick, thin}), 1e-6);
 }
 
+TEST(HashShading, CountsContentsOfOneNetworkTogether) {
+  const std::vector<Sample> samples = randomSamples(12);
+  const std::span<const Sample> all(samples);
+  HashContent left, right, other;
+  left.network = right.network = madeHashNetwork(1);
+  other.network = madeHashNetwork(2);
+  const std::vector<ContentComposite> pieces = {compositeOf(all.first(4)), compositeOf(all.subspan(4, 3)),
+                                                compositeOf(all.subspan(7))};
+  const float first = 1 - pieces[0].transmittance, second = pieces[0].transmittance * (1 - pieces[1].transmittance),
+              third = pieces[0].transmittance * pieces[1].transmittance * (1 - pieces[2].transmittance);
+  ASSERT_GT(second, std::max(first, third));
+  ASSERT_GT(first + third, second);
+  expectNear(shade({&left, &other, &right}, pieces), shade({&left, &left, &left}, pieces), 1e-6);
+}
+
 Camera camera() {
   Camera camera;
   camera.width = 24;
