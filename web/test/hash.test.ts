@@ -1,0 +1,157 @@
+// Scenes of hash in the browser: what those of volume do not have.
+import { cpSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import type { Browser, Page } from 'playwright-core';
+import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import type { Plain, View } from '../src/plain';
+import type { SceneOptions } from '../src/scene';
+import { decodeTileset } from '../src/tiles/decode-tileset';
+import { goldenHash, launch, missing, run, serve, type Server } from './machine';
+import { cameraPath, decodePng, psnr } from './pictures';
+import { openPlain } from './plain-page';
+import { viewAt } from './views';
+
+declare const plain: Plain;
+
+// Changes every content's JSON to text of the same length.
+function changeContents(folder: string, from: string, to: string): void {
+  expect(to.length).toBe(from.length);
+  for (const entry of readdirSync(folder, { recursive: true, encoding: 'utf8' })) {
+    if (!entry.endsWith('.glb')) continue;
+    const file = readFileSync(join(folder, entry));
+    const at = file.indexOf(from);
+    expect(at).toBeGreaterThan(0);
+    file.write(to, at);
+    writeFileSync(join(folder, entry), file);
+  }
+}
+
+describe.skipIf(missing())('a scene of hash', () => {
+  let server: Server;
+  let browser: Browser;
+  let folder: string;
+  const tileset = decodeTileset(readFileSync(`${goldenHash}/tileset.json`, 'utf8'), 'tileset.json');
+  const across = viewAt(tileset, [0.1, -4, 2], [0, 0, -0.3]);
+  const below = viewAt(tileset, [-0.7, 0.1, 0.5], [-0.69, 0.12, -1]);
+
+  beforeAll(async () => {
+    folder = mkdtempSync(join(tmpdir(), 'tessera-hash-'));
+    [server, browser] = await Promise.all([serve(goldenHash), launch()]);
+  });
+  afterAll(async () => {
+    await browser?.close();
+    server?.close();
+    rmSync(folder, { recursive: true });
+  });
+
+  async function open(said: string[], options: SceneOptions = {}, from = server): Promise<Page> {
+    const page = await openPlain(browser, from, said);
+    await page.evaluate((one) => plain.open('scene/tileset.json', { selection: { mostPixels: 0 }, ...one }), options);
+    return page;
+  }
+  async function look(page: Page, view: View): Promise<Uint8Array> {
+    await page.evaluate((one) => plain.settle(one), view);
+    return new Uint8Array(Buffer.from(await page.evaluate(() => plain.pixels()), 'base64'));
+  }
+
+  it('that is whole has no end: rays that meet nothing show what the network says of them', async () => {
+    const scene = join(folder, 'whole');
+    cpSync(goldenHash, scene, { recursive: true });
+    changeContents(scene, '"whole":false', '"whole":true ');
+    const up = viewAt(tileset, [0.2, 0.1, 0.4], [0.3, 0.4, 5]);
+    const views = [across, up];
+    writeFileSync(join(folder, 'path.json'), cameraPath(tileset, views.map(({ matrix }) => matrix)));
+    run('render', scene, join(folder, 'oracle'), '--path', join(folder, 'path.json'));
+    const whole = await serve(scene);
+    const said: string[] = [];
+    const page = await open(said, {}, whole);
+    const ending = await open(said);
+    for (const [i, view] of views.entries()) {
+      const expected = await decodePng(page, join(folder, 'oracle', `0000${i}.png`));
+      expect(psnr(await look(page, view), expected)).toBeGreaterThan(38);
+      if (view === up) expect(psnr(await look(ending, view), expected)).toBeLessThan(30); // which leaves the sky away
+    }
+    // What stands in it is behind the rays that it ends.
+    const boxes = async () => {
+      await page.evaluate(() => plain.addBox([1, 1, 4.5], [2, 2, 5]));
+      const pixels = await look(page, up);
+      await page.evaluate(() => plain.removeBox());
+      return pixels.filter((_, at) => at % 3 === 0 && pixels[at] > 200 && pixels[at + 1] < 60 && pixels[at + 2] < 60).length;
+    };
+    expect(await boxes()).toBeGreaterThan(20);
+    expect(said).toEqual([]);
+    await page.close();
+    await ending.close();
+    whole.close();
+  });
+
+  it('shows what its levels are weighed with, where weights are the same everywhere', async () => {
+    const said: string[] = [];
+    // Level 1's block has these logits (attention to density and to all else), and its surround weighs nothing.
+    const uris = tileset.tiles.flatMap(({ contents }) => contents.map(({ uri }) => uri));
+    const file = readFileSync(join(goldenHash, uris.find((uri) => uri.startsWith('tiles/L1/all'))!));
+    const json = JSON.parse(file.toString('utf8', 20, 20 + file.readUInt32LE(12))) as { extensions: { TESSERA_content: { logits: number[] } } };
+    const { logits } = json.extensions.TESSERA_content;
+    const page = await open(said, { selection: { mostPixels: 0, finestLevel: 1 } });
+    for (const [mode, level, logit] of [['densityAttention', 1, 0], ['attention', 1, 1], ['densityAttention', 2, 2], ['attention', 2, 3]] as const) {
+      await page.evaluate(([display, featureLevel]) => Object.assign(plain.city!, { display, featureLevel }), [mode, level] as const);
+      const pixels = await look(page, below);
+      const weight = 255 / (1 + Math.exp(-logits[logit]));
+      const alike = pixels.filter((value) => Math.abs(value - weight) < 3).length / pixels.length;
+      expect(alike, `${mode} ${level}`).toBeGreaterThan(0.95);
+    }
+    expect(await page.evaluate(() => plain.city!.featureLevels)).toBe(2);
+    expect(said).toEqual([]);
+    await page.close();
+  });
+
+  it('shows what a level alone gives to the colour, and tells contents and levels of detail apart', async () => {
+    const said: string[] = [];
+    const page = await open(said);
+    const show = async (display: string, featureLevel = 0) => {
+      await page.evaluate((one) => Object.assign(plain.city!, one), { display, featureLevel });
+      return look(page, across);
+    };
+    const colour = await show('colour');
+    const pictures = [
+      colour, await show('contribution', 0), await show('contribution', 1), await show('contribution', 2), await show('diffuse'),
+      await show('specular'), await show('features'), await show('blocks'), await show('levels'), await show('depth'),
+    ];
+    for (const [i, one] of pictures.entries()) {
+      expect(new Set(one).size).toBeGreaterThan(20);
+      for (const other of pictures.slice(i + 1)) expect(psnr(one, other)).toBeLessThan(35);
+    }
+    expect(await show('colour')).toEqual(colour);
+    expect(said).toEqual([]);
+    await page.close();
+  });
+
+  it('is drawn alike whichever numbers its networks have', async () => {
+    const said: string[] = [];
+    const scene = join(folder, 'levels');
+    cpSync(goldenHash, scene, { recursive: true });
+    const text = readFileSync(join(scene, 'tileset.json'), 'utf8');
+    expect(text).toContain('"levels": 2');
+    writeFileSync(join(scene, 'tileset.json'), text.replace('"levels": 2', '"levels": 5'));
+    const deep = await serve(scene);
+    const [page, plainly] = [await open(said, {}, deep), await open(said)];
+    const expected = await look(plainly, across);
+    expect(await look(page, across)).toEqual(expected);
+    // As if two others came first: theirs take the numbers that one picture of weights tells apart.
+    await page.evaluate(() => {
+      const { compositor } = plain.city as unknown as { compositor: any };
+      const { networksOf } = compositor;
+      compositor.networksOf = (parts: any[]) => {
+        const { networks, behind, whole } = networksOf.call(compositor, parts);
+        for (const { content } of parts) content.mesh.material.uniforms.network.value += 3;
+        return { networks: [networks[0], networks[0], networks[0], ...networks], behind: behind + 3, whole };
+      };
+    });
+    expect(psnr(await look(page, across), expected)).toBeGreaterThan(55);
+    expect(said).toEqual([]);
+    await page.close();
+    await plainly.close();
+    deep.close();
+  });
+});
