@@ -5,8 +5,9 @@
 #                second beside `field`
 #   ablation     the paper's table 3, equal steps, held-out PSNR of seeds: attention (separate, from place to place) against
 #                the sum of levels and against a network for each sample; multiply-accumulates of each
+#   browser      ten held-out views of fox's scene and of the city's in Debian's Chromium, against the renderer on the processor
 # Resumable: all is kept in build/bench/hash, and what is there is not made again.
-#   TESSERA_SHARED_DATA=DIR [ROWS="photographs scene ablation"] [SEEDS="1 2 3"] [STEPS=1500] [MINUTES=10] bench/hash.sh
+#   TESSERA_SHARED_DATA=DIR [ROWS="photographs scene ablation browser"] [SEEDS="1 2 3"] [STEPS=1500] [MINUTES=10] bench/hash.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
@@ -100,5 +101,19 @@ ablation() {
     "$(awk -v a="$(arithmetic "fox-attention-${seeds%% *}")" -v b="$(arithmetic "$field")" 'BEGIN { print a / b }')" '<=' 0.1
 }
 
-for row in ${ROWS:-photographs scene ablation}; do "$row"; done
+browser() {
+  trained fox-hash fox --method hash ${blocks[fox]} --minutes "$minutes"
+  baked fox-hash fox.scene fox
+  trained city-attention-1 city --method hash ${blocks[city]} --set aggregation=attention --steps "$steps" --seed 1 --set level_share=0
+  baked city-attention-1 city.scene city
+  tools/install-debian-packages.sh --browser
+  tools/build-web.sh
+  local place=$PWD/$work
+  export SCENES="$place/fox.scene $place/fox $place/city.scene $place/city" OUT=$place/browser
+  TESSERA=$(realpath "$tessera")
+  export TESSERA
+  (cd web && xvfb-run -a npx vitest run bench/hash.ts --config vitest.bench.config.ts --disable-console-intercept) || failures=$((failures + 1))
+}
+
+for row in ${ROWS:-photographs scene ablation browser}; do "$row"; done
 finish

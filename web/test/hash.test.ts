@@ -8,7 +8,7 @@ import type { Plain, View } from '../src/plain';
 import type { SceneOptions } from '../src/scene';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenHash, launch, missing, run, serve, type Server } from './machine';
-import { cameraPath, decodePng, psnr } from './pictures';
+import { cameraPath, coloursOf, decodePng, psnr } from './pictures';
 import { openPlain } from './plain-page';
 import { viewAt } from './views';
 
@@ -97,7 +97,7 @@ describe.skipIf(missing())('a scene of hash', () => {
     for (const [mode, level, logit] of [['densityAttention', 1, 0], ['attention', 1, 1], ['densityAttention', 2, 2], ['attention', 2, 3]] as const) {
       await page.evaluate(([display, featureLevel]) => Object.assign(plain.city!, { display, featureLevel }), [mode, level] as const);
       const pixels = await look(page, below);
-      const weight = 255 / (1 + Math.exp(-logits[logit]));
+      const weight = 255 * (1 + Math.exp(-logits[logit])) ** (-1 / 2.2); // as the eye sees it
       const alike = pixels.filter((value) => Math.abs(value - weight) < 3).length / pixels.length;
       expect(alike, `${mode} ${level}`).toBeGreaterThan(0.95);
     }
@@ -123,6 +123,28 @@ describe.skipIf(missing())('a scene of hash', () => {
       for (const other of pictures.slice(i + 1)) expect(psnr(one, other)).toBeLessThan(35);
     }
     expect(await show('colour')).toEqual(colour);
+    expect(said).toEqual([]);
+    await page.close();
+  });
+
+  it('is shown by the viewer, whose settings tell of its levels of features', async () => {
+    const page = await browser.newPage({ viewport: { width: 480, height: 270 } });
+    const said: string[] = [];
+    page.on('console', (message) => message.type() === 'error' && said.push(message.text()));
+    page.on('pageerror', (error) => said.push(error.message));
+    await page.goto(server.url);
+    await page.waitForSelector('.loading.done', { state: 'attached' });
+    expect(await coloursOf(page)).toBeGreaterThan(200);
+    await page.keyboard.press('c');
+    const level = page.getByLabel(/^Hash level/);
+    expect(await level.isVisible()).toBe(false);
+    await page.getByLabel(/^ShowColour/).selectOption('Colour of a hash level');
+    expect(await level.isVisible()).toBe(true);
+    const shown = () => level.evaluate((select: HTMLSelectElement) => [...select.options].filter(({ hidden }) => !hidden).length);
+    expect(await shown()).toBe(3); // two, and the coarse features
+    await level.selectOption('Level 2');
+    await page.getByLabel(/^ShowColour/).selectOption('Attention to colour');
+    expect(await shown()).toBe(2);
     expect(said).toEqual([]);
     await page.close();
   });

@@ -57,7 +57,9 @@ void main() {
   if (display == kShowDiffuse) colour = opacity * sigmoid(diffuse.rgb);
   if (display == kShowSpecular) colour = opacity * clamp(0.5 + seen - sigmoid(diffuse.rgb), 0.0, 1.0);  // grey: nothing
   if (display == kShowFeatures) colour = opacity * sigmoid(features.rgb);
-  if (display == kShowAttention || display == kShowDensityAttention) colour = features.rgb;
+  if (display == kShowAttention || display == kShowDensityAttention) {
+    colour = opacity * pow(features.rgb / opacity, vec3(1.0 / 2.2));  // most are small
+  }
   if (display == kShowBlocks || display == kShowLevels) {
     colour = features.rgb * (0.35 + 0.65 * dot(sigmoid(diffuse.rgb), vec3(0.3, 0.6, 0.1)));
   }
