@@ -44,7 +44,7 @@ void addBakeVerb(CLI::App& app) {
       ->check(CLI::Range(0.0, 1.0));
   verb->add_option(
           "--cells", flags->options.cells,
-          "of hash: cells of a block's occupancy along an edge, a multiple of 8; 0: twice the lattice's, or 256")
+          "of hash: cells of a block's occupancy along an edge, a multiple of 8; 0: three times the lattice's, up to 384")
       ->capture_default_str()
       ->check(CLI::Range(0u, kMostOccupancyCells))
       ->check(CLI::Validator(

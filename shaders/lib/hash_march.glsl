@@ -5,9 +5,9 @@
 //   to place; SHARED, defined where one logit weighs all of a level; VECTORS_OF_PART; `content`: the parts' vectors (see
 //   partOf); vec4 corners0First(vec3), corners0Second(vec3), and where VARYING corners1First and corners1Second: texels of
 //   an atlas of macroblocks of 9³ corners, of columns 1 2 3 0, 4 5 6 7 and so on, the middle of the first at 0.5; sampler3D
-//   macroblocks: where they are in it, bytes, the fourth 0 where none is; usampler3D distances: cells of each octant, four bits each;
-//   usampler3D occupied: bits of 2 × 2 × 2 finest cells; usampler2DArray tables: entries, two words each, 2048 a row, 2048 rows a
-//   layer; vec2 levelWeights[TABLES], where not VARYING: of density, of all else; float shares[TABLES + 1] or more: of the coarse features'
+//   macroblocks: where they are in it, bytes, the fourth 0 where none is; usampler3D distances and usampler2DArray
+//   nearDistances: both grids of src/tiles/occupancy_distance.h, the second as a list; usampler2DArray tables: entries, two
+//   words each; lists have 2048 a row, 2048 rows a layer; vec2 levelWeights[TABLES], where not VARYING: of density, of all else; float shares[TABLES + 1] or more: of the coarse features'
 //   and each level's diffuse colour and features, 1 but for display; int attention: the level whose weights of density (1 +
 //   2 l) or of all else (2 + 2 l) stand for features, 0 for none; float stepLength: share of the domain's width; float
 //   minTransmittance.
@@ -22,16 +22,22 @@ struct Part {
   Place place;
   float texels;   // finest cells along an axis
   float lattice;  // corners along an axis
-  int level;      // of the distances: so often are finest cells halved
-  ivec3 macroblockOrigin, distanceOrigin, occupiedOrigin;
+  int ratio;      // 0, 1, 2: coarse cells of distances are 1, 2 or 4 finest ones wide
+  ivec3 macroblockOrigin, distanceOrigin;
+  uint nearRow;   // of its first near distance
   int ranges;     // its vector where those of its columns begin
 };
 
 Part partOf(int n) {
   int at = VECTORS_OF_PART * n;
   vec4 a = content[at], b = content[at + 1], c = content[at + 2], d = content[at + 3], e = content[at + 4], f = content[at + 5];
-  ivec3 occupiedOrigin = ivec3(e.w, 0, f.w);
-  return Part(placeOf(a, b, c, d), b.w, a.w, int(d.w), ivec3(e.xyz), ivec3(f.xyz), occupiedOrigin, at + kPlaceVectors);
+  return Part(placeOf(a, b, c, d), b.w, a.w, int(d.w), ivec3(e.xyz), ivec3(f.xyz), uint(e.w), at + kPlaceVectors);
+}
+
+// Where item number n of a list is that begins at a row.
+ivec3 placeInList(uint firstRow, uint n) {
+  uint row = firstRow + (n >> 11);
+  return ivec3(n & 2047u, row & 2047u, row >> 11);
 }
 
 // Bytes of an entry: diffuse colour and density, features.
@@ -57,9 +63,8 @@ void mixTable(int at, vec3 p, out vec4 first, out vec4 second) {
   for (int k = 0; k < 8; ++k) {
     int i = k & 1, j = (k >> 1) & 1, l = k >> 2;
     uint entry = hashed ? (x[i] ^ y[j] ^ z[l]) & (entries - 1u) : (x[i] + y[j] + z[l]) % entries;
-    uint row = firstRow + (entry >> 11);
     vec4 one, other;
-    unpackEntry(texelFetch(tables, ivec3(entry & 2047u, row & 2047u, row >> 11), 0).rg, one, other);
+    unpackEntry(texelFetch(tables, placeInList(firstRow, entry), 0).rg, one, other);
     float weight = (i == 1 ? upper.x : 1.0 - upper.x) * (j == 1 ? upper.y : 1.0 - upper.y) * (l == 1 ? upper.z : 1.0 - upper.z);
     first += weight * one;
     second += weight * other;
@@ -119,7 +124,6 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
   vec3 up = vec3(greaterThan(s.direction, vec3(0.0)));
   vec3 inverse = mix(1.0 / s.direction, vec3(-1e20), equal(s.direction, vec3(0.0)));  // the octant is that below
   uint shift = 4u * uint(up.x + 2.0 * up.y + 4.0 * up.z);
-  float coarse = float(1 << part.level);
   float count = ceil(s.length / step);
   float i = 0.0;
   int guard = 0;  // no segment is longer than its diagonal; a bound for drivers that want one
@@ -133,16 +137,17 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
       tau = 0.5 * (from + to);
       x = clamp(s.start + tau * s.direction, 0.0, cells * 0.9999999);
       ivec3 cell = ivec3(x);
-      float edge = coarse;  // of what is empty's cells
-      float free = float((texelFetch(distances, part.distanceOrigin + (cell >> part.level), 0).r >> shift) & 15u);
-      if (free == 0.0) {
-        if (part.level == 0) break;
-        uint eight = texelFetch(occupied, part.occupiedOrigin + (cell >> 1), 0).r;
-        ivec3 odd = cell & 1;
-        if (((eight >> uint(odd.x + 2 * odd.y + 4 * odd.z)) & 1u) != 0u) break;
-        free = 1.0;
-        edge = eight == 0u ? 2.0 : 1.0;
+      float edge = float(1 << part.ratio);  // of the cells that what is empty is told in
+      uint word = texelFetch(distances, part.distanceOrigin + (cell >> part.ratio), 0).r;
+      if ((word & 15u) == 0u) {
+        if (part.ratio == 0) break;
+        ivec3 inside = cell & ((1 << part.ratio) - 1);
+        uint n = ((word >> 4) << (3 * part.ratio)) + uint(inside.x + ((inside.y + (inside.z << part.ratio)) << part.ratio));
+        word = texelFetch(nearDistances, placeInList(part.nearRow, n), 0).r;
+        edge = 1.0;
       }
+      float free = float((word >> shift) & 15u);
+      if (free == 0.0) break;
       // A cube of so many cells is empty that begins here and lies where the ray goes: on to the first step whose middle
       // lies behind it.
       vec3 end = (floor(x / edge) + mix(vec3(1.0 - free), vec3(free), up)) * edge + mix(vec3(kCellSlack), vec3(-kCellSlack), up);

@@ -66,7 +66,7 @@ inline void makeHash(HashPart& part, const MadeHashPart& made, const MadeFeature
     if (made.occupied(place)) occupied.set(number);
   }
   part.occupied = pyramidFromOccupancy(std::move(occupied));
-  part.distances = octantDistances(part.occupied.levels[HashPart::distanceLevel(part.cells())]);
+  part.distances = octantDistances(part.occupied);
 }
 
 // 23 → 16 → 3, as strong as `strength`.

@@ -18,13 +18,7 @@ std::optional<LevelWeights> levelWeightsFrom(std::string_view name) {
   return std::nullopt;
 }
 
-size_t HashPart::distanceLevel(uint32_t cells) {
-  size_t level = 0;
-  for (; cells > kMostDistanceCells; cells = (cells + 1) / 2) ++level;
-  return level;
-}
-
-uint64_t hashPartBytes(const HashPart& part, uint64_t storedMacroblocks, uint32_t cells) {
+uint64_t hashPartBytes(const HashPart& part, uint64_t storedMacroblocks, uint32_t cells, uint64_t nearCells) {
   const auto cube = [](uint64_t edge) { return edge * edge * edge; };
   uint64_t bytes = sizeof(HashPart) + sizeof(ByteRange) * part.ranges.size() +
                    sizeof(uint32_t) * cube(part.lattice / HashPart::kMacroblock) +
@@ -32,10 +26,9 @@ uint64_t hashPartBytes(const HashPart& part, uint64_t storedMacroblocks, uint32_
   for (const HashTable& table : part.tables) {
     bytes += sizeof(HashTable) + uint64_t{table.entries} * HashPart::kFeatures;
   }
-  const size_t distanceLevel = HashPart::distanceLevel(cells);
-  size_t level = 0;
+  const uint64_t ratio = OctantDistances::ratioFor(cells);
+  bytes += sizeof(uint32_t) * (cube(cells / ratio) + (ratio > 1 ? nearCells * cube(ratio) : 0));
   for (uint32_t edge = cells;; edge = (edge + 1) / 2) {
-    if (level++ == distanceLevel) bytes += sizeof(uint32_t) * cube(edge);
     bytes += sizeof(OccupancyBits) + sizeof(uint64_t) * ((cube(edge) + 63) / 64);
     if (edge <= 1) return bytes;
   }
@@ -43,7 +36,8 @@ uint64_t hashPartBytes(const HashPart& part, uint64_t storedMacroblocks, uint32_
 
 uint64_t bytesInMemory(const HashContent& content) {
   uint64_t bytes = sizeof(HashContent) + sizeof(float) * content.logits.size() + bytesInMemory(content.network);
-  for (const HashPart& part : content.parts) bytes += hashPartBytes(part, part.storedMacroblocks(), part.cells());
+  for (const HashPart& part : content.parts)
+    bytes += hashPartBytes(part, part.storedMacroblocks(), part.cells(), part.distances.nearCells());
   return bytes;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tiles/content.h"
+#include "tiles/occupancy_distance.h"
 #include "tiles/occupancy_pyramid.h"
 
 namespace tessera {
@@ -53,12 +54,7 @@ struct HashPart : ContentPart {
   // Where anything is seen, cells³ of the domain; levels[0] is the finest. All corners that samples there mix are
   // stored.
   OccupancyPyramid occupied;
-  // octantDistances of occupied.levels[distanceLevel(cells())]: what a ray may pass over.
-  std::vector<uint32_t> distances;
-
-  // The finest level that has no more than these cells along an edge.
-  static constexpr uint32_t kMostDistanceCells = 128;
-  static size_t distanceLevel(uint32_t cells);
+  OctantDistances distances;  // of it: what a ray may pass over
 
   uint32_t cells() const { return occupied.levels.front().cells; }
   uint32_t storedMacroblocks() const {
@@ -89,8 +85,9 @@ struct HashContent {
   }
 };
 
-// What a part takes in memory that has so many macroblocks, and cells along an edge, all else being there or not.
-uint64_t hashPartBytes(const HashPart& part, uint64_t storedMacroblocks, uint32_t cells);
+// What a part takes in memory that has so many macroblocks, cells along an edge, and near cells (OctantDistances), all
+// else being there or not.
+uint64_t hashPartBytes(const HashPart& part, uint64_t storedMacroblocks, uint32_t cells, uint64_t nearCells);
 // What a content takes in memory. Renderers' budgets count this.
 uint64_t bytesInMemory(const HashContent& content);
 

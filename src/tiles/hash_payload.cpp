@@ -39,6 +39,7 @@ class HashWriter : ContentWriter {
     json["tables"] = Json::array();
     for (const HashTable& table : part.tables) json["tables"].push_back(tableOf(table));
     json["cells"] = part.cells();
+    if (part.distances.ratio > 1) json["nearCells"] = part.distances.nearCells();
     json["occupied"] = picture(pictureOfBits(part.occupied.levels.front()));
     return json;
   }
@@ -85,7 +86,7 @@ Bytes encodeHash(const HashContent& content, int effort) {
   const auto broken = brokenRule(content);
   CHECK(broken.value_or("") == "");
   for (const HashPart& part : content.parts) {
-    CHECK((part.distances == octantDistances(part.occupied.levels[HashPart::distanceLevel(part.cells())])));
+    CHECK(part.distances == octantDistances(part.occupied));
   }
   Bytes file = HashWriter(content, effort).write();
   requireFileWithin(limits, file.size(), kRemedy);

@@ -144,10 +144,10 @@ TEST(HashPayload, CountsTheBytesThatItsPartsHold) {
   const HashContent content = madeHashContent(3);
   const HashPart& part = content.parts[0];
   uint64_t bytes = sizeof(HashPart) + part.ranges.size() * sizeof(ByteRange) + part.macroblocks.size() * 4 +
-                   part.cornerBytes.size() + 4 * part.distances.size();
+                   part.cornerBytes.size() + 4 * (part.distances.coarse.size() + part.distances.fine.size());
   for (const HashTable& table : part.tables) bytes += sizeof(HashTable) + table.bytes.size();
   for (const OccupancyBits& level : part.occupied.levels) bytes += sizeof(OccupancyBits) + 8 * level.words.size();
-  EXPECT_EQ(hashPartBytes(part, part.storedMacroblocks(), part.cells()), bytes);
+  EXPECT_EQ(hashPartBytes(part, part.storedMacroblocks(), part.cells(), part.distances.nearCells()), bytes);
 }
 
 TEST(HashPayload, HasPicturesThatWebPCanHoldUpToItsBounds) {
@@ -194,7 +194,8 @@ TEST(HashPayload, NamesTheRuleThatIsBroken) {
   names("part 0: a table has not its entries", [](HashContent& c) { c.parts[0].tables[1].bytes.pop_back(); });
   names("part 0: its occupancy is out of bounds", [](HashContent& c) { c.parts[0].occupied.levels.clear(); });
   names("part 0: its occupancy is out of bounds", [](HashContent& c) { c.parts[0].occupied.levels[0].cells = 12; });
-  names("part 0: its distances are not those of its cells", [](HashContent& c) { c.parts[0].distances.pop_back(); });
+  names("part 0: its distances are not those of its cells",
+        [](HashContent& c) { c.parts[0].distances.coarse.pop_back(); });
 }
 
 class HashRefusal : public testing::Test {
@@ -257,6 +258,30 @@ TEST_F(HashRefusal, OfHeadersThatLie) {
   refuses("part 0: its tables", [](json& asset) { part(asset)["tables"][1]["texels"].erase(2); });
   refuses("part 0: its tables", [](json& asset) { part(asset)["tables"][1]["entries"] = 1024; });
   refuses("part 0: its occupied cells", [](json& asset) { part(asset)["cells"] = 32; });
+  refuses(header, [](json& asset) { part(asset)["cells"] = 136; });  // does not say how many are near
+}
+
+TEST_F(HashRefusal, OfNearCellsThatAreNotThere) {
+  HashContent content = madeHashContent(5);
+  HashPart& part = content.parts[0];
+  OccupancyBits occupied(136);
+  occupied.set(7);
+  occupied.set(occupied.number(90, 90, 90));
+  part.occupied = pyramidFromOccupancy(std::move(occupied));
+  part.distances = octantDistances(part.occupied);
+  const auto again = roundTrip(content);
+  ASSERT_TRUE(again);
+  expectSame(content, *again);
+  const Bytes file = encodeHash(content, 1);
+  const auto view = decodeGlb(file);
+  for (const json& lie : {json(1), json(3), json(-1), json(1e9), json("2")}) {
+    json asset = json::parse(view->json);
+    EXPECT_EQ(asset["extensions"]["TESSERA_content"]["parts"][0]["nearCells"], 2);
+    asset["extensions"]["TESSERA_content"]["parts"][0]["nearCells"] = lie;
+    std::string reason;
+    EXPECT_FALSE(decodeHash(encodeGlb(asset.dump(), view->bytes), reason));
+    EXPECT_EQ(reason.substr(0, 7), "part 0:");
+  }
 }
 
 TEST_F(HashRefusal, OfMoreMemoryThanAllowedBeforeItIsTaken) {

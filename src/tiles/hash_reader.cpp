@@ -22,10 +22,10 @@ bool takeRange(const json& source, ByteRange& range) {
 // What a part says of itself, before anything is allocated for it.
 struct PartHeader {
   HashPart part;  // without bytes
-  uint32_t stored = 0, cells = 0;
+  uint32_t stored = 0, cells = 0, nearCells = 0;
   const json* source = nullptr;
 
-  uint64_t bytes() const { return hashPartBytes(part, stored, cells); }
+  uint64_t bytes() const { return hashPartBytes(part, stored, cells, nearCells); }
 };
 
 class HashReader : ContentReader {
@@ -111,6 +111,12 @@ class HashReader : ContentReader {
     part.columns = content_.columns();
     header.stored = *stored;
     header.cells = *cells;
+    if (const uint32_t ratio = OctantDistances::ratioFor(*cells); ratio > 1) {
+      const uint64_t edge = *cells / ratio;
+      const auto nearCells = unsignedOf(source, "nearCells", static_cast<uint32_t>(edge * edge * edge));
+      if (!nearCells) return false;
+      header.nearCells = *nearCells;
+    }
     const json* ranges = arrayOf(source, "ranges");
     if (!ranges || ranges->size() != part.columns) return false;
     part.ranges.resize(part.columns);
@@ -161,7 +167,8 @@ class HashReader : ContentReader {
     OccupancyBits occupied(header.cells);
     if (!readBits(source, "occupied", occupied)) return false;
     part.occupied = pyramidFromOccupancy(std::move(occupied));
-    part.distances = octantDistances(part.occupied.levels[HashPart::distanceLevel(part.cells())]);
+    if (nearCellsOf(part.occupied) != header.nearCells) return false;
+    part.distances = octantDistances(part.occupied);
     return true;
   }
 

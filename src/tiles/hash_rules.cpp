@@ -46,12 +46,16 @@ Broken ruleOfPart(const HashContent& content, const HashPart& part) {
   }
   if (part.occupied.levels.empty()) return "its occupancy is out of bounds";
   const uint32_t cells = part.cells();
-  if (cells % HashPart::kOccupancyUnit != 0 || cells < 1 || cells > kMostOccupancyCells) {
+  if (cells % HashPart::kOccupancyUnit != 0 || cells < 1 || cells > kMostOccupancyCells ||
+      part.occupied.levels.size() <= static_cast<size_t>(std::countr_zero(OctantDistances::kMostRatio))) {
     return "its occupancy is out of bounds";
   }
-  const size_t level = HashPart::distanceLevel(cells);
-  if (part.occupied.levels.size() <= level) return "its occupancy is out of bounds";
-  if (part.distances.size() != part.occupied.levels[level].count()) return "its distances are not those of its cells";
+  const uint32_t ratio = OctantDistances::ratioFor(cells);
+  if (part.distances.ratio != ratio || part.distances.cells != cells / ratio ||
+      part.distances.coarse.size() != size_t{cells / ratio} * (cells / ratio) * (cells / ratio) ||
+      part.distances.nearCells() != nearCellsOf(part.occupied)) {
+    return "its distances are not those of its cells";
+  }
   return std::nullopt;
 }
 

@@ -1,6 +1,7 @@
 #include "tiles/occupancy_distance.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <utility>
 
@@ -44,6 +45,144 @@ std::vector<uint32_t> octantDistances(const OccupancyBits& occupied) {
     }
   }
   return distances;
+}
+
+uint32_t OctantDistances::ratioFor(uint32_t finestCells) {
+  uint32_t ratio = 1;
+  while (ratio < kMostRatio && finestCells / ratio > kMostCoarse) ratio *= 2;
+  return ratio;
+}
+
+namespace {
+
+const OccupancyBits& coarseLevel(const OccupancyPyramid& occupied) {
+  const uint32_t ratio = OctantDistances::ratioFor(occupied.levels.front().cells);
+  return occupied.levels[static_cast<size_t>(std::countr_zero(ratio))];
+}
+
+// Of the finest cells in those coarse ones that hold something, of one octant. In an empty coarse cell, of whose octant
+// k coarse cells are empty along an edge, what is so of a finest one is what is left of these.
+class NearSweep {
+ public:
+  NearSweep(const OccupancyBits& finest, OctantDistances& into, uint32_t octant)
+      : finest_(finest), into_(into), octant_(octant), ratio_(into.ratio) {
+    for (uint32_t a = 0; a < 3; ++a) up_[a] = (octant >> a & 1) != 0;
+  }
+
+  // Begins at the end that the octant looks towards.
+  void run() {
+    const uint32_t n = into_.cells;
+    const auto ordered = [n](uint32_t i, bool up) { return up ? n - 1 - i : i; };
+    for (uint32_t k = 0; k < n; ++k) {
+      for (uint32_t j = 0; j < n; ++j) {
+        for (uint32_t i = 0; i < n; ++i) {
+          const Place cell = {ordered(i, up_[0]), ordered(j, up_[1]), ordered(k, up_[2])};
+          const uint32_t word = wordOf(cell);
+          if (!OctantDistances::isEmpty(word)) sweep(cell, word >> 4);
+        }
+      }
+    }
+  }
+
+ private:
+  using Place = std::array<uint32_t, 3>;
+  static constexpr uint32_t kSide = OctantDistances::kMostRatio + 1;
+
+  uint32_t wordOf(const Place& cell) const {
+    const size_t n = into_.cells;
+    return into_.coarse[cell[0] + n * (cell[1] + n * cell[2])];
+  }
+  // Finest cells are numbered from the end of theirs towards which the octant looks, from 1 on; 0 is in the next one.
+  uint32_t inside(size_t axis, uint32_t i) const {
+    if (i == 0) return up_[axis] ? 0 : ratio_ - 1;
+    return up_[axis] ? ratio_ - i : i - 1;
+  }
+  size_t fineNumber(uint32_t number, const Place& at) const {
+    const size_t r = ratio_;
+    return number * r * r * r + inside(0, at[0]) + r * (inside(1, at[1]) + r * inside(2, at[2]));
+  }
+  uint32_t& valueOf(const Place& at) { return values_[at[0] + kSide * (at[1] + kSide * at[2])]; }
+
+  void sweep(const Place& cell, uint32_t number) {
+    for (uint32_t next = 1; next < 8; ++next) takeNext(cell, next);
+    for (uint32_t k = 1; k <= ratio_; ++k) {
+      for (uint32_t j = 1; j <= ratio_; ++j) {
+        for (uint32_t i = 1; i <= ratio_; ++i) {
+          uint32_t least = kFarthestOctantDistance - 1;
+          for (uint32_t next = 1; next < 8; ++next) {
+            least = std::min(least, valueOf({i - (next & 1), j - (next >> 1 & 1), k - (next >> 2)}));
+          }
+          const Place at = {i, j, k};
+          Place finest;
+          for (size_t a = 0; a < 3; ++a) finest[a] = ratio_ * cell[a] + inside(a, at[a]);
+          const uint32_t free = finest_.at(finest[0], finest[1], finest[2]) ? 0 : 1 + least;
+          valueOf(at) = free;
+          into_.fine[fineNumber(number, at)] |= free << (4 * octant_);
+        }
+      }
+    }
+  }
+
+  // What is needed of the next coarse cell along the axes whose bits are set.
+  void takeNext(const Place& cell, uint32_t axes) {
+    Place other = cell, first, last;
+    bool outside = false;
+    for (size_t a = 0; a < 3; ++a) {
+      const bool moves = (axes >> a & 1) != 0;
+      first[a] = moves ? 0 : 1;
+      last[a] = moves ? 0 : ratio_;
+      if (!moves) continue;
+      outside = outside || (up_[a] ? cell[a] + 1 == into_.cells : cell[a] == 0);
+      other[a] = up_[a] ? cell[a] + 1 : cell[a] - 1;
+    }
+    const uint32_t word = outside ? 0xffffffffu : wordOf(other);
+    const uint32_t reach = outside ? 2 * kFarthestOctantDistance : ratio_ * octantDistance(word, octant_);
+    for (uint32_t k = first[2]; k <= last[2]; ++k) {
+      for (uint32_t j = first[1]; j <= last[1]; ++j) {
+        for (uint32_t i = first[0]; i <= last[0]; ++i) {
+          const Place at = {i, j, k};
+          if (!OctantDistances::isEmpty(word)) {
+            valueOf(at) = octantDistance(into_.fine[fineNumber(word >> 4, at)], octant_);
+            continue;
+          }
+          uint32_t offset = 0;  // from where the coarse cube begins
+          for (size_t a = 0; a < 3; ++a) offset = std::max(offset, at[a] == 0 ? 0 : ratio_ - at[a]);
+          valueOf(at) = std::min(kFarthestOctantDistance, reach - offset);
+        }
+      }
+    }
+  }
+
+  const OccupancyBits& finest_;
+  OctantDistances& into_;
+  uint32_t octant_, ratio_;
+  bool up_[3];
+  std::array<uint32_t, kSide * kSide * kSide> values_{};  // of one coarse cell, and of the next ones beside it
+};
+
+}  // namespace
+
+OctantDistances octantDistances(const OccupancyPyramid& occupied) {
+  const OccupancyBits &finest = occupied.levels.front(), &coarse = coarseLevel(occupied);
+  OctantDistances distances;
+  distances.ratio = OctantDistances::ratioFor(finest.cells);
+  distances.cells = coarse.cells;
+  distances.coarse = octantDistances(coarse);
+  if (distances.ratio == 1) return distances;
+  uint32_t number = 0;
+  for (uint32_t& word : distances.coarse) {
+    if (word == 0) word = number++ << 4;
+  }
+  distances.fine.assign(size_t{number} * distances.ratio * distances.ratio * distances.ratio, 0);
+  for (uint32_t octant = 0; octant < 8; ++octant) NearSweep(finest, distances, octant).run();
+  return distances;
+}
+
+size_t nearCellsOf(const OccupancyPyramid& occupied) {
+  if (OctantDistances::ratioFor(occupied.levels.front().cells) == 1) return 0;
+  size_t count = 0;
+  for (const uint64_t word : coarseLevel(occupied).words) count += static_cast<size_t>(std::popcount(word));
+  return count;
 }
 
 OccupancyBits dilated(const OccupancyBits& occupied) {

@@ -62,6 +62,75 @@ TEST(OccupancyDistance, IsTheLargestEmptyCubeOfEachOctant) {
   }
 }
 
+// Of a finest cell, whichever grid it is told by; and the edge of the cells that it is told in.
+uint32_t distanceOf(const OctantDistances& distances, const Cell& cell, uint32_t octant, uint32_t& edge) {
+  const size_t n = distances.cells, r = distances.ratio;
+  size_t coarse = 0, fine = 0;
+  for (int a = 2; a >= 0; --a) {
+    coarse = coarse * n + static_cast<size_t>(cell.at[a]) / r;
+    fine = fine * r + static_cast<size_t>(cell.at[a]) % r;
+  }
+  const uint32_t word = distances.coarse[coarse];
+  edge = OctantDistances::isEmpty(word) ? distances.ratio : 1;
+  if (edge > 1 || r == 1) return OctantDistances::isEmpty(word) ? octantDistance(word, octant) : 0;
+  return octantDistance(distances.fine[(word >> 4) * r * r * r + fine], octant);
+}
+
+// Invariant 7, where distances are in two grids.
+TEST(OccupancyDistance, InTwoGridsIsOfEmptyCubesAndNearlyAsLargeAsTheyAre) {
+  for (const uint32_t cells : {128u, 136u, 264u}) {
+    OccupancyBits bits(cells);
+    const RandomStream random(5, cells);
+    for (uint64_t ball = 0; ball < 30; ++ball) {  // clusters, and some alone
+      const uint32_t size = static_cast<uint32_t>(1 + ball % 7);
+      uint32_t at[3];
+      for (uint64_t a = 0; a < 3; ++a) at[a] = random.below(4 * ball + a, cells - size);
+      for (uint32_t i = 0; i < size * size * size; ++i) {
+        bits.set(bits.number(at[0] + i % size, at[1] + i / size % size, at[2] + i / size / size));
+      }
+    }
+    std::vector<size_t> set;
+    for (size_t i = 0; i < bits.count(); ++i) {
+      if (bits.at(i)) set.push_back(i);
+    }
+    const OccupancyPyramid pyramid = pyramidFromOccupancy(bits);
+    const OctantDistances distances = octantDistances(pyramid);
+    EXPECT_EQ(distances.ratio, cells <= 128 ? 1u : cells <= 256 ? 2u : 4u);
+    EXPECT_EQ(distances.nearCells(), nearCellsOf(pyramid));
+    size_t occupied = 0, near = 0;
+    double told = 0, largest = 0;
+    for (uint64_t number = 0; number < 4000; ++number) {
+      // Most of them beside what is occupied.
+      size_t i = random.below(1000 + number, static_cast<uint32_t>(bits.count()));
+      if (number % 20 != 0) i = set[i % set.size()] - std::min<size_t>(set[i % set.size()], number % 3);
+      const uint32_t octant = static_cast<uint32_t>(number % 8);
+      uint32_t edge = 0;
+      const uint32_t k = distanceOf(distances, Cell(i, cells), octant, edge);
+      occupied += bits.at(i);
+      ASSERT_EQ(k == 0, bits.at(i));
+      if (k == 0 || (edge > 1 && number % 100 != 0)) continue;
+      // A coarse cell's cube begins at its own corner.
+      Cell from(i, cells);
+      for (int a = 0; a < 3; ++a) {
+        const int e = static_cast<int>(edge), lower = from.at[a] / e * e;
+        from.at[a] = octant >> a & 1 ? lower : lower + e - 1;
+      }
+      ASSERT_TRUE(isEmptyCube(bits, from, octant, static_cast<int>(k * edge)));
+      if (edge > 1 || cells <= 128) continue;
+      ++near;
+      int trueEdge = static_cast<int>(k);
+      while (trueEdge < 15 && isEmptyCube(bits, from, octant, trueEdge + 1)) ++trueEdge;
+      told += k;
+      largest += trueEdge;
+    }
+    EXPECT_GT(occupied, 300u);
+    if (cells > 128) {
+      EXPECT_GT(near, 200u) << cells;
+    }
+    EXPECT_GE(told, 0.6 * largest) << cells;
+  }
+}
+
 struct Ray {
   double place[3], direction[3];  // in cells; of length 1
   size_t cell = 0;

@@ -113,7 +113,7 @@ inline HashPart madeHashPart(uint64_t seed, const MadeHash& made, uint32_t colum
     if (random.below(next++, 20) == 0) occupied.set(i);
   }
   part.occupied = pyramidFromOccupancy(std::move(occupied));
-  part.distances = octantDistances(part.occupied.levels[HashPart::distanceLevel(part.cells())]);
+  part.distances = octantDistances(part.occupied);
   return part;
 }
 

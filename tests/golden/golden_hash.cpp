@@ -24,7 +24,9 @@ struct Sizes {
 };
 
 const Sizes kFine = {32, 32, {{12, 1728, false, {}, {}}, {48, 1024, true, {}, {}}}};
-const Sizes kCoarse = {16, 16, {{24, 512, true, {}, {}}, {32, 512, true, {}, {}}}};
+// With so many cells that distances are kept in two grids, of which one is twice or four times as fine.
+const Sizes kCoarse = {16, 160, {{24, 512, true, {}, {}}, {32, 512, true, {}, {}}}};
+const Sizes kCoarseSurround = {16, 288, kCoarse.tables};
 
 class PartMaker {
  public:
@@ -36,6 +38,11 @@ class PartMaker {
 
   void make() {
     makeRanges();
+    for (uint32_t i = 0; i < part_.lattice * part_.lattice * part_.lattice; ++i) {
+      const Triple<uint32_t> corner = {i % part_.lattice, i / part_.lattice % part_.lattice,
+                                       i / part_.lattice / part_.lattice};
+      logDensities_.push_back(featuresAt(placeOfTexel(part_, corner, part_.lattice))[0]);
+    }
     makeCorners();
     makeTables();
     makeOccupied();
@@ -49,7 +56,7 @@ class PartMaker {
   }
 
   double logDensity(uint32_t x, uint32_t y, uint32_t z) const {
-    return featuresAt(placeOfTexel(part_, {x, y, z}, part_.lattice))[0];
+    return logDensities_[x + part_.lattice * (y + part_.lattice * z)];
   }
 
   // Whether anything is dense among the corners from `first` to `last` along each axis, clamped.
@@ -106,24 +113,39 @@ class PartMaker {
   // A cell may hold something where a corner that is mixed into a sample in it is dense, and not only hidden ones.
   void makeOccupied() {
     OccupancyBits occupied(sizes_.cells);
-    const uint32_t side = part_.lattice / sizes_.cells;
-    const auto below = [&](uint32_t index) { return index == 0 ? 0 : side * index - 1; };
+    // The corners that samples of a cell mix lie from its lower side's lower one to its upper side's upper one. Many
+    // cells mix the same.
+    const double side = static_cast<double>(part_.lattice) / sizes_.cells;
+    std::vector<std::array<uint32_t, 2>> ranges;
+    std::vector<size_t> rangeOf;
+    for (uint32_t i = 0; i < sizes_.cells; ++i) {
+      const std::array<uint32_t, 2> range = {static_cast<uint32_t>(std::max(0.0, std::floor(side * i - 0.5))),
+                                             static_cast<uint32_t>(std::floor(side * (i + 1) - 0.5)) + 1};
+      if (ranges.empty() || ranges.back() != range) ranges.push_back(range);
+      rangeOf.push_back(ranges.size() - 1);
+    }
+    std::vector<bool> isAnything;
+    for (const auto& z : ranges) {
+      for (const auto& y : ranges) {
+        for (const auto& x : ranges) isAnything.push_back(isAnythingIn({x[0], y[0], z[0]}, {x[1], y[1], z[1]}));
+      }
+    }
     for (uint32_t z = 0; z < sizes_.cells; ++z) {
       for (uint32_t y = 0; y < sizes_.cells; ++y) {
         for (uint32_t x = 0; x < sizes_.cells; ++x) {
-          if (isAnythingIn({below(x), below(y), below(z)}, {side * (x + 1), side * (y + 1), side * (z + 1)})) {
-            occupied.set(occupied.number(x, y, z));
-          }
+          const size_t n = ranges.size();
+          if (isAnything[rangeOf[x] + n * (rangeOf[y] + n * rangeOf[z])]) occupied.set(occupied.number(x, y, z));
         }
       }
     }
     part_.occupied = pyramidFromOccupancy(std::move(occupied));
-    part_.distances = octantDistances(part_.occupied.levels[HashPart::distanceLevel(sizes_.cells)]);
+    part_.distances = octantDistances(part_.occupied);
   }
 
   HashPart& part_;
   const Sizes& sizes_;
   RandomStream random_;
+  std::vector<double> logDensities_;  // of corners
 };
 
 HashContent contentOf(uint64_t seed, LevelWeights weights, bool varies, const Sizes& sizes,
@@ -168,7 +190,7 @@ Scene<HashContent> makeHashScene() {
   scene.contents["1_0"] = contentOf(2, LevelWeights::shared, true, kFine, {blockPart(1)});
   scene.contents["all"] = contentOf(3, LevelWeights::separate, false, kCoarse, {blockPart(0), blockPart(1)});
   scene.contents["surround"] = contentOf(4, LevelWeights::separate, true, kFine, {surroundPart()});
-  scene.contents["coarse_surround"] = contentOf(5, LevelWeights::none, false, kCoarse, {surroundPart()});
+  scene.contents["coarse_surround"] = contentOf(5, LevelWeights::none, false, kCoarseSurround, {surroundPart()});
   return scene;
 }
 
@@ -184,9 +206,13 @@ HashSums sumsOf(const HashPart& part) {
   const auto first = std::find(part.macroblocks.begin(), part.macroblocks.end(), 0u);
   sums.firstStored = static_cast<uint64_t>(first - part.macroblocks.begin());
   for (const uint64_t word : part.occupied.levels[0].words) sums.occupied += static_cast<uint64_t>(std::popcount(word));
-  for (const uint32_t word : part.distances) {
+  const auto addDistances = [&](uint32_t word) {
     for (uint32_t octant = 0; octant < 8; ++octant) sums.distances += octantDistance(word, octant);
+  };
+  for (const uint32_t word : part.distances.coarse) {
+    if (OctantDistances::isEmpty(word)) addDistances(word);
   }
+  for (const uint32_t word : part.distances.fine) addDistances(word);
   add(part.cornerBytes, sums.corners, sums.cornersOrdered);
   for (const HashTable& table : part.tables) {
     add(table.bytes, sums.tables.emplace_back(), sums.tablesOrdered.emplace_back());

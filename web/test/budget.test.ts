@@ -8,7 +8,7 @@ import type { Plain } from '../src/plain';
 import type { SceneOptions } from '../src/scene';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { countCardMemory, type CardMemory } from './card-memory';
-import { goldenHash, goldenScene, launch, missing, serve, type Server } from './machine';
+import { goldenScene, launch, missing, serve, type Server } from './machine';
 import { psnr } from './pictures';
 import { kWidth, viewAt } from './views';
 
@@ -16,18 +16,16 @@ declare const plain: Plain;
 declare const cardMemory: CardMemory;
 
 describe.skipIf(missing())('the graphics card', () => {
-  let servers: Record<'volume' | 'hash', Server>;
+  let server: Server;
   let browser: Browser;
   const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json');
 
   beforeAll(async () => {
-    const [volume, hash] = await Promise.all([serve(goldenScene), serve(goldenHash)]);
-    servers = { volume, hash };
-    browser = await launch();
+    [server, browser] = await Promise.all([serve(goldenScene), launch()]);
   });
   afterAll(async () => {
     await browser?.close();
-    for (const server of Object.values(servers ?? {})) server.close();
+    server?.close();
   });
 
   // Seen from the wall between them, a block has a half of the picture. Without a surround, which shines through.
@@ -70,12 +68,12 @@ describe.skipIf(missing())('the graphics card', () => {
     rmSync(folder, { recursive: true });
   });
 
-  it.each(['volume', 'hash'] as const)('holds no more than the budget during a flight, and nothing of the scene afterwards: %s', async (representation) => {
+  it('holds no more than the budget during a flight, and nothing of the scene afterwards', async () => {
     const page = await browser.newPage();
     const said: string[] = [];
     page.on('console', (message) => message.type() === 'error' && said.push(message.text()));
     await page.addInitScript(countCardMemory);
-    await page.goto(`${servers[representation].url}plain.html`);
+    await page.goto(`${server.url}plain.html`);
     await page.waitForFunction(() => 'plain' in window);
 
     // Over one block, over the other, and both in view: there is room for one, and the coarser level stands for the other.

@@ -1,6 +1,7 @@
 #include "render/cpu/hash_march.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <new>
@@ -34,10 +35,16 @@ HWY_ATTR HWY_INLINE Vec loaded(const double x[3], double factor, double offset) 
 struct Cell {
   alignas(16) int32_t at[4];
 
-  size_t numberIn(const OccupancyBits& level, size_t shift) const {
-    const size_t n = level.cells;
+  // Of a grid of n cells along an edge, each 2^shift finest ones wide.
+  size_t numberIn(size_t n, size_t shift) const {
     return static_cast<size_t>(at[0] >> shift) +
            n * (static_cast<size_t>(at[1] >> shift) + n * static_cast<size_t>(at[2] >> shift));
+  }
+  // Among the finest cells of one that is 2^shift wide.
+  size_t numberWithin(uint32_t shift) const {
+    const uint32_t mask = (1u << shift) - 1;
+    return (static_cast<uint32_t>(at[0]) & mask) + ((static_cast<uint32_t>(at[1]) & mask) << shift) +
+           ((static_cast<uint32_t>(at[2]) & mask) << (2 * shift));
   }
 };
 
@@ -47,13 +54,9 @@ class Piece {
  public:
   Piece() = default;
   HWY_ATTR Piece(const HashPart& part, const DomainSegment& s, bool useDistances)
-      : levels_(part.occupied.levels.data()),
-        distances_(useDistances ? part.distances.data() : nullptr),
-        coarsest_(HashPart::distanceLevel(part.cells())) {
-    if (!useDistances) {
-      coarsest_ = 0;
-      while (coarsest_ + 1 < part.occupied.levels.size() && levels_[coarsest_ + 1].cells >= kCoarsestCells) ++coarsest_;
-    }
+      : levels_(part.occupied.levels.data()), distances_(useDistances ? &part.distances : nullptr) {
+    while (coarsest_ + 1 < part.occupied.levels.size() && levels_[coarsest_ + 1].cells >= kCoarsestCells) ++coarsest_;
+    coarseShift_ = static_cast<uint32_t>(std::countr_zero(part.distances.ratio));
     const double toCells = part.cells() / (2.0 * part.halfDomain());
     start_ = loaded(s.start.data(), toCells, part.halfDomain() * toCells);
     direction_ = loaded(s.direction.data(), toCells, 0);
@@ -80,16 +83,17 @@ class Piece {
 
   // The length up to which nothing is; negative where the cell is occupied.
   HWY_ATTR HWY_INLINE float emptyUpTo(const Cell& cell) const {
-    size_t level = coarsest_;
     if (distances_ != nullptr) {
-      const uint32_t free = octantDistance(distances_[cell.numberIn(levels_[level], level)], octant_);
-      if (free > 0) return leaves(cell, level, free);
-      if (level == 0) return -1;
-      --level;
+      const uint32_t word = distances_->coarse[cell.numberIn(distances_->cells, coarseShift_)];
+      if (OctantDistances::isEmpty(word)) return leaves(cell, coarseShift_, octantDistance(word, octant_));
+      if (coarseShift_ == 0) return -1;
+      const size_t finest = ((size_t{word} >> 4) << (3 * coarseShift_)) + cell.numberWithin(coarseShift_);
+      const uint32_t free = octantDistance(distances_->fine[finest], octant_);
+      return free > 0 ? leaves(cell, 0, free) : -1;
     }
     // The largest empty cell that holds the place.
-    for (;; --level) {
-      if (!levels_[level].at(cell.numberIn(levels_[level], level))) return leaves(cell, level, 1);
+    for (size_t level = coarsest_;; --level) {
+      if (!levels_[level].at(cell.numberIn(levels_[level].cells, level))) return leaves(cell, level, 1);
       if (level == 0) return -1;
     }
   }
@@ -114,8 +118,9 @@ class Piece {
   }
 
   const OccupancyBits* levels_ = nullptr;
-  const uint32_t* distances_ = nullptr;  // of levels_[coarsest_]; null: unused
-  size_t coarsest_ = 0;                  // level that is looked into
+  const OctantDistances* distances_ = nullptr;  // null: unused
+  uint32_t coarseShift_ = 0;                    // of their coarse cells
+  size_t coarsest_ = 0;                         // level that is looked into without them
   uint32_t octant_ = 0;
   Vec start_, direction_, inverse_, up_, sign_;
 };
@@ -149,7 +154,7 @@ class Traveller {
         ++counts.steps;
         const uint64_t step = step_++;
         if (!march_.settings.skipEmptySpace) {
-          if (!occupied.at(cell.numberIn(occupied, 0))) continue;
+          if (!occupied.at(cell.numberIn(occupied.cells, 0))) continue;
         } else if (const float empty = piece_.emptyUpTo(cell); empty >= 0) {
           // The first step whose middle lies there or beyond.
           const float next = std::ceil(empty * perLength - 0.5f);

@@ -2,9 +2,9 @@
 //
 // Each straight piece of the path is cut, from its entry on, into steps of one length in the domain, the last one
 // shorter; in the middle of each lies a sample, as in training (MarchBlocks). A sample is evaluated where the finest
-// occupancy says that something is. Where it says no, the ray leaves the empty cube of its octant (octantDistances), or
-// else the largest empty cell that holds the place; always by whole steps, so which samples are evaluated does not
-// depend on it.
+// occupancy says that something is. Where it says no, the ray leaves the empty cube of its octant (OctantDistances),
+// or, without these, the largest empty cell that holds the place; always by whole steps, so which samples are evaluated
+// does not depend on it.
 #pragma once
 
 #include <span>

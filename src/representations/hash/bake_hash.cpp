@@ -24,7 +24,7 @@ constexpr float kMinTransmittance = 2e-3f;  // the paper's
 constexpr uint32_t kTexels = 1 << 16;       // evaluated together
 // Of a block's occupancy along an edge, unless the lattice is finer. The finer, the fewer samples: half the size takes
 // three of ten away.
-constexpr uint32_t kMostCells = 256;
+constexpr uint32_t kMostCells = 384;
 
 // Looks at a model through photos, and marks where it sees something.
 class SeenFinder {
@@ -294,7 +294,7 @@ std::vector<OccupancyBits> findSeenCells(HashModel& model, const Capture& captur
   const uint32_t lattice = model.fields().lattice().voxels;
   const uint32_t cells = options.cells > 0
                              ? options.cells
-                             : std::min(std::max(lattice, std::min(2 * lattice, kMostCells)), kMostOccupancyCells);
+                             : std::min(std::max(lattice, std::min(3 * lattice, kMostCells)), kMostOccupancyCells);
   std::vector<OccupancyBits> seen(model.space().blocks(), OccupancyBits(cells));
   SeenFinder finder(model, capture, options, seen);
   const std::vector<int> photos = capture.photosIn(Split::train);
@@ -323,7 +323,7 @@ HashPart bakeHashPart(HashModel& model, uint32_t block, const OccupancyBits& see
   bakeCorners(model, block, seen, part);
   bakeTables(model, block, seen, part);
   part.occupied = pyramidFromOccupancy(seen);
-  part.distances = octantDistances(part.occupied.levels[HashPart::distanceLevel(part.cells())]);
+  part.distances = octantDistances(part.occupied);
   return part;
 }
 

@@ -14,8 +14,8 @@ namespace tessera {
 
 struct BakeHashOptions : BakeOptions {
   int dilation = 1;  // cells around those that are seen are kept, too
-  // Of a finest block's occupancy along an edge, a multiple of 8, and half as many for each coarser level; 0: twice as
-  // many as the lattice has corners, if 256 suffice.
+  // Of a finest block's occupancy along an edge, a multiple of 8, and half as many for each coarser level; 0: three
+  // times as many as the lattice has corners, up to 384.
   uint32_t cells = 0;
 };
 

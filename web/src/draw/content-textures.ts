@@ -32,7 +32,6 @@ const kWords = { type: THREE.UnsignedIntType } as const;
 export const kForms = {
   fourBytes: { ...kBytes, internal: 'RGBA8', format: THREE.RGBAFormat, numbers: 4, gl: { format: 'RGBA', type: 'UNSIGNED_BYTE' } },
   oneByte: { ...kBytes, internal: 'R8', format: THREE.RedFormat, numbers: 1, gl: { format: 'RED', type: 'UNSIGNED_BYTE' } },
-  wholeByte: { ...kBytes, internal: 'R8UI', format: THREE.RedIntegerFormat, numbers: 1, gl: { format: 'RED_INTEGER', type: 'UNSIGNED_BYTE' } },
   wholeWord: { ...kWords, internal: 'R32UI', format: THREE.RedIntegerFormat, numbers: 1, gl: { format: 'RED_INTEGER', type: 'UNSIGNED_INT' } },
   twoWords: { ...kWords, internal: 'RG32UI', format: THREE.RGIntegerFormat, numbers: 2, gl: { format: 'RG_INTEGER', type: 'UNSIGNED_INT' } },
 } satisfies Record<string, TexelForm>;

@@ -35,8 +35,8 @@ function outputs(weightTargets: number): string {
 
 const kUniforms = `
 uniform sampler3D macroblocks;
-uniform usampler3D distances, occupied;
-uniform usampler2DArray tables;
+uniform usampler3D distances;
+uniform usampler2DArray nearDistances, tables;
 uniform vec2 levelWeights[TABLES];
 uniform float shares[${kMostTables + 1}], stepLength;
 uniform int attention;

@@ -1,6 +1,7 @@
 // A content of a `hash` scene on the graphics card.
 import * as THREE from 'three';
-import { columnsOf, distanceLevel, kEntriesOfRow, logitsOfLevel, vectorsOfPart, type ByteRange, type HashContent, type HashPart, type HashSettings } from '../tiles/hash-content';
+import { columnsOf, kLengthOfRow, logitsOfLevel, vectorsOfPart, type ByteRange, type HashContent, type HashPart, type HashSettings, type List } from '../tiles/hash-content';
+import { ratioFor } from '../tiles/octant-distances';
 import type { Vec3 } from '../tiles/tileset';
 import { atlasUniforms, ContentTextures, kForms } from './content-textures';
 
@@ -14,23 +15,22 @@ export class HashTextures extends ContentTextures<HashPart> {
   readonly numbers: Float32Array;
   private readonly ofMarch: Record<string, THREE.IUniform>;
   private readonly columns: number;
-  private readonly origins: { macroblocks: Vec3[]; distances: Vec3[]; occupied: Vec3[] };
-  private readonly rowOf: number[][];
+  private readonly origins: { macroblocks: Vec3[]; distances: Vec3[] };
+  private readonly rowsOf: { tables: number[]; nearDistances: number[] };
 
   constructor(content: HashContent) {
     super(content.parts);
-    const { settings, corners, atlasDepth, macroblocks, distances, occupied, tables } = content;
+    const { settings, corners, atlasDepth, macroblocks, distances, nearDistances, tables } = content;
     this.columns = columnsOf(settings);
-    this.rowOf = tables.rowOf;
-    this.origins = { macroblocks: macroblocks.origins, distances: distances.origins, occupied: occupied.origins };
-    const entries = new THREE.DataArrayTexture(null, kEntriesOfRow, tables.rows, tables.layers);
+    this.rowsOf = { tables: tables.rowOf, nearDistances: nearDistances.rowOf };
+    this.origins = { macroblocks: macroblocks.origins, distances: distances.origins };
     this.ofMarch = {
       ...Object.assign({}, ...corners.map((eight, e) => this.addAtlas(eight, atlasDepth, kCornerAtlases[e]))) as Record<string, THREE.IUniform>,
       ...atlasUniforms(corners[0].size, atlasDepth),
       macroblocks: { value: this.addCubes(macroblocks, kForms.fourBytes) },
       distances: { value: this.addCubes(distances, kForms.wholeWord) },
-      occupied: { value: this.addCubes(occupied, kForms.wholeByte) },
-      tables: { value: this.add(entries, kForms.twoWords, tables.words) },
+      nearDistances: { value: this.add(textureOf(nearDistances), kForms.wholeWord, nearDistances.words) },
+      tables: { value: this.add(textureOf(tables), kForms.twoWords, tables.words) },
       levelWeights: { value: levelWeights(settings, this.parts[0].tables.length) },
       stepLength: { value: settings.step },
     };
@@ -43,7 +43,7 @@ export class HashTextures extends ContentTextures<HashPart> {
   }
 
   orderParts(order: number[]): void {
-    const { macroblocks, distances, occupied } = this.origins;
+    const { macroblocks, distances } = this.origins;
     const vectors = vectorsOfPart(this.columns, this.parts[0].tables.length);
     order.forEach((n, place) => {
       const part = this.parts[n];
@@ -51,16 +51,20 @@ export class HashTextures extends ContentTextures<HashPart> {
       this.numbers.set(
         [
           ...part.centre, part.lattice, ...part.scale, part.cells, ...part.low, part.contracted ? 1 : 0,
-          ...part.high, distanceLevel(part.cells), ...macroblocks[n], occupied[n][0], ...distances[n], occupied[n][2],
+          ...part.high, Math.log2(ratioFor(part.cells)), ...macroblocks[n], this.rowsOf.nearDistances[n], ...distances[n], 0,
           // What the card has made numbers from 0 to 1 of; entries of tables stay bytes.
           ...eights.flatMap((ranges) => rangeVectors(ranges, 1)),
           ...part.tables.flatMap(({ resolution, entries, hashed, ranges }, level) =>
-            [resolution, entries, hashed ? 1 : 0, this.rowOf[n][level], ...rangeVectors(ranges, 255)]),
+            [resolution, entries, hashed ? 1 : 0, this.rowsOf.tables[n * part.tables.length + level], ...rangeVectors(ranges, 255)]),
         ],
         4 * vectors * place,
       );
     });
   }
+}
+
+function textureOf({ rows, layers }: List): THREE.DataArrayTexture {
+  return layers === 0 ? new THREE.DataArrayTexture(null, 1, 1, 1) : new THREE.DataArrayTexture(null, kLengthOfRow, rows, layers);
 }
 
 // What is added, and what a number from 0 to `most` is multiplied with: of diffuse colour and density, then of features.

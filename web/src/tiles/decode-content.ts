@@ -29,7 +29,7 @@ export function decodeContent(header: ContentHeader, name: string): Content {
 export function buffersOf(content: Content): ArrayBuffer[] {
   const { macroblocks, distances } = content;
   const atlases = content.representation === 'hash' ? content.corners : [content.planes, content.voxels];
-  const others = content.representation === 'hash' ? [content.occupied.texels, content.tables.words] : [];
-  const arrays = [...atlases.flatMap(({ first, second }) => [first, second]), macroblocks.texels, distances.texels, ...others];
+  const lists = content.representation === 'hash' ? [content.nearDistances.words, content.tables.words] : [];
+  const arrays = [...atlases.flatMap(({ first, second }) => [first, second]), macroblocks.texels, distances.texels, ...lists];
   return arrays.map(({ buffer }) => buffer as ArrayBuffer);
 }

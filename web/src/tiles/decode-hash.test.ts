@@ -2,8 +2,9 @@ import { beforeAll, describe, expect, it } from 'vitest';
 import { decodeGolden, storedIn, Sum, testContentReader } from '../testing/content-tests';
 import { goldenFile, goldenText, prepareDecoderInNode } from '../testing/golden';
 import { kStoredEdge, type TexelTextures } from './content';
-import { kEntriesOfRow, type HashContent } from './hash-content';
-import { kFarthestOctantDistance } from './octant-distances';
+import { kLengthOfRow, type HashContent } from './hash-content';
+import { lengthOf, listsOf } from './hash-layout';
+import { kFarthestOctantDistance, ratioFor } from './octant-distances';
 
 interface Sums {
   stored: number;
@@ -29,7 +30,7 @@ function columnsAt({ size, first, second }: TexelTextures, x: number, y: number,
 
 // The numbers of a part's cube.
 function* cubeOf(
-  { size, origins, texels }: HashContent['occupied'] | HashContent['distances'], n: number, edge: number,
+  { size, origins, texels }: HashContent['distances'], n: number, edge: number,
 ): Generator<number> {
   const [x0, y0, z0] = origins[n];
   for (let z = 0; z < edge; ++z) {
@@ -59,17 +60,25 @@ describe('decodeHash', () => {
       const entries = new Uint8Array(content.tables.words.buffer);
       const tables = part.tables.map((table, level) => {
         const sum = new Sum();
-        const first = 8 * kEntriesOfRow * content.tables.rowOf[n][level];
+        const first = 8 * kLengthOfRow * content.tables.rowOf[n * part.tables.length + level];
         sum.add(entries.subarray(first, first + 8 * table.entries));
         return sum;
       });
-      let occupied = 0;
-      for (const eight of cubeOf(content.occupied, n, part.cells / 2)) {
-        for (let bit = 0; bit < 8; ++bit) occupied += (eight >> bit) & 1;
-      }
-      let distances = 0;
-      for (const word of cubeOf(content.distances, n, part.cells)) {
+      // Of the coarse grid, then of near cells.
+      const ratio = ratioFor(part.cells);
+      const add = (word: number) => {
         for (let octant = 0; octant < 8; ++octant) distances += (word >>> (4 * octant)) & kFarthestOctantDistance;
+      };
+      let distances = 0;
+      let occupied = 0;
+      for (const word of cubeOf(content.distances, n, part.cells / ratio)) {
+        if ((word & 15) !== 0) add(word);
+        else if (ratio === 1) ++occupied;
+      }
+      const near = kLengthOfRow * content.nearDistances.rowOf[n];
+      for (const word of content.nearDistances.words.subarray(near, near + part.nearCells * ratio ** 3)) {
+        add(word);
+        occupied += word === 0 ? 1 : 0;
       }
       expect({
         stored: stored.length, firstStored: stored[0]?.number ?? -1, occupied, distances,
@@ -79,5 +88,12 @@ describe('decodeHash', () => {
     });
   });
 
-  testContentReader('hash', uris);
+  it('lays lists out in rows and layers that cards take', () => {
+    expect(listsOf([1, 2048, 2049, 0])).toEqual({ rows: 4, layers: 1, rowOf: [0, 1, 2, 4] });
+    expect(listsOf([2 ** 22 - 1, 5])).toEqual({ rows: 2048, layers: 2, rowOf: [0, 2048] });
+    expect(lengthOf(listsOf([2 ** 22 - 1, 5]))).toBe(2 ** 23);
+    expect(listsOf([0, 0])).toEqual({ rows: 0, layers: 0, rowOf: [0, 0] });
+  });
+
+  testContentReader('hash', uris, uris.filter((uri) => uri.startsWith('tiles/L0')));
 });

@@ -4,15 +4,14 @@ import { texturesOf } from './content-layout';
 import { ContentReader } from './content-reader';
 import { brokenPromise, ruleOfNetwork, ruleOfParts } from './content-rules';
 import {
-  columnsOf, distanceLevel, kEntriesOfRow, kLevelWeights, kMostTables, vectorsOfPart, type ByteRange, type EntryList, type HashContent,
+  columnsOf, kLengthOfRow, kLevelWeights, kMostTables, vectorsOfPart, type ByteRange, type HashContent,
   type HashPart, type HashSettings, type HashTable, type LevelWeights,
 } from './hash-content';
-import { layOutHash, type HashLayout } from './hash-layout';
+import { layOutHash, lengthOf, type HashLayout } from './hash-layout';
 import * as rules from './hash-rules';
 import { arrayOf, fieldOf, flagOf, numberFrom, numberOf, stringOf, wholeOf, type Json } from './json-fields';
 import { networkVectors } from './network';
-import type { OccupancyBits } from './occupancy';
-import { eightsOf, halved, octantDistances, type Cells } from './octant-distances';
+import { octantDistances, ratioFor } from './octant-distances';
 import { sizeOfList, takeList } from './texel-pictures';
 import type { TileContent } from './tileset';
 
@@ -75,9 +74,8 @@ class HashReader extends ContentReader {
     const corners = Array.from({ length: columnsOf(settings) / kAttributes }, () => emptyTextures(layout.corners.size));
     const macroblocks: Cubes<Uint8Array> = { ...layout.macroblocks, texels: new Uint8Array(4 * count(layout.macroblocks.size)) };
     const distances: Cubes<Uint32Array> = { ...layout.distances, texels: new Uint32Array(count(layout.distances.size)) };
-    const occupied: Cubes<Uint8Array> = { ...layout.occupied, texels: new Uint8Array(count(layout.occupied.size)) };
-    const { rows, layers } = layout.tables;
-    const bytes = new Uint8Array(kAttributes * kEntriesOfRow * rows * layers);
+    const near = new Uint32Array(lengthOf(layout.nearDistances));
+    const bytes = new Uint8Array(kAttributes * lengthOf(layout.tables));
     let begin = 0; // of the part's macroblocks in the atlas
     parts.forEach((part, n) => {
       const source = header.sources[n];
@@ -88,23 +86,22 @@ class HashReader extends ContentReader {
       }
       begin += part.stored;
       part.tables.forEach(({ entries }, level) => {
-        const first = kEntriesOfRow * layout.tables.rowOf[n][level];
+        const first = kLengthOfRow * layout.tables.rowOf[n * part.tables.length + level];
         const pictures = fieldOf(arrayOf(source, 'tables')![level], 'texels');
         const taken = this.takePictures(views, pictures, sizeOfList(entries),
           (pixels, which) => takeList(pixels, which, entries, bytes, first));
         if (!taken) this.fail(of('tables'));
       });
       const bits = this.readBits(views, fieldOf(source, 'occupied'), part.cells);
-      if (!bits) this.fail(of('occupied cells'));
-      const eights = eightsOf(bits);
-      putCube(eights.cells, eights.edge, occupied, n);
-      const coarse = cellsOfDistances(bits, eights);
-      putCube(octantDistances(coarse), coarse.edge, distances, n);
+      const found = bits && octantDistances(bits);
+      if (found?.fine.length !== part.nearCells * ratioFor(part.cells) ** 3) this.fail(of('occupied cells'));
+      putCube(found.coarse, found.edge, distances, n);
+      near.set(found.fine, kLengthOfRow * layout.nearDistances.rowOf[n]);
     });
-    const tables: EntryList = { ...layout.tables, words: new Uint32Array(bytes.buffer) };
     return {
       representation: 'hash', settings, network, parts, corners, atlases, atlasDepth: layout.corners.depth, macroblocks, distances,
-      occupied, tables,
+      nearDistances: { ...layout.nearDistances, words: near },
+      tables: { ...layout.tables, words: new Uint32Array(bytes.buffer) },
     };
   }
 
@@ -124,29 +121,22 @@ class HashReader extends ContentReader {
   }
 }
 
-// Where the finest level has more cells than distances are kept for, a coarser one.
-function cellsOfDistances(bits: OccupancyBits, eights: Cells): Cells {
-  const level = distanceLevel(bits.edge);
-  if (level === 0) {
-    const cells = new Uint8Array(bits.edge ** 3);
-    for (let n = 0; n < cells.length; ++n) cells[n] = (bits.bytes[n >> 3] >> (n & 7)) & 1;
-    return { edge: bits.edge, cells };
-  }
-  let cells = eights; // itself the next level
-  for (let l = 1; l < level; ++l) cells = halved(cells);
-  return cells;
-}
-
 // Undefined where something is missing.
 function readPart(source: Json, columns: number, place: ReturnType<ContentReader['readPlace']>): HashPart | undefined {
   const lattice = wholeOf(source, 'lattice', rules.kMostLattice);
   const cells = wholeOf(source, 'cells', rules.kMostOccupancyCells);
+  const nearCells = readNearCells(source, cells ?? 0);
   const ranges = readRanges(source, columns);
   const sources = arrayOf(source, 'tables') ?? [];
-  if (!place || lattice === undefined || cells === undefined || !ranges) return undefined;
+  if (!place || lattice === undefined || cells === undefined || nearCells === undefined || !ranges) return undefined;
   if (sources.length < 1 || sources.length > kMostTables) return undefined;
   const tables = sources.map(readTable);
-  return tables.includes(undefined) ? undefined : { ...place, lattice, cells, ranges, tables: tables as HashTable[] };
+  return tables.includes(undefined) ? undefined : { ...place, lattice, cells, nearCells, ranges, tables: tables as HashTable[] };
+}
+
+function readNearCells(source: Json, cells: number): number | undefined {
+  const ratio = ratioFor(cells);
+  return ratio === 1 ? 0 : wholeOf(source, 'nearCells', Math.floor(cells / ratio) ** 3);
 }
 
 function readTable(source: Json): HashTable | undefined {

@@ -3,7 +3,6 @@
 import { kAttributes, type ContentPart, type Cubes, type DenseLayer, type TexelTextures } from './content';
 
 export const kMostTables = 8;
-export const kMostDistanceCells = 128; // along an edge of the grid of distances
 
 // What a byte stands for: evenly from low (0) to high (255).
 export interface ByteRange {
@@ -23,6 +22,7 @@ export interface HashPart extends ContentPart {
   ranges: ByteRange[]; // of the columns of its corners
   tables: HashTable[];
   cells: number; // along an axis
+  nearCells: number; // of OctantDistances, coarse ones that hold something; 0 where there is one grid alone
 }
 
 // What weighs a fine level: nothing, a number for all features, or one for density and one for the rest.
@@ -47,29 +47,21 @@ export interface HashContent {
   atlases: number; // textures that it is cut into
   atlasDepth: number; // texels of the atlas that one texture has, at most
   macroblocks: Cubes<Uint8Array>; // as VolumeContent's
-  // octantDistances: of the finest level of the occupancy that has no more than kMostDistanceCells along an edge.
-  distances: Cubes<Uint32Array>;
-  occupied: Cubes<Uint8Array>; // of each 2 × 2 × 2 finest cells (eightsOf)
-  tables: EntryList;
+  distances: Cubes<Uint32Array>; // OctantDistances' coarse grids
+  nearDistances: List; // and their fine cells, a word each, a list a part
+  tables: List; // their entries, of which 8 bytes are 2 words, a list a table
 }
 
-// Entries of tables one after another, their 8 bytes as 2 words: [layer][row][kEntriesOfRow][2]. A table begins a row.
-export interface EntryList {
+// Lists one after another, each beginning a row: [layer][row][kLengthOfRow][1 or 2 words].
+export interface List {
   rows: number; // of a layer
   layers: number;
-  rowOf: number[][]; // of each part and table the first row, counted through all layers
+  rowOf: number[]; // of each list the first row, counted through all layers
   words: Uint32Array;
 }
 
-export const kEntriesOfRow = 2048;
+export const kLengthOfRow = 2048;
 export const kRowsOfLayer = 2048; // at most
-
-// Of the finest occupancy: how often it is halved for distances.
-export function distanceLevel(cells: number): number {
-  let level = 0;
-  while (cells / 2 ** level > kMostDistanceCells) ++level;
-  return level;
-}
 
 export function logitsOfLevel(weights: LevelWeights): number {
   return kLevelWeights.indexOf(weights);

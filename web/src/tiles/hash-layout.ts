@@ -1,19 +1,22 @@
 // How the parts of a hash content share textures, before anything is allocated for them.
 import { count, kAttributes, kMacroblock, kTexturesOfShader, type TextureLimits } from './content';
 import { atlasOf, stack, type AtlasLayout } from './content-layout';
-import { distanceLevel, kEntriesOfRow, kRowsOfLayer, type EntryList, type HashPart } from './hash-content';
+import { kLengthOfRow, kRowsOfLayer, type HashPart, type List } from './hash-content';
+import { ratioFor } from './octant-distances';
 import type { Vec3 } from './tileset';
+
+export type ListLayout = Omit<List, 'words'>;
 
 export interface HashLayout {
   corners: AtlasLayout;
   macroblocks: { size: Vec3; origins: Vec3[] };
   distances: { size: Vec3; origins: Vec3[] };
-  occupied: { size: Vec3; origins: Vec3[] };
-  tables: Omit<EntryList, 'words'>;
+  nearDistances: ListLayout;
+  tables: ListLayout;
   bytes: number; // of all textures
 }
 
-const kOthers = 5; // macroblocks, distances, occupied, tables, what is opaque
+const kOthers = 5; // macroblocks, distances (2), tables, what is opaque
 
 // Undefined where the limits do not allow it.
 export function layOutHash(parts: HashPart[], columns: number, limits: TextureLimits): HashLayout | undefined {
@@ -21,24 +24,28 @@ export function layOutHash(parts: HashPart[], columns: number, limits: TextureLi
   const mostAtlases = Math.floor((kTexturesOfShader - kOthers) / texturesOfAtlas);
   const corners = atlasOf(parts.reduce((sum, part) => sum + part.stored, 0), limits.edge3D, mostAtlases);
   const macroblocks = stack(parts.map((part) => part.lattice / kMacroblock), limits.edge3D);
-  const distances = stack(parts.map((part) => part.cells / 2 ** distanceLevel(part.cells)), limits.edge3D);
-  const occupied = stack(parts.map((part) => part.cells / 2), limits.edge3D);
-  const tables = listOf(parts);
-  if (!corners || !macroblocks || !distances || !occupied || tables.layers > limits.layers) return undefined;
+  const distances = stack(parts.map(({ cells }) => cells / ratioFor(cells)), limits.edge3D);
+  const nearDistances = listsOf(parts.map(({ cells, nearCells }) => nearCells * ratioFor(cells) ** 3));
+  const tables = listsOf(parts.flatMap((part) => part.tables.map(({ entries }) => entries)));
+  if (!corners || !macroblocks || !distances || Math.max(tables.layers, nearDistances.layers) > limits.layers) return undefined;
   const bytes =
-    4 * texturesOfAtlas * count(corners.size) + 4 * count(macroblocks.size) + 4 * count(distances.size) + count(occupied.size) +
-    kAttributes * kEntriesOfRow * tables.rows * tables.layers;
-  return { corners, macroblocks, distances, occupied, tables, bytes };
+    4 * texturesOfAtlas * count(corners.size) + 4 * count(macroblocks.size) + 4 * count(distances.size) +
+    4 * lengthOf(nearDistances) + kAttributes * lengthOf(tables);
+  return { corners, macroblocks, distances, nearDistances, tables, bytes };
 }
 
-function listOf(parts: HashPart[]): Omit<EntryList, 'words'> {
+export function listsOf(lengths: number[]): ListLayout {
   let rows = 0;
-  const rowOf = parts.map((part) =>
-    part.tables.map(({ entries }) => {
-      const first = rows;
-      rows += Math.ceil(entries / kEntriesOfRow);
-      return first;
-    }));
+  const rowOf = lengths.map((length) => {
+    const first = rows;
+    rows += Math.ceil(length / kLengthOfRow);
+    return first;
+  });
   const layers = Math.ceil(rows / kRowsOfLayer);
   return { rows: layers > 1 ? kRowsOfLayer : rows, layers, rowOf };
+}
+
+// With what is left over at the ends of rows.
+export function lengthOf({ rows, layers }: ListLayout): number {
+  return kLengthOfRow * rows * layers;
 }

@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { randomNumbers } from '../testing/made-tree';
 import { isSet, type OccupancyBits } from './occupancy';
-import { eightsOf, halved, kFarthestOctantDistance, octantDistances } from './octant-distances';
+import { kFarthestOctantDistance, octantDistances, ratioFor } from './octant-distances';
 
 function madeBits(edge: number, share: number, seed: number): OccupancyBits {
   const random = randomNumbers(seed);
@@ -27,36 +27,42 @@ describe('octantDistances', () => {
   it.each([0.3, 0.02, 0.002, 0])('are the edges of the largest empty cubes: a share of %s occupied', (share) => {
     const edge = 16;
     const bits = madeBits(edge, share, 7);
-    const cells = Uint8Array.from({ length: edge ** 3 }, (_, cell) => (isSet(bits, cell) ? 1 : 0));
-    const distances = octantDistances({ edge, cells });
+    const { coarse, fine } = octantDistances(bits);
+    expect(fine.length).toBe(0);
     const random = randomNumbers(1);
     for (let round = 0; round < 300; ++round) {
       const at = [0, 1, 2].map(() => Math.floor(random() * edge));
       const octant = Math.floor(random() * 8);
-      const found = (distances[at[0] + edge * (at[1] + edge * at[2])] >>> (4 * octant)) & kFarthestOctantDistance;
-      expect(found).toBe(freeFrom(edge, at, octant, (x, y, z) => cells[x + edge * (y + edge * z)] === 1));
+      const found = (coarse[at[0] + edge * (at[1] + edge * at[2])] >>> (4 * octant)) & kFarthestOctantDistance;
+      expect(found).toBe(freeFrom(edge, at, octant, (x, y, z) => isSet(bits, x + edge * (y + edge * z))));
     }
   });
-});
 
-describe('coarser cells', () => {
-  it('hold the bits of eight finer ones, and are occupied where one of them is', () => {
-    const edge = 16;
-    const bits = madeBits(edge, 0.05, 3);
-    const eights = eightsOf(bits);
-    const quarter = halved(eights);
-    expect([eights.edge, quarter.edge]).toEqual([8, 4]);
-    const anyIn = new Set<number>();
-    for (let z = 0; z < edge; ++z) {
-      for (let y = 0; y < edge; ++y) {
-        for (let x = 0; x < edge; ++x) {
-          const set = isSet(bits, x + edge * (y + edge * z));
-          const eight = eights.cells[(x >> 1) + 8 * ((y >> 1) + 8 * (z >> 1))];
-          expect(((eight >> ((x & 1) + 2 * (y & 1) + 4 * (z & 1))) & 1) === 1).toBe(set);
-          if (set) anyIn.add((x >> 2) + 4 * ((y >> 2) + 4 * (z >> 2)));
+  it.each([136, 264])('are kept in two grids where there are many cells, and lead nowhere: %i', (edge) => {
+    const bits = madeBits(edge, 3e-5, 3);
+    const ratio = ratioFor(edge);
+    expect(ratio).toBe(edge > 256 ? 4 : 2);
+    const { edge: coarseEdge, coarse, fine } = octantDistances(bits);
+    expect(coarseEdge).toBe(edge / ratio);
+    const occupied = (x: number, y: number, z: number) => isSet(bits, x + edge * (y + edge * z));
+    let near = 0;
+    let wrong = 0;
+    coarse.forEach((word, cell) => {
+      if ((word & 15) !== 0) return;
+      const corner = [cell % coarseEdge, Math.floor(cell / coarseEdge) % coarseEdge, Math.floor(cell / coarseEdge ** 2)];
+      for (let n = 0; n < ratio ** 3; ++n) {
+        const at = [n % ratio, Math.floor(n / ratio) % ratio, Math.floor(n / ratio ** 2)].map((x, a) => ratio * corner[a] + x);
+        const value = fine[(word >>> 4) * ratio ** 3 + n];
+        const isOccupied = occupied(at[0], at[1], at[2]);
+        if ((value === 0) !== isOccupied) ++wrong;
+        if (isOccupied || near++ % 50 !== 0) continue;
+        for (let octant = 0; octant < 8; ++octant) {
+          const found = (value >>> (4 * octant)) & kFarthestOctantDistance;
+          if (found < 1 || found > freeFrom(edge, at, octant, occupied)) ++wrong;
         }
       }
-    }
-    quarter.cells.forEach((cell, n) => expect(cell !== 0).toBe(anyIn.has(n)));
+    });
+    expect(near).toBeGreaterThan(400);
+    expect(wrong).toBe(0);
   });
 });
