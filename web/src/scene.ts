@@ -23,7 +23,7 @@ import { tileView } from './picture-view';
 import { SceneError } from './scene-error';
 import { ServedFiles, type ContentFile, type SceneFiles } from './scene-files';
 import { TileSelector, kSelectionSettings, type SelectionSettings } from './stream/tile-selector';
-import { boxOfCells, cutFrontToBack, tileTree, type TileTree } from './stream/tile-tree';
+import { boxOfCells, coarsestTiles, cutFrontToBack, tileTree, type TileTree } from './stream/tile-tree';
 import { jointView } from './stream/tile-view';
 import { kStreamSettings, TileStreamer, type StreamSettings, type StreamStatistics } from './stream/tile-streamer';
 import { isKnown, type Content, type KnownRepresentation } from './tiles/decode-content';
@@ -91,6 +91,7 @@ export class TesseraScene extends THREE.Object3D {
   private drawn: number[] = [];
   private lastUpdate = 0;
   private disposed = false;
+  private refused = false; // the card cannot draw it
   private canvas?: EventTarget;
   // What was on the card is gone: all is fetched anew when there is a card again.
   private readonly onContextLost = () => this.leaveCard();
@@ -192,9 +193,12 @@ export class TesseraScene extends THREE.Object3D {
     const sceneFromLocal = this.localFromScene.clone().invert();
     const inScene = (boxes: readonly THREE.Matrix4[]) => boxes.map((box) => sceneFromLocal.clone().multiply(box));
     compositor.hide(inScene(this.hidden), inScene(this.neighbours.boxes), !this.showsSurround);
-    compositor.draw(renderer, pictures, worldFromScene, contents, depth);
+    // Rays that meet nothing in whole scenes have the surround's network, or else the coarsest content's: always there,
+    // whatever is in view.
+    const ofNothing = this.tree.surround >= 0 ? behind : streamer.residentOf(coarsestTiles(this.tree)[0]);
+    compositor.draw(renderer, pictures, worldFromScene, contents, depth, ofNothing);
     mesh.renderOrder = kFirstRenderOrder + this.neighbours.behind.length;
-    mesh.visible = contents.some((ofOne) => ofOne.length > 0);
+    mesh.visible = ofNothing?.whole || contents.some((ofOne) => ofOne.length > 0);
   }
 
   // Streams in what `update` would draw, and draws nothing: for who waits until it is `idle`, and then wants one picture.
@@ -237,8 +241,9 @@ export class TesseraScene extends THREE.Object3D {
 
   // Nothing where nothing can be drawn.
   private look(camera: THREE.Camera, renderer: THREE.WebGLRenderer): Look | undefined {
-    if (this.disposed || renderer.getContext().isContextLost()) return undefined;
+    if (this.disposed || this.refused || renderer.getContext().isContextLost()) return undefined;
     const prepared = this.prepare(renderer);
+    if (!prepared) return undefined;
     this.updateWorldMatrix(true, false);
     camera.updateWorldMatrix(true, false);
     const worldFromScene = this.matrixWorld.clone().multiply(this.localFromScene);
@@ -267,7 +272,14 @@ export class TesseraScene extends THREE.Object3D {
   // What needs to know the graphics card.
   private prepare(renderer: THREE.WebGLRenderer) {
     if (!this.compositor || !this.streamer || !this.mesh) {
-      this.compositor = new Compositor(renderer, this.tileset);
+      try {
+        this.compositor = new Compositor(renderer, this.tileset);
+      } catch (error) {
+        if (!(error instanceof SceneError)) throw error;
+        this.refused = true;
+        this.onError(error);
+        return undefined;
+      }
       const source = new ContentSource(this.tileset.representation, this.tree, this.files, this.pool, this.compositor, renderer);
       this.streamer = new TileStreamer(new TileSelector(this.tree, this.selection), source, this.stream);
       this.streamer.onError = (error) => this.onError(error);

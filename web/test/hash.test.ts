@@ -88,6 +88,30 @@ describe.skipIf(missing())('a scene of hash', () => {
     whole.close();
   });
 
+  it('that is whole has none without a surround either, whatever is in view', async () => {
+    const scene = join(folder, 'alone');
+    cpSync(goldenHash, scene, { recursive: true });
+    changeContents(scene, '"whole":false', '"whole":true ');
+    const json = JSON.parse(readFileSync(join(scene, 'tileset.json'), 'utf8'));
+    json.root.contents = json.root.contents.filter((one: any) => !one.extensions.TESSERA_scene.surround);
+    json.root.boundingVolume = json.root.contents[0].boundingVolume;
+    writeFileSync(join(scene, 'tileset.json'), JSON.stringify(json));
+    const views = [across, viewAt(tileset, [0.2, 0.1, 0.4], [0.3, 0.4, 5]), viewAt(tileset, [6, 3, 0.5], [20, 9, 3])];
+    writeFileSync(join(folder, 'alone.json'), cameraPath(tileset, views.map(({ matrix }) => matrix)));
+    run('render', scene, join(folder, 'aloneOracle'), '--path', join(folder, 'alone.json'));
+    const served = await serve(scene);
+    const said: string[] = [];
+    const page = await open(said, {}, served);
+    for (const [i, view] of views.entries()) {
+      const expected = await decodePng(page, join(folder, 'aloneOracle', `0000${i}.png`));
+      expect(new Set(expected).size).toBeGreaterThan(10);
+      expect(psnr(await look(page, view), expected)).toBeGreaterThan(38);
+    }
+    expect(said).toEqual([]);
+    await page.close();
+    served.close();
+  });
+
   it('shows what its levels are weighed with, where weights are the same everywhere', async () => {
     const said: string[] = [];
     // Level 1's block has these logits (attention to density and to all else), and its surround weighs nothing.

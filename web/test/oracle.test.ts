@@ -92,9 +92,9 @@ describe.skipIf(missing())('the browser', () => {
     await page.close();
   });
 
-  it('lets what lies far beyond what was captured fade into what is behind', async () => {
+  it.each<Golden>(['volume', 'hash'])('lets what lies far beyond what was captured fade into what is behind: %s', async (representation) => {
     const said: string[] = [];
-    const page = await openPlain(browser, servers.volume, said);
+    const page = await openPlain(browser, servers[representation], said);
     await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
     const look = async (change: () => void) => {
       await page.evaluate(change);
@@ -104,9 +104,17 @@ describe.skipIf(missing())('the browser', () => {
     const whole = await look(() => {});
     const faded = await look(() => (plain.city!.visibility = 1e-3));
     const alone = await look(() => (plain.city!.showsSurround = false));
+    // Between what is there and what is behind, nothing is brighter or darker than both.
+    const half = await look(() => {
+      plain.city!.showsSurround = true;
+      plain.city!.visibility = 0.6;
+    });
+    const between = half.filter((value, i) => value >= Math.min(whole[i], alone[i]) - 3 && value <= Math.max(whole[i], alone[i]) + 3);
+    expect(between.length / half.length).toBeGreaterThan(0.99);
     const changed = (a: Uint8Array, b: Uint8Array) => a.filter((value, i) => Math.abs(value - b[i]) > 4).length / a.length;
     expect(changed(whole, alone)).toBeGreaterThan(0.1);
     expect(changed(faded, alone)).toBeLessThan(0.05);
+    expect(Math.min(changed(half, alone), changed(half, whole))).toBeGreaterThan(0.05);
     expect(said).toEqual([]);
     await page.close();
   });

@@ -1,6 +1,5 @@
 // What is drawn, and how well.
-import { displayModesOf, isOfFeatureLevel, type DisplayMode } from '../draw/display-modes';
-import { kMostTables } from '../tiles/hash-content';
+import { displayModesOf, isOfFeatureLevel, kMostFeatureLevels, type DisplayMode } from '../draw/display-modes';
 import { element } from './page/element';
 import type { Toolbar } from './page/toolbar';
 import type { Viewer } from './viewer';
@@ -49,14 +48,24 @@ export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
 
 // Which level of features such modes show.
 function featureLevelOf({ city }: Viewer, change: (level: number) => void) {
-  const fine = Array.from({ length: kMostTables }, (_, i): [string, number] => [`Level ${i + 1}`, i + 1]);
+  const fine = Array.from({ length: kMostFeatureLevels }, (_, i): [string, number] => [`Level ${i + 1}`, i + 1]);
   const label = choice('Hash level', [...fine, ['The coarse features', 0] as [string, number]], change);
-  const options = [...label.querySelectorAll('option')];
-  const show = (mode: DisplayMode) => {
-    label.hidden = !isOfFeatureLevel(mode);
-    fine.forEach(([, level], i) => (options[i].hidden = level > city.featureLevels));
-    options[fine.length].hidden = mode !== 'contribution'; // nothing weighs them
+  const select = label.querySelector('select')!;
+  const options = [...select.options];
+  let shown: DisplayMode = 'colour';
+  const offer = () => {
+    fine.forEach(([, level], i) => (options[i].hidden = options[i].disabled = level > city.featureLevels));
+    options[fine.length].hidden = options[fine.length].disabled = shown !== 'contribution'; // nothing weighs them
+    if (!options[select.selectedIndex].hidden) return;
+    select.selectedIndex = 0;
+    change(1);
   };
+  const show = (mode: DisplayMode) => {
+    shown = mode;
+    label.hidden = !isOfFeatureLevel(mode);
+    if (!label.hidden) offer();
+  };
+  select.addEventListener('focus', offer); // levels that have come meanwhile
   show('colour');
   return { label, show };
 }

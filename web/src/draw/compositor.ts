@@ -25,7 +25,6 @@ export interface DrawnContent {
   mesh: THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>;
   network?: DrawnNetwork; // of `hash`: what makes colours when all contents are drawn
   whole: boolean; // rays that end nowhere are opaque
-  level: number;
 }
 
 // Of a content, the part in a box; all of it where there is none.
@@ -167,9 +166,11 @@ export class Compositor {
       place.everywhere ? this.screen : this.cube, material);
     mesh.frustumCulled = false;
     mesh.matrixAutoUpdate = mesh.matrixWorldAutoUpdate = false;
-    if (!isHash) return { textures, box, surround, mesh, whole: false, level };
+    if (!isHash) return { textures, box, surround, mesh, whole: false };
     material.uniforms.network = { value: 0 };
-    return { textures, box, surround, mesh, network: this.networks!.networkOf(content.network), whole: content.settings.whole, level };
+    const network = this.networks!.networkOf(content.network);
+    ++network.contents;
+    return { textures, box, surround, mesh, network, whole: content.settings.whole };
   }
 
   compile(renderer: THREE.WebGLRenderer, { mesh, network }: DrawnContent): void {
@@ -189,6 +190,7 @@ export class Compositor {
     content.mesh.material.uniformsGroups.forEach((group) => group.dispose());
     content.mesh.material.dispose();
     content.textures.dispose();
+    if (content.network) this.networks!.release(content.network);
   }
 
   // Of the card, without contents.
@@ -236,7 +238,7 @@ export class Compositor {
   // of what is opaque, if that is given.
   draw(
     renderer: THREE.WebGLRenderer, pictures: Picture[], worldFromScene: THREE.Matrix4, contents: DrawnPart[][],
-    opaqueDepth: THREE.Texture | null,
+    opaqueDepth: THREE.Texture | null, ofNothing?: DrawnContent,
   ): void {
     this.pictures = pictures;
     this.view.opaqueDepth.value = opaqueDepth ?? this.nothingOpaque;
@@ -256,7 +258,7 @@ export class Compositor {
       renderer.clear();
     }
     drawAsTheyStand(renderer, pictures, () =>
-      pictures.forEach((picture, i) => this.drawOne(renderer, picture, worldFromScene, contents[i])));
+      pictures.forEach((picture, i) => this.drawOne(renderer, picture, worldFromScene, contents[i], ofNothing)));
     renderer.autoClear = autoClear;
     renderer.setClearColor(clearColour, clearAlpha);
     renderer.setRenderTarget(before);
@@ -300,16 +302,14 @@ export class Compositor {
     return { surround, everywhere, distancesOfBytes: this.distancesOfBytes, cuts: this.cuts };
   }
 
-  // Which number each network has in a picture. The surround's, or else that of the coarsest content, speaks for rays that
-  // nothing meets.
-  private networksOf(frontToBack: DrawnPart[]): NetworkOrder {
-    const found = new Set(frontToBack.map(({ content }) => content.network!));
+  // Which number each network has in a picture. More than can be told apart are taken for the last.
+  private networksOf(frontToBack: DrawnPart[], ofNothing?: DrawnContent): NetworkOrder {
+    const whole = this.endsRays && ofNothing?.whole === true;
+    const found = new Set([...(whole ? [ofNothing] : []), ...frontToBack.map(({ content }) => content)].map(({ network }) => network!));
     const networks = [...found].slice(0, networksOf(this.weightTargets));
-    const numberOf = ({ network }: DrawnContent) => Math.max(0, networks.indexOf(network!)); // more are not told apart
+    const numberOf = ({ network }: DrawnContent) => (networks.includes(network!) ? networks.indexOf(network!) : networks.length - 1);
     for (const { content } of frontToBack) content.mesh.material.uniforms.network.value = numberOf(content);
-    const whole = this.endsRays && frontToBack.some(({ content }) => content.whole);
-    const coarser = (a: DrawnPart, b: DrawnPart) => (b.content.surround || (!a.content.surround && b.content.level > a.content.level) ? b : a);
-    return { networks, whole, behind: frontToBack.length > 0 ? numberOf(frontToBack.reduce(coarser).content) : 0 };
+    return { networks, whole, behind: whole ? numberOf(ofNothing) : 0 };
   }
 
   private place({ mesh, box }: DrawnContent, within: Box, worldFromScene: THREE.Matrix4): void {
@@ -320,7 +320,7 @@ export class Compositor {
   }
 
   private drawOne(
-    renderer: THREE.WebGLRenderer, picture: Picture, worldFromScene: THREE.Matrix4, frontToBack: DrawnPart[],
+    renderer: THREE.WebGLRenderer, picture: Picture, worldFromScene: THREE.Matrix4, frontToBack: DrawnPart[], ofNothing?: DrawnContent,
   ): void {
     const { camera, part, eye, origin, ray, sceneFromClip } = picture;
     this.view.part.value = part;
@@ -333,7 +333,7 @@ export class Compositor {
     this.target.viewport.copy(part);
     this.depthAlone.viewport.copy(part);
     renderer.setRenderTarget(this.target);
-    const networks = this.networks && this.networksOf(frontToBack);
+    const networks = this.networks && this.networksOf(frontToBack, ofNothing);
     const hides = this.view.minTransmittance.value > 0;
     frontToBack.forEach(({ content, within = kEverywhere }, i) => {
       if (hides && i > 0 && (content.surround || i % kContentsBetweenHiding === 0)) {

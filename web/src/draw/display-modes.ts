@@ -1,5 +1,6 @@
 // What of the scene is shown.
 import * as THREE from 'three';
+import { kMostTables } from '../tiles/hash-content';
 import type { Representation } from '../tiles/tileset';
 
 export const kDisplayModes = [
@@ -10,6 +11,8 @@ export type DisplayMode = (typeof kDisplayModes)[number];
 // Those that show one of the levels of features that scenes of `hash` have (NGP-RT, figures 6 and S2): what it alone gives to the
 // colour, and what it is weighed with, for colours and for density.
 const kOfFeatureLevel: readonly DisplayMode[] = ['contribution', 'attention', 'densityAttention'];
+
+export const kMostFeatureLevels = kMostTables; // fine ones
 
 export function isOfFeatureLevel(mode: DisplayMode): boolean {
   return kOfFeatureLevel.includes(mode);

@@ -7,13 +7,14 @@ import type { ProgramPieces } from './content-program';
 import { atlasShader } from './content-textures';
 import { kCornerAtlases } from './hash-textures';
 
-// Networks that a picture tells apart: those beyond are taken for the last of them.
+// Networks that a picture tells apart.
 export const kWeightsOfTarget = 3; // numbers of a target beside its opacity
 export function networksOf(weightTargets: number): number {
   return kWeightsOfTarget * (1 + weightTargets);
 }
 
-// Targets: sums of diffuse colour, distances, of three features, of the fourth and the weights of networks 1 and 2, and of three
+// Targets: sums of diffuse colour, distances, of three features (whose opacity is what is left after what fades in the
+// distance: of sums nothing does, as a colour is not made of them linearly), of the fourth and the weights of networks 1 and 2, and of three
 // more in each further one. What weighs network 0 is the rest of the opacity.
 function outputs(weightTargets: number): string {
   const more = [...Array(weightTargets).keys()];
@@ -48,10 +49,10 @@ void writeContent(Composite sum, vec3 d, float opacity, float seen) {
   if (display == kShowBlocks) features.rgb = opacity * colourOfBlock;
   if (display == kShowLevels) features.rgb = opacity * colourOfLevel;
   const float most = 60000.0;  // half floats end at 65504
-  diffuseAndOpacity = seen * vec4(clamp(sum.diffuse, -most, most), opacity);
-  features = seen * clamp(features, -most, most);
+  diffuseAndOpacity = vec4(clamp(sum.diffuse, -most, most), opacity);
+  features = clamp(features, -most, most);
   featuresAndOpacity = vec4(features.xyz, seen * opacity);
-  writeWeights(features.w, seen * opacity);
+  writeWeights(features.w, opacity);
 }`;
 
 export function hashPieces(

@@ -49,8 +49,10 @@ void main() {
   bool open = whole && texture(opaqueDepth, gl_FragCoord.xy / resolution).r >= 1.0;
   if (opacity <= 0.0 && !open) discard;
   if ((opacity > 0.0 ? heaviest(at, opacity) : behind) != network) discard;
-  vec4 features = vec4(texelFetch(featuresAndOpacity, at, 0).xyz, texelFetch(weightsAndOpacity, at, 0).x);
-  if (open) opacity = 1.0;
+  vec4 threeFeatures = texelFetch(featuresAndOpacity, at, 0);
+  vec4 features = vec4(threeFeatures.xyz, texelFetch(weightsAndOpacity, at, 0).x);
+  vec3 shown = features.rgb / max(opacity, 1e-6);  // of modes that show something else instead
+  opacity = open ? 1.0 : threeFeatures.a;
   vec2 ndc = 2.0 * (gl_FragCoord.xy - part.xy) / part.zw - 1.0;
   vec3 seen = sigmoid(diffuse.rgb + viewDependent(diffuse.rgb, features, normalize(ray * vec3(ndc, 1.0))));
   vec3 colour = opacity * seen;
@@ -58,10 +60,10 @@ void main() {
   if (display == kShowSpecular) colour = opacity * clamp(0.5 + seen - sigmoid(diffuse.rgb), 0.0, 1.0);  // grey: nothing
   if (display == kShowFeatures) colour = opacity * sigmoid(features.rgb);
   if (display == kShowAttention || display == kShowDensityAttention) {
-    colour = opacity * pow(features.rgb / opacity, vec3(1.0 / 2.2));  // most are small
+    colour = opacity * pow(max(shown, 0.0), vec3(1.0 / 2.2));  // most are small
   }
   if (display == kShowBlocks || display == kShowLevels) {
-    colour = features.rgb * (0.35 + 0.65 * dot(sigmoid(diffuse.rgb), vec3(0.3, 0.6, 0.1)));
+    colour = opacity * shown * (0.35 + 0.65 * dot(sigmoid(diffuse.rgb), vec3(0.3, 0.6, 0.1)));
   }
   colourAndOpacity = vec4(colour, opacity);
 }`;
@@ -96,7 +98,11 @@ function viewDependentShader(network: DenseLayer[]): string {
 // Of one or several contents: those that have the same numbers have the same.
 export interface DrawnNetwork {
   mesh: THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>;
+  contents: number; // that are on the card
 }
+
+// As many as are kept with no content on the card that has them: so that a level that comes back finds its own.
+const kMostUnused = 16;
 
 // What of a picture's contents there is to know.
 export interface NetworkOrder {
@@ -124,7 +130,7 @@ export class NetworkPass {
     return 8 * this.target.width * this.target.height;
   }
 
-  // Kept until all is disposed of: a scene has one for each level of detail.
+  // A scene has one for each level of detail.
   networkOf(network: DenseLayer[]): DrawnNetwork {
     const key = viewDependentShader(network);
     const known = this.networks.get(key);
@@ -144,9 +150,19 @@ export class NetworkPass {
     });
     const mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>(this.screen, material);
     mesh.frustumCulled = false;
-    const made = { mesh };
+    const made = { mesh, contents: 0 };
     this.networks.set(key, made);
     return made;
+  }
+
+  // Of which as many are kept as scenes have levels; others go when no content has them.
+  release(network: DrawnNetwork): void {
+    --network.contents;
+    const unused = [...this.networks].filter(([, { contents }]) => contents === 0);
+    for (const [key, { mesh }] of unused.slice(0, Math.max(0, unused.length - kMostUnused))) {
+      mesh.material.dispose();
+      this.networks.delete(key);
+    }
   }
 
   resize(width: number, height: number): void {
