@@ -102,7 +102,7 @@ bool ContentReader::readMacroblocks(const json& part, uint32_t texels, uint32_t 
   return pictures && take(*pictures, sizeOfMacroblocks(stored));
 }
 
-bool ContentReader::readPictures(const json& source, const PictureSize& size, const TakePicture& take) {
+bool ContentReader::takePictures(const json& source, const PictureSize& size, const TakePicture& take) {
   if (!source.is_array() || source.size() != kTexelPictures) return false;
   for (size_t which = 0; which < kTexelPictures; ++which) {
     const auto picture = readPicture(source[which], size);

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "tiles/content_test_support.h"
 #include "tiles/glb.h"
 #include "tiles/lossless_image.h"
 #include "tiles/read_content.h"
@@ -27,24 +28,14 @@ void expectSame(const HashContent& a, const HashContent& b) {
   EXPECT_EQ(a.logits, b.logits);
   EXPECT_EQ(a.step, b.step);
   EXPECT_EQ(a.isWhole, b.isWhole);
-  ASSERT_EQ(a.network.size(), b.network.size());
-  for (size_t i = 0; i < a.network.size(); ++i) {
-    EXPECT_EQ(a.network[i].weights, b.network[i].weights);
-    EXPECT_EQ(a.network[i].biases, b.network[i].biases);
-  }
+  EXPECT_TRUE(a.network == b.network);
   ASSERT_EQ(a.parts.size(), b.parts.size());
   for (size_t i = 0; i < a.parts.size(); ++i) {
     const HashPart &one = a.parts[i], &other = b.parts[i];
-    EXPECT_EQ(one.centre, other.centre);
-    EXPECT_EQ(one.scale, other.scale);
-    EXPECT_EQ(one.low, other.low);
-    EXPECT_EQ(one.high, other.high);
-    EXPECT_EQ(one.contracted, other.contracted);
-    EXPECT_EQ(one.surround, other.surround);
+    tiles_test::expectSamePlace(one, other);
     EXPECT_EQ(one.lattice, other.lattice);
     EXPECT_EQ(one.columns, other.columns);
     EXPECT_EQ(one.ranges, other.ranges);
-    EXPECT_EQ(one.macroblocks, other.macroblocks);
     EXPECT_EQ(one.cornerBytes, other.cornerBytes);
     ASSERT_EQ(one.tables.size(), other.tables.size());
     for (size_t l = 0; l < one.tables.size(); ++l) {
@@ -198,33 +189,11 @@ TEST(HashPayload, NamesTheRuleThatIsBroken) {
         [](HashContent& c) { c.parts[0].distances.coarse.pop_back(); });
 }
 
-class HashRefusal : public testing::Test {
+class HashRefusal : public tiles_test::Refusal {
  protected:
-  static json& ours(json& asset) { return asset["extensions"]["TESSERA_content"]; }
-  static json& part(json& asset) { return ours(asset)["parts"][0]; }
-
-  void refuses(const std::string& why, const std::function<void(json&)>& spoil, const ContentLimits& limits = {}) {
-    refusesBytes(
-        why, [&](json& asset, Bytes&) { spoil(asset); }, limits);
-  }
-  void refusesBytes(const std::string& why, const std::function<void(json&, Bytes&)>& spoil,
-                    const ContentLimits& limits = {}) {
-    const Bytes file = encodeHash(madeHashContent(5), 1);
-    const auto view = decodeGlb(file);
-    json asset = json::parse(view->json);
-    Bytes bytes(view->bytes.begin(), view->bytes.end());
-    spoil(asset, bytes);
-    std::string reason;
-    EXPECT_FALSE(decodeHash(encodeGlb(asset.dump(), bytes), reason, limits)) << why;
-    EXPECT_EQ(reason.substr(0, why.size()), why);
-  }
-  static void replace(json& asset, Bytes& bytes, json& entry, const ImageU8& image) {
-    const Bytes encoded = encodeLossless(image, 1);
-    bytes.resize((bytes.size() + 3) / 4 * 4);
-    asset["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", bytes.size()}, {"byteLength", encoded.size()}});
-    entry["bufferView"] = asset["bufferViews"].size() - 1;
-    bytes.insert(bytes.end(), encoded.begin(), encoded.end());
-    asset["buffers"][0]["byteLength"] = bytes.size();
+  Bytes file() const override { return encodeHash(madeHashContent(5), 1); }
+  bool isRead(std::span<const std::byte> file, std::string& reason, const ContentLimits& limits) const override {
+    return decodeHash(file, reason, limits).has_value();
   }
 };
 

@@ -1,6 +1,4 @@
 // A hash content, read: untrusted bytes.
-#include <fmt/format.h>
-
 #include "tiles/content_reader.h"
 #include "tiles/hash_payload.h"
 #include "tiles/json_fields.h"
@@ -23,46 +21,14 @@ bool takeRange(const json& source, ByteRange& range) {
 struct PartHeader {
   HashPart part;  // without bytes
   uint32_t stored = 0, cells = 0, nearCells = 0;
-  const json* source = nullptr;
 
   uint64_t bytes() const { return hashPartBytes(part, stored, cells, nearCells); }
 };
 
-class HashReader : ContentReader {
+class HashReader : public PartsReader<HashReader, HashContent, PartHeader> {
  public:
-  HashReader(const ContentFile& file, std::string& reason, const ContentLimits& limits)
-      : ContentReader(file, reason, limits) {}
+  using PartsReader::PartsReader;
 
-  std::optional<HashContent> read() {
-    if (!readSettings() || !readLayers(content_.network) || !readNetwork(content_.network) || !readHeaders()) {
-      return std::nullopt;
-    }
-    for (size_t i = 0; i < headers_.size(); ++i) {
-      if (!readBytesOf(headers_[i])) {
-        fail(fmt::format("part {}: its {} are not what they should be", i, what_));
-        return std::nullopt;
-      }
-      content_.parts.push_back(std::move(headers_[i].part));
-    }
-    if (auto broken = brokenRule(content_)) {
-      fail(*broken);
-      return std::nullopt;
-    }
-    return std::move(content_);
-  }
-
-  // Looks at no buffer view.
-  std::optional<uint64_t> readBytes() {
-    if (!readSettings() || !readLayers(content_.network) || !readHeaders()) return std::nullopt;
-    uint64_t bytes = bytesInMemory(content_);
-    for (const DenseLayer& layer : content_.network) {
-      bytes += sizeof(float) * (uint64_t{layer.inputs} * layer.outputs + layer.outputs);
-    }
-    for (const PartHeader& header : headers_) bytes += header.bytes();
-    return bytes;
-  }
-
- private:
   bool readSettings() {
     const std::string* weights = stringOf(file_.ours, "weights");
     const auto known = weights ? levelWeightsFrom(*weights) : std::nullopt;
@@ -80,21 +46,6 @@ class HashReader : ContentReader {
       const auto logit = numberFrom(source);
       if (!logit) return fail("a logit is no number");
       content_.logits.push_back(static_cast<float>(*logit));
-    }
-    return true;
-  }
-
-  bool readHeaders() {
-    const json* parts = partsOf();
-    if (!parts) return false;
-    uint64_t bytes = 0;
-    for (const json& source : *parts) {
-      PartHeader header;
-      header.source = &source;
-      if (!readHeader(source, header)) return fail(fmt::format("part {}: its header is not complete", headers_.size()));
-      bytes += header.bytes();
-      if (bytes > limits_.bytes) return fail(fmt::format("takes more than {} bytes of memory", limits_.bytes));
-      headers_.push_back(std::move(header));
     }
     return true;
   }
@@ -131,6 +82,7 @@ class HashReader : ContentReader {
     return readPlace(source, part);
   }
 
+ private:
   static bool readTable(const json& source, HashTable& table) {
     const auto resolution = unsignedOf(source, "resolution", kMostTableResolution);
     const auto entries = unsignedOf(source, "entries", kMostTableEntries);
@@ -147,23 +99,23 @@ class HashReader : ContentReader {
     return true;
   }
 
-  bool readBytesOf(PartHeader& header) {
+ public:
+  bool readPictures(const json& source, PartHeader& header, const char*& what) {
     HashPart& part = header.part;
-    const json& source = *header.source;
-    what_ = "macroblocks";
+    what = "macroblocks";
     const auto takeCorners = [&](const json& pictures, const PictureSize& size) {
       return readCorners(pictures, size, header.stored, part);
     };
     if (!readMacroblocks(source, part.lattice, header.stored, part, takeCorners)) return false;
-    what_ = "tables";
+    what = "tables";
     for (size_t l = 0; l < part.tables.size(); ++l) {
       HashTable& table = part.tables[l];
       table.bytes.resize(size_t{table.entries} * HashPart::kFeatures);
       const json* pictures = fieldOf((*arrayOf(source, "tables"))[l], "texels");
       const auto take = [&](const ImageU8& picture, size_t which) { return takeTexels(picture, which, table.bytes); };
-      if (!pictures || !readPictures(*pictures, sizeOfList(table.entries), take)) return false;
+      if (!pictures || !takePictures(*pictures, sizeOfList(table.entries), take)) return false;
     }
-    what_ = "occupied cells";
+    what = "occupied cells";
     OccupancyBits occupied(header.cells);
     if (!readBits(source, "occupied", occupied)) return false;
     part.occupied = pyramidFromOccupancy(std::move(occupied));
@@ -172,6 +124,7 @@ class HashReader : ContentReader {
     return true;
   }
 
+ private:
   bool readCorners(const json& pictures, const PictureSize& size, uint32_t stored, HashPart& part) {
     const size_t eights = part.columns / HashPart::kFeatures, corners = size_t{stored} * HashPart::kStoredTexels;
     if (!pictures.is_array() || pictures.size() != eights * kTexelPictures) return false;
@@ -183,7 +136,7 @@ class HashReader : ContentReader {
       const auto take = [&](const ImageU8& picture, size_t which) {
         return takeMacroblocks(picture, which, stored, eight);
       };
-      if (!readPictures(three, size, take)) return false;
+      if (!takePictures(three, size, take)) return false;
       for (size_t i = 0; i < corners; ++i) {
         std::copy_n(eight.data() + i * HashPart::kFeatures, HashPart::kFeatures,
                     part.cornerBytes.data() + i * part.columns + e * HashPart::kFeatures);
@@ -191,10 +144,6 @@ class HashReader : ContentReader {
     }
     return true;
   }
-
-  const char* what_ = "";  // is being read
-  std::vector<PartHeader> headers_;
-  HashContent content_;
 };
 
 }  // namespace

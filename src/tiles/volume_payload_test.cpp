@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "tiles/content_file.h"
+#include "tiles/content_test_support.h"
 #include "tiles/glb.h"
 #include "tiles/lossless_image.h"
 #include "tiles/read_content.h"
@@ -28,24 +29,13 @@ void expectSame(const VolumeContent& a, const VolumeContent& b) {
   EXPECT_EQ(a.featureRange, b.featureRange);
   EXPECT_EQ(a.densityRange, b.densityRange);
   EXPECT_EQ(a.stepsPerTexel, b.stepsPerTexel);
-  ASSERT_EQ(a.network.size(), b.network.size());
-  for (size_t i = 0; i < a.network.size(); ++i) {
-    EXPECT_EQ(a.network[i].inputs, b.network[i].inputs);
-    EXPECT_EQ(a.network[i].weights, b.network[i].weights);
-    EXPECT_EQ(a.network[i].biases, b.network[i].biases);
-  }
+  EXPECT_TRUE(a.network == b.network);
   ASSERT_EQ(a.parts.size(), b.parts.size());
   for (size_t i = 0; i < a.parts.size(); ++i) {
     const VolumePart &one = a.parts[i], &other = b.parts[i];
-    EXPECT_EQ(one.centre, other.centre);
-    EXPECT_EQ(one.scale, other.scale);
-    EXPECT_EQ(one.low, other.low);
-    EXPECT_EQ(one.high, other.high);
-    EXPECT_EQ(one.contracted, other.contracted);
-    EXPECT_EQ(one.surround, other.surround);
+    tiles_test::expectSamePlace(one, other);
     EXPECT_EQ(one.voxels, other.voxels);
     EXPECT_EQ(one.planes, other.planes);
-    EXPECT_EQ(one.macroblocks, other.macroblocks);
     EXPECT_EQ(one.voxelBytes, other.voxelBytes);
     EXPECT_EQ(one.planeBytes, other.planeBytes);
     EXPECT_EQ(one.distances, other.distances);
@@ -293,34 +283,11 @@ TEST(VolumePayload, NamesTheRuleThatIsBroken) {
   names("part 0: its distances are not those of its cells", [](VolumeContent& c) { c.parts[0].distances.pop_back(); });
 }
 
-class VolumeRefusal : public testing::Test {
+class VolumeRefusal : public tiles_test::Refusal {
  protected:
-  static json& ours(json& asset) { return asset["extensions"]["TESSERA_content"]; }
-  static json& part(json& asset) { return ours(asset)["parts"][0]; }
-
-  void refuses(const std::string& why, const std::function<void(json&)>& spoil, const ContentLimits& limits = {}) {
-    refusesBytes(
-        why, [&](json& asset, Bytes&) { spoil(asset); }, limits);
-  }
-  void refusesBytes(const std::string& why, const std::function<void(json&, Bytes&)>& spoil,
-                    const ContentLimits& limits = {}) {
-    const Bytes file = encodeVolume(madeContent(5), 1);
-    const auto view = decodeGlb(file);
-    json asset = json::parse(view->json);
-    Bytes bytes(view->bytes.begin(), view->bytes.end());
-    spoil(asset, bytes);
-    std::string reason;
-    EXPECT_FALSE(decodeVolume(encodeGlb(asset.dump(), bytes), reason, limits)) << why;
-    EXPECT_EQ(reason.substr(0, why.size()), why);
-  }
-  // Another picture in place of the one that `entry` names.
-  static void replace(json& asset, Bytes& bytes, json& entry, const ImageU8& image) {
-    const Bytes encoded = encodeLossless(image, 1);
-    bytes.resize((bytes.size() + 3) / 4 * 4);
-    asset["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", bytes.size()}, {"byteLength", encoded.size()}});
-    entry["bufferView"] = asset["bufferViews"].size() - 1;
-    bytes.insert(bytes.end(), encoded.begin(), encoded.end());
-    asset["buffers"][0]["byteLength"] = bytes.size();
+  Bytes file() const override { return encodeVolume(madeContent(5), 1); }
+  bool isRead(std::span<const std::byte> file, std::string& reason, const ContentLimits& limits) const override {
+    return decodeVolume(file, reason, limits).has_value();
   }
 };
 

@@ -1,6 +1,4 @@
 // A volume's content, read: untrusted bytes.
-#include <fmt/format.h>
-
 #include "tiles/content_reader.h"
 #include "tiles/json_fields.h"
 #include "tiles/volume_payload.h"
@@ -14,48 +12,16 @@ using namespace json_fields;
 struct PartHeader {
   VolumePart part;  // without texels
   uint32_t stored = 0;
-  const json* source = nullptr;
 
   uint32_t cells() const { return part.planes / VolumePart::kDistanceCell; }
-  uint64_t bytes() const { return texelBytes(part, stored); }
+  uint64_t bytes() const { return sizeof(VolumePart) + texelBytes(part, stored); }
 };
 
-class VolumeReader : ContentReader {
+class VolumeReader : public PartsReader<VolumeReader, VolumeContent, PartHeader> {
  public:
-  VolumeReader(const ContentFile& file, std::string& reason, const ContentLimits& limits)
-      : ContentReader(file, reason, limits) {}
+  using PartsReader::PartsReader;
 
-  std::optional<VolumeContent> read() {
-    if (!readRanges() || !readLayers(content_.network) || !readNetwork(content_.network) || !readHeaders()) {
-      return std::nullopt;
-    }
-    for (size_t i = 0; i < headers_.size(); ++i) {
-      if (!readTexels(headers_[i])) {
-        fail(fmt::format("part {}: its {} are not what they should be", i, what_));
-        return std::nullopt;
-      }
-      content_.parts.push_back(std::move(headers_[i].part));
-    }
-    if (auto broken = brokenRule(content_)) {
-      fail(*broken);
-      return std::nullopt;
-    }
-    return std::move(content_);
-  }
-
-  // Looks at no buffer view.
-  std::optional<uint64_t> readBytes() {
-    if (!readRanges() || !readLayers(content_.network) || !readHeaders()) return std::nullopt;
-    uint64_t bytes = bytesInMemory(content_);
-    for (const DenseLayer& layer : content_.network) {
-      bytes += sizeof(float) * (uint64_t{layer.inputs} * layer.outputs + layer.outputs);
-    }
-    for (const PartHeader& header : headers_) bytes += sizeof(VolumePart) + header.bytes();
-    return bytes;
-  }
-
- private:
-  bool readRanges() {
+  bool readSettings() {
     const auto features = numberOf(file_.ours, "featureRange"), density = numberOf(file_.ours, "densityRange");
     if (!features || !density) return fail("has no ranges to dequantise with");
     content_.featureRange = static_cast<float>(*features);
@@ -64,21 +30,6 @@ class VolumeReader : ContentReader {
       const auto number = unsignedFrom(*steps, VolumeContent::kMostStepsPerTexel);
       if (!number) return fail("its steps per texel are out of bounds");
       content_.stepsPerTexel = static_cast<uint32_t>(*number);
-    }
-    return true;
-  }
-
-  bool readHeaders() {
-    const json* parts = partsOf();
-    if (!parts) return false;
-    uint64_t bytes = 0;
-    for (const json& source : *parts) {
-      PartHeader header;
-      header.source = &source;
-      if (!readHeader(source, header)) return fail(fmt::format("part {}: its header is not complete", headers_.size()));
-      bytes += header.bytes();
-      if (bytes > limits_.bytes) return fail(fmt::format("takes more than {} bytes of memory", limits_.bytes));
-      headers_.push_back(std::move(header));
     }
     return true;
   }
@@ -96,18 +47,17 @@ class VolumeReader : ContentReader {
     return readPlace(source, part);
   }
 
-  bool readTexels(PartHeader& header) {
+  bool readPictures(const json& source, PartHeader& header, const char*& what) {
     VolumePart& part = header.part;
-    const json& source = *header.source;
-    what_ = "macroblocks";
+    what = "macroblocks";
     const auto takeVoxels = [&](const json& pictures, const PictureSize& size) {
       part.voxelBytes.resize(size_t{header.stored} * VolumePart::kMacroblockBytes);
-      return readPictures(pictures, size, [&](const ImageU8& picture, size_t which) {
+      return takePictures(pictures, size, [&](const ImageU8& picture, size_t which) {
         return takeMacroblocks(picture, which, header.stored, part.voxelBytes);
       });
     };
     if (!readMacroblocks(source, part.voxels, header.stored, part, takeVoxels)) return false;
-    what_ = "planes";
+    what = "planes";
     const json* planes = arrayOf(source, "planeTexels");
     if (!planes || planes->size() != 3) return false;
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -115,18 +65,14 @@ class VolumeReader : ContentReader {
       const auto take = [&](const ImageU8& picture, size_t which) {
         return takeTexels(picture, which, part.planeBytes[axis]);
       };
-      if (!readPictures((*planes)[axis], {part.planes, part.planes}, take)) return false;
+      if (!takePictures((*planes)[axis], {part.planes, part.planes}, take)) return false;
     }
-    what_ = "occupied cells";
+    what = "occupied cells";
     OccupancyBits occupied(header.cells());
     if (!readBits(source, "occupied", occupied)) return false;
     part.distances = chebyshevDistances(occupied);
     return true;
   }
-
-  const char* what_ = "";  // is being read
-  std::vector<PartHeader> headers_;
-  VolumeContent content_;
 };
 
 }  // namespace
