@@ -81,7 +81,7 @@ export class TesseraScene extends THREE.Object3D {
   // How far one sees beyond `bounds`, in diagonals of these: what lies farther fades into what is behind.
   visibility = Infinity;
   neighbours: Neighbours = { behind: [], boxes: [] };
-  // Of tiles that cannot be had, and of a budget that is too small; told once each.
+  // Of tiles that cannot be had, of a budget that is too small, and of a card that cannot draw the scene; told once each.
   onError: (error: SceneError) => void = () => {};
   private readonly tree: TileTree;
   private readonly opaque = new OpaqueDepth();
@@ -195,7 +195,7 @@ export class TesseraScene extends THREE.Object3D {
     compositor.hide(inScene(this.hidden), inScene(this.neighbours.boxes), !this.showsSurround);
     // Rays that meet nothing in whole scenes have the surround's network, or else the coarsest content's: always there,
     // whatever is in view.
-    const ofNothing = this.tree.surround >= 0 ? behind : streamer.residentOf(coarsestTiles(this.tree)[0]);
+    const ofNothing = behind ?? streamer.residentOf(coarsestTiles(this.tree)[0]);
     compositor.draw(renderer, pictures, worldFromScene, contents, depth, ofNothing);
     mesh.renderOrder = kFirstRenderOrder + this.neighbours.behind.length;
     mesh.visible = ofNothing?.whole || contents.some((ofOne) => ofOne.length > 0);

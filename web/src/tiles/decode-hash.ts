@@ -93,8 +93,8 @@ class HashReader extends ContentReader {
         if (!taken) this.fail(of('tables'));
       });
       const bits = this.readBits(views, fieldOf(source, 'occupied'), part.cells);
-      const found = bits && octantDistances(bits);
-      if (found?.fine.length !== part.nearCells * ratioFor(part.cells) ** 3) this.fail(of('occupied cells'));
+      const found = bits && octantDistances(bits, part.nearCells);
+      if (!found) this.fail(of('occupied cells'));
       putCube(found.coarse, found.edge, distances, n);
       near.set(found.fine, kLengthOfRow * layout.nearDistances.rowOf[n]);
     });

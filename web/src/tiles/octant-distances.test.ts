@@ -27,7 +27,7 @@ describe('octantDistances', () => {
   it.each([0.3, 0.02, 0.002, 0])('are the edges of the largest empty cubes: a share of %s occupied', (share) => {
     const edge = 16;
     const bits = madeBits(edge, share, 7);
-    const { coarse, fine } = octantDistances(bits);
+    const { coarse, fine } = octantDistances(bits)!;
     expect(fine.length).toBe(0);
     const random = randomNumbers(1);
     for (let round = 0; round < 300; ++round) {
@@ -42,7 +42,7 @@ describe('octantDistances', () => {
     const bits = madeBits(edge, 3e-5, 3);
     const ratio = ratioFor(edge);
     expect(ratio).toBe(edge > 256 ? 4 : 2);
-    const { edge: coarseEdge, coarse, fine } = octantDistances(bits);
+    const { edge: coarseEdge, coarse, fine } = octantDistances(bits)!;
     expect(coarseEdge).toBe(edge / ratio);
     const occupied = (x: number, y: number, z: number) => isSet(bits, x + edge * (y + edge * z));
     let near = 0;
@@ -63,6 +63,9 @@ describe('octantDistances', () => {
       }
     });
     expect(near).toBeGreaterThan(400);
+    const promised = fine.length / ratio ** 3;
+    expect(octantDistances(bits, promised)).toBeDefined();
+    for (const lie of [0, promised - 1, promised + 1]) expect(octantDistances(bits, lie)).toBeUndefined();
     expect(wrong).toBe(0);
   });
 });

@@ -26,9 +26,11 @@ export interface OctantDistances {
   fine: Uint32Array;
 }
 
-export function octantDistances(occupied: OccupancyBits): OctantDistances {
+// Undefined where there are not as many near cells as was promised, which is seen before there is room for them.
+export function octantDistances(occupied: OccupancyBits, promisedNear?: number): OctantDistances | undefined {
   const ratio = ratioFor(occupied.edge);
   const cells = coarseCells(occupied, ratio);
+  if (promisedNear !== undefined && ratio > 1 && cells.reduce((sum, cell) => sum + (cell > 0 ? 1 : 0), 0) !== promisedNear) return undefined;
   const edge = occupied.edge / ratio;
   const coarse = new Uint32Array(edge ** 3);
   for (let octant = 0; octant < 8; ++octant) sweep(coarse, cells, edge, octant);
