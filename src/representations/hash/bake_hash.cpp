@@ -23,7 +23,7 @@ static_assert(kSamples >= HashModel::kMostSteps);
 constexpr float kMinTransmittance = 2e-3f;  // the paper's
 constexpr uint32_t kTexels = 1 << 16;       // evaluated together
 // Of a block's occupancy along an edge, unless the lattice is finer. The finer, the fewer samples: of fox
-// 8.5 a ray with 256, 7.3 with 384, 6.7 with 512, which take twice the memory of 384.
+// 8.5 a ray with 256, 7.3 with 384, 6.7 with 512, which take 1.8 times the memory of 384.
 constexpr uint32_t kMostCells = 384;
 
 // Looks at a model through photos, and marks where it sees something.
