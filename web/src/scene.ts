@@ -141,14 +141,14 @@ export class TesseraScene extends THREE.Object3D {
     return new THREE.Color().setRGB(...this.tileset.background, THREE.SRGBColorSpace);
   }
 
-  // The coarsest level and the surround are there, or cannot be had.
+  // The coarsest level and the surround are there, or cannot be had; on a card that cannot draw it, nothing can.
   get complete(): boolean {
-    return this.streamer?.complete ?? false;
+    return this.refused || (this.streamer?.complete ?? false);
   }
 
   // Nothing that the last view asked for is still to come.
   get idle(): boolean {
-    return this.complete && (this.streamer?.idle ?? false);
+    return this.refused || (this.complete && (this.streamer?.idle ?? false));
   }
 
   // Of `hash`: the most fine levels of features that any content has which has come so far.

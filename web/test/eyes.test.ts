@@ -4,25 +4,25 @@ import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Plain, View } from '../src/plain';
 import { decodeTileset } from '../src/tiles/decode-tileset';
-import { goldenScene, launch, missing, serve, type Server } from './machine';
+import { goldenHash, goldenScene, launch, missing, serve, type Server } from './machine';
 import { psnr } from './pictures';
 import { openPlain } from './plain-page';
 import { viewAt, type Place } from './views';
 
 declare const plain: Plain;
 
-// In the golden scene a building stands at |x + 1| < 0.4, |y| < 0.3, and blocks meet at x = 0.
-describe.skipIf(missing())('two cameras', () => {
+// In the golden scenes a building stands at |x + 1| < 0.4, |y| < 0.3, and blocks meet at x = 0.
+describe.skipIf(missing()).each([['volume', goldenScene], ['hash', goldenHash]])('two cameras, in a scene of %s,', (_, golden) => {
   let server: Server;
   let browser: Browser;
   let page: Page;
   const said: string[] = [];
-  const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json');
+  const tileset = decodeTileset(readFileSync(`${golden}/tileset.json`, 'utf8'), 'tileset.json');
   const view = (eye: Place, target: Place): View => ({ ...viewAt(tileset, eye, target), cx: 126, width: 240, cy: 80, height: 160 }); // not in the middle
   const atFacade = [view([-1.05, -2.2, 0.3], [-1, 0, 0.1]), view([-0.95, -2.2, 0.3], [-1, 0, 0.1])];
 
   beforeAll(async () => {
-    [server, browser] = await Promise.all([serve(goldenScene), launch()]);
+    [server, browser] = await Promise.all([serve(golden), launch()]);
     page = await openPlain(browser, server, said);
     await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
   });

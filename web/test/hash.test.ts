@@ -191,6 +191,50 @@ describe.skipIf(missing())('a scene of hash', () => {
     await page.close();
   });
 
+  it('is told of once on a card that cannot blend half floats, and nothing is waited for', async () => {
+    const page = await openPlain(browser, server, [], () => {
+      const { getExtension } = WebGL2RenderingContext.prototype;
+      WebGL2RenderingContext.prototype.getExtension = function (this: WebGL2RenderingContext, name: string) {
+        return name.startsWith('EXT_color_buffer') ? null : (getExtension as (name: string) => unknown).call(this, name);
+      } as typeof getExtension;
+    });
+    await page.evaluate(() => plain.open('scene/tileset.json'));
+    await page.evaluate((one) => plain.settle(one), across);
+    const said = await page.evaluate(() => plain.errors);
+    expect(said).toHaveLength(1);
+    expect(said[0]).toContain('cannot blend half floats');
+    await page.close();
+  });
+
+  it('is drawn by cards too that have fewer bits for a pixel than would be best', async () => {
+    const said: string[] = [];
+    const scene = join(folder, 'bits');
+    cpSync(goldenHash, scene, { recursive: true });
+    const text = readFileSync(join(scene, 'tileset.json'), 'utf8');
+    writeFileSync(join(scene, 'tileset.json'), text.replace('"levels": 2', '"levels": 5')); // wants a target more
+    const deep = await serve(scene);
+    const best = await open(said, {}, deep);
+    const page = await openPlain(browser, deep, said, () => {
+      const { checkFramebufferStatus } = WebGL2RenderingContext.prototype;
+      WebGL2RenderingContext.prototype.checkFramebufferStatus = function (target) {
+        let bits = 0;
+        for (let n = 0; n < 8; ++n) {
+          const of = (what: number) => this.getFramebufferAttachmentParameter(target, this.COLOR_ATTACHMENT0 + n, what) as number;
+          if (of(this.FRAMEBUFFER_ATTACHMENT_OBJECT_TYPE) !== this.NONE) bits += 4 * of(this.FRAMEBUFFER_ATTACHMENT_RED_SIZE);
+        }
+        return bits > 256 ? this.FRAMEBUFFER_UNSUPPORTED : checkFramebufferStatus.call(this, target);
+      };
+    });
+    await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
+    expect(psnr(await look(page, across), await look(best, across))).toBeGreaterThan(50);
+    const bytes = (one: Page) => one.evaluate(() => plain.city!.statistics!.targetBytes);
+    expect((await bytes(best)) - (await bytes(page))).toBeGreaterThanOrEqual((8 + 8) * across.width * across.height);
+    expect(said).toEqual([]);
+    await best.close();
+    await page.close();
+    deep.close();
+  });
+
   it('is drawn alike whichever numbers its networks have', async () => {
     const said: string[] = [];
     const scene = join(folder, 'levels');

@@ -4,7 +4,7 @@ import type { Browser, Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from 'vitest';
 import type { Plain, View } from '../src/plain';
 import { decodeTileset } from '../src/tiles/decode-tileset';
-import { goldenScene, launch, missing, serve, type Server } from './machine';
+import { goldenHash, goldenScene, launch, missing, serve, type Server } from './machine';
 import { openPlain } from './plain-page';
 import { viewAt } from './views';
 
@@ -14,14 +14,14 @@ const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'
 const options = { selection: { mostPixels: 0 } };
 const kBackgrounds = [0xff00ff, 0x00ff00];
 
-describe.skipIf(missing())('in one world', () => {
+describe.skipIf(missing()).each([['volume', goldenScene], ['hash', goldenHash]])('in one world, of a scene of %s,', (_, golden) => {
   let server: Server;
   let browser: Browser;
   let page: Page;
   const said: string[] = [];
 
   beforeAll(async () => {
-    [server, browser] = await Promise.all([serve(goldenScene), launch()]);
+    [server, browser] = await Promise.all([serve(golden), launch()]);
   });
   afterAll(async () => {
     await browser?.close();

@@ -7,6 +7,7 @@ import type { Content, ContentHeader } from '../tiles/decode-content';
 import type { Box, TileContent, Tileset } from '../tiles/tileset';
 import { frontToBack as orderOf } from './box-order';
 import { contentMaterial, keyOf, programMaterial, viewUniforms, type ProgramPieces, type ProgramPlace, type ViewUniforms } from './content-program';
+import { contentTarget } from './content-target';
 import type { ContentTextures } from './content-textures';
 import { colourOfBlock, colourOfLevel, kDisplayModes, type DisplayMode } from './display-modes';
 import { hashPieces, networksOf } from './hash-program';
@@ -65,13 +66,10 @@ void main() {
 }`;
 
 const kContentsBetweenHiding = 4;
-const kPicturesOfVolume = 2;
-const kSumsOfHash = 4;
 const kEverywhere: Box = { low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
 
 export class Compositor {
   readonly view: ViewUniforms = viewUniforms();
-  // 0: what the scene adds, or sums of which that is made, with opacity; 1: how far its surface is; of `hash` further sums.
   readonly target: THREE.WebGLRenderTarget;
   pictures: Picture[] = []; // that are in the target
   endsRays = true; // rays that end nowhere in scenes that say so are opaque
@@ -90,27 +88,16 @@ export class Compositor {
   private cuts = false; // from the first hidden box on, so that programs are not made anew for each
   private readonly prepared = new Map<string, THREE.Material>(); // hold programs, by their keys
 
-  // What the card can blend decides how the pictures are kept. Throws SceneError where that is too little.
+  // Throws SceneError where the card cannot draw such a scene.
   constructor(renderer: THREE.WebGLRenderer, scene: DrawnScene) {
-    const has = (name: string) => renderer.extensions.has(name);
-    const canBlendHalves = has('EXT_color_buffer_half_float') || has('EXT_color_buffer_float');
-    const isHash = scene.representation === 'hash';
-    if (isHash && !canBlendHalves) {
-      throw new SceneError('graphics card', '', 'cannot blend half floats, which scenes of hash need', 'draw it on another machine');
-    }
-    this.distancesOfBytes = !canBlendHalves;
-    const gl = renderer.getContext() as WebGL2RenderingContext;
-    const most = Math.min(gl.getParameter(gl.MAX_DRAW_BUFFERS) as number, gl.getParameter(gl.MAX_COLOR_ATTACHMENTS) as number);
-    this.weightTargets = isHash ? Math.min(Math.max(Math.ceil(scene.levels / networksOf(0)) - 1, 0), most - kSumsOfHash) : 0;
-    const count = isHash ? kSumsOfHash + this.weightTargets : kPicturesOfVolume;
-    this.bytesPerPixel = (canBlendHalves ? 8 : 4) * count;
-    const depthTexture = new THREE.DepthTexture(1, 1, THREE.UnsignedIntType);
-    const common = { generateMipmaps: false, depthBuffer: true, depthTexture };
-    const filter = isHash ? THREE.NearestFilter : THREE.LinearFilter;
-    this.target = new THREE.WebGLRenderTarget(1, 1, {
-      ...common, count, type: canBlendHalves ? THREE.HalfFloatType : THREE.UnsignedByteType, minFilter: filter, magFilter: filter,
+    const { target, distancesOfBytes, weightTargets, bytesPerPixel } = contentTarget(renderer, scene);
+    this.target = target;
+    this.distancesOfBytes = distancesOfBytes;
+    this.weightTargets = weightTargets;
+    this.bytesPerPixel = bytesPerPixel;
+    this.depthAlone = new THREE.WebGLRenderTarget(1, 1, {
+      generateMipmaps: false, depthBuffer: true, depthTexture: target.depthTexture, format: THREE.RedFormat,
     });
-    this.depthAlone = new THREE.WebGLRenderTarget(1, 1, { ...common, format: THREE.RedFormat });
     this.hiding.add(new THREE.Mesh(this.screen, new THREE.ShaderMaterial({
       vertexShader: 'void main() { gl_Position = vec4(position.xy, -1.0, 1.0); }',
       fragmentShader: kHideShader,
@@ -120,13 +107,7 @@ export class Compositor {
       depthFunc: THREE.AlwaysDepth, colorWrite: false,
     })));
     this.hiding.children[0].frustumCulled = false;
-    this.target.textures[1].minFilter = this.target.textures[1].magFilter = THREE.NearestFilter;
-    // Half floats tell distances apart by a two-thousandth: places that are measured want more.
-    if (has('EXT_color_buffer_float') && has('EXT_float_blend')) {
-      this.target.textures[1].type = THREE.FloatType;
-      this.bytesPerPixel += 8;
-    }
-    if (isHash) this.networks = new NetworkPass(this.target, this.screen, this.view, this.weightTargets);
+    if (scene.representation === 'hash') this.networks = new NetworkPass(this.target, this.screen, this.view, this.weightTargets);
     this.contents.matrixWorldAutoUpdate = false;
     this.view.sceneLow.value.set(...scene.box.low);
     this.view.sceneHigh.value.set(...scene.box.high);
