@@ -13,7 +13,7 @@ namespace {
 // The logarithm of density, then seven sums of colours and features.
 std::array<double, 8> featuresAt(const Triple<double>& p) {
   std::array<double, 8> features;
-  features[0] = std::clamp(-60 * (p[2] - heightAt(p[0], p[1])), -12.0, 6.0);
+  features[0] = logDensityAt(p);
   for (uint64_t a = 0; a < 7; ++a) features[a + 1] = 2 * noise(20 + a, 2 * p[0] + p[2], 2 * p[1]);
   return features;
 }
@@ -31,18 +31,13 @@ const Sizes kCoarseSurround = {16, 288, kCoarse.tables};
 class PartMaker {
  public:
   PartMaker(HashPart& part, const Sizes& sizes, uint32_t columns, uint64_t seed)
-      : part_(part), sizes_(sizes), random_(seed, 11) {
+      : part_(part), sizes_(sizes), random_(seed, 11), corners_(part, sizes.lattice) {
     part_.lattice = sizes.lattice;
     part_.columns = columns;
   }
 
   void make() {
     makeRanges();
-    for (uint32_t i = 0; i < part_.lattice * part_.lattice * part_.lattice; ++i) {
-      const Triple<uint32_t> corner = {i % part_.lattice, i / part_.lattice % part_.lattice,
-                                       i / part_.lattice / part_.lattice};
-      logDensities_.push_back(featuresAt(placeOfTexel(part_, corner, part_.lattice))[0]);
-    }
     makeCorners();
     makeTables();
     makeOccupied();
@@ -55,32 +50,13 @@ class PartMaker {
     for (size_t f = 1; f < 8; ++f) part_.ranges[f] = {-2, 2.5f};
   }
 
-  double logDensity(uint32_t x, uint32_t y, uint32_t z) const {
-    return logDensities_[x + part_.lattice * (y + part_.lattice * z)];
-  }
-
-  // Whether anything is dense among the corners from `first` to `last` along each axis, clamped.
-  bool isAnythingIn(const Triple<uint32_t>& first, const Triple<uint32_t>& last) const {
-    const uint32_t most = part_.lattice - 1;
-    bool dense = false, hollow = false;
-    for (uint32_t z = first[2]; z <= std::min(last[2], most); ++z) {
-      for (uint32_t y = first[1]; y <= std::min(last[1], most); ++y) {
-        for (uint32_t x = first[0]; x <= std::min(last[0], most); ++x) {
-          dense = dense || logDensity(x, y, z) > -6;
-          hollow = hollow || logDensity(x, y, z) < 3;
-        }
-      }
-    }
-    return dense && (hollow || first[2] == 0);  // what lies deep below is never seen
-  }
-
   void makeCorners() {
     constexpr uint32_t kEdge = HashPart::kMacroblock;
     const uint32_t edge = part_.lattice / kEdge, most = part_.lattice - 1;
     uint32_t stored = 0;
     for (uint32_t b = 0; b < edge * edge * edge; ++b) {
       const Triple<uint32_t> first = {kEdge * (b % edge), kEdge * (b / edge % edge), kEdge * (b / edge / edge)};
-      const bool wanted = isAnythingIn(first, {first[0] + kEdge, first[1] + kEdge, first[2] + kEdge});
+      const bool wanted = corners_.isAnythingIn(first, {first[0] + kEdge, first[1] + kEdge, first[2] + kEdge});
       part_.macroblocks.push_back(wanted ? stored++ : HashPart::kEmpty);
       for (uint32_t i = 0; wanted && i < HashPart::kStoredTexels; ++i) {
         const Triple<uint32_t> corner = {std::min(first[0] + i % 9, most), std::min(first[1] + i / 9 % 9, most),
@@ -127,7 +103,8 @@ class PartMaker {
     std::vector<bool> isAnything;
     for (const auto& z : ranges) {
       for (const auto& y : ranges) {
-        for (const auto& x : ranges) isAnything.push_back(isAnythingIn({x[0], y[0], z[0]}, {x[1], y[1], z[1]}));
+        for (const auto& x : ranges)
+          isAnything.push_back(corners_.isAnythingIn({x[0], y[0], z[0]}, {x[1], y[1], z[1]}));
       }
     }
     for (uint32_t z = 0; z < sizes_.cells; ++z) {
@@ -145,7 +122,7 @@ class PartMaker {
   HashPart& part_;
   const Sizes& sizes_;
   RandomStream random_;
-  std::vector<double> logDensities_;  // of corners
+  Densities corners_;
 };
 
 HashContent contentOf(uint64_t seed, LevelWeights weights, bool varies, const Sizes& sizes,
@@ -155,12 +132,7 @@ HashContent contentOf(uint64_t seed, LevelWeights weights, bool varies, const Si
   content.step = 1.0f / static_cast<float>(2 * sizes.lattice);
   const RandomStream random(seed, 7);
   uint64_t next = 0;
-  for (const auto& [inputs, outputs] : {std::pair{23u, 16u}, {16u, 16u}, {16u, 3u}}) {
-    DenseLayer layer{inputs, outputs, {}, {}};
-    for (uint32_t i = 0; i < inputs * outputs; ++i) layer.weights.push_back(random.uniform(next++) - 0.5f);
-    for (uint32_t i = 0; i < outputs; ++i) layer.biases.push_back(random.uniform(next++) - 0.5f);
-    content.network.push_back(std::move(layer));
-  }
+  content.network = makeNetwork(23, random, next);
   for (size_t i = 0; !varies && i < sizes.tables.size() * content.logitsOfLevel(); ++i) {
     content.logits.push_back(2 * random.uniform(next++) - 1);
   }
@@ -195,12 +167,6 @@ Scene<HashContent> makeHashScene() {
 }
 
 HashSums sumsOf(const HashPart& part) {
-  const auto add = [](const std::vector<uint8_t>& bytes, uint64_t& sum, uint64_t& ordered) {
-    for (size_t i = 0; i < bytes.size(); ++i) {
-      sum += bytes[i];
-      ordered += (i % 251 + 1) * bytes[i];
-    }
-  };
   HashSums sums;
   sums.stored = part.storedMacroblocks();
   const auto first = std::find(part.macroblocks.begin(), part.macroblocks.end(), 0u);
@@ -213,11 +179,25 @@ HashSums sumsOf(const HashPart& part) {
     if (OctantDistances::isEmpty(word)) addDistances(word);
   }
   for (const uint32_t word : part.distances.fine) addDistances(word);
-  add(part.cornerBytes, sums.corners, sums.cornersOrdered);
-  for (const HashTable& table : part.tables) {
-    add(table.bytes, sums.tables.emplace_back(), sums.tablesOrdered.emplace_back());
-  }
+  sums.corners = sumsOf(part.cornerBytes);
+  for (const HashTable& table : part.tables) sums.tables.push_back(sumsOf(table.bytes));
   return sums;
+}
+
+nlohmann::ordered_json toJson(const HashSums& sums) {
+  nlohmann::ordered_json tables, tablesOrdered;
+  for (const ByteSums& table : sums.tables) {
+    tables.push_back(table.sum);
+    tablesOrdered.push_back(table.ordered);
+  }
+  return {{"stored", sums.stored},
+          {"firstStored", sums.firstStored},
+          {"occupied", sums.occupied},
+          {"distances", sums.distances},
+          {"corners", sums.corners.sum},
+          {"cornersOrdered", sums.corners.ordered},
+          {"tables", tables},
+          {"tablesOrdered", tablesOrdered}};
 }
 
 }  // namespace tessera::golden

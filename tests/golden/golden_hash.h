@@ -1,6 +1,8 @@
 // The scene that is committed in tests/golden/hash, as a function. Its blocks differ in what weighs their levels.
 #pragma once
 
+#include <nlohmann/json.hpp>
+
 #include "golden/golden_landscape.h"
 #include "tiles/hash_content.h"
 
@@ -11,11 +13,10 @@ Scene<HashContent> makeHashScene();
 // What every reader has to come to: docs/tile-format.md, section 11.
 struct HashSums {
   uint64_t stored = 0, firstStored = 0, occupied = 0, distances = 0;
-  uint64_t corners = 0, cornersOrdered = 0;
-  std::vector<uint64_t> tables, tablesOrdered;
-
-  bool operator==(const HashSums&) const = default;
+  ByteSums corners;
+  std::vector<ByteSums> tables;
 };
 HashSums sumsOf(const HashPart& part);
+nlohmann::ordered_json toJson(const HashSums& sums);
 
 }  // namespace tessera::golden

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/random.h"
-
 namespace tessera::golden {
 namespace {
 
@@ -20,6 +18,13 @@ Tile tileOf(const Tileset& tileset, uint32_t level, const CellRange& cells) {
   tile.contents[0].cells = cells;
   tile.contents[0].box = tile.box;
   return tile;
+}
+
+// The height of what stands at x, y.
+double heightAt(double x, double y) {
+  const double fromMiddle = std::abs(std::abs(x) - 1);
+  if (fromMiddle < 0.4 && std::abs(y) < 0.3 && std::abs(x) < 2) return x < 0 ? 0.45 : 0.1;
+  return -0.45 + 0.12 * noise(1, 1.5 * x, 1.5 * y);
 }
 
 }  // namespace
@@ -38,11 +43,8 @@ double noise(uint64_t stream, double x, double y) {
   return (1 - v) * ((1 - u) * at(i, j) + u * at(i + 1, j)) + v * ((1 - u) * at(i, j + 1) + u * at(i + 1, j + 1));
 }
 
-// The height of what stands at x, y: rolling ground, and one building in each block.
-double heightAt(double x, double y) {
-  const double fromMiddle = std::abs(std::abs(x) - 1);
-  if (fromMiddle < 0.4 && std::abs(y) < 0.3 && std::abs(x) < 2) return x < 0 ? 0.45 : 0.1;
-  return -0.45 + 0.12 * noise(1, 1.5 * x, 1.5 * y);
+double logDensityAt(const Triple<double>& p) {
+  return std::clamp(-60 * (p[2] - heightAt(p[0], p[1])), -12.0, 6.0);
 }
 
 Triple<double> inScene(const ContentPart& part, const Triple<double>& inDomain) {
@@ -59,6 +61,50 @@ double middle(const ContentPart& part, uint32_t index, uint32_t count) {
 
 Triple<double> placeOfTexel(const ContentPart& part, const Triple<uint32_t>& texel, uint32_t count) {
   return inScene(part, {middle(part, texel[0], count), middle(part, texel[1], count), middle(part, texel[2], count)});
+}
+
+Densities::Densities(const ContentPart& part, uint32_t count) : count_(count) {
+  values_.reserve(size_t{count} * count * count);
+  for (uint32_t z = 0; z < count; ++z) {
+    for (uint32_t y = 0; y < count; ++y) {
+      for (uint32_t x = 0; x < count; ++x) values_.push_back(logDensityAt(placeOfTexel(part, {x, y, z}, count)));
+    }
+  }
+}
+
+bool Densities::isAnythingIn(const Triple<uint32_t>& first, const Triple<uint32_t>& last) const {
+  const uint32_t most = count_ - 1;
+  bool dense = false, hollow = false;
+  for (uint32_t z = first[2]; z <= std::min(last[2], most); ++z) {
+    for (uint32_t y = first[1]; y <= std::min(last[1], most); ++y) {
+      for (uint32_t x = first[0]; x <= std::min(last[0], most); ++x) {
+        dense = dense || at(x, y, z) > -6;
+        hollow = hollow || at(x, y, z) < 3;
+      }
+    }
+  }
+  return dense && (hollow || first[2] == 0);  // what lies deep below is never seen
+}
+
+std::vector<DenseLayer> makeNetwork(uint32_t inputs, const RandomStream& random, uint64_t& next) {
+  std::vector<DenseLayer> network;
+  for (const uint32_t outputs : {16u, 16u, 3u}) {
+    DenseLayer layer{inputs, outputs, {}, {}};
+    for (uint32_t i = 0; i < inputs * outputs; ++i) layer.weights.push_back(random.uniform(next++) - 0.5f);
+    for (uint32_t i = 0; i < outputs; ++i) layer.biases.push_back(random.uniform(next++) - 0.5f);
+    network.push_back(std::move(layer));
+    inputs = outputs;
+  }
+  return network;
+}
+
+ByteSums sumsOf(const std::vector<uint8_t>& bytes) {
+  ByteSums sums;
+  for (size_t i = 0; i < bytes.size(); ++i) {
+    sums.sum += bytes[i];
+    sums.ordered += (i % 251 + 1) * bytes[i];
+  }
+  return sums;
 }
 
 void placeBlock(ContentPart& part, uint32_t column) {

@@ -4,7 +4,9 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
+#include "base/random.h"
 #include "scene/contraction.h"
 #include "tiles/content.h"
 #include "tiles/tileset.h"
@@ -19,8 +21,8 @@ struct Scene {
 
 // Smooth, in [-1,1]: random values at whole numbers, mixed.
 double noise(uint64_t stream, double x, double y);
-// The height of what stands at x, y: rolling ground, and one building in each block.
-double heightAt(double x, double y);
+// The logarithm of density: of rolling ground, and of one building in each block.
+double logDensityAt(const Triple<double>& inScene);
 
 // The place of a texel (x, y, z) of so many along each axis of a part's domain.
 Triple<double> placeOfTexel(const ContentPart& part, const Triple<uint32_t>& texel, uint32_t count);
@@ -28,6 +30,29 @@ Triple<double> placeOfTexel(const ContentPart& part, const Triple<uint32_t>& tex
 Triple<double> inScene(const ContentPart& part, const Triple<double>& inDomain);
 // A texel's coordinate along an axis of the domain.
 double middle(const ContentPart& part, uint32_t index, uint32_t count);
+
+// The logarithms of density at texels of a part's domain, so many along each axis.
+class Densities {
+ public:
+  Densities(const ContentPart& part, uint32_t count);
+
+  double at(uint32_t x, uint32_t y, uint32_t z) const { return values_[x + size_t{count_} * (y + size_t{count_} * z)]; }
+  // Whether anything is dense among the texels from `first` to `last` along each axis, clamped, and not only hidden.
+  bool isAnythingIn(const Triple<uint32_t>& first, const Triple<uint32_t>& last) const;
+
+ private:
+  uint32_t count_;
+  std::vector<double> values_;
+};
+
+// Layers of 16, 16 and 3 outputs; `next`: the stream's next number.
+std::vector<DenseLayer> makeNetwork(uint32_t inputs, const RandomStream& random, uint64_t& next);
+
+// Of bytes, and with each weighed by its place, so that their order tells.
+struct ByteSums {
+  uint64_t sum = 0, ordered = 0;
+};
+ByteSums sumsOf(const std::vector<uint8_t>& bytes);
 
 void placeBlock(ContentPart& part, uint32_t column);
 void placeSurround(ContentPart& part);

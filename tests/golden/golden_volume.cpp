@@ -15,49 +15,16 @@ uint8_t quantised(double value, double range) {
 
 class PartMaker {
  public:
-  PartMaker(VolumePart& part, const VolumeContent& content) : part_(part), content_(content) {}
+  PartMaker(VolumePart& part, const VolumeContent& content)
+      : part_(part), content_(content), voxels_(part, part.voxels) {}
 
   void make() {
-    makeLogDensities();
     makeMacroblocks();
     makePlanes();
     makeDistances();
   }
 
  private:
-  double& logDensity(uint32_t x, uint32_t y, uint32_t z) {
-    return logDensities_[x + size_t{part_.voxels} * (y + size_t{part_.voxels} * z)];
-  }
-
-  void makeLogDensities() {
-    const uint32_t n = part_.voxels;
-    logDensities_.resize(size_t{n} * n * n);
-    for (uint32_t z = 0; z < n; ++z) {
-      for (uint32_t y = 0; y < n; ++y) {
-        for (uint32_t x = 0; x < n; ++x) {
-          const auto p = inScene(part_, {middle(part_, x, n), middle(part_, y, n), middle(part_, z, n)});
-          const double above = p[2] - heightAt(p[0], p[1]);
-          logDensity(x, y, z) = std::clamp(-60 * above, -12.0, 6.0);
-        }
-      }
-    }
-  }
-
-  // Whether anything is dense among the voxels from `first` to `last` along each axis, clamped.
-  bool isAnythingIn(const Triple<uint32_t>& first, const Triple<uint32_t>& last) {
-    const uint32_t most = part_.voxels - 1;
-    bool dense = false, hollow = false;
-    for (uint32_t z = first[2]; z <= std::min(last[2], most); ++z) {
-      for (uint32_t y = first[1]; y <= std::min(last[1], most); ++y) {
-        for (uint32_t x = first[0]; x <= std::min(last[0], most); ++x) {
-          dense = dense || logDensity(x, y, z) > -6;
-          hollow = hollow || logDensity(x, y, z) < 3;
-        }
-      }
-    }
-    return dense && (hollow || first[2] == 0);  // what lies deep below is never seen
-  }
-
   void makeMacroblocks() {
     constexpr uint32_t kEdge = VolumePart::kMacroblock;
     const uint32_t edge = part_.voxels / kEdge;
@@ -66,7 +33,7 @@ class PartMaker {
       for (uint32_t y = 0; y < edge; ++y) {
         for (uint32_t x = 0; x < edge; ++x) {
           const Triple<uint32_t> first = {kEdge * x, kEdge * y, kEdge * z};
-          if (!isAnythingIn(first, {first[0] + kEdge, first[1] + kEdge, first[2] + kEdge})) {
+          if (!voxels_.isAnythingIn(first, {first[0] + kEdge, first[1] + kEdge, first[2] + kEdge})) {
             part_.macroblocks.push_back(VolumePart::kEmpty);
             continue;
           }
@@ -84,7 +51,7 @@ class PartMaker {
         for (uint32_t i = 0; i < VolumePart::kStoredEdge; ++i) {
           const uint32_t x = std::min(first[0] + i, most), y = std::min(first[1] + j, most),
                          z = std::min(first[2] + k, most);
-          part_.voxelBytes.push_back(quantised(logDensity(x, y, z), content_.densityRange));
+          part_.voxelBytes.push_back(quantised(voxels_.at(x, y, z), content_.densityRange));
           const auto p = inScene(part_, {middle(part_, x, n), middle(part_, y, n), middle(part_, z, n)});
           for (uint64_t a = 0; a < 7; ++a) {
             part_.voxelBytes.push_back(
@@ -123,7 +90,7 @@ class PartMaker {
     for (uint32_t z = 0; z < cells; ++z) {
       for (uint32_t y = 0; y < cells; ++y) {
         for (uint32_t x = 0; x < cells; ++x) {
-          if (isAnythingIn({below(x), below(y), below(z)}, {side * (x + 1), side * (y + 1), side * (z + 1)})) {
+          if (voxels_.isAnythingIn({below(x), below(y), below(z)}, {side * (x + 1), side * (y + 1), side * (z + 1)})) {
             occupied.set(occupied.number(x, y, z));
           }
         }
@@ -134,19 +101,14 @@ class PartMaker {
 
   VolumePart& part_;
   const VolumeContent& content_;
-  std::vector<double> logDensities_;
+  Densities voxels_;
 };
 
 VolumeContent contentOf(uint64_t seed, const std::vector<VolumePart>& parts) {
   VolumeContent content;
   const RandomStream random(seed, 7);
   uint64_t next = 0;
-  for (const auto& [inputs, outputs] : {std::pair{34u, 16u}, {16u, 16u}, {16u, 3u}}) {
-    DenseLayer layer{inputs, outputs, {}, {}};
-    for (uint32_t i = 0; i < inputs * outputs; ++i) layer.weights.push_back(random.uniform(next++) - 0.5f);
-    for (uint32_t i = 0; i < outputs; ++i) layer.biases.push_back(random.uniform(next++) - 0.5f);
-    content.network.push_back(std::move(layer));
-  }
+  content.network = makeNetwork(34, random, next);
   content.parts = parts;
   for (VolumePart& part : content.parts) PartMaker(part, content).make();
   return content;
@@ -184,12 +146,6 @@ Scene<VolumeContent> makeVolumeScene() {
 }
 
 VolumeSums sumsOf(const VolumePart& part) {
-  const auto add = [](const std::vector<uint8_t>& bytes, uint64_t& sum, uint64_t& ordered) {
-    for (size_t i = 0; i < bytes.size(); ++i) {
-      sum += bytes[i];
-      ordered += (i % 251 + 1) * bytes[i];
-    }
-  };
   VolumeSums sums;
   sums.stored = part.storedMacroblocks();
   const auto first = std::find(part.macroblocks.begin(), part.macroblocks.end(), 0u);
@@ -198,9 +154,21 @@ VolumeSums sumsOf(const VolumePart& part) {
     sums.occupied += distance == 0;
     sums.distances += distance;
   }
-  add(part.voxelBytes, sums.voxels, sums.voxelsOrdered);
-  for (size_t axis = 0; axis < 3; ++axis) add(part.planeBytes[axis], sums.planes[axis], sums.planesOrdered[axis]);
+  sums.voxels = sumsOf(part.voxelBytes);
+  for (size_t axis = 0; axis < 3; ++axis) sums.planes[axis] = sumsOf(part.planeBytes[axis]);
   return sums;
+}
+
+nlohmann::ordered_json toJson(const VolumeSums& sums) {
+  nlohmann::ordered_json planes, planesOrdered;
+  for (const ByteSums& plane : sums.planes) {
+    planes.push_back(plane.sum);
+    planesOrdered.push_back(plane.ordered);
+  }
+  return {{"stored", sums.stored},     {"firstStored", sums.firstStored},
+          {"occupied", sums.occupied}, {"distances", sums.distances},
+          {"voxels", sums.voxels.sum}, {"voxelsOrdered", sums.voxels.ordered},
+          {"planes", planes},          {"planesOrdered", planesOrdered}};
 }
 
 }  // namespace tessera::golden

@@ -1,6 +1,9 @@
 // The scene that is committed in tests/golden/volume, as a function; its merged level has steps of half a texel.
 #pragma once
 
+#include <array>
+#include <nlohmann/json.hpp>
+
 #include "golden/golden_landscape.h"
 #include "tiles/volume_content.h"
 
@@ -12,11 +15,10 @@ Scene<VolumeContent> makeVolumeScene();
 // section 11.
 struct VolumeSums {
   uint64_t stored = 0, firstStored = 0, occupied = 0, distances = 0;
-  uint64_t voxels = 0, voxelsOrdered = 0;
-  uint64_t planes[3] = {0, 0, 0}, planesOrdered[3] = {0, 0, 0};
-
-  bool operator==(const VolumeSums&) const = default;
+  ByteSums voxels;
+  std::array<ByteSums, 3> planes;
 };
 VolumeSums sumsOf(const VolumePart& part);
+nlohmann::ordered_json toJson(const VolumeSums& sums);
 
 }  // namespace tessera::golden

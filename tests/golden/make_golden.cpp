@@ -33,20 +33,6 @@ std::string raysToJson(const std::vector<golden::ExpectedRay>& rays) {
   return text + "\n]\n";
 }
 
-nlohmann::ordered_json toJson(const golden::VolumeSums& sums) {
-  return {{"stored", sums.stored},     {"firstStored", sums.firstStored},
-          {"occupied", sums.occupied}, {"distances", sums.distances},
-          {"voxels", sums.voxels},     {"voxelsOrdered", sums.voxelsOrdered},
-          {"planes", sums.planes},     {"planesOrdered", sums.planesOrdered}};
-}
-
-nlohmann::ordered_json toJson(const golden::HashSums& sums) {
-  return {{"stored", sums.stored},     {"firstStored", sums.firstStored},
-          {"occupied", sums.occupied}, {"distances", sums.distances},
-          {"corners", sums.corners},   {"cornersOrdered", sums.cornersOrdered},
-          {"tables", sums.tables},     {"tablesOrdered", sums.tablesOrdered}};
-}
-
 template <class Content, class Encode>
 void write(const fs::path& root, golden::Scene<Content> scene, const Encode& encode) {
   const SceneFolderWriter writer(root);
@@ -56,7 +42,8 @@ void write(const fs::path& root, golden::Scene<Content> scene, const Encode& enc
     const Bytes bytes = encode(scene.contents.at(name), 9);
     content.uri = writer.addContent(level, name, bytes);
     content.bytes = bytes.size();
-    for (const auto& part : scene.contents.at(name).parts) sums[content.uri].push_back(toJson(golden::sumsOf(part)));
+    for (const auto& part : scene.contents.at(name).parts)
+      sums[content.uri].push_back(golden::toJson(golden::sumsOf(part)));
   };
   writeContent(tileset.tiles[0].contents[0], 1, "all");
   writeContent(tileset.tiles[0].contents[1], 0, "surround");
