@@ -5,9 +5,10 @@
 #                second beside `field`
 #   ablation     the paper's table 3, equal steps, held-out PSNR of seeds: attention (separate, from place to place) against
 #                the sum of levels and against a network for each sample; multiply-accumulates of each
+#   distortion   the weight of the distortion loss that `auto` finds out, against each that it chooses from
 #   browser      ten held-out views of fox's scene and of the city's in Debian's Chromium, against the renderer on the processor
 # Resumable: all is kept in build/bench/hash, and what is there is not made again.
-#   TESSERA_SHARED_DATA=DIR [ROWS="photographs scene ablation browser"] [SEEDS="1 2 3"] [STEPS=1500] [MINUTES=10] bench/hash.sh
+#   TESSERA_SHARED_DATA=DIR [ROWS="photographs scene ablation distortion browser"] [SEEDS="1 2 3"] [STEPS=1500] [MINUTES=10] bench/hash.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
@@ -101,6 +102,26 @@ ablation() {
     "$(awk -v a="$(arithmetic "fox-attention-${seeds%% *}")" -v b="$(arithmetic "$field")" 'BEGIN { print a / b }')" '<=' 0.1
 }
 
+distortion() {
+  local capture chosen weight best
+  for capture in fox city; do
+    trained "$capture-auto" "$capture" --method hash ${blocks[$capture]} --set distortion=auto --steps "$steps" --set level_share=0
+    chosen=$(jq .chosen "$work/$capture-auto/distortion.json")
+    echo "$capture: chosen $chosen, $(judged "$capture-auto" "$capture") dB; after" \
+      "$(jq -r '"\(.steps) steps " + ([.probes[] | "\(.distortion): \(.psnr * 100 | round / 100) dB"] | join(", "))' "$work/$capture-auto/distortion.json")"
+    best=$(jq .psnr "$work/$capture-auto.json")
+    for weight in $(jq '.probes[].distortion' "$work/$capture-auto/distortion.json"); do
+      [ "$weight" != "$chosen" ] || continue
+      trained "$capture-distortion-$weight" "$capture" --method hash ${blocks[$capture]} --set distortion="$weight" --steps "$steps" \
+        --set level_share=0
+      echo "$capture, $weight: $(judged "$capture-distortion-$weight" "$capture") dB"
+      best=$(jq "[., $best] | max" <<< "$(jq .psnr "$work/$capture-distortion-$weight.json")")
+    done
+    verdict "$capture: the best weight less the chosen one, held-out PSNR in dB" \
+      "$(shortfall "$best" "$(jq .psnr "$work/$capture-auto.json")")" '<=' 0.1
+  done
+}
+
 browser() {
   trained fox-hash fox --method hash ${blocks[fox]} --minutes "$minutes"
   baked fox-hash fox.scene fox
@@ -115,5 +136,5 @@ browser() {
   (cd web && xvfb-run -a npx vitest run bench/hash.ts --config vitest.bench.config.ts --disable-console-intercept) || failures=$((failures + 1))
 }
 
-for row in ${ROWS:-photographs scene ablation browser}; do "$row"; done
+for row in ${ROWS:-photographs scene ablation distortion browser}; do "$row"; done
 finish

@@ -83,15 +83,12 @@ TrainingResult train(Device& device, const TrainFlags& flags) {
   if (!blocks) throw CLI::ValidationError("--blocks", "'" + flags.blocks + "' is neither auto nor of the form 2x2");
   std::optional<BlockGrid> grid;
   if (!flags.grid.empty()) grid = readGrid(flags.grid, capture);
+  const BlockRunOptions options{flags.loop, *blocks, grid, flags.memoryMiB};
   if (flags.method == "hash") {
     if (!flags.residentBlocks.empty()) throw CLI::ValidationError("--resident-blocks", "is of --method volume");
-    return trainHash(
-        device, capture, flags.model,
-        {chosenConfig(flags, presetDefaults<HashConfig>(flags)), flags.loop, *blocks, grid, flags.memoryMiB});
+    return trainHash(device, capture, flags.model, {options, chosenConfig(flags, presetDefaults<HashConfig>(flags))});
   }
-  return trainVolume(
-      device, capture, flags.model,
-      {chosenConfig(flags, presetDefaults<VolumeConfig>(flags)), flags.loop, *blocks, grid, flags.memoryMiB});
+  return trainVolume(device, capture, flags.model, {options, chosenConfig(flags, presetDefaults<VolumeConfig>(flags))});
 }
 
 }  // namespace

@@ -43,6 +43,8 @@ std::string nearest(const std::vector<ConfigField>& fields, std::string_view nam
   return best == fields.end() ? std::string() : std::string(best->name);
 }
 
+constexpr std::string_view kAuto = "auto";
+
 template <class T>
 bool parseNumber(std::string_view text, T* value) {
   T parsed{};
@@ -61,12 +63,23 @@ bool assign(const ConfigField& field, std::string_view text) {
   if (const auto* number = std::get_if<int*>(&field.value)) return parseNumber(text, *number);
   if (const auto* number = std::get_if<int64_t*>(&field.value)) return parseNumber(text, *number);
   if (const auto* number = std::get_if<double*>(&field.value)) return parseNumber(text, *number);
+  if (const auto* number = std::get_if<NumberOrAuto*>(&field.value)) {
+    double parsed = 0;
+    if (text == kAuto) {
+      (*number)->reset();
+      return true;
+    }
+    if (!parseNumber(text, &parsed)) return false;
+    **number = parsed;
+    return true;
+  }
   **std::get_if<std::string*>(&field.value) = std::string(text);
   return true;
 }
 
 const char* typeName(const ConfigField& field) {
-  constexpr const char* kNames[] = {"true or false", "a whole number", "a whole number", "a number", "text"};
+  constexpr const char* kNames[] = {"true or false", "a whole number",   "a whole number",
+                                    "a number",      "a number or auto", "text"};
   return kNames[field.value.index()];
 }
 
@@ -86,28 +99,45 @@ void setConfigField(const std::vector<ConfigField>& fields, std::string_view ass
   }
 }
 
+namespace {
+
+std::string textOf(bool value) {
+  return value ? "true" : "false";
+}
+std::string textOf(double value) {
+  std::string text = fmt::format("{}", value);
+  if (text.find_first_of(".en") == std::string::npos) text += ".0";
+  return text;
+}
+std::string textOf(const NumberOrAuto& value) {
+  return value ? textOf(*value) : std::string(kAuto);
+}
+std::string textOf(const std::string& value) {
+  return value;
+}
+template <class T>
+std::string textOf(T whole) {
+  return fmt::format("{}", whole);
+}
+
+}  // namespace
+
+bool ConfigField::isAuto() const {
+  const auto* number = std::get_if<NumberOrAuto*>(&value);
+  return number != nullptr && !(*number)->has_value();
+}
+
 std::string configValueText(const ConfigField& field) {
-  return std::visit(
-      [](auto* value) -> std::string {
-        using T = std::remove_pointer_t<decltype(value)>;
-        if constexpr (std::is_same_v<T, bool>) return *value ? "true" : "false";
-        if constexpr (std::is_same_v<T, double>) {
-          std::string text = fmt::format("{}", *value);
-          if (text.find_first_of(".en") == std::string::npos) text += ".0";
-          return text;
-        }
-        return fmt::format("{}", *value);
-      },
-      field.value);
+  return std::visit([](const auto* value) { return textOf(*value); }, field.value);
 }
 
 std::string configToToml(const std::vector<ConfigField>& fields) {
   std::string text;
   for (const ConfigField& field : fields) {
     std::string value = configValueText(field);
-    if (const auto* string = std::get_if<std::string*>(&field.value)) {
+    if (std::holds_alternative<std::string*>(field.value) || field.isAuto()) {
       std::ostringstream quoted;
-      quoted << toml::value<std::string>(**string);
+      quoted << toml::value<std::string>(value);
       value = quoted.str();
     }
     text += fmt::format("{} = {}  # {}\n", field.name, value, field.help);
@@ -135,9 +165,14 @@ void configFromToml(const std::vector<ConfigField>& fields, const fs::path& path
         [&node = node](auto* value) {
           using T = std::remove_pointer_t<decltype(value)>;
           if (node.is_boolean() != std::is_same_v<T, bool>) return false;  // toml++ would take one for the other
-          const auto found = node.template value<T>();
-          if (found) *value = *found;
-          return found.has_value();
+          if constexpr (std::is_same_v<T, NumberOrAuto>) {
+            *value = node.template value<double>();
+            return value->has_value() || node.template value<std::string>() == kAuto;
+          } else {
+            const auto found = node.template value<T>();
+            if (found) *value = *found;
+            return found.has_value();
+          }
         },
         field->value);
     if (!read) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -12,10 +13,15 @@
 
 namespace tessera {
 
+// A number that is found out where none is given: `auto` as text.
+using NumberOrAuto = std::optional<double>;
+
 struct ConfigField {
   std::string_view name;  // snake_case
   std::string_view help;
-  std::variant<bool*, int*, int64_t*, double*, std::string*> value;
+  std::variant<bool*, int*, int64_t*, double*, NumberOrAuto*, std::string*> value;
+
+  bool isAuto() const;
 };
 
 // key=value. Throws Error naming the key (with the nearest known one) or the value that does not parse.

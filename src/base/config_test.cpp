@@ -16,14 +16,13 @@ struct Settings {
   int count = 3;
   int64_t large = 4;
   double rate = 0.5;
+  NumberOrAuto weight = 0.25;
   std::string name = "first";
 
   std::vector<ConfigField> fields() {
-    return {{"flag", "a switch", &flag},
-            {"count", "how many", &count},
-            {"large", "how many more", &large},
-            {"learning_rate", "how fast", &rate},
-            {"name", "what it is called", &name}};
+    return {{"flag", "a switch", &flag},        {"count", "how many", &count},
+            {"large", "how many more", &large}, {"learning_rate", "how fast", &rate},
+            {"weight", "how much", &weight},    {"name", "what it is called", &name}};
   }
 };
 
@@ -75,6 +74,24 @@ TEST(Config, SetsFieldsOfEveryType) {
   EXPECT_EQ(settings.large, 9007199254740993);
   EXPECT_EQ(settings.rate, 1e-3);
   EXPECT_EQ(settings.name, "a=b c");  // only the first sign of equality divides
+}
+
+TEST_F(ConfigFile, TakesANumberOrLeavesItToBeFoundOut) {
+  Settings settings;
+  const ConfigField weight = settings.fields()[4];
+  EXPECT_FALSE(weight.isAuto());
+  setConfigField(settings.fields(), "weight=auto");
+  EXPECT_FALSE(settings.weight);
+  EXPECT_TRUE(weight.isAuto());
+  EXPECT_EQ(configValueText(weight), "auto");
+  EXPECT_FALSE(roundTrip(settings).weight);
+  setConfigField(settings.fields(), "weight=2");
+  EXPECT_EQ(settings.weight, 2);
+  EXPECT_EQ(roundTrip(settings).weight, 2);
+  EXPECT_EQ(read("weight = 3").weight, 3) << "a whole number is a number";
+  EXPECT_TRUE(contains(errorOfSet("weight=automatic"), "a number or auto"));
+  EXPECT_TRUE(contains(errorOf("weight = \"automatic\""), "a number or auto"));
+  EXPECT_TRUE(contains(errorOf("weight = true"), "a number or auto"));
 }
 
 TEST(Config, NamesTheNearestFieldWhenItDoesNotKnowOne) {

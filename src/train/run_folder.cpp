@@ -26,13 +26,12 @@ std::string howToRepeat(const Device& device, const TrainingLoopOptions& loop, c
       device.target());
 }
 
-double settledPhotoBudget(double wanted, const Capture& capture, int64_t usableMemory) {
+double settledPhotoBudget(double wanted, const Capture& capture, double mostBytes) {
   constexpr double kMiB = 1048576;
   if (wanted > 0) return wanted;
-  const double most = static_cast<double>(usableMemory) / 2;
   const double all = static_cast<double>(decodedBytes(capture, capture.photosIn(Split::train)));
-  if (all <= most) return 0;
-  const double budget = std::max(0.001, std::floor(most / kMiB * 1000) / 1000);
+  if (all <= mostBytes) return 0;
+  const double budget = std::max(0.001, std::floor(mostBytes / kMiB * 1000) / 1000);
   inform("the training photos take {:.0f} MiB decoded, more than their share of memory: photo_budget_mib is {}",
          all / kMiB, budget);
   return budget;
@@ -56,7 +55,7 @@ void requireSameSettings(const fs::path& model, const std::vector<ConfigField>& 
                          const std::vector<ConfigField>& now) {
   for (size_t i = 0; i < now.size(); ++i) {
     const std::string was = configValueText(saved[i]), is = configValueText(now[i]);
-    if (was == is) continue;
+    if (was == is || now[i].isAuto()) continue;
     throw Error(model.string(), "config.toml", fmt::format("the run has {}={}, not {}", now[i].name, was, is),
                 "resume without that setting, or train into another folder");
   }

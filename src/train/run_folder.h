@@ -13,9 +13,9 @@ void refuseCaptureFolder(const fs::path& model);
 // The first lines of config.toml. `flags`: more of them, as " --grid blocks.json".
 std::string howToRepeat(const Device& device, const TrainingLoopOptions& loop, const std::string& flags = {});
 
-// The photo budget in MiB to train with: `wanted` if it is set; else half of `usableMemory` (bytes) where all training
-// photos, decoded, would take more than that, which it says; else 0, no limit.
-double settledPhotoBudget(double wanted, const Capture& capture, int64_t usableMemory);
+// The photo budget in MiB to train with: `wanted` if it is set; else `mostBytes` where all training photos, decoded,
+// would take more than that, which it says; else 0, no limit.
+double settledPhotoBudget(double wanted, const Capture& capture, double mostBytes);
 
 // The manifest of a trained model. Throws Error when there is none; and, of a method, when it is another one's.
 ModelManifest requireManifest(const ModelFolder& folder);
@@ -30,7 +30,8 @@ Config savedConfig(const fs::path& model) {
   return config;
 }
 
-// Throws Error when `model` holds a run of other settings: resumed, it would be repeatable from neither.
+// Throws Error when `model` holds a run of other settings: resumed, it would be repeatable from neither. What is left
+// to be found out (`auto`) is what the run has found.
 void requireSameSettings(const fs::path& model, const std::vector<ConfigField>& saved,
                          const std::vector<ConfigField>& now);
 template <class Config>

@@ -19,6 +19,8 @@ void change(const ConfigField& field, int i) {
           *value = !*value;
         } else if constexpr (std::is_same_v<T, std::string>) {
           *value += "-" + std::to_string(i);
+        } else if constexpr (std::is_same_v<T, NumberOrAuto>) {
+          *value = value->value_or(0) + i + 1.125;
         } else {
           *value += static_cast<T>(i) + static_cast<T>(1) + static_cast<T>(0.123456789);
         }

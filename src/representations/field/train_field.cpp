@@ -5,6 +5,8 @@
 
 namespace tessera {
 
+constexpr double kShareOfPhotos = 0.5;  // of the memory there is
+
 TrainingResult trainField(Device& device, const Capture& capture, const fs::path& model, TrainFieldOptions options) {
   refuseCaptureFolder(model);
   const ModelFolder folder(model);
@@ -13,7 +15,8 @@ TrainingResult trainField(Device& device, const Capture& capture, const fs::path
   if (goingOn) requireTrainedOn(folder, capture);
   // A resumed run stands where the killed one stood, whatever has become of the capture's points since.
   const SceneFrame frame = goingOn ? folder.readPlacement().frame : fitSceneFrame(capture, options.config.roiMargin);
-  options.config.photoBudgetMiB = settledPhotoBudget(options.config.photoBudgetMiB, capture, usableMemoryBytes());
+  options.config.photoBudgetMiB = settledPhotoBudget(options.config.photoBudgetMiB, capture,
+                                                     kShareOfPhotos * static_cast<double>(usableMemoryBytes()));
   FieldTrainer trainer(device, capture, options.config, frame);
   if (!folder.manifest()) {
     writeFileAtomically(folder.configPath(), howToRepeat(device, options.loop) + configToToml(options.config.fields()));

@@ -83,7 +83,10 @@ std::vector<ConfigField> HashConfig::fields() {
       {"exposure_rate", "learning rate of the photos' exposures", &exposureRate},
       {"loss", "colour loss: huber, mse or charbonnier", &loss},
       {"loss_parameter", "delta of huber, epsilon of charbonnier", &lossParameter},
-      {"distortion", "weight of the distortion loss", &distortion},
+      {"distortion",
+       "weight of the distortion loss; auto: of 0, 0.001, 0.01 and 0.1 the best on a tenth of the training pixels that "
+       "is left out, after a twentieth of the training with each",
+       &distortion},
       {"ramp_share", "share of the steps over which it rises to its weight", &rampShare},
       {"full_gradient_distance",
        "samples nearer to the camera learn more slowly, or fog gathers there; in halves of a block",
@@ -162,7 +165,7 @@ void HashConfig::check() const {
   requireWithin("network_l2", networkL2, 0, kHuge);
   requireWithin("exposure_rate", exposureRate, 0, kHuge);
   requireWithin("loss_parameter", lossParameter, kTiny, kHuge);
-  requireWithin("distortion", distortion, 0, kHuge);
+  if (distortion) requireWithin("distortion", *distortion, 0, kHuge);
   requireWithin("ramp_share", rampShare, 0, 1);
   requireWithin("full_gradient_distance", fullGradientDistance, 0, kHuge);
   requireWithin("depth", depth, 0, kHuge);

@@ -47,7 +47,8 @@ struct HashConfig {
          exposureRate = 1e-3;
   // Losses
   std::string loss = "huber";
-  double lossParameter = 0.1, distortion = 0.01, rampShare = 0, fullGradientDistance = 0.25;
+  double lossParameter = 0.1, rampShare = 0, fullGradientDistance = 0.25;
+  NumberOrAuto distortion = 0.01;  // found out before training (distortion_choice.h)
   double depth = 0.03, depthTolerance = 0.01, knownShare = 0.125;
   // Coarser levels of detail
   double levelShare = 0.2;

@@ -43,7 +43,7 @@ double distortionWeight(const HashConfig& config, int64_t step, int64_t plannedS
   // While the number of steps is not known, it is early.
   const double risen = config.rampShare * static_cast<double>(plannedSteps);
   const double share = risen > 0 ? std::min(1.0, static_cast<double>(step) / risen) : config.rampShare > 0 ? 0 : 1;
-  return config.distortion * share;
+  return config.distortion.value() * share;
 }
 
 HashTrainer::HashTrainer(Device& device, const Capture& capture, const HashConfig& config, const BlockGrid& grid)
@@ -54,6 +54,7 @@ HashTrainer::HashTrainer(Device& device, const Capture& capture, const HashConfi
       photoRays_(device, capture, model_.frame(), raySettings(config)),
       exposures_(device, capture),
       rays_(static_cast<uint32_t>(config.firstRays)) {
+  CHECK(config.distortion.has_value());
   colourLossKind(config.loss);
   bool anything = false;
   for (uint32_t block = 0; block < parts(); ++block) {
@@ -103,15 +104,14 @@ StepReport HashTrainer::step(int64_t step, int64_t plannedSteps) {
 
   // The step is over: its counters may be read.
   const std::vector<uint32_t> counters = pass_.counters();
-  const std::vector<float> losses = device_.read(losses_.all()), inner = device_.read(pass_.losses());
+  const std::vector<float> inner = device_.read(pass_.losses());
   StepReport report;
   report.samples = counters[0];
   report.rays = counters[1];
   for (uint32_t round = 0; round < HashSamples::kRounds; ++round) report.marched += counters[2 + round];
-  report.loss = losses[0] + inner[0] + inner[1];
-  double weight = 0;
-  for (uint32_t ray = 0; ray < report.rays; ++ray) weight += photoRays_.batch().weights[ray];
-  report.squaredError = losses[1] / std::max(1.0, 3 * weight);
+  report.loss = device_.read(losses_.all())[0] + inner[0] + inner[1];
+  const Fit fit = comparedRays(report.rays);
+  report.squaredError = fit.squaredError / std::max(1.0, fit.channels);
   report.texels = pass_.texelsWanted();
   const double perRay = static_cast<double>(report.samples) / std::max(1u, report.rays);
   model_.adaptStep(perRay);
@@ -123,13 +123,26 @@ StepReport HashTrainer::step(int64_t step, int64_t plannedSteps) {
   return report;
 }
 
-void HashTrainer::addGradients(const HashModel::Rays& drawn, int64_t step, int64_t plannedSteps) {
-  const Count rays = pass_.finished(drawn);
-  const Slice<const uint32_t> photoOfRay = photoRays_.photoOfRay(0, rays_);
-  const Slice<const float> backgrounds =
-      config_.background == "random" ? photoRays_.backgrounds(0, rays_) : Slice<const float>();
-  device_.run(
-      ExposureForward{rays, pass_.colour(), pass_.opacity(), backgrounds, photoOfRay, exposures_.logGains(), exposed_});
+HashTrainer::Fit HashTrainer::fit(int64_t step) {
+  compareWithPhotos(pass_.finished(drawRays(step)));
+  return comparedRays(pass_.counters()[1]);
+}
+
+// Of the `rays` that were compared last.
+HashTrainer::Fit HashTrainer::comparedRays(uint32_t rays) {
+  double weight = 0;
+  for (uint32_t ray = 0; ray < rays; ++ray) weight += photoRays_.batch().weights[ray];
+  return {device_.read(losses_.all())[1], 3 * weight};
+}
+
+Slice<const float> HashTrainer::backgrounds() const {
+  return config_.background == "random" ? photoRays_.backgrounds(0, rays_) : Slice<const float>();
+}
+
+// Losses of colours, and their gradients.
+void HashTrainer::compareWithPhotos(Count rays) {
+  device_.run(ExposureForward{rays, pass_.colour(), pass_.opacity(), backgrounds(), photoRays_.photoOfRay(0, rays_),
+                              exposures_.logGains(), exposed_});
   ColourLoss loss;
   loss.kind = colourLossKind(config_.loss);
   loss.parameter = static_cast<float>(config_.lossParameter);
@@ -141,9 +154,15 @@ void HashTrainer::addGradients(const HashModel::Rays& drawn, int64_t step, int64
   loss.loss = losses_;
   loss.gradients = colourGradients_;
   device_.run(loss);
+}
+
+void HashTrainer::addGradients(const HashModel::Rays& drawn, int64_t step, int64_t plannedSteps) {
+  const Count rays = pass_.finished(drawn);
+  compareWithPhotos(rays);
   device_.fillZero(opacityGradients_.all());
-  device_.run(ExposureBackward{rays, pass_.colour(), backgrounds, photoOfRay, exposures_.logGains(), colourGradients_,
-                               colourGradients_, opacityGradients_, exposures_.gradients()});
+  device_.run(ExposureBackward{rays, pass_.colour(), backgrounds(), photoRays_.photoOfRay(0, rays_),
+                               exposures_.logGains(), colourGradients_, colourGradients_, opacityGradients_,
+                               exposures_.gradients()});
   HashPass::LossScales scales;
   scales.distortion = static_cast<float>(distortionWeight(config_, step, plannedSteps) / rays_);
   if (config_.knownShare > 0) scales.depth = static_cast<float>(config_.depth / rays_);

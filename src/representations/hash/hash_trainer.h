@@ -11,6 +11,7 @@ namespace tessera {
 class HashTrainer final : public Trainee {
  public:
   // Keeps references to `device` and `capture`. Trains on the capture's training photos.
+  // `config.distortion` must be known (distortion_choice.h).
   HashTrainer(Device& device, const Capture& capture, const HashConfig& config, const BlockGrid& grid);
 
   StepReport step(int64_t step, int64_t plannedSteps) override;
@@ -22,9 +23,21 @@ class HashTrainer final : public Trainee {
 
   HashModel& model() { return model_; }
 
+  // Takes rays from these tiles alone from now on; [photo].
+  void drawFrom(std::vector<TileShares> tiles) { photoRays_.drawFrom(std::move(tiles)); }
+  // How far the rays of a step are off, over colour channels, without being learned from.
+  struct Fit {
+    double squaredError = 0;  // sum
+    double channels = 0;
+  };
+  Fit fit(int64_t step);
+
  private:
   void refreshOccupancy(int64_t step);
   HashModel::Rays drawRays(int64_t step);
+  void compareWithPhotos(Count rays);
+  Fit comparedRays(uint32_t rays);
+  Slice<const float> backgrounds() const;
   void addGradients(const HashModel::Rays& rays, int64_t step, int64_t plannedSteps);
   void updateParameters(int64_t step, int64_t plannedSteps);
 

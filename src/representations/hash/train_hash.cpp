@@ -3,41 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "bake/levels.h"
 #include "base/error.h"
 #include "base/log.h"
-#include "base/memory.h"
+#include "representations/hash/distortion_choice.h"
 #include "tiles/hash_payload.h"
-#include "train/known_distances.h"
-#include "train/level_folders.h"
 
 namespace tessera {
-namespace {
-
-constexpr double kMiB = 1048576;
-// Of the memory that is planned for: for blocks, and for decoded photos. The rest is for what a step works on.
-constexpr double kShareOfBlocks = 0.4, kShareOfPhotos = 0.4;
-constexpr double kMostPixelsOff = 2;  // of observations whose distance is believed
-
-double plannedMemory(const TrainHashOptions& options) {
-  return options.memoryMiB > 0 ? options.memoryMiB * kMiB : static_cast<double>(usableMemoryBytes());
-}
-
-PartitionOptions partitioningFor(const Capture& capture, const TrainHashOptions& options) {
-  PartitionOptions partitioning;
-  partitioning.blocks = options.blocks;
-  partitioning.grid = options.grid;
-  partitioning.limits.texelsPerEdge = options.config.lattice << options.config.levels;
-  partitioning.limits.bytesPerBlock = trainingBytesPerBlock(options.config);
-  partitioning.limits.memoryBudget = kShareOfBlocks * plannedMemory(options);
-  partitioning.enough.pixels = int64_t{options.config.lattice} * options.config.lattice;
-  partitioning.depthOf = KnownDepths(capture, kMostPixelsOff);
-  return partitioning;
-}
-
-}  // namespace
 
 double trainingBytesPerBlock(const HashConfig& config) {
   constexpr double kPerParameter = 5 * sizeof(float);  // values, gradients, two moments, counts
@@ -74,72 +50,80 @@ void requireStepsOfScenes(const HashConfig& config) {
               "use another one, or level_share=0");
 }
 
-// What all levels are trained on.
-struct Training {
-  Device& device;
-  const Capture& capture;
-  const BlockGrid& grid;
-};
+BlockLimits limitsOf(const TrainHashOptions& options) {
+  BlockLimits limits;
+  limits.texelsPerEdge = options.config.lattice << options.config.levels;
+  limits.bytesPerBlock = trainingBytesPerBlock(options.config);
+  limits.memoryBudget = options.bytesForBlocks();
+  return limits;
+}
 
-TrainingResult trainLevel(const ModelFolder& folder, const Training& on, HashConfig config,
-                          const TrainingLoopOptions& loop) {
+TrainingResult trainLevel(const ModelFolder& folder, const BlockTraining& on, HashConfig config,
+                          const TrainHashOptions& options, const TrainingLoopOptions& loop) {
   HashTrainer trainer(on.device, on.capture, config, on.grid);
-  if (!folder.manifest()) {
-    writeFileAtomically(folder.configPath(),
-                        howToRepeat(on.device, loop, " --grid blocks.json") + configToToml(config.fields()));
-    folder.writePlacement({{}, on.grid, on.capture.sourceFromWorld, on.capture.root, trainingNames(on.capture)},
-                          loop.method);
+  writeRun(folder, on, config.fields(), loop);
+  if (config.level == 0) {
+    sayWhatMemoryItTakes(on.capture, options,
+                         {config.photoBudgetMiB, trainingBytesPerBlock(config), "",
+                          "lower samples_per_step, texels_per_step or photo_budget_mib, or use --method volume with "
+                          "--resident-blocks"});
   }
   return runTraining(trainer, folder, loop);
 }
 
-// `loop.steps` of the level that `config` is for, or those that it had planned when it was begun. True when it is
-// trained to its end.
-bool trainCoarserLevel(const fs::path& model, const Training& on, const HashConfig& config, TrainingLoopOptions loop) {
-  const uint32_t level = static_cast<uint32_t>(config.level);
-  const ModelFolder folder(levelFolder(model, level));
-  if (folder.manifest() && savedConfig<HashConfig>(folder.root()).finestStep != config.finestStep) {
-    removeLevel(folder.root());
+// Into the config, and in distortion.json how; a part of the time is spent. False when asked to stop.
+bool findDistortion(const BlockTraining& on, const fs::path& model, TrainHashOptions& options) {
+  constexpr double kShareOfProbe = 0.05, kMostMinutes = 5;  // of steps or minutes; what is killed is begun again
+  constexpr int64_t kFewestSteps = 32, kMostSteps = 1000;
+  TrainingLoopOptions& loop = options.loop;
+  DistortionProbing probing;
+  const int64_t steps = loop.steps > 0 ? loop.steps : kDefaultSteps;
+  probing.steps =
+      std::clamp(static_cast<int64_t>(kShareOfProbe * static_cast<double>(steps)), kFewestSteps, kMostSteps);
+  probing.minutes = std::min(kShareOfProbe * loop.minutes, kMostMinutes);
+  const auto start = std::chrono::steady_clock::now();
+  const std::optional<DistortionChoice> choice =
+      chooseDistortion(on.device, on.capture, options.config, on.grid, probing, loop.stopRequested);
+  if (!choice) return false;
+  options.config.distortion = choice->weight();
+  const std::chrono::duration<double, std::ratio<60>> spent = std::chrono::steady_clock::now() - start;
+  if (loop.minutes > 0) loop.minutes = std::max(0.1 * loop.minutes, loop.minutes - spent.count());
+  nlohmann::json written = {{"steps", choice->steps}, {"chosen", choice->weight()}};
+  for (const DistortionChoice::Probe& probe : choice->probes) {
+    written["probes"].push_back({{"distortion", probe.weight}, {"psnr", probe.psnr}});
   }
-  if (const std::optional<ModelManifest> before = folder.manifest()) {
-    if (before->step >= before->plannedSteps) return true;
-    loop.steps = before->plannedSteps;
-  }
-  const LevelGroups groups =
-      groupsOfLevel(static_cast<uint32_t>(on.grid.columns), static_cast<uint32_t>(on.grid.rows), level, false);
-  inform("level {}: {} blocks in {} tiles, {} steps", level, on.grid.cells(), groups.cells.size(), loop.steps);
-  return trainLevel(folder, on, config, loop).finished;
+  writeFileAtomically(model / "distortion.json", written.dump(2) + "\n");
+  return true;
 }
 
 }  // namespace
 
 TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options) {
-  options.config.check();
-  refuseCaptureFolder(model);
-  const ModelFolder folder(model);
-  options.loop.method = "hash";
-  refuseTrainedModel(folder, options.loop);
-  const bool goingOn = folder.manifest().has_value();
-  if (goingOn) requireTrainedOn(folder, capture);
   HashConfig& config = options.config;
-  config.photoBudgetMiB = settledPhotoBudget(config.photoBudgetMiB, capture,
-                                             static_cast<int64_t>(2 * kShareOfPhotos * plannedMemory(options)));
-  // A resumed run stands where the killed one stood, whatever has become of the capture's points since.
-  const BlockGrid grid = goingOn ? requireGrid(folder) : cutBlocks(capture, model, partitioningFor(capture, options));
-  if (goingOn) requireSameBlocks(model / "blocks.json", grid, options.blocks, options.grid);
-  const uint32_t top =
-      config.levelShare > 0 ? topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows)) : 0;
+  config.check();
+  options.loop.method = "hash";
+  const BlockRun run = openBlockRun(capture, model, options, limitsOf(options),
+                                    {kEnoughPhotos, int64_t{config.lattice} * config.lattice});
+  config.photoBudgetMiB = settledPhotoBudget(config.photoBudgetMiB, capture, options.bytesForPhotos());
+  const uint32_t top = config.levelShare > 0
+                           ? topLevel(static_cast<uint32_t>(run.grid.columns), static_cast<uint32_t>(run.grid.rows))
+                           : 0;
   for (uint32_t level = 0; level <= top; ++level) requireStepsOfScenes(levelConfig(config, level, 0));
-  if (!goingOn) fs::remove_all(model / "levels");  // of a run that is no more
-  TrainingResult result = trainLevel(folder, {device, capture, grid}, config, options.loop);
-  for (uint32_t level = 1; level <= top && result.finished; ++level) {
-    TrainingLoopOptions loop = options.loop;
-    loop.minutes = 0;
-    loop.resume = true;
-    loop.steps = levelSteps(config.levelShare, level, result.plannedSteps);
-    if (loop.steps < 1) break;
-    result.finished = trainCoarserLevel(model, {device, capture, grid}, levelConfig(config, level, result.step), loop);
-  }
+  const BlockTraining on{device, capture, run.grid};
+  if (!run.goesOn) fs::remove_all(model / "levels");  // of a run that is no more
+  if (run.goesOn && !config.distortion) config.distortion = savedConfig<HashConfig>(model).distortion;
+  if (!config.distortion && !findDistortion(on, model, options)) return {};
+  TrainingResult result = trainLevel(run.folder, on, config, options, options.loop);
+  if (!result.finished) return result;
+  LevelTraining levels;
+  levels.madeFrom = [](const fs::path& folder) { return savedConfig<HashConfig>(folder).finestStep; };
+  levels.train = [&](const ModelFolder& folder, uint32_t level, const TrainingLoopOptions& loop) {
+    const LevelGroups groups =
+        groupsOfLevel(static_cast<uint32_t>(run.grid.columns), static_cast<uint32_t>(run.grid.rows), level, false);
+    inform("level {}: {} blocks in {} tiles, {} steps", level, run.grid.cells(), groups.cells.size(), loop.steps);
+    return trainLevel(folder, on, levelConfig(config, level, result.step), options, loop).finished;
+  };
+  result.finished = trainCoarserLevels(model, top, config.levelShare, result, options.loop, levels);
   return result;
 }
 

@@ -1,21 +1,19 @@
 // `tessera train --method hash`: a capture to a model folder.
 #pragma once
 
-#include "partition/cut_blocks.h"
 #include "representations/hash/hash_trainer.h"
+#include "train/block_run.h"
 
 namespace tessera {
 
-struct TrainHashOptions {
+struct TrainHashOptions : BlockRunOptions {
   HashConfig config;
-  TrainingLoopOptions loop;
-  BlockCount blocks;
-  std::optional<BlockGrid> grid;  // of these blocks, whatever `blocks` says
-  double memoryMiB = 0;           // to plan blocks and photos for; 0: what the machine has
 };
 
 // Cuts the capture into blocks, or takes those that are given (blocks.json, blocks.svg, blocks.geojson), warns of those
 // that will not come out well, trains, resumes, saves; see training_loop.h. Writes config.toml and blocks.json first.
+// Before that, where the weight of the distortion loss is to be found out, short trainings of a few weights, which
+// distortion.json tells of; they count as part of `loop.minutes`. A run that goes on has found it out.
 // Then coarser levels of detail of the same blocks, up to one whose tiles hold all; where the finest has been trained
 // on since, they are made anew. The result counts the finest level's steps; it is finished when all levels are.
 TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options);

@@ -5,35 +5,22 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/log.h"
-#include "base/memory.h"
-#include "train/known_distances.h"
-#include "train/level_folders.h"
 
 namespace tessera {
 namespace {
 
 constexpr double kMiB = 1048576;
-// Of the memory that is planned for: for blocks in training, and for decoded photos. The rest is for what a step works
-// on.
-constexpr double kShareOfBlocks = 0.4, kShareOfPhotos = 0.4;
-constexpr double kHeap = 1.02;         // what the C library keeps besides (1.002 was measured)
 constexpr double kWorthSaying = 0.02;  // of the pixels are not trained on
-constexpr double kMostPixelsOff = 2;   // of observations whose distance is believed
 constexpr const char* kWaiting = "waiting";
-
-double plannedMemory(const TrainVolumeOptions& options) {
-  return options.memoryMiB > 0 ? options.memoryMiB * kMiB : static_cast<double>(usableMemoryBytes());
-}
 
 BlockLimits limitsOf(const TrainVolumeOptions& options) {
   BlockLimits limits;
   limits.texelsPerEdge = options.config.planes;
   limits.bytesPerBlock = trainingBytesPerBlock(options.config);
-  limits.memoryBudget = kShareOfBlocks * plannedMemory(options);
+  limits.memoryBudget = options.bytesForBlocks();
   const int resident = options.config.residentBlocks;
   if (resident == 0) return limits;
   const double bytes = resident * limits.bytesPerBlock;
@@ -45,16 +32,6 @@ BlockLimits limitsOf(const TrainVolumeOptions& options) {
   }
   limits.memoryBudget = std::numeric_limits<double>::infinity();  // however many there are
   return limits;
-}
-
-PartitionOptions partitioningFor(const Capture& capture, const TrainVolumeOptions& options) {
-  PartitionOptions partitioning;
-  partitioning.blocks = options.blocks;
-  partitioning.grid = options.grid;
-  partitioning.limits = limitsOf(options);
-  partitioning.enough.pixels = int64_t{options.config.planes} * options.config.planes / 16;
-  partitioning.depthOf = KnownDepths(capture, kMostPixelsOff);
-  return partitioning;
 }
 
 }  // namespace
@@ -79,23 +56,18 @@ VolumeConfig levelConfig(VolumeConfig finest, uint32_t level, int64_t finestStep
 
 namespace {
 
-// With all that is allocated by now: what training adds are decoded photos, and a checkpoint of one block, twice.
-void sayWhatMemoryItTakes(VolumeTrainer& trainer, const Capture& capture, const TrainVolumeOptions& options) {
+void sayWhatThereIsMemoryFor(VolumeTrainer& trainer, const Capture& capture, const TrainVolumeOptions& options) {
   const VolumeConfig& config = options.config;
-  const double all = static_cast<double>(decodedBytes(capture, capture.photosIn(Split::train)));
-  const double photos = config.photoBudgetMiB > 0 ? std::min(all, config.photoBudgetMiB * kMiB) : all;
-  const double bytes = kHeap * (static_cast<double>(residentBytes()) + photos + 2 * trainingBytesPerBlock(config));
   const Residency* residency = trainer.residency();
-  inform("memory: at most {:.0f} MiB{}", bytes / kMiB,
-         residency ? fmt::format(", with {} of {} blocks at a time, {} stays in {} steps", config.residentBlocks,
-                                 trainer.model().space().cells(), residency->stays().size(), residency->cycleSteps())
-                   : "");
-  if (bytes > plannedMemory(options)) {
-    warn(
-        "that is more than the {:.0f} MiB there are; use --resident-blocks, or lower texels_per_step or "
-        "photo_budget_mib",
-        plannedMemory(options) / kMiB);
+  MemoryNeeds needs;
+  needs.photoBudgetMiB = config.photoBudgetMiB;
+  needs.bytesPerBlock = trainingBytesPerBlock(config);
+  needs.remedy = "use --resident-blocks, or lower texels_per_step or photo_budget_mib";
+  if (residency) {
+    needs.how = fmt::format(", with {} of {} blocks at a time, {} stays in {} steps", config.residentBlocks,
+                            trainer.model().space().cells(), residency->stays().size(), residency->cycleSteps());
   }
+  sayWhatMemoryItTakes(capture, options, needs);
   if (!residency) return;
   const std::vector<uint32_t> never = residency->neverServed();
   if (!never.empty()) {
@@ -123,39 +95,14 @@ void warnWhereBlocksMissTheirTurn(const VolumeTrainer& trainer, int64_t steps) {
       cycle, steps);
 }
 
-// What all levels are trained on.
-struct Training {
-  Device& device;
-  const Capture& capture;
-  const BlockGrid& grid;
-};
-
-// Writes what a run is made of, unless a run is there already.
-void writeRun(const ModelFolder& folder, const Training& on, VolumeConfig config, const TrainingLoopOptions& loop) {
-  if (folder.manifest()) return;
-  writeFileAtomically(folder.configPath(),
-                      howToRepeat(on.device, loop, " --grid blocks.json") + configToToml(config.fields()));
-  folder.writePlacement({{}, on.grid, on.capture.sourceFromWorld, on.capture.root, trainingNames(on.capture)},
-                        loop.method);
-}
-
-// `loop.steps` of the level that `config` is for, or those that it had planned when it was begun. True when it is
-// trained to its end.
-bool trainLevel(const fs::path& model, const Training& on, VolumeConfig config, TrainingLoopOptions loop) {
+// True when it is trained to its end.
+bool trainLevel(const fs::path& model, const BlockTraining& on, const ModelFolder& folder, VolumeConfig config,
+                const TrainingLoopOptions& loop) {
   const uint32_t level = static_cast<uint32_t>(config.level);
-  const ModelFolder folder(levelFolder(model, level));
-  if (folder.manifest() && savedConfig<VolumeConfig>(folder.root()).finestStep != config.finestStep) {
-    removeLevel(folder.root());
-  }
-  const std::optional<ModelManifest> before = folder.manifest();
-  if (before && before->step >= before->plannedSteps) return true;
-  loop.minutes = 0;
-  if (before) loop.steps = before->plannedSteps;
   config.residencySteps = std::min(config.residencySteps, loop.steps);  // all blocks get their turn
   VolumeTrainer trainer(on.device, on.capture, config, on.grid, folder.root() / kWaiting);
-  if (!before) trainer.beginFrom(levelFolder(model, level - 1));
-  loop.resume = true;
-  writeRun(folder, on, config, loop);
+  if (!folder.manifest()) trainer.beginFrom(levelFolder(model, level - 1));
+  writeRun(folder, on, config.fields(), loop);
   inform("level {}: {} blocks in {} models, {} steps", level, on.grid.cells(), trainer.model().groups().cells.size(),
          loop.steps);
   return runTraining(trainer, folder, loop).finished;
@@ -164,37 +111,32 @@ bool trainLevel(const fs::path& model, const Training& on, VolumeConfig config, 
 }  // namespace
 
 TrainingResult trainVolume(Device& device, const Capture& capture, const fs::path& model, TrainVolumeOptions options) {
-  options.config.check();
-  refuseCaptureFolder(model);
-  const ModelFolder folder(model);
-  options.loop.method = "volume";
-  refuseTrainedModel(folder, options.loop);
-  const bool goingOn = folder.manifest().has_value();
-  if (goingOn) requireTrainedOn(folder, capture);
   VolumeConfig& config = options.config;
-  config.photoBudgetMiB = settledPhotoBudget(config.photoBudgetMiB, capture,
-                                             static_cast<int64_t>(2 * kShareOfPhotos * plannedMemory(options)));
-  // A resumed run stands where the killed one stood, whatever has become of the capture's points since.
-  const BlockGrid grid = goingOn ? requireGrid(folder) : cutBlocks(capture, model, partitioningFor(capture, options));
-  if (goingOn) requireSameBlocks(model / "blocks.json", grid, options.blocks, options.grid);
-  const Training on{device, capture, grid};
+  config.check();
+  options.loop.method = "volume";
+  const BlockRun run = openBlockRun(capture, model, options, limitsOf(options),
+                                    {kEnoughPhotos, int64_t{config.planes} * config.planes / 16});
+  config.photoBudgetMiB = settledPhotoBudget(config.photoBudgetMiB, capture, options.bytesForPhotos());
+  const BlockTraining on{device, capture, run.grid};
   TrainingResult result;
   {
-    VolumeTrainer trainer(device, capture, config, grid, folder.root() / kWaiting);
-    if (!goingOn) fs::remove_all(model / "levels");  // of a run that is no more
-    writeRun(folder, on, config, options.loop);
-    sayWhatMemoryItTakes(trainer, capture, options);
-    const bool stepsAreKnown = options.loop.steps > 0 && !goingOn;  // else they are settled on the way
+    VolumeTrainer trainer(device, capture, config, run.grid, run.folder.root() / kWaiting);
+    if (!run.goesOn) fs::remove_all(model / "levels");  // of a run that is no more
+    writeRun(run.folder, on, config.fields(), options.loop);
+    sayWhatThereIsMemoryFor(trainer, capture, options);
+    const bool stepsAreKnown = options.loop.steps > 0 && !run.goesOn;  // else they are settled on the way
     if (stepsAreKnown) warnWhereBlocksMissTheirTurn(trainer, options.loop.steps);
-    result = runTraining(trainer, folder, options.loop);
+    result = runTraining(trainer, run.folder, options.loop);
     if (!stepsAreKnown && result.finished) warnWhereBlocksMissTheirTurn(trainer, result.plannedSteps);
   }
-  const uint32_t top = topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
-  for (uint32_t level = 1; level <= top && result.finished; ++level) {
-    options.loop.steps = levelSteps(config.levelShare, level, result.plannedSteps);
-    if (options.loop.steps < 1) break;
-    result.finished = trainLevel(model, on, levelConfig(config, level, result.step), options.loop);
-  }
+  if (!result.finished) return result;
+  LevelTraining levels;
+  levels.madeFrom = [](const fs::path& folder) { return savedConfig<VolumeConfig>(folder).finestStep; };
+  levels.train = [&](const ModelFolder& folder, uint32_t level, const TrainingLoopOptions& loop) {
+    return trainLevel(model, on, folder, levelConfig(config, level, result.step), loop);
+  };
+  const uint32_t top = topLevel(static_cast<uint32_t>(run.grid.columns), static_cast<uint32_t>(run.grid.rows));
+  result.finished = trainCoarserLevels(model, top, config.levelShare, result, options.loop, levels);
   return result;
 }
 

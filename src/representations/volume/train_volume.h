@@ -1,17 +1,13 @@
 // `tessera train --method volume`: a capture to a model folder.
 #pragma once
 
-#include "partition/cut_blocks.h"
 #include "representations/volume/volume_trainer.h"
+#include "train/block_run.h"
 
 namespace tessera {
 
-struct TrainVolumeOptions {
+struct TrainVolumeOptions : BlockRunOptions {
   VolumeConfig config;
-  TrainingLoopOptions loop;
-  BlockCount blocks;
-  std::optional<BlockGrid> grid;  // of these blocks, whatever `blocks` says
-  double memoryMiB = 0;           // to plan blocks and photos for; 0: what the machine has
 };
 
 // Cuts the capture into blocks, or takes those that are given (blocks.json, blocks.svg, blocks.geojson), warns of those

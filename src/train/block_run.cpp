@@ -1,0 +1,90 @@
+#include "train/block_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "train/block_frame.h"
+#include "train/known_distances.h"
+#include "train/photo_window.h"
+
+namespace tessera {
+namespace {
+
+constexpr double kMiB = 1048576;
+constexpr double kShareOfBlocks = 0.4, kShareOfPhotos = 0.4;
+constexpr double kMostPixelsOff = 2;  // of observations whose distance is believed
+constexpr double kHeap = 1.02;        // what the C library keeps besides (1.002 was measured)
+
+}  // namespace
+
+double BlockRunOptions::plannedBytes() const {
+  return memoryMiB > 0 ? memoryMiB * kMiB : static_cast<double>(usableMemoryBytes());
+}
+double BlockRunOptions::bytesForBlocks() const {
+  return kShareOfBlocks * plannedBytes();
+}
+double BlockRunOptions::bytesForPhotos() const {
+  return kShareOfPhotos * plannedBytes();
+}
+
+BlockRun openBlockRun(const Capture& capture, const fs::path& model, const BlockRunOptions& options,
+                      const BlockLimits& limits, const Sufficiency& enough) {
+  refuseCaptureFolder(model);
+  const ModelFolder folder(model);
+  refuseTrainedModel(folder, options.loop);
+  if (folder.manifest()) {
+    requireTrainedOn(folder, capture);
+    BlockGrid grid = requireGrid(folder);
+    requireSameBlocks(model / "blocks.json", grid, options.blocks, options.grid);
+    return {folder, grid, true};
+  }
+  PartitionOptions partitioning;
+  partitioning.blocks = options.blocks;
+  partitioning.grid = options.grid;
+  partitioning.limits = limits;
+  partitioning.enough = enough;
+  partitioning.depthOf = KnownDepths(capture, kMostPixelsOff);
+  return {folder, cutBlocks(capture, model, partitioning), false};
+}
+
+void writeRun(const ModelFolder& folder, const BlockTraining& on, const std::vector<ConfigField>& config,
+              const TrainingLoopOptions& loop) {
+  if (folder.manifest()) return;
+  writeFileAtomically(folder.configPath(), howToRepeat(on.device, loop, " --grid blocks.json") + configToToml(config));
+  folder.writePlacement({{}, on.grid, on.capture.sourceFromWorld, on.capture.root, trainingNames(on.capture)},
+                        loop.method);
+}
+
+void sayWhatMemoryItTakes(const Capture& capture, const BlockRunOptions& options, const MemoryNeeds& needs) {
+  constexpr double kCheckpoint = 2;  // a block that is saved stands in memory twice
+  const double all = static_cast<double>(decodedBytes(capture, capture.photosIn(Split::train)));
+  const double photos = needs.photoBudgetMiB > 0 ? std::min(all, needs.photoBudgetMiB * kMiB) : all;
+  const double bytes = kHeap * (static_cast<double>(residentBytes()) + photos + kCheckpoint * needs.bytesPerBlock);
+  inform("memory: at most {:.0f} MiB{}", bytes / kMiB, needs.how);
+  if (bytes <= options.plannedBytes()) return;
+  warn("that is more than the {:.0f} MiB there are; {}", options.plannedBytes() / kMiB, needs.remedy);
+}
+
+bool trainCoarserLevels(const fs::path& model, uint32_t top, double share, const TrainingResult& finest,
+                        TrainingLoopOptions loop, const LevelTraining& training) {
+  loop.minutes = 0;
+  loop.resume = true;
+  for (uint32_t level = 1; level <= top; ++level) {
+    loop.steps = levelSteps(share, level, finest.plannedSteps);
+    if (loop.steps < 1) break;
+    const ModelFolder folder(levelFolder(model, level));
+    if (folder.manifest() && training.madeFrom(folder.root()) != finest.step) removeLevel(folder.root());
+    if (const std::optional<ModelManifest> before = folder.manifest()) {
+      if (before->step >= before->plannedSteps) continue;
+      loop.steps = before->plannedSteps;
+    }
+    if (!training.train(folder, level, loop)) return false;
+  }
+  return true;
+}
+
+}  // namespace tessera
