@@ -64,8 +64,9 @@ const OccupancyBits& coarseLevel(const OccupancyPyramid& occupied) {
 // k coarse cells are empty along an edge, what is so of a finest one is what is left of these.
 class NearSweep {
  public:
-  NearSweep(const OccupancyBits& finest, OctantDistances& into, uint32_t octant)
-      : finest_(finest), into_(into), octant_(octant), ratio_(into.ratio) {
+  // `full`: of near cells, by number; nothing is empty in those.
+  NearSweep(const OccupancyBits& finest, const std::vector<bool>& full, OctantDistances& into, uint32_t octant)
+      : finest_(finest), full_(full), into_(into), octant_(octant), ratio_(into.ratio) {
     for (uint32_t a = 0; a < 3; ++a) up_[a] = (octant >> a & 1) != 0;
   }
 
@@ -78,7 +79,7 @@ class NearSweep {
         for (uint32_t i = 0; i < n; ++i) {
           const Place cell = {ordered(i, up_[0]), ordered(j, up_[1]), ordered(k, up_[2])};
           const uint32_t word = wordOf(cell);
-          if (!OctantDistances::isEmpty(word)) sweep(cell, word >> 4);
+          if (!OctantDistances::isEmpty(word) && !full_[word >> 4]) sweep(cell, word >> 4);
         }
       }
     }
@@ -154,11 +155,27 @@ class NearSweep {
   }
 
   const OccupancyBits& finest_;
+  const std::vector<bool>& full_;
   OctantDistances& into_;
   uint32_t octant_, ratio_;
   bool up_[3];
   std::array<uint32_t, kSide * kSide * kSide> values_{};  // of one coarse cell, and of the next ones beside it
 };
+
+}  // namespace
+
+namespace {
+
+bool isFull(const OccupancyBits& finest, uint32_t ratio, uint32_t x, uint32_t y, uint32_t z) {
+  for (uint32_t k = 0; k < ratio; ++k) {
+    for (uint32_t j = 0; j < ratio; ++j) {
+      for (uint32_t i = 0; i < ratio; ++i) {
+        if (!finest.at(ratio * x + i, ratio * y + j, ratio * z + k)) return false;
+      }
+    }
+  }
+  return true;
+}
 
 }  // namespace
 
@@ -169,12 +186,16 @@ OctantDistances octantDistances(const OccupancyPyramid& occupied) {
   distances.cells = coarse.cells;
   distances.coarse = octantDistances(coarse);
   if (distances.ratio == 1) return distances;
-  uint32_t number = 0;
-  for (uint32_t& word : distances.coarse) {
-    if (word == 0) word = number++ << 4;
+  std::vector<bool> full;
+  const uint32_t n = distances.cells;
+  for (uint32_t cell = 0; cell < distances.coarse.size(); ++cell) {
+    uint32_t& word = distances.coarse[cell];
+    if (word != 0) continue;
+    word = static_cast<uint32_t>(full.size()) << 4;
+    full.push_back(isFull(finest, distances.ratio, cell % n, cell / n % n, cell / n / n));
   }
-  distances.fine.assign(size_t{number} * distances.ratio * distances.ratio * distances.ratio, 0);
-  for (uint32_t octant = 0; octant < 8; ++octant) NearSweep(finest, distances, octant).run();
+  distances.fine.assign(full.size() * distances.ratio * distances.ratio * distances.ratio, 0);
+  for (uint32_t octant = 0; octant < 8; ++octant) NearSweep(finest, full, distances, octant).run();
   return distances;
 }
 
