@@ -91,6 +91,11 @@ TrainingResult train(Device& device, const TrainFlags& flags) {
   return trainVolume(device, capture, flags.model, {options, chosenConfig(flags, presetDefaults<VolumeConfig>(flags))});
 }
 
+std::string howToGoOn(const fs::path& model) {
+  if (ModelFolder(model).manifest()) return "go on with --resume";
+  return "there is no model yet: give the same command again, with --resume for what was found out so far";
+}
+
 }  // namespace
 
 void addTrainVerb(CLI::App& app) {
@@ -151,7 +156,7 @@ void addTrainVerb(CLI::App& app) {
       fmt::print("{}: {} of {} steps in {:.0f} s, {:.2f} dB on the training photos, {:.2f} M samples/s on {}\n",
                  flags->model, result.step, result.plannedSteps, result.seconds, result.psnr,
                  result.samplesPerSecond / 1e6, device->name());
-      if (!result.finished) fmt::print("stopped on request; go on with --resume\n");
+      if (!result.finished) fmt::print("stopped on request; {}\n", howToGoOn(flags->model));
     }
     // Whoever is to bake it next is told.
     if (!result.finished) throw CLI::RuntimeError(interruptedStatus());

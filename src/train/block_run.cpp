@@ -32,23 +32,25 @@ double BlockRunOptions::bytesForPhotos() const {
 }
 
 BlockRun openBlockRun(const Capture& capture, const fs::path& model, const BlockRunOptions& options,
-                      const BlockLimits& limits, const Sufficiency& enough) {
+                      const BlockDemands& demands) {
   refuseCaptureFolder(model);
   const ModelFolder folder(model);
   refuseTrainedModel(folder, options.loop);
-  if (folder.manifest()) {
-    requireTrainedOn(folder, capture);
+  const bool goesOn = folder.manifest().has_value();
+  if (goesOn) requireTrainedOn(folder, capture);
+  const double photoBudgetMiB = settledPhotoBudget(demands.photoBudgetMiB, capture, options.bytesForPhotos());
+  if (goesOn) {
     BlockGrid grid = requireGrid(folder);
     requireSameBlocks(model / "blocks.json", grid, options.blocks, options.grid);
-    return {folder, grid, true};
+    return {folder, grid, true, photoBudgetMiB};
   }
   PartitionOptions partitioning;
   partitioning.blocks = options.blocks;
   partitioning.grid = options.grid;
-  partitioning.limits = limits;
-  partitioning.enough = enough;
+  partitioning.limits = demands.limits();
+  partitioning.enough = demands.enough;
   partitioning.depthOf = KnownDepths(capture, kMostPixelsOff);
-  return {folder, cutBlocks(capture, model, partitioning), false};
+  return {folder, cutBlocks(capture, model, partitioning), false, photoBudgetMiB};
 }
 
 void writeRun(const ModelFolder& folder, const BlockTraining& on, const std::vector<ConfigField>& config,

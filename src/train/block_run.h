@@ -22,17 +22,25 @@ struct BlockRunOptions {
   double bytesForPhotos() const;
 };
 
+// What a run asks of a capture.
+struct BlockDemands {
+  std::function<BlockLimits()> limits;  // asked only where the capture is cut
+  Sufficiency enough;
+  double photoBudgetMiB = 0;  // 0: what there is memory for, see settledPhotoBudget
+};
+
 struct BlockRun {
   ModelFolder folder;
   BlockGrid grid;
   bool goesOn;  // with the model that is in the folder
+  double photoBudgetMiB;
 };
 
-// Cuts the capture into blocks, as `limits` and `enough` ask for, or takes those that are given; a run that goes on
-// stands where it stood, whatever has become of the capture's points since. Throws Error when the folder holds a
-// capture, or a model that is not to be gone on with, or one of other photos or blocks.
+// Cuts the capture into blocks, or takes those that are given; a run that goes on stands where it stood, whatever has
+// become of the capture's points since. Throws Error when the folder holds a capture, or a model that is not to be gone
+// on with, or one of other photos or blocks.
 BlockRun openBlockRun(const Capture& capture, const fs::path& model, const BlockRunOptions& options,
-                      const BlockLimits& limits, const Sufficiency& enough);
+                      const BlockDemands& demands);
 
 // What all levels of a run are trained on.
 struct BlockTraining {

@@ -1,67 +1,118 @@
 #include "representations/hash/distortion_choice.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 
 #include "base/check.h"
+#include "base/error.h"
 #include "base/log.h"
+#include "base/progress.h"
 #include "train/held_out_tiles.h"
 #include "train/schedule.h"
 
 namespace tessera {
 namespace {
 
-constexpr int64_t kJudgedBatches = 64;  // of rays
+constexpr int64_t kJudgedBatches = 64;  // of rays, at most
+constexpr const char* kRemedy = "give a number: --set distortion=0.01";
 
-// Trains for `plannedSteps`, or until `budget` says how many those are. False when asked to stop.
-bool trainProbe(HashTrainer& trainer, int64_t& plannedSteps, StepBudget budget,
-                const std::function<bool()>& stopRequested) {
-  using Clock = std::chrono::steady_clock;
-  const Clock::time_point start = Clock::now();
-  for (int64_t step = 0; plannedSteps == 0 || step < plannedSteps; ++step) {
-    if (stopRequested()) return false;
-    trainer.step(step, plannedSteps);
-    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
-    if (plannedSteps == 0) plannedSteps = budget.observe(step + 1, seconds);
+// One short training, and how far it is from what was left out.
+class Probing {
+ public:
+  Probing(HashTrainer& trainer, const DistortionProbing& options, const std::string& title)
+      : trainer_(trainer), options_(options) {
+    if (options.progress) progress_.emplace(title, 0, "steps");
   }
-  return true;
-}
 
-double judgedPsnr(HashTrainer& trainer, int64_t firstStep) {
-  HashTrainer::Fit all;
-  for (int64_t batch = 0; batch < kJudgedBatches; ++batch) {
-    const HashTrainer::Fit fit = trainer.fit(firstStep + batch);
-    all.squaredError += fit.squaredError;
-    all.channels += fit.channels;
+  // For `steps`, which a time settles where they are 0. False when asked to stop.
+  bool train(int64_t& steps) {
+    using Clock = std::chrono::steady_clock;
+    StepBudget budget(options_.minutes);
+    const Clock::time_point start = Clock::now();
+    for (int64_t step = 0; isFinite_ && (steps == 0 || step < steps); ++step) {
+      if (options_.stopRequested()) return false;
+      isFinite_ = std::isfinite(trainer_.step(step, steps).loss);
+      if (steps == 0) {
+        steps = budget.observe(step + 1, std::chrono::duration<double>(Clock::now() - start).count());
+      }
+      if (!progress_) continue;
+      progress_->setTotal(steps);
+      progress_->update(step + 1);
+    }
+    return true;
   }
-  return -10 * std::log10(std::max(1e-10, all.squaredError / std::max(1.0, all.channels)));
-}
+
+  // Nothing in `psnr` where training came to no numbers. False when asked to stop.
+  bool judge(int64_t steps, std::optional<double>& psnr) {
+    HashTrainer::Fit all;
+    for (int64_t batch = 0; isFinite_ && batch < std::min(kJudgedBatches, steps); ++batch) {
+      if (options_.stopRequested()) return false;
+      const HashTrainer::Fit fit = trainer_.fit(steps + batch);
+      all.squaredError += fit.squaredError;
+      all.channels += fit.channels;
+    }
+    if (isFinite_) psnr = psnrOf(all);
+    return true;
+  }
+
+ private:
+  HashTrainer& trainer_;
+  const DistortionProbing& options_;
+  std::optional<Progress> progress_;
+  bool isFinite_ = true;
+};
 
 }  // namespace
 
+HashConfig probedConfig(HashConfig config, double weight, int sizeDivisor) {
+  constexpr int kFewest = 64;
+  config.distortion = weight;
+  config.mostRays = std::max(kFewest, config.mostRays / sizeDivisor);
+  config.firstRays = std::clamp(config.firstRays / sizeDivisor, 1, config.mostRays);
+  config.samplesPerStep = std::max(kFewest, config.samplesPerStep / sizeDivisor);
+  config.texelsPerStep = std::max(kFewest, config.texelsPerStep / sizeDivisor);
+  return config;
+}
+
+std::optional<double> psnrOf(const HashTrainer::Fit& fit) {
+  if (fit.channels == 0) {
+    throw Error("--set distortion=auto", "", "all pixels that were left out to judge by are masked", kRemedy);
+  }
+  if (!std::isfinite(fit.squaredError)) return std::nullopt;
+  return -10 * std::log10(std::max(1e-10, fit.squaredError / fit.channels));
+}
+
 double DistortionChoice::weight() const {
   CHECK(!probes.empty());
-  return std::max_element(probes.begin(), probes.end(), [](const Probe& a, const Probe& b) { return a.psnr < b.psnr; })
-      ->weight;
+  // Nothing is less than any number.
+  const Probe& best =
+      *std::max_element(probes.begin(), probes.end(), [](const Probe& a, const Probe& b) { return a.psnr < b.psnr; });
+  if (best.psnr) return best.weight;
+  throw Error("--set distortion=auto", "", "with no weight did a short training come to numbers",
+              "lower the learning rate: --set rate=...; or " + std::string(kRemedy));
 }
 
 std::optional<DistortionChoice> chooseDistortion(Device& device, const Capture& capture, const HashConfig& config,
-                                                 const BlockGrid& grid, const DistortionProbing& probing,
-                                                 const std::function<bool()>& stopRequested) {
+                                                 const BlockGrid& grid, const DistortionProbing& probing) {
   const HeldOutTiles tiles = holdOutTiles(capture, probing.heldOutShare, static_cast<uint64_t>(config.seed));
-  DistortionChoice choice;
-  choice.steps = probing.minutes > 0 ? 0 : probing.steps;
-  for (const double weight : probing.weights) {
-    HashConfig probed = config;
-    probed.distortion = weight;
-    HashTrainer trainer(device, capture, probed, grid);
+  DistortionChoice choice = probing.known;
+  if (choice.steps == 0 && probing.minutes <= 0) choice.steps = probing.steps;
+  for (size_t i = choice.probes.size(); i < probing.weights.size(); ++i) {
+    HashTrainer trainer(device, capture, probedConfig(config, probing.weights[i], probing.sizeDivisor), grid);
+    if (i == probing.known.probes.size()) probing.begun();
     trainer.drawFrom(tiles.trained);
-    if (!trainProbe(trainer, choice.steps, StepBudget(probing.minutes), stopRequested)) return std::nullopt;
+    Probing probe(trainer, probing, fmt::format("distortion {}", probing.weights[i]));
+    if (!probe.train(choice.steps)) return std::nullopt;
     trainer.drawFrom(tiles.heldOut);
-    choice.probes.push_back({weight, judgedPsnr(trainer, choice.steps)});
-    inform("distortion {}: {:.2f} dB on pixels left out, after {} steps", weight, choice.probes.back().psnr,
-           choice.steps);
+    DistortionChoice::Probe judged{probing.weights[i], {}};
+    if (!probe.judge(choice.steps, judged.psnr)) return std::nullopt;
+    choice.probes.push_back(judged);
+    inform("distortion {}: {} on pixels left out, after {} steps", judged.weight,
+           judged.psnr ? fmt::format("{:.2f} dB", *judged.psnr) : "no numbers", choice.steps);
+    probing.probed(choice);
   }
   return choice;
 }

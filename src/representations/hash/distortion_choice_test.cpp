@@ -2,28 +2,96 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
+#include "base/error.h"
 #include "representations/hash/hash_cube.h"
+#include "train/held_out_tiles.h"
 
 namespace tessera {
 namespace {
 
-const auto goOn = [] { return false; };
+// As small as they are; a divisor makes steps of few rays of large ones.
+DistortionProbing wholeSteps() {
+  DistortionProbing probing;
+  probing.sizeDivisor = 1;
+  return probing;
+}
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 TEST(DistortionChoice, TakesTheWeightThatIsClosestToPixelsThatWereLeftOut) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
-  DistortionProbing probing;
-  probing.weights = {100, 1e-3};  // the first leaves nothing standing
+  DistortionProbing probing = wholeSteps();
+  probing.weights = {100, 1e-3, 30};  // of which two leave nothing standing
   probing.steps = 60;
+  size_t done = 0;
+  probing.probed = [&](const DistortionChoice& choice) { EXPECT_EQ(choice.probes.size(), ++done); };
   HashConfig config = smallHashConfig();
   config.distortion.reset();
-  const auto choice = chooseDistortion(*device, scene.capture(), config, cubeGrid(), probing, goOn);
+  const auto choice = chooseDistortion(*device, scene.capture(), config, cubeGrid(), probing);
   ASSERT_TRUE(choice);
+  EXPECT_EQ(done, 3u);
   EXPECT_EQ(choice->steps, 60);
-  ASSERT_EQ(choice->probes.size(), 2u);
+  ASSERT_EQ(choice->probes.size(), 3u);
   EXPECT_EQ(choice->probes[0].weight, 100);
-  EXPECT_LT(choice->probes[0].psnr + 2, choice->probes[1].psnr);
+  EXPECT_LT(*choice->probes[0].psnr + 2, *choice->probes[1].psnr);
   EXPECT_EQ(choice->weight(), 1e-3);
+}
+
+// Held-out tiles are painted over: whoever learned from them, or judged by others, would come to another number.
+TEST(DistortionChoice, LearnsFromTheOtherPixelsAloneAndIsJudgedByThoseLeftOut) {
+  CubeScene scene;
+  const HashConfig config = smallHashConfig();
+  DistortionProbing probing = wholeSteps();
+  probing.weights = {1e-3};
+  probing.steps = 40;
+  const HeldOutTiles tiles = holdOutTiles(scene.capture(), probing.heldOutShare, static_cast<uint64_t>(config.seed));
+  for (size_t i = 0; i < scene.capture().photos.size(); ++i) {
+    ImageU8 image = readImage(scene.capture().photos[i].image).image;
+    for (const PhotoTile& tile : tiles.heldOut[i].tiles) {
+      for (uint32_t y = tile.top; y < tile.bottom; ++y) {
+        for (uint32_t x = tile.left; x < tile.right; ++x) {
+          const uint8_t magenta[] = {255, 0, 255, 255};
+          std::copy(magenta, magenta + image.channels, image.at(static_cast<int>(x), static_cast<int>(y)));
+        }
+      }
+    }
+    writePng(scene.capture().photos[i].image, image);
+  }
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  const auto choice = chooseDistortion(*device, scene.capture(), config, cubeGrid(), probing);
+  ASSERT_TRUE(choice);
+
+  HashConfig probed = config;
+  probed.distortion = 1e-3;
+  HashTrainer trainer(*device, scene.capture(), probed, cubeGrid());
+  trainer.drawFrom(tiles.trained);
+  for (int64_t step = 0; step < 40; ++step) trainer.step(step, 40);
+  const HashTrainer::Fit learned = trainer.fit(40);
+  trainer.drawFrom(tiles.heldOut);
+  HashTrainer::Fit judged;
+  for (int64_t batch = 0; batch < 40; ++batch) {
+    const HashTrainer::Fit fit = trainer.fit(40 + batch);
+    judged.squaredError += fit.squaredError;
+    judged.channels += fit.channels;
+  }
+  EXPECT_EQ(choice->probes[0].psnr, psnrOf(judged));
+  EXPECT_GT(*psnrOf(learned), *psnrOf(judged) + 5) << "nobody expects magenta";
+}
+
+TEST(DistortionChoice, ProbesWithStepsOfFewRays) {
+  HashConfig config;
+  const HashConfig probed = probedConfig(config, 0.5, 8);
+  EXPECT_EQ(probed.distortion, 0.5);
+  EXPECT_EQ(probed.mostRays, config.mostRays / 8);
+  EXPECT_EQ(probed.firstRays, config.firstRays / 8);
+  EXPECT_EQ(probed.samplesPerStep, config.samplesPerStep / 8);
+  EXPECT_EQ(probed.texelsPerStep, config.texelsPerStep / 8);
+  EXPECT_EQ(probed.lattice, config.lattice);
+  config.mostRays = config.firstRays = config.samplesPerStep = config.texelsPerStep = 64;
+  probedConfig(config, 0.5, 8).check();
 }
 
 TEST(DistortionChoice, GivesAllProbesTheStepsThatTheFirstOneHasTimeFor) {
@@ -32,21 +100,52 @@ TEST(DistortionChoice, GivesAllProbesTheStepsThatTheFirstOneHasTimeFor) {
   DistortionProbing probing;
   probing.weights = {1e-2, 1e-3};
   probing.minutes = 0.01;
-  const auto choice = chooseDistortion(*device, scene.capture(), smallHashConfig(), cubeGrid(), probing, goOn);
+  int64_t asked = 0;  // before each step, and before each batch that is judged
+  probing.stopRequested = [&] { return ++asked < 0; };
+  const auto choice = chooseDistortion(*device, scene.capture(), smallHashConfig(), cubeGrid(), probing);
   ASSERT_TRUE(choice);
   EXPECT_GE(choice->steps, 16);
-  EXPECT_EQ(choice->probes.size(), 2u);
+  EXPECT_EQ(asked, 2 * (choice->steps + std::min<int64_t>(64, choice->steps)));
 }
 
-TEST(DistortionChoice, IsNoneWhenAskedToStop) {
+TEST(DistortionChoice, MakesNoProbesThatAreKnown) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   DistortionProbing probing;
-  probing.steps = 100;
+  probing.weights = {1e-2, 1e-3};
+  probing.steps = 40;
+  probing.known = {20, {{1e-2, 99}}};
   int64_t asked = 0;
-  const auto stopSoon = [&] { return ++asked > 110; };
-  EXPECT_FALSE(chooseDistortion(*device, scene.capture(), smallHashConfig(), cubeGrid(), probing, stopSoon));
-  EXPECT_EQ(asked, 111);
+  probing.stopRequested = [&] { return ++asked < 0; };
+  const auto choice = chooseDistortion(*device, scene.capture(), smallHashConfig(), cubeGrid(), probing);
+  ASSERT_TRUE(choice);
+  EXPECT_EQ(choice->probes.size(), 2u);
+  EXPECT_EQ(choice->weight(), 1e-2);
+  EXPECT_EQ(choice->steps, 20) << "as many as those that it is compared with";
+  EXPECT_EQ(asked, 20 + 20);
+}
+
+TEST(DistortionChoice, IsNoneWhenAskedToStopWhetherItTrainsOrJudges) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  for (const int64_t last : {25, 45}) {
+    DistortionProbing probing;
+    probing.steps = 30;
+    int64_t asked = 0;
+    probing.stopRequested = [&] { return ++asked > last; };
+    EXPECT_FALSE(chooseDistortion(*device, scene.capture(), smallHashConfig(), cubeGrid(), probing));
+    EXPECT_EQ(asked, last + 1);
+  }
+}
+
+TEST(DistortionChoice, TakesNoWeightThatCameToNoNumbers) {
+  EXPECT_EQ(psnrOf(HashTrainer::Fit{kNone, 300, 0}), std::nullopt);
+  EXPECT_EQ(*psnrOf(HashTrainer::Fit{3, 300, 0}), 20);
+  DistortionChoice choice{10, {{0, std::nullopt}, {1e-3, -4.0}, {1e-2, std::nullopt}}};
+  EXPECT_EQ(choice.weight(), 1e-3);
+  choice.probes.erase(choice.probes.begin() + 1);
+  EXPECT_THROW(choice.weight(), Error);
+  EXPECT_THROW(psnrOf(HashTrainer::Fit{0, 0, 0}), Error) << "nothing to judge by";
 }
 
 // What it is judged by is neither learned from nor changed by looking.
@@ -58,8 +157,7 @@ TEST(HashTrainer, ComparesRaysWithoutLearningFromThem) {
   EXPECT_GT(fit.channels, 0);
   EXPECT_EQ(fit.squaredError, again.squaredError);
   EXPECT_EQ(trained.saved(), before);
-  const double psnr = -10 * std::log10(fit.squaredError / fit.channels);
-  EXPECT_NEAR(psnr, -10 * std::log10(trained.last.squaredError), 3);
+  EXPECT_NEAR(*psnrOf(fit), -10 * std::log10(trained.last.squaredError), 3);
 }
 
 }  // namespace

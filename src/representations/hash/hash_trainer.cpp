@@ -109,8 +109,8 @@ StepReport HashTrainer::step(int64_t step, int64_t plannedSteps) {
   report.samples = counters[0];
   report.rays = counters[1];
   for (uint32_t round = 0; round < HashSamples::kRounds; ++round) report.marched += counters[2 + round];
-  report.loss = device_.read(losses_.all())[0] + inner[0] + inner[1];
   const Fit fit = comparedRays(report.rays);
+  report.loss = fit.loss + inner[0] + inner[1];
   report.squaredError = fit.squaredError / std::max(1.0, fit.channels);
   report.texels = pass_.texelsWanted();
   const double perRay = static_cast<double>(report.samples) / std::max(1u, report.rays);
@@ -132,7 +132,8 @@ HashTrainer::Fit HashTrainer::fit(int64_t step) {
 HashTrainer::Fit HashTrainer::comparedRays(uint32_t rays) {
   double weight = 0;
   for (uint32_t ray = 0; ray < rays; ++ray) weight += photoRays_.batch().weights[ray];
-  return {device_.read(losses_.all())[1], 3 * weight};
+  const std::vector<float> losses = device_.read(losses_.all());
+  return {losses[1], 3 * weight, losses[0]};
 }
 
 Slice<const float> HashTrainer::backgrounds() const {

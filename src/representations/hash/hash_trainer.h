@@ -28,7 +28,8 @@ class HashTrainer final : public Trainee {
   // How far the rays of a step are off, over colour channels, without being learned from.
   struct Fit {
     double squaredError = 0;  // sum
-    double channels = 0;
+    double channels = 0;      // of rays that no mask leaves out
+    double loss = 0;
   };
   Fit fit(int64_t step);
 

@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <nlohmann/json.hpp>
+#include <utility>
 
 #include "bake/levels.h"
 #include "base/error.h"
 #include "base/log.h"
-#include "representations/hash/distortion_choice.h"
+#include "representations/hash/find_distortion.h"
 #include "tiles/hash_payload.h"
 
 namespace tessera {
@@ -58,42 +57,20 @@ BlockLimits limitsOf(const TrainHashOptions& options) {
   return limits;
 }
 
-TrainingResult trainLevel(const ModelFolder& folder, const BlockTraining& on, HashConfig config,
-                          const TrainHashOptions& options, const TrainingLoopOptions& loop) {
-  HashTrainer trainer(on.device, on.capture, config, on.grid);
-  writeRun(folder, on, config.fields(), loop);
-  if (config.level == 0) {
-    sayWhatMemoryItTakes(on.capture, options,
-                         {config.photoBudgetMiB, trainingBytesPerBlock(config), "",
-                          "lower samples_per_step, texels_per_step or photo_budget_mib, or use --method volume with "
-                          "--resident-blocks"});
-  }
-  return runTraining(trainer, folder, loop);
+void sayMemory(const BlockTraining& on, const TrainHashOptions& options) {
+  const HashConfig& config = options.config;
+  sayWhatMemoryItTakes(on.capture, options,
+                       {config.photoBudgetMiB, trainingBytesPerBlock(config), "",
+                        "lower samples_per_step, texels_per_step or photo_budget_mib, or use --method volume with "
+                        "--resident-blocks"});
 }
 
-// Into the config, and in distortion.json how; a part of the time is spent. False when asked to stop.
-bool findDistortion(const BlockTraining& on, const fs::path& model, TrainHashOptions& options) {
-  constexpr double kShareOfProbe = 0.05, kMostMinutes = 5;  // of steps or minutes; what is killed is begun again
-  constexpr int64_t kFewestSteps = 32, kMostSteps = 1000;
-  TrainingLoopOptions& loop = options.loop;
-  DistortionProbing probing;
-  const int64_t steps = loop.steps > 0 ? loop.steps : kDefaultSteps;
-  probing.steps =
-      std::clamp(static_cast<int64_t>(kShareOfProbe * static_cast<double>(steps)), kFewestSteps, kMostSteps);
-  probing.minutes = std::min(kShareOfProbe * loop.minutes, kMostMinutes);
-  const auto start = std::chrono::steady_clock::now();
-  const std::optional<DistortionChoice> choice =
-      chooseDistortion(on.device, on.capture, options.config, on.grid, probing, loop.stopRequested);
-  if (!choice) return false;
-  options.config.distortion = choice->weight();
-  const std::chrono::duration<double, std::ratio<60>> spent = std::chrono::steady_clock::now() - start;
-  if (loop.minutes > 0) loop.minutes = std::max(0.1 * loop.minutes, loop.minutes - spent.count());
-  nlohmann::json written = {{"steps", choice->steps}, {"chosen", choice->weight()}};
-  for (const DistortionChoice::Probe& probe : choice->probes) {
-    written["probes"].push_back({{"distortion", probe.weight}, {"psnr", probe.psnr}});
-  }
-  writeFileAtomically(model / "distortion.json", written.dump(2) + "\n");
-  return true;
+TrainingResult trainLevel(const ModelFolder& folder, const BlockTraining& on, HashConfig config,
+                          const TrainingLoopOptions& loop, const std::function<void()>& begun) {
+  HashTrainer trainer(on.device, on.capture, config, on.grid);
+  writeRun(folder, on, config.fields(), loop);
+  begun();
+  return runTraining(trainer, folder, loop);
 }
 
 }  // namespace
@@ -102,18 +79,31 @@ TrainingResult trainHash(Device& device, const Capture& capture, const fs::path&
   HashConfig& config = options.config;
   config.check();
   options.loop.method = "hash";
-  const BlockRun run = openBlockRun(capture, model, options, limitsOf(options),
-                                    {kEnoughPhotos, int64_t{config.lattice} * config.lattice});
-  config.photoBudgetMiB = settledPhotoBudget(config.photoBudgetMiB, capture, options.bytesForPhotos());
+  const BlockRun run = openBlockRun(capture, model, options,
+                                    {[&] { return limitsOf(options); },
+                                     {kEnoughPhotos, int64_t{config.lattice} * config.lattice},
+                                     config.photoBudgetMiB});
+  config.photoBudgetMiB = run.photoBudgetMiB;
   const uint32_t top = config.levelShare > 0
                            ? topLevel(static_cast<uint32_t>(run.grid.columns), static_cast<uint32_t>(run.grid.rows))
                            : 0;
   for (uint32_t level = 0; level <= top; ++level) requireStepsOfScenes(levelConfig(config, level, 0));
   const BlockTraining on{device, capture, run.grid};
   if (!run.goesOn) fs::remove_all(model / "levels");  // of a run that is no more
-  if (run.goesOn && !config.distortion) config.distortion = savedConfig<HashConfig>(model).distortion;
-  if (!config.distortion && !findDistortion(on, model, options)) return {};
-  TrainingResult result = trainLevel(run.folder, on, config, options, options.loop);
+  bool memoryIsSaid = false;
+  const auto sayMemoryOnce = [&] {
+    if (!std::exchange(memoryIsSaid, true)) sayMemory(on, options);
+  };
+  if (run.goesOn && !config.distortion) {
+    config.distortion = savedConfig<HashConfig>(model).distortion;
+    inform("going on with a distortion loss of weight {}", config.distortion.value());
+  } else if (!config.distortion) {
+    if (!options.loop.resume) fs::remove(distortionFile(model));
+    if (!findDistortion(on, model, config, options.loop, sayMemoryOnce)) return {};
+  } else if (!run.goesOn) {
+    fs::remove(distortionFile(model));  // of another run
+  }
+  TrainingResult result = trainLevel(run.folder, on, config, options.loop, sayMemoryOnce);
   if (!result.finished) return result;
   LevelTraining levels;
   levels.madeFrom = [](const fs::path& folder) { return savedConfig<HashConfig>(folder).finestStep; };
@@ -121,7 +111,7 @@ TrainingResult trainHash(Device& device, const Capture& capture, const fs::path&
     const LevelGroups groups =
         groupsOfLevel(static_cast<uint32_t>(run.grid.columns), static_cast<uint32_t>(run.grid.rows), level, false);
     inform("level {}: {} blocks in {} tiles, {} steps", level, run.grid.cells(), groups.cells.size(), loop.steps);
-    return trainLevel(folder, on, levelConfig(config, level, result.step), options, loop).finished;
+    return trainLevel(folder, on, levelConfig(config, level, result.step), loop, [] {}).finished;
   };
   result.finished = trainCoarserLevels(model, top, config.levelShare, result, options.loop, levels);
   return result;

@@ -13,7 +13,8 @@ struct TrainHashOptions : BlockRunOptions {
 // Cuts the capture into blocks, or takes those that are given (blocks.json, blocks.svg, blocks.geojson), warns of those
 // that will not come out well, trains, resumes, saves; see training_loop.h. Writes config.toml and blocks.json first.
 // Before that, where the weight of the distortion loss is to be found out, short trainings of a few weights, which
-// distortion.json tells of; they count as part of `loop.minutes`. A run that goes on has found it out.
+// distortion.json tells of, and which `loop.resume` does not make again; they count as part of `loop.minutes`. A run
+// that goes on has found it out. Asked to stop meanwhile, there is no model yet.
 // Then coarser levels of detail of the same blocks, up to one whose tiles hold all; where the finest has been trained
 // on since, they are made anew. The result counts the finest level's steps; it is finished when all levels are.
 TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options);

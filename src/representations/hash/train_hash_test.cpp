@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <nlohmann/json.hpp>
-
 #include "base/error.h"
 #include "render/cpu/scene_renderer.h"
 #include "render/tile_scene.h"
@@ -127,39 +125,6 @@ TEST_F(HashTraining, LeavesCoarserLevelsOutWhereNoneAreWanted) {
   train(alone);
   EXPECT_EQ(trainedLevels<HashConfig>(scene_ / "model"), 1u);
   EXPECT_FALSE(fs::exists(scene_ / "model" / "levels"));
-}
-
-TEST_F(HashTraining, FindsTheWeightOfTheDistortionLossOutOnce) {
-  TrainHashOptions finding = options(40);
-  finding.config.levelShare = 0;
-  finding.config.distortion.reset();
-  train(finding);
-  const fs::path model = scene_ / "model";
-  const auto found = savedConfig<HashConfig>(model).distortion;
-  ASSERT_TRUE(found) << "config.toml says what a run is repeated with";
-  const nlohmann::json written = nlohmann::json::parse(readTextFile(model / "distortion.json"));
-  EXPECT_EQ(written["chosen"], *found);
-  EXPECT_EQ(written["probes"].size(), 4u);
-  EXPECT_EQ(written["steps"], 32);
-
-  // Whoever goes on need not know, whether asked to find it out or not.
-  fs::remove(model / "distortion.json");
-  finding.loop.resume = true;
-  finding.loop.steps = 50;
-  requireSameConfig(model, finding.config);
-  EXPECT_EQ(train(finding).step, 50);
-  EXPECT_EQ(savedConfig<HashConfig>(model).distortion, found);
-  EXPECT_FALSE(fs::exists(model / "distortion.json")) << "found out again";
-}
-
-TEST_F(HashTraining, LeavesNoModelWhenStoppedWhileItLooksForAWeight) {
-  TrainHashOptions finding = options(40);
-  finding.config.distortion.reset();
-  int asked = 0;
-  finding.loop.stopRequested = [&asked] { return ++asked > 10; };
-  EXPECT_FALSE(train(finding).finished);
-  EXPECT_FALSE(ModelFolder(scene_ / "model").manifest());
-  EXPECT_FALSE(fs::exists(scene_ / "model" / "distortion.json"));
 }
 
 }  // namespace

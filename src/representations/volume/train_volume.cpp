@@ -114,9 +114,11 @@ TrainingResult trainVolume(Device& device, const Capture& capture, const fs::pat
   VolumeConfig& config = options.config;
   config.check();
   options.loop.method = "volume";
-  const BlockRun run = openBlockRun(capture, model, options, limitsOf(options),
-                                    {kEnoughPhotos, int64_t{config.planes} * config.planes / 16});
-  config.photoBudgetMiB = settledPhotoBudget(config.photoBudgetMiB, capture, options.bytesForPhotos());
+  const BlockRun run = openBlockRun(capture, model, options,
+                                    {[&] { return limitsOf(options); },
+                                     {kEnoughPhotos, int64_t{config.planes} * config.planes / 16},
+                                     config.photoBudgetMiB});
+  config.photoBudgetMiB = run.photoBudgetMiB;
   const BlockTraining on{device, capture, run.grid};
   TrainingResult result;
   {
