@@ -48,7 +48,8 @@ struct HashConfig {
   // Losses
   std::string loss = "huber";
   double lossParameter = 0.1, rampShare = 0, fullGradientDistance = 0.25;
-  NumberOrAuto distortion = 0.01;  // found out before training (distortion_choice.h)
+  NumberOrAuto distortion = 0.01;  // auto: what suits the scene is found out before training (distortion_choice.h)
+  double distortionRelative = 0;   // to the squared error of colours
   double depth = 0.03, depthTolerance = 0.01, knownShare = 0.125;
   // Coarser levels of detail
   double levelShare = 0.2;

@@ -67,16 +67,6 @@ class Probing {
 
 }  // namespace
 
-HashConfig probedConfig(HashConfig config, double weight, int sizeDivisor) {
-  constexpr int kFewest = 64;
-  config.distortion = weight;
-  config.mostRays = std::max(kFewest, config.mostRays / sizeDivisor);
-  config.firstRays = std::clamp(config.firstRays / sizeDivisor, 1, config.mostRays);
-  config.samplesPerStep = std::max(kFewest, config.samplesPerStep / sizeDivisor);
-  config.texelsPerStep = std::max(kFewest, config.texelsPerStep / sizeDivisor);
-  return config;
-}
-
 std::optional<double> psnrOf(const HashTrainer::Fit& fit) {
   if (fit.channels == 0) {
     throw Error("--set distortion=auto", "", "all pixels that were left out to judge by are masked", kRemedy);
@@ -85,12 +75,12 @@ std::optional<double> psnrOf(const HashTrainer::Fit& fit) {
   return -10 * std::log10(std::max(1e-10, fit.squaredError / fit.channels));
 }
 
-double DistortionChoice::weight() const {
+double DistortionChoice::relative() const {
   CHECK(!probes.empty());
   // Nothing is less than any number.
   const Probe& best =
       *std::max_element(probes.begin(), probes.end(), [](const Probe& a, const Probe& b) { return a.psnr < b.psnr; });
-  if (best.psnr) return best.weight;
+  if (best.psnr) return best.relative;
   throw Error("--set distortion=auto", "", "with no weight did a short training come to numbers",
               "lower the learning rate: --set rate=...; or " + std::string(kRemedy));
 }
@@ -100,17 +90,21 @@ std::optional<DistortionChoice> chooseDistortion(Device& device, const Capture& 
   const HeldOutTiles tiles = holdOutTiles(capture, probing.heldOutShare, static_cast<uint64_t>(config.seed));
   DistortionChoice choice = probing.known;
   if (choice.steps == 0 && probing.minutes <= 0) choice.steps = probing.steps;
-  for (size_t i = choice.probes.size(); i < probing.weights.size(); ++i) {
-    HashTrainer trainer(device, capture, probedConfig(config, probing.weights[i], probing.sizeDivisor), grid);
+  for (size_t i = choice.probes.size(); i < probing.relatives.size(); ++i) {
+    const double relative = probing.relatives[i];
+    HashConfig probed = config;
+    probed.distortion = probing.most;
+    probed.distortionRelative = relative;
+    HashTrainer trainer(device, capture, probed, grid);
     if (i == probing.known.probes.size()) probing.begun();
     trainer.drawFrom(tiles.trained);
-    Probing probe(trainer, probing, fmt::format("distortion {}", probing.weights[i]));
+    Probing probe(trainer, probing, fmt::format("distortion_relative {}", relative));
     if (!probe.train(choice.steps)) return std::nullopt;
     trainer.drawFrom(tiles.heldOut);
-    DistortionChoice::Probe judged{probing.weights[i], {}};
+    DistortionChoice::Probe judged{relative, {}};
     if (!probe.judge(choice.steps, judged.psnr)) return std::nullopt;
     choice.probes.push_back(judged);
-    inform("distortion {}: {} on pixels left out, after {} steps", judged.weight,
+    inform("distortion_relative {}: {} on pixels left out, after {} steps", relative,
            judged.psnr ? fmt::format("{:.2f} dB", *judged.psnr) : "no numbers", choice.steps);
     probing.probed(choice);
   }

@@ -11,20 +11,14 @@
 namespace tessera {
 namespace {
 
-// As small as they are; a divisor makes steps of few rays of large ones.
-DistortionProbing wholeSteps() {
-  DistortionProbing probing;
-  probing.sizeDivisor = 1;
-  return probing;
-}
-
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 TEST(DistortionChoice, TakesTheWeightThatIsClosestToPixelsThatWereLeftOut) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
-  DistortionProbing probing = wholeSteps();
-  probing.weights = {100, 1e-3, 30};  // of which two leave nothing standing
+  DistortionProbing probing;
+  probing.relatives = {1e6, 1, 1e5};  // of which two leave nothing standing
+  probing.most = 100;
   probing.steps = 60;
   size_t done = 0;
   probing.probed = [&](const DistortionChoice& choice) { EXPECT_EQ(choice.probes.size(), ++done); };
@@ -35,17 +29,17 @@ TEST(DistortionChoice, TakesTheWeightThatIsClosestToPixelsThatWereLeftOut) {
   EXPECT_EQ(done, 3u);
   EXPECT_EQ(choice->steps, 60);
   ASSERT_EQ(choice->probes.size(), 3u);
-  EXPECT_EQ(choice->probes[0].weight, 100);
+  EXPECT_EQ(choice->probes[0].relative, 1e6);
   EXPECT_LT(*choice->probes[0].psnr + 2, *choice->probes[1].psnr);
-  EXPECT_EQ(choice->weight(), 1e-3);
+  EXPECT_EQ(choice->relative(), 1);
 }
 
 // Held-out tiles are painted over: whoever learned from them, or judged by others, would come to another number.
 TEST(DistortionChoice, LearnsFromTheOtherPixelsAloneAndIsJudgedByThoseLeftOut) {
   CubeScene scene;
   const HashConfig config = smallHashConfig();
-  DistortionProbing probing = wholeSteps();
-  probing.weights = {1e-3};
+  DistortionProbing probing;
+  probing.relatives = {1};
   probing.steps = 40;
   const HeldOutTiles tiles = holdOutTiles(scene.capture(), probing.heldOutShare, static_cast<uint64_t>(config.seed));
   for (size_t i = 0; i < scene.capture().photos.size(); ++i) {
@@ -65,7 +59,8 @@ TEST(DistortionChoice, LearnsFromTheOtherPixelsAloneAndIsJudgedByThoseLeftOut) {
   ASSERT_TRUE(choice);
 
   HashConfig probed = config;
-  probed.distortion = 1e-3;
+  probed.distortion = probing.most;
+  probed.distortionRelative = 1;
   HashTrainer trainer(*device, scene.capture(), probed, cubeGrid());
   trainer.drawFrom(tiles.trained);
   for (int64_t step = 0; step < 40; ++step) trainer.step(step, 40);
@@ -81,24 +76,11 @@ TEST(DistortionChoice, LearnsFromTheOtherPixelsAloneAndIsJudgedByThoseLeftOut) {
   EXPECT_GT(*psnrOf(learned), *psnrOf(judged) + 5) << "nobody expects magenta";
 }
 
-TEST(DistortionChoice, ProbesWithStepsOfFewRays) {
-  HashConfig config;
-  const HashConfig probed = probedConfig(config, 0.5, 8);
-  EXPECT_EQ(probed.distortion, 0.5);
-  EXPECT_EQ(probed.mostRays, config.mostRays / 8);
-  EXPECT_EQ(probed.firstRays, config.firstRays / 8);
-  EXPECT_EQ(probed.samplesPerStep, config.samplesPerStep / 8);
-  EXPECT_EQ(probed.texelsPerStep, config.texelsPerStep / 8);
-  EXPECT_EQ(probed.lattice, config.lattice);
-  config.mostRays = config.firstRays = config.samplesPerStep = config.texelsPerStep = 64;
-  probedConfig(config, 0.5, 8).check();
-}
-
 TEST(DistortionChoice, GivesAllProbesTheStepsThatTheFirstOneHasTimeFor) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   DistortionProbing probing;
-  probing.weights = {1e-2, 1e-3};
+  probing.relatives = {1, 3};
   probing.minutes = 0.01;
   int64_t asked = 0;  // before each step, and before each batch that is judged
   probing.stopRequested = [&] { return ++asked < 0; };
@@ -112,15 +94,15 @@ TEST(DistortionChoice, MakesNoProbesThatAreKnown) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   DistortionProbing probing;
-  probing.weights = {1e-2, 1e-3};
+  probing.relatives = {1, 3};
   probing.steps = 40;
-  probing.known = {20, {{1e-2, 99}}};
+  probing.known = {20, {{1, 99}}};
   int64_t asked = 0;
   probing.stopRequested = [&] { return ++asked < 0; };
   const auto choice = chooseDistortion(*device, scene.capture(), smallHashConfig(), cubeGrid(), probing);
   ASSERT_TRUE(choice);
   EXPECT_EQ(choice->probes.size(), 2u);
-  EXPECT_EQ(choice->weight(), 1e-2);
+  EXPECT_EQ(choice->relative(), 1);
   EXPECT_EQ(choice->steps, 20) << "as many as those that it is compared with";
   EXPECT_EQ(asked, 20 + 20);
 }
@@ -141,10 +123,10 @@ TEST(DistortionChoice, IsNoneWhenAskedToStopWhetherItTrainsOrJudges) {
 TEST(DistortionChoice, TakesNoWeightThatCameToNoNumbers) {
   EXPECT_EQ(psnrOf(HashTrainer::Fit{kNone, 300, 0}), std::nullopt);
   EXPECT_EQ(*psnrOf(HashTrainer::Fit{3, 300, 0}), 20);
-  DistortionChoice choice{10, {{0, std::nullopt}, {1e-3, -4.0}, {1e-2, std::nullopt}}};
-  EXPECT_EQ(choice.weight(), 1e-3);
+  DistortionChoice choice{10, {{0.3, std::nullopt}, {1, -4.0}, {3, std::nullopt}}};
+  EXPECT_EQ(choice.relative(), 1);
   choice.probes.erase(choice.probes.begin() + 1);
-  EXPECT_THROW(choice.weight(), Error);
+  EXPECT_THROW(choice.relative(), Error);
   EXPECT_THROW(psnrOf(HashTrainer::Fit{0, 0, 0}), Error) << "nothing to judge by";
 }
 

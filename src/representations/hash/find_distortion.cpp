@@ -17,8 +17,8 @@ class ProbeFile {
     for (const ConfigField& field : config.fields()) madeWith_[std::string(field.name)] = configValueText(field);
   }
 
-  // Those that were made with the same, of the weights in their order.
-  DistortionChoice read(const std::vector<double>& weights) const {
+  // Those that were made with the same, in their order.
+  DistortionChoice read(const std::vector<double>& relatives) const {
     DistortionChoice choice;
     if (!fs::exists(path_)) return choice;
     const nlohmann::json json = nlohmann::json::parse(readTextFile(path_), nullptr, false);
@@ -27,10 +27,10 @@ class ProbeFile {
       choice.steps = json.at("steps");
       for (const nlohmann::json& probe : json.at("probes")) {
         const size_t next = choice.probes.size();
-        if (next == weights.size() || probe.at("distortion") != weights[next]) return {};
+        if (next == relatives.size() || probe.at("distortion_relative") != relatives[next]) return {};
         const nlohmann::json& psnr = probe.at("psnr");
         choice.probes.push_back(
-            {weights[next], psnr.is_null() ? std::nullopt : std::optional<double>(psnr.get<double>())});
+            {relatives[next], psnr.is_null() ? std::nullopt : std::optional<double>(psnr.get<double>())});
       }
     } catch (const nlohmann::json::exception&) {
       return {};  // somebody else's
@@ -42,7 +42,7 @@ class ProbeFile {
     if (chosen) json["chosen"] = *chosen;
     json["steps"] = choice.steps;
     for (const DistortionChoice::Probe& probe : choice.probes) {
-      json["probes"].push_back({{"distortion", probe.weight},
+      json["probes"].push_back({{"distortion_relative", probe.relative},
                                 {"psnr", probe.psnr ? nlohmann::ordered_json(*probe.psnr) : nlohmann::ordered_json()}});
     }
     json["made_with"] = madeWith_;
@@ -75,7 +75,7 @@ bool findDistortion(const BlockTraining& on, const fs::path& model, HashConfig& 
                     std::function<void()> begun) {
   DistortionProbing probing = distortionProbing(loop);
   const ProbeFile file(model, config, on.grid, probing);
-  if (loop.resume) probing.known = file.read(probing.weights);
+  if (loop.resume) probing.known = file.read(probing.relatives);
   probing.progress = loop.progress;
   probing.stopRequested = loop.stopRequested;
   probing.begun = std::move(begun);
@@ -83,14 +83,17 @@ bool findDistortion(const BlockTraining& on, const fs::path& model, HashConfig& 
   const auto start = std::chrono::steady_clock::now();
   const std::optional<DistortionChoice> choice = chooseDistortion(on.device, on.capture, config, on.grid, probing);
   if (!choice) return false;
-  config.distortion = choice->weight();
-  file.write(*choice, choice->weight());
+  config.distortion = probing.most;
+  config.distortionRelative = choice->relative();
+  file.write(*choice, choice->relative());
   if (loop.minutes <= 0) return true;
   const std::chrono::duration<double, std::ratio<60>> spent = std::chrono::steady_clock::now() - start;
   const double left = loop.minutes - spent.count();
   if (left < loop.minutes / 2) {
-    warn("to find the weight of the distortion loss out has taken {:.1f} of {} minutes; next time: --set distortion={}",
-         spent.count(), loop.minutes, choice->weight());
+    warn(
+        "to find the weight of the distortion loss out has taken {:.1f} of {} minutes; next time: --set distortion={} "
+        "--set distortion_relative={}",
+        spent.count(), loop.minutes, probing.most, choice->relative());
   }
   loop.minutes = std::max(0.1 * loop.minutes, left);
   return true;

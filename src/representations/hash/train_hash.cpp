@@ -95,8 +95,10 @@ TrainingResult trainHash(Device& device, const Capture& capture, const fs::path&
     if (!std::exchange(memoryIsSaid, true)) sayMemory(on, options);
   };
   if (run.goesOn && !config.distortion) {
-    config.distortion = savedConfig<HashConfig>(model).distortion;
-    inform("going on with a distortion loss of weight {}", config.distortion.value());
+    const HashConfig saved = savedConfig<HashConfig>(model);
+    config.distortion = saved.distortion;
+    config.distortionRelative = saved.distortionRelative;
+    inform("going on with distortion={} and distortion_relative={}", *config.distortion, config.distortionRelative);
   } else if (!config.distortion) {
     if (!options.loop.resume) fs::remove(distortionFile(model));
     if (!findDistortion(on, model, config, options.loop, sayMemoryOnce)) return {};
