@@ -117,16 +117,6 @@ std::vector<uint32_t> cellsAlong(const BlockSpace& space, const Vec3d& origin, c
   return cells;
 }
 
-std::vector<PhotoTile> tilesOfPhoto(const Capture& capture, int photo) {
-  const Camera& camera = capture.cameras[static_cast<size_t>(capture.photos[static_cast<size_t>(photo)].camera)];
-  const TileCounts counts(camera);
-  std::vector<PhotoTile> tiles;
-  for (uint32_t j = 0; j < counts.rows; ++j) {
-    for (uint32_t i = 0; i < counts.columns; ++i) tiles.push_back(counts.tile(camera, photo, i, j));
-  }
-  return tiles;
-}
-
 TiledPhotos tilePhotos(const Capture& capture, const SceneFrame& frame, const BlockSpace& space) {
   const std::vector<std::vector<KnownDistance>> known = knownDistances(capture, frame, kMostPixelsOff);
   const std::vector<int> photos = capture.photosIn(Split::train);
@@ -140,9 +130,12 @@ TiledPhotos tilePhotos(const Capture& capture, const SceneFrame& frame, const Bl
     const Camera& camera = capture.cameras[capture.photos[photos[k]].camera];
     const TileCounts counts(camera);
     const std::vector<double> depths = coarseDepths(camera, counts, known[photos[k]]);
-    made[k].tiles = tilesOfPhoto(capture, photos[k]);
-    for (size_t i = 0; i < made[k].tiles.size(); ++i) {
-      made[k].cells.push_back(cellsBehind(made[k].tiles[i], capture, frame, space, depths[i]));
+    for (uint32_t j = 0; j < counts.rows; ++j) {
+      for (uint32_t i = 0; i < counts.columns; ++i) {
+        made[k].tiles.push_back(counts.tile(camera, photos[k], i, j));
+        made[k].cells.push_back(
+            cellsBehind(made[k].tiles.back(), capture, frame, space, depths[i + size_t{counts.columns} * j]));
+      }
     }
   });
   TiledPhotos all;

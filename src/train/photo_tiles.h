@@ -13,10 +13,6 @@ struct PhotoTile {
   uint32_t left = 0, top = 0, right = 1, bottom = 1;
 };
 
-// At most kTilesAcross along the photo's longer edge, about square; row after row.
-inline constexpr uint32_t kTilesAcross = 32;
-std::vector<PhotoTile> tilesOfPhoto(const Capture& capture, int photo);
-
 struct TiledPhotos {
   std::vector<PhotoTile> tiles;             // photo after photo
   std::vector<uint32_t> setOfTile;          // [tiles]
@@ -27,11 +23,11 @@ struct TiledPhotos {
 // beyond the box, whoever owns that.
 std::vector<uint32_t> cellsAlong(const BlockSpace& space, const Vec3d& origin, const Vec3d& direction, double farthest);
 
-// Of the training photos. A tile's blocks are those of kRaysAcrossTile² rays spread over it to its very corners, up to
-// its coarse depth: kDepthSlack times the farthest known distance in it and its neighbours where they hold
-// kEnoughKnown, else where rays leave the box. (A ray between may still cut the corner of another block for a fraction
-// of a tile's width.)
-inline constexpr uint32_t kRaysAcrossTile = 5;
+// Of the training photos: each is cut into at most kTilesAcross tiles along its longer edge, about square. A tile's
+// blocks are those of kRaysAcrossTile² rays spread over it to its very corners, up to its coarse depth: kDepthSlack
+// times the farthest known distance in it and its neighbours where they hold kEnoughKnown, else where rays leave the
+// box. (A ray between may still cut the corner of another block for a fraction of a tile's width.)
+inline constexpr uint32_t kTilesAcross = 32, kRaysAcrossTile = 5;
 inline constexpr double kDepthSlack = 1.2;
 inline constexpr size_t kEnoughKnown = 8;
 TiledPhotos tilePhotos(const Capture& capture, const SceneFrame& frame, const BlockSpace& space);

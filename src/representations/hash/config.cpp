@@ -84,9 +84,8 @@ std::vector<ConfigField> HashConfig::fields() {
       {"loss", "colour loss: huber, mse or charbonnier", &loss},
       {"loss_parameter", "delta of huber, epsilon of charbonnier", &lossParameter},
       {"distortion",
-       "weight of the distortion loss; auto: 0.03 at most, and for distortion_relative that of 0.3, 1, 3 and 10 which "
-       "is "
-       "best, after a short training with each, on a tenth of the training pixels that is left out",
+       "weight of the distortion loss; auto: 0.03, and for distortion_relative that of 0.3, 1, 3 and 10 which is best, "
+       "after a short training with each, on one training photo in ten that is left out",
        &distortion},
       {"distortion_relative",
        "the weight is so many times the colours' mean squared error, where that is less; 0: it is not",

@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "base/progress.h"
-#include "train/held_out_tiles.h"
+#include "train/held_out_photos.h"
 #include "train/schedule.h"
 
 namespace tessera {
@@ -45,12 +45,14 @@ class Probing {
     return true;
   }
 
-  // Nothing in `psnr` where training came to no numbers. False when asked to stop.
-  bool judge(int64_t steps, std::optional<double>& psnr) {
+  // Nothing in `psnr` where training came to no numbers. False when asked to stop. Where a budget leaves few photos in
+  // memory at a time, batches are so far apart that each photo comes up in some: in `stepsOfAllPhotos`.
+  bool judge(int64_t steps, int64_t stepsOfAllPhotos, std::optional<double>& psnr) {
     HashTrainer::Fit all;
-    for (int64_t batch = 0; isFinite_ && batch < std::min(kJudgedBatches, steps); ++batch) {
+    const int64_t batches = std::min(kJudgedBatches, steps), apart = std::max<int64_t>(1, stepsOfAllPhotos / batches);
+    for (int64_t batch = 0; isFinite_ && batch < batches; ++batch) {
       if (options_.stopRequested()) return false;
-      const HashTrainer::Fit fit = trainer_.fit(steps + batch);
+      const HashTrainer::Fit fit = trainer_.fit(steps + apart * batch);
       all.squaredError += fit.squaredError;
       all.channels += fit.channels;
     }
@@ -69,7 +71,8 @@ class Probing {
 
 std::optional<double> psnrOf(const HashTrainer::Fit& fit) {
   if (fit.channels == 0) {
-    throw Error("--set distortion=auto", "", "all pixels that were left out to judge by are masked", kRemedy);
+    throw Error("--set distortion=auto", "", "all pixels of the photos that were left out to judge by are masked",
+                kRemedy);
   }
   if (!std::isfinite(fit.squaredError)) return std::nullopt;
   return -10 * std::log10(std::max(1e-10, fit.squaredError / fit.channels));
@@ -87,7 +90,8 @@ double DistortionChoice::relative() const {
 
 std::optional<DistortionChoice> chooseDistortion(Device& device, const Capture& capture, const HashConfig& config,
                                                  const BlockGrid& grid, const DistortionProbing& probing) {
-  const HeldOutTiles tiles = holdOutTiles(capture, probing.heldOutShare, static_cast<uint64_t>(config.seed));
+  const HeldOutPhotos photos = holdOutPhotos(capture, probing.heldOutOf, static_cast<uint64_t>(config.seed));
+  const int64_t stepsOfAllPhotos = static_cast<int64_t>(capture.photosIn(Split::train).size()) * config.stepsPerPhoto;
   DistortionChoice choice = probing.known;
   if (choice.steps == 0 && probing.minutes <= 0) choice.steps = probing.steps;
   for (size_t i = choice.probes.size(); i < probing.relatives.size(); ++i) {
@@ -97,14 +101,14 @@ std::optional<DistortionChoice> chooseDistortion(Device& device, const Capture& 
     probed.distortionRelative = relative;
     HashTrainer trainer(device, capture, probed, grid);
     if (i == probing.known.probes.size()) probing.begun();
-    trainer.drawFrom(tiles.trained);
+    trainer.drawFrom(photos.trained);
     Probing probe(trainer, probing, fmt::format("distortion_relative {}", relative));
     if (!probe.train(choice.steps)) return std::nullopt;
-    trainer.drawFrom(tiles.heldOut);
+    trainer.drawFrom(photos.heldOut);
     DistortionChoice::Probe judged{relative, {}};
-    if (!probe.judge(choice.steps, judged.psnr)) return std::nullopt;
+    if (!probe.judge(choice.steps, stepsOfAllPhotos, judged.psnr)) return std::nullopt;
     choice.probes.push_back(judged);
-    inform("distortion_relative {}: {} on pixels left out, after {} steps", relative,
+    inform("distortion_relative {}: {} on photos left out, after {} steps", relative,
            judged.psnr ? fmt::format("{:.2f} dB", *judged.psnr) : "no numbers", choice.steps);
     probing.probed(choice);
   }

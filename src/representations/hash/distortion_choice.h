@@ -15,7 +15,7 @@ namespace tessera {
 struct DistortionChoice {
   struct Probe {
     double relative = 0;         // HashConfig::distortionRelative
-    std::optional<double> psnr;  // on pixels that were not trained on; nothing when training came to no numbers
+    std::optional<double> psnr;  // on photos that were not trained on; nothing when training came to no numbers
   };
   int64_t steps = 0;  // of each probe; 0: not known yet
   std::vector<Probe> probes;
@@ -26,19 +26,20 @@ struct DistortionChoice {
 
 struct DistortionProbing {
   std::vector<double> relatives{0.3, 1, 3, 10};
-  double most = 0.03;         // of the weight itself: more flattens whatever is there
-  double heldOutShare = 0.1;  // of the tiles of each photo
-  int64_t steps = 0;          // of each probe; or
-  double minutes = 0;         // > 0: of each probe: as many steps as the first one makes in this time
-  DistortionChoice known;     // probes that need not be made again
+  double most = 0.03;       // of the weight itself: more flattens whatever is there
+  uint32_t heldOutOf = 10;  // one training photo of so many is left out
+  int64_t steps = 0;        // of each probe; or
+  double minutes = 0;       // > 0: of each probe: as many steps as the first one makes in this time
+  DistortionChoice known;   // probes that need not be made again
   bool progress = false;
   std::function<bool()> stopRequested = [] { return false; };
   std::function<void()> begun = [] {};  // all that a probe needs has been allocated
   std::function<void(const DistortionChoice&)> probed = [](const DistortionChoice&) {};  // one more is done
 };
 
-// A short training for each, all with the same pixels left out, on which they are then compared. Nothing when
-// asked to stop. Throws Error as HashTrainer does, and where all pixels that are left out are masked.
+// A short training for each, all with the same photos left out, on which they are then compared, with the mean of the
+// photos' exposures. Nothing when asked to stop. Throws Error as HashTrainer does, and where there are no photos to
+// leave out, or all of their pixels are masked.
 std::optional<DistortionChoice> chooseDistortion(Device& device, const Capture& capture, const HashConfig& config,
                                                  const BlockGrid& grid, const DistortionProbing& probing);
 

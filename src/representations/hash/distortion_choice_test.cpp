@@ -6,14 +6,14 @@
 
 #include "base/error.h"
 #include "representations/hash/hash_cube.h"
-#include "train/held_out_tiles.h"
+#include "train/held_out_photos.h"
 
 namespace tessera {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-TEST(DistortionChoice, TakesTheWeightThatIsClosestToPixelsThatWereLeftOut) {
+TEST(DistortionChoice, TakesTheWeightThatIsClosestToPhotosThatWereLeftOut) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   DistortionProbing probing;
@@ -34,24 +34,19 @@ TEST(DistortionChoice, TakesTheWeightThatIsClosestToPixelsThatWereLeftOut) {
   EXPECT_EQ(choice->relative(), 1);
 }
 
-// Held-out tiles are painted over: whoever learned from them, or judged by others, would come to another number.
-TEST(DistortionChoice, LearnsFromTheOtherPixelsAloneAndIsJudgedByThoseLeftOut) {
+// Photos that are left out are painted over: whoever learned from them, or judged by others, would come to another
+// number.
+TEST(DistortionChoice, LearnsFromTheOtherPhotosAloneAndIsJudgedByThoseLeftOut) {
   CubeScene scene;
   const HashConfig config = smallHashConfig();
   DistortionProbing probing;
   probing.relatives = {1};
   probing.steps = 40;
-  const HeldOutTiles tiles = holdOutTiles(scene.capture(), probing.heldOutShare, static_cast<uint64_t>(config.seed));
+  const HeldOutPhotos photos = holdOutPhotos(scene.capture(), probing.heldOutOf, static_cast<uint64_t>(config.seed));
   for (size_t i = 0; i < scene.capture().photos.size(); ++i) {
-    ImageU8 image = readImage(scene.capture().photos[i].image).image;
-    for (const PhotoTile& tile : tiles.heldOut[i].tiles) {
-      for (uint32_t y = tile.top; y < tile.bottom; ++y) {
-        for (uint32_t x = tile.left; x < tile.right; ++x) {
-          const uint8_t magenta[] = {255, 0, 255, 255};
-          std::copy(magenta, magenta + image.channels, image.at(static_cast<int>(x), static_cast<int>(y)));
-        }
-      }
-    }
+    if (photos.heldOut[i].total() == 0) continue;
+    ImageU8 image(CubeScene::kWidth, CubeScene::kHeight, 3);
+    for (size_t k = 0; k < image.pixels.size(); ++k) image.pixels[k] = k % 3 == 1 ? 0 : 255;  // magenta
     writePng(scene.capture().photos[i].image, image);
   }
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
@@ -62,13 +57,13 @@ TEST(DistortionChoice, LearnsFromTheOtherPixelsAloneAndIsJudgedByThoseLeftOut) {
   probed.distortion = probing.most;
   probed.distortionRelative = 1;
   HashTrainer trainer(*device, scene.capture(), probed, cubeGrid());
-  trainer.drawFrom(tiles.trained);
+  trainer.drawFrom(photos.trained);
   for (int64_t step = 0; step < 40; ++step) trainer.step(step, 40);
   const HashTrainer::Fit learned = trainer.fit(40);
-  trainer.drawFrom(tiles.heldOut);
+  trainer.drawFrom(photos.heldOut);
   HashTrainer::Fit judged;
   for (int64_t batch = 0; batch < 40; ++batch) {
-    const HashTrainer::Fit fit = trainer.fit(40 + batch);
+    const HashTrainer::Fit fit = trainer.fit(40 + 2 * batch);  // 41 photos, two steps each
     judged.squaredError += fit.squaredError;
     judged.channels += fit.channels;
   }

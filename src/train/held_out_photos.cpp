@@ -1,0 +1,29 @@
+#include "train/held_out_photos.h"
+
+#include <algorithm>
+
+#include "base/check.h"
+#include "base/error.h"
+
+namespace tessera {
+
+HeldOutPhotos holdOutPhotos(const Capture& capture, uint32_t every, uint64_t seed) {
+  CHECK(every >= 2u);
+  const std::vector<int> photos = capture.photosIn(Split::train);
+  if (photos.size() < 2) {
+    throw Error(capture.root.string(), "transforms.json", "has one photo to train on, of which none can be left out",
+                "judge settings on another capture");
+  }
+  const size_t step = std::min<size_t>(every, photos.size());
+  HeldOutPhotos made{std::vector<TileShares>(capture.photos.size()), std::vector<TileShares>(capture.photos.size())};
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const size_t photo = static_cast<size_t>(photos[i]);
+    const Camera& camera = capture.cameras[static_cast<size_t>(capture.photos[photo].camera)];
+    const PhotoTile whole{photos[i], 0, 0, static_cast<uint32_t>(camera.width), static_cast<uint32_t>(camera.height)};
+    const double pixels = static_cast<double>(camera.width) * camera.height;
+    (i % step == seed % step ? made.heldOut : made.trained)[photo] = {{whole}, {pixels}};
+  }
+  return made;
+}
+
+}  // namespace tessera
