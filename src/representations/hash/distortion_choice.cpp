@@ -80,12 +80,16 @@ std::optional<double> psnrOf(const HashTrainer::Fit& fit) {
 
 double DistortionChoice::relative() const {
   CHECK(!probes.empty());
-  // Nothing is less than any number.
-  const Probe& best =
-      *std::max_element(probes.begin(), probes.end(), [](const Probe& a, const Probe& b) { return a.psnr < b.psnr; });
-  if (best.psnr) return best.relative;
-  throw Error("--set distortion=auto", "", "with no weight did a short training come to numbers",
-              "lower the learning rate: --set rate=...; or " + std::string(kRemedy));
+  std::optional<double> best, chosen;
+  for (const Probe& probe : probes) best = std::max(best, probe.psnr);  // nothing is less than any number
+  if (!best) {
+    throw Error("--set distortion=auto", "", "with no weight did a short training come to numbers",
+                "lower the learning rate: --set rate=...; or " + std::string(kRemedy));
+  }
+  for (const Probe& probe : probes) {
+    if (probe.psnr && *probe.psnr >= *best - kAsGood) chosen = std::max(chosen, std::optional<double>(probe.relative));
+  }
+  return *chosen;
 }
 
 std::optional<DistortionChoice> chooseDistortion(Device& device, const Capture& capture, const HashConfig& config,

@@ -115,6 +115,13 @@ TEST(DistortionChoice, IsNoneWhenAskedToStopWhetherItTrainsOrJudges) {
   }
 }
 
+TEST(DistortionChoice, IsTheGreatestOfThoseThatAreAsGood) {
+  const double near = DistortionChoice::kAsGood / 2, far = 2 * DistortionChoice::kAsGood;
+  EXPECT_EQ((DistortionChoice{10, {{0.3, 20 - far}, {1, 20.0}, {3, 20 - near}, {10, 20 - far}}}).relative(), 3);
+  EXPECT_EQ((DistortionChoice{10, {{3, 20.0}, {1, 20 - near}}}).relative(), 3) << "in whichever order";
+  EXPECT_EQ((DistortionChoice{10, {{1, 20.0}, {3, 20 - far}}}).relative(), 1);
+}
+
 TEST(DistortionChoice, TakesNoWeightThatCameToNoNumbers) {
   EXPECT_EQ(psnrOf(HashTrainer::Fit{kNone, 300, 0}), std::nullopt);
   EXPECT_EQ(*psnrOf(HashTrainer::Fit{3, 300, 0}), 20);

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/error.h"
 #include "representations/hash/hash_cube.h"
 #include "representations/hash/train_hash.h"
 
@@ -143,6 +144,9 @@ TEST_F(FindingDistortion, IsForgottenByATrainingThatBeginsAnew) {
   options_.loop.steps = 50;
   EXPECT_EQ(train().step, 50);
   EXPECT_EQ(savedConfig<HashConfig>(model_).distortion, 0.05);
+  // Somebody has written into config.toml.
+  writeFileAtomically(model_ / "config.toml", configToToml(options_.config.fields()));
+  EXPECT_THROW(train(), Error);
 }
 
 TEST_F(FindingDistortion, IsPartOfTheTime) {

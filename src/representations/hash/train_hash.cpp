@@ -96,6 +96,10 @@ TrainingResult trainHash(Device& device, const Capture& capture, const fs::path&
   };
   if (run.goesOn && !config.distortion) {
     const HashConfig saved = savedConfig<HashConfig>(model);
+    if (!saved.distortion) {
+      throw Error((model / "config.toml").string(), "distortion", "is auto, where a run that has begun has a number",
+                  "restore the file, or train into another folder");
+    }
     config.distortion = saved.distortion;
     config.distortionRelative = saved.distortionRelative;
     inform("going on with distortion={} and distortion_relative={}", *config.distortion, config.distortionRelative);
