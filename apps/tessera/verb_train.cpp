@@ -43,6 +43,9 @@ Config chosenConfig(const TrainFlags& flags, Config config) {
   for (const std::string& setting : flags.settings) setConfigField(config.fields(), setting);
   if (!flags.seed.empty()) setConfigField(config.fields(), "seed=" + flags.seed);
   if (!flags.residentBlocks.empty()) setConfigField(config.fields(), "resident_blocks=" + flags.residentBlocks);
+  if (flags.loop.resume && ModelFolder(flags.model).manifest()) {
+    if constexpr (requires { config.keepFound(config); }) config.keepFound(savedConfig<Config>(flags.model));
+  }
   if (flags.loop.resume) requireSameConfig(flags.model, config);
   return config;
 }

@@ -3,17 +3,13 @@
 #include <algorithm>
 
 #include "base/check.h"
-#include "base/error.h"
 
 namespace tessera {
 
 HeldOutPhotos holdOutPhotos(const Capture& capture, uint32_t every, uint64_t seed) {
   CHECK(every >= 2u);
   const std::vector<int> photos = capture.photosIn(Split::train);
-  if (photos.size() < 2) {
-    throw Error(capture.root.string(), "transforms.json", "has one photo to train on, of which none can be left out",
-                "judge settings on another capture");
-  }
+  CHECK(photos.size() >= 2u);
   const size_t step = std::min<size_t>(every, photos.size());
   HeldOutPhotos made{std::vector<TileShares>(capture.photos.size()), std::vector<TileShares>(capture.photos.size())};
   for (size_t i = 0; i < photos.size(); ++i) {

@@ -12,7 +12,7 @@ struct HeldOutPhotos {
 };
 
 // One training photo of `every`, in their order, from a place on that `seed` decides; of two or more, at least one and
-// never all. Throws Error when there is only one.
+// never all. There must be two.
 HeldOutPhotos holdOutPhotos(const Capture& capture, uint32_t every, uint64_t seed);
 
 }  // namespace tessera

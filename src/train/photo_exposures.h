@@ -15,14 +15,16 @@ class PhotoExposures {
   Slice<float> gradients() { return group_.gradients; }
   // One step of Adam; without `train` gradients are dropped.
   void step(int64_t step, float rate, bool train);
+  // Only these photos are trained on: the others' stay where the mean is.
+  void trainOn(std::vector<int> photos) { trainingPhotos_ = std::move(photos); }
+  // Puts the mean at zero, as some steps do.
+  void centre();
 
   bool allFinite() const { return group_.allFinite(device_); }
   void save(TensorSet& tensors) { tensors.add(device_, group_, true); }
   void restore(const fs::path& path, const Safetensors& file) { loadGroup(device_, path, file, group_); }
 
  private:
-  void centre();
-
   Device& device_;
   std::vector<int> trainingPhotos_;
   ParameterGroup group_;

@@ -55,7 +55,7 @@ void requireSameSettings(const fs::path& model, const std::vector<ConfigField>& 
                          const std::vector<ConfigField>& now) {
   for (size_t i = 0; i < now.size(); ++i) {
     const std::string was = configValueText(saved[i]), is = configValueText(now[i]);
-    if (was == is || now[i].isAuto()) continue;
+    if (was == is) continue;
     throw Error(model.string(), "config.toml", fmt::format("the run has {}={}, not {}", now[i].name, was, is),
                 "resume without that setting, or train into another folder");
   }

@@ -121,6 +121,16 @@ void oneOf(const char* name, const std::string& value, std::initializer_list<con
 
 }  // namespace
 
+void HashConfig::keepFound(const HashConfig& run) {
+  if (distortion) return;
+  if (!run.distortion) {
+    throw Error("config.toml", "distortion", "is auto, where a run that has begun has a number",
+                "restore the file, or train into another folder");
+  }
+  distortion = run.distortion;
+  distortionRelative = run.distortionRelative;
+}
+
 void HashConfig::check() const {
   constexpr double kTiny = 1e-12, kHuge = 1e12;
   ofPreset(preset);
@@ -170,6 +180,10 @@ void HashConfig::check() const {
   requireWithin("loss_parameter", lossParameter, kTiny, kHuge);
   if (distortion) requireWithin("distortion", *distortion, 0, kHuge);
   requireWithin("distortion_relative", distortionRelative, 0, kHuge);
+  if (!distortion && distortionRelative > 0) {
+    throw Error("--set distortion=auto", "", "finds distortion_relative out, which is given too",
+                "leave one of the two away");
+  }
   requireWithin("ramp_share", rampShare, 0, 1);
   requireWithin("full_gradient_distance", fullGradientDistance, 0, kHuge);
   requireWithin("depth", depth, 0, kHuge);

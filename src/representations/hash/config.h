@@ -58,6 +58,8 @@ struct HashConfig {
   bool exposure = true;
 
   std::vector<ConfigField> fields();
+  // What is to be found out a run that goes on has found, with these settings. Throws Error when it has not.
+  void keepFound(const HashConfig& run);
   // Throws Error naming the first setting that no model can be made of.
   void check() const;
   // Throws Error when there is no such preset.

@@ -36,7 +36,8 @@ class Probing {
       if (options_.stopRequested()) return false;
       isFinite_ = std::isfinite(trainer_.step(step, steps).loss);
       if (steps == 0) {
-        steps = budget.observe(step + 1, std::chrono::duration<double>(Clock::now() - start).count());
+        const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+        if (const int64_t fitting = budget.observe(step + 1, seconds)) steps = std::max(fitting, options_.fewestSteps);
       }
       if (!progress_) continue;
       progress_->setTotal(steps);
@@ -48,15 +49,16 @@ class Probing {
   // Nothing in `psnr` where training came to no numbers. False when asked to stop. Where a budget leaves few photos in
   // memory at a time, batches are so far apart that each photo comes up in some: in `stepsOfAllPhotos`.
   bool judge(int64_t steps, int64_t stepsOfAllPhotos, std::optional<double>& psnr) {
+    if (!isFinite_) return true;
     HashTrainer::Fit all;
-    const int64_t batches = std::min(kJudgedBatches, steps), apart = std::max<int64_t>(1, stepsOfAllPhotos / batches);
-    for (int64_t batch = 0; isFinite_ && batch < batches; ++batch) {
+    const int64_t batches = std::min(kJudgedBatches, steps), apart = (stepsOfAllPhotos + batches - 1) / batches;
+    for (int64_t batch = 0; batch < batches; ++batch) {
       if (options_.stopRequested()) return false;
       const HashTrainer::Fit fit = trainer_.fit(steps + apart * batch);
       all.squaredError += fit.squaredError;
       all.channels += fit.channels;
     }
-    if (isFinite_) psnr = psnrOf(all);
+    psnr = psnrOf(all);
     return true;
   }
 
@@ -71,7 +73,9 @@ class Probing {
 
 std::optional<double> psnrOf(const HashTrainer::Fit& fit) {
   if (fit.channels == 0) {
-    throw Error("--set distortion=auto", "", "all pixels of the photos that were left out to judge by are masked",
+    throw Error("--set distortion=auto", "",
+                "no pixel was found in the photos that were left out to judge by: they are masked, or too few photos "
+                "are in memory at a time",
                 kRemedy);
   }
   if (!std::isfinite(fit.squaredError)) return std::nullopt;
@@ -94,6 +98,9 @@ double DistortionChoice::relative() const {
 
 std::optional<DistortionChoice> chooseDistortion(Device& device, const Capture& capture, const HashConfig& config,
                                                  const BlockGrid& grid, const DistortionProbing& probing) {
+  if (capture.photosIn(Split::train).size() < 2) {
+    throw Error("--set distortion=auto", "", "there is one photo to train on, of which none can be left out", kRemedy);
+  }
   const HeldOutPhotos photos = holdOutPhotos(capture, probing.heldOutOf, static_cast<uint64_t>(config.seed));
   const int64_t stepsOfAllPhotos = static_cast<int64_t>(capture.photosIn(Split::train).size()) * config.stepsPerPhoto;
   DistortionChoice choice = probing.known;
@@ -105,10 +112,10 @@ std::optional<DistortionChoice> chooseDistortion(Device& device, const Capture& 
     probed.distortionRelative = relative;
     HashTrainer trainer(device, capture, probed, grid);
     if (i == probing.known.probes.size()) probing.begun();
-    trainer.drawFrom(photos.trained);
+    trainer.trainOn(photos.trained);
     Probing probe(trainer, probing, fmt::format("distortion_relative {}", relative));
     if (!probe.train(choice.steps)) return std::nullopt;
-    trainer.drawFrom(photos.heldOut);
+    trainer.judgeBy(photos.heldOut);
     DistortionChoice::Probe judged{relative, {}};
     if (!probe.judge(choice.steps, stepsOfAllPhotos, judged.psnr)) return std::nullopt;
     choice.probes.push_back(judged);

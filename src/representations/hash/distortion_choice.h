@@ -31,7 +31,8 @@ struct DistortionProbing {
   double most = 0.03;       // of the weight itself: more flattens whatever is there
   uint32_t heldOutOf = 10;  // one training photo of so many is left out
   int64_t steps = 0;        // of each probe; or
-  double minutes = 0;       // > 0: of each probe: as many steps as the first one makes in this time
+  double minutes = 0;       // > 0: of each probe: as many steps as the first one makes in this time,
+  int64_t fewestSteps = 0;  // or so many
   DistortionChoice known;   // probes that need not be made again
   bool progress = false;
   std::function<bool()> stopRequested = [] { return false; };

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "base/error.h"
@@ -57,13 +58,13 @@ TEST(DistortionChoice, LearnsFromTheOtherPhotosAloneAndIsJudgedByThoseLeftOut) {
   probed.distortion = probing.most;
   probed.distortionRelative = 1;
   HashTrainer trainer(*device, scene.capture(), probed, cubeGrid());
-  trainer.drawFrom(photos.trained);
+  trainer.trainOn(photos.trained);
   for (int64_t step = 0; step < 40; ++step) trainer.step(step, 40);
   const HashTrainer::Fit learned = trainer.fit(40);
-  trainer.drawFrom(photos.heldOut);
+  trainer.judgeBy(photos.heldOut);
   HashTrainer::Fit judged;
   for (int64_t batch = 0; batch < 40; ++batch) {
-    const HashTrainer::Fit fit = trainer.fit(40 + 2 * batch);  // 41 photos, two steps each
+    const HashTrainer::Fit fit = trainer.fit(40 + 3 * batch);  // 82 steps until 41 photos have come up
     judged.squaredError += fit.squaredError;
     judged.channels += fit.channels;
   }
@@ -77,11 +78,12 @@ TEST(DistortionChoice, GivesAllProbesTheStepsThatTheFirstOneHasTimeFor) {
   DistortionProbing probing;
   probing.relatives = {1, 3};
   probing.minutes = 0.01;
+  probing.fewestSteps = 32;
   int64_t asked = 0;  // before each step, and before each batch that is judged
   probing.stopRequested = [&] { return ++asked < 0; };
   const auto choice = chooseDistortion(*device, scene.capture(), smallHashConfig(), cubeGrid(), probing);
   ASSERT_TRUE(choice);
-  EXPECT_GE(choice->steps, 16);
+  EXPECT_GE(choice->steps, 32);
   EXPECT_EQ(asked, 2 * (choice->steps + std::min<int64_t>(64, choice->steps)));
 }
 
@@ -130,6 +132,51 @@ TEST(DistortionChoice, TakesNoWeightThatCameToNoNumbers) {
   choice.probes.erase(choice.probes.begin() + 1);
   EXPECT_THROW(choice.relative(), Error);
   EXPECT_THROW(psnrOf(HashTrainer::Fit{0, 0, 0}), Error) << "nothing to judge by";
+}
+
+TEST(DistortionChoice, SaysThatNoTrainingCameToNumbersRatherThanChoose) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  HashConfig config = smallHashConfig();
+  config.rate = 1e9;
+  config.networkL2 = 1e9;
+  DistortionProbing probing;
+  probing.minutes = 0.05;
+  probing.relatives = {1};
+  const auto choice = chooseDistortion(*device, scene.capture(), config, cubeGrid(), probing);
+  ASSERT_TRUE(choice);
+  EXPECT_FALSE(choice->probes[0].psnr);
+  EXPECT_THROW(choice->relative(), Error);
+}
+
+// Photos that are left out stay at the mean of the others.
+TEST(DistortionChoice, JudgesByTheMeanOfTheExposuresThatWereLearned) {
+  CubeScene::Options options;
+  options.log2Gains = {0.4, -0.4};
+  const CubeScene scene(options);
+  HashConfig config = smallHashConfig();
+  config.exposure = true;
+  config.exposureRate = 0.05;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  HashTrainer trainer(*device, scene.capture(), config, cubeGrid());
+  const HeldOutPhotos photos = holdOutPhotos(scene.capture(), 10, 0);
+  trainer.trainOn(photos.trained);
+  for (int64_t step = 0; step < 40; ++step) trainer.step(step, 40);
+  trainer.judgeBy(photos.heldOut);
+  const Bytes state = trainer.save(0);
+  const auto file = decodeSafetensors(state);
+  ASSERT_TRUE(file);
+  const std::span<const float> gains = file->require("state", "exposures", TensorType::f32).as<float>();
+  double sum = 0;
+  for (size_t photo = 0; photo < photos.trained.size(); ++photo) {
+    const bool isTrained = photos.trained[photo].total() > 0;
+    for (size_t c = 0; c < 3; ++c) {
+      if (!isTrained) EXPECT_EQ(gains[3 * photo + c], 0) << photo;
+      sum += isTrained ? gains[3 * photo + c] : 0;
+    }
+  }
+  EXPECT_NEAR(sum, 0, 1e-3);
+  EXPECT_GT(*std::max_element(gains.begin(), gains.end()), 0.05);
 }
 
 // What it is judged by is neither learned from nor changed by looking.

@@ -5,15 +5,20 @@
 #include <nlohmann/json.hpp>
 
 #include "base/log.h"
+#include "scene/block_grid_json.h"
 
 namespace tessera {
 namespace {
 
 class ProbeFile {
  public:
-  ProbeFile(const fs::path& model, HashConfig config, const BlockGrid& grid, const DistortionProbing& probing)
+  ProbeFile(const fs::path& model, HashConfig config, const BlockTraining& on, const DistortionProbing& probing)
       : path_(distortionFile(model)) {
-    madeWith_ = {{"blocks", {grid.columns, grid.rows}}, {"minutes", probing.minutes}, {"steps", probing.steps}};
+    madeWith_ = {{"capture", on.capture.root.string()},
+                 {"photos", trainingNames(on.capture)},
+                 {"blocks", blockGridToJson(on.grid)},
+                 {"minutes", probing.minutes},
+                 {"steps", probing.steps}};
     for (const ConfigField& field : config.fields()) madeWith_[std::string(field.name)] = configValueText(field);
   }
 
@@ -62,6 +67,7 @@ fs::path distortionFile(const fs::path& model) {
 
 DistortionProbing distortionProbing(const TrainingLoopOptions& loop) {
   DistortionProbing probing;
+  probing.fewestSteps = kFewestProbeSteps;
   if (loop.minutes > 0) {
     probing.minutes = std::min(kProbeShare * loop.minutes, kMostProbeMinutes);
     return probing;
@@ -74,7 +80,7 @@ DistortionProbing distortionProbing(const TrainingLoopOptions& loop) {
 bool findDistortion(const BlockTraining& on, const fs::path& model, HashConfig& config, TrainingLoopOptions& loop,
                     std::function<void()> begun) {
   DistortionProbing probing = distortionProbing(loop);
-  const ProbeFile file(model, config, on.grid, probing);
+  const ProbeFile file(model, config, on, probing);
   if (loop.resume) probing.known = file.read(probing.relatives);
   probing.progress = loop.progress;
   probing.stopRequested = loop.stopRequested;

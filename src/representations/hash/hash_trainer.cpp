@@ -116,7 +116,7 @@ StepReport HashTrainer::step(int64_t step, int64_t plannedSteps) {
   const Fit fit = comparedRays(report.rays);
   report.loss = fit.loss + inner[0] + inner[1];
   report.squaredError = fit.squaredError / std::max(1.0, fit.channels);
-  squaredError_ += (squaredError_ == 0 ? 1 : kNewInMean) * (report.squaredError - squaredError_);
+  if (fit.channels > 0) squaredError_ += (squaredError_ == 0 ? 1 : kNewInMean) * (report.squaredError - squaredError_);
   report.texels = pass_.texelsWanted();
   const double perRay = static_cast<double>(report.samples) / std::max(1u, report.rays);
   model_.adaptStep(perRay);
@@ -126,6 +126,20 @@ StepReport HashTrainer::step(int64_t step, int64_t plannedSteps) {
   if (report.rays < rays_) wanted = std::min<double>(wanted, report.rays);  // not all of them fitted
   rays_ = static_cast<uint32_t>(std::clamp<double>(std::ceil(wanted / 8) * 8, 8, config_.mostRays));
   return report;
+}
+
+void HashTrainer::trainOn(std::vector<TileShares> photos) {
+  std::vector<int> trained;
+  for (size_t photo = 0; photo < photos.size(); ++photo) {
+    if (photos[photo].total() > 0) trained.push_back(static_cast<int>(photo));
+  }
+  exposures_.trainOn(std::move(trained));
+  photoRays_.drawFrom(std::move(photos));
+}
+
+void HashTrainer::judgeBy(std::vector<TileShares> photos) {
+  exposures_.centre();
+  photoRays_.drawFrom(std::move(photos));
 }
 
 HashTrainer::Fit HashTrainer::fit(int64_t step) {

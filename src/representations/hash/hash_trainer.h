@@ -23,8 +23,9 @@ class HashTrainer final : public Trainee {
 
   HashModel& model() { return model_; }
 
-  // Takes rays from these tiles alone from now on; [photo].
-  void drawFrom(std::vector<TileShares> tiles) { photoRays_.drawFrom(std::move(tiles)); }
+  // Takes rays from these alone from now on ([photo]), to learn from them, or to be judged by them (fit).
+  void trainOn(std::vector<TileShares> photos);
+  void judgeBy(std::vector<TileShares> photos);
   // How far the rays of a step are off, over colour channels, without being learned from.
   struct Fit {
     double squaredError = 0;  // sum

@@ -77,6 +77,7 @@ TrainingResult trainLevel(const ModelFolder& folder, const BlockTraining& on, Ha
 
 TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options) {
   HashConfig& config = options.config;
+  if (options.loop.resume && ModelFolder(model).manifest()) config.keepFound(savedConfig<HashConfig>(model));
   config.check();
   options.loop.method = "hash";
   const BlockRun run = openBlockRun(capture, model, options,
@@ -94,16 +95,7 @@ TrainingResult trainHash(Device& device, const Capture& capture, const fs::path&
   const auto sayMemoryOnce = [&] {
     if (!std::exchange(memoryIsSaid, true)) sayMemory(on, options);
   };
-  if (run.goesOn && !config.distortion) {
-    const HashConfig saved = savedConfig<HashConfig>(model);
-    if (!saved.distortion) {
-      throw Error((model / "config.toml").string(), "distortion", "is auto, where a run that has begun has a number",
-                  "restore the file, or train into another folder");
-    }
-    config.distortion = saved.distortion;
-    config.distortionRelative = saved.distortionRelative;
-    inform("going on with distortion={} and distortion_relative={}", *config.distortion, config.distortionRelative);
-  } else if (!config.distortion) {
+  if (!config.distortion) {
     if (!options.loop.resume) fs::remove(distortionFile(model));
     if (!findDistortion(on, model, config, options.loop, sayMemoryOnce)) return {};
   } else if (!run.goesOn) {
