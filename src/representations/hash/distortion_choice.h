@@ -1,7 +1,7 @@
 // The weight of the distortion loss, found out for a scene: the paper sets it by hand, and outdoors another one for
 // each scene. The better a model gets, the smaller is the weight that suits it, as the colour loss falls and this one
-// does not. What is found out is therefore the weight relative to the colours' squared error, of which a short training
-// can tell what a long one needs.
+// does not. What is found out is therefore the weight relative to the colours' squared error, which changes less from
+// short trainings to long ones (how well that does: docs/benchmarks.md).
 #pragma once
 
 #include <functional>
@@ -42,7 +42,7 @@ struct DistortionProbing {
 
 // A short training for each, all with the same photos left out, on which they are then compared, with the mean of the
 // photos' exposures. Nothing when asked to stop. Throws Error as HashTrainer does, and where there are no photos to
-// leave out, or all of their pixels are masked.
+// leave out, or none of their pixels is drawn.
 std::optional<DistortionChoice> chooseDistortion(Device& device, const Capture& capture, const HashConfig& config,
                                                  const BlockGrid& grid, const DistortionProbing& probing);
 
