@@ -14,7 +14,7 @@ namespace tessera {
 //
 // Rounds, and rays that do not fit: as MarchRays.
 struct MarchBlocks {
-  static constexpr uint32_t kThrough = 0xffffffffu;  // nextInterval of a ray that has no more samples
+  static constexpr uint32_t kThrough = 0xffffffffu;  // nextStep of a ray that has no more samples
   static constexpr double kLongestStep = 1e3;        // scene units: contracted steps at the end of the world are longer
 
   const BlockSpace& space;
@@ -31,7 +31,7 @@ struct MarchBlocks {
   Slice<const uint32_t> slotOfBlock;       // optional, [blocks]
   Slice<const uint32_t> occupancy;         // [slots][cells³ / 32] bits, x fastest, least significant first
   Slice<const float> opticalDepth;         // optional, [rays]: of the samples before
-  Slice<uint32_t> nextInterval;            // optional, [rays]: as MarchRays::nextStep
+  Slice<uint32_t> nextStep;                // optional, [rays]: as MarchRays::nextStep
   Slice<uint32_t> firstSample;             // [rays + 1]
   Slice<uint32_t> sampleCount;             // [1]
   Slice<uint32_t> finishedRays;            // optional, [1]

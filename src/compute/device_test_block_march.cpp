@@ -87,7 +87,7 @@ OperationTests testsOf<MarchBlocks>() {
                                a.jitter = stage.randomInput(count, 0, 1);
                                a.occupancy = stage.input(randomOccupancy(stage.random, named.space.blocks(), share));
                                a.opticalDepth = stage.input(stage.random.floats(count, 0, 1));
-                               a.nextInterval = stage.outputWords("nextInterval", std::vector<uint32_t>(count));
+                               a.nextStep = stage.outputWords("nextStep", std::vector<uint32_t>(count));
                                for (const uint32_t most : {5u, 0u, 1u, 15u, ~0u}) {  // the fourth time not all fit
                                  a.most = most;
                                  watchSamples(stage, count, 300, a);

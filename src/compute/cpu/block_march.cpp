@@ -31,7 +31,7 @@ struct Marcher {
 
   // Adds the ray's next samples; returns the interval to go on from.
   uint32_t march(uint32_t ray, std::vector<Sample>& samples) {
-    const uint32_t first = a.nextInterval ? hostPointer(a.nextInterval)[ray] : 0;
+    const uint32_t first = a.nextStep ? hostPointer(a.nextStep)[ray] : 0;
     if (first == MarchBlocks::kThrough || a.most == 0) return first;
     if (a.opticalDepth && hostPointer(a.opticalDepth)[ray] > a.mostOpticalDepth) return first;
     Triple<double> origin, direction;
@@ -126,21 +126,21 @@ void run(Context& context, const MarchBlocks& a) {
   const size_t tasks = (rays + kRaysPerTask - 1) / kRaysPerTask;
   uint32_t* firstSample = hostPointer(a.firstSample);
   std::vector<std::vector<Sample>> made(tasks);
-  std::vector<uint32_t> nextInterval(rays);
+  std::vector<uint32_t> nextStep(rays);
   context.pool.run(tasks, [&](size_t task, int) {
     std::vector<Sample>& samples = made[task];
     samples.reserve(kRaysPerTask * 32);
     Marcher marcher{a};
     for (size_t ray = task * kRaysPerTask; ray < std::min<size_t>(rays, (task + 1) * kRaysPerTask); ++ray) {
       const size_t before = samples.size();
-      nextInterval[ray] = marcher.march(static_cast<uint32_t>(ray), samples);
+      nextStep[ray] = marcher.march(static_cast<uint32_t>(ray), samples);
       firstSample[ray + 1] = static_cast<uint32_t>(samples.size() - before);  // a count for now
     }
   });
   const uint32_t finished = countsToOffsets(firstSample, rays, a.sampleCapacity);
   if (a.finishedRays) *hostPointer(a.finishedRays) = finished;
   *hostPointer(a.sampleCount) = firstSample[rays];
-  if (a.nextInterval) std::copy(nextInterval.begin(), nextInterval.begin() + finished, hostPointer(a.nextInterval));
+  if (a.nextStep) std::copy(nextStep.begin(), nextStep.begin() + finished, hostPointer(a.nextStep));
   uint32_t* const rayOfSample = hostPointer(a.rayOfSample);
   uint32_t* const slotOfSample = hostPointer(a.slotOfSample);
   float* const positions = hostPointer(a.positions);

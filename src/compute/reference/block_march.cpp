@@ -48,14 +48,14 @@ void run(const MarchBlocks& a) {
   const Doubles opticalDepth = doubles(a.opticalDepth, rays);
   const Indices slots = indices(a.slotOfBlock, a.slotOfBlock.count);
   const Indices occupancy = indices(a.occupancy, a.occupancy.count);
-  uint32_t* const nextInterval = hostPointer(a.nextInterval);
+  uint32_t* const nextStep = hostPointer(a.nextStep);
   Doubles positions, distances, steps, middles, widths;
   uint32_t made = 0, finished = 0;
   bool full = false;
   hostPointer(a.firstSample)[0] = 0;
   for (size_t r = 0; r < rays; ++r) {
     const bool opaque = !opticalDepth.empty() && opticalDepth[r] > a.mostOpticalDepth;
-    const uint32_t first = nextInterval ? nextInterval[r] : 0;
+    const uint32_t first = nextStep ? nextStep[r] : 0;
     uint32_t next = opaque || a.most == 0 ? first : MarchBlocks::kThrough;
     std::vector<std::pair<uint32_t, BlockInterval>> samples;  // with their slots
     if (!opaque && a.most > 0 && first != MarchBlocks::kThrough) {
@@ -79,7 +79,7 @@ void run(const MarchBlocks& a) {
     full = full || made + samples.size() > a.sampleCapacity;
     if (!full) {
       ++finished;
-      if (nextInterval) nextInterval[r] = next;
+      if (nextStep) nextStep[r] = next;
       for (const auto& [slot, sample] : samples) {
         hostPointer(a.rayOfSample)[made] = static_cast<uint32_t>(r);
         hostPointer(a.slotOfSample)[made] = slot;

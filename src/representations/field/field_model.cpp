@@ -9,8 +9,7 @@
 namespace tessera {
 namespace {
 
-// Samples of a ray that a round makes: few at first, for most rays end early.
-constexpr uint32_t kMostOfRound[RaySamples::kRounds] = {8, 8, 16, 32, 64, 128, 256, 0xffffffffu};
+const std::vector<uint32_t> kMostOfRound{8, 8, 16, 32, 64, 128, 256, 0xffffffffu};
 
 }  // namespace
 
@@ -36,80 +35,43 @@ FieldModel::FieldModel(Device& device, const FieldConfig& config, const SceneFra
       frame_(frame),
       space_(config.space()),
       field_(device, config.shape(), static_cast<uint64_t>(config.seed)),
-      occupancy_(device, space_) {}
+      occupancy_(device, space_),
+      rounds_(device, kMostOfRound) {
+  CHECK(rounds_.count() == RaySamples::kRounds);
+}
 
 void FieldModel::sample(const Rays& rays, float minTransmittance, RaySamples& seen) {
   const uint32_t capacity = static_cast<uint32_t>(seen.distances.size());
   reserve(static_cast<uint32_t>(seen.firstSample.size()) - 1, capacity);
   CHECK(rays.count < seen.firstSample.size());
-  const float mostOpticalDepth = -std::log(minTransmittance);
-  const uint32_t firstsOfRound = rays.count + 1;
-  device_.fillZero(nextStep_.part(0, rays.count));
-  device_.fillZero(opticalDepth_.part(0, rays.count));
+  MarchRays march{space_};
+  march.origins = rays.origins;
+  march.directions = rays.directions;
+  march.jitter = rays.jitter;
+  march.farOfRay = rays.far;
+  march.occupancy = occupancy_.bits();
+  rounds_.begin(rays.count, capacity, minTransmittance, seen.counters);
   for (uint32_t round = 0; round < RaySamples::kRounds; ++round) {
-    const auto ofRound = [&](Array<float>& array, uint32_t columns) {
-      return array.part(size_t{round} * capacity * columns, size_t{capacity} * columns);
-    };
-    MarchRays march{space_};
-    march.rays = {rays.count, {}};
-    march.sampleCapacity = capacity;
-    march.most = kMostOfRound[round];
-    march.mostOpticalDepth = mostOpticalDepth;
-    march.origins = rays.origins;
-    march.directions = rays.directions;
-    march.jitter = rays.jitter;
-    march.farOfRay = rays.far;
-    march.occupancy = occupancy_.bits();
-    march.opticalDepth = opticalDepth_;
-    march.nextStep = nextStep_;
-    march.firstSample = roundFirst_.part(size_t{round} * firstsOfRound, firstsOfRound);
-    march.sampleCount = seen.counters.part(2 + round, 1);
-    march.positions = ofRound(positions_, 3);
-    march.distances = ofRound(distances_, 1);
-    march.steps = ofRound(steps_, 1);
+    rounds_.prepare(march, round);
+    march.positions = rounds_.part(positions_, 3, round);
+    march.distances = rounds_.part(distances_, 1, round);
     device_.run(march);
-    const Count made{capacity, march.sampleCount};
-    const Matrix<float> logDensities(ofRound(logDensities_, 1), 1);
-    field_.logDensity(made, march.positions, logDensities);
-    device_.run(OpticalDepth{march.rays, march.firstSample, logDensities, march.steps, opticalDepth_});
+    field_.logDensity(rounds_.made(round), march.positions, rounds_.logDensities(round));
+    rounds_.lookedUp(round);
   }
-
-  CompactSamples compact;
-  compact.rays = {rays.count, {}};
-  compact.rounds = RaySamples::kRounds;
-  compact.sampleCapacity = compact.keptCapacity = capacity;
-  compact.mostOpticalDepth = mostOpticalDepth;
-  compact.firstSample = roundFirst_;
-  compact.nextStep = nextStep_;
-  compact.logDensity = Matrix<float>(logDensities_, 1);
-  compact.steps = steps_;
-  compact.keptFirstSample = seen.firstSample;
-  compact.keptCount = seen.counters.part(0, 1);
-  compact.finishedRays = seen.counters.part(1, 1);
-  compact.source = source_;
-  compact.rayOfSample = seen.rayOfSample;
-  device_.run(compact);
-
-  const auto gather = [&](Array<float>& from, Array<float>& to, uint32_t columns) {
-    device_.run(GatherRows{seen.samples(), source_, Matrix<float>(from, columns), Matrix<float>(to, columns)});
-  };
-  gather(positions_, seen.positions, 3);
-  gather(distances_, seen.distances, 1);
-  gather(steps_, seen.steps, 1);
+  rounds_.keepSeen(seen.firstSample, seen.rayOfSample);
+  rounds_.gather(positions_, seen.positions, 3);
+  rounds_.gather(distances_, seen.distances, 1);
+  rounds_.gatherSteps(seen.steps);
 }
 
 void FieldModel::reserve(uint32_t rays, uint32_t samples) {
+  const size_t all = size_t{rounds_.count()} * samples;
   field_.reserve(samples);
-  if (nextStep_.size() < rays || !roundFirst_.size()) {
-    nextStep_ = device_.array<uint32_t>(rays);
-    opticalDepth_ = device_.array<float>(rays);
-    roundFirst_ = device_.array<uint32_t>(size_t{RaySamples::kRounds} * (rays + 1));
-  }
-  if (source_.size() < samples) {
-    const size_t all = size_t{RaySamples::kRounds} * samples;
-    source_ = device_.array<uint32_t>(samples);
+  rounds_.reserve(rays, samples);
+  if (distances_.size() < all) {
     positions_ = device_.array<float>(all * 3);
-    for (Array<float>* perSample : {&distances_, &steps_, &logDensities_}) *perSample = device_.array<float>(all);
+    distances_ = device_.array<float>(all);
   }
 }
 

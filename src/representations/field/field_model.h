@@ -3,6 +3,7 @@
 
 #include "field/radiance_field.h"
 #include "representations/field/config.h"
+#include "train/march_rounds.h"
 #include "train/occupancy_grid.h"
 #include "train/scene_frame.h"
 
@@ -32,9 +33,7 @@ class FieldModel {
     uint32_t count;
     Slice<const float> origins, directions, jitter, far;
   };
-  // Finds the samples of rays that can be seen: those in front of the point where transmittance has fallen below
-  // `minTransmittance`. Marches in rounds from the front and looks densities up in between, so that what lies behind
-  // surfaces costs nothing. Rays whose samples do not fit are not finished, nor are those after them.
+  // Finds the samples of rays that can be seen (train/march_rounds.h).
   void sample(const Rays& rays, float minTransmittance, RaySamples& seen);
 
   void refreshOccupancy(uint32_t uniform, uint32_t occupied, uint64_t seed);
@@ -61,9 +60,8 @@ class FieldModel {
   RadianceField field_;
   OccupancyGrid occupancy_;
 
-  // Of marching, all rounds.
-  Array<uint32_t> nextStep_, roundFirst_, source_;
-  Array<float> opticalDepth_, positions_, distances_, steps_, logDensities_;
+  MarchRounds rounds_;
+  Array<float> positions_, distances_;  // what marches make, all rounds
 };
 
 // A trained model for drawing, from its folder.

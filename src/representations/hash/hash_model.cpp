@@ -15,8 +15,7 @@
 namespace tessera {
 namespace {
 
-// Samples of a ray that a round makes: few at first, for most rays end early.
-constexpr uint32_t kMostOfRound[HashSamples::kRounds] = {8, 16, 32, 64, 128, 0xffffffffu};
+const std::vector<uint32_t> kMostOfRound{8, 16, 32, 64, 128, 0xffffffffu};
 
 constexpr uint32_t kLeastChunk = 1 << 12;  // points of the occupancy that are looked at together
 
@@ -53,7 +52,9 @@ HashModel::HashModel(Device& device, const HashConfig& config, const BlockGrid& 
       direction_(device, "direction.network",
                  initialWeights(config.directionShape(), mix64(static_cast<uint64_t>(config.seed) + 2), 0xd1),
                  forTraining),
-      seen_(space_.blocks(), true) {
+      seen_(space_.blocks(), true),
+      rounds_(device, kMostOfRound) {
+  CHECK(rounds_.count() == HashSamples::kRounds);
   // In widths of a domain: the diagonal of the box, and a contracted block from end to end.
   const double widths = std::hypot(space_.columns, space_.rows, 1) + 4;
   const double steps = widths / (config.longestStep() * config.shortestStep);
@@ -85,95 +86,55 @@ MarchSpace HashModel::occupancySpace(uint32_t block) const {
 void HashModel::reserve(uint32_t rays, uint32_t samples, uint32_t texels) {
   fields_.reserve(samples, std::max(texels, 8 * std::min(samples, kLeastChunk)));
   if (!zero_.size()) zero_ = device_.array<uint32_t>(1);
-  if (nextInterval_.size() < rays || !roundFirst_.size()) {
-    nextInterval_ = device_.array<uint32_t>(rays);
-    opticalDepth_ = device_.array<float>(rays);
-    roundFirst_ = device_.array<uint32_t>(size_t{HashSamples::kRounds} * (rays + size_t{1}));
-  }
-  if (source_.size() < samples) {
-    const size_t all = size_t{HashSamples::kRounds} * samples;
-    source_ = device_.array<uint32_t>(samples);
+  const size_t all = size_t{rounds_.count()} * samples;
+  rounds_.reserve(rays, samples);
+  if (distances_.size() < all) {
     for (Array<uint32_t>* words : {&slots_, &rays_}) *words = device_.array<uint32_t>(all);
     positions_ = device_.array<float>(all * 3);
-    for (Array<float>* one : {&distances_, &steps_, &middles_, &widths_, &logDensities_}) {
-      *one = device_.array<float>(all);
-    }
+    for (Array<float>* one : {&distances_, &middles_, &widths_}) *one = device_.array<float>(all);
   }
 }
 
 void HashModel::sample(const Rays& rays, float minTransmittance, HashSamples& seen) {
   const uint32_t capacity = static_cast<uint32_t>(seen.distances.size());
-  CHECK(source_.size() >= capacity);
   CHECK(rays.count < seen.firstSample.size());
-  const float mostOpticalDepth = -std::log(minTransmittance);
-  const size_t firstsOfRound = rays.count + size_t{1};
-  device_.fillZero(nextInterval_.part(0, rays.count));
-  device_.fillZero(opticalDepth_.part(0, rays.count));
+  MarchBlocks march{space_};
+  march.cells = static_cast<uint32_t>(config_.occupancyResolution);
+  march.step = static_cast<float>(stepScale_) * config_.longestStep();
+  march.origins = rays.origins;
+  march.directions = rays.directions;
+  march.jitter = rays.jitter;
+  march.nearOfRay = rays.near;
+  march.farOfRay = rays.far;
+  march.occupancy = occupied_;
+  rounds_.begin(rays.count, capacity, minTransmittance, seen.counters.part(0, 2 + HashSamples::kRounds));
   for (uint32_t round = 0; round < HashSamples::kRounds; ++round) {
-    const auto ofRound = [&](auto& array, uint32_t columns) {
-      return array.part(size_t{round} * capacity * columns, size_t{capacity} * columns);
-    };
-    MarchBlocks march{space_};
-    march.cells = static_cast<uint32_t>(config_.occupancyResolution);
-    march.step = static_cast<float>(stepScale_) * config_.longestStep();
-    march.rays = {rays.count};
-    march.sampleCapacity = capacity;
-    march.most = kMostOfRound[round];
-    march.mostOpticalDepth = mostOpticalDepth;
-    march.origins = rays.origins;
-    march.directions = rays.directions;
-    march.jitter = rays.jitter;
-    march.nearOfRay = rays.near;
-    march.farOfRay = rays.far;
-    march.occupancy = occupied_;
-    march.opticalDepth = opticalDepth_;
-    march.nextInterval = nextInterval_;
-    march.firstSample = roundFirst_.part(round * firstsOfRound, firstsOfRound);
-    march.sampleCount = seen.counters.part(2 + round, 1);
-    march.rayOfSample = ofRound(rays_, 1);
-    march.slotOfSample = ofRound(slots_, 1);
-    march.positions = ofRound(positions_, 3);
-    march.distances = ofRound(distances_, 1);
-    march.steps = ofRound(steps_, 1);
-    march.middles = ofRound(middles_, 1);
-    march.widths = ofRound(widths_, 1);
+    rounds_.prepare(march, round);
+    march.rayOfSample = rounds_.part(rays_, 1, round);
+    march.slotOfSample = rounds_.part(slots_, 1, round);
+    march.positions = rounds_.part(positions_, 3, round);
+    march.distances = rounds_.part(distances_, 1, round);
+    march.middles = rounds_.part(middles_, 1, round);
+    march.widths = rounds_.part(widths_, 1, round);
     device_.run(march);
-    const Count made{capacity, march.sampleCount};
+    const Count made = rounds_.made(round);
     const Matrix<const float> features = fields_.forward({made, march.slotOfSample, march.positions}, false);
-    const Matrix<float> logDensities(ofRound(logDensities_, 1), 1);
+    const Matrix<float> logDensities = rounds_.logDensities(round);
     device_.fillZero(logDensities.data);
     device_.run(AddColumns{made, Matrix<const float>(features.data, 1, features.rowStride), logDensities});
-    device_.run(OpticalDepth{march.rays, march.firstSample, logDensities, march.steps, opticalDepth_});
+    rounds_.lookedUp(round);
     device_.run(GatherRows{{1},
                            zero_,
                            Matrix<const float>(asFloats(fields_.texelCounter()), 1),
                            Matrix<float>(asFloats(seen.counters.part(2 + HashSamples::kRounds + round, 1)), 1)});
   }
-
-  CompactSamples compact;
-  compact.rays = {rays.count};
-  compact.rounds = HashSamples::kRounds;
-  compact.sampleCapacity = compact.keptCapacity = capacity;
-  compact.mostOpticalDepth = mostOpticalDepth;
-  compact.firstSample = roundFirst_;
-  compact.nextStep = nextInterval_;
-  compact.logDensity = Matrix<float>(logDensities_, 1);
-  compact.steps = steps_;
-  compact.keptFirstSample = seen.firstSample;
-  compact.keptCount = seen.counters.part(0, 1);
-  compact.finishedRays = seen.counters.part(1, 1);
-  compact.source = source_;
-  compact.rayOfSample = seen.rayOfSample;
-  device_.run(compact);
-  const auto gather = [&](const Slice<float>& from, const Slice<float>& to, uint32_t columns) {
-    device_.run(GatherRows{seen.samples(), source_, Matrix<float>(from, columns), Matrix<float>(to, columns)});
-  };
-  gather(asFloats(slots_.all()), asFloats(seen.slotOfSample.all()), 1);
-  gather(positions_, seen.positions, 3);
-  gather(distances_, seen.distances, 1);
-  gather(steps_, seen.steps, 1);
-  gather(middles_, seen.middles, 1);
-  gather(widths_, seen.widths, 1);
+  rounds_.keepSeen(seen.firstSample, seen.rayOfSample);
+  rounds_.gather(asFloats(slots_.all()), asFloats(seen.slotOfSample.all()), 1);
+  rounds_.gather(positions_, seen.positions, 3);
+  rounds_.gather(distances_, seen.distances, 1);
+  rounds_.gatherSteps(seen.steps);
+  rounds_.gather(middles_, seen.middles, 1);
+  rounds_.gather(widths_, seen.widths, 1);
 }
 
 void HashModel::adaptStep(double samplesPerRay) {
@@ -195,7 +156,7 @@ void HashModel::exclude(uint32_t block, const std::vector<bool>& visible) {
 
 void HashModel::refreshOccupancy(bool everything, uint64_t seed) {
   // As many points as have room for all of their corners: what has none would count as fog.
-  const uint32_t chunk = std::min(static_cast<uint32_t>(source_.size()), fields_.roomForTexels() / 8);
+  const uint32_t chunk = std::min(rounds_.sampleCapacity(), fields_.roomForTexels() / 8);
   CHECK(chunk >= 1u);
   if (slotOfPoint_.size() < chunk) slotOfPoint_ = device_.array<uint32_t>(chunk);
   for (uint32_t block = 0; block < space_.blocks(); ++block) {

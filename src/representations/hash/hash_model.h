@@ -6,6 +6,7 @@
 #include "representations/hash/hash_fields.h"
 #include "scene/block_grid.h"
 #include "train/block_frame.h"
+#include "train/march_rounds.h"
 #include "train/occupancy_grid.h"
 
 namespace tessera {
@@ -49,9 +50,7 @@ class HashModel {
     uint32_t count;
     Slice<const float> origins, directions, jitter, near, far;  // the last three optional
   };
-  // Finds the samples of rays that can be seen: those in front of the point where transmittance has fallen below
-  // `minTransmittance`. Marches in rounds from the front and looks densities up in between, so that what lies behind
-  // surfaces costs little. Rays whose samples do not fit are not finished, nor are those after them.
+  // Finds the samples of rays that can be seen (train/march_rounds.h).
   void sample(const Rays& rays, float minTransmittance, HashSamples& seen);
 
   // Steps of rays, relative to the longest (the paper's γ).
@@ -87,9 +86,10 @@ class HashModel {
   std::vector<bool> seen_;  // [blocks]: by any photo
   double stepScale_ = 1;
 
-  // Of marching, all rounds.
-  Array<uint32_t> nextInterval_, roundFirst_, source_, slots_, rays_, zero_;
-  Array<float> opticalDepth_, positions_, distances_, steps_, middles_, widths_, logDensities_;
+  MarchRounds rounds_;
+  Array<uint32_t> slots_, rays_;  // what marches make, all rounds
+  Array<float> positions_, distances_, middles_, widths_;
+  Array<uint32_t> zero_;
   Array<uint32_t> slotOfPoint_;  // of occupancy's points
 };
 
