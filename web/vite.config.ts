@@ -8,5 +8,6 @@ export default defineConfig({
     chunkSizeWarningLimit: 1000,
     rollupOptions: { input: ['index.html', 'plain.html'] },
   },
+  server: { fs: { allow: ['..'] } }, // ../shaders
   test: { testTimeout: 60000, hookTimeout: 60000 },
 });
