@@ -107,8 +107,8 @@ distortion() {
   for capture in fox city; do
     file=$work/$capture-auto/distortion.json
     trained "$capture-auto" "$capture" --method hash ${blocks[$capture]} --set distortion=auto --steps "$steps" --set level_share=0
-    echo "$capture: $(judged "$capture-auto" "$capture") dB with distortion_relative=$(jq .chosen "$file"); after" \
-      "$(jq -r '"\(.steps) steps " + ([.probes[] | "\(.distortion_relative): \(if .psnr then .psnr * 100 | round / 100 else "no" end) dB"] | join(", "))' "$file")"
+    echo "$capture: $(judged "$capture-auto" "$capture") dB with distortion=$(jq .chosen "$file"); after" \
+      "$(jq -r '"\(.steps) steps " + ([.probes[] | "\(.distortion): \(if .psnr then .psnr * 100 | round / 100 else "no" end) dB"] | join(", "))' "$file")"
     best=0
     for weight in 0.001 0.01 0.03; do
       trained "$capture-distortion-$weight" "$capture" --method hash ${blocks[$capture]} --set distortion="$weight" --steps "$steps" \

@@ -42,9 +42,9 @@ void addBakeVerb(CLI::App& app) {
   verb->add_option("--background", flags->options.background,
                    "red, green and blue where no photo looked; default: a hazy sky")
       ->check(CLI::Range(0.0, 1.0));
-  verb->add_option(
-          "--cells", flags->options.cells,
-          "of hash: cells of a block's occupancy along an edge, a multiple of 8; 0: three times the lattice's, up to 384")
+  verb->add_option("--cells", flags->options.cells,
+                   "of hash: cells of a block's occupancy along an edge, a multiple of 8; 0: three times the "
+                   "lattice's, up to 384 or the lattice's")
       ->capture_default_str()
       ->check(CLI::Range(0u, kMostOccupancyCells))
       ->check(CLI::Validator(

@@ -29,12 +29,12 @@ std::string formattedSeconds(double seconds) {
   return seconds < 1 ? fmt::format("{:.1f} ms", seconds * 1000) : fmt::format("{:.2f} s", seconds);
 }
 
-// Rendered z-depth; NaN where next to nothing was drawn.
+// Rendered z-depth; NaN where next to nothing was drawn, or nothing but what lies behind everything.
 ImageF normalisedDepth(const RenderedView& view) {
   ImageF depth = view.depth;
   for (size_t i = 0; i < depth.pixels.size(); ++i) {
     const float opacity = view.opacity.pixels[i];
-    depth.pixels[i] = opacity > 0.05f ? depth.pixels[i] / opacity : std::nanf("");
+    depth.pixels[i] = opacity > 0.05f && depth.pixels[i] > 0 ? depth.pixels[i] / opacity : std::nanf("");
   }
   return depth;
 }

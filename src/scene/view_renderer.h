@@ -13,7 +13,8 @@ namespace tessera {
 struct RenderedView {
   ImageF colour;   // 3 channels, premultiplied by opacity, in the trained sRGB space
   ImageF opacity;  // 1 channel
-  ImageF depth;    // 1 channel: expected z-depth along the optical axis, premultiplied by opacity
+  // 1 channel: expected z-depth along the optical axis, premultiplied by opacity; 0 where nothing stands
+  ImageF depth;
 };
 
 // The picture that people see: 3 channels, opaque.

@@ -49,7 +49,13 @@ struct ContentLimits {
 
 inline constexpr uint32_t kMostStored = 606 * 606;                 // macroblocks in a picture of 16383 pixels a side
 inline constexpr uint32_t kMostLayers = 8, kMostLayerWidth = 256;  // of a network
+inline constexpr uint32_t kMostNetworkVectors = 4096;              // of four numbers, as shaders take them
 inline constexpr float kFarthestInScene = 1e7f;                    // scene units
+
+// Of four numbers, that a layer takes in a shader: biases, and weights for each input.
+inline uint32_t networkVectors(uint32_t inputs, uint32_t outputs) {
+  return (outputs + 3) / 4 * (1 + inputs);
+}
 
 // What a network takes in memory.
 inline uint64_t bytesInMemory(const std::vector<DenseLayer>& network) {

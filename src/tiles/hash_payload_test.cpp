@@ -160,6 +160,12 @@ TEST(HashPayload, NamesTheRuleThatIsBroken) {
   names("the step is out of bounds", [](HashContent& c) { c.step = 0; });
   names("the step is out of bounds", [&](HashContent& c) { c.step = nan; });
   names("the network's layers do not follow one another", [](HashContent& c) { c.network[0].inputs = 34; });
+  names("the network is larger than a shader takes", [](HashContent& c) {
+    const auto layer = [](uint32_t inputs, uint32_t outputs) {
+      return DenseLayer{inputs, outputs, std::vector<float>(size_t{inputs} * outputs), std::vector<float>(outputs)};
+    };
+    c.network = {layer(23, 128), layer(128, 128), layer(128, 3)};
+  });
   names("there is no part", [](HashContent& c) { c.parts.clear(); });
   names("its logits are not those of its tables", [](HashContent& c) { c.logits = {1, 2, 3}; });
   names("a logit is out of bounds", [&](HashContent& c) { c.logits = {1, 2, 3, nan}; });

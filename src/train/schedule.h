@@ -9,13 +9,21 @@
 namespace tessera {
 
 // Warm-up, then constant until `constantFraction` of the steps, then an exponential fall to `finalFactor` at the end.
+// Or, `linear`, from 0 at step 0 in a line to `rate` after the warm-up, and in another to 0 at the end (NGP-RT's).
 struct RateSchedule {
   double rate = 1e-2;
   double finalFactor = 0.03;
   double constantFraction = 0.4;
   int warmUpSteps = 20;
+  bool linear = false;
 
+  // While `steps` is 0, nobody knows how many there will be, and nothing falls.
   double at(int64_t step, int64_t steps) const {
+    if (linear) {
+      const auto now = static_cast<double>(step), all = static_cast<double>(steps);
+      if (step < warmUpSteps) return rate * now / warmUpSteps;
+      return steps > 0 ? rate * std::max(0.0, all - now) / std::max(1.0, all - warmUpSteps) : rate;
+    }
     double value = rate * std::min(1.0, static_cast<double>(step + 1) / (warmUpSteps + 1));
     const double fraction = steps > 0 ? static_cast<double>(step) / static_cast<double>(steps) : 0.0;
     if (fraction > constantFraction)

@@ -31,6 +31,21 @@ TEST(RateSchedule, DoesNotFallWhileTheNumberOfStepsIsUnknown) {
   EXPECT_EQ(schedule().at(1000000, 0), 0.5);
 }
 
+// Invariant 12 of NGP-RT.
+TEST(RateSchedule, RisesAndFallsInLinesWhereItIsThePapers) {
+  RateSchedule paper;
+  paper.rate = 0.01;
+  paper.warmUpSteps = 1000;
+  paper.linear = true;
+  EXPECT_EQ(paper.at(0, 100000), 0);
+  EXPECT_NEAR(paper.at(500, 100000), 0.005, 1e-12);
+  EXPECT_NEAR(paper.at(1000, 100000), 0.01, 1e-12);
+  EXPECT_NEAR(paper.at(50500, 100000), 0.005, 1e-12);
+  EXPECT_EQ(paper.at(100000, 100000), 0);
+  EXPECT_EQ(paper.at(5000, 0), 0.01) << "nobody knows yet how far it is";
+  EXPECT_GT(paper.at(400, 500), 0) << "a short training";
+}
+
 // Steps that take `perStep` seconds, until the number of steps is told.
 int64_t stepsOf(StepBudget budget, double perStep, double slowStart, int64_t* toldAt) {
   for (int64_t step = 1; step < 1000000; ++step) {

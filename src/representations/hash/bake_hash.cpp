@@ -288,7 +288,23 @@ std::vector<DenseLayer> networkOf(HashModel& model) {
   return layers;
 }
 
+float stepOf(const HashModel& model) {
+  return static_cast<float>(model.stepScale()) * model.config().longestStep();
+}
+
 }  // namespace
+
+void requireBakeable(const HashModel& model) {
+  if (model.config().mixesByNetwork()) {
+    throw Error("--set aggregation=mlp", "", "a network for each sample cannot be baked", "train with attention");
+  }
+  const float step = stepOf(model);
+  if (step >= kShortestHashStep && step <= kLongestHashStep) return;
+  throw Error(fmt::format("--set step={}", model.config().step), "",
+              fmt::format("rays take steps of {} of a block, where scenes have {} to {}", step, kShortestHashStep,
+                          kLongestHashStep),
+              "train with another one");
+}
 
 std::vector<OccupancyBits> findSeenCells(HashModel& model, const Capture& capture, const BakeHashOptions& options) {
   const uint32_t lattice = model.fields().lattice().voxels;
@@ -329,9 +345,7 @@ HashPart bakeHashPart(HashModel& model, uint32_t block, const OccupancyBits& see
 
 HashContent bakeHashGroup(HashModel& model, const std::vector<uint32_t>& blocks,
                           const std::vector<OccupancyBits>& seen) {
-  if (model.config().mixesByNetwork()) {
-    throw Error("--set aggregation=mlp", "", "a network for each sample cannot be baked", "train with attention");
-  }
+  requireBakeable(model);
   const AttentionShape& attention = model.fields().attention();
   HashContent content;
   content.weights = attention.weights == AttentionWeights::none     ? LevelWeights::none
@@ -340,13 +354,7 @@ HashContent bakeHashGroup(HashModel& model, const std::vector<uint32_t>& blocks,
   if (!attention.varies && attention.logits() > 0) {
     content.logits = model.device().read(model.fields().logits().values.all());
   }
-  content.step = static_cast<float>(model.stepScale()) * model.config().longestStep();
-  if (content.step < kShortestHashStep || content.step > kLongestHashStep) {
-    throw Error(fmt::format("--set step={}", model.config().step), "",
-                fmt::format("rays take steps of {} of a block, where scenes have {} to {}", content.step,
-                            kShortestHashStep, kLongestHashStep),
-                "train with another one");
-  }
+  content.step = stepOf(model);
   content.isWhole = model.config().background == "learned";
   content.network = networkOf(model);
   for (const uint32_t block : blocks) content.parts.push_back(bakeHashPart(model, block, seen[block]));

@@ -14,8 +14,8 @@ namespace tessera {
 
 struct BakeHashOptions : BakeOptions {
   int dilation = 1;  // cells around those that are seen are kept, too
-  // Of a finest block's occupancy along an edge, a multiple of 8, and half as many for each coarser level; 0: three
-  // times as many as the lattice has corners, up to 384.
+  // Of a finest block's occupancy along an edge, a multiple of 8, and half as many for each coarser level; 0: at each
+  // level three times as many as its lattice has corners, up to 384 or as many as those.
   uint32_t cells = 0;
 };
 
@@ -23,11 +23,14 @@ struct BakeHashOptions : BakeOptions {
 using HashLevelModels = std::function<std::unique_ptr<HashModel>(uint32_t level)>;
 
 // Writes the scene folder; tileset.json last. A function of models, capture and options. Throws Error when a file
-// cannot be written, and for a model that mixes levels by a network for each sample.
+// cannot be written, and as below.
 BakedScene bakeHash(const HashLevelModels& models, uint32_t levels, const Capture& capture, const fs::path& scene,
                     const BakeHashOptions& options);
 
-// The steps of it. Which cells of each block hold anything that a training photo sees through pixels that no mask
+// The steps of it. Throws Error for a model that scenes cannot hold: that mixes levels by a network for each sample, or
+// whose steps are out of bounds.
+void requireBakeable(const HashModel& model);
+// Which cells of each block hold anything that a training photo sees through pixels that no mask
 // leaves out, dilated: [blocks]. Of a surround of its own also what is seen beside the photos. Throws Error when a mask
 // cannot be read.
 std::vector<OccupancyBits> findSeenCells(HashModel& model, const Capture& capture, const BakeHashOptions& options);

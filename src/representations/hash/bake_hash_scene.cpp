@@ -11,6 +11,7 @@ namespace {
 // Writes the contents of a level.
 void bakeLevel(HashModel& model, uint32_t level, const Capture& capture, const BakeHashOptions& options,
                SceneWriter& scene) {
+  requireBakeable(model);
   const std::vector<OccupancyBits> seen = findSeenCells(model, capture, options);
   const bool surround = model.space().blocks() > model.space().cells();
   const LevelGroups groups = groupsOfLevel(static_cast<uint32_t>(model.grid().columns),

@@ -233,7 +233,6 @@ TEST_F(BakedScenes, LookAsTheirModelsDo) {
       SceneRendererSettings settings;
       settings.threads = 2;
       settings.selection.mostPixels = 0;
-      settings.march.minTransmittance = 2e-3f;
       HashRenderer tiles(opened.frame, std::move(opened.tree), std::move(opened.source), settings);
       HashModelRenderer model(trained.model());
       const Capture& capture = scene.capture();
@@ -294,11 +293,14 @@ TEST(BakeHash, LeavesOutEntriesThatNoSeenSampleReads) {
   }
 }
 
-TEST(BakeHash, RefusesModelsThatMixByANetwork) {
+TEST_F(BakedScenes, AreNotMadeOfModelsThatMixByANetworkWhichIsSaidBeforePhotosAreLookedThrough) {
   HashConfig config = smallHashConfig();
   config.aggregation = "mlp";
   const CubeScene scene;
   TrainedHashCube trained(scene, config, cubeGrid(), 0);
+  BakeHashOptions options;
+  options.onPhoto = [](int64_t, int64_t) { ADD_FAILURE() << "looked"; };
+  EXPECT_THROW(bakeHash(onlyModel(trained, folder_), 1, scene.capture(), folder_ / "scene", options), Error);
   EXPECT_THROW(bakeHashGroup(trained.model(), {0}, {OccupancyBits(16)}), Error);
 }
 

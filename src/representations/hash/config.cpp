@@ -6,6 +6,7 @@
 
 #include "base/config_checks.h"
 #include "compute/lattice.h"
+#include "tiles/content.h"
 #include "train/block_frame.h"
 
 namespace tessera {
@@ -22,6 +23,9 @@ HashConfig HashConfig::ofPreset(const std::string& name) {
   config.step = 0.5 * std::sqrt(3.0);  // half of a voxel's diagonal
   config.fineRateFactor = 1;
   config.rampShare = 0.5;
+  config.distortion = 0.1;  // the paper's 0.01, beside ten times its Huber loss (compute/losses.h)
+  config.warmUpSteps = 1000;
+  config.rateFall = "linear";
   config.networkL2 = config.depth = config.knownShare = config.fullGradientDistance = 0;
   config.exposure = false;
   config.coarseLog2Size = 21;
@@ -77,6 +81,11 @@ std::vector<ConfigField> HashConfig::fields() {
        &occupancyShare},
       {"rate", "learning rate", &rate},
       {"fine_rate_factor", "learning rate of the fine features, relative", &fineRateFactor},
+      {"warm_up_steps", "steps during which the learning rate rises", &warmUpSteps},
+      {"rate_fall",
+       "exponential: by the two settings that follow; linear: from 0 to the learning rate and to 0 again, in lines, as "
+       "in the paper",
+       &rateFall},
       {"final_rate_factor", "learning rate at the end, relative", &finalRateFactor},
       {"constant_rate_share", "share of the steps before the learning rate begins to fall", &constantRateShare},
       {"network_l2", "weight decay of the networks", &networkL2},
@@ -84,12 +93,9 @@ std::vector<ConfigField> HashConfig::fields() {
       {"loss", "colour loss: huber, mse or charbonnier", &loss},
       {"loss_parameter", "delta of huber, epsilon of charbonnier", &lossParameter},
       {"distortion",
-       "weight of the distortion loss; auto: 0.03, and for distortion_relative that of 0.3, 1, 3 and 10 which is best, "
-       "after a short training with each, on one training photo in ten that is left out",
+       "weight of the distortion loss; auto: the preset's, or 0.3 or 0.1 times that, whichever is best on one training "
+       "photo in ten that is left out, after a short training with each",
        &distortion},
-      {"distortion_relative",
-       "the weight is so many times the colours' mean squared error, where that is less; 0: it is not",
-       &distortionRelative},
       {"ramp_share", "share of the steps over which it rises to its weight", &rampShare},
       {"full_gradient_distance",
        "samples nearer to the camera learn more slowly, or fog gathers there; in halves of a block",
@@ -119,6 +125,20 @@ void oneOf(const char* name, const std::string& value, std::initializer_list<con
   throw Error(fmt::format("--set {}={}", name, value), "", "there is no such thing", "use one of: " + all);
 }
 
+// A viewer has the network's numbers in its shaders, in vectors of four.
+void requireDrawable(const MlpShape& shape) {
+  uint32_t vectors = 0;
+  for (int layer = 0; layer < shape.layers(); ++layer) {
+    const int inputs = layer == 0 ? shape.inputs : shape.width;
+    const int outputs = layer == shape.hiddenLayers ? shape.outputs : shape.width;
+    vectors += networkVectors(static_cast<uint32_t>(inputs), static_cast<uint32_t>(outputs));
+  }
+  if (vectors <= kMostNetworkVectors) return;
+  throw Error(fmt::format("--set direction_width={} direction_hidden={}", shape.width, shape.hiddenLayers), "",
+              fmt::format("a network of {} vectors of four numbers; scenes take {}", vectors, kMostNetworkVectors),
+              "use a narrower or shallower one");
+}
+
 }  // namespace
 
 void HashConfig::keepFound(const HashConfig& run) {
@@ -128,7 +148,6 @@ void HashConfig::keepFound(const HashConfig& run) {
                 "restore the file, or train into another folder");
   }
   distortion = run.distortion;
-  distortionRelative = run.distortionRelative;
 }
 
 void HashConfig::check() const {
@@ -137,6 +156,7 @@ void HashConfig::check() const {
   surroundKind();
   oneOf("background", background, {"random", "learned"});
   oneOf("aggregation", aggregation, {"attention", "sum", "mlp"});
+  oneOf("rate_fall", rateFall, {"exponential", "linear"});
   oneOf("attention", attention, {"separate", "shared"});
   requireWithin("level", level, 0, 16);
   requireWithin("level_share", levelShare, 0, 10);
@@ -155,7 +175,8 @@ void HashConfig::check() const {
   requireWithin("levels", levels, 1, static_cast<int>(AttentionShape::kMostLevels));
   requireWithin("fine_log2_size", fineLog2Size, 3, 24);
   requireOneOf("direction_width", directionWidth, {16, 32, 64, 128});
-  requireWithin("direction_hidden", directionHidden, 1, 16);
+  requireWithin("direction_hidden", directionHidden, 1, static_cast<int>(kMostLayers) - 1);
+  requireDrawable(directionShape());
   requireWithin("step", step, 0.01, 100);
   requireWithin("occupancy_resolution", occupancyResolution, 4, 512);
   if (occupancyResolution % 4 != 0) {
@@ -173,17 +194,13 @@ void HashConfig::check() const {
   requireWithin("occupancy_share", occupancyShare, 0, 1);
   requireWithin("rate", rate, kTiny, kHuge);
   requireWithin("fine_rate_factor", fineRateFactor, 0, kHuge);
+  requireWithin("warm_up_steps", warmUpSteps, 1, 1 << 30);
   requireWithin("final_rate_factor", finalRateFactor, kTiny, kHuge);
   requireWithin("constant_rate_share", constantRateShare, 0, 1);
   requireWithin("network_l2", networkL2, 0, kHuge);
   requireWithin("exposure_rate", exposureRate, 0, kHuge);
   requireWithin("loss_parameter", lossParameter, kTiny, kHuge);
   if (distortion) requireWithin("distortion", *distortion, 0, kHuge);
-  requireWithin("distortion_relative", distortionRelative, 0, kHuge);
-  if (!distortion && distortionRelative > 0) {
-    throw Error("--set distortion=auto", "", "finds distortion_relative out, which is given too",
-                "leave one of the two away");
-  }
   requireWithin("ramp_share", rampShare, 0, 1);
   requireWithin("full_gradient_distance", fullGradientDistance, 0, kHuge);
   requireWithin("depth", depth, 0, kHuge);

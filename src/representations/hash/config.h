@@ -45,11 +45,12 @@ struct HashConfig {
   // Optimiser
   double rate = 1e-2, fineRateFactor = 5, finalRateFactor = 0.03, constantRateShare = 0.4, networkL2 = 1e-6,
          exposureRate = 1e-3;
+  int warmUpSteps = 20;
+  std::string rateFall = "exponential";
   // Losses
   std::string loss = "huber";
   double lossParameter = 0.1, rampShare = 0, fullGradientDistance = 0.25;
   NumberOrAuto distortion = 0.01;  // auto: what suits the scene is found out before training (distortion_choice.h)
-  double distortionRelative = 0;   // to the squared error of colours
   double depth = 0.03, depthTolerance = 0.01, knownShare = 0.125;
   // Coarser levels of detail
   double levelShare = 0.2;

@@ -37,6 +37,17 @@ TEST(HashConfig, OfThePaperHasThePapersTables) {
   EXPECT_NEAR(paper.longestStep() * 4, 2 * std::sqrt(3) / 512, 1e-6);
 }
 
+// Invariant 12, with what it is made of in schedule_test.cpp and hash_trainer_test.cpp.
+TEST(HashConfig, OfThePaperHasThePapersSchedules) {
+  const HashConfig paper = HashConfig::ofPreset("paper");
+  EXPECT_EQ(paper.rate, 0.01);
+  EXPECT_EQ(paper.rateFall, "linear");
+  EXPECT_EQ(paper.warmUpSteps, 1000);
+  EXPECT_EQ(paper.rampShare, 0.5);
+  // Next to r² / 2, as which the paper's Huber loss begins; ours begins as r² / 2δ.
+  EXPECT_NEAR(*paper.distortion * paper.lossParameter, 0.01, 1e-12);
+}
+
 // Section 14 of the specification, and the paper's "over 90 %".
 TEST(HashConfig, TakesATenthOfTheArithmeticOfANetworkForEachSample) {
   const HashConfig paper = HashConfig::ofPreset("paper"), cpu;
@@ -71,6 +82,10 @@ TEST(HashConfig, RefusesWhatNoModelCanBeMadeOf) {
       [](HashConfig& c) { c.width = 48; },
       [](HashConfig& c) { c.occupancyResolution = 30; },
       [](HashConfig& c) { c.coarseBase = 4096; },
+      [](HashConfig& c) { c.rateFall = "steep"; },
+      [](HashConfig& c) { c.directionHidden = 8; },
+      [](HashConfig& c) { c.directionWidth = 128; },  // of two hidden layers
+      [](HashConfig& c) { c.directionHidden = 5; },   // of width 64
   };
   for (const auto& wrong : wrongs) {
     HashConfig config;

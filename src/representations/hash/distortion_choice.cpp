@@ -27,8 +27,8 @@ class Probing {
     if (options.progress) progress_.emplace(title, 0, "steps");
   }
 
-  // For `steps`, which a time settles where they are 0. False when asked to stop.
-  bool train(int64_t& steps) {
+  // For `steps`, which a time settles where they are 0; `untilSettled`: and no longer. False when asked to stop.
+  bool train(int64_t& steps, bool untilSettled) {
     using Clock = std::chrono::steady_clock;
     StepBudget budget(options_.minutes);
     const Clock::time_point start = Clock::now();
@@ -38,6 +38,7 @@ class Probing {
       if (steps == 0) {
         const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
         if (const int64_t fitting = budget.observe(step + 1, seconds)) steps = std::max(fitting, options_.fewestSteps);
+        if (untilSettled && steps > 0) break;
       }
       if (!progress_) continue;
       progress_->setTotal(steps);
@@ -82,7 +83,7 @@ std::optional<double> psnrOf(const HashTrainer::Fit& fit) {
   return -10 * std::log10(std::max(1e-10, fit.squaredError / fit.channels));
 }
 
-double DistortionChoice::relative() const {
+double DistortionChoice::weight() const {
   CHECK(!probes.empty());
   std::optional<double> best, chosen;
   for (const Probe& probe : probes) best = std::max(best, probe.psnr);  // nothing is less than any number
@@ -91,7 +92,7 @@ double DistortionChoice::relative() const {
                 "lower the learning rate: --set rate=...; or " + std::string(kRemedy));
   }
   for (const Probe& probe : probes) {
-    if (probe.psnr && *probe.psnr >= *best - kAsGood) chosen = std::max(chosen, std::optional<double>(probe.relative));
+    if (probe.psnr && *probe.psnr >= *best - kAsGood) chosen = std::max(chosen, std::optional<double>(probe.weight));
   }
   return *chosen;
 }
@@ -105,21 +106,23 @@ std::optional<DistortionChoice> chooseDistortion(Device& device, const Capture& 
   const int64_t stepsOfAllPhotos = static_cast<int64_t>(capture.photosIn(Split::train).size()) * config.stepsPerPhoto;
   DistortionChoice choice = probing.known;
   if (choice.steps == 0 && probing.minutes <= 0) choice.steps = probing.steps;
-  for (size_t i = choice.probes.size(); i < probing.relatives.size(); ++i) {
-    const double relative = probing.relatives[i];
+  while (choice.probes.size() < probing.weights.size()) {
+    const double weight = probing.weights[choice.probes.size()];
     HashConfig probed = config;
-    probed.distortion = probing.most;
-    probed.distortionRelative = relative;
+    probed.distortion = weight;
     HashTrainer trainer(device, capture, probed, grid);
-    if (i == probing.known.probes.size()) probing.begun();
+    if (choice.probes.size() == probing.known.probes.size()) probing.begun();
     trainer.trainOn(photos.trained);
-    Probing probe(trainer, probing, fmt::format("distortion_relative {}", relative));
-    if (!probe.train(choice.steps)) return std::nullopt;
+    Probing probe(trainer, probing, fmt::format("distortion {}", weight));
+    // Where its weight rises with the share of the steps that are done, the first one would be trained otherwise.
+    const bool asTimer = choice.steps == 0 && config.rampShare > 0;
+    if (!probe.train(choice.steps, asTimer)) return std::nullopt;
+    if (asTimer && choice.steps > 0) continue;
     trainer.judgeBy(photos.heldOut);
-    DistortionChoice::Probe judged{relative, {}};
+    DistortionChoice::Probe judged{weight, {}};
     if (!probe.judge(choice.steps, stepsOfAllPhotos, judged.psnr)) return std::nullopt;
     choice.probes.push_back(judged);
-    inform("distortion_relative {}: {} on photos left out, after {} steps", relative,
+    inform("distortion {}: {} on photos left out, after {} steps", weight,
            judged.psnr ? fmt::format("{:.2f} dB", *judged.psnr) : "no numbers", choice.steps);
     probing.probed(choice);
   }

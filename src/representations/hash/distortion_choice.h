@@ -1,7 +1,6 @@
 // The weight of the distortion loss, found out for a scene: the paper sets it by hand, and outdoors another one for
-// each scene. The better a model gets, the smaller is the weight that suits it, as the colour loss falls and this one
-// does not. What is found out is therefore the weight relative to the colours' squared error, which changes less from
-// short trainings to long ones (how well that does: docs/benchmarks.md).
+// each scene. It is the usual one or less. Short trainings ask for more than suits long ones, which have time to do
+// without (of fox, 0.03 is best after 300 steps, and 0.01 after 1500); that less suits a scene they can tell.
 #pragma once
 
 #include <functional>
@@ -14,7 +13,7 @@ namespace tessera {
 
 struct DistortionChoice {
   struct Probe {
-    double relative = 0;         // HashConfig::distortionRelative
+    double weight = 0;
     std::optional<double> psnr;  // on photos that were not trained on; nothing when training came to no numbers
   };
   int64_t steps = 0;  // of each probe; 0: not known yet
@@ -23,12 +22,11 @@ struct DistortionChoice {
   // Of the best probe; of several as good as it (kAsGood), the greatest: it leaves less fog where no photo that was
   // left out looks. Throws Error when none came to anything.
   static constexpr double kAsGood = 0.05;  // dB
-  double relative() const;
+  double weight() const;
 };
 
 struct DistortionProbing {
-  std::vector<double> relatives{0.3, 1, 3, 10};
-  double most = 0.03;       // of the weight itself: more flattens whatever is there
+  std::vector<double> weights;
   uint32_t heldOutOf = 10;  // one training photo of so many is left out
   int64_t steps = 0;        // of each probe; or
   double minutes = 0;       // > 0: of each probe: as many steps as the first one makes in this time,

@@ -18,8 +18,7 @@ TEST(DistortionChoice, TakesTheWeightThatIsClosestToPhotosThatWereLeftOut) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   DistortionProbing probing;
-  probing.relatives = {1e6, 1, 1e5};  // of which two leave nothing standing
-  probing.most = 100;
+  probing.weights = {100, 0.01, 30};  // of which two leave nothing standing
   probing.steps = 60;
   size_t done = 0;
   probing.probed = [&](const DistortionChoice& choice) { EXPECT_EQ(choice.probes.size(), ++done); };
@@ -30,9 +29,9 @@ TEST(DistortionChoice, TakesTheWeightThatIsClosestToPhotosThatWereLeftOut) {
   EXPECT_EQ(done, 3u);
   EXPECT_EQ(choice->steps, 60);
   ASSERT_EQ(choice->probes.size(), 3u);
-  EXPECT_EQ(choice->probes[0].relative, 1e6);
+  EXPECT_EQ(choice->probes[0].weight, 100);
   EXPECT_LT(*choice->probes[0].psnr + 2, *choice->probes[1].psnr);
-  EXPECT_EQ(choice->relative(), 1);
+  EXPECT_EQ(choice->weight(), 0.01);
 }
 
 // Photos that are left out are painted over: whoever learned from them, or judged by others, would come to another
@@ -41,7 +40,7 @@ TEST(DistortionChoice, LearnsFromTheOtherPhotosAloneAndIsJudgedByThoseLeftOut) {
   CubeScene scene;
   const HashConfig config = smallHashConfig();
   DistortionProbing probing;
-  probing.relatives = {1};
+  probing.weights = {0.03};
   probing.steps = 40;
   const HeldOutPhotos photos = holdOutPhotos(scene.capture(), probing.heldOutOf, static_cast<uint64_t>(config.seed));
   for (size_t i = 0; i < scene.capture().photos.size(); ++i) {
@@ -55,8 +54,7 @@ TEST(DistortionChoice, LearnsFromTheOtherPhotosAloneAndIsJudgedByThoseLeftOut) {
   ASSERT_TRUE(choice);
 
   HashConfig probed = config;
-  probed.distortion = probing.most;
-  probed.distortionRelative = 1;
+  probed.distortion = 0.03;
   HashTrainer trainer(*device, scene.capture(), probed, cubeGrid());
   trainer.trainOn(photos.trained);
   for (int64_t step = 0; step < 40; ++step) trainer.step(step, 40);
@@ -76,7 +74,7 @@ TEST(DistortionChoice, GivesAllProbesTheStepsThatTheFirstOneHasTimeFor) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   DistortionProbing probing;
-  probing.relatives = {1, 3};
+  probing.weights = {0.001, 0.01};
   probing.minutes = 0.01;
   probing.fewestSteps = 32;
   int64_t asked = 0;  // before each step, and before each batch that is judged
@@ -87,19 +85,35 @@ TEST(DistortionChoice, GivesAllProbesTheStepsThatTheFirstOneHasTimeFor) {
   EXPECT_EQ(asked, 2 * (choice->steps + std::min<int64_t>(64, choice->steps)));
 }
 
+// Else the first would have no distortion loss at all until the number of its steps is known.
+TEST(DistortionChoice, TrainsAllProbesAlikeWhereTheWeightRisesWithTheShareThatIsDone) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  HashConfig config = smallHashConfig();
+  config.rampShare = 0.5;
+  DistortionProbing probing;
+  probing.weights = {0.03, 0.03};
+  probing.minutes = 0.01;
+  probing.fewestSteps = 32;
+  const auto choice = chooseDistortion(*device, scene.capture(), config, cubeGrid(), probing);
+  ASSERT_TRUE(choice);
+  EXPECT_GE(choice->steps, 32);
+  EXPECT_EQ(choice->probes[0].psnr, choice->probes[1].psnr);
+}
+
 TEST(DistortionChoice, MakesNoProbesThatAreKnown) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   DistortionProbing probing;
-  probing.relatives = {1, 3};
+  probing.weights = {0.001, 0.01};
   probing.steps = 40;
-  probing.known = {20, {{1, 99}}};
+  probing.known = {20, {{0.001, 99}}};
   int64_t asked = 0;
   probing.stopRequested = [&] { return ++asked < 0; };
   const auto choice = chooseDistortion(*device, scene.capture(), smallHashConfig(), cubeGrid(), probing);
   ASSERT_TRUE(choice);
   EXPECT_EQ(choice->probes.size(), 2u);
-  EXPECT_EQ(choice->relative(), 1);
+  EXPECT_EQ(choice->weight(), 0.001);
   EXPECT_EQ(choice->steps, 20) << "as many as those that it is compared with";
   EXPECT_EQ(asked, 20 + 20);
 }
@@ -109,6 +123,7 @@ TEST(DistortionChoice, IsNoneWhenAskedToStopWhetherItTrainsOrJudges) {
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   for (const int64_t last : {25, 45}) {
     DistortionProbing probing;
+    probing.weights = {0.01};
     probing.steps = 30;
     int64_t asked = 0;
     probing.stopRequested = [&] { return ++asked > last; };
@@ -119,18 +134,18 @@ TEST(DistortionChoice, IsNoneWhenAskedToStopWhetherItTrainsOrJudges) {
 
 TEST(DistortionChoice, IsTheGreatestOfThoseThatAreAsGood) {
   const double near = DistortionChoice::kAsGood / 2, far = 2 * DistortionChoice::kAsGood;
-  EXPECT_EQ((DistortionChoice{10, {{0.3, 20 - far}, {1, 20.0}, {3, 20 - near}, {10, 20 - far}}}).relative(), 3);
-  EXPECT_EQ((DistortionChoice{10, {{3, 20.0}, {1, 20 - near}}}).relative(), 3) << "in whichever order";
-  EXPECT_EQ((DistortionChoice{10, {{1, 20.0}, {3, 20 - far}}}).relative(), 1);
+  EXPECT_EQ((DistortionChoice{10, {{0.3, 20 - far}, {1, 20.0}, {3, 20 - near}, {10, 20 - far}}}).weight(), 3);
+  EXPECT_EQ((DistortionChoice{10, {{3, 20.0}, {1, 20 - near}}}).weight(), 3) << "in whichever order";
+  EXPECT_EQ((DistortionChoice{10, {{1, 20.0}, {3, 20 - far}}}).weight(), 1);
 }
 
 TEST(DistortionChoice, TakesNoWeightThatCameToNoNumbers) {
   EXPECT_EQ(psnrOf(HashTrainer::Fit{kNone, 300, 0}), std::nullopt);
   EXPECT_EQ(*psnrOf(HashTrainer::Fit{3, 300, 0}), 20);
   DistortionChoice choice{10, {{0.3, std::nullopt}, {1, -4.0}, {3, std::nullopt}}};
-  EXPECT_EQ(choice.relative(), 1);
+  EXPECT_EQ(choice.weight(), 1);
   choice.probes.erase(choice.probes.begin() + 1);
-  EXPECT_THROW(choice.relative(), Error);
+  EXPECT_THROW(choice.weight(), Error);
   EXPECT_THROW(psnrOf(HashTrainer::Fit{0, 0, 0}), Error) << "nothing to judge by";
 }
 
@@ -142,11 +157,11 @@ TEST(DistortionChoice, SaysThatNoTrainingCameToNumbersRatherThanChoose) {
   config.networkL2 = 1e9;
   DistortionProbing probing;
   probing.minutes = 0.05;
-  probing.relatives = {1};
+  probing.weights = {0.01};
   const auto choice = chooseDistortion(*device, scene.capture(), config, cubeGrid(), probing);
   ASSERT_TRUE(choice);
   EXPECT_FALSE(choice->probes[0].psnr);
-  EXPECT_THROW(choice->relative(), Error);
+  EXPECT_THROW(choice->weight(), Error);
 }
 
 // Photos that are left out stay at the mean of the others.

@@ -23,7 +23,7 @@ class ProbeFile {
   }
 
   // Those that were made with the same, in their order.
-  DistortionChoice read(const std::vector<double>& relatives) const {
+  DistortionChoice read(const std::vector<double>& weights) const {
     DistortionChoice choice;
     if (!fs::exists(path_)) return choice;
     const nlohmann::json json = nlohmann::json::parse(readTextFile(path_), nullptr, false);
@@ -32,10 +32,10 @@ class ProbeFile {
       choice.steps = json.at("steps");
       for (const nlohmann::json& probe : json.at("probes")) {
         const size_t next = choice.probes.size();
-        if (next == relatives.size() || probe.at("distortion_relative") != relatives[next]) return {};
+        if (next == weights.size() || probe.at("distortion") != weights[next]) return {};
         const nlohmann::json& psnr = probe.at("psnr");
         choice.probes.push_back(
-            {relatives[next], psnr.is_null() ? std::nullopt : std::optional<double>(psnr.get<double>())});
+            {weights[next], psnr.is_null() ? std::nullopt : std::optional<double>(psnr.get<double>())});
       }
     } catch (const nlohmann::json::exception&) {
       return {};  // somebody else's
@@ -47,7 +47,7 @@ class ProbeFile {
     if (chosen) json["chosen"] = *chosen;
     json["steps"] = choice.steps;
     for (const DistortionChoice::Probe& probe : choice.probes) {
-      json["probes"].push_back({{"distortion_relative", probe.relative},
+      json["probes"].push_back({{"distortion", probe.weight},
                                 {"psnr", probe.psnr ? nlohmann::ordered_json(*probe.psnr) : nlohmann::ordered_json()}});
     }
     json["made_with"] = madeWith_;
@@ -65,8 +65,10 @@ fs::path distortionFile(const fs::path& model) {
   return model / "distortion.json";
 }
 
-DistortionProbing distortionProbing(const TrainingLoopOptions& loop) {
+DistortionProbing distortionProbing(const std::string& preset, const TrainingLoopOptions& loop) {
   DistortionProbing probing;
+  const double usual = HashConfig::ofPreset(preset).distortion.value();
+  probing.weights = {0.1 * usual, 0.3 * usual, usual};
   probing.fewestSteps = kFewestProbeSteps;
   if (loop.minutes > 0) {
     probing.minutes = std::min(kProbeShare * loop.minutes, kMostProbeMinutes);
@@ -79,9 +81,9 @@ DistortionProbing distortionProbing(const TrainingLoopOptions& loop) {
 
 bool findDistortion(const BlockTraining& on, const fs::path& model, HashConfig& config, TrainingLoopOptions& loop,
                     std::function<void()> begun) {
-  DistortionProbing probing = distortionProbing(loop);
+  DistortionProbing probing = distortionProbing(config.preset, loop);
   const ProbeFile file(model, config, on, probing);
-  if (loop.resume) probing.known = file.read(probing.relatives);
+  if (loop.resume) probing.known = file.read(probing.weights);
   probing.progress = loop.progress;
   probing.stopRequested = loop.stopRequested;
   probing.begun = std::move(begun);
@@ -89,17 +91,14 @@ bool findDistortion(const BlockTraining& on, const fs::path& model, HashConfig& 
   const auto start = std::chrono::steady_clock::now();
   const std::optional<DistortionChoice> choice = chooseDistortion(on.device, on.capture, config, on.grid, probing);
   if (!choice) return false;
-  config.distortion = probing.most;
-  config.distortionRelative = choice->relative();
-  file.write(*choice, choice->relative());
+  config.distortion = choice->weight();
+  file.write(*choice, choice->weight());
   if (loop.minutes <= 0) return true;
   const std::chrono::duration<double, std::ratio<60>> spent = std::chrono::steady_clock::now() - start;
   const double left = loop.minutes - spent.count();
   if (left < loop.minutes / 2) {
-    warn(
-        "to find the weight of the distortion loss out has taken {:.1f} of {} minutes; next time: --set distortion={} "
-        "--set distortion_relative={}",
-        spent.count(), loop.minutes, probing.most, choice->relative());
+    warn("to find the weight of the distortion loss out has taken {:.1f} of {} minutes; next time: --set distortion={}",
+         spent.count(), loop.minutes, choice->weight());
   }
   loop.minutes = std::max(0.1 * loop.minutes, left);
   return true;

@@ -9,8 +9,9 @@ namespace tessera {
 // What a training of so many steps or minutes is preceded by: probes of a share of it each, but no fewer than so many
 // steps, and no more of either.
 inline constexpr double kProbeShare = 0.1, kMostProbeMinutes = 5;
-inline constexpr int64_t kFewestProbeSteps = 32, kMostProbeSteps = 1000;
-DistortionProbing distortionProbing(const TrainingLoopOptions& loop);
+inline constexpr int64_t kFewestProbeSteps = 64, kMostProbeSteps = 1000;
+// The preset's weight, and such as are less.
+DistortionProbing distortionProbing(const std::string& preset, const TrainingLoopOptions& loop);
 
 // In the model's folder: what probes have come to, what they were made with, and, at the end, what was chosen.
 fs::path distortionFile(const fs::path& model);

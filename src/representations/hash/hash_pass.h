@@ -19,6 +19,7 @@ class HashPass {
   void forward(const HashModel::Rays& rays, float minTransmittance);
 
   Slice<const float> colour() const { return colour_; }    // [rays][3]; black behind, unless the background is learned
+  Slice<const float> sums() const { return composited_; }  // [rays][7]: of diffuse colours and what the network takes
   Slice<const float> opacity() const { return opacity_; }  // [rays]
   Slice<const float> depth() const { return depth_; }      // [rays]: expected t, times opacity
   const HashSamples& samples() const { return seen_; }

@@ -15,7 +15,6 @@ namespace {
 
 constexpr double kRoomPerWanted = 2;  // for steps that see more than the last one did
 constexpr float kMinTransmittance = 1e-4f;
-constexpr double kNewInMean = 0.05;  // of running means: a step's share
 constexpr const char* kFormat = "tessera hash 1";
 
 PhotoRays::Settings raySettings(const HashConfig& config) {
@@ -40,14 +39,11 @@ HashPass::Room roomFor(const HashConfig& config) {
 
 }  // namespace
 
-double distortionWeight(const HashConfig& config, int64_t step, int64_t plannedSteps, double squaredError) {
-  double weight = config.distortion.value();
-  const bool isRelative = config.distortionRelative > 0 && squaredError > 0;
-  if (isRelative) weight = std::min(weight, config.distortionRelative * squaredError);
+double distortionWeight(const HashConfig& config, int64_t step, int64_t plannedSteps) {
   // While the number of steps is not known, it is early.
   const double risen = config.rampShare * static_cast<double>(plannedSteps);
   const double share = risen > 0 ? std::min(1.0, static_cast<double>(step) / risen) : config.rampShare > 0 ? 0 : 1;
-  return weight * share;
+  return config.distortion.value() * share;
 }
 
 HashTrainer::HashTrainer(Device& device, const Capture& capture, const HashConfig& config, const BlockGrid& grid)
@@ -116,7 +112,6 @@ StepReport HashTrainer::step(int64_t step, int64_t plannedSteps) {
   const Fit fit = comparedRays(report.rays);
   report.loss = fit.loss + inner[0] + inner[1];
   report.squaredError = fit.squaredError / std::max(1.0, fit.channels);
-  if (fit.channels > 0) squaredError_ += (squaredError_ == 0 ? 1 : kNewInMean) * (report.squaredError - squaredError_);
   report.texels = pass_.texelsWanted();
   const double perRay = static_cast<double>(report.samples) / std::max(1u, report.rays);
   model_.adaptStep(perRay);
@@ -184,7 +179,7 @@ void HashTrainer::addGradients(const HashModel::Rays& drawn, int64_t step, int64
                                exposures_.logGains(), colourGradients_, colourGradients_, opacityGradients_,
                                exposures_.gradients()});
   HashPass::LossScales scales;
-  scales.distortion = static_cast<float>(distortionWeight(config_, step, plannedSteps, squaredError_) / rays_);
+  scales.distortion = static_cast<float>(distortionWeight(config_, step, plannedSteps) / rays_);
   if (config_.knownShare > 0) scales.depth = static_cast<float>(config_.depth / rays_);
   scales.depthTolerance = static_cast<float>(config_.depthTolerance);
   pass_.backward(drawn, colourGradients_, opacityGradients_, photoRays_.distances(0, rays_), scales);
@@ -195,6 +190,8 @@ void HashTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
   schedule.rate = config_.rate;
   schedule.finalFactor = config_.finalRateFactor;
   schedule.constantFraction = config_.constantRateShare;
+  schedule.warmUpSteps = config_.warmUpSteps;
+  schedule.linear = config_.rateFall == "linear";
   HashFields::Rates rates;
   rates.table.rate = rates.network.rate = static_cast<float>(schedule.at(step, plannedSteps));
   rates.table.skipZeroGradients = rates.network.skipZeroGradients = true;
@@ -212,7 +209,6 @@ Bytes HashTrainer::save(uint32_t part) {
   if (part == 0) {
     exposures_.save(tensors);
     tensors.add("rays", std::vector<uint32_t>{rays_});
-    tensors.add("squared_error", std::vector<double>{squaredError_});
   }
   return tensors.encode({{"format", kFormat}, {"device", device_.target()}, {"block", std::to_string(part)}});
 }
@@ -230,15 +226,8 @@ void HashTrainer::restore(uint32_t part, const fs::path& path, const Safetensors
   if (part != 0) return;
   warnOfOtherDevice(path, state, device_.target());
   exposures_.restore(path, state);
-  const auto one = [&](const char* name, TensorType type) -> const TensorView& {
-    const TensorView& tensor = state.require(path, name, type);
-    if (tensor.elements() != 1) {
-      throw Error(path.string(), "tensor " + std::string(name), "is not one number", "train again");
-    }
-    return tensor;
-  };
-  squaredError_ = one("squared_error", TensorType::f64).as<double>()[0];
-  const TensorView& rays = one("rays", TensorType::u32);
+  const TensorView& rays = state.require(path, "rays", TensorType::u32);
+  if (rays.elements() != 1) throw Error(path.string(), "tensor rays", "is not one number", "train again");
   rays_ = std::clamp(rays.as<uint32_t>()[0], 1u, static_cast<uint32_t>(config_.mostRays));
 }
 

@@ -49,14 +49,12 @@ class HashTrainer final : public Trainee {
   HashPass pass_;
   PhotoRays photoRays_;
   PhotoExposures exposures_;
-  uint32_t rays_;            // of the next step
-  double squaredError_ = 0;  // of colours, a running mean; 0: not known yet
+  uint32_t rays_;  // of the next step
   Array<float> exposed_, colourGradients_, opacityGradients_, losses_;
 };
 
 // The weight of the distortion loss, `step` into training: from 0 it rises to the config's (section 5 of the
-// specification's schedules), or to what the mean squared error of colours (0: not known yet) asks for, where that is
-// less.
-double distortionWeight(const HashConfig& config, int64_t step, int64_t plannedSteps, double squaredError);
+// specification's schedules).
+double distortionWeight(const HashConfig& config, int64_t step, int64_t plannedSteps);
 
 }  // namespace tessera

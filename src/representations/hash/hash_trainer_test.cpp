@@ -95,7 +95,6 @@ TEST(HashTrainer, MakesTheSameBytesOnAnyNumberOfThreads) {
 TEST(HashTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
   const CubeScene scene;
   HashConfig config = smallHashConfig();
-  config.distortionRelative = 0.5;
   constexpr int64_t kSteps = 60;
   TrainedHashCube unbroken(scene, config, cubeGrid(2), 0);
   for (int64_t step = 0; step < kSteps; ++step) unbroken.trainer->step(step, kSteps);
@@ -130,30 +129,13 @@ TEST(HashTrainer, RaisesTheDistortionLossAsPlanned) {
   HashConfig config;
   config.distortion = 0.01;
   config.rampShare = 0.5;
-  EXPECT_EQ(distortionWeight(config, 0, 100000, 0.1), 0);
-  EXPECT_NEAR(distortionWeight(config, 25000, 100000, 0.1), 0.005, 1e-12);
-  EXPECT_NEAR(distortionWeight(config, 50000, 100000, 0.1), 0.01, 1e-12);
-  EXPECT_NEAR(distortionWeight(config, 100000, 100000, 0.1), 0.01, 1e-12);
-  EXPECT_EQ(distortionWeight(config, 700, 0, 0.1), 0);  // it is early while nobody knows
+  EXPECT_EQ(distortionWeight(config, 0, 100000), 0);
+  EXPECT_NEAR(distortionWeight(config, 25000, 100000), 0.005, 1e-12);
+  EXPECT_NEAR(distortionWeight(config, 50000, 100000), 0.01, 1e-12);
+  EXPECT_NEAR(distortionWeight(config, 100000, 100000), 0.01, 1e-12);
+  EXPECT_EQ(distortionWeight(config, 700, 0), 0);  // it is early while nobody knows
   config.rampShare = 0;
-  EXPECT_EQ(distortionWeight(config, 0, 0, 0), 0.01);
-}
-
-TEST(HashTrainer, LowersTheDistortionLossWithTheErrorOfColours) {
-  HashConfig config;
-  config.distortion = 0.03;
-  config.distortionRelative = 10;
-  EXPECT_EQ(distortionWeight(config, 0, 0, 0), 0.03) << "not known yet";
-  EXPECT_EQ(distortionWeight(config, 10, 0, 0.1), 0.03);
-  EXPECT_NEAR(distortionWeight(config, 10, 0, 0.001), 0.01, 1e-12);
-  // The mean is that of the steps so far, and goes on where it was.
-  const CubeScene scene;
-  HashConfig small = smallHashConfig();
-  small.distortion = 0.03;
-  small.distortionRelative = 0.1;
-  const std::vector<Bytes> relative = TrainedHashCube(scene, small, cubeGrid(), 30).saved();
-  small.distortionRelative = 0;
-  EXPECT_NE(relative, TrainedHashCube(scene, small, cubeGrid(), 30).saved());
+  EXPECT_EQ(distortionWeight(config, 0, 0), 0.01);
 }
 
 // Invariant 3.

@@ -1,6 +1,7 @@
 // The rules that contents of every representation keep (docs/tile-format.md, sections 5 to 7). Each says the first that is
 // broken, for people.
 import { type ContentPart, type DenseLayer } from './content';
+import { networkVectors } from './network';
 import type { TileContent } from './tileset';
 import { kFarthestInScene } from './tileset-rules';
 
@@ -9,6 +10,7 @@ export type Broken = string | undefined;
 export const kMostStored = 606 * 606; // macroblocks in a picture of 16383 pixels a side
 export const kMostLayers = 8;
 export const kMostLayerWidth = 256;
+export const kMostNetworkVectors = 4096; // of a network, as shaders take it
 const kOutputs = 3;
 const kAxes = [0, 1, 2];
 
@@ -22,7 +24,8 @@ export function ruleOfNetwork(network: DenseLayer[], inputs: number): Broken {
       return 'the network holds a number that is not finite';
     }
   }
-  return width === kOutputs ? undefined : 'the network does not end in a colour';
+  if (width !== kOutputs) return 'the network does not end in a colour';
+  return networkVectors(network) > kMostNetworkVectors ? 'the network is larger than a shader takes' : undefined;
 }
 
 // Of `texels` along an axis.

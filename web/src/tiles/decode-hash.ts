@@ -10,7 +10,6 @@ import {
 import { layOutHash, lengthOf, type HashLayout } from './hash-layout';
 import * as rules from './hash-rules';
 import { arrayOf, fieldOf, flagOf, numberFrom, numberOf, stringOf, wholeOf, type Json } from './json-fields';
-import { networkVectors } from './network';
 import { octantDistances, ratioFor } from './octant-distances';
 import { sizeOfList, takeList } from './texel-pictures';
 import type { TileContent } from './tileset';
@@ -27,8 +26,6 @@ export interface HashHeader {
   network: DenseLayer[];
   views: Uint8Array[];
 }
-
-export const kMostNetworkVectors = 4096; // which are written into a shader
 
 // Both throw SceneError that names `name` and the first rule that is broken; `promised` is what tileset.json says of
 // the content. The decoder of pictures must be prepared (lossless-image.ts).
@@ -59,9 +56,6 @@ class HashReader extends ContentReader {
       rules.ruleOfSettings(settings, tables) ?? ruleOfNetwork(network, rules.kHashInputs) ??
       ruleOfParts(parts, (part) => rules.ruleOfPart(part, tables)) ?? (promised && brokenPromise(parts, promised));
     if (broken) this.fail(broken);
-    if (networkVectors(network) > kMostNetworkVectors) {
-      this.fail('has a larger network than this viewer takes', 'draw it with tessera render');
-    }
     const uniformBytes = 16 * vectorsOfPart(columns, tables) * parts.length;
     const layout = this.laidOut(layOutHash(parts, columns, this.limits), uniformBytes);
     const cardBytes = layout.bytes + uniformBytes;
