@@ -1,7 +1,6 @@
 #include "representations/field/field_model.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "base/error.h"
 #include "train/run_folder.h"
