@@ -10,7 +10,7 @@ packages=(
   libcli11-dev libfmt-dev libspdlog-dev nlohmann-json3-dev libtomlplusplus-dev
   libgeographiclib-dev
   libboost-dev zlib1g-dev
-  libvulkan-dev mesa-vulkan-drivers glslang-tools
+  libvulkan-dev libvulkan-volk-dev mesa-vulkan-drivers vulkan-validationlayers glslang-tools
   libgtest-dev
   ffmpeg
 )

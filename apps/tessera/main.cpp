@@ -40,7 +40,9 @@ void catchInterrupts() {
 }
 
 void addDeviceFlags(CLI::App& verb, DeviceOptions& options) {
-  verb.add_option("--device", options.kind, "what computes: auto, cpu, vulkan or reference")->capture_default_str();
+  verb.add_option("--device", options.kind,
+                  "what computes: auto (a graphics card, else cpu), cpu, vulkan, vulkan:<index or name> or reference")
+      ->capture_default_str();
   verb.add_option("--threads", options.threads, "processor threads; 0: all cores")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));

@@ -5,6 +5,7 @@
 #include "apps/tessera/folder_kind.h"
 #include "apps/tessera/verbs.h"
 #include "base/error.h"
+#include "compute/device.h"
 #include "import/capture_reader.h"
 #include "import/importer.h"
 #include "representations/field/train_field.h"
@@ -136,6 +137,18 @@ ordered_json describe(const fs::path& folder) {
   throw Error(folder.string(), "", "holds nothing that tessera knows", "name a source, capture, model or scene folder");
 }
 
+// What --device may name here.
+ordered_json describeDevices() {
+  ordered_json info = {{"kind", "devices"}};
+  for (const DeviceDescription& device : listDevices()) {
+    ordered_json& about = info[device.kind];
+    if (!device.name.empty()) about["name"] = device.name;
+    if (device.memoryBytes > 0) about["memory_bytes"] = device.memoryBytes;
+    if (!device.missing.empty()) about["cannot_be_used"] = device.missing;
+  }
+  return info;
+}
+
 void printIndented(const ordered_json& info, int indent) {
   for (const auto& [key, value] : info.items()) {
     if (value.is_object()) {
@@ -155,15 +168,17 @@ void addInfoVerb(CLI::App& app) {
     bool json = false;
   };
   auto flags = std::make_shared<Flags>();
-  CLI::App* verb = app.add_subcommand("info", "what a folder is and holds: source, capture, model or scene");
-  verb->footer("Example:\n  tessera info fox.model --json");
-  verb->add_option("what", flags->what, "a folder")->required();
+  CLI::App* verb = app.add_subcommand(
+      "info", "what a folder is and holds: source, capture, model or scene; or the devices of this machine");
+  verb->footer("Examples:\n  tessera info fox.model --json\n  tessera info devices");
+  verb->add_option("what", flags->what, "a folder, or the word devices")->required();
   verb->add_flag("--json", flags->json, "as one JSON object");
   verb->callback([flags] {
     const fs::path folder = flags->what;
-    if (!fs::is_directory(folder))
+    const bool ofDevices = flags->what == "devices" && !fs::exists(folder);
+    if (!ofDevices && !fs::is_directory(folder))
       throw Error(flags->what, "", "is not a folder", "name a source, capture, model or scene");
-    const ordered_json info = describe(folder);
+    const ordered_json info = ofDevices ? describeDevices() : describe(folder);
     if (flags->json) {
       fmt::print("{}\n", info.dump(2));
     } else {

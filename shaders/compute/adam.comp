@@ -2,6 +2,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
+#include "arguments_adam.h"
 
 layout(local_size_x = 256) in;
 KERNEL_ARGUMENTS(AdamArguments)

@@ -1,15 +1,10 @@
 // Where a point lies in one level of the hash grid (src/compute/hash_grid.h says the convention).
-// Reads: FloatPointer, LevelArguments. Defines: Cell, positionOf(), cellOf(), upperSides(), cornerEntry(),
-// cornerWeight().
+// Reads: LevelArguments. Defines: Cell, cellOf(), upperSides(), cornerEntry(), cornerWeight().
 
 struct Cell {
   uvec3 lattice;  // the lower corner
   vec3 fraction;  // within the cell
 };
-
-vec3 positionOf(FloatPointer positions, uint index) {
-  return vec3(positions.values[index * 3], positions.values[index * 3 + 1], positions.values[index * 3 + 2]);
-}
 
 Cell cellOf(vec3 position, LevelArguments level) {
   const vec3 scaled = position * level.scale + 0.5;

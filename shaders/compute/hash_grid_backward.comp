@@ -3,7 +3,9 @@
 #extension GL_GOOGLE_include_directive : require
 #include "float_sum.glsl"
 #include "kernel.glsl"
+#include "arguments_hash_grid.h"
 #include "hash_grid.glsl"
+#include "vectors.glsl"
 
 layout(local_size_x = 128) in;
 layout(constant_id = 0) const uint kFeatures = 2;
@@ -23,7 +25,7 @@ void main() {
     }
     if (!any) continue;
 
-    const Cell cell = cellOf(positionOf(arguments.values.positions, sampleIndex), level);
+    const Cell cell = cellOf(pointAt(arguments.values.positions, sampleIndex), level);
     [[unroll]] for (uint corner = 0; corner < 8; ++corner) {
       const float weight = cornerWeight(cell, corner);
       const uint entry = cornerEntry(cell, corner, level) * kFeatures;

@@ -2,7 +2,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
+#include "arguments_hash_grid.h"
 #include "hash_grid.glsl"
+#include "vectors.glsl"
 
 layout(local_size_x = 128) in;
 layout(constant_id = 0) const uint kFeatures = 2;
@@ -15,7 +17,7 @@ void main() {
   MatrixArguments encoded = arguments.values.encoded;
 
   FOR_EACH_ROW(sampleIndex, arguments.values.samples) {
-    const Cell cell = cellOf(positionOf(arguments.values.positions, sampleIndex), level);
+    const Cell cell = cellOf(pointAt(arguments.values.positions, sampleIndex), level);
     float mixed[kFeatures];
     [[unroll]] for (uint f = 0; f < kFeatures; ++f) mixed[f] = 0;
     [[unroll]] for (uint corner = 0; corner < 8; ++corner) {

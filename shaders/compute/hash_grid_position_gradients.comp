@@ -3,7 +3,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
+#include "arguments_hash_grid.h"
 #include "hash_grid.glsl"
+#include "vectors.glsl"
 
 layout(local_size_x = 128) in;
 layout(constant_id = 0) const uint kFeatures = 2;
@@ -32,7 +34,7 @@ vec3 slopeInLevel(vec3 position, uint sampleIndex, uint levelIndex) {
 void main() {
   FloatPointer gradients = arguments.values.positionGradients;
   FOR_EACH_ROW(sampleIndex, arguments.values.samples) {
-    const vec3 position = positionOf(arguments.values.positions, sampleIndex);
+    const vec3 position = pointAt(arguments.values.positions, sampleIndex);
     vec3 sum = vec3(0);
     for (uint l = 0; l < arguments.values.levelCount; ++l) sum += slopeInLevel(position, sampleIndex, l);
     for (uint axis = 0; axis < 3; ++axis) gradients.values[sampleIndex * 3 + axis] = sum[axis];

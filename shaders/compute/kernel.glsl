@@ -5,8 +5,12 @@
 #extension GL_EXT_buffer_reference_uvec2 : require
 #extension GL_EXT_control_flow_attributes : require
 
-layout(buffer_reference, std430, buffer_reference_align = 4) buffer FloatPointer { float values[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer UintPointer { uint values[]; };
+#ifdef TESSERA_WORDS  // of kernels that only move numbers: words of any kind travel this way
+#define FloatPointer UintPointer
+#else
+layout(buffer_reference, std430, buffer_reference_align = 4) buffer FloatPointer { float values[]; };
+#endif
 #ifndef TESSERA_SUM_POINTER
 #define SumPointer FloatPointer
 #endif

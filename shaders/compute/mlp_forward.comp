@@ -3,6 +3,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
+#include "arguments_mlp.h"
 #include "mlp_tile.glsl"
 
 KERNEL_ARGUMENTS(MlpForwardArguments)

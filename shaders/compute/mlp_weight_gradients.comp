@@ -4,6 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "float_sum.glsl"
 #include "kernel.glsl"
+#include "arguments_mlp.h"
 
 const uint kTile = 32;
 const uint kDepth = 16;   // samples at a time

@@ -141,14 +141,24 @@ class Device {
 };
 
 struct DeviceOptions {
-  std::string kind = "cpu";  // auto, cpu, reference, vulkan
+  std::string kind = "cpu";  // auto, cpu, reference, vulkan, vulkan:1 (an index) or vulkan:radeon (a part of a name)
   int threads = 0;           // cpu: 0 = all cores
 };
 
 // Throws Error naming the first operation that the device lacks.
 void requireAllOperations(const Device& device);
 
-// Throws Error when there is no such device on this machine. "auto" is cpu until the Vulkan device can train.
+// Throws Error when there is no such device on this machine. "auto" is the best graphics card that can be used, else
+// cpu; it is never a Vulkan driver that computes on the processor.
 std::unique_ptr<Device> makeDevice(const DeviceOptions& options);
+
+// What `kind` may name on this machine.
+struct DeviceDescription {
+  std::string kind;  // "cpu", "vulkan:0"
+  std::string name;
+  uint64_t memoryBytes = 0;  // of a graphics card
+  std::string missing;       // why it cannot be used; empty where it can
+};
+std::vector<DeviceDescription> listDevices();
 
 }  // namespace tessera

@@ -1,7 +1,7 @@
 // Calls to Vulkan: their arguments begin empty, their results are never ignored.
 #pragma once
 
-#include <vulkan/vulkan.h>
+#include <volk.h>
 
 namespace tessera {
 

@@ -9,7 +9,9 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "gpu/call.h"
+#include "gpu/heap.h"
 #include "gpu/physical_device.h"
+#include "gpu/pipeline_cache.h"
 #include "gpu/validation.h"
 
 namespace tessera {
@@ -19,6 +21,16 @@ namespace {
 std::string environment(const char* name) {
   const char* value = std::getenv(name);
   return value ? value : "";
+}
+
+// Finds the loader when it is first wanted: a machine without one trains on its processor with the same program.
+void openLoader() {
+  static const VkResult found = volkInitialize();
+  if (found != VK_SUCCESS) {
+    throw Error(
+        "vulkan", "libvulkan.so.1", "no Vulkan loader is installed",
+        "install libvulkan1 and a driver (mesa-vulkan-drivers or that of the graphics card), or use --device cpu");
+  }
 }
 
 VkInstance makeInstance(bool validation) {
@@ -35,6 +47,7 @@ VkInstance makeInstance(bool validation) {
   }
   VkInstance instance = VK_NULL_HANDLE;
   checkVulkan(vkCreateInstance(&info, nullptr, &instance), "vkCreateInstance");
+  volkLoadInstance(instance);
   return instance;
 }
 
@@ -47,12 +60,41 @@ std::shared_ptr<GpuContext> GpuContext::open(const GpuOptions& options) {
   context->chooseQueueFamily();
   context->chooseFeatures(options.allowed);
   context->createDevice();
+  context->heap_ = std::make_unique<GpuHeap>(*context);
+  VkPhysicalDeviceProperties properties = {};
+  vkGetPhysicalDeviceProperties(context->physicalDevice_, &properties);
+  context->pipelines_ = std::make_unique<PipelineCache>(context->device_, properties);
   return context;
+}
+
+std::vector<GpuDescription> GpuContext::devices() {
+  GpuContext context;
+  context.createInstance(false);
+  std::vector<GpuDescription> all;
+  for (const PhysicalDevice& device : physicalDevices(context.instance_)) {
+    GpuDescription made;
+    made.name = device.properties.deviceName;
+    made.driver = device.driver;
+    made.isProcessor = device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+    made.missing = missingIn(device);
+    VkPhysicalDeviceMemoryProperties memory = {};
+    vkGetPhysicalDeviceMemoryProperties(device.handle, &memory);
+    for (uint32_t i = 0; i < memory.memoryHeapCount; ++i) {
+      const VkMemoryHeap& heap = memory.memoryHeaps[i];
+      if (heap.flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT)
+        made.memoryBytes = std::max<uint64_t>(made.memoryBytes, heap.size);
+    }
+    all.push_back(std::move(made));
+  }
+  if (all.empty()) checkVulkan(VK_ERROR_INCOMPATIBLE_DRIVER, "vkEnumeratePhysicalDevices");
+  return all;
 }
 
 GpuContext::~GpuContext() {
   if (device_) {
     vkDeviceWaitIdle(device_);
+    pipelines_.reset();
+    heap_.reset();
     vkDestroyDevice(device_, nullptr);
   }
   if (messenger_) destroyValidationMessenger(instance_, messenger_);
@@ -60,11 +102,12 @@ GpuContext::~GpuContext() {
 }
 
 void GpuContext::createInstance(bool validation) {
+  openLoader();
   validation = validation && validationInstalled();
-  instance_ = makeInstance(validation);
-  if (validation) messenger_ = createValidationMessenger(instance_);
   // Drivers leak when they are unloaded: one instance stays open as long as the process, so that they never are.
   [[maybe_unused]] static const VkInstance keepsDriversLoaded = makeInstance(false);
+  instance_ = makeInstance(validation);
+  if (validation) messenger_ = createValidationMessenger(instance_);
 }
 
 void GpuContext::choosePhysicalDevice(const std::string& wanted) {
@@ -92,7 +135,7 @@ void GpuContext::chooseQueueFamily() {
       return;
     }
   }
-  throw Error(name_, "", "it has no compute queue", "choose another device with TESSERA_GPU");
+  throw Error(name_, "", "it has no compute queue", "choose another device (tessera info devices)");
 }
 
 void GpuContext::chooseFeatures(const GpuFeatures& allowed) {
@@ -104,6 +147,7 @@ void GpuContext::chooseFeatures(const GpuFeatures& allowed) {
     return used;
   };
   features_.floatAtomics = use(has.floatAtomics, allowed.floatAtomics, "floatAtomics");
+  features_.float64 = use(has.float64, allowed.float64, "float64");
   features_.float16 = use(has.float16, allowed.float16, "float16");
   features_.subgroups = use(has.subgroups, allowed.subgroups, "subgroups");
 }
@@ -120,10 +164,12 @@ void GpuContext::createDevice() {
   atomics.shaderBufferFloat32AtomicAdd = VK_TRUE;
   auto vulkan12 = vulkanStruct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
   vulkan12.bufferDeviceAddress = VK_TRUE;
+  vulkan12.timelineSemaphore = VK_TRUE;
   vulkan12.shaderFloat16 = features_.float16;
   auto vulkan11 = vulkanStruct<VkPhysicalDeviceVulkan11Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES);
   vulkan11.storageBuffer16BitAccess = features_.float16;
   auto features = vulkanStruct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
+  features.features.shaderFloat64 = features_.float64;
   features.pNext = &vulkan11;
   vulkan11.pNext = &vulkan12;
 

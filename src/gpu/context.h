@@ -2,19 +2,24 @@
 // Needs Vulkan 1.2 with buffer device addresses; everything beyond is a feature that has a fallback.
 #pragma once
 
-#include <vulkan/vulkan.h>
+#include <volk.h>
 
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace tessera {
+
+class GpuHeap;
+class PipelineCache;
 
 // What kernels may use where the device has it. As part of GpuOptions: what they may use at all, so that tests force
 // the fallbacks.
 struct GpuFeatures {
   bool floatAtomics =
       true;               // 32-bit float atomic add on buffers (VK_EXT_shader_atomic_float); else a compare-swap loop
+  bool float64 = true;    // double arithmetic; else fp32
   bool float16 = true;    // fp16 arithmetic and 16-bit storage; else fp32
   bool subgroups = true;  // subgroup arithmetic in compute; else shared memory
 };
@@ -23,14 +28,24 @@ struct GpuOptions {
   // A part of the device's name, any case, or its index. Empty: the environment's TESSERA_GPU, else the best there is
   // (discrete, integrated, virtual, processor).
   std::string device;
-  // Masked further by the environment's TESSERA_GPU_WITHOUT, a list of floatAtomics,float16,subgroups.
+  // Masked further by the environment's TESSERA_GPU_WITHOUT, a list of floatAtomics,float64,float16,subgroups.
   GpuFeatures allowed;
   // Validation layers, if installed. The environment's TESSERA_VULKAN_VALIDATION=1 turns them on too.
   bool validation = false;
 };
 
+// A device of this machine, used or not.
+struct GpuDescription {
+  std::string name, driver;
+  bool isProcessor = false;  // Mesa's lavapipe and the like
+  uint64_t memoryBytes = 0;  // its own, or what it shares with the processor
+  std::string missing;       // why it cannot be used; empty where it can
+};
+
 class GpuContext {
  public:
+  // In the order of their indices. Throws Error when there is no loader or no driver.
+  static std::vector<GpuDescription> devices();
   // Throws Error when there is no driver, no such device, or the device lacks what we need.
   static std::shared_ptr<GpuContext> open(const GpuOptions& options = {});
   ~GpuContext();
@@ -47,6 +62,9 @@ class GpuContext {
   VkDevice device() const { return device_; }
   VkQueue queue() const { return queue_; }  // compute and transfer, and graphics where the device draws at all
   uint32_t queueFamily() const { return queueFamily_; }
+
+  GpuHeap& heap() const { return *heap_; }
+  const PipelineCache& pipelines() const { return *pipelines_; }
 
   // The first memory type among `typeBits` that has all `wanted` properties, those with `preferred` first.
   uint32_t memoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted, VkMemoryPropertyFlags preferred) const;
@@ -72,6 +90,8 @@ class GpuContext {
   VkPhysicalDeviceMemoryProperties memory_ = {};
   GpuFeatures features_;
   std::string name_, target_;
+  std::unique_ptr<GpuHeap> heap_;
+  std::unique_ptr<PipelineCache> pipelines_;
 };
 
 }  // namespace tessera

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "gpu/call.h"
+#include "gpu/pipeline_cache.h"
 
 namespace tessera {
 
@@ -38,7 +39,7 @@ GpuKernel::GpuKernel(std::shared_ptr<const GpuContext> context, std::span<const 
     info.stage.pName = "main";
     info.stage.pSpecializationInfo = constants.empty() ? nullptr : &specialization;
     info.layout = layout_;
-    result = vkCreateComputePipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline_);
+    result = vkCreateComputePipelines(device, context_->pipelines().handle(), 1, &info, nullptr, &pipeline_);
     vkDestroyShaderModule(device, module, nullptr);
   }
   if (result != VK_SUCCESS) vkDestroyPipelineLayout(device, layout_, nullptr);

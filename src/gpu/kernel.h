@@ -1,7 +1,7 @@
 // A compute shader ready to run. Every kernel takes the same thing: one push constant, the address of its arguments.
 #pragma once
 
-#include <vulkan/vulkan.h>
+#include <volk.h>
 
 #include <cstdint>
 #include <memory>

@@ -85,18 +85,22 @@ const PhysicalDevice& choosePhysicalDevice(const std::vector<PhysicalDevice>& de
   throw Error("Vulkan device \"" + wanted + "\"", "", "there is no such device", "choose one of: " + list);
 }
 
-void requireFeatures(const PhysicalDevice& device) {
-  const std::string remedy = "update the graphics driver, choose another device with TESSERA_GPU, or use --device cpu";
-  if (device.properties.apiVersion < VK_API_VERSION_1_2) {
-    throw Error(device.properties.deviceName, "", "its driver has no Vulkan 1.2", remedy);
-  }
+std::string missingIn(const PhysicalDevice& device) {
+  if (device.properties.apiVersion < VK_API_VERSION_1_2) return "no Vulkan 1.2";
   auto vulkan12 = vulkanStruct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
   auto features = vulkanStruct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
   features.pNext = &vulkan12;
   vkGetPhysicalDeviceFeatures2(device.handle, &features);
-  if (!vulkan12.bufferDeviceAddress) {
-    throw Error(device.properties.deviceName, "", "its driver has no buffer device addresses", remedy);
-  }
+  if (!vulkan12.bufferDeviceAddress) return "no buffer device addresses";
+  if (!vulkan12.timelineSemaphore) return "no timeline semaphores";
+  return {};
+}
+
+void requireFeatures(const PhysicalDevice& device) {
+  const std::string missing = missingIn(device);
+  if (missing.empty()) return;
+  throw Error(device.properties.deviceName, "", "its driver has " + missing,
+              "update the graphics driver, choose another device (tessera info devices), or use --device cpu");
 }
 
 GpuFeatures presentFeatures(VkPhysicalDevice device) {
@@ -118,6 +122,7 @@ GpuFeatures presentFeatures(VkPhysicalDevice device) {
 
   GpuFeatures present;
   present.floatAtomics = atomics.shaderBufferFloat32AtomicAdd;
+  present.float64 = features.features.shaderFloat64;
   present.float16 = vulkan12.shaderFloat16 && vulkan11.storageBuffer16BitAccess;
   present.subgroups = (subgroup.supportedStages & VK_SHADER_STAGE_COMPUTE_BIT) &&
                       (subgroup.supportedOperations & VK_SUBGROUP_FEATURE_ARITHMETIC_BIT);

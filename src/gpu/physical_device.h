@@ -1,7 +1,7 @@
 // Which of a machine's devices to use, and what it can do.
 #pragma once
 
-#include <vulkan/vulkan.h>
+#include <volk.h>
 
 #include <string>
 #include <vector>
@@ -22,7 +22,9 @@ std::vector<PhysicalDevice> physicalDevices(VkInstance instance);
 // devices when none fits. `devices` must not be empty.
 const PhysicalDevice& choosePhysicalDevice(const std::vector<PhysicalDevice>& devices, const std::string& wanted);
 
-// Throws Error when the device has no Vulkan 1.2 or no buffer device addresses.
+// Of what drivers have to have, what this one lacks: "no Vulkan 1.2". Empty where it lacks nothing.
+std::string missingIn(const PhysicalDevice& device);
+// Throws Error where it lacks something.
 void requireFeatures(const PhysicalDevice& device);
 
 // What the device has of the features that have a fallback. Vulkan 1.2 only.

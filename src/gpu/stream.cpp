@@ -10,88 +10,160 @@ namespace tessera {
 
 namespace {
 
-constexpr size_t kAlignment = 64;       // of staged bytes; more than any argument struct needs
-constexpr int kCommandsPerBatch = 128;  // enough to amortise a submission, few enough to start the device early
+constexpr size_t kAlignment = 64;           // of staged bytes; more than any argument struct needs
+constexpr size_t kCommandsPerBatch = 1024;  // more than a training step has
+constexpr uint32_t kQueries = kCommandsPerBatch + 1;
+constexpr VkPipelineStageFlags kStages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
+
+void barrier(VkCommandBuffer commands, VkAccessFlags reads, VkPipelineStageFlags stages) {
+  auto barrier = vulkanStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
+  barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
+  barrier.dstAccessMask = reads;
+  vkCmdPipelineBarrier(commands, kStages, stages, 0, 1, &barrier, 0, nullptr, 0, nullptr);
+}
 
 }  // namespace
 
 GpuStream::GpuStream(std::shared_ptr<const GpuContext> context, size_t stagingBytes)
     : context_(std::move(context)), stagingBytes_(stagingBytes / kAlignment * kAlignment) {
   CHECK(size_t{0} < stagingBytes_);
+  const VkDevice device = context_->device();
   auto poolInfo = vulkanStruct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
   poolInfo.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
   poolInfo.queueFamilyIndex = context_->queueFamily();
-  checkVulkan(vkCreateCommandPool(context_->device(), &poolInfo, nullptr, &pool_), "vkCreateCommandPool");
+  checkVulkan(vkCreateCommandPool(device, &poolInfo, nullptr, &pool_), "vkCreateCommandPool");
+  auto type = vulkanStruct<VkSemaphoreTypeCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO);
+  type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
+  auto semaphoreInfo = vulkanStruct<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO);
+  semaphoreInfo.pNext = &type;
+  checkVulkan(vkCreateSemaphore(device, &semaphoreInfo, nullptr, &timeline_), "vkCreateSemaphore");
   for (Batch& batch : batches_) {
-    auto info = vulkanStruct<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
-    info.commandPool = pool_;
-    info.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
-    info.commandBufferCount = 1;
-    checkVulkan(vkAllocateCommandBuffers(context_->device(), &info, &batch.commands), "vkAllocateCommandBuffers");
-    auto fenceInfo = vulkanStruct<VkFenceCreateInfo>(VK_STRUCTURE_TYPE_FENCE_CREATE_INFO);
-    checkVulkan(vkCreateFence(context_->device(), &fenceInfo, nullptr, &batch.done), "vkCreateFence");
+    for (Recording& recording : batch.recordings) {
+      auto info = vulkanStruct<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
+      info.commandPool = pool_;
+      info.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+      info.commandBufferCount = 1;
+      checkVulkan(vkAllocateCommandBuffers(device, &info, &recording.buffer), "vkAllocateCommandBuffers");
+    }
     batch.staging = GpuBuffer(context_, stagingBytes_, BufferUse::upload);
   }
-  begin();
 }
 
 GpuStream::~GpuStream() {
+  const VkDevice device = context_->device();
+  vkDeviceWaitIdle(device);
   for (Batch& batch : batches_) {
-    if (batch.submitted) vkWaitForFences(context_->device(), 1, &batch.done, VK_TRUE, UINT64_MAX);
+    if (batch.queries) vkDestroyQueryPool(device, batch.queries, nullptr);
   }
-  for (Batch& batch : batches_) vkDestroyFence(context_->device(), batch.done, nullptr);
-  vkDestroyCommandPool(context_->device(), pool_, nullptr);
+  vkDestroySemaphore(device, timeline_, nullptr);
+  vkDestroyCommandPool(device, pool_, nullptr);
 }
 
-void GpuStream::begin() {
-  Batch& batch = recording();
-  auto info = vulkanStruct<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
-  info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-  checkVulkan(vkBeginCommandBuffer(batch.commands, &info), "vkBeginCommandBuffer");
-  batch.staged = 0;
-  batch.recorded = 0;
+void GpuStream::add(const Command& command) {
+  if (listing().commands.size() >= kCommandsPerBatch) submit();
+  listing().commands.push_back(command);
+  if (measuring_) listing().labels.push_back(label_);
 }
 
 void GpuStream::submit() {
-  Batch& batch = recording();
-  checkVulkan(vkEndCommandBuffer(batch.commands), "vkEndCommandBuffer");
+  Batch& batch = listing();
+  Recording& recording = recordingOf(batch);
+  batch.done = ++sent_;
+  recording.lastUse = sent_;
+  auto values = vulkanStruct<VkTimelineSemaphoreSubmitInfo>(VK_STRUCTURE_TYPE_TIMELINE_SEMAPHORE_SUBMIT_INFO);
+  values.signalSemaphoreValueCount = 1;
+  values.pSignalSemaphoreValues = &batch.done;
   auto info = vulkanStruct<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
+  info.pNext = &values;
   info.commandBufferCount = 1;
-  info.pCommandBuffers = &batch.commands;
-  checkVulkan(vkQueueSubmit(context_->queue(), 1, &info, batch.done), "vkQueueSubmit");
-  batch.submitted = true;
+  info.pCommandBuffers = &recording.buffer;
+  info.signalSemaphoreCount = 1;
+  info.pSignalSemaphores = &timeline_;
+  checkVulkan(vkQueueSubmit(context_->queue(), 1, &info, VK_NULL_HANDLE), "vkQueueSubmit");
   current_ = 1 - current_;
-  wait(recording());
-  begin();
+  wait(listing());
+}
+
+GpuStream::Recording& GpuStream::recordingOf(Batch& batch) {
+  const uint64_t generation = context_->heap().generation();
+  if (!measuring_) {
+    for (Recording& kept : batch.recordings) {
+      if (kept.generation == generation && kept.commands == batch.commands) return kept;
+    }
+  }
+  Recording& oldest = *std::min_element(batch.recordings.begin(), batch.recordings.end(),
+                                        [](const Recording& a, const Recording& b) { return a.lastUse < b.lastUse; });
+  record(batch, oldest);
+  oldest.commands = measuring_ ? std::vector<Command>() : batch.commands;
+  oldest.generation = measuring_ ? 0 : generation;
+  return oldest;
+}
+
+void GpuStream::record(Batch& batch, Recording& recording) {
+  ++recorded_;
+  const VkCommandBuffer commands = recording.buffer;
+  const auto info = vulkanStruct<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
+  checkVulkan(vkBeginCommandBuffer(commands, &info), "vkBeginCommandBuffer");
+  batch.measured = measuring_;
+  if (measuring_) {
+    vkCmdResetQueryPool(commands, batch.queries, 0, kQueries);
+    vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, batch.queries, 0);
+  }
+  uint32_t query = 0;
+  for (const Command& command : batch.commands) {
+    // A barrier reaches back over all batches sent before, too: they are on one queue.
+    barrier(commands,
+            VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_READ_BIT |
+                VK_ACCESS_TRANSFER_WRITE_BIT,
+            kStages);
+    switch (command.kind) {
+      case Command::Kind::copy: {
+        const VkBufferCopy copy = {command.fromOffset, command.toOffset, command.bytes};
+        vkCmdCopyBuffer(commands, command.from, command.to, 1, &copy);
+        break;
+      }
+      case Command::Kind::fill:
+        vkCmdFillBuffer(commands, command.to, command.toOffset, command.bytes, 0);
+        break;
+      case Command::Kind::kernel:
+        vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, command.kernel->pipeline());
+        vkCmdPushConstants(commands, command.kernel->layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof command.arguments,
+                           &command.arguments);
+        vkCmdDispatch(commands, command.groups.x, command.groups.y, command.groups.z);
+        break;
+    }
+    if (measuring_) {
+      vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, batch.queries, ++query);
+    }
+  }
+  barrier(commands, VK_ACCESS_HOST_READ_BIT, VK_PIPELINE_STAGE_HOST_BIT);
+  checkVulkan(vkEndCommandBuffer(commands), "vkEndCommandBuffer");
 }
 
 void GpuStream::wait(Batch& batch) {
-  if (!batch.submitted) return;
-  checkVulkan(vkWaitForFences(context_->device(), 1, &batch.done, VK_TRUE, UINT64_MAX), "vkWaitForFences");
-  checkVulkan(vkResetFences(context_->device(), 1, &batch.done), "vkResetFences");
-  batch.submitted = false;
+  if (batch.done > 0) {
+    auto info = vulkanStruct<VkSemaphoreWaitInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO);
+    info.semaphoreCount = 1;
+    info.pSemaphores = &timeline_;
+    info.pValues = &batch.done;
+    checkVulkan(vkWaitSemaphores(context_->device(), &info, UINT64_MAX), "vkWaitSemaphores");
+    if (batch.measured) collect(batch);
+  }
+  batch.done = 0;
+  batch.measured = false;
+  batch.commands.clear();
+  batch.labels.clear();
+  batch.staged = 0;
   batch.retired.clear();
 }
 
 void GpuStream::finish() {
-  if (recording().recorded > 0 || !recording().retired.empty()) submit();
+  if (!listing().commands.empty() || !listing().retired.empty()) submit();
   for (Batch& batch : batches_) wait(batch);
 }
 
-void GpuStream::beforeCommand() {
-  if (recording().recorded >= kCommandsPerBatch) submit();
-  ++recording().recorded;
-  // A barrier reaches back over all batches sent before, too: they are on one queue.
-  auto barrier = vulkanStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
-  barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
-  barrier.dstAccessMask = VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_READ_BIT |
-                          VK_ACCESS_TRANSFER_WRITE_BIT;
-  constexpr VkPipelineStageFlags kStages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
-  vkCmdPipelineBarrier(recording().commands, kStages, kStages, 0, 1, &barrier, 0, nullptr, 0, nullptr);
-}
-
 size_t GpuStream::stage(std::span<const std::byte> bytes) {
-  Batch& batch = recording();
+  Batch& batch = listing();
   const size_t offset = batch.staged;
   CHECK(bytes.size() <= stagingBytes_ - offset);
   std::memcpy(batch.staging.mapped() + offset, bytes.data(), bytes.size());
@@ -102,11 +174,16 @@ size_t GpuStream::stage(std::span<const std::byte> bytes) {
 void GpuStream::upload(const GpuBuffer& to, size_t offset, std::span<const std::byte> bytes) {
   CHECK(offset + bytes.size() <= to.bytes());
   while (!bytes.empty()) {
-    if (recording().staged == stagingBytes_) submit();
-    beforeCommand();
-    const size_t length = std::min(bytes.size(), stagingBytes_ - recording().staged);
-    const VkBufferCopy copy = {stage(bytes.first(length)), offset, length};
-    vkCmdCopyBuffer(recording().commands, recording().staging.handle(), to.handle(), 1, &copy);
+    if (listing().staged == stagingBytes_ || listing().commands.size() >= kCommandsPerBatch) submit();
+    const size_t length = std::min(bytes.size(), stagingBytes_ - listing().staged);
+    const GpuBuffer& staging = listing().staging;
+    Command copy;
+    copy.from = staging.handle();
+    copy.fromOffset = staging.offset() + stage(bytes.first(length));
+    copy.to = to.handle();
+    copy.toOffset = to.offset() + offset;
+    copy.bytes = length;
+    add(copy);
     bytes = bytes.subspan(length);
     offset += length;
   }
@@ -117,14 +194,13 @@ void GpuStream::download(const GpuBuffer& from, size_t offset, std::span<std::by
   if (!downloads_ && !bytes.empty()) downloads_ = GpuBuffer(context_, stagingBytes_, BufferUse::download);
   while (!bytes.empty()) {
     const size_t length = std::min(bytes.size(), stagingBytes_);
-    beforeCommand();
-    const VkBufferCopy copy = {offset, 0, length};
-    vkCmdCopyBuffer(recording().commands, from.handle(), downloads_.handle(), 1, &copy);
-    auto barrier = vulkanStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
-    barrier.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
-    barrier.dstAccessMask = VK_ACCESS_HOST_READ_BIT;
-    vkCmdPipelineBarrier(recording().commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1,
-                         &barrier, 0, nullptr, 0, nullptr);
+    Command copy;
+    copy.from = from.handle();
+    copy.fromOffset = from.offset() + offset;
+    copy.to = downloads_.handle();
+    copy.toOffset = downloads_.offset();
+    copy.bytes = length;
+    add(copy);
     finish();
     std::memcpy(bytes.data(), downloads_.mapped(), length);
     bytes = bytes.subspan(length);
@@ -136,8 +212,12 @@ void GpuStream::fillZero(const GpuBuffer& buffer, size_t offset, size_t bytes) {
   CHECK(offset % 4 == 0u);
   CHECK(bytes % 4 == 0u);
   if (bytes == 0) return;
-  beforeCommand();
-  vkCmdFillBuffer(recording().commands, buffer.handle(), offset, bytes, 0);
+  Command fill;
+  fill.kind = Command::Kind::fill;
+  fill.to = buffer.handle();
+  fill.toOffset = buffer.offset() + offset;
+  fill.bytes = bytes;
+  add(fill);
 }
 
 void GpuStream::run(const GpuKernel& kernel, std::span<const std::byte> arguments, Groups groups) {
@@ -146,17 +226,51 @@ void GpuStream::run(const GpuKernel& kernel, std::span<const std::byte> argument
   CHECK(groups.x <= context_->limits().maxComputeWorkGroupCount[0]);
   CHECK(groups.y <= context_->limits().maxComputeWorkGroupCount[1]);
   CHECK(groups.z <= context_->limits().maxComputeWorkGroupCount[2]);
-  if (stagingBytes_ - recording().staged < arguments.size()) submit();
-  beforeCommand();
-  const VkDeviceAddress address = recording().staging.address() + stage(arguments);
-  const VkCommandBuffer commands = recording().commands;
-  vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.pipeline());
-  vkCmdPushConstants(commands, kernel.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof address, &address);
-  vkCmdDispatch(commands, groups.x, groups.y, groups.z);
+  const bool full = stagingBytes_ - listing().staged < arguments.size();
+  if (full || listing().commands.size() >= kCommandsPerBatch) submit();
+  Command command;
+  command.kind = Command::Kind::kernel;
+  command.kernel = &kernel;
+  command.arguments = listing().staging.address() + stage(arguments);
+  command.groups = groups;
+  add(command);
 }
 
 void GpuStream::retire(GpuBuffer buffer) {
-  if (buffer) recording().retired.push_back(std::move(buffer));
+  if (buffer) listing().retired.push_back(std::move(buffer));
+}
+
+void GpuStream::measure(bool on) {
+  finish();
+  measuring_ = on;
+  measured_.clear();
+  if (!on) return;
+  for (Batch& batch : batches_) {
+    if (batch.queries) continue;
+    auto info = vulkanStruct<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
+    info.queryType = VK_QUERY_TYPE_TIMESTAMP;
+    info.queryCount = kQueries;
+    checkVulkan(vkCreateQueryPool(context_->device(), &info, nullptr, &batch.queries), "vkCreateQueryPool");
+  }
+}
+
+void GpuStream::collect(Batch& batch) {
+  const uint32_t count = static_cast<uint32_t>(batch.labels.size()) + 1;
+  std::vector<uint64_t> ticks(count);
+  checkVulkan(vkGetQueryPoolResults(context_->device(), batch.queries, 0, count, count * sizeof(uint64_t), ticks.data(),
+                                    sizeof(uint64_t), VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
+              "vkGetQueryPoolResults");
+  const double secondsPerTick = 1e-9 * context_->limits().timestampPeriod;
+  for (uint32_t i = 0; i + 1 < count; ++i) {
+    Measured& all = measured_[std::string(batch.labels[i])];
+    all.seconds += secondsPerTick * static_cast<double>(ticks[i + 1] - ticks[i]);
+    ++all.commands;
+  }
+}
+
+const std::map<std::string, GpuStream::Measured, std::less<>>& GpuStream::measured() {
+  finish();
+  return measured_;
 }
 
 }  // namespace tessera

@@ -1,12 +1,18 @@
-// Work for the device, in order: copies, fills and kernels are recorded and sent in batches; each sees all that came
+// Work for the device, in order: copies, fills and kernels are listed and sent in batches; each sees all that came
 // before it. Only `download` and `finish` wait. For one thread at a time.
+//
+// A batch that is the same list as one before (a training step, mostly) is not recorded again: its commands are sent
+// once more with new arguments, which lie in memory.
 #pragma once
 
-#include <vulkan/vulkan.h>
+#include <volk.h>
 
 #include <array>
+#include <map>
 #include <memory>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "gpu/buffer.h"
@@ -16,12 +22,13 @@ namespace tessera {
 
 struct Groups {
   uint32_t x = 1, y = 1, z = 1;
+  bool operator==(const Groups&) const = default;
 };
 
 class GpuStream {
  public:
   // `stagingBytes` is what one batch can carry of uploads and kernel arguments; larger uploads take several batches.
-  explicit GpuStream(std::shared_ptr<const GpuContext> context, size_t stagingBytes = size_t{4} << 20);
+  explicit GpuStream(std::shared_ptr<const GpuContext> context, size_t stagingBytes = size_t{16} << 20);
   ~GpuStream();  // waits
   GpuStream(const GpuStream&) = delete;
   GpuStream& operator=(const GpuStream&) = delete;
@@ -35,32 +42,69 @@ class GpuStream {
   // Destroys the buffer once nothing queued so far can touch it.
   void retire(GpuBuffer buffer);
 
+  // What each label's commands took on the device since `measure(true)`. Batches are then recorded anew each time.
+  struct Measured {
+    double seconds = 0;
+    uint64_t commands = 0;
+  };
+  void measure(bool on);
+  void label(std::string_view name) { label_ = name; }             // of what comes next; outlives the stream
+  const std::map<std::string, Measured, std::less<>>& measured();  // waits
+
+  // Of this stream so far: batches sent, and those of them that had to be recorded.
+  uint64_t batchesSent() const { return sent_; }
+  uint64_t batchesRecorded() const { return recorded_; }
+
   const std::shared_ptr<const GpuContext>& context() const { return context_; }
 
  private:
+  struct Command {
+    enum class Kind { copy, fill, kernel } kind = Kind::copy;
+    VkBuffer from = VK_NULL_HANDLE, to = VK_NULL_HANDLE;
+    size_t fromOffset = 0, toOffset = 0, bytes = 0;
+    const GpuKernel* kernel = nullptr;
+    VkDeviceAddress arguments = 0;
+    Groups groups;
+    bool operator==(const Command&) const = default;
+  };
+  struct Recording {
+    std::vector<Command> commands;
+    VkCommandBuffer buffer = VK_NULL_HANDLE;
+    uint64_t lastUse = 0;
+    uint64_t generation = 0;  // of the heap: buffers that have gone must not be named again
+  };
   struct Batch {
-    VkCommandBuffer commands = VK_NULL_HANDLE;
-    VkFence done = VK_NULL_HANDLE;
+    std::vector<Command> commands;
+    std::vector<std::string_view> labels;  // of each command, while measuring
     GpuBuffer staging;
     size_t staged = 0;
-    int recorded = 0;        // commands since `begin`
-    bool submitted = false;  // and not yet waited for
+    uint64_t done = 0;  // the semaphore's value then
     std::vector<GpuBuffer> retired;
+    std::array<Recording, 4> recordings;
+    VkQueryPool queries = VK_NULL_HANDLE;
+    bool measured = false;
   };
 
-  Batch& recording() { return batches_[current_]; }
-  void begin();
+  Batch& listing() { return batches_[current_]; }
+  void add(const Command& command);
   void submit();  // sends the batch, and begins the next one
+  Recording& recordingOf(Batch& batch);
+  void record(Batch& batch, Recording& recording);
   void wait(Batch& batch);
-  void beforeCommand();                            // makes all earlier results visible to the next command
+  void collect(Batch& batch);                      // timestamps
   size_t stage(std::span<const std::byte> bytes);  // → offset in the staging buffer; the bytes must fit
 
   std::shared_ptr<const GpuContext> context_;
   size_t stagingBytes_;
   VkCommandPool pool_ = VK_NULL_HANDLE;
-  std::array<Batch, 2> batches_;  // one is recorded while the device works on the other
+  VkSemaphore timeline_ = VK_NULL_HANDLE;
+  std::array<Batch, 2> batches_;  // one is listed while the device works on the other
   int current_ = 0;
+  uint64_t sent_ = 0, recorded_ = 0;
   GpuBuffer downloads_;
+  bool measuring_ = false;
+  std::string_view label_;
+  std::map<std::string, Measured, std::less<>> measured_;
 };
 
 }  // namespace tessera

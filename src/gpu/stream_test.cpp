@@ -118,6 +118,56 @@ TEST_F(GpuStreamTest, KeepsARetiredBufferUntilTheWorkOnItIsDone) {
   EXPECT_NO_THROW(stream.finish());
 }
 
+TEST_F(GpuStreamTest, RecordsABatchOnceAndSendsItAgainWithOtherArgumentsAndUploads) {
+  GpuStream stream(context_);
+  const GpuKernel kernel(context_, kDoubleValuesSpirv);
+  const GpuBuffer a(context_, 4000), b(context_, 4000);
+  for (uint32_t i = 0; i < 20; ++i) {
+    const std::vector<uint32_t> values(1000, i);
+    stream.upload(a, 0, std::as_bytes(std::span(values)));
+    stream.upload(b, 0, std::as_bytes(std::span(values)));
+    runDouble(stream, kernel, i % 2 ? a : b);  // the address differs, which is an argument
+    uint32_t last = 0;
+    stream.download(a, 3996, std::as_writable_bytes(std::span(&last, 1)));
+    EXPECT_EQ(last, i % 2 ? 2 * i : i);
+  }
+  EXPECT_EQ(stream.batchesSent(), 20u);
+  EXPECT_EQ(stream.batchesRecorded(), 2u);  // once for each of its two staging buffers
+}
+
+TEST_F(GpuStreamTest, RecordsABatchAnewWhenItsBuffersHaveGone) {
+  GpuStream stream(context_);
+  const std::vector<uint32_t> values = numbers(size_t{10} << 20);
+  for (int i = 0; i < 6; ++i) {
+    GpuBuffer large(context_, size_t{40} << 20);  // of its own block, perhaps with the handle of the last
+    stream.fillZero(large, 0, large.bytes());
+    uint32_t last = 1;
+    stream.download(large, large.bytes() - 4, std::as_writable_bytes(std::span(&last, 1)));
+    EXPECT_EQ(last, 0u);
+    stream.retire(std::move(large));
+    stream.finish();
+  }
+  EXPECT_GE(stream.batchesRecorded(), 6u);
+}
+
+TEST_F(GpuStreamTest, MeasuresWhatEachLabelTook) {
+  GpuStream stream(context_);
+  const GpuKernel kernel(context_, kDoubleValuesSpirv);
+  const GpuBuffer buffer(context_, 4000);
+  stream.measure(true);
+  for (int i = 0; i < 2000; ++i) {
+    stream.label(i % 2 ? "odd" : "even");
+    runDouble(stream, kernel, buffer);
+  }
+  const auto measured = stream.measured();
+  EXPECT_EQ(measured.at("odd").commands, 1000u);
+  EXPECT_EQ(measured.at("even").commands, 1000u);
+  EXPECT_GT(measured.at("odd").seconds, 0);
+  stream.measure(false);
+  runDouble(stream, kernel, buffer);
+  EXPECT_TRUE(stream.measured().empty());
+}
+
 TEST_F(GpuStreamTest, FinishesWhenThereIsNothingToDo) {
   GpuStream stream(context_);
   stream.finish();

@@ -1,7 +1,7 @@
 // Khronos' validation layers: they say what we do wrong with Vulkan. Off unless asked for.
 #pragma once
 
-#include <vulkan/vulkan.h>
+#include <volk.h>
 
 namespace tessera {
 

@@ -2,10 +2,11 @@
 
 #include "compute/vulkan/vulkan_device.h"
 #include "shaders/adam.h"
+#include "shaders/compute/arguments_adam.h"
 
 namespace tessera {
 
-void VulkanDevice::run(const Adam& options) {
+void VulkanDevice::enqueue(const Adam& options) {
   const size_t count = options.parameters.count;
   CHECK(count < size_t{1} << 31);
   CHECK(options.gradients.count == count);

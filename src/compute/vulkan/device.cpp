@@ -1,6 +1,7 @@
 #include "compute/vulkan/device.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "compute/vulkan/vulkan_device.h"
 
@@ -50,19 +51,6 @@ void VulkanDevice::finish() {
   stream_->finish();
 }
 
-bool VulkanDevice::supports(Operation operation) const {
-  switch (operation) {
-    case Operation::kHashGridForward:
-    case Operation::kHashGridBackward:
-    case Operation::kMlpForward:
-    case Operation::kMlpBackward:
-    case Operation::kAdam:
-      return true;
-    default:
-      return false;
-  }
-}
-
 const GpuKernel& VulkanDevice::kernel(std::span<const uint32_t> spirv, std::vector<uint32_t> constants) {
   const auto key = std::make_pair(spirv.data(), std::move(constants));
   const auto found = kernels_.find(key);
@@ -75,9 +63,24 @@ const GpuKernel& VulkanDevice::sumKernel(std::span<const uint32_t> withFloatAtom
   return kernel(stream_->context()->features().floatAtomics ? withFloatAtomics : without, std::move(constants));
 }
 
+const GpuKernel& VulkanDevice::realKernel(std::span<const uint32_t> inDouble, std::span<const uint32_t> inFloat,
+                                          std::vector<uint32_t> constants) {
+  return kernel(stream_->context()->features().float64 ? inDouble : inFloat, std::move(constants));
+}
+
+arguments::RealArguments VulkanDevice::realArguments(double value) const {
+  if (!stream_->context()->features().float64) return {std::bit_cast<uint32_t>(static_cast<float>(value)), 0};
+  const auto bits = std::bit_cast<uint64_t>(value);
+  return {static_cast<uint32_t>(bits), static_cast<uint32_t>(bits >> 32)};
+}
+
 uint32_t VulkanDevice::groups(size_t count, size_t perGroup) const {
   const size_t most = stream_->context()->limits().maxComputeWorkGroupCount[0];
-  return static_cast<uint32_t>(std::min((count + perGroup - 1) / perGroup, most));
+  size_t groups = (count + perGroup - 1) / perGroup;
+  // Few different numbers: batches that are the same are not recorded again, and empty workgroups cost next to nothing.
+  const int spare = static_cast<int>(std::bit_width(groups)) - 4;
+  if (spare > 0) groups = ((groups + (size_t{1} << spare) - 1) >> spare) << spare;
+  return static_cast<uint32_t>(std::min(groups, most));
 }
 
 uint64_t VulkanDevice::scratch(size_t floats) {

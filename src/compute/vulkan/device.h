@@ -1,4 +1,4 @@
-// The GPU device: GLSL kernels on any vendor's Vulkan 1.2 driver. It has the hash grid, the MLP and Adam so far.
+// The GPU device: GLSL kernels on any vendor's Vulkan 1.2 driver.
 #pragma once
 
 #include <memory>

@@ -1,6 +1,7 @@
 #include "compute/hash_grid.h"
 
 #include "compute/vulkan/vulkan_device.h"
+#include "shaders/compute/arguments_hash_grid.h"
 #include "shaders/hash_grid_backward.h"
 #include "shaders/hash_grid_backward_float_atomics.h"
 #include "shaders/hash_grid_forward.h"
@@ -24,7 +25,7 @@ void setLevels(const HashGrid& grid, arguments::LevelArguments* levels) {
 
 }  // namespace
 
-void VulkanDevice::run(const HashGridForward& options) {
+void VulkanDevice::enqueue(const HashGridForward& options) {
   const HashGrid& grid = options.grid;
   CHECK(options.encoded.columns == grid.columns());
   arguments::HashGridForwardArguments arguments = {};
@@ -37,7 +38,7 @@ void VulkanDevice::run(const HashGridForward& options) {
         {groups(options.samples.capacity, kSamplesPerGroup), static_cast<uint32_t>(grid.levels.size())});
 }
 
-void VulkanDevice::run(const HashGridBackward& options) {
+void VulkanDevice::enqueue(const HashGridBackward& options) {
   const HashGrid& grid = options.grid;
   CHECK(options.encodedGradients.columns == grid.columns());
   arguments::HashGridBackwardArguments arguments = {};

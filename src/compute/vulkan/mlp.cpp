@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "compute/vulkan/vulkan_device.h"
+#include "shaders/compute/arguments_mlp.h"
 #include "shaders/mlp_backward.h"
 #include "shaders/mlp_forward.h"
 #include "shaders/mlp_weight_gradients.h"
@@ -32,7 +33,7 @@ Block blockFor(const MlpShape& shape, uint32_t stateWidth) {
 
 }  // namespace
 
-void VulkanDevice::run(const MlpForward& options) {
+void VulkanDevice::enqueue(const MlpForward& options) {
   const MlpShape& shape = options.shape;
   const size_t capacity = options.samples.capacity;
   CHECK(options.input.columns == static_cast<uint32_t>(shape.inputs));
@@ -54,7 +55,7 @@ void VulkanDevice::run(const MlpForward& options) {
   queue(kernel(kMlpForwardSpirv, block.constants()), arguments, {groups(capacity, block.samples)});
 }
 
-void VulkanDevice::run(const MlpBackward& options) {
+void VulkanDevice::enqueue(const MlpBackward& options) {
   const MlpShape& shape = options.shape;
   const uint32_t width = shape.width, hiddenLayers = shape.hiddenLayers;
   const uint32_t paddedOutputs = shape.layerOutputs(shape.hiddenLayers);

@@ -1,6 +1,7 @@
 // Device on a GpuStream: every operation copies its arguments, queues its kernels and returns.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <span>
@@ -35,28 +36,72 @@ class VulkanDevice : public Device {
   void readBytes(const Memory& from, size_t offset, std::span<std::byte> to) override;
   void fillZero(Memory& memory, size_t offset, size_t bytes) override;
   void finish() override;
-  bool supports(Operation operation) const override;
+  bool supports(Operation) const override { return true; }
 
   using Device::fillZero;
   using Device::run;
-  void run(const HashGridForward& options) override;
-  void run(const HashGridBackward& options) override;
-  void run(const MlpForward& options) override;
-  void run(const MlpBackward& options) override;
-  void run(const Adam& options) override;
+#define TESSERA_RUN_LABELLED(name)         \
+  void run(const name& options) override { \
+    stream_->label(#name);                 \
+    enqueue(options);                      \
+  }
+  TESSERA_OPERATIONS(TESSERA_RUN_LABELLED)
+#undef TESSERA_RUN_LABELLED
 
  private:
+#define TESSERA_ENQUEUE(name) void enqueue(const name& options);
+  TESSERA_OPERATIONS(TESSERA_ENQUEUE)
+#undef TESSERA_ENQUEUE
+
   // Compiled at first use. `constants` are the shader's specialization constants in order.
   const GpuKernel& kernel(std::span<const uint32_t> spirv, std::vector<uint32_t> constants = {});
   // Chooses between the two forms of a kernel that adds to sums from many invocations.
   const GpuKernel& sumKernel(std::span<const uint32_t> withFloatAtomics, std::span<const uint32_t> without,
                              std::vector<uint32_t> constants = {});
+  // And of one that reckons in double where it can (real.glsl).
+  const GpuKernel& realKernel(std::span<const uint32_t> inDouble, std::span<const uint32_t> inFloat,
+                              std::vector<uint32_t> constants = {});
+  arguments::RealArguments realArguments(double value) const;
   template <class Arguments>
   void queue(const GpuKernel& kernel, const Arguments& arguments, Groups groups) {
     stream_->run(kernel, std::as_bytes(std::span(&arguments, 1)), groups);
   }
   // Enough workgroups of `perGroup` for `count`, or the most there may be: kernels share out what is left.
   uint32_t groups(size_t count, size_t perGroup) const;
+  uint32_t atLeastOneGroup(size_t count, size_t perGroup) const {
+    return std::max(groups(count, perGroup), 1u);
+  }
+
+  // values[i] = Σ_{j <= i} values[j] for i below `rows`, in place; see ScanArguments. With `marks`, what is summed are
+  // the bits of those words, and of all words before each. `scratch` has room for scanScratch(rows.capacity) numbers.
+  struct RunningSums {
+    Count rows;
+    uint64_t values = 0;
+    uint64_t total = 0, fitting = 0;  // [1] each
+    uint32_t limit = 0;
+    uint64_t scratch = 0;
+    uint64_t marks = 0;
+  };
+  void queueRunningSums(const RunningSums& sums);
+  static size_t scanScratch(size_t rows);
+  // What kernels need that first count a ray's samples and then write them.
+  struct RayScratch {
+    uint64_t counts = 0, nexts = 0;  // [rays]
+    uint64_t fitting = 0;            // [1]
+    uint64_t partials = 0;
+  };
+  RayScratch rayScratch(uint32_t rays);
+  void zeroRows(const Count& rows, uint32_t columns, const Slice<float>& numbers);
+  void moveRows(const Count& rows, const Slice<const uint32_t>& source, const Matrix<const float>& from,
+                const Matrix<const float>& to, bool scatter);
+  // Runs a kernel whose workgroups leave `columns` sums each at arguments.partials, and adds those up.
+  template <class Arguments>
+  void queueSums(const GpuKernel& kernel, Arguments& arguments, uint32_t groups, uint32_t columns, uint64_t sums) {
+    arguments.partials = scratch(size_t{groups} * columns);
+    queue(kernel, arguments, {groups});
+    addPartials(arguments.partials, groups, columns, sums);
+  }
+  void addPartials(uint64_t partials, uint32_t count, uint32_t columns, uint64_t sums);
   // The address of at least `floats` floats for use within one operation.
   uint64_t scratch(size_t floats);
 

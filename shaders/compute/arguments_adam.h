@@ -1,0 +1,26 @@
+// Arguments of Adam (src/compute/adam.h).
+#ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_ADAM_H
+#define TESSERA_SHADERS_COMPUTE_ARGUMENTS_ADAM_H
+#include "arguments.h"
+TESSERA_BEGIN_ARGUMENTS
+
+struct AdamArguments {
+  FloatPointer parameters;
+  FloatPointer gradients;
+  FloatPointer firstMoments;
+  FloatPointer secondMoments;
+  UintPointer counts;
+  UintPointer rows;  // 0: none
+  uint count;
+  uint skipZeroGradients;
+  float rate;
+  float beta1;
+  float beta2;
+  float epsilon;
+  float l2;
+  uint unused;
+};
+TESSERA_SIZE(AdamArguments, 80);
+
+TESSERA_END_ARGUMENTS
+#endif

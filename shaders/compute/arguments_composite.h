@@ -1,0 +1,47 @@
+// Arguments of volume rendering (src/compute/composite.h).
+#ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_COMPOSITE_H
+#define TESSERA_SHADERS_COMPUTE_ARGUMENTS_COMPOSITE_H
+#include "arguments.h"
+TESSERA_BEGIN_ARGUMENTS
+
+struct CompositeForwardArguments {
+  CountArguments rays;
+  uint extinction;  // 0 opacity, 1 density, 2 logarithm of density
+  float minTransmittance;
+  UintPointer firstSample;
+  MatrixArguments x;
+  FloatPointer steps;
+  FloatPointer distances;   // optional
+  MatrixArguments colours;  // optional
+  FloatPointer background;  // optional
+  FloatPointer colour;
+  FloatPointer opacity;
+  FloatPointer depth;  // optional
+  FloatPointer weights;
+};
+TESSERA_SIZE(CompositeForwardArguments, 144);
+
+struct CompositeBackwardArguments {
+  CountArguments rays;
+  uint extinction;
+  float minTransmittance;
+  float fullGradientDistance;
+  uint addToXGradients;
+  UintPointer firstSample;
+  MatrixArguments x;
+  FloatPointer steps;
+  FloatPointer distances;
+  MatrixArguments colours;            // optional
+  FloatPointer background;            // optional
+  FloatPointer rayColourGradients;    // with colours
+  FloatPointer rayOpacityGradients;   // optional
+  FloatPointer rayDepthGradients;     // optional
+  FloatPointer weightGradients;       // optional
+  FloatPointer opacities;             // [samples][2]: opacity, and the transmittance in front
+  FloatPointer xGradients;
+  MatrixArguments colourGradients;    // optional
+};
+TESSERA_SIZE(CompositeBackwardArguments, 192);
+
+TESSERA_END_ARGUMENTS
+#endif

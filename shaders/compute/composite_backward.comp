@@ -1,0 +1,69 @@
+// One invocation a ray: front to back for opacities, then back to front with what a unit of light arriving from behind
+// is worth to the loss. It never divides by 1 - opacity.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "kernel.glsl"
+#include "arguments_composite.h"
+#include "composite.glsl"
+
+layout(local_size_x = 64) in;
+layout(constant_id = 0) const uint kColumns = 3;
+KERNEL_ARGUMENTS(CompositeBackwardArguments)
+
+// Opacities and transmittances of the ray's samples up to where it stops. → that place.
+uint throughRay(CompositeBackwardArguments a, uint first, uint end) {
+  float transmittance = 1;
+  uint i = first;
+  for (; i < end && transmittance >= a.minTransmittance; ++i) {
+    const float length = a.extinction == kOpacity ? 0 : a.steps.values[i];
+    const float alpha = opacityOf(a.extinction, a.x.data.values[elementOf(a.x, i, 0)], length);
+    a.opacities.values[2 * i] = alpha;
+    a.opacities.values[2 * i + 1] = transmittance;
+    transmittance *= 1 - alpha;
+  }
+  return i;
+}
+
+float slopeOfOpacity(CompositeBackwardArguments a, uint i, float alpha) {
+  if (a.extinction == kOpacity) return 1;
+  const float slope = (1 - alpha) * a.steps.values[i];
+  return a.extinction == kDensity ? slope : slope * exp(clamp(a.x.data.values[elementOf(a.x, i, 0)], -15, 15));
+}
+
+void backward(CompositeBackwardArguments a, uint ray) {
+  const uint first = a.firstSample.values[ray], end = a.firstSample.values[ray + 1];
+  const uint stop = throughRay(a, first, end);
+  float gradient[kMostColumns];
+  float rear = WANTED(a.rayOpacityGradients) ? -a.rayOpacityGradients.values[ray] : 0;  // opacity = 1 - T
+  [[unroll]] for (uint c = 0; c < kColumns; ++c) {
+    gradient[c] = a.rayColourGradients.values[kColumns * ray + c];
+    if (WANTED(a.background)) rear += gradient[c] * a.background.values[kColumns * ray + c];
+  }
+  for (uint i = stop; i-- > first;) {
+    const float alpha = a.opacities.values[2 * i], reaching = a.opacities.values[2 * i + 1];
+    float scale = 1;
+    if (a.fullGradientDistance > 0) {
+      const float nearness = a.distances.values[i] / a.fullGradientDistance;
+      scale = min(1, nearness * nearness);
+    }
+    float worth = WANTED(a.weightGradients) ? a.weightGradients.values[i] : 0;
+    if (WANTED(a.rayDepthGradients)) worth += a.rayDepthGradients.values[ray] * a.distances.values[i];
+    [[unroll]] for (uint c = 0; c < kColumns; ++c) {
+      worth += gradient[c] * a.colours.data.values[elementOf(a.colours, i, c)];
+      a.colourGradients.data.values[elementOf(a.colourGradients, i, c)] = scale * reaching * alpha * gradient[c];
+    }
+    const float slope = scale * reaching * (worth - rear) * slopeOfOpacity(a, i, alpha);
+    a.xGradients.values[i] = a.addToXGradients != 0 ? a.xGradients.values[i] + slope : slope;
+    rear = alpha * worth + (1 - alpha) * rear;
+  }
+  for (uint i = stop; i < end; ++i) {
+    if (a.addToXGradients == 0) a.xGradients.values[i] = 0;
+    [[unroll]] for (uint c = 0; c < kColumns; ++c) {
+      a.colourGradients.data.values[elementOf(a.colourGradients, i, c)] = 0;
+    }
+  }
+}
+
+void main() {
+  FOR_EACH_ROW(ray, arguments.values.rays) backward(arguments.values, ray);
+}

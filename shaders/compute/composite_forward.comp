@@ -1,0 +1,40 @@
+// One invocation a ray, front to back.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "kernel.glsl"
+#include "arguments_composite.h"
+#include "composite.glsl"
+
+layout(local_size_x = 64) in;
+layout(constant_id = 0) const uint kColumns = 3;
+KERNEL_ARGUMENTS(CompositeForwardArguments)
+
+void main() {
+  CompositeForwardArguments a = arguments.values;
+  FOR_EACH_ROW(ray, a.rays) {
+    float transmittance = 1, depth = 0;
+    float sum[kMostColumns];
+    [[unroll]] for (uint c = 0; c < kColumns; ++c) sum[c] = 0;
+    const uint end = a.firstSample.values[ray + 1];
+    for (uint i = a.firstSample.values[ray]; i < end; ++i) {
+      float weight = 0;  // behind the stop
+      if (transmittance >= a.minTransmittance) {
+        const float length = a.extinction == kOpacity ? 0 : a.steps.values[i];
+        const float alpha = opacityOf(a.extinction, a.x.data.values[elementOf(a.x, i, 0)], length);
+        weight = transmittance * alpha;
+        [[unroll]] for (uint c = 0; c < kColumns; ++c) {
+          sum[c] += weight * a.colours.data.values[elementOf(a.colours, i, c)];
+        }
+        if (WANTED(a.depth)) depth += weight * a.distances.values[i];
+        transmittance *= 1 - alpha;
+      }
+      a.weights.values[i] = weight;
+    }
+    [[unroll]] for (uint c = 0; c < kColumns; ++c) {
+      const uint at = kColumns * ray + c;
+      a.colour.values[at] = WANTED(a.background) ? sum[c] + transmittance * a.background.values[at] : sum[c];
+    }
+    a.opacity.values[ray] = 1 - transmittance;
+    if (WANTED(a.depth)) a.depth.values[ray] = depth;
+  }
+}

@@ -1,0 +1,29 @@
+// One invocation a sample.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "kernel.glsl"
+#include "arguments_virtual_grid.h"
+#include "vectors.glsl"
+#include "virtual_grid.glsl"
+
+layout(local_size_x = 64) in;
+KERNEL_ARGUMENTS(LatticeArguments)
+
+const uint kColumns = 16;
+
+void main() {
+  LatticeArguments a = arguments.values;
+  FOR_EACH_ROW(index, a.samples) {
+    const Places places = placesOf(a.grid, pointAt(a.positions, index));
+    const uint block = a.blockOfSample.values[index];
+    float sums[kColumns];
+    [[unroll]] for (uint c = 0; c < kColumns; ++c) sums[c] = 0;
+    for (uint k = 0; k < 8; ++k) {
+      const Corner corner = cornerAt(a.grid, places, k);
+      const uint row = rowOf(a.grid, a.marks, a.ranks, block, index, k, corner.texel);
+      if (row >= a.texels.capacity) continue;
+      [[unroll]] for (uint c = 0; c < kColumns; ++c) sums[c] += corner.weight * a.values.values[kColumns * row + c];
+    }
+    [[unroll]] for (uint c = 0; c < kColumns; ++c) a.mixed.data.values[elementOf(a.mixed, index, c)] = sums[c];
+  }
+}

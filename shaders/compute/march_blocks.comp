@@ -1,0 +1,190 @@
+// One invocation a ray, run twice as march_rays.comp is. Empty cells are left by whole steps, so samples are those of
+// brute force.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "kernel.glsl"
+#include "arguments_blocks.h"
+#include "real.glsl"
+#include "block_space.glsl"
+#include "domain_pieces.glsl"
+#include "vectors.glsl"
+
+layout(local_size_x = 64) in;
+layout(constant_id = 0) const bool kWrite = false;
+KERNEL_ARGUMENTS(MarchBlocksArguments)
+
+const uint kThrough = 0xffffffffu, kNoSlot = 0xffffffffu;
+const real kLongestStep = real(1e3);
+
+struct Ray {
+  uint index;
+  realVec3 origin, direction;
+  real jitter, far;
+  uint first;  // the interval to go on from
+  uint row;    // of its first sample
+};
+
+struct State {
+  uint samples, number;  // samples made; intervals of the pieces in front
+  real before;           // their length
+  uint next;             // the interval to go on from
+  bool done;
+};
+
+void store(MarchBlocksArguments a, Ray ray, uint row, uint slot, DomainPiece s, realVec3 position, real before,
+           real begin, real end) {
+  const real middle = (begin + end) / 2, distance = alongPiece(s, begin);
+  const real inScene = min(min(alongPieceBetween(s, begin, end), ray.far - distance), kLongestStep);
+  a.rayOfSample.values[row] = ray.index;
+  a.slotOfSample.values[row] = slot;
+  storePoint(a.positions, row, vec3(position));
+  a.distances.values[row] = float(alongPiece(s, middle));
+  a.steps.values[row] = float(inScene);
+  a.middles.values[row] = float(before + middle);
+  a.widths.values[row] = float(end - begin);
+}
+
+// Intervals [from, count) of a piece.
+void marchPiece(MarchBlocksArguments a, Ray ray, DomainPiece s, real all, uint slot, uint from, uint count,
+                inout State state) {
+  const real stride = a.step * 2 * all;
+  const uint firstWord = slot * (a.cells * a.cells * a.cells / 32);
+  for (uint i = from; i < count;) {
+    const real begin = max(real(0), (real(i) - 1 + ray.jitter) * stride);
+    const real end = min(s.whole, (real(i) + ray.jitter) * stride), middle = (begin + end) / 2;
+    const realVec3 position = clamp((s.start + middle * s.direction + all) / (2 * all), real(0), real(1));
+    const uvec3 cell = min(uvec3(position * real(a.cells)), uvec3(a.cells - 1));
+    const uint bit = cell.x + a.cells * (cell.y + a.cells * cell.z);
+    if ((a.occupancy.values[firstWord + bit / 32] >> bit % 32 & 1) == 0) {
+      // Whole intervals to the first whose middle is past the empty cell; the tolerance costs one more look.
+      real exit = s.whole;
+      for (int axis = 0; axis < 3; ++axis) {
+        const real d = s.direction[axis];
+        if (d == 0) continue;
+        const real face = (real(cell[axis]) + (d > 0 ? 1 : 0)) / a.cells * 2 * all - all;
+        exit = min(exit, (face - s.start[axis]) / d);
+      }
+      const real passed = floor((exit - kRoundingShare) / stride + real(0.5) - ray.jitter);
+      i = max(i + 1, uint(clamp(passed, real(0), real(count))));
+      continue;
+    }
+    if (alongPiece(s, begin) >= ray.far) return;
+    if (kWrite) store(a, ray, ray.row + state.samples, slot, s, position, state.before, begin, end);
+    ++i;
+    if (++state.samples == a.most) {
+      state.next = state.number + i;
+      state.done = true;
+      return;
+    }
+  }
+}
+
+// How many intervals begin within a piece: at (i - 1 + jitter) steps, and the first.
+uint intervalsOf(Ray ray, real whole, real stride) {
+  uint count = uint(max(real(1), ceil(whole / stride + 1 - ray.jitter)));
+  while (count > 1 && (real(count) - 2 + ray.jitter) * stride >= whole) --count;
+  while ((real(count) - 1 + ray.jitter) * stride < whole) ++count;
+  return count;
+}
+
+// All that one block owns of the ray between two distances.
+void marchRange(MarchBlocksArguments a, Ray ray, real near, real far, inout State state) {
+  const real middle = (near + far) / 2;
+  const uint block = blockAt(a.space, ray.origin + middle * ray.direction);
+  const Placement placement = placementOf(a.space, block);
+  if (!placement.contracted) {  // walls bound it along x and y
+    const real o = ray.origin.z - placement.centre.z, d = ray.direction.z;
+    if (d == 0) {
+      if (abs(o) > 1) return;
+    } else {
+      near = max(near, min((-1 - o) / d, (1 - o) / d));
+      far = min(far, max((-1 - o) / d, (1 - o) / d));
+    }
+  }
+  if (!(near < far)) return;
+  const uint slot = WANTED(a.slotOfBlock) ? a.slotOfBlock.values[block] : block;
+  const real all = placement.halfDomain;
+  DomainPieces pieces = piecesOf(placement, ray.origin, ray.direction, near, far);
+  DomainPiece piece;
+  while (!state.done && nextPiece(pieces, placement.contracted, piece)) {
+    if (piece.entry >= ray.far) {
+      state.done = true;
+      return;
+    }
+    const uint count = intervalsOf(ray, piece.whole, a.step * 2 * all);
+    if (slot != kNoSlot && ray.first < state.number + count) {
+      const uint from = ray.first > state.number ? ray.first - state.number : 0;
+      marchPiece(a, ray, piece, all, slot, from, count, state);
+    }
+    state.number += count;
+    state.before += piece.whole;
+  }
+}
+
+State march(MarchBlocksArguments a, Ray ray) {
+  State state = State(0, 0, real(0), kThrough, false);
+  real near = a.space.near;
+  if (WANTED(a.nearOfRay)) near = max(near, real(a.nearOfRay.values[ray.index]));
+  const Range box = rangeInBox(a.space, ray.origin, ray.direction, near);
+  const bool empty = isEmpty(box), own = a.space.surround == kSurroundOwn;
+  if (!empty) near = box.near;
+  real walled = own || a.space.surround == kSurroundNone ? box.far : kFarthest;  // so far, cells own it
+  if (empty && a.space.surround != kSurroundBorder) walled = near;
+  WallWalk walk = wallWalkOf(a.space, ray.direction);
+  real from = near;
+  for (real to = nextWall(a.space, ray.origin, ray.direction, walk); !state.done;
+       to = nextWall(a.space, ray.origin, ray.direction, walk)) {
+    const bool last = !(to < walled);
+    if (last) to = walled;
+    if (from < to) {
+      marchRange(a, ray, from, to, state);
+      from = to;
+    }
+    if (last) break;
+  }
+  if (own && !state.done && from < kFarthest) marchRange(a, ray, from, kFarthest, state);
+  return state;
+}
+
+Ray rayAt(MarchBlocksArguments a, uint index) {
+  Ray ray;
+  ray.index = index;
+  ray.origin = realVec3(pointAt(a.origins, index));
+  ray.direction = realVec3(pointAt(a.directions, index));
+  ray.jitter = WANTED(a.jitter) ? real(a.jitter.values[index]) : real(1);
+  ray.far = WANTED(a.farOfRay) ? real(a.farOfRay.values[index]) : kNever;
+  ray.first = WANTED(a.nextStep) ? a.nextStep.values[index] : 0;
+  ray.row = 0;
+  return ray;
+}
+
+void main() {
+  MarchBlocksArguments a = arguments.values;
+  if (!kWrite) {
+    FOR_EACH_ROW(index, a.rays) {
+      const Ray ray = rayAt(a, index);
+      const bool opaque = WANTED(a.opticalDepth) && a.opticalDepth.values[index] > a.mostOpticalDepth;
+      const bool waits = opaque || a.most == 0 || ray.first == kThrough;
+      State state = State(0, 0, real(0), waits ? ray.first : kThrough, true);
+      if (!waits && ray.direction != realVec3(0)) state = march(a, ray);
+      a.counts.values[index] = state.samples;
+      a.nexts.values[index] = state.next;
+    }
+    return;
+  }
+  const uint fitting = a.fitting.values[0];
+  if (gl_GlobalInvocationID.x == 0) {
+    a.firstSample.values[0] = 0;
+    if (WANTED(a.finishedRays)) a.finishedRays.values[0] = fitting;
+  }
+  FOR_EACH_ROW(index, a.rays) {
+    const bool fits = index < fitting;
+    const uint first = index == 0 ? 0 : a.counts.values[index - 1], end = a.counts.values[index];
+    a.firstSample.values[index + 1] = fits ? end : a.sampleCount.values[0];
+    if (!fits) continue;
+    Ray ray = rayAt(a, index);
+    ray.row = first;
+    if (end > first) march(a, ray);
+    if (WANTED(a.nextStep)) a.nextStep.values[index] = a.nexts.values[index];
+  }
+}

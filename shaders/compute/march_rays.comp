@@ -1,0 +1,123 @@
+// One invocation a ray, run twice: first its samples are counted; then, when it is known where each ray's begin, they
+// are made again and written. Empty cells are left by whole steps, so samples are those of brute force.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "kernel.glsl"
+#include "arguments_rays.h"
+#include "real.glsl"
+#include "march_space.glsl"
+#include "vectors.glsl"
+
+layout(local_size_x = 64) in;
+layout(constant_id = 0) const bool kWrite = false;
+KERNEL_ARGUMENTS(MarchRaysArguments)
+
+const uint kThrough = 0xffffffffu;
+const uint kMostIndex = 1u << 30;
+
+struct Round {
+  uint samples;
+  uint next;  // the index to go on from
+};
+
+bool isOccupied(MarchRaysArguments a, ivec3 cell) {
+  const uint i = cell.x + a.space.resolution * (cell.y + a.space.resolution * cell.z);
+  return (a.occupancy.values[i / 32] >> i % 32 & 1) != 0;
+}
+
+void store(MarchRaysArguments a, uint ray, uint row, realVec3 u, real middle, real length_) {
+  if (WANTED(a.rayOfSample)) a.rayOfSample.values[row] = ray;
+  storePoint(a.positions, row, clamp(vec3(u), 0, 1));
+  a.distances.values[row] = float(middle);
+  a.steps.values[row] = float(length_);
+}
+
+// Of a bounded space, where the ray is inside: [enter, leave], empty where it never is.
+void clipToCube(realVec3 o, realVec3 d, out real enter, out real leave) {
+  enter = 0;
+  leave = real(1e30);
+  for (int axis = 0; axis < 3; ++axis) {
+    if (d[axis] == 0) {
+      if (abs(o[axis]) > 1) leave = 0;
+      continue;
+    }
+    const real t0 = (-1 - o[axis]) / d[axis], t1 = (1 - o[axis]) / d[axis];
+    enter = max(enter, min(t0, t1));
+    leave = min(leave, max(t0, t1));
+  }
+}
+
+// The ray's next samples; with kWrite to rows from `row` on.
+Round march(MarchRaysArguments a, uint ray, uint row) {
+  const uint from = WANTED(a.nextStep) ? a.nextStep.values[ray] : 0;
+  const bool opaque = WANTED(a.opticalDepth) && a.opticalDepth.values[ray] > a.mostOpticalDepth;
+  if (from == kThrough || opaque || a.most == 0) return Round(0, from);
+  const realVec3 o = realVec3(pointAt(a.origins, ray)), d = realVec3(pointAt(a.directions, ray));
+  Round made = Round(0, kThrough);
+  if (d == realVec3(0)) return made;
+  const real jitter = WANTED(a.jitter) ? a.jitter.values[ray] : 0;
+  real far = a.space.far;
+  if (WANTED(a.farOfRay)) far = min(far, real(a.farOfRay.values[ray]));
+  real k = ceil(realOf(a.space.firstIndex) - jitter);
+  if (a.space.contracted == 0) {
+    real enter, leave;
+    clipToCube(o, d, enter, leave);
+    if (!(enter < leave)) return made;
+    far = min(far, leave * (1 + real(1e-6)) + real(1e-6));
+    k = max(k, floor(stepIndexOf(a.space, enter) - jitter) - 1);
+  }
+  k = max(max(k, real(0)), real(min(from, kMostIndex)));
+  real begin = distanceAt(a.space, k + jitter);
+  for (;;) {
+    const real end = distanceAt(a.space, k + 1 + jitter), middle = (begin + end) / 2;
+    if (!(middle < far)) return made;
+    const Cell cell = cellAt(a.space, o + middle * d);
+    const real length_ = end - begin;
+    k += 1;
+    begin = end;
+    if (cell.inside && isOccupied(a, cell.index)) {
+      if (kWrite) store(a, ray, row + made.samples, cell.u, middle, length_);
+      if (++made.samples < a.most) continue;
+      made.next = uint(k);
+      return made;
+    }
+    if (!cell.inside) continue;
+    // Whole steps to the first middle past the empty cell; the tolerance only costs one more look.
+    const real exit = exitDistance(a.space, cell, o, d, middle) * (1 - kRoundingShare);
+    if (exit >= far) return made;
+    if (exit > begin + 4 * (end - middle)) {
+      k = max(k, floor(stepIndexOf(a.space, exit) - jitter) - 1);
+      begin = distanceAt(a.space, k + jitter);
+    }
+    for (real next = distanceAt(a.space, k + 1 + jitter); (begin + next) / 2 < exit;
+         next = distanceAt(a.space, k + 1 + jitter)) {
+      k += 1;
+      begin = next;
+    }
+  }
+}
+
+void main() {
+  MarchRaysArguments a = arguments.values;
+  if (!kWrite) {
+    FOR_EACH_ROW(ray, a.rays) {
+      const Round made = march(a, ray, 0);
+      a.counts.values[ray] = made.samples;
+      a.nexts.values[ray] = made.next;
+    }
+    return;
+  }
+  const uint fitting = a.fitting.values[0];
+  if (gl_GlobalInvocationID.x == 0) {
+    a.firstSample.values[0] = 0;
+    if (WANTED(a.finishedRays)) a.finishedRays.values[0] = fitting;
+  }
+  FOR_EACH_ROW(ray, a.rays) {
+    const bool fits = ray < fitting;
+    const uint first = ray == 0 ? 0 : a.counts.values[ray - 1], end = a.counts.values[ray];
+    a.firstSample.values[ray + 1] = fits ? end : a.sampleCount.values[0];
+    if (!fits) continue;
+    if (end > first) march(a, ray, first);
+    if (WANTED(a.nextStep)) a.nextStep.values[ray] = a.nexts.values[ray];
+  }
+}

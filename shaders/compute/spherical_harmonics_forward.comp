@@ -1,0 +1,20 @@
+// One invocation an element.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "kernel.glsl"
+#include "arguments_encodings.h"
+#include "spherical_harmonics.glsl"
+#include "vectors.glsl"
+
+layout(local_size_x = 256) in;
+KERNEL_ARGUMENTS(SphericalHarmonicsArguments)
+
+void main() {
+  SphericalHarmonicsArguments a = arguments.values;
+  const uint columns = a.degree * a.degree;
+  FOR_EACH(i, endOf(a.samples) * columns) {
+    const uint row = i / columns, column = i % columns;
+    const vec3 direction = pointAt(a.directions, WANTED(a.rayOfSample) ? a.rayOfSample.values[row] : row);
+    a.encoded.data.values[elementOf(a.encoded, row, column)] = harmonic(column, direction);
+  }
+}

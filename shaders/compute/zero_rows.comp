@@ -1,0 +1,12 @@
+// One invocation a number.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "kernel.glsl"
+#include "arguments_virtual_grid.h"
+
+layout(local_size_x = 256) in;
+KERNEL_ARGUMENTS(ZeroRowsArguments)
+
+void main() {
+  FOR_EACH(i, endOf(arguments.values.rows) * arguments.values.columns) arguments.values.numbers.values[i] = 0;
+}

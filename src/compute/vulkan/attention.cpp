@@ -1,0 +1,85 @@
+#include "compute/attention.h"
+
+#include "compute/vulkan/vulkan_device.h"
+#include "shaders/add_columns.h"
+#include "shaders/attention_backward.h"
+#include "shaders/attention_backward_float_atomics.h"
+#include "shaders/attention_forward.h"
+#include "shaders/compute/arguments_attention.h"
+#include "shaders/shade_backward.h"
+#include "shaders/shade_forward.h"
+
+namespace tessera {
+
+namespace {
+
+std::vector<uint32_t> constantsOf(const AttentionShape& shape) {
+  return {shape.levels, static_cast<uint32_t>(shape.weights), shape.varies};
+}
+
+template <class Options>
+arguments::AttentionArguments attentionArguments(const Options& options) {
+  CHECK(options.fine.columns == AttentionShape::kFeatures * options.shape.levels);
+  arguments::AttentionArguments arguments = {};
+  arguments.samples = countArguments(options.samples);
+  arguments.coarse = matrixArguments(options.coarse, options.samples.capacity);
+  arguments.fine = matrixArguments(options.fine, options.samples.capacity);
+  arguments.logits = deviceAddress(options.logits);
+  return arguments;
+}
+
+template <class Options>
+arguments::ShadeArguments shadeArguments(const Options& options) {
+  arguments::ShadeArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.diffuse = matrixArguments(options.diffuse, options.rays.capacity);
+  arguments.specular = matrixArguments(options.specular, options.rays.capacity);
+  arguments.opacity = deviceAddress(options.opacity);
+  return arguments;
+}
+
+}  // namespace
+
+void VulkanDevice::enqueue(const AttentionForward& options) {
+  arguments::AttentionArguments arguments = attentionArguments(options);
+  arguments.features = matrixArguments(options.features, options.samples.capacity);
+  queue(kernel(kAttentionForwardSpirv, constantsOf(options.shape)), arguments, {groups(options.samples.capacity, 128)});
+}
+
+void VulkanDevice::enqueue(const AttentionBackward& options) {
+  const size_t samples = options.samples.capacity;
+  arguments::AttentionArguments arguments = attentionArguments(options);
+  arguments.logDensityGradients = deviceAddress(options.logDensityGradients);
+  arguments.colourGradients = matrixArguments(options.colourGradients, samples);
+  arguments.coarseGradients = matrixArguments(options.coarseGradients, samples);
+  arguments.fineGradients = matrixArguments(options.fineGradients, samples);
+  arguments.logitGradients = deviceAddress(options.logitGradients);
+  queue(sumKernel(kAttentionBackwardFloatAtomicsSpirv, kAttentionBackwardSpirv, constantsOf(options.shape)), arguments,
+        {groups(samples, 256)});
+}
+
+void VulkanDevice::enqueue(const ShadeForward& options) {
+  arguments::ShadeArguments arguments = shadeArguments(options);
+  arguments.colour = deviceAddress(options.colour);
+  queue(kernel(kShadeForwardSpirv, {options.whole}), arguments, {groups(3 * size_t{options.rays.capacity}, 256)});
+}
+
+void VulkanDevice::enqueue(const ShadeBackward& options) {
+  arguments::ShadeArguments arguments = shadeArguments(options);
+  arguments.colour = deviceAddress(options.colourGradients);
+  arguments.sumGradients = matrixArguments(options.sumGradients, options.rays.capacity);
+  arguments.opacityGradients = deviceAddress(options.opacityGradients);
+  queue(kernel(kShadeBackwardSpirv, {options.whole}), arguments, {groups(options.rays.capacity, 128)});
+}
+
+void VulkanDevice::enqueue(const AddColumns& options) {
+  const size_t rows = options.rows.capacity;
+  CHECK(options.input.columns == options.output.columns);
+  arguments::AddColumnsArguments arguments = {};
+  arguments.rows = countArguments(options.rows);
+  arguments.added = matrixArguments(options.input, rows);
+  arguments.sums = matrixArguments(options.output, rows);
+  queue(kernel(kAddColumnsSpirv), arguments, {groups(rows * options.output.columns, 256)});
+}
+
+}  // namespace tessera

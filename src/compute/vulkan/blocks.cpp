@@ -1,0 +1,176 @@
+#include "compute/blocks.h"
+
+#include "base/random.h"
+#include "compute/block_march.h"
+#include "compute/vulkan/vulkan_device.h"
+#include "shaders/block_points.h"
+#include "shaders/block_points_float64.h"
+#include "shaders/block_samples.h"
+#include "shaders/block_samples_float64.h"
+#include "shaders/compute/arguments_blocks.h"
+#include "shaders/enter_scene.h"
+#include "shaders/enter_scene_float64.h"
+#include "shaders/group_by_block.h"
+#include "shaders/march_blocks.h"
+#include "shaders/march_blocks_float64.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr uint32_t kRaysPerGroup = 64;      // local_size_x of the kernels that take rays
+constexpr uint32_t kRowsPerShare = 32;      // group_by_block.comp
+constexpr uint32_t kNoLimit = 0x7fffffffu;  // of running sums
+
+arguments::BlockSpaceArguments spaceArguments(const BlockSpace& space) {
+  return {space.columns, space.rows, space.bottom, space.top, space.near, static_cast<uint32_t>(space.surround)};
+}
+
+}  // namespace
+
+void VulkanDevice::enqueue(const EnterScene& options) {
+  arguments::EnterSceneArguments arguments = {};
+  arguments.space = spaceArguments(options.space);
+  arguments.rays = countArguments(options.rays);
+  arguments.origins = deviceAddress(options.origins);
+  arguments.directions = deviceAddress(options.directions);
+  arguments.jitter = deviceAddress(options.jitter);
+  arguments.nearOfRay = deviceAddress(options.nearOfRay);
+  arguments.range = deviceAddress(options.range);
+  arguments.fences = deviceAddress(options.fences);
+  arguments.intervals = options.intervals;
+  const size_t posts = size_t{options.rays.capacity} * (options.intervals + 1);
+  queue(realKernel(kEnterSceneFloat64Spirv, kEnterSceneSpirv), arguments, {groups(posts, 128)});
+}
+
+void VulkanDevice::enqueue(const BlockSamples& options) {
+  const size_t rays = options.rays.capacity;
+  CHECK(!options.rays.first);
+  arguments::BlockSamplesArguments arguments = {};
+  arguments.space = spaceArguments(options.space);
+  arguments.rays = countArguments(options.rays);
+  arguments.intervals = options.intervals;
+  arguments.firstRow = options.firstRow;
+  arguments.texels = options.texels;
+  arguments.origins = deviceAddress(options.origins);
+  arguments.directions = deviceAddress(options.directions);
+  arguments.range = deviceAddress(options.range);
+  arguments.farOfRay = deviceAddress(options.farOfRay);
+  arguments.fences = deviceAddress(options.fences);
+  arguments.slotOfBlock = deviceAddress(options.slotOfBlock);
+  arguments.groupOfBlock = deviceAddress(options.groupOfBlock);
+  arguments.firstSample = deviceAddress(options.firstSample);
+  arguments.rowCount = deviceAddress(options.rowCount);
+  arguments.blockOfSample = deviceAddress(options.blockOfSample);
+  arguments.positions = deviceAddress(options.positions);
+  arguments.distances = deviceAddress(options.distances);
+  arguments.steps = deviceAddress(options.steps);
+  arguments.middles = deviceAddress(options.middles);
+  arguments.widths = deviceAddress(options.widths);
+  arguments.runtimeSteps = deviceAddress(options.runtimeSteps);
+  arguments.firstSegment = deviceAddress(options.firstSegment);
+  arguments.segmentCount = deviceAddress(options.segmentCount);
+  arguments.firstSampleOfSegment = deviceAddress(options.firstSampleOfSegment);
+  arguments.groupOfSegment = deviceAddress(options.groupOfSegment);
+  arguments.rayOfSegment = deviceAddress(options.rayOfSegment);
+  if (options.split) {
+    arguments.sampleCounts = scratch(2 * rays + 2 + scanScratch(rays));
+    arguments.segmentCounts = arguments.sampleCounts + rays * sizeof(uint32_t);
+    const uint64_t total = arguments.segmentCounts + rays * sizeof(uint32_t);
+    queue(realKernel(kBlockSamplesFloat64Spirv, kBlockSamplesSpirv, {false, true}), arguments,
+          {groups(rays, kRaysPerGroup)});
+    for (const uint64_t counts : {arguments.sampleCounts, arguments.segmentCounts}) {
+      queueRunningSums({.rows = options.rays,
+                        .values = counts,
+                        .total = total,
+                        .fitting = total + sizeof(uint32_t),
+                        .limit = kNoLimit,
+                        .scratch = total + 2 * sizeof(uint32_t)});
+    }
+  }
+  queue(realKernel(kBlockSamplesFloat64Spirv, kBlockSamplesSpirv, {true, options.split}), arguments,
+        {groups(rays + 1, kRaysPerGroup)});
+}
+
+void VulkanDevice::enqueue(const BlockPoints& options) {
+  CHECK(options.points < 1u << 29);  // indices of random numbers
+  if (options.points > 0) CHECK(options.blocks.count > 0u);
+  arguments::BlockPointsArguments arguments = {};
+  arguments.space = spaceArguments(options.space);
+  arguments.key = RandomStream(options.seed, 0x5ba).key;
+  arguments.points = options.points;
+  arguments.texels = options.texels;
+  arguments.blockCount = static_cast<uint32_t>(options.blocks.count);
+  arguments.blocks = deviceAddress(options.blocks);
+  arguments.slotOfBlock = deviceAddress(options.slotOfBlock);
+  arguments.blockOfSample = deviceAddress(options.blockOfSample);
+  arguments.positions = deviceAddress(options.positions);
+  arguments.runtimeSteps = deviceAddress(options.runtimeSteps);
+  queue(realKernel(kBlockPointsFloat64Spirv, kBlockPointsSpirv), arguments, {groups(options.points, 128)});
+}
+
+void VulkanDevice::enqueue(const GroupByBlock& options) {
+  const uint32_t shares = std::max((options.samples.capacity + kRowsPerShare - 1) / kRowsPerShare, 1u);
+  const size_t counts = size_t{shares} * options.blocks;
+  CHECK(counts < size_t{1} << 31);
+  arguments::GroupByBlockArguments arguments = {};
+  arguments.samples = countArguments(options.samples);
+  arguments.blockOfSample = deviceAddress(options.blockOfSample);
+  arguments.counts = scratch(counts + 2 + scanScratch(counts));
+  arguments.firstOfBlock = deviceAddress(options.firstOfBlock);
+  arguments.source = deviceAddress(options.source);
+  arguments.blocks = options.blocks;
+  arguments.shares = shares;
+  stream_->fillZero(scratch_, 0, counts * sizeof(uint32_t));
+  const Groups all = {groups(shares, 64)};
+  queue(kernel(kGroupByBlockSpirv, {false}), arguments, all);
+  const uint64_t total = arguments.counts + counts * sizeof(uint32_t);
+  queueRunningSums({.rows = {static_cast<uint32_t>(counts)},
+                    .values = arguments.counts,
+                    .total = total,
+                    .fitting = total + sizeof(uint32_t),
+                    .limit = kNoLimit,
+                    .scratch = total + 2 * sizeof(uint32_t)});
+  queue(kernel(kGroupByBlockSpirv, {true}), arguments, all);
+}
+
+void VulkanDevice::enqueue(const MarchBlocks& options) {
+  const uint32_t rays = options.rays.capacity;
+  arguments::MarchBlocksArguments arguments = {};
+  arguments.space = spaceArguments(options.space);
+  arguments.rays = countArguments(options.rays);
+  arguments.cells = options.cells;
+  arguments.step = options.step;
+  arguments.most = options.most;
+  arguments.mostOpticalDepth = options.mostOpticalDepth;
+  arguments.origins = deviceAddress(options.origins);
+  arguments.directions = deviceAddress(options.directions);
+  arguments.jitter = deviceAddress(options.jitter);
+  arguments.nearOfRay = deviceAddress(options.nearOfRay);
+  arguments.farOfRay = deviceAddress(options.farOfRay);
+  arguments.slotOfBlock = deviceAddress(options.slotOfBlock);
+  arguments.occupancy = deviceAddress(options.occupancy);
+  arguments.opticalDepth = deviceAddress(options.opticalDepth);
+  arguments.nextStep = deviceAddress(options.nextStep);
+  const RayScratch scratch = rayScratch(rays);
+  arguments.counts = scratch.counts;
+  arguments.nexts = scratch.nexts;
+  arguments.fitting = scratch.fitting;
+  arguments.firstSample = deviceAddress(options.firstSample);
+  arguments.sampleCount = deviceAddress(options.sampleCount);
+  arguments.finishedRays = deviceAddress(options.finishedRays);
+  arguments.rayOfSample = deviceAddress(options.rayOfSample);
+  arguments.slotOfSample = deviceAddress(options.slotOfSample);
+  arguments.positions = deviceAddress(options.positions);
+  arguments.distances = deviceAddress(options.distances);
+  arguments.steps = deviceAddress(options.steps);
+  arguments.middles = deviceAddress(options.middles);
+  arguments.widths = deviceAddress(options.widths);
+  const Groups all = {atLeastOneGroup(rays, kRaysPerGroup)};
+  queue(realKernel(kMarchBlocksFloat64Spirv, kMarchBlocksSpirv, {false}), arguments, all);
+  queueRunningSums(
+      {options.rays, scratch.counts, arguments.sampleCount, scratch.fitting, options.sampleCapacity, scratch.partials});
+  queue(realKernel(kMarchBlocksFloat64Spirv, kMarchBlocksSpirv, {true}), arguments, all);
+}
+
+}  // namespace tessera

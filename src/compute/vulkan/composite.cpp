@@ -1,0 +1,62 @@
+#include "compute/composite.h"
+
+#include "compute/vulkan/vulkan_device.h"
+#include "shaders/composite_backward.h"
+#include "shaders/composite_forward.h"
+#include "shaders/compute/arguments_composite.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr uint32_t kRaysPerGroup = 64;  // local_size_x of the kernels
+constexpr uint32_t kMostColumns = 16;   // composite.glsl
+
+}  // namespace
+
+void VulkanDevice::enqueue(const CompositeForward& options) {
+  const uint32_t columns = options.colours.columns;
+  CHECK(columns <= kMostColumns);
+  arguments::CompositeForwardArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.extinction = static_cast<uint32_t>(options.extinction);
+  arguments.minTransmittance = options.minTransmittance;
+  arguments.firstSample = deviceAddress(options.firstSample);
+  arguments.x = matrixArguments(options.x, 0);
+  arguments.steps = deviceAddress(options.steps);
+  arguments.distances = deviceAddress(options.distances);
+  arguments.colours = matrixArguments(options.colours, 0);
+  arguments.background = deviceAddress(options.background);
+  arguments.colour = deviceAddress(options.colour);
+  arguments.opacity = deviceAddress(options.opacity);
+  arguments.depth = deviceAddress(options.depth);
+  arguments.weights = deviceAddress(options.weights);
+  queue(kernel(kCompositeForwardSpirv, {columns}), arguments, {groups(options.rays.capacity, kRaysPerGroup)});
+}
+
+void VulkanDevice::enqueue(const CompositeBackward& options) {
+  const uint32_t columns = options.colours.columns;
+  CHECK(columns <= kMostColumns);
+  arguments::CompositeBackwardArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.extinction = static_cast<uint32_t>(options.extinction);
+  arguments.minTransmittance = options.minTransmittance;
+  arguments.fullGradientDistance = options.fullGradientDistance;
+  arguments.addToXGradients = options.addToXGradients;
+  arguments.firstSample = deviceAddress(options.firstSample);
+  arguments.x = matrixArguments(options.x, 0);
+  arguments.steps = deviceAddress(options.steps);
+  arguments.distances = deviceAddress(options.distances);
+  arguments.colours = matrixArguments(options.colours, 0);
+  arguments.background = deviceAddress(options.background);
+  arguments.rayColourGradients = deviceAddress(options.rayColourGradients);
+  arguments.rayOpacityGradients = deviceAddress(options.rayOpacityGradients);
+  arguments.rayDepthGradients = deviceAddress(options.rayDepthGradients);
+  arguments.weightGradients = deviceAddress(options.weightGradients);
+  arguments.opacities = scratch(2 * std::max<size_t>(options.xGradients.count, 1));
+  arguments.xGradients = deviceAddress(options.xGradients);
+  arguments.colourGradients = matrixArguments(options.colourGradients, 0);
+  queue(kernel(kCompositeBackwardSpirv, {columns}), arguments, {groups(options.rays.capacity, kRaysPerGroup)});
+}
+
+}  // namespace tessera

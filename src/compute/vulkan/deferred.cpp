@@ -1,0 +1,86 @@
+#include "compute/deferred.h"
+
+#include "compute/vulkan/vulkan_device.h"
+#include "shaders/blend_backward.h"
+#include "shaders/blend_forward.h"
+#include "shaders/compute/arguments_deferred.h"
+#include "shaders/deferred_backward.h"
+#include "shaders/deferred_forward.h"
+#include "shaders/deferred_weight_gradients.h"
+#include "shaders/deferred_weight_gradients_float_atomics.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr uint32_t kPerGroup = 64;  // local_size_x of the kernels that take segments or rays
+constexpr uint32_t kShare = 256;    // deferred_weight_gradients.comp: segments of a workgroup
+constexpr size_t kNumbers = DeferredNetwork::kInputs + 4 * DeferredNetwork::kHidden + 3;  // deferred.glsl
+
+template <class Options>
+arguments::DeferredArguments deferredArguments(const Options& options) {
+  arguments::DeferredArguments arguments = {};
+  arguments.segments = countArguments(options.segments);
+  arguments.composited = deviceAddress(options.composited);
+  arguments.networkOfSegment = deviceAddress(options.networkOfSegment);
+  arguments.rayOfSegment = deviceAddress(options.rayOfSegment);
+  arguments.directions = deviceAddress(options.directions);
+  arguments.networks = deviceAddress(options.networks);
+  return arguments;
+}
+
+template <class Options>
+arguments::BlendArguments blendArguments(const Options& options) {
+  arguments::BlendArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.firstSegment = deviceAddress(options.firstSegment);
+  arguments.composited = deviceAddress(options.composited);
+  arguments.specular = deviceAddress(options.specular);
+  arguments.opacities = deviceAddress(options.opacities);
+  return arguments;
+}
+
+}  // namespace
+
+void VulkanDevice::enqueue(const DeferredForward& options) {
+  arguments::DeferredArguments arguments = deferredArguments(options);
+  arguments.specular = deviceAddress(options.specular);
+  queue(kernel(kDeferredForwardSpirv), arguments, {groups(options.segments.capacity, kPerGroup)});
+}
+
+void VulkanDevice::enqueue(const DeferredBackward& options) {
+  const size_t segments = options.segments.capacity;
+  if (segments == 0) return;
+  CHECK(segments * kNumbers < size_t{1} << 31);
+  arguments::DeferredArguments arguments = deferredArguments(options);
+  arguments.specular = deviceAddress(options.specularGradients);
+  arguments.compositedGradients = deviceAddress(options.compositedGradients);
+  arguments.networkGradients = deviceAddress(options.networkGradients);
+  arguments.layers = scratch(segments * kNumbers);
+  queue(kernel(kDeferredBackwardSpirv), arguments, {groups(segments, kPerGroup)});
+  const auto networks = static_cast<uint32_t>(options.networks.count / DeferredNetwork::kParameters);
+  queue(sumKernel(kDeferredWeightGradientsFloatAtomicsSpirv, kDeferredWeightGradientsSpirv), arguments,
+        {groups(segments, kShare), networks});
+}
+
+void VulkanDevice::enqueue(const BlendForward& options) {
+  arguments::BlendArguments arguments = blendArguments(options);
+  arguments.depths = deviceAddress(options.depths);
+  arguments.colour = deviceAddress(options.colour);
+  arguments.opacity = deviceAddress(options.opacity);
+  arguments.depth = deviceAddress(options.depth);
+  queue(kernel(kBlendForwardSpirv, {options.literal}), arguments, {groups(options.rays.capacity, kPerGroup)});
+}
+
+void VulkanDevice::enqueue(const BlendBackward& options) {
+  arguments::BlendArguments arguments = blendArguments(options);
+  arguments.colour = deviceAddress(options.rayColourGradients);
+  arguments.opacity = deviceAddress(options.rayOpacityGradients);
+  arguments.transmittances = scratch(std::max<size_t>(options.opacityGradients.count, 1));
+  arguments.compositedGradients = deviceAddress(options.compositedGradients);
+  arguments.specularGradients = deviceAddress(options.specularGradients);
+  arguments.opacityGradients = deviceAddress(options.opacityGradients);
+  queue(kernel(kBlendBackwardSpirv, {options.literal}), arguments, {groups(options.rays.capacity, kPerGroup)});
+}
+
+}  // namespace tessera

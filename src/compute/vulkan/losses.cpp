@@ -1,0 +1,135 @@
+#include "compute/losses.h"
+
+#include "compute/vulkan/vulkan_device.h"
+#include "shaders/colour_loss.h"
+#include "shaders/compute/arguments_losses.h"
+#include "shaders/depth_loss.h"
+#include "shaders/distortion_loss.h"
+#include "shaders/exposure_backward.h"
+#include "shaders/exposure_backward_float_atomics.h"
+#include "shaders/exposure_forward.h"
+#include "shaders/opacity_loss.h"
+#include "shaders/s3im_loss.h"
+#include "shaders/s3im_loss_float_atomics.h"
+#include "shaders/s3im_orders.h"
+#include "shaders/sparsity_loss.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr uint32_t kPerGroup = 256;  // local_size_x of the kernels that sum
+
+template <class Options>
+arguments::RayLossArguments rayLossArguments(const Options& options) {
+  arguments::RayLossArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.scale = options.scale;
+  arguments.firstSample = deviceAddress(options.firstSample);
+  arguments.weights = deviceAddress(options.weights);
+  arguments.gradients = deviceAddress(options.weightGradients);
+  return arguments;
+}
+
+}  // namespace
+
+void VulkanDevice::enqueue(const ColourLoss& options) {
+  arguments::ColourLossArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.kind = static_cast<uint32_t>(options.kind);
+  arguments.parameter = options.parameter;
+  arguments.scale = options.scale;
+  arguments.predicted = deviceAddress(options.predicted);
+  arguments.target = deviceAddress(options.target);
+  arguments.weights = deviceAddress(options.weights);
+  arguments.gradients = deviceAddress(options.gradients);
+  queueSums(kernel(kColourLossSpirv), arguments, atLeastOneGroup(3 * size_t{options.rays.capacity}, kPerGroup), 2,
+            deviceAddress(options.loss));
+}
+
+void VulkanDevice::enqueue(const DistortionLoss& options) {
+  arguments::RayLossArguments arguments = rayLossArguments(options);
+  arguments.normalised = options.normalised;
+  arguments.distances = deviceAddress(options.distances);
+  arguments.steps = deviceAddress(options.steps);
+  queueSums(kernel(kDistortionLossSpirv), arguments, atLeastOneGroup(options.rays.capacity, kPerGroup), 1,
+            deviceAddress(options.loss));
+}
+
+void VulkanDevice::enqueue(const DepthLoss& options) {
+  arguments::RayLossArguments arguments = rayLossArguments(options);
+  arguments.tolerance = options.tolerance;
+  arguments.distances = deviceAddress(options.distances);
+  arguments.known = deviceAddress(options.known);
+  queueSums(kernel(kDepthLossSpirv), arguments, atLeastOneGroup(options.rays.capacity, kPerGroup), 1,
+            deviceAddress(options.loss));
+}
+
+void VulkanDevice::enqueue(const S3imLoss& options) {
+  const size_t rays = options.rays.capacity;
+  const uint32_t parts = atLeastOneGroup(3 * options.patches * (rays / 16), kPerGroup);
+  arguments::S3imArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.patches = options.patches;
+  arguments.scale = options.scale;
+  arguments.seed = options.seed;
+  arguments.predicted = deviceAddress(options.predicted);
+  arguments.target = deviceAddress(options.target);
+  arguments.weights = deviceAddress(options.weights);
+  arguments.partials = scratch(parts + options.patches * rays);
+  arguments.orders = arguments.partials + parts * sizeof(float);
+  arguments.gradients = deviceAddress(options.gradients);
+  queue(kernel(kS3imOrdersSpirv), arguments, {options.patches});
+  queue(sumKernel(kS3imLossFloatAtomicsSpirv, kS3imLossSpirv), arguments, {parts});
+  addPartials(arguments.partials, parts, 1, deviceAddress(options.loss));
+}
+
+void VulkanDevice::enqueue(const OpacityLoss& options) {
+  arguments::NumberLossArguments arguments = {};
+  arguments.numbers = countArguments(options.segments);
+  arguments.scale = options.scale;
+  arguments.values = deviceAddress(options.opacities);
+  arguments.gradients = deviceAddress(options.opacityGradients);
+  queueSums(kernel(kOpacityLossSpirv), arguments, atLeastOneGroup(options.segments.capacity, kPerGroup), 1,
+            deviceAddress(options.loss));
+}
+
+void VulkanDevice::enqueue(const SparsityLoss& options) {
+  arguments::NumberLossArguments arguments = {};
+  arguments.numbers = countArguments(options.points);
+  arguments.scale = options.scale;
+  arguments.values = deviceAddress(options.logDensities);
+  arguments.runtimeSteps = deviceAddress(options.runtimeSteps);
+  arguments.gradients = deviceAddress(options.gradients);
+  queueSums(kernel(kSparsityLossSpirv), arguments, atLeastOneGroup(options.points.capacity, kPerGroup), 1,
+            deviceAddress(options.loss));
+}
+
+void VulkanDevice::enqueue(const ExposureForward& options) {
+  arguments::ExposureArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.colours = deviceAddress(options.colours);
+  arguments.opacity = deviceAddress(options.opacity);
+  arguments.background = deviceAddress(options.background);
+  arguments.photoOfRay = deviceAddress(options.photoOfRay);
+  arguments.logGains = deviceAddress(options.logGains);
+  arguments.exposed = deviceAddress(options.exposed);
+  queue(kernel(kExposureForwardSpirv), arguments, {groups(3 * size_t{options.rays.capacity}, 256)});
+}
+
+void VulkanDevice::enqueue(const ExposureBackward& options) {
+  arguments::ExposureArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.colours = deviceAddress(options.colours);
+  arguments.background = deviceAddress(options.background);
+  arguments.photoOfRay = deviceAddress(options.photoOfRay);
+  arguments.logGains = deviceAddress(options.logGains);
+  arguments.exposed = deviceAddress(options.exposedGradients);
+  arguments.colourGradients = deviceAddress(options.colourGradients);
+  arguments.opacityGradients = deviceAddress(options.opacityGradients);
+  arguments.logGainGradients = deviceAddress(options.logGainGradients);
+  queue(sumKernel(kExposureBackwardFloatAtomicsSpirv, kExposureBackwardSpirv), arguments,
+        {groups(options.rays.capacity, 128)});
+}
+
+}  // namespace tessera

@@ -1,0 +1,148 @@
+#include "compute/rays.h"
+
+#include <cmath>
+
+#include "compute/vulkan/vulkan_device.h"
+#include "shaders/compact_samples.h"
+#include "shaders/compute/arguments_rays.h"
+#include "shaders/generate_rays.h"
+#include "shaders/march_rays.h"
+#include "shaders/march_rays_float64.h"
+#include "shaders/move_rows.h"
+#include "shaders/optical_depth.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr uint32_t kRaysPerGroup = 64;       // local_size_x of the kernels
+constexpr uint32_t kElementsPerGroup = 256;  // of those that move rows
+
+}  // namespace
+
+void VulkanDevice::enqueue(const GenerateRays& options) {
+  arguments::GenerateRaysArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.cameras = deviceAddress(options.cameras);
+  arguments.cameraOfRay = deviceAddress(options.cameraOfRay);
+  arguments.pixels = deviceAddress(options.pixels);
+  arguments.origins = deviceAddress(options.origins);
+  arguments.directions = deviceAddress(options.directions);
+  queue(kernel(kGenerateRaysSpirv), arguments, {groups(options.rays.capacity, kRaysPerGroup)});
+}
+
+void VulkanDevice::enqueue(const MarchRays& options) {
+  const MarchSpace& space = options.space;
+  const uint32_t rays = options.rays.capacity;
+  arguments::MarchRaysArguments arguments = {};
+  arguments.space.contracted = space.contracted;
+  arguments.space.resolution = space.gridResolution;
+  arguments.space.far = space.far;
+  arguments.space.minStep = space.minStep;
+  arguments.space.maxStep = space.maxStep;
+  arguments.space.cone = space.cone;
+  arguments.space.firstIndex = realArguments(space.stepIndex(space.near));
+  if (space.cone > 0) {
+    const double lambda = std::log1p(static_cast<double>(space.cone)), last = space.maxStep / lambda;
+    arguments.space.lambda = realArguments(lambda);
+    arguments.space.linearEnd = realArguments(1 / lambda);
+    arguments.space.linearDistance = realArguments(space.minStep / lambda);
+    arguments.space.geometricEnd = realArguments(space.stepIndex(last));
+    arguments.space.geometricDistance = realArguments(last);
+  }
+  arguments.rays = countArguments(options.rays);
+  arguments.most = options.most;
+  arguments.mostOpticalDepth = options.mostOpticalDepth;
+  arguments.origins = deviceAddress(options.origins);
+  arguments.directions = deviceAddress(options.directions);
+  arguments.jitter = deviceAddress(options.jitter);
+  arguments.farOfRay = deviceAddress(options.farOfRay);
+  arguments.occupancy = deviceAddress(options.occupancy);
+  arguments.opticalDepth = deviceAddress(options.opticalDepth);
+  arguments.nextStep = deviceAddress(options.nextStep);
+  const RayScratch scratch = rayScratch(rays);
+  arguments.counts = scratch.counts;
+  arguments.nexts = scratch.nexts;
+  arguments.fitting = scratch.fitting;
+  arguments.firstSample = deviceAddress(options.firstSample);
+  arguments.sampleCount = deviceAddress(options.sampleCount);
+  arguments.finishedRays = deviceAddress(options.finishedRays);
+  arguments.rayOfSample = deviceAddress(options.rayOfSample);
+  arguments.positions = deviceAddress(options.positions);
+  arguments.distances = deviceAddress(options.distances);
+  arguments.steps = deviceAddress(options.steps);
+  const Groups all = {atLeastOneGroup(rays, kRaysPerGroup)};
+  queue(realKernel(kMarchRaysFloat64Spirv, kMarchRaysSpirv, {false}), arguments, all);
+  queueRunningSums(
+      {options.rays, scratch.counts, arguments.sampleCount, scratch.fitting, options.sampleCapacity, scratch.partials});
+  queue(realKernel(kMarchRaysFloat64Spirv, kMarchRaysSpirv, {true}), arguments, all);
+}
+
+void VulkanDevice::enqueue(const OpticalDepth& options) {
+  arguments::OpticalDepthArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.firstSample = deviceAddress(options.firstSample);
+  arguments.logDensity = matrixArguments(options.logDensity, 0);
+  arguments.steps = deviceAddress(options.steps);
+  arguments.opticalDepth = deviceAddress(options.opticalDepth);
+  queue(kernel(kOpticalDepthSpirv), arguments, {groups(options.rays.capacity, kRaysPerGroup)});
+}
+
+void VulkanDevice::enqueue(const CompactSamples& options) {
+  const uint32_t rays = options.rays.capacity;
+  arguments::CompactSamplesArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.rounds = options.rounds;
+  arguments.sampleCapacity = options.sampleCapacity;
+  arguments.keptCapacity = options.keptCapacity;
+  arguments.mostOpticalDepth = options.mostOpticalDepth;
+  arguments.firstSample = deviceAddress(options.firstSample);
+  arguments.nextStep = deviceAddress(options.nextStep);
+  arguments.logDensity = matrixArguments(options.logDensity, 0);
+  arguments.steps = deviceAddress(options.steps);
+  const RayScratch scratch = rayScratch(rays);
+  arguments.counts = scratch.counts;
+  arguments.fitting = scratch.fitting;
+  arguments.keptFirstSample = deviceAddress(options.keptFirstSample);
+  arguments.keptCount = deviceAddress(options.keptCount);
+  arguments.finishedRays = deviceAddress(options.finishedRays);
+  arguments.source = deviceAddress(options.source);
+  arguments.rayOfSample = deviceAddress(options.rayOfSample);
+  const Groups all = {atLeastOneGroup(rays, kRaysPerGroup)};
+  queue(kernel(kCompactSamplesSpirv, {false}), arguments, all);
+  queueRunningSums(
+      {options.rays, scratch.counts, arguments.keptCount, scratch.fitting, options.keptCapacity, scratch.partials});
+  queue(kernel(kCompactSamplesSpirv, {true}), arguments, all);
+}
+
+VulkanDevice::RayScratch VulkanDevice::rayScratch(uint32_t rays) {
+  RayScratch made;
+  made.counts = scratch(2 * size_t{rays} + 2 + scanScratch(rays));
+  made.nexts = made.counts + rays * sizeof(uint32_t);
+  made.fitting = made.nexts + rays * sizeof(uint32_t);
+  made.partials = made.fitting + 2 * sizeof(uint32_t);
+  return made;
+}
+
+void VulkanDevice::moveRows(const Count& rows, const Slice<const uint32_t>& source, const Matrix<const float>& from,
+                            const Matrix<const float>& to, bool scatter) {
+  CHECK(from.columns == to.columns);
+  arguments::MoveRowsArguments arguments = {};
+  arguments.rows = countArguments(rows);
+  arguments.source = deviceAddress(source);
+  arguments.from = matrixArguments(from, scatter ? rows.capacity : 0);
+  arguments.to = matrixArguments(to, scatter ? 0 : rows.capacity);
+  CHECK(size_t{rows.capacity} * from.columns < size_t{1} << 31);
+  queue(kernel(kMoveRowsSpirv, {scatter}), arguments,
+        {groups(size_t{rows.capacity} * from.columns, kElementsPerGroup)});
+}
+
+void VulkanDevice::enqueue(const GatherRows& options) {
+  moveRows(options.rows, options.source, options.input, options.output, false);
+}
+
+void VulkanDevice::enqueue(const ScatterRows& options) {
+  moveRows(options.rows, options.source, options.input, options.output, true);
+}
+
+}  // namespace tessera

@@ -1,0 +1,82 @@
+#include "compute/vulkan/virtual_grid.h"
+
+#include "shaders/distinct_texels_mark.h"
+#include "shaders/distinct_texels_place.h"
+#include "shaders/virtual_grid_backward.h"
+#include "shaders/virtual_grid_backward_float_atomics.h"
+#include "shaders/virtual_grid_forward.h"
+#include "shaders/zero_rows.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr uint32_t kSamplesPerGroup = 64;  // local_size_x of the lookups
+
+}  // namespace
+
+void VulkanDevice::zeroRows(const Count& rows, uint32_t columns, const Slice<float>& numbers) {
+  const size_t most = size_t{rows.capacity} * columns;
+  CHECK(most < size_t{1} << 31);
+  queue(kernel(kZeroRowsSpirv), arguments::ZeroRowsArguments{countArguments(rows), deviceAddress(numbers), columns, 0},
+        {groups(most, 256)});
+}
+
+void VulkanDevice::enqueue(const DistinctTexels& options) {
+  const VirtualGrid& grid = options.grid;
+  const size_t corners = size_t{options.samples.capacity} * grid.corners();
+  const size_t words = size_t{options.blocks} * grid.words();
+  CHECK(corners < size_t{1} << 31);
+  CHECK(32 * words < size_t{1} << 31);
+  arguments::DistinctTexelsArguments arguments = {};
+  arguments.grid = gridArguments(grid);
+  arguments.samples = countArguments(options.samples);
+  arguments.blockOfSample = deviceAddress(options.blockOfSample);
+  arguments.positions = deviceAddress(options.positions);
+  arguments.marks = deviceAddress(options.marks);
+  arguments.ranks = deviceAddress(options.ranks);
+  arguments.firstTexel = deviceAddress(options.firstTexel);
+  arguments.texelPositions = deviceAddress(options.texelPositions);
+  arguments.blocks = options.blocks;
+  arguments.texelCapacity = options.texelCapacity;
+  const Groups ofCorners = {atLeastOneGroup(corners, 128)};
+  if (!grid.shareTexels) {
+    queue(kernel(kDistinctTexelsMarkSpirv, {false}), arguments, ofCorners);
+    return;
+  }
+  fillZero(options.marks.part(0, words));
+  queue(kernel(kDistinctTexelsMarkSpirv, {true}), arguments, ofCorners);
+  const uint64_t fitting = scratch(2 + scanScratch(words));
+  queueRunningSums({.rows = {static_cast<uint32_t>(words)},
+                    .values = arguments.ranks,
+                    .total = arguments.firstTexel + options.blocks * sizeof(uint32_t),
+                    .fitting = fitting,
+                    .limit = 0x7fffffff,
+                    .scratch = fitting + 2 * sizeof(uint32_t),
+                    .marks = arguments.marks});
+  queue(kernel(kDistinctTexelsPlaceSpirv), arguments, {groups(words, 128)});
+}
+
+void VulkanDevice::enqueue(const VirtualGridForward& options) {
+  auto arguments = lookupArguments<arguments::VirtualGridLookupArguments>(options);
+  arguments.attributes = deviceAddress(options.attributes);
+  arguments.runtimeSteps = deviceAddress(options.runtimeSteps);
+  arguments.logDensities = deviceAddress(options.logDensities);
+  arguments.colours = deviceAddress(options.colours);
+  arguments.minAlpha = options.minAlpha;
+  queue(kernel(kVirtualGridForwardSpirv), arguments, {groups(options.samples.capacity, kSamplesPerGroup)});
+}
+
+void VulkanDevice::enqueue(const VirtualGridBackward& options) {
+  auto arguments = lookupArguments<arguments::VirtualGridLookupArguments>(options);
+  arguments.logDensities = deviceAddress(options.logDensities);
+  arguments.colours = deviceAddress(options.colours);
+  arguments.logDensityGradients = deviceAddress(options.logDensityGradients);
+  arguments.colourGradients = deviceAddress(options.colourGradients);
+  arguments.attributeGradients = deviceAddress(options.attributeGradients);
+  zeroRows(options.texels, VirtualGrid::kAttributes, options.attributeGradients);
+  queue(sumKernel(kVirtualGridBackwardFloatAtomicsSpirv, kVirtualGridBackwardSpirv), arguments,
+        {groups(options.samples.capacity, kSamplesPerGroup)});
+}
+
+}  // namespace tessera

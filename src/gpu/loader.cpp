@@ -1,0 +1,3 @@
+// volk's own code, which finds the Vulkan loader at run time.
+#define VOLK_IMPLEMENTATION
+#include <volk.h>
