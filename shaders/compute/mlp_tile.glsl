@@ -46,11 +46,11 @@ void accumulate(FloatPointer weights, uint first, uint kStep, uint nStep, uint d
     }
     barrier();
     for (uint k = 0; k < kDepth; ++k) {
+      float column[kColumns];
+      [[unroll]] for (uint c = 0; c < kColumns; ++c) column[c] = weightTile[k * kWidth + stateColumn(c)];
       [[unroll]] for (uint r = 0; r < kRows; ++r) {
         const float value = state[stateRow(r) * kStride + k0 + k];
-        [[unroll]] for (uint c = 0; c < kColumns; ++c) {
-          sums[r * kColumns + c] += value * weightTile[k * kWidth + stateColumn(c)];
-        }
+        [[unroll]] for (uint c = 0; c < kColumns; ++c) sums[r * kColumns + c] += value * column[c];
       }
     }
   }

@@ -37,10 +37,11 @@ void main() {
     }
     barrier();
     for (uint k = 0; k < kDepth; ++k) {
+      float before[4];
+      [[unroll]] for (uint c = 0; c < 4; ++c) before[c] = beforeTile[k * kTile + c * 8 + tileColumn];
       [[unroll]] for (uint r = 0; r < 4; ++r) {
-        [[unroll]] for (uint c = 0; c < 4; ++c) {
-          sums[r * 4 + c] += afterTile[k * kTile + r * 8 + tileRow] * beforeTile[k * kTile + c * 8 + tileColumn];
-        }
+        const float after = afterTile[k * kTile + r * 8 + tileRow];
+        [[unroll]] for (uint c = 0; c < 4; ++c) sums[r * 4 + c] += after * before[c];
       }
     }
   }

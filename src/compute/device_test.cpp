@@ -11,6 +11,10 @@
 #include <cstring>
 #include <set>
 
+#ifdef TESSERA_HAS_VULKAN
+#include "gpu/context.h"
+#endif
+
 namespace tessera::device_test {
 namespace {
 
@@ -63,9 +67,29 @@ std::string difference(const Output& got, const Output& want, bool exact) {
   return {};
 }
 
-void compare(const Outputs& got, const Outputs& want, bool exact, const std::string& what) {
+// How far outputs may be from those of the reference.
+enum class Closeness {
+  exact,     // the same bits
+  close,     // as each output says
+  inFloat,   // or 1e-4 of the largest, where that is more
+  sameSize,  // as many samples but for three hundredths: counts alone are compared
+};
+
+std::string differenceOfCounts(const Output& got, const Output& want) {
+  if (want.words.size() != 1) return {};
+  const double a = got.words[0], b = want.words[0];
+  return std::abs(a - b) <= 3 + 0.03 * b ? "" : fmt::format("{} is {} instead of {}", want.name, a, b);
+}
+
+void compare(const Outputs& got, Outputs want, Closeness closeness, const std::string& what) {
   ASSERT_EQ(got.size(), want.size());
-  for (size_t i = 0; i < want.size(); ++i) EXPECT_EQ(difference(got[i], want[i], exact), "") << what;
+  for (size_t i = 0; i < want.size(); ++i) {
+    if (closeness == Closeness::inFloat && want[i].tolerance > 0) want[i].tolerance = std::max(want[i].tolerance, 1e-4);
+    EXPECT_EQ(closeness == Closeness::sameSize ? differenceOfCounts(got[i], want[i])
+                                               : difference(got[i], want[i], closeness == Closeness::exact),
+              "")
+        << what;
+  }
 }
 
 Outputs outputsOf(const Case& testCase, Device& device, uint64_t seed) {
@@ -88,7 +112,12 @@ class DeviceTest : public testing::TestWithParam<OperationOnDevice> {
     if (!device->supports(operation)) GTEST_SKIP() << name << " does not support " << nameOf(operation);
   }
 
-  void TearDown() override { useSimdTargetOf({}); }
+  void TearDown() override {
+    useSimdTargetOf({});
+#ifdef TESSERA_HAS_VULKAN
+    EXPECT_EQ(GpuContext::validationMessages(), 0);
+#endif
+  }
 
   Operation operation{};
   OperationTests tests;
@@ -101,10 +130,12 @@ class Threads : public DeviceTest {};
 
 TEST_P(Values, AgreeWithTheReference) {
   ASSERT_FALSE(tests.cases.empty());
+  Closeness closeness = Closeness::close;
+  if (std::get<1>(GetParam()) == kWithoutDoubles) closeness = tests.decides ? Closeness::sameSize : Closeness::inFloat;
   for (size_t i = 0; i < tests.cases.size(); ++i) {
     const uint64_t seed = seedOf(operation, i);
     const Case& testCase = tests.cases[i];
-    compare(outputsOf(testCase, *device, seed), outputsOf(testCase, *deviceNamed("reference"), seed), false,
+    compare(outputsOf(testCase, *device, seed), outputsOf(testCase, *deviceNamed("reference"), seed), closeness,
             fmt::format("{}, {}, seed {}", nameOf(operation), testCase.name, seed));
   }
 }
@@ -129,7 +160,7 @@ TEST_P(Threads, NeverChangeABit) {
   for (size_t i = 0; i < tests.cases.size(); ++i) {
     const uint64_t seed = seedOf(operation, i);
     compare(outputsOf(tests.cases[i], *device, seed),
-            outputsOf(tests.cases[i], *deviceNamed("cpu with 1 thread"), seed), true,
+            outputsOf(tests.cases[i], *deviceNamed("cpu with 1 thread"), seed), Closeness::exact,
             fmt::format("{}, {}, seed {}", nameOf(operation), tests.cases[i].name, seed));
   }
 }

@@ -126,6 +126,8 @@ struct OperationTests {
   std::vector<Case> cases;
   std::vector<GradientCase> gradients;
   std::string noGradient;  // why there is none to check
+  // Which samples there are is decided in double: a device without may now and then decide otherwise.
+  bool decides = false;
 };
 
 template <class Arguments>
@@ -148,6 +150,7 @@ double dot(View a, View b);
 // The devices of this build, by name: "reference", "cpu with 1 thread", ... Null where this machine has none.
 std::vector<std::string> deviceNames();
 Device* deviceNamed(const std::string& name);
+inline constexpr std::string_view kWithoutDoubles = "vulkan without doubles";
 // The cpu device with each lesser instruction set that this machine has: "cpu AVX2 with 2 threads", ... All cpu devices
 // share one set, so a test on a device first says which.
 std::vector<std::string> lesserCpuNames();

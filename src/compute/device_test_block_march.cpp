@@ -37,6 +37,7 @@ void watchSamples(Stage& stage, uint32_t rays, uint32_t capacity, MarchBlocks& a
 template <>
 OperationTests testsOf<MarchBlocks>() {
   OperationTests tests;
+  tests.decides = true;
   tests.noGradient = "sample positions carry no gradient";
   for (const NamedBlockSpace& named : blockSpaces())
     for (const Size& size : {Size{0}, Size{1}, Size{37}, Size{40, 23}, Size{5, 0}, Size{150, 1000}})

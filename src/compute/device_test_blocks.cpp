@@ -119,6 +119,7 @@ OperationTests testsOf<EnterScene>() {
 template <>
 OperationTests testsOf<BlockSamples>() {
   OperationTests tests;
+  tests.decides = true;
   tests.noGradient = "cameras and fence posts are fixed";
   for (const NamedBlockSpace& named : blockSpaces())
     for (const Size& size : kSizes)

@@ -123,6 +123,7 @@ OperationTests testsOf<GenerateRays>() {
 template <>
 OperationTests testsOf<MarchRays>() {
   OperationTests tests;
+  tests.decides = true;
   tests.noGradient = "sample positions carry no gradient";
   for (const NamedSpace& named : spaces())
     for (const Size& size : {Size{0}, Size{1}, Size{37}, Size{40, 23}, Size{5, 0}, Size{150, 1000}})

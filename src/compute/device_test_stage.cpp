@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstdio>
@@ -183,9 +184,9 @@ namespace {
 
 std::unique_ptr<Device> openDevice(const std::string& name) {
 #ifdef TESSERA_HAS_VULKAN
-  if (name == "vulkan without float atomics") {
+  if (name == "vulkan without float atomics" || name == kWithoutDoubles) {
     GpuOptions options;
-    options.allowed.floatAtomics = false;
+    (name == kWithoutDoubles ? options.allowed.float64 : options.allowed.floatAtomics) = false;
     return makeVulkanDevice(options);
   }
 #endif
@@ -222,6 +223,7 @@ std::vector<std::string> deviceNames() {
 #ifdef TESSERA_HAS_VULKAN
   names.push_back("vulkan");
   names.push_back("vulkan without float atomics");
+  names.emplace_back(kWithoutDoubles);
 #endif
   return names;
 }
@@ -230,9 +232,24 @@ void useSimdTargetOf(const std::string& name) {
   cpu::useSimdTarget(simdTargetOf(name));
 }
 
-Device* deviceNamed(const std::string& name) {
+namespace {
+
+std::map<std::string, std::unique_ptr<Device>>& openDevices() {
   static std::map<std::string, std::unique_ptr<Device>> devices;
-  const auto [found, isNew] = devices.try_emplace(name);
+  return devices;
+}
+
+// Devices go before the process ends: drivers and layers that were loaded after `openDevices` was made go before it.
+class CloseDevices : public testing::Environment {
+ public:
+  void TearDown() override { openDevices().clear(); }
+};
+[[maybe_unused]] testing::Environment* const closeDevices = testing::AddGlobalTestEnvironment(new CloseDevices);
+
+}  // namespace
+
+Device* deviceNamed(const std::string& name) {
+  const auto [found, isNew] = openDevices().try_emplace(name);
   if (isNew) {
     try {
       found->second = openDevice(name);

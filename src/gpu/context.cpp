@@ -198,8 +198,8 @@ uint32_t GpuContext::memoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted,
   throw Error(name_, "", "it has no memory of the kind we need", "update the graphics driver");
 }
 
-int GpuContext::validationErrors() {
-  return validationErrorCount();
+int GpuContext::validationMessages() {
+  return validationMessageCount();
 }
 
 }  // namespace tessera

@@ -69,8 +69,9 @@ class GpuContext {
   // The first memory type among `typeBits` that has all `wanted` properties, those with `preferred` first.
   uint32_t memoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted, VkMemoryPropertyFlags preferred) const;
 
-  // Mistakes that the validation layers reported so far in this process.
-  static int validationErrors();
+  // Mistakes that the validation layers reported so far in this process, warnings too.
+  static int validationMessages();
+  bool validates() const { return messenger_ != VK_NULL_HANDLE; }
 
  private:
   GpuContext() = default;

@@ -78,12 +78,32 @@ TEST(GpuContext, OpensTheBestDevice) {
   EXPECT_EQ(context->target().rfind("vulkan/", 0), 0u) << context->target();
 }
 
+TEST(GpuContext, ValidatesWhereTheEnvironmentAsksForIt) {
+  const Environment wanted("TESSERA_VULKAN_VALIDATION", "1");
+  const auto context = openForTest();
+  SKIP_WITHOUT_VULKAN(context);
+  if (!context->validates() && !vulkanIsRequired())
+    GTEST_SKIP() << "the package vulkan-validationlayers is not installed";
+  EXPECT_TRUE(context->validates());
+}
+
+TEST(GpuContext, ListsTheDevicesOfThisMachine) {
+  SKIP_WITHOUT_VULKAN(openForTest());
+  const std::vector<GpuDescription> devices = GpuContext::devices();
+  ASSERT_FALSE(devices.empty());
+  for (const GpuDescription& device : devices) {
+    EXPECT_FALSE(device.name.empty());
+    EXPECT_GT(device.memoryBytes, 0u);
+  }
+}
+
 TEST(GpuContext, LeavesOutFeaturesThatAreNotAllowed) {
   GpuOptions options;
-  options.allowed = {.floatAtomics = false, .float16 = false, .subgroups = false};
+  options.allowed = {.floatAtomics = false, .float64 = false, .float16 = false, .subgroups = false};
   const auto context = openForTest(options);
   SKIP_WITHOUT_VULKAN(context);
   EXPECT_FALSE(context->features().floatAtomics);
+  EXPECT_FALSE(context->features().float64);
   EXPECT_FALSE(context->features().float16);
   EXPECT_FALSE(context->features().subgroups);
 }

@@ -39,7 +39,7 @@ class GpuStreamTest : public testing::Test {
     context_ = openForTest();
     SKIP_WITHOUT_VULKAN(context_);
   }
-  void TearDown() override { EXPECT_EQ(GpuContext::validationErrors(), 0); }
+  void TearDown() override { EXPECT_EQ(GpuContext::validationMessages(), 0); }
 
   std::shared_ptr<GpuContext> context_;
 };

@@ -11,11 +11,11 @@ namespace tessera {
 
 namespace {
 
-std::atomic<int> errorCount = 0;
+std::atomic<int> messageCount = 0;
 
-VKAPI_ATTR VkBool32 VKAPI_CALL report(VkDebugUtilsMessageSeverityFlagBitsEXT severity, VkDebugUtilsMessageTypeFlagsEXT,
+VKAPI_ATTR VkBool32 VKAPI_CALL report(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
                                       const VkDebugUtilsMessengerCallbackDataEXT* data, void*) {
-  if (severity & VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT) ++errorCount;
+  ++messageCount;
   warn("vulkan validation: {}", data->pMessage);
   return VK_FALSE;
 }
@@ -53,8 +53,8 @@ void destroyValidationMessenger(VkInstance instance, VkDebugUtilsMessengerEXT me
   destroy(instance, messenger, nullptr);
 }
 
-int validationErrorCount() {
-  return errorCount;
+int validationMessageCount() {
+  return messageCount;
 }
 
 }  // namespace tessera

@@ -15,7 +15,7 @@ bool validationInstalled();
 VkDebugUtilsMessengerEXT createValidationMessenger(VkInstance instance);
 void destroyValidationMessenger(VkInstance instance, VkDebugUtilsMessengerEXT messenger);
 
-// Errors that they reported so far in this process.
-int validationErrorCount();
+// Errors and warnings that they reported so far in this process.
+int validationMessageCount();
 
 }  // namespace tessera

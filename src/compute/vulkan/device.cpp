@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstdlib>
+#include <string_view>
 
+#include "base/log.h"
 #include "compute/vulkan/vulkan_device.h"
 
 namespace tessera {
@@ -21,7 +24,23 @@ VulkanMemory::VulkanMemory(std::shared_ptr<GpuStream> stream, size_t bytes)
 }
 
 VulkanDevice::VulkanDevice(std::shared_ptr<const GpuContext> context)
-    : stream_(std::make_shared<GpuStream>(std::move(context))) {}
+    : stream_(std::make_shared<GpuStream>(std::move(context))) {
+  const char* times = std::getenv("TESSERA_GPU_TIMES");
+  if (times != nullptr && std::string_view(times) == "1") stream_->measure(true);
+}
+
+VulkanDevice::~VulkanDevice() {
+  try {
+    double all = 0;
+    for (const auto& [name, measured] : stream_->measured()) all += measured.seconds;
+    for (const auto& [name, measured] : stream_->measured()) {
+      inform("{:<26} {:10.3f} ms in {} commands, {:.1f} %", name, 1e3 * measured.seconds, measured.commands,
+           100 * measured.seconds / all);
+    }
+  } catch (const std::exception& error) {  // a device that is lost tells no times
+    warn("{}", error.what());
+  }
+}
 
 std::string VulkanDevice::name() const {
   return "vulkan " + stream_->context()->name();
@@ -35,15 +54,18 @@ std::unique_ptr<Memory> VulkanDevice::allocate(size_t bytes) {
 }
 
 void VulkanDevice::writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) {
+  stream_->label("copies");
   stream_->upload(static_cast<VulkanMemory&>(to).buffer(), offset, from);
 }
 
 void VulkanDevice::readBytes(const Memory& from, size_t offset, std::span<std::byte> to) {
+  stream_->label("copies");
   stream_->download(static_cast<const VulkanMemory&>(from).buffer(), offset, to);
 }
 
 void VulkanDevice::fillZero(Memory& memory, size_t offset, size_t bytes) {
   CHECK(offset + bytes <= memory.bytes());
+  stream_->label("fills");
   stream_->fillZero(static_cast<VulkanMemory&>(memory).buffer(), offset, bytes);
 }
 

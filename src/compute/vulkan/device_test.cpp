@@ -49,7 +49,7 @@ class VulkanDeviceTest : public testing::TestWithParam<bool> {
     options.allowed.floatAtomics = GetParam();
     device_ = makeVulkanDevice(options);
   }
-  void TearDown() override { EXPECT_EQ(GpuContext::validationErrors(), 0); }
+  void TearDown() override { EXPECT_EQ(GpuContext::validationMessages(), 0); }
 
   std::unique_ptr<Device> device_;
 };
