@@ -6,6 +6,7 @@
 #include "representations/field/field_renderer.h"
 #include "representations/field/trained_cube.h"
 #include "train/run_folder.h"
+#include "train/two_devices.h"
 
 namespace tessera {
 namespace {
@@ -133,6 +134,22 @@ TEST(TrainField, SaysWhenThereIsNoModelToDraw) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   EXPECT_THROW(loadFieldModel(*device, scene / "nothing"), Error);
+}
+
+TEST(TrainField, ComesToTheSameOnVulkanAndGoesOnThereAndBack) {
+  const CubeScene scene;
+  const TwoDevices both = {[&](Device& device, const fs::path& folder, const TrainingLoopOptions& loop) {
+                             TrainFieldOptions some = options(0);
+                             some.loop = loop;
+                             trainField(device, scene.capture(), folder, some);
+                           },
+                           [&](Device& device, const fs::path& folder) {
+                             const std::unique_ptr<FieldModel> model = loadFieldModel(device, folder);
+                             return FieldRenderer(*model)
+                                 .render(scene.capture().cameras[0], scene.capture().photos[3].worldFromCamera, nullptr)
+                                 .colour;
+                           }};
+  both.expectTheSamePictures(scene / "models");
 }
 
 }  // namespace

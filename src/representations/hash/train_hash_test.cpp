@@ -7,7 +7,9 @@
 #include "render/tile_scene.h"
 #include "representations/hash/bake_hash.h"
 #include "representations/hash/hash_cube.h"
+#include "representations/hash/hash_model_renderer.h"
 #include "train/level_folders.h"
+#include "train/two_devices.h"
 
 namespace tessera {
 namespace {
@@ -125,6 +127,23 @@ TEST_F(HashTraining, LeavesCoarserLevelsOutWhereNoneAreWanted) {
   train(alone);
   EXPECT_EQ(trainedLevels<HashConfig>(scene_ / "model"), 1u);
   EXPECT_FALSE(fs::exists(scene_ / "model" / "levels"));
+}
+
+TEST_F(HashTraining, ComesToTheSameOnVulkanAndGoesOnThereAndBack) {
+  const TwoDevices both = {[&](Device& device, const fs::path& folder, const TrainingLoopOptions& loop) {
+                             TrainHashOptions some = options(0);
+                             some.config.levelShare = 0;
+                             some.loop = loop;
+                             trainHash(device, scene_.capture(), folder, some);
+                           },
+                           [&](Device& device, const fs::path& folder) {
+                             const std::unique_ptr<HashModel> model = loadHashModel(device, folder);
+                             return HashModelRenderer(*model)
+                                 .render(scene_.capture().cameras[0], scene_.capture().photos[3].worldFromCamera,
+                                         nullptr)
+                                 .colour;
+                           }};
+  both.expectTheSamePictures(scene_ / "models");
 }
 
 }  // namespace

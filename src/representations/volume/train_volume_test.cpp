@@ -4,8 +4,10 @@
 
 #include "base/error.h"
 #include "representations/volume/volume_cube.h"
+#include "representations/volume/volume_model_renderer.h"
 #include "train/level_folders.h"
 #include "train/run_folder.h"
+#include "train/two_devices.h"
 
 namespace tessera {
 namespace {
@@ -270,6 +272,23 @@ TEST(TrainVolume, CountsWhatABlockTakes) {
   EXPECT_GT(trainingBytesPerBlock(cpu), 5e6);
   EXPECT_LT(trainingBytesPerBlock(cpu), 100e6);
   EXPECT_GT(trainingBytesPerBlock(paper), 5 * trainingBytesPerBlock(cpu));
+}
+
+TEST(TrainVolume, ComesToTheSameOnVulkanAndGoesOnThereAndBack) {
+  const CubeScene scene;
+  const TwoDevices both = {[&](Device& device, const fs::path& folder, const TrainingLoopOptions& loop) {
+                             TrainVolumeOptions some = options(0);
+                             some.config.levelShare = 0;
+                             some.loop = loop;
+                             trainVolume(device, scene.capture(), folder, some);
+                           },
+                           [&](Device& device, const fs::path& folder) {
+                             const std::unique_ptr<VolumeModel> model = loadVolumeModel(device, folder);
+                             return VolumeModelRenderer(*model, 0)
+                                 .render(scene.capture().cameras[0], scene.capture().photos[3].worldFromCamera, nullptr)
+                                 .colour;
+                           }};
+  both.expectTheSamePictures(scene / "models");
 }
 
 }  // namespace

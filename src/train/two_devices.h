@@ -1,0 +1,67 @@
+// For tests: the same training on the processor, on Vulkan, and begun on the one and ended on the other.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "base/error.h"
+#include "base/image.h"
+#include "compute/device.h"
+#include "train/training_loop.h"
+#ifdef TESSERA_HAS_VULKAN
+#include "gpu/test_context.h"
+#endif
+
+namespace tessera {
+
+struct TwoDevices {
+  static constexpr int64_t kSteps = 8;
+
+  // Trains, or goes on with, the model in a folder.
+  std::function<void(Device& device, const fs::path& folder, const TrainingLoopOptions& loop)> train;
+  // A picture of that model.
+  std::function<ImageF(Device& device, const fs::path& folder)> draw;
+
+  void trainOn(Device& device, const fs::path& folder, bool resume, int64_t stopAfter = kSteps) const {
+    TrainingLoopOptions loop;
+    loop.steps = kSteps;
+    loop.resume = resume;
+    loop.progress = false;
+    int64_t asked = 0;
+    loop.stopRequested = [&] { return asked++ >= stopAfter; };
+    train(device, folder, loop);
+  }
+
+  // Steps differ in rounding alone, which a few of them do not blow up to much.
+  void expectTheSamePictures(const fs::path& scratch) const {
+#ifndef TESSERA_HAS_VULKAN
+    GTEST_SKIP() << "this build has no Vulkan";
+#else
+    SKIP_WITHOUT_VULKAN(openForTest());
+    const std::unique_ptr<Device> cpu = makeDevice({"cpu", 2}), vulkan = makeDevice({"vulkan"});
+    trainOn(*cpu, scratch / "cpu", false);
+    const ImageF wanted = draw(*cpu, scratch / "cpu");
+    trainOn(*vulkan, scratch / "vulkan", false);
+    trainOn(*vulkan, scratch / "to-cpu", false, kSteps / 2);
+    trainOn(*cpu, scratch / "to-cpu", true);
+    trainOn(*cpu, scratch / "to-vulkan", false, kSteps / 2);
+    trainOn(*vulkan, scratch / "to-vulkan", true);
+    for (const char* folder : {"vulkan", "to-cpu", "to-vulkan"}) {
+      EXPECT_GT(decibels(draw(*cpu, scratch / folder), wanted), 40) << folder;
+    }
+    EXPECT_GT(decibels(draw(*vulkan, scratch / "cpu"), wanted), 50) << "drawn on Vulkan";
+    EXPECT_EQ(GpuContext::validationMessages(), 0);
+#endif
+  }
+
+  static double decibels(const ImageF& a, const ImageF& b) {
+    CHECK(a.pixels.size() == b.pixels.size());
+    double squares = 1e-12;
+    for (size_t i = 0; i < a.pixels.size(); ++i) squares += std::pow(a.pixels[i] - b.pixels[i], 2);
+    return 10 * std::log10(static_cast<double>(a.pixels.size()) / squares);
+  }
+};
+
+}  // namespace tessera
