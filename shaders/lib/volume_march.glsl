@@ -1,26 +1,15 @@
 // One content of a `volume` scene along a ray: its samples, composited (docs/tile-format.md, section 6; City-on-Web,
 // section 4.2). Twin of src/render/cpu/volume_march.cpp.
 //
-// Reads: domain_path.glsl, part_place.glsl; `content`, whose first vectors are those of its parts, 6 each (see partOf);
-//   sampler2DArray planesFirst, planesSecond (diffuse and density; features): a part's three planes in its corner of
-//   three layers; vec4 voxelsFirst(vec3), voxelsSecond(vec3): texels of an atlas of macroblocks of 9³, the middle of the
-//   first at 0.5; sampler3D macroblocks: where they are in it, bytes, the fourth 0 where none is; sampler3D distances:
-//   bytes; float featureRange, densityRange, stepsPerTexel, minTransmittance.
-// Defines: Part, partOf, marchSegment.
-
-struct Part {
-  Place place;
-  float texels;  // of a plane along an axis
-  float voxels;  // along an axis
-  float layer;   // of its first plane
-  ivec3 macroblockOrigin, distanceOrigin;
-};
-
-Part partOf(int n) {
-  vec4 a = content[6 * n], b = content[6 * n + 1], c = content[6 * n + 2], d = content[6 * n + 3];
-  ivec3 macroblocks = ivec3(content[6 * n + 4].xyz), distances = ivec3(content[6 * n + 5].xyz);
-  return Part(placeOf(a, b, c, d), b.w, a.w, d.w, macroblocks, distances);
-}
+// Reads: domain_path.glsl, part_place.glsl; how a viewer holds a content:
+//     struct Part               with place; texels and voxels, of a plane and of the voxels along an axis
+//     float reachAt(Part, vec3 cell)           how many cells of 8 texels nothing is near; 0 where something may be
+//     vec4 macroblockAt(Part, vec3 block)      of 9³ voxels; the fourth is 0 where none is, the rest is the viewer's
+//     vec4 voxelsFirst(Part, vec4 macroblock, vec3 within), voxelsSecond(...)    their mix, 0 at the middle of the first:
+//                                              diffuse and density; features; in shares of 255
+//     vec4 planesFirst(Part, vec3 x), planesSecond(...)    the three planes' mixes at x texels, added up
+//   float featureRange, densityRange, stepsPerTexel, minTransmittance.
+// Defines: marchSegment.
 
 void marchSegment(Part part, DomainSegment s, inout Composite sum) {
   float cells = part.texels / 8.0;
@@ -29,7 +18,6 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
   float voxelsPerTexel = part.voxels / part.texels;
   vec3 inverse = sign(s.direction) / max(abs(s.direction), vec3(1e-20));
   inverse = mix(inverse, vec3(1e20), equal(s.direction, vec3(0.0)));
-  float widest = float(textureSize(planesFirst, 0).x);
   float count = ceil(s.length * stepsPerTexel);
   float i = 0.0;
   int guard = 0;  // no segment is longer than its diagonal; a bound for drivers that want one
@@ -43,7 +31,7 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
       tau = 0.5 * (from + to);
       x = s.start + tau * s.direction;
       vec3 cell = clamp(floor(x / 8.0), 0.0, cells - 1.0);
-      float reach = floor(texelFetch(distances, part.distanceOrigin + ivec3(cell), 0).r * 255.0 + 0.5);
+      float reach = reachAt(part, cell);
       if (reach == 0.0) break;
       // The cube of cells nearer than that is empty: on to the first step whose middle lies behind it.
       vec3 end = mix((cell - reach + 1.0) * 8.0 + margin, (cell + reach) * 8.0 - margin, greaterThan(inverse, vec3(0.0)));
@@ -55,24 +43,19 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
     i += 1.0;
     vec3 u = clamp(x * voxelsPerTexel - 0.5, 0.0, part.voxels - 1.0);
     vec3 block = floor(u / 8.0);
-    vec4 place = texelFetch(macroblocks, part.macroblockOrigin + ivec3(block), 0);
-    vec3 voxel = floor(place.xyz * 255.0 + 0.5) * 9.0 + (u - 8.0 * block) + 0.5;
-    vec3 p = clamp(x, 0.5, part.texels - 0.5) / widest;
+    vec3 within = u - 8.0 * block;
+    vec4 macroblock = macroblockAt(part, block);
     float weight = 0.0, opacity = 0.0;
     vec4 first = vec4(0.0);
-    if (place.w != 0.0) {
-      first = voxelsFirst(voxel) + textureLod(planesFirst, vec3(p.yz, part.layer), 0.0) +
-              textureLod(planesFirst, vec3(p.xz, part.layer + 1.0), 0.0) +
-              textureLod(planesFirst, vec3(p.xy, part.layer + 2.0), 0.0);
+    if (macroblock.w != 0.0) {
+      first = voxelsFirst(part, macroblock, within) + planesFirst(part, x);
       // A byte b of four sources stands for -R + 2R b / 255 each.
       float density = exp(min(densityRange * (2.0 * first.a - 4.0) - 1.0, 15.0));
       opacity = opacityOf(density * distanceBetween(s, from, to));
       weight = sum.transmittance * opacity;
     }
     if (weight >= 1e-6) {
-      vec4 second = voxelsSecond(voxel) + textureLod(planesSecond, vec3(p.yz, part.layer), 0.0) +
-                    textureLod(planesSecond, vec3(p.xz, part.layer + 1.0), 0.0) +
-                    textureLod(planesSecond, vec3(p.xy, part.layer + 2.0), 0.0);
+      vec4 second = voxelsSecond(part, macroblock, within) + planesSecond(part, x);
       addTo(sum, 1.0 / (1.0 + exp(featureRange * (4.0 - 2.0 * first.rgb))), 1.0 / (1.0 + exp(featureRange * (4.0 - 2.0 * second))),
             opacity, distanceAt(s, tau));
     }

@@ -11,9 +11,51 @@ import { kVoxelAtlases } from './volume-textures';
 
 const kUniforms = `
 layout(location = 0) out vec4 colourAndOpacity;
-uniform sampler2DArray planesFirst, planesSecond;
+uniform sampler2DArray planeTexelsFirst, planeTexelsSecond;
 uniform sampler3D macroblocks, distances;
 uniform float featureRange, densityRange, stepsPerTexel;
+`;
+
+// `content` begins with six vectors of each part; its planes lie in their corner of three layers; macroblocks' numbers are
+// places in an atlas, in bytes.
+const kParts = `
+struct Part {
+  Place place;
+  float texels;  // of a plane along an axis
+  float voxels;  // along an axis
+  float layer;   // of its first plane
+  ivec3 macroblockOrigin, distanceOrigin;
+};
+
+Part partOf(int n) {
+  vec4 a = content[6 * n], b = content[6 * n + 1], c = content[6 * n + 2], d = content[6 * n + 3];
+  ivec3 macroblocks = ivec3(content[6 * n + 4].xyz), distances = ivec3(content[6 * n + 5].xyz);
+  return Part(placeOf(a, b, c, d), b.w, a.w, d.w, macroblocks, distances);
+}
+
+float reachAt(Part part, vec3 cell) {
+  return floor(texelFetch(distances, part.distanceOrigin + ivec3(cell), 0).r * 255.0 + 0.5);
+}
+
+vec4 macroblockAt(Part part, vec3 block) {
+  return texelFetch(macroblocks, part.macroblockOrigin + ivec3(block), 0);
+}
+
+vec3 inAtlas(vec4 macroblock, vec3 within) {
+  return floor(macroblock.xyz * 255.0 + 0.5) * 9.0 + within + 0.5;
+}
+
+vec4 voxelsFirst(Part part, vec4 macroblock, vec3 within) { return voxelAtlasFirst(inAtlas(macroblock, within)); }
+vec4 voxelsSecond(Part part, vec4 macroblock, vec3 within) { return voxelAtlasSecond(inAtlas(macroblock, within)); }
+
+vec4 planesOf(highp sampler2DArray planes, Part part, vec3 x) {
+  vec3 p = clamp(x, 0.5, part.texels - 0.5) / float(textureSize(planes, 0).x);
+  return textureLod(planes, vec3(p.yz, part.layer), 0.0) + textureLod(planes, vec3(p.xz, part.layer + 1.0), 0.0) +
+    textureLod(planes, vec3(p.xy, part.layer + 2.0), 0.0);
+}
+
+vec4 planesFirst(Part part, vec3 x) { return planesOf(planeTexelsFirst, part, x); }
+vec4 planesSecond(Part part, vec3 x) { return planesOf(planeTexelsSecond, part, x); }
 `;
 
 const kWrite = `
@@ -53,6 +95,6 @@ export function volumePieces(
   const ofParts = kVectorsOfPart * parts.length;
   const packed = packNetwork(network);
   const vector = (n: number) => (ownNetwork ? writtenVector(packed, n) : `content[${ofParts + n}]`);
-  const source = [kUniforms, atlasShader(kVoxelAtlases, atlases), marchSource, deferredShader(network, vector), kWrite].join('\n');
+  const source = [kUniforms, atlasShader(kVoxelAtlases, atlases), kParts, marchSource, deferredShader(network, vector), kWrite].join('\n');
   return { parts: parts.length, vectors: ofParts + networkVectors(network), defines: {}, source };
 }

@@ -5,7 +5,7 @@ import { packNetwork } from '../tiles/network';
 import { kVectorsOfPart, type VolumeContent, type VolumePart } from '../tiles/volume-content';
 import { atlasUniforms, ContentTextures, kForms } from './content-textures';
 
-export const kVoxelAtlases = ['voxelsFirst', 'voxelsSecond'] as const;
+export const kVoxelAtlases = ['voxelAtlasFirst', 'voxelAtlasSecond'] as const;
 
 export class VolumeTextures extends ContentTextures<VolumePart> {
   readonly numbers: Float32Array;
@@ -17,8 +17,8 @@ export class VolumeTextures extends ContentTextures<VolumePart> {
     const { planes, voxels, atlasDepth, macroblocks, distances } = content;
     this.origins = { macroblocks: macroblocks.origins, distances: distances.origins };
     this.ofMarch = {
-      planesFirst: { value: this.add(new THREE.DataArrayTexture(null, ...planes.size), kForms.fourBytes, planes.first, true) },
-      planesSecond: { value: this.add(new THREE.DataArrayTexture(null, ...planes.size), kForms.fourBytes, planes.second, true) },
+      planeTexelsFirst: { value: this.add(new THREE.DataArrayTexture(null, ...planes.size), kForms.fourBytes, planes.first, true) },
+      planeTexelsSecond: { value: this.add(new THREE.DataArrayTexture(null, ...planes.size), kForms.fourBytes, planes.second, true) },
       ...this.addAtlas(voxels, atlasDepth, kVoxelAtlases),
       ...atlasUniforms(voxels.size, atlasDepth),
       macroblocks: { value: this.addCubes(macroblocks, kForms.fourBytes) },
