@@ -9,22 +9,13 @@
 #include "base/threads.h"
 #include "render/cpu/hash_shading.h"
 #include "render/cpu/volume_shading.h"
+#include "render/scene_tiles.h"
 #include "render/tile_frame.h"
 #include "scene/view_renderer.h"
 
 namespace tessera {
 
-// Of a content, the part in a box, whose sides may be infinite. Content: VolumeContent or HashContent.
-template <class Content>
-struct DrawnContent {
-  const Content* content;
-  Vec3d low, high;  // scene units
-
-  DrawnContent(const Content* content)  // NOLINT(google-explicit-constructor): all of it
-      : DrawnContent(content, Vec3d::Constant(-INFINITY), Vec3d::Constant(INFINITY)) {}
-  DrawnContent(const Content* content, const Vec3d& low, const Vec3d& high) : content(content), low(low), high(high) {}
-};
-
+// Content: VolumeContent or HashContent.
 template <class Content>
 struct SceneDrawing {
   TileFrame frame;

@@ -5,8 +5,7 @@
 #pragma once
 
 #include "render/cpu/draw_scene.h"
-#include "render/tile_cache.h"
-#include "render/tile_selection.h"
+#include "render/scene_tiles.h"
 
 namespace tessera {
 
@@ -33,23 +32,16 @@ class SceneRenderer final : public ViewRenderer {
   std::string device() const override;
   Eigen::Array3f background() const override { return settings_.background; }
 
-  const TileCut& cut() const { return cut_; }  // of the last picture
-  const TileChoice& choice() const { return choice_; }
-  const TileCache<Content>& cache() const { return cache_; }
-  const TileCacheStatistics& cacheStatistics() const { return cache_.statistics(); }
+  const TileCut& cut() const { return tiles_.cut(); }  // of the last picture
+  const TileChoice& choice() const { return tiles_.choice(); }
+  const TileCache<Content>& cache() const { return tiles_.cache(); }
+  const TileCacheStatistics& cacheStatistics() const { return tiles_.cache().statistics(); }
   const MarchCounts& marchCounts() const { return counts_; }  // of all pictures
 
  private:
-  void loadFor(const TileView& view);
-
-  TileFrame frame_;
-  TileTree tree_;
+  SceneTiles<Content> tiles_;
   SceneRendererSettings settings_;
-  TileCache<Content> cache_;
-  TileSelector selector_;
   ThreadPool pool_;
-  TileChoice choice_;
-  TileCut cut_;
   PixelDirections directions_;
   MarchCounts counts_;
 };
