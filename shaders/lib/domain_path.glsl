@@ -8,7 +8,7 @@
 struct DomainSegment {
   vec3 start;
   vec3 direction;
-  float length;
+  float whole;  // its length
   float entry, square, rate, growth;
 };
 
@@ -91,7 +91,7 @@ DomainSegment domainSegment(vec3 o, vec3 d, int region, float near, float far, f
   float speed = length(v);
   s.start = (y + halfDomain) * perUnit;
   s.direction = v / speed;
-  s.length = perUnit * speed * (far - near) / (entryM * exitM);
+  s.whole = perUnit * speed * (far - near) / (entryM * exitM);
   s.entry = near;
   s.square = entryM * entryM;
   s.rate = speed * perUnit;

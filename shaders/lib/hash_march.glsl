@@ -124,7 +124,7 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
   vec3 up = vec3(greaterThan(s.direction, vec3(0.0)));
   vec3 inverse = mix(1.0 / s.direction, vec3(-1e20), equal(s.direction, vec3(0.0)));  // the octant is that below
   uint shift = 4u * uint(up.x + 2.0 * up.y + 4.0 * up.z);
-  float count = ceil(s.length / step);
+  float count = ceil(s.whole / step);
   float i = 0.0;
   int guard = 0;  // no segment is longer than its diagonal; a bound for drivers that want one
   do {
@@ -133,7 +133,7 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
     float from, to, tau;
     vec3 x;
     do {
-      from = i * step, to = min(from + step, s.length);
+      from = i * step, to = min(from + step, s.whole);
       tau = 0.5 * (from + to);
       x = clamp(s.start + tau * s.direction, 0.0, cells * 0.9999999);
       ivec3 cell = ivec3(x);
@@ -152,7 +152,7 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
       // lies behind it.
       vec3 end = (floor(x / edge) + mix(vec3(1.0 - free), vec3(free), up)) * edge + mix(vec3(kCellSlack), vec3(-kCellSlack), up);
       vec3 exits = (end - s.start) * inverse;
-      float exit = min(min(exits.x, exits.y), min(exits.z, s.length));
+      float exit = min(min(exits.x, exits.y), min(exits.z, s.whole));
       i = max(i + 1.0, ceil(exit / step - 0.5));
     } while (i < count && ++guard < 65536);
     if (i >= count) return;

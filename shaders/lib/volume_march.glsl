@@ -18,7 +18,7 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
   float voxelsPerTexel = part.voxels / part.texels;
   vec3 inverse = sign(s.direction) / max(abs(s.direction), vec3(1e-20));
   inverse = mix(inverse, vec3(1e20), equal(s.direction, vec3(0.0)));
-  float count = ceil(s.length * stepsPerTexel);
+  float count = ceil(s.whole * stepsPerTexel);
   float i = 0.0;
   int guard = 0;  // no segment is longer than its diagonal; a bound for drivers that want one
   do {
@@ -27,7 +27,7 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
     float from, to, tau;
     vec3 x;
     do {
-      from = i * stepLength, to = min(from + stepLength, s.length);
+      from = i * stepLength, to = min(from + stepLength, s.whole);
       tau = 0.5 * (from + to);
       x = s.start + tau * s.direction;
       vec3 cell = clamp(floor(x / 8.0), 0.0, cells - 1.0);
@@ -36,7 +36,7 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
       // The cube of cells nearer than that is empty: on to the first step whose middle lies behind it.
       vec3 end = mix((cell - reach + 1.0) * 8.0 + margin, (cell + reach) * 8.0 - margin, greaterThan(inverse, vec3(0.0)));
       vec3 exits = (end - s.start) * inverse;
-      float exit = min(min(exits.x, exits.y), min(exits.z, s.length));
+      float exit = min(min(exits.x, exits.y), min(exits.z, s.whole));
       i = max(i + 1.0, ceil(exit * stepsPerTexel - 0.5));
     } while (i < count && ++guard < 65536);
     if (i >= count) return;

@@ -1,0 +1,163 @@
+// Adds one content of `volume` to each pixel's ray, behind what is there (docs/tile-format.md, section 6). Contents come
+// front to back.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "../compute/kernel.glsl"
+#include "arguments_draw.h"
+#include "../compute/vectors.glsl"
+#include "view.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(constant_id = 0) const uint kMostWidth = 34;  // of the network's layers
+KERNEL_ARGUMENTS(DrawVolumeArguments)
+
+#include "dense_network.glsl"
+#include "../lib/domain_path.glsl"
+#include "../lib/part_place.glsl"
+
+const uint kEmpty = 0xffffffffu;
+
+float featureRange, densityRange, stepsPerTexel, minTransmittance;
+
+struct Part {
+  Place place;
+  float texels, voxels;
+  UintPointer macroblocks, voxelWords, distances;
+  uint number;
+};
+
+Part partOf(uint number) {
+  VolumePartArguments a = arguments.values.parts.values[number];
+  const Place place = Place(vectorOf(a.centre), vectorOf(a.scale), vectorOf(a.low), vectorOf(a.high), a.contracted != 0);
+  return Part(place, a.texels, a.voxels, a.macroblocks, a.voxelWords, a.distances, number);
+}
+
+uint cellIndex(vec3 cell, float edge) {
+  const uvec3 c = uvec3(cell);
+  return c.x + uint(edge) * (c.y + uint(edge) * c.z);
+}
+
+float reachAt(Part part, vec3 cell) {
+  const uint i = cellIndex(cell, part.texels / 8);
+  return float(part.distances.values[i / 4] >> 8 * (i % 4) & 255);
+}
+
+vec4 macroblockAt(Part part, vec3 block) {
+  const uint number = part.macroblocks.values[cellIndex(block, part.voxels / 8)];
+  return number == kEmpty ? vec4(0) : vec4(float(number), 0, 0, 1);  // below 2^24
+}
+
+// Word 0 holds density and diffuse, word 1 features.
+vec4 mixVoxels(Part part, vec4 macroblock, vec3 within, uint word) {
+  const vec3 low = min(floor(within), 7.0), share = within - low;
+  const uint first = uint(macroblock.x) * 729 + uint(low.x) + 9 * (uint(low.y) + 9 * uint(low.z));
+  vec4 sum = vec4(0);
+  for (uint k = 0; k < 8; ++k) {
+    const bvec3 upper = bvec3(k & 1, k & 2, k & 4);
+    const vec3 w = mix(1 - share, share, upper);
+    const uint texel = first + uint(upper.x) + 9 * uint(upper.y) + 81 * uint(upper.z);
+    sum += w.x * w.y * w.z * unpackUnorm4x8(part.voxelWords.values[2 * texel + word]);
+  }
+  return sum;
+}
+
+vec4 voxelsFirst(Part part, vec4 macroblock, vec3 within) { return mixVoxels(part, macroblock, within, 0).yzwx; }
+vec4 voxelsSecond(Part part, vec4 macroblock, vec3 within) { return mixVoxels(part, macroblock, within, 1); }
+
+vec4 mixPlane(UintPointer words, float texels, vec2 x, uint word) {
+  const vec2 u = clamp(x - 0.5, 0, texels - 1), low = min(floor(u), texels - 2), share = u - low;
+  const uint edge = uint(texels), first = uint(low.x) + edge * uint(low.y);
+  const vec4 a = unpackUnorm4x8(words.values[2 * first + word]), b = unpackUnorm4x8(words.values[2 * first + 2 + word]);
+  const uint next = first + edge;
+  const vec4 c = unpackUnorm4x8(words.values[2 * next + word]), d = unpackUnorm4x8(words.values[2 * next + 2 + word]);
+  return mix(mix(a, b, share.x), mix(c, d, share.x), share.y);
+}
+
+vec4 mixPlanes(Part part, vec3 x, uint word) {
+  UintPointer planes[3] = arguments.values.parts.values[part.number].planeWords;
+  return mixPlane(planes[0], part.texels, x.yz, word) + mixPlane(planes[1], part.texels, x.xz, word) +
+         mixPlane(planes[2], part.texels, x.xy, word);
+}
+
+vec4 planesFirst(Part part, vec3 x) { return mixPlanes(part, x, 0).yzwx; }
+vec4 planesSecond(Part part, vec3 x) { return mixPlanes(part, x, 1); }
+
+#include "../lib/volume_march.glsl"
+#include "../lib/march_part.glsl"
+
+// What the network says of a ray's sums and its direction.
+vec3 specularOf(DrawVolumeArguments a, Composite sum, vec3 d) {
+  float values[kMostWidth];
+  for (uint i = 0; i < 3; ++i) values[i] = sum.diffuse[i];
+  for (uint i = 0; i < 4; ++i) values[3 + i] = sum.features[i];
+  for (uint axis = 0; axis < 3; ++axis) {
+    values[7 + axis] = d[axis];
+    float sine = sin(d[axis]), cosine = cos(d[axis]);
+    for (uint k = 0; k < 4; ++k) {
+      values[10 + 3 * k + axis] = sine;
+      values[22 + 3 * k + axis] = cosine;
+      const float twice = 2 * sine * cosine;
+      cosine = 1 - 2 * sine * sine;
+      sine = twice;
+    }
+  }
+  runNetwork(a.layers, a.layerCount, a.weights, values);
+  return 1 / (1 + exp(-vec3(values[0], values[1], values[2])));
+}
+
+// Marches what the content owns of the ray, part after part in the order in which the ray enters them.
+void marchParts(DrawVolumeArguments a, vec3 o, vec3 d, vec2 whole, inout Composite sum) {
+  float entered = -1;  // the last one's entry and number
+  uint last = 0;
+  for (uint turn = 0; turn < a.partCount && sum.transmittance >= minTransmittance; ++turn) {
+    uint nearest = a.partCount;
+    vec2 range = vec2(0);
+    for (uint n = 0; n < a.partCount; ++n) {
+      VolumePartArguments part = a.parts.values[n];
+      const Place place =
+          Place(vectorOf(part.centre), vectorOf(part.scale), vectorOf(part.low), vectorOf(part.high), part.contracted != 0);
+      const vec2 owned = ownedRange(place, o, d, whole);
+      const bool isNext = owned.x > entered || (owned.x == entered && n > last);
+      if (!(owned.x < owned.y) || !(turn == 0 || isNext)) continue;
+      if (nearest < a.partCount && owned.x >= range.x) continue;
+      nearest = n;
+      range = owned;
+    }
+    if (nearest == a.partCount) return;
+    marchPart(partOf(nearest), o, d, range, sum);
+    entered = range.x;
+    last = nearest;
+  }
+}
+
+void main() {
+  DrawVolumeArguments a = arguments.values;
+  uint pixel;
+  if (!pixelIndex(a.view, pixel)) return;
+  const uint first = kNumbersOfPixel * pixel;
+  const float before = a.view.pixels.values[first + 3];
+  const vec3 d = rayDirection(a.view, pixel);
+  if (before < a.view.minTransmittance || d == vec3(0)) return;
+  featureRange = a.featureRange;
+  densityRange = a.densityRange;
+  stepsPerTexel = a.stepsPerTexel;
+  minTransmittance = a.view.minTransmittance / before;
+  const vec3 o = vectorOf(a.view.origin);
+  const vec2 box = clipToBox(o, d, vectorOf(a.view.low), vectorOf(a.view.high), vec2(a.view.near, 1e30));
+  const bool meetsBox = box.x < box.y;
+  const float far = farthestOf(a.view, pixel);
+  Composite sum = Composite(vec3(0), vec4(0), 1, 0, 0);
+  if (a.isSurround != 0) {
+    const vec2 behind = vec2(meetsBox ? box.y : a.view.near, far);
+    if (behind.x < behind.y) marchPart(partOf(0), o, d, behind, sum);
+  } else {
+    const vec2 whole = clipToBox(o, d, vectorOf(a.low), vectorOf(a.high), vec2(meetsBox ? box.x : a.view.near, far));
+    if (whole.x < whole.y) marchParts(a, o, d, whole, sum);
+  }
+  const float opacity = 1 - sum.transmittance;
+  if (opacity <= 0) return;
+  const vec3 colour = sum.diffuse + opacity * specularOf(a, sum, d);
+  for (uint c = 0; c < 3; ++c) a.view.pixels.values[first + c] += before * colour[c];
+  a.view.pixels.values[first + 3] = before * sum.transmittance;
+  a.view.pixels.values[first + 4] += before * sum.depth;
+}
