@@ -14,6 +14,10 @@
 #include "representations/volume/train_volume.h"
 #include "representations/volume/volume_model_renderer.h"
 #include "tiles/scene_folder.h"
+#ifdef TESSERA_HAS_VULKAN
+#include "compute/vulkan/device.h"
+#include "render/vulkan/volume_renderer.h"
+#endif
 
 namespace tessera {
 namespace {
@@ -39,13 +43,12 @@ class DrawableModel final : public Drawable {
 };
 
 // Says once when a picture was drawn coarser than asked for.
-template <class Content>
+template <class Renderer>
 class WarningRenderer final : public ViewRenderer {
  public:
-  WarningRenderer(const fs::path& folder, TileScene<Content> scene, const SceneRendererSettings& settings)
-      : folder_(folder),
-        renderer_(scene.frame, std::move(scene.tree), std::move(scene.source), settings),
-        budgetBytes_(settings.budgetBytes) {}
+  template <class... Arguments>
+  WarningRenderer(const fs::path& folder, uint64_t budgetBytes, Arguments&&... arguments)
+      : folder_(folder), budgetBytes_(budgetBytes), renderer_(std::forward<Arguments>(arguments)...) {}
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override {
     RenderedView view = renderer_.render(camera, worldFromCamera, opaqueDepth);
@@ -60,21 +63,44 @@ class WarningRenderer final : public ViewRenderer {
 
  private:
   fs::path folder_;
-  SceneRenderer<Content> renderer_;
   uint64_t budgetBytes_;
+  Renderer renderer_;
   bool warned_ = false;
 };
 
 template <class Content>
-std::unique_ptr<ViewRenderer> rendererOf(const fs::path& folder, SceneRendererSettings settings) {
+std::unique_ptr<ViewRenderer> onProcessor(const fs::path& folder, SceneRendererSettings settings) {
   TileScene<Content> scene = openTileScene<Content>(folder);
   settings.background = Eigen::Array3f(scene.background[0], scene.background[1], scene.background[2]);
-  return std::make_unique<WarningRenderer<Content>>(folder, std::move(scene), settings);
+  return std::make_unique<WarningRenderer<SceneRenderer<Content>>>(
+      folder, settings.budgetBytes, scene.frame, std::move(scene.tree), std::move(scene.source), settings);
+}
+
+// Null where `device` cannot draw scenes: then the processor does.
+std::unique_ptr<ViewRenderer> onCard([[maybe_unused]] const Device& device, [[maybe_unused]] const fs::path& folder,
+                                     [[maybe_unused]] Representation representation,
+                                     [[maybe_unused]] const SceneRendererSettings& settings) {
+#ifdef TESSERA_HAS_VULKAN
+  const std::shared_ptr<const GpuContext> context = contextOf(device);
+  if (context == nullptr) return nullptr;
+  if (representation != Representation::volume) {
+    inform("scenes of {} are drawn by the processor", nameOf(representation));
+    return nullptr;
+  }
+  GpuRendererSettings ofCard;
+  ofCard.minTransmittance = settings.march.minTransmittance;
+  ofCard.selection = settings.selection;
+  ofCard.budgetBytes = settings.budgetBytes;
+  return std::make_unique<WarningRenderer<GpuVolumeRenderer>>(folder, settings.budgetBytes, context,
+                                                              openTileScene<VolumeContent>(folder), ofCard);
+#else
+  return nullptr;
+#endif
 }
 
 class DrawableScene final : public Drawable {
  public:
-  DrawableScene(const fs::path& folder, const DrawableOptions& options)
+  DrawableScene(const Device& device, const fs::path& folder, const DrawableOptions& options)
       : folder_(folder), tileset_(readTileset(folder)) {
     SceneRendererSettings settings;
     // Not the number of levels: a root that only holds the others together is one of them.
@@ -88,8 +114,10 @@ class DrawableScene final : public Drawable {
     settings.threads = options.threads;
     settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB > 0 ? options.memoryMiB * 1048576
                                                                        : static_cast<double>(usableMemoryBytes()) / 2);
-    renderer_ = tileset_.representation == Representation::hash ? rendererOf<HashContent>(folder, settings)
-                                                                : rendererOf<VolumeContent>(folder, settings);
+    renderer_ = onCard(device, folder, tileset_.representation, settings);
+    if (renderer_ != nullptr) return;
+    renderer_ = tileset_.representation == Representation::hash ? onProcessor<HashContent>(folder, settings)
+                                                                : onProcessor<VolumeContent>(folder, settings);
   }
 
   ViewRenderer& renderer() override { return *renderer_; }
@@ -111,7 +139,7 @@ class DrawableScene final : public Drawable {
 }  // namespace
 
 std::unique_ptr<Drawable> openDrawable(Device& device, const fs::path& folder, const DrawableOptions& options) {
-  if (fs::exists(folder / "tileset.json")) return std::make_unique<DrawableScene>(folder, options);
+  if (fs::exists(folder / "tileset.json")) return std::make_unique<DrawableScene>(device, folder, options);
   const std::optional<ModelManifest> manifest = ModelFolder(folder).manifest();
   if (!manifest || manifest->method == "field") {
     auto model = loadFieldModel(device, folder);

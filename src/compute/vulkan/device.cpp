@@ -18,6 +18,11 @@ std::unique_ptr<Device> makeVulkanDevice(const GpuOptions& options) {
   return std::make_unique<VulkanDevice>(GpuContext::open(options));
 }
 
+std::shared_ptr<const GpuContext> contextOf(const Device& device) {
+  const auto* const vulkan = dynamic_cast<const VulkanDevice*>(&device);
+  return vulkan == nullptr ? nullptr : vulkan->context();
+}
+
 VulkanMemory::VulkanMemory(std::shared_ptr<GpuStream> stream, size_t bytes)
     : Memory(bytes), stream_(std::move(stream)), buffer_(stream_->context(), bytes) {
   stream_->fillZero(buffer_, 0, (bytes + 3) / 4 * 4);

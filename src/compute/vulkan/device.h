@@ -7,10 +7,14 @@
 
 namespace tessera {
 
+class GpuContext;
 struct GpuOptions;
 
 // Throws Error when there is no driver or no device that fits.
 std::unique_ptr<Device> makeVulkanDevice();
 std::unique_ptr<Device> makeVulkanDevice(const GpuOptions& options);
+
+// The context of a Vulkan device, which others may draw with; null of any other device.
+std::shared_ptr<const GpuContext> contextOf(const Device& device);
 
 }  // namespace tessera

@@ -30,6 +30,8 @@ class VulkanDevice : public Device {
   explicit VulkanDevice(std::shared_ptr<const GpuContext> context);
   ~VulkanDevice() override;  // with TESSERA_GPU_TIMES=1 in the environment, says what each operation took on the device
 
+  const std::shared_ptr<const GpuContext>& context() const { return stream_->context(); }
+
   std::string name() const override;
   std::string target() const override;
   std::unique_ptr<Memory> allocate(size_t bytes) override;

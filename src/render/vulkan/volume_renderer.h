@@ -29,6 +29,7 @@ class GpuVolumeRenderer final : public ViewRenderer {
   Eigen::Array3f background() const override { return background_; }
 
   const TileCut& cut() const { return tiles_.cut(); }  // of the last picture
+  const TileChoice& choice() const { return tiles_.choice(); }
   const TileCache<GpuVolumeContent>& cache() const { return tiles_.cache(); }
 
  private:
