@@ -2,6 +2,8 @@
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_BLOCKS_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_BLOCKS_H
 #include "arguments.h"
+#define TESSERA_ROWS_OF_SHARE 32  // GroupByBlock
+
 TESSERA_BEGIN_ARGUMENTS
 
 struct BlockSpaceArguments {

@@ -2,6 +2,9 @@
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_DEFERRED_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_DEFERRED_H
 #include "arguments.h"
+#define TESSERA_SEGMENTS_OF_SHARE 256  // whose weight gradients a workgroup sums
+#define TESSERA_DEFERRED_NUMBERS 101   // of a segment: inputs, both hidden layers, gradients of the sums of all three
+
 TESSERA_BEGIN_ARGUMENTS
 
 struct DeferredArguments {

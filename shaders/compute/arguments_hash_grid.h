@@ -4,7 +4,7 @@
 #include "arguments.h"
 TESSERA_BEGIN_ARGUMENTS
 
-#define TESSERA_MAX_LEVELS 32
+#define TESSERA_MAX_LEVELS 128
 
 struct LevelArguments {
   float scale;

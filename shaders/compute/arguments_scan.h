@@ -2,6 +2,8 @@
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_SCAN_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_SCAN_H
 #include "arguments.h"
+#define TESSERA_SCAN_CHUNK 4096  // numbers of a workgroup
+
 TESSERA_BEGIN_ARGUMENTS
 
 // values[i] = Σ_{j <= i} counts[j], at most limit + 1. total is the largest that is at most `limit`, and fitting how

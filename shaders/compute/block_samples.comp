@@ -20,6 +20,7 @@ struct Ray {
   realVec3 origin, direction;
   Range range;
   real farthest;
+  uint endRow, endSegment;  // nothing is written beyond, whatever a driver rounds otherwise in the second run
 };
 
 struct Made {
@@ -62,8 +63,8 @@ void add(BlockSamplesArguments a, Ray ray, uint firstRow, uint firstSegment, Pos
   if (kSplit) {
     const uint group = WANTED(a.groupOfBlock) ? a.groupOfBlock.values[slot] : slot;
     if (made.samples == 0 || group != made.group) {
-      if (kWrite) {
-        const uint segment = firstSegment + made.segments;
+      const uint segment = firstSegment + made.segments;
+      if (kWrite && segment < ray.endSegment) {
         a.firstSampleOfSegment.values[segment] = row;
         a.groupOfSegment.values[segment] = group;
         a.rayOfSegment.values[segment] = ray.index;
@@ -72,7 +73,7 @@ void add(BlockSamplesArguments a, Ray ray, uint firstRow, uint firstSegment, Pos
       made.group = group;
     }
   }
-  if (kWrite) {
+  if (kWrite && row < ray.endRow) {
     a.blockOfSample.values[row] = slot;
     store(a, ray, row, from, to, block, held);
   }
@@ -131,6 +132,7 @@ Made samplesOf(BlockSamplesArguments a, Ray ray, uint firstRow, uint firstSegmen
 Ray rayAt(BlockSamplesArguments a, uint index) {
   Ray ray;
   ray.index = index;
+  ray.endRow = ray.endSegment = 0;
   ray.origin = realVec3(pointAt(a.origins, index));
   ray.direction = realVec3(pointAt(a.directions, index));
   ray.range = Range(a.range.values[2 * index], a.range.values[2 * index + 1]);
@@ -158,7 +160,10 @@ void main() {
     }
     a.firstSample.values[index] = firstRow;
     if (index < rays) {
-      samplesOf(a, rayAt(a, index), firstRow, firstSegment);
+      Ray ray = rayAt(a, index);
+      ray.endRow = kSplit ? a.firstRow + a.sampleCounts.values[index] : firstRow + a.intervals;
+      ray.endSegment = kSplit ? a.segmentCounts.values[index] : 0;
+      samplesOf(a, ray, firstRow, firstSegment);
       continue;
     }
     a.rowCount.values[0] = firstRow;

@@ -6,8 +6,7 @@
 const uint kComposited = 7, kDirection = 27, kInputs = kComposited + kDirection, kHidden = 16;
 const uint kSecond = kInputs * kHidden + kHidden, kThird = kSecond + kHidden * kHidden + kHidden;  // first parameters
 const uint kParameters = kThird + kHidden * 3 + 3;
-// Of a segment: inputs, what leaves both hidden layers, and gradients of the sums of all three.
-const uint kNumbers = kInputs + 4 * kHidden + 3;
+const uint kNumbers = TESSERA_DEFERRED_NUMBERS;
 
 struct Layers {
   float inputs[kInputs];

@@ -8,7 +8,7 @@
 #include "deferred.glsl"
 
 const uint kThreads = 256;
-const uint kShare = 256;  // segments
+const uint kShare = TESSERA_SEGMENTS_OF_SHARE;
 const uint kOfThread = (kParameters + kThreads - 1) / kThreads;
 layout(local_size_x = 256) in;
 KERNEL_ARGUMENTS(DeferredArguments)

@@ -9,7 +9,7 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kWrite = false;
 KERNEL_ARGUMENTS(GroupByBlockArguments)
 
-const uint kShare = 32;  // rows
+const uint kShare = TESSERA_ROWS_OF_SHARE;
 
 void main() {
   GroupByBlockArguments a = arguments.values;

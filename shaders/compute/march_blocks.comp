@@ -21,7 +21,7 @@ struct Ray {
   realVec3 origin, direction;
   real jitter, far;
   uint first;  // the interval to go on from
-  uint row;    // of its first sample
+  uint row, endRow;  // of its samples: none goes beyond, whatever a driver rounds otherwise in the second run
 };
 
 struct State {
@@ -69,7 +69,7 @@ void marchPiece(MarchBlocksArguments a, Ray ray, DomainPiece s, real all, uint s
       continue;
     }
     if (alongPiece(s, begin) >= ray.far) return;
-    if (kWrite) store(a, ray, ray.row + state.samples, slot, s, position, state.before, begin, end);
+    if (kWrite && ray.row + state.samples < ray.endRow) store(a, ray, ray.row + state.samples, slot, s, position, state.before, begin, end);
     ++i;
     if (++state.samples == a.most) {
       state.next = state.number + i;
@@ -154,7 +154,7 @@ Ray rayAt(MarchBlocksArguments a, uint index) {
   ray.jitter = WANTED(a.jitter) ? real(a.jitter.values[index]) : real(1);
   ray.far = WANTED(a.farOfRay) ? real(a.farOfRay.values[index]) : kNever;
   ray.first = WANTED(a.nextStep) ? a.nextStep.values[index] : 0;
-  ray.row = 0;
+  ray.row = ray.endRow = 0;
   return ray;
 }
 
@@ -184,6 +184,7 @@ void main() {
     if (!fits) continue;
     Ray ray = rayAt(a, index);
     ray.row = first;
+    ray.endRow = end;
     if (end > first) march(a, ray);
     if (WANTED(a.nextStep)) a.nextStep.values[index] = a.nexts.values[index];
   }

@@ -47,8 +47,9 @@ void clipToCube(realVec3 o, realVec3 d, out real enter, out real leave) {
   }
 }
 
-// The ray's next samples; with kWrite to rows from `row` on.
-Round march(MarchRaysArguments a, uint ray, uint row) {
+// The ray's next samples; with kWrite to rows [row, endRow), which nobody else writes to: a driver may have compiled both
+// runs to other roundings.
+Round march(MarchRaysArguments a, uint ray, uint row, uint endRow) {
   const uint from = WANTED(a.nextStep) ? a.nextStep.values[ray] : 0;
   const bool opaque = WANTED(a.opticalDepth) && a.opticalDepth.values[ray] > a.mostOpticalDepth;
   if (from == kThrough || opaque || a.most == 0) return Round(0, from);
@@ -70,13 +71,13 @@ Round march(MarchRaysArguments a, uint ray, uint row) {
   real begin = distanceAt(a.space, k + jitter);
   for (;;) {
     const real end = distanceAt(a.space, k + 1 + jitter), middle = (begin + end) / 2;
-    if (!(middle < far)) return made;
+    if (!(middle < far && end > begin)) return made;
     const Cell cell = cellAt(a.space, o + middle * d);
     const real length_ = end - begin;
     k += 1;
     begin = end;
     if (cell.inside && isOccupied(a, cell.index)) {
-      if (kWrite) store(a, ray, row + made.samples, cell.u, middle, length_);
+      if (kWrite && row + made.samples < endRow) store(a, ray, row + made.samples, cell.u, middle, length_);
       if (++made.samples < a.most) continue;
       made.next = uint(k);
       return made;
@@ -89,7 +90,7 @@ Round march(MarchRaysArguments a, uint ray, uint row) {
       k = max(k, floor(stepIndexOf(a.space, exit) - jitter) - 1);
       begin = distanceAt(a.space, k + jitter);
     }
-    for (real next = distanceAt(a.space, k + 1 + jitter); (begin + next) / 2 < exit;
+    for (real next = distanceAt(a.space, k + 1 + jitter); (begin + next) / 2 < exit && next > begin;
          next = distanceAt(a.space, k + 1 + jitter)) {
       k += 1;
       begin = next;
@@ -101,7 +102,7 @@ void main() {
   MarchRaysArguments a = arguments.values;
   if (!kWrite) {
     FOR_EACH_ROW(ray, a.rays) {
-      const Round made = march(a, ray, 0);
+      const Round made = march(a, ray, 0, 0);
       a.counts.values[ray] = made.samples;
       a.nexts.values[ray] = made.next;
     }
@@ -117,7 +118,7 @@ void main() {
     const uint first = ray == 0 ? 0 : a.counts.values[ray - 1], end = a.counts.values[ray];
     a.firstSample.values[ray + 1] = fits ? end : a.sampleCount.values[0];
     if (!fits) continue;
-    if (end > first) march(a, ray, first);
+    if (end > first) march(a, ray, first, end);
     if (WANTED(a.nextStep)) a.nextStep.values[ray] = a.nexts.values[ray];
   }
 }

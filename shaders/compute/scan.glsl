@@ -3,8 +3,8 @@
 #include "arguments_scan.h"
 
 const uint kThreads = 256;
-const uint kRun = 16;
-const uint kChunk = kThreads * kRun;
+const uint kRun = TESSERA_SCAN_CHUNK / kThreads;
+const uint kChunk = TESSERA_SCAN_CHUNK;
 layout(local_size_x = 256) in;
 layout(constant_id = 0) const bool kCountsBits = false;  // of words instead of words themselves
 KERNEL_ARGUMENTS(ScanArguments)

@@ -304,7 +304,7 @@ OperationTests testsOf<OccupancyPoints>() {
                stage.device.run(OccupancyPoints{named.space, uniform, occupied, seed, candidates,
                                                 stage.input(randomBits(stage.random, named.space, share)),
                                                 stage.outputWords("cells", points),
-                                                stage.output("positions", 3 * points, 0), first});
+                                                stage.output("positions", 3 * points, 1e-6), first});
              }});
     }
   return tests;

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <optional>
+
 #include "base/error.h"
 #include "compute/cpu/device.h"
 #include "compute/device.h"
@@ -16,15 +18,18 @@ namespace {
 constexpr std::string_view kVulkan = "vulkan";
 
 #ifdef TESSERA_HAS_VULKAN
-// Whether a graphics card can be used; what computes on the processor anyway does not count.
-bool hasGraphicsCard() {
+// The index of the best graphics card that can be used; what computes on the processor anyway does not count.
+std::optional<size_t> graphicsCard() {
+  std::optional<size_t> best;
   try {
-    for (const GpuDescription& device : GpuContext::devices()) {
-      if (!device.isProcessor && device.missing.empty()) return true;
+    const std::vector<GpuDescription> devices = GpuContext::devices();
+    for (size_t i = 0; i < devices.size(); ++i) {
+      if (devices[i].isProcessor || !devices[i].missing.empty()) continue;
+      if (!best || (devices[i].isDiscrete && !devices[*best].isDiscrete)) best = i;
     }
   } catch (const Error&) {  // no loader, no driver
   }
-  return false;
+  return best;
 }
 #endif
 
@@ -35,9 +40,11 @@ std::unique_ptr<Device> makeDevice(const DeviceOptions& options) {
   if (kind == "reference") return makeReferenceDevice();
 #ifdef TESSERA_HAS_VULKAN
   const bool named = kind.starts_with(std::string(kVulkan) + ":");
-  if (kind == kVulkan || named || (kind == "auto" && hasGraphicsCard())) {
+  const std::optional<size_t> card = kind == "auto" ? graphicsCard() : std::nullopt;
+  if (kind == kVulkan || named || card) {
     GpuOptions gpu;
     if (named) gpu.device = kind.substr(kVulkan.size() + 1);
+    if (card) gpu.device = std::to_string(*card);
     return makeVulkanDevice(gpu);
   }
 #endif

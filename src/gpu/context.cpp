@@ -76,7 +76,8 @@ std::vector<GpuDescription> GpuContext::devices() {
     made.name = device.properties.deviceName;
     made.driver = device.driver;
     made.isProcessor = device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
-    made.missing = missingIn(device);
+    made.isDiscrete = device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+    made.missing = device.missing;
     VkPhysicalDeviceMemoryProperties memory = {};
     vkGetPhysicalDeviceMemoryProperties(device.handle, &memory);
     for (uint32_t i = 0; i < memory.memoryHeapCount; ++i) {
@@ -132,6 +133,7 @@ void GpuContext::chooseQueueFamily() {
     for (uint32_t i = 0; i < count; ++i) {
       if ((families[i].queueFlags & flags) != flags) continue;
       queueFamily_ = i;
+      timestampBits_ = families[i].timestampValidBits;
       return;
     }
   }

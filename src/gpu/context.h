@@ -38,6 +38,7 @@ struct GpuOptions {
 struct GpuDescription {
   std::string name, driver;
   bool isProcessor = false;  // Mesa's lavapipe and the like
+  bool isDiscrete = false;   // a card of its own
   uint64_t memoryBytes = 0;  // its own, or what it shares with the processor
   std::string missing;       // why it cannot be used; empty where it can
 };
@@ -62,6 +63,7 @@ class GpuContext {
   VkDevice device() const { return device_; }
   VkQueue queue() const { return queue_; }  // compute and transfer, and graphics where the device draws at all
   uint32_t queueFamily() const { return queueFamily_; }
+  uint32_t timestampBits() const { return timestampBits_; }  // of the queue's clock; 0: it has none
 
   GpuHeap& heap() const { return *heap_; }
   const PipelineCache& pipelines() const { return *pipelines_; }
@@ -86,7 +88,7 @@ class GpuContext {
   VkPhysicalDevice physicalDevice_ = VK_NULL_HANDLE;
   VkDevice device_ = VK_NULL_HANDLE;
   VkQueue queue_ = VK_NULL_HANDLE;
-  uint32_t queueFamily_ = 0;
+  uint32_t queueFamily_ = 0, timestampBits_ = 0;
   VkPhysicalDeviceLimits limits_ = {};
   VkPhysicalDeviceMemoryProperties memory_ = {};
   GpuFeatures features_;

@@ -55,6 +55,19 @@ TEST(PhysicalDevice, IsFoundByPartOfItsNameOrItsIndex) {
   EXPECT_EQ(nameOf(choosePhysicalDevice(kDevices, "1")), "Intel Arc");
 }
 
+TEST(PhysicalDevice, IsTheOneOfAnIndexWhateverNumbersNamesHold) {
+  const std::vector<PhysicalDevice> cards = {device("H100", VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU),
+                                             device("H101", VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU)};
+  EXPECT_EQ(nameOf(choosePhysicalDevice(cards, "1")), "H101");
+  EXPECT_THROW(choosePhysicalDevice(cards, "2"), Error);
+}
+
+TEST(PhysicalDevice, IsNoneThatCannotBeUsedWhereAnotherCan) {
+  std::vector<PhysicalDevice> cards = kDevices;
+  cards[2].missing = cards[3].missing = "no Vulkan 1.2";
+  EXPECT_EQ(nameOf(choosePhysicalDevice(cards, "")), "Intel Arc");
+}
+
 TEST(PhysicalDevice, ThatIsNotThereIsAnErrorThatListsThoseThatAre) {
   try {
     choosePhysicalDevice(kDevices, "voodoo");

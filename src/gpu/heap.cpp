@@ -78,7 +78,12 @@ std::unique_ptr<GpuHeap::Block> GpuHeap::makeBlock(size_t bytes, BufferUse use) 
   allocation.allocationSize = needs.size;
   const Kind kind = kindOf(use);
   allocation.memoryTypeIndex = context_.memoryType(needs.memoryTypeBits, kind.wanted, kind.preferred);
-  checkVulkan(vkAllocateMemory(device, &allocation, nullptr, &block->memory), wanted.c_str());
+  VkResult result = vkAllocateMemory(device, &allocation, nullptr, &block->memory);
+  if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY) {  // of the preferred kind; another may do
+    allocation.memoryTypeIndex = context_.memoryType(needs.memoryTypeBits, kind.wanted, 0);
+    result = vkAllocateMemory(device, &allocation, nullptr, &block->memory);
+  }
+  checkVulkan(result, wanted.c_str());
   checkVulkan(vkBindBufferMemory(device, block->buffer, block->memory, 0), "vkBindBufferMemory");
   if (use != BufferUse::device) {
     void* pointer = nullptr;

@@ -58,6 +58,7 @@ std::vector<PhysicalDevice> physicalDevices(VkInstance instance) {
     device.handle = handle;
     vkGetPhysicalDeviceProperties(handle, &device.properties);
     device.driver = fmt::format("driver {:#x}", device.properties.driverVersion);
+    device.missing = missingIn(device);
     if (device.properties.apiVersion < VK_API_VERSION_1_2) continue;
     auto driver = vulkanStruct<VkPhysicalDeviceDriverProperties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES);
     auto properties = vulkanStruct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
@@ -72,14 +73,19 @@ const PhysicalDevice& choosePhysicalDevice(const std::vector<PhysicalDevice>& de
   CHECK(!devices.empty());
   if (wanted.empty()) {
     return *std::max_element(devices.begin(), devices.end(), [](const PhysicalDevice& a, const PhysicalDevice& b) {
-      return rank(a.properties.deviceType) < rank(b.properties.deviceType);
+      const auto worth = [](const PhysicalDevice& d) {
+        return rank(d.properties.deviceType) + (d.missing.empty() ? 10 : 0);
+      };
+      return worth(a) < worth(b);
     });
   }
+  const bool isIndex = wanted.find_first_not_of("0123456789") == std::string::npos;
   std::string list;
   for (size_t i = 0; i < devices.size(); ++i) {
     const std::string name = devices[i].properties.deviceName;
-    if (std::to_string(i) == wanted) return devices[i];
-    if (lowerCase(name).find(lowerCase(wanted)) != std::string::npos) return devices[i];
+    if (isIndex ? std::to_string(i) == wanted : lowerCase(name).find(lowerCase(wanted)) != std::string::npos) {
+      return devices[i];
+    }
     list += fmt::format("{}{} {}", i ? ", " : "", i, name);
   }
   throw Error("Vulkan device \"" + wanted + "\"", "", "there is no such device", "choose one of: " + list);
@@ -93,6 +99,11 @@ std::string missingIn(const PhysicalDevice& device) {
   vkGetPhysicalDeviceFeatures2(device.handle, &features);
   if (!vulkan12.bufferDeviceAddress) return "no buffer device addresses";
   if (!vulkan12.timelineSemaphore) return "no timeline semaphores";
+  const VkPhysicalDeviceLimits& limits = device.properties.limits;
+  if (limits.maxComputeWorkGroupInvocations < 256 || limits.maxComputeWorkGroupSize[0] < 256) {
+    return "no workgroups of 256";
+  }
+  if (limits.maxComputeSharedMemorySize < 32768) return "no 32 KiB of shared memory";
   return {};
 }
 

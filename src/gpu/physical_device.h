@@ -13,13 +13,14 @@ namespace tessera {
 struct PhysicalDevice {
   VkPhysicalDevice handle = VK_NULL_HANDLE;
   VkPhysicalDeviceProperties properties = {};
-  std::string driver;  // "llvmpipe Mesa 22.3.6 (LLVM 15.0.6)"
+  std::string driver;   // "llvmpipe Mesa 22.3.6 (LLVM 15.0.6)"
+  std::string missing;  // missingIn; empty where it can be used
 };
 
 std::vector<PhysicalDevice> physicalDevices(VkInstance instance);
 
-// `wanted` is a part of a name, any case, or an index; empty takes the best kind there is. Throws Error that lists the
-// devices when none fits. `devices` must not be empty.
+// `wanted` is an index, or a part of a name, any case; empty takes the best kind there is among those that can be used.
+// Throws Error that lists the devices when none fits. `devices` must not be empty.
 const PhysicalDevice& choosePhysicalDevice(const std::vector<PhysicalDevice>& devices, const std::string& wanted);
 
 // Of what drivers have to have, what this one lacks: "no Vulkan 1.2". Empty where it lacks nothing.

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "base/check.h"
+#include "base/error.h"
 #include "gpu/call.h"
 
 namespace tessera {
@@ -93,6 +94,7 @@ GpuStream::Recording& GpuStream::recordingOf(Batch& batch) {
   }
   Recording& oldest = *std::min_element(batch.recordings.begin(), batch.recordings.end(),
                                         [](const Recording& a, const Recording& b) { return a.lastUse < b.lastUse; });
+  oldest.generation = 0;  // whatever becomes of this
   record(batch, oldest);
   oldest.commands = measuring_ ? std::vector<Command>() : batch.commands;
   oldest.generation = measuring_ ? 0 : generation;
@@ -242,6 +244,9 @@ void GpuStream::retire(GpuBuffer buffer) {
 
 void GpuStream::measure(bool on) {
   finish();
+  if (on && context_->timestampBits() == 0) {
+    throw Error(context_->name(), "", "it has no clock that can be asked", "leave TESSERA_GPU_TIMES out");
+  }
   measuring_ = on;
   measured_.clear();
   if (!on) return;
@@ -260,10 +265,12 @@ void GpuStream::collect(Batch& batch) {
   checkVulkan(vkGetQueryPoolResults(context_->device(), batch.queries, 0, count, count * sizeof(uint64_t), ticks.data(),
                                     sizeof(uint64_t), VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
               "vkGetQueryPoolResults");
+  const uint32_t bits = context_->timestampBits();
+  const uint64_t mask = bits >= 64 ? ~uint64_t{0} : (uint64_t{1} << bits) - 1;
   const double secondsPerTick = 1e-9 * context_->limits().timestampPeriod;
   for (uint32_t i = 0; i + 1 < count; ++i) {
     Measured& all = measured_[std::string(batch.labels[i])];
-    all.seconds += secondsPerTick * static_cast<double>(ticks[i + 1] - ticks[i]);
+    all.seconds += secondsPerTick * static_cast<double>((ticks[i + 1] - ticks[i]) & mask);
     ++all.commands;
   }
 }

@@ -137,7 +137,6 @@ TEST_F(GpuStreamTest, RecordsABatchOnceAndSendsItAgainWithOtherArgumentsAndUploa
 
 TEST_F(GpuStreamTest, RecordsABatchAnewWhenItsBuffersHaveGone) {
   GpuStream stream(context_);
-  const std::vector<uint32_t> values = numbers(size_t{10} << 20);
   for (int i = 0; i < 6; ++i) {
     GpuBuffer large(context_, size_t{40} << 20);  // of its own block, perhaps with the handle of the last
     stream.fillZero(large, 0, large.bytes());

@@ -18,9 +18,8 @@ namespace tessera {
 
 namespace {
 
-constexpr uint32_t kRaysPerGroup = 64;      // local_size_x of the kernels that take rays
-constexpr uint32_t kRowsPerShare = 32;      // group_by_block.comp
-constexpr uint32_t kNoLimit = 0x7fffffffu;  // of running sums
+constexpr uint32_t kRaysPerGroup = 64;  // local_size_x of the kernels that take rays
+constexpr uint32_t kRowsPerShare = TESSERA_ROWS_OF_SHARE;
 
 arguments::BlockSpaceArguments spaceArguments(const BlockSpace& space) {
   return {space.columns, space.rows, space.bottom, space.top, space.near, static_cast<uint32_t>(space.surround)};

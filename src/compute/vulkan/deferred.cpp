@@ -14,8 +14,9 @@ namespace tessera {
 namespace {
 
 constexpr uint32_t kPerGroup = 64;  // local_size_x of the kernels that take segments or rays
-constexpr uint32_t kShare = 256;    // deferred_weight_gradients.comp: segments of a workgroup
-constexpr size_t kNumbers = DeferredNetwork::kInputs + 4 * DeferredNetwork::kHidden + 3;  // deferred.glsl
+constexpr uint32_t kShare = TESSERA_SEGMENTS_OF_SHARE;
+constexpr size_t kNumbers = TESSERA_DEFERRED_NUMBERS;
+static_assert(kNumbers == DeferredNetwork::kInputs + 4 * DeferredNetwork::kHidden + 3);
 
 template <class Options>
 arguments::DeferredArguments deferredArguments(const Options& options) {

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "base/error.h"
 #include "base/log.h"
 #include "compute/vulkan/vulkan_device.h"
 
@@ -23,11 +24,6 @@ std::shared_ptr<const GpuContext> contextOf(const Device& device) {
   return vulkan == nullptr ? nullptr : vulkan->context();
 }
 
-VulkanMemory::VulkanMemory(std::shared_ptr<GpuStream> stream, size_t bytes)
-    : Memory(bytes), stream_(std::move(stream)), buffer_(stream_->context(), bytes) {
-  stream_->fillZero(buffer_, 0, (bytes + 3) / 4 * 4);
-}
-
 VulkanDevice::VulkanDevice(std::shared_ptr<const GpuContext> context)
     : stream_(std::make_shared<GpuStream>(std::move(context))) {
   const char* times = std::getenv("TESSERA_GPU_TIMES");
@@ -40,7 +36,7 @@ VulkanDevice::~VulkanDevice() {
     for (const auto& [name, measured] : stream_->measured()) all += measured.seconds;
     for (const auto& [name, measured] : stream_->measured()) {
       inform("{:<26} {:10.3f} ms in {} commands, {:.1f} %", name, 1e3 * measured.seconds, measured.commands,
-           100 * measured.seconds / all);
+             100 * measured.seconds / all);
     }
   } catch (const std::exception& error) {  // a device that is lost tells no times
     warn("{}", error.what());
@@ -55,7 +51,10 @@ std::string VulkanDevice::target() const {
 }
 
 std::unique_ptr<Memory> VulkanDevice::allocate(size_t bytes) {
-  return std::make_unique<VulkanMemory>(stream_, bytes);
+  auto memory = std::make_unique<VulkanMemory>(stream_, makeBuffer(bytes), bytes);
+  stream_->label("fills");
+  stream_->fillZero(memory->buffer(), 0, (bytes + 3) / 4 * 4);
+  return memory;
 }
 
 void VulkanDevice::writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) {
@@ -104,10 +103,19 @@ arguments::RealArguments VulkanDevice::realArguments(double value) const {
 uint32_t VulkanDevice::groups(size_t count, size_t perGroup) const {
   const size_t most = stream_->context()->limits().maxComputeWorkGroupCount[0];
   size_t groups = (count + perGroup - 1) / perGroup;
-  // Few different numbers: batches that are the same are not recorded again, and empty workgroups cost next to nothing.
+  // Few different numbers: batches that are the same are not recorded again. Empty workgroups cost next to nothing.
   const int spare = static_cast<int>(std::bit_width(groups)) - 4;
   if (spare > 0) groups = ((groups + (size_t{1} << spare) - 1) >> spare) << spare;
   return static_cast<uint32_t>(std::min(groups, most));
+}
+
+GpuBuffer VulkanDevice::makeBuffer(size_t bytes) {
+  try {
+    return GpuBuffer(stream_->context(), bytes);
+  } catch (const Error&) {
+    stream_->finish();
+    return GpuBuffer(stream_->context(), bytes);
+  }
 }
 
 uint64_t VulkanDevice::scratch(size_t floats) {
@@ -115,12 +123,17 @@ uint64_t VulkanDevice::scratch(size_t floats) {
   if (scratch_.bytes() < bytes) {
     stream_->retire(std::move(scratch_));
     scratch_ = GpuBuffer();
-    scratch_ = GpuBuffer(stream_->context(), bytes);
+    scratch_ = makeBuffer(bytes);
   }
   return scratch_.address();
 }
 
 arguments::CountArguments countArguments(const Count& count) {
+  CHECK(!count.first);
+  return partArguments(count);
+}
+
+arguments::CountArguments partArguments(const Count& count) {
   return {deviceAddress(count.counter), deviceAddress(count.first), count.capacity, 0};
 }
 

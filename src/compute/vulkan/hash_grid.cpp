@@ -29,7 +29,7 @@ void VulkanDevice::enqueue(const HashGridForward& options) {
   const HashGrid& grid = options.grid;
   CHECK(options.encoded.columns == grid.columns());
   arguments::HashGridForwardArguments arguments = {};
-  arguments.samples = countArguments(options.samples);
+  arguments.samples = partArguments(options.samples);
   arguments.positions = deviceAddress(options.positions);
   arguments.table = deviceAddress(options.table);
   arguments.encoded = matrixArguments(options.encoded, options.samples.capacity);
@@ -42,7 +42,7 @@ void VulkanDevice::enqueue(const HashGridBackward& options) {
   const HashGrid& grid = options.grid;
   CHECK(options.encodedGradients.columns == grid.columns());
   arguments::HashGridBackwardArguments arguments = {};
-  arguments.samples = countArguments(options.samples);
+  arguments.samples = partArguments(options.samples);
   arguments.positions = deviceAddress(options.positions);
   arguments.table = deviceAddress(options.table);
   arguments.tableGradients = deviceAddress(options.tableGradients);

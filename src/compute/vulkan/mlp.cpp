@@ -42,7 +42,7 @@ void VulkanDevice::enqueue(const MlpForward& options) {
   CHECK(capacity * shape.activationsPerSample() < size_t{1} << 31);
 
   arguments::MlpForwardArguments arguments = {};
-  arguments.samples = countArguments(options.samples);
+  arguments.samples = partArguments(options.samples);
   arguments.inputs = matrixArguments(options.input, capacity);
   arguments.outputs = matrixArguments(options.output, capacity);
   arguments.weights = deviceAddress(options.weights);
@@ -69,7 +69,7 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
   const uint64_t hiddenGradients = scratch(hiddenFloats + capacity * paddedOutputs);
   const uint64_t lastGradients = hiddenGradients + hiddenFloats * sizeof(float);
   arguments::MlpBackwardArguments arguments = {};
-  arguments.samples = countArguments(options.samples);
+  arguments.samples = partArguments(options.samples);
   arguments.outputs = matrixArguments(options.output, capacity);
   arguments.outputGradients = matrixArguments(options.outputGradients, capacity);
   arguments.inputGradients = matrixArguments(options.inputGradients, capacity);

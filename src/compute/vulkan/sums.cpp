@@ -10,7 +10,7 @@ namespace tessera {
 
 namespace {
 
-constexpr size_t kChunk = 256 * 16;  // scan.glsl
+constexpr size_t kChunk = TESSERA_SCAN_CHUNK;
 
 }  // namespace
 
@@ -19,7 +19,7 @@ size_t VulkanDevice::scanScratch(size_t rows) {
 }
 
 void VulkanDevice::queueRunningSums(const RunningSums& sums) {
-  CHECK(sums.limit < 1u << 31);
+  CHECK(sums.limit <= kNoLimit);
   CHECK(!sums.rows.first);
   arguments::ScanArguments arguments = {};
   arguments.rows = countArguments(sums.rows);

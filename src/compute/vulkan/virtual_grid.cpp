@@ -27,7 +27,7 @@ void VulkanDevice::enqueue(const DistinctTexels& options) {
   const size_t corners = size_t{options.samples.capacity} * grid.corners();
   const size_t words = size_t{options.blocks} * grid.words();
   CHECK(corners < size_t{1} << 31);
-  CHECK(32 * words < size_t{1} << 31);
+  CHECK(words < size_t{1} << 31);
   arguments::DistinctTexelsArguments arguments = {};
   arguments.grid = gridArguments(grid);
   arguments.samples = countArguments(options.samples);
@@ -51,7 +51,7 @@ void VulkanDevice::enqueue(const DistinctTexels& options) {
                     .values = arguments.ranks,
                     .total = arguments.firstTexel + options.blocks * sizeof(uint32_t),
                     .fitting = fitting,
-                    .limit = 0x7fffffff,
+                    .limit = kNoLimit,
                     .scratch = fitting + 2 * sizeof(uint32_t),
                     .marks = arguments.marks});
   queue(kernel(kDistinctTexelsPlaceSpirv), arguments, {groups(words, 128)});

@@ -8,8 +8,8 @@
 namespace tessera {
 
 inline arguments::VirtualGridArguments gridArguments(const VirtualGrid& grid) {
-  CHECK(grid.voxels < 4096u);  // virtual_grid.glsl: products with positions are exact
-  CHECK(grid.planes < 4096u);
+  CHECK(grid.voxels <= 4096u);  // virtual_grid.glsl: products with positions are exact
+  CHECK(grid.planes <= 4096u);
   arguments::VirtualGridArguments arguments = {};
   arguments.voxels = grid.voxels;
   arguments.planes = grid.planes;

@@ -16,7 +16,8 @@ namespace tessera {
 
 class VulkanMemory : public Memory {
  public:
-  VulkanMemory(std::shared_ptr<GpuStream> stream, size_t bytes);
+  VulkanMemory(std::shared_ptr<GpuStream> stream, GpuBuffer buffer, size_t bytes)
+      : Memory(bytes), stream_(std::move(stream)), buffer_(std::move(buffer)) {}
   ~VulkanMemory() override { stream_->retire(std::move(buffer_)); }
   const GpuBuffer& buffer() const { return buffer_; }
 
@@ -85,6 +86,7 @@ class VulkanDevice : public Device {
     uint64_t scratch = 0;
     uint64_t marks = 0;
   };
+  static constexpr uint32_t kNoLimit = 0x7ffffffeu;  // so that no two sums overflow
   void queueRunningSums(const RunningSums& sums);
   static size_t scanScratch(size_t rows);
   // What kernels need that first count a ray's samples and then write them.
@@ -105,6 +107,8 @@ class VulkanDevice : public Device {
     addPartials(arguments.partials, groups, columns, sums);
   }
   void addPartials(uint64_t partials, uint32_t count, uint32_t columns, uint64_t sums);
+  // Where memory is short, what is no longer used is given back first.
+  GpuBuffer makeBuffer(size_t bytes);
   // The address of at least `floats` floats for use within one operation.
   uint64_t scratch(size_t floats);
 
@@ -120,7 +124,9 @@ uint64_t deviceAddress(const Slice<T>& slice) {
   return static_cast<const VulkanMemory*>(slice.memory)->buffer().address() + slice.first * sizeof(T);
 }
 
+// Of operations that begin at row 0, and of those that take part of the rows.
 arguments::CountArguments countArguments(const Count& count);
+arguments::CountArguments partArguments(const Count& count);
 
 // CHECKs that a kernel's 32-bit indices reach the last of `rows` rows.
 arguments::MatrixArguments matrixArguments(const Matrix<const float>& matrix, size_t rows);
