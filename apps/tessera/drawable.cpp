@@ -16,7 +16,7 @@
 #include "tiles/scene_folder.h"
 #ifdef TESSERA_HAS_VULKAN
 #include "compute/vulkan/device.h"
-#include "render/vulkan/volume_renderer.h"
+#include "render/vulkan/gpu_scene_renderer.h"
 #endif
 
 namespace tessera {
@@ -76,26 +76,26 @@ std::unique_ptr<ViewRenderer> onProcessor(const fs::path& folder, SceneRendererS
       folder, settings.budgetBytes, scene.frame, std::move(scene.tree), std::move(scene.source), settings);
 }
 
-// Null where `device` cannot draw scenes: then the processor does.
-std::unique_ptr<ViewRenderer> onCard([[maybe_unused]] const Device& device, [[maybe_unused]] const fs::path& folder,
-                                     [[maybe_unused]] Representation representation,
-                                     [[maybe_unused]] const SceneRendererSettings& settings) {
 #ifdef TESSERA_HAS_VULKAN
-  const std::shared_ptr<const GpuContext> context = contextOf(device);
-  if (context == nullptr) return nullptr;
-  if (representation != Representation::volume) {
-    inform("scenes of {} are drawn by the processor", nameOf(representation));
-    return nullptr;
-  }
+template <class Content>
+std::unique_ptr<ViewRenderer> onCard(const std::shared_ptr<const GpuContext>& context, const fs::path& folder,
+                                     const SceneRendererSettings& settings) {
   GpuRendererSettings ofCard;
   ofCard.minTransmittance = settings.march.minTransmittance;
   ofCard.selection = settings.selection;
   ofCard.budgetBytes = settings.budgetBytes;
-  return std::make_unique<WarningRenderer<GpuVolumeRenderer>>(folder, settings.budgetBytes, context,
-                                                              openTileScene<VolumeContent>(folder), ofCard);
-#else
-  return nullptr;
+  return std::make_unique<WarningRenderer<GpuSceneRenderer<Content>>>(folder, settings.budgetBytes, context,
+                                                                      openTileScene<Content>(folder), ofCard);
+}
 #endif
+
+template <class Content>
+std::unique_ptr<ViewRenderer> rendererOf([[maybe_unused]] const Device& device, const fs::path& folder,
+                                         const SceneRendererSettings& settings) {
+#ifdef TESSERA_HAS_VULKAN
+  if (const auto context = contextOf(device)) return onCard<Content>(context, folder, settings);
+#endif
+  return onProcessor<Content>(folder, settings);
 }
 
 class DrawableScene final : public Drawable {
@@ -114,10 +114,8 @@ class DrawableScene final : public Drawable {
     settings.threads = options.threads;
     settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB > 0 ? options.memoryMiB * 1048576
                                                                        : static_cast<double>(usableMemoryBytes()) / 2);
-    renderer_ = onCard(device, folder, tileset_.representation, settings);
-    if (renderer_ != nullptr) return;
-    renderer_ = tileset_.representation == Representation::hash ? onProcessor<HashContent>(folder, settings)
-                                                                : onProcessor<VolumeContent>(folder, settings);
+    renderer_ = tileset_.representation == Representation::hash ? rendererOf<HashContent>(device, folder, settings)
+                                                                : rendererOf<VolumeContent>(device, folder, settings);
   }
 
   ViewRenderer& renderer() override { return *renderer_; }

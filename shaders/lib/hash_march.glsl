@@ -2,43 +2,27 @@
 // Twin of src/render/cpu/hash_march.cpp and hash_features.cpp.
 //
 // Reads: domain_path.glsl, part_place.glsl; TABLES, fine levels of a part; VARYING, defined where weights differ from place
-//   to place; SHARED, defined where one logit weighs all of a level; VECTORS_OF_PART; `content`: the parts' vectors (see
-//   partOf); vec4 corners0First(vec3), corners0Second(vec3), and where VARYING corners1First and corners1Second: texels of
-//   an atlas of macroblocks of 9³ corners, of columns 1 2 3 0, 4 5 6 7 and so on, the middle of the first at 0.5; sampler3D
-//   macroblocks: where they are in it, bytes, the fourth 0 where none is; usampler3D distances and usampler2DArray
-//   nearDistances: both grids of src/tiles/occupancy_distance.h, the second as a list; usampler2DArray tables: entries, two
-//   words each; lists have 2048 a row, 2048 rows a layer; vec2 levelWeights[TABLES], where not VARYING: of density, of all else; float shares[TABLES + 1] or more: of the coarse features'
+//   to place; SHARED, defined where one logit weighs all of a level; how a viewer holds a content:
+//     struct Part               with place; texels, finest cells along an axis; lattice, corners along an axis; ratio: 0, 1, 2
+//                               where coarse cells of distances are 1, 2 or 4 finest ones wide; ranges, an index of:
+//     vec4 content[]            for each eight columns low and scale of columns 1 2 3 0 and low and scale of 4 5 6 7, per byte of
+//                               255 that counts as 1; then for each table its resolution, entries, whether it is hashed (and a
+//                               number of the viewer's), and likewise four vectors for its bytes
+//     uint distanceWord(Part, ivec3 coarseCell), uint nearWord(Part, uint n)    of src/tiles/occupancy_distance.h
+//     vec4 macroblockAt(Part, vec3 block)      of 9³ corners; the fourth is 0 where none is, the rest is the viewer's
+//     vec4 cornersFirst(Part, int eight, vec4 macroblock, vec3 within), cornersSecond(...)    of each eight columns the mix
+//                                              of columns 1 2 3 0 and 4 5 6 7, 0 at the middle of the first corner
+//     uvec2 entryAt(Part, int level, float number, uint entry)    the eight bytes of an entry, `number` the viewer's
+//   vec2 levelWeights[TABLES], where not VARYING: of density, of all else; float shares[TABLES + 1] or more: of the coarse features'
 //   and each level's diffuse colour and features, 1 but for display; int attention: the level whose weights of density (1 +
 //   2 l) or of all else (2 + 2 l) stand for features, 0 for none; float stepLength: share of the domain's width; float
 //   minTransmittance.
-// Defines: Part, partOf, marchSegment.
+// Defines: marchSegment.
 
 const float kLongestStep = 1e3;     // that counts, scene units
 const float kMostLogDensity = 15.0;
 const float kCellSlack = 1e-3;      // finest cells: more than what places are rounded by
-const int kPlaceVectors = 6, kTableVectors = 5;
-
-struct Part {
-  Place place;
-  float texels;   // finest cells along an axis
-  float lattice;  // corners along an axis
-  int ratio;      // 0, 1, 2: coarse cells of distances are 1, 2 or 4 finest ones wide
-  ivec3 macroblockOrigin, distanceOrigin;
-  uint nearRow;   // of its first near distance
-  int ranges;     // its vector where those of its columns begin
-};
-
-Part partOf(int n) {
-  int at = VECTORS_OF_PART * n;
-  vec4 a = content[at], b = content[at + 1], c = content[at + 2], d = content[at + 3], e = content[at + 4], f = content[at + 5];
-  return Part(placeOf(a, b, c, d), b.w, a.w, int(d.w), ivec3(e.xyz), ivec3(f.xyz), uint(e.w), at + kPlaceVectors);
-}
-
-// Where item number n of a list is that begins at a row.
-ivec3 placeInList(uint firstRow, uint n) {
-  uint row = firstRow + (n >> 11);
-  return ivec3(n & 2047u, row & 2047u, row >> 11);
-}
+const int kTableVectors = 5;
 
 // Bytes of an entry: diffuse colour and density, features.
 void unpackEntry(uvec2 words, out vec4 first, out vec4 second) {
@@ -47,12 +31,12 @@ void unpackEntry(uvec2 words, out vec4 first, out vec4 second) {
 }
 
 // A fine level at p in [0,1]³ of the domain; its vectors begin at `at`.
-void mixTable(int at, vec3 p, out vec4 first, out vec4 second) {
-  vec4 head = content[at];  // resolution, entries, hashed, first row
+void mixTable(Part part, int level, int at, vec3 p, out vec4 first, out vec4 second) {
+  vec4 head = content[at];  // resolution, entries, hashed, the viewer's number
   vec3 scaled = (head.x - 1.0) * p + 0.5;
   vec3 lower = floor(scaled), upper = scaled - lower;
   uvec3 c = uvec3(lower);
-  uint resolution = uint(head.x), entries = uint(head.y), firstRow = uint(head.w);
+  uint resolution = uint(head.x), entries = uint(head.y);
   // What the lower and the upper sides add to the number of an entry.
   uvec2 x = uvec2(c.x, c.x + 1u), y = uvec2(c.y, c.y + 1u), z = uvec2(c.z, c.z + 1u);
   bool hashed = head.z != 0.0;
@@ -64,7 +48,7 @@ void mixTable(int at, vec3 p, out vec4 first, out vec4 second) {
     int i = k & 1, j = (k >> 1) & 1, l = k >> 2;
     uint entry = hashed ? (x[i] ^ y[j] ^ z[l]) & (entries - 1u) : (x[i] + y[j] + z[l]) % entries;
     vec4 one, other;
-    unpackEntry(texelFetch(tables, placeInList(firstRow, entry), 0).rg, one, other);
+    unpackEntry(entryAt(part, level, head.w, entry), one, other);
     float weight = (i == 1 ? upper.x : 1.0 - upper.x) * (j == 1 ? upper.y : 1.0 - upper.y) * (l == 1 ? upper.z : 1.0 - upper.z);
     first += weight * one;
     second += weight * other;
@@ -87,15 +71,15 @@ vec2 weightsOf(int level, vec4 first, vec4 second) {
 #endif
 
 // Where macroblocks have a corner; `first` is diffuse colour and the logarithm of density, before any activation.
-void featuresAt(Part part, vec3 p, vec3 corner, out vec4 first, out vec4 second) {
+void featuresAt(Part part, vec3 p, vec4 macroblock, vec3 within, out vec4 first, out vec4 second) {
   int ranges = part.ranges;
-  vec4 coarse = content[ranges] + content[ranges + 1] * corners0First(corner);
-  vec4 coarseFeatures = content[ranges + 2] + content[ranges + 3] * corners0Second(corner);
+  vec4 coarse = content[ranges] + content[ranges + 1] * cornersFirst(part, 0, macroblock, within);
+  vec4 coarseFeatures = content[ranges + 2] + content[ranges + 3] * cornersSecond(part, 0, macroblock, within);
   first = vec4(shares[0] * coarse.rgb, coarse.a);
   second = shares[0] * coarseFeatures;
 #ifdef VARYING
-  vec4 logitsFirst = content[ranges + 4] + content[ranges + 5] * corners1First(corner);
-  vec4 logitsSecond = content[ranges + 6] + content[ranges + 7] * corners1Second(corner);
+  vec4 logitsFirst = content[ranges + 4] + content[ranges + 5] * cornersFirst(part, 1, macroblock, within);
+  vec4 logitsSecond = content[ranges + 6] + content[ranges + 7] * cornersSecond(part, 1, macroblock, within);
   int table = ranges + 8;
 #else
   int table = ranges + 4;
@@ -108,7 +92,7 @@ void featuresAt(Part part, vec3 p, vec3 corner, out vec4 first, out vec4 second)
     vec2 weights = levelWeights[level];
 #endif
     vec4 fine, fineFeatures;
-    mixTable(table, p, fine, fineFeatures);
+    mixTable(part, level, table, p, fine, fineFeatures);
     float share = shares[level + 1] * weights.y;
     first += vec4(vec3(share), weights.x) * fine;
     second += share * fineFeatures;
@@ -138,12 +122,12 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
       x = clamp(s.start + tau * s.direction, 0.0, cells * 0.9999999);
       ivec3 cell = ivec3(x);
       float edge = float(1 << part.ratio);  // of the cells that what is empty is told in
-      uint word = texelFetch(distances, part.distanceOrigin + (cell >> part.ratio), 0).r;
+      uint word = distanceWord(part, cell >> part.ratio);
       if ((word & 15u) == 0u) {
         if (part.ratio == 0) break;
         ivec3 inside = cell & ((1 << part.ratio) - 1);
         uint n = ((word >> 4) << (3 * part.ratio)) + uint(inside.x + ((inside.y + (inside.z << part.ratio)) << part.ratio));
-        word = texelFetch(nearDistances, placeInList(part.nearRow, n), 0).r;
+        word = nearWord(part, n);
         edge = 1.0;
       }
       float free = float((word >> shift) & 15u);
@@ -160,10 +144,10 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
     vec3 p = x / cells;
     vec3 u = clamp(p * part.lattice - 0.5, 0.0, part.lattice - 1.0);
     vec3 block = floor(u / 8.0);
-    vec4 place = texelFetch(macroblocks, part.macroblockOrigin + ivec3(block), 0);
-    if (place.w != 0.0) {
+    vec4 macroblock = macroblockAt(part, block);
+    if (macroblock.w != 0.0) {
       vec4 first, second;
-      featuresAt(part, p, floor(place.xyz * 255.0 + 0.5) * 9.0 + (u - 8.0 * block) + 0.5, first, second);
+      featuresAt(part, p, macroblock, u - 8.0 * block, first, second);
       float opacity = opacityOf(exp(min(first.a, kMostLogDensity)) * min(distanceBetween(s, from, to), kLongestStep));
       addTo(sum, first.rgb, second, opacity, distanceAt(s, tau));
     }

@@ -1,4 +1,5 @@
-// One invocation a pixel: nothing has been met.
+// One invocation a pixel: nothing has been met. A pixel begins with its transmittance and the depth along its ray; then
+// come its premultiplied colour (of `volume`), or the sums of diffuse colour and features and what each network weighs (of `hash`).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../compute/kernel.glsl"
@@ -13,5 +14,5 @@ void main() {
   ViewArguments view = arguments.values;
   uint pixel;
   if (!pixelIndex(view, pixel)) return;
-  for (uint i = 0; i < kNumbersOfPixel; ++i) view.pixels.values[kNumbersOfPixel * pixel + i] = i == 3 ? 1 : 0;
+  for (uint i = 0; i < view.numbersOfPixel; ++i) view.pixels.values[view.numbersOfPixel * pixel + i] = i == 0 ? 1 : 0;
 }

@@ -26,10 +26,14 @@ struct Part {
   uint number;
 };
 
+Place placeOfPart(uint number) {
+  VolumePartArguments a = arguments.values.parts.values[number];
+  return Place(vectorOf(a.centre), vectorOf(a.scale), vectorOf(a.low), vectorOf(a.high), a.contracted != 0);
+}
+
 Part partOf(uint number) {
   VolumePartArguments a = arguments.values.parts.values[number];
-  const Place place = Place(vectorOf(a.centre), vectorOf(a.scale), vectorOf(a.low), vectorOf(a.high), a.contracted != 0);
-  return Part(place, a.texels, a.voxels, a.macroblocks, a.voxelWords, a.distances, number);
+  return Part(placeOfPart(number), a.texels, a.voxels, a.macroblocks, a.voxelWords, a.distances, number);
 }
 
 uint cellIndex(vec3 cell, float edge) {
@@ -84,6 +88,7 @@ vec4 planesSecond(Part part, vec3 x) { return mixPlanes(part, x, 1); }
 
 #include "../lib/volume_march.glsl"
 #include "../lib/march_part.glsl"
+#include "march_parts.glsl"
 
 // What the network says of a ray's sums and its direction.
 vec3 specularOf(DrawVolumeArguments a, Composite sum, vec3 d) {
@@ -105,59 +110,23 @@ vec3 specularOf(DrawVolumeArguments a, Composite sum, vec3 d) {
   return 1 / (1 + exp(-vec3(values[0], values[1], values[2])));
 }
 
-// Marches what the content owns of the ray, part after part in the order in which the ray enters them.
-void marchParts(DrawVolumeArguments a, vec3 o, vec3 d, vec2 whole, inout Composite sum) {
-  float entered = -1;  // the last one's entry and number
-  uint last = 0;
-  for (uint turn = 0; turn < a.partCount && sum.transmittance >= minTransmittance; ++turn) {
-    uint nearest = a.partCount;
-    vec2 range = vec2(0);
-    for (uint n = 0; n < a.partCount; ++n) {
-      VolumePartArguments part = a.parts.values[n];
-      const Place place =
-          Place(vectorOf(part.centre), vectorOf(part.scale), vectorOf(part.low), vectorOf(part.high), part.contracted != 0);
-      const vec2 owned = ownedRange(place, o, d, whole);
-      const bool isNext = owned.x > entered || (owned.x == entered && n > last);
-      if (!(owned.x < owned.y) || !(turn == 0 || isNext)) continue;
-      if (nearest < a.partCount && owned.x >= range.x) continue;
-      nearest = n;
-      range = owned;
-    }
-    if (nearest == a.partCount) return;
-    marchPart(partOf(nearest), o, d, range, sum);
-    entered = range.x;
-    last = nearest;
-  }
-}
-
 void main() {
   DrawVolumeArguments a = arguments.values;
   uint pixel;
   if (!pixelIndex(a.view, pixel)) return;
-  const uint first = kNumbersOfPixel * pixel;
-  const float before = a.view.pixels.values[first + 3];
+  const uint first = a.view.numbersOfPixel * pixel;
+  const float before = a.view.pixels.values[first];
   const vec3 d = rayDirection(a.view, pixel);
   if (before < a.view.minTransmittance || d == vec3(0)) return;
   featureRange = a.featureRange;
   densityRange = a.densityRange;
   stepsPerTexel = a.stepsPerTexel;
   minTransmittance = a.view.minTransmittance / before;
-  const vec3 o = vectorOf(a.view.origin);
-  const vec2 box = clipToBox(o, d, vectorOf(a.view.low), vectorOf(a.view.high), vec2(a.view.near, 1e30));
-  const bool meetsBox = box.x < box.y;
-  const float far = farthestOf(a.view, pixel);
-  Composite sum = Composite(vec3(0), vec4(0), 1, 0, 0);
-  if (a.isSurround != 0) {
-    const vec2 behind = vec2(meetsBox ? box.y : a.view.near, far);
-    if (behind.x < behind.y) marchPart(partOf(0), o, d, behind, sum);
-  } else {
-    const vec2 whole = clipToBox(o, d, vectorOf(a.low), vectorOf(a.high), vec2(meetsBox ? box.x : a.view.near, far));
-    if (whole.x < whole.y) marchParts(a, o, d, whole, sum);
-  }
+  const Composite sum = marchContent(a.view, pixel, d, vectorOf(a.low), vectorOf(a.high), a.partCount, a.isSurround != 0);
   const float opacity = 1 - sum.transmittance;
   if (opacity <= 0) return;
   const vec3 colour = sum.diffuse + opacity * specularOf(a, sum, d);
-  for (uint c = 0; c < 3; ++c) a.view.pixels.values[first + c] += before * colour[c];
-  a.view.pixels.values[first + 3] = before * sum.transmittance;
-  a.view.pixels.values[first + 4] += before * sum.depth;
+  a.view.pixels.values[first] = before * sum.transmittance;
+  a.view.pixels.values[first + 1] += before * sum.depth;
+  for (uint c = 0; c < 3; ++c) a.view.pixels.values[first + 2 + c] += before * colour[c];
 }

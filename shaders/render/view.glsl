@@ -1,8 +1,7 @@
 // A camera's rays, and what has been added up along them.
-// Reads: ViewArguments. Defines: pixelIndex(), rayDirection(), viewOrigin(), kSceneEnd, Range functions for whole rays.
+// Reads: ViewArguments. Defines: pixelIndex(), vectorOf(), rayDirection(), farthestOf(), kSceneEnd.
 
 const float kSceneEnd = 1e6;  // scene units: no sample beyond
-const uint kNumbersOfPixel = 5;
 
 // The number of this invocation's pixel; false beside the picture.
 bool pixelIndex(ViewArguments view, out uint pixel) {

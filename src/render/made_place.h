@@ -5,6 +5,7 @@
 #include "render/made_volume.h"
 #include "render/tile_cache.h"
 #include "render/tile_frame.h"
+#include "scene/camera.h"
 
 namespace tessera {
 
@@ -55,6 +56,27 @@ struct Place {
     return {[this](int tile) { return bytesInMemory(contents[tile]); }, [this](int tile) { return contents[tile]; }};
   }
 };
+
+// A small camera, and a flight over and through the place.
+inline Camera flightCamera() {
+  Camera camera;
+  camera.width = 64;
+  camera.height = 48;
+  camera.parameters = {60, 60, 32, 24};
+  return camera;
+}
+inline Pose flightPose(int step) {
+  const double angle = 0.021 * step;
+  const Vec3d eye(5 * std::cos(angle), 4 * std::sin(1.7 * angle), 1.2 + std::sin(0.9 * angle));
+  const Vec3d target(2 * std::sin(angle), std::cos(2 * angle), -0.5);
+  Pose pose;
+  const Vec3d forward = (target - eye).normalized(), right = forward.cross(Vec3d::UnitZ()).normalized();
+  pose.rotation.col(0) = right;
+  pose.rotation.col(1) = forward.cross(right);
+  pose.rotation.col(2) = forward;
+  pose.translation = eye;
+  return pose;
+}
 
 inline const Place& place() {
   static const Place made;

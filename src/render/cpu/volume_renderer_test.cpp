@@ -17,28 +17,6 @@ SceneRendererSettings settingsWith(uint64_t budget) {
   return settings;
 }
 
-Camera camera() {
-  Camera camera;
-  camera.width = 64;
-  camera.height = 48;
-  camera.parameters = {60, 60, 32, 24};
-  return camera;
-}
-
-// A flight over and through the place.
-Pose poseAt(int step) {
-  const double angle = 0.021 * step;
-  const Vec3d eye(5 * std::cos(angle), 4 * std::sin(1.7 * angle), 1.2 + std::sin(0.9 * angle));
-  const Vec3d target(2 * std::sin(angle), std::cos(2 * angle), -0.5);
-  Pose pose;
-  const Vec3d forward = (target - eye).normalized(), right = forward.cross(Vec3d::UnitZ()).normalized();
-  pose.rotation.col(0) = right;
-  pose.rotation.col(1) = forward.cross(right);
-  pose.rotation.col(2) = forward;
-  pose.translation = eye;
-  return pose;
-}
-
 TEST(VolumeRenderer, NeverExceedsAQuarterOfTheFinestLevelAndNeverLacksTheCoarsest) {
   const uint64_t budget = place().finestBytes / 4;
   ASSERT_LT(place().coarsestBytes, budget);
@@ -47,7 +25,7 @@ TEST(VolumeRenderer, NeverExceedsAQuarterOfTheFinestLevelAndNeverLacksTheCoarses
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
   std::set<int> drawn;
   for (int step = 0; step < 600; ++step) {
-    renderer.render(camera().scaledTo(16, 12), poseAt(step), nullptr);
+    renderer.render(flightCamera().scaledTo(16, 12), flightPose(step), nullptr);
     for (const SelectedTile& selected : renderer.cut().tiles) {
       if (selected.visible) drawn.insert(selected.content);
     }
@@ -67,8 +45,8 @@ TEST(VolumeRenderer, DrawsTheSamePictureAsWithoutABudgetWhereWhatIsWantedFits) {
     VolumeRenderer bounded(place().frame, place().tree, place().source(), tight);
     int same = 0, frames = 0;
     for (int step = 0; step < 600; step += 20, ++frames) {
-      const RenderedView a = unbounded.render(camera(), poseAt(step), nullptr);
-      const RenderedView b = bounded.render(camera(), poseAt(step), nullptr);
+      const RenderedView a = unbounded.render(flightCamera(), flightPose(step), nullptr);
+      const RenderedView b = bounded.render(flightCamera(), flightPose(step), nullptr);
       EXPECT_EQ(unbounded.choice().refused, 0);
       if (bounded.choice().refused > 0) continue;
       ++same;
@@ -92,7 +70,7 @@ TEST(VolumeRenderer, DrawsWhatIsAboveAMissingTileInItsCellsAlone) {
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
   int pixels = 0, instead = 0;
   for (int step = 0; step < 600; step += 50) {
-    const RenderedView view = renderer.render(camera(), poseAt(step), nullptr);
+    const RenderedView view = renderer.render(flightCamera(), flightPose(step), nullptr);
     EXPECT_GT(renderer.choice().refused, 0);
     std::map<int, RenderedView> alone;
     for (const SelectedTile& one : renderer.cut().tiles) {
@@ -100,15 +78,15 @@ TEST(VolumeRenderer, DrawsWhatIsAboveAMissingTileInItsCellsAlone) {
       ThreadPool pool(1);
       const SceneDrawing<VolumeContent> drawing{
           place().frame, {&place().contents[one.content]}, &place().contents.back(), {}};
-      alone.emplace(one.content, drawScene(drawing, camera(), poseAt(step), nullptr, pool));
+      alone.emplace(one.content, drawScene(drawing, flightCamera(), flightPose(step), nullptr, pool));
     }
-    for (int y = 0; y < camera().height; ++y) {
-      for (int x = 0; x < camera().width; ++x) {
-        const Vec3d d = poseAt(step).rotation * *camera().directionInCamera(Vec2d(x + 0.5, y + 0.5));
+    for (int y = 0; y < flightCamera().height; ++y) {
+      for (int x = 0; x < flightCamera().width; ++x) {
+        const Vec3d d = flightPose(step).rotation * *flightCamera().directionInCamera(Vec2d(x + 0.5, y + 0.5));
         std::vector<SelectedTile> met;
         for (const SelectedTile& one : renderer.cut().tiles) {
           const TileNode& node = place().tree.tiles[one.tile];
-          const SceneRay ray{poseAt(step).translation, d.normalized()};
+          const SceneRay ray{flightPose(step).translation, d.normalized()};
           if (one.visible && !clipToBox(ray, node.low, node.high, {1e-9, 1e6}).empty()) met.push_back(one);
         }
         if (met.size() != 1) continue;
@@ -127,7 +105,7 @@ TEST(VolumeRenderer, DrawsTheFinestLevelWhereNoErrorIsAllowed) {
   SceneRendererSettings settings = settingsWith(place().allBytes);
   settings.selection.mostPixels = 0;
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
-  const RenderedView view = renderer.render(camera(), poseAt(0), nullptr);
+  const RenderedView view = renderer.render(flightCamera(), flightPose(0), nullptr);
   std::vector<VolumeContent> finest;
   for (size_t i = 0; i < place().tree.tiles.size(); ++i) {
     if (place().tree.tiles[i].level == 0 && static_cast<int>(i) != place().tree.surround) {
@@ -139,7 +117,7 @@ TEST(VolumeRenderer, DrawsTheFinestLevelWhereNoErrorIsAllowed) {
   const auto contentAt = [&](int tile) -> const VolumeContent& { return tile == 17 ? surround : finest[tile - 1]; };
   const TileSource<VolumeContent> source{[&](int tile) { return bytesInMemory(contentAt(tile)); }, contentAt};
   VolumeRenderer flat(place().frame, flatTileTree(finest, true), source, settings);
-  const RenderedView expected = flat.render(camera(), poseAt(0), nullptr);
+  const RenderedView expected = flat.render(flightCamera(), flightPose(0), nullptr);
   EXPECT_EQ(view.colour.pixels, expected.colour.pixels);
   EXPECT_EQ(view.opacity.pixels, expected.opacity.pixels);
   double opacity = 0;
@@ -153,16 +131,16 @@ TEST(VolumeRenderer, OrdersMixedLevelsAsEachRayMeetsThem) {
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
   bool mixed = false;
   for (int step = 0; step < 600; step += 7) {
-    renderer.render(camera().scaledTo(16, 12), poseAt(step), nullptr);
+    renderer.render(flightCamera().scaledTo(16, 12), flightPose(step), nullptr);
     std::set<int> levels;
     for (int pixel = 0; pixel < 20; ++pixel) {
-      const Vec3d d = *camera().directionInCamera(Vec2d(3.2 * pixel, 2.4 * pixel));
+      const Vec3d d = *flightCamera().directionInCamera(Vec2d(3.2 * pixel, 2.4 * pixel));
       double last = -1;
       for (const SelectedTile& selected : renderer.cut().tiles) {
         const TileNode& node = place().tree.tiles[selected.tile];
         levels.insert(node.level);
         const RayRange range =
-            clipToBox({poseAt(step).translation, poseAt(step).rotation * d}, node.low, node.high, {0, 1e6});
+            clipToBox({flightPose(step).translation, flightPose(step).rotation * d}, node.low, node.high, {0, 1e6});
         if (range.far - range.near < 1e-9) continue;
         EXPECT_GE(range.near, last - 1e-9);
         last = range.near;
@@ -183,9 +161,9 @@ TEST(VolumeRenderer, SaysWhatDrewAndWhatABudgetIsTooSmallFor) {
 
 TEST(VolumeRenderer, IsTheSameEveryTime) {
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settingsWith(place().allBytes));
-  const RenderedView first = renderer.render(camera(), poseAt(3), nullptr);
-  renderer.render(camera(), poseAt(4), nullptr);
-  const RenderedView again = renderer.render(camera(), poseAt(3), nullptr);
+  const RenderedView first = renderer.render(flightCamera(), flightPose(3), nullptr);
+  renderer.render(flightCamera(), flightPose(4), nullptr);
+  const RenderedView again = renderer.render(flightCamera(), flightPose(3), nullptr);
   EXPECT_EQ(first.colour.pixels, again.colour.pixels);
   EXPECT_EQ(first.depth.pixels, again.depth.pixels);
 }

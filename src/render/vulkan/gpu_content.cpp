@@ -1,84 +1,125 @@
 #include "render/vulkan/gpu_content.h"
 
-#include <algorithm>
-#include <cstring>
+#include <bit>
+#include <cmath>
 
-#include "shaders/render/arguments_draw.h"
+#include "base/check.h"
 
 namespace tessera {
 
 namespace {
 
-constexpr size_t kAlignment = 8;
-
-// Puts pieces behind one another in one buffer whose address is known when all are there.
-class Packed {
- public:
-  // → offset
-  template <class T>
-  size_t add(const std::vector<T>& values) {
-    const size_t offset = bytes_.size();
-    const auto from = std::as_bytes(std::span(values));
-    bytes_.insert(bytes_.end(), from.begin(), from.end());
-    bytes_.resize((bytes_.size() + kAlignment - 1) / kAlignment * kAlignment);
-    return offset;
+// What a kernel knows of where a part stands.
+template <class Arguments>
+Arguments placed(const ContentPart& part) {
+  Arguments made = {};
+  for (int a = 0; a < 3; ++a) {
+    made.centre[a] = part.centre[a];
+    made.scale[a] = part.scale[a];
+    made.low[a] = part.low[a];
+    made.high[a] = part.high[a];
   }
-  std::vector<std::byte>& bytes() { return bytes_; }
+  made.contracted = part.contracted;
+  return made;
+}
 
- private:
-  std::vector<std::byte> bytes_;
-};
+// What is added, and what a number from 0 to `most` is multiplied with, of columns 1 2 3 0 and then of 4 5 6 7.
+void addRangeVectors(std::span<const ByteRange> ranges, float most, std::vector<float>& numbers) {
+  for (const std::array<int, 4>& columns : {std::array<int, 4>{1, 2, 3, 0}, {4, 5, 6, 7}}) {
+    for (const int c : columns) numbers.push_back(ranges[c].low);
+    for (const int c : columns) numbers.push_back((ranges[c].high - ranges[c].low) / most);
+  }
+}
+
+float sigmoid(float x) {
+  return 1 / (1 + std::exp(-x));
+}
 
 }  // namespace
 
-GpuVolumeContent::GpuVolumeContent(std::shared_ptr<GpuStream> stream, const VolumeContent& content)
-    : stream_(std::move(stream)) {
-  Packed packed;
-  std::vector<arguments::VolumePartArguments> parts;
+GpuVolumeContent::GpuVolumeContent(const std::shared_ptr<GpuStream>& stream, const VolumeContent& content)
+    : featureRange(content.featureRange),
+      densityRange(content.densityRange),
+      stepsPerTexel(static_cast<float>(content.stepsPerTexel)),
+      partCount(static_cast<uint32_t>(content.parts.size())) {
+  PackedContent packed;
+  std::vector<arguments::VolumePartArguments> all;
   for (const VolumePart& part : content.parts) {
-    arguments::VolumePartArguments made = {};
-    for (int a = 0; a < 3; ++a) {
-      made.centre[a] = part.centre[a];
-      made.scale[a] = part.scale[a];
-      made.low[a] = part.low[a];
-      made.high[a] = part.high[a];
-      made.planeWords[a] = packed.add(part.planeBytes[a]);
-    }
+    auto made = placed<arguments::VolumePartArguments>(part);
     made.texels = static_cast<float>(part.planes);
     made.voxels = static_cast<float>(part.voxels);
-    made.contracted = part.contracted;
+    for (int a = 0; a < 3; ++a) made.planeWords[a] = packed.add(part.planeBytes[a]);
     made.macroblocks = packed.add(part.macroblocks);
     made.voxelWords = packed.add(part.voxelBytes);
     made.distances = packed.add(part.distances);
-    parts.push_back(made);
+    all.push_back(made);
   }
-  std::vector<arguments::LayerArguments> layers;
-  std::vector<float> weights;
-  for (const DenseLayer& layer : content.network) {
-    layers.push_back({layer.inputs, layer.outputs, static_cast<uint32_t>(weights.size()), 0});
-    weights.insert(weights.end(), layer.weights.begin(), layer.weights.end());
-    weights.insert(weights.end(), layer.biases.begin(), layer.biases.end());
-    about_.mostWidth = std::max({about_.mostWidth, layer.inputs, layer.outputs});
+  network = addNetwork(content.network, packed);
+  parts = packed.add(all);
+  memory = GpuContentMemory(stream, packed.bytes().size());
+  const uint64_t base = memory.address();
+  for (arguments::VolumePartArguments& part : all) {
+    for (uint64_t& plane : part.planeWords) plane += base;
+    for (uint64_t* at : {&part.macroblocks, &part.voxelWords, &part.distances}) *at += base;
   }
-  const size_t atLayers = packed.add(layers), atWeights = packed.add(weights);
-  const size_t atParts = packed.add(parts);
-  memory_ = GpuBuffer(stream_->context(), packed.bytes().size());
-  for (arguments::VolumePartArguments& part : parts) {  // offsets become addresses
-    for (uint64_t* at : {&part.planeWords[0], &part.planeWords[1], &part.planeWords[2], &part.macroblocks,
-                         &part.voxelWords, &part.distances}) {
-      *at += memory_.address();
+  packed.replace(parts, all);
+  memory.upload(packed);
+  for (uint64_t* at : {&parts, &network.layers, &network.weights}) *at += base;
+}
+
+GpuHashContent::GpuHashContent(const std::shared_ptr<GpuStream>& stream, const HashContent& content)
+    : weights(content.weights),
+      varies(content.columns() > HashPart::kFeatures),
+      step(content.step),
+      isWhole(content.isWhole),
+      partCount(static_cast<uint32_t>(content.parts.size())),
+      tables(static_cast<uint32_t>(content.parts.front().tables.size())),
+      columns(content.columns()),
+      layers(content.network) {
+  const uint32_t each = content.logitsOfLevel();
+  for (uint32_t level = 0; level < tables; ++level) {
+    const bool weighed = each > 0 && !content.logits.empty();
+    levelWeights[2 * level] = weighed ? sigmoid(content.logits[each * level]) : 1;
+    levelWeights[2 * level + 1] = weighed ? sigmoid(content.logits[each * level + each - 1]) : 1;
+  }
+  PackedContent packed;
+  std::vector<arguments::HashPartArguments> all;
+  std::vector<float> numbers;  // of `vectors`
+  for (const HashPart& part : content.parts) {
+    CHECK(part.tables.size() == size_t{tables});
+    auto made = placed<arguments::HashPartArguments>(part);
+    made.texels = static_cast<float>(part.cells());
+    made.lattice = static_cast<float>(part.lattice);
+    made.ratio = std::countr_zero(part.distances.ratio);
+    made.macroblocks = packed.add(part.macroblocks);
+    made.cornerWords = packed.add(part.cornerBytes);
+    made.coarse = packed.add(part.distances.coarse);
+    made.fine = packed.add(part.distances.fine);
+    made.firstVector = static_cast<uint32_t>(numbers.size() / 4);
+    for (uint32_t first = 0; first < columns; first += HashPart::kFeatures) {
+      addRangeVectors(std::span(part.ranges).subspan(first, HashPart::kFeatures), 1, numbers);
     }
+    for (uint32_t level = 0; level < tables; ++level) {
+      const HashTable& table = part.tables[level];
+      made.tables[level] = packed.add(table.bytes);
+      numbers.insert(numbers.end(), {static_cast<float>(table.resolution), static_cast<float>(table.entries),
+                                     table.hashed ? 1.0f : 0.0f, 0.0f});
+      addRangeVectors(table.ranges, 255, numbers);
+    }
+    all.push_back(made);
   }
-  std::memcpy(packed.bytes().data() + atParts, parts.data(), parts.size() * sizeof(parts[0]));
-  stream_->upload(memory_, 0, packed.bytes());
-  about_.featureRange = content.featureRange;
-  about_.densityRange = content.densityRange;
-  about_.stepsPerTexel = static_cast<float>(content.stepsPerTexel);
-  about_.parts = static_cast<uint32_t>(parts.size());
-  about_.layers = static_cast<uint32_t>(layers.size());
-  about_.partsAddress = memory_.address() + atParts;
-  about_.layersAddress = memory_.address() + atLayers;
-  about_.weightsAddress = memory_.address() + atWeights;
+  network = addNetwork(content.network, packed);
+  vectors = packed.add(numbers);
+  parts = packed.add(all);
+  memory = GpuContentMemory(stream, packed.bytes().size());
+  const uint64_t base = memory.address();
+  for (arguments::HashPartArguments& part : all) {
+    for (uint64_t* at : {&part.macroblocks, &part.cornerWords, &part.coarse, &part.fine}) *at += base;
+    for (uint32_t level = 0; level < tables; ++level) part.tables[level] += base;
+  }
+  packed.replace(parts, all);
+  memory.upload(packed);
+  for (uint64_t* at : {&parts, &vectors, &network.layers, &network.weights}) *at += base;
 }
 
 }  // namespace tessera

@@ -1,45 +1,74 @@
-// Contents of `volume` on a graphics card: their bytes as they lie in memory, reached by address.
+// Contents of scenes on a graphics card: their bytes as they lie in memory, reached by address.
 #pragma once
 
+#include <array>
 #include <memory>
 
 #include "gpu/stream.h"
+#include "render/vulkan/packed_content.h"
+#include "tiles/hash_content.h"
 #include "tiles/volume_content.h"
 
 namespace tessera {
 
-class GpuVolumeContent {
+// One buffer, which goes when the card has done what it was asked to do with it.
+class GpuContentMemory {
  public:
-  GpuVolumeContent() = default;
-  GpuVolumeContent(std::shared_ptr<GpuStream> stream, const VolumeContent& content);
-  ~GpuVolumeContent() {
-    if (memory_) stream_->retire(std::move(memory_));
+  GpuContentMemory() = default;
+  GpuContentMemory(std::shared_ptr<GpuStream> stream, size_t bytes)
+      : stream_(std::move(stream)), buffer_(stream_->context(), bytes) {}
+  ~GpuContentMemory() {
+    if (buffer_) stream_->retire(std::move(buffer_));
   }
-  GpuVolumeContent(GpuVolumeContent&&) noexcept = default;
-  GpuVolumeContent& operator=(GpuVolumeContent&& other) noexcept {
+  GpuContentMemory(GpuContentMemory&& other) noexcept { *this = std::move(other); }
+  GpuContentMemory& operator=(GpuContentMemory&& other) noexcept {
     std::swap(stream_, other.stream_);
-    std::swap(memory_, other.memory_);
-    about_ = other.about_;
+    std::swap(buffer_, other.buffer_);
     return *this;
   }
 
-  struct About {
-    float featureRange = 0, densityRange = 0, stepsPerTexel = 1;
-    uint32_t parts = 0, layers = 0, mostWidth = 0;  // inputs or outputs of a layer
-    uint64_t partsAddress = 0, layersAddress = 0, weightsAddress = 0;
-  };
-  const About& about() const { return about_; }
-  size_t bytes() const { return memory_.bytes(); }
+  void upload(const PackedContent& packed) { stream_->upload(buffer_, 0, packed.bytes()); }
+  uint64_t address() const { return buffer_.address(); }
+  size_t bytes() const { return buffer_.bytes(); }
 
  private:
   std::shared_ptr<GpuStream> stream_;
-  GpuBuffer memory_;
-  About about_;
+  GpuBuffer buffer_;
 };
 
-// What it takes on the card: no more than the content takes in memory.
+// Each takes no more of the card than the content that it is made of takes in memory.
+struct GpuVolumeContent {
+  GpuVolumeContent() = default;
+  GpuVolumeContent(const std::shared_ptr<GpuStream>& stream, const VolumeContent& content);
+
+  GpuContentMemory memory;
+  float featureRange = 0, densityRange = 0, stepsPerTexel = 1;
+  uint32_t partCount = 0;
+  uint64_t parts = 0;  // address
+  GpuNetwork network;
+};
+
+struct GpuHashContent {
+  GpuHashContent() = default;
+  GpuHashContent(const std::shared_ptr<GpuStream>& stream, const HashContent& content);
+
+  GpuContentMemory memory;
+  LevelWeights weights = LevelWeights::separate;
+  bool varies = false;  // from place to place; else `levelWeights` are those of density and of all else
+  std::array<float, 2 * HashPart::kMostTables> levelWeights = {};
+  float step = 0;
+  bool isWhole = false;
+  uint32_t partCount = 0, tables = 0, columns = 0;
+  uint64_t parts = 0, vectors = 0;  // addresses
+  GpuNetwork network;
+  std::vector<DenseLayer> layers;  // of the network: contents with the same numbers have the same one
+};
+
 inline uint64_t bytesInMemory(const GpuVolumeContent& content) {
-  return content.bytes();
+  return content.memory.bytes();
+}
+inline uint64_t bytesInMemory(const GpuHashContent& content) {
+  return content.memory.bytes();
 }
 
 }  // namespace tessera

@@ -43,6 +43,59 @@ uniform float shares[${kMostTables + 1}], stepLength;
 uniform int attention;
 `;
 
+// `content` begins with VECTORS_OF_PART vectors of each part; lists have 2048 a row, 2048 rows a layer; macroblocks' numbers
+// are places in an atlas, in bytes.
+function partsShader(varying: boolean): string {
+  const columns = (half: string) => [
+    `vec4 corners${half}(Part part, int eight, vec4 macroblock, vec3 within) {`,
+    '  vec3 x = floor(macroblock.xyz * 255.0 + 0.5) * 9.0 + within + 0.5;',
+    varying ? `  return eight == 0 ? corners0${half}(x) : corners1${half}(x);` : `  return corners0${half}(x);`,
+    '}',
+  ].join('\n');
+  return `
+struct Part {
+  Place place;
+  float texels, lattice;
+  int ratio;
+  ivec3 macroblockOrigin, distanceOrigin;
+  uint nearRow;  // of its first near distance
+  int ranges;
+};
+
+Part partOf(int n) {
+  int at = VECTORS_OF_PART * n;
+  vec4 a = content[at], b = content[at + 1], c = content[at + 2], d = content[at + 3], e = content[at + 4], f = content[at + 5];
+  return Part(placeOf(a, b, c, d), b.w, a.w, int(d.w), ivec3(e.xyz), ivec3(f.xyz), uint(e.w), at + 6);
+}
+
+// Where item number n of a list is that begins at a row.
+ivec3 placeInList(uint firstRow, uint n) {
+  uint row = firstRow + (n >> 11);
+  return ivec3(n & 2047u, row & 2047u, row >> 11);
+}
+
+uint distanceWord(Part part, ivec3 cell) {
+  return texelFetch(distances, part.distanceOrigin + cell, 0).r;
+}
+
+uint nearWord(Part part, uint n) {
+  return texelFetch(nearDistances, placeInList(part.nearRow, n), 0).r;
+}
+
+vec4 macroblockAt(Part part, vec3 block) {
+  return texelFetch(macroblocks, part.macroblockOrigin + ivec3(block), 0);
+}
+
+uvec2 entryAt(Part part, int level, float firstRow, uint entry) {
+  return texelFetch(tables, placeInList(uint(firstRow), entry), 0).rg;
+}
+
+${columns('First')}
+
+${columns('Second')}
+`;
+}
+
 const kWrite = `
 void writeContent(Composite sum, vec3 d, float opacity, float seen) {
   vec4 features = sum.features;
@@ -65,6 +118,6 @@ export function hashPieces(
   if (columns > kAttributes) defines.VARYING = '';
   if (settings.weights === 'shared') defines.SHARED = '';
   const names = kCornerAtlases.slice(0, columns / kAttributes).flat();
-  const source = [outputs(weightTargets), kUniforms, atlasShader(names, atlases), marchSource, kWrite].join('\n');
+  const source = [outputs(weightTargets), kUniforms, atlasShader(names, atlases), partsShader(columns > kAttributes), marchSource, kWrite].join('\n');
   return { parts: parts.length, vectors: vectorsOfOne * parts.length, defines, source };
 }

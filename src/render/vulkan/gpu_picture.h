@@ -1,0 +1,42 @@
+// A picture that is being drawn on a graphics card: its rays, what is added up along them, and what comes back.
+#pragma once
+
+#include <memory>
+
+#include "gpu/stream.h"
+#include "render/cpu/draw_scene.h"
+#include "render/tile_frame.h"
+#include "shaders/render/arguments_draw.h"
+
+namespace tessera {
+
+class GpuPicture {
+ public:
+  explicit GpuPicture(std::shared_ptr<GpuStream> stream);
+
+  // Begins a picture, with so many numbers of each pixel to add up (begin_view.comp).
+  void begin(const TileFrame& frame, float minTransmittance, uint32_t numbersOfPixel, const Camera& camera,
+             const Pose& worldFromCamera, const ImageF* opaqueDepth);
+  const arguments::ViewArguments& view() const { return view_; }
+  // Runs a kernel for each pixel.
+  template <class Arguments>
+  void run(const GpuKernel& kernel, const Arguments& arguments) {
+    stream_->run(kernel, std::as_bytes(std::span(&arguments, 1)), groups_);
+  }
+  RenderedView drawn();  // waits
+
+ private:
+  void makeRoom(const Camera& camera, uint32_t numbersOfPixel);
+
+  std::shared_ptr<GpuStream> stream_;
+  GpuKernel begin_;
+  ThreadPool pool_;
+  PixelDirections pixels_;
+  Camera camera_;  // that there is room for
+  uint32_t numbersOfPixel_ = 0;
+  GpuBuffer directions_, opaqueDepth_, state_, drawn_;
+  arguments::ViewArguments view_ = {};
+  Groups groups_;
+};
+
+}  // namespace tessera

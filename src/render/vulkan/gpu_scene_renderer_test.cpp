@@ -1,0 +1,188 @@
+#include "render/vulkan/gpu_scene_renderer.h"
+
+#include <gtest/gtest.h>
+
+#include "gpu/test_context.h"
+#include "render/cpu/scene_renderer.h"
+#include "render/made_hash.h"
+#include "render/made_place.h"
+
+namespace tessera {
+namespace {
+
+double decibels(const ImageF& a, const ImageF& b) {
+  double squares = 1e-12, largest = 1e-6;
+  for (size_t i = 0; i < a.pixels.size(); ++i) {
+    squares += std::pow(a.pixels[i] - b.pixels[i], 2);
+    largest = std::max<double>(largest, std::abs(b.pixels[i]));
+  }
+  return 10 * std::log10(static_cast<double>(a.pixels.size()) * largest * largest / squares);
+}
+
+// 2x2 cells of made features under one content of them all, which has a network of its own, and a surround.
+struct HashPlace {
+  TileTree tree = madeTree(2, 2);
+  std::vector<HashContent> contents;
+  TileFrame frame;
+  uint64_t allBytes = 0, coarsestBytes = 0;
+
+  // `adapt` makes of a content what is to be drawn.
+  explicit HashPlace(
+      uint32_t cells, const std::function<void(HashContent&)>& adapt = [](HashContent&) {}) {
+    frame.low = Vec3d(-2, -2, -1);
+    frame.high = Vec3d(2, 2, 1);
+    for (TileNode& node : tree.tiles) {
+      std::vector<HashPart> parts;
+      for (double y = node.low.y(); y < node.high.y(); y += 2) {
+        for (double x = node.low.x(); x < node.high.x(); x += 2) {
+          HashPart part;
+          part.centre = {static_cast<float>(x + 1), static_cast<float>(y + 1), 0};
+          part.low = {static_cast<float>(x), static_cast<float>(y), -1};
+          part.high = {static_cast<float>(x + 2), static_cast<float>(y + 2), 1};
+          const Vec3d middle(x + 1, y + 1, 0);
+          makeHash(part, {16, cells, 0.5f, [](const Vec3d& at) { return at.z() < 0.3; }},
+                   [&](const Vec3d& at) { return smoothFeatures(at + middle); });
+          parts.push_back(std::move(part));
+        }
+      }
+      add(hashContentOf(std::move(parts), madeHashNetwork(node.level)), adapt);
+      node.geometricError = 2.0 / 64 * (1 << node.level);
+      if (node.parent < 0) coarsestBytes += bytesInMemory(contents.back());
+    }
+    HashPart around;
+    around.contracted = around.surround = true;
+    around.scale = {2, 2, 1};
+    makeHash(around, {16, 32, 0.5f, [](const Vec3d& at) { return at.norm() > 1.2; }}, smoothFeatures);
+    add(hashContentOf({around}, madeHashNetwork(0)), adapt);
+    coarsestBytes += bytesInMemory(contents.back());
+    tree.surround = static_cast<int>(tree.tiles.size());
+    tree.tiles.emplace_back().isSurround = true;
+  }
+  void add(HashContent content, const std::function<void(HashContent&)>& adapt) {
+    adapt(content);
+    allBytes += bytesInMemory(content);
+    contents.push_back(std::move(content));
+  }
+  TileSource<HashContent> source() const {
+    return {[this](int tile) { return bytesInMemory(contents[tile]); }, [this](int tile) { return contents[tile]; }};
+  }
+};
+
+// Weights that are the same everywhere: columns of features alone.
+void withoutLogitColumns(HashContent& content) {
+  for (HashPart& part : content.parts) {
+    std::vector<uint8_t> features;
+    for (size_t corner = 0; corner < part.cornerBytes.size() / 16; ++corner) {
+      const auto first = part.cornerBytes.begin() + static_cast<std::ptrdiff_t>(16 * corner);
+      features.insert(features.end(), first, first + 8);
+    }
+    part.cornerBytes = std::move(features);
+    part.columns = 8;
+    part.ranges.resize(8);
+  }
+}
+
+class GpuSceneRendererTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    context_ = openForTest();
+    SKIP_WITHOUT_VULKAN(context_);
+  }
+  void TearDown() override { EXPECT_EQ(GpuContext::validationMessages(), 0); }
+
+  // Both renderers along a flight.
+  template <class Content, class Place>
+  void compare(const Place& place, uint64_t budget, double mostPixels, const ImageF* opaqueDepth = nullptr) {
+    SceneRendererSettings settings;
+    settings.budgetBytes = budget;
+    settings.selection.mostPixels = mostPixels;
+    SceneRenderer<Content> oracle(place.frame, place.tree, place.source(), settings);
+    GpuRendererSettings ofCard;
+    ofCard.budgetBytes = budget;
+    ofCard.selection = settings.selection;
+    GpuSceneRenderer<Content> card(context_, {place.frame, place.tree, place.source(), {}}, ofCard);
+    for (int step = 0; step < 600; step += 75) {
+      SCOPED_TRACE(step);
+      const RenderedView wanted = oracle.render(flightCamera(), flightPose(step), opaqueDepth);
+      const RenderedView got = card.render(flightCamera(), flightPose(step), opaqueDepth);
+      EXPECT_GT(decibels(got.colour, wanted.colour), 55);
+      EXPECT_GT(decibels(got.opacity, wanted.opacity), 55);
+      EXPECT_GT(decibels(got.depth, wanted.depth), 45);
+      ASSERT_EQ(card.cut().tiles.size(), oracle.cut().tiles.size());
+      for (size_t i = 0; i < oracle.cut().tiles.size(); ++i) {
+        EXPECT_EQ(card.cut().tiles[i].content, oracle.cut().tiles[i].content);
+      }
+      EXPECT_LE(card.cache().statistics().mostBytes, budget);
+    }
+  }
+
+  std::shared_ptr<GpuContext> context_;
+};
+
+ImageF opaqueOnTheLeft() {
+  ImageF opaque(flightCamera().width, flightCamera().height, 1, INFINITY);
+  for (int y = 0; y < opaque.height; ++y) {
+    for (int x = 0; x < opaque.width / 2; ++x) *opaque.at(x, y) = 3;
+  }
+  return opaque;
+}
+
+TEST_F(GpuSceneRendererTest, DrawsVolumeAsTheProcessorDoes) {
+  compare<VolumeContent>(place(), place().allBytes, 1.5);
+}
+
+TEST_F(GpuSceneRendererTest, DrawsTheSameCutWithinABudget) {
+  compare<VolumeContent>(place(), place().finestBytes / 3, 0.5);
+}
+
+TEST_F(GpuSceneRendererTest, EndsRaysOfVolumeWhereSomethingOpaqueStands) {
+  const ImageF opaque = opaqueOnTheLeft();
+  compare<VolumeContent>(place(), place().allBytes, 16, &opaque);
+}
+
+TEST_F(GpuSceneRendererTest, DrawsHashAsTheProcessorDoes) {
+  const HashPlace made(32);
+  compare<HashContent>(made, made.allBytes, 1.5);
+}
+
+TEST_F(GpuSceneRendererTest, DrawsHashOfSeveralNetworksWithinABudget) {
+  const HashPlace made(32);
+  compare<HashContent>(made, made.coarsestBytes + (made.allBytes - made.coarsestBytes) / 2, 0.5);
+}
+
+TEST_F(GpuSceneRendererTest, PassesOverEmptySpaceInTwoGridsOfDistances) {
+  const HashPlace made(136);
+  ASSERT_GT(made.contents.front().parts.front().distances.ratio, 1u);
+  compare<HashContent>(made, made.allBytes, 16);
+}
+
+TEST_F(GpuSceneRendererTest, WeighsLevelsOfHashInEveryWay) {
+  const HashPlace shared(32, [](HashContent& content) { content.weights = LevelWeights::shared; });
+  compare<HashContent>(shared, shared.allBytes, 16);
+  const HashPlace none(32, [](HashContent& content) {
+    content.weights = LevelWeights::none;
+    withoutLogitColumns(content);
+  });
+  compare<HashContent>(none, none.allBytes, 16);
+  const HashPlace everywhere(32, [](HashContent& content) {
+    content.logits = {0.7f, -1.2f};
+    withoutLogitColumns(content);
+  });
+  compare<HashContent>(everywhere, everywhere.allBytes, 16);
+}
+
+TEST_F(GpuSceneRendererTest, ShowsWhereNothingIsWhatAWholeHashSaysOfTheDirection) {
+  const HashPlace whole(32, [](HashContent& content) { content.isWhole = true; });
+  compare<HashContent>(whole, whole.allBytes, 1.5);
+  const ImageF opaque = opaqueOnTheLeft();
+  compare<HashContent>(whole, whole.allBytes, 16, &opaque);
+}
+
+TEST_F(GpuSceneRendererTest, FollowsCamerasOfOtherSizes) {
+  GpuVolumeRenderer card(context_, {place().frame, place().tree, place().source(), {}}, {});
+  EXPECT_EQ(card.render(flightCamera(), flightPose(0), nullptr).colour.width, 64);
+  EXPECT_EQ(card.render(flightCamera().scaledTo(20, 11), flightPose(0), nullptr).opacity.pixels.size(), 220u);
+}
+
+}  // namespace
+}  // namespace tessera
