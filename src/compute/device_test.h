@@ -146,6 +146,8 @@ std::vector<float> pick(const std::vector<float>& values, const std::vector<uint
 Doubles toDoubles(const std::vector<float>& values);
 std::vector<float> toFloats(View values);
 double dot(View a, View b);
+// Apart from the order in which a device with atomics adds: every difference is at most 1e-5 of the largest.
+void expectTheSameSums(const std::vector<float>& got, const std::vector<float>& wanted);
 
 // The devices of this build, by name: "reference", "cpu with 1 thread", ... Null where this machine has none.
 std::vector<std::string> deviceNames();

@@ -175,6 +175,13 @@ std::vector<float> toFloats(View values) {
   return floats;
 }
 
+void expectTheSameSums(const std::vector<float>& got, const std::vector<float>& wanted) {
+  ASSERT_EQ(got.size(), wanted.size());
+  float largest = 0;
+  for (const float value : wanted) largest = std::max(largest, std::abs(value));
+  for (size_t i = 0; i < wanted.size(); ++i) EXPECT_NEAR(got[i], wanted[i], 1e-5 * largest) << i;
+}
+
 double dot(View a, View b) {
   CHECK(a.size() == b.size());
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);

@@ -210,7 +210,7 @@ TEST_P(VirtualGridLookup, PassesGradientsStraightThroughTheRounding) {
   const Looked looked = through.look(attributes);
   const Looked upstream = {stage.random.floats(200, -1, 1), stage.random.floats(1400, -1, 1)};
   const std::vector<float> gradients = through.gradients(looked, upstream);
-  EXPECT_EQ(gradients, without.gradients(looked, upstream));
+  expectTheSameSums(gradients, without.gradients(looked, upstream));
   EXPECT_GT(*std::max_element(gradients.begin(), gradients.end()), 0.1f);
 }
 
