@@ -11,6 +11,7 @@ packages=(
   libgeographiclib-dev
   libboost-dev zlib1g-dev
   libvulkan-dev libvulkan-volk-dev mesa-vulkan-drivers vulkan-validationlayers glslang-tools
+  libglfw3-dev libimgui-dev
   libgtest-dev
   ffmpeg
 )

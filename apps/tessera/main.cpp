@@ -5,11 +5,8 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
-#include <exception>
-#include <filesystem>
 
 #include "apps/tessera/verbs.h"
-#include "base/error.h"
 
 namespace tessera {
 namespace {
@@ -39,15 +36,6 @@ void catchInterrupts() {
   std::signal(SIGTERM, onInterrupt);
 }
 
-void addDeviceFlags(CLI::App& verb, DeviceOptions& options) {
-  verb.add_option("--device", options.kind,
-                  "what computes: auto (a graphics card, else cpu), cpu, vulkan, vulkan:<index or name> or reference")
-      ->capture_default_str();
-  verb.add_option("--threads", options.threads, "processor threads; 0: all cores")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
-}
-
 }  // namespace tessera
 
 int main(int argc, char** argv) {
@@ -58,7 +46,7 @@ int main(int argc, char** argv) {
       "tessera turns photographs of a large place into a neural scene.\n"
       "  photos -import-> capture -train-> model -bake-> scene\n"
       "  model or scene -eval, render-> numbers, pictures\n"
-      "  scene -serve-> browser");
+      "  scene -serve-> browser, model or scene -view-> window");
   app.name("tessera");
   app.require_subcommand(1);
   app.option_defaults()->always_capture_default();
@@ -70,34 +58,14 @@ int main(int argc, char** argv) {
   tessera::addEvalVerb(app);
   tessera::addRenderVerb(app);
   tessera::addServeVerb(app);
+  tessera::addViewVerb(app);
   tessera::addExportVerb(app);
   tessera::addInfoVerb(app);
   tessera::addBenchVerb(app);
-  try {
-    const auto isMeant = [&](const CLI::App* verb) { return verb->get_name() == argv[1]; };
-    if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(isMeant).empty()) {
-      std::fprintf(stderr, "tessera: there is no verb '%s'; tessera --help lists them\n", argv[1]);
-      return 2;
-    }
-    app.parse(argc, argv);
-    return 0;
-  } catch (const CLI::RuntimeError& ended) {
-    return ended.get_exit_code();  // as the verb wants it
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  } catch (const tessera::Error& error) {
-    std::fprintf(stderr, "tessera: error: %s\n", error.what());
-  } catch (const std::filesystem::filesystem_error& error) {
-    const tessera::Error said(error.path1().string(), "", error.code().message(),
-                              "see that the disk is there and has room, and that the folder may be changed");
-    std::fprintf(stderr, "tessera: error: %s\n", said.what());
-  } catch (const std::bad_alloc&) {
-    std::fprintf(stderr,
-                 "tessera: error: memory: this machine has not enough; lower --set photo_budget_mib, grid_log2_size or "
-                 "fine_log2_size; "
-                 "of field samples_per_pass; of volume texels_per_step, or keep few blocks with --resident-blocks\n");
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "tessera: error: internal: %s; please report it\n", error.what());
+  const auto isMeant = [&](const CLI::App* verb) { return verb->get_name() == argv[1]; };
+  if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(isMeant).empty()) {
+    std::fprintf(stderr, "tessera: there is no verb '%s'; tessera --help lists them\n", argv[1]);
+    return 2;
   }
-  return 1;
+  return tessera::runCommandLine(app, argc, argv);
 }

@@ -17,16 +17,6 @@ struct RenderFlags {
   double memoryMiB = 0;
 };
 
-void parseSize(const std::string& size, RenderViewsOptions& options) {
-  if (size.empty()) return;
-  int used = 0;
-  if (std::sscanf(size.c_str(), "%dx%d%n", &options.width, &options.height, &used) != 2 ||
-      used != static_cast<int>(size.size()) || options.width < 1 || options.height < 1 || options.width > 16384 ||
-      options.height > 16384) {
-    throw CLI::ValidationError("--size", "'" + size + "' is not of the form 1280x720");
-  }
-}
-
 }  // namespace
 
 void addRenderVerb(CLI::App& app) {
@@ -59,7 +49,7 @@ void addRenderVerb(CLI::App& app) {
   verb->callback([flags] {
     if (flags->views.empty() && flags->path.empty()) throw CLI::RequiredError("--views or --path");
     RenderViewsOptions options;
-    parseSize(flags->size, options);
+    if (!flags->size.empty()) parsePictureSize(flags->size, options.width, options.height);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
     const std::unique_ptr<Drawable> drawable =
         openDrawable(*device, flags->model, {flags->device.threads, flags->level, flags->memoryMiB});

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/tessera/command_line.h"
 #include "base/file.h"
-#include "compute/device.h"
 
 namespace tessera {
 
@@ -20,6 +20,7 @@ void addBakeVerb(CLI::App& app);
 void addEvalVerb(CLI::App& app);
 void addRenderVerb(CLI::App& app);
 void addServeVerb(CLI::App& app);
+void addViewVerb(CLI::App& app);
 void addExportVerb(CLI::App& app);
 void addInfoVerb(CLI::App& app);
 void addBenchVerb(CLI::App& app);
@@ -29,8 +30,5 @@ bool interrupted();
 // What a verb that was interrupted before its end ends with, as CLI::RuntimeError: 130 for SIGINT, 143 for SIGTERM.
 int interruptedStatus();
 void catchInterrupts();
-
-// Flags shared by verbs that compute.
-void addDeviceFlags(CLI::App& verb, DeviceOptions& options);
 
 }  // namespace tessera

@@ -6,6 +6,7 @@
 // operation × device × shape: an operation without a row there does not build.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -151,6 +152,10 @@ void requireAllOperations(const Device& device);
 // Throws Error when there is no such device on this machine. "auto" is the best graphics card that can be used, else
 // cpu; it is never a Vulkan driver that computes on the processor.
 std::unique_ptr<Device> makeDevice(const DeviceOptions& options);
+
+// Of a kind that means a Vulkan device on this machine (auto too): its index or a part of its name, as
+// GpuOptions::device has it. Nothing: another kind.
+std::optional<std::string> vulkanDeviceOf(const std::string& kind);
 
 // What `kind` may name on this machine.
 struct DeviceDescription {

@@ -35,16 +35,24 @@ std::optional<size_t> graphicsCard() {
 
 }  // namespace
 
+std::optional<std::string> vulkanDeviceOf([[maybe_unused]] const std::string& kind) {
+#ifdef TESSERA_HAS_VULKAN
+  if (kind == kVulkan) return "";
+  if (kind.starts_with(std::string(kVulkan) + ":")) return kind.substr(kVulkan.size() + 1);
+  if (kind == "auto") {
+    if (const std::optional<size_t> card = graphicsCard()) return std::to_string(*card);
+  }
+#endif
+  return std::nullopt;
+}
+
 std::unique_ptr<Device> makeDevice(const DeviceOptions& options) {
   const std::string& kind = options.kind;
   if (kind == "reference") return makeReferenceDevice();
 #ifdef TESSERA_HAS_VULKAN
-  const bool named = kind.starts_with(std::string(kVulkan) + ":");
-  const std::optional<size_t> card = kind == "auto" ? graphicsCard() : std::nullopt;
-  if (kind == kVulkan || named || card) {
+  if (const std::optional<std::string> device = vulkanDeviceOf(kind)) {
     GpuOptions gpu;
-    if (named) gpu.device = kind.substr(kVulkan.size() + 1);
-    if (card) gpu.device = std::to_string(*card);
+    gpu.device = *device;
     return makeVulkanDevice(gpu);
   }
 #endif

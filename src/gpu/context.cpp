@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <cstring>
 #include <vector>
 
 #include "base/check.h"
@@ -33,7 +34,23 @@ void openLoader() {
   }
 }
 
-VkInstance makeInstance(bool validation) {
+// What makes surfaces of windows, as far as it is there: which one is used is known when there is a window.
+std::vector<const char*> surfaceExtensions() {
+  uint32_t count = 0;
+  checkVulkan(vkEnumerateInstanceExtensionProperties(nullptr, &count, nullptr),
+              "vkEnumerateInstanceExtensionProperties");
+  std::vector<VkExtensionProperties> present(count);
+  checkVulkan(vkEnumerateInstanceExtensionProperties(nullptr, &count, present.data()),
+              "vkEnumerateInstanceExtensionProperties");
+  std::vector<const char*> names;
+  for (const char* name : {"VK_KHR_surface", "VK_KHR_xcb_surface", "VK_KHR_xlib_surface", "VK_KHR_wayland_surface"}) {
+    const auto isNamed = [&](const VkExtensionProperties& one) { return std::strcmp(one.extensionName, name) == 0; };
+    if (std::any_of(present.begin(), present.end(), isNamed)) names.push_back(name);
+  }
+  return names;
+}
+
+VkInstance makeInstance(bool validation, std::vector<const char*> extensions = {}) {
   auto application = vulkanStruct<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
   application.pApplicationName = "tessera";
   application.apiVersion = VK_API_VERSION_1_2;
@@ -42,9 +59,10 @@ VkInstance makeInstance(bool validation) {
   if (validation) {
     info.enabledLayerCount = 1;
     info.ppEnabledLayerNames = &kValidationLayer;
-    info.enabledExtensionCount = 1;
-    info.ppEnabledExtensionNames = &kValidationExtension;
+    extensions.push_back(kValidationExtension);
   }
+  info.enabledExtensionCount = static_cast<uint32_t>(extensions.size());
+  info.ppEnabledExtensionNames = extensions.data();
   VkInstance instance = VK_NULL_HANDLE;
   checkVulkan(vkCreateInstance(&info, nullptr, &instance), "vkCreateInstance");
   volkLoadInstance(instance);
@@ -55,11 +73,11 @@ VkInstance makeInstance(bool validation) {
 
 std::shared_ptr<GpuContext> GpuContext::open(const GpuOptions& options) {
   std::shared_ptr<GpuContext> context(new GpuContext);
-  context->createInstance(options.validation || environment("TESSERA_VULKAN_VALIDATION") == "1");
+  context->createInstance(options.validation || environment("TESSERA_VULKAN_VALIDATION") == "1", options.presents);
   context->choosePhysicalDevice(options.device.empty() ? environment("TESSERA_GPU") : options.device);
   context->chooseQueueFamily();
   context->chooseFeatures(options.allowed);
-  context->createDevice();
+  context->createDevice(options.presents);
   context->heap_ = std::make_unique<GpuHeap>(*context);
   VkPhysicalDeviceProperties properties = {};
   vkGetPhysicalDeviceProperties(context->physicalDevice_, &properties);
@@ -69,7 +87,7 @@ std::shared_ptr<GpuContext> GpuContext::open(const GpuOptions& options) {
 
 std::vector<GpuDescription> GpuContext::devices() {
   GpuContext context;
-  context.createInstance(false);
+  context.createInstance(false, false);
   std::vector<GpuDescription> all;
   for (const PhysicalDevice& device : physicalDevices(context.instance_)) {
     GpuDescription made;
@@ -102,12 +120,12 @@ GpuContext::~GpuContext() {
   if (instance_) vkDestroyInstance(instance_, nullptr);
 }
 
-void GpuContext::createInstance(bool validation) {
+void GpuContext::createInstance(bool validation, bool presents) {
   openLoader();
   validation = validation && validationInstalled();
   // Drivers leak when they are unloaded: one instance stays open as long as the process, so that they never are.
   [[maybe_unused]] static const VkInstance keepsDriversLoaded = makeInstance(false);
-  instance_ = makeInstance(validation);
+  instance_ = makeInstance(validation, presents ? surfaceExtensions() : std::vector<const char*>());
   if (validation) messenger_ = createValidationMessenger(instance_);
 }
 
@@ -154,7 +172,7 @@ void GpuContext::chooseFeatures(const GpuFeatures& allowed) {
   features_.subgroups = use(has.subgroups, allowed.subgroups, "subgroups");
 }
 
-void GpuContext::createDevice() {
+void GpuContext::createDevice(bool presents) {
   const float priority = 1;
   auto queue = vulkanStruct<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
   queue.queueFamilyIndex = queueFamily_;
@@ -175,16 +193,23 @@ void GpuContext::createDevice() {
   features.pNext = &vulkan11;
   vulkan11.pNext = &vulkan12;
 
-  const char* atomicsExtension = VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME;
   auto info = vulkanStruct<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO);
   info.pNext = &features;
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queue;
+  std::vector<const char*> extensions;
   if (features_.floatAtomics) {
     vulkan12.pNext = &atomics;
-    info.enabledExtensionCount = 1;
-    info.ppEnabledExtensionNames = &atomicsExtension;
+    extensions.push_back(VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME);
   }
+  if (presents) {
+    if (!hasDeviceExtension(physicalDevice_, VK_KHR_SWAPCHAIN_EXTENSION_NAME)) {
+      throw Error(name_, "", "it cannot show pictures in windows", "choose another device (tessera info devices)");
+    }
+    extensions.push_back(VK_KHR_SWAPCHAIN_EXTENSION_NAME);
+  }
+  info.enabledExtensionCount = static_cast<uint32_t>(extensions.size());
+  info.ppEnabledExtensionNames = extensions.data();
   checkVulkan(vkCreateDevice(physicalDevice_, &info, nullptr, &device_), "vkCreateDevice");
   vkGetDeviceQueue(device_, queueFamily_, 0, &queue_);
 }

@@ -32,6 +32,8 @@ struct GpuOptions {
   GpuFeatures allowed;
   // Validation layers, if installed. The environment's TESSERA_VULKAN_VALIDATION=1 turns them on too.
   bool validation = false;
+  // For pictures in windows (gpu/presenter.h).
+  bool presents = false;
 };
 
 // A device of this machine, used or not.
@@ -77,11 +79,11 @@ class GpuContext {
 
  private:
   GpuContext() = default;
-  void createInstance(bool validation);
+  void createInstance(bool validation, bool presents);
   void choosePhysicalDevice(const std::string& wanted);
   void chooseQueueFamily();
   void chooseFeatures(const GpuFeatures& allowed);
-  void createDevice();
+  void createDevice(bool presents);
 
   VkInstance instance_ = VK_NULL_HANDLE;
   VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;

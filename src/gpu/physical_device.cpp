@@ -34,7 +34,9 @@ int rank(VkPhysicalDeviceType type) {
   }
 }
 
-bool hasExtension(VkPhysicalDevice device, const char* name) {
+}  // namespace
+
+bool hasDeviceExtension(VkPhysicalDevice device, const char* name) {
   uint32_t count = 0;
   checkVulkan(vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr),
               "vkEnumerateDeviceExtensionProperties");
@@ -44,8 +46,6 @@ bool hasExtension(VkPhysicalDevice device, const char* name) {
   return std::any_of(extensions.begin(), extensions.end(),
                      [&](const VkExtensionProperties& e) { return std::strcmp(e.extensionName, name) == 0; });
 }
-
-}  // namespace
 
 std::vector<PhysicalDevice> physicalDevices(VkInstance instance) {
   uint32_t count = 0;
@@ -122,7 +122,7 @@ GpuFeatures presentFeatures(VkPhysicalDevice device) {
   auto features = vulkanStruct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
   features.pNext = &vulkan11;
   vulkan11.pNext = &vulkan12;
-  if (hasExtension(device, VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME)) vulkan12.pNext = &atomics;
+  if (hasDeviceExtension(device, VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME)) vulkan12.pNext = &atomics;
   vkGetPhysicalDeviceFeatures2(device, &features);
 
   auto subgroup =

@@ -28,6 +28,8 @@ std::string missingIn(const PhysicalDevice& device);
 // Throws Error where it lacks something.
 void requireFeatures(const PhysicalDevice& device);
 
+bool hasDeviceExtension(VkPhysicalDevice device, const char* name);
+
 // What the device has of the features that have a fallback. Vulkan 1.2 only.
 GpuFeatures presentFeatures(VkPhysicalDevice device);
 

@@ -159,8 +159,12 @@ void GpuStream::wait(Batch& batch) {
   batch.retired.clear();
 }
 
-void GpuStream::finish() {
+void GpuStream::send() {
   if (!listing().commands.empty() || !listing().retired.empty()) submit();
+}
+
+void GpuStream::finish() {
+  send();
   for (Batch& batch : batches_) wait(batch);
 }
 

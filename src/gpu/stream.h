@@ -1,5 +1,5 @@
 // Work for the device, in order: copies, fills and kernels are listed and sent in batches; each sees all that came
-// before it. Only `download` and `finish` wait. For one thread at a time.
+// before it. Only `download` and `finish` wait for all. For one thread at a time.
 //
 // A batch that is the same list as one before (a training step, mostly) is not recorded again: its commands are sent
 // once more with new arguments, which lie in memory.
@@ -38,6 +38,7 @@ class GpuStream {
   void fillZero(const GpuBuffer& buffer, size_t offset, size_t bytes);              // multiples of 4
   // Copies `arguments` and runs the kernel with their address. No groups, no work.
   void run(const GpuKernel& kernel, std::span<const std::byte> arguments, Groups groups);
+  void send();  // what has been listed begins now; waits for none of it, but for what was sent before the last time
   void finish();
   // Destroys the buffer once nothing queued so far can touch it.
   void retire(GpuBuffer buffer);

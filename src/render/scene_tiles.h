@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -38,11 +39,25 @@ class SceneTiles {
 
   // Throws what the source throws.
   void loadFor(const TileView& view) {
-    const auto holds = [this](int tile) { return cache_.holds(tile); };
-    choice_ = selector_.choose(view, {cache_.budgetBytes(), holds, [this](int tile) { return cache_.bytesOf(tile); }});
+    choose(view);
     cache_.load(choice_.wanted);
-    cut_ = selector_.cut(view, holds);
+    cut(view);
   }
+  // Loads only one that is ready, if any: `ready` is given what is missing, the most urgent first, and answers which
+  // comes now; -1: none. The cut is of what is there.
+  void loadReadyFor(const TileView& view, const std::function<int(const std::vector<int>& missing)>& ready) {
+    choose(view);
+    std::vector<int> missing, present;
+    for (const int tile : choice_.wanted) (cache_.holds(tile) ? present : missing).push_back(tile);
+    missing_ = missing.size();
+    if (const int tile = ready(missing); tile >= 0) {
+      present.push_back(tile);
+      cache_.load(present);
+      --missing_;
+    }
+    cut(view);
+  }
+  size_t missing() const { return missing_; }  // of the last view's wanted ones
 
   // Of the last view, in an order that is front to back for every ray of its camera. Counts as a use of each.
   std::vector<DrawnContent<Content>> frontToBack() {
@@ -70,12 +85,22 @@ class SceneTiles {
   const TileCache<Content>& cache() const { return cache_; }
 
  private:
+  void choose(const TileView& view) {
+    const auto holds = [this](int tile) { return cache_.holds(tile); };
+    choice_ = selector_.choose(view, {cache_.budgetBytes(), holds, [this](int tile) { return cache_.bytesOf(tile); }});
+    missing_ = 0;
+  }
+  void cut(const TileView& view) {
+    cut_ = selector_.cut(view, [this](int tile) { return cache_.holds(tile); });
+  }
+
   TileFrame frame_;
   TileTree tree_;
   TileCache<Content> cache_;
   TileSelector selector_;
   TileChoice choice_;
   TileCut cut_;
+  size_t missing_ = 0;
 };
 
 }  // namespace tessera

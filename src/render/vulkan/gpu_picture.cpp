@@ -1,5 +1,7 @@
 #include "render/vulkan/gpu_picture.h"
 
+#include <algorithm>
+
 #include "shaders/begin_view.h"
 
 namespace tessera {
@@ -77,6 +79,10 @@ void GpuPicture::begin(const TileFrame& frame, float minTransmittance, uint32_t 
   run(begin_, view_);
 }
 
+DrawnOnCard GpuPicture::onCard() const {
+  return {camera_.width, camera_.height, view_.colour, view_.opacity, view_.depth};
+}
+
 RenderedView GpuPicture::drawn() {
   const int width = camera_.width, height = camera_.height;
   RenderedView made{ImageF(width, height, 3), ImageF(width, height, 1), ImageF(width, height, 1)};
@@ -87,6 +93,22 @@ RenderedView GpuPicture::drawn() {
     offset += bytes.size();
   }
   return made;
+}
+
+std::optional<double> GpuPicture::depthAt(double right, double down) {
+  if (!drawn_) return std::nullopt;
+  const size_t pixels = static_cast<size_t>(camera_.width) * camera_.height;
+  const size_t x = static_cast<size_t>(std::clamp(right, 0.0, 1.0) * (camera_.width - 1) + 0.5);
+  const size_t y = static_cast<size_t>(std::clamp(down, 0.0, 1.0) * (camera_.height - 1) + 0.5);
+  const size_t pixel = y * static_cast<size_t>(camera_.width) + x;
+  const auto numberAt = [&](size_t index) {
+    float number = 0;
+    stream_->download(drawn_, index * sizeof(float), std::as_writable_bytes(std::span(&number, 1)));
+    return number;
+  };
+  const float opacity = numberAt(3 * pixels + pixel), depth = numberAt(4 * pixels + pixel);
+  if (opacity < 0.5f) return std::nullopt;
+  return depth / opacity;
 }
 
 }  // namespace tessera

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "gpu/stream.h"
 #include "render/cpu/draw_scene.h"
@@ -9,6 +10,12 @@
 #include "shaders/render/arguments_draw.h"
 
 namespace tessera {
+
+// A picture on the card, as RenderedView has it: addresses of [pixels][3], [pixels], [pixels] floats.
+struct DrawnOnCard {
+  int width = 0, height = 0;
+  uint64_t colour = 0, opacity = 0, depth = 0;
+};
 
 class GpuPicture {
  public:
@@ -23,7 +30,9 @@ class GpuPicture {
   void run(const GpuKernel& kernel, const Arguments& arguments) {
     stream_->run(kernel, std::as_bytes(std::span(&arguments, 1)), groups_);
   }
-  RenderedView drawn();  // waits
+  DrawnOnCard onCard() const;  // valid until the next one begins, for what the card does after it
+  RenderedView drawn();        // waits
+  std::optional<double> depthAt(double right, double down);  // GpuViewRenderer
 
  private:
   void makeRoom(const Camera& camera, uint32_t numbersOfPixel);

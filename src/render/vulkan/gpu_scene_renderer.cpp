@@ -16,16 +16,6 @@ namespace {
 // Numbers of a pixel (begin_view.comp).
 constexpr uint32_t kNumbersOfVolume = 5, kNumbersOfHash = 9;
 
-template <class Held, class Content>
-TileSource<Held> onCard(const std::shared_ptr<GpuStream>& stream, const TileSource<Content>& source) {
-  TileSource<Held> made;
-  made.bytes = source.bytes;
-  made.load = [stream, load = source.load](int tile) { return Held(stream, load(tile)); };
-  made.folder = source.folder;
-  made.file = source.file;
-  return made;
-}
-
 template <class Arguments, class Held>
 Arguments drawArguments(const arguments::ViewArguments& view, const DrawnContent<Held>& where, bool isSurround) {
   Arguments made = {};
@@ -43,11 +33,24 @@ Arguments drawArguments(const arguments::ViewArguments& view, const DrawnContent
 }  // namespace
 
 template <class Content>
+TileSource<typename OnCard<Content>::Type> GpuSceneRenderer<Content>::heldFrom(const TileSource<Content>& source) {
+  TileSource<Held> made;
+  made.bytes = source.bytes;
+  made.load = [this, load = source.load](int tile) {
+    const bool isRead = prefetch_ && prefetch_->isReady(tile);
+    return Held(stream_, isRead ? prefetch_->take(tile) : load(tile));
+  };
+  made.folder = source.folder;
+  made.file = source.file;
+  return made;
+}
+
+template <class Content>
 GpuSceneRenderer<Content>::GpuSceneRenderer(const std::shared_ptr<const GpuContext>& context, TileScene<Content> scene,
                                             const GpuRendererSettings& settings)
     : stream_(std::make_shared<GpuStream>(context)),
-      tiles_(scene.frame, std::move(scene.tree), onCard<Held>(stream_, scene.source), settings.selection,
-             settings.budgetBytes),
+      prefetch_(settings.inBackground ? std::make_unique<TilePrefetch<Content>>(scene.source.load) : nullptr),
+      tiles_(scene.frame, std::move(scene.tree), heldFrom(scene.source), settings.selection, settings.budgetBytes),
       settings_(settings),
       background_(scene.background[0], scene.background[1], scene.background[2]),
       picture_(stream_) {}
@@ -61,9 +64,18 @@ const GpuKernel& GpuSceneRenderer<Content>::kernel(std::span<const uint32_t> spi
 }
 
 template <class Content>
-RenderedView GpuSceneRenderer<Content>::render(const Camera& camera, const Pose& worldFromCamera,
-                                               const ImageF* opaqueDepth) {
-  tiles_.loadFor(tileView(camera, worldFromCamera, tiles_.frame()));
+void GpuSceneRenderer<Content>::queue(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
+  const TileView view = tileView(camera, worldFromCamera, tiles_.frame());
+  if (prefetch_) {
+    tiles_.loadReadyFor(view, [this](const std::vector<int>& missing) {
+      prefetch_->want(missing);
+      const auto ready = [this](int tile) { return prefetch_->isReady(tile); };
+      const auto found = std::find_if(missing.begin(), missing.end(), ready);
+      return found == missing.end() ? -1 : *found;
+    });
+  } else {
+    tiles_.loadFor(view);
+  }
   Contents contents{tiles_.frontToBack(), 0};
   contents.inBox = contents.frontToBack.size();
   if (const Held* surround = tiles_.surround()) contents.frontToBack.emplace_back(surround);
@@ -72,7 +84,29 @@ RenderedView GpuSceneRenderer<Content>::render(const Camera& camera, const Pose&
     draw(*contents.frontToBack[i].content, contents.frontToBack[i], i >= contents.inBox);
   }
   end();
+}
+
+template <class Content>
+RenderedView GpuSceneRenderer<Content>::render(const Camera& camera, const Pose& worldFromCamera,
+                                               const ImageF* opaqueDepth) {
+  queue(camera, worldFromCamera, opaqueDepth);
   return picture_.drawn();
+}
+
+template <class Content>
+DrawnOnCard GpuSceneRenderer<Content>::draw(const Camera& camera, const Pose& worldFromCamera) {
+  queue(camera, worldFromCamera, nullptr);
+  stream_->send();
+  return picture_.onCard();
+}
+
+template <class Content>
+SceneState GpuSceneRenderer<Content>::state() const {
+  const auto isDrawn = [](const SelectedTile& tile) { return tile.visible; };
+  const std::vector<SelectedTile>& tiles = cut().tiles;
+  const size_t inBox = static_cast<size_t>(std::count_if(tiles.begin(), tiles.end(), isDrawn));
+  return {inBox + (cut().surround >= 0 ? 1 : 0), tiles_.missing(), static_cast<size_t>(choice().refused),
+          cache().statistics(), cache().budgetBytes()};
 }
 
 template <>

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "render/scene_tiles.h"
+#include "render/tile_prefetch.h"
 #include "render/tile_scene.h"
 #include "render/vulkan/gpu_content.h"
 #include "render/vulkan/gpu_picture.h"
@@ -15,6 +16,30 @@ struct GpuRendererSettings {
   float minTransmittance = 1.0f / 255;  // rays end where less than this would be seen
   SelectionSettings selection;
   uint64_t budgetBytes = uint64_t{1} << 30;  // of the card's memory, for contents
+  // Contents are read by threads of their own, and a picture is of what is there; else each picture waits for all that
+  // it asks for.
+  bool inBackground = false;
+};
+
+// What of a scene is drawn, and what is held for it.
+struct SceneState {
+  size_t drawn = 0;    // contents in the last picture
+  size_t missing = 0;  // contents that it asked for and did not have
+  size_t refused = 0;  // that the budget has no room for
+  TileCacheStatistics cache;
+  uint64_t budgetBytes = 0;
+};
+
+// A scene of any representation on a graphics card.
+class GpuViewRenderer : public ViewRenderer {
+ public:
+  // As render(), but the picture stays on the card, and nothing waits for it: it is there for what is sent to the
+  // context's queue afterwards, until the next one begins.
+  virtual DrawnOnCard draw(const Camera& camera, const Pose& worldFromCamera) = 0;
+  // z-depth in world units at a place of the last picture, 0 to 1 to the right and down; nothing where less than half
+  // of what is behind is hidden. Waits.
+  virtual std::optional<double> depthAt(double right, double down) = 0;
+  virtual SceneState state() const = 0;
 };
 
 // What a content becomes on the card.
@@ -31,7 +56,7 @@ struct OnCard<HashContent> {
 
 // Content: VolumeContent or HashContent.
 template <class Content>
-class GpuSceneRenderer final : public ViewRenderer {
+class GpuSceneRenderer final : public GpuViewRenderer {
  public:
   using Held = typename OnCard<Content>::Type;
 
@@ -41,8 +66,11 @@ class GpuSceneRenderer final : public ViewRenderer {
                    const GpuRendererSettings& settings);
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
+  DrawnOnCard draw(const Camera& camera, const Pose& worldFromCamera) override;
   std::string device() const override { return "vulkan " + stream_->context()->name(); }
   Eigen::Array3f background() const override { return background_; }
+  std::optional<double> depthAt(double right, double down) override { return picture_.depthAt(right, down); }
+  SceneState state() const override;
 
   const TileCut& cut() const { return tiles_.cut(); }  // of the last picture
   const TileChoice& choice() const { return tiles_.choice(); }
@@ -54,12 +82,15 @@ class GpuSceneRenderer final : public ViewRenderer {
     std::vector<DrawnContent<Held>> frontToBack;
     size_t inBox = 0;
   };
+  void queue(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth);
+  TileSource<Held> heldFrom(const TileSource<Content>& source);
   void begin(const Contents& contents, const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth);
   void draw(const Held& content, const DrawnContent<Held>& where, bool isSurround);
   void end();
   const GpuKernel& kernel(std::span<const uint32_t> spirv, uint32_t constant);
 
   std::shared_ptr<GpuStream> stream_;
+  std::unique_ptr<TilePrefetch<Content>> prefetch_;  // null: everything is waited for
   SceneTiles<Held> tiles_;
   GpuRendererSettings settings_;
   Eigen::Array3f background_;

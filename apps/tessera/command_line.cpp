@@ -1,0 +1,56 @@
+#include "apps/tessera/command_line.h"
+
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+
+#include "base/error.h"
+
+namespace tessera {
+
+void addDeviceFlags(CLI::App& verb, DeviceOptions& options) {
+  verb.add_option("--device", options.kind,
+                  "what computes: auto (a graphics card, else cpu), cpu, vulkan, vulkan:<index or name> or reference")
+      ->capture_default_str();
+  verb.add_option("--threads", options.threads, "processor threads; 0: all cores")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+}
+
+void parsePictureSize(const std::string& size, int& width, int& height) {
+  int used = 0, wide = 0, high = 0;
+  if (std::sscanf(size.c_str(), "%dx%d%n", &wide, &high, &used) != 2 || used != static_cast<int>(size.size()) ||
+      wide < 1 || high < 1 || wide > 16384 || high > 16384) {
+    throw CLI::ValidationError("--size", "'" + size + "' is not of the form 1280x720");
+  }
+  width = wide;
+  height = high;
+}
+
+int runCommandLine(CLI::App& app, int argc, char** argv, const std::function<void()>& run) {
+  try {
+    app.parse(argc, argv);
+    run();
+    return 0;
+  } catch (const CLI::RuntimeError& ended) {
+    return ended.get_exit_code();  // as the verb wants it
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const Error& error) {
+    std::fprintf(stderr, "tessera: error: %s\n", error.what());
+  } catch (const std::filesystem::filesystem_error& error) {
+    const Error said(error.path1().string(), "", error.code().message(),
+                     "see that the disk is there and has room, and that the folder may be changed");
+    std::fprintf(stderr, "tessera: error: %s\n", said.what());
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr,
+                 "tessera: error: memory: this machine has not enough; lower --set photo_budget_mib, grid_log2_size or "
+                 "fine_log2_size; "
+                 "of field samples_per_pass; of volume texels_per_step, or keep few blocks with --resident-blocks\n");
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "tessera: error: internal: %s; please report it\n", error.what());
+  }
+  return 1;
+}
+
+}  // namespace tessera

@@ -1,0 +1,43 @@
+#include "apps/viewer/card_pictures.h"
+
+#include <fmt/format.h>
+
+namespace tessera {
+
+ShownPicture CardPictures::update(const Camera& window, const Pose& worldFromCamera, bool moving) {
+  const Camera camera = inPixels(window, moving ? pace_.share() : 1);
+  const bool isSame = camera == camera_ && worldFromCamera.rotation == pose_.rotation &&
+                      worldFromCamera.translation == pose_.translation;
+  shown_.isNew = !isSame || !shown_.isWhole;
+  if (!shown_.isNew) {
+    begun_.reset();
+    return shown_;
+  }
+  // From one picture to the next: whatever the device, the screen and we take for it.
+  const Clock::time_point now = Clock::now();
+  if (begun_ && moving) pace_.took(std::chrono::duration<double, std::milli>(now - *begun_).count());
+  begun_ = moving ? std::optional(now) : std::nullopt;
+  shown_.onCard = renderer_->draw(camera, worldFromCamera);
+  shown_.isWhole = !moving && renderer_->state().missing == 0;
+  camera_ = camera;
+  pose_ = worldFromCamera;
+  return shown_;
+}
+
+PictureSource::Facts CardPictures::facts() const {
+  const SceneState state = renderer_->state();
+  constexpr double kMiB = 1048576;
+  Facts facts = {
+      {"Drawn by", renderer_->device()},
+      {"Picture", fmt::format("{} x {}", camera_.width, camera_.height)},
+      {"Contents drawn", fmt::format("{}", state.drawn)},
+      {"In memory", fmt::format("{:.1f} of {:.0f} MiB", static_cast<double>(state.cache.bytes) / kMiB,
+                                static_cast<double>(state.budgetBytes) / kMiB)},
+      {"Loaded, dropped", fmt::format("{}, {}", state.cache.loads, state.cache.evictions)},
+  };
+  if (state.missing > 0) facts.emplace_back("Still to come", fmt::format("{}", state.missing));
+  if (state.refused > 0) facts.emplace_back("No memory for", fmt::format("{}", state.refused));
+  return facts;
+}
+
+}  // namespace tessera

@@ -1,0 +1,133 @@
+#include "apps/viewer/opened.h"
+
+#include <chrono>
+#include <thread>
+
+#include "apps/viewer/card_pictures.h"
+#include "apps/viewer/opened_drawable.h"
+#include "apps/viewer/worker_pictures.h"
+#include "base/error.h"
+#include "base/log.h"
+#include "import/capture_reader.h"
+#include "render/tile_scene.h"
+#include "render/vulkan/gpu_scene_renderer.h"
+#include "tiles/scene_folder.h"
+#include "train/model_folder.h"
+
+namespace tessera {
+namespace {
+
+bool isScene(const fs::path& folder) {
+  return fs::exists(folder / "tileset.json");
+}
+
+bool isModel(const fs::path& folder) {
+  return fs::exists(folder / "blocks.json");
+}
+
+// The box in the world around one that stands in axes of its own.
+template <class ToWorld>
+void include(const Vec3d& low, const Vec3d& high, ToWorld toWorld, Place& place) {
+  place.low = Vec3d::Constant(INFINITY);
+  place.high = Vec3d::Constant(-INFINITY);
+  for (int corner = 0; corner < 8; ++corner) {
+    Vec3d at;
+    for (int axis = 0; axis < 3; ++axis) at[axis] = (corner >> axis & 1) != 0 ? high[axis] : low[axis];
+    const Vec3d inWorld = toWorld(at);
+    place.low = place.low.cwiseMin(inWorld);
+    place.high = place.high.cwiseMax(inWorld);
+  }
+}
+
+template <class Content>
+std::unique_ptr<PictureSource> onCard(const ViewOptions& options, const std::shared_ptr<const GpuContext>& window) {
+  GpuRendererSettings settings;
+  settings.selection.mostPixels = options.mostPixels;
+  settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB * 1048576);
+  settings.inBackground = true;
+  return std::make_unique<CardPictures>(
+      std::make_unique<GpuSceneRenderer<Content>>(window, openTileScene<Content>(options.folder), settings));
+}
+
+}  // namespace
+
+void requireViewable(const fs::path& folder) {
+  if (isScene(folder) || isModel(folder)) return;
+  const std::string name = folder.string();
+  if (!fs::exists(folder)) {
+    throw Error(name, "", "there is no such folder", "name the folder of a scene or of a model");
+  }
+  if (fs::exists(folder / "world.json") || folder.filename() == "world.json") {
+    throw Error(name, "", "is a world, which only browsers show so far", "tessera serve " + name);
+  }
+  throw Error(name, "", "holds neither a scene (tileset.json) nor a model (blocks.json)",
+              "name the folder of a scene or of a model");
+}
+
+Place placeOf(const ViewOptions& options) {
+  Place place;
+  fs::path views = options.views;
+  Mat4d sourceFromWorld;
+  if (isScene(options.folder)) {
+    const Tileset tileset = readTileset(options.folder);
+    const TileFrame frame = frameOf(tileset);
+    include(
+        frame.low, frame.high,
+        [&](const Vec3d& x) { return Vec3d(frame.translation + frame.scale * (frame.rotation * x)); }, place);
+    sourceFromWorld = tileset.sourceFromWorld;
+  } else {
+    const ModelPlacement placement = ModelFolder(options.folder).readPlacement();
+    if (placement.grid) {
+      const BlockGrid& grid = *placement.grid;
+      include(
+          {0, 0, grid.bottom}, {grid.columns * grid.edge, grid.rows * grid.edge, grid.top},
+          [&](const Vec3d& x) { return grid.inWorld(x); }, place);
+    } else {
+      include(
+          -Vec3d::Ones(), Vec3d::Ones(), [&](const Vec3d& x) { return placement.frame.worldFromScene(x); }, place);
+    }
+    sourceFromWorld = placement.sourceFromWorld;
+    if (views.empty() && fs::exists(placement.capture / "transforms.json")) views = placement.capture;
+  }
+  if (views.empty()) return place;
+  const Capture capture = readCapture(views);
+  if ((capture.sourceFromWorld - sourceFromWorld).norm() > 1e-9 * sourceFromWorld.norm()) {
+    const std::string other = "its world is not the one of " + options.folder.string();
+    if (!options.views.empty()) {
+      throw Error(views.string(), "transforms.json", other, "use the capture that it was trained on");
+    }
+    warn("{}: {}: there are no views of photos", views.string(), other);
+    return place;
+  }
+  place.views = viewsOfCapture(capture, std::nullopt);
+  return place;
+}
+
+GpuOptions windowDevice(const ViewOptions& options) {
+  GpuOptions gpu;
+  gpu.presents = true;
+  if (isScene(options.folder)) gpu.device = vulkanDeviceOf(options.device.kind).value_or("");
+  return gpu;
+}
+
+std::unique_ptr<PictureSource> openPictures(const ViewOptions& options,
+                                            const std::shared_ptr<const GpuContext>& window) {
+  if (isScene(options.folder) && vulkanDeviceOf(options.device.kind)) {
+    const bool isHash = readTileset(options.folder).representation == Representation::hash;
+    return isHash ? onCard<HashContent>(options, window) : onCard<VolumeContent>(options, window);
+  }
+  const ModelFolder model(options.folder);
+  for (bool told = false; !isScene(options.folder) && !model.manifest();) {
+    if (!std::exchange(told, true)) {
+      inform("{}: waits for the training's first checkpoint (train --checkpoint-seconds)", options.folder.string());
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  }
+  DrawableOptions drawable;
+  drawable.threads = options.device.threads;
+  drawable.memoryMiB = options.memoryMiB;
+  return std::make_unique<WorkerPictures>(window,
+                                          std::make_unique<OpenedDrawable>(options.folder, options.device, drawable));
+}
+
+}  // namespace tessera

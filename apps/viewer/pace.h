@@ -1,0 +1,69 @@
+// How many pixels to draw while the camera moves: as many as come in time. The browser's viewer does alike
+// (web/src/app/moving/resolution.ts).
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace tessera {
+
+class Pace {
+ public:
+  // `target`: milliseconds that a picture may take.
+  explicit Pace(double target = 40) : target_(target) {}
+
+  double share() const { return kShares[step_]; }  // of the pixels along an edge
+
+  // What the last picture took, at that share.
+  void took(double milliseconds) {
+    if (unmeasured_ > 0) {
+      --unmeasured_;
+      return;
+    }
+    measured_ = measured_ == 0 ? milliseconds : 0.6 * measured_ + 0.4 * milliseconds;
+    if (measured_ > target_) {
+      inTime_ = 0;
+      if (step_ == 0) return;
+      change(step_ - 1);
+      if (tried_) wait_ = std::min(2 * wait_, kLongestWait * kPatience);
+      tried_ = false;
+      return;
+    }
+    if (++inTime_ > wait_) tried_ = false;  // it has stood the trial
+    if (step_ + 1 == kShares.size()) return;
+    const double more = kShares[step_ + 1] / kShares[step_];
+    if (measured_ * more * more < 0.7 * target_) {
+      change(step_ + 1);
+    } else if (inTime_ > wait_) {
+      // Nobody knows what more pixels take where no picture comes sooner than the screen shows it.
+      change(step_ + 1);
+      tried_ = true;
+      measured_ = 0;
+      unmeasured_ = kUnmeasured;
+    }
+  }
+
+ private:
+  static constexpr std::array<double, 5> kShares = {0.25, 0.375, 0.5, 0.75, 1};
+  static constexpr int kPatience = 120;    // pictures in time, after which more pixels are tried
+  static constexpr int kLongestWait = 16;  // times that: longer each time that they took too long
+  static constexpr int kUnmeasured = 3;    // pictures after more pixels are tried
+
+  void change(size_t step) {
+    const double ratio = kShares[step] / kShares[step_];
+    measured_ *= ratio * ratio;
+    step_ = step;
+    inTime_ = 0;
+  }
+
+  double target_;
+  size_t step_ = kShares.size() - 1;
+  double measured_ = 0;  // milliseconds of a picture, at this step
+  int inTime_ = 0;       // pictures, since the last step
+  int wait_ = kPatience;
+  int unmeasured_ = 0;
+  bool tried_ = false;  // this step was
+};
+
+}  // namespace tessera

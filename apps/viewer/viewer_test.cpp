@@ -1,0 +1,108 @@
+#include "apps/viewer/viewer.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "apps/viewer/test_screen.h"
+#include "base/error.h"
+#include "base/image_io.h"
+#include "base/temporary_folder.h"
+#include "eval/psnr.h"
+#include "gpu/test_context.h"
+
+namespace tessera {
+namespace {
+
+constexpr int kWidth = 320, kHeight = 240;
+
+class ViewerTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    SKIP_WITHOUT_VULKAN(openForTest());
+    if (!screen_.isThere()) {
+      if (vulkanIsRequired()) FAIL() << "no virtual screen: install xvfb";
+      GTEST_SKIP() << "no virtual screen is installed (xvfb has one)";
+    }
+  }
+
+  // What the window shows of a golden scene once it is whole.
+  ImageU8 shown(const std::string& representation, const std::string& device, bool panels = false) {
+    ViewOptions view;
+    view.folder = fs::path(TESSERA_GOLDEN_SCENES) / representation;
+    view.device = {device, 2};
+    view.mostPixels = 0;
+    WindowOptions window;
+    window.width = kWidth;
+    window.height = kHeight;
+    window.panels = panels;
+    window.screenshot = folder_ / "shown.png";
+    runViewer(view, window);
+    return readImage(window.screenshot).image;
+  }
+
+  // The same by the renderer on the processor, with nothing of a window.
+  static ImageF wanted(const std::string& representation) {
+    const fs::path folder = fs::path(TESSERA_GOLDEN_SCENES) / representation;
+    const std::unique_ptr<Device> cpu = makeDevice({"cpu", 2});
+    const std::unique_ptr<Drawable> drawable = openDrawable(*cpu, folder, {2});
+    ViewOptions view;
+    view.folder = folder;
+    const Place place = placeOf(view);
+    const double focal = 0.5 * kHeight / std::tan(25 * std::numbers::pi / 180);
+    const Camera camera = {kWidth, kHeight, LensModel::pinhole, {focal, focal, 0.5 * kWidth, 0.5 * kHeight}};
+    const Pose pose = Navigation(place.low, place.high).worldFromCamera();
+    // As bytes: the golden scenes' colours are brighter than any screen's.
+    return toFloat(
+        toBytes(compositeOver(drawable->renderer().render(camera, pose), drawable->renderer().background())));
+  }
+
+  TemporaryFolder folder_;
+
+ private:
+  TestScreen screen_;
+};
+
+TEST_F(ViewerTest, ShowsScenesThatItsDeviceDrawsAsTheProcessorDoes) {
+  for (const char* representation : {"volume", "hash"}) {
+    const ImageF oracle = wanted(representation);
+    EXPECT_GT(psnr(toFloat(shown(representation, "vulkan")), oracle), 45) << representation;
+  }
+  EXPECT_EQ(GpuContext::validationMessages(), 0);
+}
+
+TEST_F(ViewerTest, ShowsWhatAnotherDeviceDraws) {
+  EXPECT_GT(psnr(toFloat(shown("volume", "cpu")), wanted("volume")), 50);
+  EXPECT_EQ(GpuContext::validationMessages(), 0);
+}
+
+TEST_F(ViewerTest, LaysThePanelOverThePicture) {
+  const ImageU8 without = shown("volume", "vulkan"), with = shown("volume", "vulkan", true);
+  size_t left = 0, right = 0;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const size_t p = 3 * (static_cast<size_t>(y) * kWidth + static_cast<size_t>(x));
+      const bool differs = std::abs(with.pixels[p] - without.pixels[p]) > 8;
+      (x < 5 || y < 5 ? left : right) += differs;
+    }
+  }
+  EXPECT_EQ(left, 0u);  // beside the panel
+  EXPECT_GT(right, 5000u);
+  EXPECT_EQ(GpuContext::validationMessages(), 0);
+}
+
+TEST_F(ViewerTest, NamesWhatItCannotShow) {
+  ViewOptions view;
+  view.folder = folder_ / "nothing";
+  try {
+    runViewer(view, {});
+    FAIL() << "shown";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("there is no such folder"), std::string::npos) << error.what();
+  }
+  fs::create_directories(view.folder);
+  EXPECT_THROW(runViewer(view, {}), Error);
+}
+
+}  // namespace
+}  // namespace tessera

@@ -1,0 +1,6 @@
+// One triangle over all of the window.
+#version 460
+
+void main() {
+  gl_Position = vec4(gl_VertexIndex == 1 ? 3 : -1, gl_VertexIndex == 2 ? 3 : -1, 0, 1);
+}

@@ -1,0 +1,34 @@
+// A vertex and a fragment shader that draw triangles into a window's picture, blended over what is there (premultiplied
+// colours). Like kernels they take one thing: the address of their arguments.
+#pragma once
+
+#include <volk.h>
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "gpu/context.h"
+
+namespace tessera {
+
+class GpuScreenPipeline {
+ public:
+  GpuScreenPipeline(std::shared_ptr<const GpuContext> context, VkRenderPass renderPass,
+                    std::span<const uint32_t> vertexSpirv, std::span<const uint32_t> fragmentSpirv);
+  ~GpuScreenPipeline();
+  GpuScreenPipeline(const GpuScreenPipeline&) = delete;
+  GpuScreenPipeline& operator=(const GpuScreenPipeline&) = delete;
+
+  VkPipeline pipeline() const { return pipeline_; }
+  VkPipelineLayout layout() const { return layout_; }
+
+  static constexpr VkShaderStageFlags kStages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT;
+
+ private:
+  std::shared_ptr<const GpuContext> context_;
+  VkPipelineLayout layout_ = VK_NULL_HANDLE;
+  VkPipeline pipeline_ = VK_NULL_HANDLE;
+};
+
+}  // namespace tessera
