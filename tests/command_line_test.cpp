@@ -230,7 +230,8 @@ TEST_F(CommandLine, SaysWhatAFolderIsThatCannotBeServedAndWhatToDo) {
   says(city(), "is a capture, not a scene; train and bake it first: tessera train " + city() +
                    " MODEL --method volume, then tessera bake MODEL SCENE");
   says(model(),
-       "is a model of --method field, of which no scene can be baked; train one with --method volume, and bake that");
+       "is a model of --method field, of which no scene can be baked; train one with --method volume or hash, and bake "
+       "that; tessera view shows this one");
   const std::string volume = at("volume.model");
   writeFileAtomically(volume + "/blocks.json", std::string_view("{}"));
   says(volume,
@@ -549,6 +550,24 @@ TEST_F(CommandLine, ImportsPhotographsFromTheWild) {
     EXPECT_GT(json::parse(said.out).at("test"), 0);
   }
 }
+
+#ifdef TESSERA_HAS_WINDOW
+TEST_F(CommandLine, ViewIsAnsweredByAProgramOfItsOwn) {
+  const Said help = run({"view", "--help"});
+  EXPECT_EQ(help.exitCode, 0) << help.err;
+  for (const char* flag : {"tessera view [OPTIONS] what", "--views", "--detail", "--device", "--screenshot"}) {
+    EXPECT_TRUE(contains(help.out, flag)) << flag << "\n" << help.out;
+  }
+  const Said missing = run({"view", at("missing")});
+  EXPECT_EQ(missing.exitCode, 1);
+  EXPECT_EQ(missing.err, "tessera: error: " + at("missing") +
+                             ": there is no such folder; name the folder of a scene or of a model\n");
+  EXPECT_EQ(run({"view"}).exitCode, 2);
+  EXPECT_EQ(run({"view", city(), "--size", "wide"}).exitCode, 2);
+  const Said capture = run({"view", city()});
+  EXPECT_TRUE(contains(capture.err, "holds neither a scene (tileset.json) nor a model (blocks.json)")) << capture.err;
+}
+#endif
 
 }  // namespace
 }  // namespace tessera

@@ -109,7 +109,7 @@ class DrawableScene final : public Drawable {
                   coarsest == 0 ? "the scene has level 0 only" : fmt::format("the scene has levels 0 to {}", coarsest),
                   coarsest == 0 ? "leave it out" : "name one of those");
     }
-    settings.selection.mostPixels = 0;  // the finest everywhere
+    settings.selection.mostPixels = options.mostPixels;
     settings.selection.finestLevel = options.level;
     settings.threads = options.threads;
     settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB > 0 ? options.memoryMiB * 1048576

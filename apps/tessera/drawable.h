@@ -21,9 +21,10 @@ class Drawable {
 };
 
 struct DrawableOptions {
-  int threads = 0;       // of scenes; models have their device's
-  int level = 0;         // of detail of scenes: the finest to draw
-  double memoryMiB = 0;  // for the contents of scenes; 0: half of the machine's
+  int threads = 0;        // of scenes; models have their device's
+  int level = 0;          // of detail of scenes: the finest to draw
+  double memoryMiB = 0;   // for the contents of scenes; 0: half of the machine's
+  double mostPixels = 0;  // of scenes: SelectionSettings; the finest everywhere
 };
 
 // Throws Error when the folder holds neither, the scene has no such level, or its coarsest does not fit. Warns when a

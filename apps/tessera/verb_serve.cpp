@@ -42,9 +42,9 @@ void requireScene(const fs::path& path) {
         throw Error(name, "", "is a model that is not trained yet, not a scene",
                     "train it, then bake it: tessera bake " + name + " SCENE");
       }
-      if (manifest->method != "volume") {
+      if (manifest->method != "volume" && manifest->method != "hash") {
         throw Error(name, "", "is a model of --method " + manifest->method + ", of which no scene can be baked",
-                    "train one with --method volume, and bake that");
+                    "train one with --method volume or hash, and bake that; tessera view shows this one");
       }
       throw Error(name, "", "is a model, not a scene", "bake it first: tessera bake " + name + " SCENE");
     }

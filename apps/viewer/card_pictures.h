@@ -24,7 +24,7 @@ class CardPictures final : public PictureSource {
   using Clock = std::chrono::steady_clock;
 
   std::unique_ptr<GpuViewRenderer> renderer_;
-  Pace pace_;
+  Pace pace_{40};
   ShownPicture shown_;
   Camera camera_;  // of the last picture
   Pose pose_;

@@ -34,7 +34,7 @@ double held(int key, int other) {
 }  // namespace
 
 Interface::Interface(Window& window, const std::shared_ptr<const GpuContext>& context, VkRenderPass renderPass)
-    : pipeline_(context, renderPass, kInterfaceTrianglesSpirv, kInterfaceSpirv) {
+    : window_(window), pipeline_(context, renderPass, kInterfaceTrianglesSpirv, kInterfaceSpirv) {
   IMGUI_CHECKVERSION();
   ImGui::CreateContext();
   ImGuiIO& io = ImGui::GetIO();
@@ -68,6 +68,7 @@ Interface::~Interface() {
 void Interface::begin() {
   ImGui_ImplGlfw_NewFrame();
   ImGui::NewFrame();
+  pressed_ = window_.takePressed();
 }
 
 Moves Interface::moves() const {
@@ -103,8 +104,7 @@ std::optional<Vec2d> Interface::doubleClick() const {
 }
 
 bool Interface::pressed(int key) const {
-  const ImGuiIO& io = ImGui::GetIO();
-  return !io.WantTextInput && !io.KeyCtrl && !io.KeyAlt && !io.KeySuper && ImGui::IsKeyPressed(key, false);
+  return !ImGui::GetIO().WantTextInput && std::find(pressed_.begin(), pressed_.end(), key) != pressed_.end();
 }
 
 void Interface::end() {

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "apps/viewer/navigation.h"
 #include "apps/viewer/window.h"
@@ -25,11 +26,13 @@ class Interface {
   Moves moves() const;
   // Where somebody clicked twice outside of panels: 0 to 1 to the right and down.
   std::optional<Vec2d> doubleClick() const;
-  bool pressed(int key) const;  // GLFW's number; not while text is entered
+  bool pressed(int key) const;  // GLFW's number; since the last picture, not while text is entered
   void end();                   // of what is shown
   void paint(GpuPresenter& presenter) const;
 
  private:
+  Window& window_;
+  std::vector<int> pressed_;
   GpuScreenPipeline pipeline_;
   GpuBuffer font_;
   uint32_t fontWidth_ = 0, fontHeight_ = 0;

@@ -126,6 +126,7 @@ std::unique_ptr<PictureSource> openPictures(const ViewOptions& options,
   DrawableOptions drawable;
   drawable.threads = options.device.threads;
   drawable.memoryMiB = options.memoryMiB;
+  drawable.mostPixels = options.mostPixels;
   return std::make_unique<WorkerPictures>(window,
                                           std::make_unique<OpenedDrawable>(options.folder, options.device, drawable));
 }

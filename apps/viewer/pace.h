@@ -10,8 +10,10 @@ namespace tessera {
 
 class Pace {
  public:
-  // `target`: milliseconds that a picture may take.
-  explicit Pace(double target = 40) : target_(target) {}
+  // `target`: milliseconds that a picture may take. Begins with all pixels, or with as few as there may be.
+  enum class Begin { all, few };
+  explicit Pace(double target, Begin begin = Begin::all)
+      : target_(target), step_(begin == Begin::all ? kShares.size() - 1 : 0) {}
 
   double share() const { return kShares[step_]; }  // of the pixels along an edge
 
@@ -45,7 +47,7 @@ class Pace {
   }
 
  private:
-  static constexpr std::array<double, 5> kShares = {0.25, 0.375, 0.5, 0.75, 1};
+  static constexpr std::array<double, 6> kShares = {0.125, 0.25, 0.375, 0.5, 0.75, 1};
   static constexpr int kPatience = 120;    // pictures in time, after which more pixels are tried
   static constexpr int kLongestWait = 16;  // times that: longer each time that they took too long
   static constexpr int kUnmeasured = 3;    // pictures after more pixels are tried
@@ -58,7 +60,7 @@ class Pace {
   }
 
   double target_;
-  size_t step_ = kShares.size() - 1;
+  size_t step_;
   double measured_ = 0;  // milliseconds of a picture, at this step
   int inTime_ = 0;       // pictures, since the last step
   int wait_ = kPatience;

@@ -21,21 +21,28 @@ TEST(Pace, DrawsFewerWhereTheyDoNot) {
   draw(pace, 10, 150);
   EXPECT_EQ(pace.share(), 0.5);
   draw(pace, 10, 10000);
-  EXPECT_EQ(pace.share(), 0.25);
+  EXPECT_EQ(pace.share(), 0.125);
+}
+
+TEST(Pace, MayBeginWithFewPixels) {
+  Pace pace(40, Pace::Begin::few);
+  EXPECT_EQ(pace.share(), 0.125);
+  draw(pace, 20, 5);
+  EXPECT_EQ(pace.share(), 1);
 }
 
 TEST(Pace, ComesBackWhenTheMachineIsFreeAgain) {
   Pace pace(40);
-  draw(pace, 10, 1000);
-  EXPECT_EQ(pace.share(), 0.25);
+  draw(pace, 10, 10000);
+  EXPECT_EQ(pace.share(), 0.125);
   draw(pace, 20, 10);
   EXPECT_EQ(pace.share(), 1);
 }
 
 TEST(Pace, TriesMorePixelsWhereAScreenHidesWhatTheyTake) {
   Pace pace(20);
-  draw(pace, 10, 200, 16);
-  EXPECT_EQ(pace.share(), 0.25);
+  draw(pace, 10, 2000, 16);
+  EXPECT_EQ(pace.share(), 0.125);
   draw(pace, 1000, 5, 16);
   EXPECT_EQ(pace.share(), 1);
 }

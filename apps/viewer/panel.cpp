@@ -63,7 +63,7 @@ PanelWish showPanel(const std::string& title, Navigation& navigation, const std:
               fmt::format("{:.1f} pictures a second, {:.1f} ms", 1000 / state.milliseconds, state.milliseconds));
     }
     for (const auto& [name, value] : facts) factRow(name, value);
-    factRow("At rest", state.isWhole ? "whole" : "not whole yet");
+    factRow("All there is", state.isWhole ? "shown" : "not shown yet");
     const Vec3d& eye = navigation.look().eye;
     factRow("Camera", fmt::format("{:.2f}, {:.2f}, {:.2f}", eye.x(), eye.y(), eye.z()));
     if (navigation.mode() == NavigationMode::fly) factRow("Speed", fmt::format("{:.3g} a second", navigation.speed()));

@@ -62,7 +62,6 @@ class Viewer {
   }
 
   void run() {
-    int settled = 0;
     while (!window_.isClosing()) {
       window_.listen(isMoving() ? 0 : panel_.isWhole ? kIdle : kBusy);
       const VkExtent2D size = window_.pixels();
@@ -70,18 +69,23 @@ class Viewer {
         window_.listen(kIdle);
         continue;
       }
+      if (window_.takeTouched() || isMoving()) rested_ = 0;
+      if (rested_ > kSettling && !pictureOf(size).isNew) continue;  // all is shown as it is
       interface_.begin();
       move();
-      const ShownPicture picture =
-          pictures_->update(cameraOf(size, panel_.fieldOfView), navigation_.worldFromCamera(), isMoving());
+      const ShownPicture picture = pictureOf(size);
       panel_.isWhole = picture.isWhole;
+      count(picture);
+      rested_ = picture.isWhole ? rested_ + 1 : 0;
       tell();
       interface_.end();
-      if (!presenter_.begin(size)) continue;
+      if (!presenter_.begin(size)) {
+        rested_ = 0;
+        continue;
+      }
       show(picture);
       interface_.paint(presenter_);
-      settled = picture.isWhole ? settled + 1 : 0;
-      const bool isTaken = !options_.screenshot.empty() && settled == kSettling;
+      const bool isTaken = !options_.screenshot.empty() && rested_ == kSettling;
       ImageU8 taken;
       presenter_.end(isTaken ? &taken : nullptr);
       if (isTaken) {
@@ -114,6 +118,10 @@ class Viewer {
     navigation_.flyTo(navigation_.lookOf(to.worldFromCamera));
   }
 
+  ShownPicture pictureOf(VkExtent2D size) {
+    return pictures_->update(cameraOf(size, panel_.fieldOfView), navigation_.worldFromCamera(), isMoving());
+  }
+
   bool isMoving() const { return Clock::now() - lastMove_ < std::chrono::duration<double>(kRest); }
 
   void move() {
@@ -130,12 +138,18 @@ class Viewer {
         place && navigation_.mode() != NavigationMode::fly) {
       focus(*place);
     }
-    if (navigation_.update(interface_.moves())) {
-      const Clock::time_point now = Clock::now();
-      const double passed = std::chrono::duration<double, std::milli>(now - lastMove_).count();
-      if (isMoving()) panel_.milliseconds += 0.1 * (passed - panel_.milliseconds);
-      lastMove_ = now;
-    }
+    if (navigation_.update(interface_.moves())) lastMove_ = Clock::now();
+  }
+
+  // How fast pictures come while the camera moves.
+  void count(const ShownPicture& picture) {
+    if (!picture.isNew) return;
+    const Clock::time_point now = Clock::now();
+    const double passed = std::chrono::duration<double, std::milli>(now - lastPicture_).count();
+    const bool isFirst = panel_.milliseconds == 0;
+    if (isMoving() && wasMoving_) panel_.milliseconds += (isFirst ? 1 : 0.1) * (passed - panel_.milliseconds);
+    wasMoving_ = isMoving();
+    lastPicture_ = now;
   }
 
   // Nearer to what is seen there.
@@ -181,7 +195,9 @@ class Viewer {
   Interface interface_;
   std::unique_ptr<PictureSource> pictures_;
   PanelState panel_;
-  Clock::time_point lastMove_;
+  Clock::time_point lastMove_, lastPicture_;
+  bool wasMoving_ = false;  // at the last new picture
+  int rested_ = 0;          // pictures of the window since all was shown
 };
 
 }  // namespace

@@ -28,11 +28,31 @@ Window::Window(const std::string& title, int width, int height) {
     glfwTerminate();
     throw error;
   }
+  glfwSetWindowUserPointer(window_, this);
+  glfwSetKeyCallback(window_, onKey);
+  glfwSetCharCallback(window_, [](GLFWwindow* window, unsigned) { of(window).touched_ = true; });
+  glfwSetMouseButtonCallback(window_, [](GLFWwindow* window, int, int, int) { of(window).touched_ = true; });
+  glfwSetScrollCallback(window_, [](GLFWwindow* window, double, double) { of(window).touched_ = true; });
+  glfwSetCursorPosCallback(window_, [](GLFWwindow* window, double, double) { of(window).touched_ = true; });
+  glfwSetWindowRefreshCallback(window_, [](GLFWwindow* window) { of(window).touched_ = true; });
+  glfwSetFramebufferSizeCallback(window_, [](GLFWwindow* window, int, int) { of(window).touched_ = true; });
 }
 
 Window::~Window() {
   glfwDestroyWindow(window_);
   glfwTerminate();
+}
+
+Window& Window::of(GLFWwindow* window) {
+  return *static_cast<Window*>(glfwGetWindowUserPointer(window));
+}
+
+// Dear ImGui sees what is down when it looks, and pictures may take longer than a finger.
+void Window::onKey(GLFWwindow* window, int key, int, int action, int modifiers) {
+  of(window).touched_ = true;
+  constexpr int kOthers = GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER;
+  if (action != GLFW_PRESS || (modifiers & kOthers) != 0) return;
+  of(window).pressed_.push_back(key);
 }
 
 VkSurfaceKHR Window::makeSurface(VkInstance instance) const {

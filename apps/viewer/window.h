@@ -4,6 +4,8 @@
 #include <volk.h>
 
 #include <string>
+#include <utility>
+#include <vector>
 
 struct GLFWwindow;
 
@@ -27,9 +29,19 @@ class Window {
   float contentScale() const;  // pixels of what is one pixel on an ordinary screen
   // Takes in what people did; waits for something to happen, at most so long.
   void listen(double seconds);
+  // Whether people did anything, or the window has to be drawn anew: since the last time.
+  bool takeTouched() { return std::exchange(touched_, false); }
+  // Keys that went down, GLFW's numbers: since the last time.
+  std::vector<int> takePressed() { return std::exchange(pressed_, {}); }
 
  private:
+  static void onKey(GLFWwindow* window, int key, int scanCode, int action, int modifiers);
+
+  static Window& of(GLFWwindow* window);
+
   GLFWwindow* window_ = nullptr;
+  std::vector<int> pressed_;
+  bool touched_ = true;
 };
 
 }  // namespace tessera

@@ -13,7 +13,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr auto kLook = std::chrono::milliseconds(500);  // between two questions whether there is something new
 constexpr int kBandPixels = 1 << 15;                    // drawn before one looks whether another view is wanted
-constexpr std::array kFiner = {0.5, 1.0};               // of the window's pixels along an edge, one after another
+constexpr std::array kFiner = {0.25, 0.5, 1.0};         // of the window's pixels along an edge, one after another
 
 double milliseconds(Clock::time_point since) {
   return std::chrono::duration<double, std::milli>(Clock::now() - since).count();
@@ -57,13 +57,22 @@ void WorkerPictures::work() {
         if (!request_) continue;
         request = *request_;
       }
-      if (drawn_->refresh()) done_.reset();
+      isRefreshed();
       if (done_ != request) drawFor(request);
     }
   } catch (...) {
     const std::lock_guard lock(mutex_);
     failure_ = std::current_exception();
   }
+}
+
+bool WorkerPictures::isRefreshed() {
+  const Clock::time_point now = Clock::now();
+  if (now - looked_ < kLook) return false;
+  looked_ = now;
+  if (!drawn_->refresh()) return false;
+  done_.reset();
+  return true;
 }
 
 bool WorkerPictures::isOutdated(const Request& request) {
@@ -92,7 +101,7 @@ std::optional<RenderedView> WorkerPictures::drawInBands(const Camera& camera, co
                    ImageF(camera.width, camera.height, 1)};
   const int rows = std::max(1, kBandPixels / camera.width);
   for (int first = 0; first < camera.height; first += rows) {
-    if (isOutdated(request)) return std::nullopt;
+    if (isOutdated(request) || isRefreshed()) return std::nullopt;
     const int count = std::min(rows, camera.height - first);
     const RenderedView band = drawn_->renderer().render(bandOf(camera, first, count), request.worldFromCamera);
     const size_t at = static_cast<size_t>(first) * static_cast<size_t>(camera.width);

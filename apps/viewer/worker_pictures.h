@@ -1,6 +1,7 @@
 // Pictures that take long, drawn by a thread of its own: a few pixels at first, all of them when the camera rests.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <exception>
 #include <functional>
@@ -58,9 +59,10 @@ class WorkerPictures final : public PictureSource {
 
   void work();
   void drawFor(const Request& request);
-  // Nothing where another view has been asked for meanwhile.
+  // Nothing where another view has been asked for meanwhile, or there is something new to draw.
   std::optional<RenderedView> drawInBands(const Camera& camera, const Request& request);
   bool isOutdated(const Request& request);
+  bool isRefreshed();
   void hand(RenderedView view, const Request& request, bool isWhole);
 
   std::shared_ptr<GpuStream> stream_;
@@ -70,8 +72,9 @@ class WorkerPictures final : public PictureSource {
 
   // Of the thread that draws:
   std::unique_ptr<ChangingRenderer> drawn_;
-  Pace pace_{100};
+  Pace pace_{100, Pace::Begin::few};
   std::optional<Request> done_;
+  std::chrono::steady_clock::time_point looked_;  // when it was asked for something new
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;

@@ -50,7 +50,7 @@ std::vector<const char*> surfaceExtensions() {
   return names;
 }
 
-VkInstance makeInstance(bool validation, std::vector<const char*> extensions = {}) {
+VkInstance makeInstance(bool validation, std::vector<const char*> extensions) {
   auto application = vulkanStruct<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
   application.pApplicationName = "tessera";
   application.apiVersion = VK_API_VERSION_1_2;
@@ -65,8 +65,18 @@ VkInstance makeInstance(bool validation, std::vector<const char*> extensions = {
   info.ppEnabledExtensionNames = extensions.data();
   VkInstance instance = VK_NULL_HANDLE;
   checkVulkan(vkCreateInstance(&info, nullptr, &instance), "vkCreateInstance");
-  volkLoadInstance(instance);
   return instance;
+}
+
+// Calls are those of one instance that knows all we may ask for and stays open as long as the process: the loader
+// passes them on to whose they are. It keeps drivers loaded, too, which leak when they are unloaded.
+void loadCalls() {
+  static const VkInstance first = [] {
+    const VkInstance made = makeInstance(false, surfaceExtensions());
+    volkLoadInstance(made);
+    return made;
+  }();
+  CHECK((first != VK_NULL_HANDLE) == true);
 }
 
 }  // namespace
@@ -123,8 +133,7 @@ GpuContext::~GpuContext() {
 void GpuContext::createInstance(bool validation, bool presents) {
   openLoader();
   validation = validation && validationInstalled();
-  // Drivers leak when they are unloaded: one instance stays open as long as the process, so that they never are.
-  [[maybe_unused]] static const VkInstance keepsDriversLoaded = makeInstance(false);
+  loadCalls();
   instance_ = makeInstance(validation, presents ? surfaceExtensions() : std::vector<const char*>());
   if (validation) messenger_ = createValidationMessenger(instance_);
 }
