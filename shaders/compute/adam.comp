@@ -17,8 +17,19 @@ float power(float base, uint exponent) {
   return result;
 }
 
+bool foundTooMuch(AdamArguments a) {
+  for (uint i = 0; i < a.foundCount; ++i) {
+    if (a.found.values[i] > a.room) return true;
+  }
+  return false;
+}
+
 void main() {
   AdamArguments a = arguments.values;
+  if (foundTooMuch(a)) {
+    FOR_EACH(i, a.count) a.gradients.values[i] = 0;
+    return;
+  }
   if (WANTED(a.rows) && a.rows.values[0] == a.rows.values[1]) return;
   FOR_EACH(i, a.count) {
     float gradient = a.gradients.values[i];

@@ -10,7 +10,10 @@ struct AdamArguments {
   FloatPointer firstMoments;
   FloatPointer secondMoments;
   UintPointer counts;
-  UintPointer rows;  // 0: none
+  UintPointer rows;   // 0: none
+  UintPointer found;  // [foundCount]
+  uint foundCount;
+  uint room;
   uint count;
   uint skipZeroGradients;
   float rate;
@@ -20,7 +23,7 @@ struct AdamArguments {
   float l2;
   uint unused;
 };
-TESSERA_SIZE(AdamArguments, 80);
+TESSERA_SIZE(AdamArguments, 96);
 
 TESSERA_END_ARGUMENTS
 #endif

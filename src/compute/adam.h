@@ -16,11 +16,15 @@ struct Adam {
   float l2 = 0;
   bool skipZeroGradients = false;  // for hash tables: no moment decay, no count
   Slice<const uint32_t> rows;      // optional, [2]: where both are the same, no sample came here, and nothing is done
-  Slice<float> parameters;         // [n]
-  Slice<float> gradients;          // [n]; zero afterwards
-  Slice<float> firstMoments;       // [n]
-  Slice<float> secondMoments;      // [n]
-  Slice<uint32_t> counts;          // [n]: steps taken
+  // Optional, any number of counters of what a step found: where one is above `room`, there was no room for all of it,
+  // and the step teaches nothing. Gradients become zero, and nothing else changes.
+  Slice<const uint32_t> found;
+  uint32_t room = 0;
+  Slice<float> parameters;     // [n]
+  Slice<float> gradients;      // [n]; zero afterwards
+  Slice<float> firstMoments;   // [n]
+  Slice<float> secondMoments;  // [n]
+  Slice<uint32_t> counts;      // [n]: steps taken
 };
 
 }  // namespace tessera

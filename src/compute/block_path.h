@@ -16,8 +16,8 @@ struct BlockPiece {
 BlockDomain domainOf(const BlockSpace::Placement& placement);
 
 // The pieces that the blocks own of the ray (BlockSpace), from `near` or the space's own, whichever is farther, to
-// BlockSpace::kFarthest; not before the box is entered, where it is (as EnterScene). `pieces` is overwritten; no ray has
-// any without a direction.
+// BlockSpace::kFarthest; not before the box is entered, where it is (as EnterScene). `pieces` is overwritten; no ray
+// has any without a direction.
 void blockPath(const BlockSpace& space, const Triple<double>& origin, const Triple<double>& direction, double near,
                std::vector<BlockPiece>& pieces);
 

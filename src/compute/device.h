@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "compute/adam.h"
@@ -103,8 +104,13 @@ class Device {
 
   virtual std::unique_ptr<Memory> allocate(size_t bytes) = 0;  // zeroed
   virtual void writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) = 0;
-  virtual void readBytes(const Memory& from, size_t offset, std::span<std::byte> to) = 0;  // waits
-  virtual void fillZero(Memory& memory, size_t offset, size_t bytes) = 0;                  // multiples of 4
+  struct Reading {
+    const Memory* from = nullptr;
+    size_t offset = 0;
+    std::span<std::byte> to;
+  };
+  virtual void readBytes(std::span<const Reading> readings) = 0;           // waits, once for all
+  virtual void fillZero(Memory& memory, size_t offset, size_t bytes) = 0;  // multiples of 4
   virtual void finish() = 0;
 
   // False where a device does not have an operation yet; calling it then is our own mistake (CHECK).
@@ -131,9 +137,20 @@ class Device {
   }
   template <class T>
   std::vector<std::remove_const_t<T>> read(const Slice<T>& from) {
-    std::vector<std::remove_const_t<T>> values(from.count);
-    if (!values.empty()) readBytes(*from.memory, from.first * sizeof(T), std::as_writable_bytes(std::span(values)));
-    return values;
+    return std::get<0>(readTogether(from));
+  }
+  // Several, for the time of one.
+  template <class... T>
+  std::tuple<std::vector<std::remove_const_t<T>>...> readTogether(const Slice<T>&... from) {
+    std::tuple<std::vector<std::remove_const_t<T>>...> all{std::vector<std::remove_const_t<T>>(from.count)...};
+    std::vector<Reading> readings;
+    const auto add = [&](const auto& slice, auto& to) {
+      if (to.empty()) return;
+      readings.push_back({slice.memory, slice.first * sizeof to[0], std::as_writable_bytes(std::span(to))});
+    };
+    std::apply([&](auto&... to) { (add(from, to), ...); }, all);
+    if (!readings.empty()) readBytes(readings);
+    return all;
   }
   template <class T>
   void fillZero(const Slice<T>& slice) {

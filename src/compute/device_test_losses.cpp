@@ -422,6 +422,9 @@ OperationTests testsOf<Adam>() {
                                  a.skipZeroGradients = skip;
                                  a.l2 = l2;
                                  if (count == 1061) a.rows = stage.input(std::vector<uint32_t>{7, skip ? 7u : 8u});
+                                 // What was found has room, or has not.
+                                 if (count == 37) a.found = stage.input(std::vector<uint32_t>{7, skip ? 9u : 8u, 3});
+                                 a.room = 8;
                                  a.parameters = stage.output("parameters", stage.random.floats(count, -1, 1));
                                  a.gradients = stage.output("gradients", gradients);
                                  a.firstMoments = stage.output("firstMoments", stage.random.floats(count, -0.1f, 0.1f));

@@ -38,6 +38,12 @@ T* hostPointer(const Slice<T>& slice) {
   return reinterpret_cast<T*>(static_cast<HostMemory*>(slice.memory)->data()) + slice.first;
 }
 
+// Adam::found.
+inline bool isAnyAbove(const Slice<const uint32_t>& counters, uint32_t most) {
+  const uint32_t* values = hostPointer(counters);
+  return std::any_of(values, values + counters.count, [&](uint32_t value) { return value > most; });
+}
+
 // Rows [begin, end) that an operation works on.
 struct HostRows {
   uint32_t begin = 0, end = 0;

@@ -195,23 +195,38 @@ void GpuStream::upload(const GpuBuffer& to, size_t offset, std::span<const std::
   }
 }
 
-void GpuStream::download(const GpuBuffer& from, size_t offset, std::span<std::byte> bytes) {
-  CHECK(offset + bytes.size() <= from.bytes());
-  if (!downloads_ && !bytes.empty()) downloads_ = GpuBuffer(context_, stagingBytes_, BufferUse::download);
-  while (!bytes.empty()) {
-    const size_t length = std::min(bytes.size(), stagingBytes_);
-    Command copy;
-    copy.from = from.handle();
-    copy.fromOffset = from.offset() + offset;
-    copy.to = downloads_.handle();
-    copy.toOffset = downloads_.offset();
-    copy.bytes = length;
-    add(copy);
+void GpuStream::download(std::span<const Download> downloads) {
+  if (!downloads_) downloads_ = GpuBuffer(context_, stagingBytes_, BufferUse::download);
+  struct Piece {
+    std::span<std::byte> to;
+    size_t at;
+  };
+  std::vector<Piece> pieces;  // in `downloads_`
+  size_t used = 0;
+  const auto bring = [&] {
     finish();
-    std::memcpy(bytes.data(), downloads_.mapped(), length);
-    bytes = bytes.subspan(length);
-    offset += length;
+    for (const Piece& piece : pieces) std::memcpy(piece.to.data(), downloads_.mapped() + piece.at, piece.to.size());
+    pieces.clear();
+    used = 0;
+  };
+  for (const auto& [from, offset, to] : downloads) {
+    CHECK(offset + to.size() <= from->bytes());
+    for (size_t done = 0; done < to.size();) {
+      if (used == stagingBytes_) bring();
+      const size_t length = std::min(to.size() - done, stagingBytes_ - used);
+      Command copy;
+      copy.from = from->handle();
+      copy.fromOffset = from->offset() + offset + done;
+      copy.to = downloads_.handle();
+      copy.toOffset = downloads_.offset() + used;
+      copy.bytes = length;
+      add(copy);
+      pieces.push_back({to.subspan(done, length), used});
+      done += length;
+      used += (length + kAlignment - 1) / kAlignment * kAlignment;
+    }
   }
+  if (!pieces.empty()) bring();
 }
 
 void GpuStream::fillZero(const GpuBuffer& buffer, size_t offset, size_t bytes) {

@@ -34,8 +34,17 @@ class GpuStream {
   GpuStream& operator=(const GpuStream&) = delete;
 
   void upload(const GpuBuffer& to, size_t offset, std::span<const std::byte> bytes);
-  void download(const GpuBuffer& from, size_t offset, std::span<std::byte> bytes);  // waits
-  void fillZero(const GpuBuffer& buffer, size_t offset, size_t bytes);              // multiples of 4
+  struct Download {
+    const GpuBuffer* from = nullptr;
+    size_t offset = 0;
+    std::span<std::byte> to;
+  };
+  void download(std::span<const Download> downloads);  // waits, once for as many as staging holds
+  void download(const GpuBuffer& from, size_t offset, std::span<std::byte> to) {
+    const Download one = {&from, offset, to};
+    download(std::span(&one, 1));
+  }
+  void fillZero(const GpuBuffer& buffer, size_t offset, size_t bytes);  // multiples of 4
   // Copies `arguments` and runs the kernel with their address. No groups, no work.
   void run(const GpuKernel& kernel, std::span<const std::byte> arguments, Groups groups);
   void send();  // what has been listed begins now; waits for none of it, but for what was sent before the last time

@@ -7,16 +7,16 @@ PhotoExposures::PhotoExposures(Device& device, const Capture& capture)
       trainingPhotos_(capture.photosIn(Split::train)),
       group_(device, "exposures", std::vector<float>(capture.photos.size() * 3)) {}
 
-void PhotoExposures::step(int64_t step, float rate, bool train) {
-  if (!train) {
+void PhotoExposures::step(const Adam& adam, bool train) {
+  if (train) {
+    group_.step(device_, adam);
+  } else {
     device_.fillZero(group_.gradients.all());
-    return;
   }
-  Adam adam;
-  adam.rate = rate;
-  adam.skipZeroGradients = true;
-  group_.step(device_, adam);
-  if (step % 16 == 15) centre();
+}
+
+void PhotoExposures::settle(int64_t step, bool train) {
+  if (train && step % 16 == 15) centre();
 }
 
 void PhotoExposures::centre() {

@@ -14,10 +14,12 @@ class PhotoExposures {
   Slice<const float> logGains() const { return group_.values; }  // [photos][3]
   Slice<float> gradients() { return group_.gradients; }
   // One step of Adam; without `train` gradients are dropped.
-  void step(int64_t step, float rate, bool train);
+  void step(const Adam& adam, bool train);
+  // After a step that has been made: every now and then, centres. Waits.
+  void settle(int64_t step, bool train);
   // Only these photos are trained on: the others' stay where the mean is.
   void trainOn(std::vector<int> photos) { trainingPhotos_ = std::move(photos); }
-  // Puts the mean at zero, as some steps do.
+  // Puts the mean at zero. Waits.
   void centre();
 
   bool allFinite() const { return group_.allFinite(device_); }

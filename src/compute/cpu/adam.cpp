@@ -96,6 +96,12 @@ StepSizes makeStepSizes(const Adam& a) {
 }  // namespace
 
 void run(Context& context, const Adam& a) {
+  if (isAnyAbove(a.found, a.room)) {
+    context.pool.forRanges(a.gradients.count, size_t{1} << 18, [&](size_t begin, size_t end) {
+      std::fill(hostPointer(a.gradients) + begin, hostPointer(a.gradients) + end, 0.0f);
+    });
+    return;
+  }
   if (a.rows && hostPointer(a.rows)[0] == hostPointer(a.rows)[1]) return;
   const StepSizes stepSizes = makeStepSizes(a);
   const auto range = HWY_DYNAMIC_DISPATCH(adamRange);

@@ -26,8 +26,11 @@ class CpuDevice final : public Device {
   void writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) override {
     std::memcpy(bytesAt(to, offset, from.size()), from.data(), from.size());
   }
-  void readBytes(const Memory& from, size_t offset, std::span<std::byte> to) override {
-    std::memcpy(to.data(), bytesAt(const_cast<Memory&>(from), offset, to.size()), to.size());
+  void readBytes(std::span<const Reading> readings) override {
+    for (const Reading& reading : readings) {
+      Memory& from = const_cast<Memory&>(*reading.from);
+      std::memcpy(reading.to.data(), bytesAt(from, reading.offset, reading.to.size()), reading.to.size());
+    }
   }
   void fillZero(Memory& memory, size_t offset, size_t bytes) override {
     std::byte* first = bytesAt(memory, offset, bytes);

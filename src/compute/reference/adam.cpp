@@ -1,5 +1,6 @@
 #include "compute/adam.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "compute/reference/convert.h"
@@ -21,6 +22,10 @@ void adamStep(const Adam& options, double gradient, AdamState& state) {
 
 void run(const Adam& a) {
   const size_t n = a.parameters.count;
+  if (isAnyAbove(a.found, a.room)) {
+    std::fill_n(hostPointer(a.gradients), n, 0.0f);
+    return;
+  }
   if (a.rows && hostPointer(a.rows)[0] == hostPointer(a.rows)[1]) return;
   for (const size_t count : {a.gradients.count, a.firstMoments.count, a.secondMoments.count, a.counts.count})
     CHECK(count == n);

@@ -22,8 +22,10 @@ class ReferenceDevice final : public Device {
   void writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) override {
     std::memcpy(bytesAt(to, offset, from.size()), from.data(), from.size());
   }
-  void readBytes(const Memory& from, size_t offset, std::span<std::byte> to) override {
-    std::memcpy(to.data(), bytesAt(from, offset, to.size()), to.size());
+  void readBytes(std::span<const Reading> readings) override {
+    for (const Reading& reading : readings) {
+      std::memcpy(reading.to.data(), bytesAt(*reading.from, reading.offset, reading.to.size()), reading.to.size());
+    }
   }
   void fillZero(Memory& memory, size_t offset, size_t bytes) override {
     std::memset(bytesAt(memory, offset, bytes), 0, bytes);

@@ -20,6 +20,11 @@ void VulkanDevice::enqueue(const Adam& options) {
   arguments.secondMoments = deviceAddress(options.secondMoments);
   arguments.counts = deviceAddress(options.counts);
   if (options.rows) arguments.rows = deviceAddress(options.rows);
+  if (options.found) {
+    arguments.found = deviceAddress(options.found);
+    arguments.foundCount = static_cast<uint32_t>(options.found.count);
+    arguments.room = options.room;
+  }
   arguments.count = static_cast<uint32_t>(count);
   arguments.skipZeroGradients = options.skipZeroGradients;
   arguments.rate = options.rate;

@@ -62,9 +62,13 @@ void VulkanDevice::writeBytes(Memory& to, size_t offset, std::span<const std::by
   stream_->upload(static_cast<VulkanMemory&>(to).buffer(), offset, from);
 }
 
-void VulkanDevice::readBytes(const Memory& from, size_t offset, std::span<std::byte> to) {
+void VulkanDevice::readBytes(std::span<const Reading> readings) {
   stream_->label("copies");
-  stream_->download(static_cast<const VulkanMemory&>(from).buffer(), offset, to);
+  std::vector<GpuStream::Download> downloads;
+  for (const Reading& reading : readings) {
+    downloads.push_back({&static_cast<const VulkanMemory*>(reading.from)->buffer(), reading.offset, reading.to});
+  }
+  stream_->download(downloads);
 }
 
 void VulkanDevice::fillZero(Memory& memory, size_t offset, size_t bytes) {

@@ -37,7 +37,7 @@ class VulkanDevice : public Device {
   std::string target() const override;
   std::unique_ptr<Memory> allocate(size_t bytes) override;
   void writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) override;
-  void readBytes(const Memory& from, size_t offset, std::span<std::byte> to) override;
+  void readBytes(std::span<const Reading> readings) override;
   void fillZero(Memory& memory, size_t offset, size_t bytes) override;
   void finish() override;
   bool supports(Operation) const override { return true; }

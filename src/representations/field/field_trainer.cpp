@@ -84,8 +84,8 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
   updateParameters(step, plannedSteps);
 
   // The step is over: its counters may be read.
-  const std::vector<uint32_t> counters = device_.read(counters_.all());
-  const std::vector<float> losses = device_.read(losses_.all());
+  const auto [counters, losses] = device_.readTogether(counters_.all(), losses_.all());
+  exposures_.settle(step, config_.exposure);
   StepReport report;
   double squares = 0, weight = 0;
   for (uint32_t pass = 0; pass < passes_; ++pass) {
@@ -209,7 +209,10 @@ void FieldTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
   adam.l2 = static_cast<float>(config_.networkL2);
   model_.field().densityNetwork().step(device_, adam);
   model_.field().colourNetwork().step(device_, adam);
-  exposures_.step(step, static_cast<float>(config_.exposureRate * adam.rate / config_.rate), config_.exposure);
+  Adam ofExposures;
+  ofExposures.rate = static_cast<float>(config_.exposureRate * adam.rate / config_.rate);
+  ofExposures.skipZeroGradients = true;
+  exposures_.step(ofExposures, config_.exposure);
 }
 
 Bytes FieldTrainer::save(uint32_t) {

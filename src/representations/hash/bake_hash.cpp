@@ -72,7 +72,7 @@ class SeenFinder {
     while (!pixels.empty()) {
       const PictureRays::Piece piece = pictureRays_.through(pixels);
       pass_.forward({piece.rays, piece.origins, piece.directions, {}, {}, {}}, kMinTransmittance);
-      const std::vector<uint32_t> counters = pass_.counters();
+      const std::vector<uint32_t> counters = device.read(pass_.counters());
       const uint32_t samples = counters[0], finished = counters[1];
       CHECK(finished >= 1u);  // one ray's steps always fit
       const HashSamples& at = pass_.samples();

@@ -123,10 +123,7 @@ void HashModel::sample(const Rays& rays, float minTransmittance, HashSamples& se
     device_.fillZero(logDensities.data);
     device_.run(AddColumns{made, Matrix<const float>(features.data, 1, features.rowStride), logDensities});
     rounds_.lookedUp(round);
-    device_.run(GatherRows{{1},
-                           zero_,
-                           Matrix<const float>(asFloats(fields_.texelCounter()), 1),
-                           Matrix<float>(asFloats(seen.counters.part(2 + HashSamples::kRounds + round, 1)), 1)});
+    keepTexelCount(seen, round);
   }
   rounds_.keepSeen(seen.firstSample, seen.rayOfSample);
   rounds_.gather(asFloats(slots_.all()), asFloats(seen.slotOfSample.all()), 1);
@@ -135,6 +132,18 @@ void HashModel::sample(const Rays& rays, float minTransmittance, HashSamples& se
   rounds_.gatherSteps(seen.steps);
   rounds_.gather(middles_, seen.middles, 1);
   rounds_.gather(widths_, seen.widths, 1);
+}
+
+Matrix<const float> HashModel::featuresOf(HashSamples& seen, bool forBackward) {
+  const Matrix<const float> features = fields_.forward(seen.places(), forBackward);
+  keepTexelCount(seen, HashSamples::kRounds);
+  return features;
+}
+
+void HashModel::keepTexelCount(HashSamples& seen, uint32_t lookUp) {
+  const Slice<uint32_t> kept = seen.counters.part(HashSamples::kFirstTexels + lookUp, 1);
+  device_.run(GatherRows{
+      {1}, zero_, Matrix<const float>(asFloats(fields_.texelCounter()), 1), Matrix<float>(asFloats(kept), 1)});
 }
 
 void HashModel::adaptStep(double samplesPerRay) {

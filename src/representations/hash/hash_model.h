@@ -18,8 +18,10 @@ struct HashSamples {
   Slice<uint32_t> counters;                                   // [kCounters]; whoever samples says where
 
   static constexpr uint32_t kRounds = 6;
-  // Samples, finished rays, of each round the densities looked up and the corners that they wanted.
-  static constexpr uint32_t kCounters = 2 + 2 * kRounds;
+  // Samples, finished rays, of each round the densities looked up and the corners that they wanted, and those that the
+  // samples wanted that were seen.
+  static constexpr uint32_t kFirstTexels = 2 + kRounds;
+  static constexpr uint32_t kCounters = kFirstTexels + kRounds + 1;
 
   HashSamples() = default;
   HashSamples(Device& device, uint32_t rays, uint32_t samples);
@@ -52,6 +54,8 @@ class HashModel {
   };
   // Finds the samples of rays that can be seen (train/march_rounds.h).
   void sample(const Rays& rays, float minTransmittance, HashSamples& seen);
+  // HashFields::forward of those samples.
+  Matrix<const float> featuresOf(HashSamples& seen, bool forBackward);
 
   // Steps of rays, relative to the longest (the paper's γ).
   double stepScale() const { return stepScale_; }
@@ -72,6 +76,7 @@ class HashModel {
   bool allFinite(uint32_t block);
 
  private:
+  void keepTexelCount(HashSamples& seen, uint32_t lookUp);  // of the last
   std::vector<ParameterGroup*> sharedGroups();
 
   Device& device_;

@@ -38,7 +38,7 @@ RenderedView HashModelRenderer::render(const Camera& camera, const Pose& worldFr
     const PictureRays::Piece piece = pictureRays_.piece(first, wanted);
     const HashModel::Rays rays{piece.rays, piece.origins, piece.directions, {}, {}, piece.far};
     pass_.forward(rays, kMinTransmittance);
-    const std::vector<uint32_t> counters = pass_.counters();
+    const std::vector<uint32_t> counters = device.read(pass_.counters());
     const uint32_t finished = counters[1];
     CHECK(finished >= 1u);  // one ray's steps always fit
     const std::vector<float> colour = device.read(pass_.colour().part(0, size_t{finished} * 3));

@@ -31,7 +31,7 @@ void HashPass::forward(const HashModel::Rays& rays, float minTransmittance) {
   CHECK(rays.count <= room_.rays);
   minTransmittance_ = minTransmittance;
   model_.sample(rays, minTransmittance, seen_);
-  features_ = model_.fields().forward(seen_.places(), room_.training);
+  features_ = model_.featuresOf(seen_, room_.training);
   CompositeForward composite;
   composite.minTransmittance = minTransmittance;
   composite.rays = finished(rays);
@@ -58,11 +58,6 @@ void HashPass::shade(const HashModel::Rays& rays) {
                          Matrix<float>(specular_, 3), room_.training ? activations_.all() : Slice<float>()});
   device_.run(ShadeForward{isWhole(), count, Matrix<float>(composited_, kColours).columnRange(0, 3),
                            Matrix<float>(specular_, 3), opacity_, colour_});
-}
-
-uint32_t HashPass::texelsWanted() {
-  const std::vector<uint32_t> all = counters();
-  return std::max(model_.fields().texelsWanted(), *std::max_element(all.begin() + 2 + HashSamples::kRounds, all.end()));
 }
 
 void HashPass::backward(const HashModel::Rays& rays, Slice<const float> colourGradients, Slice<float> opacityGradients,

@@ -25,11 +25,12 @@ class HashPass {
   const HashSamples& samples() const { return seen_; }
   Slice<const float> weights() const { return weights_; }  // [samples]
   Count finished(const HashModel::Rays& rays) const { return seen_.finished(rays.count); }
-  // Waits: samples, finished rays, and what each round looked up.
-  std::vector<uint32_t> counters() { return device_.read(counters_.all()); }
-  // Waits: corners of lattices, at most, of the rounds of marching and of what is seen. Where it is above the fields'
-  // room, some counted as nothing.
-  uint32_t texelsWanted();
+  Slice<const uint32_t> counters() const { return counters_; }  // HashSamples::kCounters
+  // Of those: corners of lattices, of each round of marching and of what is seen. Where one is above the fields' room,
+  // some counted as nothing.
+  Slice<const uint32_t> texelsWanted() const {
+    return counters_.part(HashSamples::kFirstTexels, HashSamples::kRounds + 1);
+  }
 
   // Of the losses on samples' weights, already divided by the number of rays; the colour's gradients come from outside.
   struct LossScales {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "base/error.h"
 #include "base/random.h"
@@ -79,40 +80,47 @@ void HashTrainer::refreshOccupancy(int64_t step) {
                           mix64(static_cast<uint64_t>(config_.seed) ^ (static_cast<uint64_t>(step) << 20)));
 }
 
-// Where corners have no room, what they hold would count as nothing: then again with fewer rays.
 HashModel::Rays HashTrainer::drawRays(int64_t step) {
-  for (;;) {
-    photoRays_.draw(step, rays_);
-    const HashModel::Rays rays{rays_,
-                               photoRays_.origins(0, rays_),
-                               photoRays_.directions(0, rays_),
-                               photoRays_.jitter(0, rays_),
-                               photoRays_.nears(0, rays_),
-                               photoRays_.fars(0, rays_)};
-    pass_.forward(rays, kMinTransmittance);
-    const double room = model_.fields().roomForTexels(), wanted = pass_.texelsWanted();
-    if (wanted <= room || rays_ == 1) return rays;
-    rays_ = std::max(1u, static_cast<uint32_t>(0.9 * room / wanted * rays_));
-  }
+  photoRays_.draw(step, rays_);
+  const HashModel::Rays rays{rays_,
+                             photoRays_.origins(0, rays_),
+                             photoRays_.directions(0, rays_),
+                             photoRays_.jitter(0, rays_),
+                             photoRays_.nears(0, rays_),
+                             photoRays_.fars(0, rays_)};
+  pass_.forward(rays, kMinTransmittance);
+  return rays;
+}
+
+// Where corners have no room, what they hold counts as nothing: then again with fewer rays.
+bool HashTrainer::drawsFewerRays(uint32_t texelsWanted) {
+  const double room = model_.fields().roomForTexels(), wanted = texelsWanted;
+  if (wanted <= room || rays_ == 1) return false;
+  rays_ = std::max(1u, static_cast<uint32_t>(0.9 * room / wanted * rays_));
+  return true;
 }
 
 StepReport HashTrainer::step(int64_t step, int64_t plannedSteps) {
   refreshOccupancy(step);
-  const HashModel::Rays rays = drawRays(step);
-  addGradients(rays, step, plannedSteps);
-  updateParameters(step, plannedSteps);
-
-  // The step is over: its counters may be read.
-  const std::vector<uint32_t> counters = pass_.counters();
-  const std::vector<float> inner = device_.read(pass_.losses());
+  std::vector<uint32_t> counters;
+  std::vector<float> losses, inner;
   StepReport report;
+  do {
+    const HashModel::Rays rays = drawRays(step);
+    addGradients(rays, step, plannedSteps);
+    updateParameters(step, plannedSteps);
+    // The step is over: its counters may be read. Where it had no room, it has changed nothing.
+    std::tie(counters, losses, inner) = device_.readTogether(pass_.counters(), losses_.all(), pass_.losses());
+    report.texels = *std::max_element(counters.begin() + HashSamples::kFirstTexels, counters.end());
+  } while (drawsFewerRays(report.texels));
+  exposures_.settle(step, config_.exposure);
+
   report.samples = counters[0];
   report.rays = counters[1];
   for (uint32_t round = 0; round < HashSamples::kRounds; ++round) report.marched += counters[2 + round];
-  const Fit fit = comparedRays(report.rays);
+  const Fit fit = fitOf(report.rays, losses);
   report.loss = fit.loss + inner[0] + inner[1];
   report.squaredError = fit.squaredError / std::max(1.0, fit.channels);
-  report.texels = pass_.texelsWanted();
   const double perRay = static_cast<double>(report.samples) / std::max(1u, report.rays);
   model_.adaptStep(perRay);
 
@@ -138,15 +146,18 @@ void HashTrainer::judgeBy(std::vector<TileShares> photos) {
 }
 
 HashTrainer::Fit HashTrainer::fit(int64_t step) {
-  compareWithPhotos(pass_.finished(drawRays(step)));
-  return comparedRays(pass_.counters()[1]);
+  std::vector<uint32_t> counters;
+  std::vector<float> losses;
+  do {
+    compareWithPhotos(pass_.finished(drawRays(step)));
+    std::tie(counters, losses) = device_.readTogether(pass_.counters(), losses_.all());
+  } while (drawsFewerRays(*std::max_element(counters.begin() + HashSamples::kFirstTexels, counters.end())));
+  return fitOf(counters[1], losses);
 }
 
-// Of the `rays` that were compared last.
-HashTrainer::Fit HashTrainer::comparedRays(uint32_t rays) {
+HashTrainer::Fit HashTrainer::fitOf(uint32_t rays, const std::vector<float>& losses) const {
   double weight = 0;
   for (uint32_t ray = 0; ray < rays; ++ray) weight += photoRays_.batch().weights[ray];
-  const std::vector<float> losses = device_.read(losses_.all());
   return {losses[1], 3 * weight, losses[0]};
 }
 
@@ -198,9 +209,15 @@ void HashTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
   rates.fine = rates.table;
   rates.fine.rate *= static_cast<float>(config_.fineRateFactor);
   rates.network.l2 = static_cast<float>(config_.networkL2);
+  for (Adam* adam : {&rates.table, &rates.fine, &rates.network}) {
+    if (rays_ > 1) adam->found = pass_.texelsWanted();
+    adam->room = model_.fields().roomForTexels();
+  }
   model_.fields().step(rates);
   model_.direction().step(device_, rates.network);
-  exposures_.step(step, static_cast<float>(config_.exposureRate * rates.table.rate / config_.rate), config_.exposure);
+  Adam ofExposures = rates.table;
+  ofExposures.rate = static_cast<float>(config_.exposureRate * rates.table.rate / config_.rate);
+  exposures_.step(ofExposures, config_.exposure);
 }
 
 Bytes HashTrainer::save(uint32_t part) {

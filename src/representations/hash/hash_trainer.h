@@ -37,8 +37,9 @@ class HashTrainer final : public Trainee {
  private:
   void refreshOccupancy(int64_t step);
   HashModel::Rays drawRays(int64_t step);
+  bool drawsFewerRays(uint32_t texelsWanted);
   void compareWithPhotos(Count rays);
-  Fit comparedRays(uint32_t rays);
+  Fit fitOf(uint32_t rays, const std::vector<float>& losses) const;
   Slice<const float> backgrounds() const;
   void addGradients(const HashModel::Rays& rays, int64_t step, int64_t plannedSteps);
   void updateParameters(int64_t step, int64_t plannedSteps);

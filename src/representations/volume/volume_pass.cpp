@@ -251,10 +251,6 @@ void VolumePass::composite(const VolumeRays& rays) {
                            depth_});
 }
 
-uint32_t VolumePass::texelsWanted() {
-  return device_.read(firstTexel_.part(model_.slots(), 1))[0];
-}
-
 void VolumePass::backward(const VolumeRays& rays, Slice<const float> colourGradients,
                           Slice<const float> opacityGradients, const LossScales& scales) {
   device_.fillZero(losses_.all());

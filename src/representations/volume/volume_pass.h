@@ -52,7 +52,9 @@ class VolumePass {
   Slice<const float> logDensities() const { return logDensities_; }
   Slice<const float> colours() const { return colours_; }  // [7]: diffuse, features
   Slice<const float> runtimeSteps() const { return runtimeSteps_; }
-  uint32_t texelsWanted();  // waits; may be above the room there is
+  Slice<const uint32_t> texelsWanted() const {  // [1], may be above the room there is
+    return firstTexel_.part(model_.slots(), 1);
+  }
   uint32_t roomForTexels() const { return room_.texels; }
   // Of the texels that a slot's field was asked for; both the same when no sample came to its block.
   Slice<const uint32_t> texelRows(uint32_t slot) const { return firstTexel_.part(slot, 2); }

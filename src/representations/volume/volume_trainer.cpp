@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "base/error.h"
 #include "base/log.h"
@@ -160,22 +161,25 @@ VolumePass::Options VolumeTrainer::passOptions(int64_t step, double progress) co
   return options;
 }
 
-// Where rays want more texels than there is room for, what has none is fog: then again with fewer rays.
 VolumeRays VolumeTrainer::forward(int64_t step, const VolumePass::Options& options) {
+  photoRays_.draw(step, rays_);
+  const VolumeRays rays{rays_,
+                        photoRays_.origins(0, rays_),
+                        photoRays_.directions(0, rays_),
+                        photoRays_.jitters(),
+                        photoRays_.fars(0, rays_),
+                        photoRays_.nears(0, rays_)};
+  pass_.forward(rays, options);
+  return rays;
+}
+
+// Where rays want more texels than there is room for, what has none is fog: then again with fewer rays.
+bool VolumeTrainer::drawsFewerRays(uint32_t texelsWanted) {
   constexpr double kFewer = 0.9;  // texels grow more slowly than rays
-  for (;;) {
-    photoRays_.draw(step, rays_);
-    const VolumeRays rays{rays_,
-                          photoRays_.origins(0, rays_),
-                          photoRays_.directions(0, rays_),
-                          photoRays_.jitters(),
-                          photoRays_.fars(0, rays_),
-                          photoRays_.nears(0, rays_)};
-    pass_.forward(rays, options);
-    const double room = pass_.roomForTexels(), wanted = pass_.texelsWanted();
-    if (wanted <= room || rays_ == kGroup) return rays;
-    rays_ = std::max(1u, static_cast<uint32_t>(kFewer * room / wanted * rays_ / kGroup)) * kGroup;
-  }
+  const double room = pass_.roomForTexels(), wanted = texelsWanted;
+  if (wanted <= room || rays_ == kGroup) return false;
+  rays_ = std::max(1u, static_cast<uint32_t>(kFewer * room / wanted * rays_ / kGroup)) * kGroup;
+  return true;
 }
 
 StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
@@ -187,29 +191,34 @@ StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
   }
   const VolumePass::Options options = passOptions(step, progress);
   if (config_.level > 0) model_.lookThrough(isFrozen(progress) ? finerGrid(config_) : config_.virtualGrid());
-  const VolumeRays rays = forward(step, options);
-  addColourGradients(step);
-  pass_.backward(rays, colourGradients_, opacityGradients_, lossScales(step, plannedSteps));
-  updateParameters(step, plannedSteps, options);
+  std::vector<float> losses, inner;
+  std::vector<uint32_t> texels, samples;
+  do {
+    const VolumeRays rays = forward(step, options);
+    addColourGradients(step);
+    pass_.backward(rays, colourGradients_, opacityGradients_, lossScales(step, plannedSteps));
+    updateParameters(step, plannedSteps, options);
+    // The step is over: its counters may be read. Where it had no room, it has changed nothing.
+    std::tie(losses, inner, texels, samples) =
+        device_.readTogether(losses_.all(), pass_.losses(), pass_.texelsWanted(), pass_.firstSample().part(rays_, 1));
+  } while (drawsFewerRays(texels[0]));
+  exposures_.settle(step, config_.exposure);
 
   for (const uint32_t block : model_.blockOfSlot()) asSaved_[block] = false;
 
-  // The step is over: its counters may be read.
-  const std::vector<float> losses = device_.read(losses_.all()), inner = device_.read(pass_.losses());
   StepReport report;
   report.rays = rays_;
-  report.samples = device_.read(pass_.firstSample().part(rays_, 1))[0];
+  report.samples = samples[0];
   report.marched = rays_ * static_cast<uint32_t>(config_.firstIntervals + config_.secondIntervals);
   report.loss = losses[0] + losses[2];
   for (const float loss : inner) report.loss += loss;
   double weight = 0;
   for (const float w : photoRays_.batch().weights) weight += w;
   report.squaredError = losses[1] / std::max(1.0, 3 * weight);
-  const double texels = std::max(1u, pass_.texelsWanted());
-  report.texels = static_cast<uint32_t>(texels);
+  report.texels = std::max(1u, texels[0]);
 
   // Texels grow more slowly than rays, so half of the way is enough.
-  const double wanted = rays_ * std::sqrt(config_.texelsPerStep / texels);
+  const double wanted = rays_ * std::sqrt(static_cast<double>(config_.texelsPerStep) / report.texels);
   rays_ = static_cast<uint32_t>(std::clamp<double>(std::floor(wanted / kGroup), 1, config_.mostRays / kGroup)) * kGroup;
   return report;
 }
@@ -254,11 +263,14 @@ void VolumeTrainer::updateParameters(int64_t step, int64_t plannedSteps, const V
   schedule.constantFraction = config_.constantRateShare;
   const float rate = static_cast<float>(schedule.at(step, plannedSteps));
   const float ofFields = config_.level > 0 ? rate * static_cast<float>(config_.levelRateFactor) : rate;
-  Adam table;
+  Adam all;
+  if (rays_ > kGroup) all.found = pass_.texelsWanted();
+  all.room = pass_.roomForTexels();
+  Adam table = all;
   table.rate = ofFields;
   table.skipZeroGradients = true;
   table.l2 = static_cast<float>(config_.tableL2);
-  Adam network;
+  Adam network = all;
   network.rate = ofFields;
   network.skipZeroGradients = true;  // of blocks that no ray of the step came to
   network.l2 = static_cast<float>(config_.networkL2);
@@ -273,7 +285,10 @@ void VolumeTrainer::updateParameters(int64_t step, int64_t plannedSteps, const V
   }
   network.rate = rate * static_cast<float>(config_.deferredRateFactor);
   model_.deferred().step(device_, network);
-  exposures_.step(step, static_cast<float>(config_.exposureRate / config_.rate) * rate, config_.exposure);
+  Adam ofExposures = all;
+  ofExposures.rate = static_cast<float>(config_.exposureRate / config_.rate) * rate;
+  ofExposures.skipZeroGradients = true;
+  exposures_.step(ofExposures, config_.exposure);
 }
 
 Bytes VolumeTrainer::save(uint32_t part) {

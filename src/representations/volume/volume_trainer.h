@@ -42,6 +42,7 @@ class VolumeTrainer final : public Trainee {
   VolumePass::Options passOptions(int64_t step, double progress) const;
   VolumePass::LossScales lossScales(int64_t step, int64_t plannedSteps) const;
   VolumeRays forward(int64_t step, const VolumePass::Options& options);
+  bool drawsFewerRays(uint32_t texelsWanted);
   void addColourGradients(int64_t step);
   // A coarser level's first steps: only deferred networks are trained, through the grid of the level below.
   bool isFrozen(double progress) const { return config_.level > 0 && progress < config_.frozenShare; }
