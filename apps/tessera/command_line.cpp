@@ -27,7 +27,8 @@ void parsePictureSize(const std::string& size, int& width, int& height) {
   height = high;
 }
 
-int runCommandLine(CLI::App& app, int argc, char** argv, const std::function<void()>& run) {
+int runCommandLine(CLI::App& app, int argc, char** argv, const std::string& moreMemory,
+                   const std::function<void()>& run) {
   try {
     app.parse(argc, argv);
     run();
@@ -43,10 +44,7 @@ int runCommandLine(CLI::App& app, int argc, char** argv, const std::function<voi
                      "see that the disk is there and has room, and that the folder may be changed");
     std::fprintf(stderr, "tessera: error: %s\n", said.what());
   } catch (const std::bad_alloc&) {
-    std::fprintf(stderr,
-                 "tessera: error: memory: this machine has not enough; lower --set photo_budget_mib, grid_log2_size or "
-                 "fine_log2_size; "
-                 "of field samples_per_pass; of volume texels_per_step, or keep few blocks with --resident-blocks\n");
+    std::fprintf(stderr, "tessera: error: memory: this machine has not enough; %s\n", moreMemory.c_str());
   } catch (const std::exception& error) {
     std::fprintf(stderr, "tessera: error: internal: %s; please report it\n", error.what());
   }

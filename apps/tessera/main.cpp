@@ -67,5 +67,8 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "tessera: there is no verb '%s'; tessera --help lists them\n", argv[1]);
     return 2;
   }
-  return tessera::runCommandLine(app, argc, argv);
+  return tessera::runCommandLine(
+      app, argc, argv,
+      "lower --set photo_budget_mib, grid_log2_size or fine_log2_size; of field samples_per_pass; of volume "
+      "texels_per_step, or keep few blocks with --resident-blocks");
 }

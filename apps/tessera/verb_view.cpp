@@ -16,7 +16,7 @@ namespace {
   const fs::path viewer = fs::read_symlink("/proc/self/exe").parent_path() / "tessera-viewer";
   if (!fs::exists(viewer)) {
     throw Error(viewer.string(), "", "this tessera was built without its window",
-                "build it with TESSERA_WINDOW=ON, or use tessera serve");
+                "build it with TESSERA_VULKAN=ON and TESSERA_WINDOW=ON, or use tessera serve");
   }
   if (dlopen("libglfw.so.3", RTLD_LAZY) == nullptr) {
     throw Error("libglfw.so.3", "", "cannot be loaded",

@@ -8,8 +8,9 @@ ShownPicture CardPictures::update(const Camera& window, const Pose& worldFromCam
   const Camera camera = inPixels(window, moving ? pace_.share() : 1);
   const bool isSame = camera == camera_ && worldFromCamera.rotation == pose_.rotation &&
                       worldFromCamera.translation == pose_.translation;
-  shown_.isNew = !isSame || !shown_.isWhole;
+  shown_.isNew = !isSame || renderer_->hasMore();
   if (!shown_.isNew) {
+    shown_.isWhole = !moving && renderer_->state().missing == 0 && camera == camera_;
     begun_.reset();
     return shown_;
   }
@@ -22,6 +23,12 @@ ShownPicture CardPictures::update(const Camera& window, const Pose& worldFromCam
   camera_ = camera;
   pose_ = worldFromCamera;
   return shown_;
+}
+
+std::optional<Vec3d> CardPictures::placeAt(double right, double down) {
+  const std::pair<int, int> pixel = pixelAt(camera_, right, down);
+  const GpuViewRenderer::Pixel drawn = renderer_->pixelAt(pixel.first, pixel.second);
+  return placeOf(camera_, pose_, pixel, drawn.depth, drawn.opacity);
 }
 
 PictureSource::Facts CardPictures::facts() const {

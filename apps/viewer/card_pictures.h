@@ -17,7 +17,7 @@ class CardPictures final : public PictureSource {
 
   ShownPicture update(const Camera& window, const Pose& worldFromCamera, bool moving) override;
   Eigen::Array3f background() const override { return renderer_->background(); }
-  std::optional<double> depthAt(double right, double down) override { return renderer_->depthAt(right, down); }
+  std::optional<Vec3d> placeAt(double right, double down) override;
   Facts facts() const override;
 
  private:

@@ -18,6 +18,7 @@ namespace tessera {
 namespace {
 
 constexpr float kFontPixels = 15;
+constexpr double kLongestStep = 0.1;  // seconds
 
 // As the shaders read them.
 static_assert(sizeof(ImDrawVert) == 20 && sizeof(ImDrawIdx) == 2);
@@ -25,10 +26,6 @@ static_assert(sizeof(ImDrawVert) == 20 && sizeof(ImDrawIdx) == 2);
 template <class T>
 std::span<const std::byte> bytesOf(const ImVector<T>& values) {
   return std::as_bytes(std::span(values.Data, static_cast<size_t>(values.Size)));
-}
-
-double held(int key, int other) {
-  return ImGui::IsKeyDown(key) || ImGui::IsKeyDown(other) ? 1 : 0;
 }
 
 }  // namespace
@@ -42,9 +39,11 @@ Interface::Interface(Window& window, const std::shared_ptr<const GpuContext>& co
   io.BackendFlags |= ImGuiBackendFlags_RendererHasVtxOffset;
   ImGui_ImplGlfw_InitForVulkan(window.handle(), true);
   ImGui::StyleColorsDark();
-  const float scale = window.contentScale();
-  ImGui::GetStyle().ScaleAllSizes(scale);
-  ImGui::GetStyle().WindowRounding = 4 * scale;
+  // Dear ImGui reckons in the desktop's units, of which a pixel may be a part; letters are made for pixels.
+  const float scale = window.contentScale(), unit = window.unitsOfPixel();
+  ImGui::GetStyle().ScaleAllSizes(scale * unit);
+  ImGui::GetStyle().WindowRounding = 4 * scale * unit;
+  io.FontGlobalScale = unit;
   ImFontConfig font;
   font.SizePixels = std::round(kFontPixels * scale);
   font.OversampleH = font.OversampleV = 1;
@@ -74,7 +73,7 @@ void Interface::begin() {
 Moves Interface::moves() const {
   const ImGuiIO& io = ImGui::GetIO();
   Moves moves;
-  moves.seconds = io.DeltaTime;
+  moves.seconds = std::min(static_cast<double>(io.DeltaTime), kLongestStep);  // nobody moved while the window rested
   const double height = std::max(1.0f, io.DisplaySize.y);
   if (!io.WantCaptureMouse) {
     if (ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
@@ -89,6 +88,7 @@ Moves Interface::moves() const {
     moves.wheel = io.MouseWheel;
   }
   if (!io.WantTextInput && !io.KeyCtrl && !io.KeyAlt && !io.KeySuper) {
+    const auto held = [&](int key, int other) { return window_.isHeld(key) || window_.isHeld(other) ? 1.0 : 0.0; };
     moves.right = held(GLFW_KEY_D, GLFW_KEY_RIGHT) - held(GLFW_KEY_A, GLFW_KEY_LEFT);
     moves.up = held(GLFW_KEY_E, GLFW_KEY_PAGE_UP) - held(GLFW_KEY_Q, GLFW_KEY_PAGE_DOWN);
     moves.forward = held(GLFW_KEY_W, GLFW_KEY_UP) - held(GLFW_KEY_S, GLFW_KEY_DOWN);

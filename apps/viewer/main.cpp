@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
   app.add_flag("--no-panel", hidden, "begin without the panel (F1 shows it)");
   app.add_option("--screenshot", window.screenshot, "write this PNG once the picture is whole, and end");
   addDeviceFlags(app, view.device);
-  return runCommandLine(app, argc, argv, [&] {
+  return runCommandLine(app, argc, argv, "lower --memory-mib, or make the window smaller with --size", [&] {
     parsePictureSize(size, window.width, window.height);
     window.panels = !hidden;
     window.mode = mode == "fly" ? NavigationMode::fly : mode == "orbit" ? NavigationMode::orbit : NavigationMode::map;

@@ -13,7 +13,7 @@ constexpr double kLookTurn = 1.5;                       // likewise, when flying
 constexpr double kLeastFromUp = 0.02;                   // radians: never straight up or down
 constexpr double kMapAngle = 0.495 * std::numbers::pi;  // from straight down: no farther on the map
 constexpr double kWheel = 0.85;                         // of the distance that is left, a notch
-constexpr double kPanShare = 0.93;  // 2 tan(fov / 2), of the 50° that windows show: dragged places keep up
+constexpr double kDragNotches = 20;                     // of the wheel, for a drag over the whole window's height
 const Vec3d kUp = Vec3d::UnitZ();
 
 // Forwards, by its angle from straight up and around.
@@ -45,15 +45,8 @@ Vec3d rightOf(const Vec3d& forward) {
 
 }  // namespace
 
-Navigation::Navigation(const Vec3d& low, const Vec3d& high) : low_(low), high_(high) {
-  setBounds(low, high);
+Navigation::Navigation(const Vec3d& low, const Vec3d& high) : low_(low), high_(high), speed_(radius() / 8) {
   look_ = overview();
-}
-
-void Navigation::setBounds(const Vec3d& low, const Vec3d& high) {
-  low_ = low;
-  high_ = high;
-  speed_ = radius() / 8;
 }
 
 double Navigation::radius() const {
@@ -61,11 +54,11 @@ double Navigation::radius() const {
   return std::max(0.5 * std::hypot(size.x(), size.y()), 1e-6);
 }
 
-Look Navigation::overview() const {
+Look Navigation::overview(double aspect) const {
   Look look;
   look.target = 0.5 * (low_ + high_);
   look.target.z() = low_.z();
-  look.eye = look.target + radius() * Vec3d(0, -0.8, 0.75);
+  look.eye = look.target + radius() * std::max(1.0, 1 / aspect) * Vec3d(0, -0.8, 0.75);
   return look;
 }
 
@@ -76,6 +69,7 @@ void Navigation::setMode(NavigationMode mode) {
     look_.target = look_.eye + distance * forwardOf(look_);
   }
   mode_ = mode;
+  flight_.reset();
   if (mode == NavigationMode::map && anglesOf(forwardOf(look_)).fromUp < std::numbers::pi - kMapAngle) {
     turnAround(0, 0);  // nobody looks upwards over a map
   }
@@ -132,9 +126,7 @@ bool Navigation::update(const Moves& moves) {
     if (mode_ == NavigationMode::fly) {
       speed_ = std::clamp(speed_ * std::pow(1.2, moves.wheel), radius() / 1000, 10 * radius());
     } else {
-      const Vec3d away = look_.eye - look_.target;
-      const double distance = std::clamp(away.norm() * std::pow(kWheel, moves.wheel), leastDistance(), mostDistance());
-      look_.eye = look_.target - distance * forwardOf(look_);
+      comeNearer(moves.wheel);
     }
   }
   const double pace = mode_ == NavigationMode::fly ? speed_ : 0.8 * (look_.eye - look_.target).norm();
@@ -143,19 +135,29 @@ bool Navigation::update(const Moves& moves) {
   return look_.eye != before.eye || look_.target != before.target;
 }
 
+void Navigation::comeNearer(double notches) {
+  const double now = (look_.eye - look_.target).norm();
+  const double distance = std::clamp(now * std::pow(kWheel, notches), leastDistance(), mostDistance());
+  look_.eye = look_.target - distance * forwardOf(look_);
+}
+
 void Navigation::drag(const Moves& moves) {
   if (moves.drag == Moves::Drag::none || (moves.dragRight == 0 && moves.dragDown == 0)) return;
   if (mode_ == NavigationMode::fly) {
     turnHere(moves.dragRight * kLookTurn, moves.dragDown * kLookTurn);  // drags the picture
     return;
   }
+  if (moves.drag == Moves::Drag::middle) {
+    comeNearer(-moves.dragDown * kDragNotches);
+    return;
+  }
   const bool turns = (moves.drag == Moves::Drag::left) == (mode_ == NavigationMode::orbit);
-  if (turns && moves.drag != Moves::Drag::middle) {
+  if (turns) {
     turnAround(-moves.dragRight * kTurn, -moves.dragDown * kTurn);
     return;
   }
   const Vec3d forward = forwardOf(look_), right = rightOf(forward);
-  const double height = kPanShare * (look_.eye - look_.target).norm();  // of the window, where the target is
+  const double height = moves.viewHeight * (look_.eye - look_.target).norm();  // of the window, where the target is
   // Over the ground, or in the picture's plane.
   Vec3d down = forward.cross(right);
   double share = 1;

@@ -1,4 +1,4 @@
-// How people move: over a map, around a place, or flying. The browser's viewer moves alike (web/src/app/moving). World
+// How people move: over a map, around a place, or flying; much as in the browser's viewer (web/src/app/moving). World
 // units; Z is up.
 #pragma once
 
@@ -17,6 +17,7 @@ struct Look {
 // What people did since the last picture.
 struct Moves {
   double seconds = 0;
+  double viewHeight = 0.93;  // of the window at distance 1: 2 tan(fov / 2)
   enum class Drag { none, left, right, middle } drag = Drag::none;
   double dragRight = 0, dragDown = 0;     // of the window's height
   double wheel = 0;                       // notches, away from oneself
@@ -29,14 +30,13 @@ class Navigation {
   // A box around what there is to be seen, in the world.
   Navigation(const Vec3d& low, const Vec3d& high);
 
-  void setBounds(const Vec3d& low, const Vec3d& high);
   void setMode(NavigationMode mode);
   NavigationMode mode() const { return mode_; }
 
   const Look& look() const { return look_; }
   void setLook(const Look& look);  // at once; flyTo takes its time
   void flyTo(const Look& look);
-  Look overview() const;                           // above and beside the middle
+  Look overview(double aspect = 1.5) const;        // above and beside the middle; of a window so much wider than high
   void focus(const Vec3d& place);                  // comes nearer to a place, from where the camera is
   Look lookOf(const Pose& worldFromCamera) const;  // what a photo looks at, some way ahead
 
@@ -52,6 +52,7 @@ class Navigation {
     double seconds = 0;
   };
   void drag(const Moves& moves);
+  void comeNearer(double notches);                   // of a wheel
   void go(double right, double up, double forward);  // world units
   void turnAround(double yaw, double pitch);         // the target; radians
   void turnHere(double yaw, double pitch);

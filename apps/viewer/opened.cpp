@@ -1,7 +1,9 @@
 #include "apps/viewer/opened.h"
 
 #include <chrono>
+#include <cmath>
 #include <thread>
+#include <utility>
 
 #include "apps/viewer/card_pictures.h"
 #include "apps/viewer/opened_drawable.h"
@@ -90,7 +92,14 @@ Place placeOf(const ViewOptions& options) {
     if (views.empty() && fs::exists(placement.capture / "transforms.json")) views = placement.capture;
   }
   if (views.empty()) return place;
-  const Capture capture = readCapture(views);
+  Capture capture;
+  try {
+    capture = readCapture(views);
+  } catch (const Error& error) {
+    if (!options.views.empty()) throw;
+    warn("{}: there are no views of photos", error.what());
+    return place;
+  }
   if ((capture.sourceFromWorld - sourceFromWorld).norm() > 1e-9 * sourceFromWorld.norm()) {
     const std::string other = "its world is not the one of " + options.folder.string();
     if (!options.views.empty()) {
@@ -103,11 +112,14 @@ Place placeOf(const ViewOptions& options) {
   return place;
 }
 
-GpuOptions windowDevice(const ViewOptions& options) {
-  GpuOptions gpu;
-  gpu.presents = true;
-  if (isScene(options.folder)) gpu.device = vulkanDeviceOf(options.device.kind).value_or("");
-  return gpu;
+void waitForModel(const fs::path& folder) {
+  const ModelFolder model(folder);
+  for (bool told = false; !isScene(folder) && !model.manifest();) {
+    if (!std::exchange(told, true)) {
+      inform("{}: waits for the training's first checkpoint (train --checkpoint-seconds)", folder.string());
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  }
 }
 
 std::unique_ptr<PictureSource> openPictures(const ViewOptions& options,
@@ -115,13 +127,6 @@ std::unique_ptr<PictureSource> openPictures(const ViewOptions& options,
   if (isScene(options.folder) && vulkanDeviceOf(options.device.kind)) {
     const bool isHash = readTileset(options.folder).representation == Representation::hash;
     return isHash ? onCard<HashContent>(options, window) : onCard<VolumeContent>(options, window);
-  }
-  const ModelFolder model(options.folder);
-  for (bool told = false; !isScene(options.folder) && !model.manifest();) {
-    if (!std::exchange(told, true)) {
-      inform("{}: waits for the training's first checkpoint (train --checkpoint-seconds)", options.folder.string());
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(500));
   }
   DrawableOptions drawable;
   drawable.threads = options.device.threads;

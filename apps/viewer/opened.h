@@ -29,10 +29,11 @@ struct Place {
 void requireViewable(const fs::path& folder);
 Place placeOf(const ViewOptions& options);
 
-// The context that the window shows pictures with: of scenes that a graphics card draws, that card's.
-GpuOptions windowDevice(const ViewOptions& options);
+// Of a model that has not saved anything yet: waits until it has.
+void waitForModel(const fs::path& folder);
 
-// Of a model that has not saved anything yet: waits until it has. Throws Error as openDrawable and GpuSceneRenderer do.
+// `window`: of the device that shows pictures, and draws scenes unless the processor is to. Throws Error as
+// openDrawable and GpuSceneRenderer do.
 std::unique_ptr<PictureSource> openPictures(const ViewOptions& options,
                                             const std::shared_ptr<const GpuContext>& window);
 

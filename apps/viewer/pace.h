@@ -32,7 +32,10 @@ class Pace {
       tried_ = false;
       return;
     }
-    if (++inTime_ > wait_) tried_ = false;  // it has stood the trial
+    if (++inTime_ > wait_ && tried_) {  // it has stood the trial
+      tried_ = false;
+      wait_ = kPatience;
+    }
     if (step_ + 1 == kShares.size()) return;
     const double more = kShares[step_ + 1] / kShares[step_];
     if (measured_ * more * more < 0.7 * target_) {

@@ -1,6 +1,7 @@
-// For tests: a screen, a virtual one (Xvfb) where the machine has none.
+// For tests: a virtual screen (Xvfb), whatever others there are.
 #pragma once
 
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -17,8 +18,10 @@ class TestScreen {
     before_ = display ? display : "";
     int ends[2];
     if (pipe(ends) != 0) return;
+    unsetenv("WAYLAND_DISPLAY");
     server_ = fork();
     if (server_ == 0) {
+      prctl(PR_SET_PDEATHSIG, SIGKILL);
       close(ends[0]);
       const std::string number = std::to_string(ends[1]);
       execlp("Xvfb", "Xvfb", "-displayfd", number.c_str(), "-screen", "0", "800x600x24", "-nolisten", "tcp",

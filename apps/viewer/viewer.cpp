@@ -43,23 +43,63 @@ float fieldOfViewOf(const Camera& camera) {
   return static_cast<float>(std::clamp(angle, 15.0, 110.0));
 }
 
+// What shows pictures in the window: the device that was asked for, else the best that can.
+struct Screen {
+  std::shared_ptr<const GpuContext> context;
+  std::unique_ptr<GpuPresenter> presenter;
+};
+
+Screen openScreen(const Window& window, const ViewOptions& view) {
+  GpuOptions options;
+  options.presents = true;
+  const auto open = [&] {
+    std::shared_ptr<const GpuContext> context = GpuContext::open(options);
+    auto presenter = std::make_unique<GpuPresenter>(context, window.makeSurface(context->instance()));
+    return Screen{std::move(context), std::move(presenter)};
+  };
+  options.device = vulkanDeviceOf(view.device.kind).value_or("");
+  if (view.device.kind.starts_with("vulkan:")) return open();
+  try {
+    return open();
+  } catch (const Error&) {
+    const size_t devices = GpuContext::devices().size();
+    for (size_t device = 0; device < devices; ++device) {
+      options.device = std::to_string(device);
+      try {
+        return open();
+      } catch (const Error&) {  // what is wrong with the best one is said
+      }
+    }
+    throw;
+  }
+}
+
+std::string nameOf(const fs::path& folder) {
+  const fs::path whole = fs::absolute(folder).lexically_normal();
+  return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+}
+
 class Viewer {
  public:
   Viewer(const ViewOptions& view, const WindowOptions& options)
       : options_(options),
         place_(placeOf(view)),
         navigation_(place_.low, place_.high),
-        name_(fs::absolute(view.folder).lexically_normal().filename().string()),
+        name_(nameOf(view.folder)),
         window_("tessera: " + name_, options.width, options.height),
-        context_(GpuContext::open(windowDevice(view))),
-        presenter_(context_, window_.makeSurface(context_->instance())),
-        showPicture_(context_, presenter_.renderPass(), kWholeWindowSpirv, kShowPictureSpirv),
-        interface_(window_, context_, presenter_.renderPass()),
-        pictures_(openPictures(view, context_)) {
+        screen_(openScreen(window_, view)),
+        pictures_(openPictures(view, screen_.context)),
+        showPicture_(screen_.context, screen_.presenter->renderPass(), kWholeWindowSpirv, kShowPictureSpirv),
+        interface_(window_, screen_.context, screen_.presenter->renderPass()) {
     navigation_.setMode(options.mode);
+    navigation_.setLook(overview());
     panel_.isShown = options.panels;
     if (!options.from.empty()) begin(options.from);
+    window_.show();
   }
+  ~Viewer() { screen_.context->waitIdle(); }
+  Viewer(const Viewer&) = delete;
+  Viewer& operator=(const Viewer&) = delete;
 
   void run() {
     while (!window_.isClosing()) {
@@ -69,25 +109,27 @@ class Viewer {
         window_.listen(kIdle);
         continue;
       }
-      if (window_.takeTouched() || isMoving()) rested_ = 0;
-      if (rested_ > kSettling && !pictureOf(size).isNew) continue;  // all is shown as it is
+      if (window_.takeTouched() || isMoving()) still_ = 0;
+      if (still_ > kSettling && !pictureOf(size).isNew) continue;  // all is shown as it is
       interface_.begin();
       move();
       const ShownPicture picture = pictureOf(size);
+      still_ = picture.isNew ? 0 : still_ + 1;
+      whole_ = picture.isWhole ? whole_ + 1 : 0;
       panel_.isWhole = picture.isWhole;
       count(picture);
-      rested_ = picture.isWhole ? rested_ + 1 : 0;
       tell();
       interface_.end();
-      if (!presenter_.begin(size)) {
-        rested_ = 0;
+      GpuPresenter& presenter = *screen_.presenter;
+      if (!presenter.begin(size)) {
+        still_ = 0;
         continue;
       }
       show(picture);
-      interface_.paint(presenter_);
-      const bool isTaken = !options_.screenshot.empty() && rested_ == kSettling;
+      interface_.paint(presenter);
+      const bool isTaken = !options_.screenshot.empty() && whole_ == kSettling;
       ImageU8 taken;
-      presenter_.end(isTaken ? &taken : nullptr);
+      presenter.end(isTaken ? &taken : nullptr);
       if (isTaken) {
         writePng(options_.screenshot, taken);
         return;
@@ -96,6 +138,10 @@ class Viewer {
   }
 
  private:
+  ShownPicture pictureOf(VkExtent2D size) {
+    return pictures_->update(cameraOf(size, panel_.fieldOfView), navigation_.worldFromCamera(), isMoving());
+  }
+
   // By the end of a name, so that nobody has to write folders.
   void begin(const std::string& name) {
     for (size_t i = 0; i < place_.views.size(); ++i) {
@@ -118,8 +164,9 @@ class Viewer {
     navigation_.flyTo(navigation_.lookOf(to.worldFromCamera));
   }
 
-  ShownPicture pictureOf(VkExtent2D size) {
-    return pictures_->update(cameraOf(size, panel_.fieldOfView), navigation_.worldFromCamera(), isMoving());
+  Look overview() const {
+    const VkExtent2D size = window_.pixels();
+    return navigation_.overview(size.height > 0 ? static_cast<double>(size.width) / size.height : 1);
   }
 
   bool isMoving() const { return Clock::now() - lastMove_ < std::chrono::duration<double>(kRest); }
@@ -131,14 +178,16 @@ class Viewer {
       if (interface_.pressed(key)) navigation_.setMode(mode);
     }
     if (interface_.pressed(GLFW_KEY_F1)) panel_.isShown = !panel_.isShown;
-    if (interface_.pressed(GLFW_KEY_H)) navigation_.flyTo(navigation_.overview());
+    if (interface_.pressed(GLFW_KEY_H)) navigation_.flyTo(overview());
     if (interface_.pressed(GLFW_KEY_N)) go(panel_.view + 1);
     if (interface_.pressed(GLFW_KEY_B)) go(std::max(panel_.view, 0) - 1);
     if (const std::optional<Vec2d> place = interface_.doubleClick();
         place && navigation_.mode() != NavigationMode::fly) {
-      focus(*place);
+      if (const std::optional<Vec3d> seen = pictures_->placeAt(place->x(), place->y())) navigation_.focus(*seen);
     }
-    if (navigation_.update(interface_.moves())) lastMove_ = Clock::now();
+    Moves moves = interface_.moves();
+    moves.viewHeight = 2 * std::tan(0.5 * panel_.fieldOfView * std::numbers::pi / 180);
+    if (navigation_.update(moves)) lastMove_ = Clock::now();
   }
 
   // How fast pictures come while the camera moves.
@@ -152,20 +201,12 @@ class Viewer {
     lastPicture_ = now;
   }
 
-  // Nearer to what is seen there.
-  void focus(const Vec2d& place) {
-    const std::optional<double> depth = pictures_->depthAt(place.x(), place.y());
-    if (!depth) return;
-    const Camera camera = cameraOf(window_.pixels(), panel_.fieldOfView);
-    const std::optional<Vec3d> direction =
-        camera.directionInCamera({place.x() * camera.width, place.y() * camera.height});
-    navigation_.focus(navigation_.worldFromCamera() * (*direction / direction->z() * *depth));
-  }
-
   void tell() {
     if (!panel_.isShown) return;
+    const float lens = panel_.fieldOfView;
     const PanelWish wish = showPanel(name_, navigation_, place_.views, pictures_->facts(), panel_);
-    if (wish.all) navigation_.flyTo(navigation_.overview());
+    if (panel_.fieldOfView != lens) lastMove_ = Clock::now();
+    if (wish.all) navigation_.flyTo(overview());
     if (wish.view >= 0) go(wish.view);
   }
 
@@ -176,12 +217,12 @@ class Viewer {
     shown.opacity = picture.onCard.opacity;
     shown.width = static_cast<uint32_t>(picture.onCard.width);
     shown.height = static_cast<uint32_t>(picture.onCard.height);
-    const VkExtent2D size = presenter_.extent();
+    const VkExtent2D size = screen_.presenter->extent();
     shown.windowWidth = static_cast<float>(size.width);
     shown.windowHeight = static_cast<float>(size.height);
     const Eigen::Array3f background = pictures_->background();
     std::copy(background.data(), background.data() + 3, shown.background);
-    presenter_.draw(showPicture_, std::as_bytes(std::span(&shown, 1)), 3, {{0, 0}, size});
+    screen_.presenter->draw(showPicture_, std::as_bytes(std::span(&shown, 1)), 3, {{0, 0}, size});
   }
 
   WindowOptions options_;
@@ -189,21 +230,22 @@ class Viewer {
   Navigation navigation_;
   std::string name_;
   Window window_;
-  std::shared_ptr<const GpuContext> context_;
-  GpuPresenter presenter_;
+  Screen screen_;
+  std::unique_ptr<PictureSource> pictures_;
   GpuScreenPipeline showPicture_;
   Interface interface_;
-  std::unique_ptr<PictureSource> pictures_;
   PanelState panel_;
   Clock::time_point lastMove_, lastPicture_;
   bool wasMoving_ = false;  // at the last new picture
-  int rested_ = 0;          // pictures of the window since all was shown
+  int still_ = 0;           // pictures of the window since anything changed
+  int whole_ = 0;           // likewise, since all was shown
 };
 
 }  // namespace
 
 void runViewer(const ViewOptions& view, const WindowOptions& options) {
   requireViewable(view.folder);
+  waitForModel(view.folder);
   Viewer(view, options).run();
 }
 

@@ -1,14 +1,18 @@
 #include "apps/viewer/viewer.h"
 
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
 #include <gtest/gtest.h>
 
 #include <numbers>
 
 #include "apps/viewer/test_screen.h"
+#include "apps/viewer/window.h"
 #include "base/error.h"
 #include "base/image_io.h"
 #include "base/temporary_folder.h"
 #include "eval/psnr.h"
+#include "gpu/presenter.h"
 #include "gpu/test_context.h"
 
 namespace tessera {
@@ -19,6 +23,7 @@ constexpr int kWidth = 320, kHeight = 240;
 class ViewerTest : public testing::Test {
  protected:
   void SetUp() override {
+    setenv("TESSERA_VULKAN_VALIDATION", "1", 0);
     SKIP_WITHOUT_VULKAN(openForTest());
     if (!screen_.isThere()) {
       if (vulkanIsRequired()) FAIL() << "no virtual screen: install xvfb";
@@ -88,6 +93,30 @@ TEST_F(ViewerTest, LaysThePanelOverThePicture) {
   }
   EXPECT_EQ(left, 0u);  // beside the panel
   EXPECT_GT(right, 5000u);
+  EXPECT_EQ(GpuContext::validationMessages(), 0);
+}
+
+TEST_F(ViewerTest, FollowsTheWindowsSize) {
+  Window window("resized", 200, 100);
+  window.show();
+  GpuOptions options;
+  options.presents = true;
+  const std::shared_ptr<GpuContext> context = GpuContext::open(options);
+  GpuPresenter presenter(context, window.makeSurface(context->instance()));
+  for (const auto& [width, height] : {std::pair(200, 100), std::pair(320, 240), std::pair(120, 90)}) {
+    glfwSetWindowSize(window.handle(), width, height);
+    ImageU8 seen;
+    for (int i = 0; i < 200 && (seen.width != width || seen.height != height); ++i) {
+      window.listen(0.01);
+      if (presenter.begin(window.pixels())) presenter.end(&seen);
+    }
+    EXPECT_EQ(seen.width, width);
+    EXPECT_EQ(seen.height, height);
+    for (const uint8_t value : seen.pixels) ASSERT_EQ(value, 0);
+  }
+  EXPECT_FALSE(presenter.begin({0, 0}));
+  EXPECT_TRUE(presenter.begin(window.pixels()));
+  presenter.end();
   EXPECT_EQ(GpuContext::validationMessages(), 0);
 }
 

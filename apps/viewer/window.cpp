@@ -22,6 +22,7 @@ Window::Window(const std::string& title, int width, int height) {
                  "run it in a desktop session; elsewhere tessera render makes pictures, tessera serve shows scenes");
   }
   glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
+  glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);
   window_ = glfwCreateWindow(width, height, title.c_str(), nullptr, nullptr);
   if (!window_) {
     const Error error = failed("could not be made", "see that the desktop session is there");
@@ -67,8 +68,12 @@ bool Window::isClosing() const {
   return glfwWindowShouldClose(window_) != 0;
 }
 
-void Window::close() {
-  glfwSetWindowShouldClose(window_, GLFW_TRUE);
+void Window::show() {
+  glfwShowWindow(window_);
+}
+
+bool Window::isHeld(int key) const {
+  return glfwGetKey(window_, key) == GLFW_PRESS;
 }
 
 VkExtent2D Window::pixels() const {
@@ -81,6 +86,13 @@ float Window::contentScale() const {
   float x = 1, y = 1;
   glfwGetWindowContentScale(window_, &x, &y);
   return x;
+}
+
+float Window::unitsOfPixel() const {
+  int width = 0, height = 0;
+  glfwGetWindowSize(window_, &width, &height);
+  const uint32_t inPixels = pixels().width;
+  return inPixels > 0 && width > 0 ? static_cast<float>(width) / static_cast<float>(inPixels) : 1;
 }
 
 void Window::listen(double seconds) {

@@ -24,9 +24,11 @@ class Window {
   VkSurfaceKHR makeSurface(VkInstance instance) const;
 
   bool isClosing() const;
-  void close();
+  void show();                 // it is hidden at first
   VkExtent2D pixels() const;   // 0 × 0 while it is hidden
   float contentScale() const;  // pixels of what is one pixel on an ordinary screen
+  float unitsOfPixel() const;  // the desktop's, in which it speaks of places in windows
+  bool isHeld(int key) const;  // GLFW's number
   // Takes in what people did; waits for something to happen, at most so long.
   void listen(double seconds);
   // Whether people did anything, or the window has to be drawn anew: since the last time.

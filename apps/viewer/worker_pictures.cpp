@@ -12,11 +12,11 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr auto kLook = std::chrono::milliseconds(500);  // between two questions whether there is something new
-constexpr int kBandPixels = 1 << 15;                    // drawn before one looks whether another view is wanted
+constexpr double kBandSeconds = 0.1;                    // drawn before one looks whether another view is wanted
 constexpr std::array kFiner = {0.25, 0.5, 1.0};         // of the window's pixels along an edge, one after another
 
-double milliseconds(Clock::time_point since) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - since).count();
+double secondsSince(Clock::time_point begun) {
+  return std::chrono::duration<double>(Clock::now() - begun).count();
 }
 
 // Rows [first, first + count) of a camera's picture.
@@ -44,6 +44,7 @@ WorkerPictures::~WorkerPictures() {
   }
   changed_.notify_all();
   thread_.join();
+  stream_->context()->waitIdle();
 }
 
 void WorkerPictures::work() {
@@ -57,7 +58,7 @@ void WorkerPictures::work() {
         if (!request_) continue;
         request = *request_;
       }
-      isRefreshed();
+      if (drawn_->refresh()) done_.reset();
       if (done_ != request) drawFor(request);
     }
   } catch (...) {
@@ -66,25 +67,19 @@ void WorkerPictures::work() {
   }
 }
 
-bool WorkerPictures::isRefreshed() {
-  const Clock::time_point now = Clock::now();
-  if (now - looked_ < kLook) return false;
-  looked_ = now;
-  if (!drawn_->refresh()) return false;
-  done_.reset();
-  return true;
-}
-
 bool WorkerPictures::isOutdated(const Request& request) {
   const std::lock_guard lock(mutex_);
   return ends_ || request_ != request;
 }
 
 void WorkerPictures::drawFor(const Request& request) {
-  const Clock::time_point begun = Clock::now();
   const double share = pace_.share();
-  hand(drawn_->renderer().render(inPixels(request.window, share), request.worldFromCamera), request, share == 1);
-  pace_.took(milliseconds(begun));
+  const Clock::time_point begun = Clock::now();
+  const Camera few = inPixels(request.window, share);
+  hand(drawn_->renderer().render(few, request.worldFromCamera), request, share == 1);
+  const double seconds = secondsSince(begun);
+  pace_.took(1000 * seconds);
+  secondsOfPixel_ = seconds / (static_cast<double>(few.width) * few.height);
   if (!request.moving) {
     for (const double finer : kFiner) {
       if (finer <= share) continue;
@@ -99,15 +94,18 @@ void WorkerPictures::drawFor(const Request& request) {
 std::optional<RenderedView> WorkerPictures::drawInBands(const Camera& camera, const Request& request) {
   RenderedView all{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
                    ImageF(camera.width, camera.height, 1)};
-  const int rows = std::max(1, kBandPixels / camera.width);
-  for (int first = 0; first < camera.height; first += rows) {
-    if (isOutdated(request) || isRefreshed()) return std::nullopt;
-    const int count = std::min(rows, camera.height - first);
+  for (int first = 0; first < camera.height;) {
+    if (isOutdated(request)) return std::nullopt;
+    const double rows = std::clamp(kBandSeconds / (secondsOfPixel_ * camera.width), 1.0, 1e6);
+    const int count = std::min(static_cast<int>(rows), camera.height - first);
+    const Clock::time_point begun = Clock::now();
     const RenderedView band = drawn_->renderer().render(bandOf(camera, first, count), request.worldFromCamera);
+    secondsOfPixel_ = std::max(1e-9, secondsSince(begun) / (static_cast<double>(camera.width) * count));
     const size_t at = static_cast<size_t>(first) * static_cast<size_t>(camera.width);
     std::copy(band.colour.pixels.begin(), band.colour.pixels.end(), all.colour.pixels.begin() + 3 * at);
     std::copy(band.opacity.pixels.begin(), band.opacity.pixels.end(), all.opacity.pixels.begin() + at);
     std::copy(band.depth.pixels.begin(), band.depth.pixels.end(), all.depth.pixels.begin() + at);
+    first += count;
   }
   return all;
 }
@@ -137,9 +135,10 @@ ShownPicture WorkerPictures::update(const Camera& window, const Pose& worldFromC
   }
   shown_.isNew = made.has_value();
   if (!made) return shown_;
-  view_ = std::move(made->view);
-  const auto colour = std::as_bytes(std::span(view_.colour.pixels));
-  const auto opacity = std::as_bytes(std::span(view_.opacity.pixels));
+  view_ = std::move(*made);
+  const ImageF& picture = view_.view.colour;
+  const auto colour = std::as_bytes(std::span(picture.pixels));
+  const auto opacity = std::as_bytes(std::span(view_.view.opacity.pixels));
   if (pixels_.bytes() < colour.size() + opacity.size()) {
     stream_->retire(std::move(pixels_));
     pixels_ = GpuBuffer(stream_->context(), colour.size() + opacity.size());
@@ -147,26 +146,25 @@ ShownPicture WorkerPictures::update(const Camera& window, const Pose& worldFromC
   stream_->upload(pixels_, 0, colour);
   stream_->upload(pixels_, colour.size(), opacity);
   stream_->send();
-  shown_.onCard = {view_.colour.width, view_.colour.height, pixels_.address(), pixels_.address() + colour.size(), 0};
-  shown_.isWhole = made->isWhole && !moving && made->of == request;
+  shown_.onCard = {picture.width, picture.height, pixels_.address(), pixels_.address() + colour.size()};
+  shown_.isWhole = view_.isWhole && !moving && view_.of == request;
   return shown_;
 }
 
-std::optional<double> WorkerPictures::depthAt(double right, double down) {
-  const ImageF& depth = view_.depth;
-  if (depth.pixels.empty()) return std::nullopt;
-  const int x = static_cast<int>(std::clamp(right, 0.0, 1.0) * (depth.width - 1) + 0.5);
-  const int y = static_cast<int>(std::clamp(down, 0.0, 1.0) * (depth.height - 1) + 0.5);
-  const size_t pixel = static_cast<size_t>(y) * static_cast<size_t>(depth.width) + static_cast<size_t>(x);
-  const float opacity = view_.opacity.pixels[pixel];
-  if (opacity < 0.5f) return std::nullopt;
-  return depth.pixels[pixel] / opacity;
+std::optional<Vec3d> WorkerPictures::placeAt(double right, double down) {
+  const RenderedView& view = view_.view;
+  if (view.depth.pixels.empty()) return std::nullopt;
+  const Camera camera = view_.of.window.scaledTo(view.depth.width, view.depth.height);
+  const std::pair<int, int> pixel = pixelAt(camera, right, down);
+  const size_t row = static_cast<size_t>(pixel.second) * static_cast<size_t>(camera.width);
+  const size_t at = row + static_cast<size_t>(pixel.first);
+  return placeOf(camera, view_.of.worldFromCamera, pixel, view.depth.pixels[at], view.opacity.pixels[at]);
 }
 
 PictureSource::Facts WorkerPictures::facts() const {
   const std::lock_guard lock(mutex_);
   Facts facts = facts_;
-  facts.emplace_back("Picture", fmt::format("{} x {}", view_.colour.width, view_.colour.height));
+  facts.emplace_back("Picture", fmt::format("{} x {}", view_.view.colour.width, view_.view.colour.height));
   return facts;
 }
 

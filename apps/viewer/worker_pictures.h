@@ -1,7 +1,6 @@
 // Pictures that take long, drawn by a thread of its own: a few pixels at first, all of them when the camera rests.
 #pragma once
 
-#include <chrono>
 #include <condition_variable>
 #include <exception>
 #include <functional>
@@ -37,7 +36,7 @@ class WorkerPictures final : public PictureSource {
     const std::lock_guard lock(mutex_);
     return background_;
   }
-  std::optional<double> depthAt(double right, double down) override;
+  std::optional<Vec3d> placeAt(double right, double down) override;
   Facts facts() const override;
 
  private:
@@ -59,22 +58,21 @@ class WorkerPictures final : public PictureSource {
 
   void work();
   void drawFor(const Request& request);
-  // Nothing where another view has been asked for meanwhile, or there is something new to draw.
+  // Nothing where another view has been asked for meanwhile.
   std::optional<RenderedView> drawInBands(const Camera& camera, const Request& request);
   bool isOutdated(const Request& request);
-  bool isRefreshed();
   void hand(RenderedView view, const Request& request, bool isWhole);
 
   std::shared_ptr<GpuStream> stream_;
   GpuBuffer pixels_;
   ShownPicture shown_;
-  RenderedView view_;  // that is shown
+  Made view_;  // that is shown
 
   // Of the thread that draws:
   std::unique_ptr<ChangingRenderer> drawn_;
   Pace pace_{100, Pace::Begin::few};
   std::optional<Request> done_;
-  std::chrono::steady_clock::time_point looked_;  // when it was asked for something new
+  double secondsOfPixel_ = 1e-4;  // that it took to draw one, lately
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;

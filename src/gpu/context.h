@@ -65,6 +65,7 @@ class GpuContext {
   VkDevice device() const { return device_; }
   VkQueue queue() const { return queue_; }  // compute and transfer, and graphics where the device draws at all
   uint32_t queueFamily() const { return queueFamily_; }
+  void waitIdle() const { vkDeviceWaitIdle(device_); }       // for destructors: whatever went wrong, it is over
   uint32_t timestampBits() const { return timestampBits_; }  // of the queue's clock; 0: it has none
 
   GpuHeap& heap() const { return *heap_; }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "base/check.h"
+#include "base/error.h"
 #include "gpu/call.h"
 
 namespace tessera {
@@ -57,13 +57,10 @@ bool GpuPresenter::begin(VkExtent2D window) {
   }
   Frame& frame = frames_[current_];
   checkVulkan(vkWaitForFences(context_->device(), 1, &frame.drawn, VK_TRUE, UINT64_MAX), "vkWaitForFences");
-  const std::optional<uint32_t> image = swapchain_.acquire(frame.available);
-  if (!image) {
-    fits_ = false;
-    return false;
-  }
+  const GpuSwapchain::Acquired acquired = swapchain_.acquire(frame.available, image_);
+  fits_ = acquired != GpuSwapchain::Acquired::fitsNoMore;
+  if (acquired != GpuSwapchain::Acquired::image) return false;
   checkVulkan(vkResetFences(context_->device(), 1, &frame.drawn), "vkResetFences");
-  image_ = *image;
   frame.buffer = frame.staged = 0;
 
   auto info = vulkanStruct<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
@@ -133,6 +130,11 @@ void GpuPresenter::read(const GpuSwapchain::Image& image, const GpuBuffer& to) {
   copy.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
   copy.imageExtent = {extent().width, extent().height, 1};
   vkCmdCopyImageToBuffer(commands, image.image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, to.handle(), 1, &copy);
+  auto copied = vulkanStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
+  copied.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+  copied.dstAccessMask = VK_ACCESS_HOST_READ_BIT;
+  vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &copied, 0, nullptr,
+                       0, nullptr);
   turn.srcAccessMask = VK_ACCESS_TRANSFER_READ_BIT;
   turn.dstAccessMask = 0;
   std::swap(turn.oldLayout, turn.newLayout);
@@ -146,7 +148,9 @@ void GpuPresenter::end(ImageU8* wanted) {
   vkCmdEndRenderPass(frame.commands);
   GpuBuffer copied;
   if (wanted) {
-    CHECK(swapchain_.canBeRead() == true);
+    if (!swapchain_.canBeRead()) {
+      throw Error(context_->name(), "", "what it shows on this screen cannot be read", "do without a screenshot");
+    }
     copied = GpuBuffer(context_, size_t{4} * extent().width * extent().height, BufferUse::download);
     read(image, copied);
   }

@@ -6,7 +6,6 @@
 #include <array>
 #include <cstddef>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -36,7 +35,8 @@ class GpuPresenter {
   // Draws triangles of so many vertices (gl_VertexIndex from 0), only where `where` says.
   void draw(const GpuScreenPipeline& pipeline, std::span<const std::byte> arguments, uint32_t vertices,
             const VkRect2D& where);
-  // Shows the picture. With `wanted`, waits, and gives it its colours.
+  // Shows the picture. With `wanted`, waits, and gives it its colours; throws Error where the screen does not let them
+  // go.
   void end(ImageU8* wanted = nullptr);
 
  private:

@@ -172,13 +172,15 @@ bool GpuSwapchain::isBlueFirst() const {
   return format_.format == VK_FORMAT_B8G8R8A8_UNORM;
 }
 
-std::optional<uint32_t> GpuSwapchain::acquire(VkSemaphore available) {
-  uint32_t index = 0;
+// Of a window that nobody sees there may be no next image for long.
+GpuSwapchain::Acquired GpuSwapchain::acquire(VkSemaphore available, uint32_t& index) {
+  constexpr uint64_t kLongest = 200'000'000;  // nanoseconds
   const VkResult result =
-      vkAcquireNextImageKHR(context_->device(), swapchain_, UINT64_MAX, available, VK_NULL_HANDLE, &index);
-  if (result == VK_ERROR_OUT_OF_DATE_KHR) return std::nullopt;
+      vkAcquireNextImageKHR(context_->device(), swapchain_, kLongest, available, VK_NULL_HANDLE, &index);
+  if (result == VK_ERROR_OUT_OF_DATE_KHR) return Acquired::fitsNoMore;
   checkVulkan(result, "vkAcquireNextImageKHR");
-  return index;  // VK_SUBOPTIMAL_KHR too: `available` will be signalled, and `present` says so once more
+  if (result == VK_TIMEOUT || result == VK_NOT_READY) return Acquired::nothingYet;
+  return Acquired::image;  // VK_SUBOPTIMAL_KHR too: `present` says so once more
 }
 
 bool GpuSwapchain::present(uint32_t index) {

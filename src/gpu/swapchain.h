@@ -4,7 +4,6 @@
 #include <volk.h>
 
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "gpu/context.h"
@@ -38,8 +37,9 @@ class GpuSwapchain {
     VkFramebuffer framebuffer = VK_NULL_HANDLE;
     VkSemaphore drawn = VK_NULL_HANDLE;  // to be signalled by what is drawn
   };
-  // The next one, which may be drawn once `available` is signalled. Nothing: the images fit the window no more.
-  std::optional<uint32_t> acquire(VkSemaphore available);
+  // The next one, which may be drawn once `available` is signalled.
+  enum class Acquired { image, nothingYet, fitsNoMore };
+  Acquired acquire(VkSemaphore available, uint32_t& index);
   const Image& image(uint32_t index) const { return images_[index]; }
   // Once its `drawn` is signalled. False: the images fit the window no more.
   bool present(uint32_t index);

@@ -47,17 +47,16 @@ class SceneTiles {
   // comes now; -1: none. The cut is of what is there.
   void loadReadyFor(const TileView& view, const std::function<int(const std::vector<int>& missing)>& ready) {
     choose(view);
-    std::vector<int> missing, present;
-    for (const int tile : choice_.wanted) (cache_.holds(tile) ? present : missing).push_back(tile);
-    missing_ = missing.size();
-    if (const int tile = ready(missing); tile >= 0) {
+    std::vector<int> present;
+    for (const int tile : choice_.wanted) (cache_.holds(tile) ? present : missing_).push_back(tile);
+    if (const int tile = ready(missing_); tile >= 0) {
       present.push_back(tile);
       cache_.load(present);
-      --missing_;
+      std::erase(missing_, tile);
     }
     cut(view);
   }
-  size_t missing() const { return missing_; }  // of the last view's wanted ones
+  const std::vector<int>& missing() const { return missing_; }  // of the last view's wanted ones
 
   // Of the last view, in an order that is front to back for every ray of its camera. Counts as a use of each.
   std::vector<DrawnContent<Content>> frontToBack() {
@@ -88,7 +87,7 @@ class SceneTiles {
   void choose(const TileView& view) {
     const auto holds = [this](int tile) { return cache_.holds(tile); };
     choice_ = selector_.choose(view, {cache_.budgetBytes(), holds, [this](int tile) { return cache_.bytesOf(tile); }});
-    missing_ = 0;
+    missing_.clear();
   }
   void cut(const TileView& view) {
     cut_ = selector_.cut(view, [this](int tile) { return cache_.holds(tile); });
@@ -100,7 +99,7 @@ class SceneTiles {
   TileSelector selector_;
   TileChoice choice_;
   TileCut cut_;
-  size_t missing_ = 0;
+  std::vector<int> missing_;
 };
 
 }  // namespace tessera

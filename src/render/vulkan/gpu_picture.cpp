@@ -1,7 +1,5 @@
 #include "render/vulkan/gpu_picture.h"
 
-#include <algorithm>
-
 #include "shaders/begin_view.h"
 
 namespace tessera {
@@ -20,20 +18,22 @@ void copy(const Vec3d& from, float* to) {
 GpuPicture::GpuPicture(std::shared_ptr<GpuStream> stream)
     : stream_(std::move(stream)), begin_(stream_->context(), kBeginViewSpirv), pool_(0) {}
 
+void GpuPicture::makeRoom(GpuBuffer& buffer, size_t floats) {
+  if (buffer.bytes() >= floats * sizeof(float)) return;
+  stream_->retire(std::move(buffer));
+  buffer = GpuBuffer();
+  buffer = GpuBuffer(stream_->context(), floats * sizeof(float));
+}
+
 void GpuPicture::makeRoom(const Camera& camera, uint32_t numbersOfPixel) {
   pixels_.update(camera, pool_);
-  if (directions_ && camera == camera_ && numbersOfPixel <= numbersOfPixel_) return;
-  camera_ = camera;
-  numbersOfPixel_ = numbersOfPixel;
   const size_t pixels = static_cast<size_t>(camera.width) * camera.height;
-  for (GpuBuffer* buffer : {&directions_, &opaqueDepth_, &state_, &drawn_}) {
-    stream_->retire(std::move(*buffer));
-    *buffer = GpuBuffer();
-  }
-  directions_ = GpuBuffer(stream_->context(), pixels * 3 * sizeof(float));
-  opaqueDepth_ = GpuBuffer(stream_->context(), pixels * sizeof(float));
-  state_ = GpuBuffer(stream_->context(), pixels * numbersOfPixel * sizeof(float));
-  drawn_ = GpuBuffer(stream_->context(), pixels * kNumbersDrawn * sizeof(float));
+  makeRoom(directions_, pixels * 3);
+  makeRoom(opaqueDepth_, pixels);
+  makeRoom(state_, pixels * numbersOfPixel);
+  makeRoom(drawn_, pixels * kNumbersDrawn);
+  if (camera == camera_) return;
+  camera_ = camera;
   std::vector<float> directions;
   directions.reserve(3 * pixels);
   for (int y = 0; y < camera.height; ++y) {
@@ -80,7 +80,7 @@ void GpuPicture::begin(const TileFrame& frame, float minTransmittance, uint32_t 
 }
 
 DrawnOnCard GpuPicture::onCard() const {
-  return {camera_.width, camera_.height, view_.colour, view_.opacity, view_.depth};
+  return {camera_.width, camera_.height, view_.colour, view_.opacity};
 }
 
 RenderedView GpuPicture::drawn() {
@@ -95,20 +95,18 @@ RenderedView GpuPicture::drawn() {
   return made;
 }
 
-std::optional<double> GpuPicture::depthAt(double right, double down) {
-  if (!drawn_) return std::nullopt;
-  const size_t pixels = static_cast<size_t>(camera_.width) * camera_.height;
-  const size_t x = static_cast<size_t>(std::clamp(right, 0.0, 1.0) * (camera_.width - 1) + 0.5);
-  const size_t y = static_cast<size_t>(std::clamp(down, 0.0, 1.0) * (camera_.height - 1) + 0.5);
-  const size_t pixel = y * static_cast<size_t>(camera_.width) + x;
-  const auto numberAt = [&](size_t index) {
-    float number = 0;
-    stream_->download(drawn_, index * sizeof(float), std::as_writable_bytes(std::span(&number, 1)));
-    return number;
+std::array<float, 2> GpuPicture::opacityAndDepthAt(int x, int y) {
+  const size_t width = static_cast<size_t>(camera_.width), pixels = width * static_cast<size_t>(camera_.height);
+  const size_t pixel = static_cast<size_t>(y) * width + static_cast<size_t>(x);
+  CHECK(pixel < pixels);
+  std::array<float, 2> read = {};
+  const auto one = [&](size_t number, float& to) {
+    return GpuStream::Download{&drawn_, (number * pixels + pixel) * sizeof(float),
+                               std::as_writable_bytes(std::span(&to, 1))};
   };
-  const float opacity = numberAt(3 * pixels + pixel), depth = numberAt(4 * pixels + pixel);
-  if (opacity < 0.5f) return std::nullopt;
-  return depth / opacity;
+  const GpuStream::Download downloads[] = {one(3, read[0]), one(4, read[1])};
+  stream_->download(downloads);
+  return read;
 }
 
 }  // namespace tessera

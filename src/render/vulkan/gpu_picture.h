@@ -1,8 +1,8 @@
 // A picture that is being drawn on a graphics card: its rays, what is added up along them, and what comes back.
 #pragma once
 
+#include <array>
 #include <memory>
-#include <optional>
 
 #include "gpu/stream.h"
 #include "render/cpu/draw_scene.h"
@@ -11,10 +11,10 @@
 
 namespace tessera {
 
-// A picture on the card, as RenderedView has it: addresses of [pixels][3], [pixels], [pixels] floats.
+// A picture on the card, as RenderedView has it: addresses of [pixels][3] and [pixels] floats.
 struct DrawnOnCard {
   int width = 0, height = 0;
-  uint64_t colour = 0, opacity = 0, depth = 0;
+  uint64_t colour = 0, opacity = 0;
 };
 
 class GpuPicture {
@@ -32,17 +32,17 @@ class GpuPicture {
   }
   DrawnOnCard onCard() const;  // valid until the next one begins, for what the card does after it
   RenderedView drawn();        // waits
-  std::optional<double> depthAt(double right, double down);  // GpuViewRenderer
+  std::array<float, 2> opacityAndDepthAt(int x, int y);  // waits; there must be a picture
 
  private:
+  void makeRoom(GpuBuffer& buffer, size_t floats);
   void makeRoom(const Camera& camera, uint32_t numbersOfPixel);
 
   std::shared_ptr<GpuStream> stream_;
   GpuKernel begin_;
   ThreadPool pool_;
   PixelDirections pixels_;
-  Camera camera_;  // that there is room for
-  uint32_t numbersOfPixel_ = 0;
+  Camera camera_;  // of the last picture
   GpuBuffer directions_, opaqueDepth_, state_, drawn_;
   arguments::ViewArguments view_ = {};
   Groups groups_;

@@ -101,11 +101,17 @@ DrawnOnCard GpuSceneRenderer<Content>::draw(const Camera& camera, const Pose& wo
 }
 
 template <class Content>
+bool GpuSceneRenderer<Content>::hasMore() const {
+  return std::any_of(tiles_.missing().begin(), tiles_.missing().end(),
+                     [this](int tile) { return prefetch_->isReady(tile); });
+}
+
+template <class Content>
 SceneState GpuSceneRenderer<Content>::state() const {
   const auto isDrawn = [](const SelectedTile& tile) { return tile.visible; };
   const std::vector<SelectedTile>& tiles = cut().tiles;
   const size_t inBox = static_cast<size_t>(std::count_if(tiles.begin(), tiles.end(), isDrawn));
-  return {inBox + (cut().surround >= 0 ? 1 : 0), tiles_.missing(), static_cast<size_t>(choice().refused),
+  return {inBox + (cut().surround >= 0 ? 1 : 0), tiles_.missing().size(), static_cast<size_t>(choice().refused),
           cache().statistics(), cache().budgetBytes()};
 }
 

@@ -36,9 +36,12 @@ class GpuViewRenderer : public ViewRenderer {
   // As render(), but the picture stays on the card, and nothing waits for it: it is there for what is sent to the
   // context's queue afterwards, until the next one begins.
   virtual DrawnOnCard draw(const Camera& camera, const Pose& worldFromCamera) = 0;
-  // z-depth in world units at a place of the last picture, 0 to 1 to the right and down; nothing where less than half
-  // of what is behind is hidden. Waits.
-  virtual std::optional<double> depthAt(double right, double down) = 0;
+  // Whether the same view would show more now: something has been read that the last picture had to do without.
+  virtual bool hasMore() const = 0;
+  struct Pixel {
+    float opacity = 0, depth = 0;  // as of RenderedView
+  };
+  virtual Pixel pixelAt(int x, int y) = 0;  // of the last picture; waits
   virtual SceneState state() const = 0;
 };
 
@@ -64,12 +67,17 @@ class GpuSceneRenderer final : public GpuViewRenderer {
   // throws.
   GpuSceneRenderer(const std::shared_ptr<const GpuContext>& context, TileScene<Content> scene,
                    const GpuRendererSettings& settings);
+  ~GpuSceneRenderer() override { stream_->context()->waitIdle(); }
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
   DrawnOnCard draw(const Camera& camera, const Pose& worldFromCamera) override;
+  bool hasMore() const override;
   std::string device() const override { return "vulkan " + stream_->context()->name(); }
   Eigen::Array3f background() const override { return background_; }
-  std::optional<double> depthAt(double right, double down) override { return picture_.depthAt(right, down); }
+  Pixel pixelAt(int x, int y) override {
+    const auto [opacity, depth] = picture_.opacityAndDepthAt(x, y);
+    return {opacity, depth};
+  }
   SceneState state() const override;
 
   const TileCut& cut() const { return tiles_.cut(); }  // of the last picture

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <thread>
+
 #include "gpu/test_context.h"
 #include "render/cpu/scene_renderer.h"
 #include "render/made_hash.h"
@@ -176,6 +179,44 @@ TEST_F(GpuSceneRendererTest, ShowsWhereNothingIsWhatAWholeHashSaysOfTheDirection
   compare<HashContent>(whole, whole.allBytes, 1.5);
   const ImageF opaque = opaqueOnTheLeft();
   compare<HashContent>(whole, whole.allBytes, 16, &opaque);
+}
+
+TEST_F(GpuSceneRendererTest, ReadsContentsInTheBackgroundAndShowsInTheEndWhatItWouldHaveWaitedFor) {
+  GpuRendererSettings settings;
+  settings.selection.mostPixels = 0.5;
+  GpuVolumeRenderer waits(context_, {place().frame, place().tree, place().source(), {}}, settings);
+  const RenderedView wanted = waits.render(flightCamera(), flightPose(0), nullptr);
+  settings.inBackground = true;
+  GpuVolumeRenderer card(context_, {place().frame, place().tree, place().source(), {}}, settings);
+  card.draw(flightCamera(), flightPose(0));
+  const size_t missing = card.state().missing;
+  EXPECT_GT(missing, 0u);  // coarser contents stand in
+  for (int i = 0; i < 5000 && card.state().missing > 0; ++i) {
+    const size_t before = card.state().missing;
+    if (!card.hasMore()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      continue;
+    }
+    card.draw(flightCamera(), flightPose(0));
+    EXPECT_EQ(card.state().missing, before - 1);  // one at a time: no picture waits for many
+  }
+  ASSERT_EQ(card.state().missing, 0u);
+  EXPECT_EQ(card.state().cache.loads, waits.state().cache.loads);
+  const RenderedView got = card.render(flightCamera(), flightPose(0), nullptr);
+  EXPECT_EQ(got.colour.pixels, wanted.colour.pixels);
+  for (const auto& [x, y] : {std::pair(0, 0), std::pair(31, 20), std::pair(63, 30)}) {
+    const GpuViewRenderer::Pixel pixel = card.pixelAt(x, y);
+    EXPECT_EQ(pixel.opacity, *wanted.opacity.at(x, y));
+    EXPECT_EQ(pixel.depth, *wanted.depth.at(x, y));
+  }
+}
+
+TEST_F(GpuSceneRendererTest, MayGoWhileTheCardStillDraws) {
+  const HashPlace made(32);
+  for (int i = 0; i < 3; ++i) {
+    GpuHashRenderer card(context_, {made.frame, made.tree, made.source(), {}}, {});
+    card.draw(flightCamera().scaledTo(300, 200), flightPose(100 * i));
+  }
 }
 
 TEST_F(GpuSceneRendererTest, FollowsCamerasOfOtherSizes) {

@@ -43,6 +43,24 @@ TEST(HashTrainer, LearnsWhatLiesAroundTheRegionInTheSurround) {
   }
 }
 
+TEST(HashTrainer, MakesAStepThatHadNoRoomAgainAsIfItHadNeverTriedMoreRays) {
+  const CubeScene scene;
+  HashConfig config = smallHashConfig();
+  config.exposure = true;
+  config.samplesPerStep = 1 << 16;
+  config.lattice = 64;
+  config.texelsPerStep = 1 << 11;
+  config.firstRays = config.mostRays;
+  TrainedHashCube trained(scene, config, cubeGrid(), 0);
+  const StepReport report = trained.trainer->step(0, 10);
+  EXPECT_LT(report.rays, static_cast<uint32_t>(config.mostRays));
+  EXPECT_LE(report.texels, trained.model().fields().roomForTexels());
+  config.firstRays = static_cast<int>(report.rays);
+  TrainedHashCube meant(scene, config, cubeGrid(), 0);
+  EXPECT_EQ(meant.trainer->step(0, 10).texels, report.texels);
+  EXPECT_EQ(meant.saved(), trained.saved());
+}
+
 TEST(HashTrainer, LearnsWithEveryWayToFuseLevels) {
   const CubeScene scene;
   for (const char* aggregation : {"attention", "sum", "mlp"}) {

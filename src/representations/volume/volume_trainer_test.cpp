@@ -173,6 +173,7 @@ TEST(VolumeTrainer, TakesFewerRaysWhereTheyWantMoreTexelsThanThereIsRoomFor) {
   VolumeConfig config = smallVolumeConfig();
   config.texelsPerStep = 4096;
   config.sparsityPoints = 16;
+  config.exposure = true;
   config.firstRays = config.mostRays;
   TrainedVolumeCube trained(scene, config, cubeGrid(), 0);
   const StepReport report = trained.trainer->step(0, 10);
@@ -183,6 +184,11 @@ TEST(VolumeTrainer, TakesFewerRaysWhereTheyWantMoreTexelsThanThereIsRoomFor) {
   TrainedVolumeCube again(scene, config, cubeGrid(), 0);
   EXPECT_EQ(again.trainer->step(0, 10).rays, report.rays);
   EXPECT_EQ(again.saved(), trained.saved());
+  // As if it had never been tried with more.
+  config.firstRays = static_cast<int>(report.rays);
+  TrainedVolumeCube meant(scene, config, cubeGrid(), 0);
+  EXPECT_EQ(meant.trainer->step(0, 10).rays, report.rays);
+  EXPECT_EQ(meant.saved(), trained.saved());
 }
 
 // Of each ray of the last step: the blocks that are seen through its tile.

@@ -1,0 +1,166 @@
+#include "apps/viewer/worker_pictures.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+
+#include "base/error.h"
+#include "gpu/test_context.h"
+
+namespace tessera {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr int kWidth = 64, kHeight = 48;
+
+// A plane at depth 2 · x, whose colour says which version was drawn and where.
+class FakeRenderer final : public ChangingRenderer, public ViewRenderer {
+ public:
+  struct Control {
+    std::atomic<int> version = 1, slowness = 0;  // milliseconds of a picture
+    std::atomic<int> pictures = 0;
+    std::atomic<bool> fails = false;
+  };
+  explicit FakeRenderer(Control& control) : control_(control), drawn_(control.version) {}
+
+  bool refresh() override {
+    if (control_.fails) throw Error("model", "", "is gone", "bring it back");
+    return std::exchange(drawn_, control_.version) != drawn_;
+  }
+  ViewRenderer& renderer() override { return *this; }
+  PictureSource::Facts facts() const override { return {{"Version", std::to_string(drawn_)}}; }
+  std::string device() const override { return "fake"; }
+  RenderedView render(const Camera& camera, const Pose& pose, const ImageF*) override {
+    ++control_.pictures;
+    std::this_thread::sleep_for(milliseconds(control_.slowness));
+    RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
+                      ImageF(camera.width, camera.height, 1)};
+    for (size_t p = 0; p < view.opacity.pixels.size(); ++p) {
+      view.opacity.pixels[p] = pose.translation.x() > 0 ? 1.0f : 0.25f;
+      view.depth.pixels[p] = view.opacity.pixels[p] * 2 * static_cast<float>(pose.translation.x());
+    }
+    return view;
+  }
+
+ private:
+  Control& control_;
+  int drawn_;
+};
+
+class WorkerPicturesTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    GpuOptions options;
+    options.validation = true;
+    context_ = openForTest(options);
+    SKIP_WITHOUT_VULKAN(context_);
+    pictures_ = std::make_unique<WorkerPictures>(context_, std::make_unique<FakeRenderer>(control_));
+  }
+  void TearDown() override {
+    pictures_.reset();
+    if (context_) {
+      EXPECT_EQ(GpuContext::validationMessages(), 0);
+    }
+  }
+
+  static Camera window() { return {kWidth, kHeight, LensModel::pinhole, {50, 50, 0.5 * kWidth, 0.5 * kHeight}}; }
+  static Pose poseAt(double x) {
+    Pose pose;
+    pose.translation.x() = x;
+    return pose;
+  }
+  ShownPicture update(double x, bool moving = false) { return pictures_->update(window(), poseAt(x), moving); }
+  // Asks for a view until it is whole; false where that takes too long.
+  bool becomesWhole(double x) {
+    for (int i = 0; i < 5000; ++i) {
+      if (update(x).isWhole) return true;
+      std::this_thread::sleep_for(milliseconds(1));
+    }
+    return false;
+  }
+
+  FakeRenderer::Control control_;
+  std::shared_ptr<GpuContext> context_;
+  std::unique_ptr<WorkerPictures> pictures_;
+};
+
+TEST_F(WorkerPicturesTest, ShowFewPixelsFirstAndThenAllOfThem) {
+  EXPECT_EQ(update(1).onCard.colour, 0u);  // there is none yet, and nobody waits
+  int first = 0;
+  for (int i = 0; i < 5000 && first == 0; ++i) {
+    first = update(1).onCard.width;
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  EXPECT_LE(first, kWidth);
+  ASSERT_TRUE(becomesWhole(1));
+  EXPECT_EQ(update(1).onCard.width, kWidth);
+  EXPECT_FALSE(update(1).isNew);
+}
+
+TEST_F(WorkerPicturesTest, AreNotWholeOfAViewThatWasAskedForBefore) {
+  ASSERT_TRUE(becomesWhole(1));
+  EXPECT_FALSE(update(2).isWhole);
+  EXPECT_FALSE(update(3).isWhole);
+  ASSERT_TRUE(becomesWhole(3));
+  const std::optional<Vec3d> place = pictures_->placeAt(0.5, 0.5);
+  ASSERT_TRUE(place.has_value());
+  EXPECT_NEAR(place->z(), 6, 1e-5);  // of the third view
+  EXPECT_NEAR(place->x(), 3, 0.2);
+  EXPECT_FALSE(update(3, true).isWhole);  // while it moves, nothing is
+}
+
+TEST_F(WorkerPicturesTest, TellNoPlaceWhereLittleStands) {
+  ASSERT_TRUE(becomesWhole(-1));
+  EXPECT_FALSE(pictures_->placeAt(0.5, 0.5).has_value());
+}
+
+TEST_F(WorkerPicturesTest, AreDrawnAnewWhenWhatIsDrawnHasChanged) {
+  ASSERT_TRUE(becomesWhole(1));
+  const int before = control_.pictures;
+  control_.version = 2;
+  for (int i = 0; i < 5000 && control_.pictures == before; ++i) std::this_thread::sleep_for(milliseconds(1));
+  EXPECT_GT(control_.pictures, before);
+  for (int i = 0; i < 5000 && pictures_->facts()[0].second != "2"; ++i) {
+    update(1);
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  EXPECT_EQ(pictures_->facts()[0].second, "2");
+}
+
+TEST_F(WorkerPicturesTest, LeaveAPictureWhenAnotherViewIsWanted) {
+  ASSERT_TRUE(becomesWhole(1));
+  control_.slowness = 150;  // of each band: one row at a time
+  update(2);
+  std::this_thread::sleep_for(milliseconds(400));
+  const auto begun = std::chrono::steady_clock::now();
+  int seen = 0;
+  for (int i = 0; i < 3000 && seen == 0; ++i) {  // not after all rows of the second view
+    const ShownPicture picture = update(3);
+    if (picture.isNew) {
+      const std::optional<Vec3d> place = pictures_->placeAt(0.5, 0.5);
+      if (place && std::abs(place->z() - 6) < 1e-4) seen = 1;
+    }
+    std::this_thread::sleep_for(milliseconds(2));
+  }
+  EXPECT_EQ(seen, 1);
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(4));  // all rows: 7 seconds
+  control_.slowness = 0;
+}
+
+TEST_F(WorkerPicturesTest, SayWhatWentWrongWhileTheyWereDrawn) {
+  ASSERT_TRUE(becomesWhole(1));
+  control_.fails = true;
+  EXPECT_THROW(
+      {
+        for (int i = 0; i < 5000; ++i) {
+          update(1);
+          std::this_thread::sleep_for(milliseconds(1));
+        }
+      },
+      Error);
+}
+
+}  // namespace
+}  // namespace tessera
