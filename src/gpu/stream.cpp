@@ -1,11 +1,13 @@
 #include "gpu/stream.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 
 #include "base/check.h"
 #include "base/error.h"
 #include "gpu/call.h"
+#include "shaders/copy_words.h"
 
 namespace tessera {
 
@@ -13,6 +15,9 @@ namespace {
 
 constexpr size_t kAlignment = 64;           // of staged bytes; more than any argument struct needs
 constexpr size_t kCommandsPerBatch = 1024;  // more than a training step has
+constexpr size_t kArgumentBytes = 256 * kCommandsPerBatch;
+constexpr size_t kSmallBatch = 8;                     // commands
+constexpr size_t kMostCopiedWords = size_t{1} << 20;  // by a kernel: what is larger is as large the next time, mostly
 constexpr uint32_t kQueries = kCommandsPerBatch + 1;
 constexpr VkPipelineStageFlags kStages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
 
@@ -25,8 +30,18 @@ void barrier(VkCommandBuffer commands, VkAccessFlags reads, VkPipelineStageFlags
 
 }  // namespace
 
+uint32_t workgroups(size_t count, size_t perGroup, size_t most) {
+  size_t groups = (count + perGroup - 1) / perGroup;
+  const int spare = static_cast<int>(std::bit_width(groups)) - 4;
+  if (spare > 0) groups = ((groups + (size_t{1} << spare) - 1) >> spare) << spare;
+  return static_cast<uint32_t>(std::min(groups, most));
+}
+
 GpuStream::GpuStream(std::shared_ptr<const GpuContext> context, size_t stagingBytes)
-    : context_(std::move(context)), stagingBytes_(stagingBytes / kAlignment * kAlignment) {
+    : context_(std::move(context)),
+      stagingBytes_(stagingBytes / kAlignment * kAlignment),
+      copyWords_(context_, kCopyWordsSpirv),
+      zeroWords_(context_, kCopyWordsSpirv, std::array{1u}) {
   CHECK(size_t{0} < stagingBytes_);
   const VkDevice device = context_->device();
   auto poolInfo = vulkanStruct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
@@ -39,14 +54,17 @@ GpuStream::GpuStream(std::shared_ptr<const GpuContext> context, size_t stagingBy
   semaphoreInfo.pNext = &type;
   checkVulkan(vkCreateSemaphore(device, &semaphoreInfo, nullptr, &timeline_), "vkCreateSemaphore");
   for (Batch& batch : batches_) {
-    for (Recording& recording : batch.recordings) {
+    const auto makeBuffer = [&](Recording& recording) {
       auto info = vulkanStruct<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
       info.commandPool = pool_;
       info.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
       info.commandBufferCount = 1;
       checkVulkan(vkAllocateCommandBuffers(device, &info, &recording.buffer), "vkAllocateCommandBuffers");
-    }
+    };
+    for (Recording& recording : batch.recordings) makeBuffer(recording);
+    for (Recording& recording : batch.small) makeBuffer(recording);
     batch.staging = GpuBuffer(context_, stagingBytes_, BufferUse::upload);
+    batch.arguments = GpuBuffer(context_, kArgumentBytes, BufferUse::upload);
   }
 }
 
@@ -87,13 +105,21 @@ void GpuStream::submit() {
 
 GpuStream::Recording& GpuStream::recordingOf(Batch& batch) {
   const uint64_t generation = context_->heap().generation();
+  const auto oldestOf = [](auto& recordings) -> Recording& {
+    return *std::min_element(recordings.begin(), recordings.end(),
+                             [](const Recording& a, const Recording& b) { return a.lastUse < b.lastUse; });
+  };
+  if (batch.commands.size() < kSmallBatch) {
+    Recording& oldest = oldestOf(batch.small);
+    record(batch, oldest);
+    return oldest;
+  }
   if (!measuring_) {
     for (Recording& kept : batch.recordings) {
       if (kept.generation == generation && kept.commands == batch.commands) return kept;
     }
   }
-  Recording& oldest = *std::min_element(batch.recordings.begin(), batch.recordings.end(),
-                                        [](const Recording& a, const Recording& b) { return a.lastUse < b.lastUse; });
+  Recording& oldest = oldestOf(batch.recordings);
   oldest.generation = 0;  // whatever becomes of this
   record(batch, oldest);
   oldest.commands = measuring_ ? std::vector<Command>() : batch.commands;
@@ -155,7 +181,7 @@ void GpuStream::wait(Batch& batch) {
   batch.measured = false;
   batch.commands.clear();
   batch.labels.clear();
-  batch.staged = 0;
+  batch.staged = batch.argumentBytes = 0;
   batch.retired.clear();
 }
 
@@ -182,17 +208,31 @@ void GpuStream::upload(const GpuBuffer& to, size_t offset, std::span<const std::
   while (!bytes.empty()) {
     if (listing().staged == stagingBytes_ || listing().commands.size() >= kCommandsPerBatch) submit();
     const size_t length = std::min(bytes.size(), stagingBytes_ - listing().staged);
+    const size_t staged = stage(bytes.first(length));
     const GpuBuffer& staging = listing().staging;
-    Command copy;
-    copy.from = staging.handle();
-    copy.fromOffset = staging.offset() + stage(bytes.first(length));
-    copy.to = to.handle();
-    copy.toOffset = to.offset() + offset;
-    copy.bytes = length;
-    add(copy);
+    if (!copyWords(staging.address() + staged, to.address() + offset, length)) {
+      Command copy;
+      copy.from = staging.handle();
+      copy.fromOffset = staging.offset() + staged;
+      copy.to = to.handle();
+      copy.toOffset = to.offset() + offset;
+      copy.bytes = length;
+      add(copy);
+    }
     bytes = bytes.subspan(length);
     offset += length;
   }
+}
+
+bool GpuStream::copyWords(VkDeviceAddress from, VkDeviceAddress to, size_t bytes) {
+  if (from % 4 != 0 || to % 4 != 0 || bytes % 4 != 0 || bytes / 4 > kMostCopiedWords) return false;
+  struct {
+    VkDeviceAddress from, to;
+    uint32_t words, unused = 0;
+  } const arguments = {from, to, static_cast<uint32_t>(bytes / 4)};
+  const uint32_t groups = workgroups(arguments.words, 64, context_->limits().maxComputeWorkGroupCount[0]);
+  run(from != 0 ? copyWords_ : zeroWords_, std::as_bytes(std::span(&arguments, 1)), {groups});
+  return true;
 }
 
 void GpuStream::download(std::span<const Download> downloads) {
@@ -214,13 +254,15 @@ void GpuStream::download(std::span<const Download> downloads) {
     for (size_t done = 0; done < to.size();) {
       if (used == stagingBytes_) bring();
       const size_t length = std::min(to.size() - done, stagingBytes_ - used);
-      Command copy;
-      copy.from = from->handle();
-      copy.fromOffset = from->offset() + offset + done;
-      copy.to = downloads_.handle();
-      copy.toOffset = downloads_.offset() + used;
-      copy.bytes = length;
-      add(copy);
+      if (!copyWords(from->address() + offset + done, downloads_.address() + used, length)) {
+        Command copy;
+        copy.from = from->handle();
+        copy.fromOffset = from->offset() + offset + done;
+        copy.to = downloads_.handle();
+        copy.toOffset = downloads_.offset() + used;
+        copy.bytes = length;
+        add(copy);
+      }
       pieces.push_back({to.subspan(done, length), used});
       done += length;
       used += (length + kAlignment - 1) / kAlignment * kAlignment;
@@ -232,7 +274,7 @@ void GpuStream::download(std::span<const Download> downloads) {
 void GpuStream::fillZero(const GpuBuffer& buffer, size_t offset, size_t bytes) {
   CHECK(offset % 4 == 0u);
   CHECK(bytes % 4 == 0u);
-  if (bytes == 0) return;
+  if (bytes == 0 || copyWords(0, buffer.address() + offset, bytes)) return;
   Command fill;
   fill.kind = Command::Kind::fill;
   fill.to = buffer.handle();
@@ -243,17 +285,20 @@ void GpuStream::fillZero(const GpuBuffer& buffer, size_t offset, size_t bytes) {
 
 void GpuStream::run(const GpuKernel& kernel, std::span<const std::byte> arguments, Groups groups) {
   if (groups.x == 0 || groups.y == 0 || groups.z == 0) return;
-  CHECK(arguments.size() <= stagingBytes_);
+  CHECK(arguments.size() <= kArgumentBytes);
   CHECK(groups.x <= context_->limits().maxComputeWorkGroupCount[0]);
   CHECK(groups.y <= context_->limits().maxComputeWorkGroupCount[1]);
   CHECK(groups.z <= context_->limits().maxComputeWorkGroupCount[2]);
-  const bool full = stagingBytes_ - listing().staged < arguments.size();
+  const bool full = kArgumentBytes - listing().argumentBytes < arguments.size();
   if (full || listing().commands.size() >= kCommandsPerBatch) submit();
+  Batch& batch = listing();
+  std::memcpy(batch.arguments.mapped() + batch.argumentBytes, arguments.data(), arguments.size());
   Command command;
   command.kind = Command::Kind::kernel;
   command.kernel = &kernel;
-  command.arguments = listing().staging.address() + stage(arguments);
+  command.arguments = batch.arguments.address() + batch.argumentBytes;
   command.groups = groups;
+  batch.argumentBytes += (arguments.size() + kAlignment - 1) / kAlignment * kAlignment;
   add(command);
 }
 

@@ -2,7 +2,8 @@
 // before it. Only `download` and `finish` wait for all. For one thread at a time.
 //
 // A batch that is the same list as one before (a training step, mostly) is not recorded again: its commands are sent
-// once more with new arguments, which lie in memory.
+// once more with new arguments, which lie in memory. So that it is, small copies and fills are kernels, too: what they
+// move and how much is an argument then; and numbers of workgroups are few different ones (workgroups()).
 #pragma once
 
 #include <volk.h>
@@ -25,9 +26,12 @@ struct Groups {
   bool operator==(const Groups&) const = default;
 };
 
+// Enough of `perGroup` for `count`, and a few more: one of few different numbers. Empty ones cost next to nothing.
+uint32_t workgroups(size_t count, size_t perGroup, size_t most);
+
 class GpuStream {
  public:
-  // `stagingBytes` is what one batch can carry of uploads and kernel arguments; larger uploads take several batches.
+  // `stagingBytes` is what one batch can carry of uploads; larger ones take several batches.
   explicit GpuStream(std::shared_ptr<const GpuContext> context, size_t stagingBytes = size_t{16} << 20);
   ~GpuStream();  // waits
   GpuStream(const GpuStream&) = delete;
@@ -86,11 +90,12 @@ class GpuStream {
   struct Batch {
     std::vector<Command> commands;
     std::vector<std::string_view> labels;  // of each command, while measuring
-    GpuBuffer staging;
-    size_t staged = 0;
-    uint64_t done = 0;  // the semaphore's value then
+    GpuBuffer staging, arguments;
+    size_t staged = 0, argumentBytes = 0;  // of those that are used
+    uint64_t done = 0;                     // the semaphore's value then
     std::vector<GpuBuffer> retired;
-    std::array<Recording, 4> recordings;
+    std::array<Recording, 8> recordings;
+    std::array<Recording, 4> small;  // of what is as soon recorded as found: it displaces none of those
     VkQueryPool queries = VK_NULL_HANDLE;
     bool measured = false;
   };
@@ -103,9 +108,12 @@ class GpuStream {
   void wait(Batch& batch);
   void collect(Batch& batch);                      // timestamps
   size_t stage(std::span<const std::byte> bytes);  // → offset in the staging buffer; the bytes must fit
+  // By a kernel, where that can be done: few words, and whole ones.
+  bool copyWords(VkDeviceAddress from, VkDeviceAddress to, size_t bytes);
 
   std::shared_ptr<const GpuContext> context_;
   size_t stagingBytes_;
+  GpuKernel copyWords_, zeroWords_;
   VkCommandPool pool_ = VK_NULL_HANDLE;
   VkSemaphore timeline_ = VK_NULL_HANDLE;
   std::array<Batch, 2> batches_;  // one is listed while the device works on the other

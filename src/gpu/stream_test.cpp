@@ -118,21 +118,42 @@ TEST_F(GpuStreamTest, KeepsARetiredBufferUntilTheWorkOnItIsDone) {
   EXPECT_NO_THROW(stream.finish());
 }
 
-TEST_F(GpuStreamTest, RecordsABatchOnceAndSendsItAgainWithOtherArgumentsAndUploads) {
+TEST_F(GpuStreamTest, RecordsABatchOnceAndSendsItAgainWithOtherArgumentsUploadsAndSizes) {
   GpuStream stream(context_);
   const GpuKernel kernel(context_, kDoubleValuesSpirv);
-  const GpuBuffer a(context_, 4000), b(context_, 4000);
+  const GpuBuffer a(context_, 400000), b(context_, 400000);
   for (uint32_t i = 0; i < 20; ++i) {
-    const std::vector<uint32_t> values(1000, i);
-    stream.upload(a, 0, std::as_bytes(std::span(values)));
-    stream.upload(b, 0, std::as_bytes(std::span(values)));
-    runDouble(stream, kernel, i % 2 ? a : b);  // the address differs, which is an argument
-    uint32_t last = 0;
-    stream.download(a, 3996, std::as_writable_bytes(std::span(&last, 1)));
-    EXPECT_EQ(last, i % 2 ? 2 * i : i);
+    // As the rays of training steps: other numbers of them, which round to the same workgroups.
+    const std::vector<uint32_t> values(99000 + i, i + 1);
+    const size_t first = i % 3;
+    for (const GpuBuffer* buffer : {&a, &b}) stream.upload(*buffer, 4 * first, std::as_bytes(std::span(values)));
+    for (int k = 0; k < 5; ++k) runDouble(stream, kernel, i % 2 ? a : b);  // the address differs, which is an argument
+    stream.fillZero(b, 4 * first, 4 * (98000 + i));
+    uint32_t last[3] = {};
+    const auto bytes = [](uint32_t& value) { return std::as_writable_bytes(std::span(&value, 1)); };
+    const GpuStream::Download downloads[] = {{&a, 4 * (first + values.size() - 1), bytes(last[0])},
+                                             {&b, 4 * (first + 98000 + i - 1), bytes(last[1])},
+                                             {&b, 4 * (first + 98000 + i), bytes(last[2])}};
+    stream.download(downloads);
+    EXPECT_EQ(last[0], i % 2 ? 32 * (i + 1) : i + 1);
+    EXPECT_EQ(last[1], 0u);
+    EXPECT_EQ(last[2], i % 2 ? i + 1 : 32 * (i + 1));
   }
   EXPECT_EQ(stream.batchesSent(), 20u);
   EXPECT_EQ(stream.batchesRecorded(), 2u);  // once for each of its two staging buffers
+}
+
+TEST_F(GpuStreamTest, KeepsWhatItRecordedWhileItDoesSmallThings) {
+  GpuStream stream(context_);
+  const GpuKernel kernel(context_, kDoubleValuesSpirv);
+  const GpuBuffer buffer(context_, 4000);
+  for (int i = 0; i < 40; ++i) {
+    for (int k = 0; k < 10; ++k) runDouble(stream, kernel, buffer);
+    stream.send();
+    uint32_t one = 0;
+    for (int k = 0; k < i % 3; ++k) stream.download(buffer, 0, std::as_writable_bytes(std::span(&one, 1)));
+  }
+  EXPECT_LE(stream.batchesRecorded(), 2u + 39u);  // the large ones twice
 }
 
 TEST_F(GpuStreamTest, RecordsABatchAnewWhenItsBuffersHaveGone) {

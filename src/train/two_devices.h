@@ -5,12 +5,14 @@
 
 #include <cmath>
 #include <functional>
+#include <set>
 
 #include "base/error.h"
 #include "base/image.h"
 #include "compute/device.h"
 #include "train/training_loop.h"
 #ifdef TESSERA_HAS_VULKAN
+#include "compute/vulkan/device.h"
 #include "gpu/test_context.h"
 #endif
 
@@ -63,5 +65,25 @@ struct TwoDevices {
     return 10 * std::log10(static_cast<double>(a.pixels.size()) / squares);
   }
 };
+
+// Nothing is read in the middle of a step, and its commands are recorded seldom, however many rays it has. `trainee` is
+// made on a Vulkan device.
+inline void expectOneBatchAStep([[maybe_unused]] Device& vulkan, [[maybe_unused]] Trainee& trainee) {
+#ifdef TESSERA_HAS_VULKAN
+  constexpr int64_t kFirst = 7, kEnd = 15;  // between two looks at what is empty
+  std::set<uint32_t> rays;
+  VulkanBatches before;
+  for (int64_t step = 0; step < kEnd; ++step) {
+    if (step == kFirst) before = batchesOf(vulkan);
+    const StepReport report = trainee.step(step, 100);
+    if (step >= kFirst) rays.insert(report.rays);
+  }
+  const VulkanBatches after = batchesOf(vulkan);
+  EXPECT_EQ(after.sent - before.sent, static_cast<uint64_t>(kEnd - kFirst));
+  EXPECT_LE(after.recorded - before.recorded, static_cast<uint64_t>(kEnd - kFirst) / 2);
+  EXPECT_GT(rays.size(), 1u);
+  EXPECT_EQ(GpuContext::validationMessages(), 0);
+#endif
+}
 
 }  // namespace tessera

@@ -24,6 +24,11 @@ std::shared_ptr<const GpuContext> contextOf(const Device& device) {
   return vulkan == nullptr ? nullptr : vulkan->context();
 }
 
+VulkanBatches batchesOf(const Device& device) {
+  const GpuStream& stream = dynamic_cast<const VulkanDevice&>(device).stream();
+  return {stream.batchesSent(), stream.batchesRecorded()};
+}
+
 VulkanDevice::VulkanDevice(std::shared_ptr<const GpuContext> context)
     : stream_(std::make_shared<GpuStream>(std::move(context))) {
   const char* times = std::getenv("TESSERA_GPU_TIMES");
@@ -105,12 +110,7 @@ arguments::RealArguments VulkanDevice::realArguments(double value) const {
 }
 
 uint32_t VulkanDevice::groups(size_t count, size_t perGroup) const {
-  const size_t most = stream_->context()->limits().maxComputeWorkGroupCount[0];
-  size_t groups = (count + perGroup - 1) / perGroup;
-  // Few different numbers: batches that are the same are not recorded again. Empty workgroups cost next to nothing.
-  const int spare = static_cast<int>(std::bit_width(groups)) - 4;
-  if (spare > 0) groups = ((groups + (size_t{1} << spare) - 1) >> spare) << spare;
-  return static_cast<uint32_t>(std::min(groups, most));
+  return workgroups(count, perGroup, stream_->context()->limits().maxComputeWorkGroupCount[0]);
 }
 
 GpuBuffer VulkanDevice::makeBuffer(size_t bytes) {

@@ -17,4 +17,10 @@ std::unique_ptr<Device> makeVulkanDevice(const GpuOptions& options);
 // The context of a Vulkan device, which others may draw with; null of any other device.
 std::shared_ptr<const GpuContext> contextOf(const Device& device);
 
+// Of a Vulkan device so far: batches of work sent, and those of them that had to be recorded (gpu/stream.h).
+struct VulkanBatches {
+  uint64_t sent = 0, recorded = 0;
+};
+VulkanBatches batchesOf(const Device& device);
+
 }  // namespace tessera

@@ -32,6 +32,7 @@ class VulkanDevice : public Device {
   ~VulkanDevice() override;  // with TESSERA_GPU_TIMES=1 in the environment, says what each operation took on the device
 
   const std::shared_ptr<const GpuContext>& context() const { return stream_->context(); }
+  const GpuStream& stream() const { return *stream_; }
 
   std::string name() const override;
   std::string target() const override;

@@ -152,5 +152,17 @@ TEST(TrainField, ComesToTheSameOnVulkanAndGoesOnThereAndBack) {
   both.expectTheSamePictures(scene / "models");
 }
 
+TEST(TrainField, SendsEachStepToAGraphicsCardAtOnce) {
+#ifdef TESSERA_HAS_VULKAN
+  SKIP_WITHOUT_VULKAN(openForTest());
+  const CubeScene scene;
+  const std::unique_ptr<Device> vulkan = makeDevice({"vulkan"});
+  FieldConfig config = options(0).config;
+  config.occupancyEvery = 16;
+  FieldTrainer trainer(*vulkan, scene.capture(), config, fitSceneFrame(scene.capture(), 1.5));
+  expectOneBatchAStep(*vulkan, trainer);
+#endif
+}
+
 }  // namespace
 }  // namespace tessera

@@ -146,5 +146,14 @@ TEST_F(HashTraining, ComesToTheSameOnVulkanAndGoesOnThereAndBack) {
   both.expectTheSamePictures(scene_ / "models");
 }
 
+TEST_F(HashTraining, SendsEachStepToAGraphicsCardAtOnce) {
+#ifdef TESSERA_HAS_VULKAN
+  SKIP_WITHOUT_VULKAN(openForTest());
+  const std::unique_ptr<Device> vulkan = makeDevice({"vulkan"});
+  HashTrainer trainer(*vulkan, scene_.capture(), smallHashConfig(), cubeGrid());
+  expectOneBatchAStep(*vulkan, trainer);
+#endif
+}
+
 }  // namespace
 }  // namespace tessera

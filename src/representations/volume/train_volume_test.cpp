@@ -291,5 +291,15 @@ TEST(TrainVolume, ComesToTheSameOnVulkanAndGoesOnThereAndBack) {
   both.expectTheSamePictures(scene / "models");
 }
 
+TEST(TrainVolume, SendsEachStepToAGraphicsCardAtOnce) {
+#ifdef TESSERA_HAS_VULKAN
+  SKIP_WITHOUT_VULKAN(openForTest());
+  const CubeScene scene;
+  const std::unique_ptr<Device> vulkan = makeDevice({"vulkan"});
+  VolumeTrainer trainer(*vulkan, scene.capture(), smallVolumeConfig(), cubeGrid(), {});
+  expectOneBatchAStep(*vulkan, trainer);
+#endif
+}
+
 }  // namespace
 }  // namespace tessera
