@@ -9,9 +9,8 @@
 //                  needed forward, 32 backward), and as many lookups as are done while the arguments are copied:
 //                  16 bytes a sample for where it is, 8 for every 32 texels (bits and ranks), then 12 a needed texel
 //                  (finding), 32 a needed texel and 32 a sample (forward), 32 and 64 (backward)
-//   lattice        8 corners · samples lookups, 64 bytes each; the limit likewise: 64 bytes a needed corner and a
-//   sample all others     bytes of their arguments, each array once however often a kernel passes over it; the limit is
-//   a copy
+//   lattice        8 corners · samples lookups, 64 bytes each; the limit likewise: 64 bytes a needed corner and a sample
+//   all others     bytes of their arguments, each array once however often a kernel passes over it; the limit is a copy
 //                  of the same footprint (to the next power of two)
 //
 // The limit of the hash grid is the gather rate of tables of the same sizes, level by level: lookups / Σ (lookups of a

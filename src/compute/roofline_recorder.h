@@ -51,7 +51,7 @@ void measureHashGrids(RooflineRecorder& recorder, const HashGrid& grid);
 void measureSampleStreams(RooflineRecorder& recorder);  // encodings, marching, compaction, compositing
 void measureBlockStreams(RooflineRecorder& recorder);   // sampling through blocks and proposals
 void measureVirtualGrid(RooflineRecorder& recorder);
-void measureAttention(RooflineRecorder& recorder);         // marching in blocks, lattice, fusing levels, shading
+void measureAttention(RooflineRecorder& recorder);  // marching in blocks, lattice, fusing levels, shading
 void measureParameterStreams(RooflineRecorder& recorder);  // losses, exposure, occupancy, Adam
 
 }  // namespace tessera
