@@ -329,6 +329,12 @@ void addBenchCompute(CLI::App& bench) {
   verb->footer("Example:\n  tessera bench compute --json compute.json");
   verb->add_option("--json", flags->json, "write the result as one JSON object here; - prints it");
   verb->add_option("--seconds", flags->options.secondsPerRow, "time for each row")->capture_default_str();
+  verb->add_option("--samples", flags->options.samples, "samples of networks and hash grids")
+      ->capture_default_str()
+      ->check(CLI::Range(32u, 1u << 22));
+  verb->add_option("--streamed", flags->options.streamed, "samples of what only streams")
+      ->capture_default_str()
+      ->check(CLI::Range(32u, 1u << 24));
   addDeviceFlags(*verb, flags->options.device);
   verb->callback([flags] {
     const Roofline roofline = measureRoofline(flags->options);

@@ -32,7 +32,7 @@ struct RooflineOptions {
   double secondsPerRow = 0.15;                    // repeats for so long, and at least 3 times
 };
 
-// Of all threads together. Zero where it is not measured: any device but the processor.
+// Of all threads, or the whole card. Zero where it is not measured: on the reference device.
 struct MachineLimits {
   double flops = 0;  // multiply-adds on registers, 2 operations each, per second
   struct Stream {

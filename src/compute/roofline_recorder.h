@@ -3,16 +3,18 @@
 
 #include <functional>
 
-#include "base/threads.h"
+#include "compute/machine_probe.h"
 #include "compute/roofline.h"
 
 namespace tessera {
 
 class RooflineRecorder {
  public:
-  // `pool` measures the limits of streams, which are added to `limits`; none where the device is not the processor.
-  RooflineRecorder(Device& device, ThreadPool* pool, const RooflineOptions& options, MachineLimits& limits)
-      : device_(device), pool_(pool), options_(options), limits_(limits) {}
+  // `isQueued`: of the device's operations. `probe` measures the limits of streams, which are added to `limits`; null
+  // where nobody knows them.
+  RooflineRecorder(Device& device, bool isQueued, MachineProbe* probe, const RooflineOptions& options,
+                   MachineLimits& limits)
+      : device_(device), isQueued_(isQueued), probe_(probe), options_(options), limits_(limits) {}
 
   struct Work {
     std::string name, shape;
@@ -39,7 +41,8 @@ class RooflineRecorder {
 
  private:
   Device& device_;
-  ThreadPool* pool_;
+  bool isQueued_;
+  MachineProbe* probe_;
   const RooflineOptions& options_;
   MachineLimits& limits_;
   std::vector<RooflineRow> rows_;
@@ -51,7 +54,7 @@ void measureHashGrids(RooflineRecorder& recorder, const HashGrid& grid);
 void measureSampleStreams(RooflineRecorder& recorder);  // encodings, marching, compaction, compositing
 void measureBlockStreams(RooflineRecorder& recorder);   // sampling through blocks and proposals
 void measureVirtualGrid(RooflineRecorder& recorder);
-void measureAttention(RooflineRecorder& recorder);  // marching in blocks, lattice, fusing levels, shading
+void measureAttention(RooflineRecorder& recorder);         // marching in blocks, lattice, fusing levels, shading
 void measureParameterStreams(RooflineRecorder& recorder);  // losses, exposure, occupancy, Adam
 
 }  // namespace tessera

@@ -4,6 +4,10 @@
 
 #include <set>
 
+#ifdef TESSERA_HAS_VULKAN
+#include "gpu/test_context.h"
+#endif
+
 namespace tessera {
 namespace {
 
@@ -21,6 +25,30 @@ TEST(Roofline, HasARowForEveryOperation) {
   }
   EXPECT_EQ(measured.size(), std::size(kOperationNames));
 }
+
+#ifdef TESSERA_HAS_VULKAN
+TEST(Roofline, HoldsEveryOperationOfAGraphicsCardAgainstWhatTheCardCanDo) {
+  SKIP_WITHOUT_VULKAN(openForTest());
+  RooflineOptions options;
+  options.device.kind = "vulkan";
+  options.samples = {256};
+  options.streamed = 512;
+  options.secondsPerRow = 0;
+  const Roofline roofline = measureRoofline(options);
+  EXPECT_GT(roofline.limits.flops, 1e8);
+  EXPECT_FALSE(roofline.limits.streams.empty());
+  for (const MachineLimits::Stream& stream : roofline.limits.streams) EXPECT_GT(stream.rate, 1e7) << stream.bytes;
+  for (const MachineLimits::Gather& gather : roofline.limits.gathers)
+    EXPECT_GT(gather.lookups, 1e5) << gather.tableBytes;
+  std::set<Operation> measured;
+  for (const RooflineRow& row : roofline.rows) {
+    EXPECT_GT(row.limit, 0) << row.name;
+    measured.insert(row.operation);
+  }
+  EXPECT_EQ(measured.size(), std::size(kOperationNames));
+  EXPECT_EQ(GpuContext::validationMessages(), 0);
+}
+#endif
 
 TEST(Roofline, LinesUpRayLikePositions) {
   const std::vector<float> points = rayLikePositions(3, 8, 1);
