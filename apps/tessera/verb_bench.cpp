@@ -16,6 +16,11 @@
 #include "representations/field/train_field.h"
 #include "tiles/scene_folder.h"
 #include "train/run_folder.h"
+#ifdef TESSERA_HAS_VULKAN
+#include "compute/vulkan/device.h"
+#include "gpu/context.h"
+#include "render/vulkan/gpu_scene_renderer.h"
+#endif
 
 namespace tessera {
 namespace {
@@ -319,6 +324,97 @@ void addBenchRender(CLI::App& bench) {
   });
 }
 
+// Pictures a second of a scene, at one size. On a graphics card none leaves it, as none does on its way to a screen.
+ordered_json measureFrames(const Device& device, const fs::path& scene, const std::vector<BenchmarkView>& views,
+                           const DrawableOptions& options, double seconds) {
+  std::function<void(const BenchmarkView&)> draw;
+  std::function<void()> wait = [] {};
+  std::string name;
+#ifdef TESSERA_HAS_VULKAN
+  std::unique_ptr<GpuViewRenderer> onCard;
+  if (const auto context = contextOf(device)) {
+    GpuRendererSettings settings;
+    settings.selection.mostPixels = options.mostPixels;
+    onCard = openGpuScene(context, scene, settings);
+    draw = [&](const BenchmarkView& view) { onCard->draw(view.camera, view.worldFromCamera); };
+    wait = [context] { context->waitIdle(); };
+    name = onCard->device();
+  }
+#endif
+  std::unique_ptr<Device> cpu;
+  std::unique_ptr<Drawable> drawable;
+  if (!draw) {
+    cpu = makeDevice({"cpu", options.threads});
+    drawable = openDrawable(*cpu, scene, options);
+    draw = [&](const BenchmarkView& view) { drawable->renderer().render(view.camera, view.worldFromCamera); };
+    name = drawable->renderer().device();
+  }
+  const auto timed = [&](const BenchmarkView& view) {
+    const auto begun = std::chrono::steady_clock::now();
+    draw(view);
+    wait();
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  };
+  double slowest = 0, spent = 0;
+  for (const BenchmarkView& view : views) {
+    draw(view);  // what it needs is loaded
+    wait();
+    slowest = std::max(slowest, std::min(timed(view), timed(view)));
+  }
+  uint64_t frames = 0;
+  const auto begun = std::chrono::steady_clock::now();
+  while (spent < seconds || frames == 0) {
+    for (const BenchmarkView& view : views) draw(view);
+    wait();
+    frames += views.size();
+    spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  }
+  return {{"device", name},
+          {"width", views[0].camera.width},
+          {"height", views[0].camera.height},
+          {"views", views.size()},
+          {"frames_per_second", static_cast<double>(frames) / spent},
+          {"slowest_milliseconds", 1e3 * slowest}};
+}
+
+void addBenchFrames(CLI::App& bench) {
+  struct Flags {
+    std::string scene, views, size = "1920x1080", json;
+    DeviceOptions device;
+    DrawableOptions options{.mostPixels = 1.5};
+    double seconds = 3;
+  };
+  auto flags = std::make_shared<Flags>();
+  CLI::App* verb = bench.add_subcommand("frames", "pictures a second of a scene");
+  verb->footer("Example:\n  tessera bench frames city.scene --views city.capture --device vulkan");
+  verb->add_option("scene", flags->scene, "scene folder")->required();
+  verb->add_option("--views", flags->views, "draw this capture's held-out views, in turn")->required();
+  verb->add_option("--size", flags->size, "of the pictures")->capture_default_str();
+  verb->add_option("--detail", flags->options.mostPixels, "pixels of error that may be seen")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1000.0));
+  verb->add_option("--seconds", flags->seconds, "repeats for so long")->capture_default_str();
+  verb->add_option("--json", flags->json, "write the result as one JSON object here; - prints it");
+  addDeviceFlags(*verb, flags->device);
+  verb->callback([flags] {
+    int width = 0, height = 0;
+    parsePictureSize(flags->size, width, height);
+    std::vector<BenchmarkView> views;
+    for (const NamedView& view : viewsOfCapture(readCapture(flags->views), Split::test)) {
+      views.push_back({view.camera.scaledTo(width, height), view.worldFromCamera});
+    }
+    flags->options.threads = flags->device.threads;
+    const std::unique_ptr<Device> device = makeDevice(flags->device);
+    const ordered_json json = measureFrames(*device, flags->scene, views, flags->options, flags->seconds);
+    if (flags->json != "-") {
+      fmt::print("{}\n{} x {}, {} views: {:.1f} pictures a second, the slowest {:.1f} ms\n",
+                 json["device"].get<std::string>(), width, height, views.size(),
+                 json["frames_per_second"].get<double>(), json["slowest_milliseconds"].get<double>());
+    }
+    writeJson(flags->json, json);
+  });
+}
+
 void addBenchCompute(CLI::App& bench) {
   struct Flags {
     RooflineOptions options;
@@ -374,6 +470,7 @@ void addBenchVerb(CLI::App& app) {
   CLI::App* bench = app.add_subcommand("bench", "how fast this machine computes, and how fast it could");
   bench->require_subcommand(1);
   addBenchCompute(*bench);
+  addBenchFrames(*bench);
   addBenchTrain(*bench);
   addBenchRender(*bench);
 }

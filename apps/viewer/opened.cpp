@@ -41,16 +41,6 @@ void include(const Vec3d& low, const Vec3d& high, ToWorld toWorld, Place& place)
   }
 }
 
-template <class Content>
-std::unique_ptr<PictureSource> onCard(const ViewOptions& options, const std::shared_ptr<const GpuContext>& window) {
-  GpuRendererSettings settings;
-  settings.selection.mostPixels = options.mostPixels;
-  settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB * 1048576);
-  settings.inBackground = true;
-  return std::make_unique<CardPictures>(
-      std::make_unique<GpuSceneRenderer<Content>>(window, openTileScene<Content>(options.folder), settings));
-}
-
 }  // namespace
 
 void requireViewable(const fs::path& folder) {
@@ -125,8 +115,11 @@ void waitForModel(const fs::path& folder) {
 std::unique_ptr<PictureSource> openPictures(const ViewOptions& options,
                                             const std::shared_ptr<const GpuContext>& window) {
   if (isScene(options.folder) && vulkanDeviceOf(options.device.kind)) {
-    const bool isHash = readTileset(options.folder).representation == Representation::hash;
-    return isHash ? onCard<HashContent>(options, window) : onCard<VolumeContent>(options, window);
+    GpuRendererSettings settings;
+    settings.selection.mostPixels = options.mostPixels;
+    settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB * 1048576);
+    settings.inBackground = true;
+    return std::make_unique<CardPictures>(openGpuScene(window, options.folder, settings));
   }
   DrawableOptions drawable;
   drawable.threads = options.device.threads;

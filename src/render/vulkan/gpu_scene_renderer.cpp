@@ -8,6 +8,7 @@
 #include "shaders/draw_volume.h"
 #include "shaders/end_hash.h"
 #include "shaders/end_volume.h"
+#include "tiles/scene_folder.h"
 
 namespace tessera {
 
@@ -207,5 +208,13 @@ void GpuSceneRenderer<HashContent>::end() {
 
 template class GpuSceneRenderer<VolumeContent>;
 template class GpuSceneRenderer<HashContent>;
+
+std::unique_ptr<GpuViewRenderer> openGpuScene(const std::shared_ptr<const GpuContext>& context, const fs::path& folder,
+                                              const GpuRendererSettings& settings) {
+  if (readTileset(folder).representation == Representation::hash) {
+    return std::make_unique<GpuHashRenderer>(context, openTileScene<HashContent>(folder), settings);
+  }
+  return std::make_unique<GpuVolumeRenderer>(context, openTileScene<VolumeContent>(folder), settings);
+}
 
 }  // namespace tessera

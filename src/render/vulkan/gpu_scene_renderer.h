@@ -109,6 +109,10 @@ class GpuSceneRenderer final : public GpuViewRenderer {
   GpuBuffer networkTable_;
 };
 
+// Of a scene's folder, whatever its representation. Throws Error as openTileScene and the renderer do.
+std::unique_ptr<GpuViewRenderer> openGpuScene(const std::shared_ptr<const GpuContext>& context, const fs::path& folder,
+                                              const GpuRendererSettings& settings);
+
 using GpuVolumeRenderer = GpuSceneRenderer<VolumeContent>;
 using GpuHashRenderer = GpuSceneRenderer<HashContent>;
 
