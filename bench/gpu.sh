@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Packs what was built into a bundle that runs on any x86-64 Linux with nothing but a graphics card's driver (and glibc, of
-# which it says the version): the programs, the libraries that they need, the Vulkan loader, a made city. Then runs it here.
+# Packs what was built into a bundle that runs on x86-64 Linux with nothing but a graphics card's driver, and a glibc as new as
+# that of the machine that it was built on, which it names: the programs, the libraries that they need, the Vulkan loader, a made city. Then runs it here.
 # On another machine: unpack it, ./run.sh.
 #   [BUILD=build/release] [ONLY_PACK=1] bench/gpu.sh        settings of the run: bench/gpu_run.sh
 set -euo pipefail

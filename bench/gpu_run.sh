@@ -18,12 +18,17 @@ export LD_LIBRARY_PATH=$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
 tessera() { "$here/bin/tessera" "$@"; }
 tessera --version > /dev/null || { echo "run.sh: the programs do not start here; they need glibc $(cat "$here/glibc")" >&2; exit 1; }
 
+# Whether there is a card, and not only a driver for the processor.
+card() {
+  tessera info devices 2> /dev/null | awk '/^vulkan:[0-9]/ { next_is = 1 }
+    /^  name/ { if (next_is && !/llvmpipe|SwiftShader/) found = 1; next_is = 0 } END { exit !found }'
+}
 # NVIDIA's driver in a container often comes without the file that names it.
-if ! tessera info devices 2> /dev/null | grep -q '^vulkan:' && [ -z "${VK_DRIVER_FILES:-}" ]; then
+if ! card && [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ]; then
   for library in libGLX_nvidia.so.0 libEGL_nvidia.so.0; do
     printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "%s", "api_version": "1.2.0"}}\n' "$library" > "$work/icd.json"
     export VK_DRIVER_FILES=$work/icd.json VK_ICD_FILENAMES=$work/icd.json
-    tessera info devices 2> /dev/null | grep -q '^vulkan:' && break
+    card && break
     unset VK_DRIVER_FILES VK_ICD_FILENAMES
   done
 fi
@@ -45,10 +50,13 @@ quoted() { printf '"%s"' "$(printf '%s' "$1" | tr -d '\000-\037' | sed 's/[\\"]/
 # psnr FILE: of `eval --json`.
 psnr() { sed -n 's/^ *"psnr": *\([0-9.]*\).*/\1/p' "$1" 2> /dev/null | head -1; }
 step() { write; echo "== $*"; }
+case $device in vulkan:*) export TESSERA_GPU=${device#vulkan:} ;; esac  # of the tests
 declare -A more=([volume]=${VOLUME:-} [hash]=${HASH:-} [field]=${FIELD:-})
 
 {
   tessera info devices
+  card || echo "NO CARD: what follows is of a driver for the processor"
+  members+=("\"is_card\": $(card && echo true || echo false)")
   members+=("\"commit\": $(quoted "$(cat "$here/commit")")" "\"machine\": $(quoted "$(uname -srm)")"
     "\"processor\": $(quoted "$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1)")"
     "\"devices\": $(quoted "$(tessera info devices | sed -n 's/^  name *//p' | paste -sd';')")")

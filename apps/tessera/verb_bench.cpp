@@ -49,7 +49,7 @@ void printRoofline(const Roofline& roofline) {
                  scaled(gather.lookups, "lookup"));
     }
   } else {
-    fmt::print("  none: they are known for the cpu device only\n");
+    fmt::print("  none: nobody hurries the reference device\n");
   }
   fmt::print("\n{:<28} {:<44} {:>9}  {:>17}  {:>17}  {:>7}\n", "operation", "shape", "ms", "rate", "limit", "share");
   for (const RooflineRow& row : roofline.rows) {

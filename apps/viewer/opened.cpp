@@ -114,7 +114,9 @@ void waitForModel(const fs::path& folder) {
 
 std::unique_ptr<PictureSource> openPictures(const ViewOptions& options,
                                             const std::shared_ptr<const GpuContext>& window) {
-  if (isScene(options.folder) && vulkanDeviceOf(options.device.kind)) {
+  // The card may have no screen, and the window be shown by another device.
+  const bool isMeant = vulkanDeviceOf(options.device.kind) && (options.device.kind != "auto" || !window->isProcessor());
+  if (isScene(options.folder) && isMeant) {
     GpuRendererSettings settings;
     settings.selection.mostPixels = options.mostPixels;
     settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB * 1048576);

@@ -24,7 +24,7 @@ class TestScreen {
       prctl(PR_SET_PDEATHSIG, SIGKILL);
       close(ends[0]);
       const std::string number = std::to_string(ends[1]);
-      execlp("Xvfb", "Xvfb", "-displayfd", number.c_str(), "-screen", "0", "800x600x24", "-nolisten", "tcp",
+      execlp("Xvfb", "Xvfb", "-displayfd", number.c_str(), "-screen", "0", "1600x1200x24", "-nolisten", "tcp",
              static_cast<char*>(nullptr));
       _exit(127);
     }

@@ -110,7 +110,10 @@ class Viewer {
         continue;
       }
       if (window_.takeTouched() || isMoving()) still_ = 0;
-      if (still_ > kSettling && !pictureOf(size).isNew) continue;  // all is shown as it is
+      if (still_ > kSettling) {
+        if (!pictureOf(size).isNew) continue;  // all is shown as it is
+        still_ = 0;
+      }
       interface_.begin();
       move();
       const ShownPicture picture = pictureOf(size);
@@ -127,7 +130,7 @@ class Viewer {
       }
       show(picture);
       interface_.paint(presenter);
-      const bool isTaken = !options_.screenshot.empty() && whole_ == kSettling;
+      const bool isTaken = !options_.screenshot.empty() && whole_ >= kSettling;
       ImageU8 taken;
       presenter.end(isTaken ? &taken : nullptr);
       if (isTaken) {

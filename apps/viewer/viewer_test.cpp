@@ -32,14 +32,14 @@ class ViewerTest : public testing::Test {
   }
 
   // What the window shows of a golden scene once it is whole.
-  ImageU8 shown(const std::string& representation, const std::string& device, bool panels = false) {
+  ImageU8 shown(const std::string& representation, const std::string& device, bool panels = false, int scale = 1) {
     ViewOptions view;
     view.folder = fs::path(TESSERA_GOLDEN_SCENES) / representation;
     view.device = {device, 2};
     view.mostPixels = 0;
     WindowOptions window;
-    window.width = kWidth;
-    window.height = kHeight;
+    window.width = scale * kWidth;
+    window.height = scale * kHeight;
     window.panels = panels;
     window.screenshot = folder_ / "shown.png";
     runViewer(view, window);
@@ -78,6 +78,8 @@ TEST_F(ViewerTest, ShowsScenesThatItsDeviceDrawsAsTheProcessorDoes) {
 
 TEST_F(ViewerTest, ShowsWhatAnotherDeviceDraws) {
   EXPECT_GT(psnr(toFloat(shown("volume", "cpu")), wanted("volume")), 50);
+  // Where pictures come long after the window has come to rest, too.
+  EXPECT_EQ(shown("volume", "cpu", false, 4).width, 4 * kWidth);
   EXPECT_EQ(GpuContext::validationMessages(), 0);
 }
 

@@ -11,13 +11,15 @@ KERNEL_ARGUMENTS(ProbeArguments)
 void main() {
   ProbeArguments a = arguments.values;
   EntriesPointer table = EntriesPointer(uvec2(a.from));
-  uint at = gl_GlobalInvocationID.x * 747796405u + 2891336453u;
+  uint state = gl_GlobalInvocationID.x * 747796405u + 2891336453u;
   uvec2 sum = uvec2(0);
   for (uint round = 0; round < a.rounds; ++round) {
     uvec2 loaded[8];
     [[unroll]] for (int i = 0; i < 8; ++i) {
-      at = at * 1664525u + 1013904223u;
-      loaded[i] = table.values[(at >> 8) & (a.count - 1)];
+      // PCG: neighbours go to places that have nothing to do with each other.
+      state = state * 747796405u + 2891336453u;
+      const uint word = ((state >> ((state >> 28) + 4)) ^ state) * 277803737u;
+      loaded[i] = table.values[((word >> 22) ^ word) & (a.count - 1)];
     }
     [[unroll]] for (int i = 0; i < 8; ++i) sum += loaded[i];
   }

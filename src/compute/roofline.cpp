@@ -77,7 +77,7 @@ void RooflineRecorder::measure(Operation operation, Work work, const std::functi
     return std::chrono::duration<double>(Clock::now() - start).count();
   };
   timed();
-  constexpr double kLeastSeconds = 2e-3;
+  constexpr double kLeastSeconds = 1e-2;
   constexpr int kMostTimes = 1024;
   while (isQueued_ && times < kMostTimes && timed() < kLeastSeconds) times *= 2;
   double best = 1e30, spent = 0;

@@ -145,6 +145,7 @@ void GpuContext::choosePhysicalDevice(const std::string& wanted) {
   requireFeatures(chosen);
   physicalDevice_ = chosen.handle;
   limits_ = chosen.properties.limits;
+  isProcessor_ = chosen.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
   name_ = fmt::format("{} ({})", chosen.properties.deviceName, chosen.driver);
   target_ = fmt::format("vulkan/{}/{}", chosen.properties.deviceName, chosen.driver);
   vkGetPhysicalDeviceMemoryProperties(physicalDevice_, &memory_);

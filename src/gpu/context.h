@@ -57,6 +57,7 @@ class GpuContext {
 
   const std::string& name() const { return name_; }      // "NVIDIA GeForce RTX 3060 (driver 535.183)"
   const std::string& target() const { return target_; }  // what bits depend on: driver, device, features in use
+  bool isProcessor() const { return isProcessor_; }      // Mesa's lavapipe and the like
   const GpuFeatures& features() const { return features_; }
   const VkPhysicalDeviceLimits& limits() const { return limits_; }
 
@@ -94,6 +95,7 @@ class GpuContext {
   uint32_t queueFamily_ = 0, timestampBits_ = 0;
   VkPhysicalDeviceLimits limits_ = {};
   VkPhysicalDeviceMemoryProperties memory_ = {};
+  bool isProcessor_ = false;
   GpuFeatures features_;
   std::string name_, target_;
   std::unique_ptr<GpuHeap> heap_;

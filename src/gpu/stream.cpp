@@ -13,9 +13,9 @@ namespace tessera {
 
 namespace {
 
-constexpr size_t kAlignment = 64;           // of staged bytes; more than any argument struct needs
-constexpr size_t kCommandsPerBatch = 1024;  // more than a training step has
-constexpr size_t kArgumentBytes = 256 * kCommandsPerBatch;
+constexpr size_t kAlignment = 64;           // of staged bytes and of arguments
+constexpr size_t kCommandsPerBatch = 1024;  // a training step has some hundreds, and more with many blocks
+constexpr size_t kArgumentBytes = 512 * kCommandsPerBatch;
 constexpr size_t kSmallBatch = 8;                     // commands
 constexpr size_t kMostCopiedWords = size_t{1} << 20;  // by a kernel: what is larger is as large the next time, mostly
 constexpr uint32_t kQueries = kCommandsPerBatch + 1;
@@ -62,7 +62,7 @@ GpuStream::GpuStream(std::shared_ptr<const GpuContext> context, size_t stagingBy
       checkVulkan(vkAllocateCommandBuffers(device, &info, &recording.buffer), "vkAllocateCommandBuffers");
     };
     for (Recording& recording : batch.recordings) makeBuffer(recording);
-    for (Recording& recording : batch.small) makeBuffer(recording);
+    makeBuffer(batch.small);
     batch.staging = GpuBuffer(context_, stagingBytes_, BufferUse::upload);
     batch.arguments = GpuBuffer(context_, kArgumentBytes, BufferUse::upload);
   }
@@ -105,21 +105,17 @@ void GpuStream::submit() {
 
 GpuStream::Recording& GpuStream::recordingOf(Batch& batch) {
   const uint64_t generation = context_->heap().generation();
-  const auto oldestOf = [](auto& recordings) -> Recording& {
-    return *std::min_element(recordings.begin(), recordings.end(),
-                             [](const Recording& a, const Recording& b) { return a.lastUse < b.lastUse; });
-  };
   if (batch.commands.size() < kSmallBatch) {
-    Recording& oldest = oldestOf(batch.small);
-    record(batch, oldest);
-    return oldest;
+    record(batch, batch.small);
+    return batch.small;
   }
   if (!measuring_) {
     for (Recording& kept : batch.recordings) {
       if (kept.generation == generation && kept.commands == batch.commands) return kept;
     }
   }
-  Recording& oldest = oldestOf(batch.recordings);
+  Recording& oldest = *std::min_element(batch.recordings.begin(), batch.recordings.end(),
+                                        [](const Recording& a, const Recording& b) { return a.lastUse < b.lastUse; });
   oldest.generation = 0;  // whatever becomes of this
   record(batch, oldest);
   oldest.commands = measuring_ ? std::vector<Command>() : batch.commands;
@@ -206,7 +202,8 @@ size_t GpuStream::stage(std::span<const std::byte> bytes) {
 void GpuStream::upload(const GpuBuffer& to, size_t offset, std::span<const std::byte> bytes) {
   CHECK(offset + bytes.size() <= to.bytes());
   while (!bytes.empty()) {
-    if (listing().staged == stagingBytes_ || listing().commands.size() >= kCommandsPerBatch) submit();
+    // What is staged is copied by a command of the same batch.
+    if (listing().staged == stagingBytes_ || isFull(kAlignment)) submit();
     const size_t length = std::min(bytes.size(), stagingBytes_ - listing().staged);
     const size_t staged = stage(bytes.first(length));
     const GpuBuffer& staging = listing().staging;
@@ -222,6 +219,11 @@ void GpuStream::upload(const GpuBuffer& to, size_t offset, std::span<const std::
     bytes = bytes.subspan(length);
     offset += length;
   }
+}
+
+bool GpuStream::isFull(size_t argumentBytes) const {
+  const Batch& batch = batches_[current_];
+  return batch.commands.size() >= kCommandsPerBatch || kArgumentBytes - batch.argumentBytes < argumentBytes;
 }
 
 bool GpuStream::copyWords(VkDeviceAddress from, VkDeviceAddress to, size_t bytes) {
@@ -289,8 +291,7 @@ void GpuStream::run(const GpuKernel& kernel, std::span<const std::byte> argument
   CHECK(groups.x <= context_->limits().maxComputeWorkGroupCount[0]);
   CHECK(groups.y <= context_->limits().maxComputeWorkGroupCount[1]);
   CHECK(groups.z <= context_->limits().maxComputeWorkGroupCount[2]);
-  const bool full = kArgumentBytes - listing().argumentBytes < arguments.size();
-  if (full || listing().commands.size() >= kCommandsPerBatch) submit();
+  if (isFull(arguments.size())) submit();
   Batch& batch = listing();
   std::memcpy(batch.arguments.mapped() + batch.argumentBytes, arguments.data(), arguments.size());
   Command command;

@@ -49,7 +49,8 @@ class GpuStream {
     download(std::span(&one, 1));
   }
   void fillZero(const GpuBuffer& buffer, size_t offset, size_t bytes);  // multiples of 4
-  // Copies `arguments` and runs the kernel with their address. No groups, no work.
+  // Copies `arguments` and runs the kernel with their address. No groups, no work. The kernel stays until the stream
+  // goes: what was recorded names it.
   void run(const GpuKernel& kernel, std::span<const std::byte> arguments, Groups groups);
   void send();  // what has been listed begins now; waits for none of it, but for what was sent before the last time
   void finish();
@@ -95,12 +96,13 @@ class GpuStream {
     uint64_t done = 0;                     // the semaphore's value then
     std::vector<GpuBuffer> retired;
     std::array<Recording, 8> recordings;
-    std::array<Recording, 4> small;  // of what is as soon recorded as found: it displaces none of those
+    Recording small;  // of what is as soon recorded as found: it displaces none of those
     VkQueryPool queries = VK_NULL_HANDLE;
     bool measured = false;
   };
 
   Batch& listing() { return batches_[current_]; }
+  bool isFull(size_t argumentBytes) const;  // the batch: for one more command
   void add(const Command& command);
   void submit();  // sends the batch, and begins the next one
   Recording& recordingOf(Batch& batch);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <numeric>
 
 #include "gpu/test_context.h"
@@ -95,7 +96,7 @@ TEST_F(GpuStreamTest, KernelsSeeTheResultsOfThoseBeforeThem) {
 }
 
 TEST_F(GpuStreamTest, ArgumentsOutliveTheCall) {
-  GpuStream stream(context_, 64);  // room for one set of arguments: each run starts a batch
+  GpuStream stream(context_, 64);  // uploads take several batches
   const GpuKernel kernel(context_, kDoubleValuesSpirv);
   const GpuBuffer a(context_, 256), b(context_, 256);
   const auto values = numbers(64);
@@ -104,6 +105,25 @@ TEST_F(GpuStreamTest, ArgumentsOutliveTheCall) {
   for (int i = 0; i < 5; ++i) runDouble(stream, kernel, i % 2 ? a : b);
   EXPECT_EQ(downloaded(stream, a)[2], 3u << 2);
   EXPECT_EQ(downloaded(stream, b)[2], 3u << 3);
+}
+
+TEST_F(GpuStreamTest, CopiesWhatIsStagedThoughArgumentsAreMany) {
+  GpuStream stream(context_);
+  const GpuKernel kernel(context_, kDoubleValuesSpirv);
+  const GpuBuffer a(context_, 256), b(context_, 256);
+  struct {
+    Arguments used;
+    std::array<uint64_t, 500> more = {};
+  } large = {{a.address(), 64}};
+  for (uint32_t i = 0; i < 400; ++i) {
+    const std::vector<uint32_t> values(64, i);
+    stream.upload(b, 0, std::as_bytes(std::span(values)));
+    stream.run(kernel, std::as_bytes(std::span(&large, 1)), {1});
+    if (i % 37 == 0) {
+      EXPECT_EQ(downloaded(stream, b), values);
+    }
+  }
+  EXPECT_EQ(downloaded(stream, b)[63], 399u);
 }
 
 TEST_F(GpuStreamTest, KeepsARetiredBufferUntilTheWorkOnItIsDone) {
@@ -153,6 +173,7 @@ TEST_F(GpuStreamTest, KeepsWhatItRecordedWhileItDoesSmallThings) {
     uint32_t one = 0;
     for (int k = 0; k < i % 3; ++k) stream.download(buffer, 0, std::as_writable_bytes(std::span(&one, 1)));
   }
+  stream.finish();
   EXPECT_LE(stream.batchesRecorded(), 2u + 39u);  // the large ones twice
 }
 
@@ -160,7 +181,9 @@ TEST_F(GpuStreamTest, RecordsABatchAnewWhenItsBuffersHaveGone) {
   GpuStream stream(context_);
   for (int i = 0; i < 6; ++i) {
     GpuBuffer large(context_, size_t{40} << 20);  // of its own block, perhaps with the handle of the last
-    stream.fillZero(large, 0, large.bytes());
+    constexpr size_t kPart = size_t{4'500'000};   // too large for a kernel
+    for (size_t part = 0; part < 8; ++part) stream.fillZero(large, part * kPart, kPart);
+    stream.fillZero(large, 8 * kPart, large.bytes() - 8 * kPart);
     uint32_t last = 1;
     stream.download(large, large.bytes() - 4, std::as_writable_bytes(std::span(&last, 1)));
     EXPECT_EQ(last, 0u);

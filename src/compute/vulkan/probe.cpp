@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <functional>
 
 #include "compute/vulkan/vulkan_device.h"
 #include "shaders/compute/arguments_probe.h"
@@ -15,77 +16,98 @@ namespace {
 
 constexpr uint32_t kThreads = 256;     // of a workgroup
 constexpr double kWorkSeconds = 0.01;  // that a measurement takes at least: what it costs to begin one is nothing then
-constexpr uint32_t kMostRounds = 1 << 14;
+constexpr uint32_t kMostRounds = 1 << 18, kMostCopies = 512;
 
 class VulkanProbe final : public MachineProbe {
  public:
   explicit VulkanProbe(VulkanDevice& device)
-      : device_(device), stream_(std::make_shared<GpuStream>(device.context())), sink_(device.context(), 16) {}
+      : context_(device.context()),
+        multiplyAdds_(context_, kProbeFlopsSpirv),
+        gather_(context_, kProbeGatherSpirv),
+        copy_(context_, kProbeStreamSpirv),
+        sink_(context_, 16),
+        stream_(context_) {}
 
   double flops() override {
-    const GpuKernel kernel(device_.context(), kProbeFlopsSpirv);
-    constexpr uint32_t kGroups = 1024;
+    constexpr uint32_t kGroups = 8192;
     arguments::ProbeArguments arguments = {};
     arguments.to = sink_.address();
-    return rate(kernel, arguments, kGroups, 2.0 * 16 * kThreads * kGroups);
+    const auto run = [&](uint32_t rounds) {
+      arguments.rounds = rounds;
+      queue(multiplyAdds_, arguments, kGroups);
+    };
+    return rate(run, kMostRounds, 2.0 * 16 * kThreads * kGroups);
   }
 
   double gatherRate(size_t bytes, int) override {
-    const GpuKernel kernel(device_.context(), kProbeGatherSpirv);
     const size_t table = std::bit_floor(std::max<size_t>(bytes, 64));
-    const GpuBuffer entries = zeroed(table);
+    GpuBuffer entries = zeroed(table);
     constexpr uint32_t kGroups = 1024;
     arguments::ProbeArguments arguments = {};
     arguments.from = entries.address();
     arguments.to = sink_.address();
     arguments.count = static_cast<uint32_t>(table / 8);
-    const double found = rate(kernel, arguments, kGroups, 8.0 * kThreads * kGroups);
-    stream_->finish();
+    const auto run = [&](uint32_t rounds) {
+      arguments.rounds = rounds;
+      queue(gather_, arguments, kGroups);
+    };
+    const double found = rate(run, kMostRounds, 8.0 * kThreads * kGroups);
+    stream_.retire(std::move(entries));
     return found;
   }
 
   double streamRate(size_t bytes) override {
-    const GpuKernel kernel(device_.context(), kProbeStreamSpirv);
     const size_t half = std::max<size_t>(bytes / 2 / 16 * 16, 16);
-    GpuBuffer from = zeroed(half), to = zeroed(half);
-    arguments::ProbeArguments arguments = {};
-    arguments.from = from.address();
-    arguments.to = to.address();
-    arguments.count = static_cast<uint32_t>(half / 16);
-    const size_t most = device_.context()->limits().maxComputeWorkGroupCount[0];
-    const auto groups = static_cast<uint32_t>(std::min<size_t>((arguments.count + kThreads - 1) / kThreads, most));
-    const double found = rate(kernel, arguments, groups, 2.0 * static_cast<double>(half));
-    stream_->finish();
+    GpuBuffer one = zeroed(half), other = zeroed(half);
+    arguments::ProbeArguments there = {};
+    there.from = one.address();
+    there.to = other.address();
+    there.count = static_cast<uint32_t>(half / 16);
+    arguments::ProbeArguments back = there;
+    std::swap(back.from, back.to);
+    const size_t most = context_->limits().maxComputeWorkGroupCount[0];
+    const auto groups = static_cast<uint32_t>(std::min<size_t>((there.count + kThreads - 1) / kThreads, most));
+    // Each copy begins when the one before has ended: nothing of it stays where it was made.
+    const auto run = [&](uint32_t copies) {
+      for (uint32_t i = 0; i < copies; ++i) queue(copy_, i % 2 == 0 ? there : back, groups);
+    };
+    const double found = rate(run, kMostCopies, 2.0 * static_cast<double>(half));
+    stream_.retire(std::move(one));
+    stream_.retire(std::move(other));
     return found;
   }
 
  private:
   GpuBuffer zeroed(size_t bytes) {
-    GpuBuffer buffer(device_.context(), bytes);
-    stream_->fillZero(buffer, 0, bytes);
-    stream_->finish();
+    GpuBuffer buffer(context_, bytes);
+    stream_.fillZero(buffer, 0, bytes);
+    stream_.finish();
     return buffer;
   }
 
-  double seconds(const GpuKernel& kernel, const arguments::ProbeArguments& arguments, uint32_t groups) {
-    const auto begun = std::chrono::steady_clock::now();
-    stream_->run(kernel, std::as_bytes(std::span(&arguments, 1)), {groups});
-    stream_->finish();
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  void queue(const GpuKernel& kernel, const arguments::ProbeArguments& arguments, uint32_t groups) {
+    stream_.run(kernel, std::as_bytes(std::span(&arguments, 1)), {groups});
   }
 
-  // `amount`: of a round.
-  double rate(const GpuKernel& kernel, arguments::ProbeArguments arguments, uint32_t groups, double amount) {
-    arguments.rounds = 2;
-    while (arguments.rounds < kMostRounds && seconds(kernel, arguments, groups) < kWorkSeconds) arguments.rounds *= 2;
+  // `run` queues so many rounds, of so much each.
+  double rate(const std::function<void(uint32_t rounds)>& run, uint32_t mostRounds, double amount) {
+    uint32_t rounds = 2;
+    const auto seconds = [&] {
+      const auto begun = std::chrono::steady_clock::now();
+      run(rounds);
+      stream_.finish();
+      return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    };
+    while (seconds() < kWorkSeconds && rounds < mostRounds) rounds *= 2;
     double best = 1e30;
-    for (int i = 0; i < 4; ++i) best = std::min(best, seconds(kernel, arguments, groups));
-    return amount * arguments.rounds / best;
+    for (int i = 0; i < 4; ++i) best = std::min(best, seconds());
+    return amount * rounds / best;
   }
 
-  VulkanDevice& device_;
-  std::shared_ptr<GpuStream> stream_;
+  std::shared_ptr<const GpuContext> context_;
+  GpuKernel multiplyAdds_, gather_, copy_;
   GpuBuffer sink_;
+  GpuStream stream_;  // waits before the others go
 };
 
 }  // namespace
