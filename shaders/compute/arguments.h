@@ -11,10 +11,12 @@
 #define TESSERA_SIZE(type, bytes) static_assert(sizeof(type) == bytes)
 namespace tessera::arguments {
 using uint = uint32_t;
-using FloatPointer = uint64_t;  // device addresses; 0 = not wanted
+using FloatPointer = uint64_t;   // device addresses; 0 = not wanted
 using UintPointer = uint64_t;
-using SumPointer = uint64_t;  // floats that several invocations add to
-using Bits64 = uint64_t;      // the lower half first
+using NumberPointer = uint64_t;  // fp16 or float, as the kernel is; see number.glsl
+using QuadPointer = uint64_t;    // four of them
+using SumPointer = uint64_t;     // floats that several invocations add to
+using Bits64 = uint64_t;         // the lower half first
 }  // namespace tessera::arguments
 #else
 #define TESSERA_BEGIN_ARGUMENTS

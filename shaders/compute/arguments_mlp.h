@@ -4,13 +4,14 @@
 #include "arguments.h"
 TESSERA_BEGIN_ARGUMENTS
 
-// Sizes are padded to multiples of 16 where they say so; the weights lie as MlpShape says.
+// Sizes are padded to multiples of 16 where they say so; the weights lie as MlpShape says. Numbers and quads of them are
+// fp16 or float as the kernel is (number.glsl); quads lie at multiples of 16 bytes.
 struct MlpForwardArguments {
   CountArguments samples;
   MatrixArguments inputs;
   MatrixArguments outputs;
-  FloatPointer weights;
-  FloatPointer activations;  // optional
+  NumberPointer weights;
+  QuadPointer activations;  // optional
   uint paddedInputs;
   uint paddedOutputs;
   uint hiddenLayers;
@@ -18,33 +19,61 @@ struct MlpForwardArguments {
 };
 TESSERA_SIZE(MlpForwardArguments, 104);
 
-struct MlpBackwardArguments {
+// What the gradients of the output layer's sums are made of.
+struct MlpOutputArguments {
   CountArguments samples;
-  MatrixArguments outputs;
-  MatrixArguments outputGradients;
+  MatrixArguments values;
+  MatrixArguments gradients;
+  FloatPointer firstGradients;  // optional
+  uint sigmoid;
+  uint unused;
+};
+TESSERA_SIZE(MlpOutputArguments, 88);
+
+struct MlpBackwardArguments {
+  MlpOutputArguments last;
   MatrixArguments inputGradients;  // optional
-  FloatPointer weights;
-  FloatPointer activations;
-  FloatPointer firstOutputGradients;  // optional
-  FloatPointer hiddenGradients;       // [hiddenLayers][capacity][width]: before ReLU
-  FloatPointer lastGradients;         // [capacity][paddedOutputs]: before the output activation
+  NumberPointer weights;
+  QuadPointer activations;
+  QuadPointer hiddenGradients;  // [hiddenLayers][capacity][width]: before ReLU
+  NumberPointer lastGradients;  // [capacity][paddedOutputs]: before the output activation
+  FloatPointer largest;         // [largestCount], for lossScale
+  uint largestCount;            // 0: nothing is scaled
   uint paddedInputs;
   uint paddedOutputs;
   uint hiddenLayers;
-  uint sigmoidOutput;
 };
-TESSERA_SIZE(MlpBackwardArguments, 152);
+TESSERA_SIZE(MlpBackwardArguments, 168);
 
-// gradients[o][i] += Σ_samples after[sample][o] · before[sample][i]: the weights of one layer.
+struct MlpLargestGradientArguments {
+  MlpOutputArguments last;
+  FloatPointer largest;  // [workgroups]
+};
+TESSERA_SIZE(MlpLargestGradientArguments, 96);
+
+struct HalveNumbersArguments {
+  FloatPointer numbers;
+  NumberPointer halves;
+  uint count;
+  uint unused;
+};
+TESSERA_SIZE(HalveNumbersArguments, 24);
+
+// gradients[o][i] += Σ_samples after[sample][o] · before[sample][i]: the weights of one layer. Its input is a matrix of
+// floats (the network's) or activations; columns beyond its own read as zero.
 struct MlpWeightGradientsArguments {
   CountArguments samples;
-  MatrixArguments before;  // the layer's input; columns beyond its own read as zero
-  FloatPointer after;      // [capacity][rows]: gradient of the layer's sums
-  SumPointer gradients;    // [rows][columns]
+  MatrixArguments inputs;     // empty where there are activations
+  NumberPointer activations;  // [capacity][columns]
+  NumberPointer after;        // [capacity][rows]: gradient of the layer's sums, scaled
+  SumPointer gradients;       // [rows][columns]
+  FloatPointer largest;       // as in MlpBackwardArguments
+  uint largestCount;
   uint rows;
   uint columns;
+  uint unused;
 };
-TESSERA_SIZE(MlpWeightGradientsArguments, 72);
+TESSERA_SIZE(MlpWeightGradientsArguments, 96);
 
 TESSERA_END_ARGUMENTS
 #endif

@@ -1,6 +1,6 @@
 // What every kernel starts with: pointers, the shared argument structs, and how to read them.
 // Defines: FloatPointer, UintPointer, KERNEL_ARGUMENTS(), WANTED(), FOR_EACH(), FOR_EACH_ROW(), firstOf(), endOf(),
-// elementOf().
+// columnOffset(), elementOf().
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 #extension GL_EXT_control_flow_attributes : require
@@ -42,8 +42,9 @@ uint firstOf(CountArguments count) { return WANTED(count.first) ? count.first.va
   for (uint row = firstOf(count) + gl_GlobalInvocationID.x, row##End = endOf(count); row < row##End; \
        row += gl_NumWorkGroups.x * gl_WorkGroupSize.x)
 
-// The index of an element of a matrix, in either layout.
-uint elementOf(MatrixArguments m, uint row, uint column) {
-  if (m.groupWidth == 0) return row * m.rowStride + column;
-  return column / m.groupWidth * m.groupStride + row * m.rowStride + column % m.groupWidth;
+// The index of an element of a matrix, in either layout. Loops over rows have the column's part once.
+uint columnOffset(MatrixArguments m, uint column) {
+  if (m.groupWidth == 0) return column;
+  return column / m.groupWidth * m.groupStride + column % m.groupWidth;
 }
+uint elementOf(MatrixArguments m, uint row, uint column) { return columnOffset(m, column) + row * m.rowStride; }

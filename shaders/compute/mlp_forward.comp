@@ -2,19 +2,30 @@
 // to the output (Müller et al. 2021, fully fused networks).
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "number.glsl"
 #include "kernel.glsl"
 #include "arguments_mlp.h"
-#include "mlp_tile.glsl"
+#include "mlp_block.glsl"
 
 KERNEL_ARGUMENTS(MlpForwardArguments)
+
+void take(uint row, uint column, float sum) {
+  MatrixArguments outputs = arguments.values.outputs;
+  if (row >= endOf(arguments.values.samples) || column >= outputs.columns) return;
+  if (arguments.values.sigmoidOutput != 0) sum = 1 / (1 + exp(-sum));
+  outputs.data.values[elementOf(outputs, row, column)] = sum;
+}
 
 // Columns [first, first + count) of the block's input; padding and samples beyond the last are zero.
 void loadInput(MatrixArguments m, uint firstSample, uint samples, uint first, uint count) {
   barrier();
-  for (uint i = gl_LocalInvocationIndex; i < kBlock * count; i += kThreads) {
-    const uint row = i / count, column = i % count;
-    const bool inside = firstSample + row < samples && first + column < m.columns;
-    state[row * kStride + column] = inside ? m.data.values[elementOf(m, firstSample + row, first + column)] : 0;
+  for (uint column = gl_LocalInvocationIndex % 16; column < count; column += 16) {
+    const bool given = first + column < m.columns;
+    const uint offset = given ? columnOffset(m, first + column) : 0;
+    for (uint row = gl_LocalInvocationIndex / 16; row < kBlock; row += kThreads / 16) {
+      const bool inside = given && firstSample + row < samples;
+      STATE(row, column) = toNumber(inside ? m.data.values[offset + (firstSample + row) * m.rowStride] : 0);
+    }
   }
 }
 
@@ -28,18 +39,13 @@ void forward(MlpForwardArguments a, uint firstSample, uint samples) {
 
   uint offset = a.paddedInputs * kWidth;  // of the next layer's weights
   for (uint layer = 0; layer < a.hiddenLayers; ++layer) {
-    barrier();
-    [[unroll]] for (uint r = 0; r < kRows; ++r) {
-      [[unroll]] for (uint c = 0; c < kColumns; ++c) {
-        state[stateRow(r) * kStride + stateColumn(c)] = max(sums[r * kColumns + c], 0);
-      }
-    }
+    keepSums(true);
     if (WANTED(a.activations)) {
       barrier();
-      const uint base = (layer * a.samples.capacity + firstSample) * kWidth;
+      const uint base = (layer * a.samples.capacity + firstSample) * kWidth / 4;
       const uint rows = min(kBlock, samples - firstSample);
-      for (uint i = gl_LocalInvocationIndex; i < rows * kWidth; i += kThreads) {
-        a.activations.values[base + i] = state[i / kWidth * kStride + i % kWidth];
+      for (uint i = gl_LocalInvocationIndex; i < rows * kWidth / 4; i += kThreads) {
+        a.activations.values[base + i] = STATE_QUAD(i / (kWidth / 4), i % (kWidth / 4));
       }
     }
     if (layer + 1 < a.hiddenLayers) {
@@ -52,15 +58,7 @@ void forward(MlpForwardArguments a, uint firstSample, uint samples) {
   for (uint first = 0; first < a.paddedOutputs; first += kWidth) {
     clearSums();
     accumulate(a.weights, offset + first * kWidth, 1, kWidth, kWidth, min(kWidth, a.paddedOutputs - first));
-    [[unroll]] for (uint r = 0; r < kRows; ++r) {
-      [[unroll]] for (uint c = 0; c < kColumns; ++c) {
-        const uint row = firstSample + stateRow(r), column = first + stateColumn(c);
-        if (row >= samples || column >= a.outputs.columns) continue;
-        const float sum = sums[r * kColumns + c];
-        a.outputs.data.values[elementOf(a.outputs, row, column)] =
-            a.sigmoidOutput != 0 ? 1 / (1 + exp(-sum)) : sum;
-      }
-    }
+    giveSums(firstSample, first);
   }
 }
 

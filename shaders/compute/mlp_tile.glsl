@@ -1,10 +1,12 @@
 // One workgroup takes a block of samples through a layer: `state` holds the block's vectors, the layer's weights pass
-// through `weightTile` sixteen rows at a time, and each invocation sums kRows samples × kColumns neurons in registers.
-// Defines: state, sums, FOR_EACH_BLOCK(), stateRow(), stateColumn(), clearSums(), accumulate().
+// through `weightTile` sixteen inputs at a time, and each invocation sums kRows samples × kColumns neurons in registers.
+// Both are kept in fours along the inputs: three loads of four numbers feed as many multiply-adds as twelve of one.
+// Include after number.glsl. Defines what mlp_matrices.glsl does: kThreads, kWidth, kBlock, STATE(), STATE_QUAD(),
+// clearSums(), accumulate(), keepSums(), giveSums(), which calls take() of the kernel.
 
 const uint kThreads = 128;
-const uint kRowGroups = 16;
-const uint kColumnGroups = kThreads / kRowGroups;
+const uint kColumnGroups = 8;
+const uint kRowGroups = kThreads / kColumnGroups;
 const uint kDepth = 16;
 
 layout(local_size_x = 128) in;
@@ -14,44 +16,77 @@ layout(constant_id = 2) const uint kStateWidth = 64;  // at least kWidth
 
 const uint kRows = kBlock / kRowGroups;
 const uint kColumns = kWidth / kColumnGroups;
-const uint kStride = kStateWidth + 1;  // odd, so that neighbouring samples lie in different banks
+const uint kStride = kStateWidth / 4 + 1;   // in fours; odd, so that neighbouring samples lie in different banks
+const uint kTileStride = kDepth / 4 + 1;
 
-shared float state[kBlock * kStride];
-shared float weightTile[kDepth * kWidth];
+shared NumberQuad state[kBlock * kStride];
+shared NumberQuad weightTile[kWidth * kTileStride];
 float sums[kRows * kColumns];
 
-// The sample (within the block) and the neuron of this invocation's sum (r, c).
-uint stateRow(uint r) { return r * kRowGroups + gl_LocalInvocationIndex % kRowGroups; }
-uint stateColumn(uint c) { return gl_LocalInvocationIndex / kRowGroups * kColumns + c; }
+#define STATE(row, column) state[(row) * kStride + (column) / 4][(column) % 4]
+#define STATE_QUAD(row, quad) state[(row) * kStride + (quad)]
+#define KEEP_QUAD(row, quad, four) state[(row) * kStride + (quad)] = four
 
-// The first sample of every block of samples [begin, end), shared out among the workgroups.
-#define FOR_EACH_BLOCK(firstSample, begin, end)                                     \
-  for (uint firstSample = (begin) + gl_WorkGroupID.x * kBlock; firstSample < (end); \
-       firstSample += gl_NumWorkGroups.x * kBlock)
+// The sample (within the block) and the neuron of this invocation's sum (r, c): neighbours have neighbouring neurons.
+uint sumRow(uint r) { return r * kRowGroups + gl_LocalInvocationIndex / kColumnGroups; }
+uint sumColumn(uint c) { return c * kColumnGroups + gl_LocalInvocationIndex % kColumnGroups; }
 
 void clearSums() {
   [[unroll]] for (uint i = 0; i < kRows * kColumns; ++i) sums[i] = 0;
 }
 
+// Inputs [k, k + 4) of neuron n.
+NumberQuad weightsOf(NumberPointer weights, uint first, uint kStep, uint nStep, uint k, uint n) {
+  if (kStep == 1) return QuadPointer(weights).values[(first + k + n * nStep) / 4];
+  NumberQuad four;
+  [[unroll]] for (uint i = 0; i < 4; ++i) four[i] = weights.values[first + (k + i) * kStep + n * nStep];
+  return four;
+}
+
 // sums[sample][n] += Σ_{k < depth} state[sample][k] · weights[first + k · kStep + n · nStep] for n < columns; others add
-// nothing. `depth` is a multiple of 16. All invocations call it together; it waits before it reads `state`.
-void accumulate(FloatPointer weights, uint first, uint kStep, uint nStep, uint depth, uint columns) {
+// nothing. One of the steps is 1, all else a multiple of 16. All invocations call it together; it waits before it reads
+// `state`.
+void accumulate(NumberPointer weights, uint first, uint kStep, uint nStep, uint depth, uint columns) {
   for (uint k0 = 0; k0 < depth; k0 += kDepth) {
     barrier();
-    for (uint i = gl_LocalInvocationIndex; i < kDepth * kWidth; i += kThreads) {
+    for (uint i = gl_LocalInvocationIndex; i < kWidth * kDepth / 4; i += kThreads) {
       // Neighbouring invocations read neighbouring weights.
-      const uint k = kStep == 1 ? i % kDepth : i / kWidth;
-      const uint n = kStep == 1 ? i / kDepth : i % kWidth;
-      weightTile[k * kWidth + n] = n < columns ? weights.values[first + (k0 + k) * kStep + n * nStep] : 0;
+      const uint quad = kStep == 1 ? i % (kDepth / 4) : i / kWidth;
+      const uint n = kStep == 1 ? i / (kDepth / 4) : i % kWidth;
+      weightTile[n * kTileStride + quad] =
+          n < columns ? weightsOf(weights, first, kStep, nStep, k0 + 4 * quad, n) : NumberQuad(0);
     }
     barrier();
-    for (uint k = 0; k < kDepth; ++k) {
-      float column[kColumns];
-      [[unroll]] for (uint c = 0; c < kColumns; ++c) column[c] = weightTile[k * kWidth + stateColumn(c)];
+    for (uint quad = 0; quad < kDepth / 4; ++quad) {
+      vec4 column[kColumns];
+      [[unroll]] for (uint c = 0; c < kColumns; ++c) column[c] = vec4(weightTile[sumColumn(c) * kTileStride + quad]);
       [[unroll]] for (uint r = 0; r < kRows; ++r) {
-        const float value = state[stateRow(r) * kStride + k0 + k];
-        [[unroll]] for (uint c = 0; c < kColumns; ++c) sums[r * kColumns + c] += value * column[c];
+        const vec4 value = vec4(state[sumRow(r) * kStride + k0 / 4 + quad]);
+        [[unroll]] for (uint i = 0; i < 4; ++i) {
+          [[unroll]] for (uint c = 0; c < kColumns; ++c) sums[r * kColumns + c] += value[i] * column[c][i];
+        }
       }
+    }
+  }
+}
+
+// state ← sums, where `rectified` those above zero. Waits before it writes, not after.
+void keepSums(bool rectified) {
+  barrier();
+  [[unroll]] for (uint r = 0; r < kRows; ++r) {
+    [[unroll]] for (uint c = 0; c < kColumns; ++c) {
+      const float sum = sums[r * kColumns + c];
+      STATE(sumRow(r), sumColumn(c)) = toNumber(rectified && sum < 0 ? 0 : sum);
+    }
+  }
+}
+
+// Hands each sum to the kernel.
+void take(uint row, uint column, float sum);
+void giveSums(uint firstRow, uint firstColumn) {
+  [[unroll]] for (uint c = 0; c < kColumns; ++c) {
+    [[unroll]] for (uint r = 0; r < kRows; ++r) {
+      take(firstRow + sumRow(r), firstColumn + sumColumn(c), sums[r * kColumns + c]);
     }
   }
 }

@@ -116,6 +116,9 @@ class Device {
   // False where a device does not have an operation yet; calling it then is our own mistake (CHECK).
   virtual bool supports(Operation operation) const = 0;
 
+  // Whether activations of networks are kept in fp16, two to a word; else as floats.
+  virtual bool keepsHalves() const { return false; }
+
 #define TESSERA_RUN(name) virtual void run(const name&);
   TESSERA_OPERATIONS(TESSERA_RUN)
 #undef TESSERA_RUN
@@ -123,6 +126,10 @@ class Device {
   template <class T>
   Array<T> array(size_t count) {
     return count ? Array<T>(allocate(count * sizeof(T)), count) : Array<T>();
+  }
+  // What MlpForward keeps for MlpBackward.
+  Array<float> activationsOf(const MlpShape& shape, size_t samples) {
+    return array<float>(samples * shape.activationsPerSample() / (keepsHalves() ? 2 : 1));
   }
   template <class T>
   Array<T> arrayOf(const std::vector<T>& values) {

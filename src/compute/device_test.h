@@ -86,6 +86,9 @@ class Stage {
   Slice<uint32_t> outputWords(std::string name, size_t size);
   Slice<uint32_t> outputWords(std::string name, const std::vector<uint32_t>& initial);
   Matrix<float> outputMatrix(std::string name, size_t rows, uint32_t columns, Layout layout, double tolerance = 1e-5);
+  // Of what the device keeps in fp16 where Device::keepsHalves says so.
+  Slice<float> keptInput(const std::vector<float>& values);
+  Slice<float> keptOutput(std::string name, size_t size, double tolerance = 1e-5);
 
   Outputs outputs();  // waits for the device
 
@@ -100,6 +103,7 @@ class Stage {
     double tolerance;
     Slice<const float> floats;
     Slice<const uint32_t> words;
+    bool halves = false;  // `words` are pairs of fp16
   };
   std::vector<Watched> watched_;
 };
@@ -128,6 +132,8 @@ struct OperationTests {
   std::string noGradient;  // why there is none to check
   // Which samples there are is decided in double: a device without may now and then decide otherwise.
   bool decides = false;
+  // Some devices compute it in fp16: those are held to a hundredth.
+  bool inHalves = false;
 };
 
 template <class Arguments>
@@ -153,6 +159,11 @@ void expectTheSameSums(const std::vector<float>& got, const std::vector<float>& 
 std::vector<std::string> deviceNames();
 Device* deviceNamed(const std::string& name);
 inline constexpr std::string_view kWithoutDoubles = "vulkan without doubles";
+// Of operations that have such a form alone. "Emulated": by the same kernels as cooperative matrices, which Mesa's
+// driver for the processor lacks.
+inline constexpr std::string_view kInHalves = "vulkan in halves", kWithMatrices = "vulkan with matrices",
+                                  kWithEmulatedMatrices = "vulkan with emulated matrices";
+bool computesInHalves(std::string_view name);
 // The cpu device with each lesser instruction set that this machine has: "cpu AVX2 with 2 threads", ... All cpu devices
 // share one set, so a test on a device first says which.
 std::vector<std::string> lesserCpuNames();

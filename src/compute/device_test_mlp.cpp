@@ -61,6 +61,7 @@ template <>
 OperationTests testsOf<MlpForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is MlpBackward";
+  tests.inHalves = true;
   for (const NetworkCase& network : networks())
     for (const Size& size : kRowSizes)
       for (bool keep : {false, true})
@@ -74,7 +75,8 @@ OperationTests testsOf<MlpForward>() {
                    shape, stage.count(size), stage.randomMatrix(size.capacity, shape.inputs, network.input, -1, 1),
                    stage.input(randomWeights(stage.random, shape)),
                    stage.outputMatrix("output", size.capacity, outputs, network.output),
-                   keep ? stage.output("activations", size.capacity * shape.activationsPerSample()) : Slice<float>()});
+                   keep ? stage.keptOutput("activations", size.capacity * shape.activationsPerSample())
+                        : Slice<float>()});
              }});
   return tests;
 }
@@ -82,6 +84,7 @@ OperationTests testsOf<MlpForward>() {
 template <>
 OperationTests testsOf<MlpBackward>() {
   OperationTests tests;
+  tests.inHalves = true;
   for (const NetworkCase& network : networks())
     for (const Size& size : kRowSizes)
       for (int optional = 0; optional < 4; ++optional) {
@@ -95,7 +98,7 @@ OperationTests testsOf<MlpBackward>() {
                stage.device.run(MlpBackward{
                    shape, stage.count(size), stage.matrixOf(kept.input, shape.inputs, network.input),
                    stage.input(kept.weights), stage.matrixOf(kept.output, shape.outputs, network.output),
-                   stage.input(kept.activations),
+                   stage.keptInput(kept.activations),
                    stage.randomMatrix(size.capacity, shape.outputs, network.output, -1, 1),
                    withFirst ? stage.randomInput(size.capacity, -1, 1) : Slice<float>(),
                    stage.output("weightGradients", stage.random.floats(shape.parameters(), -1, 1)),
@@ -117,7 +120,7 @@ OperationTests testsOf<MlpBackward>() {
            stage.device.run(
                MlpBackward{shape, Count{samples, {}}, stage.matrixOf(kept.input, shape.inputs, network.input),
                            stage.input(kept.weights), stage.matrixOf(kept.output, shape.outputs, network.output),
-                           stage.input(kept.activations), stage.matrixOf(upstream, shape.outputs, network.output),
+                           stage.keptInput(kept.activations), stage.matrixOf(upstream, shape.outputs, network.output),
                            stage.input(first), weightGradients, inputGradients});
            const auto loss = [&](View input, View weights) {
              const reference::MlpResult result = reference::mlpForward(shape, samples, input, weights);

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -130,11 +131,64 @@ Matrix<float> Stage::outputMatrix(std::string name, size_t rows, uint32_t column
   return shaped(output(std::move(name), sizeOf(rows, columns, layout), tolerance), rows, columns, layout);
 }
 
+namespace {
+
+// To the nearest, ties to even; what is too large is infinite.
+uint16_t halfOf(float value) {
+  const uint32_t bits = std::bit_cast<uint32_t>(value);
+  const auto sign = static_cast<uint16_t>(bits >> 16 & 0x8000u);
+  const float size = std::abs(value);
+  if (size >= 65520) return sign | 0x7c00u;
+  const int exponent = std::max(std::ilogb(std::max(size, 1e-30f)), -14);
+  const float steps = std::nearbyint(std::ldexp(size, 10 - exponent));  // of the last bit; 1024 and more: normal
+  return sign | static_cast<uint16_t>((exponent + 14) * 1024 + static_cast<int>(steps));
+}
+
+float floatOf(uint16_t half) {
+  const int exponent = half >> 10 & 31, steps = half & 1023;
+  const float size = exponent == 0    ? std::ldexp(static_cast<float>(steps), -24)
+                     : exponent == 31 ? (steps == 0 ? INFINITY : NAN)
+                                      : std::ldexp(static_cast<float>(1024 + steps), exponent - 25);
+  return half >> 15 ? -size : size;
+}
+
+}  // namespace
+
+Slice<float> Stage::keptInput(const std::vector<float>& values) {
+  if (!device.keepsHalves()) return input(values);
+  CHECK(values.size() % 2 == 0u);
+  std::vector<float> pairs;
+  for (size_t i = 0; i < values.size(); i += 2)
+    pairs.push_back(std::bit_cast<float>(halfOf(values[i]) | static_cast<uint32_t>(halfOf(values[i + 1])) << 16));
+  return input(pairs);
+}
+
+Slice<float> Stage::keptOutput(std::string name, size_t size, double tolerance) {
+  if (!device.keepsHalves()) return output(std::move(name), size, tolerance);
+  CHECK(size % 2 == 0u);
+  const Slice<float> slice = input(std::vector<float>(size / 2, std::bit_cast<float>(kPoisonWord)));
+  watched_.push_back({std::move(name), tolerance, slice, {}, true});
+  return slice;
+}
+
 Outputs Stage::outputs() {
   device.finish();
   Outputs outputs;
-  for (const Watched& watched : watched_)
-    outputs.push_back({watched.name, device.read(watched.floats), device.read(watched.words), watched.tolerance});
+  for (const Watched& watched : watched_) {
+    Output output = {watched.name, device.read(watched.floats), device.read(watched.words), watched.tolerance};
+    if (watched.halves) {
+      std::vector<float> values;
+      for (const float pair : output.values) {
+        const auto word = std::bit_cast<uint32_t>(pair);
+        for (const uint32_t shift : {0, 16}) {
+          const auto half = static_cast<uint16_t>(word >> shift);
+          values.push_back(half == static_cast<uint16_t>(kPoisonWord >> shift) ? kPoison : floatOf(half));
+        }
+      }
+      output.values = std::move(values);
+    }
+    outputs.push_back(std::move(output));
+  }
   return outputs;
 }
 
@@ -191,10 +245,19 @@ namespace {
 
 std::unique_ptr<Device> openDevice(const std::string& name) {
 #ifdef TESSERA_HAS_VULKAN
-  if (name == "vulkan without float atomics" || name == kWithoutDoubles) {
+  if (name.starts_with("vulkan")) {
     GpuOptions options;
-    (name == kWithoutDoubles ? options.allowed.float64 : options.allowed.floatAtomics) = false;
-    return makeVulkanDevice(options);
+    options.allowed.floatAtomics = name != "vulkan without float atomics";
+    options.allowed.float64 = name != kWithoutDoubles;
+    options.allowed.float16 = computesInHalves(name);
+    options.allowed.matrices = name == kWithMatrices;
+    const auto context = GpuContext::open(options);
+    const GpuFeatures& features = context->features();
+    if (features.float16 != options.allowed.float16 || features.matrices != options.allowed.matrices) {
+      std::printf("no device \"%s\": %s has no such arithmetic\n", name.c_str(), context->name().c_str());
+      return nullptr;
+    }
+    return name == kWithEmulatedMatrices ? makeVulkanDeviceWithEmulatedMatrices(options) : makeVulkanDevice(options);
   }
 #endif
   DeviceOptions options;
@@ -231,8 +294,13 @@ std::vector<std::string> deviceNames() {
   names.push_back("vulkan");
   names.push_back("vulkan without float atomics");
   names.emplace_back(kWithoutDoubles);
+  for (const std::string_view name : {kInHalves, kWithMatrices, kWithEmulatedMatrices}) names.emplace_back(name);
 #endif
   return names;
+}
+
+bool computesInHalves(std::string_view name) {
+  return name == kInHalves || name == kWithMatrices || name == kWithEmulatedMatrices;
 }
 
 void useSimdTargetOf(const std::string& name) {

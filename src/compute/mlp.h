@@ -36,14 +36,15 @@ inline size_t multiplyAccumulatesOf(const MlpShape& shape) {
          width * width * static_cast<size_t>(shape.hiddenLayers - 1);
 }
 
-// Both take part of the rows (Count::first).
+// Both take part of the rows (Count::first). Activations are [hiddenLayers][capacity][width], after ReLU, as
+// Device::keepsHalves says; they begin at a multiple of 16 bytes.
 struct MlpForward {
   const MlpShape& shape;
   Count samples;
   Matrix<const float> input;   // [capacity][inputs]
   Slice<const float> weights;  // [shape.parameters()]
   Matrix<float> output;        // [capacity][outputs or fewer: the first ones are wanted], row-major
-  Slice<float> activations;    // optional, [hiddenLayers][capacity][width]: kept for backward (after ReLU)
+  Slice<float> activations;    // optional, Device::activationsOf(shape, capacity): kept for backward
 };
 
 // Adds to `weightGradients`; overwrites `inputGradients`.

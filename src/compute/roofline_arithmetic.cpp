@@ -30,7 +30,7 @@ void measureNetwork(RooflineRecorder& recorder, const Network& network, const st
   Array<float> w = recorder.randomFloats(shape.parameters(), -0.2f, 0.2f);
   Array<float> dy = recorder.randomFloats(size_t{n} * outputs, -1, 1);
   Array<float> y = device.array<float>(size_t{n} * outputs), dx = device.array<float>(planeRows * inputs);
-  Array<float> kept = device.array<float>(n * shape.activationsPerSample());
+  Array<float> kept = device.activationsOf(shape, n);
   Array<float> dw = device.array<float>(shape.parameters());
   const MlpForward forward{shape, {n, {}}, inputMatrix(x), w, Matrix<float>(y, outputs), kept};
   const MlpBackward backward{

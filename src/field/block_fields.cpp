@@ -24,7 +24,7 @@ BlockFieldBatch::BlockFieldBatch(Device& device, const BlockFieldShape& shape, u
   outputs = device.array<float>(n * static_cast<size_t>(shape.network.outputs));
   if (!forBackward) return;
   encodedGradients = device.array<float>(encodings);
-  activations = device.array<float>(n * shape.network.activationsPerSample());
+  activations = device.activationsOf(shape.network, n);
   outputGradients = device.array<float>(n * static_cast<size_t>(shape.network.outputs));
 }
 

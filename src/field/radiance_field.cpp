@@ -43,8 +43,8 @@ void RadianceField::reserve(uint32_t samples) {
   }
   colourInput_ = device_.array<float>(n * shape_.colour.inputs);
   colours_ = device_.array<float>(n * 3);
-  densityActivations_ = device_.array<float>(n * shape_.density.activationsPerSample());
-  colourActivations_ = device_.array<float>(n * shape_.colour.activationsPerSample());
+  densityActivations_ = device_.activationsOf(shape_.density, n);
+  colourActivations_ = device_.activationsOf(shape_.colour, n);
   colourInputGradients_ = device_.array<float>(n * shape_.colour.inputs);
 }
 

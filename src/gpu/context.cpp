@@ -179,6 +179,7 @@ void GpuContext::chooseFeatures(const GpuFeatures& allowed) {
   features_.float64 = use(has.float64, allowed.float64, "float64");
   features_.float16 = use(has.float16, allowed.float16, "float16");
   features_.subgroups = use(has.subgroups, allowed.subgroups, "subgroups");
+  features_.matrices = features_.float16 && use(has.matrices, allowed.matrices, "matrices");
 }
 
 void GpuContext::createDevice(bool presents) {
@@ -191,7 +192,11 @@ void GpuContext::createDevice(bool presents) {
   auto atomics = vulkanStruct<VkPhysicalDeviceShaderAtomicFloatFeaturesEXT>(
       VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SHADER_ATOMIC_FLOAT_FEATURES_EXT);
   atomics.shaderBufferFloat32AtomicAdd = VK_TRUE;
+  auto matrices = vulkanStruct<VkPhysicalDeviceCooperativeMatrixFeaturesNV>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_COOPERATIVE_MATRIX_FEATURES_NV);
+  matrices.cooperativeMatrix = VK_TRUE;
   auto vulkan12 = vulkanStruct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
+  vulkan12.vulkanMemoryModel = features_.matrices;  // kernels with such matrices are written for it
   vulkan12.bufferDeviceAddress = VK_TRUE;
   vulkan12.timelineSemaphore = VK_TRUE;
   vulkan12.shaderFloat16 = features_.float16;
@@ -208,8 +213,14 @@ void GpuContext::createDevice(bool presents) {
   info.pQueueCreateInfos = &queue;
   std::vector<const char*> extensions;
   if (features_.floatAtomics) {
+    atomics.pNext = vulkan12.pNext;
     vulkan12.pNext = &atomics;
     extensions.push_back(VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME);
+  }
+  if (features_.matrices) {
+    matrices.pNext = vulkan12.pNext;
+    vulkan12.pNext = &matrices;
+    extensions.push_back(VK_NV_COOPERATIVE_MATRIX_EXTENSION_NAME);
   }
   if (presents) {
     if (!hasDeviceExtension(physicalDevice_, VK_KHR_SWAPCHAIN_EXTENSION_NAME)) {

@@ -22,13 +22,16 @@ struct GpuFeatures {
   bool float64 = true;    // double arithmetic; else fp32
   bool float16 = true;    // fp16 arithmetic and 16-bit storage; else fp32
   bool subgroups = true;  // subgroup arithmetic in compute; else shared memory
+  // Products of 16 × 16 fp16 matrices, summed in float, by subgroups of 32 (VK_NV_cooperative_matrix). Needs float16.
+  bool matrices = true;
 };
 
 struct GpuOptions {
   // A part of the device's name, any case, or its index. Empty: the environment's TESSERA_GPU, else the best there is
   // (discrete, integrated, virtual, processor).
   std::string device;
-  // Masked further by the environment's TESSERA_GPU_WITHOUT, a list of floatAtomics,float64,float16,subgroups.
+  // Masked further by the environment's TESSERA_GPU_WITHOUT, a list of
+  // floatAtomics,float64,float16,subgroups,matrices.
   GpuFeatures allowed;
   // Validation layers, if installed. The environment's TESSERA_VULKAN_VALIDATION=1 turns them on too.
   bool validation = false;

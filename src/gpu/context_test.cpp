@@ -112,13 +112,22 @@ TEST(GpuContext, ListsTheDevicesOfThisMachine) {
 
 TEST(GpuContext, LeavesOutFeaturesThatAreNotAllowed) {
   GpuOptions options;
-  options.allowed = {.floatAtomics = false, .float64 = false, .float16 = false, .subgroups = false};
+  options.allowed = {.floatAtomics = false, .float64 = false, .float16 = false, .subgroups = false, .matrices = false};
   const auto context = openForTest(options);
   SKIP_WITHOUT_VULKAN(context);
   EXPECT_FALSE(context->features().floatAtomics);
   EXPECT_FALSE(context->features().float64);
   EXPECT_FALSE(context->features().float16);
   EXPECT_FALSE(context->features().subgroups);
+  EXPECT_FALSE(context->features().matrices);
+}
+
+TEST(GpuContext, MultipliesNoMatricesOfHalvesWithoutHalves) {
+  GpuOptions options;
+  options.allowed.float16 = false;
+  const auto context = openForTest(options);
+  SKIP_WITHOUT_VULKAN(context);
+  EXPECT_FALSE(context->features().matrices);
 }
 
 TEST(GpuContext, LeavesOutFeaturesThatTheEnvironmentForbids) {

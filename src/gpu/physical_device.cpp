@@ -114,6 +114,36 @@ void requireFeatures(const PhysicalDevice& device) {
               "update the graphics driver, choose another device (tessera info devices), or use --device cpu");
 }
 
+namespace {
+
+// Whether the device multiplies matrices as matrix_tiles.glsl does.
+bool multipliesMatrices(VkPhysicalDevice device) {
+  if (!hasDeviceExtension(device, VK_NV_COOPERATIVE_MATRIX_EXTENSION_NAME)) return false;
+  auto matrices = vulkanStruct<VkPhysicalDeviceCooperativeMatrixFeaturesNV>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_COOPERATIVE_MATRIX_FEATURES_NV);
+  auto vulkan12 = vulkanStruct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
+  auto features = vulkanStruct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
+  features.pNext = &vulkan12;
+  vulkan12.pNext = &matrices;
+  vkGetPhysicalDeviceFeatures2(device, &features);
+  if (!matrices.cooperativeMatrix || !vulkan12.vulkanMemoryModel) return false;
+
+  uint32_t count = 0;
+  checkVulkan(vkGetPhysicalDeviceCooperativeMatrixPropertiesNV(device, &count, nullptr),
+              "vkGetPhysicalDeviceCooperativeMatrixPropertiesNV");
+  std::vector<VkCooperativeMatrixPropertiesNV> shapes(
+      count, vulkanStruct<VkCooperativeMatrixPropertiesNV>(VK_STRUCTURE_TYPE_COOPERATIVE_MATRIX_PROPERTIES_NV));
+  checkVulkan(vkGetPhysicalDeviceCooperativeMatrixPropertiesNV(device, &count, shapes.data()),
+              "vkGetPhysicalDeviceCooperativeMatrixPropertiesNV");
+  return std::any_of(shapes.begin(), shapes.end(), [](const VkCooperativeMatrixPropertiesNV& shape) {
+    return shape.MSize == 16 && shape.NSize == 16 && shape.KSize == 16 && shape.AType == VK_COMPONENT_TYPE_FLOAT16_NV &&
+           shape.BType == VK_COMPONENT_TYPE_FLOAT16_NV && shape.CType == VK_COMPONENT_TYPE_FLOAT32_NV &&
+           shape.DType == VK_COMPONENT_TYPE_FLOAT32_NV && shape.scope == VK_SCOPE_SUBGROUP_NV;
+  });
+}
+
+}  // namespace
+
 GpuFeatures presentFeatures(VkPhysicalDevice device) {
   auto atomics = vulkanStruct<VkPhysicalDeviceShaderAtomicFloatFeaturesEXT>(
       VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SHADER_ATOMIC_FLOAT_FEATURES_EXT);
@@ -137,6 +167,7 @@ GpuFeatures presentFeatures(VkPhysicalDevice device) {
   present.float16 = vulkan12.shaderFloat16 && vulkan11.storageBuffer16BitAccess;
   present.subgroups = (subgroup.supportedStages & VK_SHADER_STAGE_COMPUTE_BIT) &&
                       (subgroup.supportedOperations & VK_SUBGROUP_FEATURE_ARITHMETIC_BIT);
+  present.matrices = subgroup.subgroupSize == 32 && multipliesMatrices(device);
   return present;
 }
 

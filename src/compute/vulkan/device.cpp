@@ -19,6 +19,12 @@ std::unique_ptr<Device> makeVulkanDevice(const GpuOptions& options) {
   return std::make_unique<VulkanDevice>(GpuContext::open(options));
 }
 
+std::unique_ptr<Device> makeVulkanDeviceWithEmulatedMatrices(const GpuOptions& options) {
+  auto context = GpuContext::open(options);
+  CHECK(context->features().float16);
+  return std::make_unique<VulkanDevice>(std::move(context), VulkanDevice::MlpArithmetic::emulatedMatrices);
+}
+
 std::shared_ptr<const GpuContext> contextOf(const Device& device) {
   const auto* const vulkan = dynamic_cast<const VulkanDevice*>(&device);
   return vulkan == nullptr ? nullptr : vulkan->context();
@@ -30,9 +36,17 @@ VulkanBatches batchesOf(const Device& device) {
 }
 
 VulkanDevice::VulkanDevice(std::shared_ptr<const GpuContext> context)
-    : stream_(std::make_shared<GpuStream>(std::move(context))) {
+    : VulkanDevice(context, bestArithmetic(context->features())) {}
+
+VulkanDevice::VulkanDevice(std::shared_ptr<const GpuContext> context, MlpArithmetic arithmetic)
+    : stream_(std::make_shared<GpuStream>(std::move(context))), mlpArithmetic_(arithmetic) {
   const char* times = std::getenv("TESSERA_GPU_TIMES");
   if (times != nullptr && std::string_view(times) == "1") stream_->measure(true);
+}
+
+VulkanDevice::MlpArithmetic VulkanDevice::bestArithmetic(const GpuFeatures& features) {
+  if (features.matrices) return MlpArithmetic::matrices;
+  return features.float16 ? MlpArithmetic::halves : MlpArithmetic::floats;
 }
 
 VulkanDevice::~VulkanDevice() {

@@ -1,11 +1,13 @@
-// What is particular to this device: both forms of the kernels that sum, every width of the MLP, memory that comes and
-// goes while work is queued. The walk over all operations and shapes is compute/device_test.cpp.
+// What is particular to this device: both forms of the kernels that sum, every width and arithmetic of the MLP, memory
+// that comes and goes while work is queued. The walk over all operations and shapes is compute/device_test.cpp.
 #include "compute/vulkan/device.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
+#include <tuple>
 
 #include "base/random.h"
 #include "compute/reference/functions.h"
@@ -20,6 +22,11 @@ std::vector<float> randomFloats(size_t count, float low, float high, uint64_t se
   const RandomStream random(seed, 1);
   std::vector<float> values(count);
   for (size_t i = 0; i < count; ++i) values[i] = low + (high - low) * random.uniform(i);
+  return values;
+}
+
+std::vector<float> eighths(std::vector<float> values) {
+  for (float& value : values) value = std::round(8 * value) / 8;
   return values;
 }
 
@@ -40,6 +47,51 @@ void expectNear(const std::vector<float>& got, const Doubles& want, double toler
   EXPECT_LE(worst, tolerance * largest) << what;
 }
 
+// Both passes of a network of each width, with gradients of about `gradientSize`. Inputs and weights are eighths:
+// whether a neuron is on does not depend on rounding.
+void runEveryWidth(Device& device, float gradientSize, double tolerance) {
+  for (const int width : {16, 32, 64, 128}) {
+    SCOPED_TRACE(width);
+    // 2500 samples: several shares of the weight gradients, and a last block that is not full. The input is wider than
+    // the narrow networks, the output wider than 16.
+    const MlpShape shape = {.inputs = 40, .width = width, .hiddenLayers = 2, .outputs = 19};
+    const uint32_t samples = 2500;
+    const auto input = eighths(randomFloats(samples * shape.inputs, -1, 1, 3));
+    const auto weights = eighths(randomFloats(shape.parameters(), -0.3f, 0.3f, 4));
+    const auto outputGradients = randomFloats(samples * shape.outputs, -gradientSize, gradientSize, 5);
+    auto deviceInput = device.arrayOf(input);
+    auto deviceWeights = device.arrayOf(weights);
+    auto deviceOutputGradients = device.arrayOf(outputGradients);
+    auto output = device.array<float>(samples * shape.outputs);
+    auto activations = device.activationsOf(shape, samples);
+    auto weightGradients = device.array<float>(shape.parameters());
+    auto inputGradients = device.array<float>(input.size());
+    const Matrix<float> inputMatrix(deviceInput, shape.inputs), outputMatrix(output, shape.outputs);
+    device.run(MlpForward{.shape = shape,
+                          .samples = {samples, {}},
+                          .input = inputMatrix,
+                          .weights = deviceWeights.all(),
+                          .output = outputMatrix,
+                          .activations = activations});
+    device.run(MlpBackward{.shape = shape,
+                           .samples = {samples, {}},
+                           .input = inputMatrix,
+                           .weights = deviceWeights.all(),
+                           .output = outputMatrix,
+                           .activations = activations.all(),
+                           .outputGradients = Matrix<float>(deviceOutputGradients, shape.outputs),
+                           .firstOutputGradients = {},
+                           .weightGradients = weightGradients,
+                           .inputGradients = Matrix<float>(inputGradients, shape.inputs)});
+    const auto forward = reference::mlpForward(shape, samples, doubles(input), doubles(weights));
+    const auto backward = reference::mlpBackward(shape, samples, doubles(input), doubles(weights), forward.output,
+                                                 forward.activations, doubles(outputGradients));
+    expectNear(device.read(output.all()), forward.output, tolerance, "output");
+    expectNear(device.read(weightGradients.all()), backward.weights, tolerance, "weight gradients");
+    expectNear(device.read(inputGradients.all()), backward.input, tolerance, "input gradients");
+  }
+}
+
 // With hardware float atomics where there are any, and with the fallback.
 class VulkanDeviceTest : public testing::TestWithParam<bool> {
  protected:
@@ -47,6 +99,7 @@ class VulkanDeviceTest : public testing::TestWithParam<bool> {
     SKIP_WITHOUT_VULKAN(openForTest());
     GpuOptions options;
     options.allowed.floatAtomics = GetParam();
+    options.allowed.float16 = false;
     device_ = makeVulkanDevice(options);
   }
   void TearDown() override { EXPECT_EQ(GpuContext::validationMessages(), 0); }
@@ -84,48 +137,8 @@ TEST_P(VulkanDeviceTest, LosesNoGradientWhereManySamplesMeet) {
   expectNear(device_->read(tableGradients.all()), want.table, 1e-4, "table gradients");
 }
 
-TEST_P(VulkanDeviceTest, RunsEveryWidthForwardAndBackward) {
-  for (const int width : {16, 32, 64, 128}) {
-    SCOPED_TRACE(width);
-    // 2500 samples: several shares of the weight gradients, and a last block that is not full. The input is wider than
-    // the narrow networks, the output wider than 16.
-    const MlpShape shape = {.inputs = 40, .width = width, .hiddenLayers = 2, .outputs = 19};
-    const uint32_t samples = 2500;
-    const auto input = randomFloats(samples * shape.inputs, -1, 1, 3);
-    const auto weights = randomFloats(shape.parameters(), -0.3f, 0.3f, 4);
-    const auto outputGradients = randomFloats(samples * shape.outputs, -1, 1, 5);
-    auto deviceInput = device_->arrayOf(input);
-    auto deviceWeights = device_->arrayOf(weights);
-    auto deviceOutputGradients = device_->arrayOf(outputGradients);
-    auto output = device_->array<float>(samples * shape.outputs);
-    auto activations = device_->array<float>(samples * shape.activationsPerSample());
-    auto weightGradients = device_->array<float>(shape.parameters());
-    auto inputGradients = device_->array<float>(input.size());
-    const Matrix<float> inputMatrix(deviceInput, shape.inputs), outputMatrix(output, shape.outputs);
-    device_->run(MlpForward{.shape = shape,
-                            .samples = {samples, {}},
-                            .input = inputMatrix,
-                            .weights = deviceWeights.all(),
-                            .output = outputMatrix,
-                            .activations = activations});
-    device_->run(MlpBackward{.shape = shape,
-                             .samples = {samples, {}},
-                             .input = inputMatrix,
-                             .weights = deviceWeights.all(),
-                             .output = outputMatrix,
-                             .activations = activations.all(),
-                             .outputGradients = Matrix<float>(deviceOutputGradients, shape.outputs),
-                             .firstOutputGradients = {},
-                             .weightGradients = weightGradients,
-                             .inputGradients = Matrix<float>(inputGradients, shape.inputs)});
-    const auto forward = reference::mlpForward(shape, samples, doubles(input), doubles(weights));
-    const auto backward = reference::mlpBackward(shape, samples, doubles(input), doubles(weights), forward.output,
-                                                 forward.activations, doubles(outputGradients));
-    expectNear(device_->read(output.all()), forward.output, 1e-5, "output");
-    expectNear(device_->read(activations.all()), forward.activations, 1e-5, "activations");
-    expectNear(device_->read(weightGradients.all()), backward.weights, 1e-4, "weight gradients");
-    expectNear(device_->read(inputGradients.all()), backward.input, 1e-4, "input gradients");
-  }
+TEST_P(VulkanDeviceTest, RunsEveryWidthOfNetworks) {
+  runEveryWidth(*device_, 1, 1e-4);
 }
 
 TEST_P(VulkanDeviceTest, MemoryMayGoWhileWorkOnItIsQueued) {
@@ -159,6 +172,67 @@ TEST_P(VulkanDeviceTest, AllocatesZeros) {
     EXPECT_EQ(device_->read(array.all()), std::vector<uint32_t>(1001));
     device_->write(array.all(), std::span<const uint32_t>(std::vector<uint32_t>(1001, 7u)));
   }
+}
+
+// Gradients of losses that are means over many rays are far below what fp16 holds, those of sums far above: each
+// network's are scaled before they become fp16.
+class HalfNetworks : public testing::TestWithParam<std::tuple<const char*, float>> {
+ protected:
+  void TearDown() override { EXPECT_EQ(GpuContext::validationMessages(), 0); }
+};
+
+std::string halfNetworkName(const testing::TestParamInfo<HalfNetworks::ParamType>& info) {
+  const auto& [arithmetic, size] = info.param;
+  return std::string(arithmetic) + (size < 1 ? "Tiny" : size > 1 ? "Huge" : "");
+}
+
+INSTANTIATE_TEST_SUITE_P(Networks, HalfNetworks,
+                         testing::Combine(testing::Values("Halves", "Matrices", "EmulatedMatrices"),
+                                          testing::Values(1e-12f, 1.0f, 1e9f)),
+                         halfNetworkName);
+
+TEST_P(HalfNetworks, AreRightWhateverTheSizeOfGradients) {
+  const auto& [arithmetic, gradientSize] = GetParam();
+  const bool byMatrices = std::string_view(arithmetic) == "Matrices";
+  GpuOptions options;
+  options.allowed.matrices = byMatrices;
+  const auto context = openForTest(options);
+  SKIP_WITHOUT_VULKAN(context);
+  if (!context->features().float16 || context->features().matrices != byMatrices) {
+    GTEST_SKIP() << context->name() << " has no such arithmetic: " << arithmetic;
+  }
+  const std::unique_ptr<Device> device = std::string_view(arithmetic) == "EmulatedMatrices"
+                                             ? makeVulkanDeviceWithEmulatedMatrices(options)
+                                             : makeVulkanDevice(options);
+  EXPECT_TRUE(device->keepsHalves());
+  runEveryWidth(*device, gradientSize, 1e-2);
+}
+
+// Where a step has gone wrong, that is seen and not made to look like large numbers.
+TEST(NetworksInHalves, PassOnGradientsThatAreNoNumbers) {
+  const auto context = openForTest();
+  SKIP_WITHOUT_VULKAN(context);
+  if (!context->features().float16) GTEST_SKIP() << context->name() << " has no fp16";
+  const std::unique_ptr<Device> device = makeVulkanDevice();
+  const MlpShape shape = {.inputs = 16, .width = 16, .hiddenLayers = 1, .outputs = 16};
+  auto input = device->arrayOf(std::vector<float>(16, 1.0f)), output = device->array<float>(16);
+  auto weights = device->arrayOf(std::vector<float>(shape.parameters(), 0.1f));
+  auto weightGradients = device->array<float>(shape.parameters());
+  auto outputGradients = device->arrayOf(std::vector<float>(16, NAN));
+  auto activations = device->activationsOf(shape, 1);
+  const Matrix<float> inputMatrix(input, 16), outputMatrix(output, 16), gradientMatrix(outputGradients, 16);
+  device->run(MlpForward{shape, {1, {}}, inputMatrix, weights.all(), outputMatrix, activations});
+  device->run(MlpBackward{shape,
+                          {1, {}},
+                          inputMatrix,
+                          weights.all(),
+                          outputMatrix,
+                          activations.all(),
+                          gradientMatrix,
+                          {},
+                          weightGradients,
+                          {}});
+  EXPECT_FALSE(std::isfinite(device->read(weightGradients.all())[0]));
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "compute/device.h"
 #include "gpu/stream.h"
 #include "shaders/compute/arguments.h"
+#include "shaders/compute/arguments_mlp.h"
 
 namespace tessera {
 
@@ -28,7 +29,11 @@ class VulkanMemory : public Memory {
 
 class VulkanDevice : public Device {
  public:
-  explicit VulkanDevice(std::shared_ptr<const GpuContext> context);
+  // How networks are computed; floats need no feature. Sums are floats in all of them.
+  enum class MlpArithmetic { floats, halves, matrices, emulatedMatrices };
+
+  explicit VulkanDevice(std::shared_ptr<const GpuContext> context);  // as fast as its features allow
+  VulkanDevice(std::shared_ptr<const GpuContext> context, MlpArithmetic arithmetic);
   ~VulkanDevice() override;  // with TESSERA_GPU_TIMES=1 in the environment, says what each operation took on the device
 
   const std::shared_ptr<const GpuContext>& context() const { return stream_->context(); }
@@ -42,6 +47,7 @@ class VulkanDevice : public Device {
   void fillZero(Memory& memory, size_t offset, size_t bytes) override;
   void finish() override;
   bool supports(Operation) const override { return true; }
+  bool keepsHalves() const override { return mlpArithmetic_ != MlpArithmetic::floats; }
 
   using Device::fillZero;
   using Device::run;
@@ -57,6 +63,8 @@ class VulkanDevice : public Device {
 #define TESSERA_ENQUEUE(name) void enqueue(const name& options);
   TESSERA_OPERATIONS(TESSERA_ENQUEUE)
 #undef TESSERA_ENQUEUE
+
+  static MlpArithmetic bestArithmetic(const GpuFeatures& features);
 
   // Compiled at first use. `constants` are the shader's specialization constants in order.
   const GpuKernel& kernel(std::span<const uint32_t> spirv, std::vector<uint32_t> constants = {});
@@ -112,8 +120,12 @@ class VulkanDevice : public Device {
   GpuBuffer makeBuffer(size_t bytes);
   // The address of at least `floats` floats for use within one operation.
   uint64_t scratch(size_t floats);
+  // The network's weights as its kernels read them: themselves, or copies in fp16 at `scratch`.
+  uint64_t weightNumbers(const Slice<const float>& weights, uint64_t scratch);
+  void queueWeightGradients(const arguments::MlpWeightGradientsArguments& sums, size_t capacity);
 
   std::shared_ptr<GpuStream> stream_;
+  MlpArithmetic mlpArithmetic_;
   std::map<std::pair<const uint32_t*, std::vector<uint32_t>>, GpuKernel> kernels_;
   GpuBuffer scratch_;
 };

@@ -38,7 +38,7 @@ void HashFields::reserve(uint32_t samples, uint32_t texels) {
     const size_t n = samples, planes = Matrix<float>::rowsOfPlane(n) * kWidth;
     encoded_ = device_.array<float>(planes * (kCoarsePlanes + attention_.levels));
     features_ = device_.array<float>(n * kWidth);
-    if (mixesByNetwork_) mixActivations_ = device_.array<float>(n * mix_.activationsPerSample());
+    if (mixesByNetwork_) mixActivations_ = device_.activationsOf(mix_, n);
     if (forTraining_) {
       encodedGradients_ = device_.array<float>(encoded_.size());
       if (mixesByNetwork_) mixGradients_ = device_.array<float>(n * kWidth);

@@ -20,7 +20,7 @@ HashPass::HashPass(HashModel& model, const Room& room)
   weights_ = device_.array<float>(samples);
   losses_ = device_.array<float>(kLosses);
   if (!room.training) return;
-  activations_ = device_.array<float>(rays * model.config().directionShape().activationsPerSample());
+  activations_ = device_.activationsOf(model.config().directionShape(), rays);
   compositedGradients_ = device_.array<float>(kColours * rays);
   inputGradients_ = device_.array<float>(kInputs * rays);
   for (Array<float>* one : {&weightGradients_, &logDensityGradients_}) *one = device_.array<float>(samples);
