@@ -144,6 +144,7 @@ ordered_json describeDevices() {
     ordered_json& about = info[device.kind];
     if (!device.name.empty()) about["name"] = device.name;
     if (device.memoryBytes > 0) about["memory_bytes"] = device.memoryBytes;
+    if (!device.features.empty()) about["features"] = fmt::format("{}", fmt::join(device.features, ", "));
     if (!device.missing.empty()) about["cannot_be_used"] = device.missing;
   }
   return info;

@@ -1,9 +1,22 @@
-// Sums over a workgroup of 256 invocations, always in the same order.
+// Sums over a workgroup of 256 invocations, always in the same order on the same device: by subgroups with
+// TESSERA_SUBGROUPS, else by halves.
 // Defines: groupSum().
 
 shared float groupSums[256];
 
 // → the sum over all invocations, to each of them. All call it together.
+#ifdef TESSERA_SUBGROUPS
+#extension GL_KHR_shader_subgroup_arithmetic : require
+float groupSum(float own) {
+  const float ofSubgroup = subgroupAdd(own);
+  barrier();
+  if (subgroupElect()) groupSums[gl_SubgroupID] = ofSubgroup;
+  barrier();
+  float sum = 0;
+  for (uint i = 0; i < gl_NumSubgroups; ++i) sum += groupSums[i];
+  return sum;
+}
+#else
 float groupSum(float own) {
   barrier();
   groupSums[gl_LocalInvocationIndex] = own;
@@ -14,3 +27,4 @@ float groupSum(float own) {
   barrier();
   return groupSums[0];
 }
+#endif

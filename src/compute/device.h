@@ -185,8 +185,9 @@ std::optional<std::string> vulkanDeviceOf(const std::string& kind);
 struct DeviceDescription {
   std::string kind;  // "cpu", "vulkan:0"
   std::string name;
-  uint64_t memoryBytes = 0;  // of a graphics card
-  std::string missing;       // why it cannot be used; empty where it can
+  uint64_t memoryBytes = 0;           // of a graphics card
+  std::string missing;                // why it cannot be used; empty where it can
+  std::vector<std::string> features;  // of a graphics card: what its kernels make use of
 };
 std::vector<DeviceDescription> listDevices();
 

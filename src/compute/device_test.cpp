@@ -180,6 +180,11 @@ std::vector<OperationOnDevice> rows(bool needsGradient, const std::vector<std::s
   return chosen;
 }
 
+std::vector<std::string> withHalfDevices(std::vector<std::string> names) {
+  for (std::string& name : halfDeviceNames()) names.push_back(std::move(name));
+  return names;
+}
+
 std::vector<std::string> devicesButTheReference() {
   std::vector<std::string> names = deviceNames();
   std::erase(names, "reference");
@@ -198,8 +203,9 @@ std::string testName(const testing::TestParamInfo<OperationOnDevice>& info) {
   return name;
 }
 
-INSTANTIATE_TEST_SUITE_P(Device, Values, testing::ValuesIn(rows(false, devicesButTheReference())), testName);
-INSTANTIATE_TEST_SUITE_P(Device, Gradients, testing::ValuesIn(rows(true, deviceNames())), testName);
+INSTANTIATE_TEST_SUITE_P(Device, Values, testing::ValuesIn(rows(false, withHalfDevices(devicesButTheReference()))),
+                         testName);
+INSTANTIATE_TEST_SUITE_P(Device, Gradients, testing::ValuesIn(rows(true, withHalfDevices(deviceNames()))), testName);
 INSTANTIATE_TEST_SUITE_P(Device, Threads, testing::ValuesIn(rows(false, cpusWithTwoThreads())), testName);
 
 TEST(Operations, HaveAGradientToCheckOrAReasonForNone) {

@@ -158,9 +158,11 @@ void expectTheSameSums(const std::vector<float>& got, const std::vector<float>& 
 // The devices of this build, by name: "reference", "cpu with 1 thread", ... Null where this machine has none.
 std::vector<std::string> deviceNames();
 Device* deviceNamed(const std::string& name);
+inline constexpr std::string_view kWithFallbacks = "vulkan without float atomics and subgroups";
 inline constexpr std::string_view kWithoutDoubles = "vulkan without doubles";
-// Of operations that have such a form alone. "Emulated": by the same kernels as cooperative matrices, which Mesa's
-// driver for the processor lacks.
+// Those that compute OperationTests::inHalves. "Emulated": by the kernels of cooperative matrices, but without these,
+// which Mesa's driver for the processor lacks.
+std::vector<std::string> halfDeviceNames();
 inline constexpr std::string_view kInHalves = "vulkan in halves", kWithMatrices = "vulkan with matrices",
                                   kWithEmulatedMatrices = "vulkan with emulated matrices";
 bool computesInHalves(std::string_view name);

@@ -247,7 +247,7 @@ std::unique_ptr<Device> openDevice(const std::string& name) {
 #ifdef TESSERA_HAS_VULKAN
   if (name.starts_with("vulkan")) {
     GpuOptions options;
-    options.allowed.floatAtomics = name != "vulkan without float atomics";
+    options.allowed.floatAtomics = options.allowed.subgroups = name != kWithFallbacks;
     options.allowed.float64 = name != kWithoutDoubles;
     options.allowed.float16 = computesInHalves(name);
     options.allowed.matrices = name == kWithMatrices;
@@ -292,11 +292,18 @@ std::vector<std::string> deviceNames() {
   for (std::string& name : lesserCpuNames()) names.push_back(std::move(name));
 #ifdef TESSERA_HAS_VULKAN
   names.push_back("vulkan");
-  names.push_back("vulkan without float atomics");
+  names.emplace_back(kWithFallbacks);
   names.emplace_back(kWithoutDoubles);
-  for (const std::string_view name : {kInHalves, kWithMatrices, kWithEmulatedMatrices}) names.emplace_back(name);
 #endif
   return names;
+}
+
+std::vector<std::string> halfDeviceNames() {
+#ifdef TESSERA_HAS_VULKAN
+  return {std::string(kInHalves), std::string(kWithMatrices), std::string(kWithEmulatedMatrices)};
+#else
+  return {};
+#endif
 }
 
 bool computesInHalves(std::string_view name) {

@@ -68,8 +68,12 @@ std::vector<DeviceDescription> listDevices() {
     const std::vector<GpuDescription> devices = GpuContext::devices();
     for (size_t i = 0; i < devices.size(); ++i) {
       const GpuDescription& device = devices[i];
-      all.push_back({fmt::format("{}:{}", kVulkan, i), fmt::format("{} ({})", device.name, device.driver),
-                     device.memoryBytes, device.missing});
+      DeviceDescription& made = all.emplace_back();
+      made = {fmt::format("{}:{}", kVulkan, i), fmt::format("{} ({})", device.name, device.driver), device.memoryBytes,
+              device.missing};
+      for (const auto& [name, feature] : kGpuFeatureNames) {
+        if (device.missing.empty() && device.features.*feature) made.features.emplace_back(name);
+      }
     }
   } catch (const Error& error) {
     all.push_back({.kind = std::string(kVulkan), .missing = error.reason()});

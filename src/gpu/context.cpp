@@ -105,6 +105,7 @@ std::vector<GpuDescription> GpuContext::devices() {
     made.isProcessor = device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
     made.isDiscrete = device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
     made.missing = device.missing;
+    if (made.missing.empty()) made.features = presentFeatures(device.handle);
     VkPhysicalDeviceMemoryProperties memory = {};
     vkGetPhysicalDeviceMemoryProperties(device.handle, &memory);
     for (uint32_t i = 0; i < memory.memoryHeapCount; ++i) {
@@ -170,16 +171,13 @@ void GpuContext::chooseQueueFamily() {
 void GpuContext::chooseFeatures(const GpuFeatures& allowed) {
   const GpuFeatures has = presentFeatures(physicalDevice_);
   const std::string without = environment("TESSERA_GPU_WITHOUT");
-  const auto use = [&](bool present, bool allow, const char* feature) {
-    const bool used = present && allow && without.find(feature) == std::string::npos;
-    if (used) target_ += fmt::format("+{}", feature);
-    return used;
-  };
-  features_.floatAtomics = use(has.floatAtomics, allowed.floatAtomics, "floatAtomics");
-  features_.float64 = use(has.float64, allowed.float64, "float64");
-  features_.float16 = use(has.float16, allowed.float16, "float16");
-  features_.subgroups = use(has.subgroups, allowed.subgroups, "subgroups");
-  features_.matrices = features_.float16 && use(has.matrices, allowed.matrices, "matrices");
+  for (const auto& [name, feature] : kGpuFeatureNames) {
+    features_.*feature = has.*feature && allowed.*feature && without.find(name) == std::string::npos;
+  }
+  features_.matrices = features_.matrices && features_.float16;
+  for (const auto& [name, feature] : kGpuFeatureNames) {
+    if (features_.*feature) target_ += fmt::format("+{}", name);
+  }
 }
 
 void GpuContext::createDevice(bool presents) {

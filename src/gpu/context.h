@@ -25,13 +25,21 @@ struct GpuFeatures {
   // Products of 16 × 16 fp16 matrices, summed in float, by subgroups of 32 (VK_NV_cooperative_matrix). Needs float16.
   bool matrices = true;
 };
+struct GpuFeatureName {
+  const char* name;
+  bool GpuFeatures::*feature;
+};
+inline constexpr GpuFeatureName kGpuFeatureNames[] = {{"floatAtomics", &GpuFeatures::floatAtomics},
+                                                      {"float64", &GpuFeatures::float64},
+                                                      {"float16", &GpuFeatures::float16},
+                                                      {"subgroups", &GpuFeatures::subgroups},
+                                                      {"matrices", &GpuFeatures::matrices}};
 
 struct GpuOptions {
   // A part of the device's name, any case, or its index. Empty: the environment's TESSERA_GPU, else the best there is
   // (discrete, integrated, virtual, processor).
   std::string device;
-  // Masked further by the environment's TESSERA_GPU_WITHOUT, a list of
-  // floatAtomics,float64,float16,subgroups,matrices.
+  // Masked further by the environment's TESSERA_GPU_WITHOUT, a list of kGpuFeatureNames.
   GpuFeatures allowed;
   // Validation layers, if installed. The environment's TESSERA_VULKAN_VALIDATION=1 turns them on too.
   bool validation = false;
@@ -46,6 +54,7 @@ struct GpuDescription {
   bool isDiscrete = false;   // a card of its own
   uint64_t memoryBytes = 0;  // its own, or what it shares with the processor
   std::string missing;       // why it cannot be used; empty where it can
+  GpuFeatures features;
 };
 
 class GpuContext {

@@ -4,6 +4,8 @@
 #include "shaders/add_columns.h"
 #include "shaders/attention_backward.h"
 #include "shaders/attention_backward_float_atomics.h"
+#include "shaders/attention_backward_subgroups.h"
+#include "shaders/attention_backward_subgroups_float_atomics.h"
 #include "shaders/attention_forward.h"
 #include "shaders/compute/arguments_attention.h"
 #include "shaders/shade_backward.h"
@@ -54,8 +56,9 @@ void VulkanDevice::enqueue(const AttentionBackward& options) {
   arguments.coarseGradients = matrixArguments(options.coarseGradients, samples);
   arguments.fineGradients = matrixArguments(options.fineGradients, samples);
   arguments.logitGradients = deviceAddress(options.logitGradients);
-  queue(sumKernel(kAttentionBackwardFloatAtomicsSpirv, kAttentionBackwardSpirv, constantsOf(options.shape)), arguments,
-        {groups(samples, 256)});
+  queue(sumKernel(groupSpirv(kAttentionBackwardSubgroupsFloatAtomicsSpirv, kAttentionBackwardFloatAtomicsSpirv),
+                  groupSpirv(kAttentionBackwardSubgroupsSpirv, kAttentionBackwardSpirv), constantsOf(options.shape)),
+        arguments, {groups(samples, 256)});
 }
 
 void VulkanDevice::enqueue(const ShadeForward& options) {

@@ -2,17 +2,24 @@
 
 #include "compute/vulkan/vulkan_device.h"
 #include "shaders/colour_loss.h"
+#include "shaders/colour_loss_subgroups.h"
 #include "shaders/compute/arguments_losses.h"
 #include "shaders/depth_loss.h"
+#include "shaders/depth_loss_subgroups.h"
 #include "shaders/distortion_loss.h"
+#include "shaders/distortion_loss_subgroups.h"
 #include "shaders/exposure_backward.h"
 #include "shaders/exposure_backward_float_atomics.h"
 #include "shaders/exposure_forward.h"
 #include "shaders/opacity_loss.h"
+#include "shaders/opacity_loss_subgroups.h"
 #include "shaders/s3im_loss.h"
 #include "shaders/s3im_loss_float_atomics.h"
+#include "shaders/s3im_loss_subgroups.h"
+#include "shaders/s3im_loss_subgroups_float_atomics.h"
 #include "shaders/s3im_orders.h"
 #include "shaders/sparsity_loss.h"
+#include "shaders/sparsity_loss_subgroups.h"
 
 namespace tessera {
 
@@ -43,8 +50,8 @@ void VulkanDevice::enqueue(const ColourLoss& options) {
   arguments.target = deviceAddress(options.target);
   arguments.weights = deviceAddress(options.weights);
   arguments.gradients = deviceAddress(options.gradients);
-  queueSums(kernel(kColourLossSpirv), arguments, atLeastOneGroup(3 * size_t{options.rays.capacity}, kPerGroup), 2,
-            deviceAddress(options.loss));
+  queueSums(kernel(groupSpirv(kColourLossSubgroupsSpirv, kColourLossSpirv)), arguments,
+            atLeastOneGroup(3 * size_t{options.rays.capacity}, kPerGroup), 2, deviceAddress(options.loss));
 }
 
 void VulkanDevice::enqueue(const DistortionLoss& options) {
@@ -52,8 +59,8 @@ void VulkanDevice::enqueue(const DistortionLoss& options) {
   arguments.normalised = options.normalised;
   arguments.distances = deviceAddress(options.distances);
   arguments.steps = deviceAddress(options.steps);
-  queueSums(kernel(kDistortionLossSpirv), arguments, atLeastOneGroup(options.rays.capacity, kPerGroup), 1,
-            deviceAddress(options.loss));
+  queueSums(kernel(groupSpirv(kDistortionLossSubgroupsSpirv, kDistortionLossSpirv)), arguments,
+            atLeastOneGroup(options.rays.capacity, kPerGroup), 1, deviceAddress(options.loss));
 }
 
 void VulkanDevice::enqueue(const DepthLoss& options) {
@@ -61,8 +68,8 @@ void VulkanDevice::enqueue(const DepthLoss& options) {
   arguments.tolerance = options.tolerance;
   arguments.distances = deviceAddress(options.distances);
   arguments.known = deviceAddress(options.known);
-  queueSums(kernel(kDepthLossSpirv), arguments, atLeastOneGroup(options.rays.capacity, kPerGroup), 1,
-            deviceAddress(options.loss));
+  queueSums(kernel(groupSpirv(kDepthLossSubgroupsSpirv, kDepthLossSpirv)), arguments,
+            atLeastOneGroup(options.rays.capacity, kPerGroup), 1, deviceAddress(options.loss));
 }
 
 void VulkanDevice::enqueue(const S3imLoss& options) {
@@ -80,7 +87,9 @@ void VulkanDevice::enqueue(const S3imLoss& options) {
   arguments.orders = arguments.partials + parts * sizeof(float);
   arguments.gradients = deviceAddress(options.gradients);
   queue(kernel(kS3imOrdersSpirv), arguments, {options.patches});
-  queue(sumKernel(kS3imLossFloatAtomicsSpirv, kS3imLossSpirv), arguments, {parts});
+  queue(sumKernel(groupSpirv(kS3imLossSubgroupsFloatAtomicsSpirv, kS3imLossFloatAtomicsSpirv),
+                  groupSpirv(kS3imLossSubgroupsSpirv, kS3imLossSpirv)),
+        arguments, {parts});
   addPartials(arguments.partials, parts, 1, deviceAddress(options.loss));
 }
 
@@ -90,8 +99,8 @@ void VulkanDevice::enqueue(const OpacityLoss& options) {
   arguments.scale = options.scale;
   arguments.values = deviceAddress(options.opacities);
   arguments.gradients = deviceAddress(options.opacityGradients);
-  queueSums(kernel(kOpacityLossSpirv), arguments, atLeastOneGroup(options.segments.capacity, kPerGroup), 1,
-            deviceAddress(options.loss));
+  queueSums(kernel(groupSpirv(kOpacityLossSubgroupsSpirv, kOpacityLossSpirv)), arguments,
+            atLeastOneGroup(options.segments.capacity, kPerGroup), 1, deviceAddress(options.loss));
 }
 
 void VulkanDevice::enqueue(const SparsityLoss& options) {
@@ -101,8 +110,8 @@ void VulkanDevice::enqueue(const SparsityLoss& options) {
   arguments.values = deviceAddress(options.logDensities);
   arguments.runtimeSteps = deviceAddress(options.runtimeSteps);
   arguments.gradients = deviceAddress(options.gradients);
-  queueSums(kernel(kSparsityLossSpirv), arguments, atLeastOneGroup(options.points.capacity, kPerGroup), 1,
-            deviceAddress(options.loss));
+  queueSums(kernel(groupSpirv(kSparsityLossSubgroupsSpirv, kSparsityLossSpirv)), arguments,
+            atLeastOneGroup(options.points.capacity, kPerGroup), 1, deviceAddress(options.loss));
 }
 
 void VulkanDevice::enqueue(const ExposureForward& options) {

@@ -8,6 +8,7 @@
 #include "shaders/occupancy_points.h"
 #include "shaders/occupancy_raise.h"
 #include "shaders/occupancy_sums.h"
+#include "shaders/occupancy_sums_subgroups.h"
 
 namespace tessera {
 
@@ -50,7 +51,7 @@ void VulkanDevice::enqueue(const OccupancyUpdate& options) {
   arguments.sums = arguments.partials + 2 * summing * sizeof(float);
   queue(kernel(kOccupancyDecaySpirv), arguments, {all});
   queue(kernel(kOccupancyRaiseSpirv), arguments, {groups(options.points, 256)});
-  queue(kernel(kOccupancySumsSpirv), arguments, {summing});
+  queue(kernel(groupSpirv(kOccupancySumsSubgroupsSpirv, kOccupancySumsSpirv)), arguments, {summing});
   addPartials(arguments.partials, summing, 2, arguments.sums);
   queue(kernel(kOccupancyBitsSpirv), arguments, {groups(arguments.cellCount / 32, 128)});
 }

@@ -5,6 +5,8 @@
 #include "shaders/compute/arguments_proposals.h"
 #include "shaders/interlevel_loss.h"
 #include "shaders/interlevel_loss_float64.h"
+#include "shaders/interlevel_loss_subgroups.h"
+#include "shaders/interlevel_loss_subgroups_float64.h"
 #include "shaders/resample_fences.h"
 #include "shaders/resample_fences_float64.h"
 
@@ -36,8 +38,9 @@ void VulkanDevice::enqueue(const InterlevelLoss& options) {
   arguments.widths = deviceAddress(options.widths);
   arguments.sampleWeights = deviceAddress(options.sampleWeights);
   arguments.gradients = deviceAddress(options.weightGradients);
-  queueSums(realKernel(kInterlevelLossFloat64Spirv, kInterlevelLossSpirv), arguments,
-            atLeastOneGroup(options.rays.capacity, 256), 1, deviceAddress(options.loss));
+  queueSums(realKernel(groupSpirv(kInterlevelLossSubgroupsFloat64Spirv, kInterlevelLossFloat64Spirv),
+                       groupSpirv(kInterlevelLossSubgroupsSpirv, kInterlevelLossSpirv)),
+            arguments, atLeastOneGroup(options.rays.capacity, 256), 1, deviceAddress(options.loss));
 }
 
 }  // namespace tessera

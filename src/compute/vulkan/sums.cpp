@@ -1,6 +1,7 @@
 // Running sums and sums over all: what several operations need.
 #include "compute/vulkan/vulkan_device.h"
 #include "shaders/add_partials.h"
+#include "shaders/add_partials_subgroups.h"
 #include "shaders/compute/arguments_scan.h"
 #include "shaders/scan_apply.h"
 #include "shaders/scan_offsets.h"
@@ -38,7 +39,8 @@ void VulkanDevice::queueRunningSums(const RunningSums& sums) {
 }
 
 void VulkanDevice::addPartials(uint64_t partials, uint32_t count, uint32_t columns, uint64_t sums) {
-  queue(kernel(kAddPartialsSpirv), arguments::AddPartialsArguments{partials, sums, count, columns}, {columns});
+  queue(kernel(groupSpirv(kAddPartialsSubgroupsSpirv, kAddPartialsSpirv)),
+        arguments::AddPartialsArguments{partials, sums, count, columns}, {columns});
 }
 
 }  // namespace tessera

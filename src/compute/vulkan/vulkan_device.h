@@ -74,6 +74,11 @@ class VulkanDevice : public Device {
   // And of one that reckons in double where it can (real.glsl).
   const GpuKernel& realKernel(std::span<const uint32_t> inDouble, std::span<const uint32_t> inFloat,
                               std::vector<uint32_t> constants = {});
+  // And of one that sums over workgroups (group_sum.glsl).
+  std::span<const uint32_t> groupSpirv(std::span<const uint32_t> withSubgroups,
+                                       std::span<const uint32_t> without) const {
+    return stream_->context()->features().subgroups ? withSubgroups : without;
+  }
   arguments::RealArguments realArguments(double value) const;
   template <class Arguments>
   void queue(const GpuKernel& kernel, const Arguments& arguments, Groups groups) {
