@@ -86,7 +86,7 @@ TrainingResult train(Device& device, const TrainFlags& flags) {
   if (!blocks) throw CLI::ValidationError("--blocks", "'" + flags.blocks + "' is neither auto nor of the form 2x2");
   std::optional<BlockGrid> grid;
   if (!flags.grid.empty()) grid = readGrid(flags.grid, capture);
-  const BlockRunOptions options{flags.loop, *blocks, grid, flags.memoryMiB};
+  const BlockRunOptions options{flags.loop, *blocks, grid, flags.memoryMiB, device.ownMemory().bytes};
   if (flags.method == "hash") {
     if (!flags.residentBlocks.empty()) throw CLI::ValidationError("--resident-blocks", "is of --method volume");
     return trainHash(device, capture, flags.model, {options, chosenConfig(flags, presetDefaults<HashConfig>(flags))});

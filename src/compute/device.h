@@ -102,6 +102,11 @@ class Device {
   virtual std::string name() const = 0;
   virtual std::string target() const = 0;
 
+  // Of a card that has memory of its own: how much, and how much of it is taken by this device. Else zeros.
+  struct OwnMemory {
+    uint64_t bytes = 0, inUse = 0;
+  };
+  virtual OwnMemory ownMemory() const { return {}; }
   virtual std::unique_ptr<Memory> allocate(size_t bytes) = 0;  // zeroed
   virtual void writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) = 0;
   struct Reading {

@@ -78,6 +78,15 @@ void loadCalls() {
   }();
 }
 
+uint64_t largestHeap(const VkPhysicalDeviceMemoryProperties& memory) {
+  uint64_t bytes = 0;
+  for (uint32_t i = 0; i < memory.memoryHeapCount; ++i) {
+    const VkMemoryHeap& heap = memory.memoryHeaps[i];
+    if (heap.flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT) bytes = std::max<uint64_t>(bytes, heap.size);
+  }
+  return bytes;
+}
+
 }  // namespace
 
 std::shared_ptr<GpuContext> GpuContext::open(const GpuOptions& options) {
@@ -108,11 +117,7 @@ std::vector<GpuDescription> GpuContext::devices() {
     if (made.missing.empty()) made.features = presentFeatures(device.handle);
     VkPhysicalDeviceMemoryProperties memory = {};
     vkGetPhysicalDeviceMemoryProperties(device.handle, &memory);
-    for (uint32_t i = 0; i < memory.memoryHeapCount; ++i) {
-      const VkMemoryHeap& heap = memory.memoryHeaps[i];
-      if (heap.flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT)
-        made.memoryBytes = std::max<uint64_t>(made.memoryBytes, heap.size);
-    }
+    made.memoryBytes = largestHeap(memory);
     all.push_back(std::move(made));
   }
   if (all.empty()) checkVulkan(VK_ERROR_INCOMPATIBLE_DRIVER, "vkEnumeratePhysicalDevices");
@@ -147,6 +152,7 @@ void GpuContext::choosePhysicalDevice(const std::string& wanted) {
   physicalDevice_ = chosen.handle;
   limits_ = chosen.properties.limits;
   isProcessor_ = chosen.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+  isDiscrete_ = chosen.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
   name_ = fmt::format("{} ({})", chosen.properties.deviceName, chosen.driver);
   target_ = fmt::format("vulkan/{}/{}", chosen.properties.deviceName, chosen.driver);
   vkGetPhysicalDeviceMemoryProperties(physicalDevice_, &memory_);
@@ -230,6 +236,10 @@ void GpuContext::createDevice(bool presents) {
   info.ppEnabledExtensionNames = extensions.data();
   checkVulkan(vkCreateDevice(physicalDevice_, &info, nullptr, &device_), "vkCreateDevice");
   vkGetDeviceQueue(device_, queueFamily_, 0, &queue_);
+}
+
+uint64_t GpuContext::memoryBytes() const {
+  return largestHeap(memory_);
 }
 
 uint32_t GpuContext::memoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted,

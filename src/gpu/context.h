@@ -70,6 +70,8 @@ class GpuContext {
   const std::string& name() const { return name_; }      // "NVIDIA GeForce RTX 3060 (driver 535.183)"
   const std::string& target() const { return target_; }  // what bits depend on: driver, device, features in use
   bool isProcessor() const { return isProcessor_; }      // Mesa's lavapipe and the like
+  bool isDiscrete() const { return isDiscrete_; }        // a card of its own
+  uint64_t memoryBytes() const;  // its largest heap: its own, or what it shares with the processor
   const GpuFeatures& features() const { return features_; }
   const VkPhysicalDeviceLimits& limits() const { return limits_; }
 
@@ -107,7 +109,7 @@ class GpuContext {
   uint32_t queueFamily_ = 0, timestampBits_ = 0;
   VkPhysicalDeviceLimits limits_ = {};
   VkPhysicalDeviceMemoryProperties memory_ = {};
-  bool isProcessor_ = false;
+  bool isProcessor_ = false, isDiscrete_ = false;
   GpuFeatures features_;
   std::string name_, target_;
   std::unique_ptr<GpuHeap> heap_;

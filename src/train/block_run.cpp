@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kMiB = 1048576;
 constexpr double kShareOfBlocks = 0.4, kShareOfPhotos = 0.4;
+constexpr double kShareOfCard = 0.5;  // the rest is for what a step works on, and for other programs
 constexpr double kMostPixelsOff = 2;  // of observations whose distance is believed
 constexpr double kHeap = 1.02;        // what the C library keeps besides (1.002 was measured)
 
@@ -25,6 +26,7 @@ double BlockRunOptions::plannedBytes() const {
   return memoryMiB > 0 ? memoryMiB * kMiB : static_cast<double>(usableMemoryBytes());
 }
 double BlockRunOptions::bytesForBlocks() const {
+  if (cardBytes > 0) return kShareOfCard * static_cast<double>(cardBytes);
   return kShareOfBlocks * plannedBytes();
 }
 double BlockRunOptions::bytesForPhotos() const {
@@ -61,12 +63,18 @@ void writeRun(const ModelFolder& folder, const BlockTraining& on, const std::vec
                         loop.method);
 }
 
-void sayWhatMemoryItTakes(const Capture& capture, const BlockRunOptions& options, const MemoryNeeds& needs) {
+void sayWhatMemoryItTakes(const BlockTraining& on, const BlockRunOptions& options, const MemoryNeeds& needs) {
   constexpr double kCheckpoint = 2;  // a block that is saved stands in memory twice
+  const Device::OwnMemory card = on.device.ownMemory();
+  const Capture& capture = on.capture;
   const double all = static_cast<double>(decodedBytes(capture, capture.photosIn(Split::train)));
   const double photos = needs.photoBudgetMiB > 0 ? std::min(all, needs.photoBudgetMiB * kMiB) : all;
   const double bytes = kHeap * (static_cast<double>(residentBytes()) + photos + kCheckpoint * needs.bytesPerBlock);
-  inform("memory: at most {:.0f} MiB{}", bytes / kMiB, needs.how);
+  const std::string ofCard =
+      card.bytes == 0 ? ""
+                      : fmt::format(", and {:.0f} of the card's {:.0f} MiB", static_cast<double>(card.inUse) / kMiB,
+                                    static_cast<double>(card.bytes) / kMiB);
+  inform("memory: at most {:.0f} MiB{}{}", bytes / kMiB, ofCard, needs.how);
   if (bytes <= options.plannedBytes()) return;
   warn("that is more than the {:.0f} MiB there are; {}", options.plannedBytes() / kMiB, needs.remedy);
 }

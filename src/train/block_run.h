@@ -16,9 +16,10 @@ struct BlockRunOptions {
   BlockCount blocks;
   std::optional<BlockGrid> grid;  // of these blocks, whatever `blocks` says
   double memoryMiB = 0;           // to plan blocks and photos for; 0: what the machine has
+  uint64_t cardBytes = 0;         // Device::ownMemory of the device that trains: blocks stand there
 
   double plannedBytes() const;
-  double bytesForBlocks() const;  // of those; what photos leave is for what a step works on
+  double bytesForBlocks() const;  // of those, or of the card's; what photos leave is for what a step works on
   double bytesForPhotos() const;
 };
 
@@ -61,7 +62,7 @@ struct MemoryNeeds {
   double bytesPerBlock = 0;
   std::string how, remedy;
 };
-void sayWhatMemoryItTakes(const Capture& capture, const BlockRunOptions& options, const MemoryNeeds& needs);
+void sayWhatMemoryItTakes(const BlockTraining& on, const BlockRunOptions& options, const MemoryNeeds& needs);
 
 // Levels 1 to `top`, after the finest, for as many steps as levelSteps says of `share`, or as they had planned when
 // they were begun; those that were made before the finest came to where it is are made anew. False when one is not

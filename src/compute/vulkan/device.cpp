@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "compute/vulkan/vulkan_device.h"
+#include "gpu/heap.h"
 
 namespace tessera {
 
@@ -67,6 +68,12 @@ std::string VulkanDevice::name() const {
 }
 std::string VulkanDevice::target() const {
   return stream_->context()->target();
+}
+
+Device::OwnMemory VulkanDevice::ownMemory() const {
+  const GpuContext& context = *stream_->context();
+  if (!context.isDiscrete()) return {};
+  return {context.memoryBytes(), context.heap().bytesInUse()};
 }
 
 std::unique_ptr<Memory> VulkanDevice::allocate(size_t bytes) {

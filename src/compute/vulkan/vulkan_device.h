@@ -41,6 +41,7 @@ class VulkanDevice : public Device {
 
   std::string name() const override;
   std::string target() const override;
+  OwnMemory ownMemory() const override;
   std::unique_ptr<Memory> allocate(size_t bytes) override;
   void writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) override;
   void readBytes(std::span<const Reading> readings) override;

@@ -59,7 +59,7 @@ BlockLimits limitsOf(const TrainHashOptions& options) {
 
 void sayMemory(const BlockTraining& on, const TrainHashOptions& options) {
   const HashConfig& config = options.config;
-  sayWhatMemoryItTakes(on.capture, options,
+  sayWhatMemoryItTakes(on, options,
                        {config.photoBudgetMiB, trainingBytesPerBlock(config), "",
                         "lower samples_per_step, texels_per_step or photo_budget_mib, or use --method volume with "
                         "--resident-blocks"});

@@ -56,7 +56,7 @@ VolumeConfig levelConfig(VolumeConfig finest, uint32_t level, int64_t finestStep
 
 namespace {
 
-void sayWhatThereIsMemoryFor(VolumeTrainer& trainer, const Capture& capture, const TrainVolumeOptions& options) {
+void sayWhatThereIsMemoryFor(VolumeTrainer& trainer, const BlockTraining& on, const TrainVolumeOptions& options) {
   const VolumeConfig& config = options.config;
   const Residency* residency = trainer.residency();
   MemoryNeeds needs;
@@ -67,7 +67,7 @@ void sayWhatThereIsMemoryFor(VolumeTrainer& trainer, const Capture& capture, con
     needs.how = fmt::format(", with {} of {} blocks at a time, {} stays in {} steps", config.residentBlocks,
                             trainer.model().space().cells(), residency->stays().size(), residency->cycleSteps());
   }
-  sayWhatMemoryItTakes(capture, options, needs);
+  sayWhatMemoryItTakes(on, options, needs);
   if (!residency) return;
   const std::vector<uint32_t> never = residency->neverServed();
   if (!never.empty()) {
@@ -125,7 +125,7 @@ TrainingResult trainVolume(Device& device, const Capture& capture, const fs::pat
     VolumeTrainer trainer(device, capture, config, run.grid, run.folder.root() / kWaiting);
     if (!run.goesOn) fs::remove_all(model / "levels");  // of a run that is no more
     writeRun(run.folder, on, config.fields(), options.loop);
-    sayWhatThereIsMemoryFor(trainer, capture, options);
+    sayWhatThereIsMemoryFor(trainer, on, options);
     const bool stepsAreKnown = options.loop.steps > 0 && !run.goesOn;  // else they are settled on the way
     if (stepsAreKnown) warnWhereBlocksMissTheirTurn(trainer, options.loop.steps);
     result = runTraining(trainer, run.folder, options.loop);
