@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Packs what was built into a bundle that runs on x86-64 Linux with nothing but a graphics card's driver, and a glibc as new as
-# that of the machine that it was built on, which it names: the programs, the libraries that they need, the Vulkan loader, a made city. Then runs it here.
-# On another machine: unpack it, ./run.sh.
+# Packs what was built into a bundle that runs on x86-64 Linux with nothing but a graphics card's driver: the programs, the
+# libraries that they need, the Vulkan loader, a made city, and the glibc that the programs need, for machines with an
+# older one. Then runs it here. On another machine: tar -xzf, ./run.sh.
 #   [BUILD=build/release] [ONLY_PACK=1] bench/gpu.sh        settings of the run: bench/gpu_run.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
@@ -13,19 +13,25 @@ commit=$(git rev-parse --short HEAD 2> /dev/null || echo unknown)
 work=$out/gpu
 bundle=$work/tessera-gpu-$commit
 rm -rf "$bundle"
-mkdir -p "$bundle"/{bin,lib,lib-c++}
+mkdir -p "$bundle"/{bin,lib,lib-c,lib-c++}
 [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2 --size 400x300
 cp -r "$work/city" "$bundle/city"
+rm -r "$bundle/city/depths"  # four fifths of it, and nothing here asks for them
+jq -c 'del(.frames[].depth_file_path)' "$work/city/transforms.json" > "$bundle/city/transforms.json"
 for program in "$tessera" "$test"; do
   strip -o "$bundle/bin/$(basename "$program")" "$program"
 done
-# All but glibc, which must be the machine's, as its driver is. The C++ library apart: the driver may bring a newer one.
+# glibc and the C++ library apart: the driver is linked to the machine's, which may be newer.
 ldd "$tessera" "$test" | awk '$3 ~ /^\// { print $3 }' | sort -u | while read -r library; do
   case "$(basename "$library")" in
-    libc.so.* | libm.so.* | libdl.so.* | libpthread.so.* | librt.so.* | ld-linux*) ;;
+    libc.so.* | libm.so.* | libdl.so.* | libpthread.so.* | librt.so.* | ld-linux*) ;;  # below, whole
     libstdc++.so.* | libgcc_s.so.*) cp -L "$library" "$bundle/lib-c++/" ;;
     *) cp -L "$library" "$bundle/lib/" ;;
   esac
+done
+glibc=$(dirname "$(ldd "$tessera" | awk '$1 == "libc.so.6" { print $3 }')")
+for library in libc.so.6 libm.so.6 libmvec.so.1 libdl.so.2 libpthread.so.0 librt.so.1 libresolv.so.2 libutil.so.1 ld-linux-x86-64.so.2; do
+  cp -L "$glibc/$library" "$bundle/lib-c/"
 done
 loader=$(ldconfig -p | awk '/libvulkan\.so\.1 / && /x86-64/ { path = $NF } END { print path }')
 [ -n "$loader" ] || die "libvulkan.so.1: not installed (apt-get install libvulkan1)"
@@ -35,9 +41,9 @@ cp LICENSE "$bundle/"
 echo "$commit" > "$bundle/commit"
 find "$bundle" -type f \( -path '*/bin/*' -o -path '*/lib*/*' \) -exec objdump -T {} + 2> /dev/null |
   grep -o 'GLIBC_2\.[0-9]*' | sort -Vu | tail -1 | sed 's/GLIBC_//' > "$bundle/glibc"
-tar -C "$work" --sort=name -cJf "$bundle.tar.xz" "$(basename "$bundle")"
-megabytes=$(awk -v b="$(stat -c %s "$bundle.tar.xz")" 'BEGIN { printf "%.1f", b / 1e6 }')
-echo "$bundle.tar.xz: needs glibc $(cat "$bundle/glibc") or later, and a driver"
+tar -C "$work" --sort=name -c "$(basename "$bundle")" | gzip -9 > "$bundle.tar.gz"
+megabytes=$(awk -v b="$(stat -c %s "$bundle.tar.gz")" 'BEGIN { printf "%.1f", b / 1e6 }')
+echo "$bundle.tar.gz: needs a driver, and brings glibc $(cat "$bundle/glibc") for machines with an older one"
 verdict "megabytes of the bundle" "$megabytes" '<=' 60
 [ -n "${ONLY_PACK:-}" ] || "$bundle/run.sh" "$work"
 finish

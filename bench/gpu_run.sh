@@ -4,6 +4,7 @@
 #   ./run.sh [OUT]        default: the folder that this lies in
 #   DEVICE=vulkan:1       another device than the best (bin/tessera info devices)
 #   FOX=DIR               a capture of the fox photographs, for the row of 60 s
+#   GLIBC=packed          the bundle's glibc, which is otherwise used where the machine's is too old
 #   SECONDS_OF_TRAINING=60 SIZE=1920x1080 SAMPLES=65536 STREAMED=1048576 VALUES=1
 #   LENGTH="--steps 3" VOLUME="--set most_rays=128" HASH=... FIELD=...    instead of the seconds; more of train's flags
 set -uo pipefail
@@ -12,11 +13,22 @@ out=$(mkdir -p "${1:-$here}" && cd "${1:-$here}" && pwd)
 device=${DEVICE:-vulkan} seconds=${SECONDS_OF_TRAINING:-60} size=${SIZE:-1920x1080}
 work=$(mktemp -d) && trap 'rm -rf "$work"' EXIT
 
-# The machine's own C++ library where it is new enough: its driver may need that very one.
-export LD_LIBRARY_PATH=$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
-"$here/bin/tessera" --version > /dev/null 2>&1 || LD_LIBRARY_PATH=$here/lib-c++:$LD_LIBRARY_PATH
-tessera() { "$here/bin/tessera" "$@"; }
-tessera --version > /dev/null || { echo "run.sh: the programs do not start here; they need glibc $(cat "$here/glibc")" >&2; exit 1; }
+# The machine's own glibc and C++ library where they are new enough: its driver may need those very ones. Other programs
+# of the machine see none of the bundle's.
+given=${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
+start() { # PROGRAM ARGUMENT...
+  local program=$here/bin/$1
+  shift
+  case $libraries in
+    machine) LD_LIBRARY_PATH=$here/lib$given "$program" "$@" ;;
+    c++) LD_LIBRARY_PATH=$here/lib-c++:$here/lib$given "$program" "$@" ;;
+    packed) "$here/lib-c/ld-linux-x86-64.so.2" --library-path "$here/lib-c:$here/lib-c++:$here/lib$given" "$program" "$@" ;;
+  esac
+}
+tessera() { start tessera "$@"; }
+[ "${GLIBC:-}" = packed ] && choices=packed || choices="machine c++ packed"
+for libraries in $choices; do tessera --version > /dev/null 2>&1 && break; done
+tessera --version > /dev/null || { echo "run.sh: the programs do not start here" >&2; exit 1; }
 
 # Whether there is a card, and not only a driver for the processor.
 card() {
@@ -57,13 +69,14 @@ declare -A more=([volume]=${VOLUME:-} [hash]=${HASH:-} [field]=${FIELD:-})
   tessera info devices
   card || echo "NO CARD: what follows is of a driver for the processor"
   members+=("\"is_card\": $(card && echo true || echo false)")
+  members+=("\"libraries\": $(quoted "$libraries")")
   members+=("\"commit\": $(quoted "$(cat "$here/commit")")" "\"machine\": $(quoted "$(uname -srm)")"
     "\"processor\": $(quoted "$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1)")"
     "\"devices\": $(quoted "$(tessera info devices | sed -n 's/^  name *//p' | paste -sd';')")")
 
   if [ "${VALUES:-1}" = 1 ]; then
     step "every operation against the reference"
-    TESSERA_REQUIRE_VULKAN=1 "$here/bin/tessera_devices_test" --gtest_brief=1 --gtest_filter='*vulkan*' > "$work/values.txt" 2>&1
+    TESSERA_REQUIRE_VULKAN=1 start tessera_devices_test --gtest_brief=1 --gtest_filter='*vulkan*' > "$work/values.txt" 2>&1
     number values_status $?
     grep -E '^\[  (PASSED|FAILED)' "$work/values.txt"
     number values_passed "$(sed -n 's/^\[  PASSED  \] \([0-9]*\) test.*/\1/p' "$work/values.txt" | head -1)"

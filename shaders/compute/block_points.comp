@@ -3,6 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
 #include "arguments_blocks.h"
+#include "../lib/trigonometry.glsl"
 #include "real.glsl"
 #include "block_space.glsl"
 #include "random.glsl"
@@ -29,7 +30,7 @@ void main() {
     const float angle = 6.283185307179586 * randomUniform(a.key, index + 5), across = sqrt(1 - z * z);
     const real most = all - 1 / kFarthest;
     y = clamp(y, -most, most);
-    const realVec3 direction = realVec3(across * cos(angle), across * sin(angle), z);
+    const realVec3 direction = realVec3(across * sineAndCosine(angle).yx, z);
     const real texel = runtimeStepAt(placement, a.texels, placement.contracted ? uncontracted(y) : y, direction);
     a.runtimeSteps.values[p] = float(texel);
     a.blockOfSample.values[p] = WANTED(a.slotOfBlock) ? a.slotOfBlock.values[block] : block;

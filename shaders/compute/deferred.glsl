@@ -1,6 +1,7 @@
 // City-on-Web's deferred network: 7 composited + 27 of the direction → 16 → 16 → 3.
 // Reads: DeferredArguments. Defines: kComposited, kInputs, kHidden, kParameters, kSecond, kThird, kNumbers, Layers,
 // layersOf().
+#include "../lib/trigonometry.glsl"
 #include "vectors.glsl"
 
 const uint kComposited = 7, kDirection = 27, kInputs = kComposited + kDirection, kHidden = 16;
@@ -24,9 +25,9 @@ Layers layersOf(DeferredArguments a, uint segment) {
   [[unroll]] for (uint axis = 0; axis < 3; ++axis) {
     layers.inputs[kComposited + axis] = direction[axis];
     [[unroll]] for (uint k = 0; k < 4; ++k) {
-      const float angle = direction[axis] * float(1 << k);
-      layers.inputs[kComposited + 3 + 3 * k + axis] = sin(angle);
-      layers.inputs[kComposited + 15 + 3 * k + axis] = cos(angle);
+      const vec2 wave = sineAndCosine(direction[axis] * float(1 << k));
+      layers.inputs[kComposited + 3 + 3 * k + axis] = wave.x;
+      layers.inputs[kComposited + 15 + 3 * k + axis] = wave.y;
     }
   }
   FloatPointer weights = a.networks;

@@ -3,6 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
 #include "arguments_encodings.h"
+#include "../lib/trigonometry.glsl"
 
 layout(local_size_x = 256) in;
 KERNEL_ARGUMENTS(FrequencyArguments)
@@ -16,7 +17,7 @@ void main() {
     if (column >= a.dimensions) {
       const uint wave = (column - a.dimensions) % waves;
       value *= float(1u << wave / a.dimensions);
-      value = column < a.dimensions + waves ? sin(value) : cos(value);
+      value = column < a.dimensions + waves ? sine(value) : cosine(value);
     }
     a.encoded.data.values[elementOf(a.encoded, row, column)] = value;
   }

@@ -1,5 +1,6 @@
 // Directions through pixels, with the lens undone: src/scene/lens.h in GLSL, models numbered as there.
 // Defines: RayCamera, cameraAt(), lensUnproject().
+#include "../lib/trigonometry.glsl"
 
 const uint kCameraWords = 29;
 const int kSimplePinhole = 0, kPinhole = 1, kSimpleRadial = 2, kRadial = 3, kOpenCv = 4, kOpenCvFisheye = 5;
@@ -174,8 +175,8 @@ bool undistort(LensTerms t, vec2 wanted, out vec2 found) {
 bool undistortFov(float omega, inout vec2 place) {
   const float angle = length(place) * omega;
   if (!(abs(angle) < 1.5707)) return false;
-  const float slope = abs(omega) < 1e-6 ? 1 : 2 * tan(omega / 2) / omega;  // at the centre
-  place *= (abs(angle) < 1e-3 ? 1 + angle * angle / 3 : tan(angle) / angle) / slope;
+  const float slope = abs(omega) < 1e-6 ? 1 : 2 * tangent(omega / 2) / omega;  // at the centre
+  place *= (abs(angle) < 1e-3 ? 1 + angle * angle / 3 : tangent(angle) / angle) / slope;
   return true;
 }
 
@@ -211,8 +212,8 @@ bool lensUnproject(int lens, float parameters[16], vec2 pixel, out vec3 directio
   } else if (t.fisheye) {
     const float theta = length(place);
     if (!(theta <= 3.14159265)) return false;
-    place *= theta < 1e-3 ? 1 - theta * theta / 6 : sin(theta) / theta;
-    z = cos(theta);
+    place *= theta < 1e-3 ? 1 - theta * theta / 6 : sine(theta) / theta;
+    z = cosine(theta);
   }
   const float all = length(vec3(place, z));
   direction = vec3(place, z) / all;

@@ -11,6 +11,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = 0) const uint kMostWidth = 34;  // of the network's layers
 KERNEL_ARGUMENTS(DrawVolumeArguments)
 
+#include "../lib/trigonometry.glsl"
 #include "dense_network.glsl"
 #include "../lib/domain_path.glsl"
 #include "../lib/part_place.glsl"
@@ -97,7 +98,8 @@ vec3 specularOf(DrawVolumeArguments a, Composite sum, vec3 d) {
   for (uint i = 0; i < 4; ++i) values[3 + i] = sum.features[i];
   for (uint axis = 0; axis < 3; ++axis) {
     values[7 + axis] = d[axis];
-    float sine = sin(d[axis]), cosine = cos(d[axis]);
+    const vec2 wave = sineAndCosine(d[axis]);
+    float sine = wave.x, cosine = wave.y;
     for (uint k = 0; k < 4; ++k) {
       values[10 + 3 * k + axis] = sine;
       values[22 + 3 * k + axis] = cosine;
