@@ -4,11 +4,11 @@
 #include "float_sum.glsl"
 #include "kernel.glsl"
 #include "arguments_hash_grid.h"
-#include "hash_grid.glsl"
 #include "vectors.glsl"
 
 layout(local_size_x = 128) in;
 layout(constant_id = 0) const uint kFeatures = 2;
+#include "hash_grid.glsl"
 KERNEL_ARGUMENTS(HashGridBackwardArguments)
 
 void main() {

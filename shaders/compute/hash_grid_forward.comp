@@ -3,11 +3,11 @@
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
 #include "arguments_hash_grid.h"
-#include "hash_grid.glsl"
 #include "vectors.glsl"
 
 layout(local_size_x = 128) in;
 layout(constant_id = 0) const uint kFeatures = 2;
+#include "hash_grid.glsl"
 KERNEL_ARGUMENTS(HashGridForwardArguments)
 
 void main() {
@@ -18,15 +18,15 @@ void main() {
 
   FOR_EACH_ROW(sampleIndex, arguments.values.samples) {
     const Cell cell = cellOf(pointAt(arguments.values.positions, sampleIndex), level);
-    float mixed[kFeatures];
-    [[unroll]] for (uint f = 0; f < kFeatures; ++f) mixed[f] = 0;
+    vec4 mixed[kQuads];
+    [[unroll]] for (uint q = 0; q < kQuads; ++q) mixed[q] = vec4(0);
     [[unroll]] for (uint corner = 0; corner < 8; ++corner) {
       const float weight = cornerWeight(cell, corner);
-      const uint entry = cornerEntry(cell, corner, level) * kFeatures;
-      [[unroll]] for (uint f = 0; f < kFeatures; ++f) mixed[f] += weight * table.values[entry + f];
+      const uint entry = cornerEntry(cell, corner, level);
+      [[unroll]] for (uint q = 0; q < kQuads; ++q) mixed[q] += weight * entryQuad(table, entry, q);
     }
     [[unroll]] for (uint f = 0; f < kFeatures; ++f) {
-      encoded.data.values[elementOf(encoded, sampleIndex, levelIndex * kFeatures + f)] = mixed[f];
+      encoded.data.values[elementOf(encoded, sampleIndex, levelIndex * kFeatures + f)] = mixed[f / 4][f % 4];
     }
   }
 }

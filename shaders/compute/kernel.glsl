@@ -1,5 +1,5 @@
 // What every kernel starts with: pointers, the shared argument structs, and how to read them.
-// Defines: FloatPointer, UintPointer, KERNEL_ARGUMENTS(), WANTED(), FOR_EACH(), FOR_EACH_ROW(), firstOf(), endOf(),
+// Defines: FloatPointer, UintPointer, Vec2Pointer, Vec4Pointer, KERNEL_ARGUMENTS(), WANTED(), FOR_EACH(), FOR_EACH_ROW(), firstOf(), endOf(),
 // columnOffset(), elementOf().
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
@@ -11,6 +11,9 @@ layout(buffer_reference, std430, buffer_reference_align = 4) buffer UintPointer 
 #else
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer FloatPointer { float values[]; };
 #endif
+// The same floats, several with one load.
+layout(buffer_reference, std430, buffer_reference_align = 8) buffer Vec2Pointer { vec2 values[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer Vec4Pointer { vec4 values[]; };
 #ifndef TESSERA_SUM_POINTER
 #define SumPointer FloatPointer
 #endif

@@ -20,7 +20,7 @@ void main() {
     const uint block = a.blockOfSample.values[index];
     float gradient[kColumns];
     [[unroll]] for (uint c = 0; c < kColumns; ++c) gradient[c] = a.mixed.data.values[elementOf(a.mixed, index, c)];
-    for (uint k = 0; k < 8; ++k) {
+    [[unroll]] for (uint k = 0; k < 8; ++k) {
       const Corner corner = cornerAt(a.grid, places, k);
       const uint row = rowOf(a.grid, a.marks, a.ranks, block, index, k, corner.texel);
       if (row >= rows || corner.weight == 0) continue;

@@ -1,4 +1,5 @@
 // Where a sample's corners lie in the virtual grid (src/compute/virtual_grid.h says the convention).
+// Loops over corners are unrolled, so that which axes a corner is of is known when a kernel is compiled.
 // Reads: VirtualGridArguments, UintPointer. Defines: Places, placesOf(), Corner, cornerAt(), rowOf(), texelPosition(),
 // quantised().
 

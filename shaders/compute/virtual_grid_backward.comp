@@ -8,6 +8,7 @@
 #include "virtual_grid.glsl"
 
 layout(local_size_x = 64) in;
+layout(constant_id = 0) const uint kCorners = 20;
 KERNEL_ARGUMENTS(VirtualGridLookupArguments)
 
 const uint kAttributes = 8;
@@ -31,7 +32,7 @@ void main() {
     if (!any) continue;
     const Places places = placesOf(a.grid, pointAt(a.positions, index));
     const uint block = a.blockOfSample.values[index];
-    for (uint k = 0; k < a.grid.corners; ++k) {
+    [[unroll]] for (uint k = 0; k < kCorners; ++k) {
       const Corner corner = cornerAt(a.grid, places, k);
       const uint row = rowOf(a.grid, a.marks, a.ranks, block, index, k, corner.texel);
       if (row >= rows || corner.weight == 0) continue;

@@ -8,6 +8,7 @@
 #include "virtual_grid.glsl"
 
 layout(local_size_x = 64) in;
+layout(constant_id = 0) const uint kCorners = 20;
 KERNEL_ARGUMENTS(VirtualGridLookupArguments)
 
 const uint kAttributes = 8;
@@ -20,12 +21,13 @@ void main() {
     const uint block = a.blockOfSample.values[index];
     float sums[kAttributes];
     [[unroll]] for (uint f = 0; f < kAttributes; ++f) sums[f] = 0;
-    for (uint k = 0; k < a.grid.corners; ++k) {
+    [[unroll]] for (uint k = 0; k < kCorners; ++k) {
       const Corner corner = cornerAt(a.grid, places, k);
       const uint row = rowOf(a.grid, a.marks, a.ranks, block, index, k, corner.texel);
       if (row >= a.texels.capacity) continue;  // counts as ½, which is 0
+      const vec4 quads[2] = {Vec4Pointer(a.attributes).values[2 * row], Vec4Pointer(a.attributes).values[2 * row + 1]};
       [[unroll]] for (uint f = 0; f < kAttributes; ++f) {
-        const float value = a.attributes.values[kAttributes * row + f];
+        const float value = quads[f / 4][f % 4];
         sums[f] += corner.weight * (2 * (a.grid.quantise != 0 ? quantised(value) : value) - 1);
       }
     }

@@ -31,7 +31,7 @@ void VulkanDevice::enqueue(const HashGridForward& options) {
   arguments::HashGridForwardArguments arguments = {};
   arguments.samples = partArguments(options.samples);
   arguments.positions = deviceAddress(options.positions);
-  arguments.table = deviceAddress(options.table);
+  arguments.table = quadAddress(options.table);
   arguments.encoded = matrixArguments(options.encoded, options.samples.capacity);
   setLevels(grid, arguments.levels);
   queue(kernel(kHashGridForwardSpirv, {static_cast<uint32_t>(grid.features)}), arguments,
@@ -44,7 +44,7 @@ void VulkanDevice::enqueue(const HashGridBackward& options) {
   arguments::HashGridBackwardArguments arguments = {};
   arguments.samples = partArguments(options.samples);
   arguments.positions = deviceAddress(options.positions);
-  arguments.table = deviceAddress(options.table);
+  arguments.table = quadAddress(options.table);
   arguments.tableGradients = deviceAddress(options.tableGradients);
   arguments.positionGradients = deviceAddress(options.positionGradients);
   arguments.encodedGradients = matrixArguments(options.encodedGradients, options.samples.capacity);

@@ -16,7 +16,7 @@ constexpr uint32_t kSamplesPerGroup = 64;  // local_size_x of the kernels
 void VulkanDevice::enqueue(const LatticeForward& options) {
   CHECK(options.grid.planes == 0u);
   auto arguments = lookupArguments<arguments::LatticeArguments>(options);
-  arguments.values = deviceAddress(options.values);
+  arguments.values = quadAddress(options.values);
   arguments.mixed = matrixArguments(options.mixed, options.samples.capacity);
   queue(kernel(kLatticeForwardSpirv), arguments, {groups(options.samples.capacity, kSamplesPerGroup)});
 }

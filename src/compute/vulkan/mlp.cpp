@@ -64,12 +64,6 @@ Block blockFor(const MlpShape& shape, uint32_t stateWidth, Arithmetic arithmetic
   return {static_cast<uint32_t>(shape.width), samples, stateWidth};
 }
 
-uint64_t quadAddress(const Slice<const float>& slice) {
-  const uint64_t address = deviceAddress(slice);
-  CHECK(address % 16 == 0u);
-  return address;
-}
-
 // Places in scratch memory, each at a multiple of 16 bytes.
 class Places {
  public:

@@ -59,12 +59,13 @@ void VulkanDevice::enqueue(const DistinctTexels& options) {
 
 void VulkanDevice::enqueue(const VirtualGridForward& options) {
   auto arguments = lookupArguments<arguments::VirtualGridLookupArguments>(options);
-  arguments.attributes = deviceAddress(options.attributes);
+  arguments.attributes = quadAddress(options.attributes);
   arguments.runtimeSteps = deviceAddress(options.runtimeSteps);
   arguments.logDensities = deviceAddress(options.logDensities);
   arguments.colours = deviceAddress(options.colours);
   arguments.minAlpha = options.minAlpha;
-  queue(kernel(kVirtualGridForwardSpirv), arguments, {groups(options.samples.capacity, kSamplesPerGroup)});
+  queue(kernel(kVirtualGridForwardSpirv, {options.grid.corners()}), arguments,
+        {groups(options.samples.capacity, kSamplesPerGroup)});
 }
 
 void VulkanDevice::enqueue(const VirtualGridBackward& options) {
@@ -75,8 +76,8 @@ void VulkanDevice::enqueue(const VirtualGridBackward& options) {
   arguments.colourGradients = deviceAddress(options.colourGradients);
   arguments.attributeGradients = deviceAddress(options.attributeGradients);
   zeroRows(options.texels, VirtualGrid::kAttributes, options.attributeGradients);
-  queue(sumKernel(kVirtualGridBackwardFloatAtomicsSpirv, kVirtualGridBackwardSpirv), arguments,
-        {groups(options.samples.capacity, kSamplesPerGroup)});
+  queue(sumKernel(kVirtualGridBackwardFloatAtomicsSpirv, kVirtualGridBackwardSpirv, {options.grid.corners()}),
+        arguments, {groups(options.samples.capacity, kSamplesPerGroup)});
 }
 
 }  // namespace tessera

@@ -143,6 +143,13 @@ uint64_t deviceAddress(const Slice<T>& slice) {
   return static_cast<const VulkanMemory*>(slice.memory)->buffer().address() + slice.first * sizeof(T);
 }
 
+// Of what kernels read in fours: it lies at a multiple of 16 bytes.
+inline uint64_t quadAddress(const Slice<const float>& slice) {
+  const uint64_t address = deviceAddress(slice);
+  CHECK(address % 16 == 0u);
+  return address;
+}
+
 // Of operations that begin at row 0, and of those that take part of the rows.
 arguments::CountArguments countArguments(const Count& count);
 arguments::CountArguments partArguments(const Count& count);
