@@ -11,7 +11,8 @@
 //     uint distanceWord(Part, ivec3 coarseCell), uint nearWord(Part, uint n)    of src/tiles/occupancy_distance.h
 //     vec4 macroblockAt(Part, vec3 block)      of 9³ corners; the fourth is 0 where none is, the rest is the viewer's
 //     vec4 cornersFirst(Part, int eight, vec4 macroblock, vec3 within), cornersSecond(...)    of each eight columns the mix
-//                                              of columns 1 2 3 0 and 4 5 6 7, 0 at the middle of the first corner
+//                                              of columns 1 2 3 0 and 4 5 6 7, 0 at the middle of the first corner; the
+//                                              second is asked for right after the first
 //     uvec2 entryAt(Part, int level, float number, uint entry)    the eight bytes of an entry, `number` the viewer's
 //   vec2 levelWeights[TABLES], where not VARYING: of density, of all else; float shares[TABLES + 1] or more: of the coarse features'
 //   and each level's diffuse colour and features, 1 but for display; int attention: the level whose weights of density (1 +

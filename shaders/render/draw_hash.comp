@@ -14,6 +14,7 @@ KERNEL_ARGUMENTS(DrawHashArguments)
 #include "../lib/domain_path.glsl"
 #include "../lib/part_place.glsl"
 
+layout(buffer_reference, std430, buffer_reference_align = 8) buffer Words2Pointer { uvec2 values[]; };
 const uint kEmpty = 0xffffffffu;
 const float shares[TESSERA_MOST_TABLES + 1] = float[](1, 1, 1, 1, 1, 1, 1, 1, 1);  // of levels: display modes are the browser's
 const int attention = 0;
@@ -55,31 +56,30 @@ vec4 macroblockAt(Part part, vec3 block) {
   return number == kEmpty ? vec4(0) : vec4(float(number), 0, 0, 1);  // below 2^24
 }
 
-// Of word number `word` of each corner, which holds four columns.
-vec4 mixCorners(Part part, uint word, vec4 macroblock, vec3 within) {
+vec4 secondOfCorners;  // of the eight columns that cornersFirst was last asked for
+
+// A corner's eight columns are two words, read together.
+vec4 cornersFirst(Part part, int eight, vec4 macroblock, vec3 within) {
   const vec3 low = min(floor(within), 7.0), share = within - low;
-  const uint words = arguments.values.columns / 4;
+  const uint eights = arguments.values.columns / 8;
   const uint first = uint(macroblock.x) * 729 + uint(low.x) + 9 * (uint(low.y) + 9 * uint(low.z));
   vec4 sum = vec4(0);
-  for (uint k = 0; k < 8; ++k) {
+  secondOfCorners = vec4(0);
+  [[unroll]] for (uint k = 0; k < 8; ++k) {
     const bvec3 upper = bvec3(k & 1, k & 2, k & 4);
     const vec3 w = mix(1 - share, share, upper);
     const uint corner = first + uint(upper.x) + 9 * uint(upper.y) + 81 * uint(upper.z);
-    sum += w.x * w.y * w.z * unpackUnorm4x8(part.cornerWords.values[words * corner + word]);
+    const uvec2 words = Words2Pointer(part.cornerWords).values[eights * corner + eight];
+    const float weight = w.x * w.y * w.z;
+    sum += weight * unpackUnorm4x8(words.x);
+    secondOfCorners += weight * unpackUnorm4x8(words.y);
   }
-  return sum;
+  return sum.yzwx;
 }
-
-vec4 cornersFirst(Part part, int eight, vec4 macroblock, vec3 within) {
-  return mixCorners(part, 2 * eight, macroblock, within).yzwx;
-}
-vec4 cornersSecond(Part part, int eight, vec4 macroblock, vec3 within) {
-  return mixCorners(part, 2 * eight + 1, macroblock, within);
-}
+vec4 cornersSecond(Part part, int eight, vec4 macroblock, vec3 within) { return secondOfCorners; }
 
 uvec2 entryAt(Part part, int level, float number, uint entry) {
-  UintPointer table = arguments.values.parts.values[part.number].tables[level];
-  return uvec2(table.values[2 * entry], table.values[2 * entry + 1]);
+  return Words2Pointer(arguments.values.parts.values[part.number].tables[level]).values[entry];
 }
 
 #include "../lib/hash_march.glsl"
