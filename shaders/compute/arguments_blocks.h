@@ -1,7 +1,7 @@
 // Arguments of scenes cut into blocks (src/compute/blocks.h, block_march.h).
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_BLOCKS_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_BLOCKS_H
-#include "arguments.h"
+#include "arguments_march.h"
 #define TESSERA_ROWS_OF_SHARE 32  // GroupByBlock
 
 TESSERA_BEGIN_ARGUMENTS
@@ -80,31 +80,12 @@ TESSERA_SIZE(BlockPointsArguments, 88);
 
 struct MarchBlocksArguments {
   BlockSpaceArguments space;
-  CountArguments rays;
+  MarchArguments march;
   uint cells;
   float step;
-  uint most;
-  float mostOpticalDepth;
-  FloatPointer origins;
-  FloatPointer directions;
-  FloatPointer jitter;        // optional
-  FloatPointer nearOfRay;     // optional
-  FloatPointer farOfRay;      // optional
-  UintPointer slotOfBlock;    // optional
-  UintPointer occupancy;
-  FloatPointer opticalDepth;  // optional
-  UintPointer nextStep;       // optional
-  UintPointer counts;         // [rays]: of samples, then their running sums
-  UintPointer nexts;          // [rays]: of a ray that fits
-  UintPointer fitting;        // [1]
-  UintPointer firstSample;
-  UintPointer sampleCount;
-  UintPointer finishedRays;  // optional
-  UintPointer rayOfSample;
+  FloatPointer nearOfRay;   // optional
+  UintPointer slotOfBlock;  // optional
   UintPointer slotOfSample;
-  FloatPointer positions;
-  FloatPointer distances;
-  FloatPointer steps;
   FloatPointer middles;
   FloatPointer widths;
 };

@@ -1,7 +1,7 @@
 // Arguments of rays and their samples (src/compute/rays.h, occupancy.h).
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_RAYS_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_RAYS_H
-#include "arguments.h"
+#include "arguments_march.h"
 TESSERA_BEGIN_ARGUMENTS
 
 struct GenerateRaysArguments {
@@ -34,26 +34,7 @@ TESSERA_SIZE(MarchSpaceArguments, 72);
 
 struct MarchRaysArguments {
   MarchSpaceArguments space;
-  CountArguments rays;
-  uint most;
-  float mostOpticalDepth;
-  FloatPointer origins;
-  FloatPointer directions;
-  FloatPointer jitter;        // optional
-  FloatPointer farOfRay;      // optional
-  UintPointer occupancy;
-  FloatPointer opticalDepth;  // optional
-  UintPointer nextStep;       // optional
-  UintPointer counts;         // [rays]: of samples, then their running sums
-  UintPointer nexts;          // [rays]: of a ray that fits
-  UintPointer fitting;        // [1]
-  UintPointer firstSample;
-  UintPointer sampleCount;
-  UintPointer finishedRays;  // optional
-  UintPointer rayOfSample;   // optional
-  FloatPointer positions;
-  FloatPointer distances;
-  FloatPointer steps;
+  MarchArguments march;
 };
 TESSERA_SIZE(MarchRaysArguments, 240);
 

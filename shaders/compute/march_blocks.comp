@@ -35,11 +35,11 @@ void store(MarchBlocksArguments a, Ray ray, uint row, uint slot, DomainPiece s, 
            real begin, real end) {
   const real middle = (begin + end) / 2, distance = alongPiece(s, begin);
   const real inScene = min(min(alongPieceBetween(s, begin, end), ray.far - distance), kLongestStep);
-  a.rayOfSample.values[row] = ray.index;
+  a.march.rayOfSample.values[row] = ray.index;
   a.slotOfSample.values[row] = slot;
-  storePoint(a.positions, row, vec3(position));
-  a.distances.values[row] = float(alongPiece(s, middle));
-  a.steps.values[row] = float(inScene);
+  storePoint(a.march.positions, row, vec3(position));
+  a.march.distances.values[row] = float(alongPiece(s, middle));
+  a.march.steps.values[row] = float(inScene);
   a.middles.values[row] = float(before + middle);
   a.widths.values[row] = float(end - begin);
 }
@@ -55,7 +55,7 @@ void marchPiece(MarchBlocksArguments a, Ray ray, DomainPiece s, real all, uint s
     const realVec3 position = clamp((s.start + middle * s.direction + all) / (2 * all), real(0), real(1));
     const uvec3 cell = min(uvec3(position * real(a.cells)), uvec3(a.cells - 1));
     const uint bit = cell.x + a.cells * (cell.y + a.cells * cell.z);
-    if ((a.occupancy.values[firstWord + bit / 32] >> bit % 32 & 1) == 0) {
+    if ((a.march.occupancy.values[firstWord + bit / 32] >> bit % 32 & 1) == 0) {
       // Whole intervals to the first whose middle is past the empty cell; the tolerance costs one more look.
       real exit = s.whole;
       for (int axis = 0; axis < 3; ++axis) {
@@ -71,7 +71,7 @@ void marchPiece(MarchBlocksArguments a, Ray ray, DomainPiece s, real all, uint s
     if (alongPiece(s, begin) >= ray.far) return;
     if (kWrite && ray.row + state.samples < ray.endRow) store(a, ray, ray.row + state.samples, slot, s, position, state.before, begin, end);
     ++i;
-    if (++state.samples == a.most) {
+    if (++state.samples == a.march.most) {
       state.next = state.number + i;
       state.done = true;
       return;
@@ -149,11 +149,11 @@ State march(MarchBlocksArguments a, Ray ray) {
 Ray rayAt(MarchBlocksArguments a, uint index) {
   Ray ray;
   ray.index = index;
-  ray.origin = realVec3(pointAt(a.origins, index));
-  ray.direction = realVec3(pointAt(a.directions, index));
-  ray.jitter = WANTED(a.jitter) ? real(a.jitter.values[index]) : real(1);
-  ray.far = WANTED(a.farOfRay) ? real(a.farOfRay.values[index]) : kNever;
-  ray.first = WANTED(a.nextStep) ? a.nextStep.values[index] : 0;
+  ray.origin = realVec3(pointAt(a.march.origins, index));
+  ray.direction = realVec3(pointAt(a.march.directions, index));
+  ray.jitter = WANTED(a.march.jitter) ? real(a.march.jitter.values[index]) : real(1);
+  ray.far = WANTED(a.march.farOfRay) ? real(a.march.farOfRay.values[index]) : kNever;
+  ray.first = WANTED(a.march.nextStep) ? a.march.nextStep.values[index] : 0;
   ray.row = ray.endRow = 0;
   return ray;
 }
@@ -161,31 +161,31 @@ Ray rayAt(MarchBlocksArguments a, uint index) {
 void main() {
   MarchBlocksArguments a = arguments.values;
   if (!kWrite) {
-    FOR_EACH_ROW(index, a.rays) {
+    FOR_EACH_ROW(index, a.march.rays) {
       const Ray ray = rayAt(a, index);
-      const bool opaque = WANTED(a.opticalDepth) && a.opticalDepth.values[index] > a.mostOpticalDepth;
-      const bool waits = opaque || a.most == 0 || ray.first == kThrough;
+      const bool opaque = WANTED(a.march.opticalDepth) && a.march.opticalDepth.values[index] > a.march.mostOpticalDepth;
+      const bool waits = opaque || a.march.most == 0 || ray.first == kThrough;
       State state = State(0, 0, real(0), waits ? ray.first : kThrough, true);
       if (!waits && ray.direction != realVec3(0)) state = march(a, ray);
-      a.counts.values[index] = state.samples;
-      a.nexts.values[index] = state.next;
+      a.march.counts.values[index] = state.samples;
+      a.march.nexts.values[index] = state.next;
     }
     return;
   }
-  const uint fitting = a.fitting.values[0];
+  const uint fitting = a.march.fitting.values[0];
   if (gl_GlobalInvocationID.x == 0) {
-    a.firstSample.values[0] = 0;
-    if (WANTED(a.finishedRays)) a.finishedRays.values[0] = fitting;
+    a.march.firstSample.values[0] = 0;
+    if (WANTED(a.march.finishedRays)) a.march.finishedRays.values[0] = fitting;
   }
-  FOR_EACH_ROW(index, a.rays) {
+  FOR_EACH_ROW(index, a.march.rays) {
     const bool fits = index < fitting;
-    const uint first = index == 0 ? 0 : a.counts.values[index - 1], end = a.counts.values[index];
-    a.firstSample.values[index + 1] = fits ? end : a.sampleCount.values[0];
+    const uint first = index == 0 ? 0 : a.march.counts.values[index - 1], end = a.march.counts.values[index];
+    a.march.firstSample.values[index + 1] = fits ? end : a.march.sampleCount.values[0];
     if (!fits) continue;
     Ray ray = rayAt(a, index);
     ray.row = first;
     ray.endRow = end;
     if (end > first) march(a, ray);
-    if (WANTED(a.nextStep)) a.nextStep.values[index] = a.nexts.values[index];
+    if (WANTED(a.march.nextStep)) a.march.nextStep.values[index] = a.march.nexts.values[index];
   }
 }

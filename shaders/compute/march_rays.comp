@@ -22,14 +22,14 @@ struct Round {
 
 bool isOccupied(MarchRaysArguments a, ivec3 cell) {
   const uint i = cell.x + a.space.resolution * (cell.y + a.space.resolution * cell.z);
-  return (a.occupancy.values[i / 32] >> i % 32 & 1) != 0;
+  return (a.march.occupancy.values[i / 32] >> i % 32 & 1) != 0;
 }
 
 void store(MarchRaysArguments a, uint ray, uint row, realVec3 u, real middle, real length_) {
-  if (WANTED(a.rayOfSample)) a.rayOfSample.values[row] = ray;
-  storePoint(a.positions, row, clamp(vec3(u), 0, 1));
-  a.distances.values[row] = float(middle);
-  a.steps.values[row] = float(length_);
+  if (WANTED(a.march.rayOfSample)) a.march.rayOfSample.values[row] = ray;
+  storePoint(a.march.positions, row, clamp(vec3(u), 0, 1));
+  a.march.distances.values[row] = float(middle);
+  a.march.steps.values[row] = float(length_);
 }
 
 // Of a bounded space, where the ray is inside: [enter, leave], empty where it never is.
@@ -50,15 +50,15 @@ void clipToCube(realVec3 o, realVec3 d, out real enter, out real leave) {
 // The ray's next samples; with kWrite to rows [row, endRow), which nobody else writes to: a driver may have compiled both
 // runs to other roundings.
 Round march(MarchRaysArguments a, uint ray, uint row, uint endRow) {
-  const uint from = WANTED(a.nextStep) ? a.nextStep.values[ray] : 0;
-  const bool opaque = WANTED(a.opticalDepth) && a.opticalDepth.values[ray] > a.mostOpticalDepth;
-  if (from == kThrough || opaque || a.most == 0) return Round(0, from);
-  const realVec3 o = realVec3(pointAt(a.origins, ray)), d = realVec3(pointAt(a.directions, ray));
+  const uint from = WANTED(a.march.nextStep) ? a.march.nextStep.values[ray] : 0;
+  const bool opaque = WANTED(a.march.opticalDepth) && a.march.opticalDepth.values[ray] > a.march.mostOpticalDepth;
+  if (from == kThrough || opaque || a.march.most == 0) return Round(0, from);
+  const realVec3 o = realVec3(pointAt(a.march.origins, ray)), d = realVec3(pointAt(a.march.directions, ray));
   Round made = Round(0, kThrough);
   if (d == realVec3(0)) return made;
-  const real jitter = WANTED(a.jitter) ? a.jitter.values[ray] : 0;
+  const real jitter = WANTED(a.march.jitter) ? a.march.jitter.values[ray] : 0;
   real far = a.space.far;
-  if (WANTED(a.farOfRay)) far = min(far, real(a.farOfRay.values[ray]));
+  if (WANTED(a.march.farOfRay)) far = min(far, real(a.march.farOfRay.values[ray]));
   real k = ceil(realOf(a.space.firstIndex) - jitter);
   if (a.space.contracted == 0) {
     real enter, leave;
@@ -78,7 +78,7 @@ Round march(MarchRaysArguments a, uint ray, uint row, uint endRow) {
     begin = end;
     if (cell.inside && isOccupied(a, cell.index)) {
       if (kWrite && row + made.samples < endRow) store(a, ray, row + made.samples, cell.u, middle, length_);
-      if (++made.samples < a.most) continue;
+      if (++made.samples < a.march.most) continue;
       made.next = uint(k);
       return made;
     }
@@ -101,24 +101,24 @@ Round march(MarchRaysArguments a, uint ray, uint row, uint endRow) {
 void main() {
   MarchRaysArguments a = arguments.values;
   if (!kWrite) {
-    FOR_EACH_ROW(ray, a.rays) {
+    FOR_EACH_ROW(ray, a.march.rays) {
       const Round made = march(a, ray, 0, 0);
-      a.counts.values[ray] = made.samples;
-      a.nexts.values[ray] = made.next;
+      a.march.counts.values[ray] = made.samples;
+      a.march.nexts.values[ray] = made.next;
     }
     return;
   }
-  const uint fitting = a.fitting.values[0];
+  const uint fitting = a.march.fitting.values[0];
   if (gl_GlobalInvocationID.x == 0) {
-    a.firstSample.values[0] = 0;
-    if (WANTED(a.finishedRays)) a.finishedRays.values[0] = fitting;
+    a.march.firstSample.values[0] = 0;
+    if (WANTED(a.march.finishedRays)) a.march.finishedRays.values[0] = fitting;
   }
-  FOR_EACH_ROW(ray, a.rays) {
+  FOR_EACH_ROW(ray, a.march.rays) {
     const bool fits = ray < fitting;
-    const uint first = ray == 0 ? 0 : a.counts.values[ray - 1], end = a.counts.values[ray];
-    a.firstSample.values[ray + 1] = fits ? end : a.sampleCount.values[0];
+    const uint first = ray == 0 ? 0 : a.march.counts.values[ray - 1], end = a.march.counts.values[ray];
+    a.march.firstSample.values[ray + 1] = fits ? end : a.march.sampleCount.values[0];
     if (!fits) continue;
     if (end > first) march(a, ray, first, end);
-    if (WANTED(a.nextStep)) a.nextStep.values[ray] = a.nexts.values[ray];
+    if (WANTED(a.march.nextStep)) a.march.nextStep.values[ray] = a.march.nexts.values[ray];
   }
 }

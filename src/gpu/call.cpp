@@ -18,11 +18,12 @@ constexpr Meaning kMeanings[] = {
     {VK_ERROR_INCOMPATIBLE_DRIVER, "no Vulkan driver is installed",
      "install mesa-vulkan-drivers or the driver of the graphics card, or use --device cpu"},
     {VK_ERROR_INITIALIZATION_FAILED, "the driver could not start", "see what vulkaninfo says, or reinstall the driver"},
-    {VK_ERROR_OUT_OF_DEVICE_MEMORY, "out of device memory", "use smaller batches or tables, or --device cpu"},
-    {VK_ERROR_OUT_OF_HOST_MEMORY, "out of memory", "use smaller batches or tables"},
+    {VK_ERROR_OUT_OF_DEVICE_MEMORY, "out of device memory",
+     "train with fewer samples a step or smaller tables, draw with a lower --memory-mib, or use --device cpu"},
+    {VK_ERROR_OUT_OF_HOST_MEMORY, "out of memory", "close other programs, or lower --memory-mib"},
     {VK_ERROR_TOO_MANY_OBJECTS, "too many allocations", "use fewer blocks at a time"},
     {VK_ERROR_DEVICE_LOST, "the device stopped answering",
-     "resume from the last checkpoint; look in dmesg for the cause"},
+     "train: go on with --resume, from the last checkpoint; look in dmesg for the cause"},
 };
 
 }  // namespace

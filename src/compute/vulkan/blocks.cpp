@@ -2,7 +2,7 @@
 
 #include "base/random.h"
 #include "compute/block_march.h"
-#include "compute/vulkan/vulkan_device.h"
+#include "compute/vulkan/march.h"
 #include "shaders/block_points.h"
 #include "shaders/block_points_float64.h"
 #include "shaders/block_samples.h"
@@ -134,42 +134,16 @@ void VulkanDevice::enqueue(const GroupByBlock& options) {
 }
 
 void VulkanDevice::enqueue(const MarchBlocks& options) {
-  const uint32_t rays = options.rays.capacity;
   arguments::MarchBlocksArguments arguments = {};
   arguments.space = spaceArguments(options.space);
-  arguments.rays = countArguments(options.rays);
   arguments.cells = options.cells;
   arguments.step = options.step;
-  arguments.most = options.most;
-  arguments.mostOpticalDepth = options.mostOpticalDepth;
-  arguments.origins = deviceAddress(options.origins);
-  arguments.directions = deviceAddress(options.directions);
-  arguments.jitter = deviceAddress(options.jitter);
   arguments.nearOfRay = deviceAddress(options.nearOfRay);
-  arguments.farOfRay = deviceAddress(options.farOfRay);
   arguments.slotOfBlock = deviceAddress(options.slotOfBlock);
-  arguments.occupancy = deviceAddress(options.occupancy);
-  arguments.opticalDepth = deviceAddress(options.opticalDepth);
-  arguments.nextStep = deviceAddress(options.nextStep);
-  const RayScratch scratch = rayScratch(rays);
-  arguments.counts = scratch.counts;
-  arguments.nexts = scratch.nexts;
-  arguments.fitting = scratch.fitting;
-  arguments.firstSample = deviceAddress(options.firstSample);
-  arguments.sampleCount = deviceAddress(options.sampleCount);
-  arguments.finishedRays = deviceAddress(options.finishedRays);
-  arguments.rayOfSample = deviceAddress(options.rayOfSample);
   arguments.slotOfSample = deviceAddress(options.slotOfSample);
-  arguments.positions = deviceAddress(options.positions);
-  arguments.distances = deviceAddress(options.distances);
-  arguments.steps = deviceAddress(options.steps);
   arguments.middles = deviceAddress(options.middles);
   arguments.widths = deviceAddress(options.widths);
-  const Groups all = {atLeastOneGroup(rays, kRaysPerGroup)};
-  queue(realKernel(kMarchBlocksFloat64Spirv, kMarchBlocksSpirv, {false}), arguments, all);
-  queueRunningSums(
-      {options.rays, scratch.counts, arguments.sampleCount, scratch.fitting, options.sampleCapacity, scratch.partials});
-  queue(realKernel(kMarchBlocksFloat64Spirv, kMarchBlocksSpirv, {true}), arguments, all);
+  queueMarch(kMarchBlocksFloat64Spirv, kMarchBlocksSpirv, options, arguments);
 }
 
 }  // namespace tessera

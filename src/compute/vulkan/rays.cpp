@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "compute/vulkan/vulkan_device.h"
+#include "compute/vulkan/march.h"
 #include "shaders/compact_samples.h"
 #include "shaders/compute/arguments_rays.h"
 #include "shaders/generate_rays.h"
@@ -33,7 +33,6 @@ void VulkanDevice::enqueue(const GenerateRays& options) {
 
 void VulkanDevice::enqueue(const MarchRays& options) {
   const MarchSpace& space = options.space;
-  const uint32_t rays = options.rays.capacity;
   arguments::MarchRaysArguments arguments = {};
   arguments.space.contracted = space.contracted;
   arguments.space.resolution = space.gridResolution;
@@ -50,32 +49,7 @@ void VulkanDevice::enqueue(const MarchRays& options) {
     arguments.space.geometricEnd = realArguments(space.stepIndex(last));
     arguments.space.geometricDistance = realArguments(last);
   }
-  arguments.rays = countArguments(options.rays);
-  arguments.most = options.most;
-  arguments.mostOpticalDepth = options.mostOpticalDepth;
-  arguments.origins = deviceAddress(options.origins);
-  arguments.directions = deviceAddress(options.directions);
-  arguments.jitter = deviceAddress(options.jitter);
-  arguments.farOfRay = deviceAddress(options.farOfRay);
-  arguments.occupancy = deviceAddress(options.occupancy);
-  arguments.opticalDepth = deviceAddress(options.opticalDepth);
-  arguments.nextStep = deviceAddress(options.nextStep);
-  const RayScratch scratch = rayScratch(rays);
-  arguments.counts = scratch.counts;
-  arguments.nexts = scratch.nexts;
-  arguments.fitting = scratch.fitting;
-  arguments.firstSample = deviceAddress(options.firstSample);
-  arguments.sampleCount = deviceAddress(options.sampleCount);
-  arguments.finishedRays = deviceAddress(options.finishedRays);
-  arguments.rayOfSample = deviceAddress(options.rayOfSample);
-  arguments.positions = deviceAddress(options.positions);
-  arguments.distances = deviceAddress(options.distances);
-  arguments.steps = deviceAddress(options.steps);
-  const Groups all = {atLeastOneGroup(rays, kRaysPerGroup)};
-  queue(realKernel(kMarchRaysFloat64Spirv, kMarchRaysSpirv, {false}), arguments, all);
-  queueRunningSums(
-      {options.rays, scratch.counts, arguments.sampleCount, scratch.fitting, options.sampleCapacity, scratch.partials});
-  queue(realKernel(kMarchRaysFloat64Spirv, kMarchRaysSpirv, {true}), arguments, all);
+  queueMarch(kMarchRaysFloat64Spirv, kMarchRaysSpirv, options, arguments);
 }
 
 void VulkanDevice::enqueue(const OpticalDepth& options) {

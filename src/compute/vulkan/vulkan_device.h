@@ -111,6 +111,11 @@ class VulkanDevice : public Device {
     uint64_t partials = 0;
   };
   RayScratch rayScratch(uint32_t rays);
+  // A kernel that marches, twice: samples are counted, then written. march.h fills in what is
+  // common to all.
+  template <class Options, class Arguments>
+  void queueMarch(std::span<const uint32_t> inDouble, std::span<const uint32_t> inFloat, const Options& options,
+                  Arguments& arguments);
   void zeroRows(const Count& rows, uint32_t columns, const Slice<float>& numbers);
   void moveRows(const Count& rows, const Slice<const uint32_t>& source, const Matrix<const float>& from,
                 const Matrix<const float>& to, bool scatter);
