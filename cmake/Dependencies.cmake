@@ -25,6 +25,7 @@ target_link_libraries(tessera_geographic INTERFACE ${GEOGRAPHICLIB_LIBRARY})
 if(TESSERA_VULKAN)
   find_path(VOLK_INCLUDE_DIR volk.h REQUIRED)  # finds the loader at run time: nothing is linked
   find_program(GLSLANG_VALIDATOR glslangValidator REQUIRED)
+  include(KhrMatrices)
 endif()
 if(TESSERA_VULKAN AND TESSERA_WINDOW)
   pkg_check_modules(GLFW REQUIRED IMPORTED_TARGET glfw3)

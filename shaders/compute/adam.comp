@@ -30,7 +30,7 @@ void main() {
     FOR_EACH(i, a.count) a.gradients.values[i] = 0;
     return;
   }
-  if (WANTED(a.rows) && a.rows.values[0] == a.rows.values[1]) return;
+  if (a.rows.values[0] == a.rows.values[1]) return;
   FOR_EACH(i, a.count) {
     float gradient = a.gradients.values[i];
     if (gradient == 0 && a.skipZeroGradients != 0) continue;

@@ -28,8 +28,8 @@ using Bits64 = uint64_t;         // the lower half first
 TESSERA_BEGIN_ARGUMENTS
 
 struct CountArguments {
-  UintPointer counter;  // optional
-  UintPointer first;    // optional
+  UintPointer counter;  // where the operation has none, the largest number
+  UintPointer first;    // or 0
   uint capacity;
   uint unused;
 };

@@ -10,7 +10,7 @@ struct AdamArguments {
   FloatPointer firstMoments;
   FloatPointer secondMoments;
   UintPointer counts;
-  UintPointer rows;   // 0: none
+  UintPointer rows;   // the same number twice: nothing is done
   UintPointer found;  // [foundCount]
   uint foundCount;
   uint room;

@@ -34,11 +34,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) buffer Vec4Pointer
        index += gl_NumWorkGroups.x * gl_WorkGroupSize.x)
 
 // Rows [firstOf, endOf) are what an operation works on.
-uint endOf(CountArguments count) {
-  if (!WANTED(count.counter)) return count.capacity;
-  return min(count.counter.values[0], count.capacity);
-}
-uint firstOf(CountArguments count) { return WANTED(count.first) ? count.first.values[0] : 0; }
+uint endOf(CountArguments count) { return min(count.counter.values[0], count.capacity); }
+uint firstOf(CountArguments count) { return count.first.values[0]; }
 
 // Every row of a count, shared out likewise.
 #define FOR_EACH_ROW(row, count)                                                                     \

@@ -1,64 +1,93 @@
-// Products of 16 × 16 matrices by all lanes of a subgroup together: fp16 times fp16, summed in float.
-// Defines: TileA, TileB, TileSum, LOAD_A(), LOAD_B(), CLEAR_SUM(), MULTIPLY_ADD(), STORE_SUM(), kSubgroup,
-// kLane, subgroupWait(), CONVERT_AND_STORE(). `element` and `stride` are in numbers of `array`, multiples of 8.
+// Products of small matrices by all lanes of a subgroup together: fp16 times fp16, summed in float.
+// Defines: kTileRows, kTileColumns, kTileDepth, which divide 16; kSubgroupSize, kSubgroups of a workgroup, kThreads,
+// kSubgroup, kLane, subgroupWait(); TileA (rows × depth), TileB (depth × columns), TileSum (rows × columns); LOAD_A(),
+// LOAD_B(), CLEAR_SUM(), MULTIPLY_ADD(), STORE_SUM(), CONVERT_AND_STORE(). `element` and `stride` are in numbers of
+// `array`, multiples of 8. All invocations of a workgroup call these together.
 //
-// By VK_NV_cooperative_matrix; with TESSERA_EMULATED_MATRICES by loops over what each lane holds, so that kernels which
-// use them can be tested on any device. All invocations of a workgroup call these together.
+// By VK_KHR_cooperative_matrix (TESSERA_KHR_MATRICES), by VK_NV_cooperative_matrix, or, with TESSERA_EMULATED_MATRICES, by
+// loops over what each lane holds, so that kernels which use them can be tested on any device.
 
-const uint kSubgroupSize = 32;
+layout(constant_id = 3) const uint kSubgroupSize = 32;
+layout(constant_id = 4) const uint kTileRows = 16;
+layout(constant_id = 5) const uint kTileColumns = 16;
+layout(constant_id = 6) const uint kTileDepth = 16;
+layout(local_size_x_id = 7) in;  // kThreads
+
+const uint kSubgroups = 4;
+const uint kThreads = kSubgroups * kSubgroupSize;
 
 float atLeast(float x, float least) { return x < least ? least : x; }  // what is no number stays none
 
 #ifdef TESSERA_EMULATED_MATRICES
-// A lane holds one row of A, eight columns of B, and where they meet eight sums. Callers know no `nth` and no `inner`.
-struct TileA { float numbers[16]; };
-struct TileB { float numbers[128]; };
-struct TileSum { float numbers[8]; };
+// A lane holds one row of A, some columns of B, and where they meet so many sums. Callers know no `nth` and no `inner`.
+const uint kColumnsOfLane = kTileRows * kTileColumns / kSubgroupSize;
+const uint kLanesOfRow = kTileColumns / kColumnsOfLane;
+struct TileA { float numbers[kTileDepth]; };
+struct TileB { float numbers[kTileDepth * kColumnsOfLane]; };
+struct TileSum { float numbers[kColumnsOfLane]; };
 #define kSubgroup (gl_LocalInvocationIndex / kSubgroupSize)
 #define kLane (gl_LocalInvocationIndex % kSubgroupSize)
-#define LANE_ROW (kLane / 2)
-#define LANE_COLUMN (kLane % 2 * 8)
+#define LANE_ROW (kLane / kLanesOfRow)
+#define LANE_COLUMN (kLane % kLanesOfRow * kColumnsOfLane)
 #define AT(element, stride, columnMajor, row, column) \
   ((element) + ((columnMajor) ? (column) * (stride) + (row) : (row) * (stride) + (column)))
-#define LOAD_A(tile, array, element, stride, columnMajor) \
-  for (uint inner = 0; inner < 16; ++inner)               \
+#define LOAD_A(tile, array, element, stride, columnMajor)   \
+  for (uint inner = 0; inner < kTileDepth; ++inner)         \
   tile.numbers[inner] = float(array[AT(element, stride, columnMajor, LANE_ROW, inner)])
-#define LOAD_B(tile, array, element, stride, columnMajor) \
-  for (uint nth = 0; nth < 128; ++nth)                    \
-  tile.numbers[nth] = float(array[AT(element, stride, columnMajor, nth / 8, LANE_COLUMN + nth % 8)])
+#define LOAD_B(tile, array, element, stride, columnMajor)               \
+  for (uint nth = 0; nth < kTileDepth * kColumnsOfLane; ++nth)          \
+  tile.numbers[nth] = float(                                            \
+      array[AT(element, stride, columnMajor, nth / kColumnsOfLane, LANE_COLUMN + nth % kColumnsOfLane)])
 #define CLEAR_SUM(sum) \
-  for (uint nth = 0; nth < 8; ++nth) sum.numbers[nth] = 0
-#define MULTIPLY_ADD(sum, a, b)           \
-  for (uint nth = 0; nth < 128; ++nth) \
-  sum.numbers[nth % 8] += a.numbers[nth / 8] * b.numbers[nth]
-#define STORE_SUM(sum, array, element, stride) \
-  for (uint nth = 0; nth < 8; ++nth)           \
+  for (uint nth = 0; nth < kColumnsOfLane; ++nth) sum.numbers[nth] = 0
+#define MULTIPLY_ADD(sum, a, b)                                \
+  for (uint nth = 0; nth < kTileDepth * kColumnsOfLane; ++nth) \
+  sum.numbers[nth % kColumnsOfLane] += a.numbers[nth / kColumnsOfLane] * b.numbers[nth]
+#define STORE_SUM(sum, array, element, stride)      \
+  for (uint nth = 0; nth < kColumnsOfLane; ++nth)   \
   array[AT(element, stride, false, LANE_ROW, LANE_COLUMN + nth)] = sum.numbers[nth]
 // As fp16; `sum` holds nothing of use afterwards.
 #define CONVERT_AND_STORE(sum, least, array, element, stride) \
-  for (uint nth = 0; nth < 8; ++nth)                          \
+  for (uint nth = 0; nth < kColumnsOfLane; ++nth)             \
   array[AT(element, stride, false, LANE_ROW, LANE_COLUMN + nth)] = toNumber(atLeast(sum.numbers[nth], least))
 void subgroupWait() { barrier(); }
 
 #else
 #extension GL_KHR_memory_scope_semantics : require
 #extension GL_KHR_shader_subgroup_basic : require
+#ifdef TESSERA_KHR_MATRICES
+#extension GL_KHR_cooperative_matrix : require
+#define TileA coopmat<float16_t, gl_ScopeSubgroup, kTileRows, kTileDepth, gl_MatrixUseA>
+#define TileB coopmat<float16_t, gl_ScopeSubgroup, kTileDepth, kTileColumns, gl_MatrixUseB>
+#define TileSum coopmat<float, gl_ScopeSubgroup, kTileRows, kTileColumns, gl_MatrixUseAccumulator>
+#define TileHalfSum coopmat<float16_t, gl_ScopeSubgroup, kTileRows, kTileColumns, gl_MatrixUseAccumulator>
+#define LAYOUT(columnMajor) \
+  ((columnMajor) ? gl_CooperativeMatrixLayoutColumnMajor : gl_CooperativeMatrixLayoutRowMajor)
+#define LOAD_TILE(tile, array, element, stride, columnMajor) \
+  coopMatLoad(tile, array, element, stride, LAYOUT(columnMajor))
+#define STORE_SUM(sum, array, element, stride) coopMatStore(sum, array, element, stride, LAYOUT(false))
+#define MULTIPLY_ADD(sum, a, b) sum = coopMatMulAdd(a, b, sum)
+#else
 #extension GL_NV_cooperative_matrix : require
-#define TileA fcoopmatNV<16, gl_ScopeSubgroup, 16, 16>
-#define TileB fcoopmatNV<16, gl_ScopeSubgroup, 16, 16>
-#define TileSum fcoopmatNV<32, gl_ScopeSubgroup, 16, 16>
+#define TileA fcoopmatNV<16, gl_ScopeSubgroup, kTileRows, kTileDepth>
+#define TileB fcoopmatNV<16, gl_ScopeSubgroup, kTileDepth, kTileColumns>
+#define TileSum fcoopmatNV<32, gl_ScopeSubgroup, kTileRows, kTileColumns>
+#define TileHalfSum fcoopmatNV<16, gl_ScopeSubgroup, kTileRows, kTileColumns>
+#define LOAD_TILE(tile, array, element, stride, columnMajor) coopMatLoadNV(tile, array, element, stride, columnMajor)
+#define STORE_SUM(sum, array, element, stride) coopMatStoreNV(sum, array, element, stride, false)
+#define MULTIPLY_ADD(sum, a, b) sum = coopMatMulAddNV(a, b, sum)
+#endif
+#define LOAD_A LOAD_TILE
+#define LOAD_B LOAD_TILE
 #define kSubgroup gl_SubgroupID
 #define kLane gl_SubgroupInvocationID
-#define LOAD_A(tile, array, element, stride, columnMajor) coopMatLoadNV(tile, array, element, stride, columnMajor)
-#define LOAD_B(tile, array, element, stride, columnMajor) coopMatLoadNV(tile, array, element, stride, columnMajor)
 #define CLEAR_SUM(sum) sum = TileSum(0.0)
-#define MULTIPLY_ADD(sum, a, b) sum = coopMatMulAddNV(a, b, sum)
-#define STORE_SUM(sum, array, element, stride) coopMatStoreNV(sum, array, element, stride, false)
 // Which lane holds what is the driver's affair, and may differ between fp16 and float: only whole matrices convert.
-#define CONVERT_AND_STORE(sum, least, array, element, stride)                                   \
-  {                                                                                             \
-    for (uint i = 0; i < sum.length(); ++i) sum[i] = withinHalf(atLeast(sum[i], least));        \
-    coopMatStoreNV(TileA(sum), array, element, stride, false);                                  \
+#define CONVERT_AND_STORE(sum, least, array, element, stride)                             \
+  {                                                                                       \
+    for (uint i = 0; i < sum.length(); ++i) sum[i] = withinHalf(atLeast(sum[i], least));  \
+    TileHalfSum converted = TileHalfSum(sum);                                             \
+    STORE_SUM(converted, array, element, stride);                                         \
   }
 void subgroupWait() { subgroupBarrier(); }
 #endif

@@ -1,26 +1,24 @@
-// What mlp_tile.glsl does, by cooperative matrices: each of four subgroups sums 16 × 16 tiles of the block. The weights
+// What mlp_tile.glsl does, by cooperative matrices: each of four subgroups sums tiles of the block. The weights
 // come from device memory straight away (fp16, see halve_weights.comp), each once a block, or once a row of subgroups.
 // Include after number.glsl. Defines: kThreads, kWidth, kBlock, STATE(), STATE_QUAD(), KEEP_QUAD(), clearSums(),
 // accumulate(), keepSums(), giveSums(), which calls take() of the kernel.
 #include "matrix_tiles.glsl"
 
-const uint kThreads = 128;
-const uint kSubgroups = kThreads / kSubgroupSize;
-
-layout(local_size_x = 128) in;
 layout(constant_id = 0) const uint kWidth = 64;       // of the hidden layers
 layout(constant_id = 1) const uint kBlock = 128;      // samples of a workgroup, a multiple of 64
 layout(constant_id = 2) const uint kStateWidth = 64;  // at least kWidth
 
 // Tiles are dealt out to subgroups along the columns first.
-const uint kColumnShares = kWidth / 16 < kSubgroups ? kWidth / 16 : kSubgroups;
+const uint kTilesAcross = kWidth / kTileColumns;
+const uint kColumnShares = kTilesAcross < kSubgroups ? kTilesAcross : kSubgroups;
 const uint kRowShares = kSubgroups / kColumnShares;
-const uint kColumnTiles = kWidth / 16 / kColumnShares;  // of one subgroup
-const uint kRowTiles = kBlock / 16 / kRowShares;
+const uint kColumnTiles = kTilesAcross / kColumnShares;  // of one subgroup
+const uint kRowTiles = kBlock / kTileRows / kRowShares;
 const uint kStride = kStateWidth + 8;  // eight rows lie in different banks
+const uint kTileNumbers = kTileRows * kTileColumns;
 
 shared float16_t state[kBlock * kStride];
-shared float given[kSubgroups * 256];
+shared float given[kSubgroups * kTileNumbers];
 TileSum sums[kColumnTiles * kRowTiles];
 
 #define STATE(row, column) state[(row) * kStride + (column)]
@@ -31,8 +29,8 @@ TileSum sums[kColumnTiles * kRowTiles];
   [[unroll]] for (uint k = 0; k < 4; ++k) STATE(row, 4 * (quad) + k) = (four)[k]
 
 // The first sample (within the block) and the first neuron of this subgroup's tile (r, c).
-uint tileRow(uint r) { return (kSubgroup / kColumnShares + r * kRowShares) * 16; }
-uint tileColumn(uint c) { return (kSubgroup % kColumnShares + c * kColumnShares) * 16; }
+uint tileRow(uint r) { return (kSubgroup / kColumnShares + r * kRowShares) * kTileRows; }
+uint tileColumn(uint c) { return (kSubgroup % kColumnShares + c * kColumnShares) * kTileColumns; }
 
 void clearSums() {
   [[unroll]] for (uint i = 0; i < kColumnTiles * kRowTiles; ++i) { CLEAR_SUM(sums[i]); }
@@ -40,7 +38,7 @@ void clearSums() {
 
 void accumulate(NumberPointer weights, uint first, uint kStep, uint nStep, uint depth, uint columns) {
   barrier();
-  for (uint k0 = 0; k0 < depth; k0 += 16) {
+  for (uint k0 = 0; k0 < depth; k0 += kTileDepth) {
     [[unroll]] for (uint c = 0; c < kColumnTiles; ++c) {
       const uint n0 = tileColumn(c);
       if (n0 >= columns) continue;
@@ -75,10 +73,11 @@ void giveSums(uint firstRow, uint firstColumn) {
   [[unroll]] for (uint c = 0; c < kColumnTiles; ++c) {
     [[unroll]] for (uint r = 0; r < kRowTiles; ++r) {
       subgroupWait();
-      STORE_SUM(sums[c * kRowTiles + r], given, kSubgroup * 256, 16);
+      STORE_SUM(sums[c * kRowTiles + r], given, kSubgroup * kTileNumbers, kTileColumns);
       subgroupWait();
-      for (uint i = kLane; i < 256; i += kSubgroupSize) {
-        take(firstRow + tileRow(r) + i / 16, firstColumn + tileColumn(c) + i % 16, given[kSubgroup * 256 + i]);
+      for (uint i = kLane; i < kTileNumbers; i += kSubgroupSize) {
+        take(firstRow + tileRow(r) + i / kTileColumns, firstColumn + tileColumn(c) + i % kTileColumns,
+             given[kSubgroup * kTileNumbers + i]);
       }
     }
   }

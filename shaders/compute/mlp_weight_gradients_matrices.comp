@@ -1,5 +1,5 @@
-// mlp_weight_gradients.comp by cooperative matrices: a workgroup sums a tile of 16 kRowTiles × 16 kColumnTiles weights,
-// 64 samples at a time. Its four subgroups share out the rows, and the samples where there are fewer rows.
+// mlp_weight_gradients.comp by cooperative matrices: a workgroup sums kRows × kColumns weights, 64 samples at a time. Its
+// four subgroups share out the rows, and the samples where there are fewer rows.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "float_sum.glsl"
@@ -9,22 +9,25 @@
 #include "mlp_output_gradient.glsl"
 #include "matrix_tiles.glsl"
 
-const uint kThreads = 128;
-const uint kSubgroups = kThreads / kSubgroupSize;
 const uint kDepth = 64;  // samples at a time
-layout(local_size_x = 128) in;
-layout(constant_id = 0) const uint kRowTiles = 4;  // 1, 2 or 4
-layout(constant_id = 1) const uint kColumnTiles = 4;
+layout(constant_id = 0) const uint kRows = 64;  // multiples of 16
+layout(constant_id = 1) const uint kColumns = 64;
 KERNEL_ARGUMENTS(MlpWeightGradientsArguments)
 
-const uint kRows = 16 * kRowTiles, kColumns = 16 * kColumnTiles;
 const uint kRowStride = kRows + 8, kColumnStride = kColumns + 8;
-const uint kParts = kSubgroups / kRowTiles;  // of the samples
+const uint kTilesDown = kRows / kTileRows;
+const uint kRowShares = kTilesDown < kSubgroups ? kTilesDown : kSubgroups;
+const uint kRowTiles = kTilesDown / kRowShares;  // of one subgroup
+const uint kColumnTiles = kColumns / kTileColumns;
+const uint kPart = kDepth / (kSubgroups / kRowShares);  // samples of one subgroup
+const uint kTileNumbers = kTileRows * kTileColumns;
 
 shared float16_t afterTile[kDepth * kRowStride];
 shared float16_t beforeTile[kDepth * kColumnStride];
-shared float given[kSubgroups * 256];
-TileSum sums[kColumnTiles];
+shared float given[kSubgroups * kTileNumbers];
+TileSum sums[kRowTiles * kColumnTiles];
+
+uint tileRow(uint r) { return (kSubgroup % kRowShares + r * kRowShares) * kTileRows; }
 
 // Samples [first, first + 64); those beyond the last are zero.
 void load(MlpWeightGradientsArguments a, uint first, uint samples, uint firstRow, uint firstColumn) {
@@ -57,33 +60,37 @@ void main() {
   MlpWeightGradientsArguments a = arguments.values;
   const uint samples = endOf(a.samples);
   const uint firstColumn = gl_WorkGroupID.x * kColumns, firstRow = gl_WorkGroupID.y * kRows;
-  const uint tileRow = kSubgroup % kRowTiles * 16, part = kSubgroup / kRowTiles;
+  const uint part = kSubgroup / kRowShares * kPart;
 
-  [[unroll]] for (uint c = 0; c < kColumnTiles; ++c) { CLEAR_SUM(sums[c]); }
+  [[unroll]] for (uint i = 0; i < kRowTiles * kColumnTiles; ++i) { CLEAR_SUM(sums[i]); }
   for (uint first = firstOf(a.samples) + gl_WorkGroupID.z * kDepth; first < samples; first += gl_NumWorkGroups.z * kDepth) {
     barrier();
     load(a, first, samples, firstRow, firstColumn);
     barrier();
-    for (uint k0 = part * (kDepth / kParts); k0 < (part + 1) * (kDepth / kParts); k0 += 16) {
-      TileA after;
-      LOAD_A(after, afterTile, k0 * kRowStride + tileRow, kRowStride, true);
-      [[unroll]] for (uint c = 0; c < kColumnTiles; ++c) {
-        TileB before;
-        LOAD_B(before, beforeTile, k0 * kColumnStride + c * 16, kColumnStride, false);
-        MULTIPLY_ADD(sums[c], after, before);
+    for (uint k0 = part; k0 < part + kPart; k0 += kTileDepth) {
+      [[unroll]] for (uint r = 0; r < kRowTiles; ++r) {
+        TileA after;
+        LOAD_A(after, afterTile, k0 * kRowStride + tileRow(r), kRowStride, true);
+        [[unroll]] for (uint c = 0; c < kColumnTiles; ++c) {
+          TileB before;
+          LOAD_B(before, beforeTile, k0 * kColumnStride + c * kTileColumns, kColumnStride, false);
+          MULTIPLY_ADD(sums[r * kColumnTiles + c], after, before);
+        }
       }
     }
   }
 
   const float scale = 1 / lossScale(a.largest, a.largestCount);
-  [[unroll]] for (uint c = 0; c < kColumnTiles; ++c) {
-    subgroupWait();
-    STORE_SUM(sums[c], given, kSubgroup * 256, 16);
-    subgroupWait();
-    for (uint i = kLane; i < 256; i += kSubgroupSize) {
-      const float sum = given[kSubgroup * 256 + i];
-      const uint to = (firstRow + tileRow + i / 16) * a.columns + firstColumn + c * 16 + i % 16;
-      if (sum != 0) addTo(a.gradients, to, sum * scale);
+  [[unroll]] for (uint r = 0; r < kRowTiles; ++r) {
+    [[unroll]] for (uint c = 0; c < kColumnTiles; ++c) {
+      subgroupWait();
+      STORE_SUM(sums[r * kColumnTiles + c], given, kSubgroup * kTileNumbers, kTileColumns);
+      subgroupWait();
+      for (uint i = kLane; i < kTileNumbers; i += kSubgroupSize) {
+        const float sum = given[kSubgroup * kTileNumbers + i];
+        const uint row = firstRow + tileRow(r) + i / kTileColumns, column = firstColumn + c * kTileColumns + i % kTileColumns;
+        if (sum != 0) addTo(a.gradients, row * a.columns + column, sum * scale);
+      }
     }
   }
 }

@@ -257,7 +257,8 @@ std::unique_ptr<Device> openDevice(const std::string& name) {
       std::printf("no device \"%s\": %s has no such arithmetic\n", name.c_str(), context->name().c_str());
       return nullptr;
     }
-    return name == kWithEmulatedMatrices ? makeVulkanDeviceWithEmulatedMatrices(options) : makeVulkanDevice(options);
+    return name == kWithEmulatedMatrices ? makeVulkanDeviceWithEmulatedMatrices(options, {})
+                                         : makeVulkanDevice(options);
   }
 #endif
   DeviceOptions options;

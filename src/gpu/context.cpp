@@ -181,6 +181,7 @@ void GpuContext::chooseFeatures(const GpuFeatures& allowed) {
     features_.*feature = has.*feature && allowed.*feature && without.find(name) == std::string::npos;
   }
   features_.matrices = features_.matrices && features_.float16;
+  if (features_.matrices) matrices_ = presentMatrices(physicalDevice_);
   for (const auto& [name, feature] : kGpuFeatureNames) {
     if (features_.*feature) target_ += fmt::format("+{}", name);
   }
@@ -196,9 +197,17 @@ void GpuContext::createDevice(bool presents) {
   auto atomics = vulkanStruct<VkPhysicalDeviceShaderAtomicFloatFeaturesEXT>(
       VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SHADER_ATOMIC_FLOAT_FEATURES_EXT);
   atomics.shaderBufferFloat32AtomicAdd = VK_TRUE;
-  auto matrices = vulkanStruct<VkPhysicalDeviceCooperativeMatrixFeaturesNV>(
+  auto subgroupSize = vulkanStruct<VkPhysicalDeviceSubgroupSizeControlFeaturesEXT>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_FEATURES_EXT);
+  subgroupSize.subgroupSizeControl = subgroupSize.computeFullSubgroups = VK_TRUE;
+  auto nvMatrices = vulkanStruct<VkPhysicalDeviceCooperativeMatrixFeaturesNV>(
       VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_COOPERATIVE_MATRIX_FEATURES_NV);
-  matrices.cooperativeMatrix = VK_TRUE;
+  nvMatrices.cooperativeMatrix = VK_TRUE;
+#ifdef TESSERA_KHR_MATRICES
+  auto khrMatrices = vulkanStruct<VkPhysicalDeviceCooperativeMatrixFeaturesKHR>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_COOPERATIVE_MATRIX_FEATURES_KHR);
+  khrMatrices.cooperativeMatrix = VK_TRUE;
+#endif
   auto vulkan12 = vulkanStruct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
   vulkan12.vulkanMemoryModel = features_.matrices;  // kernels with such matrices are written for it
   vulkan12.bufferDeviceAddress = VK_TRUE;
@@ -216,16 +225,17 @@ void GpuContext::createDevice(bool presents) {
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queue;
   std::vector<const char*> extensions;
-  if (features_.floatAtomics) {
-    atomics.pNext = vulkan12.pNext;
-    vulkan12.pNext = &atomics;
-    extensions.push_back(VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME);
-  }
-  if (features_.matrices) {
-    matrices.pNext = vulkan12.pNext;
-    vulkan12.pNext = &matrices;
-    extensions.push_back(VK_NV_COOPERATIVE_MATRIX_EXTENSION_NAME);
-  }
+  const auto add = [&](auto& feature, const char* extension) {
+    feature.pNext = vulkan12.pNext;
+    vulkan12.pNext = &feature;
+    extensions.push_back(extension);
+  };
+  if (features_.floatAtomics) add(atomics, VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME);
+  if (features_.matrices) add(subgroupSize, VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME);
+  if (matrices_.kind == GpuMatrices::Kind::nv) add(nvMatrices, VK_NV_COOPERATIVE_MATRIX_EXTENSION_NAME);
+#ifdef TESSERA_KHR_MATRICES
+  if (matrices_.kind == GpuMatrices::Kind::khr) add(khrMatrices, VK_KHR_COOPERATIVE_MATRIX_EXTENSION_NAME);
+#endif
   if (presents) {
     if (!hasDeviceExtension(physicalDevice_, VK_KHR_SWAPCHAIN_EXTENSION_NAME)) {
       throw Error(name_, "", "it cannot show pictures in windows", "choose another device (tessera info devices)");

@@ -22,8 +22,7 @@ struct GpuFeatures {
   bool float64 = true;    // double arithmetic; else fp32
   bool float16 = true;    // fp16 arithmetic and 16-bit storage; else fp32
   bool subgroups = true;  // subgroup arithmetic in compute; else shared memory
-  // Products of 16 × 16 fp16 matrices, summed in float, by subgroups of 32 (VK_NV_cooperative_matrix). Needs float16.
-  bool matrices = true;
+  bool matrices = true;   // GpuMatrices; needs float16
 };
 struct GpuFeatureName {
   const char* name;
@@ -34,6 +33,14 @@ inline constexpr GpuFeatureName kGpuFeatureNames[] = {{"floatAtomics", &GpuFeatu
                                                       {"float16", &GpuFeatures::float16},
                                                       {"subgroups", &GpuFeatures::subgroups},
                                                       {"matrices", &GpuFeatures::matrices}};
+
+// How a device multiplies matrices by a subgroup together: fp16, rows × depth times depth × columns, summed in float.
+struct GpuMatrices {
+  enum class Kind { none, nv, khr };  // VK_NV_cooperative_matrix; VK_KHR_cooperative_matrix, of builds that know it
+  Kind kind = Kind::none;
+  uint32_t rows = 16, columns = 16, depth = 16;
+  uint32_t subgroupSize = 32;  // that its kernels ask for
+};
 
 struct GpuOptions {
   // A part of the device's name, any case, or its index. Empty: the environment's TESSERA_GPU, else the best there is
@@ -73,6 +80,7 @@ class GpuContext {
   bool isDiscrete() const { return isDiscrete_; }        // a card of its own
   uint64_t memoryBytes() const;  // its largest heap: its own, or what it shares with the processor
   const GpuFeatures& features() const { return features_; }
+  const GpuMatrices& matrices() const { return matrices_; }  // with features().matrices
   const VkPhysicalDeviceLimits& limits() const { return limits_; }
 
   VkInstance instance() const { return instance_; }
@@ -111,6 +119,7 @@ class GpuContext {
   VkPhysicalDeviceMemoryProperties memory_ = {};
   bool isProcessor_ = false, isDiscrete_ = false;
   GpuFeatures features_;
+  GpuMatrices matrices_;
   std::string name_, target_;
   std::unique_ptr<GpuHeap> heap_;
   std::unique_ptr<PipelineCache> pipelines_;

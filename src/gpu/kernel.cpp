@@ -8,7 +8,7 @@
 namespace tessera {
 
 GpuKernel::GpuKernel(std::shared_ptr<const GpuContext> context, std::span<const uint32_t> spirv,
-                     std::span<const uint32_t> constants)
+                     std::span<const uint32_t> constants, uint32_t subgroupSize)
     : context_(std::move(context)) {
   const VkDevice device = context_->device();
 
@@ -38,6 +38,13 @@ GpuKernel::GpuKernel(std::shared_ptr<const GpuContext> context, std::span<const 
     info.stage.module = module;
     info.stage.pName = "main";
     info.stage.pSpecializationInfo = constants.empty() ? nullptr : &specialization;
+    auto size = vulkanStruct<VkPipelineShaderStageRequiredSubgroupSizeCreateInfoEXT>(
+        VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_REQUIRED_SUBGROUP_SIZE_CREATE_INFO_EXT);
+    size.requiredSubgroupSize = subgroupSize;
+    if (subgroupSize > 0) {
+      info.stage.pNext = &size;
+      info.stage.flags = VK_PIPELINE_SHADER_STAGE_CREATE_REQUIRE_FULL_SUBGROUPS_BIT_EXT;
+    }
     info.layout = layout_;
     result = vkCreateComputePipelines(device, context_->pipelines().handle(), 1, &info, nullptr, &pipeline_);
     vkDestroyShaderModule(device, module, nullptr);

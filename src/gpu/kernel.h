@@ -13,9 +13,10 @@ namespace tessera {
 
 class GpuKernel {
  public:
-  // `constants` are the values of the shader's specialization constants 0, 1, 2, ...
+  // `constants` are the values of the shader's specialization constants 0, 1, 2, ... All its subgroups are full and
+  // have `subgroupSize` lanes where that is not 0 (GpuMatrices::subgroupSize).
   GpuKernel(std::shared_ptr<const GpuContext> context, std::span<const uint32_t> spirv,
-            std::span<const uint32_t> constants = {});
+            std::span<const uint32_t> constants = {}, uint32_t subgroupSize = 0);
   ~GpuKernel();
   GpuKernel(const GpuKernel&) = delete;
   GpuKernel& operator=(const GpuKernel&) = delete;

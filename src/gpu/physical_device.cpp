@@ -116,33 +116,100 @@ void requireFeatures(const PhysicalDevice& device) {
 
 namespace {
 
-// Whether the device multiplies matrices as matrix_tiles.glsl does.
-bool multipliesMatrices(VkPhysicalDevice device) {
-  if (!hasDeviceExtension(device, VK_NV_COOPERATIVE_MATRIX_EXTENSION_NAME)) return false;
-  auto matrices = vulkanStruct<VkPhysicalDeviceCooperativeMatrixFeaturesNV>(
-      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_COOPERATIVE_MATRIX_FEATURES_NV);
+// The size of all subgroups in compute kernels that ask for it; 0 where kernels cannot.
+uint32_t settledSubgroupSize(VkPhysicalDevice device) {
+  if (!hasDeviceExtension(device, VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME)) return 0;
+  auto control = vulkanStruct<VkPhysicalDeviceSubgroupSizeControlFeaturesEXT>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_FEATURES_EXT);
+  auto features = vulkanStruct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
+  features.pNext = &control;
+  vkGetPhysicalDeviceFeatures2(device, &features);
+  if (!control.subgroupSizeControl || !control.computeFullSubgroups) return 0;
+  auto sizes = vulkanStruct<VkPhysicalDeviceSubgroupSizeControlPropertiesEXT>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_PROPERTIES_EXT);
+  auto subgroup =
+      vulkanStruct<VkPhysicalDeviceSubgroupProperties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES);
+  auto properties = vulkanStruct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
+  properties.pNext = &sizes;
+  sizes.pNext = &subgroup;
+  vkGetPhysicalDeviceProperties2(device, &properties);
+  if (!(sizes.requiredSubgroupSizeStages & VK_SHADER_STAGE_COMPUTE_BIT)) return 0;
+  return std::clamp(subgroup.subgroupSize, sizes.minSubgroupSize, sizes.maxSubgroupSize);
+}
+
+// Both extensions say the same things by other names.
+template <class Shape>
+bool fits(const Shape& shape, uint32_t rows, uint32_t columns, uint32_t depth) {
+  return 16 % rows == 0 && 16 % columns == 0 && 16 % depth == 0 &&
+         static_cast<int>(shape.scope) == VK_SCOPE_SUBGROUP_NV;
+}
+
+template <class Features>
+bool knowsMatrices(VkPhysicalDevice device, VkStructureType type) {
+  auto matrices = vulkanStruct<Features>(type);
   auto vulkan12 = vulkanStruct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
   auto features = vulkanStruct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
   features.pNext = &vulkan12;
   vulkan12.pNext = &matrices;
   vkGetPhysicalDeviceFeatures2(device, &features);
-  if (!matrices.cooperativeMatrix || !vulkan12.vulkanMemoryModel) return false;
+  return matrices.cooperativeMatrix && vulkan12.vulkanMemoryModel;
+}
 
+template <class Shape, class List>
+std::vector<Shape> shapesOf(VkPhysicalDevice device, VkStructureType type, List list) {
   uint32_t count = 0;
-  checkVulkan(vkGetPhysicalDeviceCooperativeMatrixPropertiesNV(device, &count, nullptr),
-              "vkGetPhysicalDeviceCooperativeMatrixPropertiesNV");
-  std::vector<VkCooperativeMatrixPropertiesNV> shapes(
-      count, vulkanStruct<VkCooperativeMatrixPropertiesNV>(VK_STRUCTURE_TYPE_COOPERATIVE_MATRIX_PROPERTIES_NV));
-  checkVulkan(vkGetPhysicalDeviceCooperativeMatrixPropertiesNV(device, &count, shapes.data()),
-              "vkGetPhysicalDeviceCooperativeMatrixPropertiesNV");
-  return std::any_of(shapes.begin(), shapes.end(), [](const VkCooperativeMatrixPropertiesNV& shape) {
-    return shape.MSize == 16 && shape.NSize == 16 && shape.KSize == 16 && shape.AType == VK_COMPONENT_TYPE_FLOAT16_NV &&
-           shape.BType == VK_COMPONENT_TYPE_FLOAT16_NV && shape.CType == VK_COMPONENT_TYPE_FLOAT32_NV &&
-           shape.DType == VK_COMPONENT_TYPE_FLOAT32_NV && shape.scope == VK_SCOPE_SUBGROUP_NV;
-  });
+  checkVulkan(list(device, &count, nullptr), "vkGetPhysicalDeviceCooperativeMatrixProperties");
+  std::vector<Shape> shapes(count, vulkanStruct<Shape>(type));
+  checkVulkan(list(device, &count, shapes.data()), "vkGetPhysicalDeviceCooperativeMatrixProperties");
+  return shapes;
+}
+
+// The largest product so far.
+void consider(GpuMatrices& best, GpuMatrices::Kind kind, uint32_t rows, uint32_t columns, uint32_t depth) {
+  const bool isFirst = best.kind == GpuMatrices::Kind::none;
+  if (isFirst || rows * columns * depth > best.rows * best.columns * best.depth) {
+    best = {kind, rows, columns, depth, best.subgroupSize};
+  }
 }
 
 }  // namespace
+
+GpuMatrices presentMatrices(VkPhysicalDevice device) {
+  GpuMatrices best;
+  best.subgroupSize = settledSubgroupSize(device);
+  if (best.subgroupSize == 0) return best;
+#ifdef TESSERA_KHR_MATRICES
+  if (hasDeviceExtension(device, VK_KHR_COOPERATIVE_MATRIX_EXTENSION_NAME) &&
+      knowsMatrices<VkPhysicalDeviceCooperativeMatrixFeaturesKHR>(
+          device, VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_COOPERATIVE_MATRIX_FEATURES_KHR)) {
+    for (const auto& s :
+         shapesOf<VkCooperativeMatrixPropertiesKHR>(device, VK_STRUCTURE_TYPE_COOPERATIVE_MATRIX_PROPERTIES_KHR,
+                                                    vkGetPhysicalDeviceCooperativeMatrixPropertiesKHR)) {
+      if (fits(s, s.MSize, s.NSize, s.KSize) && s.AType == VK_COMPONENT_TYPE_FLOAT16_KHR &&
+          s.BType == VK_COMPONENT_TYPE_FLOAT16_KHR && s.CType == VK_COMPONENT_TYPE_FLOAT32_KHR &&
+          s.ResultType == VK_COMPONENT_TYPE_FLOAT32_KHR && !s.saturatingAccumulation) {
+        consider(best, GpuMatrices::Kind::khr, s.MSize, s.NSize, s.KSize);
+      }
+    }
+    if (best.kind != GpuMatrices::Kind::none) return best;
+  }
+#endif
+  if (!hasDeviceExtension(device, VK_NV_COOPERATIVE_MATRIX_EXTENSION_NAME) ||
+      !knowsMatrices<VkPhysicalDeviceCooperativeMatrixFeaturesNV>(
+          device, VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_COOPERATIVE_MATRIX_FEATURES_NV)) {
+    return best;
+  }
+  for (const auto& s :
+       shapesOf<VkCooperativeMatrixPropertiesNV>(device, VK_STRUCTURE_TYPE_COOPERATIVE_MATRIX_PROPERTIES_NV,
+                                                 vkGetPhysicalDeviceCooperativeMatrixPropertiesNV)) {
+    if (fits(s, s.MSize, s.NSize, s.KSize) && s.AType == VK_COMPONENT_TYPE_FLOAT16_NV &&
+        s.BType == VK_COMPONENT_TYPE_FLOAT16_NV && s.CType == VK_COMPONENT_TYPE_FLOAT32_NV &&
+        s.DType == VK_COMPONENT_TYPE_FLOAT32_NV) {
+      consider(best, GpuMatrices::Kind::nv, s.MSize, s.NSize, s.KSize);
+    }
+  }
+  return best;
+}
 
 GpuFeatures presentFeatures(VkPhysicalDevice device) {
   auto atomics = vulkanStruct<VkPhysicalDeviceShaderAtomicFloatFeaturesEXT>(
@@ -167,7 +234,7 @@ GpuFeatures presentFeatures(VkPhysicalDevice device) {
   present.float16 = vulkan12.shaderFloat16 && vulkan11.storageBuffer16BitAccess;
   present.subgroups = (subgroup.supportedStages & VK_SHADER_STAGE_COMPUTE_BIT) &&
                       (subgroup.supportedOperations & VK_SUBGROUP_FEATURE_ARITHMETIC_BIT);
-  present.matrices = subgroup.subgroupSize == 32 && multipliesMatrices(device);
+  present.matrices = presentMatrices(device).kind != GpuMatrices::Kind::none;
   return present;
 }
 

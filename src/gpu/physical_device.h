@@ -30,6 +30,9 @@ void requireFeatures(const PhysicalDevice& device);
 
 bool hasDeviceExtension(VkPhysicalDevice device, const char* name);
 
+// None where no shape of its matrices fits what kernels do. Vulkan 1.2 only.
+GpuMatrices presentMatrices(VkPhysicalDevice device);
+
 // What the device has of the features that have a fallback. Vulkan 1.2 only.
 GpuFeatures presentFeatures(VkPhysicalDevice device);
 

@@ -19,7 +19,8 @@ void VulkanDevice::enqueue(const Adam& options) {
   arguments.firstMoments = deviceAddress(options.firstMoments);
   arguments.secondMoments = deviceAddress(options.secondMoments);
   arguments.counts = deviceAddress(options.counts);
-  if (options.rows) arguments.rows = deviceAddress(options.rows);
+  arguments.rows = options.rows ? deviceAddress(options.rows) : noCounter_.address();
+  arguments.found = noCounter_.address();
   if (options.found) {
     arguments.found = deviceAddress(options.found);
     arguments.foundCount = static_cast<uint32_t>(options.found.count);

@@ -20,10 +20,10 @@ std::vector<uint32_t> constantsOf(const AttentionShape& shape) {
 }
 
 template <class Options>
-arguments::AttentionArguments attentionArguments(const Options& options) {
+arguments::AttentionArguments attentionArguments(const VulkanDevice& device, const Options& options) {
   CHECK(options.fine.columns == AttentionShape::kFeatures * options.shape.levels);
   arguments::AttentionArguments arguments = {};
-  arguments.samples = countArguments(options.samples);
+  arguments.samples = device.countArguments(options.samples);
   arguments.coarse = matrixArguments(options.coarse, options.samples.capacity);
   arguments.fine = matrixArguments(options.fine, options.samples.capacity);
   arguments.logits = deviceAddress(options.logits);
@@ -31,9 +31,9 @@ arguments::AttentionArguments attentionArguments(const Options& options) {
 }
 
 template <class Options>
-arguments::ShadeArguments shadeArguments(const Options& options) {
+arguments::ShadeArguments shadeArguments(const VulkanDevice& device, const Options& options) {
   arguments::ShadeArguments arguments = {};
-  arguments.rays = countArguments(options.rays);
+  arguments.rays = device.countArguments(options.rays);
   arguments.diffuse = matrixArguments(options.diffuse, options.rays.capacity);
   arguments.specular = matrixArguments(options.specular, options.rays.capacity);
   arguments.opacity = deviceAddress(options.opacity);
@@ -43,14 +43,14 @@ arguments::ShadeArguments shadeArguments(const Options& options) {
 }  // namespace
 
 void VulkanDevice::enqueue(const AttentionForward& options) {
-  arguments::AttentionArguments arguments = attentionArguments(options);
+  arguments::AttentionArguments arguments = attentionArguments(*this, options);
   arguments.features = matrixArguments(options.features, options.samples.capacity);
   queue(kernel(kAttentionForwardSpirv, constantsOf(options.shape)), arguments, {groups(options.samples.capacity, 128)});
 }
 
 void VulkanDevice::enqueue(const AttentionBackward& options) {
   const size_t samples = options.samples.capacity;
-  arguments::AttentionArguments arguments = attentionArguments(options);
+  arguments::AttentionArguments arguments = attentionArguments(*this, options);
   arguments.logDensityGradients = deviceAddress(options.logDensityGradients);
   arguments.colourGradients = matrixArguments(options.colourGradients, samples);
   arguments.coarseGradients = matrixArguments(options.coarseGradients, samples);
@@ -62,13 +62,13 @@ void VulkanDevice::enqueue(const AttentionBackward& options) {
 }
 
 void VulkanDevice::enqueue(const ShadeForward& options) {
-  arguments::ShadeArguments arguments = shadeArguments(options);
+  arguments::ShadeArguments arguments = shadeArguments(*this, options);
   arguments.colour = deviceAddress(options.colour);
   queue(kernel(kShadeForwardSpirv, {options.whole}), arguments, {groups(3 * size_t{options.rays.capacity}, 256)});
 }
 
 void VulkanDevice::enqueue(const ShadeBackward& options) {
-  arguments::ShadeArguments arguments = shadeArguments(options);
+  arguments::ShadeArguments arguments = shadeArguments(*this, options);
   arguments.colour = deviceAddress(options.colourGradients);
   arguments.sumGradients = matrixArguments(options.sumGradients, options.rays.capacity);
   arguments.opacityGradients = deviceAddress(options.opacityGradients);

@@ -19,9 +19,9 @@ constexpr size_t kNumbers = TESSERA_DEFERRED_NUMBERS;
 static_assert(kNumbers == DeferredNetwork::kInputs + 4 * DeferredNetwork::kHidden + 3);
 
 template <class Options>
-arguments::DeferredArguments deferredArguments(const Options& options) {
+arguments::DeferredArguments deferredArguments(const VulkanDevice& device, const Options& options) {
   arguments::DeferredArguments arguments = {};
-  arguments.segments = countArguments(options.segments);
+  arguments.segments = device.countArguments(options.segments);
   arguments.composited = deviceAddress(options.composited);
   arguments.networkOfSegment = deviceAddress(options.networkOfSegment);
   arguments.rayOfSegment = deviceAddress(options.rayOfSegment);
@@ -31,9 +31,9 @@ arguments::DeferredArguments deferredArguments(const Options& options) {
 }
 
 template <class Options>
-arguments::BlendArguments blendArguments(const Options& options) {
+arguments::BlendArguments blendArguments(const VulkanDevice& device, const Options& options) {
   arguments::BlendArguments arguments = {};
-  arguments.rays = countArguments(options.rays);
+  arguments.rays = device.countArguments(options.rays);
   arguments.firstSegment = deviceAddress(options.firstSegment);
   arguments.composited = deviceAddress(options.composited);
   arguments.specular = deviceAddress(options.specular);
@@ -44,7 +44,7 @@ arguments::BlendArguments blendArguments(const Options& options) {
 }  // namespace
 
 void VulkanDevice::enqueue(const DeferredForward& options) {
-  arguments::DeferredArguments arguments = deferredArguments(options);
+  arguments::DeferredArguments arguments = deferredArguments(*this, options);
   arguments.specular = deviceAddress(options.specular);
   queue(kernel(kDeferredForwardSpirv), arguments, {groups(options.segments.capacity, kPerGroup)});
 }
@@ -53,7 +53,7 @@ void VulkanDevice::enqueue(const DeferredBackward& options) {
   const size_t segments = options.segments.capacity;
   if (segments == 0) return;
   CHECK(segments * kNumbers < size_t{1} << 31);
-  arguments::DeferredArguments arguments = deferredArguments(options);
+  arguments::DeferredArguments arguments = deferredArguments(*this, options);
   arguments.specular = deviceAddress(options.specularGradients);
   arguments.compositedGradients = deviceAddress(options.compositedGradients);
   arguments.networkGradients = deviceAddress(options.networkGradients);
@@ -65,7 +65,7 @@ void VulkanDevice::enqueue(const DeferredBackward& options) {
 }
 
 void VulkanDevice::enqueue(const BlendForward& options) {
-  arguments::BlendArguments arguments = blendArguments(options);
+  arguments::BlendArguments arguments = blendArguments(*this, options);
   arguments.depths = deviceAddress(options.depths);
   arguments.colour = deviceAddress(options.colour);
   arguments.opacity = deviceAddress(options.opacity);
@@ -74,7 +74,7 @@ void VulkanDevice::enqueue(const BlendForward& options) {
 }
 
 void VulkanDevice::enqueue(const BlendBackward& options) {
-  arguments::BlendArguments arguments = blendArguments(options);
+  arguments::BlendArguments arguments = blendArguments(*this, options);
   arguments.colour = deviceAddress(options.rayColourGradients);
   arguments.opacity = deviceAddress(options.rayOpacityGradients);
   arguments.transmittances = scratch(std::max<size_t>(options.opacityGradients.count, 1));

@@ -20,10 +20,10 @@ std::unique_ptr<Device> makeVulkanDevice(const GpuOptions& options) {
   return std::make_unique<VulkanDevice>(GpuContext::open(options));
 }
 
-std::unique_ptr<Device> makeVulkanDeviceWithEmulatedMatrices(const GpuOptions& options) {
+std::unique_ptr<Device> makeVulkanDeviceWithEmulatedMatrices(const GpuOptions& options, const GpuMatrices& matrices) {
   auto context = GpuContext::open(options);
   CHECK(context->features().float16);
-  return std::make_unique<VulkanDevice>(std::move(context), VulkanDevice::MlpArithmetic::emulatedMatrices);
+  return std::make_unique<VulkanDevice>(std::move(context), VulkanDevice::MlpArithmetic::emulatedMatrices, matrices);
 }
 
 std::shared_ptr<const GpuContext> contextOf(const Device& device) {
@@ -37,17 +37,24 @@ VulkanBatches batchesOf(const Device& device) {
 }
 
 VulkanDevice::VulkanDevice(std::shared_ptr<const GpuContext> context)
-    : VulkanDevice(context, bestArithmetic(context->features())) {}
+    : VulkanDevice(context, bestArithmetic(*context), context->matrices()) {}
 
-VulkanDevice::VulkanDevice(std::shared_ptr<const GpuContext> context, MlpArithmetic arithmetic)
-    : stream_(std::make_shared<GpuStream>(std::move(context))), mlpArithmetic_(arithmetic) {
+VulkanDevice::VulkanDevice(std::shared_ptr<const GpuContext> context, MlpArithmetic arithmetic,
+                           const GpuMatrices& matrices)
+    : stream_(std::make_shared<GpuStream>(context)),
+      noCounter_(context, 2 * sizeof(uint32_t)),
+      mlpArithmetic_(arithmetic),
+      matrices_(matrices) {
+  const uint32_t words[] = {0, ~0u};
+  stream_->upload(noCounter_, 0, std::as_bytes(std::span(words)));
   const char* times = std::getenv("TESSERA_GPU_TIMES");
   if (times != nullptr && std::string_view(times) == "1") stream_->measure(true);
 }
 
-VulkanDevice::MlpArithmetic VulkanDevice::bestArithmetic(const GpuFeatures& features) {
-  if (features.matrices) return MlpArithmetic::matrices;
-  return features.float16 ? MlpArithmetic::halves : MlpArithmetic::floats;
+VulkanDevice::MlpArithmetic VulkanDevice::bestArithmetic(const GpuContext& context) {
+  if (context.matrices().kind == GpuMatrices::Kind::khr) return MlpArithmetic::khrMatrices;
+  if (context.matrices().kind == GpuMatrices::Kind::nv) return MlpArithmetic::nvMatrices;
+  return context.features().float16 ? MlpArithmetic::halves : MlpArithmetic::floats;
 }
 
 VulkanDevice::~VulkanDevice() {
@@ -107,11 +114,12 @@ void VulkanDevice::finish() {
   stream_->finish();
 }
 
-const GpuKernel& VulkanDevice::kernel(std::span<const uint32_t> spirv, std::vector<uint32_t> constants) {
+const GpuKernel& VulkanDevice::kernel(std::span<const uint32_t> spirv, std::vector<uint32_t> constants,
+                                      uint32_t subgroupSize) {
   const auto key = std::make_pair(spirv.data(), std::move(constants));
   const auto found = kernels_.find(key);
   if (found != kernels_.end()) return found->second;
-  return kernels_.try_emplace(key, stream_->context(), spirv, key.second).first->second;
+  return kernels_.try_emplace(key, stream_->context(), spirv, key.second, subgroupSize).first->second;
 }
 
 const GpuKernel& VulkanDevice::sumKernel(std::span<const uint32_t> withFloatAtomics, std::span<const uint32_t> without,
@@ -153,13 +161,14 @@ uint64_t VulkanDevice::scratch(size_t floats) {
   return scratch_.address();
 }
 
-arguments::CountArguments countArguments(const Count& count) {
+arguments::CountArguments VulkanDevice::countArguments(const Count& count) const {
   CHECK(!count.first);
   return partArguments(count);
 }
 
-arguments::CountArguments partArguments(const Count& count) {
-  return {deviceAddress(count.counter), deviceAddress(count.first), count.capacity, 0};
+arguments::CountArguments VulkanDevice::partArguments(const Count& count) const {
+  return {count.counter ? deviceAddress(count.counter) : noCounter_.address() + sizeof(uint32_t),
+          count.first ? deviceAddress(count.first) : noCounter_.address(), count.capacity, 0};
 }
 
 arguments::MatrixArguments matrixArguments(const Matrix<const float>& matrix, size_t rows) {

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string_view>
 #include <tuple>
 
@@ -176,33 +177,48 @@ TEST_P(VulkanDeviceTest, AllocatesZeros) {
 
 // Gradients of losses that are means over many rays are far below what fp16 holds, those of sums far above: each
 // network's are scaled before they become fp16.
-class HalfNetworks : public testing::TestWithParam<std::tuple<const char*, float>> {
+struct HalfArithmetic {
+  const char* name;
+  std::optional<GpuMatrices> emulated = {};  // matrices that the device would have
+};
+
+class HalfNetworks : public testing::TestWithParam<std::tuple<HalfArithmetic, float>> {
  protected:
   void TearDown() override { EXPECT_EQ(GpuContext::validationMessages(), 0); }
 };
 
 std::string halfNetworkName(const testing::TestParamInfo<HalfNetworks::ParamType>& info) {
   const auto& [arithmetic, size] = info.param;
-  return std::string(arithmetic) + (size < 1 ? "Tiny" : size > 1 ? "Huge" : "");
+  return std::string(arithmetic.name) + (size < 1 ? "Tiny" : size > 1 ? "Huge" : "");
 }
 
+// As of NVIDIA's and AMD's cards, of Intel's, and of Mesa's driver for the processor.
+constexpr GpuMatrices kLarge = {}, kFlat = {.rows = 8, .subgroupSize = 16},
+                      kSmall = {.rows = 8, .columns = 8, .depth = 8, .subgroupSize = 8};
 INSTANTIATE_TEST_SUITE_P(Networks, HalfNetworks,
-                         testing::Combine(testing::Values("Halves", "Matrices", "EmulatedMatrices"),
+                         testing::Combine(testing::Values(HalfArithmetic{"Halves"}, HalfArithmetic{"Matrices"},
+                                                          HalfArithmetic{"EmulatedMatrices", kLarge},
+                                                          HalfArithmetic{"EmulatedFlatMatrices", kFlat},
+                                                          HalfArithmetic{"EmulatedSmallMatrices", kSmall}),
                                           testing::Values(1e-12f, 1.0f, 1e9f)),
                          halfNetworkName);
 
 TEST_P(HalfNetworks, AreRightWhateverTheSizeOfGradients) {
   const auto& [arithmetic, gradientSize] = GetParam();
-  const bool byMatrices = std::string_view(arithmetic) == "Matrices";
+  const bool byMatrices = std::string_view(arithmetic.name) == "Matrices";
   GpuOptions options;
   options.allowed.matrices = byMatrices;
   const auto context = openForTest(options);
   SKIP_WITHOUT_VULKAN(context);
   if (!context->features().float16 || context->features().matrices != byMatrices) {
-    GTEST_SKIP() << context->name() << " has no such arithmetic: " << arithmetic;
+    GTEST_SKIP() << context->name() << " has no such arithmetic: " << arithmetic.name;
   }
-  const std::unique_ptr<Device> device = std::string_view(arithmetic) == "EmulatedMatrices"
-                                             ? makeVulkanDeviceWithEmulatedMatrices(options)
+  // More tiles than it unrolls, and it mixes up what invocations keep of them while they wait for one another.
+  if (arithmetic.emulated && arithmetic.emulated->rows < 16 && context->name().find("Mesa 22.") != std::string::npos) {
+    GTEST_SKIP() << context->name() << " emulates 16 x 16 matrices alone";
+  }
+  const std::unique_ptr<Device> device = arithmetic.emulated
+                                             ? makeVulkanDeviceWithEmulatedMatrices(options, *arithmetic.emulated)
                                              : makeVulkanDevice(options);
   EXPECT_TRUE(device->keepsHalves());
   runEveryWidth(*device, gradientSize, 1e-2);

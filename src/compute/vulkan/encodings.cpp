@@ -12,10 +12,11 @@ namespace tessera {
 namespace {
 
 template <class Options>
-arguments::SphericalHarmonicsArguments harmonicsArguments(const Options& options, const Matrix<const float>& encoded) {
+arguments::SphericalHarmonicsArguments harmonicsArguments(const VulkanDevice& device, const Options& options,
+                                                          const Matrix<const float>& encoded) {
   CHECK(encoded.columns == static_cast<uint32_t>(options.degree * options.degree));
   arguments::SphericalHarmonicsArguments arguments = {};
-  arguments.samples = countArguments(options.samples);
+  arguments.samples = device.countArguments(options.samples);
   arguments.directions = deviceAddress(options.directions);
   arguments.rayOfSample = deviceAddress(options.rayOfSample);
   arguments.encoded = matrixArguments(encoded, options.samples.capacity);
@@ -24,9 +25,10 @@ arguments::SphericalHarmonicsArguments harmonicsArguments(const Options& options
 }
 
 template <class Options>
-arguments::FrequencyArguments frequencyArguments(const Options& options, const Matrix<const float>& encoded) {
+arguments::FrequencyArguments frequencyArguments(const VulkanDevice& device, const Options& options,
+                                                 const Matrix<const float>& encoded) {
   arguments::FrequencyArguments arguments = {};
-  arguments.samples = countArguments(options.samples);
+  arguments.samples = device.countArguments(options.samples);
   arguments.inputs = deviceAddress(options.inputs);
   arguments.encoded = matrixArguments(encoded, options.samples.capacity);
   arguments.dimensions = options.dimensions;
@@ -38,22 +40,23 @@ arguments::FrequencyArguments frequencyArguments(const Options& options, const M
 
 void VulkanDevice::enqueue(const SphericalHarmonicsForward& options) {
   const size_t elements = size_t{options.samples.capacity} * options.encoded.columns;
-  queue(kernel(kSphericalHarmonicsForwardSpirv), harmonicsArguments(options, options.encoded), {groups(elements, 256)});
+  queue(kernel(kSphericalHarmonicsForwardSpirv), harmonicsArguments(*this, options, options.encoded),
+        {groups(elements, 256)});
 }
 
 void VulkanDevice::enqueue(const SphericalHarmonicsBackward& options) {
-  arguments::SphericalHarmonicsArguments arguments = harmonicsArguments(options, options.encodedGradients);
+  arguments::SphericalHarmonicsArguments arguments = harmonicsArguments(*this, options, options.encodedGradients);
   arguments.directionGradients = deviceAddress(options.directionGradients);
   queue(kernel(kSphericalHarmonicsBackwardSpirv), arguments, {groups(options.samples.capacity, 128)});
 }
 
 void VulkanDevice::enqueue(const FrequencyForward& options) {
   const size_t elements = size_t{options.samples.capacity} * options.encoded.columns;
-  queue(kernel(kFrequencyForwardSpirv), frequencyArguments(options, options.encoded), {groups(elements, 256)});
+  queue(kernel(kFrequencyForwardSpirv), frequencyArguments(*this, options, options.encoded), {groups(elements, 256)});
 }
 
 void VulkanDevice::enqueue(const FrequencyBackward& options) {
-  arguments::FrequencyArguments arguments = frequencyArguments(options, options.encodedGradients);
+  arguments::FrequencyArguments arguments = frequencyArguments(*this, options, options.encodedGradients);
   arguments.inputGradients = deviceAddress(options.inputGradients);
   const size_t numbers = size_t{options.samples.capacity} * options.dimensions;
   queue(kernel(kFrequencyBackwardSpirv), arguments, {groups(numbers, 256)});

@@ -28,9 +28,9 @@ namespace {
 constexpr uint32_t kPerGroup = 256;  // local_size_x of the kernels that sum
 
 template <class Options>
-arguments::RayLossArguments rayLossArguments(const Options& options) {
+arguments::RayLossArguments rayLossArguments(const VulkanDevice& device, const Options& options) {
   arguments::RayLossArguments arguments = {};
-  arguments.rays = countArguments(options.rays);
+  arguments.rays = device.countArguments(options.rays);
   arguments.scale = options.scale;
   arguments.firstSample = deviceAddress(options.firstSample);
   arguments.weights = deviceAddress(options.weights);
@@ -55,7 +55,7 @@ void VulkanDevice::enqueue(const ColourLoss& options) {
 }
 
 void VulkanDevice::enqueue(const DistortionLoss& options) {
-  arguments::RayLossArguments arguments = rayLossArguments(options);
+  arguments::RayLossArguments arguments = rayLossArguments(*this, options);
   arguments.normalised = options.normalised;
   arguments.distances = deviceAddress(options.distances);
   arguments.steps = deviceAddress(options.steps);
@@ -64,7 +64,7 @@ void VulkanDevice::enqueue(const DistortionLoss& options) {
 }
 
 void VulkanDevice::enqueue(const DepthLoss& options) {
-  arguments::RayLossArguments arguments = rayLossArguments(options);
+  arguments::RayLossArguments arguments = rayLossArguments(*this, options);
   arguments.tolerance = options.tolerance;
   arguments.distances = deviceAddress(options.distances);
   arguments.known = deviceAddress(options.known);

@@ -10,42 +10,46 @@
 #include "shaders/mlp_backward.h"
 #include "shaders/mlp_backward_emulated_matrices.h"
 #include "shaders/mlp_backward_half.h"
-#include "shaders/mlp_backward_matrices.h"
+#include "shaders/mlp_backward_nv_matrices.h"
 #include "shaders/mlp_forward.h"
 #include "shaders/mlp_forward_emulated_matrices.h"
 #include "shaders/mlp_forward_half.h"
-#include "shaders/mlp_forward_matrices.h"
+#include "shaders/mlp_forward_nv_matrices.h"
 #include "shaders/mlp_largest_gradient.h"
 #include "shaders/mlp_weight_gradients.h"
 #include "shaders/mlp_weight_gradients_float_atomics.h"
 #include "shaders/mlp_weight_gradients_half.h"
 #include "shaders/mlp_weight_gradients_half_float_atomics.h"
-#include "shaders/mlp_weight_gradients_matrices.h"
 #include "shaders/mlp_weight_gradients_matrices_emulated.h"
 #include "shaders/mlp_weight_gradients_matrices_emulated_float_atomics.h"
-#include "shaders/mlp_weight_gradients_matrices_float_atomics.h"
+#include "shaders/mlp_weight_gradients_matrices_nv.h"
+#include "shaders/mlp_weight_gradients_matrices_nv_float_atomics.h"
+#ifdef TESSERA_KHR_MATRICES
+#include "shaders/mlp_backward_khr_matrices.h"
+#include "shaders/mlp_forward_khr_matrices.h"
+#include "shaders/mlp_weight_gradients_matrices_khr.h"
+#include "shaders/mlp_weight_gradients_matrices_khr_float_atomics.h"
+#endif
 
 namespace tessera {
 
 namespace {
-
-using Arithmetic = VulkanDevice::MlpArithmetic;
-using Spirv = std::span<const uint32_t>;
 
 constexpr uint32_t kWeightTile = 32;         // mlp_weight_gradients.comp: weights of a workgroup, squared
 constexpr uint32_t kSamplesPerShare = 1024;  // samples that one workgroup there should at least sum
 constexpr uint32_t kMostShares = 64;         // each weight is added to by so many workgroups at most
 constexpr uint32_t kScaleGroups = 64;        // workgroups that look for the largest gradient
 
-bool isOfMatrices(Arithmetic arithmetic) {
-  return arithmetic == Arithmetic::matrices || arithmetic == Arithmetic::emulatedMatrices;
-}
-
-// In the order of Arithmetic.
-Spirv chosen(Arithmetic arithmetic, Spirv floats, Spirv halves, Spirv matrices, Spirv emulatedMatrices) {
-  const Spirv all[] = {floats, halves, matrices, emulatedMatrices};
-  return all[static_cast<int>(arithmetic)];
-}
+#ifdef TESSERA_KHR_MATRICES
+constexpr std::span<const uint32_t> kForwardByKhr = kMlpForwardKhrMatricesSpirv;
+constexpr std::span<const uint32_t> kBackwardByKhr = kMlpBackwardKhrMatricesSpirv;
+constexpr std::span<const uint32_t> kWeightGradientsByKhr = kMlpWeightGradientsMatricesKhrSpirv;
+constexpr std::span<const uint32_t> kWeightGradientsByKhrAndFloatAtomics =
+    kMlpWeightGradientsMatricesKhrFloatAtomicsSpirv;
+#else  // the compiler of shaders did not know them
+constexpr std::span<const uint32_t> kForwardByKhr, kBackwardByKhr, kWeightGradientsByKhr,
+    kWeightGradientsByKhrAndFloatAtomics;
+#endif
 
 // How a network's kernels are built: see mlp_tile.glsl and mlp_matrices.glsl.
 struct Block {
@@ -54,13 +58,13 @@ struct Block {
 };
 
 // Blocks fit in 32 KiB of shared memory.
-Block blockFor(const MlpShape& shape, uint32_t stateWidth, Arithmetic arithmetic) {
+Block blockFor(const MlpShape& shape, uint32_t stateWidth, bool byMatrices) {
   CHECK(std::has_single_bit(static_cast<uint32_t>(shape.width)));
   CHECK(16 <= shape.width);
   CHECK(shape.width <= 128);
   CHECK(shape.hiddenLayers >= 1);
   CHECK(stateWidth <= 128u);
-  const uint32_t samples = (stateWidth <= 64 ? 64 : 32) * (isOfMatrices(arithmetic) ? 2 : 1);
+  const uint32_t samples = (stateWidth <= 64 ? 64 : 32) * (byMatrices ? 2 : 1);
   return {static_cast<uint32_t>(shape.width), samples, stateWidth};
 }
 
@@ -79,6 +83,18 @@ class Places {
 };
 
 }  // namespace
+
+const GpuKernel& VulkanDevice::mlpKernel(const MlpForms& forms, std::vector<uint32_t> constants) {
+  const std::span<const uint32_t> spirv = forms[static_cast<size_t>(mlpArithmetic_)];
+  CHECK(!spirv.empty());
+  if (!multipliesMatrices()) return kernel(spirv, std::move(constants));
+  constexpr uint32_t kSubgroups = 4;  // of a workgroup, see matrix_tiles.glsl
+  constants.resize(3);
+  constants.insert(constants.end(), {matrices_.subgroupSize, matrices_.rows, matrices_.columns, matrices_.depth,
+                                     kSubgroups * matrices_.subgroupSize});
+  const bool isEmulated = mlpArithmetic_ == MlpArithmetic::emulatedMatrices;
+  return kernel(spirv, std::move(constants), isEmulated ? 0 : matrices_.subgroupSize);
+}
 
 uint64_t VulkanDevice::weightNumbers(const Slice<const float>& weights, uint64_t scratch) {
   if (!keepsHalves()) return quadAddress(weights);
@@ -109,10 +125,10 @@ void VulkanDevice::enqueue(const MlpForward& options) {
   arguments.paddedOutputs = shape.layerOutputs(shape.hiddenLayers);
   arguments.hiddenLayers = shape.hiddenLayers;
   arguments.sigmoidOutput = shape.activation == OutputActivation::sigmoid;
-  const Block block = blockFor(shape, shape.width, mlpArithmetic_);
-  const Spirv spirv = chosen(mlpArithmetic_, kMlpForwardSpirv, kMlpForwardHalfSpirv, kMlpForwardMatricesSpirv,
-                             kMlpForwardEmulatedMatricesSpirv);
-  queue(kernel(spirv, block.constants()), arguments, {groups(capacity, block.samples)});
+  const Block block = blockFor(shape, shape.width, multipliesMatrices());
+  const MlpForms forms = {kMlpForwardSpirv, kMlpForwardHalfSpirv, kMlpForwardNvMatricesSpirv, kForwardByKhr,
+                          kMlpForwardEmulatedMatricesSpirv};
+  queue(mlpKernel(forms, block.constants()), arguments, {groups(capacity, block.samples)});
 }
 
 void VulkanDevice::enqueue(const MlpBackward& options) {
@@ -149,6 +165,7 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
   arguments.paddedInputs = shape.layerInputs(0);
   arguments.paddedOutputs = paddedOutputs;
   arguments.hiddenLayers = hiddenLayers;
+  arguments.largest = noCounter_.address();
   if (keepsHalves()) {
     arguments.largest = base + largestPlace;
     arguments.largestCount = std::min(groups(capacity, 128), kScaleGroups);
@@ -157,10 +174,10 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
     largest.largest = arguments.largest;
     queue(kernel(kMlpLargestGradientSpirv), largest, {arguments.largestCount});
   }
-  const Block block = blockFor(shape, std::max(width, paddedOutputs), mlpArithmetic_);
-  const Spirv spirv = chosen(mlpArithmetic_, kMlpBackwardSpirv, kMlpBackwardHalfSpirv, kMlpBackwardMatricesSpirv,
-                             kMlpBackwardEmulatedMatricesSpirv);
-  queue(kernel(spirv, block.constants()), arguments, {groups(capacity, block.samples)});
+  const Block block = blockFor(shape, std::max(width, paddedOutputs), multipliesMatrices());
+  const MlpForms forms = {kMlpBackwardSpirv, kMlpBackwardHalfSpirv, kMlpBackwardNvMatricesSpirv, kBackwardByKhr,
+                          kMlpBackwardEmulatedMatricesSpirv};
+  queue(mlpKernel(forms, block.constants()), arguments, {groups(capacity, block.samples)});
 
   for (uint32_t layer = 0; layer <= hiddenLayers; ++layer) {
     arguments::MlpWeightGradientsArguments sums = {};
@@ -179,23 +196,23 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
 
 void VulkanDevice::queueWeightGradients(const arguments::MlpWeightGradientsArguments& sums, size_t capacity) {
   const uint32_t shares = std::clamp<uint32_t>(groups(capacity, kSamplesPerShare), 1, kMostShares);
-  const Spirv withFloatAtomics =
-      chosen(mlpArithmetic_, kMlpWeightGradientsFloatAtomicsSpirv, kMlpWeightGradientsHalfFloatAtomicsSpirv,
-             kMlpWeightGradientsMatricesFloatAtomicsSpirv, kMlpWeightGradientsMatricesEmulatedFloatAtomicsSpirv);
-  const Spirv without = chosen(mlpArithmetic_, kMlpWeightGradientsSpirv, kMlpWeightGradientsHalfSpirv,
-                               kMlpWeightGradientsMatricesSpirv, kMlpWeightGradientsMatricesEmulatedSpirv);
+  const MlpForms withFloatAtomics = {kMlpWeightGradientsFloatAtomicsSpirv, kMlpWeightGradientsHalfFloatAtomicsSpirv,
+                                     kMlpWeightGradientsMatricesNvFloatAtomicsSpirv,
+                                     kWeightGradientsByKhrAndFloatAtomics,
+                                     kMlpWeightGradientsMatricesEmulatedFloatAtomicsSpirv};
+  const MlpForms without = {kMlpWeightGradientsSpirv, kMlpWeightGradientsHalfSpirv, kMlpWeightGradientsMatricesNvSpirv,
+                            kWeightGradientsByKhr, kMlpWeightGradientsMatricesEmulatedSpirv};
   uint32_t tileRows = kWeightTile, tileColumns = kWeightTile;
-  std::vector<uint32_t> constants;
-  if (isOfMatrices(mlpArithmetic_)) {
-    // The widest tiles that share out the rows among four subgroups and leave no column over.
-    const auto tiles = [](uint32_t size, std::initializer_list<uint32_t> choices) {
-      return *std::find_if(choices.begin(), choices.end(), [&](uint32_t n) { return size % (16 * n) == 0; });
+  if (multipliesMatrices()) {
+    // The largest that leave no row and no column over.
+    const auto largest = [](uint32_t size, std::initializer_list<uint32_t> choices) {
+      return *std::find_if(choices.begin(), choices.end(), [&](uint32_t n) { return size % n == 0; });
     };
-    constants = {tiles(sums.rows, {4, 2, 1}), tiles(sums.columns, {4, 3, 2, 1})};
-    tileRows = 16 * constants[0];
-    tileColumns = 16 * constants[1];
+    tileRows = largest(sums.rows, {64, 32, 16});
+    tileColumns = largest(sums.columns, {64, 48, 32, 16});
   }
-  queue(sumKernel(withFloatAtomics, without, constants), sums,
+  const MlpForms& forms = stream_->context()->features().floatAtomics ? withFloatAtomics : without;
+  queue(mlpKernel(forms, {tileRows, tileColumns}), sums,
         {groups(sums.columns, tileColumns), groups(sums.rows, tileRows), shares});
 }
 

@@ -24,7 +24,7 @@ inline arguments::VirtualGridArguments gridArguments(const VirtualGrid& grid) {
 
 // What all lookups have in common.
 template <class Arguments, class Options>
-Arguments lookupArguments(const Options& options) {
+Arguments VulkanDevice::lookupArguments(const Options& options) const {
   Arguments arguments = {};
   arguments.grid = gridArguments(options.grid);
   arguments.samples = countArguments(options.samples);

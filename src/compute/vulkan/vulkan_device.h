@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <memory>
 #include <span>
@@ -30,10 +31,10 @@ class VulkanMemory : public Memory {
 class VulkanDevice : public Device {
  public:
   // How networks are computed; floats need no feature. Sums are floats in all of them.
-  enum class MlpArithmetic { floats, halves, matrices, emulatedMatrices };
+  enum class MlpArithmetic { floats, halves, nvMatrices, khrMatrices, emulatedMatrices };
 
   explicit VulkanDevice(std::shared_ptr<const GpuContext> context);  // as fast as its features allow
-  VulkanDevice(std::shared_ptr<const GpuContext> context, MlpArithmetic arithmetic);
+  VulkanDevice(std::shared_ptr<const GpuContext> context, MlpArithmetic arithmetic, const GpuMatrices& matrices);
   ~VulkanDevice() override;  // with TESSERA_GPU_TIMES=1 in the environment, says what each operation took on the device
 
   const std::shared_ptr<const GpuContext>& context() const { return stream_->context(); }
@@ -48,6 +49,10 @@ class VulkanDevice : public Device {
   void fillZero(Memory& memory, size_t offset, size_t bytes) override;
   void finish() override;
   bool supports(Operation) const override { return true; }
+  // Of operations that begin at row 0, and of those that take part of the rows.
+  arguments::CountArguments countArguments(const Count& count) const;
+  arguments::CountArguments partArguments(const Count& count) const;
+
   bool keepsHalves() const override { return mlpArithmetic_ != MlpArithmetic::floats; }
 
   using Device::fillZero;
@@ -65,10 +70,17 @@ class VulkanDevice : public Device {
   TESSERA_OPERATIONS(TESSERA_ENQUEUE)
 #undef TESSERA_ENQUEUE
 
-  static MlpArithmetic bestArithmetic(const GpuFeatures& features);
+  static MlpArithmetic bestArithmetic(const GpuContext& context);
+  bool multipliesMatrices() const {
+    return mlpArithmetic_ >= MlpArithmetic::nvMatrices;
+  }
 
   // Compiled at first use. `constants` are the shader's specialization constants in order.
-  const GpuKernel& kernel(std::span<const uint32_t> spirv, std::vector<uint32_t> constants = {});
+  const GpuKernel& kernel(std::span<const uint32_t> spirv, std::vector<uint32_t> constants = {},
+                          uint32_t subgroupSize = 0);
+  // A kernel of networks, in the forms that it has for each arithmetic. `constants` are those that all have.
+  using MlpForms = std::array<std::span<const uint32_t>, 5>;  // in the order of MlpArithmetic
+  const GpuKernel& mlpKernel(const MlpForms& forms, std::vector<uint32_t> constants);
   // Chooses between the two forms of a kernel that adds to sums from many invocations.
   const GpuKernel& sumKernel(std::span<const uint32_t> withFloatAtomics, std::span<const uint32_t> without,
                              std::vector<uint32_t> constants = {});
@@ -126,6 +138,8 @@ class VulkanDevice : public Device {
     queue(kernel, arguments, {groups});
     addPartials(arguments.partials, groups, columns, sums);
   }
+  template <class Arguments, class Options>
+  Arguments lookupArguments(const Options& options) const;  // of virtual grids and lattices
   void addPartials(uint64_t partials, uint32_t count, uint32_t columns, uint64_t sums);
   // Where memory is short, what is no longer used is given back first.
   GpuBuffer makeBuffer(size_t bytes);
@@ -136,7 +150,11 @@ class VulkanDevice : public Device {
   void queueWeightGradients(const arguments::MlpWeightGradientsArguments& sums, size_t capacity);
 
   std::shared_ptr<GpuStream> stream_;
+  // 0 and the largest number. What all invocations would read of nothing is read of it instead: Mesa's driver for the
+  // processor (26.2) reads such words where no invocation comes, too.
+  GpuBuffer noCounter_;
   MlpArithmetic mlpArithmetic_;
+  GpuMatrices matrices_;
   std::map<std::pair<const uint32_t*, std::vector<uint32_t>>, GpuKernel> kernels_;
   GpuBuffer scratch_;
 };
@@ -154,10 +172,6 @@ inline uint64_t quadAddress(const Slice<const float>& slice) {
   CHECK(address % 16 == 0u);
   return address;
 }
-
-// Of operations that begin at row 0, and of those that take part of the rows.
-arguments::CountArguments countArguments(const Count& count);
-arguments::CountArguments partArguments(const Count& count);
 
 // CHECKs that a kernel's 32-bit indices reach the last of `rows` rows.
 arguments::MatrixArguments matrixArguments(const Matrix<const float>& matrix, size_t rows);
