@@ -51,6 +51,9 @@ void printRoofline(const Roofline& roofline) {
   } else {
     fmt::print("  none: nobody hurries the reference device\n");
   }
+  if (roofline.limits.matrixFlops > 0) {
+    fmt::print("  {:<44} {}\n", "products of fp16 matrices", scaled(roofline.limits.matrixFlops, "FLOP"));
+  }
   fmt::print("\n{:<28} {:<44} {:>9}  {:>17}  {:>17}  {:>7}\n", "operation", "shape", "ms", "rate", "limit", "share");
   for (const RooflineRow& row : roofline.rows) {
     fmt::print("{:<28} {:<44} {:>9.3f}  {:>17}  {:>17}  {}\n", row.name, row.shape, 1e3 * row.seconds,
@@ -83,6 +86,7 @@ ordered_json toJson(const Roofline& roofline) {
   }
   return {{"device", roofline.device},
           {"flops_per_second", roofline.limits.flops},
+          {"matrix_flops_per_second", roofline.limits.matrixFlops},
           {"streams", streams},
           {"gathers", gathers},
           {"operations", rows}};

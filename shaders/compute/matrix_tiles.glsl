@@ -2,7 +2,7 @@
 // Defines: kTileRows, kTileColumns, kTileDepth, which divide 16; kSubgroupSize, kSubgroups of a workgroup, kThreads,
 // kSubgroup, kLane, subgroupWait(); TileA (rows × depth), TileB (depth × columns), TileSum (rows × columns); LOAD_A(),
 // LOAD_B(), CLEAR_SUM(), MULTIPLY_ADD(), STORE_SUM(), CONVERT_AND_STORE(). `element` and `stride` are in numbers of
-// `array`, multiples of 8. All invocations of a workgroup call these together.
+// `array`, multiples of 8. All invocations of a workgroup call subgroupWait() together, those of a subgroup all else.
 //
 // By VK_KHR_cooperative_matrix (TESSERA_KHR_MATRICES), by VK_NV_cooperative_matrix, or, with TESSERA_EMULATED_MATRICES, by
 // loops over what each lane holds, so that kernels which use them can be tested on any device.
@@ -15,8 +15,6 @@ layout(local_size_x_id = 7) in;  // kThreads
 
 const uint kSubgroups = 4;
 const uint kThreads = kSubgroups * kSubgroupSize;
-
-float atLeast(float x, float least) { return x < least ? least : x; }  // what is no number stays none
 
 #ifdef TESSERA_EMULATED_MATRICES
 // A lane holds one row of A, some columns of B, and where they meet so many sums. Callers know no `nth` and no `inner`.

@@ -64,8 +64,9 @@ void backward(MlpBackwardArguments a, float scale, uint firstSample, uint sample
 
 void main() {
   CountArguments count = arguments.values.last.samples;
+  const uint begin = firstOf(count), samples = endOf(count);
+  if (begin + gl_WorkGroupID.x * kBlock >= samples) return;
   const float scale = lossScale(arguments.values.largest, arguments.values.largestCount);
   inputScale = 1 / scale;
-  const uint begin = firstOf(count), samples = endOf(count);
   FOR_EACH_BLOCK(firstSample, begin, samples) backward(arguments.values, scale, firstSample, samples);
 }

@@ -16,7 +16,8 @@ void main() {
   float most = 0;
   FOR_EACH_ROW(row, a.last.samples) {
     for (uint column = 0; column < a.last.gradients.columns; ++column) {
-      most = max(most, abs(outputGradient(a.last, row, column)));
+      const float size = abs(outputGradient(a.last, row, column));
+      most = max(most, isNoNumber(size) ? uintBitsToFloat(0x7f800000u) : size);
     }
   }
   largest[gl_LocalInvocationIndex] = most;

@@ -1,5 +1,5 @@
 // What mlp_tile.glsl does, by cooperative matrices: each of four subgroups sums tiles of the block. The weights
-// come from device memory straight away (fp16, see halve_weights.comp), each once a block, or once a row of subgroups.
+// come from device memory straight away (fp16, see halve_numbers.comp), each once a block, or once a row of subgroups.
 // Include after number.glsl. Defines: kThreads, kWidth, kBlock, STATE(), STATE_QUAD(), KEEP_QUAD(), clearSums(),
 // accumulate(), keepSums(), giveSums(), which calls take() of the kernel.
 #include "matrix_tiles.glsl"

@@ -15,11 +15,12 @@ float outputGradient(MlpOutputArguments a, uint row, uint column) {
 
 // A power of two that brings the largest of `largest` to [64, 128): layers further back may grow it a few hundred times,
 // and what is 2⁻²⁰ of it still has all bits of fp16. Chosen from the gradients themselves, it needs neither history nor
-// steps that are thrown away. 1 where there is no list.
+// steps that are thrown away. 1 where there is no list. Where one is infinite, no number: then none is one.
 float lossScale(FloatPointer largest, uint count) {
   float most = 0;
   for (uint i = 0; i < count; ++i) most = max(most, largest.values[i]);
   const int exponent = int(floatBitsToUint(most) >> 23) - 127;
-  if (most == 0 || exponent == 128) return 1;
+  if (most == 0) return 1;
+  if (exponent == 128) return uintBitsToFloat(0x7fc00000u);
   return uintBitsToFloat(uint(clamp(6 - exponent, -100, 100) + 127) << 23);
 }

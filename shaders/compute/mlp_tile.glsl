@@ -2,7 +2,7 @@
 // through `weightTile` sixteen inputs at a time, and each invocation sums kRows samples × kColumns neurons in registers.
 // Both are kept in fours along the inputs: three loads of four numbers feed as many multiply-adds as twelve of one.
 // Include after number.glsl. Defines what mlp_matrices.glsl does: kThreads, kWidth, kBlock, STATE(), STATE_QUAD(),
-// clearSums(), accumulate(), keepSums(), giveSums(), which calls take() of the kernel.
+// KEEP_QUAD(), clearSums(), accumulate(), keepSums(), giveSums(), which calls take() of the kernel.
 
 const uint kThreads = 128;
 const uint kColumnGroups = 8;
@@ -76,7 +76,7 @@ void keepSums(bool rectified) {
   [[unroll]] for (uint r = 0; r < kRows; ++r) {
     [[unroll]] for (uint c = 0; c < kColumns; ++c) {
       const float sum = sums[r * kColumns + c];
-      STATE(sumRow(r), sumColumn(c)) = toNumber(rectified && sum < 0 ? 0 : sum);
+      STATE(sumRow(r), sumColumn(c)) = toNumber(rectified ? atLeast(sum, 0) : sum);
     }
   }
 }

@@ -20,6 +20,7 @@ shared NumberQuad beforeTile[kDepth * kQuads];
 void main() {
   MlpWeightGradientsArguments a = arguments.values;
   const uint samples = endOf(a.samples);
+  if (firstOf(a.samples) + gl_WorkGroupID.z * kDepth >= samples) return;
   const uint firstColumn = gl_WorkGroupID.x * 4 * kQuads;
   const uint firstRow = gl_WorkGroupID.y * 4 * kQuads;
   const bool ofInputs = WANTED(a.inputs.data);

@@ -59,6 +59,7 @@ void load(MlpWeightGradientsArguments a, uint first, uint samples, uint firstRow
 void main() {
   MlpWeightGradientsArguments a = arguments.values;
   const uint samples = endOf(a.samples);
+  if (firstOf(a.samples) + gl_WorkGroupID.z * kDepth >= samples) return;
   const uint firstColumn = gl_WorkGroupID.x * kColumns, firstRow = gl_WorkGroupID.y * kRows;
   const uint part = kSubgroup / kRowShares * kPart;
 

@@ -37,7 +37,7 @@ inline size_t multiplyAccumulatesOf(const MlpShape& shape) {
 }
 
 // Both take part of the rows (Count::first). Activations are [hiddenLayers][capacity][width], after ReLU, as
-// Device::keepsHalves says; they begin at a multiple of 16 bytes.
+// Device::keepsHalves says; they and weights begin at a multiple of 16 bytes.
 struct MlpForward {
   const MlpShape& shape;
   Count samples;

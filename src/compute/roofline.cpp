@@ -49,6 +49,7 @@ std::unique_ptr<MachineProbe> probeOf([[maybe_unused]] Device& device, const Dev
 MachineLimits measureLimits(MachineProbe& probe, const HashGrid& grid) {
   MachineLimits limits;
   limits.flops = probe.flops();
+  limits.matrixFlops = probe.matrixFlops();
   std::map<size_t, int> tables;
   for (const HashGridLevel& level : grid.levels) ++tables[size_t{level.entries} * grid.features * sizeof(float)];
   for (const auto& [bytes, count] : tables) limits.gathers.push_back({bytes, probe.gatherRate(bytes, count)});
@@ -58,6 +59,7 @@ MachineLimits measureLimits(MachineProbe& probe, const HashGrid& grid) {
 // The higher of two measurements: a limit taken in a disturbed moment would flatter every share.
 void raise(MachineLimits& limits, const MachineLimits& again) {
   limits.flops = std::max(limits.flops, again.flops);
+  limits.matrixFlops = std::max(limits.matrixFlops, again.matrixFlops);
   for (size_t i = 0; i < limits.gathers.size(); ++i) {
     limits.gathers[i].lookups = std::max(limits.gathers[i].lookups, again.gathers[i].lookups);
   }

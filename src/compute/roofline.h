@@ -34,7 +34,8 @@ struct RooflineOptions {
 
 // Of all threads, or the whole card. Zero where it is not measured: on the reference device.
 struct MachineLimits {
-  double flops = 0;  // multiply-adds on registers, 2 operations each, per second
+  double flops = 0;        // multiply-adds on registers, 2 operations each, per second
+  double matrixFlops = 0;  // MachineProbe::matrixFlops
   struct Stream {
     size_t bytes = 0;  // footprint: half of it is copied to the other half
     double rate = 0;   // bytes read + written per second

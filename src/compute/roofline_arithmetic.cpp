@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "compute/roofline_recorder.h"
 
 namespace tessera {
@@ -36,7 +38,8 @@ void measureNetwork(RooflineRecorder& recorder, const Network& network, const st
   const MlpBackward backward{
       shape, {n, {}}, inputMatrix(x), w, Matrix<float>(y, outputs), kept, Matrix<float>(dy, outputs),
       {},    dw,      inputMatrix(dx)};
-  const double flops = 2 * weights(shape) * n, limit = recorder.limits().flops;
+  const double flops = 2 * weights(shape) * n;
+  const double limit = std::max(recorder.limits().flops, recorder.limits().matrixFlops);
   const std::string where = fmt::format("{}, {} samples", title, n);
   recorder.measure(Operation::kMlpForward, {"MlpForward", where, flops, "FLOP", limit}, [&] { device.run(forward); });
   recorder.measure(Operation::kMlpBackward, {"MlpBackward", where, 2 * flops, "FLOP", limit},

@@ -182,12 +182,18 @@ GpuMatrices presentMatrices(VkPhysicalDevice device) {
   if (hasDeviceExtension(device, VK_KHR_COOPERATIVE_MATRIX_EXTENSION_NAME) &&
       knowsMatrices<VkPhysicalDeviceCooperativeMatrixFeaturesKHR>(
           device, VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_COOPERATIVE_MATRIX_FEATURES_KHR)) {
-    for (const auto& s :
-         shapesOf<VkCooperativeMatrixPropertiesKHR>(device, VK_STRUCTURE_TYPE_COOPERATIVE_MATRIX_PROPERTIES_KHR,
-                                                    vkGetPhysicalDeviceCooperativeMatrixPropertiesKHR)) {
+    const auto shapes = shapesOf<VkCooperativeMatrixPropertiesKHR>(
+        device, VK_STRUCTURE_TYPE_COOPERATIVE_MATRIX_PROPERTIES_KHR, vkGetPhysicalDeviceCooperativeMatrixPropertiesKHR);
+    // Sums are made fp16 as whole matrices: there have to be such.
+    const auto halvesLike = [&](const VkCooperativeMatrixPropertiesKHR& sums) {
+      return std::any_of(shapes.begin(), shapes.end(), [&](const VkCooperativeMatrixPropertiesKHR& s) {
+        return s.MSize == sums.MSize && s.NSize == sums.NSize && s.ResultType == VK_COMPONENT_TYPE_FLOAT16_KHR;
+      });
+    };
+    for (const auto& s : shapes) {
       if (fits(s, s.MSize, s.NSize, s.KSize) && s.AType == VK_COMPONENT_TYPE_FLOAT16_KHR &&
           s.BType == VK_COMPONENT_TYPE_FLOAT16_KHR && s.CType == VK_COMPONENT_TYPE_FLOAT32_KHR &&
-          s.ResultType == VK_COMPONENT_TYPE_FLOAT32_KHR && !s.saturatingAccumulation) {
+          s.ResultType == VK_COMPONENT_TYPE_FLOAT32_KHR && !s.saturatingAccumulation && halvesLike(s)) {
         consider(best, GpuMatrices::Kind::khr, s.MSize, s.NSize, s.KSize);
       }
     }

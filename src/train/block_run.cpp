@@ -26,8 +26,10 @@ double BlockRunOptions::plannedBytes() const {
   return memoryMiB > 0 ? memoryMiB * kMiB : static_cast<double>(usableMemoryBytes());
 }
 double BlockRunOptions::bytesForBlocks() const {
-  if (cardBytes > 0) return kShareOfCard * static_cast<double>(cardBytes);
-  return kShareOfBlocks * plannedBytes();
+  const double ofMachine = kShareOfBlocks * plannedBytes();
+  if (cardBytes == 0) return ofMachine;
+  const double ofCard = kShareOfCard * static_cast<double>(cardBytes);
+  return memoryMiB > 0 ? std::min(ofCard, ofMachine) : ofCard;
 }
 double BlockRunOptions::bytesForPhotos() const {
   return kShareOfPhotos * plannedBytes();
@@ -70,11 +72,14 @@ void sayWhatMemoryItTakes(const BlockTraining& on, const BlockRunOptions& option
   const double all = static_cast<double>(decodedBytes(capture, capture.photosIn(Split::train)));
   const double photos = needs.photoBudgetMiB > 0 ? std::min(all, needs.photoBudgetMiB * kMiB) : all;
   const double bytes = kHeap * (static_cast<double>(residentBytes()) + photos + kCheckpoint * needs.bytesPerBlock);
-  const std::string ofCard =
-      card.bytes == 0 ? ""
-                      : fmt::format(", and {:.0f} of the card's {:.0f} MiB", static_cast<double>(card.inUse) / kMiB,
-                                    static_cast<double>(card.bytes) / kMiB);
-  inform("memory: at most {:.0f} MiB{}{}", bytes / kMiB, ofCard, needs.how);
+  std::string ofCard;
+  if (card.bytes > 0) {
+    ofCard = fmt::format("; {:.0f} of the card's {:.0f} MiB before the first step",
+                         static_cast<double>(card.inUse) / kMiB, static_cast<double>(card.bytes) / kMiB);
+  }
+  inform("memory: at most {:.0f} MiB{}{}", bytes / kMiB, needs.how, ofCard);
+  if (card.inUse > card.bytes)
+    warn("the card has less: what does not fit lies in the machine's memory; {}", needs.remedy);
   if (bytes <= options.plannedBytes()) return;
   warn("that is more than the {:.0f} MiB there are; {}", options.plannedBytes() / kMiB, needs.remedy);
 }

@@ -19,13 +19,17 @@ TEST(BlockRun, PlansBlocksAndPhotosWithinTheMachinesMemory) {
   EXPECT_LT(options.bytesForBlocks() + options.bytesForPhotos(), 1000 * 1048576.0);
 }
 
-// A large machine with a small card, and the reverse.
 TEST(BlockRun, PlansBlocksWithinTheMemoryOfTheCardThatTrainsThem) {
-  for (const double machine : {64000.0, 1000.0}) {
-    const BlockRunOptions options = planned(machine, uint64_t{4} << 30);
-    EXPECT_EQ(options.bytesForBlocks(), static_cast<double>(uint64_t{2} << 30));
-    EXPECT_EQ(options.bytesForPhotos(), planned(machine, 0).bytesForPhotos());
+  for (const uint64_t gibibytes : {1, 1000}) {
+    const BlockRunOptions options = planned(0, gibibytes << 30);
+    EXPECT_EQ(options.bytesForBlocks(), static_cast<double>(gibibytes << 29));
+    EXPECT_GT(options.bytesForPhotos(), 0);
   }
+}
+
+TEST(BlockRun, PlansNoMoreOnACardThanItIsToldTo) {
+  EXPECT_EQ(planned(1000, uint64_t{100} << 30).bytesForBlocks(), planned(1000, 0).bytesForBlocks());
+  EXPECT_LT(planned(100000, uint64_t{1} << 30).bytesForBlocks(), planned(100000, 0).bytesForBlocks());
 }
 
 }  // namespace

@@ -229,26 +229,34 @@ TEST(NetworksInHalves, PassOnGradientsThatAreNoNumbers) {
   const auto context = openForTest();
   SKIP_WITHOUT_VULKAN(context);
   if (!context->features().float16) GTEST_SKIP() << context->name() << " has no fp16";
-  const std::unique_ptr<Device> device = makeVulkanDevice();
   const MlpShape shape = {.inputs = 16, .width = 16, .hiddenLayers = 1, .outputs = 16};
-  auto input = device->arrayOf(std::vector<float>(16, 1.0f)), output = device->array<float>(16);
-  auto weights = device->arrayOf(std::vector<float>(shape.parameters(), 0.1f));
-  auto weightGradients = device->array<float>(shape.parameters());
-  auto outputGradients = device->arrayOf(std::vector<float>(16, NAN));
-  auto activations = device->activationsOf(shape, 1);
-  const Matrix<float> inputMatrix(input, 16), outputMatrix(output, 16), gradientMatrix(outputGradients, 16);
-  device->run(MlpForward{shape, {1, {}}, inputMatrix, weights.all(), outputMatrix, activations});
-  device->run(MlpBackward{shape,
-                          {1, {}},
-                          inputMatrix,
-                          weights.all(),
-                          outputMatrix,
-                          activations.all(),
-                          gradientMatrix,
-                          {},
-                          weightGradients,
-                          {}});
-  EXPECT_FALSE(std::isfinite(device->read(weightGradients.all())[0]));
+  for (const bool emulated : {false, true}) {
+    const std::unique_ptr<Device> device = emulated ? makeVulkanDeviceWithEmulatedMatrices({}, {}) : makeVulkanDevice();
+    for (const float wrong : {NAN, INFINITY, -INFINITY}) {
+      std::vector<float> upstream(16, 1.0f);
+      upstream[3] = wrong;
+      auto input = device->arrayOf(std::vector<float>(16, 1.0f)), output = device->array<float>(16);
+      auto weights = device->arrayOf(std::vector<float>(shape.parameters(), 0.1f));
+      auto weightGradients = device->array<float>(shape.parameters());
+      auto outputGradients = device->arrayOf(upstream);
+      auto activations = device->activationsOf(shape, 1);
+      const Matrix<float> inputMatrix(input, 16), outputMatrix(output, 16), gradientMatrix(outputGradients, 16);
+      device->run(MlpForward{shape, {1, {}}, inputMatrix, weights.all(), outputMatrix, activations});
+      device->run(MlpBackward{shape,
+                              {1, {}},
+                              inputMatrix,
+                              weights.all(),
+                              outputMatrix,
+                              activations.all(),
+                              gradientMatrix,
+                              {},
+                              weightGradients,
+                              {}});
+      const std::vector<float> found = device->read(weightGradients.all());
+      EXPECT_FALSE(std::isfinite(found[0])) << wrong << ", first layer, emulated: " << emulated;
+      EXPECT_FALSE(std::isfinite(found[shape.weightOffset(1) + 3 * shape.width])) << wrong << ", last layer";
+    }
+  }
 }
 
 }  // namespace

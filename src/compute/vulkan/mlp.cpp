@@ -84,14 +84,19 @@ class Places {
 
 }  // namespace
 
+std::vector<uint32_t> VulkanDevice::matrixConstants(std::vector<uint32_t> own, const GpuMatrices& matrices) {
+  constexpr uint32_t kSubgroups = 4;  // of a workgroup
+  own.resize(3);
+  own.insert(own.end(), {matrices.subgroupSize, matrices.rows, matrices.columns, matrices.depth,
+                         kSubgroups * matrices.subgroupSize});
+  return own;
+}
+
 const GpuKernel& VulkanDevice::mlpKernel(const MlpForms& forms, std::vector<uint32_t> constants) {
   const std::span<const uint32_t> spirv = forms[static_cast<size_t>(mlpArithmetic_)];
   CHECK(!spirv.empty());
   if (!multipliesMatrices()) return kernel(spirv, std::move(constants));
-  constexpr uint32_t kSubgroups = 4;  // of a workgroup, see matrix_tiles.glsl
-  constants.resize(3);
-  constants.insert(constants.end(), {matrices_.subgroupSize, matrices_.rows, matrices_.columns, matrices_.depth,
-                                     kSubgroups * matrices_.subgroupSize});
+  constants = matrixConstants(std::move(constants), matrices_);
   const bool isEmulated = mlpArithmetic_ == MlpArithmetic::emulatedMatrices;
   return kernel(spirv, std::move(constants), isEmulated ? 0 : matrices_.subgroupSize);
 }

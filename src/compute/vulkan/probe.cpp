@@ -9,7 +9,11 @@
 #include "shaders/compute/arguments_probe.h"
 #include "shaders/probe_flops.h"
 #include "shaders/probe_gather.h"
+#include "shaders/probe_matrices_nv.h"
 #include "shaders/probe_stream.h"
+#ifdef TESSERA_KHR_MATRICES
+#include "shaders/probe_matrices_khr.h"
+#endif
 
 namespace tessera {
 namespace {
@@ -26,7 +30,18 @@ class VulkanProbe final : public MachineProbe {
         gather_(context_, kProbeGatherSpirv),
         copy_(context_, kProbeStreamSpirv),
         sink_(context_, 16),
-        stream_(context_) {}
+        stream_(context_) {
+    const GpuMatrices& matrices = context_->matrices();
+    std::span<const uint32_t> spirv;
+    if (matrices.kind == GpuMatrices::Kind::nv) spirv = kProbeMatricesNvSpirv;
+#ifdef TESSERA_KHR_MATRICES
+    if (matrices.kind == GpuMatrices::Kind::khr) spirv = kProbeMatricesKhrSpirv;
+#endif
+    if (!spirv.empty()) {
+      matrices_ = std::make_unique<GpuKernel>(context_, spirv, VulkanDevice::matrixConstants({}, matrices),
+                                              matrices.subgroupSize);
+    }
+  }
 
   double flops() override {
     constexpr uint32_t kGroups = 8192;
@@ -37,6 +52,20 @@ class VulkanProbe final : public MachineProbe {
       queue(multiplyAdds_, arguments, kGroups);
     };
     return rate(run, kMostRounds, 2.0 * 16 * kThreads * kGroups);
+  }
+
+  double matrixFlops() override {
+    if (!matrices_) return 0;
+    constexpr uint32_t kGroups = 8192;
+    const GpuMatrices& shape = context_->matrices();
+    arguments::ProbeArguments arguments = {};
+    arguments.to = sink_.address();
+    const auto run = [&](uint32_t rounds) {
+      arguments.rounds = rounds;
+      queue(*matrices_, arguments, kGroups);
+    };
+    constexpr double kSubgroups = 4, kSums = 4;  // probe_matrices.comp
+    return rate(run, kMostRounds, 2.0 * shape.rows * shape.columns * shape.depth * kSums * kSubgroups * kGroups);
   }
 
   double gatherRate(size_t bytes, int) override {
@@ -106,6 +135,7 @@ class VulkanProbe final : public MachineProbe {
 
   std::shared_ptr<const GpuContext> context_;
   GpuKernel multiplyAdds_, gather_, copy_;
+  std::unique_ptr<GpuKernel> matrices_;  // null where the device multiplies none
   GpuBuffer sink_;
   GpuStream stream_;  // waits before the others go
 };

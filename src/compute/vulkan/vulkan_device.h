@@ -37,6 +37,9 @@ class VulkanDevice : public Device {
   VulkanDevice(std::shared_ptr<const GpuContext> context, MlpArithmetic arithmetic, const GpuMatrices& matrices);
   ~VulkanDevice() override;  // with TESSERA_GPU_TIMES=1 in the environment, says what each operation took on the device
 
+  // The specialization constants of a kernel that includes matrix_tiles.glsl: its own three, then those of that.
+  static std::vector<uint32_t> matrixConstants(std::vector<uint32_t> own, const GpuMatrices& matrices);
+
   const std::shared_ptr<const GpuContext>& context() const { return stream_->context(); }
   const GpuStream& stream() const { return *stream_; }
 
