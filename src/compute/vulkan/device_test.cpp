@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <ostream>
 #include <string_view>
 #include <tuple>
 
@@ -181,6 +182,9 @@ struct HalfArithmetic {
   const char* name;
   std::optional<GpuMatrices> emulated = {};  // matrices that the device would have
 };
+void PrintTo(const HalfArithmetic& arithmetic, std::ostream* out) {
+  *out << arithmetic.name;
+}
 
 class HalfNetworks : public testing::TestWithParam<std::tuple<HalfArithmetic, float>> {
  protected:
