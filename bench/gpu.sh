@@ -39,11 +39,11 @@ cp -L "$loader" "$bundle/lib/libvulkan.so.1"
 cp bench/gpu_run.sh "$bundle/run.sh"
 cp LICENSE "$bundle/"
 echo "$commit" > "$bundle/commit"
-find "$bundle" -type f \( -path '*/bin/*' -o -path '*/lib*/*' \) -exec objdump -T {} + 2> /dev/null |
+find "$bundle/bin" "$bundle/lib" -type f -exec objdump -T {} + 2> /dev/null |
   grep -o 'GLIBC_2\.[0-9]*' | sort -Vu | tail -1 | sed 's/GLIBC_//' > "$bundle/glibc"
 tar -C "$work" --sort=name -c "$(basename "$bundle")" | gzip -9 > "$bundle.tar.gz"
 megabytes=$(awk -v b="$(stat -c %s "$bundle.tar.gz")" 'BEGIN { printf "%.1f", b / 1e6 }')
-echo "$bundle.tar.gz: needs a driver, and brings glibc $(cat "$bundle/glibc") for machines with an older one"
+echo "$bundle.tar.gz: needs a driver, and brings its own glibc for machines whose is older than $(cat "$bundle/glibc")"
 verdict "megabytes of the bundle" "$megabytes" '<=' 60
 [ -n "${ONLY_PACK:-}" ] || "$bundle/run.sh" "$work"
 finish
