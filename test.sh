@@ -10,4 +10,4 @@ tools/build.sh "$preset"
 ctest --preset "$preset" --parallel "$(nproc)" --output-on-failure
 tools/build-web.sh
 export TESSERA=$PWD/build/$preset/apps/tessera/tessera
-(cd web && xvfb-run -a npm test --silent)
+(cd web && xvfb-run -a -s "-screen 0 1280x1024x24 -noreset" npm test --silent)

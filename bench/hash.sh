@@ -132,7 +132,7 @@ browser() {
   export SCENES="$place/fox.scene $place/fox $place/city.scene $place/city" OUT=$place/browser
   TESSERA=$(realpath "$tessera")
   export TESSERA
-  (cd web && xvfb-run -a npx vitest run bench/hash.ts --config vitest.bench.config.ts --disable-console-intercept) || failures=$((failures + 1))
+  (cd web && xvfb-run -a -s "-screen 0 1280x1024x24 -noreset" npx vitest run bench/hash.ts --config vitest.bench.config.ts --disable-console-intercept) || failures=$((failures + 1))
 }
 
 for row in ${ROWS:-photographs scene ablation distortion browser}; do "$row"; done

@@ -27,5 +27,5 @@ TESSERA=$(realpath "$tessera")
 export MERF_NEAR TESSERA MERF_WORK=$PWD/$work
 tools/install-debian-packages.sh --browser
 tools/build-web.sh
-cd web && xvfb-run -a npx vitest run bench/merf.ts --config vitest.bench.config.ts --disable-console-intercept 2>&1 |
+cd web && xvfb-run -a -s "-screen 0 1280x1024x24 -noreset" npx vitest run bench/merf.ts --config vitest.bench.config.ts --disable-console-intercept 2>&1 |
   tee "../$out/merf_viewer.txt"

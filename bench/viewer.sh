@@ -16,5 +16,5 @@ FINEST_BYTES=$("$tessera" info "$LARGE_SCENE" --json | jq .level_0.bytes_in_memo
 export FINEST_BYTES
 tools/install-debian-packages.sh --browser
 tools/build-web.sh
-cd web && xvfb-run -a npx vitest run bench/viewer.ts --config vitest.bench.config.ts --disable-console-intercept 2>&1 |
+cd web && xvfb-run -a -s "-screen 0 1280x1024x24 -noreset" npx vitest run bench/viewer.ts --config vitest.bench.config.ts --disable-console-intercept 2>&1 |
   tee "../$out/viewer.txt"

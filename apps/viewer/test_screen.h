@@ -24,8 +24,9 @@ class TestScreen {
       prctl(PR_SET_PDEATHSIG, SIGKILL);
       close(ends[0]);
       const std::string number = std::to_string(ends[1]);
-      execlp("Xvfb", "Xvfb", "-displayfd", number.c_str(), "-screen", "0", "1600x1200x24", "-nolisten", "tcp",
-             static_cast<char*>(nullptr));
+      // -noreset: else it starts anew whenever its last window closes, and refuses the next one meanwhile.
+      execlp("Xvfb", "Xvfb", "-displayfd", number.c_str(), "-screen", "0", "1600x1200x24", "-noreset", "-nolisten",
+             "tcp", static_cast<char*>(nullptr));
       _exit(127);
     }
     close(ends[1]);
