@@ -39,7 +39,8 @@ struct GpuMatrices {
   enum class Kind { none, nv, khr };  // VK_NV_cooperative_matrix; VK_KHR_cooperative_matrix, of builds that know it
   Kind kind = Kind::none;
   uint32_t rows = 16, columns = 16, depth = 16;
-  uint32_t subgroupSize = 32;  // that its kernels ask for
+  uint32_t subgroupSize = 32;                // that its kernels ask for
+  static constexpr uint32_t kSubgroups = 4;  // of a workgroup of theirs
 };
 
 struct GpuOptions {

@@ -134,7 +134,9 @@ uint32_t settledSubgroupSize(VkPhysicalDevice device) {
   sizes.pNext = &subgroup;
   vkGetPhysicalDeviceProperties2(device, &properties);
   if (!(sizes.requiredSubgroupSizeStages & VK_SHADER_STAGE_COMPUTE_BIT)) return 0;
-  return std::clamp(subgroup.subgroupSize, sizes.minSubgroupSize, sizes.maxSubgroupSize);
+  const uint32_t size = std::clamp(subgroup.subgroupSize, sizes.minSubgroupSize, sizes.maxSubgroupSize);
+  const bool fits = GpuMatrices::kSubgroups * size <= properties.properties.limits.maxComputeWorkGroupInvocations;
+  return fits ? size : 0;
 }
 
 // Both extensions say the same things by other names.

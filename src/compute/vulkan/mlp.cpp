@@ -85,10 +85,9 @@ class Places {
 }  // namespace
 
 std::vector<uint32_t> VulkanDevice::matrixConstants(std::vector<uint32_t> own, const GpuMatrices& matrices) {
-  constexpr uint32_t kSubgroups = 4;  // of a workgroup
   own.resize(3);
   own.insert(own.end(), {matrices.subgroupSize, matrices.rows, matrices.columns, matrices.depth,
-                         kSubgroups * matrices.subgroupSize});
+                         GpuMatrices::kSubgroups * matrices.subgroupSize});
   return own;
 }
 

@@ -64,8 +64,9 @@ class VulkanProbe final : public MachineProbe {
       arguments.rounds = rounds;
       queue(*matrices_, arguments, kGroups);
     };
-    constexpr double kSubgroups = 4, kSums = 4;  // probe_matrices.comp
-    return rate(run, kMostRounds, 2.0 * shape.rows * shape.columns * shape.depth * kSums * kSubgroups * kGroups);
+    constexpr double kSums = 4;  // probe_matrices.comp
+    return rate(run, kMostRounds,
+                2.0 * shape.rows * shape.columns * shape.depth * kSums * GpuMatrices::kSubgroups * kGroups);
   }
 
   double gatherRate(size_t bytes, int) override {
