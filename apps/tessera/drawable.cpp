@@ -112,8 +112,8 @@ class DrawableScene final : public Drawable {
     settings.selection.mostPixels = options.mostPixels;
     settings.selection.finestLevel = options.level;
     settings.threads = options.threads;
-    settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB > 0 ? options.memoryMiB * 1048576
-                                                                       : static_cast<double>(usableMemoryBytes()) / 2);
+    settings.budgetBytes =
+        options.memoryMiB > 0 ? static_cast<uint64_t>(options.memoryMiB * 1048576) : sceneBudgetBytes(device);
     renderer_ = tileset_.representation == Representation::hash ? rendererOf<HashContent>(device, folder, settings)
                                                                 : rendererOf<VolumeContent>(device, folder, settings);
   }
@@ -135,6 +135,11 @@ class DrawableScene final : public Drawable {
 };
 
 }  // namespace
+
+uint64_t sceneBudgetBytes(const Device& device) {
+  const uint64_t own = device.ownMemory().bytes;
+  return (own > 0 ? own : static_cast<uint64_t>(usableMemoryBytes())) / 2;
+}
 
 std::unique_ptr<Drawable> openDrawable(Device& device, const fs::path& folder, const DrawableOptions& options) {
   if (fs::exists(folder / "tileset.json")) return std::make_unique<DrawableScene>(device, folder, options);

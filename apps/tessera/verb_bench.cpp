@@ -82,7 +82,9 @@ ordered_json toJson(const Roofline& roofline) {
                     {"rate", row.rate},
                     {"unit", row.unit + "/s"},
                     {"limit", row.limit > 0 ? ordered_json(row.limit) : ordered_json()},
-                    {"share", row.limit > 0 ? ordered_json(row.share()) : ordered_json()}});
+                    {"share", row.limit > 0 ? ordered_json(row.share()) : ordered_json()},
+                    {"memory_limit", row.memoryLimit > 0 ? ordered_json(row.memoryLimit) : ordered_json()},
+                    {"share_of_both", row.limit > 0 ? ordered_json(row.shareOfBoth()) : ordered_json()}});
   }
   return {{"device", roofline.device},
           {"flops_per_second", roofline.limits.flops},
@@ -333,15 +335,18 @@ ordered_json measureFrames(const Device& device, const fs::path& scene, const st
                            const DrawableOptions& options, double seconds) {
   std::function<void(const BenchmarkView&)> draw;
   std::function<void()> wait = [] {};
+  std::function<size_t()> refused = [] { return size_t{0}; };  // contents of the last picture: no room
   std::string name;
 #ifdef TESSERA_HAS_VULKAN
   std::unique_ptr<GpuViewRenderer> onCard;
   if (const auto context = contextOf(device)) {
     GpuRendererSettings settings;
     settings.selection.mostPixels = options.mostPixels;
+    settings.budgetBytes = sceneBudgetBytes(device);
     onCard = openGpuScene(context, scene, settings);
     draw = [&](const BenchmarkView& view) { onCard->draw(view.camera, view.worldFromCamera); };
     wait = [context] { context->waitIdle(); };
+    refused = [&] { return onCard->state().refused; };
     name = onCard->device();
   }
 #endif
@@ -360,9 +365,11 @@ ordered_json measureFrames(const Device& device, const fs::path& scene, const st
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   };
   double slowest = 0, spent = 0;
+  size_t coarser = 0;  // views
   for (const BenchmarkView& view : views) {
     draw(view);  // what it needs is loaded
     wait();
+    if (refused() > 0) ++coarser;
     slowest = std::max(slowest, std::min(timed(view), timed(view)));
   }
   uint64_t frames = 0;
@@ -378,7 +385,8 @@ ordered_json measureFrames(const Device& device, const fs::path& scene, const st
           {"height", views[0].camera.height},
           {"views", views.size()},
           {"frames_per_second", static_cast<double>(frames) / spent},
-          {"slowest_milliseconds", 1e3 * slowest}};
+          {"slowest_milliseconds", 1e3 * slowest},
+          {"views_drawn_coarser", coarser}};
 }
 
 void addBenchFrames(CLI::App& bench) {

@@ -42,7 +42,8 @@ void addRenderVerb(CLI::App& app) {
   verb->add_option("--lod", flags->level, "of a scene: the finest level of detail to draw")
       ->capture_default_str()
       ->check(CLI::Range(0, 64));
-  verb->add_option("--memory-mib", flags->memoryMiB, "of a scene: memory for its contents; 0: half of the machine's")
+  verb->add_option("--memory-mib", flags->memoryMiB,
+                   "of a scene: memory for its contents; 0: half of the machine's, or of a card's own")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1e9));
   addDeviceFlags(*verb, flags->device);

@@ -114,8 +114,11 @@ void waitForModel(const fs::path& folder) {
 
 std::unique_ptr<PictureSource> openPictures(const ViewOptions& options,
                                             const std::shared_ptr<const GpuContext>& window) {
-  // The card may have no screen, and the window be shown by another device.
-  const bool isMeant = vulkanDeviceOf(options.device.kind) && (options.device.kind != "auto" || !window->isProcessor());
+  // The card may have no screen, and the window be shown by a driver for the processor: that is meant only where it is
+  // named, or where there is no card.
+  const std::string& kind = options.device.kind;
+  const bool isMeant =
+      vulkanDeviceOf(kind) && (!window->isProcessor() || kind.starts_with("vulkan:") || !vulkanDeviceOf("auto"));
   if (isScene(options.folder) && isMeant) {
     GpuRendererSettings settings;
     settings.selection.mostPixels = options.mostPixels;

@@ -129,6 +129,23 @@ Made samplesOf(BlockSamplesArguments a, Ray ray, uint firstRow, uint firstSegmen
   return made;
 }
 
+// Whatever a driver rounds otherwise in the second run: each row and segment that was counted is written.
+void closeRows(BlockSamplesArguments a, Ray ray, uint row, uint segment) {
+  for (; row < ray.endRow; ++row) {
+    a.blockOfSample.values[row] = 0;
+    storePoint(a.positions, row, vec3(0));
+    a.distances.values[row] = a.steps.values[row] = 0;
+    if (WANTED(a.middles)) a.middles.values[row] = 0;
+    if (WANTED(a.widths)) a.widths.values[row] = 0;
+    if (WANTED(a.runtimeSteps)) a.runtimeSteps.values[row] = 0;
+  }
+  for (; segment < ray.endSegment; ++segment) {
+    a.firstSampleOfSegment.values[segment] = ray.endRow;
+    a.groupOfSegment.values[segment] = 0;
+    a.rayOfSegment.values[segment] = ray.index;
+  }
+}
+
 Ray rayAt(BlockSamplesArguments a, uint index) {
   Ray ray;
   ray.index = index;
@@ -163,7 +180,8 @@ void main() {
       Ray ray = rayAt(a, index);
       ray.endRow = kSplit ? a.firstRow + a.sampleCounts.values[index] : firstRow + a.intervals;
       ray.endSegment = kSplit ? a.segmentCounts.values[index] : 0;
-      samplesOf(a, ray, firstRow, firstSegment);
+      const Made made = samplesOf(a, ray, firstRow, firstSegment);
+      closeRows(a, ray, firstRow + made.samples, firstSegment + made.segments);
       continue;
     }
     a.rowCount.values[0] = firstRow;

@@ -44,6 +44,13 @@ void store(MarchBlocksArguments a, Ray ray, uint row, uint slot, DomainPiece s, 
   a.widths.values[row] = float(end - begin);
 }
 
+void storeNothing(MarchBlocksArguments a, Ray ray, uint row) {
+  a.march.rayOfSample.values[row] = ray.index;
+  a.slotOfSample.values[row] = 0;
+  storePoint(a.march.positions, row, vec3(0));
+  a.march.distances.values[row] = a.march.steps.values[row] = a.middles.values[row] = a.widths.values[row] = 0;
+}
+
 // Intervals [from, count) of a piece.
 void marchPiece(MarchBlocksArguments a, Ray ray, DomainPiece s, real all, uint slot, uint from, uint count,
                 inout State state) {
@@ -185,7 +192,10 @@ void main() {
     Ray ray = rayAt(a, index);
     ray.row = first;
     ray.endRow = end;
-    if (end > first) march(a, ray);
+    if (end > first) {
+      // Whatever a driver rounds otherwise in the second run: each row that was counted is written.
+      for (uint row = first + march(a, ray).samples; row < end; ++row) storeNothing(a, ray, row);
+    }
     if (WANTED(a.march.nextStep)) a.march.nextStep.values[index] = a.march.nexts.values[index];
   }
 }

@@ -118,7 +118,10 @@ void main() {
     const uint first = ray == 0 ? 0 : a.march.counts.values[ray - 1], end = a.march.counts.values[ray];
     a.march.firstSample.values[ray + 1] = fits ? end : a.march.sampleCount.values[0];
     if (!fits) continue;
-    if (end > first) march(a, ray, first, end);
+    if (end > first) {
+      // Whatever a driver rounds otherwise in the second run: each row that was counted is written.
+      for (uint row = first + march(a, ray, first, end).samples; row < end; ++row) store(a, ray, row, realVec3(0), 0, 0);
+    }
     if (WANTED(a.march.nextStep)) a.march.nextStep.values[ray] = a.march.nexts.values[ray];
   }
 }

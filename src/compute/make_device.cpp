@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/log.h"
 #include "compute/cpu/device.h"
 #include "compute/device.h"
 #include "compute/reference/device.h"
@@ -53,7 +54,12 @@ std::unique_ptr<Device> makeDevice(const DeviceOptions& options) {
   if (const std::optional<std::string> device = vulkanDeviceOf(kind)) {
     GpuOptions gpu;
     gpu.device = *device;
-    return makeVulkanDevice(gpu);
+    try {
+      return makeVulkanDevice(gpu);
+    } catch (const Error& error) {
+      if (kind != "auto") throw;
+      warn("{}; goes on with the processor", error.what());
+    }
   }
 #endif
   if (kind == "cpu" || kind == "auto") return makeCpuDevice(options.threads);

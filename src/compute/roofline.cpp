@@ -89,7 +89,7 @@ void RooflineRecorder::measure(Operation operation, Work work, const std::functi
     spent += seconds;
   }
   rows_.push_back({operation, std::move(work.name), std::move(work.shape), best, work.amount / best,
-                   std::move(work.unit), work.limit});
+                   std::move(work.unit), work.limit, work.memoryLimit});
 }
 
 void RooflineRecorder::measureStream(Operation operation, std::string shape, double bytes,

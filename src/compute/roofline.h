@@ -2,7 +2,9 @@
 // (Williams et al. 2009, the roofline model). What is counted:
 //
 //   networks       2 · parameters · samples forward (a multiply and an add a weight), twice that backward (the gradient
-//                  of the weights and that of the inputs); padding of inputs and outputs is not counted
+//                  of the weights and that of the inputs); padding of inputs and outputs is not counted. Beside the
+//                  arithmetic's limit (the matrix units', where there are any) memory's: as much as is done while inputs,
+//                  outputs and what is kept of activations are copied, and backward their gradients
 //   hash grid      8 corners · levels · samples lookups, forward (read) as backward (read, add, write)
 //   virtual grid   20 corners · samples lookups; the limit is the lower of two rates: gathers from a table of what the
 //                  corners are looked up in (a bit each of all texels to find those needed, 8 bytes each of those
@@ -18,6 +20,7 @@
 // Every time is the best of several: what the code can do, not what the machine was disturbed to.
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -55,7 +58,14 @@ struct RooflineRow {
   double rate = 0;     // per second
   std::string unit;    // "FLOP", "lookup", "B"
   double limit = 0;    // per second; 0: not known
+  // Likewise, while the arguments are copied once: of networks, which small ones never reach the arithmetic's limit for.
+  double memoryLimit = 0;
   double share() const { return limit > 0 ? rate / limit : 0; }
+  // Of the lower of both.
+  double shareOfBoth() const {
+    const double lower = memoryLimit > 0 ? std::min(limit, memoryLimit) : limit;
+    return lower > 0 ? rate / lower : 0;
+  }
 };
 
 struct Roofline {

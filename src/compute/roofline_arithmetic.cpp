@@ -41,10 +41,17 @@ void measureNetwork(RooflineRecorder& recorder, const Network& network, const st
   const double flops = 2 * weights(shape) * n;
   const double limit = std::max(recorder.limits().flops, recorder.limits().matrixFlops);
   const std::string where = fmt::format("{}, {} samples", title, n);
-  recorder.measure(Operation::kMlpForward, {"MlpForward", where, flops, "FLOP", limit}, [&] { device.run(forward); });
-  recorder.measure(Operation::kMlpBackward, {"MlpBackward", where, 2 * flops, "FLOP", limit},
+  const double in = sizeof(float) * static_cast<double>(n) * inputs;
+  const double out = sizeof(float) * static_cast<double>(n) * outputs;
+  const double forwardBytes = in + out + static_cast<double>(kept.size()) * sizeof(float);
+  const double backwardBytes = forwardBytes + out + in;
+  const auto work = [&](const char* name, double amount, double bytes) {
+    return RooflineRecorder::Work{name, where, amount, "FLOP", limit, amount / bytes * recorder.streamLimit(bytes)};
+  };
+  recorder.measure(Operation::kMlpForward, work("MlpForward", flops, forwardBytes), [&] { device.run(forward); });
+  recorder.measure(Operation::kMlpBackward, work("MlpBackward", 2 * flops, backwardBytes),
                    [&] { device.run(backward); });
-  recorder.measure(Operation::kMlpBackward, {"Mlp both", where, 3 * flops, "FLOP", limit}, [&] {
+  recorder.measure(Operation::kMlpBackward, work("Mlp both", 3 * flops, forwardBytes + backwardBytes), [&] {
     device.run(forward);
     device.run(backward);
   });

@@ -21,6 +21,7 @@ class RooflineRecorder {
     double amount = 0;  // of one run
     std::string unit;
     double limit = 0;
+    double memoryLimit = 0;
   };
   // Times `run` and adds a row, unless the device lacks the operation.
   void measure(Operation operation, Work work, const std::function<void()>& run);

@@ -43,6 +43,8 @@ TEST(Roofline, HoldsEveryOperationOfAGraphicsCardAgainstWhatTheCardCanDo) {
   std::set<Operation> measured;
   for (const RooflineRow& row : roofline.rows) {
     EXPECT_GT(row.limit, 0) << row.name;
+    EXPECT_EQ(row.memoryLimit > 0, row.name.starts_with("Mlp")) << row.name;
+    EXPECT_GE(row.shareOfBoth(), row.share()) << row.name;
     measured.insert(row.operation);
   }
   EXPECT_EQ(measured.size(), std::size(kOperationNames));

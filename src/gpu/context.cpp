@@ -124,7 +124,11 @@ std::vector<GpuDescription> GpuContext::devices() {
     made.isProcessor = device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
     made.isDiscrete = device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
     made.missing = device.missing;
-    if (made.missing.empty()) made.features = presentFeatures(device.handle);
+    try {
+      if (made.missing.empty()) made.features = presentFeatures(device.handle);
+    } catch (const Error& error) {  // of this driver alone
+      made.missing = error.reason();
+    }
     VkPhysicalDeviceMemoryProperties memory = {};
     vkGetPhysicalDeviceMemoryProperties(device.handle, &memory);
     made.memoryBytes = largestHeap(memory);
@@ -167,6 +171,12 @@ void GpuContext::choosePhysicalDevice(const std::string& wanted) {
   name_ = fmt::format("{} ({})", chosen.properties.deviceName, chosen.driver);
   target_ = fmt::format("vulkan/{}/{}", chosen.properties.deviceName, chosen.driver);
   vkGetPhysicalDeviceMemoryProperties(physicalDevice_, &memory_);
+  auto allocations =
+      vulkanStruct<VkPhysicalDeviceMaintenance3Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES);
+  auto properties = vulkanStruct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
+  properties.pNext = &allocations;
+  vkGetPhysicalDeviceProperties2(physicalDevice_, &properties);
+  largestAllocation_ = allocations.maxMemoryAllocationSize;
 }
 
 void GpuContext::chooseQueueFamily() {
@@ -272,6 +282,14 @@ uint32_t GpuContext::memoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted,
     }
   }
   throw Error(name_, "", "it has no memory of the kind we need", "update the graphics driver");
+}
+
+uint32_t GpuContext::typesOfSameHeap(uint32_t type) const {
+  uint32_t types = 0;
+  for (uint32_t i = 0; i < memory_.memoryTypeCount; ++i) {
+    if (memory_.memoryTypes[i].heapIndex == memory_.memoryTypes[type].heapIndex) types |= 1u << i;
+  }
+  return types;
 }
 
 int GpuContext::validationMessages() {

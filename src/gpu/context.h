@@ -97,6 +97,8 @@ class GpuContext {
 
   // The first memory type among `typeBits` that has all `wanted` properties, those with `preferred` first.
   uint32_t memoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted, VkMemoryPropertyFlags preferred) const;
+  uint32_t typesOfSameHeap(uint32_t type) const;  // as bits, itself among them
+  uint64_t largestAllocation() const { return largestAllocation_; }
 
   // Mistakes that the validation layers reported so far in this process, warnings too.
   static int validationMessages();
@@ -118,6 +120,7 @@ class GpuContext {
   uint32_t queueFamily_ = 0, timestampBits_ = 0;
   VkPhysicalDeviceLimits limits_ = {};
   VkPhysicalDeviceMemoryProperties memory_ = {};
+  uint64_t largestAllocation_ = 0;
   bool isProcessor_ = false, isDiscrete_ = false;
   GpuFeatures features_;
   GpuMatrices matrices_;

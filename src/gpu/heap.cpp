@@ -66,7 +66,11 @@ std::unique_ptr<GpuHeap::Block> GpuHeap::makeBlock(size_t bytes, BufferUse use) 
   info.size = bytes;
   info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT |
                VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
-  const std::string wanted = fmt::format("{} MiB more, with {} MiB in use", bytes >> 20, inUse_ >> 20);
+  std::string wanted = fmt::format("{} MiB more, with {} MiB in use", bytes >> 20, inUse_ >> 20);
+  if (bytes > context_.largestAllocation()) {
+    wanted += fmt::format(" (and at most {} MiB at once, says the driver)", context_.largestAllocation() >> 20);
+    checkVulkan(VK_ERROR_OUT_OF_DEVICE_MEMORY, wanted.c_str());
+  }
   checkVulkan(vkCreateBuffer(device, &info, nullptr, &block->buffer), wanted.c_str());
 
   VkMemoryRequirements needs = {};
@@ -79,8 +83,10 @@ std::unique_ptr<GpuHeap::Block> GpuHeap::makeBlock(size_t bytes, BufferUse use) 
   const Kind kind = kindOf(use);
   allocation.memoryTypeIndex = context_.memoryType(needs.memoryTypeBits, kind.wanted, kind.preferred);
   VkResult result = vkAllocateMemory(device, &allocation, nullptr, &block->memory);
-  if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY) {  // of the preferred kind; another may do
-    allocation.memoryTypeIndex = context_.memoryType(needs.memoryTypeBits, kind.wanted, 0);
+  // What the host writes may lie with the host. What kernels work on may not: many times slower, nobody would know why.
+  const uint32_t elsewhere = needs.memoryTypeBits & ~context_.typesOfSameHeap(allocation.memoryTypeIndex);
+  if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY && use != BufferUse::device && elsewhere != 0) {
+    allocation.memoryTypeIndex = context_.memoryType(elsewhere, kind.wanted, 0);
     result = vkAllocateMemory(device, &allocation, nullptr, &block->memory);
   }
   checkVulkan(result, wanted.c_str());

@@ -307,6 +307,15 @@ void GpuStream::retire(GpuBuffer buffer) {
   if (buffer) listing().retired.push_back(std::move(buffer));
 }
 
+GpuBuffer GpuStream::makeBuffer(size_t bytes) {
+  try {
+    return GpuBuffer(context_, bytes);
+  } catch (const Error&) {
+    finish();
+    return GpuBuffer(context_, bytes);
+  }
+}
+
 void GpuStream::measure(bool on) {
   finish();
   if (on && context_->timestampBits() == 0) {

@@ -56,6 +56,8 @@ class GpuStream {
   void finish();
   // Destroys the buffer once nothing queued so far can touch it.
   void retire(GpuBuffer buffer);
+  // A buffer of the device's; where memory is short, once what has been retired is gone. Throws Error.
+  GpuBuffer makeBuffer(size_t bytes);
 
   // What each label's commands took on the device since `measure(true)`. Batches are then recorded anew each time.
   struct Measured {
@@ -63,6 +65,7 @@ class GpuStream {
     uint64_t commands = 0;
   };
   void measure(bool on);
+  bool isMeasuring() const { return measuring_; }
   void label(std::string_view name) { label_ = name; }             // of what comes next; outlives the stream
   const std::map<std::string, Measured, std::less<>>& measured();  // waits
 

@@ -12,6 +12,7 @@
 #include <tuple>
 
 #include "base/random.h"
+#include "compute/cpu/device.h"
 #include "compute/reference/functions.h"
 #include "gpu/test_context.h"
 
@@ -141,6 +142,29 @@ TEST_P(VulkanDeviceTest, LosesNoGradientWhereManySamplesMeet) {
 
 TEST_P(VulkanDeviceTest, RunsEveryWidthOfNetworks) {
   runEveryWidth(*device_, 1, 1e-4);
+}
+
+// Whether all, some or none of a round of exchanges is left, and whether the rays fit in shared memory.
+TEST_P(VulkanDeviceTest, TakesPatchesOfAnyNumberOfRays) {
+  const std::unique_ptr<Device> cpu = makeCpuDevice(2);
+  for (const uint32_t rays : {16u, 257u, 5001u, 20000u}) {
+    SCOPED_TRACE(rays);
+    const auto predicted = randomFloats(3 * rays, 0, 1, 21), target = randomFloats(3 * rays, 0, 1, 22);
+    const auto gradientsOn = [&](Device& device) {
+      auto there = device.arrayOf(predicted), wanted = device.arrayOf(target);
+      auto loss = device.array<float>(1), gradients = device.array<float>(3 * rays);
+      device.run(S3imLoss{.rays = {rays, {}},
+                          .patches = 3,
+                          .seed = 23,
+                          .predicted = there,
+                          .target = wanted,
+                          .weights = {},
+                          .loss = loss,
+                          .gradients = gradients});
+      return device.read(gradients.all());
+    };
+    expectNear(gradientsOn(*device_), doubles(gradientsOn(*cpu)), 1e-4, "gradients");
+  }
 }
 
 TEST_P(VulkanDeviceTest, MemoryMayGoWhileWorkOnItIsQueued) {

@@ -16,7 +16,7 @@ class GpuContentMemory {
  public:
   GpuContentMemory() = default;
   GpuContentMemory(std::shared_ptr<GpuStream> stream, size_t bytes)
-      : stream_(std::move(stream)), buffer_(stream_->context(), bytes) {}
+      : stream_(std::move(stream)), buffer_(stream_->makeBuffer(bytes)) {}
   ~GpuContentMemory() {
     if (buffer_) stream_->retire(std::move(buffer_));
   }

@@ -1,5 +1,11 @@
 #include "render/vulkan/gpu_picture.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "base/error.h"
 #include "shaders/begin_view.h"
 
 namespace tessera {
@@ -22,12 +28,17 @@ void GpuPicture::makeRoom(GpuBuffer& buffer, size_t floats) {
   if (buffer.bytes() >= floats * sizeof(float)) return;
   stream_->retire(std::move(buffer));
   buffer = GpuBuffer();
-  buffer = GpuBuffer(stream_->context(), floats * sizeof(float));
+  buffer = stream_->makeBuffer(floats * sizeof(float));
 }
 
 void GpuPicture::makeRoom(const Camera& camera, uint32_t numbersOfPixel) {
   pixels_.update(camera, pool_);
   const size_t pixels = static_cast<size_t>(camera.width) * camera.height;
+  constexpr size_t kMost = std::numeric_limits<uint32_t>::max();  // kernels count in 32 bits
+  if (pixels * std::max<size_t>(numbersOfPixel, kNumbersDrawn) > kMost) {
+    throw Error(fmt::format("picture of {}x{}", camera.width, camera.height), "",
+                "is too large for one on a graphics card", "ask for a smaller one, or use --device cpu");
+  }
   makeRoom(directions_, pixels * 3);
   makeRoom(opaqueDepth_, pixels);
   makeRoom(state_, pixels * numbersOfPixel);
