@@ -12,6 +12,7 @@
 #include <set>
 
 #ifdef TESSERA_HAS_VULKAN
+#include "compute/vulkan/device.h"
 #include "gpu/context.h"
 #endif
 
@@ -104,6 +105,14 @@ Outputs outputsOf(const Case& testCase, Device& device, uint64_t seed) {
 
 using OperationOnDevice = std::tuple<Row, std::string>;
 
+// Not by a driver for the processor: then exponentials and divisions may be several units in the last place off.
+bool isOnACard([[maybe_unused]] const Device& device) {
+#ifdef TESSERA_HAS_VULKAN
+  if (const auto context = contextOf(device)) return !context->isProcessor();
+#endif
+  return false;
+}
+
 class DeviceTest : public testing::TestWithParam<OperationOnDevice> {
  protected:
   void SetUp() override {
@@ -136,6 +145,7 @@ TEST_P(Values, AgreeWithTheReference) {
   ASSERT_FALSE(tests.cases.empty());
   Closeness closeness = Closeness::close;
   if (computesInHalves(std::get<1>(GetParam()))) closeness = Closeness::inHalves;
+  if (isOnACard(*device)) closeness = std::max(closeness, Closeness::inFloat);
   if (std::get<1>(GetParam()) == kWithoutDoubles) closeness = tests.decides ? Closeness::sameSize : Closeness::inFloat;
   for (size_t i = 0; i < tests.cases.size(); ++i) {
     const uint64_t seed = seedOf(operation, i);
