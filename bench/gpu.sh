@@ -3,8 +3,37 @@
 # libraries that they need, the Vulkan loader, a made city, and the glibc that the programs need, for machines with an
 # older one. Then runs it here. On another machine: tar -xzf, ./run.sh.
 #   [BUILD=build/release] [ONLY_PACK=1] bench/gpu.sh        settings of the run: bench/gpu_run.sh
+#   JUDGE="gpu.json ..." bench/gpu.sh                       holds what runs on a card wrote against what is wanted of one
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
+# judge FILE...: of one card, whose rows may have been run one at a time. What no run measured is a failure.
+judge() {
+  local all=$out/gpu-all.json number
+  jq -s 'add + {failed: map(.failed) | add}' "$@" > "$all"
+  [ "$(jq .is_card "$all")" = true ] || die "$*: not measured on a card"
+  holds_of() { # WHAT EXPRESSION BOUND
+    number=$(jq "($2) // -1" "$all")
+    verdict "$1" "$number" '>=' "$3"
+  }
+  rows='[(.compute.operations // [])[] | select(.operation | test($o)) | select(.shape | test($s))]'
+  least() { # OPERATION SHAPE MEMBER: in percent
+    jq --arg o "$1" --arg s "$2" "$rows | map(.$3) | min // -0.01 | . * 1000 | round / 10" "$all"
+  }
+  echo "card: $(jq -r .compute.device "$all"), commit $(jq -r .commit "$all")"
+  holds_of "operations that agree with the reference" .values_passed 200
+  verdict "operations that do not" "$(jq '.values_failed | if . == null then 1 else length end' "$all")" '<=' 0
+  holds_of "fox held out, field, dB" .fox_field_psnr 27
+  verdict "operations that were timed" "$(jq '.compute.operations | length' "$all")" '>=' 48
+  for samples in $(jq -r '[(.compute.operations // [])[].shape | capture("(?<n>[0-9]+) samples$").n | tonumber] | unique | .[]' "$all"); do
+    verdict "hash grids, $samples samples, % of the gather rate" "$(least '^HashGrid' " $samples samples\$" share)" '>=' 50
+    verdict "networks, $samples samples, % of arithmetic or memory" "$(least '^Mlp' " $samples samples\$" share_of_both)" '>=' 30
+  done
+  holds_of "hash at two levels, pictures a second at $(jq .city_hash_2_frames.width "$all") wide" .city_hash_2_frames.frames_per_second 108
+  holds_of "volume, pictures a second" .city_volume_frames.frames_per_second 100
+  verdict "steps that failed" "$(jq '.failed | length' "$all")" '<=' 0
+}
+# shellcheck disable=SC2086
+[ -z "${JUDGE:-}" ] || { judge $JUDGE; finish; exit 0; }
 need_tessera
 build=${BUILD:-build/release}
 test=$build/src/compute/tessera_devices_test

@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
 # What a graphics card can do with tessera: run.sh of the bundle that bench/gpu.sh packs. Needs the card's driver and
-# nothing else. Writes gpu.json, and what was said into gpu.txt.
+# nothing else. Writes gpu.json, and what was said into gpu.txt; ends with status 1 where something failed.
 #   ./run.sh [OUT]        default: the folder that this lies in
+#   ROWS="values compute fox cities"      some of them
 #   DEVICE=vulkan:1       another device than the best (bin/tessera info devices)
 #   FOX=DIR               a capture of the fox photographs, for the row of 60 s
+#   CITY=DIR              another capture than the bundle's city of 2x2 blocks
 #   GLIBC=packed          the bundle's glibc, which is otherwise used where the machine's is too old
-#   SECONDS_OF_TRAINING=60 SIZE=1920x1080 SAMPLES=65536 STREAMED=1048576 VALUES=1
+#   SECONDS_OF_TRAINING=60 SIZE=1920x1080 SAMPLES="65536 1048576" STREAMED=1048576
 #   LENGTH="--steps 3" VOLUME="--set most_rays=128" HASH=... FIELD=...    instead of the seconds; more of train's flags
 set -uo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
@@ -62,8 +64,73 @@ quoted() { printf '"%s"' "$(printf '%s' "$1" | tr -d '\000-\037' | sed 's/[\\"]/
 # psnr FILE: of `eval --json`.
 psnr() { sed -n 's/^ *"psnr": *\([0-9.]*\).*/\1/p' "$1" 2> /dev/null | head -1; }
 step() { write; echo "== $*"; }
+# try NAME COMMAND...: its last line, and its status into gpu.json where it failed.
+failed=()
+try() {
+  local name=$1 status=0
+  shift
+  "$@" > "$work/said.txt" 2>&1 || status=$?
+  tail -n 1 "$work/said.txt"
+  [ "$status" -eq 0 ] && return
+  tail -n 5 "$work/said.txt"
+  failed+=("$(quoted "$name: status $status, $(tail -n 1 "$work/said.txt")")")
+}
 case $device in vulkan:*) export TESSERA_GPU=${device#vulkan:} ;; esac  # of the tests
-declare -A more=([volume]=${VOLUME:-} [hash]=${HASH:-} [field]=${FIELD:-})
+# By name: hash-2 is `hash` with two levels of features, as in the paper's figures.
+declare -A method=([volume]=volume [hash]=hash [hash-2]=hash [field]=field)
+declare -A more=([volume]=${VOLUME:-} [hash]=${HASH:-} [hash-2]="--set levels=2 ${HASH:-}" [field]=${FIELD:-})
+city=${CITY:-$here/city}
+read -ra samples <<< "${SAMPLES:-65536 1048576}"
+length=${LENGTH:---minutes $(awk -v s="$seconds" 'BEGIN { print s / 60 }')}
+
+values() {
+  step "every operation against the reference"
+  TESSERA_REQUIRE_VULKAN=1 start tessera_devices_test --gtest_brief=1 --gtest_filter='*vulkan*' > "$work/values.txt" 2>&1
+  number values_status $?
+  grep -E '^\[  (PASSED|FAILED)' "$work/values.txt"
+  number values_passed "$(sed -n 's/^\[  PASSED  \] \([0-9]*\) test.*/\1/p' "$work/values.txt" | head -1)"
+  members+=("\"values_failed\": [$(sed -n 's/^\[  FAILED  \] \([^ ,]*\).*/"\1"/p' "$work/values.txt" | sort -u | paste -sd, -)]")
+  cp "$work/values.txt" "$out/values.txt"
+}
+
+compute() {
+  step "rates beside the card's own limits"
+  try compute tessera bench compute --device "$device" --samples "${samples[@]}" --streamed "${STREAMED:-1048576}" --json "$work/compute.json"
+  json compute "$work/compute.json"
+  step "a training step"
+  try step tessera bench train --device "$device" --samples "${samples[0]}" --json "$work/step.json"
+  json step "$work/step.json"
+}
+
+fox() {
+  local name blocks
+  [ -n "${FOX:-}" ] || return
+  for name in field hash; do
+    step "fox, $name, $length"
+    blocks=$([ "$name" = hash ] && echo "--blocks 1x1 --set surround=border")
+    # shellcheck disable=SC2086
+    try "fox $name" tessera train "$FOX" "$work/fox-$name" --method "$name" $blocks $length --device "$device" ${more[$name]}
+    try "fox $name" tessera eval "$work/fox-$name" "$FOX" --device "$device" --json "$work/fox-$name.json"
+    number "fox_${name}_psnr" "$(psnr "$work/fox-$name.json")"
+  done
+}
+
+cities() {
+  local name key
+  for name in volume hash hash-2; do
+    step "a city of 2x2 blocks, $name, $length, and its scene"
+    key=city_${name//-/_}
+    # shellcheck disable=SC2086
+    try "$name" tessera train "$city" "$work/$name" --method "${method[$name]}" --blocks 2x2 $length --device "$device" \
+      --set level_share=0 ${more[$name]}
+    # A driver for the processor takes an hour for it.
+    try "$name" tessera bake "$work/$name" "$work/$name.scene" --capture "$city" --device "$(card && echo "$device" || echo cpu)"
+    try "$name" tessera eval "$work/$name.scene" "$city" --device "$device" --json "$work/$name.json"
+    number "${key}_psnr" "$(psnr "$work/$name.json")"
+    try "$name" tessera bench frames "$work/$name.scene" --views "$city" --device "$device" --size "$size" --json "$work/$name-frames.json"
+    json "${key}_frames" "$work/$name-frames.json"
+  done
+}
 
 {
   tessera info devices
@@ -72,49 +139,12 @@ declare -A more=([volume]=${VOLUME:-} [hash]=${HASH:-} [field]=${FIELD:-})
   members+=("\"libraries\": $(quoted "$libraries")")
   members+=("\"commit\": $(quoted "$(cat "$here/commit")")" "\"machine\": $(quoted "$(uname -srm)")"
     "\"processor\": $(quoted "$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1)")"
-    "\"devices\": $(quoted "$(tessera info devices | sed -n 's/^  name *//p' | paste -sd';')")")
-
-  if [ "${VALUES:-1}" = 1 ]; then
-    step "every operation against the reference"
-    TESSERA_REQUIRE_VULKAN=1 start tessera_devices_test --gtest_brief=1 --gtest_filter='*vulkan*' > "$work/values.txt" 2>&1
-    number values_status $?
-    grep -E '^\[  (PASSED|FAILED)' "$work/values.txt"
-    number values_passed "$(sed -n 's/^\[  PASSED  \] \([0-9]*\) test.*/\1/p' "$work/values.txt" | head -1)"
-    members+=("\"values_failed\": [$(sed -n 's/^\[  FAILED  \] \([^ ,]*\).*/"\1"/p' "$work/values.txt" | sort -u | paste -sd, -)]")
-    cp "$work/values.txt" "$out/values.txt"
-  fi
-
-  step "rates beside the card's own limits"
-  tessera bench compute --device "$device" --samples "${SAMPLES:-65536}" --streamed "${STREAMED:-1048576}" --json "$work/compute.json"
-  json compute "$work/compute.json"
-  step "a training step"
-  tessera bench train --device "$device" --samples "${SAMPLES:-65536}" --json "$work/step.json"
-  json step "$work/step.json"
-
-  length=${LENGTH:---minutes $(awk -v s="$seconds" 'BEGIN { print s / 60 }')}
-  members+=("\"length\": $(quoted "$length")")
-  for method in volume hash; do
-    step "a city of 2x2 blocks, $method, $length, and its scene"
-    # shellcheck disable=SC2086
-    tessera train "$here/city" "$work/$method" --method "$method" --blocks 2x2 $length --device "$device" \
-      --set level_share=0 ${more[$method]} 2>&1 | tail -1
-    tessera bake "$work/$method" "$work/$method.scene" --capture "$here/city" 2>&1 | tail -1
-    tessera eval "$work/$method.scene" "$here/city" --device "$device" --json "$work/$method.json" 2>&1 | tail -1
-    number "city_${method}_psnr" "$(psnr "$work/$method.json")"
-    tessera bench frames "$work/$method.scene" --views "$here/city" --device "$device" --size "$size" --json "$work/$method-frames.json"
-    json "city_${method}_frames" "$work/$method-frames.json"
-  done
-
-  if [ -n "${FOX:-}" ]; then
-    for method in field hash; do
-      step "fox, $method, $length"
-      blocks=$([ "$method" = hash ] && echo "--blocks 1x1 --set surround=border")
-      # shellcheck disable=SC2086
-      tessera train "$FOX" "$work/fox-$method" --method "$method" $blocks $length --device "$device" ${more[$method]} 2>&1 | tail -1
-      tessera eval "$work/fox-$method" "$FOX" --device "$device" --json "$work/fox-$method.json" 2>&1 | tail -1
-      number "fox_${method}_psnr" "$(psnr "$work/fox-$method.json")"
-    done
-  fi
+    "\"devices\": $(quoted "$(tessera info devices | sed -n 's/^  name *//p' | paste -sd';')")" "\"length\": $(quoted "$length")")
+  for row in ${ROWS:-values compute fox cities}; do "$row"; done
+  members+=("\"failed\": [$(IFS=,; echo "${failed[*]-}")]")
   write
+  exit $((${#failed[@]} > 0))
 } 2>&1 | tee "$out/gpu.txt"
+status=${PIPESTATUS[0]}
 [ -s "$out/gpu.json" ] && echo "wrote $out/gpu.json"
+exit "$status"

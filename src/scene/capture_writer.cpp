@@ -118,7 +118,7 @@ Json frameOf(const Capture& capture, const Photo& photo) {
   frame["transform_matrix"] = rowsOf(matrixOf(photo.worldFromCamera));
   Json& ours = frame["tessera"];
   ours["camera"] = photo.camera;
-  if (photo.name != frame["file_path"]) ours["name"] = photo.name;
+  if (photo.name != frame["file_path"].get<std::string>()) ours["name"] = photo.name;
   if (photo.exposure != 0) ours["exposure"] = photo.exposure;
   if (!photo.depth.empty()) ours["depth_unit"] = photo.depthUnit;
   if (photo.gps) {

@@ -1,11 +1,35 @@
 #include "synth/tracer.h"
 
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
 #include <embree3/rtcore.h>
+#endif
 
 #include "base/error.h"
 
 namespace tessera {
 namespace {
+
+#if RTC_VERSION_MAJOR >= 4
+void intersectOne(RTCScene scene, RTCRayHit& query) {
+  rtcIntersect1(scene, &query);
+}
+void occludeOne(RTCScene scene, RTCRay& query) {
+  rtcOccluded1(scene, &query);
+}
+#else
+void intersectOne(RTCScene scene, RTCRayHit& query) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(scene, &context, &query);
+}
+void occludeOne(RTCScene scene, RTCRay& query) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(scene, &context, &query);
+}
+#endif
 
 constexpr unsigned kSolid = 0, kFoliage = 1;
 
@@ -96,13 +120,11 @@ TraceScene::TraceScene(const TraceDevice& device, const SurfaceMesh& mesh)
 }
 
 std::optional<SurfaceHit> TraceScene::intersect(const Ray& ray) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
   RTCRayHit query{};
   query.ray = embreeRay(ray);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(scene_.get(), &context, &query);
+  intersectOne(scene_.get(), query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
 
   SurfaceHit hit;
@@ -129,10 +151,8 @@ std::optional<SurfaceHit> TraceScene::intersect(const Ray& ray) const {
 }
 
 bool TraceScene::occluded(const Ray& ray) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
   RTCRay query = embreeRay(ray);
-  rtcOccluded1(scene_.get(), &context, &query);
+  occludeOne(scene_.get(), query);
   return query.tfar < 0;
 }
 
