@@ -276,12 +276,17 @@ uint64_t GpuContext::memoryBytes() const {
 uint32_t GpuContext::memoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted,
                                 VkMemoryPropertyFlags preferred) const {
   for (VkMemoryPropertyFlags flags : {wanted | preferred, wanted}) {
-    for (uint32_t i = 0; i < memory_.memoryTypeCount; ++i) {
-      const bool allowed = (typeBits >> i & 1) != 0;
-      if (allowed && (memory_.memoryTypes[i].propertyFlags & flags) == flags) return i;
-    }
+    if (const std::optional<uint32_t> found = findMemoryType(typeBits, flags)) return *found;
   }
   throw Error(name_, "", "it has no memory of the kind we need", "update the graphics driver");
+}
+
+std::optional<uint32_t> GpuContext::findMemoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted) const {
+  for (uint32_t i = 0; i < memory_.memoryTypeCount; ++i) {
+    const bool allowed = (typeBits >> i & 1) != 0;
+    if (allowed && (memory_.memoryTypes[i].propertyFlags & wanted) == wanted) return i;
+  }
+  return std::nullopt;
 }
 
 uint32_t GpuContext::typesOfSameHeap(uint32_t type) const {

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -97,8 +98,9 @@ class GpuContext {
 
   // The first memory type among `typeBits` that has all `wanted` properties, those with `preferred` first.
   uint32_t memoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted, VkMemoryPropertyFlags preferred) const;
-  uint32_t typesOfSameHeap(uint32_t type) const;  // as bits, itself among them
-  uint64_t largestAllocation() const { return largestAllocation_; }
+  std::optional<uint32_t> findMemoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted) const;
+  uint32_t typesOfSameHeap(uint32_t type) const;                     // as bits, itself among them
+  uint64_t largestAllocation() const { return largestAllocation_; }  // bytes at once that the driver promises
 
   // Mistakes that the validation layers reported so far in this process, warnings too.
   static int validationMessages();
