@@ -3,7 +3,8 @@
 # libraries that they need, the Vulkan loader, a made city, and the glibc that the programs need, for machines with an
 # older one. Then runs it here. On another machine: tar -xzf, ./run.sh.
 #   [BUILD=build/release] [ONLY_PACK=1] bench/gpu.sh        settings of the run: bench/gpu_run.sh
-#   JUDGE="gpu.json ..." bench/gpu.sh                       holds what runs on a card wrote against what is wanted of one
+#   JUDGE="gpu.json ..." bench/gpu.sh                       holds what runs on a card (and bench/tiny_cuda_nn.sh there) wrote
+#                                                           against what is wanted of one
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 # judge FILE...: of one card, whose rows may have been run one at a time. What no run measured is a failure.
@@ -30,6 +31,16 @@ judge() {
   done
   holds_of "hash at two levels, pictures a second at $(jq .city_hash_2_frames.width "$all") wide" .city_hash_2_frames.frames_per_second 108
   holds_of "volume, pictures a second" .city_volume_frames.frames_per_second 100
+  # Their time by ours.
+  if [ "$(jq 'has("tiny_cuda_nn")' "$all")" = true ]; then
+    while IFS=$'\t' read -r what number; do
+      verdict "$what, times tiny-cuda-nn's rate" "$number" '>=' 0.7
+    done < <(jq -r '.compute.operations as $ours | .tiny_cuda_nn.operations[] | . as $theirs
+      | ($ours[] | select(.operation == $theirs.operation and .shape == $theirs.shape)) as $same
+      | "\(.operation) \(.shape)\t\(.seconds / $same.seconds * 1000 | round / 1000)"' "$all")
+  else
+    echo "beside tiny-cuda-nn: not measured (bench/tiny_cuda_nn.sh)"
+  fi
   verdict "steps that failed" "$(jq '.failed | length' "$all")" '<=' 0
 }
 # shellcheck disable=SC2086
