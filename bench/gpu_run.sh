@@ -86,7 +86,9 @@ length=${LENGTH:---minutes $(awk -v s="$seconds" 'BEGIN { print s / 60 }')}
 values() {
   step "every operation against the reference"
   TESSERA_REQUIRE_VULKAN=1 start tessera_devices_test --gtest_brief=1 --gtest_filter='*vulkan*' > "$work/values.txt" 2>&1
-  number values_status $?
+  local status=$?
+  number values_status "$status"
+  [ "$status" -eq 0 ] || failed+=("$(quoted "values: status $status")")
   grep -E '^\[  (PASSED|FAILED)' "$work/values.txt"
   number values_passed "$(sed -n 's/^\[  PASSED  \] \([0-9]*\) test.*/\1/p' "$work/values.txt" | head -1)"
   members+=("\"values_failed\": [$(sed -n 's/^\[  FAILED  \] \([^ ,]*\).*/"\1"/p' "$work/values.txt" | sort -u | paste -sd, -)]")
@@ -140,8 +142,10 @@ cities() {
   members+=("\"commit\": $(quoted "$(cat "$here/commit")")" "\"machine\": $(quoted "$(uname -srm)")"
     "\"processor\": $(quoted "$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1)")"
     "\"devices\": $(quoted "$(tessera info devices | sed -n 's/^  name *//p' | paste -sd';')")" "\"length\": $(quoted "$length")")
-  for row in ${ROWS:-values compute fox cities}; do "$row"; done
-  members+=("\"failed\": [$(IFS=,; echo "${failed[*]-}")]")
+  for row in ${ROWS:-values compute fox cities}; do
+    case $row in values | compute | fox | cities) "$row" ;; *) failed+=("$(quoted "ROWS: there is no $row")") ;; esac
+  done
+  members+=("\"failed\": [$(IFS=,; echo "${failed[*]-}")]" "\"ended\": true")
   write
   exit $((${#failed[@]} > 0))
 } 2>&1 | tee "$out/gpu.txt"

@@ -122,6 +122,7 @@ json networkOf(int width, int hiddenLayers, const char* output) {
 int main(int argc, char** argv) try {
   if (argc < 3) throw std::runtime_error("usage: tiny_cuda_nn OUT.json SAMPLES...");
   if (tcnn::cpp::preferred_precision() != tcnn::cpp::Precision::Fp16) throw std::runtime_error("built without fp16");
+  std::ofstream file(argv[1]);
   cudaDeviceProp card;
   check(cudaGetDeviceProperties(&card, 0));
   cudaStream_t stream;
@@ -151,7 +152,9 @@ int main(int argc, char** argv) try {
     const std::unique_ptr<tcnn::cpp::Module> module(tcnn::cpp::create_encoding(3, grid, tcnn::cpp::Precision::Fp16));
     measure(rows, stream, *module, samples, "HashGrid", "16 levels x 2, random points" + count);
   }
-  std::ofstream(argv[1]) << json{{"tiny_cuda_nn", {{"device", card.name}, {"operations", rows}}}}.dump(1) << "\n";
+  file << json{{"tiny_cuda_nn", {{"device", card.name}, {"operations", rows}}}}.dump(1) << "\n";
+  file.close();
+  if (!file) throw std::runtime_error(std::string(argv[1]) + ": cannot be written");
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "tiny_cuda_nn: %s\n", error.what());

@@ -65,7 +65,7 @@ void add(BlockSamplesArguments a, Ray ray, uint firstRow, uint firstSegment, Pos
     if (made.samples == 0 || group != made.group) {
       const uint segment = firstSegment + made.segments;
       if (kWrite && segment < ray.endSegment) {
-        a.firstSampleOfSegment.values[segment] = row;
+        a.firstSampleOfSegment.values[segment] = min(row, ray.endRow);
         a.groupOfSegment.values[segment] = group;
         a.rayOfSegment.values[segment] = ray.index;
       }

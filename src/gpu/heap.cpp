@@ -83,10 +83,12 @@ std::unique_ptr<GpuHeap::Block> GpuHeap::makeBlock(size_t bytes, BufferUse use) 
   const Kind kind = kindOf(use);
   allocation.memoryTypeIndex = context_.memoryType(needs.memoryTypeBits, kind.wanted, kind.preferred);
   VkResult result = vkAllocateMemory(device, &allocation, nullptr, &block->memory);
-  // What the host writes may lie with the host. What kernels work on may not: many times slower, nobody would know why.
+  // What the host writes may lie with the host. What kernels of a card work on may not: many times slower, and nobody
+  // would know why.
+  const bool mayLieElsewhere = use != BufferUse::device || !context_.isDiscrete();
   const uint32_t others = needs.memoryTypeBits & ~context_.typesOfSameHeap(allocation.memoryTypeIndex);
   const std::optional<uint32_t> elsewhere = context_.findMemoryType(others, kind.wanted);
-  if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY && use != BufferUse::device && elsewhere) {
+  if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY && mayLieElsewhere && elsewhere) {
     allocation.memoryTypeIndex = *elsewhere;
     result = vkAllocateMemory(device, &allocation, nullptr, &block->memory);
   }

@@ -58,6 +58,7 @@ VulkanDevice::MlpArithmetic VulkanDevice::bestArithmetic(const GpuContext& conte
 }
 
 VulkanDevice::~VulkanDevice() {
+  stream_->context()->waitIdle();  // whatever went wrong: kernels and memory go next
   if (!stream_->isMeasuring()) return;
   try {
     double all = 0;

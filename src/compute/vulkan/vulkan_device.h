@@ -144,7 +144,6 @@ class VulkanDevice : public Device {
   template <class Arguments, class Options>
   Arguments lookupArguments(const Options& options) const;  // of virtual grids and lattices
   void addPartials(uint64_t partials, uint32_t count, uint32_t columns, uint64_t sums);
-  // Where memory is short, what is no longer used is given back first.
   // The address of at least `floats` floats for use within one operation.
   uint64_t scratch(size_t floats);
   // The network's weights as its kernels read them: themselves, or copies in fp16 at `scratch`.
