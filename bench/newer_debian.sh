@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds and tests tessera on a newer Debian, in a folder of its own: newer compilers, libraries and Mesa. From Debian 13 on glslang
-# and Vulkan's headers know VK_KHR_cooperative_matrix, and so do the drivers for the processor of Mesa 24.1 and later.
+# and Vulkan's headers know VK_KHR_cooperative_matrix; of Mesa's drivers for the processor that of sid (26.2) has it.
 #   [SUITE=trixie] [MIRROR=http://deb.debian.org/debian] [TARGETS=all] [TESTS=REGEX] bench/newer_debian.sh
 # As root, with debootstrap installed; wants 6 GB under build/bench.
 set -euo pipefail
