@@ -56,7 +56,7 @@ void PhotoRays::draw(int64_t step, uint32_t rays) {
   CHECK(rays <= settings_.mostRays);
   drawRays(photos_.at(step), known_,
            {settings_.seed, settings_.randomBackground, settings_.knownShare, tiles_ ? &*tiles_ : nullptr}, step, rays,
-           batch_);
+           pool_, batch_);
   count_ = rays;
   device_.write(photoOfRay_.all(), std::span<const uint32_t>(batch_.photoOfRay));
   device_.write(pixels_.all(), std::span<const float>(batch_.pixels));

@@ -59,6 +59,7 @@ class PhotoRays {
 
   Device& device_;
   Settings settings_;
+  ThreadPool pool_;
   PhotoWindow photos_;
   std::vector<std::vector<KnownDistance>> known_;  // [photo]
   std::vector<float> nearOfPhoto_;                 // with freeSpace

@@ -54,10 +54,11 @@ class TileDraw {
 }  // namespace
 
 void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<std::vector<KnownDistance>>& known,
-              const RayBatchOptions& options, int64_t step, uint32_t rays, RayBatch& batch) {
+              const RayBatchOptions& options, int64_t step, uint32_t rays, ThreadPool& pool, RayBatch& batch) {
   CHECK(!window.empty());
   constexpr int kTries = 4, kPicks = 2;
   constexpr uint64_t kDrawsPerRay = 32;
+  constexpr size_t kRaysPerTask = 512;
   batch.photoOfRay.resize(rays);
   batch.pixels.resize(2 * size_t{rays});
   batch.targets.resize(3 * size_t{rays});
@@ -69,10 +70,10 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
   if (options.tiles) tiles.emplace(window, *options.tiles);
   const bool nothing = tiles && tiles->isEmpty();
   const RandomStream random(options.seed, 0x4a75 + (static_cast<uint64_t>(step) << 16));
-  for (uint32_t ray = 0; ray < rays; ++ray) {
+  const auto drawRay = [&](size_t ray) {
     uint64_t draw = kDrawsPerRay * ray;
     batch.jitter[ray] = random.uniform(draw++);
-    float* background = &batch.backgrounds[3 * size_t{ray}];
+    float* background = &batch.backgrounds[3 * ray];
     for (int k = 0; k < 3; ++k) background[k] = options.randomBackground ? random.uniform(draw + k) : 0.0f;
     draw += 3;
     const bool wantsKnown = random.uniform(draw++) < options.knownShare;
@@ -111,18 +112,21 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
       batch.weights[ray] = masked || nothing ? 0.0f : 1.0f;
       if (masked && attempt + 1 < kTries) continue;
       batch.photoOfRay[ray] = static_cast<uint32_t>(entry.photo);
-      batch.pixels[2 * size_t{ray}] = static_cast<float>(x) + 0.5f;
-      batch.pixels[2 * size_t{ray} + 1] = static_cast<float>(y) + 0.5f;
+      batch.pixels[2 * ray] = static_cast<float>(x) + 0.5f;
+      batch.pixels[2 * ray + 1] = static_cast<float>(y) + 0.5f;
       const uint8_t* pixel = image.at(static_cast<int>(x), static_cast<int>(y));
       const float alpha = image.channels == 4 ? static_cast<float>(pixel[3]) / 255 : 1.0f;
       if (masked || alpha < 1) batch.distances[ray] = 0;  // what is known is not what the photo shows there
       for (int k = 0; k < 3; ++k) {
         const float value = static_cast<float>(pixel[image.channels >= 3 ? k : 0]) / 255;
-        batch.targets[3 * size_t{ray} + k] = value * alpha + background[k] * (1 - alpha);
+        batch.targets[3 * ray + k] = value * alpha + background[k] * (1 - alpha);
       }
       break;
     }
-  }
+  };
+  pool.forRanges(rays, kRaysPerTask, [&](size_t begin, size_t end) {
+    for (size_t ray = begin; ray < end; ++ray) drawRay(ray);
+  });
 }
 
 }  // namespace tessera

@@ -1,6 +1,7 @@
 // Rays for one training step: which pixels, and what colour they should have.
 #pragma once
 
+#include "base/threads.h"
 #include "scene/capture.h"
 #include "train/known_distances.h"
 #include "train/photo_tiles.h"
@@ -25,11 +26,12 @@ struct RayBatchOptions {
   const std::vector<TileShares>* tiles = nullptr;  // [photo]: draw from these alone
 };
 
-// Uniform over the window's photos and their pixels, or by the shares of tiles; a function of window, seed and step.
+// Uniform over the window's photos and their pixels, or by the shares of tiles; a function of window, seed and step,
+// whatever the pool's threads.
 // Masked pixels are drawn again a few times before they are kept with weight zero; where no photo of the window has a
 // tile, all rays have that weight.
 // `known` is by photo, and may be empty.
 void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<std::vector<KnownDistance>>& known,
-              const RayBatchOptions& options, int64_t step, uint32_t rays, RayBatch& batch);
+              const RayBatchOptions& options, int64_t step, uint32_t rays, ThreadPool& pool, RayBatch& batch);
 
 }  // namespace tessera

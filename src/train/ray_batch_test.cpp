@@ -8,6 +8,11 @@
 namespace tessera {
 namespace {
 
+ThreadPool& pool() {
+  static ThreadPool pool(2);
+  return pool;
+}
+
 PhotoWindow::Entry entry(int photo, ImageU8 image, ImageU8 mask = {}) {
   auto decoded = std::make_shared<DecodedPhoto>();
   decoded->image = std::move(image);
@@ -36,7 +41,7 @@ std::vector<PhotoWindow::Entry> twoPhotos() {
 
 RayBatch draw(const std::vector<PhotoWindow::Entry>& window, uint64_t seed, int64_t step, uint32_t rays = 2000) {
   RayBatch batch;
-  drawRays(window, {}, {seed, true, 0, nullptr}, step, rays, batch);
+  drawRays(window, {}, {seed, true, 0, nullptr}, step, rays, pool(), batch);
   return batch;
 }
 
@@ -48,6 +53,19 @@ TEST(RayBatch, IsAFunctionOfSeedAndStep) {
   EXPECT_EQ(first.backgrounds, again.backgrounds);
   EXPECT_NE(first.pixels, draw(twoPhotos(), 1, 8).pixels);
   EXPECT_NE(first.pixels, draw(twoPhotos(), 2, 7).pixels);
+}
+
+TEST(RayBatch, IsTheSameByAnyNumberOfThreads) {
+  const RayBatch byTwo = draw(twoPhotos(), 1, 7, 5000);
+  for (const int threads : {1, 3}) {
+    ThreadPool others(threads);
+    RayBatch batch;
+    drawRays(twoPhotos(), {}, {1, true, 0, nullptr}, 7, 5000, others, batch);
+    EXPECT_EQ(batch.pixels, byTwo.pixels) << threads;
+    EXPECT_EQ(batch.targets, byTwo.targets) << threads;
+    EXPECT_EQ(batch.photoOfRay, byTwo.photoOfRay) << threads;
+    EXPECT_EQ(batch.jitter, byTwo.jitter) << threads;
+  }
 }
 
 TEST(RayBatch, BeginsWithTheSameRaysHoweverManyAreWanted) {
@@ -64,7 +82,7 @@ TEST(RayBatch, DrawsFromTilesByTheirShares) {
   RayBatchOptions options{1, true, 0.5, &tiles};
   RayBatch batch;
   constexpr uint32_t kMany = 8000;
-  drawRays(twoPhotos(), {}, options, 3, kMany, batch);
+  drawRays(twoPhotos(), {}, options, 3, kMany, pool(), batch);
   int counts[3] = {};
   for (uint32_t ray = 0; ray < kMany; ++ray) {
     const float x = batch.pixels[2 * ray], y = batch.pixels[2 * ray + 1];
@@ -87,7 +105,7 @@ TEST(RayBatch, DrawsFromTilesByTheirShares) {
 TEST(RayBatch, GivesRaysNoWeightWhereThePhotosHaveNoTile) {
   const std::vector<TileShares> tiles(10);
   RayBatch batch;
-  drawRays(twoPhotos(), {}, {1, true, 0, &tiles}, 3, 50, batch);
+  drawRays(twoPhotos(), {}, {1, true, 0, &tiles}, 3, 50, pool(), batch);
   for (const float weight : batch.weights) EXPECT_EQ(weight, 0);
 }
 
@@ -142,7 +160,7 @@ TEST(RayBatch, LaysTransparentPixelsOverTheBackground) {
 
 TEST(RayBatch, HasBlackBehindItWhenBackgroundsAreNotRandom) {
   RayBatch batch;
-  drawRays({entry(0, addressed(7, 5, 100, 4, 51))}, {}, {1, false, 0}, 0, 100, batch);
+  drawRays({entry(0, addressed(7, 5, 100, 4, 51))}, {}, {1, false, 0}, 0, 100, pool(), batch);
   EXPECT_EQ(batch.backgrounds, std::vector<float>(300, 0.0f));
   EXPECT_NEAR(batch.targets[2], 0.2f * 100 / 255, 1e-6);
 }
@@ -156,7 +174,7 @@ TEST(RayBatch, DrawsAShareOfItsRaysWhereDistancesAreKnown) {
   std::vector<std::vector<KnownDistance>> known(10);
   known[4] = {{1, 2, 1.5f}, {6, 4, 2.5f}, {7, 0, 9.0f}};  // the last one is beside the photo
   RayBatch batch;
-  drawRays(twoPhotos(), known, {1, true, 0.25}, 0, 4000, batch);
+  drawRays(twoPhotos(), known, {1, true, 0.25}, 0, 4000, pool(), batch);
   int inFour = 0, counts[2] = {};
   for (size_t ray = 0; ray < batch.weights.size(); ++ray) {
     const float x = batch.pixels[2 * ray], y = batch.pixels[2 * ray + 1];
@@ -171,7 +189,7 @@ TEST(RayBatch, DrawsAShareOfItsRaysWhereDistancesAreKnown) {
   EXPECT_NEAR(inFour, 2000, 150);
   EXPECT_NEAR(counts[0], 2000 * 0.25 / 3, 50);
   EXPECT_NEAR(counts[1], 2000 * 0.25 / 3, 50);
-  drawRays(twoPhotos(), known, {1, true, 0}, 0, 4000, batch);
+  drawRays(twoPhotos(), known, {1, true, 0}, 0, 4000, pool(), batch);
   EXPECT_EQ(batch.distances, std::vector<float>(4000, 0.0f));
 }
 
@@ -183,7 +201,7 @@ TEST(RayBatch, DrawsKnownPixelsFromTilesOnlyWhereItDrawsFromTiles) {
   tiles[4] = {{{4, 0, 0, 2, 5}, {4, 5, 1, 7, 2}}, {1, 4}};
   tiles[9] = {{{9, 3, 3, 4, 4}}, {4}};
   RayBatch batch;
-  drawRays(twoPhotos(), known, {1, true, 0.5, &tiles}, 0, 4000, batch);
+  drawRays(twoPhotos(), known, {1, true, 0.5, &tiles}, 0, 4000, pool(), batch);
   std::map<float, int> drawn;
   for (size_t ray = 0; ray < batch.weights.size(); ++ray) {
     ++drawn[batch.distances[ray]];
@@ -199,14 +217,14 @@ TEST(RayBatch, DrawsKnownPixelsFromTilesOnlyWhereItDrawsFromTiles) {
 TEST(RayBatch, KnowsNoDistancesUnderMasks) {
   const std::vector<std::vector<KnownDistance>> known = {{{3, 2, 1.5f}}};
   RayBatch batch;
-  drawRays({entry(0, addressed(7, 5, 0), ImageU8(7, 5, 1, 0))}, known, {1, true, 1}, 0, 100, batch);
+  drawRays({entry(0, addressed(7, 5, 0), ImageU8(7, 5, 1, 0))}, known, {1, true, 1}, 0, 100, pool(), batch);
   EXPECT_EQ(batch.distances, std::vector<float>(100, 0.0f));
 }
 
 TEST(RayBatch, ShrinksWithTheNumberOfRays) {
   RayBatch batch;
-  drawRays(twoPhotos(), {}, {1, true, 0}, 0, 100, batch);
-  drawRays(twoPhotos(), {}, {1, true, 0}, 1, 10, batch);
+  drawRays(twoPhotos(), {}, {1, true, 0}, 0, 100, pool(), batch);
+  drawRays(twoPhotos(), {}, {1, true, 0}, 1, 10, pool(), batch);
   EXPECT_EQ(batch.weights.size(), 10u);
   EXPECT_EQ(batch.targets.size(), 30u);
   EXPECT_EQ(batch.photoOfRay.size(), 10u);

@@ -186,7 +186,9 @@ TEST(DistortionChoice, JudgesByTheMeanOfTheExposuresThatWereLearned) {
   for (size_t photo = 0; photo < photos.trained.size(); ++photo) {
     const bool isTrained = photos.trained[photo].total() > 0;
     for (size_t c = 0; c < 3; ++c) {
-      if (!isTrained) EXPECT_EQ(gains[3 * photo + c], 0) << photo;
+      if (!isTrained) {
+        EXPECT_EQ(gains[3 * photo + c], 0) << photo;
+      }
       sum += isTrained ? gains[3 * photo + c] : 0;
     }
   }
