@@ -257,6 +257,7 @@ std::unique_ptr<Device> openDevice(const std::string& name) {
       std::printf("no device \"%s\": %s has no such arithmetic\n", name.c_str(), context->name().c_str());
       return nullptr;
     }
+    if (name == kWithFallbacks) return makeVulkanDeviceWithFewGroups(options);
     return name == kWithEmulatedMatrices ? makeVulkanDeviceWithEmulatedMatrices(options, {})
                                          : makeVulkanDevice(options);
   }

@@ -19,7 +19,8 @@ constexpr size_t kArgumentBytes = 512 * kCommandsPerBatch;
 constexpr size_t kSmallBatch = 8;                     // commands
 constexpr size_t kMostCopiedWords = size_t{1} << 20;  // by a kernel: what is larger is as large the next time, mostly
 constexpr uint32_t kQueries = kCommandsPerBatch + 1;
-constexpr VkPipelineStageFlags kStages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
+constexpr VkPipelineStageFlags kStages =
+    VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT | VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT;
 
 void barrier(VkCommandBuffer commands, VkAccessFlags reads, VkPipelineStageFlags stages) {
   auto barrier = vulkanStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
@@ -138,7 +139,7 @@ void GpuStream::record(Batch& batch, Recording& recording) {
     // A barrier reaches back over all batches sent before, too: they are on one queue.
     barrier(commands,
             VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_READ_BIT |
-                VK_ACCESS_TRANSFER_WRITE_BIT,
+                VK_ACCESS_TRANSFER_WRITE_BIT | VK_ACCESS_INDIRECT_COMMAND_READ_BIT,
             kStages);
     switch (command.kind) {
       case Command::Kind::copy: {
@@ -153,7 +154,11 @@ void GpuStream::record(Batch& batch, Recording& recording) {
         vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, command.kernel->pipeline());
         vkCmdPushConstants(commands, command.kernel->layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof command.arguments,
                            &command.arguments);
-        vkCmdDispatch(commands, command.groups.x, command.groups.y, command.groups.z);
+        if (command.groups.buffer != VK_NULL_HANDLE) {
+          vkCmdDispatchIndirect(commands, command.groups.buffer, command.groups.offset);
+        } else {
+          vkCmdDispatch(commands, command.groups.x, command.groups.y, command.groups.z);
+        }
         break;
     }
     if (measuring_) {

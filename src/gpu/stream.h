@@ -21,8 +21,15 @@
 
 namespace tessera {
 
+// How many workgroups run a kernel: a number, or what stands in the device's memory when the kernel's turn has come.
 struct Groups {
   uint32_t x = 1, y = 1, z = 1;
+  VkBuffer buffer = VK_NULL_HANDLE;  // where set: x, y and z are read at `offset` of it
+  VkDeviceSize offset = 0;
+
+  static Groups counted(const GpuBuffer& words, size_t offset) {
+    return {.buffer = words.handle(), .offset = words.offset() + offset};
+  }
   bool operator==(const Groups&) const = default;
 };
 

@@ -61,6 +61,23 @@ TEST_F(GpuStreamTest, CarriesMoreThanItsStagingHolds) {
   EXPECT_EQ(downloaded(stream, buffer), values);
 }
 
+TEST_F(GpuStreamTest, RunsAsManyWorkgroupsAsTheDevicesMemorySays) {
+  GpuStream stream(context_);
+  const GpuKernel doubles(context_, kDoubleValuesSpirv);
+  const GpuBuffer buffer(context_, 4000), words(context_, 16);
+  auto expected = numbers(1000);
+  stream.upload(buffer, 0, std::as_bytes(std::span(expected)));
+  const Arguments arguments = {buffer.address(), 1000};
+  for (const uint32_t groups : {2u, 0u, 5u}) {  // of 64 each; the lists are the same but for that number
+    const std::array<uint32_t, 3> counted = {groups, 1, 1};
+    stream.upload(words, 4, std::as_bytes(std::span(counted)));
+    stream.run(doubles, std::as_bytes(std::span(&arguments, 1)), Groups::counted(words, 4));
+    stream.send();
+    for (uint32_t i = 0; i < 64 * groups; ++i) expected[i] *= 2;
+  }
+  EXPECT_EQ(downloaded(stream, buffer), expected);
+}
+
 TEST_F(GpuStreamTest, WritesReadsAndClearsPartsOnly) {
   GpuStream stream(context_);
   const GpuBuffer buffer(context_, 40);

@@ -45,7 +45,7 @@ arguments::ShadeArguments shadeArguments(const VulkanDevice& device, const Optio
 void VulkanDevice::enqueue(const AttentionForward& options) {
   arguments::AttentionArguments arguments = attentionArguments(*this, options);
   arguments.features = matrixArguments(options.features, options.samples.capacity);
-  queue(kernel(kAttentionForwardSpirv, constantsOf(options.shape)), arguments, {groups(options.samples.capacity, 128)});
+  queue(kernel(kAttentionForwardSpirv, constantsOf(options.shape)), arguments, groupsOf(options.samples, 128));
 }
 
 void VulkanDevice::enqueue(const AttentionBackward& options) {
@@ -58,13 +58,13 @@ void VulkanDevice::enqueue(const AttentionBackward& options) {
   arguments.logitGradients = deviceAddress(options.logitGradients);
   queue(sumKernel(groupSpirv(kAttentionBackwardSubgroupsFloatAtomicsSpirv, kAttentionBackwardFloatAtomicsSpirv),
                   groupSpirv(kAttentionBackwardSubgroupsSpirv, kAttentionBackwardSpirv), constantsOf(options.shape)),
-        arguments, {groups(samples, 256)});
+        arguments, groupsOf(options.samples, 256));
 }
 
 void VulkanDevice::enqueue(const ShadeForward& options) {
   arguments::ShadeArguments arguments = shadeArguments(*this, options);
   arguments.colour = deviceAddress(options.colour);
-  queue(kernel(kShadeForwardSpirv, {options.whole}), arguments, {groups(3 * size_t{options.rays.capacity}, 256)});
+  queue(kernel(kShadeForwardSpirv, {options.whole}), arguments, groupsOf(options.rays, 256, 3));
 }
 
 void VulkanDevice::enqueue(const ShadeBackward& options) {
@@ -72,7 +72,7 @@ void VulkanDevice::enqueue(const ShadeBackward& options) {
   arguments.colour = deviceAddress(options.colourGradients);
   arguments.sumGradients = matrixArguments(options.sumGradients, options.rays.capacity);
   arguments.opacityGradients = deviceAddress(options.opacityGradients);
-  queue(kernel(kShadeBackwardSpirv, {options.whole}), arguments, {groups(options.rays.capacity, 128)});
+  queue(kernel(kShadeBackwardSpirv, {options.whole}), arguments, groupsOf(options.rays, 128));
 }
 
 void VulkanDevice::enqueue(const AddColumns& options) {
@@ -82,7 +82,7 @@ void VulkanDevice::enqueue(const AddColumns& options) {
   arguments.rows = countArguments(options.rows);
   arguments.added = matrixArguments(options.input, rows);
   arguments.sums = matrixArguments(options.output, rows);
-  queue(kernel(kAddColumnsSpirv), arguments, {groups(rows * options.output.columns, 256)});
+  queue(kernel(kAddColumnsSpirv), arguments, groupsOf(options.rows, 256, options.output.columns));
 }
 
 }  // namespace tessera

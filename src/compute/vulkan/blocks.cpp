@@ -38,8 +38,8 @@ void VulkanDevice::enqueue(const EnterScene& options) {
   arguments.range = deviceAddress(options.range);
   arguments.fences = deviceAddress(options.fences);
   arguments.intervals = options.intervals;
-  const size_t posts = size_t{options.rays.capacity} * (options.intervals + 1);
-  queue(realKernel(kEnterSceneFloat64Spirv, kEnterSceneSpirv), arguments, {groups(posts, 128)});
+  queue(realKernel(kEnterSceneFloat64Spirv, kEnterSceneSpirv), arguments,
+        groupsOf(options.rays, 128, options.intervals + 1));
 }
 
 void VulkanDevice::enqueue(const BlockSamples& options) {
@@ -89,6 +89,8 @@ void VulkanDevice::enqueue(const BlockSamples& options) {
   }
   queue(realKernel(kBlockSamplesFloat64Spirv, kBlockSamplesSpirv, {true, options.split}), arguments,
         {groups(rays + 1, kRaysPerGroup)});
+  countersChanged(options.rowCount);
+  countersChanged(options.segmentCount);
 }
 
 void VulkanDevice::enqueue(const BlockPoints& options) {
@@ -131,6 +133,7 @@ void VulkanDevice::enqueue(const GroupByBlock& options) {
                     .limit = kNoLimit,
                     .scratch = total + 2 * sizeof(uint32_t)});
   queue(kernel(kGroupByBlockSpirv, {true}), arguments, all);
+  countersChanged(options.firstOfBlock);
 }
 
 void VulkanDevice::enqueue(const MarchBlocks& options) {

@@ -31,7 +31,7 @@ void VulkanDevice::enqueue(const CompositeForward& options) {
   arguments.opacity = deviceAddress(options.opacity);
   arguments.depth = deviceAddress(options.depth);
   arguments.weights = deviceAddress(options.weights);
-  queue(kernel(kCompositeForwardSpirv, {columns}), arguments, {groups(options.rays.capacity, kRaysPerGroup)});
+  queue(kernel(kCompositeForwardSpirv, {columns}), arguments, groupsOf(options.rays, kRaysPerGroup));
 }
 
 void VulkanDevice::enqueue(const CompositeBackward& options) {
@@ -56,7 +56,7 @@ void VulkanDevice::enqueue(const CompositeBackward& options) {
   arguments.opacities = scratch(2 * std::max<size_t>(options.xGradients.count, 1));
   arguments.xGradients = deviceAddress(options.xGradients);
   arguments.colourGradients = matrixArguments(options.colourGradients, 0);
-  queue(kernel(kCompositeBackwardSpirv, {columns}), arguments, {groups(options.rays.capacity, kRaysPerGroup)});
+  queue(kernel(kCompositeBackwardSpirv, {columns}), arguments, groupsOf(options.rays, kRaysPerGroup));
 }
 
 }  // namespace tessera

@@ -46,7 +46,7 @@ arguments::BlendArguments blendArguments(const VulkanDevice& device, const Optio
 void VulkanDevice::enqueue(const DeferredForward& options) {
   arguments::DeferredArguments arguments = deferredArguments(*this, options);
   arguments.specular = deviceAddress(options.specular);
-  queue(kernel(kDeferredForwardSpirv), arguments, {groups(options.segments.capacity, kPerGroup)});
+  queue(kernel(kDeferredForwardSpirv), arguments, groupsOf(options.segments, kPerGroup));
 }
 
 void VulkanDevice::enqueue(const DeferredBackward& options) {
@@ -58,10 +58,10 @@ void VulkanDevice::enqueue(const DeferredBackward& options) {
   arguments.compositedGradients = deviceAddress(options.compositedGradients);
   arguments.networkGradients = deviceAddress(options.networkGradients);
   arguments.layers = scratch(segments * kNumbers);
-  queue(kernel(kDeferredBackwardSpirv), arguments, {groups(segments, kPerGroup)});
+  queue(kernel(kDeferredBackwardSpirv), arguments, groupsOf(options.segments, kPerGroup));
   const auto networks = static_cast<uint32_t>(options.networks.count / DeferredNetwork::kParameters);
   queue(sumKernel(kDeferredWeightGradientsFloatAtomicsSpirv, kDeferredWeightGradientsSpirv), arguments,
-        {groups(segments, kShare), networks});
+        groupsOf(options.segments, kShare, 1, networks));
 }
 
 void VulkanDevice::enqueue(const BlendForward& options) {
@@ -70,7 +70,7 @@ void VulkanDevice::enqueue(const BlendForward& options) {
   arguments.colour = deviceAddress(options.colour);
   arguments.opacity = deviceAddress(options.opacity);
   arguments.depth = deviceAddress(options.depth);
-  queue(kernel(kBlendForwardSpirv, {options.literal}), arguments, {groups(options.rays.capacity, kPerGroup)});
+  queue(kernel(kBlendForwardSpirv, {options.literal}), arguments, groupsOf(options.rays, kPerGroup));
 }
 
 void VulkanDevice::enqueue(const BlendBackward& options) {
@@ -81,7 +81,7 @@ void VulkanDevice::enqueue(const BlendBackward& options) {
   arguments.compositedGradients = deviceAddress(options.compositedGradients);
   arguments.specularGradients = deviceAddress(options.specularGradients);
   arguments.opacityGradients = deviceAddress(options.opacityGradients);
-  queue(kernel(kBlendBackwardSpirv, {options.literal}), arguments, {groups(options.rays.capacity, kPerGroup)});
+  queue(kernel(kBlendBackwardSpirv, {options.literal}), arguments, groupsOf(options.rays, kPerGroup));
 }
 
 }  // namespace tessera

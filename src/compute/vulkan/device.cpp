@@ -26,6 +26,12 @@ std::unique_ptr<Device> makeVulkanDeviceWithEmulatedMatrices(const GpuOptions& o
   return std::make_unique<VulkanDevice>(std::move(context), VulkanDevice::MlpArithmetic::emulatedMatrices, matrices);
 }
 
+std::unique_ptr<Device> makeVulkanDeviceWithFewGroups(const GpuOptions& options) {
+  auto context = GpuContext::open(options);
+  return std::make_unique<VulkanDevice>(context, VulkanDevice::bestArithmetic(*context), context->matrices(),
+                                        GroupBounds{.fewest = 0, .most = 3});
+}
+
 std::shared_ptr<const GpuContext> contextOf(const Device& device) {
   const auto* const vulkan = dynamic_cast<const VulkanDevice*>(&device);
   return vulkan == nullptr ? nullptr : vulkan->context();
@@ -40,9 +46,10 @@ VulkanDevice::VulkanDevice(std::shared_ptr<const GpuContext> context)
     : VulkanDevice(context, bestArithmetic(*context), context->matrices()) {}
 
 VulkanDevice::VulkanDevice(std::shared_ptr<const GpuContext> context, MlpArithmetic arithmetic,
-                           const GpuMatrices& matrices)
+                           const GpuMatrices& matrices, const GroupBounds& bounds)
     : stream_(std::make_shared<GpuStream>(context)),
       noCounter_(context, 2 * sizeof(uint32_t)),
+      countedGroups_(context, bounds),
       mlpArithmetic_(arithmetic),
       matrices_(matrices) {
   const uint32_t words[] = {0, ~0u};
@@ -87,13 +94,17 @@ Device::OwnMemory VulkanDevice::ownMemory() const {
 std::unique_ptr<Memory> VulkanDevice::allocate(size_t bytes) {
   auto memory = std::make_unique<VulkanMemory>(stream_, stream_->makeBuffer(bytes), bytes);
   stream_->label("fills");
-  stream_->fillZero(memory->buffer(), 0, (bytes + 3) / 4 * 4);
+  const size_t filled = (bytes + 3) / 4 * 4;
+  stream_->fillZero(memory->buffer(), 0, filled);
+  countedGroups_.changed(memory->buffer().address(), filled);
   return memory;
 }
 
 void VulkanDevice::writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) {
   stream_->label("copies");
-  stream_->upload(static_cast<VulkanMemory&>(to).buffer(), offset, from);
+  const GpuBuffer& buffer = static_cast<VulkanMemory&>(to).buffer();
+  stream_->upload(buffer, offset, from);
+  countedGroups_.changed(buffer.address() + offset, from.size());
 }
 
 void VulkanDevice::readBytes(std::span<const Reading> readings) {
@@ -108,7 +119,9 @@ void VulkanDevice::readBytes(std::span<const Reading> readings) {
 void VulkanDevice::fillZero(Memory& memory, size_t offset, size_t bytes) {
   CHECK(offset + bytes <= memory.bytes());
   stream_->label("fills");
-  stream_->fillZero(static_cast<VulkanMemory&>(memory).buffer(), offset, bytes);
+  const GpuBuffer& buffer = static_cast<VulkanMemory&>(memory).buffer();
+  stream_->fillZero(buffer, offset, bytes);
+  countedGroups_.changed(buffer.address() + offset, bytes);
 }
 
 void VulkanDevice::finish() {
@@ -141,6 +154,10 @@ arguments::RealArguments VulkanDevice::realArguments(double value) const {
 
 uint32_t VulkanDevice::groups(size_t count, size_t perGroup) const {
   return workgroups(count, perGroup, stream_->context()->limits().maxComputeWorkGroupCount[0]);
+}
+
+void VulkanDevice::countersChanged(const Slice<const uint32_t>& words) {
+  if (words) countedGroups_.changed(deviceAddress(words), words.count * sizeof(uint32_t));
 }
 
 uint64_t VulkanDevice::scratch(size_t floats) {

@@ -18,6 +18,10 @@ std::unique_ptr<Device> makeVulkanDevice(const GpuOptions& options);
 // the device had such matrices. It has to have fp16.
 std::unique_ptr<Device> makeVulkanDeviceWithEmulatedMatrices(const GpuOptions& options, const GpuMatrices& matrices);
 
+// For tests: kernels get three workgroups at most for their rows, and the device counts how many wherever it counts
+// rows.
+std::unique_ptr<Device> makeVulkanDeviceWithFewGroups(const GpuOptions& options);
+
 // The context of a Vulkan device, which others may draw with; null of any other device.
 std::shared_ptr<const GpuContext> contextOf(const Device& device);
 

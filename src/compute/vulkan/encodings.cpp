@@ -39,27 +39,25 @@ arguments::FrequencyArguments frequencyArguments(const VulkanDevice& device, con
 }  // namespace
 
 void VulkanDevice::enqueue(const SphericalHarmonicsForward& options) {
-  const size_t elements = size_t{options.samples.capacity} * options.encoded.columns;
   queue(kernel(kSphericalHarmonicsForwardSpirv), harmonicsArguments(*this, options, options.encoded),
-        {groups(elements, 256)});
+        groupsOf(options.samples, 256, options.encoded.columns));
 }
 
 void VulkanDevice::enqueue(const SphericalHarmonicsBackward& options) {
   arguments::SphericalHarmonicsArguments arguments = harmonicsArguments(*this, options, options.encodedGradients);
   arguments.directionGradients = deviceAddress(options.directionGradients);
-  queue(kernel(kSphericalHarmonicsBackwardSpirv), arguments, {groups(options.samples.capacity, 128)});
+  queue(kernel(kSphericalHarmonicsBackwardSpirv), arguments, groupsOf(options.samples, 128));
 }
 
 void VulkanDevice::enqueue(const FrequencyForward& options) {
-  const size_t elements = size_t{options.samples.capacity} * options.encoded.columns;
-  queue(kernel(kFrequencyForwardSpirv), frequencyArguments(*this, options, options.encoded), {groups(elements, 256)});
+  queue(kernel(kFrequencyForwardSpirv), frequencyArguments(*this, options, options.encoded),
+        groupsOf(options.samples, 256, options.encoded.columns));
 }
 
 void VulkanDevice::enqueue(const FrequencyBackward& options) {
   arguments::FrequencyArguments arguments = frequencyArguments(*this, options, options.encodedGradients);
   arguments.inputGradients = deviceAddress(options.inputGradients);
-  const size_t numbers = size_t{options.samples.capacity} * options.dimensions;
-  queue(kernel(kFrequencyBackwardSpirv), arguments, {groups(numbers, 256)});
+  queue(kernel(kFrequencyBackwardSpirv), arguments, groupsOf(options.samples, 256, options.dimensions));
 }
 
 }  // namespace tessera

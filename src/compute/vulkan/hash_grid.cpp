@@ -35,7 +35,7 @@ void VulkanDevice::enqueue(const HashGridForward& options) {
   arguments.encoded = matrixArguments(options.encoded, options.samples.capacity);
   setLevels(grid, arguments.levels);
   queue(kernel(kHashGridForwardSpirv, {static_cast<uint32_t>(grid.features)}), arguments,
-        {groups(options.samples.capacity, kSamplesPerGroup), static_cast<uint32_t>(grid.levels.size())});
+        groupsOf(options.samples, kSamplesPerGroup, 1, static_cast<uint32_t>(grid.levels.size())));
 }
 
 void VulkanDevice::enqueue(const HashGridBackward& options) {
@@ -52,11 +52,10 @@ void VulkanDevice::enqueue(const HashGridBackward& options) {
   setLevels(grid, arguments.levels);
 
   const std::vector<uint32_t> constants = {static_cast<uint32_t>(grid.features)};
-  const uint32_t sampleGroups = groups(options.samples.capacity, kSamplesPerGroup);
   queue(sumKernel(kHashGridBackwardFloatAtomicsSpirv, kHashGridBackwardSpirv, constants), arguments,
-        {sampleGroups, arguments.levelCount});
+        groupsOf(options.samples, kSamplesPerGroup, 1, arguments.levelCount));
   if (options.positionGradients) {
-    queue(kernel(kHashGridPositionGradientsSpirv, constants), arguments, {sampleGroups});
+    queue(kernel(kHashGridPositionGradientsSpirv, constants), arguments, groupsOf(options.samples, kSamplesPerGroup));
   }
 }
 

@@ -18,7 +18,7 @@ void VulkanDevice::enqueue(const LatticeForward& options) {
   auto arguments = lookupArguments<arguments::LatticeArguments>(options);
   arguments.values = quadAddress(options.values);
   arguments.mixed = matrixArguments(options.mixed, options.samples.capacity);
-  queue(kernel(kLatticeForwardSpirv), arguments, {groups(options.samples.capacity, kSamplesPerGroup)});
+  queue(kernel(kLatticeForwardSpirv), arguments, groupsOf(options.samples, kSamplesPerGroup));
 }
 
 void VulkanDevice::enqueue(const LatticeBackward& options) {
@@ -28,7 +28,7 @@ void VulkanDevice::enqueue(const LatticeBackward& options) {
   arguments.valueGradients = deviceAddress(options.valueGradients);
   zeroRows(options.texels, LatticeForward::kColumns, options.valueGradients);
   queue(sumKernel(kLatticeBackwardFloatAtomicsSpirv, kLatticeBackwardSpirv), arguments,
-        {groups(options.samples.capacity, kSamplesPerGroup)});
+        groupsOf(options.samples, kSamplesPerGroup));
 }
 
 }  // namespace tessera

@@ -125,7 +125,7 @@ void VulkanDevice::enqueue(const ExposureForward& options) {
   arguments.photoOfRay = deviceAddress(options.photoOfRay);
   arguments.logGains = deviceAddress(options.logGains);
   arguments.exposed = deviceAddress(options.exposed);
-  queue(kernel(kExposureForwardSpirv), arguments, {groups(3 * size_t{options.rays.capacity}, 256)});
+  queue(kernel(kExposureForwardSpirv), arguments, groupsOf(options.rays, 256, 3));
 }
 
 void VulkanDevice::enqueue(const ExposureBackward& options) {
@@ -139,8 +139,7 @@ void VulkanDevice::enqueue(const ExposureBackward& options) {
   arguments.colourGradients = deviceAddress(options.colourGradients);
   arguments.opacityGradients = deviceAddress(options.opacityGradients);
   arguments.logGainGradients = deviceAddress(options.logGainGradients);
-  queue(sumKernel(kExposureBackwardFloatAtomicsSpirv, kExposureBackwardSpirv), arguments,
-        {groups(options.rays.capacity, 128)});
+  queue(sumKernel(kExposureBackwardFloatAtomicsSpirv, kExposureBackwardSpirv), arguments, groupsOf(options.rays, 128));
 }
 
 }  // namespace tessera

@@ -38,6 +38,8 @@ void VulkanDevice::queueMarch(std::span<const uint32_t> inDouble, std::span<cons
   queueRunningSums(
       {options.rays, march.counts, march.sampleCount, march.fitting, options.sampleCapacity, scratch.partials});
   queue(realKernel(inDouble, inFloat, {true}), arguments, all);
+  countersChanged(options.sampleCount);
+  countersChanged(options.finishedRays);
 }
 
 }  // namespace tessera

@@ -132,7 +132,7 @@ void VulkanDevice::enqueue(const MlpForward& options) {
   const Block block = blockFor(shape, shape.width, multipliesMatrices());
   const MlpForms forms = {kMlpForwardSpirv, kMlpForwardHalfSpirv, kMlpForwardNvMatricesSpirv, kForwardByKhr,
                           kMlpForwardEmulatedMatricesSpirv};
-  queue(mlpKernel(forms, block.constants()), arguments, {groups(capacity, block.samples)});
+  queue(mlpKernel(forms, block.constants()), arguments, groupsOf(options.samples, block.samples));
 }
 
 void VulkanDevice::enqueue(const MlpBackward& options) {
@@ -181,7 +181,7 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
   const Block block = blockFor(shape, std::max(width, paddedOutputs), multipliesMatrices());
   const MlpForms forms = {kMlpBackwardSpirv, kMlpBackwardHalfSpirv, kMlpBackwardNvMatricesSpirv, kBackwardByKhr,
                           kMlpBackwardEmulatedMatricesSpirv};
-  queue(mlpKernel(forms, block.constants()), arguments, {groups(capacity, block.samples)});
+  queue(mlpKernel(forms, block.constants()), arguments, groupsOf(options.samples, block.samples));
 
   for (uint32_t layer = 0; layer <= hiddenLayers; ++layer) {
     arguments::MlpWeightGradientsArguments sums = {};

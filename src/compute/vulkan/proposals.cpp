@@ -23,7 +23,7 @@ void VulkanDevice::enqueue(const ResampleFences& options) {
   arguments.weights = deviceAddress(options.weights);
   arguments.jitter = deviceAddress(options.jitter);
   arguments.resampled = deviceAddress(options.resampled);
-  queue(realKernel(kResampleFencesFloat64Spirv, kResampleFencesSpirv), arguments, {groups(options.rays.capacity, 64)});
+  queue(realKernel(kResampleFencesFloat64Spirv, kResampleFencesSpirv), arguments, groupsOf(options.rays, 64));
 }
 
 void VulkanDevice::enqueue(const InterlevelLoss& options) {

@@ -28,7 +28,7 @@ void VulkanDevice::enqueue(const GenerateRays& options) {
   arguments.pixels = deviceAddress(options.pixels);
   arguments.origins = deviceAddress(options.origins);
   arguments.directions = deviceAddress(options.directions);
-  queue(kernel(kGenerateRaysSpirv), arguments, {groups(options.rays.capacity, kRaysPerGroup)});
+  queue(kernel(kGenerateRaysSpirv), arguments, groupsOf(options.rays, kRaysPerGroup));
 }
 
 void VulkanDevice::enqueue(const MarchRays& options) {
@@ -59,7 +59,7 @@ void VulkanDevice::enqueue(const OpticalDepth& options) {
   arguments.logDensity = matrixArguments(options.logDensity, 0);
   arguments.steps = deviceAddress(options.steps);
   arguments.opticalDepth = deviceAddress(options.opticalDepth);
-  queue(kernel(kOpticalDepthSpirv), arguments, {groups(options.rays.capacity, kRaysPerGroup)});
+  queue(kernel(kOpticalDepthSpirv), arguments, groupsOf(options.rays, kRaysPerGroup));
 }
 
 void VulkanDevice::enqueue(const CompactSamples& options) {
@@ -87,6 +87,8 @@ void VulkanDevice::enqueue(const CompactSamples& options) {
   queueRunningSums(
       {options.rays, scratch.counts, arguments.keptCount, scratch.fitting, options.keptCapacity, scratch.partials});
   queue(kernel(kCompactSamplesSpirv, {true}), arguments, all);
+  countersChanged(options.keptCount);
+  countersChanged(options.finishedRays);
 }
 
 VulkanDevice::RayScratch VulkanDevice::rayScratch(uint32_t rays) {
@@ -107,8 +109,8 @@ void VulkanDevice::moveRows(const Count& rows, const Slice<const uint32_t>& sour
   arguments.from = matrixArguments(from, scatter ? rows.capacity : 0);
   arguments.to = matrixArguments(to, scatter ? 0 : rows.capacity);
   CHECK(size_t{rows.capacity} * from.columns < size_t{1} << 31);
-  queue(kernel(kMoveRowsSpirv, {scatter}), arguments,
-        {groups(size_t{rows.capacity} * from.columns, kElementsPerGroup)});
+  queue(kernel(kMoveRowsSpirv, {scatter}), arguments, groupsOf(rows, kElementsPerGroup, from.columns));
+  countedGroups_.changed(arguments.to.data, to.data.count * sizeof(float));  // counters may travel as floats
 }
 
 void VulkanDevice::enqueue(const GatherRows& options) {

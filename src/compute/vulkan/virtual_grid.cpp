@@ -1,5 +1,7 @@
 #include "compute/vulkan/virtual_grid.h"
 
+#include <algorithm>
+
 #include "shaders/distinct_texels_mark.h"
 #include "shaders/distinct_texels_place.h"
 #include "shaders/virtual_grid_backward.h"
@@ -19,7 +21,7 @@ void VulkanDevice::zeroRows(const Count& rows, uint32_t columns, const Slice<flo
   const size_t most = size_t{rows.capacity} * columns;
   CHECK(most < size_t{1} << 31);
   queue(kernel(kZeroRowsSpirv), arguments::ZeroRowsArguments{countArguments(rows), deviceAddress(numbers), columns, 0},
-        {groups(most, 256)});
+        groupsOf(rows, 256, columns));
 }
 
 void VulkanDevice::enqueue(const DistinctTexels& options) {
@@ -39,9 +41,11 @@ void VulkanDevice::enqueue(const DistinctTexels& options) {
   arguments.texelPositions = deviceAddress(options.texelPositions);
   arguments.blocks = options.blocks;
   arguments.texelCapacity = options.texelCapacity;
-  const Groups ofCorners = {atLeastOneGroup(corners, 128)};
+  Groups ofCorners = groupsOf(options.samples, 128, grid.corners());
+  ofCorners.x = std::max(ofCorners.x, 1u);
   if (!grid.shareTexels) {
     queue(kernel(kDistinctTexelsMarkSpirv, {false}), arguments, ofCorners);
+    countersChanged(options.firstTexel);
     return;
   }
   fillZero(options.marks.part(0, words));
@@ -55,6 +59,7 @@ void VulkanDevice::enqueue(const DistinctTexels& options) {
                     .scratch = fitting + 2 * sizeof(uint32_t),
                     .marks = arguments.marks});
   queue(kernel(kDistinctTexelsPlaceSpirv), arguments, {groups(words, 128)});
+  countersChanged(options.firstTexel);
 }
 
 void VulkanDevice::enqueue(const VirtualGridForward& options) {
@@ -65,7 +70,7 @@ void VulkanDevice::enqueue(const VirtualGridForward& options) {
   arguments.colours = deviceAddress(options.colours);
   arguments.minAlpha = options.minAlpha;
   queue(kernel(kVirtualGridForwardSpirv, {options.grid.corners()}), arguments,
-        {groups(options.samples.capacity, kSamplesPerGroup)});
+        groupsOf(options.samples, kSamplesPerGroup));
 }
 
 void VulkanDevice::enqueue(const VirtualGridBackward& options) {
@@ -77,7 +82,7 @@ void VulkanDevice::enqueue(const VirtualGridBackward& options) {
   arguments.attributeGradients = deviceAddress(options.attributeGradients);
   zeroRows(options.texels, VirtualGrid::kAttributes, options.attributeGradients);
   queue(sumKernel(kVirtualGridBackwardFloatAtomicsSpirv, kVirtualGridBackwardSpirv, {options.grid.corners()}),
-        arguments, {groups(options.samples.capacity, kSamplesPerGroup)});
+        arguments, groupsOf(options.samples, kSamplesPerGroup));
 }
 
 }  // namespace tessera

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "compute/device.h"
+#include "compute/vulkan/counted_groups.h"
 #include "gpu/stream.h"
 #include "shaders/compute/arguments.h"
 #include "shaders/compute/arguments_mlp.h"
@@ -34,7 +35,8 @@ class VulkanDevice : public Device {
   enum class MlpArithmetic { floats, halves, nvMatrices, khrMatrices, emulatedMatrices };
 
   explicit VulkanDevice(std::shared_ptr<const GpuContext> context);  // as fast as its features allow
-  VulkanDevice(std::shared_ptr<const GpuContext> context, MlpArithmetic arithmetic, const GpuMatrices& matrices);
+  VulkanDevice(std::shared_ptr<const GpuContext> context, MlpArithmetic arithmetic, const GpuMatrices& matrices,
+               const GroupBounds& bounds = {});
   ~VulkanDevice() override;  // with TESSERA_GPU_TIMES=1 in the environment, says what each operation took on the device
 
   // The specialization constants of a kernel that includes matrix_tiles.glsl: its own three, then those of that.
@@ -52,6 +54,7 @@ class VulkanDevice : public Device {
   void fillZero(Memory& memory, size_t offset, size_t bytes) override;
   void finish() override;
   bool supports(Operation) const override { return true; }
+  static MlpArithmetic bestArithmetic(const GpuContext& context);
   // Of operations that begin at row 0, and of those that take part of the rows.
   arguments::CountArguments countArguments(const Count& count) const;
   arguments::CountArguments partArguments(const Count& count) const;
@@ -73,7 +76,6 @@ class VulkanDevice : public Device {
   TESSERA_OPERATIONS(TESSERA_ENQUEUE)
 #undef TESSERA_ENQUEUE
 
-  static MlpArithmetic bestArithmetic(const GpuContext& context);
   bool multipliesMatrices() const {
     return mlpArithmetic_ >= MlpArithmetic::nvMatrices;
   }
@@ -102,6 +104,13 @@ class VulkanDevice : public Device {
   }
   // Enough workgroups of `perGroup` for `count`, or the most there may be: kernels share out what is left.
   uint32_t groups(size_t count, size_t perGroup) const;
+  // The same for `elements` of each of `rows`, of which the device may count fewer than there is room for; times `y`.
+  // Queues that counting where need be.
+  Groups groupsOf(const Count& rows, uint32_t perGroup, uint32_t elements = 1, uint32_t y = 1) {
+    return countedGroups_.of(*stream_, partArguments(rows), static_cast<bool>(rows.counter), elements, perGroup, y);
+  }
+  // Whatever writes numbers that may be counters says so.
+  void countersChanged(const Slice<const uint32_t>& words);
   uint32_t atLeastOneGroup(size_t count, size_t perGroup) const {
     return std::max(groups(count, perGroup), 1u);
   }
@@ -154,6 +163,7 @@ class VulkanDevice : public Device {
   // 0 and the largest number. What all invocations would read of nothing is read of it instead: Mesa's driver for the
   // processor (26.2) reads such words where no invocation comes, too.
   GpuBuffer noCounter_;
+  CountedGroups countedGroups_;
   MlpArithmetic mlpArithmetic_;
   GpuMatrices matrices_;
   std::map<std::pair<const uint32_t*, std::vector<uint32_t>>, GpuKernel> kernels_;

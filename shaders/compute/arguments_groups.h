@@ -1,0 +1,20 @@
+// How many workgroups kernels get for rows that the device counts: compute/vulkan/counted_groups.h.
+#ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_GROUPS_H
+#define TESSERA_SHADERS_COMPUTE_ARGUMENTS_GROUPS_H
+
+#include "arguments.h"
+
+TESSERA_BEGIN_ARGUMENTS
+
+struct CountGroupsArguments {
+  CountArguments rows;
+  UintPointer groups;  // [3]: x, y, z
+  uint elements;       // of a row
+  uint perGroup;       // elements that a group takes
+  uint most;           // along x
+  uint y;
+};
+TESSERA_SIZE(CountGroupsArguments, 48);
+
+TESSERA_END_ARGUMENTS
+#endif

@@ -1,0 +1,114 @@
+#include "compute/vulkan/counted_groups.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "gpu/test_context.h"
+#include "shaders/double_values.h"
+
+namespace tessera {
+namespace {
+
+constexpr uint32_t kPerGroup = 64;  // local_size_x of double_values.comp
+constexpr uint32_t kCapacity = 2000;
+
+class CountedGroupsTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    context_ = openForTest();
+    SKIP_WITHOUT_VULKAN(context_);
+    stream_ = std::make_unique<GpuStream>(context_);
+    doubles_ = std::make_unique<GpuKernel>(context_, kDoubleValuesSpirv);
+    values_ = GpuBuffer(context_, kCapacity * sizeof(uint32_t));
+    counters_ = GpuBuffer(context_, 2 * sizeof(uint32_t));
+    rows_ = {counters_.address() + sizeof(uint32_t), counters_.address(), kCapacity, 0};
+  }
+  void TearDown() override { EXPECT_EQ(GpuContext::validationMessages(), 0); }
+
+  // Rows [first, end) are what the device counts.
+  void setCounters(uint32_t first, uint32_t end) {
+    const std::array words = {first, end};
+    stream_->upload(counters_, 0, std::as_bytes(std::span(words)));
+  }
+
+  // How many workgroups run.
+  uint32_t run(const Groups& groups) {
+    const std::vector<uint32_t> ones(kCapacity, 1);
+    stream_->upload(values_, 0, std::as_bytes(std::span(ones)));
+    struct {
+      uint64_t values;
+      uint32_t count, unused;
+    } const arguments = {values_.address(), kCapacity, 0};
+    stream_->run(*doubles_, std::as_bytes(std::span(&arguments, 1)), groups);
+    std::vector<uint32_t> values(kCapacity);
+    stream_->download(values_, 0, std::as_writable_bytes(std::span(values)));
+    return (std::count(values.begin(), values.end(), 2u) + kPerGroup - 1) / kPerGroup;
+  }
+
+  std::shared_ptr<GpuContext> context_;
+  std::unique_ptr<GpuStream> stream_;
+  std::unique_ptr<GpuKernel> doubles_;
+  GpuBuffer values_, counters_;
+  arguments::CountArguments rows_ = {};
+};
+
+TEST_F(CountedGroupsTest, AreEnoughForTheRowsThatTheDeviceHasCounted) {
+  CountedGroups counted(context_, {.fewest = 4});
+  const auto groups = [&](uint32_t elements) { return counted.of(*stream_, rows_, true, elements, kPerGroup, 1); };
+  setCounters(10, 10 + 3 * kPerGroup);
+  EXPECT_EQ(run(groups(1)), 3u);
+  EXPECT_EQ(run(groups(5)), 15u);
+  setCounters(10, 10 + 3 * kPerGroup + 1);
+  counted.changed(counters_.address() + sizeof(uint32_t), sizeof(uint32_t));
+  EXPECT_EQ(run(groups(1)), 4u);
+  setCounters(kPerGroup, 10 + 3 * kPerGroup + 1);
+  counted.changed(counters_.address(), sizeof(uint32_t));
+  EXPECT_EQ(run(groups(1)), 3u);
+}
+
+TEST_F(CountedGroupsTest, AreOneAtLeastAndNoMoreThanThereIsRoomFor) {
+  CountedGroups counted(context_, {.fewest = 0, .most = 8});
+  const auto groups = [&] {
+    counted.changed(counters_.address(), counters_.bytes());
+    return counted.of(*stream_, rows_, true, 1, kPerGroup, 1);
+  };
+  setCounters(5, 5);
+  EXPECT_EQ(run(groups()), 1u);
+  setCounters(6, 5);
+  EXPECT_EQ(run(groups()), 1u);
+  rows_.capacity = 4 * kPerGroup;
+  setCounters(0, kCapacity);
+  EXPECT_EQ(run(groups()), 4u);
+  rows_.capacity = kCapacity;
+  EXPECT_EQ(run(groups()), 8u);
+}
+
+TEST_F(CountedGroupsTest, AreCountedOnceUntilCountersMayHaveChanged) {
+  CountedGroups counted(context_, {.fewest = 0});
+  setCounters(0, 3 * kPerGroup);
+  const auto of = [&] { return counted.of(*stream_, rows_, true, 1, kPerGroup, 1); };
+  EXPECT_EQ(run(of()), 3u);
+  setCounters(0, 7 * kPerGroup);
+  EXPECT_EQ(run(of()), 3u);
+  counted.changed(counters_.address() - 4, 4);
+  counted.changed(counters_.address() + counters_.bytes(), 4);
+  EXPECT_EQ(run(of()), 3u);
+  counted.changed(counters_.address(), counters_.bytes());
+  EXPECT_EQ(run(of()), 7u);
+}
+
+TEST_F(CountedGroupsTest, AreNotCountedWhereFewAreEnoughForAll) {
+  CountedGroups counted(context_, {.fewest = (kCapacity + kPerGroup - 1) / kPerGroup});
+  setCounters(0, 0);
+  EXPECT_EQ(run(counted.of(*stream_, rows_, true, 1, kPerGroup, 1)), (kCapacity + kPerGroup - 1) / kPerGroup);
+  CountedGroups always(context_, {.fewest = 0});
+  EXPECT_EQ(run(always.of(*stream_, rows_, false, 1, kPerGroup, 1)), (kCapacity + kPerGroup - 1) / kPerGroup);
+}
+
+}  // namespace
+}  // namespace tessera
