@@ -13,6 +13,9 @@
 #include "render/tile_scene.h"
 #include "representations/hash/hash_cube.h"
 #include "representations/hash/hash_model_renderer.h"
+#ifdef TESSERA_HAS_VULKAN
+#include "gpu/test_context.h"
+#endif
 
 namespace tessera {
 namespace {
@@ -189,10 +192,10 @@ TEST(BakeHash, StoresAllCornersOfEverySeenCell) {
   }
 }
 
-HashLevelModels onlyModel(TrainedHashCube& trained, const fs::path& folder) {
+HashLevelModels onlyModel(TrainedHashCube& trained, const fs::path& folder, Device& device) {
   // Baking holds a model of its own.
-  return [&trained, folder](uint32_t) {
-    auto model = std::make_unique<HashModel>(*trained.device, trained.model().config(), trained.model().grid(), false);
+  return [&trained, folder, &device](uint32_t) {
+    auto model = std::make_unique<HashModel>(device, trained.model().config(), trained.model().grid(), false);
     for (uint32_t part = 0; part < trained.trainer->parts(); ++part) {
       const fs::path path = folder / ("part" + std::to_string(part));
       writeFileAtomically(path, trained.trainer->save(part));
@@ -200,6 +203,10 @@ HashLevelModels onlyModel(TrainedHashCube& trained, const fs::path& folder) {
     }
     return model;
   };
+}
+
+HashLevelModels onlyModel(TrainedHashCube& trained, const fs::path& folder) {
+  return onlyModel(trained, folder, *trained.device);
 }
 
 class BakedScenes : public testing::Test {
@@ -245,6 +252,28 @@ TEST_F(BakedScenes, LookAsTheirModelsDo) {
       }
     }
   }
+}
+
+TEST_F(BakedScenes, LookTheSameWhereVulkanMadeThem) {
+#ifndef TESSERA_HAS_VULKAN
+  GTEST_SKIP() << "this build has no Vulkan";
+#else
+  SKIP_WITHOUT_VULKAN(openForTest());
+  const CubeScene scene;
+  TrainedHashCube trained(scene, smallHashConfig(), cubeGrid(2), 120);
+  const std::unique_ptr<Device> vulkan = makeDevice({"vulkan"});
+  const auto drawn = [&](Device& device, const char* name) {
+    bakeHash(onlyModel(trained, folder_, device), 1, scene.capture(), folder_ / name, {});
+    TileScene<HashContent> opened = openTileScene<HashContent>(folder_ / name);
+    SceneRendererSettings settings;
+    settings.threads = 2;
+    settings.selection.mostPixels = 0;
+    HashRenderer tiles(opened.frame, std::move(opened.tree), std::move(opened.source), settings);
+    return tiles.render(scene.capture().cameras[0], scene.capture().photos[0].worldFromCamera, nullptr).colour;
+  };
+  EXPECT_GT(psnrOf(drawn(*vulkan, "vulkan"), drawn(*trained.device, "cpu")), 40);
+  EXPECT_EQ(GpuContext::validationMessages(), 0);
+#endif
 }
 
 TEST_F(BakedScenes, AreTheSameBytesAgain) {

@@ -16,6 +16,9 @@
 #include "tiles/volume_payload.h"
 #include "train/level_folders.h"
 #include "train/test_support.h"
+#ifdef TESSERA_HAS_VULKAN
+#include "gpu/test_context.h"
+#endif
 
 namespace tessera {
 namespace {
@@ -372,6 +375,35 @@ TEST(BakeVolume, PutsLevelsAboveOneAnother) {
     EXPECT_EQ(renderer.cut().tiles.size(), finest == 0 ? 4u : 1u);
     for (const float value : view.colour.pixels) ASSERT_TRUE(std::isfinite(value));
   }
+}
+
+TEST(BakeVolume, LooksTheSameWhereVulkanMadeIt) {
+#ifndef TESSERA_HAS_VULKAN
+  GTEST_SKIP() << "this build has no Vulkan";
+#else
+  SKIP_WITHOUT_VULKAN(openForTest());
+  const CubeScene scene;
+  const TemporaryFolder folder;
+  TrainedVolumeCube trained(scene, smallVolumeConfig(), cubeGrid(2), 200);
+  const std::vector<Bytes> saved = trained.saved();
+  const std::unique_ptr<Device> vulkan = makeDevice({"vulkan"});
+  const auto drawn = [&](Device& device, const char* name) {
+    const LevelModels models = [&](uint32_t) {
+      auto model = std::make_unique<VolumeModel>(device, trained.model().config(), trained.model().grid());
+      for (uint32_t block = 0; block < saved.size(); ++block) {
+        const fs::path path = folder / ("block" + std::to_string(block));
+        writeFileAtomically(path, saved[block]);
+        model->restore(block, path, readSafetensors(path));
+      }
+      return model;
+    };
+    bakeVolume(models, 1, scene.capture(), folder / name, {});
+    return openScene(folder / name)
+        ->render(scene.capture().cameras[0], scene.capture().photos[0].worldFromCamera, nullptr);
+  };
+  EXPECT_GT(psnrOf(drawn(*vulkan, "vulkan"), drawn(*trained.device, "cpu")), 40);
+  EXPECT_EQ(GpuContext::validationMessages(), 0);
+#endif
 }
 
 TEST(BakeVolume, WritesTheSameSceneAgain) {
