@@ -54,6 +54,7 @@ VulkanDevice::VulkanDevice(std::shared_ptr<const GpuContext> context, MlpArithme
       matrices_(matrices) {
   const uint32_t words[] = {0, ~0u};
   stream_->upload(noCounter_, 0, std::as_bytes(std::span(words)));
+  settleArithmetic();
   const char* times = std::getenv("TESSERA_GPU_TIMES");
   if (times != nullptr && std::string_view(times) == "1") stream_->measure(true);
 }

@@ -252,6 +252,41 @@ TEST_P(HalfNetworks, AreRightWhateverTheSizeOfGradients) {
   runEveryWidth(*device, gradientSize, 1e-2);
 }
 
+// While it is there, the driver compiles no kernels that multiply matrices.
+class NoMatrixKernels {
+ public:
+  NoMatrixKernels() {
+    kept() = vkCreateComputePipelines;
+    vkCreateComputePipelines = [](VkDevice device, VkPipelineCache cache, uint32_t count,
+                                  const VkComputePipelineCreateInfo* infos, const VkAllocationCallbacks* allocator,
+                                  VkPipeline* pipelines) {
+      constexpr uint32_t kConstantsOfMatrices = 8;  // VulkanDevice::matrixConstants
+      const VkSpecializationInfo* constants = infos->stage.pSpecializationInfo;
+      if (constants != nullptr && constants->mapEntryCount == kConstantsOfMatrices) return VK_ERROR_UNKNOWN;
+      return kept()(device, cache, count, infos, allocator, pipelines);
+    };
+  }
+  ~NoMatrixKernels() { vkCreateComputePipelines = kept(); }
+  NoMatrixKernels(const NoMatrixKernels&) = delete;
+  NoMatrixKernels& operator=(const NoMatrixKernels&) = delete;
+
+ private:
+  static PFN_vkCreateComputePipelines& kept() {
+    static PFN_vkCreateComputePipelines function = nullptr;
+    return function;
+  }
+};
+
+TEST(NetworksInHalves, DoWithoutMatricesWhereTheDriverCompilesNoKernelsOfThem) {
+  const auto context = openForTest();
+  SKIP_WITHOUT_VULKAN(context);
+  if (!context->features().float16) GTEST_SKIP() << context->name() << " has no fp16";
+  const NoMatrixKernels none;
+  const std::unique_ptr<Device> device = makeVulkanDeviceWithEmulatedMatrices({}, kLarge);
+  EXPECT_TRUE(device->keepsHalves());
+  runEveryWidth(*device, 1, 1e-2);
+}
+
 // Where a step has gone wrong, that is seen and not made to look like large numbers.
 TEST(NetworksInHalves, PassOnGradientsThatAreNoNumbers) {
   const auto context = openForTest();

@@ -1,9 +1,12 @@
 #include "compute/mlp.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <span>
 
+#include "base/error.h"
+#include "base/log.h"
 #include "compute/vulkan/vulkan_device.h"
 #include "shaders/compute/arguments_mlp.h"
 #include "shaders/halve_numbers.h"
@@ -51,6 +54,20 @@ constexpr std::span<const uint32_t> kForwardByKhr, kBackwardByKhr, kWeightGradie
     kWeightGradientsByKhrAndFloatAtomics;
 #endif
 
+// In the order of MlpArithmetic.
+using MlpForms = std::array<std::span<const uint32_t>, 5>;
+constexpr MlpForms kForwardForms = {kMlpForwardSpirv, kMlpForwardHalfSpirv, kMlpForwardNvMatricesSpirv, kForwardByKhr,
+                                    kMlpForwardEmulatedMatricesSpirv};
+constexpr MlpForms kBackwardForms = {kMlpBackwardSpirv, kMlpBackwardHalfSpirv, kMlpBackwardNvMatricesSpirv,
+                                     kBackwardByKhr, kMlpBackwardEmulatedMatricesSpirv};
+constexpr MlpForms kWeightGradientForms = {kMlpWeightGradientsSpirv, kMlpWeightGradientsHalfSpirv,
+                                           kMlpWeightGradientsMatricesNvSpirv, kWeightGradientsByKhr,
+                                           kMlpWeightGradientsMatricesEmulatedSpirv};
+constexpr MlpForms kWeightGradientFormsWithFloatAtomics = {
+    kMlpWeightGradientsFloatAtomicsSpirv, kMlpWeightGradientsHalfFloatAtomicsSpirv,
+    kMlpWeightGradientsMatricesNvFloatAtomicsSpirv, kWeightGradientsByKhrAndFloatAtomics,
+    kMlpWeightGradientsMatricesEmulatedFloatAtomicsSpirv};
+
 // How a network's kernels are built: see mlp_tile.glsl and mlp_matrices.glsl.
 struct Block {
   uint32_t width, samples, stateWidth;
@@ -91,13 +108,32 @@ std::vector<uint32_t> VulkanDevice::matrixConstants(std::vector<uint32_t> own, c
   return own;
 }
 
-const GpuKernel& VulkanDevice::mlpKernel(const MlpForms& forms, std::vector<uint32_t> constants) {
+const GpuKernel& VulkanDevice::mlpKernel(std::span<const std::span<const uint32_t>, 5> forms,
+                                         std::vector<uint32_t> constants) {
   const std::span<const uint32_t> spirv = forms[static_cast<size_t>(mlpArithmetic_)];
   CHECK(!spirv.empty());
   if (!multipliesMatrices()) return kernel(spirv, std::move(constants));
   constants = matrixConstants(std::move(constants), matrices_);
   const bool isEmulated = mlpArithmetic_ == MlpArithmetic::emulatedMatrices;
   return kernel(spirv, std::move(constants), isEmulated ? 0 : matrices_.subgroupSize);
+}
+
+const GpuKernel& VulkanDevice::weightGradientKernel(uint32_t tileRows, uint32_t tileColumns) {
+  const bool atomics = stream_->context()->features().floatAtomics;
+  return mlpKernel(atomics ? kWeightGradientFormsWithFloatAtomics : kWeightGradientForms, {tileRows, tileColumns});
+}
+
+void VulkanDevice::settleArithmetic() {
+  if (!multipliesMatrices()) return;
+  const Block block = blockFor({.width = 64}, 64, true);
+  try {
+    mlpKernel(kForwardForms, block.constants());
+    mlpKernel(kBackwardForms, block.constants());
+    weightGradientKernel(64, 64);
+  } catch (const Error& error) {
+    warn("{} compiles no kernels of cooperative matrices ({}): networks do without", name(), error.reason());
+    mlpArithmetic_ = MlpArithmetic::halves;
+  }
 }
 
 uint64_t VulkanDevice::weightNumbers(const Slice<const float>& weights, uint64_t scratch) {
@@ -130,9 +166,7 @@ void VulkanDevice::enqueue(const MlpForward& options) {
   arguments.hiddenLayers = shape.hiddenLayers;
   arguments.sigmoidOutput = shape.activation == OutputActivation::sigmoid;
   const Block block = blockFor(shape, shape.width, multipliesMatrices());
-  const MlpForms forms = {kMlpForwardSpirv, kMlpForwardHalfSpirv, kMlpForwardNvMatricesSpirv, kForwardByKhr,
-                          kMlpForwardEmulatedMatricesSpirv};
-  queue(mlpKernel(forms, block.constants()), arguments, groupsOf(options.samples, block.samples));
+  queue(mlpKernel(kForwardForms, block.constants()), arguments, groupsOf(options.samples, block.samples));
 }
 
 void VulkanDevice::enqueue(const MlpBackward& options) {
@@ -179,9 +213,7 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
     queue(kernel(kMlpLargestGradientSpirv), largest, {arguments.largestCount});
   }
   const Block block = blockFor(shape, std::max(width, paddedOutputs), multipliesMatrices());
-  const MlpForms forms = {kMlpBackwardSpirv, kMlpBackwardHalfSpirv, kMlpBackwardNvMatricesSpirv, kBackwardByKhr,
-                          kMlpBackwardEmulatedMatricesSpirv};
-  queue(mlpKernel(forms, block.constants()), arguments, groupsOf(options.samples, block.samples));
+  queue(mlpKernel(kBackwardForms, block.constants()), arguments, groupsOf(options.samples, block.samples));
 
   for (uint32_t layer = 0; layer <= hiddenLayers; ++layer) {
     arguments::MlpWeightGradientsArguments sums = {};
@@ -200,12 +232,6 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
 
 void VulkanDevice::queueWeightGradients(const arguments::MlpWeightGradientsArguments& sums, size_t capacity) {
   const uint32_t shares = std::clamp<uint32_t>(groups(capacity, kSamplesPerShare), 1, kMostShares);
-  const MlpForms withFloatAtomics = {kMlpWeightGradientsFloatAtomicsSpirv, kMlpWeightGradientsHalfFloatAtomicsSpirv,
-                                     kMlpWeightGradientsMatricesNvFloatAtomicsSpirv,
-                                     kWeightGradientsByKhrAndFloatAtomics,
-                                     kMlpWeightGradientsMatricesEmulatedFloatAtomicsSpirv};
-  const MlpForms without = {kMlpWeightGradientsSpirv, kMlpWeightGradientsHalfSpirv, kMlpWeightGradientsMatricesNvSpirv,
-                            kWeightGradientsByKhr, kMlpWeightGradientsMatricesEmulatedSpirv};
   uint32_t tileRows = kWeightTile, tileColumns = kWeightTile;
   if (multipliesMatrices()) {
     // The largest that leave no row and no column over.
@@ -215,8 +241,7 @@ void VulkanDevice::queueWeightGradients(const arguments::MlpWeightGradientsArgum
     tileRows = largest(sums.rows, {64, 32, 16});
     tileColumns = largest(sums.columns, {64, 48, 32, 16});
   }
-  const MlpForms& forms = stream_->context()->features().floatAtomics ? withFloatAtomics : without;
-  queue(mlpKernel(forms, {tileRows, tileColumns}), sums,
+  queue(weightGradientKernel(tileRows, tileColumns), sums,
         {groups(sums.columns, tileColumns), groups(sums.rows, tileRows), shares});
 }
 

@@ -83,9 +83,10 @@ class VulkanDevice : public Device {
   // Compiled at first use. `constants` are the shader's specialization constants in order.
   const GpuKernel& kernel(std::span<const uint32_t> spirv, std::vector<uint32_t> constants = {},
                           uint32_t subgroupSize = 0);
-  // A kernel of networks, in the forms that it has for each arithmetic. `constants` are those that all have.
-  using MlpForms = std::array<std::span<const uint32_t>, 5>;  // in the order of MlpArithmetic
-  const GpuKernel& mlpKernel(const MlpForms& forms, std::vector<uint32_t> constants);
+  // A kernel of networks, in the forms that it has for each MlpArithmetic. `constants` are those that all have.
+  const GpuKernel& mlpKernel(std::span<const std::span<const uint32_t>, 5> forms, std::vector<uint32_t> constants);
+  const GpuKernel& weightGradientKernel(uint32_t tileRows, uint32_t tileColumns);
+  void settleArithmetic();  // without matrices where the driver compiles no kernels of theirs
   // Chooses between the two forms of a kernel that adds to sums from many invocations.
   const GpuKernel& sumKernel(std::span<const uint32_t> withFloatAtomics, std::span<const uint32_t> without,
                              std::vector<uint32_t> constants = {});
