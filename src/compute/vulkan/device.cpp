@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <string_view>
 
 #include "base/error.h"
@@ -151,6 +153,12 @@ arguments::RealArguments VulkanDevice::realArguments(double value) const {
   if (!stream_->context()->features().float64) return {std::bit_cast<uint32_t>(static_cast<float>(value)), 0};
   const auto bits = std::bit_cast<uint64_t>(value);
   return {static_cast<uint32_t>(bits), static_cast<uint32_t>(bits >> 32)};
+}
+
+arguments::RealArguments VulkanDevice::realArgumentsNotBelow(double value) const {
+  const auto rounded = static_cast<float>(value);
+  if (stream_->context()->features().float64 || rounded >= value) return realArguments(value);
+  return realArguments(std::nextafter(rounded, std::numeric_limits<float>::infinity()));
 }
 
 uint32_t VulkanDevice::groups(size_t count, size_t perGroup) const {

@@ -40,7 +40,7 @@ void VulkanDevice::enqueue(const MarchRays& options) {
   arguments.space.minStep = space.minStep;
   arguments.space.maxStep = space.maxStep;
   arguments.space.cone = space.cone;
-  arguments.space.firstIndex = realArguments(space.stepIndex(space.near));
+  arguments.space.firstIndex = realArgumentsNotBelow(space.stepIndex(space.near));
   if (space.cone > 0) {
     const double lambda = std::log1p(static_cast<double>(space.cone)), last = space.maxStep / lambda;
     arguments.space.lambda = realArguments(lambda);

@@ -99,6 +99,8 @@ class VulkanDevice : public Device {
     return stream_->context()->features().subgroups ? withSubgroups : without;
   }
   arguments::RealArguments realArguments(double value) const;
+  // Of a bound that a number just below it must not meet.
+  arguments::RealArguments realArgumentsNotBelow(double value) const;
   template <class Arguments>
   void queue(const GpuKernel& kernel, const Arguments& arguments, Groups groups) {
     stream_->run(kernel, std::as_bytes(std::span(&arguments, 1)), groups);
