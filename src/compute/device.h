@@ -118,6 +118,10 @@ class Device {
   virtual void fillZero(Memory& memory, size_t offset, size_t bytes) = 0;  // multiples of 4
   virtual void finish() = 0;
 
+  // Threads of the processor for what training does on the host between steps, such as drawing rays.
+  int hostThreads() const { return hostThreads_; }
+  void setHostThreads(int threads) { hostThreads_ = threads; }
+
   // False where a device does not have an operation yet; calling it then is our own mistake (CHECK).
   virtual bool supports(Operation operation) const = 0;
 
@@ -168,11 +172,14 @@ class Device {
   void fillZero(const Slice<T>& slice) {
     if (slice) fillZero(*slice.memory, slice.first * sizeof(T), slice.count * sizeof(T));
   }
+
+ private:
+  int hostThreads_ = 1;
 };
 
 struct DeviceOptions {
   std::string kind = "cpu";  // auto, cpu, reference, vulkan, vulkan:1 (an index) or vulkan:radeon (a part of a name)
-  int threads = 0;           // cpu: 0 = all cores
+  int threads = 0;           // of the processor; 0: all cores for cpu, a few beside other devices
 };
 
 // Throws Error naming the first operation that the device lacks.

@@ -257,9 +257,10 @@ std::unique_ptr<Device> openDevice(const std::string& name) {
       std::printf("no device \"%s\": %s has no such arithmetic\n", name.c_str(), context->name().c_str());
       return nullptr;
     }
-    if (name == kWithFallbacks) return makeVulkanDeviceWithFewGroups(options);
+    if (name == "vulkan") return makeVulkanDevice(options);
+    // By few workgroups, which share out what the plain one has many for.
     return name == kWithEmulatedMatrices ? makeVulkanDeviceWithEmulatedMatrices(options, {})
-                                         : makeVulkanDevice(options);
+                                         : makeVulkanDeviceWithFewGroups(options);
   }
 #endif
   DeviceOptions options;

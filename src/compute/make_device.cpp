@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
+#include <thread>
 
 #include "base/error.h"
 #include "base/log.h"
@@ -47,7 +49,9 @@ std::optional<std::string> vulkanDeviceOf([[maybe_unused]] const std::string& ki
   return std::nullopt;
 }
 
-std::unique_ptr<Device> makeDevice(const DeviceOptions& options) {
+namespace {
+
+std::unique_ptr<Device> makeDeviceOfKind(const DeviceOptions& options) {
   const std::string& kind = options.kind;
   if (kind == "reference") return makeReferenceDevice();
 #ifdef TESSERA_HAS_VULKAN
@@ -65,6 +69,16 @@ std::unique_ptr<Device> makeDevice(const DeviceOptions& options) {
   if (kind == "cpu" || kind == "auto") return makeCpuDevice(options.threads);
   throw Error("--device " + kind, "", "there is no such device in this build",
               "use one of auto, cpu, reference, vulkan, vulkan:<index or part of a name>");
+}
+
+}  // namespace
+
+std::unique_ptr<Device> makeDevice(const DeviceOptions& options) {
+  constexpr int kMostHostThreads = 8;  // what they do takes a ms or two of one
+  std::unique_ptr<Device> made = makeDeviceOfKind(options);
+  const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
+  made->setHostThreads(std::clamp(threads, 1, kMostHostThreads));
+  return made;
 }
 
 std::vector<DeviceDescription> listDevices() {

@@ -1,5 +1,7 @@
 #include "gpu/kernel.h"
 
+#include <fmt/format.h>
+
 #include <vector>
 
 #include "gpu/call.h"
@@ -50,6 +52,11 @@ GpuKernel::GpuKernel(std::shared_ptr<const GpuContext> context, std::span<const 
     vkDestroyShaderModule(device, module, nullptr);
   }
   if (result != VK_SUCCESS) vkDestroyPipelineLayout(device, layout_, nullptr);
+  if (result < 0 && result != VK_ERROR_OUT_OF_DEVICE_MEMORY && result != VK_ERROR_OUT_OF_HOST_MEMORY &&
+      result != VK_ERROR_DEVICE_LOST) {
+    throw KernelRefused(context_->name(), "vkCreateComputePipelines",
+                        fmt::format("VkResult {}", static_cast<int>(result)), "update the graphics driver");
+  }
   checkVulkan(result, "vkCreateComputePipelines");
 }
 

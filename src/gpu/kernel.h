@@ -7,14 +7,21 @@
 #include <memory>
 #include <span>
 
+#include "base/error.h"
 #include "gpu/context.h"
 
 namespace tessera {
 
+// The driver does not compile a shader. Not thrown where memory is short or the device is lost.
+class KernelRefused : public Error {
+ public:
+  using Error::Error;
+};
+
 class GpuKernel {
  public:
   // `constants` are the values of the shader's specialization constants 0, 1, 2, ... All its subgroups are full and
-  // have `subgroupSize` lanes where that is not 0 (GpuMatrices::subgroupSize).
+  // have `subgroupSize` lanes where that is not 0 (GpuMatrices::subgroupSize). Throws Error.
   GpuKernel(std::shared_ptr<const GpuContext> context, std::span<const uint32_t> spirv,
             std::span<const uint32_t> constants = {}, uint32_t subgroupSize = 0);
   ~GpuKernel();

@@ -68,13 +68,18 @@ TEST_F(GpuStreamTest, RunsAsManyWorkgroupsAsTheDevicesMemorySays) {
   auto expected = numbers(1000);
   stream.upload(buffer, 0, std::as_bytes(std::span(expected)));
   const Arguments arguments = {buffer.address(), 1000};
-  for (const uint32_t groups : {2u, 0u, 5u}) {  // of 64 each; the lists are the same but for that number
-    const std::array<uint32_t, 3> counted = {groups, 1, 1};
-    stream.upload(words, 4, std::as_bytes(std::span(counted)));
-    stream.run(doubles, std::as_bytes(std::span(&arguments, 1)), Groups::counted(words, 4));
+  stream.finish();
+  const uint64_t before = stream.batchesRecorded();
+  for (const uint32_t groups : {2u, 0u, 5u, 1u, 3u}) {  // of 64 each; the lists are the same but for that number
+    for (uint32_t again = 0; again < 5; ++again) {      // short lists are always recorded
+      const std::array<uint32_t, 3> counted = {groups + again, 1, 1};
+      stream.upload(words, 4, std::as_bytes(std::span(counted)));
+      stream.run(doubles, std::as_bytes(std::span(&arguments, 1)), Groups::counted(words, 4));
+      for (uint32_t i = 0; i < 64 * (groups + again); ++i) expected[i] *= 2;
+    }
     stream.send();
-    for (uint32_t i = 0; i < 64 * groups; ++i) expected[i] *= 2;
   }
+  EXPECT_EQ(stream.batchesRecorded() - before, 2u) << "one of each buffer of commands";
   EXPECT_EQ(downloaded(stream, buffer), expected);
 }
 

@@ -34,6 +34,7 @@ std::vector<int> trainingPhotos(const Capture& capture) {
 PhotoRays::PhotoRays(Device& device, const Capture& capture, const SceneFrame& frame, const Settings& settings)
     : device_(device),
       settings_(settings),
+      pool_(device.hostThreads()),
       photos_(capture, trainingPhotos(capture),
               {static_cast<size_t>(settings.photoBudgetMiB * 1048576), settings.stepsPerPhoto, settings.seed}),
       known_(knownDistances(capture, frame, kMostPixelsOff)),

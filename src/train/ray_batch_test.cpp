@@ -55,19 +55,6 @@ TEST(RayBatch, IsAFunctionOfSeedAndStep) {
   EXPECT_NE(first.pixels, draw(twoPhotos(), 2, 7).pixels);
 }
 
-TEST(RayBatch, IsTheSameByAnyNumberOfThreads) {
-  const RayBatch byTwo = draw(twoPhotos(), 1, 7, 5000);
-  for (const int threads : {1, 3}) {
-    ThreadPool others(threads);
-    RayBatch batch;
-    drawRays(twoPhotos(), {}, {1, true, 0, nullptr}, 7, 5000, others, batch);
-    EXPECT_EQ(batch.pixels, byTwo.pixels) << threads;
-    EXPECT_EQ(batch.targets, byTwo.targets) << threads;
-    EXPECT_EQ(batch.photoOfRay, byTwo.photoOfRay) << threads;
-    EXPECT_EQ(batch.jitter, byTwo.jitter) << threads;
-  }
-}
-
 TEST(RayBatch, BeginsWithTheSameRaysHoweverManyAreWanted) {
   const RayBatch many = draw(twoPhotos(), 1, 7), few = draw(twoPhotos(), 1, 7, 50);
   ASSERT_EQ(few.pixels.size(), 100u);
@@ -228,6 +215,32 @@ TEST(RayBatch, ShrinksWithTheNumberOfRays) {
   EXPECT_EQ(batch.weights.size(), 10u);
   EXPECT_EQ(batch.targets.size(), 30u);
   EXPECT_EQ(batch.photoOfRay.size(), 10u);
+}
+
+TEST(RayBatch, IsTheSameByAnyNumberOfThreads) {
+  constexpr uint32_t kRays = 5000;
+  ImageU8 mask(7, 5, 1, 255);
+  for (int x = 0; x < 4; ++x) *mask.at(x, 2) = 0;
+  const std::vector<PhotoWindow::Entry> window = {entry(0, addressed(7, 5, 0, 4, 128), std::move(mask)),
+                                                  entry(1, addressed(5, 9, 1))};
+  const std::vector<std::vector<KnownDistance>> known = {{{3, 1, 2.0f}}, {{2, 7, 5.0f}, {4, 8, 3.0f}}};
+  const std::vector<TileShares> tiles = {{{{0, 0, 0, 7, 5}}, {1}}, {{{1, 0, 0, 5, 4}, {1, 0, 4, 5, 9}}, {1, 3}}};
+  for (const std::vector<TileShares>* drawnFrom : {static_cast<const std::vector<TileShares>*>(nullptr), &tiles}) {
+    std::vector<RayBatch> batches(3);
+    for (int threads = 1; threads <= 3; ++threads) {
+      ThreadPool others(threads);
+      drawRays(window, known, {1, true, 0.5, drawnFrom}, 7, kRays, others, batches[threads - 1]);
+    }
+    for (const RayBatch& batch : {batches[1], batches[2]}) {
+      EXPECT_EQ(batch.photoOfRay, batches[0].photoOfRay);
+      EXPECT_EQ(batch.pixels, batches[0].pixels);
+      EXPECT_EQ(batch.targets, batches[0].targets);
+      EXPECT_EQ(batch.backgrounds, batches[0].backgrounds);
+      EXPECT_EQ(batch.weights, batches[0].weights);
+      EXPECT_EQ(batch.jitter, batches[0].jitter);
+      EXPECT_EQ(batch.distances, batches[0].distances);
+    }
+  }
 }
 
 }  // namespace

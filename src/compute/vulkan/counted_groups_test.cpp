@@ -72,7 +72,7 @@ TEST_F(CountedGroupsTest, AreEnoughForTheRowsThatTheDeviceHasCounted) {
 }
 
 TEST_F(CountedGroupsTest, AreOneAtLeastAndNoMoreThanThereIsRoomFor) {
-  CountedGroups counted(context_, {.fewest = 0, .most = 8});
+  CountedGroups counted(context_, {.fewest = 1, .most = 8});
   const auto groups = [&] {
     counted.changed(counters_.address(), counters_.bytes());
     return counted.of(*stream_, rows_, true, 1, kPerGroup, 1);
@@ -89,7 +89,7 @@ TEST_F(CountedGroupsTest, AreOneAtLeastAndNoMoreThanThereIsRoomFor) {
 }
 
 TEST_F(CountedGroupsTest, AreCountedOnceUntilCountersMayHaveChanged) {
-  CountedGroups counted(context_, {.fewest = 0});
+  CountedGroups counted(context_, {.fewest = 1});
   setCounters(0, 3 * kPerGroup);
   const auto of = [&] { return counted.of(*stream_, rows_, true, 1, kPerGroup, 1); };
   EXPECT_EQ(run(of()), 3u);
@@ -103,11 +103,37 @@ TEST_F(CountedGroupsTest, AreCountedOnceUntilCountersMayHaveChanged) {
 }
 
 TEST_F(CountedGroupsTest, AreNotCountedWhereFewAreEnoughForAll) {
-  CountedGroups counted(context_, {.fewest = (kCapacity + kPerGroup - 1) / kPerGroup});
+  constexpr uint32_t kEnough = (kCapacity + kPerGroup - 1) / kPerGroup;
+  CountedGroups counted(context_, {.fewest = kEnough + 1});
   setCounters(0, 0);
-  EXPECT_EQ(run(counted.of(*stream_, rows_, true, 1, kPerGroup, 1)), (kCapacity + kPerGroup - 1) / kPerGroup);
-  CountedGroups always(context_, {.fewest = 0});
-  EXPECT_EQ(run(always.of(*stream_, rows_, false, 1, kPerGroup, 1)), (kCapacity + kPerGroup - 1) / kPerGroup);
+  EXPECT_EQ(run(counted.of(*stream_, rows_, true, 1, kPerGroup, 1)), kEnough);
+  CountedGroups always(context_, {.fewest = 1});
+  EXPECT_EQ(run(always.of(*stream_, rows_, true, 1, kPerGroup, 1)), 1u);
+  EXPECT_EQ(run(always.of(*stream_, rows_, false, 1, kPerGroup, 1)), kEnough) << "no counter";
+}
+
+TEST_F(CountedGroupsTest, StandAtTheSamePlaceHoweverMuchRoomThereIs) {
+  CountedGroups counted(context_, {.fewest = 1});
+  setCounters(0, kCapacity);
+  const auto groups = [&](uint32_t capacity, uint32_t elements = 1) {
+    rows_.capacity = capacity;
+    return counted.of(*stream_, rows_, true, elements, kPerGroup, 1);
+  };
+  const Groups many = groups(7 * kPerGroup);
+  EXPECT_EQ(run(many), 7u);
+  const Groups few = groups(2 * kPerGroup);
+  EXPECT_EQ(few, many);
+  EXPECT_EQ(run(few), 2u);
+  EXPECT_EQ(run(groups(5 * kPerGroup)), 5u);
+  EXPECT_NE(groups(5 * kPerGroup, 2), many);
+}
+
+TEST_F(CountedGroupsTest, AreRightWhenAllPlacesAreTaken) {
+  CountedGroups counted(context_, {.fewest = 1});
+  setCounters(0, 6 * kPerGroup);
+  for (uint32_t elements = 1; elements < 5000; ++elements) counted.of(*stream_, rows_, true, elements, kPerGroup, 1);
+  EXPECT_EQ(run(counted.of(*stream_, rows_, true, 1, kPerGroup, 1)), 6u);
+  EXPECT_EQ(run(counted.of(*stream_, rows_, true, 2, kPerGroup, 1)), 12u);
 }
 
 }  // namespace

@@ -1,11 +1,9 @@
 #include "compute/mlp.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <span>
 
-#include "base/error.h"
 #include "base/log.h"
 #include "compute/vulkan/vulkan_device.h"
 #include "shaders/compute/arguments_mlp.h"
@@ -54,8 +52,7 @@ constexpr std::span<const uint32_t> kForwardByKhr, kBackwardByKhr, kWeightGradie
     kWeightGradientsByKhrAndFloatAtomics;
 #endif
 
-// In the order of MlpArithmetic.
-using MlpForms = std::array<std::span<const uint32_t>, 5>;
+using MlpForms = VulkanDevice::MlpForms;
 constexpr MlpForms kForwardForms = {kMlpForwardSpirv, kMlpForwardHalfSpirv, kMlpForwardNvMatricesSpirv, kForwardByKhr,
                                     kMlpForwardEmulatedMatricesSpirv};
 constexpr MlpForms kBackwardForms = {kMlpBackwardSpirv, kMlpBackwardHalfSpirv, kMlpBackwardNvMatricesSpirv,
@@ -108,8 +105,7 @@ std::vector<uint32_t> VulkanDevice::matrixConstants(std::vector<uint32_t> own, c
   return own;
 }
 
-const GpuKernel& VulkanDevice::mlpKernel(std::span<const std::span<const uint32_t>, 5> forms,
-                                         std::vector<uint32_t> constants) {
+const GpuKernel& VulkanDevice::mlpKernel(const MlpForms& forms, std::vector<uint32_t> constants) {
   const std::span<const uint32_t> spirv = forms[static_cast<size_t>(mlpArithmetic_)];
   CHECK(!spirv.empty());
   if (!multipliesMatrices()) return kernel(spirv, std::move(constants));
@@ -118,22 +114,24 @@ const GpuKernel& VulkanDevice::mlpKernel(std::span<const std::span<const uint32_
   return kernel(spirv, std::move(constants), isEmulated ? 0 : matrices_.subgroupSize);
 }
 
-const GpuKernel& VulkanDevice::weightGradientKernel(uint32_t tileRows, uint32_t tileColumns) {
-  const bool atomics = stream_->context()->features().floatAtomics;
-  return mlpKernel(atomics ? kWeightGradientFormsWithFloatAtomics : kWeightGradientForms, {tileRows, tileColumns});
+template <class Make>
+auto VulkanDevice::withOrWithoutMatrices(const Make& make) {
+  if (multipliesMatrices()) {
+    try {
+      return make();
+    } catch (const KernelRefused& refused) {
+      warn("{} compiles no kernels of cooperative matrices ({}): networks do without", name(), refused.reason());
+      mlpArithmetic_ = MlpArithmetic::halves;  // which keep the same activations
+    }
+  }
+  return make();
 }
 
-void VulkanDevice::settleArithmetic() {
-  if (!multipliesMatrices()) return;
-  const Block block = blockFor({.width = 64}, 64, true);
-  try {
-    mlpKernel(kForwardForms, block.constants());
-    mlpKernel(kBackwardForms, block.constants());
-    weightGradientKernel(64, 64);
-  } catch (const Error& error) {
-    warn("{} compiles no kernels of cooperative matrices ({}): networks do without", name(), error.reason());
-    mlpArithmetic_ = MlpArithmetic::halves;
-  }
+VulkanDevice::BlockKernel VulkanDevice::blockKernel(const MlpForms& forms, const MlpShape& shape, uint32_t stateWidth) {
+  return withOrWithoutMatrices([&]() -> BlockKernel {
+    const Block block = blockFor(shape, stateWidth, multipliesMatrices());
+    return {mlpKernel(forms, block.constants()), block.samples};
+  });
 }
 
 uint64_t VulkanDevice::weightNumbers(const Slice<const float>& weights, uint64_t scratch) {
@@ -165,8 +163,8 @@ void VulkanDevice::enqueue(const MlpForward& options) {
   arguments.paddedOutputs = shape.layerOutputs(shape.hiddenLayers);
   arguments.hiddenLayers = shape.hiddenLayers;
   arguments.sigmoidOutput = shape.activation == OutputActivation::sigmoid;
-  const Block block = blockFor(shape, shape.width, multipliesMatrices());
-  queue(mlpKernel(kForwardForms, block.constants()), arguments, groupsOf(options.samples, block.samples));
+  const BlockKernel block = blockKernel(kForwardForms, shape, shape.width);
+  queue(block.kernel, arguments, groupsOf(options.samples, block.samples));
 }
 
 void VulkanDevice::enqueue(const MlpBackward& options) {
@@ -212,8 +210,8 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
     largest.largest = arguments.largest;
     queue(kernel(kMlpLargestGradientSpirv), largest, {arguments.largestCount});
   }
-  const Block block = blockFor(shape, std::max(width, paddedOutputs), multipliesMatrices());
-  queue(mlpKernel(kBackwardForms, block.constants()), arguments, groupsOf(options.samples, block.samples));
+  const BlockKernel block = blockKernel(kBackwardForms, shape, std::max(width, paddedOutputs));
+  queue(block.kernel, arguments, groupsOf(options.samples, block.samples));
 
   for (uint32_t layer = 0; layer <= hiddenLayers; ++layer) {
     arguments::MlpWeightGradientsArguments sums = {};
@@ -232,17 +230,22 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
 
 void VulkanDevice::queueWeightGradients(const arguments::MlpWeightGradientsArguments& sums, size_t capacity) {
   const uint32_t shares = std::clamp<uint32_t>(groups(capacity, kSamplesPerShare), 1, kMostShares);
-  uint32_t tileRows = kWeightTile, tileColumns = kWeightTile;
-  if (multipliesMatrices()) {
-    // The largest that leave no row and no column over.
-    const auto largest = [](uint32_t size, std::initializer_list<uint32_t> choices) {
-      return *std::find_if(choices.begin(), choices.end(), [&](uint32_t n) { return size % n == 0; });
-    };
-    tileRows = largest(sums.rows, {64, 32, 16});
-    tileColumns = largest(sums.columns, {64, 48, 32, 16});
-  }
-  queue(weightGradientKernel(tileRows, tileColumns), sums,
-        {groups(sums.columns, tileColumns), groups(sums.rows, tileRows), shares});
+  const bool atomics = stream_->context()->features().floatAtomics;
+  uint32_t tileRows = 0, tileColumns = 0;
+  const auto make = [&]() -> const GpuKernel* {
+    tileRows = tileColumns = kWeightTile;
+    if (multipliesMatrices()) {
+      // The largest that leave no row and no column over.
+      const auto largest = [](uint32_t size, std::initializer_list<uint32_t> choices) {
+        return *std::find_if(choices.begin(), choices.end(), [&](uint32_t n) { return size % n == 0; });
+      };
+      tileRows = largest(sums.rows, {64, 32, 16});
+      tileColumns = largest(sums.columns, {64, 48, 32, 16});
+    }
+    return &mlpKernel(atomics ? kWeightGradientFormsWithFloatAtomics : kWeightGradientForms, {tileRows, tileColumns});
+  };
+  const GpuKernel& kernel = *withOrWithoutMatrices(make);
+  queue(kernel, sums, {groups(sums.columns, tileColumns), groups(sums.rows, tileRows), shares});
 }
 
 }  // namespace tessera

@@ -33,13 +33,16 @@ class VulkanProbe final : public MachineProbe {
         stream_(context_) {
     const GpuMatrices& matrices = context_->matrices();
     std::span<const uint32_t> spirv;
+    if (!device.multipliesMatrices()) return;
     if (matrices.kind == GpuMatrices::Kind::nv) spirv = kProbeMatricesNvSpirv;
 #ifdef TESSERA_KHR_MATRICES
     if (matrices.kind == GpuMatrices::Kind::khr) spirv = kProbeMatricesKhrSpirv;
 #endif
-    if (!spirv.empty()) {
+    if (spirv.empty()) return;
+    try {
       matrices_ = std::make_unique<GpuKernel>(context_, spirv, VulkanDevice::matrixConstants({}, matrices),
                                               matrices.subgroupSize);
+    } catch (const KernelRefused&) {  // networks do without, too
     }
   }
 

@@ -33,6 +33,7 @@ class VulkanDevice : public Device {
  public:
   // How networks are computed; floats need no feature. Sums are floats in all of them.
   enum class MlpArithmetic { floats, halves, nvMatrices, khrMatrices, emulatedMatrices };
+  using MlpForms = std::array<std::span<const uint32_t>, 5>;  // of a kernel, for each of those
 
   explicit VulkanDevice(std::shared_ptr<const GpuContext> context);  // as fast as its features allow
   VulkanDevice(std::shared_ptr<const GpuContext> context, MlpArithmetic arithmetic, const GpuMatrices& matrices,
@@ -55,6 +56,7 @@ class VulkanDevice : public Device {
   void finish() override;
   bool supports(Operation) const override { return true; }
   static MlpArithmetic bestArithmetic(const GpuContext& context);
+  bool multipliesMatrices() const { return mlpArithmetic_ >= MlpArithmetic::nvMatrices; }
   // Of operations that begin at row 0, and of those that take part of the rows.
   arguments::CountArguments countArguments(const Count& count) const;
   arguments::CountArguments partArguments(const Count& count) const;
@@ -76,17 +78,20 @@ class VulkanDevice : public Device {
   TESSERA_OPERATIONS(TESSERA_ENQUEUE)
 #undef TESSERA_ENQUEUE
 
-  bool multipliesMatrices() const {
-    return mlpArithmetic_ >= MlpArithmetic::nvMatrices;
-  }
-
   // Compiled at first use. `constants` are the shader's specialization constants in order.
   const GpuKernel& kernel(std::span<const uint32_t> spirv, std::vector<uint32_t> constants = {},
                           uint32_t subgroupSize = 0);
-  // A kernel of networks, in the forms that it has for each MlpArithmetic. `constants` are those that all have.
-  const GpuKernel& mlpKernel(std::span<const std::span<const uint32_t>, 5> forms, std::vector<uint32_t> constants);
-  const GpuKernel& weightGradientKernel(uint32_t tileRows, uint32_t tileColumns);
-  void settleArithmetic();  // without matrices where the driver compiles no kernels of theirs
+  // A kernel of networks. `constants` are those that all its forms have.
+  const GpuKernel& mlpKernel(const MlpForms& forms, std::vector<uint32_t> constants);
+  // What `make` makes of kernels of networks; once more, and from then on without matrices, where the driver compiles
+  // none of theirs.
+  template <class Make>
+  auto withOrWithoutMatrices(const Make& make);
+  struct BlockKernel {
+    const GpuKernel& kernel;
+    uint32_t samples;  // of a workgroup
+  };
+  BlockKernel blockKernel(const MlpForms& forms, const MlpShape& shape, uint32_t stateWidth);
   // Chooses between the two forms of a kernel that adds to sums from many invocations.
   const GpuKernel& sumKernel(std::span<const uint32_t> withFloatAtomics, std::span<const uint32_t> without,
                              std::vector<uint32_t> constants = {});

@@ -164,7 +164,7 @@ TEST(TrainField, SendsEachStepToAGraphicsCardAtOnce) {
 #ifdef TESSERA_HAS_VULKAN
   SKIP_WITHOUT_VULKAN(openForTest());
   const CubeScene scene;
-  const std::unique_ptr<Device> vulkan = makeDevice({"vulkan"});
+  const std::unique_ptr<Device> vulkan = makeVulkanDeviceWithFewGroups({});
   FieldConfig config = options(0).config;
   config.occupancyEvery = 16;
   FieldTrainer trainer(*vulkan, scene.capture(), config, fitSceneFrame(scene.capture(), 1.5));

@@ -156,7 +156,7 @@ TEST_F(HashTraining, LosesNothingWhereAGraphicsCardFails) {
 TEST_F(HashTraining, SendsEachStepToAGraphicsCardAtOnce) {
 #ifdef TESSERA_HAS_VULKAN
   SKIP_WITHOUT_VULKAN(openForTest());
-  const std::unique_ptr<Device> vulkan = makeDevice({"vulkan"});
+  const std::unique_ptr<Device> vulkan = makeVulkanDeviceWithFewGroups({});
   HashTrainer trainer(*vulkan, scene_.capture(), smallHashConfig(), cubeGrid());
   expectOneBatchAStep(*vulkan, trainer);
 #endif

@@ -303,7 +303,7 @@ TEST(TrainVolume, SendsEachStepToAGraphicsCardAtOnce) {
 #ifdef TESSERA_HAS_VULKAN
   SKIP_WITHOUT_VULKAN(openForTest());
   const CubeScene scene;
-  const std::unique_ptr<Device> vulkan = makeDevice({"vulkan"});
+  const std::unique_ptr<Device> vulkan = makeVulkanDeviceWithFewGroups({});
   VolumeTrainer trainer(*vulkan, scene.capture(), smallVolumeConfig(), cubeGrid(), {});
   expectOneBatchAStep(*vulkan, trainer);
 #endif
