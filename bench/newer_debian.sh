@@ -26,7 +26,7 @@ unshare --mount --propagation private bash -euo pipefail -c '
     ${TESSERA_SHARED_DATA:+TESSERA_SHARED_DATA=/data} bash -euo pipefail -c "
       /tessera/tools/install-debian-packages.sh
       cmake -S /tessera -B /build -G Ninja -DCMAKE_BUILD_TYPE=Release
-      nice ninja -C /build \$TARGETS
+      nice ninja -k 0 -C /build \$TARGETS
       cd /build
       TESSERA_VULKAN_VALIDATION=1 TESSERA_REQUIRE_VULKAN=1 ctest -R \"\$TESTS\" -j \$(nproc) --output-on-failure
       [ ! -x apps/tessera/tessera ] || apps/tessera/tessera info devices"

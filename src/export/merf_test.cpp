@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
+
 #include "base/error.h"
 #include "export/merf_layout.h"
 #include "export/merf_viewer.h"

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <numbers>
 
 #include "synth/city_geometry.h"

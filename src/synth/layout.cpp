@@ -1,5 +1,6 @@
 #include "synth/layout.h"
 
+#include <algorithm>
 #include <numbers>
 
 #include "base/random.h"

@@ -1,5 +1,6 @@
 #include "synth/photographer.h"
 
+#include <algorithm>
 #include <array>
 
 #include "base/check.h"

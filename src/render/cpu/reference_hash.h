@@ -2,6 +2,8 @@
 // slowly.
 #pragma once
 
+#include <algorithm>
+
 #include "render/cpu/reference_path.h"
 #include "tiles/hash_content.h"
 

@@ -1,6 +1,8 @@
 // For tests: one part of a volume marched by the definition, in double, slowly: each of the 20 texels by its formula.
 #pragma once
 
+#include <algorithm>
+
 #include "render/cpu/reference_path.h"
 #include "tiles/volume_content.h"
 
