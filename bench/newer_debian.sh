@@ -25,6 +25,7 @@ unshare --mount --propagation private bash -euo pipefail -c '
   exec chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 TARGETS="$TARGETS" TESTS="$TESTS" \
     ${TESSERA_SHARED_DATA:+TESSERA_SHARED_DATA=/data} bash -euo pipefail -c "
       /tessera/tools/install-debian-packages.sh
+      apt-get install -y --no-install-recommends xvfb
       cmake -S /tessera -B /build -G Ninja -DCMAKE_BUILD_TYPE=Release
       nice ninja -k 0 -C /build \$TARGETS
       cd /build

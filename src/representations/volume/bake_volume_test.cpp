@@ -177,7 +177,8 @@ TEST(BakeVolume, StoresTheVeryNumbersThatTrainingSaw) {
       for (size_t f = 1; f < 8; ++f) EXPECT_NEAR(colour[7 * s + f - 1], 1 / (1 + std::exp(-sums[f])), tolerance);
     }
   };
-  expectStored(device.read(logDensities.all()), device.read(colours.all()), 1e-5);
+  // Places among 32 voxels are floats, half a unit of which is 1e-6 of a voxel; densities of two differ by up to 28.
+  expectStored(device.read(logDensities.all()), device.read(colours.all()), 3e-5);
   expectStored(reference->read(exactDensities.all()), reference->read(exactColours.all()), 1e-6);
 }
 
