@@ -53,8 +53,8 @@ agree() {
 # killed MODEL DEVICE: a training that is killed as soon as it has saved something.
 killed() {
   rm -rf "${work:?}/$1" "$work/$1.done"
-  "$tessera" train "$work/fox" "$work/$1" --method field --steps 60 --set samples_per_step=4096 --set occupancy_resolution=32 \
-    --device "$2" --checkpoint-seconds 0.5 > /dev/null 2>&1 &
+  "$tessera" train "$work/fox" "$work/$1" --method field --steps 120 --set samples_per_step=4096 --set occupancy_resolution=32 \
+    --device "$2" --checkpoint-seconds 0.1 > /dev/null 2>&1 &
   local training=$!
   until [ -e "$work/$1/manifest.json" ]; do
     kill -0 "$training" 2> /dev/null || die "$work/$1: training ended before it was killed"
@@ -71,7 +71,7 @@ resume() {
     killed "killed-on-$from" "$from"
     echo "killed on $from at step $(jq .step "$work/killed-on-$from/manifest.json")"
     "$tessera" train "$work/fox" "$work/killed-on-$from" --resume --device "$to" 2>&1 | tail -1
-    verdict "steps after resuming on $to" "$(jq .step "$work/killed-on-$from/manifest.json")" '>=' 60
+    verdict "steps after resuming on $to" "$(jq .step "$work/killed-on-$from/manifest.json")" '>=' 120
   done
 }
 
