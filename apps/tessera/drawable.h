@@ -23,12 +23,9 @@ class Drawable {
 struct DrawableOptions {
   int threads = 0;        // of scenes; models have their device's
   int level = 0;          // of detail of scenes: the finest to draw
-  double memoryMiB = 0;   // for the contents of scenes; 0: sceneBudgetBytes
+  double memoryMiB = 0;   // for the contents of scenes; 0: sceneBudgetBytes (scene_source.h)
   double mostPixels = 0;  // of scenes: SelectionSettings; the finest everywhere
 };
-
-// Of a scene's contents, where nothing is said: half of the memory that they lie in, a card's own or the machine's.
-uint64_t sceneBudgetBytes(const Device& device);
 
 // Throws Error when the folder holds neither, the scene has no such level, or its coarsest does not fit. Warns when a
 // picture was drawn coarser than asked for, as memory was short. Keeps a reference to `device`.

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/tessera/drawable.h"
+#include "apps/tessera/scene_source.h"
 #include "apps/tessera/verbs.h"
 #include "compute/roofline.h"
 #include "eval/psnr.h"

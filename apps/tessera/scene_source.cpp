@@ -1,0 +1,124 @@
+#include "apps/tessera/scene_source.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "base/error.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "render/cpu/scene_renderer.h"
+#include "render/tile_scene.h"
+#include "tiles/scene_folder.h"
+#ifdef TESSERA_HAS_VULKAN
+#include "compute/vulkan/device.h"
+#include "render/vulkan/gpu_scene_renderer.h"
+#endif
+
+namespace tessera {
+namespace {
+
+// Says once when a picture was drawn coarser than asked for.
+template <class Renderer>
+class WarningRenderer final : public ViewRenderer {
+ public:
+  template <class... Arguments>
+  WarningRenderer(const fs::path& folder, uint64_t budgetBytes, Arguments&&... arguments)
+      : folder_(folder), budgetBytes_(budgetBytes), renderer_(std::forward<Arguments>(arguments)...) {}
+
+  RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override {
+    RenderedView view = renderer_.render(camera, worldFromCamera, opaqueDepth);
+    if (renderer_.choice().refused > 0 && !std::exchange(warned_, true)) {
+      warn("{}: views do not fit into {:.4g} MiB at their finest level and are drawn coarser; raise --memory-mib",
+           folder_.string(), static_cast<double>(budgetBytes_) / 1048576);
+    }
+    return view;
+  }
+  std::string device() const override { return renderer_.device(); }
+  Eigen::Array3f background() const override { return renderer_.background(); }
+
+ private:
+  fs::path folder_;
+  uint64_t budgetBytes_;
+  Renderer renderer_;
+  bool warned_ = false;
+};
+
+template <class Content>
+std::unique_ptr<ViewRenderer> onProcessor(const fs::path& folder, SceneRendererSettings settings) {
+  TileScene<Content> scene = openTileScene<Content>(folder);
+  settings.background = Eigen::Array3f(scene.background[0], scene.background[1], scene.background[2]);
+  return std::make_unique<WarningRenderer<SceneRenderer<Content>>>(
+      folder, settings.budgetBytes, scene.frame, std::move(scene.tree), std::move(scene.source), settings);
+}
+
+#ifdef TESSERA_HAS_VULKAN
+template <class Content>
+std::unique_ptr<ViewRenderer> onCard(const std::shared_ptr<const GpuContext>& context, const fs::path& folder,
+                                     const SceneRendererSettings& settings) {
+  GpuRendererSettings ofCard;
+  ofCard.minTransmittance = settings.march.minTransmittance;
+  ofCard.selection = settings.selection;
+  ofCard.budgetBytes = settings.budgetBytes;
+  return std::make_unique<WarningRenderer<GpuSceneRenderer<Content>>>(folder, settings.budgetBytes, context,
+                                                                      openTileScene<Content>(folder), ofCard);
+}
+#endif
+
+template <class Content>
+std::unique_ptr<ViewRenderer> rendererOf([[maybe_unused]] const Device& device, const fs::path& folder,
+                                         const SceneRendererSettings& settings) {
+#ifdef TESSERA_HAS_VULKAN
+  if (const auto context = contextOf(device)) return onCard<Content>(context, folder, settings);
+#endif
+  return onProcessor<Content>(folder, settings);
+}
+
+class DrawableScene final : public Drawable {
+ public:
+  DrawableScene(const Device& device, const fs::path& folder, const DrawableOptions& options)
+      : folder_(folder), tileset_(readTileset(folder)) {
+    SceneRendererSettings settings;
+    // Not the number of levels: a root that only holds the others together is one of them.
+    if (const uint32_t coarsest = coarsestLevel(tileset_); static_cast<uint32_t>(options.level) > coarsest) {
+      throw Error(folder.string(), fmt::format("--lod {}", options.level),
+                  coarsest == 0 ? "the scene has level 0 only" : fmt::format("the scene has levels 0 to {}", coarsest),
+                  coarsest == 0 ? "leave it out" : "name one of those");
+    }
+    settings.selection.mostPixels = options.mostPixels;
+    settings.selection.finestLevel = options.level;
+    settings.threads = options.threads;
+    settings.budgetBytes =
+        options.memoryMiB > 0 ? static_cast<uint64_t>(options.memoryMiB * 1048576) : sceneBudgetBytes(device);
+    renderer_ = tileset_.representation == Representation::hash ? rendererOf<HashContent>(device, folder, settings)
+                                                                : rendererOf<VolumeContent>(device, folder, settings);
+  }
+
+  ViewRenderer& renderer() override { return *renderer_; }
+  Mat4d sourceFromWorld() const override { return tileset_.sourceFromWorld; }
+  void requireWorldOf(const Capture& capture) const override {
+    if ((capture.sourceFromWorld - tileset_.sourceFromWorld).norm() <= 1e-9 * tileset_.sourceFromWorld.norm()) return;
+    throw Error(capture.root.string(), "transforms.json",
+                "its world is not the one of " + folder_.string() + ", which was baked from '" + tileset_.name + "'",
+                "use that capture");
+  }
+  std::vector<std::string> trainedOnAmong(const Capture&, Split) const override { return {}; }  // scenes do not say
+
+ private:
+  fs::path folder_;
+  Tileset tileset_;
+  std::unique_ptr<ViewRenderer> renderer_;
+};
+
+}  // namespace
+
+uint64_t sceneBudgetBytes(const Device& device) {
+  const uint64_t own = device.ownMemory().bytes;
+  return (own > 0 ? own : static_cast<uint64_t>(usableMemoryBytes())) / 2;
+}
+
+std::unique_ptr<Drawable> openScene(const Device& device, const fs::path& folder, const DrawableOptions& options) {
+  return std::make_unique<DrawableScene>(device, folder, options);
+}
+
+}  // namespace tessera
