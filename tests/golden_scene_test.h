@@ -19,15 +19,16 @@ inline nlohmann::ordered_json readGoldenJson(const fs::path& file) {
 }
 
 // All contents of a scene, as (uri, name in the maker's words: tiles/L0/0_1-<digest>.glb).
-template <class Content>
+template <class Content_>
 void forEachGoldenContent(
-    const fs::path& scene,
-    const std::function<void(const std::string& uri, const std::string& name, const Content& content)>& use) {
+    const fs::path& scene, const ContentCodec& codec,
+    const std::function<void(const std::string& uri, const std::string& name, const Content_& content)>& use) {
   size_t contents = 0;
   for (const Tile& tile : readTileset(scene).tiles) {
     for (const TileContent& content : tile.contents) {
       const std::string file = fs::path(content.uri).filename().string();
-      use(content.uri, file.substr(0, file.find('-')), readContent<Content>(contentPath(scene, content.uri)));
+      use(content.uri, file.substr(0, file.find('-')),
+          contentAs<Content_>(*readContent(contentPath(scene, content.uri), codec)));
       ++contents;
     }
   }
@@ -35,11 +36,13 @@ void forEachGoldenContent(
 }
 
 // The oracle, which reckons in floats, against the definition.
-template <class Content>
-void expectRaysAsDefined(const fs::path& folder) {
-  const TileScene<Content> scene = openTileScene<Content>(folder);
-  std::vector<Content> contents;
-  for (size_t i = 0; i < scene.tree.tiles.size(); ++i) contents.push_back(scene.source.load(static_cast<int>(i)));
+template <class Content_>
+void expectRaysAsDefined(const fs::path& folder, const ContentCodec& codec) {
+  const TileScene scene = openTileScene(folder, codec);
+  std::vector<Content_> contents;
+  for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
+    contents.push_back(contentAs<Content_>(*scene.source.load(static_cast<int>(i))));
+  }
   const nlohmann::ordered_json rays = readGoldenJson(folder / "rays.json");
   EXPECT_EQ(rays.size(), 60u);
   std::map<std::string, int> kinds;
@@ -48,7 +51,7 @@ void expectRaysAsDefined(const fs::path& folder) {
     const auto vector = [&](const char* key) { return Vec3d(ray.at(key).at(0), ray.at(key).at(1), ray.at(key).at(2)); };
     const SceneRay along{vector("origin"), vector("direction")};
     const int coarse = scene.tree.surround, fine = scene.tree.tiles[static_cast<size_t>(coarse)].children.at(0);
-    SceneDrawing<Content> drawing{
+    SceneDrawing<Content_> drawing{
         scene.frame, {}, &contents[static_cast<size_t>(ray.at("level") == 1 ? coarse : fine)], {}};
     drawing.march.minTransmittance = 0;
     if (ray.at("level") == 1) {
@@ -59,7 +62,7 @@ void expectRaysAsDefined(const fs::path& folder) {
       }
     }
     MarchCounts counts;
-    const DrawnPixel seen = RayCaster<Content>(drawing).cast(along, INFINITY, counts);
+    const DrawnPixel seen = RayCaster<Content_>(drawing).cast(along, INFINITY, counts);
     const double opacity = ray.at("opacity"), distance = ray.at("distance");
     const Vec3d colour = vector("colour");
     for (size_t c = 0; c < 3; ++c)
@@ -71,7 +74,7 @@ void expectRaysAsDefined(const fs::path& folder) {
     kinds["far"] += distance > 6;
     drawing.frontToBack.erase(drawing.frontToBack.begin() + 1, drawing.frontToBack.end());
     drawing.surround = nullptr;
-    const float left = RayCaster<Content>(drawing).cast(along, INFINITY, counts).transmittance;
+    const float left = RayCaster<Content_>(drawing).cast(along, INFINITY, counts).transmittance;
     kinds["blended"] += left > 0.05f && left < 0.95f;
   }
   EXPECT_GE(kinds["opaque"], 20);

@@ -2,6 +2,7 @@
 #include "golden/golden_volume.h"
 
 #include "golden_scene_test.h"
+#include "render/cpu/volume_drawer.h"
 #include "tiles/volume_payload.h"
 
 namespace tessera {
@@ -40,13 +41,14 @@ void expectSame(const VolumeContent& a, const VolumeContent& b) {
 TEST(GoldenVolume, IsReadToTheExpectedSums) {
   const nlohmann::ordered_json expected = readGoldenJson(kScene / "sums.json");
   EXPECT_EQ(expected.size(), 5u);
-  forEachGoldenContent<VolumeContent>(kScene, [&](const auto& uri, const auto&, const VolumeContent& volume) {
-    const auto& sums = expected.at(uri);
-    ASSERT_EQ(volume.parts.size(), sums.size());
-    for (size_t i = 0; i < sums.size(); ++i) {
-      EXPECT_EQ(golden::toJson(golden::sumsOf(volume.parts[i])), sums[i]) << uri << " part " << i;
-    }
-  });
+  forEachGoldenContent<VolumeContent>(
+      kScene, volumeCodec(), [&](const auto& uri, const auto&, const VolumeContent& volume) {
+        const auto& sums = expected.at(uri);
+        ASSERT_EQ(volume.parts.size(), sums.size());
+        for (size_t i = 0; i < sums.size(); ++i) {
+          EXPECT_EQ(golden::toJson(golden::sumsOf(volume.parts[i])), sums[i]) << uri << " part " << i;
+        }
+      });
 }
 
 TEST(GoldenVolume, HoldsWhatItWasMadeFrom) {
@@ -56,22 +58,23 @@ TEST(GoldenVolume, HoldsWhatItWasMadeFrom) {
   EXPECT_EQ(tileset.sourceFromWorld, scene.tileset.sourceFromWorld);
   EXPECT_EQ(tileset.background, scene.tileset.background);
   EXPECT_EQ(tileset.georeference->latitude, scene.tileset.georeference->latitude);
-  forEachGoldenContent<VolumeContent>(kScene, [&](const auto&, const auto& name, const VolumeContent& volume) {
-    expectSame(volume, scene.contents.at(name));
-  });
+  forEachGoldenContent<VolumeContent>(
+      kScene, volumeCodec(),
+      [&](const auto&, const auto& name, const VolumeContent& volume) { expectSame(volume, scene.contents.at(name)); });
 }
 
 TEST(GoldenVolume, IsTheSameWhenItIsWrittenAgain) {
-  forEachGoldenContent<VolumeContent>(kScene, [&](const auto&, const auto&, const VolumeContent& volume) {
-    std::string reason;
-    const auto again = decodeVolume(encodeVolume(volume), reason);
-    ASSERT_TRUE(again) << reason;
-    expectSame(volume, *again);
-  });
+  forEachGoldenContent<VolumeContent>(kScene, volumeCodec(),
+                                      [&](const auto&, const auto&, const VolumeContent& volume) {
+                                        std::string reason;
+                                        const auto again = decodeVolume(encodeVolume(volume), reason);
+                                        ASSERT_TRUE(again) << reason;
+                                        expectSame(volume, *again);
+                                      });
 }
 
 TEST(GoldenVolume, LooksAlongItsRaysAsTheDefinitionSays) {
-  expectRaysAsDefined<VolumeContent>(kScene);
+  expectRaysAsDefined<VolumeContent>(kScene, volumeCodec());
 }
 
 // Samples along a vertical line through a building: there is something, and it is where it should be.

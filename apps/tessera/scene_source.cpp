@@ -9,10 +9,12 @@
 #include "base/memory.h"
 #include "render/cpu/scene_renderer.h"
 #include "render/tile_scene.h"
+#include "representations/codecs.h"
+#include "representations/cpu_drawers.h"
 #include "tiles/scene_folder.h"
 #ifdef TESSERA_HAS_VULKAN
 #include "compute/vulkan/device.h"
-#include "render/vulkan/gpu_scene_renderer.h"
+#include "representations/gpu_drawers.h"
 #endif
 
 namespace tessera {
@@ -22,56 +24,49 @@ namespace {
 template <class Renderer>
 class WarningRenderer final : public ViewRenderer {
  public:
-  template <class... Arguments>
-  WarningRenderer(const fs::path& folder, uint64_t budgetBytes, Arguments&&... arguments)
-      : folder_(folder), budgetBytes_(budgetBytes), renderer_(std::forward<Arguments>(arguments)...) {}
+  WarningRenderer(const fs::path& folder, uint64_t budgetBytes, std::unique_ptr<Renderer> renderer)
+      : folder_(folder), budgetBytes_(budgetBytes), renderer_(std::move(renderer)) {}
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override {
-    RenderedView view = renderer_.render(camera, worldFromCamera, opaqueDepth);
-    if (renderer_.choice().refused > 0 && !std::exchange(warned_, true)) {
+    RenderedView view = renderer_->render(camera, worldFromCamera, opaqueDepth);
+    if (renderer_->choice().refused > 0 && !std::exchange(warned_, true)) {
       warn("{}: views do not fit into {:.4g} MiB at their finest level and are drawn coarser; raise --memory-mib",
            folder_.string(), static_cast<double>(budgetBytes_) / 1048576);
     }
     return view;
   }
-  std::string device() const override { return renderer_.device(); }
-  Eigen::Array3f background() const override { return renderer_.background(); }
+  std::string device() const override { return renderer_->device(); }
+  Eigen::Array3f background() const override { return renderer_->background(); }
 
  private:
   fs::path folder_;
   uint64_t budgetBytes_;
-  Renderer renderer_;
+  std::unique_ptr<Renderer> renderer_;
   bool warned_ = false;
 };
 
-template <class Content>
-std::unique_ptr<ViewRenderer> onProcessor(const fs::path& folder, SceneRendererSettings settings) {
-  TileScene<Content> scene = openTileScene<Content>(folder);
-  settings.background = Eigen::Array3f(scene.background[0], scene.background[1], scene.background[2]);
-  return std::make_unique<WarningRenderer<SceneRenderer<Content>>>(
-      folder, settings.budgetBytes, scene.frame, std::move(scene.tree), std::move(scene.source), settings);
+template <class Renderer>
+std::unique_ptr<ViewRenderer> withWarnings(const fs::path& folder, uint64_t budgetBytes,
+                                           std::unique_ptr<Renderer> renderer) {
+  return std::make_unique<WarningRenderer<Renderer>>(folder, budgetBytes, std::move(renderer));
 }
 
-#ifdef TESSERA_HAS_VULKAN
-template <class Content>
-std::unique_ptr<ViewRenderer> onCard(const std::shared_ptr<const GpuContext>& context, const fs::path& folder,
-                                     const SceneRendererSettings& settings) {
-  GpuRendererSettings ofCard;
-  ofCard.minTransmittance = settings.march.minTransmittance;
-  ofCard.selection = settings.selection;
-  ofCard.budgetBytes = settings.budgetBytes;
-  return std::make_unique<WarningRenderer<GpuSceneRenderer<Content>>>(folder, settings.budgetBytes, context,
-                                                                      openTileScene<Content>(folder), ofCard);
-}
-#endif
-
-template <class Content>
 std::unique_ptr<ViewRenderer> rendererOf([[maybe_unused]] const Device& device, const fs::path& folder,
-                                         const SceneRendererSettings& settings) {
+                                         const Tileset& tileset, SceneRendererSettings settings) {
 #ifdef TESSERA_HAS_VULKAN
-  if (const auto context = contextOf(device)) return onCard<Content>(context, folder, settings);
+  if (const auto context = contextOf(device)) {
+    GpuRendererSettings ofGpu;
+    ofGpu.draw = settings.draw;
+    ofGpu.selection = settings.selection;
+    ofGpu.budgetBytes = settings.budgetBytes;
+    return withWarnings(folder, settings.budgetBytes, openGpuScene(context, folder, ofGpu));
+  }
 #endif
-  return onProcessor<Content>(folder, settings);
+  TileScene scene = openTileScene(folder, requireCodec(folder, tileset));
+  settings.background = Eigen::Array3f(scene.background[0], scene.background[1], scene.background[2]);
+  return withWarnings(folder, settings.budgetBytes,
+                      std::make_unique<SceneRenderer>(makeCpuDrawer(tileset.representation), scene.frame,
+                                                      std::move(scene.tree), std::move(scene.source), settings));
 }
 
 class DrawableScene final : public Drawable {
@@ -90,8 +85,7 @@ class DrawableScene final : public Drawable {
     settings.threads = options.threads;
     settings.budgetBytes =
         options.memoryMiB > 0 ? static_cast<uint64_t>(options.memoryMiB * 1048576) : sceneBudgetBytes(device);
-    renderer_ = tileset_.representation == Representation::hash ? rendererOf<HashContent>(device, folder, settings)
-                                                                : rendererOf<VolumeContent>(device, folder, settings);
+    renderer_ = rendererOf(device, folder, tileset_, settings);
   }
 
   ViewRenderer& renderer() override { return *renderer_; }

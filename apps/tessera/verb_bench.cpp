@@ -13,6 +13,8 @@
 #include "import/capture_reader.h"
 #include "render/cpu/scene_benchmark.h"
 #include "render/tile_scene.h"
+#include "representations/codecs.h"
+#include "representations/cpu_drawers.h"
 #include "representations/field/field_renderer.h"
 #include "representations/field/step_benchmark.h"
 #include "representations/field/train_field.h"
@@ -21,7 +23,7 @@
 #ifdef TESSERA_HAS_VULKAN
 #include "compute/vulkan/device.h"
 #include "gpu/context.h"
-#include "render/vulkan/gpu_scene_renderer.h"
+#include "representations/gpu_drawers.h"
 #endif
 
 namespace tessera {
@@ -204,8 +206,7 @@ struct DrawnViews {
 };
 
 // A scene beside a `field` model, view after view in turn, rays ending alike.
-template <class Content>
-ordered_json measureAgainst(const TileScene<Content>& scene, const fs::path& field,
+ordered_json measureAgainst(const TileScene& scene, const MakeDrawer& makeDrawer, const fs::path& field,
                             const std::vector<BenchmarkView>& views, int threads, bool print) {
   requireManifest(ModelFolder(field), "field");
   const std::unique_ptr<Device> device = makeDevice({"cpu", threads});
@@ -214,8 +215,8 @@ ordered_json measureAgainst(const TileScene<Content>& scene, const fs::path& fie
   SceneRendererSettings settings;
   settings.threads = threads;
   settings.selection.mostPixels = 0;
-  settings.march.minTransmittance = FieldRenderer::kMinTransmittance;
-  SceneRenderer<Content> renderer(scene.frame, scene.tree, scene.source, settings);
+  settings.draw.minTransmittance = FieldRenderer::kMinTransmittance;
+  SceneRenderer renderer(makeDrawer(), scene.frame, scene.tree, scene.source, settings);
   constexpr int kRounds = 3;
   DrawnViews ours, theirs;
   std::vector<double> ratios;
@@ -237,7 +238,7 @@ ordered_json measureAgainst(const TileScene<Content>& scene, const fs::path& fie
     ratios.push_back(seconds[1] / seconds[0]);
   }
   theirs.rays = ours.rays;
-  ours.samples = renderer.marchCounts().samples;
+  ours.samples = renderer.drawCounts().samples;
   theirs.samples = other.samplesEvaluated();
   const double frames = kRounds * static_cast<double>(views.size());
   const double least = *std::min_element(ratios.begin(), ratios.end()), all = theirs.seconds / ours.seconds;
@@ -265,19 +266,20 @@ struct SceneMeasurement {
   bool print = true;
 };
 
-template <class Content>
 ordered_json measureScene(const SceneMeasurement& what) {
-  const TileScene<Content> scene = openTileScene<Content>(what.scene);
+  const Tileset tileset = readTileset(what.scene);
+  const TileScene scene = openTileScene(what.scene, requireCodec(what.scene, tileset));
+  const MakeDrawer makeDrawer = [&] { return makeCpuDrawer(tileset.representation); };
   ordered_json json = ordered_json::object();
   if (!what.against.empty()) {
-    json["against"] = measureAgainst(scene, what.against, what.views, what.threads, what.print);
+    json["against"] = measureAgainst(scene, makeDrawer, what.against, what.views, what.threads, what.print);
   } else if (!what.views.empty()) {
-    const SkippingBenchmark skipping = benchmarkSkipping(scene, what.views, what.threads);
+    const SkippingBenchmark skipping = benchmarkSkipping(scene, makeDrawer, what.views, what.threads);
     if (what.print) printSkipping(skipping);
     json["skipping"] = toJson(skipping);
   }
   if (what.flight) {
-    const CacheBenchmark cache = benchmarkCache(scene, *what.flight);
+    const CacheBenchmark cache = benchmarkCache(scene, makeDrawer, *what.flight);
     if (what.print) printCache(cache);
     json["cache"] = toJson(cache);
   }
@@ -326,9 +328,7 @@ void addBenchRender(CLI::App& bench) {
     }
     const std::optional<CacheBenchmarkOptions> cache = flags->flight ? std::optional(flags->cache) : std::nullopt;
     const SceneMeasurement what{flags->scene, views, cache, flags->against, flags->cache.threads, flags->json != "-"};
-    const bool hash = readTileset(flags->scene).representation == Representation::hash;
-    const ordered_json json = hash ? measureScene<HashContent>(what) : measureScene<VolumeContent>(what);
-    writeJson(flags->json, json);
+    writeJson(flags->json, measureScene(what));
   });
 }
 
@@ -340,7 +340,7 @@ ordered_json measureFrames(const Device& device, const fs::path& scene, const st
   std::function<size_t()> refused = [] { return size_t{0}; };  // contents of the last picture: no room
   std::string name;
 #ifdef TESSERA_HAS_VULKAN
-  std::unique_ptr<GpuViewRenderer> onCard;
+  std::unique_ptr<GpuSceneRenderer> onCard;
   if (const auto context = contextOf(device)) {
     GpuRendererSettings settings;
     settings.selection.mostPixels = options.mostPixels;

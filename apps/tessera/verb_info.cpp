@@ -8,6 +8,7 @@
 #include "compute/device.h"
 #include "import/capture_reader.h"
 #include "import/importer.h"
+#include "representations/codecs.h"
 #include "representations/field/train_field.h"
 #include "representations/hash/config.h"
 #include "representations/volume/train_volume.h"
@@ -94,6 +95,7 @@ ordered_json describeScene(const fs::path& folder) {
   struct Sizes {
     uint64_t contents = 0, onDisk = 0, inMemory = 0;
   };
+  const ContentCodec& codec = requireCodec(folder, tileset);
   std::vector<Sizes> levels(tileset.levels), surrounds(tileset.levels);
   for (size_t tile = 0; tile < tileset.tiles.size(); ++tile) {
     for (const TileContent& content : tileset.tiles[tile].contents) {
@@ -101,12 +103,12 @@ ordered_json describeScene(const fs::path& folder) {
       ++sizes.contents;
       const fs::path file = contentPath(folder, content.uri);
       sizes.onDisk += fs::file_size(file);
-      sizes.inMemory += readDecodedBytes(file, tileset.representation);
+      sizes.inMemory += readDecodedBytes(file, codec);
     }
   }
   ordered_json info = {
       {"kind", "scene"},
-      {"representation", nameOf(tileset.representation)},
+      {"representation", tileset.representation},
       {"name", tileset.name},
       {"blocks", {{"columns", tileset.columns}, {"rows", tileset.rows}, {"edge", tileset.blockGrid().edge}}}};
   const auto describe = [&](const char* what, const std::vector<Sizes>& all) {

@@ -12,7 +12,7 @@
 #include "base/log.h"
 #include "import/capture_reader.h"
 #include "render/tile_scene.h"
-#include "render/vulkan/gpu_scene_renderer.h"
+#include "representations/gpu_drawers.h"
 #include "tiles/scene_folder.h"
 #include "train/model_folder.h"
 

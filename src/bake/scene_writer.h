@@ -44,7 +44,7 @@ inline constexpr std::array<float, 3> kHazySky = {0.74f, 0.8f, 0.86f};
 
 // What is said of a scene, besides its tiles.
 struct SceneDescription {
-  Representation representation = Representation::volume;
+  std::string representation;
   double near = 0.05;  // scene units
   std::array<float, 3> background = kHazySky;
 };

@@ -45,7 +45,7 @@ class SceneWriting : public testing::Test {
 };
 
 TEST_F(SceneWriting, MakesATreeOfLevelsAndASurroundOfEach) {
-  SceneWriter writer(folder_, capture_, grid_, {Representation::hash, 0.1, {0.1f, 0.2f, 0.3f}});
+  SceneWriter writer(folder_, capture_, grid_, {"hash", 0.1, {0.1f, 0.2f, 0.3f}});
   const HashContent left = cell(-1), right = cell(1), around = surround();
   HashContent both = left;
   both.parts.push_back(right.parts[0]);
@@ -58,7 +58,7 @@ TEST_F(SceneWriting, MakesATreeOfLevelsAndASurroundOfEach) {
   writer.addSurround(encodeHash(around), summaryOf(around));
   const BakedScene baked = writer.commit();
   const Tileset tileset = readTileset(folder_);
-  EXPECT_EQ(tileset.representation, Representation::hash);
+  EXPECT_EQ(tileset.representation, "hash");
   EXPECT_EQ(tileset.name, "town");
   EXPECT_EQ(tileset.background[2], 0.3f);
   EXPECT_EQ(tileset.near, 0.1);
@@ -76,7 +76,7 @@ TEST_F(SceneWriting, MakesATreeOfLevelsAndASurroundOfEach) {
 }
 
 TEST_F(SceneWriting, MakesARootWhereNothingStandsForAll) {
-  SceneWriter writer(folder_, capture_, grid_, {Representation::hash});
+  SceneWriter writer(folder_, capture_, grid_, {"hash"});
   const HashContent left = cell(-1), right = cell(1);
   writer.beginLevel(64);
   writer.add({{0, 0}, {1, 1}}, encodeHash(left), summaryOf(left));

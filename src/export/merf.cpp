@@ -32,9 +32,8 @@ VolumeContent readOnlyContent(const fs::path& scene, const Tileset& tileset, fs:
   const auto unsuitable = [&](const std::string& why) {
     return Error((scene / "tileset.json").string(), "", why, kTrainOneBlock);
   };
-  if (tileset.representation != Representation::volume) {
-    throw unsuitable(
-        fmt::format("is a scene of {}, and MERF's viewer knows volume only", nameOf(tileset.representation)));
+  if (tileset.representation != kVolumeName) {
+    throw unsuitable(fmt::format("is a scene of {}, and MERF's viewer knows volume only", tileset.representation));
   }
   if (tileset.allCells().cells() != 1) {
     throw unsuitable(fmt::format("has {} by {} blocks, and MERF's files hold one that owns all of space",
@@ -48,7 +47,8 @@ VolumeContent readOnlyContent(const fs::path& scene, const Tileset& tileset, fs:
   const Tile& finest = tileset.tiles.back();  // one below the other: there is one cell
   if (finest.contents.size() != 1) throw unsuitable("has not one content, and MERF's files hold one block");
   file = contentPath(scene, finest.contents[0].uri);
-  return readPromisedContent<VolumeContent>(file, tileset.tiles.size() - 1, finest.contents[0]);
+  return contentAs<VolumeContent>(
+      *readPromisedContent(file, volumeCodec(), tileset.tiles.size() - 1, finest.contents[0]));
 }
 
 void requireMerfBlock(const VolumeContent& content, const fs::path& file) {

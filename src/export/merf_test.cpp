@@ -256,7 +256,7 @@ TEST_F(Merf, SaysWhyASceneCannotBeExportedAndWhatToTrain) {
   tileset.tiles[0].contents[0].box.high[2] /= 2;
   refused(sceneOf(good, tileset), "outside of the content's box", "copy the scene again");
   tileset = tilesetOf(good);
-  tileset.representation = Representation::mesh;
+  tileset.representation = "mesh";
   refused(sceneOf(good, tileset), "is a scene of mesh", train);
 
   VolumeContent content = good;

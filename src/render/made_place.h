@@ -1,6 +1,7 @@
 // For tests: a whole scene of made contents: a tree, its surround, and where they come from.
 #pragma once
 
+#include "render/cpu/test_renderer.h"
 #include "render/made_tree.h"
 #include "render/made_volume.h"
 #include "render/tile_cache.h"
@@ -52,8 +53,8 @@ struct Place {
     coarsestBytes += bytesInMemory(contents.back());
   }
 
-  TileSource<VolumeContent> source() const {
-    return {[this](int tile) { return bytesInMemory(contents[tile]); }, [this](int tile) { return contents[tile]; }};
+  TileSource<Content> source() const {
+    return sourceOfCopies([this](int tile) -> const VolumeContent& { return contents[tile]; });
   }
 };
 

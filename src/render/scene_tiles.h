@@ -2,34 +2,23 @@
 // All renderers of scenes in this program choose alike.
 #pragma once
 
-#include <cmath>
 #include <functional>
 #include <utility>
 #include <vector>
 
+#include "render/drawer.h"
 #include "render/tile_cache.h"
 #include "render/tile_frame.h"
 #include "render/tile_selection.h"
 
 namespace tessera {
 
-// Of a content, the part in a box, whose sides may be infinite.
-template <class Content>
-struct DrawnContent {
-  const Content* content;
-  Vec3d low, high;  // scene units
-
-  DrawnContent(const Content* content)  // NOLINT(google-explicit-constructor): all of it
-      : DrawnContent(content, Vec3d::Constant(-INFINITY), Vec3d::Constant(INFINITY)) {}
-  DrawnContent(const Content* content, const Vec3d& low, const Vec3d& high) : content(content), low(low), high(high) {}
-};
-
-// Content: as of TileCache.
-template <class Content>
+// Held: as of TileCache.
+template <class Held>
 class SceneTiles {
  public:
   // Throws Error where the coarsest level does not fit into the budget.
-  SceneTiles(const TileFrame& frame, TileTree tree, TileSource<Content> source, const SelectionSettings& selection,
+  SceneTiles(const TileFrame& frame, TileTree tree, TileSource<Held> source, const SelectionSettings& selection,
              uint64_t budgetBytes)
       : frame_(frame),
         tree_(std::move(tree)),
@@ -58,35 +47,34 @@ class SceneTiles {
   }
   const std::vector<int>& missing() const { return missing_; }  // of the last view's wanted ones
 
-  // Of the last view, in an order that is front to back for every ray of its camera. Counts as a use of each.
-  std::vector<DrawnContent<Content>> frontToBack() {
-    std::vector<DrawnContent<Content>> contents;
+  // Of the last view. Counts as a use of each content.
+  SceneView<Held> view() {
+    SceneView<Held> view{frame_, {}, nullptr, nullptr};
     for (const SelectedTile& selected : cut_.tiles) {
       if (!selected.visible) continue;
-      DrawnContent<Content>& drawn = contents.emplace_back(cache_.find(selected.content));
+      DrawnContent<Held>& drawn = view.frontToBack.emplace_back(cache_.find(selected.content));
       if (selected.content == selected.tile) continue;
       const TileBox cells = tree_.boxOfCells(selected.tile);
       drawn.low = cells.low;
       drawn.high = cells.high;
     }
-    return contents;
-  }
-  const Content* surround() { return cut_.surround >= 0 ? cache_.find(cut_.surround) : nullptr; }  // may be null
-  // One that is always there, whatever is in view; null where the scene is empty.
-  const Content* always() {
+    if (cut_.surround >= 0) view.surround = cache_.find(cut_.surround);
     const std::vector<int> coarsest = tree_.coarsest();
-    return coarsest.empty() ? nullptr : cache_.find(coarsest.front());
+    if (!coarsest.empty()) view.pinned = cache_.find(coarsest.front());
+    return view;
   }
 
   const TileFrame& frame() const { return frame_; }
   const TileCut& cut() const { return cut_; }
   const TileChoice& choice() const { return choice_; }
-  const TileCache<Content>& cache() const { return cache_; }
+  const TileCache<Held>& cache() const { return cache_; }
 
  private:
   void choose(const TileView& view) {
     const auto holds = [this](int tile) { return cache_.holds(tile); };
-    choice_ = selector_.choose(view, {cache_.budgetBytes(), holds, [this](int tile) { return cache_.bytesOf(tile); }});
+    choice_ = selector_.choose(view, {cache_.budgetBytes(), holds, [this](int tile) { return cache_.bytesOf(tile); },
+                                      [this](int tile) { return cache_.resourcesOf(tile); },
+                                      [this](int resource) { return cache_.bytesOfResource(resource); }});
     missing_.clear();
   }
   void cut(const TileView& view) {
@@ -95,7 +83,7 @@ class SceneTiles {
 
   TileFrame frame_;
   TileTree tree_;
-  TileCache<Content> cache_;
+  TileCache<Held> cache_;
   TileSelector selector_;
   TileChoice choice_;
   TileCut cut_;

@@ -12,32 +12,22 @@
 namespace tessera {
 namespace {
 
-// A content of exactly so many bytes.
-VolumeContent contentOfBytes(uint64_t bytes) {
-  VolumeContent content;
-  content.parts.resize(1);
-  content.parts[0].voxelBytes.resize(bytes - bytesInMemory(content));
-  return content;
-}
+struct FakeContent {
+  uint64_t bytes = 0;
+  uint64_t memoryBytes() const { return bytes; }
+};
 
 constexpr uint64_t kBytes = 2000;
 
-TileSource<VolumeContent> sourceOf(std::function<VolumeContent(int)> load) {
-  return {[](int) { return kBytes; }, std::move(load)};
+std::unique_ptr<FakeContent> contentOfBytes(uint64_t bytes) {
+  return std::make_unique<FakeContent>(FakeContent{bytes});
 }
 
-TEST(TileCache, CountsAllThatAContentHolds) {
-  VolumeContent content;
-  const uint64_t before = bytesInMemory(content);
-  content.network = {{34, 3, std::vector<float>(102), std::vector<float>(3)}};
-  EXPECT_EQ(bytesInMemory(content) - before, sizeof(DenseLayer) + 4 * 105);
-  const uint64_t withNetwork = bytesInMemory(content);
-  content.parts.resize(1);
-  content.parts[0].macroblocks.resize(64);
-  content.parts[0].voxelBytes.resize(5832);
-  content.parts[0].planeBytes[2].resize(1000);
-  content.parts[0].distances.resize(512);
-  EXPECT_EQ(bytesInMemory(content) - withNetwork, sizeof(VolumePart) + 256 + 5832 + 1000 + 512);
+TileSource<FakeContent> sourceOf(std::function<std::unique_ptr<FakeContent>(int)> load) {
+  TileSource<FakeContent> source;
+  source.bytes = [](int) { return kBytes; };
+  source.load = std::move(load);
+  return source;
 }
 
 TEST(TileCache, NeverHoldsMoreThanItsBudgetUnderRandomAccess) {
@@ -45,10 +35,10 @@ TEST(TileCache, NeverHoldsMoreThanItsBudgetUnderRandomAccess) {
   const RandomStream random(1, 1);
   for (const uint64_t budget : {kBytes, 3 * kBytes, 7 * kBytes + 5, 100 * kBytes}) {
     uint64_t loads = 0;
-    TileCache<VolumeContent> cache(tree, budget, sourceOf([&](int) {
-                                     ++loads;
-                                     return contentOfBytes(kBytes);
-                                   }));
+    TileCache<FakeContent> cache(tree, budget, sourceOf([&](int) {
+                                   ++loads;
+                                   return contentOfBytes(kBytes);
+                                 }));
     uint64_t found = 0;
     for (uint64_t i = 0; i < 3000; ++i) {
       std::vector<int> tiles;
@@ -77,7 +67,7 @@ TEST(TileCache, NeverHoldsMoreThanItsBudgetUnderRandomAccess) {
 
 TEST(TileCache, EvictsWhatHasNotBeenUsedForLongestAndNothingWithoutNeed) {
   const TileTree tree = madeTree(4, 4);
-  TileCache<VolumeContent> cache(tree, 4 * kBytes, sourceOf([](int) { return contentOfBytes(kBytes); }));
+  TileCache<FakeContent> cache(tree, 4 * kBytes, sourceOf([](int) { return contentOfBytes(kBytes); }));
   cache.load(std::vector<int>{1, 2, 3});
   cache.load({});
   EXPECT_EQ(cache.statistics().evictions, 0u);
@@ -95,11 +85,11 @@ TEST(TileCache, SaysHowMuchTheCoarsestLevelAndTheSurroundNeed) {
   tree.surround = static_cast<int>(tree.tiles.size());
   tree.tiles.emplace_back().isSurround = true;
   int loads = 0;
-  const TileSource<VolumeContent> source = sourceOf([&](int) {
+  const TileSource<FakeContent> source = sourceOf([&](int) {
     ++loads;
     return contentOfBytes(kBytes);
   });
-  TileSource<VolumeContent> named = source;
+  TileSource<FakeContent> named = source;
   named.folder = "site.scene";
   try {
     TileCache(tree, 2 * kBytes - 1, named);
@@ -109,16 +99,16 @@ TEST(TileCache, SaysHowMuchTheCoarsestLevelAndTheSurroundNeed) {
     EXPECT_NE(std::string(error.what()).find("4000 bytes"), std::string::npos) << error.what();
   }
   EXPECT_EQ(loads, 0);
-  const TileCache<VolumeContent> cache(tree, 2 * kBytes, source);
+  const TileCache<FakeContent> cache(tree, 2 * kBytes, source);
   EXPECT_TRUE(cache.holds(tree.surround));
   EXPECT_TRUE(cache.holds(0));
 }
 
 TEST(TileCache, RefusesAContentThatIsLargerThanItsSourceSaid) {
   const TileTree tree = madeTree(2, 2);
-  TileSource<VolumeContent> source = sourceOf([](int tile) { return contentOfBytes(kBytes + (tile == 2 ? 1 : 0)); });
+  TileSource<FakeContent> source = sourceOf([](int tile) { return contentOfBytes(kBytes + (tile == 2 ? 1 : 0)); });
   source.file = [](int tile) { return std::to_string(tile) + ".glb"; };
-  TileCache<VolumeContent> cache(tree, 100 * kBytes, source);
+  TileCache<FakeContent> cache(tree, 100 * kBytes, source);
   try {
     cache.load(std::vector<int>{1, 2});
     FAIL();
@@ -128,6 +118,45 @@ TEST(TileCache, RefusesAContentThatIsLargerThanItsSourceSaid) {
   EXPECT_TRUE(cache.holds(1));
   EXPECT_FALSE(cache.holds(2));
   EXPECT_EQ(cache.statistics().bytes, 2 * kBytes);
+}
+
+// Tile t needs resource t % 2, and the root none; a resource takes as much as a content.
+TEST(TileCache, ChargesASharedResourceOnceAndOnlyWhileAContentNeedsIt) {
+  const TileTree tree = madeTree(4, 4);
+  TileSource<FakeContent> source = sourceOf([](int) { return contentOfBytes(kBytes); });
+  source.resourcesOf = [](int tile) { return tile == 0 ? std::vector<int>{} : std::vector<int>{tile % 2}; };
+  source.bytesOfResource = [](int) { return kBytes; };
+  TileCache<FakeContent> cache(tree, 5 * kBytes, source);
+  EXPECT_EQ(cache.statistics().bytes, kBytes);
+  cache.load(std::vector<int>{1});
+  EXPECT_EQ(cache.statistics().bytes, 3 * kBytes);  // the resource came with it
+  cache.load(std::vector<int>{3});
+  EXPECT_EQ(cache.statistics().bytes, 4 * kBytes);  // and is shared
+  cache.load(std::vector<int>{5});
+  EXPECT_EQ(cache.statistics().bytes, 5 * kBytes);
+  EXPECT_EQ(cache.statistics().evictions, 0u);
+  // One that needs the other resource takes the room of two contents.
+  cache.load(std::vector<int>{2});
+  EXPECT_EQ(cache.statistics().evictions, 2u);
+  EXPECT_FALSE(cache.holds(1));
+  EXPECT_FALSE(cache.holds(3));
+  EXPECT_EQ(cache.statistics().bytes, 5 * kBytes);
+  // With its last content the first resource goes too.
+  cache.load(std::vector<int>{2, 4, 6});
+  EXPECT_FALSE(cache.holds(5));
+  EXPECT_EQ(cache.statistics().bytes, 5 * kBytes);  // the root, three contents and their resource
+  EXPECT_LE(cache.statistics().mostBytes, 5 * kBytes);
+}
+
+TEST(TileCache, CountsTheResourcesOfWhatMustStay) {
+  TileTree tree = madeTree(2, 2);
+  tree.surround = static_cast<int>(tree.tiles.size());
+  tree.tiles.emplace_back().isSurround = true;
+  TileSource<FakeContent> source = sourceOf([](int) { return contentOfBytes(kBytes); });
+  source.resourcesOf = [](int) { return std::vector<int>{7}; };
+  source.bytesOfResource = [](int) { return kBytes; };
+  EXPECT_THROW(TileCache<FakeContent>(tree, 3 * kBytes - 1, source), Error);
+  EXPECT_EQ(TileCache<FakeContent>(tree, 3 * kBytes, source).statistics().bytes, 3 * kBytes);
 }
 
 }  // namespace

@@ -4,12 +4,11 @@
 
 #include <functional>
 #include <map>
+#include <mutex>
 
 #include "base/error.h"
-#include "tiles/hash_content.h"
 #include "tiles/read_content.h"
 #include "tiles/scene_folder.h"
-#include "tiles/volume_content.h"
 
 namespace tessera {
 namespace {
@@ -18,6 +17,34 @@ struct PromisedFile {
   fs::path path;
   size_t tile = 0;  // of tileset.json
   TileContent promised;
+};
+
+// The resources of a scene: read when a content first needs one, and there as long as one does. For several threads.
+class SceneResources {
+ public:
+  SceneResources(const fs::path& folder, const ContentCodec& codec, const std::vector<SharedResource>& described)
+      : codec_(codec), described_(described), held_(described.size()) {
+    for (const SharedResource& resource : described) files_.push_back(contentPath(folder, resource.uri));
+  }
+
+  Resources of(const TileContent& content) {
+    const std::lock_guard lock(mutex_);
+    Resources resources;
+    for (const uint32_t number : content.resources) {
+      std::shared_ptr<const Resource> resource = held_[number].lock();
+      if (!resource) held_[number] = resource = readResource(files_[number], codec_, described_[number]);
+      resources.push_back(std::move(resource));
+    }
+    return resources;
+  }
+  uint64_t bytesOf(int number) const { return readResourceBytes(files_[number], codec_, described_[number]); }
+
+ private:
+  const ContentCodec& codec_;
+  std::vector<SharedResource> described_;
+  std::vector<fs::path> files_;
+  std::mutex mutex_;
+  std::vector<std::weak_ptr<const Resource>> held_;
 };
 
 }  // namespace
@@ -33,16 +60,18 @@ TileFrame frameOf(const Tileset& tileset) {
   return frame;
 }
 
-template <class Content>
-TileScene<Content> openTileScene(const fs::path& folder) {
+TileScene openTileScene(const fs::path& folder, const ContentCodec& codec) {
   const Tileset tileset = readTileset(folder);
-  if (tileset.representation != representationOf<Content>()) {
-    throw Error(
-        (folder / "tileset.json").string(), "",
-        fmt::format("is a scene of {}, not of {}", nameOf(tileset.representation), nameOf(representationOf<Content>())),
-        "draw it with a viewer that knows it");
+  if (tileset.representation != codec.representation()) {
+    throw Error((folder / "tileset.json").string(), "",
+                fmt::format("is a scene of {}, not of {}", tileset.representation, codec.representation()),
+                "draw it with a viewer that knows it");
   }
-  TileScene<Content> scene;
+  if (const auto tile = tileWithoutOrder(tileset); tile && !codec.contentsMayOverlap()) {
+    throw Error((folder / "tileset.json").string(), fmt::format("tile {}", *tile), "contents of a tile have no order",
+                "bake the scene again");
+  }
+  TileScene scene;
   scene.frame = frameOf(tileset);
   scene.background = tileset.background;
   scene.tree.columns = static_cast<int>(tileset.columns);
@@ -93,17 +122,20 @@ TileScene<Content> openTileScene(const fs::path& folder) {
     scene.tree.tiles.push_back(std::move(node));
     files.push_back(file);
   }
-  scene.source.bytes = [files](int tile) { return readDecodedBytes<Content>(files[tile].path); };
-  scene.source.load = [files](int tile) {
+  const auto resources = std::make_shared<SceneResources>(folder, codec, tileset.resources);
+  scene.source.bytes = [files, &codec](int tile) { return readDecodedBytes(files[tile].path, codec); };
+  scene.source.load = [files, resources, &codec](int tile) {
     const PromisedFile& file = files[tile];
-    return readPromisedContent<Content>(file.path, file.tile, file.promised);
+    return readPromisedContent(file.path, codec, file.tile, file.promised, resources->of(file.promised));
   };
+  scene.source.resourcesOf = [files](int tile) {
+    const std::vector<uint32_t>& numbers = files[tile].promised.resources;
+    return std::vector<int>(numbers.begin(), numbers.end());
+  };
+  scene.source.bytesOfResource = [resources](int resource) { return resources->bytesOf(resource); };
   scene.source.folder = folder.string();
   scene.source.file = [files](int tile) { return files[tile].path.string(); };
   return scene;
 }
-
-template TileScene<VolumeContent> openTileScene(const fs::path&);
-template TileScene<HashContent> openTileScene(const fs::path&);
 
 }  // namespace tessera

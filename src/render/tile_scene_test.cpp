@@ -4,9 +4,10 @@
 #include <unistd.h>
 
 #include "base/error.h"
-#include "render/cpu/scene_renderer.h"
+#include "render/cpu/test_renderer.h"
 #include "tiles/scene_folder.h"
 #include "tiles/tileset_json.h"
+#include "tiles/volume_payload.h"
 
 namespace tessera {
 namespace {
@@ -19,6 +20,10 @@ Camera camera() {
   camera.height = 72;
   camera.parameters = {80, 80, 48, 36};
   return camera;
+}
+
+VolumeContent volumeAt(const TileScene& scene, int tile) {
+  return contentAs<VolumeContent>(*scene.source.load(tile));
 }
 
 // In the world, from a place in the scene.
@@ -34,13 +39,13 @@ Pose lookingAt(const TileFrame& frame, const Vec3d& eye, const Vec3d& target) {
 }
 
 TEST(TileScene, KnowsWhatContentsTakeInMemoryBeforeTheyAreLoaded) {
-  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(kScene);
+  const TileScene scene = openTileScene(kScene, volumeCodec());
   scene.tree.check();
   int contents = 0;
   for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
     if (!scene.tree.tiles[i].hasContent) continue;
     const int tile = static_cast<int>(i);
-    EXPECT_EQ(scene.source.bytes(tile), bytesInMemory(scene.source.load(tile)));
+    EXPECT_EQ(scene.source.bytes(tile), scene.source.load(tile)->memoryBytes());
     ++contents;
   }
   EXPECT_EQ(contents, 5);  // two blocks, one level above, two surrounds
@@ -51,12 +56,12 @@ TEST(TileScene, KnowsWhatContentsTakeInMemoryBeforeTheyAreLoaded) {
   EXPECT_EQ(coarse.level, 1);
   EXPECT_EQ(scene.tree.tiles[fine].level, 0);
   EXPECT_DOUBLE_EQ(coarse.geometricError, 2 * scene.tree.tiles[fine].geometricError);
-  EXPECT_TRUE(scene.source.load(fine).parts[0].surround);
-  EXPECT_EQ(scene.source.load(fine).parts[0].planes, 2 * scene.source.load(scene.tree.surround).parts[0].planes);
+  EXPECT_TRUE(volumeAt(scene, fine).parts[0].surround);
+  EXPECT_EQ(volumeAt(scene, fine).parts[0].planes, 2 * volumeAt(scene, scene.tree.surround).parts[0].planes);
 }
 
 TEST(TileScene, IsDrawnFromDiskAsFromMemory) {
-  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(kScene);
+  const TileScene scene = openTileScene(kScene, volumeCodec());
   SceneRendererSettings settings;
   settings.threads = 1;
   settings.selection.mostPixels = 0;
@@ -67,10 +72,10 @@ TEST(TileScene, IsDrawnFromDiskAsFromMemory) {
   std::vector<VolumeContent> finest;
   for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
     const TileNode& node = scene.tree.tiles[i];
-    if (!node.isSurround && node.children.empty()) finest.push_back(scene.source.load(static_cast<int>(i)));
+    if (!node.isSurround && node.children.empty()) finest.push_back(volumeAt(scene, static_cast<int>(i)));
   }
   ASSERT_EQ(finest.size(), 2u);
-  const VolumeContent surround = scene.source.load(scene.tree.tiles[scene.tree.surround].children.at(0));
+  const VolumeContent surround = volumeAt(scene, scene.tree.tiles[scene.tree.surround].children.at(0));
   SceneDrawing<VolumeContent> drawing{scene.frame, {&finest[0], &finest[1]}, &surround, {}};  // the first is nearer
   ThreadPool pool(1);
   const RenderedView expected = drawScene(drawing, camera(), pose, nullptr, pool);
@@ -82,7 +87,7 @@ TEST(TileScene, IsDrawnFromDiskAsFromMemory) {
 }
 
 TEST(TileScene, IsCoarserFromAfar) {
-  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(kScene);
+  const TileScene scene = openTileScene(kScene, volumeCodec());
   VolumeRenderer renderer(scene.frame, scene.tree, scene.source, {});
   renderer.render(camera(), lookingAt(scene.frame, Vec3d(0, -300, 100), Vec3d::Zero()), nullptr);
   EXPECT_EQ(renderer.cut().tiles.size(), 1u);
@@ -93,7 +98,7 @@ TEST(TileScene, IsCoarserFromAfar) {
 }
 
 TEST(TileScene, HasTheSurroundOfTheLevelThatIsAskedFor) {
-  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(kScene);
+  const TileScene scene = openTileScene(kScene, volumeCodec());
   SceneRendererSettings settings;
   settings.selection.mostPixels = 0;
   const int coarse = scene.tree.surround, fine = scene.tree.tiles[coarse].children.at(0);
@@ -121,7 +126,7 @@ class VolumeSceneThatLies : public testing::Test {
   // Loads the content of a tile, or the surround, and expects an error that names its file, its tile and the rule.
   void refuses(bool surround, size_t tile, const std::string& rule) {
     writeFileAtomically(folder_ / "tileset.json", encodeTileset(tileset_));
-    const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(folder_);
+    const TileScene scene = openTileScene(folder_, volumeCodec());
     const int node = surround ? scene.tree.tiles[scene.tree.surround].children.at(0) : static_cast<int>(tile);
     try {
       scene.source.load(node);
@@ -145,7 +150,7 @@ TEST_F(VolumeSceneThatLies, IsRefusedWhereAContentIsASurroundAndShouldBeNoneAndT
   refuses(false, 0, "part 0 is a surround, and tileset.json says that the content is none");
   refuses(true, 0, "part 0 is no surround, and tileset.json says that the content is one");
   // The renderer, which relies on it, says so instead of drawing.
-  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(folder_);
+  const TileScene scene = openTileScene(folder_, volumeCodec());
   EXPECT_THROW(VolumeRenderer(scene.frame, scene.tree, scene.source, {}), Error);
 }
 
@@ -161,7 +166,7 @@ TEST_F(VolumeSceneThatLies, IsRefusedWhereAPartLeavesTheBoxOfItsContent) {
   tileset_ = readTileset(kScene);
   tileset_.tiles[2].contents[0].box.high.z() -= 1e-7;  // no more than rounding
   writeFileAtomically(folder_ / "tileset.json", encodeTileset(tileset_));
-  EXPECT_EQ(openTileScene<VolumeContent>(folder_).source.load(2).parts.size(), 1u);
+  EXPECT_EQ(volumeAt(openTileScene(folder_, volumeCodec()), 2).parts.size(), 1u);
 }
 
 // The format allows them.
@@ -175,7 +180,7 @@ TEST_F(VolumeSceneThatLies, IsRefusedWithSeveralContentsOfATileWhichAreNotDrawn)
   }
   writeFileAtomically(folder_ / "tileset.json", encodeTileset(tileset_));
   try {
-    openTileScene<VolumeContent>(folder_);
+    openTileScene(folder_, volumeCodec());
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.subject(), (folder_ / "tileset.json").string());
@@ -185,7 +190,7 @@ TEST_F(VolumeSceneThatLies, IsRefusedWithSeveralContentsOfATileWhichAreNotDrawn)
 }
 
 TEST_F(VolumeSceneThatLies, IsNotReadWhereItsFilesAreLargerThanAnyShouldBe) {
-  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(folder_);
+  const TileScene scene = openTileScene(folder_, volumeCodec());
   fs::resize_file(scene.source.file(1), (uint64_t{1} << 30) + 1);  // a hole
   try {
     scene.source.load(1);
@@ -196,7 +201,7 @@ TEST_F(VolumeSceneThatLies, IsNotReadWhereItsFilesAreLargerThanAnyShouldBe) {
   }
   fs::resize_file(folder_ / "tileset.json", (uint64_t{16} << 20) + 1);
   try {
-    openTileScene<VolumeContent>(folder_);
+    openTileScene(folder_, volumeCodec());
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.subject(), (folder_ / "tileset.json").string());
@@ -205,7 +210,7 @@ TEST_F(VolumeSceneThatLies, IsNotReadWhereItsFilesAreLargerThanAnyShouldBe) {
 }
 
 TEST(TileScene, NamesTheFolderWhoseCoarsestLevelDoesNotFit) {
-  const TileScene<VolumeContent> scene = openTileScene<VolumeContent>(kScene);
+  const TileScene scene = openTileScene(kScene, volumeCodec());
   SceneRendererSettings settings;
   settings.budgetBytes = 1000;
   try {
@@ -218,7 +223,7 @@ TEST(TileScene, NamesTheFolderWhoseCoarsestLevelDoesNotFit) {
 
 TEST(TileScene, SaysWhatIsMissing) {
   try {
-    openTileScene<VolumeContent>("/nowhere/scene");
+    openTileScene("/nowhere/scene", volumeCodec());
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("/nowhere/scene"), std::string::npos);

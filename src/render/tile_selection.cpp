@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <queue>
+#include <set>
 
 #include "base/check.h"
 
@@ -97,6 +98,33 @@ bool showsSurround(const SceneRay& ray, const Vec3d& low, const Vec3d& high) {
   return upwards == 0 || ((upwards > 0 ? high : low).z() - ray.origin.z()) / upwards > inside.far;
 }
 
+namespace {
+
+// What tiles take in memory together: each resource that they share counts once, at the first of them that needs it.
+class Charges {
+ public:
+  explicit Charges(const TileMemory& memory) : memory_(memory) {}
+
+  uint64_t bytesWith(int tile) const {
+    uint64_t bytes = bytes_ + memory_.bytes(tile);
+    for (const int resource : memory_.resourcesOf(tile)) {
+      if (!resources_.contains(resource)) bytes += memory_.bytesOfResource(resource);
+    }
+    return bytes;
+  }
+  void add(int tile) {
+    bytes_ = bytesWith(tile);
+    for (const int resource : memory_.resourcesOf(tile)) resources_.insert(resource);
+  }
+
+ private:
+  const TileMemory& memory_;
+  uint64_t bytes_ = 0;
+  std::set<int> resources_;
+};
+
+}  // namespace
+
 struct TileSelector::Pass {
   const TileView& view;
   const std::function<bool(int)>& holds;
@@ -138,20 +166,20 @@ TileChoice TileSelector::choose(const TileView& view, const TileMemory& memory) 
     addBelow(tile, view.errorInPixels(tree_.tiles[tile]) / std::max(settings_.mostPixels, 1e-3));
   };
   TileChoice choice;
-  uint64_t bytes = 0;
+  Charges charges(memory);
   for (const int tile : pinned_) {
-    bytes += memory.bytes(tile);
+    charges.add(tile);
     if (view.sees(tree_.tiles[tile])) refine(tile);
   }
   while (!open.empty()) {
     const int tile = open.top().tile;
     open.pop();
-    if (bytes + memory.bytes(tile) > memory.budget) {
+    if (charges.bytesWith(tile) > memory.budget) {
       ++choice.refused;
       if (isReplaced(view, tile)) lookBelow(view, tile);
       continue;
     }
-    bytes += memory.bytes(tile);
+    charges.add(tile);
     choice.wanted.push_back(tile);
     refine(tile);
   }

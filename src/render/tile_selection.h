@@ -55,9 +55,12 @@ bool showsSurround(const SceneRay& ray, const Vec3d& low, const Vec3d& high);
 
 // What there is to choose from.
 struct TileMemory {
-  uint64_t budget = 0;                  // bytes
-  std::function<bool(int tile)> holds;  // the coarsest, also of the surround, always
-  std::function<uint64_t(int tile)> bytes;
+  uint64_t budget = 0;                      // bytes
+  std::function<bool(int tile)> holds;      // the coarsest, also of the surround, always
+  std::function<uint64_t(int tile)> bytes;  // without its resources
+  // Resources that a tile shares with others, each once: charged at the first tile that needs them.
+  std::function<std::vector<int>(int tile)> resourcesOf = [](int) { return std::vector<int>(); };
+  std::function<uint64_t(int resource)> bytesOfResource = [](int) { return uint64_t{0}; };
 };
 
 struct SelectedTile {

@@ -54,7 +54,8 @@ bool isPartition(const TileTree& tree, const std::vector<SelectedTile>& cut) {
 const auto kAll = [](int) { return true; };
 
 // Room for everything, of which nothing is there.
-const TileMemory kRoom = {UINT64_MAX, [](int) { return false; }, [](int) { return uint64_t{1}; }};
+const TileMemory kRoom = {
+    .budget = UINT64_MAX, .holds = [](int) { return false; }, .bytes = [](int) { return uint64_t{1}; }};
 
 // A tree with a coarse and a fine surround. Returns their numbers.
 std::pair<int, int> addSurrounds(TileTree& tree) {
@@ -339,6 +340,28 @@ TEST(TileSelection, DrawsFinerTilesThanAskedForRatherThanNone) {
   for (const int child : tree.tiles[middle].children) EXPECT_TRUE(cut.contains(child));
   const TileChoice choice = selector.choose(near, kRoom);
   EXPECT_NE(std::find(choice.wanted.begin(), choice.wanted.end(), middle), choice.wanted.end());
+}
+
+// All four tiles below the root need one resource, which takes as much as ten of them.
+TEST(TileSelection, ChargesASharedResourceOnceAtTheFirstTileThatNeedsIt) {
+  const TileTree tree = madeTree(2, 2);
+  const TileView view = tileView(smallCamera(), lookingAt(Vec3d(0, -4, 3), Vec3d::Zero()), {});
+  const auto chosen = [&](uint64_t budget, bool rootNeedsIt) {
+    TileMemory memory = kRoom;
+    memory.budget = budget;
+    memory.resourcesOf = [=](int tile) { return tile > 0 || rootNeedsIt ? std::vector<int>{3} : std::vector<int>(); };
+    memory.bytesOfResource = [](int resource) { return uint64_t{resource == 3 ? 10u : 1000u}; };
+    TileSelector selector(tree, {0, 1.2, 0});
+    const TileChoice choice = selector.choose(view, memory);
+    EXPECT_EQ(choice.wanted.size() + static_cast<size_t>(choice.refused), 4u);
+    return choice.wanted.size();
+  };
+  EXPECT_EQ(chosen(1 + 4, false), 0u);  // a tile that is refused brings nothing
+  EXPECT_EQ(chosen(1 + 10, false), 0u);
+  EXPECT_EQ(chosen(1 + 10 + 1, false), 1u);
+  EXPECT_EQ(chosen(1 + 10 + 4, false), 4u);
+  EXPECT_EQ(chosen(1 + 10, true), 0u);  // it came with the root
+  EXPECT_EQ(chosen(1 + 10 + 2, true), 2u);
 }
 
 }  // namespace

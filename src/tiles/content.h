@@ -1,44 +1,24 @@
-// What contents of `volume` and of `hash` have in common in memory: where their parts stand in the scene, macroblocks
-// of texels, and a network's layers. docs/tile-format.md is normative.
+// What a tile holds, whatever its representation: decoded contents, what several of them share, and the codec that
+// makes them of untrusted bytes. A representation has one codec; everything that reads scenes knows no more of it than
+// this.
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
+
+#include "base/check.h"
 
 namespace tessera {
 
-// outputs = weights · inputs + biases; ReLU after each layer but the last.
-struct DenseLayer {
-  uint32_t inputs = 0, outputs = 0;
-  std::vector<float> weights;  // [outputs][inputs]
-  std::vector<float> biases;   // [outputs]
-
-  bool operator==(const DenseLayer&) const = default;
-};
-
-// Scene units: those of tileset.json's extension, where half a finest block's edge is 1. Local coordinates are q = (x -
-// centre) / scale per axis. A bounded part's domain is [-1,1]³ and holds q; a contracted one's is [-2,2]³ and holds
-// scene/contraction.h of q. With h half the domain's size, texel i of R along an axis lies at -h + 2h (i + ½) / R.
-struct ContentPart {
-  static constexpr uint32_t kMacroblock = 8;  // texels along an edge; stored with one more at the upper end (the apron)
-  static constexpr uint32_t kStoredEdge = 9;  // kMacroblock + 1
-  static constexpr uint32_t kStoredTexels = kStoredEdge * kStoredEdge * kStoredEdge;
-  static constexpr uint32_t kEmpty = 0xffffffffu;
-
-  std::array<float, 3> centre = {0, 0, 0}, scale = {1, 1, 1};
-  bool contracted = false;
-  // What it owns, scene units. The surround owns all that lies outside the scene's box, and is seen behind it only.
-  std::array<float, 3> low = {-1, -1, -1}, high = {1, 1, 1};
-  bool surround = false;
-
-  // [(texels along an axis / 8)³], x fastest: the number of a macroblock among those stored, or kEmpty. Macroblock b
-  // holds the texels 8b to 8b + 8 along each axis (the last clamped to the grid), so that a sample whose lower texel is
-  // in it finds its upper ones too.
-  std::vector<uint32_t> macroblocks;
-
-  float halfDomain() const { return contracted ? 2.0f : 1.0f; }
-};
+struct SharedResource;  // tiles/tileset.h
+struct TileContent;
 
 // What readers allow.
 struct ContentLimits {
@@ -47,23 +27,91 @@ struct ContentLimits {
   uint32_t parts = 1024;
 };
 
-inline constexpr uint32_t kMostStored = 606 * 606;                 // macroblocks in a picture of 16383 pixels a side
-inline constexpr uint32_t kMostLayers = 8, kMostLayerWidth = 256;  // of a network
-inline constexpr uint32_t kMostNetworkVectors = 4096;              // of four numbers, as shaders take them
-inline constexpr float kFarthestInScene = 1e7f;                    // scene units
+// What several contents of a scene need and what is in memory once for all of them: a network, a table of a block.
+class Resource {
+ public:
+  Resource() = default;
+  Resource(const Resource&) = delete;
+  Resource& operator=(const Resource&) = delete;
+  virtual ~Resource() = default;
 
-// Of four numbers, that a layer takes in a shader: biases, and weights for each input.
-inline uint32_t networkVectors(uint32_t inputs, uint32_t outputs) {
-  return (outputs + 3) / 4 * (1 + inputs);
-}
+  virtual uint64_t memoryBytes() const = 0;
+};
+// Those of a content, in the order of TileContent::resources. A content that needs them longer keeps them.
+using Resources = std::vector<std::shared_ptr<const Resource>>;
 
-// What a network takes in memory.
-inline uint64_t bytesInMemory(const std::vector<DenseLayer>& network) {
-  uint64_t bytes = 0;
-  for (const DenseLayer& layer : network) {
-    bytes += sizeof(DenseLayer) + sizeof(float) * (layer.weights.size() + layer.biases.size());
+// A decoded content, which keeps all rules of its format.
+class Content {
+ public:
+  Content() = default;
+  Content(const Content&) = delete;
+  Content& operator=(const Content&) = delete;
+  virtual ~Content() = default;
+
+  // What it takes in memory, without its resources. Renderers' budgets count this.
+  virtual uint64_t memoryBytes() const = 0;
+  // Why it is not the content that tileset.json speaks of, for people: it is the surround where that says none, or the
+  // other way round, or it reaches out of the box there. Nothing where it is.
+  virtual std::optional<std::string> mismatchWith(const TileContent& promised) const = 0;
+};
+
+// A content that is a plain value, of which these are found beside its type:
+//   uint64_t bytesInMemory(const T&);
+//   std::optional<std::string> mismatchWithTileset(const T&, const TileContent& promised);
+template <class T>
+class ContentOf final : public Content {
+ public:
+  explicit ContentOf(T value) : value(std::move(value)) {}
+
+  uint64_t memoryBytes() const override { return bytesInMemory(value); }
+  std::optional<std::string> mismatchWith(const TileContent& promised) const override {
+    return mismatchWithTileset(value, promised);
   }
-  return bytes;
+
+  T value;
+};
+
+template <class T>
+std::unique_ptr<Content> makeContent(T value) {
+  return std::make_unique<ContentOf<T>>(std::move(value));
 }
+
+// The value of a content that is a ContentOf<T>; CHECKs that it is one.
+template <class T>
+const T& contentAs(const Content& content) {
+  const auto* typed = dynamic_cast<const ContentOf<T>*>(&content);
+  CHECK(typed != nullptr);
+  return typed->value;
+}
+
+// Decodes the contents of one representation. Stateless and there for as long as the program; its functions may be
+// called by several threads at a time. Bytes are untrusted: nothing, and why in `reason` (for people), where they are
+// not as docs/tile-format.md has them, or would take more memory than the limits allow, which is known before it is
+// taken. Where something is returned, `reason` is empty.
+class ContentCodec {
+ public:
+  virtual ~ContentCodec() = default;
+
+  // As tileset.json and contents name the representation.
+  virtual std::string_view representation() const = 0;
+  // Whether contents of a tile may overlap, which need then no order (tileWithoutOrder).
+  virtual bool contentsMayOverlap() const { return false; }
+
+  // What a content will take in memory (Content::memoryBytes), by the JSON of its container alone.
+  virtual std::optional<uint64_t> memoryBytes(std::string_view gltfJson, std::string& reason,
+                                              const ContentLimits& limits = {}) const = 0;
+  // `glb`: the whole file. Null where it is refused.
+  virtual std::unique_ptr<Content> decode(std::span<const std::byte> glb, const Resources& resources,
+                                          std::string& reason, const ContentLimits& limits = {}) const = 0;
+
+  // What a shared resource will take in memory at most, whose file has so many bytes.
+  virtual uint64_t resourceMemoryBytes(const SharedResource&, uint64_t fileBytes) const { return fileBytes; }
+  // Null where it is refused, as it is by representations that share nothing.
+  virtual std::shared_ptr<const Resource> decodeResource(std::span<const std::byte>, const SharedResource&,
+                                                         std::string& reason) const {
+    reason = "is a shared resource, which contents of this representation do not have";
+    return nullptr;
+  }
+};
 
 }  // namespace tessera

@@ -45,7 +45,7 @@ bool readViews(const json& asset, std::span<const std::byte> bytes, ContentFile&
   return true;
 }
 
-std::optional<json> decodeAsset(std::string_view text, Representation representation, std::string& reason) {
+std::optional<json> decodeAsset(std::string_view text, std::string_view representation, std::string& reason) {
   const auto fail = [&reason](std::string why) {
     reason = std::move(why);
     return std::nullopt;
@@ -60,8 +60,8 @@ std::optional<json> decodeAsset(std::string_view text, Representation representa
   const auto version = unsignedOf(*ours, "version");
   if (!version) return fail("does not say which version it is of");
   if (*version != kContentVersion) return fail(fmt::format("is of version {}; {} is known", *version, kContentVersion));
-  if (!isString(*ours, "representation", nameOf(representation))) {
-    return fail(fmt::format("is not of the representation {}", nameOf(representation)));
+  if (!isString(*ours, "representation", representation)) {
+    return fail(fmt::format("is not of the representation {}", representation));
   }
   return asset;
 }
@@ -75,9 +75,9 @@ Json ContentFileWriter::add(std::span<const std::byte> bytes, const char* mimeTy
   return {{"bufferView", views_.size() - 1}, {"mimeType", mimeType}};
 }
 
-Bytes ContentFileWriter::finish(Representation representation, const Json& ours) {
+Bytes ContentFileWriter::finish(std::string_view representation, const Json& ours) {
   CHECK(!views_.empty());
-  Json extension = {{"version", kContentVersion}, {"representation", nameOf(representation)}};
+  Json extension = {{"version", kContentVersion}, {"representation", representation}};
   extension.update(ours);
   const Json asset = {{"asset", {{"version", "2.0"}, {"generator", "tessera"}}},
                       {"extensionsUsed", {kExtension}},
@@ -95,7 +95,7 @@ std::optional<std::span<const std::byte>> ContentFile::viewOf(const json& object
   return views[*index];
 }
 
-std::optional<ContentFile> decodeContentHeader(std::string_view text, Representation representation,
+std::optional<ContentFile> decodeContentHeader(std::string_view text, std::string_view representation,
                                                std::string& reason) {
   const auto asset = decodeAsset(text, representation, reason);
   if (!asset) return std::nullopt;
@@ -104,7 +104,7 @@ std::optional<ContentFile> decodeContentHeader(std::string_view text, Representa
   return result;
 }
 
-std::optional<ContentFile> decodeContentFile(std::span<const std::byte> file, Representation representation,
+std::optional<ContentFile> decodeContentFile(std::span<const std::byte> file, std::string_view representation,
                                              std::string& reason) {
   const auto glb = decodeGlb(file);
   if (!glb) {

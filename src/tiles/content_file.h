@@ -26,7 +26,7 @@ class ContentFileWriter {
   // {"bufferView": n, "mimeType": ...}: how the extension names it.
   nlohmann::ordered_json add(std::span<const std::byte> bytes, const char* mimeType);
   // `ours`: the extension's members after version and representation.
-  Bytes finish(Representation representation, const nlohmann::ordered_json& ours);
+  Bytes finish(std::string_view representation, const nlohmann::ordered_json& ours);
 
  private:
   Bytes bytes_;
@@ -43,12 +43,12 @@ struct ContentFile {
 
 // By the JSON of a container alone, without its buffer views. Untrusted: nothing, and why, where it is no asset or has
 // not the extension, its version and the representation as they should be.
-std::optional<ContentFile> decodeContentHeader(std::string_view text, Representation representation,
+std::optional<ContentFile> decodeContentHeader(std::string_view text, std::string_view representation,
                                                std::string& reason);
 
 // Untrusted bytes: nothing, and why, where the container, the asset, its buffer views or the extension's version and
 // representation are not as they should be.
-std::optional<ContentFile> decodeContentFile(std::span<const std::byte> file, Representation representation,
+std::optional<ContentFile> decodeContentFile(std::span<const std::byte> file, std::string_view representation,
                                              std::string& reason);
 
 }  // namespace tessera

@@ -12,6 +12,8 @@
 
 #include "tiles/content.h"
 #include "tiles/content_file.h"
+#include "tiles/content_part.h"
+#include "tiles/dense_layer.h"
 #include "tiles/texel_pictures.h"
 
 namespace tessera {

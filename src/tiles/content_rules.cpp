@@ -71,7 +71,7 @@ bool overlap(const ContentPart& one, const ContentPart& other) {
   return true;
 }
 
-Broken brokenPromise(const ContentPart& part, size_t number, const TileContent& promised) {
+Broken mismatchOfPart(const ContentPart& part, size_t number, const TileContent& promised) {
   const SceneBox& box = promised.box;
   const auto slack = [](double x) { return 1e-6 * std::max(1.0, std::abs(x)); };  // parts are rounded to floats
   if (part.surround != promised.surround) {

@@ -7,7 +7,8 @@
 #include <optional>
 #include <string>
 
-#include "tiles/content.h"
+#include "tiles/content_part.h"
+#include "tiles/dense_layer.h"
 #include "tiles/tileset.h"
 
 namespace tessera {
@@ -38,8 +39,14 @@ Broken ruleOfParts(const std::vector<Part>& parts, const Rule& rule) {
   return std::nullopt;
 }
 
-// Why a part is none of the content that tileset.json speaks of: it is a surround where that says none, or the other
-// way round, or owns what lies outside of the box there.
-Broken brokenPromise(const ContentPart& part, size_t number, const TileContent& promised);
+// Content::mismatchWith of a content that has these parts.
+Broken mismatchOfPart(const ContentPart& part, size_t number, const TileContent& promised);
+template <class Part>
+Broken mismatchOfParts(const std::vector<Part>& parts, const TileContent& promised) {
+  for (size_t i = 0; i < parts.size(); ++i) {
+    if (auto broken = mismatchOfPart(parts[i], i, promised)) return broken;
+  }
+  return std::nullopt;
+}
 
 }  // namespace tessera

@@ -9,6 +9,8 @@
 
 #include "base/image.h"
 #include "tiles/content.h"
+#include "tiles/content_part.h"
+#include "tiles/dense_layer.h"
 #include "tiles/glb.h"
 #include "tiles/lossless_image.h"
 

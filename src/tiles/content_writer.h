@@ -7,6 +7,8 @@
 #include "base/error.h"
 #include "tiles/content.h"
 #include "tiles/content_file.h"
+#include "tiles/content_part.h"
+#include "tiles/dense_layer.h"
 #include "tiles/texel_pictures.h"
 
 namespace tessera {

@@ -5,14 +5,20 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
-#include "tiles/content.h"
+#include "tiles/content_part.h"
+#include "tiles/dense_layer.h"
 #include "tiles/occupancy_distance.h"
 #include "tiles/occupancy_pyramid.h"
 
 namespace tessera {
+
+struct TileContent;  // tiles/tileset.h
+
+inline constexpr const char* kHashName = "hash";  // of the representation, in files
 
 // What a byte stands for: evenly from `low` (0) to `high` (255).
 struct ByteRange {
@@ -90,5 +96,8 @@ struct HashContent {
 uint64_t hashPartBytes(const HashPart& part, uint64_t storedMacroblocks, uint32_t cells, uint64_t nearCells);
 // What a content takes in memory. Renderers' budgets count this.
 uint64_t bytesInMemory(const HashContent& content);
+
+// Content::mismatchWith.
+std::optional<std::string> mismatchWithTileset(const HashContent& content, const TileContent& promised);
 
 }  // namespace tessera

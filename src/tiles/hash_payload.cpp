@@ -22,7 +22,7 @@ class HashWriter : ContentWriter {
                  {"parts", Json::array()}};
     if (!content_.logits.empty()) ours["logits"] = content_.logits;
     for (const HashPart& part : content_.parts) ours["parts"].push_back(partOf(part));
-    return file_.finish(Representation::hash, ours);
+    return file_.finish(kHashName, ours);
   }
 
  private:

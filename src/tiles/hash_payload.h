@@ -1,4 +1,4 @@
-// One content of a `hash` scene as a file, and back (read_content.h reads files by name). docs/tile-format.md,
+// One content of a `hash` scene as a file, and back (tiles/read_content.h reads files by name). docs/tile-format.md,
 // section 7.
 #pragma once
 
@@ -7,6 +7,7 @@
 #include <string>
 
 #include "base/file.h"
+#include "tiles/content.h"
 #include "tiles/hash_content.h"
 
 namespace tessera {
@@ -31,5 +32,8 @@ Bytes encodeHash(const HashContent& content, int effort = 6);
 std::optional<HashContent> decodeHash(std::span<const std::byte> file, std::string& reason,
                                       const ContentLimits& limits = {});
 std::optional<uint64_t> decodedHashBytes(std::string_view json, std::string& reason, const ContentLimits& limits = {});
+
+// Its contents are ContentOf<HashContent>.
+const ContentCodec& hashCodec();
 
 }  // namespace tessera

@@ -15,6 +15,7 @@
 #include "tiles/read_content.h"
 #include "tiles/test_support.h"
 #include "tiles/texel_pictures.h"
+#include "tiles/volume_payload.h"
 
 namespace tessera {
 namespace {
@@ -124,10 +125,9 @@ TEST(HashPayload, SaysWhatItTakesInMemoryByItsHeadersAlone) {
   const fs::path path = fs::temp_directory_path() / ("tessera-hash-file-" + std::to_string(::getpid()) + ".glb");
   const HashContent content = madeHashContent(5, 2);
   writeFileAtomically(path, encodeHash(content, 1));
-  EXPECT_EQ(readDecodedBytes<HashContent>(path), bytesInMemory(content));
-  EXPECT_EQ(readDecodedBytes(path, Representation::hash), bytesInMemory(content));
-  EXPECT_EQ(bytesInMemory(readContent<HashContent>(path)), bytesInMemory(content));
-  EXPECT_THROW(readContent<VolumeContent>(path), Error);
+  EXPECT_EQ(readDecodedBytes(path, hashCodec()), bytesInMemory(content));
+  EXPECT_EQ(readContent(path, hashCodec())->memoryBytes(), bytesInMemory(content));
+  EXPECT_THROW(readContent(path, volumeCodec()), Error);
   fs::remove(path);
 }
 

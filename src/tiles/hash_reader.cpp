@@ -151,16 +151,39 @@ class HashReader : public PartsReader<HashReader, HashContent, PartHeader> {
 std::optional<HashContent> decodeHash(std::span<const std::byte> file, std::string& reason,
                                       const ContentLimits& limits) {
   reason.clear();
-  const auto content = decodeContentFile(file, Representation::hash, reason);
+  const auto content = decodeContentFile(file, kHashName, reason);
   if (!content) return std::nullopt;
   return HashReader(*content, reason, limits).read();
 }
 
 std::optional<uint64_t> decodedHashBytes(std::string_view text, std::string& reason, const ContentLimits& limits) {
   reason.clear();
-  const auto header = decodeContentHeader(text, Representation::hash, reason);
+  const auto header = decodeContentHeader(text, kHashName, reason);
   if (!header) return std::nullopt;
   return HashReader(*header, reason, limits).readBytes();
+}
+
+namespace {
+
+class HashCodec final : public ContentCodec {
+ public:
+  std::string_view representation() const override { return kHashName; }
+  std::optional<uint64_t> memoryBytes(std::string_view json, std::string& reason,
+                                      const ContentLimits& limits) const override {
+    return decodedHashBytes(json, reason, limits);
+  }
+  std::unique_ptr<Content> decode(std::span<const std::byte> glb, const Resources&, std::string& reason,
+                                  const ContentLimits& limits) const override {
+    auto content = decodeHash(glb, reason, limits);
+    return content ? makeContent(std::move(*content)) : nullptr;
+  }
+};
+
+}  // namespace
+
+const ContentCodec& hashCodec() {
+  static const HashCodec codec;
+  return codec;
 }
 
 }  // namespace tessera

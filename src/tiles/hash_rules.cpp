@@ -61,6 +61,10 @@ Broken ruleOfPart(const HashContent& content, const HashPart& part) {
 
 }  // namespace
 
+std::optional<std::string> mismatchWithTileset(const HashContent& content, const TileContent& promised) {
+  return mismatchOfParts(content.parts, promised);
+}
+
 std::optional<std::string> brokenRule(const HashContent& content) {
   if (!(content.step >= kShortestHashStep && content.step <= kLongestHashStep)) return "the step is out of bounds";
   if (auto broken = ruleOfNetwork(content.network, kInputs, kOutputs)) return broken;

@@ -27,7 +27,7 @@ inline const std::string* stringOf(const json& object, const char* key) {
   return field && field->is_string() ? &field->get_ref<const std::string&>() : nullptr;
 }
 
-inline bool isString(const json& object, const char* key, const char* expected) {
+inline bool isString(const json& object, const char* key, std::string_view expected) {
   const std::string* text = stringOf(object, key);
   return text && *text == expected;
 }

@@ -6,10 +6,7 @@
 
 #include "base/error.h"
 #include "tiles/content_file.h"
-#include "tiles/content_rules.h"
 #include "tiles/glb.h"
-#include "tiles/hash_payload.h"
-#include "tiles/volume_payload.h"
 
 namespace tessera {
 namespace {
@@ -18,47 +15,27 @@ Error noContent(const fs::path& path, const std::string& reason) {
   return {path.string(), "", reason, "copy the scene again, or bake it again"};
 }
 
-template <class Content>
-struct Payload;
-
-template <>
-struct Payload<VolumeContent> {
-  static constexpr Representation kRepresentation = Representation::volume;
-  static constexpr auto kDecode = decodeVolume;
-  static constexpr auto kDecodedBytes = decodedVolumeBytes;
-};
-
-template <>
-struct Payload<HashContent> {
-  static constexpr Representation kRepresentation = Representation::hash;
-  static constexpr auto kDecode = decodeHash;
-  static constexpr auto kDecodedBytes = decodedHashBytes;
-};
-
 }  // namespace
 
-template <class Content>
-Content readContent(const fs::path& path, const ContentLimits& limits) {
+std::unique_ptr<Content> readContent(const fs::path& path, const ContentCodec& codec, const Resources& resources,
+                                     const ContentLimits& limits) {
   std::string reason;
-  auto content = Payload<Content>::kDecode(readFile(path, limits.fileBytes), reason, limits);
+  auto content = codec.decode(readFile(path, limits.fileBytes), resources, reason, limits);
   if (!content) throw noContent(path, reason);
-  return std::move(*content);
+  return content;
 }
 
-template <class Content>
-Content readPromisedContent(const fs::path& path, size_t tile, const TileContent& promised) {
-  Content content = readContent<Content>(path);
-  for (size_t i = 0; i < content.parts.size(); ++i) {
-    if (const auto broken = brokenPromise(content.parts[i], i, promised)) {
-      throw Error(path.string(), fmt::format("of tile {} in tileset.json", tile), *broken,
-                  "copy the scene again, or bake it again");
-    }
+std::unique_ptr<Content> readPromisedContent(const fs::path& path, const ContentCodec& codec, size_t tile,
+                                             const TileContent& promised, const Resources& resources) {
+  auto content = readContent(path, codec, resources);
+  if (const auto mismatch = content->mismatchWith(promised)) {
+    throw Error(path.string(), fmt::format("of tile {} in tileset.json", tile), *mismatch,
+                "copy the scene again, or bake it again");
   }
   return content;
 }
 
-template <class Content>
-uint64_t readDecodedBytes(const fs::path& path, const ContentLimits& limits) {
+uint64_t readDecodedBytes(const fs::path& path, const ContentCodec& codec, const ContentLimits& limits) {
   std::error_code status;
   const auto length = jsonLengthOf(readFileStart(path, kGlbStart), fs::file_size(path, status));
   if (!length) throw noContent(path, kNoGlb);
@@ -66,35 +43,24 @@ uint64_t readDecodedBytes(const fs::path& path, const ContentLimits& limits) {
   const Bytes start = readFileStart(path, kGlbStart + std::min<uint64_t>(*length, kMostContentJson + 1));
   const std::string_view text(reinterpret_cast<const char*>(start.data()), start.size());
   std::string reason;
-  const auto bytes = Payload<Content>::kDecodedBytes(text.substr(std::min(kGlbStart, text.size())), reason, limits);
+  const auto bytes = codec.memoryBytes(text.substr(std::min(kGlbStart, text.size())), reason, limits);
   if (!bytes) throw noContent(path, reason);
   return *bytes;
 }
 
-uint64_t readDecodedBytes(const fs::path& path, Representation representation) {
-  switch (representation) {
-    case Representation::volume:
-      return readDecodedBytes<VolumeContent>(path);
-    case Representation::hash:
-      return readDecodedBytes<HashContent>(path);
-    case Representation::mesh:
-      break;
-  }
-  throw noContent(path, "is of a representation that is not known yet");
+std::shared_ptr<const Resource> readResource(const fs::path& path, const ContentCodec& codec,
+                                             const SharedResource& resource, const ContentLimits& limits) {
+  std::string reason;
+  auto made = codec.decodeResource(readFile(path, limits.fileBytes), resource, reason);
+  if (!made) throw noContent(path, reason);
+  return made;
 }
 
-template <class Content>
-Representation representationOf() {
-  return Payload<Content>::kRepresentation;
+uint64_t readResourceBytes(const fs::path& path, const ContentCodec& codec, const SharedResource& resource) {
+  std::error_code status;
+  const uint64_t bytes = fs::file_size(path, status);
+  if (status) throw noContent(path, "there is no such file");
+  return codec.resourceMemoryBytes(resource, bytes);
 }
-
-template VolumeContent readContent(const fs::path&, const ContentLimits&);
-template HashContent readContent(const fs::path&, const ContentLimits&);
-template VolumeContent readPromisedContent(const fs::path&, size_t, const TileContent&);
-template HashContent readPromisedContent(const fs::path&, size_t, const TileContent&);
-template uint64_t readDecodedBytes<VolumeContent>(const fs::path&, const ContentLimits&);
-template uint64_t readDecodedBytes<HashContent>(const fs::path&, const ContentLimits&);
-template Representation representationOf<VolumeContent>();
-template Representation representationOf<HashContent>();
 
 }  // namespace tessera

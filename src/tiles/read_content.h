@@ -1,4 +1,5 @@
-// Contents by the names of their files, whatever their representation: VolumeContent or HashContent.
+// Contents and shared resources by the names of their files. Functions throw Error naming the file and what is wrong
+// with it.
 #pragma once
 
 #include "base/file.h"
@@ -7,18 +8,18 @@
 
 namespace tessera {
 
-// Throws Error naming the file.
-template <class Content>
-Content readContent(const fs::path& path, const ContentLimits& limits = {});
-// And it must be the one that tile number `tile` of tileset.json speaks of: a surround where that says one, within the
-// box there.
-template <class Content>
-Content readPromisedContent(const fs::path& path, size_t tile, const TileContent& promised);
-// What a content will take in memory (bytesInMemory), by the JSON of its container alone: its texels are not read.
-template <class Content>
-uint64_t readDecodedBytes(const fs::path& path, const ContentLimits& limits = {});
-uint64_t readDecodedBytes(const fs::path& path, Representation representation);
-template <class Content>
-Representation representationOf();
+std::unique_ptr<Content> readContent(const fs::path& path, const ContentCodec& codec, const Resources& resources = {},
+                                     const ContentLimits& limits = {});
+// And it must be the one that tile number `tile` of tileset.json speaks of (Content::mismatchWith).
+std::unique_ptr<Content> readPromisedContent(const fs::path& path, const ContentCodec& codec, size_t tile,
+                                             const TileContent& promised, const Resources& resources = {});
+// What a content will take in memory (Content::memoryBytes), by the JSON of its container alone: its texels are not
+// read.
+uint64_t readDecodedBytes(const fs::path& path, const ContentCodec& codec, const ContentLimits& limits = {});
+
+std::shared_ptr<const Resource> readResource(const fs::path& path, const ContentCodec& codec,
+                                             const SharedResource& resource, const ContentLimits& limits = {});
+// What a resource will take in memory at most (ContentCodec::resourceMemoryBytes).
+uint64_t readResourceBytes(const fs::path& path, const ContentCodec& codec, const SharedResource& resource);
 
 }  // namespace tessera

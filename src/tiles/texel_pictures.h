@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/image.h"
-#include "tiles/content.h"
+#include "tiles/content_part.h"
 #include "tiles/occupancy_pyramid.h"
 
 namespace tessera {

@@ -126,16 +126,4 @@ uint32_t coarsestLevel(const Tileset& tileset) {
   return level;
 }
 
-const char* nameOf(Representation representation) {
-  static constexpr const char* kNames[] = {"mesh", "volume", "hash"};
-  return kNames[static_cast<size_t>(representation)];
-}
-
-std::optional<Representation> representationOf(std::string_view name) {
-  for (const Representation one : {Representation::mesh, Representation::volume, Representation::hash}) {
-    if (name == nameOf(one)) return one;
-  }
-  return std::nullopt;
-}
-
 }  // namespace tessera

@@ -18,8 +18,6 @@
 
 namespace tessera {
 
-enum class Representation { mesh, volume, hash };
-
 // x ↦ scale · rotation · x + translation.
 struct Similarity {
   Mat3d rotation = Mat3d::Identity();
@@ -87,7 +85,9 @@ struct Tile {
 };
 
 struct Tileset {
-  Representation representation = Representation::volume;
+  // What decodes and draws the contents: lower-case letters, digits and '_'. Which names are known is for whoever has
+  // their codecs (tiles/content.h).
+  std::string representation = "volume";
   std::string name;  // of the capture, for people
 
   Similarity worldFromScene;
@@ -140,7 +140,9 @@ void placeOn(Tileset& tileset, const BlockGrid& grid);
 // Why the tileset is none: the first rule of docs/tile-format.md that it breaks, for people. Nothing when it is one.
 std::optional<std::string> brokenRule(const Tileset& tileset);
 
-const char* nameOf(Representation representation);
-std::optional<Representation> representationOf(std::string_view name);
+// Whether the contents of each tile, the surround apart, lie on a grid as children do, so that they have an order in
+// front of every camera. The first tile whose contents do not; nothing where all do. Contents of representations whose
+// codec lets them overlap need no order.
+std::optional<uint32_t> tileWithoutOrder(const Tileset& tileset);
 
 }  // namespace tessera

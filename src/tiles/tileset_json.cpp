@@ -77,7 +77,7 @@ Json tileOf(const Tileset& tileset, const Tile& tile, bool isRoot) {
 
 Json sceneOf(const Tileset& tileset) {
   Json scene = {{"version", kSceneVersion},
-                {"representation", nameOf(tileset.representation)},
+                {"representation", tileset.representation},
                 {"name", tileset.name},
                 {"worldFromScene",
                  {{"rotation", numbersOf(tileset.worldFromScene.rotation)},

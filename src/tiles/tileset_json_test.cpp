@@ -41,7 +41,7 @@ void expectSame(const Tileset& a, const Tileset& b) {
 
 TEST(TilesetJson, GivesBackWhatWasWritten) {
   for (const bool georeferenced : {false, true}) {
-    for (const auto representation : {Representation::mesh, Representation::volume, Representation::hash}) {
+    for (const auto representation : {"mesh", "volume", "hash"}) {
       Tileset tileset = madeTileset(3, georeferenced);
       tileset.representation = representation;
       tileset.near = 0.1 + 0.2;  // no short decimal
@@ -141,7 +141,8 @@ TEST_F(TilesetJsonRefusal, OfWhatIsNoTileset) {
   refuses("requires extensions", [](json& file) { file["extensionsRequired"] = {"VENDOR_x"}; });
   refuses("is of version 2; 1 is known", [](json& file) { ours(file)["version"] = 2; });
   refuses("does not say which version", [](json& file) { ours(file)["version"] = "1"; });
-  refuses("has no representation", [](json& file) { ours(file)["representation"] = "field"; });
+  refuses("does not name its representation", [](json& file) { ours(file)["representation"] = 7; });
+  refuses("the representation's name is none", [](json& file) { ours(file)["representation"] = "Two words"; });
 }
 
 TEST_F(TilesetJsonRefusal, OfNumbersThatAreNone) {

@@ -96,9 +96,8 @@ class TilesetReader {
 
   bool readScene(const json& ours) {
     const std::string* representation = stringOf(ours, "representation");
-    const auto known = representation ? representationOf(*representation) : std::nullopt;
-    if (!known) return fail("has no representation that is known");
-    tileset_.representation = *known;
+    if (!representation) return fail("does not name its representation");
+    tileset_.representation = *representation;
     if (const std::string* name = stringOf(ours, "name")) tileset_.name = *name;
     const json* placement = fieldOf(ours, "worldFromScene");
     if (!placement) return fail("has no worldFromScene");

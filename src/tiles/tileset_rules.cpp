@@ -16,6 +16,7 @@ using Broken = std::optional<std::string>;
 
 constexpr double kFarthestInScene = 1e7;
 constexpr uint32_t kMostLevels = 64;
+constexpr size_t kMostNameLength = 64;  // of a representation
 
 bool isRotation(const Mat3d& rotation) {
   return rotation.allFinite() && rotation.cwiseAbs().maxCoeff() < 2 &&
@@ -92,6 +93,11 @@ Broken ruleOfFrames(const Tileset& tileset) {
   return std::nullopt;
 }
 
+bool isName(std::string_view name) {
+  const auto isPlain = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_'; };
+  return !name.empty() && name.size() <= kMostNameLength && std::all_of(name.begin(), name.end(), isPlain);
+}
+
 Broken ruleOfResources(const Tileset& tileset) {
   std::set<std::string> seen;
   for (const SharedResource& resource : tileset.resources) {
@@ -121,7 +127,6 @@ Broken ruleOfSurrounds(const Tileset& tileset) {
 }
 
 Broken ruleOfContents(const Tileset& tileset, const Tile& tile, bool isRoot) {
-  std::vector<CellRange> ranges;
   for (const TileContent& content : tile.contents) {
     if (!isPlainUri(content.uri) || !content.uri.ends_with(".glb"))
       return "a content's uri is not a plain one of a .glb";
@@ -137,9 +142,7 @@ Broken ruleOfContents(const Tileset& tileset, const Tile& tile, bool isRoot) {
     }
     if (!tile.box.contains(content.box)) return "a content's box leaves its tile's";
     if (!isRange(content.cells) || !tile.cells.contains(content.cells)) return "a content's cells leave its tile's";
-    ranges.push_back(content.cells);
   }
-  if (tileset.representation != Representation::mesh && !lieOnGrid(ranges)) return "contents of a tile have no order";
   return isRoot ? ruleOfSurrounds(tileset) : std::nullopt;
 }
 
@@ -196,9 +199,21 @@ bool isTree(const Tileset& tileset) {
 
 }  // namespace
 
+std::optional<uint32_t> tileWithoutOrder(const Tileset& tileset) {
+  for (size_t i = 0; i < tileset.tiles.size(); ++i) {
+    std::vector<CellRange> ranges;
+    for (const TileContent& content : tileset.tiles[i].contents) {
+      if (!content.surround) ranges.push_back(content.cells);
+    }
+    if (!lieOnGrid(ranges)) return static_cast<uint32_t>(i);
+  }
+  return std::nullopt;
+}
+
 std::optional<std::string> brokenRule(const Tileset& tileset) {
   if (tileset.tiles.empty()) return "there is no tile";
   if (tileset.levels < 1 || tileset.levels > kMostLevels) return "the number of levels is out of bounds";
+  if (!isName(tileset.representation)) return "the representation's name is none";
   if (auto broken = ruleOfFrames(tileset)) return broken;
   if (auto broken = ruleOfResources(tileset)) return broken;
   if (!(tileset.geometricError >= tileset.root().geometricError && tileset.geometricError <= kFarthest)) {

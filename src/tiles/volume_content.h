@@ -3,9 +3,17 @@
 // on disk and for what it looks like; this is the same in C++.
 #pragma once
 
-#include "tiles/content.h"
+#include <optional>
+#include <string>
+
+#include "tiles/content_part.h"
+#include "tiles/dense_layer.h"
 
 namespace tessera {
+
+struct TileContent;  // tiles/tileset.h
+
+inline constexpr const char* kVolumeName = "volume";  // of the representation, in files
 
 // Where it stands, and its macroblocks of voxels: ContentPart.
 //
@@ -51,5 +59,8 @@ inline uint64_t bytesInMemory(const VolumeContent& content) {
   }
   return bytes;
 }
+
+// Content::mismatchWith.
+std::optional<std::string> mismatchWithTileset(const VolumeContent& content, const TileContent& promised);
 
 }  // namespace tessera

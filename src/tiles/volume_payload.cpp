@@ -19,7 +19,7 @@ class VolumeWriter : ContentWriter {
                  {"parts", Json::array()}};
     if (content_.stepsPerTexel != 1) ours["stepsPerTexel"] = content_.stepsPerTexel;
     for (const VolumePart& part : content_.parts) ours["parts"].push_back(partOf(part));
-    return file_.finish(Representation::volume, ours);
+    return file_.finish(kVolumeName, ours);
   }
 
  private:

@@ -1,4 +1,4 @@
-// One content of a `volume` scene as a file, and back (read_content.h reads files by name). docs/tile-format.md,
+// One content of a `volume` scene as a file, and back (tiles/read_content.h reads files by name). docs/tile-format.md,
 // section 6.
 #pragma once
 
@@ -7,6 +7,7 @@
 #include <string>
 
 #include "base/file.h"
+#include "tiles/content.h"
 #include "tiles/volume_content.h"
 
 namespace tessera {
@@ -32,5 +33,8 @@ std::optional<VolumeContent> decodeVolume(std::span<const std::byte> file, std::
 // What a content will take in memory (bytesInMemory), by the JSON of its container alone: its texels are not read.
 std::optional<uint64_t> decodedVolumeBytes(std::string_view json, std::string& reason,
                                            const ContentLimits& limits = {});
+
+// Its contents are ContentOf<VolumeContent>.
+const ContentCodec& volumeCodec();
 
 }  // namespace tessera

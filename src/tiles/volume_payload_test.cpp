@@ -182,7 +182,7 @@ class VolumeFile : public testing::Test {
   std::string refusal(std::span<const std::byte> bytes) {
     writeFileAtomically(path_, bytes);
     try {
-      readDecodedBytes<VolumeContent>(path_);
+      readDecodedBytes(path_, volumeCodec());
     } catch (const Error& error) {
       EXPECT_EQ(error.subject(), path_.string());
       return error.reason();
@@ -197,13 +197,13 @@ TEST_F(VolumeFile, SaysWhatItTakesInMemoryWithoutATexelBeingRead) {
   const VolumeContent content = madeContent(5, 2);
   Bytes file = encodeVolume(content, 1);
   writeFileAtomically(path_, file);
-  EXPECT_EQ(readDecodedBytes<VolumeContent>(path_), bytesInMemory(content));
-  EXPECT_EQ(bytesInMemory(readContent<VolumeContent>(path_)), bytesInMemory(content));
+  EXPECT_EQ(readDecodedBytes(path_, volumeCodec()), bytesInMemory(content));
+  EXPECT_EQ(readContent(path_, volumeCodec())->memoryBytes(), bytesInMemory(content));
   std::fill(file.begin() + static_cast<ptrdiff_t>(kGlbStart + *jsonLengthOf(file, file.size())), file.end(),
             std::byte{0});
   writeFileAtomically(path_, file);
-  EXPECT_EQ(readDecodedBytes<VolumeContent>(path_), bytesInMemory(content));
-  EXPECT_THROW(readContent<VolumeContent>(path_), Error);
+  EXPECT_EQ(readDecodedBytes(path_, volumeCodec()), bytesInMemory(content));
+  EXPECT_THROW(readContent(path_, volumeCodec()), Error);
 }
 
 TEST_F(VolumeFile, IsRefusedByHeadersThatLie) {
@@ -410,6 +410,20 @@ TEST_F(VolumeRefusal, OfEveryCutAndNoOtherHarm) {
       EXPECT_EQ(isAccepted, reason.empty());
     }
   }
+}
+
+TEST(VolumeContent, CountsAllThatItHolds) {
+  VolumeContent content;
+  const uint64_t before = bytesInMemory(content);
+  content.network = {{34, 3, std::vector<float>(102), std::vector<float>(3)}};
+  EXPECT_EQ(bytesInMemory(content) - before, sizeof(DenseLayer) + 4 * 105);
+  const uint64_t withNetwork = bytesInMemory(content);
+  content.parts.resize(1);
+  content.parts[0].macroblocks.resize(64);
+  content.parts[0].voxelBytes.resize(5832);
+  content.parts[0].planeBytes[2].resize(1000);
+  content.parts[0].distances.resize(512);
+  EXPECT_EQ(bytesInMemory(content) - withNetwork, sizeof(VolumePart) + 256 + 5832 + 1000 + 512);
 }
 
 }  // namespace

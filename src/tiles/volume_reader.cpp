@@ -80,16 +80,39 @@ class VolumeReader : public PartsReader<VolumeReader, VolumeContent, PartHeader>
 std::optional<VolumeContent> decodeVolume(std::span<const std::byte> file, std::string& reason,
                                           const ContentLimits& limits) {
   reason.clear();
-  const auto content = decodeContentFile(file, Representation::volume, reason);
+  const auto content = decodeContentFile(file, kVolumeName, reason);
   if (!content) return std::nullopt;
   return VolumeReader(*content, reason, limits).read();
 }
 
 std::optional<uint64_t> decodedVolumeBytes(std::string_view text, std::string& reason, const ContentLimits& limits) {
   reason.clear();
-  const auto header = decodeContentHeader(text, Representation::volume, reason);
+  const auto header = decodeContentHeader(text, kVolumeName, reason);
   if (!header) return std::nullopt;
   return VolumeReader(*header, reason, limits).readBytes();
+}
+
+namespace {
+
+class VolumeCodec final : public ContentCodec {
+ public:
+  std::string_view representation() const override { return kVolumeName; }
+  std::optional<uint64_t> memoryBytes(std::string_view json, std::string& reason,
+                                      const ContentLimits& limits) const override {
+    return decodedVolumeBytes(json, reason, limits);
+  }
+  std::unique_ptr<Content> decode(std::span<const std::byte> glb, const Resources&, std::string& reason,
+                                  const ContentLimits& limits) const override {
+    auto content = decodeVolume(glb, reason, limits);
+    return content ? makeContent(std::move(*content)) : nullptr;
+  }
+};
+
+}  // namespace
+
+const ContentCodec& volumeCodec() {
+  static const VolumeCodec codec;
+  return codec;
 }
 
 }  // namespace tessera

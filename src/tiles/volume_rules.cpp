@@ -36,6 +36,10 @@ uint64_t texelBytes(const VolumePart& part, uint64_t storedMacroblocks) {
          sizeof(uint32_t) * cube(part.voxels / VolumePart::kMacroblock);
 }
 
+std::optional<std::string> mismatchWithTileset(const VolumeContent& content, const TileContent& promised) {
+  return mismatchOfParts(content.parts, promised);
+}
+
 std::optional<std::string> brokenRule(const VolumeContent& content) {
   for (const float range : {content.featureRange, content.densityRange}) {
     if (!(range > 0 && range <= kLargestRange)) return "a range is out of bounds";

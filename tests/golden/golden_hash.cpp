@@ -157,7 +157,7 @@ HashPart surroundPart() {
 
 Scene<HashContent> makeHashScene() {
   Scene<HashContent> scene;
-  scene.tileset = landscapeTileset(Representation::hash, 64);
+  scene.tileset = landscapeTileset(kHashName, 64);
   scene.contents["0_0"] = contentOf(1, LevelWeights::separate, true, kFine, {blockPart(0)});
   scene.contents["1_0"] = contentOf(2, LevelWeights::shared, true, kFine, {blockPart(1)});
   scene.contents["all"] = contentOf(3, LevelWeights::separate, false, kCoarse, {blockPart(0), blockPart(1)});

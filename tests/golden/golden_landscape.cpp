@@ -120,7 +120,7 @@ void placeSurround(ContentPart& part) {
   part.high = {1e4f, 1e4f, 1e4f};
 }
 
-Tileset landscapeTileset(Representation representation, uint32_t texels) {
+Tileset landscapeTileset(const std::string& representation, uint32_t texels) {
   Tileset tileset;
   tileset.representation = representation;
   tileset.name = "golden";

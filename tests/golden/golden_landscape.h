@@ -8,7 +8,8 @@
 
 #include "base/random.h"
 #include "scene/contraction.h"
-#include "tiles/content.h"
+#include "tiles/content_part.h"
+#include "tiles/dense_layer.h"
 #include "tiles/tileset.h"
 
 namespace tessera::golden {
@@ -59,6 +60,6 @@ void placeSurround(ContentPart& part);
 
 // `texels`: that a finest block is fine, along an axis. Contents of tiles are "all" with the surrounds behind it, "0_0"
 // and "1_0".
-Tileset landscapeTileset(Representation representation, uint32_t texels);
+Tileset landscapeTileset(const std::string& representation, uint32_t texels);
 
 }  // namespace tessera::golden

@@ -134,7 +134,7 @@ VolumePart surroundPart(uint32_t voxels, uint32_t planes) {
 
 Scene<VolumeContent> makeVolumeScene() {
   Scene<VolumeContent> scene;
-  scene.tileset = landscapeTileset(Representation::volume, 64);
+  scene.tileset = landscapeTileset(kVolumeName, 64);
   scene.contents["0_0"] = contentOf(1, {blockPart(0, 32, 64)});
   scene.contents["1_0"] = contentOf(2, {blockPart(1, 32, 64)});
   scene.contents["all"] = contentOf(3, {blockPart(0, 16, 32), blockPart(1, 16, 32)});

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "tiles/content.h"
+#include "tiles/dense_layer.h"
 
 namespace tessera {
 

@@ -1,4 +1,5 @@
-// A picture of contents in memory: the definition of what scenes of `volume` and of `hash` look like, on the processor.
+// A picture of ray-marched contents in memory: the definition of what such scenes look like, on the CPU. The templates
+// are defined in draw_scene-inl.h and instantiated once for each content, in the file that makes its drawer.
 #pragma once
 
 #include <array>
@@ -7,15 +8,15 @@
 #include <vector>
 
 #include "base/threads.h"
-#include "render/cpu/hash_shading.h"
-#include "render/cpu/volume_shading.h"
-#include "render/scene_tiles.h"
+#include "render/cpu/shading.h"
+#include "render/drawer.h"
+#include "render/pixel_directions.h"
 #include "render/tile_frame.h"
 #include "scene/view_renderer.h"
 
 namespace tessera {
 
-// Content: VolumeContent or HashContent.
+// Content: one that has parts, and a Shading.
 template <class Content>
 struct SceneDrawing {
   TileFrame frame;
@@ -24,25 +25,9 @@ struct SceneDrawing {
   // Optional: seen behind the frame's box, or alone by rays that miss it.
   const Content* surround = nullptr;
   MarchSettings march;
-  // Optional, of `hash`: whose network speaks for rays that meet nothing, where contents are whole. Without: the
-  // surround's, or the last one's.
+  // Optional: one that counts as the last of all in what shadings say of rays that meet nothing, though no ray meets
+  // it. Without: the surround, or the last one.
   const Content* ofNothing = nullptr;
-};
-
-// Which way the pixels of a camera look, in its axes. Asking a lens is dear: kept while the camera stays the same.
-class PixelDirections {
- public:
-  PixelDirections() = default;
-  PixelDirections(const Camera& camera, ThreadPool& pool) { update(camera, pool); }
-  void update(const Camera& camera, ThreadPool& pool);
-
-  const Camera& camera() const { return camera_; }
-  // Of length 1; zero where the lens sees nothing.
-  const Vec3f& at(int x, int y) const { return directions_[static_cast<size_t>(y) * camera_.width + x]; }
-
- private:
-  Camera camera_;
-  std::vector<Vec3f> directions_;
 };
 
 // As ViewRenderer::render. The picture does not depend on the number of threads. `counts`: optional, added to.

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "render/cpu/draw_scene.h"
+#include "render/cpu/volume_drawer.h"
 #include "render/made_volume.h"
 #include "scene/block_grid.h"
 

@@ -1,21 +1,18 @@
 // What marching has in common, whatever the representation.
 #pragma once
 
-#include <cstdint>
+#include "render/drawer.h"
 
 namespace tessera {
 
 struct MarchSettings {
   bool skipEmptySpace = true;
   float minTransmittance = 1.0f / 255;  // rays end where less than this would be seen; 0: never
-  bool useDistances = true;             // of `hash`, to skip by: beside the levels of the occupancy
+  // Whether a grid of distances is used to skip by where contents have another way too: the levels of the occupancy.
+  bool useDistances = true;
 };
 
-// Adds up over calls.
-struct MarchCounts {
-  uint64_t steps = 0;    // places that were looked at
-  uint64_t samples = 0;  // of them evaluated
-};
+using MarchCounts = DrawCounts;
 
 // One content along one ray: Σ w c, Σ w f, Π (1 - α) and Σ w t of its samples, t in scene units.
 struct ContentComposite {

@@ -3,7 +3,7 @@
 
 #include "render/tile_frame.h"
 #include "scene/domain_path.h"
-#include "tiles/content.h"
+#include "tiles/content_part.h"
 
 namespace tessera {
 

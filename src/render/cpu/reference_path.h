@@ -8,7 +8,7 @@
 
 #include "render/tile_frame.h"
 #include "scene/contraction.h"
-#include "tiles/content.h"
+#include "tiles/content_part.h"
 
 namespace tessera {
 

@@ -6,7 +6,6 @@
 #include <limits>
 #include <memory>
 #include <numbers>
-#include <type_traits>
 
 #include "base/check.h"
 
@@ -18,16 +17,14 @@ constexpr double kHighInEdges = 2;         // of the scene's longer edge in bloc
 constexpr double kAhead = 30, kDown = 75;  // degrees below the horizon
 constexpr double kFullWidth = 1280;        // pixels: what CacheBenchmarkOptions::mostPixels speaks of
 
-template <class Content>
-SceneRendererSettings settingsFor(const TileScene<Content>& scene, int threads) {
+SceneRendererSettings settingsFor(const TileScene& scene, int threads) {
   SceneRendererSettings settings;
   settings.threads = threads;
   settings.background = Eigen::Array3f(scene.background[0], scene.background[1], scene.background[2]);
   return settings;
 }
 
-template <class Content>
-RenderedView drawTimed(SceneRenderer<Content>& renderer, const BenchmarkView& view, double& seconds) {
+RenderedView drawTimed(SceneRenderer& renderer, const BenchmarkView& view, double& seconds) {
   using Clock = std::chrono::steady_clock;
   renderer.prepare(view.camera, view.worldFromCamera);
   const auto start = Clock::now();
@@ -47,19 +44,18 @@ double meanSquare(const ImageF& a, const ImageF& b) {
 }
 
 // What the cache holds by what was loaded, not by its own books.
-template <class Content>
 class Watched {
  public:
-  Watched(const TileScene<Content>& scene, const SceneRendererSettings& settings)
+  Watched(const TileScene& scene, const MakeDrawer& makeDrawer, const SceneRendererSettings& settings)
       : scene_(scene), bytes_(scene.tree.tiles.size()) {
     TileSource<Content> source = scene.source;
     source.load = [this](int tile) {
-      Content content = scene_.source.load(tile);
-      bytes_[tile] = bytesInMemory(content);
+      std::unique_ptr<Content> content = scene_.source.load(tile);
+      bytes_[tile] = content->memoryBytes();
       return content;
     };
     run_.budgetBytes = settings.budgetBytes;
-    renderer_ = std::make_unique<SceneRenderer<Content>>(scene.frame, scene.tree, source, settings);
+    renderer_ = std::make_unique<SceneRenderer>(makeDrawer(), scene.frame, scene.tree, source, settings);
   }
 
   RenderedView draw(const Camera& camera, const Pose& pose) {
@@ -104,12 +100,12 @@ class Watched {
   }
 
  private:
-  const TileScene<Content>& scene_;
+  const TileScene& scene_;
   std::vector<uint64_t> bytes_;
   CacheBenchmark::Run run_;
   int steps_ = 0, tilesOfLevel0_ = 0;
   double errors_ = 0;
-  std::unique_ptr<SceneRenderer<Content>> renderer_;
+  std::unique_ptr<SceneRenderer> renderer_;
 };
 
 Camera flightCamera(const CacheBenchmarkOptions& options) {
@@ -123,23 +119,25 @@ Camera flightCamera(const CacheBenchmarkOptions& options) {
 
 }  // namespace
 
-template <class Content>
-SkippingBenchmark benchmarkSkipping(const TileScene<Content>& scene, const std::vector<BenchmarkView>& views,
-                                    int threads) {
+SkippingBenchmark benchmarkSkipping(const TileScene& scene, const MakeDrawer& makeDrawer,
+                                    const std::vector<BenchmarkView>& views, int threads) {
   SceneRendererSettings settings = settingsFor(scene, threads);
   settings.selection.mostPixels = 0;
-  SceneRenderer<Content> skipping(scene.frame, scene.tree, scene.source, settings);
-  settings.march.useDistances = false;
-  std::optional<SceneRenderer<Content>> byCells;
-  if constexpr (std::is_same_v<Content, HashContent>) byCells.emplace(scene.frame, scene.tree, scene.source, settings);
-  settings.march.skipEmptySpace = false;
-  SceneRenderer<Content> whole(scene.frame, scene.tree, scene.source, settings);
+  SceneRenderer skipping(makeDrawer(), scene.frame, scene.tree, scene.source, settings);
+  const std::vector<std::string_view> modes = makeDrawer()->skippingModes();
+  std::optional<SceneRenderer> byCells;
+  if (std::find(modes.begin(), modes.end(), "cells") != modes.end()) {
+    settings.draw.skipping = "cells";
+    byCells.emplace(makeDrawer(), scene.frame, scene.tree, scene.source, settings);
+  }
+  settings.draw.skipping = "none";
+  SceneRenderer whole(makeDrawer(), scene.frame, scene.tree, scene.source, settings);
   SkippingBenchmark result;
   result.device = skipping.device();
   if (byCells) result.byCells.emplace();
   for (const BenchmarkView& view : views) {
     const ImageF picture = compositeOver(drawTimed(skipping, view, result.skipping.seconds), skipping.background());
-    const auto compare = [&](SceneRenderer<Content>& other, double& seconds) {
+    const auto compare = [&](SceneRenderer& other, double& seconds) {
       const ImageF drawn = compositeOver(drawTimed(other, view, seconds), other.background());
       for (size_t i = 0; i < picture.pixels.size(); ++i) {
         const double difference = std::abs(picture.pixels[i] - drawn.pixels[i]);
@@ -150,14 +148,14 @@ SkippingBenchmark benchmarkSkipping(const TileScene<Content>& scene, const std::
     compare(whole, result.whole.seconds);
     result.rays += picture.pixelCount();
   }
-  result.skipping.counts = skipping.marchCounts();
-  if (byCells) result.byCells->counts = byCells->marchCounts();
-  result.whole.counts = whole.marchCounts();
+  result.skipping.counts = skipping.drawCounts();
+  if (byCells) result.byCells->counts = byCells->drawCounts();
+  result.whole.counts = whole.drawCounts();
   return result;
 }
 
-template <class Content>
-CacheBenchmark benchmarkCache(const TileScene<Content>& scene, const CacheBenchmarkOptions& options) {
+CacheBenchmark benchmarkCache(const TileScene& scene, const MakeDrawer& makeDrawer,
+                              const CacheBenchmarkOptions& options) {
   CacheBenchmark result;
   result.steps = options.steps;
   for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
@@ -170,11 +168,11 @@ CacheBenchmark benchmarkCache(const TileScene<Content>& scene, const CacheBenchm
   SceneRendererSettings settings = settingsFor(scene, options.threads);
   settings.selection.mostPixels = options.mostPixels * options.width / kFullWidth;
   settings.budgetBytes = static_cast<uint64_t>(options.finestShare * static_cast<double>(result.finestBytes));
-  Watched<Content> tight(scene, settings);
+  Watched tight(scene, makeDrawer, settings);
   settings.budgetBytes = result.allBytes;
-  Watched<Content> whole(scene, settings);
+  Watched whole(scene, makeDrawer, settings);
   settings.budgetBytes = std::numeric_limits<uint64_t>::max();
-  SceneRenderer<Content> unbounded(scene.frame, scene.tree, scene.source, settings);
+  SceneRenderer unbounded(makeDrawer(), scene.frame, scene.tree, scene.source, settings);
   const Camera camera = flightCamera(options);
   for (int step = 0; step < options.steps; ++step) {
     const Pose pose = flightPose(scene.frame, scene.tree, static_cast<double>(step) / options.steps);
@@ -187,11 +185,6 @@ CacheBenchmark benchmarkCache(const TileScene<Content>& scene, const CacheBenchm
   result.whole = whole.result();
   return result;
 }
-
-template SkippingBenchmark benchmarkSkipping(const TileScene<VolumeContent>&, const std::vector<BenchmarkView>&, int);
-template SkippingBenchmark benchmarkSkipping(const TileScene<HashContent>&, const std::vector<BenchmarkView>&, int);
-template CacheBenchmark benchmarkCache(const TileScene<VolumeContent>&, const CacheBenchmarkOptions&);
-template CacheBenchmark benchmarkCache(const TileScene<HashContent>&, const CacheBenchmarkOptions&);
 
 Pose flightPose(const TileFrame& frame, const TileTree& tree, double lap) {
   const bool high = lap >= 0.5;

@@ -1,6 +1,8 @@
 // What skipping empty space saves, and what a cache smaller than the scene costs, measured on a baked scene.
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <optional>
 
 #include "render/cpu/scene_renderer.h"
@@ -16,20 +18,22 @@ struct BenchmarkView {
 // The same views of the finest level, drawn with empty space skipped and without. All ways draw the same picture.
 struct SkippingBenchmark {
   struct Way {
-    MarchCounts counts;
+    DrawCounts counts;
     double seconds = 0;  // of drawing; loading is left out
   };
   std::string device;
   uint64_t rays = 0;
   Way skipping, whole;
-  std::optional<Way> byCells;    // of `hash`: with the levels of the occupancy, without the grid of distances
+  std::optional<Way> byCells;    // where the drawer has that mode: by the levels of the occupancy alone
   double largestDifference = 0;  // of any value of a pixel's colour, which is in [0,1]
 };
 
-// `threads`: as SceneRendererSettings.
-template <class Content>
-SkippingBenchmark benchmarkSkipping(const TileScene<Content>& scene, const std::vector<BenchmarkView>& views,
-                                    int threads);
+// Makes the drawer of the scene's representation.
+using MakeDrawer = std::function<std::unique_ptr<CpuDrawer>()>;
+
+// `threads`: as SceneRendererSettings. CHECKs that the drawer has the mode "none".
+SkippingBenchmark benchmarkSkipping(const TileScene& scene, const MakeDrawer& makeDrawer,
+                                    const std::vector<BenchmarkView>& views, int threads);
 
 struct CacheBenchmarkOptions {
   int steps = 600;
@@ -60,8 +64,8 @@ struct CacheBenchmark {
 };
 
 // Throws Error where the coarsest level and the surround do not fit into the budget.
-template <class Content>
-CacheBenchmark benchmarkCache(const TileScene<Content>& scene, const CacheBenchmarkOptions& options);
+CacheBenchmark benchmarkCache(const TileScene& scene, const MakeDrawer& makeDrawer,
+                              const CacheBenchmarkOptions& options);
 
 // The flight, at `lap` in [0,1): along the rows of cells forth and back, so that each is flown over. In the first half
 // of it a quarter of a half block above the box and looking ahead; in the second rising to twice the scene's edge and

@@ -10,8 +10,8 @@
 namespace tessera {
 namespace {
 
-TileScene<VolumeContent> scene() {
-  TileScene<VolumeContent> scene;
+TileScene scene() {
+  TileScene scene;
   scene.frame = place().frame;
   scene.frame.rotation = Eigen::AngleAxisd(0.4, Vec3d::UnitZ()).toRotationMatrix();
   scene.frame.scale = 25;
@@ -23,14 +23,14 @@ TileScene<VolumeContent> scene() {
 }
 
 TEST(SceneBenchmark, CountsTheSameSamplesInFewerSteps) {
-  const TileScene<VolumeContent> made = scene();
+  const TileScene made = scene();
   BenchmarkView view;
   view.camera.width = 24;
   view.camera.height = 16;
   view.camera.parameters = {20, 20, 12, 8};
   std::vector<BenchmarkView> views(2, view);
   for (size_t i = 0; i < views.size(); ++i) views[i].worldFromCamera = flightPose(made.frame, made.tree, 0.1 + 0.5 * i);
-  const SkippingBenchmark result = benchmarkSkipping(made, views, 1);
+  const SkippingBenchmark result = benchmarkSkipping(made, makeVolumeDrawer, views, 1);
   EXPECT_EQ(result.rays, 2u * 24 * 16);
   EXPECT_GT(result.skipping.counts.samples, 1000u);
   EXPECT_EQ(result.skipping.counts.samples, result.whole.counts.samples);
@@ -53,7 +53,7 @@ CacheBenchmarkOptions smallPictures() {
 }
 
 TEST(SceneBenchmark, FliesThroughAQuarterOfTheFinestLevel) {
-  const CacheBenchmark result = benchmarkCache(scene(), smallPictures());
+  const CacheBenchmark result = benchmarkCache(scene(), makeVolumeDrawer, smallPictures());
   EXPECT_EQ(result.finestBytes, place().finestBytes);
   EXPECT_EQ(result.allBytes, place().allBytes);
   EXPECT_EQ(result.tight.budgetBytes, place().finestBytes / 4);
@@ -81,11 +81,11 @@ TEST(SceneBenchmark, FliesThroughAQuarterOfTheFinestLevel) {
 TEST(SceneBenchmark, RefusesABudgetBelowTheCoarsestLevel) {
   CacheBenchmarkOptions options = smallPictures();
   options.finestShare = 0.9 * static_cast<double>(place().coarsestBytes) / static_cast<double>(place().finestBytes);
-  EXPECT_THROW(benchmarkCache(scene(), options), Error);
+  EXPECT_THROW(benchmarkCache(scene(), makeVolumeDrawer, options), Error);
 }
 
 TEST(SceneBenchmark, FliesOverEveryCellLowAndHigh) {
-  const TileScene<VolumeContent> made = scene();
+  const TileScene made = scene();
   std::set<std::pair<int, int>> low, high;
   double top = 0;
   for (int step = 0; step < 600; ++step) {

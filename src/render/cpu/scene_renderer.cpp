@@ -2,36 +2,44 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "base/check.h"
+#include "render/cpu/simd_target.h"
+
 namespace tessera {
+namespace {
 
-template <class Content>
-SceneRenderer<Content>::SceneRenderer(const TileFrame& frame, TileTree tree, TileSource<Content> source,
-                                      const SceneRendererSettings& settings)
-    : tiles_(frame, std::move(tree), std::move(source), settings.selection, settings.budgetBytes),
+TileSource<Content> preparedBy(const CpuDrawer& drawer, TileSource<Content> source) {
+  source.bytes = [&drawer, bytes = source.bytes](int tile) { return drawer.residentBytes(bytes(tile)); };
+  source.load = [&drawer, load = source.load](int tile) { return drawer.prepare(load(tile)); };
+  return source;
+}
+
+}  // namespace
+
+SceneRenderer::SceneRenderer(std::unique_ptr<CpuDrawer> drawer, const TileFrame& frame, TileTree tree,
+                             TileSource<Content> source, const SceneRendererSettings& settings)
+    : drawer_(std::move(drawer)),
+      tiles_(frame, std::move(tree), preparedBy(*drawer_, std::move(source)), settings.selection, settings.budgetBytes),
       settings_(settings),
-      pool_(settings.threads) {}
+      pool_(settings.threads) {
+  const std::vector<std::string_view> modes = drawer_->skippingModes();
+  const std::string_view wanted = settings.draw.skipping;
+  CHECK((wanted.empty() || std::find(modes.begin(), modes.end(), wanted) != modes.end()) == true);
+}
 
-template <class Content>
-std::string SceneRenderer<Content>::device() const {
+std::string SceneRenderer::device() const {
   return fmt::format("cpu {}, {} threads", renderSimdTarget(), pool_.threads());
 }
 
-template <class Content>
-void SceneRenderer<Content>::prepare(const Camera& camera, const Pose& worldFromCamera) {
+void SceneRenderer::prepare(const Camera& camera, const Pose& worldFromCamera) {
   tiles_.loadFor(tileView(camera, worldFromCamera, tiles_.frame()));
 }
 
-template <class Content>
-RenderedView SceneRenderer<Content>::render(const Camera& camera, const Pose& worldFromCamera,
-                                            const ImageF* opaqueDepth) {
+RenderedView SceneRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
   prepare(camera, worldFromCamera);
-  SceneDrawing<Content> drawing{tiles_.frame(), tiles_.frontToBack(), tiles_.surround(), settings_.march};
-  if (drawing.surround == nullptr) drawing.ofNothing = tiles_.always();
-  directions_.update(camera, pool_);
-  return drawScene(drawing, directions_, worldFromCamera, opaqueDepth, pool_, &counts_);
+  return drawer_->draw(tiles_.view(), {camera, worldFromCamera, opaqueDepth}, settings_.draw, pool_, counts_);
 }
-
-template class SceneRenderer<VolumeContent>;
-template class SceneRenderer<HashContent>;
 
 }  // namespace tessera

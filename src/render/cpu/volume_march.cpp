@@ -13,10 +13,6 @@ HWY_BEFORE_NAMESPACE();
 namespace tessera::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-const char* targetName() {
-  return hwy::TargetName(HWY_TARGET);
-}
-
 // The 8 attributes of a texel: one vector, or two.
 using Tag = hn::CappedTag<float, 8>;
 using Vector = hn::Vec<Tag>;
@@ -263,15 +259,10 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace tessera {
 
-HWY_EXPORT(targetName);
 HWY_EXPORT(marchVolume);
 
 void VolumeMarch::run(ContentComposite& composite, MarchCounts& counts) const {
   HWY_DYNAMIC_DISPATCH(marchVolume)(*this, composite, counts);
-}
-
-const char* renderSimdTarget() {
-  return HWY_DYNAMIC_DISPATCH(targetName)();
 }
 
 }  // namespace tessera

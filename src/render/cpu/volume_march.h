@@ -32,7 +32,4 @@ struct VolumeMarch {
   void run(ContentComposite& composite, MarchCounts& counts) const;
 };
 
-// The instruction set that is used: "AVX3".
-const char* renderSimdTarget();
-
 }  // namespace tessera

@@ -4,6 +4,7 @@
 #include <hwy/targets.h>
 
 #include "render/cpu/reference_volume.h"
+#include "render/cpu/simd_target.h"
 #include "render/made_volume.h"
 
 namespace tessera {

@@ -115,7 +115,7 @@ TEST(VolumeRenderer, DrawsTheFinestLevelWhereNoErrorIsAllowed) {
   ASSERT_EQ(finest.size(), 16u);
   const VolumeContent& surround = place().contents.back();
   const auto contentAt = [&](int tile) -> const VolumeContent& { return tile == 17 ? surround : finest[tile - 1]; };
-  const TileSource<VolumeContent> source{[&](int tile) { return bytesInMemory(contentAt(tile)); }, contentAt};
+  const TileSource<Content> source = sourceOfCopies(contentAt);
   VolumeRenderer flat(place().frame, flatTileTree(finest, true), source, settings);
   const RenderedView expected = flat.render(flightCamera(), flightPose(0), nullptr);
   EXPECT_EQ(view.colour.pixels, expected.colour.pixels);

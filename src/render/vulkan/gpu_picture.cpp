@@ -56,8 +56,11 @@ void GpuPicture::makeRoom(const Camera& camera, uint32_t numbersOfPixel) {
   stream_->upload(directions_, 0, std::as_bytes(std::span(directions)));
 }
 
-void GpuPicture::begin(const TileFrame& frame, float minTransmittance, uint32_t numbersOfPixel, const Camera& camera,
-                       const Pose& worldFromCamera, const ImageF* opaqueDepth) {
+void GpuPicture::begin(const TileFrame& frame, float minTransmittance, uint32_t numbersOfPixel,
+                       const PictureRequest& request) {
+  const Camera& camera = request.camera;
+  const Pose& worldFromCamera = request.worldFromCamera;
+  const ImageF* opaqueDepth = request.opaqueDepth;
   makeRoom(camera, numbersOfPixel);
   const size_t pixels = static_cast<size_t>(camera.width) * camera.height;
   view_ = {};

@@ -5,8 +5,8 @@
 #include <memory>
 
 #include "gpu/stream.h"
-#include "render/cpu/draw_scene.h"
-#include "render/tile_frame.h"
+#include "render/drawer.h"
+#include "render/pixel_directions.h"
 #include "shaders/render/arguments_draw.h"
 
 namespace tessera {
@@ -22,8 +22,7 @@ class GpuPicture {
   explicit GpuPicture(std::shared_ptr<GpuStream> stream);
 
   // Begins a picture, with so many numbers of each pixel to add up (begin_view.comp).
-  void begin(const TileFrame& frame, float minTransmittance, uint32_t numbersOfPixel, const Camera& camera,
-             const Pose& worldFromCamera, const ImageF* opaqueDepth);
+  void begin(const TileFrame& frame, float minTransmittance, uint32_t numbersOfPixel, const PictureRequest& request);
   const arguments::ViewArguments& view() const { return view_; }
   // Runs a kernel for each pixel.
   template <class Arguments>

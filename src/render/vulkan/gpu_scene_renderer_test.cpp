@@ -6,9 +6,11 @@
 #include <thread>
 
 #include "gpu/test_context.h"
-#include "render/cpu/scene_renderer.h"
+#include "render/cpu/test_renderer.h"
 #include "render/made_hash.h"
 #include "render/made_place.h"
+#include "render/vulkan/gpu_hash_drawer.h"
+#include "render/vulkan/gpu_volume_drawer.h"
 
 namespace tessera {
 namespace {
@@ -66,8 +68,8 @@ struct HashPlace {
     allBytes += bytesInMemory(content);
     contents.push_back(std::move(content));
   }
-  TileSource<HashContent> source() const {
-    return {[this](int tile) { return bytesInMemory(contents[tile]); }, [this](int tile) { return contents[tile]; }};
+  TileSource<Content> source() const {
+    return sourceOfCopies([this](int tile) -> const HashContent& { return contents[tile]; });
   }
 };
 
@@ -93,17 +95,26 @@ class GpuSceneRendererTest : public testing::Test {
   }
   void TearDown() override { EXPECT_EQ(GpuContext::validationMessages(), 0); }
 
+  GpuSceneRenderer onGpu(const Place& place, const GpuRendererSettings& settings) {
+    const auto stream = std::make_shared<GpuStream>(context_);
+    return {stream, makeGpuVolumeDrawer(stream), {place.frame, place.tree, place.source(), {}}, settings};
+  }
+  GpuSceneRenderer onGpu(const HashPlace& place, const GpuRendererSettings& settings) {
+    const auto stream = std::make_shared<GpuStream>(context_);
+    return {stream, makeGpuHashDrawer(stream), {place.frame, place.tree, place.source(), {}}, settings};
+  }
+
   // Both renderers along a flight.
-  template <class Content, class Place>
+  template <class Oracle, class Place>
   void compare(const Place& place, uint64_t budget, double mostPixels, const ImageF* opaqueDepth = nullptr) {
     SceneRendererSettings settings;
     settings.budgetBytes = budget;
     settings.selection.mostPixels = mostPixels;
-    SceneRenderer<Content> oracle(place.frame, place.tree, place.source(), settings);
+    Oracle oracle(place.frame, place.tree, place.source(), settings);
     GpuRendererSettings ofCard;
     ofCard.budgetBytes = budget;
     ofCard.selection = settings.selection;
-    GpuSceneRenderer<Content> card(context_, {place.frame, place.tree, place.source(), {}}, ofCard);
+    GpuSceneRenderer card = onGpu(place, ofCard);
     for (int step = 0; step < 600; step += 75) {
       SCOPED_TRACE(step);
       const RenderedView wanted = oracle.render(flightCamera(), flightPose(step), opaqueDepth);
@@ -131,63 +142,63 @@ ImageF opaqueOnTheLeft() {
 }
 
 TEST_F(GpuSceneRendererTest, DrawsVolumeAsTheProcessorDoes) {
-  compare<VolumeContent>(place(), place().allBytes, 1.5);
+  compare<VolumeRenderer>(place(), place().allBytes, 1.5);
 }
 
 TEST_F(GpuSceneRendererTest, DrawsTheSameCutWithinABudget) {
-  compare<VolumeContent>(place(), place().finestBytes / 3, 0.5);
+  compare<VolumeRenderer>(place(), place().finestBytes / 3, 0.5);
 }
 
 TEST_F(GpuSceneRendererTest, EndsRaysOfVolumeWhereSomethingOpaqueStands) {
   const ImageF opaque = opaqueOnTheLeft();
-  compare<VolumeContent>(place(), place().allBytes, 16, &opaque);
+  compare<VolumeRenderer>(place(), place().allBytes, 16, &opaque);
 }
 
 TEST_F(GpuSceneRendererTest, DrawsHashAsTheProcessorDoes) {
   const HashPlace made(32);
-  compare<HashContent>(made, made.allBytes, 1.5);
+  compare<HashRenderer>(made, made.allBytes, 1.5);
 }
 
 TEST_F(GpuSceneRendererTest, DrawsHashOfSeveralNetworksWithinABudget) {
   const HashPlace made(32);
-  compare<HashContent>(made, made.coarsestBytes + (made.allBytes - made.coarsestBytes) / 2, 0.5);
+  compare<HashRenderer>(made, made.coarsestBytes + (made.allBytes - made.coarsestBytes) / 2, 0.5);
 }
 
 TEST_F(GpuSceneRendererTest, PassesOverEmptySpaceInTwoGridsOfDistances) {
   const HashPlace made(136);
   ASSERT_GT(made.contents.front().parts.front().distances.ratio, 1u);
-  compare<HashContent>(made, made.allBytes, 16);
+  compare<HashRenderer>(made, made.allBytes, 16);
 }
 
 TEST_F(GpuSceneRendererTest, WeighsLevelsOfHashInEveryWay) {
   const HashPlace shared(32, [](HashContent& content) { content.weights = LevelWeights::shared; });
-  compare<HashContent>(shared, shared.allBytes, 16);
+  compare<HashRenderer>(shared, shared.allBytes, 16);
   const HashPlace none(32, [](HashContent& content) {
     content.weights = LevelWeights::none;
     withoutLogitColumns(content);
   });
-  compare<HashContent>(none, none.allBytes, 16);
+  compare<HashRenderer>(none, none.allBytes, 16);
   const HashPlace everywhere(32, [](HashContent& content) {
     content.logits = {0.7f, -1.2f};
     withoutLogitColumns(content);
   });
-  compare<HashContent>(everywhere, everywhere.allBytes, 16);
+  compare<HashRenderer>(everywhere, everywhere.allBytes, 16);
 }
 
 TEST_F(GpuSceneRendererTest, ShowsWhereNothingIsWhatAWholeHashSaysOfTheDirection) {
   const HashPlace whole(32, [](HashContent& content) { content.isWhole = true; });
-  compare<HashContent>(whole, whole.allBytes, 1.5);
+  compare<HashRenderer>(whole, whole.allBytes, 1.5);
   const ImageF opaque = opaqueOnTheLeft();
-  compare<HashContent>(whole, whole.allBytes, 16, &opaque);
+  compare<HashRenderer>(whole, whole.allBytes, 16, &opaque);
 }
 
 TEST_F(GpuSceneRendererTest, ReadsContentsInTheBackgroundAndShowsInTheEndWhatItWouldHaveWaitedFor) {
   GpuRendererSettings settings;
   settings.selection.mostPixels = 0.5;
-  GpuVolumeRenderer waits(context_, {place().frame, place().tree, place().source(), {}}, settings);
+  GpuSceneRenderer waits = onGpu(place(), settings);
   const RenderedView wanted = waits.render(flightCamera(), flightPose(0), nullptr);
   settings.inBackground = true;
-  GpuVolumeRenderer card(context_, {place().frame, place().tree, place().source(), {}}, settings);
+  GpuSceneRenderer card = onGpu(place(), settings);
   card.draw(flightCamera(), flightPose(0));
   const size_t missing = card.state().missing;
   EXPECT_GT(missing, 0u);  // coarser contents stand in
@@ -214,13 +225,13 @@ TEST_F(GpuSceneRendererTest, ReadsContentsInTheBackgroundAndShowsInTheEndWhatItW
 TEST_F(GpuSceneRendererTest, MayGoWhileTheCardStillDraws) {
   const HashPlace made(32);
   for (int i = 0; i < 3; ++i) {
-    GpuHashRenderer card(context_, {made.frame, made.tree, made.source(), {}}, {});
+    GpuSceneRenderer card = onGpu(made, {});
     card.draw(flightCamera().scaledTo(300, 200), flightPose(100 * i));
   }
 }
 
 TEST_F(GpuSceneRendererTest, FollowsCamerasOfOtherSizes) {
-  GpuVolumeRenderer card(context_, {place().frame, place().tree, place().source(), {}}, {});
+  GpuSceneRenderer card = onGpu(place(), {});
   EXPECT_EQ(card.render(flightCamera(), flightPose(0), nullptr).colour.width, 64);
   EXPECT_EQ(card.render(flightCamera().scaledTo(20, 11), flightPose(0), nullptr).opacity.pixels.size(), 220u);
 }

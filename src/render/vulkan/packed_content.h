@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "shaders/render/arguments_draw.h"
-#include "tiles/content.h"
+#include "tiles/dense_layer.h"
 
 namespace tessera {
 

@@ -49,7 +49,7 @@ BakedScene bakeHash(const HashLevelModels& models, uint32_t levels, const Captur
     const std::unique_ptr<HashModel> model = models(level);
     if (level == 0) {
       scene.emplace(folder, capture, model->grid(),
-                    SceneDescription{Representation::hash, model->space().near, options.background.value_or(kHazySky)});
+                    SceneDescription{kHashName, model->space().near, options.background.value_or(kHazySky)});
     }
     bakeLevel(*model, level, capture, ofLevel, *scene);
   }

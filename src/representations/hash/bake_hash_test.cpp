@@ -9,10 +9,11 @@
 #include "base/random.h"
 #include "compute/block_path.h"
 #include "render/cpu/hash_march.h"
-#include "render/cpu/scene_renderer.h"
+#include "render/cpu/test_renderer.h"
 #include "render/tile_scene.h"
 #include "representations/hash/hash_cube.h"
 #include "representations/hash/hash_model_renderer.h"
+#include "tiles/hash_payload.h"
 #ifdef TESSERA_HAS_VULKAN
 #include "gpu/test_context.h"
 #endif
@@ -236,7 +237,7 @@ TEST_F(BakedScenes, LookAsTheirModelsDo) {
       const fs::path where = folder_ / (std::string(surround) + background);
       const BakedScene baked = bakeHash(onlyModel(trained, folder_), 1, scene.capture(), where, {});
       EXPECT_EQ(baked.levels.size(), 1u);
-      TileScene<HashContent> opened = openTileScene<HashContent>(where);
+      TileScene opened = openTileScene(where, hashCodec());
       SceneRendererSettings settings;
       settings.threads = 2;
       settings.selection.mostPixels = 0;
@@ -264,7 +265,7 @@ TEST_F(BakedScenes, LookTheSameWhereVulkanMadeThem) {
   const std::unique_ptr<Device> vulkan = makeDevice({"vulkan"});
   const auto drawn = [&](Device& device, const char* name) {
     bakeHash(onlyModel(trained, folder_, device), 1, scene.capture(), folder_ / name, {});
-    TileScene<HashContent> opened = openTileScene<HashContent>(folder_ / name);
+    TileScene opened = openTileScene(folder_ / name, hashCodec());
     SceneRendererSettings settings;
     settings.threads = 2;
     settings.selection.mostPixels = 0;

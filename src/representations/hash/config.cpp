@@ -6,7 +6,7 @@
 
 #include "base/config_checks.h"
 #include "compute/lattice.h"
-#include "tiles/content.h"
+#include "tiles/dense_layer.h"
 #include "train/block_frame.h"
 
 namespace tessera {

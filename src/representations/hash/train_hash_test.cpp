@@ -3,11 +3,12 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "render/cpu/scene_renderer.h"
+#include "render/cpu/test_renderer.h"
 #include "render/tile_scene.h"
 #include "representations/hash/bake_hash.h"
 #include "representations/hash/hash_cube.h"
 #include "representations/hash/hash_model_renderer.h"
+#include "tiles/hash_payload.h"
 #include "train/level_folders.h"
 #include "train/two_devices.h"
 
@@ -85,7 +86,7 @@ TEST_F(HashTraining, MakesCoarserLevelsOfTheSameBlocks) {
   EXPECT_EQ(baked.tileset.tiles.size(), 3u);
   EXPECT_GT(baked.tileset.root().geometricError, 1.9 * baked.tileset.tiles[1].geometricError);
   for (const int level : {0, 1}) {
-    TileScene<HashContent> opened = openTileScene<HashContent>(scene_ / "scene");
+    TileScene opened = openTileScene(scene_ / "scene", hashCodec());
     EXPECT_EQ(opened.source.load(0).parts.size(), 2u);
     SceneRendererSettings settings;
     settings.threads = 2;

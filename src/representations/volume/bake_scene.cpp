@@ -41,7 +41,7 @@ BakedScene bakeVolume(const LevelModels& models, uint32_t levels, const Capture&
     if (level == 0) {
       const std::array<float, 3> behind = model->config().randomBackground ? kHazySky : kBlack;
       scene.emplace(folder, capture, model->grid(),
-                    SceneDescription{Representation::volume, model->space().near, options.background.value_or(behind)});
+                    SceneDescription{kVolumeName, model->space().near, options.background.value_or(behind)});
       if (model->config().literalEq3) {
         warn(
             "the model was trained with literal_eq3; scenes multiply the network's colour by the block's opacity, and "

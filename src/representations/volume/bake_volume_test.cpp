@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "base/random.h"
-#include "render/cpu/scene_renderer.h"
+#include "render/cpu/test_renderer.h"
 #include "render/tile_scene.h"
 #include "representations/volume/train_volume.h"
 #include "representations/volume/volume_cube.h"
@@ -24,7 +24,7 @@ namespace tessera {
 namespace {
 
 std::unique_ptr<VolumeRenderer> openScene(const fs::path& folder) {
-  TileScene<VolumeContent> scene = openTileScene<VolumeContent>(folder);
+  TileScene scene = openTileScene(folder, volumeCodec());
   SceneRendererSettings settings;
   settings.selection.mostPixels = 0;
   settings.threads = 2;
@@ -352,7 +352,8 @@ TEST(BakeVolume, PutsLevelsAboveOneAnother) {
   EXPECT_EQ(root.children.size(), 4u);
   EXPECT_EQ(root.level, 1u);
   EXPECT_NEAR(root.geometricError, 2 * baked.tileset.tiles[1].geometricError, 1e-9);
-  const VolumeContent merged = readContent<VolumeContent>(contentPath(folder / "scene", root.contents.at(0).uri));
+  const VolumeContent merged =
+      contentAs<VolumeContent>(*readContent(contentPath(folder / "scene", root.contents.at(0).uri), volumeCodec()));
   EXPECT_EQ(merged.parts.size(), 4u) << "side by side, each with its own texels";
   EXPECT_EQ(merged.parts[0].planes, 32u);
   // Looked at through half as many rows and columns: its texels are twice as large.
@@ -366,7 +367,7 @@ TEST(BakeVolume, PutsLevelsAboveOneAnother) {
   EXPECT_NE(merged.parts[0].planeBytes, seenThroughEvery(8).planeBytes);
   // Drawn at either level.
   for (const int finest : {0, 1}) {
-    TileScene<VolumeContent> opened = openTileScene<VolumeContent>(folder / "scene");
+    TileScene opened = openTileScene(folder / "scene", volumeCodec());
     SceneRendererSettings settings;
     settings.selection.mostPixels = 0;
     settings.selection.finestLevel = finest;

@@ -6,12 +6,13 @@
 #include <set>
 
 #include "base/error.h"
-#include "render/cpu/scene_renderer.h"
+#include "render/cpu/test_renderer.h"
 #include "render/tile_scene.h"
 #include "representations/volume/bake_volume.h"
 #include "representations/volume/train_volume.h"
 #include "representations/volume/volume_cube.h"
 #include "tiles/scene_folder.h"
+#include "tiles/volume_payload.h"
 #include "train/level_folders.h"
 #include "train/picture_rays.h"
 
@@ -269,7 +270,7 @@ TEST(BakeVolume, NeverHasMoreBlocksInMemoryThanItMay) {
   EXPECT_EQ(bake(4, "scene"), all);
   bake(1, "few");
   const auto psnr = [&](const std::string& of) {
-    TileScene<VolumeContent> opened = openTileScene<VolumeContent>(scene / of);
+    TileScene opened = openTileScene(scene / of, volumeCodec());
     SceneRendererSettings settings;
     settings.selection.mostPixels = 0;
     VolumeRenderer renderer(opened.frame, std::move(opened.tree), std::move(opened.source), settings);

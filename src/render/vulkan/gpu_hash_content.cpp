@@ -1,27 +1,14 @@
-#include "render/vulkan/gpu_content.h"
+#include "render/vulkan/gpu_hash_content.h"
 
 #include <bit>
 #include <cmath>
+#include <span>
 
 #include "base/check.h"
+#include "render/vulkan/part_arguments.h"
 
 namespace tessera {
-
 namespace {
-
-// What a kernel knows of where a part stands.
-template <class Arguments>
-Arguments placed(const ContentPart& part) {
-  Arguments made = {};
-  for (int a = 0; a < 3; ++a) {
-    made.centre[a] = part.centre[a];
-    made.scale[a] = part.scale[a];
-    made.low[a] = part.low[a];
-    made.high[a] = part.high[a];
-  }
-  made.contracted = part.contracted;
-  return made;
-}
 
 // What is added, and what a number from 0 to `most` is multiplied with, of columns 1 2 3 0 and then of 4 5 6 7.
 void addRangeVectors(std::span<const ByteRange> ranges, float most, std::vector<float>& numbers) {
@@ -36,36 +23,6 @@ float sigmoid(float x) {
 }
 
 }  // namespace
-
-GpuVolumeContent::GpuVolumeContent(const std::shared_ptr<GpuStream>& stream, const VolumeContent& content)
-    : featureRange(content.featureRange),
-      densityRange(content.densityRange),
-      stepsPerTexel(static_cast<float>(content.stepsPerTexel)),
-      partCount(static_cast<uint32_t>(content.parts.size())) {
-  PackedContent packed;
-  std::vector<arguments::VolumePartArguments> all;
-  for (const VolumePart& part : content.parts) {
-    auto made = placed<arguments::VolumePartArguments>(part);
-    made.texels = static_cast<float>(part.planes);
-    made.voxels = static_cast<float>(part.voxels);
-    for (int a = 0; a < 3; ++a) made.planeWords[a] = packed.add(part.planeBytes[a]);
-    made.macroblocks = packed.add(part.macroblocks);
-    made.voxelWords = packed.add(part.voxelBytes);
-    made.distances = packed.add(part.distances);
-    all.push_back(made);
-  }
-  network = addNetwork(content.network, packed);
-  parts = packed.add(all);
-  memory = GpuContentMemory(stream, packed.bytes().size());
-  const uint64_t base = memory.address();
-  for (arguments::VolumePartArguments& part : all) {
-    for (uint64_t& plane : part.planeWords) plane += base;
-    for (uint64_t* at : {&part.macroblocks, &part.voxelWords, &part.distances}) *at += base;
-  }
-  packed.replace(parts, all);
-  memory.upload(packed);
-  for (uint64_t* at : {&parts, &network.layers, &network.weights}) *at += base;
-}
 
 GpuHashContent::GpuHashContent(const std::shared_ptr<GpuStream>& stream, const HashContent& content)
     : weights(content.weights),
@@ -87,7 +44,7 @@ GpuHashContent::GpuHashContent(const std::shared_ptr<GpuStream>& stream, const H
   std::vector<float> numbers;  // of `vectors`
   for (const HashPart& part : content.parts) {
     CHECK(part.tables.size() == size_t{tables});
-    auto made = placed<arguments::HashPartArguments>(part);
+    auto made = placedArguments<arguments::HashPartArguments>(part);
     made.texels = static_cast<float>(part.cells());
     made.lattice = static_cast<float>(part.lattice);
     made.ratio = std::countr_zero(part.distances.ratio);

@@ -1,18 +1,20 @@
-#include "render/cpu/draw_scene.h"
+// The definitions of draw_scene.h's templates.
+#pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "base/check.h"
+#include "render/cpu/draw_scene.h"
 
 namespace tessera {
-namespace {
+namespace draw_scene {
 
-constexpr int kTile = 16;  // pixels along an edge of what one task draws: neighbours read the same texels
+inline constexpr int kTile = 16;  // pixels along an edge of what one task draws: neighbours read the same texels
 
 // A packet of rays is a square of pixels.
-std::pair<int, int> pixelOfTile(int number, int left, int top) {
+inline std::pair<int, int> pixelOfTile(int number, int left, int top) {
   constexpr int kEdge = 4;
   static_assert(kEdge * kEdge == kRayLanes);
   const int square = number / (kEdge * kEdge), within = number % (kEdge * kEdge), across = kTile / kEdge;
@@ -33,12 +35,12 @@ std::vector<const Content*> contentsOf(const SceneDrawing<Content>& drawing) {
   return once;
 }
 
-}  // namespace
+}  // namespace draw_scene
 
 template <class Content>
 RayCaster<Content>::RayCaster(const SceneDrawing<Content>& drawing)
-    : drawing_(drawing), shading_(contentsOf(drawing), drawing.march) {
-  const std::vector<const Content*> numbered = contentsOf(drawing);
+    : drawing_(drawing), shading_(draw_scene::contentsOf(drawing), drawing.march) {
+  const std::vector<const Content*> numbered = draw_scene::contentsOf(drawing);
   const auto place = [&numbered](const Content& content) {
     const auto number = std::find(numbered.begin(), numbered.end(), &content) - numbered.begin();
     Placed placed{&content, static_cast<size_t>(number), Vec3d::Constant(INFINITY), Vec3d::Constant(-INFINITY)};
@@ -154,18 +156,6 @@ DrawnPixel RayCaster<Content>::cast(const SceneRay& ray, double far, MarchCounts
   return pixel;
 }
 
-void PixelDirections::update(const Camera& camera, ThreadPool& pool) {
-  if (!directions_.empty() && camera == camera_) return;
-  camera_ = camera;
-  directions_.assign(static_cast<size_t>(camera.width) * camera.height, Vec3f::Zero());
-  pool.run(static_cast<size_t>(camera.height), [&](size_t y, int) {
-    for (int x = 0; x < camera.width; ++x) {
-      const auto direction = camera.directionInCamera(Vec2d(x + 0.5, static_cast<double>(y) + 0.5));
-      if (direction) directions_[y * static_cast<size_t>(camera.width) + x] = direction->cast<float>();
-    }
-  });
-}
-
 template <class Content>
 RenderedView drawScene(const SceneDrawing<Content>& drawing, const Camera& camera, const Pose& worldFromCamera,
                        const ImageF* opaqueDepth, ThreadPool& pool, MarchCounts* counts) {
@@ -175,6 +165,7 @@ RenderedView drawScene(const SceneDrawing<Content>& drawing, const Camera& camer
 template <class Content>
 RenderedView drawScene(const SceneDrawing<Content>& drawing, const PixelDirections& directions,
                        const Pose& worldFromCamera, const ImageF* opaqueDepth, ThreadPool& pool, MarchCounts* counts) {
+  using draw_scene::kTile;
   const Camera& camera = directions.camera();
   const TileFrame& frame = drawing.frame;
   RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
@@ -193,7 +184,7 @@ RenderedView drawScene(const SceneDrawing<Content>& drawing, const PixelDirectio
     std::vector<Pixel> pixels;
     std::vector<BoundedRay> rays;
     for (int number = 0; number < kTile * kTile; ++number) {
-      const auto [x, y] = pixelOfTile(number, left, top);
+      const auto [x, y] = draw_scene::pixelOfTile(number, left, top);
       if (x < camera.width && y < camera.height) {
         const Vec3d inCamera = directions.at(x, y).cast<double>();
         if (inCamera.isZero()) continue;  // beyond the lens: nothing
@@ -224,16 +215,5 @@ RenderedView drawScene(const SceneDrawing<Content>& drawing, const PixelDirectio
   }
   return view;
 }
-
-template class RayCaster<VolumeContent>;
-template class RayCaster<HashContent>;
-template RenderedView drawScene(const SceneDrawing<VolumeContent>&, const PixelDirections&, const Pose&, const ImageF*,
-                                ThreadPool&, MarchCounts*);
-template RenderedView drawScene(const SceneDrawing<VolumeContent>&, const Camera&, const Pose&, const ImageF*,
-                                ThreadPool&, MarchCounts*);
-template RenderedView drawScene(const SceneDrawing<HashContent>&, const PixelDirections&, const Pose&, const ImageF*,
-                                ThreadPool&, MarchCounts*);
-template RenderedView drawScene(const SceneDrawing<HashContent>&, const Camera&, const Pose&, const ImageF*,
-                                ThreadPool&, MarchCounts*);
 
 }  // namespace tessera

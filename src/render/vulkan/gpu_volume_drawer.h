@@ -1,0 +1,10 @@
+// Draws contents of `volume` on a GPU.
+#pragma once
+
+#include "render/vulkan/gpu_drawer.h"
+
+namespace tessera {
+
+std::unique_ptr<GpuDrawer> makeGpuVolumeDrawer(const std::shared_ptr<GpuStream>& stream);
+
+}  // namespace tessera

@@ -1,0 +1,30 @@
+#include "representations/codecs.h"
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "representations/list.h"
+#include "tiles/hash_payload.h"
+#include "tiles/volume_payload.h"
+
+namespace tessera {
+
+const ContentCodec* codecOf(std::string_view representation) {
+#define SKIP(name, Name)
+#define CODEC(name, Name) \
+  if (representation == #name) return &name##Codec();
+  TESSERA_REPRESENTATIONS(SKIP, CODEC)
+#undef CODEC
+#undef SKIP
+  return nullptr;
+}
+
+const ContentCodec& requireCodec(const fs::path& folder, const Tileset& tileset) {
+  const ContentCodec* codec = codecOf(tileset.representation);
+  if (codec) return *codec;
+  throw Error((folder / "tileset.json").string(), "representation",
+              fmt::format("is a scene of {}, which is not known", tileset.representation),
+              "restore the file, or use a newer tessera");
+}
+
+}  // namespace tessera
