@@ -3,6 +3,7 @@ import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Page } from 'playwright-core';
 import type { Plain, View } from '../src/plain';
+import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { run } from '../test/machine';
 import { cameraPath, capturedViews, decodePng, psnr } from '../test/pictures';
@@ -10,7 +11,7 @@ import { cameraPath, capturedViews, decodePng, psnr } from '../test/pictures';
 declare const plain: Plain;
 
 export function tilesetOf(scene: string) {
-  return decodeTileset(readFileSync(join(scene, 'tileset.json'), 'utf8'), 'tileset.json');
+  return decodeTileset(readFileSync(join(scene, 'tileset.json'), 'utf8'), 'tileset.json', kCodecs);
 }
 
 // PSNR in dB and seconds of a frame, of each of the first held-out views; `page` is a plain one of the server of this scene.

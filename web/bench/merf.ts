@@ -6,6 +6,7 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Plain, View } from '../src/plain';
+import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { launch, serve, type Server } from '../test/machine';
 import { capturedViews, psnr } from '../test/pictures';
@@ -33,7 +34,7 @@ const kHost = 'http://merf.viewer';
 const median = (numbers: number[]) => [...numbers].sort((a, b) => a - b)[numbers.length >> 1];
 
 describe('the viewer beside that of MERF', () => {
-  const tileset = decodeTileset(readFileSync(join(scene, 'tileset.json'), 'utf8'), 'tileset.json');
+  const tileset = decodeTileset(readFileSync(join(scene, 'tileset.json'), 'utf8'), 'tileset.json', kCodecs);
   let browser: Browser;
   let server: Server;
   let ours: Page;

@@ -1,33 +1,35 @@
-// Where the contents of a scene come from: files, read by workers, drawn by a compositor.
+// Where the contents of a scene come from: files, read by workers, drawn by the representation's drawer.
 import type * as THREE from 'three';
 import type { DecodePool } from './decode-pool';
-import type { Compositor, DrawnContent } from './draw/compositor';
+import type { ContentPlace, DrawnContent, SceneDrawer } from './draw/scene-drawer';
+import { codecOf, type KnownRepresentation } from './representations/codecs';
 import type { ContentFile, SceneFiles } from './scene-files';
 import type { TileSource, UploadStep } from './stream/tile-streamer';
 import { coarsestTiles, type TileTree } from './stream/tile-tree';
-import { kContentLimits, type ContentLimits } from './tiles/content';
-import { readContentHeader, type Content, type KnownRepresentation } from './tiles/decode-content';
+import type { Content, ContentCodec } from './tiles/content-codec';
+import { kContentLimits, type ContentLimits } from './tiles/content-limits';
 import type { TileContent } from './tiles/tileset';
 
-// What of a `volume` scene is drawn for long, the coarsest tiles and surrounds, has its network written into a program of its own,
-// which is faster than to read it from a buffer. What comes and goes shares programs, as compiling takes long.
-const kOwnPrograms = 4; // of tiles
+// Surrounds are drawn for long, and so are the coarsest tiles where there are no more.
+const kMostDrawnForLong = 4;
 
 export class ContentSource implements TileSource<ContentFile, Content, DrawnContent> {
   private readonly limits: ContentLimits;
-  private readonly ownProgram: Set<number>;
+  private readonly codec: ContentCodec;
+  private readonly drawnForLong: Set<number>;
 
   constructor(
     private readonly representation: KnownRepresentation,
     private readonly tree: TileTree,
     private readonly files: SceneFiles,
     private readonly pool: DecodePool,
-    private readonly compositor: Compositor,
-    private readonly renderer: THREE.WebGLRenderer,
+    private readonly drawer: SceneDrawer,
+    renderer: THREE.WebGLRenderer,
   ) {
+    this.codec = codecOf(representation);
     const surrounds = [...tree.tiles.keys()].filter((tile) => tree.tiles[tile].isSurround);
     const coarsest = coarsestTiles(tree);
-    this.ownProgram = new Set([...surrounds, ...(coarsest.length <= kOwnPrograms ? coarsest : [])]);
+    this.drawnForLong = new Set([...surrounds, ...(coarsest.length <= kMostDrawnForLong ? coarsest : [])]);
     const gl = renderer.getContext() as WebGL2RenderingContext;
     this.limits = {
       ...kContentLimits,
@@ -45,33 +47,34 @@ export class ContentSource implements TileSource<ContentFile, Content, DrawnCont
   async fetch(tile: number, signal: AbortSignal) {
     const content = this.contentOf(tile);
     const file = await this.files.read(content.uri, this.limits.fileBytes, signal);
-    const header = readContentHeader(this.representation, file, content.uri, content, this.limits);
-    this.compositor.prepare(this.renderer, header, content.surround, this.ownProgram.has(tile));
-    return { file, fileBytes: file.length, cardBytes: header.cardBytes };
+    const header = this.codec.readHeader(file, content.uri, content, this.limits);
+    this.drawer.prepare(header, this.placeOf(tile));
+    return { file, fileBytes: file.length, cardBytes: this.drawer.residentBytes(header) };
   }
 
   decode(tile: number, file: ContentFile): Promise<Content> {
     const { uri, surround, box } = this.contentOf(tile);
-    return this.pool.decode(this.representation, file, uri, { surround, box }, this.limits);
+    return this.pool.decode({ representation: this.representation, file, name: uri, promised: { surround, box }, limits: this.limits });
   }
 
   allocate(tile: number, decoded: Content): DrawnContent {
-    const made = this.compositor.make(
-      decoded, this.contentOf(tile), tile, this.tree.tiles[tile].level, this.ownProgram.has(tile));
-    this.compositor.compile(this.renderer, made);
-    return made;
+    return this.drawer.allocate(decoded, this.placeOf(tile), []);
   }
 
   upload(resident: DrawnContent): UploadStep {
-    if (!resident.textures.upload(this.renderer)) return 'more';
-    return this.compositor.isCompiled(this.renderer, resident) ? 'done' : 'wait';
+    return this.drawer.upload(resident);
   }
 
   free(resident: DrawnContent): void {
-    this.compositor.remove(resident);
+    this.drawer.free(resident);
   }
 
   private contentOf(tile: number): TileContent {
     return this.tree.tiles[tile].content!;
+  }
+
+  private placeOf(tile: number): ContentPlace {
+    const { box, surround } = this.contentOf(tile);
+    return { box, surround, number: tile, level: this.tree.tiles[tile].level, isDrawnForLong: this.drawnForLong.has(tile) };
   }
 }

@@ -1,9 +1,7 @@
 // Workers that read contents.
 import { makeWorker } from './make-worker';
 import { SceneError } from './scene-error';
-import type { ContentLimits } from './tiles/content';
-import type { Content, KnownRepresentation } from './tiles/decode-content';
-import type { TileContent } from './tiles/tileset';
+import type { Content } from './tiles/content-codec';
 import type { DecodeAnswer, DecodeRequest } from './worker';
 
 interface Waiting {
@@ -25,15 +23,12 @@ export class DecodePool {
   }
 
   // The file is handed over: it is of no use afterwards.
-  decode(
-    representation: KnownRepresentation, file: Uint8Array<ArrayBuffer>, name: string, promised: Pick<TileContent, 'surround' | 'box'>,
-    limits: ContentLimits,
-  ): Promise<Content> {
+  decode(request: DecodeRequest): Promise<Content> {
     const id = this.next++;
     const worker = this.worker(id % this.size);
     return new Promise((resolve, reject) => {
       this.waiting.set(id, { worker, resolve, reject });
-      worker.postMessage({ id, representation, file, name, promised, limits } satisfies DecodeRequest, [file.buffer]);
+      worker.postMessage({ id, ...request }, [request.file.buffer]);
     });
   }
 

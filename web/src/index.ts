@@ -1,6 +1,6 @@
 // The library: a scene as an object of three.js.
 export { kYUpFromZUp } from './axes';
-export { kDisplayModes, type DisplayMode } from './draw/display-modes';
+export { kDisplayModes, type DisplayMode } from './representations/drawers';
 export { TesseraScene, type SceneOptions, type SceneStatistics } from './scene';
 export { updateScenes } from './scenes';
 export { kMostHiddenBoxes } from './draw/hidden-boxes';

@@ -14,19 +14,19 @@ import { kYUpFromZUp } from './axes';
 import { ContentSource } from './content-source';
 import { DecodePool } from './decode-pool';
 import { cityMesh, kFirstRenderOrder } from './draw/city-mesh';
-import { Compositor, type DrawnContent, type DrawnPart } from './draw/compositor';
-import { kFarAway } from './draw/content-program';
-import type { DisplayMode } from './draw/display-modes';
 import { OpaqueDepth } from './draw/opaque-depth';
 import { picturesOf, type Picture } from './draw/picture';
+import { kFarAway, type DrawnContent, type DrawnPart, type SceneDrawer } from './draw/scene-drawer';
 import { tileView } from './picture-view';
+import { kCodecs, type KnownRepresentation } from './representations/codecs';
+import { drawingOf, type DisplayMode, type KnownDrawing } from './representations/drawers';
 import { SceneError } from './scene-error';
 import { ServedFiles, type ContentFile, type SceneFiles } from './scene-files';
 import { TileSelector, kSelectionSettings, type SelectionSettings } from './stream/tile-selector';
 import { boxOfCells, coarsestTiles, cutFrontToBack, tileTree, type TileTree } from './stream/tile-tree';
 import { jointView } from './stream/tile-view';
 import { kStreamSettings, TileStreamer, type StreamSettings, type StreamStatistics } from './stream/tile-streamer';
-import { isKnown, type Content, type KnownRepresentation } from './tiles/decode-content';
+import type { Content } from './tiles/content-codec';
 import { decodeTileset } from './tiles/decode-tileset';
 import type { Tileset } from './tiles/tileset';
 
@@ -51,7 +51,7 @@ export interface Neighbours {
 }
 
 export type { StreamSettings };
-export type KnownTileset = Tileset & { representation: KnownRepresentation };
+export type KnownTileset = Tileset<KnownRepresentation>;
 
 type Streamer = TileStreamer<ContentFile, Content, DrawnContent>;
 
@@ -60,7 +60,7 @@ interface Look {
   size: THREE.Vector2; // of the pictures, in pixels
   pictures: Picture[];
   worldFromScene: THREE.Matrix4;
-  compositor: Compositor;
+  drawer: SceneDrawer;
   streamer: Streamer;
   mesh: ReturnType<typeof cityMesh>;
 }
@@ -72,7 +72,7 @@ export class TesseraScene extends THREE.Object3D {
   resolutionScale = 1; // pixels of the scene beside those of the canvas, along an edge
   largestResolutionScale = 1; // for which room is kept on the card, so that tiles need not go when it is reached
   display: DisplayMode = 'colour';
-  featureLevel = 1; // of `hash`, which display modes show: 0, the coarse features, to 8
+  featureLevel = 1; // which display modes show that show one: 0, the coarse features, to `featureLevels`
   minTransmittance = 1 / 255; // rays end where less would be seen; 0: never
   // Boxes in which nothing of it is drawn, at most kMostHiddenBoxes: from the cube of edge 1 about the origin to this
   // object's frame.
@@ -85,7 +85,8 @@ export class TesseraScene extends THREE.Object3D {
   onError: (error: SceneError) => void = () => {};
   private readonly tree: TileTree;
   private readonly opaque = new OpaqueDepth();
-  private compositor?: Compositor;
+  private readonly drawing: KnownDrawing;
+  private drawer?: SceneDrawer;
   private streamer?: Streamer;
   private mesh?: ReturnType<typeof cityMesh>;
   private drawn: number[] = [];
@@ -121,6 +122,7 @@ export class TesseraScene extends THREE.Object3D {
     this.selection = { ...kSelectionSettings, ...options.selection };
     this.stream = { ...kStreamSettings, ...options.stream };
     this.tree = tileTree(tileset, 'tileset.json');
+    this.drawing = drawingOf(tileset.representation);
     const { rotation: r, scale, translation: t } = tileset.worldFromScene;
     this.localFromScene.set(
       r[0] * scale, r[3] * scale, r[6] * scale, t[0],
@@ -148,24 +150,29 @@ export class TesseraScene extends THREE.Object3D {
 
   // Nothing that the last view asked for is still to come.
   get idle(): boolean {
-    return this.refused || (this.complete && (this.streamer?.idle ?? false));
+    return this.refused || (this.complete && (this.streamer?.idle ?? false) && this.drawer?.wantsAnotherFrame() === false);
   }
 
-  // Of `hash`: the most fine levels of features that any content has which has come so far.
+  // What `display` may be, and what `featureLevel` may be where a mode shows one.
+  get shows(): Pick<KnownDrawing, 'modes' | 'featureLevels'> {
+    return this.drawing;
+  }
+
+  // The most fine levels of features that any content has which has come so far; 0 where there are none.
   get featureLevels(): number {
-    return this.compositor?.featureLevels ?? 0;
+    return this.drawer?.featureLevels ?? 0;
   }
 
   get statistics(): SceneStatistics | undefined {
-    if (!this.streamer || !this.compositor) return undefined;
-    return { ...this.streamer.statistics, targetBytes: this.compositor.bytes + this.opaque.bytes, drawn: this.drawn };
+    if (!this.streamer || !this.drawer) return undefined;
+    return { ...this.streamer.statistics, targetBytes: this.drawer.bytes + this.opaque.bytes, drawn: this.drawn };
   }
 
   // Of an ArrayCamera, and of a headset while it presents, a picture for each of its cameras; all are streamed for at once.
   update(camera: THREE.Camera, renderer: THREE.WebGLRenderer): void {
     const look = this.look(camera, renderer);
     if (!look) return;
-    const { size, pictures, worldFromScene, compositor, streamer, mesh } = look;
+    const { size, pictures, worldFromScene, drawer, streamer, mesh } = look;
     const surfaces = this.neighbours.behind.map((scene) => scene.mesh).filter((one) => one !== undefined);
     const depth = this.opaque.draw(renderer, pictures, this, size, new Set(surfaces));
     const { views, tiles, surround } = this.ask(look, this.uploadTime());
@@ -183,22 +190,25 @@ export class TesseraScene extends THREE.Object3D {
     });
     this.drawn = new Array<number>(this.tileset.levels).fill(0);
     for (const content of new Set(contentOf.values())) ++this.drawn[this.tree.tiles[content].level];
-    compositor.view.minTransmittance.value = this.minTransmittance;
     const { low, high } = this.tileset.box;
     const diagonal = Math.hypot(...high.map((x, axis) => x - low[axis]));
-    compositor.view.visibility.value = Math.min(Math.max(this.visibility * diagonal, kNearby), kFarAway);
-    compositor.show(this.display, this.featureLevel);
-    // Something else may stand behind, though nothing that ends rays does.
-    compositor.endsRays = this.showsSurround && this.visibility === Infinity && this.neighbours.behind.length === 0;
     const sceneFromLocal = this.localFromScene.clone().invert();
     const inScene = (boxes: readonly THREE.Matrix4[]) => boxes.map((box) => sceneFromLocal.clone().multiply(box));
-    compositor.hide(inScene(this.hidden), inScene(this.neighbours.boxes), !this.showsSurround);
-    // Rays that meet nothing in whole scenes have the surround's network, or else the coarsest content's: always there,
-    // whatever is in view.
+    // Rays that meet nothing in whole scenes are the surround's, or else the coarsest content's: always there, whatever is in
+    // view.
     const ofNothing = behind ?? streamer.residentOf(coarsestTiles(this.tree)[0]);
-    compositor.draw(renderer, pictures, worldFromScene, contents, depth, ofNothing);
+    mesh.visible = drawer.draw({ pictures, worldFromScene, contents, opaqueDepth: depth, ofNothing }, {
+      minTransmittance: this.minTransmittance,
+      visibility: Math.min(Math.max(this.visibility * diagonal, kNearby), kFarAway),
+      display: this.display,
+      featureLevel: this.featureLevel,
+      // Something else may stand behind, though nothing that ends rays does.
+      endsRays: this.showsSurround && this.visibility === Infinity && this.neighbours.behind.length === 0,
+      hidden: inScene(this.hidden),
+      hiddenOfSurround: inScene(this.neighbours.boxes),
+      withinBox: !this.showsSurround,
+    });
     mesh.renderOrder = kFirstRenderOrder + this.neighbours.behind.length;
-    mesh.visible = ofNothing?.whole || contents.some((ofOne) => ofOne.length > 0);
   }
 
   // Streams in what `update` would draw, and draws nothing: for who waits until it is `idle`, and then wants one picture.
@@ -211,9 +221,9 @@ export class TesseraScene extends THREE.Object3D {
   // where there is nothing, or what is there hides less than half of what is behind. Of several cameras, `eye` is the number
   // of the one whose picture it is.
   pick(at: THREE.Vector2, renderer: THREE.WebGLRenderer, eye = 0): THREE.Vector3 | undefined {
-    const picture = this.compositor?.pictures[eye];
+    const picture = this.drawer?.pictures[eye];
     if (!picture) return undefined;
-    const inScene = this.compositor!.surfaceAt(renderer, picture, at);
+    const inScene = this.drawer!.surfaceAt(renderer, picture, at);
     return inScene?.applyMatrix4(this.localFromScene).applyMatrix4(this.matrixWorld);
   }
 
@@ -228,7 +238,7 @@ export class TesseraScene extends THREE.Object3D {
   // Gives back the memory of the card, and of what was fetched; the next update fetches it anew.
   leaveCard(): void {
     this.streamer?.dispose();
-    this.compositor?.dispose();
+    this.drawer?.dispose();
     this.opaque.dispose();
     if (this.mesh) {
       this.remove(this.mesh);
@@ -236,7 +246,7 @@ export class TesseraScene extends THREE.Object3D {
       this.mesh.material.dispose();
     }
     this.canvas?.removeEventListener('webglcontextlost', this.onContextLost);
-    this.streamer = this.compositor = this.mesh = this.canvas = undefined;
+    this.streamer = this.drawer = this.mesh = this.canvas = undefined;
   }
 
   // Nothing where nothing can be drawn.
@@ -252,10 +262,10 @@ export class TesseraScene extends THREE.Object3D {
   }
 
   // What to draw of what is there; and another step of what is on its way.
-  private ask({ size, pictures, worldFromScene, compositor, streamer }: Look, uploadFor: number) {
-    compositor.resize(size);
+  private ask({ size, pictures, worldFromScene, drawer, streamer }: Look, uploadFor: number) {
+    drawer.resize(size);
     const enlarged = Math.max(1, this.largestResolutionScale / this.resolutionScale) ** 2;
-    streamer.settings = { ...this.stream, cardBytes: this.stream.cardBytes - enlarged * (compositor.bytes + this.opaque.bytes) };
+    streamer.settings = { ...this.stream, cardBytes: this.stream.cardBytes - enlarged * (drawer.bytes + this.opaque.bytes) };
     const views = pictures.map((picture) => tileView(this.tileset, picture, worldFromScene));
     return { views, ...streamer.update(jointView(views), uploadFor) };
   }
@@ -271,33 +281,28 @@ export class TesseraScene extends THREE.Object3D {
 
   // What needs to know the graphics card.
   private prepare(renderer: THREE.WebGLRenderer) {
-    if (!this.compositor || !this.streamer || !this.mesh) {
+    if (!this.drawer || !this.streamer || !this.mesh) {
       try {
-        this.compositor = new Compositor(renderer, this.tileset);
+        this.drawer = this.drawing.makeDrawer(renderer, this.tileset);
       } catch (error) {
         if (!(error instanceof SceneError)) throw error;
         this.refused = true;
         this.onError(error);
         return undefined;
       }
-      const source = new ContentSource(this.tileset.representation, this.tree, this.files, this.pool, this.compositor, renderer);
+      const source = new ContentSource(this.tileset.representation, this.tree, this.files, this.pool, this.drawer, renderer);
       this.streamer = new TileStreamer(new TileSelector(this.tree, this.selection), source, this.stream);
       this.streamer.onError = (error) => this.onError(error);
-      this.mesh = cityMesh(this.compositor);
+      this.mesh = cityMesh(this.drawer);
       this.add(this.mesh);
       this.canvas = renderer.domElement;
       this.canvas.addEventListener('webglcontextlost', this.onContextLost);
     }
-    return { compositor: this.compositor, streamer: this.streamer, mesh: this.mesh };
+    return { drawer: this.drawer, streamer: this.streamer, mesh: this.mesh };
   }
 }
 
 async function openTileset(files: SceneFiles): Promise<KnownTileset> {
   const text = new TextDecoder().decode(await files.read('tileset.json', kTilesetBytes));
-  const tileset = decodeTileset(text, 'tileset.json');
-  const { representation } = tileset;
-  if (!isKnown(representation)) {
-    throw new SceneError('tileset.json', '', `is a scene of ${representation}, not of volume or hash`, 'draw it with a viewer that knows it');
-  }
-  return { ...tileset, representation };
+  return decodeTileset(text, 'tileset.json', kCodecs);
 }

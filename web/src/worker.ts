@@ -1,17 +1,16 @@
 // Reads contents away from the page's own thread.
 import decoderUrl from '@jsquash/webp/codec/dec/webp_dec.wasm?url';
+import { codecOf, type KnownRepresentation } from './representations/codecs';
 import { SceneError } from './scene-error';
-import type { ContentLimits } from './tiles/content';
-import { buffersOf, decodeContent, readContentHeader, type Content, type KnownRepresentation } from './tiles/decode-content';
+import type { Content, PromisedContent } from './tiles/content-codec';
+import type { ContentLimits } from './tiles/content-limits';
 import { isDecoderPrepared, prepareDecoder } from './tiles/lossless-image';
-import type { TileContent } from './tiles/tileset';
 
 export interface DecodeRequest {
-  id: number;
   representation: KnownRepresentation;
   file: Uint8Array<ArrayBuffer>;
   name: string;
-  promised: Pick<TileContent, 'surround' | 'box'>;
+  promised: PromisedContent;
   limits: ContentLimits;
 }
 
@@ -36,7 +35,7 @@ function ready(): Promise<void> {
 
 ready().catch(() => {}); // while the first files are fetched
 
-self.onmessage = async ({ data }: MessageEvent<DecodeRequest>) => {
+self.onmessage = async ({ data }: MessageEvent<DecodeRequest & { id: number }>) => {
   const { id, representation, file, name, promised, limits } = data;
   try {
     await ready();
@@ -44,8 +43,9 @@ self.onmessage = async ({ data }: MessageEvent<DecodeRequest>) => {
       prepared = undefined; // it gave up meanwhile
       await ready();
     }
-    const content = decodeContent(readContentHeader(representation, file, name, promised, limits), name);
-    self.postMessage({ id, content } satisfies DecodeAnswer, { transfer: buffersOf(content) });
+    const codec = codecOf(representation);
+    const content = codec.decode(codec.readHeader(file, name, promised, limits), name, []);
+    self.postMessage({ id, content } satisfies DecodeAnswer, { transfer: codec.buffersOf(content) });
   } catch (error) {
     const { what, place, reason, remedy } =
       error instanceof SceneError ? error : new SceneError(name, '', String(error), 'reload the page');

@@ -6,6 +6,7 @@ import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Plain } from '../src/plain';
 import type { SceneOptions } from '../src/scene';
+import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { countCardMemory, type CardMemory } from './card-memory';
 import { goldenScene, launch, missing, serve, type Server } from './machine';
@@ -18,7 +19,7 @@ declare const cardMemory: CardMemory;
 describe.skipIf(missing())('the graphics card', () => {
   let server: Server;
   let browser: Browser;
-  const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json');
+  const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json', kCodecs);
 
   beforeAll(async () => {
     [server, browser] = await Promise.all([serve(goldenScene), launch()]);

@@ -3,6 +3,7 @@ import { readFileSync } from 'node:fs';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Plain, View } from '../src/plain';
+import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenHash, goldenScene, launch, missing, serve, type Server } from './machine';
 import { psnr } from './pictures';
@@ -17,7 +18,7 @@ describe.skipIf(missing()).each([['volume', goldenScene], ['hash', goldenHash]])
   let browser: Browser;
   let page: Page;
   const said: string[] = [];
-  const tileset = decodeTileset(readFileSync(`${golden}/tileset.json`, 'utf8'), 'tileset.json');
+  const tileset = decodeTileset(readFileSync(`${golden}/tileset.json`, 'utf8'), 'tileset.json', kCodecs);
   const view = (eye: Place, target: Place): View => ({ ...viewAt(tileset, eye, target), cx: 126, width: 240, cy: 80, height: 160 }); // not in the middle
   const atFacade = [view([-1.05, -2.2, 0.3], [-1, 0, 0.1]), view([-0.95, -2.2, 0.3], [-1, 0, 0.1])];
 

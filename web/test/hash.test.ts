@@ -6,6 +6,7 @@ import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Plain, View } from '../src/plain';
 import type { SceneOptions } from '../src/scene';
+import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { countCardMemory, type CardMemory } from './card-memory';
 import { goldenHash, launch, missing, run, serve, type Server } from './machine';
@@ -33,7 +34,7 @@ describe.skipIf(missing())('a scene of hash', () => {
   let server: Server;
   let browser: Browser;
   let folder: string;
-  const tileset = decodeTileset(readFileSync(`${goldenHash}/tileset.json`, 'utf8'), 'tileset.json');
+  const tileset = decodeTileset(readFileSync(`${goldenHash}/tileset.json`, 'utf8'), 'tileset.json', kCodecs);
   const across = viewAt(tileset, [0.1, -4, 2], [0, 0, -0.3]);
   const below = viewAt(tileset, [-0.7, 0.1, 0.5], [-0.69, 0.12, -1]);
 
@@ -248,11 +249,11 @@ describe.skipIf(missing())('a scene of hash', () => {
     expect(await look(page, across)).toEqual(expected);
     // As if two others came first: theirs take the numbers that one picture of weights tells apart.
     await page.evaluate(() => {
-      const { compositor } = plain.city as unknown as { compositor: any };
-      const { networksOf } = compositor;
-      compositor.networksOf = (parts: any[]) => {
-        const { networks, behind, whole } = networksOf.call(compositor, parts);
-        for (const { content } of parts) content.mesh.material.uniforms.network.value += 3;
+      const { drawer: { marching } } = plain.city as unknown as { drawer: { marching: any } };
+      const { networksOf } = marching;
+      marching.networksOf = (contents: any[]) => {
+        const { networks, behind, whole } = networksOf.call(marching, contents);
+        for (const { uniforms } of contents) uniforms.network.value += 3;
         return { networks: [networks[0], networks[0], networks[0], ...networks], behind: behind + 3, whole };
       };
     });

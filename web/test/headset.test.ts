@@ -4,6 +4,7 @@ import { fileURLToPath } from 'node:url';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Plain, View } from '../src/plain';
+import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenScene, launch, missing, serve, type Server } from './machine';
 import { decodePixels, psnr } from './pictures';
@@ -26,7 +27,7 @@ const kTarget: Place = [-1, 0, 0.3];
 describe.skipIf(missing())('with a headset', () => {
   let server: Server;
   let browser: Browser;
-  const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json');
+  const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json', kCodecs);
   const middle = worldFromCamera(tileset, kEye, kTarget);
   // What each eye should see.
   const eyes = [-1, 1].map((side): View => {

@@ -3,6 +3,7 @@ import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { goldenFile, goldenText } from '../src/testing/golden';
 import { randomNumbers } from '../src/testing/made-tree';
+import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenScene, launch, missing, serve, type Server } from './machine';
 
@@ -65,7 +66,7 @@ describe.skipIf(missing())('a scene that lies', () => {
   let page: Page;
   const thrown: string[] = [];
   let change: { file: RegExp; body: Buffer } | undefined;
-  const tileset = decodeTileset(goldenText('tileset.json'), 'tileset.json');
+  const tileset = decodeTileset(goldenText('tileset.json'), 'tileset.json', kCodecs);
   const uri = tileset.tiles[1].contents[0].uri;
 
   beforeAll(async () => {

@@ -5,12 +5,13 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import * as THREE from 'three';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import type { Vec3 } from '../src/tiles/tileset';
 import { goldenScene, launch, missing, serve } from './machine';
 
 const kSize = { width: 1200, height: 250 }; // the panel hides nothing of what is clicked
-const tileset = decodeTileset(readFileSync(join(goldenScene, 'tileset.json'), 'utf8'), 'tileset.json');
+const tileset = decodeTileset(readFileSync(join(goldenScene, 'tileset.json'), 'utf8'), 'tileset.json', kCodecs);
 const metres = tileset.worldFromScene.scale; // of a scene unit
 const kVoxel = metres / 16;
 

@@ -4,6 +4,7 @@ import type { Browser, Page } from 'playwright-core';
 import type { Material, Mesh } from 'three';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Plain, View } from '../src/plain';
+import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenScene, launch, missing, serve, type Server } from './machine';
 import { openPlain } from './plain-page';
@@ -20,7 +21,7 @@ describe.skipIf(missing())('a model in the scene', () => {
   let browser: Browser;
   let page: Page;
   const said: string[] = [];
-  const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json');
+  const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json', kCodecs);
   const atFacade = viewAt(tileset, [-1, -2.2, 0.3], [-1, 0, 0.1]);
 
   beforeAll(async () => {

@@ -3,6 +3,7 @@ import { readFileSync } from 'node:fs';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from 'vitest';
 import type { Plain, View } from '../src/plain';
+import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenHash, goldenScene, launch, missing, serve, type Server } from './machine';
 import { openPlain } from './plain-page';
@@ -10,7 +11,7 @@ import { viewAt } from './views';
 
 declare const plain: Plain;
 
-const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json');
+const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json', kCodecs);
 const options = { selection: { mostPixels: 0 } };
 const kBackgrounds = [0xff00ff, 0x00ff00];
 

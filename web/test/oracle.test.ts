@@ -5,6 +5,7 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Plain } from '../src/plain';
+import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenHash, goldenScene, launch, missing, run, serve, type Server } from './machine';
 import { cameraPath, decodePng, psnr } from './pictures';
@@ -46,7 +47,7 @@ describe.skipIf(missing())('the browser', () => {
   let browser: Browser;
   let swiftShader: Browser;
   let folder: string;
-  const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json');
+  const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json', kCodecs);
   const views = kLooks.map(([eye, target]) => viewAt(tileset, eye, target));
 
   beforeAll(async () => {

@@ -4,6 +4,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenScene, launch, missing, run, serve } from './machine';
 import { coloursOf, decodePng, psnr } from './pictures';
@@ -56,7 +57,7 @@ describe.skipIf(missing())('the viewer', () => {
   });
 
   it('passes a view on by its address, and draws it at any size and along a path as the processor does', async () => {
-    const tileset = decodeTileset(readFileSync(join(goldenScene, 'tileset.json'), 'utf8'), 'tileset.json');
+    const tileset = decodeTileset(readFileSync(join(goldenScene, 'tileset.json'), 'utf8'), 'tileset.json', kCodecs);
     await open(goldenScene, async (page, said) => {
       // Above the block on the left, to the other one; in the capture's world.
       const places = [[-1.8, -1.6, 0.9], [0.8, 0.2, -0.4]].map(([x, y, z]) => {

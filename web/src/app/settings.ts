@@ -1,14 +1,9 @@
 // What is drawn, and how well.
-import { displayModesOf, isOfFeatureLevel, kMostFeatureLevels, type DisplayMode } from '../draw/display-modes';
+import type { ShownMode } from '../draw/display-modes';
+import type { DisplayMode } from '../representations/drawers';
 import { element } from './page/element';
 import type { Toolbar } from './page/toolbar';
 import type { Viewer } from './viewer';
-
-const kModeNames: Record<DisplayMode, string> = {
-  colour: 'Colour', diffuse: 'Without reflections', specular: 'Reflections alone', features: 'Features', depth: 'Distance',
-  blocks: 'Blocks', levels: 'Levels of detail', contribution: 'Colour of a hash level', attention: 'Attention to colour',
-  densityAttention: 'Attention to density',
-};
 
 const kResolutions: [string, number | undefined][] = [
   ['As fast as needed', undefined], ['100 %', 1], ['75 %', 0.75], ['50 %', 0.5], ['25 %', 0.25],
@@ -21,15 +16,16 @@ export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
     viewer.needPicture();
   };
   const levels = Array.from({ length: city.tileset.levels }, (_, level): [string, number] => [level === 0 ? 'All' : `Level ${level} and coarser`, level]);
+  const { modes } = city.shows;
   const featureLevel = featureLevelOf(viewer, changed((level) => scenes.forEach((scene) => (scene.featureLevel = level))));
   const panel = element(
     'div', '',
-    choice('Show', displayModesOf(city.tileset.representation).map((mode): [string, DisplayMode] => [kModeNames[mode], mode]),
+    choice('Show', modes.map((mode): [string, ShownMode<DisplayMode>] => [mode.label, mode]),
       changed((mode) => {
-        scenes.forEach((scene) => (scene.display = mode));
-        featureLevel.show(mode);
+        scenes.forEach((scene) => (scene.display = mode.name));
+        featureLevel?.show(mode);
       })),
-    featureLevel.label,
+    ...(featureLevel ? [featureLevel.label] : []),
     slider('Error at most', 0, 3, Math.log2(2 * city.selection.mostPixels), 0.25, (x) => `${(2 ** x / 2).toPrecision(2)} px`,
       changed((x) => scenes.forEach(({ selection }) => (selection.mostPixels = 2 ** x / 2)))),
     ...(levels.length > 1 ? [choice('Detail', levels, changed((level) => scenes.forEach(({ selection }) => (selection.finestLevel = level))))] : []),
@@ -46,27 +42,29 @@ export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
   toolbar.add({ name: 'Settings', key: 'c', icon: 'sliders', panel });
 }
 
-// Which level of features such modes show.
+// Which level of features the modes show that show one.
 function featureLevelOf({ city }: Viewer, change: (level: number) => void) {
-  const fine = Array.from({ length: kMostFeatureLevels }, (_, i): [string, number] => [`Level ${i + 1}`, i + 1]);
-  const label = choice('Hash level', [...fine, ['The coarse features', 0] as [string, number]], change);
+  const { featureLevels } = city.shows;
+  if (!featureLevels) return undefined;
+  const fine = Array.from({ length: featureLevels.most }, (_, i): [string, number] => [`Level ${i + 1}`, i + 1]);
+  const label = choice(featureLevels.label, [...fine, [featureLevels.coarse, 0] as [string, number]], change);
   const select = label.querySelector('select')!;
   const options = [...select.options];
-  let shown: DisplayMode = 'colour';
+  let shown: ShownMode['featureLevel'];
   const offer = () => {
     fine.forEach(([, level], i) => (options[i].hidden = options[i].disabled = level > city.featureLevels));
-    options[fine.length].hidden = options[fine.length].disabled = shown !== 'contribution'; // nothing weighs them
+    options[fine.length].hidden = options[fine.length].disabled = shown !== 'any';
     if (!options[select.selectedIndex].hidden) return;
     select.selectedIndex = 0;
     change(1);
   };
-  const show = (mode: DisplayMode) => {
-    shown = mode;
-    label.hidden = !isOfFeatureLevel(mode);
+  const show = (mode: ShownMode) => {
+    shown = mode.featureLevel;
+    label.hidden = shown === undefined;
     if (!label.hidden) offer();
   };
+  label.hidden = true;
   select.addEventListener('focus', offer); // levels that have come meanwhile
-  show('colour');
   return { label, show };
 }
 

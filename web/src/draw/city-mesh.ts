@@ -1,9 +1,9 @@
 // The picture of a scene as a part of three's own: a triangle that fills the screen, blended over what is opaque, and
 // written into the depth buffer, so that what is drawn later is hidden by the scene and hides it.
 import * as THREE from 'three';
-import type { Compositor } from './compositor';
-import { screenTriangle } from './compositor';
 import { kDisplayConstants } from './display-modes';
+import type { DrawnPicture } from './scene-drawer';
+import { screenTriangle } from './screen-triangle';
 
 export const kFirstRenderOrder = -1e9; // of what is transparent
 
@@ -52,14 +52,14 @@ void main() {
   gl_FragColor = vec4(gl_FragColor.rgb * colour.a, colour.a);
 }`;
 
-export function cityMesh(compositor: Compositor): THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial> {
-  const { view, target, colour, distancesOfBytes } = compositor;
+export function cityMesh(drawn: DrawnPicture): THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial> {
+  const { view, colour, distance, distancesOfBytes } = drawn;
   const material = new THREE.ShaderMaterial({
     vertexShader: kVertexShader,
     fragmentShader: `${kDisplayConstants}\n${kFragmentShader}`,
     uniforms: {
       colourAndOpacity: { value: colour },
-      distanceAndOpacity: { value: target.textures[1] },
+      distanceAndOpacity: { value: distance },
       viewport: { value: new THREE.Vector4() }, // of what three draws into
       part: { value: new THREE.Vector4() },
       clipFromScene: { value: new THREE.Matrix4() },
@@ -89,7 +89,7 @@ export function cityMesh(compositor: Compositor): THREE.Mesh<THREE.BufferGeometr
   mesh.onBeforeRender = (renderer, _, camera) => {
     const { uniforms } = material;
     renderer.getCurrentViewport(uniforms.viewport.value);
-    const { part, origin, ray, clipFromScene } = compositor.pictures.find((one) => one.camera === camera) ?? compositor.pictures[0];
+    const { part, origin, ray, clipFromScene } = drawn.pictures.find((one) => one.camera === camera) ?? drawn.pictures[0];
     for (const [name, value] of Object.entries({ part, origin, ray, clipFromScene })) uniforms[name].value = value;
     material.uniformsNeedUpdate = true; // for each camera, not once a picture
   };

@@ -1,15 +1,13 @@
 // The shader that draws one content: what it adds to each pixel, and how far away that is (docs/tile-format.md, section 4). What
-// depends on the representation is in volume-program.ts and hash-program.ts.
+// depends on the representation are its ProgramPieces.
 import * as THREE from 'three';
 import marchPartSource from '../../../shaders/lib/march_part.glsl?raw';
 import pathSource from '../../../shaders/lib/domain_path.glsl?raw';
 import placeSource from '../../../shaders/lib/part_place.glsl?raw';
-import { kMostTables } from '../tiles/hash-content';
 import type { ContentTextures } from './content-textures';
 import { kDisplayConstants } from './display-modes';
 import { kMostHiddenBoxes } from './hidden-boxes';
-
-export const kFarAway = 1e30; // scene units
+import { kFarAway } from './scene-drawer';
 
 // The same for all contents of a picture. Scene units; `part`, `origin`, `ray` and `sceneFromClip` are those of Picture.
 export interface ViewUniforms {
@@ -26,9 +24,7 @@ export interface ViewUniforms {
   minTransmittance: { value: number }; // rays end where less would be seen; 0: never
   opaqueDepth: { value: THREE.Texture | null }; // of the depth buffer of what stands in the scene; 1 everywhere where nothing does
   sceneFromClip: { value: THREE.Matrix4 };
-  display: { value: number }; // of kDisplayModes
-  shares: { value: number[] }; // of `hash`: of the coarse features and of each level, what is shown of their colours
-  attention: { value: number }; // and whose weights are shown instead, as shaders/lib/hash_march.glsl has it
+  display: { value: number }; // of the drawer's modes
   boxFromScene: { value: THREE.Matrix4[] }; // of boxes in which nothing is drawn, |x| <= 1/2 in each
   hiddenBoxes: { value: number }; // so many of them for what is no surround
   hiddenBoxesOfSurround: { value: number }; // and for the surround
@@ -51,8 +47,6 @@ export function viewUniforms(): ViewUniforms {
     opaqueDepth: { value: null },
     sceneFromClip: { value: new THREE.Matrix4() },
     display: { value: 0 },
-    shares: { value: new Array<number>(kMostTables + 1).fill(1) },
-    attention: { value: 0 },
     boxFromScene: { value: Array.from({ length: 2 * kMostHiddenBoxes }, () => new THREE.Matrix4()) },
     hiddenBoxes: { value: 0 },
     hiddenBoxesOfSurround: { value: 0 },
@@ -225,9 +219,10 @@ export function programMaterial(pieces: ProgramPieces, place: ProgramPlace): THR
   });
 }
 
-// Contents of one shape share a program, if they have none of their own. Drawn front to back, blended under what is there.
+// Contents of one shape share a program, if they have none of their own. Drawn front to back, blended under what is there. Of its
+// uniforms the representation's, colourOfBlock and colourOfLevel are still to be added.
 export function contentMaterial(
-  textures: ContentTextures, view: ViewUniforms, pieces: ProgramPieces, place: ProgramPlace, colours: { block: THREE.Color; level: THREE.Color },
+  textures: ContentTextures, view: ViewUniforms, pieces: ProgramPieces, place: ProgramPlace,
 ): THREE.RawShaderMaterial {
   const material = programMaterial(pieces, place);
   const group = new THREE.UniformsGroup();
@@ -237,8 +232,6 @@ export function contentMaterial(
     ...view,
     ...textures.uniforms(),
     hiddenBoxes: place.surround ? view.hiddenBoxesOfSurround : view.hiddenBoxes,
-    colourOfBlock: { value: colours.block },
-    colourOfLevel: { value: colours.level },
   };
   material.uniformsGroups = [group];
   return material;

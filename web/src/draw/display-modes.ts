@@ -1,31 +1,26 @@
-// What of the scene is shown.
+// What of the scene is shown. A representation's drawer says which modes it has: these, and then its own.
 import * as THREE from 'three';
-import { kMostTables } from '../tiles/hash-content';
-import type { Representation } from '../tiles/tileset';
 
-export const kDisplayModes = [
-  'colour', 'diffuse', 'specular', 'features', 'depth', 'blocks', 'levels', 'contribution', 'attention', 'densityAttention',
-] as const;
-export type DisplayMode = (typeof kDisplayModes)[number];
-
-// Those that show one of the levels of features that scenes of `hash` have (NGP-RT, figures 6 and S2): what it alone gives to the
-// colour, and what it is weighed with, for colours and for density.
-const kOfFeatureLevel: readonly DisplayMode[] = ['contribution', 'attention', 'densityAttention'];
-
-export const kMostFeatureLevels = kMostTables; // fine ones
-
-export function isOfFeatureLevel(mode: DisplayMode): boolean {
-  return kOfFeatureLevel.includes(mode);
+export interface ShownMode<Name extends string = string> {
+  name: Name;
+  label: string; // for people
+  // Shows one of the levels of features that its contents have: any of them, or the fine ones, from 1 on.
+  featureLevel?: 'any' | 'fine';
 }
 
-export function displayModesOf(representation: Representation): DisplayMode[] {
-  return kDisplayModes.filter((mode) => representation === 'hash' || !isOfFeatureLevel(mode));
+export const kSharedModes = [
+  { name: 'colour', label: 'Colour' }, { name: 'diffuse', label: 'Without reflections' }, { name: 'specular', label: 'Reflections alone' },
+  { name: 'features', label: 'Features' }, { name: 'depth', label: 'Distance' }, { name: 'blocks', label: 'Blocks' },
+  { name: 'levels', label: 'Levels of detail' },
+] as const satisfies readonly ShownMode[];
+
+// `const int kShowDiffuse = 1; …` for shaders: numbers in the list of modes.
+export function displayConstants(modes: readonly ShownMode[]): string {
+  return modes.map(({ name }, i) => `const int kShow${name.charAt(0).toUpperCase()}${name.slice(1)} = ${i};`).join('\n');
 }
 
-// `const int kShowDiffuse = 1; …` for shaders.
-export const kDisplayConstants = kDisplayModes
-  .map((mode, i) => `const int kShow${mode.charAt(0).toUpperCase()}${mode.slice(1)} = ${i};`)
-  .join('\n');
+// Of those that every drawer has first.
+export const kDisplayConstants = displayConstants(kSharedModes);
 
 // Neighbours in the tree have numbers that follow one another: hues a golden angle apart tell them apart.
 export function colourOfBlock(number: number): THREE.Color {

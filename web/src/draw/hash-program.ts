@@ -2,7 +2,7 @@
 // network-pass.ts makes colours when those of all contents are there (docs/tile-format.md, section 7).
 import marchSource from '../../../shaders/lib/hash_march.glsl?raw';
 import { kAttributes } from '../tiles/content';
-import { columnsOf, kMostTables, vectorsOfPart, type HashPart, type HashSettings } from '../tiles/hash-content';
+import { columnsOf, kMostTables, vectorsOfHash, vectorsOfPart, type HashPart, type HashSettings } from '../tiles/hash-content';
 import type { ProgramPieces } from './content-program';
 import { atlasShader } from './content-textures';
 import { kCornerAtlases } from './hash-textures';
@@ -113,11 +113,10 @@ export function hashPieces(
 ): ProgramPieces {
   const columns = columnsOf(settings);
   const tables = parts[0].tables.length;
-  const vectorsOfOne = vectorsOfPart(columns, tables);
-  const defines: Record<string, number | string> = { TABLES: tables, VECTORS_OF_PART: vectorsOfOne };
+  const defines: Record<string, number | string> = { TABLES: tables, VECTORS_OF_PART: vectorsOfPart(columns, tables) };
   if (columns > kAttributes) defines.VARYING = '';
   if (settings.weights === 'shared') defines.SHARED = '';
   const names = kCornerAtlases.slice(0, columns / kAttributes).flat();
   const source = [outputs(weightTargets), kUniforms, atlasShader(names, atlases), partsShader(columns > kAttributes), marchSource, kWrite].join('\n');
-  return { parts: parts.length, vectors: vectorsOfOne * parts.length, defines, source };
+  return { parts: parts.length, vectors: vectorsOfHash({ parts, settings }), defines, source };
 }

@@ -2,10 +2,10 @@
 // largest share in it makes a colour (docs/tile-format.md, section 7; NGP-RT, eq. 5). Each network has a program of its own,
 // which fills the picture and leaves the other networks' pixels alone.
 import * as THREE from 'three';
-import type { DenseLayer } from '../tiles/content';
-import { packNetwork } from '../tiles/network';
+import { packNetwork, type DenseLayer } from '../tiles/network';
 import type { ViewUniforms } from './content-program';
-import { kDisplayConstants } from './display-modes';
+import { displayConstants } from './display-modes';
+import { kHashModes } from './hash-modes';
 import { kWeightsOfTarget, networksOf } from './hash-program';
 import { layersShader, writtenVector } from './network-shader';
 import type { Picture } from './picture';
@@ -140,7 +140,7 @@ export class NetworkPass {
     const material = new THREE.RawShaderMaterial({
       glslVersion: THREE.GLSL3,
       vertexShader: kVertexShader,
-      fragmentShader: [kHead, kDisplayConstants, heaviestShader(this.weightTargets), key, kMain].join('\n'),
+      fragmentShader: [kHead, displayConstants(kHashModes), heaviestShader(this.weightTargets), key, kMain].join('\n'),
       uniforms: {
         opaqueDepth, resolution, part, ray, display, network: { value: 0 }, behind: { value: 0 }, whole: { value: false },
         diffuseAndOpacity: { value: diffuse }, featuresAndOpacity: { value: features }, weightsAndOpacity: { value: weights[0] },

@@ -1,6 +1,6 @@
 // The layers of a content's network as GLSL. Their loops are written out: shaders index arrays slowly, and vectors not at
 // all.
-import type { DenseLayer } from '../tiles/content';
+import type { DenseLayer } from '../tiles/network';
 
 // One number as GLSL writes it, to a float's digits.
 function literal(x: number): string {

@@ -1,9 +1,8 @@
 // What of a `volume` scene goes into the shader that draws a content: its march, and its network, which is run for each content
 // (docs/tile-format.md, section 6).
 import marchSource from '../../../shaders/lib/volume_march.glsl?raw';
-import type { DenseLayer } from '../tiles/content';
-import { networkVectors, packNetwork } from '../tiles/network';
-import { kVectorsOfPart, type VolumePart } from '../tiles/volume-content';
+import { packNetwork, type DenseLayer } from '../tiles/network';
+import { kVectorsOfPart, vectorsOfVolume, type VolumePart } from '../tiles/volume-content';
 import type { ProgramPieces } from './content-program';
 import { atlasShader } from './content-textures';
 import { layersShader, writtenVector } from './network-shader';
@@ -88,7 +87,8 @@ export function deferredShader(network: Pick<DenseLayer, 'inputs' | 'outputs'>[]
   ].join('\n');
 }
 
-// `ownNetwork`: written into the program, which then is of one content alone.
+// `ownNetwork`: written into the program, which then is of one content alone, and faster than one that reads a buffer. What comes
+// and goes shares programs, as compiling takes long.
 export function volumePieces(
   { parts, network, atlases }: { parts: VolumePart[]; network: DenseLayer[]; atlases: number }, ownNetwork: boolean,
 ): ProgramPieces {
@@ -96,5 +96,5 @@ export function volumePieces(
   const packed = packNetwork(network);
   const vector = (n: number) => (ownNetwork ? writtenVector(packed, n) : `content[${ofParts + n}]`);
   const source = [kUniforms, atlasShader(kVoxelAtlases, atlases), kParts, marchSource, deferredShader(network, vector), kWrite].join('\n');
-  return { parts: parts.length, vectors: ofParts + networkVectors(network), defines: {}, source };
+  return { parts: parts.length, vectors: vectorsOfVolume({ parts, network }), defines: {}, source };
 }

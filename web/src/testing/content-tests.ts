@@ -1,13 +1,20 @@
 // What the readers of every representation's contents are tested for alike.
 import { expect, it } from 'vitest';
+import { kCodecs, type KnownRepresentation } from '../representations/codecs';
 import { SceneError } from '../scene-error';
-import { kContentLimits } from '../tiles/content';
-import { buffersOf, decodeContent, readContentHeader, type Content, type KnownRepresentation } from '../tiles/decode-content';
+import type { MarchedContent, MarchedHeader } from '../tiles/content';
+import type { ContentCodec, PromisedContent } from '../tiles/content-codec';
+import { kContentLimits } from '../tiles/content-limits';
 import { decodeTileset } from '../tiles/decode-tileset';
 import { goldenFile, goldenText } from './golden';
 
-export function decodeGolden(representation: KnownRepresentation, file: Uint8Array, limits = kContentLimits): Content {
-  return decodeContent(readContentHeader(representation, file, 'a.glb', undefined, limits), 'a.glb');
+function codecOf(representation: KnownRepresentation): ContentCodec<MarchedHeader, MarchedContent> {
+  return kCodecs[representation];
+}
+
+export function decodeGolden(representation: KnownRepresentation, file: Uint8Array, limits = kContentLimits): MarchedContent {
+  const codec = codecOf(representation);
+  return codec.decode(codec.readHeader(file, 'a.glb', undefined, limits), 'a.glb', []);
 }
 
 // Bytes as the golden scenes' sums have them.
@@ -25,20 +32,20 @@ export class Sum {
 
 // Of the contents of the golden scene of that representation; `small`: those that do not take long.
 export function testContentReader(representation: KnownRepresentation, uris: string[], small = uris): void {
-  const header = (file: Uint8Array, limits = kContentLimits, promised?: Parameters<typeof readContentHeader>[3]) =>
-    readContentHeader(representation, file, 'a', promised, limits);
+  const codec = codecOf(representation);
+  const header = (file: Uint8Array, limits = kContentLimits, promised?: PromisedContent) => codec.readHeader(file, 'a', promised, limits);
 
   it('knows what textures will take before it decodes them', () => {
     for (const uri of uris) {
       const found = header(goldenFile(uri, representation));
-      const bytes = buffersOf(decodeContent(found, uri)).reduce((sum, buffer) => sum + buffer.byteLength, 0);
-      expect(found.layout.bytes).toBe(bytes);
+      const bytes = codec.buffersOf(codec.decode(found, uri, [])).reduce((sum, buffer) => sum + buffer.byteLength, 0);
+      expect(found.memoryBytes).toBe(bytes);
     }
   });
 
   it('refuses what would take more memory than allowed, or more than a texture holds', () => {
     const file = goldenFile(uris[0], representation);
-    const { bytes } = header(file).layout;
+    const { memoryBytes: bytes } = header(file);
     expect(() => header(file, { ...kContentLimits, bytes: bytes - 1 })).toThrow('bytes of memory');
     expect(() => header(file, { ...kContentLimits, layers: 0 })).toThrow('in one texture');
     expect(() => header(file, { ...kContentLimits, edge3D: 8 })).toThrow('in one texture');
@@ -46,7 +53,7 @@ export function testContentReader(representation: KnownRepresentation, uris: str
   });
 
   it('refuses a content that is not the one that tileset.json speaks of', () => {
-    const tileset = decodeTileset(goldenText('tileset.json', representation), 'tileset.json');
+    const tileset = decodeTileset(goldenText('tileset.json', representation), 'tileset.json', kCodecs);
     const contents = tileset.tiles.flatMap((tile) => tile.contents);
     for (const promised of contents) {
       const file = goldenFile(promised.uri, representation);
@@ -58,8 +65,10 @@ export function testContentReader(representation: KnownRepresentation, uris: str
   });
 
   it('refuses a content of another representation', () => {
-    const other = representation === 'hash' ? 'volume' : 'hash';
-    expect(() => readContentHeader(other, goldenFile(uris[0], representation), 'a')).toThrow(`representation ${other}`);
+    for (const other of Object.keys(kCodecs) as KnownRepresentation[]) {
+      const read = () => codecOf(other).readHeader(goldenFile(uris[0], representation), 'a');
+      if (other !== representation) expect(read).toThrow(`representation ${other}`);
+    }
   });
 
   it('refuses every file that is cut off', () => {
@@ -96,7 +105,7 @@ export function testContentReader(representation: KnownRepresentation, uris: str
 }
 
 // Of each macroblock that is stored, in the order of their numbers, its place in the atlas.
-export function storedIn({ macroblocks }: Content, n: number, edge: number): { number: number; place: [number, number, number] }[] {
+export function storedIn({ macroblocks }: MarchedContent, n: number, edge: number): { number: number; place: [number, number, number] }[] {
   const [mx, my, mz] = macroblocks.origins[n];
   const { size, texels } = macroblocks;
   const stored: ReturnType<typeof storedIn> = [];

@@ -1,32 +1,10 @@
-// The rules that contents of every representation keep (docs/tile-format.md, sections 5 to 7). Each says the first that is
-// broken, for people.
-import { type ContentPart, type DenseLayer } from './content';
-import { networkVectors } from './network';
-import type { TileContent } from './tileset';
-import { kFarthestInScene } from './tileset-rules';
-
-export type Broken = string | undefined;
+// The rules that parts keep (docs/tile-format.md, sections 5 to 7). Each says the first that is broken, for people.
+import type { ContentPart } from './content';
+import type { PromisedContent } from './content-codec';
+import { kFarthestInScene, type Broken } from './tileset-rules';
 
 export const kMostStored = 606 * 606; // macroblocks in a picture of 16383 pixels a side
-export const kMostLayers = 8;
-export const kMostLayerWidth = 256;
-export const kMostNetworkVectors = 4096; // of a network, as shaders take it
-const kOutputs = 3;
 const kAxes = [0, 1, 2];
-
-export function ruleOfNetwork(network: DenseLayer[], inputs: number): Broken {
-  if (network.length < 1) return 'the network has no layers';
-  let width = inputs;
-  for (const layer of network) {
-    if (layer.inputs !== width || layer.outputs < 1) return "the network's layers do not follow one another";
-    width = layer.outputs;
-    if (!layer.weights.every(Number.isFinite) || !layer.biases.every(Number.isFinite)) {
-      return 'the network holds a number that is not finite';
-    }
-  }
-  if (width !== kOutputs) return 'the network does not end in a colour';
-  return networkVectors(network) > kMostNetworkVectors ? 'the network is larger than a shader takes' : undefined;
-}
 
 // Of `texels` along an axis.
 export function ruleOfMacroblocks(part: ContentPart, texels: number): Broken {
@@ -68,7 +46,7 @@ function overlap(one: ContentPart, other: ContentPart): boolean {
 }
 
 // Why the content is not the one that tileset.json speaks of.
-export function brokenPromise(parts: ContentPart[], promised: Pick<TileContent, 'surround' | 'box'>): Broken {
+export function brokenPromise(parts: ContentPart[], promised: PromisedContent): Broken {
   const slack = (x: number) => 1e-6 * Math.max(1, Math.abs(x)); // parts are rounded to floats
   for (const [i, part] of parts.entries()) {
     if (part.surround !== promised.surround) {

@@ -1,20 +1,14 @@
-// What contents of `volume` and of `hash` have in common in memory (docs/tile-format.md, sections 6 and 7), laid out as
+// What contents through which rays are marched have in common in memory (docs/tile-format.md, sections 6 and 7), laid out as
 // graphics cards take it.
 //
 // A texel has 8 attributes, which stand in two textures of 4 bytes: the first holds diffuse red, green, blue and density,
 // the second the 4 features.
+import type { ContentHeader } from './content-codec';
 import type { Vec3 } from './tileset';
 
 export const kMacroblock = 8; // texels along an edge
 export const kStoredEdge = 9; // and one more at the upper end: the apron
 export const kAttributes = 8;
-
-export interface DenseLayer {
-  inputs: number;
-  outputs: number;
-  weights: Float32Array; // [outputs][inputs]
-  biases: Float32Array; // [outputs]
-}
 
 export interface ContentPart {
   centre: Vec3;
@@ -24,6 +18,16 @@ export interface ContentPart {
   low: Vec3; // what it owns, scene units
   high: Vec3;
   stored: number; // macroblocks
+}
+
+// Of either representation.
+export interface MarchedHeader extends ContentHeader {
+  parts: ContentPart[];
+}
+
+export interface MarchedContent {
+  parts: ContentPart[];
+  macroblocks: Cubes<Uint8Array>; // where each lies in its atlas
 }
 
 // A texture of three dimensions, x fastest, that holds one cube of each part. Part n's begins at origins[n].
@@ -39,26 +43,7 @@ export interface TexelTextures {
   second: Uint8Array;
 }
 
-export interface TextureLimits {
-  edge2D: number; // texels along an edge of a layer; WebGL2 promises 2048
-  edge3D: number; // texels along an edge of a texture of three dimensions; WebGL2 promises 256
-  layers: number; // of an array; 256
-  uniformBytes: number; // of a block of uniforms; 16384
-}
-
-export const kPromisedLimits: TextureLimits = { edge2D: 2048, edge3D: 256, layers: 256, uniformBytes: 16384 };
 export const kTexturesOfShader = 16; // that WebGL2 promises
-
-export interface ContentLimits extends TextureLimits {
-  fileBytes: number;
-  jsonBytes: number;
-  bytes: number; // of textures
-  parts: number;
-}
-
-export const kContentLimits: ContentLimits = {
-  ...kPromisedLimits, fileBytes: 2 ** 30, jsonBytes: 2 ** 23, bytes: 2 ** 30, parts: 1024,
-};
 
 export function count(size: Vec3): number {
   return size[0] * size[1] * size[2];

@@ -1,27 +1,27 @@
 // A hash content, read: untrusted bytes. docs/tile-format.md, sections 5, 7 and 10.
-import { count, emptyTextures, kAttributes, kContentLimits, putCube, type ContentLimits, type Cubes, type DenseLayer } from './content';
+import { count, emptyTextures, kAttributes, putCube, type ContentPart, type Cubes, type MarchedHeader } from './content';
+import type { ContentCodec, PromisedContent } from './content-codec';
 import { texturesOf } from './content-layout';
-import { ContentReader } from './content-reader';
-import { brokenPromise, ruleOfNetwork, ruleOfParts } from './content-rules';
+import { kContentLimits, type ContentLimits } from './content-limits';
+import { brokenPromise, ruleOfParts } from './content-rules';
 import {
-  columnsOf, kLengthOfRow, kLevelWeights, kMostTables, vectorsOfPart, type ByteRange, type HashContent,
+  columnsOf, kLengthOfRow, kLevelWeights, kMostTables, vectorsOfHash, type ByteRange, type HashContent,
   type HashPart, type HashSettings, type HashTable, type LevelWeights,
 } from './hash-content';
 import { layOutHash, lengthOf, type HashLayout } from './hash-layout';
 import * as rules from './hash-rules';
 import { arrayOf, fieldOf, flagOf, numberFrom, numberOf, stringOf, wholeOf, type Json } from './json-fields';
+import { ruleOfNetwork, type DenseLayer } from './network';
 import { octantDistances, ratioFor } from './octant-distances';
+import { PartReader } from './part-reader';
 import { sizeOfList, takeList } from './texel-pictures';
-import type { TileContent } from './tileset';
 
 // What a content says of itself; nothing has been allocated for its texels.
-export interface HashHeader {
-  representation: 'hash';
+export interface HashHeader extends MarchedHeader {
   settings: HashSettings;
   parts: HashPart[];
   layout: HashLayout;
   atlases: number; // of the layout's corners
-  cardBytes: number; // that its textures and its numbers will take on the graphics card
   sources: Json[]; // of the parts
   network: DenseLayer[];
   views: Uint8Array[];
@@ -30,7 +30,7 @@ export interface HashHeader {
 // Both throw SceneError that names `name` and the first rule that is broken; `promised` is what tileset.json says of
 // the content. The decoder of pictures must be prepared (lossless-image.ts).
 export function readHashHeader(
-  file: Uint8Array, name: string, promised?: Pick<TileContent, 'surround' | 'box'>, limits = kContentLimits,
+  file: Uint8Array, name: string, promised?: PromisedContent, limits = kContentLimits,
 ): HashHeader {
   return new HashReader(name, limits).readHeader(file, promised);
 }
@@ -39,12 +39,23 @@ export function decodeHash(header: HashHeader, name: string): HashContent {
   return new HashReader(name, kContentLimits).readTexels(header);
 }
 
-class HashReader extends ContentReader {
+export const hashCodec: ContentCodec<HashHeader, HashContent> = {
+  readHeader: readHashHeader,
+  decode: decodeHash,
+  buffersOf({ corners, macroblocks, distances, nearDistances, tables }) {
+    const arrays = [
+      ...corners.flatMap(({ first, second }) => [first, second]), macroblocks.texels, distances.texels, nearDistances.words, tables.words,
+    ];
+    return arrays.map(({ buffer }) => buffer as ArrayBuffer);
+  },
+};
+
+class HashReader extends PartReader {
   constructor(name: string, limits: ContentLimits) {
     super(name, limits);
   }
 
-  readHeader(file: Uint8Array, promised?: Pick<TileContent, 'surround' | 'box'>): HashHeader {
+  readHeader(file: Uint8Array, promised?: PromisedContent): HashHeader {
     const { ours, views } = this.readFile(file, 'hash');
     const settings = this.readSettings(ours);
     const columns = columnsOf(settings);
@@ -56,11 +67,9 @@ class HashReader extends ContentReader {
       rules.ruleOfSettings(settings, tables) ?? ruleOfNetwork(network, rules.kHashInputs) ??
       ruleOfParts(parts, (part) => rules.ruleOfPart(part, tables)) ?? (promised && brokenPromise(parts, promised));
     if (broken) this.fail(broken);
-    const uniformBytes = 16 * vectorsOfPart(columns, tables) * parts.length;
-    const layout = this.laidOut(layOutHash(parts, columns, this.limits), uniformBytes);
-    const cardBytes = layout.bytes + uniformBytes;
+    const layout = this.laidOut(layOutHash(parts, columns, this.limits), 16 * vectorsOfHash({ parts, settings }));
     const atlases = texturesOf(layout.corners);
-    return { representation: 'hash', settings, parts, layout, atlases, cardBytes, sources, network, views };
+    return { memoryBytes: layout.bytes, settings, parts, layout, atlases, sources, network, views };
   }
 
   readTexels(header: HashHeader): HashContent {
@@ -93,7 +102,7 @@ class HashReader extends ContentReader {
       near.set(found.fine, kLengthOfRow * layout.nearDistances.rowOf[n]);
     });
     return {
-      representation: 'hash', settings, network, parts, corners, atlases, atlasDepth: layout.corners.depth, macroblocks, distances,
+      settings, network, parts, corners, atlases, atlasDepth: layout.corners.depth, macroblocks, distances,
       nearDistances: { ...layout.nearDistances, words: near },
       tables: { ...layout.tables, words: new Uint32Array(bytes.buffer) },
     };
@@ -116,7 +125,7 @@ class HashReader extends ContentReader {
 }
 
 // Undefined where something is missing.
-function readPart(source: Json, columns: number, place: ReturnType<ContentReader['readPlace']>): HashPart | undefined {
+function readPart(source: Json, columns: number, place: ContentPart | undefined): HashPart | undefined {
   const lattice = wholeOf(source, 'lattice', rules.kMostLattice);
   const cells = wholeOf(source, 'cells', rules.kMostOccupancyCells);
   const nearCells = readNearCells(source, cells ?? 0);

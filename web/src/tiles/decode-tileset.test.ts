@@ -17,11 +17,13 @@ function changed(change: (file: Changeable) => void): string {
 }
 
 const ours = (object: Changeable): Changeable => object.extensions.TESSERA_scene;
+const name = ours(JSON.parse(text)).representation as string;
+const kKnown = { [name]: {} };
 
 describe('decodeTileset', () => {
   it('reads the golden scene', () => {
-    const tileset = decodeTileset(text, 'tileset.json');
-    expect(tileset.representation).toBe('volume');
+    const tileset = decodeTileset(text, 'tileset.json', kKnown);
+    expect(tileset.representation).toBe(name);
     expect([tileset.columns, tileset.rows, tileset.levels]).toEqual([2, 1, 2]);
     expect(tileset.tiles).toHaveLength(3);
     expect(tileset.tiles[0].children).toEqual([1, 2]);
@@ -36,7 +38,7 @@ describe('decodeTileset', () => {
     expect(() => decodeTileset(changed((file) => {
       file.root.extras = { a: 1 };
       ours(file).later = [1];
-    }), 'a')).not.toThrow();
+    }), 'a', kKnown)).not.toThrow();
   });
 
   it.each<[string, (file: Changeable) => void]>([
@@ -82,18 +84,33 @@ describe('decodeTileset', () => {
     ['its boundingVolume is not its box', (file) => (file.root.boundingVolume.box[0] += 10)],
     ['a shared resource that is not listed', (file) => (ours(file.root.children[0].content).resources = [0])],
   ])('refuses by name: %s', (reason, change) => {
-    expect(() => decodeTileset(changed(change), 'folder/tileset.json')).toThrow(SceneError);
-    expect(() => decodeTileset(changed(change), 'folder/tileset.json')).toThrow(reason);
-    expect(() => decodeTileset(changed(change), 'folder/tileset.json')).toThrow('folder/tileset.json');
+    expect(() => decodeTileset(changed(change), 'folder/tileset.json', kKnown)).toThrow(SceneError);
+    expect(() => decodeTileset(changed(change), 'folder/tileset.json', kKnown)).toThrow(reason);
+    expect(() => decodeTileset(changed(change), 'folder/tileset.json', kKnown)).toThrow('folder/tileset.json');
+  });
+
+  it('names the representation that is not known, and those that are', () => {
+    const other = changed((file) => (ours(file).representation = 'points'));
+    expect(() => decodeTileset(other, 'a', { lines: {}, planes: {} })).toThrow('a scene of points, not of lines or planes');
+    expect(decodeTileset(other, 'a', { points: {} }).representation).toBe('points');
+  });
+
+  it('lets contents of a tile overlap only where the representation does', () => {
+    const overlapping = changed(({ root: { children: [child] } }) => {
+      child.contents = [child.content, { ...child.content, uri: 'b.glb' }];
+      delete child.content;
+    });
+    expect(() => decodeTileset(overlapping, 'a', kKnown)).toThrow('contents of a tile have no order');
+    expect(() => decodeTileset(overlapping, 'a', { [name]: { overlappingContents: true } })).not.toThrow();
   });
 
   it('refuses what is larger than its limits', () => {
     const limits = { textLength: 1e6, tiles: 9, depth: 9, contentsOfTile: 9, resources: 9 };
-    expect(() => decodeTileset(text, 'a', limits)).not.toThrow();
-    expect(() => decodeTileset(text, 'a', { ...limits, textLength: 100 })).toThrow('larger than any tileset');
-    expect(() => decodeTileset(text, 'a', { ...limits, tiles: 2 })).toThrow('too many tiles');
-    expect(() => decodeTileset(text, 'a', { ...limits, depth: 1 })).toThrow('too deep');
-    expect(() => decodeTileset(text, 'a', { ...limits, contentsOfTile: 1 })).toThrow('too many contents');
+    expect(() => decodeTileset(text, 'a', kKnown, limits)).not.toThrow();
+    expect(() => decodeTileset(text, 'a', kKnown, { ...limits, textLength: 100 })).toThrow('larger than any tileset');
+    expect(() => decodeTileset(text, 'a', kKnown, { ...limits, tiles: 2 })).toThrow('too many tiles');
+    expect(() => decodeTileset(text, 'a', kKnown, { ...limits, depth: 1 })).toThrow('too deep');
+    expect(() => decodeTileset(text, 'a', kKnown, { ...limits, contentsOfTile: 1 })).toThrow('too many contents');
   });
 
   it('reads mutated text or names what is wrong, and nothing else happens', () => {
@@ -104,7 +121,7 @@ describe('decodeTileset', () => {
         letters[Math.floor(random() * letters.length)] = String.fromCharCode(32 + Math.floor(random() * 95));
       }
       try {
-        decodeTileset(letters.join(''), 'a');
+        decodeTileset(letters.join(''), 'a', kKnown);
       } catch (error) {
         expect(error).toBeInstanceOf(SceneError);
       }

@@ -1,5 +1,6 @@
 // tileset.json, read: untrusted text.
 import { SceneError } from '../scene-error';
+import type { TilesetRules } from './content-codec';
 import { arrayOf, fieldOf, flagOf, numberOf, numbersOf, stringOf, wholeFrom, wholeOf, type Json } from './json-fields';
 import { boundingBoxNumbers, type Box, type Cells, type Tile, type TileContent, type Tileset, type Vec3 } from './tileset';
 import { brokenRule } from './tileset-rules';
@@ -16,9 +17,12 @@ export interface TilesetLimits {
 
 const kLimits: TilesetLimits = { textLength: 1 << 24, tiles: 65536, depth: 64, contentsOfTile: 64, resources: 65536 };
 
-// Throws SceneError that names `file`, and the first rule that is broken.
-export function decodeTileset(text: string, file: string, limits = kLimits): Tileset {
-  return new TilesetReader(file, limits).read(text);
+// Of a scene of one of the representations that are `known`. Throws SceneError that names `file`, and the first rule that is
+// broken.
+export function decodeTileset<Representation extends string>(
+  text: string, file: string, known: Readonly<Record<Representation, TilesetRules>>, limits = kLimits,
+): Tileset<Representation> {
+  return new TilesetReader(file, known, limits).read(text);
 }
 
 function oursOf(object: Json): Json {
@@ -43,15 +47,16 @@ function bytesOf(object: Json): number {
   return wholeOf(object, 'bytes', Number.MAX_SAFE_INTEGER) ?? 0;
 }
 
-class TilesetReader {
+class TilesetReader<Representation extends string> {
   private readonly sources: Json[] = []; // of the tiles
 
   constructor(
     private readonly file: string,
+    private readonly known: Readonly<Record<Representation, TilesetRules>>,
     private readonly limits: TilesetLimits,
   ) {}
 
-  read(text: string): Tileset {
+  read(text: string): Tileset<Representation> {
     if (text.length > this.limits.textLength) this.fail('is larger than any tileset should be');
     let file: Json;
     try {
@@ -62,14 +67,14 @@ class TilesetReader {
     this.readAsset(file);
     const tileset = this.readScene(file);
     this.readTree(this.needed(fieldOf(file, 'root'), 'has no root'), tileset);
-    const broken = brokenRule(tileset);
+    const broken = brokenRule(tileset, this.known[tileset.representation]);
     if (broken) this.fail(broken);
     tileset.tiles.forEach((tile, index) => this.checkBoxes(tileset, tile, index));
     return tileset;
   }
 
-  private fail(reason: string, place = ''): never {
-    throw new SceneError(this.file, place, reason, 'copy the scene again, or bake it again');
+  private fail(reason: string, place = '', remedy = 'copy the scene again, or bake it again'): never {
+    throw new SceneError(this.file, place, reason, remedy);
   }
 
   private needed<T>(value: T | undefined, reason: string, place?: string): NonNullable<T> {
@@ -87,17 +92,14 @@ class TilesetReader {
     if (version !== kSceneVersion) this.fail(`is of version ${version}; ${kSceneVersion} is known`);
   }
 
-  private readScene(file: Json): Tileset {
+  private readScene(file: Json): Tileset<Representation> {
     const ours = oursOf(file);
-    const representation = stringOf(ours, 'representation');
-    if (representation !== 'mesh' && representation !== 'volume' && representation !== 'hash') {
-      this.fail('has no representation that is known');
-    }
+    const representation = this.readRepresentation(ours);
     const placement = fieldOf(ours, 'worldFromScene');
     const noPlace = 'worldFromScene or sourceFromWorld lacks numbers';
     const grid = fieldOf(ours, 'grid');
     const incomplete = 'the grid, levels, near or background is not complete';
-    const tileset: Tileset = {
+    const tileset: Tileset<Representation> = {
       representation,
       name: stringOf(ours, 'name') ?? '',
       worldFromScene: {
@@ -132,6 +134,13 @@ class TilesetReader {
       };
     }
     return tileset;
+  }
+
+  private readRepresentation(ours: Json): Representation {
+    const name = stringOf(ours, 'representation') ?? this.fail('has no representation');
+    if (Object.hasOwn(this.known, name)) return name as Representation;
+    const others = Object.keys(this.known).join(' or ');
+    return this.fail(`has no representation that is known: it is a scene of ${name.slice(0, 32)}, not of ${others}`, '', 'draw it with a viewer that knows it');
   }
 
   private readResources(ours: Json): Tileset['resources'] {

@@ -1,24 +1,24 @@
 // A volume's content, read: untrusted bytes. docs/tile-format.md, sections 5, 6 and 10.
-import { count, emptyTextures, kContentLimits, putCube, type ContentLimits, type Cubes, type DenseLayer } from './content';
+import { count, emptyTextures, putCube, type Cubes, type MarchedHeader } from './content';
+import type { ContentCodec, PromisedContent } from './content-codec';
 import { texturesOf } from './content-layout';
-import { ContentReader, type ContentFile } from './content-reader';
-import { brokenPromise, ruleOfNetwork, ruleOfParts } from './content-rules';
+import { kContentLimits, type ContentLimits } from './content-limits';
+import type { ContentFile } from './content-reader';
+import { brokenPromise, ruleOfParts } from './content-rules';
 import { arrayOf, fieldOf, numberOf, wholeOf, type Json } from './json-fields';
-import { networkVectors } from './network';
+import { ruleOfNetwork, type DenseLayer } from './network';
 import { chebyshevDistances } from './occupancy';
+import { PartReader } from './part-reader';
 import { takePlane } from './texel-pictures';
-import type { TileContent } from './tileset';
-import { kDistanceCell, kVectorsOfPart, type VolumeContent, type VolumePart } from './volume-content';
+import { kDistanceCell, vectorsOfVolume, type VolumeContent, type VolumePart } from './volume-content';
 import { layOut, type VolumeLayout } from './volume-layout';
 import * as rules from './volume-rules';
 
 // What a content says of itself; nothing has been allocated for its texels.
-export interface VolumeHeader {
-  representation: 'volume';
+export interface VolumeHeader extends MarchedHeader {
   parts: VolumePart[];
   layout: VolumeLayout;
   atlases: number; // of the layout's voxels
-  cardBytes: number; // that its textures and its numbers will take on the graphics card
   featureRange: number;
   densityRange: number;
   stepsPerTexel: number;
@@ -30,7 +30,7 @@ export interface VolumeHeader {
 // Both throw SceneError that names `name` and the first rule that is broken; `promised` is what tileset.json says of
 // the content. The decoder of pictures must be prepared (lossless-image.ts).
 export function readVolumeHeader(
-  file: Uint8Array, name: string, promised?: Pick<TileContent, 'surround' | 'box'>, limits = kContentLimits,
+  file: Uint8Array, name: string, promised?: PromisedContent, limits = kContentLimits,
 ): VolumeHeader {
   return new VolumeReader(name, limits).readHeader(file, promised);
 }
@@ -39,12 +39,21 @@ export function decodeVolume(header: VolumeHeader, name: string): VolumeContent 
   return new VolumeReader(name, kContentLimits).readTexels(header);
 }
 
-class VolumeReader extends ContentReader {
+export const volumeCodec: ContentCodec<VolumeHeader, VolumeContent> = {
+  readHeader: readVolumeHeader,
+  decode: decodeVolume,
+  buffersOf({ planes, voxels, macroblocks, distances }) {
+    const arrays = [planes.first, planes.second, voxels.first, voxels.second, macroblocks.texels, distances.texels];
+    return arrays.map(({ buffer }) => buffer as ArrayBuffer);
+  },
+};
+
+class VolumeReader extends PartReader {
   constructor(name: string, limits: ContentLimits) {
     super(name, limits);
   }
 
-  readHeader(file: Uint8Array, promised?: Pick<TileContent, 'surround' | 'box'>): VolumeHeader {
+  readHeader(file: Uint8Array, promised?: PromisedContent): VolumeHeader {
     const { ours, views }: ContentFile = this.readFile(file, 'volume');
     const sources = this.partsOf(ours);
     const parts = sources.map((source, i) => this.readPart(source) ?? this.fail(`part ${i}: its header is not complete`));
@@ -59,12 +68,10 @@ class VolumeReader extends ContentReader {
       rules.ruleOfRange(featureRange) ?? rules.ruleOfRange(densityRange) ?? ruleOfNetwork(network, rules.kVolumeInputs) ??
       ruleOfParts(parts, rules.ruleOfPart) ?? (promised && brokenPromise(parts, promised));
     if (broken) this.fail(broken);
-    const uniformBytes = 16 * (kVectorsOfPart * parts.length + networkVectors(network));
-    const layout = this.laidOut(layOut(parts, this.limits), uniformBytes);
-    const cardBytes = layout.bytes + uniformBytes;
+    const layout = this.laidOut(layOut(parts, this.limits), 16 * vectorsOfVolume({ parts, network }));
     const atlases = texturesOf(layout.voxels);
     return {
-      representation: 'volume', parts, layout, atlases, cardBytes, featureRange, densityRange, stepsPerTexel, sources, network, views,
+      memoryBytes: layout.bytes, parts, layout, atlases, featureRange, densityRange, stepsPerTexel, sources, network, views,
     };
   }
 
@@ -95,8 +102,8 @@ class VolumeReader extends ContentReader {
       putCube(chebyshevDistances(occupied), occupied.edge, distances, n);
     });
     return {
-      representation: 'volume', featureRange, densityRange, stepsPerTexel, network, parts, planes, voxels, atlases,
-      atlasDepth: layout.voxels.depth, macroblocks, distances,
+      featureRange, densityRange, stepsPerTexel, network, parts, planes, voxels, atlases, atlasDepth: layout.voxels.depth,
+      macroblocks, distances,
     };
   }
 

@@ -1,6 +1,7 @@
 // One content of a `hash` scene in memory, laid out as graphics cards take it. docs/tile-format.md, section 7, is normative
 // for what it means.
-import { kAttributes, type ContentPart, type Cubes, type DenseLayer, type TexelTextures } from './content';
+import { kAttributes, type ContentPart, type Cubes, type TexelTextures } from './content';
+import type { DenseLayer } from './network';
 
 export const kMostTables = 8;
 
@@ -38,7 +39,6 @@ export interface HashSettings {
 }
 
 export interface HashContent {
-  representation: 'hash';
   settings: HashSettings;
   network: DenseLayer[];
   parts: HashPart[];
@@ -78,4 +78,8 @@ export const kVectorsOfTable = 5;
 
 export function vectorsOfPart(columns: number, tables: number): number {
   return kVectorsOfPlace + columns / 2 + kVectorsOfTable * tables;
+}
+
+export function vectorsOfHash({ parts, settings }: Pick<HashContent, 'parts' | 'settings'>): number {
+  return vectorsOfPart(columnsOf(settings), parts[0].tables.length) * parts.length;
 }

@@ -1,6 +1,7 @@
 // How the parts of a hash content share textures, before anything is allocated for them.
-import { count, kAttributes, kMacroblock, kTexturesOfShader, type TextureLimits } from './content';
+import { count, kAttributes, kMacroblock, kTexturesOfShader } from './content';
 import { atlasOf, stack, type AtlasLayout } from './content-layout';
+import type { TextureLimits } from './content-limits';
 import { kLengthOfRow, kRowsOfLayer, type HashPart, type List } from './hash-content';
 import { ratioFor } from './octant-distances';
 import type { Vec3 } from './tileset';

@@ -1,7 +1,8 @@
 // The rules that a hash content keeps: docs/tile-format.md, section 7. The first that is broken, for people.
 import { kAttributes } from './content';
-import { ruleOfMacroblocks, ruleOfPlace, type Broken } from './content-rules';
+import { ruleOfMacroblocks, ruleOfPlace } from './content-rules';
 import { logitsOfLevel, type ByteRange, type HashPart, type HashSettings, type HashTable } from './hash-content';
+import type { Broken } from './tileset-rules';
 
 export const kMostLattice = 1024; // corners along an axis
 export const kMostOccupancyCells = 1016;

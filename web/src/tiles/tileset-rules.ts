@@ -1,4 +1,5 @@
 // The rules that a tileset keeps: docs/tile-format.md, section 3. Each says what is broken first, for people.
+import type { TilesetRules } from './content-codec';
 import {
   boxOfCells,
   cellsIn,
@@ -11,7 +12,7 @@ import {
   type Tileset,
 } from './tileset';
 
-type Broken = string | undefined;
+export type Broken = string | undefined;
 
 export const kFarthestInScene = 1e7; // scene units
 const kFarthest = 1e12; // metres
@@ -125,7 +126,7 @@ function ruleOfSurrounds(tileset: Tileset): Broken {
   return undefined;
 }
 
-function ruleOfContents(tileset: Tileset, tile: Tile): Broken {
+function ruleOfContents(tileset: Tileset, tile: Tile, { overlappingContents }: TilesetRules): Broken {
   const ranges: Cells[] = [];
   for (const content of tile.contents) {
     if (!isPlainUri(content.uri) || !content.uri.endsWith('.glb')) return "a content's uri is not a plain one of a .glb";
@@ -142,7 +143,7 @@ function ruleOfContents(tileset: Tileset, tile: Tile): Broken {
     if (!isRange(content.cells) || !holdsCells(tile.cells, content.cells)) return "a content's cells leave its tile's";
     ranges.push(content.cells);
   }
-  if (tileset.representation !== 'mesh' && !lieOnGrid(ranges)) return 'contents of a tile have no order';
+  if (!overlappingContents && !lieOnGrid(ranges)) return 'contents of a tile have no order';
   return tile.parent === -1 ? ruleOfSurrounds(tileset) : undefined;
 }
 
@@ -158,14 +159,14 @@ function keepsToCells(tileset: Tileset, tile: Tile): boolean {
   );
 }
 
-function ruleOfTile(tileset: Tileset, tile: Tile): Broken {
+function ruleOfTile(tileset: Tileset, tile: Tile, rules: TilesetRules): Broken {
   if (tile.level >= tileset.levels) return "its level is not below the scene's number of levels";
   const all = { i0: 0, j0: 0, i1: tileset.columns, j1: tileset.rows };
   if (!isRange(tile.cells) || !holdsCells(all, tile.cells)) return 'its cells are not of the grid';
   if (!isBox(tile.box)) return 'its box is none';
   if (!keepsToCells(tileset, tile)) return 'its box leaves its cells';
   if (!isError(tile.geometricError)) return 'its geometric error is no length';
-  return ruleOfContents(tileset, tile);
+  return ruleOfContents(tileset, tile, rules);
 }
 
 function ruleOfChildren(tileset: Tileset, tile: Tile): Broken {
@@ -182,8 +183,8 @@ function ruleOfChildren(tileset: Tileset, tile: Tile): Broken {
   return undefined;
 }
 
-// The first rule that is broken. `tiles` are a tree already: the reader makes it so.
-export function brokenRule(tileset: Tileset): Broken {
+// The first rule that is broken; `rules` are the representation's. `tiles` are a tree already: the reader makes it so.
+export function brokenRule(tileset: Tileset, rules: TilesetRules): Broken {
   if (tileset.levels < 1 || tileset.levels > kMostLevels) return 'the number of levels is out of bounds';
   const broken = ruleOfFrames(tileset) ?? ruleOfResources(tileset);
   if (broken) return broken;
@@ -195,7 +196,7 @@ export function brokenRule(tileset: Tileset): Broken {
   if (i0 !== 0 || j0 !== 0 || i1 !== tileset.columns || j1 !== tileset.rows) return 'the root does not stand for all cells';
   for (const ruleOf of [ruleOfTile, ruleOfChildren]) {
     for (const [index, tile] of tileset.tiles.entries()) {
-      const reason = ruleOf(tileset, tile);
+      const reason = ruleOf(tileset, tile, rules);
       if (reason) return `tile ${index}: ${reason}`;
     }
   }

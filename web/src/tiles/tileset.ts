@@ -48,9 +48,7 @@ export interface Georeference {
   enuFromWorld: Matrix4; // a similarity
 }
 
-export type Representation = 'mesh' | 'volume' | 'hash';
-
-export interface Tileset {
+export interface Tileset<Representation extends string = string> {
   representation: Representation;
   name: string;
   worldFromScene: { rotation: readonly number[]; scale: number; translation: Vec3 }; // rotation: columns

@@ -1,6 +1,7 @@
 // One content of a `volume` scene in memory, laid out as graphics cards take it. docs/tile-format.md, section 6, is
 // normative for what it means. A sample that turns out to be empty has cost half its lookups: the first of two textures.
-import type { ContentPart, Cubes, DenseLayer, TexelTextures } from './content';
+import type { ContentPart, Cubes, TexelTextures } from './content';
+import { networkVectors, type DenseLayer } from './network';
 
 export const kDistanceCell = 8; // plane texels along an edge of a cell of `distances`
 
@@ -11,7 +12,6 @@ export interface VolumePart extends ContentPart {
 }
 
 export interface VolumeContent {
-  representation: 'volume';
   featureRange: number;
   densityRange: number;
   stepsPerTexel: number;
@@ -27,5 +27,9 @@ export interface VolumeContent {
   distances: Cubes<Uint8Array>;
 }
 
-// Vectors of four numbers that shaders are given of each part.
+// Vectors of four numbers that shaders are given: of each part, then of the network.
 export const kVectorsOfPart = 6;
+
+export function vectorsOfVolume({ parts, network }: Pick<VolumeContent, 'parts' | 'network'>): number {
+  return kVectorsOfPart * parts.length + networkVectors(network);
+}

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import { kPromisedLimits } from './content';
 import { texturesOf } from './content-layout';
+import { kPromisedLimits } from './content-limits';
 import type { VolumePart } from './volume-content';
 import { layOut } from './volume-layout';
 

@@ -1,6 +1,7 @@
 // How the parts of a volume's content share textures, before anything is allocated for them.
-import { count, kMacroblock, kTexturesOfShader, type TextureLimits } from './content';
+import { count, kMacroblock, kTexturesOfShader } from './content';
 import { atlasOf, stack, type AtlasLayout } from './content-layout';
+import type { TextureLimits } from './content-limits';
 import type { Vec3 } from './tileset';
 import { kDistanceCell, type VolumePart } from './volume-content';
 

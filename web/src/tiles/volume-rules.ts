@@ -1,5 +1,6 @@
 // The rules that a volume's content keeps: docs/tile-format.md, section 6. The first that is broken, for people.
-import { ruleOfMacroblocks, ruleOfPlace, type Broken } from './content-rules';
+import { ruleOfMacroblocks, ruleOfPlace } from './content-rules';
+import type { Broken } from './tileset-rules';
 import type { VolumePart } from './volume-content';
 
 export const kMostVoxels = 1024; // along an axis

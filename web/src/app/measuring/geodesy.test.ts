@@ -1,4 +1,5 @@
 import { describe, expect, it } from 'vitest';
+import { kCodecs } from '../../representations/codecs';
 import { decodeTileset } from '../../tiles/decode-tileset';
 import { goldenText } from '../../testing/golden';
 import type { Vec3 } from '../../tiles/tileset';
@@ -72,7 +73,7 @@ describe('the frame of the ground', () => {
   });
 
   it('says where places of the viewer are', () => {
-    const frame = new GroundFrame(decodeTileset(goldenText('tileset.json'), 'tileset.json').georeference);
+    const frame = new GroundFrame(decodeTileset(goldenText('tileset.json'), 'tileset.json', kCodecs).georeference);
     // Two steps of a hundred metres: radii of curvature at 50.8225° N, by hand.
     const e2 = 0.00669437999014;
     const w = Math.sqrt(1 - e2 * Math.sin((latitude * Math.PI) / 180) ** 2);

@@ -1,0 +1,23 @@
+// How scenes of each representation are drawn, a row each.
+import { hashDrawing } from '../draw/hash-marching';
+import type { ShownMode } from '../draw/display-modes';
+import type { SceneDrawing } from '../draw/scene-drawer';
+import { volumeDrawing } from '../draw/volume-marching';
+import type { KnownRepresentation } from './codecs';
+
+const kDrawings = { volume: volumeDrawing, hash: hashDrawing } satisfies Record<KnownRepresentation, SceneDrawing>;
+
+export type DisplayMode = (typeof kDrawings)[KnownRepresentation]['modes'][number]['name'];
+
+// Of all representations, those that they share first.
+export const kDisplayModes: readonly DisplayMode[] = [
+  ...new Set(Object.values(kDrawings).flatMap(({ modes }) => modes.map(({ name }) => name))),
+];
+
+export interface KnownDrawing extends SceneDrawing {
+  modes: readonly ShownMode<DisplayMode>[];
+}
+
+export function drawingOf(representation: KnownRepresentation): KnownDrawing {
+  return kDrawings[representation];
+}
