@@ -4,29 +4,35 @@ import type { DecodePool } from './decode-pool';
 import type { ContentPlace, DrawnContent, SceneDrawer } from './draw/scene-drawer';
 import { codecOf, type KnownRepresentation } from './representations/codecs';
 import type { ContentFile, SceneFiles } from './scene-files';
+import type { ResourceSource } from './stream/shared-resources';
 import type { TileSource, UploadStep } from './stream/tile-streamer';
 import { coarsestTiles, type TileTree } from './stream/tile-tree';
-import type { Content, ContentCodec } from './tiles/content-codec';
+import type { Content, ContentCodec, Resource } from './tiles/content-codec';
 import { kContentLimits, type ContentLimits } from './tiles/content-limits';
-import type { TileContent } from './tiles/tileset';
+import type { TileContent, Tileset } from './tiles/tileset';
 
 // Surrounds are drawn for long, and so are the coarsest tiles where there are no more.
 const kMostDrawnForLong = 4;
 
-export class ContentSource implements TileSource<ContentFile, Content, DrawnContent> {
+// What contents come from, and go to.
+export interface ContentPath {
+  tileset: Pick<Tileset<KnownRepresentation>, 'representation' | 'resources'>;
+  tree: TileTree;
+  files: SceneFiles;
+  pool: Pick<DecodePool, 'decode' | 'decodeResource'>;
+  drawer: SceneDrawer;
+}
+
+export class ContentSource implements TileSource<ContentFile, Content, DrawnContent, Resource> {
+  readonly resources?: ResourceSource<Resource>;
   private readonly limits: ContentLimits;
-  private readonly codec: ContentCodec;
   private readonly drawnForLong: Set<number>;
 
   constructor(
-    private readonly representation: KnownRepresentation,
-    private readonly tree: TileTree,
-    private readonly files: SceneFiles,
-    private readonly pool: DecodePool,
-    private readonly drawer: SceneDrawer,
-    renderer: THREE.WebGLRenderer,
+    private readonly path: ContentPath, renderer: THREE.WebGLRenderer,
+    private readonly codec: ContentCodec = codecOf(path.tileset.representation),
   ) {
-    this.codec = codecOf(representation);
+    const { tileset, tree } = path;
     const surrounds = [...tree.tiles.keys()].filter((tile) => tree.tiles[tile].isSurround);
     const coarsest = coarsestTiles(tree);
     this.drawnForLong = new Set([...surrounds, ...(coarsest.length <= kMostDrawnForLong ? coarsest : [])]);
@@ -38,6 +44,12 @@ export class ContentSource implements TileSource<ContentFile, Content, DrawnCont
       layers: gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS) as number,
       uniformBytes: gl.getParameter(gl.MAX_UNIFORM_BLOCK_SIZE) as number,
     };
+    if (!this.codec.decodeResource || tileset.resources.length === 0) return;
+    this.resources = {
+      resourcesOf: (tile) => this.contentOf(tile).resources,
+      promisedBytes: (id) => tileset.resources[id].bytes,
+      load: (id, signal) => this.loadResource(id, signal),
+    };
   }
 
   promisedBytes(tile: number): number {
@@ -45,36 +57,48 @@ export class ContentSource implements TileSource<ContentFile, Content, DrawnCont
   }
 
   async fetch(tile: number, signal: AbortSignal) {
+    const { files, drawer } = this.path;
     const content = this.contentOf(tile);
-    const file = await this.files.read(content.uri, this.limits.fileBytes, signal);
+    const file = await files.read(content.uri, this.limits.fileBytes, signal);
     const header = this.codec.readHeader(file, content.uri, content, this.limits);
-    this.drawer.prepare(header, this.placeOf(tile));
-    return { file, fileBytes: file.length, cardBytes: this.drawer.residentBytes(header) };
+    drawer.prepare(header, this.placeOf(tile));
+    return { file, fileBytes: file.length, cardBytes: drawer.residentBytes(header) };
   }
 
-  decode(tile: number, file: ContentFile): Promise<Content> {
+  decode(tile: number, file: ContentFile, resources: readonly Resource[]): Promise<Content> {
     const { uri, surround, box } = this.contentOf(tile);
-    return this.pool.decode({ representation: this.representation, file, name: uri, promised: { surround, box }, limits: this.limits });
+    const { tileset: { representation }, pool } = this.path;
+    return pool.decode({ representation, file, name: uri, promised: { surround, box }, limits: this.limits, resources });
   }
 
-  allocate(tile: number, decoded: Content): DrawnContent {
-    return this.drawer.allocate(decoded, this.placeOf(tile), []);
+  allocate(tile: number, decoded: Content, resources: readonly Resource[]): DrawnContent {
+    return this.path.drawer.allocate(decoded, this.placeOf(tile), resources);
   }
 
   upload(resident: DrawnContent): UploadStep {
-    return this.drawer.upload(resident);
+    return this.path.drawer.upload(resident);
   }
 
   free(resident: DrawnContent): void {
-    this.drawer.free(resident);
+    this.path.drawer.free(resident);
+  }
+
+  private async loadResource(id: number, signal: AbortSignal) {
+    const { tileset: { representation, resources }, files, pool, drawer } = this.path;
+    const from = resources[id];
+    const file = await files.read(from.uri, this.limits.fileBytes, signal);
+    const fileBytes = file.length; // before it is handed over
+    const resource = await pool.decodeResource({ representation, file, from, limits: this.limits });
+    const cardBytes = drawer.residentBytesOfResource?.(resource) ?? resource.memoryBytes;
+    return { resource, fileBytes, pageBytes: resource.memoryBytes, cardBytes };
   }
 
   private contentOf(tile: number): TileContent {
-    return this.tree.tiles[tile].content!;
+    return this.path.tree.tiles[tile].content!;
   }
 
   private placeOf(tile: number): ContentPlace {
     const { box, surround } = this.contentOf(tile);
-    return { box, surround, number: tile, level: this.tree.tiles[tile].level, isDrawnForLong: this.drawnForLong.has(tile) };
+    return { box, surround, number: tile, level: this.path.tree.tiles[tile].level, isDrawnForLong: this.drawnForLong.has(tile) };
   }
 }

@@ -1,12 +1,12 @@
 // Workers that read contents.
 import { makeWorker } from './make-worker';
 import { SceneError } from './scene-error';
-import type { Content } from './tiles/content-codec';
-import type { DecodeAnswer, DecodeRequest } from './worker';
+import type { Content, Resource } from './tiles/content-codec';
+import type { ContentRequest, DecodeAnswer, DecodeRequest, ResourceRequest } from './worker';
 
 interface Waiting {
   worker: Worker;
-  resolve: (content: Content) => void;
+  resolve: (decoded: Content | Resource) => void;
   reject: (error: SceneError) => void;
 }
 
@@ -22,14 +22,13 @@ export class DecodePool {
     for (let i = 0; i < Math.min(count, this.size); ++i) this.worker(i);
   }
 
-  // The file is handed over: it is of no use afterwards.
-  decode(request: DecodeRequest): Promise<Content> {
-    const id = this.next++;
-    const worker = this.worker(id % this.size);
-    return new Promise((resolve, reject) => {
-      this.waiting.set(id, { worker, resolve, reject });
-      worker.postMessage({ id, ...request }, [request.file.buffer]);
-    });
+  // The file is handed over: it is of no use afterwards. Resources are copied.
+  decode(request: ContentRequest): Promise<Content> {
+    return this.ask(request);
+  }
+
+  decodeResource(request: ResourceRequest): Promise<Resource> {
+    return this.ask(request) as Promise<Resource>;
   }
 
   dispose(): void {
@@ -40,6 +39,15 @@ export class DecodePool {
     this.waiting.clear();
   }
 
+  private ask(request: DecodeRequest): Promise<Content | Resource> {
+    const id = this.next++;
+    const worker = this.worker(id % this.size);
+    return new Promise((resolve, reject) => {
+      this.waiting.set(id, { worker, resolve, reject });
+      worker.postMessage({ id, ...request }, [request.file.buffer]);
+    });
+  }
+
   private worker(index: number): Worker {
     const known = this.workers[index];
     if (known) return known;
@@ -47,7 +55,7 @@ export class DecodePool {
     worker.onmessage = ({ data }: MessageEvent<DecodeAnswer>) => {
       const waiting = this.waiting.get(data.id);
       this.waiting.delete(data.id);
-      if ('content' in data) waiting?.resolve(data.content);
+      if ('decoded' in data) waiting?.resolve(data.decoded);
       else waiting?.reject(new SceneError(data.error.what, data.error.place, data.error.reason, data.error.remedy));
     };
     // The next content gets a new one.

@@ -26,7 +26,7 @@ import { TileSelector, kSelectionSettings, type SelectionSettings } from './stre
 import { boxOfCells, coarsestTiles, cutFrontToBack, tileTree, type TileTree } from './stream/tile-tree';
 import { jointView } from './stream/tile-view';
 import { kStreamSettings, TileStreamer, type StreamSettings, type StreamStatistics } from './stream/tile-streamer';
-import type { Content } from './tiles/content-codec';
+import type { Content, Resource } from './tiles/content-codec';
 import { decodeTileset } from './tiles/decode-tileset';
 import type { Tileset } from './tiles/tileset';
 
@@ -53,7 +53,7 @@ export interface Neighbours {
 export type { StreamSettings };
 export type KnownTileset = Tileset<KnownRepresentation>;
 
-type Streamer = TileStreamer<ContentFile, Content, DrawnContent>;
+type Streamer = TileStreamer<ContentFile, Content, DrawnContent, Resource>;
 
 // From where, and what draws it.
 interface Look {
@@ -290,7 +290,7 @@ export class TesseraScene extends THREE.Object3D {
         this.onError(error);
         return undefined;
       }
-      const source = new ContentSource(this.tileset.representation, this.tree, this.files, this.pool, this.drawer, renderer);
+      const source = new ContentSource({ tileset: this.tileset, tree: this.tree, files: this.files, pool: this.pool, drawer: this.drawer }, renderer);
       this.streamer = new TileStreamer(new TileSelector(this.tree, this.selection), source, this.stream);
       this.streamer.onError = (error) => this.onError(error);
       this.mesh = cityMesh(this.drawer);

@@ -2,20 +2,31 @@
 import decoderUrl from '@jsquash/webp/codec/dec/webp_dec.wasm?url';
 import { codecOf, type KnownRepresentation } from './representations/codecs';
 import { SceneError } from './scene-error';
-import type { Content, PromisedContent } from './tiles/content-codec';
+import type { Content, PromisedContent, Resource } from './tiles/content-codec';
 import type { ContentLimits } from './tiles/content-limits';
 import { isDecoderPrepared, prepareDecoder } from './tiles/lossless-image';
+import type { SharedResource } from './tiles/tileset';
 
-export interface DecodeRequest {
+interface Request {
   representation: KnownRepresentation;
   file: Uint8Array<ArrayBuffer>;
-  name: string;
-  promised: PromisedContent;
   limits: ContentLimits;
 }
 
+export interface ContentRequest extends Request {
+  name: string;
+  promised: PromisedContent;
+  resources: readonly Resource[];
+}
+
+export interface ResourceRequest extends Request {
+  from: SharedResource;
+}
+
+export type DecodeRequest = ContentRequest | ResourceRequest;
+
 export type DecodeAnswer =
-  | { id: number; content: Content }
+  | { id: number; decoded: Content | Resource }
   | { id: number; error: { what: string; place: string; reason: string; remedy: string } };
 
 let prepared: Promise<void> | undefined;
@@ -35,20 +46,31 @@ function ready(): Promise<void> {
 
 ready().catch(() => {}); // while the first files are fetched
 
+function decode(request: DecodeRequest): { decoded: Content | Resource; buffers: ArrayBuffer[] } {
+  const { representation, file, limits } = request;
+  const codec = codecOf(representation);
+  if ('from' in request) {
+    const resource = codec.decodeResource!(file, request.from, limits);
+    return { decoded: resource, buffers: codec.buffersOfResource?.(resource) ?? [] };
+  }
+  const { name, promised, resources } = request;
+  const content = codec.decode(codec.readHeader(file, name, promised, limits), name, resources);
+  return { decoded: content, buffers: codec.buffersOf(content) };
+}
+
 self.onmessage = async ({ data }: MessageEvent<DecodeRequest & { id: number }>) => {
-  const { id, representation, file, name, promised, limits } = data;
+  const { id } = data;
   try {
     await ready();
     if (!isDecoderPrepared()) {
       prepared = undefined; // it gave up meanwhile
       await ready();
     }
-    const codec = codecOf(representation);
-    const content = codec.decode(codec.readHeader(file, name, promised, limits), name, []);
-    self.postMessage({ id, content } satisfies DecodeAnswer, { transfer: codec.buffersOf(content) });
+    const { decoded, buffers } = decode(data);
+    self.postMessage({ id, decoded } satisfies DecodeAnswer, { transfer: buffers });
   } catch (error) {
     const { what, place, reason, remedy } =
-      error instanceof SceneError ? error : new SceneError(name, '', String(error), 'reload the page');
+      error instanceof SceneError ? error : new SceneError('name' in data ? data.name : data.from.uri, '', String(error), 'reload the page');
     self.postMessage({ id, error: { what, place, reason, remedy } } satisfies DecodeAnswer);
   }
 };

@@ -68,6 +68,8 @@ export interface SceneDrawer<Header extends ContentHeader = ContentHeader, Decod
 
   // Of the card, once it is there; resources apart.
   residentBytes(header: Header): number;
+  // Of the card, while any content is there that needs it; as in memory where this is not said.
+  residentBytesOfResource?(resource: Resource): number;
   // Has the driver begin with what is needed to draw such a content, beside other work.
   prepare(header: Header, place: ContentPlace): void;
   // `resources`: those that it was decoded with, the same objects for all contents that share them.

@@ -22,7 +22,9 @@ function isWithin(tree: TileTree, tile: number, content: number): boolean {
 const high = madeView([0, 0, 40], 0, -1.5);
 const low = madeView([-3.5, -3.5, 1], 0.8, -0.4);
 
-const everything = { budget: Infinity, holds: () => false, bytesOf: () => 1, canBeHad: () => true };
+const everything = {
+  budget: Infinity, holds: () => false, bytesOf: () => 1, canBeHad: () => true, resourcesOf: (): number[] => [], bytesOfResource: () => 0,
+};
 
 describe('a selection', () => {
   it('stands for each place once, whatever the view and whatever is loaded', () => {
@@ -186,6 +188,35 @@ describe('a selection', () => {
         before = near;
       }
     }
+  });
+});
+
+describe('what tiles share', () => {
+  const tree = madeTree(2);
+  const all = [0, ...tree.tiles[0].children];
+  const choose = (budget: number, resources: Record<number, number[]>, bytesOfResource = (_: number) => 10) =>
+    new TileSelector(tree, { mostPixels: 0, hysteresis: 1, finestLevel: 0 }).choose(
+      high, { ...everything, budget, resourcesOf: (tile) => resources[tile] ?? [], bytesOfResource });
+  const ofAll = (tiles: number[], id: number) => Object.fromEntries(tiles.map((tile) => [tile, [id]]));
+
+  it('counts once, for the first tile that needs it', () => {
+    const resources = ofAll(tree.tiles[0].children, 3);
+    expect(choose(1 + 10 + 4, resources)).toMatchObject({ wanted: { length: 4 }, refused: 0 });
+    expect(choose(1 + 10 + 3, resources)).toMatchObject({ wanted: { length: 3 }, refused: 1 });
+    expect(choose(1 + 10, resources)).toEqual({ wanted: [], refused: 4 });
+  });
+
+  it('counts with the coarsest, which are there always', () => {
+    expect(choose(10 + 5, ofAll(all, 3)).wanted).toHaveLength(4);
+    expect(choose(10 + 4, ofAll(all, 3)).wanted).toHaveLength(3);
+  });
+
+  it('does not count for a tile that is refused', () => {
+    const [first, ...others] = choose(Infinity, {}).wanted;
+    const bytesOfResource = (id: number) => [10, 4][id];
+    const { wanted, refused } = choose(1 + 4 + 3, { [first]: [0, 1], ...ofAll(others, 1) }, bytesOfResource);
+    expect([wanted, refused]).toEqual([others, 1]);
+    expect(choose(1 + 4 + 2, { [first]: [0, 1], ...ofAll(others, 1) }, bytesOfResource).wanted).toEqual(others.slice(0, 2));
   });
 });
 

@@ -21,8 +21,10 @@ export const kSelectionSettings: SelectionSettings = { mostPixels: 1.5, hysteres
 export interface TileMemory {
   budget: number; // bytes
   holds(tile: number): boolean;
-  bytesOf(tile: number): number; // that it takes, as far as is known
+  bytesOf(tile: number): number; // that it takes, as far as is known; of itself, without what it shares with others
   canBeHad(tile: number): boolean;
+  resourcesOf(tile: number): readonly number[]; // what it shares with others, and cannot be drawn without
+  bytesOfResource(id: number): number; // as bytesOf; counted once, for the first tile that needs it
 }
 
 export interface SelectedTile {
@@ -80,9 +82,17 @@ export class TileSelector {
       }
     };
     let bytes = 0;
+    const brought = new Set<number>(); // resources of tiles that are to be in memory
+    const bytesWith = (tile: number) => memory.resourcesOf(tile)
+      .filter((id) => !brought.has(id))
+      .reduce((sum, id) => sum + memory.bytesOfResource(id), memory.bytesOf(tile));
+    const bring = (tile: number) => {
+      bytes += bytesWith(tile);
+      for (const id of memory.resourcesOf(tile)) brought.add(id);
+    };
     for (const tile of this.pinned) {
       const node = this.tree.tiles[tile];
-      bytes += memory.bytesOf(tile);
+      bring(tile);
       if (view.sees(node) && this.isReplaced(view, tile)) addBelow(tile, node);
     }
     const wanted: number[] = [];
@@ -97,12 +107,12 @@ export class TileSelector {
         if (isReplaced) addBelow(tile, instead);
         continue;
       }
-      if (bytes + memory.bytesOf(tile) > memory.budget) {
+      if (bytes + bytesWith(tile) > memory.budget) {
         ++refused;
         if (isReplaced) this.lookBelow(view, tile);
         continue;
       }
-      bytes += memory.bytesOf(tile);
+      bring(tile);
       wanted.push(tile);
       if (isReplaced) addBelow(tile, this.tree.tiles[tile]);
     }

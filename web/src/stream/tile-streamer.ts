@@ -1,22 +1,25 @@
 // Keeps what a view needs on the graphics card, within a number of bytes that is never passed: what a content takes is
 // known, and room made for it, before any of it is allocated.
 //
-// A tile's way: absent → fetching (its file) → fetched (its size on the card is known; it waits for room) → decoding (in a
-// worker) → uploading (slice by slice) → resident. The coarsest tiles and the surround come first and stay. Of the others
+// A tile's way: absent → fetching (its file) → fetched (its size on the card is known; it waits for what it shares with others, and
+// for room) → decoding (in a worker) → uploading (slice by slice) → resident. The coarsest tiles and the surround come first and stay. Of the others
 // those go that the selector does not want any more, when there is need of their room: what has not been drawn for longest
 // first, and at last what is drawn, which then is drawn coarser.
 import { SceneError } from '../scene-error';
+import { SharedResources, type ResourceSource } from './shared-resources';
 import type { Cut, TileSelector } from './tile-selector';
 import type { SelectionView } from './tile-view';
 
 export type UploadStep = 'more' | 'wait' | 'done';
 
-// Where contents come from, and what becomes of them. `Fetched` is a file, `Decoded` its texels, `Resident` what is drawn.
-export interface TileSource<Fetched, Decoded, Resident> {
+// Where contents come from, and what becomes of them. `Fetched` is a file, `Decoded` its texels, `Resident` what is drawn; each
+// is given what it shares with others, in its order.
+export interface TileSource<Fetched, Decoded, Resident, Resource = unknown> {
+  readonly resources?: ResourceSource<Resource>; // none where tiles share nothing
   promisedBytes(tile: number): number; // of its file; 0 where nobody knows
   fetch(tile: number, signal: AbortSignal): Promise<{ file: Fetched; fileBytes: number; cardBytes: number }>;
-  decode(tile: number, file: Fetched): Promise<Decoded>;
-  allocate(tile: number, decoded: Decoded): Resident;
+  decode(tile: number, file: Fetched, resources: readonly Resource[]): Promise<Decoded>;
+  allocate(tile: number, decoded: Decoded, resources: readonly Resource[]): Resident;
   // Takes the next slice to the card, and says what comes next: another; to wait for the card; or that it can be drawn.
   upload(resident: Resident): UploadStep;
   free(resident: Resident): void;
@@ -69,7 +72,7 @@ export interface StreamStatistics {
   failures: number;
 }
 
-export class TileStreamer<Fetched, Decoded, Resident> {
+export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
   private readonly entries = new Map<number, Entry<Fetched, Resident>>();
   private readonly uploads: number[] = [];
   private frame = 0;
@@ -81,16 +84,19 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     cardBytes: 0, mostCardBytes: 0, pageBytes: 0, fetchedBytes: 0, resident: 0, pending: 0, loads: 0, evictions: 0,
     refused: 0, failures: 0,
   };
-  // Of tiles that cannot be had; told once each.
+  private readonly shared: SharedResources<Resource>;
+  // Of tiles that cannot be had, and of what they share; told once each.
   onError: (error: SceneError, tile: number) => void = () => {};
 
   constructor(
     private readonly selector: TileSelector,
-    private readonly source: TileSource<Fetched, Decoded, Resident>,
+    private readonly source: TileSource<Fetched, Decoded, Resident, Resource>,
     public settings: StreamSettings = { ...kStreamSettings },
     private readonly now: () => number = () => performance.now(),
   ) {
     for (const tile of selector.pinned) this.entry(tile).pinned = true;
+    this.shared = new SharedResources(source.resources, this.statistics, now);
+    this.shared.onError = (error, tile) => this.onError(error, tile);
   }
 
   residentOf(tile: number): Resident | undefined {
@@ -99,7 +105,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
   }
 
   errorOf(tile: number): SceneError | undefined {
-    return this.entries.get(tile)?.error;
+    return this.entries.get(tile)?.error ?? this.shared.errorOf(tile);
   }
 
   // All that is to be there always is, or cannot be had.
@@ -124,6 +130,8 @@ export class TileStreamer<Fetched, Decoded, Resident> {
       holds: (tile) => this.entry(tile).reserved,
       bytesOf: (tile) => this.bytesOf(tile),
       canBeHad: (tile) => this.canBeHad(tile, now),
+      resourcesOf: (tile) => this.shared.of(tile),
+      bytesOfResource: (id) => this.shared.bytesOf(id),
     });
     this.statistics.refused = refused;
     this.keepToBudget(wanted);
@@ -144,6 +152,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
   dispose(): void {
     this.disposed = true;
     for (const [tile, entry] of this.entries) this.drop(tile, entry);
+    this.shared.keepOnlyOf([]);
   }
 
   private entry(tile: number): Entry<Fetched, Resident> {
@@ -174,12 +183,14 @@ export class TileStreamer<Fetched, Decoded, Resident> {
       const isPatient = entry.pinned || now - entry.wantedSince >= this.settings.patience;
       const hasRoom = mayPass || this.statistics.pageBytes + this.source.promisedBytes(tile) <= this.settings.pageBytes;
       mayPass = false;
-      if (entry.state === 'absent' && isPatient && hasRoom && fetches < this.settings.fetches) {
+      if (!entry.reserved && isPatient && hasRoom) this.shared.load(tile, this.settings, this.settings.fetches - fetches);
+      if (entry.state === 'absent' && isPatient && hasRoom && fetches + this.shared.loading < this.settings.fetches) {
         ++fetches;
         void this.fetch(tile, entry);
       }
-      if (entry.state === 'fetched' && !entry.reserved) this.admit(entry, isWanted);
+      if (entry.state === 'fetched' && !entry.reserved) this.admit(tile, entry, isWanted);
     }
+    this.forgetResources(wanted);
     this.startDecodes(wanted);
     this.countPending(isWanted, now);
   }
@@ -195,8 +206,9 @@ export class TileStreamer<Fetched, Decoded, Resident> {
 
   // Not what is to be tried again later.
   private canBeHad(tile: number, now: number): boolean {
-    const { state, retryAt } = this.entry(tile);
-    if (state !== 'absent' || now >= retryAt) return true;
+    const entry = this.entry(tile);
+    const retryAt = Math.max(entry.state === 'absent' ? entry.retryAt : -Infinity, this.shared.retryAt(tile));
+    if (now >= retryAt) return true;
     this.nextRetry = Math.min(this.nextRetry, retryAt);
     return false;
   }
@@ -212,7 +224,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     if (now - entry.lastWanted < this.settings.patience) return;
     entry.wantedSince = NaN;
     if (entry.state === 'fetching') entry.abort!.abort();
-    if (entry.state === 'fetched') this.forget(entry);
+    if (entry.state === 'fetched') this.forget(tile, entry);
   }
 
   // The budget may have become smaller: pictures of a larger window take their share of the card. Of what is wanted, the
@@ -240,11 +252,15 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     }
   }
 
-  // Makes room for it, now that its size is known; or waits, for what is on its way and not wanted any more.
-  private admit(entry: Entry<Fetched, Resident>, wanted: Set<number>): void {
+  // Makes room for it, now that its size is known and that of what it shares; or waits, for what is on its way and not wanted any
+  // more.
+  private admit(tile: number, entry: Entry<Fetched, Resident>, wanted: Set<number>): void {
+    if (!this.shared.areLoaded(tile)) return;
     const going = this.unwanted(wanted);
-    const free = going.reduce((sum, [, { cardBytes }]) => sum + cardBytes, this.settings.cardBytes - this.statistics.cardBytes);
-    if (entry.cardBytes > free) return;
+    const freed = this.shared.bytesFreedBy(going.map(([one]) => one), tile);
+    const free = going.reduce((sum, [, { cardBytes }]) => sum + cardBytes, this.settings.cardBytes - this.statistics.cardBytes) + freed;
+    if (entry.cardBytes + this.shared.bytesToHold(tile) > free) return;
+    this.shared.hold(tile); // before others go, with which it would go too
     this.evict(going, entry.cardBytes);
     entry.reserved = true;
     this.statistics.cardBytes += entry.cardBytes;
@@ -252,7 +268,8 @@ export class TileStreamer<Fetched, Decoded, Resident> {
   }
 
   private pinnedBytes(): number {
-    return this.selector.pinned.reduce((sum, tile) => sum + this.entry(tile).cardBytes, 0);
+    const { pinned } = this.selector;
+    return pinned.reduce((sum, tile) => sum + this.entry(tile).cardBytes, this.shared.knownBytesOf(pinned));
   }
 
   private failPinned(): void {
@@ -267,8 +284,15 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     for (const tile of this.selector.pinned) {
       const entry = this.entry(tile);
       if (entry.state !== 'resident') entry.error = error;
-      if (entry.state === 'fetched' && !entry.reserved) this.forget(entry);
+      if (entry.state === 'fetched' && !entry.reserved) this.forget(tile, entry);
     }
+  }
+
+  // Those that no tile needs which is wanted, on its way or on the card.
+  private forgetResources(wanted: number[]): void {
+    if (!this.source.resources) return;
+    const there = [...this.entries].filter(([, { state }]) => state !== 'absent').map(([tile]) => tile);
+    this.shared.keepOnlyOf([...wanted, ...there]);
   }
 
   private async fetch(tile: number, entry: Entry<Fetched, Resident>): Promise<void> {
@@ -289,7 +313,7 @@ export class TileStreamer<Fetched, Decoded, Resident> {
       if (!signal.aborted && !this.disposed) this.fail(tile, entry, error);
     } finally {
       entry.abort = undefined;
-      if (entry.state === 'fetching') this.forget(entry);
+      if (entry.state === 'fetching') this.forget(tile, entry);
     }
   }
 
@@ -321,15 +345,16 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     entry.state = 'decoding';
     this.statistics.pageBytes += entry.cardBytes; // texels take as much in the page until they are on the card
     try {
-      const decoded = await this.source.decode(tile, entry.file!);
+      const resources = this.shared.loadedOf(tile);
+      const decoded = await this.source.decode(tile, entry.file!, resources);
       if (this.disposed) throw new Error('disposed');
-      entry.resident = this.source.allocate(tile, decoded);
+      entry.resident = this.source.allocate(tile, decoded, resources);
       entry.state = 'uploading';
       this.uploads.push(tile);
     } catch (error) {
       if (!this.disposed) this.fail(tile, entry, error);
       this.statistics.pageBytes -= entry.cardBytes;
-      this.release(entry);
+      this.release(tile, entry);
       entry.state = 'absent';
     } finally {
       this.holdInPage(entry, 0);
@@ -368,16 +393,18 @@ export class TileStreamer<Fetched, Decoded, Resident> {
   }
 
   // A file that is not needed after all.
-  private forget(entry: Entry<Fetched, Resident>): void {
+  private forget(tile: number, entry: Entry<Fetched, Resident>): void {
     this.holdInPage(entry, 0);
     entry.file = undefined;
     entry.state = 'absent';
-    this.release(entry);
+    this.release(tile, entry);
   }
 
-  private release(entry: Entry<Fetched, Resident>): void {
-    if (entry.reserved) this.statistics.cardBytes -= entry.cardBytes;
+  private release(tile: number, entry: Entry<Fetched, Resident>): void {
+    if (!entry.reserved) return;
     entry.reserved = false;
+    this.statistics.cardBytes -= entry.cardBytes;
+    this.shared.release(tile);
   }
 
   private drop(tile: number, entry: Entry<Fetched, Resident>): void {
@@ -390,11 +417,11 @@ export class TileStreamer<Fetched, Decoded, Resident> {
     }
     entry.resident = undefined;
     if (entry.state === 'decoding') return; // lets go of itself
-    this.forget(entry);
+    this.forget(tile, entry);
   }
 
   private countPending(wanted: Set<number>, now: number): void {
-    let pending = 0;
+    let pending = this.shared.loading;
     for (const [tile, { state, reserved, retryAt }] of this.entries) {
       const comes = state === 'fetching' || state === 'decoding' || state === 'uploading' || (state === 'fetched' && reserved);
       const waits = wanted.has(tile) && state !== 'resident' && now >= retryAt;

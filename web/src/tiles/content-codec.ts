@@ -1,7 +1,7 @@
 // What a representation says of its contents' files (docs/tile-format.md, sections 5 to 7): how they are read. Workers read
 // them, so nothing here knows three.js. representations/codecs.ts has one for each representation.
 import type { ContentLimits } from './content-limits';
-import type { TileContent } from './tileset';
+import type { SharedResource, TileContent } from './tileset';
 
 // What a file says of itself; nothing has been allocated for its texels.
 export interface ContentHeader {
@@ -12,7 +12,7 @@ export interface ContentHeader {
 // page, and so holds nothing but data.
 export type Content = object;
 
-// What several contents share (Tileset.resources), read once and given to the decoding of each; likewise data alone.
+// What several contents share (SharedResource), read once and given to the decoding of each; likewise data alone.
 export interface Resource {
   memoryBytes: number;
 }
@@ -25,7 +25,7 @@ export interface TilesetRules {
   overlappingContents?: boolean; // contents of a tile need no order, and may overlap
 }
 
-// Without state. Bytes are untrusted: what reads them throws SceneError that names `name` and the first rule that is broken.
+// Without state. Bytes are untrusted: what reads them throws SceneError that names the file and the first rule that is broken.
 export interface ContentCodec<Header extends ContentHeader = ContentHeader, Decoded extends Content = Content> extends TilesetRules {
   readHeader(file: Uint8Array, name: string, promised?: PromisedContent, limits?: ContentLimits): Header;
   // `resources`: those that the tile needs, in its order. The decoder of pictures must be prepared (lossless-image.ts).
@@ -33,6 +33,6 @@ export interface ContentCodec<Header extends ContentHeader = ContentHeader, Deco
   // The memory of a content's texels, which may be handed over to another thread.
   buffersOf(content: Decoded): ArrayBuffer[];
   // Where there is none, contents share nothing: what they list is not fetched.
-  decodeResource?(file: Uint8Array, name: string, mimeType: string, limits: ContentLimits): Resource;
+  decodeResource?(file: Uint8Array, from: SharedResource, limits: ContentLimits): Resource;
   buffersOfResource?(resource: Resource): ArrayBuffer[]; // as buffersOf; where there is none, it is copied
 }

@@ -48,6 +48,13 @@ export interface Georeference {
   enuFromWorld: Matrix4; // a similarity
 }
 
+// What several contents share.
+export interface SharedResource {
+  uri: string; // relative to the folder of tileset.json
+  mimeType: string;
+  bytes: number; // of the file, 0 where not known; a hint
+}
+
 export interface Tileset<Representation extends string = string> {
   representation: Representation;
   name: string;
@@ -61,7 +68,7 @@ export interface Tileset<Representation extends string = string> {
   background: Vec3;
   levels: number;
   geometricError: number;
-  resources: { uri: string; mimeType: string; bytes: number }[];
+  resources: SharedResource[];
   tiles: Tile[]; // the root first
 }
 
