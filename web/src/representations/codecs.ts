@@ -1,7 +1,7 @@
 // The representations whose contents are read, a row each. The decoding worker loads this table, and therefore no three.js.
-import { hashCodec } from '../tiles/decode-hash';
-import { volumeCodec } from '../tiles/decode-volume';
 import type { ContentCodec } from '../tiles/content-codec';
+import { hashCodec } from './hash/decode-hash';
+import { volumeCodec } from './volume/decode-volume';
 
 export const kCodecs = { volume: volumeCodec, hash: hashCodec };
 

@@ -1,9 +1,9 @@
 // How scenes of each representation are drawn, a row each.
-import { hashDrawing } from '../draw/hash-marching';
 import type { ShownMode } from '../draw/display-modes';
 import type { SceneDrawing } from '../draw/scene-drawer';
-import { volumeDrawing } from '../draw/volume-marching';
 import type { KnownRepresentation } from './codecs';
+import { hashDrawing } from './hash/hash-marching';
+import { volumeDrawing } from './volume/volume-marching';
 
 const kDrawings = { volume: volumeDrawing, hash: hashDrawing } satisfies Record<KnownRepresentation, SceneDrawing>;
 

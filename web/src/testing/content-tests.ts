@@ -1,8 +1,8 @@
 // What the readers of every representation's contents are tested for alike.
 import { expect, it } from 'vitest';
+import type { MarchedContent, MarchedHeader } from '../raymarch/content';
 import { kCodecs, type KnownRepresentation } from '../representations/codecs';
 import { SceneError } from '../scene-error';
-import type { MarchedContent, MarchedHeader } from '../tiles/content';
 import type { ContentCodec, PromisedContent } from '../tiles/content-codec';
 import { kContentLimits } from '../tiles/content-limits';
 import { decodeTileset } from '../tiles/decode-tileset';

@@ -1,0 +1,300 @@
+// Draws contents, front to back, into targets of their own: what the scene adds to each pixel, and how far away it is
+// (docs/tile-format.md, section 4).
+import * as THREE from 'three';
+import { colourOfBlock, colourOfLevel, type ShownMode } from '../draw/display-modes';
+import { kMostHiddenBoxes } from '../draw/hidden-boxes';
+import { drawAsTheyStand, type Picture } from '../draw/picture';
+import type { ContentPlace, DrawnPart, DrawnScene, DrawSettings, SceneDrawer, SceneView } from '../draw/scene-drawer';
+import { screenTriangle } from '../draw/screen-triangle';
+import { SceneError } from '../scene-error';
+import type { Box } from '../tiles/tileset';
+import { frontToBack as orderOf } from './box-order';
+import type { ContentPart, MarchedContent, MarchedHeader } from './content';
+import { contentMaterial, keyOf, programMaterial, viewUniforms, type ProgramPlace, type ViewUniforms } from './content-program';
+import { contentTarget } from './content-target';
+import type { ContentTextures } from './content-textures';
+import type { MarchedOwn, Marching, MarchMethod } from './marching';
+
+// A content that may be drawn.
+export interface MarchedDrawnContent<Own extends MarchedOwn = MarchedOwn> {
+  textures: ContentTextures;
+  box: Box; // scene units
+  surround: boolean;
+  mesh: THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>;
+  own: Own;
+}
+
+// One texel, so that programs need not differ where there is nothing opaque.
+function farthestDepth(): THREE.DataTexture {
+  const texture = new THREE.DataTexture(new Uint8Array([255]), 1, 1, THREE.RedFormat);
+  texture.needsUpdate = true;
+  return texture;
+}
+
+function bytesOfGeometry({ attributes, index }: THREE.BufferGeometry): number {
+  const buffers = [...Object.values(attributes), ...(index ? [index] : [])];
+  return buffers.reduce((sum, { array }) => sum + array.byteLength, 0);
+}
+
+// Puts the nearest depth where nothing of what comes next would be seen: it is not even begun there.
+const kHideShader = `
+uniform sampler2D colourAndOpacity;
+uniform float minTransmittance;
+void main() {
+  if (1.0 - texelFetch(colourAndOpacity, ivec2(gl_FragCoord.xy), 0).a >= minTransmittance) discard;
+  gl_FragColor = vec4(0.0);
+}`;
+
+const kContentsBetweenHiding = 4;
+const kEverywhere: Box = { low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
+
+export class Compositor<Header extends MarchedHeader, Decoded extends MarchedContent, Own extends MarchedOwn>
+  implements SceneDrawer<Header, Decoded, MarchedDrawnContent<Own>> {
+  readonly view: ViewUniforms = viewUniforms();
+  readonly target: THREE.WebGLRenderTarget;
+  pictures: Picture[] = []; // that are in the target
+  readonly distancesOfBytes: boolean;
+  private readonly modes: readonly ShownMode[];
+  private readonly bytesPerPixel: number; // of all pictures
+  private readonly depthAlone: THREE.WebGLRenderTarget; // the depth of `target`, so that its colours can be read meanwhile
+  private readonly hiding = new THREE.Scene();
+  private readonly contents = new THREE.Scene();
+  private readonly cube = new THREE.BoxGeometry(1, 1, 1);
+  private readonly screen = screenTriangle();
+  private readonly anyCamera = new THREE.Camera();
+  private readonly nothingOpaque = farthestDepth();
+  private readonly marching: Marching<Header, Decoded, Own>;
+  private cuts = false; // from the first hidden box on, so that programs are not made anew for each
+  private readonly prepared = new Map<string, THREE.Material>(); // hold programs, by their keys
+
+  // Throws SceneError where the card cannot draw such a scene.
+  constructor(private readonly renderer: THREE.WebGLRenderer, scene: DrawnScene, method: MarchMethod<Header, Decoded, Own>) {
+    const made = contentTarget(renderer, method.target(scene.levels));
+    this.target = made.target;
+    this.distancesOfBytes = made.distancesOfBytes;
+    this.bytesPerPixel = made.bytesPerPixel;
+    this.modes = method.modes;
+    this.depthAlone = new THREE.WebGLRenderTarget(1, 1, {
+      generateMipmaps: false, depthBuffer: true, depthTexture: made.target.depthTexture, format: THREE.RedFormat,
+    });
+    this.hiding.add(new THREE.Mesh(this.screen, new THREE.ShaderMaterial({
+      vertexShader: 'void main() { gl_Position = vec4(position.xy, -1.0, 1.0); }',
+      fragmentShader: kHideShader,
+      uniforms: {
+        colourAndOpacity: { value: this.target.textures[0] }, minTransmittance: this.view.minTransmittance,
+      },
+      depthFunc: THREE.AlwaysDepth, colorWrite: false,
+    })));
+    this.hiding.children[0].frustumCulled = false;
+    this.marching = method.make(made, this.screen, this.view);
+    this.contents.matrixWorldAutoUpdate = false;
+    this.view.sceneLow.value.set(...scene.box.low);
+    this.view.sceneHigh.value.set(...scene.box.high);
+    this.view.sceneNear.value = scene.near;
+  }
+
+  get colour(): THREE.Texture {
+    return (this.marching.lastPass?.target ?? this.target).textures[0];
+  }
+
+  get distance(): THREE.Texture {
+    return this.target.textures[1];
+  }
+
+  get featureLevels(): number {
+    return this.marching.featureLevels;
+  }
+
+  // Of the textures, and of the numbers that its program is given.
+  residentBytes(header: Header): number {
+    return header.memoryBytes + 16 * this.marching.vectors(header);
+  }
+
+  prepare(header: Header, { surround, isDrawnForLong }: ContentPlace): void {
+    for (const mesh of this.marching.prepare?.(header) ?? []) this.renderer.compile(mesh, this.anyCamera);
+    const pieces = this.marching.pieces(header, isDrawnForLong);
+    const place = this.placeOf(header.parts, surround);
+    const key = keyOf(pieces, place);
+    if (this.prepared.has(key)) return;
+    const material = programMaterial(pieces, place);
+    this.prepared.set(key, material);
+    this.renderer.compile(new THREE.Mesh(this.screen, material), this.anyCamera);
+  }
+
+  allocate(content: Decoded, { box, surround, number, level, isDrawnForLong }: ContentPlace): MarchedDrawnContent<Own> {
+    const place = this.placeOf(content.parts, surround);
+    const textures = this.marching.textures(content);
+    const own = this.marching.own(content);
+    const material = contentMaterial(textures, this.view, this.marching.pieces(content, isDrawnForLong), place);
+    Object.assign(material.uniforms, {
+      ...this.marching.uniforms, ...own.uniforms,
+      colourOfBlock: { value: colourOfBlock(number) }, colourOfLevel: { value: colourOfLevel(level) },
+    });
+    const mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>(
+      place.everywhere ? this.screen : this.cube, material);
+    mesh.frustumCulled = false;
+    mesh.matrixAutoUpdate = mesh.matrixWorldAutoUpdate = false;
+    for (const one of [mesh, ...own.meshes]) this.renderer.compile(one, this.anyCamera);
+    return { textures, box, surround, mesh, own };
+  }
+
+  upload(content: MarchedDrawnContent<Own>): 'more' | 'wait' | 'done' {
+    if (!content.textures.upload(this.renderer)) return 'more';
+    return this.isCompiled(content) ? 'done' : 'wait';
+  }
+
+  free({ mesh, textures, own }: MarchedDrawnContent<Own>): void {
+    mesh.material.uniformsGroups.forEach((group) => group.dispose());
+    mesh.material.dispose();
+    textures.dispose();
+    this.marching.release?.(own);
+  }
+
+  get bytes(): number {
+    const pixels = this.target.width * this.target.height;
+    const lastPass = this.marching.lastPass?.bytes ?? 0;
+    return (this.bytesPerPixel + 4 + 1) * pixels + lastPass + bytesOfGeometry(this.cube) + bytesOfGeometry(this.screen) + 4;
+  }
+
+  resize({ x, y }: THREE.Vector2): void {
+    if (this.target.width !== x || this.target.height !== y) {
+      this.target.setSize(x, y);
+      this.depthAlone.setSize(x, y);
+      this.marching.lastPass?.resize(x, y);
+    }
+    this.view.resolution.value.set(x, y);
+  }
+
+  draw({ pictures, worldFromScene, contents, opaqueDepth, ofNothing }: SceneView<MarchedDrawnContent<Own>>, settings: DrawSettings): boolean {
+    const { renderer } = this;
+    this.set(settings);
+    this.pictures = pictures;
+    this.view.opaqueDepth.value = opaqueDepth ?? this.nothingOpaque;
+    for (const { mesh: { material } } of new Set(contents.flat().map(({ content }) => content))) {
+      if (!this.cuts || 'CUTS' in material.defines) continue;
+      material.defines.CUTS = '';
+      material.needsUpdate = true;
+    }
+    const before = renderer.getRenderTarget();
+    const autoClear = renderer.autoClear;
+    const clearColour = renderer.getClearColor(new THREE.Color());
+    const clearAlpha = renderer.getClearAlpha();
+    renderer.setClearColor(0, 0);
+    renderer.autoClear = false;
+    for (const target of [this.target, ...(this.marching.lastPass ? [this.marching.lastPass.target] : [])]) {
+      renderer.setRenderTarget(target);
+      renderer.clear();
+    }
+    const opaque = settings.endsRays && ofNothing?.own.whole ? ofNothing.own : undefined;
+    drawAsTheyStand(renderer, pictures, () =>
+      pictures.forEach((picture, i) => this.drawOne(picture, worldFromScene, contents[i], opaque)));
+    renderer.autoClear = autoClear;
+    renderer.setClearColor(clearColour, clearAlpha);
+    renderer.setRenderTarget(before);
+    return ofNothing?.own.whole || contents.some((ofOne) => ofOne.length > 0);
+  }
+
+  wantsAnotherFrame(): boolean {
+    return false;
+  }
+
+  surfaceAt(renderer: THREE.WebGLRenderer, { part, origin, ray }: Picture, at: THREE.Vector2): THREE.Vector3 | undefined {
+    const pixel = (x: number, size: number) => Math.min(Math.max(Math.floor((0.5 + 0.5 * x) * size), 0), size - 1);
+    const { type } = this.target.textures[1];
+    const read = type === THREE.FloatType ? new Float32Array(4) : type === THREE.HalfFloatType ? new Uint16Array(4) : new Uint8Array(4);
+    renderer.readRenderTargetPixels(this.target, part.x + pixel(at.x, part.z), part.y + pixel(at.y, part.w), 1, 1, read, undefined, 1);
+    const [value, , , hides] = [...read].map(
+      (x) => (type === THREE.FloatType ? x : type === THREE.HalfFloatType ? THREE.DataUtils.fromHalfFloat(x) : x / 255));
+    if (hides <= 0.99) return undefined;
+    const distance = this.distancesOfBytes ? value / hides / Math.max(1 - value / hides, 1e-3) : value / hides;
+    const inPicture = new THREE.Vector3(at.x, at.y, 1);
+    const direction = inPicture.clone().applyMatrix3(ray).normalize();
+    return inPicture.applyMatrix3(origin).addScaledVector(direction, distance);
+  }
+
+  dispose(): void {
+    this.target.depthTexture?.dispose();
+    this.target.dispose();
+    this.depthAlone.dispose();
+    this.marching.lastPass?.dispose();
+    (this.hiding.children[0] as THREE.Mesh<THREE.BufferGeometry, THREE.Material>).material.dispose();
+    this.cube.dispose();
+    this.screen.dispose();
+    this.nothingOpaque.dispose();
+    for (const material of this.prepared.values()) material.dispose();
+    this.prepared.clear();
+  }
+
+  private set({ display, featureLevel, minTransmittance, visibility, hidden, hiddenOfSurround, withinBox }: DrawSettings): void {
+    this.view.minTransmittance.value = minTransmittance;
+    this.view.visibility.value = visibility;
+    this.view.display.value = this.modes.findIndex(({ name }) => name === display);
+    this.marching.show?.(display, featureLevel);
+    this.hide(hidden, hiddenOfSurround, withinBox);
+  }
+
+  private hide(boxes: readonly THREE.Matrix4[], ofSurround: readonly THREE.Matrix4[], withinBox: boolean): void {
+    if (boxes.length > kMostHiddenBoxes) {
+      throw new SceneError('scene', 'hidden', `are ${boxes.length} boxes, and ${kMostHiddenBoxes} can be hidden`, 'hide fewer, larger ones');
+    }
+    const { boxFromScene, hiddenBoxes, hiddenBoxesOfSurround } = this.view;
+    const whole = (box: THREE.Matrix4) => box.determinant() !== 0;
+    const all = [...boxes.filter(whole), ...ofSurround.filter(whole).slice(0, kMostHiddenBoxes)];
+    all.forEach((box, n) => boxFromScene.value[n].copy(box).invert());
+    hiddenBoxes.value = boxes.filter(whole).length;
+    hiddenBoxesOfSurround.value = all.length;
+    this.view.withinBox.value = withinBox;
+    this.cuts ||= all.length > 0 || withinBox;
+  }
+
+  private isCompiled({ mesh, own }: MarchedDrawnContent<Own>): boolean {
+    return [mesh, ...own.meshes].every(({ material }) => {
+      const { currentProgram } = this.renderer.properties.get(material) as { currentProgram?: { isReady(): boolean } };
+      return currentProgram?.isReady() ?? true;
+    });
+  }
+
+  private placeOf(parts: ContentPart[], surround: boolean): ProgramPlace {
+    // What is contracted may own what lies beyond any box.
+    const everywhere = surround || parts.some((part) => part.contracted);
+    return { surround, everywhere, distancesOfBytes: this.distancesOfBytes, cuts: this.cuts };
+  }
+
+  private place({ mesh, box }: MarchedDrawnContent<Own>, within: Box, worldFromScene: THREE.Matrix4): void {
+    const low = new THREE.Vector3(...box.low).max(this.view.withinLow.value.set(...within.low));
+    const high = new THREE.Vector3(...box.high).min(this.view.withinHigh.value.set(...within.high));
+    const middle = low.clone().add(high).multiplyScalar(0.5);
+    mesh.matrixWorld.makeScale(high.x - low.x, high.y - low.y, high.z - low.z).setPosition(middle).premultiply(worldFromScene);
+  }
+
+  private drawOne(
+    picture: Picture, worldFromScene: THREE.Matrix4, frontToBack: DrawnPart<MarchedDrawnContent<Own>>[], ofNothing?: Own,
+  ): void {
+    const { renderer } = this;
+    const { camera, part, eye, origin, ray, sceneFromClip } = picture;
+    this.view.part.value = part;
+    this.view.origin.value = origin;
+    this.view.ray.value = ray;
+    this.view.sceneFromClip.value = sceneFromClip;
+    for (const { textures } of new Set(frontToBack.map(({ content }) => content))) {
+      if (textures.parts.length > 1) textures.orderParts(orderOf(textures.parts, eye));
+    }
+    this.target.viewport.copy(part);
+    this.depthAlone.viewport.copy(part);
+    renderer.setRenderTarget(this.target);
+    const end = this.marching.begin?.(frontToBack.map(({ content }) => content.own), ofNothing);
+    const hides = this.view.minTransmittance.value > 0;
+    frontToBack.forEach(({ content, within = kEverywhere }, i) => {
+      if (hides && i > 0 && (content.surround || i % kContentsBetweenHiding === 0)) {
+        renderer.setRenderTarget(this.depthAlone);
+        renderer.render(this.hiding, camera);
+        renderer.setRenderTarget(this.target);
+      }
+      this.place(content, within, worldFromScene);
+      this.contents.children = [content.mesh];
+      renderer.render(this.contents, camera);
+    });
+    this.contents.children = [];
+    end?.(renderer, picture);
+  }
+}

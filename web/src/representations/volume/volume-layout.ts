@@ -1,0 +1,29 @@
+// How the parts of a volume's content share textures, before anything is allocated for them.
+import { count, kMacroblock, kTexturesOfShader } from '../../raymarch/content';
+import { atlasOf, stack, type AtlasLayout } from '../../raymarch/content-layout';
+import type { TextureLimits } from '../../tiles/content-limits';
+import type { Vec3 } from '../../tiles/tileset';
+import { kDistanceCell, type VolumePart } from './volume-content';
+
+export interface VolumeLayout {
+  planes: Vec3; // width, height, layers
+  voxels: AtlasLayout;
+  macroblocks: { size: Vec3; origins: Vec3[] };
+  distances: { size: Vec3; origins: Vec3[] };
+  bytes: number; // of all textures
+}
+
+const kOthers = 5; // planes (2), macroblocks, distances, what is opaque
+const kMostAtlases = Math.min(4, Math.floor((kTexturesOfShader - kOthers) / 2)); // with two textures each
+
+// Undefined where the limits do not allow it.
+export function layOut(parts: VolumePart[], limits: TextureLimits): VolumeLayout | undefined {
+  const widest = Math.max(...parts.map((part) => part.planes));
+  const voxels = atlasOf(parts.reduce((sum, part) => sum + part.stored, 0), limits.edge3D, kMostAtlases);
+  const macroblocks = stack(parts.map((part) => part.voxels / kMacroblock), limits.edge3D);
+  const distances = stack(parts.map((part) => part.planes / kDistanceCell), limits.edge3D);
+  if (!voxels || !macroblocks || !distances || 3 * parts.length > limits.layers || widest > limits.edge2D) return undefined;
+  const planes: Vec3 = [widest, widest, 3 * parts.length];
+  const bytes = 8 * (count(planes) + count(voxels.size)) + 4 * count(macroblocks.size) + count(distances.size);
+  return { planes, voxels, macroblocks, distances, bytes };
+}
