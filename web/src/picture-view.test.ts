@@ -62,7 +62,9 @@ describe('the view of a camera', () => {
     golden.views.forEach(({ camera, held, budget, wanted, refused, cut, surround }, i) => {
       const holds = (tile: number) => held.includes(tile);
       const view = viewOf(camera);
-      const choice = selector.choose(view, { budget, holds, bytesOf: (tile) => golden.bytes[tile], canBeHad: () => true, resourcesOf: () => [], bytesOfResource: () => 0 });
+      const choice = selector.choose(view, {
+        budget, holds, bytesOf: (tile) => golden.bytes[tile], canBeHad: () => true, resourcesOf: () => [], bytesOfResource: () => 0,
+      });
       const drawn = selector.cut(view, holds);
       expect({ i, ...choice }).toEqual({ i, wanted, refused });
       const visible = drawn.tiles.filter((one) => one.visible).map((one) => [one.tile, one.content]);

@@ -33,8 +33,8 @@ export interface DrawSettings {
   display: string; // of ShownMode
   featureLevel: number; // which such a mode shows
   endsRays: boolean; // rays that end nowhere in scenes that say so are opaque
-  // Boxes in which nothing is drawn, and such in which nothing of the surround is: from the cube of edge 1 about the origin to
-  // the scene. Those without a volume hide nothing.
+  // Boxes in which nothing is drawn, and such in which nothing of the surround is: from the cube of edge 1 about the
+  // origin to the scene. Those that are flat hide nothing.
   hidden: readonly THREE.Matrix4[];
   hiddenOfSurround: readonly THREE.Matrix4[];
   withinBox: boolean; // nor is anything outside of the scene's box
@@ -61,8 +61,9 @@ export interface DrawnPicture {
   };
 }
 
-export interface SceneDrawer<Header extends ContentHeader = ContentHeader, Decoded extends Content = Content, Drawn extends DrawnContent = DrawnContent>
-  extends DrawnPicture {
+export interface SceneDrawer<
+  Header extends ContentHeader = ContentHeader, Decoded extends Content = Content, Drawn extends DrawnContent = DrawnContent,
+> extends DrawnPicture {
   readonly bytes: number; // of the card, without contents
   readonly featureLevels: number; // the most fine levels of any content that has been prepared; 0 where there are none
 
@@ -96,7 +97,9 @@ export interface FeatureLevels {
 }
 
 // How scenes of a representation are drawn.
-export interface SceneDrawing<Header extends ContentHeader = ContentHeader, Decoded extends Content = Content, Drawn extends DrawnContent = DrawnContent> {
+export interface SceneDrawing<
+  Header extends ContentHeader = ContentHeader, Decoded extends Content = Content, Drawn extends DrawnContent = DrawnContent,
+> {
   modes: readonly ShownMode[];
   featureLevels?: FeatureLevels;
   // Throws SceneError where the card cannot draw such a scene.

@@ -25,7 +25,7 @@ export interface LastPass {
 }
 
 // One for each scene.
-export interface Marching<Header extends MarchedHeader = MarchedHeader, Decoded extends MarchedContent = MarchedContent, Own extends MarchedOwn = MarchedOwn> {
+export interface Marching<Header extends MarchedHeader, Decoded extends MarchedContent, Own extends MarchedOwn> {
   readonly uniforms: Record<string, THREE.IUniform>; // of all contents' programs, beside the view's
   readonly featureLevels: number; // as SceneDrawer has them
   readonly lastPass?: LastPass; // where there is none, contents write colours

@@ -1,6 +1,6 @@
-// What tiles share (docs/tile-format.md, section 3, `resources`). Each resource is loaded once, however many tiles need it, and
-// its bytes count once: in the page while a tile needs it that is wanted, on its way or on the card; on the card from the first tile
-// on that gets room there to the last one that leaves it.
+// What tiles share (docs/tile-format.md, section 3, `resources`). Each resource is loaded once, however many tiles need it,
+// and its bytes count once: in the page while a tile needs it that is wanted, on its way or on the card; on the card from
+// the first tile that gets room there to the last one that leaves it.
 import { SceneError } from '../scene-error';
 import type { StreamSettings, StreamStatistics } from './tile-streamer';
 

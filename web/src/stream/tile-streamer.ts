@@ -1,10 +1,10 @@
 // Keeps what a view needs on the graphics card, within a number of bytes that is never passed: what a content takes is
 // known, and room made for it, before any of it is allocated.
 //
-// A tile's way: absent → fetching (its file) → fetched (its size on the card is known; it waits for what it shares with others, and
-// for room) → decoding (in a worker) → uploading (slice by slice) → resident. The coarsest tiles and the surround come first and stay. Of the others
-// those go that the selector does not want any more, when there is need of their room: what has not been drawn for longest
-// first, and at last what is drawn, which then is drawn coarser.
+// A tile's way: absent → fetching (its file) → fetched (its size on the card is known; it waits for what it shares with
+// others, and for room) → decoding (in a worker) → uploading (slice by slice) → resident. The coarsest tiles and the
+// surround come first and stay. Of the others those go that the selector does not want any more, when there is need of
+// their room: what has not been drawn for longest first, and at last what is drawn, which then is drawn coarser.
 import { SceneError } from '../scene-error';
 import { SharedResources, type ResourceSource } from './shared-resources';
 import type { Cut, TileSelector } from './tile-selector';
@@ -12,8 +12,8 @@ import type { SelectionView } from './tile-view';
 
 export type UploadStep = 'more' | 'wait' | 'done';
 
-// Where contents come from, and what becomes of them. `Fetched` is a file, `Decoded` its texels, `Resident` what is drawn; each
-// is given what it shares with others, in its order.
+// Where contents come from, and what becomes of them. `Fetched` is a file, `Decoded` its texels, `Resident` what is drawn,
+// `Resource` what a tile shares with others: it is given its own, in its order.
 export interface TileSource<Fetched, Decoded, Resident, Resource = unknown> {
   readonly resources?: ResourceSource<Resource>; // none where tiles share nothing
   promisedBytes(tile: number): number; // of its file; 0 where nobody knows
@@ -252,8 +252,8 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
     }
   }
 
-  // Makes room for it, now that its size is known and that of what it shares; or waits, for what is on its way and not wanted any
-  // more.
+  // Makes room for it, now that its size is known, and that of what it shares; or waits, for what is on its way and not
+  // wanted any more.
   private admit(tile: number, entry: Entry<Fetched, Resident>, wanted: Set<number>): void {
     if (!this.shared.areLoaded(tile)) return;
     const going = this.unwanted(wanted);

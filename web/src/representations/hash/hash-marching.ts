@@ -1,4 +1,5 @@
-// How contents of a `hash` scene are marched through: they add up to sums, of which the networks make colours when all are there.
+// How contents of a `hash` scene are marched through: they add up to sums, of which the networks make colours when all
+// are there.
 import * as THREE from 'three';
 import type { Picture } from '../../draw/picture';
 import type { SceneDrawing } from '../../draw/scene-drawer';
@@ -16,9 +17,8 @@ import { NetworkPass, type DrawnNetwork, type NetworkOrder } from './network-pas
 
 const kSums = 4; // pictures
 
-// The network is the content's own number in a picture (hash-program.ts).
 interface HashOwn extends MarchedOwn {
-  uniforms: { network: { value: number } };
+  uniforms: { network: { value: number } }; // the network's number in the picture (hash-program.ts)
   network: DrawnNetwork;
 }
 
