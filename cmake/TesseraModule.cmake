@@ -15,10 +15,89 @@ function(tessera_module name)
   endforeach()
   target_link_libraries(tessera_${name} PUBLIC ${ARG_LIBRARIES} PRIVATE ${ARG_PRIVATE_LIBRARIES})
   if(TESSERA_TESTS AND ARG_TESTS)
-    add_executable(tessera_${name}_test ${ARG_TESTS})
-    target_link_libraries(tessera_${name}_test PRIVATE tessera_${name} ${ARG_PRIVATE_LIBRARIES} GTest::gtest_main)
-    gtest_discover_tests(tessera_${name}_test TEST_PREFIX "${name}/" DISCOVERY_MODE PRE_TEST
-      PROPERTIES TIMEOUT 300 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
+    tessera_unit_tests(${name} SOURCES ${ARG_TESTS} LIBRARIES tessera_${name} ${ARG_PRIVATE_LIBRARIES})
+  endif()
+endfunction()
+
+# tessera_unit_tests(NAME SOURCES a_test.cpp ... LIBRARIES x ...): the binary tessera_NAME_test, one CTest entry
+# NAME/... a test.
+function(tessera_unit_tests name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LIBRARIES" ${ARGN})
+  add_executable(tessera_${name}_test ${ARG_SOURCES})
+  target_link_libraries(tessera_${name}_test PRIVATE ${ARG_LIBRARIES} GTest::gtest_main)
+  gtest_discover_tests(tessera_${name}_test TEST_PREFIX "${name}/" DISCOVERY_MODE PRE_TEST
+    PROPERTIES TIMEOUT 300 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
+endfunction()
+
+# tessera_simd_kernels(TARGET): Highway's kernels of a library that chooses among instruction sets at run time, for which
+# -O3 pays.
+function(tessera_simd_kernels target)
+  target_compile_options(${target} PRIVATE -O3)
+  tessera_simd_targets(${target})
+endfunction()
+
+# tessera_simd_targets(TARGET): Highway with the instruction sets of this project. Also for tests that run a library's
+# kernels with each set in turn: they include what was compiled for each, and have to see the same ones.
+function(tessera_simd_targets target)
+  target_link_libraries(${target} PRIVATE PkgConfig::HWY)
+  # Targets that bring these kernels nothing over AVX3 would only double the build.
+  target_compile_definitions(${target} PRIVATE "HWY_DISABLED_TARGETS=(HWY_AVX3_DL)")
+endfunction()
+
+# tessera_representation(NAME
+#   CONTENT a.cpp ...              tessera_NAME_content: a content in memory, its reader, writer and rules
+#   CPU a.cpp ...                  tessera_NAME_cpu: drawing on the CPU, by kernels of several instruction sets
+#   VULKAN a.cpp ...               tessera_NAME_vulkan: drawing on the GPU; only in builds with Vulkan
+#   TRAIN a.cpp ...                tessera_NAME_train: settings, model, training step and baking
+#   CONTENT_USES base scene ...    other modules (public); likewise CPU_USES, VULKAN_USES, TRAIN_USES
+#   CONTENT_LIBRARIES x ...        third-party targets that no header of this part mentions; likewise of the others
+#   TESTS a_test.cpp ...           unit tests of all parts: one binary tessera_NAME_test, as each costs a link
+#   VULKAN_TESTS b_test.cpp ...    those of them that need Vulkan
+#   TEST_USES render ...           other modules that tests use
+#   TEST_LIBRARIES x ...)          third-party targets that they use
+#
+# One library for each part of a representation, so that what only draws links no trainer. CPU, VULKAN and TRAIN use
+# CONTENT. A part without files is not made: `field` has no content. Files are named from the folder of the caller
+# (content/reader.cpp). VULKAN is the place of the shaders: tessera_shader(tessera_NAME_vulkan ...).
+function(tessera_representation name)
+  set(parts CONTENT CPU VULKAN TRAIN)
+  set(lists ${parts} TESTS VULKAN_TESTS TEST_USES TEST_LIBRARIES)
+  foreach(part IN LISTS parts)
+    list(APPEND lists ${part}_USES ${part}_LIBRARIES)
+  endforeach()
+  cmake_parse_arguments(ARG "" "" "${lists}" ${ARGN})
+  if(ARG_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "tessera_representation(${name}) does not know ${ARG_UNPARSED_ARGUMENTS}")
+  endif()
+  if(NOT TESSERA_VULKAN)
+    set(ARG_VULKAN)
+    set(ARG_VULKAN_TESTS)
+  endif()
+
+  set(libraries)
+  foreach(part IN LISTS parts)
+    if(NOT ARG_${part})
+      continue()
+    endif()
+    string(TOLOWER ${part} suffix)
+    set(uses ${ARG_${part}_USES})
+    if(NOT part STREQUAL CONTENT AND ARG_CONTENT)
+      list(PREPEND uses ${name}_content)
+    endif()
+    tessera_module(${name}_${suffix} SOURCES ${ARG_${part}} USES ${uses} PRIVATE_LIBRARIES ${ARG_${part}_LIBRARIES})
+    list(APPEND libraries tessera_${name}_${suffix})
+  endforeach()
+  if(ARG_CPU)
+    tessera_simd_kernels(tessera_${name}_cpu)
+  endif()
+
+  if(TESSERA_TESTS AND (ARG_TESTS OR ARG_VULKAN_TESTS))
+    list(TRANSFORM ARG_TEST_USES PREPEND tessera_)
+    tessera_unit_tests(${name} SOURCES ${ARG_TESTS} ${ARG_VULKAN_TESTS}
+      LIBRARIES ${libraries} ${ARG_TEST_USES} ${ARG_TEST_LIBRARIES})
+    if(ARG_CPU)
+      tessera_simd_targets(tessera_${name}_test)
+    endif()
   endif()
 endfunction()
 
