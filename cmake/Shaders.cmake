@@ -1,7 +1,9 @@
 # tessera_shader(TARGET source.comp [VARIANT name] [DEFINES A B ...])
 #
 # Compiles GLSL to SPIR-V when TARGET is built, as the header "shaders/<source>[_<variant>].h", which holds the words as
-# `const uint32_t k<Source><Variant>Spirv[]` (snake_case becomes PascalCase). Includes are followed.
+# `const uint32_t k<Source><Variant>Spirv[]` (snake_case becomes PascalCase). Includes are followed. The folder and the
+# stage are no part of the name: two shaders that would write the same header of one CMakeLists.txt (render/draw.comp and
+# window/draw.frag) stop the configuration.
 function(tessera_shader target source)
   cmake_parse_arguments(ARG "" "VARIANT" "DEFINES" ${ARGN})
   get_filename_component(name ${source} NAME_WE)
@@ -20,6 +22,12 @@ function(tessera_shader target source)
 
   set(folder ${CMAKE_CURRENT_BINARY_DIR}/generated)
   set(header ${folder}/shaders/${name}.h)
+  set(from "${source} ${ARG_VARIANT}")
+  get_property(other GLOBAL PROPERTY tessera_shader_of_${header})
+  if(other AND NOT other STREQUAL from)
+    message(FATAL_ERROR "The shaders ${other} and ${from} would both become shaders/${name}.h: rename one")
+  endif()
+  set_property(GLOBAL PROPERTY tessera_shader_of_${header} ${from})
   file(MAKE_DIRECTORY ${folder}/shaders)
   add_custom_command(
     OUTPUT ${header}
