@@ -6,6 +6,7 @@
 #pragma once
 
 #include "compute/memory.h"
+#include "compute/operation.h"
 
 namespace tessera {
 
@@ -26,5 +27,6 @@ struct Adam {
   Slice<float> secondMoments;  // [n]
   Slice<uint32_t> counts;      // [n]: steps taken
 };
+TESSERA_OPERATION(Adam);
 
 }  // namespace tessera

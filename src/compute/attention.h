@@ -2,6 +2,7 @@
 #pragma once
 
 #include "compute/memory.h"
+#include "compute/operation.h"
 
 namespace tessera {
 
@@ -32,6 +33,7 @@ struct AttentionForward {
   Slice<const float> logits;   // [shape.logits()] where they do not vary
   Matrix<float> features;      // 8 columns
 };
+TESSERA_OPERATION(AttentionForward);
 
 // Overwrites coarseGradients and fineGradients, adds to logitGradients. The bound on density passes gradients on, as
 // exponentials are truncated (Extinction::logDensity).
@@ -45,6 +47,7 @@ struct AttentionBackward {
   Matrix<float> coarseGradients, fineGradients;
   Slice<float> logitGradients;  // [shape.logits()] where they do not vary
 };
+TESSERA_OPERATION(AttentionBackward);
 
 // NGP-RT, eq. 5, with the sigmoid of its supplement: what a ray's samples add up to, and what its direction adds to
 // that, become a colour. colour = g · sigmoid(diffuse + specular), g the opacity, or 1 where there is nothing else to
@@ -57,6 +60,7 @@ struct ShadeForward {
   Slice<const float> opacity;    // [rays]; not with `whole`
   Slice<float> colour;           // [rays][3]
 };
+TESSERA_OPERATION(ShadeForward);
 
 // Overwrites sumGradients, which are those of diffuse and of specular. Adds to opacityGradients.
 struct ShadeBackward {
@@ -68,12 +72,6 @@ struct ShadeBackward {
   Matrix<float> sumGradients;          // 3 columns
   Slice<float> opacityGradients;       // [rays]; not with `whole`
 };
-
-// output += input, element by element.
-struct AddColumns {
-  Count rows;
-  Matrix<const float> input;
-  Matrix<float> output;  // as many columns
-};
+TESSERA_OPERATION(ShadeBackward);
 
 }  // namespace tessera

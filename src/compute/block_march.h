@@ -3,6 +3,7 @@
 #pragma once
 
 #include "compute/blocks.h"
+#include "compute/operation.h"
 
 namespace tessera {
 
@@ -44,5 +45,6 @@ struct MarchBlocks {
   Slice<float> middles;    // length along the ray's pieces up to the middle
   Slice<float> widths;     // of the interval, likewise
 };
+TESSERA_OPERATION(MarchBlocks);
 
 }  // namespace tessera

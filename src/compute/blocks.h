@@ -4,6 +4,7 @@
 #include <array>
 
 #include "compute/memory.h"
+#include "compute/operation.h"
 
 namespace tessera {
 
@@ -78,6 +79,7 @@ struct EnterScene {
   Slice<float> range;             // [rays][2]
   Slice<float> fences;            // [rays][intervals + 1]
 };
+TESSERA_OPERATION(EnterScene);
 
 // Intervals between fence posts become samples at their middles (in t). Rows are written from `firstRow` on, ray after
 // ray, front to back. With `split`, intervals are cut where the ray passes from one block to another: at every distance
@@ -128,6 +130,7 @@ struct BlockSamples {
     return rayCount * (mostCuts() + 1 + (space.surround == Surround::own ? 1 : 0));
   }
 };
+TESSERA_OPERATION(BlockSamples);
 
 // Random points for the sparsity loss: point p draws from RandomStream(seed, 0x5ba) at index 8 p + purpose. It lies in
 // block blocks[below(0)], evenly in its domain (purposes 1, 2, 3: x, y, z; a bounded block's z between bottom and top),
@@ -144,6 +147,7 @@ struct BlockPoints {
   Slice<float> positions;             // [points][3]
   Slice<float> runtimeSteps;          // [points]
 };
+TESSERA_OPERATION(BlockPoints);
 
 // A stable sort of samples by block: source lists the rows of block 0 in order, then those of block 1, ...
 struct GroupByBlock {
@@ -153,13 +157,6 @@ struct GroupByBlock {
   Slice<uint32_t> firstOfBlock;  // [blocks + 1], rows of `source`
   Slice<uint32_t> source;        // [capacity]
 };
-
-// output row source[i] = input row i: the inverse of GatherRows where `source` is a permutation.
-struct ScatterRows {
-  Count rows;
-  Slice<const uint32_t> source;
-  Matrix<const float> input;
-  Matrix<float> output;
-};
+TESSERA_OPERATION(GroupByBlock);
 
 }  // namespace tessera

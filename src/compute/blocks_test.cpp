@@ -9,6 +9,7 @@
 #include <set>
 
 #include "compute/device_test.h"
+#include "compute/rows.h"
 #include "scene/block_grid.h"
 #include "scene/contraction.h"
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "compute/memory.h"
+#include "compute/operation.h"
 
 namespace tessera {
 
@@ -31,6 +32,7 @@ struct CompositeForward {
   Slice<float> depth;                 // optional, [rays]
   Slice<float> weights;               // [samples]
 };
+TESSERA_OPERATION(CompositeForward);
 
 // Overwrites xGradients, colourGradients (of samples) for all samples of the rays, zero behind the stop. A place near a
 // camera is seen by few photos and by many of their pixels: unscaled, it learns fastest and becomes fog. With
@@ -55,5 +57,6 @@ struct CompositeBackward {
   Slice<float> xGradients;                 // [samples]
   Matrix<float> colourGradients;           // [samples], as colours; with colours
 };
+TESSERA_OPERATION(CompositeBackward);
 
 }  // namespace tessera

@@ -1,22 +1,16 @@
 #include "compute/device.h"
 
-#include "base/error.h"
+#include "compute/mlp.h"
 
 namespace tessera {
 
-#define TESSERA_UNSUPPORTED(name)        \
-  void Device::run(const name&) {        \
-    CHECK(!"this device has no " #name); \
-  }
-TESSERA_OPERATIONS(TESSERA_UNSUPPORTED)
-#undef TESSERA_UNSUPPORTED
+Array<float> Device::activationsOf(const MlpShape& shape, size_t samples) {
+  return array<float>(samples * shape.activationsPerSample() / (keepsHalves() ? 2 : 1));
+}
 
-void requireAllOperations(const Device& device) {
-  for (size_t i = 0; i < std::size(kOperationNames); ++i) {
-    if (device.supports(static_cast<Operation>(i))) continue;
-    throw Error("--device", device.name(), "cannot train or draw yet: it has no " + std::string(kOperationNames[i]),
-                "use --device cpu");
-  }
+void Device::lacks(const OperationId& operation) const {
+  const std::string missing = name() + " has no operation " + std::string(operation.name());
+  CHECK(missing == "");
 }
 
 }  // namespace tessera

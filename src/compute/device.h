@@ -1,9 +1,10 @@
 // The one interface between what is computed and what computes it. Training is written against Device and knows no
 // hardware. Operations are queued in order and never read back in the middle of a step; `read` and `finish` wait.
 //
-// Each operation is a struct of arguments (shapes, what is read, what is written) in a header named after it, and one
-// function here; reference/, cpu/ and vulkan/ each have a file of the same name. device_test.cpp walks
-// operation × device × shape: an operation without a row there does not build.
+// Each operation is a struct of arguments (shapes, what is read, what is written) in a header named after its kind,
+// with its name beside it (operation.h). This header knows none of them, so that a new operation rebuilds its users
+// only. reference/, cpu/ and vulkan/ each have a file of the same name. device_test.cpp walks operation × device ×
+// shape: an operation without a row there does not link.
 #pragma once
 
 #include <optional>
@@ -12,87 +13,12 @@
 #include <tuple>
 #include <vector>
 
-#include "compute/adam.h"
-#include "compute/attention.h"
-#include "compute/block_march.h"
-#include "compute/blocks.h"
-#include "compute/composite.h"
-#include "compute/deferred.h"
-#include "compute/encodings.h"
-#include "compute/hash_grid.h"
-#include "compute/lattice.h"
-#include "compute/losses.h"
 #include "compute/memory.h"
-#include "compute/mlp.h"
-#include "compute/occupancy.h"
-#include "compute/proposals.h"
-#include "compute/rays.h"
-#include "compute/virtual_grid.h"
+#include "compute/operation.h"
 
 namespace tessera {
 
-// X(argument struct): every operation, in the order of the headers.
-#define TESSERA_OPERATIONS(X)   \
-  X(HashGridForward)            \
-  X(HashGridBackward)           \
-  X(MlpForward)                 \
-  X(MlpBackward)                \
-  X(SphericalHarmonicsForward)  \
-  X(SphericalHarmonicsBackward) \
-  X(FrequencyForward)           \
-  X(FrequencyBackward)          \
-  X(GenerateRays)               \
-  X(MarchRays)                  \
-  X(OpticalDepth)               \
-  X(CompactSamples)             \
-  X(GatherRows)                 \
-  X(OccupancyPoints)            \
-  X(OccupancyUpdate)            \
-  X(DistinctTexels)             \
-  X(VirtualGridForward)         \
-  X(VirtualGridBackward)        \
-  X(LatticeForward)             \
-  X(LatticeBackward)            \
-  X(AttentionForward)           \
-  X(AttentionBackward)          \
-  X(EnterScene)                 \
-  X(MarchBlocks)                \
-  X(BlockSamples)               \
-  X(BlockPoints)                \
-  X(GroupByBlock)               \
-  X(ScatterRows)                \
-  X(ResampleFences)             \
-  X(InterlevelLoss)             \
-  X(CompositeForward)           \
-  X(CompositeBackward)          \
-  X(DeferredForward)            \
-  X(DeferredBackward)           \
-  X(BlendForward)               \
-  X(BlendBackward)              \
-  X(ShadeForward)               \
-  X(ShadeBackward)              \
-  X(AddColumns)                 \
-  X(ColourLoss)                 \
-  X(DistortionLoss)             \
-  X(DepthLoss)                  \
-  X(S3imLoss)                   \
-  X(OpacityLoss)                \
-  X(SparsityLoss)               \
-  X(ExposureForward)            \
-  X(ExposureBackward)           \
-  X(Adam)
-
-enum class Operation {
-#define TESSERA_ENUMERATOR(name) k##name,
-  TESSERA_OPERATIONS(TESSERA_ENUMERATOR)
-#undef TESSERA_ENUMERATOR
-};
-
-inline constexpr std::string_view kOperationNames[] = {
-#define TESSERA_NAME(name) #name,
-    TESSERA_OPERATIONS(TESSERA_NAME)
-#undef TESSERA_NAME
-};
+struct MlpShape;
 
 class Device {
  public:
@@ -122,24 +48,23 @@ class Device {
   int hostThreads() const { return hostThreads_; }
   void setHostThreads(int threads) { hostThreads_ = threads; }
 
-  // False where a device does not have an operation yet; calling it then is our own mistake (CHECK).
-  virtual bool supports(Operation operation) const = 0;
-
   // Whether activations of networks are kept in fp16, two to a word; else as floats.
   virtual bool keepsHalves() const { return false; }
 
-#define TESSERA_RUN(name) virtual void run(const name&);
-  TESSERA_OPERATIONS(TESSERA_RUN)
-#undef TESSERA_RUN
+  // Queues an operation. Every device runs every operation of the list (operations.h); one that is not on it is our own
+  // mistake (CHECK, which names it).
+  template <class Arguments>
+  void run(const Arguments& arguments) {
+    static_assert(Operation<Arguments>, "this is no operation: no TESSERA_OPERATION stands below the struct");
+    if (!runOperation(kOperation<Arguments>, &arguments)) lacks(kOperation<Arguments>);
+  }
 
   template <class T>
   Array<T> array(size_t count) {
     return count ? Array<T>(allocate(count * sizeof(T)), count) : Array<T>();
   }
   // What MlpForward keeps for MlpBackward.
-  Array<float> activationsOf(const MlpShape& shape, size_t samples) {
-    return array<float>(samples * shape.activationsPerSample() / (keepsHalves() ? 2 : 1));
-  }
+  Array<float> activationsOf(const MlpShape& shape, size_t samples);
   template <class T>
   Array<T> arrayOf(const std::vector<T>& values) {
     Array<T> made = array<T>(values.size());
@@ -174,6 +99,10 @@ class Device {
   }
 
  private:
+  // Queues the operation with the arguments that it names the type of. False: it is not on the list.
+  virtual bool runOperation(const OperationId& operation, const void* arguments) = 0;
+  void lacks(const OperationId& operation) const;
+
   int hostThreads_ = 1;
 };
 
@@ -181,9 +110,6 @@ struct DeviceOptions {
   std::string kind = "cpu";  // auto, cpu, reference, vulkan, vulkan:1 (an index) or vulkan:radeon (a part of a name)
   int threads = 0;           // of the processor; 0: all cores for cpu, a few beside other devices
 };
-
-// Throws Error naming the first operation that the device lacks.
-void requireAllOperations(const Device& device);
 
 // Throws Error when there is no such device on this machine. "auto" is the best graphics card that can be used, else
 // cpu; it is never a Vulkan driver that computes on the processor.

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "compute/attention.h"
 #include "compute/device_test.h"
+#include "compute/rows.h"
 
 namespace tessera::device_test {
 namespace {

@@ -1,6 +1,7 @@
 // Cases of marching through blocks.
 #include <fmt/format.h>
 
+#include "compute/block_march.h"
 #include "compute/device_test.h"
 #include "compute/test_block_rays.h"
 

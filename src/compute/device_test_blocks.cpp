@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "compute/device_test.h"
+#include "compute/rows.h"
 #include "compute/test_block_rays.h"
 
 namespace tessera::device_test {

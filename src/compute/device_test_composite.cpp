@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "compute/composite.h"
 #include "compute/device_test.h"
 
 namespace tessera::device_test {

@@ -1,6 +1,8 @@
 // Cases of deferred networks and of blending blocks.
 #include <fmt/format.h>
 
+#include "compute/blend.h"
+#include "compute/deferred.h"
 #include "compute/device_test.h"
 
 namespace tessera::device_test {

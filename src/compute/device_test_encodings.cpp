@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "compute/device_test.h"
+#include "compute/encodings.h"
+#include "compute/hash_grid.h"
 
 namespace tessera::device_test {
 namespace {

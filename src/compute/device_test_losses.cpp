@@ -3,7 +3,10 @@
 
 #include <cmath>
 
+#include "compute/adam.h"
 #include "compute/device_test.h"
+#include "compute/exposure.h"
+#include "compute/losses.h"
 
 namespace tessera::device_test {
 namespace {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "compute/device_test.h"
+#include "compute/mlp.h"
 
 namespace tessera::device_test {
 namespace {

@@ -5,7 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compute/adam.h"
+#include "compute/composite.h"
 #include "compute/device_test.h"
+#include "compute/occupancy.h"
+#include "compute/rays.h"
 
 namespace tessera::device_test {
 namespace {
@@ -18,7 +22,6 @@ class DeviceProperties : public testing::TestWithParam<std::string> {
     if (device == nullptr) GTEST_SKIP() << "this machine has no device \"" << GetParam() << "\"";
   }
   void TearDown() override { useSimdTargetOf({}); }
-  bool lacks(Operation operation) const { return !device->supports(operation); }
   Device* device = nullptr;
 };
 
@@ -33,7 +36,6 @@ TEST_P(DeviceProperties, MemoryStartsZeroedAndKeepsWhatIsWritten) {
 }
 
 TEST_P(DeviceProperties, OpacityIsTheSumOfWeights) {
-  if (lacks(Operation::kCompositeForward)) GTEST_SKIP() << "no CompositeForward";
   Stage stage(*device, 71);
   const uint32_t rays = 50;
   const std::vector<uint32_t> first = stage.random.firstSamples(rays, 60);
@@ -60,7 +62,6 @@ TEST_P(DeviceProperties, OpacityIsTheSumOfWeights) {
 }
 
 TEST_P(DeviceProperties, MarchingInRoundsMakesTheSamplesOfOneMarch) {
-  if (lacks(Operation::kMarchRays)) GTEST_SKIP() << "lacks operations";
   Stage stage(*device, 74);
   const uint32_t rays = 50, room = 20000;
   const MarchSpace space{.contracted = true, .gridResolution = 16, .far = 50, .minStep = 0.02f, .cone = 1.0f / 64};
@@ -98,7 +99,6 @@ TEST_P(DeviceProperties, MarchingInRoundsMakesTheSamplesOfOneMarch) {
 }
 
 TEST_P(DeviceProperties, CompactionKeepsAllSamplesThatCompositingWeighs) {
-  if (lacks(Operation::kCompositeForward) || lacks(Operation::kCompactSamples)) GTEST_SKIP() << "lacks operations";
   Stage stage(*device, 72);
   const uint32_t rays = 40;
   const std::vector<uint32_t> first = stage.random.firstSamples(rays, 60);
@@ -136,7 +136,6 @@ TEST_P(DeviceProperties, CompactionKeepsAllSamplesThatCompositingWeighs) {
 }
 
 TEST_P(DeviceProperties, OccupancyForgetsWhatIsEmptyAndKeepsWhatIsFull) {
-  if (lacks(Operation::kOccupancyPoints) || lacks(Operation::kOccupancyUpdate)) GTEST_SKIP() << "lacks operations";
   Stage stage(*device, 73);
   const MarchSpace space{.contracted = false, .gridResolution = 8, .minStep = 0.01f, .cone = 0};
   const uint32_t all = 512;
@@ -164,7 +163,6 @@ TEST_P(DeviceProperties, OccupancyForgetsWhatIsEmptyAndKeepsWhatIsFull) {
 }
 
 TEST_P(DeviceProperties, AdamCountsTheStepsOfEachParameterAndLeavesTheUntouchedAlone) {
-  if (lacks(Operation::kAdam)) GTEST_SKIP() << "no Adam";
   Stage stage(*device, 74);
   const size_t n = 101;
   std::vector<float> parameters = stage.random.floats(n, -1, 1);

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "compute/device_test.h"
+#include "compute/proposals.h"
 
 namespace tessera::device_test {
 namespace {

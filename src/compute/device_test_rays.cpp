@@ -4,6 +4,9 @@
 #include <cmath>
 
 #include "compute/device_test.h"
+#include "compute/occupancy.h"
+#include "compute/rays.h"
+#include "compute/rows.h"
 #include "scene/camera.h"
 
 namespace tessera::device_test {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "compute/memory.h"
+#include "compute/operation.h"
 
 namespace tessera {
 
@@ -13,6 +14,7 @@ struct SphericalHarmonicsForward {
   Slice<const uint32_t> rayOfSample;  // optional, [capacity]: which direction a sample has; else its own index
   Matrix<float> encoded;              // [capacity][degree²], row-major
 };
+TESSERA_OPERATION(SphericalHarmonicsForward);
 
 // Overwrites `directionGradients` (per sample). The gradient is of the polynomials as functions on R³.
 struct SphericalHarmonicsBackward {
@@ -23,6 +25,7 @@ struct SphericalHarmonicsBackward {
   Matrix<const float> encodedGradients;
   Slice<float> directionGradients;  // [capacity][3]
 };
+TESSERA_OPERATION(SphericalHarmonicsBackward);
 
 // x, then sin(2^k x) for k in [0, frequencies), then cos(2^k x): per k all input components (MERF's order).
 // dimensions × (1 + 2 · frequencies) columns.
@@ -33,6 +36,7 @@ struct FrequencyForward {
   Slice<const float> inputs;  // [capacity][dimensions]
   Matrix<float> encoded;      // row-major
 };
+TESSERA_OPERATION(FrequencyForward);
 
 // Overwrites `inputGradients`.
 struct FrequencyBackward {
@@ -43,5 +47,6 @@ struct FrequencyBackward {
   Matrix<const float> encodedGradients;
   Slice<float> inputGradients;  // [capacity][dimensions]
 };
+TESSERA_OPERATION(FrequencyBackward);
 
 }  // namespace tessera

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "compute/memory.h"
+#include "compute/operation.h"
 
 namespace tessera {
 
@@ -55,6 +56,7 @@ struct HashGridForward {
   Slice<const float> table;      // [grid.entries()][features]
   Matrix<float> encoded;         // [capacity][grid.columns()], grouped by level
 };
+TESSERA_OPERATION(HashGridForward);
 
 // Adds to `tableGradients`; overwrites `positionGradients`.
 struct HashGridBackward {
@@ -66,5 +68,6 @@ struct HashGridBackward {
   Slice<float> tableGradients;           // [grid.entries()][features]
   Slice<float> positionGradients;        // optional, [capacity][3]
 };
+TESSERA_OPERATION(HashGridBackward);
 
 }  // namespace tessera

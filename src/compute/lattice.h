@@ -2,6 +2,7 @@
 // baked grid will hold them, and interpolated, so that training sees what will be drawn.
 #pragma once
 
+#include "compute/operation.h"
 #include "compute/virtual_grid.h"
 
 namespace tessera {
@@ -19,6 +20,7 @@ struct LatticeForward {
   Slice<const float> values;            // [texels][16]; those of texels beyond the capacity count as 0
   Matrix<float> mixed;                  // [samples], 16 columns: a row is one run, or groups of 8
 };
+TESSERA_OPERATION(LatticeForward);
 
 // Overwrites valueGradients of all rows below the count of texels.
 struct LatticeBackward {
@@ -32,5 +34,6 @@ struct LatticeBackward {
   Matrix<const float> mixedGradients;  // as `mixed`
   Slice<float> valueGradients;         // [texels][16]
 };
+TESSERA_OPERATION(LatticeBackward);
 
 }  // namespace tessera

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "compute/memory.h"
+#include "compute/operation.h"
 
 namespace tessera {
 
@@ -22,6 +23,7 @@ struct ColourLoss {
   Slice<float> loss;             // [2], overwritten: the loss, and Σ weight · Σ r² (for PSNR)
   Slice<float> gradients;        // [rays][3], overwritten
 };
+TESSERA_OPERATION(ColourLoss);
 
 // Distortion (Barron et al. 2022, eq. 15) in O(n) per ray, on normalised positions s = g(t), g(t) = t/2 for t < 1,
 // 1 - 1/(2t) beyond (MERF's warp): Σ_ij w_i w_j |s_i - s_j| + Σ_i w_i² Δs_i / 3; intervals [t - step/2, t + step/2],
@@ -38,6 +40,7 @@ struct DistortionLoss {
   Slice<float> loss;                  // [1], overwritten
   Slice<float> weightGradients;       // [samples], overwritten
 };
+TESSERA_OPERATION(DistortionLoss);
 
 // Pulls what a ray sees to where structure from motion found a point, at distance D: scale · Σ_rays (1 - Σ_i w_i (1 -
 // r_i)), r_i = min(1, max(0, |t_i - D| / D - tolerance)). That is the Wasserstein distance between the ray's weights
@@ -53,6 +56,7 @@ struct DepthLoss {
   Slice<float> loss;                  // [1], overwritten
   Slice<float> weightGradients;       // [samples], added to
 };
+TESSERA_OPERATION(DepthLoss);
 
 // S3IM (Xie et al. 2023): the similarity of random groups of pixels. `patches` times, all rays are put in an order (the
 // first time their own; then by a Fisher-Yates shuffle, i from n - 1 down to 1 swapped with below(i, i + 1) of
@@ -72,6 +76,7 @@ struct S3imLoss {
   Slice<float> loss;             // [1], overwritten
   Slice<float> gradients;        // [rays][3], added to
 };
+TESSERA_OPERATION(S3imLoss);
 
 // City-on-Web, eq. 6: pulls the opacity of each block along a ray to 0 or 1. loss = scale · Σ -(α ln α + (1 - α) ln(1 -
 // α)), α clamped to [1e-5, 1 - 1e-5] in value and gradient: beyond, the gradient stays what it is at the bound.
@@ -82,6 +87,7 @@ struct OpacityLoss {
   Slice<float> loss;              // [1], overwritten
   Slice<float> opacityGradients;  // [segments], added to
 };
+TESSERA_OPERATION(OpacityLoss);
 
 // City-on-Web, eq. 5 (with 1 - exp, not 1 - σv): what a renderer's step would see at random points. loss = scale · Σ (1
 // - exp(-exp(logDensity) · runtimeStep)). Gradients are overwritten; through exp they clamp as in compositing.
@@ -93,30 +99,6 @@ struct SparsityLoss {
   Slice<float> loss;                // [1], overwritten
   Slice<float> gradients;           // [points]
 };
-
-// Per-photo exposure: exposed = colour · 2^(logGain[photo of ray]) + (1 - opacity) · background per channel, in the
-// trained colour space. Colours are of the scene alone: what stands behind it is not exposed with it.
-struct ExposureForward {
-  Count rays;
-  Slice<const float> colours;        // [rays][3]
-  Slice<const float> opacity;        // [rays]; read only with a background
-  Slice<const float> background;     // optional, [rays][3]; else black
-  Slice<const uint32_t> photoOfRay;  // [rays]
-  Slice<const float> logGains;       // [photos][3]
-  Slice<float> exposed;              // [rays][3]
-};
-
-// Overwrites colourGradients and opacityGradients, adds to logGainGradients.
-struct ExposureBackward {
-  Count rays;
-  Slice<const float> colours;
-  Slice<const float> background;
-  Slice<const uint32_t> photoOfRay;
-  Slice<const float> logGains;
-  Slice<const float> exposedGradients;  // [rays][3]
-  Slice<float> colourGradients;         // [rays][3]; may be the same memory as exposedGradients
-  Slice<float> opacityGradients;        // [rays]; with a background
-  Slice<float> logGainGradients;        // [photos][3]
-};
+TESSERA_OPERATION(SparsityLoss);
 
 }  // namespace tessera

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "compute/memory.h"
+#include "compute/operation.h"
 
 namespace tessera {
 
@@ -46,6 +47,7 @@ struct MlpForward {
   Matrix<float> output;        // [capacity][outputs or fewer: the first ones are wanted], row-major
   Slice<float> activations;    // optional, Device::activationsOf(shape, capacity): kept for backward
 };
+TESSERA_OPERATION(MlpForward);
 
 // Adds to `weightGradients`; overwrites `inputGradients`.
 struct MlpBackward {
@@ -61,5 +63,6 @@ struct MlpBackward {
   Slice<float> weightGradients;             // [shape.parameters()]
   Matrix<float> inputGradients;             // optional, [capacity][inputs]
 };
+TESSERA_OPERATION(MlpBackward);
 
 }  // namespace tessera

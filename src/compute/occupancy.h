@@ -2,6 +2,7 @@
 #pragma once
 
 #include "compute/memory.h"
+#include "compute/operation.h"
 #include "compute/rays.h"
 
 namespace tessera {
@@ -21,6 +22,7 @@ struct OccupancyPoints {
   Slice<float> positions;            // [points][3], grid coordinates
   uint32_t first = 0;                // of the list: these points are its entries [first, first + points)
 };
+TESSERA_OPERATION(OccupancyPoints);
 
 // First every cell decays; then grid = max(grid, exp(min(logDensity, 15)) · step) at the chosen cells (which may
 // repeat), where step is the marching step there: clamp(cone · ‖x‖∞, minStep, maxStep) with x the cell centre in scene
@@ -38,5 +40,6 @@ struct OccupancyUpdate {
   Slice<float> grid;               // [resolution³]
   Slice<uint32_t> occupancy;       // [resolution³ / 32]
 };
+TESSERA_OPERATION(OccupancyUpdate);
 
 }  // namespace tessera

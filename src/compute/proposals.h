@@ -3,6 +3,7 @@
 #pragma once
 
 #include "compute/memory.h"
+#include "compute/operation.h"
 
 namespace tessera {
 
@@ -20,6 +21,7 @@ struct ResampleFences {
   Slice<const float> jitter;   // optional, [rays], in [0,1); else 1/2
   Slice<float> resampled;      // [rays][after + 1]
 };
+TESSERA_OPERATION(ResampleFences);
 
 // Interlevel loss: the proposal's histogram should be an upper bound of the samples'. For sample i on [a, b] with
 // weight w_i, B_i sums the proposal's bins from the one that holds a (the last fence ≤ a) to the one that holds b (up
@@ -37,5 +39,6 @@ struct InterlevelLoss {
   Slice<float> loss;                   // [1], overwritten
   Slice<float> weightGradients;        // [rays][intervals], overwritten
 };
+TESSERA_OPERATION(InterlevelLoss);
 
 }  // namespace tessera

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "compute/memory.h"
+#include "compute/operation.h"
 
 namespace tessera {
 
@@ -24,6 +25,7 @@ struct GenerateRays {
   Slice<float> origins;               // [capacity][3]
   Slice<float> directions;            // [capacity][3], unit
 };
+TESSERA_OPERATION(GenerateRays);
 
 // What lies between a ray and its samples.
 //   contracted   MERF's piecewise-projective map (Reiser et al. 2023, eq. 4): identity in [-1,1]³, everything outside
@@ -84,6 +86,7 @@ struct MarchRays {
   Slice<float> distances;           // [sampleCapacity]: t of the middle
   Slice<float> steps;               // [sampleCapacity]: t(n+1) - t(n)
 };
+TESSERA_OPERATION(MarchRays);
 
 // opticalDepth[ray] += Σ exp(logDensity) · step over the ray's samples, in order. Transmittance is exp(-opticalDepth).
 struct OpticalDepth {
@@ -93,6 +96,7 @@ struct OpticalDepth {
   Slice<const float> steps;
   Slice<float> opticalDepth;  // [rays]
 };
+TESSERA_OPERATION(OpticalDepth);
 
 // Keeps of each ray the samples in front of the point where its optical depth passes `mostOpticalDepth` (the one that
 // crosses included), out of all rounds of marching: sample i of round q stands at row q · sampleCapacity + i. The first
@@ -113,13 +117,6 @@ struct CompactSamples {
   Slice<uint32_t> source;             // [keptCapacity]: the row that a kept sample was
   Slice<uint32_t> rayOfSample;        // [keptCapacity]
 };
-
-// output row i = input row source[i]. 32-bit elements of any kind.
-struct GatherRows {
-  Count rows;
-  Slice<const uint32_t> source;
-  Matrix<const float> input;
-  Matrix<float> output;  // same layout kind and columns
-};
+TESSERA_OPERATION(CompactSamples);
 
 }  // namespace tessera

@@ -9,6 +9,7 @@
 #include "base/random.h"
 #include "base/threads.h"
 #include "compute/cpu/kernels.h"
+#include "compute/hash_grid.h"
 #include "compute/roofline_recorder.h"
 #ifdef TESSERA_HAS_VULKAN
 #include "compute/vulkan/device.h"
@@ -67,9 +68,8 @@ void raise(MachineLimits& limits, const MachineLimits& again) {
 
 }  // namespace
 
-void RooflineRecorder::measure(Operation operation, Work work, const std::function<void()>& run) {
+void RooflineRecorder::measure(const OperationId& operation, Work work, const std::function<void()>& run) {
   using Clock = std::chrono::steady_clock;
-  if (!device_.supports(operation)) return;
   // So many one after another that beginning and waiting cost nothing.
   int times = 1;
   const auto timed = [&] {
@@ -92,9 +92,9 @@ void RooflineRecorder::measure(Operation operation, Work work, const std::functi
                    std::move(work.unit), work.limit, work.memoryLimit});
 }
 
-void RooflineRecorder::measureStream(Operation operation, std::string shape, double bytes,
+void RooflineRecorder::measureStream(const OperationId& operation, std::string shape, double bytes,
                                      const std::function<void()>& run) {
-  const std::string name(kOperationNames[static_cast<int>(operation)]);
+  const std::string name(operation.name());
   measure(operation, {name, std::move(shape), bytes, "B", streamLimit(bytes)}, run);
 }
 

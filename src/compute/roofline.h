@@ -3,16 +3,17 @@
 //
 //   networks       2 · parameters · samples forward (a multiply and an add a weight), twice that backward (the gradient
 //                  of the weights and that of the inputs); padding of inputs and outputs is not counted. Beside the
-//                  arithmetic's limit (the matrix units', where there are any) memory's: as much as is done while inputs,
-//                  outputs and what is kept of activations are copied, and backward their gradients
+//                  arithmetic's limit (the matrix units', where there are any) memory's: as much as is done while
+//                  inputs, outputs and what is kept of activations are copied, and backward their gradients
 //   hash grid      8 corners · levels · samples lookups, forward (read) as backward (read, add, write)
 //   virtual grid   20 corners · samples lookups; the limit is the lower of two rates: gathers from a table of what the
 //                  corners are looked up in (a bit each of all texels to find those needed, 8 bytes each of those
 //                  needed forward, 32 backward), and as many lookups as are done while the arguments are copied:
 //                  16 bytes a sample for where it is, 8 for every 32 texels (bits and ranks), then 12 a needed texel
 //                  (finding), 32 a needed texel and 32 a sample (forward), 32 and 64 (backward)
-//   lattice        8 corners · samples lookups, 64 bytes each; the limit likewise: 64 bytes a needed corner and a sample
-//   all others     bytes of their arguments, each array once however often a kernel passes over it; the limit is a copy
+//   lattice        8 corners · samples lookups, 64 bytes each; the limit likewise: 64 bytes a needed corner and a
+//   sample all others     bytes of their arguments, each array once however often a kernel passes over it; the limit is
+//   a copy
 //                  of the same footprint (to the next power of two)
 //
 // The limit of the hash grid is the gather rate of tables of the same sizes, level by level: lookups / Σ (lookups of a
@@ -52,13 +53,14 @@ struct MachineLimits {
 };
 
 struct RooflineRow {
-  Operation operation;
+  OperationId operation;
   std::string name, shape;
   double seconds = 0;  // of one run
   double rate = 0;     // per second
   std::string unit;    // "FLOP", "lookup", "B"
   double limit = 0;    // per second; 0: not known
-  // Likewise, while the arguments are copied once: of networks, which small ones never reach the arithmetic's limit for.
+  // Likewise, while the arguments are copied once: of networks, which small ones never reach the arithmetic's limit
+  // for.
   double memoryLimit = 0;
   double share() const { return limit > 0 ? rate / limit : 0; }
   // Of the lower of both.
@@ -74,7 +76,7 @@ struct Roofline {
   std::vector<RooflineRow> rows;
 };
 
-// Throws Error when there is no such device. Operations that the device lacks have no row.
+// Throws Error when there is no such device.
 Roofline measureRoofline(const RooflineOptions& options);
 
 // Samples as marching makes them: `perRay` points half a finest cell or so apart on each of `rays` random lines in

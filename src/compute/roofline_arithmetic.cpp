@@ -4,6 +4,9 @@
 
 #include <algorithm>
 
+#include "compute/deferred.h"
+#include "compute/hash_grid.h"
+#include "compute/mlp.h"
 #include "compute/roofline_recorder.h"
 
 namespace tessera {
@@ -48,10 +51,10 @@ void measureNetwork(RooflineRecorder& recorder, const Network& network, const st
   const auto work = [&](const char* name, double amount, double bytes) {
     return RooflineRecorder::Work{name, where, amount, "FLOP", limit, amount / bytes * recorder.streamLimit(bytes)};
   };
-  recorder.measure(Operation::kMlpForward, work("MlpForward", flops, forwardBytes), [&] { device.run(forward); });
-  recorder.measure(Operation::kMlpBackward, work("MlpBackward", 2 * flops, backwardBytes),
+  recorder.measure(kOperation<MlpForward>, work("MlpForward", flops, forwardBytes), [&] { device.run(forward); });
+  recorder.measure(kOperation<MlpBackward>, work("MlpBackward", 2 * flops, backwardBytes),
                    [&] { device.run(backward); });
-  recorder.measure(Operation::kMlpBackward, work("Mlp both", 3 * flops, forwardBytes + backwardBytes), [&] {
+  recorder.measure(kOperation<MlpBackward>, work("Mlp both", 3 * flops, forwardBytes + backwardBytes), [&] {
     device.run(forward);
     device.run(backward);
   });
@@ -77,10 +80,10 @@ void measureDeferred(RooflineRecorder& recorder, uint32_t n) {
   Array<float> weightGradients = device.array<float>(weights.size());
   const double flops = 2.0 * DeferredNetwork::kParameters * n, limit = recorder.limits().flops;
   const std::string where = fmt::format("deferred 34-16-16-3, {} segments", n);
-  recorder.measure(Operation::kDeferredForward, {"DeferredForward", where, flops, "FLOP", limit}, [&] {
+  recorder.measure(kOperation<DeferredForward>, {"DeferredForward", where, flops, "FLOP", limit}, [&] {
     device.run(DeferredForward{{n, {}}, composited, networkOfSegment, rayOfSegment, direction, weights, specular});
   });
-  recorder.measure(Operation::kDeferredBackward, {"DeferredBackward", where, 2 * flops, "FLOP", limit}, [&] {
+  recorder.measure(kOperation<DeferredBackward>, {"DeferredBackward", where, 2 * flops, "FLOP", limit}, [&] {
     device.run(DeferredBackward{{n, {}},
                                 composited,
                                 networkOfSegment,
@@ -111,9 +114,9 @@ void measureHashGrid(RooflineRecorder& recorder, const HashGrid& grid, const std
   const HashGridBackward backward{
       grid,      {n, {}}, positions, table, Matrix<float>::grouped(upstream, grid.columns(), features, planeRows),
       gradients, {}};
-  recorder.measure(Operation::kHashGridForward, {"HashGridForward", where, lookups, "lookup", limit},
+  recorder.measure(kOperation<HashGridForward>, {"HashGridForward", where, lookups, "lookup", limit},
                    [&] { device.run(forward); });
-  recorder.measure(Operation::kHashGridBackward, {"HashGridBackward", where, lookups, "lookup", limit},
+  recorder.measure(kOperation<HashGridBackward>, {"HashGridBackward", where, lookups, "lookup", limit},
                    [&] { device.run(backward); });
 }
 

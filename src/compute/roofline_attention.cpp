@@ -4,7 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compute/attention.h"
+#include "compute/block_march.h"
+#include "compute/blocks.h"
+#include "compute/lattice.h"
 #include "compute/roofline_recorder.h"
+#include "compute/rows.h"
+#include "compute/virtual_grid.h"
 
 namespace tessera {
 namespace {
@@ -24,7 +30,6 @@ std::vector<float> positionsNearGround(uint32_t samples) {
 
 void measureMarch(RooflineRecorder& recorder) {
   Device& device = recorder.device();
-  if (!device.supports(Operation::kMarchBlocks)) return;
   const BlockSpace space{.columns = 3, .rows = 2};
   MarchBlocks march{space};
   march.cells = 64;
@@ -66,14 +71,13 @@ void measureMarch(RooflineRecorder& recorder) {
   march.widths = widths;
   device.run(march);
   const uint32_t made = device.read(count.all())[0];
-  recorder.measureStream(Operation::kMarchBlocks, fmt::format("{} rays, {} samples", rays, made),
+  recorder.measureStream(kOperation<MarchBlocks>, fmt::format("{} rays, {} samples", rays, made),
                          made * 36.0 + rays * 28.0, [&] { device.run(march); });
 }
 
 // Of one block, as training evaluates them.
 void measureLattice(RooflineRecorder& recorder) {
   Device& device = recorder.device();
-  if (!device.supports(Operation::kDistinctTexels)) return;
   constexpr uint32_t kColumns = LatticeForward::kColumns;
   VirtualGrid grid;
   grid.planes = 0;
@@ -96,11 +100,11 @@ void measureLattice(RooflineRecorder& recorder) {
   const double lookups = 8.0 * n, bits = 8.0 * grid.words(), row = 4.0 * kColumns;
   const std::string shape = fmt::format("{} samples, {} of {} corners", n, texels, grid.texels());
   // As of the virtual grid: lookups, or moving the arguments once.
-  const auto measure = [&](Operation operation, double bytes, const std::function<void()>& run) {
+  const auto measure = [&](const OperationId& operation, double bytes, const std::function<void()>& run) {
     const double moved = bytes + 16.0 * n;
     const double limit =
         std::min(recorder.gatherLimit(size_t{texels} * kColumns * 4), lookups / moved * recorder.streamLimit(moved));
-    const std::string name(kOperationNames[static_cast<size_t>(operation)]);
+    const std::string name(operation.name());
     recorder.measure(operation, {name, shape, lookups, "lookup", limit}, run);
   };
   Array<float> values = recorder.randomFloats(size_t{kColumns} * texels, -1, 1);
@@ -114,7 +118,7 @@ void measureLattice(RooflineRecorder& recorder) {
   forward.texels = {texels};
   forward.values = values;
   forward.mixed = Matrix<float>(mixed, kColumns);
-  measure(Operation::kLatticeForward, bits + row * (texels + n), [&] { device.run(forward); });
+  measure(kOperation<LatticeForward>, bits + row * (texels + n), [&] { device.run(forward); });
   LatticeBackward backward{grid};
   backward.samples = {n};
   backward.blockOfSample = blocks;
@@ -125,7 +129,7 @@ void measureLattice(RooflineRecorder& recorder) {
   backward.texels = {texels};
   backward.mixedGradients = Matrix<float>(mixed, kColumns);
   backward.valueGradients = values;
-  measure(Operation::kLatticeBackward, bits + row * (texels + n), [&] { device.run(backward); });
+  measure(kOperation<LatticeBackward>, bits + row * (texels + n), [&] { device.run(backward); });
 }
 
 void measureFusion(RooflineRecorder& recorder) {
@@ -142,10 +146,10 @@ void measureFusion(RooflineRecorder& recorder) {
   const Matrix<float> ofFine = Matrix<float>::grouped(fine, fineColumns, kFeatures, n);
   const Matrix<float> ofFineGradients = Matrix<float>::grouped(fineGradients, fineColumns, kFeatures, n);
   const Matrix<float> made(features, kFeatures);
-  recorder.measureStream(Operation::kAttentionForward, shape, n * 4.0 * (kCoarse + fineColumns + kFeatures), [&] {
+  recorder.measureStream(kOperation<AttentionForward>, shape, n * 4.0 * (kCoarse + fineColumns + kFeatures), [&] {
     device.run(AttentionForward{attention, {n}, Matrix<float>(coarse, kCoarse), ofFine, {}, made});
   });
-  recorder.measureStream(Operation::kAttentionBackward, shape, n * 4.0 * (2 * (kCoarse + fineColumns) + kFeatures),
+  recorder.measureStream(kOperation<AttentionBackward>, shape, n * 4.0 * (2 * (kCoarse + fineColumns) + kFeatures),
                          [&] {
                            device.run(AttentionBackward{attention,
                                                         {n},
@@ -161,13 +165,13 @@ void measureFusion(RooflineRecorder& recorder) {
   const Matrix<float> diffuse = made.columnRange(0, 3), specular(fineGradients, 3), sums(coarseGradients, 3);
   Array<float> colour = device.array<float>(size_t{3} * n);
   const std::string rays = fmt::format("{} rays", n);
-  recorder.measureStream(Operation::kShadeForward, rays, n * 40.0, [&] {
+  recorder.measureStream(kOperation<ShadeForward>, rays, n * 40.0, [&] {
     device.run(ShadeForward{false, {n}, diffuse, specular, densityGradients, colour});
   });
-  recorder.measureStream(Operation::kShadeBackward, rays, n * 56.0, [&] {
+  recorder.measureStream(kOperation<ShadeBackward>, rays, n * 56.0, [&] {
     device.run(ShadeBackward{false, {n}, diffuse, specular, densityGradients, colour, sums, densityGradients});
   });
-  recorder.measureStream(Operation::kAddColumns, fmt::format("8 columns, {} rows", n), n * 96.0, [&] {
+  recorder.measureStream(kOperation<AddColumns>, fmt::format("8 columns, {} rows", n), n * 96.0, [&] {
     device.run(AddColumns{{n}, Matrix<float>(coarse, kFeatures), made});
   });
 }

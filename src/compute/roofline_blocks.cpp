@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compute/blocks.h"
+#include "compute/proposals.h"
 #include "compute/roofline_recorder.h"
+#include "compute/rows.h"
 
 namespace tessera {
 namespace {
@@ -75,12 +78,11 @@ void measureMoves(RooflineRecorder& recorder, const BlockSpace& space, Samples& 
   Device& device = recorder.device();
   const std::string shape = fmt::format("{} samples, {} blocks", rows, space.blocks());
   Array<uint32_t> firstOfBlock = device.array<uint32_t>(space.blocks() + 1), source = device.array<uint32_t>(rows);
-  recorder.measureStream(Operation::kGroupByBlock, shape, rows * 8.0, [&] {
+  recorder.measureStream(kOperation<GroupByBlock>, shape, rows * 8.0, [&] {
     device.run(GroupByBlock{{rows}, space.blocks(), samples.blocks, firstOfBlock, source});
   });
-  if (!device.supports(Operation::kGroupByBlock)) return;
   Array<float> to = device.array<float>(size_t{rows} * 3);
-  recorder.measureStream(Operation::kScatterRows, "3 columns, " + shape, rows * (4.0 + 24), [&] {
+  recorder.measureStream(kOperation<ScatterRows>, "3 columns, " + shape, rows * (4.0 + 24), [&] {
     device.run(ScatterRows{{rows}, source, Matrix<float>(samples.positions, 3), Matrix<float>(to, 3)});
   });
 }
@@ -94,9 +96,9 @@ void measureProposals(RooflineRecorder& recorder, const Slice<const float>& fenc
   Array<float> resampled = device.array<float>(size_t{rays} * (kIntervals + 1));
   ResampleFences resample{{rays}, kIntervals, kIntervals, 1, 0.01f, fences, weights, {}, resampled};
   const std::string shape = fmt::format("{} rays, {} from {} intervals", rays, kIntervals, kIntervals);
-  recorder.measureStream(Operation::kResampleFences, shape, bins * 12, [&] { device.run(resample); });
+  recorder.measureStream(kOperation<ResampleFences>, shape, bins * 12, [&] { device.run(resample); });
   resample.anneal = 0.5f;
-  recorder.measureStream(Operation::kResampleFences, shape + ", annealed", bins * 12, [&] { device.run(resample); });
+  recorder.measureStream(kOperation<ResampleFences>, shape + ", annealed", bins * 12, [&] { device.run(resample); });
   Array<float> sampleWeights = recorder.randomFloats(rows, 0, 0.02f);
   InterlevelLoss interlevel;
   interlevel.rays = {rays};
@@ -109,7 +111,7 @@ void measureProposals(RooflineRecorder& recorder, const Slice<const float>& fenc
   interlevel.sampleWeights = sampleWeights;
   interlevel.loss = loss;
   interlevel.weightGradients = gradients;
-  recorder.measureStream(Operation::kInterlevelLoss, fmt::format("{} rays, {} samples", rays, rows),
+  recorder.measureStream(kOperation<InterlevelLoss>, fmt::format("{} rays, {} samples", rays, rows),
                          bins * 12 + rows * 12.0, [&] { device.run(interlevel); });
 }
 
@@ -125,8 +127,7 @@ void measureBlockStreams(RooflineRecorder& recorder) {
   const std::string shape = fmt::format("{} rays, {} intervals", rays, kIntervals);
   const double perRay = 24 + 8 + 4 * (kIntervals + 1);
   const EnterScene enter{space, {rays}, kIntervals, views.origins, views.directions, {}, {}, range, fences};
-  recorder.measureStream(Operation::kEnterScene, shape, rays * perRay, [&] { device.run(enter); });
-  if (!device.supports(Operation::kEnterScene) || !device.supports(Operation::kBlockSamples)) return;
+  recorder.measureStream(kOperation<EnterScene>, shape, rays * perRay, [&] { device.run(enter); });
 
   for (const bool split : {false, true}) {
     BlockSamples sample{space};
@@ -141,7 +142,7 @@ void measureBlockStreams(RooflineRecorder& recorder) {
     samples.nameIn(sample);
     device.run(sample);
     const uint32_t rows = device.read(sample.rowCount)[0];
-    recorder.measureStream(Operation::kBlockSamples, shape + (split ? ", split" : ""),
+    recorder.measureStream(kOperation<BlockSamples>, shape + (split ? ", split" : ""),
                            rays * perRay + rows * (split ? 36.0 : 32.0), [&] { device.run(sample); });
     if (split) continue;
     measureMoves(recorder, space, samples, rows);
@@ -150,7 +151,7 @@ void measureBlockStreams(RooflineRecorder& recorder) {
   const uint32_t points = recorder.options().streamed;
   Array<uint32_t> chosen = device.arrayOf(std::vector<uint32_t>{0, 3, 6}), blocks = device.array<uint32_t>(points);
   Array<float> positions = device.array<float>(size_t{points} * 3), steps = device.array<float>(points);
-  recorder.measureStream(Operation::kBlockPoints, fmt::format("{} points", points), points * 20.0, [&] {
+  recorder.measureStream(kOperation<BlockPoints>, fmt::format("{} points", points), points * 20.0, [&] {
     device.run(BlockPoints{space, points, 1, 2048, chosen, {}, blocks, positions, steps});
   });
 }

@@ -8,6 +8,8 @@
 
 namespace tessera {
 
+struct HashGrid;
+
 class RooflineRecorder {
  public:
   // `isQueued`: of the device's operations. `probe` measures the limits of streams, which are added to `limits`; null
@@ -23,10 +25,10 @@ class RooflineRecorder {
     double limit = 0;
     double memoryLimit = 0;
   };
-  // Times `run` and adds a row, unless the device lacks the operation.
-  void measure(Operation operation, Work work, const std::function<void()>& run);
+  // Times `run` and adds a row.
+  void measure(const OperationId& operation, Work work, const std::function<void()>& run);
   // An operation that moves this many bytes.
-  void measureStream(Operation operation, std::string shape, double bytes, const std::function<void()>& run);
+  void measureStream(const OperationId& operation, std::string shape, double bytes, const std::function<void()>& run);
 
   Device& device() { return device_; }
   const RooflineOptions& options() const { return options_; }

@@ -5,7 +5,16 @@
 #include <algorithm>
 #include <numeric>
 
+#include "compute/adam.h"
+#include "compute/blend.h"
+#include "compute/composite.h"
+#include "compute/encodings.h"
+#include "compute/exposure.h"
+#include "compute/losses.h"
+#include "compute/occupancy.h"
+#include "compute/rays.h"
 #include "compute/roofline_recorder.h"
+#include "compute/rows.h"
 
 namespace tessera {
 namespace {
@@ -48,17 +57,17 @@ void measureEncodings(RooflineRecorder& recorder, Lines& lines) {
   Array<float> wide = recorder.randomFloats(size_t{lines.samples} * 27, -1, 1);
   Array<float> narrow = recorder.randomFloats(size_t{lines.samples} * 3, -1, 1);
   const Matrix<float> harmonics(wide, 16), waves(wide, 27);
-  recorder.measureStream(Operation::kSphericalHarmonicsForward, shape, n * (4 + 64) + rays * 12, [&] {
+  recorder.measureStream(kOperation<SphericalHarmonicsForward>, shape, n * (4 + 64) + rays * 12, [&] {
     device.run(SphericalHarmonicsForward{4, {lines.samples, {}}, lines.perRay, lines.rayOfSample, harmonics});
   });
-  recorder.measureStream(Operation::kSphericalHarmonicsBackward, shape, n * (4 + 64 + 12) + rays * 12, [&] {
+  recorder.measureStream(kOperation<SphericalHarmonicsBackward>, shape, n * (4 + 64 + 12) + rays * 12, [&] {
     device.run(SphericalHarmonicsBackward{4, {lines.samples, {}}, lines.perRay, lines.rayOfSample, harmonics, narrow});
   });
   const std::string frequencies = fmt::format("4 frequencies, {}", shapeOf(n, "samples"));
-  recorder.measureStream(Operation::kFrequencyForward, frequencies, n * (12 + 108), [&] {
+  recorder.measureStream(kOperation<FrequencyForward>, frequencies, n * (12 + 108), [&] {
     device.run(FrequencyForward{3, 4, {lines.samples, {}}, lines.colours, waves});
   });
-  recorder.measureStream(Operation::kFrequencyBackward, frequencies, n * (12 + 108 + 12), [&] {
+  recorder.measureStream(kOperation<FrequencyBackward>, frequencies, n * (12 + 108 + 12), [&] {
     device.run(FrequencyBackward{3, 4, {lines.samples, {}}, lines.colours, waves, narrow});
   });
 }
@@ -83,7 +92,7 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
   forward.opacity = opacity;
   forward.depth = depth;
   forward.weights = weights;
-  recorder.measureStream(Operation::kCompositeForward, shape, n * 28 + rays * 36, [&] { device.run(forward); });
+  recorder.measureStream(kOperation<CompositeForward>, shape, n * 28 + rays * 36, [&] { device.run(forward); });
 
   CompositeBackward backward;
   backward.rays = forward.rays;
@@ -96,7 +105,7 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
   backward.rayColourGradients = lines.perRay;
   backward.xGradients = dx;
   backward.colourGradients = Matrix<float>(dColours, 3);
-  recorder.measureStream(Operation::kCompositeBackward, shape, n * (24 + 16) + rays * 28,
+  recorder.measureStream(kOperation<CompositeBackward>, shape, n * (24 + 16) + rays * 28,
                          [&] { device.run(backward); });
 
   DistortionLoss distortion;
@@ -107,9 +116,9 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
   distortion.steps = lines.steps;
   distortion.loss = opacity.part(0, 1);
   distortion.weightGradients = dx;
-  recorder.measureStream(Operation::kDistortionLoss, shape, n * 16 + rays * 4, [&] { device.run(distortion); });
+  recorder.measureStream(kOperation<DistortionLoss>, shape, n * 16 + rays * 4, [&] { device.run(distortion); });
 
-  recorder.measureStream(Operation::kDepthLoss, shape, n * 16 + rays * 8, [&] {
+  recorder.measureStream(kOperation<DepthLoss>, shape, n * 16 + rays * 8, [&] {
     device.run(DepthLoss{1,
                          0.01f,
                          {lines.rays, {}},
@@ -122,11 +131,11 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
   });
   Array<uint32_t> first = device.array<uint32_t>(lines.rays + 1), count = device.array<uint32_t>(1);
   Array<uint32_t> source = device.array<uint32_t>(lines.samples), rayOfSample = device.array<uint32_t>(lines.samples);
-  recorder.measureStream(Operation::kOpticalDepth, shape, n * 8 + rays * 12, [&] {
+  recorder.measureStream(kOperation<OpticalDepth>, shape, n * 8 + rays * 12, [&] {
     device.run(
         OpticalDepth{{lines.rays, {}}, lines.firstSample, Matrix<float>(lines.logDensity, 1), lines.steps, opacity});
   });
-  recorder.measureStream(Operation::kCompactSamples, shape, n * 16 + rays * 8, [&] {
+  recorder.measureStream(kOperation<CompactSamples>, shape, n * 16 + rays * 8, [&] {
     CompactSamples compact;
     compact.rays = {lines.rays, {}};
     compact.sampleCapacity = compact.keptCapacity = lines.samples;
@@ -140,10 +149,9 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
     compact.rayOfSample = rayOfSample;
     device.run(compact);
   });
-  if (!device.supports(Operation::kCompactSamples)) return;
   Array<float> to = device.array<float>(size_t{lines.samples} * 3);
   recorder.measureStream(
-      Operation::kGatherRows, fmt::format("3 columns, {}", shapeOf(n, "samples")), n * (4 + 24), [&] {
+      kOperation<GatherRows>, fmt::format("3 columns, {}", shapeOf(n, "samples")), n * (4 + 24), [&] {
         device.run(GatherRows{{lines.samples, {}}, source, Matrix<float>(lines.colours, 3), Matrix<float>(to, 3)});
       });
 }
@@ -163,15 +171,15 @@ void measureBlending(RooflineRecorder& recorder, uint32_t segments) {
   Array<float> dComposited = device.array<float>(composited.size()), dSpecular = device.array<float>(specular.size());
   Array<float> dAlpha = device.array<float>(segments), loss = device.array<float>(1);
   const std::string shape = fmt::format("{}, 2 a ray", shapeOf(segments, "segments"));
-  recorder.measureStream(Operation::kBlendForward, shape, segments * 48.0 + rays * 24.0, [&] {
+  recorder.measureStream(kOperation<BlendForward>, shape, segments * 48.0 + rays * 24.0, [&] {
     device.run(
         BlendForward{false, {rays, {}}, firstSegment, composited, specular, alpha, alpha, colour, opacity, depth});
   });
-  recorder.measureStream(Operation::kBlendBackward, shape, segments * 88.0 + rays * 16.0, [&] {
+  recorder.measureStream(kOperation<BlendBackward>, shape, segments * 88.0 + rays * 16.0, [&] {
     device.run(BlendBackward{
         false, {rays, {}}, firstSegment, composited, specular, alpha, colour, {}, dComposited, dSpecular, dAlpha});
   });
-  recorder.measureStream(Operation::kOpacityLoss, shapeOf(segments, "segments"), segments * 12.0, [&] {
+  recorder.measureStream(kOperation<OpacityLoss>, shapeOf(segments, "segments"), segments * 12.0, [&] {
     device.run(OpacityLoss{1, {segments, {}}, alpha, loss, dAlpha});
   });
 }
@@ -204,10 +212,9 @@ void measureRays(RooflineRecorder& recorder, uint32_t capacity) {
   Array<uint32_t> cameraOfRay = device.array<uint32_t>(rays);
   Array<float> pixels = recorder.randomFloats(size_t{rays} * 2, 0, 512);
   Array<float> origins = device.array<float>(size_t{rays} * 3), directions = device.array<float>(size_t{rays} * 3);
-  recorder.measureStream(Operation::kGenerateRays, shapeOf(rays, "rays"), rays * 36.0, [&] {
+  recorder.measureStream(kOperation<GenerateRays>, shapeOf(rays, "rays"), rays * 36.0, [&] {
     device.run(GenerateRays{{rays, {}}, camera, cameraOfRay, pixels, origins, directions});
   });
-  if (!device.supports(Operation::kMarchRays)) return;
 
   const MarchSpace space;
   Array<uint32_t> occupancy = device.arrayOf(shellOccupancy(space));
@@ -231,7 +238,7 @@ void measureRays(RooflineRecorder& recorder, uint32_t capacity) {
   march.steps = steps;
   device.run(march);
   const uint32_t made = device.read(counters.all())[0];
-  recorder.measureStream(Operation::kMarchRays, fmt::format("{} rays, {} samples", rays, made),
+  recorder.measureStream(kOperation<MarchRays>, fmt::format("{} rays, {} samples", rays, made),
                          made * 24.0 + rays * 32.0, [&] { device.run(march); });
   Array<uint32_t> nextStep = device.array<uint32_t>(rays);
   Array<float> opticalDepth = device.array<float>(rays);
@@ -240,7 +247,7 @@ void measureRays(RooflineRecorder& recorder, uint32_t capacity) {
   march.opticalDepth = opticalDepth;
   device.run(march);
   const uint32_t round = device.read(counters.all())[0];
-  recorder.measureStream(Operation::kMarchRays, fmt::format("{} rays, the first {} samples", rays, round),
+  recorder.measureStream(kOperation<MarchRays>, fmt::format("{} rays, the first {} samples", rays, round),
                          round * 24.0 + rays * 44.0, [&] {
                            device.fillZero(nextStep.all());
                            device.run(march);
@@ -258,21 +265,21 @@ void measureLosses(RooflineRecorder& recorder, uint32_t rays) {
   std::vector<uint32_t> photos(rays);
   for (uint32_t r = 0; r < rays; ++r) photos[r] = r % 100;
   Array<uint32_t> photoOfRay = device.arrayOf(photos);
-  recorder.measureStream(Operation::kColourLoss, shape, rays * 40.0, [&] {
+  recorder.measureStream(kOperation<ColourLoss>, shape, rays * 40.0, [&] {
     device.run(ColourLoss{ColourLossKind::huber, 0.1f, 1, {rays, {}}, predicted, target, weights, loss, out});
   });
   // As many as a training step has: each patch walks all over them.
   const uint32_t batch = std::min(rays, 16384u);
-  recorder.measureStream(Operation::kS3imLoss, fmt::format("{} rays, 10 patches", batch), batch * 52.0, [&] {
+  recorder.measureStream(kOperation<S3imLoss>, fmt::format("{} rays, 10 patches", batch), batch * 52.0, [&] {
     device.run(S3imLoss{1, {batch, {}}, 10, 1, predicted, target, weights, loss.part(0, 1), out});
   });
-  recorder.measureStream(Operation::kSparsityLoss, shapeOf(rays, "points"), rays * 12.0, [&] {
+  recorder.measureStream(kOperation<SparsityLoss>, shapeOf(rays, "points"), rays * 12.0, [&] {
     device.run(SparsityLoss{1, {rays, {}}, predicted.part(0, rays), target.part(0, rays), loss.part(0, 1), out});
   });
-  recorder.measureStream(Operation::kExposureForward, shape, rays * 28.0, [&] {
+  recorder.measureStream(kOperation<ExposureForward>, shape, rays * 28.0, [&] {
     device.run(ExposureForward{{rays, {}}, predicted, {}, {}, photoOfRay, gains, out});
   });
-  recorder.measureStream(Operation::kExposureBackward, shape, rays * 40.0, [&] {
+  recorder.measureStream(kOperation<ExposureBackward>, shape, rays * 40.0, [&] {
     device.run(ExposureBackward{{rays, {}}, predicted, {}, photoOfRay, gains, target, out, {}, gainGradients});
   });
 }
@@ -285,11 +292,11 @@ void measureOccupancy(RooflineRecorder& recorder) {
   Array<uint32_t> occupancy = device.arrayOf(shellOccupancy(space)), chosen = device.array<uint32_t>(points);
   Array<float> positions = device.array<float>(size_t{points} * 3), grid = recorder.randomFloats(cells, 0, 0.02f);
   Array<float> logDensity = recorder.randomFloats(points, -2, 2);
-  recorder.measureStream(Operation::kOccupancyPoints, shapeOf(points, "points"), points * 16.0, [&] {
+  recorder.measureStream(kOperation<OccupancyPoints>, shapeOf(points, "points"), points * 16.0, [&] {
     device.run(OccupancyPoints{space, half, half, 1, {}, occupancy, chosen, positions});
   });
   recorder.measureStream(
-      Operation::kOccupancyUpdate, fmt::format("{} cells, {} points", cells, points), cells * 8.125 + points * 8.0,
+      kOperation<OccupancyUpdate>, fmt::format("{} cells, {} points", cells, points), cells * 8.125 + points * 8.0,
       [&] {
         device.run(OccupancyUpdate{space, points, 0.95f, 0.01f, chosen, Matrix<float>(logDensity, 1), grid, occupancy});
       });
@@ -308,10 +315,10 @@ void measureAdam(RooflineRecorder& recorder, size_t n) {
   adam.firstMoments = first;
   adam.secondMoments = second;
   adam.counts = counts;
-  recorder.measureStream(Operation::kAdam, fmt::format("all of {} parameters", n), n * 40.0, [&] { device.run(adam); });
+  recorder.measureStream(kOperation<Adam>, fmt::format("all of {} parameters", n), n * 40.0, [&] { device.run(adam); });
   adam.skipZeroGradients = true;
   adam.l2 = 0;
-  recorder.measureStream(Operation::kAdam, fmt::format("none of {}: zero gradients", n), n * 4.0,
+  recorder.measureStream(kOperation<Adam>, fmt::format("none of {}: zero gradients", n), n * 4.0,
                          [&] { device.run(adam); });
 }
 

@@ -4,6 +4,7 @@
 
 #include <set>
 
+#include "compute/operations.h"
 #ifdef TESSERA_HAS_VULKAN
 #include "gpu/test_context.h"
 #endif
@@ -18,12 +19,12 @@ TEST(Roofline, HasARowForEveryOperation) {
   options.streamed = 128;
   options.secondsPerRow = 0;
   const Roofline roofline = measureRoofline(options);
-  std::set<Operation> measured;
+  std::set<OperationId> measured;
   for (const RooflineRow& row : roofline.rows) {
     EXPECT_GT(row.rate, 0) << row.name;
     measured.insert(row.operation);
   }
-  EXPECT_EQ(measured.size(), std::size(kOperationNames));
+  EXPECT_EQ(measured.size(), std::size(kAllOperations));
 }
 
 #ifdef TESSERA_HAS_VULKAN
@@ -40,14 +41,14 @@ TEST(Roofline, HoldsEveryOperationOfAGraphicsCardAgainstWhatTheCardCanDo) {
   for (const MachineLimits::Stream& stream : roofline.limits.streams) EXPECT_GT(stream.rate, 1e7) << stream.bytes;
   for (const MachineLimits::Gather& gather : roofline.limits.gathers)
     EXPECT_GT(gather.lookups, 1e5) << gather.tableBytes;
-  std::set<Operation> measured;
+  std::set<OperationId> measured;
   for (const RooflineRow& row : roofline.rows) {
     EXPECT_GT(row.limit, 0) << row.name;
     EXPECT_EQ(row.memoryLimit > 0, row.name.starts_with("Mlp")) << row.name;
     EXPECT_GE(row.shareOfBoth(), row.share()) << row.name;
     measured.insert(row.operation);
   }
-  EXPECT_EQ(measured.size(), std::size(kOperationNames));
+  EXPECT_EQ(measured.size(), std::size(kAllOperations));
   EXPECT_EQ(GpuContext::validationMessages(), 0);
 }
 #endif

@@ -7,6 +7,7 @@
 
 #include "base/random.h"
 #include "compute/roofline_recorder.h"
+#include "compute/virtual_grid.h"
 
 namespace tessera {
 namespace {
@@ -48,21 +49,20 @@ void measureVirtualGrid(RooflineRecorder& recorder) {
   distinct.ranks = ranks;
   distinct.firstTexel = firstTexel;
   distinct.texelPositions = texelPositions;
-  if (!device.supports(Operation::kDistinctTexels)) return;
   device.run(distinct);
   const uint32_t texels = device.read(firstTexel.all())[1];
   const double lookups = static_cast<double>(VirtualGrid::kCorners) * n;
   const std::string shape = fmt::format("{} samples, {} of {} texels", n, texels, grid.texels());
   // `table` is what the corners are looked up in, `bytes` what the arguments beside positions and blocks have. It takes
   // at least as long as the slower of the lookups and of moving the arguments once.
-  const auto measure = [&](Operation operation, size_t table, double bytes, const std::function<void()>& run) {
+  const auto measure = [&](const OperationId& operation, size_t table, double bytes, const std::function<void()>& run) {
     const double moved = bytes + 16.0 * n;
     const double limit = std::min(recorder.gatherLimit(table), lookups / moved * recorder.streamLimit(moved));
-    const std::string name(kOperationNames[static_cast<size_t>(operation)]);
+    const std::string name(operation.name());
     recorder.measure(operation, {name, shape, lookups, "lookup", limit}, run);
   };
   const double bits = 8.0 * grid.words(), attributeBytes = 4.0 * VirtualGrid::kAttributes;
-  measure(Operation::kDistinctTexels, size_t{grid.words()} * 4, bits + 12.0 * texels, [&] { device.run(distinct); });
+  measure(kOperation<DistinctTexels>, size_t{grid.words()} * 4, bits + 12.0 * texels, [&] { device.run(distinct); });
 
   Array<float> attributes = recorder.randomFloats(size_t{VirtualGrid::kAttributes} * texels, 0, 1);
   Array<float> logDensities = device.array<float>(n), colours = device.array<float>(size_t{n} * 7);
@@ -76,7 +76,7 @@ void measureVirtualGrid(RooflineRecorder& recorder) {
   forward.attributes = attributes;
   forward.logDensities = logDensities;
   forward.colours = colours;
-  measure(Operation::kVirtualGridForward, size_t{texels} * VirtualGrid::kAttributes,
+  measure(kOperation<VirtualGridForward>, size_t{texels} * VirtualGrid::kAttributes,
           bits + attributeBytes * (texels + n), [&] { device.run(forward); });
 
   Array<float> densityGradients = recorder.randomFloats(n, -1, 1);
@@ -95,7 +95,7 @@ void measureVirtualGrid(RooflineRecorder& recorder) {
   backward.logDensityGradients = densityGradients;
   backward.colourGradients = colourGradients;
   backward.attributeGradients = attributeGradients;
-  measure(Operation::kVirtualGridBackward, size_t{texels} * VirtualGrid::kAttributes * sizeof(float),
+  measure(kOperation<VirtualGridBackward>, size_t{texels} * VirtualGrid::kAttributes * sizeof(float),
           bits + attributeBytes * (texels + 2.0 * n), [&] { device.run(backward); });
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "compute/blocks.h"
 #include "compute/device_test.h"
 
 namespace tessera::device_test {

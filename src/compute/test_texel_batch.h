@@ -2,6 +2,7 @@
 #pragma once
 
 #include "compute/device_test.h"
+#include "compute/virtual_grid.h"
 
 namespace tessera::device_test {
 

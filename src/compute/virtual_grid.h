@@ -6,6 +6,7 @@
 #include <array>
 
 #include "compute/memory.h"
+#include "compute/operation.h"
 
 namespace tessera {
 
@@ -48,6 +49,7 @@ struct DistinctTexels {
   Slice<uint32_t> firstTexel;   // [blocks + 1], rows; not limited by the capacity
   Slice<float> texelPositions;  // [texelCapacity][3]; rows beyond the capacity are left out
 };
+TESSERA_OPERATION(DistinctTexels);
 
 // Samples from the texels of voxels and planes: per attribute Σ over corners of weight · dequantised value (features -7
 // + 14 q, density -14 + 28 q, q = floor(255 a + ½) / 255 in double), the four sources (voxels and three planes) summed;
@@ -66,6 +68,7 @@ struct VirtualGridForward {
   Slice<float> logDensities;        // [samples]
   Slice<float> colours;             // [samples][7]: diffuse, features
 };
+TESSERA_OPERATION(VirtualGridForward);
 
 // Overwrites attributeGradients of all rows below the count of texels. Rounding is passed straight
 // through; culled samples pass nothing, nor does the density where it is held at 15.
@@ -81,5 +84,6 @@ struct VirtualGridBackward {
   Slice<const float> logDensityGradients, colourGradients;  // [samples], [samples][7]
   Slice<float> attributeGradients;                          // [texels][8]
 };
+TESSERA_OPERATION(VirtualGridBackward);
 
 }  // namespace tessera

@@ -5,6 +5,8 @@
 
 #include <deque>
 
+#include "compute/hash_grid.h"
+#include "compute/mlp.h"
 #include "field/parameters.h"
 
 namespace tessera {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/safetensors.h"
+#include "compute/adam.h"
 #include "compute/device.h"
 
 namespace tessera {

@@ -1,5 +1,6 @@
 #include "field/radiance_field.h"
 
+#include "compute/encodings.h"
 #include "field/initial_values.h"
 
 namespace tessera {

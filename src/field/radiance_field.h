@@ -3,6 +3,8 @@
 // harmonics.
 #pragma once
 
+#include "compute/hash_grid.h"
+#include "compute/mlp.h"
 #include "field/parameters.h"
 
 namespace tessera {

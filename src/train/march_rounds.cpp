@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "compute/rays.h"
+#include "compute/rows.h"
 
 namespace tessera {
 

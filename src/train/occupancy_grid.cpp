@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "compute/occupancy.h"
+
 namespace tessera {
 
 OccupancyGrid::OccupancyGrid(Device& device, const MarchSpace& space, Slice<uint32_t> bits)

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "compute/device.h"
+#include "compute/rays.h"
 
 namespace tessera {
 

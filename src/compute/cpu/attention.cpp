@@ -155,17 +155,4 @@ void run(Context& context, const ShadeBackward& a) {
   });
 }
 
-void run(Context& context, const AddColumns& a) {
-  CHECK(a.input.columns == a.output.columns);
-  const float* input = hostPointer(a.input.data);
-  float* output = hostPointer(a.output.data);
-  context.pool.forRanges(hostCount(a.rows), kRowsPerTask, [&](size_t begin, size_t end) {
-    for (size_t row = begin; row < end; ++row) {
-      for (uint32_t c = 0; c < a.input.columns; ++c) {
-        output[a.output.offset(row, c)] += input[a.input.offset(row, c)];
-      }
-    }
-  });
-}
-
 }  // namespace tessera::cpu

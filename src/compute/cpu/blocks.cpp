@@ -461,23 +461,4 @@ void run(Context& context, const GroupByBlock& a) {
   });
 }
 
-void run(Context& context, const ScatterRows& a) {
-  const uint32_t* source = hostPointer(a.source);
-  const float* input = hostPointer(a.input.data);
-  float* output = hostPointer(a.output.data);
-  CHECK(a.input.columns == a.output.columns);
-  CHECK(a.input.groupWidth == a.output.groupWidth);
-  const uint32_t group = a.input.groupWidth ? a.input.groupWidth : a.input.columns;
-  const size_t groups = a.input.columns / group, rows = hostCount(a.rows);
-  const size_t ranges = (rows + kRowsPerTask - 1) / kRowsPerTask;
-  context.pool.run(groups * ranges, [&](size_t task, int) {
-    const size_t g = task / ranges, begin = task % ranges * kRowsPerTask, end = std::min(rows, begin + kRowsPerTask);
-    const float* const from = input + g * a.input.groupStride;
-    float* const to = output + g * a.output.groupStride;
-    for (size_t i = begin; i < end; ++i) {
-      std::memcpy(to + size_t{source[i]} * a.output.rowStride, from + i * a.input.rowStride, group * sizeof(float));
-    }
-  });
-}
-
 }  // namespace tessera::cpu

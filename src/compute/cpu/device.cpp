@@ -6,8 +6,16 @@
 
 #include "compute/cpu/kernels.h"
 #include "compute/host_memory.h"
+#include "compute/operations.h"
 
 namespace tessera {
+
+namespace cpu {
+#define TESSERA_KERNEL(name) void run(Context& context, const name& arguments);
+TESSERA_OPERATIONS(TESSERA_KERNEL)
+#undef TESSERA_KERNEL
+}  // namespace cpu
+
 namespace {
 
 std::byte* bytesAt(Memory& memory, size_t offset, size_t length) {
@@ -38,16 +46,12 @@ class CpuDevice final : public Device {
                     [&](size_t begin, size_t end) { std::memset(first + begin, 0, end - begin); });
   }
   void finish() override {}
-  bool supports(Operation) const override { return true; }
-
-#define TESSERA_FORWARD(name)                \
-  void run(const name& arguments) override { \
-    cpu::run(context_, arguments);           \
-  }
-  TESSERA_OPERATIONS(TESSERA_FORWARD)
-#undef TESSERA_FORWARD
 
  private:
+  bool runOperation(const OperationId& operation, const void* arguments) override {
+    return dispatchOperation(operation, arguments, [this](const auto& typed) { cpu::run(context_, typed); });
+  }
+
   ThreadPool pool_;
   cpu::Context context_;
 };

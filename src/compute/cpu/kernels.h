@@ -1,20 +1,17 @@
 // The kernels behind the cpu device, one file per interface header. Each cuts its work into tasks whose inputs and
 // outputs depend on the task's number alone; sums over tasks are taken in task order. That makes the bits independent
-// of the number of threads.
+// of the number of threads. They are the functions run(Context&, const Operation&), which device.cpp declares.
 #pragma once
 
+#include <cstddef>
+
 #include "base/threads.h"
-#include "compute/device.h"
 
 namespace tessera::cpu {
 
 struct Context {
   ThreadPool& pool;
 };
-
-#define TESSERA_KERNEL(name) void run(Context& context, const name& arguments);
-TESSERA_OPERATIONS(TESSERA_KERNEL)
-#undef TESSERA_KERNEL
 
 const char* simdTarget();  // the instruction set chosen at run time: "SSE4", "AVX2", "AVX3"
 

@@ -341,32 +341,4 @@ void run(Context& context, const CompactSamples& a) {
   });
 }
 
-void run(Context& context, const GatherRows& a) {
-  const uint32_t* source = hostPointer(a.source);
-  const float* input = hostPointer(a.input.data);
-  float* output = hostPointer(a.output.data);
-  const uint32_t group = a.input.groupWidth ? a.input.groupWidth : a.input.columns;
-  CHECK(a.input.columns == a.output.columns);
-  CHECK(a.input.groupWidth == a.output.groupWidth);
-  const size_t groups = a.input.columns / group, rows = hostCount(a.rows);
-  constexpr size_t kRange = 8192;
-  const size_t ranges = (rows + kRange - 1) / kRange;
-  context.pool.run(groups * ranges, [&](size_t task, int) {
-    const size_t g = task / ranges, begin = task % ranges * kRange, end = std::min(rows, begin + kRange);
-    const float* from = input + g * a.input.groupStride;
-    float* to = output + g * a.output.groupStride;
-    if (group == 2) {
-      for (size_t i = begin; i < end; ++i) {
-        std::memcpy(to + i * a.output.rowStride, from + size_t{source[i]} * a.input.rowStride, 8);
-      }
-    } else {
-      for (size_t i = begin; i < end; ++i) {
-        for (uint32_t c = 0; c < group; ++c) {
-          to[i * a.output.rowStride + c] = from[size_t{source[i]} * a.input.rowStride + c];
-        }
-      }
-    }
-  });
-}
-
 }  // namespace tessera::cpu

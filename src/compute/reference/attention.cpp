@@ -5,7 +5,6 @@
 
 #include "compute/reference/convert.h"
 #include "compute/reference/functions.h"
-#include "compute/reference/operations.h"
 
 namespace tessera::reference {
 namespace {
@@ -130,15 +129,6 @@ void run(const ShadeBackward& a) {
   }
   store(a.sumGradients, sums);
   if (!a.whole) add(a.opacityGradients, opacities);
-}
-
-void run(const AddColumns& a) {
-  const size_t rows = hostCount(a.rows);
-  Doubles sums = doubles(Matrix<const float>(a.output), rows);
-  const Doubles added = doubles(a.input, rows);
-  CHECK(a.input.columns == a.output.columns);
-  for (size_t i = 0; i < sums.size(); ++i) sums[i] += added[i];
-  store(a.output, sums);
 }
 
 }  // namespace tessera::reference

@@ -8,7 +8,6 @@
 #include "base/random.h"
 #include "compute/reference/convert.h"
 #include "compute/reference/functions.h"
-#include "compute/reference/operations.h"
 #include "scene/contraction.h"
 
 namespace tessera::reference {
@@ -247,19 +246,6 @@ void run(const GroupByBlock& a) {
   CHECK(source.size() == blockOfSample.size());  // no block beyond the last
   store(a.firstOfBlock, first);
   store(a.source, source);
-}
-
-void run(const ScatterRows& a) {
-  const Indices source = indices(a.source, hostCount(a.rows));
-  CHECK(a.input.columns == a.output.columns);
-  for (size_t row = 0; row < source.size(); ++row)
-    for (uint32_t column = 0; column < a.input.columns; ++column) {
-      const size_t from = a.input.offset(row, column), to = a.output.offset(source[row], column);
-      CHECK(from < a.input.data.count);
-      CHECK(to < a.output.data.count);
-      // By the word: numbers of any kind travel this way.
-      std::memcpy(hostPointer(a.output.data) + to, hostPointer(a.input.data) + from, sizeof(float));
-    }
 }
 
 }  // namespace tessera::reference

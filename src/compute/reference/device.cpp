@@ -3,9 +3,18 @@
 #include <cstring>
 
 #include "compute/host_memory.h"
-#include "compute/reference/operations.h"
+#include "compute/operations.h"
 
 namespace tessera {
+
+// Every operation on float buffers in HostMemory: reads doubles, calls functions.h, stores floats. One file per
+// interface header.
+namespace reference {
+#define TESSERA_DECLARE(name) void run(const name&);
+TESSERA_OPERATIONS(TESSERA_DECLARE)
+#undef TESSERA_DECLARE
+}  // namespace reference
+
 namespace {
 
 std::byte* bytesAt(const Memory& memory, size_t offset, size_t length) {
@@ -31,14 +40,11 @@ class ReferenceDevice final : public Device {
     std::memset(bytesAt(memory, offset, bytes), 0, bytes);
   }
   void finish() override {}
-  bool supports(Operation) const override { return true; }
 
-#define TESSERA_FORWARD(name)                \
-  void run(const name& arguments) override { \
-    reference::run(arguments);               \
+ private:
+  bool runOperation(const OperationId& operation, const void* arguments) override {
+    return dispatchOperation(operation, arguments, [](const auto& typed) { reference::run(typed); });
   }
-  TESSERA_OPERATIONS(TESSERA_FORWARD)
-#undef TESSERA_FORWARD
 };
 
 }  // namespace

@@ -9,19 +9,20 @@
 #include <span>
 #include <vector>
 
-#include "compute/adam.h"
-#include "compute/attention.h"
-#include "compute/block_march.h"
-#include "compute/blocks.h"
-#include "compute/composite.h"
-#include "compute/deferred.h"
-#include "compute/hash_grid.h"
-#include "compute/losses.h"
-#include "compute/mlp.h"
-#include "compute/occupancy.h"
-#include "compute/proposals.h"
-#include "compute/rays.h"
-#include "compute/virtual_grid.h"
+namespace tessera {
+
+struct Adam;
+struct AttentionShape;
+struct BlockSpace;
+struct HashGrid;
+struct MarchSpace;
+struct MlpShape;
+struct RayCamera;
+struct VirtualGrid;
+enum class ColourLossKind;
+enum class Extinction;
+
+}  // namespace tessera
 
 namespace tessera::reference {
 
@@ -169,13 +170,14 @@ Doubles virtualSample(const VirtualGrid& grid, std::span<const VirtualCorner> co
 // attention.cpp: one sample; its log density without a bound
 Doubles fusedFeatures(const AttentionShape& shape, View coarse, View fine, View logits);
 Point shadedColour(const double diffuse[3], const double specular[3], double opacity);
-// deferred.cpp: one segment of a ray, then the segments of one ray
+// deferred.cpp: one segment of a ray
 Point deferredForward(View network, View composited, const double direction[3]);
 struct DeferredGradients {
   Doubles network, composited;
 };
 DeferredGradients deferredBackward(View network, View composited, const double direction[3], const Point& gradient);
 
+// blend.cpp: the segments of one ray
 struct RaySegments {
   View composited, specular, opacities, depths;  // [n][7], [n][3], [n], [n] or empty
 };

@@ -4,7 +4,6 @@
 
 #include "compute/reference/convert.h"
 #include "compute/reference/functions.h"
-#include "compute/reference/operations.h"
 
 namespace tessera::reference {
 namespace {

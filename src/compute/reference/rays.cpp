@@ -6,7 +6,6 @@
 
 #include "compute/reference/convert.h"
 #include "compute/reference/functions.h"
-#include "compute/reference/operations.h"
 #include "scene/contraction.h"
 #include "scene/lens.h"
 
@@ -180,16 +179,6 @@ void run(const CompactSamples& a) {
   }
   hostPointer(a.keptCount)[0] = made;
   if (a.finishedRays) hostPointer(a.finishedRays)[0] = finished;
-}
-
-void run(const GatherRows& a) {
-  const size_t rows = hostCount(a.rows);
-  const Indices source = indices(a.source, rows);
-  CHECK(a.input.columns == a.output.columns);
-  for (size_t row = 0; row < rows; ++row)
-    for (size_t column = 0; column < a.output.columns; ++column)  // bits, whatever they mean
-      std::memcpy(hostPointer(a.output.data) + a.output.offset(row, column),
-                  hostPointer(a.input.data) + a.input.offset(source[row], column), sizeof(float));
 }
 
 }  // namespace tessera::reference

@@ -5,6 +5,11 @@
 #include <cmath>
 
 #include "base/random.h"
+#include "compute/adam.h"
+#include "compute/composite.h"
+#include "compute/deferred.h"
+#include "compute/losses.h"
+#include "compute/rays.h"
 #include "compute/reference/functions.h"
 
 namespace tessera::reference {

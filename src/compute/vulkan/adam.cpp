@@ -6,6 +6,7 @@
 
 namespace tessera {
 
+template <>
 void VulkanDevice::enqueue(const Adam& options) {
   const size_t count = options.parameters.count;
   CHECK(count < size_t{1} << 31);

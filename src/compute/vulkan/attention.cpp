@@ -1,7 +1,6 @@
 #include "compute/attention.h"
 
 #include "compute/vulkan/vulkan_device.h"
-#include "shaders/add_columns.h"
 #include "shaders/attention_backward.h"
 #include "shaders/attention_backward_float_atomics.h"
 #include "shaders/attention_backward_subgroups.h"
@@ -42,12 +41,14 @@ arguments::ShadeArguments shadeArguments(const VulkanDevice& device, const Optio
 
 }  // namespace
 
+template <>
 void VulkanDevice::enqueue(const AttentionForward& options) {
   arguments::AttentionArguments arguments = attentionArguments(*this, options);
   arguments.features = matrixArguments(options.features, options.samples.capacity);
   queue(kernel(kAttentionForwardSpirv, constantsOf(options.shape)), arguments, groupsOf(options.samples, 128));
 }
 
+template <>
 void VulkanDevice::enqueue(const AttentionBackward& options) {
   const size_t samples = options.samples.capacity;
   arguments::AttentionArguments arguments = attentionArguments(*this, options);
@@ -61,28 +62,20 @@ void VulkanDevice::enqueue(const AttentionBackward& options) {
         arguments, groupsOf(options.samples, 256));
 }
 
+template <>
 void VulkanDevice::enqueue(const ShadeForward& options) {
   arguments::ShadeArguments arguments = shadeArguments(*this, options);
   arguments.colour = deviceAddress(options.colour);
   queue(kernel(kShadeForwardSpirv, {options.whole}), arguments, groupsOf(options.rays, 256, 3));
 }
 
+template <>
 void VulkanDevice::enqueue(const ShadeBackward& options) {
   arguments::ShadeArguments arguments = shadeArguments(*this, options);
   arguments.colour = deviceAddress(options.colourGradients);
   arguments.sumGradients = matrixArguments(options.sumGradients, options.rays.capacity);
   arguments.opacityGradients = deviceAddress(options.opacityGradients);
   queue(kernel(kShadeBackwardSpirv, {options.whole}), arguments, groupsOf(options.rays, 128));
-}
-
-void VulkanDevice::enqueue(const AddColumns& options) {
-  const size_t rows = options.rows.capacity;
-  CHECK(options.input.columns == options.output.columns);
-  arguments::AddColumnsArguments arguments = {};
-  arguments.rows = countArguments(options.rows);
-  arguments.added = matrixArguments(options.input, rows);
-  arguments.sums = matrixArguments(options.output, rows);
-  queue(kernel(kAddColumnsSpirv), arguments, groupsOf(options.rows, 256, options.output.columns));
 }
 
 }  // namespace tessera

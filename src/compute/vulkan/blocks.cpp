@@ -1,8 +1,8 @@
 #include "compute/blocks.h"
 
 #include "base/random.h"
-#include "compute/block_march.h"
-#include "compute/vulkan/march.h"
+#include "compute/vulkan/block_space.h"
+#include "compute/vulkan/vulkan_device.h"
 #include "shaders/block_points.h"
 #include "shaders/block_points_float64.h"
 #include "shaders/block_samples.h"
@@ -11,8 +11,6 @@
 #include "shaders/enter_scene.h"
 #include "shaders/enter_scene_float64.h"
 #include "shaders/group_by_block.h"
-#include "shaders/march_blocks.h"
-#include "shaders/march_blocks_float64.h"
 
 namespace tessera {
 
@@ -21,12 +19,9 @@ namespace {
 constexpr uint32_t kRaysPerGroup = 64;  // local_size_x of the kernels that take rays
 constexpr uint32_t kRowsPerShare = TESSERA_ROWS_OF_SHARE;
 
-arguments::BlockSpaceArguments spaceArguments(const BlockSpace& space) {
-  return {space.columns, space.rows, space.bottom, space.top, space.near, static_cast<uint32_t>(space.surround)};
-}
-
 }  // namespace
 
+template <>
 void VulkanDevice::enqueue(const EnterScene& options) {
   arguments::EnterSceneArguments arguments = {};
   arguments.space = spaceArguments(options.space);
@@ -42,6 +37,7 @@ void VulkanDevice::enqueue(const EnterScene& options) {
         groupsOf(options.rays, 128, options.intervals + 1));
 }
 
+template <>
 void VulkanDevice::enqueue(const BlockSamples& options) {
   const size_t rays = options.rays.capacity;
   CHECK(!options.rays.first);
@@ -93,6 +89,7 @@ void VulkanDevice::enqueue(const BlockSamples& options) {
   countersChanged(options.segmentCount);
 }
 
+template <>
 void VulkanDevice::enqueue(const BlockPoints& options) {
   CHECK(options.points < 1u << 29);  // indices of random numbers
   if (options.points > 0) CHECK(options.blocks.count > 0u);
@@ -110,6 +107,7 @@ void VulkanDevice::enqueue(const BlockPoints& options) {
   queue(realKernel(kBlockPointsFloat64Spirv, kBlockPointsSpirv), arguments, {groups(options.points, 128)});
 }
 
+template <>
 void VulkanDevice::enqueue(const GroupByBlock& options) {
   const uint32_t shares = std::max((options.samples.capacity + kRowsPerShare - 1) / kRowsPerShare, 1u);
   const size_t counts = size_t{shares} * options.blocks;
@@ -134,19 +132,6 @@ void VulkanDevice::enqueue(const GroupByBlock& options) {
                     .scratch = total + 2 * sizeof(uint32_t)});
   queue(kernel(kGroupByBlockSpirv, {true}), arguments, all);
   countersChanged(options.firstOfBlock);
-}
-
-void VulkanDevice::enqueue(const MarchBlocks& options) {
-  arguments::MarchBlocksArguments arguments = {};
-  arguments.space = spaceArguments(options.space);
-  arguments.cells = options.cells;
-  arguments.step = options.step;
-  arguments.nearOfRay = deviceAddress(options.nearOfRay);
-  arguments.slotOfBlock = deviceAddress(options.slotOfBlock);
-  arguments.slotOfSample = deviceAddress(options.slotOfSample);
-  arguments.middles = deviceAddress(options.middles);
-  arguments.widths = deviceAddress(options.widths);
-  queueMarch(kMarchBlocksFloat64Spirv, kMarchBlocksSpirv, options, arguments);
 }
 
 }  // namespace tessera

@@ -14,6 +14,7 @@ constexpr uint32_t kMostColumns = 16;   // composite.glsl
 
 }  // namespace
 
+template <>
 void VulkanDevice::enqueue(const CompositeForward& options) {
   const uint32_t columns = options.colours.columns;
   CHECK(columns <= kMostColumns);
@@ -34,6 +35,7 @@ void VulkanDevice::enqueue(const CompositeForward& options) {
   queue(kernel(kCompositeForwardSpirv, {columns}), arguments, groupsOf(options.rays, kRaysPerGroup));
 }
 
+template <>
 void VulkanDevice::enqueue(const CompositeBackward& options) {
   const uint32_t columns = options.colours.columns;
   CHECK(columns <= kMostColumns);

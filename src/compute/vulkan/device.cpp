@@ -9,10 +9,17 @@
 
 #include "base/error.h"
 #include "base/log.h"
+#include "compute/operations.h"
 #include "compute/vulkan/vulkan_device.h"
 #include "gpu/heap.h"
 
 namespace tessera {
+
+#define TESSERA_ENQUEUE(name) \
+  template <>                 \
+  void VulkanDevice::enqueue(const name& options);
+TESSERA_OPERATIONS(TESSERA_ENQUEUE)
+#undef TESSERA_ENQUEUE
 
 namespace {
 
@@ -138,6 +145,11 @@ void VulkanDevice::fillZero(Memory& memory, size_t offset, size_t bytes) {
 
 void VulkanDevice::finish() {
   stream_->finish();
+}
+
+bool VulkanDevice::runOperation(const OperationId& operation, const void* arguments) {
+  stream_->label(operation.name());
+  return dispatchOperation(operation, arguments, [this](const auto& options) { enqueue(options); });
 }
 
 const GpuKernel& VulkanDevice::kernel(std::span<const uint32_t> spirv, std::vector<uint32_t> constants,

@@ -12,7 +12,11 @@
 #include <tuple>
 
 #include "base/random.h"
+#include "compute/adam.h"
 #include "compute/cpu/device.h"
+#include "compute/hash_grid.h"
+#include "compute/losses.h"
+#include "compute/mlp.h"
 #include "compute/reference/functions.h"
 #include "gpu/test_context.h"
 

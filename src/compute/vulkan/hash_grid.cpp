@@ -25,6 +25,7 @@ void setLevels(const HashGrid& grid, arguments::LevelArguments* levels) {
 
 }  // namespace
 
+template <>
 void VulkanDevice::enqueue(const HashGridForward& options) {
   const HashGrid& grid = options.grid;
   CHECK(options.encoded.columns == grid.columns());
@@ -38,6 +39,7 @@ void VulkanDevice::enqueue(const HashGridForward& options) {
         groupsOf(options.samples, kSamplesPerGroup, 1, static_cast<uint32_t>(grid.levels.size())));
 }
 
+template <>
 void VulkanDevice::enqueue(const HashGridBackward& options) {
   const HashGrid& grid = options.grid;
   CHECK(options.encodedGradients.columns == grid.columns());

@@ -13,6 +13,7 @@ constexpr uint32_t kSamplesPerGroup = 64;  // local_size_x of the kernels
 
 }  // namespace
 
+template <>
 void VulkanDevice::enqueue(const LatticeForward& options) {
   CHECK(options.grid.planes == 0u);
   auto arguments = lookupArguments<arguments::LatticeArguments>(options);
@@ -21,6 +22,7 @@ void VulkanDevice::enqueue(const LatticeForward& options) {
   queue(kernel(kLatticeForwardSpirv), arguments, groupsOf(options.samples, kSamplesPerGroup));
 }
 
+template <>
 void VulkanDevice::enqueue(const LatticeBackward& options) {
   CHECK(options.grid.planes == 0u);
   auto arguments = lookupArguments<arguments::LatticeArguments>(options);

@@ -8,9 +8,6 @@
 #include "shaders/depth_loss_subgroups.h"
 #include "shaders/distortion_loss.h"
 #include "shaders/distortion_loss_subgroups.h"
-#include "shaders/exposure_backward.h"
-#include "shaders/exposure_backward_float_atomics.h"
-#include "shaders/exposure_forward.h"
 #include "shaders/opacity_loss.h"
 #include "shaders/opacity_loss_subgroups.h"
 #include "shaders/s3im_loss.h"
@@ -40,6 +37,7 @@ arguments::RayLossArguments rayLossArguments(const VulkanDevice& device, const O
 
 }  // namespace
 
+template <>
 void VulkanDevice::enqueue(const ColourLoss& options) {
   arguments::ColourLossArguments arguments = {};
   arguments.rays = countArguments(options.rays);
@@ -54,6 +52,7 @@ void VulkanDevice::enqueue(const ColourLoss& options) {
             atLeastOneGroup(3 * size_t{options.rays.capacity}, kPerGroup), 2, deviceAddress(options.loss));
 }
 
+template <>
 void VulkanDevice::enqueue(const DistortionLoss& options) {
   arguments::RayLossArguments arguments = rayLossArguments(*this, options);
   arguments.normalised = options.normalised;
@@ -63,6 +62,7 @@ void VulkanDevice::enqueue(const DistortionLoss& options) {
             atLeastOneGroup(options.rays.capacity, kPerGroup), 1, deviceAddress(options.loss));
 }
 
+template <>
 void VulkanDevice::enqueue(const DepthLoss& options) {
   arguments::RayLossArguments arguments = rayLossArguments(*this, options);
   arguments.tolerance = options.tolerance;
@@ -72,6 +72,7 @@ void VulkanDevice::enqueue(const DepthLoss& options) {
             atLeastOneGroup(options.rays.capacity, kPerGroup), 1, deviceAddress(options.loss));
 }
 
+template <>
 void VulkanDevice::enqueue(const S3imLoss& options) {
   const size_t rays = options.rays.capacity;
   const uint32_t parts = atLeastOneGroup(3 * options.patches * (rays / 16), kPerGroup);
@@ -95,6 +96,7 @@ void VulkanDevice::enqueue(const S3imLoss& options) {
   addPartials(arguments.partials, parts, 1, deviceAddress(options.loss));
 }
 
+template <>
 void VulkanDevice::enqueue(const OpacityLoss& options) {
   arguments::NumberLossArguments arguments = {};
   arguments.numbers = countArguments(options.segments);
@@ -105,6 +107,7 @@ void VulkanDevice::enqueue(const OpacityLoss& options) {
             atLeastOneGroup(options.segments.capacity, kPerGroup), 1, deviceAddress(options.loss));
 }
 
+template <>
 void VulkanDevice::enqueue(const SparsityLoss& options) {
   arguments::NumberLossArguments arguments = {};
   arguments.numbers = countArguments(options.points);
@@ -114,32 +117,6 @@ void VulkanDevice::enqueue(const SparsityLoss& options) {
   arguments.gradients = deviceAddress(options.gradients);
   queueSums(kernel(groupSpirv(kSparsityLossSubgroupsSpirv, kSparsityLossSpirv)), arguments,
             atLeastOneGroup(options.points.capacity, kPerGroup), 1, deviceAddress(options.loss));
-}
-
-void VulkanDevice::enqueue(const ExposureForward& options) {
-  arguments::ExposureArguments arguments = {};
-  arguments.rays = countArguments(options.rays);
-  arguments.colours = deviceAddress(options.colours);
-  arguments.opacity = deviceAddress(options.opacity);
-  arguments.background = deviceAddress(options.background);
-  arguments.photoOfRay = deviceAddress(options.photoOfRay);
-  arguments.logGains = deviceAddress(options.logGains);
-  arguments.exposed = deviceAddress(options.exposed);
-  queue(kernel(kExposureForwardSpirv), arguments, groupsOf(options.rays, 256, 3));
-}
-
-void VulkanDevice::enqueue(const ExposureBackward& options) {
-  arguments::ExposureArguments arguments = {};
-  arguments.rays = countArguments(options.rays);
-  arguments.colours = deviceAddress(options.colours);
-  arguments.background = deviceAddress(options.background);
-  arguments.photoOfRay = deviceAddress(options.photoOfRay);
-  arguments.logGains = deviceAddress(options.logGains);
-  arguments.exposed = deviceAddress(options.exposedGradients);
-  arguments.colourGradients = deviceAddress(options.colourGradients);
-  arguments.opacityGradients = deviceAddress(options.opacityGradients);
-  arguments.logGainGradients = deviceAddress(options.logGainGradients);
-  queue(sumKernel(kExposureBackwardFloatAtomicsSpirv, kExposureBackwardSpirv), arguments, groupsOf(options.rays, 128));
 }
 
 }  // namespace tessera

@@ -144,6 +144,7 @@ uint64_t VulkanDevice::weightNumbers(const Slice<const float>& weights, uint64_t
   return scratch;
 }
 
+template <>
 void VulkanDevice::enqueue(const MlpForward& options) {
   const MlpShape& shape = options.shape;
   const size_t capacity = options.samples.capacity;
@@ -167,6 +168,7 @@ void VulkanDevice::enqueue(const MlpForward& options) {
   queue(block.kernel, arguments, groupsOf(options.samples, block.samples));
 }
 
+template <>
 void VulkanDevice::enqueue(const MlpBackward& options) {
   const MlpShape& shape = options.shape;
   const uint32_t width = shape.width, hiddenLayers = shape.hiddenLayers;

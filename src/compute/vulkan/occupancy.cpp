@@ -12,6 +12,7 @@
 
 namespace tessera {
 
+template <>
 void VulkanDevice::enqueue(const OccupancyPoints& options) {
   const uint32_t resolution = options.space.gridResolution, points = static_cast<uint32_t>(options.cells.count);
   CHECK(16 * (uint64_t{options.first} + points) < uint64_t{1} << 32);  // indices of random numbers
@@ -30,6 +31,7 @@ void VulkanDevice::enqueue(const OccupancyPoints& options) {
   queue(kernel(kOccupancyPointsSpirv), arguments, {groups(points, 128)});
 }
 
+template <>
 void VulkanDevice::enqueue(const OccupancyUpdate& options) {
   constexpr uint32_t kMostSums = 256;  // workgroups that sum
   arguments::OccupancyUpdateArguments arguments = {};

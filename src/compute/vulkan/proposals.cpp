@@ -12,6 +12,7 @@
 
 namespace tessera {
 
+template <>
 void VulkanDevice::enqueue(const ResampleFences& options) {
   arguments::ResampleFencesArguments arguments = {};
   arguments.rays = countArguments(options.rays);
@@ -26,6 +27,7 @@ void VulkanDevice::enqueue(const ResampleFences& options) {
   queue(realKernel(kResampleFencesFloat64Spirv, kResampleFencesSpirv), arguments, groupsOf(options.rays, 64));
 }
 
+template <>
 void VulkanDevice::enqueue(const InterlevelLoss& options) {
   arguments::RayLossArguments arguments = {};
   arguments.rays = countArguments(options.rays);

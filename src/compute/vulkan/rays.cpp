@@ -8,18 +8,17 @@
 #include "shaders/generate_rays.h"
 #include "shaders/march_rays.h"
 #include "shaders/march_rays_float64.h"
-#include "shaders/move_rows.h"
 #include "shaders/optical_depth.h"
 
 namespace tessera {
 
 namespace {
 
-constexpr uint32_t kRaysPerGroup = 64;       // local_size_x of the kernels
-constexpr uint32_t kElementsPerGroup = 256;  // of those that move rows
+constexpr uint32_t kRaysPerGroup = 64;  // local_size_x of the kernels
 
 }  // namespace
 
+template <>
 void VulkanDevice::enqueue(const GenerateRays& options) {
   arguments::GenerateRaysArguments arguments = {};
   arguments.rays = countArguments(options.rays);
@@ -31,6 +30,7 @@ void VulkanDevice::enqueue(const GenerateRays& options) {
   queue(kernel(kGenerateRaysSpirv), arguments, groupsOf(options.rays, kRaysPerGroup));
 }
 
+template <>
 void VulkanDevice::enqueue(const MarchRays& options) {
   const MarchSpace& space = options.space;
   arguments::MarchRaysArguments arguments = {};
@@ -52,6 +52,7 @@ void VulkanDevice::enqueue(const MarchRays& options) {
   queueMarch(kMarchRaysFloat64Spirv, kMarchRaysSpirv, options, arguments);
 }
 
+template <>
 void VulkanDevice::enqueue(const OpticalDepth& options) {
   arguments::OpticalDepthArguments arguments = {};
   arguments.rays = countArguments(options.rays);
@@ -62,6 +63,7 @@ void VulkanDevice::enqueue(const OpticalDepth& options) {
   queue(kernel(kOpticalDepthSpirv), arguments, groupsOf(options.rays, kRaysPerGroup));
 }
 
+template <>
 void VulkanDevice::enqueue(const CompactSamples& options) {
   const uint32_t rays = options.rays.capacity;
   arguments::CompactSamplesArguments arguments = {};
@@ -98,27 +100,6 @@ VulkanDevice::RayScratch VulkanDevice::rayScratch(uint32_t rays) {
   made.fitting = made.nexts + rays * sizeof(uint32_t);
   made.partials = made.fitting + 2 * sizeof(uint32_t);
   return made;
-}
-
-void VulkanDevice::moveRows(const Count& rows, const Slice<const uint32_t>& source, const Matrix<const float>& from,
-                            const Matrix<const float>& to, bool scatter) {
-  CHECK(from.columns == to.columns);
-  arguments::MoveRowsArguments arguments = {};
-  arguments.rows = countArguments(rows);
-  arguments.source = deviceAddress(source);
-  arguments.from = matrixArguments(from, scatter ? rows.capacity : 0);
-  arguments.to = matrixArguments(to, scatter ? 0 : rows.capacity);
-  CHECK(size_t{rows.capacity} * from.columns < size_t{1} << 31);
-  queue(kernel(kMoveRowsSpirv, {scatter}), arguments, groupsOf(rows, kElementsPerGroup, from.columns));
-  countedGroups_.changed(arguments.to.data, to.data.count * sizeof(float));  // counters may travel as floats
-}
-
-void VulkanDevice::enqueue(const GatherRows& options) {
-  moveRows(options.rows, options.source, options.input, options.output, false);
-}
-
-void VulkanDevice::enqueue(const ScatterRows& options) {
-  moveRows(options.rows, options.source, options.input, options.output, true);
 }
 
 }  // namespace tessera

@@ -24,6 +24,7 @@ void VulkanDevice::zeroRows(const Count& rows, uint32_t columns, const Slice<flo
         groupsOf(rows, 256, columns));
 }
 
+template <>
 void VulkanDevice::enqueue(const DistinctTexels& options) {
   const VirtualGrid& grid = options.grid;
   const size_t corners = size_t{options.samples.capacity} * grid.corners();
@@ -62,6 +63,7 @@ void VulkanDevice::enqueue(const DistinctTexels& options) {
   countersChanged(options.firstTexel);
 }
 
+template <>
 void VulkanDevice::enqueue(const VirtualGridForward& options) {
   auto arguments = lookupArguments<arguments::VirtualGridLookupArguments>(options);
   arguments.attributes = quadAddress(options.attributes);
@@ -73,6 +75,7 @@ void VulkanDevice::enqueue(const VirtualGridForward& options) {
         groupsOf(options.samples, kSamplesPerGroup));
 }
 
+template <>
 void VulkanDevice::enqueue(const VirtualGridBackward& options) {
   auto arguments = lookupArguments<arguments::VirtualGridLookupArguments>(options);
   arguments.logDensities = deviceAddress(options.logDensities);

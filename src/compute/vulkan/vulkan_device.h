@@ -54,7 +54,6 @@ class VulkanDevice : public Device {
   void readBytes(std::span<const Reading> readings) override;
   void fillZero(Memory& memory, size_t offset, size_t bytes) override;
   void finish() override;
-  bool supports(Operation) const override { return true; }
   static MlpArithmetic bestArithmetic(const GpuContext& context);
   bool multipliesMatrices() const { return mlpArithmetic_ >= MlpArithmetic::nvMatrices; }
   // Of operations that begin at row 0, and of those that take part of the rows.
@@ -64,19 +63,12 @@ class VulkanDevice : public Device {
   bool keepsHalves() const override { return mlpArithmetic_ != MlpArithmetic::floats; }
 
   using Device::fillZero;
-  using Device::run;
-#define TESSERA_RUN_LABELLED(name)         \
-  void run(const name& options) override { \
-    stream_->label(#name);                 \
-    enqueue(options);                      \
-  }
-  TESSERA_OPERATIONS(TESSERA_RUN_LABELLED)
-#undef TESSERA_RUN_LABELLED
 
  private:
-#define TESSERA_ENQUEUE(name) void enqueue(const name& options);
-  TESSERA_OPERATIONS(TESSERA_ENQUEUE)
-#undef TESSERA_ENQUEUE
+  bool runOperation(const OperationId& operation, const void* arguments) override;
+  // Specialised for every operation, in the file of its kind; device.cpp knows the list.
+  template <class Arguments>
+  void enqueue(const Arguments& options);
 
   // Compiled at first use. `constants` are the shader's specialization constants in order.
   const GpuKernel& kernel(std::span<const uint32_t> spirv, std::vector<uint32_t> constants = {},
@@ -119,9 +111,7 @@ class VulkanDevice : public Device {
   }
   // Whatever writes numbers that may be counters says so.
   void countersChanged(const Slice<const uint32_t>& words);
-  uint32_t atLeastOneGroup(size_t count, size_t perGroup) const {
-    return std::max(groups(count, perGroup), 1u);
-  }
+  uint32_t atLeastOneGroup(size_t count, size_t perGroup) const { return std::max(groups(count, perGroup), 1u); }
 
   // values[i] = Σ_{j <= i} values[j] for i below `rows`, in place; see ScanArguments. With `marks`, what is summed are
   // the bits of those words, and of all words before each. `scratch` has room for scanScratch(rows.capacity) numbers.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "base/config.h"
+#include "compute/rays.h"
 #include "field/radiance_field.h"
 
 namespace tessera {

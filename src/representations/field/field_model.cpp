@@ -19,17 +19,8 @@ RaySamples::RaySamples(Device& device, uint32_t rays, uint32_t samples)
       distances(device.array<float>(samples)),
       steps(device.array<float>(samples)) {}
 
-namespace {
-
-Device& able(Device& device) {
-  requireAllOperations(device);
-  return device;
-}
-
-}  // namespace
-
 FieldModel::FieldModel(Device& device, const FieldConfig& config, const SceneFrame& frame)
-    : device_(able(device)),
+    : device_(device),
       config_(config),
       frame_(frame),
       space_(config.space()),

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "compute/composite.h"
+
 namespace tessera {
 namespace {
 

@@ -6,6 +6,8 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "base/random.h"
+#include "compute/composite.h"
+#include "compute/exposure.h"
 #include "train/colour_loss.h"
 #include "train/schedule.h"
 #include "train/visible_cells.h"

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "base/random.h"
+#include "compute/composite.h"
+#include "compute/losses.h"
 #include "compute/roofline.h"
 
 namespace tessera {

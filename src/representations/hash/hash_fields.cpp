@@ -2,6 +2,7 @@
 
 #include "base/random.h"
 #include "compute/lattice.h"
+#include "compute/rows.h"
 #include "field/initial_values.h"
 
 namespace tessera {

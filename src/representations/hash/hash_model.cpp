@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/random.h"
+#include "compute/rows.h"
 #include "field/initial_values.h"
 #include "train/run_folder.h"
 
@@ -21,7 +22,6 @@ constexpr uint32_t kLeastChunk = 1 << 12;  // points of the occupancy that are l
 
 Device& able(Device& device, const HashConfig& config) {
   config.check();
-  requireAllOperations(device);
   return device;
 }
 

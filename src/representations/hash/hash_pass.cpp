@@ -2,6 +2,11 @@
 
 #include <algorithm>
 
+#include "compute/composite.h"
+#include "compute/encodings.h"
+#include "compute/losses.h"
+#include "compute/rows.h"
+
 namespace tessera {
 
 HashPass::HashPass(HashModel& model, const Room& room)

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/random.h"
 #include "compute/block_path.h"
+#include "compute/exposure.h"
 #include "train/colour_loss.h"
 #include "train/schedule.h"
 #include "train/visible_cells.h"

@@ -2,6 +2,12 @@
 
 #include <algorithm>
 
+#include "compute/blend.h"
+#include "compute/composite.h"
+#include "compute/losses.h"
+#include "compute/proposals.h"
+#include "compute/rows.h"
+
 namespace tessera {
 namespace {
 

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "base/random.h"
+#include "compute/exposure.h"
 #include "train/colour_loss.h"
 #include "train/run_folder.h"
 #include "train/schedule.h"

@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# How many objects are compiled anew when an operation's header changes, of all that a build has: those that include it,
+# directly or not, as the compiler found. A new operation in a header of its own costs its users, the devices' tables and
+# the op test.
+#   bench/rebuild_cost.sh [BUILD_FOLDER [HEADER...]]     default: build/release, which is built in full; all operations
+set -euo pipefail
+cd "$(dirname "$0")/.."
+build=${1:-build/release}
+shift $(($# > 0 ? 1 : 0))
+headers=("$@")
+if [ ${#headers[@]} -eq 0 ]; then
+  mapfile -t headers < <(grep -l '^TESSERA_OPERATION(' src/compute/*.h)
+  headers+=(src/compute/operations.h src/compute/device.h)
+fi
+ninja -C "$build" -t deps | awk -v headers="${headers[*]}" '
+  /^[^ ].*: #deps/ { isObject = $1 ~ /\.o:$/; objects += isObject; next }
+  isObject && NF == 1 { name = $1; sub(/^.*\/src\/compute\//, "src/compute/", name); ++users[name] }
+  END {
+    count = split(headers, names, " ")
+    for (i = 1; i <= count; ++i) printf "%-32s %4d of %d objects\n", names[i], users[names[i]], objects
+  }'
