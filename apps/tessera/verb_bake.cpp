@@ -83,7 +83,6 @@ void addBakeVerb(CLI::App& app) {
       const LevelModels models = [&](uint32_t level) {
         return loadVolumeModel(*device, levelFolder(flags->model, level), resident);
       };
-      flags->options.minAlpha = config.cullLast;
       baked = bakeVolume(models, levels, capture, flags->scene, flags->options);
     } else {
       const HashLevelModels models = [&](uint32_t level) {
@@ -95,18 +94,19 @@ void addBakeVerb(CLI::App& app) {
     if (flags->json) {
       nlohmann::ordered_json result = {{"tiles", baked.tileset.tiles.size()}};
       for (const BakedLevel& level : baked.levels) {
-        result["levels"].push_back({{"bytes_on_disk", level.bytesOnDisk},
-                                    {"bytes_in_memory", level.bytesInMemory},
-                                    {"macroblocks", level.macroblocks}});
+        nlohmann::ordered_json& of = result["levels"].emplace_back();
+        of = {{"bytes_on_disk", level.bytesOnDisk}, {"bytes_in_memory", level.bytesInMemory}};
+        for (const auto& [what, count] : level.counts) of[what] = count;
       }
       fmt::print("{}\n", result.dump(2));
       return;
     }
     for (size_t level = 0; level < baked.levels.size(); ++level) {
       const BakedLevel& of = baked.levels[level];
-      fmt::print("{}, level {}: {:.1f} MB on disk, {:.1f} MB in memory, {} macroblocks\n", flags->scene, level,
-                 static_cast<double>(of.bytesOnDisk) / 1e6, static_cast<double>(of.bytesInMemory) / 1e6,
-                 of.macroblocks);
+      fmt::print("{}, level {}: {:.1f} MB on disk, {:.1f} MB in memory", flags->scene, level,
+                 static_cast<double>(of.bytesOnDisk) / 1e6, static_cast<double>(of.bytesInMemory) / 1e6);
+      for (const auto& [what, count] : of.counts) fmt::print(", {} {}", count, what);
+      fmt::print("\n");
     }
   });
 }

@@ -1,16 +1,12 @@
 // Levels of detail (City-on-Web, section 4.4): which blocks are merged into one model at which level.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 
-namespace tessera {
+#include "tiles/tileset.h"
 
-// Cells [first, end) along x and y.
-struct CellGroup {
-  std::array<uint32_t, 2> first = {0, 0}, end = {1, 1};
-};
+namespace tessera {
 
 // Level 0 is the blocks themselves. Each next one merges 2 × 2 groups, and all there are when no more than kMostMerged
 // remain: 24 blocks come to 6 and then to 1, as in the paper.
@@ -22,7 +18,7 @@ uint32_t topLevel(uint32_t columns, uint32_t rows);
 
 struct LevelGroups {
   std::vector<uint32_t> groupOfBlock;  // [blocks]; a surround, the last block, is always a group of its own, the last
-  std::vector<CellGroup> cells;        // [groups], without the surround's
+  std::vector<CellRange> cells;        // [groups], without the surround's
 
   uint32_t groups() const { return groupOfBlock.empty() ? 0 : groupOfBlock.back() + 1; }
 };

@@ -36,7 +36,7 @@ TEST(Levels, HoldEveryBlockOnceInRectanglesThatNest) {
       ASSERT_EQ(groups.groupOfBlock.size(), columns * rows + 1);
       EXPECT_EQ(groups.groupOfBlock.back(), groups.cells.size()) << "the surround is a group of its own";
       for (uint32_t block = 0; block < columns * rows; ++block) {
-        const CellGroup& cells = groups.cells.at(groups.groupOfBlock[block]);
+        const CellRange& cells = groups.cells.at(groups.groupOfBlock[block]);
         const uint32_t i = block % columns, j = block / columns;
         EXPECT_TRUE(cells.first[0] <= i && i < cells.end[0] && cells.first[1] <= j && j < cells.end[1]);
       }

@@ -8,8 +8,27 @@
 
 namespace tessera {
 
-SceneWriter::SceneWriter(const fs::path& folder, const Capture& capture, const BlockGrid& grid,
-                         const SceneDescription& about)
+namespace {
+
+// Of the file of a shared resource.
+std::string extensionOf(const std::string& mimeType) {
+  if (mimeType == "model/gltf-binary") return "glb";
+  if (mimeType.starts_with("image/")) return mimeType.substr(std::string_view("image/").size());
+  return "bin";
+}
+
+void addCount(std::vector<std::pair<std::string, uint64_t>>& counts, const std::pair<std::string, uint64_t>& count) {
+  const auto same = std::find_if(counts.begin(), counts.end(), [&](const auto& c) { return c.first == count.first; });
+  if (same == counts.end()) {
+    counts.push_back(count);
+  } else {
+    same->second += count.second;
+  }
+}
+
+}  // namespace
+
+SceneWriter::SceneWriter(const fs::path& folder, const Capture& capture, const SceneDescription& about)
     : folder_(folder) {
   tileset_.representation = about.representation;
   tileset_.name = fs::weakly_canonical(capture.root).filename().string();
@@ -17,41 +36,46 @@ SceneWriter::SceneWriter(const fs::path& folder, const Capture& capture, const B
   tileset_.georeference = capture.geo;
   tileset_.near = about.near;
   tileset_.background = about.background;
-  placeOn(tileset_, grid);
+  placeOn(tileset_, about.grid);
 }
 
-void SceneWriter::beginLevel(uint32_t texels) {
-  levels_.emplace_back().texels = texels;
+uint32_t SceneWriter::addResource(const std::string& name, const std::string& mimeType,
+                                  std::span<const std::byte> bytes) {
+  const std::string uri = folder_.addResource(name, extensionOf(mimeType), bytes);
+  for (size_t i = 0; i < tileset_.resources.size(); ++i) {
+    if (tileset_.resources[i].uri == uri) return static_cast<uint32_t>(i);
+  }
+  tileset_.resources.push_back({uri, mimeType, bytes.size()});
+  return static_cast<uint32_t>(tileset_.resources.size() - 1);
 }
 
-TileContent SceneWriter::write(const std::string& name, std::span<const std::byte> file,
-                               const ContentSummary& content) {
-  CHECK(!levels_.empty());
+void SceneWriter::add(uint32_t level, const std::optional<CellRange>& cells, std::span<const std::byte> glb,
+                      const ContentSummary& content, const std::vector<uint32_t>& resources) {
+  CHECK(cells.has_value() != content.isBackground);
+  if (level >= levels_.size()) levels_.resize(level + size_t{1});
+  Level& at = levels_[level];
+  const std::string name = cells ? fmt::format("block_{}_{}", cells->first[0], cells->first[1]) : "surround";
   TileContent entry;
-  entry.uri = folder_.addContent(static_cast<uint32_t>(levels_.size() - 1), name, file);
-  entry.bytes = file.size();
+  entry.uri = folder_.addContent(level, name, glb);
+  entry.bytes = glb.size();
   entry.box = content.box;
-  BakedLevel& sizes = levels_.back().sizes;
-  sizes.bytesOnDisk += file.size();
-  sizes.bytesInMemory += content.bytesInMemory;
-  sizes.macroblocks += content.macroblocks;
-  return entry;
-}
-
-void SceneWriter::add(const CellGroup& cells, std::span<const std::byte> file, const ContentSummary& content) {
-  TileContent entry = write(fmt::format("block_{}_{}", cells.first[0], cells.first[1]), file, content);
-  entry.cells = CellRange{cells.first, cells.end};
-  levels_.back().contents.push_back(std::move(entry));
-}
-
-void SceneWriter::addSurround(std::span<const std::byte> file, const ContentSummary& content) {
-  TileContent entry = write("surround", file, content);
+  entry.resources = resources;
+  at.sizes.bytesOnDisk += glb.size();
+  at.sizes.bytesInMemory += content.memoryBytes;
+  for (const auto& count : content.counts) addCount(at.sizes.counts, count);
+  const double geometricError = content.geometricError * tileset_.tileFromScene().scale;
+  if (cells) {
+    entry.cells = *cells;
+    at.contents.push_back(std::move(entry));
+    at.geometricErrors.push_back(geometricError);
+    return;
+  }
+  CHECK(!at.background);
   entry.surround = true;
   entry.cells = tileset_.allCells();
-  entry.level = static_cast<uint32_t>(levels_.size() - 1);
-  // Its domain is 4 wide.
-  entry.geometricError = content.largestScale * 4.0 / levels_.back().texels * tileset_.tileFromScene().scale;
-  levels_.back().surround = std::move(entry);
+  entry.level = level;
+  entry.geometricError = geometricError;
+  at.background = std::move(entry);
 }
 
 // Adds the tile of a group and, below it, those that it merges. Returns its number.
@@ -62,7 +86,7 @@ uint32_t SceneWriter::addTiles(size_t level, size_t group) {
   tile.level = static_cast<uint32_t>(level);
   tile.cells = content.cells;
   tile.box = content.box;
-  tile.geometricError = 2.0 / levels_[level].texels * tileset_.tileFromScene().scale;
+  tile.geometricError = levels_[level].geometricErrors[group];
   tile.contents.push_back(content);
   tileset_.tiles.push_back(tile);
   for (size_t below = 0; level > 0 && below < levels_[level - 1].contents.size(); ++below) {
@@ -89,6 +113,7 @@ void SceneWriter::addRoot(const Level& top) {
 
 BakedScene SceneWriter::commit() {
   CHECK(!levels_.empty());
+  for (const Level& level : levels_) CHECK(!level.contents.empty());
   tileset_.levels = static_cast<uint32_t>(levels_.size());
   const size_t top = levels_.size() - 1;
   if (levels_[top].contents.size() == 1) {
@@ -101,7 +126,7 @@ BakedScene SceneWriter::commit() {
     }
   }
   for (const Level& level : levels_) {
-    if (level.surround) tileset_.tiles[0].contents.push_back(*level.surround);
+    if (level.background) tileset_.tiles[0].contents.push_back(*level.background);
   }
   tileset_.geometricError = tileset_.tileFromScene().scale * std::max(tileset_.columns, tileset_.rows);
   folder_.commit(tileset_);

@@ -1,92 +1,144 @@
 #include "bake/scene_writer.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include "tiles/hash_payload.h"
-#include "tiles/test_support.h"
-#include "tiles/volume_payload.h"
+#include "base/temporary_folder.h"
 
 namespace tessera {
 namespace {
 
+Bytes bytesOf(const std::string& text) {
+  const auto raw = std::as_bytes(std::span(text.data(), text.size()));
+  return Bytes(raw.begin(), raw.end());
+}
+
 class SceneWriting : public testing::Test {
  protected:
-  SceneWriting() : folder_(fs::temp_directory_path() / ("tessera-scene-writer-" + std::to_string(::getpid()))) {
+  SceneWriting() {
     capture_.root = "/photos/town";
-    grid_.columns = 2;
-    grid_.rows = 1;
-    grid_.bottom = -10;
-    grid_.top = 10;
-    grid_.edge = 20;
-  }
-  ~SceneWriting() override { fs::remove_all(folder_); }
-
-  static HashContent cell(float x) {
-    HashContent content = tiles_test::madeHashContent(3);
-    content.parts[0].centre = {x, 0, 0};
-    content.parts[0].low = {x - 1, -1, -1};
-    content.parts[0].high = {x + 1, 1, 1};
-    return content;
-  }
-  static HashContent surround() {
-    HashContent content = cell(0);
-    HashPart& part = content.parts[0];
-    part.surround = part.contracted = true;
-    part.scale = {2, 1, 1};
-    part.low = {-1000, -1000, -1000};
-    part.high = {1000, 1000, 1000};
-    return content;
+    about_.representation = "hash";
+    about_.near = 0.1;
+    about_.background = {0.1f, 0.2f, 0.3f};
+    about_.grid.columns = 2;
+    about_.grid.rows = 1;
+    about_.grid.bottom = -10;
+    about_.grid.top = 10;
+    about_.grid.edge = 20;
   }
 
-  const fs::path folder_;
+  // Of cells that are `width` wide around x, baked of a grid of `texels`.
+  static ContentSummary around(double x, double width, double texels) {
+    ContentSummary content;
+    content.box = {{x - width / 2, -1, -1}, {x + width / 2, 1, 1}};
+    content.geometricError = 2.0 / texels;
+    content.memoryBytes = static_cast<uint64_t>(1000 * texels);
+    content.counts = {{"macroblocks", 5}};
+    return content;
+  }
+  static ContentSummary background(double texels) {
+    ContentSummary content;
+    content.box = {Vec3d::Constant(-1000), Vec3d::Constant(1000)};
+    content.isBackground = true;
+    content.geometricError = 8.0 / texels;
+    content.memoryBytes = 7;
+    content.counts = {{"macroblocks", 2}};
+    return content;
+  }
+
+  const TemporaryFolder folder_;
   Capture capture_;
-  BlockGrid grid_;
+  SceneDescription about_;
 };
 
-TEST_F(SceneWriting, MakesATreeOfLevelsAndASurroundOfEach) {
-  SceneWriter writer(folder_, capture_, grid_, {"hash", 0.1, {0.1f, 0.2f, 0.3f}});
-  const HashContent left = cell(-1), right = cell(1), around = surround();
-  HashContent both = left;
-  both.parts.push_back(right.parts[0]);
-  writer.beginLevel(64);
-  writer.add({{0, 0}, {1, 1}}, encodeHash(left), summaryOf(left));
-  writer.add({{1, 0}, {2, 1}}, encodeHash(right), summaryOf(right));
-  writer.addSurround(encodeHash(around), summaryOf(around));
-  writer.beginLevel(32);
-  writer.add({{0, 0}, {2, 1}}, encodeHash(both), summaryOf(both));
-  writer.addSurround(encodeHash(around), summaryOf(around));
+constexpr CellRange kLeft = {{0, 0}, {1, 1}}, kRight = {{1, 0}, {2, 1}}, kBoth = {{0, 0}, {2, 1}};
+
+TEST_F(SceneWriting, MakesATreeOfLevelsAndABackgroundOfEach) {
+  SceneWriter writer(folder_ / "scene", capture_, about_);
+  // A model that holds all levels may give those of one block together.
+  writer.add(0, kLeft, bytesOf("left"), around(-1, 2, 64));
+  writer.add(1, kBoth, bytesOf("both, coarser"), around(0, 4, 32));
+  writer.add(1, std::nullopt, bytesOf("all around, coarser"), background(32));
+  writer.add(0, kRight, bytesOf("right"), around(1, 2, 64));
+  writer.add(0, std::nullopt, bytesOf("all around"), background(64));
   const BakedScene baked = writer.commit();
-  const Tileset tileset = readTileset(folder_);
-  EXPECT_EQ(tileset.representation, "hash");
+  const Tileset tileset = readTileset(folder_ / "scene");
+  EXPECT_EQ(tileset.representation, about_.representation);
   EXPECT_EQ(tileset.name, "town");
   EXPECT_EQ(tileset.background[2], 0.3f);
   EXPECT_EQ(tileset.near, 0.1);
   EXPECT_EQ(tileset.levels, 2u);
   ASSERT_EQ(tileset.tiles.size(), 3u);
   EXPECT_EQ(tileset.root().children.size(), 2u);
-  EXPECT_EQ(tileset.root().contents.size(), 3u);
+  ASSERT_EQ(tileset.root().contents.size(), 3u);
   EXPECT_NEAR(tileset.root().geometricError, 2.0 / 32 * 10, 1e-9);  // half an edge is 10
   EXPECT_NEAR(tileset.tiles[1].geometricError, 2.0 / 64 * 10, 1e-9);
+  EXPECT_NEAR(tileset.root().contents[1].geometricError, 8.0 / 64 * 10, 1e-9);
+  EXPECT_EQ(tileset.root().contents[2].level, 1u);
+  EXPECT_EQ(readTextFile(contentPath(folder_ / "scene", tileset.tiles[2].contents.at(0).uri)), "right");
+  EXPECT_EQ(tileset.tiles[2].contents[0].box.low.x(), 0);
+  EXPECT_EQ(baked.tileset.tiles.size(), 3u);
   ASSERT_EQ(baked.levels.size(), 2u);
-  EXPECT_EQ(baked.levels[1].bytesInMemory, bytesInMemory(both) + bytesInMemory(around));
-  EXPECT_EQ(baked.levels[1].macroblocks, 2u * left.parts[0].storedMacroblocks() + around.parts[0].storedMacroblocks());
-  EXPECT_EQ(baked.levels[0].bytesOnDisk,
-            encodeHash(left).size() + encodeHash(right).size() + encodeHash(around).size());
+  EXPECT_EQ(baked.levels[1].bytesInMemory, 32007u);
+  EXPECT_EQ(baked.levels[0].counts, (decltype(BakedLevel::counts){{"macroblocks", 12}}));
+  EXPECT_EQ(baked.levels[0].bytesOnDisk, std::string("leftrightall around").size());
 }
 
 TEST_F(SceneWriting, MakesARootWhereNothingStandsForAll) {
-  SceneWriter writer(folder_, capture_, grid_, {"hash"});
-  const HashContent left = cell(-1), right = cell(1);
-  writer.beginLevel(64);
-  writer.add({{0, 0}, {1, 1}}, encodeHash(left), summaryOf(left));
-  writer.add({{1, 0}, {2, 1}}, encodeHash(right), summaryOf(right));
+  SceneWriter writer(folder_ / "scene", capture_, about_);
+  writer.add(0, kLeft, bytesOf("left"), around(-1, 2, 64));
+  writer.add(0, kRight, bytesOf("right"), around(1, 2, 64));
   const BakedScene baked = writer.commit();
   EXPECT_EQ(baked.levels.size(), 1u);
-  const Tileset tileset = readTileset(folder_);
+  const Tileset tileset = readTileset(folder_ / "scene");
   EXPECT_EQ(tileset.levels, 2u);
   EXPECT_FALSE(tileset.root().hasContents());
   EXPECT_EQ(tileset.root().children.size(), 2u);
+}
+
+TEST_F(SceneWriting, WritesWhatContentsShareOnceAndSaysWhoNeedsIt) {
+  SceneWriter writer(folder_ / "scene", capture_, about_);
+  const uint32_t network = writer.addResource("network", "application/octet-stream", bytesOf("weights"));
+  const uint32_t texture = writer.addResource("texture", "image/webp", bytesOf("texels"));
+  EXPECT_EQ(writer.addResource("network", "application/octet-stream", bytesOf("weights")), network);
+  EXPECT_NE(network, texture);
+  writer.add(0, kLeft, bytesOf("left"), around(-1, 2, 64), {network, texture});
+  writer.add(0, kRight, bytesOf("right"), around(1, 2, 64), {network});
+  writer.commit();
+  const Tileset tileset = readTileset(folder_ / "scene");
+  ASSERT_EQ(tileset.resources.size(), 2u);
+  const SharedResource& shared = tileset.resources[network];
+  EXPECT_EQ(shared.mimeType, "application/octet-stream");
+  EXPECT_EQ(shared.bytes, std::string("weights").size());
+  EXPECT_TRUE(shared.uri.starts_with("resources/network-") && shared.uri.ends_with(".bin")) << shared.uri;
+  EXPECT_TRUE(tileset.resources[texture].uri.ends_with(".webp")) << tileset.resources[texture].uri;
+  EXPECT_EQ(readTextFile(contentPath(folder_ / "scene", shared.uri)), "weights");
+  EXPECT_EQ(tileset.tiles[1].contents.at(0).resources, (std::vector<uint32_t>{network, texture}));
+  EXPECT_EQ(tileset.tiles[2].contents.at(0).resources, (std::vector<uint32_t>{network}));
+}
+
+// A baker of any kind.
+class OneContent final : public Baker {
+ public:
+  explicit OneContent(const SceneDescription& about) : about_(about) {}
+  SceneDescription description() const override { return about_; }
+  void bake(const Capture&, const BakeOptions& options, ContentSink& sink) override {
+    sink.add(0, kBoth, bytesOf("fine" + std::to_string(options.effort)), ContentSummary{.geometricError = 0.1});
+  }
+
+ private:
+  SceneDescription about_;
+};
+
+TEST_F(SceneWriting, TakesTheBackgroundThatIsAskedForElseTheBakers) {
+  OneContent baker(about_);
+  BakeOptions options;
+  options.effort = 7;
+  const BakedScene baked = bakeScene(baker, capture_, folder_ / "scene", options);
+  EXPECT_EQ(readTileset(folder_ / "scene").background, about_.background);
+  EXPECT_EQ(readTextFile(contentPath(folder_ / "scene", baked.tileset.root().contents.at(0).uri)), "fine7");
+  options.background = {0.5f, 0.25f, 0.75f};
+  bakeScene(baker, capture_, folder_ / "scene", options);
+  EXPECT_EQ(readTileset(folder_ / "scene").background, *options.background);
 }
 
 }  // namespace

@@ -4,26 +4,30 @@
 #include <functional>
 #include <memory>
 
-#include "bake/bake_options.h"
-#include "bake/scene_writer.h"
+#include "bake/baker.h"
 #include "representations/hash/hash_model.h"
 #include "scene/capture.h"
 #include "tiles/hash_content.h"
 
 namespace tessera {
 
-struct BakeHashOptions : BakeOptions {
+struct HashBakeSettings {
   int dilation = 1;  // cells around those that are seen are kept, too
   // Of a finest block's occupancy along an edge, a multiple of 8, and half as many for each coarser level; 0: at each
   // level three times as many as its lattice has corners, up to 384 or as many as those.
   uint32_t cells = 0;
 };
 
+struct BakeHashOptions : BakeOptions, HashBakeSettings {};
+
 // Gives the model of a level, the finest (0) first. One is held at a time.
 using HashLevelModels = std::function<std::unique_ptr<HashModel>(uint32_t level)>;
 
-// Writes the scene folder; tileset.json last. A function of models, capture and options. Throws Error when a file
-// cannot be written, and as below.
+// Of models of all levels.
+std::unique_ptr<Baker> makeHashBaker(HashLevelModels models, uint32_t levels, const HashBakeSettings& settings);
+
+// bakeScene of that: writes the scene folder; tileset.json last. A function of models, capture and options. Throws
+// Error when a file cannot be written, and as below.
 BakedScene bakeHash(const HashLevelModels& models, uint32_t levels, const Capture& capture, const fs::path& scene,
                     const BakeHashOptions& options);
 

@@ -6,8 +6,7 @@
 #include <functional>
 #include <memory>
 
-#include "bake/bake_options.h"
-#include "bake/scene_writer.h"
+#include "bake/baker.h"
 #include "representations/volume/alive_texels.h"
 #include "representations/volume/volume_model.h"
 #include "scene/capture.h"
@@ -18,8 +17,11 @@ namespace tessera {
 // Gives the model of a level, the finest (0) first. One is held at a time.
 using LevelModels = std::function<std::unique_ptr<VolumeModel>(uint32_t level)>;
 
-// Writes the scene folder; tileset.json last. A function of models, capture and options. Throws Error when a file
-// cannot be written.
+// Of models of all levels. Opacities below the last threshold of training (`cull_last`) are culled.
+std::unique_ptr<Baker> makeVolumeBaker(LevelModels models, uint32_t levels);
+
+// bakeScene of that: writes the scene folder; tileset.json last. A function of models, capture and options. Throws
+// Error when a file cannot be written.
 BakedScene bakeVolume(const LevelModels& models, uint32_t levels, const Capture& capture, const fs::path& scene,
                       const BakeOptions& options);
 

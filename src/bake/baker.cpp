@@ -1,0 +1,15 @@
+#include "bake/baker.h"
+
+#include "bake/scene_writer.h"
+
+namespace tessera {
+
+BakedScene bakeScene(Baker& baker, const Capture& capture, const fs::path& scene, const BakeOptions& options) {
+  SceneDescription description = baker.description();
+  description.background = options.background.value_or(description.background);
+  SceneWriter writer(scene, capture, description);
+  baker.bake(capture, options, writer);
+  return writer.commit();
+}
+
+}  // namespace tessera
