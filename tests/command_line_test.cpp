@@ -6,6 +6,7 @@
 #include <regex>
 
 #include "base/image_io.h"
+#include "representations/list.h"
 #include "tests/program.h"
 
 namespace tessera {
@@ -143,6 +144,26 @@ TEST_F(CommandLine, HelpOfEveryVerbHasDefaultsAndAnExample) {
   const Said said = run({"--help"});
   EXPECT_EQ(said.exitCode, 0);
   for (const auto& verb : verbs) EXPECT_TRUE(contains(said.out, "  " + verb[0] + " ")) << said.out;
+}
+
+TEST_F(CommandLine, ListsTheMethodsThatThereAre) {
+#define NAME(name, Name) #name,
+#define SKIP(name, Name)
+  const std::vector<std::string> all = {TESSERA_REPRESENTATIONS(NAME, NAME)};
+  const std::vector<std::string> baked = {TESSERA_REPRESENTATIONS(SKIP, NAME)};
+#undef SKIP
+#undef NAME
+  std::string choices;
+  for (const std::string& name : all) choices += (choices.empty() ? "" : ",") + name;
+  const std::string train = run({"train", "--help"}).out;
+  EXPECT_TRUE(contains(train, "--method TEXT:{" + choices + "}")) << train;
+  for (const std::string& name : all) EXPECT_TRUE(contains(train, "Settings of --method " + name)) << train;
+  EXPECT_TRUE(contains(usageErrorOf({"train", city(), at("m"), "--method", "guess"}), "{" + choices + "}"));
+  std::string sentence;
+  for (const std::string& name : baked)
+    sentence += (sentence.empty() ? "" : name == baked.back() ? " or " : ", ") + name;
+  const std::string bake = run({"bake", "--help"}).out;
+  EXPECT_TRUE(contains(bake, "of --method " + sentence)) << bake;
 }
 
 TEST_F(CommandLine, SaysItsVersion) {

@@ -1,95 +1,130 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "apps/tessera/verbs.h"
+#include "bake/baker.h"
 #include "base/error.h"
 #include "base/progress.h"
 #include "import/capture_reader.h"
-#include "representations/hash/bake_hash.h"
-#include "representations/volume/bake_volume.h"
-#include "representations/volume/train_volume.h"
-#include "tiles/hash_payload.h"
-#include "train/level_folders.h"
+#include "representations/methods.h"
 #include "train/run_folder.h"
 
 namespace tessera {
+namespace {
+
+std::string flagOf(const BakeParameter& parameter) {
+  std::string flag = "--" + std::string(parameter.name);
+  std::replace(flag.begin(), flag.end(), '_', '-');
+  return flag;
+}
+
+CLI::Validator multipleOf(int64_t unit) {
+  return CLI::Validator(
+      [unit](const std::string& text) {
+        return std::stoll(text) % unit == 0 ? "" : fmt::format("{} is no multiple of {}", text, unit);
+      },
+      fmt::format("a multiple of {}", unit));
+}
+
+// A flag for each parameter of a method's bakes. Parameters of one name are one, of all methods that have it.
+class ParameterFlags {
+ public:
+  void addTo(CLI::App& verb) {
+    for (const Method* method : methods()) {
+      for (const BakeParameter& parameter : method->bakeParameters) {
+        if (!given_.contains(parameter.name)) add(verb, parameter);
+      }
+    }
+  }
+
+  // Throws Error where one was given that the method does not have.
+  BakeParameters of(const Method& method) const {
+    BakeParameters chosen;
+    for (const BakeParameter& parameter : method.bakeParameters) {
+      const std::optional<int64_t>& given = given_.at(parameter.name);
+      if (given || parameter.standard) chosen.emplace(parameter.name, given.value_or(parameter.standard.value_or(0)));
+    }
+    for (const auto& [name, value] : given_) {
+      if (!value || chosen.contains(name)) continue;
+      throw Error(flagOf({.name = name}), "", "is for models of --method " + methodsWith(name), "leave it out");
+    }
+    return chosen;
+  }
+
+ private:
+  static std::string methodsWith(std::string_view name) {
+    std::string names;
+    for (const Method* method : methods()) {
+      for (const BakeParameter& parameter : method->bakeParameters) {
+        if (parameter.name == name) names += (names.empty() ? "" : " or ") + std::string(method->name);
+      }
+    }
+    return names;
+  }
+
+  void add(CLI::App& verb, const BakeParameter& parameter) {
+    std::optional<int64_t>& given = given_[parameter.name];
+    CLI::Option* option = verb.add_option(flagOf(parameter), given,
+                                          fmt::format("of {}: {}", methodsWith(parameter.name), parameter.help));
+    if (parameter.standard) option->default_str(std::to_string(*parameter.standard));
+    option->check(CLI::Range(parameter.least, parameter.most));
+    if (parameter.multipleOf > 1) option->check(multipleOf(parameter.multipleOf));
+  }
+
+  std::map<std::string_view, std::optional<int64_t>> given_;
+};
+
+}  // namespace
 
 void addBakeVerb(CLI::App& app) {
   struct Flags {
     std::string model, scene, capture;
-    BakeHashOptions options;
-    std::optional<uint32_t> residentBlocks;
+    BakeOptions options;
+    ParameterFlags parameters;
     DeviceOptions device;
     bool json = false;
   };
   auto flags = std::make_shared<Flags>();
   CLI::App* verb = app.add_subcommand("bake", "a trained model to a scene of tiles");
   verb->footer("Example:\n  tessera bake city.model city.scene");
-  verb->add_option("model", flags->model, "model folder, of --method volume or hash")->required();
+  verb->add_option("model", flags->model, "model folder, of --method " + namesOfMethods(isBaked, "or"))->required();
   verb->add_option("scene", flags->scene, "scene folder to write")->required();
   verb->add_option("--capture", flags->capture, "what the model was trained on; default: where it was then");
   verb->add_option("--stride", flags->options.stride,
                    "look at every so manieth pixel of rows and columns to find what is seen")
       ->capture_default_str()
       ->check(CLI::Range(1, 64));
-  verb->add_option("--resident-blocks", flags->residentBlocks,
-                   "of volume: blocks of the model in memory at once, besides a surround of its own; 0: all; default: "
-                   "as many as "
-                   "in training")
-      ->check(CLI::Range(0, 1 << 20));
   verb->add_option("--background", flags->options.background,
                    "red, green and blue where no photo looked; default: a hazy sky")
       ->check(CLI::Range(0.0, 1.0));
-  verb->add_option("--cells", flags->options.cells,
-                   "of hash: cells of a block's occupancy along an edge, a multiple of 8; 0: three times the "
-                   "lattice's, up to 384 or the lattice's")
-      ->capture_default_str()
-      ->check(CLI::Range(0u, kMostOccupancyCells))
-      ->check(CLI::Validator(
-          [](const std::string& text) {
-            return std::stoul(text) % HashPart::kOccupancyUnit == 0 ? "" : text + " is no multiple of 8";
-          },
-          "a multiple of 8"));
-  verb->add_option("--dilation", flags->options.dilation, "of hash: cells around those that are seen are kept, too")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 8));
+  flags->parameters.addTo(*verb);
   verb->add_option("--effort", flags->options.effort, "of compression")->capture_default_str()->check(CLI::Range(0, 9));
   verb->add_flag("--json", flags->json, "print the result as one JSON object");
   addDeviceFlags(*verb, flags->device);
   verb->callback([flags] {
     const ModelFolder folder(flags->model);
-    const std::string method = requireManifest(folder).method;
-    if (method != "volume" && method != "hash") {
-      throw Error(flags->model, "", "is a model of " + method + ", which is not baked",
-                  "train with --method volume or hash");
+    const std::string name = requireManifest(folder).method;
+    const Method* method = findMethod(name);
+    if (method == nullptr || !isBaked(*method)) {
+      throw Error(flags->model, "", "is a model of " + name + ", which is not baked",
+                  "train with --method " + namesOfMethods(isBaked, "or"));
     }
-    if (method == "hash" && flags->residentBlocks) {
-      throw Error("--resident-blocks", "", "is for models of --method volume", "leave it out");
-    }
+    const BakeParameters parameters = flags->parameters.of(*method);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
     const Capture capture =
         readCapture(flags->capture.empty() ? folder.readPlacement().capture.string() : flags->capture);
     requireSameWorld(folder, capture);
-    const uint32_t levels =
-        method == "hash" ? trainedLevels<HashConfig>(flags->model) : trainedLevels<VolumeConfig>(flags->model);
-    Progress progress("baking", static_cast<int64_t>(levels * capture.photosIn(Split::train).size()), "photos");
-    flags->options.onPhoto = [&](int64_t done, int64_t) { progress.update(done); };
-    BakedScene baked;
-    if (method == "volume") {
-      const VolumeConfig config = savedConfig<VolumeConfig>(flags->model);
-      const uint32_t resident = flags->residentBlocks.value_or(static_cast<uint32_t>(config.residentBlocks));
-      const LevelModels models = [&](uint32_t level) {
-        return loadVolumeModel(*device, levelFolder(flags->model, level), resident);
-      };
-      baked = bakeVolume(models, levels, capture, flags->scene, flags->options);
-    } else {
-      const HashLevelModels models = [&](uint32_t level) {
-        return loadHashModel(*device, levelFolder(flags->model, level));
-      };
-      baked = bakeHash(models, levels, capture, flags->scene, flags->options);
-    }
+    const std::unique_ptr<Baker> baker = method->openBaker(*device, flags->model, parameters);
+    Progress progress("baking", 0, "photos");
+    flags->options.onPhoto = [&](int64_t done, int64_t all) {
+      progress.setTotal(all);
+      progress.update(done);
+    };
+    const BakedScene baked = bakeScene(*baker, capture, flags->scene, flags->options);
     progress.finish();
     if (flags->json) {
       nlohmann::ordered_json result = {{"tiles", baked.tileset.tiles.size()}};

@@ -7,6 +7,7 @@
 #include "apps/tessera/drawable.h"
 #include "apps/tessera/scene_source.h"
 #include "apps/tessera/verbs.h"
+#include "base/error.h"
 #include "compute/roofline.h"
 #include "eval/psnr.h"
 #include "eval/render_views.h"
@@ -15,9 +16,7 @@
 #include "render/tile_scene.h"
 #include "representations/codecs.h"
 #include "representations/cpu_drawers.h"
-#include "representations/field/field_renderer.h"
-#include "representations/field/step_benchmark.h"
-#include "representations/field/train_field.h"
+#include "representations/methods.h"
 #include "tiles/scene_folder.h"
 #include "train/run_folder.h"
 #ifdef TESSERA_HAS_VULKAN
@@ -205,17 +204,29 @@ struct DrawnViews {
   double samplesPerRay() const { return static_cast<double>(samples) / static_cast<double>(rays); }
 };
 
-// A scene beside a `field` model, view after view in turn, rays ending alike.
-ordered_json measureAgainst(const TileScene& scene, const MakeDrawer& makeDrawer, const fs::path& field,
+bool countsSamples(const Method& method) {
+  return method.countsSamples;
+}
+
+// The model that a scene is measured beside. Throws Error when its samples are not counted.
+const Method& methodBeside(const fs::path& folder) {
+  const Method& method = methodOf(ModelFolder(folder));
+  if (method.countsSamples) return method;
+  throw Error(folder.string(), "manifest.json",
+              fmt::format("is of --method {}, where {} is wanted", method.name, namesOfMethods(countsSamples, "or")),
+              "name another model");
+}
+
+// A scene beside a model whose samples are counted, view after view in turn, rays ending alike.
+ordered_json measureAgainst(const TileScene& scene, const MakeDrawer& makeDrawer, const fs::path& folder,
                             const std::vector<BenchmarkView>& views, int threads, bool print) {
-  requireManifest(ModelFolder(field), "field");
+  const Method& method = methodBeside(folder);
   const std::unique_ptr<Device> device = makeDevice({"cpu", threads});
-  const std::unique_ptr<FieldModel> model = loadFieldModel(*device, field);
-  FieldRenderer other(*model);
+  const std::unique_ptr<OpenedModel> model = method.openModel(*device, folder);
   SceneRendererSettings settings;
   settings.threads = threads;
   settings.selection.mostPixels = 0;
-  settings.draw.minTransmittance = FieldRenderer::kMinTransmittance;
+  settings.draw.minTransmittance = model->rayWork().minTransmittance;
   SceneRenderer renderer(makeDrawer(), scene.frame, scene.tree, scene.source, settings);
   constexpr int kRounds = 3;
   DrawnViews ours, theirs;
@@ -230,7 +241,7 @@ ordered_json measureAgainst(const TileScene& scene, const MakeDrawer& makeDrawer
     for (const BenchmarkView& view : views) {
       renderer.prepare(view.camera, view.worldFromCamera);
       seconds[0] += draw(renderer, view);
-      seconds[1] += draw(other, view);
+      seconds[1] += draw(model->renderer(), view);
       ours.rays += static_cast<uint64_t>(view.camera.width) * static_cast<uint64_t>(view.camera.height);
     }
     ours.seconds += seconds[0];
@@ -239,20 +250,20 @@ ordered_json measureAgainst(const TileScene& scene, const MakeDrawer& makeDrawer
   }
   theirs.rays = ours.rays;
   ours.samples = renderer.drawCounts().samples;
-  theirs.samples = other.samplesEvaluated();
+  theirs.samples = model->rayWork().samples;
   const double frames = kRounds * static_cast<double>(views.size());
   const double least = *std::min_element(ratios.begin(), ratios.end()), all = theirs.seconds / ours.seconds;
   if (print) {
-    fmt::print("{}\n  scene {:7.2f} frames/s, {:5.1f} samples a ray\n  field {:7.2f} frames/s, {:5.1f} samples a ray\n",
-               renderer.device(), frames / ours.seconds, ours.samplesPerRay(), frames / theirs.seconds,
+    fmt::print("{}\n  scene {:7.2f} frames/s, {:5.1f} samples a ray\n  {:<5} {:7.2f} frames/s, {:5.1f} samples a ray\n",
+               renderer.device(), frames / ours.seconds, ours.samplesPerRay(), method.name, frames / theirs.seconds,
                theirs.samplesPerRay());
     fmt::print("  {:.2f} times as many frames, at least {:.2f} in each of {} rounds\n", all, least, kRounds);
   }
   return {{"device", renderer.device()},
           {"frames_per_second", frames / ours.seconds},
           {"samples_per_ray", ours.samplesPerRay()},
-          {"field_frames_per_second", frames / theirs.seconds},
-          {"field_samples_per_ray", theirs.samplesPerRay()},
+          {fmt::format("{}_frames_per_second", method.name), frames / theirs.seconds},
+          {fmt::format("{}_samples_per_ray", method.name), theirs.samplesPerRay()},
           {"times", all},
           {"least_times", least}};
 }
@@ -300,7 +311,9 @@ void addBenchRender(CLI::App& bench) {
   verb->add_option("scene", flags->scene, "scene folder")->required();
   CLI::Option* ofViews =
       verb->add_option("--views", flags->views, "draw this capture's held-out views with and without skipping");
-  verb->add_option("--against", flags->against, "or beside this model, of --method field, in turn")->needs(ofViews);
+  verb->add_option("--against", flags->against,
+                   fmt::format("or beside this model, of --method {}, in turn", namesOfMethods(countsSamples, "or")))
+      ->needs(ofViews);
   CLI::Option* flight =
       verb->add_flag("--flight", flags->flight, "fly over all blocks, low and high, with a small cache");
   verb->add_option("--steps", flags->cache.steps, "pictures of the flight")
@@ -453,6 +466,10 @@ void addBenchCompute(CLI::App& bench) {
   });
 }
 
+bool hasStepBenchmark(const Method& method) {
+  return method.benchmarkStep != nullptr;
+}
+
 void addBenchTrain(CLI::App& bench) {
   struct Flags {
     StepBenchmarkOptions options;
@@ -472,7 +489,7 @@ void addBenchTrain(CLI::App& bench) {
   verb->callback([flags] {
     flags->options.rays = flags->samples / flags->options.samplesPerRay;
     const std::unique_ptr<Device> device = makeDevice(flags->device);
-    const StepBenchmark step = benchmarkStep(*device, flags->options);
+    const StepBenchmark step = firstMethod(hasStepBenchmark).benchmarkStep(*device, flags->options);
     if (flags->json != "-") printStep(device->name(), step);
     writeJson(flags->json, toJson(device->name(), step));
   });

@@ -9,9 +9,7 @@
 #include "import/capture_reader.h"
 #include "import/importer.h"
 #include "representations/codecs.h"
-#include "representations/field/train_field.h"
-#include "representations/hash/config.h"
-#include "representations/volume/train_volume.h"
+#include "representations/methods.h"
 #include "tiles/read_content.h"
 #include "tiles/scene_folder.h"
 #include "train/run_folder.h"
@@ -46,43 +44,21 @@ ordered_json describeModel(const fs::path& folder) {
   const ModelFolder model(folder);
   const std::optional<ModelManifest> manifest = model.manifest();
   const ModelPlacement placement = model.readPlacement();
+  // One that has saved nothing yet does not say its method.
+  const Method& method = manifest ? methodOf(model, *manifest) : *methods().front();
   ordered_json info = {{"kind", "model"},
-                       {"method", manifest ? manifest->method : "field"},
+                       {"method", method.name},
                        {"step", manifest ? manifest->step : 0},
                        {"planned_steps", manifest ? manifest->plannedSteps : 0},
                        {"capture", placement.capture.string()}};
-  const auto describeConfig = [&](const std::vector<ConfigField>& fields) {
-    for (const ConfigField& field : fields) info["config"][std::string(field.name)] = configValueText(field);
-  };
-  const auto describeBlocks = [&] {
+  const std::unique_ptr<MethodSettings> settings = savedSettings(method, folder);
+  if (method.trainsInBlocks) {
     info["blocks"] = {{"columns", placement.grid ? placement.grid->columns : 0},
                       {"rows", placement.grid ? placement.grid->rows : 0},
                       {"edge", placement.grid ? placement.grid->edge : 0}};
-  };
-  if (info["method"] == "volume") {
-    VolumeConfig config = savedConfig<VolumeConfig>(folder);
-    const BlockFieldShape attributes = config.attributeShape(), proposals = config.proposalShape();
-    describeBlocks();
-    info["parameters_per_block"] = attributes.grid.parameters() + attributes.network.parameters() +
-                                   proposals.grid.parameters() + proposals.network.parameters();
-    describeConfig(config.fields());
-    return info;
   }
-  if (info["method"] == "hash") {
-    HashConfig config = savedConfig<HashConfig>(folder);
-    const BlockFieldShape coarse = config.coarseShape();
-    describeBlocks();
-    info["parameters_per_block"] =
-        coarse.grid.parameters() + coarse.network.parameters() + config.fineGrid().parameters();
-    info["multiply_accumulates_per_sample"] = config.multiplyAccumulates();
-    describeConfig(config.fields());
-    return info;
-  }
-  FieldConfig config = savedConfig<FieldConfig>(folder);
-  info["parameters"] =
-      config.shape().grid.parameters() + config.shape().density.parameters() + config.shape().colour.parameters();
-  info["multiply_accumulates_per_sample"] = multiplyAccumulates(config.shape());
-  describeConfig(config.fields());
+  for (const auto& [key, number] : method.describe(*settings)) info[key] = number;
+  for (const ConfigField& field : settings->fields()) info["config"][std::string(field.name)] = configValueText(field);
   return info;
 }
 

@@ -3,6 +3,7 @@
 #include "apps/tessera/folder_kind.h"
 #include "apps/tessera/verbs.h"
 #include "base/error.h"
+#include "representations/methods.h"
 #include "serve/http_server.h"
 #include "serve/world_file.h"
 #include "tiles/scene_folder.h"
@@ -26,7 +27,8 @@ void requireScene(const fs::path& path) {
   const std::string name = path.string(), another = "name the folder of a scene, or the world.json of a world";
   if (isMissing(path)) throw Error(name, "", "there is no such file or folder", another);
   if (!fs::is_directory(path)) throw Error(name, "", "is neither the folder of a scene nor a world.json", another);
-  const std::string intoScene = " MODEL --method volume, then tessera bake MODEL SCENE";
+  const std::string intoScene =
+      fmt::format(" MODEL --method {}, then tessera bake MODEL SCENE", firstMethod(isBaked).name);
   switch (kindOfFolder(path)) {
     case FolderKind::scene:
       return;
@@ -42,9 +44,10 @@ void requireScene(const fs::path& path) {
         throw Error(name, "", "is a model that is not trained yet, not a scene",
                     "train it, then bake it: tessera bake " + name + " SCENE");
       }
-      if (manifest->method != "volume" && manifest->method != "hash") {
+      if (const Method* method = findMethod(manifest->method); method == nullptr || !isBaked(*method)) {
         throw Error(name, "", "is a model of --method " + manifest->method + ", of which no scene can be baked",
-                    "train one with --method volume or hash, and bake that; tessera view shows this one");
+                    fmt::format("train one with --method {}, and bake that; tessera view shows this one",
+                                namesOfMethods(isBaked, "or")));
       }
       throw Error(name, "", "is a model, not a scene", "bake it first: tessera bake " + name + " SCENE");
     }

@@ -5,9 +5,7 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "import/capture_reader.h"
-#include "representations/field/train_field.h"
-#include "representations/hash/train_hash.h"
-#include "representations/volume/train_volume.h"
+#include "representations/methods.h"
 #include "train/run_folder.h"
 
 namespace tessera {
@@ -25,7 +23,7 @@ CLI::Validator amount(double low, double high) {
 }
 
 struct TrainFlags {
-  std::string method = "field", configFile, blocks = "auto", grid;
+  std::string method = std::string(methods().front()->name), configFile, blocks = "auto", grid;
   std::vector<std::string> settings;
   std::string seed, residentBlocks;
   DeviceOptions device;
@@ -35,34 +33,49 @@ struct TrainFlags {
   bool json = false;
 };
 
-// Settings in the order of their strength: defaults (of a preset), the run that is resumed, --config, --set.
-template <class Config>
-Config chosenConfig(const TrainFlags& flags, Config config) {
-  if (flags.loop.resume && ModelFolder(flags.model).manifest()) config = savedConfig<Config>(flags.model);
-  if (!flags.configFile.empty()) configFromToml(config.fields(), flags.configFile);
-  for (const std::string& setting : flags.settings) setConfigField(config.fields(), setting);
-  if (!flags.seed.empty()) setConfigField(config.fields(), "seed=" + flags.seed);
-  if (!flags.residentBlocks.empty()) setConfigField(config.fields(), "resident_blocks=" + flags.residentBlocks);
-  if (flags.loop.resume && ModelFolder(flags.model).manifest()) {
-    if constexpr (requires { config.keepFound(config); }) config.keepFound(savedConfig<Config>(flags.model));
-  }
-  if (flags.loop.resume) requireSameConfig(flags.model, config);
-  return config;
-}
-
 // Of the preset that is asked for.
-template <class Config>
-Config presetDefaults(const TrainFlags& flags) {
-  Config config;
+std::unique_ptr<MethodSettings> presetDefaults(const Method& method, const TrainFlags& flags) {
+  std::unique_ptr<MethodSettings> settings = method.settings("");
   if (!flags.configFile.empty()) {
-    configFromToml(config.fields(), flags.configFile);
-    config = Config::ofPreset(config.preset);
+    configFromToml(settings->fields(), flags.configFile);
+    std::string preset;
+    for (const ConfigField& field : settings->fields()) {
+      if (field.name == "preset") preset = configValueText(field);
+    }
+    settings = method.settings(preset);
   }
   constexpr std::string_view kPreset = "preset=";
   for (const std::string& setting : flags.settings) {
-    if (setting.starts_with(kPreset)) config = Config::ofPreset(setting.substr(kPreset.size()));
+    if (setting.starts_with(kPreset)) settings = method.settings(setting.substr(kPreset.size()));
   }
-  return config;
+  return settings;
+}
+
+// Settings in the order of their strength: defaults (of a preset), the run that is resumed, --config, --set.
+std::unique_ptr<MethodSettings> chosenSettings(const Method& method, const TrainFlags& flags) {
+  std::unique_ptr<MethodSettings> settings = presetDefaults(method, flags), saved;
+  if (flags.loop.resume && ModelFolder(flags.model).manifest()) {
+    saved = savedSettings(method, flags.model);
+    settings = savedSettings(method, flags.model);
+  }
+  const std::vector<ConfigField> fields = settings->fields();
+  if (!flags.configFile.empty()) configFromToml(fields, flags.configFile);
+  for (const std::string& setting : flags.settings) setConfigField(fields, setting);
+  if (!flags.seed.empty()) setConfigField(fields, "seed=" + flags.seed);
+  if (!flags.residentBlocks.empty()) setConfigField(fields, "resident_blocks=" + flags.residentBlocks);
+  if (saved) {
+    settings->keepFound(*saved);
+    requireSameSettings(flags.model, saved->fields(), fields);
+  }
+  return settings;
+}
+
+bool trainsInBlocks(const Method& method) {
+  return method.trainsInBlocks;
+}
+
+bool swapsBlocks(const Method& method) {
+  return method.swapsBlocks;
 }
 
 // Its settings would not even be understood.
@@ -76,22 +89,43 @@ void requireSameMethod(const TrainFlags& flags) {
 
 TrainingResult train(Device& device, const TrainFlags& flags) {
   requireSameMethod(flags);
+  const Method& method = *findMethod(flags.method);
   const Capture capture = readCapture(flags.capture);
-  if (flags.method == "field") {
-    if (!flags.grid.empty()) throw CLI::ValidationError("--grid", "is of --method volume and hash");
-    if (flags.memoryMiB > 0) throw CLI::ValidationError("--memory-mib", "is of --method volume and hash");
-    return trainField(device, capture, flags.model, {chosenConfig(flags, FieldConfig()), flags.loop});
+  BlockRunOptions options;
+  options.loop = flags.loop;
+  if (method.trainsInBlocks) {
+    const std::optional<BlockCount> blocks = parseBlockCount(flags.blocks);
+    if (!blocks) throw CLI::ValidationError("--blocks", "'" + flags.blocks + "' is neither auto nor of the form 2x2");
+    options.blocks = *blocks;
+    if (!flags.grid.empty()) options.grid = readGrid(flags.grid, capture);
+    options.memoryMiB = flags.memoryMiB;
+    options.cardBytes = device.ownMemory().bytes;
+    if (!method.swapsBlocks && !flags.residentBlocks.empty()) {
+      throw CLI::ValidationError("--resident-blocks", "is of --method " + namesOfMethods(swapsBlocks));
+    }
+  } else {
+    const std::string ofOthers = "is of --method " + namesOfMethods(trainsInBlocks);
+    if (!flags.grid.empty()) throw CLI::ValidationError("--grid", ofOthers);
+    if (flags.memoryMiB > 0) throw CLI::ValidationError("--memory-mib", ofOthers);
   }
-  const std::optional<BlockCount> blocks = parseBlockCount(flags.blocks);
-  if (!blocks) throw CLI::ValidationError("--blocks", "'" + flags.blocks + "' is neither auto nor of the form 2x2");
-  std::optional<BlockGrid> grid;
-  if (!flags.grid.empty()) grid = readGrid(flags.grid, capture);
-  const BlockRunOptions options{flags.loop, *blocks, grid, flags.memoryMiB, device.ownMemory().bytes};
-  if (flags.method == "hash") {
-    if (!flags.residentBlocks.empty()) throw CLI::ValidationError("--resident-blocks", "is of --method volume");
-    return trainHash(device, capture, flags.model, {options, chosenConfig(flags, presetDefaults<HashConfig>(flags))});
+  return method.train(device, capture, flags.model, *chosenSettings(method, flags), options);
+}
+
+std::vector<std::string> namesOfAllMethods() {
+  std::vector<std::string> names;
+  for (const Method* method : methods()) names.emplace_back(method->name);
+  return names;
+}
+
+std::string settingsOfAllMethods() {
+  std::string text;
+  for (const Method* method : methods()) {
+    const bool isFirst = text.empty();
+    text += fmt::format("{}Settings of --method {}{}:\n", isFirst ? "" : "\n", method->name,
+                        isFirst ? " for --set and --config, with their defaults" : "");
+    text += configToToml(method->settings("")->fields());
   }
-  return trainVolume(device, capture, flags.model, {options, chosenConfig(flags, presetDefaults<VolumeConfig>(flags))});
+  return text;
 }
 
 std::string howToGoOn(const fs::path& model) {
@@ -104,17 +138,16 @@ std::string howToGoOn(const fs::path& model) {
 void addTrainVerb(CLI::App& app) {
   auto flags = std::make_shared<TrainFlags>();
   CLI::App* verb = app.add_subcommand("train", "a capture to a model");
-  verb->footer("Settings of --method field for --set and --config, with their defaults:\n" +
-               configToToml(FieldConfig().fields()) + "\nSettings of --method volume:\n" +
-               configToToml(VolumeConfig().fields()) + "\nSettings of --method hash:\n" +
-               configToToml(HashConfig().fields()) +
-               "\nExamples:\n  tessera train fox.capture fox.model --method field --minutes 10\n"
-               "  tessera train city.capture city.model --method volume --blocks 2x2 --minutes 15");
+  verb->footer(settingsOfAllMethods() + fmt::format("\nExamples:\n"
+                                                    "  tessera train fox.capture fox.model --method {} --minutes 10\n"
+                                                    "  tessera train city.capture city.model --method {} --blocks 2x2 "
+                                                    "--minutes 15",
+                                                    flags->method, firstMethod(trainsInBlocks).name));
   verb->add_option("capture", flags->capture, "capture folder")->required();
   verb->add_option("model", flags->model, "model folder to write")->required();
   verb->add_option("--method", flags->method, "representation")
       ->capture_default_str()
-      ->check(CLI::IsMember({"field", "volume", "hash"}));
+      ->check(CLI::IsMember(namesOfAllMethods()));
   CLI::Option* steps = verb->add_option("--steps", flags->loop.steps, "training steps")
                            ->default_str(fmt::format("{}, or what the run that is resumed had planned", kDefaultSteps))
                            ->check(CLI::Range(int64_t{1}, int64_t{1} << 40));
@@ -122,19 +155,19 @@ void addTrainVerb(CLI::App& app) {
       ->check(amount(1e-3, 1e7))
       ->excludes(steps);
   verb->add_flag("--resume", flags->loop.resume, "go on with the model that is in the folder");
-  CLI::Option* blocks =
-      verb->add_option("--blocks", flags->blocks, "of --method volume and hash: auto, or so many along x and y, as 3x2")
-          ->capture_default_str();
-  verb->add_option("--grid", flags->grid,
-                   "of --method volume and hash: the blocks of this blocks.json, of another model")
+  const std::string ofBlocks = fmt::format("of --method {}: ", namesOfMethods(trainsInBlocks));
+  CLI::Option* blocks = verb->add_option("--blocks", flags->blocks, ofBlocks + "auto, or so many along x and y, as 3x2")
+                            ->capture_default_str();
+  verb->add_option("--grid", flags->grid, ofBlocks + "the blocks of this blocks.json, of another model")
       ->check(CLI::ExistingFile)
       ->excludes(blocks);
   verb->add_option("--resident-blocks", flags->residentBlocks,
-                   "of --method volume: so many blocks in memory at once, the others on disk; the same as --set "
-                   "resident_blocks=...")
+                   fmt::format("of --method {}: so many blocks in memory at once, the others on disk; the same as "
+                               "--set resident_blocks=...",
+                               namesOfMethods(swapsBlocks)))
       ->check(CLI::Range(1, 1 << 20));
   verb->add_option("--memory-mib", flags->memoryMiB,
-                   "of --method volume and hash: memory to plan blocks and photos for; default: what the machine has")
+                   ofBlocks + "memory to plan blocks and photos for; default: what the machine has")
       ->check(amount(1, 1e9));
   verb->add_option("--seed", flags->seed, "of everything random, a whole number; the same as --set seed=...");
   verb->add_option("--config", flags->configFile, "settings file (TOML)")->check(CLI::ExistingFile);

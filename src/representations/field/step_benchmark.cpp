@@ -8,6 +8,8 @@
 #include "compute/composite.h"
 #include "compute/losses.h"
 #include "compute/roofline.h"
+#include "field/radiance_field.h"
+#include "representations/field/config.h"
 
 namespace tessera {
 namespace {
@@ -24,7 +26,6 @@ class Step {
  public:
   Step(Device& device, const StepBenchmarkOptions& options)
       : device_(device),
-        config_(options.config),
         field_(device, config_.shape(), 1),
         samplesPerRay_(options.samplesPerRay),
         allRays_(options.rays),
@@ -148,7 +149,7 @@ class Step {
 
 }  // namespace
 
-StepBenchmark benchmarkStep(Device& device, const StepBenchmarkOptions& options) {
+StepBenchmark benchmarkFieldStep(Device& device, const StepBenchmarkOptions& options) {
   CHECK(options.rays > 0u);
   CHECK(options.samplesPerRay > 0u);
   Step step(device, options);

@@ -1,0 +1,33 @@
+#include "apps/tessera/model_source.h"
+
+#include <utility>
+
+#include "representations/methods.h"
+
+namespace tessera {
+namespace {
+
+class DrawableModel final : public Drawable {
+ public:
+  DrawableModel(const fs::path& folder, std::unique_ptr<OpenedModel> model)
+      : folder_(folder), model_(std::move(model)) {}
+
+  ViewRenderer& renderer() override { return model_->renderer(); }
+  Mat4d sourceFromWorld() const override { return folder_.readPlacement().sourceFromWorld; }
+  void requireWorldOf(const Capture& capture) const override { requireSameWorld(folder_, capture); }
+  std::vector<std::string> trainedOnAmong(const Capture& capture, Split split) const override {
+    return tessera::trainedOnAmong(folder_, capture, split);
+  }
+
+ private:
+  ModelFolder folder_;
+  std::unique_ptr<OpenedModel> model_;
+};
+
+}  // namespace
+
+std::unique_ptr<Drawable> openModel(Device& device, const fs::path& folder) {
+  return std::make_unique<DrawableModel>(folder, methodOf(ModelFolder(folder)).openModel(device, folder));
+}
+
+}  // namespace tessera

@@ -1,0 +1,10 @@
+// `field` as a method, for the table of methods (representations/methods.h).
+#pragma once
+
+#include "train/method.h"
+
+namespace tessera {
+
+const Method& fieldMethod();
+
+}  // namespace tessera

@@ -1,0 +1,76 @@
+#include "representations/hash/method.h"
+
+#include "representations/hash/bake_hash.h"
+#include "representations/hash/hash_model_renderer.h"
+#include "representations/hash/train_hash.h"
+#include "tiles/hash_payload.h"
+
+namespace tessera {
+namespace {
+
+TrainingResult train(Device& device, const Capture& capture, const fs::path& model, const MethodSettings& settings,
+                     const BlockRunOptions& options) {
+  return trainHash(device, capture, model, {options, SettingsOf<HashConfig>::in(settings)});
+}
+
+std::unique_ptr<OpenedModel> openModel(Device& device, const fs::path& folder) {
+  auto model = loadHashModel(device, folder);
+  auto renderer = std::make_unique<HashModelRenderer>(*model);
+  return std::make_unique<ModelWithRenderer<HashModel, HashModelRenderer>>(std::move(model), std::move(renderer));
+}
+
+constexpr std::string_view kCells = "cells", kDilation = "dilation";
+constexpr BakeParameter kBakeParameters[] = {
+    {.name = kCells,
+     .help = "cells of a block's occupancy along an edge, a multiple of 8; 0: three times the lattice's, up to 384 or "
+             "the lattice's",
+     .least = 0,
+     .most = kMostOccupancyCells,
+     .multipleOf = HashPart::kOccupancyUnit,
+     .standard = HashBakeSettings().cells},
+    {.name = kDilation,
+     .help = "cells around those that are seen are kept, too",
+     .least = 0,
+     .most = 8,
+     .standard = HashBakeSettings().dilation}};
+
+std::unique_ptr<Baker> openBaker(Device& device, const fs::path& folder, const BakeParameters& parameters) {
+  HashBakeSettings settings;
+  if (const auto cells = parameters.find(kCells); cells != parameters.end()) {
+    settings.cells = static_cast<uint32_t>(cells->second);
+  }
+  if (const auto dilation = parameters.find(kDilation); dilation != parameters.end()) {
+    settings.dilation = static_cast<int>(dilation->second);
+  }
+  const HashLevelModels models = [&device, folder](uint32_t level) {
+    return loadHashModel(device, levelFolder(folder, level));
+  };
+  return makeHashBaker(models, trainedLevels<HashConfig>(folder), settings);
+}
+
+std::vector<std::pair<std::string, uint64_t>> describe(const MethodSettings& settings) {
+  const HashConfig& config = SettingsOf<HashConfig>::in(settings);
+  const BlockFieldShape coarse = config.coarseShape();
+  return {
+      {"parameters_per_block", coarse.grid.parameters() + coarse.network.parameters() + config.fineGrid().parameters()},
+      {"multiply_accumulates_per_sample", config.multiplyAccumulates()}};
+}
+
+}  // namespace
+
+const Method& hashMethod() {
+  static const Method kMethod = {
+      .name = "hash",
+      .summary = "hash tables of blocks whose levels are weighed by attention, decoded once a pixel (NGP-RT)",
+      .trainsInBlocks = true,
+      .settings = makeSettings<HashConfig>,
+      .train = train,
+      .openModel = openModel,
+      .openBaker = openBaker,
+      .bakeParameters = kBakeParameters,
+      .describe = describe,
+  };
+  return kMethod;
+}
+
+}  // namespace tessera

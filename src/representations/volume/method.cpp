@@ -1,0 +1,70 @@
+#include "representations/volume/method.h"
+
+#include <algorithm>
+
+#include "representations/volume/bake_volume.h"
+#include "representations/volume/train_volume.h"
+#include "representations/volume/volume_model_renderer.h"
+
+namespace tessera {
+namespace {
+
+TrainingResult train(Device& device, const Capture& capture, const fs::path& model, const MethodSettings& settings,
+                     const BlockRunOptions& options) {
+  return trainVolume(device, capture, model, {options, SettingsOf<VolumeConfig>::in(settings)});
+}
+
+// Draws what a scene baked now would hold.
+std::unique_ptr<OpenedModel> openModel(Device& device, const fs::path& folder) {
+  auto model = loadVolumeModel(device, folder);
+  const ModelManifest manifest = requireManifest(ModelFolder(folder));
+  const double progress =
+      static_cast<double>(manifest.step) / static_cast<double>(std::max<int64_t>(1, manifest.plannedSteps));
+  auto renderer = std::make_unique<VolumeModelRenderer>(*model, cullThreshold(model->config(), progress));
+  return std::make_unique<ModelWithRenderer<VolumeModel, VolumeModelRenderer>>(std::move(model), std::move(renderer));
+}
+
+constexpr std::string_view kResidentBlocks = "resident_blocks";
+constexpr BakeParameter kBakeParameters[] = {
+    {.name = kResidentBlocks,
+     .help = "blocks of the model in memory at once, besides a surround of its own; 0: all; default: as many as in "
+             "training",
+     .least = 0,
+     .most = 1 << 20}};
+
+std::unique_ptr<Baker> openBaker(Device& device, const fs::path& folder, const BakeParameters& parameters) {
+  const auto given = parameters.find(kResidentBlocks);
+  const uint32_t resident = static_cast<uint32_t>(
+      given != parameters.end() ? given->second : savedConfig<VolumeConfig>(folder).residentBlocks);
+  const LevelModels models = [&device, folder, resident](uint32_t level) {
+    return loadVolumeModel(device, levelFolder(folder, level), resident);
+  };
+  return makeVolumeBaker(models, trainedLevels<VolumeConfig>(folder));
+}
+
+std::vector<std::pair<std::string, uint64_t>> describe(const MethodSettings& settings) {
+  const VolumeConfig& config = SettingsOf<VolumeConfig>::in(settings);
+  const BlockFieldShape attributes = config.attributeShape(), proposals = config.proposalShape();
+  return {{"parameters_per_block", attributes.grid.parameters() + attributes.network.parameters() +
+                                       proposals.grid.parameters() + proposals.network.parameters()}};
+}
+
+}  // namespace
+
+const Method& volumeMethod() {
+  static const Method kMethod = {
+      .name = "volume",
+      .summary = "texels of blocks in sparse voxels and planes, shaded once a pixel (City-on-Web, MERF)",
+      .trainsInBlocks = true,
+      .swapsBlocks = true,
+      .settings = makeSettings<VolumeConfig>,
+      .train = train,
+      .openModel = openModel,
+      .openBaker = openBaker,
+      .bakeParameters = kBakeParameters,
+      .describe = describe,
+  };
+  return kMethod;
+}
+
+}  // namespace tessera

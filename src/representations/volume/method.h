@@ -1,0 +1,10 @@
+// `volume` as a method, for the table of methods (representations/methods.h).
+#pragma once
+
+#include "train/method.h"
+
+namespace tessera {
+
+const Method& volumeMethod();
+
+}  // namespace tessera
