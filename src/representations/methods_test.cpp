@@ -180,7 +180,7 @@ TEST(Methods, TrainDescribeDrawAndBakeTheirModels) {
     };
     const std::unique_ptr<Baker> baker = method->openBaker(*device, model, parameters);
     const BakedScene baked = bakeScene(*baker, scene.capture(), model / "scene", baking);
-    EXPECT_EQ(nameOf(readTileset(model / "scene").representation), method->name);
+    EXPECT_EQ(readTileset(model / "scene").representation, method->name);
     ASSERT_EQ(baked.levels.size(), 2u) << method->name << ": two blocks, and what holds both";
     EXPECT_EQ(baked.tileset.tiles.size(), 3u);
     EXPECT_EQ(done, all) << method->name;

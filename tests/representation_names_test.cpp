@@ -1,0 +1,110 @@
+// Code that is no representation's own names none, so that another one is a row in representations/list.h.
+#include "tests/representation_names.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "base/file.h"
+#include "representations/list.h"
+
+namespace tessera {
+namespace {
+
+const fs::path kProject = TESSERA_PROJECT;
+
+bool isSource(const fs::path& path) {
+  const std::string kind = path.extension().string(), name = path.filename().string();
+  for (const char* test : {"_test.", "_test_", ".test.", "_fuzz.", "test_support"}) {
+    if (name.find(test) != std::string::npos) return false;
+  }
+  for (const char* extension : {".cpp", ".h", ".comp", ".vert", ".frag", ".glsl", ".ts"}) {
+    if (kind == extension) return true;
+  }
+  return false;
+}
+
+// Folders where representations are named, and those of tests.
+bool isApart(const std::string& path) {
+  for (const char* folder : {"src/representations/", "src/raymarch/", "shaders/representations/", "shaders/raymarch/",
+                             "web/src/representations/", "web/src/raymarch/", "web/src/testing/"}) {
+    if (path.starts_with(folder)) return true;
+  }
+  return false;
+}
+
+// By file, relative to the project.
+std::map<std::string, std::set<std::string>> namesIn(const std::vector<std::string>& folders) {
+  std::map<std::string, std::set<std::string>> names;
+  for (const std::string& folder : folders) {
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kProject / folder)) {
+      const std::string path = entry.path().lexically_relative(kProject).generic_string();
+      if (!entry.is_regular_file() || !isSource(entry.path()) || isApart(path)) continue;
+      const std::string source = readTextFile(entry.path());
+      names[path] = NamedRepresentations(source).names();
+    }
+  }
+  return names;
+}
+
+using Names = std::set<std::string>;
+
+Names namedBy(std::string_view source) {
+  return NamedRepresentations(source).names();
+}
+
+TEST(RepresentationNames, AreSeenInCode) {
+  EXPECT_EQ(namedBy("VolumeContent decodeHash(x);"), (Names{"volume", "hash"}));
+  EXPECT_EQ(namedBy("kDrawVolumeSpirv"), Names{"volume"});
+  EXPECT_EQ(namedBy("draw_hash_varying"), Names{"hash"});
+  EXPECT_EQ(namedBy("r == Representation::mesh"), Names{"mesh"});
+  EXPECT_EQ(namedBy("case Representation::hash:"), Names{"hash"});
+  EXPECT_EQ(namedBy("method == \"field\" || kind === 'volume'"), (Names{"field", "volume"}));
+  EXPECT_EQ(namedBy("\"train with --method volume\""), Names{"volume"});
+  EXPECT_EQ(namedBy("#include \"representations/field/config.h\""), Names{"field"});
+  EXPECT_EQ(namedBy("#include \"tiles/hash_payload.h\"\nimport x from './volume-content'"), (Names{"volume", "hash"}));
+}
+
+TEST(RepresentationNames, AreNotSeenInOrdinaryWords) {
+  EXPECT_EQ(namedBy("// VolumeContent\n/* \"hash\" */"), Names());
+  EXPECT_EQ(namedBy("HashGridLevel kHashGridForward hash_grid hashGridIndex(x) latticeHash"), Names());
+  EXPECT_EQ(namedBy("#include \"compute/hash_grid.h\"\n#include \"synth/light_volume.h\""), Names());
+  EXPECT_EQ(namedBy("LightVolume light; ConfigField field; SurfaceMesh mesh; int hash = 1'000, volume;"), Names());
+  EXPECT_EQ(namedBy("\"the volume of a hash\" \"\\\"\" x = '\\'' + y"), Names());
+}
+
+TEST(RepresentationNames, CoverTheList) {
+#define NAME(name, Name) #name,
+  for (const std::string_view name : {TESSERA_REPRESENTATIONS(NAME, NAME)}) {
+#undef NAME
+    EXPECT_EQ(namedBy("\"" + std::string(name) + "\""), Names{std::string(name)}) << "is not looked for";
+  }
+}
+
+TEST(RepresentationNames, StandTogetherInFewFilesThatAreNoRepresentations) {
+  constexpr size_t kMost = 19;
+  std::string files;
+  size_t count = 0;
+  for (const auto& [path, names] : namesIn({"apps", "src", "shaders", "web/src", "bench"})) {
+    if (names.size() < 2) continue;
+    ++count;
+    files += "\n  " + path + ":";
+    for (const std::string& name : names) files += " " + name;
+  }
+  std::printf("%zu files name two or more representations:%s\n", count, files.c_str());
+  EXPECT_LE(count, kMost) << files;
+}
+
+TEST(RepresentationNames, DoNotStandInProgramsNorInTheBakeDriver) {
+  // Draws contents of each representation by a template of its own.
+  const std::set<std::string> exceptions = {"apps/tessera/scene_source.cpp"};
+  const auto files = namesIn({"apps", "src/bake"});
+  EXPECT_GT(files.size(), 40u);
+  for (const auto& [path, names] : files) {
+    if (names.empty() || exceptions.contains(path)) continue;
+    ADD_FAILURE() << path << " names " << *names.begin();
+  }
+}
+
+}  // namespace
+}  // namespace tessera
