@@ -1,6 +1,7 @@
 #include "base/config.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
@@ -84,6 +85,14 @@ const char* typeName(const ConfigField& field) {
 }
 
 }  // namespace
+
+void setOwnDefaults(const std::vector<ConfigField>& fields) {
+  for (const ConfigField& field : fields) {
+    if (!field.ownDefault) continue;
+    std::visit([&](auto* member) { *member = std::get<std::remove_pointer_t<decltype(member)>>(*field.ownDefault); },
+               field.value);
+  }
+}
 
 void setConfigField(const std::vector<ConfigField>& fields, std::string_view assignment) {
   const size_t equals = assignment.find('=');
@@ -177,6 +186,58 @@ void configFromToml(const std::vector<ConfigField>& fields, const fs::path& path
         field->value);
     if (!read) {
       throw Error(path.string(), place, fmt::format("{} wants {}", key.str(), typeName(*field)), "correct the value");
+    }
+  }
+}
+
+namespace {
+
+void requireWithin(std::string_view name, double value, const ConfigBounds& bounds) {
+  if (bounds.isBounded && !(value >= bounds.low && value <= bounds.high)) {
+    throw Error(fmt::format("--set {}={}", name, value), "", "is out of range",
+                fmt::format("use {} from {} to {}", name, bounds.low, bounds.high));
+  }
+}
+
+void requireOneOf(std::string_view name, int value, const ConfigBounds& bounds) {
+  if (!bounds.sizes.empty() && std::find(bounds.sizes.begin(), bounds.sizes.end(), value) == bounds.sizes.end()) {
+    throw Error(fmt::format("--set {}={}", name, value), "", "is none of the sizes there are",
+                fmt::format("use one of {}", fmt::join(bounds.sizes, ", ")));
+  }
+  if (value % bounds.divisor != 0) {
+    throw Error(fmt::format("--set {}={}", name, value), "", fmt::format("is no multiple of {}", bounds.divisor),
+                fmt::format("use {}={}", name, (value + bounds.rounding) / bounds.divisor * bounds.divisor));
+  }
+}
+
+void requireOneOf(std::string_view name, const std::string& value, const std::vector<std::string_view>& choices) {
+  if (choices.empty() || std::find(choices.begin(), choices.end(), value) != choices.end()) return;
+  throw Error(fmt::format("--set {}={}", name, value), "", "there is no such thing",
+              fmt::format("use one of: {}", fmt::join(choices, ", ")));
+}
+
+void requireWithinBounds(const ConfigField& field) {
+  const ConfigBounds& bounds = field.bounds;
+  if (const auto* number = std::get_if<int*>(&field.value)) {
+    requireWithin(field.name, **number, bounds);
+    requireOneOf(field.name, **number, bounds);
+  } else if (const auto* large = std::get_if<int64_t*>(&field.value)) {
+    requireWithin(field.name, static_cast<double>(**large), bounds);
+  } else if (const auto* real = std::get_if<double*>(&field.value)) {
+    requireWithin(field.name, **real, bounds);
+  } else if (const auto* found = std::get_if<NumberOrAuto*>(&field.value)) {
+    if (**found) requireWithin(field.name, ***found, bounds);
+  } else if (const auto* text = std::get_if<std::string*>(&field.value)) {
+    requireOneOf(field.name, **text, bounds.choices);
+  }
+}
+
+}  // namespace
+
+void requireWithinBounds(const std::vector<ConfigField>& fields) {
+  for (const bool dependent : {false, true}) {
+    for (const ConfigField& field : fields) {
+      if (field.bounds.isDependent == dependent) requireWithinBounds(field);
     }
   }
 }

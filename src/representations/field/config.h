@@ -1,42 +1,49 @@
 // Every setting of the `field` representation: flag (`--set`), default, help and the line in config.toml.
 #pragma once
 
-#include "base/config.h"
 #include "compute/rays.h"
 #include "field/radiance_field.h"
+#include "train/settings/learning_rate.h"
+#include "train/settings/losses.h"
+#include "train/settings/networks.h"
+#include "train/settings/occupancy.h"
+#include "train/settings/rays.h"
 
 namespace tessera {
 
-struct FieldConfig {
+struct FieldConfig : RaySettings,
+                     RandomBackgroundSettings,
+                     SampleBudgetSettings,
+                     HashGridSettings,
+                     NetworkSettings,
+                     OccupancySettings,
+                     LearningRateSettings,
+                     TableDecaySettings,
+                     PhotoLossSettings,
+                     SampleLossSettings,
+                     DistortionSettings,
+                     DepthLossSettings {
   static constexpr uint32_t kMostSteps = 16384;  // that the longest ray may take
 
   // Scene
-  bool contracted = true;
-  double roiMargin = 1.0;
+  SETTING(bool, contracted, true, "contracted",
+          "the scene is unbounded: contract what lies outside the region of interest", anything());
+  SETTING(double, roiMargin, 1.0, "roi_margin", "region of interest relative to the one fitted to the capture",
+          within(1e-6, 1e6));
   // Model
-  int gridLevels = 16, gridFeatures = 2, gridLog2Size = 17, gridBase = 16, gridFinest = 2048;
-  int width = 64, densityHidden = 1, colourHidden = 2;
+  SETTING(int, gridFeatures, 2, "grid_features", "features per hash entry", oneOf({1, 2, 4, 8}));
+  SETTING(int, densityHidden, 1, "density_hidden", "hidden layers of the density network", within(1, 16));
+  SETTING(int, colourHidden, 2, "colour_hidden", "hidden layers of the colour network", within(1, 16));
   // Marching
-  int occupancyResolution = 128;
-  double near = 0.05, far = 32, minStep = 0.01, cone = 0.0078125;
+  SETTING(double, far, 32, "far", "rays end here", atLeast(near).dependent());
+  SETTING(double, minStep, 0.01, "min_step", "shortest marching step", atLeast(1e-6));
+  SETTING(double, cone, 0.0078125, "cone", "marching step relative to distance; 0 for uniform steps", share());
   // Batches
-  int64_t seed = 0;
-  int samplesPerStep = 1 << 16, samplesPerPass = 1 << 16;
-  int firstRays = 512, mostRays = 1 << 14;
-  double photoBudgetMiB = 0;
-  int stepsPerPhoto = 2;
-  // Occupancy
-  int occupancyEvery = 16, occupancyWarmUp = 256;
-  double occupancyShare = 0.0625;
-  // Optimiser
-  double rate = 1e-2, finalRateFactor = 0.03, constantRateShare = 0.4, networkL2 = 1e-6, tableL2 = 0,
-         exposureRate = 1e-3;
-  // Losses
-  std::string loss = "mse";
-  double lossParameter = 0.1, distortion = 0.01, fullGradientDistance = 1;
-  double depth = 0.03, depthTolerance = 0.01, knownShare = 0.125;
-  bool exposure = true, randomBackground = true;
+  SETTING(int, samplesPerPass, 1 << 16, "samples_per_pass",
+          "samples of which a step keeps everything at a time: fewer take less memory", within(64, 1 << 24));
 
+  FieldConfig();
+  // In the order of config.toml.
   std::vector<ConfigField> fields();
   // Throws Error naming the first setting that no model can be made of.
   void check() const;

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "base/config_checks.h"
+#include "base/error.h"
 #include "compute/lattice.h"
 #include "tiles/dense_layer.h"
 #include "train/block_frame.h"
@@ -36,94 +36,69 @@ HashConfig HashConfig::ofPreset(const std::string& name) {
   return config;
 }
 
+HashConfig::HashConfig() {
+  setOwnDefaults(fields());
+}
+
 std::vector<ConfigField> HashConfig::fields() {
   return {
-      {"preset", "the defaults of all others: cpu, or paper (large graphics cards)", &preset},
-      {"level", "of detail: 0 is the finest; set by training for those above", &level},
-      {"finest_step", "of a coarser level: steps of the finest one when it was made; set by training", &finestStep},
-      {"surround",
-       "what lies outside the region: own (a block of its own), border (the border blocks'; with one block, as in the "
-       "paper), none",
-       &surround},
-      {"background",
-       "what is seen where rays end nowhere: random (whatever stands behind the scene), learned (what the directions' "
-       "network says, as in the paper)",
-       &background},
-      {"near", "no sample nearer to a camera, in halves of a block", &near},
-      {"lattice", "corners along an edge of a block, of coarse features and attention", &lattice},
-      {"coarse_levels", "hash grid levels of a block's coarse features", &coarseLevels},
-      {"coarse_features", "features per entry of it", &coarseFeatures},
-      {"coarse_log2_size", "log2 of the entries of a level", &coarseLog2Size},
-      {"coarse_base", "coarsest resolution; the finest is the lattice's", &coarseBase},
-      {"width", "hidden width of the coarse features' networks: 16, 32, 64 or 128", &width},
-      {"hidden", "hidden layers of them", &hidden},
-      {"levels", "of fine features, the first of twice the lattice's resolution, each next one of twice as much",
-       &levels},
-      {"fine_log2_size", "log2 of the entries of a level", &fineLog2Size},
-      {"aggregation", "how levels become one: attention, sum, or mlp (a network for each sample)", &aggregation},
-      {"attention", "weights of a level: separate (of density and colours) or shared", &attention},
-      {"attention_varies", "from place to place; else the whole model has one set", &attentionVaries},
-      {"direction_width", "hidden width of the network for directions: 16, 32, 64 or 128", &directionWidth},
-      {"direction_hidden", "hidden layers of it", &directionHidden},
-      {"step", "longest step of a ray, in edges of the lattice", &step},
-      {"occupancy_resolution", "cells along an edge of a block's occupancy", &occupancyResolution},
-      {"seed", "of everything random", &seed},
-      {"samples_per_step", "samples that a step aims for; rays adapt", &samplesPerStep},
-      {"texels_per_step", "corners of the lattice that a step aims for at most", &texelsPerStep},
-      {"first_rays", "rays of the first step", &firstRays},
-      {"most_rays", "rays that a step never exceeds", &mostRays},
-      {"photo_budget_mib", "memory for decoded photos in MiB; 0: as they need, but at most half of the machine's",
-       &photoBudgetMiB},
-      {"steps_per_photo", "with a photo budget: steps after which one photo is exchanged", &stepsPerPhoto},
-      {"occupancy_every", "steps between updates of the occupancy", &occupancyEvery},
-      {"occupancy_warm_up", "steps during which updates look at every cell", &occupancyWarmUp},
-      {"occupancy_share", "share of the cells that an update looks at, at random, and again among occupied ones",
-       &occupancyShare},
-      {"rate", "learning rate", &rate},
-      {"fine_rate_factor", "learning rate of the fine features, relative", &fineRateFactor},
-      {"warm_up_steps", "steps during which the learning rate rises", &warmUpSteps},
-      {"rate_fall",
-       "exponential: by the two settings that follow; linear: from 0 to the learning rate and to 0 again, in lines, as "
-       "in the paper",
-       &rateFall},
-      {"final_rate_factor", "learning rate at the end, relative", &finalRateFactor},
-      {"constant_rate_share", "share of the steps before the learning rate begins to fall", &constantRateShare},
-      {"network_l2", "weight decay of the networks", &networkL2},
-      {"exposure_rate", "learning rate of the photos' exposures", &exposureRate},
-      {"loss", "colour loss: huber, mse or charbonnier", &loss},
-      {"loss_parameter", "delta of huber, epsilon of charbonnier", &lossParameter},
-      {"distortion",
-       "weight of the distortion loss; auto: the preset's, or 0.3 or 0.1 times that, whichever is best on one training "
-       "photo in ten that is left out, after a short training with each",
-       &distortion},
-      {"ramp_share", "share of the steps over which it rises to its weight", &rampShare},
-      {"full_gradient_distance",
-       "samples nearer to the camera learn more slowly, or fog gathers there; in halves of a block",
-       &fullGradientDistance},
-      {"depth", "weight of the depth loss, on rays through sparse points", &depth},
-      {"depth_tolerance", "of sparse points' distances, relative", &depthTolerance},
-      {"known_share", "share of the rays through sparse points, in captures that have some", &knownShare},
-      {"level_share",
-       "steps of the first coarser level of detail, as a share of the finest's, each next one taking twice as many, up "
-       "to the finest's; 0: no coarser levels",
-       &levelShare},
-      {"fewest_samples", "with fewer for each ray on average, steps become shorter", &fewestSamples},
-      {"shortest_step", "of a ray, relative to the longest", &shortestStep},
-      {"step_change", "by which share the length of steps changes from one training step to the next", &stepChange},
-      {"exposure", "fit an exposure to each photo", &exposure},
+      presetSetting(),
+      levelSetting(),
+      finestStepSetting(),
+      surroundSetting(),
+      backgroundSetting(),
+      nearSetting(),
+      latticeSetting(),
+      coarseLevelsSetting(),
+      coarseFeaturesSetting(),
+      coarseLog2SizeSetting(),
+      coarseBaseSetting(),
+      widthSetting(),
+      hiddenSetting(),
+      levelsSetting(),
+      fineLog2SizeSetting(),
+      aggregationSetting(),
+      attentionSetting(),
+      attentionVariesSetting(),
+      directionWidthSetting(),
+      directionHiddenSetting(),
+      stepSetting(),
+      occupancyResolutionSetting(),
+      seedSetting(),
+      samplesPerStepSetting(),
+      texelsPerStepSetting().byDefault(3 << 16),
+      firstRaysSetting(),
+      mostRaysSetting().byDefault(8000),
+      photoBudgetMiBSetting(),
+      stepsPerPhotoSetting(),
+      occupancyEverySetting(),
+      occupancyWarmUpSetting(),
+      occupancyShareSetting(),
+      rateSetting(),
+      fineRateFactorSetting(),
+      warmUpStepsSetting(),
+      rateFallSetting(),
+      finalRateFactorSetting(),
+      constantRateShareSetting(),
+      networkL2Setting(),
+      exposureRateSetting(),
+      lossSetting().byDefault("huber"),
+      lossParameterSetting(),
+      distortionSetting(),
+      rampShareSetting(),
+      fullGradientDistanceSetting().byDefault(0.25),
+      depthSetting(),
+      depthToleranceSetting(),
+      knownShareSetting(),
+      levelShareSetting(),
+      fewestSamplesSetting(),
+      shortestStepSetting(),
+      stepChangeSetting(),
+      exposureSetting(),
   };
 }
 
 namespace {
-
-void oneOf(const char* name, const std::string& value, std::initializer_list<const char*> allowed) {
-  std::string all;
-  for (const char* const each : allowed) {
-    if (value == each) return;
-    all += (all.empty() ? "" : ", ") + std::string(each);
-  }
-  throw Error(fmt::format("--set {}={}", name, value), "", "there is no such thing", "use one of: " + all);
-}
 
 // A viewer has the network's numbers in its shaders, in vectors of four.
 void requireDrawable(const MlpShape& shape) {
@@ -151,64 +126,11 @@ void HashConfig::keepFound(const HashConfig& run) {
 }
 
 void HashConfig::check() const {
-  constexpr double kTiny = 1e-12, kHuge = 1e12;
   ofPreset(preset);
   surroundKind();
-  oneOf("background", background, {"random", "learned"});
-  oneOf("aggregation", aggregation, {"attention", "sum", "mlp"});
-  oneOf("rate_fall", rateFall, {"exponential", "linear"});
-  oneOf("attention", attention, {"separate", "shared"});
-  requireWithin("level", level, 0, 16);
-  requireWithin("level_share", levelShare, 0, 10);
-  requireWithin("near", near, 0, 1);
-  requireWithin("lattice", lattice, 8, 1024);
-  if (lattice % 8 != 0) {
-    throw Error(fmt::format("--set lattice={}", lattice), "", "is no multiple of 8",
-                fmt::format("use lattice={}", (lattice + 4) / 8 * 8));
-  }
-  requireWithin("coarse_base", coarseBase, 2, lattice);
-  requireOneOf("coarse_features", coarseFeatures, {1, 2, 4, 8});
-  requireWithin("coarse_levels", coarseLevels, 1, 128 / coarseFeatures);
-  requireWithin("coarse_log2_size", coarseLog2Size, 3, 28);
-  requireOneOf("width", width, {16, 32, 64, 128});
-  requireWithin("hidden", hidden, 1, 16);
-  requireWithin("levels", levels, 1, static_cast<int>(AttentionShape::kMostLevels));
-  requireWithin("fine_log2_size", fineLog2Size, 3, 24);
-  requireOneOf("direction_width", directionWidth, {16, 32, 64, 128});
-  requireWithin("direction_hidden", directionHidden, 1, static_cast<int>(kMostLayers) - 1);
+  HashConfig checked = *this;
+  requireWithinBounds(checked.fields());
   requireDrawable(directionShape());
-  requireWithin("step", step, 0.01, 100);
-  requireWithin("occupancy_resolution", occupancyResolution, 4, 512);
-  if (occupancyResolution % 4 != 0) {
-    throw Error(fmt::format("--set occupancy_resolution={}", occupancyResolution), "", "is no multiple of 4",
-                fmt::format("use occupancy_resolution={}", occupancyResolution / 4 * 4));
-  }
-  requireWithin("samples_per_step", samplesPerStep, 64, 1 << 24);
-  requireWithin("texels_per_step", texelsPerStep, 64, 1 << 26);
-  requireWithin("most_rays", mostRays, 64, 1 << 24);
-  requireWithin("first_rays", firstRays, 1, mostRays);
-  requireWithin("photo_budget_mib", photoBudgetMiB, 0, kHuge);
-  requireWithin("steps_per_photo", stepsPerPhoto, 1, 1 << 30);
-  requireWithin("occupancy_every", occupancyEvery, 1, 1 << 30);
-  requireWithin("occupancy_warm_up", occupancyWarmUp, 0, 1 << 30);
-  requireWithin("occupancy_share", occupancyShare, 0, 1);
-  requireWithin("rate", rate, kTiny, kHuge);
-  requireWithin("fine_rate_factor", fineRateFactor, 0, kHuge);
-  requireWithin("warm_up_steps", warmUpSteps, 1, 1 << 30);
-  requireWithin("final_rate_factor", finalRateFactor, kTiny, kHuge);
-  requireWithin("constant_rate_share", constantRateShare, 0, 1);
-  requireWithin("network_l2", networkL2, 0, kHuge);
-  requireWithin("exposure_rate", exposureRate, 0, kHuge);
-  requireWithin("loss_parameter", lossParameter, kTiny, kHuge);
-  if (distortion) requireWithin("distortion", *distortion, 0, kHuge);
-  requireWithin("ramp_share", rampShare, 0, 1);
-  requireWithin("full_gradient_distance", fullGradientDistance, 0, kHuge);
-  requireWithin("depth", depth, 0, kHuge);
-  requireWithin("depth_tolerance", depthTolerance, 0, 1);
-  requireWithin("known_share", knownShare, 0, 1);
-  requireWithin("fewest_samples", fewestSamples, 0, 1e6);
-  requireWithin("shortest_step", shortestStep, 1e-3, 1);
-  requireWithin("step_change", stepChange, 0, 0.5);
 }
 
 Surround HashConfig::surroundKind() const {

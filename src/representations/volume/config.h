@@ -1,56 +1,97 @@
 // Every setting of the `volume` representation: flag (`--set`), default, help and the line in config.toml.
 #pragma once
 
-#include "base/config.h"
 #include "compute/blocks.h"
 #include "compute/virtual_grid.h"
 #include "field/block_fields.h"
+#include "train/settings/blocks.h"
+#include "train/settings/learning_rate.h"
+#include "train/settings/losses.h"
+#include "train/settings/networks.h"
+#include "train/settings/rays.h"
 
 namespace tessera {
 
-struct VolumeConfig {
-  // `cpu`, the defaults below; `paper`, what the paper and MERF use on large graphics cards.
-  std::string preset = "cpu";
-
-  // Scene
-  std::string surround = "own";
-  double near = 0.05;
-  int level = 0;           // of detail; those above 0 are made from the one below, see train_volume.h
-  int64_t finestStep = 0;  // of those above 0
+// What is settled by presets is for the `cpu` one here, and for `paper`, what the paper and MERF use, in ofPreset.
+struct VolumeConfig : BlockSettings,
+                      RaySettings,
+                      RandomBackgroundSettings,
+                      TexelBudgetSettings,
+                      HashGridSettings,
+                      NetworkSettings,
+                      HiddenLayerSettings,
+                      LearningRateSettings,
+                      TableDecaySettings,
+                      PhotoLossSettings,
+                      SampleLossSettings,
+                      DistortionSettings,
+                      RampSettings {
   // Virtual grid
-  int voxels = 128, planes = 512;
-  double featureRange = 7, densityRange = 14;
-  bool quantise = true, shareTexels = true;
-  // Attribute fields
-  int gridLevels = 8, gridLog2Size = 17, gridBase = 16, gridFinest = 512;
-  int width = 32, hidden = 1;
+  SETTING(int, voxels, 128, "voxels", "voxels along an edge of a block", within(8, 1024).inMultiplesOf(8, 4));
+  SETTING(int, planes, 512, "planes", "texels along an edge of a block's planes", within(8, 4096).inMultiplesOf(8, 4));
+  SETTING(double, featureRange, 7, "feature_range",
+          "colours and features span plus and minus this before their activation", within(0.1, 100));
+  SETTING(double, densityRange, 14, "density_range", "log densities likewise", within(0.1, 100));
+  SETTING(bool, quantise, true, "quantise", "train through the bytes that tiles hold", anything());
+  SETTING(bool, shareTexels, true, "share_texels",
+          "evaluate each texel of a step once; false: each corner of each sample (one block only)", anything());
   // Proposal fields and sampling
-  int proposalLevels = 5, proposalLog2Size = 14, proposalFinest = 128, proposalWidth = 16;
-  int firstIntervals = 32, secondIntervals = 24, samples = 16;
-  double padding = 0.02;
-  int proposalEvery = 4, proposalWarmUp = 256;
+  SETTING(int, proposalLevels, 5, "proposal_levels", "hash grid levels of a block's proposals", within(1, 64));
+  SETTING(int, proposalLog2Size, 14, "proposal_log2_size", "log2 of the entries of a level", within(3, 28));
+  SETTING(int, proposalFinest, 128, "proposal_finest", "finest resolution", within(gridBase, 1 << 20).dependent());
+  SETTING(int, proposalWidth, 16, "proposal_width", "hidden width of the proposal networks: 16, 32, 64 or 128",
+          oneOf({16, 32, 64, 128}));
+  SETTING(int, firstIntervals, 32, "first_intervals", "of a ray in the first round of proposals", within(2, 1024));
+  SETTING(int, secondIntervals, 24, "second_intervals", "in the second; 0 for one round", within(0, 1024));
+  SETTING(int, samples, 16, "samples", "of a ray, more where it passes from block to block", within(2, 1024));
+  SETTING(double, padding, 0.02, "padding", "share of the samples that are spread evenly whatever the proposals say",
+          share());
+  SETTING(int, proposalEvery, 4, "proposal_every", "steps between updates of the proposals after the warm-up",
+          within(1, 1 << 20));
+  SETTING(int, proposalWarmUp, 256, "proposal_warm_up", "steps during which each updates the proposals",
+          within(0, 1 << 30));
   // Batches
-  int64_t seed = 0;
-  int residentBlocks = 0;
-  int64_t residencySteps = 1000;
-  int texelsPerStep = 1 << 19;
-  int firstRays = 1024, mostRays = 1 << 14;
-  double photoBudgetMiB = 0;
-  int stepsPerPhoto = 2;
+  SETTING(int, residentBlocks, 0, "resident_blocks",
+          "blocks that are in memory at once, besides a surround of its own; 0: all", within(0, 1 << 20));
+  SETTING(int64_t, residencySteps, 1000, "residency_steps",
+          "steps in which all blocks get their turn, where not all are in memory", within(1, 1e9));
+  SETTING(
+      double, knownBracket, 0.03, "known_bracket",
+      "such rays begin and end this share of their distance before and behind the point: what they see stands there",
+      share());
+  SETTING(bool, freeSpace, true, "free_space", "nothing stands before the nearest sparse points that a photo shows",
+          anything());
+  SETTING(bool, blocksOnly, false, "blocks_only",
+          "no rays from parts of photos that see no block, as where --grid is a part of the place", anything());
   // Optimiser
-  double rate = 1e-2, finalRateFactor = 0.1, constantRateShare = 0.3, deferredRateFactor = 0.3, tableL2 = 0,
-         networkL2 = 1e-6, exposureRate = 1e-3;
+  SETTING(double, deferredRateFactor, 0.3, "deferred_rate_factor", "learning rate of the deferred networks, relative",
+          atLeast(0));
   // Losses
-  std::string loss = "charbonnier";
-  double lossParameter = 1e-3, s3im = 0.2, interlevel = 1, distortion = 0.01, sparsity = 0.01, opacity = 1e-3;
-  double rampShare = 0.1, fullGradientDistance = 1, knownShare = 0.05, knownBracket = 0.03;
-  int sparsityPoints = 4096;
-  double cullBegin = 0.4, cullEnd = 0.8, cullFirst = 5e-4, cullLast = 5e-3;
-  bool literalEq3 = false;
+  SETTING(double, s3im, 0.2, "s3im", "weight of the structural similarity of random pixels", atLeast(0));
+  SETTING(double, interlevel, 1, "interlevel", "weight of the loss that trains proposals", positive());
+  SETTING(double, sparsity, 0.01, "sparsity", "weight of the loss on what stands at random points", atLeast(0));
+  SETTING(double, opacity, 1e-3, "opacity", "weight of the loss on blocks that are half seen through", atLeast(0));
+  SETTING(int, sparsityPoints, 4096, "sparsity_points", "random points of a step", within(0, 1 << 24));
+  SETTING(double, cullBegin, 0.4, "cull_begin",
+          "share of the steps from which on what a renderer would not see is culled", share());
+  SETTING(double, cullEnd, 0.8, "cull_end", "share of the steps at which the threshold is the last",
+          within(cullBegin, 1).dependent());
+  SETTING(double, cullFirst, 5e-4, "cull_first", "opacity of a renderer's step below which it is culled, at first",
+          within(ConfigBounds::kTiny, 1));
+  SETTING(double, cullLast, 5e-3, "cull_last", "in the end, and when baked", within(cullFirst, 1).dependent());
+  SETTING(bool, literalEq3, false, "literal_eq3",
+          "the deferred network's colour whole, as printed, not times the block's opacity", anything());
   // Levels of detail
-  double levelShare = 0.2, frozenShare = 0.1, levelRateFactor = 0.5, levelPadding = 0.2;
-  bool exposure = true, randomBackground = true, freeSpace = true, blocksOnly = false;
+  SETTING(double, frozenShare, 0.1, "frozen_share",
+          "share of a coarser level's steps in which only its deferred networks are trained", share());
+  SETTING(double, levelRateFactor, 0.5, "level_rate_factor", "learning rate of a coarser level's fields, relative",
+          atLeast(0));
+  SETTING(double, levelPadding, 0.2, "level_padding",
+          "padding of coarser levels, if more: else what their proposals pass over is not seen before it is drawn",
+          share());
 
+  VolumeConfig();
+  // In the order of config.toml.
   std::vector<ConfigField> fields();
   // Throws Error naming the first setting that no model can be made of.
   void check() const;

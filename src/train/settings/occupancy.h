@@ -1,0 +1,18 @@
+// Settings of occupancy grids (occupancy_grid.h), which keep rays out of empty space.
+#pragma once
+
+#include "base/setting.h"
+
+namespace tessera {
+
+struct OccupancySettings {
+  SETTING(int, occupancyResolution, 128, "occupancy_resolution", "cells along an edge of an occupancy grid",
+          within(4, 512).inMultiplesOf(4, 0));
+  SETTING(int, occupancyEvery, 16, "occupancy_every", "steps between updates of the occupancy", within(1, 1 << 30));
+  SETTING(int, occupancyWarmUp, 256, "occupancy_warm_up", "steps during which updates look at every cell",
+          within(0, 1 << 30));
+  SETTING(double, occupancyShare, 0.0625, "occupancy_share",
+          "share of the cells that an update looks at, at random, and again among occupied ones", share());
+};
+
+}  // namespace tessera
