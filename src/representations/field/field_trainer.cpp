@@ -7,27 +7,20 @@
 #include "base/log.h"
 #include "base/random.h"
 #include "compute/composite.h"
-#include "compute/exposure.h"
-#include "train/colour_loss.h"
-#include "train/schedule.h"
 #include "train/visible_cells.h"
 
 namespace tessera {
 namespace {
 
-constexpr uint32_t kRoomPerWanted = 2;  // for passes that see more than the last step's did
-constexpr uint32_t kRoomPerRay = 8;     // so that the first round of marching fits
-constexpr uint32_t kLosses = 4;         // of a pass: colour loss, squared error, distortion, depth
+constexpr uint32_t kRoomPerWanted = 2;                // for passes that see more than the last step's did
+constexpr uint32_t kRoomPerRay = 8;                   // so that the first round of marching fits
+constexpr uint32_t kLosses = PhotoLoss::kLosses + 2;  // of a pass: of colours, distortion, depth
 constexpr float kMinTransmittance = 1e-4f;
 
 PhotoRays::Settings raySettings(const FieldConfig& config) {
-  PhotoRays::Settings settings;
-  settings.seed = static_cast<uint64_t>(config.seed);
-  settings.mostRays = static_cast<uint32_t>(config.mostRays);
-  settings.photoBudgetMiB = config.photoBudgetMiB;
-  settings.stepsPerPhoto = config.stepsPerPhoto;
+  PhotoRays::Settings settings = config.photoRaySettings();
   settings.randomBackground = config.randomBackground;
-  settings.knownShare = config.depth > 0 ? config.knownShare : 0;
+  if (config.depth <= 0) settings.knownShare = 0;
   return settings;
 }
 
@@ -38,9 +31,8 @@ FieldTrainer::FieldTrainer(Device& device, const Capture& capture, const FieldCo
       config_(config),
       model_(device, config, frame),
       photoRays_(device, capture, frame, raySettings(config)),
-      rays_(static_cast<uint32_t>(config.firstRays)),
-      exposures_(device, capture) {
-  colourLossKind(config.loss);
+      photoLoss_(device, capture, config, static_cast<uint32_t>(config.mostRays)),
+      budget_(config) {
   const std::vector<bool> visible = visibleCells(capture, frame, model_.space());
   if (std::find(visible.begin(), visible.end(), true) == visible.end()) {
     throw Error(capture.root.string(), "transforms.json", "no training photo sees any of the scene",
@@ -55,8 +47,8 @@ FieldTrainer::FieldTrainer(Device& device, const Capture& capture, const FieldCo
       std::max({kRoomPerWanted * perPass, std::min(kRoomPerRay * raysPerPass, 4 * perPass), FieldConfig::kMostSteps});
   seen_ = RaySamples(device, raysPerPass, samples);
   counters_ = device.array<uint32_t>(size_t{passes_} * RaySamples::kCounters);
-  for (Array<float>* perRay : {&opacity_, &depth_, &opacityGradients_}) *perRay = device.array<float>(rays);
-  for (Array<float>* perRay : {&colour_, &exposed_, &colourGradients_}) *perRay = device.array<float>(size_t{rays} * 3);
+  for (Array<float>* perRay : {&opacity_, &depth_}) *perRay = device.array<float>(rays);
+  colour_ = device.array<float>(size_t{rays} * 3);
   losses_ = device.array<float>(size_t{passes_} * kLosses);
   for (Array<float>* perSample : {&sampleWeights_, &weightGradients_, &logDensityGradients_}) {
     *perSample = device.array<float>(samples);
@@ -78,8 +70,9 @@ void FieldTrainer::refreshOccupancy(int64_t step) {
 
 StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
   refreshOccupancy(step);
-  photoRays_.draw(step, rays_);
-  const auto raysBefore = [&](uint32_t pass) { return static_cast<uint32_t>(uint64_t{rays_} * pass / passes_); };
+  const uint32_t rays = budget_.rays();
+  photoRays_.draw(step, rays);
+  const auto raysBefore = [&](uint32_t pass) { return static_cast<uint32_t>(uint64_t{rays} * pass / passes_); };
   for (uint32_t pass = 0; pass < passes_; ++pass) {
     addGradients(pass, raysBefore(pass), raysBefore(pass + 1) - raysBefore(pass));
   }
@@ -87,7 +80,7 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
 
   // The step is over: its counters may be read.
   const auto [counters, losses] = device_.readTogether(counters_.all(), losses_.all());
-  exposures_.settle(step, config_.exposure);
+  photoLoss_.exposures().settle(step, config_.exposure);
   StepReport report;
   double squares = 0, weight = 0;
   for (uint32_t pass = 0; pass < passes_; ++pass) {
@@ -104,9 +97,8 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
 
   const double perRay = std::max(1.0, static_cast<double>(report.samples)) / std::max(1u, report.rays);
   double wanted = config_.samplesPerStep / perRay;
-  if (report.rays < rays_) wanted = std::min<double>(wanted, report.rays);  // not all of them fitted
-  const double rounded = std::ceil(wanted / 8) * 8;
-  rays_ = static_cast<uint32_t>(std::clamp<double>(rounded, 8, config_.mostRays));
+  if (report.rays < rays) wanted = std::min<double>(wanted, report.rays);  // not all of them fitted
+  budget_.aimFor(std::ceil(wanted / 8) * 8);
   return report;
 }
 
@@ -115,8 +107,6 @@ void FieldTrainer::addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCo
     return array.part(size_t{firstRay} * columns, size_t{rayCount} * columns);
   };
   const Slice<const float> directions = photoRays_.directions(firstRay, rayCount);
-  const Slice<const float> backgrounds = photoRays_.backgrounds(firstRay, rayCount);
-  const Slice<const uint32_t> photoOfRay = photoRays_.photoOfRay(firstRay, rayCount);
   const Slice<float> losses = losses_.part(size_t{pass} * kLosses, kLosses);
   seen_.counters = counters_.part(size_t{pass} * RaySamples::kCounters, RaySamples::kCounters);
   model_.sample(
@@ -139,24 +129,13 @@ void FieldTrainer::addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCo
   composite.depth = ofRays(depth_, 1);
   composite.weights = sampleWeights_;
   device_.run(composite);
-  device_.run(ExposureForward{rays, composite.colour, composite.opacity, backgrounds, photoOfRay, exposures_.logGains(),
-                              ofRays(exposed_, 3)});
+  const PhotoLoss::Picture picture{rays, firstRay, rayCount, composite.colour, composite.opacity};
+  photoLoss_.compare(photoRays_, picture, losses.part(0, PhotoLoss::kLosses));
+  photoLoss_.passBack(photoRays_, picture);
 
-  ColourLoss loss;
-  loss.kind = colourLossKind(config_.loss);
-  loss.parameter = static_cast<float>(config_.lossParameter);
-  loss.scale = 1.0f / (3.0f * static_cast<float>(rays_));
-  loss.rays = rays;
-  loss.predicted = ofRays(exposed_, 3);
-  loss.target = photoRays_.targets(firstRay, rayCount);
-  loss.weights = photoRays_.weights(firstRay, rayCount);
-  loss.loss = losses.part(0, 2);
-  loss.gradients = ofRays(colourGradients_, 3);
-  device_.run(loss);
-  device_.run(ExposureBackward{rays, composite.colour, backgrounds, photoOfRay, exposures_.logGains(), loss.gradients,
-                               loss.gradients, ofRays(opacityGradients_, 1), exposures_.gradients()});
+  const float allRays = static_cast<float>(photoRays_.count());
   DistortionLoss distortion;
-  distortion.scale = static_cast<float>(config_.distortion) / static_cast<float>(rays_);
+  distortion.scale = static_cast<float>(config_.distortion) / allRays;
   distortion.rays = rays;
   distortion.firstSample = seen_.firstSample;
   distortion.weights = sampleWeights_;
@@ -167,7 +146,7 @@ void FieldTrainer::addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCo
   device_.run(distortion);
   if (config_.depth > 0 && config_.knownShare > 0) {
     DepthLoss depth;
-    depth.scale = static_cast<float>(config_.depth) / static_cast<float>(rays_);
+    depth.scale = static_cast<float>(config_.depth) / allRays;
     depth.tolerance = static_cast<float>(config_.depthTolerance);
     depth.rays = rays;
     depth.firstSample = seen_.firstSample;
@@ -188,8 +167,8 @@ void FieldTrainer::addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCo
   back.steps = seen_.steps;
   back.distances = seen_.distances;
   back.colours = output.colours;
-  back.rayColourGradients = loss.gradients;
-  back.rayOpacityGradients = ofRays(opacityGradients_, 1);
+  back.rayColourGradients = photoLoss_.colourGradients(picture);
+  back.rayOpacityGradients = photoLoss_.opacityGradients(picture);
   back.weightGradients = weightGradients_;
   back.xGradients = logDensityGradients_;
   back.colourGradients = Matrix<float>(sampleColourGradients_, 3);
@@ -198,12 +177,8 @@ void FieldTrainer::addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCo
 }
 
 void FieldTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
-  RateSchedule schedule;
-  schedule.rate = config_.rate;
-  schedule.finalFactor = config_.finalRateFactor;
-  schedule.constantFraction = config_.constantRateShare;
   Adam adam;
-  adam.rate = static_cast<float>(schedule.at(step, plannedSteps));
+  adam.rate = static_cast<float>(config_.rateSchedule().at(step, plannedSteps));
   adam.skipZeroGradients = true;
   adam.l2 = static_cast<float>(config_.tableL2);
   model_.field().table().step(device_, adam);
@@ -214,29 +189,27 @@ void FieldTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
   Adam ofExposures;
   ofExposures.rate = static_cast<float>(config_.exposureRate * adam.rate / config_.rate);
   ofExposures.skipZeroGradients = true;
-  exposures_.step(ofExposures, config_.exposure);
+  photoLoss_.exposures().step(ofExposures, config_.exposure);
 }
 
 Bytes FieldTrainer::save(uint32_t) {
   TensorSet tensors;
   model_.save(tensors, true);
-  exposures_.save(tensors);
-  tensors.add("rays", std::vector<uint32_t>{rays_});
+  photoLoss_.exposures().save(tensors);
+  budget_.save(tensors);
   return tensors.encode({{"format", "tessera field 1"}, {"device", device_.target()}});
 }
 
 std::optional<uint32_t> FieldTrainer::brokenPart() {
-  return model_.allFinite() && exposures_.allFinite() ? std::nullopt : std::optional<uint32_t>(0);
+  return model_.allFinite() && photoLoss_.exposures().allFinite() ? std::nullopt : std::optional<uint32_t>(0);
 }
 
 void FieldTrainer::restore(uint32_t, const fs::path& path, const Safetensors& state) {
   requireFormat(path, state, "tessera field 1", "field");
   warnOfOtherDevice(path, state, device_.target());
   model_.restore(path, state);
-  exposures_.restore(path, state);
-  const TensorView& rays = state.require(path, "rays", TensorType::u32);
-  if (rays.elements() != 1) throw Error(path.string(), "tensor rays", "is not one number", "train again");
-  rays_ = std::clamp(rays.as<uint32_t>()[0], 1u, static_cast<uint32_t>(config_.mostRays));
+  photoLoss_.exposures().restore(path, state);
+  budget_.restore(path, state);
 }
 
 }  // namespace tessera

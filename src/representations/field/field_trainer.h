@@ -2,8 +2,8 @@
 #pragma once
 
 #include "representations/field/field_model.h"
-#include "train/photo_exposures.h"
-#include "train/photo_rays.h"
+#include "train/photo_loss.h"
+#include "train/ray_budget.h"
 #include "train/training_loop.h"
 
 namespace tessera {
@@ -30,12 +30,12 @@ class FieldTrainer final : public Trainee {
   FieldConfig config_;
   FieldModel model_;
   PhotoRays photoRays_;
-  uint32_t rays_;    // of the next step
+  PhotoLoss photoLoss_;
+  RayBudget budget_;
   uint32_t passes_;  // of a step: a part of the rays each, so that what is kept until backward fits memory
-  PhotoExposures exposures_;
   RaySamples seen_;  // of one pass
   Array<uint32_t> counters_;
-  Array<float> colour_, exposed_, opacity_, depth_, colourGradients_, opacityGradients_, losses_;
+  Array<float> colour_, opacity_, depth_, losses_;
   Array<float> sampleWeights_, weightGradients_, logDensityGradients_, sampleColourGradients_;
 };
 

@@ -6,7 +6,6 @@
 
 #include "base/error.h"
 #include "compute/lattice.h"
-#include "tiles/dense_layer.h"
 #include "train/block_frame.h"
 
 namespace tessera {

@@ -5,7 +5,7 @@
 #include "compute/block_march.h"
 #include "compute/virtual_grid.h"
 #include "field/block_fields.h"
-#include "tiles/content.h"
+#include "tiles/dense_layer.h"
 #include "train/settings/blocks.h"
 #include "train/settings/learning_rate.h"
 #include "train/settings/losses.h"

@@ -7,9 +7,6 @@
 #include "base/error.h"
 #include "base/random.h"
 #include "compute/block_path.h"
-#include "compute/exposure.h"
-#include "train/colour_loss.h"
-#include "train/schedule.h"
 #include "train/visible_cells.h"
 
 namespace tessera {
@@ -20,13 +17,9 @@ constexpr float kMinTransmittance = 1e-4f;
 constexpr const char* kFormat = "tessera hash 1";
 
 PhotoRays::Settings raySettings(const HashConfig& config) {
-  PhotoRays::Settings settings;
-  settings.seed = static_cast<uint64_t>(config.seed);
-  settings.mostRays = static_cast<uint32_t>(config.mostRays);
-  settings.photoBudgetMiB = config.photoBudgetMiB;
-  settings.stepsPerPhoto = config.stepsPerPhoto;
+  PhotoRays::Settings settings = config.photoRaySettings();
   settings.randomBackground = config.background == "random";
-  settings.knownShare = config.depth > 0 ? config.knownShare : 0;
+  if (config.depth <= 0) settings.knownShare = 0;
   return settings;
 }
 
@@ -54,10 +47,9 @@ HashTrainer::HashTrainer(Device& device, const Capture& capture, const HashConfi
       model_(device, config, grid),
       pass_(model_, roomFor(config)),
       photoRays_(device, capture, model_.frame(), raySettings(config)),
-      exposures_(device, capture),
-      rays_(static_cast<uint32_t>(config.firstRays)) {
+      photoLoss_(device, capture, config, static_cast<uint32_t>(config.mostRays)),
+      budget_(config) {
   CHECK(config.distortion.has_value());
-  colourLossKind(config.loss);
   bool anything = false;
   for (uint32_t block = 0; block < parts(); ++block) {
     const std::vector<bool> visible =
@@ -69,10 +61,7 @@ HashTrainer::HashTrainer(Device& device, const Capture& capture, const HashConfi
     throw Error(capture.root.string(), "transforms.json", "no training photo sees any of the scene",
                 "look whether the poses are right, and the lens and its distortion");
   }
-  const size_t rays = static_cast<size_t>(config.mostRays);
-  for (Array<float>* three : {&exposed_, &colourGradients_}) *three = device.array<float>(3 * rays);
-  opacityGradients_ = device.array<float>(rays);
-  losses_ = device.array<float>(2);
+  losses_ = device.array<float>(PhotoLoss::kLosses);
 }
 
 void HashTrainer::refreshOccupancy(int64_t step) {
@@ -82,23 +71,21 @@ void HashTrainer::refreshOccupancy(int64_t step) {
 }
 
 HashModel::Rays HashTrainer::drawRays(int64_t step) {
-  photoRays_.draw(step, rays_);
-  const HashModel::Rays rays{rays_,
-                             photoRays_.origins(0, rays_),
-                             photoRays_.directions(0, rays_),
-                             photoRays_.jitter(0, rays_),
-                             photoRays_.nears(0, rays_),
-                             photoRays_.fars(0, rays_)};
+  const uint32_t count = budget_.rays();
+  photoRays_.draw(step, count);
+  const HashModel::Rays rays{count,
+                             photoRays_.origins(0, count),
+                             photoRays_.directions(0, count),
+                             photoRays_.jitter(0, count),
+                             photoRays_.nears(0, count),
+                             photoRays_.fars(0, count)};
   pass_.forward(rays, kMinTransmittance);
   return rays;
 }
 
 // Where corners have no room, what they hold counts as nothing: then again with fewer rays.
 bool HashTrainer::drawsFewerRays(uint32_t texelsWanted) {
-  const double room = model_.fields().roomForTexels(), wanted = texelsWanted;
-  if (wanted <= room || rays_ == 1) return false;
-  rays_ = std::max(1u, static_cast<uint32_t>(0.9 * room / wanted * rays_));
-  return true;
+  return budget_.drawsFewer(texelsWanted, model_.fields().roomForTexels());
 }
 
 StepReport HashTrainer::step(int64_t step, int64_t plannedSteps) {
@@ -114,7 +101,7 @@ StepReport HashTrainer::step(int64_t step, int64_t plannedSteps) {
     std::tie(counters, losses, inner) = device_.readTogether(pass_.counters(), losses_.all(), pass_.losses());
     report.texels = *std::max_element(counters.begin() + HashSamples::kFirstTexels, counters.end());
   } while (drawsFewerRays(report.texels));
-  exposures_.settle(step, config_.exposure);
+  photoLoss_.exposures().settle(step, config_.exposure);
 
   report.samples = counters[0];
   report.rays = counters[1];
@@ -126,9 +113,10 @@ StepReport HashTrainer::step(int64_t step, int64_t plannedSteps) {
   model_.adaptStep(perRay);
 
   double wanted = config_.samplesPerStep / std::max(1.0 / 64, perRay);
-  wanted = std::min(wanted, rays_ * static_cast<double>(config_.texelsPerStep) / std::max(1u, report.texels));
-  if (report.rays < rays_) wanted = std::min<double>(wanted, report.rays);  // not all of them fitted
-  rays_ = static_cast<uint32_t>(std::clamp<double>(std::ceil(wanted / 8) * 8, 8, config_.mostRays));
+  const uint32_t rays = budget_.rays();
+  wanted = std::min(wanted, rays * static_cast<double>(config_.texelsPerStep) / std::max(1u, report.texels));
+  if (report.rays < rays) wanted = std::min<double>(wanted, report.rays);  // not all of them fitted
+  budget_.aimFor(std::ceil(wanted / 8) * 8);
   return report;
 }
 
@@ -137,12 +125,12 @@ void HashTrainer::trainOn(std::vector<TileShares> photos) {
   for (size_t photo = 0; photo < photos.size(); ++photo) {
     if (photos[photo].total() > 0) trained.push_back(static_cast<int>(photo));
   }
-  exposures_.trainOn(std::move(trained));
+  photoLoss_.exposures().trainOn(std::move(trained));
   photoRays_.drawFrom(std::move(photos));
 }
 
 void HashTrainer::judgeBy(std::vector<TileShares> photos) {
-  exposures_.centre();
+  photoLoss_.exposures().centre();
   photoRays_.drawFrom(std::move(photos));
 }
 
@@ -150,7 +138,7 @@ HashTrainer::Fit HashTrainer::fit(int64_t step) {
   std::vector<uint32_t> counters;
   std::vector<float> losses;
   do {
-    compareWithPhotos(pass_.finished(drawRays(step)));
+    photoLoss_.compare(photoRays_, pictureOf(drawRays(step)), losses_);
     std::tie(counters, losses) = device_.readTogether(pass_.counters(), losses_.all());
   } while (drawsFewerRays(*std::max_element(counters.begin() + HashSamples::kFirstTexels, counters.end())));
   return fitOf(counters[1], losses);
@@ -162,46 +150,24 @@ HashTrainer::Fit HashTrainer::fitOf(uint32_t rays, const std::vector<float>& los
   return {losses[1], 3 * weight, losses[0]};
 }
 
-Slice<const float> HashTrainer::backgrounds() const {
-  return config_.background == "random" ? photoRays_.backgrounds(0, rays_) : Slice<const float>();
-}
-
-// Losses of colours, and their gradients.
-void HashTrainer::compareWithPhotos(Count rays) {
-  device_.run(ExposureForward{rays, pass_.colour(), pass_.opacity(), backgrounds(), photoRays_.photoOfRay(0, rays_),
-                              exposures_.logGains(), exposed_});
-  ColourLoss loss;
-  loss.kind = colourLossKind(config_.loss);
-  loss.parameter = static_cast<float>(config_.lossParameter);
-  loss.scale = 1.0f / (3.0f * static_cast<float>(rays_));
-  loss.rays = rays;
-  loss.predicted = exposed_;
-  loss.target = photoRays_.targets(0, rays_);
-  loss.weights = photoRays_.weights(0, rays_);
-  loss.loss = losses_;
-  loss.gradients = colourGradients_;
-  device_.run(loss);
+PhotoLoss::Picture HashTrainer::pictureOf(const HashModel::Rays& rays) const {
+  return {pass_.finished(rays), 0, rays.count, pass_.colour(), pass_.opacity(), config_.background == "random"};
 }
 
 void HashTrainer::addGradients(const HashModel::Rays& drawn, int64_t step, int64_t plannedSteps) {
-  const Count rays = pass_.finished(drawn);
-  compareWithPhotos(rays);
-  device_.fillZero(opacityGradients_.all());
-  device_.run(ExposureBackward{rays, pass_.colour(), backgrounds(), photoRays_.photoOfRay(0, rays_),
-                               exposures_.logGains(), colourGradients_, colourGradients_, opacityGradients_,
-                               exposures_.gradients()});
+  const PhotoLoss::Picture picture = pictureOf(drawn);
+  photoLoss_.compare(photoRays_, picture, losses_);
+  photoLoss_.passBack(photoRays_, picture);
   HashPass::LossScales scales;
-  scales.distortion = static_cast<float>(distortionWeight(config_, step, plannedSteps) / rays_);
-  if (config_.knownShare > 0) scales.depth = static_cast<float>(config_.depth / rays_);
+  scales.distortion = static_cast<float>(distortionWeight(config_, step, plannedSteps) / drawn.count);
+  if (config_.knownShare > 0) scales.depth = static_cast<float>(config_.depth / drawn.count);
   scales.depthTolerance = static_cast<float>(config_.depthTolerance);
-  pass_.backward(drawn, colourGradients_, opacityGradients_, photoRays_.distances(0, rays_), scales);
+  pass_.backward(drawn, photoLoss_.colourGradients(picture), photoLoss_.opacityGradients(picture),
+                 photoRays_.distances(0, drawn.count), scales);
 }
 
 void HashTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
-  RateSchedule schedule;
-  schedule.rate = config_.rate;
-  schedule.finalFactor = config_.finalRateFactor;
-  schedule.constantFraction = config_.constantRateShare;
+  RateSchedule schedule = config_.rateSchedule();
   schedule.warmUpSteps = config_.warmUpSteps;
   schedule.linear = config_.rateFall == "linear";
   HashFields::Rates rates;
@@ -211,22 +177,22 @@ void HashTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
   rates.fine.rate *= static_cast<float>(config_.fineRateFactor);
   rates.network.l2 = static_cast<float>(config_.networkL2);
   for (Adam* adam : {&rates.table, &rates.fine, &rates.network}) {
-    if (rays_ > 1) adam->found = pass_.texelsWanted();
+    if (budget_.canShrink()) adam->found = pass_.texelsWanted();
     adam->room = model_.fields().roomForTexels();
   }
   model_.fields().step(rates);
   model_.direction().step(device_, rates.network);
   Adam ofExposures = rates.table;
   ofExposures.rate = static_cast<float>(config_.exposureRate * rates.table.rate / config_.rate);
-  exposures_.step(ofExposures, config_.exposure);
+  photoLoss_.exposures().step(ofExposures, config_.exposure);
 }
 
 Bytes HashTrainer::save(uint32_t part) {
   TensorSet tensors;
   model_.save(part, tensors, true);
   if (part == 0) {
-    exposures_.save(tensors);
-    tensors.add("rays", std::vector<uint32_t>{rays_});
+    photoLoss_.exposures().save(tensors);
+    budget_.save(tensors);
   }
   return tensors.encode({{"format", kFormat}, {"device", device_.target()}, {"block", std::to_string(part)}});
 }
@@ -235,7 +201,7 @@ std::optional<uint32_t> HashTrainer::brokenPart() {
   for (uint32_t part = 0; part < parts(); ++part) {
     if (!model_.allFinite(part)) return part;
   }
-  return exposures_.allFinite() ? std::nullopt : std::optional<uint32_t>(0);
+  return photoLoss_.exposures().allFinite() ? std::nullopt : std::optional<uint32_t>(0);
 }
 
 void HashTrainer::restore(uint32_t part, const fs::path& path, const Safetensors& state) {
@@ -243,10 +209,8 @@ void HashTrainer::restore(uint32_t part, const fs::path& path, const Safetensors
   model_.restore(part, path, state);
   if (part != 0) return;
   warnOfOtherDevice(path, state, device_.target());
-  exposures_.restore(path, state);
-  const TensorView& rays = state.require(path, "rays", TensorType::u32);
-  if (rays.elements() != 1) throw Error(path.string(), "tensor rays", "is not one number", "train again");
-  rays_ = std::clamp(rays.as<uint32_t>()[0], 1u, static_cast<uint32_t>(config_.mostRays));
+  photoLoss_.exposures().restore(path, state);
+  budget_.restore(path, state);
 }
 
 }  // namespace tessera

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "representations/hash/hash_pass.h"
-#include "train/photo_exposures.h"
-#include "train/photo_rays.h"
+#include "train/photo_loss.h"
+#include "train/ray_budget.h"
 #include "train/training_loop.h"
 
 namespace tessera {
@@ -38,9 +38,8 @@ class HashTrainer final : public Trainee {
   void refreshOccupancy(int64_t step);
   HashModel::Rays drawRays(int64_t step);
   bool drawsFewerRays(uint32_t texelsWanted);
-  void compareWithPhotos(Count rays);
+  PhotoLoss::Picture pictureOf(const HashModel::Rays& rays) const;
   Fit fitOf(uint32_t rays, const std::vector<float>& losses) const;
-  Slice<const float> backgrounds() const;
   void addGradients(const HashModel::Rays& rays, int64_t step, int64_t plannedSteps);
   void updateParameters(int64_t step, int64_t plannedSteps);
 
@@ -49,9 +48,9 @@ class HashTrainer final : public Trainee {
   HashModel model_;
   HashPass pass_;
   PhotoRays photoRays_;
-  PhotoExposures exposures_;
-  uint32_t rays_;  // of the next step
-  Array<float> exposed_, colourGradients_, opacityGradients_, losses_;
+  PhotoLoss photoLoss_;
+  RayBudget budget_;
+  Array<float> losses_;  // of colours
 };
 
 // The weight of the distortion loss, `step` into training: from 0 it rises to the config's (section 5 of the

@@ -7,28 +7,20 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "base/random.h"
-#include "compute/exposure.h"
-#include "train/colour_loss.h"
 #include "train/run_folder.h"
-#include "train/schedule.h"
 
 namespace tessera {
 namespace {
 
-constexpr double kRoomPerWanted = 1.5;  // for steps that need more texels than the last one did
-constexpr uint32_t kLosses = 3;         // colour loss, squared error, S3IM
-constexpr uint32_t kGroup = 16;         // rays come in groups of so many, as S3IM wants them
+constexpr double kRoomPerWanted = 1.5;                // for steps that need more texels than the last one did
+constexpr uint32_t kLosses = PhotoLoss::kLosses + 1;  // of colours, S3IM
+constexpr uint32_t kGroup = 16;                       // rays come in groups of so many, as S3IM wants them
 constexpr const char* kFormat = "tessera volume 1";
 
 PhotoRays::Settings raySettings(const VolumeConfig& config) {
-  PhotoRays::Settings settings;
-  settings.seed = static_cast<uint64_t>(config.seed);
-  settings.mostRays = static_cast<uint32_t>(config.mostRays);
-  settings.photoBudgetMiB = config.photoBudgetMiB;
-  settings.stepsPerPhoto = config.stepsPerPhoto;
+  PhotoRays::Settings settings = config.photoRaySettings();
   settings.randomBackground = config.randomBackground;
   settings.freeSpace = config.freeSpace;
-  settings.knownShare = config.knownShare;
   settings.knownBracket = config.knownBracket;
   settings.jitters = VolumePass::kRounds + 1;
   return settings;
@@ -68,12 +60,8 @@ VolumeTrainer::VolumeTrainer(Device& device, const Capture& capture, const Volum
       model_(device, config, grid, {static_cast<uint32_t>(config.residentBlocks), true}),
       pass_(model_, roomFor(config)),
       photoRays_(device, capture, model_.frame(), raySettings(config)),
-      exposures_(device, capture),
-      rays_(static_cast<uint32_t>(config.firstRays) / kGroup * kGroup) {
-  colourLossKind(config.loss);
-  const size_t rays = static_cast<size_t>(config.mostRays);
-  for (Array<float>* three : {&exposed_, &colourGradients_}) *three = device.array<float>(3 * rays);
-  opacityGradients_ = device.array<float>(rays);
+      photoLoss_(device, capture, config, static_cast<uint32_t>(config.mostRays)),
+      budget_(config, kGroup) {
   losses_ = device.array<float>(kLosses);
   asSaved_.assign(parts(), false);
   if (config.blocksOnly || !model_.holdsAll()) tiles_ = tilePhotos(capture, model_.frame(), model_.space());
@@ -133,7 +121,7 @@ VolumePass::LossScales VolumeTrainer::lossScales(int64_t step, int64_t plannedSt
                ? 0
                : std::min(1.0, static_cast<double>(into) / (config_.rampShare * static_cast<double>(plannedSteps)));
   }
-  const double perRay = 1.0 / rays_;
+  const double perRay = 1.0 / budget_.rays();
   VolumePass::LossScales scales;
   scales.interlevel = static_cast<float>(config_.interlevel * perRay);
   scales.distortion = static_cast<float>(config_.distortion * ramp * perRay);
@@ -163,24 +151,16 @@ VolumePass::Options VolumeTrainer::passOptions(int64_t step, double progress) co
 }
 
 VolumeRays VolumeTrainer::forward(int64_t step, const VolumePass::Options& options) {
-  photoRays_.draw(step, rays_);
-  const VolumeRays rays{rays_,
-                        photoRays_.origins(0, rays_),
-                        photoRays_.directions(0, rays_),
+  const uint32_t count = budget_.rays();
+  photoRays_.draw(step, count);
+  const VolumeRays rays{count,
+                        photoRays_.origins(0, count),
+                        photoRays_.directions(0, count),
                         photoRays_.jitters(),
-                        photoRays_.fars(0, rays_),
-                        photoRays_.nears(0, rays_)};
+                        photoRays_.fars(0, count),
+                        photoRays_.nears(0, count)};
   pass_.forward(rays, options);
   return rays;
-}
-
-// Where rays want more texels than there is room for, what has none is fog: then again with fewer rays.
-bool VolumeTrainer::drawsFewerRays(uint32_t texelsWanted) {
-  constexpr double kFewer = 0.9;  // texels grow more slowly than rays
-  const double room = pass_.roomForTexels(), wanted = texelsWanted;
-  if (wanted <= room || rays_ == kGroup) return false;
-  rays_ = std::max(1u, static_cast<uint32_t>(kFewer * room / wanted * rays_ / kGroup)) * kGroup;
-  return true;
 }
 
 StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
@@ -196,21 +176,24 @@ StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
   std::vector<uint32_t> texels, samples;
   do {
     const VolumeRays rays = forward(step, options);
-    addColourGradients(step);
-    pass_.backward(rays, colourGradients_, opacityGradients_, lossScales(step, plannedSteps));
+    const PhotoLoss::Picture picture = addColourGradients(step);
+    pass_.backward(rays, photoLoss_.colourGradients(picture), photoLoss_.opacityGradients(picture),
+                   lossScales(step, plannedSteps));
     updateParameters(step, plannedSteps, options);
     // The step is over: its counters may be read. Where it had no room, it has changed nothing.
-    std::tie(losses, inner, texels, samples) =
-        device_.readTogether(losses_.all(), pass_.losses(), pass_.texelsWanted(), pass_.firstSample().part(rays_, 1));
-  } while (drawsFewerRays(texels[0]));
-  exposures_.settle(step, config_.exposure);
+    std::tie(losses, inner, texels, samples) = device_.readTogether(losses_.all(), pass_.losses(), pass_.texelsWanted(),
+                                                                    pass_.firstSample().part(rays.count, 1));
+    // Where rays want more texels than there is room for, what has none is fog: then again with fewer rays.
+  } while (budget_.drawsFewer(texels[0], pass_.roomForTexels()));
+  photoLoss_.exposures().settle(step, config_.exposure);
 
   for (const uint32_t block : model_.blockOfSlot()) asSaved_[block] = false;
 
   StepReport report;
-  report.rays = rays_;
+  const uint32_t rays = budget_.rays();
+  report.rays = rays;
   report.samples = samples[0];
-  report.marched = rays_ * static_cast<uint32_t>(config_.firstIntervals + config_.secondIntervals);
+  report.marched = rays * static_cast<uint32_t>(config_.firstIntervals + config_.secondIntervals);
   report.loss = losses[0] + losses[2];
   for (const float loss : inner) report.loss += loss;
   double weight = 0;
@@ -219,53 +202,36 @@ StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
   report.texels = std::max(1u, texels[0]);
 
   // Texels grow more slowly than rays, so half of the way is enough.
-  const double wanted = rays_ * std::sqrt(static_cast<double>(config_.texelsPerStep) / report.texels);
-  rays_ = static_cast<uint32_t>(std::clamp<double>(std::floor(wanted / kGroup), 1, config_.mostRays / kGroup)) * kGroup;
+  const double wanted = rays * std::sqrt(static_cast<double>(config_.texelsPerStep) / report.texels);
+  budget_.aimFor(std::floor(wanted / kGroup) * kGroup);
   return report;
 }
 
-void VolumeTrainer::addColourGradients(int64_t step) {
-  const Count rays{rays_};
-  const Slice<const uint32_t> photoOfRay = photoRays_.photoOfRay(0, rays_);
-  const Slice<const float> backgrounds = photoRays_.backgrounds(0, rays_);
-  device_.run(
-      ExposureForward{rays, pass_.colour(), pass_.opacity(), backgrounds, photoOfRay, exposures_.logGains(), exposed_});
-  ColourLoss loss;
-  loss.kind = colourLossKind(config_.loss);
-  loss.parameter = static_cast<float>(config_.lossParameter);
-  loss.scale = 1.0f / (3.0f * static_cast<float>(rays_));
-  loss.rays = rays;
-  loss.predicted = exposed_;
-  loss.target = photoRays_.targets(0, rays_);
-  loss.weights = photoRays_.weights(0, rays_);
-  loss.loss = losses_.part(0, 2);
-  loss.gradients = colourGradients_;
-  device_.run(loss);
+PhotoLoss::Picture VolumeTrainer::addColourGradients(int64_t step) {
+  const uint32_t rays = photoRays_.count();
+  const PhotoLoss::Picture picture{{rays}, 0, rays, pass_.colour(), pass_.opacity()};
+  photoLoss_.compare(photoRays_, picture, losses_.part(0, PhotoLoss::kLosses));
   if (config_.s3im > 0) {
     S3imLoss similarity;
     similarity.scale = static_cast<float>(config_.s3im);
-    similarity.rays = rays;
+    similarity.rays = picture.finished;
     similarity.seed = mix64(static_cast<uint64_t>(config_.seed) + static_cast<uint64_t>(step));
-    similarity.predicted = exposed_;
-    similarity.target = loss.target;
-    similarity.weights = loss.weights;
-    similarity.loss = losses_.part(2, 1);
-    similarity.gradients = colourGradients_;
+    similarity.predicted = photoLoss_.exposed(picture);
+    similarity.target = photoRays_.targets(0, rays);
+    similarity.weights = photoRays_.weights(0, rays);
+    similarity.loss = losses_.part(PhotoLoss::kLosses, 1);
+    similarity.gradients = photoLoss_.colourGradients(picture);
     device_.run(similarity);
   }
-  device_.run(ExposureBackward{rays, pass_.colour(), backgrounds, photoOfRay, exposures_.logGains(), colourGradients_,
-                               colourGradients_, opacityGradients_, exposures_.gradients()});
+  photoLoss_.passBack(photoRays_, picture);
+  return picture;
 }
 
 void VolumeTrainer::updateParameters(int64_t step, int64_t plannedSteps, const VolumePass::Options& kept) {
-  RateSchedule schedule;
-  schedule.rate = config_.rate;
-  schedule.finalFactor = config_.finalRateFactor;
-  schedule.constantFraction = config_.constantRateShare;
-  const float rate = static_cast<float>(schedule.at(step, plannedSteps));
+  const float rate = static_cast<float>(config_.rateSchedule().at(step, plannedSteps));
   const float ofFields = config_.level > 0 ? rate * static_cast<float>(config_.levelRateFactor) : rate;
   Adam all;
-  if (rays_ > kGroup) all.found = pass_.texelsWanted();
+  if (budget_.canShrink()) all.found = pass_.texelsWanted();
   all.room = pass_.roomForTexels();
   Adam table = all;
   table.rate = ofFields;
@@ -289,7 +255,7 @@ void VolumeTrainer::updateParameters(int64_t step, int64_t plannedSteps, const V
   Adam ofExposures = all;
   ofExposures.rate = static_cast<float>(config_.exposureRate / config_.rate) * rate;
   ofExposures.skipZeroGradients = true;
-  exposures_.step(ofExposures, config_.exposure);
+  photoLoss_.exposures().step(ofExposures, config_.exposure);
 }
 
 Bytes VolumeTrainer::save(uint32_t part) {
@@ -304,8 +270,8 @@ Bytes VolumeTrainer::save(uint32_t part) {
   }
   if (part == 0) {
     model_.saveDeferred(tensors, true);
-    exposures_.save(tensors);
-    tensors.add("rays", std::vector<uint32_t>{rays_});
+    photoLoss_.exposures().save(tensors);
+    budget_.save(tensors);
   }
   asSaved_[part] = true;
   return tensors.encode({{"format", kFormat}, {"device", device_.target()}, {"block", std::to_string(part)}});
@@ -318,7 +284,7 @@ std::optional<uint32_t> VolumeTrainer::brokenPart() {
       if (!group->allFinite(device_)) return model_.blockOfSlot()[slot];
     }
   }
-  if (!model_.deferred().allFinite(device_) || !exposures_.allFinite()) return 0;
+  if (!model_.deferred().allFinite(device_) || !photoLoss_.exposures().allFinite()) return 0;
   return std::nullopt;
 }
 
@@ -344,7 +310,7 @@ void VolumeTrainer::beginFrom(const fs::path& below) {
       return tensor.first.ends_with(".m1") || tensor.first.ends_with(".m2") || tensor.first.ends_with(".count");
     });
     restoreBlock(block, path, state);
-    if (block == 0) exposures_.restore(path, state);
+    if (block == 0) photoLoss_.exposures().restore(path, state);
   }
 }
 
@@ -355,11 +321,8 @@ void VolumeTrainer::restore(uint32_t part, const fs::path& path, const Safetenso
   if (part != 0) return;
   model_.restoreDeferred(path, state);
   warnOfOtherDevice(path, state, device_.target());
-  exposures_.restore(path, state);
-  const TensorView& rays = state.require(path, "rays", TensorType::u32);
-  if (rays.elements() != 1) throw Error(path.string(), "tensor rays", "is not one number", "train again");
-  const uint32_t groups = rays.as<uint32_t>()[0] / kGroup;
-  rays_ = std::clamp(groups, 1u, static_cast<uint32_t>(config_.mostRays) / kGroup) * kGroup;
+  photoLoss_.exposures().restore(path, state);
+  budget_.restore(path, state);
 }
 
 }  // namespace tessera

@@ -3,8 +3,8 @@
 
 #include "representations/volume/volume_pass.h"
 #include "representations/volume/waiting_blocks.h"
-#include "train/photo_exposures.h"
-#include "train/photo_rays.h"
+#include "train/photo_loss.h"
+#include "train/ray_budget.h"
 #include "train/residency.h"
 #include "train/training_loop.h"
 
@@ -42,8 +42,7 @@ class VolumeTrainer final : public Trainee {
   VolumePass::Options passOptions(int64_t step, double progress) const;
   VolumePass::LossScales lossScales(int64_t step, int64_t plannedSteps) const;
   VolumeRays forward(int64_t step, const VolumePass::Options& options);
-  bool drawsFewerRays(uint32_t texelsWanted);
-  void addColourGradients(int64_t step);
+  PhotoLoss::Picture addColourGradients(int64_t step);
   // A coarser level's first steps: only deferred networks are trained, through the grid of the level below.
   bool isFrozen(double progress) const { return config_.level > 0 && progress < config_.frozenShare; }
   void updateParameters(int64_t step, int64_t plannedSteps, const VolumePass::Options& kept);
@@ -53,7 +52,7 @@ class VolumeTrainer final : public Trainee {
   VolumeModel model_;
   VolumePass pass_;
   PhotoRays photoRays_;
-  PhotoExposures exposures_;
+  PhotoLoss photoLoss_;
   TiledPhotos tiles_;  // where rays come from some of them alone
   size_t photoCount_ = 0;
   // Where not all blocks are in memory.
@@ -61,8 +60,8 @@ class VolumeTrainer final : public Trainee {
   std::optional<Residency> residency_;
   std::optional<size_t> stay_;  // that the slots are filled for
   std::vector<bool> asSaved_;   // [blocks]
-  uint32_t rays_;               // of the next step
-  Array<float> exposed_, colourGradients_, opacityGradients_, losses_;
+  RayBudget budget_;
+  Array<float> losses_;  // of colours, S3IM
 };
 
 // The opacity of a renderer's step below which samples are culled, `progress` in [0,1] into training.
