@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "base/error.h"
 #include "base/log.h"
@@ -57,14 +58,6 @@ BlockRun openBlockRun(const Capture& capture, const fs::path& model, const Block
   return {folder, cutBlocks(capture, model, partitioning), false, photoBudgetMiB};
 }
 
-void writeRun(const ModelFolder& folder, const BlockTraining& on, const std::vector<ConfigField>& config,
-              const TrainingLoopOptions& loop) {
-  if (folder.manifest()) return;
-  writeFileAtomically(folder.configPath(), howToRepeat(on.device, loop, " --grid blocks.json") + configToToml(config));
-  folder.writePlacement({{}, on.grid, on.capture.sourceFromWorld, on.capture.root, trainingNames(on.capture)},
-                        loop.method);
-}
-
 void sayWhatMemoryItTakes(const BlockTraining& on, const BlockRunOptions& options, const MemoryNeeds& needs) {
   constexpr double kCheckpoint = 2;  // a block that is saved stands in memory twice
   const Device::OwnMemory card = on.device.ownMemory();
@@ -84,22 +77,66 @@ void sayWhatMemoryItTakes(const BlockTraining& on, const BlockRunOptions& option
   warn("that is more than the {:.0f} MiB there are; {}", options.plannedBytes() / kMiB, needs.remedy);
 }
 
-bool trainCoarserLevels(const fs::path& model, uint32_t top, double share, const TrainingResult& finest,
-                        TrainingLoopOptions loop, const LevelTraining& training) {
+namespace {
+
+// Writes what a level's run is made of (config.toml, blocks.json), unless there is a model already.
+void writeRun(const ModelFolder& folder, const BlockTraining& on, const std::vector<ConfigField>& config,
+              const TrainingLoopOptions& loop) {
+  if (folder.manifest()) return;
+  writeFileAtomically(folder.configPath(), howToRepeat(on.device, loop, " --grid blocks.json") + configToToml(config));
+  folder.writePlacement({{}, on.grid, on.capture.sourceFromWorld, on.capture.root, trainingNames(on.capture)},
+                        loop.method);
+}
+
+// False when it was asked to stop.
+bool trainCoarserLevels(const BlockTraining& on, const fs::path& model, uint32_t top, const TrainingResult& finest,
+                        TrainingLoopOptions loop, BlockMethod& method) {
   loop.minutes = 0;
   loop.resume = true;
   for (uint32_t level = 1; level <= top; ++level) {
-    loop.steps = levelSteps(share, level, finest.plannedSteps);
+    loop.steps = levelSteps(method.levelShare(), level, finest.plannedSteps);
     if (loop.steps < 1) break;
-    const ModelFolder folder(levelFolder(model, level));
-    if (folder.manifest() && training.madeFrom(folder.root()) != finest.step) removeLevel(folder.root());
+    const ModelFolder folder(levelFolder(model, level)), below(levelFolder(model, level - 1));
+    if (folder.manifest() && method.madeFrom(folder.root()) != finest.step) removeLevel(folder.root());
     if (const std::optional<ModelManifest> before = folder.manifest()) {
       if (before->step >= before->plannedSteps) continue;
       loop.steps = before->plannedSteps;
     }
-    if (!training.train(folder, level, loop)) return false;
+    const std::unique_ptr<Trainee> trainee = method.begin(on, {level, loop.steps, finest.step, folder, below});
+    writeRun(folder, on, method.settings(), loop);
+    inform("level {}: {} blocks in {}, {} steps", level, on.grid.cells(), method.parts(), loop.steps);
+    if (!runTraining(*trainee, folder, loop).finished) return false;
   }
   return true;
+}
+
+}  // namespace
+
+TrainingResult trainInBlocks(Device& device, const Capture& capture, const fs::path& model,
+                             const BlockRunOptions& options, BlockMethod& method) {
+  const BlockRun run = openBlockRun(capture, model, options, method.demands());
+  const BlockTraining on{device, capture, run.grid};
+  const uint32_t top = method.levelShare() > 0 ? method.topLevel(run.grid) : 0;
+  method.open(run, top);
+  if (!run.goesOn) fs::remove_all(model / "levels");  // of a run that is no more
+  bool memoryIsSaid = false;
+  const auto sayMemoryOnce = [&] {
+    if (!std::exchange(memoryIsSaid, true)) method.sayMemory(on);
+  };
+  TrainingLoopOptions loop = options.loop;
+  if (!method.findSettings(on, run, loop, sayMemoryOnce)) return {};
+  TrainingResult result;
+  {
+    const std::unique_ptr<Trainee> trainee = method.begin(on, {0, loop.steps, 0, run.folder, run.folder});
+    writeRun(run.folder, on, method.settings(), loop);
+    sayMemoryOnce();
+    const bool stepsAreKnown = loop.steps > 0 && !run.goesOn;  // else they are settled on the way
+    if (stepsAreKnown) method.stepsAreKnown(loop.steps);
+    result = runTraining(*trainee, run.folder, loop);
+    if (!stepsAreKnown && result.finished) method.stepsAreKnown(result.plannedSteps);
+  }
+  if (result.finished) result.finished = trainCoarserLevels(on, model, top, result, loop, method);
+  return result;
 }
 
 }  // namespace tessera

@@ -1,8 +1,9 @@
-// What training a capture in blocks has in common, whatever the blocks are (`volume`, `hash`): a run that is begun or
-// gone on with, what memory it takes, and the coarser levels of detail after it.
+// What training a capture in blocks has in common, whatever the blocks are: a run that is begun or gone on with, what
+// memory it takes, and the coarser levels of detail after it.
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "compute/device.h"
@@ -50,10 +51,6 @@ struct BlockTraining {
   const BlockGrid& grid;
 };
 
-// Writes what a level's run is made of (config.toml, blocks.json), unless there is a model already.
-void writeRun(const ModelFolder& folder, const BlockTraining& on, const std::vector<ConfigField>& config,
-              const TrainingLoopOptions& loop);
-
 // Says how much memory training takes, with all allocated by now but decoded photos and checkpoints, and what else
 // there is to say of it (`how`, as ", with 4 of 9 blocks at a time"); warns with a `remedy` where it is more than
 // planned for.
@@ -64,16 +61,51 @@ struct MemoryNeeds {
 };
 void sayWhatMemoryItTakes(const BlockTraining& on, const BlockRunOptions& options, const MemoryNeeds& needs);
 
-// Levels 1 to `top`, after the finest, for as many steps as levelSteps says of `share`, or as they had planned when
-// they were begun; those that were made before the finest came to where it is are made anew. False when one is not
-// finished.
-struct LevelTraining {
-  // The finest level's step when the level in that folder was made.
-  std::function<int64_t(const fs::path& folder)> madeFrom;
-  // One level into its folder, which holds a model when it was begun before. False when it was asked to stop.
-  std::function<bool(const ModelFolder& folder, uint32_t level, const TrainingLoopOptions& loop)> train;
+// A level of detail that is about to be trained, or to be gone on with where its folder holds a model.
+struct BlockLevel {
+  uint32_t level;      // 0 is the finest
+  int64_t steps;       // to train in all; of the finest 0, where only the loop will know
+  int64_t finestStep;  // of a coarser one: where the finest has come to
+  ModelFolder folder, below;
 };
-bool trainCoarserLevels(const fs::path& model, uint32_t top, double share, const TrainingResult& finest,
-                        TrainingLoopOptions loop, const LevelTraining& training);
+
+// What a representation that is trained in blocks supplies to its training.
+class BlockMethod {
+ public:
+  virtual ~BlockMethod() = default;
+
+  virtual BlockDemands demands() const = 0;
+  // Steps of the first coarser level, as a share of the finest's; 0: there are no coarser levels.
+  virtual double levelShare() const = 0;
+  // The coarsest level of so many blocks, one that holds all.
+  virtual uint32_t topLevel(const BlockGrid& grid) const = 0;
+  // The run is open, and takes a photo budget. Throws Error, before anything is trained, where a level up to `top`
+  // could not be made.
+  virtual void open(const BlockRun& run, uint32_t top) = 0;
+  // Finds out what the settings leave to be found out, in a run that does not go on or has not got that far; `begun` is
+  // to be called once most memory is allocated. False when it was asked to stop.
+  virtual bool findSettings(const BlockTraining&, const BlockRun&, TrainingLoopOptions&,
+                            const std::function<void()>& begun) = 0;
+
+  // Makes what trains a level. Until the next call, the settings that the level has, and what there is of it, as "4
+  // models".
+  virtual std::unique_ptr<Trainee> begin(const BlockTraining& on, const BlockLevel& level) = 0;
+  virtual std::vector<ConfigField> settings() = 0;
+  virtual std::string parts() const = 0;
+  // By sayWhatMemoryItTakes, of the finest level, and warns of what comes of it.
+  virtual void sayMemory(const BlockTraining& on) const = 0;
+  // How many steps the finest level, which has begun, is trained for: as soon as that is known.
+  virtual void stepsAreKnown(int64_t) const {}
+
+  // The finest level's step when the coarser level in that folder was made.
+  virtual int64_t madeFrom(const fs::path& folder) const = 0;
+};
+
+// Trains the finest level into `model`, then coarser ones up to one that holds all blocks into its `levels`, each in as
+// many steps as levelSteps says, or as it had planned when it was begun; those that were made before the finest came to
+// where it is are made anew. The result counts the finest level's steps, and is finished when all levels are. Throws
+// Error as openBlockRun and runTraining do.
+TrainingResult trainInBlocks(Device& device, const Capture& capture, const fs::path& model,
+                             const BlockRunOptions& options, BlockMethod& method);
 
 }  // namespace tessera

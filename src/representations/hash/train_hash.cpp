@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "bake/levels.h"
 #include "base/error.h"
@@ -57,20 +56,63 @@ BlockLimits limitsOf(const TrainHashOptions& options) {
   return limits;
 }
 
-void sayMemory(const BlockTraining& on, const TrainHashOptions& options) {
-  const HashConfig& config = options.config;
-  sayWhatMemoryItTakes(on, options,
-                       {config.photoBudgetMiB, trainingBytesPerBlock(config), "",
-                        "lower samples_per_step, texels_per_step or photo_budget_mib, or use --method volume with "
-                        "--resident-blocks"});
+class HashMethod final : public BlockMethod {
+ public:
+  HashMethod(const TrainHashOptions& options, const fs::path& model)
+      : options_(options), model_(model), finest_(options.config) {}
+
+  BlockDemands demands() const override {
+    return {[&] { return limitsOf(options_); },
+            {kEnoughPhotos, int64_t{finest_.lattice} * finest_.lattice},
+            finest_.photoBudgetMiB};
+  }
+  double levelShare() const override { return finest_.levelShare; }
+  uint32_t topLevel(const BlockGrid& grid) const override {
+    return tessera::topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
+  }
+  void open(const BlockRun& run, uint32_t top) override {
+    finest_.photoBudgetMiB = run.photoBudgetMiB;
+    for (uint32_t level = 0; level <= top; ++level) requireStepsOfScenes(levelConfig(finest_, level, 0));
+  }
+  bool findSettings(const BlockTraining& on, const BlockRun& run, TrainingLoopOptions& loop,
+                    const std::function<void()>& begun) override;
+  std::unique_ptr<Trainee> begin(const BlockTraining& on, const BlockLevel& level) override;
+  std::vector<ConfigField> settings() override { return config_.fields(); }
+  std::string parts() const override { return fmt::format("{} tiles", tiles_); }
+  void sayMemory(const BlockTraining& on) const override;
+  int64_t madeFrom(const fs::path& folder) const override { return savedConfig<HashConfig>(folder).finestStep; }
+
+ private:
+  const TrainHashOptions& options_;
+  const fs::path& model_;
+  HashConfig finest_, config_;  // of the finest level, and of the one that was begun last
+  size_t tiles_ = 0;
+};
+
+// The weight of the distortion loss.
+bool HashMethod::findSettings(const BlockTraining& on, const BlockRun& run, TrainingLoopOptions& loop,
+                              const std::function<void()>& begun) {
+  if (finest_.distortion) {
+    if (!run.goesOn) fs::remove(distortionFile(model_));  // of another run
+    return true;
+  }
+  if (!loop.resume) fs::remove(distortionFile(model_));
+  return findDistortion(on, model_, finest_, loop, begun);
 }
 
-TrainingResult trainLevel(const ModelFolder& folder, const BlockTraining& on, HashConfig config,
-                          const TrainingLoopOptions& loop, const std::function<void()>& begun) {
-  HashTrainer trainer(on.device, on.capture, config, on.grid);
-  writeRun(folder, on, config.fields(), loop);
-  begun();
-  return runTraining(trainer, folder, loop);
+std::unique_ptr<Trainee> HashMethod::begin(const BlockTraining& on, const BlockLevel& level) {
+  config_ = level.level > 0 ? levelConfig(finest_, level.level, level.finestStep) : finest_;
+  tiles_ =
+      groupsOfLevel(static_cast<uint32_t>(on.grid.columns), static_cast<uint32_t>(on.grid.rows), level.level, false)
+          .cells.size();
+  return std::make_unique<HashTrainer>(on.device, on.capture, config_, on.grid);
+}
+
+void HashMethod::sayMemory(const BlockTraining& on) const {
+  sayWhatMemoryItTakes(on, options_,
+                       {finest_.photoBudgetMiB, trainingBytesPerBlock(finest_), "",
+                        "lower samples_per_step, texels_per_step or photo_budget_mib, or use --method volume with "
+                        "--resident-blocks"});
 }
 
 }  // namespace
@@ -80,39 +122,8 @@ TrainingResult trainHash(Device& device, const Capture& capture, const fs::path&
   if (options.loop.resume && ModelFolder(model).manifest()) config.keepFound(savedConfig<HashConfig>(model));
   config.check();
   options.loop.method = "hash";
-  const BlockRun run = openBlockRun(capture, model, options,
-                                    {[&] { return limitsOf(options); },
-                                     {kEnoughPhotos, int64_t{config.lattice} * config.lattice},
-                                     config.photoBudgetMiB});
-  config.photoBudgetMiB = run.photoBudgetMiB;
-  const uint32_t top = config.levelShare > 0
-                           ? topLevel(static_cast<uint32_t>(run.grid.columns), static_cast<uint32_t>(run.grid.rows))
-                           : 0;
-  for (uint32_t level = 0; level <= top; ++level) requireStepsOfScenes(levelConfig(config, level, 0));
-  const BlockTraining on{device, capture, run.grid};
-  if (!run.goesOn) fs::remove_all(model / "levels");  // of a run that is no more
-  bool memoryIsSaid = false;
-  const auto sayMemoryOnce = [&] {
-    if (!std::exchange(memoryIsSaid, true)) sayMemory(on, options);
-  };
-  if (!config.distortion) {
-    if (!options.loop.resume) fs::remove(distortionFile(model));
-    if (!findDistortion(on, model, config, options.loop, sayMemoryOnce)) return {};
-  } else if (!run.goesOn) {
-    fs::remove(distortionFile(model));  // of another run
-  }
-  TrainingResult result = trainLevel(run.folder, on, config, options.loop, sayMemoryOnce);
-  if (!result.finished) return result;
-  LevelTraining levels;
-  levels.madeFrom = [](const fs::path& folder) { return savedConfig<HashConfig>(folder).finestStep; };
-  levels.train = [&](const ModelFolder& folder, uint32_t level, const TrainingLoopOptions& loop) {
-    const LevelGroups groups =
-        groupsOfLevel(static_cast<uint32_t>(run.grid.columns), static_cast<uint32_t>(run.grid.rows), level, false);
-    inform("level {}: {} blocks in {} tiles, {} steps", level, run.grid.cells(), groups.cells.size(), loop.steps);
-    return trainLevel(folder, on, levelConfig(config, level, result.step), loop, [] {}).finished;
-  };
-  result.finished = trainCoarserLevels(model, top, config.levelShare, result, options.loop, levels);
-  return result;
+  HashMethod method(options, model);
+  return trainInBlocks(device, capture, model, options, method);
 }
 
 }  // namespace tessera

@@ -56,38 +56,83 @@ VolumeConfig levelConfig(VolumeConfig finest, uint32_t level, int64_t finestStep
 
 namespace {
 
-void sayWhatThereIsMemoryFor(VolumeTrainer& trainer, const BlockTraining& on, const TrainVolumeOptions& options) {
-  const VolumeConfig& config = options.config;
-  const Residency* residency = trainer.residency();
+class VolumeMethod final : public BlockMethod {
+ public:
+  explicit VolumeMethod(const TrainVolumeOptions& options) : options_(options), finest_(options.config) {}
+
+  BlockDemands demands() const override {
+    return {[&] { return limitsOf(options_); },
+            {kEnoughPhotos, int64_t{finest_.planes} * finest_.planes / 16},
+            finest_.photoBudgetMiB};
+  }
+  double levelShare() const override { return finest_.levelShare; }
+  uint32_t topLevel(const BlockGrid& grid) const override {
+    return tessera::topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
+  }
+  void open(const BlockRun& run, uint32_t) override { finest_.photoBudgetMiB = run.photoBudgetMiB; }
+  bool findSettings(const BlockTraining&, const BlockRun&, TrainingLoopOptions&,
+                    const std::function<void()>&) override {
+    return true;
+  }
+  std::unique_ptr<Trainee> begin(const BlockTraining& on, const BlockLevel& level) override;
+  std::vector<ConfigField> settings() override { return config_.fields(); }
+  std::string parts() const override { return fmt::format("{} models", models_); }
+  void sayMemory(const BlockTraining& on) const override;
+  void stepsAreKnown(int64_t steps) const override;
+  int64_t madeFrom(const fs::path& folder) const override { return savedConfig<VolumeConfig>(folder).finestStep; }
+
+ private:
+  const TrainVolumeOptions& options_;
+  VolumeConfig finest_, config_;            // of the finest level, and of the one that was begun last
+  const VolumeTrainer* trainer_ = nullptr;  // of that
+  size_t models_ = 0;
+};
+
+std::unique_ptr<Trainee> VolumeMethod::begin(const BlockTraining& on, const BlockLevel& level) {
+  config_ = finest_;
+  if (level.level > 0) {
+    config_ = levelConfig(finest_, level.level, level.finestStep);
+    config_.residencySteps = std::min(config_.residencySteps, level.steps);  // all blocks get their turn
+  }
+  auto trainer =
+      std::make_unique<VolumeTrainer>(on.device, on.capture, config_, on.grid, level.folder.root() / kWaiting);
+  if (level.level > 0 && !level.folder.manifest()) trainer->beginFrom(level.below.root());
+  trainer_ = trainer.get();
+  models_ = trainer->model().groups().cells.size();
+  return trainer;
+}
+
+void VolumeMethod::sayMemory(const BlockTraining& on) const {
+  const Residency* residency = trainer_->residency();
   MemoryNeeds needs;
-  needs.photoBudgetMiB = config.photoBudgetMiB;
-  needs.bytesPerBlock = trainingBytesPerBlock(config);
+  needs.photoBudgetMiB = config_.photoBudgetMiB;
+  needs.bytesPerBlock = trainingBytesPerBlock(config_);
   needs.remedy = "use --resident-blocks, or lower texels_per_step or photo_budget_mib";
   if (residency) {
-    needs.how = fmt::format(", with {} of {} blocks at a time, {} stays in {} steps", config.residentBlocks,
-                            trainer.model().space().cells(), residency->stays().size(), residency->cycleSteps());
+    needs.how = fmt::format(", with {} of {} blocks at a time, {} stays in {} steps", config_.residentBlocks,
+                            on.grid.cells(), residency->stays().size(), residency->cycleSteps());
   }
-  sayWhatMemoryItTakes(on, options, needs);
+  sayWhatMemoryItTakes(on, options_, needs);
   if (!residency) return;
   const std::vector<uint32_t> never = residency->neverServed();
   if (!never.empty()) {
-    const uint32_t columns = trainer.model().space().columns;
+    const uint32_t columns = static_cast<uint32_t>(on.grid.columns);
     std::vector<std::string> names;
     for (const uint32_t block : never) names.push_back(fmt::format("({}, {})", block % columns, block / columns));
     warn(
         "blocks {} are seen through more than {} blocks at a time wherever they are seen, and will hold nothing; raise "
         "--resident-blocks",
-        fmt::join(names, ", "), config.residentBlocks);
+        fmt::join(names, ", "), config_.residentBlocks);
   }
   if (residency->unserved() < kWorthSaying) return;
   warn(
       "{:.0f} % of what the photos show is seen through more than {} blocks, or rare sets of them, and not trained on; "
       "raise --resident-blocks",
-      100 * residency->unserved(), config.residentBlocks);
+      100 * residency->unserved(), config_.residentBlocks);
 }
 
-void warnWhereBlocksMissTheirTurn(const VolumeTrainer& trainer, int64_t steps) {
-  const int64_t cycle = trainer.residency() ? trainer.residency()->cycleSteps() : 0;
+void VolumeMethod::stepsAreKnown(int64_t steps) const {
+  const int64_t cycle = trainer_->residency() ? trainer_->residency()->cycleSteps() : 0;
   if (steps >= cycle) return;
   warn(
       "all blocks get their turn in {} steps, and there are {}: some are trained too little, or not at all; train for "
@@ -95,51 +140,13 @@ void warnWhereBlocksMissTheirTurn(const VolumeTrainer& trainer, int64_t steps) {
       cycle, steps);
 }
 
-// True when it is trained to its end.
-bool trainLevel(const fs::path& model, const BlockTraining& on, const ModelFolder& folder, VolumeConfig config,
-                const TrainingLoopOptions& loop) {
-  const uint32_t level = static_cast<uint32_t>(config.level);
-  config.residencySteps = std::min(config.residencySteps, loop.steps);  // all blocks get their turn
-  VolumeTrainer trainer(on.device, on.capture, config, on.grid, folder.root() / kWaiting);
-  if (!folder.manifest()) trainer.beginFrom(levelFolder(model, level - 1));
-  writeRun(folder, on, config.fields(), loop);
-  inform("level {}: {} blocks in {} models, {} steps", level, on.grid.cells(), trainer.model().groups().cells.size(),
-         loop.steps);
-  return runTraining(trainer, folder, loop).finished;
-}
-
 }  // namespace
 
 TrainingResult trainVolume(Device& device, const Capture& capture, const fs::path& model, TrainVolumeOptions options) {
-  VolumeConfig& config = options.config;
-  config.check();
+  options.config.check();
   options.loop.method = "volume";
-  const BlockRun run = openBlockRun(capture, model, options,
-                                    {[&] { return limitsOf(options); },
-                                     {kEnoughPhotos, int64_t{config.planes} * config.planes / 16},
-                                     config.photoBudgetMiB});
-  config.photoBudgetMiB = run.photoBudgetMiB;
-  const BlockTraining on{device, capture, run.grid};
-  TrainingResult result;
-  {
-    VolumeTrainer trainer(device, capture, config, run.grid, run.folder.root() / kWaiting);
-    if (!run.goesOn) fs::remove_all(model / "levels");  // of a run that is no more
-    writeRun(run.folder, on, config.fields(), options.loop);
-    sayWhatThereIsMemoryFor(trainer, on, options);
-    const bool stepsAreKnown = options.loop.steps > 0 && !run.goesOn;  // else they are settled on the way
-    if (stepsAreKnown) warnWhereBlocksMissTheirTurn(trainer, options.loop.steps);
-    result = runTraining(trainer, run.folder, options.loop);
-    if (!stepsAreKnown && result.finished) warnWhereBlocksMissTheirTurn(trainer, result.plannedSteps);
-  }
-  if (!result.finished) return result;
-  LevelTraining levels;
-  levels.madeFrom = [](const fs::path& folder) { return savedConfig<VolumeConfig>(folder).finestStep; };
-  levels.train = [&](const ModelFolder& folder, uint32_t level, const TrainingLoopOptions& loop) {
-    return trainLevel(model, on, folder, levelConfig(config, level, result.step), loop);
-  };
-  const uint32_t top = topLevel(static_cast<uint32_t>(run.grid.columns), static_cast<uint32_t>(run.grid.rows));
-  result.finished = trainCoarserLevels(model, top, config.levelShare, result, options.loop, levels);
-  return result;
+  VolumeMethod method(options);
+  return trainInBlocks(device, capture, model, options, method);
 }
 
 std::unique_ptr<VolumeModel> loadVolumeModel(Device& device, const fs::path& folder, uint32_t residentBlocks) {
