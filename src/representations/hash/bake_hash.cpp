@@ -12,8 +12,7 @@
 #include "representations/hash/hash_pass.h"
 #include "tiles/hash_payload.h"
 #include "tiles/occupancy_distance.h"
-#include "train/photo_sight.h"
-#include "train/picture_rays.h"
+#include "train/photo_visitor.h"
 
 namespace tessera {
 namespace {
@@ -26,48 +25,22 @@ constexpr uint32_t kTexels = 1 << 16;       // evaluated together
 // 8.5 a ray with 256, 7.3 with 384, 6.7 with 512, which take 1.8 times the memory of 384.
 constexpr uint32_t kMostCells = 384;
 
-// Looks at a model through photos, and marks where it sees something.
-class SeenFinder {
+// Marks where a model is seen through pixels: all of it, or the surround alone.
+class SeenFinder final : public PixelVisitor {
  public:
-  SeenFinder(HashModel& model, const Capture& capture, const BakeHashOptions& options, std::vector<OccupancyBits>& seen)
+  SeenFinder(HashModel& model, const BakeHashOptions& options, std::vector<OccupancyBits>& seen)
       : model_(model),
         options_(options),
         seen_(seen),
-        photoPixels_(capture, model.frame()),
         pass_(model, {kRays, kSamples, 8 * kSamples, false}),
         pictureRays_(model.device(), kRays) {}
 
-  void look(const Photo& photo, const Camera& camera) {
-    photoPixels_.begin(photo, camera);
+  void begin(const Photo& photo, const Camera& camera) override {
     pictureRays_.begin(makeRayCamera(camera, photo.worldFromCamera, model_.frame()), model_.frame(), {});
-    const uint32_t surround = model_.space().cells();
-    lookThrough({0, 0, camera.width, camera.height, options_.stride}, 0);
-    if (model_.space().blocks() == surround) return;
-    const int x = static_cast<int>(kBesidePhotos * camera.width), y = static_cast<int>(kBesidePhotos * camera.height);
-    lookThrough({-x, -y, camera.width + x, camera.height + y, kBesideStride * options_.stride}, surround);
   }
-
- private:
-  struct Lattice {
-    int left, top, right, bottom, stride;
-  };
-
-  // Marks what is seen of a block and those after it.
-  void lookThrough(const Lattice& lattice, uint32_t firstBlock) {
-    std::vector<float> pixels;
-    for (int y = lattice.top; y < lattice.bottom; y += lattice.stride) {
-      for (int x = lattice.left; x < lattice.right; x += lattice.stride) {
-        if ((firstBlock > 0 && photoPixels_.within(x, y)) || !photoPixels_.count(x, y)) continue;
-        pixels.push_back(static_cast<float>(x) + 0.5f);
-        pixels.push_back(static_cast<float>(y) + 0.5f);
-        if (pixels.size() == size_t{2} * kRays) mark(pixels, firstBlock);
-      }
-    }
-    if (!pixels.empty()) mark(pixels, firstBlock);
-  }
-
-  // Empties `pixels`. Rays that did not fit into one pass go through the next.
-  void mark(std::vector<float>& pixels, uint32_t firstBlock) {
+  // Rays that did not fit into one pass go through the next.
+  void visit(std::span<const float> pixels, SeenThrough through) override {
+    const uint32_t firstBlock = through == SeenThrough::margin ? model_.space().cells() : 0;
     Device& device = model_.device();
     while (!pixels.empty()) {
       const PictureRays::Piece piece = pictureRays_.through(pixels);
@@ -89,10 +62,11 @@ class SeenFinder {
             markCell(seen_[blocks[s]], &positions[3 * s]);
         }
       }
-      pixels.erase(pixels.begin(), pixels.begin() + static_cast<ptrdiff_t>(size_t{2} * finished));
+      pixels = pixels.subspan(size_t{2} * finished);
     }
   }
 
+ private:
   static void markCell(OccupancyBits& bits, const float position[3]) {
     uint32_t cell[3];
     for (int a = 0; a < 3; ++a) {
@@ -105,7 +79,6 @@ class SeenFinder {
   HashModel& model_;
   const BakeHashOptions& options_;
   std::vector<OccupancyBits>& seen_;
-  PhotoPixels photoPixels_;
   HashPass pass_;
   PictureRays pictureRays_;
 };
@@ -312,13 +285,9 @@ std::vector<OccupancyBits> findSeenCells(HashModel& model, const Capture& captur
                              ? options.cells
                              : std::min(std::max(lattice, std::min(3 * lattice, kMostCells)), kMostOccupancyCells);
   std::vector<OccupancyBits> seen(model.space().blocks(), OccupancyBits(cells));
-  SeenFinder finder(model, capture, options, seen);
-  const std::vector<int> photos = capture.photosIn(Split::train);
-  int64_t done = 0;
-  for (const int photo : photos) {
-    finder.look(capture.photos[photo], capture.cameras[capture.photos[photo].camera]);
-    options.onPhoto(++done, static_cast<int64_t>(photos.size()));
-  }
+  SeenFinder finder(model, options, seen);
+  const bool surround = model.space().blocks() > model.space().cells();
+  PhotoVisitor(capture, model.frame(), kRays, finder).visitAll(options.stride, {surround, true}, options.onPhoto);
   for (OccupancyBits& bits : seen) {
     for (int i = 0; i < options.dilation; ++i) bits = dilated(bits);
   }

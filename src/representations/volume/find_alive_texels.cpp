@@ -4,15 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "base/error.h"
 #include "base/log.h"
 #include "representations/volume/bake_stays.h"
 #include "representations/volume/bake_volume.h"
 #include "representations/volume/volume_pass.h"
-#include "train/photo_sight.h"
-#include "train/picture_rays.h"
+#include "train/photo_visitor.h"
 
 namespace tessera {
 namespace {
@@ -31,50 +29,22 @@ VolumePass::Room roomForRays(const VolumeModel& model) {
   return room;
 }
 
-// Which blocks are marked through which of the pixels.
-struct Looking {
-  uint32_t firstBlock = 0;  // and those after it
-  bool onlyBeside = false;  // not through pixels within the photo
-};
-
-class AliveFinder {
+// Marks what is seen through pixels: of all blocks, or of the surround alone.
+class AliveFinder final : public PixelVisitor {
  public:
-  AliveFinder(VolumeModel& model, const Capture& capture, const BakeOptions& options, std::vector<AliveTexels>& alive)
+  AliveFinder(VolumeModel& model, const BakeOptions& options, std::vector<AliveTexels>& alive)
       : model_(model),
         options_(options),
-        pixels_(capture, model.frame()),
         alive_(alive),
         pass_(model, roomForRays(model)),
         pictureRays_(model.device(), kRays) {
     drawing_.minAlpha = static_cast<float>(options.minAlpha);
   }
-  void beginPhoto(const Photo& photo, const Camera& camera) {
-    pixels_.begin(photo, camera);
+  void begin(const Photo& photo, const Camera& camera) override {
     pictureRays_.begin(makeRayCamera(camera, photo.worldFromCamera, model_.frame()), model_.frame(), {});
   }
-  // Marks what is seen through those pixels of the photo that its mask does not leave out.
-  void look(const std::vector<PixelLattice>& lattices, const Looking& looking) {
-    std::vector<float> pixels;
-    for (const PixelLattice& lattice : lattices) {
-      for (int y = lattice.firstY; y < lattice.endY; y += lattice.stride) {
-        for (int x = lattice.firstX; x < lattice.endX; x += lattice.stride) {
-          if (!isWanted(x, y, looking)) continue;
-          pixels.push_back(static_cast<float>(x) + 0.5f);
-          pixels.push_back(static_cast<float>(y) + 0.5f);
-          if (pixels.size() < size_t{2} * kRays) continue;
-          mark(pixels, looking.firstBlock);
-          pixels.clear();
-        }
-      }
-    }
-    if (!pixels.empty()) mark(pixels, looking.firstBlock);
-  }
-
- private:
-  bool isWanted(int x, int y, const Looking& looking) const {
-    return !(looking.onlyBeside && pixels_.within(x, y)) && pixels_.count(x, y);
-  }
-  void mark(const std::vector<float>& pixels, uint32_t firstBlock) {
+  void visit(std::span<const float> pixels, SeenThrough through) override {
+    const uint32_t firstBlock = through == SeenThrough::margin ? model_.space().cells() : 0;
     Device& device = model_.device();
     const PictureRays::Piece piece = pictureRays_.through(pixels);
     pass_.forward({piece.rays, piece.origins, piece.directions, {}, {}, {}}, drawing_);
@@ -92,23 +62,14 @@ class AliveFinder {
     }
   }
 
+ private:
   VolumeModel& model_;
   const BakeOptions& options_;
-  PhotoPixels pixels_;
   std::vector<AliveTexels>& alive_;
   VolumePass pass_;
   PictureRays pictureRays_;
   VolumePass::Options drawing_;
 };
-
-PixelLattice latticeWithin(const Camera& camera, int stride) {
-  return {0, 0, camera.width, camera.height, stride};
-}
-
-PixelLattice latticeBeside(const Camera& camera, int stride) {
-  const int x = static_cast<int>(kBesidePhotos * camera.width), y = static_cast<int>(kBesidePhotos * camera.height);
-  return {-x, -y, camera.width + x, camera.height + y, kBesideStride * stride};
-}
 
 // Those pixels of a lattice that lie in a tile, whose pixels count from the lattice's first.
 PixelLattice partOf(const PixelLattice& whole, const PhotoTile& tile) {
@@ -118,20 +79,6 @@ PixelLattice partOf(const PixelLattice& whole, const PhotoTile& tile) {
   };
   return {whole.firstX + next(tile.left), whole.firstY + next(tile.top), whole.firstX + static_cast<int>(tile.right),
           whole.firstY + static_cast<int>(tile.bottom), whole.stride};
-}
-
-void lookThroughWholePhotos(VolumeModel& model, const Capture& capture, const BakeOptions& options,
-                            AliveFinder& finder) {
-  const bool surround = model.space().blocks() > model.space().cells();
-  const std::vector<int> photos = capture.photosIn(Split::train);
-  int64_t done = 0;
-  for (const int photo : photos) {
-    const Camera& camera = capture.cameras[capture.photos[photo].camera];
-    finder.beginPhoto(capture.photos[photo], camera);
-    finder.look({latticeWithin(camera, options.stride)}, {});
-    if (surround) finder.look({latticeBeside(camera, options.stride)}, {model.space().cells(), false});
-    options.onPhoto(++done, static_cast<int64_t>(photos.size()));
-  }
 }
 
 // Of the pixels of latticeBeside(), from its first on; none that lie within the photo.
@@ -186,19 +133,18 @@ class StayByStay {
     for (const uint32_t set : tiled_.setOfTile) looks_ += static_cast<int64_t>(stays_.staysOfSet(set).size());
   }
   double inParts() const { return stays_.inParts(); }
-  void look(AliveFinder& finder) {
+  void look(PhotoVisitor& photos) {
     for (uint32_t stay = 0; stay < stays_.stays().size(); ++stay) {
       model_.bring(stays_.stays()[stay]);
-      lookDuring(stay, finder);
+      lookDuring(stay, photos);
     }
   }
 
  private:
-  void lookDuring(uint32_t stay, AliveFinder& finder) {
+  void lookDuring(uint32_t stay, PhotoVisitor& photos) {
     size_t tile = 0;
     for (size_t k = 0; k < photos_.size(); ++k) {
-      const Photo& photo = capture_.photos[photos_[k]];
-      const Camera& camera = capture_.cameras[photo.camera];
+      const Camera& camera = capture_.cameras[capture_.photos[photos_[k]].camera];
       std::vector<PixelLattice> within, beside;
       for (; tile < tiled_.tiles.size() && tiled_.tiles[tile].photo == photos_[k]; ++tile) {
         const std::vector<uint32_t>& in = stays_.staysOfSet(tiled_.setOfTile[tile]);
@@ -212,9 +158,9 @@ class StayByStay {
         }
       }
       if (within.empty() && beside.empty()) continue;
-      finder.beginPhoto(photo, camera);
-      finder.look(within, {});
-      finder.look(beside, {model_.space().cells(), true});
+      photos.begin(photos_[k]);
+      photos.look(within, SeenThrough::photo, false);
+      photos.look(beside, SeenThrough::margin, true);
       looked_ += static_cast<int64_t>(within.size());
       const int64_t all = static_cast<int64_t>(photos_.size());
       options_.onPhoto(all * looked_ / looks_, all);
@@ -236,9 +182,11 @@ class StayByStay {
 
 std::vector<AliveTexels> findAliveTexels(VolumeModel& model, const Capture& capture, const BakeOptions& options) {
   std::vector<AliveTexels> alive(model.space().blocks(), AliveTexels(model.virtualGrid()));
-  AliveFinder finder(model, capture, options, alive);
+  AliveFinder finder(model, options, alive);
+  PhotoVisitor photos(capture, model.frame(), kRays, finder);
   if (model.holdsAll()) {
-    lookThroughWholePhotos(model, capture, options, finder);
+    const bool surround = model.space().blocks() > model.space().cells();
+    photos.visitAll(options.stride, {surround, false}, options.onPhoto);
     return alive;
   }
   StayByStay stays(model, capture, options);
@@ -248,7 +196,7 @@ std::vector<AliveTexels> findAliveTexels(VolumeModel& model, const Capture& capt
         "parts: the scene keeps some of what is hidden there; raise --resident-blocks",
         100 * stays.inParts());
   }
-  stays.look(finder);
+  stays.look(photos);
   return alive;
 }
 
