@@ -46,8 +46,8 @@ void MarchRounds::keepSeen(Slice<uint32_t> firstSample, Slice<uint32_t> rayOfSam
   compact.logDensity = Matrix<float>(logDensities_, 1);
   compact.steps = steps_;
   compact.keptFirstSample = firstSample;
-  compact.keptCount = counters_.part(0, 1);
-  compact.finishedRays = counters_.part(1, 1);
+  compact.keptCount = counters_.part(kKept, 1);
+  compact.finishedRays = counters_.part(kFinished, 1);
   compact.source = source_;
   compact.rayOfSample = rayOfSample;
   device_.run(compact);
@@ -55,7 +55,7 @@ void MarchRounds::keepSeen(Slice<uint32_t> firstSample, Slice<uint32_t> rayOfSam
 
 void MarchRounds::gather(Slice<const float> made, Slice<float> kept, uint32_t columns) {
   device_.run(GatherRows{
-      {samples_, counters_.part(0, 1)}, source_, Matrix<const float>(made, columns), Matrix<float>(kept, columns)});
+      {samples_, counters_.part(kKept, 1)}, source_, Matrix<const float>(made, columns), Matrix<float>(kept, columns)});
 }
 
 }  // namespace tessera

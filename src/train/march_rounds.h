@@ -13,6 +13,9 @@
 //   rounds.gather(array, kept, columns);
 #pragma once
 
+#include <algorithm>
+#include <numeric>
+#include <span>
 #include <vector>
 
 #include "compute/device.h"
@@ -21,6 +24,9 @@ namespace tessera {
 
 class MarchRounds {
  public:
+  // What counters hold: samples kept, rays finished, and from kMarched on the samples made in each round.
+  static constexpr uint32_t kKept = 0, kFinished = 1, kMarched = 2;
+
   // `most`: samples of a ray that a round makes. Few at first, for most rays end early.
   MarchRounds(Device& device, std::vector<uint32_t> most) : device_(device), most_(std::move(most)) {}
 
@@ -30,7 +36,7 @@ class MarchRounds {
   void reserve(uint32_t rays, uint32_t samples);
   uint32_t sampleCapacity() const { return static_cast<uint32_t>(source_.size()); }
 
-  // `counters`: samples kept, rays finished, and of each round the samples made: [2 + count()].
+  // `counters`: [kMarched + count()].
   void begin(uint32_t rays, uint32_t capacity, float minTransmittance, Slice<uint32_t> counters);
 
   // A MarchRays or MarchBlocks for this round.
@@ -43,11 +49,11 @@ class MarchRounds {
     march.opticalDepth = opticalDepth_;
     march.nextStep = nextStep_;
     march.firstSample = firstOf(round);
-    march.sampleCount = counters_.part(2 + round, 1);
+    march.sampleCount = counters_.part(kMarched + round, 1);
     march.steps = part(steps_, 1, round);
   }
 
-  Count made(uint32_t round) const { return {samples_, counters_.part(2 + round, 1)}; }
+  Count made(uint32_t round) const { return {samples_, counters_.part(kMarched + round, 1)}; }
   Matrix<float> logDensities(uint32_t round) { return {part(logDensities_, 1, round), 1}; }
   void lookedUp(uint32_t round);  // takes the densities into account
 
@@ -77,6 +83,20 @@ class MarchRounds {
   Array<uint32_t> nextStep_, source_;
   Array<uint32_t> roundFirst_;  // [count()][rays + 1]
   Array<float> opticalDepth_, steps_, logDensities_;
+};
+
+// What counters of so many rounds say, once they are read.
+struct RoundCounts {
+  uint32_t kept, finished;
+  uint32_t marched;  // samples made in all rounds
+  uint32_t fullest;  // samples of whichever had most, a round or what is kept: each has the same room
+
+  RoundCounts(std::span<const uint32_t> counters, uint32_t rounds)
+      : kept(counters[MarchRounds::kKept]), finished(counters[MarchRounds::kFinished]) {
+    const std::span<const uint32_t> made = counters.subspan(MarchRounds::kMarched, rounds);
+    marched = std::accumulate(made.begin(), made.end(), 0u);
+    fullest = std::max(kept, *std::max_element(made.begin(), made.end()));
+  }
 };
 
 }  // namespace tessera

@@ -13,16 +13,16 @@ namespace tessera {
 struct RaySamples {
   Array<uint32_t> firstSample, rayOfSample;
   Array<float> positions, distances, steps;
-  Slice<uint32_t> counters;  // [kCounters]; whoever samples says where
+  Slice<uint32_t> counters;  // [kCounters], of train/march_rounds.h; whoever samples says where
 
   static constexpr uint32_t kRounds = 8;
-  static constexpr uint32_t kCounters = 2 + kRounds;  // samples, finished rays, densities looked up in each round
+  static constexpr uint32_t kCounters = MarchRounds::kMarched + kRounds;
 
   RaySamples() = default;
   RaySamples(Device& device, uint32_t rays, uint32_t samples);
 
-  Count samples() const { return {static_cast<uint32_t>(distances.size()), counters.part(0, 1)}; }
-  Count finished(uint32_t rays) const { return {rays, counters.part(1, 1)}; }
+  Count samples() const { return {static_cast<uint32_t>(distances.size()), counters.part(MarchRounds::kKept, 1)}; }
+  Count finished(uint32_t rays) const { return {rays, counters.part(MarchRounds::kFinished, 1)}; }
 };
 
 class FieldModel {

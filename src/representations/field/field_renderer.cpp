@@ -53,8 +53,8 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
     composite.depth = depth_;
     composite.weights = weights_;
     device.run(composite);
-    const std::vector<uint32_t> counters = device.read(counters_.all());
-    const uint32_t finished = counters[1];
+    const RoundCounts counts(device.read(counters_.all()), RaySamples::kRounds);
+    const uint32_t finished = counts.finished;
     CHECK(finished >= 1u);  // one ray's steps always fit
     const std::vector<float> colour = device.read(colour_.part(0, size_t{finished} * 3));
     const std::vector<float> opacity = device.read(opacity_.part(0, finished));
@@ -64,11 +64,9 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
     for (uint32_t ray = 0; ray < finished; ++ray)
       view.depth.pixels[first + ray] = pictureRays_.depthOf(ray, depth[ray]);
     first += finished;
-    samples_ += counters[0];
+    samples_ += counts.kept;
     // Each round of marching has room for so many samples, and so has what is seen.
-    const uint32_t fullest =
-        std::max(counters[0], *std::max_element(counters.begin() + 2, counters.begin() + RaySamples::kCounters));
-    const double fitting = 0.9 * kSamples / std::max(1.0, fullest / (1.0 * finished));
+    const double fitting = 0.9 * kSamples / std::max(1.0, counts.fullest / (1.0 * finished));
     wanted = static_cast<uint32_t>(std::clamp(fitting, 64.0, static_cast<double>(kRays)));
   }
   return view;

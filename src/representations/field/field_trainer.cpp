@@ -84,14 +84,15 @@ StepReport FieldTrainer::step(int64_t step, int64_t plannedSteps) {
   StepReport report;
   double squares = 0, weight = 0;
   for (uint32_t pass = 0; pass < passes_; ++pass) {
-    const uint32_t* counter = &counters[size_t{pass} * RaySamples::kCounters];
-    report.samples += counter[0];
-    report.rays += counter[1];
-    for (uint32_t round = 0; round < RaySamples::kRounds; ++round) report.marched += counter[2 + round];
+    const std::span<const uint32_t> ofPass(&counters[size_t{pass} * RaySamples::kCounters], RaySamples::kCounters);
+    const RoundCounts counts(ofPass, RaySamples::kRounds);
+    report.samples += counts.kept;
+    report.rays += counts.finished;
+    report.marched += counts.marched;
     const float* loss = &losses[size_t{pass} * kLosses];
     report.loss += loss[0] + loss[2] + loss[3];
     squares += loss[1];
-    for (uint32_t ray = 0; ray < counter[1]; ++ray) weight += photoRays_.batch().weights[raysBefore(pass) + ray];
+    for (uint32_t ray = 0; ray < counts.finished; ++ray) weight += photoRays_.batch().weights[raysBefore(pass) + ray];
   }
   report.squaredError = squares / std::max(1.0, 3 * weight);
 

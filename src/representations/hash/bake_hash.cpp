@@ -45,8 +45,8 @@ class SeenFinder final : public PixelVisitor {
     while (!pixels.empty()) {
       const PictureRays::Piece piece = pictureRays_.through(pixels);
       pass_.forward({piece.rays, piece.origins, piece.directions, {}, {}, {}}, kMinTransmittance);
-      const std::vector<uint32_t> counters = device.read(pass_.counters());
-      const uint32_t samples = counters[0], finished = counters[1];
+      const RoundCounts counts(device.read(pass_.counters()), HashSamples::kRounds);
+      const uint32_t samples = counts.kept, finished = counts.finished;
       CHECK(finished >= 1u);  // one ray's steps always fit
       const HashSamples& at = pass_.samples();
       const std::vector<uint32_t> first = device.read(at.firstSample.part(0, finished + size_t{1}));

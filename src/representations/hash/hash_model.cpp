@@ -107,7 +107,7 @@ void HashModel::sample(const Rays& rays, float minTransmittance, HashSamples& se
   march.nearOfRay = rays.near;
   march.farOfRay = rays.far;
   march.occupancy = occupied_;
-  rounds_.begin(rays.count, capacity, minTransmittance, seen.counters.part(0, 2 + HashSamples::kRounds));
+  rounds_.begin(rays.count, capacity, minTransmittance, seen.counters.part(0, HashSamples::kFirstTexels));
   for (uint32_t round = 0; round < HashSamples::kRounds; ++round) {
     rounds_.prepare(march, round);
     march.rayOfSample = rounds_.part(rays_, 1, round);

@@ -18,16 +18,16 @@ struct HashSamples {
   Slice<uint32_t> counters;                                   // [kCounters]; whoever samples says where
 
   static constexpr uint32_t kRounds = 6;
-  // Samples, finished rays, of each round the densities looked up and the corners that they wanted, and those that the
-  // samples wanted that were seen.
-  static constexpr uint32_t kFirstTexels = 2 + kRounds;
+  // Those of train/march_rounds.h, then the corners that each round's samples wanted, and those that the samples wanted
+  // that were seen.
+  static constexpr uint32_t kFirstTexels = MarchRounds::kMarched + kRounds;
   static constexpr uint32_t kCounters = kFirstTexels + kRounds + 1;
 
   HashSamples() = default;
   HashSamples(Device& device, uint32_t rays, uint32_t samples);
 
-  Count samples() const { return {static_cast<uint32_t>(distances.size()), counters.part(0, 1)}; }
-  Count finished(uint32_t rays) const { return {rays, counters.part(1, 1)}; }
+  Count samples() const { return {static_cast<uint32_t>(distances.size()), counters.part(MarchRounds::kKept, 1)}; }
+  Count finished(uint32_t rays) const { return {rays, counters.part(MarchRounds::kFinished, 1)}; }
   HashFields::Samples places() const { return {samples(), slotOfSample.all(), positions.all()}; }
 };
 

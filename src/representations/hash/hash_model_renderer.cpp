@@ -38,8 +38,8 @@ RenderedView HashModelRenderer::render(const Camera& camera, const Pose& worldFr
     const PictureRays::Piece piece = pictureRays_.piece(first, wanted);
     const HashModel::Rays rays{piece.rays, piece.origins, piece.directions, {}, {}, piece.far};
     pass_.forward(rays, kMinTransmittance);
-    const std::vector<uint32_t> counters = device.read(pass_.counters());
-    const uint32_t finished = counters[1];
+    const RoundCounts counts(device.read(pass_.counters()), HashSamples::kRounds);
+    const uint32_t finished = counts.finished;
     CHECK(finished >= 1u);  // one ray's steps always fit
     const std::vector<float> colour = device.read(pass_.colour().part(0, size_t{finished} * 3));
     const std::vector<float> opacity = device.read(pass_.opacity().part(0, finished));
@@ -56,9 +56,7 @@ RenderedView HashModelRenderer::render(const Camera& camera, const Pose& worldFr
     }
     first += finished;
     // Each round of marching has room for so many samples, and so has what is seen.
-    const uint32_t fullest =
-        std::max(counters[0], *std::max_element(counters.begin() + 2, counters.begin() + 2 + HashSamples::kRounds));
-    const double fitting = 0.9 * kSamples / std::max(1.0, fullest / (1.0 * finished));
+    const double fitting = 0.9 * kSamples / std::max(1.0, counts.fullest / (1.0 * finished));
     wanted = static_cast<uint32_t>(std::clamp(fitting, 64.0, static_cast<double>(kRays)));
   }
   return view;

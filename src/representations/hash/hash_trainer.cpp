@@ -103,9 +103,10 @@ StepReport HashTrainer::step(int64_t step, int64_t plannedSteps) {
   } while (drawsFewerRays(report.texels));
   photoLoss_.exposures().settle(step, config_.exposure);
 
-  report.samples = counters[0];
-  report.rays = counters[1];
-  for (uint32_t round = 0; round < HashSamples::kRounds; ++round) report.marched += counters[2 + round];
+  const RoundCounts counts(counters, HashSamples::kRounds);
+  report.samples = counts.kept;
+  report.rays = counts.finished;
+  report.marched = counts.marched;
   const Fit fit = fitOf(report.rays, losses);
   report.loss = fit.loss + inner[0] + inner[1];
   report.squaredError = fit.squaredError / std::max(1.0, fit.channels);
@@ -141,7 +142,7 @@ HashTrainer::Fit HashTrainer::fit(int64_t step) {
     photoLoss_.compare(photoRays_, pictureOf(drawRays(step)), losses_);
     std::tie(counters, losses) = device_.readTogether(pass_.counters(), losses_.all());
   } while (drawsFewerRays(*std::max_element(counters.begin() + HashSamples::kFirstTexels, counters.end())));
-  return fitOf(counters[1], losses);
+  return fitOf(counters[MarchRounds::kFinished], losses);
 }
 
 HashTrainer::Fit HashTrainer::fitOf(uint32_t rays, const std::vector<float>& losses) const {
