@@ -27,10 +27,10 @@ void requireCell(const fs::path& folder, VolumeModel& apart, VolumeModel& joint,
     refuse("blocks.json", "is not block " + std::to_string(cell) + " alone");
   }
   VolumeConfig has = apart.config(), wants = joint.config();
-  for (const auto which : {&VolumeConfig::firstRays, &VolumeConfig::mostRays, &VolumeConfig::texelsPerStep,
-                           &VolumeConfig::sparsityPoints}) {
-    has.*which = wants.*which;
-  }
+  has.firstRays = wants.firstRays;
+  has.mostRays = wants.mostRays;
+  has.texelsPerStep = wants.texelsPerStep;
+  has.sparsityPoints = wants.sparsityPoints;
   has.blocksOnly = wants.blocksOnly;
   if (configToToml(has.fields()) != configToToml(wants.fields())) {
     refuse("config.toml", "has other settings than the joint model");

@@ -13,6 +13,7 @@
 #include "export/whole_folder.h"
 #include "tiles/read_content.h"
 #include "tiles/scene_folder.h"
+#include "tiles/volume_payload.h"
 
 namespace tessera {
 namespace {

@@ -1,5 +1,6 @@
 #include "train/photo_loss.h"
 
+#include "compute/exposure.h"
 #include "train/colour_loss.h"
 
 namespace tessera {

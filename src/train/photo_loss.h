@@ -5,6 +5,7 @@
 //   loss.passBack(photoRays, picture);
 #pragma once
 
+#include "compute/losses.h"
 #include "train/photo_exposures.h"
 #include "train/photo_rays.h"
 #include "train/settings/losses.h"

@@ -7,6 +7,7 @@
 #include "base/log.h"
 #include "base/random.h"
 #include "compute/composite.h"
+#include "compute/losses.h"
 #include "train/visible_cells.h"
 
 namespace tessera {

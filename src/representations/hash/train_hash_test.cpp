@@ -87,7 +87,7 @@ TEST_F(HashTraining, MakesCoarserLevelsOfTheSameBlocks) {
   EXPECT_GT(baked.tileset.root().geometricError, 1.9 * baked.tileset.tiles[1].geometricError);
   for (const int level : {0, 1}) {
     TileScene opened = openTileScene(scene_ / "scene", hashCodec());
-    EXPECT_EQ(opened.source.load(0).parts.size(), 2u);
+    EXPECT_EQ(contentAs<HashContent>(*opened.source.load(0)).parts.size(), 2u);
     SceneRendererSettings settings;
     settings.threads = 2;
     settings.selection.mostPixels = 0;

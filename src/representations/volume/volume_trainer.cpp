@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "base/random.h"
+#include "compute/losses.h"
 #include "train/run_folder.h"
 
 namespace tessera {
