@@ -408,6 +408,26 @@ TEST(BakeVolume, LooksTheSameWhereVulkanMadeIt) {
 #endif
 }
 
+TEST(BakeVolume, CullsWhatTrainingCulledInTheEndWhoeverBakes) {
+  const CubeScene scene;
+  const TemporaryFolder folder;
+  VolumeConfig config = smallVolumeConfig();
+  config.cullLast = 0.3;
+  TrainedVolumeCube trained(scene, config, cubeGrid(), 60);
+  BakeOptions options;
+  options.stride = 4;
+  const BakedScene baked = bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / "scene", options);
+  const auto contentAbove = [&](double minAlpha) {
+    BakeOptions looking = options;
+    looking.minAlpha = minAlpha;
+    const std::vector<AliveTexels> alive = findAliveTexels(trained.model(), scene.capture(), looking);
+    return encodeVolume(bakeGroup(trained.model(), 0, alive), options.effort);
+  };
+  const Bytes content = readFile(contentPath(folder / "scene", baked.tileset.root().contents.at(0).uri));
+  EXPECT_EQ(content, contentAbove(config.cullLast));
+  EXPECT_NE(content, contentAbove(options.minAlpha));
+}
+
 TEST(BakeVolume, WritesTheSameSceneAgain) {
   const CubeScene scene;
   const TemporaryFolder folder;
