@@ -6,7 +6,7 @@
 #include <cstdio>
 
 #include "base/error.h"
-#include "representations/volume/train_volume.h"
+#include "representations/volume/train/train_volume.h"
 #include "train/run_folder.h"
 
 namespace tessera {

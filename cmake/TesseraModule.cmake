@@ -5,15 +5,19 @@
 #   PRIVATE_LIBRARIES x y ...   third-party targets that no header of this room mentions
 #   TESTS a_test.cpp ...)       unit tests; one binary tessera_NAME_test, one CTest entry a test)
 #
-# A room is a static library tessera_NAME; its headers are included as "NAME/file.h".
+# A room is a static library tessera_NAME; its headers are included as "NAME/file.h". One of headers alone has no SOURCES.
 function(tessera_module name)
   cmake_parse_arguments(ARG "" "" "SOURCES;USES;LIBRARIES;PRIVATE_LIBRARIES;TESTS" ${ARGN})
-  add_library(tessera_${name} STATIC ${ARG_SOURCES})
-  target_include_directories(tessera_${name} PUBLIC ${CMAKE_SOURCE_DIR}/src)
-  foreach(room IN LISTS ARG_USES)
-    target_link_libraries(tessera_${name} PUBLIC tessera_${room})
-  endforeach()
-  target_link_libraries(tessera_${name} PUBLIC ${ARG_LIBRARIES} PRIVATE ${ARG_PRIVATE_LIBRARIES})
+  list(TRANSFORM ARG_USES PREPEND tessera_)
+  if(ARG_SOURCES)
+    add_library(tessera_${name} STATIC ${ARG_SOURCES})
+    target_include_directories(tessera_${name} PUBLIC ${CMAKE_SOURCE_DIR}/src)
+    target_link_libraries(tessera_${name} PUBLIC ${ARG_USES} ${ARG_LIBRARIES} PRIVATE ${ARG_PRIVATE_LIBRARIES})
+  else()
+    add_library(tessera_${name} INTERFACE)
+    target_include_directories(tessera_${name} INTERFACE ${CMAKE_SOURCE_DIR}/src)
+    target_link_libraries(tessera_${name} INTERFACE ${ARG_USES} ${ARG_LIBRARIES})
+  endif()
   if(TESSERA_TESTS AND ARG_TESTS)
     tessera_unit_tests(${name} SOURCES ${ARG_TESTS} LIBRARIES tessera_${name} ${ARG_PRIVATE_LIBRARIES})
   endif()
@@ -51,7 +55,7 @@ endfunction()
 #   TRAIN a.cpp ...                tessera_NAME_train: settings, model, training step and baking
 #   CONTENT_USES base scene ...    other modules (public); likewise CPU_USES, VULKAN_USES, TRAIN_USES
 #   CONTENT_LIBRARIES x ...        third-party targets that no header of this part mentions; likewise of the others
-#   TESTS a_test.cpp ...           unit tests of all parts: one binary tessera_NAME_test, as each costs a link
+#   TESTS a_test.cpp ...           unit tests of all parts: one binary tessera_representation_NAME_test, as each costs a link
 #   VULKAN_TESTS b_test.cpp ...    those of them that need Vulkan
 #   TEST_USES render ...           other modules that tests use
 #   TEST_LIBRARIES x ...)          third-party targets that they use
@@ -93,10 +97,10 @@ function(tessera_representation name)
 
   if(TESSERA_TESTS AND (ARG_TESTS OR ARG_VULKAN_TESTS))
     list(TRANSFORM ARG_TEST_USES PREPEND tessera_)
-    tessera_unit_tests(${name} SOURCES ${ARG_TESTS} ${ARG_VULKAN_TESTS}
+    tessera_unit_tests(representation_${name} SOURCES ${ARG_TESTS} ${ARG_VULKAN_TESTS}
       LIBRARIES ${libraries} ${ARG_TEST_USES} ${ARG_TEST_LIBRARIES})
     if(ARG_CPU)
-      tessera_simd_targets(tessera_${name}_test)
+      tessera_simd_targets(tessera_representation_${name}_test)
     endif()
   endif()
 endfunction()

@@ -2,8 +2,8 @@
 #include "golden/golden_hash.h"
 
 #include "golden_scene_test.h"
-#include "render/cpu/hash_drawer.h"
-#include "tiles/hash_payload.h"
+#include "representations/hash/content/hash_payload.h"
+#include "representations/hash/cpu/hash_drawer.h"
 
 namespace tessera {
 namespace {

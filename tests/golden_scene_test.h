@@ -7,7 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "render/cpu/draw_scene.h"
+#include "raymarch/cpu/draw_scene.h"
 #include "render/tile_scene.h"
 #include "tiles/read_content.h"
 #include "tiles/scene_folder.h"

@@ -2,8 +2,8 @@
 #include "golden/golden_volume.h"
 
 #include "golden_scene_test.h"
-#include "render/cpu/volume_drawer.h"
-#include "tiles/volume_payload.h"
+#include "representations/volume/content/volume_payload.h"
+#include "representations/volume/cpu/volume_drawer.h"
 
 namespace tessera {
 namespace {

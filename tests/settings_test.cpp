@@ -9,9 +9,9 @@
 #include <map>
 
 #include "base/error.h"
-#include "representations/field/config.h"
-#include "representations/hash/config.h"
-#include "representations/volume/config.h"
+#include "representations/field/train/config.h"
+#include "representations/hash/train/config.h"
+#include "representations/volume/train/config.h"
 
 namespace tessera {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "representations/field/train_field.h"
-#include "train/cube_scene.h"
+#include "representations/field/train/train_field.h"
+#include "train/testing/cube_scene.h"
 
 namespace tessera {
 namespace {

@@ -6,14 +6,14 @@
 
 #include <numbers>
 
-#include "apps/viewer/test_screen.h"
+#include "apps/viewer/testing/test_screen.h"
 #include "apps/viewer/window.h"
 #include "base/error.h"
 #include "base/image_io.h"
-#include "base/temporary_folder.h"
+#include "base/testing/temporary_folder.h"
 #include "eval/psnr.h"
 #include "gpu/presenter.h"
-#include "gpu/test_context.h"
+#include "gpu/testing/test_context.h"
 
 namespace tessera {
 namespace {

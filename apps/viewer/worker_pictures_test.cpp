@@ -6,7 +6,7 @@
 #include <chrono>
 
 #include "base/error.h"
-#include "gpu/test_context.h"
+#include "gpu/testing/test_context.h"
 
 namespace tessera {
 namespace {

@@ -3,7 +3,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../compute/kernel.glsl"
-#include "arguments_draw.h"
+#include "arguments_view.h"
 #include "../compute/vectors.glsl"
 #include "view.glsl"
 

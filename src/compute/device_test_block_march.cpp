@@ -3,7 +3,7 @@
 
 #include "compute/block_march.h"
 #include "compute/device_test.h"
-#include "compute/test_block_rays.h"
+#include "compute/testing/test_block_rays.h"
 
 namespace tessera::device_test {
 namespace {

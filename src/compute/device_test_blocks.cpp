@@ -7,7 +7,7 @@
 
 #include "compute/device_test.h"
 #include "compute/rows.h"
-#include "compute/test_block_rays.h"
+#include "compute/testing/test_block_rays.h"
 
 namespace tessera::device_test {
 namespace {

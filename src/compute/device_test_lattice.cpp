@@ -5,7 +5,7 @@
 
 #include "compute/device_test.h"
 #include "compute/lattice.h"
-#include "compute/test_texel_batch.h"
+#include "compute/testing/test_texel_batch.h"
 
 namespace tessera::device_test {
 namespace {

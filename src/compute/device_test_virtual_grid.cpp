@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "compute/device_test.h"
-#include "compute/test_texel_batch.h"
+#include "compute/testing/test_texel_batch.h"
 
 namespace tessera::device_test {
 namespace {

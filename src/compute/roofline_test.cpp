@@ -6,7 +6,7 @@
 
 #include "compute/operations.h"
 #ifdef TESSERA_HAS_VULKAN
-#include "gpu/test_context.h"
+#include "gpu/testing/test_context.h"
 #endif
 
 namespace tessera {

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
-#include "eval/fake_capture.h"
 #include "eval/psnr.h"
+#include "eval/testing/fake_capture.h"
 
 namespace tessera {
 namespace {

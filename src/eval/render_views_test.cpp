@@ -7,7 +7,7 @@
 #include "base/error.h"
 #include "base/image_io.h"
 #include "eval/evaluate.h"
-#include "eval/fake_capture.h"
+#include "eval/testing/fake_capture.h"
 
 namespace tessera {
 namespace {

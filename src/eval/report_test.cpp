@@ -6,8 +6,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "eval/fake_capture.h"
 #include "eval/html.h"
+#include "eval/testing/fake_capture.h"
 
 namespace tessera {
 namespace {

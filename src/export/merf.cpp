@@ -11,9 +11,9 @@
 #include "base/image_io.h"
 #include "export/merf_layout.h"
 #include "export/whole_folder.h"
+#include "representations/volume/content/volume_payload.h"
 #include "tiles/read_content.h"
 #include "tiles/scene_folder.h"
-#include "tiles/volume_payload.h"
 
 namespace tessera {
 namespace {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "base/file.h"
-#include "tiles/volume_content.h"
+#include "representations/volume/content/volume_content.h"
 
 namespace tessera {
 

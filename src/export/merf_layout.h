@@ -23,7 +23,7 @@
 #include <vector>
 
 #include "base/image.h"
-#include "tiles/volume_content.h"
+#include "representations/volume/content/volume_content.h"
 
 namespace tessera {
 

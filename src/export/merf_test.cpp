@@ -7,13 +7,13 @@
 
 #include "base/error.h"
 #include "export/merf_layout.h"
-#include "export/merf_viewer.h"
-#include "render/cpu/reference_volume.h"
-#include "render/cpu/volume_shading.h"
-#include "render/made_volume.h"
-#include "tiles/occupancy_pyramid.h"
+#include "export/testing/merf_viewer.h"
+#include "raymarch/content/occupancy_pyramid.h"
+#include "representations/volume/content/volume_payload.h"
+#include "representations/volume/cpu/volume_shading.h"
+#include "representations/volume/testing/made_volume.h"
+#include "representations/volume/testing/reference_volume.h"
 #include "tiles/scene_folder.h"
-#include "tiles/volume_payload.h"
 
 namespace tessera {
 namespace {

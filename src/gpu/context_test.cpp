@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "gpu/physical_device.h"
-#include "gpu/test_context.h"
+#include "gpu/testing/test_context.h"
 
 namespace tessera {
 namespace {

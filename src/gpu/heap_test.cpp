@@ -4,7 +4,7 @@
 
 #include "base/error.h"
 #include "gpu/buffer.h"
-#include "gpu/test_context.h"
+#include "gpu/testing/test_context.h"
 
 namespace tessera {
 namespace {

@@ -5,9 +5,9 @@
 #include <cstdlib>
 
 #include "base/file.h"
-#include "base/temporary_folder.h"
+#include "base/testing/temporary_folder.h"
 #include "gpu/kernel.h"
-#include "gpu/test_context.h"
+#include "gpu/testing/test_context.h"
 #include "shaders/double_values.h"
 
 namespace tessera {

@@ -5,7 +5,7 @@
 #include <array>
 #include <numeric>
 
-#include "gpu/test_context.h"
+#include "gpu/testing/test_context.h"
 #include "shaders/double_values.h"
 
 namespace tessera {

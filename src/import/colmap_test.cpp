@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "import/colmap_model.h"
-#include "import/test_support.h"
+#include "import/testing/test_support.h"
 
 namespace tessera {
 namespace {

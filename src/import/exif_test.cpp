@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "import/test_support.h"
+#include "import/testing/test_support.h"
 
 namespace tessera {
 namespace {

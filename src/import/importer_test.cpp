@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "import/capture_reader.h"
-#include "import/test_support.h"
+#include "import/testing/test_support.h"
 
 namespace tessera {
 namespace {

@@ -5,7 +5,7 @@
 #include <atomic>
 
 #include "base/error.h"
-#include "import/test_support.h"
+#include "import/testing/test_support.h"
 
 namespace tessera {
 namespace {

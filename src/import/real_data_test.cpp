@@ -5,7 +5,7 @@
 
 #include "import/capture_reader.h"
 #include "import/importer.h"
-#include "import/test_support.h"
+#include "import/testing/test_support.h"
 
 namespace tessera {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "base/error.h"
 #include "import/capture_reader.h"
-#include "import/test_support.h"
+#include "import/testing/test_support.h"
 #include "import/transforms_json.h"
 #include "scene/capture_writer.h"
 

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "partition/made_captures.h"
+#include "partition/testing/made_captures.h"
 #include "scene/block_grid_json.h"
 
 namespace tessera {

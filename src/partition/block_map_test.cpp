@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "partition/block_geography.h"
-#include "partition/made_captures.h"
+#include "partition/testing/made_captures.h"
 
 namespace tessera {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "partition/made_captures.h"
+#include "partition/testing/made_captures.h"
 
 namespace tessera {
 namespace {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
-#include "partition/made_captures.h"
+#include "partition/testing/made_captures.h"
 
 namespace tessera {
 namespace {

@@ -5,12 +5,12 @@
 #include <numbers>
 
 #include "base/error.h"
-#include "base/temporary_folder.h"
+#include "base/testing/temporary_folder.h"
 #include "render/scene_tiles.h"
 #include "render/tile_scene.h"
 #include "tiles/glb.h"
 #include "tiles/scene_folder.h"
-#include "tiles/test_support.h"
+#include "tiles/testing/made_tileset.h"
 
 namespace tessera {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/random.h"
-#include "render/made_tree.h"
+#include "render/testing/made_tree.h"
 
 namespace tessera {
 namespace {

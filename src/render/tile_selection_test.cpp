@@ -6,7 +6,7 @@
 #include <set>
 
 #include "base/random.h"
-#include "render/made_tree.h"
+#include "render/testing/made_tree.h"
 
 namespace tessera {
 namespace {

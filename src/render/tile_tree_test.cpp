@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "base/random.h"
-#include "render/made_tree.h"
+#include "render/testing/made_tree.h"
 #include "render/tile_frame.h"
 
 namespace tessera {

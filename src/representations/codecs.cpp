@@ -4,18 +4,19 @@
 
 #include "base/error.h"
 #include "representations/list.h"
-#include "tiles/hash_payload.h"
-#include "tiles/volume_payload.h"
 
 namespace tessera {
 
-const ContentCodec* codecOf(std::string_view representation) {
 #define SKIP(name, Name)
+#define CODEC(name, Name) const ContentCodec& name##Codec();
+TESSERA_REPRESENTATIONS(SKIP, CODEC)
+#undef CODEC
+
+const ContentCodec* codecOf(std::string_view representation) {
 #define CODEC(name, Name) \
   if (representation == #name) return &name##Codec();
   TESSERA_REPRESENTATIONS(SKIP, CODEC)
 #undef CODEC
-#undef SKIP
   return nullptr;
 }
 

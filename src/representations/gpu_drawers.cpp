@@ -1,22 +1,23 @@
 #include "representations/gpu_drawers.h"
 
 #include "base/check.h"
-#include "render/vulkan/gpu_hash_drawer.h"
-#include "render/vulkan/gpu_volume_drawer.h"
 #include "representations/codecs.h"
 #include "representations/list.h"
 #include "tiles/scene_folder.h"
 
 namespace tessera {
 
+#define SKIP(name, Name)
+#define DRAWER(name, Name) std::unique_ptr<GpuDrawer> makeGpu##Name##Drawer(const std::shared_ptr<GpuStream>& stream);
+TESSERA_REPRESENTATIONS(SKIP, DRAWER)
+#undef DRAWER
+
 std::unique_ptr<GpuDrawer> makeGpuDrawer(std::string_view representation, const std::shared_ptr<GpuStream>& stream) {
   std::unique_ptr<GpuDrawer> drawer;
-#define SKIP(name, Name)
 #define DRAWER(name, Name) \
   if (representation == #name) drawer = makeGpu##Name##Drawer(stream);
   TESSERA_REPRESENTATIONS(SKIP, DRAWER)
 #undef DRAWER
-#undef SKIP
   CHECK(drawer != nullptr);
   return drawer;
 }

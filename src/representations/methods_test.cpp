@@ -8,11 +8,11 @@
 
 #include "bake/baker.h"
 #include "base/error.h"
-#include "base/temporary_folder.h"
-#include "representations/field/trained_cube.h"
-#include "representations/hash/hash_cube.h"
+#include "base/testing/temporary_folder.h"
+#include "representations/field/testing/trained_cube.h"
+#include "representations/hash/testing/hash_cube.h"
 #include "representations/list.h"
-#include "representations/volume/volume_cube.h"
+#include "representations/volume/testing/volume_cube.h"
 #include "tiles/scene_folder.h"
 #include "train/run_folder.h"
 

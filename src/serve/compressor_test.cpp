@@ -5,7 +5,7 @@
 
 #include <future>
 
-#include "base/temporary_folder.h"
+#include "base/testing/temporary_folder.h"
 
 namespace tessera {
 namespace {

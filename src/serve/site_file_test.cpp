@@ -9,7 +9,7 @@
 #include <atomic>
 #include <thread>
 
-#include "base/temporary_folder.h"
+#include "base/testing/temporary_folder.h"
 
 namespace tessera {
 namespace {

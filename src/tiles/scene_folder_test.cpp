@@ -4,7 +4,7 @@
 #include <unistd.h>
 
 #include "base/error.h"
-#include "tiles/test_support.h"
+#include "tiles/testing/made_tileset.h"
 #include "tiles/tileset_json.h"
 
 namespace tessera {

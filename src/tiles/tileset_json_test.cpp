@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
-#include "tiles/test_support.h"
+#include "tiles/testing/made_tileset.h"
 
 namespace tessera {
 namespace {

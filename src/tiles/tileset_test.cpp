@@ -7,7 +7,8 @@
 #include <cstdlib>
 #include <functional>
 
-#include "tiles/test_support.h"
+#include "base/random.h"
+#include "tiles/testing/made_tileset.h"
 
 namespace tessera {
 namespace {

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
-#include "train/test_support.h"
+#include "train/testing/test_support.h"
 
 namespace tessera {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "train/cube_scene.h"
+#include "train/testing/cube_scene.h"
 
 namespace tessera {
 namespace {

@@ -6,7 +6,7 @@
 #include <set>
 #include <utility>
 
-#include "train/test_support.h"
+#include "train/testing/test_support.h"
 
 namespace tessera {
 namespace {

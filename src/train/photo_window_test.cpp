@@ -6,7 +6,7 @@
 #include <numeric>
 #include <set>
 
-#include "train/test_support.h"
+#include "train/testing/test_support.h"
 
 namespace tessera {
 namespace {

@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "base/error.h"
-#include "train/test_support.h"
+#include "train/testing/test_support.h"
 
 namespace tessera {
 namespace {

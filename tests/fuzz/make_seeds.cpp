@@ -6,12 +6,14 @@
 #include "base/file.h"
 #include "base/image_io.h"
 #include "base/safetensors.h"
+#include "representations/hash/content/hash_payload.h"
+#include "representations/hash/testing/random_content.h"
+#include "representations/volume/content/volume_payload.h"
+#include "representations/volume/testing/random_content.h"
 #include "scene/ply.h"
 #include "tiles/glb.h"
-#include "tiles/hash_payload.h"
-#include "tiles/test_support.h"
+#include "tiles/testing/made_tileset.h"
 #include "tiles/tileset_json.h"
-#include "tiles/volume_payload.h"
 
 using namespace tessera;
 

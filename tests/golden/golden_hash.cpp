@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "base/random.h"
-#include "tiles/occupancy_distance.h"
+#include "representations/hash/content/occupancy_distance.h"
 
 namespace tessera::golden {
 namespace {

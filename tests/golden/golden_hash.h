@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "golden/golden_landscape.h"
-#include "tiles/hash_content.h"
+#include "representations/hash/content/hash_content.h"
 
 namespace tessera::golden {
 

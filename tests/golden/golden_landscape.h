@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/random.h"
+#include "raymarch/content/content_part.h"
 #include "scene/contraction.h"
-#include "tiles/content_part.h"
 #include "tiles/dense_layer.h"
 #include "tiles/tileset.h"
 

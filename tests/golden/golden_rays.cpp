@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "base/random.h"
-#include "render/cpu/reference_hash.h"
-#include "render/cpu/reference_volume.h"
+#include "representations/hash/testing/reference_hash.h"
+#include "representations/volume/testing/reference_volume.h"
 
 namespace tessera::golden {
 namespace {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "golden/golden_landscape.h"
-#include "tiles/hash_content.h"
-#include "tiles/volume_content.h"
+#include "representations/hash/content/hash_content.h"
+#include "representations/volume/content/volume_content.h"
 
 namespace tessera::golden {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/random.h"
-#include "tiles/occupancy_pyramid.h"
+#include "raymarch/content/occupancy_pyramid.h"
 
 namespace tessera::golden {
 namespace {

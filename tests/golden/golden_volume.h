@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "golden/golden_landscape.h"
-#include "tiles/volume_content.h"
+#include "representations/volume/content/volume_content.h"
 
 namespace tessera::golden {
 

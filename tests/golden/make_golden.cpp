@@ -8,9 +8,9 @@
 #include "golden/golden_hash.h"
 #include "golden/golden_rays.h"
 #include "golden/golden_volume.h"
-#include "tiles/hash_payload.h"
+#include "representations/hash/content/hash_payload.h"
+#include "representations/volume/content/volume_payload.h"
 #include "tiles/scene_folder.h"
-#include "tiles/volume_payload.h"
 
 using namespace tessera;
 

@@ -113,7 +113,7 @@ class Reader {
     parts.insert(parts.end(), words["TEST_USES"].begin(), words["TEST_USES"].end());
     std::vector<std::string> tests = words["TESTS"];
     tests.insert(tests.end(), words["VULKAN_TESTS"].begin(), words["VULKAN_TESTS"].end());
-    addTests(name, tests, parts);
+    addTests("representation_" + name, tests, parts);
   }
 
   std::string folder_;

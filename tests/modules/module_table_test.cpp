@@ -213,6 +213,18 @@ TEST(Modules, LinkInCmakeWhatTheTableAllows) {
   EXPECT_GT(checked, 30u);
 }
 
+TEST(Modules, LetWhatOnlyDrawsScenesLinkNoTrainer) {
+  const CmakeTargets targets = targetsOfProject();
+  for (const std::string scenes : {"scene_source", "cpu_drawers", "gpu_drawers"}) {
+    const std::set<std::string> linked = linkedBy(targets, scenes);
+    EXPECT_TRUE(linked.contains("codecs")) << scenes;
+    for (const std::string& link : linked) {
+      EXPECT_TRUE(link != "train" && !link.ends_with("_train") && link != "methods") << scenes << " links " << link;
+    }
+  }
+  EXPECT_TRUE(linkedBy(targets, "model_source").contains("train"));
+}
+
 constexpr const char* kTable = R"(# Architecture
 
 ## Modules, bottom to top
@@ -303,8 +315,9 @@ TEST(CmakeTargets, AreThoseOfModulesAndRepresentations) {
   EXPECT_EQ(targets["render_test"].links, (std::set<std::string>{"import", "render"}));
   EXPECT_EQ(targets["hash_content"].links, std::set<std::string>{"tiles"});
   EXPECT_EQ(targets["hash_cpu"].links, (std::set<std::string>{"hash_content", "render"}));
-  EXPECT_EQ(targets["hash_test"].sources, std::vector<std::string>{"representations/hash/cpu/b_test.cpp"});
-  EXPECT_EQ(linkedBy(targets, "hash_test"),
+  EXPECT_EQ(targets["representation_hash_test"].sources,
+            std::vector<std::string>{"representations/hash/cpu/b_test.cpp"});
+  EXPECT_EQ(linkedBy(targets, "representation_hash_test"),
             (std::set<std::string>{"hash_content", "hash_cpu", "import", "render", "tiles"}));
 }
 

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "gpu/test_context.h"
+#include "gpu/testing/test_context.h"
 #include "shaders/double_values.h"
 
 namespace tessera {

@@ -18,7 +18,7 @@
 #include "compute/losses.h"
 #include "compute/mlp.h"
 #include "compute/reference/functions.h"
-#include "gpu/test_context.h"
+#include "gpu/testing/test_context.h"
 
 namespace tessera {
 namespace {

@@ -7,7 +7,7 @@
 #include "gpu/stream.h"
 #include "render/drawer.h"
 #include "render/pixel_directions.h"
-#include "shaders/render/arguments_draw.h"
+#include "shaders/render/arguments_view.h"
 
 namespace tessera {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "shaders/render/arguments_draw.h"
+#include "shaders/render/arguments_view.h"
 #include "tiles/dense_layer.h"
 
 namespace tessera {

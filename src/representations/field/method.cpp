@@ -1,8 +1,8 @@
 #include "representations/field/method.h"
 
-#include "representations/field/field_renderer.h"
-#include "representations/field/step_benchmark.h"
-#include "representations/field/train_field.h"
+#include "representations/field/train/field_renderer.h"
+#include "representations/field/train/step_benchmark.h"
+#include "representations/field/train/train_field.h"
 
 namespace tessera {
 namespace {

@@ -1,9 +1,9 @@
 #include "representations/hash/method.h"
 
-#include "representations/hash/bake_hash.h"
-#include "representations/hash/hash_model_renderer.h"
-#include "representations/hash/train_hash.h"
-#include "tiles/hash_payload.h"
+#include "representations/hash/bake/bake_hash.h"
+#include "representations/hash/content/hash_payload.h"
+#include "representations/hash/train/hash_model_renderer.h"
+#include "representations/hash/train/train_hash.h"
 
 namespace tessera {
 namespace {

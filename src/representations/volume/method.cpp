@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "representations/volume/bake_volume.h"
-#include "representations/volume/train_volume.h"
-#include "representations/volume/volume_model_renderer.h"
+#include "representations/volume/bake/bake_volume.h"
+#include "representations/volume/train/train_volume.h"
+#include "representations/volume/train/volume_model_renderer.h"
 
 namespace tessera {
 namespace {

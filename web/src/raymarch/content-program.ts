@@ -1,9 +1,9 @@
 // The shader that draws one content: what it adds to each pixel, and how far away that is (docs/tile-format.md, section 4). What
 // depends on the representation are its ProgramPieces.
 import * as THREE from 'three';
-import marchPartSource from '../../../shaders/lib/march_part.glsl?raw';
+import marchPartSource from '../../../shaders/raymarch/march_part.glsl?raw';
 import pathSource from '../../../shaders/lib/domain_path.glsl?raw';
-import placeSource from '../../../shaders/lib/part_place.glsl?raw';
+import placeSource from '../../../shaders/raymarch/part_place.glsl?raw';
 import { kDisplayConstants } from '../draw/display-modes';
 import { kMostHiddenBoxes } from '../draw/hidden-boxes';
 import { kFarAway } from '../draw/scene-drawer';

@@ -39,7 +39,7 @@ export const hashDrawing = {
 class HashMarching implements Marching<HashHeader, HashContent, HashOwn> {
   readonly uniforms = {
     shares: { value: new Array<number>(kMostTables + 1).fill(1) }, // of the coarse features and of each level, what is shown of their colours
-    attention: { value: 0 }, // whose weights are shown instead, as shaders/lib/hash_march.glsl has it
+    attention: { value: 0 }, // whose weights are shown instead, as shaders/representations/hash/hash_march.glsl has it
   };
   featureLevels = 0;
   readonly lastPass: NetworkPass;

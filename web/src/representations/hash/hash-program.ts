@@ -1,6 +1,6 @@
 // What of a `hash` scene goes into the shader that draws a content: its march. What it writes are sums, of which
 // network-pass.ts makes colours when those of all contents are there (docs/tile-format.md, section 7).
-import marchSource from '../../../../shaders/lib/hash_march.glsl?raw';
+import marchSource from '../../../../shaders/representations/hash/hash_march.glsl?raw';
 import { kAttributes } from '../../raymarch/content';
 import type { ProgramPieces } from '../../raymarch/content-program';
 import { atlasShader } from '../../raymarch/content-textures';

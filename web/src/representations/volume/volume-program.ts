@@ -1,6 +1,6 @@
 // What of a `volume` scene goes into the shader that draws a content: its march, and its network, which is run for each content
 // (docs/tile-format.md, section 6).
-import marchSource from '../../../../shaders/lib/volume_march.glsl?raw';
+import marchSource from '../../../../shaders/representations/volume/volume_march.glsl?raw';
 import { layersShader, writtenVector } from '../../draw/network-shader';
 import type { ProgramPieces } from '../../raymarch/content-program';
 import { atlasShader } from '../../raymarch/content-textures';

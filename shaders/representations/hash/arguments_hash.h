@@ -1,0 +1,83 @@
+// What the host hands to the kernels that draw contents of `hash`: one truth, read by C++ and GLSL alike, as in
+// shaders/compute/arguments.h.
+#ifndef TESSERA_SHADERS_REPRESENTATIONS_HASH_ARGUMENTS_HASH_H
+#define TESSERA_SHADERS_REPRESENTATIONS_HASH_ARGUMENTS_HASH_H
+#include "../../render/arguments_view.h"
+TESSERA_BEGIN_ARGUMENTS
+
+// HashPart.
+#define TESSERA_MOST_TABLES 8
+
+struct HashPartArguments {
+  float centre[3];
+  float texels;  // finest cells along an axis
+  float scale[3];
+  float lattice;  // corners along an axis
+  float low[3];
+  uint contracted;
+  float high[3];
+  int ratio;                // 0, 1, 2: coarse cells are 1, 2 or 4 finest ones wide
+  UintPointer macroblocks;  // numbers of those stored
+  UintPointer cornerWords;  // [stored][9][9][9][columns / 4]
+  UintPointer coarse;
+  UintPointer fine;
+  UintPointer tables[TESSERA_MOST_TABLES];  // [entries][2]
+  uint firstVector;                         // of `vectors`: gpu_hash_content.cpp
+  uint unused;
+};
+TESSERA_SIZE(HashPartArguments, 168);
+
+struct NetworkArguments {
+  Bits64 layers;   // LayersPointer
+  Bits64 weights;  // FloatPointer
+  uint layerCount;
+  uint unused;
+};
+TESSERA_SIZE(NetworkArguments, 24);
+
+#ifdef __cplusplus
+using HashPartsPointer = uint64_t;
+using NetworksPointer = uint64_t;
+using VectorsPointer = uint64_t;
+#else
+layout(buffer_reference, std430, buffer_reference_align = 8) buffer HashPartsPointer {
+  HashPartArguments values[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 8) buffer NetworksPointer {
+  NetworkArguments values[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer VectorsPointer {
+  vec4 values[];
+};
+#endif
+
+// HashContent, and where of it something is drawn.
+struct DrawHashArguments {
+  ViewArguments view;
+  float low[3];
+  uint partCount;
+  float high[3];
+  uint isSurround;
+  float stepLength;
+  uint columns;
+  uint network;  // among those of the picture
+  uint unused;
+  float levelWeights[2 * TESSERA_MOST_TABLES];  // of density and of all else, where they are the same everywhere
+  HashPartsPointer parts;
+  VectorsPointer vectors;
+};
+TESSERA_SIZE(DrawHashArguments, 272);
+
+// What of all contents together becomes a colour.
+struct EndHashArguments {
+  ViewArguments view;
+  NetworksPointer networks;
+  uint networkCount;
+  uint ofNothing;  // the network of rays that nothing meets
+  uint isWhole;
+  uint unused;
+};
+TESSERA_SIZE(EndHashArguments, 168);
+
+TESSERA_END_ARGUMENTS
+#endif

@@ -1,0 +1,126 @@
+#include "raymarch/content/content_reader.h"
+
+#include <bit>
+#include <cstring>
+
+#include "tiles/json_fields.h"
+#include "tiles/lossless_image.h"
+
+namespace tessera {
+
+using namespace json_fields;
+
+namespace {
+
+bool takeFloats(std::span<const std::byte>& bytes, size_t count, std::vector<float>& numbers) {
+  static_assert(std::endian::native == std::endian::little);
+  if (bytes.size() / sizeof(float) < count) return false;
+  numbers.resize(count);
+  std::memcpy(numbers.data(), bytes.data(), count * sizeof(float));
+  bytes = bytes.subspan(count * sizeof(float));
+  return true;
+}
+
+bool takeTriple(const json& object, const char* key, std::array<float, 3>& triple) {
+  const auto numbers = numbersOf<3>(object, key);
+  if (!numbers) return false;
+  for (size_t a = 0; a < 3; ++a) triple[a] = static_cast<float>((*numbers)[a]);
+  return true;
+}
+
+}  // namespace
+
+bool ContentReader::fail(const std::string& reason) {
+  if (reason_.empty()) reason_ = reason;
+  return false;
+}
+
+bool ContentReader::readLayers(std::vector<DenseLayer>& into) {
+  const json* network = fieldOf(file_.ours, "network");
+  const json* layers = network ? arrayOf(*network, "layers") : nullptr;
+  if (!layers || layers->size() > kMostLayers) return fail("has no network");
+  for (const json& sides : *layers) {
+    if (!sides.is_array() || sides.size() != 2) return fail("a layer of the network has no two sides");
+    const auto inputs = unsignedFrom(sides[0], kMostLayerWidth), outputs = unsignedFrom(sides[1], kMostLayerWidth);
+    if (!inputs || !outputs) return fail("a layer of the network is out of bounds");
+    DenseLayer layer;
+    layer.inputs = static_cast<uint32_t>(*inputs);
+    layer.outputs = static_cast<uint32_t>(*outputs);
+    into.push_back(std::move(layer));
+  }
+  return true;
+}
+
+bool ContentReader::readNetwork(std::vector<DenseLayer>& network) {
+  auto bytes = file_.viewOf(*fieldOf(file_.ours, "network"), kRawBytes);
+  if (!bytes) return fail("has no network");
+  for (DenseLayer& layer : network) {
+    if (!takeFloats(*bytes, size_t{layer.inputs} * layer.outputs, layer.weights) ||
+        !takeFloats(*bytes, layer.outputs, layer.biases)) {
+      return fail("the network has fewer numbers than its layers need");
+    }
+  }
+  return bytes->empty() || fail("the network has more numbers than its layers need");
+}
+
+const json* ContentReader::partsOf() {
+  const json* parts = arrayOf(file_.ours, "parts");
+  if (parts && !parts->empty() && parts->size() <= limits_.parts) return parts;
+  fail("has no parts, or too many");
+  return nullptr;
+}
+
+bool ContentReader::readPlace(const json& source, ContentPart& part) {
+  const auto contracted = flagOf(source, "contracted"), surround = flagOf(source, "surround");
+  if (!contracted || !surround) return false;
+  part.contracted = *contracted;
+  part.surround = *surround;
+  return takeTriple(source, "centre", part.centre) && takeTriple(source, "scale", part.scale) &&
+         takeTriple(source, "low", part.low) && takeTriple(source, "high", part.high);
+}
+
+std::optional<uint32_t> ContentReader::storedOf(const json& source) {
+  const json* macroblocks = fieldOf(source, "macroblocks");
+  return macroblocks ? unsignedOf(*macroblocks, "stored", kMostStored) : std::nullopt;
+}
+
+bool ContentReader::readMacroblocks(const json& part, uint32_t texels, uint32_t stored, ContentPart& into,
+                                    const TakePictures& take) {
+  const json& source = *fieldOf(part, "macroblocks");
+  OccupancyBits alive(texels / ContentPart::kMacroblock);
+  if (!readBits(source, "alive", alive)) return false;
+  uint32_t count = 0;
+  for (const uint64_t word : alive.words) count += static_cast<uint32_t>(std::popcount(word));
+  if (count != stored) return false;
+  into.macroblocks.resize(alive.count());
+  uint32_t number = 0;
+  for (size_t place = 0; place < alive.count(); ++place) {
+    into.macroblocks[place] = alive.at(place) ? number++ : ContentPart::kEmpty;
+  }
+  if (stored == 0) return true;
+  const json* pictures = fieldOf(source, "texels");
+  return pictures && take(*pictures, sizeOfMacroblocks(stored));
+}
+
+bool ContentReader::takePictures(const json& source, const PictureSize& size, const TakePicture& take) {
+  if (!source.is_array() || source.size() != kTexelPictures) return false;
+  for (size_t which = 0; which < kTexelPictures; ++which) {
+    const auto picture = readPicture(source[which], size);
+    if (!picture || !take(*picture, which)) return false;
+  }
+  return true;
+}
+
+bool ContentReader::readBits(const json& source, const char* key, OccupancyBits& bits) {
+  const json* entry = fieldOf(source, key);
+  const auto picture = entry ? readPicture(*entry, sizeOfBits(bits.count())) : std::nullopt;
+  return picture && takeBits(*picture, bits);
+}
+
+std::optional<ImageU8> ContentReader::readPicture(const json& source, const PictureSize& size) {
+  const auto bytes = file_.viewOf(source, kWebP);
+  if (!bytes) return std::nullopt;
+  return decodeLossless(*bytes, static_cast<int>(size.width), static_cast<int>(size.height));
+}
+
+}  // namespace tessera

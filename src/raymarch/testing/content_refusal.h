@@ -1,0 +1,66 @@
+// What the payloads of every representation are tested for alike.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "base/image.h"
+#include "raymarch/content/content_part.h"
+#include "tiles/content.h"
+#include "tiles/dense_layer.h"
+#include "tiles/glb.h"
+#include "tiles/lossless_image.h"
+
+namespace tessera::tiles_test {
+
+inline void expectSamePlace(const ContentPart& one, const ContentPart& other) {
+  EXPECT_EQ(one.centre, other.centre);
+  EXPECT_EQ(one.scale, other.scale);
+  EXPECT_EQ(one.low, other.low);
+  EXPECT_EQ(one.high, other.high);
+  EXPECT_EQ(one.contracted, other.contracted);
+  EXPECT_EQ(one.surround, other.surround);
+  EXPECT_EQ(one.macroblocks, other.macroblocks);
+}
+
+// Files that have been spoilt are refused, and why.
+class Refusal : public testing::Test {
+ protected:
+  using json = nlohmann::json;
+  static json& ours(json& asset) { return asset["extensions"]["TESSERA_content"]; }
+  static json& part(json& asset) { return ours(asset)["parts"][0]; }
+
+  virtual Bytes file() const = 0;
+  virtual bool isRead(std::span<const std::byte> file, std::string& reason, const ContentLimits& limits) const = 0;
+
+  // What is said begins with `why`.
+  void refuses(const std::string& why, const std::function<void(json&)>& spoil, const ContentLimits& limits = {}) {
+    const auto spoilAsset = [&](json& asset, Bytes&) { spoil(asset); };
+    refusesBytes(why, spoilAsset, limits);
+  }
+  void refusesBytes(const std::string& why, const std::function<void(json&, Bytes&)>& spoil,
+                    const ContentLimits& limits = {}) {
+    const Bytes whole = file();
+    const auto view = decodeGlb(whole);
+    json asset = json::parse(view->json);
+    Bytes bytes(view->bytes.begin(), view->bytes.end());
+    spoil(asset, bytes);
+    std::string reason;
+    EXPECT_FALSE(isRead(encodeGlb(asset.dump(), bytes), reason, limits)) << why;
+    EXPECT_EQ(reason.substr(0, why.size()), why);
+  }
+  // Another picture in place of the one that `entry` names.
+  static void replace(json& asset, Bytes& bytes, json& entry, const ImageU8& image) {
+    const Bytes encoded = encodeLossless(image, 1);
+    bytes.resize((bytes.size() + 3) / 4 * 4);
+    asset["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", bytes.size()}, {"byteLength", encoded.size()}});
+    entry["bufferView"] = asset["bufferViews"].size() - 1;
+    bytes.insert(bytes.end(), encoded.begin(), encoded.end());
+    asset["buffers"][0]["byteLength"] = bytes.size();
+  }
+};
+
+}  // namespace tessera::tiles_test

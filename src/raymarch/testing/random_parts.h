@@ -1,0 +1,36 @@
+// For tests: networks of random numbers, and parts in a row.
+#pragma once
+
+#include <vector>
+
+#include "base/random.h"
+#include "tiles/dense_layer.h"
+
+namespace tessera::tiles_test {
+
+inline std::vector<DenseLayer> madeNetwork(uint64_t seed, std::vector<uint32_t> widths) {
+  const RandomStream random(seed, 0xc0);
+  uint64_t next = 0;
+  std::vector<DenseLayer> network;
+  for (size_t i = 0; i + 1 < widths.size(); ++i) {
+    DenseLayer layer{widths[i], widths[i + 1], {}, {}};
+    for (uint32_t k = 0; k < layer.inputs * layer.outputs; ++k) {
+      layer.weights.push_back(random.uniform(next++) - 0.5f);
+    }
+    for (uint32_t k = 0; k < layer.outputs; ++k) layer.biases.push_back(random.uniform(next++) - 0.5f);
+    network.push_back(std::move(layer));
+  }
+  return network;
+}
+
+// Side by side along x, cells of edge 2.
+template <class Part>
+void placeInRow(std::vector<Part>& parts) {
+  for (size_t i = 0; i < parts.size(); ++i) {
+    parts[i].centre[0] = 2.0f * static_cast<float>(i);
+    parts[i].low[0] = parts[i].centre[0] - 1;
+    parts[i].high[0] = parts[i].centre[0] + 1;
+  }
+}
+
+}  // namespace tessera::tiles_test

@@ -1,0 +1,20 @@
+// For tests: contents that are in memory as the source of a renderer.
+#pragma once
+
+#include <type_traits>
+
+#include "render/tile_cache.h"
+#include "tiles/content.h"
+
+namespace tessera {
+
+// Copies of what contentAt(tile) gives.
+template <class ContentAt>
+TileSource<Content> sourceOfCopies(ContentAt contentAt) {
+  TileSource<Content> source;
+  source.bytes = [contentAt](int tile) { return bytesInMemory(contentAt(tile)); };
+  source.load = [contentAt](int tile) { return makeContent(std::decay_t<decltype(contentAt(tile))>(contentAt(tile))); };
+  return source;
+}
+
+}  // namespace tessera

@@ -1,0 +1,144 @@
+#include "representations/field/train/field_renderer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "base/error.h"
+#include "representations/field/testing/trained_cube.h"
+
+namespace tessera {
+namespace {
+
+// One trained model for all tests of this file.
+class RenderedField : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    scene_ = new CubeScene;
+    trained_ = new TrainedCube(*scene_, cubeConfig(), 300);
+    renderer_ = new FieldRenderer(trained_->trainer->model());
+  }
+  static void TearDownTestSuite() {
+    delete renderer_;
+    delete trained_;
+    delete scene_;
+  }
+  static const Pose& pose(int photo = 3) { return scene_->capture().photos[photo].worldFromCamera; }
+  static const Camera& camera() { return scene_->capture().cameras[0]; }
+
+  static CubeScene* scene_;
+  static TrainedCube* trained_;
+  static FieldRenderer* renderer_;
+};
+
+CubeScene* RenderedField::scene_ = nullptr;
+TrainedCube* RenderedField::trained_ = nullptr;
+FieldRenderer* RenderedField::renderer_ = nullptr;
+
+TEST_F(RenderedField, IsPremultipliedAndOpaqueWhereTheCubeIs) {
+  const RenderedView view = renderer_->render(camera(), pose(), nullptr), truth = scene_->truth(camera(), pose());
+  double inside = 0, outside = 0;
+  int insides = 0, outsides = 0;
+  for (size_t i = 0; i < view.opacity.pixels.size(); ++i) {
+    EXPECT_GE(view.opacity.pixels[i], 0);
+    EXPECT_LE(view.opacity.pixels[i], 1.0001f);
+    for (int k = 0; k < 3; ++k) EXPECT_LE(view.colour.pixels[3 * i + k], view.opacity.pixels[i] + 1e-4f);
+    if (truth.opacity.pixels[i] > 0.99f) inside += view.opacity.pixels[i], ++insides;
+    if (truth.opacity.pixels[i] == 0) outside += view.opacity.pixels[i], ++outsides;
+  }
+  ASSERT_GT(insides, 100);
+  ASSERT_GT(outsides, 100);
+  EXPECT_GT(inside / insides, 0.9);
+  EXPECT_LT(outside / outsides, 0.25);
+}
+
+TEST_F(RenderedField, HasTheDepthOfTheCubeInWorldUnits) {
+  const RenderedView view = renderer_->render(camera(), pose(), nullptr), truth = scene_->truth(camera(), pose());
+  std::vector<double> errors;
+  for (size_t i = 0; i < view.opacity.pixels.size(); ++i) {
+    if (truth.opacity.pixels[i] < 0.99f) continue;
+    errors.push_back(std::abs(view.depth.pixels[i] / view.opacity.pixels[i] - truth.depth.pixels[i]));
+  }
+  ASSERT_GT(errors.size(), 100u);
+  std::nth_element(errors.begin(), errors.begin() + static_cast<ptrdiff_t>(errors.size() / 2), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.15);  // of about 1.3; the cube is 1 wide
+}
+
+TEST_F(RenderedField, IsTheSameWhenTheCameraIsCutInPieces) {
+  const Camera whole = camera().scaledTo(180, 144);  // more rays than one piece of the renderer's own
+  const RenderedView picture = renderer_->render(whole, pose(), nullptr);
+  for (const auto& [left, top] : {std::pair(0, 0), std::pair(90, 0), std::pair(60, 100)}) {
+    Camera piece = whole;
+    piece.width = 90;
+    piece.height = 44;
+    piece.parameters[2] -= left;
+    piece.parameters[3] -= top;
+    const RenderedView part = renderer_->render(piece, pose(), nullptr);
+    double worst = 0;
+    for (int y = 0; y < piece.height; ++y) {
+      for (int x = 0; x < piece.width; ++x) {
+        for (int k = 0; k < 3; ++k) {
+          worst = std::max<double>(worst, std::abs(part.colour.at(x, y)[k] - picture.colour.at(x + left, y + top)[k]));
+        }
+        worst = std::max<double>(worst, std::abs(*part.depth.at(x, y) - *picture.depth.at(x + left, y + top)));
+      }
+    }
+    EXPECT_LT(worst, 5e-3) << left << "," << top;
+  }
+}
+
+TEST_F(RenderedField, IsTheSameEveryTime) {
+  const RenderedView first = renderer_->render(camera(), pose(), nullptr);
+  renderer_->render(camera().scaledTo(60, 48), pose(5), nullptr);
+  const RenderedView again = renderer_->render(camera(), pose(), nullptr);
+  EXPECT_EQ(first.colour.pixels, again.colour.pixels);
+  EXPECT_EQ(first.depth.pixels, again.depth.pixels);
+}
+
+TEST_F(RenderedField, EndsAtOpaqueThings) {
+  const RenderedView free = renderer_->render(camera(), pose(), nullptr);
+  const auto with = [&](float depth) {
+    const ImageF opaque(camera().width, camera().height, 1, depth);
+    return renderer_->render(camera(), pose(), &opaque);
+  };
+  const float infinity = std::numeric_limits<float>::infinity();
+  const RenderedView nothing = with(infinity), behind = with(50), before = with(0.6f), at = with(0);
+  EXPECT_EQ(nothing.colour.pixels, free.colour.pixels);
+  EXPECT_EQ(behind.colour.pixels, free.colour.pixels);
+  double left = 0, all = 0;
+  for (size_t i = 0; i < free.opacity.pixels.size(); ++i) {
+    EXPECT_LE(before.opacity.pixels[i], free.opacity.pixels[i] + 1e-5f);
+    left += before.opacity.pixels[i];
+    all += free.opacity.pixels[i];
+    EXPECT_EQ(at.opacity.pixels[i], 0);
+  }
+  EXPECT_LT(left, 0.2 * all);  // the cube begins at 1
+}
+
+TEST_F(RenderedField, EndsPixelByPixelAtOpaqueThings) {
+  const RenderedView free = renderer_->render(camera(), pose(), nullptr);
+  ImageF opaque(camera().width, camera().height, 1, std::numeric_limits<float>::infinity());
+  for (int y = 0; y < opaque.height; ++y) {
+    for (int x = 0; x < opaque.width / 2; ++x) *opaque.at(x, y) = 0.01f;
+  }
+  const RenderedView half = renderer_->render(camera(), pose(), &opaque);
+  for (int y = 0; y < opaque.height; ++y) {
+    for (int x = 0; x < opaque.width; ++x) {
+      EXPECT_EQ(*half.opacity.at(x, y), x < opaque.width / 2 ? 0 : *free.opacity.at(x, y)) << x << "," << y;
+    }
+  }
+}
+
+TEST_F(RenderedField, DrawsWhatLiesOutsideThePicturesOfADistortedLensAsNothing) {
+  Camera fisheye = camera();
+  fisheye.lens = LensModel::openCvFisheye;
+  fisheye.parameters = {6, 6, 20, 16, -0.1, 0, 0, 0};  // the corners lie beyond the fold
+  ASSERT_FALSE(fisheye.directionInCamera(Vec2d(0.5, 0.5)));
+  const RenderedView view = renderer_->render(fisheye, pose(), nullptr);
+  EXPECT_EQ(*view.opacity.at(0, 0), 0);
+  for (const float value : view.depth.pixels) EXPECT_TRUE(std::isfinite(value));
+}
+
+}  // namespace
+}  // namespace tessera

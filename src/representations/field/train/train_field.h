@@ -1,0 +1,16 @@
+// `tessera train --method field`: a capture to a model folder.
+#pragma once
+
+#include "representations/field/train/field_trainer.h"
+
+namespace tessera {
+
+struct TrainFieldOptions {
+  FieldConfig config;
+  TrainingLoopOptions loop;
+};
+
+// Trains, resumes, saves; see training_loop.h. Writes config.toml and blocks.json first.
+TrainingResult trainField(Device& device, const Capture& capture, const fs::path& model, TrainFieldOptions options);
+
+}  // namespace tessera

@@ -1,0 +1,17 @@
+// Hash contents from arbitrary bytes: bounded, and what is accepted keeps the rules and survives being written.
+#include "raymarch/testing/content_fuzz.h"
+#include "representations/hash/content/hash_payload.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace tessera;
+  fuzzContent(
+      data, size, decodedHashBytes, decodeHash, [](const HashContent& content) { return encodeHash(content, 0); },
+      [](const HashPart& a, const HashPart& b) {
+        if (a.tables.size() != b.tables.size()) return false;
+        for (size_t l = 0; l < a.tables.size(); ++l) {
+          if (a.tables[l].bytes != b.tables[l].bytes) return false;
+        }
+        return a.cornerBytes == b.cornerBytes && a.occupied.levels == b.occupied.levels && a.distances == b.distances;
+      });
+  return 0;
+}

@@ -1,0 +1,133 @@
+#include "representations/hash/cpu/hash_shading.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tessera {
+
+std::array<float, 16> harmonicsOf(const Vec3d& direction) {
+  const float x = static_cast<float>(direction[0]), y = static_cast<float>(direction[1]),
+              z = static_cast<float>(direction[2]);
+  return {0.28209479177387814f,
+          -0.48860251190291987f * y,
+          0.48860251190291987f * z,
+          -0.48860251190291987f * x,
+          1.0925484305920792f * x * y,
+          -1.0925484305920792f * y * z,
+          0.94617469575755997f * z * z - 0.31539156525251999f,
+          -1.0925484305920792f * x * z,
+          0.54627421529603959f * (x * x - y * y),
+          0.59004358992664352f * y * (y * y - 3 * x * x),
+          2.8906114426405538f * x * y * z,
+          0.45704579946446572f * y * (1 - 5 * z * z),
+          0.37317633259011546f * z * (5 * z * z - 3),
+          0.45704579946446572f * x * (1 - 5 * z * z),
+          1.4453057213202769f * z * (x * x - y * y),
+          0.59004358992664352f * x * (3 * y * y - x * x)};
+}
+
+HashShading::HashShading(const std::vector<const HashContent*>& contents, const MarchSettings& settings)
+    : settings_(settings) {
+  std::vector<const std::vector<DenseLayer>*> known;
+  for (const HashContent* content : contents) {
+    const auto same = std::find_if(known.begin(), known.end(),
+                                   [content](const auto* network) { return *network == content->network; });
+    networkOfContent_.push_back(static_cast<size_t>(same - known.begin()));
+    if (same == known.end()) {
+      known.push_back(&content->network);
+      networks_.emplace_back(content->network, kInputs, kOutputs);
+    }
+    isWhole_ |= content->isWhole;
+    for (const HashPart& part : content->parts) features_.emplace(&part, HashFeatures(*content, part));
+  }
+}
+
+void HashShading::begin(size_t number, const BoundedRay& ray) {
+  Lane& lane = lanes_[number];
+  lane.sums = {};
+  lane.direction = ray.ray.direction;
+  lane.isOpen = !std::isfinite(ray.far);
+  lane.weights.clear();
+}
+
+void HashShading::march(const HashContent& content, const HashPart& part, std::span<const PartRay> rays,
+                        MarchCounts& counts) {
+  std::array<HashRay*, kRayLanes> all;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    rays_[i].path = partPath(part, *rays[i].ray, rays[i].range);
+    rays_[i].transmittanceBefore = transmittance(rays[i].lane);
+    rays_[i].composite = *rays[i].composite;
+    all[i] = &rays_[i];
+  }
+  HashMarch{features_.at(&part), content.step, settings_}.run(std::span(all).first(rays.size()), counts);
+  for (size_t i = 0; i < rays.size(); ++i) *rays[i].composite = rays_[i].composite;
+}
+
+void HashShading::add(size_t number, const ContentComposite& composite, size_t content) {
+  Lane& lane = lanes_[number];
+  const float weight = lane.sums.transmittance * (1 - composite.transmittance);
+  const size_t network = networkOfContent_[content];
+  const auto known = std::find_if(lane.weights.begin(), lane.weights.end(),
+                                  [network](const auto& one) { return one.first == network; });
+  if (known != lane.weights.end()) {
+    known->second += weight;
+  } else if (weight > 0) {
+    lane.weights.emplace_back(network, weight);
+  }
+  for (int k = 0; k < ContentComposite::kValues; ++k) {
+    lane.sums.values[k] += lane.sums.transmittance * composite.values[k];
+  }
+  lane.sums.depth += lane.sums.transmittance * composite.depth;
+  lane.sums.transmittance *= composite.transmittance;
+}
+
+void HashShading::end(size_t number, DrawnPixel& pixel) {
+  const Lane& lane = lanes_[number];
+  pixel = {{0, 0, 0}, lane.sums.transmittance, lane.sums.depth};
+  const bool whole = isWhole_ && lane.isOpen;
+  if (networks_.empty() || (!whole && lane.sums.transmittance >= 1)) return;
+  const auto heaviest = std::max_element(lane.weights.begin(), lane.weights.end(),
+                                         [](const auto& a, const auto& b) { return a.second < b.second; });
+  const size_t network = heaviest == lane.weights.end() ? networkOfContent_.back() : heaviest->first;
+  waiting_.push_back({&pixel, lane.sums, lane.direction, network, whole});
+}
+
+void HashShading::finish() {
+  constexpr size_t kPacket = DenseNetwork::kPacket;
+  alignas(64) float values[DenseNetwork::kMostWidth * kPacket];
+  // Rays of one network side by side, however they came.
+  std::stable_sort(waiting_.begin(), waiting_.end(),
+                   [](const Waiting& a, const Waiting& b) { return a.network < b.network; });
+  for (size_t first = 0; first < waiting_.size();) {
+    const size_t network = waiting_[first].network;
+    size_t count = 0;
+    for (; count < kPacket && first + count < waiting_.size() && waiting_[first + count].network == network; ++count) {
+      const Waiting& ray = waiting_[first + count];
+      const std::array<float, 16> harmonics = harmonicsOf(ray.direction);
+      for (size_t k = 0; k < ContentComposite::kValues; ++k) values[k * kPacket + count] = ray.sums.values[k];
+      for (size_t k = 0; k < harmonics.size(); ++k) {
+        values[(ContentComposite::kValues + k) * kPacket + count] = harmonics[k];
+      }
+    }
+    for (size_t column = count; column < kPacket; ++column) {
+      for (size_t k = 0; k < kInputs; ++k) values[k * kPacket + column] = 0;
+    }
+    networks_[network].runPacket(values);
+    for (size_t column = 0; column < count; ++column) {
+      const Waiting& ray = waiting_[first + column];
+      DrawnPixel& pixel = *ray.pixel;
+      if (ray.whole) {
+        pixel.depth /= std::max(1 - pixel.transmittance, 1e-6f);  // of an opaque pixel
+        pixel.transmittance = 0;
+      }
+      for (size_t c = 0; c < kOutputs; ++c) {
+        const float z = ray.sums.values[c] + values[c * kPacket + column];
+        pixel.colour[c] = (1 - pixel.transmittance) / (1 + std::exp(-z));
+      }
+    }
+    first += count;
+  }
+  waiting_.clear();
+}
+
+}  // namespace tessera

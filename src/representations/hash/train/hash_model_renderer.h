@@ -1,0 +1,24 @@
+// Draws a `hash` model by marching: the training-time picture.
+#pragma once
+
+#include "representations/hash/train/hash_pass.h"
+#include "scene/view_renderer.h"
+#include "train/picture_rays.h"
+
+namespace tessera {
+
+class HashModelRenderer final : public ViewRenderer {
+ public:
+  // Keeps a reference to `model`.
+  explicit HashModelRenderer(HashModel& model);
+
+  RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
+  std::string device() const override;
+
+ private:
+  HashModel& model_;
+  HashPass pass_;
+  PictureRays pictureRays_;
+};
+
+}  // namespace tessera

@@ -1,0 +1,167 @@
+#include "representations/hash/train/train_hash.h"
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "render/tile_scene.h"
+#include "representations/hash/bake/bake_hash.h"
+#include "representations/hash/content/hash_payload.h"
+#include "representations/hash/testing/hash_cube.h"
+#include "representations/hash/testing/hash_renderer.h"
+#include "representations/hash/train/hash_model_renderer.h"
+#include "train/level_folders.h"
+#include "train/testing/two_devices.h"
+
+namespace tessera {
+namespace {
+
+class HashTraining : public testing::Test {
+ protected:
+  HashTraining() : device_(makeDevice({"cpu", 2})) {}
+
+  TrainHashOptions options(int64_t steps, bool resume = false) const {
+    TrainHashOptions options;
+    options.config = smallHashConfig();
+    options.config.lattice = 32;
+    options.config.levelShare = 0.5;
+    options.grid = cubeGrid(2);
+    options.loop.steps = steps;
+    options.loop.resume = resume;
+    return options;
+  }
+
+  TwoDevices trainings() const {
+    return {[this](Device& device, const fs::path& folder, const TrainingLoopOptions& loop) {
+              TrainHashOptions some = options(0);
+              some.config.levelShare = 0;
+              some.loop = loop;
+              trainHash(device, scene_.capture(), folder, some);
+            },
+            [this](Device& device, const fs::path& folder) {
+              const std::unique_ptr<HashModel> model = loadHashModel(device, folder);
+              return HashModelRenderer(*model)
+                  .render(scene_.capture().cameras[0], scene_.capture().photos[3].worldFromCamera, nullptr)
+                  .colour;
+            }};
+  }
+
+  TrainingResult train(const TrainHashOptions& options) {
+    return trainHash(*device_, scene_.capture(), scene_ / "model", options);
+  }
+
+  const CubeScene scene_;
+  const std::unique_ptr<Device> device_;
+};
+
+TEST(HashLevels, HaveHalfTheLatticeOneFineLevelFewerAndAQuarterOfTheEntries) {
+  HashConfig finest;
+  const HashConfig coarse = levelConfig(finest, 1, 100), coarsest = levelConfig(finest, 9, 100);
+  EXPECT_EQ(coarse.lattice, finest.lattice / 2);
+  EXPECT_EQ(coarse.levels, finest.levels - 1);
+  EXPECT_EQ(coarse.fineLog2Size, finest.fineLog2Size - 2);
+  EXPECT_EQ(coarse.level, 1);
+  EXPECT_EQ(coarse.finestStep, 100);
+  coarse.check();
+  coarsest.check();
+  EXPECT_EQ(coarsest.lattice, 8);
+  EXPECT_EQ(coarsest.levels, 1);
+}
+
+TEST_F(HashTraining, MakesCoarserLevelsOfTheSameBlocks) {
+  const TrainingResult result = train(options(60));
+  EXPECT_TRUE(result.finished);
+  EXPECT_EQ(result.step, 60);
+  const fs::path model = scene_ / "model";
+  ASSERT_EQ(trainedLevels<HashConfig>(model), 2u) << "two blocks, and a tile that holds both";
+  const HashConfig coarse = savedConfig<HashConfig>(levelFolder(model, 1));
+  EXPECT_EQ(coarse.lattice, 16);
+  EXPECT_EQ(coarse.finestStep, 60);
+  EXPECT_EQ(ModelFolder(levelFolder(model, 1)).manifest()->step, 30);
+
+  // Both are drawn, the coarser one in one tile of two parts.
+  const HashLevelModels models = [&](uint32_t level) { return loadHashModel(*device_, levelFolder(model, level)); };
+  const BakedScene baked = bakeHash(models, 2, scene_.capture(), scene_ / "scene", {});
+  ASSERT_EQ(baked.levels.size(), 2u);
+  EXPECT_LT(baked.levels[1].bytesInMemory, baked.levels[0].bytesInMemory / 2);
+  EXPECT_EQ(baked.tileset.tiles.size(), 3u);
+  EXPECT_GT(baked.tileset.root().geometricError, 1.9 * baked.tileset.tiles[1].geometricError);
+  for (const int level : {0, 1}) {
+    TileScene opened = openTileScene(scene_ / "scene", hashCodec());
+    EXPECT_EQ(contentAs<HashContent>(*opened.source.load(0)).parts.size(), 2u);
+    SceneRendererSettings settings;
+    settings.threads = 2;
+    settings.selection.mostPixels = 0;
+    settings.selection.finestLevel = level;
+    HashRenderer renderer(opened.frame, std::move(opened.tree), std::move(opened.source), settings);
+    const Photo& photo = scene_.capture().photos[0];
+    const RenderedView view =
+        renderer.render(scene_.capture().cameras[static_cast<size_t>(photo.camera)], photo.worldFromCamera, nullptr);
+    float most = 0;
+    for (const float opacity : view.opacity.pixels) most = std::max(most, opacity);
+    EXPECT_GT(most, 0.3f) << level;
+    for (const SelectedTile& tile : renderer.cut().tiles) EXPECT_EQ(tile.content == 0, level == 1);
+  }
+}
+
+TEST_F(HashTraining, MakesCoarserLevelsAnewWhenTheFinestHasGoneOn) {
+  train(options(20));
+  const fs::path model = scene_ / "model";
+  ASSERT_EQ(trainedLevels<HashConfig>(model), 2u);
+  TrainHashOptions finestAlone = options(40, true);
+  finestAlone.config.levelShare = 0;
+  train(finestAlone);
+  EXPECT_EQ(trainedLevels<HashConfig>(model), 1u) << "made from the model as it was at step 20";
+  train(options(40, true));
+  EXPECT_EQ(trainedLevels<HashConfig>(model), 2u);
+  EXPECT_EQ(savedConfig<HashConfig>(levelFolder(model, 1)).finestStep, 40);
+}
+
+// Killed while a level was being made, or taken away.
+TEST_F(HashTraining, MakesALevelThatIsNotWhole) {
+  train(options(20));
+  const fs::path level = levelFolder(scene_ / "model", 1);
+  const Bytes unbroken = readFile(level / ModelFolder(level).manifest()->files[0]);
+  fs::remove(level / "manifest.json");
+  fs::remove_all(level / "blocks");
+  EXPECT_EQ(trainedLevels<HashConfig>(scene_ / "model"), 1u);
+  train(options(20, true));
+  ASSERT_EQ(trainedLevels<HashConfig>(scene_ / "model"), 2u);
+  EXPECT_EQ(readFile(level / ModelFolder(level).manifest()->files[0]), unbroken);
+}
+
+TEST_F(HashTraining, RefusesStepsThatNoSceneHasBeforeItTrains) {
+  TrainHashOptions wide = options(20);
+  wide.config.step = 3;  // of 32 corners; of 16 too long
+  EXPECT_THROW(train(wide), Error);
+  EXPECT_FALSE(fs::exists(scene_ / "model" / "manifest.json"));
+  wide.config.levelShare = 0;
+  train(wide);
+}
+
+TEST_F(HashTraining, LeavesCoarserLevelsOutWhereNoneAreWanted) {
+  TrainHashOptions alone = options(10);
+  alone.config.levelShare = 0;
+  train(alone);
+  EXPECT_EQ(trainedLevels<HashConfig>(scene_ / "model"), 1u);
+  EXPECT_FALSE(fs::exists(scene_ / "model" / "levels"));
+}
+
+TEST_F(HashTraining, ComesToTheSameOnVulkanAndGoesOnThereAndBack) {
+  trainings().expectTheSamePictures(scene_ / "models");
+}
+
+TEST_F(HashTraining, LosesNothingWhereAGraphicsCardFails) {
+  trainings().expectToSurviveFailures(scene_ / "models");
+}
+
+TEST_F(HashTraining, SendsEachStepToAGraphicsCardAtOnce) {
+#ifdef TESSERA_HAS_VULKAN
+  SKIP_WITHOUT_VULKAN(openForTest());
+  const std::unique_ptr<Device> vulkan = makeVulkanDeviceWithFewGroups({});
+  HashTrainer trainer(*vulkan, scene_.capture(), smallHashConfig(), cubeGrid());
+  expectOneBatchAStep(*vulkan, trainer);
+#endif
+}
+
+}  // namespace
+}  // namespace tessera

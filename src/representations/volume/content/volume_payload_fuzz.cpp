@@ -1,0 +1,14 @@
+// Volume contents from arbitrary bytes: bounded, and what is accepted keeps the rules and survives being written.
+#include "raymarch/testing/content_fuzz.h"
+#include "representations/volume/content/volume_payload.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace tessera;
+  fuzzContent(
+      data, size, decodedVolumeBytes, decodeVolume,
+      [](const VolumeContent& content) { return encodeVolume(content, 0); },
+      [](const VolumePart& a, const VolumePart& b) {
+        return a.voxelBytes == b.voxelBytes && a.planeBytes == b.planeBytes && a.distances == b.distances;
+      });
+  return 0;
+}

@@ -1,0 +1,16 @@
+// For tests: the renderer on the CPU of scenes of `volume`.
+#pragma once
+
+#include "render/cpu/scene_renderer.h"
+#include "representations/volume/cpu/volume_drawer.h"
+
+namespace tessera {
+
+class VolumeRenderer final : public SceneRenderer {
+ public:
+  VolumeRenderer(const TileFrame& frame, TileTree tree, TileSource<Content> source,
+                 const SceneRendererSettings& settings)
+      : SceneRenderer(makeVolumeDrawer(), frame, std::move(tree), std::move(source), settings) {}
+};
+
+}  // namespace tessera

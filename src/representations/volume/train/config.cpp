@@ -1,0 +1,146 @@
+#include "representations/volume/train/config.h"
+
+#include "base/error.h"
+#include "train/block_frame.h"
+
+namespace tessera {
+VolumeConfig VolumeConfig::ofPreset(const std::string& name) {
+  VolumeConfig config;
+  config.preset = name;
+  if (name == "cpu") return config;
+  if (name != "paper") throw Error("--set preset=" + name, "", "there is no such preset", "use cpu or paper");
+  config.voxels = 512;
+  config.planes = 2048;
+  config.gridLevels = 16;
+  config.gridLog2Size = 19;
+  config.gridFinest = 2048;
+  config.width = 64;
+  config.hidden = 3;
+  config.proposalLog2Size = 17;
+  config.proposalFinest = 256;
+  config.firstIntervals = config.secondIntervals = 64;
+  config.samples = 32;
+  config.proposalEvery = 1;
+  config.texelsPerStep = 1 << 22;
+  config.sparsityPoints = 1 << 17;
+  return config;
+}
+
+VolumeConfig::VolumeConfig() {
+  setOwnDefaults(fields());
+}
+
+std::vector<ConfigField> VolumeConfig::fields() {
+  return {
+      presetSetting(),
+      surroundSetting(),
+      levelSetting(),
+      finestStepSetting(),
+      nearSetting(),
+      voxelsSetting(),
+      planesSetting(),
+      featureRangeSetting(),
+      densityRangeSetting(),
+      quantiseSetting(),
+      shareTexelsSetting(),
+      gridLevelsSetting(),
+      gridLog2SizeSetting(),
+      gridBaseSetting(),
+      gridFinestSetting(),
+      widthSetting().byDefault(32),
+      hiddenSetting(),
+      proposalLevelsSetting(),
+      proposalLog2SizeSetting(),
+      proposalFinestSetting(),
+      proposalWidthSetting(),
+      firstIntervalsSetting(),
+      secondIntervalsSetting(),
+      samplesSetting(),
+      paddingSetting(),
+      proposalEverySetting(),
+      proposalWarmUpSetting(),
+      seedSetting(),
+      residentBlocksSetting(),
+      residencyStepsSetting(),
+      texelsPerStepSetting().within(1024, 1 << 26),
+      firstRaysSetting().byDefault(1024).within(16, mostRays),
+      mostRaysSetting().within(64, 1 << 20),
+      photoBudgetMiBSetting(),
+      stepsPerPhotoSetting(),
+      rateSetting(),
+      finalRateFactorSetting().byDefault(0.1),
+      constantRateShareSetting().byDefault(0.3),
+      deferredRateFactorSetting(),
+      tableL2Setting(),
+      networkL2Setting(),
+      exposureRateSetting(),
+      lossSetting().byDefault("charbonnier"),
+      lossParameterSetting().byDefault(1e-3),
+      s3imSetting(),
+      interlevelSetting(),
+      distortionSetting(),
+      sparsitySetting(),
+      opacitySetting(),
+      rampShareSetting().byDefault(0.1),
+      sparsityPointsSetting(),
+      cullBeginSetting(),
+      cullEndSetting(),
+      cullFirstSetting(),
+      cullLastSetting(),
+      literalEq3Setting(),
+      fullGradientDistanceSetting(),
+      knownShareSetting().byDefault(0.05),
+      knownBracketSetting(),
+      freeSpaceSetting(),
+      blocksOnlySetting(),
+      levelShareSetting(),
+      frozenShareSetting(),
+      levelRateFactorSetting(),
+      levelPaddingSetting(),
+      exposureSetting(),
+      randomBackgroundSetting(),
+  };
+}
+
+void VolumeConfig::check() const {
+  surroundKind();
+  ofPreset(preset);
+  VolumeConfig checked = *this;
+  requireWithinBounds(checked.fields());
+}
+
+Surround VolumeConfig::surroundKind() const {
+  return surroundNamed(surround);
+}
+
+VirtualGrid VolumeConfig::virtualGrid() const {
+  VirtualGrid grid;
+  grid.voxels = static_cast<uint32_t>(voxels);
+  grid.planes = static_cast<uint32_t>(planes);
+  grid.quantise = quantise;
+  grid.shareTexels = shareTexels;
+  grid.featureRange = static_cast<float>(featureRange);
+  grid.densityRange = static_cast<float>(densityRange);
+  return grid;
+}
+
+BlockFieldShape VolumeConfig::attributeShape() const {
+  HashGridOptions grid;
+  grid.levels = gridLevels;
+  grid.log2TableSize = gridLog2Size;
+  grid.baseResolution = gridBase;
+  grid.finestResolution = gridFinest;
+  return makeBlockFieldShape(grid, width, hidden, static_cast<int>(VirtualGrid::kAttributes),
+                             OutputActivation::sigmoid);
+}
+
+BlockFieldShape VolumeConfig::proposalShape() const {
+  HashGridOptions grid;
+  grid.levels = proposalLevels;
+  grid.log2TableSize = proposalLog2Size;
+  grid.baseResolution = gridBase;
+  grid.finestResolution = proposalFinest;
+  return makeBlockFieldShape(grid, proposalWidth, 1, 1, OutputActivation::none);
+}
+
+}  // namespace tessera

@@ -1,0 +1,392 @@
+#include "representations/volume/train/volume_trainer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/error.h"
+#include "representations/volume/testing/volume_cube.h"
+#include "representations/volume/train/train_volume.h"
+#include "representations/volume/train/volume_model_renderer.h"
+
+namespace tessera {
+namespace {
+
+// Mean PSNR over the held-out views.
+double heldOut(const CubeScene& scene, VolumeModel& model) {
+  VolumeModelRenderer renderer(model, static_cast<float>(model.config().cullLast));
+  double sum = 0;
+  const std::vector<int> photos = scene.capture().photosIn(Split::test);
+  for (const int photo : photos) {
+    const Camera& camera = scene.capture().cameras[0];
+    const Pose& pose = scene.capture().photos[photo].worldFromCamera;
+    sum += psnrOf(renderer.render(camera, pose, nullptr), scene.truth(camera, pose));
+  }
+  return sum / static_cast<double>(photos.size());
+}
+
+TEST(VolumeTrainer, LearnsACubeInOneBlockAndInTwoThatMeetInIt) {
+  const CubeScene scene;
+  for (const int columns : {1, 2}) {
+    TrainedVolumeCube trained(scene, smallVolumeConfig(), cubeGrid(columns), 300);
+    EXPECT_GT(heldOut(scene, trained.model()), 24) << columns << " blocks";
+  }
+}
+
+TEST(VolumeTrainer, LearnsWhatLiesAroundTheRegionInTheSurround) {
+  CubeScene::Options options;
+  options.room = true;  // walls at 2.5, far outside of the blocks
+  const CubeScene scene(options);
+  for (const char* surround : {"own", "border"}) {
+    VolumeConfig config = smallVolumeConfig();
+    config.surround = surround;
+    TrainedVolumeCube trained(scene, config, cubeGrid(), 300);
+    EXPECT_EQ(trained.model().space().blocks(), surround == std::string("own") ? 2u : 1u);
+    EXPECT_GT(heldOut(scene, trained.model()), 20) << surround;
+  }
+}
+
+// Median of how far depths are from the truth, of held-out views' pixels where something is.
+double depthError(const CubeScene& scene, VolumeModel& model) {
+  VolumeModelRenderer renderer(model, static_cast<float>(model.config().cullLast));
+  std::vector<float> errors;
+  for (const int photo : scene.capture().photosIn(Split::test)) {
+    const Camera& camera = scene.capture().cameras[0];
+    const Pose& pose = scene.capture().photos[photo].worldFromCamera;
+    const RenderedView seen = renderer.render(camera, pose, nullptr), truth = scene.truth(camera, pose);
+    for (size_t i = 0; i < truth.depth.pixels.size(); ++i)
+      errors.push_back(std::abs(seen.depth.pixels[i] - truth.depth.pixels[i]));
+  }
+  std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
+  return errors[errors.size() / 2];
+}
+
+TEST(VolumeTrainer, LearnsFromSparsePointsWhereThingsStand) {
+  CubeScene::Options options;
+  options.room = true;
+  options.observationsPerPhoto = 50;
+  const CubeScene scene(options);
+  VolumeConfig config = smallVolumeConfig();
+  config.surround = "own";
+  const auto errorWith = [&](double knownShare) {
+    config.knownShare = knownShare;
+    TrainedVolumeCube trained(scene, config, cubeGrid(2), 60);
+    return depthError(scene, trained.model());
+  };
+  const double without = errorWith(0), with = errorWith(0.1);
+  EXPECT_LT(with, 0.5 * without);
+}
+
+TEST(VolumeTrainer, MakesTheSameBytesOnAnyNumberOfThreads) {
+  const CubeScene scene;
+  const VolumeConfig config = smallVolumeConfig();
+  const std::vector<Bytes> one = TrainedVolumeCube(scene, config, cubeGrid(2), 40, 1).saved();
+  EXPECT_EQ(one, TrainedVolumeCube(scene, config, cubeGrid(2), 40, 2).saved());
+  EXPECT_EQ(one, TrainedVolumeCube(scene, config, cubeGrid(2), 40, 5).saved());
+  VolumeConfig other = config;
+  other.seed = 1;
+  EXPECT_NE(one, TrainedVolumeCube(scene, other, cubeGrid(2), 40, 2).saved());
+}
+
+TEST(VolumeTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
+  const CubeScene scene;
+  const VolumeConfig config = smallVolumeConfig();
+  constexpr int64_t kSteps = 60;
+  TrainedVolumeCube unbroken(scene, config, cubeGrid(2), 0);
+  for (int64_t step = 0; step < kSteps; ++step) unbroken.trainer->step(step, kSteps);
+  std::vector<Bytes> state;
+  for (int64_t step = 0; step < kSteps;) {
+    TrainedVolumeCube part(scene, config, cubeGrid(2), 0);
+    for (size_t k = 0; k < state.size(); ++k) {
+      const auto file = decodeSafetensors(state[k]);
+      ASSERT_TRUE(file);
+      part.trainer->restore(static_cast<uint32_t>(k), "state", *file);
+    }
+    for (const int64_t until = step + 25; step < std::min(until, kSteps); ++step) part.trainer->step(step, kSteps);
+    state = part.saved();
+  }
+  EXPECT_EQ(state, unbroken.saved());
+}
+
+// Four blocks about the cube, of which two are in memory.
+VolumeConfig twoOfFour() {
+  VolumeConfig config = smallVolumeConfig();
+  config.residentBlocks = 2;
+  config.residencySteps = 24;
+  return config;
+}
+
+BlockGrid fourBlocks() {
+  BlockGrid grid = cubeGrid(2);
+  grid.rows = 2;
+  return grid;
+}
+
+TEST(VolumeTrainer, LearnsACubeWithHalfOfItsBlocksInMemory) {
+  const CubeScene scene;
+  const VolumeConfig config = twoOfFour();
+  constexpr int64_t kSteps = 400;
+  TrainedVolumeCube few(scene, config, fourBlocks(), kSteps);
+  EXPECT_EQ(few.model().slots(), 2u);
+  ASSERT_NE(few.trainer->residency(), nullptr);
+  EXPECT_GE(few.trainer->residency()->stays().size(), 4u) << "each pair of neighbours";
+  // As a model for drawing has it: all in memory.
+  VolumeModel whole(*few.device, config, fourBlocks());
+  const std::vector<Bytes> parts = few.saved();
+  ASSERT_EQ(parts.size(), 4u);
+  for (uint32_t block = 0; block < 4; ++block) whole.restore(block, "state", *decodeSafetensors(parts[block]));
+  // Nearly half of what the photos show passes three or four blocks, and is not trained on: all in memory gives 23.5.
+  EXPECT_NEAR(few.trainer->residency()->unserved(), 0.46, 0.1);
+  EXPECT_GT(heldOut(scene, whole), 20.5);
+}
+
+// Asked before they have seen anything, they decide for being empty.
+TEST(VolumeTrainer, LetsBlocksThatWaitSeeSomethingBeforeTheyAreToDecide) {
+  const CubeScene scene;
+  VolumeConfig config = twoOfFour(), urged = config;
+  urged.rampShare = 0;
+  urged.opacity = urged.distortion = urged.sparsity = 1;
+  config.opacity = config.distortion = config.sparsity = 0;
+  TrainedVolumeCube calm(scene, config, fourBlocks(), 0), strict(scene, urged, fourBlocks(), 0);
+  const int64_t cycle = calm.trainer->residency()->cycleSteps();
+  for (int64_t step = 0; step <= cycle; ++step) {
+    EXPECT_EQ(calm.saved(), strict.saved()) << "before step " << step;
+    calm.trainer->step(step, 100);
+    strict.trainer->step(step, 100);
+  }
+  EXPECT_NE(calm.saved(), strict.saved());
+  // A coarser level has been copied from one that has seen everything.
+  for (VolumeConfig* level : {&config, &urged}) {
+    *level = levelConfig(*level, 1, cycle);
+    level->frozenShare = 0;
+  }
+  TrainedVolumeCube calmLevel(scene, config, fourBlocks(), 0), strictLevel(scene, urged, fourBlocks(), 0);
+  calmLevel.trainer->step(0, 100);
+  strictLevel.trainer->step(0, 100);
+  EXPECT_NE(calmLevel.saved(), strictLevel.saved());
+}
+
+TEST(VolumeTrainer, TakesFewerRaysWhereTheyWantMoreTexelsThanThereIsRoomFor) {
+  const CubeScene scene;
+  VolumeConfig config = smallVolumeConfig();
+  config.texelsPerStep = 4096;
+  config.sparsityPoints = 16;
+  config.exposure = true;
+  config.firstRays = config.mostRays;
+  TrainedVolumeCube trained(scene, config, cubeGrid(), 0);
+  const StepReport report = trained.trainer->step(0, 10);
+  EXPECT_LE(report.texels, 6144u + 16 * VirtualGrid::kCorners);
+  EXPECT_LT(report.rays, static_cast<uint32_t>(config.firstRays));
+  EXPECT_GE(report.rays, 16u);
+  // A function of the step alone.
+  TrainedVolumeCube again(scene, config, cubeGrid(), 0);
+  EXPECT_EQ(again.trainer->step(0, 10).rays, report.rays);
+  EXPECT_EQ(again.saved(), trained.saved());
+  // As if it had never been tried with more.
+  config.firstRays = static_cast<int>(report.rays);
+  TrainedVolumeCube meant(scene, config, cubeGrid(), 0);
+  EXPECT_EQ(meant.trainer->step(0, 10).rays, report.rays);
+  EXPECT_EQ(meant.saved(), trained.saved());
+}
+
+// Of each ray of the last step: the blocks that are seen through its tile.
+std::vector<std::vector<uint32_t>> blocksOfRays(const CubeScene& scene, TrainedVolumeCube& trained) {
+  const TiledPhotos photos = tilePhotos(scene.capture(), trained.model().frame(), trained.model().space());
+  const RayBatch& batch = trained.trainer->rays().batch();
+  std::vector<std::vector<uint32_t>> blocks;
+  for (size_t ray = 0; ray < batch.photoOfRay.size(); ++ray) {
+    const float x = batch.pixels[2 * ray], y = batch.pixels[2 * ray + 1];
+    for (size_t t = 0; t < photos.tiles.size(); ++t) {
+      const PhotoTile& tile = photos.tiles[t];
+      const bool inside = static_cast<float>(tile.left) <= x && x < static_cast<float>(tile.right) &&
+                          static_cast<float>(tile.top) <= y && y < static_cast<float>(tile.bottom);
+      if (inside && tile.photo == static_cast<int>(batch.photoOfRay[ray])) {
+        blocks.push_back(photos.sets[photos.setOfTile[t]]);
+      }
+    }
+  }
+  return blocks;
+}
+
+TEST(VolumeTrainer, DrawsNoRaysThatSeeNoBlockWhenToldSo) {
+  const CubeScene scene;
+  BlockGrid part = cubeGrid();
+  part.edge /= 4;
+  part.bottom /= 4;
+  part.top /= 4;
+  const auto missing = [&](bool blocksOnly) {
+    VolumeConfig config = smallVolumeConfig();
+    config.blocksOnly = blocksOnly;
+    TrainedVolumeCube trained(scene, config, part, 0);
+    trained.trainer->step(0, 10);
+    const std::vector<std::vector<uint32_t>> blocks = blocksOfRays(scene, trained);
+    return std::count_if(blocks.begin(), blocks.end(), [](const auto& seen) { return seen.empty(); });
+  };
+  EXPECT_GT(missing(false), 100);
+  EXPECT_EQ(missing(true), 0);
+}
+
+TEST(VolumeTrainer, DrawsNoRaysThatSeeABlockThatWaits) {
+  const CubeScene scene;
+  TrainedVolumeCube trained(scene, twoOfFour(), fourBlocks(), 0);
+  std::vector<int> raysOfBlock(4);
+  const int64_t cycle = trained.trainer->residency()->cycleSteps();
+  for (int64_t step = 0; step < cycle; ++step) {
+    const StepReport report = trained.trainer->step(step, 100);
+    const std::vector<uint32_t>& held = trained.model().blockOfSlot();
+    const std::vector<std::vector<uint32_t>> blocks = blocksOfRays(scene, trained);
+    ASSERT_GE(blocks.size(), report.rays);
+    for (const std::vector<uint32_t>& seen : blocks) {
+      for (const uint32_t block : seen) {
+        ASSERT_NE(std::find(held.begin(), held.end(), block), held.end()) << block << " in step " << step;
+        ++raysOfBlock[block];
+      }
+    }
+  }
+  for (const int rays : raysOfBlock) EXPECT_GT(rays, 100) << "each has its share";
+}
+
+TEST(VolumeTrainer, TrainsNothingButNetworksWhileALevelIsFrozen) {
+  const CubeScene scene;
+  VolumeConfig config = levelConfig(smallVolumeConfig(), 1, 0);
+  config.frozenShare = 0.5;
+  TrainedVolumeCube level(scene, config, cubeGrid(2), 0);
+  const auto fields = [&] {
+    std::vector<std::vector<float>> values;
+    for (uint32_t slot = 0; slot < level.model().slots(); ++slot) {
+      values.push_back(level.device->read(level.model().attributes().table(slot).values.all()));
+      values.push_back(level.device->read(level.model().attributes().network(slot).values.all()));
+      values.push_back(level.device->read(level.model().proposals().table(slot).values.all()));
+    }
+    return values;
+  };
+  const auto network = [&] { return level.device->read(level.model().deferred().values.all()); };
+  const auto fieldsBefore = fields();
+  const std::vector<float> networkBefore = network();
+  for (int64_t step = 0; step < 5; ++step) level.trainer->step(step, 10);
+  EXPECT_EQ(fields(), fieldsBefore);
+  EXPECT_NE(network(), networkBefore);
+  level.trainer->step(5, 10);
+  EXPECT_NE(fields(), fieldsBefore);
+}
+
+TEST(VolumeTrainer, BeginsALevelWithTheExposuresOfTheOneBelow) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  TrainVolumeOptions options;
+  options.config = smallVolumeConfig();
+  options.config.levelShare = 0;
+  options.config.exposure = true;
+  options.blocks = *parseBlockCount("2x1");
+  options.loop.steps = 40;
+  options.loop.progress = false;
+  trainVolume(*device, scene.capture(), scene / "model", options);
+  VolumeTrainer level(*device, scene.capture(), levelConfig(options.config, 1, 40),
+                      requireGrid(ModelFolder(scene / "model")));
+  level.beginFrom(scene / "model");
+  const fs::path file = scene / "model" / ModelFolder(scene / "model").manifest()->files[0];
+  const auto exposures = [](const Safetensors& state) {
+    const auto values = state.require("state", "exposures", TensorType::f32).as<float>();
+    return std::vector<float>(values.begin(), values.end());
+  };
+  const std::vector<float> below = exposures(readSafetensors(file));
+  EXPECT_NE(below, std::vector<float>(below.size(), 0.0f));
+  EXPECT_EQ(exposures(*decodeSafetensors(level.save(0))), below);
+}
+
+TEST(VolumeTrainer, LeavesWaitingBlocksAsTheyAre) {
+  const CubeScene scene;
+  VolumeConfig config = twoOfFour();
+  config.residencySteps = 4000;  // one stay
+  TrainedVolumeCube before(scene, config, fourBlocks(), 0);
+  const std::vector<Bytes> first = before.saved();
+  before.trainer.reset();  // its scratch is in the same place
+  TrainedVolumeCube after(scene, config, fourBlocks(), 12);
+  const std::vector<uint32_t>& held = after.model().blockOfSlot();
+  const std::vector<Bytes> last = after.saved();
+  for (uint32_t block = 0; block < 4; ++block) {
+    const auto was = decodeSafetensors(first[block]), is = decodeSafetensors(last[block]);
+    for (const char* name : {"attributes.table", "proposals.network"}) {
+      const auto a = was->tensors.at(name).bytes, b = is->tensors.at(name).bytes;
+      EXPECT_EQ(std::equal(a.begin(), a.end(), b.begin(), b.end()),
+                std::find(held.begin(), held.end(), block) == held.end())
+          << name << " of block " << block;
+    }
+  }
+}
+
+TEST(VolumeTrainer, GoesOnAfterRestoringWithBlocksThatWait) {
+  const CubeScene scene;
+  for (const char* surround : {"none", "own"}) {
+    VolumeConfig config = twoOfFour();
+    config.surround = surround;
+    constexpr int64_t kSteps = 60;
+    std::vector<Bytes> unbroken;
+    {
+      TrainedVolumeCube whole(scene, config, fourBlocks(), 0);
+      for (int64_t step = 0; step < kSteps; ++step) whole.trainer->step(step, kSteps);
+      unbroken = whole.saved();
+    }
+    EXPECT_FALSE(fs::exists(scene / "waiting")) << "scratch is gone";
+    std::vector<Bytes> state;
+    for (int64_t step = 0; step < kSteps;) {
+      TrainedVolumeCube part(scene, config, fourBlocks(), 0);
+      for (size_t k = 0; k < state.size(); ++k) {
+        part.trainer->restore(static_cast<uint32_t>(k), "state", *decodeSafetensors(state[k]));
+      }
+      for (const int64_t until = step + 25; step < std::min(until, kSteps); ++step) part.trainer->step(step, kSteps);
+      state = part.saved();
+    }
+    EXPECT_EQ(state, unbroken) << surround;
+  }
+}
+
+TEST(VolumeTrainer, NamesTheBlockThatIsBroken) {
+  const CubeScene scene;
+  TrainedVolumeCube trained(scene, smallVolumeConfig(), cubeGrid(2), 1);
+  EXPECT_EQ(trained.trainer->brokenPart(), std::nullopt);
+  ParameterGroup& network = trained.model().attributes().network(1);
+  std::vector<float> values = trained.device->read(network.values.all());
+  values[5] = std::numeric_limits<float>::quiet_NaN();
+  trained.device->write(network.values.all(), std::span<const float>(values));
+  EXPECT_EQ(trained.trainer->brokenPart(), 1u);
+}
+
+TEST(VolumeTrainer, RefusesCheckpointsOfOtherKinds) {
+  const CubeScene scene;
+  TrainedVolumeCube trained(scene, smallVolumeConfig(), cubeGrid(), 0);
+  const auto other = decodeSafetensors(encodeSafetensors({}, {{"format", "tessera field 1"}}));
+  ASSERT_TRUE(other);
+  EXPECT_THROW(trained.trainer->restore(0, "file", *other), Error);
+}
+
+// An untouched block costs nothing: its parameters are what they were.
+TEST(VolumeTrainer, LeavesBlocksAloneThatNoRayComesTo) {
+  const CubeScene scene;
+  BlockGrid grid = cubeGrid(2);
+  grid.originInWorld.x() += 0.7 + 1.4;  // the cube is in no block, and behind the grid for nobody
+  grid.originInWorld.z() += 40;
+  VolumeConfig config = smallVolumeConfig();
+  config.sparsityPoints = 0;
+  TrainedVolumeCube before(scene, config, grid, 0), after(scene, config, grid, 20);
+  for (uint32_t block = 0; block < 2; ++block) {
+    EXPECT_EQ(before.device->read(before.model().attributes().table(block).values.all()),
+              after.device->read(after.model().attributes().table(block).values.all()));
+  }
+}
+
+TEST(VolumeTrainer, RaisesTheCullThresholdAsPlanned) {
+  VolumeConfig config;
+  EXPECT_EQ(cullThreshold(config, 0), 0);
+  EXPECT_EQ(cullThreshold(config, config.cullBegin - 1e-6), 0);
+  EXPECT_NEAR(cullThreshold(config, config.cullBegin), config.cullFirst, 1e-9);
+  EXPECT_NEAR(cullThreshold(config, (config.cullBegin + config.cullEnd) / 2),
+              std::sqrt(config.cullFirst * config.cullLast), 1e-7);
+  EXPECT_NEAR(cullThreshold(config, config.cullEnd), config.cullLast, 1e-9);
+  EXPECT_NEAR(cullThreshold(config, 1), config.cullLast, 1e-9);
+}
+
+}  // namespace
+}  // namespace tessera

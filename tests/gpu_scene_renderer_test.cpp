@@ -1,0 +1,242 @@
+#include "render/vulkan/gpu_scene_renderer.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <thread>
+
+#include "gpu/testing/test_context.h"
+#include "render/testing/source_of_copies.h"
+#include "representations/hash/testing/hash_renderer.h"
+#include "representations/hash/testing/made_hash.h"
+#include "representations/hash/vulkan/gpu_hash_drawer.h"
+#include "representations/volume/testing/made_place.h"
+#include "representations/volume/testing/volume_renderer.h"
+#include "representations/volume/vulkan/gpu_volume_drawer.h"
+
+namespace tessera {
+namespace {
+
+double decibels(const ImageF& a, const ImageF& b) {
+  double squares = 1e-12, largest = 1e-6;
+  for (size_t i = 0; i < a.pixels.size(); ++i) {
+    squares += std::pow(a.pixels[i] - b.pixels[i], 2);
+    largest = std::max<double>(largest, std::abs(b.pixels[i]));
+  }
+  return 10 * std::log10(static_cast<double>(a.pixels.size()) * largest * largest / squares);
+}
+
+// 2x2 cells of made features under one content of them all, which has a network of its own, and a surround.
+struct HashPlace {
+  TileTree tree = madeTree(2, 2);
+  std::vector<HashContent> contents;
+  TileFrame frame;
+  uint64_t allBytes = 0, coarsestBytes = 0;
+
+  // `adapt` makes of a content what is to be drawn.
+  explicit HashPlace(
+      uint32_t cells, const std::function<void(HashContent&)>& adapt = [](HashContent&) {}) {
+    frame.low = Vec3d(-2, -2, -1);
+    frame.high = Vec3d(2, 2, 1);
+    for (TileNode& node : tree.tiles) {
+      std::vector<HashPart> parts;
+      for (double y = node.low.y(); y < node.high.y(); y += 2) {
+        for (double x = node.low.x(); x < node.high.x(); x += 2) {
+          HashPart part;
+          part.centre = {static_cast<float>(x + 1), static_cast<float>(y + 1), 0};
+          part.low = {static_cast<float>(x), static_cast<float>(y), -1};
+          part.high = {static_cast<float>(x + 2), static_cast<float>(y + 2), 1};
+          const Vec3d middle(x + 1, y + 1, 0);
+          makeHash(part, {16, cells, 0.5f, [](const Vec3d& at) { return at.z() < 0.3; }},
+                   [&](const Vec3d& at) { return smoothFeatures(at + middle); });
+          parts.push_back(std::move(part));
+        }
+      }
+      add(hashContentOf(std::move(parts), madeHashNetwork(node.level)), adapt);
+      node.geometricError = 2.0 / 64 * (1 << node.level);
+      if (node.parent < 0) coarsestBytes += bytesInMemory(contents.back());
+    }
+    HashPart around;
+    around.contracted = around.surround = true;
+    around.scale = {2, 2, 1};
+    makeHash(around, {16, 32, 0.5f, [](const Vec3d& at) { return at.norm() > 1.2; }}, smoothFeatures);
+    add(hashContentOf({around}, madeHashNetwork(0)), adapt);
+    coarsestBytes += bytesInMemory(contents.back());
+    tree.surround = static_cast<int>(tree.tiles.size());
+    tree.tiles.emplace_back().isSurround = true;
+  }
+  void add(HashContent content, const std::function<void(HashContent&)>& adapt) {
+    adapt(content);
+    allBytes += bytesInMemory(content);
+    contents.push_back(std::move(content));
+  }
+  TileSource<Content> source() const {
+    return sourceOfCopies([this](int tile) -> const HashContent& { return contents[tile]; });
+  }
+};
+
+// Weights that are the same everywhere: columns of features alone.
+void withoutLogitColumns(HashContent& content) {
+  for (HashPart& part : content.parts) {
+    std::vector<uint8_t> features;
+    for (size_t corner = 0; corner < part.cornerBytes.size() / 16; ++corner) {
+      const auto first = part.cornerBytes.begin() + static_cast<std::ptrdiff_t>(16 * corner);
+      features.insert(features.end(), first, first + 8);
+    }
+    part.cornerBytes = std::move(features);
+    part.columns = 8;
+    part.ranges.resize(8);
+  }
+}
+
+class GpuSceneRendererTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    context_ = openForTest();
+    SKIP_WITHOUT_VULKAN(context_);
+  }
+  void TearDown() override { EXPECT_EQ(GpuContext::validationMessages(), 0); }
+
+  GpuSceneRenderer onGpu(const Place& place, const GpuRendererSettings& settings) {
+    const auto stream = std::make_shared<GpuStream>(context_);
+    return {stream, makeGpuVolumeDrawer(stream), {place.frame, place.tree, place.source(), {}}, settings};
+  }
+  GpuSceneRenderer onGpu(const HashPlace& place, const GpuRendererSettings& settings) {
+    const auto stream = std::make_shared<GpuStream>(context_);
+    return {stream, makeGpuHashDrawer(stream), {place.frame, place.tree, place.source(), {}}, settings};
+  }
+
+  // Both renderers along a flight.
+  template <class Oracle, class Place>
+  void compare(const Place& place, uint64_t budget, double mostPixels, const ImageF* opaqueDepth = nullptr) {
+    SceneRendererSettings settings;
+    settings.budgetBytes = budget;
+    settings.selection.mostPixels = mostPixels;
+    Oracle oracle(place.frame, place.tree, place.source(), settings);
+    GpuRendererSettings ofCard;
+    ofCard.budgetBytes = budget;
+    ofCard.selection = settings.selection;
+    GpuSceneRenderer card = onGpu(place, ofCard);
+    for (int step = 0; step < 600; step += 75) {
+      SCOPED_TRACE(step);
+      const RenderedView wanted = oracle.render(flightCamera(), flightPose(step), opaqueDepth);
+      const RenderedView got = card.render(flightCamera(), flightPose(step), opaqueDepth);
+      EXPECT_GT(decibels(got.colour, wanted.colour), 55);
+      EXPECT_GT(decibels(got.opacity, wanted.opacity), 55);
+      EXPECT_GT(decibels(got.depth, wanted.depth), 45);
+      ASSERT_EQ(card.cut().tiles.size(), oracle.cut().tiles.size());
+      for (size_t i = 0; i < oracle.cut().tiles.size(); ++i) {
+        EXPECT_EQ(card.cut().tiles[i].content, oracle.cut().tiles[i].content);
+      }
+      EXPECT_LE(card.cache().statistics().mostBytes, budget);
+    }
+  }
+
+  std::shared_ptr<GpuContext> context_;
+};
+
+ImageF opaqueOnTheLeft() {
+  ImageF opaque(flightCamera().width, flightCamera().height, 1, INFINITY);
+  for (int y = 0; y < opaque.height; ++y) {
+    for (int x = 0; x < opaque.width / 2; ++x) *opaque.at(x, y) = 3;
+  }
+  return opaque;
+}
+
+TEST_F(GpuSceneRendererTest, DrawsVolumeAsTheProcessorDoes) {
+  compare<VolumeRenderer>(place(), place().allBytes, 1.5);
+}
+
+TEST_F(GpuSceneRendererTest, DrawsTheSameCutWithinABudget) {
+  compare<VolumeRenderer>(place(), place().finestBytes / 3, 0.5);
+}
+
+TEST_F(GpuSceneRendererTest, EndsRaysOfVolumeWhereSomethingOpaqueStands) {
+  const ImageF opaque = opaqueOnTheLeft();
+  compare<VolumeRenderer>(place(), place().allBytes, 16, &opaque);
+}
+
+TEST_F(GpuSceneRendererTest, DrawsHashAsTheProcessorDoes) {
+  const HashPlace made(32);
+  compare<HashRenderer>(made, made.allBytes, 1.5);
+}
+
+TEST_F(GpuSceneRendererTest, DrawsHashOfSeveralNetworksWithinABudget) {
+  const HashPlace made(32);
+  compare<HashRenderer>(made, made.coarsestBytes + (made.allBytes - made.coarsestBytes) / 2, 0.5);
+}
+
+TEST_F(GpuSceneRendererTest, PassesOverEmptySpaceInTwoGridsOfDistances) {
+  const HashPlace made(136);
+  ASSERT_GT(made.contents.front().parts.front().distances.ratio, 1u);
+  compare<HashRenderer>(made, made.allBytes, 16);
+}
+
+TEST_F(GpuSceneRendererTest, WeighsLevelsOfHashInEveryWay) {
+  const HashPlace shared(32, [](HashContent& content) { content.weights = LevelWeights::shared; });
+  compare<HashRenderer>(shared, shared.allBytes, 16);
+  const HashPlace none(32, [](HashContent& content) {
+    content.weights = LevelWeights::none;
+    withoutLogitColumns(content);
+  });
+  compare<HashRenderer>(none, none.allBytes, 16);
+  const HashPlace everywhere(32, [](HashContent& content) {
+    content.logits = {0.7f, -1.2f};
+    withoutLogitColumns(content);
+  });
+  compare<HashRenderer>(everywhere, everywhere.allBytes, 16);
+}
+
+TEST_F(GpuSceneRendererTest, ShowsWhereNothingIsWhatAWholeHashSaysOfTheDirection) {
+  const HashPlace whole(32, [](HashContent& content) { content.isWhole = true; });
+  compare<HashRenderer>(whole, whole.allBytes, 1.5);
+  const ImageF opaque = opaqueOnTheLeft();
+  compare<HashRenderer>(whole, whole.allBytes, 16, &opaque);
+}
+
+TEST_F(GpuSceneRendererTest, ReadsContentsInTheBackgroundAndShowsInTheEndWhatItWouldHaveWaitedFor) {
+  GpuRendererSettings settings;
+  settings.selection.mostPixels = 0.5;
+  GpuSceneRenderer waits = onGpu(place(), settings);
+  const RenderedView wanted = waits.render(flightCamera(), flightPose(0), nullptr);
+  settings.inBackground = true;
+  GpuSceneRenderer card = onGpu(place(), settings);
+  card.draw(flightCamera(), flightPose(0));
+  const size_t missing = card.state().missing;
+  EXPECT_GT(missing, 0u);  // coarser contents stand in
+  for (int i = 0; i < 5000 && card.state().missing > 0; ++i) {
+    const size_t before = card.state().missing;
+    if (!card.hasMore()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      continue;
+    }
+    card.draw(flightCamera(), flightPose(0));
+    EXPECT_EQ(card.state().missing, before - 1);  // one at a time: no picture waits for many
+  }
+  ASSERT_EQ(card.state().missing, 0u);
+  EXPECT_EQ(card.state().cache.loads, waits.state().cache.loads);
+  const RenderedView got = card.render(flightCamera(), flightPose(0), nullptr);
+  EXPECT_EQ(got.colour.pixels, wanted.colour.pixels);
+  for (const auto& [x, y] : {std::pair(0, 0), std::pair(31, 20), std::pair(63, 30)}) {
+    const GpuViewRenderer::Pixel pixel = card.pixelAt(x, y);
+    EXPECT_EQ(pixel.opacity, *wanted.opacity.at(x, y));
+    EXPECT_EQ(pixel.depth, *wanted.depth.at(x, y));
+  }
+}
+
+TEST_F(GpuSceneRendererTest, MayGoWhileTheCardStillDraws) {
+  const HashPlace made(32);
+  for (int i = 0; i < 3; ++i) {
+    GpuSceneRenderer card = onGpu(made, {});
+    card.draw(flightCamera().scaledTo(300, 200), flightPose(100 * i));
+  }
+}
+
+TEST_F(GpuSceneRendererTest, FollowsCamerasOfOtherSizes) {
+  GpuSceneRenderer card = onGpu(place(), {});
+  EXPECT_EQ(card.render(flightCamera(), flightPose(0), nullptr).colour.width, 64);
+  EXPECT_EQ(card.render(flightCamera().scaledTo(20, 11), flightPose(0), nullptr).opacity.pixels.size(), 220u);
+}
+
+}  // namespace
+}  // namespace tessera
