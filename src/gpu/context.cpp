@@ -105,6 +105,7 @@ std::shared_ptr<GpuContext> GpuContext::open(const GpuOptions& options) {
   context->choosePhysicalDevice(options.device.empty() ? environment("TESSERA_GPU") : options.device);
   context->chooseQueueFamily();
   context->chooseFeatures(options.allowed);
+  context->chooseGraphicsFeatures(options.allowedGraphics);
   context->createDevice(options.presents);
   context->heap_ = std::make_unique<GpuHeap>(*context);
   VkPhysicalDeviceProperties properties = {};
@@ -189,6 +190,7 @@ void GpuContext::chooseQueueFamily() {
       if ((families[i].queueFlags & flags) != flags) continue;
       queueFamily_ = i;
       timestampBits_ = families[i].timestampValidBits;
+      graphics_.queue = (families[i].queueFlags & VK_QUEUE_GRAPHICS_BIT) != 0;
       return;
     }
   }
@@ -206,6 +208,19 @@ void GpuContext::chooseFeatures(const GpuFeatures& allowed) {
   for (const auto& [name, feature] : kGpuFeatureNames) {
     if (features_.*feature) target_ += fmt::format("+{}", name);
   }
+}
+
+void GpuContext::chooseGraphicsFeatures(const GpuGraphicsFeatures& allowed) {
+  VkPhysicalDeviceFeatures present = {};
+  vkGetPhysicalDeviceFeatures(physicalDevice_, &present);
+  graphics_.queue = graphics_.queue && allowed.queue;
+  graphics_.fragmentStores = graphics_.queue && allowed.fragmentStores && present.fragmentStoresAndAtomics;
+  graphics_.independentBlend = graphics_.queue && allowed.independentBlend && present.independentBlend;
+}
+
+void GpuContext::requireGraphics() const {
+  if (graphics_.queue) return;
+  throw Error(name_, "", "it computes, but does not rasterise", "choose another device (tessera info devices)");
 }
 
 void GpuContext::createDevice(bool presents) {
@@ -238,6 +253,8 @@ void GpuContext::createDevice(bool presents) {
   vulkan11.storageBuffer16BitAccess = features_.float16;
   auto features = vulkanStruct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
   features.features.shaderFloat64 = features_.float64;
+  features.features.fragmentStoresAndAtomics = graphics_.fragmentStores;
+  features.features.independentBlend = graphics_.independentBlend;
   features.pNext = &vulkan11;
   vulkan11.pNext = &vulkan12;
 

@@ -4,6 +4,7 @@
 
 #include <volk.h>
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -35,6 +36,14 @@ inline constexpr GpuFeatureName kGpuFeatureNames[] = {{"floatAtomics", &GpuFeatu
                                                       {"subgroups", &GpuFeatures::subgroups},
                                                       {"matrices", &GpuFeatures::matrices}};
 
+// What rasterisation (gpu/render_pass.h) may use where the device has it. Bits of kernels do not depend on it. As part
+// of GpuOptions: what it may use at all, so that tests force the refusals.
+struct GpuGraphicsFeatures {
+  bool queue = true;             // the queue draws; else there is no rasterisation
+  bool fragmentStores = true;    // fragment shaders write to buffers
+  bool independentBlend = true;  // colour attachments of one pipeline blend in different ways
+};
+
 // How a device multiplies matrices by a subgroup together: fp16, rows × depth times depth × columns, summed in float.
 struct GpuMatrices {
   enum class Kind { none, nv, khr };  // VK_NV_cooperative_matrix; VK_KHR_cooperative_matrix, of builds that know it
@@ -50,6 +59,7 @@ struct GpuOptions {
   std::string device;
   // Masked further by the environment's TESSERA_GPU_WITHOUT, a list of kGpuFeatureNames.
   GpuFeatures allowed;
+  GpuGraphicsFeatures allowedGraphics;
   // Validation layers, if installed. The environment's TESSERA_VULKAN_VALIDATION=1 turns them on too.
   bool validation = false;
   // For pictures in windows (gpu/presenter.h).
@@ -82,6 +92,9 @@ class GpuContext {
   bool isDiscrete() const { return isDiscrete_; }        // a card of its own
   uint64_t memoryBytes() const;  // its largest heap: its own, or what it shares with the processor
   const GpuFeatures& features() const { return features_; }
+  const GpuGraphicsFeatures& graphics() const { return graphics_; }
+  // Throws Error where the device does not rasterise.
+  void requireGraphics() const;
   const GpuMatrices& matrices() const { return matrices_; }  // with features().matrices
   const VkPhysicalDeviceLimits& limits() const { return limits_; }
 
@@ -94,6 +107,8 @@ class GpuContext {
   uint32_t timestampBits() const { return timestampBits_; }  // of the queue's clock; 0: it has none
 
   GpuHeap& heap() const { return *heap_; }
+  // Another number at each call. Drivers reuse the handles of objects that are gone; these tell such objects apart.
+  uint64_t nextSerial() const { return ++serial_; }
   const PipelineCache& pipelines() const { return *pipelines_; }
 
   // The first memory type among `typeBits` that has all `wanted` properties, those with `preferred` first.
@@ -112,6 +127,7 @@ class GpuContext {
   void choosePhysicalDevice(const std::string& wanted);
   void chooseQueueFamily();
   void chooseFeatures(const GpuFeatures& allowed);
+  void chooseGraphicsFeatures(const GpuGraphicsFeatures& allowed);
   void createDevice(bool presents);
 
   VkInstance instance_ = VK_NULL_HANDLE;
@@ -125,6 +141,8 @@ class GpuContext {
   uint64_t largestAllocation_ = 0;
   bool isProcessor_ = false, isDiscrete_ = false;
   GpuFeatures features_;
+  GpuGraphicsFeatures graphics_;
+  mutable std::atomic<uint64_t> serial_ = 0;
   GpuMatrices matrices_;
   std::string name_, target_;
   std::unique_ptr<GpuHeap> heap_;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <string>
 
 #include "base/check.h"
 #include "base/error.h"
@@ -35,11 +36,26 @@ Kind kindOf(BufferUse use) {
 size_t indexOf(BufferUse use) {
   return static_cast<size_t>(use);
 }
+constexpr size_t kImages = 3;  // the index of their blocks
+
+size_t roundedUp(size_t bytes, size_t alignment) {
+  return (bytes + alignment - 1) / alignment * alignment;
+}
+
+// What was asked for, for people.
+std::string wantedBytes(size_t bytes, size_t inUse, const GpuContext& context) {
+  std::string wanted = fmt::format("{} MiB more, with {} MiB in use", bytes >> 20, inUse >> 20);
+  if (bytes > context.largestAllocation()) {  // drivers may give more than they promise
+    wanted += fmt::format("; the driver promises {} MiB at once", context.largestAllocation() >> 20);
+  }
+  return wanted;
+}
 
 }  // namespace
 
 struct GpuHeap::Block {
-  Block(VkDevice itsDevice, size_t bytes, BufferUse itsUse) : device(itsDevice), use(itsUse), free(bytes) {}
+  Block(VkDevice itsDevice, size_t itsBytes, size_t itsList)
+      : device(itsDevice), bytes(itsBytes), list(itsList), free(itsBytes) {}
   ~Block() {
     if (buffer) vkDestroyBuffer(device, buffer, nullptr);
     if (memory) vkFreeMemory(device, memory, nullptr);  // unmaps
@@ -48,9 +64,11 @@ struct GpuHeap::Block {
   Block& operator=(const Block&) = delete;
 
   VkDevice device;
-  BufferUse use;
+  size_t bytes;
+  size_t list;  // the index of the list of blocks that it stands in
   FreeRanges free;
   bool shared = false;  // by several pieces
+  uint32_t memoryType = 0;
   VkBuffer buffer = VK_NULL_HANDLE;
   VkDeviceMemory memory = VK_NULL_HANDLE;
   VkDeviceAddress address = 0;
@@ -60,30 +78,13 @@ struct GpuHeap::Block {
 GpuHeap::GpuHeap(const GpuContext& context) : context_(context) {}
 GpuHeap::~GpuHeap() = default;
 
-std::unique_ptr<GpuHeap::Block> GpuHeap::makeBlock(size_t bytes, BufferUse use) const {
-  const VkDevice device = context_.device();
-  auto block = std::make_unique<Block>(device, bytes, use);
-  auto info = vulkanStruct<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
-  info.size = bytes;
-  info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT |
-               VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
-               VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT;
-  std::string wanted = fmt::format("{} MiB more, with {} MiB in use", bytes >> 20, inUse_ >> 20);
-  if (bytes > context_.largestAllocation()) {  // drivers may give more than they promise
-    wanted += fmt::format("; the driver promises {} MiB at once", context_.largestAllocation() >> 20);
-  }
-  checkVulkan(vkCreateBuffer(device, &info, nullptr, &block->buffer), wanted.c_str());
-
-  VkMemoryRequirements needs = {};
-  vkGetBufferMemoryRequirements(device, block->buffer, &needs);
-  auto flags = vulkanStruct<VkMemoryAllocateFlagsInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO);
-  flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
+void GpuHeap::allocateMemory(Block& block, const VkMemoryRequirements& needs, BufferUse use, const void* next) const {
   auto allocation = vulkanStruct<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
-  allocation.pNext = &flags;
+  allocation.pNext = next;
   allocation.allocationSize = needs.size;
   const Kind kind = kindOf(use);
   allocation.memoryTypeIndex = context_.memoryType(needs.memoryTypeBits, kind.wanted, kind.preferred);
-  VkResult result = vkAllocateMemory(device, &allocation, nullptr, &block->memory);
+  VkResult result = vkAllocateMemory(block.device, &allocation, nullptr, &block.memory);
   // What the host writes may lie with the host. What kernels of a card work on may not: many times slower, and nobody
   // would know why.
   const bool mayLieElsewhere = use != BufferUse::device || !context_.isDiscrete();
@@ -91,9 +92,27 @@ std::unique_ptr<GpuHeap::Block> GpuHeap::makeBlock(size_t bytes, BufferUse use) 
   const std::optional<uint32_t> elsewhere = context_.findMemoryType(others, kind.wanted);
   if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY && mayLieElsewhere && elsewhere) {
     allocation.memoryTypeIndex = *elsewhere;
-    result = vkAllocateMemory(device, &allocation, nullptr, &block->memory);
+    result = vkAllocateMemory(block.device, &allocation, nullptr, &block.memory);
   }
-  checkVulkan(result, wanted.c_str());
+  checkVulkan(result, wantedBytes(block.bytes, inUse_, context_).c_str());
+  block.memoryType = allocation.memoryTypeIndex;
+}
+
+std::unique_ptr<GpuHeap::Block> GpuHeap::makeBufferBlock(size_t bytes, BufferUse use) const {
+  const VkDevice device = context_.device();
+  auto block = std::make_unique<Block>(device, bytes, indexOf(use));
+  auto info = vulkanStruct<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
+  info.size = bytes;
+  info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT |
+               VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
+               VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT;
+  checkVulkan(vkCreateBuffer(device, &info, nullptr, &block->buffer), wantedBytes(bytes, inUse_, context_).c_str());
+
+  VkMemoryRequirements needs = {};
+  vkGetBufferMemoryRequirements(device, block->buffer, &needs);
+  auto flags = vulkanStruct<VkMemoryAllocateFlagsInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO);
+  flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
+  allocateMemory(*block, needs, use, &flags);
   checkVulkan(vkBindBufferMemory(device, block->buffer, block->memory, 0), "vkBindBufferMemory");
   if (use != BufferUse::device) {
     void* pointer = nullptr;
@@ -106,29 +125,58 @@ std::unique_ptr<GpuHeap::Block> GpuHeap::makeBlock(size_t bytes, BufferUse use) 
   return block;
 }
 
+std::unique_ptr<GpuHeap::Block> GpuHeap::makeImageBlock(const VkMemoryRequirements& needs) const {
+  auto block = std::make_unique<Block>(context_.device(), needs.size, kImages);
+  allocateMemory(*block, needs, BufferUse::device, nullptr);
+  return block;
+}
+
 GpuHeap::Piece GpuHeap::allocate(size_t bytes, BufferUse use) {
   CHECK(bytes > 0u);
   const std::lock_guard lock(mutex_);
-  const size_t room = (bytes + kAlignment - 1) / kAlignment * kAlignment;
-  const bool shared = room <= kBlockBytes / 2;
-  auto& blocks = blocks_[indexOf(use)];
+  return take(blocks_[indexOf(use)], {roundedUp(bytes, kAlignment)},
+              [&](size_t blockBytes) { return makeBufferBlock(blockBytes, use); });
+}
+
+GpuHeap::Piece GpuHeap::allocateImage(VkImage image) {
+  VkMemoryRequirements needs = {};
+  vkGetImageMemoryRequirements(context_.device(), image, &needs);
+  const std::lock_guard lock(mutex_);
+  // Pieces of multiples of kImageAlignment are aligned to it. An image that needs more has a block of its own.
+  const Request request = {roundedUp(needs.size, kImageAlignment), needs.memoryTypeBits,
+                           needs.alignment <= kImageAlignment};
+  return take(blocks_[kImages], request, [&](size_t blockBytes) {
+    needs.size = blockBytes;
+    return makeImageBlock(needs);
+  });
+}
+
+GpuHeap::Piece GpuHeap::take(Blocks& blocks, const Request& request, const MakeBlock& make) {
+  const size_t room = request.room;
+  const bool shared = request.mayShare && room <= kBlockBytes / 2;
   Block* chosen = nullptr;
   std::optional<size_t> offset;
   for (size_t i = 0; shared && i < blocks.size() && !offset; ++i) {
-    if (!blocks[i]->shared) continue;
+    if (!blocks[i]->shared || (request.typeBits >> blocks[i]->memoryType & 1) == 0) continue;
     chosen = blocks[i].get();
     offset = chosen->free.take(room);
   }
   if (!offset) {
-    blocks.push_back(makeBlock(shared ? kBlockBytes : room, use));
+    blocks.push_back(make(shared ? kBlockBytes : room));
     chosen = blocks.back().get();
     chosen->shared = shared;
     offset = chosen->free.take(room);
   }
   inUse_ += room;
-  return {
-      chosen, chosen->buffer, *offset, chosen->address + *offset, chosen->mapped ? chosen->mapped + *offset : nullptr,
-      room};
+  Piece piece;
+  piece.block = chosen;
+  piece.buffer = chosen->buffer;
+  piece.offset = *offset;
+  piece.address = chosen->buffer ? chosen->address + *offset : 0;
+  piece.mapped = chosen->mapped ? chosen->mapped + *offset : nullptr;
+  piece.room = room;
+  piece.memory = chosen->memory;
+  return piece;
 }
 
 void GpuHeap::free(const Piece& piece) {
@@ -138,9 +186,12 @@ void GpuHeap::free(const Piece& piece) {
   inUse_ -= piece.room;
   if (!block.free.allFree()) return;
   // One empty block of a kind waits for the next piece.
-  auto& blocks = blocks_[indexOf(block.use)];
+  auto& blocks = blocks_[block.list];
+  const auto isAlike = [&](const Block& other) {
+    return block.list != kImages || other.memoryType == block.memoryType;
+  };
   const bool another = std::any_of(blocks.begin(), blocks.end(), [&](const std::unique_ptr<Block>& other) {
-    return other.get() != &block && other->shared && other->free.allFree();
+    return other.get() != &block && other->shared && isAlike(*other) && other->free.allFree();
   });
   if (block.shared && !another) return;
   ++generation_;

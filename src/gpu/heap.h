@@ -1,11 +1,13 @@
 // Device memory, taken in large blocks and given out in pieces: drivers allow a few thousand allocations in all, and
-// each is a call to the kernel. For several threads.
+// each is a call to the kernel. Images have blocks apart from those of buffers (bufferImageGranularity). For several
+// threads.
 #pragma once
 
 #include <volk.h>
 
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -31,17 +33,20 @@ class GpuHeap {
   struct Block;
   struct Piece {
     Block* block = nullptr;
-    VkBuffer buffer = VK_NULL_HANDLE;  // of the whole block
-    size_t offset = 0;                 // in it
-    VkDeviceAddress address = 0;       // of the piece
-    std::byte* mapped = nullptr;       // likewise; null for BufferUse::device
-    size_t room = 0;                   // of the piece, at least what was asked for
+    VkBuffer buffer = VK_NULL_HANDLE;        // of the whole block; none for images
+    size_t offset = 0;                       // in it, and in its memory
+    VkDeviceAddress address = 0;             // of the piece; 0 for images
+    std::byte* mapped = nullptr;             // likewise; null for BufferUse::device and for images
+    size_t room = 0;                         // of the piece, at least what was asked for
+    VkDeviceMemory memory = VK_NULL_HANDLE;  // of the whole block
   };
   // Throws Error when memory is short, saying how much is in use.
   Piece allocate(size_t bytes, BufferUse use);
+  // The device's own memory for an image that is not bound to any yet. Throws Error likewise.
+  Piece allocateImage(VkImage image);
   void free(const Piece& piece);
 
-  size_t bytesInUse() const;
+  size_t bytesInUse() const;  // by buffers and images
   size_t blockCount() const;
   // Rises whenever a block is given back to the driver: handles may then mean something else.
   uint64_t generation() const;
@@ -49,12 +54,24 @@ class GpuHeap {
  private:
   static constexpr size_t kBlockBytes = size_t{64} << 20;
   static constexpr size_t kAlignment = 256;
+  static constexpr size_t kImageAlignment = size_t{64} << 10;
 
-  std::unique_ptr<Block> makeBlock(size_t bytes, BufferUse use) const;
+  std::unique_ptr<Block> makeBufferBlock(size_t bytes, BufferUse use) const;
+  std::unique_ptr<Block> makeImageBlock(const VkMemoryRequirements& needs) const;
+  void allocateMemory(Block& block, const VkMemoryRequirements& needs, BufferUse use, const void* next) const;
+  using Blocks = std::vector<std::unique_ptr<Block>>;
+  using MakeBlock = std::function<std::unique_ptr<Block>(size_t bytes)>;
+  struct Request {
+    size_t room;              // bytes
+    uint32_t typeBits = ~0u;  // the memory types that serve
+    bool mayShare = true;     // a block with others
+  };
+  // A piece of one of the blocks, else of one more that `make` makes.
+  Piece take(Blocks& blocks, const Request& request, const MakeBlock& make);
 
   const GpuContext& context_;
   mutable std::mutex mutex_;
-  std::array<std::vector<std::unique_ptr<Block>>, 3> blocks_;  // by use
+  std::array<Blocks, 4> blocks_;  // of buffers by use, then of images
   size_t inUse_ = 0;
   uint64_t generation_ = 1;
 };

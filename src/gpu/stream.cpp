@@ -7,26 +7,21 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "gpu/call.h"
+#include "gpu/stages.h"
 #include "shaders/copy_words.h"
 
 namespace tessera {
 
 namespace {
 
-constexpr size_t kAlignment = 64;           // of staged bytes and of arguments
-constexpr size_t kCommandsPerBatch = 1024;  // a training step has some hundreds, and more with many blocks
-constexpr size_t kArgumentBytes = 512 * kCommandsPerBatch;
-constexpr size_t kSmallBatch = 8;                     // commands
+constexpr size_t kSmallBatch = 8;                     // commands, and draws of passes
 constexpr size_t kMostCopiedWords = size_t{1} << 20;  // by a kernel: what is larger is as large the next time, mostly
-constexpr uint32_t kQueries = kCommandsPerBatch + 1;
-constexpr VkPipelineStageFlags kStages =
-    VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT | VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT;
 
-void barrier(VkCommandBuffer commands, VkAccessFlags reads, VkPipelineStageFlags stages) {
+void barrier(VkCommandBuffer commands, VkAccessFlags reads, VkPipelineStageFlags to) {
   auto barrier = vulkanStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
-  barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
+  barrier.srcAccessMask = stages::kStreamWrites;
   barrier.dstAccessMask = reads;
-  vkCmdPipelineBarrier(commands, kStages, stages, 0, 1, &barrier, 0, nullptr, 0, nullptr);
+  vkCmdPipelineBarrier(commands, stages::kStream, to, 0, 1, &barrier, 0, nullptr, 0, nullptr);
 }
 
 }  // namespace
@@ -106,13 +101,13 @@ void GpuStream::submit() {
 
 GpuStream::Recording& GpuStream::recordingOf(Batch& batch) {
   const uint64_t generation = context_->heap().generation();
-  if (batch.commands.size() < kSmallBatch) {
+  if (batch.commands.size() + batch.draws.size() < kSmallBatch) {
     record(batch, batch.small);
     return batch.small;
   }
   if (!measuring_) {
     for (Recording& kept : batch.recordings) {
-      if (kept.generation == generation && kept.commands == batch.commands) return kept;
+      if (kept.generation == generation && kept.commands == batch.commands && kept.draws == batch.draws) return kept;
     }
   }
   Recording& oldest = *std::min_element(batch.recordings.begin(), batch.recordings.end(),
@@ -120,6 +115,7 @@ GpuStream::Recording& GpuStream::recordingOf(Batch& batch) {
   oldest.generation = 0;  // whatever becomes of this
   record(batch, oldest);
   oldest.commands = measuring_ ? std::vector<Command>() : batch.commands;
+  oldest.draws = measuring_ ? std::vector<Draw>() : batch.draws;
   oldest.generation = measuring_ ? 0 : generation;
   return oldest;
 }
@@ -136,11 +132,10 @@ void GpuStream::record(Batch& batch, Recording& recording) {
   }
   uint32_t query = 0;
   for (const Command& command : batch.commands) {
-    // A barrier reaches back over all batches sent before, too: they are on one queue.
-    barrier(commands,
-            VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_READ_BIT |
-                VK_ACCESS_TRANSFER_WRITE_BIT | VK_ACCESS_INDIRECT_COMMAND_READ_BIT,
-            kStages);
+    // A barrier reaches back over all batches sent before, too: they are on one queue. Passes bring their own.
+    if (command.kind != Command::Kind::draw) {
+      barrier(commands, stages::kStreamReads | stages::kStreamWrites, stages::kStream);
+    }
     switch (command.kind) {
       case Command::Kind::copy: {
         const VkBufferCopy copy = {command.fromOffset, command.toOffset, command.bytes};
@@ -159,6 +154,13 @@ void GpuStream::record(Batch& batch, Recording& recording) {
         } else {
           vkCmdDispatch(commands, command.groups.x, command.groups.y, command.groups.z);
         }
+        break;
+      case Command::Kind::draw:
+        recordPass(commands, batch, command);
+        break;
+      case Command::Kind::copyFromImage:
+      case Command::Kind::copyToImage:
+        recordImageCopy(commands, command);
         break;
     }
     if (measuring_) {
@@ -181,13 +183,16 @@ void GpuStream::wait(Batch& batch) {
   batch.done = 0;
   batch.measured = false;
   batch.commands.clear();
+  batch.draws.clear();
   batch.labels.clear();
   batch.staged = batch.argumentBytes = 0;
   batch.retired.clear();
+  batch.retiredObjects.clear();
 }
 
 void GpuStream::send() {
-  if (!listing().commands.empty() || !listing().retired.empty()) submit();
+  const Batch& batch = listing();
+  if (!batch.commands.empty() || !batch.retired.empty() || !batch.retiredObjects.empty()) submit();
 }
 
 void GpuStream::finish() {
@@ -200,7 +205,7 @@ size_t GpuStream::stage(std::span<const std::byte> bytes) {
   const size_t offset = batch.staged;
   CHECK(bytes.size() <= stagingBytes_ - offset);
   std::memcpy(batch.staging.mapped() + offset, bytes.data(), bytes.size());
-  batch.staged += (bytes.size() + kAlignment - 1) / kAlignment * kAlignment;
+  batch.staged += roundedUp(bytes.size());
   return offset;
 }
 
@@ -272,7 +277,7 @@ void GpuStream::download(std::span<const Download> downloads) {
       }
       pieces.push_back({to.subspan(done, length), used});
       done += length;
-      used += (length + kAlignment - 1) / kAlignment * kAlignment;
+      used += roundedUp(length);
     }
   }
   if (!pieces.empty()) bring();
@@ -297,15 +302,22 @@ void GpuStream::run(const GpuKernel& kernel, std::span<const std::byte> argument
   CHECK(groups.y <= context_->limits().maxComputeWorkGroupCount[1]);
   CHECK(groups.z <= context_->limits().maxComputeWorkGroupCount[2]);
   if (isFull(arguments.size())) submit();
-  Batch& batch = listing();
-  std::memcpy(batch.arguments.mapped() + batch.argumentBytes, arguments.data(), arguments.size());
   Command command;
   command.kind = Command::Kind::kernel;
   command.kernel = &kernel;
-  command.arguments = batch.arguments.address() + batch.argumentBytes;
+  command.arguments = addArguments(arguments);
   command.groups = groups;
-  batch.argumentBytes += (arguments.size() + kAlignment - 1) / kAlignment * kAlignment;
   add(command);
+}
+
+VkDeviceAddress GpuStream::addArguments(std::span<const std::byte> arguments) {
+  Batch& batch = listing();
+  if (!arguments.empty()) {
+    std::memcpy(batch.arguments.mapped() + batch.argumentBytes, arguments.data(), arguments.size());
+  }
+  const VkDeviceAddress address = batch.arguments.address() + batch.argumentBytes;
+  batch.argumentBytes += roundedUp(arguments.size());
+  return address;
 }
 
 void GpuStream::retire(GpuBuffer buffer) {
