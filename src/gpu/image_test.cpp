@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "gpu/stream.h"
-#include "gpu/test_context.h"
+#include "gpu/testing/test_context.h"
 
 namespace tessera {
 namespace {

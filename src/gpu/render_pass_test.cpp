@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "gpu/draw_test_support.h"
+#include "gpu/testing/draw_test_support.h"
 
 namespace tessera::gpu_test {
 namespace {

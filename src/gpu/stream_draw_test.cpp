@@ -1,5 +1,5 @@
 // Render passes among a stream's other commands: order, replayed batches, counts in memory, and retiring.
-#include "gpu/draw_test_support.h"
+#include "gpu/testing/draw_test_support.h"
 #include "shaders/double_values.h"
 
 namespace tessera::gpu_test {

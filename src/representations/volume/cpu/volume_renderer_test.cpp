@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "render/cpu/scene_renderer.h"
+#include "representations/volume/testing/flat_tile_tree.h"
 #include "representations/volume/testing/made_place.h"
 
 namespace tessera {

@@ -1,4 +1,4 @@
-#include "gpu/triangle_rasteriser.h"
+#include "gpu/testing/triangle_rasteriser.h"
 
 #include <cmath>
 #include <limits>

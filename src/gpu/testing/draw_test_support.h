@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "gpu/stream.h"
-#include "gpu/test_context.h"
-#include "gpu/triangle_rasteriser.h"
+#include "gpu/testing/test_context.h"
+#include "gpu/testing/triangle_rasteriser.h"
 #include "shaders/triangles.h"
 #include "shaders/triangles_colour.h"
 #include "shaders/triangles_coverage.h"
