@@ -3,7 +3,7 @@
 #include <set>
 
 #include "base/random.h"
-#include "render/made_tree.h"
+#include "render/testing/made_tree.h"
 #include "render/tile_selection.h"
 
 namespace tessera::golden {
@@ -64,6 +64,10 @@ ordered_json makeSelections() {
   frame.high = made.tiles[0].high;
   const auto bytes = [](int tile) { return static_cast<uint64_t>(100 + 37 * tile % 61); };
   TileSelector selector(made, {});  // one for all: what was replaced before counts
+  // The same views where tiles share resources, as networks.
+  const auto resourcesOf = [](int tile) { return std::vector<int>{tile % 5, 5 + tile % 3}; };
+  const auto bytesOfResource = [](int resource) { return static_cast<uint64_t>(60 + 90 * resource % 170); };
+  TileSelector sharing(made, {});
   const RandomStream random(17, 1);
   ordered_json views = ordered_json::array();
   for (uint64_t i = 0; i < kViews; ++i) {
@@ -88,6 +92,7 @@ ordered_json makeSelections() {
     const TileView view = tileView(camera, pose, frame);
     const TileChoice choice = selector.choose(view, {budget, holds, bytes});
     const TileCut cut = selector.cut(view, holds);
+    const TileChoice shared = sharing.choose(view, {budget, holds, bytes, resourcesOf, bytesOfResource});
     ordered_json tiles = ordered_json::array();
     for (const SelectedTile& one : cut.tiles) {
       if (one.visible) tiles.push_back({one.tile, one.content});
@@ -104,14 +109,22 @@ ordered_json makeSelections() {
                      {"budget", budget},
                      {"wanted", choice.wanted},
                      {"refused", choice.refused},
+                     {"sharing", {{"wanted", shared.wanted}, {"refused", shared.refused}}},
                      {"cut", tiles},
                      {"surround", cut.surround}});
   }
   ordered_json sizes = ordered_json::array();
-  for (size_t tile = 0; tile < made.tiles.size(); ++tile) sizes.push_back(bytes(static_cast<int>(tile)));
+  ordered_json resources = ordered_json::array(), resourceSizes = ordered_json::array();
+  for (size_t tile = 0; tile < made.tiles.size(); ++tile) {
+    sizes.push_back(bytes(static_cast<int>(tile)));
+    resources.push_back(resourcesOf(static_cast<int>(tile)));
+  }
+  for (int resource = 0; resource < 8; ++resource) resourceSizes.push_back(bytesOfResource(resource));
   return {{"frame", {{"near", frame.near}, {"low", toJson(frame.low)}, {"high", toJson(frame.high)}}},
           {"tree", toJson(made)},
           {"bytes", sizes},
+          {"resources", resources},
+          {"bytesOfResources", resourceSizes},
           {"views", views}};
 }
 

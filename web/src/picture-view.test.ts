@@ -20,6 +20,7 @@ interface GoldenView {
   budget: number;
   wanted: number[];
   refused: number;
+  sharing: { wanted: number[]; refused: number }; // where tiles share resources
   cut: [number, number][];
   surround: number;
 }
@@ -28,6 +29,8 @@ const golden = JSON.parse(readFileSync(new URL('../../tests/golden/selection.jso
   frame: { near: number; low: Vec3; high: Vec3 };
   tree: Omit<TileTree, 'tiles'> & { tiles: GoldenTile[] };
   bytes: number[];
+  resources: number[][];
+  bytesOfResources: number[];
   views: GoldenView[];
 };
 
@@ -69,6 +72,21 @@ describe('the view of a camera', () => {
       expect({ i, ...choice }).toEqual({ i, wanted, refused });
       const visible = drawn.tiles.filter((one) => one.visible).map((one) => [one.tile, one.content]);
       expect({ i, surround: drawn.surround, cut: visible }).toEqual({ i, surround, cut });
+    });
+  });
+
+  it('has the selector charge what tiles share as the renderer on the processor does', () => {
+    const selector = new TileSelector(treeOf(golden.tree));
+    golden.views.forEach(({ camera, held, budget, sharing }, i) => {
+      const choice = selector.choose(viewOf(camera), {
+        budget,
+        holds: (tile) => held.includes(tile),
+        bytesOf: (tile) => golden.bytes[tile],
+        canBeHad: () => true,
+        resourcesOf: (tile) => golden.resources[tile],
+        bytesOfResource: (id) => golden.bytesOfResources[id],
+      });
+      expect({ i, ...choice }).toEqual({ i, ...sharing });
     });
   });
 });
