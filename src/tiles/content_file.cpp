@@ -66,7 +66,37 @@ std::optional<json> decodeAsset(std::string_view text, std::string_view represen
   return asset;
 }
 
+// Nodes of the scene, and above its roots the one that turns z up into y up.
+Json turnedNodes(const GltfScene& scene) {
+  Json nodes = scene.nodes;
+  Json turned = {{"children", scene.roots}};
+  turned["matrix"] = {1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1};  // column after column
+  nodes.push_back(std::move(turned));
+  return nodes;
+}
+
+// Members of the asset; glTF allows no empty arrays.
+void addScene(const GltfScene& scene, Json& asset) {
+  for (const std::string& extension : scene.extensionsUsed) asset["extensionsUsed"].push_back(extension);
+  asset["scenes"][0]["nodes"] = {scene.nodes.size()};
+  asset["nodes"] = turnedNodes(scene);
+  const std::pair<const char*, const Json&> members[] = {{"meshes", scene.meshes},       {"accessors", scene.accessors},
+                                                         {"materials", scene.materials}, {"textures", scene.textures},
+                                                         {"images", scene.images},       {"samplers", scene.samplers}};
+  for (const auto& [key, member] : members) {
+    if (!member.empty()) asset[key] = member;
+  }
+}
+
 }  // namespace
+
+size_t ContentFileWriter::addView(std::span<const std::byte> bytes, uint32_t target) {
+  CHECK(!bytes.empty());
+  const size_t view = views_.size();
+  add(bytes, kRawBytes);
+  if (target != 0) views_.back()["target"] = target;
+  return view;
+}
 
 Json ContentFileWriter::add(std::span<const std::byte> bytes, const char* mimeType) {
   bytes_.resize((bytes_.size() + 3) / 4 * 4);
@@ -75,17 +105,19 @@ Json ContentFileWriter::add(std::span<const std::byte> bytes, const char* mimeTy
   return {{"bufferView", views_.size() - 1}, {"mimeType", mimeType}};
 }
 
-Bytes ContentFileWriter::finish(std::string_view representation, const Json& ours) {
+Bytes ContentFileWriter::finish(std::string_view representation, const Json& ours, const GltfScene& scene) {
   CHECK(!views_.empty());
+  CHECK(scene.isEmpty() == scene.roots.empty());
   Json extension = {{"version", kContentVersion}, {"representation", representation}};
   extension.update(ours);
-  const Json asset = {{"asset", {{"version", "2.0"}, {"generator", "tessera"}}},
-                      {"extensionsUsed", {kExtension}},
-                      {"scene", 0},
-                      {"scenes", {Json::object()}},
-                      {"buffers", {{{"byteLength", bytes_.size()}}}},
-                      {"bufferViews", views_},
-                      {"extensions", {{kExtension, std::move(extension)}}}};
+  Json asset = {{"asset", {{"version", "2.0"}, {"generator", "tessera"}}},
+                {"extensionsUsed", {kExtension}},
+                {"scene", 0},
+                {"scenes", {Json::object()}},
+                {"buffers", {{{"byteLength", bytes_.size()}}}},
+                {"bufferViews", views_},
+                {"extensions", {{kExtension, std::move(extension)}}}};
+  if (!scene.isEmpty()) addScene(scene, asset);
   return encodeGlb(asset.dump(), bytes_);
 }
 

@@ -3,6 +3,7 @@
 // in buffer views. docs/tile-format.md, section 5. For this room's own files: it shows JSON.
 #pragma once
 
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
@@ -21,12 +22,31 @@ inline constexpr const char* kNoGlb = "is not a binary glTF file of version 2, o
 inline constexpr const char* kWebP = "image/webp";
 inline constexpr const char* kRawBytes = "application/octet-stream";
 
+// What other programs draw of a content: members of the glTF asset itself, each empty where there are none of it.
+// Accessors and images name buffer views by the numbers that ContentFileWriter::addView gives.
+struct GltfScene {
+  using Json = nlohmann::ordered_json;
+
+  Json accessors = Json::array(), meshes = Json::array(), materials = Json::array();
+  Json textures = Json::array(), images = Json::array(), samplers = Json::array();
+  // In Z-up coordinates of the tile frame. The writer adds a node above those in `roots` that turns them by (x, y, z) →
+  // (x, z, -y), since glTF is Y-up.
+  Json nodes = Json::array();
+  std::vector<size_t> roots;                // indices of `nodes`
+  std::vector<std::string> extensionsUsed;  // of the members above: "KHR_materials_unlit"
+
+  bool isEmpty() const { return nodes.empty(); }
+};
+
 class ContentFileWriter {
  public:
+  // A buffer view that accessors or images name → its number. `target` is glTF's of vertices (34962) and indices
+  // (34963); 0 for images.
+  size_t addView(std::span<const std::byte> bytes, uint32_t target = 0);
   // {"bufferView": n, "mimeType": ...}: how the extension names it.
   nlohmann::ordered_json add(std::span<const std::byte> bytes, const char* mimeType);
   // `ours`: the extension's members after version and representation.
-  Bytes finish(std::string_view representation, const nlohmann::ordered_json& ours);
+  Bytes finish(std::string_view representation, const nlohmann::ordered_json& ours, const GltfScene& scene = {});
 
  private:
   Bytes bytes_;
