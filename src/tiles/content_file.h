@@ -1,6 +1,6 @@
 // What contents of every representation have in common: a .glb that is a valid glTF 2.0 asset (with an empty scene
 // where there is nothing that other programs could draw), whose extension TESSERA_content describes a payload that lies
-// in buffer views. docs/tile-format.md, section 5. For this room's own files: it shows JSON.
+// in buffer views. docs/tile-format.md, section 5. For codecs, not for their users: it shows JSON.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // One content of a `hash` scene along a ray: its samples, composited (docs/tile-format.md, section 7; NGP-RT, section 4.3).
-// Twin of src/render/cpu/hash_march.cpp and hash_features.cpp.
+// Twin of src/representations/hash/cpu/hash_march.cpp and hash_features.cpp.
 //
 // Reads: domain_path.glsl, part_place.glsl; TABLES, fine levels of a part; VARYING, defined where weights differ from place
 //   to place; SHARED, defined where one logit weighs all of a level; how a viewer holds a content:
@@ -8,7 +8,7 @@
 //     vec4 content[]            for each eight columns low and scale of columns 1 2 3 0 and low and scale of 4 5 6 7, per byte of
 //                               255 that counts as 1; then for each table its resolution, entries, whether it is hashed (and a
 //                               number of the viewer's), and likewise four vectors for its bytes
-//     uint distanceWord(Part, ivec3 coarseCell), uint nearWord(Part, uint n)    of src/tiles/occupancy_distance.h
+//     uint distanceWord(Part, ivec3 coarseCell), uint nearWord(Part, uint n)    of src/representations/hash/content/occupancy_distance.h
 //     vec4 macroblockAt(Part, vec3 block)      of 9³ corners; the fourth is 0 where none is, the rest is the viewer's
 //     vec4 cornersFirst(Part, int eight, vec4 macroblock, vec3 within), cornersSecond(...)    of each eight columns the mix
 //                                              of columns 1 2 3 0 and 4 5 6 7, 0 at the middle of the first corner; the

@@ -1,5 +1,5 @@
 // One content of a `volume` scene along a ray: its samples, composited (docs/tile-format.md, section 6; City-on-Web,
-// section 4.2). Twin of src/render/cpu/volume_march.cpp.
+// section 4.2). Twin of src/representations/volume/cpu/volume_march.cpp.
 //
 // Reads: domain_path.glsl, part_place.glsl; how a viewer holds a content:
 //     struct Part               with place; texels and voxels, of a plane and of the voxels along an axis

@@ -1,5 +1,5 @@
-// What the readers of every representation's payload have in common: parts of the extension and of the buffer views,
-// untrusted. For this room's own files: it shows JSON.
+// What the readers of payloads of parts have in common: parts of the extension and of the buffer views, untrusted. For
+// codecs, not for their users: it shows JSON.
 #pragma once
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// What the writers of every representation's payload have in common. For this room's own files: it shows JSON.
+// What the writers of payloads of parts have in common. For codecs, not for their users: it shows JSON.
 #pragma once
 
 #include <span>

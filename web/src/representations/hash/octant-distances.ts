@@ -1,5 +1,5 @@
 // How far nothing is for rays of each octant of directions: what hash contents pass over empty space with
-// (docs/tile-format.md, section 7). Twin of src/tiles/occupancy_distance.cpp.
+// (docs/tile-format.md, section 7). Twin of src/representations/hash/content/occupancy_distance.cpp.
 import type { OccupancyBits } from '../../raymarch/occupancy';
 
 export const kFarthestOctantDistance = 15;
