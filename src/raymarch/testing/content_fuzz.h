@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "../../tests/fuzz/fuzz_input.h"
+#include "../../../tests/fuzz/fuzz_input.h"
 #include "tiles/content.h"
 #include "tiles/glb.h"
 

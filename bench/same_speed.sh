@@ -1,0 +1,50 @@
+#!/usr/bin/env bash
+# A change of structure costs no speed: two programs train and draw in turn, in one run. Prints the median of the ratios
+# of each pair (after / before) and fails where one is below 0.97.
+#   BEFORE_PROGRAM=... AFTER_PROGRAM=... [ROUNDS=5] [STEPS=60] bench/same_speed.sh FOLDER
+# FOLDER is what bench/same_bytes.sh kept (KEEP): its city, and the scenes that the first program baked of it.
+source "$(dirname "$0")/setup.sh"
+folder=$(cd "${1:?usage: bench/same_speed.sh FOLDER}" && pwd)
+rounds=${ROUNDS:-5} steps=${STEPS:-60}
+before=$(realpath "${BEFORE_PROGRAM:?}") after=$(realpath "${AFTER_PROGRAM:?}")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+# Steps a second of a training, as its last line has it.
+train() {
+  local program=$1 method=$2
+  shift 2
+  rm -rf "$work/model"
+  local json seconds
+  json=$(alone "$program" train "$folder/city" "$work/model" --method "$method" --steps "$steps" --seed 7 --json \
+    --checkpoint-seconds 1000000 --device cpu "$@" 2> /dev/null | tail -1)
+  seconds=$(grep -o '"seconds": [0-9.]*' <<< "$json" | grep -o '[0-9.]*$')
+  awk -v s="$steps" -v t="$seconds" 'BEGIN { print s / t }'
+}
+train_field() { train "$1" field --set samples_per_step=8192 --set samples_per_pass=2048; }
+train_volume() { train "$1" volume --blocks 2x2 --set level_share=0 --set texels_per_step=131072; }
+train_hash() { train "$1" hash --blocks 2x2 --set level_share=0 --set samples_per_step=16384; }
+
+frames() {
+  alone "$1" bench frames "$folder/before/$2.scene" --views "$folder/city" --size 320x240 --seconds 4 --device cpu --json - \
+    2> /dev/null | grep -o '"frames_per_second": [0-9.]*' | grep -o '[0-9.]*$'
+}
+frames_volume() { frames "$1" volume; }
+frames_hash() { frames "$1" hash; }
+
+for what in train_field train_volume train_hash frames_volume frames_hash; do
+  ratios=() was="" is=""
+  for ((round = 0; round < rounds; ++round)); do
+    # Whoever comes first may find the machine colder: they take turns.
+    if ((round % 2 == 0)); then
+      was=$($what "$before") is=$($what "$after")
+    else
+      is=$($what "$after") was=$($what "$before")
+    fi
+    ratios+=("$(awk -v a="$is" -v b="$was" 'BEGIN { printf "%.4f", a / b }')")
+  done
+  median=$(printf '%s\n' "${ratios[@]}" | sort -g | sed -n "$(((rounds + 1) / 2))p")
+  echo "$what: ${ratios[*]} (the last pair: $was before, $is after, a second)"
+  verdict "$what, after / before" "$median" '>=' 0.97
+done
+finish
