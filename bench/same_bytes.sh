@@ -3,7 +3,8 @@
 # method, and bake the same scenes, byte for byte; their golden scenes hold the same numbers. One line a comparison.
 #   [STEPS=300] [METHODS="field volume hash"] bench/same_bytes.sh BEFORE_COMMIT [AFTER_COMMIT=HEAD]
 # BEFORE_PROGRAM and AFTER_PROGRAM name programs that are built already, as of those commits; else both are built.
-# KEEP names a folder that keeps what was made; what the first commit made there is not made again. What settings mean is said in comments of config.toml, which may differ.
+# KEEP names a folder that keeps what was made; what the first commit made there is not made again. What settings mean is
+# said in comments of config.toml, which may differ.
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 before=${1:?usage: bench/same_bytes.sh BEFORE_COMMIT [AFTER_COMMIT]} after=${2:-HEAD}
@@ -12,8 +13,9 @@ work=${KEEP:-$(mktemp -d)}
 mkdir -p "$work"
 work=$(cd "$work" && pwd)
 trees=()
+root=$PWD
 leave() {
-  for tree in "${trees[@]}"; do git worktree remove --force "$tree"; done
+  for tree in "${trees[@]}"; do git -C "$root" worktree remove --force "$tree" || true; done
   [ -n "${KEEP:-}" ] || rm -rf "$work"
 }
 trap leave EXIT

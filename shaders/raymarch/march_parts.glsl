@@ -1,5 +1,5 @@
 // A pixel's ray through a content.
-// Reads: ../lib/march_part.glsl; view.glsl; Part partOf(uint), Place placeOfPart(uint); float minTransmittance. Defines: marchContent().
+// Reads: march_part.glsl; view.glsl; Part partOf(uint), Place placeOfPart(uint); float minTransmittance. Defines: marchContent().
 
 // Through what the content owns of the ray, part after part in the order in which the ray enters them.
 void marchParts(vec3 o, vec3 d, vec2 whole, uint partCount, inout Composite sum) {

@@ -43,9 +43,9 @@ class SharingCodec final : public ContentCodec {
     content->resources = resources;
     return content;
   }
-  uint64_t resourceMemoryBytes(const SharedResource&, uint64_t fileBytes) const override { return 1000 * fileBytes; }
+  uint64_t resourceMemoryBytes(const SharedResource&, uint64_t fileBytes) const override { return perByte * fileBytes; }
   std::shared_ptr<const Resource> decodeResource(std::span<const std::byte> bytes, const SharedResource& resource,
-                                                 std::string& reason) const override {
+                                                 std::string& reason, const ContentLimits&) const override {
     EXPECT_EQ(resource.mimeType, "application/octet-stream");
     if (bytes.size() != kTableBytes / 1000) {
       reason = "is no table";
@@ -56,6 +56,7 @@ class SharingCodec final : public ContentCodec {
   }
 
   bool mayOverlap = false;
+  uint64_t perByte = 1000;
   mutable int decoded = 0, alive = 0;
 };
 
@@ -137,6 +138,26 @@ TEST_F(SharedResources, AreRefusedByTheNameOfTheirFile) {
     EXPECT_EQ(error.reason(), "is no table");
     EXPECT_FALSE(error.remedy().empty());
   }
+}
+
+TEST_F(SharedResources, AreRefusedWhereTheyTakeMoreMemoryThanWasChargedForThem) {
+  codec_.perByte = 999;
+  const TileScene scene = openTileScene(folder_.path(), codec_);
+  EXPECT_THROW(scene.source.load(1), Error);
+  codec_.perByte = 1000;
+  EXPECT_NO_THROW(scene.source.load(1));
+}
+
+// One block after another in a budget for one: the table that they share stays.
+TEST_F(SharedResources, StayWhereOneContentMakesRoomForAnotherThatNeedsThem) {
+  TileScene scene = openTileScene(folder_.path(), codec_);
+  TileCache<Content> cache(scene.tree, 2 * kContentBytes + kContentBytes + kTableBytes, scene.source);
+  for (const int tile : {1, 2, 3, 1}) {
+    cache.load(std::vector<int>{tile});
+    EXPECT_TRUE(cache.holds(tile));
+  }
+  EXPECT_EQ(cache.statistics().evictions, 3u);
+  EXPECT_EQ(codec_.decoded, 1);
 }
 
 TEST_F(SharedResources, AreOfContentsThatMustHaveAnOrderUnlessTheirCodecLetsThemOverlap) {

@@ -39,6 +39,8 @@ struct TileSource {
   // them takes at most, however many contents need it.
   std::function<std::vector<int>(int tile)> resourcesOf = [](int) { return std::vector<int>(); };
   std::function<uint64_t(int resource)> bytesOfResource = [](int) { return uint64_t{0}; };
+  // Keeps those of a tile's resources in memory that are there, as long as what it returns.
+  std::function<std::shared_ptr<const void>(int tile)> holdResources = [](int) { return nullptr; };
 };
 
 template <class Held>
@@ -124,6 +126,7 @@ void TileCache<Held>::load(std::span<const int> tiles) {
   };
   for (const int tile : tiles) {
     if (holds(tile)) continue;
+    const std::shared_ptr<const void> shared = source_.holdResources(tile);  // also while their last user is evicted
     while (statistics_.bytes + bytesToLoad(tile) > budget_) {
       const auto oldest = std::find_if_not(uses_.rbegin(), uses_.rend(), stays);
       CHECK((oldest != uses_.rend()) == true);

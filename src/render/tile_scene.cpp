@@ -37,6 +37,13 @@ class SceneResources {
     }
     return resources;
   }
+  // Those that are in memory.
+  Resources present(const TileContent& content) {
+    const std::lock_guard lock(mutex_);
+    Resources resources;
+    for (const uint32_t number : content.resources) resources.push_back(held_[number].lock());
+    return resources;
+  }
   uint64_t bytesOf(int number) const { return readResourceBytes(files_[number], codec_, described_[number]); }
 
  private:
@@ -131,6 +138,9 @@ TileScene openTileScene(const fs::path& folder, const ContentCodec& codec) {
   scene.source.resourcesOf = [files](int tile) {
     const std::vector<uint32_t>& numbers = files[tile].promised.resources;
     return std::vector<int>(numbers.begin(), numbers.end());
+  };
+  scene.source.holdResources = [files, resources](int tile) {
+    return std::make_shared<const Resources>(resources->present(files[tile].promised));
   };
   scene.source.bytesOfResource = [resources](int resource) { return resources->bytesOf(resource); };
   scene.source.folder = folder.string();

@@ -108,7 +108,7 @@ class ContentCodec {
   virtual uint64_t resourceMemoryBytes(const SharedResource&, uint64_t fileBytes) const { return fileBytes; }
   // Null where it is refused, as it is by representations that share nothing.
   virtual std::shared_ptr<const Resource> decodeResource(std::span<const std::byte>, const SharedResource&,
-                                                         std::string& reason) const {
+                                                         std::string& reason, const ContentLimits& = {}) const {
     reason = "is a shared resource, which contents of this representation do not have";
     return nullptr;
   }

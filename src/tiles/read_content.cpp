@@ -51,8 +51,14 @@ uint64_t readDecodedBytes(const fs::path& path, const ContentCodec& codec, const
 std::shared_ptr<const Resource> readResource(const fs::path& path, const ContentCodec& codec,
                                              const SharedResource& resource, const ContentLimits& limits) {
   std::string reason;
-  auto made = codec.decodeResource(readFile(path, limits.fileBytes), resource, reason);
+  const Bytes file = readFile(path, limits.fileBytes);
+  auto made = codec.decodeResource(file, resource, reason, limits);
   if (!made) throw noContent(path, reason);
+  // What budgets have charged for it.
+  const uint64_t charged = codec.resourceMemoryBytes(resource, file.size());
+  if (made->memoryBytes() > charged) {
+    throw noContent(path, fmt::format("takes {} bytes of memory, its size said {}", made->memoryBytes(), charged));
+  }
   return made;
 }
 

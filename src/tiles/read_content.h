@@ -17,6 +17,7 @@ std::unique_ptr<Content> readPromisedContent(const fs::path& path, const Content
 // read.
 uint64_t readDecodedBytes(const fs::path& path, const ContentCodec& codec, const ContentLimits& limits = {});
 
+// And it must take no more memory than readResourceBytes() said.
 std::shared_ptr<const Resource> readResource(const fs::path& path, const ContentCodec& codec,
                                              const SharedResource& resource, const ContentLimits& limits = {});
 // What a resource will take in memory at most (ContentCodec::resourceMemoryBytes).

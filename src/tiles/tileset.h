@@ -75,7 +75,7 @@ struct Tile {
   // Its contents and those below it lie inside, the surround apart. It keeps to its cells' walls, those at the border
   // of the grid apart (blocks there may own what lies outside), and may be lower than they are.
   SceneBox box;
-  double geometricError = 0;       // metres: the edge of a plane's texel (`volume`); no more than its parent's
+  double geometricError = 0;       // metres: of drawing it instead of what it was baked from; no more than its parent's
   std::vector<uint32_t> children;  // of Tileset::tiles, each after its parent; none for a leaf
   // One with none (the surround apart) and with children cannot stand for them. A leaf with none is empty.
   std::vector<TileContent> contents;

@@ -197,7 +197,7 @@ void ModelFolder::cutMetrics(int64_t step) const {
 }
 
 BlockGrid readGrid(const fs::path& file, const Capture& capture) {
-  constexpr const char* kRemedy = "name the blocks.json of a model of --method volume";
+  constexpr const char* kRemedy = "name the blocks.json of a model that was trained in blocks";
   const json parsed = json::parse(readTextFile(file), nullptr, false);
   if (!parsed.is_object() || !parsed.contains("grid"))
     throw Error(file.string(), "grid", "the file holds no grid of blocks", kRemedy);

@@ -15,6 +15,7 @@ TileSource<GpuContent> GpuSceneRenderer::uploaded(const TileSource<Content>& sou
   made.file = source.file;
   made.resourcesOf = source.resourcesOf;
   made.bytesOfResource = source.bytesOfResource;
+  made.holdResources = source.holdResources;
   return made;
 }
 
