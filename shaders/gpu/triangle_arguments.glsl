@@ -1,4 +1,4 @@
-// What the host hands to triangles.vert and triangles.frag (src/gpu/testing/draw_test_support.h has the same).
+// What the host hands to triangles.vert and triangles.frag (src/gpu/testing/triangle_rasteriser.h has the same).
 struct Vertex {
   vec4 position;  // clip space
   vec4 colour;
