@@ -17,7 +17,7 @@ import { NetworkPass, type DrawnNetwork, type NetworkOrder } from './network-pas
 
 const kSums = 4; // pictures
 
-interface HashOwn extends MarchedOwn {
+export interface HashOwn extends MarchedOwn {
   uniforms: { network: { value: number } }; // the network's number in the picture (hash-program.ts)
   network: DrawnNetwork;
 }
