@@ -1,7 +1,6 @@
 #include "raymarch/content/content_reader.h"
 
 #include <bit>
-#include <cstring>
 
 #include "tiles/json_fields.h"
 #include "tiles/lossless_image.h"
@@ -11,15 +10,6 @@ namespace tessera {
 using namespace json_fields;
 
 namespace {
-
-bool takeFloats(std::span<const std::byte>& bytes, size_t count, std::vector<float>& numbers) {
-  static_assert(std::endian::native == std::endian::little);
-  if (bytes.size() / sizeof(float) < count) return false;
-  numbers.resize(count);
-  std::memcpy(numbers.data(), bytes.data(), count * sizeof(float));
-  bytes = bytes.subspan(count * sizeof(float));
-  return true;
-}
 
 bool takeTriple(const json& object, const char* key, std::array<float, 3>& triple) {
   const auto numbers = numbersOf<3>(object, key);
@@ -35,32 +25,8 @@ bool ContentReader::fail(const std::string& reason) {
   return false;
 }
 
-bool ContentReader::readLayers(std::vector<DenseLayer>& into) {
-  const json* network = fieldOf(file_.ours, "network");
-  const json* layers = network ? arrayOf(*network, "layers") : nullptr;
-  if (!layers || layers->size() > kMostLayers) return fail("has no network");
-  for (const json& sides : *layers) {
-    if (!sides.is_array() || sides.size() != 2) return fail("a layer of the network has no two sides");
-    const auto inputs = unsignedFrom(sides[0], kMostLayerWidth), outputs = unsignedFrom(sides[1], kMostLayerWidth);
-    if (!inputs || !outputs) return fail("a layer of the network is out of bounds");
-    DenseLayer layer;
-    layer.inputs = static_cast<uint32_t>(*inputs);
-    layer.outputs = static_cast<uint32_t>(*outputs);
-    into.push_back(std::move(layer));
-  }
-  return true;
-}
-
-bool ContentReader::readNetwork(std::vector<DenseLayer>& network) {
-  auto bytes = file_.viewOf(*fieldOf(file_.ours, "network"), kRawBytes);
-  if (!bytes) return fail("has no network");
-  for (DenseLayer& layer : network) {
-    if (!takeFloats(*bytes, size_t{layer.inputs} * layer.outputs, layer.weights) ||
-        !takeFloats(*bytes, layer.outputs, layer.biases)) {
-      return fail("the network has fewer numbers than its layers need");
-    }
-  }
-  return bytes->empty() || fail("the network has more numbers than its layers need");
+const json* ContentReader::networkField() const {
+  return fieldOf(file_.ours, "network");
 }
 
 const json* ContentReader::partsOf() {

@@ -14,7 +14,7 @@
 #include "raymarch/content/texel_pictures.h"
 #include "tiles/content.h"
 #include "tiles/content_file.h"
-#include "tiles/dense_layer.h"
+#include "tiles/network_payload.h"
 
 namespace tessera {
 
@@ -26,10 +26,7 @@ class ContentReader {
   // False; the first reason counts.
   bool fail(const std::string& reason);
 
-  // What the layers are to hold, and their numbers.
-  bool readLayers(std::vector<DenseLayer>& network);
-  bool readNetwork(std::vector<DenseLayer>& network);
-
+  const nlohmann::json* networkField() const;  // null where there is none
   // The parts' array, if there are not too many.
   const nlohmann::json* partsOf();
   static bool readPlace(const nlohmann::json& source, ContentPart& part);
@@ -65,7 +62,8 @@ class PartsReader : protected ContentReader {
       : ContentReader(file, reason, limits) {}
 
   std::optional<Content> read() {
-    if (!self().readSettings() || !readLayers(content_.network) || !readNetwork(content_.network) || !readHeaders()) {
+    if (!self().readSettings() || !readNetworkLayers() ||
+        !readLayerNumbers(file_, *networkField(), content_.network, reason_) || !readHeaders()) {
       return std::nullopt;
     }
     for (size_t i = 0; i < headers_.size(); ++i) {
@@ -85,7 +83,7 @@ class PartsReader : protected ContentReader {
 
   // What it takes in memory; looks at no buffer view.
   std::optional<uint64_t> readBytes() {
-    if (!self().readSettings() || !readLayers(content_.network) || !readHeaders()) return std::nullopt;
+    if (!self().readSettings() || !readNetworkLayers() || !readHeaders()) return std::nullopt;
     uint64_t bytes = bytesInMemory(content_);
     for (const DenseLayer& layer : content_.network) {
       bytes += sizeof(float) * (uint64_t{layer.inputs} * layer.outputs + layer.outputs);
@@ -99,6 +97,7 @@ class PartsReader : protected ContentReader {
 
  private:
   Reader& self() { return static_cast<Reader&>(*this); }
+  bool readNetworkLayers() { return readLayers(networkField(), content_.network, reason_); }
 
   bool readHeaders() {
     const nlohmann::json* parts = partsOf();

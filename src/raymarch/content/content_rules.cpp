@@ -5,29 +5,6 @@
 
 namespace tessera {
 
-bool areFinite(const std::vector<float>& numbers) {
-  return std::all_of(numbers.begin(), numbers.end(), [](float number) { return std::isfinite(number); });
-}
-
-Broken ruleOfNetwork(const std::vector<DenseLayer>& network, uint32_t inputs, uint32_t outputs) {
-  if (network.empty() || network.size() > kMostLayers) return "the network has no layers, or too many";
-  uint32_t width = inputs, vectors = 0;
-  for (const DenseLayer& layer : network) {
-    if (layer.inputs != width || layer.outputs < 1 || layer.outputs > kMostLayerWidth) {
-      return "the network's layers do not follow one another";
-    }
-    width = layer.outputs;
-    vectors += networkVectors(layer.inputs, layer.outputs);
-    if (layer.weights.size() != size_t{layer.inputs} * layer.outputs || layer.biases.size() != layer.outputs) {
-      return "the network's layers have not the numbers that they need";
-    }
-    if (!areFinite(layer.weights) || !areFinite(layer.biases)) return "the network holds a number that is not finite";
-  }
-  if (width != outputs) return "the network does not end in a colour";
-  if (vectors > kMostNetworkVectors) return "the network is larger than a shader takes";
-  return std::nullopt;
-}
-
 Broken ruleOfPlace(const ContentPart& part) {
   for (size_t a = 0; a < 3; ++a) {
     const float centre = part.centre[a], scale = part.scale[a], low = part.low[a], high = part.high[a];

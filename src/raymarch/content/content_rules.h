@@ -8,17 +8,13 @@
 #include <string>
 
 #include "raymarch/content/content_part.h"
-#include "tiles/dense_layer.h"
+#include "tiles/network_payload.h"
 #include "tiles/tileset.h"
 
 namespace tessera {
 
 using Broken = std::optional<std::string>;
 
-bool areFinite(const std::vector<float>& numbers);
-
-// inputs → … → outputs, finite.
-Broken ruleOfNetwork(const std::vector<DenseLayer>& network, uint32_t inputs, uint32_t outputs);
 // Where the part stands: a bounded one owns nothing outside its domain, but for rounding.
 Broken ruleOfPlace(const ContentPart& part);
 // `texels` along an axis; so many bytes of them are there, of so many a texel.

@@ -7,28 +7,6 @@
 #include "tiles/lossless_image.h"
 
 namespace tessera {
-namespace {
-
-void append(Bytes& bytes, const std::vector<float>& numbers) {
-  static_assert(std::endian::native == std::endian::little);
-  const auto raw = std::as_bytes(std::span(numbers));
-  bytes.insert(bytes.end(), raw.begin(), raw.end());
-}
-
-}  // namespace
-
-ContentWriter::Json ContentWriter::network(const std::vector<DenseLayer>& from) {
-  Bytes bytes;
-  Json layers = Json::array();
-  for (const DenseLayer& layer : from) {
-    layers.push_back({layer.inputs, layer.outputs});
-    append(bytes, layer.weights);
-    append(bytes, layer.biases);
-  }
-  Json json = {{"layers", std::move(layers)}};
-  json.update(file_.add(bytes, kRawBytes));
-  return json;
-}
 
 ContentWriter::Json ContentWriter::place(const ContentPart& part) {
   return {{"centre", part.centre},     {"scale", part.scale}, {"contracted", part.contracted},

@@ -9,7 +9,6 @@
 #include "raymarch/content/texel_pictures.h"
 #include "tiles/content.h"
 #include "tiles/content_file.h"
-#include "tiles/dense_layer.h"
 
 namespace tessera {
 
@@ -19,7 +18,6 @@ class ContentWriter {
 
   explicit ContentWriter(int effort) : effort_(effort) {}
 
-  Json network(const std::vector<DenseLayer>& layers);
   static Json place(const ContentPart& part);
   // Which macroblocks of a part of `texels` along an axis are stored, and how many. Their places say their numbers, so
   // that none can be wrong: they are to be written in the order of places (inOrder).

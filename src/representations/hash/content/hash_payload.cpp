@@ -3,6 +3,7 @@
 #include "base/check.h"
 #include "raymarch/content/content_writer.h"
 #include "representations/hash/content/occupancy_distance.h"
+#include "tiles/network_payload.h"
 
 namespace tessera {
 namespace {
@@ -18,7 +19,7 @@ class HashWriter : ContentWriter {
     Json ours = {{"weights", nameOf(content_.weights)},
                  {"step", content_.step},
                  {"whole", content_.isWhole},
-                 {"network", network(content_.network)},
+                 {"network", writeNetwork(file_, content_.network)},
                  {"parts", Json::array()}};
     if (!content_.logits.empty()) ours["logits"] = content_.logits;
     for (const HashPart& part : content_.parts) ours["parts"].push_back(partOf(part));

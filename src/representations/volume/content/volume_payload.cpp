@@ -2,6 +2,7 @@
 
 #include "base/check.h"
 #include "raymarch/content/content_writer.h"
+#include "tiles/network_payload.h"
 
 namespace tessera {
 namespace {
@@ -15,7 +16,7 @@ class VolumeWriter : ContentWriter {
   Bytes write() {
     Json ours = {{"featureRange", content_.featureRange},
                  {"densityRange", content_.densityRange},
-                 {"network", network(content_.network)},
+                 {"network", writeNetwork(file_, content_.network)},
                  {"parts", Json::array()}};
     if (content_.stepsPerTexel != 1) ours["stepsPerTexel"] = content_.stepsPerTexel;
     for (const VolumePart& part : content_.parts) ours["parts"].push_back(partOf(part));
