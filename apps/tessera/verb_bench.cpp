@@ -132,7 +132,7 @@ void writeJson(const std::string& file, const ordered_json& json) {
 }
 
 void printSkipping(const SkippingBenchmark& b) {
-  const auto line = [&](const char* name, const SkippingBenchmark::Way& way) {
+  const auto line = [&](const char* name, const DrawingCost& way) {
     fmt::print("  {:<10} {:12d} steps  {:12d} samples  {:8.3f} M rays/s\n", name, way.counts.steps, way.counts.samples,
                static_cast<double>(b.rays) / way.seconds / 1e6);
   };
@@ -147,7 +147,7 @@ void printSkipping(const SkippingBenchmark& b) {
 }
 
 ordered_json toJson(const SkippingBenchmark& b) {
-  const auto way = [&](const SkippingBenchmark::Way& w) -> ordered_json {
+  const auto way = [&](const DrawingCost& w) -> ordered_json {
     return {{"steps", w.counts.steps},
             {"samples", w.counts.samples},
             {"seconds", w.seconds},

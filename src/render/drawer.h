@@ -71,6 +71,8 @@ class CpuDrawer {
   // What a content takes in memory at most once it is prepared, where it takes `decodedBytes` as it is decoded: what
   // drawing builds besides counts too.
   virtual uint64_t residentBytes(uint64_t decodedBytes) const { return decodedBytes; }
+  // Likewise of a resource, once for all contents that keep it: what drawing builds of it besides counts too.
+  virtual uint64_t residentBytesOfResource(uint64_t decodedBytes) const { return decodedBytes; }
   // Makes of a content as it was decoded one that draw() takes. Called by several threads at a time.
   virtual std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const { return content; }
 

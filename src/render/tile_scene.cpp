@@ -23,35 +23,43 @@ struct PromisedFile {
 class SceneResources {
  public:
   SceneResources(const fs::path& folder, const ContentCodec& codec, const std::vector<SharedResource>& described)
-      : codec_(codec), described_(described), held_(described.size()) {
+      : codec_(codec), described_(described), held_(described.size()), reading_(described.size()) {
     for (const SharedResource& resource : described) files_.push_back(contentPath(folder, resource.uri));
   }
 
   Resources of(const TileContent& content) {
-    const std::lock_guard lock(mutex_);
     Resources resources;
-    for (const uint32_t number : content.resources) {
-      std::shared_ptr<const Resource> resource = held_[number].lock();
-      if (!resource) held_[number] = resource = readResource(files_[number], codec_, described_[number]);
-      resources.push_back(std::move(resource));
-    }
+    for (const uint32_t number : content.resources) resources.push_back(of(number));
     return resources;
   }
-  // Those that are in memory.
+  // Those that are in memory; waits for no file.
   Resources present(const TileContent& content) {
-    const std::lock_guard lock(mutex_);
     Resources resources;
-    for (const uint32_t number : content.resources) resources.push_back(held_[number].lock());
+    for (const uint32_t number : content.resources) resources.push_back(present(number));
     return resources;
   }
   uint64_t bytesOf(int number) const { return readResourceBytes(files_[number], codec_, described_[number]); }
 
  private:
+  std::shared_ptr<const Resource> of(uint32_t number) {
+    const std::lock_guard reading(reading_[number]);  // others who need it wait; other resources can be read meanwhile
+    if (auto resource = present(number)) return resource;
+    std::shared_ptr<const Resource> resource = readResource(files_[number], codec_, described_[number]);
+    const std::lock_guard lock(mutex_);
+    held_[number] = resource;
+    return resource;
+  }
+  std::shared_ptr<const Resource> present(uint32_t number) {
+    const std::lock_guard lock(mutex_);
+    return held_[number].lock();
+  }
+
   const ContentCodec& codec_;
   std::vector<SharedResource> described_;
   std::vector<fs::path> files_;
-  std::mutex mutex_;
+  std::mutex mutex_;  // of held_
   std::vector<std::weak_ptr<const Resource>> held_;
+  std::vector<std::mutex> reading_;  // one for each resource
 };
 
 }  // namespace

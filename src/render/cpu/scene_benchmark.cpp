@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <set>
 
 #include "base/check.h"
 
@@ -108,6 +109,23 @@ class Watched {
   std::unique_ptr<SceneRenderer> renderer_;
 };
 
+// What the tiles that `counts` names take in memory, drawn by `drawer`: each resource that they share once.
+template <class Counts>
+uint64_t memoryOf(const TileScene& scene, const CpuDrawer& drawer, const Counts& counts) {
+  uint64_t bytes = 0;
+  std::set<int> resources;
+  for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
+    if (!scene.tree.tiles[i].hasContent || !counts(scene.tree.tiles[i])) continue;
+    const int tile = static_cast<int>(i);
+    bytes += drawer.residentBytes(scene.source.bytes(tile));
+    for (const int resource : scene.source.resourcesOf(tile)) resources.insert(resource);
+  }
+  for (const int resource : resources) {
+    bytes += drawer.residentBytesOfResource(scene.source.bytesOfResource(resource));
+  }
+  return bytes;
+}
+
 Camera flightCamera(const CacheBenchmarkOptions& options) {
   Camera camera;
   camera.width = options.width;
@@ -158,13 +176,10 @@ CacheBenchmark benchmarkCache(const TileScene& scene, const MakeDrawer& makeDraw
                               const CacheBenchmarkOptions& options) {
   CacheBenchmark result;
   result.steps = options.steps;
-  for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
-    const int tile = static_cast<int>(i);
-    if (!scene.tree.tiles[i].hasContent) continue;
-    const uint64_t bytes = scene.source.bytes(tile);
-    result.allBytes += bytes;
-    if (!scene.tree.tiles[i].isSurround && scene.tree.tiles[i].level == 0) result.finestBytes += bytes;
-  }
+  const std::unique_ptr<CpuDrawer> drawer = makeDrawer();
+  result.allBytes = memoryOf(scene, *drawer, [](const TileNode&) { return true; });
+  result.finestBytes =
+      memoryOf(scene, *drawer, [](const TileNode& tile) { return !tile.isSurround && tile.level == 0; });
   SceneRendererSettings settings = settingsFor(scene, options.threads);
   settings.selection.mostPixels = options.mostPixels * options.width / kFullWidth;
   settings.budgetBytes = static_cast<uint64_t>(options.finestShare * static_cast<double>(result.finestBytes));

@@ -15,17 +15,18 @@ struct BenchmarkView {
   Pose worldFromCamera;
 };
 
+struct DrawingCost {
+  DrawCounts counts;
+  double seconds = 0;  // of drawing; loading is left out
+};
+
 // The same views of the finest level, drawn with empty space skipped and without. All ways draw the same picture.
 struct SkippingBenchmark {
-  struct Way {
-    DrawCounts counts;
-    double seconds = 0;  // of drawing; loading is left out
-  };
   std::string device;
   uint64_t rays = 0;
-  Way skipping, whole;
-  std::optional<Way> byCells;    // where the drawer has that mode: by the levels of the occupancy alone
-  double largestDifference = 0;  // of any value of a pixel's colour, which is in [0,1]
+  DrawingCost skipping, whole;
+  std::optional<DrawingCost> byCells;  // where the drawer has that mode: by the levels of the occupancy alone
+  double largestDifference = 0;        // of any value of a pixel's colour, which is in [0,1]
 };
 
 // Makes the drawer of the scene's representation.

@@ -12,6 +12,9 @@ namespace {
 
 TileSource<Content> preparedBy(const CpuDrawer& drawer, TileSource<Content> source) {
   source.bytes = [&drawer, bytes = source.bytes](int tile) { return drawer.residentBytes(bytes(tile)); };
+  source.bytesOfResource = [&drawer, bytes = source.bytesOfResource](int resource) {
+    return drawer.residentBytesOfResource(bytes(resource));
+  };
   source.load = [&drawer, load = source.load](int tile) { return drawer.prepare(load(tile)); };
   return source;
 }

@@ -15,7 +15,7 @@ class GpuContent {
   GpuContent& operator=(const GpuContent&) = delete;
   virtual ~GpuContent() = default;
 
-  // What it takes of the GPU's memory.
+  // What it takes of the GPU's memory, without what it shares with others.
   virtual uint64_t memoryBytes() const = 0;
 };
 

@@ -18,6 +18,10 @@ class GpuDrawer {
 
   // What a content takes of the GPU at most, where it takes `decodedBytes` as it is decoded.
   virtual uint64_t residentBytes(uint64_t decodedBytes) const { return decodedBytes; }
+  // Likewise of a resource, once for all contents that need it.
+  virtual uint64_t residentBytesOfResource(uint64_t decodedBytes) const { return decodedBytes; }
+  // What is made of the content's resources is shared by all contents that need them, and goes with the last: the
+  // drawer finds what it has made of a resource, and each GpuContent keeps it.
   virtual std::unique_ptr<GpuContent> upload(const Content& content) = 0;
 
   // Queues a whole picture.

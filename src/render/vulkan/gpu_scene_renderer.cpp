@@ -14,7 +14,9 @@ TileSource<GpuContent> GpuSceneRenderer::uploaded(const TileSource<Content>& sou
   made.folder = source.folder;
   made.file = source.file;
   made.resourcesOf = source.resourcesOf;
-  made.bytesOfResource = source.bytesOfResource;
+  made.bytesOfResource = [this, bytes = source.bytesOfResource](int resource) {
+    return drawer_->residentBytesOfResource(bytes(resource));
+  };
   made.holdResources = source.holdResources;
   return made;
 }

@@ -1,0 +1,121 @@
+// What the renderer asks of its drawer.
+#include "render/cpu/scene_renderer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <mutex>
+
+#include "base/error.h"
+#include "render/testing/numbered_contents.h"
+
+namespace tessera {
+namespace {
+
+// What a drawer was asked for.
+struct Asked {
+  int prepared = 0;
+  std::vector<int> drawn;  // of the last picture, tiles in the order that they were given in
+  bool allWerePrepared = true;
+  int pinned = -1;
+  DrawSettings settings;
+  const ImageF* opaqueDepth = nullptr;
+};
+
+// Contents take three times their memory once they are prepared, and resources twice theirs.
+class AskedDrawer final : public CpuDrawer {
+ public:
+  explicit AskedDrawer(Asked* asked, uint64_t preparedBytes) : asked_(asked), preparedBytes_(preparedBytes) {}
+
+  uint64_t residentBytes(uint64_t decodedBytes) const override { return 3 * decodedBytes; }
+  uint64_t residentBytesOfResource(uint64_t decodedBytes) const override { return 2 * decodedBytes; }
+  std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const override {
+    auto& numbered = static_cast<NumberedContent&>(*content);
+    EXPECT_FALSE(numbered.prepared);
+    numbered.prepared = true;
+    numbered.bytes = preparedBytes_;
+    ++asked_->prepared;
+    return content;
+  }
+  RenderedView draw(const SceneView<Content>& view, const PictureRequest& request, const DrawSettings& settings,
+                    ThreadPool&, DrawCounts& counts) override {
+    asked_->drawn.clear();
+    for (const DrawnContent<Content>& drawn : view.frontToBack) {
+      const auto& content = static_cast<const NumberedContent&>(*drawn.content);
+      asked_->drawn.push_back(content.tile);
+      asked_->allWerePrepared &= content.prepared;
+    }
+    asked_->pinned = static_cast<const NumberedContent&>(*view.pinned).tile;
+    asked_->settings = settings;
+    asked_->opaqueDepth = request.opaqueDepth;
+    counts.steps += 5;
+    return {};
+  }
+  std::vector<std::string_view> skippingModes() const override { return {"fast", "none"}; }
+
+ private:
+  Asked* asked_;
+  uint64_t preparedBytes_;
+};
+
+class SceneRendererTest : public testing::Test {
+ protected:
+  static constexpr uint64_t kPrepared = 3 * NumberedPlace::kContentBytes;
+  static constexpr uint64_t kResource = 2 * NumberedPlace::kResourceBytes;
+  static constexpr uint64_t kAll = 5 * kPrepared + kResource;
+
+  SceneRenderer rendererWith(const SceneRendererSettings& settings, uint64_t preparedBytes = kPrepared) {
+    return {std::make_unique<AskedDrawer>(&asked_, preparedBytes), place_.frame, place_.tree, place_.source(),
+            settings};
+  }
+  static SceneRendererSettings within(uint64_t budgetBytes) {
+    SceneRendererSettings settings;
+    settings.budgetBytes = budgetBytes;
+    settings.selection.mostPixels = 0;  // the finest that there is
+    return settings;
+  }
+
+  const NumberedPlace place_;
+  Asked asked_;
+};
+
+TEST_F(SceneRendererTest, DrawsContentsThatItsDrawerHasPreparedOnce) {
+  SceneRenderer renderer = rendererWith(within(kAll));
+  EXPECT_EQ(asked_.prepared, 1) << "the root, which always is in memory";
+  for (int picture = 0; picture < 2; ++picture) renderer.render(place_.camera(), place_.above(), nullptr);
+  std::sort(asked_.drawn.begin(), asked_.drawn.end());
+  EXPECT_EQ(asked_.drawn, (std::vector<int>{1, 2, 3, 4}));
+  EXPECT_TRUE(asked_.allWerePrepared);
+  EXPECT_EQ(asked_.prepared, 5);
+  EXPECT_EQ(asked_.pinned, 0);
+  EXPECT_EQ(renderer.drawCounts().steps, 10u);
+}
+
+TEST_F(SceneRendererTest, CountsWhatPreparedContentsAndTheirResourcesTake) {
+  SceneRenderer all = rendererWith(within(kAll));
+  all.render(place_.camera(), place_.above(), nullptr);
+  EXPECT_EQ(all.cacheStatistics().bytes, kAll);
+  SceneRenderer few = rendererWith(within(kAll - 1));
+  few.render(place_.camera(), place_.above(), nullptr);
+  EXPECT_EQ(std::count(asked_.drawn.begin(), asked_.drawn.end(), 0), 1) << "a byte less, and the root stands for one";
+  EXPECT_LE(few.cacheStatistics().mostBytes, kAll - 1);
+}
+
+TEST_F(SceneRendererTest, RefusesAContentThatTakesMoreThanItsDrawerSaid) {
+  EXPECT_THROW(rendererWith(within(kAll), kPrepared + 1), Error);
+}
+
+TEST_F(SceneRendererTest, HandsItsDrawerWhatWasAskedFor) {
+  SceneRendererSettings settings = within(kAll);
+  settings.draw = {0.25f, "none", false};
+  SceneRenderer renderer = rendererWith(settings);
+  const ImageF depth(place_.camera().width, place_.camera().height, 1, 2.0f);
+  renderer.render(place_.camera(), place_.above(), &depth);
+  EXPECT_EQ(asked_.settings.minTransmittance, 0.25f);
+  EXPECT_EQ(asked_.settings.skipping, "none");
+  EXPECT_FALSE(asked_.settings.exact);
+  EXPECT_EQ(asked_.opaqueDepth, &depth);
+}
+
+}  // namespace
+}  // namespace tessera
