@@ -7,7 +7,7 @@ import { SceneError } from './scene-error';
 import { TileSelector } from './stream/tile-selector';
 import { kStreamSettings, TileStreamer, type StreamSettings } from './stream/tile-streamer';
 import { madeTree, madeView, randomNumbers } from './testing/made-tree';
-import type { ContentCodec, Resource } from './tiles/content-codec';
+import { decodeResource, type ContentCodec, type Resource } from './tiles/content-codec';
 
 const kContentBytes = 100;
 const kResourceBytes = 1000;
@@ -21,7 +21,9 @@ interface FakeDrawn extends FakeContent {
   resources: readonly Resource[];
 }
 
-const kCodec: ContentCodec<{ memoryBytes: number }, FakeContent> = {
+type FakeCodec = ContentCodec<{ memoryBytes: number }, FakeContent>;
+
+const kCodec: FakeCodec = {
   readHeader: () => ({ memoryBytes: kContentBytes }),
   decode: (_, name, read) => ({ name, read }),
   buffersOf: () => [],
@@ -35,7 +37,7 @@ const near = madeView([0, 0, 1], 0.3, -0.3);
 const far = madeView([0, 0, 400], 0, -1.5);
 
 // `resourcesOf`: of each tile of a city of edge × edge blocks.
-function make(edge: number, resourcesOf: (tile: number) => number[], settings: Partial<StreamSettings>) {
+function make(edge: number, resourcesOf: (tile: number) => number[], settings: Partial<StreamSettings>, codec = kCodec) {
   const tree = madeTree(edge);
   tree.tiles.forEach(({ content }, tile) => (content!.resources = resourcesOf(tile)));
   const resources = Array.from({ length: 4 }, (_, id) => ({ uri: `resources/${id}.bin`, mimeType: 'a/b', bytes: 50 }));
@@ -74,15 +76,15 @@ function make(edge: number, resourcesOf: (tile: number) => number[], settings: P
     },
     pool: {
       decode: async ({ file, name, promised, limits, resources: shared }: any) =>
-        kCodec.decode(kCodec.readHeader(file, name, promised, limits), name, shared),
-      decodeResource: async ({ file, from, limits }: any) => kCodec.decodeResource!(file, from, limits),
+        codec.decode(codec.readHeader(file, name, promised, limits), name, shared),
+      decodeResource: async ({ file, from, limits }: any) => decodeResource(codec as ContentCodec, file, from, limits),
     },
     drawer,
   } as unknown as ContentPath;
   const renderer = { getContext: () => ({ getParameter: () => 256 }) } as unknown as THREE.WebGLRenderer;
   const clock = { now: 0 };
   const streamer = new TileStreamer(
-    new TileSelector(tree), new ContentSource(path, renderer, kCodec as ContentCodec), { ...kStreamSettings, ...settings }, () => clock.now);
+    new TileSelector(tree), new ContentSource(path, renderer, codec as ContentCodec), { ...kStreamSettings, ...settings }, () => clock.now);
   const errors: string[] = [];
   streamer.onError = ({ message }) => errors.push(message);
   const settle = async (view: typeof near, frames = 60) => {
@@ -148,6 +150,14 @@ describe('what tiles share', () => {
     await made.settle(near);
     expect(made.drawn.size).toBeGreaterThan(1);
     expect(streamer.errorOf(made.tree.tiles[0].children[0])).toBeUndefined();
+  });
+
+  it('is refused where contents of the representation share nothing', async () => {
+    const made = make(2, (tile) => (tile === 0 ? [] : [1]), { cardBytes: 1e6 }, { ...kCodec, decodeResource: undefined });
+    const cut = await made.settle(near);
+    expect(cut.filter(({ visible }) => visible).every(({ content }) => content === 0)).toBe(true);
+    expect(made.errors).toEqual([expect.stringMatching(/resources.1\.bin.*contents of this representation do not have/)]);
+    expect([...made.drawn].map(({ name }) => name)).toEqual(['tiles/0.glb']);
   });
 
   it('is part of what the coarsest level takes', async () => {

@@ -44,7 +44,7 @@ export class ContentSource implements TileSource<ContentFile, Content, DrawnCont
       layers: gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS) as number,
       uniformBytes: gl.getParameter(gl.MAX_UNIFORM_BLOCK_SIZE) as number,
     };
-    if (!this.codec.decodeResource || tileset.resources.length === 0) return;
+    if (tileset.resources.length === 0) return;
     this.resources = {
       resourcesOf: (tile) => this.contentOf(tile).resources,
       promisedBytes: (id) => tileset.resources[id].bytes,

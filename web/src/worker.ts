@@ -2,7 +2,7 @@
 import decoderUrl from '@jsquash/webp/codec/dec/webp_dec.wasm?url';
 import { codecOf, type KnownRepresentation } from './representations/codecs';
 import { SceneError } from './scene-error';
-import type { Content, PromisedContent, Resource } from './tiles/content-codec';
+import { decodeResource, type Content, type PromisedContent, type Resource } from './tiles/content-codec';
 import type { ContentLimits } from './tiles/content-limits';
 import { isDecoderPrepared, prepareDecoder } from './tiles/lossless-image';
 import type { SharedResource } from './tiles/tileset';
@@ -50,7 +50,7 @@ function decode(request: DecodeRequest): { decoded: Content | Resource; buffers:
   const { representation, file, limits } = request;
   const codec = codecOf(representation);
   if ('from' in request) {
-    const resource = codec.decodeResource!(file, request.from, limits);
+    const resource = decodeResource(codec, file, request.from, limits);
     return { decoded: resource, buffers: codec.buffersOfResource?.(resource) ?? [] };
   }
   const { name, promised, resources } = request;

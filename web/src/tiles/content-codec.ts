@@ -1,5 +1,6 @@
 // What a representation says of its contents' files (docs/tile-format.md, sections 5 to 7): how they are read. Workers read
 // them, so nothing here knows three.js. representations/codecs.ts has one for each representation.
+import { SceneError } from '../scene-error';
 import type { ContentLimits } from './content-limits';
 import type { SharedResource, TileContent } from './tileset';
 
@@ -32,7 +33,13 @@ export interface ContentCodec<Header extends ContentHeader = ContentHeader, Deco
   decode(header: Header, name: string, resources: readonly Resource[]): Decoded;
   // The memory of a content's texels, which may be handed over to another thread.
   buffersOf(content: Decoded): ArrayBuffer[];
-  // Where there is none, contents share nothing: what they list is not fetched.
+  // Where there is none, contents share nothing, and a tile that needs a resource is not drawn (decodeResource below).
   decodeResource?(file: Uint8Array, from: SharedResource, limits: ContentLimits): Resource;
   buffersOfResource?(resource: Resource): ArrayBuffer[]; // as buffersOf; where there is none, it is copied
+}
+
+export function decodeResource(codec: ContentCodec, file: Uint8Array, from: SharedResource, limits: ContentLimits): Resource {
+  if (codec.decodeResource) return codec.decodeResource(file, from, limits);
+  throw new SceneError(
+    from.uri, '', 'is a shared resource, which contents of this representation do not have', 'copy the scene again, or bake it again');
 }
