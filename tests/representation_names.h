@@ -12,7 +12,7 @@
 namespace tessera {
 
 // Whose names stand within identifiers of their own (VolumeContent, decodeHash), and those that are too ordinary for
-// that (ConfigField, SurfaceMesh): of them only texts, enumerators and paths count.
+// that (ConfigField, SurfaceMesh): of them only texts and paths count.
 inline constexpr std::string_view kDistinctNames[] = {"volume", "hash"}, kOrdinaryNames[] = {"field", "mesh"};
 
 // Words of identifiers and of file names that mean something else.
@@ -74,7 +74,7 @@ class NamedRepresentations {
     } else if (isOfName(c)) {
       const size_t begin = at_;
       while (at_ < source_.size() && isOfName(source_[at_])) ++at_;
-      identifier(source_.substr(begin, at_ - begin), begin);
+      identifier(source_.substr(begin, at_ - begin));
     } else {
       ++at_;
     }
@@ -103,16 +103,9 @@ class NamedRepresentations {
     }
   }
 
-  // `begin`: where it stands in the source.
-  void identifier(std::string_view identifier, size_t begin) {
-    constexpr std::string_view kEnumeration = "Representation::";
-    const bool isEnumerator = begin >= kEnumeration.size() &&
-                              source_.substr(begin - kEnumeration.size(), kEnumeration.size()) == kEnumeration;
-    for (const std::string_view name : kOrdinaryNames) {
-      if (isEnumerator && identifier == name) names_.emplace(name);
-    }
+  void identifier(std::string_view identifier) {
     for (const std::string_view name : kDistinctNames) {
-      if (identifier == name ? isEnumerator : isWordOf(identifier, name)) names_.emplace(name);
+      if (identifier != name && isWordOf(identifier, name)) names_.emplace(name);
     }
   }
 

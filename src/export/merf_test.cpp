@@ -71,6 +71,7 @@ class Merf : public testing::Test {
 
   static Tileset tilesetOf(const VolumeContent& content) {
     Tileset tileset;
+    tileset.representation = "volume";
     tileset.geometricError = 10;
     Tile tile;
     tile.cells = tileset.allCells();

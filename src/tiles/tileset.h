@@ -87,7 +87,7 @@ struct Tile {
 struct Tileset {
   // What decodes and draws the contents: lower-case letters, digits and '_'. Which names are known is for whoever has
   // their codecs (tiles/content.h).
-  std::string representation = "volume";
+  std::string representation;
   std::string name;  // of the capture, for people
 
   Similarity worldFromScene;

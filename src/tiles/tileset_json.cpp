@@ -33,7 +33,7 @@ void addBox(Json& object, const SceneBox& box) {
   object["high"] = numbersOf(box.high);
 }
 
-Json volumeOf(const Tileset& tileset, const SceneBox& box) {
+Json boundsOf(const Tileset& tileset, const SceneBox& box) {
   return {{"box", boundingBoxNumbers(tileset, box)}};
 }
 
@@ -50,7 +50,7 @@ Json contentOf(const Tileset& tileset, const Tile& tile, const TileContent& cont
   if (!content.resources.empty()) ours["resources"] = content.resources;
   if (content.bytes > 0) ours["bytes"] = content.bytes;
   return {{"uri", content.uri},
-          {"boundingVolume", volumeOf(tileset, content.box)},
+          {"boundingVolume", boundsOf(tileset, content.box)},
           {"extensions", {{kExtension, std::move(ours)}}}};
 }
 
@@ -58,7 +58,7 @@ Json contentOf(const Tileset& tileset, const Tile& tile, const TileContent& cont
 Json tileOf(const Tileset& tileset, const Tile& tile, bool isRoot) {
   Json json;
   if (isRoot && tileset.georeference) json["transform"] = numbersOf(tileset.rootTransform());
-  json["boundingVolume"] = volumeOf(tileset, enclosingBox(tile));
+  json["boundingVolume"] = boundsOf(tileset, enclosingBox(tile));
   json["geometricError"] = tile.geometricError;
   if (isRoot) json["refine"] = "REPLACE";
   Json contents = Json::array();

@@ -10,6 +10,7 @@ namespace tessera::tiles_test {
 // Columns × 2 cells, each a leaf; all of them below one root, with two surrounds.
 inline Tileset madeTileset(uint32_t columns = 3, bool georeferenced = true) {
   Tileset tileset;
+  tileset.representation = "volume";
   tileset.name = "made";
   tileset.worldFromScene.rotation << 0.8, -0.6, 0, 0.6, 0.8, 0, 0, 0, 1;
   tileset.worldFromScene.scale = 12.5;
