@@ -1,4 +1,6 @@
 // Render passes among a stream's other commands: order, replayed batches, counts in memory, and retiring.
+#include <optional>
+
 #include "gpu/testing/draw_test_support.h"
 #include "shaders/double_values.h"
 
@@ -161,6 +163,27 @@ TEST_F(GpuStreamDrawTest, RecordsAPassAnewWhereItsDrawsDiffer) {
     }
   }
   EXPECT_GE(stream_->batchesRecorded() - recorded, 6u);
+}
+
+TEST_F(GpuStreamDrawTest, RecordsAPassAnewWhereItStandsAtTheAddressOfOneThatIsGone) {
+  const Target targets[3] = {makeTarget(), makeTarget(), makeTarget()};
+  const GpuGraphicsPipeline pipeline = makePipeline();
+  const GpuBuffer copied(context_, targets[0].numbers->copiedBytes());
+  std::vector<uint32_t> numbers(copied.bytes() / 4);
+  std::optional<GpuRenderPass> pass;  // always at this address
+  for (uint64_t i = 0; i < 9; ++i) {
+    const Target& target = targets[i % 3];
+    const Triangles triangles = randomTriangles(i, 12);
+    const OnDevice device = uploaded(triangles);
+    stream_->finish();
+    pass.emplace(context_, std::vector<ColourAttachment>{{.image = target.numbers}},
+                 DepthAttachment{.image = target.depth});
+    stream_->draw(*pass, std::vector<DrawCall>(12, call(pipeline, device.arguments, {.vertices = 36})));
+    stream_->finish();
+    stream_->copy(*target.numbers, copied, 0);
+    stream_->download(copied, 0, std::as_writable_bytes(std::span(numbers)));
+    expectNumbers(rasterise(triangles, kSize), numbers);
+  }
 }
 
 TEST_F(GpuStreamDrawTest, DrawsAsMuchAsTheDevicesMemorySays) {
