@@ -146,24 +146,31 @@ TEST_F(CommandLine, HelpOfEveryVerbHasDefaultsAndAnExample) {
   for (const auto& verb : verbs) EXPECT_TRUE(contains(said.out, "  " + verb[0] + " ")) << said.out;
 }
 
-TEST_F(CommandLine, ListsTheMethodsThatThereAre) {
 #define NAME(name, Name) #name,
 #define SKIP(name, Name)
-  const std::vector<std::string> all = {TESSERA_REPRESENTATIONS(NAME, NAME)};
-  const std::vector<std::string> baked = {TESSERA_REPRESENTATIONS(SKIP, NAME)};
+const std::vector<std::string> kMethods = {TESSERA_REPRESENTATIONS(NAME, NAME)};
+const std::vector<std::string> kBakedMethods = {TESSERA_REPRESENTATIONS(SKIP, NAME)};
 #undef SKIP
 #undef NAME
+
+// "volume or hash".
+std::string sentenceOf(const std::vector<std::string>& names) {
+  std::string sentence;
+  for (const std::string& name : names) {
+    sentence += (sentence.empty() ? "" : name == names.back() ? " or " : ", ") + name;
+  }
+  return sentence;
+}
+
+TEST_F(CommandLine, ListsTheMethodsThatThereAre) {
   std::string choices;
-  for (const std::string& name : all) choices += (choices.empty() ? "" : ",") + name;
+  for (const std::string& name : kMethods) choices += (choices.empty() ? "" : ",") + name;
   const std::string train = run({"train", "--help"}).out;
   EXPECT_TRUE(contains(train, "--method TEXT:{" + choices + "}")) << train;
-  for (const std::string& name : all) EXPECT_TRUE(contains(train, "Settings of --method " + name)) << train;
+  for (const std::string& name : kMethods) EXPECT_TRUE(contains(train, "Settings of --method " + name)) << train;
   EXPECT_TRUE(contains(usageErrorOf({"train", city(), at("m"), "--method", "guess"}), "{" + choices + "}"));
-  std::string sentence;
-  for (const std::string& name : baked)
-    sentence += (sentence.empty() ? "" : name == baked.back() ? " or " : ", ") + name;
   const std::string bake = run({"bake", "--help"}).out;
-  EXPECT_TRUE(contains(bake, "of --method " + sentence)) << bake;
+  EXPECT_TRUE(contains(bake, "of --method " + sentenceOf(kBakedMethods))) << bake;
 }
 
 TEST_F(CommandLine, SaysItsVersion) {
@@ -250,9 +257,8 @@ TEST_F(CommandLine, SaysWhatAFolderIsThatCannotBeServedAndWhatToDo) {
            "MODEL SCENE");
   says(city(), "is a capture, not a scene; train and bake it first: tessera train " + city() +
                    " MODEL --method volume, then tessera bake MODEL SCENE");
-  says(model(),
-       "is a model of --method field, of which no scene can be baked; train one with --method volume or hash, and bake "
-       "that; tessera view shows this one");
+  says(model(), "is a model of --method field, of which no scene can be baked; train one with --method " +
+                    sentenceOf(kBakedMethods) + ", and bake that; tessera view shows this one");
   const std::string volume = at("volume.model");
   writeFileAtomically(volume + "/blocks.json", std::string_view("{}"));
   says(volume,

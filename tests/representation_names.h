@@ -9,11 +9,25 @@
 #include <string_view>
 #include <vector>
 
+#include "representations/list.h"
+
 namespace tessera {
 
-// Whose names stand within identifiers of their own (VolumeContent, decodeHash), and those that are too ordinary for
-// that (ConfigField, SurfaceMesh): of them only texts and paths count.
-inline constexpr std::string_view kDistinctNames[] = {"volume", "hash"}, kOrdinaryNames[] = {"field", "mesh"};
+// Names that are too ordinary to stand within identifiers of their own (ConfigField, SurfaceMesh): of them only texts
+// and paths count.
+inline constexpr std::string_view kOrdinaryNames[] = {"field", "mesh"};
+
+// The others of the list, of which identifiers count too (VolumeContent, decodeHash).
+inline const std::vector<std::string_view>& distinctNames() {
+#define TESSERA_NAME(name, Name) #name,
+  static const std::vector<std::string_view> names = [] {
+    std::vector<std::string_view> all = {TESSERA_REPRESENTATIONS(TESSERA_NAME, TESSERA_NAME)};
+    for (const std::string_view ordinary : kOrdinaryNames) std::erase(all, ordinary);
+    return all;
+  }();
+#undef TESSERA_NAME
+  return names;
+}
 
 // Words of identifiers and of file names that mean something else.
 inline constexpr std::string_view kHomonyms[] = {
@@ -98,13 +112,13 @@ class NamedRepresentations {
     for (const std::string_view name : kOrdinaryNames) {
       if (names(name)) names_.emplace(name);
     }
-    for (const std::string_view name : kDistinctNames) {
+    for (const std::string_view name : distinctNames()) {
       if (names(name) || (isPath && isWordOf(content, name))) names_.emplace(name);
     }
   }
 
   void identifier(std::string_view identifier) {
-    for (const std::string_view name : kDistinctNames) {
+    for (const std::string_view name : distinctNames()) {
       if (identifier != name && isWordOf(identifier, name)) names_.emplace(name);
     }
   }

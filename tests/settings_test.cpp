@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "representations/field/train/config.h"
 #include "representations/hash/train/config.h"
+#include "representations/list.h"
 #include "representations/volume/train/config.h"
 
 namespace tessera {
@@ -21,6 +22,14 @@ void forEachMethod(const Use& use) {
   use("field", FieldConfig());
   use("volume", VolumeConfig());
   use("hash", HashConfig());
+}
+
+TEST(Settings, OfAllMethodsAreLookedAt) {
+  std::vector<std::string> methods;
+  forEachMethod([&](const char* method, const auto&) { methods.emplace_back(method); });
+#define TESSERA_NAME(name, Name) #name,
+  EXPECT_EQ(methods, std::vector<std::string>({TESSERA_REPRESENTATIONS(TESSERA_NAME, TESSERA_NAME)}));
+#undef TESSERA_NAME
 }
 
 struct Listed {

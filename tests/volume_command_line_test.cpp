@@ -284,6 +284,9 @@ TEST_F(VolumeCommandLine, RefusesBlocksThatAreNone) {
   const std::string grid = (fs::path(model()) / "blocks.json").string();
   const Said both = run({"train", at("city"), at("never"), "--method", "volume", "--blocks", "2x2", "--grid", grid});
   EXPECT_EQ(both.exitCode, 2) << both.err;
+  const Said cut = run({"train", at("city"), at("never"), "--method", "field", "--blocks", "2x2"});
+  EXPECT_EQ(cut.exitCode, 2) << cut.err;
+  EXPECT_TRUE(contains(cut.err, "--blocks: is of --method ")) << cut.err;
   const Said ofField = run({"train", at("city"), at("never"), "--method", "field", "--grid", grid});
   EXPECT_EQ(ofField.exitCode, 2) << ofField.err;
   EXPECT_TRUE(contains(ofField.err, "--grid")) << ofField.err;

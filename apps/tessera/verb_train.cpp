@@ -22,8 +22,10 @@ CLI::Validator amount(double low, double high) {
       fmt::format("FLOAT in [{} - {}]", low, high));
 }
 
+constexpr const char* kAutoBlocks = "auto";
+
 struct TrainFlags {
-  std::string method = std::string(methods().front()->name), configFile, blocks = "auto", grid;
+  std::string method = std::string(methods().front()->name), configFile, blocks = kAutoBlocks, grid;
   std::vector<std::string> settings;
   std::string seed, residentBlocks;
   DeviceOptions device;
@@ -105,6 +107,7 @@ TrainingResult train(Device& device, const TrainFlags& flags) {
     }
   } else {
     const std::string ofOthers = "is of --method " + namesOfMethods(trainsInBlocks);
+    if (flags.blocks != kAutoBlocks) throw CLI::ValidationError("--blocks", ofOthers);
     if (!flags.grid.empty()) throw CLI::ValidationError("--grid", ofOthers);
     if (flags.memoryMiB > 0) throw CLI::ValidationError("--memory-mib", ofOthers);
   }

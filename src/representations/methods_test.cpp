@@ -181,10 +181,36 @@ TEST(Methods, TrainDescribeDrawAndBakeTheirModels) {
     const std::unique_ptr<Baker> baker = method->openBaker(*device, model, parameters);
     const BakedScene baked = bakeScene(*baker, scene.capture(), model / "scene", baking);
     EXPECT_EQ(readTileset(model / "scene").representation, method->name);
-    ASSERT_EQ(baked.levels.size(), 2u) << method->name << ": two blocks, and what holds both";
-    EXPECT_EQ(baked.tileset.tiles.size(), 3u);
+    if (method->trainsInBlocks) {
+      ASSERT_EQ(baked.levels.size(), 2u) << method->name << ": two blocks, and what holds both";
+      EXPECT_EQ(baked.tileset.tiles.size(), 3u);
+    }
     EXPECT_EQ(done, all) << method->name;
     EXPECT_GT(done, 0) << method->name;
+  }
+}
+
+TEST(Methods, RefuseToTrainWithSettingsThatTheirCheckRefuses) {
+  const CubeScene scene;
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  for (const Method* method : methods()) {
+    const std::unique_ptr<MethodSettings> settings = method->settings("");
+    const std::vector<ConfigField> fields = settings->fields();
+    const auto wrong = std::find_if(fields.begin(), fields.end(), [](const ConfigField& field) {
+      return field.bounds.isBounded && std::holds_alternative<double*>(field.value);
+    });
+    ASSERT_NE(wrong, fields.end()) << method->name;
+    *std::get<double*>(wrong->value) = 2 * wrong->bounds.high + 1;
+    const fs::path model = scene / std::string(method->name);
+    BlockRunOptions options;
+    options.loop.progress = false;
+    try {
+      method->train(*device, scene.capture(), model, *settings, options);
+      ADD_FAILURE() << method->name << " trains with a wrong " << wrong->name;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(wrong->name), std::string::npos) << method->name << ": " << error.what();
+    }
+    EXPECT_FALSE(fs::exists(model)) << method->name;
   }
 }
 

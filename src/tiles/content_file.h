@@ -45,7 +45,8 @@ class ContentFileWriter {
   size_t addView(std::span<const std::byte> bytes, uint32_t target = 0);
   // {"bufferView": n, "mimeType": ...}: how the extension names it.
   nlohmann::ordered_json add(std::span<const std::byte> bytes, const char* mimeType);
-  // `ours`: the extension's members after version and representation.
+  // `ours`: the extension's members after version and representation. CHECKs that a view was added, as glTF allows no
+  // empty buffer.
   Bytes finish(std::string_view representation, const nlohmann::ordered_json& ours, const GltfScene& scene = {});
 
  private:

@@ -99,7 +99,8 @@ struct Method {
   // presets, which have no setting of that name, give their defaults.
   std::unique_ptr<MethodSettings> (*settings)(const std::string& preset) = nullptr;
 
-  // Trains, resumes, saves; see training_loop.h.
+  // Trains, resumes, saves; see training_loop.h. Names itself in options.loop.method, for what config.toml says of how
+  // to repeat the run. Throws Error before it writes anything where `settings` are refused (MethodSettings::check).
   TrainingResult (*train)(Device& device, const Capture& capture, const fs::path& model, const MethodSettings& settings,
                           const BlockRunOptions& options) = nullptr;
 

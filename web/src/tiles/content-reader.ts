@@ -16,6 +16,12 @@ export interface ContentFile {
   views: Uint8Array[];
 }
 
+// The view that an object names, if its mimeType is this one.
+export function viewOf(views: Uint8Array[], source: Json, mimeType: string): Uint8Array | undefined {
+  const index = wholeOf(source, 'bufferView');
+  return index !== undefined && stringOf(source, 'mimeType') === mimeType ? views[index] : undefined;
+}
+
 export class ContentReader {
   // `name` is what errors name.
   constructor(
@@ -101,9 +107,4 @@ export class ContentReader {
       this.fail('is more than the decoder of pictures has memory for', 'close other pages, or copy the scene again');
     }
   }
-}
-
-function viewOf(views: Uint8Array[], source: Json, mimeType: string): Uint8Array | undefined {
-  const index = wholeOf(source, 'bufferView');
-  return index !== undefined && stringOf(source, 'mimeType') === mimeType ? views[index] : undefined;
 }
