@@ -1,8 +1,11 @@
 #!/usr/bin/env bash
-# A change of structure costs no speed: two programs train and draw in turn, in one run. Prints the median of the ratios
-# of each pair (after / before) and fails where one is below 0.97.
-#   BEFORE_PROGRAM=... AFTER_PROGRAM=... [ROUNDS=5] [STEPS=60] bench/same_speed.sh FOLDER
-# FOLDER is what bench/same_bytes.sh kept (KEEP): its city, and the scenes that the first program baked of it.
+# A change of structure costs no speed: two programs train and draw in turn, in one run, and so do two builds of the viewer
+# where they are named. Prints the median of the ratios of each pair (after / before), in the browser the ratio of the
+# fastest frames, and fails where one is below 0.97.
+#   BEFORE_PROGRAM=... AFTER_PROGRAM=... [BEFORE_VIEWER=... AFTER_VIEWER=...] [ROUNDS=5] [STEPS=60] [ROWS="..."] \
+#     bench/same_speed.sh FOLDER
+# FOLDER is what bench/same_bytes.sh kept (KEEP): its city, and the scenes that the first program baked of it. Viewers are
+# what tools/build-web.sh makes (web/dist) of each commit. ROWS: train_field, train_volume, ... instead of all.
 source "$(dirname "$0")/setup.sh"
 folder=$(cd "${1:?usage: bench/same_speed.sh FOLDER}" && pwd)
 rounds=${ROUNDS:-5} steps=${STEPS:-60}
@@ -32,7 +35,7 @@ frames() {
 frames_volume() { frames "$1" volume; }
 frames_hash() { frames "$1" hash; }
 
-for what in train_field train_volume train_hash frames_volume frames_hash; do
+for what in ${ROWS-train_field train_volume train_hash frames_volume frames_hash}; do
   ratios=() was="" is=""
   for ((round = 0; round < rounds; ++round)); do
     # Whoever comes first may find the machine colder: they take turns.
@@ -47,4 +50,11 @@ for what in train_field train_volume train_hash frames_volume frames_hash; do
   echo "$what: ${ratios[*]} (the last pair: $was before, $is after, a second)"
   verdict "$what, after / before" "$median" '>=' 0.97
 done
+if [ -n "${BEFORE_VIEWER:-}" ]; then
+  TESSERA=$after SCENES="$folder/before/volume.scene $folder/before/hash.scene" VIEWS=$folder/city
+  BEFORE_VIEWER=$(realpath "$BEFORE_VIEWER") AFTER_VIEWER=$(realpath "${AFTER_VIEWER:?}")
+  export TESSERA SCENES VIEWS BEFORE_VIEWER AFTER_VIEWER
+  (cd web && xvfb-run -a -s "-screen 0 1280x1024x24 -noreset" npx vitest run bench/same-speed.ts \
+    --config vitest.bench.config.ts --disable-console-intercept) || failures=$((failures + 1))
+fi
 finish

@@ -23,8 +23,8 @@ export interface Server {
   close(): void;
 }
 
-export async function serve(scene: string): Promise<Server> {
-  const server: ChildProcess = spawn(program, ['serve', scene, '--viewer', viewer, '--port', '0']);
+export async function serve(scene: string, folder = viewer): Promise<Server> {
+  const server: ChildProcess = spawn(program, ['serve', scene, '--viewer', folder, '--port', '0']);
   const url = await new Promise<string>((resolve, reject) => {
     let said = '';
     const hear = (text: Buffer) => {
