@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <mutex>
 
 #include "base/error.h"
 #include "render/testing/numbered_contents.h"
