@@ -159,6 +159,13 @@ TEST_F(HttpServerTest, AnswersRequestAfterRequestOfOneClient) {
   EXPECT_LT(all.size(), 2000u) << "HEAD sends no body";
 }
 
+// AddressSanitizer keeps so much of what was freed, to tell its uses.
+#ifdef __SANITIZE_ADDRESS__
+constexpr int64_t kKeptFreed = int64_t{256} << 20;
+#else
+constexpr int64_t kKeptFreed = 0;
+#endif
+
 TEST_F(HttpServerTest, ServesAnHonestClientBesideManyThatStall) {
   start();
   const int64_t before = residentBytes();
@@ -177,7 +184,7 @@ TEST_F(HttpServerTest, ServesAnHonestClientBesideManyThatStall) {
     EXPECT_EQ(bodyOf(exchange(get("/tile.glb"))), tile_);
     EXPECT_LT(Clock::now() - begin, 1s);
   }
-  EXPECT_LT(residentBytes() - before, int64_t{48} << 20);
+  EXPECT_LT(residentBytes() - before, (int64_t{48} << 20) + kKeptFreed);
 }
 
 TEST_F(HttpServerTest, HandsTheSystemNoMoreThanItCanSendSoon) {
