@@ -6,6 +6,7 @@
 #     bench/same_speed.sh FOLDER
 # FOLDER is what bench/same_bytes.sh kept (KEEP): its city, and the scenes that the first program baked of it. Viewers are
 # what tools/build-web.sh makes (web/dist) of each commit. ROWS: train_field, train_volume, ... instead of all.
+set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 folder=$(cd "${1:?usage: bench/same_speed.sh FOLDER}" && pwd)
 rounds=${ROUNDS:-9} steps=${STEPS:-120}

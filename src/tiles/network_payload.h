@@ -1,6 +1,6 @@
-// A network in a content's file (docs/tile-format.md, section 5): its layers in the extension, its numbers in a buffer
-// view. For codecs, not for their users: it shows JSON. What is read is untrusted: false, and why in `reason` (for
-// people; the first reason counts), where it is refused.
+// A network in a content's file (docs/tile-format.md, sections 6 and 7): its layers in the extension, its numbers in a
+// buffer view. For codecs, not for their users: it shows JSON. What is read is untrusted: false, and why in `reason`
+// (for people; the first reason counts), where it is refused.
 #pragma once
 
 #include <nlohmann/json.hpp>
