@@ -23,16 +23,6 @@ function(tessera_module name)
   endif()
 endfunction()
 
-# tessera_unit_tests(NAME SOURCES a_test.cpp ... LIBRARIES x ...): the binary tessera_NAME_test, one CTest entry
-# NAME/... a test.
-function(tessera_unit_tests name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LIBRARIES" ${ARGN})
-  add_executable(tessera_${name}_test ${ARG_SOURCES})
-  target_link_libraries(tessera_${name}_test PRIVATE ${ARG_LIBRARIES} GTest::gtest_main)
-  gtest_discover_tests(tessera_${name}_test TEST_PREFIX "${name}/" DISCOVERY_MODE PRE_TEST
-    PROPERTIES TIMEOUT 300 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
-endfunction()
-
 # tessera_simd_kernels(TARGET): Highway's kernels of a library that chooses among instruction sets at run time, for which
 # -O3 pays.
 function(tessera_simd_kernels target)
