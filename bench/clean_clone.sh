@@ -1,0 +1,19 @@
+#!/usr/bin/env bash
+# Times ./test.sh in a fresh clone of HEAD without compiler cache, packages and build included: at most 20 minutes on 2
+# cores. Says how long each part of it took. Real photographs are found by TESSERA_SHARED_DATA, as ever.
+#   bench/clean_clone.sh
+set -euo pipefail
+source "$(dirname "$0")/setup.sh"
+rm -rf "$out/clone"
+git clone --quiet . "$out/clone"
+export CCACHE_DISABLE=1
+log=$PWD/$out/clean_clone.txt
+started=$(date +%s)
+(cd "$out/clone" && ./test.sh 2>&1) | while IFS= read -r line; do echo "$(($(date +%s) - started)) $line"; done > "$log" ||
+  { tail -n 40 "$log" >&2; die "the tests did not pass"; }
+seconds=$(($(date +%s) - started))
+reached() { awk -v what="$1" 'index($0, what) { print $1; exit }' "$log"; }
+built=$(reached 'Test project') tested=$(reached 'Total Test time')
+echo "packages and build $built s, C++ tests $((tested - built)) s, the viewer's build and tests $((seconds - tested)) s"
+verdict "./test.sh in a clean clone, seconds" "$seconds" '<=' 1200
+finish
