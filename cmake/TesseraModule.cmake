@@ -27,6 +27,8 @@ endfunction()
 # -O3 pays.
 function(tessera_simd_kernels target)
   target_compile_options(${target} PRIVATE -O3)
+  # A source that Highway compiles once for each instruction set includes itself, so it cannot be joined with others.
+  set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)
   tessera_simd_targets(${target})
 endfunction()
 

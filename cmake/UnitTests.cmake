@@ -1,15 +1,16 @@
-# Precompiled headers of the tests: GoogleTest and standard headers are most of what the compiler reads of a small test.
+# Precompiled headers of the tests: GoogleTest, Eigen, fmt and standard headers are most of what the compiler reads of a
+# small test.
 # The flags have to be those of the tests, or the compiler does not use them: tests are programs (-fPIE), not parts of
 # libraries. Only tests have them, so that sources of the product include what they use.
 if(TESSERA_TESTS)
   file(GENERATE OUTPUT ${CMAKE_BINARY_DIR}/test_precompiled_headers.cpp CONTENT "")
   add_library(tessera_test_precompiled_headers OBJECT ${CMAKE_BINARY_DIR}/test_precompiled_headers.cpp)
   set_target_properties(tessera_test_precompiled_headers PROPERTIES POSITION_INDEPENDENT_CODE OFF)
-  target_link_libraries(tessera_test_precompiled_headers PRIVATE GTest::gtest)
+  target_link_libraries(tessera_test_precompiled_headers PRIVATE GTest::gtest Eigen3::Eigen fmt::fmt)
   target_compile_options(tessera_test_precompiled_headers PRIVATE -fPIE -O1)
   target_precompile_headers(tessera_test_precompiled_headers PRIVATE <gtest/gtest.h> <algorithm> <array> <chrono>
     <cmath> <filesystem> <fstream> <functional> <map> <memory> <optional> <random> <span> <sstream> <string>
-    <string_view> <thread> <vector>)
+    <string_view> <thread> <vector> <Eigen/Core> <Eigen/Geometry> <fmt/format.h>)
 endif()
 
 # tessera_unit_tests(NAME SOURCES a_test.cpp ... LIBRARIES x ... [PREFIX p]): the binary tessera_NAME_test, one CTest

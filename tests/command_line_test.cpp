@@ -14,25 +14,21 @@ namespace {
 
 using nlohmann::json;
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 // Settings that make a model in a moment.
-const std::vector<std::string> kTiny = {"grid_levels=4",
-                                        "grid_log2_size=10",
-                                        "grid_finest=64",
-                                        "width=16",
-                                        "colour_hidden=1",
-                                        "min_step=0.05",
-                                        "cone=0.1",
-                                        "far=8",
-                                        "first_rays=128",
-                                        "most_rays=512",
-                                        "samples_per_step=2048",
-                                        "occupancy_resolution=16",
-                                        "occupancy_warm_up=16",
-                                        "rate=0.02"};
+const std::vector<std::string> kTinyField = {"grid_levels=4",
+                                             "grid_log2_size=10",
+                                             "grid_finest=64",
+                                             "width=16",
+                                             "colour_hidden=1",
+                                             "min_step=0.05",
+                                             "cone=0.1",
+                                             "far=8",
+                                             "first_rays=128",
+                                             "most_rays=512",
+                                             "samples_per_step=2048",
+                                             "occupancy_resolution=16",
+                                             "occupancy_warm_up=16",
+                                             "rate=0.02"};
 
 class CommandLine : public testing::Test {
  protected:
@@ -55,7 +51,7 @@ class CommandLine : public testing::Test {
 
   static std::vector<std::string> trainArguments(const std::string& model, const std::vector<std::string>& more) {
     std::vector<std::string> arguments = {"train", city(), model};
-    for (const std::string& setting : kTiny) arguments.insert(arguments.end(), {"--set", setting});
+    for (const std::string& setting : kTinyField) arguments.insert(arguments.end(), {"--set", setting});
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }

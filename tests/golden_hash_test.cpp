@@ -8,14 +8,14 @@
 namespace tessera {
 namespace {
 
-const fs::path kScene = TESSERA_GOLDEN_HASH;
+const fs::path kHashScene = TESSERA_GOLDEN_HASH;
 
 TEST(GoldenHash, IsReadToTheExpectedSumsAndHoldsWhatItWasMadeFrom) {
-  const nlohmann::ordered_json expected = readGoldenJson(kScene / "sums.json");
+  const nlohmann::ordered_json expected = readGoldenJson(kHashScene / "sums.json");
   EXPECT_EQ(expected.size(), 5u);
   const golden::Scene<HashContent> scene = golden::makeHashScene();
   forEachGoldenContent<HashContent>(
-      kScene, hashCodec(), [&](const auto& uri, const auto& name, const HashContent& hash) {
+      kHashScene, hashCodec(), [&](const auto& uri, const auto& name, const HashContent& hash) {
         const HashContent& made = scene.contents.at(name);
         const auto& sums = expected.at(uri);
         ASSERT_EQ(hash.parts.size(), sums.size());
@@ -32,7 +32,7 @@ TEST(GoldenHash, IsReadToTheExpectedSumsAndHoldsWhatItWasMadeFrom) {
 }
 
 TEST(GoldenHash, LooksAlongItsRaysAsTheDefinitionSays) {
-  expectRaysAsDefined<HashContent>(kScene, hashCodec());
+  expectRaysAsDefined<HashContent>(kHashScene, hashCodec());
 }
 
 }  // namespace

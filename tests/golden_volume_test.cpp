@@ -8,7 +8,7 @@
 namespace tessera {
 namespace {
 
-const fs::path kScene = TESSERA_GOLDEN_VOLUME;
+const fs::path kVolumeScene = TESSERA_GOLDEN_VOLUME;
 
 void expectSame(const VolumeContent& a, const VolumeContent& b) {
   EXPECT_EQ(a.featureRange, b.featureRange);
@@ -39,10 +39,10 @@ void expectSame(const VolumeContent& a, const VolumeContent& b) {
 }
 
 TEST(GoldenVolume, IsReadToTheExpectedSums) {
-  const nlohmann::ordered_json expected = readGoldenJson(kScene / "sums.json");
+  const nlohmann::ordered_json expected = readGoldenJson(kVolumeScene / "sums.json");
   EXPECT_EQ(expected.size(), 5u);
   forEachGoldenContent<VolumeContent>(
-      kScene, volumeCodec(), [&](const auto& uri, const auto&, const VolumeContent& volume) {
+      kVolumeScene, volumeCodec(), [&](const auto& uri, const auto&, const VolumeContent& volume) {
         const auto& sums = expected.at(uri);
         ASSERT_EQ(volume.parts.size(), sums.size());
         for (size_t i = 0; i < sums.size(); ++i) {
@@ -53,18 +53,18 @@ TEST(GoldenVolume, IsReadToTheExpectedSums) {
 
 TEST(GoldenVolume, HoldsWhatItWasMadeFrom) {
   const golden::Scene<VolumeContent> scene = golden::makeVolumeScene();
-  const Tileset tileset = readTileset(kScene);
+  const Tileset tileset = readTileset(kVolumeScene);
   EXPECT_EQ(tileset.worldFromScene.matrix(), scene.tileset.worldFromScene.matrix());
   EXPECT_EQ(tileset.sourceFromWorld, scene.tileset.sourceFromWorld);
   EXPECT_EQ(tileset.background, scene.tileset.background);
   EXPECT_EQ(tileset.georeference->latitude, scene.tileset.georeference->latitude);
   forEachGoldenContent<VolumeContent>(
-      kScene, volumeCodec(),
+      kVolumeScene, volumeCodec(),
       [&](const auto&, const auto& name, const VolumeContent& volume) { expectSame(volume, scene.contents.at(name)); });
 }
 
 TEST(GoldenVolume, IsTheSameWhenItIsWrittenAgain) {
-  forEachGoldenContent<VolumeContent>(kScene, volumeCodec(),
+  forEachGoldenContent<VolumeContent>(kVolumeScene, volumeCodec(),
                                       [&](const auto&, const auto&, const VolumeContent& volume) {
                                         std::string reason;
                                         const auto again = decodeVolume(encodeVolume(volume), reason);
@@ -74,7 +74,7 @@ TEST(GoldenVolume, IsTheSameWhenItIsWrittenAgain) {
 }
 
 TEST(GoldenVolume, LooksAlongItsRaysAsTheDefinitionSays) {
-  expectRaysAsDefined<VolumeContent>(kScene, volumeCodec());
+  expectRaysAsDefined<VolumeContent>(kVolumeScene, volumeCodec());
 }
 
 // Samples along a vertical line through a building: there is something, and it is where it should be.

@@ -11,17 +11,17 @@ namespace {
 using nlohmann::json;
 
 // Settings that make a model in a moment.
-const std::vector<std::string> kTiny = {"lattice=16",
-                                        "coarse_levels=3",
-                                        "coarse_log2_size=10",
-                                        "width=16",
-                                        "levels=2",
-                                        "fine_log2_size=10",
-                                        "direction_width=16",
-                                        "occupancy_resolution=16",
-                                        "samples_per_step=4096",
-                                        "first_rays=64",
-                                        "most_rays=512"};
+const std::vector<std::string> kTinyHash = {"lattice=16",
+                                            "coarse_levels=3",
+                                            "coarse_log2_size=10",
+                                            "width=16",
+                                            "levels=2",
+                                            "fine_log2_size=10",
+                                            "direction_width=16",
+                                            "occupancy_resolution=16",
+                                            "samples_per_step=4096",
+                                            "first_rays=64",
+                                            "most_rays=512"};
 
 class HashCommandLine : public testing::Test {
  protected:
@@ -41,7 +41,7 @@ class HashCommandLine : public testing::Test {
 
   static std::vector<std::string> trainArguments(const std::string& model, const std::vector<std::string>& more) {
     std::vector<std::string> arguments = {"train", at("city"), model, "--method", "hash", "--blocks", "2x1"};
-    for (const std::string& setting : kTiny) arguments.insert(arguments.end(), {"--set", setting});
+    for (const std::string& setting : kTinyHash) arguments.insert(arguments.end(), {"--set", setting});
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }

@@ -6,11 +6,10 @@
 #include <vector>
 
 #include "base/file.h"
+#include "tests/project.h"
 
 namespace tessera {
 namespace {
-
-const fs::path kProject = TESSERA_PROJECT;
 
 std::set<std::string> testsIn(const fs::path& folder) {
   static const std::regex test(R"(\nTEST(?:_[FP])?\(\s*(\w+),\s*(\w+)\))");

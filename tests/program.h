@@ -27,6 +27,10 @@ struct Said {
   std::string out, err;
 };
 
+inline bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
 class Program {
  public:
   Program(const fs::path& folder, const std::vector<std::string>& arguments) {

@@ -7,11 +7,10 @@
 
 #include "base/file.h"
 #include "representations/list.h"
+#include "tests/project.h"
 
 namespace tessera {
 namespace {
-
-const fs::path kProject = TESSERA_PROJECT;
 
 bool isSource(const fs::path& path) {
   const std::string kind = path.extension().string(), name = path.filename().string();

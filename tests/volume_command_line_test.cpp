@@ -13,12 +13,8 @@ namespace {
 
 using nlohmann::json;
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 // Settings that make a model in a moment.
-const std::vector<std::string> kTiny = {
+const std::vector<std::string> kTinyVolume = {
     "voxels=16",          "planes=32",         "grid_levels=4",        "grid_log2_size=10",  "grid_finest=32",
     "width=16",           "proposal_levels=3", "proposal_log2_size=8", "proposal_finest=16", "first_intervals=12",
     "second_intervals=8", "samples=8",         "texels_per_step=8192", "first_rays=64",      "most_rays=512",
@@ -42,7 +38,7 @@ class VolumeCommandLine : public testing::Test {
 
   static std::vector<std::string> trainArguments(const std::string& model, const std::vector<std::string>& more) {
     std::vector<std::string> arguments = {"train", at("city"), model, "--method", "volume", "--blocks", "2x1"};
-    for (const std::string& setting : kTiny) arguments.insert(arguments.end(), {"--set", setting});
+    for (const std::string& setting : kTinyVolume) arguments.insert(arguments.end(), {"--set", setting});
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }
@@ -299,7 +295,7 @@ TEST_F(VolumeCommandLine, RefusesBlocksThatAreNone) {
 TEST_F(VolumeCommandLine, ExportsASceneOfOneBlockForMerfsViewer) {
   std::vector<std::string> arguments = {"train", at("city"), at("one"), "--method", "volume",         "--blocks",
                                         "1x1",   "--steps",  "40",      "--set",    "surround=border"};
-  for (const std::string& setting : kTiny) arguments.insert(arguments.end(), {"--set", setting});
+  for (const std::string& setting : kTinyVolume) arguments.insert(arguments.end(), {"--set", setting});
   for (const char* setting : {"voxels=32", "planes=512"}) arguments.insert(arguments.end(), {"--set", setting});
   const Said trained = run(arguments);
   ASSERT_EQ(trained.exitCode, 0) << trained.err;
@@ -334,7 +330,7 @@ TEST_F(VolumeCommandLine, TrainsTheBlocksOfAnotherModel) {
   std::vector<std::string> arguments = {
       "train",   at("city"), at("again"), "--method", "volume", "--grid", (fs::path(model()) / "blocks.json").string(),
       "--steps", "40"};
-  for (const std::string& setting : kTiny) arguments.insert(arguments.end(), {"--set", setting});
+  for (const std::string& setting : kTinyVolume) arguments.insert(arguments.end(), {"--set", setting});
   const Said said = run(arguments);
   ASSERT_EQ(said.exitCode, 0) << said.err;
   EXPECT_EQ(checkpoints(at("again")), checkpoints(model()));

@@ -9,5 +9,6 @@ export default defineConfig({
     rollupOptions: { input: ['index.html', 'plain.html'] },
   },
   server: { fs: { allow: ['..'] } }, // ../shaders
-  test: { testTimeout: 60000, hookTimeout: 60000 },
+  // Vitest leaves one processor idle by default, which is half of a small machine.
+  test: { testTimeout: 60000, hookTimeout: 60000, maxWorkers: '100%', minWorkers: 1 },
 });

@@ -13,7 +13,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr int kWidth = 64, kHeight = 48;
+constexpr int kPictureWidth = 64, kPictureHeight = 48;
 
 // A plane at depth 2 · x, whose colour says which version was drawn and where.
 class FakeRenderer final : public ChangingRenderer, public ViewRenderer {
@@ -65,7 +65,7 @@ class WorkerPicturesTest : public testing::Test {
     }
   }
 
-  static Camera window() { return {kWidth, kHeight, LensModel::pinhole, {50, 50, 0.5 * kWidth, 0.5 * kHeight}}; }
+  static Camera window() { return {kPictureWidth, kPictureHeight, LensModel::pinhole, {50, 50, 0.5 * kPictureWidth, 0.5 * kPictureHeight}}; }
   static Pose poseAt(double x) {
     Pose pose;
     pose.translation.x() = x;
@@ -93,9 +93,9 @@ TEST_F(WorkerPicturesTest, ShowFewPixelsFirstAndThenAllOfThem) {
     first = update(1).onCard.width;
     std::this_thread::sleep_for(milliseconds(1));
   }
-  EXPECT_LE(first, kWidth);
+  EXPECT_LE(first, kPictureWidth);
   ASSERT_TRUE(becomesWhole(1));
-  EXPECT_EQ(update(1).onCard.width, kWidth);
+  EXPECT_EQ(update(1).onCard.width, kPictureWidth);
   EXPECT_FALSE(update(1).isNew);
 }
 

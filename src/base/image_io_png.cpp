@@ -10,7 +10,7 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kMaximumChunk = size_t{64} << 20;  // texts and profiles; a picture's own data is not held as a chunk
+constexpr size_t kMaximumMetadataChunk = size_t{64} << 20;  // texts and profiles; a picture's own data is not held as a chunk
 
 using Codec = std::unique_ptr<spng_ctx, decltype(&spng_ctx_free)>;
 
@@ -25,7 +25,7 @@ std::optional<OpenPng> open(std::span<const std::byte> bytes, const DecodeLimits
   png.codec.reset(spng_ctx_new(0));
   if (!png.codec) return std::nullopt;
   spng_ctx* codec = png.codec.get();
-  spng_set_chunk_limits(codec, kMaximumChunk, kMaximumChunk);
+  spng_set_chunk_limits(codec, kMaximumMetadataChunk, kMaximumMetadataChunk);
   if (spng_set_png_buffer(codec, bytes.data(), bytes.size()) != 0) return std::nullopt;
   if (spng_get_ihdr(codec, &png.header) != 0) return std::nullopt;
   if (!image_codecs::isPlausible(png.header.width, png.header.height, bytes.size(), limits)) return std::nullopt;

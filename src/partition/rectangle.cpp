@@ -9,10 +9,6 @@
 namespace tessera {
 namespace {
 
-double cross(const Vec2d& a, const Vec2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
-
 // Within ±45°: a rectangle turned by a right angle is the same one.
 double reduced(double angle) {
   constexpr double kRight = std::numbers::pi / 2;

@@ -9,6 +9,11 @@
 
 namespace tessera {
 
+// Twice the area of the triangle (0, a, b), positive where b lies counterclockwise of a.
+inline double cross(const Vec2d& a, const Vec2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
 struct Rectangle {
   Vec2d centre = Vec2d::Zero();
   double angle = 0;             // radians from the plane's x to the rectangle's, within ±45°

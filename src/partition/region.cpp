@@ -10,6 +10,7 @@
 #include "base/check.h"
 #include "partition/cameras.h"
 #include "partition/ray_fan.h"
+#include "partition/rectangle.h"
 
 namespace tessera {
 namespace {
@@ -19,10 +20,6 @@ constexpr int kMapSide = 256;  // cells of the coarse map along its longer side
 
 // A part of a photo on the ground.
 using Quad = std::array<Vec2d, 4>;
-
-double cross(const Vec2d& a, const Vec2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 // What a pixel measures there in its narrower direction, `pixels` being the size of the part in the photo: flat rays
 // draw pixels out along themselves, which hides nothing of what stands upright. The smaller singular value of the map.

@@ -8,7 +8,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kRotationTolerance = 1e-9;  // of RᵀR against the identity; ours come back exactly
+constexpr double kGridRotationTolerance = 1e-9;  // of RᵀR against the identity; ours come back exactly
 constexpr double kHeightTolerance = 1e-9;    // of the heights against the edge, relative
 
 std::optional<double> numberIn(const json& object, const char* key) {
@@ -57,7 +57,7 @@ std::optional<BlockGrid> blockGridFromJson(const json& value) {
   Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rotation;
   if (!readNumbers(value, "origin", 3, grid.originInWorld.data())) return std::nullopt;
   if (!readNumbers(value, "grid_from_world", 9, rotation.data())) return std::nullopt;
-  if ((rotation.transpose() * rotation - Mat3d::Identity()).cwiseAbs().maxCoeff() > kRotationTolerance ||
+  if ((rotation.transpose() * rotation - Mat3d::Identity()).cwiseAbs().maxCoeff() > kGridRotationTolerance ||
       rotation.determinant() < 0) {
     return std::nullopt;
   }

@@ -11,9 +11,9 @@ namespace {
 
 using Point = Triple<double>;
 
-class Points {
+class NearAndFarPoints {
  public:
-  explicit Points(uint64_t seed) : random_(seed, 0) {}
+  explicit NearAndFarPoints(uint64_t seed) : random_(seed, 0) {}
   // Near and far, inside the cube and outside.
   Point next() {
     Point x;
@@ -57,7 +57,7 @@ TEST(Contraction, MapsKnownPairsBothWays) {
 }
 
 TEST(Contraction, ComesBackFromEveryPlace) {
-  Points points(1);
+  NearAndFarPoints points(1);
   int outside = 0;
   for (int n = 0; n < 2000; ++n) {
     const Point x = points.next(), y = contract(x), back = uncontract(y);
@@ -81,7 +81,7 @@ TEST(Contraction, LeavesTheCubeAsItIs) {
 }
 
 TEST(Contraction, HasTheDerivativeOfFiniteDifferences) {
-  Points points(2);
+  NearAndFarPoints points(2);
   const double h = 1e-6;
   int compared = 0;
   for (int n = 0; n < 2000; ++n) {
@@ -108,7 +108,7 @@ TEST(Contraction, KeepsLinesStraightWithinARegion) {
 }
 
 TEST(Contraction, StretchesAtMost1Point9319TimesAndAsMuchAtACorner) {
-  Points points(3);
+  NearAndFarPoints points(3);
   double most = 0;
   for (int n = 0; n < 20000; ++n) {
     Point x = points.next(), d = points.direction();

@@ -6,7 +6,7 @@
 namespace tessera {
 namespace {
 
-constexpr float kPi = std::numbers::pi_v<float>;
+constexpr float kHalfTurn = std::numbers::pi_v<float>;  // radians
 
 // A closed body from two rectangles, one above the other: bonnet line to roof line.
 void addFrustum(const std::array<Vec3f, 4>& low, const std::array<Vec3f, 4>& high, Material sides, uint32_t sideObject,
@@ -69,7 +69,7 @@ SurfaceMesh buildTraffic(const CityLayout& city, double seconds) {
         const float lane = street.centre + (alongX ? -1.f : 1.f) * static_cast<float>(direction) * 0.15f * street.width;
         const float x = alongX ? from + static_cast<float>(along) : lane;
         const float y = alongX ? lane : from + static_cast<float>(along);
-        const float yaw = (alongX ? 0.f : 0.5f * kPi) + (direction < 0 ? kPi : 0.f);
+        const float yaw = (alongX ? 0.f : 0.5f * kHalfTurn) + (direction < 0 ? kHalfTurn : 0.f);
         addCar({x, y, city.terrain(x, y)}, yaw, seed, mesh);
       }
     }

@@ -14,7 +14,7 @@ namespace {
 using namespace json_fields;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kExtension = "TESSERA_content";
+constexpr const char* kContentExtension = "TESSERA_content";
 constexpr size_t kMostViews = size_t{1} << 16;
 
 bool uses(const json& asset, const char* extension) {
@@ -55,8 +55,8 @@ std::optional<json> decodeAsset(std::string_view text, std::string_view represen
   const json* header = fieldOf(asset, "asset");
   if (!header || !isString(*header, "version", "2.0")) return fail("its JSON is not that of a glTF 2.0 asset");
   const json* extensions = fieldOf(asset, "extensions");
-  const json* ours = extensions ? fieldOf(*extensions, kExtension) : nullptr;
-  if (!ours || !uses(asset, kExtension)) return fail("has no extension TESSERA_content");
+  const json* ours = extensions ? fieldOf(*extensions, kContentExtension) : nullptr;
+  if (!ours || !uses(asset, kContentExtension)) return fail("has no extension TESSERA_content");
   const auto version = unsignedOf(*ours, "version");
   if (!version) return fail("does not say which version it is of");
   if (*version != kContentVersion) return fail(fmt::format("is of version {}; {} is known", *version, kContentVersion));
@@ -111,12 +111,12 @@ Bytes ContentFileWriter::finish(std::string_view representation, const Json& our
   Json extension = {{"version", kContentVersion}, {"representation", representation}};
   extension.update(ours);
   Json asset = {{"asset", {{"version", "2.0"}, {"generator", "tessera"}}},
-                {"extensionsUsed", {kExtension}},
+                {"extensionsUsed", {kContentExtension}},
                 {"scene", 0},
                 {"scenes", {Json::object()}},
                 {"buffers", {{{"byteLength", bytes_.size()}}}},
                 {"bufferViews", views_},
-                {"extensions", {{kExtension, std::move(extension)}}}};
+                {"extensions", {{kContentExtension, std::move(extension)}}}};
   if (!scene.isEmpty()) addScene(scene, asset);
   return encodeGlb(asset.dump(), bytes_);
 }
@@ -132,7 +132,7 @@ std::optional<ContentFile> decodeContentHeader(std::string_view text, std::strin
   const auto asset = decodeAsset(text, representation, reason);
   if (!asset) return std::nullopt;
   ContentFile result;
-  result.ours = asset->at("extensions").at(kExtension);
+  result.ours = asset->at("extensions").at(kContentExtension);
   return result;
 }
 
@@ -150,7 +150,7 @@ std::optional<ContentFile> decodeContentFile(std::span<const std::byte> file, st
     reason = "its buffer views do not lie within its bytes";
     return std::nullopt;
   }
-  result.ours = asset->at("extensions").at(kExtension);
+  result.ours = asset->at("extensions").at(kContentExtension);
   return result;
 }
 

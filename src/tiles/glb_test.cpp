@@ -7,7 +7,7 @@
 namespace tessera {
 namespace {
 
-Bytes bytesOf(std::string_view text) {
+Bytes bytesOfText(std::string_view text) {
   const auto raw = std::as_bytes(std::span(text.data(), text.size()));
   return Bytes(raw.begin(), raw.end());
 }
@@ -19,7 +19,7 @@ void put(Bytes& file, size_t at, uint32_t value) {
 TEST(Glb, GivesBackWhatWasPutInForEveryLength) {
   for (size_t length = 0; length < 9; ++length) {
     const std::string json = "{" + std::string(length, ' ') + "}";
-    const Bytes content = bytesOf(std::string(length, 'b'));
+    const Bytes content = bytesOfText(std::string(length, 'b'));
     const Bytes file = encodeGlb(json, content);
     EXPECT_EQ(file.size() % 4, 0u);
     const auto view = decodeGlb(file);
@@ -33,8 +33,8 @@ TEST(Glb, GivesBackWhatWasPutInForEveryLength) {
 }
 
 TEST(Glb, PassesOverLaterChunksOfUnknownTypes) {
-  Bytes file = encodeGlb("{}", bytesOf("abcd"));
-  const Bytes more = bytesOf(std::string("\4\0\0\0WHATxxxx", 12));
+  Bytes file = encodeGlb("{}", bytesOfText("abcd"));
+  const Bytes more = bytesOfText(std::string("\4\0\0\0WHATxxxx", 12));
   file.insert(file.end(), more.begin(), more.end());
   put(file, 8, static_cast<uint32_t>(file.size()));
   const auto view = decodeGlb(file);
@@ -43,7 +43,7 @@ TEST(Glb, PassesOverLaterChunksOfUnknownTypes) {
 }
 
 TEST(Glb, RefusesEveryCut) {
-  const Bytes file = encodeGlb("{\"a\":1}", bytesOf("abcdefg"));
+  const Bytes file = encodeGlb("{\"a\":1}", bytesOfText("abcdefg"));
   for (size_t length = 0; length < file.size(); ++length) {
     EXPECT_FALSE(decodeGlb(std::span(file).first(length))) << length;
   }
@@ -51,7 +51,7 @@ TEST(Glb, RefusesEveryCut) {
 
 TEST(Glb, RefusesWhatIsNotExact) {
   // 12 bytes of header, JSON chunk at 12 with 4 bytes, BIN chunk at 24 with 8.
-  const Bytes good = encodeGlb("{}", bytesOf("abcdefgh"));
+  const Bytes good = encodeGlb("{}", bytesOfText("abcdefgh"));
   ASSERT_TRUE(decodeGlb(good));
   ASSERT_EQ(good.size(), 40u);
   const auto refuses = [&](const char* what, const std::function<void(Bytes&)>& spoil) {
@@ -79,7 +79,7 @@ TEST(Glb, RefusesWhatIsNotExact) {
   refuses("a gap too small for a chunk", [](Bytes& file) { put(file, 24, 4); });
   refuses("bytes as the third chunk", [](Bytes& file) {
     put(file, 28, 0x54414857);
-    const Bytes third = bytesOf(std::string("\0\0\0\0BIN\0", 8));
+    const Bytes third = bytesOfText(std::string("\0\0\0\0BIN\0", 8));
     file.insert(file.end(), third.begin(), third.end());
     put(file, 8, static_cast<uint32_t>(file.size()));
   });

@@ -13,10 +13,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kExtension = "TESSERA_scene";
-
 template <class Derived>
-std::vector<double> numbersOf(const Eigen::MatrixBase<Derived>& matrix) {  // column after column
+std::vector<double> flattened(const Eigen::MatrixBase<Derived>& matrix) {  // column after column
   std::vector<double> numbers;
   for (Eigen::Index c = 0; c < matrix.cols(); ++c) {
     for (Eigen::Index r = 0; r < matrix.rows(); ++r) numbers.push_back(matrix(r, c));
@@ -29,8 +27,8 @@ Json cellsOf(const CellRange& range) {
 }
 
 void addBox(Json& object, const SceneBox& box) {
-  object["low"] = numbersOf(box.low);
-  object["high"] = numbersOf(box.high);
+  object["low"] = flattened(box.low);
+  object["high"] = flattened(box.high);
 }
 
 Json boundsOf(const Tileset& tileset, const SceneBox& box) {
@@ -51,13 +49,13 @@ Json contentOf(const Tileset& tileset, const Tile& tile, const TileContent& cont
   if (content.bytes > 0) ours["bytes"] = content.bytes;
   return {{"uri", content.uri},
           {"boundingVolume", boundsOf(tileset, content.box)},
-          {"extensions", {{kExtension, std::move(ours)}}}};
+          {"extensions", {{kSceneExtension, std::move(ours)}}}};
 }
 
 // Levels fall from parent to child, so the depth is bounded.
 Json tileOf(const Tileset& tileset, const Tile& tile, bool isRoot) {
   Json json;
-  if (isRoot && tileset.georeference) json["transform"] = numbersOf(tileset.rootTransform());
+  if (isRoot && tileset.georeference) json["transform"] = flattened(tileset.rootTransform());
   json["boundingVolume"] = boundsOf(tileset, enclosingBox(tile));
   json["geometricError"] = tile.geometricError;
   if (isRoot) json["refine"] = "REPLACE";
@@ -68,7 +66,7 @@ Json tileOf(const Tileset& tileset, const Tile& tile, bool isRoot) {
   } else if (!contents.empty()) {
     json["contents"] = std::move(contents);
   }
-  Json& ours = json["extensions"][kExtension];
+  Json& ours = json["extensions"][kSceneExtension];
   ours = {{"level", tile.level}, {"cells", cellsOf(tile.cells)}};
   addBox(ours, tile.box);
   for (const uint32_t child : tile.children) json["children"].push_back(tileOf(tileset, tileset.tiles[child], false));
@@ -80,10 +78,10 @@ Json sceneOf(const Tileset& tileset) {
                 {"representation", tileset.representation},
                 {"name", tileset.name},
                 {"worldFromScene",
-                 {{"rotation", numbersOf(tileset.worldFromScene.rotation)},
+                 {{"rotation", flattened(tileset.worldFromScene.rotation)},
                   {"scale", tileset.worldFromScene.scale},
-                  {"translation", numbersOf(tileset.worldFromScene.translation)}}},
-                {"sourceFromWorld", numbersOf(tileset.sourceFromWorld)},
+                  {"translation", flattened(tileset.worldFromScene.translation)}}},
+                {"sourceFromWorld", flattened(tileset.sourceFromWorld)},
                 {"grid", {{"columns", tileset.columns}, {"rows", tileset.rows}}},
                 {"near", tileset.near},
                 {"background", tileset.background},
@@ -93,7 +91,7 @@ Json sceneOf(const Tileset& tileset) {
     scene["georeference"] = {{"latitude", geo->latitude},
                              {"longitude", geo->longitude},
                              {"altitude", geo->altitude},
-                             {"enuFromWorld", numbersOf(geo->enuFromWorld)}};
+                             {"enuFromWorld", flattened(geo->enuFromWorld)}};
   }
   for (const SharedResource& resource : tileset.resources) {
     Json entry = {{"uri", resource.uri}, {"mimeType", resource.mimeType}};
@@ -148,8 +146,8 @@ std::string encodeTileset(const Tileset& tileset) {
   const auto broken = brokenRule(tileset);
   CHECK(broken.value_or("") == "");
   const Json file = {{"asset", {{"version", "1.1"}, {"generator", "tessera"}}},
-                     {"extensionsUsed", {kExtension}},
-                     {"extensions", {{kExtension, sceneOf(tileset)}}},
+                     {"extensionsUsed", {kSceneExtension}},
+                     {"extensions", {{kSceneExtension, sceneOf(tileset)}}},
                      {"geometricError", tileset.geometricError},
                      {"root", tileOf(tileset, tileset.root(), true)}};
   std::string text = file.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";

@@ -9,6 +9,7 @@
 
 namespace tessera {
 
+inline constexpr const char* kSceneExtension = "TESSERA_scene";
 inline constexpr int kSceneVersion = 1;
 
 inline constexpr uint32_t kMostCells = 4096;  // of the grid, along an axis

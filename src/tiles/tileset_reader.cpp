@@ -11,11 +11,9 @@ namespace {
 
 using namespace json_fields;
 
-constexpr const char* kExtension = "TESSERA_scene";
-
 const json* oursOf(const json& object) {
   const json* extensions = fieldOf(object, "extensions");
-  return extensions ? fieldOf(*extensions, kExtension) : nullptr;
+  return extensions ? fieldOf(*extensions, kSceneExtension) : nullptr;
 }
 
 std::optional<Vec3d> vectorOf(const json& object, const char* key) {

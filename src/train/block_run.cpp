@@ -18,7 +18,6 @@ namespace {
 constexpr double kMiB = 1048576;
 constexpr double kShareOfBlocks = 0.4, kShareOfPhotos = 0.4;
 constexpr double kShareOfCard = 0.5;  // the rest is for what a step works on, and for other programs
-constexpr double kMostPixelsOff = 2;  // of observations whose distance is believed
 constexpr double kHeap = 1.02;        // what the C library keeps besides (1.002 was measured)
 
 }  // namespace

@@ -6,6 +6,9 @@
 
 namespace tessera {
 
+// An observation farther from its point's image, pixels, teaches nothing.
+inline constexpr double kMostPixelsOff = 2;
+
 struct KnownDistance {
   uint32_t x = 0, y = 0;  // the pixel that the observation falls in
   float distance = 0;     // from the camera, scene units

@@ -9,7 +9,6 @@
 namespace tessera {
 namespace {
 
-constexpr double kMostPixelsOff = 2;  // an observation farther from its point's image teaches nothing
 constexpr float kGoldenRatio = 0.61803399f;
 
 std::vector<RayCamera> rayCameras(const Capture& capture, const SceneFrame& frame) {

@@ -11,8 +11,6 @@
 namespace tessera {
 namespace {
 
-constexpr double kMostPixelsOff = 2;  // of observations whose distance is believed
-
 struct TileCounts {
   uint32_t columns, rows;
 

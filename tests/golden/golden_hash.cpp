@@ -28,9 +28,9 @@ const Sizes kFine = {32, 32, {{12, 1728, false, {}, {}}, {48, 1024, true, {}, {}
 const Sizes kCoarse = {16, 160, {{24, 512, true, {}, {}}, {32, 512, true, {}, {}}}};
 const Sizes kCoarseSurround = {16, 288, kCoarse.tables};
 
-class PartMaker {
+class HashPartMaker {
  public:
-  PartMaker(HashPart& part, const Sizes& sizes, uint32_t columns, uint64_t seed)
+  HashPartMaker(HashPart& part, const Sizes& sizes, uint32_t columns, uint64_t seed)
       : part_(part), sizes_(sizes), random_(seed, 11), corners_(part, sizes.lattice) {
     part_.lattice = sizes.lattice;
     part_.columns = columns;
@@ -137,7 +137,7 @@ HashContent contentOf(uint64_t seed, LevelWeights weights, bool varies, const Si
     content.logits.push_back(2 * random.uniform(next++) - 1);
   }
   content.parts = parts;
-  for (HashPart& part : content.parts) PartMaker(part, sizes, content.columns(), seed).make();
+  for (HashPart& part : content.parts) HashPartMaker(part, sizes, content.columns(), seed).make();
   return content;
 }
 

@@ -13,9 +13,9 @@ uint8_t quantised(double value, double range) {
   return static_cast<uint8_t>(std::clamp(std::floor(255 * (value + range) / (2 * range) + 0.5), 0.0, 255.0));
 }
 
-class PartMaker {
+class VolumePartMaker {
  public:
-  PartMaker(VolumePart& part, const VolumeContent& content)
+  VolumePartMaker(VolumePart& part, const VolumeContent& content)
       : part_(part), content_(content), voxels_(part, part.voxels) {}
 
   void make() {
@@ -110,7 +110,7 @@ VolumeContent contentOf(uint64_t seed, const std::vector<VolumePart>& parts) {
   uint64_t next = 0;
   content.network = makeNetwork(34, random, next);
   content.parts = parts;
-  for (VolumePart& part : content.parts) PartMaker(part, content).make();
+  for (VolumePart& part : content.parts) VolumePartMaker(part, content).make();
   return content;
 }
 

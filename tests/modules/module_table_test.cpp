@@ -13,11 +13,10 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "modules/cmake_targets.h"
+#include "tests/project.h"
 
 namespace tessera {
 namespace {
-
-const fs::path kProject = TESSERA_PROJECT;
 
 struct Include {
   int line = 0;

@@ -11,7 +11,7 @@ namespace tessera {
 
 namespace {
 
-constexpr uint32_t kRaysPerGroup = 64;  // local_size_x of the kernels
+constexpr uint32_t kBlendRaysPerGroup = 64;  // local_size_x of the kernels
 
 template <class Options>
 arguments::BlendArguments blendArguments(const VulkanDevice& device, const Options& options) {
@@ -33,7 +33,7 @@ void VulkanDevice::enqueue(const BlendForward& options) {
   arguments.colour = deviceAddress(options.colour);
   arguments.opacity = deviceAddress(options.opacity);
   arguments.depth = deviceAddress(options.depth);
-  queue(kernel(kBlendForwardSpirv, {options.literal}), arguments, groupsOf(options.rays, kRaysPerGroup));
+  queue(kernel(kBlendForwardSpirv, {options.literal}), arguments, groupsOf(options.rays, kBlendRaysPerGroup));
 }
 
 template <>
@@ -45,7 +45,7 @@ void VulkanDevice::enqueue(const BlendBackward& options) {
   arguments.compositedGradients = deviceAddress(options.compositedGradients);
   arguments.specularGradients = deviceAddress(options.specularGradients);
   arguments.opacityGradients = deviceAddress(options.opacityGradients);
-  queue(kernel(kBlendBackwardSpirv, {options.literal}), arguments, groupsOf(options.rays, kRaysPerGroup));
+  queue(kernel(kBlendBackwardSpirv, {options.literal}), arguments, groupsOf(options.rays, kBlendRaysPerGroup));
 }
 
 }  // namespace tessera

@@ -16,7 +16,7 @@ namespace tessera {
 
 namespace {
 
-constexpr uint32_t kRaysPerGroup = 64;  // local_size_x of the kernels that take rays
+constexpr uint32_t kBlockRaysPerGroup = 64;  // local_size_x of the kernels that take rays
 constexpr uint32_t kRowsPerShare = TESSERA_ROWS_OF_SHARE;
 
 }  // namespace
@@ -73,7 +73,7 @@ void VulkanDevice::enqueue(const BlockSamples& options) {
     arguments.segmentCounts = arguments.sampleCounts + rays * sizeof(uint32_t);
     const uint64_t total = arguments.segmentCounts + rays * sizeof(uint32_t);
     queue(realKernel(kBlockSamplesFloat64Spirv, kBlockSamplesSpirv, {false, true}), arguments,
-          {groups(rays, kRaysPerGroup)});
+          {groups(rays, kBlockRaysPerGroup)});
     for (const uint64_t counts : {arguments.sampleCounts, arguments.segmentCounts}) {
       queueRunningSums({.rows = options.rays,
                         .values = counts,
@@ -84,7 +84,7 @@ void VulkanDevice::enqueue(const BlockSamples& options) {
     }
   }
   queue(realKernel(kBlockSamplesFloat64Spirv, kBlockSamplesSpirv, {true, options.split}), arguments,
-        {groups(rays + 1, kRaysPerGroup)});
+        {groups(rays + 1, kBlockRaysPerGroup)});
   countersChanged(options.rowCount);
   countersChanged(options.segmentCount);
 }

@@ -9,7 +9,7 @@ namespace tessera {
 
 namespace {
 
-constexpr uint32_t kRaysPerGroup = 64;  // local_size_x of the kernels
+constexpr uint32_t kCompositeRaysPerGroup = 64;  // local_size_x of the kernels
 constexpr uint32_t kMostColumns = 16;   // composite.glsl
 
 }  // namespace
@@ -32,7 +32,7 @@ void VulkanDevice::enqueue(const CompositeForward& options) {
   arguments.opacity = deviceAddress(options.opacity);
   arguments.depth = deviceAddress(options.depth);
   arguments.weights = deviceAddress(options.weights);
-  queue(kernel(kCompositeForwardSpirv, {columns}), arguments, groupsOf(options.rays, kRaysPerGroup));
+  queue(kernel(kCompositeForwardSpirv, {columns}), arguments, groupsOf(options.rays, kCompositeRaysPerGroup));
 }
 
 template <>
@@ -58,7 +58,7 @@ void VulkanDevice::enqueue(const CompositeBackward& options) {
   arguments.opacities = scratch(2 * std::max<size_t>(options.xGradients.count, 1));
   arguments.xGradients = deviceAddress(options.xGradients);
   arguments.colourGradients = matrixArguments(options.colourGradients, 0);
-  queue(kernel(kCompositeBackwardSpirv, {columns}), arguments, groupsOf(options.rays, kRaysPerGroup));
+  queue(kernel(kCompositeBackwardSpirv, {columns}), arguments, groupsOf(options.rays, kCompositeRaysPerGroup));
 }
 
 }  // namespace tessera

@@ -11,7 +11,7 @@ namespace tessera {
 
 namespace {
 
-constexpr uint32_t kPerGroup = 64;  // local_size_x of the kernels that take segments or rays
+constexpr uint32_t kSegmentsPerGroup = 64;  // local_size_x of the kernels that take segments or rays
 constexpr uint32_t kShare = TESSERA_SEGMENTS_OF_SHARE;
 constexpr size_t kNumbers = TESSERA_DEFERRED_NUMBERS;
 static_assert(kNumbers == DeferredNetwork::kInputs + 4 * DeferredNetwork::kHidden + 3);
@@ -34,7 +34,7 @@ template <>
 void VulkanDevice::enqueue(const DeferredForward& options) {
   arguments::DeferredArguments arguments = deferredArguments(*this, options);
   arguments.specular = deviceAddress(options.specular);
-  queue(kernel(kDeferredForwardSpirv), arguments, groupsOf(options.segments, kPerGroup));
+  queue(kernel(kDeferredForwardSpirv), arguments, groupsOf(options.segments, kSegmentsPerGroup));
 }
 
 template <>
@@ -47,7 +47,7 @@ void VulkanDevice::enqueue(const DeferredBackward& options) {
   arguments.compositedGradients = deviceAddress(options.compositedGradients);
   arguments.networkGradients = deviceAddress(options.networkGradients);
   arguments.layers = scratch(segments * kNumbers);
-  queue(kernel(kDeferredBackwardSpirv), arguments, groupsOf(options.segments, kPerGroup));
+  queue(kernel(kDeferredBackwardSpirv), arguments, groupsOf(options.segments, kSegmentsPerGroup));
   const auto networks = static_cast<uint32_t>(options.networks.count / DeferredNetwork::kParameters);
   queue(sumKernel(kDeferredWeightGradientsFloatAtomicsSpirv, kDeferredWeightGradientsSpirv), arguments,
         groupsOf(options.segments, kShare, 1, networks));

@@ -22,7 +22,7 @@ namespace tessera {
 
 namespace {
 
-constexpr uint32_t kPerGroup = 256;  // local_size_x of the kernels that sum
+constexpr uint32_t kSummedPerGroup = 256;  // local_size_x of the kernels that sum
 
 template <class Options>
 arguments::RayLossArguments rayLossArguments(const VulkanDevice& device, const Options& options) {
@@ -49,7 +49,7 @@ void VulkanDevice::enqueue(const ColourLoss& options) {
   arguments.weights = deviceAddress(options.weights);
   arguments.gradients = deviceAddress(options.gradients);
   queueSums(kernel(groupSpirv(kColourLossSubgroupsSpirv, kColourLossSpirv)), arguments,
-            atLeastOneGroup(3 * size_t{options.rays.capacity}, kPerGroup), 2, deviceAddress(options.loss));
+            atLeastOneGroup(3 * size_t{options.rays.capacity}, kSummedPerGroup), 2, deviceAddress(options.loss));
 }
 
 template <>
@@ -59,7 +59,7 @@ void VulkanDevice::enqueue(const DistortionLoss& options) {
   arguments.distances = deviceAddress(options.distances);
   arguments.steps = deviceAddress(options.steps);
   queueSums(kernel(groupSpirv(kDistortionLossSubgroupsSpirv, kDistortionLossSpirv)), arguments,
-            atLeastOneGroup(options.rays.capacity, kPerGroup), 1, deviceAddress(options.loss));
+            atLeastOneGroup(options.rays.capacity, kSummedPerGroup), 1, deviceAddress(options.loss));
 }
 
 template <>
@@ -69,13 +69,13 @@ void VulkanDevice::enqueue(const DepthLoss& options) {
   arguments.distances = deviceAddress(options.distances);
   arguments.known = deviceAddress(options.known);
   queueSums(kernel(groupSpirv(kDepthLossSubgroupsSpirv, kDepthLossSpirv)), arguments,
-            atLeastOneGroup(options.rays.capacity, kPerGroup), 1, deviceAddress(options.loss));
+            atLeastOneGroup(options.rays.capacity, kSummedPerGroup), 1, deviceAddress(options.loss));
 }
 
 template <>
 void VulkanDevice::enqueue(const S3imLoss& options) {
   const size_t rays = options.rays.capacity;
-  const uint32_t parts = atLeastOneGroup(3 * options.patches * (rays / 16), kPerGroup);
+  const uint32_t parts = atLeastOneGroup(3 * options.patches * (rays / 16), kSummedPerGroup);
   arguments::S3imArguments arguments = {};
   arguments.rays = countArguments(options.rays);
   arguments.patches = options.patches;
@@ -104,7 +104,7 @@ void VulkanDevice::enqueue(const OpacityLoss& options) {
   arguments.values = deviceAddress(options.opacities);
   arguments.gradients = deviceAddress(options.opacityGradients);
   queueSums(kernel(groupSpirv(kOpacityLossSubgroupsSpirv, kOpacityLossSpirv)), arguments,
-            atLeastOneGroup(options.segments.capacity, kPerGroup), 1, deviceAddress(options.loss));
+            atLeastOneGroup(options.segments.capacity, kSummedPerGroup), 1, deviceAddress(options.loss));
 }
 
 template <>
@@ -116,7 +116,7 @@ void VulkanDevice::enqueue(const SparsityLoss& options) {
   arguments.runtimeSteps = deviceAddress(options.runtimeSteps);
   arguments.gradients = deviceAddress(options.gradients);
   queueSums(kernel(groupSpirv(kSparsityLossSubgroupsSpirv, kSparsityLossSpirv)), arguments,
-            atLeastOneGroup(options.points.capacity, kPerGroup), 1, deviceAddress(options.loss));
+            atLeastOneGroup(options.points.capacity, kSummedPerGroup), 1, deviceAddress(options.loss));
 }
 
 }  // namespace tessera

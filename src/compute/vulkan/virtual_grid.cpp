@@ -13,7 +13,7 @@ namespace tessera {
 
 namespace {
 
-constexpr uint32_t kSamplesPerGroup = 64;  // local_size_x of the lookups
+constexpr uint32_t kLookupsPerGroup = 64;  // local_size_x of the lookups
 
 }  // namespace
 
@@ -72,7 +72,7 @@ void VulkanDevice::enqueue(const VirtualGridForward& options) {
   arguments.colours = deviceAddress(options.colours);
   arguments.minAlpha = options.minAlpha;
   queue(kernel(kVirtualGridForwardSpirv, {options.grid.corners()}), arguments,
-        groupsOf(options.samples, kSamplesPerGroup));
+        groupsOf(options.samples, kLookupsPerGroup));
 }
 
 template <>
@@ -85,7 +85,7 @@ void VulkanDevice::enqueue(const VirtualGridBackward& options) {
   arguments.attributeGradients = deviceAddress(options.attributeGradients);
   zeroRows(options.texels, VirtualGrid::kAttributes, options.attributeGradients);
   queue(sumKernel(kVirtualGridBackwardFloatAtomicsSpirv, kVirtualGridBackwardSpirv, {options.grid.corners()}),
-        arguments, groupsOf(options.samples, kSamplesPerGroup));
+        arguments, groupsOf(options.samples, kLookupsPerGroup));
 }
 
 }  // namespace tessera

@@ -1,12 +1,19 @@
-// For tests: networks of random numbers, and parts in a row.
+// For tests: vectors and networks of random numbers, and parts in a row.
 #pragma once
 
 #include <vector>
 
 #include "base/random.h"
+#include "scene/axes.h"
 #include "tiles/dense_layer.h"
 
 namespace tessera::tiles_test {
+
+// Within a cube about zero of twice that `size`.
+inline Vec3d randomVector(const RandomStream& random, uint64_t index, double size) {
+  return size * Vec3d(2 * random.uniformDouble(3 * index) - 1, 2 * random.uniformDouble(3 * index + 1) - 1,
+                      2 * random.uniformDouble(3 * index + 2) - 1);
+}
 
 inline std::vector<DenseLayer> madeNetwork(uint64_t seed, std::vector<uint32_t> widths) {
   const RandomStream random(seed, 0xc0);

@@ -66,12 +66,6 @@ void train(Device& device, const CubeScene& scene, const BlockGrid& grid, const 
 }
 
 // Four blocks that meet in the cube's middle.
-BlockGrid fourBlocks() {
-  BlockGrid grid = cubeGrid(2);
-  grid.rows = 2;
-  return grid;
-}
-
 // The definition: through every pixel, and beside the photos every third for the surround, but not higher than photos
 // look; all at once.
 TEST(FindAliveTexels, FindsWhatThePixelsOfAllPhotosShow) {
@@ -218,7 +212,7 @@ TEST(FindAliveTexels, MissesAlmostNothingWithFewBlocks) {
   inRoom.observationsPerPhoto = 600;
   const CubeScene scene(inRoom);
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
-  train(*device, scene, fourBlocks(), "own");
+  train(*device, scene, cubeGrid(2, 2), "own");
   const std::unique_ptr<VolumeModel> all = loadVolumeModel(*device, scene / "model");
   const std::vector<Bits> expected = bitsOf(findAliveTexels(*all, scene.capture(), {}));
   for (const Bits& bits : expected) EXPECT_GT(bits.count(), 1000);
@@ -244,7 +238,7 @@ TEST(FindAliveTexels, MissesAlmostNothingWithFewBlocks) {
 TEST(BakeVolume, NeverHasMoreBlocksInMemoryThanItMay) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
-  train(*device, scene, fourBlocks(), "own");
+  train(*device, scene, cubeGrid(2, 2), "own");
   ASSERT_EQ(trainedLevels<VolumeConfig>(scene / "model"), 2u);
   const auto bake = [&](uint32_t resident, const std::string& to) {
     VolumeModel* model = nullptr;

@@ -14,7 +14,7 @@ namespace {
 
 const fs::path kScene = TESSERA_GOLDEN_VOLUME;
 
-Camera camera() {
+Camera smallCamera() {
   Camera camera;
   camera.width = 96;
   camera.height = 72;
@@ -67,7 +67,7 @@ TEST(TileScene, IsDrawnFromDiskAsFromMemory) {
   settings.selection.mostPixels = 0;
   VolumeRenderer renderer(scene.frame, scene.tree, scene.source, settings);
   const Pose pose = lookingAt(scene.frame, Vec3d(-3, -3, 2), Vec3d(0, 0, -0.3));
-  const RenderedView view = renderer.render(camera(), pose, nullptr);
+  const RenderedView view = renderer.render(smallCamera(), pose, nullptr);
 
   std::vector<VolumeContent> finest;
   for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
@@ -78,7 +78,7 @@ TEST(TileScene, IsDrawnFromDiskAsFromMemory) {
   const VolumeContent surround = volumeAt(scene, scene.tree.tiles[scene.tree.surround].children.at(0));
   SceneDrawing<VolumeContent> drawing{scene.frame, {&finest[0], &finest[1]}, &surround, {}};  // the first is nearer
   ThreadPool pool(1);
-  const RenderedView expected = drawScene(drawing, camera(), pose, nullptr, pool);
+  const RenderedView expected = drawScene(drawing, smallCamera(), pose, nullptr, pool);
   EXPECT_EQ(view.colour.pixels, expected.colour.pixels);
   EXPECT_EQ(view.depth.pixels, expected.depth.pixels);
   double opacity = 0;
@@ -89,7 +89,7 @@ TEST(TileScene, IsDrawnFromDiskAsFromMemory) {
 TEST(TileScene, IsCoarserFromAfar) {
   const TileScene scene = openTileScene(kScene, volumeCodec());
   VolumeRenderer renderer(scene.frame, scene.tree, scene.source, {});
-  renderer.render(camera(), lookingAt(scene.frame, Vec3d(0, -300, 100), Vec3d::Zero()), nullptr);
+  renderer.render(smallCamera(), lookingAt(scene.frame, Vec3d(0, -300, 100), Vec3d::Zero()), nullptr);
   EXPECT_EQ(renderer.cut().tiles.size(), 1u);
   const int coarse = scene.tree.surround, fine = scene.tree.tiles[coarse].children.at(0);
   EXPECT_TRUE(renderer.cache().holds(coarse));
@@ -106,7 +106,7 @@ TEST(TileScene, HasTheSurroundOfTheLevelThatIsAskedFor) {
     settings.selection.finestLevel = level;
     VolumeRenderer renderer(scene.frame, scene.tree, scene.source, settings);
     const Pose pose = lookingAt(scene.frame, Vec3d(-3, -3, 2), Vec3d(0, 0, -0.3));
-    const RenderedView view = renderer.render(camera(), pose, nullptr);
+    const RenderedView view = renderer.render(smallCamera(), pose, nullptr);
     EXPECT_EQ(renderer.cut().surround, expected);
     EXPECT_EQ(renderer.cache().holds(fine), level == 0);
   }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
+#include "raymarch/testing/random_parts.h"
 #include "render/cpu/simd_target.h"
 #include "representations/volume/testing/made_volume.h"
 #include "representations/volume/testing/reference_volume.h"
@@ -10,10 +11,7 @@
 namespace tessera {
 namespace {
 
-Vec3d randomVector(const RandomStream& random, uint64_t index, double size) {
-  return size * Vec3d(2 * random.uniformDouble(3 * index) - 1, 2 * random.uniformDouble(3 * index + 1) - 1,
-                      2 * random.uniformDouble(3 * index + 2) - 1);
-}
+using tiles_test::randomVector;
 
 constexpr MarchSettings kToTheEnd{true, 0};
 

@@ -2,16 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include "base/random.h"
+#include "raymarch/testing/random_parts.h"
 #include "scene/contraction.h"
 
 namespace tessera {
 namespace {
 
-Vec3d randomVector(const RandomStream& random, uint64_t index, double size) {
-  return size * Vec3d(2 * random.uniformDouble(3 * index) - 1, 2 * random.uniformDouble(3 * index + 1) - 1,
-                      2 * random.uniformDouble(3 * index + 2) - 1);
-}
+using tiles_test::randomVector;
 
 VolumePart contractedPart() {
   VolumePart part;

@@ -118,22 +118,16 @@ VolumeConfig twoOfFour() {
   return config;
 }
 
-BlockGrid fourBlocks() {
-  BlockGrid grid = cubeGrid(2);
-  grid.rows = 2;
-  return grid;
-}
-
 TEST(VolumeTrainer, LearnsACubeWithHalfOfItsBlocksInMemory) {
   const CubeScene scene;
   const VolumeConfig config = twoOfFour();
   constexpr int64_t kSteps = 400;
-  TrainedVolumeCube few(scene, config, fourBlocks(), kSteps);
+  TrainedVolumeCube few(scene, config, cubeGrid(2, 2), kSteps);
   EXPECT_EQ(few.model().slots(), 2u);
   ASSERT_NE(few.trainer->residency(), nullptr);
   EXPECT_GE(few.trainer->residency()->stays().size(), 4u) << "each pair of neighbours";
   // As a model for drawing has it: all in memory.
-  VolumeModel whole(*few.device, config, fourBlocks());
+  VolumeModel whole(*few.device, config, cubeGrid(2, 2));
   const std::vector<Bytes> parts = few.saved();
   ASSERT_EQ(parts.size(), 4u);
   for (uint32_t block = 0; block < 4; ++block) whole.restore(block, "state", *decodeSafetensors(parts[block]));
@@ -149,7 +143,7 @@ TEST(VolumeTrainer, LetsBlocksThatWaitSeeSomethingBeforeTheyAreToDecide) {
   urged.rampShare = 0;
   urged.opacity = urged.distortion = urged.sparsity = 1;
   config.opacity = config.distortion = config.sparsity = 0;
-  TrainedVolumeCube calm(scene, config, fourBlocks(), 0), strict(scene, urged, fourBlocks(), 0);
+  TrainedVolumeCube calm(scene, config, cubeGrid(2, 2), 0), strict(scene, urged, cubeGrid(2, 2), 0);
   const int64_t cycle = calm.trainer->residency()->cycleSteps();
   for (int64_t step = 0; step <= cycle; ++step) {
     EXPECT_EQ(calm.saved(), strict.saved()) << "before step " << step;
@@ -162,7 +156,7 @@ TEST(VolumeTrainer, LetsBlocksThatWaitSeeSomethingBeforeTheyAreToDecide) {
     *level = levelConfig(*level, 1, cycle);
     level->frozenShare = 0;
   }
-  TrainedVolumeCube calmLevel(scene, config, fourBlocks(), 0), strictLevel(scene, urged, fourBlocks(), 0);
+  TrainedVolumeCube calmLevel(scene, config, cubeGrid(2, 2), 0), strictLevel(scene, urged, cubeGrid(2, 2), 0);
   calmLevel.trainer->step(0, 100);
   strictLevel.trainer->step(0, 100);
   EXPECT_NE(calmLevel.saved(), strictLevel.saved());
@@ -230,7 +224,7 @@ TEST(VolumeTrainer, DrawsNoRaysThatSeeNoBlockWhenToldSo) {
 
 TEST(VolumeTrainer, DrawsNoRaysThatSeeABlockThatWaits) {
   const CubeScene scene;
-  TrainedVolumeCube trained(scene, twoOfFour(), fourBlocks(), 0);
+  TrainedVolumeCube trained(scene, twoOfFour(), cubeGrid(2, 2), 0);
   std::vector<int> raysOfBlock(4);
   const int64_t cycle = trained.trainer->residency()->cycleSteps();
   for (int64_t step = 0; step < cycle; ++step) {
@@ -300,10 +294,10 @@ TEST(VolumeTrainer, LeavesWaitingBlocksAsTheyAre) {
   const CubeScene scene;
   VolumeConfig config = twoOfFour();
   config.residencySteps = 4000;  // one stay
-  TrainedVolumeCube before(scene, config, fourBlocks(), 0);
+  TrainedVolumeCube before(scene, config, cubeGrid(2, 2), 0);
   const std::vector<Bytes> first = before.saved();
   before.trainer.reset();  // its scratch is in the same place
-  TrainedVolumeCube after(scene, config, fourBlocks(), 12);
+  TrainedVolumeCube after(scene, config, cubeGrid(2, 2), 12);
   const std::vector<uint32_t>& held = after.model().blockOfSlot();
   const std::vector<Bytes> last = after.saved();
   for (uint32_t block = 0; block < 4; ++block) {
@@ -325,14 +319,14 @@ TEST(VolumeTrainer, GoesOnAfterRestoringWithBlocksThatWait) {
     constexpr int64_t kSteps = 60;
     std::vector<Bytes> unbroken;
     {
-      TrainedVolumeCube whole(scene, config, fourBlocks(), 0);
+      TrainedVolumeCube whole(scene, config, cubeGrid(2, 2), 0);
       for (int64_t step = 0; step < kSteps; ++step) whole.trainer->step(step, kSteps);
       unbroken = whole.saved();
     }
     EXPECT_FALSE(fs::exists(scene / "waiting")) << "scratch is gone";
     std::vector<Bytes> state;
     for (int64_t step = 0; step < kSteps;) {
-      TrainedVolumeCube part(scene, config, fourBlocks(), 0);
+      TrainedVolumeCube part(scene, config, cubeGrid(2, 2), 0);
       for (size_t k = 0; k < state.size(); ++k) {
         part.trainer->restore(static_cast<uint32_t>(k), "state", *decodeSafetensors(state[k]));
       }
