@@ -9,6 +9,5 @@ export default defineConfig({
     rollupOptions: { input: ['index.html', 'plain.html'] },
   },
   server: { fs: { allow: ['..'] } }, // ../shaders
-  // Vitest leaves one processor idle by default, which is half of a small machine.
-  test: { testTimeout: 60000, hookTimeout: 60000, maxWorkers: '100%', minWorkers: 1 },
+  test: { testTimeout: 60000, hookTimeout: 60000 },
 });

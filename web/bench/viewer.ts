@@ -118,7 +118,7 @@ describe('the viewer', () => {
     const { seconds, bytes } = await page.evaluate(async (one) => {
       const begin = performance.now();
       await plain.open('scene/tileset.json', { selection: { mostPixels: 1e9 } });
-      await plain.settle(one);
+      await plain.drawUntilSettled(one);
       return { seconds: (performance.now() - begin) / 1000, bytes: plain.city!.statistics!.fetchedBytes };
     }, view);
     const total = bytesOnDisk(large);

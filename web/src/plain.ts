@@ -59,6 +59,19 @@ function draw(city: TesseraScene, camera: THREE.Camera): void {
   gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
 }
 
+function shownScenes(): TesseraScene[] {
+  return plain.beside ? [plain.city!, plain.beside].filter(({ visible }) => visible) : [plain.city!];
+}
+
+// Takes steps until nothing that the shown scenes ask for is still to come.
+async function untilIdle(step: () => void, end: number): Promise<void> {
+  do {
+    if (performance.now() > end) throw new Error('the view does not come to rest');
+    step();
+    await new Promise((resolve) => setTimeout(resolve, 5));
+  } while (shownScenes().some(({ idle }) => !idle));
+}
+
 const plain = {
   THREE, renderer, world, camera,
   city: undefined as TesseraScene | undefined,
@@ -102,18 +115,21 @@ const plain = {
     await restored;
   },
 
-  // Draws until nothing that the view asks for is still to come; milliseconds.
-  async settle(view: View | View[], most = 60000): Promise<number> {
-    const begin = performance.now();
-    const scenes = this.beside ? [this.city!, this.beside].filter(({ visible }) => visible) : [this.city!];
-    const isBusy = () => scenes.some(({ idle }) => !idle);
-    const looking = look(view);
-    for (let frames = 0; frames < 3 || isBusy(); ++frames) {
-      if (performance.now() - begin > most) throw new Error('the view does not come to rest');
-      draw(this.city!, looking);
-      await new Promise((resolve) => setTimeout(resolve, 0));
-    }
-    return performance.now() - begin;
+  // Streams in all that the view asks for, then draws it. Meanwhile nothing is drawn, which takes long where there is no
+  // graphics card.
+  async settle(view: View | View[], most = 60000): Promise<void> {
+    const camera = look(view);
+    const end = performance.now() + most;
+    do {
+      await untilIdle(() => shownScenes().forEach((scene) => scene.prefetch(camera, renderer)), end);
+      draw(this.city!, camera);
+    } while (shownScenes().some(({ idle }) => !idle));
+  },
+
+  // The same with a picture of what has come at each step, as the viewer does it.
+  async drawUntilSettled(view: View | View[], most = 60000): Promise<void> {
+    const camera = look(view);
+    await untilIdle(() => draw(this.city!, camera), performance.now() + most);
   },
 
   // Draws a picture again and again; seconds for each.
