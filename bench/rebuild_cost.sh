@@ -2,10 +2,11 @@
 # How many objects are compiled anew when an operation's header changes, of all that a build has: those that include it,
 # directly or not, as the compiler found. A new operation in a header of its own costs its users, the devices' tables and
 # the op test.
-#   bench/rebuild_cost.sh [BUILD_FOLDER [HEADER...]]     default: build/release, which is built in full; all operations
+# Of the preset dev, which compiles each source by itself; in release up to eight are joined, and a header costs groups.
+#   bench/rebuild_cost.sh [BUILD_FOLDER [HEADER...]]     default: build/dev, which is built in full; all operations
 set -euo pipefail
 cd "$(dirname "$0")/.."
-build=${1:-build/release}
+build=${1:-build/dev}
 shift $(($# > 0 ? 1 : 0))
 headers=("$@")
 if [ ${#headers[@]} -eq 0 ]; then
