@@ -65,7 +65,9 @@ class WorkerPicturesTest : public testing::Test {
     }
   }
 
-  static Camera window() { return {kPictureWidth, kPictureHeight, LensModel::pinhole, {50, 50, 0.5 * kPictureWidth, 0.5 * kPictureHeight}}; }
+  static Camera window() {
+    return {kPictureWidth, kPictureHeight, LensModel::pinhole, {50, 50, 0.5 * kPictureWidth, 0.5 * kPictureHeight}};
+  }
   static Pose poseAt(double x) {
     Pose pose;
     pose.translation.x() = x;

@@ -10,7 +10,8 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kMaximumMetadataChunk = size_t{64} << 20;  // texts and profiles; a picture's own data is not held as a chunk
+constexpr size_t kMaximumMetadataChunk = size_t{64}
+                                         << 20;  // texts and profiles; a picture's own data is not held as a chunk
 
 using Codec = std::unique_ptr<spng_ctx, decltype(&spng_ctx_free)>;
 

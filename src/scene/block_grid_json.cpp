@@ -9,7 +9,7 @@ namespace {
 using nlohmann::json;
 
 constexpr double kGridRotationTolerance = 1e-9;  // of RᵀR against the identity; ours come back exactly
-constexpr double kHeightTolerance = 1e-9;    // of the heights against the edge, relative
+constexpr double kHeightTolerance = 1e-9;        // of the heights against the edge, relative
 
 std::optional<double> numberIn(const json& object, const char* key) {
   const auto found = object.find(key);

@@ -1,6 +1,6 @@
 // ARCHITECTURE.md's table of modules holds: no file includes what its module may not use, and libraries link what the
-// table says. Of files that only tests need the rule is wider: they may also include what their binary links, and helpers
-// of tests, which stand in testing/ of a module and which nothing else may include.
+// table says. Of files that only tests need the rule is wider: they may also include what their binary links, and
+// helpers of tests, which stand in testing/ of a module and which nothing else may include.
 #include "modules/module_table.h"
 
 #include <fmt/format.h>

@@ -126,7 +126,7 @@ const plain = {
     } while (shownScenes().some(({ idle }) => !idle));
   },
 
-  // The same with a picture of what has come at each step, as the viewer does it.
+  // Draws what has come, at each step, until all that the view asks for has come: as the viewer does.
   async drawUntilSettled(view: View | View[], most = 60000): Promise<void> {
     const camera = look(view);
     await untilIdle(() => draw(this.city!, camera), performance.now() + most);

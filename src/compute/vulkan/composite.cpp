@@ -10,7 +10,7 @@ namespace tessera {
 namespace {
 
 constexpr uint32_t kCompositeRaysPerGroup = 64;  // local_size_x of the kernels
-constexpr uint32_t kMostColumns = 16;   // composite.glsl
+constexpr uint32_t kMostColumns = 16;            // composite.glsl
 
 }  // namespace
 

@@ -57,7 +57,8 @@ void VulkanDevice::enqueue(const HashGridBackward& options) {
   queue(sumKernel(kHashGridBackwardFloatAtomicsSpirv, kHashGridBackwardSpirv, constants), arguments,
         groupsOf(options.samples, kHashGridSamplesPerGroup, 1, arguments.levelCount));
   if (options.positionGradients) {
-    queue(kernel(kHashGridPositionGradientsSpirv, constants), arguments, groupsOf(options.samples, kHashGridSamplesPerGroup));
+    queue(kernel(kHashGridPositionGradientsSpirv, constants), arguments,
+          groupsOf(options.samples, kHashGridSamplesPerGroup));
   }
 }
 

@@ -195,7 +195,7 @@ inline double psnrOf(const RenderedView& view, const RenderedView& truth, int fr
   return -10 * std::log10(sum / static_cast<double>(count));
 }
 
-// About the cube, which has half a side of 0.5: one block, or several of which the first two or four meet in its middle.
+// About the cube, which has half a side of 0.5: one block, or two (2, 1) or four (2, 2) that meet in its middle.
 inline BlockGrid cubeGrid(int columns = 1, int rows = 1) {
   BlockGrid grid;
   grid.originInWorld = CubeScene::centre();

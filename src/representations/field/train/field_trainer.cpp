@@ -16,7 +16,7 @@ namespace {
 constexpr uint32_t kRoomPerWanted = 2;                // for passes that see more than the last step's did
 constexpr uint32_t kRoomPerRay = 8;                   // so that the first round of marching fits
 constexpr uint32_t kLosses = PhotoLoss::kLosses + 2;  // of a pass: of colours, distortion, depth
-constexpr float kTrainedMinTransmittance = 1e-4f;
+constexpr float kMinTransmittance = 1e-4f;
 
 PhotoRays::Settings raySettings(const FieldConfig& config) {
   PhotoRays::Settings settings = config.photoRaySettings();
@@ -113,13 +113,13 @@ void FieldTrainer::addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCo
   seen_.counters = counters_.part(size_t{pass} * RaySamples::kCounters, RaySamples::kCounters);
   model_.sample(
       {rayCount, photoRays_.origins(firstRay, rayCount), directions, photoRays_.jitter(firstRay, rayCount), {}},
-      kTrainedMinTransmittance, seen_);
+      kMinTransmittance, seen_);
   const Count samples = seen_.samples(), rays = seen_.finished(rayCount);
   RadianceField& field = model_.field();
   const RadianceField::Output output = field.forward(samples, seen_.positions, directions, seen_.rayOfSample, true);
 
   CompositeForward composite;
-  composite.minTransmittance = kTrainedMinTransmittance;
+  composite.minTransmittance = kMinTransmittance;
   composite.rays = rays;
   composite.firstSample = seen_.firstSample;
   composite.x = output.logDensity;
@@ -161,7 +161,7 @@ void FieldTrainer::addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCo
   }
 
   CompositeBackward back;
-  back.minTransmittance = kTrainedMinTransmittance;
+  back.minTransmittance = kMinTransmittance;
   back.fullGradientDistance = static_cast<float>(config_.fullGradientDistance);
   back.rays = rays;
   back.firstSample = seen_.firstSample;

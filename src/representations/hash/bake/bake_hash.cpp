@@ -17,10 +17,10 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kBakedRays = 2048, kBakedSamples = 1 << 16;  // of one piece of a photo
-static_assert(kBakedSamples >= HashModel::kMostSteps);
-constexpr float kBakedMinTransmittance = 2e-3f;  // the paper's
-constexpr uint32_t kTexels = 1 << 16;       // evaluated together
+constexpr uint32_t kBakingRays = 2048, kBakingSamples = 1 << 16;  // of one piece of a photo
+static_assert(kBakingSamples >= HashModel::kMostSteps);
+constexpr float kBakingMinTransmittance = 2e-3f;  // the paper's
+constexpr uint32_t kTexels = 1 << 16;             // evaluated together
 // Of a block's occupancy along an edge, unless the lattice is finer. The finer, the fewer samples: of fox
 // 8.5 a ray with 256, 7.3 with 384, 6.7 with 512, which take 1.8 times the memory of 384.
 constexpr uint32_t kMostCells = 384;
@@ -32,8 +32,8 @@ class SeenFinder final : public PixelVisitor {
       : model_(model),
         options_(options),
         seen_(seen),
-        pass_(model, {kBakedRays, kBakedSamples, 8 * kBakedSamples, false}),
-        pictureRays_(model.device(), kBakedRays) {}
+        pass_(model, {kBakingRays, kBakingSamples, 8 * kBakingSamples, false}),
+        pictureRays_(model.device(), kBakingRays) {}
 
   void begin(const Photo& photo, const Camera& camera) override {
     pictureRays_.begin(makeRayCamera(camera, photo.worldFromCamera, model_.frame()), model_.frame(), {});
@@ -44,7 +44,7 @@ class SeenFinder final : public PixelVisitor {
     Device& device = model_.device();
     while (!pixels.empty()) {
       const PictureRays::Piece piece = pictureRays_.through(pixels);
-      pass_.forward({piece.rays, piece.origins, piece.directions, {}, {}, {}}, kBakedMinTransmittance);
+      pass_.forward({piece.rays, piece.origins, piece.directions, {}, {}, {}}, kBakingMinTransmittance);
       const RoundCounts counts(device.read(pass_.counters()), HashSamples::kRounds);
       const uint32_t samples = counts.kept, finished = counts.finished;
       CHECK(finished >= 1u);  // one ray's steps always fit
@@ -287,7 +287,7 @@ std::vector<OccupancyBits> findSeenCells(HashModel& model, const Capture& captur
   std::vector<OccupancyBits> seen(model.space().blocks(), OccupancyBits(cells));
   SeenFinder finder(model, options, seen);
   const bool surround = model.space().blocks() > model.space().cells();
-  PhotoVisitor(capture, model.frame(), kBakedRays, finder).visitAll(options.stride, {surround, true}, options.onPhoto);
+  PhotoVisitor(capture, model.frame(), kBakingRays, finder).visitAll(options.stride, {surround, true}, options.onPhoto);
   for (OccupancyBits& bits : seen) {
     for (int i = 0; i < options.dilation; ++i) bits = dilated(bits);
   }

@@ -9,7 +9,7 @@ namespace {
 constexpr uint32_t kRays = 4096;        // of one piece of the picture, at most
 constexpr uint32_t kSamples = 1 << 16;  // rays that do not fit are taken up by the next piece
 static_assert(kSamples >= HashModel::kMostSteps);
-constexpr float kDrawnMinTransmittance = 2e-3f;
+constexpr float kDrawingMinTransmittance = 2e-3f;
 
 // Room for every corner of every sample: no picture lacks any.
 HashPass::Room room() {
@@ -37,7 +37,7 @@ RenderedView HashModelRenderer::render(const Camera& camera, const Pose& worldFr
   for (size_t first = 0; first < pixelCount;) {
     const PictureRays::Piece piece = pictureRays_.piece(first, wanted);
     const HashModel::Rays rays{piece.rays, piece.origins, piece.directions, {}, {}, piece.far};
-    pass_.forward(rays, kDrawnMinTransmittance);
+    pass_.forward(rays, kDrawingMinTransmittance);
     const RoundCounts counts(device.read(pass_.counters()), HashSamples::kRounds);
     const uint32_t finished = counts.finished;
     CHECK(finished >= 1u);  // one ray's steps always fit

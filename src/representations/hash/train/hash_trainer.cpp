@@ -13,7 +13,7 @@ namespace tessera {
 namespace {
 
 constexpr double kRoomPerWanted = 2;  // for steps that see more than the last one did
-constexpr float kTrainedMinTransmittance = 1e-4f;
+constexpr float kTrainingMinTransmittance = 1e-4f;
 constexpr const char* kFormat = "tessera hash 1";
 
 PhotoRays::Settings raySettings(const HashConfig& config) {
@@ -79,7 +79,7 @@ HashModel::Rays HashTrainer::drawRays(int64_t step) {
                              photoRays_.jitter(0, count),
                              photoRays_.nears(0, count),
                              photoRays_.fars(0, count)};
-  pass_.forward(rays, kTrainedMinTransmittance);
+  pass_.forward(rays, kTrainingMinTransmittance);
   return rays;
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/random.h"
 #include "raymarch/testing/random_parts.h"
 #include "scene/contraction.h"
 
