@@ -3,11 +3,12 @@
 #   USES base scene ...         other rooms (public)
 #   LIBRARIES x y ...           third-party targets (public)
 #   PRIVATE_LIBRARIES x y ...   third-party targets that no header of this room mentions
-#   TESTS a_test.cpp ...)       unit tests; one binary tessera_NAME_test, one CTest entry a test)
+#   TESTS a_test.cpp ...        unit tests; one binary tessera_NAME_test, one CTest entry a test
+#   TEST_PROCESSES n)           instead n entries that share out the tests (tessera_unit_tests)
 #
 # A room is a static library tessera_NAME; its headers are included as "NAME/file.h". One of headers alone has no SOURCES.
 function(tessera_module name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;USES;LIBRARIES;PRIVATE_LIBRARIES;TESTS" ${ARGN})
+  cmake_parse_arguments(ARG "" "TEST_PROCESSES" "SOURCES;USES;LIBRARIES;PRIVATE_LIBRARIES;TESTS" ${ARGN})
   list(TRANSFORM ARG_USES PREPEND tessera_)
   if(ARG_SOURCES)
     add_library(tessera_${name} STATIC ${ARG_SOURCES})
@@ -19,7 +20,8 @@ function(tessera_module name)
     target_link_libraries(tessera_${name} INTERFACE ${ARG_USES} ${ARG_LIBRARIES})
   endif()
   if(TESSERA_TESTS AND ARG_TESTS)
-    tessera_unit_tests(${name} SOURCES ${ARG_TESTS} LIBRARIES tessera_${name} ${ARG_PRIVATE_LIBRARIES})
+    tessera_unit_tests(${name} SOURCES ${ARG_TESTS} LIBRARIES tessera_${name} ${ARG_PRIVATE_LIBRARIES}
+      PROCESSES ${ARG_TEST_PROCESSES})
   endif()
 endfunction()
 

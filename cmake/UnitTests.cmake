@@ -13,11 +13,13 @@ if(TESSERA_TESTS)
     <string_view> <thread> <vector> <Eigen/Core> <Eigen/Geometry> <fmt/format.h>)
 endif()
 
-# tessera_unit_tests(NAME SOURCES a_test.cpp ... LIBRARIES x ... [PREFIX p]): the binary tessera_NAME_test, one CTest
-# entry p/... a test; p is NAME unless told. Tests are compiled with -O1, which takes a tenth less time than -O2;
-# most of what they run is in libraries, which are compiled as in the product.
+# tessera_unit_tests(NAME SOURCES a_test.cpp ... LIBRARIES x ... [PREFIX p] [PROCESSES n]): the binary
+# tessera_NAME_test, one CTest entry p/... a test; p is NAME unless told. With PROCESSES it is n entries that share out
+# its tests: for many tests that make ready the same thing (a device and its pipelines, a capture), which each process
+# then does once. Tests are compiled with -O1, which takes a tenth less time than -O2; most of what they run is in
+# libraries, which are compiled as in the product.
 function(tessera_unit_tests name)
-  cmake_parse_arguments(ARG "" "PREFIX" "SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "" "PREFIX;PROCESSES" "SOURCES;LIBRARIES" ${ARGN})
   if(NOT ARG_PREFIX)
     set(ARG_PREFIX ${name})
   endif()
@@ -26,6 +28,15 @@ function(tessera_unit_tests name)
   target_link_libraries(${target} PRIVATE ${ARG_LIBRARIES} GTest::gtest_main)
   target_compile_options(${target} PRIVATE -O1)
   target_precompile_headers(${target} REUSE_FROM tessera_test_precompiled_headers)
-  gtest_discover_tests(${target} TEST_PREFIX "${ARG_PREFIX}/" DISCOVERY_MODE PRE_TEST
-    PROPERTIES TIMEOUT 300 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
+  if(ARG_PROCESSES)
+    math(EXPR last "${ARG_PROCESSES} - 1")
+    foreach(index RANGE ${last})
+      add_test(NAME ${ARG_PREFIX}/process_${index}_of_${ARG_PROCESSES} COMMAND ${target})
+      set_tests_properties(${ARG_PREFIX}/process_${index}_of_${ARG_PROCESSES} PROPERTIES TIMEOUT 1200
+        ENVIRONMENT "GTEST_TOTAL_SHARDS=${ARG_PROCESSES};GTEST_SHARD_INDEX=${index}")
+    endforeach()
+  else()
+    gtest_discover_tests(${target} TEST_PREFIX "${ARG_PREFIX}/" DISCOVERY_MODE PRE_TEST
+      PROPERTIES TIMEOUT 300 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
+  endif()
 endfunction()

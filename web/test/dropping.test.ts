@@ -4,7 +4,7 @@ import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, beforeEach, describe, expect, it } from 'vitest';
 import { madeGlb } from '../src/testing/made-glb';
 import { goldenScene, launch, missing, serve, type Server } from './machine';
-import { decodePixels } from './pictures';
+import { decodePixels, pictureAtRest } from './pictures';
 
 interface Given {
   name: string;
@@ -69,8 +69,7 @@ describe.skipIf(missing())('a model that is dropped', () => {
   async function picture(): Promise<{ pixels: Uint8Array; red: number }> {
     await page.keyboard.press('Escape');
     await page.mouse.move(470, 260);
-    await page.waitForTimeout(1500);
-    const pixels = await decodePixels(page, await page.screenshot());
+    const pixels = await decodePixels(page, await pictureAtRest(page));
     let red = 0;
     for (let at = 0; at < pixels.length; at += 3) if (pixels[at] > 200 && pixels[at + 1] < 40 && pixels[at + 2] < 40) ++red;
     return { pixels, red };

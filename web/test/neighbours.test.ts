@@ -1,11 +1,12 @@
 // Parts of a scene that are not drawn, and scenes beside one another. By pixels.
 import { readFileSync } from 'node:fs';
 import type { Browser, Page } from 'playwright-core';
-import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from 'vitest';
+import { afterAll, beforeAll, beforeEach, describe, expect, it } from 'vitest';
 import type { Plain, View } from '../src/plain';
 import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenHash, goldenScene, launch, missing, serve, type Server } from './machine';
+import { isSame } from './pictures';
 import { openPlain } from './plain-page';
 import { viewAt } from './views';
 
@@ -29,11 +30,11 @@ describe.skipIf(missing()).each([['volume', goldenScene], ['hash', goldenHash]])
     server?.close();
     expect(said).toEqual([]);
   });
-  beforeEach(async () => {
+
+  async function open(): Promise<void> {
     page = await openPlain(browser, server, said);
     await page.evaluate((one) => plain.open('scene/tileset.json', one), options);
-  });
-  afterEach(() => page.close());
+  }
 
   async function picture(view: View): Promise<Uint8Array> {
     await page.evaluate((one) => plain.settle(one), view);
@@ -45,6 +46,13 @@ describe.skipIf(missing()).each([['volume', goldenScene], ['hash', goldenHash]])
   const pixelsOf = (image: Uint8Array) => Array.from({ length: image.length / 3 }, (_, pixel) => pixel);
 
   describe('what is hidden', () => {
+    beforeAll(open);
+    beforeEach(() => page.evaluate(() => {
+      plain.hide([]);
+      plain.world.background = plain.city!.background;
+    }));
+    afterAll(() => page.close());
+
     // In the golden scene a building stands at |x + 1| < 0.4, |y| < 0.3, up to z = 0.45.
     const building = { low: [-1.5, -0.4, -0.05], high: [-0.5, 0.4, 0.6] };
     const atFacade = viewAt(tileset, [-1, -2.2, 0.3], [-1, 0, 0.1]);
@@ -66,13 +74,13 @@ describe.skipIf(missing()).each([['volume', goldenScene], ['hash', goldenHash]])
       expect(pixelsOf(whole).filter((pixel) => isBeside(pixel) && differs(whole, without, pixel)).length).toBe(0);
       await page.evaluate(() => plain.removeBox());
       await hide();
-      expect(await picture(atFacade)).toEqual(whole);
+      expect(isSame(await picture(atFacade), whole)).toBe(true);
     });
 
     it('is nothing at all in boxes that hold nothing, or are none', async () => {
       const whole = await picture(atFacade);
       await hide({ low: [-1.5, -0.4, 50], high: [-0.5, 0.4, 60] }, { low: [-1, -1, -1], high: [1, 1, -1] });
-      expect(await picture(atFacade)).toEqual(whole);
+      expect(isSame(await picture(atFacade), whole)).toBe(true);
     });
 
     it('is all that lies in any of several boxes that overlap', async () => {
@@ -131,10 +139,14 @@ describe.skipIf(missing()).each([['volume', goldenScene], ['hash', goldenHash]])
     const front = viewAt(tileset, [-0.3, -3, 0.7], [-0.2, 1, 0]);
     const back = viewAt(tileset, [-0.3, kAway + 3, 0.7], [-0.2, kAway - 1, 0]);
 
-    beforeEach(() => page.evaluate(async ([place, one]) => {
-      await plain.openBeside('scene/tileset.json', place, one);
-      plain.city!.showsSurround = false;
-    }, [away, options] as const));
+    beforeAll(async () => {
+      await open();
+      await page.evaluate(async ([place, one]) => {
+        await plain.openBeside('scene/tileset.json', place, one);
+        plain.city!.showsSurround = false;
+      }, [away, options] as const);
+    });
+    afterAll(() => page.close());
 
     // Of one of them, the other or both, before each background.
     async function pictures(view: View, city: boolean, beside: boolean): Promise<Uint8Array[]> {
@@ -173,12 +185,15 @@ describe.skipIf(missing()).each([['volume', goldenScene], ['hash', goldenHash]])
       // Who is asked where it is answers from the other side.
       await page.evaluate(() => {
         for (const scene of [plain.city!, plain.beside!]) {
-          Object.defineProperty(scene, 'bounds', { get: () => new plain.THREE.Box3().setFromCenterAndSize(
+          Object.defineProperty(scene, 'bounds', { configurable: true, get: () => new plain.THREE.Box3().setFromCenterAndSize(
             scene.position.clone().multiplyScalar(-1000), new plain.THREE.Vector3(1, 1, 1)) });
         }
       });
       await check(front, true);
       await check(back, false);
+      await page.evaluate(() => {
+        for (const scene of [plain.city!, plain.beside!]) Reflect.deleteProperty(scene, 'bounds');
+      });
     });
 
     it('has models before it hidden by the other one', async () => {

@@ -58,6 +58,23 @@ export async function coloursOf(page: Page): Promise<number> {
   return colours.size;
 }
 
+// The page once all that it shows has come and nothing on it moves: twice the same.
+export async function pictureAtRest(page: Page): Promise<Buffer> {
+  await page.waitForSelector('.loading.done', { state: 'attached' });
+  let picture = await page.screenshot();
+  for (;;) {
+    await page.waitForTimeout(300);
+    const next = await page.screenshot();
+    if (next.equals(picture)) return next;
+    picture = next;
+  }
+}
+
+// What toEqual says of two pictures takes seconds.
+export function isSame(a: Uint8Array, b: Uint8Array): boolean {
+  return Buffer.compare(a, b) === 0;
+}
+
 export function psnr(a: Uint8Array, b: Uint8Array): number {
   if (a.length !== b.length) throw new Error('pictures of different sizes');
   const squares = a.reduce((sum, value, i) => sum + (value - b[i]) ** 2, 0);

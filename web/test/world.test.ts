@@ -7,7 +7,7 @@ import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, beforeEach, describe, expect, it } from 'vitest';
 import { madeGlb } from '../src/testing/made-glb';
 import { goldenScene, launch, missing, program, serve, viewer, type Server } from './machine';
-import { decodePixels } from './pictures';
+import { decodePixels, pictureAtRest } from './pictures';
 
 const kView = 'eye=10,-120,70&target=10,-20,5&fov=50';
 const upright = [0, 0, 0, 1];
@@ -71,9 +71,7 @@ describe.skipIf(missing())('a world that is served', () => {
   async function picture(): Promise<Uint8Array> {
     await page.keyboard.press('Escape');
     await page.mouse.move(630, 390);
-    await page.waitForTimeout(1500);
-    await page.waitForSelector('.loading.done', { state: 'attached' });
-    return decodePixels(page, await page.screenshot());
+    return decodePixels(page, await pictureAtRest(page));
   }
 
   const isBesideToolbar = (pixel: number) => pixel % 640 >= 110; // which shows what has the focus
