@@ -70,7 +70,7 @@ export async function pictureAtRest(page: Page): Promise<Buffer> {
   }
 }
 
-// What toEqual says of two pictures takes seconds.
+// Of two pictures, for which toEqual takes seconds.
 export function isSame(a: Uint8Array, b: Uint8Array): boolean {
   return Buffer.compare(a, b) === 0;
 }
