@@ -15,8 +15,8 @@ endif()
 
 # tessera_unit_tests(NAME SOURCES a_test.cpp ... LIBRARIES x ... [PREFIX p] [PROCESSES n]): the binary
 # tessera_NAME_test, one CTest entry p/... a test; p is NAME unless told. With PROCESSES it is n entries that share out
-# its tests: for many tests that make ready the same thing (a device and its pipelines, a capture), which each process
-# then does once. Tests are compiled with -O1, which takes a tenth less time than -O2; most of what they run is in
+# its tests: for many tests that need the same thing (a device and its pipelines, a capture), which each process then
+# prepares once. CTest does not report what these skip. Tests are compiled with -O1, which takes a tenth less time than -O2; most of what they run is in
 # libraries, which are compiled as in the product.
 function(tessera_unit_tests name)
   cmake_parse_arguments(ARG "" "PREFIX;PROCESSES" "SOURCES;LIBRARIES" ${ARGN})

@@ -58,7 +58,7 @@ export async function coloursOf(page: Page): Promise<number> {
   return colours.size;
 }
 
-// The page once all that it shows has come and nothing on it moves: twice the same.
+// Waits until everything has loaded and two screenshots in a row are the same, and returns the second.
 export async function pictureAtRest(page: Page): Promise<Buffer> {
   await page.waitForSelector('.loading.done', { state: 'attached' });
   let picture = await page.screenshot();
@@ -70,7 +70,7 @@ export async function pictureAtRest(page: Page): Promise<Buffer> {
   }
 }
 
-// Of two pictures, for which toEqual takes seconds.
+// Compares two pictures, for which toEqual takes seconds.
 export function isSame(a: Uint8Array, b: Uint8Array): boolean {
   return Buffer.compare(a, b) === 0;
 }
