@@ -1,17 +1,18 @@
-// border_error MODEL|SCENE CAPTURE BLOCKS_JSON [SHARE]: where held-out views are wrong. Each pixel's surface is put on
-// the ground of BLOCKS_JSON's grid: by the photo's depth map, so that all that is compared is judged by the same
-// pixels, or where there is none by the drawn depth. JSON of the mean squared error (RGB in [0,1]) in
-//   border    within SHARE (0.05) of an edge from a wall between two blocks
-//   rim       likewise from the grid's outer walls, whatever else is near
+// border_error MODEL|SCENE CAPTURE BLOCKS_JSON [SHARE]: where in held-out views the errors are. Each pixel's surface
+// point is projected onto the ground of BLOCKS_JSON's grid: by the photo's depth map, so that everything that is
+// compared uses the same pixels, or by the rendered depth if there is none. Prints, as JSON, the mean squared error
+// (RGB in [0,1]) in
+//   border    within SHARE (0.05) of a block's edge length from a wall between two blocks
+//   rim       as close to the grid's outer walls, whatever else is near
 //   interior  the rest of the blocks
-// What lies outside the blocks, and sky, does not count. See consistency.sh.
+// Pixels outside the blocks and of the sky do not count. See consistency.sh.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "apps/tessera/drawable.h"
+#include "apps/tessera/render_source.h"
 #include "base/error.h"
 #include "eval/evaluate.h"
 #include "import/capture_reader.h"
@@ -23,10 +24,10 @@ namespace {
 enum Place { kBorder, kRim, kInterior, kOutside };
 constexpr const char* kPlaces[] = {"border", "rim", "interior", "outside"};
 
-Place placeOf(const BlockGrid& grid, const Vec3d& xInWorld, double share) {
+Place classifyPoint(const BlockGrid& grid, const Vec3d& xInWorld, double share) {
   const Vec3d x = grid.inGrid(xInWorld);
   if (!(x.z() >= grid.bottom && x.z() <= grid.top)) return kOutside;
-  double toRim = INFINITY, toWall = INFINITY;  // in edges
+  double toRim = INFINITY, toWall = INFINITY;  // in block edges
   const int counts[] = {grid.columns, grid.rows};
   for (int axis = 0; axis < 2; ++axis) {
     const double at = x[axis] / grid.edge + 0.5 * counts[axis];
@@ -59,7 +60,7 @@ void add(Errors& errors, const ViewPictures& pictures, const Camera& camera, con
       Place place = kOutside;
       if (direction && direction->z() > 0 && depth > 0 && std::isfinite(depth)) {
         const Vec3d xInWorld = pose.translation + pose.rotation * *direction * (depth / direction->z());
-        place = placeOf(grid, xInWorld, share);
+        place = classifyPoint(grid, xInWorld, share);
       }
       for (int c = 0; c < 3; ++c) {
         const double difference = pictures.rendered.at(x, y)[c] - pictures.photo.at(x, y)[c];
@@ -75,8 +76,8 @@ nlohmann::ordered_json measure(const fs::path& what, const fs::path& captureFold
   const Capture capture = readCapture(captureFolder);
   const BlockGrid grid = readGrid(blocks, capture);
   const std::unique_ptr<Device> device = makeDevice({});
-  const std::unique_ptr<Drawable> drawable = openDrawable(*device, what, {});
-  drawable->requireWorldOf(capture);
+  const std::unique_ptr<RenderSource> renderSource = openRenderSource(*device, what, {});
+  renderSource->requireMatchingWorld(capture);
   EvaluateOptions options;
   const std::vector<int> photos = capture.photosIn(options.split);
   Errors errors;
@@ -85,7 +86,8 @@ nlohmann::ordered_json measure(const fs::path& what, const fs::path& captureFold
     const Photo& photo = capture.photos[static_cast<size_t>(photos[done++])];
     add(errors, pictures, capture.cameras[static_cast<size_t>(photo.camera)], photo.worldFromCamera, grid, share);
   };
-  nlohmann::ordered_json result = {{"psnr", evaluate(drawable->renderer(), capture, options).psnr}, {"share", share}};
+  nlohmann::ordered_json result = {{"psnr", evaluate(renderSource->renderer(), capture, options).psnr},
+                                   {"share", share}};
   for (const Place place : {kBorder, kRim, kInterior, kOutside}) {
     result[kPlaces[place]] = {{"pixels", errors.pixels[place]}, {"mse", errors.mse(place)}};
   }

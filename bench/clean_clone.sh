@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Times ./test.sh in a fresh clone of HEAD without compiler cache, packages and build included: at most 20 minutes on 2
-# cores. Says how long each part of it took. Real photographs are found by TESSERA_SHARED_DATA, as ever.
+# Times ./test.sh in a fresh clone of HEAD without a compiler cache, including package installation and the build: at most 20
+# minutes on 2 cores. Prints how long each part took. Real photographs are found through TESSERA_SHARED_DATA, as always.
 #   bench/clean_clone.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Every operation's rate beside the machine's own limit, and the whole training step. Several rounds: of each operation and
-# of each limit the best counts, for on a shared machine others disturb now the one, now the other.
+# The rate of every operation relative to the machine's own limit, and the whole training step. Of several rounds, the best of each
+# operation and of each limit counts, because on a shared machine other processes disturb now one, now the other.
 #   [THREADS=0] [ROUNDS=5] bench/compute.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
@@ -17,7 +17,7 @@ jq -s '{device: .[0].device, rounds: length, flops_per_second: map(.flops_per_se
 rm "${rounds[@]}"
 alone "$tessera" bench train --threads "${THREADS:-0}" --json "$out/train.json" | tee -a "$out/compute.txt"
 verdict "training step, M samples/s" "$(jq '.samples_per_second / 1e6 * 1000 | round / 1000' "$out/train.json")" '>=' 0.5
-# row OPERATION SHAPE: its share of the limit in percent.
+# row OPERATION SHAPE: prints its share of the limit in percent.
 row() { jq --arg o "$1" --arg s "$2" '.operations[] | select(.operation == $o and .shape == $s).share * 1000 | round / 10' "$out/compute.json"; }
 for samples in 65536 8192; do
   for network in 64-64-64-64 'density 32-64-16' 'colour 32-64-64-3'; do
@@ -29,7 +29,7 @@ for samples in 65536 8192; do
     verdict "hash grid backward, $points, $samples samples, % of gather rate" "$(row HashGridBackward "$shape")" '>=' 50
   done
 done
-# The virtual grid, of which no bound is asked.
+# The virtual grid, for which no bound is required.
 jq -r '[.operations[] | select(.operation | IN("DistinctTexels", "VirtualGridForward", "VirtualGridBackward"))]
   | (.[0].shape | split(" ")[0] | tonumber / 1e6) as $samples
   | (.[] | "\(.operation), \(.shape): \($samples / .seconds * 100 | round / 100) M samples/s, "

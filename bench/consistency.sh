@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# City-on-Web's ablation (table 5) on the processor, in a made city of 2x2 blocks; all models take equal steps of equal
-# numbers of rays, and baked scenes are judged.
-#   consistency  blocks trained together against blocks trained apart, and merged: each with a surround of its own (which
-#                can stand behind its box only), and a quarter of the rays, all of them through it (and as
-#                many points of the sparsity loss a block: 4096 in five, 1638 in two). The merged model is
-#                given the surround of the joint one.
+# City-on-Web's ablation (table 5) on the CPU, in a synthetic city of 2x2 blocks. All models take the same number of steps with the
+# same number of rays; baked scenes are evaluated.
+#   consistency  blocks trained together against blocks trained separately and merged. Each separate model has a background
+#                block of its own (which covers only what is behind its box) and a quarter of the rays, all of which pass
+#                through its block (and as many points of the sparsity loss per block: 4096 in five, 1638 in two). The
+#                merged model uses the background block of the joint one.
 #   resolution   four blocks against one block of their size together, with twice the resolution along each axis, tables
 #                four times as large, and every distance that settings measure in blocks halved.
-# Resumable: all is kept in build/bench/consistency, and what is there is not made again.
+# Resumable: everything is kept in build/bench/consistency, and what exists is not made again.
 #   [ROWS="consistency resolution"] [SEEDS="1 2 3"] [STEPS=1500] [RAYS=4096] [CITY="--size 400x300"] bench/consistency.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
@@ -22,17 +22,18 @@ steps=${STEPS:-1500} rays=${RAYS:-4096}
 settings "STEPS=$steps RAYS=$rays CITY='${CITY:-}'"
 [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2 ${CITY:-}
 
-# volume MODEL SEED RAYS ARGUMENTS...: with more room for texels than so many rays can want, so that their number stays.
+# volume MODEL SEED RAYS ARGUMENTS...: trains with a capacity for texels that no number of rays exceeds, so that the number of rays
+# is constant.
 volume() {
   local model=$1 seed=$2 number=$3
   shift 3
-  trained "$model" city --method volume --seed "$seed" --steps "$steps" --set level_share=0 \
-    --set first_rays="$number" --set most_rays="$number" --set texels_per_step=$((512 * number)) "$@"
+  trained "$model" city --method volume --seed "$seed" --steps "$steps" --set lod_step_fraction=0 \
+    --set first_rays="$number" --set max_rays="$number" --set texels_per_step=$((512 * number)) "$@"
 }
 joint() { volume "joint-$1" "$1" "$rays" --blocks 2x2; }
-# grid NAME JQ: $work/NAME.json, the joint blocks changed. The capture decides them, whatever the seed.
+# grid NAME JQ: writes $work/NAME.json, the joint blocks changed by JQ. The capture determines them, whatever the seed.
 grid() { jq "$2" "$work/joint-${seeds%% *}/blocks.json" > "$work/$1.json"; }
-# scene MODEL: baked from it, and judged as a whole and along the joint blocks' walls.
+# scene MODEL: bakes it, and evaluates the scene as a whole and along the walls of the joint blocks.
 scene() {
   baked "$1" "$1-scene" city
   judged "$1-scene" city > /dev/null
@@ -75,12 +76,12 @@ consistency() {
   verdict "trained together: error at walls as a share of that in the blocks, mean of seeds" "$ratio" '<=' 1.05
 }
 
-# seconds SCENE: a frame's, the median view (the first view loads the tiles).
+# seconds SCENE: prints the seconds per frame of the median view (the first view loads the tiles).
 seconds() {
   alone "$tessera" eval "$work/$1" "$work/city" --json "$work/seconds.json" --report "$work/seconds.html" > /dev/null
   jq '[.views[].seconds] | sort | .[length / 2 | floor]' "$work/seconds.json"
 }
-# share FOUR ONE EXPRESSION: of what `info` says of the scenes.
+# share FOUR ONE EXPRESSION: prints the ratio of a value that `info` reports of the two scenes.
 share() {
   awk -v a="$(jq "$3" "$work/$1-info.json")" -v b="$(jq "$3" "$work/$2-info.json")" 'BEGIN { printf "%.3f\n", a / b }'
 }
@@ -104,14 +105,14 @@ resolution() {
   done
   for what in "$four" "$one"; do
     echo "$what: $(jq -r '"blocks \(.level_0.bytes_in_memory) bytes in memory, \(.level_0.bytes_on_disk) on disk; " +
-      "surround \(.surround_0.bytes_in_memory) and \(.surround_0.bytes_on_disk)"' "$work/$what-info.json")"
+      "background block \(.background_block_0.bytes_in_memory) and \(.background_block_0.bytes_on_disk)"' "$work/$what-info.json")"
   done
   verdict "four blocks less one of twice the resolution, held-out PSNR in dB" \
     "$(shortfall "$(jq .psnr "$work/$four-scene.json")" "$(jq .psnr "$work/$one-scene.json")")" '>=' 0
   whole=.bytes_in_memory
-  verdict "their memory as a share, without surrounds" "$(share "$four" "$one" .level_0$whole)" '<=' 1
-  verdict "with surrounds" "$(share "$four" "$one" ".level_0$whole + .surround_0$whole")" '<=' 1
-  verdict "their bytes on disk as a share, without surrounds" "$(share "$four" "$one" .level_0.bytes_on_disk)" '<=' 1
+  verdict "their memory as a share, without background blocks" "$(share "$four" "$one" .level_0$whole)" '<=' 1
+  verdict "with background blocks" "$(share "$four" "$one" ".level_0$whole + .background_block_0$whole")" '<=' 1
+  verdict "their bytes on disk as a share, without background blocks" "$(share "$four" "$one" .level_0.bytes_on_disk)" '<=' 1
   echo "a frame in $fastest_four s, of the one block in $fastest_one s"
   verdict "their time a frame as a share" \
     "$(awk -v a="$fastest_four" -v b="$fastest_one" 'BEGIN { printf "%.3f\n", a / b }')" '<=' 1

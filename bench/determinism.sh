@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The same seed gives the same final checkpoint, byte for byte: with one thread, with two, and when the run is killed
-# with SIGKILL ten times at random moments and resumed.
+# The same seed gives the same final checkpoint, byte for byte: with one thread, with two, and when the run is killed with SIGKILL
+# ten times at random moments and resumed.
 #   [STEPS=1500] [KILLS=10] [RANDOM_SEED=N] bench/determinism.sh [CAPTURE]     default: a small city made here
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
@@ -13,19 +13,19 @@ trap 'rm -rf "$work"' EXIT
 capture=${1:-$work/city}
 [ -e "$capture" ] || "$tessera" synth city "$capture" --blocks 1x1 --photos 16 --size 160x120 --samples 2 --traffic
 
-train() { "$tessera" train "$capture" "$@" --method field --steps "$steps" --seed 7 --set samples_per_step=8192 --set samples_per_pass=2048; }
+train() { "$tessera" train "$capture" "$@" --method field --steps "$steps" --seed 7 --set samples_per_step=8192 --set samples_per_micro_batch=2048; }
 
 train "$work/one" --threads 1
 started=$(date +%s%N)
 train "$work/two" --threads 2
 lasted=$(($(date +%s%N) - started))
 
-# Moments within a sixth of the run, so that ten of them end before it does.
+# Moments within a sixth of the run, so that all ten are before its end.
 killed=0
 mkdir "$work/killed"
 while [ "$killed" -lt "$kills" ]; do
   nap=$(awk -v l="$lasted" -v k="$kills" -v r="$RANDOM" 'BEGIN { printf "%.3f", 0.05 + l / 1e9 * 1.6 / k * r / 32768 }')
-  "$tessera" train "$capture" "$work/killed" --method field --steps "$steps" --seed 7 --set samples_per_step=8192 --set samples_per_pass=2048 \
+  "$tessera" train "$capture" "$work/killed" --method field --steps "$steps" --seed 7 --set samples_per_step=8192 --set samples_per_micro_batch=2048 \
     --threads 2 --resume --checkpoint-seconds 0.3 > "$work/log" 2>&1 &
   pid=$!
   sleep "$nap"

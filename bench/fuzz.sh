@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Every decoder of outside bytes under libFuzzer with ASan and UBSan, ten minutes each; fails at the first finding.
+# Runs every decoder of untrusted bytes under libFuzzer with ASan and UBSan, ten minutes each; fails at the first finding.
 #   bench/fuzz.sh [SECONDS]
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"

@@ -1,19 +1,19 @@
 #!/usr/bin/env bash
-# Packs what was built into a bundle that runs on x86-64 Linux with nothing but a graphics card's driver: the programs, the
-# libraries that they need, the Vulkan loader, a made city, and the glibc that the programs need, for machines with an
-# older one. Then runs it here. On another machine: tar -xzf, ./run.sh.
+# Packs the build into a bundle that runs on x86-64 Linux with nothing but a GPU driver: the programs, the libraries that they need,
+# the Vulkan loader, a synthetic city, and the glibc that the programs need, for machines with an older one. Then runs it here. On
+# another machine: tar -xzf, ./run.sh.
 #   [BUILD=build/release] [ONLY_PACK=1] bench/gpu.sh        settings of the run: bench/gpu_run.sh
-#   JUDGE="gpu.json ..." bench/gpu.sh                       holds what runs on a card (and bench/tiny_cuda_nn.sh there) wrote
-#                                                           against what is wanted of one
+#   JUDGE="gpu.json ..." bench/gpu.sh                       compares what runs on a GPU (and bench/tiny_cuda_nn.sh there)
+#                                                           measured with the required values
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
-# judge FILE...: of one card, whose rows may have been run one at a time. What no run measured is a failure.
+# judge FILE...: the files are of one GPU, whose rows may have been run one at a time. A missing measurement is a failure.
 judge() {
   local all=$out/gpu-all.json number
   jq -s 'add + {failed: map(.failed) | add}' "$@" > "$all"
-  # Runs that were not cut off, all on a card; the comparison says neither.
-  jq -se 'map(select(has("tiny_cuda_nn") | not)) | length > 0 and all(.[]; .is_card and has("ended"))' "$@" > /dev/null ||
-    die "$*: not measured on a card, or cut off"
+  # Accepts only runs that were not cut off and were all on a GPU; the tiny-cuda-nn comparison records neither.
+  jq -se 'map(select(has("tiny_cuda_nn") | not)) | length > 0 and all(.[]; .is_gpu and has("ended"))' "$@" > /dev/null ||
+    die "$*: not measured on a GPU, or cut off"
   holds_of() { # WHAT EXPRESSION BOUND
     number=$(jq "($2) // -1" "$all")
     verdict "$1" "$number" '>=' "$3"
@@ -22,7 +22,7 @@ judge() {
   least() { # OPERATION SHAPE MEMBER: in percent
     jq --arg o "$1" --arg s "$2" "$rows | map(.$3) | min // -0.01 | . * 1000 | round / 10" "$all"
   }
-  echo "card: $(jq -r .compute.device "$all"), commit $(jq -r .commit "$all")"
+  echo "GPU: $(jq -r .compute.device "$all"), commit $(jq -r .commit "$all")"
   holds_of "operations that agree with the reference" .values_passed 200
   verdict "operations that do not" "$(jq '.values_failed | if . == null then 1 else length end' "$all")" '<=' 0
   holds_of "fox held out, field, dB" .fox_field_psnr 27
@@ -36,7 +36,7 @@ judge() {
   done
   holds_of "hash at two levels, pictures a second at $(jq .city_hash_2_frames.width "$all") wide" .city_hash_2_frames.frames_per_second 108
   holds_of "volume, pictures a second" .city_volume_frames.frames_per_second 100
-  # Their time by ours.
+  # The time of tiny-cuda-nn relative to ours.
   if [ "$(jq 'has("tiny_cuda_nn")' "$all")" = true ]; then
     compared=$(jq -r '(.compute.operations // []) as $ours | .tiny_cuda_nn.operations[] | . as $theirs
       | [$ours[] | select(.operation == $theirs.operation and .shape == $theirs.shape).seconds][0] as $seconds
@@ -62,15 +62,15 @@ rm -rf "$bundle"
 mkdir -p "$bundle"/{bin,lib,lib-c,lib-c++}
 [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2 --size 400x300
 cp -r "$work/city" "$bundle/city"
-rm -r "$bundle/city/depths"  # four fifths of it, and nothing here asks for them
+rm -r "$bundle/city/depths"  # four fifths of the city's size, and nothing here reads them
 jq -c 'del(.frames[].depth_file_path)' "$work/city/transforms.json" > "$bundle/city/transforms.json"
 for program in "$tessera" "$test"; do
   strip -o "$bundle/bin/$(basename "$program")" "$program"
 done
-# glibc and the C++ library apart: the driver is linked to the machine's, which may be newer.
+# glibc and the C++ library are packed separately: the driver is linked to the machine's, which may be newer.
 ldd "$tessera" "$test" | awk '$3 ~ /^\// { print $3 }' | sort -u | while read -r library; do
   case "$(basename "$library")" in
-    libc.so.* | libm.so.* | libdl.so.* | libpthread.so.* | librt.so.* | ld-linux*) ;;  # below, whole
+    libc.so.* | libm.so.* | libdl.so.* | libpthread.so.* | librt.so.* | ld-linux*) ;;  # packed below, as a whole
     libstdc++.so.* | libgcc_s.so.*) cp -L "$library" "$bundle/lib-c++/" ;;
     *) cp -L "$library" "$bundle/lib/" ;;
   esac

@@ -1,22 +1,22 @@
 #!/usr/bin/env bash
-# What a graphics card can do with tessera: run.sh of the bundle that bench/gpu.sh packs. Needs the card's driver and
-# nothing else. Writes gpu.json, and what was said into gpu.txt; ends with status 1 where something failed.
-#   ./run.sh [OUT]        default: the folder that this lies in
+# Measures what a GPU can do with tessera: run.sh of the bundle that bench/gpu.sh packs. Needs only the GPU's driver. Writes
+# gpu.json, and the output to gpu.txt; ends with status 1 if something failed.
+#   ./run.sh [OUT]        default: the folder that contains this script
 #   ROWS="values compute fox cities"      some of them
-#   DEVICE=vulkan:1       another device than the best (bin/tessera info devices)
-#   FOX=DIR               a capture of the fox photographs, for the row of 60 s
-#   CITY=DIR              another capture than the bundle's city of 2x2 blocks
-#   GLIBC=packed          the bundle's glibc, which is otherwise used where the machine's is too old
+#   DEVICE=vulkan:1       a device other than the best one (bin/tessera info devices)
+#   FOX=DIR               a capture of the fox photographs, for the row `fox`
+#   CITY=DIR              a capture other than the bundle's city of 2x2 blocks
+#   GLIBC=packed          use the bundle's glibc, which is otherwise used only if the machine's is too old
 #   SECONDS_OF_TRAINING=60 SIZE=1920x1080 SAMPLES="65536 1048576" STREAMED=1048576
-#   LENGTH="--steps 3" VOLUME="--set most_rays=128" HASH=... FIELD=...    instead of the seconds; more of train's flags
+#   LENGTH="--steps 3" VOLUME="--set max_rays=128" HASH=... FIELD=...    instead of the seconds; further flags of train
 set -uo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 out=$(mkdir -p "${1:-$here}" && cd "${1:-$here}" && pwd)
 device=${DEVICE:-vulkan} seconds=${SECONDS_OF_TRAINING:-60} size=${SIZE:-1920x1080}
 work=$(mktemp -d) && trap 'rm -rf "$work"' EXIT
 
-# The machine's own glibc and C++ library where they are new enough: its driver may need those very ones. Other programs
-# of the machine see none of the bundle's.
+# Uses the machine's own glibc and C++ library if they are new enough, because its driver may need exactly those. Other programs of
+# the machine do not see the bundle's.
 given=${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
 start() { # PROGRAM ARGUMENT...
   local program=$here/bin/$1
@@ -32,22 +32,22 @@ tessera() { start tessera "$@"; }
 for libraries in $choices; do tessera --version > /dev/null 2>&1 && break; done
 tessera --version > /dev/null || { echo "run.sh: the programs do not start here" >&2; exit 1; }
 
-# Whether there is a card, and not only a driver for the processor.
-card() {
+# Returns whether there is a GPU, not only a Vulkan driver for the CPU.
+has_gpu() {
   tessera info devices 2> /dev/null | awk '/^vulkan:[0-9]/ { next_is = 1 }
     /^  name/ { if (next_is && !/llvmpipe|SwiftShader/) found = 1; next_is = 0 } END { exit !found }'
 }
-# NVIDIA's driver in a container often comes without the file that names it.
-if ! card && [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ]; then
+# In a container, NVIDIA's driver often lacks the file that registers it with the Vulkan loader.
+if ! has_gpu && [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ]; then
   for library in libGLX_nvidia.so.0 libEGL_nvidia.so.0; do
     printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "%s", "api_version": "1.2.0"}}\n' "$library" > "$work/icd.json"
     export VK_DRIVER_FILES=$work/icd.json VK_ICD_FILENAMES=$work/icd.json
-    card && break
+    has_gpu && break
     unset VK_DRIVER_FILES VK_ICD_FILENAMES
   done
 fi
 
-# What is known so far, so that nothing is lost where this is stopped.
+# Writes what is known so far, so that nothing is lost if the script is stopped.
 write() {
   local i
   {
@@ -56,15 +56,15 @@ write() {
     echo "}"
   } > "$out/gpu.json.part" && mv "$out/gpu.json.part" "$out/gpu.json"
 }
-# json NAME FILE: one more member of gpu.json; of a file that is not there, null.
+# json NAME FILE: adds a member to gpu.json; null if the file does not exist.
 members=()
 json() { members+=("\"$1\": $(if [ -s "$2" ]; then cat "$2"; else echo null; fi)"); }
 number() { members+=("\"$1\": ${2:-null}"); }
 quoted() { printf '"%s"' "$(printf '%s' "$1" | tr -d '\000-\037' | sed 's/[\\"]/\\&/g')"; }
-# psnr FILE: of `eval --json`.
+# psnr FILE: prints the PSNR in the output of `eval --json`.
 psnr() { sed -n 's/^ *"psnr": *\([0-9.]*\).*/\1/p' "$1" 2> /dev/null | head -1; }
 step() { write; echo "== $*"; }
-# try NAME COMMAND...: its last line, and its status into gpu.json where it failed.
+# try NAME COMMAND...: prints the last line of its output, and records its status in gpu.json if it failed.
 failed=()
 try() {
   local name=$1 status=0
@@ -75,10 +75,10 @@ try() {
   tail -n 5 "$work/said.txt"
   failed+=("$(quoted "$name: status $status, $(tail -n 1 "$work/said.txt")")")
 }
-case $device in vulkan:*) export TESSERA_GPU=${device#vulkan:} ;; esac  # of the tests
-# By name: hash-2 is `hash` with two levels of features, as in the paper's figures.
+case $device in vulkan:*) export TESSERA_GPU=${device#vulkan:} ;; esac  # for the tests
+# Methods and settings by name: hash-2 is `hash` with two levels of features, as in the paper's figures.
 declare -A method=([volume]=volume [hash]=hash [hash-2]=hash [field]=field)
-declare -A more=([volume]=${VOLUME:-} [hash]=${HASH:-} [hash-2]="--set levels=2 ${HASH:-}" [field]=${FIELD:-})
+declare -A more=([volume]=${VOLUME:-} [hash]=${HASH:-} [hash-2]="--set fine_levels=2 ${HASH:-}" [field]=${FIELD:-})
 city=${CITY:-$here/city}
 read -ra samples <<< "${SAMPLES:-65536 1048576}"
 length=${LENGTH:---minutes $(awk -v s="$seconds" 'BEGIN { print s / 60 }')}
@@ -96,7 +96,7 @@ values() {
 }
 
 compute() {
-  step "rates beside the card's own limits"
+  step "rates beside the GPU's own limits"
   try compute tessera bench compute --device "$device" --samples "${samples[@]}" --streamed "${STREAMED:-1048576}" --json "$work/compute.json"
   json compute "$work/compute.json"
   step "a training step"
@@ -109,7 +109,7 @@ fox() {
   [ -n "${FOX:-}" ] || return
   for name in field hash; do
     step "fox, $name, $length"
-    blocks=$([ "$name" = hash ] && echo "--blocks 1x1 --set surround=border")
+    blocks=$([ "$name" = hash ] && echo "--blocks 1x1 --set background_block=border")
     # shellcheck disable=SC2086
     try "fox $name" tessera train "$FOX" "$work/fox-$name" --method "$name" $blocks $length --device "$device" ${more[$name]}
     try "fox $name" tessera eval "$work/fox-$name" "$FOX" --device "$device" --json "$work/fox-$name.json"
@@ -124,9 +124,9 @@ cities() {
     key=city_${name//-/_}
     # shellcheck disable=SC2086
     try "$name" tessera train "$city" "$work/$name" --method "${method[$name]}" --blocks 2x2 $length --device "$device" \
-      --set level_share=0 ${more[$name]}
-    # A driver for the processor takes an hour for it.
-    try "$name" tessera bake "$work/$name" "$work/$name.scene" --capture "$city" --device "$(card && echo "$device" || echo cpu)"
+      --set lod_step_fraction=0 ${more[$name]}
+    # Baking with a Vulkan driver for the CPU would take an hour.
+    try "$name" tessera bake "$work/$name" "$work/$name.scene" --capture "$city" --device "$(has_gpu && echo "$device" || echo cpu)"
     try "$name" tessera eval "$work/$name.scene" "$city" --device "$device" --json "$work/$name.json"
     number "${key}_psnr" "$(psnr "$work/$name.json")"
     try "$name" tessera bench frames "$work/$name.scene" --views "$city" --device "$device" --size "$size" --json "$work/$name-frames.json"
@@ -136,8 +136,8 @@ cities() {
 
 {
   tessera info devices
-  card || echo "NO CARD: what follows is of a driver for the processor"
-  members+=("\"is_card\": $(card && echo true || echo false)")
+  has_gpu || echo "NO GPU: what follows was measured with a Vulkan driver for the CPU"
+  members+=("\"is_gpu\": $(has_gpu && echo true || echo false)")
   members+=("\"libraries\": $(quoted "$libraries")")
   members+=("\"commit\": $(quoted "$(cat "$here/commit")")" "\"machine\": $(quoted "$(uname -srm)")"
     "\"processor\": $(quoted "$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1)")"

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# NGP-RT's models (`--method hash`) on the processor: hand-held photographs (fox at 270x480) and a made city of 2x2 blocks.
+# NGP-RT's models (`--method hash`) on the CPU: hand-held photographs (fox at 270x480) and a synthetic city of 2x2 blocks.
 #   photographs  ten minutes on fox, and ten of `field`: at most 1 dB below it
-#   scene        what fox's model becomes: held-out PSNR, size, points of rays with and without the distances, frames per
-#                second beside `field`
-#   ablation     the paper's table 3, equal steps, held-out PSNR of seeds: attention (separate, from place to place) against
+#   scene        the scene baked from fox's model: held-out PSNR, size, samples per ray with and without the distance grids,
+#                frames per second beside `field`
+#   ablation     the paper's table 3 with equal steps, held-out PSNR over seeds: attention (separate, varying in space) against
 #                the sum of levels and against a network for each sample; multiply-accumulates of each
-#   distortion   the weight of the distortion loss that `auto` finds out, against three that are given
-#   browser      ten held-out views of fox's scene and of the city's in Debian's Chromium, against the renderer on the processor
-# Resumable: all is kept in build/bench/hash, and what is there is not made again.
+#   distortion   the weight of the distortion loss that `auto` determines, against three given ones
+#   browser      ten held-out views of the scenes of fox and the city in Debian's Chromium, against the renderer on the CPU
+# Resumable: everything is kept in build/bench/hash, and what exists is not made again.
 #   TESSERA_SHARED_DATA=DIR [ROWS="photographs scene ablation distortion browser"] [SEEDS="1 2 3"] [STEPS=1500] [MINUTES=10] bench/hash.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
@@ -21,8 +21,8 @@ settings "STEPS=$steps MINUTES=$minutes"
 [ -e "$work/fox/transforms.json" ] || "$tessera" import "$data/fox" "$work/fox" --downscale 2 --holdout every:8
 [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2 --size 400x300
 
-# One unbounded block, as in the paper, about photographs from all around; four and their surround in the city.
-declare -A blocks=([fox]="--blocks 1x1 --set surround=border" [city]="--blocks 2x2")
+# One unbounded block, as in the paper, for photographs from all around; four and a background block in the city.
+declare -A blocks=([fox]="--blocks 1x1 --set background_block=border" [city]="--blocks 2x2")
 
 photographs() {
   trained fox-hash fox --method hash ${blocks[fox]} --minutes "$minutes"
@@ -33,7 +33,7 @@ photographs() {
   verdict "hash less field at equal time, held-out PSNR in dB" "$(shortfall "$hash" "$field")" '>=' -1
 }
 
-# jq's EXPRESSION of what a bench of the scene said.
+# said FILE EXPRESSION: evaluates a jq expression on the output of a benchmark of the scene.
 said() { jq -r "$2" "$work/$1.json"; }
 
 scene() {
@@ -65,7 +65,7 @@ scene() {
 
 arithmetic() { "$tessera" info "$work/$1" --json | jq .multiply_accumulates_per_sample; }
 
-# gain CAPTURE ONE OTHER: of seeds, mean and the ends of its 95 % interval.
+# gain CAPTURE ONE OTHER: prints the mean over seeds and the ends of its 95 % interval.
 gain() {
   local seed gains=""
   for seed in $seeds; do
@@ -81,7 +81,7 @@ ablation() {
     for seed in $seeds; do
       for way in attention sum mlp; do
         trained "$capture-$way-$seed" "$capture" --method hash ${blocks[$capture]} ${ways[$way]} --steps "$steps" \
-          --seed "$seed" --set level_share=0
+          --seed "$seed" --set lod_step_fraction=0
         echo "$capture, $way, seed $seed: $(judged "$capture-$way-$seed" "$capture") dB"
       done
     done
@@ -106,13 +106,13 @@ distortion() {
   local capture file weight best
   for capture in fox city; do
     file=$work/$capture-auto/distortion.json
-    trained "$capture-auto" "$capture" --method hash ${blocks[$capture]} --set distortion=auto --steps "$steps" --set level_share=0
+    trained "$capture-auto" "$capture" --method hash ${blocks[$capture]} --set distortion_weight=auto --steps "$steps" --set lod_step_fraction=0
     echo "$capture: $(judged "$capture-auto" "$capture") dB with distortion=$(jq .chosen "$file"); after" \
       "$(jq -r '"\(.steps) steps " + ([.probes[] | "\(.distortion): \(if .psnr then .psnr * 100 | round / 100 else "no" end) dB"] | join(", "))' "$file")"
     best=0
     for weight in 0.001 0.01 0.03; do
-      trained "$capture-distortion-$weight" "$capture" --method hash ${blocks[$capture]} --set distortion="$weight" --steps "$steps" \
-        --set level_share=0
+      trained "$capture-distortion-$weight" "$capture" --method hash ${blocks[$capture]} --set distortion_weight="$weight" --steps "$steps" \
+        --set lod_step_fraction=0
       echo "$capture, $weight: $(judged "$capture-distortion-$weight" "$capture") dB"
       best=$(jq "[.psnr, $best] | max" "$work/$capture-distortion-$weight.json")
     done
@@ -124,7 +124,7 @@ distortion() {
 browser() {
   trained fox-hash fox --method hash ${blocks[fox]} --minutes "$minutes"
   baked fox-hash fox.scene fox
-  trained city-attention-1 city --method hash ${blocks[city]} --set aggregation=attention --steps "$steps" --seed 1 --set level_share=0
+  trained city-attention-1 city --method hash ${blocks[city]} --set aggregation=attention --steps "$steps" --seed 1 --set lod_step_fraction=0
   baked city-attention-1 city.scene city
   tools/install-debian-packages.sh --browser
   tools/build-web.sh

@@ -1,7 +1,7 @@
-// The training step of `tessera bench train`, put together from libtorch's CPU operations the way a careful user would:
-// the same model (hash grid 16 x 2, T = 2^17; density 32-64-16; colour 32-64-64-3; harmonics of degree 4), the same
-// batch shape (2048 rays of 32 samples), Huber, backward, Adam. Indices and trilinear weights are made without
-// autograd. The sum over a cell's corners is tried in three ways; the fastest counts.
+// The training step of `tessera bench train`, composed of libtorch's CPU operations the way a careful user would: the
+// same model (hash grid 16 x 2, T = 2^17; density 32-64-16; colour 32-64-64-3; spherical harmonics of degree 4), the
+// same batch shape (2048 rays of 32 samples), Huber loss, backward pass, Adam. Indices and trilinear weights are
+// computed without autograd. The sum over a cell's corners is implemented in three ways, of which the fastest counts.
 //
 //   libtorch_step [seconds per variant]
 
@@ -42,16 +42,17 @@ std::vector<Level> makeLevels() {
   int64_t first = 0;
   for (int l = 0; l < kLevels; ++l) {
     const double scale = kBase * std::pow(growth, l) - 1;
-    const int64_t resolution = static_cast<int64_t>(std::ceil(scale - 1e-6)) + 1, most = int64_t{1} << kLog2Entries;
+    const int64_t resolution = static_cast<int64_t>(std::ceil(scale - 1e-6)) + 1, maximum = int64_t{1} << kLog2Entries;
     const int64_t dense = (resolution * resolution * resolution + 7) / 8 * 8;
-    levels.push_back({static_cast<float>(scale), resolution, std::min(dense, most), first, dense > most});
+    levels.push_back({static_cast<float>(scale), resolution, std::min(dense, maximum), first, dense > maximum});
     first += levels.back().entries;
   }
   return levels;
 }
 
-// [samples, 8] entries of the table of all levels, and trilinear weights. int32 wraps as the hash wants it to.
-void cornersOf(const Level& level, const Tensor& positions, Tensor& index, Tensor& weight) {
+// Computes indices [samples, 8] into the table of all levels, and trilinear weights. int32 wraps around as the hash
+// requires.
+void findCorners(const Level& level, const Tensor& positions, Tensor& index, Tensor& weight) {
   const Tensor at = positions * level.scale + 0.5f, floor = at.floor(), t = at - floor, cell = floor.to(torch::kInt);
   const int32_t primeY = level.hashed ? static_cast<int32_t>(2654435761u) : static_cast<int32_t>(level.resolution);
   const int32_t primeZ = level.hashed ? 805459861 : static_cast<int32_t>(level.resolution * level.resolution);
@@ -120,7 +121,7 @@ class Step {
   double run() {
     {
       const torch::NoGradGuard noGrad;
-      for (int l = 0; l < kLevels; ++l) cornersOf(levels_[l], positions_, indices_[l], corners_[l]);
+      for (int l = 0; l < kLevels; ++l) findCorners(levels_[l], positions_, indices_[l], corners_[l]);
     }
     std::vector<Tensor> encoded;
     for (int l = 0; l < kLevels; ++l) encoded.push_back(mix(indices_[l], corners_[l]));
@@ -179,9 +180,10 @@ int main(int argc, char** argv) {
   at::set_num_threads(2);
   using CoreName = char* (*)();
   const auto coreName = reinterpret_cast<CoreName>(dlsym(RTLD_DEFAULT, "openblas_get_corename"));
-  const char* wanted = std::getenv("OPENBLAS_CORETYPE");
+  const char* requested = std::getenv("OPENBLAS_CORETYPE");
   std::printf("libtorch %s, %d threads, BLAS %s, OPENBLAS_CORETYPE %s\n", TORCH_VERSION, at::get_num_threads(),
-              coreName ? (std::string("OpenBLAS ") + coreName()).c_str() : "not OpenBLAS", wanted ? wanted : "not set");
+              coreName ? (std::string("OpenBLAS ") + coreName()).c_str() : "not OpenBLAS",
+              requested ? requested : "not set");
   std::printf("gemm 1024x1024x1024      %7.1f GFLOP/s\n", gemmRate(1024, 1024, 1024) / 1e9);
   std::printf("gemm 65536x64x64         %7.1f GFLOP/s\n", gemmRate(65536, 64, 64) / 1e9);
   double bestRate = 0;

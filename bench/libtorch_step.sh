@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# The training step beside the same step from libtorch's CPU operations (Debian: libtorch-dev, libopenblas0-pthread), both
-# with two threads; fails below a ratio of 8. OpenBLAS is tried as OPENBLAS_CORETYPE says and as it chooses itself, and
-# libtorch counts with the best of all its variants.
+# The training step beside the same step from libtorch's CPU operations (Debian: libtorch-dev, libopenblas0-pthread), both with two
+# threads; fails below a ratio of 8. OpenBLAS is tried both with OPENBLAS_CORETYPE and with its own choice, and the best of all of
+# libtorch's variants counts.
 #   [SECONDS_EACH=4] bench/libtorch_step.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# A frame of the viewer against one of MERF's own, both in Debian's Chromium by Mesa's OpenGL on the processor: one block of
-# a city, trained, baked and exported for it, from twenty pinholes at 480x270. Resumable, as volume.sh is; pictures of both
-# lie in build/bench/merf_viewer/pictures. MERF_VIEWER is the folder merf/webviewer of google-research, with what its README
-# says to download into third_party.
+# Compares frames of our viewer with those of MERF's own, both in Debian's Chromium with Mesa's OpenGL on the CPU: one block of a
+# city is trained, baked and exported for it, and rendered from twenty pinhole cameras at 480x270. Resumable, as volume.sh is;
+# images of both are in build/bench/merf_viewer/pictures. MERF_VIEWER is the folder merf/webviewer of google-research, with the
+# downloads in third_party that its README lists.
 #   MERF_VIEWER=DIR [MINUTES=10] bench/merf_viewer.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
@@ -20,7 +20,7 @@ work=$out/merf_viewer
 minutes=${MINUTES:-10}
 settings "MINUTES=$minutes"
 [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
-trained model city --method volume --blocks 1x1 --set surround=border --minutes "$minutes"
+trained model city --method volume --blocks 1x1 --set background_block=border --minutes "$minutes"
 baked model scene city
 MERF_NEAR=$("$tessera" export "$work/scene" "$work/export" --format merf --json | jq .near)
 TESSERA=$(realpath "$tessera")

@@ -1,6 +1,6 @@
-// merge_blocks JOINT OUT APART...: a `volume` model whose block k is that of the k-th APART, a model of this one block
-// and its own surround, and whose surround is JOINT's. What blocks that know nothing of each other come to; see
-// consistency.sh. Exposures, which belong to photos, are left out.
+// merge_blocks JOINT OUT APART...: writes a `volume` model whose block k is that of the k-th APART, a model of this one
+// block and a background block of its own; the background block is JOINT's. It shows the result of training blocks
+// independently of each other; see consistency.sh. Exposures, which belong to photos, are left out.
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -12,23 +12,23 @@
 namespace tessera {
 namespace {
 
-// Throws Error unless `apart` is cell `cell` of the joint model, with the same settings but for how many rays and
-// points a step has: local coordinates must mean the same.
+// Throws Error unless `apart` is cell `cell` of the joint model and has the same settings, except for the numbers of
+// rays and points of a step: local coordinates must have the same meaning.
 void requireCell(const fs::path& folder, VolumeModel& apart, VolumeModel& joint, int cell) {
   const auto refuse = [&](const char* file, const std::string& why) {
     throw Error((folder / file).string(), "", why, "train it with --grid and the settings of the joint model");
   };
-  const BlockGrid &is = apart.grid(), &wanted = joint.grid();
-  const double tolerance = 1e-9 * wanted.edge;
-  const Vec2d centre = wanted.centre(cell);
-  const Vec3d off = is.originInWorld - wanted.inWorld({centre.x(), centre.y(), 0});
-  if (is.cells() != 1 || !(off.norm() <= tolerance) || is.gridFromWorld != wanted.gridFromWorld ||
-      is.edge != wanted.edge || is.bottom != wanted.bottom || is.top != wanted.top) {
+  const BlockGrid &is = apart.grid(), &requested = joint.grid();
+  const double tolerance = 1e-9 * requested.edge;
+  const Vec2d centre = requested.centre(cell);
+  const Vec3d off = is.originInWorld - requested.inWorld({centre.x(), centre.y(), 0});
+  if (is.cells() != 1 || !(off.norm() <= tolerance) || is.gridFromWorld != requested.gridFromWorld ||
+      is.edge != requested.edge || is.bottom != requested.bottom || is.top != requested.top) {
     refuse("blocks.json", "is not block " + std::to_string(cell) + " alone");
   }
   VolumeConfig has = apart.config(), wants = joint.config();
   has.firstRays = wants.firstRays;
-  has.mostRays = wants.mostRays;
+  has.maxRays = wants.maxRays;
   has.texelsPerStep = wants.texelsPerStep;
   has.sparsityPoints = wants.sparsityPoints;
   has.blocksOnly = wants.blocksOnly;

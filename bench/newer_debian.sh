@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Builds and tests tessera on a newer Debian, in a folder of its own: newer compilers, libraries and Mesa. From Debian 13 on glslang
-# and Vulkan's headers know VK_KHR_cooperative_matrix; of Mesa's drivers for the processor that of sid (26.2) has it.
+# Builds and tests tessera on a newer Debian in a chroot: newer compilers, libraries and Mesa. From Debian 13 on, glslang and
+# Vulkan's headers support VK_KHR_cooperative_matrix; of Mesa's drivers for the CPU, that of sid (26.2) does.
 #   [SUITE=trixie] [MIRROR=http://deb.debian.org/debian] [TARGETS=all] [TESTS=REGEX] bench/newer_debian.sh
-# As root, with debootstrap installed; wants 6 GB under build/bench.
+# Needs root, debootstrap, and 6 GB in build/bench.
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 suite=${SUITE:-trixie}
@@ -16,7 +16,7 @@ if [ ! -e "$root/made" ]; then
 fi
 mkdir -p "$root/tessera" "$root/build" "$root/data"
 
-# What is mounted is seen by nothing but this, and gone with it.
+# The mounts are private to this process and disappear with it.
 export TARGETS=${TARGETS:-all} TESTS=${TESTS:-.} root
 unshare --mount --propagation private bash -euo pipefail -c '
   mount --bind . "$root/tessera"

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Training with memory for a quarter of the decoded photos, beside one without a limit and one on a single photo: memory
-# above the one-photo run within the budget + 20 %, steps per second within 15 % and held-out PSNR within 0.2 dB of the
-# unlimited run. The single photo is the same capture imported again with every other photo held out, so that all else
-# that takes memory is the same.
+# Training with memory for a quarter of the decoded photos, beside one run without a limit and one on a single photo: memory above
+# the one-photo run within the budget + 20 %, steps per second within 15 % and held-out PSNR within 0.2 dB of the unlimited run. The
+# single photo is the same capture imported again with every other photo held out, so that everything else that takes memory is the
+# same.
 #   [STEPS=2000] bench/photo_budget.sh [CAPTURE]     default: a city of 48 photos at 1200x900, made here (a few minutes)
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
@@ -13,7 +13,7 @@ trap 'rm -rf "$work"' EXIT
 capture=${1:-$work/city}
 [ -e "$capture" ] || "$tessera" synth city "$capture" --blocks 1x1 --photos 48 --size 1200x900 --samples 2
 
-# Names of all photos but the first of those that are trained on.
+# The names of all training photos except the first.
 jq -r '(.test_filenames // []) as $test | [.frames[].file_path] | (map(select(. as $f | $test | index([$f]) | not))[0]) as $kept
        | .[] | select(. != $kept)' "$capture/transforms.json" > "$work/held_out.txt"
 "$tessera" import "$capture" "$work/single" --holdout "list:$work/held_out.txt"
@@ -26,7 +26,7 @@ decoded=$(jq --argjson masks "$masks" '.train * .cameras[0].width * .cameras[0].
 budget=$(awk -v d="$decoded" 'BEGIN { printf "%.3f", d / 4 / 1048576 }')
 echo "decoded training photos: $(awk -v d="$decoded" 'BEGIN { printf "%.1f", d / 1048576 }') MiB, budget $budget MiB"
 
-# run NAME CAPTURE [FLAGS]: trains; peak memory in MiB and the median pace of the second half go to NAME.json.
+# run NAME CAPTURE [FLAGS]: trains; writes the peak memory in MiB and the median speed of the second half to NAME.json.
 run() {
   local name=$1 from=$2
   shift 2

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Times ./quickstart.sh --no-serve with packages installed and everything built: at most 8 minutes, held-out PSNR of at
-# least 24 dB, report written.
+# Times ./quickstart.sh --no-serve with packages installed and everything built: at most 8 minutes, held-out PSNR of at least 24 dB,
+# and a report must be written.
 #   bench/quickstart.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
-rm -rf out/quickstart  # else it would go on with the model that is there
+rm -rf out/quickstart  # otherwise it would resume the existing model
 started=$(date +%s)
 ./quickstart.sh --no-serve 2>&1 | tee "$out/quickstart.txt"
 seconds=$(($(date +%s) - started))

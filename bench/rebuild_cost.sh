@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
-# How many objects are compiled anew when an operation's header changes, of all that a build has: those that include it,
-# directly or not, as the compiler found. A new operation in a header of its own costs its users, the devices' tables and
-# the op test.
-# Of the preset dev, which compiles each source by itself; in release up to eight are joined, and a header costs groups.
+# How many of a build's objects are recompiled when an operation's header changes: those that include it, directly or not, according
+# to the compiler. A new operation in a header of its own costs its users, the devices' tables and the op test. Measured in the
+# preset dev, which compiles each source separately; in release up to eight are joined, and a header costs whole groups.
 #   bench/rebuild_cost.sh [BUILD_FOLDER [HEADER...]]     default: build/dev, which is built in full; all operations
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -1,7 +1,8 @@
-"""Compares what same_bytes.sh has made of two commits, in two folders: one line a comparison, status 1 if any differs.
+"""Compares the results of same_bytes.sh for two commits, in two folders: one line per comparison, status 1 if any differs.
 
-Checkpoints, tiles and all else that is baked: byte for byte. config.toml: without its comments. Golden scenes: what
-buffer views hold, and JSON but for the names and lengths of files.
+Checkpoints are compared byte for byte, config.toml without its comments. Tiles are compared by the contents of buffer views and
+by JSON without the names and lengths of files: names contain a digest of the bytes. Keys that were renamed
+(src/base/former_settings.cpp) count as the same.
 """
 import json
 import re
@@ -11,6 +12,7 @@ from pathlib import Path
 
 before, after = Path(sys.argv[1]), Path(sys.argv[2])
 failures = 0
+renamed = dict(re.findall(r'{"(\w+)", "(\w+)"}', Path("src/base/former_settings.cpp").read_text()))
 
 
 def verdict(name, same, what):
@@ -20,21 +22,32 @@ def verdict(name, same, what):
 
 
 def settings(path):
-    return [re.sub(r"\s+# .*", "", line) for line in path.read_text().splitlines() if not line.startswith("#")]
+    """Returns the lines `key = value` with the current names of settings."""
+    lines = [re.sub(r"\s+# .*", "", line) for line in path.read_text().splitlines() if not line.startswith("#")]
+    return [re.sub(r"^\w+", lambda key: renamed.get(key[0], key[0]), line) for line in lines]
 
 
 def same_file(a, b):
     if a.name == "config.toml":
         return settings(a) == settings(b)
+    if a.suffix == ".glb":
+        return glb(a) == glb(b)
+    if a.suffix == ".json":
+        return neutral(json.loads(a.read_text())) == neutral(json.loads(b.read_text()))
     return a.read_bytes() == b.read_bytes()
 
 
+def current_name(path):
+    """Returns a file's name without the digest of its bytes."""
+    return re.sub(r"-[0-9a-f]{16}(?=\.\w+$)", "", str(path)).replace("surround", "background_block")
+
+
 def compare(name, pattern, what):
-    files = [{p.relative_to(side / name) for p in (side / name).glob(pattern)} for side in (before, after)]
+    files = [{current_name(p.relative_to(side / name)): p for p in (side / name).glob(pattern)} for side in (before, after)]
     if not files[0] and not files[1]:
         return
-    missing = files[0] ^ files[1]
-    different = [p for p in files[0] & files[1] if not same_file(before / name / p, after / name / p)]
+    missing = files[0].keys() ^ files[1].keys()
+    different = [p for p in files[0].keys() & files[1].keys() if not same_file(files[0][p], files[1][p])]
     for path in sorted(missing):
         print(f"  {name}/{path}: only {'before' if path in files[0] else 'after'}")
     for path in sorted(different):
@@ -43,16 +56,17 @@ def compare(name, pattern, what):
 
 
 def neutral(value):
-    """JSON without the names and the lengths of files."""
+    """Returns the JSON without the names and the lengths of files."""
     if isinstance(value, dict):
-        return {k: neutral(v) for k, v in value.items() if k not in ("uri", "byteLength", "byteOffset", "bytes")}
+        names = ("uri", "byteLength", "byteOffset", "bytes")
+        return {"background_block" if k == "surround" else k: neutral(v) for k, v in value.items() if k not in names}
     if isinstance(value, list):
         return [neutral(v) for v in value]
     return value
 
 
 def glb(path):
-    """JSON and what its buffer views hold."""
+    """Returns the JSON and the contents of its buffer views."""
     data = path.read_bytes()
     length = struct.unpack_from("<I", data, 12)[0]
     content = json.loads(data[20 : 20 + length])
@@ -65,7 +79,7 @@ def golden(scene):
     sides = []
     for side in (before, after):
         root = side / "golden/tests/golden" / scene
-        tiles = {re.sub(r"-[0-9a-f]{16}(?=\.glb$)", "", str(p.relative_to(root))): glb(p) for p in root.rglob("*.glb")}
+        tiles = {current_name(p.relative_to(root)): glb(p) for p in root.rglob("*.glb")}
         sides.append((tiles, {p.name: neutral(json.loads(p.read_text())) for p in sorted(root.glob("*.json"))}))
     (tiles, texts), (others, otherTexts) = sides
     verdict(f"golden {scene}", tiles.keys() == others.keys() and len(tiles) > 0, f"names of {len(tiles)} tiles")

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# A change of structure changes no bytes: on a made city of 2x2 blocks, two commits train the same models with each
-# method, and bake the same scenes, byte for byte; their golden scenes hold the same numbers. One line a comparison.
+# Tests that a refactoring changes no bytes: on a synthetic city of 2x2 blocks, two commits train the same models with each method
+# and bake the same scenes, byte for byte; their golden scenes hold the same numbers. Prints one line for each comparison.
 #   [STEPS=300] [METHODS="field volume hash"] bench/same_bytes.sh BEFORE_COMMIT [AFTER_COMMIT=HEAD]
-# BEFORE_PROGRAM and AFTER_PROGRAM name programs that are built already, as of those commits; else both are built.
-# KEEP names a folder that keeps what was made; what the first commit made there is not made again. What settings mean is
-# said in comments of config.toml, which may differ.
+# BEFORE_PROGRAM and AFTER_PROGRAM name programs that are already built from those commits; otherwise both are built. KEEP names a
+# folder that keeps the results; what the first commit made there is not made again. Help texts in the comments of config.toml may
+# differ.
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 before=${1:?usage: bench/same_bytes.sh BEFORE_COMMIT [AFTER_COMMIT]} after=${2:-HEAD}
@@ -20,7 +20,7 @@ leave() {
 }
 trap leave EXIT
 
-# program NAME COMMIT GIVEN: where it is.
+# program NAME COMMIT GIVEN: prints the program's path.
 program() {
   if [ -n "$3" ]; then
     realpath "$3"
@@ -42,7 +42,7 @@ programAfter=$(program after "$after" "${AFTER_PROGRAM:-}")
 [ -e "$work/city/transforms.json" ] ||
   "$programBefore" synth city "$work/city" --blocks 2x2 --photos 24 --size 160x120 --samples 2 --traffic
 
-# run SIDE PROGRAM: all models and scenes. Both sides are made in the folder `run`, as files may name their own.
+# run SIDE PROGRAM: makes all models and scenes. Both sides work in the folder `run`, because files may contain their own path.
 run() {
   rm -rf "$work/run" "${work:?}/$1"
   mkdir "$work/run"
@@ -56,7 +56,7 @@ run() {
   local program=$2 method
   for method in $methods; do
     case $method in
-      field) train field --method field --set samples_per_step=8192 --set samples_per_pass=2048 ;;
+      field) train field --method field --set samples_per_step=8192 --set samples_per_micro_batch=2048 ;;
       volume)
         train volume --method volume --blocks 2x2 --set texels_per_step=131072
         bake volume

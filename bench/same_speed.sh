@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# A change of structure costs no speed: two programs train and draw in turn, in one run, and so do two builds of the viewer
-# where they are named. Prints the ratios of each pair (after / before) and fails where the best of the one is below 0.97 of
-# the best of the other: whatever else a machine does only ever slows them.
+# Tests that a refactoring costs no speed: two programs train and render alternately in one run, and so do two builds of the viewer
+# if they are named. Prints the ratios of each pair (after / before) and fails if the best of one is below 0.97 of the best of the
+# other: disturbances on a machine can only slow a program down.
 #   BEFORE_PROGRAM=... AFTER_PROGRAM=... [BEFORE_VIEWER=... AFTER_VIEWER=...] [ROUNDS=9] [STEPS=120] [ROWS="..."] \
 #     bench/same_speed.sh FOLDER
-# FOLDER is what bench/same_bytes.sh kept (KEEP): its city, and the scenes that the first program baked of it. Viewers are
-# what tools/build-web.sh makes (web/dist) of each commit. ROWS: train_field, train_volume, ... instead of all.
+# FOLDER is what bench/same_bytes.sh kept (KEEP): its city, and the scenes that the first program baked from it. Viewers are what
+# tools/build-web.sh makes (web/dist) from each commit. ROWS: train_field, train_volume, ... instead of all.
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 folder=$(cd "${1:?usage: bench/same_speed.sh FOLDER}" && pwd)
@@ -14,7 +14,7 @@ before=$(realpath "${BEFORE_PROGRAM:?}") after=$(realpath "${AFTER_PROGRAM:?}")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# Steps a second of a training, as its last line has it.
+# Prints the steps per second of a training run, from its last line.
 train() {
   local program=$1 method=$2
   shift 2
@@ -25,9 +25,9 @@ train() {
   seconds=$(grep -o '"seconds": [0-9.]*' <<< "$json" | grep -o '[0-9.]*$')
   awk -v s="$steps" -v t="$seconds" 'BEGIN { print s / t }'
 }
-train_field() { train "$1" field --set samples_per_step=8192 --set samples_per_pass=2048; }
-train_volume() { train "$1" volume --blocks 2x2 --set level_share=0 --set texels_per_step=131072; }
-train_hash() { train "$1" hash --blocks 2x2 --set level_share=0 --set samples_per_step=16384; }
+train_field() { train "$1" field --set samples_per_step=8192 --set samples_per_micro_batch=2048; }
+train_volume() { train "$1" volume --blocks 2x2 --set lod_step_fraction=0 --set texels_per_step=131072; }
+train_hash() { train "$1" hash --blocks 2x2 --set lod_step_fraction=0 --set samples_per_step=16384; }
 
 frames() {
   alone "$1" bench frames "$folder/before/$2.scene" --views "$folder/city" --size 320x240 --seconds 4 --device cpu --json - \
@@ -39,7 +39,7 @@ frames_hash() { frames "$1" hash; }
 for what in ${ROWS-train_field train_volume train_hash frames_volume frames_hash}; do
   ratios=() allBefore=() allAfter=() was="" is=""
   for ((round = 0; round < rounds; ++round)); do
-    # Whoever comes first may find the machine colder: they take turns.
+    # They take turns at being first, because the machine may be colder then.
     if ((round % 2 == 0)); then
       was=$($what "$before") is=$($what "$after")
     else

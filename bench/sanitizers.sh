@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The whole test suite under AddressSanitizer with UBSan, and under ThreadSanitizer.
+# Runs the whole test suite under AddressSanitizer with UBSan, and under ThreadSanitizer.
 #   bench/sanitizers.sh [PRESET ...]     default: asan tsan
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"

@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
-# `tessera serve` among clients that mean harm: paths that lead outside, requests that are none, 500 clients that stall
-# in five ways, twice; an honest one meanwhile.
+# `tessera serve` under attack: paths that lead outside, malformed requests, 500 clients that stall in five ways, twice; meanwhile a
+# well-behaved client is served.
 #   bench/server.sh [SECONDS]
-# A client may cost the server a piece of a file of 64 KiB and 16 KiB of headers, both ways: 500 of them 40 MiB. It may
-# cost the system 128 KiB that are not sent yet, with what that takes beside and what is on its way 256 KiB: 125 MiB.
+# Each client may cost the server one 64 KiB piece of a file and 16 KiB of headers in both directions: 40 MiB for 500 clients. It
+# may cost the system 128 KiB of unsent data, or 256 KiB with overhead and data in flight: 125 MiB.
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
 work=$(mktemp -d)
 server= first=()
-chrt -r 1 true 2> /dev/null && first=(chrt -r 1)  # as `alone`, whose process would be another
+chrt -r 1 true 2> /dev/null && first=(chrt -r 1)  # like `alone`, which would start another process
 trap '[ -z "$server" ] || kill "$server" 2> /dev/null; rm -rf "$work"' EXIT
 secret=secret-$RANDOM$RANDOM$RANDOM
 cp -r tests/golden/volume "$work/scene"

@@ -1,6 +1,6 @@
-# What server.sh sends to a server, and what came of it, as JSON. Python 3.11 and its standard library.
+# The requests that server.sh sends to a server, and their results as JSON. Python 3.11 and its standard library.
 #   server_clients.py PORT PID FOLDER SECRET SECONDS
-# The server serves FOLDER/scene, and FOLDER/viewer at its root. SECRET is text that no answer may hold.
+# The server serves FOLDER/scene, and FOLDER/viewer at its root. SECRET is text that no response may contain.
 import itertools
 import json
 import multiprocessing
@@ -30,7 +30,7 @@ def request(target, more=b"Connection: close\r\n", method=b"GET"):
 
 
 def exchange(sent, half_close=False, timeout=10.0):
-    """All that the server answers until it closes, or has said nothing for so long."""
+    """Returns all that the server answers until it closes the connection or sends nothing for `timeout` seconds."""
     answer = bytearray()
     with connect(timeout) as one:
         try:
@@ -56,7 +56,7 @@ def resident_mib():
 
 
 def system_mib():
-    """What the system holds for TCP, of all processes."""
+    """Returns the MiB that the system uses for TCP, over all processes."""
     for line in open("/proc/net/sockstat"):
         if line.startswith("TCP:"):
             return int(line.split()[-1]) * resource.getpagesize() / (1 << 20)
@@ -68,7 +68,7 @@ def descriptors():
 
 
 def paths_outside():
-    """Targets of which none is a file of the site."""
+    """Returns request targets, none of which is a file of the site."""
     dots = ["..", "%2e%2e", ".%2E", "%252e%252e", "%c0%ae%c0%ae", "%e0%80%ae%e0%80%ae", "%uff0e%uff0e", "\uff0e\uff0e",
             "..;", "...", "..%00", "..%20", "..%0d%0a", "\x01..", "%%32e%%32e"]
     slashes = ["/", "%2f", "%252f", "%c0%af", "%5c", "\\", "//", "/./", "%c1%9c", "\u2215"]
@@ -127,9 +127,9 @@ def traversal():
 
 
 def honest(ended, report):
-    """Fetches on fresh connections until told to end; the longest time from connecting to the last byte."""
+    """Fetches on new connections until told to end; reports the longest time from connecting to the last byte."""
     tiles = sorted((FOLDER / "scene").rglob("*.glb"), key=lambda path: path.stat().st_size)
-    wanted = [FOLDER / "scene/tileset.json", *tiles[-2:]]  # the scene's largest, and large.glb
+    wanted = [FOLDER / "scene/tileset.json", *tiles[-2:]]  # the largest files of the scene, and large.glb
     pairs = [(request("/" + str(path.relative_to(FOLDER))), path.read_bytes()) for path in wanted]
     longest, fetches, wrong = 0.0, 0, 0
     while not ended.is_set():
@@ -147,7 +147,7 @@ def honest(ended, report):
 
 
 class Stalled:
-    """A client of one of five kinds, and again where the server closes it."""
+    """A stalling client of one of five kinds; it reconnects if the server closes the connection."""
 
     def __init__(self, kind):
         self.kind, self.socket = kind, None
@@ -172,7 +172,7 @@ class Stalled:
             self.socket.close()
 
     def is_held(self):
-        """Whether the server has not closed it."""
+        """Returns whether the server keeps the connection open."""
         waiting = select.poll()
         waiting.register(self.socket, select.POLLRDHUP)
         return not waiting.poll(0)
@@ -180,7 +180,7 @@ class Stalled:
     def turn(self):
         try:
             if self.kind == 2:
-                self.socket.send(bytes([next(self.left)]))  # one byte of its headers
+                self.socket.send(bytes([next(self.left)]))  # one byte of the headers
             if self.kind == 3:
                 return  # never reads
             if self.socket.recv(1) == b"":  # of kind 4, one byte of the file
@@ -198,10 +198,10 @@ def storm():
     client = multiprocessing.Process(target=honest, args=(ended, report))
     client.start()
     clients = [Stalled(i % 5) for i in range(STALLED)]
-    end, most, most_system, held = time.monotonic() + SECONDS, 0.0, 0.0, []
+    end, most, max_system, held = time.monotonic() + SECONDS, 0.0, 0.0, []
     while time.monotonic() < end:
         time.sleep(0.25)
-        most, most_system = max(most, resident_mib()), max(most_system, system_mib())
+        most, max_system = max(most, resident_mib()), max(max_system, system_mib())
         held.append(sum(one.is_held() for one in clients))
         for one in clients:
             one.turn()
@@ -210,12 +210,12 @@ def storm():
     client.join()
     for one in clients:
         one.close()
-    return figures | {"growth_mib": round(most - before, 1), "system_mib": round(most_system - system_before, 1),
+    return figures | {"growth_mib": round(most - before, 1), "system_mib": round(max_system - system_before, 1),
                       "stalled": sum(held) // len(held)}
 
 
 def garbage():
-    """Requests cut off everywhere, with bytes changed, and bytes at random."""
+    """Returns requests truncated at every position, requests with changed bytes, and random bytes."""
     chance = random.Random(1)
     good = [request("/scene/tileset.json", b"Range: bytes=0-10\r\nIf-None-Match: \"a\"\r\nAccept-Encoding: gzip\r\n"),
             request("/", b"Content-Length: 5\r\nConnection: close\r\n") + b"hello",
@@ -233,7 +233,7 @@ def garbage():
     for one in sent:
         if chance.random() < 0.3:
             with connect() as client:
-                client.sendall(one)  # and gone
+                client.sendall(one)  # and disconnects
             continue
         answer = exchange(one, half_close=True)
         bad += (answer != b"" and not 200 <= status_of(answer) < 500) or SECRET in answer
@@ -241,7 +241,7 @@ def garbage():
 
 
 def quiet():
-    """Waits until the server has let go of all connections, and says how much it then holds."""
+    """Waits until the server has closed all connections, and returns how much memory it then uses."""
     end = time.monotonic() + 30
     while descriptors() > idle and time.monotonic() < end:
         time.sleep(0.1)

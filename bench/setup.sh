@@ -1,5 +1,5 @@
-# Sourced by the scripts of this folder, which run from the repository's root: where things are, and what several share.
-# TESSERA overrides the binary; TESSERA_SHARED_DATA names the folder of photographs.
+# Sourced by the scripts of this folder, which run from the repository's root: paths and shared functions. TESSERA overrides the
+# binary; TESSERA_SHARED_DATA names the folder of photographs.
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 tessera=${TESSERA:-build/release/apps/tessera/tessera}
 out=build/bench
@@ -14,15 +14,15 @@ need_tessera() {
   [ -x "$tessera" ] || die "$tessera: not built; run: cmake --preset release && cmake --build --preset release"
 }
 
-# Measured at real-time priority where that is allowed (CAP_SYS_NICE), so that a busy machine disturbs less.
+# Runs at real-time priority if that is allowed (CAP_SYS_NICE), so that other processes disturb the measurement less.
 alone() {
   if chrt -r 1 true 2> /dev/null; then chrt -r 1 "$@"; else "$@"; fi
 }
 
-# Numbers, not text: holds 27.3 '>=' 27.2
+# Compares numbers, not text: holds 27.3 '>=' 27.2
 holds() { awk -v a="$1" -v b="$3" -v how="$2" 'BEGIN { exit !(how == ">=" ? a >= b : a <= b) }'; }
 
-# verdict WHAT VALUE >=|<= BOUND: one line, and a failure remembered for `finish`.
+# verdict WHAT VALUE >=|<= BOUND: prints one line, and remembers a failure for `finish`.
 failures=0
 verdict() {
   local word=ok
@@ -31,7 +31,7 @@ verdict() {
 }
 finish() { [ "$failures" -eq 0 ] || exit 1; }
 
-# interval NUMBERS...: mean and the ends of its 95 % interval (Student's t).
+# interval NUMBERS...: prints the mean and the ends of its 95 % interval (Student's t).
 interval() {
   awk 'BEGIN {
     split("12.706 4.303 3.182 2.776 2.571 2.447 2.365 2.306 2.262", t, " ")
@@ -43,17 +43,17 @@ interval() {
   }' "$@"
 }
 
-# The file that holds a model's state.
+# Prints the file that contains a model's state.
 checkpoint() { echo "$1/$(jq -r '.files[0]' "$1/manifest.json")"; }
 
-# What follows works in the folder $work and makes nothing again that is there.
-# settings TEXT: makes the folder, or sees that it was made with the same ones.
+# The functions below work in the folder $work and do not repeat what exists there.
+# settings TEXT: makes the folder, or checks that it was made with the same settings.
 settings() {
   mkdir -p "$work"
   [ -e "$work/settings" ] || echo "$1" > "$work/settings"
   [ "$(cat "$work/settings")" = "$1" ] || die "$work was made with $(cat "$work/settings"): repeat those, or remove it"
 }
-# trained MODEL CAPTURE ARGUMENTS...: goes on with one that was interrupted.
+# trained MODEL CAPTURE ARGUMENTS...: trains, or resumes an interrupted run.
 trained() {
   local model=$work/$1 capture=$work/$2
   shift 2
@@ -65,7 +65,7 @@ trained() {
 baked() {
   [ -e "$work/$2/tileset.json" ] || "$tessera" bake "$work/$1" "$work/$2" --capture "$work/$3"
 }
-# judged WHAT CAPTURE [LOD]: its held-out PSNR, from the file if it was judged before.
+# judged WHAT CAPTURE [LOD]: prints its held-out PSNR, from the file if it was evaluated before.
 judged() {
   local name=$1${3:+-lod$3}
   [ -s "$work/$name.json" ] ||
@@ -75,7 +75,7 @@ judged() {
 difference() { awk -v a="$1" -v b="$2" 'BEGIN { d = a - b; print d < 0 ? -d : d }'; }
 shortfall() { awk -v a="$1" -v b="$2" 'BEGIN { print a - b }'; }
 
-# photographs NAME DOWNSCALE BOUND: imports real photographs, trains for MINUTES with each of SEEDS, judges held-out views.
+# photographs NAME DOWNSCALE BOUND: imports real photographs, trains for MINUTES with each of SEEDS, and evaluates held-out views.
 photographs() {
   local name=$1 downscale=$2 bound=$3 seed psnr
   local data=${TESSERA_SHARED_DATA:?names no folder; it must hold $name/}/$name work

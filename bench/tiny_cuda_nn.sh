@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Networks and hash grids of the shapes that `tessera bench compute` times, by tiny-cuda-nn, on an NVIDIA card: to be held against what
-# bench/gpu.sh measured there (JUDGE="gpu.json tiny_cuda_nn.json" bench/gpu.sh). Needs CUDA's compiler.
+# Times networks and hash grids of the shapes that `tessera bench compute` times, with tiny-cuda-nn on an NVIDIA GPU, for comparison
+# with what bench/gpu.sh measured there (JUDGE="gpu.json tiny_cuda_nn.json" bench/gpu.sh). Needs CUDA's compiler.
 #   TINY_CUDA_NN=DIR [SAMPLES="65536 1048576"] bench/tiny_cuda_nn.sh [OUT.json]
 # DIR: a checkout of https://github.com/NVlabs/tiny-cuda-nn with its submodules (written for 6ee3546).
 set -euo pipefail

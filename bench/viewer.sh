@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# The viewer in Debian's Chromium, by Mesa's OpenGL on the processor: ten held-out views of a city of 2x2 blocks against
-# the renderer on the processor; a city of 4x4 blocks until its first picture, and in a flight of 600 steps with a quarter
-# of the finest level's memory. Draws the scenes that volume.sh (ROWS=city) and levels.sh leave in build/bench.
+# The viewer in Debian's Chromium with Mesa's OpenGL on the CPU: ten held-out views of a city of 2x2 blocks against the renderer on
+# the CPU; a city of 4x4 blocks until its first image, and in a flight of 600 steps with a quarter of the finest level's memory.
+# Uses the scenes that volume.sh (ROWS=city) and levels.sh leave in build/bench.
 #   bench/viewer.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# City-on-Web on the processor: a city of 2x2 blocks and real nadir photographs, trained, baked and judged. Resumable: captures
-# and models stay in build/bench/volume, and what is there is not made again; remove city* or beach* in it to repeat a row.
+# City-on-Web on the CPU: a city of 2x2 blocks and real nadir photographs, trained, baked and evaluated. Resumable: captures and
+# models stay in build/bench/volume, and what exists is not made again; remove city* or beach* there to repeat a row.
 #   [ROWS="city beach"] [MINUTES=15] [TESSERA_SHARED_DATA=DIR] bench/volume.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"

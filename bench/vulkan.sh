@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Training on Vulkan: on a graphics card, or on Mesa's driver for the processor, which takes hours for the first row.
-#   agree    300 steps of 2^14 samples on fox and on a made city, `cpu` and `vulkan`, three representations: PSNR of what was
-#            trained on, drawn by the processor, at most 0.2 dB apart
+# Training with Vulkan: on a GPU, or with Mesa's driver for the CPU, which takes hours for the first row.
+#   agree    300 steps of 2^14 samples on fox and on a synthetic city, with `cpu` and `vulkan`, three representations: PSNR of the
+#            training photos, rendered on the CPU, at most 0.2 dB apart
 #   resume   killed on vulkan and resumed on cpu, and the reverse
-#   loader   without a Vulkan loader, and without a driver: cpu trains, vulkan says in one line what to install
-# Resumable: all is kept in build/bench/vulkan, and what is there is not made again.
+#   loader   without a Vulkan loader, and without a driver: cpu trains, vulkan prints one line that says what to install
+# Resumable: everything is kept in build/bench/vulkan, and what exists is not made again.
 #   TESSERA_SHARED_DATA=DIR [ROWS="agree resume loader"] [CAPTURES="fox city"] [METHODS="field volume hash"] bench/vulkan.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
@@ -17,17 +17,17 @@ settings "STEPS=$steps"
 [ -e "$work/fox/transforms.json" ] || "$tessera" import "$data/fox" "$work/fox" --downscale 2 --holdout every:8
 [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2 --size 400x300
 
-# Steps of 2^14 samples, and nothing beside them that takes longer.
+# Steps of 2^14 samples, without anything that takes longer than them.
 declare -A blocks=([fox]="--blocks 1x1" [city]="--blocks 2x2")
 flags() { # METHOD CAPTURE
   case "$1" in
     field) echo "--set samples_per_step=16384 --set occupancy_resolution=64" ;;
-    hash) echo "${blocks[$2]} --set level_share=0 --set samples_per_step=16384 --set occupancy_resolution=64" ;;
-    volume) echo "${blocks[$2]} --set level_share=0 --set first_rays=512 --set most_rays=512" ;;
+    hash) echo "${blocks[$2]} --set lod_step_fraction=0 --set samples_per_step=16384 --set occupancy_resolution=64" ;;
+    volume) echo "${blocks[$2]} --set lod_step_fraction=0 --set first_rays=512 --set max_rays=512" ;;
   esac
 }
 
-# The PSNR of MODEL on what it was trained on.
+# fitted MODEL: prints its PSNR on its training photos.
 fitted() {
   [ -s "$work/$1.json" ] || "$tessera" eval "$work/$1" "$work/$2" --split train --json "$work/$1.json" > /dev/null
   jq .psnr "$work/$1.json"
@@ -50,7 +50,7 @@ agree() {
   done
 }
 
-# killed MODEL DEVICE: a training that is killed as soon as it has saved something.
+# killed MODEL DEVICE: trains, and kills the run as soon as it has saved something.
 killed() {
   rm -rf "${work:?}/$1" "$work/$1.done"
   "$tessera" train "$work/fox" "$work/$1" --method field --steps 120 --set samples_per_step=4096 --set occupancy_resolution=32 \
@@ -75,7 +75,7 @@ resume() {
   done
 }
 
-# without COMMAND...: runs it where no Vulkan loader can be found. Needs to be root, or user namespaces.
+# without COMMAND...: runs it where no Vulkan loader can be found. Needs root or user namespaces.
 without_loader() {
   unshare --mount --map-root-user bash -c '
     for library in $(ldconfig -p | grep -o "/.*libvulkan\.so.*"); do mount --bind /dev/null "$library"; done

@@ -1,4 +1,4 @@
-# Language level, warnings, and the oldest processor that a release binary runs on.
+# Language level, warnings, and the oldest CPU that a release binary runs on.
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
@@ -29,7 +29,7 @@ if(TESSERA_SANITIZER)
   endif()
 endif()
 
-# Fuzzers see which branches an input took only where the code is instrumented: in every room.
+# Fuzzers see which branches an input took only in instrumented code, so every module is instrumented.
 if(TESSERA_FUZZERS)
   add_compile_options(-fsanitize=fuzzer-no-link)
   add_link_options(-fsanitize=fuzzer-no-link)

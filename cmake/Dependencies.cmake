@@ -1,4 +1,4 @@
-# Every third-party library in one place. The README says what each is for.
+# Finds all third-party libraries. The README states the purpose of each.
 find_package(Threads REQUIRED)
 find_package(Boost 1.74 REQUIRED)
 find_package(ZLIB REQUIRED)
@@ -26,7 +26,7 @@ add_library(tessera_geographic INTERFACE)
 target_include_directories(tessera_geographic SYSTEM INTERFACE ${GEOGRAPHICLIB_INCLUDE_DIR})
 target_link_libraries(tessera_geographic INTERFACE ${GEOGRAPHICLIB_LIBRARY})
 if(TESSERA_VULKAN)
-  find_path(VOLK_INCLUDE_DIR volk.h REQUIRED)  # finds the loader at run time: nothing is linked
+  find_path(VOLK_INCLUDE_DIR volk.h REQUIRED)  # loads the Vulkan loader at run time: nothing is linked
   find_program(GLSLANG_VALIDATOR glslangValidator REQUIRED)
   include(KhrMatrices)
 endif()

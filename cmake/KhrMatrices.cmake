@@ -1,5 +1,5 @@
-# TESSERA_KHR_MATRICES: whether the shader compiler and Vulkan's headers know VK_KHR_cooperative_matrix (glslang 14, headers
-# 1.3.255); Debian 12's do not, and know VK_NV_cooperative_matrix alone.
+# TESSERA_KHR_MATRICES: whether the shader compiler and Vulkan's headers support VK_KHR_cooperative_matrix (glslang 14, headers
+# 1.3.255). Debian 12's support only VK_NV_cooperative_matrix.
 include(CheckCXXSourceCompiles)
 set(CMAKE_REQUIRED_INCLUDES ${VOLK_INCLUDE_DIR})
 check_cxx_source_compiles("

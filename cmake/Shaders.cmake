@@ -1,8 +1,8 @@
 # tessera_shader(TARGET source.comp [VARIANT name] [DEFINES A B ...])
 #
-# Compiles GLSL to SPIR-V when TARGET is built, as the header "shaders/<source>[_<variant>].h", which holds the words as
-# `const uint32_t k<Source><Variant>Spirv[]` (snake_case becomes PascalCase). Includes are followed. The folder and the
-# stage are no part of the name: two shaders that would write the same header of one CMakeLists.txt (render/draw.comp and
+# Compiles GLSL to SPIR-V when TARGET is built, as the header "shaders/<source>[_<variant>].h", which holds the words as `const
+# uint32_t k<Source><Variant>Spirv[]` (snake_case becomes PascalCase). Includes are tracked as dependencies. The folder and the
+# stage are not part of the name: two shaders of one CMakeLists.txt that would write the same header (render/draw.comp and
 # window/draw.frag) stop the configuration.
 function(tessera_shader target source)
   cmake_parse_arguments(ARG "" "VARIANT" "DEFINES" ${ARGN})

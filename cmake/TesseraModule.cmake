@@ -1,12 +1,12 @@
 # tessera_module(NAME
 #   SOURCES a.cpp b.cpp ...     implementation files
-#   USES base scene ...         other rooms (public)
+#   USES base scene ...         other modules (public)
 #   LIBRARIES x y ...           third-party targets (public)
-#   PRIVATE_LIBRARIES x y ...   third-party targets that no header of this room mentions
-#   TESTS a_test.cpp ...        unit tests; one binary tessera_NAME_test, one CTest entry a test
-#   TEST_PROCESSES n)           instead n entries that share out the tests (tessera_unit_tests)
+#   PRIVATE_LIBRARIES x y ...   third-party targets that no header of this module mentions
+#   TESTS a_test.cpp ...        unit tests; one binary tessera_NAME_test, one CTest entry for each test
+#   TEST_PROCESSES n)           instead, n entries that share the tests (tessera_unit_tests)
 #
-# A room is a static library tessera_NAME; its headers are included as "NAME/file.h". One of headers alone has no SOURCES.
+# A module is a static library tessera_NAME; its headers are included as "NAME/file.h". A header-only module has no SOURCES.
 function(tessera_module name)
   cmake_parse_arguments(ARG "" "TEST_PROCESSES" "SOURCES;USES;LIBRARIES;PRIVATE_LIBRARIES;TESTS" ${ARGN})
   list(TRANSFORM ARG_USES PREPEND tessera_)
@@ -25,38 +25,38 @@ function(tessera_module name)
   endif()
 endfunction()
 
-# tessera_simd_kernels(TARGET): Highway's kernels of a library that chooses among instruction sets at run time, for which
-# -O3 pays.
+# tessera_simd_kernels(TARGET): for the Highway kernels of a library that chooses an instruction set at run time. These are compiled
+# with -O3, which is faster for them.
 function(tessera_simd_kernels target)
   target_compile_options(${target} PRIVATE -O3)
-  # A source that Highway compiles once for each instruction set includes itself, so it cannot be joined with others.
+  # A source that Highway compiles once for each instruction set includes itself, so it cannot be part of a unity build.
   set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)
   tessera_simd_targets(${target})
 endfunction()
 
-# tessera_simd_targets(TARGET): Highway with the instruction sets of this project. Also for tests that run a library's
-# kernels with each set in turn: they include what was compiled for each, and have to see the same ones.
+# tessera_simd_targets(TARGET): links Highway with the instruction sets of this project. Also for tests that run a library's kernels
+# with each set in turn: they include what was compiled for each set, and must see the same sets.
 function(tessera_simd_targets target)
   target_link_libraries(${target} PRIVATE PkgConfig::HWY)
-  # Targets that bring these kernels nothing over AVX3 would only double the build.
+  # Targets that speed up these kernels no further than AVX3 would only double the build time.
   target_compile_definitions(${target} PRIVATE "HWY_DISABLED_TARGETS=(HWY_AVX3_DL)")
 endfunction()
 
 # tessera_representation(NAME
 #   CONTENT a.cpp ...              tessera_NAME_content: a content in memory, its reader, writer and rules
-#   CPU a.cpp ...                  tessera_NAME_cpu: drawing on the CPU, by kernels of several instruction sets
-#   VULKAN a.cpp ...               tessera_NAME_vulkan: drawing on the GPU; only in builds with Vulkan
+#   CPU a.cpp ...                  tessera_NAME_cpu: rendering on the CPU, with kernels for several instruction sets
+#   VULKAN a.cpp ...               tessera_NAME_vulkan: rendering on the GPU; only in builds with Vulkan
 #   TRAIN a.cpp ...                tessera_NAME_train: settings, model, training step and baking
 #   CONTENT_USES base scene ...    other modules (public); likewise CPU_USES, VULKAN_USES, TRAIN_USES
-#   CONTENT_LIBRARIES x ...        third-party targets that no header of this part mentions; likewise of the others
-#   TESTS a_test.cpp ...           unit tests of all parts: one binary tessera_representation_NAME_test, as each costs a link
+#   CONTENT_LIBRARIES x ...        third-party targets that no header of this part mentions; likewise for the other parts
+#   TESTS a_test.cpp ...           unit tests of all parts, in one binary tessera_representation_NAME_test to save link time
 #   VULKAN_TESTS b_test.cpp ...    those of them that need Vulkan
 #   TEST_USES render ...           other modules that tests use
 #   TEST_LIBRARIES x ...)          third-party targets that they use
 #
-# One library for each part of a representation, so that what only draws links no trainer. CPU, VULKAN and TRAIN use
-# CONTENT. A part without files is not made: `field` has no content. Files are named from the folder of the caller
-# (content/reader.cpp). VULKAN is the place of the shaders: tessera_shader(tessera_NAME_vulkan ...).
+# Each part of a representation is a library of its own, so that programs that only render link no trainer. CPU, VULKAN and TRAIN
+# use CONTENT. A part without files is not created: `field` has no content. File names are relative to the caller's folder
+# (content/reader.cpp). VULKAN is the target of the shaders: tessera_shader(tessera_NAME_vulkan ...).
 function(tessera_representation name)
   set(parts CONTENT CPU VULKAN TRAIN)
   set(lists ${parts} TESTS VULKAN_TESTS TEST_USES TEST_LIBRARIES)
@@ -99,11 +99,11 @@ function(tessera_representation name)
   endif()
 endfunction()
 
-# tessera_fuzzer(NAME source.cpp ROOM): a libFuzzer target for one decoder of outside bytes.
-function(tessera_fuzzer name source room)
+# tessera_fuzzer(NAME source.cpp MODULE): a libFuzzer target for one decoder of untrusted bytes.
+function(tessera_fuzzer name source module)
   if(TESSERA_FUZZERS)
     add_executable(fuzz_${name} ${source})
-    target_link_libraries(fuzz_${name} PRIVATE tessera_${room})
+    target_link_libraries(fuzz_${name} PRIVATE tessera_${module})
     target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
   endif()
 endfunction()

@@ -1,7 +1,6 @@
-# Precompiled headers of the tests: GoogleTest, Eigen, fmt and standard headers are most of what the compiler reads of a
-# small test.
-# The flags have to be those of the tests, or the compiler does not use them: tests are programs (-fPIE), not parts of
-# libraries. Only tests have them, so that sources of the product include what they use.
+# Precompiled headers of the tests: GoogleTest, Eigen, fmt and standard headers are most of what the compiler reads for a small
+# test. They must be compiled with the flags of the tests, or the compiler does not use them: tests are executables (-fPIE), not
+# parts of libraries. Only tests use them, so that product sources include what they use.
 if(TESSERA_TESTS)
   file(GENERATE OUTPUT ${CMAKE_BINARY_DIR}/test_precompiled_headers.cpp CONTENT "")
   add_library(tessera_test_precompiled_headers OBJECT ${CMAKE_BINARY_DIR}/test_precompiled_headers.cpp)
@@ -13,11 +12,11 @@ if(TESSERA_TESTS)
     <string_view> <thread> <vector> <Eigen/Core> <Eigen/Geometry> <fmt/format.h>)
 endif()
 
-# tessera_unit_tests(NAME SOURCES a_test.cpp ... LIBRARIES x ... [PREFIX p] [PROCESSES n]): the binary
-# tessera_NAME_test, one CTest entry p/... a test; p is NAME unless told. With PROCESSES it is n entries that share out
-# its tests: for many tests that need the same thing (a device and its pipelines, a capture), which each process then
-# prepares once. CTest does not report what these skip. Tests are compiled with -O1, which takes a tenth less time than -O2; most of what they run is in
-# libraries, which are compiled as in the product.
+# tessera_unit_tests(NAME SOURCES a_test.cpp ... LIBRARIES x ... [PREFIX p] [PROCESSES n]): adds the binary tessera_NAME_test with
+# one CTest entry p/... for each test; p defaults to NAME. With PROCESSES there are n entries that share its tests instead: for many
+# tests that need the same fixture (a device and its pipelines, a capture), which each process then prepares once. CTest does not
+# report which of these tests are skipped. Tests are compiled with -O1, which takes a tenth less time than -O2; most of what they
+# run is in libraries, which are compiled as in the product.
 function(tessera_unit_tests name)
   cmake_parse_arguments(ARG "" "PREFIX;PROCESSES" "SOURCES;LIBRARIES" ${ARGN})
   if(NOT ARG_PREFIX)

@@ -1,4 +1,4 @@
-// The program as people use it: what it says, what it leaves on disk, and how it ends.
+// Runs the program as a user does: its output, the files that it writes, and its exit status.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-// Settings that make a model in a moment.
+// Settings that train a model in a moment.
 const std::vector<std::string> kTinyField = {"grid_levels=4",
                                              "grid_log2_size=10",
                                              "grid_finest=64",
@@ -24,15 +24,15 @@ const std::vector<std::string> kTinyField = {"grid_levels=4",
                                              "cone=0.1",
                                              "far=8",
                                              "first_rays=128",
-                                             "most_rays=512",
+                                             "max_rays=512",
                                              "samples_per_step=2048",
                                              "occupancy_resolution=16",
-                                             "occupancy_warm_up=16",
-                                             "rate=0.02"};
+                                             "occupancy_warmup_steps=16",
+                                             "learning_rate=0.02"};
 
 class CommandLine : public testing::Test {
  protected:
-  // One city for all tests.
+  // All tests share one city.
   static void SetUpTestSuite() {
     folder_ = fs::weakly_canonical(fs::temp_directory_path()) / ("tessera-command-line-" + std::to_string(::getpid()));
     fs::remove_all(folder_);
@@ -62,18 +62,18 @@ class CommandLine : public testing::Test {
     const json manifest = json::parse(readTextFile(fs::path(model) / "manifest.json"));
     return readFile(fs::path(model) / manifest.at("files").at(0).get<std::string>());
   }
-  // A model of a few steps, made once.
+  // A model of a few steps, trained once.
   static std::string model() {
-    const std::string made = at("model");
-    if (!fs::exists(made)) {
-      const Said said = train(made, {"--steps", "6"});
+    const std::string modelPath = at("model");
+    if (!fs::exists(modelPath)) {
+      const Said said = train(modelPath, {"--steps", "6"});
       EXPECT_EQ(said.exitCode, 0) << said.err;
     }
-    return made;
+    return modelPath;
   }
 
-  // A camera path that stops at the first three photos of the city; poses are moved by 2 · (x + (5, 0, 0)) unless they
-  // are to stay in the source's world.
+  // Writes a camera path that stops at the first three photos of the city; poses are transformed by 2 · (x + (5, 0, 0))
+  // unless they are to stay in the source's world.
   static std::string writePath(const std::string& name, bool inSourceWorld) {
     json views = json::array();
     const json capture = json::parse(readTextFile(fs::path(city()) / "transforms.json"));
@@ -89,8 +89,8 @@ class CommandLine : public testing::Test {
     return at(name);
   }
 
-  // Fails with exit code 1 and one line of the one form; the line.
-  static std::string failureOf(const std::vector<std::string>& arguments) {
+  // Expects exit code 1 and one line on stderr in the standard form; returns the line.
+  static std::string expectFailure(const std::vector<std::string>& arguments) {
     const Said said = run(arguments);
     std::string command;
     for (const std::string& word : arguments) command += word + " ";
@@ -105,7 +105,7 @@ class CommandLine : public testing::Test {
     EXPECT_FALSE(contains(line, "internal")) << command << line;
     return line;
   }
-  static std::string usageErrorOf(const std::vector<std::string>& arguments) {
+  static std::string expectUsageError(const std::vector<std::string>& arguments) {
     const Said said = run(arguments);
     std::string command;
     for (const std::string& word : arguments) command += word + " ";
@@ -149,8 +149,8 @@ const std::vector<std::string> kBakedMethods = {TESSERA_REPRESENTATIONS(SKIP, NA
 #undef SKIP
 #undef NAME
 
-// "volume or hash".
-std::string sentenceOf(const std::vector<std::string>& names) {
+// Returns, for example, "volume or hash".
+std::string joinNames(const std::vector<std::string>& names) {
   std::string sentence;
   for (const std::string& name : names) {
     sentence += (sentence.empty() ? "" : name == names.back() ? " or " : ", ") + name;
@@ -164,9 +164,9 @@ TEST_F(CommandLine, ListsTheMethodsThatThereAre) {
   const std::string train = run({"train", "--help"}).out;
   EXPECT_TRUE(contains(train, "--method TEXT:{" + choices + "}")) << train;
   for (const std::string& name : kMethods) EXPECT_TRUE(contains(train, "Settings of --method " + name)) << train;
-  EXPECT_TRUE(contains(usageErrorOf({"train", city(), at("m"), "--method", "guess"}), "{" + choices + "}"));
+  EXPECT_TRUE(contains(expectUsageError({"train", city(), at("m"), "--method", "guess"}), "{" + choices + "}"));
   const std::string bake = run({"bake", "--help"}).out;
-  EXPECT_TRUE(contains(bake, "of --method " + sentenceOf(kBakedMethods))) << bake;
+  EXPECT_TRUE(contains(bake, "of --method " + joinNames(kBakedMethods))) << bake;
 }
 
 TEST_F(CommandLine, SaysItsVersion) {
@@ -176,64 +176,65 @@ TEST_F(CommandLine, SaysItsVersion) {
 }
 
 TEST_F(CommandLine, EndsWithTwoWhenItIsUsedWrongly) {
-  usageErrorOf({});
-  EXPECT_TRUE(contains(usageErrorOf({"fly"}), "'fly'"));
-  usageErrorOf({"train"});
-  usageErrorOf({"train", city()});
-  usageErrorOf({"train", city(), at("m"), "--stops", "3"});
-  usageErrorOf({"train", city(), at("m"), "--steps", "many"});
-  usageErrorOf({"train", city(), at("m"), "--steps", "3", "--minutes", "1"});
+  expectUsageError({});
+  EXPECT_TRUE(contains(expectUsageError({"fly"}), "'fly'"));
+  expectUsageError({"train"});
+  expectUsageError({"train", city()});
+  expectUsageError({"train", city(), at("m"), "--stops", "3"});
+  expectUsageError({"train", city(), at("m"), "--steps", "many"});
+  expectUsageError({"train", city(), at("m"), "--steps", "3", "--minutes", "1"});
   for (const char* minutes : {"-1", "0", "nan", "inf", "1e300", "long"}) {
-    usageErrorOf({"train", city(), at("m"), "--minutes", minutes});
+    expectUsageError({"train", city(), at("m"), "--minutes", minutes});
   }
-  for (const char* steps : {"-5", "0", "1.5"}) usageErrorOf({"train", city(), at("m"), "--steps", steps});
-  usageErrorOf({"train", city(), at("m"), "--steps", "3", "--checkpoint-seconds", "-1"});
-  usageErrorOf({"train", city(), at("m"), "--method", "guess"});
-  usageErrorOf({"train", city(), at("m"), "--threads", "-3"});
-  usageErrorOf({"eval", model(), city(), "--split", "best"});
-  usageErrorOf({"import", city()});
-  usageErrorOf({"import", city(), at("i"), "--downscale", "0"});
-  usageErrorOf({"import", city(), at("i"), "--threads", "-1"});
-  usageErrorOf({"synth", "city", at("none"), "--threads", "-1"});
-  usageErrorOf({"render", model(), at("r")});
-  usageErrorOf({"render", model(), at("r"), "--views", city(), "--path", at("path.json")});
-  usageErrorOf({"render", model(), at("r"), "--views", city(), "--dataparser-transforms", at("transforms.json")});
-  usageErrorOf({"bench"});
+  for (const char* steps : {"-5", "0", "1.5"}) expectUsageError({"train", city(), at("m"), "--steps", steps});
+  expectUsageError({"train", city(), at("m"), "--steps", "3", "--checkpoint-seconds", "-1"});
+  expectUsageError({"train", city(), at("m"), "--method", "guess"});
+  expectUsageError({"train", city(), at("m"), "--threads", "-3"});
+  expectUsageError({"eval", model(), city(), "--split", "best"});
+  expectUsageError({"import", city()});
+  expectUsageError({"import", city(), at("i"), "--downscale", "0"});
+  expectUsageError({"import", city(), at("i"), "--threads", "-1"});
+  expectUsageError({"synth", "city", at("none"), "--threads", "-1"});
+  expectUsageError({"render", model(), at("r")});
+  expectUsageError({"render", model(), at("r"), "--views", city(), "--path", at("path.json")});
+  expectUsageError({"render", model(), at("r"), "--views", city(), "--dataparser-transforms", at("transforms.json")});
+  expectUsageError({"bench"});
   EXPECT_FALSE(fs::exists(at("m")));
 }
 
-TEST_F(CommandLine, RefusesSizesThatAreNone) {
+TEST_F(CommandLine, RejectsMalformedSizes) {
   for (const char* size : {"640", "640x", "x480", "0x10", "640x480x3", "-1x5", "640 x 480"}) {
-    EXPECT_TRUE(contains(usageErrorOf({"synth", "city", at("none"), "--size", size}), size));
-    EXPECT_TRUE(contains(usageErrorOf({"render", model(), at("r"), "--views", city(), "--size", size}), size));
+    EXPECT_TRUE(contains(expectUsageError({"synth", "city", at("none"), "--size", size}), size));
+    EXPECT_TRUE(contains(expectUsageError({"render", model(), at("r"), "--views", city(), "--size", size}), size));
   }
   EXPECT_FALSE(fs::exists(at("none")));
 }
 
 TEST_F(CommandLine, ExplainsWhatIsWrongWithAFolder) {
   fs::create_directories(at("empty"));
-  EXPECT_TRUE(contains(failureOf({"import", at("missing"), at("out1")}), at("missing")));
-  EXPECT_TRUE(contains(failureOf({"import", at("empty"), at("out1")}), at("empty")));
-  EXPECT_TRUE(contains(failureOf({"train", at("missing"), at("out1")}), at("missing")));
-  EXPECT_TRUE(contains(failureOf({"train", at("empty"), at("out1")}), "tessera import"));
-  EXPECT_TRUE(contains(failureOf({"info", at("missing")}), at("missing")));
-  EXPECT_TRUE(contains(failureOf({"info", at("empty")}), at("empty")));
-  EXPECT_TRUE(contains(failureOf({"eval", at("empty"), city()}), at("empty")));
-  EXPECT_TRUE(contains(failureOf({"eval", city(), city()}), "tessera train"));
-  EXPECT_TRUE(contains(failureOf({"eval", model(), model()}), model()));
-  EXPECT_TRUE(contains(failureOf({"eval", model(), at("missing")}), at("missing")));
-  EXPECT_TRUE(contains(failureOf({"render", at("missing"), at("out1"), "--views", city()}), at("missing")));
-  EXPECT_TRUE(contains(failureOf({"render", model(), at("out1"), "--path", at("missing.json")}), "missing.json"));
-  EXPECT_TRUE(contains(failureOf(trainArguments(city(), {"--steps", "3"})), "holds a capture"));
-  EXPECT_TRUE(contains(failureOf({"import", city(), at("out1"), "--holdout", "every:1"}), "every:1"));
-  EXPECT_TRUE(contains(failureOf({"import", city(), at("out1"), "--holdout", "list:" + at("none.txt")}), "none.txt"));
+  EXPECT_TRUE(contains(expectFailure({"import", at("missing"), at("out1")}), at("missing")));
+  EXPECT_TRUE(contains(expectFailure({"import", at("empty"), at("out1")}), at("empty")));
+  EXPECT_TRUE(contains(expectFailure({"train", at("missing"), at("out1")}), at("missing")));
+  EXPECT_TRUE(contains(expectFailure({"train", at("empty"), at("out1")}), "tessera import"));
+  EXPECT_TRUE(contains(expectFailure({"info", at("missing")}), at("missing")));
+  EXPECT_TRUE(contains(expectFailure({"info", at("empty")}), at("empty")));
+  EXPECT_TRUE(contains(expectFailure({"eval", at("empty"), city()}), at("empty")));
+  EXPECT_TRUE(contains(expectFailure({"eval", city(), city()}), "tessera train"));
+  EXPECT_TRUE(contains(expectFailure({"eval", model(), model()}), model()));
+  EXPECT_TRUE(contains(expectFailure({"eval", model(), at("missing")}), at("missing")));
+  EXPECT_TRUE(contains(expectFailure({"render", at("missing"), at("out1"), "--views", city()}), at("missing")));
+  EXPECT_TRUE(contains(expectFailure({"render", model(), at("out1"), "--path", at("missing.json")}), "missing.json"));
+  EXPECT_TRUE(contains(expectFailure(trainArguments(city(), {"--steps", "3"})), "holds a capture"));
+  EXPECT_TRUE(contains(expectFailure({"import", city(), at("out1"), "--holdout", "every:1"}), "every:1"));
+  EXPECT_TRUE(
+      contains(expectFailure({"import", city(), at("out1"), "--holdout", "list:" + at("none.txt")}), "none.txt"));
   EXPECT_FALSE(fs::exists(at("out1")));
   EXPECT_FALSE(fs::exists(at("out1") + "/transforms.json"));
 }
 
 TEST_F(CommandLine, SaysWhatAFolderIsThatCannotBeServedAndWhatToDo) {
   const auto says = [](const std::string& what, const std::string& answer) {
-    EXPECT_EQ(failureOf({"serve", what}), "tessera: error: " + what + ": " + answer + "\n");
+    EXPECT_EQ(expectFailure({"serve", what}), "tessera: error: " + what + ": " + answer + "\n");
   };
   const std::string another = "; name the folder of a scene, or the world.json of a world";
   says(at("missing"), "there is no such file or folder" + another);
@@ -254,7 +255,7 @@ TEST_F(CommandLine, SaysWhatAFolderIsThatCannotBeServedAndWhatToDo) {
   says(city(), "is a capture, not a scene; train and bake it first: tessera train " + city() +
                    " MODEL --method volume, then tessera bake MODEL SCENE");
   says(model(), "is a model of --method field, of which no scene can be baked; train one with --method " +
-                    sentenceOf(kBakedMethods) + ", and bake that; tessera view shows this one");
+                    joinNames(kBakedMethods) + ", and bake that; tessera view shows this one");
   const std::string volume = at("volume.model");
   writeFileAtomically(volume + "/blocks.json", std::string_view("{}"));
   says(volume,
@@ -264,13 +265,13 @@ TEST_F(CommandLine, SaysWhatAFolderIsThatCannotBeServedAndWhatToDo) {
   says(volume, "is a model, not a scene; bake it first: tessera bake " + volume + " SCENE");
 }
 
-TEST_F(CommandLine, SaysWhichPortsThereAre) {
+TEST_F(CommandLine, StatesWhichPortsAreValid) {
   for (const char* port : {"99999", "65536", "-1", "x", "8.5", "80x", "99999999999999999999"}) {
-    const std::string line = usageErrorOf({"serve", at("missing"), "--port", port});
+    const std::string line = expectUsageError({"serve", at("missing"), "--port", port});
     EXPECT_TRUE(contains(line, std::string("--port: '") + port + "' is no port")) << line;
     EXPECT_TRUE(contains(line, "from 0 to 65535")) << line;
   }
-  for (const char* port : {"0", "65535"}) failureOf({"serve", at("missing"), "--port", port});
+  for (const char* port : {"0", "65535"}) expectFailure({"serve", at("missing"), "--port", port});
 }
 
 TEST_F(CommandLine, ServesUntilItIsInterrupted) {
@@ -289,21 +290,21 @@ TEST_F(CommandLine, ServesUntilItIsInterrupted) {
 
 TEST_F(CommandLine, RecognisesAPlainFolderOfPhotosAndSaysWhatToDo) {
   for (int i = 0; i < 3; ++i) writePng(folder_ / "plain" / (std::to_string(i) + ".png"), ImageU8(8, 6, 3, 90));
-  EXPECT_TRUE(contains(failureOf({"import", at("plain"), at("out2")}), "colmap"));
+  EXPECT_TRUE(contains(expectFailure({"import", at("plain"), at("out2")}), "colmap"));
 }
 
 TEST_F(CommandLine, ExplainsWhatIsWrongWithSettings) {
   const auto failure = [&](const std::string& setting) {
-    return failureOf({"train", city(), at("unset"), "--steps", "1", "--set", setting});
+    return expectFailure({"train", city(), at("unset"), "--steps", "1", "--set", setting});
   };
-  EXPECT_TRUE(contains(failure("rat=3"), "did you mean 'rate'?"));
-  EXPECT_TRUE(contains(failure("rate=fast"), "rate wants a number"));
+  EXPECT_TRUE(contains(failure("learning_rat=3"), "did you mean 'learning_rate'?"));
+  EXPECT_TRUE(contains(failure("learning_rate=fast"), "rate wants a number"));
   EXPECT_TRUE(contains(failure("rate"), "rate"));
   EXPECT_TRUE(contains(failure("loss=hinge"), "hinge"));
-  EXPECT_TRUE(contains(failureOf({"train", city(), at("unset"), "--steps", "1", "--seed", "99999999999999999999"}),
+  EXPECT_TRUE(contains(expectFailure({"train", city(), at("unset"), "--steps", "1", "--seed", "99999999999999999999"}),
                        "seed wants a whole number"));
-  writeFileAtomically(folder_ / "wrong.toml", "rate = 1\nwidht = 64\n");
-  const std::string file = failureOf({"train", city(), at("unset"), "--config", at("wrong.toml")});
+  writeFileAtomically(folder_ / "wrong.toml", "learning_rate = 1\nwidht = 64\n");
+  const std::string file = expectFailure({"train", city(), at("unset"), "--config", at("wrong.toml")});
   EXPECT_TRUE(contains(file, "wrong.toml: line 2")) << file;
   EXPECT_TRUE(contains(file, "did you mean 'width'?")) << file;
   EXPECT_FALSE(fs::exists(at("unset") + "/manifest.json"));
@@ -312,9 +313,9 @@ TEST_F(CommandLine, ExplainsWhatIsWrongWithSettings) {
 TEST_F(CommandLine, ExplainsSettingsThatMakeNoModel) {
   for (const char* setting :
        {"width=17", "grid_features=3", "grid_levels=0", "occupancy_resolution=30", "samples_per_step=0",
-        "samples_per_step=-5", "most_rays=0", "density_hidden=0", "min_step=0", "occupancy_every=0", "rate=nan",
+        "samples_per_step=-5", "max_rays=0", "density_hidden=0", "min_step=0", "occupancy_every=0", "learning_rate=nan",
         "steps_per_photo=0", "grid_log2_size=60"}) {
-    const std::string line = failureOf({"train", city(), at("unset"), "--steps", "1", "--set", setting});
+    const std::string line = expectFailure({"train", city(), at("unset"), "--steps", "1", "--set", setting});
     const std::string key = std::string(setting).substr(0, std::string(setting).find('='));
     EXPECT_TRUE(contains(line, key)) << setting << ": " << line;
   }
@@ -322,7 +323,7 @@ TEST_F(CommandLine, ExplainsSettingsThatMakeNoModel) {
 
 TEST_F(CommandLine, DoesNotTouchAModelUnlessToldToGoOn) {
   const Bytes before = checkpoint(model());
-  EXPECT_TRUE(contains(failureOf(trainArguments(model(), {"--steps", "9"})), "--resume"));
+  EXPECT_TRUE(contains(expectFailure(trainArguments(model(), {"--steps", "9"})), "--resume"));
   EXPECT_EQ(checkpoint(model()), before);
 }
 
@@ -334,25 +335,25 @@ TEST_F(CommandLine, ExplainsModelsThatAreBroken) {
   const std::string truncated = copied("truncated");
   const fs::path block = fs::path(truncated) / "blocks/0/step-6.safetensors";
   fs::resize_file(block, fs::file_size(block) / 2);
-  EXPECT_TRUE(contains(failureOf({"eval", truncated, city()}), block.string()));
-  EXPECT_TRUE(contains(failureOf({"train", city(), truncated, "--resume", "--steps", "9"}), block.string()));
+  EXPECT_TRUE(contains(expectFailure({"eval", truncated, city()}), block.string()));
+  EXPECT_TRUE(contains(expectFailure({"train", city(), truncated, "--resume", "--steps", "9"}), block.string()));
   fs::remove(block);
-  EXPECT_TRUE(contains(failureOf({"eval", truncated, city()}), "step-6.safetensors"));
+  EXPECT_TRUE(contains(expectFailure({"eval", truncated, city()}), "step-6.safetensors"));
 
   const std::string unlisted = copied("unlisted");
   fs::remove(fs::path(unlisted) / "manifest.json");
-  EXPECT_TRUE(contains(failureOf({"eval", unlisted, city()}), "manifest.json"));
-  EXPECT_TRUE(contains(failureOf({"render", unlisted, at("r"), "--views", city()}), "manifest.json"));
+  EXPECT_TRUE(contains(expectFailure({"eval", unlisted, city()}), "manifest.json"));
+  EXPECT_TRUE(contains(expectFailure({"render", unlisted, at("r"), "--views", city()}), "manifest.json"));
 
   const std::string foreign = copied("foreign");
   json manifest = json::parse(readTextFile(fs::path(foreign) / "manifest.json"));
   manifest["method"] = "mesh";
   writeFileAtomically(fs::path(foreign) / "manifest.json", manifest.dump());
-  EXPECT_TRUE(contains(failureOf({"train", city(), foreign, "--resume", "--steps", "9"}), "mesh"));
+  EXPECT_TRUE(contains(expectFailure({"train", city(), foreign, "--resume", "--steps", "9"}), "mesh"));
 
   const std::string misset = copied("misset");
   writeFileAtomically(fs::path(misset) / "config.toml", "grid_levels = 5\n");
-  EXPECT_TRUE(contains(failureOf({"eval", misset, city()}), "step-6.safetensors"));
+  EXPECT_TRUE(contains(expectFailure({"eval", misset, city()}), "step-6.safetensors"));
 }
 
 TEST_F(CommandLine, ExplainsCapturesThatAreBroken) {
@@ -364,7 +365,7 @@ TEST_F(CommandLine, ExplainsCapturesThatAreBroken) {
                                                   {"info", at("cut")},
                                                   {"eval", model(), at("cut")},
                                                   {"import", at("cut"), at("out3")}}) {
-    EXPECT_TRUE(contains(failureOf(command), "transforms.json"));
+    EXPECT_TRUE(contains(expectFailure(command), "transforms.json"));
   }
   writeFileAtomically(transforms, whole);
   const fs::path photo = folder_ / "cut" / json::parse(whole).at("frames").at(2).at("file_path").get<std::string>();
@@ -372,12 +373,12 @@ TEST_F(CommandLine, ExplainsCapturesThatAreBroken) {
   writeFileAtomically(photo, std::span(picture).first(picture.size() / 2));
   std::vector<std::string> command = trainArguments(at("out3"), {"--steps", "3"});
   command[1] = at("cut");
-  EXPECT_TRUE(contains(failureOf(command), photo.filename().string()));
+  EXPECT_TRUE(contains(expectFailure(command), photo.filename().string()));
   fs::remove(photo);
-  EXPECT_TRUE(contains(failureOf(command), photo.filename().string()));
+  EXPECT_TRUE(contains(expectFailure(command), photo.filename().string()));
 }
 
-TEST_F(CommandLine, HoldsAModelAgainstTheCaptureThatItIsUsedWith) {
+TEST_F(CommandLine, ChecksAModelAgainstTheCaptureThatItIsUsedWith) {
   fs::copy(city(), at("resplit"), fs::copy_options::recursive);
   const fs::path transforms = folder_ / "resplit/transforms.json";
   json capture = json::parse(readTextFile(transforms));
@@ -391,7 +392,7 @@ TEST_F(CommandLine, HoldsAModelAgainstTheCaptureThatItIsUsedWith) {
   EXPECT_TRUE(contains(judged.err, "1 of the views were trained on")) << judged.err;
   std::vector<std::string> goingOn = trainArguments(model(), {"--steps", "9", "--resume"});
   goingOn[1] = at("resplit");
-  EXPECT_TRUE(contains(failureOf(goingOn), "other photos"));
+  EXPECT_TRUE(contains(expectFailure(goingOn), "other photos"));
   EXPECT_FALSE(contains(run({"eval", model(), city(), "--report", at("city.html")}).err, "trained on"));
 
   const std::string moved = at("moved");
@@ -399,20 +400,24 @@ TEST_F(CommandLine, HoldsAModelAgainstTheCaptureThatItIsUsedWith) {
   json placement = json::parse(readTextFile(fs::path(moved) / "blocks.json"));
   placement["source_from_world"][3] = 12.5;
   writeFileAtomically(fs::path(moved) / "blocks.json", placement.dump());
-  EXPECT_TRUE(contains(failureOf({"eval", moved, city()}), "its world is not the one"));
-  EXPECT_TRUE(contains(failureOf({"render", moved, at("r"), "--views", city()}), "its world is not the one"));
+  EXPECT_TRUE(contains(expectFailure({"eval", moved, city()}), "its world is not the one"));
+  EXPECT_TRUE(contains(expectFailure({"render", moved, at("r"), "--views", city()}), "its world is not the one"));
 }
 
 TEST_F(CommandLine, ExplainsWhenItCannotWrite) {
   writeFileAtomically(folder_ / "file", "in the way");
-  EXPECT_TRUE(contains(failureOf({"synth", "city", at("file/city"), "--photos", "2", "--size", "16x12"}), at("file")));
-  EXPECT_TRUE(contains(failureOf(trainArguments(at("file/model"), {"--steps", "2"})), at("file")));
-  EXPECT_TRUE(contains(failureOf({"eval", model(), city(), "--json", at("file/eval.json")}), at("file")));
-  EXPECT_TRUE(contains(failureOf({"render", model(), at("file/frames"), "--views", city()}), at("file")));
+  EXPECT_TRUE(
+      contains(expectFailure({"synth", "city", at("file/city"), "--photos", "2", "--size", "16x12"}), at("file")));
+  EXPECT_TRUE(contains(expectFailure(trainArguments(at("file/model"), {"--steps", "2"})), at("file")));
+  EXPECT_TRUE(contains(expectFailure({"eval", model(), city(), "--json", at("file/eval.json")}), at("file")));
+  EXPECT_TRUE(contains(expectFailure({"render", model(), at("file/frames"), "--views", city()}), at("file")));
 }
 
-TEST_F(CommandLine, RefusesDevicesThatAreNone) {
-  failureOf(trainArguments(at("none"), {"--device", "abacus"}));
+TEST_F(CommandLine, RejectsUnknownDevices) {
+  const std::string failure = expectFailure(trainArguments(at("none"), {"--device", "abacus"}));
+  EXPECT_TRUE(contains(failure, "--device abacus")) << failure;
+  EXPECT_TRUE(contains(failure, "there is no such device")) << failure;
+  EXPECT_TRUE(contains(failure, "cpu")) << "the remedy names a device: " << failure;
 }
 
 TEST_F(CommandLine, GoesTheWholeWayFromACityToPictures) {
@@ -493,7 +498,7 @@ TEST_F(CommandLine, FollowsACameraPath) {
   ASSERT_EQ(said.exitCode, 0) << said.err;
   EXPECT_EQ(probeImageFile(at("flown-large/00002.png")).width, 32);
 
-  // The same places as nerfstudio's viewer tells them.
+  // The same poses in the format of nerfstudio's viewer.
   const std::string moved = writePath("viewer/path.json", false);
   writeFileAtomically(at("moved.json"),
                       std::string_view(R"({"transform": [[1,0,0,5],[0,1,0,0],[0,0,1,0]], "scale": 2})"));
@@ -508,7 +513,8 @@ TEST_F(CommandLine, FollowsACameraPath) {
   ASSERT_EQ(said.exitCode, 0) << said.err;
   EXPECT_TRUE(contains(said.err, "dataparser_transforms.json")) << said.err;
   EXPECT_EQ(readImage(at("flown-beside/00001.png")).image.pixels, frames[1].pixels);
-  const std::string wrong = failureOf({"render", model(), at("none"), "--path", path, "--dataparser-transforms", path});
+  const std::string wrong =
+      expectFailure({"render", model(), at("none"), "--path", path, "--dataparser-transforms", path});
   EXPECT_TRUE(contains(wrong, "flights/path.json")) << wrong;
   EXPECT_FALSE(fs::exists(at("none")));
 }

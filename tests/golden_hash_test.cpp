@@ -1,4 +1,4 @@
-// The committed scene of `hash`, read: what a change of the format would break.
+// Tests that the committed scene of `hash` can be read, which a change of the format would break.
 #include "golden/golden_hash.h"
 
 #include "golden_scene_test.h"
@@ -10,28 +10,29 @@ namespace {
 
 const fs::path kHashScene = TESSERA_GOLDEN_HASH;
 
-TEST(GoldenHash, IsReadToTheExpectedSumsAndHoldsWhatItWasMadeFrom) {
+TEST(GoldenHash, MatchesTheExpectedSumsAndItsGenerator) {
   const nlohmann::ordered_json expected = readGoldenJson(kHashScene / "sums.json");
   EXPECT_EQ(expected.size(), 5u);
   const golden::Scene<HashContent> scene = golden::makeHashScene();
   forEachGoldenContent<HashContent>(
       kHashScene, hashCodec(), [&](const auto& uri, const auto& name, const HashContent& hash) {
-        const HashContent& made = scene.contents.at(name);
+        const HashContent& source = scene.contents.at(name);
         const auto& sums = expected.at(uri);
         ASSERT_EQ(hash.parts.size(), sums.size());
-        EXPECT_EQ(hash.weights, made.weights);
-        EXPECT_EQ(hash.logits, made.logits);
-        EXPECT_EQ(hash.step, made.step);
-        for (size_t l = 0; l < made.network.size(); ++l) EXPECT_EQ(hash.network[l].weights, made.network[l].weights);
+        EXPECT_EQ(hash.weights, source.weights);
+        EXPECT_EQ(hash.logits, source.logits);
+        EXPECT_EQ(hash.step, source.step);
+        for (size_t l = 0; l < source.network.size(); ++l)
+          EXPECT_EQ(hash.network[l].weights, source.network[l].weights);
         for (size_t i = 0; i < sums.size(); ++i) {
-          EXPECT_EQ(golden::toJson(golden::sumsOf(hash.parts[i])), sums[i]) << uri << " part " << i;
-          EXPECT_EQ(golden::toJson(golden::sumsOf(made.parts[i])), sums[i]) << uri << " part " << i;
-          EXPECT_EQ(hash.parts[i].ranges, made.parts[i].ranges);
+          EXPECT_EQ(golden::toJson(golden::computeSums(hash.parts[i])), sums[i]) << uri << " part " << i;
+          EXPECT_EQ(golden::toJson(golden::computeSums(source.parts[i])), sums[i]) << uri << " part " << i;
+          EXPECT_EQ(hash.parts[i].ranges, source.parts[i].ranges);
         }
       });
 }
 
-TEST(GoldenHash, LooksAlongItsRaysAsTheDefinitionSays) {
+TEST(GoldenHash, RendersItsRaysAsTheDefinitionSays) {
   expectRaysAsDefined<HashContent>(kHashScene, hashCodec());
 }
 

@@ -1,4 +1,4 @@
-// What tests of the committed scenes have in common, whatever the representation.
+// What the tests of the committed scenes share, for all representations.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ inline nlohmann::ordered_json readGoldenJson(const fs::path& file) {
   return nlohmann::ordered_json::parse(readTextFile(file));
 }
 
-// All contents of a scene, as (uri, name in the maker's words: tiles/L0/0_1-<digest>.glb).
+// Calls `use` with each content of a scene, its uri, and its name in the generator (tiles/L0/<name>-<digest>.glb).
 template <class Content_>
 void forEachGoldenContent(
     const fs::path& scene, const ContentCodec& codec,
@@ -35,7 +35,7 @@ void forEachGoldenContent(
   EXPECT_EQ(contents, 5u);
 }
 
-// The oracle, which reckons in floats, against the definition.
+// Tests the CPU oracle, which computes in floats, against the definition.
 template <class Content_>
 void expectRaysAsDefined(const fs::path& folder, const ContentCodec& codec) {
   const TileScene scene = openTileScene(folder, codec);
@@ -50,7 +50,7 @@ void expectRaysAsDefined(const fs::path& folder, const ContentCodec& codec) {
     const auto& ray = rays[i];
     const auto vector = [&](const char* key) { return Vec3d(ray.at(key).at(0), ray.at(key).at(1), ray.at(key).at(2)); };
     const SceneRay along{vector("origin"), vector("direction")};
-    const int coarse = scene.tree.surround, fine = scene.tree.tiles[static_cast<size_t>(coarse)].children.at(0);
+    const int coarse = scene.tree.backgroundBlock, fine = scene.tree.tiles[static_cast<size_t>(coarse)].children.at(0);
     SceneDrawing<Content_> drawing{
         scene.frame, {}, &contents[static_cast<size_t>(ray.at("level") == 1 ? coarse : fine)], {}};
     drawing.march.minTransmittance = 0;
@@ -73,7 +73,7 @@ void expectRaysAsDefined(const fs::path& folder, const ContentCodec& codec) {
     kinds["coarse"] += ray.at("level") == 1;
     kinds["far"] += distance > 6;
     drawing.frontToBack.erase(drawing.frontToBack.begin() + 1, drawing.frontToBack.end());
-    drawing.surround = nullptr;
+    drawing.backgroundBlock = nullptr;
     const float left = RayCaster<Content_>(drawing).cast(along, INFINITY, counts).transmittance;
     kinds["blended"] += left > 0.05f && left < 0.95f;
   }

@@ -1,4 +1,4 @@
-// The committed scene, read: what a change of the format would break.
+// Tests that the committed scene of `volume` can be read, which a change of the format would break.
 #include "golden/golden_volume.h"
 
 #include "golden_scene_test.h"
@@ -28,7 +28,7 @@ void expectSame(const VolumeContent& a, const VolumeContent& b) {
     EXPECT_EQ(a.parts[i].low, b.parts[i].low);
     EXPECT_EQ(a.parts[i].high, b.parts[i].high);
     EXPECT_EQ(a.parts[i].contracted, b.parts[i].contracted);
-    EXPECT_EQ(a.parts[i].surround, b.parts[i].surround);
+    EXPECT_EQ(a.parts[i].backgroundBlock, b.parts[i].backgroundBlock);
     EXPECT_EQ(a.parts[i].voxels, b.parts[i].voxels);
     EXPECT_EQ(a.parts[i].planes, b.parts[i].planes);
     EXPECT_EQ(a.parts[i].macroblocks, b.parts[i].macroblocks);
@@ -38,7 +38,7 @@ void expectSame(const VolumeContent& a, const VolumeContent& b) {
   }
 }
 
-TEST(GoldenVolume, IsReadToTheExpectedSums) {
+TEST(GoldenVolume, MatchesTheExpectedSums) {
   const nlohmann::ordered_json expected = readGoldenJson(kVolumeScene / "sums.json");
   EXPECT_EQ(expected.size(), 5u);
   forEachGoldenContent<VolumeContent>(
@@ -46,12 +46,12 @@ TEST(GoldenVolume, IsReadToTheExpectedSums) {
         const auto& sums = expected.at(uri);
         ASSERT_EQ(volume.parts.size(), sums.size());
         for (size_t i = 0; i < sums.size(); ++i) {
-          EXPECT_EQ(golden::toJson(golden::sumsOf(volume.parts[i])), sums[i]) << uri << " part " << i;
+          EXPECT_EQ(golden::toJson(golden::computeSums(volume.parts[i])), sums[i]) << uri << " part " << i;
         }
       });
 }
 
-TEST(GoldenVolume, HoldsWhatItWasMadeFrom) {
+TEST(GoldenVolume, MatchesItsGenerator) {
   const golden::Scene<VolumeContent> scene = golden::makeVolumeScene();
   const Tileset tileset = readTileset(kVolumeScene);
   EXPECT_EQ(tileset.worldFromScene.matrix(), scene.tileset.worldFromScene.matrix());
@@ -73,11 +73,11 @@ TEST(GoldenVolume, IsTheSameWhenItIsWrittenAgain) {
                                       });
 }
 
-TEST(GoldenVolume, LooksAlongItsRaysAsTheDefinitionSays) {
+TEST(GoldenVolume, RendersItsRaysAsTheDefinitionSays) {
   expectRaysAsDefined<VolumeContent>(kVolumeScene, volumeCodec());
 }
 
-// Samples along a vertical line through a building: there is something, and it is where it should be.
+// Samples along a vertical line through a building, whose roof must be found at its height.
 TEST(GoldenVolume, HasOccupiedCellsAtItsRoofs) {
   const golden::Scene<VolumeContent> scene = golden::makeVolumeScene();
   const VolumePart& part = scene.contents.at("0_0").parts[0];

@@ -8,9 +8,9 @@
 #include "gpu/testing/test_context.h"
 #include "render/testing/source_of_copies.h"
 #include "representations/hash/testing/hash_renderer.h"
-#include "representations/hash/testing/made_hash.h"
+#include "representations/hash/testing/test_hash_content.h"
 #include "representations/hash/vulkan/gpu_hash_drawer.h"
-#include "representations/volume/testing/made_place.h"
+#include "representations/volume/testing/test_scene.h"
 #include "representations/volume/testing/volume_renderer.h"
 #include "representations/volume/vulkan/gpu_volume_drawer.h"
 
@@ -26,14 +26,15 @@ double decibels(const ImageF& a, const ImageF& b) {
   return 10 * std::log10(static_cast<double>(a.pixels.size()) * largest * largest / squares);
 }
 
-// 2x2 cells of made features under one content of them all, which has a network of its own, and a surround.
+// 2x2 cells of synthetic features below one content of all of them, which has a network of its own, and a background
+// block.
 struct HashPlace {
-  TileTree tree = madeTree(2, 2);
+  TileTree tree = testTree(2, 2);
   std::vector<HashContent> contents;
   TileFrame frame;
   uint64_t allBytes = 0, coarsestBytes = 0;
 
-  // `adapt` makes of a content what is to be drawn.
+  // `adapt` changes a content before it is used.
   explicit HashPlace(
       uint32_t cells, const std::function<void(HashContent&)>& adapt = [](HashContent&) {}) {
     frame.low = Vec3d(-2, -2, -1);
@@ -52,18 +53,18 @@ struct HashPlace {
           parts.push_back(std::move(part));
         }
       }
-      add(hashContentOf(std::move(parts), madeHashNetwork(node.level)), adapt);
+      add(makeHashContent(std::move(parts), testHashNetwork(node.level)), adapt);
       node.geometricError = 2.0 / 64 * (1 << node.level);
       if (node.parent < 0) coarsestBytes += bytesInMemory(contents.back());
     }
     HashPart around;
-    around.contracted = around.surround = true;
+    around.contracted = around.backgroundBlock = true;
     around.scale = {2, 2, 1};
     makeHash(around, {16, 32, 0.5f, [](const Vec3d& at) { return at.norm() > 1.2; }}, smoothFeatures);
-    add(hashContentOf({around}, madeHashNetwork(0)), adapt);
+    add(makeHashContent({around}, testHashNetwork(0)), adapt);
     coarsestBytes += bytesInMemory(contents.back());
-    tree.surround = static_cast<int>(tree.tiles.size());
-    tree.tiles.emplace_back().isSurround = true;
+    tree.backgroundBlock = static_cast<int>(tree.tiles.size());
+    tree.tiles.emplace_back().isBackgroundBlock = true;
   }
   void add(HashContent content, const std::function<void(HashContent&)>& adapt) {
     adapt(content);
@@ -75,7 +76,7 @@ struct HashPlace {
   }
 };
 
-// Weights that are the same everywhere: columns of features alone.
+// Makes the level weights the same everywhere: only feature columns remain.
 void withoutLogitColumns(HashContent& content) {
   for (HashPart& part : content.parts) {
     std::vector<uint8_t> features;
@@ -106,29 +107,30 @@ class GpuSceneRendererTest : public testing::Test {
     return {stream, makeGpuHashDrawer(stream), {place.frame, place.tree, place.source(), {}}, settings};
   }
 
-  // Both renderers along a flight.
+  // Compares the images of both renderers along a flight.
   template <class Oracle, class Place>
-  void compare(const Place& place, uint64_t budget, double mostPixels, const ImageF* opaqueDepth = nullptr) {
+  void compare(const Place& place, uint64_t budget, double maximumScreenSpaceError,
+               const ImageF* opaqueDepth = nullptr) {
     SceneRendererSettings settings;
     settings.budgetBytes = budget;
-    settings.selection.mostPixels = mostPixels;
+    settings.selection.maximumScreenSpaceError = maximumScreenSpaceError;
     Oracle oracle(place.frame, place.tree, place.source(), settings);
-    GpuRendererSettings ofCard;
-    ofCard.budgetBytes = budget;
-    ofCard.selection = settings.selection;
-    GpuSceneRenderer card = onGpu(place, ofCard);
+    GpuRendererSettings ofGpu;
+    ofGpu.budgetBytes = budget;
+    ofGpu.selection = settings.selection;
+    GpuSceneRenderer gpu = onGpu(place, ofGpu);
     for (int step = 0; step < 600; step += 75) {
       SCOPED_TRACE(step);
-      const RenderedView wanted = oracle.render(flightCamera(), flightPose(step), opaqueDepth);
-      const RenderedView got = card.render(flightCamera(), flightPose(step), opaqueDepth);
-      EXPECT_GT(decibels(got.colour, wanted.colour), 55);
-      EXPECT_GT(decibels(got.opacity, wanted.opacity), 55);
-      EXPECT_GT(decibels(got.depth, wanted.depth), 45);
-      ASSERT_EQ(card.cut().tiles.size(), oracle.cut().tiles.size());
+      const RenderedView expected = oracle.render(flightCamera(), flightPose(step), opaqueDepth);
+      const RenderedView actual = gpu.render(flightCamera(), flightPose(step), opaqueDepth);
+      EXPECT_GT(decibels(actual.colour, expected.colour), 55);
+      EXPECT_GT(decibels(actual.opacity, expected.opacity), 55);
+      EXPECT_GT(decibels(actual.depth, expected.depth), 45);
+      ASSERT_EQ(gpu.cut().tiles.size(), oracle.cut().tiles.size());
       for (size_t i = 0; i < oracle.cut().tiles.size(); ++i) {
-        EXPECT_EQ(card.cut().tiles[i].content, oracle.cut().tiles[i].content);
+        EXPECT_EQ(gpu.cut().tiles[i].content, oracle.cut().tiles[i].content);
       }
-      EXPECT_LE(card.cache().statistics().mostBytes, budget);
+      EXPECT_LE(gpu.cache().statistics().maxBytes, budget);
     }
   }
 
@@ -143,7 +145,7 @@ ImageF opaqueOnTheLeft() {
   return opaque;
 }
 
-TEST_F(GpuSceneRendererTest, DrawsVolumeAsTheProcessorDoes) {
+TEST_F(GpuSceneRendererTest, DrawsVolumeAsTheCpuDoes) {
   compare<VolumeRenderer>(place(), place().allBytes, 1.5);
 }
 
@@ -156,20 +158,20 @@ TEST_F(GpuSceneRendererTest, EndsRaysOfVolumeWhereSomethingOpaqueStands) {
   compare<VolumeRenderer>(place(), place().allBytes, 16, &opaque);
 }
 
-TEST_F(GpuSceneRendererTest, DrawsHashAsTheProcessorDoes) {
-  const HashPlace made(32);
-  compare<HashRenderer>(made, made.allBytes, 1.5);
+TEST_F(GpuSceneRendererTest, DrawsHashAsTheCpuDoes) {
+  const HashPlace hashPlace(32);
+  compare<HashRenderer>(hashPlace, hashPlace.allBytes, 1.5);
 }
 
 TEST_F(GpuSceneRendererTest, DrawsHashOfSeveralNetworksWithinABudget) {
-  const HashPlace made(32);
-  compare<HashRenderer>(made, made.coarsestBytes + (made.allBytes - made.coarsestBytes) / 2, 0.5);
+  const HashPlace hashPlace(32);
+  compare<HashRenderer>(hashPlace, hashPlace.coarsestBytes + (hashPlace.allBytes - hashPlace.coarsestBytes) / 2, 0.5);
 }
 
-TEST_F(GpuSceneRendererTest, PassesOverEmptySpaceInTwoGridsOfDistances) {
-  const HashPlace made(136);
-  ASSERT_GT(made.contents.front().parts.front().distances.ratio, 1u);
-  compare<HashRenderer>(made, made.allBytes, 16);
+TEST_F(GpuSceneRendererTest, SkipsEmptySpaceInTwoDistanceGrids) {
+  const HashPlace hashPlace(136);
+  ASSERT_GT(hashPlace.contents.front().parts.front().distances.ratio, 1u);
+  compare<HashRenderer>(hashPlace, hashPlace.allBytes, 16);
 }
 
 TEST_F(GpuSceneRendererTest, WeighsLevelsOfHashInEveryWay) {
@@ -187,55 +189,55 @@ TEST_F(GpuSceneRendererTest, WeighsLevelsOfHashInEveryWay) {
   compare<HashRenderer>(everywhere, everywhere.allBytes, 16);
 }
 
-TEST_F(GpuSceneRendererTest, ShowsWhereNothingIsWhatAWholeHashSaysOfTheDirection) {
-  const HashPlace whole(32, [](HashContent& content) { content.isWhole = true; });
+TEST_F(GpuSceneRendererTest, ShowsTheLearnedBackgroundOfHashWhereNothingIs) {
+  const HashPlace whole(32, [](HashContent& content) { content.hasLearnedBackground = true; });
   compare<HashRenderer>(whole, whole.allBytes, 1.5);
   const ImageF opaque = opaqueOnTheLeft();
   compare<HashRenderer>(whole, whole.allBytes, 16, &opaque);
 }
 
-TEST_F(GpuSceneRendererTest, ReadsContentsInTheBackgroundAndShowsInTheEndWhatItWouldHaveWaitedFor) {
+TEST_F(GpuSceneRendererTest, ReadsContentsInTheBackgroundUntilTheImageEqualsTheBlockingOne) {
   GpuRendererSettings settings;
-  settings.selection.mostPixels = 0.5;
+  settings.selection.maximumScreenSpaceError = 0.5;
   GpuSceneRenderer waits = onGpu(place(), settings);
-  const RenderedView wanted = waits.render(flightCamera(), flightPose(0), nullptr);
+  const RenderedView expected = waits.render(flightCamera(), flightPose(0), nullptr);
   settings.inBackground = true;
-  GpuSceneRenderer card = onGpu(place(), settings);
-  card.draw(flightCamera(), flightPose(0));
-  const size_t missing = card.state().missing;
-  EXPECT_GT(missing, 0u);  // coarser contents stand in
-  for (int i = 0; i < 5000 && card.state().missing > 0; ++i) {
-    const size_t before = card.state().missing;
-    if (!card.hasMore()) {
+  GpuSceneRenderer gpu = onGpu(place(), settings);
+  gpu.draw(flightCamera(), flightPose(0));
+  const size_t missing = gpu.state().missing;
+  EXPECT_GT(missing, 0u);  // coarser contents are drawn in their place
+  for (int i = 0; i < 5000 && gpu.state().missing > 0; ++i) {
+    const size_t before = gpu.state().missing;
+    if (!gpu.hasMore()) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
       continue;
     }
-    card.draw(flightCamera(), flightPose(0));
-    EXPECT_EQ(card.state().missing, before - 1);  // one at a time: no picture waits for many
+    gpu.draw(flightCamera(), flightPose(0));
+    EXPECT_EQ(gpu.state().missing, before - 1);  // one at a time: no frame waits for several
   }
-  ASSERT_EQ(card.state().missing, 0u);
-  EXPECT_EQ(card.state().cache.loads, waits.state().cache.loads);
-  const RenderedView got = card.render(flightCamera(), flightPose(0), nullptr);
-  EXPECT_EQ(got.colour.pixels, wanted.colour.pixels);
+  ASSERT_EQ(gpu.state().missing, 0u);
+  EXPECT_EQ(gpu.state().cache.loads, waits.state().cache.loads);
+  const RenderedView actual = gpu.render(flightCamera(), flightPose(0), nullptr);
+  EXPECT_EQ(actual.colour.pixels, expected.colour.pixels);
   for (const auto& [x, y] : {std::pair(0, 0), std::pair(31, 20), std::pair(63, 30)}) {
-    const GpuViewRenderer::Pixel pixel = card.pixelAt(x, y);
-    EXPECT_EQ(pixel.opacity, *wanted.opacity.at(x, y));
-    EXPECT_EQ(pixel.depth, *wanted.depth.at(x, y));
+    const GpuViewRenderer::Pixel pixel = gpu.pixelAt(x, y);
+    EXPECT_EQ(pixel.opacity, *expected.opacity.at(x, y));
+    EXPECT_EQ(pixel.depth, *expected.depth.at(x, y));
   }
 }
 
-TEST_F(GpuSceneRendererTest, MayGoWhileTheCardStillDraws) {
-  const HashPlace made(32);
+TEST_F(GpuSceneRendererTest, CanBeDestroyedWhileTheGpuStillDraws) {
+  const HashPlace hashPlace(32);
   for (int i = 0; i < 3; ++i) {
-    GpuSceneRenderer card = onGpu(made, {});
-    card.draw(flightCamera().scaledTo(300, 200), flightPose(100 * i));
+    GpuSceneRenderer gpu = onGpu(hashPlace, {});
+    gpu.draw(flightCamera().scaledTo(300, 200), flightPose(100 * i));
   }
 }
 
 TEST_F(GpuSceneRendererTest, FollowsCamerasOfOtherSizes) {
-  GpuSceneRenderer card = onGpu(place(), {});
-  EXPECT_EQ(card.render(flightCamera(), flightPose(0), nullptr).colour.width, 64);
-  EXPECT_EQ(card.render(flightCamera().scaledTo(20, 11), flightPose(0), nullptr).opacity.pixels.size(), 220u);
+  GpuSceneRenderer gpu = onGpu(place(), {});
+  EXPECT_EQ(gpu.render(flightCamera(), flightPose(0), nullptr).colour.width, 64);
+  EXPECT_EQ(gpu.render(flightCamera().scaledTo(20, 11), flightPose(0), nullptr).opacity.pixels.size(), 220u);
 }
 
 }  // namespace

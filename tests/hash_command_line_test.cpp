@@ -1,4 +1,4 @@
-// The program as people use it with `--method hash`.
+// Runs the program as a user does, with `--method hash`.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -10,22 +10,22 @@ namespace {
 
 using nlohmann::json;
 
-// Settings that make a model in a moment.
+// Settings that train a model in a moment.
 const std::vector<std::string> kTinyHash = {"lattice=16",
                                             "coarse_levels=3",
                                             "coarse_log2_size=10",
                                             "width=16",
-                                            "levels=2",
+                                            "fine_levels=2",
                                             "fine_log2_size=10",
                                             "direction_width=16",
                                             "occupancy_resolution=16",
                                             "samples_per_step=4096",
                                             "first_rays=64",
-                                            "most_rays=512"};
+                                            "max_rays=512"};
 
 class HashCommandLine : public testing::Test {
  protected:
-  // One city for all tests.
+  // All tests share one city.
   static void SetUpTestSuite() {
     folder_ = fs::weakly_canonical(fs::temp_directory_path()) / ("tessera-hash-line-" + std::to_string(::getpid()));
     fs::remove_all(folder_);
@@ -61,7 +61,7 @@ TEST_F(HashCommandLine, GoesFromACityToPicturesAndNumbers) {
   for (const char* file : {"blocks.svg", "blocks.geojson", "blocks.json", "config.toml"}) {
     EXPECT_TRUE(fs::exists(fs::path(model) / file)) << file;
   }
-  EXPECT_EQ(checkpoints(model).size(), 3u) << "two blocks and the surround";
+  EXPECT_EQ(checkpoints(model).size(), 3u) << "two blocks and the background block";
   const Said judged = run({"eval", model, at("city"), "--json", at("numbers.json")});
   ASSERT_EQ(judged.exitCode, 0) << judged.err;
   EXPECT_GT(json::parse(readTextFile(at("numbers.json"))).at("psnr").get<double>(), 10);
@@ -79,7 +79,7 @@ TEST_F(HashCommandLine, GoesFromACityToPicturesAndNumbers) {
   ASSERT_EQ(scene.exitCode, 0) << scene.err;
   EXPECT_EQ(json::parse(scene.out).at("representation"), "hash");
   EXPECT_EQ(json::parse(scene.out).at("level_0").at("contents"), 2);
-  EXPECT_EQ(json::parse(scene.out).at("surround_0").at("contents"), 1);
+  EXPECT_EQ(json::parse(scene.out).at("background_block_0").at("contents"), 1);
   EXPECT_EQ(json::parse(scene.out).at("level_1").at("contents"), 1) << "both blocks, coarser";
   const Said judgedScene = run({"eval", at("scene"), at("city"), "--json", at("scene.json")});
   ASSERT_EQ(judgedScene.exitCode, 0) << judgedScene.err;
@@ -99,7 +99,7 @@ TEST_F(HashCommandLine, GoesFromACityToPicturesAndNumbers) {
   EXPECT_FALSE(fs::exists(at("odd")));
 }
 
-TEST_F(HashCommandLine, GoesOnWithTheModelThatIsThere) {
+TEST_F(HashCommandLine, ResumesAnExistingModel) {
   const std::string model = at("goes-on");
   ASSERT_EQ(run(trainArguments(model, {"--steps", "12"})).exitCode, 0);
   const auto step = [&] { return json::parse(readTextFile(fs::path(model) / "manifest.json")).at("step"); };
@@ -117,7 +117,7 @@ TEST_F(HashCommandLine, GoesOnWithTheModelThatIsThere) {
   EXPECT_NE(method.err.find("resume with --method hash"), std::string::npos) << method.err;
 }
 
-TEST_F(HashCommandLine, RefusesWhatIsOfOtherMethods) {
+TEST_F(HashCommandLine, RejectsOptionsThatItDoesNotSupport) {
   const Said resident = run(trainArguments(at("nothing"), {"--steps", "3", "--resident-blocks", "1"}));
   EXPECT_NE(resident.exitCode, 0);
   EXPECT_NE(resident.err.find("--resident-blocks"), std::string::npos) << resident.err;

@@ -1,4 +1,4 @@
-// The tests that ARCHITECTURE.md names for the invariants of each representation are there.
+// Tests that the tests exist which docs/invariants.md names for the invariants of each representation.
 #include <gtest/gtest.h>
 
 #include <regex>
@@ -25,9 +25,9 @@ std::set<std::string> testsIn(const fs::path& folder) {
   return names;
 }
 
-// The numbers of the rows of a representation's table.
+// Returns the numbers of the rows in a representation's table.
 std::vector<int> provedRows(const std::string& representation) {
-  const std::string text = readTextFile(kProject / "ARCHITECTURE.md");
+  const std::string text = readTextFile(kProject / "docs/invariants.md");
   const size_t from = text.find("\n## Invariants of `" + representation + "`\n");
   if (from == std::string::npos) return {};
   const std::string section = text.substr(from, text.find("\n## ", from + 1) - from);

@@ -1,5 +1,5 @@
-// Real photographs cut into blocks. They are no part of the project: TESSERA_SHARED_DATA names the folder that holds
-// them.
+// Partitions real photographs into blocks. The photographs are not part of the project: TESSERA_SHARED_DATA names the
+// folder that contains them.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -41,7 +41,7 @@ TEST_F(PartitionOfRealData, BrightonBeachIsAGeoreferencedFieldUnderAFlight) {
   const Capture capture = importCapture(*beach, folder_ / "capture", {.downscale = 8});
   const Partition partition = partitionCapture(capture, {.blocks = {false, 2, 2}, .enough = {3, 4096}});
 
-  // 40 m above take-off; the beach is not flat.
+  // The flight was 40 m above take-off; the beach is not flat.
   double flight = 0;
   for (const Photo& photo : capture.photos) {
     flight +=
@@ -49,10 +49,10 @@ TEST_F(PartitionOfRealData, BrightonBeachIsAGeoreferencedFieldUnderAFlight) {
   }
   EXPECT_NEAR(flight, 40, 12);
   EXPECT_TRUE(partition.region.looksAtGround);
-  // What a nadir photo at that height resolves: height over focal length.
+  // The ground resolution of a nadir photo at that height: height over focal length.
   EXPECT_NEAR(partition.region.groundPixel, flight / capture.cameras[0].focalX(), 0.1 * partition.region.groundPixel);
 
-  // The photos stand over the region, most points inside it and between its heights.
+  // The photos are above the region; most points are inside it and within its height range.
   size_t inside = 0, between = 0;
   for (const SparsePoint& point : capture.points) {
     const Vec3d at = partition.ground.inGround(point.xInWorld);
@@ -66,7 +66,7 @@ TEST_F(PartitionOfRealData, BrightonBeachIsAGeoreferencedFieldUnderAFlight) {
   for (const CellCoverage& cell : partition.coverage) EXPECT_GE(cell.photos, 3);
   EXPECT_TRUE(partition.thin.empty());
 
-  // The map lies where the photos' GPS says that they were taken.
+  // The map is where the photos' GPS places them.
   ASSERT_TRUE(writeBlockMap(folder_, capture, partition));
   const nlohmann::json map = nlohmann::json::parse(readTextFile(folder_ / "blocks.geojson"));
   double west = 180, east = -180, south = 90, north = -90;
@@ -94,7 +94,7 @@ TEST_F(PartitionOfRealData, FoxIsOneSquareAmongCameras) {
   EXPECT_FALSE(partition.region.looksAtGround);
   EXPECT_EQ(partition.region.rectangle.width, partition.region.rectangle.depth);
   EXPECT_LE(partition.grid.top - partition.grid.bottom, partition.grid.edge * (1 + 1e-12));
-  // Everyone looks at it.
+  // Every camera looks at it.
   ASSERT_EQ(partition.coverage.size(), 1u);
   EXPECT_EQ(partition.coverage[0].photos, static_cast<int>(capture.photosIn(Split::train).size()));
   EXPECT_FALSE(writeBlockMap(folder_, capture, partition));

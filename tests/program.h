@@ -1,4 +1,4 @@
-// For tests: runs the built `tessera` with an argument vector, no shell, and takes what it says.
+// For tests: runs the built `tessera` with an argument vector, without a shell, and captures its output.
 #pragma once
 
 #include <fcntl.h>
@@ -60,14 +60,14 @@ class Program {
 
   void kill(int signal) { ::kill(process_, signal); }
 
-  // Whether it has ended already.
+  // Returns whether the process has ended.
   bool ended() {
     siginfo_t info{};
     return waitid(P_PID, static_cast<id_t>(process_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
            info.si_pid == process_;
   }
 
-  // On its standard output, until now.
+  // Returns its standard output so far.
   std::string said() const { return readTextFile(out_); }
 
   Said wait() {
@@ -85,7 +85,7 @@ class Program {
   pid_t process_ = -1;
 };
 
-// Whether a program of that name can be started.
+// Returns whether a program of that name can be started.
 inline bool isInPath(const std::string& name) {
   const char* search = std::getenv("PATH");
   std::stringstream folders(search == nullptr ? "" : search);
@@ -95,7 +95,7 @@ inline bool isInPath(const std::string& name) {
   return false;
 }
 
-// Until it is so, or the program has ended.
+// Waits until the condition holds or the program has ended.
 template <class Condition>
 void waitUntil(Program& program, const Condition& isSo) {
   while (!isSo() && !program.ended()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
@@ -104,8 +104,8 @@ inline void waitForFile(Program& program, const fs::path& file) {
   waitUntil(program, [&] { return fs::exists(file); });
 }
 
-// Of a model's last checkpoint; -1 where there is none.
-inline int64_t stepOf(const fs::path& model) {
+// Returns the step of a model's last checkpoint; -1 if there is none.
+inline int64_t readLastStep(const fs::path& model) {
   const fs::path manifest = model / "manifest.json";
   return fs::exists(manifest) ? nlohmann::json::parse(readTextFile(manifest)).at("step").get<int64_t>() : -1;
 }

@@ -1,5 +1,5 @@
-// For tests: which representations a source file names, in C++, GLSL or TypeScript. Comments do not count, and neither
-// do ordinary words.
+// For tests: finds the representations that a source file names, in C++, GLSL or TypeScript. Comments and ordinary
+// words do not count.
 #pragma once
 
 #include <algorithm>
@@ -13,11 +13,11 @@
 
 namespace tessera {
 
-// Names that are too ordinary to stand within identifiers of their own (ConfigField, SurfaceMesh): of them only texts
-// and paths count.
+// Names that are also ordinary parts of identifiers (ConfigField, SurfaceMesh): of these only string literals and paths
+// count.
 inline constexpr std::string_view kOrdinaryNames[] = {"field", "mesh"};
 
-// The others of the list, of which identifiers count too (VolumeContent, decodeHash).
+// The other names of the list, of which identifiers count too (VolumeContent, decodeHash).
 inline const std::vector<std::string_view>& distinctNames() {
 #define TESSERA_NAME(name, Name) #name,
   static const std::vector<std::string_view> names = [] {
@@ -29,7 +29,7 @@ inline const std::vector<std::string_view>& distinctNames() {
   return names;
 }
 
-// Words of identifiers and of file names that mean something else.
+// Words in identifiers and file names that mean something else.
 inline constexpr std::string_view kHomonyms[] = {
     "hash grid",      // the encoding of positions, an operation that several representations use
     "lattice hash",   // of a point of that grid
@@ -38,8 +38,8 @@ inline constexpr std::string_view kHomonyms[] = {
     "light volume",   // of the synthetic city: how much light reaches a place
 };
 
-// "hash grid level" of HashGridLevel, hash_grid_level, kHashGridLevel or hash-grid-level.h.
-inline std::string wordsOf(std::string_view name) {
+// Returns "hash grid level" for HashGridLevel, hash_grid_level, kHashGridLevel or hash-grid-level.h.
+inline std::string splitWords(std::string_view name) {
   std::string words;
   for (size_t i = 0; i < name.size(); ++i) {
     const auto is = [&](size_t at, int (*kind)(int)) {
@@ -56,14 +56,14 @@ inline std::string wordsOf(std::string_view name) {
   return words;
 }
 
-// Whatever the case of its letters.
+// Returns whether `text` contains `letters` (lower case), ignoring the case of `text`.
 inline bool hasLetters(std::string_view text, std::string_view letters) {
   const auto same = [](char a, char b) { return std::tolower(static_cast<unsigned char>(a)) == b; };
   return std::search(text.begin(), text.end(), letters.begin(), letters.end(), same) != text.end();
 }
 
-inline bool hasWords(const std::string& words, std::string_view wanted) {
-  return (" " + words + " ").find(" " + std::string(wanted) + " ") != std::string::npos;
+inline bool hasWords(const std::string& words, std::string_view phrase) {
+  return (" " + words + " ").find(" " + std::string(phrase) + " ") != std::string::npos;
 }
 
 class NamedRepresentations {
@@ -113,23 +113,23 @@ class NamedRepresentations {
       if (names(name)) names_.emplace(name);
     }
     for (const std::string_view name : distinctNames()) {
-      if (names(name) || (isPath && isWordOf(content, name))) names_.emplace(name);
+      if (names(name) || (isPath && containsWord(content, name))) names_.emplace(name);
     }
   }
 
   void identifier(std::string_view identifier) {
     for (const std::string_view name : distinctNames()) {
-      if (identifier != name && isWordOf(identifier, name)) names_.emplace(name);
+      if (identifier != name && containsWord(identifier, name)) names_.emplace(name);
     }
   }
 
   static bool contains(std::string_view text, const std::string& part) {
     return text.find(part) != std::string_view::npos;
   }
-  // A word of an identifier or of a path, and not of a homonym.
-  static bool isWordOf(std::string_view identifier, std::string_view name) {
+  // Returns whether a name is a word of an identifier or path and not part of a homonym.
+  static bool containsWord(std::string_view identifier, std::string_view name) {
     if (!hasLetters(identifier, name)) return false;
-    const std::string words = wordsOf(identifier);
+    const std::string words = splitWords(identifier);
     return hasWords(words, name) && std::none_of(std::begin(kHomonyms), std::end(kHomonyms),
                                                  [&](std::string_view other) { return hasWords(words, other); });
   }

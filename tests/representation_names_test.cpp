@@ -1,4 +1,5 @@
-// Code that is no representation's own names none, so that another one is a row in representations/list.h.
+// Tests that code outside of a representation does not name any, so that adding one requires only a row in
+// representations/list.h.
 #include "tests/representation_names.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +24,7 @@ bool isSource(const fs::path& path) {
   return false;
 }
 
-// Folders where representations are named, and those of tests.
+// Returns whether a folder may name representations, or contains tests.
 bool isApart(const std::string& path) {
   if (path.find("/testing/") != std::string::npos) return true;
   for (const char* folder : {"src/representations/", "src/raymarch/", "shaders/representations/", "shaders/raymarch/",
@@ -33,7 +34,7 @@ bool isApart(const std::string& path) {
   return false;
 }
 
-// By file, relative to the project.
+// Returns the representations that each file names, by path relative to the project.
 std::map<std::string, std::set<std::string>> namesIn(const std::vector<std::string>& folders) {
   std::map<std::string, std::set<std::string>> names;
   for (const std::string& folder : folders) {
@@ -80,7 +81,7 @@ TEST(RepresentationNames, CoverTheList) {
 }
 
 TEST(RepresentationNames, StandTogetherInFewFilesThatAreNoRepresentations) {
-  constexpr size_t kMost = 2;
+  constexpr size_t kMax = 2;
   std::string files;
   size_t count = 0;
   for (const auto& [path, names] : namesIn({"apps", "src", "shaders", "web/src", "bench"})) {
@@ -90,7 +91,7 @@ TEST(RepresentationNames, StandTogetherInFewFilesThatAreNoRepresentations) {
     for (const std::string& name : names) files += " " + name;
   }
   std::printf("%zu files name two or more representations:%s\n", count, files.c_str());
-  EXPECT_LE(count, kMost) << files;
+  EXPECT_LE(count, kMax) << files;
 }
 
 TEST(RepresentationNames, DoNotStandInProgramsNorInWhatServesAllOfThem) {

@@ -1,4 +1,4 @@
-// All settings of all methods: what is shared means the same everywhere, and every setting is what it says.
+// Tests all settings of all methods: shared settings mean the same everywhere, and each setting behaves as documented.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -24,7 +24,7 @@ void forEachMethod(const Use& use) {
   use("hash", HashConfig());
 }
 
-TEST(Settings, OfAllMethodsAreLookedAt) {
+TEST(Settings, AreTestedForAllMethods) {
   std::vector<std::string> methods;
   forEachMethod([&](const char* method, const auto&) { methods.emplace_back(method); });
 #define TESSERA_NAME(name, Name) #name,
@@ -33,11 +33,11 @@ TEST(Settings, OfAllMethodsAreLookedAt) {
 }
 
 struct Listed {
-  std::string method, text;  // of its default
-  ConfigField field;         // what it points at is gone
+  std::string method, text;  // of the setting's default value
+  ConfigField field;         // its pointer is dangling; used for its type and text
 };
 
-// Of each key, the settings of the methods that have it.
+// Returns, for each key, the settings of the methods that have it.
 std::map<std::string, std::vector<Listed>> settingsByKey() {
   std::map<std::string, std::vector<Listed>> byKey;
   forEachMethod([&](const char* method, auto config) {
@@ -48,7 +48,7 @@ std::map<std::string, std::vector<Listed>> settingsByKey() {
   return byKey;
 }
 
-// Another value than it has, whatever the field.
+// Changes the value of a field of any type.
 void change(const ConfigField& field) {
   std::visit(
       [](auto* value) {
@@ -66,10 +66,10 @@ void change(const ConfigField& field) {
       field.value);
 }
 
-TEST(Settings, OfOneKeyMeanTheSameInAllMethods) {
-  const auto isAutoOf = [](const ConfigField& found, const ConfigField& given) {
-    return std::holds_alternative<NumberOrAuto*>(found.value) && std::holds_alternative<double*>(given.value) &&
-           found.help.starts_with(std::string(given.help) + "; auto: ");
+TEST(Settings, WithTheSameKeyMeanTheSameInAllMethods) {
+  const auto isAutoVariant = [](const ConfigField& candidate, const ConfigField& given) {
+    return std::holds_alternative<NumberOrAuto*>(candidate.value) && std::holds_alternative<double*>(given.value) &&
+           candidate.help.starts_with(std::string(given.help) + "; auto: ");
   };
   size_t shared = 0;
   for (const auto& [key, settings] : settingsByKey()) {
@@ -77,8 +77,8 @@ TEST(Settings, OfOneKeyMeanTheSameInAllMethods) {
     for (const Listed& a : settings) {
       EXPECT_FALSE(a.field.help.empty()) << key;
       for (const Listed& b : settings) {
-        // One method may find out what another is given: then its help says that besides.
-        if (isAutoOf(a.field, b.field) || isAutoOf(b.field, a.field)) continue;
+        // One method may determine by itself what another is given: its help then says so in addition.
+        if (isAutoVariant(a.field, b.field) || isAutoVariant(b.field, a.field)) continue;
         EXPECT_EQ(a.field.help, b.field.help) << key << " of " << a.method << " and " << b.method;
         EXPECT_TRUE(a.field.isSameTypeAs(b.field)) << key << " of " << a.method << " and " << b.method;
       }
@@ -111,7 +111,7 @@ TEST(Settings, HaveOtherDefaultsOnlyWhereAMethodStatesItsOwn) {
 TEST(Settings, HaveTheDefaultThatTheHelpShows) {
   forEachMethod([](const char* method, auto config) {
     const fs::path path = fs::temp_directory_path() / ("tessera_settings_" + std::to_string(::getpid()) + ".toml");
-    writeFileAtomically(path, configToToml(config.fields()));  // as `tessera train --help` prints
+    writeFileAtomically(path, configToToml(config.fields()));  // as `tessera train --help` prints them
     auto other = config;
     for (const ConfigField& field : other.fields()) change(field);
     configFromToml(other.fields(), path);
@@ -138,9 +138,9 @@ TEST(Settings, TakeTheirOwnDefaults) {
   });
 }
 
-// What check() says of a config in which one setting is changed by `set`.
+// Returns the message of check() for a config in which `set` changes one setting.
 template <class Config>
-std::string refusalOf(Config config, size_t setting, const std::function<void(const ConfigField&)>& set) {
+std::string rejectionSubject(Config config, size_t setting, const std::function<void(const ConfigField&)>& set) {
   set(config.fields()[setting]);
   try {
     config.check();
@@ -187,12 +187,12 @@ TEST(Settings, AreRefusedOutOfTheirBounds) {
       const std::string named = "--set " + std::string(field.name) + "=";
       for (const double wrong : wrongs) {
         if (std::count(bounds.sizes.begin(), bounds.sizes.end(), wrong)) continue;
-        const std::string refusal = refusalOf(config, i, [&](const ConfigField& set) { setNumber(set, wrong); });
+        const std::string refusal = rejectionSubject(config, i, [&](const ConfigField& set) { setNumber(set, wrong); });
         EXPECT_TRUE(refusal.starts_with(named)) << method << " " << field.name << "=" << wrong << ": " << refusal;
       }
       if (bounds.choices.empty()) continue;
       const auto nonsense = [](const ConfigField& set) { *std::get<std::string*>(set.value) = "nonsense"; };
-      EXPECT_EQ(refusalOf(config, i, nonsense), named + "nonsense") << method;
+      EXPECT_EQ(rejectionSubject(config, i, nonsense), named + "nonsense") << method;
     }
   });
 }
@@ -203,8 +203,8 @@ TEST(Settings, AreTakenAtTheirBounds) {
     for (size_t i = 0; i < fields.size(); ++i) {
       if (!fields[i].bounds.isBounded) continue;
       for (const double bound : {fields[i].bounds.low, fields[i].bounds.high}) {
-        const std::string refusal = refusalOf(config, i, [&](const ConfigField& set) { setNumber(set, bound); });
-        // Others may no longer fit it.
+        const std::string refusal = rejectionSubject(config, i, [&](const ConfigField& set) { setNumber(set, bound); });
+        // Other settings may then be inconsistent with it.
         const std::string named = "--set " + std::string(fields[i].name) + "=";
         EXPECT_FALSE(refusal.starts_with(named) && refusal.find(' ', 6) == std::string::npos)
             << method << " " << fields[i].name << "=" << bound << ": " << refusal;
@@ -213,11 +213,11 @@ TEST(Settings, AreTakenAtTheirBounds) {
   });
 }
 
-// A setting that is declared but not listed would be lost: fields point at members, and together they cover the struct,
-// but for what alignment leaves free.
+// A setting that is declared but not listed would not be saved. Fields point at members, and together they cover the
+// struct except for its alignment padding.
 TEST(Settings, AreAllListed) {
   forEachMethod([](const char* method, auto config) {
-    std::map<size_t, std::pair<size_t, std::string>> places;  // where each begins: where it ends
+    std::map<size_t, std::pair<size_t, std::string>> places;  // begin → end, and name
     const char* const begin = reinterpret_cast<const char*>(&config);
     const std::vector<ConfigField> fields = config.fields();
     for (const ConfigField& field : fields) {

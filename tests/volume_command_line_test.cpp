@@ -1,4 +1,4 @@
-// The program as people use it on large places: blocks, tiles, and what it says when something is wrong with them.
+// Runs the program as a user does on large places: blocks, tiles, and error messages about them.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -13,16 +13,16 @@ namespace {
 
 using nlohmann::json;
 
-// Settings that make a model in a moment.
+// Settings that train a model in a moment.
 const std::vector<std::string> kTinyVolume = {
     "voxels=16",          "planes=32",         "grid_levels=4",        "grid_log2_size=10",  "grid_finest=32",
     "width=16",           "proposal_levels=3", "proposal_log2_size=8", "proposal_finest=16", "first_intervals=12",
-    "second_intervals=8", "samples=8",         "texels_per_step=8192", "first_rays=64",      "most_rays=512",
+    "second_intervals=8", "samples=8",         "texels_per_step=8192", "first_rays=64",      "max_rays=512",
     "sparsity_points=128"};
 
 class VolumeCommandLine : public testing::Test {
  protected:
-  // One city for all tests.
+  // All tests share one city.
   static void SetUpTestSuite() {
     folder_ = fs::weakly_canonical(fs::temp_directory_path()) / ("tessera-volume-line-" + std::to_string(::getpid()));
     fs::remove_all(folder_);
@@ -42,23 +42,23 @@ class VolumeCommandLine : public testing::Test {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }
-  // A model and its scene, made once.
+  // A model, and the scene baked from it, each made once.
   static std::string model() {
-    const std::string made = at("model");
-    if (!fs::exists(made)) {
-      const Said said = run(trainArguments(made, {"--steps", "40"}));
+    const std::string modelPath = at("model");
+    if (!fs::exists(modelPath)) {
+      const Said said = run(trainArguments(modelPath, {"--steps", "40"}));
       EXPECT_EQ(said.exitCode, 0) << said.err;
     }
-    return made;
+    return modelPath;
   }
   static std::string scene() {
-    const std::string made = at("scene");
-    if (!fs::exists(made)) {
-      const Said said = run({"bake", model(), made});
+    const std::string scenePath = at("scene");
+    if (!fs::exists(scenePath)) {
+      const Said said = run({"bake", model(), scenePath});
       EXPECT_EQ(said.exitCode, 0) << said.err;
       EXPECT_TRUE(contains(said.out, "macroblocks")) << said.out;
     }
-    return made;
+    return scenePath;
   }
   static std::vector<Bytes> checkpoints(const std::string& model) {
     const json manifest = json::parse(readTextFile(fs::path(model) / "manifest.json"));
@@ -73,7 +73,7 @@ TEST_F(VolumeCommandLine, GoesTheWholeWayFromACityToThePicturesOfAScene) {
   for (const char* file : {"blocks.svg", "blocks.geojson", "blocks.json", "config.toml"}) {
     EXPECT_TRUE(fs::exists(fs::path(model()) / file)) << file;
   }
-  EXPECT_EQ(checkpoints(model()).size(), 3u) << "two blocks and the surround";
+  EXPECT_EQ(checkpoints(model()).size(), 3u) << "two blocks and the background block";
   for (const std::string& what : {model(), scene()}) {
     const Said said = run({"eval", what, at("city"), "--json", at("eval.json")});
     EXPECT_EQ(said.exitCode, 0) << said.err;
@@ -82,7 +82,7 @@ TEST_F(VolumeCommandLine, GoesTheWholeWayFromACityToThePicturesOfAScene) {
     EXPECT_EQ(result.at("views").size(), 2u);
     EXPECT_TRUE(fs::exists(fs::path(what) / "report.html"));
   }
-  // Two blocks, and a level that holds both.
+  // Two blocks, and a level that merges both.
   const Said coarse = run({"eval", scene(), at("city"), "--lod", "1", "--json", at("eval.json")});
   EXPECT_EQ(coarse.exitCode, 0) << coarse.err;
   EXPECT_GT(json::parse(readTextFile(at("eval.json"))).at("psnr").get<double>(), 8);
@@ -104,14 +104,15 @@ TEST_F(VolumeCommandLine, GoesTheWholeWayFromACityToThePicturesOfAScene) {
   EXPECT_EQ(holds.at("kind"), "scene");
   EXPECT_EQ(holds.at("level_0").at("contents"), 2);
   EXPECT_EQ(holds.at("level_1").at("contents"), 1);
-  for (const char* surround : {"surround_0", "surround_1"}) EXPECT_EQ(holds.at(surround).at("contents"), 1);
+  for (const char* backgroundBlock : {"background_block_0", "background_block_1"})
+    EXPECT_EQ(holds.at(backgroundBlock).at("contents"), 1);
   uintmax_t onDisk = 0;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(scene())) {
     if (entry.path().extension() == ".glb") onDisk += entry.file_size();
   }
   const auto sum = [&](const char* what) {
     int64_t bytes = 0;
-    for (const char* part : {"level_0", "level_1", "surround_0", "surround_1"}) {
+    for (const char* part : {"level_0", "level_1", "background_block_0", "background_block_1"}) {
       bytes += holds.at(part).at(what).get<int64_t>();
     }
     return bytes;
@@ -120,12 +121,12 @@ TEST_F(VolumeCommandLine, GoesTheWholeWayFromACityToThePicturesOfAScene) {
   EXPECT_GT(sum("bytes_in_memory"), static_cast<int64_t>(onDisk));
 }
 
-TEST_F(VolumeCommandLine, DrawsNoLevelThatHoldsNothingButTheOthers) {
-  const Said trained = run(trainArguments(at("flat"), {"--steps", "10", "--set", "level_share=0"}));
+TEST_F(VolumeCommandLine, RejectsALevelThatOnlyGroupsOthers) {
+  const Said trained = run(trainArguments(at("flat"), {"--steps", "10", "--set", "lod_step_fraction=0"}));
   ASSERT_EQ(trained.exitCode, 0) << trained.err;
   ASSERT_EQ(run({"bake", at("flat"), at("flat.scene")}).exitCode, 0);
   const json tileset = json::parse(readTextFile(fs::path(at("flat.scene")) / "tileset.json"));
-  EXPECT_EQ(tileset.at("extensions").at("TESSERA_scene").at("levels"), 2);  // the root is one
+  EXPECT_EQ(tileset.at("extensions").at("TESSERA_scene").at("levels"), 2);  // the root is a level
   const Said said = run({"eval", at("flat.scene"), at("city"), "--lod", "1"});
   EXPECT_EQ(said.exitCode, 1);
   EXPECT_TRUE(contains(said.err, "flat.scene")) << said.err;
@@ -149,7 +150,7 @@ TEST_F(VolumeCommandLine, MeasuresWhatSkippingSavesAndAFlightWithASmallCache) {
   EXPECT_EQ(cache.at("all").at("budget_bytes"), cache.at("all_bytes"));
   EXPECT_EQ(cache.at("all").at("steps_in_full"), 20);
   EXPECT_EQ(cache.at("all").at("steps_unlike_unbounded"), 0);
-  // Not quite enough for all, and not even for the coarsest level.
+  // A budget slightly below the whole scene, and one below the coarsest level.
   const double mebibytes = cache.at("all_bytes").get<double>() / 1048576;
   const Said coarser = run({"eval", scene(), at("city"), "--memory-mib", std::to_string(0.99 * mebibytes)});
   EXPECT_EQ(coarser.exitCode, 0) << coarser.err;
@@ -168,9 +169,9 @@ TEST_F(VolumeCommandLine, EndsWithTheSameBytesHoweverOftenItIsKilled) {
   const std::string unbroken = at("unbroken"), killed = at("killed");
   ASSERT_EQ(run(trainArguments(unbroken, {"--steps", "60"})).exitCode, 0);
   for (int times = 0; times < 3; ++times) {
-    const int64_t before = stepOf(killed);
+    const int64_t before = readLastStep(killed);
     Program program(folder_, trainArguments(killed, {"--steps", "60", "--resume", "--checkpoint-seconds", "0"}));
-    waitUntil(program, [&] { return stepOf(killed) > before + 2; });
+    waitUntil(program, [&] { return readLastStep(killed) > before + 2; });
     program.kill(SIGKILL);
     program.wait();
   }
@@ -196,7 +197,7 @@ TEST_F(VolumeCommandLine, BakesWithFewBlocksInMemory) {
   ASSERT_EQ(said.exitCode, 0) << said.err;
   EXPECT_TRUE(contains(said.err, "raise --resident-blocks")) << said.err;
   EXPECT_EQ(json::parse(said.out).at("tiles"), 3);
-  // As many as there are: the scene is the same.
+  // With as many resident blocks as there are, the scene is the same.
   ASSERT_EQ(run({"bake", model(), at("whole"), "--resident-blocks", "2"}).exitCode, 0);
   const auto tileset = [](const std::string& of) { return readTextFile(fs::path(of) / "tileset.json"); };
   EXPECT_EQ(tileset(at("whole")), tileset(scene()));
@@ -224,7 +225,7 @@ TEST_F(VolumeCommandLine, BakesAHazySkyOrTheBackgroundThatIsAskedFor) {
 
 TEST_F(VolumeCommandLine, LeavesTheOldSceneWholeWhenBakingIsKilled) {
   const std::string rebaked = at("rebaked"), other = at("other");
-  // Another model, with more to bake: there is time to kill it.
+  // Another model that takes longer to bake, so that there is time to kill the process.
   ASSERT_EQ(run(trainArguments(other, {"--steps", "30", "--set", "planes=512", "--set", "voxels=64"})).exitCode, 0);
   ASSERT_EQ(run({"bake", model(), rebaked}).exitCode, 0);
   const auto tiles = [&] {
@@ -270,7 +271,7 @@ TEST_F(VolumeCommandLine, PlansForTheMemoryThatItIsGiven) {
   EXPECT_FALSE(contains(run(trainArguments(at("planned"), {"--steps", "2", "--resume"})).err, "there are"));
 }
 
-TEST_F(VolumeCommandLine, RefusesBlocksThatAreNone) {
+TEST_F(VolumeCommandLine, RejectsInvalidBlocks) {
   for (const char* blocks : {"2", "0x2", "2x", "-1x2", "many", "5000x1", "99999x99999"}) {
     std::vector<std::string> arguments = {"train", at("city"), at("never"), "--method", "volume", "--blocks", blocks};
     const Said said = run(arguments);
@@ -293,8 +294,17 @@ TEST_F(VolumeCommandLine, RefusesBlocksThatAreNone) {
 }
 
 TEST_F(VolumeCommandLine, ExportsASceneOfOneBlockForMerfsViewer) {
-  std::vector<std::string> arguments = {"train", at("city"), at("one"), "--method", "volume",         "--blocks",
-                                        "1x1",   "--steps",  "40",      "--set",    "surround=border"};
+  std::vector<std::string> arguments = {"train",
+                                        at("city"),
+                                        at("one"),
+                                        "--method",
+                                        "volume",
+                                        "--blocks",
+                                        "1x1",
+                                        "--steps",
+                                        "40",
+                                        "--set",
+                                        "background_block=border"};
   for (const std::string& setting : kTinyVolume) arguments.insert(arguments.end(), {"--set", setting});
   for (const char* setting : {"voxels=32", "planes=512"}) arguments.insert(arguments.end(), {"--set", setting});
   const Said trained = run(arguments);
@@ -320,7 +330,7 @@ TEST_F(VolumeCommandLine, ExportsASceneOfOneBlockForMerfsViewer) {
     EXPECT_EQ(refused.exitCode, 1) << refused.err;
     EXPECT_TRUE(contains(refused.err, part)) << refused.err;
   };
-  explained(run({"export", scene(), at("never"), "--format", "merf"}), "--blocks 1x1 --set surround=border");
+  explained(run({"export", scene(), at("never"), "--format", "merf"}), "--blocks 1x1 --set background_block=border");
   explained(run({"export", at("one"), at("never"), "--format", "merf"}), "tessera bake");
   explained(run({"export", at("one.scene"), at("city"), "--format", "merf"}), "would be lost");
   EXPECT_FALSE(fs::exists(at("never")));
@@ -344,7 +354,7 @@ TEST_F(VolumeCommandLine, ExplainsWhatIsWrongWithModelsAndScenes) {
   };
   explained(run({"bake", at("city"), at("never")}), "no trained model");
   explained(run({"bake", model(), at("never"), "--capture", at("nowhere")}), "nowhere");
-  explained(run(trainArguments(at("never"), {"--set", "surround=all"})), "surround");
+  explained(run(trainArguments(at("never"), {"--set", "background_block=all"})), "background_block");
   explained(run(trainArguments(at("never"), {"--set", "preset=gpu"})), "preset");
   const fs::path broken = at("broken");
   fs::copy(scene(), broken, fs::copy_options::recursive);

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds the browser's viewer into web/dist; packages come from npm, as web/package-lock.json names them.
+# Builds the browser's viewer into web/dist; packages are downloaded from npm, as pinned in web/package-lock.json.
 #   tools/build-web.sh [--packages-only]
 set -euo pipefail
 cd "$(dirname "$0")/../web"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what building and testing tessera needs on Debian 12. As root, or with sudo. Nothing is done when all is there.
+# Installs what building and testing tessera needs on Debian 12. Run as root or with sudo. Does nothing if everything is installed.
 #   tools/install-debian-packages.sh [--browser] [--fuzz] [--bench]
 set -euo pipefail
 

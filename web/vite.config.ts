@@ -6,7 +6,7 @@ export default defineConfig({
   build: {
     target: 'es2022',
     chunkSizeWarningLimit: 1000,
-    rollupOptions: { input: ['index.html', 'plain.html'] },
+    rollupOptions: { input: ['index.html', 'headless.html'] },
   },
   server: { fs: { allow: ['..'] } }, // ../shaders
   test: { testTimeout: 60000, hookTimeout: 60000 },

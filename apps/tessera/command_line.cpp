@@ -10,9 +10,9 @@ namespace tessera {
 
 void addDeviceFlags(CLI::App& verb, DeviceOptions& options) {
   verb.add_option("--device", options.kind,
-                  "what computes: auto (a graphics card, else cpu), cpu, vulkan, vulkan:<index or name> or reference")
+                  "what computes: auto (a GPU, else cpu), cpu, vulkan, vulkan:<index or name> or reference")
       ->capture_default_str();
-  verb.add_option("--threads", options.threads, "processor threads; 0: all cores")
+  verb.add_option("--threads", options.threads, "CPU threads; 0: all cores")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));
 }
@@ -34,14 +34,14 @@ int runCommandLine(CLI::App& app, int argc, char** argv, const std::string& more
     run();
     return 0;
   } catch (const CLI::RuntimeError& ended) {
-    return ended.get_exit_code();  // as the verb wants it
+    return ended.get_exit_code();  // the status that the verb chose
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   } catch (const Error& error) {
     std::fprintf(stderr, "tessera: error: %s\n", error.what());
   } catch (const std::filesystem::filesystem_error& error) {
     const Error said(error.path1().string(), "", error.code().message(),
-                     "see that the disk is there and has room, and that the folder may be changed");
+                     "check that the disk is mounted and has free space, and that the folder is writable");
     std::fprintf(stderr, "tessera: error: %s\n", said.what());
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr, "tessera: error: memory: this machine has not enough; %s\n", moreMemory.c_str());

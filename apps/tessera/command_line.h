@@ -1,4 +1,4 @@
-// What the programs' command lines share: flags, and what becomes of errors.
+// What the command lines of the programs share: flags, and the handling of errors.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -9,15 +9,15 @@
 
 namespace tessera {
 
-// Flags of whatever computes.
+// Adds the flags of every verb that computes on a device.
 void addDeviceFlags(CLI::App& verb, DeviceOptions& options);
 
-// Of --size: "1280x720". Throws CLI::ValidationError.
+// Parses the value of --size, "1280x720". Throws CLI::ValidationError if it is none.
 void parsePictureSize(const std::string& size, int& width, int& height);
 
-// Parses, then runs; says in one line on stderr what went wrong. → what the program ends with: 0, 1 (failed), 2
-// (usage), or as a CLI::RuntimeError has it.
-// `moreMemory`: what to do where the machine has too little.
+// Parses the command line, calls `run`, and reports an error as one line on stderr. Returns the exit status: 0, 1
+// (failed), 2 (usage error), or the status of a CLI::RuntimeError. `moreMemory`: the advice to print if the machine
+// runs out of memory.
 int runCommandLine(
     CLI::App& app, int argc, char** argv, const std::string& moreMemory, const std::function<void()>& run = [] {});
 

@@ -1,4 +1,4 @@
-// What a folder that was named holds.
+// Detects what a folder given on the command line contains.
 #pragma once
 
 #include "base/file.h"

@@ -1,4 +1,5 @@
-// tessera: photographs of a large place to a neural scene. Every verb is a library function; errors are caught here.
+// tessera: turns photographs of a large place into a neural scene. Every verb calls one library function; errors are
+// caught here.
 
 #include <malloc.h>
 
@@ -39,8 +40,8 @@ void catchInterrupts() {
 }  // namespace tessera
 
 int main(int argc, char** argv) {
-  // Photos come and go: their memory goes back to the system each time, however large those before were. (By default
-  // glibc would keep it, in pieces that others do not fit.)
+  // Returns the memory of evicted photos to the system, whatever their size. By default, glibc raises this threshold
+  // and keeps the memory in fragments that other allocations do not fit.
   mallopt(M_MMAP_THRESHOLD, 1 << 19);
   CLI::App app(
       "tessera turns photographs of a large place into a neural scene.\n"
@@ -69,6 +70,6 @@ int main(int argc, char** argv) {
   }
   return tessera::runCommandLine(
       app, argc, argv,
-      "lower --set photo_budget_mib, grid_log2_size or fine_log2_size; of field samples_per_pass; of volume "
+      "lower --set photo_budget_mib, grid_log2_size or fine_log2_size; of field samples_per_micro_batch; of volume "
       "texels_per_step, or keep few blocks with --resident-blocks");
 }

@@ -7,14 +7,14 @@
 namespace tessera {
 namespace {
 
-class DrawableModel final : public Drawable {
+class ModelRenderSource final : public RenderSource {
  public:
-  DrawableModel(const fs::path& folder, std::unique_ptr<OpenedModel> model)
+  ModelRenderSource(const fs::path& folder, std::unique_ptr<OpenedModel> model)
       : folder_(folder), model_(std::move(model)) {}
 
   ViewRenderer& renderer() override { return model_->renderer(); }
   Mat4d sourceFromWorld() const override { return folder_.readPlacement().sourceFromWorld; }
-  void requireWorldOf(const Capture& capture) const override { requireSameWorld(folder_, capture); }
+  void requireMatchingWorld(const Capture& capture) const override { requireSameWorld(folder_, capture); }
   std::vector<std::string> trainedOnAmong(const Capture& capture, Split split) const override {
     return tessera::trainedOnAmong(folder_, capture, split);
   }
@@ -26,8 +26,8 @@ class DrawableModel final : public Drawable {
 
 }  // namespace
 
-std::unique_ptr<Drawable> openModel(Device& device, const fs::path& folder) {
-  return std::make_unique<DrawableModel>(folder, methodOf(ModelFolder(folder)).openModel(device, folder));
+std::unique_ptr<RenderSource> openModel(Device& device, const fs::path& folder) {
+  return std::make_unique<ModelRenderSource>(folder, findModelMethod(ModelFolder(folder)).openModel(device, folder));
 }
 
 }  // namespace tessera

@@ -1,11 +1,11 @@
-// Trained models as something that can be drawn, whatever their method.
+// Opens trained models, of any method, as render sources.
 #pragma once
 
-#include "apps/tessera/drawable.h"
+#include "apps/tessera/render_source.h"
 
 namespace tessera {
 
-// Throws Error when the folder holds no trained model, or one that cannot be read. Keeps a reference to `device`.
-std::unique_ptr<Drawable> openModel(Device& device, const fs::path& folder);
+// Throws Error if the folder holds no trained model or one that cannot be read. Keeps a reference to `device`.
+std::unique_ptr<RenderSource> openModel(Device& device, const fs::path& folder);
 
 }  // namespace tessera

@@ -20,7 +20,7 @@
 namespace tessera {
 namespace {
 
-// Says once when a picture was drawn coarser than asked for.
+// Warns once when an image was rendered coarser than requested.
 template <class Renderer>
 class WarningRenderer final : public ViewRenderer {
  public:
@@ -51,10 +51,10 @@ std::unique_ptr<ViewRenderer> withWarnings(const fs::path& folder, uint64_t budg
   return std::make_unique<WarningRenderer<Renderer>>(folder, budgetBytes, std::move(renderer));
 }
 
-std::unique_ptr<ViewRenderer> rendererOf([[maybe_unused]] const Device& device, const fs::path& folder,
-                                         const Tileset& tileset, SceneRendererSettings settings) {
+std::unique_ptr<ViewRenderer> makeSceneRenderer([[maybe_unused]] const Device& device, const fs::path& folder,
+                                                const Tileset& tileset, SceneRendererSettings settings) {
 #ifdef TESSERA_HAS_VULKAN
-  if (const auto context = contextOf(device)) {
+  if (const auto context = vulkanContext(device)) {
     GpuRendererSettings ofGpu;
     ofGpu.draw = settings.draw;
     ofGpu.selection = settings.selection;
@@ -69,34 +69,36 @@ std::unique_ptr<ViewRenderer> rendererOf([[maybe_unused]] const Device& device, 
                                                       std::move(scene.tree), std::move(scene.source), settings));
 }
 
-class DrawableScene final : public Drawable {
+class SceneRenderSource final : public RenderSource {
  public:
-  DrawableScene(const Device& device, const fs::path& folder, const DrawableOptions& options)
+  SceneRenderSource(const Device& device, const fs::path& folder, const RenderSourceOptions& options)
       : folder_(folder), tileset_(readTileset(folder)) {
     SceneRendererSettings settings;
-    // Not the number of levels: a root that only holds the others together is one of them.
+    // Compares with the coarsest level that has contents: a root that only groups the others counts as a level too.
     if (const uint32_t coarsest = coarsestLevel(tileset_); static_cast<uint32_t>(options.level) > coarsest) {
       throw Error(folder.string(), fmt::format("--lod {}", options.level),
                   coarsest == 0 ? "the scene has level 0 only" : fmt::format("the scene has levels 0 to {}", coarsest),
                   coarsest == 0 ? "leave it out" : "name one of those");
     }
-    settings.selection.mostPixels = options.mostPixels;
+    settings.selection.maximumScreenSpaceError = options.maximumScreenSpaceError;
     settings.selection.finestLevel = options.level;
     settings.threads = options.threads;
     settings.budgetBytes =
         options.memoryMiB > 0 ? static_cast<uint64_t>(options.memoryMiB * 1048576) : sceneBudgetBytes(device);
-    renderer_ = rendererOf(device, folder, tileset_, settings);
+    renderer_ = makeSceneRenderer(device, folder, tileset_, settings);
   }
 
   ViewRenderer& renderer() override { return *renderer_; }
   Mat4d sourceFromWorld() const override { return tileset_.sourceFromWorld; }
-  void requireWorldOf(const Capture& capture) const override {
+  void requireMatchingWorld(const Capture& capture) const override {
     if ((capture.sourceFromWorld - tileset_.sourceFromWorld).norm() <= 1e-9 * tileset_.sourceFromWorld.norm()) return;
     throw Error(capture.root.string(), "transforms.json",
                 "its world is not the one of " + folder_.string() + ", which was baked from '" + tileset_.name + "'",
                 "use that capture");
   }
-  std::vector<std::string> trainedOnAmong(const Capture&, Split) const override { return {}; }  // scenes do not say
+  std::vector<std::string> trainedOnAmong(const Capture&, Split) const override {
+    return {};
+  }  // scenes do not record their training photos
 
  private:
   fs::path folder_;
@@ -111,8 +113,9 @@ uint64_t sceneBudgetBytes(const Device& device) {
   return (own > 0 ? own : static_cast<uint64_t>(usableMemoryBytes())) / 2;
 }
 
-std::unique_ptr<Drawable> openScene(const Device& device, const fs::path& folder, const DrawableOptions& options) {
-  return std::make_unique<DrawableScene>(device, folder, options);
+std::unique_ptr<RenderSource> openScene(const Device& device, const fs::path& folder,
+                                        const RenderSourceOptions& options) {
+  return std::make_unique<SceneRenderSource>(device, folder, options);
 }
 
 }  // namespace tessera

@@ -1,15 +1,17 @@
-// Scenes as something that can be drawn, without anything that trains.
+// Opens scenes as render sources, without linking any training code.
 #pragma once
 
-#include "apps/tessera/drawable.h"
+#include "apps/tessera/render_source.h"
 
 namespace tessera {
 
-// Of a scene's contents, where nothing is said: half of the memory that they lie in, a card's own or the machine's.
+// Returns the default budget for a scene's contents: half of the memory in which they lie, the GPU's own or the
+// machine's.
 uint64_t sceneBudgetBytes(const Device& device);
 
-// Throws Error when the folder holds no scene, the scene has no such level, or its coarsest does not fit. Warns when a
-// picture was drawn coarser than asked for, as memory was short.
-std::unique_ptr<Drawable> openScene(const Device& device, const fs::path& folder, const DrawableOptions& options);
+// Throws Error if the folder holds no scene, if the scene has no such level, or if its coarsest level does not fit into
+// memory. Warns if an image was rendered coarser than requested because memory was short.
+std::unique_ptr<RenderSource> openScene(const Device& device, const fs::path& folder,
+                                        const RenderSourceOptions& options);
 
 }  // namespace tessera

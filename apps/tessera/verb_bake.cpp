@@ -16,13 +16,13 @@
 namespace tessera {
 namespace {
 
-std::string flagOf(const BakeParameter& parameter) {
+std::string optionName(const BakeParameter& parameter) {
   std::string flag = "--" + std::string(parameter.name);
   std::replace(flag.begin(), flag.end(), '_', '-');
   return flag;
 }
 
-CLI::Validator multipleOf(int64_t unit) {
+CLI::Validator makeMultipleValidator(int64_t unit) {
   return CLI::Validator(
       [unit](const std::string& text) {
         return std::stoll(text) % unit == 0 ? "" : fmt::format("{} is no multiple of {}", text, unit);
@@ -30,7 +30,7 @@ CLI::Validator multipleOf(int64_t unit) {
       fmt::format("a multiple of {}", unit));
 }
 
-// A flag for each parameter of a method's bakes. Parameters of one name are one, of all methods that have it.
+// One flag for each parameter of any method's bake. Methods that have a parameter of the same name share its flag.
 class ParameterFlags {
  public:
   void addTo(CLI::App& verb) {
@@ -41,7 +41,7 @@ class ParameterFlags {
     }
   }
 
-  // Throws Error where one was given that the method does not have.
+  // Throws Error if a parameter was given that the method does not have.
   BakeParameters of(const Method& method) const {
     BakeParameters chosen;
     for (const BakeParameter& parameter : method.bakeParameters) {
@@ -50,7 +50,7 @@ class ParameterFlags {
     }
     for (const auto& [name, value] : given_) {
       if (!value || chosen.contains(name)) continue;
-      throw Error(flagOf({.name = name}), "", "is for models of --method " + methodsWith(name), "leave it out");
+      throw Error(optionName({.name = name}), "", "is for models of --method " + methodsWith(name), "leave it out");
     }
     return chosen;
   }
@@ -68,11 +68,11 @@ class ParameterFlags {
 
   void add(CLI::App& verb, const BakeParameter& parameter) {
     std::optional<int64_t>& given = given_[parameter.name];
-    CLI::Option* option = verb.add_option(flagOf(parameter), given,
+    CLI::Option* option = verb.add_option(optionName(parameter), given,
                                           fmt::format("of {}: {}", methodsWith(parameter.name), parameter.help));
     if (parameter.standard) option->default_str(std::to_string(*parameter.standard));
-    option->check(CLI::Range(parameter.least, parameter.most));
-    if (parameter.multipleOf > 1) option->check(multipleOf(parameter.multipleOf));
+    option->check(CLI::Range(parameter.minimum, parameter.maximum));
+    if (parameter.divisibleBy > 1) option->check(makeMultipleValidator(parameter.divisibleBy));
   }
 
   std::map<std::string_view, std::optional<int64_t>> given_;
@@ -95,7 +95,7 @@ void addBakeVerb(CLI::App& app) {
   verb->add_option("scene", flags->scene, "scene folder to write")->required();
   verb->add_option("--capture", flags->capture, "what the model was trained on; default: where it was then");
   verb->add_option("--stride", flags->options.stride,
-                   "look at every so manieth pixel of rows and columns to find what is seen")
+                   "use every n-th pixel of rows and columns to find what is visible")
       ->capture_default_str()
       ->check(CLI::Range(1, 64));
   verb->add_option("--background", flags->options.background,

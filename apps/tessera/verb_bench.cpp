@@ -4,7 +4,7 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
-#include "apps/tessera/drawable.h"
+#include "apps/tessera/render_source.h"
 #include "apps/tessera/scene_source.h"
 #include "apps/tessera/verbs.h"
 #include "base/error.h"
@@ -35,7 +35,7 @@ std::string scaled(double value, const std::string& unit) {
   return fmt::format("{:8.2f} M{}/s", value / 1e6, unit);
 }
 
-std::string shareOf(const RooflineRow& row) {
+std::string formatShare(const RooflineRow& row) {
   return row.limit > 0 ? fmt::format("{:5.0f} %", 100 * row.share()) : std::string("      -");
 }
 
@@ -52,7 +52,7 @@ void printRoofline(const Roofline& roofline) {
                  scaled(gather.lookups, "lookup"));
     }
   } else {
-    fmt::print("  none: nobody hurries the reference device\n");
+    fmt::print("  none: the reference device is not built for speed\n");
   }
   if (roofline.limits.matrixFlops > 0) {
     fmt::print("  {:<44} {}\n", "products of fp16 matrices", scaled(roofline.limits.matrixFlops, "FLOP"));
@@ -60,7 +60,7 @@ void printRoofline(const Roofline& roofline) {
   fmt::print("\n{:<28} {:<44} {:>9}  {:>17}  {:>17}  {:>7}\n", "operation", "shape", "ms", "rate", "limit", "share");
   for (const RooflineRow& row : roofline.rows) {
     fmt::print("{:<28} {:<44} {:>9.3f}  {:>17}  {:>17}  {}\n", row.name, row.shape, 1e3 * row.seconds,
-               scaled(row.rate, row.unit), row.limit > 0 ? scaled(row.limit, row.unit) : "-", shareOf(row));
+               scaled(row.rate, row.unit), row.limit > 0 ? scaled(row.limit, row.unit) : "-", formatShare(row));
   }
   fmt::print(
       "\nBest of several runs each. Networks count 2 x weights x samples forward and twice that backward; the hash\n"
@@ -122,7 +122,7 @@ ordered_json toJson(const std::string& device, const StepBenchmark& step) {
           {"last_loss", step.lastLoss}};
 }
 
-// `-` means standard output, with nothing else on it.
+// Writes JSON to a file; `-` means standard output, on which nothing else is printed.
 void writeJson(const std::string& file, const ordered_json& json) {
   if (file == "-") {
     fmt::print("{}\n", json.dump(2));
@@ -162,11 +162,11 @@ void printCache(const CacheBenchmark& b) {
   constexpr double kMiB = 1 << 20;
   const auto line = [&](const char* name, const CacheBenchmark::Run& run) {
     fmt::print(
-        "  {:<8} {:9.2f} MiB allowed, {:9.2f} MiB held at most; {} loads, {} evictions, {} blocks refused\n"
-        "           steps over budget {}, without the coarsest level {}, with a cut that is none {};\n"
-        "           with all that the view asks for {}, of them unlike an unbounded cache's picture {};\n"
+        "  {:<8} {:9.2f} MiB allowed, {:9.2f} MiB resident at most; {} loads, {} evictions, {} blocks refused\n"
+        "           steps over budget {}, without the coarsest level {}, with an invalid cut {};\n"
+        "           with all that the view requests {}, of these differing from an unbounded cache's image {};\n"
         "           blocks of the finest level {:.2f} a step; {:.2f} dB from an unbounded cache's pictures\n",
-        name, static_cast<double>(run.budgetBytes) / kMiB, static_cast<double>(run.mostBytes) / kMiB, run.loads,
+        name, static_cast<double>(run.budgetBytes) / kMiB, static_cast<double>(run.maxBytes) / kMiB, run.loads,
         run.evictions, run.refused, run.stepsOverBudget, run.stepsWithoutCoarsest, run.stepsWithoutPartition,
         run.stepsInFull, run.stepsUnlikeUnbounded, run.tilesOfLevel0, psnrFromMeanSquaredError(run.meanSquaredError));
   };
@@ -179,7 +179,7 @@ void printCache(const CacheBenchmark& b) {
 ordered_json toJson(const CacheBenchmark& b) {
   const auto run = [](const CacheBenchmark::Run& r) -> ordered_json {
     return {{"budget_bytes", r.budgetBytes},
-            {"most_bytes", r.mostBytes},
+            {"max_bytes", r.maxBytes},
             {"loads", r.loads},
             {"evictions", r.evictions},
             {"refused", r.refused},
@@ -208,16 +208,17 @@ bool countsSamples(const Method& method) {
   return method.countsSamples;
 }
 
-// The model that a scene is measured beside. Throws Error when its samples are not counted.
+// Returns the method of the model that a scene is compared with. Throws Error if the method does not count samples.
 const Method& methodBeside(const fs::path& folder) {
-  const Method& method = methodOf(ModelFolder(folder));
+  const Method& method = findModelMethod(ModelFolder(folder));
   if (method.countsSamples) return method;
   throw Error(folder.string(), "manifest.json",
-              fmt::format("is of --method {}, where {} is wanted", method.name, namesOfMethods(countsSamples, "or")),
+              fmt::format("is of --method {}, but {} is required", method.name, namesOfMethods(countsSamples, "or")),
               "name another model");
 }
 
-// A scene beside a model whose samples are counted, view after view in turn, rays ending alike.
+// Compares a scene with a model whose samples are counted. The views are rendered alternately, with the same
+// transmittance threshold.
 ordered_json measureAgainst(const TileScene& scene, const MakeDrawer& makeDrawer, const fs::path& folder,
                             const std::vector<BenchmarkView>& views, int threads, bool print) {
   const Method& method = methodBeside(folder);
@@ -225,7 +226,7 @@ ordered_json measureAgainst(const TileScene& scene, const MakeDrawer& makeDrawer
   const std::unique_ptr<OpenedModel> model = method.openModel(*device, folder);
   SceneRendererSettings settings;
   settings.threads = threads;
-  settings.selection.mostPixels = 0;
+  settings.selection.maximumScreenSpaceError = 0;
   settings.draw.minTransmittance = model->rayWork().minTransmittance;
   SceneRenderer renderer(makeDrawer(), scene.frame, scene.tree, scene.source, settings);
   constexpr int kRounds = 3;
@@ -252,12 +253,12 @@ ordered_json measureAgainst(const TileScene& scene, const MakeDrawer& makeDrawer
   ours.samples = renderer.drawCounts().samples;
   theirs.samples = model->rayWork().samples;
   const double frames = kRounds * static_cast<double>(views.size());
-  const double least = *std::min_element(ratios.begin(), ratios.end()), all = theirs.seconds / ours.seconds;
+  const double minimum = *std::min_element(ratios.begin(), ratios.end()), all = theirs.seconds / ours.seconds;
   if (print) {
     fmt::print("{}\n  scene {:7.2f} frames/s, {:5.1f} samples a ray\n  {:<5} {:7.2f} frames/s, {:5.1f} samples a ray\n",
                renderer.device(), frames / ours.seconds, ours.samplesPerRay(), method.name, frames / theirs.seconds,
                theirs.samplesPerRay());
-    fmt::print("  {:.2f} times as many frames, at least {:.2f} in each of {} rounds\n", all, least, kRounds);
+    fmt::print("  {:.2f} times as many frames, at least {:.2f} in each of {} rounds\n", all, minimum, kRounds);
   }
   return {{"device", renderer.device()},
           {"frames_per_second", frames / ours.seconds},
@@ -265,7 +266,7 @@ ordered_json measureAgainst(const TileScene& scene, const MakeDrawer& makeDrawer
           {fmt::format("{}_frames_per_second", method.name), frames / theirs.seconds},
           {fmt::format("{}_samples_per_ray", method.name), theirs.samplesPerRay()},
           {"times", all},
-          {"least_times", least}};
+          {"min_times", minimum}};
 }
 
 struct SceneMeasurement {
@@ -326,7 +327,7 @@ void addBenchRender(CLI::App& bench) {
       ->check(CLI::Range(0.0, 1e3))
       ->needs(flight);
   verb->add_option("--json", flags->json, "write the result as one JSON object here; - prints it");
-  verb->add_option("--threads", flags->cache.threads, "processor threads; 0: all cores")
+  verb->add_option("--threads", flags->cache.threads, "CPU threads; 0: all cores")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));
   verb->callback([flags] {
@@ -334,7 +335,7 @@ void addBenchRender(CLI::App& bench) {
     std::vector<BenchmarkView> views;
     if (!flags->views.empty()) {
       const Capture capture = readCapture(flags->views);
-      openDrawable(*makeDevice({}), flags->scene, {})->requireWorldOf(capture);
+      openRenderSource(*makeDevice({}), flags->scene, {})->requireMatchingWorld(capture);
       for (const NamedView& view : viewsOfCapture(capture, Split::test)) {
         views.push_back({view.camera, view.worldFromCamera});
       }
@@ -345,33 +346,36 @@ void addBenchRender(CLI::App& bench) {
   });
 }
 
-// Pictures a second of a scene, at one size. On a graphics card none leaves it, as none does on its way to a screen.
+// Measures frames per second of a scene at one image size. Images rendered on a GPU are not downloaded, because
+// displaying them does not require it.
 ordered_json measureFrames(const Device& device, const fs::path& scene, const std::vector<BenchmarkView>& views,
-                           const DrawableOptions& options, double seconds) {
+                           const RenderSourceOptions& options, double seconds) {
   std::function<void(const BenchmarkView&)> draw;
   std::function<void()> wait = [] {};
-  std::function<size_t()> refused = [] { return size_t{0}; };  // contents of the last picture: no room
+  std::function<size_t()> refused = [] {
+    return size_t{0};
+  };  // contents of the last image that did not fit into the budget
   std::string name;
 #ifdef TESSERA_HAS_VULKAN
-  std::unique_ptr<GpuSceneRenderer> onCard;
-  if (const auto context = contextOf(device)) {
+  std::unique_ptr<GpuSceneRenderer> onGpu;
+  if (const auto context = vulkanContext(device)) {
     GpuRendererSettings settings;
-    settings.selection.mostPixels = options.mostPixels;
+    settings.selection.maximumScreenSpaceError = options.maximumScreenSpaceError;
     settings.budgetBytes = sceneBudgetBytes(device);
-    onCard = openGpuScene(context, scene, settings);
-    draw = [&](const BenchmarkView& view) { onCard->draw(view.camera, view.worldFromCamera); };
+    onGpu = openGpuScene(context, scene, settings);
+    draw = [&](const BenchmarkView& view) { onGpu->draw(view.camera, view.worldFromCamera); };
     wait = [context] { context->waitIdle(); };
-    refused = [&] { return onCard->state().refused; };
-    name = onCard->device();
+    refused = [&] { return onGpu->state().refused; };
+    name = onGpu->device();
   }
 #endif
   std::unique_ptr<Device> cpu;
-  std::unique_ptr<Drawable> drawable;
+  std::unique_ptr<RenderSource> renderSource;
   if (!draw) {
     cpu = makeDevice({"cpu", options.threads});
-    drawable = openDrawable(*cpu, scene, options);
-    draw = [&](const BenchmarkView& view) { drawable->renderer().render(view.camera, view.worldFromCamera); };
-    name = drawable->renderer().device();
+    renderSource = openRenderSource(*cpu, scene, options);
+    draw = [&](const BenchmarkView& view) { renderSource->renderer().render(view.camera, view.worldFromCamera); };
+    name = renderSource->renderer().device();
   }
   const auto timed = [&](const BenchmarkView& view) {
     const auto begun = std::chrono::steady_clock::now();
@@ -380,9 +384,9 @@ ordered_json measureFrames(const Device& device, const fs::path& scene, const st
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   };
   double slowest = 0, spent = 0;
-  size_t coarser = 0;  // views
+  size_t coarser = 0;  // number of views
   for (const BenchmarkView& view : views) {
-    draw(view);  // what it needs is loaded
+    draw(view);  // loads what the view needs
     wait();
     if (refused() > 0) ++coarser;
     slowest = std::max(slowest, std::min(timed(view), timed(view)));
@@ -408,7 +412,7 @@ void addBenchFrames(CLI::App& bench) {
   struct Flags {
     std::string scene, views, size = "1920x1080", json;
     DeviceOptions device;
-    DrawableOptions options{.mostPixels = 1.5};
+    RenderSourceOptions options{.maximumScreenSpaceError = 1.5};
     double seconds = 3;
   };
   auto flags = std::make_shared<Flags>();
@@ -417,10 +421,10 @@ void addBenchFrames(CLI::App& bench) {
   verb->add_option("scene", flags->scene, "scene folder")->required();
   verb->add_option("--views", flags->views, "draw this capture's held-out views, in turn")->required();
   verb->add_option("--size", flags->size, "of the pictures")->capture_default_str();
-  verb->add_option("--detail", flags->options.mostPixels, "pixels of error that may be seen")
+  verb->add_option("--detail", flags->options.maximumScreenSpaceError, "pixels of error that may be seen")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1000.0));
-  verb->add_option("--seconds", flags->seconds, "repeats for so long")->capture_default_str();
+  verb->add_option("--seconds", flags->seconds, "how long to repeat")->capture_default_str();
   verb->add_option("--json", flags->json, "write the result as one JSON object here; - prints it");
   addDeviceFlags(*verb, flags->device);
   verb->callback([flags] {
@@ -483,7 +487,7 @@ void addBenchTrain(CLI::App& bench) {
   verb->add_option("--samples", flags->samples, "samples of a step, on rays of 32")
       ->capture_default_str()
       ->check(CLI::Range(32u, 1u << 24));
-  verb->add_option("--seconds", flags->options.seconds, "repeats for so long")->capture_default_str();
+  verb->add_option("--seconds", flags->options.seconds, "how long to repeat")->capture_default_str();
   verb->add_option("--json", flags->json, "write the result as one JSON object here; - prints it");
   addDeviceFlags(*verb, flags->device);
   verb->callback([flags] {

@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include "apps/tessera/drawable.h"
+#include "apps/tessera/render_source.h"
 #include "apps/tessera/verbs.h"
 #include "base/error.h"
 #include "base/log.h"
@@ -25,7 +25,7 @@ void addEvalVerb(CLI::App& app) {
   verb->add_option("--split", flags->split, "which photos")
       ->capture_default_str()
       ->check(CLI::IsMember({"test", "validation", "train"}));
-  verb->add_option("--exposure", flags->exposure, "neutral, or fitted on the left half and judged on the right")
+  verb->add_option("--exposure", flags->exposure, "neutral, or fitted on the left half and evaluated on the right")
       ->capture_default_str()
       ->check(CLI::IsMember({"neutral", "fitted"}));
   verb->add_option("--json", flags->json, "write the result as one JSON object here; - prints it");
@@ -36,19 +36,19 @@ void addEvalVerb(CLI::App& app) {
       ->capture_default_str()
       ->check(CLI::Range(0, 64));
   verb->add_option("--memory-mib", flags->memoryMiB,
-                   "of a scene: memory for its contents; 0: half of the machine's, or of a card's own")
+                   "of a scene: memory for its contents; 0: half of the machine's, or of a GPU's own")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1e9));
   addDeviceFlags(*verb, flags->device);
   verb->callback([flags] {
     const Capture capture = readCapture(flags->capture);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
-    const std::unique_ptr<Drawable> drawable =
-        openDrawable(*device, flags->model, {flags->device.threads, flags->level, flags->memoryMiB});
+    const std::unique_ptr<RenderSource> renderSource =
+        openRenderSource(*device, flags->model, {flags->device.threads, flags->level, flags->memoryMiB});
     EvaluateOptions options;
     options.split = *splitFromName(flags->split);
-    drawable->requireWorldOf(capture);
-    if (const auto known = drawable->trainedOnAmong(capture, options.split);
+    renderSource->requireMatchingWorld(capture);
+    if (const auto known = renderSource->trainedOnAmong(capture, options.split);
         options.split != Split::train && !known.empty()) {
       warn("{} of the views were trained on ('{}' first): the numbers flatter the model", known.size(), known.front());
     }
@@ -65,7 +65,7 @@ void addEvalVerb(CLI::App& app) {
       builder.add(result, pictures);
       progress.update(++done, fmt::format("{:.2f} dB", result.psnr));
     };
-    const EvaluationReport report = evaluate(drawable->renderer(), capture, options);
+    const EvaluationReport report = evaluate(renderSource->renderer(), capture, options);
     progress.finish();
     const fs::path page = flags->report.empty() ? fs::path(flags->model) / "report.html" : fs::path(flags->report);
     builder.write(page, report);

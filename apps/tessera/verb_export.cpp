@@ -22,18 +22,19 @@ void addExportVerb(CLI::App& app) {
       ->check(CLI::IsMember({"merf"}));
   verb->add_flag("--json", flags->json, "print the result as one JSON object");
   verb->callback([flags] {
-    const MerfExport made = exportMerf(flags->scene, flags->out);
+    const MerfExport exported = exportMerf(flags->scene, flags->out);
     if (flags->json) {
       const nlohmann::ordered_json result = {{"format", flags->format},
-                                             {"bytes_on_disk", made.bytesOnDisk},
-                                             {"macroblocks", made.macroblocks},
-                                             {"slices", made.slices},
-                                             {"near", made.near}};
+                                             {"bytes_on_disk", exported.bytesOnDisk},
+                                             {"macroblocks", exported.macroblocks},
+                                             {"slices", exported.slices},
+                                             {"near", exported.near}};
       fmt::print("{}\n", result.dump(2));
       return;
     }
     fmt::print("{}: {:.1f} MB, {} macroblocks in {} slices; open the viewer with ?quality=high&near={:.3g}&dir=...\n",
-               flags->out, static_cast<double>(made.bytesOnDisk) / 1e6, made.macroblocks, made.slices, made.near);
+               flags->out, static_cast<double>(exported.bytesOnDisk) / 1e6, exported.macroblocks, exported.slices,
+               exported.near);
   });
 }
 

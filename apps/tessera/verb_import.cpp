@@ -19,10 +19,11 @@ void addImportVerb(CLI::App& app) {
   verb->add_option("--downscale", flags->options.downscale, "divides width and height")
       ->capture_default_str()
       ->check(CLI::Range(1, 64));
-  verb->add_option("--holdout", flags->options.holdout,
-                   "photos kept for judging: every:N, list:FILE, none, or auto (the source's own split, else every:8)")
+  verb->add_option(
+          "--holdout", flags->options.holdout,
+          "photos held out for evaluation: every:N, list:FILE, none, or auto (the source's own split, else every:8)")
       ->capture_default_str();
-  verb->add_option("--threads", flags->options.threads, "processor threads; 0: all cores")
+  verb->add_option("--threads", flags->options.threads, "CPU threads; 0: all cores")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));
   verb->callback([flags] {

@@ -44,8 +44,8 @@ ordered_json describeModel(const fs::path& folder) {
   const ModelFolder model(folder);
   const std::optional<ModelManifest> manifest = model.manifest();
   const ModelPlacement placement = model.readPlacement();
-  // One that has saved nothing yet does not say its method.
-  const Method& method = manifest ? methodOf(model, *manifest) : *methods().front();
+  // A model that has saved nothing yet does not state its method.
+  const Method& method = manifest ? findModelMethod(model, *manifest) : *methods().front();
   ordered_json info = {{"kind", "model"},
                        {"method", method.name},
                        {"step", manifest ? manifest->step : 0},
@@ -62,7 +62,7 @@ ordered_json describeModel(const fs::path& folder) {
   return info;
 }
 
-ordered_json sizeOf(uint64_t contents, uint64_t onDisk, uint64_t inMemory) {
+ordered_json makeSizeJson(uint64_t contents, uint64_t onDisk, uint64_t inMemory) {
   return {{"contents", contents}, {"bytes_on_disk", onDisk}, {"bytes_in_memory", inMemory}};
 }
 
@@ -72,10 +72,10 @@ ordered_json describeScene(const fs::path& folder) {
     uint64_t contents = 0, onDisk = 0, inMemory = 0;
   };
   const ContentCodec& codec = requireCodec(folder, tileset);
-  std::vector<Sizes> levels(tileset.levels), surrounds(tileset.levels);
+  std::vector<Sizes> levels(tileset.levels), backgroundBlocks(tileset.levels);
   for (size_t tile = 0; tile < tileset.tiles.size(); ++tile) {
     for (const TileContent& content : tileset.tiles[tile].contents) {
-      Sizes& sizes = content.surround ? surrounds[content.level] : levels[tileset.tiles[tile].level];
+      Sizes& sizes = content.backgroundBlock ? backgroundBlocks[content.level] : levels[tileset.tiles[tile].level];
       ++sizes.contents;
       const fs::path file = contentPath(folder, content.uri);
       sizes.onDisk += fs::file_size(file);
@@ -90,12 +90,12 @@ ordered_json describeScene(const fs::path& folder) {
   const auto describe = [&](const char* what, const std::vector<Sizes>& all) {
     for (size_t level = 0; level < all.size(); ++level) {
       const Sizes& sizes = all[level];
-      if (sizes.contents == 0) continue;  // a root that holds the others together
-      info[fmt::format("{}_{}", what, level)] = sizeOf(sizes.contents, sizes.onDisk, sizes.inMemory);
+      if (sizes.contents == 0) continue;  // a root that only groups the others
+      info[fmt::format("{}_{}", what, level)] = makeSizeJson(sizes.contents, sizes.onDisk, sizes.inMemory);
     }
   };
   describe("level", levels);
-  describe("surround", surrounds);
+  describe("background_block", backgroundBlocks);
   return info;
 }
 
@@ -115,7 +115,7 @@ ordered_json describe(const fs::path& folder) {
   throw Error(folder.string(), "", "holds nothing that tessera knows", "name a source, capture, model or scene folder");
 }
 
-// What --device may name here.
+// Describes the values that --device accepts on this machine.
 ordered_json describeDevices() {
   ordered_json info = {{"kind", "devices"}};
   for (const DeviceDescription& device : listDevices()) {

@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include "apps/tessera/drawable.h"
+#include "apps/tessera/render_source.h"
 #include "apps/tessera/verbs.h"
 #include "base/progress.h"
 #include "eval/evaluate.h"
@@ -43,7 +43,7 @@ void addRenderVerb(CLI::App& app) {
       ->capture_default_str()
       ->check(CLI::Range(0, 64));
   verb->add_option("--memory-mib", flags->memoryMiB,
-                   "of a scene: memory for its contents; 0: half of the machine's, or of a card's own")
+                   "of a scene: memory for its contents; 0: half of the machine's, or of a GPU's own")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1e9));
   addDeviceFlags(*verb, flags->device);
@@ -52,21 +52,21 @@ void addRenderVerb(CLI::App& app) {
     RenderViewsOptions options;
     if (!flags->size.empty()) parsePictureSize(flags->size, options.width, options.height);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
-    const std::unique_ptr<Drawable> drawable =
-        openDrawable(*device, flags->model, {flags->device.threads, flags->level, flags->memoryMiB});
+    const std::unique_ptr<RenderSource> renderSource =
+        openRenderSource(*device, flags->model, {flags->device.threads, flags->level, flags->memoryMiB});
     std::vector<NamedView> views;
     if (!flags->path.empty()) {
       const CameraPath path = readCameraPath(flags->path, flags->dataparserTransforms);
-      views = viewsOfPath(path, drawable->sourceFromWorld());
+      views = viewsOfPath(path, renderSource->sourceFromWorld());
       options.framesPerSecond = path.framesPerSecond;
     } else {
       const Capture capture = readCapture(flags->views);
-      drawable->requireWorldOf(capture);
-      views = viewsOfCapture(capture, splitFromName(flags->split));  // all: no split
+      renderSource->requireMatchingWorld(capture);
+      views = viewsOfCapture(capture, splitFromName(flags->split));  // all photos, if no split was given
     }
     Progress progress("rendering", static_cast<int64_t>(views.size()), "frames");
     options.onView = [&progress](size_t done) { progress.update(static_cast<int64_t>(done)); };
-    renderViews(drawable->renderer(), views, flags->out, options);
+    renderViews(renderSource->renderer(), views, flags->out, options);
     progress.finish();
     fmt::print("{}: {} frames\n", flags->out, views.size());
   });

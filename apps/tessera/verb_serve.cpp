@@ -21,7 +21,7 @@ bool isMissing(const fs::path& path) {
   return fs::status(path, status).type() == fs::file_type::not_found;
 }
 
-// Throws Error that says what the path names instead of a scene, and what makes a scene of that.
+// Throws Error if the path is not a scene; the message states what it is instead, and how to make a scene of it.
 void requireScene(const fs::path& path) {
   if (!isMissing(path / "tileset.json")) return;
   const std::string name = path.string(), another = "name the folder of a scene, or the world.json of a world";
@@ -56,21 +56,21 @@ void requireScene(const fs::path& path) {
   }
 }
 
-// Of --port. CLI would not say which there are.
+// Checks the value of --port. CLI11's own message would not state the valid range.
 std::string portError(const std::string& text) {
   int port = 0;
   const bool isPort = CLI::detail::lexical_cast(text, port) && port >= 0 && port <= 65535;
   return isPort ? "" : fmt::format("'{}' is no port: they are whole numbers from 0 to 65535", text);
 }
 
-// What is served beside the viewer.
+// A scene or a world, as it is served beside the viewer.
 struct Served {
-  std::string name;   // for people
+  std::string name;   // for display
   SiteFolder folder;  // of the site
-  std::string start;  // of the site
+  std::string start;  // path of the site at which the viewer starts
 };
 
-// Throws Error where there is neither a scene nor a world, or one that cannot be served.
+// Throws Error if the path names neither a scene nor a world, or one that cannot be served.
 Served openServed(const fs::path& path) {
   if (const auto world = worldFileAt(path)) {
     requireWorld(*world);
@@ -93,7 +93,7 @@ void addServeVerb(CLI::App& app) {
   verb->footer("Example:\n  tessera serve garden.scene --port 8080\n  tessera serve worlds/world.json");
   verb->add_option("scene", flags->scene, "scene folder; or world.json of the viewer, or the folder that it lies in")
       ->required();
-  verb->add_option("--port", flags->server.port, "0: one that is free")
+  verb->add_option("--port", flags->server.port, "0: any free port")
       ->capture_default_str()
       ->check(CLI::Validator(portError, "0 to 65535"));
   verb->add_option("--address", flags->server.address, "of this machine; 0.0.0.0: for everyone who can reach it")
@@ -105,7 +105,8 @@ void addServeVerb(CLI::App& app) {
     if (!fs::exists(fs::path(flags->viewer) / "index.html")) {
       throw Error(flags->viewer, "", "holds no viewer", "run tools/build-web.sh, or name another folder with --viewer");
     }
-    // Pages of other sites cannot have a loopback server read for them by giving it a name of theirs.
+    // Guards against DNS rebinding: pages of other sites must not read from a loopback server under a host name of
+    // theirs.
     std::vector<std::string> hosts;
     if (isLoopback(flags->server.address)) hosts = {"localhost", "127.0.0.1", "::1", flags->server.address};
     const StaticSite site({{"", flags->viewer}, served.folder}, hosts, served.start);

@@ -7,7 +7,7 @@
 namespace tessera {
 namespace {
 
-// "4x3" with both at least 1.
+// Parses a pair such as "4x3", both numbers at least 1.
 void parsePair(const std::string& text, const char* flag, int* first, int* second) {
   int used = 0;
   if (std::sscanf(text.c_str(), "%dx%d%n", first, second, &used) != 2 || used != static_cast<int>(text.size()) ||
@@ -31,7 +31,7 @@ void addSynthVerb(CLI::App& app) {
   auto flags = std::make_shared<SynthFlags>();
   verb->add_option("out", flags->out, "capture folder to write")->required();
   verb->add_option("--blocks", flags->blocks, "city blocks, east x north")->capture_default_str();
-  verb->add_option("--photos", flags->city.photos, "photos; 0: as many as the size wants")->capture_default_str();
+  verb->add_option("--photos", flags->city.photos, "photos; 0: enough for the size")->capture_default_str();
   verb->add_option("--size", flags->size, "photo size in pixels")->capture_default_str();
   verb->add_option("--seed", flags->city.seed, "another city")->capture_default_str();
   verb->add_option("--altitudes", flags->city.altitudes, "flights, metres above ground")
@@ -42,7 +42,7 @@ void addSynthVerb(CLI::App& app) {
       ->capture_default_str();
   verb->add_option("--samples", flags->city.samplesPerPixel, "rays per pixel")->capture_default_str();
   verb->add_flag("--pinhole", flags->city.pinhole, "an ideal lens instead of a mildly distorted one");
-  verb->add_option("--threads", flags->city.threads, "processor threads; 0: all cores")
+  verb->add_option("--threads", flags->city.threads, "CPU threads; 0: all cores")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));
   verb->callback([flags] {

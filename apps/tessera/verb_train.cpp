@@ -11,7 +11,7 @@
 namespace tessera {
 namespace {
 
-// As CLI::Range, but false for what is not a number.
+// Like CLI::Range, but also rejects text that is not a number.
 CLI::Validator amount(double low, double high) {
   return CLI::Validator(
       [low, high](const std::string& text) {
@@ -35,7 +35,7 @@ struct TrainFlags {
   bool json = false;
 };
 
-// Of the preset that is asked for.
+// Returns the defaults of the preset that was requested.
 std::unique_ptr<MethodSettings> presetDefaults(const Method& method, const TrainFlags& flags) {
   std::unique_ptr<MethodSettings> settings = method.settings("");
   if (!flags.configFile.empty()) {
@@ -53,7 +53,8 @@ std::unique_ptr<MethodSettings> presetDefaults(const Method& method, const Train
   return settings;
 }
 
-// Settings in the order of their strength: defaults (of a preset), the run that is resumed, --config, --set.
+// Returns the settings, in order of increasing precedence: defaults (of a preset), the run that is resumed, --config,
+// --set.
 std::unique_ptr<MethodSettings> chosenSettings(const Method& method, const TrainFlags& flags) {
   std::unique_ptr<MethodSettings> settings = presetDefaults(method, flags), saved;
   if (flags.loop.resume && ModelFolder(flags.model).manifest()) {
@@ -66,7 +67,7 @@ std::unique_ptr<MethodSettings> chosenSettings(const Method& method, const Train
   if (!flags.seed.empty()) setConfigField(fields, "seed=" + flags.seed);
   if (!flags.residentBlocks.empty()) setConfigField(fields, "resident_blocks=" + flags.residentBlocks);
   if (saved) {
-    settings->keepFound(*saved);
+    settings->adoptTunedValues(*saved);
     requireSameSettings(flags.model, saved->fields(), fields);
   }
   return settings;
@@ -80,7 +81,7 @@ bool swapsBlocks(const Method& method) {
   return method.swapsBlocks;
 }
 
-// Its settings would not even be understood.
+// Throws Error if the model to resume is of another method, whose settings this method could not interpret.
 void requireSameMethod(const TrainFlags& flags) {
   const auto manifest = flags.loop.resume ? ModelFolder(flags.model).manifest() : std::nullopt;
   if (!manifest || manifest->method == flags.method) return;
@@ -101,7 +102,7 @@ TrainingResult train(Device& device, const TrainFlags& flags) {
     options.blocks = *blocks;
     if (!flags.grid.empty()) options.grid = readGrid(flags.grid, capture);
     options.memoryMiB = flags.memoryMiB;
-    options.cardBytes = device.ownMemory().bytes;
+    options.gpuBytes = device.ownMemory().bytes;
     if (!method.swapsBlocks && !flags.residentBlocks.empty()) {
       throw CLI::ValidationError("--resident-blocks", "is of --method " + namesOfMethods(swapsBlocks));
     }
@@ -133,7 +134,7 @@ std::string settingsOfAllMethods() {
 
 std::string howToGoOn(const fs::path& model) {
   if (ModelFolder(model).manifest()) return "go on with --resume";
-  return "there is no model yet: give the same command again, with --resume for what was found out so far";
+  return "there is no model yet: repeat the same command, with --resume to keep what was determined so far";
 }
 
 }  // namespace
@@ -152,29 +153,30 @@ void addTrainVerb(CLI::App& app) {
       ->capture_default_str()
       ->check(CLI::IsMember(namesOfAllMethods()));
   CLI::Option* steps = verb->add_option("--steps", flags->loop.steps, "training steps")
-                           ->default_str(fmt::format("{}, or what the run that is resumed had planned", kDefaultSteps))
+                           ->default_str(fmt::format("{}, or what the resumed run had planned", kDefaultSteps))
                            ->check(CLI::Range(int64_t{1}, int64_t{1} << 40));
   verb->add_option("--minutes", flags->loop.minutes, "as many steps as fit; fixed once, early")
       ->check(amount(1e-3, 1e7))
       ->excludes(steps);
   verb->add_flag("--resume", flags->loop.resume, "go on with the model that is in the folder");
   const std::string ofBlocks = fmt::format("of --method {}: ", namesOfMethods(trainsInBlocks));
-  CLI::Option* blocks = verb->add_option("--blocks", flags->blocks, ofBlocks + "auto, or so many along x and y, as 3x2")
-                            ->capture_default_str();
+  CLI::Option* blocks =
+      verb->add_option("--blocks", flags->blocks, ofBlocks + "auto, or the numbers along x and y, as 3x2")
+          ->capture_default_str();
   verb->add_option("--grid", flags->grid, ofBlocks + "the blocks of this blocks.json, of another model")
       ->check(CLI::ExistingFile)
       ->excludes(blocks);
   verb->add_option("--resident-blocks", flags->residentBlocks,
-                   fmt::format("of --method {}: so many blocks in memory at once, the others on disk; the same as "
+                   fmt::format("of --method {}: number of blocks in memory at once, the others on disk; the same as "
                                "--set resident_blocks=...",
                                namesOfMethods(swapsBlocks)))
       ->check(CLI::Range(1, 1 << 20));
   verb->add_option("--memory-mib", flags->memoryMiB,
-                   ofBlocks + "memory to plan blocks and photos for; default: what the machine has")
+                   ofBlocks + "memory for which to plan blocks and photos; default: the machine's")
       ->check(amount(1, 1e9));
-  verb->add_option("--seed", flags->seed, "of everything random, a whole number; the same as --set seed=...");
+  verb->add_option("--seed", flags->seed, "seed of all random numbers, a whole number; the same as --set seed=...");
   verb->add_option("--config", flags->configFile, "settings file (TOML)")->check(CLI::ExistingFile);
-  verb->add_option("--set", flags->settings, "key=value, as often as wanted");
+  verb->add_option("--set", flags->settings, "key=value; may be repeated");
   verb->add_option("--checkpoint-seconds", flags->loop.checkpointSeconds, "time between checkpoints")
       ->capture_default_str()
       ->check(amount(0, 1e9));
@@ -197,7 +199,7 @@ void addTrainVerb(CLI::App& app) {
                  result.samplesPerSecond / 1e6, device->name());
       if (!result.finished) fmt::print("stopped on request; {}\n", howToGoOn(flags->model));
     }
-    // Whoever is to bake it next is told.
+    // Signals to the shell that training has not finished, so that nothing bakes the model by mistake.
     if (!result.finished) throw CLI::RuntimeError(interruptedStatus());
   });
 }

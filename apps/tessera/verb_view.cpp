@@ -11,8 +11,8 @@
 namespace tessera {
 namespace {
 
-// The window is a program of its own (apps/viewer), beside this one: this one needs no desktop.
-[[noreturn]] void becomeViewer(const std::vector<std::string>& arguments) {
+// Runs the viewer's window, a separate program (apps/viewer), so that this program needs no desktop libraries.
+[[noreturn]] void execViewer(const std::vector<std::string>& arguments) {
   const fs::path viewer = fs::read_symlink("/proc/self/exe").parent_path() / "tessera-viewer";
   if (!fs::exists(viewer)) {
     throw Error(viewer.string(), "", "this tessera was built without its window",
@@ -35,9 +35,9 @@ namespace {
 
 void addViewVerb(CLI::App& app) {
   CLI::App* verb = app.add_subcommand("view", "a scene, or a model in training, in a window to move through");
-  verb->set_help_flag();  // its flags are the viewer's: tessera view --help is answered there
+  verb->set_help_flag();  // the viewer has flags of its own and answers tessera view --help
   verb->prefix_command();
-  verb->callback([verb] { becomeViewer(verb->remaining()); });
+  verb->callback([verb] { execViewer(verb->remaining()); });
 }
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// The verbs of the command line. Each file verb_NAME.cpp declares its flags and calls one library function.
+// The verbs of the command line. Each file verb_NAME.cpp declares the flags of its verb and calls one library function.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -12,7 +12,7 @@
 
 namespace tessera {
 
-// Each adds its verb to `app`, which does its work when the verb was given.
+// Each function adds one verb to `app`; the verb's work is done when it is given on the command line.
 void addSynthVerb(CLI::App& app);
 void addImportVerb(CLI::App& app);
 void addTrainVerb(CLI::App& app);
@@ -25,9 +25,10 @@ void addExportVerb(CLI::App& app);
 void addInfoVerb(CLI::App& app);
 void addBenchVerb(CLI::App& app);
 
-// True once SIGINT or SIGTERM has come; a second one ends the process at once.
+// Returns whether SIGINT or SIGTERM has been received; a second signal ends the process at once.
 bool interrupted();
-// What a verb that was interrupted before its end ends with, as CLI::RuntimeError: 130 for SIGINT, 143 for SIGTERM.
+// Returns the exit status of a verb that was interrupted before its end, for CLI::RuntimeError: 130 for SIGINT, 143 for
+// SIGTERM.
 int interruptedStatus();
 void catchInterrupts();
 

@@ -18,13 +18,13 @@ namespace tessera {
 namespace {
 
 constexpr float kFontPixels = 15;
-constexpr double kLongestStep = 0.1;  // seconds
+constexpr double kLongestStep = 0.1;  // seconds of navigation per frame, at most
 
-// As the shaders read them.
+// The layout that the shaders expect.
 static_assert(sizeof(ImDrawVert) == 20 && sizeof(ImDrawIdx) == 2);
 
 template <class T>
-std::span<const std::byte> bytesOf(const ImVector<T>& values) {
+std::span<const std::byte> asBytes(const ImVector<T>& values) {
   return std::as_bytes(std::span(values.Data, static_cast<size_t>(values.Size)));
 }
 
@@ -35,11 +35,11 @@ Interface::Interface(Window& window, const std::shared_ptr<const GpuContext>& co
   IMGUI_CHECKVERSION();
   ImGui::CreateContext();
   ImGuiIO& io = ImGui::GetIO();
-  io.IniFilename = nullptr;  // nothing is written beside what people look at
+  io.IniFilename = nullptr;  // do not write a settings file
   io.BackendFlags |= ImGuiBackendFlags_RendererHasVtxOffset;
   ImGui_ImplGlfw_InitForVulkan(window.handle(), true);
   ImGui::StyleColorsDark();
-  // Dear ImGui reckons in the desktop's units, of which a pixel may be a part; letters are made for pixels.
+  // Dear ImGui measures in the desktop's units, which may be larger than a pixel; fonts are rasterised in pixels.
   const float scale = window.contentScale(), unit = window.unitsOfPixel();
   ImGui::GetStyle().ScaleAllSizes(scale * unit);
   ImGui::GetStyle().WindowRounding = 4 * scale * unit;
@@ -73,7 +73,7 @@ void Interface::begin() {
 Moves Interface::moves() const {
   const ImGuiIO& io = ImGui::GetIO();
   Moves moves;
-  moves.seconds = std::min(static_cast<double>(io.DeltaTime), kLongestStep);  // nobody moved while the window rested
+  moves.seconds = std::min(static_cast<double>(io.DeltaTime), kLongestStep);  // longer gaps are pauses of the window
   const double height = std::max(1.0f, io.DisplaySize.y);
   if (!io.WantCaptureMouse) {
     if (ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
@@ -88,10 +88,10 @@ Moves Interface::moves() const {
     moves.wheel = io.MouseWheel;
   }
   if (!io.WantTextInput && !io.KeyCtrl && !io.KeyAlt && !io.KeySuper) {
-    const auto held = [&](int key, int other) { return window_.isHeld(key) || window_.isHeld(other) ? 1.0 : 0.0; };
-    moves.right = held(GLFW_KEY_D, GLFW_KEY_RIGHT) - held(GLFW_KEY_A, GLFW_KEY_LEFT);
-    moves.up = held(GLFW_KEY_E, GLFW_KEY_PAGE_UP) - held(GLFW_KEY_Q, GLFW_KEY_PAGE_DOWN);
-    moves.forward = held(GLFW_KEY_W, GLFW_KEY_UP) - held(GLFW_KEY_S, GLFW_KEY_DOWN);
+    const auto axisInput = [&](int key, int other) { return window_.isHeld(key) || window_.isHeld(other) ? 1.0 : 0.0; };
+    moves.right = axisInput(GLFW_KEY_D, GLFW_KEY_RIGHT) - axisInput(GLFW_KEY_A, GLFW_KEY_LEFT);
+    moves.up = axisInput(GLFW_KEY_E, GLFW_KEY_PAGE_UP) - axisInput(GLFW_KEY_Q, GLFW_KEY_PAGE_DOWN);
+    moves.forward = axisInput(GLFW_KEY_W, GLFW_KEY_UP) - axisInput(GLFW_KEY_S, GLFW_KEY_DOWN);
     moves.fast = io.KeyShift;
   }
   return moves;
@@ -126,14 +126,14 @@ void Interface::paint(GpuPresenter& presenter) const {
   for (int i = 0; i < data->CmdListsCount; ++i) {
     const ImDrawList& list = *data->CmdLists[i];
     if (list.IdxBuffer.empty()) continue;
-    drawn.vertices = presenter.stage(bytesOf(list.VtxBuffer));
-    // Two indices are read at a time.
+    drawn.vertices = presenter.stage(asBytes(list.VtxBuffer));
+    // The shader reads two 16-bit indices at a time.
     std::vector<ImDrawIdx> indices(list.IdxBuffer.begin(), list.IdxBuffer.end());
     indices.resize((indices.size() + 1) / 2 * 2);
     drawn.indices = presenter.stage(std::as_bytes(std::span(indices)));
     for (const ImDrawCmd& command : list.CmdBuffer) {
-      const auto inside = [](float at, float low, float scale, uint32_t most) {
-        return static_cast<int32_t>(std::clamp((at - low) * scale, 0.0f, static_cast<float>(most)));
+      const auto inside = [](float at, float low, float scale, uint32_t maximum) {
+        return static_cast<int32_t>(std::clamp((at - low) * scale, 0.0f, static_cast<float>(maximum)));
       };
       const ImVec2 low = data->DisplayPos, scale = data->FramebufferScale;
       VkRect2D where = {};

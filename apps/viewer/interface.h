@@ -1,4 +1,4 @@
-// Dear ImGui in a window: its input, and its triangles in the window's pictures.
+// Dear ImGui in a window: forwards input to it and draws its triangles into the window's frames.
 #pragma once
 
 #include <memory>
@@ -14,20 +14,20 @@ namespace tessera {
 
 class Interface {
  public:
-  // One at a time: Dear ImGui is a global thing. Keeps a reference to `window`.
+  // Only one may exist at a time, because Dear ImGui has global state. Keeps a reference to `window`.
   Interface(Window& window, const std::shared_ptr<const GpuContext>& context, VkRenderPass renderPass);
   ~Interface();
   Interface(const Interface&) = delete;
   Interface& operator=(const Interface&) = delete;
 
-  // Begins what is shown with the next picture: calls of ImGui may follow.
+  // Begins the interface of the next frame; calls of ImGui may follow.
   void begin();
-  // What people did outside of panels since the last picture.
+  // Returns the user's input outside of panels since the last frame.
   Moves moves() const;
-  // Where somebody clicked twice outside of panels: 0 to 1 to the right and down.
+  // Returns where the user double-clicked outside of panels: 0 to 1 to the right and down.
   std::optional<Vec2d> doubleClick() const;
-  bool pressed(int key) const;  // GLFW's number; since the last picture, not while text is entered
-  void end();                   // of what is shown
+  bool pressed(int key) const;  // a GLFW key; since the last frame, ignored while text is entered
+  void end();                   // ends the interface of this frame
   void paint(GpuPresenter& presenter) const;
 
  private:

@@ -1,4 +1,5 @@
-// tessera-viewer: the window of `tessera view`. A program of its own, so that tessera itself needs no desktop.
+// tessera-viewer: the window of `tessera view`. It is a separate program, so that tessera itself needs no desktop
+// libraries.
 #include "apps/tessera/command_line.h"
 #include "apps/viewer/viewer.h"
 
@@ -20,13 +21,14 @@ int main(int argc, char** argv) {
   app.add_option("--from", window.from, "photo whose view to begin with: the end of its name");
   app.add_option("--mode", mode, "how to move")->check(CLI::IsMember({"map", "orbit", "fly"}));
   app.add_option("--size", size, "of the window, as 1280x720");
-  app.add_option("--detail", view.mostPixels, "of a scene: pixels of error that may be seen; 0: the finest everywhere")
+  app.add_option("--detail", view.maximumScreenSpaceError,
+                 "of a scene: pixels of error that may be seen; 0: the finest everywhere")
       ->check(CLI::Range(0.0, 1000.0));
-  app.add_option("--memory-mib", view.memoryMiB, "of a scene: memory of the graphics card for its contents")
+  app.add_option("--memory-mib", view.memoryMiB, "of a scene: memory of the GPU for its contents")
       ->check(CLI::Range(1.0, 1e9));
   bool hidden = false;
   app.add_flag("--no-panel", hidden, "begin without the panel (F1 shows it)");
-  app.add_option("--screenshot", window.screenshot, "write this PNG once the picture is whole, and end");
+  app.add_option("--screenshot", window.screenshot, "write this PNG once the image is complete, and end");
   addDeviceFlags(app, view.device);
   return runCommandLine(app, argc, argv, "lower --memory-mib, or make the window smaller with --size", [&] {
     parsePictureSize(size, window.width, window.height);

@@ -8,36 +8,36 @@ namespace tessera {
 namespace {
 
 constexpr double kFlightSeconds = 0.5;
-constexpr double kTurn = 2 * std::numbers::pi;          // for a drag over the whole window's height
-constexpr double kLookTurn = 1.5;                       // likewise, when flying
-constexpr double kLeastFromUp = 0.02;                   // radians: never straight up or down
-constexpr double kMapAngle = 0.495 * std::numbers::pi;  // from straight down: no farther on the map
-constexpr double kWheel = 0.85;                         // of the distance that is left, a notch
-constexpr double kDragNotches = 20;                     // of the wheel, for a drag over the whole window's height
+constexpr double kTurn = 2 * std::numbers::pi;          // radians, for a drag over the window's whole height
+constexpr double kLookTurn = 1.5;                       // the same, when flying
+constexpr double kMinFromUp = 0.02;                     // radians; never looks straight up or down
+constexpr double kMapAngle = 0.495 * std::numbers::pi;  // largest angle from straight down on the map
+constexpr double kWheel = 0.85;                         // factor of the distance to the target per notch
+constexpr double kDragNotches = 20;                     // notches that a drag over the window's whole height stands for
 const Vec3d kUp = Vec3d::UnitZ();
 
-// Forwards, by its angle from straight up and around.
+// A direction as its angle from straight up and its azimuth.
 struct Angles {
   double fromUp = 0, around = 0;
 };
 
-Angles anglesOf(const Vec3d& forward) {
+Angles toAngles(const Vec3d& forward) {
   return {std::acos(std::clamp(forward.z(), -1.0, 1.0)), std::atan2(forward.y(), forward.x())};
 }
 
-Vec3d directionOf(const Angles& angles) {
+Vec3d toDirection(const Angles& angles) {
   return {std::sin(angles.fromUp) * std::cos(angles.around), std::sin(angles.fromUp) * std::sin(angles.around),
           std::cos(angles.fromUp)};
 }
 
-Vec3d forwardOf(const Look& look) {
+Vec3d forwardDirection(const Look& look) {
   const Vec3d ahead = look.target - look.eye;
   const double length = ahead.norm();
   return length > 0 ? Vec3d(ahead / length) : Vec3d(-kUp);
 }
 
-// To the right of whoever looks there, level.
-Vec3d rightOf(const Vec3d& forward) {
+// Returns the horizontal direction to the right of a viewing direction.
+Vec3d rightDirection(const Vec3d& forward) {
   const Vec3d right = forward.cross(kUp);
   const double length = right.norm();
   return length > 1e-9 ? Vec3d(right / length) : Vec3d(Vec3d::UnitX());
@@ -64,27 +64,27 @@ Look Navigation::overview(double aspect) const {
 
 void Navigation::setMode(NavigationMode mode) {
   if (mode_ == NavigationMode::fly && mode != NavigationMode::fly) {
-    // Around what was looked at, as far away as the last target was.
-    const double distance = std::clamp((look_.target - look_.eye).norm(), leastDistance(), radius());
-    look_.target = look_.eye + distance * forwardOf(look_);
+    // Orbits around what was looked at, at the distance of the last target.
+    const double distance = std::clamp((look_.target - look_.eye).norm(), minDistance(), radius());
+    look_.target = look_.eye + distance * forwardDirection(look_);
   }
   mode_ = mode;
   flight_.reset();
-  if (mode == NavigationMode::map && anglesOf(forwardOf(look_)).fromUp < std::numbers::pi - kMapAngle) {
-    turnAround(0, 0);  // nobody looks upwards over a map
+  if (mode == NavigationMode::map && toAngles(forwardDirection(look_)).fromUp < std::numbers::pi - kMapAngle) {
+    turnAround(0, 0);  // the map never looks upwards
   }
 }
 
 void Navigation::setLook(const Look& look) {
   flight_.reset();
   look_ = look;
-  if (mode_ == NavigationMode::map && anglesOf(forwardOf(look)).fromUp < std::numbers::pi - kMapAngle) {
+  if (mode_ == NavigationMode::map && toAngles(forwardDirection(look)).fromUp < std::numbers::pi - kMapAngle) {
     mode_ = NavigationMode::orbit;
   }
 }
 
 void Navigation::flyTo(const Look& look) {
-  if (mode_ == NavigationMode::map && anglesOf(forwardOf(look)).fromUp < std::numbers::pi - kMapAngle) {
+  if (mode_ == NavigationMode::map && toAngles(forwardDirection(look)).fromUp < std::numbers::pi - kMapAngle) {
     mode_ = NavigationMode::orbit;
   }
   flight_ = {look_, look, 0};
@@ -92,13 +92,13 @@ void Navigation::flyTo(const Look& look) {
 
 void Navigation::focus(const Vec3d& place) {
   Vec3d away = 0.4 * (look_.eye - place);
-  if (away.norm() < 2 * leastDistance()) away = 2 * leastDistance() * away.normalized();
+  if (away.norm() < 2 * minDistance()) away = 2 * minDistance() * away.normalized();
   flyTo({place + away, place});
 }
 
-Look Navigation::lookOf(const Pose& worldFromCamera) const {
+Look Navigation::lookFromPose(const Pose& worldFromCamera) const {
   const Vec3d eye = worldFromCamera.translation, forward = worldFromCamera.rotation.col(2);
-  // To the ground where it looks down on it, else as far as the scene's middle.
+  // Chooses the distance to the ground if the camera looks down on it, otherwise to the middle of the scene.
   double distance = (0.5 * (low_ + high_) - eye).dot(forward);
   if (forward.z() < -0.2) distance = (eye.z() - low_.z()) / -forward.z();
   distance = std::clamp(distance, 0.1 * radius(), 2 * radius());
@@ -106,7 +106,7 @@ Look Navigation::lookOf(const Pose& worldFromCamera) const {
 }
 
 Pose Navigation::worldFromCamera() const {
-  const Vec3d forward = forwardOf(look_), right = rightOf(forward);
+  const Vec3d forward = forwardDirection(look_), right = rightDirection(forward);
   Pose pose;
   pose.rotation.col(0) = right;
   pose.rotation.col(1) = forward.cross(right);
@@ -137,14 +137,14 @@ bool Navigation::update(const Moves& moves) {
 
 void Navigation::comeNearer(double notches) {
   const double now = (look_.eye - look_.target).norm();
-  const double distance = std::clamp(now * std::pow(kWheel, notches), leastDistance(), mostDistance());
-  look_.eye = look_.target - distance * forwardOf(look_);
+  const double distance = std::clamp(now * std::pow(kWheel, notches), minDistance(), maxDistance());
+  look_.eye = look_.target - distance * forwardDirection(look_);
 }
 
 void Navigation::drag(const Moves& moves) {
   if (moves.drag == Moves::Drag::none || (moves.dragRight == 0 && moves.dragDown == 0)) return;
   if (mode_ == NavigationMode::fly) {
-    turnHere(moves.dragRight * kLookTurn, moves.dragDown * kLookTurn);  // drags the picture
+    turnHere(moves.dragRight * kLookTurn, moves.dragDown * kLookTurn);  // drags the image
     return;
   }
   if (moves.drag == Moves::Drag::middle) {
@@ -156,9 +156,10 @@ void Navigation::drag(const Moves& moves) {
     turnAround(-moves.dragRight * kTurn, -moves.dragDown * kTurn);
     return;
   }
-  const Vec3d forward = forwardOf(look_), right = rightOf(forward);
-  const double height = moves.viewHeight * (look_.eye - look_.target).norm();  // of the window, where the target is
-  // Over the ground, or in the picture's plane.
+  const Vec3d forward = forwardDirection(look_), right = rightDirection(forward);
+  const double height =
+      moves.viewHeight * (look_.eye - look_.target).norm();  // of the window at the target, in world units
+  // Moves over the ground, or in the image plane.
   Vec3d down = forward.cross(right);
   double share = 1;
   if (mode_ == NavigationMode::map) {
@@ -172,8 +173,8 @@ void Navigation::drag(const Moves& moves) {
 
 void Navigation::go(double right, double up, double forward) {
   if (right == 0 && up == 0 && forward == 0) return;
-  Vec3d ahead = forwardOf(look_);
-  const Vec3d side = rightOf(ahead);
+  Vec3d ahead = forwardDirection(look_);
+  const Vec3d side = rightDirection(ahead);
   if (mode_ != NavigationMode::fly) ahead = kUp.cross(side);  // over the ground
   const Vec3d way = right * side + up * kUp + forward * ahead;
   look_.eye += way;
@@ -181,18 +182,18 @@ void Navigation::go(double right, double up, double forward) {
 }
 
 void Navigation::turnAround(double yaw, double pitch) {
-  Angles angles = anglesOf(forwardOf(look_));
+  Angles angles = toAngles(forwardDirection(look_));
   angles.around += yaw;
-  const double least = mode_ == NavigationMode::map ? std::numbers::pi - kMapAngle : kLeastFromUp;
-  angles.fromUp = std::clamp(angles.fromUp - pitch, least, std::numbers::pi - kLeastFromUp);
-  look_.eye = look_.target - (look_.target - look_.eye).norm() * directionOf(angles);
+  const double minimum = mode_ == NavigationMode::map ? std::numbers::pi - kMapAngle : kMinFromUp;
+  angles.fromUp = std::clamp(angles.fromUp - pitch, minimum, std::numbers::pi - kMinFromUp);
+  look_.eye = look_.target - (look_.target - look_.eye).norm() * toDirection(angles);
 }
 
 void Navigation::turnHere(double yaw, double pitch) {
-  Angles angles = anglesOf(forwardOf(look_));
+  Angles angles = toAngles(forwardDirection(look_));
   angles.around += yaw;
-  angles.fromUp = std::clamp(angles.fromUp - pitch, kLeastFromUp, std::numbers::pi - kLeastFromUp);
-  look_.target = look_.eye + (look_.target - look_.eye).norm() * directionOf(angles);
+  angles.fromUp = std::clamp(angles.fromUp - pitch, kMinFromUp, std::numbers::pi - kMinFromUp);
+  look_.target = look_.eye + (look_.target - look_.eye).norm() * toDirection(angles);
 }
 
 void Navigation::flyOn(double seconds) {

@@ -18,7 +18,7 @@ Moves dragged(Moves::Drag button, double right, double down) {
   return moves;
 }
 
-Moves held(double right, double up, double forward) {
+Moves heldKeys(double right, double up, double forward) {
   Moves moves;
   moves.seconds = 0.05;
   moves.right = right;
@@ -27,7 +27,7 @@ Moves held(double right, double up, double forward) {
   return moves;
 }
 
-// Where a place is in the picture: right and down, with the focal length as the unit.
+// Returns where a place is in the image: right and down, in focal lengths.
 Vec2d inPicture(const Navigation& navigation, const Vec3d& place) {
   const Vec3d inCamera = navigation.worldFromCamera().inverse() * place;
   return {inCamera.x() / inCamera.z(), inCamera.y() / inCamera.z()};
@@ -38,7 +38,7 @@ TEST(Navigation, BeginsAboveAndBesideTheMiddle) {
   const double edge = std::tan(25.0 / 180 * M_PI);
   EXPECT_NEAR(inPicture(navigation, {0, 0, 0}).norm(), 0, 1e-12);
   for (const double x :
-       {kLow.x(), kHigh.x()}) {  // what is far is in view, or nearly, in a window that is wider than high
+       {kLow.x(), kHigh.x()}) {  // in a window wider than high, distant places are in view, or nearly so
     const Vec2d at = inPicture(navigation, {x, kHigh.y(), kHigh.z()});
     EXPECT_LT(std::abs(at.y()), 1.1 * edge);
     EXPECT_LT(std::abs(at.x()), 1.3 * edge);
@@ -55,7 +55,7 @@ TEST(Navigation, KeepsTheHorizonLevelAndCameraAxesRightHanded) {
     EXPECT_NEAR((axes.transpose() * axes - Mat3d::Identity()).norm(), 0, 1e-12);
     EXPECT_NEAR(axes.determinant(), 1, 1e-12);
     EXPECT_NEAR(axes(2, 0), 0, 1e-12);  // right is level
-    EXPECT_LT(axes(2, 1), 0);           // down is down
+    EXPECT_LT(axes(2, 1), 0);           // the camera's down axis points downwards
   }
 }
 
@@ -65,7 +65,7 @@ TEST(Navigation, DraggingOverTheMapTakesTheGroundAlong) {
   const double height = navigation.look().eye.z();
   navigation.update(dragged(Moves::Drag::left, 0.1, 0.05));
   const Vec2d at = inPicture(navigation, place);
-  // 0.1 of the window's height, which the field of view of 50 degrees makes 0.093 focal lengths.
+  // 0.1 of the window's height is 0.093 focal lengths at a field of view of 50 degrees.
   EXPECT_NEAR(at.x(), 0.093, 0.01);
   EXPECT_NEAR(at.y(), 0.0466, 0.01);
   EXPECT_EQ(navigation.look().eye.z(), height);
@@ -78,10 +78,10 @@ TEST(Navigation, TurnsAroundThePlaceThatItLooksAt) {
   navigation.update(dragged(Moves::Drag::left, 0.25, 0));  // a quarter turn
   EXPECT_EQ(navigation.look().target, before.target);
   EXPECT_NEAR((navigation.look().eye - before.target).norm(), (before.eye - before.target).norm(), 1e-9);
-  EXPECT_LT(navigation.look().eye.x(), -5);  // the picture goes right: the camera left
+  EXPECT_LT(navigation.look().eye.x(), -5);  // the image moves right, so the camera moves left
   navigation.update(dragged(Moves::Drag::left, 0, 2));
   EXPECT_GT(navigation.look().eye.z(),
-            before.eye.z());  // the picture goes down: the camera up, and no farther than that
+            before.eye.z());  // the image moves down, so the camera moves up, but not beyond the map's limit
   EXPECT_LT(navigation.worldFromCamera().rotation(2, 2), -0.99);
 }
 
@@ -110,7 +110,7 @@ TEST(Navigation, FlyingGoesWhereItLooksAndTurnsOnTheSpot) {
   Navigation navigation(kLow, kHigh);
   navigation.setMode(NavigationMode::fly);
   const Look before = navigation.look();
-  navigation.update(held(0, 0, 1));
+  navigation.update(heldKeys(0, 0, 1));
   const Vec3d way = navigation.look().eye - before.eye;
   EXPECT_NEAR(way.norm(), navigation.speed() * 0.05, 1e-9);
   EXPECT_NEAR(way.normalized().dot((before.target - before.eye).normalized()), 1, 1e-9);
@@ -118,14 +118,14 @@ TEST(Navigation, FlyingGoesWhereItLooksAndTurnsOnTheSpot) {
   navigation.update(dragged(Moves::Drag::left, 0.1, 0.1));
   EXPECT_EQ(navigation.look().eye, eye);
   const Vec2d at = inPicture(navigation, before.target);
-  EXPECT_GT(at.x(), 0.1);  // the picture goes along
+  EXPECT_GT(at.x(), 0.1);  // the image follows the pointer
   EXPECT_GT(at.y(), 0.1);
 }
 
 TEST(Navigation, KeysOverTheMapKeepTheHeight) {
   Navigation navigation(kLow, kHigh);
   const Vec3d eye = navigation.look().eye;
-  navigation.update(held(1, 0, 1));
+  navigation.update(heldKeys(1, 0, 1));
   EXPECT_EQ(navigation.look().eye.z(), eye.z());
   EXPECT_GT(navigation.look().eye.x(), eye.x());
   EXPECT_GT(navigation.look().eye.y(), eye.y());
@@ -144,7 +144,7 @@ TEST(Navigation, FliesToAViewInHalfASecondAndWhoeverMovesStopsThat) {
   EXPECT_EQ(navigation.look().eye, there.eye);
   EXPECT_FALSE(navigation.update(still));
   navigation.flyTo(navigation.overview());
-  navigation.update(held(0, 1, 0));
+  navigation.update(heldKeys(0, 1, 0));
   const Vec3d eye = navigation.look().eye;
   EXPECT_FALSE(navigation.update(still));
   EXPECT_EQ(navigation.look().eye, eye);
@@ -157,7 +157,7 @@ TEST(Navigation, ViewsOfPhotosThatLookUpwardsLeaveTheMap) {
   photo.rotation.col(0) = Vec3d(1, 0, 0);
   photo.rotation.col(1) = photo.rotation.col(2).cross(photo.rotation.col(0));
   photo.translation = {0, -8, 1};
-  navigation.setLook(navigation.lookOf(photo));
+  navigation.setLook(navigation.lookFromPose(photo));
   EXPECT_EQ(navigation.mode(), NavigationMode::orbit);
   EXPECT_NEAR((navigation.worldFromCamera().rotation - photo.rotation).norm(), 0, 1e-12);
   EXPECT_EQ(navigation.worldFromCamera().translation, photo.translation);

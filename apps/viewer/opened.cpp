@@ -5,9 +5,9 @@
 #include <thread>
 #include <utility>
 
-#include "apps/viewer/card_pictures.h"
-#include "apps/viewer/opened_drawable.h"
-#include "apps/viewer/worker_pictures.h"
+#include "apps/viewer/async_frame_source.h"
+#include "apps/viewer/gpu_frame_source.h"
+#include "apps/viewer/reloading_render_source.h"
 #include "base/error.h"
 #include "base/log.h"
 #include "import/capture_reader.h"
@@ -27,7 +27,7 @@ bool isModel(const fs::path& folder) {
   return fs::exists(folder / "blocks.json");
 }
 
-// The box in the world around one that stands in axes of its own.
+// Extends the place's box in the world by a box that is given in other axes.
 template <class ToWorld>
 void include(const Vec3d& low, const Vec3d& high, ToWorld toWorld, Place& place) {
   place.low = Vec3d::Constant(INFINITY);
@@ -56,13 +56,13 @@ void requireViewable(const fs::path& folder) {
               "name the folder of a scene or of a model");
 }
 
-Place placeOf(const ViewOptions& options) {
+Place loadPlace(const ViewOptions& options) {
   Place place;
   fs::path views = options.views;
   Mat4d sourceFromWorld;
   if (isScene(options.folder)) {
     const Tileset tileset = readTileset(options.folder);
-    const TileFrame frame = frameOf(tileset);
+    const TileFrame frame = makeTileFrame(tileset);
     include(
         frame.low, frame.high,
         [&](const Vec3d& x) { return Vec3d(frame.translation + frame.scale * (frame.rotation * x)); }, place);
@@ -112,26 +112,25 @@ void waitForModel(const fs::path& folder) {
   }
 }
 
-std::unique_ptr<PictureSource> openPictures(const ViewOptions& options,
-                                            const std::shared_ptr<const GpuContext>& window) {
-  // The card may have no screen, and the window be shown by a driver for the processor: that is meant only where it is
-  // named, or where there is no card.
+std::unique_ptr<FrameSource> openPictures(const ViewOptions& options, const std::shared_ptr<const GpuContext>& window) {
+  // If the GPU drives no screen, the window may be shown by a Vulkan driver for the CPU. That driver renders the scene
+  // only if it was named, or if there is no GPU.
   const std::string& kind = options.device.kind;
   const bool isMeant =
-      vulkanDeviceOf(kind) && (!window->isProcessor() || kind.starts_with("vulkan:") || !vulkanDeviceOf("auto"));
+      parseVulkanDevice(kind) && (!window->isCpu() || kind.starts_with("vulkan:") || !parseVulkanDevice("auto"));
   if (isScene(options.folder) && isMeant) {
     GpuRendererSettings settings;
-    settings.selection.mostPixels = options.mostPixels;
+    settings.selection.maximumScreenSpaceError = options.maximumScreenSpaceError;
     settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB * 1048576);
     settings.inBackground = true;
-    return std::make_unique<CardPictures>(openGpuScene(window, options.folder, settings));
+    return std::make_unique<GpuFrameSource>(openGpuScene(window, options.folder, settings));
   }
-  DrawableOptions drawable;
-  drawable.threads = options.device.threads;
-  drawable.memoryMiB = options.memoryMiB;
-  drawable.mostPixels = options.mostPixels;
-  return std::make_unique<WorkerPictures>(window,
-                                          std::make_unique<OpenedDrawable>(options.folder, options.device, drawable));
+  RenderSourceOptions renderSource;
+  renderSource.threads = options.device.threads;
+  renderSource.memoryMiB = options.memoryMiB;
+  renderSource.maximumScreenSpaceError = options.maximumScreenSpaceError;
+  return std::make_unique<AsyncFrameSource>(
+      window, std::make_unique<ReloadingRenderSource>(options.folder, options.device, renderSource));
 }
 
 }  // namespace tessera

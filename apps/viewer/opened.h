@@ -1,12 +1,12 @@
-// What `tessera view` was given: where it stands, and what draws it.
+// Opens what `tessera view` was given: its location, and the source of its frames.
 #pragma once
 
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "apps/tessera/drawable.h"
-#include "apps/viewer/picture_source.h"
+#include "apps/tessera/render_source.h"
+#include "apps/viewer/frame_source.h"
 #include "eval/render_views.h"
 #include "gpu/context.h"
 
@@ -14,27 +14,26 @@ namespace tessera {
 
 struct ViewOptions {
   fs::path folder;
-  fs::path views;  // a capture whose photos' views can be gone to; empty: a model's own
+  fs::path views;  // a capture whose photo poses can be visited; empty: those of a model
   DeviceOptions device = {.kind = "auto"};
-  double memoryMiB = 1024;  // for the contents of a scene
-  double mostPixels = 1.5;  // SelectionSettings
+  double memoryMiB = 1024;               // for contents of a scene
+  double maximumScreenSpaceError = 1.5;  // see SelectionSettings
 };
 
 struct Place {
-  Vec3d low = -Vec3d::Ones(), high = Vec3d::Ones();  // of what there is to be seen, in the world
-  std::vector<NamedView> views;                      // of photos
+  Vec3d low = -Vec3d::Ones(), high = Vec3d::Ones();  // box of what can be seen, in the world
+  std::vector<NamedView> views;                      // poses of photos
 };
 
-// Throws Error where the folder holds neither a scene nor a model.
+// Throws Error if the folder holds neither a scene nor a model.
 void requireViewable(const fs::path& folder);
-Place placeOf(const ViewOptions& options);
+Place loadPlace(const ViewOptions& options);
 
-// Of a model that has not saved anything yet: waits until it has.
+// If a model in training has not saved anything yet, waits until it has.
 void waitForModel(const fs::path& folder);
 
-// `window`: of the device that shows pictures, and draws scenes unless the processor is to. Throws Error as
-// openDrawable and GpuSceneRenderer do.
-std::unique_ptr<PictureSource> openPictures(const ViewOptions& options,
-                                            const std::shared_ptr<const GpuContext>& window);
+// `window`: the context of the device that shows the frames, which also renders scenes unless the CPU is chosen. Throws
+// Error as openRenderSource and GpuSceneRenderer do.
+std::unique_ptr<FrameSource> openPictures(const ViewOptions& options, const std::shared_ptr<const GpuContext>& window);
 
 }  // namespace tessera

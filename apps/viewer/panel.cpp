@@ -35,9 +35,9 @@ int chooseView(const std::vector<NamedView>& views, int current) {
 
 }  // namespace
 
-PanelWish showPanel(const std::string& title, Navigation& navigation, const std::vector<NamedView>& views,
-                    const PictureSource::Facts& facts, PanelState& state) {
-  PanelWish wish;
+PanelAction showPanel(const std::string& title, Navigation& navigation, const std::vector<NamedView>& views,
+                      const FrameSource::Facts& facts, PanelState& state) {
+  PanelAction action;
   const float unit = ImGui::GetFontSize();
   ImGui::SetNextWindowPos({unit, unit}, ImGuiCond_FirstUseEver);
   ImGui::SetNextWindowSize({26 * unit, 0}, ImGuiCond_Always);
@@ -50,10 +50,10 @@ PanelWish showPanel(const std::string& title, Navigation& navigation, const std:
   ImGui::SameLine();
   modeButton("Fly (3)", NavigationMode::fly, navigation);
   ImGui::SameLine();
-  if (ImGui::Button("All (H)")) wish.all = true;
+  if (ImGui::Button("All (H)")) action.all = true;
   ImGui::SetNextItemWidth(-7 * unit);
   ImGui::SliderFloat("Lens, degrees", &state.fieldOfView, 15, 110, "%.0f", ImGuiSliderFlags_AlwaysClamp);
-  if (!views.empty()) wish.view = chooseView(views, state.view);
+  if (!views.empty()) action.view = chooseView(views, state.view);
 
   if (ImGui::CollapsingHeader("Statistics", ImGuiTreeNodeFlags_DefaultOpen) && ImGui::BeginTable("facts", 2)) {
     ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed);
@@ -63,7 +63,7 @@ PanelWish showPanel(const std::string& title, Navigation& navigation, const std:
               fmt::format("{:.1f} pictures a second, {:.1f} ms", 1000 / state.milliseconds, state.milliseconds));
     }
     for (const auto& [name, value] : facts) factRow(name, value);
-    factRow("All there is", state.isWhole ? "shown" : "not shown yet");
+    factRow("All there is", state.isComplete ? "shown" : "not shown yet");
     const Vec3d& eye = navigation.look().eye;
     factRow("Camera", fmt::format("{:.2f}, {:.2f}, {:.2f}", eye.x(), eye.y(), eye.z()));
     if (navigation.mode() == NavigationMode::fly) factRow("Speed", fmt::format("{:.3g} a second", navigation.speed()));
@@ -82,7 +82,7 @@ PanelWish showPanel(const std::string& title, Navigation& navigation, const std:
         "F1            hide this");
   }
   ImGui::End();
-  return wish;
+  return action;
 }
 
 }  // namespace tessera

@@ -1,28 +1,28 @@
-// What a window shows beside the picture: how to move, where one is, what is drawn and how fast.
+// The panel beside the image: navigation controls, position, what is drawn and how fast.
 #pragma once
 
+#include "apps/viewer/frame_source.h"
 #include "apps/viewer/navigation.h"
-#include "apps/viewer/picture_source.h"
 #include "eval/render_views.h"
 
 namespace tessera {
 
-// What people can set, and what they are told.
+// The settings that the user can change, and the values that are displayed.
 struct PanelState {
-  float fieldOfView = 50;  // degrees, from the lower to the upper edge
-  int view = -1;           // the photo's that was gone to last
+  float fieldOfView = 50;  // degrees, vertical
+  int view = -1;           // index of the photo that was visited last
   bool isShown = true;
-  double milliseconds = 0;  // from one picture to the next, while the camera moves
-  bool isWhole = false;     // the picture
+  double milliseconds = 0;  // between frames, while the camera moves
+  bool isComplete = false;  // whether the image is complete: see ShownPicture
 };
 
-// What somebody asked for.
-struct PanelWish {
-  bool all = false;  // to see all there is
-  int view = -1;     // to go to a photo's view
+// What the user requested in this frame.
+struct PanelAction {
+  bool all = false;  // to see everything
+  int view = -1;     // to go to the pose of this photo
 };
 
-PanelWish showPanel(const std::string& title, Navigation& navigation, const std::vector<NamedView>& views,
-                    const PictureSource::Facts& facts, PanelState& state);
+PanelAction showPanel(const std::string& title, Navigation& navigation, const std::vector<NamedView>& views,
+                      const FrameSource::Facts& facts, PanelState& state);
 
 }  // namespace tessera

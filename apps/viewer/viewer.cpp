@@ -24,12 +24,12 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double kRest = 0.3;   // seconds after the last motion: the camera rests
-constexpr double kIdle = 0.1;   // seconds to wait for something to happen, at rest
-constexpr double kBusy = 0.01;  // likewise, while the picture becomes whole
-constexpr int kSettling = 3;    // pictures of the window after that: panels find their sizes
+constexpr double kRest = 0.3;   // seconds after the last motion, when the camera counts as resting
+constexpr double kIdle = 0.1;   // seconds to wait for an event at rest
+constexpr double kBusy = 0.01;  // seconds, while the image is being completed
+constexpr int kSettling = 3;    // further frames, in which panels settle to their sizes
 
-Camera cameraOf(VkExtent2D window, double fieldOfView) {
+Camera makeWindowCamera(VkExtent2D window, double fieldOfView) {
   const double focal = 0.5 * window.height / std::tan(0.5 * fieldOfView * std::numbers::pi / 180);
   Camera camera;
   camera.width = static_cast<int>(window.width);
@@ -38,13 +38,13 @@ Camera cameraOf(VkExtent2D window, double fieldOfView) {
   return camera;
 }
 
-// The lens of a photo's camera, as a window shows it: its height fits.
-float fieldOfViewOf(const Camera& camera) {
+// Returns the vertical field of view in degrees that shows a photo's full height in the window.
+float computeFieldOfView(const Camera& camera) {
   const double angle = 2 * std::atan(0.5 * camera.height / camera.focalY()) * 180 / std::numbers::pi;
   return static_cast<float>(std::clamp(angle, 15.0, 110.0));
 }
 
-// What shows pictures in the window: the device that was asked for, else the best that can.
+// The device that presents images in the window: the one that was requested, otherwise the best that can present.
 struct Screen {
   std::shared_ptr<const GpuContext> context;
   std::unique_ptr<GpuPresenter> presenter;
@@ -58,7 +58,7 @@ Screen openScreen(const Window& window, const ViewOptions& view) {
     auto presenter = std::make_unique<GpuPresenter>(context, window.makeSurface(context->instance()));
     return Screen{std::move(context), std::move(presenter)};
   };
-  options.device = vulkanDeviceOf(view.device.kind).value_or("");
+  options.device = parseVulkanDevice(view.device.kind).value_or("");
   if (view.device.kind.starts_with("vulkan:")) return open();
   try {
     return open();
@@ -68,14 +68,14 @@ Screen openScreen(const Window& window, const ViewOptions& view) {
       options.device = std::to_string(device);
       try {
         return open();
-      } catch (const Error&) {  // what is wrong with the best one is said
+      } catch (const Error&) {  // the error of the best device is reported
       }
     }
     throw;
   }
 }
 
-std::string nameOf(const fs::path& folder) {
+std::string folderName(const fs::path& folder) {
   const fs::path whole = fs::absolute(folder).lexically_normal();
   return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
 }
@@ -84,9 +84,9 @@ class Viewer {
  public:
   Viewer(const ViewOptions& view, const WindowOptions& options)
       : options_(options),
-        place_(placeOf(view)),
+        place_(loadPlace(view)),
         navigation_(place_.low, place_.high),
-        name_(nameOf(view.folder)),
+        name_(folderName(view.folder)),
         window_("tessera: " + name_, options.width, options.height),
         screen_(openScreen(window_, view)),
         pictures_(openPictures(view, screen_.context)),
@@ -104,7 +104,7 @@ class Viewer {
 
   void run() {
     while (!window_.isClosing()) {
-      window_.listen(isMoving() ? 0 : panel_.isWhole ? kIdle : kBusy);
+      window_.listen(isMoving() ? 0 : panel_.isComplete ? kIdle : kBusy);
       const VkExtent2D size = window_.pixels();
       if (size.width == 0 || size.height == 0) {
         window_.listen(kIdle);
@@ -112,15 +112,15 @@ class Viewer {
       }
       if (window_.takeTouched() || isMoving()) still_ = 0;
       if (still_ > kSettling) {
-        if (!pictureOf(size).isNew) continue;  // all is shown as it is
+        if (!updatePicture(size).isNew) continue;  // the window already shows this image
         still_ = 0;
       }
       interface_.begin();
       move();
-      const ShownPicture picture = pictureOf(size);
+      const ShownPicture picture = updatePicture(size);
       still_ = picture.isNew ? 0 : still_ + 1;
-      whole_ = picture.isWhole ? whole_ + 1 : 0;
-      panel_.isWhole = picture.isWhole;
+      whole_ = picture.isComplete ? whole_ + 1 : 0;
+      panel_.isComplete = picture.isComplete;
       count(picture);
       tell();
       interface_.end();
@@ -142,20 +142,20 @@ class Viewer {
   }
 
  private:
-  ShownPicture pictureOf(VkExtent2D size) {
-    return pictures_->update(cameraOf(size, panel_.fieldOfView), navigation_.worldFromCamera(), isMoving());
+  ShownPicture updatePicture(VkExtent2D size) {
+    return pictures_->update(makeWindowCamera(size, panel_.fieldOfView), navigation_.worldFromCamera(), isMoving());
   }
 
-  // By the end of a name, so that nobody has to write folders.
+  // Begins at a photo, found by the end of its name, so that users need not type folders.
   void begin(const std::string& name) {
     for (size_t i = 0; i < place_.views.size(); ++i) {
       if (!place_.views[i].name.ends_with(name)) continue;
       panel_.view = static_cast<int>(i);
-      panel_.fieldOfView = fieldOfViewOf(place_.views[i].camera);
-      navigation_.setLook(navigation_.lookOf(place_.views[i].worldFromCamera));
+      panel_.fieldOfView = computeFieldOfView(place_.views[i].camera);
+      navigation_.setLook(navigation_.lookFromPose(place_.views[i].worldFromCamera));
       return;
     }
-    throw Error("--from " + name, "", "no photo has a name that ends so",
+    throw Error("--from " + name, "", "no photo's name ends with this",
                 place_.views.empty() ? "name the capture with --views" : "the first is " + place_.views[0].name);
   }
 
@@ -164,8 +164,8 @@ class Viewer {
     if (count == 0) return;
     panel_.view = (view + count) % count;
     const NamedView& to = place_.views[static_cast<size_t>(panel_.view)];
-    panel_.fieldOfView = fieldOfViewOf(to.camera);
-    navigation_.flyTo(navigation_.lookOf(to.worldFromCamera));
+    panel_.fieldOfView = computeFieldOfView(to.camera);
+    navigation_.flyTo(navigation_.lookFromPose(to.worldFromCamera));
   }
 
   Look overview() const {
@@ -194,7 +194,7 @@ class Viewer {
     if (navigation_.update(moves)) lastMove_ = Clock::now();
   }
 
-  // How fast pictures come while the camera moves.
+  // Measures the time between new images while the camera moves.
   void count(const ShownPicture& picture) {
     if (!picture.isNew) return;
     const Clock::time_point now = Clock::now();
@@ -208,19 +208,19 @@ class Viewer {
   void tell() {
     if (!panel_.isShown) return;
     const float lens = panel_.fieldOfView;
-    const PanelWish wish = showPanel(name_, navigation_, place_.views, pictures_->facts(), panel_);
+    const PanelAction action = showPanel(name_, navigation_, place_.views, pictures_->facts(), panel_);
     if (panel_.fieldOfView != lens) lastMove_ = Clock::now();
-    if (wish.all) navigation_.flyTo(overview());
-    if (wish.view >= 0) go(wish.view);
+    if (action.all) navigation_.flyTo(overview());
+    if (action.view >= 0) go(action.view);
   }
 
   void show(const ShownPicture& picture) {
-    if (picture.onCard.colour == 0) return;
+    if (picture.onGpu.colour == 0) return;
     arguments::ShowPictureArguments shown = {};
-    shown.colour = picture.onCard.colour;
-    shown.opacity = picture.onCard.opacity;
-    shown.width = static_cast<uint32_t>(picture.onCard.width);
-    shown.height = static_cast<uint32_t>(picture.onCard.height);
+    shown.colour = picture.onGpu.colour;
+    shown.opacity = picture.onGpu.opacity;
+    shown.width = static_cast<uint32_t>(picture.onGpu.width);
+    shown.height = static_cast<uint32_t>(picture.onGpu.height);
     const VkExtent2D size = screen_.presenter->extent();
     shown.windowWidth = static_cast<float>(size.width);
     shown.windowHeight = static_cast<float>(size.height);
@@ -235,14 +235,14 @@ class Viewer {
   std::string name_;
   Window window_;
   Screen screen_;
-  std::unique_ptr<PictureSource> pictures_;
+  std::unique_ptr<FrameSource> pictures_;
   GpuScreenPipeline showPicture_;
   Interface interface_;
   PanelState panel_;
   Clock::time_point lastMove_, lastPicture_;
-  bool wasMoving_ = false;  // at the last new picture
-  int still_ = 0;           // pictures of the window since anything changed
-  int whole_ = 0;           // likewise, since all was shown
+  bool wasMoving_ = false;  // at the last new image
+  int still_ = 0;           // frames since anything changed
+  int whole_ = 0;           // frames since the image became complete
 };
 
 }  // namespace

@@ -31,12 +31,12 @@ class ViewerTest : public testing::Test {
     }
   }
 
-  // What the window shows of a golden scene once it is whole.
+  // Returns what the window shows of a golden scene once the image is complete.
   ImageU8 shown(const std::string& representation, const std::string& device, bool panels = false, int scale = 1) {
     ViewOptions view;
     view.folder = fs::path(TESSERA_GOLDEN_SCENES) / representation;
     view.device = {device, 2};
-    view.mostPixels = 0;
+    view.maximumScreenSpaceError = 0;
     WindowOptions window;
     window.width = scale * kWidth;
     window.height = scale * kHeight;
@@ -46,20 +46,20 @@ class ViewerTest : public testing::Test {
     return readImage(window.screenshot).image;
   }
 
-  // The same by the renderer on the processor, with nothing of a window.
-  static ImageF wanted(const std::string& representation) {
+  // Renders the same view on the CPU, without a window.
+  static ImageF requested(const std::string& representation) {
     const fs::path folder = fs::path(TESSERA_GOLDEN_SCENES) / representation;
     const std::unique_ptr<Device> cpu = makeDevice({"cpu", 2});
-    const std::unique_ptr<Drawable> drawable = openDrawable(*cpu, folder, {2});
+    const std::unique_ptr<RenderSource> renderSource = openRenderSource(*cpu, folder, {2});
     ViewOptions view;
     view.folder = folder;
-    const Place place = placeOf(view);
+    const Place place = loadPlace(view);
     const double focal = 0.5 * kHeight / std::tan(25 * std::numbers::pi / 180);
     const Camera camera = {kWidth, kHeight, LensModel::pinhole, {focal, focal, 0.5 * kWidth, 0.5 * kHeight}};
     const Pose pose = Navigation(place.low, place.high).worldFromCamera();
-    // As bytes: the golden scenes' colours are brighter than any screen's.
+    // Quantised to bytes, because the golden scenes' colours exceed the displayable range.
     return toFloat(
-        toBytes(compositeOver(drawable->renderer().render(camera, pose), drawable->renderer().background())));
+        toBytes(compositeOver(renderSource->renderer().render(camera, pose), renderSource->renderer().background())));
   }
 
   TemporaryFolder folder_;
@@ -68,17 +68,17 @@ class ViewerTest : public testing::Test {
   TestScreen screen_;
 };
 
-TEST_F(ViewerTest, ShowsScenesThatItsDeviceDrawsAsTheProcessorDoes) {
+TEST_F(ViewerTest, ShowsScenesThatItsDeviceDrawsAsTheCpuDoes) {
   for (const char* representation : {"volume", "hash"}) {
-    const ImageF oracle = wanted(representation);
+    const ImageF oracle = requested(representation);
     EXPECT_GT(psnr(toFloat(shown(representation, "vulkan")), oracle), 45) << representation;
   }
   EXPECT_EQ(GpuContext::validationMessages(), 0);
 }
 
 TEST_F(ViewerTest, ShowsWhatAnotherDeviceDraws) {
-  EXPECT_GT(psnr(toFloat(shown("volume", "cpu")), wanted("volume")), 50);
-  // Where pictures come long after the window has come to rest, too.
+  EXPECT_GT(psnr(toFloat(shown("volume", "cpu")), requested("volume")), 50);
+  // Also if images arrive long after the window has come to rest.
   EXPECT_EQ(shown("volume", "cpu", false, 4).width, 4 * kWidth);
   EXPECT_EQ(GpuContext::validationMessages(), 0);
 }

@@ -25,7 +25,7 @@ Window::Window(const std::string& title, int width, int height) {
   glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);
   window_ = glfwCreateWindow(width, height, title.c_str(), nullptr, nullptr);
   if (!window_) {
-    const Error error = failed("could not be made", "see that the desktop session is there");
+    const Error error = failed("could not be made", "check that a desktop session is running");
     glfwTerminate();
     throw error;
   }
@@ -48,7 +48,7 @@ Window& Window::of(GLFWwindow* window) {
   return *static_cast<Window*>(glfwGetWindowUserPointer(window));
 }
 
-// Dear ImGui sees what is down when it looks, and pictures may take longer than a finger.
+// Records key presses, because Dear ImGui polls the key state once per frame and a frame may take longer than a press.
 void Window::onKey(GLFWwindow* window, int key, int, int action, int modifiers) {
   of(window).touched_ = true;
   constexpr int kOthers = GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER;

@@ -1,4 +1,4 @@
-// A window of the desktop, and what people do in it.
+// A desktop window and its input.
 #pragma once
 
 #include <volk.h>
@@ -13,27 +13,27 @@ namespace tessera {
 
 class Window {
  public:
-  // Throws Error where there is no screen.
+  // Throws Error if there is no screen.
   Window(const std::string& title, int width, int height);
   ~Window();
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
 
   GLFWwindow* handle() const { return window_; }
-  // Of the pictures that the window shows. Whoever asks owns it. Throws Error.
+  // Creates the surface into which the window's frames are presented; the caller owns it. Throws Error.
   VkSurfaceKHR makeSurface(VkInstance instance) const;
 
   bool isClosing() const;
-  void show();                 // it is hidden at first
-  VkExtent2D pixels() const;   // 0 × 0 while it is hidden
-  float contentScale() const;  // pixels of what is one pixel on an ordinary screen
-  float unitsOfPixel() const;  // the desktop's, in which it speaks of places in windows
-  bool isHeld(int key) const;  // GLFW's number
-  // Takes in what people did; waits for something to happen, at most so long.
+  void show();                 // the window is hidden at first
+  VkExtent2D pixels() const;   // 0 × 0 while the window is hidden
+  float contentScale() const;  // window pixels per pixel of an ordinary screen
+  float unitsOfPixel() const;  // units of the desktop's window coordinates per pixel
+  bool isHeld(int key) const;  // a GLFW key
+  // Processes input events; waits at most `seconds` for one.
   void listen(double seconds);
-  // Whether people did anything, or the window has to be drawn anew: since the last time.
+  // Returns whether there was input, or the window must be redrawn, since the last call.
   bool takeTouched() { return std::exchange(touched_, false); }
-  // Keys that went down, GLFW's numbers: since the last time.
+  // Returns the GLFW keys that were pressed since the last call.
   std::vector<int> takePressed() { return std::exchange(pressed_, {}); }
 
  private:

@@ -60,7 +60,7 @@ class Numbers {
 };
 
 // The best of several, each of so many that beginning and waiting cost nothing.
-double secondsOf(cudaStream_t stream, const std::function<void()>& run) {
+double measureSeconds(cudaStream_t stream, const std::function<void()>& run) {
   cudaEvent_t begin, end;
   check(cudaEventCreate(&begin));
   check(cudaEventCreate(&end));
@@ -99,17 +99,17 @@ void measure(json& rows, cudaStream_t stream, tcnn::cpp::Module& module, uint32_
                     gradients.data(), input.asFloats(), output.data(), parameters.data());
   };
   const auto add = [&](const std::string& operation, const std::function<void()>& run) {
-    const double seconds = secondsOf(stream, run);
+    const double seconds = measureSeconds(stream, run);
     std::printf("%-20s %-44s %9.4f ms\n", operation.c_str(), shape.c_str(), 1e3 * seconds);
     rows.push_back({{"operation", operation}, {"shape", shape}, {"seconds", seconds}});
   };
   add(name + "Forward", [&] { forward(); });
-  const tcnn::cpp::Context kept = forward();
-  add(name + "Backward", [&] { backward(kept); });
+  const tcnn::cpp::Context context = forward();
+  add(name + "Backward", [&] { backward(context); });
   if (isNetwork) add("Mlp both", [&] { backward(forward()); });
 }
 
-json networkOf(int width, int hiddenLayers, const char* output) {
+json networkConfig(int width, int hiddenLayers, const char* output) {
   return {{"otype", "FullyFusedMLP"},
           {"activation", "ReLU"},
           {"output_activation", output},
@@ -123,8 +123,8 @@ int main(int argc, char** argv) try {
   if (argc < 3) throw std::runtime_error("usage: tiny_cuda_nn OUT.json SAMPLES...");
   if (tcnn::cpp::preferred_precision() != tcnn::cpp::Precision::Fp16) throw std::runtime_error("built without fp16");
   std::ofstream file(argv[1]);
-  cudaDeviceProp card;
-  check(cudaGetDeviceProperties(&card, 0));
+  cudaDeviceProp gpu;
+  check(cudaGetDeviceProperties(&gpu, 0));
   cudaStream_t stream;
   check(cudaStreamCreate(&stream));
   json rows = json::array();
@@ -141,10 +141,10 @@ int main(int argc, char** argv) try {
     for (const int width : {16, 32, 64, 128}) {
       const std::string one = std::to_string(width);
       network(one + "-" + one + "-" + one + "-" + one, static_cast<uint32_t>(width), static_cast<uint32_t>(width),
-              networkOf(width, 2, "None"));
+              networkConfig(width, 2, "None"));
     }
-    network("density 32-64-16", 32, 16, networkOf(64, 1, "None"));
-    network("colour 32-64-64-3", 32, 3, networkOf(64, 2, "Sigmoid"));
+    network("density 32-64-16", 32, 16, networkConfig(64, 1, "None"));
+    network("colour 32-64-64-3", 32, 3, networkConfig(64, 2, "Sigmoid"));
     const json grid = {{"otype", "HashGrid"},       {"n_levels", 16},
                        {"n_features_per_level", 2}, {"log2_hashmap_size", 17},
                        {"base_resolution", 16},     {"per_level_scale", std::pow(2048.0 / 16, 1.0 / 15)},
@@ -152,7 +152,7 @@ int main(int argc, char** argv) try {
     const std::unique_ptr<tcnn::cpp::Module> module(tcnn::cpp::create_encoding(3, grid, tcnn::cpp::Precision::Fp16));
     measure(rows, stream, *module, samples, "HashGrid", "16 levels x 2, random points" + count);
   }
-  file << json{{"tiny_cuda_nn", {{"device", card.name}, {"operations", rows}}}}.dump(1) << "\n";
+  file << json{{"tiny_cuda_nn", {{"device", gpu.name}, {"operations", rows}}}}.dump(1) << "\n";
   file.close();
   if (!file) throw std::runtime_error(std::string(argv[1]) + ": cannot be written");
   return 0;

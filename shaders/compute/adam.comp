@@ -1,4 +1,4 @@
-// One step of Adam, one parameter at a time (src/compute/adam.h has the formula).
+// One step of Adam; see src/compute/adam.h for the formula. One invocation per parameter.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -7,7 +7,8 @@
 layout(local_size_x = 256) in;
 KERNEL_ARGUMENTS(AdamArguments)
 
-// base^exponent by squaring: exact for small exponents, where 1 - β^k needs every bit (pow() has no such promise).
+// base^exponent by squaring: exact for small exponents, where 1 - β^k needs full precision, which pow() does not
+// guarantee.
 float power(float base, uint exponent) {
   float result = 1;
   for (; exponent != 0 && result != 0; exponent >>= 1) {
@@ -17,16 +18,16 @@ float power(float base, uint exponent) {
   return result;
 }
 
-bool foundTooMuch(AdamArguments a) {
-  for (uint i = 0; i < a.foundCount; ++i) {
-    if (a.found.values[i] > a.room) return true;
+bool hasOverflow(AdamArguments a) {
+  for (uint i = 0; i < a.overflowCounterCount; ++i) {
+    if (a.overflowCounters.values[i] > a.capacity) return true;
   }
   return false;
 }
 
 void main() {
   AdamArguments a = arguments.values;
-  if (foundTooMuch(a)) {
+  if (hasOverflow(a)) {
     FOR_EACH(i, a.count) a.gradients.values[i] = 0;
     return;
   }

@@ -1,4 +1,4 @@
-// One invocation an element.
+// AddColumns: adds a matrix to another. One invocation per element.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -9,8 +9,8 @@ KERNEL_ARGUMENTS(AddColumnsArguments)
 
 void main() {
   AddColumnsArguments a = arguments.values;
-  FOR_EACH(i, endOf(a.rows) * a.sums.columns) {
+  FOR_EACH(i, rowRangeEnd(a.rows) * a.sums.columns) {
     const uint row = i / a.sums.columns, column = i % a.sums.columns;
-    a.sums.data.values[elementOf(a.sums, row, column)] += a.added.data.values[elementOf(a.added, row, column)];
+    a.sums.data.values[elementIndex(a.sums, row, column)] += a.added.data.values[elementIndex(a.added, row, column)];
   }
 }

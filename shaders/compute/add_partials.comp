@@ -1,4 +1,4 @@
-// One workgroup a column: adds up what workgroups of an earlier kernel summed.
+// One workgroup per column: adds up the partial sums of an earlier kernel's workgroups.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"

@@ -1,6 +1,6 @@
-// What the host hands to each compute kernel: one truth, read by C++ and GLSL alike. Each kind of operation has a file
-// of its own; this one holds what they share. Pointers lie at multiples of 8 and so do the sizes of structs: std430 and
-// C++ lay them out the same.
+// The arguments of the compute kernels, declared once for C++ and GLSL. Each kind of operation has its own file; this
+// one contains the common parts. Pointers are aligned to 8 bytes and the sizes of structs are multiples of 8, so that
+// std430 and C++ have the same layout.
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_H
 
@@ -11,12 +11,12 @@
 #define TESSERA_SIZE(type, bytes) static_assert(sizeof(type) == bytes)
 namespace tessera::arguments {
 using uint = uint32_t;
-using FloatPointer = uint64_t;   // device addresses; 0 = not wanted
+using FloatPointer = uint64_t;   // device addresses; 0 if absent
 using UintPointer = uint64_t;
-using NumberPointer = uint64_t;  // fp16 or float, as the kernel is; see number.glsl
-using QuadPointer = uint64_t;    // four of them
+using NumberPointer = uint64_t;  // fp16 or float, depending on the kernel; see number.glsl
+using QuadPointer = uint64_t;    // four Numbers each
 using SumPointer = uint64_t;     // floats that several invocations add to
-using Bits64 = uint64_t;         // the lower half first
+using Bits64 = uint64_t;         // the lower half is first
 }  // namespace tessera::arguments
 #else
 #define TESSERA_BEGIN_ARGUMENTS
@@ -28,8 +28,8 @@ using Bits64 = uint64_t;         // the lower half first
 TESSERA_BEGIN_ARGUMENTS
 
 struct CountArguments {
-  UintPointer counter;  // where the operation has none, the largest number
-  UintPointer first;    // or 0
+  UintPointer counter;  // the number of rows; the largest uint if the operation has no counter
+  UintPointer first;    // the first row; 0 if the operation has none
   uint capacity;
   uint unused;
 };
@@ -44,10 +44,10 @@ struct MatrixArguments {
 };
 TESSERA_SIZE(MatrixArguments, 24);
 
-// A number that kernels reckon with in double where the device can, else in float: bits of the one or the other.
+// A number that kernels use as a double if the device supports it, otherwise as a float: the bits of either.
 struct RealArguments {
   uint low;
-  uint high;  // 0: float
+  uint high;  // 0 for a float
 };
 TESSERA_SIZE(RealArguments, 8);
 

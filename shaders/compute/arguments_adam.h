@@ -10,10 +10,10 @@ struct AdamArguments {
   FloatPointer firstMoments;
   FloatPointer secondMoments;
   UintPointer counts;
-  UintPointer rows;   // the same number twice: nothing is done
-  UintPointer found;  // [foundCount]
-  uint foundCount;
-  uint room;
+  UintPointer rows;              // [2]: if both are equal, nothing is done
+  UintPointer overflowCounters;  // [overflowCounterCount]
+  uint overflowCounterCount;
+  uint capacity;
   uint count;
   uint skipZeroGradients;
   float rate;

@@ -8,7 +8,7 @@ struct AttentionArguments {
   CountArguments samples;
   MatrixArguments coarse;
   MatrixArguments fine;
-  FloatPointer logits;       // where they do not vary
+  FloatPointer logits;       // if they do not vary with the position
   MatrixArguments features;  // forward
   // Backward:
   FloatPointer logDensityGradients;

@@ -1,4 +1,4 @@
-// Arguments of scenes cut into blocks (src/compute/blocks.h, block_march.h).
+// Arguments of scenes partitioned into blocks (src/compute/blocks.h, block_march.h).
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_BLOCKS_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_BLOCKS_H
 #include "arguments_march.h"
@@ -12,7 +12,7 @@ struct BlockSpaceArguments {
   float bottom;
   float top;
   float near;
-  uint surround;  // 0 none, 1 border, 2 own
+  uint backgroundBlock;  // 0 none, 1 border, 2 own
 };
 TESSERA_SIZE(BlockSpaceArguments, 24);
 
@@ -44,8 +44,8 @@ struct BlockSamplesArguments {
   FloatPointer fences;
   UintPointer slotOfBlock;    // optional
   UintPointer groupOfBlock;   // optional
-  UintPointer sampleCounts;   // [rays]: then their running sums
-  UintPointer segmentCounts;  // [rays]: likewise
+  UintPointer sampleCounts;   // [rays]: counts, then their prefix sums
+  UintPointer segmentCounts;  // [rays]: counts, then their prefix sums
   UintPointer firstSample;
   UintPointer rowCount;
   UintPointer blockOfSample;
@@ -91,11 +91,11 @@ struct MarchBlocksArguments {
 };
 TESSERA_SIZE(MarchBlocksArguments, 240);
 
-// A stable sort by block: each share of the rows is counted and written by one invocation.
+// A stable sort by block: one invocation counts and writes each share of the rows.
 struct GroupByBlockArguments {
   CountArguments samples;
   UintPointer blockOfSample;
-  UintPointer counts;  // [blocks][shares]: then their running sums
+  UintPointer counts;  // [blocks][shares]: counts, then their prefix sums
   UintPointer firstOfBlock;
   UintPointer source;
   uint blocks;

@@ -37,7 +37,7 @@ struct CompositeBackwardArguments {
   FloatPointer rayOpacityGradients;   // optional
   FloatPointer rayDepthGradients;     // optional
   FloatPointer weightGradients;       // optional
-  FloatPointer opacities;             // [samples][2]: opacity, and the transmittance in front
+  FloatPointer opacities;             // [samples][2]: opacity, and transmittance in front of the sample
   FloatPointer xGradients;
   MatrixArguments colourGradients;    // optional
 };

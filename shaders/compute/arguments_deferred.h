@@ -2,8 +2,8 @@
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_DEFERRED_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_DEFERRED_H
 #include "arguments.h"
-#define TESSERA_SEGMENTS_OF_SHARE 256  // whose weight gradients a workgroup sums
-#define TESSERA_DEFERRED_NUMBERS 101   // of a segment: inputs, both hidden layers, gradients of the sums of all three
+#define TESSERA_SEGMENTS_OF_SHARE 256  // segments whose weight gradients one workgroup sums
+#define TESSERA_DEFERRED_NUMBERS 101   // per segment: inputs, both hidden layers, gradients of the sums of all three layers
 
 TESSERA_BEGIN_ARGUMENTS
 
@@ -17,7 +17,7 @@ struct DeferredArguments {
   FloatPointer specular;  // or its gradients
   FloatPointer compositedGradients;
   SumPointer networkGradients;
-  FloatPointer layers;  // [segments][kNumbers of deferred.glsl]: what weight gradients are made of
+  FloatPointer layers;  // [segments][kNumbers of deferred.glsl]: the factors of weight gradients
 };
 TESSERA_SIZE(DeferredArguments, 96);
 
@@ -31,7 +31,7 @@ struct BlendArguments {
   FloatPointer colour;   // or its gradients
   FloatPointer opacity;  // or its gradients, optional
   FloatPointer depth;
-  FloatPointer transmittances;  // [segments]: in front of each
+  FloatPointer transmittances;  // [segments]: in front of each segment
   FloatPointer compositedGradients;
   FloatPointer specularGradients;
   FloatPointer opacityGradients;

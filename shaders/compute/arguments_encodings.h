@@ -1,4 +1,4 @@
-// Arguments of encodings by fixed functions (src/compute/encodings.h).
+// Arguments of the fixed encodings (src/compute/encodings.h).
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_ENCODINGS_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_ENCODINGS_H
 #include "arguments.h"

@@ -1,4 +1,4 @@
-// How many workgroups kernels get for rows that the device counts: compute/vulkan/counted_groups.h.
+// Arguments of the kernel that counts workgroups for rows that the device counts; see compute/vulkan/counted_groups.h.
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_GROUPS_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_GROUPS_H
 
@@ -9,9 +9,9 @@ TESSERA_BEGIN_ARGUMENTS
 struct CountGroupsArguments {
   CountArguments rows;
   UintPointer groups;  // [3]: x, y, z
-  uint elements;       // of a row
-  uint perGroup;       // elements that a group takes
-  uint most;           // along x
+  uint elements;       // per row
+  uint perGroup;       // elements per group
+  uint maximum;        // along x
   uint y;
 };
 TESSERA_SIZE(CountGroupsArguments, 48);

@@ -1,4 +1,4 @@
-// Arguments of losses and exposure (src/compute/losses.h). Losses are written as one sum a workgroup.
+// Arguments of losses and exposure (src/compute/losses.h). Each workgroup writes one partial sum of the loss.
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_LOSSES_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_LOSSES_H
 #include "arguments.h"
@@ -18,7 +18,7 @@ struct ColourLossArguments {
 };
 TESSERA_SIZE(ColourLossArguments, 80);
 
-// Of losses that are sums over a ray's samples.
+// Arguments of losses that are sums over the samples of each ray.
 struct RayLossArguments {
   CountArguments rays;
   float scale;
@@ -53,7 +53,7 @@ struct S3imArguments {
 };
 TESSERA_SIZE(S3imArguments, 88);
 
-// Of losses of one number each.
+// Arguments of losses that are sums over single numbers.
 struct NumberLossArguments {
   CountArguments numbers;
   float scale;

@@ -1,4 +1,4 @@
-// What marching along rays has in common, in one space or from block to block.
+// Common arguments of ray marching in one space and from block to block.
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_MARCH_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_MARCH_H
 #include "arguments.h"
@@ -6,8 +6,8 @@ TESSERA_BEGIN_ARGUMENTS
 
 struct MarchArguments {
   CountArguments rays;
-  uint most;
-  float mostOpticalDepth;
+  uint maximum;
+  float maxOpticalDepth;
   FloatPointer origins;
   FloatPointer directions;
   FloatPointer jitter;    // optional
@@ -15,13 +15,13 @@ struct MarchArguments {
   UintPointer occupancy;
   FloatPointer opticalDepth;  // optional
   UintPointer nextStep;       // optional
-  UintPointer counts;         // [rays]: of samples, then their running sums
-  UintPointer nexts;          // [rays]: of a ray that fits
+  UintPointer counts;         // [rays]: sample counts, then their prefix sums
+  UintPointer nexts;          // [rays]: the next step of each ray whose samples fit
   UintPointer fitting;        // [1]
   UintPointer firstSample;
   UintPointer sampleCount;
   UintPointer finishedRays;  // optional
-  UintPointer rayOfSample;   // optional in one space
+  UintPointer rayOfSample;   // optional for MarchRays
   FloatPointer positions;
   FloatPointer distances;
   FloatPointer steps;

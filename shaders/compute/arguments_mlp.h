@@ -4,8 +4,8 @@
 #include "arguments.h"
 TESSERA_BEGIN_ARGUMENTS
 
-// Sizes are padded to multiples of 16 where they say so; the weights lie as MlpShape says. Numbers and quads of them are
-// fp16 or float as the kernel is (number.glsl); quads lie at multiples of 16 bytes.
+// Sizes named `padded...` are padded to multiples of 16; MlpShape defines the layout of the weights. Numbers and quads
+// are fp16 or float, depending on the kernel (number.glsl); quads are aligned to 16 bytes.
 struct MlpForwardArguments {
   CountArguments samples;
   MatrixArguments inputs;
@@ -19,7 +19,7 @@ struct MlpForwardArguments {
 };
 TESSERA_SIZE(MlpForwardArguments, 104);
 
-// What the gradients of the output layer's sums are made of.
+// The inputs for the gradients of the output layer's sums.
 struct MlpOutputArguments {
   CountArguments samples;
   MatrixArguments values;
@@ -35,10 +35,10 @@ struct MlpBackwardArguments {
   MatrixArguments inputGradients;  // optional
   NumberPointer weights;
   QuadPointer activations;
-  QuadPointer hiddenGradients;  // [hiddenLayers][capacity][width]: before ReLU
-  NumberPointer lastGradients;  // [capacity][paddedOutputs]: before the output activation
+  QuadPointer hiddenGradients;  // [hiddenLayers][capacity][width]: with respect to the values before ReLU
+  NumberPointer lastGradients;  // [capacity][paddedOutputs]: with respect to the values before the output activation
   FloatPointer largest;         // [largestCount], for lossScale
-  uint largestCount;            // 0: nothing is scaled
+  uint largestCount;            // 0 if gradients are not scaled
   uint paddedInputs;
   uint paddedOutputs;
   uint hiddenLayers;
@@ -59,15 +59,15 @@ struct HalveNumbersArguments {
 };
 TESSERA_SIZE(HalveNumbersArguments, 24);
 
-// gradients[o][i] += Σ_samples after[sample][o] · before[sample][i]: the weights of one layer. Its input is a matrix of
-// floats (the network's) or activations; columns beyond its own read as zero.
+// gradients[o][i] += Σ_samples after[sample][o] · before[sample][i]: for the weights of one layer. The
+// layer's input is a matrix of floats (the network's input) or activations; columns beyond the matrix read as zero.
 struct MlpWeightGradientsArguments {
   CountArguments samples;
-  MatrixArguments inputs;     // empty where there are activations
+  MatrixArguments inputs;     // empty if there are activations
   NumberPointer activations;  // [capacity][columns]
-  NumberPointer after;        // [capacity][rows]: gradient of the layer's sums, scaled
+  NumberPointer after;        // [capacity][rows]: scaled gradients of the layer's sums
   SumPointer gradients;       // [rows][columns]
-  FloatPointer largest;       // as in MlpBackwardArguments
+  FloatPointer largest;       // see MlpBackwardArguments
   uint largestCount;
   uint rows;
   uint columns;

@@ -1,4 +1,4 @@
-// Arguments of the kernels that find out what a card can do (src/compute/vulkan/probe.cpp).
+// Arguments of the kernels that measure the peak rates of a GPU (src/compute/vulkan/probe.cpp).
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_PROBE_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_PROBE_H
 #include "arguments.h"
@@ -7,8 +7,8 @@ TESSERA_BEGIN_ARGUMENTS
 struct ProbeArguments {
   UintPointer from;
   UintPointer to;
-  uint count;   // of what the kernel goes through
-  uint rounds;  // how often
+  uint count;   // number of elements
+  uint rounds;  // number of repetitions
 };
 TESSERA_SIZE(ProbeArguments, 24);
 

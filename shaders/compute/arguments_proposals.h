@@ -1,4 +1,4 @@
-// Arguments of proposal sampling (src/compute/proposals.h; the loss is with the others).
+// Arguments of proposal sampling (src/compute/proposals.h; the loss is in arguments_losses.h).
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_PROPOSALS_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_PROPOSALS_H
 #include "arguments.h"
@@ -9,7 +9,7 @@ struct ResampleFencesArguments {
   uint before;
   uint after;
   float anneal;
-  float padding;
+  float uniformFraction;
   FloatPointer fences;
   FloatPointer weights;
   FloatPointer jitter;  // optional

@@ -14,8 +14,8 @@ struct GenerateRaysArguments {
 };
 TESSERA_SIZE(GenerateRaysArguments, 64);
 
-// MarchSpace, and what its step lattice is made of: λ = ln(1 + cone); linear up to distance t_a at index n_a, geometric
-// up to t_b at n_b.
+// MarchSpace and the parameters of its step lattice: λ = ln(1 + cone); linear up to distance t_a at index n_a,
+// geometric up to t_b at n_b, constant steps beyond.
 struct MarchSpaceArguments {
   uint contracted;
   int resolution;
@@ -52,12 +52,12 @@ struct CompactSamplesArguments {
   uint rounds;
   uint sampleCapacity;
   uint keptCapacity;
-  float mostOpticalDepth;
+  float maxOpticalDepth;
   UintPointer firstSample;
   UintPointer nextStep;  // optional
   MatrixArguments logDensity;
   FloatPointer steps;
-  UintPointer counts;   // [rays]: of kept samples, then their running sums
+  UintPointer counts;   // [rays]: numbers of kept samples, then their prefix sums
   UintPointer fitting;  // [1]
   UintPointer keptFirstSample;
   UintPointer keptCount;
@@ -67,7 +67,7 @@ struct CompactSamplesArguments {
 };
 TESSERA_SIZE(CompactSamplesArguments, 144);
 
-// Numbers travel as words, whatever they mean.
+// Elements are moved as 32-bit words of any type.
 struct MoveRowsArguments {
   CountArguments rows;
   UintPointer source;
@@ -80,7 +80,7 @@ struct OccupancyPointsArguments {
   Bits64 key;
   uint points;
   uint first;
-  uint uniform_;  // "uniform" is a word of GLSL
+  uint uniform_;  // "uniform" is a keyword of GLSL
   uint candidateCount;
   uint resolution;
   uint unused;

@@ -1,18 +1,18 @@
-// Arguments of running sums and of sums over all (scan_*.comp, add_partials.comp).
+// Arguments of prefix sums and reductions (scan_*.comp, add_partials.comp).
 #ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_SCAN_H
 #define TESSERA_SHADERS_COMPUTE_ARGUMENTS_SCAN_H
 #include "arguments.h"
-#define TESSERA_SCAN_CHUNK 4096  // numbers of a workgroup
+#define TESSERA_SCAN_CHUNK 4096  // numbers per workgroup
 
 TESSERA_BEGIN_ARGUMENTS
 
-// values[i] = Σ_{j <= i} counts[j], at most limit + 1. total is the largest that is at most `limit`, and fitting how
-// many there are of those.
+// values[i] = Σ_{j <= i} counts[j], saturated at limit + 1. `total` is the largest value that is at most `limit`, and
+// `fitting` the number of such values.
 struct ScanArguments {
   CountArguments rows;
   UintPointer counts;    // [capacity]; may be `values`
   UintPointer values;    // [capacity]
-  UintPointer partials;  // one a workgroup
+  UintPointer partials;  // one per workgroup
   UintPointer total;     // [1]
   UintPointer fitting;   // [1]
   uint partialCount;

@@ -8,7 +8,7 @@ struct VirtualGridArguments {
   uint voxels;
   uint planes;
   uint corners;
-  uint words;  // of a block's marks
+  uint words;  // of marks per block
   uint quantise;
   uint shareTexels;
   float featureRange;
@@ -39,7 +39,7 @@ struct VirtualGridLookupArguments {
   UintPointer marks;
   UintPointer ranks;
   FloatPointer attributes;
-  FloatPointer runtimeSteps;  // with minAlpha
+  FloatPointer runtimeSteps;  // required if minAlpha > 0
   FloatPointer logDensities;
   FloatPointer colours;
   FloatPointer logDensityGradients;

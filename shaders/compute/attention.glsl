@@ -1,9 +1,9 @@
-// What weighs the fine levels' features (src/compute/attention.h).
+// The weights of the fine levels' features (src/compute/attention.h).
 // Reads: AttentionArguments. Defines: kFeatures, kLevels, kWeights, kVaries, logitIndex(), logitCount(), sigmoid(),
-// weightOf().
+// levelWeight().
 
 const uint kFeatures = 8;
-const float kMostDensity = 15;  // of the logarithm
+const float kMaxDensity = 15;  // the largest log-density
 const uint kNone = 0, kShared = 1, kSeparate = 2;
 
 layout(constant_id = 0) const uint kLevels = 2;
@@ -15,7 +15,7 @@ uint logitCount() { return kWeights == kNone ? 0 : kWeights == kShared ? kLevels
 
 float sigmoid(float x) { return 1 / (1 + exp(-x)); }
 
-float weightOf(AttentionArguments a, uint row, uint logit) {
+float levelWeight(AttentionArguments a, uint row, uint logit) {
   if (kWeights == kNone) return 1;
-  return sigmoid(kVaries ? a.coarse.data.values[elementOf(a.coarse, row, kFeatures + logit)] : a.logits.values[logit]);
+  return sigmoid(kVaries ? a.coarse.data.values[elementIndex(a.coarse, row, kFeatures + logit)] : a.logits.values[logit]);
 }

@@ -1,4 +1,5 @@
-// One invocation a sample. Logits that are the same everywhere are summed by workgroup first.
+// AttentionBackward: one invocation per sample. Gradients of logits that do not vary are first summed over the
+// workgroup.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "float_sum.glsl"
@@ -18,16 +19,16 @@ void main() {
     float gradient[kFeatures];
     gradient[0] = a.logDensityGradients.values[row];
     [[unroll]] for (uint f = 1; f < kFeatures; ++f) {
-      gradient[f] = a.colourGradients.data.values[elementOf(a.colourGradients, row, f - 1)];
+      gradient[f] = a.colourGradients.data.values[elementIndex(a.colourGradients, row, f - 1)];
     }
     float slopes[2 * kLevels];
     [[unroll]] for (uint i = 0; i < 2 * kLevels; ++i) slopes[i] = 0;
     [[unroll]] for (uint l = 0; l < kLevels; ++l) {
-      const float ofDensity = weightOf(a, row, logitIndex(l, 0)), ofColours = weightOf(a, row, logitIndex(l, 1));
+      const float ofDensity = levelWeight(a, row, logitIndex(l, 0)), ofColours = levelWeight(a, row, logitIndex(l, 1));
       [[unroll]] for (uint f = 0; f < kFeatures; ++f) {
         const float weight = f == 0 ? ofDensity : ofColours;
-        const float fine = a.fine.data.values[elementOf(a.fine, row, kFeatures * l + f)];
-        a.fineGradients.data.values[elementOf(a.fineGradients, row, kFeatures * l + f)] = weight * gradient[f];
+        const float fine = a.fine.data.values[elementIndex(a.fine, row, kFeatures * l + f)];
+        a.fineGradients.data.values[elementIndex(a.fineGradients, row, kFeatures * l + f)] = weight * gradient[f];
         if (kWeights != kNone) slopes[logitIndex(l, f)] += gradient[f] * fine * weight * (1 - weight);
       }
     }
@@ -36,7 +37,7 @@ void main() {
       float value = 0;
       if (f < kFeatures) value = gradient[f];
       else if (kVaries && logit < logitCount()) value = slopes[logit];
-      a.coarseGradients.data.values[elementOf(a.coarseGradients, row, f)] = value;
+      a.coarseGradients.data.values[elementIndex(a.coarseGradients, row, f)] = value;
     }
     [[unroll]] for (uint i = 0; i < 2 * kLevels; ++i) sums[i] += slopes[i];
   }

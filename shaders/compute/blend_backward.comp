@@ -1,4 +1,4 @@
-// One invocation a ray: front to back for transmittances, then back to front.
+// BlendBackward: one invocation per ray, which computes transmittances front to back, then gradients back to front.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -19,7 +19,7 @@ void main() {
       transmittance *= 1 - a.opacities.values[k];
     }
     const vec3 gradient = pointAt(a.colour, ray);
-    float rear = WANTED(a.opacity) ? -a.opacity.values[ray] : 0;  // what light from behind is worth to the loss
+    float rear = IS_SET(a.opacity) ? -a.opacity.values[ray] : 0;  // derivative of the loss by the light from behind
     for (uint k = end; k-- > first;) {
       const float alpha = a.opacities.values[k], gate = kLiteral ? 1 : alpha, reaching = a.transmittances.values[k];
       const vec3 diffuse =

@@ -1,4 +1,4 @@
-// One invocation a ray, front to back over its segments.
+// BlendForward: one invocation per ray, front to back over its segments.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"

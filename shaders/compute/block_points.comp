@@ -1,4 +1,4 @@
-// One invocation a point (src/compute/blocks.h says how it is drawn).
+// BlockPoints: one invocation per random point; src/compute/blocks.h defines the distribution.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -17,7 +17,7 @@ void main() {
   FOR_EACH(p, a.points) {
     const uint index = 8 * p;
     const uint block = a.blocks.values[randomBelow(a.key, index, a.blockCount)];
-    const Placement placement = placementOf(a.space, block);
+    const Placement placement = computePlacement(a.space, block);
     const real all = placement.halfDomain;
     realVec3 y;
     for (uint axis = 0; axis < 3; ++axis) {
@@ -28,11 +28,11 @@ void main() {
     storePoint(a.positions, p, vec3((y + all) / (2 * all)));
     const float z = 2 * randomUniform(a.key, index + 4) - 1;
     const float angle = 6.283185307179586 * randomUniform(a.key, index + 5), across = sqrt(1 - z * z);
-    const real most = all - 1 / kFarthest;
-    y = clamp(y, -most, most);
+    const real maximum = all - 1 / kFarthest;
+    y = clamp(y, -maximum, maximum);
     const realVec3 direction = realVec3(across * sineAndCosine(angle).yx, z);
     const real texel = runtimeStepAt(placement, a.texels, placement.contracted ? uncontracted(y) : y, direction);
     a.runtimeSteps.values[p] = float(texel);
-    a.blockOfSample.values[p] = WANTED(a.slotOfBlock) ? a.slotOfBlock.values[block] : block;
+    a.blockOfSample.values[p] = IS_SET(a.slotOfBlock) ? a.slotOfBlock.values[block] : block;
   }
 }

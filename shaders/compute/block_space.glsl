@@ -1,9 +1,9 @@
-// A scene cut into square blocks (src/compute/blocks.h says the convention).
-// Reads: BlockSpaceArguments, real. Defines: kSurround…, kFarthest, Placement, placementOf(), blockAt(), Range, rangeInBox(),
-// alongShare(), shareAt(), contracted(), uncontracted(), contractedDirection(), runtimeStepAt(), WallWalk, wallWalkOf(),
-// nextWall().
+// A scene partitioned into square blocks; src/compute/blocks.h defines the convention.
+// Reads: BlockSpaceArguments, real. Defines: kBackgroundBlock…, kFarthest, Placement, computePlacement(), blockAt(),
+// Range, rangeInBox(), alongShare(), shareAt(), contracted(), uncontracted(), contractedDirection(), runtimeStepAt(),
+// WallWalk, makeWallWalk(), nextWall().
 
-const uint kSurroundNone = 0, kSurroundBorder = 1, kSurroundOwn = 2;
+const uint kBackgroundBlockNone = 0, kBackgroundBlockBorder = 1, kBackgroundBlockOwn = 2;
 const real kFarthest = real(1e6), kBoxShare = real(0.75), kNever = real(1e30);
 
 struct Placement {
@@ -12,18 +12,18 @@ struct Placement {
   real halfDomain;
 };
 
-uint cellsOf(BlockSpaceArguments s) { return s.columns * s.rows; }
+uint countCells(BlockSpaceArguments s) { return s.columns * s.rows; }
 
-Placement placementOf(BlockSpaceArguments s, uint block) {
-  if (block == cellsOf(s)) return Placement(realVec3(0), realVec3(s.columns, s.rows, 1), true, real(2));
+Placement computePlacement(BlockSpaceArguments s, uint block) {
+  if (block == countCells(s)) return Placement(realVec3(0), realVec3(s.columns, s.rows, 1), true, real(2));
   const uint i = block % s.columns, j = block / s.columns;
   const bool atBorder = i == 0 || j == 0 || i + 1 == s.columns || j + 1 == s.rows;
-  const bool isContracted = s.surround == kSurroundBorder && atBorder;
+  const bool isContracted = s.backgroundBlock == kBackgroundBlockBorder && atBorder;
   const realVec3 centre = realVec3(int(2 * i + 1) - int(s.columns), int(2 * j + 1) - int(s.rows), 0);
   return Placement(centre, realVec3(1), isContracted, isContracted ? real(2) : real(1));
 }
 
-// Of [-count, count] cut into `count` cells.
+// Returns the cell that contains x when [-count, count] is divided into `count` cells.
 uint clampedCell(real x, uint count) {
   const real cell = (x + count) / 2;
   if (!(cell > 0)) return 0;
@@ -32,7 +32,7 @@ uint clampedCell(real x, uint count) {
 
 uint blockAt(BlockSpaceArguments s, realVec3 x) {
   const bool inBox = abs(x.x) <= s.columns && abs(x.y) <= s.rows && x.z >= s.bottom && x.z <= s.top;
-  if (s.surround == kSurroundOwn && !inBox) return cellsOf(s);
+  if (s.backgroundBlock == kBackgroundBlockOwn && !inBox) return countCells(s);
   return clampedCell(x.x, s.columns) + s.columns * clampedCell(x.y, s.rows);
 }
 
@@ -56,16 +56,16 @@ Range rangeInBox(BlockSpaceArguments s, realVec3 o, realVec3 d, real near) {
   return range;
 }
 
-// BlockSpace::distanceAt and its inverse.
+// BlockSpace::distanceAt, and below its inverse.
 real alongShare(BlockSpaceArguments s, real share, Range range) {
-  if (s.surround == kSurroundNone) return range.near + share * (range.far - range.near);
+  if (s.backgroundBlock == kBackgroundBlockNone) return range.near + share * (range.far - range.near);
   if (share <= kBoxShare) return range.near + share / kBoxShare * (range.far - range.near);
   const real u = (share - kBoxShare) / (1 - kBoxShare);
   return 1 / ((1 - u) / range.far + u / kFarthest);
 }
 
 real shareAt(BlockSpaceArguments s, real t, Range range) {
-  if (s.surround == kSurroundNone) return (t - range.near) / (range.far - range.near);
+  if (s.backgroundBlock == kBackgroundBlockNone) return (t - range.near) / (range.far - range.near);
   if (t <= range.far) return kBoxShare * ((t - range.near) / (range.far - range.near));
   return kBoxShare + (1 - kBoxShare) * ((1 / range.far - 1 / t) / (1 / range.far - 1 / kFarthest));
 }
@@ -102,13 +102,13 @@ realVec3 contractedDirection(realVec3 x, realVec3 d) {
   const int axis = farthestAxis(x);
   const real m = abs(x[axis]);
   if (!(m > 1)) return d;
-  const real growth = (x[axis] < 0 ? -d[axis] : d[axis]) / (m * m);  // of -1/m
+  const real growth = (x[axis] < 0 ? -d[axis] : d[axis]) / (m * m);  // derivative of -1/m
   realVec3 y = d / m - x * growth;
   y[axis] = d[axis] / (m * m);
   return y;
 }
 
-// The length in t of one texel at local coordinates q along `direction`; 0 without a direction.
+// Returns the length in t of one texel at local coordinates q along `direction`; 0 if the direction is zero.
 real runtimeStepAt(Placement placement, uint texels, realVec3 q, realVec3 direction) {
   realVec3 along = direction / placement.scale;
   if (placement.contracted) along = contractedDirection(q, along);
@@ -119,22 +119,22 @@ real runtimeStepAt(Placement placement, uint texels, realVec3 q, realVec3 direct
 // The inner walls of cells in the order in which a ray meets them.
 struct WallWalk {
   ivec2 next;   // the number of the next wall along x and along y
-  ivec2 count;  // how many there are
+  ivec2 count;  // the number of walls along x and along y
 };
 
-WallWalk wallWalkOf(BlockSpaceArguments s, realVec3 direction) {
+WallWalk makeWallWalk(BlockSpaceArguments s, realVec3 direction) {
   const ivec2 walls = ivec2(s.columns, s.rows) - 1;
   return WallWalk(ivec2(0), ivec2(direction.x != 0 ? walls.x : 0, direction.y != 0 ? walls.y : 0));
 }
 
-// The distance of wall `number` along an axis, as the ray counts them.
+// Returns the distance of wall `number` along an axis, counted in the direction of the ray.
 real wallDistance(BlockSpaceArguments s, realVec3 o, realVec3 d, int axis, int number) {
   const int cells = int(axis == 0 ? s.columns : s.rows);
   const int wall = d[axis] > 0 ? 2 - cells + 2 * number : cells - 2 - 2 * number;
   return (wall - o[axis]) / d[axis];
 }
 
-// The distance of the next wall of both axes, kNever behind the last.
+// Returns the distance of the next wall of either axis; kNever after the last.
 real nextWall(BlockSpaceArguments s, realVec3 o, realVec3 d, inout WallWalk walk) {
   const real x = walk.next.x < walk.count.x ? wallDistance(s, o, d, 0, walk.next.x) : kNever;
   const real y = walk.next.y < walk.count.y ? wallDistance(s, o, d, 1, walk.next.y) : kNever;

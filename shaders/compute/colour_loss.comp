@@ -1,4 +1,4 @@
-// One invocation a channel of a ray.
+// ColourLoss: one invocation per channel of a ray.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -8,8 +8,8 @@
 layout(local_size_x = 256) in;
 KERNEL_ARGUMENTS(ColourLossArguments)
 
-// Value and slope of the loss of a residual.
-vec2 lossOf(uint kind, float parameter, float r) {
+// Returns the value and the slope of the loss of a residual.
+vec2 evaluateLoss(uint kind, float parameter, float r) {
   if (kind == 0) return vec2(r * r, 2 * r);
   if (kind == 1) {
     return abs(r) <= parameter ? vec2(r * r / (2 * parameter), r / parameter) : vec2(abs(r) - parameter / 2, sign(r));
@@ -21,10 +21,10 @@ vec2 lossOf(uint kind, float parameter, float r) {
 void main() {
   ColourLossArguments a = arguments.values;
   float loss = 0, squares = 0;
-  FOR_EACH(i, 3 * endOf(a.rays)) {
-    const float weight = WANTED(a.weights) ? a.weights.values[i / 3] : 1;
+  FOR_EACH(i, 3 * rowRangeEnd(a.rays)) {
+    const float weight = IS_SET(a.weights) ? a.weights.values[i / 3] : 1;
     const float r = a.predicted.values[i] - a.target.values[i];
-    const vec2 f = lossOf(a.kind, a.parameter, r);
+    const vec2 f = evaluateLoss(a.kind, a.parameter, r);
     loss += weight * f.x;
     squares += weight * r * r;
     a.gradients.values[i] = a.scale * weight * f.y;

@@ -1,5 +1,5 @@
-// One invocation a ray, run twice as march_rays.comp is: first kept samples are counted, then they are written. A ray
-// that is still transparent and not through counts as one that does not fit.
+// CompactSamples: one invocation per ray. Like march_rays.comp, the kernel runs twice: it counts the samples to keep,
+// then writes them. A ray that is still transparent and has not left the space counts as one that does not fit.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -13,18 +13,18 @@ const uint kThrough = 0xffffffffu;
 
 uint countKept(CompactSamplesArguments a, uint ray) {
   float opticalDepth = 0;
-  uint kept = 0;
+  uint count = 0;
   for (uint q = 0; q < a.rounds; ++q) {
     const uint at = q * (a.rays.capacity + 1) + ray;
     for (uint i = a.firstSample.values[at]; i < a.firstSample.values[at + 1]; ++i) {
       const uint row = q * a.sampleCapacity + i;
-      opticalDepth += exp(a.logDensity.data.values[elementOf(a.logDensity, row, 0)]) * a.steps.values[row];
-      ++kept;
-      if (opticalDepth > a.mostOpticalDepth) return kept;
+      opticalDepth += exp(a.logDensity.data.values[elementIndex(a.logDensity, row, 0)]) * a.steps.values[row];
+      ++count;
+      if (opticalDepth > a.maxOpticalDepth) return count;
     }
   }
-  const bool through = !WANTED(a.nextStep) || a.nextStep.values[ray] == kThrough;
-  return through ? kept : a.keptCapacity + 1;
+  const bool through = !IS_SET(a.nextStep) || a.nextStep.values[ray] == kThrough;
+  return through ? count : a.keptCapacity + 1;
 }
 
 void write(CompactSamplesArguments a, uint ray, uint first, uint end) {
@@ -47,7 +47,7 @@ void main() {
   const uint fitting = a.fitting.values[0];
   if (gl_GlobalInvocationID.x == 0) {
     a.keptFirstSample.values[0] = 0;
-    if (WANTED(a.finishedRays)) a.finishedRays.values[0] = fitting;
+    if (IS_SET(a.finishedRays)) a.finishedRays.values[0] = fitting;
   }
   FOR_EACH_ROW(ray, a.rays) {
     const bool fits = ray < fitting;

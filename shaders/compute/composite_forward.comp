@@ -1,4 +1,4 @@
-// One invocation a ray, front to back.
+// CompositeForward: one invocation per ray, front to back.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -13,28 +13,28 @@ void main() {
   CompositeForwardArguments a = arguments.values;
   FOR_EACH_ROW(ray, a.rays) {
     float transmittance = 1, depth = 0;
-    float sum[kMostColumns];
+    float sum[kMaxColumns];
     [[unroll]] for (uint c = 0; c < kColumns; ++c) sum[c] = 0;
     const uint end = a.firstSample.values[ray + 1];
     for (uint i = a.firstSample.values[ray]; i < end; ++i) {
-      float weight = 0;  // behind the stop
+      float weight = 0;  // after early termination
       if (transmittance >= a.minTransmittance) {
         const float length = a.extinction == kOpacity ? 0 : a.steps.values[i];
-        const float alpha = opacityOf(a.extinction, a.x.data.values[elementOf(a.x, i, 0)], length);
+        const float alpha = computeOpacity(a.extinction, a.x.data.values[elementIndex(a.x, i, 0)], length);
         weight = transmittance * alpha;
         [[unroll]] for (uint c = 0; c < kColumns; ++c) {
-          sum[c] += weight * a.colours.data.values[elementOf(a.colours, i, c)];
+          sum[c] += weight * a.colours.data.values[elementIndex(a.colours, i, c)];
         }
-        if (WANTED(a.depth)) depth += weight * a.distances.values[i];
+        if (IS_SET(a.depth)) depth += weight * a.distances.values[i];
         transmittance *= 1 - alpha;
       }
       a.weights.values[i] = weight;
     }
     [[unroll]] for (uint c = 0; c < kColumns; ++c) {
       const uint at = kColumns * ray + c;
-      a.colour.values[at] = WANTED(a.background) ? sum[c] + transmittance * a.background.values[at] : sum[c];
+      a.colour.values[at] = IS_SET(a.background) ? sum[c] + transmittance * a.background.values[at] : sum[c];
     }
     a.opacity.values[ray] = 1 - transmittance;
-    if (WANTED(a.depth)) a.depth.values[ray] = depth;
+    if (IS_SET(a.depth)) a.depth.values[ray] = depth;
   }
 }

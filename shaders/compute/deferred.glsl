@@ -1,11 +1,12 @@
-// City-on-Web's deferred network: 7 composited + 27 of the direction → 16 → 16 → 3.
+// City-on-Web's deferred network: 7 composited inputs + 27 of the direction → 16 → 16 → 3.
 // Reads: DeferredArguments. Defines: kComposited, kInputs, kHidden, kParameters, kSecond, kThird, kNumbers, Layers,
-// layersOf().
+// computeLayers().
 #include "../lib/trigonometry.glsl"
 #include "vectors.glsl"
 
 const uint kComposited = 7, kDirection = 27, kInputs = kComposited + kDirection, kHidden = 16;
-const uint kSecond = kInputs * kHidden + kHidden, kThird = kSecond + kHidden * kHidden + kHidden;  // first parameters
+// Offsets of the parameters of the second and third layers.
+const uint kSecond = kInputs * kHidden + kHidden, kThird = kSecond + kHidden * kHidden + kHidden;
 const uint kParameters = kThird + kHidden * 3 + 3;
 const uint kNumbers = TESSERA_DEFERRED_NUMBERS;
 
@@ -16,7 +17,7 @@ struct Layers {
   vec3 colour;
 };
 
-Layers layersOf(DeferredArguments a, uint segment) {
+Layers computeLayers(DeferredArguments a, uint segment) {
   Layers layers;
   [[unroll]] for (uint i = 0; i < kComposited; ++i) {
     layers.inputs[i] = a.composited.values[kComposited * segment + i];

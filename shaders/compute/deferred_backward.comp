@@ -1,4 +1,5 @@
-// One invocation a segment: gradients of its inputs, and what deferred_weight_gradients.comp needs.
+// DeferredBackward: one invocation per segment, which computes the gradients of its inputs and the factors that
+// deferred_weight_gradients.comp needs.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -11,7 +12,7 @@ KERNEL_ARGUMENTS(DeferredArguments)
 void main() {
   DeferredArguments a = arguments.values;
   FOR_EACH_ROW(segment, a.segments) {
-    const Layers layers = layersOf(a, segment);
+    const Layers layers = computeLayers(a, segment);
     FloatPointer weights = a.networks;
     const uint network = a.networkOfSegment.values[segment] * kParameters;
     const vec3 third = pointAt(a.specular, segment) * layers.colour * (1 - layers.colour);

@@ -1,4 +1,4 @@
-// One invocation a segment.
+// DeferredForward: one invocation per segment.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -10,5 +10,5 @@ KERNEL_ARGUMENTS(DeferredArguments)
 
 void main() {
   DeferredArguments a = arguments.values;
-  FOR_EACH_ROW(segment, a.segments) storePoint(a.specular, segment, layersOf(a, segment).colour);
+  FOR_EACH_ROW(segment, a.segments) storePoint(a.specular, segment, computeLayers(a, segment).colour);
 }

@@ -1,5 +1,5 @@
-// A workgroup sums, over its share of the segments, those of one network: each invocation a few parameters. x of the
-// workgroup chooses the share, y the network.
+// Weight gradients of DeferredBackward. A workgroup sums the gradients of one network over its share of the segments;
+// each invocation sums a few parameters. The workgroup's x selects the share, its y the network.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "float_sum.glsl"
@@ -13,8 +13,9 @@ const uint kOfThread = (kParameters + kThreads - 1) / kThreads;
 layout(local_size_x = 256) in;
 KERNEL_ARGUMENTS(DeferredArguments)
 
-// Where among a segment's numbers the two factors of a parameter's gradient stand; the second is kNumbers for a bias.
-uvec2 factorsOf(uint parameter) {
+// Returns the indices of the two factors of a parameter's gradient among a segment's numbers; the second is kNumbers
+// for a bias, whose second factor is 1.
+uvec2 gradientFactors(uint parameter) {
   const uint firstGradients = kInputs + 2 * kHidden, secondGradients = firstGradients + kHidden;
   const uint thirdGradients = secondGradients + kHidden;
   if (parameter < kInputs * kHidden) return uvec2(firstGradients + parameter / kInputs, parameter % kInputs);
@@ -33,11 +34,11 @@ uvec2 factorsOf(uint parameter) {
 
 void main() {
   DeferredArguments a = arguments.values;
-  const uint network = gl_WorkGroupID.y, segments = endOf(a.segments);
+  const uint network = gl_WorkGroupID.y, segments = rowRangeEnd(a.segments);
   uvec2 factors[kOfThread];
   float sums[kOfThread];
   [[unroll]] for (uint i = 0; i < kOfThread; ++i) {
-    factors[i] = factorsOf(min(gl_LocalInvocationIndex + i * kThreads, kParameters - 1));
+    factors[i] = gradientFactors(min(gl_LocalInvocationIndex + i * kThreads, kParameters - 1));
     sums[i] = 0;
   }
   bool any = false;

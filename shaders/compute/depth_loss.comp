@@ -1,4 +1,4 @@
-// One invocation a ray.
+// DepthLoss: one invocation per ray.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -14,7 +14,7 @@ void main() {
   FOR_EACH_ROW(ray, a.rays) {
     const float known = a.known.values[ray];
     if (!(known > 0)) continue;
-    float near = 0;  // what the ray sees near to where it should
+    float near = 0;  // the weight of the samples near the known depth
     for (uint i = a.firstSample.values[ray]; i < a.firstSample.values[ray + 1]; ++i) {
       const float nearness = 1 - clamp(abs(a.distances.values[i] - known) / known - a.tolerance, 0, 1);
       near += a.weights.values[i] * nearness;

@@ -1,5 +1,5 @@
-// First of DistinctTexels: one invocation a corner of a sample sets the bit of its texel; or, where texels are not
-// shared, writes its place.
+// First kernel of DistinctTexels: one invocation per corner of a sample sets the bit of its texel or, if texels are not
+// shared, writes its position.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -13,10 +13,10 @@ KERNEL_ARGUMENTS(DistinctTexelsArguments)
 
 void main() {
   DistinctTexelsArguments a = arguments.values;
-  const uint rows = endOf(a.samples) * a.grid.corners;
+  const uint rows = rowRangeEnd(a.samples) * a.grid.corners;
   FOR_EACH(row, rows) {
     const uint index = row / a.grid.corners;
-    const Places places = placesOf(a.grid, pointAt(a.positions, index));
+    const Places places = findPlaces(a.grid, pointAt(a.positions, index));
     const uint texel = cornerAt(a.grid, places, row % a.grid.corners).texel;
     if (kShareTexels) {
       const uint word = a.blockOfSample.values[index] * a.grid.words + texel / 32;

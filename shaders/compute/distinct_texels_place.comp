@@ -1,4 +1,4 @@
-// Last of DistinctTexels: one invocation a word of marks writes the places of its texels.
+// Last kernel of DistinctTexels: one invocation per word of marks writes the positions of its texels.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"

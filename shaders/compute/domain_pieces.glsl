@@ -1,11 +1,12 @@
-// A ray through the domain of a block: straight pieces, one of a bounded block, of a contracted one as many as it meets
-// regions. Twin of src/scene/domain_path.cpp in `real`.
-// Reads: real, Placement. Defines: DomainPiece, DomainPieces, piecesOf(), nextPiece(), alongPiece(), alongPieceBetween().
+// A ray through the domain of a block as straight pieces: one in a bounded block, one per region that it crosses in a
+// contracted block. Must match src/scene/domain_path.cpp, here in `real`.
+// Reads: real, Placement. Defines: DomainPiece, DomainPieces, makePieces(), nextPiece(), alongPiece(),
+// alongPieceBetween().
 
-// The place after a length τ is start + τ direction, in the domain.
+// A straight piece: the position after a length τ is start + τ direction, in domain coordinates.
 struct DomainPiece {
   realVec3 start, direction;
-  real whole;  // its length
+  real whole;  // total length
   real entry, square, rate, growth;
 };
 
@@ -23,7 +24,7 @@ int regionAt(realVec3 x) {
   return abs(x[axis]) > 1 ? 2 * axis + (x[axis] > 0 ? 1 : 0) : kCube;
 }
 
-DomainPiece pieceOf(realVec3 o, realVec3 d, int region, real near, real far) {
+DomainPiece makePiece(realVec3 o, realVec3 d, int region, real near, real far) {
   realVec3 y = o + near * d, v = d;
   real entryM = real(1), exitM = real(1), growth = real(0);
   if (region != kCube) {
@@ -42,15 +43,15 @@ DomainPiece pieceOf(realVec3 o, realVec3 d, int region, real near, real far) {
                      growth * entryM);
 }
 
-const uint kMostEnds = 13;
-const real kNothing = real(1e-3) * kRoundingShare;  // nothing but rounding, as a share
+const uint kMaxEnds = 13;
+const real kNothing = real(1e-3) * kRoundingShare;  // relative length below which an interval is a rounding error
 
-// What is left of a ray in a domain.
+// The rest of a ray in a domain, from which pieces are taken.
 struct DomainPieces {
   realVec3 origin, direction;  // local; distances along it are those of the scene
-  real ends[kMostEnds];        // in order, where regions may end
+  real ends[kMaxEnds];        // sorted distances at which regions may end
   uint count, next;
-  real from, to;               // of the piece that is being put together
+  real from, to;               // of the current piece
   int region;
 };
 
@@ -63,8 +64,8 @@ void addEnd(inout DomainPieces p, real near, real far, real offset, real slope) 
   p.ends[i] = t;
 }
 
-// The ray from near to far, near < far.
-DomainPieces piecesOf(Placement placement, realVec3 origin, realVec3 direction, real near, real far) {
+// Prepares the ray from near to far, near < far.
+DomainPieces makePieces(Placement placement, realVec3 origin, realVec3 direction, real near, real far) {
   DomainPieces p;
   p.origin = (origin - placement.centre) / placement.scale;
   p.direction = direction / placement.scale;
@@ -84,7 +85,7 @@ DomainPieces piecesOf(Placement placement, realVec3 origin, realVec3 direction, 
   return p;
 }
 
-// The next straight piece; false when there are no more.
+// Returns the next straight piece, or false if there are no more.
 bool nextPiece(inout DomainPieces p, bool isContracted, out DomainPiece piece) {
   for (; p.next < p.count; ++p.next) {
     const real end = p.ends[p.next];
@@ -95,14 +96,14 @@ bool nextPiece(inout DomainPieces p, bool isContracted, out DomainPiece piece) {
     p.region = region;
     p.to = end;
     if (region != before && from < to) {
-      piece = pieceOf(p.origin, p.direction, before, from, to);
+      piece = makePiece(p.origin, p.direction, before, from, to);
       p.from = to;
       ++p.next;
       return true;
     }
   }
   if (!(p.from < p.to)) return false;
-  piece = pieceOf(p.origin, p.direction, p.region, p.from, p.to);
+  piece = makePiece(p.origin, p.direction, p.region, p.from, p.to);
   p.from = p.to;
   return true;
 }

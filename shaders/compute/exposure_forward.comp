@@ -1,4 +1,4 @@
-// One invocation a channel of a ray.
+// ExposureForward: one invocation per channel of a ray.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -9,10 +9,10 @@ KERNEL_ARGUMENTS(ExposureArguments)
 
 void main() {
   ExposureArguments a = arguments.values;
-  FOR_EACH(i, 3 * endOf(a.rays)) {
+  FOR_EACH(i, 3 * rowRangeEnd(a.rays)) {
     const uint ray = i / 3;
     float value = a.colours.values[i] * exp2(a.logGains.values[3 * a.photoOfRay.values[ray] + i % 3]);
-    if (WANTED(a.background)) value += (1 - a.opacity.values[ray]) * a.background.values[i];
+    if (IS_SET(a.background)) value += (1 - a.opacity.values[ray]) * a.background.values[i];
     a.exposed.values[i] = value;
   }
 }

@@ -1,5 +1,6 @@
-// Sums that many invocations add to at once. Include before kernel.glsl.
-// Defines: SumPointer, addTo(). With TESSERA_FLOAT_ATOMICS by hardware, else by comparing and swapping the bits.
+// Atomic float sums. Include before kernel.glsl.
+// Defines: SumPointer, addTo(). With TESSERA_FLOAT_ATOMICS they use hardware atomics, otherwise a compare-and-swap
+// loop.
 #extension GL_EXT_buffer_reference : require
 #define TESSERA_SUM_POINTER
 

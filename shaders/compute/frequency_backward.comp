@@ -1,4 +1,4 @@
-// One invocation a number of the input.
+// FrequencyBackward: one invocation per input number.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -9,12 +9,12 @@ layout(local_size_x = 256) in;
 KERNEL_ARGUMENTS(FrequencyArguments)
 
 float gradientAt(FrequencyArguments a, uint row, uint column) {
-  return a.encoded.data.values[elementOf(a.encoded, row, column)];
+  return a.encoded.data.values[elementIndex(a.encoded, row, column)];
 }
 
 void main() {
   FrequencyArguments a = arguments.values;
-  FOR_EACH(i, endOf(a.samples) * a.dimensions) {
+  FOR_EACH(i, rowRangeEnd(a.samples) * a.dimensions) {
     const uint row = i / a.dimensions, d = i % a.dimensions;
     float sum = gradientAt(a, row, d);
     for (uint k = 0; k < a.frequencies; ++k) {

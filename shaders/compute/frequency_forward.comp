@@ -1,4 +1,4 @@
-// One invocation an element: x, then all sines, then all cosines.
+// FrequencyForward: one invocation per element. The columns are x, then all sines, then all cosines.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -11,7 +11,7 @@ KERNEL_ARGUMENTS(FrequencyArguments)
 void main() {
   FrequencyArguments a = arguments.values;
   const uint waves = a.dimensions * a.frequencies, columns = a.dimensions + 2 * waves;
-  FOR_EACH(i, endOf(a.samples) * columns) {
+  FOR_EACH(i, rowRangeEnd(a.samples) * columns) {
     const uint row = i / columns, column = i % columns;
     float value = a.inputs.values[row * a.dimensions + column % a.dimensions];
     if (column >= a.dimensions) {
@@ -19,6 +19,6 @@ void main() {
       value *= float(1u << wave / a.dimensions);
       value = column < a.dimensions + waves ? sine(value) : cosine(value);
     }
-    a.encoded.data.values[elementOf(a.encoded, row, column)] = value;
+    a.encoded.data.values[elementIndex(a.encoded, row, column)] = value;
   }
 }

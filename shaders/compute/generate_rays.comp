@@ -1,4 +1,4 @@
-// One invocation a ray.
+// GenerateRays: one invocation per ray.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"

@@ -1,5 +1,5 @@
-// One invocation a share of the rows, run twice: first it counts its rows of each block, then, when it is known where
-// they go, writes them in order.
+// GroupByBlock: one invocation per share of the rows. The kernel runs twice: it counts the rows of each block, and
+// after their prefix sums are known, writes the rows in order.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -13,7 +13,7 @@ const uint kShare = TESSERA_ROWS_OF_SHARE;
 
 void main() {
   GroupByBlockArguments a = arguments.values;
-  const uint rows = endOf(a.samples);
+  const uint rows = rowRangeEnd(a.samples);
   if (kWrite) {
     FOR_EACH(block, a.blocks + 1) {
       a.firstOfBlock.values[block] = block == 0 ? 0 : a.counts.values[block * a.shares - 1];
@@ -27,7 +27,7 @@ void main() {
         ++a.counts.values[at];
         continue;
       }
-      // The rows of this share are the last of its running sum; how many came before tells which this one is.
+      // The prefix sum gives the first row of this share; the number of earlier rows gives the position of this one.
       uint before = 0;
       for (uint other = first; other < row; ++other) {
         before += uint(a.blockOfSample.values[other] == a.blockOfSample.values[row]);

@@ -1,10 +1,10 @@
-// Sums over a workgroup of 256 invocations, always in the same order on the same device: by subgroups with
-// TESSERA_SUBGROUPS, else by halves.
+// Sums over a workgroup of 256 invocations, always in the same order on the same device: with subgroup arithmetic if
+// TESSERA_SUBGROUPS is defined, otherwise by a tree reduction in shared memory.
 // Defines: groupSum().
 
 shared float groupSums[256];
 
-// → the sum over all invocations, to each of them. All call it together.
+// Returns the sum over all invocations to each of them. All invocations must call it together.
 #ifdef TESSERA_SUBGROUPS
 #extension GL_KHR_shader_subgroup_arithmetic : require
 float groupSum(float own) {

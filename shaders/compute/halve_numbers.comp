@@ -1,4 +1,4 @@
-// Floats as fp16.
+// Converts floats to fp16.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "number.glsl"

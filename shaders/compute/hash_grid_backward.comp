@@ -1,4 +1,5 @@
-// One invocation a sample and level: adds the sample's gradient to the eight table entries around it.
+// HashGridBackward: one invocation per sample and level, which adds the sample's gradient to the eight table entries
+// around it.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "float_sum.glsl"
@@ -20,12 +21,12 @@ void main() {
     float gradient[kFeatures];
     bool any = false;
     [[unroll]] for (uint f = 0; f < kFeatures; ++f) {
-      gradient[f] = encoded.data.values[elementOf(encoded, sampleIndex, levelIndex * kFeatures + f)];
+      gradient[f] = encoded.data.values[elementIndex(encoded, sampleIndex, levelIndex * kFeatures + f)];
       any = any || gradient[f] != 0;
     }
     if (!any) continue;
 
-    const Cell cell = cellOf(pointAt(arguments.values.positions, sampleIndex), level);
+    const Cell cell = findCell(pointAt(arguments.values.positions, sampleIndex), level);
     [[unroll]] for (uint corner = 0; corner < 8; ++corner) {
       const float weight = cornerWeight(cell, corner);
       const uint entry = cornerEntry(cell, corner, level) * kFeatures;

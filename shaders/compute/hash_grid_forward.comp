@@ -1,4 +1,4 @@
-// One invocation a sample and level: the trilinear mix of the eight table entries around the sample.
+// HashGridForward: one invocation per sample and level, which interpolates the eight table entries around the sample.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -17,7 +17,7 @@ void main() {
   MatrixArguments encoded = arguments.values.encoded;
 
   FOR_EACH_ROW(sampleIndex, arguments.values.samples) {
-    const Cell cell = cellOf(pointAt(arguments.values.positions, sampleIndex), level);
+    const Cell cell = findCell(pointAt(arguments.values.positions, sampleIndex), level);
     vec4 mixed[kQuads];
     [[unroll]] for (uint q = 0; q < kQuads; ++q) mixed[q] = vec4(0);
     [[unroll]] for (uint corner = 0; corner < 8; ++corner) {
@@ -26,7 +26,7 @@ void main() {
       [[unroll]] for (uint q = 0; q < kQuads; ++q) mixed[q] += weight * entryQuad(table, entry, q);
     }
     [[unroll]] for (uint f = 0; f < kFeatures; ++f) {
-      encoded.data.values[elementOf(encoded, sampleIndex, levelIndex * kFeatures + f)] = mixed[f / 4][f % 4];
+      encoded.data.values[elementIndex(encoded, sampleIndex, levelIndex * kFeatures + f)] = mixed[f / 4][f % 4];
     }
   }
 }

@@ -1,5 +1,6 @@
-// One invocation a sample: the gradient of its position, summed over all levels. Within a cell the value is linear in
-// each coordinate: the slope along an axis is scale · (mix of the upper face - mix of the lower face).
+// Position gradients of HashGridBackward: one invocation per sample, which sums over all levels. Within a cell the
+// value is linear in each coordinate: the slope along an axis is scale · (mix of the upper face - mix of the lower
+// face).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -15,11 +16,11 @@ KERNEL_ARGUMENTS(HashGridBackwardArguments)
 vec3 slopeInLevel(vec3 position, uint sampleIndex, uint levelIndex) {
   const LevelArguments level = arguments.values.levels[levelIndex];
   MatrixArguments encoded = arguments.values.encodedGradients;
-  const Cell cell = cellOf(position, level);
+  const Cell cell = findCell(position, level);
   vec4 gradient[kQuads];
   [[unroll]] for (uint q = 0; q < kQuads; ++q) gradient[q] = vec4(0);
   [[unroll]] for (uint f = 0; f < kFeatures; ++f) {
-    gradient[f / 4][f % 4] = encoded.data.values[elementOf(encoded, sampleIndex, levelIndex * kFeatures + f)];
+    gradient[f / 4][f % 4] = encoded.data.values[elementIndex(encoded, sampleIndex, levelIndex * kFeatures + f)];
   }
   vec3 slope = vec3(0);
   [[unroll]] for (uint corner = 0; corner < 8; ++corner) {

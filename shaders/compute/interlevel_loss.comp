@@ -1,4 +1,4 @@
-// One invocation a ray.
+// InterlevelLoss: one invocation per ray.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -9,7 +9,7 @@
 layout(local_size_x = 256) in;
 KERNEL_ARGUMENTS(RayLossArguments)
 
-// How many fence posts are at or before s, from a guess on.
+// Returns the number of fence posts at or before s, searching from a guess.
 uint postsUpTo(RayLossArguments a, uint firstPost, real s, uint guess) {
   uint count = guess;
   while (count > 0 && a.fences.values[firstPost + count - 1] > s) --count;

@@ -1,4 +1,4 @@
-// One invocation a sample.
+// LatticeForward: one invocation per sample.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -14,18 +14,18 @@ const uint kColumns = 16;
 void main() {
   LatticeArguments a = arguments.values;
   FOR_EACH_ROW(index, a.samples) {
-    const Places places = placesOf(a.grid, pointAt(a.positions, index));
+    const Places places = findPlaces(a.grid, pointAt(a.positions, index));
     const uint block = a.blockOfSample.values[index];
     vec4 sums[kColumns / 4];
     [[unroll]] for (uint q = 0; q < kColumns / 4; ++q) sums[q] = vec4(0);
     [[unroll]] for (uint k = 0; k < 8; ++k) {
       const Corner corner = cornerAt(a.grid, places, k);
-      const uint row = rowOf(a.grid, a.marks, a.ranks, block, index, k, corner.texel);
+      const uint row = texelRow(a.grid, a.marks, a.ranks, block, index, k, corner.texel);
       if (row >= a.texels.capacity) continue;
       [[unroll]] for (uint q = 0; q < kColumns / 4; ++q) {
         sums[q] += corner.weight * Vec4Pointer(a.values).values[kColumns / 4 * row + q];
       }
     }
-    [[unroll]] for (uint c = 0; c < kColumns; ++c) a.mixed.data.values[elementOf(a.mixed, index, c)] = sums[c / 4][c % 4];
+    [[unroll]] for (uint c = 0; c < kColumns; ++c) a.mixed.data.values[elementIndex(a.mixed, index, c)] = sums[c / 4][c % 4];
   }
 }

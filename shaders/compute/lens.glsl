@@ -1,4 +1,4 @@
-// Directions through pixels, with the lens undone: src/scene/lens.h in GLSL, models numbered as there.
+// Unprojection of pixels to directions: src/scene/lens.h in GLSL, with the same numbers for the camera models.
 // Defines: RayCamera, cameraAt(), lensUnproject().
 #include "../lib/trigonometry.glsl"
 
@@ -29,11 +29,11 @@ RayCamera cameraAt(UintPointer cameras, uint index) {
   return camera;
 }
 
-// One set of terms that all models fill in part.
+// The distortion terms of all models; each model uses some of them.
 struct LensTerms {
   vec2 focal, principal;
   bool fisheye;
-  bool plain;        // the plane itself is not distorted
+  bool plain;        // there is no distortion in the image plane
   bool radialFirst;  // tangential and prism terms act on the radially distorted point
   float k[6];        // radial: numerator 1 + Σ k[i] r^(2i+2)
   float d[3];        // denominator 1 + Σ d[i] r^(2i+2)
@@ -41,7 +41,7 @@ struct LensTerms {
   vec2 prismX, prismY;  // factors of r² and r⁴
 };
 
-LensTerms termsOf(int lens, float p[16]) {
+LensTerms unpackLensTerms(int lens, float p[16]) {
   LensTerms t;
   const bool oneFocal = lens == kSimplePinhole || lens == kSimpleRadial || lens == kRadial ||
                         lens == kSimpleRadialFisheye || lens == kRadialFisheye || lens == kSimpleDivision;
@@ -54,7 +54,7 @@ LensTerms termsOf(int lens, float p[16]) {
   for (int i = 0; i < 6; ++i) t.k[i] = 0;
   for (int i = 0; i < 3; ++i) t.d[i] = 0;
   t.tangential = t.prismX = t.prismY = vec2(0);
-  const int first = oneFocal ? 3 : 4;  // of the parameters of distortion
+  const int first = oneFocal ? 3 : 4;  // index of the first distortion parameter
   if (lens == kRadTanThinPrismFisheye) {
     for (int i = 0; i < 6; ++i) t.k[i] = p[first + i];
     t.tangential = vec2(p[first + 7], p[first + 6]);
@@ -89,9 +89,9 @@ struct Distorted {
   vec2 alongA, alongB;  // the Jacobian's columns
 };
 
-float determinantOf(Distorted at) { return at.alongA.x * at.alongB.y - at.alongB.x * at.alongA.y; }
+float jacobianDeterminant(Distorted at) { return at.alongA.x * at.alongB.y - at.alongB.x * at.alongA.y; }
 
-// The plane map of the polynomial models, with its Jacobian.
+// The distortion of the polynomial models in the image plane, with its Jacobian.
 Distorted distort(LensTerms t, vec2 from) {
   const float r2 = dot(from, from);
   float n = t.k[5], nSlope = 0;  // numerator - 1 = r2·n by Horner; slopes are with respect to r2
@@ -109,73 +109,73 @@ Distorted distort(LensTerms t, vec2 from) {
   mSlope = mSlope * r2 + m;
   m = m * r2 + 1;
   const float radial = n / m, slope = 2 * (nSlope * m - n * mSlope) / (m * m);
-  Distorted made;
-  made.place = from * radial;
-  made.alongA = vec2(radial, 0) + from * (from.x * slope);
-  made.alongB = vec2(0, radial) + from * (from.y * slope);
+  Distorted result;
+  result.place = from * radial;
+  result.alongA = vec2(radial, 0) + from * (from.x * slope);
+  result.alongB = vec2(0, radial) + from * (from.y * slope);
 
-  const vec2 at = t.radialFirst ? made.place : from;
+  const vec2 at = t.radialFirst ? result.place : from;
   const float q2 = dot(at, at);
   const float p1 = t.tangential.x, p2 = t.tangential.y;
   const float prismX = 2 * (t.prismX.x + 2 * t.prismX.y * q2), prismY = 2 * (t.prismY.x + 2 * t.prismY.y * q2);
   const vec2 ofX = vec2(2 * p1 * at.y + 6 * p2 * at.x + at.x * prismX, 2 * p2 * at.y + 2 * p1 * at.x + at.x * prismY);
   const vec2 ofY = vec2(2 * p1 * at.x + 2 * p2 * at.y + at.y * prismX, 2 * p2 * at.x + 6 * p1 * at.y + at.y * prismY);
-  made.place += vec2(2 * p1 * at.x * at.y + p2 * (q2 + 2 * at.x * at.x) + q2 * (t.prismX.x + t.prismX.y * q2),
+  result.place += vec2(2 * p1 * at.x * at.y + p2 * (q2 + 2 * at.x * at.x) + q2 * (t.prismX.x + t.prismX.y * q2),
                      2 * p2 * at.x * at.y + p1 * (q2 + 2 * at.y * at.y) + q2 * (t.prismY.x + t.prismY.y * q2));
   if (t.radialFirst) {
-    made.alongA += ofX * made.alongA.x + ofY * made.alongA.y;
-    made.alongB += ofX * made.alongB.x + ofY * made.alongB.y;
+    result.alongA += ofX * result.alongA.x + ofY * result.alongA.y;
+    result.alongB += ofX * result.alongB.x + ofY * result.alongB.y;
   } else {
-    made.alongA += ofX;
-    made.alongB += ofY;
+    result.alongA += ofX;
+    result.alongB += ofY;
   }
-  return made;
+  return result;
 }
 
-// Whether the map grows all the way from the centre to a point. Sampled.
+// Whether the distortion does not fold between the centre and a point, tested at samples.
 bool isBeforeFold(LensTerms t, vec2 place) {
   for (int i = 1; i <= 16; ++i) {
-    if (!(determinantOf(distort(t, place * (float(i) / 16))) > 0)) return false;
+    if (!(jacobianDeterminant(distort(t, place * (float(i) / 16))) > 0)) return false;
   }
   return true;
 }
 
-// Newton with step halving: the point before the fold that distorts to `wanted`.
-bool undistort(LensTerms t, vec2 wanted, out vec2 found) {
-  found = wanted;
-  Distorted at = distort(t, found);
-  for (int i = 0; i < 24 && !(determinantOf(at) > 0); ++i) {  // a start beyond the fold never comes home
-    found *= 0.75;
-    at = distort(t, found);
+// Finds the point before the fold that distorts to `target`, by Newton's method with step halving.
+bool undistort(LensTerms t, vec2 target, out vec2 undistorted) {
+  undistorted = target;
+  Distorted at = distort(t, undistorted);
+  for (int i = 0; i < 24 && !(jacobianDeterminant(at) > 0); ++i) {  // the iteration does not converge from beyond the fold
+    undistorted *= 0.75;
+    at = distort(t, undistorted);
   }
-  const float scale = 1 + length(wanted);
-  float error = length(at.place - wanted);
+  const float scale = 1 + length(target);
+  float error = length(at.place - target);
   for (int iteration = 0; iteration < 40 && error > 4 * kEpsilon * scale; ++iteration) {
-    const float determinant = determinantOf(at);
+    const float determinant = jacobianDeterminant(at);
     if (!(determinant > 0)) return false;
-    const vec2 miss = wanted - at.place;
+    const vec2 miss = target - at.place;
     vec2 change = vec2(at.alongB.y * miss.x - at.alongB.x * miss.y, at.alongA.x * miss.y - at.alongA.y * miss.x);
     change /= determinant;
     bool better = false;
     for (int halving = 0; halving < 16 && !better; ++halving, change /= 2) {
-      const Distorted next = distort(t, found + change);
-      const float nextError = length(next.place - wanted);
-      if (!(determinantOf(next) > 0 && nextError < error)) continue;
-      found += change;
+      const Distorted next = distort(t, undistorted + change);
+      const float nextError = length(next.place - target);
+      if (!(jacobianDeterminant(next) > 0 && nextError < error)) continue;
+      undistorted += change;
       at = next;
       error = nextError;
       better = true;
     }
     if (!better) break;
   }
-  return error < 64 * kEpsilon * scale && isBeforeFold(t, found);
+  return error < 64 * kEpsilon * scale && isBeforeFold(t, undistorted);
 }
 
-// The FOV model is a map of the radius in closed form.
+// The FOV model has a closed-form inverse, a function of the radius.
 bool undistortFov(float omega, inout vec2 place) {
   const float angle = length(place) * omega;
   if (!(abs(angle) < 1.5707)) return false;
-  const float slope = abs(omega) < 1e-6 ? 1 : 2 * tangent(omega / 2) / omega;  // at the centre
+  const float slope = abs(omega) < 1e-6 ? 1 : 2 * tangent(omega / 2) / omega;  // slope at the centre
   place *= (abs(angle) < 1e-3 ? 1 + angle * angle / 3 : tangent(angle) / angle) / slope;
   return true;
 }
@@ -189,18 +189,19 @@ bool unifiedDepth(float alpha, float beta, vec2 place, out float z) {
   return true;
 }
 
-// Unit direction in camera axes of the ray through a pixel; false where the lens has no inverse.
+// Computes the unit direction of the ray through a pixel in camera axes. Returns false if the lens has no inverse
+// there.
 bool lensUnproject(int lens, float parameters[16], vec2 pixel, out vec3 direction) {
-  const LensTerms t = termsOf(lens, parameters);
+  const LensTerms t = unpackLensTerms(lens, parameters);
   direction = vec3(0);
   vec2 place = (pixel - t.principal) / t.focal;
   if (any(isnan(place)) || any(isinf(place))) return false;
   if (lens == kFov) {
     if (!undistortFov(parameters[4], place)) return false;
   } else if (!t.plain) {
-    vec2 found;
-    if (!undistort(t, place, found)) return false;
-    place = found;
+    vec2 undistorted;
+    if (!undistort(t, place, undistorted)) return false;
+    place = undistorted;
   }
   float z = 1;
   if (lens == kSimpleDivision || lens == kDivision) {

@@ -1,5 +1,5 @@
-// One invocation a ray, run twice as march_rays.comp is. Empty cells are left by whole steps, so samples are those of
-// brute force.
+// MarchBlocks: one invocation per ray, run twice like march_rays.comp. Empty cells are skipped by whole steps, so the
+// samples are those of a march without skipping.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -20,14 +20,14 @@ struct Ray {
   uint index;
   realVec3 origin, direction;
   real jitter, far;
-  uint first;  // the interval to go on from
-  uint row, endRow;  // of its samples: none goes beyond, whatever a driver rounds otherwise in the second run
+  uint first;  // the interval to continue from
+  uint row, endRow;  // rows of its samples: none is written beyond, even if the second run rounds differently
 };
 
 struct State {
-  uint samples, number;  // samples made; intervals of the pieces in front
-  real before;           // their length
-  uint next;             // the interval to go on from
+  uint samples, number;  // samples so far; intervals of the pieces in front
+  real before;           // length of the pieces in front
+  uint next;             // the interval to continue from
   bool done;
 };
 
@@ -51,7 +51,7 @@ void storeNothing(MarchBlocksArguments a, Ray ray, uint row) {
   a.march.distances.values[row] = a.march.steps.values[row] = a.middles.values[row] = a.widths.values[row] = 0;
 }
 
-// Intervals [from, count) of a piece.
+// Marches the intervals [from, count) of a piece.
 void marchPiece(MarchBlocksArguments a, Ray ray, DomainPiece s, real all, uint slot, uint from, uint count,
                 inout State state) {
   const real stride = a.step * 2 * all;
@@ -63,7 +63,7 @@ void marchPiece(MarchBlocksArguments a, Ray ray, DomainPiece s, real all, uint s
     const uvec3 cell = min(uvec3(position * real(a.cells)), uvec3(a.cells - 1));
     const uint bit = cell.x + a.cells * (cell.y + a.cells * cell.z);
     if ((a.march.occupancy.values[firstWord + bit / 32] >> bit % 32 & 1) == 0) {
-      // Whole intervals to the first whose middle is past the empty cell; the tolerance costs one more look.
+      // Skips to the first interval whose middle is past the empty cell; the tolerance costs at most one more lookup.
       real exit = s.whole;
       for (int axis = 0; axis < 3; ++axis) {
         const real d = s.direction[axis];
@@ -76,9 +76,11 @@ void marchPiece(MarchBlocksArguments a, Ray ray, DomainPiece s, real all, uint s
       continue;
     }
     if (alongPiece(s, begin) >= ray.far) return;
-    if (kWrite && ray.row + state.samples < ray.endRow) store(a, ray, ray.row + state.samples, slot, s, position, state.before, begin, end);
+    if (kWrite && ray.row + state.samples < ray.endRow) {
+      store(a, ray, ray.row + state.samples, slot, s, position, state.before, begin, end);
+    }
     ++i;
-    if (++state.samples == a.march.most) {
+    if (++state.samples == a.march.maximum) {
       state.next = state.number + i;
       state.done = true;
       return;
@@ -86,20 +88,20 @@ void marchPiece(MarchBlocksArguments a, Ray ray, DomainPiece s, real all, uint s
   }
 }
 
-// How many intervals begin within a piece: at (i - 1 + jitter) steps, and the first.
-uint intervalsOf(Ray ray, real whole, real stride) {
+// Returns the number of intervals that begin within a piece: the first, and those at (i - 1 + jitter) steps.
+uint countIntervals(Ray ray, real whole, real stride) {
   uint count = uint(max(real(1), ceil(whole / stride + 1 - ray.jitter)));
   while (count > 1 && (real(count) - 2 + ray.jitter) * stride >= whole) --count;
   while ((real(count) - 1 + ray.jitter) * stride < whole) ++count;
   return count;
 }
 
-// All that one block owns of the ray between two distances.
+// Marches the ray between two distances within one block.
 void marchRange(MarchBlocksArguments a, Ray ray, real near, real far, inout State state) {
   const real middle = (near + far) / 2;
   const uint block = blockAt(a.space, ray.origin + middle * ray.direction);
-  const Placement placement = placementOf(a.space, block);
-  if (!placement.contracted) {  // walls bound it along x and y
+  const Placement placement = computePlacement(a.space, block);
+  if (!placement.contracted) {  // along x and y it is bounded by walls
     const real o = ray.origin.z - placement.centre.z, d = ray.direction.z;
     if (d == 0) {
       if (abs(o) > 1) return;
@@ -109,16 +111,16 @@ void marchRange(MarchBlocksArguments a, Ray ray, real near, real far, inout Stat
     }
   }
   if (!(near < far)) return;
-  const uint slot = WANTED(a.slotOfBlock) ? a.slotOfBlock.values[block] : block;
+  const uint slot = IS_SET(a.slotOfBlock) ? a.slotOfBlock.values[block] : block;
   const real all = placement.halfDomain;
-  DomainPieces pieces = piecesOf(placement, ray.origin, ray.direction, near, far);
+  DomainPieces pieces = makePieces(placement, ray.origin, ray.direction, near, far);
   DomainPiece piece;
   while (!state.done && nextPiece(pieces, placement.contracted, piece)) {
     if (piece.entry >= ray.far) {
       state.done = true;
       return;
     }
-    const uint count = intervalsOf(ray, piece.whole, a.step * 2 * all);
+    const uint count = countIntervals(ray, piece.whole, a.step * 2 * all);
     if (slot != kNoSlot && ray.first < state.number + count) {
       const uint from = ray.first > state.number ? ray.first - state.number : 0;
       marchPiece(a, ray, piece, all, slot, from, count, state);
@@ -131,13 +133,14 @@ void marchRange(MarchBlocksArguments a, Ray ray, real near, real far, inout Stat
 State march(MarchBlocksArguments a, Ray ray) {
   State state = State(0, 0, real(0), kThrough, false);
   real near = a.space.near;
-  if (WANTED(a.nearOfRay)) near = max(near, real(a.nearOfRay.values[ray.index]));
+  if (IS_SET(a.nearOfRay)) near = max(near, real(a.nearOfRay.values[ray.index]));
   const Range box = rangeInBox(a.space, ray.origin, ray.direction, near);
-  const bool empty = isEmpty(box), own = a.space.surround == kSurroundOwn;
+  const bool empty = isEmpty(box), own = a.space.backgroundBlock == kBackgroundBlockOwn;
   if (!empty) near = box.near;
-  real walled = own || a.space.surround == kSurroundNone ? box.far : kFarthest;  // so far, cells own it
-  if (empty && a.space.surround != kSurroundBorder) walled = near;
-  WallWalk walk = wallWalkOf(a.space, ray.direction);
+  // The ray belongs to the cells up to this distance.
+  real walled = own || a.space.backgroundBlock == kBackgroundBlockNone ? box.far : kFarthest;
+  if (empty && a.space.backgroundBlock != kBackgroundBlockBorder) walled = near;
+  WallWalk walk = makeWallWalk(a.space, ray.direction);
   real from = near;
   for (real to = nextWall(a.space, ray.origin, ray.direction, walk); !state.done;
        to = nextWall(a.space, ray.origin, ray.direction, walk)) {
@@ -158,9 +161,9 @@ Ray rayAt(MarchBlocksArguments a, uint index) {
   ray.index = index;
   ray.origin = realVec3(pointAt(a.march.origins, index));
   ray.direction = realVec3(pointAt(a.march.directions, index));
-  ray.jitter = WANTED(a.march.jitter) ? real(a.march.jitter.values[index]) : real(1);
-  ray.far = WANTED(a.march.farOfRay) ? real(a.march.farOfRay.values[index]) : kNever;
-  ray.first = WANTED(a.march.nextStep) ? a.march.nextStep.values[index] : 0;
+  ray.jitter = IS_SET(a.march.jitter) ? real(a.march.jitter.values[index]) : real(1);
+  ray.far = IS_SET(a.march.farOfRay) ? real(a.march.farOfRay.values[index]) : kNever;
+  ray.first = IS_SET(a.march.nextStep) ? a.march.nextStep.values[index] : 0;
   ray.row = ray.endRow = 0;
   return ray;
 }
@@ -170,8 +173,8 @@ void main() {
   if (!kWrite) {
     FOR_EACH_ROW(index, a.march.rays) {
       const Ray ray = rayAt(a, index);
-      const bool opaque = WANTED(a.march.opticalDepth) && a.march.opticalDepth.values[index] > a.march.mostOpticalDepth;
-      const bool waits = opaque || a.march.most == 0 || ray.first == kThrough;
+      const bool opaque = IS_SET(a.march.opticalDepth) && a.march.opticalDepth.values[index] > a.march.maxOpticalDepth;
+      const bool waits = opaque || a.march.maximum == 0 || ray.first == kThrough;
       State state = State(0, 0, real(0), waits ? ray.first : kThrough, true);
       if (!waits && ray.direction != realVec3(0)) state = march(a, ray);
       a.march.counts.values[index] = state.samples;
@@ -182,7 +185,7 @@ void main() {
   const uint fitting = a.march.fitting.values[0];
   if (gl_GlobalInvocationID.x == 0) {
     a.march.firstSample.values[0] = 0;
-    if (WANTED(a.march.finishedRays)) a.march.finishedRays.values[0] = fitting;
+    if (IS_SET(a.march.finishedRays)) a.march.finishedRays.values[0] = fitting;
   }
   FOR_EACH_ROW(index, a.march.rays) {
     const bool fits = index < fitting;
@@ -193,9 +196,9 @@ void main() {
     ray.row = first;
     ray.endRow = end;
     if (end > first) {
-      // Whatever a driver rounds otherwise in the second run: each row that was counted is written.
+      // Fills the rows that were counted but not written, because the second run rounded differently.
       for (uint row = first + march(a, ray).samples; row < end; ++row) storeNothing(a, ray, row);
     }
-    if (WANTED(a.march.nextStep)) a.march.nextStep.values[index] = a.march.nexts.values[index];
+    if (IS_SET(a.march.nextStep)) a.march.nextStep.values[index] = a.march.nexts.values[index];
   }
 }

@@ -1,5 +1,6 @@
-// One invocation a ray, run twice: first its samples are counted; then, when it is known where each ray's begin, they
-// are made again and written. Empty cells are left by whole steps, so samples are those of brute force.
+// MarchRays: one invocation per ray. The kernel runs twice: it counts samples, and after their prefix sums are known,
+// generates them again and writes them. Empty cells are skipped by whole steps, so the samples are those of a march
+// without skipping.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -13,11 +14,11 @@ layout(constant_id = 0) const bool kWrite = false;
 KERNEL_ARGUMENTS(MarchRaysArguments)
 
 const uint kThrough = 0xffffffffu;
-const uint kMostIndex = 1u << 30;
+const uint kMaxIndex = 1u << 30;
 
 struct Round {
   uint samples;
-  uint next;  // the index to go on from
+  uint next;  // the step index to continue from
 };
 
 bool isOccupied(MarchRaysArguments a, ivec3 cell) {
@@ -26,13 +27,13 @@ bool isOccupied(MarchRaysArguments a, ivec3 cell) {
 }
 
 void store(MarchRaysArguments a, uint ray, uint row, realVec3 u, real middle, real length_) {
-  if (WANTED(a.march.rayOfSample)) a.march.rayOfSample.values[row] = ray;
+  if (IS_SET(a.march.rayOfSample)) a.march.rayOfSample.values[row] = ray;
   storePoint(a.march.positions, row, clamp(vec3(u), 0, 1));
   a.march.distances.values[row] = float(middle);
   a.march.steps.values[row] = float(length_);
 }
 
-// Of a bounded space, where the ray is inside: [enter, leave], empty where it never is.
+// Computes the range [enter, leave] in which the ray is inside a bounded space; empty if it never is.
 void clipToCube(realVec3 o, realVec3 d, out real enter, out real leave) {
   enter = 0;
   leave = real(1e30);
@@ -47,47 +48,47 @@ void clipToCube(realVec3 o, realVec3 d, out real enter, out real leave) {
   }
 }
 
-// The ray's next samples; with kWrite to rows [row, endRow), which nobody else writes to: a driver may have compiled both
-// runs to other roundings.
+// Generates the ray's next samples. With kWrite they are written to the rows [row, endRow) only: the driver may have
+// compiled both runs with different rounding.
 Round march(MarchRaysArguments a, uint ray, uint row, uint endRow) {
-  const uint from = WANTED(a.march.nextStep) ? a.march.nextStep.values[ray] : 0;
-  const bool opaque = WANTED(a.march.opticalDepth) && a.march.opticalDepth.values[ray] > a.march.mostOpticalDepth;
-  if (from == kThrough || opaque || a.march.most == 0) return Round(0, from);
+  const uint from = IS_SET(a.march.nextStep) ? a.march.nextStep.values[ray] : 0;
+  const bool opaque = IS_SET(a.march.opticalDepth) && a.march.opticalDepth.values[ray] > a.march.maxOpticalDepth;
+  if (from == kThrough || opaque || a.march.maximum == 0) return Round(0, from);
   const realVec3 o = realVec3(pointAt(a.march.origins, ray)), d = realVec3(pointAt(a.march.directions, ray));
-  Round made = Round(0, kThrough);
-  if (d == realVec3(0)) return made;
-  const real jitter = WANTED(a.march.jitter) ? a.march.jitter.values[ray] : 0;
+  Round result = Round(0, kThrough);
+  if (d == realVec3(0)) return result;
+  const real jitter = IS_SET(a.march.jitter) ? a.march.jitter.values[ray] : 0;
   real far = a.space.far;
-  if (WANTED(a.march.farOfRay)) far = min(far, real(a.march.farOfRay.values[ray]));
-  real k = ceil(realOf(a.space.firstIndex) - jitter);
+  if (IS_SET(a.march.farOfRay)) far = min(far, real(a.march.farOfRay.values[ray]));
+  real k = ceil(unpackReal(a.space.firstIndex) - jitter);
   if (a.space.contracted == 0) {
     real enter, leave;
     clipToCube(o, d, enter, leave);
-    if (!(enter < leave)) return made;
+    if (!(enter < leave)) return result;
     far = min(far, leave * (1 + real(1e-6)) + real(1e-6));
-    k = max(k, floor(stepIndexOf(a.space, enter) - jitter) - 1);
+    k = max(k, floor(stepIndexAt(a.space, enter) - jitter) - 1);
   }
-  k = max(max(k, real(0)), real(min(from, kMostIndex)));
+  k = max(max(k, real(0)), real(min(from, kMaxIndex)));
   real begin = distanceAt(a.space, k + jitter);
   for (;;) {
     const real end = distanceAt(a.space, k + 1 + jitter), middle = (begin + end) / 2;
-    if (!(middle < far && end > begin)) return made;
+    if (!(middle < far && end > begin)) return result;
     const Cell cell = cellAt(a.space, o + middle * d);
     const real length_ = end - begin;
     k += 1;
     begin = end;
     if (cell.inside && isOccupied(a, cell.index)) {
-      if (kWrite && row + made.samples < endRow) store(a, ray, row + made.samples, cell.u, middle, length_);
-      if (++made.samples < a.march.most) continue;
-      made.next = uint(k);
-      return made;
+      if (kWrite && row + result.samples < endRow) store(a, ray, row + result.samples, cell.u, middle, length_);
+      if (++result.samples < a.march.maximum) continue;
+      result.next = uint(k);
+      return result;
     }
     if (!cell.inside) continue;
-    // Whole steps to the first middle past the empty cell; the tolerance only costs one more look.
+    // Skips to the first step whose middle is past the empty cell; the tolerance costs at most one more lookup.
     const real exit = exitDistance(a.space, cell, o, d, middle) * (1 - kRoundingShare);
-    if (exit >= far) return made;
+    if (exit >= far) return result;
     if (exit > begin + 4 * (end - middle)) {
-      k = max(k, floor(stepIndexOf(a.space, exit) - jitter) - 1);
+      k = max(k, floor(stepIndexAt(a.space, exit) - jitter) - 1);
       begin = distanceAt(a.space, k + jitter);
     }
     for (real next = distanceAt(a.space, k + 1 + jitter); (begin + next) / 2 < exit && next > begin;
@@ -102,16 +103,16 @@ void main() {
   MarchRaysArguments a = arguments.values;
   if (!kWrite) {
     FOR_EACH_ROW(ray, a.march.rays) {
-      const Round made = march(a, ray, 0, 0);
-      a.march.counts.values[ray] = made.samples;
-      a.march.nexts.values[ray] = made.next;
+      const Round result = march(a, ray, 0, 0);
+      a.march.counts.values[ray] = result.samples;
+      a.march.nexts.values[ray] = result.next;
     }
     return;
   }
   const uint fitting = a.march.fitting.values[0];
   if (gl_GlobalInvocationID.x == 0) {
     a.march.firstSample.values[0] = 0;
-    if (WANTED(a.march.finishedRays)) a.march.finishedRays.values[0] = fitting;
+    if (IS_SET(a.march.finishedRays)) a.march.finishedRays.values[0] = fitting;
   }
   FOR_EACH_ROW(ray, a.march.rays) {
     const bool fits = ray < fitting;
@@ -119,9 +120,9 @@ void main() {
     a.march.firstSample.values[ray + 1] = fits ? end : a.march.sampleCount.values[0];
     if (!fits) continue;
     if (end > first) {
-      // Whatever a driver rounds otherwise in the second run: each row that was counted is written.
+      // Fills the rows that were counted but not written, because the second run rounded differently.
       for (uint row = first + march(a, ray, first, end).samples; row < end; ++row) store(a, ray, row, realVec3(0), 0, 0);
     }
-    if (WANTED(a.march.nextStep)) a.march.nextStep.values[ray] = a.march.nexts.values[ray];
+    if (IS_SET(a.march.nextStep)) a.march.nextStep.values[ray] = a.march.nexts.values[ray];
   }
 }

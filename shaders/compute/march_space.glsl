@@ -1,26 +1,26 @@
-// The space that rays are marched through and their step lattice (src/compute/rays.h says the convention).
-// Reads: MarchSpaceArguments, real. Defines: stepIndexOf(), distanceAt(), Cell, cellAt(), exitDistance().
+// The space that rays are marched through and its step lattice; src/compute/rays.h defines the convention.
+// Reads: MarchSpaceArguments, real. Defines: stepIndexAt(), distanceAt(), Cell, cellAt(), exitDistance().
 
-real stepIndexOf(MarchSpaceArguments s, real t) {
-  if (s.cone <= 0 || t <= realOf(s.linearDistance)) return t / s.minStep;
-  const real last = realOf(s.geometricDistance);
-  if (t <= last) return realOf(s.linearEnd) + logOf(t / realOf(s.linearDistance)) / realOf(s.lambda);
-  return realOf(s.geometricEnd) + (t - last) / s.maxStep;
+real stepIndexAt(MarchSpaceArguments s, real t) {
+  if (s.cone <= 0 || t <= unpackReal(s.linearDistance)) return t / s.minStep;
+  const real last = unpackReal(s.geometricDistance);
+  if (t <= last) return unpackReal(s.linearEnd) + logReal(t / unpackReal(s.linearDistance)) / unpackReal(s.lambda);
+  return unpackReal(s.geometricEnd) + (t - last) / s.maxStep;
 }
 
 real distanceAt(MarchSpaceArguments s, real n) {
-  if (s.cone <= 0 || n <= realOf(s.linearEnd)) return n * s.minStep;
-  const real last = realOf(s.geometricEnd);
-  if (n <= last) return realOf(s.linearDistance) * expOf((n - realOf(s.linearEnd)) * realOf(s.lambda));
-  return realOf(s.geometricDistance) + (n - last) * s.maxStep;
+  if (s.cone <= 0 || n <= unpackReal(s.linearEnd)) return n * s.minStep;
+  const real last = unpackReal(s.geometricEnd);
+  if (n <= last) return unpackReal(s.linearDistance) * expReal((n - unpackReal(s.linearEnd)) * unpackReal(s.lambda));
+  return unpackReal(s.geometricDistance) + (n - last) * s.maxStep;
 }
 
 struct Cell {
   realVec3 u;   // grid coordinates in [0,1]
   ivec3 index;
-  int region;   // contracted: axis of the largest coordinate outside the unit cube, or -1 inside
+  int region;   // contracted space: axis of the largest coordinate outside the unit cube; -1 inside
   real side;    // the sign of that coordinate
-  bool inside;  // false: bounded and outside the cube
+  bool inside;  // false outside the cube of a bounded space
 };
 
 Cell cellAt(MarchSpaceArguments s, realVec3 x) {
@@ -50,16 +50,16 @@ Cell cellAt(MarchSpaceArguments s, realVec3 x) {
   return cell;
 }
 
-// The nearer of `exit` and the t where value + slope · t = 0, if that is beyond `from`.
+// Returns the smaller of `exit` and the t where value + slope · t = 0, if that is greater than `from`.
 real nearerCrossing(real exit, real from, real value, real slope) {
   if (slope == 0) return exit;
   const real at = -value / slope;
   return at > from ? min(exit, at) : exit;
 }
 
-// The distance at which the ray leaves the cell. Every face of a cell is a plane: x_a = c inside; outside, for the
-// region of axis a, x_a = side · 1/(2 - y) for its own axis and x_b = y · |x_a| for the others; and region borders are
-// |x_b| = |x_a|.
+// Returns the distance at which the ray leaves the cell. Every face of a cell is a plane: x_a = c inside; outside, for
+// the region of axis a, x_a = side · 1/(2 - y) for its own axis and x_b = y · |x_a| for the others; and region borders
+// are |x_b| = |x_a|.
 real exitDistance(MarchSpaceArguments s, Cell cell, realVec3 o, realVec3 d, real t) {
   const real width = (s.contracted != 0 ? real(4) : real(2)) / s.resolution;
   const real origin = s.contracted != 0 ? real(-2) : real(-1);

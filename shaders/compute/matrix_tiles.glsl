@@ -1,11 +1,13 @@
-// Products of small matrices by all lanes of a subgroup together: fp16 times fp16, summed in float.
+// Cooperative matrices: all lanes of a subgroup multiply small fp16 matrices together and sum the products in float.
 // Defines: kTileRows, kTileColumns, kTileDepth, which divide 16; kSubgroupSize, kSubgroups of a workgroup, kThreads,
 // kSubgroup, kLane, subgroupWait(); TileA (rows × depth), TileB (depth × columns), TileSum (rows × columns); LOAD_A(),
-// LOAD_B(), CLEAR_SUM(), MULTIPLY_ADD(), STORE_SUM(), CONVERT_AND_STORE(). `element` and `stride` are in numbers of
-// `array`, multiples of 8. All invocations of a workgroup call subgroupWait() together, those of a subgroup all else.
+// LOAD_B(), CLEAR_SUM(), MULTIPLY_ADD(), STORE_SUM(), CONVERT_AND_STORE(). `element` and `stride` count numbers of
+// `array` and are multiples of 8. All invocations of a workgroup must call subgroupWait() together; all invocations of
+// a subgroup must use the other functions together.
 //
-// By VK_KHR_cooperative_matrix (TESSERA_KHR_MATRICES), by VK_NV_cooperative_matrix, or, with TESSERA_EMULATED_MATRICES, by
-// loops over what each lane holds, so that kernels which use them can be tested on any device.
+// They use VK_KHR_cooperative_matrix (TESSERA_KHR_MATRICES), VK_NV_cooperative_matrix, or, with
+// TESSERA_EMULATED_MATRICES, loops over the elements of each lane, so that kernels that use them can be tested on any
+// device.
 
 layout(constant_id = 3) const uint kSubgroupSize = 32;
 layout(constant_id = 4) const uint kTileRows = 16;
@@ -17,7 +19,8 @@ const uint kSubgroups = 4;
 const uint kThreads = kSubgroups * kSubgroupSize;
 
 #ifdef TESSERA_EMULATED_MATRICES
-// A lane holds one row of A, some columns of B, and where they meet so many sums. Callers know no `nth` and no `inner`.
+// A lane has one row of A, some columns of B, and the sums of their products. Callers must not use the names `nth` and
+// `inner`.
 const uint kColumnsOfLane = kTileRows * kTileColumns / kSubgroupSize;
 const uint kLanesOfRow = kTileColumns / kColumnsOfLane;
 struct TileA { float numbers[kTileDepth]; };
@@ -44,10 +47,10 @@ struct TileSum { float numbers[kColumnsOfLane]; };
 #define STORE_SUM(sum, array, element, stride)      \
   for (uint nth = 0; nth < kColumnsOfLane; ++nth)   \
   array[AT(element, stride, false, LANE_ROW, LANE_COLUMN + nth)] = sum.numbers[nth]
-// As fp16; `sum` holds nothing of use afterwards.
-#define CONVERT_AND_STORE(sum, least, array, element, stride) \
+// Stores as fp16; `sum` is undefined afterwards.
+#define CONVERT_AND_STORE(sum, minimum, array, element, stride) \
   for (uint nth = 0; nth < kColumnsOfLane; ++nth)             \
-  array[AT(element, stride, false, LANE_ROW, LANE_COLUMN + nth)] = toNumber(atLeast(sum.numbers[nth], least))
+  array[AT(element, stride, false, LANE_ROW, LANE_COLUMN + nth)] = toNumber(atLeast(sum.numbers[nth], minimum))
 void subgroupWait() { barrier(); }
 
 #else
@@ -80,10 +83,11 @@ void subgroupWait() { barrier(); }
 #define kSubgroup gl_SubgroupID
 #define kLane gl_SubgroupInvocationID
 #define CLEAR_SUM(sum) sum = TileSum(0.0)
-// Which lane holds what is the driver's affair, and may differ between fp16 and float: only whole matrices convert.
-#define CONVERT_AND_STORE(sum, least, array, element, stride)                             \
+// The distribution of elements over lanes is up to the driver and may differ between fp16 and float, so only whole
+// matrices can be converted.
+#define CONVERT_AND_STORE(sum, minimum, array, element, stride)                             \
   {                                                                                       \
-    for (uint i = 0; i < sum.length(); ++i) sum[i] = withinHalf(atLeast(sum[i], least));  \
+    for (uint i = 0; i < sum.length(); ++i) sum[i] = withinHalf(atLeast(sum[i], minimum));  \
     TileHalfSum converted = TileHalfSum(sum);                                             \
     STORE_SUM(converted, array, element, stride);                                         \
   }

@@ -1,5 +1,5 @@
-// Gradients from the outputs back to the inputs for a block of samples, in shared memory all the way. Those of each
-// layer's sums are written out for mlp_weight_gradients.comp. In fp16 they are all scaled by lossScale().
+// MlpBackward: gradients from the outputs back to the inputs for a block of samples, in shared memory. The gradients of
+// each layer's sums are also written to memory for mlp_weight_gradients.comp. In fp16 all are scaled by lossScale().
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "number.glsl"
@@ -10,15 +10,15 @@
 
 KERNEL_ARGUMENTS(MlpBackwardArguments)
 
-float inputScale;  // what takes the scale away again
+float inputScale;  // the inverse of the scale
 
-void take(uint row, uint column, float sum) {
+void storeSum(uint row, uint column, float sum) {
   MatrixArguments gradients = arguments.values.inputGradients;
-  if (row >= endOf(arguments.values.last.samples) || column >= gradients.columns) return;
-  gradients.data.values[elementOf(gradients, row, column)] = sum * inputScale;
+  if (row >= rowRangeEnd(arguments.values.last.samples) || column >= gradients.columns) return;
+  gradients.data.values[elementIndex(gradients, row, column)] = sum * inputScale;
 }
 
-// state ← the gradient of the output layer's sums.
+// Sets `state` to the gradients of the output layer's sums.
 void loadOutputGradients(MlpBackwardArguments a, float scale, uint firstSample, uint samples) {
   barrier();
   for (uint column = gl_LocalInvocationIndex % 16; column < a.paddedOutputs; column += 16) {
@@ -37,34 +37,34 @@ void backward(MlpBackwardArguments a, float scale, uint firstSample, uint sample
   loadOutputGradients(a, scale, firstSample, samples);
   uint depth = a.paddedOutputs;
   for (uint layer = a.hiddenLayers; layer > 0; --layer) {
-    const uint offset = a.paddedInputs * kWidth + (layer - 1) * kWidth * kWidth;  // of this layer's weights
+    const uint offset = a.paddedInputs * kWidth + (layer - 1) * kWidth * kWidth;  // offset of this layer's weights
     clearSums();
     accumulate(a.weights, offset, kWidth, 1, depth, kWidth);
-    keepSums(false);
+    storeSumsToState(false);
     barrier();
     const uint base = ((layer - 1) * a.last.samples.capacity + firstSample) * kWidth / 4;
     for (uint i = gl_LocalInvocationIndex; i < rows * kWidth / 4; i += kThreads) {
       const uint row = i / (kWidth / 4), quad = i % (kWidth / 4);
       const NumberQuad activation = a.activations.values[base + i];
-      // Nothing where ReLU was off.
+      // The gradient is zero where ReLU was inactive.
       const NumberQuad gradient = mix(NumberQuad(0), STATE_QUAD(row, quad), greaterThan(activation, NumberQuad(0)));
-      KEEP_QUAD(row, quad, gradient);
+      SET_STATE_QUAD(row, quad, gradient);
       a.hiddenGradients.values[base + i] = gradient;
     }
     depth = kWidth;
   }
 
-  if (!WANTED(a.inputGradients.data)) return;
+  if (!IS_SET(a.inputGradients.data)) return;
   for (uint first = 0; first < a.inputGradients.columns; first += kWidth) {
     clearSums();
     accumulate(a.weights, first, a.paddedInputs, 1, kWidth, min(kWidth, a.paddedInputs - first));
-    giveSums(firstSample, first);
+    outputSums(firstSample, first);
   }
 }
 
 void main() {
   CountArguments count = arguments.values.last.samples;
-  const uint begin = firstOf(count), samples = endOf(count);
+  const uint begin = rowRangeBegin(count), samples = rowRangeEnd(count);
   if (begin + gl_WorkGroupID.x * kBlock >= samples) return;
   const float scale = lossScale(arguments.values.largest, arguments.values.largestCount);
   inputScale = 1 / scale;

@@ -1,11 +1,11 @@
-// How a workgroup takes its block of samples through a layer: by cooperative matrices (TESSERA_MATRICES) or without.
+// Computes a layer for a block of samples per workgroup: with cooperative matrices (TESSERA_MATRICES) or without.
 #ifdef TESSERA_MATRICES
 #include "mlp_matrices.glsl"
 #else
 #include "mlp_tile.glsl"
 #endif
 
-// The first sample of every block of samples [begin, end), shared out among the workgroups.
+// Loops over the first sample of every block of samples [begin, end), distributed over the workgroups.
 #define FOR_EACH_BLOCK(firstSample, begin, end)                                     \
   for (uint firstSample = (begin) + gl_WorkGroupID.x * kBlock; firstSample < (end); \
        firstSample += gl_NumWorkGroups.x * kBlock)

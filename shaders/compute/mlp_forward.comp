@@ -1,5 +1,5 @@
-// The whole network for a block of samples: a workgroup keeps the block's activations in shared memory from the input
-// to the output (Müller et al. 2021, fully fused networks).
+// MlpForward: the whole network for a block of samples. A workgroup keeps the block's activations in shared memory from
+// the input to the output (Müller et al. 2021, fully fused networks).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "number.glsl"
@@ -9,21 +9,21 @@
 
 KERNEL_ARGUMENTS(MlpForwardArguments)
 
-void take(uint row, uint column, float sum) {
+void storeSum(uint row, uint column, float sum) {
   MatrixArguments outputs = arguments.values.outputs;
-  if (row >= endOf(arguments.values.samples) || column >= outputs.columns) return;
+  if (row >= rowRangeEnd(arguments.values.samples) || column >= outputs.columns) return;
   if (arguments.values.sigmoidOutput != 0) sum = 1 / (1 + exp(-sum));
-  outputs.data.values[elementOf(outputs, row, column)] = sum;
+  outputs.data.values[elementIndex(outputs, row, column)] = sum;
 }
 
-// Columns [first, first + count) of the block's input; padding and samples beyond the last are zero.
+// Loads columns [first, first + count) of the block's input; padding and samples beyond the last are zero.
 void loadInput(MatrixArguments m, uint firstSample, uint samples, uint first, uint count) {
   barrier();
   for (uint column = gl_LocalInvocationIndex % 16; column < count; column += 16) {
-    const bool given = first + column < m.columns;
-    const uint offset = given ? columnOffset(m, first + column) : 0;
+    const bool exists = first + column < m.columns;
+    const uint offset = exists ? columnOffset(m, first + column) : 0;
     for (uint row = gl_LocalInvocationIndex / 16; row < kBlock; row += kThreads / 16) {
-      const bool inside = given && firstSample + row < samples;
+      const bool inside = exists && firstSample + row < samples;
       STATE(row, column) = toNumber(inside ? m.data.values[offset + (firstSample + row) * m.rowStride] : 0);
     }
   }
@@ -37,10 +37,10 @@ void forward(MlpForwardArguments a, uint firstSample, uint samples) {
     accumulate(a.weights, first, 1, a.paddedInputs, count, kWidth);
   }
 
-  uint offset = a.paddedInputs * kWidth;  // of the next layer's weights
+  uint offset = a.paddedInputs * kWidth;  // offset of the next layer's weights
   for (uint layer = 0; layer < a.hiddenLayers; ++layer) {
-    keepSums(true);
-    if (WANTED(a.activations)) {
+    storeSumsToState(true);
+    if (IS_SET(a.activations)) {
       barrier();
       const uint base = (layer * a.samples.capacity + firstSample) * kWidth / 4;
       const uint rows = min(kBlock, samples - firstSample);
@@ -58,11 +58,11 @@ void forward(MlpForwardArguments a, uint firstSample, uint samples) {
   for (uint first = 0; first < a.paddedOutputs; first += kWidth) {
     clearSums();
     accumulate(a.weights, offset + first * kWidth, 1, kWidth, kWidth, min(kWidth, a.paddedOutputs - first));
-    giveSums(firstSample, first);
+    outputSums(firstSample, first);
   }
 }
 
 void main() {
-  const uint begin = firstOf(arguments.values.samples), samples = endOf(arguments.values.samples);
+  const uint begin = rowRangeBegin(arguments.values.samples), samples = rowRangeEnd(arguments.values.samples);
   FOR_EACH_BLOCK(firstSample, begin, samples) forward(arguments.values, firstSample, samples);
 }

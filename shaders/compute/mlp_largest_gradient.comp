@@ -1,4 +1,4 @@
-// The largest of an MLP's output gradients, one a workgroup: what lossScale() chooses from.
+// The largest of an MLP's output gradients, one value per workgroup: the input of lossScale().
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "number.glsl"
@@ -13,14 +13,14 @@ shared float largest[128];
 
 void main() {
   MlpLargestGradientArguments a = arguments.values;
-  float most = 0;
+  float maximum = 0;
   FOR_EACH_ROW(row, a.last.samples) {
     for (uint column = 0; column < a.last.gradients.columns; ++column) {
       const float size = abs(outputGradient(a.last, row, column));
-      most = max(most, isNoNumber(size) ? uintBitsToFloat(0x7f800000u) : size);
+      maximum = max(maximum, isNoNumber(size) ? uintBitsToFloat(0x7f800000u) : size);
     }
   }
-  largest[gl_LocalInvocationIndex] = most;
+  largest[gl_LocalInvocationIndex] = maximum;
   for (uint other = 64; other > 0; other /= 2) {
     barrier();
     if (gl_LocalInvocationIndex < other) {

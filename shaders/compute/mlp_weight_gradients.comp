@@ -1,5 +1,5 @@
 // Weight gradients of one layer. A workgroup sums a 32 × 32 tile over its share of the samples, then adds it to the
-// whole: x and y of the workgroup choose the tile, z the share. Each invocation sums 4 × 4 weights from fours.
+// result. The workgroup's x and y select the tile, its z the share. Each invocation sums 4 × 4 weights.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "float_sum.glsl"
@@ -8,7 +8,7 @@
 #include "arguments_mlp.h"
 #include "mlp_output_gradient.glsl"
 
-const uint kQuads = 8;    // a side of the tile
+const uint kQuads = 8;    // vectors of four along a side of the tile
 const uint kDepth = 16;   // samples at a time
 const uint kThreads = 64;
 layout(local_size_x = 64) in;
@@ -19,13 +19,13 @@ shared NumberQuad beforeTile[kDepth * kQuads];
 
 void main() {
   MlpWeightGradientsArguments a = arguments.values;
-  const uint samples = endOf(a.samples);
-  if (firstOf(a.samples) + gl_WorkGroupID.z * kDepth >= samples) return;
+  const uint samples = rowRangeEnd(a.samples);
+  if (rowRangeBegin(a.samples) + gl_WorkGroupID.z * kDepth >= samples) return;
   const uint firstColumn = gl_WorkGroupID.x * 4 * kQuads;
   const uint firstRow = gl_WorkGroupID.y * 4 * kQuads;
-  const bool ofInputs = WANTED(a.inputs.data);
+  const bool ofInputs = IS_SET(a.inputs.data);
 
-  // What this invocation loads: the same four rows and columns of every sixteenth sample.
+  // This invocation loads the same four rows and columns of every sixteenth sample.
   const uint quad = gl_LocalInvocationIndex % kQuads;
   const uint row = firstRow + 4 * quad, column = firstColumn + 4 * quad;
   uint offsets[4];
@@ -34,7 +34,7 @@ void main() {
   const uint rowQuad = gl_LocalInvocationIndex / kQuads, columnQuad = quad;
   vec4 sums[4];
   [[unroll]] for (uint r = 0; r < 4; ++r) sums[r] = vec4(0);
-  for (uint first = firstOf(a.samples) + gl_WorkGroupID.z * kDepth; first < samples; first += gl_NumWorkGroups.z * kDepth) {
+  for (uint first = rowRangeBegin(a.samples) + gl_WorkGroupID.z * kDepth; first < samples; first += gl_NumWorkGroups.z * kDepth) {
     barrier();
     for (uint i = gl_LocalInvocationIndex; i < kDepth * kQuads; i += kThreads) {
       const uint index = first + i / kQuads;

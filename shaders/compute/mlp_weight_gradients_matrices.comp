@@ -1,5 +1,5 @@
-// mlp_weight_gradients.comp by cooperative matrices: a workgroup sums kRows × kColumns weights, 64 samples at a time. Its
-// four subgroups share out the rows, and the samples where there are fewer rows.
+// mlp_weight_gradients.comp with cooperative matrices: a workgroup sums kRows × kColumns weights, 64 samples at a time.
+// Its four subgroups divide the rows and, if there are too few rows, the samples.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "float_sum.glsl"
@@ -17,26 +17,26 @@ KERNEL_ARGUMENTS(MlpWeightGradientsArguments)
 const uint kRowStride = kRows + 8, kColumnStride = kColumns + 8;
 const uint kTilesDown = kRows / kTileRows;
 const uint kRowShares = kTilesDown < kSubgroups ? kTilesDown : kSubgroups;
-const uint kRowTiles = kTilesDown / kRowShares;  // of one subgroup
+const uint kRowTiles = kTilesDown / kRowShares;  // per subgroup
 const uint kColumnTiles = kColumns / kTileColumns;
-const uint kPart = kDepth / (kSubgroups / kRowShares);  // samples of one subgroup
+const uint kPart = kDepth / (kSubgroups / kRowShares);  // samples per subgroup
 const uint kTileNumbers = kTileRows * kTileColumns;
 
 shared float16_t afterTile[kDepth * kRowStride];
 shared float16_t beforeTile[kDepth * kColumnStride];
-shared float given[kSubgroups * kTileNumbers];
+shared float staging[kSubgroups * kTileNumbers];
 TileSum sums[kRowTiles * kColumnTiles];
 
 uint tileRow(uint r) { return (kSubgroup % kRowShares + r * kRowShares) * kTileRows; }
 
-// Samples [first, first + 64); those beyond the last are zero.
+// Loads samples [first, first + 64); those beyond the last are zero.
 void load(MlpWeightGradientsArguments a, uint first, uint samples, uint firstRow, uint firstColumn) {
   for (uint i = gl_LocalInvocationIndex; i < kDepth * kRows / 4; i += kThreads) {
     const uint index = first + i / (kRows / 4), quad = i % (kRows / 4);
     const f16vec4 four = index < samples ? QuadPointer(a.after).values[(index * a.rows + firstRow) / 4 + quad] : f16vec4(0);
     [[unroll]] for (uint k = 0; k < 4; ++k) afterTile[i / (kRows / 4) * kRowStride + 4 * quad + k] = four[k];
   }
-  if (WANTED(a.inputs.data)) {
+  if (IS_SET(a.inputs.data)) {
     for (uint column = gl_LocalInvocationIndex % 16; column < kColumns; column += 16) {
       const bool has = firstColumn + column < a.inputs.columns;
       const uint offset = has ? columnOffset(a.inputs, firstColumn + column) : 0;
@@ -58,13 +58,13 @@ void load(MlpWeightGradientsArguments a, uint first, uint samples, uint firstRow
 
 void main() {
   MlpWeightGradientsArguments a = arguments.values;
-  const uint samples = endOf(a.samples);
-  if (firstOf(a.samples) + gl_WorkGroupID.z * kDepth >= samples) return;
+  const uint samples = rowRangeEnd(a.samples);
+  if (rowRangeBegin(a.samples) + gl_WorkGroupID.z * kDepth >= samples) return;
   const uint firstColumn = gl_WorkGroupID.x * kColumns, firstRow = gl_WorkGroupID.y * kRows;
   const uint part = kSubgroup / kRowShares * kPart;
 
   [[unroll]] for (uint i = 0; i < kRowTiles * kColumnTiles; ++i) { CLEAR_SUM(sums[i]); }
-  for (uint first = firstOf(a.samples) + gl_WorkGroupID.z * kDepth; first < samples; first += gl_NumWorkGroups.z * kDepth) {
+  for (uint first = rowRangeBegin(a.samples) + gl_WorkGroupID.z * kDepth; first < samples; first += gl_NumWorkGroups.z * kDepth) {
     barrier();
     load(a, first, samples, firstRow, firstColumn);
     barrier();
@@ -85,10 +85,10 @@ void main() {
   [[unroll]] for (uint r = 0; r < kRowTiles; ++r) {
     [[unroll]] for (uint c = 0; c < kColumnTiles; ++c) {
       subgroupWait();
-      STORE_SUM(sums[r * kColumnTiles + c], given, kSubgroup * kTileNumbers, kTileColumns);
+      STORE_SUM(sums[r * kColumnTiles + c], staging, kSubgroup * kTileNumbers, kTileColumns);
       subgroupWait();
       for (uint i = kLane; i < kTileNumbers; i += kSubgroupSize) {
-        const float sum = given[kSubgroup * kTileNumbers + i];
+        const float sum = staging[kSubgroup * kTileNumbers + i];
         const uint row = firstRow + tileRow(r) + i / kTileColumns, column = firstColumn + c * kTileColumns + i % kTileColumns;
         if (sum != 0) addTo(a.gradients, row * a.columns + column, sum * scale);
       }

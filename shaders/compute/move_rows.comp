@@ -1,4 +1,4 @@
-// One invocation an element: GatherRows, or ScatterRows.
+// GatherRows and ScatterRows: one invocation per element.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #define TESSERA_WORDS
@@ -12,9 +12,9 @@ KERNEL_ARGUMENTS(MoveRowsArguments)
 void main() {
   MoveRowsArguments a = arguments.values;
   const uint columns = a.from.columns;
-  FOR_EACH(i, endOf(a.rows) * columns) {
+  FOR_EACH(i, rowRangeEnd(a.rows) * columns) {
     const uint row = i / columns, column = i % columns, other = a.source.values[row];
-    const uint to = elementOf(a.to, kScatter ? other : row, column);
-    a.to.data.values[to] = a.from.data.values[elementOf(a.from, kScatter ? row : other, column)];
+    const uint to = elementIndex(a.to, kScatter ? other : row, column);
+    a.to.data.values[to] = a.from.data.values[elementIndex(a.from, kScatter ? row : other, column)];
   }
 }

@@ -1,4 +1,4 @@
-// Last of OccupancyUpdate: one invocation a word of bits.
+// Last kernel of OccupancyUpdate: one invocation per word of the occupancy bits.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"

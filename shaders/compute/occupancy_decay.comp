@@ -1,4 +1,4 @@
-// First of OccupancyUpdate: every cell decays.
+// First kernel of OccupancyUpdate: decays every cell.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"

@@ -1,4 +1,4 @@
-// One invocation a point (src/compute/occupancy.h says how it is chosen).
+// OccupancyPoints: one invocation per point; src/compute/occupancy.h defines how it is chosen.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -9,8 +9,8 @@
 layout(local_size_x = 128) in;
 KERNEL_ARGUMENTS(OccupancyPointsArguments)
 
-uint cellOf(OccupancyPointsArguments a, uint candidate) {
-  return WANTED(a.candidates) ? a.candidates.values[candidate] : candidate;
+uint candidateCell(OccupancyPointsArguments a, uint candidate) {
+  return IS_SET(a.candidates) ? a.candidates.values[candidate] : candidate;
 }
 
 void main() {
@@ -18,10 +18,10 @@ void main() {
   FOR_EACH(p, a.points) {
     const uint point = a.first + p, index = 16 * point;
     const bool inOrder = point < a.uniform_ && a.uniform_ == a.candidateCount;
-    uint cell = cellOf(a, inOrder ? point : randomBelow(a.key, index, a.candidateCount));
+    uint cell = candidateCell(a, inOrder ? point : randomBelow(a.key, index, a.candidateCount));
     if (point >= a.uniform_) {
       for (uint attempt = 1; attempt < 10 && (a.occupancy.values[cell / 32] >> cell % 32 & 1) == 0; ++attempt) {
-        cell = cellOf(a, randomBelow(a.key, index + attempt, a.candidateCount));
+        cell = candidateCell(a, randomBelow(a.key, index + attempt, a.candidateCount));
       }
     }
     a.cells.values[p] = cell;

@@ -1,5 +1,5 @@
-// Second of OccupancyUpdate: chosen cells are at least what was seen there. Numbers that are not negative are in the
-// order of their bits.
+// Second kernel of OccupancyUpdate: raises the chosen cells to the sampled values. Non-negative floats have the same
+// order as their bits.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -8,7 +8,7 @@
 layout(local_size_x = 256) in;
 KERNEL_ARGUMENTS(OccupancyUpdateArguments)
 
-// The marching step at a cell's centre.
+// Returns the marching step at a cell's centre.
 float stepAt(OccupancyUpdateArguments a, uint cell) {
   const uint r = a.resolution;
   const vec3 u = (vec3(cell % r, cell / r % r, cell / (r * r)) + 0.5) / float(r);
@@ -22,7 +22,7 @@ void main() {
   FOR_EACH(p, a.points) {
     const uint cell = a.cells.values[p];
     if (a.grid.values[cell] < 0) continue;
-    const float seen = exp(min(a.logDensity.data.values[elementOf(a.logDensity, p, 0)], 15)) * stepAt(a, cell);
+    const float seen = exp(min(a.logDensity.data.values[elementIndex(a.logDensity, p, 0)], 15)) * stepAt(a, cell);
     atomicMax(a.gridBits.values[cell], floatBitsToUint(seen));
   }
 }

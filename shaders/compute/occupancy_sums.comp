@@ -1,4 +1,4 @@
-// Third of OccupancyUpdate: sum and number of the cells that are not negative, a pair a workgroup.
+// Third kernel of OccupancyUpdate: the sum and the number of non-negative cells, one pair per workgroup.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"

@@ -1,4 +1,4 @@
-// One invocation a ray.
+// OpticalDepth: one invocation per ray.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -12,7 +12,7 @@ void main() {
   FOR_EACH_ROW(ray, a.rays) {
     float sum = a.opticalDepth.values[ray];
     for (uint i = a.firstSample.values[ray]; i < a.firstSample.values[ray + 1]; ++i) {
-      sum += exp(a.logDensity.data.values[elementOf(a.logDensity, i, 0)]) * a.steps.values[i];
+      sum += exp(a.logDensity.data.values[elementIndex(a.logDensity, i, 0)]) * a.steps.values[i];
     }
     a.opticalDepth.values[ray] = sum;
   }

@@ -1,4 +1,5 @@
-// Loads of 8 bytes at random places of a table of `count` entries, a power of two; `rounds` of eight that wait for nothing.
+// Measures random loads of 8 bytes from a table of `count` entries, a power of two: `rounds` of eight independent
+// loads.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -16,12 +17,12 @@ void main() {
   for (uint round = 0; round < a.rounds; ++round) {
     uvec2 loaded[8];
     [[unroll]] for (int i = 0; i < 8; ++i) {
-      // PCG: neighbours go to places that have nothing to do with each other.
+      // PCG random numbers: neighbouring invocations load unrelated entries.
       state = state * 747796405u + 2891336453u;
       const uint word = ((state >> ((state >> 28) + 4)) ^ state) * 277803737u;
       loaded[i] = table.values[((word >> 22) ^ word) & (a.count - 1)];
     }
     [[unroll]] for (int i = 0; i < 8; ++i) sum += loaded[i];
   }
-  if (sum.x == 0xdeadbeef && sum.y == 0xbeefdead) a.to.values[0] = sum.x;  // never
+  if (sum.x == 0xdeadbeef && sum.y == 0xbeefdead) a.to.values[0] = sum.x;  // never true
 }

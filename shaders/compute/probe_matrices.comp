@@ -1,5 +1,4 @@
-// Products of matrices that stay with the subgroup, by cooperative matrices: four sums that wait for nothing but their own
-// last one, `rounds` times.
+// Measures products of cooperative matrices in registers: four independent chains of `rounds` each.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "number.glsl"
@@ -10,7 +9,7 @@
 KERNEL_ARGUMENTS(ProbeArguments)
 
 shared float16_t numbers[256];
-shared float given[kSubgroups * 256];
+shared float staging[kSubgroups * 256];
 
 void main() {
   ProbeArguments a = arguments.values;
@@ -28,9 +27,9 @@ void main() {
   float sum = 0;
   [[unroll]] for (uint i = 0; i < 4; ++i) {
     subgroupWait();
-    STORE_SUM(sums[i], given, kSubgroup * 256, kTileColumns);
+    STORE_SUM(sums[i], staging, kSubgroup * 256, kTileColumns);
     subgroupWait();
-    sum += given[kSubgroup * 256 + kLane];
+    sum += staging[kSubgroup * 256 + kLane];
   }
-  if (sum == 12345.678) a.to.values[0] = floatBitsToUint(sum);  // never, which nobody knows but we
+  if (sum == 12345.678) a.to.values[0] = floatBitsToUint(sum);  // never true, which the compiler cannot know
 }

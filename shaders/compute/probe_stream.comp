@@ -1,4 +1,4 @@
-// Copies `count` blocks of 16 bytes.
+// Measures streaming: copies `count` blocks of 16 bytes.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"

@@ -1,4 +1,4 @@
-// One invocation a ray walks along bins and new posts at once: both are in order.
+// ResampleFences: one invocation per ray, which walks along bins and new posts simultaneously, as both are sorted.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -19,17 +19,17 @@ void main() {
     const uint firstWeight = ray * a.before, firstPost = ray * (a.before + 1), firstNew = ray * (a.after + 1);
     real sum = 0;
     for (uint bin = 0; bin < a.before; ++bin) sum += annealed(a.weights.values[firstWeight + bin], a.anneal);
-    const real jitter = WANTED(a.jitter) ? a.jitter.values[ray] : 0.5;
+    const real jitter = IS_SET(a.jitter) ? a.jitter.values[ray] : 0.5;
     const real evenly = 1 / real(a.before);
     uint bin = 0, next = 0;
-    real begin = 0, end = 0;  // of the bin, in the cumulative sum
+    real begin = 0, end = 0;  // the bin's range in the cumulative sum
     for (uint i = 1; i < a.after; ++i) {
       const real u = (i + jitter - real(0.5)) / a.after;
       for (; end <= u && next < a.before; ++next) {
         bin = next;
         begin = end;
         const real weight = annealed(a.weights.values[firstWeight + bin], a.anneal);
-        const real share = sum > 0 ? (1 - a.padding) * weight / sum + a.padding * evenly : evenly;
+        const real share = sum > 0 ? (1 - a.uniformFraction) * weight / sum + a.uniformFraction * evenly : evenly;
         end = bin + 1 == a.before ? real(1) : min(real(1), begin + share);
       }
       const real from = a.fences.values[firstPost + bin], to = a.fences.values[firstPost + bin + 1];

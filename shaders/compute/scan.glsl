@@ -1,4 +1,4 @@
-// Running sums over a workgroup's chunk of numbers: each invocation takes kRun of them in order.
+// Prefix sums over a workgroup's chunk of numbers: each invocation processes kRun consecutive numbers.
 // Defines: kChunk, saturated(), countAt(), runningSum().
 #include "arguments_scan.h"
 
@@ -6,12 +6,12 @@ const uint kThreads = 256;
 const uint kRun = TESSERA_SCAN_CHUNK / kThreads;
 const uint kChunk = TESSERA_SCAN_CHUNK;
 layout(local_size_x = 256) in;
-layout(constant_id = 0) const bool kCountsBits = false;  // of words instead of words themselves
+layout(constant_id = 0) const bool kCountsBits = false;  // sums the number of set bits of each word instead of the word
 KERNEL_ARGUMENTS(ScanArguments)
 
 shared uint sumOfThread[kThreads];
 
-// Sums that are too large stay so: there is no overflow.
+// Sums saturate at limit + 1, so that they cannot overflow.
 uint saturated(uint sum) { return min(sum, arguments.values.limit + 1); }
 
 uint countAt(uint index, uint end) {
@@ -20,7 +20,8 @@ uint countAt(uint index, uint end) {
   return saturated(kCountsBits ? bitCount(word) : word);
 }
 
-// → Σ of `own` over the invocations before this one; all call it together. sumOfThread[kThreads - 1] is that of all.
+// Returns the sum of `own` over the invocations before this one. All invocations must call it together. Afterwards,
+// sumOfThread[kThreads - 1] is the total.
 uint runningSum(uint own) {
   const uint thread = gl_LocalInvocationIndex;
   barrier();

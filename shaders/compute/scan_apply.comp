@@ -1,10 +1,10 @@
-// Third of three: the running sums themselves, and how many of them fit.
+// Third of three scan kernels: computes the prefix sums, and how many of them are within the limit.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
 #include "scan.glsl"
 
-layout(constant_id = 1) const bool kExclusive = false;  // what comes before each, without itself
+layout(constant_id = 1) const bool kExclusive = false;  // the sum before each number, excluding it
 
 shared uint total, fitting;
 
@@ -13,7 +13,7 @@ void main() {
     total = 0;
     fitting = 0;
   }
-  const uint end = endOf(arguments.values.rows);
+  const uint end = rowRangeEnd(arguments.values.rows);
   for (uint chunk = gl_WorkGroupID.x; chunk < arguments.values.partialCount; chunk += gl_NumWorkGroups.x) {
     uint own = 0;
     const uint first = chunk * kChunk + gl_LocalInvocationIndex * kRun;

@@ -1,11 +1,11 @@
-// Second of three, one workgroup: what comes before each chunk.
+// Second of three scan kernels, one workgroup: computes the sum before each chunk.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
 #include "scan.glsl"
 
 void main() {
-  uint before = 0;  // all that this loop has passed
+  uint before = 0;  // the sum of all previous iterations
   const uint count = arguments.values.partialCount;
   for (uint base = 0; base < count; base += kThreads) {
     const uint index = base + gl_LocalInvocationIndex;

@@ -1,11 +1,11 @@
-// First of three: the sum of each workgroup's chunk.
+// First of three scan kernels: computes the sum of each chunk.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
 #include "scan.glsl"
 
 void main() {
-  const uint end = endOf(arguments.values.rows);
+  const uint end = rowRangeEnd(arguments.values.rows);
   for (uint chunk = gl_WorkGroupID.x; chunk < arguments.values.partialCount; chunk += gl_NumWorkGroups.x) {
     uint own = 0;
     const uint first = chunk * kChunk + gl_LocalInvocationIndex * kRun;

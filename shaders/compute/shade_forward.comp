@@ -1,4 +1,4 @@
-// One invocation a channel of a ray.
+// ShadeForward: one invocation per channel of a ray.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -10,10 +10,10 @@ KERNEL_ARGUMENTS(ShadeArguments)
 
 void main() {
   ShadeArguments a = arguments.values;
-  FOR_EACH(i, 3 * endOf(a.rays)) {
+  FOR_EACH(i, 3 * rowRangeEnd(a.rays)) {
     const uint ray = i / 3, channel = i % 3;
-    const float sum = a.diffuse.data.values[elementOf(a.diffuse, ray, channel)] +
-                      a.specular.data.values[elementOf(a.specular, ray, channel)];
+    const float sum = a.diffuse.data.values[elementIndex(a.diffuse, ray, channel)] +
+                      a.specular.data.values[elementIndex(a.specular, ray, channel)];
     a.colour.values[i] = (kWhole ? 1 : a.opacity.values[ray]) / (1 + exp(-sum));
   }
 }

@@ -1,4 +1,4 @@
-// One invocation a point.
+// SparsityLoss: one invocation per point.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -13,7 +13,7 @@ void main() {
   NumberLossArguments a = arguments.values;
   float loss = 0;
   FOR_EACH_ROW(i, a.numbers) {
-    const float x = a.values.values[i], length = a.runtimeSteps.values[i], alpha = opacityOf(kLogDensity, x, length);
+    const float x = a.values.values[i], length = a.runtimeSteps.values[i], alpha = computeOpacity(kLogDensity, x, length);
     loss += alpha;
     a.gradients.values[i] = a.scale * (1 - alpha) * length * exp(clamp(x, -15, 15));
   }

@@ -23,7 +23,7 @@ float harmonic(uint i, vec3 d) {
   }
 }
 
-// Of the polynomial as a function on R³.
+// Returns the gradient of the polynomial as a function on R³.
 vec3 harmonicSlope(uint i, vec3 d) {
   const float x = d.x, y = d.y, z = d.z;
   const float a = 0.48860251190291987, b = 1.0925484305920792, c = 0.94617469575755997, e = 0.54627421529603959;

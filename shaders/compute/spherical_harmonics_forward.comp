@@ -1,4 +1,4 @@
-// One invocation an element.
+// SphericalHarmonicsForward: one invocation per element.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -12,9 +12,9 @@ KERNEL_ARGUMENTS(SphericalHarmonicsArguments)
 void main() {
   SphericalHarmonicsArguments a = arguments.values;
   const uint columns = a.degree * a.degree;
-  FOR_EACH(i, endOf(a.samples) * columns) {
+  FOR_EACH(i, rowRangeEnd(a.samples) * columns) {
     const uint row = i / columns, column = i % columns;
-    const vec3 direction = pointAt(a.directions, WANTED(a.rayOfSample) ? a.rayOfSample.values[row] : row);
-    a.encoded.data.values[elementOf(a.encoded, row, column)] = harmonic(column, direction);
+    const vec3 direction = pointAt(a.directions, IS_SET(a.rayOfSample) ? a.rayOfSample.values[row] : row);
+    a.encoded.data.values[elementIndex(a.encoded, row, column)] = harmonic(column, direction);
   }
 }

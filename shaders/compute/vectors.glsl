@@ -1,4 +1,5 @@
-// Defines: pointAt(), storePoint(): rows of three floats.
+// Access to arrays of three-dimensional points.
+// Defines: pointAt(), storePoint().
 
 vec3 pointAt(FloatPointer points, uint index) {
   return vec3(points.values[3 * index], points.values[3 * index + 1], points.values[3 * index + 2]);

@@ -1,4 +1,4 @@
-// One invocation a sample. Rounding is passed straight through.
+// VirtualGridBackward: one invocation per sample. Quantisation has a straight-through gradient.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "float_sum.glsl"
@@ -16,7 +16,7 @@ const float kCulled = -1e30;
 
 void main() {
   VirtualGridLookupArguments a = arguments.values;
-  const uint rows = endOf(a.texels);
+  const uint rows = rowRangeEnd(a.texels);
   FOR_EACH_ROW(index, a.samples) {
     float gradient[kAttributes];  // of the sums
     const float logDensity = a.logDensities.values[index];
@@ -30,11 +30,11 @@ void main() {
       any = any || gradient[f] != 0;
     }
     if (!any) continue;
-    const Places places = placesOf(a.grid, pointAt(a.positions, index));
+    const Places places = findPlaces(a.grid, pointAt(a.positions, index));
     const uint block = a.blockOfSample.values[index];
     [[unroll]] for (uint k = 0; k < kCorners; ++k) {
       const Corner corner = cornerAt(a.grid, places, k);
-      const uint row = rowOf(a.grid, a.marks, a.ranks, block, index, k, corner.texel);
+      const uint row = texelRow(a.grid, a.marks, a.ranks, block, index, k, corner.texel);
       if (row >= rows || corner.weight == 0) continue;
       [[unroll]] for (uint f = 0; f < kAttributes; ++f) {
         addTo(a.attributeGradients, kAttributes * row + f, corner.weight * gradient[f]);

@@ -1,4 +1,4 @@
-// One invocation a number.
+// Zeroes rows: one invocation per number.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"
@@ -8,5 +8,5 @@ layout(local_size_x = 256) in;
 KERNEL_ARGUMENTS(ZeroRowsArguments)
 
 void main() {
-  FOR_EACH(i, endOf(arguments.values.rows) * arguments.values.columns) arguments.values.numbers.values[i] = 0;
+  FOR_EACH(i, rowRangeEnd(arguments.values.rows) * arguments.values.columns) arguments.values.numbers.values[i] = 0;
 }

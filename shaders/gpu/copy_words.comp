@@ -1,9 +1,10 @@
-// Copies words, or makes them zero: as a kernel, whose numbers and places are arguments and not a part of what was recorded.
+// Copies words, or zeroes them. As it is a kernel, addresses and counts are arguments and not part of recorded
+// commands.
 #version 460
 #extension GL_EXT_buffer_reference : require
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const uint kFromNowhere = 0;  // 1: zeros
+layout(constant_id = 0) const uint kFromNowhere = 0;  // 1: write zeros
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Words { uint words[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Arguments {
   Words from;

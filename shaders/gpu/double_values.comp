@@ -1,4 +1,4 @@
-// For the tests of src/gpu: doubles every value, in place, then adds kAddend.
+// For the tests of src/gpu: doubles every value in place, then adds kAddend.
 #version 460
 #extension GL_EXT_buffer_reference : require
 

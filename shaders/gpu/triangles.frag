@@ -1,4 +1,4 @@
-// For the tests of src/gpu: what is known of a triangle's fragment, into images or into buffers.
+// For the tests of src/gpu: writes the data of a triangle's fragment to images or buffers.
 #version 460
 #extension GL_EXT_buffer_reference : require
 #extension GL_GOOGLE_include_directive : require

@@ -1,4 +1,4 @@
-// For the tests of src/gpu: triangles whose indices and vertices are fetched by address.
+// For the tests of src/gpu: draws triangles whose indices and vertices are fetched by address.
 #version 460
 #extension GL_EXT_buffer_reference : require
 #extension GL_GOOGLE_include_directive : require

@@ -1,18 +1,19 @@
-// A ray through the domain of one part of a content: straight pieces, measured in texels of some grid that fills the domain
-// (docs/tile-format.md, section 6; City-on-Web, section 4.4; MERF, section 4.1). Twin of src/scene/domain_path.cpp.
+// A ray through the domain of one part of a content as straight pieces, measured in texels of a grid that fills the
+// domain (docs/tile-format.md, section 6; City-on-Web, section 4.4; MERF, section 4.1). Must match
+// src/scene/domain_path.cpp.
 //
 // Defines: DomainSegment, rateAt, distanceAt, distanceBetween, regionAt, leaveRegion, domainSegment.
 
-// The place after τ texels is start + τ direction, in texels from the lower corner of the domain. Within a region the
-// contraction is a projective map, and so is the distance along the ray: entry + square τ / (rate - growth τ).
+// The position after τ texels is start + τ direction, in texels from the lower corner of the domain. Within a region
+// the contraction is a projective map, and so is the distance along the ray: entry + square τ / (rate - growth τ).
 struct DomainSegment {
   vec3 start;
   vec3 direction;
-  float whole;  // its length
+  float whole;  // total length
   float entry, square, rate, growth;
 };
 
-// rate - growth τ, which is above zero but for rounding.
+// Returns rate - growth τ, clamped because rounding could make it zero or negative.
 float rateAt(DomainSegment s, float tau) {
   return max(s.rate - s.growth * tau, 1e-7 * s.rate);
 }
@@ -25,8 +26,8 @@ float distanceBetween(DomainSegment s, float from, float to) {
   return s.square * s.rate * (to - from) / (rateAt(s, from) * rateAt(s, to));
 }
 
-// The cube |x| <= 1 is region -1; where the largest coordinate is that of axis a, the region is 2a, or 2a + 1 where it
-// is positive.
+// The cube |x| <= 1 is region -1. Outside, if the coordinate of axis a has the largest magnitude, the region is 2a, or
+// 2a + 1 if that coordinate is positive.
 const int kCube = -1;
 
 int regionAt(vec3 x) {
@@ -36,8 +37,8 @@ int regionAt(vec3 x) {
   return m[axis] > 1.0 ? 2 * axis + (x[axis] > 0.0 ? 1 : 0) : kCube;
 }
 
-// Where a ray that is in a region leaves it, and which comes next. A region is what lies within a few planes, and the
-// ray is outside of one from where it crosses that on its way out.
+// Returns the distance at which a ray in a region leaves it, and sets `next` to the following region. A region is
+// bounded by planes, and the ray leaves it where it first crosses one of them outwards.
 float leaveRegion(vec3 o, vec3 d, int region, out int next) {
   float exit = 1e30;
   next = kCube;
@@ -58,7 +59,7 @@ float leaveRegion(vec3 o, vec3 d, int region, out int next) {
   for (int k = 1; k < 3; ++k) {
     int b = (a + k) % 3;
     for (float other = -1.0; other < 2.0; other += 2.0) {
-      float speed = other * d[b] - growth;  // at which the other coordinate overtakes
+      float speed = other * d[b] - growth;  // relative growth of the other coordinate
       float t = (m - other * o[b]) / speed;
       if (speed > 0.0 && t < exit) {
         exit = t;
@@ -69,8 +70,8 @@ float leaveRegion(vec3 o, vec3 d, int region, out int next) {
   return exit;
 }
 
-// The piece of a ray (local coordinates; distances are those of the scene) from `near` to `far`, all in one region, in a
-// domain of [-half, half]³ with so many texels along an edge.
+// Returns the piece of a ray (local coordinates, distances of the scene) from `near` to `far`, which lies in one
+// region, in the domain [-halfDomain, halfDomain]³ with `texels` texels along an edge.
 DomainSegment domainSegment(vec3 o, vec3 d, int region, float near, float far, float halfDomain, float texels) {
   DomainSegment s;
   vec3 y = o + near * d;

@@ -1,10 +1,10 @@
-// Sine and cosine to a unit in the last place or two for |x| < 10^4, as S. Moshier's Cephes library has them (sinf.c):
-// Vulkan promises no more of sin() and cos() than 2^-11, and that only up to π.
+// Sine and cosine with an error of one or two units in the last place for |x| < 10^4, from S. Moshier's Cephes library
+// (sinf.c): Vulkan guarantees only an absolute error of 2^-11 for sin() and cos(), and only up to π.
 // Defines: sineAndCosine(), sine(), cosine(), tangent().
 
 vec2 sineAndCosine(float x) {
   precise const float quarters = floor(x * 0.63661977 + 0.5);
-  // π/2 in three parts; quarters times the first two is exact.
+  // π/2 is split into three parts; the products of `quarters` and the first two are exact.
   precise float r = x - quarters * 1.5703125;
   r = r - quarters * 4.837512969970703e-4;
   r = r - quarters * 7.549789948768648e-8;

@@ -1,9 +1,10 @@
-// A pixel's ray through a content.
-// Reads: march_part.glsl; view.glsl; Part partOf(uint), Place placeOfPart(uint); float minTransmittance. Defines: marchContent().
+// Marches a pixel's ray through a content.
+// Reads: march_part.glsl; view.glsl; Part fetchPart(uint), Place placeOfPart(uint); float minTransmittance. Defines:
+// marchContent().
 
-// Through what the content owns of the ray, part after part in the order in which the ray enters them.
+// Marches the part of the ray that the content owns, part by part in the order in which the ray enters them.
 void marchParts(vec3 o, vec3 d, vec2 whole, uint partCount, inout Composite sum) {
-  float entered = 0;  // the last one's entry and number
+  float entered = 0;  // entry and number of the previous part
   uint last = 0;
   for (uint turn = 0; turn < partCount && sum.transmittance >= minTransmittance; ++turn) {
     uint nearest = partCount;
@@ -17,22 +18,23 @@ void marchParts(vec3 o, vec3 d, vec2 whole, uint partCount, inout Composite sum)
       range = owned;
     }
     if (nearest == partCount) return;
-    marchPart(partOf(nearest), o, d, range, sum);
+    marchPart(fetchPart(nearest), o, d, range, sum);
     entered = range.x;
     last = nearest;
   }
 }
 
-// `low`, `high`: where the content is drawn. A surround is seen behind the scene's box, or alone where the ray misses that.
-Composite marchContent(ViewArguments view, uint pixel, vec3 d, vec3 low, vec3 high, uint partCount, bool isSurround) {
-  const vec3 o = vectorOf(view.origin);
-  const vec2 box = clipToBox(o, d, vectorOf(view.low), vectorOf(view.high), vec2(view.near, 1e30));
+// `low`, `high`: the box in which the content is drawn. A background block is drawn behind the scene's box, or alone if
+// the ray misses the box.
+Composite marchContent(ViewArguments view, uint pixel, vec3 d, vec3 low, vec3 high, uint partCount, bool isBackgroundBlock) {
+  const vec3 o = toVec3(view.origin);
+  const vec2 box = clipToBox(o, d, toVec3(view.low), toVec3(view.high), vec2(view.near, 1e30));
   const bool meetsBox = box.x < box.y;
-  const float far = farthestOf(view, pixel);
+  const float far = farthestDistance(view, pixel);
   Composite sum = Composite(vec3(0), vec4(0), 1, 0, 0);
-  if (isSurround) {
+  if (isBackgroundBlock) {
     const vec2 behind = vec2(meetsBox ? box.y : view.near, far);
-    if (behind.x < behind.y) marchPart(partOf(0), o, d, behind, sum);
+    if (behind.x < behind.y) marchPart(fetchPart(0), o, d, behind, sum);
   } else {
     const vec2 whole = clipToBox(o, d, low, high, vec2(meetsBox ? box.x : view.near, far));
     if (whole.x < whole.y) marchParts(o, d, whole, partCount, sum);

@@ -1,32 +1,32 @@
-// What the host hands to the kernels that draw scenes, whatever they hold: one truth, read by C++ and GLSL alike, as in
+// The arguments of the kernels that render scenes of any representation, declared once for C++ and GLSL as in
 // shaders/compute/arguments.h.
 #ifndef TESSERA_SHADERS_RENDER_ARGUMENTS_VIEW_H
 #define TESSERA_SHADERS_RENDER_ARGUMENTS_VIEW_H
 #include "../compute/arguments.h"
 TESSERA_BEGIN_ARGUMENTS
 
-// A camera in a scene (src/render/tile_frame.h), scene units.
+// The view of a camera in a scene (src/render/tile_frame.h), in scene units, and its output.
 struct ViewArguments {
   float sceneFromCamera[9];  // rotation, row-major
   float origin[3];
   float low[3];  // the scene's box
   float high[3];
   float near;
-  float scale;  // world units of one scene unit
+  float scale;  // world units per scene unit
   float minTransmittance;
   uint width;
   uint height;
   uint numbersOfPixel;
   FloatPointer directions;   // [pixels][3], in camera axes; zero beyond the lens
   FloatPointer opaqueDepth;  // optional, [pixels], world units
-  FloatPointer pixels;       // what has been added up: begin_view.comp
+  FloatPointer pixels;       // [pixels][numbersOfPixel]: sums along the rays; see begin_view.comp
   FloatPointer colour;       // [pixels][3]
   FloatPointer opacity;
   FloatPointer depth;
 };
 TESSERA_SIZE(ViewArguments, 144);
 
-// DenseLayer: biases behind the weights.
+// DenseLayer; the biases follow the weights.
 struct LayerArguments {
   uint inputs;
   uint outputs;

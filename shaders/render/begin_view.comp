@@ -1,5 +1,6 @@
-// One invocation a pixel: nothing has been met. A pixel begins with its transmittance and the depth along its ray; then
-// come its premultiplied colour (of `volume`), or the sums of diffuse colour and features and what each network weighs (of `hash`).
+// Initialises the sums of each pixel; one invocation per pixel. The numbers of a pixel are its transmittance and the
+// depth along its ray, followed by the premultiplied colour (`volume`), or by the sums of diffuse colour and features
+// and the weight of each network (`hash`).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../compute/kernel.glsl"

@@ -1,9 +1,9 @@
-// A network of a content, one invocation a ray.
-// Reads: LayersPointer, FloatPointer; kMostWidth, no less than any layer has inputs or outputs. Defines: runNetwork().
+// Evaluates a network of a content, one invocation per ray.
+// Reads: LayersPointer, FloatPointer; kMaxWidth, no less than any layer has inputs or outputs. Defines: runNetwork().
 
-// outputs = weights · inputs + biases; ReLU after each layer but the last.
-void runNetwork(LayersPointer layers, uint count, FloatPointer weights, inout float values[kMostWidth]) {
-  float next[kMostWidth];
+// Computes outputs = weights · inputs + biases per layer, with ReLU after each layer but the last, in place.
+void runNetwork(LayersPointer layers, uint count, FloatPointer weights, inout float values[kMaxWidth]) {
+  float next[kMaxWidth];
   for (uint l = 0; l < count; ++l) {
     LayerArguments layer = layers.values[l];
     const uint biases = layer.firstWeight + layer.inputs * layer.outputs;

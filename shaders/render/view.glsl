@@ -1,17 +1,17 @@
-// A camera's rays, and what has been added up along them.
-// Reads: ViewArguments. Defines: pixelIndex(), vectorOf(), rayDirection(), farthestOf(), kSceneEnd.
+// The rays of a camera.
+// Reads: ViewArguments. Defines: pixelIndex(), toVec3(), rayDirection(), farthestDistance(), kSceneEnd.
 
-const float kSceneEnd = 1e6;  // scene units: no sample beyond
+const float kSceneEnd = 1e6;  // scene units: there are no samples beyond
 
-// The number of this invocation's pixel; false beside the picture.
+// Sets `pixel` to the index of this invocation's pixel; returns false outside the image.
 bool pixelIndex(ViewArguments view, out uint pixel) {
   pixel = gl_GlobalInvocationID.y * view.width + gl_GlobalInvocationID.x;
   return gl_GlobalInvocationID.x < view.width && gl_GlobalInvocationID.y < view.height;
 }
 
-vec3 vectorOf(float numbers[3]) { return vec3(numbers[0], numbers[1], numbers[2]); }
+vec3 toVec3(float numbers[3]) { return vec3(numbers[0], numbers[1], numbers[2]); }
 
-// In the scene, of length 1; zero beyond the lens.
+// Returns the unit direction in the scene; zero outside the lens.
 vec3 rayDirection(ViewArguments view, uint pixel) {
   const vec3 d = pointAt(view.directions, pixel);
   if (d == vec3(0)) return d;
@@ -23,9 +23,9 @@ vec3 rayDirection(ViewArguments view, uint pixel) {
   return normalize(turned);
 }
 
-// Where what is opaque ends the ray.
-float farthestOf(ViewArguments view, uint pixel) {
+// Returns the distance at which opaque geometry ends the ray.
+float farthestDistance(ViewArguments view, uint pixel) {
   const float cosine = view.directions.values[3 * pixel + 2];
-  if (!WANTED(view.opaqueDepth) || !(cosine > 0)) return kSceneEnd;
+  if (!IS_SET(view.opaqueDepth) || !(cosine > 0)) return kSceneEnd;
   return min(kSceneEnd, view.opaqueDepth.values[pixel] / (cosine * view.scale));
 }

@@ -1,10 +1,11 @@
-// What the host hands to the shaders that draw into windows: one truth, as in shaders/compute/arguments.h.
+// The arguments of the shaders that draw into windows, declared once for C++ and GLSL as in
+// shaders/compute/arguments.h.
 #ifndef TESSERA_SHADERS_WINDOW_ARGUMENTS_WINDOW_H
 #define TESSERA_SHADERS_WINDOW_ARGUMENTS_WINDOW_H
 #include "../compute/arguments.h"
 TESSERA_BEGIN_ARGUMENTS
 
-// A picture (RenderedView) over the whole window.
+// An image (RenderedView) that fills the whole window.
 struct ShowPictureArguments {
   FloatPointer colour;   // [height][width][3], premultiplied
   FloatPointer opacity;  // [height][width]
@@ -17,17 +18,17 @@ struct ShowPictureArguments {
 };
 TESSERA_SIZE(ShowPictureArguments, 48);
 
-// Triangles of Dear ImGui: one draw command.
+// The triangles of one draw command of Dear ImGui.
 struct InterfaceArguments {
-  UintPointer vertices;  // ImDrawVert: position, place in the font's picture, colour; five words each
-  UintPointer indices;   // two in a word
-  UintPointer font;      // opacities, four in a word
+  UintPointer vertices;  // ImDrawVert: position, font texture coordinates, colour; five words each
+  UintPointer indices;   // two per word
+  UintPointer font;      // opacities, four per word
   uint firstIndex;
   uint firstVertex;
   uint fontWidth;  // texels
   uint fontHeight;
-  float low[2];    // of what is shown, ImGui's units
-  float scale[2];  // from those to Vulkan's
+  float low[2];    // upper left corner of the display, ImGui's units
+  float scale[2];  // from ImGui's units to Vulkan's clip space
 };
 TESSERA_SIZE(InterfaceArguments, 56);
 

@@ -1,4 +1,4 @@
-// Text and boxes of Dear ImGui: its font's picture holds both.
+// Text and boxes of Dear ImGui, both textured with its font texture.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../compute/kernel.glsl"

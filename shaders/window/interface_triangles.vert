@@ -1,4 +1,4 @@
-// Vertices of Dear ImGui.
+// The vertices of Dear ImGui.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../compute/kernel.glsl"
@@ -6,7 +6,7 @@
 
 KERNEL_ARGUMENTS(InterfaceArguments)
 
-layout(location = 0) out vec2 place;   // in the font's picture
+layout(location = 0) out vec2 place;   // font texture coordinates
 layout(location = 1) out vec4 colour;  // not premultiplied
 
 void main() {

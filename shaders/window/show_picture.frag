@@ -1,4 +1,4 @@
-// A picture, enlarged to the window's size, over the background.
+// Draws an image, scaled to the window's size, over the background.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../compute/kernel.glsl"

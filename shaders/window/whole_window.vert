@@ -1,4 +1,4 @@
-// One triangle over all of the window.
+// One triangle that covers the whole window.
 #version 460
 
 void main() {

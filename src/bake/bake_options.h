@@ -1,4 +1,4 @@
-// How a model becomes a scene, whatever its representation.
+// Options of baking a model into a scene, for all representations.
 #pragma once
 
 #include <array>
@@ -9,16 +9,17 @@
 namespace tessera {
 
 struct BakeOptions {
-  // What training photos see is kept: samples of their pixels whose weight in the picture and whose opacity over a
-  // renderer's step are both above these (MERF's). Bakers of models that were trained with a last threshold of the
-  // opacity take that one.
+  // Keeps what training photos see: samples of their pixels whose weight in the image and whose opacity over a
+  // renderer's step both exceed these thresholds (MERF). Bakers of models that were trained with a final opacity
+  // threshold use that one.
   double minWeight = 0.005, minAlpha = 0.005;
-  // Of the scene, where no photo looked. Without: what the baker says, as a hazy sky.
+  // The scene's background, where no photo looked. Without it, the baker's default is used, for example a hazy sky.
   std::optional<std::array<float, 3>> background;
-  int stride = 1;  // every so manieth pixel along rows and columns; where levels have models, twice as much each
-  int effort = 4;  // of compression, 0 to 9
-  // `all` counts the photos of all models that look at them. Of a model that holds few blocks at a time, photos are
-  // done in parts.
+  int stride =
+      1;  // use every stride-th pixel along rows and columns; doubled at each coarser level that has a model of its own
+  int effort = 4;  // compression effort, 0 to 9
+  // Reports progress. `all` counts a photo once for each model that looks at it. For a model that holds only few blocks
+  // at a time, photos are processed in parts.
   std::function<void(int64_t done, int64_t all)> onPhoto = [](int64_t, int64_t) {};
 };
 

@@ -1,5 +1,6 @@
-// How an opened model becomes a scene of tiles: a baker says what stands where, one driver writes it down. Whatever the
-// representation, and however its levels of detail are held: one model a level (level_baker.h), or all in one.
+// Turns an opened model into a scene of tiles: a Baker produces the contents, one driver writes them. This is
+// independent of the representation and of how levels of detail are stored: one model for each level (level_baker.h),
+// or all in one.
 #pragma once
 
 #include <array>
@@ -17,65 +18,65 @@
 
 namespace tessera {
 
-// What a content states of itself.
+// What a baker states about a content.
 struct ContentSummary {
-  SceneBox box;               // of all that it owns, scene units
-  bool isBackground = false;  // it stands for what lies outside the scene's box, behind everything else
-  double geometricError = 0;  // scene units: of drawing it instead of what it was baked from
-  uint64_t memoryBytes = 0;   // of the content in memory, without the resources that it shares
-  std::vector<std::pair<std::string, uint64_t>> counts;  // what else there is to say of it: how many of what
+  SceneBox box;               // of everything that the content owns, scene units
+  bool isBackground = false;  // it covers what lies outside the scene's box, behind everything else
+  double geometricError = 0;  // scene units: error of drawing it instead of what it was baked from
+  uint64_t memoryBytes = 0;   // of the decoded content, without shared resources
+  std::vector<std::pair<std::string, uint64_t>> counts;  // further counts to report, by name
 };
 
-// Where contents and what they share go. Files are written at once; all calls throw Error where they cannot be.
+// Receives contents and shared resources. Files are written at once; all calls throw Error if writing fails.
 class ContentSink {
  public:
   virtual ~ContentSink() = default;
 
-  // A file that several contents need, as a network. The same bytes under the same name are one. Returns its number,
-  // for add(). `name`: letters, digits, '_'.
+  // Adds a file that several contents need, such as a network, and returns its index for add(). The same bytes under
+  // the same name are stored once. `name`: letters, digits, '_'.
   virtual uint32_t addResource(const std::string& name, const std::string& mimeType,
                                std::span<const std::byte> bytes) = 0;
-  // A content of a level of detail, 0 being the finest; in any order of levels. `cells`: of the block grid, what it
-  // stands for; nothing for the background, of which a level has one at most. `glb`: its file.
+  // Adds a content of a level of detail, 0 being the finest; levels may come in any order. `cells`: the cells of the
+  // block grid that it covers; nothing for the background, of which a level has at most one. `glb`: its file.
   virtual void add(uint32_t level, const std::optional<CellRange>& cells, std::span<const std::byte> glb,
                    const ContentSummary& content, const std::vector<uint32_t>& resources = {}) = 0;
 };
 
-// Where no photo looked, unless a bake is told otherwise.
+// The default background where no photo looked.
 inline constexpr std::array<float, 3> kHazySky = {0.74f, 0.8f, 0.86f};
 
-// What is said of a scene, besides its tiles.
+// Properties of a scene besides its tiles.
 struct SceneDescription {
-  std::string representation;  // its name
+  std::string representation;  // name of the representation
   BlockGrid grid;
   double near = 0.05;                          // scene units
-  std::array<float, 3> background = kHazySky;  // where no photo looked, unless BakeOptions say otherwise
+  std::array<float, 3> background = kHazySky;  // where no photo looked, unless BakeOptions override it
 };
 
-// An opened model of some method.
+// The baker of an opened model of some method.
 class Baker {
  public:
   virtual ~Baker() = default;
 
-  // Asked before bake().
+  // Must be called before bake().
   virtual SceneDescription description() const = 0;
-  // Once. Adds the contents of all levels: each level's cells nest in those of the next, and hold all of the grid.
-  // A function of the model, the capture and the options. Throws Error when a scene cannot hold the model, or a photo's
-  // mask cannot be read.
+  // Must be called once. Adds the contents of all levels: the cells of each level nest in those of the next coarser one
+  // and cover the whole grid. The result is a function of the model, the capture and the options. Throws Error if a
+  // scene cannot hold the model or a photo's mask cannot be read.
   virtual void bake(const Capture& capture, const BakeOptions& options, ContentSink& sink) = 0;
 };
 
 struct BakedLevel {
   uint64_t bytesOnDisk = 0, bytesInMemory = 0;
-  std::vector<std::pair<std::string, uint64_t>> counts;  // of all its contents together
+  std::vector<std::pair<std::string, uint64_t>> counts;  // summed over all its contents
 };
 
 struct BakedScene {
   Tileset tileset;
-  std::vector<BakedLevel> levels;  // the finest first; the background counts there
+  std::vector<BakedLevel> levels;  // the finest first; includes the backgrounds
 };
 
-// The one driver. Writes the scene folder; tileset.json last.
+// Bakes a model with its baker and writes the scene folder; tileset.json is written last.
 BakedScene bakeScene(Baker& baker, const Capture& capture, const fs::path& scene, const BakeOptions& options);
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// Bakers of methods that train a model of its own for each level of detail.
+// Base class of bakers of methods that train a separate model for each level of detail.
 #pragma once
 
 #include <functional>
@@ -13,10 +13,10 @@ namespace tessera {
 template <class Model>
 class LevelBaker : public Baker {
  public:
-  // Gives the model of a level, the finest (0) first. One is held at a time.
+  // Opens the model of a level, beginning with the finest (0). Only one model is open at a time.
   using Models = std::function<std::unique_ptr<Model>(uint32_t level)>;
 
-  // Opens the finest. `levels`: at least 1.
+  // Opens the finest model. `levels` is at least 1.
   LevelBaker(Models models, uint32_t levels) : models_(std::move(models)), levels_(levels), next_(models_(0)) {}
 
   SceneDescription description() const final {
@@ -30,7 +30,7 @@ class LevelBaker : public Baker {
     for (uint32_t level = 0; level < levels_; ++level) {
       BakeOptions ofLevel = options;
       ofLevel.onPhoto = [&](int64_t done, int64_t) { options.onPhoto(level * photos + done, levels_ * photos); };
-      ofLevel.stride <<= level;  // as many rays through its larger texels
+      ofLevel.stride <<= level;  // texels are twice as large, so half as many rays per axis pass through each
       if (level > 0) next_ = models_(level);
       bakeLevel(*next_, level, capture, ofLevel, sink);
       next_.reset();
@@ -39,14 +39,14 @@ class LevelBaker : public Baker {
 
  protected:
   virtual SceneDescription describe(const Model& finest) const = 0;
-  // Adds the contents of a level, whose model this is.
+  // Adds the contents of one level, from its model.
   virtual void bakeLevel(Model& model, uint32_t level, const Capture& capture, const BakeOptions& options,
                          ContentSink& sink) = 0;
 
  private:
   Models models_;
   uint32_t levels_;
-  std::unique_ptr<Model> next_;  // to be baked
+  std::unique_ptr<Model> next_;  // the model to bake next
 };
 
 }  // namespace tessera

@@ -18,7 +18,7 @@ uint32_t groupsAlong(uint32_t cells, uint32_t step) {
 Steps stepsOfLevel(uint32_t columns, uint32_t rows, uint32_t level) {
   Steps steps;
   for (uint32_t l = 0; l < level; ++l) {
-    if (l > 0 && groupsAlong(columns, steps.x) * groupsAlong(rows, steps.y) <= kMostMerged) return {columns, rows};
+    if (l > 0 && groupsAlong(columns, steps.x) * groupsAlong(rows, steps.y) <= kMaxMerged) return {columns, rows};
     steps = {std::min(2 * steps.x, columns), std::min(2 * steps.y, rows)};
   }
   return steps;
@@ -34,21 +34,21 @@ uint32_t topLevel(uint32_t columns, uint32_t rows) {
   }
 }
 
-LevelGroups groupsOfLevel(uint32_t columns, uint32_t rows, uint32_t level, bool withSurround) {
+LevelGroups groupsOfLevel(uint32_t columns, uint32_t rows, uint32_t level, bool withBackgroundBlock) {
   const Steps steps = stepsOfLevel(columns, rows, level);
   const uint32_t across = groupsAlong(columns, steps.x), along = groupsAlong(rows, steps.y);
-  LevelGroups made;
+  LevelGroups groups;
   for (uint32_t j = 0; j < rows; ++j) {
-    for (uint32_t i = 0; i < columns; ++i) made.groupOfBlock.push_back(i / steps.x + across * (j / steps.y));
+    for (uint32_t i = 0; i < columns; ++i) groups.groupOfBlock.push_back(i / steps.x + across * (j / steps.y));
   }
   for (uint32_t j = 0; j < along; ++j) {
     for (uint32_t i = 0; i < across; ++i) {
-      made.cells.push_back(
+      groups.cells.push_back(
           {{i * steps.x, j * steps.y}, {std::min((i + 1) * steps.x, columns), std::min((j + 1) * steps.y, rows)}});
     }
   }
-  if (withSurround) made.groupOfBlock.push_back(across * along);
-  return made;
+  if (withBackgroundBlock) groups.groupOfBlock.push_back(across * along);
+  return groups;
 }
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// Levels of detail (City-on-Web, section 4.4): which blocks are merged into one model at which level.
+// Levels of detail (City-on-Web, section 4.4): which blocks are merged into one model at each level.
 #pragma once
 
 #include <cstdint>
@@ -8,20 +8,21 @@
 
 namespace tessera {
 
-// Level 0 is the blocks themselves. Each next one merges 2 × 2 groups, and all there are when no more than kMostMerged
-// remain: 24 blocks come to 6 and then to 1, as in the paper.
-inline constexpr uint32_t kMostMerged = 8;
+// Level 0 consists of the blocks themselves. Each coarser level merges 2 × 2 groups, or all groups if no more than
+// kMaxMerged remain: 24 blocks become 6 and then 1, as in the paper.
+inline constexpr uint32_t kMaxMerged = 8;
 
-// The level at which all is one; 0 for a single block. Where one tile cannot hold as many blocks
-// (ContentLimits::parts), the highest level whose tiles can.
+// Returns the level at which all blocks are merged into one; 0 for a single block. If one tile cannot hold that many
+// blocks (ContentLimits::parts), returns the highest level whose tiles can.
 uint32_t topLevel(uint32_t columns, uint32_t rows);
 
 struct LevelGroups {
-  std::vector<uint32_t> groupOfBlock;  // [blocks]; a surround, the last block, is always a group of its own, the last
-  std::vector<CellRange> cells;        // [groups], without the surround's
+  // [blocks]: the background block, which is the last block, always forms the last group on its own.
+  std::vector<uint32_t> groupOfBlock;
+  std::vector<CellRange> cells;  // [groups], without the background block's group
 
   uint32_t groups() const { return groupOfBlock.empty() ? 0 : groupOfBlock.back() + 1; }
 };
-LevelGroups groupsOfLevel(uint32_t columns, uint32_t rows, uint32_t level, bool withSurround);
+LevelGroups groupsOfLevel(uint32_t columns, uint32_t rows, uint32_t level, bool withBackgroundBlock);
 
 }  // namespace tessera

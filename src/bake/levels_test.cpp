@@ -34,7 +34,7 @@ TEST(Levels, HoldEveryBlockOnceInRectanglesThatNest) {
     for (uint32_t level = 0; level <= topLevel(columns, rows); ++level) {
       const LevelGroups groups = groupsOfLevel(columns, rows, level, true);
       ASSERT_EQ(groups.groupOfBlock.size(), columns * rows + 1);
-      EXPECT_EQ(groups.groupOfBlock.back(), groups.cells.size()) << "the surround is a group of its own";
+      EXPECT_EQ(groups.groupOfBlock.back(), groups.cells.size()) << "the background block is a group of its own";
       for (uint32_t block = 0; block < columns * rows; ++block) {
         const CellRange& cells = groups.cells.at(groups.groupOfBlock[block]);
         const uint32_t i = block % columns, j = block / columns;

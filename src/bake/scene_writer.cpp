@@ -10,8 +10,8 @@ namespace tessera {
 
 namespace {
 
-// Of the file of a shared resource.
-std::string extensionOf(const std::string& mimeType) {
+// Returns the file extension of a shared resource.
+std::string mimeTypeExtension(const std::string& mimeType) {
   if (mimeType == "model/gltf-binary") return "glb";
   if (mimeType.starts_with("image/")) return mimeType.substr(std::string_view("image/").size());
   return "bin";
@@ -41,7 +41,7 @@ SceneWriter::SceneWriter(const fs::path& folder, const Capture& capture, const S
 
 uint32_t SceneWriter::addResource(const std::string& name, const std::string& mimeType,
                                   std::span<const std::byte> bytes) {
-  const std::string uri = folder_.addResource(name, extensionOf(mimeType), bytes);
+  const std::string uri = folder_.addResource(name, mimeTypeExtension(mimeType), bytes);
   for (size_t i = 0; i < tileset_.resources.size(); ++i) {
     if (tileset_.resources[i].uri == uri) return static_cast<uint32_t>(i);
   }
@@ -54,7 +54,7 @@ void SceneWriter::add(uint32_t level, const std::optional<CellRange>& cells, std
   CHECK(cells.has_value() != content.isBackground);
   if (level >= levels_.size()) levels_.resize(level + size_t{1});
   Level& at = levels_[level];
-  const std::string name = cells ? fmt::format("block_{}_{}", cells->first[0], cells->first[1]) : "surround";
+  const std::string name = cells ? fmt::format("block_{}_{}", cells->first[0], cells->first[1]) : "background_block";
   TileContent entry;
   entry.uri = folder_.addContent(level, name, glb);
   entry.bytes = glb.size();
@@ -71,14 +71,14 @@ void SceneWriter::add(uint32_t level, const std::optional<CellRange>& cells, std
     return;
   }
   CHECK(!at.background);
-  entry.surround = true;
+  entry.backgroundBlock = true;
   entry.cells = tileset_.allCells();
   entry.level = level;
   entry.geometricError = geometricError;
   at.background = std::move(entry);
 }
 
-// Adds the tile of a group and, below it, those that it merges. Returns its number.
+// Adds the tile of a group and, below it, those of the groups that it merges. Returns its index.
 uint32_t SceneWriter::addTiles(size_t level, size_t group) {
   const uint32_t number = static_cast<uint32_t>(tileset_.tiles.size());
   const TileContent& content = levels_[level].contents[group];
@@ -97,7 +97,7 @@ uint32_t SceneWriter::addTiles(size_t level, size_t group) {
   return number;
 }
 
-// A root without contents of its own, where nothing stands for all.
+// Adds a root without contents of its own, for scenes whose top level has several tiles.
 void SceneWriter::addRoot(const Level& top) {
   Tile root;
   root.level = tileset_.levels++;

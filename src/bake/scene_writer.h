@@ -1,5 +1,5 @@
-// Contents of all levels of detail to a scene on disk: a tree of tiles, and the background of each level. Whatever the
-// representation.
+// Writes contents of all levels of detail to a scene on disk: a tree of tiles, and the background of each level. This
+// is independent of the representation.
 #pragma once
 
 #include <optional>
@@ -18,7 +18,8 @@ class SceneWriter final : public ContentSink {
   void add(uint32_t level, const std::optional<CellRange>& cells, std::span<const std::byte> glb,
            const ContentSummary& content, const std::vector<uint32_t>& resources = {}) override;
 
-  // Writes tileset.json. CHECKs that no level is without contents. Each level's cells nest in those of the next.
+  // Writes tileset.json. CHECKs that every level has contents. The cells of each level must nest in those of the next
+  // coarser one.
   BakedScene commit();
 
  private:

@@ -7,7 +7,7 @@
 namespace tessera {
 namespace {
 
-Bytes bytesOf(const std::string& text) {
+Bytes makeBytes(const std::string& text) {
   const auto raw = std::as_bytes(std::span(text.data(), text.size()));
   return Bytes(raw.begin(), raw.end());
 }
@@ -26,7 +26,7 @@ class SceneWriting : public testing::Test {
     about_.grid.edge = 20;
   }
 
-  // Of cells that are `width` wide around x, baked of a grid of `texels`.
+  // Summarises a content whose cells are `width` wide around x, baked from a grid of `texels`.
   static ContentSummary around(double x, double width, double texels) {
     ContentSummary content;
     content.box = {{x - width / 2, -1, -1}, {x + width / 2, 1, 1}};
@@ -54,12 +54,12 @@ constexpr CellRange kLeft = {{0, 0}, {1, 1}}, kRight = {{1, 0}, {2, 1}}, kBoth =
 
 TEST_F(SceneWriting, MakesATreeOfLevelsAndABackgroundOfEach) {
   SceneWriter writer(folder_ / "scene", capture_, about_);
-  // A model that holds all levels may give those of one block together.
-  writer.add(0, kLeft, bytesOf("left"), around(-1, 2, 64));
-  writer.add(1, kBoth, bytesOf("both, coarser"), around(0, 4, 32));
-  writer.add(1, std::nullopt, bytesOf("all around, coarser"), background(32));
-  writer.add(0, kRight, bytesOf("right"), around(1, 2, 64));
-  writer.add(0, std::nullopt, bytesOf("all around"), background(64));
+  // A model that holds all levels may add those of one block in sequence.
+  writer.add(0, kLeft, makeBytes("left"), around(-1, 2, 64));
+  writer.add(1, kBoth, makeBytes("both, coarser"), around(0, 4, 32));
+  writer.add(1, std::nullopt, makeBytes("all around, coarser"), background(32));
+  writer.add(0, kRight, makeBytes("right"), around(1, 2, 64));
+  writer.add(0, std::nullopt, makeBytes("all around"), background(64));
   const BakedScene baked = writer.commit();
   const Tileset tileset = readTileset(folder_ / "scene");
   EXPECT_EQ(tileset.representation, about_.representation);
@@ -70,7 +70,7 @@ TEST_F(SceneWriting, MakesATreeOfLevelsAndABackgroundOfEach) {
   ASSERT_EQ(tileset.tiles.size(), 3u);
   EXPECT_EQ(tileset.root().children.size(), 2u);
   ASSERT_EQ(tileset.root().contents.size(), 3u);
-  EXPECT_NEAR(tileset.root().geometricError, 2.0 / 32 * 10, 1e-9);  // half an edge is 10
+  EXPECT_NEAR(tileset.root().geometricError, 2.0 / 32 * 10, 1e-9);  // half an edge is 10 metres
   EXPECT_NEAR(tileset.tiles[1].geometricError, 2.0 / 64 * 10, 1e-9);
   EXPECT_NEAR(tileset.root().contents[1].geometricError, 8.0 / 64 * 10, 1e-9);
   EXPECT_EQ(tileset.root().contents[2].level, 1u);
@@ -83,10 +83,10 @@ TEST_F(SceneWriting, MakesATreeOfLevelsAndABackgroundOfEach) {
   EXPECT_EQ(baked.levels[0].bytesOnDisk, std::string("leftrightall around").size());
 }
 
-TEST_F(SceneWriting, MakesARootWhereNothingStandsForAll) {
+TEST_F(SceneWriting, AddsARootWhereNoTileCoversEverything) {
   SceneWriter writer(folder_ / "scene", capture_, about_);
-  writer.add(0, kLeft, bytesOf("left"), around(-1, 2, 64));
-  writer.add(0, kRight, bytesOf("right"), around(1, 2, 64));
+  writer.add(0, kLeft, makeBytes("left"), around(-1, 2, 64));
+  writer.add(0, kRight, makeBytes("right"), around(1, 2, 64));
   const BakedScene baked = writer.commit();
   EXPECT_EQ(baked.levels.size(), 1u);
   const Tileset tileset = readTileset(folder_ / "scene");
@@ -95,14 +95,14 @@ TEST_F(SceneWriting, MakesARootWhereNothingStandsForAll) {
   EXPECT_EQ(tileset.root().children.size(), 2u);
 }
 
-TEST_F(SceneWriting, WritesWhatContentsShareOnceAndSaysWhoNeedsIt) {
+TEST_F(SceneWriting, WritesSharedResourcesOnceAndRecordsTheirUsers) {
   SceneWriter writer(folder_ / "scene", capture_, about_);
-  const uint32_t network = writer.addResource("network", "application/octet-stream", bytesOf("weights"));
-  const uint32_t texture = writer.addResource("texture", "image/webp", bytesOf("texels"));
-  EXPECT_EQ(writer.addResource("network", "application/octet-stream", bytesOf("weights")), network);
+  const uint32_t network = writer.addResource("network", "application/octet-stream", makeBytes("weights"));
+  const uint32_t texture = writer.addResource("texture", "image/webp", makeBytes("texels"));
+  EXPECT_EQ(writer.addResource("network", "application/octet-stream", makeBytes("weights")), network);
   EXPECT_NE(network, texture);
-  writer.add(0, kLeft, bytesOf("left"), around(-1, 2, 64), {network, texture});
-  writer.add(0, kRight, bytesOf("right"), around(1, 2, 64), {network});
+  writer.add(0, kLeft, makeBytes("left"), around(-1, 2, 64), {network, texture});
+  writer.add(0, kRight, makeBytes("right"), around(1, 2, 64), {network});
   writer.commit();
   const Tileset tileset = readTileset(folder_ / "scene");
   ASSERT_EQ(tileset.resources.size(), 2u);
@@ -116,20 +116,20 @@ TEST_F(SceneWriting, WritesWhatContentsShareOnceAndSaysWhoNeedsIt) {
   EXPECT_EQ(tileset.tiles[2].contents.at(0).resources, (std::vector<uint32_t>{network}));
 }
 
-// A baker of any kind.
+// A baker, independent of any representation.
 class OneContent final : public Baker {
  public:
   explicit OneContent(const SceneDescription& about) : about_(about) {}
   SceneDescription description() const override { return about_; }
   void bake(const Capture&, const BakeOptions& options, ContentSink& sink) override {
-    sink.add(0, kBoth, bytesOf("fine" + std::to_string(options.effort)), ContentSummary{.geometricError = 0.1});
+    sink.add(0, kBoth, makeBytes("fine" + std::to_string(options.effort)), ContentSummary{.geometricError = 0.1});
   }
 
  private:
   SceneDescription about_;
 };
 
-TEST_F(SceneWriting, TakesTheBackgroundThatIsAskedForElseTheBakers) {
+TEST_F(SceneWriting, UsesTheRequestedBackgroundOrElseTheBakers) {
   OneContent baker(about_);
   BakeOptions options;
   options.effort = 7;

@@ -1,11 +1,12 @@
-// CHECK(a == b): our own mistakes. Prints both values and aborts, in every build type.
+// CHECK(a == b) guards against programming errors: where the condition is false it prints both values and aborts, in
+// every build type.
 #pragma once
 
 #include <sstream>
 #include <string>
 
 #if defined(__clang__)
-#pragma clang diagnostic ignored "-Woverloaded-shift-op-parentheses"  // how the left value is caught
+#pragma clang diagnostic ignored "-Woverloaded-shift-op-parentheses"  // for Splitter::operator<<
 #endif
 
 namespace tessera::check_internal {

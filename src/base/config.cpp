@@ -11,6 +11,7 @@
 #include <toml++/toml.h>
 
 #include "base/error.h"
+#include "base/former_settings.h"
 
 namespace tessera {
 namespace {
@@ -42,6 +43,13 @@ std::string nearest(const std::vector<ConfigField>& fields, std::string_view nam
     return editDistance(a.name, name) < editDistance(b.name, name);
   });
   return best == fields.end() ? std::string() : std::string(best->name);
+}
+
+// Returns the remedy for an unknown setting `name`: its current name, or the nearest one.
+std::string remedyForUnknown(const std::vector<ConfigField>& fields, std::string_view name) {
+  const std::string_view now = currentSettingName(name);
+  if (find(fields, now) != nullptr) return fmt::format("its name is '{}' now", now);
+  return "did you mean '" + nearest(fields, name) + "'?";
 }
 
 constexpr std::string_view kAuto = "auto";
@@ -100,7 +108,7 @@ void setConfigField(const std::vector<ConfigField>& fields, std::string_view ass
   const ConfigField* field = find(fields, name);
   if (field == nullptr) {
     throw Error("--set " + std::string(assignment), "", "there is no setting '" + name + "'",
-                "did you mean '" + nearest(fields, name) + "'?");
+                remedyForUnknown(fields, name));
   }
   if (equals == std::string_view::npos || !assign(*field, assignment.substr(equals + 1))) {
     throw Error("--set " + std::string(assignment), "", name + " wants " + typeName(*field),
@@ -110,22 +118,22 @@ void setConfigField(const std::vector<ConfigField>& fields, std::string_view ass
 
 namespace {
 
-std::string textOf(bool value) {
+std::string formatValue(bool value) {
   return value ? "true" : "false";
 }
-std::string textOf(double value) {
+std::string formatValue(double value) {
   std::string text = fmt::format("{}", value);
   if (text.find_first_of(".en") == std::string::npos) text += ".0";
   return text;
 }
-std::string textOf(const NumberOrAuto& value) {
-  return value ? textOf(*value) : std::string(kAuto);
+std::string formatValue(const NumberOrAuto& value) {
+  return value ? formatValue(*value) : std::string(kAuto);
 }
-std::string textOf(const std::string& value) {
+std::string formatValue(const std::string& value) {
   return value;
 }
 template <class T>
-std::string textOf(T whole) {
+std::string formatValue(T whole) {
   return fmt::format("{}", whole);
 }
 
@@ -137,7 +145,7 @@ bool ConfigField::isAuto() const {
 }
 
 std::string configValueText(const ConfigField& field) {
-  return std::visit([](const auto* value) { return textOf(*value); }, field.value);
+  return std::visit([](const auto* value) { return formatValue(*value); }, field.value);
 }
 
 std::string configToToml(const std::vector<ConfigField>& fields) {
@@ -168,19 +176,19 @@ void configFromToml(const std::vector<ConfigField>& fields, const fs::path& path
     const ConfigField* field = find(fields, key.str());
     if (field == nullptr) {
       throw Error(path.string(), place, fmt::format("there is no setting '{}'", key.str()),
-                  "did you mean '" + nearest(fields, key.str()) + "'?");
+                  remedyForUnknown(fields, key.str()));
     }
     const bool read = std::visit(
         [&node = node](auto* value) {
           using T = std::remove_pointer_t<decltype(value)>;
-          if (node.is_boolean() != std::is_same_v<T, bool>) return false;  // toml++ would take one for the other
+          if (node.is_boolean() != std::is_same_v<T, bool>) return false;  // toml++ converts between the two
           if constexpr (std::is_same_v<T, NumberOrAuto>) {
             *value = node.template value<double>();
             return value->has_value() || node.template value<std::string>() == kAuto;
           } else {
-            const auto found = node.template value<T>();
-            if (found) *value = *found;
-            return found.has_value();
+            const auto parsed = node.template value<T>();
+            if (parsed) *value = *parsed;
+            return parsed.has_value();
           }
         },
         field->value);
@@ -199,9 +207,9 @@ void requireWithin(std::string_view name, double value, const ConfigBounds& boun
   }
 }
 
-void requireOneOf(std::string_view name, int value, const ConfigBounds& bounds) {
+void requireAllowedValue(std::string_view name, int value, const ConfigBounds& bounds) {
   if (!bounds.sizes.empty() && std::find(bounds.sizes.begin(), bounds.sizes.end(), value) == bounds.sizes.end()) {
-    throw Error(fmt::format("--set {}={}", name, value), "", "is none of the sizes there are",
+    throw Error(fmt::format("--set {}={}", name, value), "", "is not one of the allowed sizes",
                 fmt::format("use one of {}", fmt::join(bounds.sizes, ", ")));
   }
   if (value % bounds.divisor != 0) {
@@ -210,9 +218,10 @@ void requireOneOf(std::string_view name, int value, const ConfigBounds& bounds) 
   }
 }
 
-void requireOneOf(std::string_view name, const std::string& value, const std::vector<std::string_view>& choices) {
+void requireAllowedValue(std::string_view name, const std::string& value,
+                         const std::vector<std::string_view>& choices) {
   if (choices.empty() || std::find(choices.begin(), choices.end(), value) != choices.end()) return;
-  throw Error(fmt::format("--set {}={}", name, value), "", "there is no such thing",
+  throw Error(fmt::format("--set {}={}", name, value), "", "is not one of the allowed values",
               fmt::format("use one of: {}", fmt::join(choices, ", ")));
 }
 
@@ -220,15 +229,15 @@ void requireWithinBounds(const ConfigField& field) {
   const ConfigBounds& bounds = field.bounds;
   if (const auto* number = std::get_if<int*>(&field.value)) {
     requireWithin(field.name, **number, bounds);
-    requireOneOf(field.name, **number, bounds);
+    requireAllowedValue(field.name, **number, bounds);
   } else if (const auto* large = std::get_if<int64_t*>(&field.value)) {
     requireWithin(field.name, static_cast<double>(**large), bounds);
   } else if (const auto* real = std::get_if<double*>(&field.value)) {
     requireWithin(field.name, **real, bounds);
-  } else if (const auto* found = std::get_if<NumberOrAuto*>(&field.value)) {
-    if (**found) requireWithin(field.name, ***found, bounds);
+  } else if (const auto* optional = std::get_if<NumberOrAuto*>(&field.value)) {
+    if (**optional) requireWithin(field.name, ***optional, bounds);
   } else if (const auto* text = std::get_if<std::string*>(&field.value)) {
-    requireOneOf(field.name, **text, bounds.choices);
+    requireAllowedValue(field.name, **text, bounds.choices);
   }
 }
 

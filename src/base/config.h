@@ -1,5 +1,5 @@
-// Settings as plain structs. A struct lists its fields once; that list is the flag, the default, the help text, the
-// `--set` key and the line in config.toml.
+// Settings are plain structs. A struct lists its fields once; from that list come the flag, the default, the help text,
+// the `--set` key and the line in config.toml.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace tessera {
 
-// A number that is found out where none is given: `auto` as text.
+// A number, or nothing where the program chooses the value itself, which is written as `auto`.
 using NumberOrAuto = std::optional<double>;
 
 using ConfigValue = std::variant<bool, int, int64_t, double, NumberOrAuto, std::string>;
@@ -25,7 +25,7 @@ struct ConfigField {
   std::string_view help;
   std::variant<bool*, int*, int64_t*, double*, NumberOrAuto*, std::string*> value;
   ConfigBounds bounds = {};
-  std::optional<ConfigValue> ownDefault = {};  // where it is not that of the struct that declares the setting
+  std::optional<ConfigValue> ownDefault = {};  // set where it differs from the default of the declaring struct
 
   bool isAuto() const;
   bool isSameTypeAs(const ConfigField& other) const { return value.index() == other.value.index(); }
@@ -51,17 +51,19 @@ struct ConfigField {
 // Writes each field's own default into its member.
 void setOwnDefaults(const std::vector<ConfigField>& fields);
 
-// Throws Error naming the first setting that is out of its bounds, of those whose bounds depend on no other setting
-// before those whose do.
+// Throws Error naming the first setting that is out of its bounds. Settings whose bounds depend on other settings are
+// checked after all those whose bounds do not.
 void requireWithinBounds(const std::vector<ConfigField>& fields);
 
-// key=value. Throws Error naming the key (with the nearest known one) or the value that does not parse.
+// Sets one field from the text key=value. Throws Error naming an unknown key, together with the nearest known one, or
+// a value that does not parse.
 void setConfigField(const std::vector<ConfigField>& fields, std::string_view assignment);
 
-// Flat TOML in the order of the fields, each line with its help as a comment.
+// Returns flat TOML with the settings in the order of the fields, each line with its help text as a comment.
 std::string configToToml(const std::vector<ConfigField>& fields);
 
-// Reads keys that are fields; unknown keys and wrong types are Errors naming `path` and the line.
+// Reads the settings of a TOML file into the fields. Throws Error naming `path` and the line for unknown keys and wrong
+// types.
 void configFromToml(const std::vector<ConfigField>& fields, const fs::path& path);
 
 std::string configValueText(const ConfigField& field);

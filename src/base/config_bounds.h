@@ -1,4 +1,4 @@
-// What a setting may be.
+// The values that a setting may have.
 #pragma once
 
 #include <initializer_list>
@@ -9,16 +9,17 @@
 
 namespace tessera {
 
-// They may depend on other settings' values, and hold for the values that these had when the bounds were made.
+// Bounds may be computed from other settings' values; they are valid for the values that those settings had when the
+// bounds were constructed.
 struct ConfigBounds {
   double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
-  bool isBounded = false;                 // by low and high, which are allowed; then no NaN is
-  int divisor = 1, rounding = 0;          // multiples of it alone; `rounding` is added to round down to one to suggest
+  bool isBounded = false;                 // by [low, high], which excludes NaN
+  int divisor = 1, rounding = 0;          // only multiples; an error suggests value + rounding, rounded down to one
   std::vector<int> sizes;                 // if not empty: one of these
   std::vector<std::string_view> choices;  // if not empty: one of these
-  bool isDependent = false;               // on other settings: is checked after those that are not
+  bool isDependent = false;               // depends on other settings: checked after those that do not
 
-  static constexpr double kTiny = 1e-12, kHuge = 1e12;  // for what must be positive, and what must be finite
+  static constexpr double kTiny = 1e-12, kHuge = 1e12;  // limits of values that must be positive or finite
 
   static ConfigBounds anything() { return {}; }
   static ConfigBounds within(double low, double high) {
@@ -31,17 +32,17 @@ struct ConfigBounds {
   static ConfigBounds atLeast(double low) { return within(low, kHuge); }
   static ConfigBounds positive() { return atLeast(kTiny); }
   static ConfigBounds share() { return within(0, 1); }
-  static ConfigBounds oneOf(std::initializer_list<int> sizes) {
+  static ConfigBounds allowedValues(std::initializer_list<int> sizes) {
     ConfigBounds bounds;
     bounds.sizes = sizes;
     return bounds;
   }
-  static ConfigBounds oneOf(std::initializer_list<std::string_view> choices) {
+  static ConfigBounds allowedValues(std::initializer_list<std::string_view> choices) {
     ConfigBounds bounds;
     bounds.choices = choices;
     return bounds;
   }
-  ConfigBounds inMultiplesOf(int number, int suggestedRounding) && {
+  ConfigBounds withDivisor(int number, int suggestedRounding) && {
     divisor = number;
     rounding = suggestedRounding;
     return std::move(*this);

@@ -37,7 +37,7 @@ class ConfigFile : public testing::Test {
     return settings;
   }
   Settings roundTrip(Settings settings) { return read(configToToml(settings.fields())); }
-  std::string errorOf(std::string_view text) {
+  std::string catchErrorMessage(std::string_view text) {
     try {
       read(text);
     } catch (const Error& error) {
@@ -73,10 +73,10 @@ TEST(Config, SetsFieldsOfEveryType) {
   EXPECT_EQ(settings.count, -7);
   EXPECT_EQ(settings.large, 9007199254740993);
   EXPECT_EQ(settings.rate, 1e-3);
-  EXPECT_EQ(settings.name, "a=b c");  // only the first sign of equality divides
+  EXPECT_EQ(settings.name, "a=b c");  // only the first equals sign separates key and value
 }
 
-TEST_F(ConfigFile, TakesANumberOrLeavesItToBeFoundOut) {
+TEST_F(ConfigFile, AcceptsANumberOrAuto) {
   Settings settings;
   const ConfigField weight = settings.fields()[4];
   EXPECT_FALSE(weight.isAuto());
@@ -90,8 +90,8 @@ TEST_F(ConfigFile, TakesANumberOrLeavesItToBeFoundOut) {
   EXPECT_EQ(roundTrip(settings).weight, 2);
   EXPECT_EQ(read("weight = 3").weight, 3) << "a whole number is a number";
   EXPECT_TRUE(contains(errorOfSet("weight=automatic"), "a number or auto"));
-  EXPECT_TRUE(contains(errorOf("weight = \"automatic\""), "a number or auto"));
-  EXPECT_TRUE(contains(errorOf("weight = true"), "a number or auto"));
+  EXPECT_TRUE(contains(catchErrorMessage("weight = \"automatic\""), "a number or auto"));
+  EXPECT_TRUE(contains(catchErrorMessage("weight = true"), "a number or auto"));
 }
 
 TEST(Config, NamesTheNearestFieldWhenItDoesNotKnowOne) {
@@ -99,6 +99,11 @@ TEST(Config, NamesTheNearestFieldWhenItDoesNotKnowOne) {
   EXPECT_TRUE(contains(error, "lerning_rate")) << error;
   EXPECT_TRUE(contains(error, "did you mean 'learning_rate'?")) << error;
   EXPECT_TRUE(contains(errorOfSet("cuont=2"), "did you mean 'count'?"));
+}
+
+TEST(Config, NamesTheCurrentNameOfASettingThatWasRenamed) {
+  EXPECT_TRUE(contains(errorOfSet("rate=2"), "its name is 'learning_rate' now"));
+  EXPECT_TRUE(contains(errorOfSet("padding=0.1"), "did you mean")) << "its current name is not one of these settings";
 }
 
 TEST(Config, RefusesValuesOfAnotherTypeAndLeavesTheFieldAlone) {
@@ -115,7 +120,7 @@ TEST(Config, RefusesValuesOfAnotherTypeAndLeavesTheFieldAlone) {
   EXPECT_TRUE(contains(errorOfSet("flag=1"), "true or false"));
 }
 
-TEST_F(ConfigFile, ComesBackAsItWasWritten) {
+TEST_F(ConfigFile, ReadsBackWhatItWrote) {
   Settings settings;
   settings.flag = true;
   settings.count = std::numeric_limits<int>::min();
@@ -141,7 +146,7 @@ TEST_F(ConfigFile, KeepsEveryBitOfNumbersWhateverTheyLookLike) {
   }
 }
 
-TEST_F(ConfigFile, TextSurvivesWhateverItHolds) {
+TEST_F(ConfigFile, KeepsTextOfAnyContent) {
   for (const char* name : {"", " ", "line\nbreak", "'single'", "\"\"\"", "C:\\path", "größe", "true", "1.5"}) {
     Settings settings;
     settings.name = name;
@@ -149,7 +154,7 @@ TEST_F(ConfigFile, TextSurvivesWhateverItHolds) {
   }
 }
 
-TEST_F(ConfigFile, SaysWhatEachLineIsFor) {
+TEST_F(ConfigFile, WritesTheHelpTextAboveEachLine) {
   Settings settings;
   const std::string text = configToToml(settings.fields());
   EXPECT_EQ(text.substr(0, text.find('\n')), "flag = false  # a switch");
@@ -163,12 +168,12 @@ TEST_F(ConfigFile, LeavesFieldsThatAreNotInTheFileAtTheirDefaults) {
   EXPECT_EQ(settings.name, "first");
 }
 
-TEST_F(ConfigFile, TakesAWholeNumberWhereANumberIsWanted) {
+TEST_F(ConfigFile, AcceptsAWholeNumberForARealSetting) {
   EXPECT_EQ(read("learning_rate = 2\n").rate, 2.0);
 }
 
 TEST_F(ConfigFile, RefusesUnknownKeysWithFileLineAndSuggestion) {
-  const std::string error = errorOf("count = 1\n\nnmae = \"x\"\n");
+  const std::string error = catchErrorMessage("count = 1\n\nnmae = \"x\"\n");
   EXPECT_TRUE(contains(error, path_.string())) << error;
   EXPECT_TRUE(contains(error, "line 3")) << error;
   EXPECT_TRUE(contains(error, "did you mean 'name'?")) << error;
@@ -177,18 +182,18 @@ TEST_F(ConfigFile, RefusesUnknownKeysWithFileLineAndSuggestion) {
 TEST_F(ConfigFile, RefusesWrongTypesWithFileAndLine) {
   for (const char* line : {"count = \"many\"", "count = 2.5", "count = 3000000000", "learning_rate = \"fast\"",
                            "name = 4", "flag = \"true\"", "flag = 2", "count = true", "count = [1]", "[count]\n"}) {
-    const std::string error = errorOf("# first line\n" + std::string(line) + "\n");
+    const std::string error = catchErrorMessage("# first line\n" + std::string(line) + "\n");
     EXPECT_TRUE(contains(error, path_.string())) << line << ": " << error;
     EXPECT_TRUE(contains(error, "line 2")) << line << ": " << error;
     EXPECT_TRUE(contains(error, " wants ")) << line << ": " << error;
   }
 }
 
-TEST_F(ConfigFile, RefusesWhatIsNoToml) {
-  const std::string error = errorOf("count = 1\ncount 2\n");
+TEST_F(ConfigFile, RejectsFilesThatAreNotToml) {
+  const std::string error = catchErrorMessage("count = 1\ncount 2\n");
   EXPECT_TRUE(contains(error, path_.string())) << error;
   EXPECT_TRUE(contains(error, "line 2")) << error;
-  EXPECT_TRUE(contains(errorOf("count = 1\ncount = 2\n"), "line 2"));  // twice is once too often
+  EXPECT_TRUE(contains(catchErrorMessage("count = 1\ncount = 2\n"), "line 2"));  // a repeated key
 }
 
 TEST_F(ConfigFile, NamesAFileThatIsNotThere) {

@@ -7,7 +7,8 @@
 namespace tessera {
 namespace {
 
-// One line that does nothing to a terminal, whatever a file name, a library or what was read put into it. UTF-8.
+// Returns the text, in UTF-8, as one line without control characters that a terminal would interpret. File names,
+// libraries and file contents may have put them there.
 std::string shown(const std::string& text) {
   std::string shown;
   for (size_t i = 0; i < text.size(); ++i) {

@@ -1,4 +1,4 @@
-// Errors of the outside world: files, flags, network. Thrown anywhere, caught once in main.
+// Errors caused by the program's input: files, flags, the network. They are thrown anywhere and caught once, in main.
 #pragma once
 
 #include <stdexcept>
@@ -6,11 +6,12 @@
 
 namespace tessera {
 
-// Printed as `tessera: error: what: where: why; remedy`, in one line, control characters as \x1b.
-//   what    the thing that failed, usually a path
-//   where   the place inside it (line, byte, key); may be empty
+// An error is printed as `tessera: error: what: where: why; remedy`, in one line, with control characters escaped as
+// \x1b.
+//   what    the object that failed, usually a path
+//   where   the location inside it (line, byte, key); may be empty
 //   why     what is wrong there
-//   remedy  what the person can do about it
+//   remedy  what the user can do about it
 class Error : public std::runtime_error {
  public:
   Error(std::string what, std::string where, std::string why, std::string remedy);

@@ -14,7 +14,7 @@
 namespace tessera {
 namespace {
 
-// Nothing is read yet; `size` is that of the file.
+// Opens the file without reading from it, and sets `size` to the size of the file.
 std::ifstream openFile(const fs::path& path, uint64_t& size) {
   std::error_code status;
   if (fs::is_directory(path, status)) throw Error(path.string(), "", "is a folder, not a file", "name the file in it");
@@ -37,12 +37,12 @@ Container readBytes(std::ifstream& in, const fs::path& path, uint64_t bytes) {
 }
 
 template <class Container>
-Container readWhole(const fs::path& path, uint64_t mostBytes) {
+Container readWhole(const fs::path& path, uint64_t maxBytes) {
   uint64_t size = 0;
   std::ifstream in = openFile(path, size);
-  if (size > mostBytes) {
+  if (size > maxBytes) {
     throw Error(path.string(), "",
-                "has " + std::to_string(size) + " bytes, where " + std::to_string(mostBytes) +
+                "has " + std::to_string(size) + " bytes, where " + std::to_string(maxBytes) +
                     " is the most that such a file may have",
                 "check that it is the right file");
   }
@@ -58,11 +58,11 @@ Container readWhole(const fs::path& path, uint64_t mostBytes) {
 
 }  // namespace
 
-Bytes readFile(const fs::path& path, uint64_t mostBytes) {
-  return readWhole<Bytes>(path, mostBytes);
+Bytes readFile(const fs::path& path, uint64_t maxBytes) {
+  return readWhole<Bytes>(path, maxBytes);
 }
-std::string readTextFile(const fs::path& path, uint64_t mostBytes) {
-  return readWhole<std::string>(path, mostBytes);
+std::string readTextFile(const fs::path& path, uint64_t maxBytes) {
+  return readWhole<std::string>(path, maxBytes);
 }
 
 Bytes readFileStart(const fs::path& path, uint64_t bytes) {
@@ -74,7 +74,7 @@ Bytes readFileStart(const fs::path& path, uint64_t bytes) {
 void writeFileAtomically(const fs::path& path, std::span<const std::byte> bytes, bool durable) {
   std::error_code status;
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), status);
-  // A pipe or a device (/dev/stdout) is written to; nothing is put in its place.
+  // A pipe or a device (/dev/stdout) is written to directly, because a rename would replace it.
   const bool isStream =
       fs::exists(path, status) && !fs::is_regular_file(path, status) && !fs::is_directory(path, status);
   fs::path partial = path;
@@ -109,17 +109,17 @@ void writeFileAtomically(const fs::path& path, std::string_view text, bool durab
 
 std::optional<fs::path> resolveInside(const fs::path& root, std::string_view relative) {
   if (relative.empty() || relative.find('\0') != std::string_view::npos) return std::nullopt;
-  const fs::path wanted{std::string(relative)};
-  if (wanted.is_absolute()) return std::nullopt;
+  const fs::path relativePath{std::string(relative)};
+  if (relativePath.is_absolute()) return std::nullopt;
   std::error_code status;
   fs::path realRoot = fs::weakly_canonical(root, status);
   if (status) return std::nullopt;
   if (!realRoot.has_filename()) realRoot = realRoot.parent_path();  // "out/" that does not exist yet
-  const fs::path real = fs::weakly_canonical(realRoot / wanted, status);
+  const fs::path real = fs::weakly_canonical(realRoot / relativePath, status);
   if (status) return std::nullopt;
   const auto [rootEnd, rest] = std::mismatch(realRoot.begin(), realRoot.end(), real.begin(), real.end());
   if (rootEnd != realRoot.end()) return std::nullopt;
-  // A link to something that does not exist yet is left as it stands: writing through it would still lead out.
+  // weakly_canonical does not resolve a link whose target does not exist, but writing through it could leave `root`.
   for (fs::path part = real; part != realRoot && part.has_relative_path(); part = part.parent_path()) {
     if (fs::is_symlink(fs::symlink_status(part, status))) return std::nullopt;
   }

@@ -1,4 +1,5 @@
-// Files as whole byte strings, written beside and renamed, and paths that cannot leave their folder.
+// Reads and writes whole files (writes are atomic: a temporary file is renamed), and resolves paths that must not leave
+// their folder.
 #pragma once
 
 #include <cstddef>
@@ -15,24 +16,26 @@ namespace tessera {
 namespace fs = std::filesystem;
 using Bytes = std::vector<std::byte>;
 
-// The whole file. Throws Error naming the path when it cannot be read, or is larger than `mostBytes`: no memory is
-// taken for it then.
-Bytes readFile(const fs::path& path, uint64_t mostBytes = UINT64_MAX);
-std::string readTextFile(const fs::path& path, uint64_t mostBytes = UINT64_MAX);
-// Its first bytes: all where it has fewer. Throws Error likewise.
+// Returns the whole file. Throws Error naming the path if it cannot be read or is larger than `maxBytes`; in the latter
+// case no memory is allocated for it.
+Bytes readFile(const fs::path& path, uint64_t maxBytes = UINT64_MAX);
+std::string readTextFile(const fs::path& path, uint64_t maxBytes = UINT64_MAX);
+// Returns the first `bytes` bytes of the file, or all of them where it has fewer. Throws Error naming the path if it
+// cannot be read.
 Bytes readFileStart(const fs::path& path, uint64_t bytes);
 
-// Writes `path` + ".partial-<pid>" and renames it over `path`, so that a reader (or a kill) sees the old file or the
-// new one, never a piece. With `durable` the bytes reach the disk before the rename. Parent folders are made. What is
-// there and no file, a pipe or a device, is written to and stays what it is.
+// Writes `path` + ".partial-<pid>" and renames it over `path`, so that a reader sees either the old file or the new
+// one, never a part, even if the process is killed. With `durable` the bytes reach the disk before the rename. Missing
+// parent folders are created. Where `path` is a pipe or a device, the bytes are written to it directly. Throws Error
+// naming the path if it cannot be written.
 void writeFileAtomically(const fs::path& path, std::span<const std::byte> bytes, bool durable = false);
 void writeFileAtomically(const fs::path& path, std::string_view text, bool durable = false);
 
-// `root / relative` when the result stays inside `root` (no absolute paths, no `..` that climbs out, no symbolic link
-// that leads out); otherwise nothing. The file need not exist.
+// Returns `root / relative` if the result stays inside `root` (no absolute path, no `..` or symbolic link that leads
+// out of it); otherwise nothing. The file need not exist.
 std::optional<fs::path> resolveInside(const fs::path& root, std::string_view relative);
 
-// File names in the order people expect: frame_2 before frame_10.
+// Compares file names in natural order: frame_2 comes before frame_10.
 bool naturalLess(std::string_view a, std::string_view b);
 
 }  // namespace tessera

@@ -82,10 +82,10 @@ TEST_F(File, NamesThePathItCannotRead) {
   EXPECT_THROW(readFile(root_), Error);
 }
 
-TEST_F(File, RefusesWhatIsLargerThanAllowedBeforeItIsRead) {
+TEST_F(File, RejectsFilesAboveTheLimitBeforeReading) {
   const fs::path path = root_ / "huge";
   writeFileAtomically(path, std::string_view("text"));
-  fs::resize_file(path, uint64_t{1} << 43);  // a hole: no disk, but no machine's memory would hold it
+  fs::resize_file(path, uint64_t{1} << 43);  // sparse: it uses no disk space, but exceeds any machine's memory
   try {
     readFile(path, 1000);
     FAIL() << "no error";
@@ -100,7 +100,7 @@ TEST_F(File, RefusesWhatIsLargerThanAllowedBeforeItIsRead) {
   EXPECT_THROW(readFile(path, 999), Error);
 }
 
-TEST_F(File, ReadsTheStartOfAFileThatNoMemoryWouldHold) {
+TEST_F(File, ReadsTheStartOfAFileLargerThanMemory) {
   const fs::path path = root_ / "huge";
   writeFileAtomically(path, std::string_view("text"));
   EXPECT_EQ(readFileStart(path, 1000).size(), 4u);
@@ -111,7 +111,7 @@ TEST_F(File, ReadsTheStartOfAFileThatNoMemoryWouldHold) {
   EXPECT_THROW(readFileStart(root_ / "absent", 6), Error);
 }
 
-TEST_F(File, ResolvesWhatStaysInside) {
+TEST_F(File, ResolvesPathsInsideTheFolder) {
   const fs::path real = fs::canonical(root_);
   EXPECT_EQ(resolveInside(root_, "a/b.png"), real / "a/b.png");
   EXPECT_EQ(resolveInside(root_, "./a/../b.png"), real / "b.png");
@@ -126,7 +126,7 @@ TEST_F(File, RefusesPathsThatLeaveTheFolder) {
     EXPECT_EQ(resolveInside(root_, path), std::nullopt) << path;
   }
   EXPECT_EQ(resolveInside(root_, std::string_view("a\0b", 3)), std::nullopt);
-  fs::create_directory(folder_ / "root_beside");  // shares the name's beginning, not the folder
+  fs::create_directory(folder_ / "root_beside");  // its name starts with that of the folder
   EXPECT_EQ(resolveInside(root_, "../root_beside/x"), std::nullopt);
 }
 

@@ -14,7 +14,7 @@ struct Coverage {
   std::vector<float> weights;  // sum to 1
 };
 
-std::vector<Coverage> coverageOf(int source, int target) {
+std::vector<Coverage> computeCoverage(int source, int target) {
   std::vector<Coverage> all(static_cast<size_t>(target));
   for (int64_t i = 0; i < target; ++i) {
     // In units of 1/target source cells everything is an integer, so the weights are exact for any ratio.
@@ -45,7 +45,8 @@ Image<T> downscale(const Image<T>& image, int width, int height) {
   CHECK(width <= image.width);
   CHECK(height <= image.height);
   if (width == image.width && height == image.height) return image;
-  const std::vector<Coverage> columns = coverageOf(image.width, width), rows = coverageOf(image.height, height);
+  const std::vector<Coverage> columns = computeCoverage(image.width, width),
+                              rows = computeCoverage(image.height, height);
   const int channels = image.channels;
   Image<T> result(width, height, channels);
   std::vector<float> line(static_cast<size_t>(image.width) * channels);  // the source rows of one target row, averaged

@@ -1,4 +1,4 @@
-// A picture in memory: rows from the top, pixels interleaved, no padding.
+// An image in memory: rows from top to bottom, interleaved channels, no padding.
 #pragma once
 
 #include <cstddef>
@@ -29,7 +29,7 @@ using ImageF = Image<float>;
 ImageF toFloat(const ImageU8& image);  // value / 255
 ImageU8 toBytes(const ImageF& image);  // clamp to [0,1], round to nearest
 
-// Mean over the source area that each target pixel covers (exact for any ratio); only for reducing.
+// Downscales by averaging the source area that each target pixel covers (exact for any ratio). Only reduces.
 ImageU8 downscaleByArea(const ImageU8& image, int width, int height);
 ImageF downscaleByArea(const ImageF& image, int width, int height);
 

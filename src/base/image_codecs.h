@@ -1,4 +1,5 @@
-// The codecs behind image_io.h, one file per format. Same promises: untrusted bytes, no exceptions.
+// The codecs behind image_io.h, one source file per format. They give the same guarantees: they accept untrusted bytes
+// and throw no exceptions.
 #pragma once
 
 #include "base/image_io.h"
@@ -18,7 +19,8 @@ std::optional<DecodedImage> decodePng(std::span<const std::byte> bytes, const De
 std::optional<ImageF> decodeExrDepth(std::span<const std::byte> bytes, const DecodeLimits& limits);
 std::optional<ImageF> decodePngDepth(std::span<const std::byte> bytes, float unitsPerStep, const DecodeLimits& limits);
 
-// False when the header's claim is above the limit, or could not be filled by so few bytes even as a flat colour.
+// Returns false if the size in the header is above the limit, or if so few bytes cannot encode that many pixels even in
+// a single flat colour.
 bool isPlausible(int64_t width, int64_t height, size_t bytes, const DecodeLimits& limits);
 
 }  // namespace tessera::image_codecs

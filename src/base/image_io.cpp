@@ -26,8 +26,8 @@ using namespace image_codecs;
 
 namespace {
 
-[[noreturn]] void failReading(const fs::path& path, const std::string& wanted) {
-  throw Error(path.string(), "", "cannot be decoded as " + wanted, "check the file, or take it out of the capture");
+[[noreturn]] void failReading(const fs::path& path, const std::string& kind) {
+  throw Error(path.string(), "", "cannot be decoded as " + kind, "check the file, or take it out of the capture");
 }
 
 }  // namespace
@@ -55,12 +55,12 @@ ImageInfo probeImageFile(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) throw Error(path.string(), "", std::strerror(errno), "check the path and its permissions");
   // Nearly always the first piece is enough; colour profiles and previews can push a JPEG's size further back.
-  constexpr size_t kFirst = size_t{64} << 10, kMost = size_t{64} << 20;
+  constexpr size_t kFirst = size_t{64} << 10, kMax = size_t{64} << 20;
   Bytes head;
-  for (size_t wanted = kFirst; wanted <= kMost; wanted *= 8) {
+  for (size_t length = kFirst; length <= kMax; length *= 8) {
     const size_t had = head.size();
-    head.resize(wanted);
-    in.read(reinterpret_cast<char*>(head.data() + had), static_cast<std::streamsize>(wanted - had));
+    head.resize(length);
+    in.read(reinterpret_cast<char*>(head.data() + had), static_cast<std::streamsize>(length - had));
     head.resize(had + static_cast<size_t>(in.gcount()));
     if (const auto info = probeImage(head)) return *info;
     if (!in) break;

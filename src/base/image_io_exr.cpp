@@ -1,4 +1,4 @@
-// Depth as EXR through OpenEXR, from and to memory. Its exceptions end here.
+// Depth maps as EXR through OpenEXR, from and to memory. Exceptions of the library are caught here.
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -18,9 +18,9 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kTiledDeepOrMultipart = 0x200 | 0x800 | 0x1000;  // nobody's depth map, and not decoded
+constexpr uint32_t kTiledDeepOrMultipart = 0x200 | 0x800 | 0x1000;  // unusual for depth maps, not decoded
 constexpr int64_t kMaximumChunk = int64_t{256} << 20;
-constexpr int kLinesPerChunk[] = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};  // by number of the compression
+constexpr int kLinesPerChunk[] = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};  // by compression number
 
 class MemoryInput : public Imf::IStream {
  public:
@@ -69,7 +69,7 @@ uint32_t littleEndian32(std::span<const std::byte> bytes, size_t at) {
   return value;
 }
 
-// A zero-terminated string at `at`, which moves behind it.
+// Returns the zero-terminated string at `at`, and moves `at` past it.
 std::optional<std::string_view> takeString(std::span<const std::byte> bytes, size_t& at) {
   if (at >= bytes.size()) return std::nullopt;
   const auto* start = reinterpret_cast<const char*>(bytes.data()) + at;
@@ -84,7 +84,7 @@ struct Attribute {
   const char* type;
   size_t bytes;  // 0: any
 };
-// What a picture needs to be decoded.
+// The attributes that decoding needs.
 constexpr Attribute kNeeded[] = {{"channels", "chlist", 0},        {"compression", "compression", 1},
                                  {"dataWindow", "box2i", 16},      {"displayWindow", "box2i", 16},
                                  {"lineOrder", "lineOrder", 1},    {"pixelAspectRatio", "float", 4},
@@ -97,7 +97,7 @@ struct Header {
   size_t length = 0;  // where the header ends
 };
 
-// The header is walked here, before the library sees it: the library allocates by what each attribute claims.
+// Parses the header before the library does, because the library allocates whatever size an attribute claims.
 std::optional<Header> walkHeader(std::span<const std::byte> bytes) {
   if (!image_codecs::isExr(bytes) || (littleEndian32(bytes, 4) & kTiledDeepOrMultipart) != 0) return std::nullopt;
   Header header;
@@ -125,7 +125,7 @@ std::optional<Header> walkHeader(std::span<const std::byte> bytes) {
   }
 }
 
-// How many channels the list holds; nothing when it does not end exactly where it should.
+// Returns the number of channels in the list, or nothing if it does not end exactly where it should.
 std::optional<int> channelCount(std::span<const std::byte> list) {
   int count = 0;
   for (size_t at = 0;;) {
@@ -149,8 +149,8 @@ std::optional<ImageInfo> infoFrom(const Header& header) {
   return ImageInfo{static_cast<int>(width), static_cast<int>(height), *channels, ImageInfo::Format::exr};
 }
 
-// The file with only the needed attributes left in its header, and one string in the place of all others, because the
-// offsets behind the header count from the start of the file.
+// Returns the file with only the needed attributes in its header. One string attribute replaces all others and keeps
+// the header's length, because the offsets after the header count from the start of the file.
 std::optional<Bytes> reducedFile(std::span<const std::byte> bytes, const Header& header) {
   static constexpr char kFiller[] = "filler\0string";  // with its final zero
   Bytes file(bytes.begin(), bytes.begin() + 8);

@@ -1,4 +1,4 @@
-// Pictures and depths from arbitrary bytes: no crash, no exception, no allocation beyond the limit.
+// Decodes images and depth maps from arbitrary bytes: no crash, no exception, no allocation beyond the limit.
 #include "base/image_io.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -1,5 +1,5 @@
-// JPEG through libjpeg-turbo. Its errors leave by longjmp, so nothing with a destructor lives in a function that calls
-// setjmp: buffers belong to the callers.
+// JPEG through libjpeg-turbo. The library reports errors by longjmp, so a function that calls setjmp has no local
+// objects with destructors: its callers own the buffers.
 // jpeglib.h needs <cstdio> before it, and jerror.h after it.
 // clang-format off
 #include <csetjmp>
@@ -16,7 +16,7 @@
 namespace tessera {
 namespace {
 
-constexpr int kMaximumScans = 200;  // a progressive file of endless scans costs a pass over the picture for each
+constexpr int kMaximumScans = 200;  // each scan of a progressive file costs a pass over the whole image
 
 struct Failure : jpeg_error_mgr {
   std::jmp_buf target;
@@ -46,7 +46,7 @@ void limitScans(j_common_ptr codec) {
   }
 }
 
-// Adobe writes inked values inverted: 255 is no ink.
+// Adobe stores ink values inverted: 255 is no ink.
 void rgbFromCmyk(const uint8_t* cmyk, uint8_t* rgb, int pixels, bool inverted) {
   for (int i = 0; i < pixels; ++i, cmyk += 4, rgb += 3) {
     const int white = inverted ? cmyk[3] : 255 - cmyk[3];
@@ -101,7 +101,7 @@ void encodeInto(const ImageU8& image, int quality, std::span<const std::byte> ex
   installFailure(&failure);
   codec.err = &failure;
   jpeg_create_compress(&codec);
-  if (setjmp(failure.target) != 0) CHECK(false);  // only a picture that the CHECKs below should have refused
+  if (setjmp(failure.target) != 0) CHECK(false);  // only for an image that the CHECKs should have rejected
   jpeg_mem_dest(&codec, buffer, size);
   codec.image_width = static_cast<JDIMENSION>(image.width);
   codec.image_height = static_cast<JDIMENSION>(image.height);
@@ -144,7 +144,7 @@ std::optional<ImageInfo> probeJpeg(std::span<const std::byte> bytes) {
       ++i;
       continue;
     }
-    if (marker == 0x01 || (marker >= 0xd0 && marker <= 0xd8)) {  // these have no length
+    if (marker == 0x01 || (marker >= 0xd0 && marker <= 0xd8)) {  // markers without a length
       i += 2;
       continue;
     }

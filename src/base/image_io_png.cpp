@@ -10,8 +10,7 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kMaximumMetadataChunk = size_t{64}
-                                         << 20;  // texts and profiles; a picture's own data is not held as a chunk
+constexpr size_t kMaximumMetadataChunk = size_t{64} << 20;  // texts and profiles; image data is not stored as a chunk
 
 using Codec = std::unique_ptr<spng_ctx, decltype(&spng_ctx_free)>;
 
@@ -35,8 +34,8 @@ std::optional<OpenPng> open(std::span<const std::byte> bytes, const DecodeLimits
   return png;
 }
 
-// Rows into `pixels` (rowBytes each, as `format` lays them out). Returns how many steps went well before the end or a
-// fault, and whether that end was the right one.
+// Decodes rows into `pixels` (rowBytes each, in the layout of `format`). Returns how many steps succeeded before the
+// end or an error, and whether it was the regular end.
 struct Rows {
   int decoded = 0;
   bool complete = false;
@@ -62,7 +61,7 @@ uint32_t bigEndian32(std::span<const std::byte> bytes, size_t at) {
   return value;
 }
 
-// One channel as 16-bit numbers, whatever the stored depth; the values are not rescaled.
+// Decodes one channel as 16-bit numbers, whatever the stored bit depth, without rescaling the values.
 std::optional<std::vector<uint16_t>> decodeGrey16(OpenPng& png, bool& truncated) {
   const int width = static_cast<int>(png.header.width), height = static_cast<int>(png.header.height);
   std::vector<uint16_t> wide(static_cast<size_t>(width) * height, png.header.bit_depth == 16 ? 0x8080 : 0x80);
@@ -107,9 +106,9 @@ std::optional<DecodedImage> decodePng(std::span<const std::byte> bytes, const De
     const auto grey = decodeGrey16(*png, result.truncated);
     if (!grey) return std::nullopt;
     result.image = ImageU8(width, height, 1);
-    const uint32_t most = png->header.bit_depth == 16 ? 65535 : 255;
+    const uint32_t maximum = png->header.bit_depth == 16 ? 65535 : 255;
     for (size_t i = 0; i < grey->size(); ++i) {
-      result.image.pixels[i] = static_cast<uint8_t>(((*grey)[i] * 255u + most / 2) / most);
+      result.image.pixels[i] = static_cast<uint8_t>(((*grey)[i] * 255u + maximum / 2) / maximum);
     }
     return result;
   }
@@ -126,11 +125,11 @@ std::optional<DecodedImage> decodePng(std::span<const std::byte> bytes, const De
 
 std::optional<ImageF> decodePngDepth(std::span<const std::byte> bytes, float unitsPerStep, const DecodeLimits& limits) {
   auto png = open(bytes, limits);
-  // Below 8 bits libspng rescales to the full byte, which would change the distances.
+  // Below 8 bits libspng rescales the values to the full byte, which would change the distances.
   if (!png || png->header.color_type != SPNG_COLOR_TYPE_GRAYSCALE || png->header.bit_depth < 8) return std::nullopt;
   bool truncated = false;
   const auto steps = decodeGrey16(*png, truncated);
-  if (!steps || truncated) return std::nullopt;  // a filled-in distance would be a lie
+  if (!steps || truncated) return std::nullopt;  // filled-in distances would be wrong
   ImageF depth(static_cast<int>(png->header.width), static_cast<int>(png->header.height), 1);
   for (size_t i = 0; i < steps->size(); ++i) depth.pixels[i] = static_cast<float>((*steps)[i]) * unitsPerStep;
   return depth;

@@ -53,8 +53,8 @@ double meanDifference(const ImageU8& a, const ImageU8& b) {
   return sum / static_cast<double>(a.pixels.size());
 }
 
-// What the product's own writer never makes: any colour type, depth and interlacing. `data`: rows as PNG stores them
-// (16-bit samples in the machine's order).
+// Encodes a PNG of any colour type, bit depth and interlacing, including those that encodePng never writes. `data`
+// contains the rows as PNG stores them (16-bit samples in the machine's byte order).
 Bytes rawPng(spng_ihdr header, const std::vector<uint8_t>& data, const spng_plte* palette = nullptr,
              const spng_trns* transparency = nullptr) {
   spng_ctx* codec = spng_ctx_new(SPNG_CTX_ENCODER);
@@ -138,7 +138,7 @@ TEST(ImageIo, PngIsLosslessForEveryChannelCount) {
   }
 }
 
-TEST(ImageIo, JpegComesBackNearlyTheSame) {
+TEST(ImageIo, ReadsBackJpegWithASmallError) {
   for (const int channels : {1, 3}) {
     const ImageU8 image = smoothPicture(50, 40, channels);
     const Bytes bytes = encodeJpeg(image, 95);
@@ -165,12 +165,12 @@ TEST(ImageIo, JpegCarriesExifWithOrWithoutItsName) {
   EXPECT_TRUE(decodeImage(plain));
 }
 
-TEST(ImageIo, ProbesAJpegWhoseSizeStandsFarBack) {
+TEST(ImageIo, ProbesAJpegWhoseSizeFollowsLargeSegments) {
   const Bytes bytes = encodeJpeg(smoothPicture(8, 9, 3), 90, Bytes(65000));
   EXPECT_FALSE(probeImage(std::span(bytes).first(60000)));
   EXPECT_EQ(probeImage(bytes)->height, 9);
   const fs::path path = fs::temp_directory_path() / ("tessera_probe_" + std::to_string(::getpid()) + ".jpg");
-  // Twice: the second application segment starts where the first ends.
+  // Two segments: the second application segment starts where the first ends.
   Bytes longer(bytes.begin(), bytes.begin() + 2 + 18);
   const auto segment = std::span(bytes).subspan(20, 65000 + 10);
   for (int i = 0; i < 3; ++i) longer.insert(longer.end(), segment.begin(), segment.end());
@@ -203,8 +203,8 @@ TEST(ImageIo, TruncatedPngIsDecodedAsFarAsItGoesAndFilledWithGrey) {
   EXPECT_EQ(decoded->image.at(127, 127)[1], 128);
 }
 
-TEST(ImageIo, CmykBecomesRgb) {
-  // Adobe's convention: 255 is no ink. Full cyan, no other.
+TEST(ImageIo, ConvertsCmykToRgb) {
+  // In Adobe's convention 255 is no ink. This is full cyan and no other ink.
   const auto cyan = decodeImage(cmykJpeg({0, 255, 255, 255}, 16));
   ASSERT_TRUE(cyan);
   ASSERT_EQ(cyan->image.channels, 3);
@@ -215,7 +215,7 @@ TEST(ImageIo, CmykBecomesRgb) {
   EXPECT_NEAR(halfBlack->image.at(3, 3)[1], 128, 3);
 }
 
-TEST(ImageIo, PalettesBecomeColours) {
+TEST(ImageIo, ConvertsPalettesToColours) {
   spng_plte palette{};
   palette.n_entries = 2;
   palette.entries[0] = {10, 20, 30, 255};
@@ -238,7 +238,7 @@ TEST(ImageIo, PalettesBecomeColours) {
   EXPECT_EQ(withAlpha->image.at(1, 0)[3], 255);
 }
 
-TEST(ImageIo, SixteenBitAndOneBitPicturesBecomeBytes) {
+TEST(ImageIo, ConvertsSixteenBitAndOneBitImagesToBytes) {
   const uint16_t deep[2] = {0xffff, 0x8000};
   std::vector<uint8_t> raw(4);
   std::memcpy(raw.data(), deep, 4);
@@ -259,7 +259,7 @@ TEST(ImageIo, SixteenBitAndOneBitPicturesBecomeBytes) {
   EXPECT_EQ(greyAlpha->image.pixels, (std::vector<uint8_t>{90, 90, 90, 200}));
 }
 
-TEST(ImageIo, InterlacedPicturesAreWovenTogether) {
+TEST(ImageIo, DecodesInterlacedImages) {
   const ImageU8 image = noisePicture(13, 11, 3);
   for (const uint8_t interlace : {0, 1}) {
     const Bytes bytes = rawPng(pngHeader(13, 11, 8, SPNG_COLOR_TYPE_TRUECOLOR, interlace), image.pixels);
@@ -270,9 +270,9 @@ TEST(ImageIo, InterlacedPicturesAreWovenTogether) {
   }
 }
 
-TEST(ImageIo, ClaimsThatFewBytesCannotHoldAreRefusedBeforeAllocating) {
+TEST(ImageIo, RejectsImplausibleSizesBeforeAllocating) {
   Bytes png = encodePng(noisePicture(4, 4, 3));
-  // 60000 × 60000 in the header, with the checksum made right.
+  // The header claims 60000 × 60000 pixels.
   png = rawPng(pngHeader(4, 4, 8, SPNG_COLOR_TYPE_TRUECOLOR), noisePicture(4, 4, 3).pixels);
   const auto patched = [](Bytes bytes, size_t at, std::initializer_list<int> values) {
     for (const int value : values) bytes[at++] = static_cast<std::byte>(value);
@@ -281,9 +281,9 @@ TEST(ImageIo, ClaimsThatFewBytesCannotHoldAreRefusedBeforeAllocating) {
   EXPECT_FALSE(decodeImage(patched(png, 16, {0, 0, 0xea, 0x60, 0, 0, 0xea, 0x60})));
   const Bytes jpeg = encodeJpeg(smoothPicture(8, 8, 3));
   const unsigned char frame[2] = {0xff, 0xc0};
-  const auto found = std::search(jpeg.begin(), jpeg.end(), reinterpret_cast<const std::byte*>(frame),
-                                 reinterpret_cast<const std::byte*>(frame) + 2);
-  const size_t at = static_cast<size_t>(found - jpeg.begin()) + 5;
+  const auto marker = std::search(jpeg.begin(), jpeg.end(), reinterpret_cast<const std::byte*>(frame),
+                                  reinterpret_cast<const std::byte*>(frame) + 2);
+  const size_t at = static_cast<size_t>(marker - jpeg.begin()) + 5;
   const Bytes absurd = patched(jpeg, at, {0xff, 0x00, 0xff, 0x00});
   EXPECT_EQ(probeImage(absurd)->width, 0xff00);
   EXPECT_FALSE(decodeImage(absurd));
@@ -308,7 +308,7 @@ TEST(ImageIo, SurvivesEveryTruncationAndManyFlippedBits) {
       probeImage(cut);
       EXPECT_FALSE(decodeDepth(cut, 1.0f, limits) && length < 40);
       const auto image = decodeImage(cut, limits);
-      // All but the closing marker or chunk may be there; before that a picture that is cut says so.
+      // An image that is cut before its closing marker or chunk is reported as truncated.
       EXPECT_FALSE(image && length + 40 < file.size() && !image->truncated) << length;
     }
     for (uint64_t round = 0; round < 300; ++round) {
@@ -384,11 +384,11 @@ TEST(ImageIo, ExrAttributesWithFalseLengthsAreRefused) {
     std::string record(text);  // up to the first zero
     record += std::string(1, '\0') + (text + record.size() + 1);
     const auto* start = reinterpret_cast<const std::byte*>(record.data());
-    const auto found = std::search(bytes.begin(), bytes.end(), start, start + record.size());
-    ASSERT_NE(found, bytes.end()) << text;
+    const auto match = std::search(bytes.begin(), bytes.end(), start, start + record.size());
+    ASSERT_NE(match, bytes.end()) << text;
     for (const int change : {-1, 1, 2}) {
       Bytes damaged = bytes;
-      std::byte& length = damaged[static_cast<size_t>(found - bytes.begin()) + record.size() + 1];
+      std::byte& length = damaged[static_cast<size_t>(match - bytes.begin()) + record.size() + 1];
       length = static_cast<std::byte>(static_cast<int>(length) + change);
       EXPECT_FALSE(decodeDepth(damaged)) << text << change;
     }
@@ -405,7 +405,7 @@ TEST(ImageIo, DepthPngIsAnIntegerTimesItsUnit) {
   EXPECT_EQ(depth->pixels, (std::vector<float>{0.0f, 0.001f, 65.535f}));
   const Bytes narrow = encodePng(ImageU8(2, 1, 1, 7));
   EXPECT_EQ(decodeDepth(narrow, 2.0f)->pixels[1], 14.0f);
-  EXPECT_FALSE(decodeDepth(encodePng(ImageU8(2, 1, 3, 7)), 1.0f));  // colour is no distance
+  EXPECT_FALSE(decodeDepth(encodePng(ImageU8(2, 1, 3, 7)), 1.0f));  // a colour image is not a depth map
   EXPECT_FALSE(decodeDepth(shortened(bytes, 0.75), 1.0f));
 }
 

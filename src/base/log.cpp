@@ -8,9 +8,9 @@ namespace {
 
 spdlog::logger& logger() {
   static const std::shared_ptr<spdlog::logger> instance = [] {
-    auto made = spdlog::stderr_color_mt("tessera");
-    made->set_pattern("%^%l%$: %v");
-    return made;
+    auto console = spdlog::stderr_color_mt("tessera");
+    console->set_pattern("%^%l%$: %v");
+    return console;
   }();
   return *instance;
 }

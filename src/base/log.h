@@ -1,4 +1,4 @@
-// Warnings and notes for people, on stderr. The library never prints anywhere else.
+// Warnings and informational messages on stderr. The library never prints anywhere else.
 #pragma once
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// What this process holds in memory, from /proc, and what it may.
+// The memory that this process uses, from /proc, and the memory that it may use.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@ namespace tessera {
 int64_t peakResidentBytes();
 int64_t residentBytes();
 
-// The machine's memory, or less where a control group (a container, a service) limits it.
+// Returns the machine's memory in bytes, or the limit of a control group (a container, a service) where that is lower.
 int64_t usableMemoryBytes();
 
 }  // namespace tessera

@@ -47,7 +47,7 @@ Progress::~Progress() {
 
 void Progress::update(int64_t done, const std::string& note) {
   const auto now = steady_clock::now();
-  if (startedAt_ < 0) {  // a resumed run begins in the middle: the rate is of this run
+  if (startedAt_ < 0) {  // a resumed run starts above 0: the rate is that of this run
     startedAt_ = done;
     start_ = now;
   }
@@ -85,7 +85,7 @@ void Progress::print(const std::string& note, bool last) {
     line += fmt::format(", {} left", formatSeconds(static_cast<double>(total_ - done_) / rate));
   }
   if (!note.empty()) line += ", " + note;
-  // One write: lines of other threads cannot fall into it.
+  // Written in a single call, so that lines of other threads cannot interleave with it.
   const std::string text = terminal_ ? "\r" + line + "\x1b[K" + (last ? "\n" : "") : line + "\n";
   std::fwrite(text.data(), 1, text.size(), stderr);
   std::fflush(stderr);

@@ -1,4 +1,5 @@
-// Progress for people: a bar with rate and time left on a terminal, a plain line every few seconds elsewhere.
+// Reports progress on stderr: a bar with the rate and the time left on a terminal, a plain line every few seconds
+// elsewhere.
 #pragma once
 
 #include <chrono>
@@ -8,14 +9,14 @@ namespace tessera {
 
 class Progress {
  public:
-  // `unit` is what is counted ("steps", "photos"); total 0 when it is not known yet.
+  // `unit` names what is counted ("steps", "photos"); `total` is 0 while it is unknown.
   Progress(std::string title, int64_t total, std::string unit);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
   void setTotal(int64_t total) { total_ = total; }
-  // `note` is shown behind the bar ("27.3 dB"). Cheap enough to be called every step.
+  // Shows `note` after the bar ("27.3 dB"). Cheap enough to be called in every step.
   void update(int64_t done, const std::string& note = {});
   void finish(const std::string& note = {});
 

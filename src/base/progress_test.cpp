@@ -20,7 +20,7 @@ TEST(Progress, WritesPlainLinesWhereThereIsNoTerminal) {
     progress.finish("again");
   }
   const std::string text = testing::internal::GetCapturedStderr();
-  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;  // the updates came faster than lines are due
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;  // the updates were more frequent than lines
   EXPECT_EQ(text.find('\r'), std::string::npos);
   EXPECT_EQ(text.find('\x1b'), std::string::npos);
   EXPECT_NE(text.find("train: 100 % (10/10 steps)"), std::string::npos) << text;

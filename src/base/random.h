@@ -1,5 +1,5 @@
 // Counter-based random numbers: a value is a function of (seed, stream, index) alone, so that any part of any step can
-// be repeated, on any number of threads and after any resume. PCG output function over a SplitMix-style mix.
+// be reproduced, on any number of threads and after any resume. PCG output function over a SplitMix-style mix.
 #pragma once
 
 #include <cstdint>
@@ -21,10 +21,10 @@ struct RandomStream {
 
   uint64_t bits(uint64_t index) const { return mix64(key ^ (index * 0x2545f4914f6cdd1dull)); }
   uint32_t bits32(uint64_t index) const { return static_cast<uint32_t>(bits(index) >> 32); }
-  // In [0, 1), 24 bits, exact in float.
+  // Uniform in [0, 1), with 24 bits, exact in float.
   float uniform(uint64_t index) const { return static_cast<float>(bits(index) >> 40) * 0x1p-24f; }
   double uniformDouble(uint64_t index) const { return static_cast<double>(bits(index) >> 11) * 0x1p-53; }
-  // In [0, n), unbiased to 2^-32.
+  // Uniform in [0, n), unbiased to 2^-32.
   uint32_t below(uint64_t index, uint32_t n) const {
     return static_cast<uint32_t>((static_cast<uint64_t>(bits32(index)) * n) >> 32);
   }

@@ -16,7 +16,7 @@ TEST(Random, IsAFunctionOfSeedStreamAndIndexAlone) {
   EXPECT_NE(a.bits(12), otherSeed.bits(12));
 }
 
-TEST(Random, KeepsItsNumbersBetweenVersions) {  // checkpoints and captures made from a seed depend on them
+TEST(Random, KeepsItsNumbersBetweenVersions) {  // checkpoints and generated captures depend on them
   EXPECT_EQ(mix64(0), 0xe220a8397b1dcdafull);   // SplitMix64's first output from state 0
   EXPECT_EQ(mix64(0x9e3779b97f4a7c15ull), 0x6e789e6aa1b965f4ull);
 }

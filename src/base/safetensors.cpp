@@ -23,7 +23,7 @@ constexpr TypeRow kTypes[] = {{TensorType::f64, "F64", 8}, {TensorType::f32, "F3
                               {TensorType::i64, "I64", 8}, {TensorType::i32, "I32", 4}, {TensorType::u32, "U32", 4},
                               {TensorType::u16, "U16", 2}, {TensorType::u8, "U8", 1}};
 
-const TypeRow& rowOf(TensorType type) {
+const TypeRow& typeRow(TensorType type) {
   for (const TypeRow& row : kTypes) {
     if (row.type == type) return row;
   }
@@ -38,8 +38,8 @@ struct Entry {
   size_t begin, end;
 };
 
-// Not get<T>(): nlohmann throws on a wrong kind and wraps a negative number.
-std::optional<uint64_t> unsignedOf(const json& value) {
+// Replaces get<T>(), because nlohmann throws on a wrong type and wraps negative numbers.
+std::optional<uint64_t> toUnsigned(const json& value) {
   if (!value.is_number_unsigned()) return std::nullopt;
   return value.get<uint64_t>();
 }
@@ -53,13 +53,13 @@ std::optional<Entry> entryFrom(const std::string& name, const json& value, size_
   const auto row = std::find_if(std::begin(kTypes), std::end(kTypes),
                                 [&](const TypeRow& one) { return dtype.get_ref<const std::string&>() == one.name; });
   if (row == std::end(kTypes)) return std::nullopt;
-  const auto begin = unsignedOf(offsets[0]), end = unsignedOf(offsets[1]);
+  const auto begin = toUnsigned(offsets[0]), end = toUnsigned(offsets[1]);
   if (!begin || !end || *begin > *end || *end > dataBytes) return std::nullopt;
   Entry entry{name, row->type, {}, *begin, *end};
   uint64_t bytes = row->bytes;
   bool isEmpty = false;
   for (const json& side : shape) {
-    const auto extent = unsignedOf(side);
+    const auto extent = toUnsigned(side);
     if (!extent || *extent > static_cast<uint64_t>(INT64_MAX)) return std::nullopt;
     if (*extent == 0) isEmpty = true;
     if (*extent != 0 && __builtin_mul_overflow(bytes, *extent, &bytes)) return std::nullopt;
@@ -72,7 +72,7 @@ std::optional<Entry> entryFrom(const std::string& name, const json& value, size_
 }  // namespace
 
 size_t bytesPerElement(TensorType type) {
-  return rowOf(type).bytes;
+  return typeRow(type).bytes;
 }
 
 int64_t TensorView::elements() const {
@@ -80,18 +80,18 @@ int64_t TensorView::elements() const {
 }
 
 const TensorView& Safetensors::require(const fs::path& path, const std::string& name, TensorType type) const {
-  const auto found = tensors.find(name);
-  if (found == tensors.end()) {
+  const auto tensor = tensors.find(name);
+  if (tensor == tensors.end()) {
     throw Error(path.string(), name, "there is no such tensor (the file has " + std::to_string(tensors.size()) + ")",
                 "use a file written for this purpose");
   }
-  if (found->second.type != type) {
-    throw Error(
-        path.string(), name,
-        std::string("the tensor holds ") + rowOf(found->second.type).name + " where " + rowOf(type).name + " is needed",
-        "convert the file");
+  if (tensor->second.type != type) {
+    throw Error(path.string(), name,
+                std::string("the tensor holds ") + typeRow(tensor->second.type).name + " where " + typeRow(type).name +
+                    " is needed",
+                "convert the file");
   }
-  return found->second;
+  return tensor->second;
 }
 
 std::optional<Safetensors> decodeSafetensors(Bytes bytes) {
@@ -125,8 +125,8 @@ std::optional<Safetensors> decodeSafetensors(Bytes bytes) {
     if (entries[i].begin < entries[i - 1].end) return std::nullopt;
   }
 
-  // The allocation is aligned for any type, so a tensor is aligned when its offset is. One that is not moves to the
-  // end of the storage, together with all others that are not.
+  // The allocation is aligned for any type, so a tensor is aligned if its offset is. All other tensors are copied to
+  // the end of the storage.
   file.storage = std::move(bytes);
   const auto isAligned = [&](const Entry& entry) {
     return (dataStart + entry.begin) % bytesPerElement(entry.type) == 0;
@@ -161,8 +161,8 @@ Safetensors readSafetensors(const fs::path& path) {
 
 Bytes encodeSafetensors(const std::map<std::string, TensorView>& tensors,
                         const std::map<std::string, std::string>& metadata) {
-  // Types differ in alignment, so every tensor starts on 8 bytes; the gaps would be holes in the format's terms, which
-  // its readers refuse. Wide types first leaves none: each size is a multiple of its own alignment.
+  // Padding tensors to their alignment would leave gaps, which readers of the format reject. Sorted by decreasing
+  // element size they need none: the size of each tensor is a multiple of its own alignment.
   std::vector<std::pair<std::string, const TensorView*>> order;
   for (const auto& [name, tensor] : tensors) order.emplace_back(name, &tensor);
   std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
@@ -176,7 +176,7 @@ Bytes encodeSafetensors(const std::map<std::string, TensorView>& tensors,
     int64_t elements = 1;
     for (const int64_t side : tensor->shape) elements *= side;
     CHECK(static_cast<size_t>(elements) * bytesPerElement(tensor->type) == tensor->bytes.size());
-    header[name] = {{"dtype", rowOf(tensor->type).name},
+    header[name] = {{"dtype", typeRow(tensor->type).name},
                     {"shape", tensor->shape},
                     {"data_offsets", {offset, offset + tensor->bytes.size()}}};
     offset += tensor->bytes.size();

@@ -19,16 +19,16 @@ size_t bytesPerElement(TensorType type);
 struct TensorView {
   TensorType type = TensorType::f32;
   std::vector<int64_t> shape;
-  std::span<const std::byte> bytes;  // borrowed from the file; length = product(shape) × bytesPerElement
+  std::span<const std::byte> bytes;  // not owned (see Safetensors::storage); product(shape) × bytesPerElement
 
   int64_t elements() const;
   template <class T>
-  std::span<const T> as() const {  // the caller has checked `type`
+  std::span<const T> as() const {  // the caller must have checked `type`
     return {reinterpret_cast<const T*>(bytes.data()), bytes.size() / sizeof(T)};
   }
 };
 
-struct Safetensors {  // moves, never copies: the views point into the storage
+struct Safetensors {  // movable but not copyable: the views point into `storage`
   Safetensors() = default;
   Safetensors(Safetensors&&) = default;
   Safetensors& operator=(Safetensors&&) = default;
@@ -37,17 +37,18 @@ struct Safetensors {  // moves, never copies: the views point into the storage
   std::map<std::string, TensorView> tensors;
   std::map<std::string, std::string> metadata;
 
-  // The tensor of that name and type, or Error naming `path` and what is there instead.
+  // Returns the tensor `name`. Throws Error naming `path` if there is none, or if its type is not `type`.
   const TensorView& require(const fs::path& path, const std::string& name, TensorType type) const;
 };
 
-// Nothing when the bytes are not a well-formed file: overlapping or out-of-range offsets, shapes that disagree with
-// lengths, misaligned tensors (copied to an aligned place, not refused), headers above 100 MiB.
+// Returns nothing if the bytes are not a well-formed file: overlapping or out-of-range offsets, shapes that disagree
+// with lengths, headers above 100 MiB. Misaligned tensors are accepted and copied to an aligned address.
 std::optional<Safetensors> decodeSafetensors(Bytes bytes);
+// Decodes a file. Throws Error naming the path if it cannot be read or is not well-formed.
 Safetensors readSafetensors(const fs::path& path);
 
-// Data in order of element size, then name, so that every tensor is aligned without holes (the header pads to 8 bytes):
-// the same content gives the same bytes.
+// Encodes the tensors in order of element size, then name, so that every tensor is aligned without gaps (the header is
+// padded to 8 bytes). The same content always gives the same bytes.
 Bytes encodeSafetensors(const std::map<std::string, TensorView>& tensors,
                         const std::map<std::string, std::string>& metadata = {});
 

@@ -1,4 +1,4 @@
-// Tensors from arbitrary bytes: what is accepted can be read to its last byte, and written and read again.
+// Decodes tensors from arbitrary bytes: an accepted file can be read to its last byte, and written and read again.
 #include <cstdlib>
 
 #include "base/safetensors.h"

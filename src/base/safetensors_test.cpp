@@ -10,7 +10,7 @@
 namespace tessera {
 namespace {
 
-Bytes fileOf(const std::string& header, size_t dataBytes, std::optional<uint64_t> claimed = {}) {
+Bytes encodeFile(const std::string& header, size_t dataBytes, std::optional<uint64_t> claimed = {}) {
   const uint64_t length = claimed.value_or(header.size());
   Bytes bytes(8 + header.size() + dataBytes);
   std::memcpy(bytes.data(), &length, 8);
@@ -20,7 +20,7 @@ Bytes fileOf(const std::string& header, size_t dataBytes, std::optional<uint64_t
 }
 
 template <class T>
-TensorView viewOf(TensorType type, std::vector<int64_t> shape, const std::vector<T>& values) {
+TensorView makeTensorView(TensorType type, std::vector<int64_t> shape, const std::vector<T>& values) {
   return {type, std::move(shape), std::as_bytes(std::span(values))};
 }
 
@@ -28,10 +28,10 @@ TEST(Safetensors, ReadsBackWhatItWrote) {
   const std::vector<float> weights = {1.5f, -2.0f, 3.0f, 0.0f, 1e-30f, 7.0f};
   const std::vector<uint8_t> odd = {1, 2, 3};
   const std::vector<double> wide = {0.1};
-  const Bytes bytes = encodeSafetensors({{"a.odd", viewOf(TensorType::u8, {3}, odd)},
-                                         {"weights", viewOf(TensorType::f32, {2, 3}, weights)},
-                                         {"scalar", viewOf(TensorType::f64, {}, wide)},
-                                         {"none", viewOf(TensorType::i32, {0, 4}, std::vector<int>{})}},
+  const Bytes bytes = encodeSafetensors({{"a.odd", makeTensorView(TensorType::u8, {3}, odd)},
+                                         {"weights", makeTensorView(TensorType::f32, {2, 3}, weights)},
+                                         {"scalar", makeTensorView(TensorType::f64, {}, wide)},
+                                         {"none", makeTensorView(TensorType::i32, {0, 4}, std::vector<int>{})}},
                                         {{"step", "12"}});
   const auto file = decodeSafetensors(bytes);
   ASSERT_TRUE(file);
@@ -49,30 +49,30 @@ TEST(Safetensors, ReadsBackWhatItWrote) {
 TEST(Safetensors, GivesTheSameBytesForTheSameContentWithoutHoles) {
   const std::vector<float> values = {1, 2};
   const std::vector<uint8_t> odd = {9};
-  const std::map<std::string, TensorView> tensors = {{"b", viewOf(TensorType::f32, {2}, values)},
-                                                     {"a", viewOf(TensorType::u8, {1}, odd)}};
+  const std::map<std::string, TensorView> tensors = {{"b", makeTensorView(TensorType::f32, {2}, values)},
+                                                     {"a", makeTensorView(TensorType::u8, {1}, odd)}};
   const Bytes bytes = encodeSafetensors(tensors);
   EXPECT_EQ(bytes, encodeSafetensors(tensors));
   uint64_t header = 0;
   std::memcpy(&header, bytes.data(), 8);
   EXPECT_EQ(header % 8, 0u);
-  EXPECT_EQ(bytes.size(), 8 + header + 9);  // readers of the format refuse holes
+  EXPECT_EQ(bytes.size(), 8 + header + 9);  // readers of the format reject gaps
 }
 
 TEST(Safetensors, SurvivesBeingMoved) {
   const std::vector<float> values = {4, 5};
-  auto file = decodeSafetensors(encodeSafetensors({{"v", viewOf(TensorType::f32, {2}, values)}}));
+  auto file = decodeSafetensors(encodeSafetensors({{"v", makeTensorView(TensorType::f32, {2}, values)}}));
   ASSERT_TRUE(file);
   const Safetensors moved = std::move(*file);
   EXPECT_EQ(moved.tensors.at("v").as<float>()[1], 5.0f);
 }
 
 TEST(Safetensors, CopiesMisalignedTensorsToAnAlignedPlace) {
-  // Data starts at an odd place and "f" lies one byte into it.
+  // The data starts at an odd offset, and "f" lies one byte into it.
   std::string header =
       R"({"u":{"dtype":"U8","shape":[1],"data_offsets":[0,1]},"f":{"dtype":"F32","shape":[2],"data_offsets":[1,9]}})";
   while ((8 + header.size()) % 4 != 0) header += ' ';
-  const auto file = decodeSafetensors(fileOf(header, 9));
+  const auto file = decodeSafetensors(encodeFile(header, 9));
   ASSERT_TRUE(file);
   const TensorView& f = file->tensors.at("f");
   EXPECT_EQ(reinterpret_cast<uintptr_t>(f.bytes.data()) % 4, 0u);
@@ -84,19 +84,19 @@ TEST(Safetensors, RefusesAbsurdHeaderSizes) {
   EXPECT_FALSE(decodeSafetensors({}));
   EXPECT_FALSE(decodeSafetensors(Bytes(7)));
   for (const uint64_t claimed : {uint64_t{3}, uint64_t{1} << 40, UINT64_MAX, UINT64_MAX - 7, uint64_t{101} << 20}) {
-    EXPECT_FALSE(decodeSafetensors(fileOf("{}", 0, claimed))) << claimed;
+    EXPECT_FALSE(decodeSafetensors(encodeFile("{}", 0, claimed))) << claimed;
   }
-  EXPECT_TRUE(decodeSafetensors(fileOf("{}", 0)));
+  EXPECT_TRUE(decodeSafetensors(encodeFile("{}", 0)));
 }
 
 TEST(Safetensors, RefusesOffsetsThatOverlap) {
-  EXPECT_FALSE(decodeSafetensors(fileOf(
+  EXPECT_FALSE(decodeSafetensors(encodeFile(
       R"({"a":{"dtype":"U8","shape":[4],"data_offsets":[0,4]},"b":{"dtype":"U8","shape":[4],"data_offsets":[3,7]}})",
       8)));
-  EXPECT_FALSE(decodeSafetensors(fileOf(
+  EXPECT_FALSE(decodeSafetensors(encodeFile(
       R"({"a":{"dtype":"U8","shape":[8],"data_offsets":[0,8]},"b":{"dtype":"U8","shape":[2],"data_offsets":[3,5]}})",
       8)));
-  EXPECT_TRUE(decodeSafetensors(fileOf(
+  EXPECT_TRUE(decodeSafetensors(encodeFile(
       R"({"a":{"dtype":"U8","shape":[4],"data_offsets":[0,4]},"b":{"dtype":"U8","shape":[4],"data_offsets":[4,8]}})",
       8)));
 }
@@ -112,21 +112,21 @@ TEST(Safetensors, RefusesOffsetsAndShapesThatDisagreeWithTheData) {
         R"({"dtype":"F32","shape":[1.0],"data_offsets":[0,4]})",                   // not an integer
         R"({"dtype":"BF13","shape":[1],"data_offsets":[0,4]})",                    // unknown type
         R"({"dtype":4,"shape":[1],"data_offsets":[0,4]})", R"({"shape":[1]})", R"([])", R"("x")"}) {
-    EXPECT_FALSE(decodeSafetensors(fileOf(std::string(R"({"t":)") + tensor + "}", 8))) << tensor;
+    EXPECT_FALSE(decodeSafetensors(encodeFile(std::string(R"({"t":)") + tensor + "}", 8))) << tensor;
   }
 }
 
 TEST(Safetensors, RefusesHeadersThatAreNotAnObject) {
   for (const char* header :
        {"", "[]", "{", "null", "{\"__metadata__\":3}", "{\"__metadata__\":{\"a\":1}}", "\xff\xfe"}) {
-    EXPECT_FALSE(decodeSafetensors(fileOf(header, 0))) << header;
+    EXPECT_FALSE(decodeSafetensors(encodeFile(header, 0))) << header;
   }
-  EXPECT_FALSE(decodeSafetensors(fileOf(std::string(100000, '['), 0)));
+  EXPECT_FALSE(decodeSafetensors(encodeFile(std::string(100000, '['), 0)));
 }
 
-TEST(Safetensors, SaysWhatIsThereInsteadOfWhatWasWanted) {
+TEST(Safetensors, NamesMissingTensorsAndWrongTypes) {
   const std::vector<float> values = {1};
-  const auto file = decodeSafetensors(encodeSafetensors({{"w", viewOf(TensorType::f32, {1}, values)}}));
+  const auto file = decodeSafetensors(encodeSafetensors({{"w", makeTensorView(TensorType::f32, {1}, values)}}));
   ASSERT_TRUE(file);
   EXPECT_THROW(file->require("m.safetensors", "v", TensorType::f32), Error);
   try {

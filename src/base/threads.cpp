@@ -12,8 +12,8 @@
 namespace tessera {
 namespace {
 
-// Work often comes in pieces of a fraction of a millisecond, and waking a thread takes as long as some of them: who
-// waits looks again for a while before going to sleep.
+// Tasks often take a fraction of a millisecond, and waking a thread takes as long as some of them: a waiting thread
+// spins for this long before it sleeps.
 constexpr std::chrono::microseconds kPatience{50};
 
 template <class Condition>

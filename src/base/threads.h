@@ -10,7 +10,7 @@ namespace tessera {
 
 class ThreadPool {
  public:
-  // 0 threads: as many as the machine has. The calling thread is one of them.
+  // Uses as many threads as the machine has where `threads` is 0. The calling thread is one of them.
   explicit ThreadPool(int threads = 0);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
@@ -18,11 +18,11 @@ class ThreadPool {
 
   int threads() const;
 
-  // Runs body(task, thread) for task in [0, tasks), thread in [0, threads()), and returns when all are done. The first
-  // exception is rethrown here. Not to be called from inside a task.
+  // Runs body(task, thread) for task in [0, tasks), thread in [0, threads()), and returns when all are done. Rethrows
+  // the first exception that a task threw. Must not be called from inside a task.
   void run(size_t tasks, const std::function<void(size_t task, int thread)>& body);
 
-  // body(begin, end) over [0, count) in pieces of `grain`.
+  // Runs body(begin, end) over [0, count) in ranges of `grain` elements.
   void forRanges(size_t count, size_t grain, const std::function<void(size_t begin, size_t end)>& body);
 
  private:

@@ -32,9 +32,9 @@ TEST(ThreadPool, SurvivesManyShortRounds) {
   ThreadPool pool(3);
   std::atomic<size_t> sum{0};
   for (int round = 0; round < 2000; ++round) {
-    // Now and then the workers, or the caller, wait for so long that they go to sleep.
-    const auto nap = [&](bool wanted) {
-      if (wanted) std::this_thread::sleep_for(std::chrono::microseconds(300));
+    // In some rounds the workers or the caller wait long enough to go to sleep.
+    const auto nap = [&](bool isDue) {
+      if (isDue) std::this_thread::sleep_for(std::chrono::microseconds(300));
     };
     nap(round % 20 == 0);
     pool.run(4, [&](size_t task, int) {

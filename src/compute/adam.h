@@ -1,5 +1,5 @@
-// Adam as tiny-cuda-nn does it: epsilon is added to the un-debiased root, every parameter counts its own steps, and a
-// parameter whose gradient is exactly zero may be left wholly alone.
+// Adam in tiny-cuda-nn's form: epsilon is added to the square root without bias correction, every parameter counts its
+// own steps, and a parameter whose gradient is exactly zero can be skipped entirely.
 //
 //   g += l2 · θ;  m = β1 m + (1-β1) g;  v = β2 v + (1-β2) g²;  k += 1
 //   θ -= rate · sqrt(1 - β2^k) / (1 - β1^k) · m / (sqrt(v) + ε)
@@ -15,12 +15,12 @@ struct Adam {
   float beta1 = 0.9f, beta2 = 0.99f;
   float epsilon = 1e-15f;
   float l2 = 0;
-  bool skipZeroGradients = false;  // for hash tables: no moment decay, no count
-  Slice<const uint32_t> rows;      // optional, [2]: where both are the same, no sample came here, and nothing is done
-  // Optional, any number of counters of what a step found: where one is above `room`, there was no room for all of it,
-  // and the step teaches nothing. Gradients become zero, and nothing else changes.
-  Slice<const uint32_t> found;
-  uint32_t room = 0;
+  bool skipZeroGradients = false;  // for hash tables: neither decays the moments nor counts the step
+  Slice<const uint32_t> rows;      // optional, [2]: equal values mean that no sample contributed; nothing is done then
+  // Optional, any number of counters. A counter above `capacity` means that the step overflowed a buffer and its
+  // gradients are incomplete: the gradients are set to zero, and nothing else changes.
+  Slice<const uint32_t> overflowCounters;
+  uint32_t capacity = 0;
   Slice<float> parameters;     // [n]
   Slice<float> gradients;      // [n]; zero afterwards
   Slice<float> firstMoments;   // [n]

@@ -1,4 +1,4 @@
-// Segments of a ray, each composited and shaded, become the colour of the ray (City-on-Web).
+// Blends the segments of a ray, each of them composited and shaded, into the colour of the ray (City-on-Web).
 #pragma once
 
 #include "compute/memory.h"
@@ -8,7 +8,8 @@ namespace tessera {
 
 // Per ray, front to back over its segments k with opacity α^k:
 //   C = Σ_k T^k (C_d^k + g^k Φ^k),  T^k = Π_{j<k} (1 - α^j);  opacity = 1 - Π (1 - α^k),  depth = Σ_k T^k depth^k
-// with g^k = α^k, so that a block that holds nothing adds nothing; `literal` is the printed equation, g^k = 1.
+// with g^k = α^k, so that an empty block contributes nothing. `literal` selects the equation as printed in the paper,
+// g^k = 1.
 struct BlendForward {
   bool literal = false;
   Count rays;
@@ -23,7 +24,7 @@ struct BlendForward {
 };
 TESSERA_OPERATION(BlendForward);
 
-// Overwrites all three gradients of segments (features' with zero).
+// Overwrites all three gradients of the segments. The gradients of the composited features are set to zero.
 struct BlendBackward {
   bool literal = false;
   Count rays;

@@ -4,7 +4,7 @@
 
 namespace tessera {
 
-BlockDomain domainOf(const BlockSpace::Placement& placement) {
+BlockDomain makeBlockDomain(const BlockSpace::Placement& placement) {
   BlockDomain domain;
   for (int a = 0; a < 3; ++a) {
     domain.centre[a] = placement.centre[a];
@@ -20,14 +20,14 @@ struct Ray {
   const Triple<double>&origin, &direction;
 };
 
-// What one block owns between two distances.
+// Adds the pieces of the ray between two distances, between which it stays in one block.
 void addPieces(const BlockSpace& space, const Ray& ray, double near, double far, std::vector<BlockPiece>& pieces) {
   const double middle = 0.5 * (near + far);
   Triple<double> x;
   for (int a = 0; a < 3; ++a) x[a] = ray.origin[a] + middle * ray.direction[a];
   const uint32_t block = space.blockAt(x[0], x[1], x[2]);
-  const BlockDomain domain = domainOf(space.placement(block));
-  if (!domain.contracted) {  // walls bound it along x and y
+  const BlockDomain domain = makeBlockDomain(space.placement(block));
+  if (!domain.contracted) {  // along x and y, walls already bound the piece
     const double o = ray.origin[2] - domain.centre[2], d = ray.direction[2];
     if (std::abs(o + middle * d) > 1 && d == 0) return;
     if (d != 0) {
@@ -48,10 +48,11 @@ void blockPath(const BlockSpace& space, const Triple<double>& origin, const Trip
   near = std::max<double>(near, space.near);
   const BlockSpace::Range box = space.rangeInBox(origin, direction, near);
   const Ray ray{origin, direction};
-  const bool own = space.surround == Surround::own;
+  const bool own = space.backgroundBlock == BackgroundBlock::own;
   if (!box.empty()) near = box.near;
-  double walled = own || space.surround == Surround::none ? box.far : BlockSpace::kFarthest;  // so far, cells own it
-  if (box.empty() && space.surround != Surround::border) walled = near;
+  // The distance up to which cells own the ray.
+  double walled = own || space.backgroundBlock == BackgroundBlock::none ? box.far : BlockSpace::kFarthest;
+  if (box.empty() && space.backgroundBlock != BackgroundBlock::border) walled = near;
   std::vector<double> walls;
   for (int axis : {0, 1}) {
     const int cells = static_cast<int>(axis == 0 ? space.columns : space.rows);

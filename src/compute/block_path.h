@@ -1,4 +1,4 @@
-// A ray through the blocks of a scene: straight pieces of their domains, front to back.
+// The path of a ray through the blocks of a scene: straight line segments in the domains of the blocks, front to back.
 #pragma once
 
 #include <vector>
@@ -13,11 +13,11 @@ struct BlockPiece {
   DomainSegment segment;
 };
 
-BlockDomain domainOf(const BlockSpace::Placement& placement);
+BlockDomain makeBlockDomain(const BlockSpace::Placement& placement);
 
-// The pieces that the blocks own of the ray (BlockSpace), from `near` or the space's own, whichever is farther, to
-// BlockSpace::kFarthest; not before the box is entered, where it is (as EnterScene). `pieces` is overwritten; no ray
-// has any without a direction.
+// Splits a ray into the pieces that lie in each block (BlockSpace), front to back, from the larger of `near` and
+// `space.near` to BlockSpace::kFarthest; a ray that enters the box begins there, as in EnterScene. Overwrites `pieces`,
+// which is empty for a ray with direction zero.
 void blockPath(const BlockSpace& space, const Triple<double>& origin, const Triple<double>& direction, double near,
                std::vector<BlockPiece>& pieces);
 

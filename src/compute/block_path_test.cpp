@@ -13,7 +13,7 @@ Triple<double> along(const Triple<double>& origin, const Triple<double>& directi
   return {origin[0] + t * direction[0], origin[1] + t * direction[1], origin[2] + t * direction[2]};
 }
 
-// A ray from in, above or beside the box.
+// A ray with an origin inside, above or beside the box.
 struct RandomRay {
   Triple<double> origin, direction;
 
@@ -28,22 +28,22 @@ struct RandomRay {
   }
 };
 
-constexpr Surround kSurrounds[] = {Surround::none, Surround::border, Surround::own};
+constexpr BackgroundBlock kBackgroundBlocks[] = {BackgroundBlock::none, BackgroundBlock::border, BackgroundBlock::own};
 
-BlockSpace spaceWith(Surround surround) {
-  return {.columns = 4, .rows = 3, .bottom = -0.4f, .top = 0.7f, .near = 0.1f, .surround = surround};
+BlockSpace spaceWith(BackgroundBlock backgroundBlock) {
+  return {.columns = 4, .rows = 3, .bottom = -0.4f, .top = 0.7f, .near = 0.1f, .backgroundBlock = backgroundBlock};
 }
 
-TEST(BlockPath, PassesThroughTheOwnerOfEachPlaceAtThePlaceInItsDomain) {
+TEST(BlockPath, MapsEachPointToItsBlockAndItsPositionInTheDomain) {
   const RandomStream random(1, 2);
   std::vector<BlockPiece> pieces;
-  for (const Surround surround : kSurrounds) {
-    const BlockSpace space = spaceWith(surround);
+  for (const BackgroundBlock backgroundBlock : kBackgroundBlocks) {
+    const BlockSpace space = spaceWith(backgroundBlock);
     for (uint64_t number = 0; number < 2000; ++number) {
       const RandomRay ray(random, number);
       blockPath(space, ray.origin, ray.direction, 0, pieces);
       for (const BlockPiece& piece : pieces) {
-        const BlockDomain domain = domainOf(space.placement(piece.block));
+        const BlockDomain domain = makeBlockDomain(space.placement(piece.block));
         for (const double share : {0.01, 0.3, 0.5, 0.7, 0.99}) {
           const double tau = share * piece.segment.length, t = piece.segment.distanceAt(tau);
           const Triple<double> x = along(ray.origin, ray.direction, t);
@@ -61,16 +61,16 @@ TEST(BlockPath, PassesThroughTheOwnerOfEachPlaceAtThePlaceInItsDomain) {
   }
 }
 
-TEST(BlockPath, MissesNothingBetweenItsBeginAndTheEndOfTheWorld) {
+TEST(BlockPath, CoversTheWholeRayUpToItsFarthestDistance) {
   const RandomStream random(3, 4);
   std::vector<BlockPiece> pieces;
-  for (const Surround surround : {Surround::none, Surround::own}) {
-    const BlockSpace space = spaceWith(surround);
+  for (const BackgroundBlock backgroundBlock : {BackgroundBlock::none, BackgroundBlock::own}) {
+    const BlockSpace space = spaceWith(backgroundBlock);
     for (uint64_t number = 0; number < 2000; ++number) {
       const RandomRay ray(random, number);
       blockPath(space, ray.origin, ray.direction, 0.5, pieces);
       const BlockSpace::Range box = space.rangeInBox(ray.origin, ray.direction, 0.5);
-      const bool own = surround == Surround::own;
+      const bool own = backgroundBlock == BackgroundBlock::own;
       if (box.empty() && !own) {
         EXPECT_TRUE(pieces.empty());
         continue;
@@ -82,14 +82,14 @@ TEST(BlockPath, MissesNothingBetweenItsBeginAndTheEndOfTheWorld) {
         end = piece.segment.distanceAt(piece.segment.length);
       }
       const double last = own ? BlockSpace::kFarthest : box.far;
-      EXPECT_NEAR(1 / end, 1 / last, 1e-9) << number;  // invariant 11: lengths add up to that of the ray
+      EXPECT_NEAR(1 / end, 1 / last, 1e-9) << number;  // the lengths of the pieces add up to that of the ray
     }
   }
 }
 
-TEST(BlockPath, IsNothingWithoutADirection) {
+TEST(BlockPath, IsEmptyForDirectionZero) {
   std::vector<BlockPiece> pieces(3);
-  blockPath(spaceWith(Surround::own), {0, 0, 0}, {0, 0, 0}, 0, pieces);
+  blockPath(spaceWith(BackgroundBlock::own), {0, 0, 0}, {0, 0, 0}, 0, pieces);
   EXPECT_TRUE(pieces.empty());
 }
 

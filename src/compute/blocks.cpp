@@ -7,7 +7,7 @@
 namespace tessera {
 namespace {
 
-// Of [-count, count] cut into `count` cells.
+// The index of the cell that contains x if [-count, count] is divided into `count` cells, clamped.
 uint32_t clampedCell(double x, uint32_t count) {
   const double cell = (x + count) / 2;
   if (!(cell > 0)) return 0;
@@ -18,19 +18,19 @@ uint32_t clampedCell(double x, uint32_t count) {
 
 BlockSpace::Placement BlockSpace::placement(uint32_t block) const {
   CHECK(block < blocks());
-  Placement made;
+  Placement place;
   if (block == cells()) {
-    made.scale[0] = static_cast<float>(columns);
-    made.scale[1] = static_cast<float>(rows);
-    made.contracted = true;
-    return made;
+    place.scale[0] = static_cast<float>(columns);
+    place.scale[1] = static_cast<float>(rows);
+    place.contracted = true;
+    return place;
   }
   const uint32_t i = block % columns, j = block / columns;
-  made.centre[0] = static_cast<float>(2 * i + 1) - static_cast<float>(columns);
-  made.centre[1] = static_cast<float>(2 * j + 1) - static_cast<float>(rows);
+  place.centre[0] = static_cast<float>(2 * i + 1) - static_cast<float>(columns);
+  place.centre[1] = static_cast<float>(2 * j + 1) - static_cast<float>(rows);
   const bool atBorder = i == 0 || j == 0 || i + 1 == columns || j + 1 == rows;
-  made.contracted = surround == Surround::border && atBorder;
-  return made;
+  place.contracted = backgroundBlock == BackgroundBlock::border && atBorder;
+  return place;
 }
 
 BlockSpace::Box BlockSpace::owned(uint32_t block) const {
@@ -46,8 +46,8 @@ BlockSpace::Box BlockSpace::owned(uint32_t block) const {
     if (j + 1 == rows) box.high[1] = kFar;
     box.low[2] = -kFar;
     box.high[2] = kFar;
-  } else if (surround == Surround::border) {
-    // Rays go on behind the box, and it was trained to the ends of its domain.
+  } else if (backgroundBlock == BackgroundBlock::border) {
+    // Rays continue behind the box, and the block was trained up to the ends of its domain.
     box.low[2] = -1;
     box.high[2] = 1;
   }
@@ -73,19 +73,19 @@ BlockSpace::Range BlockSpace::rangeInBox(const std::array<double, 3>& origin, co
 
 uint32_t BlockSpace::blockAt(double x, double y, double z) const {
   const bool inBox = std::abs(x) <= columns && std::abs(y) <= rows && z >= bottom && z <= top;
-  if (surround == Surround::own && !inBox) return cells();
+  if (backgroundBlock == BackgroundBlock::own && !inBox) return cells();
   return clampedCell(x, columns) + columns * clampedCell(y, rows);
 }
 
 double BlockSpace::distanceAt(double s, double near, double far) const {
-  if (surround == Surround::none) return near + s * (far - near);
+  if (backgroundBlock == BackgroundBlock::none) return near + s * (far - near);
   if (s <= kBoxShare) return near + s / kBoxShare * (far - near);
   const double u = (s - kBoxShare) / (1 - kBoxShare);
   return 1 / ((1 - u) / far + u / kFarthest);
 }
 
 double BlockSpace::shareAt(double t, double near, double far) const {
-  if (surround == Surround::none) return (t - near) / (far - near);
+  if (backgroundBlock == BackgroundBlock::none) return (t - near) / (far - near);
   if (t <= far) return kBoxShare * ((t - near) / (far - near));
   return kBoxShare + (1 - kBoxShare) * ((1 / far - 1 / t) / (1 / far - 1 / kFarthest));
 }

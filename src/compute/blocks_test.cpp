@@ -1,4 +1,4 @@
-// What must hold of samples through blocks on every device, whatever the reference says.
+// Properties of samples through blocks that must hold on every device, independently of the reference.
 #include "compute/blocks.h"
 
 #include <fmt/format.h>
@@ -16,20 +16,20 @@
 namespace tessera::device_test {
 namespace {
 
-BlockSpace spaceOf(uint32_t columns, uint32_t rows, Surround surround) {
-  return {.columns = columns, .rows = rows, .bottom = -0.4f, .top = 0.6f, .surround = surround};
+BlockSpace makeSpace(uint32_t columns, uint32_t rows, BackgroundBlock backgroundBlock) {
+  return {.columns = columns, .rows = rows, .bottom = -0.4f, .top = 0.6f, .backgroundBlock = backgroundBlock};
 }
 
-const BlockSpace kSpaces[] = {spaceOf(1, 1, Surround::none),   spaceOf(3, 2, Surround::none),
-                              spaceOf(4, 3, Surround::border), spaceOf(1, 1, Surround::own),
-                              spaceOf(3, 2, Surround::own),    spaceOf(2, 5, Surround::own)};
+const BlockSpace kSpaces[] = {makeSpace(1, 1, BackgroundBlock::none),   makeSpace(3, 2, BackgroundBlock::none),
+                              makeSpace(4, 3, BackgroundBlock::border), makeSpace(1, 1, BackgroundBlock::own),
+                              makeSpace(3, 2, BackgroundBlock::own),    makeSpace(2, 5, BackgroundBlock::own)};
 
-std::string nameOf(const BlockSpace& space) {
+std::string spaceName(const BlockSpace& space) {
   constexpr const char* kNames[] = {"none", "border", "own"};
-  return fmt::format("{} × {}, {}", space.columns, space.rows, kNames[static_cast<int>(space.surround)]);
+  return fmt::format("{} × {}, {}", space.columns, space.rows, kNames[static_cast<int>(space.backgroundBlock)]);
 }
 
-BlockGrid gridOf(const BlockSpace& space) {
+BlockGrid toBlockGrid(const BlockSpace& space) {
   BlockGrid grid;
   grid.edge = 2;
   grid.columns = static_cast<int>(space.columns);
@@ -44,7 +44,7 @@ bool isInBox(const BlockSpace& space, double x, double y, double z) {
 TEST(BlockSpace, GivesEveryPointToTheOneBlockThatOwnsIt) {
   Random random(1);
   for (const BlockSpace& space : kSpaces) {
-    const BlockGrid grid = gridOf(space);
+    const BlockGrid grid = toBlockGrid(space);
     std::set<uint32_t> met;
     for (int n = 0; n < 2000; ++n) {
       const float reach = n % 2 == 0 ? 1 : 3;
@@ -52,24 +52,24 @@ TEST(BlockSpace, GivesEveryPointToTheOneBlockThatOwnsIt) {
       const uint32_t block = space.blockAt(x, y, z);
       ASSERT_LT(block, space.blocks());
       met.insert(block);
-      if (space.surround == Surround::own && !isInBox(space, x, y, z)) {
+      if (space.backgroundBlock == BackgroundBlock::own && !isInBox(space, x, y, z)) {
         EXPECT_EQ(block, space.cells());
       } else {
-        EXPECT_EQ(static_cast<int>(block), grid.cellAt(Vec2d(x, y))) << nameOf(space) << ": " << x << ' ' << y;
+        EXPECT_EQ(static_cast<int>(block), grid.cellAt(Vec2d(x, y))) << spaceName(space) << ": " << x << ' ' << y;
       }
-      // And its domain holds the point.
+      // The domain of the block contains the point.
       const BlockSpace::Placement place = space.placement(block);
       Triple<double> q = {(x - place.centre[0]) / place.scale[0], (y - place.centre[1]) / place.scale[1], z};
       if (place.contracted) q = contract(q);
       if (!place.contracted && !isInBox(space, x, y, z)) continue;
-      for (double coordinate : q) EXPECT_LE(std::abs(coordinate), place.halfDomain()) << nameOf(space);
+      for (double coordinate : q) EXPECT_LE(std::abs(coordinate), place.halfDomain()) << spaceName(space);
     }
-    EXPECT_EQ(met.size(), space.blocks()) << nameOf(space);
+    EXPECT_EQ(met.size(), space.blocks()) << spaceName(space);
   }
 }
 
-TEST(BlockSpace, ContractsTheBorderOrTheSurroundAlone) {
-  const BlockSpace border = spaceOf(4, 3, Surround::border), own = spaceOf(4, 3, Surround::own);
+TEST(BlockSpace, ContractsTheBorderOrTheBackgroundBlockAlone) {
+  const BlockSpace border = makeSpace(4, 3, BackgroundBlock::border), own = makeSpace(4, 3, BackgroundBlock::own);
   for (uint32_t block = 0; block < 12; ++block) {
     EXPECT_EQ(border.placement(block).contracted, block != 5 && block != 6) << block;
     EXPECT_FALSE(own.placement(block).contracted);
@@ -83,7 +83,7 @@ TEST(BlockSpace, ContractsTheBorderOrTheSurroundAlone) {
 }
 
 TEST(BlockSpace, MeasuresTheBoxEvenlyAndTheRestInReciprocals) {
-  const BlockSpace open = spaceOf(3, 2, Surround::own), closed = spaceOf(3, 2, Surround::none);
+  const BlockSpace open = makeSpace(3, 2, BackgroundBlock::own), closed = makeSpace(3, 2, BackgroundBlock::none);
   EXPECT_EQ(closed.distanceAt(0.5, 2, 6), 4);
   EXPECT_EQ(open.distanceAt(0, 2, 6), 2);
   EXPECT_EQ(open.distanceAt(0.375, 2, 6), 4);
@@ -108,7 +108,7 @@ struct Sampled {
   std::vector<float> positions, distances, steps, middles, widths, runtimeSteps;
   uint32_t segments = 0;
 
-  // Half of the rays begin in or over the box and look down into it.
+  // Half of the rays begin inside or above the box and look down into it.
   Sampled(const std::string& device, const BlockSpace& through, bool cut, bool limited = false, uint64_t seed = 5)
       : space(through), rays(120), intervals(16), split(cut) {
     Stage stage(*deviceNamed(device), seed);
@@ -137,12 +137,12 @@ struct Sampled {
     a.range = enter.range;
     a.fences = enter.fences;
     if (limited) {
-      farOfRay = stage.random.floats(rays, -0.2f, 1.3f);  // of the range, for now
+      farOfRay = stage.random.floats(rays, -0.2f, 1.3f);  // relative to the range, converted to distances below
       const std::vector<float> ends = stage.device.read(enter.range);
       for (uint32_t r = 0; r < rays; ++r) farOfRay[r] = ends[2 * r] + farOfRay[r] * (ends[2 * r + 1] - ends[2 * r]);
       a.farOfRay = stage.input(farOfRay);
     }
-    const uint32_t rows = a.mostSamples(rays), most = a.mostSegments(rays);
+    const uint32_t rows = a.maxSamples(rays), maximum = a.maxSegments(rays);
     a.firstSample = stage.outputWords("firstSample", rays + 1);
     a.rowCount = stage.outputWords("rowCount", 1);
     a.blockOfSample = stage.outputWords("blockOfSample", rows);
@@ -156,9 +156,9 @@ struct Sampled {
     if (split) {
       a.firstSegment = stage.outputWords("firstSegment", rays + 1);
       a.segmentCount = stage.outputWords("segmentCount", 1);
-      a.firstSampleOfSegment = stage.outputWords("firstSampleOfSegment", most + 1);
-      a.groupOfSegment = stage.outputWords("groupOfSegment", most);
-      a.rayOfSegment = stage.outputWords("rayOfSegment", most);
+      a.firstSampleOfSegment = stage.outputWords("firstSampleOfSegment", maximum + 1);
+      a.groupOfSegment = stage.outputWords("groupOfSegment", maximum);
+      a.rayOfSegment = stage.outputWords("rayOfSegment", maximum);
     }
     stage.device.run(a);
     const auto keep = [&](auto& values, const auto& slice, size_t count) {
@@ -168,15 +168,15 @@ struct Sampled {
     keep(range, enter.range, 2 * rays);
     keep(fences, enter.fences, (intervals + 1) * rays);
     keep(firstSample, a.firstSample, rays + 1);
-    const size_t made = firstSample.back();
-    EXPECT_EQ(stage.device.read(a.rowCount)[0], made);
-    keep(block, a.blockOfSample, made);
-    keep(positions, a.positions, 3 * made);
-    keep(distances, a.distances, made);
-    keep(steps, a.steps, made);
-    keep(middles, a.middles, made);
-    keep(widths, a.widths, made);
-    keep(runtimeSteps, a.runtimeSteps, made);
+    const size_t sampleCount = firstSample.back();
+    EXPECT_EQ(stage.device.read(a.rowCount)[0], sampleCount);
+    keep(block, a.blockOfSample, sampleCount);
+    keep(positions, a.positions, 3 * sampleCount);
+    keep(distances, a.distances, sampleCount);
+    keep(steps, a.steps, sampleCount);
+    keep(middles, a.middles, sampleCount);
+    keep(widths, a.widths, sampleCount);
+    keep(runtimeSteps, a.runtimeSteps, sampleCount);
     if (!split) return;
     keep(firstSegment, a.firstSegment, rays + 1);
     segments = stage.device.read(a.segmentCount)[0];
@@ -194,8 +194,8 @@ struct Sampled {
     const Triple<double> x = at(ray, t);
     return space.blockAt(x[0], x[1], x[2]);
   }
-  // Both ends of a sample in t, from its place in s.
-  std::pair<double, double> endsOf(uint32_t ray, uint32_t sample) const {
+  // Both ends of a sample in t, computed from its position in s.
+  std::pair<double, double> sampleEnds(uint32_t ray, uint32_t sample) const {
     const double half = 0.5 * widths[sample], near = range[2 * ray], far = range[2 * ray + 1];
     return {space.distanceAt(middles[sample] - half, near, far), space.distanceAt(middles[sample] + half, near, far)};
   }
@@ -219,14 +219,15 @@ TEST_P(BlockSampling, EntersAndLeavesTheBoxWhereTheRangeEnds) {
         if (inside) {
           EXPECT_TRUE(t > near - 1e-4 && t < far + 1e-4);
         } else if (within && isInside((near + far) / 2)) {
-          ADD_FAILURE() << "outside within the range, at " << t;
+          ADD_FAILURE() << "the ray is outside the box within its range, at " << t;
         }
       }
       through += meets;
       if (meets || isInside((near + far) / 2)) continue;
       const Triple<double> o = s.at(r, 0);
       EXPECT_EQ(s.range[2 * r], space.near);
-      EXPECT_NEAR(far - near, space.surround == Surround::none ? 0 : 1 + std::hypot(o[0], o[1], o[2]), 1e-5);
+      EXPECT_NEAR(far - near, space.backgroundBlock == BackgroundBlock::none ? 0 : 1 + std::hypot(o[0], o[1], o[2]),
+                  1e-5);
     }
     EXPECT_GT(through, 30);
     EXPECT_LT(through, 120);
@@ -240,19 +241,19 @@ TEST_P(BlockSampling, LetsNoSampleStraddleBlocksAndMissesNothingOfTheRange) {
       double sum = 0, shares = 0;
       const double near = s.range[2 * r], far = s.range[2 * r + 1], length = far - near;
       for (uint32_t i = s.firstSample[r]; i < s.firstSample[r + 1]; ++i) {
-        if (space.surround == Surround::none || s.middles[i] < 0.75f) sum += s.steps[i];
+        if (space.backgroundBlock == BackgroundBlock::none || s.middles[i] < 0.75f) sum += s.steps[i];
         shares += s.widths[i];
-        const auto [from, to] = s.endsOf(r, i);
-        if (to - from < 1e-4) continue;  // as good as a point in float
+        const auto [from, to] = s.sampleEnds(r, i);
+        if (to - from < 1e-4) continue;  // too short to be resolved in float
         for (double share : {0.01, 0.2, 0.5, 0.8, 0.99}) {
           EXPECT_EQ(s.blockAt(r, from + share * (to - from)), s.block[i])
-              << nameOf(space) << ", ray " << r << ", sample " << i - s.firstSample[r] << ", " << share;
+              << spaceName(space) << ", ray " << r << ", sample " << i - s.firstSample[r] << ", " << share;
         }
       }
       EXPECT_NEAR(shares, 1, 1e-5);
-      // An interval of the contracted border may reach across the end of the box: only what is cut there adds up.
-      if (space.surround != Surround::border) {
-        EXPECT_NEAR(sum, length, 1e-4) << nameOf(space) << ", ray " << r;
+      // An interval of the contracted border may extend across the end of the box, where it is not cut.
+      if (space.backgroundBlock != BackgroundBlock::border) {
+        EXPECT_NEAR(sum, length, 1e-4) << spaceName(space) << ", ray " << r;
       }
     }
   }
@@ -266,29 +267,29 @@ TEST_P(BlockSampling, CutsOnlyAtWallsAndExactlyThere) {
     size_t cuts = 0;
     for (uint32_t r = 0; r < cut.rays; ++r) {
       const double near = cut.range[2 * r], far = cut.range[2 * r + 1];
-      const auto fencesOf = [&](const float s) {
+      const auto hasFenceAt = [&](const float s) {
         const auto from = cut.fences.begin() + r * (cut.intervals + 1);
         return std::any_of(from, from + cut.intervals + 1, [&](float fence) { return std::abs(fence - s) < 1e-6; });
       };
       for (uint32_t i = cut.firstSample[r]; i + 1 < cut.firstSample[r + 1]; ++i) {
         const double s = cut.middles[i] + 0.5 * cut.widths[i];
-        if (fencesOf(static_cast<float>(s))) continue;
+        if (hasFenceAt(static_cast<float>(s))) continue;
         ++cuts;
         const double t = space.distanceAt(s, near, far);
-        if (s < 0.7499 && cut.steps[i] > 0) {  // farther out floats tell less apart
+        if (s < 0.7499 && cut.steps[i] > 0) {  // farther away, floats are less precise
           const double end = cut.distances[i] + 0.5 * cut.steps[i];
           EXPECT_NEAR(t, end, 1e-4);
         }
-        double apart = space.surround == Surround::own ? std::abs(s - 0.75) : 1;
+        double apart = space.backgroundBlock == BackgroundBlock::own ? std::abs(s - 0.75) : 1;
         for (int axis : {0, 1}) {
           const int cells = static_cast<int>(axis == 0 ? space.columns : space.rows);
           for (int wall = 2 - cells; wall < cells; wall += 2)
             apart = std::min(apart, std::abs(cut.at(r, t)[axis] - wall) / std::max(1.0, t * t));
         }
-        EXPECT_LT(apart, 1e-5) << nameOf(space) << ", ray " << r << ": a cut at " << t << " where no wall is";
+        EXPECT_LT(apart, 1e-5) << spaceName(space) << ", ray " << r << ": a cut at " << t << " where no wall is";
       }
     }
-    EXPECT_EQ(cuts > 0, space.blocks() > 1) << nameOf(space);
+    EXPECT_EQ(cuts > 0, space.blocks() > 1) << spaceName(space);
   }
 }
 
@@ -300,7 +301,7 @@ TEST_P(BlockSampling, MakesSegmentsTheLongestRunsOfOneBlockInFrontToBackOrder) {
     EXPECT_EQ(s.firstOfSegment.back(), s.firstSample.back());
     size_t longest = 0;
     for (uint32_t r = 0; r < s.rays; ++r) {
-      const std::vector<int> order = gridOf(space).frontToBack(Vec2d(s.origins[3 * r], s.origins[3 * r + 1]));
+      const std::vector<int> order = toBlockGrid(space).frontToBack(Vec2d(s.origins[3 * r], s.origins[3 * r + 1]));
       std::vector<size_t> places;
       ASSERT_EQ(s.firstOfSegment[s.firstSegment[r]], s.firstSample[r]);
       for (uint32_t segment = s.firstSegment[r]; segment < s.firstSegment[r + 1]; ++segment) {
@@ -309,13 +310,15 @@ TEST_P(BlockSampling, MakesSegmentsTheLongestRunsOfOneBlockInFrontToBackOrder) {
         for (uint32_t i = s.firstOfSegment[segment]; i < s.firstOfSegment[segment + 1]; ++i)
           EXPECT_EQ(s.block[i], s.groupOfSegment[segment]);
         const int block = static_cast<int>(s.groupOfSegment[segment]);
-        places.push_back(std::find(order.begin(), order.end(), block) - order.begin());  // the surround: after all
+        places.push_back(std::find(order.begin(), order.end(), block) -
+                         order.begin());  // the background block comes last
       }
       for (size_t i = 1; i < places.size(); ++i)
-        EXPECT_LT(places[i - 1], places[i]) << nameOf(space) << ", ray " << r << ": not front to back, or a run in two";
+        EXPECT_LT(places[i - 1], places[i])
+            << spaceName(space) << ", ray " << r << ": not front to back, or a run in two";
       longest = std::max(longest, places.size());
     }
-    EXPECT_GE(longest, std::min<size_t>(3, space.blocks())) << nameOf(space);
+    EXPECT_GE(longest, std::min<size_t>(3, space.blocks())) << spaceName(space);
   }
 }
 
@@ -347,15 +350,15 @@ TEST_P(BlockSampling, PutsPositionsIntoTheDomainOfTheBlockOfTheMiddle) {
         } else if (s.widths[i] > 1e-5f) {
           EXPECT_GT(s.steps[i], 0);
         }
-        if (s.distances[i] < 10) {  // one texel of the domain
+        if (s.distances[i] < 10) {  // the step is one texel of the domain
           const double texel = s.runtimeSteps[i] * std::hypot(dy[0], dy[1], dy[2]);
           EXPECT_NEAR(texel, 2 * place.halfDomain() / 128, 1e-4 * texel);
         }
       }
-    if (space.surround == Surround::own) {
+    if (space.backgroundBlock == BackgroundBlock::own) {
       EXPECT_EQ(outside, 0);
     }
-    if (space.surround == Surround::border) {
+    if (space.backgroundBlock == BackgroundBlock::border) {
       EXPECT_GT(outside, 0) << "no ray over an inner cell";
     }
   }
@@ -371,9 +374,9 @@ TEST_P(BlockSampling, CutsStepsOffAtTheEndOfARayAndLeavesMiddles) {
     for (uint32_t r = 0; r < whole.rays; ++r)
       for (uint32_t i = whole.firstSample[r]; i < whole.firstSample[r + 1]; ++i) {
         const double from = whole.distances[i] - 0.5 * whole.steps[i], to = from + whole.steps[i];
-        const double far = limited.farOfRay[r], kept = std::max(0.0, std::min(to, far) - std::min(from, far));
-        EXPECT_NEAR(limited.steps[i], kept, 1e-6 * std::max(10.0, to));
-        shortened += kept > 0 && kept < whole.steps[i];
+        const double far = limited.farOfRay[r], remaining = std::max(0.0, std::min(to, far) - std::min(from, far));
+        EXPECT_NEAR(limited.steps[i], remaining, 1e-6 * std::max(10.0, to));
+        shortened += remaining > 0 && remaining < whole.steps[i];
       }
     EXPECT_GT(shortened, 10);
   }
@@ -421,7 +424,7 @@ TEST_P(BlockSampling, SpreadsPointsEvenlyOverTheDomainsOfTheBlocksChosen) {
 TEST_P(BlockSampling, GroupsRowsByBlockAndScattersThemBack) {
   Stage stage(*deviceNamed(GetParam()), 7);
   const uint32_t rows = 9001, blocks = 7;
-  const std::vector<uint32_t> block = stage.random.wordsBelow(rows, blocks - 1);  // none in the last
+  const std::vector<uint32_t> block = stage.random.wordsBelow(rows, blocks - 1);  // the last block has no rows
   const std::vector<float> values = stage.random.floats(rows, 0, 1);
   GroupByBlock group;
   group.samples = {rows};

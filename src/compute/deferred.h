@@ -1,5 +1,6 @@
-// What City-on-Web does with a ray's blocks: each has composited its own samples to a diffuse colour, features and an
-// opacity; each block's deferred network adds what depends on the direction; blocks are blended in order (eq. 3 and 4).
+// Deferred shading per block (City-on-Web, eq. 3 and 4): each block composites its own samples along a ray to a diffuse
+// colour, features and an opacity, and the deferred network of the block adds the view-dependent (specular) colour. The
+// blocks are then blended in order (compute/blend.h).
 #pragma once
 
 #include "compute/memory.h"
@@ -7,13 +8,13 @@
 
 namespace tessera {
 
-// 3 diffuse + 4 features + 27 of the direction (FrequencyForward, 4 frequencies) → hidden → hidden → 3: ReLU, biases, a
-// sigmoid at the end. One network's parameters: for each layer the weights [outputs][inputs], then the biases
-// [outputs].
+// A network of three layers with biases: 3 diffuse + 4 features + 27 of the encoded direction (FrequencyForward,
+// 4 frequencies) → hidden → hidden → 3. ReLU follows the hidden layers and a sigmoid follows the last. The parameters
+// of one network are, for each layer, the weights [outputs][inputs] followed by the biases [outputs].
 struct DeferredNetwork {
   static constexpr uint32_t kComposited = 7, kDirection = 27, kInputs = kComposited + kDirection, kHidden = 16;
   static constexpr uint32_t kWeights[] = {0, kInputs* kHidden + kHidden,
-                                          kInputs* kHidden + kHidden + kHidden* kHidden + kHidden};  // of each layer
+                                          kInputs* kHidden + kHidden + kHidden* kHidden + kHidden};  // layer offsets
   static constexpr uint32_t kParameters = kWeights[2] + kHidden * 3 + 3;
 };
 

@@ -1,5 +1,5 @@
-// What compositing by blocks must be on every device: the picture that one global volume would give (City-on-Web,
-// eq. 8 to 11), and losses that pull where they should.
+// Properties of compositing by blocks that must hold on every device: it gives the same image as one global volume
+// (City-on-Web, eq. 8 to 11), and the losses pull in the intended direction.
 #include "compute/deferred.h"
 
 #include <gtest/gtest.h>
@@ -18,23 +18,23 @@ namespace {
 class Blocks : public testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
-    useSimdTargetOf(GetParam());
+    selectSimdTarget(GetParam());
     device = deviceNamed(GetParam());
     if (device == nullptr) GTEST_SKIP() << "this machine has no device \"" << GetParam() << "\"";
   }
-  void TearDown() override { useSimdTargetOf({}); }
+  void TearDown() override { selectSimdTarget({}); }
 
-  // Differences of floats that were rounded once, and of sums taken in another order.
+  // Allows for rounding to float, and for sums that are added in a different order.
   double tolerance() const { return GetParam() == "reference" ? 1e-6 : 1e-5; }
-  void expectNear(const std::vector<float>& got, const std::vector<float>& want) const {
-    ASSERT_EQ(got.size(), want.size());
-    for (size_t i = 0; i < want.size(); ++i) EXPECT_NEAR(got[i], want[i], tolerance()) << i;
+  void expectNear(const std::vector<float>& actual, const std::vector<float>& expected) const {
+    ASSERT_EQ(actual.size(), expected.size());
+    for (size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(actual[i], expected[i], tolerance()) << i;
   }
 
   Device* device = nullptr;
 };
 
-// Samples of opacity and 7 columns, in rays; rays cut into segments at random places.
+// Rays of samples with an opacity and 7 columns, cut into segments at random places.
 struct Volume {
   std::vector<uint32_t> firstSample, firstSegment, firstSampleOfSegment;
   std::vector<float> alpha, distances, columns;
@@ -53,7 +53,7 @@ Volume randomVolume(Random& random) {
   for (uint32_t ray = 0; ray < volume.rays(); ++ray) {
     const uint32_t last = volume.firstSample[ray + 1];
     volume.firstSampleOfSegment.push_back(volume.firstSample[ray]);
-    while (random.below(3) > 0) {  // segments may hold nothing
+    while (random.below(3) > 0) {  // segments may be empty
       const uint32_t from = volume.firstSampleOfSegment.back();
       volume.firstSampleOfSegment.push_back(from + random.below(last - from + 1));
     }
@@ -63,7 +63,7 @@ Volume randomVolume(Random& random) {
   return volume;
 }
 
-// α and c of city-on-web.md's example, in blocks of two, two and one sample.
+// A worked example with given α and c, in blocks of two, two and one samples.
 Volume exampleVolume() {
   Volume volume;
   volume.firstSample = {0, 5};
@@ -79,7 +79,7 @@ struct Composited {
   Slice<float> colour, opacity, depth, weights;
 };
 
-// One volume a ray, or with the segments' first samples one a segment.
+// Composites each ray as one volume, or each segment if `firstSample` is that of the segments.
 Composited composite(Stage& stage, const Volume& volume, const std::vector<uint32_t>& firstSample) {
   const uint32_t rays = static_cast<uint32_t>(firstSample.size()) - 1;
   CompositeForward a;
@@ -87,9 +87,9 @@ Composited composite(Stage& stage, const Volume& volume, const std::vector<uint3
   a.minTransmittance = 0;
   a.rays.capacity = rays;
   a.firstSample = stage.input(firstSample);
-  a.x = stage.matrixOf(volume.alpha, 1, Layout::plain);
+  a.x = stage.makeMatrix(volume.alpha, 1, Layout::plain);
   a.distances = stage.input(volume.distances);
-  a.colours = stage.matrixOf(volume.columns, 7, Layout::plain);
+  a.colours = stage.makeMatrix(volume.columns, 7, Layout::plain);
   a.colour = stage.output("colour", 7 * rays);
   a.opacity = stage.output("opacity", rays);
   a.depth = stage.output("depth", rays);
@@ -102,7 +102,7 @@ struct Gradients {
   std::vector<float> x, columns;
 };
 
-// Of g · the first three columns and h · opacity, h of each ray; with weightless features.
+// Gradients for given gradients of the composited columns and of the opacity of each ray.
 Gradients compositeBackward(Stage& stage, const Volume& volume, const std::vector<uint32_t>& firstSample,
                             Slice<const float> colourGradients, Slice<const float> opacityGradients) {
   CompositeBackward a;
@@ -110,8 +110,8 @@ Gradients compositeBackward(Stage& stage, const Volume& volume, const std::vecto
   a.minTransmittance = 0;
   a.rays.capacity = static_cast<uint32_t>(firstSample.size()) - 1;
   a.firstSample = stage.input(firstSample);
-  a.x = stage.matrixOf(volume.alpha, 1, Layout::plain);
-  a.colours = stage.matrixOf(volume.columns, 7, Layout::plain);
+  a.x = stage.makeMatrix(volume.alpha, 1, Layout::plain);
+  a.colours = stage.makeMatrix(volume.columns, 7, Layout::plain);
   a.rayColourGradients = colourGradients;
   a.rayOpacityGradients = opacityGradients;
   a.xGradients = stage.output("xGradients", volume.samples());
@@ -146,7 +146,7 @@ Picture blend(Stage& stage, const Segments& segments, bool literal = false) {
   return {stage.device.read(a.colour), stage.device.read(a.opacity), stage.device.read(a.depth)};
 }
 
-Segments segmentsOf(Stage& stage, const Volume& volume) {
+Segments compositeSegments(Stage& stage, const Volume& volume) {
   const Composited c = composite(stage, volume, volume.firstSampleOfSegment);
   return {volume.firstSegment, stage.device.read(c.colour), std::vector<float>(3 * volume.segments()),
           stage.device.read(c.opacity), stage.device.read(c.depth)};
@@ -170,10 +170,10 @@ std::vector<float> firstThreeOfSeven(const std::vector<float>& rows) {
   return values;
 }
 
-TEST_P(Blocks, HaveTheValuesOfTheExample) {
+TEST_P(Blocks, MatchTheWorkedExample) {
   Stage stage(*device, 81);
   const Volume volume = exampleVolume();
-  const Segments segments = segmentsOf(stage, volume);
+  const Segments segments = compositeSegments(stage, volume);
   const float colours[] = {.144f, .38f, .025f}, opacities[] = {.37f, .6f, .25f};
   for (size_t k = 0; k < 3; ++k) {
     EXPECT_NEAR(segments.composited[7 * k], colours[k], tolerance()) << k;
@@ -184,23 +184,23 @@ TEST_P(Blocks, HaveTheValuesOfTheExample) {
   EXPECT_NEAR(picture.opacity[0], .811, tolerance());
 }
 
-TEST_P(Blocks, WithoutSpecularColourAreOneVolume) {
+TEST_P(Blocks, CompositeLikeOneVolumeWithoutSpecularColour) {
   Stage stage(*device, 82);
   const Volume volume = randomVolume(stage.random);
   ASSERT_GT(volume.segments(), volume.rays() + 20);
   const Composited whole = composite(stage, volume, volume.firstSample);
   for (bool literal : {false, true}) {
-    const Picture picture = blend(stage, segmentsOf(stage, volume), literal);
+    const Picture picture = blend(stage, compositeSegments(stage, volume), literal);
     expectNear(picture.colour, firstThreeOfSeven(device->read(whole.colour)));
     expectNear(picture.opacity, device->read(whole.opacity));
     expectNear(picture.depth, device->read(whole.depth));
   }
 }
 
-TEST_P(Blocks, WithoutSpecularColourHaveTheGradientsOfOneVolume) {
+TEST_P(Blocks, HaveTheGradientsOfOneVolumeWithoutSpecularColour) {
   Stage stage(*device, 83);
   const Volume volume = randomVolume(stage.random);
-  const Segments segments = segmentsOf(stage, volume);
+  const Segments segments = compositeSegments(stage, volume);
   const std::vector<float> colour = stage.random.floats(3 * volume.rays(), -1, 1);
   const Slice<float> opacity = stage.randomInput(volume.rays(), -1, 1);
   std::vector<float> wide(7 * volume.rays());
@@ -225,7 +225,7 @@ TEST_P(Blocks, WithoutSpecularColourHaveTheGradientsOfOneVolume) {
   expectNear(parts.columns, whole.columns);
 }
 
-TEST_P(Blocks, ThatHoldNothingChangeNothing) {
+TEST_P(Blocks, ContributeNothingIfEmpty) {
   Stage stage(*device, 84);
   const Segments segments = randomSegments(stage.random, 50);
   Segments more;
@@ -255,10 +255,11 @@ TEST_P(Blocks, ThatHoldNothingChangeNothing) {
   EXPECT_EQ(with.colour, without.colour);
   EXPECT_EQ(with.opacity, without.opacity);
   EXPECT_EQ(with.depth, without.depth);
-  EXPECT_NE(blend(stage, more, true).colour, blend(stage, segments, true).colour) << "the printed equation lets them";
+  EXPECT_NE(blend(stage, more, true).colour, blend(stage, segments, true).colour)
+      << "with the printed equation they contribute";
 }
 
-TEST_P(Blocks, DrawnBackToFrontGiveTheSamePicture) {
+TEST_P(Blocks, BlendToTheSameImageBackToFront) {
   Stage stage(*device, 85);
   const uint32_t rays = 50;
   const Segments segments = randomSegments(stage.random, rays);

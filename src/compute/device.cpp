@@ -4,8 +4,8 @@
 
 namespace tessera {
 
-Array<float> Device::activationsOf(const MlpShape& shape, size_t samples) {
-  return array<float>(samples * shape.activationsPerSample() / (keepsHalves() ? 2 : 1));
+Array<float> Device::allocateActivations(const MlpShape& shape, size_t samples) {
+  return array<float>(samples * shape.activationsPerSample() / (storesActivationsInHalf() ? 2 : 1));
 }
 
 void Device::lacks(const OperationId& operation) const {

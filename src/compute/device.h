@@ -1,10 +1,11 @@
-// The one interface between what is computed and what computes it. Training is written against Device and knows no
-// hardware. Operations are queued in order and never read back in the middle of a step; `read` and `finish` wait.
+// The interface of the compute devices. Training is written against Device and does not depend on the hardware.
+// Operations are queued in order, and nothing is read back in the middle of a step; `read` and `finish` wait for the
+// queue.
 //
-// Each operation is a struct of arguments (shapes, what is read, what is written) in a header named after its kind,
-// with its name beside it (operation.h). This header knows none of them, so that a new operation rebuilds its users
-// only. reference/, cpu/ and vulkan/ each have a file of the same name. device_test.cpp walks operation × device ×
-// shape: an operation without a row there does not link.
+// Each operation is a struct of arguments (shapes, inputs, outputs) in a header named after its kind, which also
+// declares its name (operation.h). This header includes none of them, so that a new operation rebuilds its users only.
+// reference/, cpu/ and vulkan/ each implement it in a file of the same name. device_test.cpp tests every operation on
+// every device with many shapes: an operation without test cases there does not link.
 #pragma once
 
 #include <optional>
@@ -24,38 +25,39 @@ class Device {
  public:
   virtual ~Device() = default;
 
-  // For people: "cpu AVX3_ZEN4, 2 threads". `target` is the part that bits depend on: "cpu/AVX3".
+  // `name` is a description for people: "cpu AVX3_ZEN4, 2 threads". `target` is the part of it on which the exact bits
+  // of results depend: "cpu/AVX3".
   virtual std::string name() const = 0;
   virtual std::string target() const = 0;
 
-  // Of a card that has memory of its own: how much, and how much of it is taken by this device. Else zeros.
+  // The dedicated memory of a GPU, and how much of it this device has allocated. Zeros for devices without any.
   struct OwnMemory {
     uint64_t bytes = 0, inUse = 0;
   };
   virtual OwnMemory ownMemory() const { return {}; }
-  virtual std::unique_ptr<Memory> allocate(size_t bytes) = 0;  // zeroed
+  virtual std::unique_ptr<Memory> allocate(size_t bytes) = 0;  // filled with zeros
   virtual void writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) = 0;
   struct Reading {
     const Memory* from = nullptr;
     size_t offset = 0;
     std::span<std::byte> to;
   };
-  virtual void readBytes(std::span<const Reading> readings) = 0;           // waits, once for all
+  virtual void readBytes(std::span<const Reading> readings) = 0;           // waits once for all readings
   virtual void fillZero(Memory& memory, size_t offset, size_t bytes) = 0;  // multiples of 4
   virtual void finish() = 0;
 
-  // Threads of the processor for what training does on the host between steps, such as drawing rays.
+  // The number of CPU threads for the work that training does on the host between steps, such as drawing random rays.
   int hostThreads() const { return hostThreads_; }
   void setHostThreads(int threads) { hostThreads_ = threads; }
 
-  // Whether activations of networks are kept in fp16, two to a word; else as floats.
-  virtual bool keepsHalves() const { return false; }
+  // Whether activations of networks are stored in fp16, two per 32-bit word, instead of as floats.
+  virtual bool storesActivationsInHalf() const { return false; }
 
-  // Queues an operation. Every device runs every operation of the list (operations.h); one that is not on it is our own
-  // mistake (CHECK, which names it).
+  // Queues an operation. Every device runs every operation of the list in operations.h. Passing one that is not listed
+  // there is a programming error: a CHECK that names the operation fails.
   template <class Arguments>
   void run(const Arguments& arguments) {
-    static_assert(Operation<Arguments>, "this is no operation: no TESSERA_OPERATION stands below the struct");
+    static_assert(Operation<Arguments>, "not an operation: TESSERA_OPERATION is missing below the struct");
     if (!runOperation(kOperation<Arguments>, &arguments)) lacks(kOperation<Arguments>);
   }
 
@@ -63,13 +65,13 @@ class Device {
   Array<T> array(size_t count) {
     return count ? Array<T>(allocate(count * sizeof(T)), count) : Array<T>();
   }
-  // What MlpForward keeps for MlpBackward.
-  Array<float> activationsOf(const MlpShape& shape, size_t samples);
+  // Allocates the activations that MlpForward stores for MlpBackward.
+  Array<float> allocateActivations(const MlpShape& shape, size_t samples);
   template <class T>
-  Array<T> arrayOf(const std::vector<T>& values) {
-    Array<T> made = array<T>(values.size());
-    if (!values.empty()) write(made.all(), std::span<const T>(values));
-    return made;
+  Array<T> uploadArray(const std::vector<T>& values) {
+    Array<T> uploaded = array<T>(values.size());
+    if (!values.empty()) write(uploaded.all(), std::span<const T>(values));
+    return uploaded;
   }
   template <class T>
   void write(const Slice<T>& to, std::span<const T> from) {
@@ -78,11 +80,11 @@ class Device {
   }
   template <class T>
   std::vector<std::remove_const_t<T>> read(const Slice<T>& from) {
-    return std::get<0>(readTogether(from));
+    return std::get<0>(readAll(from));
   }
-  // Several, for the time of one.
+  // Reads several slices and waits only once.
   template <class... T>
-  std::tuple<std::vector<std::remove_const_t<T>>...> readTogether(const Slice<T>&... from) {
+  std::tuple<std::vector<std::remove_const_t<T>>...> readAll(const Slice<T>&... from) {
     std::tuple<std::vector<std::remove_const_t<T>>...> all{std::vector<std::remove_const_t<T>>(from.count)...};
     std::vector<Reading> readings;
     const auto add = [&](const auto& slice, auto& to) {
@@ -99,7 +101,8 @@ class Device {
   }
 
  private:
-  // Queues the operation with the arguments that it names the type of. False: it is not on the list.
+  // Queues an operation; `arguments` points to the struct that `operation` identifies. Returns false if the operation
+  // is not on the list.
   virtual bool runOperation(const OperationId& operation, const void* arguments) = 0;
   void lacks(const OperationId& operation) const;
 
@@ -108,24 +111,24 @@ class Device {
 
 struct DeviceOptions {
   std::string kind = "cpu";  // auto, cpu, reference, vulkan, vulkan:1 (an index) or vulkan:radeon (a part of a name)
-  int threads = 0;           // of the processor; 0: all cores for cpu, a few beside other devices
+  int threads = 0;           // CPU threads; 0: all cores for the cpu device, a few for the host work of other devices
 };
 
-// Throws Error when there is no such device on this machine. "auto" is the best graphics card that can be used, else
-// cpu; it is never a Vulkan driver that computes on the processor.
+// Opens a device. "auto" selects the best usable GPU, or the cpu device if there is none, but never a Vulkan driver
+// that computes on the CPU. Throws Error if this machine has no such device.
 std::unique_ptr<Device> makeDevice(const DeviceOptions& options);
 
-// Of a kind that means a Vulkan device on this machine (auto too): its index or a part of its name, as
-// GpuOptions::device has it. Nothing: another kind.
-std::optional<std::string> vulkanDeviceOf(const std::string& kind);
+// Returns the index or the part of a name (see GpuOptions::device) if `kind` selects a Vulkan device on this machine,
+// which includes "auto"; otherwise nothing.
+std::optional<std::string> parseVulkanDevice(const std::string& kind);
 
-// What `kind` may name on this machine.
+// A device that DeviceOptions::kind can name on this machine.
 struct DeviceDescription {
   std::string kind;  // "cpu", "vulkan:0"
   std::string name;
-  uint64_t memoryBytes = 0;           // of a graphics card
-  std::string missing;                // why it cannot be used; empty where it can
-  std::vector<std::string> features;  // of a graphics card: what its kernels make use of
+  uint64_t memoryBytes = 0;           // GPUs only
+  std::string missing;                // why it cannot be used; empty if it can
+  std::vector<std::string> features;  // GPUs only: the optional features that the kernels use
 };
 std::vector<DeviceDescription> listDevices();
 

@@ -1,6 +1,6 @@
-// What the walk over operation × device × shape needs: a stage on which one case sets up inputs and outputs on any
-// device, and the table of cases. Each operation has one testsOf<Operation>() in a device_test_*.cpp; one that lacks it
-// does not link.
+// Helpers of the test of every operation on every device with many shapes: a stage, on which a case sets up its inputs
+// and outputs on any device, and the table of cases. Each operation has one makeTests<Operation>() in a
+// device_test_*.cpp; an operation without it does not link.
 #pragma once
 
 #include <deque>
@@ -17,7 +17,7 @@ namespace tessera::device_test {
 using reference::Doubles;
 using reference::View;
 
-inline constexpr float kPoison = -77777.125f;  // what no operation ever computes
+inline constexpr float kPoison = -77777.125f;  // a value that no operation ever computes
 inline constexpr uint32_t kPoisonWord = 0xdeadbeefu;
 
 class Random {
@@ -29,8 +29,8 @@ class Random {
   std::vector<float> floats(size_t count, float low, float high);
   std::vector<float> directions(size_t count);  // unit, [count][3]
   std::vector<uint32_t> wordsBelow(size_t count, uint32_t n);
-  // [rays + 1], each ray having 0 to `most` samples.
-  std::vector<uint32_t> firstSamples(size_t rays, uint32_t most);
+  // [rays + 1]; each ray has 0 to `maximum` samples.
+  std::vector<uint32_t> firstSamples(size_t rays, uint32_t maximum);
 
  private:
   RandomStream stream_;
@@ -41,31 +41,32 @@ inline constexpr int64_t kNoCounter = -1;
 struct Size {
   uint32_t capacity = 0;
   int64_t counter = kNoCounter;
-  uint32_t first = 0;  // above 0: Count::first
+  uint32_t first = 0;  // Count::first, if above 0
   uint32_t used() const {
     return counter == kNoCounter || counter > capacity ? capacity : static_cast<uint32_t>(counter);
   }
 };
 std::string toString(const Size& size);
 
-// Nothing, one, counters below, at zero and above the capacity, no multiples of vector widths, many tasks.
+// No element, one, counters at zero, below and above the capacity, sizes that are no multiples of the vector width, and
+// enough elements for many tasks.
 inline constexpr Size kSizes[] = {{0}, {1}, {5, 0}, {37}, {64, 50}, {130, 1000}, {1061}};
-// Of operations that take part of the rows.
+// Sizes for operations that can work on part of the rows.
 inline constexpr Size kRowSizes[] = {
     {0}, {1}, {5, 0}, {37}, {64, 50}, {130, 1000}, {1061}, {64, 50, 17}, {1061, 1000, 333}, {64, 20, 30}};
 inline constexpr Size kSmallSizes[] = {{1}, {5, 0}, {37}, {130, 67}};
 
-enum class Layout { plain, strided, grouped };  // grouped: two columns a plane
+enum class Layout { plain, strided, grouped };  // grouped: two columns per plane
 
 struct Output {
   std::string name;
   std::vector<float> values;
   std::vector<uint32_t> words;
-  double tolerance = 0;  // of `values`, times the largest of them; 0: the same bits
+  double tolerance = 0;  // maximum difference relative to the largest of `values`; 0: the same bits
 };
 using Outputs = std::vector<Output>;
 
-// Inputs and outputs of one case on one device; owns their memory.
+// The inputs and outputs of one case on one device; owns their memory.
 class Stage {
  public:
   Stage(Device& onDevice, uint64_t seed) : device(onDevice), random(seed) {}
@@ -78,15 +79,15 @@ class Stage {
   Slice<uint32_t> input(const std::vector<uint32_t>& values);
   Slice<float> randomInput(size_t size, float low, float high) { return input(random.floats(size, low, high)); }
   Matrix<float> randomMatrix(size_t rows, uint32_t columns, Layout layout, float low, float high);
-  Matrix<float> matrixOf(const std::vector<float>& values, uint32_t columns, Layout layout);  // values row-major
+  Matrix<float> makeMatrix(const std::vector<float>& values, uint32_t columns, Layout layout);  // values row-major
 
-  // Poisoned unless `initial` is given; compared in full afterwards, gaps and all.
+  // Outputs are filled with poison unless `initial` is given. They are compared in full afterwards, including gaps.
   Slice<float> output(std::string name, size_t size, double tolerance = 1e-5);
   Slice<float> output(std::string name, const std::vector<float>& initial, double tolerance = 1e-5);
   Slice<uint32_t> outputWords(std::string name, size_t size);
   Slice<uint32_t> outputWords(std::string name, const std::vector<uint32_t>& initial);
   Matrix<float> outputMatrix(std::string name, size_t rows, uint32_t columns, Layout layout, double tolerance = 1e-5);
-  // Of what the device keeps in fp16 where Device::keepsHalves says so.
+  // Activations, which are in fp16 if Device::storesActivationsInHalf.
   Slice<float> keptInput(const std::vector<float>& values);
   Slice<float> keptOutput(std::string name, size_t size, double tolerance = 1e-5);
 
@@ -94,7 +95,7 @@ class Stage {
 
  private:
   Matrix<float> shaped(Slice<float> buffer, size_t rows, uint32_t columns, Layout layout) const;
-  static size_t sizeOf(size_t rows, uint32_t columns, Layout layout);
+  static size_t layoutSize(size_t rows, uint32_t columns, Layout layout);
 
   std::deque<Array<float>> floats_;
   std::deque<Array<uint32_t>> words_;
@@ -108,18 +109,18 @@ class Stage {
   std::vector<Watched> watched_;
 };
 
-// Sets up inputs (from stage.random alone, so that every device gets the same) and runs the operation once.
+// Sets up the inputs, from stage.random alone so that every device gets the same, and runs the operation once.
 struct Case {
   std::string name;
   std::function<void(Stage& stage)> run;
 };
 
-// One gradient: as the device says, and by central differences of the reference forward in double.
+// One gradient: as computed by the device, and by central differences of the reference forward function in double.
 struct GradientPair {
   std::string name;
   std::vector<float> fromDevice;
   Doubles byDifferences;
-  double tolerance = 1e-4;  // times the largest
+  double tolerance = 1e-4;  // relative to the largest element
 };
 struct GradientCase {
   std::string name;
@@ -129,16 +130,16 @@ struct GradientCase {
 struct OperationTests {
   std::vector<Case> cases;
   std::vector<GradientCase> gradients;
-  std::string noGradient;  // why there is none to check
-  // Which samples there are is decided in double: a device without may now and then decide otherwise.
+  std::string noGradient;  // why there is no gradient to check
+  // The operation decides in double which samples exist; a device without doubles may decide differently for a few.
   bool decides = false;
-  // Some devices compute it in fp16: those are held to a hundredth.
+  // Some devices compute the operation in fp16; their results may differ by a hundredth.
   bool inHalves = false;
 };
 
-// Specialised for every operation, beside the cases of its kind; device_test.cpp knows the list.
+// Specialised for every operation in the device_test_*.cpp of its kind; device_test.cpp has the list of operations.
 template <class Arguments>
-OperationTests testsOf();
+OperationTests makeTests();
 
 // (f(x + h e_i) - f(x - h e_i)) / 2h for every i of `which`.
 Doubles centralDifferences(const std::function<double(View)>& f, Doubles x, double h,
@@ -148,23 +149,24 @@ std::vector<float> pick(const std::vector<float>& values, const std::vector<uint
 Doubles toDoubles(const std::vector<float>& values);
 std::vector<float> toFloats(View values);
 double dot(View a, View b);
-// Apart from the order in which a device with atomics adds: every difference is at most 1e-5 of the largest.
-void expectTheSameSums(const std::vector<float>& got, const std::vector<float>& wanted);
+// Expects sums to be equal except for the order in which a device with atomics adds: every difference is at most 1e-5
+// of the largest value.
+void expectTheSameSums(const std::vector<float>& actual, const std::vector<float>& expected);
 
-// The devices of this build, by name: "reference", "cpu with 1 thread", ... Null where this machine has none.
+// The names of the devices of this build: "reference", "cpu with 1 thread", ...
 std::vector<std::string> deviceNames();
-Device* deviceNamed(const std::string& name);
+Device* deviceNamed(const std::string& name);  // null if this machine has no such device; open until the tests end
 inline constexpr std::string_view kWithFallbacks = "vulkan without float atomics and subgroups";
 inline constexpr std::string_view kWithoutDoubles = "vulkan without doubles";
-// Those that compute OperationTests::inHalves. "Emulated": by the kernels of cooperative matrices, but without these,
-// which Mesa's driver for the processor lacks.
+// The devices that compute the operations with OperationTests::inHalves in fp16. "Emulated" uses the kernels for
+// cooperative matrices, but emulates these matrices, which Mesa's driver for the CPU lacks.
 std::vector<std::string> halfDeviceNames();
 inline constexpr std::string_view kInHalves = "vulkan in halves", kWithMatrices = "vulkan with matrices",
                                   kWithEmulatedMatrices = "vulkan with emulated matrices";
 bool computesInHalves(std::string_view name);
-// The cpu device with each lesser instruction set that this machine has: "cpu AVX2 with 2 threads", ... All cpu devices
-// share one set, so a test on a device first says which.
+// The cpu device with each instruction set of this machine except the best: "cpu AVX2 with 2 threads", ... All cpu
+// devices share one instruction set, so a test must select the one of its device first.
 std::vector<std::string> lesserCpuNames();
-void useSimdTargetOf(const std::string& name);  // the best where the name says none
+void selectSimdTarget(const std::string& name);  // selects the best if the device name contains none
 
 }  // namespace tessera::device_test

@@ -1,4 +1,4 @@
-// Cases of fusing features, and of shading what a ray adds up to.
+// Test cases of fusing features and of shading composited rays.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace {
 
 constexpr uint32_t kFeatures = AttentionShape::kFeatures, kCoarse = 16;
 
-// Every way of fusing, with each number of levels.
+// Every kind of weights with each number of levels.
 std::vector<AttentionShape> shapes() {
   std::vector<AttentionShape> all;
   for (const uint32_t levels : {1u, 2u, 4u}) {
@@ -25,13 +25,13 @@ std::vector<AttentionShape> shapes() {
   return all;
 }
 
-std::string nameOf(const AttentionShape& shape) {
+std::string caseName(const AttentionShape& shape) {
   const char* const kNames[] = {"sum", "shared", "separate"};
   return fmt::format("{} levels, {}{}", shape.levels, kNames[static_cast<int>(shape.weights)],
                      shape.varies ? "" : ", the same everywhere");
 }
 
-// Columns a level, as hash grids write them.
+// A matrix grouped by level, as hash grids write it.
 Matrix<float> byLevel(Slice<float> buffer, const AttentionShape& shape, size_t rows) {
   return Matrix<float>::grouped(buffer, kFeatures * shape.levels, kFeatures, rows);
 }
@@ -43,7 +43,7 @@ struct Inputs {
       : coarse(stage.random.floats(kCoarse * rows, -3, 3)),
         fine(stage.random.floats(kFeatures * shape.levels * rows, -3, 3)),
         logits(stage.random.floats(shape.logits(), -3, 3)) {
-    for (size_t s = 0; s < rows; s += 5) coarse[kCoarse * s] = 40;  // denser than the bound
+    for (size_t s = 0; s < rows; s += 5) coarse[kCoarse * s] = 40;  // above the bound of the density
   }
   template <class Arguments>
   void set(Stage& stage, size_t rows, Arguments& a) const {
@@ -56,12 +56,12 @@ struct Inputs {
 }  // namespace
 
 template <>
-OperationTests testsOf<AttentionForward>() {
+OperationTests makeTests<AttentionForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is AttentionBackward";
   for (const AttentionShape& shape : shapes())
     for (const Size& size : kSizes)
-      tests.cases.push_back({fmt::format("{}, samples {}", nameOf(shape), toString(size)), [=](Stage& stage) {
+      tests.cases.push_back({fmt::format("{}, samples {}", caseName(shape), toString(size)), [=](Stage& stage) {
                                AttentionForward a{shape};
                                a.samples = stage.count(size);
                                Inputs(stage, shape, size.capacity).set(stage, size.capacity, a);
@@ -72,11 +72,11 @@ OperationTests testsOf<AttentionForward>() {
 }
 
 template <>
-OperationTests testsOf<AttentionBackward>() {
+OperationTests makeTests<AttentionBackward>() {
   OperationTests tests;
   for (const AttentionShape& shape : shapes())
     for (const Size& size : kSizes)
-      tests.cases.push_back({fmt::format("{}, samples {}", nameOf(shape), toString(size)), [=](Stage& stage) {
+      tests.cases.push_back({fmt::format("{}, samples {}", caseName(shape), toString(size)), [=](Stage& stage) {
                                const size_t rows = size.capacity;
                                AttentionBackward a{shape};
                                a.samples = stage.count(size);
@@ -94,7 +94,7 @@ OperationTests testsOf<AttentionBackward>() {
                              }});
   for (const AttentionShape& shape : shapes())
     tests.gradients.push_back(
-        {nameOf(shape), [=](Stage& stage) {
+        {caseName(shape), [=](Stage& stage) {
            const size_t rows = 6;
            Inputs inputs(stage, shape, rows);
            const std::vector<float> upstream = stage.random.floats(kFeatures * rows, -1, 1);
@@ -107,7 +107,7 @@ OperationTests testsOf<AttentionBackward>() {
            a.logDensityGradients = stage.input(ofDensity);
            a.colourGradients = Matrix<float>(stage.input(ofColours), kFeatures - 1);
            a.coarseGradients = Matrix<float>(stage.output("coarse", kCoarse * rows), kCoarse);
-           // In rows: what the differences are taken of.
+           // The fine features in row-major order, for the differences.
            const uint32_t columns = kFeatures * shape.levels;
            std::vector<float> fineRows(columns * rows);
            for (size_t s = 0; s < rows; ++s)
@@ -149,7 +149,7 @@ OperationTests testsOf<AttentionBackward>() {
 
 namespace {
 
-// Sets what forward and backward have in common.
+// Sets the arguments that forward and backward share.
 template <class Arguments>
 void setInputs(Stage& stage, const Size& size, bool whole, Arguments& a) {
   a.whole = whole;
@@ -159,19 +159,19 @@ void setInputs(Stage& stage, const Size& size, bool whole, Arguments& a) {
   if (!whole) a.opacity = stage.randomInput(size.capacity, 0, 1);
 }
 
-std::string nameOf(const Size& size, bool whole) {
+std::string caseName(const Size& size, bool whole) {
   return fmt::format("rays {}{}", toString(size), whole ? ", nothing behind" : "");
 }
 
 }  // namespace
 
 template <>
-OperationTests testsOf<ShadeForward>() {
+OperationTests makeTests<ShadeForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is ShadeBackward";
   for (bool whole : {false, true})
     for (const Size& size : kSizes)
-      tests.cases.push_back({nameOf(size, whole), [=](Stage& stage) {
+      tests.cases.push_back({caseName(size, whole), [=](Stage& stage) {
                                ShadeForward a;
                                setInputs(stage, size, whole, a);
                                a.colour = stage.output("colour", size_t{3} * size.capacity);
@@ -181,11 +181,11 @@ OperationTests testsOf<ShadeForward>() {
 }
 
 template <>
-OperationTests testsOf<ShadeBackward>() {
+OperationTests makeTests<ShadeBackward>() {
   OperationTests tests;
   for (bool whole : {false, true}) {
     for (const Size& size : kSizes)
-      tests.cases.push_back({nameOf(size, whole), [=](Stage& stage) {
+      tests.cases.push_back({caseName(size, whole), [=](Stage& stage) {
                                ShadeBackward a;
                                setInputs(stage, size, whole, a);
                                a.colourGradients = stage.randomInput(size_t{3} * size.capacity, -1, 1);
@@ -237,7 +237,7 @@ OperationTests testsOf<ShadeBackward>() {
 }
 
 template <>
-OperationTests testsOf<AddColumns>() {
+OperationTests makeTests<AddColumns>() {
   OperationTests tests;
   tests.noGradient = "it is a sum";
   for (const Layout layout : {Layout::plain, Layout::strided, Layout::grouped})

@@ -1,4 +1,4 @@
-// Cases of marching through blocks.
+// Test cases of marching through blocks.
 #include <fmt/format.h>
 
 #include "compute/block_march.h"
@@ -10,7 +10,7 @@ namespace {
 
 constexpr uint32_t kCells = 8;
 
-// Of every slot; bits set with probability `share`.
+// The occupancy of all slots, each bit set with probability `share`.
 std::vector<uint32_t> randomOccupancy(Random& random, uint32_t slots, float share) {
   std::vector<uint32_t> bits(slots * kCells * kCells * kCells / 32);
   for (uint32_t& word : bits) {
@@ -36,7 +36,7 @@ void watchSamples(Stage& stage, uint32_t rays, uint32_t capacity, MarchBlocks& a
 }  // namespace
 
 template <>
-OperationTests testsOf<MarchBlocks>() {
+OperationTests makeTests<MarchBlocks>() {
   OperationTests tests;
   tests.decides = true;
   tests.noGradient = "sample positions carry no gradient";
@@ -62,7 +62,7 @@ OperationTests testsOf<MarchBlocks>() {
                                      a.nearOfRay = stage.randomInput(size.capacity, 0, 1);
                                      a.farOfRay = stage.randomInput(size.capacity, 0, 8);
                                      std::vector<uint32_t> slotOfBlock(
-                                         slots, kNoSlot);  // of every other block, from the last on
+                                         slots, kNoSlot);  // for every other block, from the last one on
                                      uint32_t next = 0;
                                      for (uint32_t block = 0; block < slots; ++block)
                                        if (block % 2 == 0) slotOfBlock[slots - 1 - block] = next++;
@@ -83,15 +83,15 @@ OperationTests testsOf<MarchBlocks>() {
                                a.cells = kCells;
                                a.step = 0.035f;
                                a.rays.capacity = count;
-                               a.mostOpticalDepth = 0.8f;
+                               a.maxOpticalDepth = 0.8f;
                                a.origins = stage.input(rays.origins);
                                a.directions = stage.input(rays.directions);
                                a.jitter = stage.randomInput(count, 0, 1);
                                a.occupancy = stage.input(randomOccupancy(stage.random, named.space.blocks(), share));
                                a.opticalDepth = stage.input(stage.random.floats(count, 0, 1));
                                a.nextStep = stage.outputWords("nextStep", std::vector<uint32_t>(count));
-                               for (const uint32_t most : {5u, 0u, 1u, 15u, ~0u}) {  // the fourth time not all fit
-                                 a.most = most;
+                               for (const uint32_t maximum : {5u, 0u, 1u, 15u, ~0u}) {  // the fourth round does not fit
+                                 a.maximum = maximum;
                                  watchSamples(stage, count, 300, a);
                                  stage.device.run(a);
                                }

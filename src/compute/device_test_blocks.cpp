@@ -1,4 +1,4 @@
-// Cases of sampling through blocks.
+// Test cases of sampling through blocks.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace tessera::device_test {
 namespace {
 
-// Evenly from 0 to 1; or anywhere, some of them twice, as resampling leaves them.
+// Fences that are uniform from 0 to 1, or random with some of them equal, as from resampling.
 std::vector<float> makeFences(Random& random, size_t rays, uint32_t intervals, bool even) {
   std::vector<float> fences;
   for (size_t r = 0; r < rays; ++r) {
@@ -25,7 +25,7 @@ std::vector<float> makeFences(Random& random, size_t rays, uint32_t intervals, b
   return fences;
 }
 
-// Distances reach from nearly 0 to 1e6: their logarithms are compared as well, so that small ones count.
+// Distances range from nearly 0 to 1e6, so their logarithms are compared as well to detect errors in small ones.
 void watchLogarithms(Stage& stage, const std::string& name, const Slice<float>& values) {
   std::vector<float> logarithms = stage.device.read(values);
   for (float& value : logarithms)
@@ -54,7 +54,7 @@ void runBlockSamples(Stage& stage, const BlockSpace& space, const Size& size, co
   a.range = stage.input(range);
   if (options.everything) a.farOfRay = stage.randomInput(rays, 0, 8);
   a.fences = stage.input(makeFences(stage.random, rays, intervals, !options.everything));
-  const uint32_t rows = a.firstRow + a.mostSamples(rays);
+  const uint32_t rows = a.firstRow + a.maxSamples(rays);
   a.firstSample = stage.outputWords("firstSample", rays + 1);
   a.rowCount = stage.outputWords("rowCount", 1);
   a.blockOfSample = stage.outputWords("blockOfSample", rows);
@@ -66,7 +66,7 @@ void runBlockSamples(Stage& stage, const BlockSpace& space, const Size& size, co
     a.widths = stage.output("widths", rows, 1e-6);
     a.runtimeSteps = stage.output("runtimeSteps", rows, 1e-6);
     a.texels = 64;
-    // Every third block has no slot, the others have them from the last on.
+    // Every third block has no slot; the others are assigned slots from the last one on.
     std::vector<uint32_t> slots(space.blocks(), kNoSlot);
     for (uint32_t block = 0; block < space.blocks(); ++block)
       if (block % 3 != 1) slots[block] = space.blocks() - 1 - block;
@@ -80,9 +80,9 @@ void runBlockSamples(Stage& stage, const BlockSpace& space, const Size& size, co
     }
     a.firstSegment = stage.outputWords("firstSegment", rays + 1);
     a.segmentCount = stage.outputWords("segmentCount", 1);
-    a.firstSampleOfSegment = stage.outputWords("firstSampleOfSegment", a.mostSegments(rays) + 1);
-    a.groupOfSegment = stage.outputWords("groupOfSegment", a.mostSegments(rays));
-    a.rayOfSegment = stage.outputWords("rayOfSegment", a.mostSegments(rays));
+    a.firstSampleOfSegment = stage.outputWords("firstSampleOfSegment", a.maxSegments(rays) + 1);
+    a.groupOfSegment = stage.outputWords("groupOfSegment", a.maxSegments(rays));
+    a.rayOfSegment = stage.outputWords("rayOfSegment", a.maxSegments(rays));
   }
   stage.device.run(a);
   watchLogarithms(stage, "log of distances", a.distances);
@@ -92,7 +92,7 @@ void runBlockSamples(Stage& stage, const BlockSpace& space, const Size& size, co
 }  // namespace
 
 template <>
-OperationTests testsOf<EnterScene>() {
+OperationTests makeTests<EnterScene>() {
   OperationTests tests;
   tests.noGradient = "cameras and fence posts are fixed";
   for (const NamedBlockSpace& named : blockSpaces())
@@ -118,7 +118,7 @@ OperationTests testsOf<EnterScene>() {
 }
 
 template <>
-OperationTests testsOf<BlockSamples>() {
+OperationTests makeTests<BlockSamples>() {
   OperationTests tests;
   tests.decides = true;
   tests.noGradient = "cameras and fence posts are fixed";
@@ -135,7 +135,7 @@ OperationTests testsOf<BlockSamples>() {
 }
 
 template <>
-OperationTests testsOf<BlockPoints>() {
+OperationTests makeTests<BlockPoints>() {
   OperationTests tests;
   tests.noGradient = "it only chooses where to look";
   for (const NamedBlockSpace& named : blockSpaces())
@@ -161,7 +161,7 @@ OperationTests testsOf<BlockPoints>() {
 }
 
 template <>
-OperationTests testsOf<GroupByBlock>() {
+OperationTests makeTests<GroupByBlock>() {
   OperationTests tests;
   tests.noGradient = "it only says what goes where";
   std::vector<Size> sizes(std::begin(kSizes), std::end(kSizes));
@@ -181,7 +181,7 @@ OperationTests testsOf<GroupByBlock>() {
 }
 
 template <>
-OperationTests testsOf<ScatterRows>() {
+OperationTests makeTests<ScatterRows>() {
   OperationTests tests;
   tests.noGradient = "it moves what has been computed";
   struct Shape {
@@ -200,7 +200,7 @@ OperationTests testsOf<ScatterRows>() {
                                  std::swap(source[i - 1], source[stage.random.below(i)]);
                                Matrix<float> input =
                                    stage.randomMatrix(size.capacity, shape.columns, shape.layout, -1, 1);
-                               // Any bits: integers travel this way too, and look like NaN or denormal numbers.
+                               // Arbitrary bits, because integers are moved too and can look like NaN or denormals.
                                std::vector<uint32_t> bits(input.data.count);
                                for (uint32_t& word : bits) word = stage.random.bits() >> stage.random.below(32);
                                if (input)

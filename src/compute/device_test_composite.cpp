@@ -1,4 +1,4 @@
-// Cases of volume rendering.
+// Test cases of volume rendering.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,11 +10,11 @@ namespace tessera::device_test {
 namespace {
 
 constexpr Extinction kExtinctions[] = {Extinction::opacity, Extinction::density, Extinction::logDensity};
-// None, every number with a kernel of its own, some without, the most.
+// No column, every number of columns with a specialised kernel, some without one, and the maximum.
 constexpr uint32_t kColumns[] = {0, 1, 3, 5, 7, 8, 16};
 constexpr const char* kExtinctionNames[] = {"opacity", "density", "log density"};
 
-// Rays that stay clear, that end in the middle, and that meet something wholly opaque.
+// Rays that stay transparent, that end in the middle, and that contain fully opaque samples.
 std::vector<float> randomExtinctions(Random& random, Extinction extinction, const std::vector<uint32_t>& first) {
   std::vector<float> x;
   for (size_t ray = 0; ray + 1 < first.size(); ++ray) {
@@ -42,9 +42,9 @@ struct Scene {
   std::vector<uint32_t> first;
   std::vector<float> x, steps, distances, colours, background;
 
-  Scene(Random& random, Extinction extinction, size_t rays, uint32_t mostSamples, uint32_t ofColours = 3)
+  Scene(Random& random, Extinction extinction, size_t rays, uint32_t maxSamples, uint32_t ofColours = 3)
       : columns(ofColours),
-        first(random.firstSamples(rays, mostSamples)),
+        first(random.firstSamples(rays, maxSamples)),
         x(randomExtinctions(random, extinction, first)) {
     steps = random.floats(x.size(), 0.005f, 0.1f);
     distances = random.floats(x.size(), 0.1f, 5);
@@ -53,7 +53,7 @@ struct Scene {
   }
 };
 
-// Sets what forward and backward have in common.
+// Sets the arguments that forward and backward share.
 template <class Arguments>
 void setInputs(Stage& stage, const Scene& scene, Extinction extinction, const Size& size, Layout layout,
                bool withBackground, Arguments& a) {
@@ -61,17 +61,17 @@ void setInputs(Stage& stage, const Scene& scene, Extinction extinction, const Si
   a.minTransmittance = size.capacity % 2 ? 1e-4f : 0.01f;
   a.rays = stage.count(size);
   a.firstSample = stage.input(scene.first);
-  a.x = stage.matrixOf(scene.x, 1, layout);
+  a.x = stage.makeMatrix(scene.x, 1, layout);
   if (extinction != Extinction::opacity) a.steps = stage.input(scene.steps);
   a.distances = stage.input(scene.distances);
-  if (scene.columns > 0) a.colours = stage.matrixOf(scene.colours, scene.columns, layout);
+  if (scene.columns > 0) a.colours = stage.makeMatrix(scene.colours, scene.columns, layout);
   if (withBackground && scene.columns > 0) a.background = stage.input(scene.background);
 }
 
 }  // namespace
 
 template <>
-OperationTests testsOf<CompositeForward>() {
+OperationTests makeTests<CompositeForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is CompositeBackward";
   for (Extinction extinction : kExtinctions)
@@ -110,7 +110,7 @@ OperationTests testsOf<CompositeForward>() {
 }
 
 template <>
-OperationTests testsOf<CompositeBackward>() {
+OperationTests makeTests<CompositeBackward>() {
   OperationTests tests;
   for (Extinction extinction : kExtinctions)
     for (const Size& size : kSizes)
@@ -163,7 +163,7 @@ OperationTests testsOf<CompositeBackward>() {
   for (uint32_t columns : kColumns) shapes.push_back({Extinction::logDensity, columns});
   for (const auto& [extinction, columns] : shapes)
     for (bool everything : {false, true}) {
-      if (columns == 0 && !everything) continue;  // nothing to have a gradient
+      if (columns == 0 && !everything) continue;  // no output has a gradient
       tests.gradients.push_back(
           {fmt::format("{}, {} columns{}", kExtinctionNames[static_cast<int>(extinction)], columns,
                        everything ? ", everything" : ""),

@@ -1,4 +1,4 @@
-// Cases of deferred networks and of blending blocks.
+// Test cases of deferred networks and of blending blocks.
 #include <fmt/format.h>
 
 #include "compute/blend.h"
@@ -8,9 +8,9 @@
 namespace tessera::device_test {
 namespace {
 
-constexpr uint32_t kNetworks = 5;  // the last of them not used by any segment
+constexpr uint32_t kNetworks = 5;  // no segment uses the last of them
 
-// Segments of rays as a ray meets blocks: those of a ray stand together.
+// The segments of rays through blocks; those of one ray are consecutive.
 struct Scene {
   uint32_t rays;
   std::vector<uint32_t> network, ray;
@@ -25,7 +25,7 @@ struct Scene {
   }
 };
 
-// Sets what forward and backward have in common.
+// Sets the arguments that forward and backward share.
 template <class Arguments>
 void setInputs(Stage& stage, const Scene& scene, const Size& size, Arguments& a) {
   a.segments = stage.count(size);
@@ -60,14 +60,14 @@ void setInputs(Stage& stage, const BlendScene& scene, const Size& size, bool lit
   a.opacities = stage.input(scene.opacities);
 }
 
-std::string nameOf(const Size& size, bool literal) {
+std::string caseName(const Size& size, bool literal) {
   return fmt::format("rays {}{}", toString(size), literal ? ", literal" : "");
 }
 
 }  // namespace
 
 template <>
-OperationTests testsOf<DeferredForward>() {
+OperationTests makeTests<DeferredForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is DeferredBackward";
   for (const Size& size : kSizes)
@@ -82,7 +82,7 @@ OperationTests testsOf<DeferredForward>() {
 }
 
 template <>
-OperationTests testsOf<DeferredBackward>() {
+OperationTests makeTests<DeferredBackward>() {
   OperationTests tests;
   for (const Size& size : kSizes)
     tests.cases.push_back({"segments " + toString(size), [=](Stage& stage) {
@@ -131,12 +131,12 @@ OperationTests testsOf<DeferredBackward>() {
 }
 
 template <>
-OperationTests testsOf<BlendForward>() {
+OperationTests makeTests<BlendForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is BlendBackward";
   for (const Size& size : kSizes)
     for (bool literal : {false, true})
-      tests.cases.push_back({nameOf(size, literal), [=](Stage& stage) {
+      tests.cases.push_back({caseName(size, literal), [=](Stage& stage) {
                                const BlendScene scene(stage.random, size.capacity);
                                BlendForward a;
                                setInputs(stage, scene, size, literal, a);
@@ -150,13 +150,13 @@ OperationTests testsOf<BlendForward>() {
 }
 
 template <>
-OperationTests testsOf<BlendBackward>() {
+OperationTests makeTests<BlendBackward>() {
   OperationTests tests;
   for (const Size& size : kSizes)
     for (bool literal : {false, true})
       for (bool opacity : {false, true})
         tests.cases.push_back(
-            {fmt::format("{}{}", nameOf(size, literal), opacity ? ", opacity" : ""), [=](Stage& stage) {
+            {fmt::format("{}{}", caseName(size, literal), opacity ? ", opacity" : ""), [=](Stage& stage) {
                const BlendScene scene(stage.random, size.capacity);
                BlendBackward a;
                setInputs(stage, scene, size, literal, a);

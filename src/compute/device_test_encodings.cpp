@@ -1,4 +1,4 @@
-// Cases of the hash grid, spherical harmonics and frequency encodings.
+// Test cases of the hash grid, spherical harmonics and frequency encodings.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,15 +17,15 @@ struct NamedGrid {
 };
 
 std::vector<NamedGrid> grids() {
-  std::vector<NamedGrid> made;
+  std::vector<NamedGrid> all;
   for (int features : {1, 2, 4, 8})
-    made.push_back({fmt::format("4 levels of {}", features), HashGrid({4, features, 10, 4, 40})});
-  made.push_back({"1 level, dense", HashGrid({1, 2, 12, 16, 16})});
-  made.push_back({"16 levels to 2048", HashGrid({16, 2, 12, 16, 2048})});
-  return made;
+    all.push_back({fmt::format("4 levels of {}", features), HashGrid({4, features, 10, 4, 40})});
+  all.push_back({"1 level, dense", HashGrid({1, 2, 12, 16, 16})});
+  all.push_back({"16 levels to 2048", HashGrid({16, 2, 12, 16, 2048})});
+  return all;
 }
 
-// In [0,1]³, with the ends themselves, and the same point twice.
+// Positions in [0,1]³, including coordinates 0 and 1, and one point twice.
 std::vector<float> anyPositions(Random& random, size_t count) {
   std::vector<float> positions = random.floats(3 * count, 0, 1);
   for (size_t i = 0; i < positions.size(); i += 17) positions[i] = random.below(2) ? 1.0f : 0.0f;
@@ -33,7 +33,7 @@ std::vector<float> anyPositions(Random& random, size_t count) {
   return positions;
 }
 
-// Where the position gradient is continuous: away from the lattice planes of every level.
+// Positions at which the position gradient is continuous: away from the lattice planes of every level.
 std::vector<float> positionsInsideCells(Random& random, const HashGrid& grid, size_t count) {
   std::vector<float> positions;
   while (positions.size() < 3 * count) {
@@ -54,7 +54,7 @@ Matrix<float> groupedByLevel(Slice<float> slice, const HashGrid& grid, size_t ro
 }  // namespace
 
 template <>
-OperationTests testsOf<HashGridForward>() {
+OperationTests makeTests<HashGridForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is HashGridBackward";
   for (const NamedGrid& named : grids())
@@ -71,7 +71,7 @@ OperationTests testsOf<HashGridForward>() {
 }
 
 template <>
-OperationTests testsOf<HashGridBackward>() {
+OperationTests makeTests<HashGridBackward>() {
   OperationTests tests;
   for (const NamedGrid& named : grids())
     for (const Size& size : kRowSizes)
@@ -110,7 +110,7 @@ OperationTests testsOf<HashGridBackward>() {
                                              grouped, tableGradients, positionGradients});
 
            const std::vector<float> all = stage.device.read(tableGradients);
-           std::vector<uint32_t> touched;  // some that matter, some that do not
+           std::vector<uint32_t> touched;  // some entries with a gradient and some without
            for (uint32_t i = 0; i < all.size() && touched.size() < 40; i += 1 + stage.random.below(5))
              if (all[i] != 0 || i % 97 == 0) touched.push_back(i);
            const auto loss = [&](View x, View t) {
@@ -128,7 +128,7 @@ OperationTests testsOf<HashGridBackward>() {
 }
 
 template <>
-OperationTests testsOf<SphericalHarmonicsForward>() {
+OperationTests makeTests<SphericalHarmonicsForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is SphericalHarmonicsBackward";
   for (int degree = 1; degree <= 4; ++degree)
@@ -150,7 +150,7 @@ OperationTests testsOf<SphericalHarmonicsForward>() {
 }
 
 template <>
-OperationTests testsOf<SphericalHarmonicsBackward>() {
+OperationTests makeTests<SphericalHarmonicsBackward>() {
   OperationTests tests;
   for (int degree = 1; degree <= 4; ++degree)
     for (const Size& size : kSizes)
@@ -177,7 +177,7 @@ OperationTests testsOf<SphericalHarmonicsBackward>() {
            a.degree = degree;
            a.samples.capacity = samples;
            a.directions = stage.input(directions);
-           a.encodedGradients = stage.matrixOf(upstream, columns, Layout::plain);
+           a.encodedGradients = stage.makeMatrix(upstream, columns, Layout::plain);
            a.directionGradients = stage.output("directionGradients", 3 * samples);
            stage.device.run(a);
            const auto loss = [&](View d) {
@@ -204,7 +204,7 @@ constexpr FrequencyShape kFrequencyShapes[] = {{3, 4}, {1, 6}, {2, 0}, {5, 1}};
 }  // namespace
 
 template <>
-OperationTests testsOf<FrequencyForward>() {
+OperationTests makeTests<FrequencyForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is FrequencyBackward";
   for (const auto& [dimensions, frequencies] : kFrequencyShapes)
@@ -225,7 +225,7 @@ OperationTests testsOf<FrequencyForward>() {
 }
 
 template <>
-OperationTests testsOf<FrequencyBackward>() {
+OperationTests makeTests<FrequencyBackward>() {
   OperationTests tests;
   for (const auto& [dimensions, frequencies] : kFrequencyShapes) {
     const uint32_t columns = dimensions * (1 + 2 * frequencies);
@@ -254,7 +254,7 @@ OperationTests testsOf<FrequencyBackward>() {
            a.frequencies = frequencies;
            a.samples.capacity = samples;
            a.inputs = stage.input(inputs);
-           a.encodedGradients = stage.matrixOf(upstream, columns, Layout::plain);
+           a.encodedGradients = stage.makeMatrix(upstream, columns, Layout::plain);
            a.inputGradients = stage.output("inputGradients", inputs.size());
            stage.device.run(a);
            const auto loss = [&](View x) {

@@ -1,4 +1,4 @@
-// Cases of the lattice.
+// Test cases of the lattice.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr uint32_t kColumns = LatticeForward::kColumns;
 
-VirtualGrid latticeOf(bool share) {
+VirtualGrid makeLattice(bool share) {
   VirtualGrid grid;
   grid.voxels = share ? 8 : 5;
   grid.planes = 0;
@@ -20,7 +20,7 @@ VirtualGrid latticeOf(bool share) {
   return grid;
 }
 
-// As hash grids write theirs, or in rows.
+// A matrix that is grouped, as hash grids write it, or row-major.
 Matrix<float> columnsIn(Slice<float> buffer, size_t rows, bool grouped) {
   return grouped ? Matrix<float>::grouped(buffer, kColumns, 8, rows) : Matrix<float>(buffer, kColumns);
 }
@@ -28,7 +28,7 @@ Matrix<float> columnsIn(Slice<float> buffer, size_t rows, bool grouped) {
 }  // namespace
 
 template <>
-OperationTests testsOf<LatticeForward>() {
+OperationTests makeTests<LatticeForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is LatticeBackward";
   for (bool share : {true, false})
@@ -37,7 +37,7 @@ OperationTests testsOf<LatticeForward>() {
         tests.cases.push_back(
             {fmt::format("samples {}{}{}", toString(size), share ? "" : ", each corner", tight ? ", no room" : ""),
              [=](Stage& stage) {
-               const VirtualGrid grid = latticeOf(share);
+               const VirtualGrid grid = makeLattice(share);
                const TexelBatch batch(stage, grid, size);
                LatticeForward a{grid};
                batch.set(stage, size, a);
@@ -50,7 +50,7 @@ OperationTests testsOf<LatticeForward>() {
 }
 
 template <>
-OperationTests testsOf<LatticeBackward>() {
+OperationTests makeTests<LatticeBackward>() {
   OperationTests tests;
   for (bool share : {true, false})
     for (const Size& size : kSizes)
@@ -58,7 +58,7 @@ OperationTests testsOf<LatticeBackward>() {
         tests.cases.push_back(
             {fmt::format("samples {}{}{}", toString(size), share ? "" : ", each corner", tight ? ", no room" : ""),
              [=](Stage& stage) {
-               const VirtualGrid grid = latticeOf(share);
+               const VirtualGrid grid = makeLattice(share);
                const TexelBatch batch(stage, grid, size);
                LatticeBackward a{grid};
                batch.set(stage, size, a);
@@ -74,7 +74,7 @@ OperationTests testsOf<LatticeBackward>() {
     tests.gradients.push_back(
         {share ? "shared corners" : "each corner", [=](Stage& stage) {
            const Size size{7};
-           const VirtualGrid grid = latticeOf(share);
+           const VirtualGrid grid = makeLattice(share);
            const TexelBatch batch(stage, grid, size);
            const std::vector<float> values = stage.random.floats(size_t{kColumns} * batch.texels, -3, 3);
            const std::vector<float> upstream = stage.random.floats(kColumns * size.capacity, -1, 1);

@@ -1,4 +1,4 @@
-// Cases of the losses, exposure and the optimiser.
+// Test cases of the losses, exposure and the optimiser.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -14,11 +14,11 @@ namespace {
 constexpr ColourLossKind kKinds[] = {ColourLossKind::mse, ColourLossKind::huber, ColourLossKind::charbonnier};
 constexpr const char* kKindNames[] = {"mse", "huber", "charbonnier"};
 
-float parameterOf(ColourLossKind kind) {
+float colourLossParameter(ColourLossKind kind) {
   return kind == ColourLossKind::huber ? 0.1f : 1e-3f;
 }
 
-// Every third ray is taken out.
+// Weights that exclude every third ray.
 std::vector<float> weightsOfRays(Random& random, size_t rays) {
   std::vector<float> weights = random.floats(rays, 0, 2);
   for (size_t i = 0; i < weights.size(); i += 3) weights[i] = 0;
@@ -28,7 +28,7 @@ std::vector<float> weightsOfRays(Random& random, size_t rays) {
 }  // namespace
 
 template <>
-OperationTests testsOf<ColourLoss>() {
+OperationTests makeTests<ColourLoss>() {
   OperationTests tests;
   for (ColourLossKind kind : kKinds) {
     for (const Size& size : kSizes)
@@ -39,7 +39,7 @@ OperationTests testsOf<ColourLoss>() {
                                  const std::vector<float> weights = weightsOfRays(stage.random, size.capacity);
                                  ColourLoss a;
                                  a.kind = kind;
-                                 a.parameter = parameterOf(kind);
+                                 a.parameter = colourLossParameter(kind);
                                  a.scale = 0.7f;
                                  a.rays = stage.count(size);
                                  a.predicted = stage.randomInput(3 * size.capacity, 0, 1);
@@ -56,7 +56,7 @@ OperationTests testsOf<ColourLoss>() {
                                  const std::vector<float> weights = stage.random.floats(rays, 0, 2);
                                  ColourLoss a;
                                  a.kind = kind;
-                                 a.parameter = parameterOf(kind);
+                                 a.parameter = colourLossParameter(kind);
                                  a.scale = 0.3f;
                                  a.rays.capacity = rays;
                                  a.predicted = stage.input(predicted);
@@ -81,14 +81,14 @@ OperationTests testsOf<ColourLoss>() {
 }
 
 template <>
-OperationTests testsOf<DistortionLoss>() {
+OperationTests makeTests<DistortionLoss>() {
   OperationTests tests;
   for (const Size& size : kSizes)
     for (bool normalised : {false, true})
       tests.cases.push_back(
           {fmt::format("rays {}{}", toString(size), normalised ? ", normalised" : ""), [=](Stage& stage) {
              const std::vector<uint32_t> first = stage.random.firstSamples(size.capacity, 40);
-             std::vector<float> distances;  // increasing along a ray, across the seam of the warp at 1
+             std::vector<float> distances;  // increasing along a ray, on both sides of the seam of the warp at 1
              for (uint32_t ray = 0; ray < size.capacity; ++ray)
                for (uint32_t i = 0; i < first[ray + 1] - first[ray]; ++i)
                  distances.push_back(0.2f + 0.05f * static_cast<float>(i) + stage.random.uniform(0, 0.04f));
@@ -135,7 +135,7 @@ OperationTests testsOf<DistortionLoss>() {
 }
 
 template <>
-OperationTests testsOf<DepthLoss>() {
+OperationTests makeTests<DepthLoss>() {
   OperationTests tests;
   for (const Size& size : kSizes)
     tests.cases.push_back({"rays " + toString(size), [=](Stage& stage) {
@@ -183,7 +183,7 @@ OperationTests testsOf<DepthLoss>() {
 }
 
 template <>
-OperationTests testsOf<S3imLoss>() {
+OperationTests makeTests<S3imLoss>() {
   OperationTests tests;
   for (const Size& size : kSizes)
     for (bool weighted : {false, true})
@@ -221,14 +221,13 @@ OperationTests testsOf<S3imLoss>() {
                                  a.loss = stage.output("loss", 1);
                                  a.gradients = stage.input(std::vector<float>(3 * rays));
                                  stage.device.run(a);
-                                 // A ray of weight 0 is alike whatever it is, so what moves there is not `predicted`
-                                 // alone.
+                                 // A ray of weight 0 counts as equal, so its prediction and its target are both fixed.
                                  const Doubles y = toDoubles(target), w = toDoubles(weights),
-                                               kept = toDoubles(predicted);
+                                               original = toDoubles(predicted);
                                  const auto loss = [&](View x) {
                                    Doubles moved(x.begin(), x.end()), beside = y;
                                    for (size_t i = 0; i < moved.size(); ++i)
-                                     if (w[i / 3] == 0) beside[i] = moved[i] = kept[i];
+                                     if (w[i / 3] == 0) beside[i] = moved[i] = original[i];
                                    return a.scale * reference::s3imLoss(moved, beside, {}, a.patches, a.seed).loss;
                                  };
                                  return std::vector<GradientPair>{{"predicted", stage.device.read(a.gradients),
@@ -239,7 +238,7 @@ OperationTests testsOf<S3imLoss>() {
 }
 
 template <>
-OperationTests testsOf<OpacityLoss>() {
+OperationTests makeTests<OpacityLoss>() {
   OperationTests tests;
   for (const Size& size : kSizes)
     tests.cases.push_back({"segments " + toString(size), [=](Stage& stage) {
@@ -279,7 +278,7 @@ OperationTests testsOf<OpacityLoss>() {
 }
 
 template <>
-OperationTests testsOf<SparsityLoss>() {
+OperationTests makeTests<SparsityLoss>() {
   OperationTests tests;
   for (const Size& size : kSizes)
     tests.cases.push_back({"points " + toString(size), [=](Stage& stage) {
@@ -317,7 +316,7 @@ OperationTests testsOf<SparsityLoss>() {
 }
 
 template <>
-OperationTests testsOf<ExposureForward>() {
+OperationTests makeTests<ExposureForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is ExposureBackward";
   for (const Size& size : kSizes)
@@ -340,7 +339,7 @@ OperationTests testsOf<ExposureForward>() {
 }
 
 template <>
-OperationTests testsOf<ExposureBackward>() {
+OperationTests makeTests<ExposureBackward>() {
   OperationTests tests;
   for (const Size& size : kSizes)
     for (bool inPlace : {false, true})
@@ -403,7 +402,7 @@ OperationTests testsOf<ExposureBackward>() {
 }
 
 template <>
-OperationTests testsOf<Adam>() {
+OperationTests makeTests<Adam>() {
   OperationTests tests;
   tests.noGradient = "it is the optimiser";
   for (uint32_t count : {1u, 37u, 1061u, 150001u})
@@ -414,7 +413,7 @@ OperationTests testsOf<Adam>() {
                                  std::vector<float> gradients = stage.random.floats(count, -1, 1);
                                  std::vector<uint32_t> counts = stage.random.wordsBelow(count, 300);
                                  for (size_t i = 0; i < count; ++i) {
-                                   // Stretches of zeros longer than any vector, as hash tables have; negative zero is
+                                   // Runs of zeros longer than any vector, as in hash tables; negative zero counts as
                                    // zero.
                                    if (i / 64 % 2 == 1 || stage.random.below(4) == 0)
                                      gradients[i] = stage.random.below(2) ? 0.0f : -0.0f;
@@ -425,9 +424,10 @@ OperationTests testsOf<Adam>() {
                                  a.skipZeroGradients = skip;
                                  a.l2 = l2;
                                  if (count == 1061) a.rows = stage.input(std::vector<uint32_t>{7, skip ? 7u : 8u});
-                                 // What was found has room, or has not.
-                                 if (count == 37) a.found = stage.input(std::vector<uint32_t>{7, skip ? 9u : 8u, 3});
-                                 a.room = 8;
+                                 // Counters that stay within the capacity, or exceed it.
+                                 if (count == 37)
+                                   a.overflowCounters = stage.input(std::vector<uint32_t>{7, skip ? 9u : 8u, 3});
+                                 a.capacity = 8;
                                  a.parameters = stage.output("parameters", stage.random.floats(count, -1, 1));
                                  a.gradients = stage.output("gradients", gradients);
                                  a.firstMoments = stage.output("firstMoments", stage.random.floats(count, -0.1f, 0.1f));

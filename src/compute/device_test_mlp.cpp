@@ -1,4 +1,4 @@
-// Cases of the fully connected networks.
+// Test cases of the fully connected networks.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -44,7 +44,7 @@ std::vector<float> randomWeights(Random& random, const MlpShape& shape) {
   return weights;
 }
 
-// What a forward pass would have left behind, of all `capacity` samples.
+// Random inputs, weights, outputs and activations, like those of a forward pass over all `capacity` samples.
 struct Network {
   std::vector<float> input, weights, output, activations;
 
@@ -59,7 +59,7 @@ struct Network {
 }  // namespace
 
 template <>
-OperationTests testsOf<MlpForward>() {
+OperationTests makeTests<MlpForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is MlpBackward";
   tests.inHalves = true;
@@ -83,7 +83,7 @@ OperationTests testsOf<MlpForward>() {
 }
 
 template <>
-OperationTests testsOf<MlpBackward>() {
+OperationTests makeTests<MlpBackward>() {
   OperationTests tests;
   tests.inHalves = true;
   for (const NetworkCase& network : networks())
@@ -95,11 +95,11 @@ OperationTests testsOf<MlpBackward>() {
                          withInput ? ", input gradients" : ""),
              [=](Stage& stage) {
                const MlpShape& shape = network.shape;
-               const Network kept(stage.random, shape, size.capacity);
+               const Network saved(stage.random, shape, size.capacity);
                stage.device.run(MlpBackward{
-                   shape, stage.count(size), stage.matrixOf(kept.input, shape.inputs, network.input),
-                   stage.input(kept.weights), stage.matrixOf(kept.output, shape.outputs, network.output),
-                   stage.keptInput(kept.activations),
+                   shape, stage.count(size), stage.makeMatrix(saved.input, shape.inputs, network.input),
+                   stage.input(saved.weights), stage.makeMatrix(saved.output, shape.outputs, network.output),
+                   stage.keptInput(saved.activations),
                    stage.randomMatrix(size.capacity, shape.outputs, network.output, -1, 1),
                    withFirst ? stage.randomInput(size.capacity, -1, 1) : Slice<float>(),
                    stage.output("weightGradients", stage.random.floats(shape.parameters(), -1, 1)),
@@ -112,26 +112,26 @@ OperationTests testsOf<MlpBackward>() {
         {network.name(), [=](Stage& stage) {
            const MlpShape& shape = network.shape;
            const uint32_t samples = 6;
-           const Network kept(stage.random, shape, samples);
+           const Network saved(stage.random, shape, samples);
            const std::vector<float> upstream = stage.random.floats(samples * shape.outputs, -1, 1);
            const std::vector<float> first = stage.random.floats(samples, -1, 1);
            const Slice<float> weightGradients = stage.input(std::vector<float>(shape.parameters()));
            const Matrix<float> inputGradients =
                stage.outputMatrix("inputGradients", samples, shape.inputs, Layout::plain);
-           stage.device.run(
-               MlpBackward{shape, Count{samples, {}}, stage.matrixOf(kept.input, shape.inputs, network.input),
-                           stage.input(kept.weights), stage.matrixOf(kept.output, shape.outputs, network.output),
-                           stage.keptInput(kept.activations), stage.matrixOf(upstream, shape.outputs, network.output),
-                           stage.input(first), weightGradients, inputGradients});
+           stage.device.run(MlpBackward{
+               shape, Count{samples, {}}, stage.makeMatrix(saved.input, shape.inputs, network.input),
+               stage.input(saved.weights), stage.makeMatrix(saved.output, shape.outputs, network.output),
+               stage.keptInput(saved.activations), stage.makeMatrix(upstream, shape.outputs, network.output),
+               stage.input(first), weightGradients, inputGradients});
            const auto loss = [&](View input, View weights) {
              const reference::MlpResult result = reference::mlpForward(shape, samples, input, weights);
              double sum = dot(result.output, toDoubles(upstream));
              for (uint32_t s = 0; s < samples; ++s) sum += first[s] * result.output[s * shape.outputs];
              return sum;
            };
-           const Doubles x = toDoubles(kept.input), w = toDoubles(kept.weights);
+           const Doubles x = toDoubles(saved.input), w = toDoubles(saved.weights);
            const std::vector<uint32_t> some = stage.random.wordsBelow(60, static_cast<uint32_t>(shape.parameters()));
-           // The step is small enough that no ReLU turns on the way.
+           // The step is small enough that no ReLU changes its state.
            return std::vector<GradientPair>{
                {"weights", pick(stage.device.read(weightGradients), some),
                 centralDifferences([&](View moved) { return loss(x, moved); }, w, 1e-7, some)},

@@ -1,4 +1,4 @@
-// What must hold on every device whatever the reference says.
+// Properties that must hold on every device, independently of the reference.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -17,11 +17,11 @@ namespace {
 class DeviceProperties : public testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
-    useSimdTargetOf(GetParam());
+    selectSimdTarget(GetParam());
     device = deviceNamed(GetParam());
     if (device == nullptr) GTEST_SKIP() << "this machine has no device \"" << GetParam() << "\"";
   }
-  void TearDown() override { useSimdTargetOf({}); }
+  void TearDown() override { selectSimdTarget({}); }
   Device* device = nullptr;
 };
 
@@ -63,22 +63,22 @@ TEST_P(DeviceProperties, OpacityIsTheSumOfWeights) {
 
 TEST_P(DeviceProperties, MarchingInRoundsMakesTheSamplesOfOneMarch) {
   Stage stage(*device, 74);
-  const uint32_t rays = 50, room = 20000;
+  const uint32_t rays = 50, capacity = 20000;
   const MarchSpace space{.contracted = true, .gridResolution = 16, .far = 50, .minStep = 0.02f, .cone = 1.0f / 64};
   std::vector<uint32_t> bits(16 * 16 * 16 / 32);
   for (uint32_t& word : bits) word = stage.random.bits();
   MarchRays march{space};
   march.rays.capacity = rays;
-  march.sampleCapacity = room;
+  march.sampleCapacity = capacity;
   march.origins = stage.input(stage.random.floats(3 * rays, -1.5f, 1.5f));
   march.directions = stage.input(stage.random.directions(rays));
   march.jitter = stage.randomInput(rays, 0, 1);
   march.occupancy = stage.input(bits);
   march.firstSample = stage.outputWords("firstSample", rays + 1);
   march.sampleCount = stage.outputWords("sampleCount", 1);
-  march.positions = stage.output("positions", 3 * room);
-  march.distances = stage.output("distances", room);
-  march.steps = stage.output("steps", room);
+  march.positions = stage.output("positions", 3 * capacity);
+  march.distances = stage.output("distances", capacity);
+  march.steps = stage.output("steps", capacity);
   std::vector<std::vector<float>> whole(rays), pieces(rays);
   const auto collect = [&](std::vector<std::vector<float>>& samples) {
     device->run(march);
@@ -90,8 +90,8 @@ TEST_P(DeviceProperties, MarchingInRoundsMakesTheSamplesOfOneMarch) {
   };
   collect(whole);
   march.nextStep = stage.input(std::vector<uint32_t>(rays));
-  for (const uint32_t most : {1u, 7u, 16u, 3u, 0xffffffffu}) {
-    march.most = most;
+  for (const uint32_t maximum : {1u, 7u, 16u, 3u, 0xffffffffu}) {
+    march.maximum = maximum;
     collect(pieces);
   }
   EXPECT_EQ(whole, pieces);
@@ -117,7 +117,7 @@ TEST_P(DeviceProperties, CompactionKeepsAllSamplesThatCompositingWeighs) {
   CompactSamples c;
   c.rays.capacity = rays;
   c.sampleCapacity = c.keptCapacity = first.back();
-  c.mostOpticalDepth = -std::log(a.minTransmittance);
+  c.maxOpticalDepth = -std::log(a.minTransmittance);
   c.firstSample = a.firstSample;
   c.logDensity = a.x;
   c.steps = a.steps;
@@ -127,10 +127,10 @@ TEST_P(DeviceProperties, CompactionKeepsAllSamplesThatCompositingWeighs) {
   c.rayOfSample = stage.outputWords("rayOfSample", first.back());
   device->run(c);
   const std::vector<uint32_t> source = device->read(c.source);
-  const uint32_t kept = device->read(c.keptCount)[0];
-  EXPECT_LT(kept, first.back());
+  const uint32_t keptSamples = device->read(c.keptCount)[0];
+  EXPECT_LT(keptSamples, first.back());
   std::vector<bool> isKept(first.back());
-  for (uint32_t i = 0; i < kept; ++i) isKept[source[i]] = true;
+  for (uint32_t i = 0; i < keptSamples; ++i) isKept[source[i]] = true;
   const std::vector<float> weights = device->read(a.weights);
   for (uint32_t i = 0; i < first.back(); ++i) EXPECT_EQ(isKept[i], weights[i] > 0) << i;
 }
@@ -148,7 +148,7 @@ TEST_P(DeviceProperties, OccupancyForgetsWhatIsEmptyAndKeepsWhatIsFull) {
   std::vector<uint32_t> before(all / 32, ~0u);
   for (; updates < 150; ++updates) {
     device->run(OccupancyPoints{space, all, 0, static_cast<uint64_t>(updates), {}, bits, cells, positions});
-    std::vector<float> logDensity;  // a wall where x < 1/4, of optical thickness 0.05 per step; nothing beyond
+    std::vector<float> logDensity;  // a wall at x < 1/4 with an optical thickness of 0.05 per step; empty beyond
     const std::vector<float> at = device->read(positions);
     for (uint32_t i = 0; i < all; ++i) logDensity.push_back(at[3 * i] < 0.25f ? std::log(5.0f) : -30.0f);
     device->write(densities, std::span<const float>(logDensity));
@@ -157,7 +157,7 @@ TEST_P(DeviceProperties, OccupancyForgetsWhatIsEmptyAndKeepsWhatIsFull) {
     if (now != before) lastChange = updates;
     before = now;
   }
-  // 0.95^n < 0.01 from n = 90 on, the mean being above 0.01 for as long.
+  // 0.95^n < 0.01 from n = 90 on; the mean stays above 0.01 until then.
   EXPECT_NEAR(lastChange, 89, 1);
   for (uint32_t cell = 0; cell < all; ++cell) EXPECT_EQ(before[cell / 32] >> cell % 32 & 1, cell % 8 < 2 ? 1u : 0u);
 }
@@ -178,7 +178,8 @@ TEST_P(DeviceProperties, AdamCountsTheStepsOfEachParameterAndLeavesTheUntouchedA
   for (int step = 0; step < 20; ++step) {
     std::vector<float> gradients(n);
     for (size_t i = 0; i < n; ++i) {
-      if (i % 10 == 9 || (i + step) % 3 == 0) continue;  // some never, all others in two of three steps
+      // Some parameters never have a gradient; all others have one in two of three steps.
+      if (i % 10 == 9 || (i + step) % 3 == 0) continue;
       const double g = gradients[i] = stage.random.uniform(0.1f, 1) * (stage.random.below(2) ? 1e-6f : 1.0f);
       m[i] = 0.9 * m[i] + 0.1 * g;
       v[i] = 0.99 * v[i] + 0.01 * g * g;

@@ -1,4 +1,4 @@
-// Cases of proposal sampling.
+// Test cases of proposal sampling.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 namespace tessera::device_test {
 namespace {
 
-// [rays][intervals + 1], increasing, no two as good as equal.
+// [rays][intervals + 1], increasing, and no two nearly equal.
 std::vector<float> randomFences(Random& random, size_t rays, uint32_t intervals) {
   std::vector<float> fences;
   for (size_t r = 0; r < rays; ++r) {
@@ -21,7 +21,7 @@ std::vector<float> randomFences(Random& random, size_t rays, uint32_t intervals)
   return fences;
 }
 
-// Some rays see nothing, some one thing only.
+// Weights that are zero on some rays, and concentrated in one interval on others.
 std::vector<float> randomWeights(Random& random, size_t rays, uint32_t intervals) {
   std::vector<float> weights = random.floats(rays * intervals, 0, 1);
   for (size_t i = 0; i < weights.size(); ++i) {
@@ -36,12 +36,12 @@ struct InterlevelScene {
   std::vector<uint32_t> first;
   std::vector<float> fences, weights, middles, widths, sampleWeights;
 
-  InterlevelScene(Random& random, size_t rays, uint32_t proposed, uint32_t mostSamples)
+  InterlevelScene(Random& random, size_t rays, uint32_t proposed, uint32_t maxSamples)
       : intervals(proposed),
-        first(random.firstSamples(rays, mostSamples)),
+        first(random.firstSamples(rays, maxSamples)),
         fences(randomFences(random, rays, proposed)),
         weights(random.floats(rays * proposed, 0, 0.3f)) {
-    for (uint32_t& row : first) row += 3;  // rows of a buffer need not begin with the first ray
+    for (uint32_t& row : first) row += 3;  // the samples of the first ray need not begin at row 0
     middles = widths = sampleWeights = {0.5f, 0.5f, 0.5f};
     for (size_t r = 0; r < rays; ++r) {
       const uint32_t count = first[r + 1] - first[r];
@@ -67,12 +67,12 @@ struct InterlevelScene {
 }  // namespace
 
 template <>
-OperationTests testsOf<ResampleFences>() {
+OperationTests makeTests<ResampleFences>() {
   OperationTests tests;
   tests.noGradient = "positions have none, by definition";
   struct Shape {
     uint32_t before, after;
-    float anneal, padding;
+    float anneal, uniformFraction;
   };
   for (const Shape& shape : {Shape{64, 32, 1, 0.01f}, Shape{17, 40, 0.4f, 0.05f}, Shape{5, 1, 0, 0.01f},
                              Shape{1, 9, 1, 0.01f}, Shape{13, 8, 1, 0}})
@@ -80,14 +80,14 @@ OperationTests testsOf<ResampleFences>() {
       for (bool jittered : {false, true})
         tests.cases.push_back(
             {fmt::format("{} from {} intervals, anneal {}, padding {}, rays {}{}", shape.after, shape.before,
-                         shape.anneal, shape.padding, toString(size), jittered ? ", jitter" : ""),
+                         shape.anneal, shape.uniformFraction, toString(size), jittered ? ", jitter" : ""),
              [=](Stage& stage) {
                ResampleFences a;
                a.rays = stage.count(size);
                a.before = shape.before;
                a.after = shape.after;
                a.anneal = shape.anneal;
-               a.padding = shape.padding;
+               a.uniformFraction = shape.uniformFraction;
                a.fences = stage.input(randomFences(stage.random, size.capacity, shape.before));
                a.weights = stage.input(randomWeights(stage.random, size.capacity, shape.before));
                if (jittered) a.jitter = stage.randomInput(size.capacity, 0, 1);
@@ -98,7 +98,7 @@ OperationTests testsOf<ResampleFences>() {
 }
 
 template <>
-OperationTests testsOf<InterlevelLoss>() {
+OperationTests makeTests<InterlevelLoss>() {
   OperationTests tests;
   for (uint32_t intervals : {1u, 16u, 64u})
     for (const Size& size : kSizes)

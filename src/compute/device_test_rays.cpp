@@ -1,4 +1,4 @@
-// Cases of ray generation, marching and moving samples about.
+// Test cases of ray generation, marching, compaction, gathering and occupancy.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -12,7 +12,7 @@
 namespace tessera::device_test {
 namespace {
 
-// A picture of about 640 × 480 through each lens, distorted as real lenses are, with a random pose.
+// A camera with an image of about 640 × 480 pixels, realistic distortion and a random pose.
 RayCamera randomCamera(Random& random, LensModel lens) {
   RayCamera camera;
   camera.lens = static_cast<int32_t>(lens);
@@ -31,7 +31,7 @@ RayCamera randomCamera(Random& random, LensModel lens) {
     camera.parameters[4] = 0.6f;
     camera.parameters[5] = 1.1f;
   }
-  const std::vector<float> axes = random.directions(2);  // made into a rotation by Gram and Schmidt
+  const std::vector<float> axes = random.directions(2);  // orthogonalised by Gram-Schmidt into a rotation
   const Vec3d x(axes[0], axes[1], axes[2]), z = x.cross(Vec3d(axes[3], axes[4], axes[5])).normalized(), y = z.cross(x);
   for (int row = 0; row < 3; ++row) {
     camera.rotation[3 * row] = static_cast<float>(x[row]);
@@ -48,27 +48,27 @@ struct NamedSpace {
 };
 
 std::vector<NamedSpace> spaces() {
-  std::vector<NamedSpace> made(6);
-  made[0] = {"contracted", {.contracted = true, .gridResolution = 16, .far = 50, .minStep = 0.02f, .cone = 1.0f / 64}};
-  made[1] = {"contracted, uniform steps",
-             {.contracted = true, .gridResolution = 12, .far = 5, .minStep = 0.03f, .cone = 0}};
-  made[2] = {"contracted, steps bounded",
-             {.contracted = true,
-              .gridResolution = 16,
-              .near = 0,
-              .far = 30,
-              .minStep = 0.02f,
-              .maxStep = 0.1f,
-              .cone = 0.02f}};
-  made[3] = {"contracted, fine grid",
-             {.contracted = true, .gridResolution = 64, .far = 1000, .minStep = 0.00338f, .cone = 1.0f / 256}};
-  made[4] = {"bounded, uniform steps", {.contracted = false, .gridResolution = 16, .minStep = 0.02f, .cone = 0}};
-  made[5] = {"bounded, fine grid",
-             {.contracted = false, .gridResolution = 32, .near = 0.2f, .minStep = 0.01f, .cone = 0.01f}};
-  return made;
+  std::vector<NamedSpace> all(6);
+  all[0] = {"contracted", {.contracted = true, .gridResolution = 16, .far = 50, .minStep = 0.02f, .cone = 1.0f / 64}};
+  all[1] = {"contracted, uniform steps",
+            {.contracted = true, .gridResolution = 12, .far = 5, .minStep = 0.03f, .cone = 0}};
+  all[2] = {"contracted, steps bounded",
+            {.contracted = true,
+             .gridResolution = 16,
+             .near = 0,
+             .far = 30,
+             .minStep = 0.02f,
+             .maxStep = 0.1f,
+             .cone = 0.02f}};
+  all[3] = {"contracted, fine grid",
+            {.contracted = true, .gridResolution = 64, .far = 1000, .minStep = 0.00338f, .cone = 1.0f / 256}};
+  all[4] = {"bounded, uniform steps", {.contracted = false, .gridResolution = 16, .minStep = 0.02f, .cone = 0}};
+  all[5] = {"bounded, fine grid",
+            {.contracted = false, .gridResolution = 32, .near = 0.2f, .minStep = 0.01f, .cone = 0.01f}};
+  return all;
 }
 
-// Bits of a grid, each set with probability `share`.
+// The bits of an occupancy grid, each set with probability `share`.
 std::vector<uint32_t> randomBits(Random& random, const MarchSpace& space, float share) {
   const uint32_t cells = space.gridResolution * space.gridResolution * space.gridResolution;
   std::vector<uint32_t> bits(cells / 32);
@@ -77,7 +77,7 @@ std::vector<uint32_t> randomBits(Random& random, const MarchSpace& space, float 
   return bits;
 }
 
-// Inside and outside of the cube, in all directions, along axes, and none.
+// Rays with origins inside and outside the cube, and with random, axis-parallel and zero directions.
 void makeRays(Random& random, size_t rays, std::vector<float>* origins, std::vector<float>* directions) {
   *origins = random.floats(3 * rays, -0.9f, 0.9f);
   *directions = random.directions(rays);
@@ -95,7 +95,7 @@ void makeRays(Random& random, size_t rays, std::vector<float>* origins, std::vec
 }  // namespace
 
 template <>
-OperationTests testsOf<GenerateRays>() {
+OperationTests makeTests<GenerateRays>() {
   OperationTests tests;
   tests.noGradient = "cameras and pixels are fixed";
   for (const Size& size : kSizes)
@@ -110,7 +110,7 @@ OperationTests testsOf<GenerateRays>() {
                              const Slice<float> memory = stage.input(words);
                              std::vector<float> pixels = stage.random.floats(2 * size.capacity, 0, 480);
                              for (size_t i = 0; i < pixels.size(); i += 26)
-                               pixels[i] = 1e7f;  // beyond every fold, or far to the side
+                               pixels[i] = 1e7f;  // far outside the image, where the lens may have no inverse
                              GenerateRays a;
                              a.rays = stage.count(size);
                              a.cameras = Slice<const RayCamera>(memory.memory, 0, kLenses);
@@ -124,7 +124,7 @@ OperationTests testsOf<GenerateRays>() {
 }
 
 template <>
-OperationTests testsOf<MarchRays>() {
+OperationTests makeTests<MarchRays>() {
   OperationTests tests;
   tests.decides = true;
   tests.noGradient = "sample positions carry no gradient";
@@ -133,7 +133,7 @@ OperationTests testsOf<MarchRays>() {
       for (float share : {0.0f, 0.02f, 0.4f, 1.0f})
         for (int optional = 0; optional < 2; ++optional) {
           if (share == 1 && size.used() > 40) continue;
-          // The second time samples run out.
+          // In the second case the capacity is too small for all samples.
           const uint32_t sampleCapacity = optional == 0 ? 60000 : 300;
           tests.cases.push_back({fmt::format("{}, rays {}, {} occupied, {}", named.name, toString(size), share,
                                              optional == 0 ? "plain" : "jitter, far of ray, few samples"),
@@ -174,15 +174,15 @@ OperationTests testsOf<MarchRays>() {
                                MarchRays a{named.space};
                                a.rays.capacity = rays;
                                a.sampleCapacity = sampleCapacity;
-                               a.mostOpticalDepth = 0.8f;
+                               a.maxOpticalDepth = 0.8f;
                                a.origins = stage.input(origins);
                                a.directions = stage.input(directions);
                                a.jitter = stage.randomInput(rays, 0, 1);
                                a.occupancy = stage.input(randomBits(stage.random, named.space, share));
                                a.opticalDepth = stage.input(opaque);
                                a.nextStep = stage.outputWords("nextStep", std::vector<uint32_t>(rays));
-                               for (const uint32_t most : {5u, 0u, 1u, 15u, ~0u}) {  // the fourth time not all fit
-                                 a.most = most;
+                               for (const uint32_t maximum : {5u, 0u, 1u, 15u, ~0u}) {  // the fourth round does not fit
+                                 a.maximum = maximum;
                                  a.firstSample = stage.outputWords("firstSample", rays + 1);
                                  a.sampleCount = stage.outputWords("sampleCount", 1);
                                  a.positions = stage.output("positions", 3 * sampleCapacity, 1e-6);
@@ -195,7 +195,7 @@ OperationTests testsOf<MarchRays>() {
 }
 
 template <>
-OperationTests testsOf<OpticalDepth>() {
+OperationTests makeTests<OpticalDepth>() {
   OperationTests tests;
   tests.noGradient = "it only decides which samples are seen";
   for (const Size& size : kSizes)
@@ -215,14 +215,14 @@ OperationTests testsOf<OpticalDepth>() {
 }
 
 template <>
-OperationTests testsOf<CompactSamples>() {
+OperationTests makeTests<CompactSamples>() {
   OperationTests tests;
   tests.noGradient = "it chooses samples; none is changed";
   for (const Size& size : kSizes)
     for (const uint32_t rounds : {1u, 3u})
       tests.cases.push_back({fmt::format("rays {}, {} rounds", toString(size), rounds), [=](Stage& stage) {
                                std::vector<uint32_t> first;
-                               uint32_t capacity = 9;  // of a round
+                               uint32_t capacity = 9;  // per round
                                for (uint32_t round = 0; round < rounds; ++round) {
                                  const auto ofRound = stage.random.firstSamples(size.capacity, 40 / rounds);
                                  first.insert(first.end(), ofRound.begin(), ofRound.end());
@@ -236,12 +236,12 @@ OperationTests testsOf<CompactSamples>() {
                                a.rounds = rounds;
                                a.sampleCapacity = capacity;
                                a.keptCapacity = capacity * rounds;
-                               a.mostOpticalDepth = 9.2f;
+                               a.maxOpticalDepth = 9.2f;
                                a.firstSample = stage.input(first);
-                               if (rounds > 1) {  // some are not finished, and not all fit
+                               if (rounds > 1) {  // some rays are not finished, and not all samples fit
                                  a.nextStep = stage.input(nextStep);
                                  a.finishedRays = stage.outputWords("finishedRays", 1);
-                                 a.mostOpticalDepth = 1.2f;
+                                 a.maxOpticalDepth = 1.2f;
                                  a.keptCapacity = capacity / 2;
                                }
                                a.logDensity = stage.randomMatrix(size_t{capacity} * rounds, 1,
@@ -257,7 +257,7 @@ OperationTests testsOf<CompactSamples>() {
 }
 
 template <>
-OperationTests testsOf<GatherRows>() {
+OperationTests makeTests<GatherRows>() {
   OperationTests tests;
   tests.noGradient = "it moves what will be computed again";
   struct Shape {
@@ -269,7 +269,7 @@ OperationTests testsOf<GatherRows>() {
     for (const Size& size : kSizes)
       tests.cases.push_back({fmt::format("{} columns, rows {}", shape.columns, toString(size)), [=](Stage& stage) {
                                const uint32_t sources = 200;
-                               // Any bits: integers travel this way too, and look like NaN or denormal numbers.
+                               // Arbitrary bits, because integers are moved too and can look like NaN or denormals.
                                Matrix<float> input = stage.randomMatrix(sources, shape.columns, shape.layout, -1, 1);
                                std::vector<uint32_t> bits(input.data.count);
                                for (uint32_t& word : bits) word = stage.random.bits() >> stage.random.below(32);
@@ -286,7 +286,7 @@ OperationTests testsOf<GatherRows>() {
 }
 
 template <>
-OperationTests testsOf<OccupancyPoints>() {
+OperationTests makeTests<OccupancyPoints>() {
   OperationTests tests;
   tests.noGradient = "it only chooses where to look";
   for (const NamedSpace& named : spaces())
@@ -300,7 +300,7 @@ OperationTests testsOf<OccupancyPoints>() {
              [=, uniform = uniform, occupied = occupied, first = first](Stage& stage) {
                const uint32_t points = uniform + occupied - first;
                const uint64_t seed = stage.random.bits();
-               Slice<const uint32_t> candidates;  // all; for many points, every third
+               Slice<const uint32_t> candidates;  // all cells, or every third if there are many points
                std::vector<uint32_t> thirds;
                for (uint32_t cell = 1; cell < all; cell += 3) thirds.push_back(cell);
                if (uniform == 1003) candidates = stage.input(thirds);
@@ -314,7 +314,7 @@ OperationTests testsOf<OccupancyPoints>() {
 }
 
 template <>
-OperationTests testsOf<OccupancyUpdate>() {
+OperationTests makeTests<OccupancyUpdate>() {
   OperationTests tests;
   tests.noGradient = "it is no part of the loss";
   for (const NamedSpace& named : spaces())
@@ -332,10 +332,10 @@ OperationTests testsOf<OccupancyUpdate>() {
                                  for (size_t i = 0; i + 1 < cells.size(); i += 5) cells[i + 1] = cells[i];
                                  std::vector<float> logDensity = stage.random.floats(points, -4, 4);
                                  for (size_t i = 0; i < logDensity.size(); i += 101)
-                                   logDensity[i] = 200;  // whose exponential is infinite
+                                   logDensity[i] = 200;  // its exponential is infinite in float
                                  stage.device.run(OccupancyUpdate{
                                      named.space, points, 0.95f, points == 1 ? 1.0f : 0.01f, stage.input(cells),
-                                     stage.matrixOf(logDensity, 1, layout), stage.output("grid", grid, 1e-6),
+                                     stage.makeMatrix(logDensity, 1, layout), stage.output("grid", grid, 1e-6),
                                      stage.outputWords("occupancy", all / 32)});
                                }});
   return tests;

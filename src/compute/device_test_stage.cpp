@@ -41,9 +41,9 @@ std::vector<uint32_t> Random::wordsBelow(size_t count, uint32_t n) {
   return values;
 }
 
-std::vector<uint32_t> Random::firstSamples(size_t rays, uint32_t most) {
+std::vector<uint32_t> Random::firstSamples(size_t rays, uint32_t maximum) {
   std::vector<uint32_t> first{0};
-  for (size_t r = 0; r < rays; ++r) first.push_back(first.back() + (below(5) == 0 ? 0 : below(most + 1)));
+  for (size_t r = 0; r < rays; ++r) first.push_back(first.back() + (below(5) == 0 ? 0 : below(maximum + 1)));
   return first;
 }
 
@@ -62,14 +62,14 @@ Count Stage::count(const Size& size) {
 }
 
 Slice<float> Stage::input(const std::vector<float>& values) {
-  return floats_.emplace_back(device.arrayOf(values)).all();
+  return floats_.emplace_back(device.uploadArray(values)).all();
 }
 
 Slice<uint32_t> Stage::input(const std::vector<uint32_t>& values) {
-  return words_.emplace_back(device.arrayOf(values)).all();
+  return words_.emplace_back(device.uploadArray(values)).all();
 }
 
-size_t Stage::sizeOf(size_t rows, uint32_t columns, Layout layout) {
+size_t Stage::layoutSize(size_t rows, uint32_t columns, Layout layout) {
   switch (layout) {
     case Layout::plain:
       return rows * columns;
@@ -93,9 +93,9 @@ Matrix<float> Stage::shaped(Slice<float> buffer, size_t rows, uint32_t columns, 
   return {};
 }
 
-Matrix<float> Stage::matrixOf(const std::vector<float>& values, uint32_t columns, Layout layout) {
+Matrix<float> Stage::makeMatrix(const std::vector<float>& values, uint32_t columns, Layout layout) {
   const size_t rows = values.size() / columns;
-  std::vector<float> placed(sizeOf(rows, columns, layout), kPoison);
+  std::vector<float> placed(layoutSize(rows, columns, layout), kPoison);
   const Matrix<float> matrix = shaped(input(placed), rows, columns, layout);
   for (size_t i = 0; i < values.size(); ++i)
     placed[matrix.data.first + matrix.offset(i / columns, i % columns)] = values[i];
@@ -104,7 +104,7 @@ Matrix<float> Stage::matrixOf(const std::vector<float>& values, uint32_t columns
 }
 
 Matrix<float> Stage::randomMatrix(size_t rows, uint32_t columns, Layout layout, float low, float high) {
-  return matrixOf(random.floats(rows * columns, low, high), columns, layout);
+  return makeMatrix(random.floats(rows * columns, low, high), columns, layout);
 }
 
 Slice<float> Stage::output(std::string name, size_t size, double tolerance) {
@@ -128,23 +128,24 @@ Slice<uint32_t> Stage::outputWords(std::string name, const std::vector<uint32_t>
 }
 
 Matrix<float> Stage::outputMatrix(std::string name, size_t rows, uint32_t columns, Layout layout, double tolerance) {
-  return shaped(output(std::move(name), sizeOf(rows, columns, layout), tolerance), rows, columns, layout);
+  return shaped(output(std::move(name), layoutSize(rows, columns, layout), tolerance), rows, columns, layout);
 }
 
 namespace {
 
-// To the nearest, ties to even; what is too large is infinite.
-uint16_t halfOf(float value) {
+// Rounds to the nearest fp16 value, ties to even; values that are too large become infinite.
+uint16_t floatToHalf(float value) {
   const uint32_t bits = std::bit_cast<uint32_t>(value);
   const auto sign = static_cast<uint16_t>(bits >> 16 & 0x8000u);
   const float size = std::abs(value);
   if (size >= 65520) return sign | 0x7c00u;
   const int exponent = std::max(std::ilogb(std::max(size, 1e-30f)), -14);
-  const float steps = std::nearbyint(std::ldexp(size, 10 - exponent));  // of the last bit; 1024 and more: normal
+  // In units of the last bit; at least 1024 for normal numbers.
+  const float steps = std::nearbyint(std::ldexp(size, 10 - exponent));
   return sign | static_cast<uint16_t>((exponent + 14) * 1024 + static_cast<int>(steps));
 }
 
-float floatOf(uint16_t half) {
+float halfToFloat(uint16_t half) {
   const int exponent = half >> 10 & 31, steps = half & 1023;
   const float size = exponent == 0    ? std::ldexp(static_cast<float>(steps), -24)
                      : exponent == 31 ? (steps == 0 ? INFINITY : NAN)
@@ -155,16 +156,17 @@ float floatOf(uint16_t half) {
 }  // namespace
 
 Slice<float> Stage::keptInput(const std::vector<float>& values) {
-  if (!device.keepsHalves()) return input(values);
+  if (!device.storesActivationsInHalf()) return input(values);
   CHECK(values.size() % 2 == 0u);
   std::vector<float> pairs;
   for (size_t i = 0; i < values.size(); i += 2)
-    pairs.push_back(std::bit_cast<float>(halfOf(values[i]) | static_cast<uint32_t>(halfOf(values[i + 1])) << 16));
+    pairs.push_back(
+        std::bit_cast<float>(floatToHalf(values[i]) | static_cast<uint32_t>(floatToHalf(values[i + 1])) << 16));
   return input(pairs);
 }
 
 Slice<float> Stage::keptOutput(std::string name, size_t size, double tolerance) {
-  if (!device.keepsHalves()) return output(std::move(name), size, tolerance);
+  if (!device.storesActivationsInHalf()) return output(std::move(name), size, tolerance);
   CHECK(size % 2 == 0u);
   const Slice<float> slice = input(std::vector<float>(size / 2, std::bit_cast<float>(kPoisonWord)));
   watched_.push_back({std::move(name), tolerance, slice, {}, true});
@@ -182,7 +184,7 @@ Outputs Stage::outputs() {
         const auto word = std::bit_cast<uint32_t>(pair);
         for (const uint32_t shift : {0, 16}) {
           const auto half = static_cast<uint16_t>(word >> shift);
-          values.push_back(half == static_cast<uint16_t>(kPoisonWord >> shift) ? kPoison : floatOf(half));
+          values.push_back(half == static_cast<uint16_t>(kPoisonWord >> shift) ? kPoison : halfToFloat(half));
         }
       }
       output.values = std::move(values);
@@ -196,12 +198,12 @@ Doubles centralDifferences(const std::function<double(View)>& f, Doubles x, doub
                            const std::vector<uint32_t>& which) {
   Doubles slopes;
   for (uint32_t i : which) {
-    const double kept = x[i];
-    x[i] = kept + h;
+    const double original = x[i];
+    x[i] = original + h;
     const double after = f(x);
-    x[i] = kept - h;
+    x[i] = original - h;
     const double before = f(x);
-    x[i] = kept;
+    x[i] = original;
     slopes.push_back((after - before) / (2 * h));
   }
   return slopes;
@@ -229,11 +231,11 @@ std::vector<float> toFloats(View values) {
   return floats;
 }
 
-void expectTheSameSums(const std::vector<float>& got, const std::vector<float>& wanted) {
-  ASSERT_EQ(got.size(), wanted.size());
+void expectTheSameSums(const std::vector<float>& actual, const std::vector<float>& expected) {
+  ASSERT_EQ(actual.size(), expected.size());
   float largest = 0;
-  for (const float value : wanted) largest = std::max(largest, std::abs(value));
-  for (size_t i = 0; i < wanted.size(); ++i) EXPECT_NEAR(got[i], wanted[i], 1e-5 * largest) << i;
+  for (const float value : expected) largest = std::max(largest, std::abs(value));
+  for (size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(actual[i], expected[i], 1e-5 * largest) << i;
 }
 
 double dot(View a, View b) {
@@ -258,7 +260,7 @@ std::unique_ptr<Device> openDevice(const std::string& name) {
       return nullptr;
     }
     if (name == "vulkan") return makeVulkanDevice(options);
-    // By few workgroups, which share out what the plain one has many for.
+    // Dispatches few workgroups, each of which processes the work of several.
     return name == kWithEmulatedMatrices ? makeVulkanDeviceWithEmulatedMatrices(options, {})
                                          : makeVulkanDeviceWithFewGroups(options);
   }
@@ -269,14 +271,14 @@ std::unique_ptr<Device> openDevice(const std::string& name) {
   return makeDevice(options);
 }
 
-// TESSERA_REQUIRE_VULKAN=1 in the environment makes a machine without a driver fail instead of skip.
+// With TESSERA_REQUIRE_VULKAN=1 in the environment, tests fail instead of being skipped on a machine without a driver.
 bool mustBeThere(const std::string& name) {
   const char* required = std::getenv("TESSERA_REQUIRE_VULKAN");
   return !name.starts_with("vulkan") || (required != nullptr && std::string(required) == "1");
 }
 
-// "cpu AVX2 with 2 threads" → "AVX2"; empty where the name says none.
-std::string simdTargetOf(const std::string& name) {
+// "cpu AVX2 with 2 threads" → "AVX2"; empty if the name contains no instruction set.
+std::string parseSimdTarget(const std::string& name) {
   const size_t begin = name.find(' ') + 1, end = name.find(" with ");
   return name.starts_with("cpu ") && begin < end ? name.substr(begin, end - begin) : std::string();
 }
@@ -286,7 +288,7 @@ std::string simdTargetOf(const std::string& name) {
 std::vector<std::string> lesserCpuNames() {
   std::vector<std::string> names;
   for (const std::string& target : cpu::simdTargets()) names.push_back("cpu " + target + " with 2 threads");
-  if (!names.empty()) names.erase(names.begin());  // the best is what cpu devices take by themselves
+  if (!names.empty()) names.erase(names.begin());  // cpu devices use the best one by default
   return names;
 }
 
@@ -313,8 +315,8 @@ bool computesInHalves(std::string_view name) {
   return name == kInHalves || name == kWithMatrices || name == kWithEmulatedMatrices;
 }
 
-void useSimdTargetOf(const std::string& name) {
-  cpu::useSimdTarget(simdTargetOf(name));
+void selectSimdTarget(const std::string& name) {
+  cpu::useSimdTarget(parseSimdTarget(name));
 }
 
 namespace {
@@ -324,7 +326,8 @@ std::map<std::string, std::unique_ptr<Device>>& openDevices() {
   return devices;
 }
 
-// Devices go before the process ends: drivers and layers that were loaded after `openDevices` was made go before it.
+// Closes the devices before the process ends: drivers and layers that were loaded after the static map in `openDevices`
+// was created are unloaded before it is destroyed.
 class CloseDevices : public testing::Environment {
  public:
   void TearDown() override { openDevices().clear(); }
@@ -334,16 +337,16 @@ class CloseDevices : public testing::Environment {
 }  // namespace
 
 Device* deviceNamed(const std::string& name) {
-  const auto [found, isNew] = openDevices().try_emplace(name);
+  const auto [it, isNew] = openDevices().try_emplace(name);
   if (isNew) {
     try {
-      found->second = openDevice(name);
+      it->second = openDevice(name);
     } catch (const Error& error) {
       if (mustBeThere(name)) throw;
       std::printf("no device \"%s\": %s\n", name.c_str(), error.what());
     }
   }
-  return found->second.get();
+  return it->second.get();
 }
 
 }  // namespace tessera::device_test

@@ -1,4 +1,4 @@
-// Cases of the virtual grid.
+// Test cases of the virtual grid.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,7 +11,8 @@ namespace {
 
 constexpr uint32_t kBlocks = TexelBatch::kBlocks, kCorners = VirtualGrid::kCorners, kWidth = VirtualGrid::kAttributes;
 
-// Small grids: few texels to share, and more words than a bit each. One resolution is odd, and no power of two.
+// Small grids, whose few texels are shared by many samples but whose marks need more than one word. Some resolutions
+// are not powers of two, and some are odd.
 std::vector<VirtualGrid> grids() {
   std::vector<VirtualGrid> all;
   for (bool quantise : {true, false})
@@ -26,7 +27,7 @@ std::vector<VirtualGrid> grids() {
   return all;
 }
 
-std::string nameOf(const VirtualGrid& grid) {
+std::string gridName(const VirtualGrid& grid) {
   return fmt::format("{}³ and {}²{}{}", grid.voxels, grid.planes, grid.quantise ? ", quantised" : "",
                      grid.shareTexels ? "" : ", each corner");
 }
@@ -34,7 +35,7 @@ std::string nameOf(const VirtualGrid& grid) {
 }  // namespace
 
 template <>
-OperationTests testsOf<DistinctTexels>() {
+OperationTests makeTests<DistinctTexels>() {
   OperationTests tests;
   tests.noGradient = "it chooses texels";
   std::vector<VirtualGrid> all = grids();
@@ -45,35 +46,36 @@ OperationTests testsOf<DistinctTexels>() {
   for (const VirtualGrid& grid : all)
     for (const Size& size : kSizes)
       for (bool tight : {false, true})
-        tests.cases.push_back({fmt::format("{}, samples {}{}", nameOf(grid), toString(size), tight ? ", no room" : ""),
-                               [=](Stage& stage) {
-                                 const TexelBatch batch(stage, grid, size);
-                                 DistinctTexels a{grid};
-                                 a.blocks = kBlocks;
-                                 a.samples = stage.count(size);
-                                 a.blockOfSample = stage.input(batch.blocks);
-                                 a.positions = stage.input(batch.positions);
-                                 a.texelCapacity = tight ? batch.texels / 2 : batch.texels + 5;
-                                 if (grid.shareTexels) {
-                                   a.marks = stage.outputWords("marks", kBlocks * grid.words());
-                                   a.ranks = stage.outputWords("ranks", kBlocks * grid.words());
-                                 }
-                                 a.firstTexel = stage.outputWords("firstTexel", kBlocks + 1);
-                                 a.texelPositions = stage.output("texelPositions", size_t{3} * a.texelCapacity, 1e-7);
-                                 stage.device.run(a);
-                               }});
+        tests.cases.push_back(
+            {fmt::format("{}, samples {}{}", gridName(grid), toString(size), tight ? ", no room" : ""),
+             [=](Stage& stage) {
+               const TexelBatch batch(stage, grid, size);
+               DistinctTexels a{grid};
+               a.blocks = kBlocks;
+               a.samples = stage.count(size);
+               a.blockOfSample = stage.input(batch.blocks);
+               a.positions = stage.input(batch.positions);
+               a.texelCapacity = tight ? batch.texels / 2 : batch.texels + 5;
+               if (grid.shareTexels) {
+                 a.marks = stage.outputWords("marks", kBlocks * grid.words());
+                 a.ranks = stage.outputWords("ranks", kBlocks * grid.words());
+               }
+               a.firstTexel = stage.outputWords("firstTexel", kBlocks + 1);
+               a.texelPositions = stage.output("texelPositions", size_t{3} * a.texelCapacity, 1e-7);
+               stage.device.run(a);
+             }});
   return tests;
 }
 
 template <>
-OperationTests testsOf<VirtualGridForward>() {
+OperationTests makeTests<VirtualGridForward>() {
   OperationTests tests;
   tests.noGradient = "its gradient is VirtualGridBackward";
   for (const VirtualGrid& grid : grids())
     for (const Size& size : kSizes)
       for (bool culled : {false, true})
         tests.cases.push_back(
-            {fmt::format("{}, samples {}{}", nameOf(grid), toString(size), culled ? ", culled, no room" : ""),
+            {fmt::format("{}, samples {}{}", gridName(grid), toString(size), culled ? ", culled, no room" : ""),
              [=](Stage& stage) {
                const TexelBatch batch(stage, grid, size);
                VirtualGridForward a{grid};
@@ -92,13 +94,13 @@ OperationTests testsOf<VirtualGridForward>() {
 }
 
 template <>
-OperationTests testsOf<VirtualGridBackward>() {
+OperationTests makeTests<VirtualGridBackward>() {
   OperationTests tests;
   for (const VirtualGrid& grid : grids())
     for (const Size& size : kSizes)
       for (bool tight : {false, true})
         tests.cases.push_back(
-            {fmt::format("{}, samples {}{}", nameOf(grid), toString(size), tight ? ", no room" : ""),
+            {fmt::format("{}, samples {}{}", gridName(grid), toString(size), tight ? ", no room" : ""),
              [=](Stage& stage) {
                const TexelBatch batch(stage, grid, size);
                VirtualGridBackward a{grid};
@@ -110,7 +112,7 @@ OperationTests testsOf<VirtualGridBackward>() {
                for (size_t i = 0; i < logDensities.size(); i += 5) logDensities[i] = i % 2 ? VirtualGrid::kCulled : 15;
                std::vector<float> gradients = stage.random.floats(size.capacity, -1, 1);
                std::vector<float> colourGradients = stage.random.floats(size_t{kWidth - 1} * size.capacity, -1, 1);
-               for (size_t i = 0; i < gradients.size(); i += 3) {  // behind a surface
+               for (size_t i = 0; i < gradients.size(); i += 3) {  // zero, as behind a surface
                  gradients[i] = 0;
                  std::fill_n(colourGradients.begin() + static_cast<ptrdiff_t>(i * (kWidth - 1)), kWidth - 1, 0.0f);
                }
@@ -123,9 +125,9 @@ OperationTests testsOf<VirtualGridBackward>() {
              }});
   for (VirtualGrid grid : grids()) {
     if (grid.quantise)
-      grid.quantise = false;  // rounding is passed straight through: differences see it, gradients do not
+      grid.quantise = false;  // rounding passes gradients straight through, but affects finite differences
     tests.gradients.push_back(
-        {nameOf(grid), [=](Stage& stage) {
+        {gridName(grid), [=](Stage& stage) {
            const Size size{7};
            const TexelBatch batch(stage, grid, size);
            const std::vector<float> attributes = stage.random.floats(size_t{kWidth} * batch.texels, 0.4f, 0.6f);

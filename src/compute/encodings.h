@@ -1,4 +1,4 @@
-// Encodings of directions and positions by fixed functions.
+// Fixed (not learned) encodings of directions and positions.
 #pragma once
 
 #include "compute/memory.h"
@@ -6,17 +6,19 @@
 
 namespace tessera {
 
-// Real spherical harmonics with tiny-cuda-nn's order and signs; degree² columns, degree 1 to 4. `directions` are unit.
+// Real spherical harmonics of unit directions, in the order and with the signs of tiny-cuda-nn: degree² columns, for
+// degrees 1 to 4.
 struct SphericalHarmonicsForward {
   int degree = 4;
   Count samples;
   Slice<const float> directions;      // [rays][3]
-  Slice<const uint32_t> rayOfSample;  // optional, [capacity]: which direction a sample has; else its own index
+  Slice<const uint32_t> rayOfSample;  // optional, [capacity]: the direction of a sample; its own index if absent
   Matrix<float> encoded;              // [capacity][degree²], row-major
 };
 TESSERA_OPERATION(SphericalHarmonicsForward);
 
-// Overwrites `directionGradients` (per sample). The gradient is of the polynomials as functions on R³.
+// Overwrites `directionGradients` (per sample). The gradient is that of the polynomials as functions on R³, not on the
+// sphere.
 struct SphericalHarmonicsBackward {
   int degree = 4;
   Count samples;
@@ -27,8 +29,8 @@ struct SphericalHarmonicsBackward {
 };
 TESSERA_OPERATION(SphericalHarmonicsBackward);
 
-// x, then sin(2^k x) for k in [0, frequencies), then cos(2^k x): per k all input components (MERF's order).
-// dimensions × (1 + 2 · frequencies) columns.
+// Frequency encoding: x, then sin(2^k x) for k in [0, frequencies), then cos(2^k x), each with all input components per
+// k (the order of MERF). The encoding has dimensions × (1 + 2 · frequencies) columns.
 struct FrequencyForward {
   int dimensions = 3;
   int frequencies = 4;

@@ -1,8 +1,8 @@
 // Multi-resolution hash grid (Müller et al. 2022, section 3), in tiny-cuda-nn's convention.
 //
 //   position of a sample in level l     scale_l · x + 0.5,  x in [0,1]³
-//   value                               trilinear mix of the 8 surrounding table entries
-//   entry of lattice corner c           dense row-major where resolution³ entries fit, else
+//   value                               trilinear interpolation of the 8 surrounding table entries
+//   entry of lattice corner c           dense row-major if resolution³ entries fit, otherwise
 //                                       (c.x) xor (c.y · 2654435761) xor (c.z · 805459861) mod entries
 #pragma once
 
@@ -17,24 +17,24 @@ namespace tessera {
 struct HashGridOptions {
   int levels = 16;
   int features = 2;        // per entry: 1, 2, 4 or 8
-  int log2TableSize = 17;  // most entries of one level
+  int log2TableSize = 17;  // log2 of the maximum number of entries per level
   int baseResolution = 16;
   int finestResolution = 2048;
 };
 
 struct HashGridLevel {
-  float scale = 0;          // resolution - 1, before rounding up
+  float scale = 0;          // resolution - 1, before the resolution is rounded up
   uint32_t resolution = 0;  // lattice points per axis
-  uint32_t entries = 0;     // a multiple of 8; a power of two where hashed
+  uint32_t entries = 0;     // a multiple of 8; a power of two if hashed
   bool hashed = false;
-  size_t firstEntry = 0;  // of this level, in the one table of all levels
+  size_t firstEntry = 0;  // index of the first entry of this level in the table of all levels
 };
 
 struct HashGrid {
   int features = 2;
   std::vector<HashGridLevel> levels;
 
-  // Resolutions are computed in double with a 1e-6 guard, so that trainer and renderer never disagree by one.
+  // Resolutions are computed in double with a tolerance of 1e-6, so that trainer and renderer never differ by one.
   explicit HashGrid(const HashGridOptions& options = {});
 
   uint32_t columns() const { return static_cast<uint32_t>(levels.size()) * features; }
@@ -48,7 +48,7 @@ inline uint32_t hashGridIndex(const HashGridLevel& level, uint32_t x, uint32_t y
   return (x + level.resolution * (y + level.resolution * z)) % level.entries;
 }
 
-// Both take part of the rows (Count::first).
+// HashGridForward and HashGridBackward can work on part of the rows (Count::first).
 struct HashGridForward {
   const HashGrid& grid;
   Count samples;
@@ -64,7 +64,7 @@ struct HashGridBackward {
   Count samples;
   Slice<const float> positions;
   Slice<const float> table;              // read only for position gradients
-  Matrix<const float> encodedGradients;  // as `encoded`
+  Matrix<const float> encodedGradients;  // same layout as `encoded`
   Slice<float> tableGradients;           // [grid.entries()][features]
   Slice<float> positionGradients;        // optional, [capacity][3]
 };

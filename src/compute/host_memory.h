@@ -1,4 +1,4 @@
-// Memory that the processor can address: what the reference and the cpu device allocate.
+// Memory in the address space of the CPU, as allocated by the reference and cpu devices.
 #pragma once
 
 #include <algorithm>
@@ -38,13 +38,13 @@ T* hostPointer(const Slice<T>& slice) {
   return reinterpret_cast<T*>(static_cast<HostMemory*>(slice.memory)->data()) + slice.first;
 }
 
-// Adam::found.
-inline bool isAnyAbove(const Slice<const uint32_t>& counters, uint32_t most) {
+// Whether any counter is above `maximum` (see Adam::overflowCounters).
+inline bool isAnyAbove(const Slice<const uint32_t>& counters, uint32_t maximum) {
   const uint32_t* values = hostPointer(counters);
-  return std::any_of(values, values + counters.count, [&](uint32_t value) { return value > most; });
+  return std::any_of(values, values + counters.count, [&](uint32_t value) { return value > maximum; });
 }
 
-// Rows [begin, end) that an operation works on.
+// The rows [begin, end) that an operation works on.
 struct HostRows {
   uint32_t begin = 0, end = 0;
   uint32_t count() const { return end - begin; }
@@ -55,7 +55,7 @@ inline HostRows hostRows(const Count& count) {
   if (count.first) rows.begin = std::min(*hostPointer(count.first), rows.end);
   return rows;
 }
-// For operations that always begin at row 0.
+// The number of rows of an operation that always begins at row 0.
 inline uint32_t hostCount(const Count& count) {
   CHECK(!count.first);
   return hostRows(count).end;

@@ -1,5 +1,5 @@
-// NGP-RT's lattice (section 4.1): coarse features and attention are asked for at the corners of a lattice alone, as a
-// baked grid will hold them, and interpolated, so that training sees what will be drawn.
+// The lattice of NGP-RT (section 4.1): coarse features and attention are evaluated only at the vertices of a lattice,
+// where a baked grid stores them, and are interpolated in between, so that training sees what will be rendered.
 #pragma once
 
 #include "compute/operation.h"
@@ -7,7 +7,8 @@
 
 namespace tessera {
 
-// Per sample and column, the trilinear mix of the eight voxels around it (VirtualGrid of voxels alone).
+// Interpolates each column trilinearly from the eight voxels around each sample. The grid is a VirtualGrid without
+// planes.
 struct LatticeForward {
   static constexpr uint32_t kColumns = 16;
 
@@ -15,14 +16,14 @@ struct LatticeForward {
   Count samples;
   Slice<const uint32_t> blockOfSample;  // [samples]
   Slice<const float> positions;         // [samples][3]
-  Slice<const uint32_t> marks, ranks;   // of DistinctTexels; not with shareTexels off
-  Count texels;                         // of DistinctTexels: the counter is its firstTexel[blocks]
-  Slice<const float> values;            // [texels][16]; those of texels beyond the capacity count as 0
-  Matrix<float> mixed;                  // [samples], 16 columns: a row is one run, or groups of 8
+  Slice<const uint32_t> marks, ranks;   // from DistinctTexels; not used with shareTexels off
+  Count texels;                         // from DistinctTexels: the counter is its firstTexel[blocks]
+  Slice<const float> values;            // [texels][16]; texels beyond the capacity count as 0
+  Matrix<float> mixed;                  // [samples], 16 columns, row-major or grouped with a width of 8
 };
 TESSERA_OPERATION(LatticeForward);
 
-// Overwrites valueGradients of all rows below the count of texels.
+// Overwrites valueGradients in all rows below the count of texels.
 struct LatticeBackward {
   const VirtualGrid& grid;
   uint32_t blocks = 1;
@@ -31,7 +32,7 @@ struct LatticeBackward {
   Slice<const float> positions;
   Slice<const uint32_t> marks, ranks, firstTexel;
   Count texels;
-  Matrix<const float> mixedGradients;  // as `mixed`
+  Matrix<const float> mixedGradients;  // same layouts as `mixed`
   Slice<float> valueGradients;         // [texels][16]
 };
 TESSERA_OPERATION(LatticeBackward);

@@ -1,4 +1,4 @@
-// Losses on rendered rays, with their gradients.
+// Losses of rendered rays, with their gradients.
 #pragma once
 
 #include "compute/memory.h"
@@ -7,11 +7,11 @@
 namespace tessera {
 
 //   mse           r²
-//   huber         r² / 2δ if |r| ≤ δ, else |r| - δ/2        (instant-ngp's normalisation: slope at most 1)
+//   huber         r² / 2δ if |r| ≤ δ, else |r| - δ/2        (normalised as in instant-ngp: slope at most 1)
 //   charbonnier   sqrt(r² + ε²)
 enum class ColourLossKind { mse, huber, charbonnier };
 
-// Loss = scale · Σ_rays weight · Σ_channels f(predicted - target). Gradient with respect to `predicted`.
+// loss = scale · Σ_rays weight · Σ_channels f(predicted - target). The gradient is with respect to `predicted`.
 struct ColourLoss {
   ColourLossKind kind = ColourLossKind::huber;
   float parameter = 0.1f;  // δ or ε
@@ -19,16 +19,16 @@ struct ColourLoss {
   Count rays;
   Slice<const float> predicted;  // [rays][3]
   Slice<const float> target;     // [rays][3]
-  Slice<const float> weights;    // optional, [rays]: 0 takes a ray out (masks)
+  Slice<const float> weights;    // optional, [rays]: 0 excludes a ray (masks)
   Slice<float> loss;             // [2], overwritten: the loss, and Σ weight · Σ r² (for PSNR)
   Slice<float> gradients;        // [rays][3], overwritten
 };
 TESSERA_OPERATION(ColourLoss);
 
-// Distortion (Barron et al. 2022, eq. 15) in O(n) per ray, on normalised positions s = g(t), g(t) = t/2 for t < 1,
-// 1 - 1/(2t) beyond (MERF's warp): Σ_ij w_i w_j |s_i - s_j| + Σ_i w_i² Δs_i / 3; intervals [t - step/2, t + step/2],
-// s_i their mean in s. Distances increase along a ray. loss[0] = scale · Σ_rays. `normalised`: distances and steps are
-// already in s, and nothing is warped.
+// Distortion loss (Barron et al. 2022, eq. 15), computed in O(n) per ray on normalised positions s = g(t), where
+// g(t) = t/2 for t < 1 and 1 - 1/(2t) beyond (the warp of MERF): Σ_ij w_i w_j |s_i - s_j| + Σ_i w_i² Δs_i / 3. The
+// intervals are [t - step/2, t + step/2], and s_i is the mean of both ends in s. Distances increase along a ray.
+// loss[0] = scale · Σ_rays. With `normalised`, distances and steps are already in s, and nothing is warped.
 struct DistortionLoss {
   float scale = 1;
   bool normalised = false;
@@ -42,9 +42,10 @@ struct DistortionLoss {
 };
 TESSERA_OPERATION(DistortionLoss);
 
-// Pulls what a ray sees to where structure from motion found a point, at distance D: scale · Σ_rays (1 - Σ_i w_i (1 -
-// r_i)), r_i = min(1, max(0, |t_i - D| / D - tolerance)). That is the Wasserstein distance between the ray's weights
-// and a surface at D, in shares of D; light from behind the scene, and from twice as far, counts as 1.
+// Depth supervision: pulls the weights of a ray towards the distance D of a point from structure from motion.
+// loss = scale · Σ_rays (1 - Σ_i w_i (1 - r_i)), r_i = min(1, max(0, |t_i - D| / D - tolerance)). This is the
+// Wasserstein distance between the weights of the ray and a surface at D, relative to D; the weight of the background,
+// and of samples at twice the distance or more, counts as 1.
 struct DepthLoss {
   float scale = 1;
   float tolerance = 0.01f;
@@ -52,19 +53,20 @@ struct DepthLoss {
   Slice<const uint32_t> firstSample;  // [rays + 1]
   Slice<const float> weights;         // [samples]
   Slice<const float> distances;       // [samples]
-  Slice<const float> known;           // [rays]: D; 0: not known, and no loss
+  Slice<const float> known;           // [rays]: D; 0 if unknown: the ray has no loss
   Slice<float> loss;                  // [1], overwritten
   Slice<float> weightGradients;       // [samples], added to
 };
 TESSERA_OPERATION(DepthLoss);
 
-// S3IM (Xie et al. 2023): the similarity of random groups of pixels. `patches` times, all rays are put in an order (the
-// first time their own; then by a Fisher-Yates shuffle, i from n - 1 down to 1 swapped with below(i, i + 1) of
-// RandomStream(mix64(seed) + patch, 0x531)) and cut into groups of 16, what is left over is not used; a group counts as
-// a 4×4 picture with separable weights .136465, .265797, .331941, .265797 (a Gaussian of σ = 1.5 about index 2). Per
-// group and channel SSIM with C1 = 1e-4, C2 = 9e-4; loss = scale · (1 - mean over patches, groups and channels). With
-// stride = kernel, as in the paper, that is its loss but for the border. Rays of weight 0 count as equal: predicted is
-// taken for both, and they get no gradient; all other weights are alike. Fewer than 16 rays have no loss.
+// S3IM (Xie et al. 2023): the structural similarity of random groups of pixels. For each of `patches` patches, all rays
+// are ordered (in the first patch as given, in the others by a Fisher-Yates shuffle that swaps i, from n - 1 down to 1,
+// with below(i, i + 1) of RandomStream(mix64(seed) + patch, 0x531)) and cut into groups of 16; a remainder is not used.
+// A group is treated as a 4×4 image with the separable weights .136465, .265797, .331941, .265797 (a Gaussian with
+// σ = 1.5 about index 2). SSIM is computed per group and channel with C1 = 1e-4 and C2 = 9e-4, and loss = scale ·
+// (1 - mean over patches, groups and channels). With stride = kernel size, as in the paper, this is its loss except at
+// the border. A ray of weight 0 counts as equal: its predicted colour also serves as its target, and it gets no
+// gradient; all other weights have the same effect. Fewer than 16 rays have no loss.
 struct S3imLoss {
   float scale = 1;
   Count rays;
@@ -78,8 +80,9 @@ struct S3imLoss {
 };
 TESSERA_OPERATION(S3imLoss);
 
-// City-on-Web, eq. 6: pulls the opacity of each block along a ray to 0 or 1. loss = scale · Σ -(α ln α + (1 - α) ln(1 -
-// α)), α clamped to [1e-5, 1 - 1e-5] in value and gradient: beyond, the gradient stays what it is at the bound.
+// Opacity loss (City-on-Web, eq. 6): pulls the opacity of each block along a ray towards 0 or 1.
+// loss = scale · Σ -(α ln α + (1 - α) ln(1 - α)), with α clamped to [1e-5, 1 - 1e-5] in the value and in the gradient:
+// beyond the bounds, the gradient keeps its value at the bound.
 struct OpacityLoss {
   float scale = 1;
   Count segments;
@@ -89,8 +92,9 @@ struct OpacityLoss {
 };
 TESSERA_OPERATION(OpacityLoss);
 
-// City-on-Web, eq. 5 (with 1 - exp, not 1 - σv): what a renderer's step would see at random points. loss = scale · Σ (1
-// - exp(-exp(logDensity) · runtimeStep)). Gradients are overwritten; through exp they clamp as in compositing.
+// Sparsity loss (City-on-Web, eq. 5, with 1 - exp instead of 1 - σv): the opacity of a renderer's step at random
+// points. loss = scale · Σ (1 - exp(-exp(logDensity) · runtimeStep)). Overwrites gradients; the gradient of exp is
+// clamped as in compositing (Extinction::logDensity).
 struct SparsityLoss {
   float scale = 1;
   Count points;

@@ -1,4 +1,4 @@
-// What a machine could do at best, measured: the limits that operations are held against (compute/roofline.h).
+// Measures the peak performance of a machine: the limits to which operations are compared (compute/roofline.h).
 #pragma once
 
 #include <cstddef>
@@ -9,13 +9,14 @@ class MachineProbe {
  public:
   virtual ~MachineProbe() = default;
 
-  // Multiply-adds on registers alone, counted as 2 operations each, per second.
+  // Floating-point operations per second of multiply-adds on registers alone, each counted as 2 operations.
   virtual double flops() = 0;
-  // Of units that multiply matrices of fp16, summed in float; 0 where the device's networks use none.
+  // Floating-point operations per second of the matrix units (fp16 with float accumulators); 0 if the networks of the
+  // device do not use any.
   virtual double matrixFlops() { return 0; }
-  // 8-byte loads per second at random places of each of so many tables of `bytes`.
+  // 8-byte loads per second at random places in each of `tables` tables of `bytes` bytes.
   virtual double gatherRate(size_t bytes, int tables) = 0;
-  // Bytes per second, read + written, of copies from one half of `bytes` to the other.
+  // Bytes per second, read + written, of copies from one half of a buffer of `bytes` bytes to the other.
   virtual double streamRate(size_t bytes) = 0;
 };
 

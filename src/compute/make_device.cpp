@@ -21,16 +21,16 @@ namespace {
 constexpr std::string_view kVulkan = "vulkan";
 
 #ifdef TESSERA_HAS_VULKAN
-// The index of the best graphics card that can be used; what computes on the processor anyway does not count.
-std::optional<size_t> graphicsCard() {
+// The index of the best usable GPU, ignoring Vulkan drivers that compute on the CPU.
+std::optional<size_t> findGpu() {
   std::optional<size_t> best;
   try {
     const std::vector<GpuDescription> devices = GpuContext::devices();
     for (size_t i = 0; i < devices.size(); ++i) {
-      if (devices[i].isProcessor || !devices[i].missing.empty()) continue;
+      if (devices[i].isCpu || !devices[i].missing.empty()) continue;
       if (!best || (devices[i].isDiscrete && !devices[*best].isDiscrete)) best = i;
     }
-  } catch (const Error&) {  // no loader, no driver
+  } catch (const Error&) {  // there is no Vulkan loader or no driver
   }
   return best;
 }
@@ -38,12 +38,12 @@ std::optional<size_t> graphicsCard() {
 
 }  // namespace
 
-std::optional<std::string> vulkanDeviceOf([[maybe_unused]] const std::string& kind) {
+std::optional<std::string> parseVulkanDevice([[maybe_unused]] const std::string& kind) {
 #ifdef TESSERA_HAS_VULKAN
   if (kind == kVulkan) return "";
   if (kind.starts_with(std::string(kVulkan) + ":")) return kind.substr(kVulkan.size() + 1);
   if (kind == "auto") {
-    if (const std::optional<size_t> card = graphicsCard()) return std::to_string(*card);
+    if (const std::optional<size_t> gpu = findGpu()) return std::to_string(*gpu);
   }
 #endif
   return std::nullopt;
@@ -55,14 +55,14 @@ std::unique_ptr<Device> makeDeviceOfKind(const DeviceOptions& options) {
   const std::string& kind = options.kind;
   if (kind == "reference") return makeReferenceDevice();
 #ifdef TESSERA_HAS_VULKAN
-  if (const std::optional<std::string> device = vulkanDeviceOf(kind)) {
+  if (const std::optional<std::string> device = parseVulkanDevice(kind)) {
     GpuOptions gpu;
     gpu.device = *device;
     try {
       return makeVulkanDevice(gpu);
     } catch (const Error& error) {
       if (kind != "auto") throw;
-      warn("{}; goes on with the processor", error.what());
+      warn("{}; continuing on the CPU", error.what());
     }
   }
 #endif
@@ -74,11 +74,11 @@ std::unique_ptr<Device> makeDeviceOfKind(const DeviceOptions& options) {
 }  // namespace
 
 std::unique_ptr<Device> makeDevice(const DeviceOptions& options) {
-  constexpr int kMostHostThreads = 8;  // what they do takes a ms or two of one
-  std::unique_ptr<Device> made = makeDeviceOfKind(options);
+  constexpr int kMaxHostThreads = 8;  // enough, since the host work takes 1 to 2 ms on a single thread
+  std::unique_ptr<Device> device = makeDeviceOfKind(options);
   const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
-  made->setHostThreads(std::clamp(threads, 1, kMostHostThreads));
-  return made;
+  device->setHostThreads(std::clamp(threads, 1, kMaxHostThreads));
+  return device;
 }
 
 std::vector<DeviceDescription> listDevices() {
@@ -88,11 +88,11 @@ std::vector<DeviceDescription> listDevices() {
     const std::vector<GpuDescription> devices = GpuContext::devices();
     for (size_t i = 0; i < devices.size(); ++i) {
       const GpuDescription& device = devices[i];
-      DeviceDescription& made = all.emplace_back();
-      made = {fmt::format("{}:{}", kVulkan, i), fmt::format("{} ({})", device.name, device.driver), device.memoryBytes,
-              device.missing};
+      DeviceDescription& description = all.emplace_back();
+      description = {fmt::format("{}:{}", kVulkan, i), fmt::format("{} ({})", device.name, device.driver),
+                     device.memoryBytes, device.missing};
       for (const auto& [name, feature] : kGpuFeatureNames) {
-        if (device.missing.empty() && device.features.*feature) made.features.emplace_back(name);
+        if (device.missing.empty() && device.features.*feature) description.features.emplace_back(name);
       }
     }
   } catch (const Error& error) {

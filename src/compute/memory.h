@@ -1,4 +1,5 @@
-// Device memory: owned by Array, named by Slice. Its contents are reached through Device::write and Device::read only.
+// Device memory: Array owns it, and Slice refers to a part of it. Its contents are accessed through Device::write and
+// Device::read only.
 #pragma once
 
 #include <cstddef>
@@ -21,8 +22,8 @@ class Memory {
   size_t bytes_;
 };
 
-// `count` elements of T starting at element `first` of an allocation that someone else owns. Empty means "not wanted"
-// wherever an operation says optional.
+// A non-owning view of `count` elements of T that begins at element `first` of an allocation. An empty slice omits an
+// optional argument of an operation.
 template <class T>
 struct Slice {
   using Element = std::remove_const_t<T>;
@@ -46,7 +47,7 @@ struct Slice {
   }
 };
 
-// Owns `count` zeroed elements on a device; made by Device::array<T>(). Move only.
+// Owns `count` elements on a device, initially zero; created by Device::array<T>(). Move-only.
 template <class T>
 class Array {
  public:
@@ -66,19 +67,20 @@ class Array {
   size_t count_ = 0;
 };
 
-// How many elements an operation works on. Sizes that only the device knows stay in a device counter: the operation
-// works on min(counter[0], capacity). Without a counter it works on `capacity`. Buffers hold `capacity` elements. Where
-// an operation says that it takes part of the rows, it works on rows [first[0], min(counter[0], capacity)) alone.
+// The number of elements that an operation works on. A size that only the device knows stays in a device counter: the
+// operation works on min(counter[0], capacity) elements, or on `capacity` elements without a counter. Buffers have
+// `capacity` elements. An operation documented to work on part of the rows processes only rows
+// [first[0], min(counter[0], capacity)).
 struct Count {
   uint32_t capacity = 0;
   Slice<const uint32_t> counter = {};  // optional, 1 element
   Slice<const uint32_t> first = {};    // optional, 1 element
 };
 
-// A matrix of `columns` float columns, one row a sample, in one of two layouts:
+// A matrix of `columns` columns, with one row per sample, in one of two layouts:
 //   row-major    element (row, column) at row × rowStride + column                                  (groupWidth 0)
 //   grouped      element (row, column) at (column / groupWidth) × groupStride + row × rowStride + column % groupWidth
-// The grouped form is how the hash grid writes: one plane per level, `groupWidth` features a plane.
+// The hash grid writes the grouped layout: one plane per level, with `groupWidth` features per plane.
 template <class T>
 struct Matrix {
   Slice<T> data;
@@ -98,8 +100,8 @@ struct Matrix {
         groupWidth(other.groupWidth),
         groupStride(other.groupStride) {}
 
-  // Rows that a plane should have room for, at least `rows`: planes a power of two apart would all fall on the same few
-  // lines of a cache.
+  // The number of rows to allocate per plane for at least `rows` rows: planes a power of two apart would all map to the
+  // same few lines of a cache.
   static size_t rowsOfPlane(size_t rows) { return (rows + 63) / 64 * 64 + 24; }
   static Matrix grouped(Slice<T> slice, uint32_t columns, uint32_t width, size_t rows) {
     Matrix m(slice, columns, width);
@@ -107,7 +109,7 @@ struct Matrix {
     m.groupStride = rows * width;
     return m;
   }
-  // Columns [first, first + count) of a row-major matrix.
+  // Columns [firstColumn, firstColumn + count) of a row-major matrix.
   Matrix columnRange(uint32_t firstColumn, uint32_t count) const {
     CHECK(groupWidth == 0u);
     return Matrix(data.part(firstColumn, data.count - firstColumn), count, rowStride);
@@ -117,7 +119,7 @@ struct Matrix {
     return groupWidth == 0 ? row * rowStride + column
                            : column / groupWidth * groupStride + row * rowStride + column % groupWidth;
   }
-  // Rows [first, …) of a matrix.
+  // The rows from `firstRow` on.
   Matrix rowsFrom(size_t firstRow) const {
     Matrix m = *this;
     m.data = data.part(firstRow * rowStride, data.count - firstRow * rowStride);

@@ -1,5 +1,5 @@
-// Small fully connected networks without biases, as tiny-cuda-nn's fully fused MLP: ReLU between layers, sizes padded
-// to multiples of 16. Padding inputs read as zero. Widths 16 to 128.
+// Small fully connected networks without biases, like the fully fused MLP of tiny-cuda-nn: ReLU between layers, and
+// sizes padded to multiples of 16. Padding inputs read as zero. Widths are 16 to 128.
 #pragma once
 
 #include "compute/memory.h"
@@ -20,7 +20,7 @@ struct MlpShape {
   int layers() const { return hiddenLayers + 1; }
   int layerInputs(int layer) const { return layer == 0 ? padded(inputs) : width; }
   int layerOutputs(int layer) const { return layer == hiddenLayers ? padded(outputs) : width; }
-  // Weights of layer l stand at weightOffset(l) as [layerOutputs][layerInputs], row-major.
+  // The weights of layer l begin at weightOffset(l), as [layerOutputs][layerInputs], row-major.
   size_t weightOffset(int layer) const {
     size_t offset = 0;
     for (int l = 0; l < layer; ++l) offset += static_cast<size_t>(layerInputs(l)) * layerOutputs(l);
@@ -30,22 +30,23 @@ struct MlpShape {
   size_t activationsPerSample() const { return static_cast<size_t>(width) * hiddenLayers; }
 };
 
-// Of one sample, without the padding.
-inline size_t multiplyAccumulatesOf(const MlpShape& shape) {
+// The multiply-accumulates of a forward pass for one sample, without the padding.
+inline size_t countMultiplyAccumulates(const MlpShape& shape) {
   const size_t width = static_cast<size_t>(shape.width);
   return width * (static_cast<size_t>(shape.inputs) + static_cast<size_t>(shape.outputs)) +
          width * width * static_cast<size_t>(shape.hiddenLayers - 1);
 }
 
-// Both take part of the rows (Count::first). Activations are [hiddenLayers][capacity][width], after ReLU, as
-// Device::keepsHalves says; they and weights begin at a multiple of 16 bytes.
+// MlpForward and MlpBackward can work on part of the rows (Count::first). Activations are
+// [hiddenLayers][capacity][width], after ReLU, as fp16 or float according to Device::storesActivationsInHalf; they and
+// the weights begin at a multiple of 16 bytes.
 struct MlpForward {
   const MlpShape& shape;
   Count samples;
   Matrix<const float> input;   // [capacity][inputs]
   Slice<const float> weights;  // [shape.parameters()]
-  Matrix<float> output;        // [capacity][outputs or fewer: the first ones are wanted], row-major
-  Slice<float> activations;    // optional, Device::activationsOf(shape, capacity): kept for backward
+  Matrix<float> output;        // [capacity][outputs], row-major; with fewer columns, only the first outputs are written
+  Slice<float> activations;    // optional, Device::allocateActivations(shape, capacity): stored for MlpBackward
 };
 TESSERA_OPERATION(MlpForward);
 
@@ -55,8 +56,8 @@ struct MlpBackward {
   Count samples;
   Matrix<const float> input;
   Slice<const float> weights;
-  Matrix<const float> output;               // read only when the output activation needs it
-  Slice<const float> activations;           // from forward
+  Matrix<const float> output;               // read only if the gradient of the output activation needs it
+  Slice<const float> activations;           // from MlpForward
   Matrix<const float> outputGradients;      // [capacity][outputs], row-major; with respect to the activated output
   Slice<const float> firstOutputGradients;  // optional, [capacity]: added to the gradient of output 0 (a density that
                                             // compositing and a colour network both use)

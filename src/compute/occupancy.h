@@ -7,29 +7,29 @@
 
 namespace tessera {
 
-// Chooses among the candidates cells and one jittered point in each: all in order when `uniform` is their number, else
-// `uniform` at random and then `occupied` at random among those whose bit is set (up to 10 tries each, else any). Entry
-// p of the list draws from RandomStream(seed, 0x0cc) at index 16 p + purpose: purposes 0 to 9 are the tries for a
-// candidate (`below(index, candidates)`; a uniform entry takes the first), 10, 11 and 12 the jitter in x, y, z
-// (`uniform`). Position = (cell + jitter) / resolution, in float.
+// Chooses cells among the candidates, and one jittered point in each: all candidates in order if `uniform` is their
+// number, otherwise `uniform` random ones followed by `occupied` random ones among those whose bit is set (up to 10
+// tries each, then any). Entry p of this list draws from RandomStream(seed, 0x0cc) at index 16 p + purpose: purposes 0
+// to 9 are the tries for a candidate (`below(index, candidates)`; a uniform entry takes the first), and 10, 11 and 12
+// are the jitter in x, y and z (`uniform`). Position = (cell + jitter) / resolution, in float.
 struct OccupancyPoints {
   const MarchSpace& space;
   uint32_t uniform = 0, occupied = 0;
   uint64_t seed = 0;                 // differs for every update
-  Slice<const uint32_t> candidates;  // optional, cells; else all there are
+  Slice<const uint32_t> candidates;  // optional, cells; all cells if absent
   Slice<const uint32_t> occupancy;   // bits
   Slice<uint32_t> cells;             // [points], at most uniform + occupied - first
   Slice<float> positions;            // [points][3], grid coordinates
-  uint32_t first = 0;                // of the list: these points are its entries [first, first + points)
+  uint32_t first = 0;                // the points are the entries [first, first + points) of the list
 };
 TESSERA_OPERATION(OccupancyPoints);
 
-// First every cell decays; then grid = max(grid, exp(min(logDensity, 15)) · step) at the chosen cells (which may
-// repeat), where step is the marching step there: clamp(cone · ‖x‖∞, minStep, maxStep) with x the cell centre in scene
-// units; ‖x‖∞ = 1 / (2 - ‖y‖∞) where the contracted centre y has ‖y‖∞ > 1. (Contracted space fills only half of its
-// grid: cells with two coordinates beyond 1 hold no point of the scene.) Negative cells are never visible and stay as
-// they are. Then
-// bit = grid > min(threshold, mean over the cells that are not negative).
+// Updates the grid and its bits. First every cell decays. Then grid = max(grid, exp(min(logDensity, 15)) · step) at the
+// chosen cells (which may repeat), where step is the marching step there: clamp(cone · ‖x‖∞, minStep, maxStep) with x
+// the cell centre in scene units; ‖x‖∞ = 1 / (2 - ‖y‖∞) if the contracted centre y has ‖y‖∞ > 1. (Contracted space
+// fills only half of its grid: cells with two coordinates beyond 1 contain no point of the scene.) Cells with negative
+// values are never visible and do not change. Finally bit = grid > min(threshold, mean over the cells that are not
+// negative).
 struct OccupancyUpdate {
   const MarchSpace& space;
   uint32_t points = 0;

@@ -1,5 +1,5 @@
-// What makes a struct of arguments an operation: a name, declared beside the struct. Who runs an operation includes its
-// header and no other operation's.
+// Turns a struct of arguments into an operation by declaring a name beside the struct. Code that runs an operation
+// includes the header of that operation and of no other.
 #pragma once
 
 #include <cstdint>
@@ -7,16 +7,16 @@
 
 namespace tessera {
 
-// An operation as devices tell it apart. Two are the same where their names are.
+// Identifies an operation. Two ids are equal if their names are.
 class OperationId {
  public:
-  // `name` outlives it.
+  // `name` must outlive the id.
   constexpr explicit OperationId(std::string_view name) : name_(name) {
     for (const char letter : name) hash_ = (hash_ ^ static_cast<unsigned char>(letter)) * 0x100000001b3;
   }
   constexpr std::string_view name() const { return name_; }
-  // FNV-1a of the name (Fowler, Noll, Vo), a constant that a device's `switch` takes: two operations of one hash do not
-  // compile (operations.h).
+  // The FNV-1a hash of the name (Fowler, Noll, Vo), a constant for use in a `switch`: two operations with the same hash
+  // do not compile (operations.h).
   constexpr uint64_t hash() const { return hash_; }
   friend constexpr bool operator==(const OperationId& a, const OperationId& b) { return a.name_ == b.name_; }
   friend constexpr auto operator<=>(const OperationId& a, const OperationId& b) { return a.name_ <=> b.name_; }
@@ -26,11 +26,11 @@ class OperationId {
   uint64_t hash_ = 0xcbf29ce484222325;
 };
 
-// Specialised by TESSERA_OPERATION for structs of arguments alone.
+// Specialised by TESSERA_OPERATION, only for structs of arguments.
 template <class Arguments>
 struct OperationTraits;
 
-// Stands below the struct, in its namespace.
+// To be placed below the struct, in its namespace.
 #define TESSERA_OPERATION(Arguments)              \
   template <>                                     \
   struct OperationTraits<Arguments> {             \

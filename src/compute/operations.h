@@ -1,5 +1,5 @@
-// The list of all operations, for what has to know all of them: the devices' tables and the walk of device_test.cpp
-// over operation × device × shape. Whoever else includes this is built anew with every operation.
+// The list of all operations, for code that needs all of them: the tables of the devices, and device_test.cpp, which
+// tests every operation on every device. Any other file that includes this is rebuilt for every new operation.
 #pragma once
 
 #include "compute/adam.h"
@@ -81,7 +81,7 @@ inline constexpr OperationId kAllOperations[] = {
 #undef TESSERA_ID
 };
 
-// Calls `run` with the arguments as the struct that `operation` names. False: there is no such operation on the list.
+// Calls `run` with `arguments` as the struct that `operation` identifies. Returns false if it is not on the list.
 template <class Run>
 bool dispatchOperation(const OperationId& operation, const void* arguments, const Run& run) {
   switch (operation.hash()) {

@@ -1,4 +1,4 @@
-// What must hold of proposals on every device, and values worked out by hand.
+// Properties of proposals that must hold on every device, and values computed by hand.
 #include "compute/proposals.h"
 
 #include <gtest/gtest.h>
@@ -15,14 +15,14 @@ class Proposals : public testing::TestWithParam<std::string> {
   Device& device() const { return *deviceNamed(GetParam()); }
 
   std::vector<float> resampled(const std::vector<float>& fences, const std::vector<float>& weights, uint32_t after,
-                               float anneal = 1, float padding = 0.01f) const {
+                               float anneal = 1, float uniformFraction = 0.01f) const {
     Stage stage(device(), 1);
     ResampleFences a;
     a.rays = {1};
     a.before = static_cast<uint32_t>(weights.size());
     a.after = after;
     a.anneal = anneal;
-    a.padding = padding;
+    a.uniformFraction = uniformFraction;
     a.fences = stage.input(fences);
     a.weights = stage.input(weights);
     a.resampled = stage.output("resampled", after + 1);
@@ -81,7 +81,7 @@ TEST_P(Proposals, PutNearlyAllFencesIntoTheOneHeavyBin) {
     const float from = static_cast<float>(heavy) / 64, to = from + 1.0f / 64;
     const auto within = std::count_if(fences.begin(), fences.end(), [&](float s) { return s >= from && s <= to; });
     EXPECT_NEAR(static_cast<double>(within), 0.99 * 301, 4);
-    EXPECT_LT(within, 299) << "padding looks elsewhere, too";
+    EXPECT_LT(within, 299) << "the padding puts some fences elsewhere";
     const std::vector<float> all = resampled(evenFences(64), weights, 300, 1, 0);
     EXPECT_GE(all[1], from);
     EXPECT_LE(all[299], to);
@@ -96,33 +96,34 @@ TEST_P(Proposals, KeepFencesSortedAndWithinTheRay) {
     fences.front() = 0;
     fences.back() = 1;
     for (float& weight : weights) weight = weight < 0.5f ? 0 : weight * weight * weight;
-    const std::vector<float> made = resampled(fences, weights, 48, n % 2 == 0 ? 1.0f : 0.5f, n % 3 == 0 ? 0 : 0.01f);
-    EXPECT_TRUE(std::is_sorted(made.begin(), made.end()));
-    EXPECT_EQ(made.front(), 0) << "the whole ray is seen";
-    EXPECT_EQ(made.back(), 1);
+    const std::vector<float> newFences =
+        resampled(fences, weights, 48, n % 2 == 0 ? 1.0f : 0.5f, n % 3 == 0 ? 0 : 0.01f);
+    EXPECT_TRUE(std::is_sorted(newFences.begin(), newFences.end()));
+    EXPECT_EQ(newFences.front(), 0) << "the fences cover the whole ray";
+    EXPECT_EQ(newFences.back(), 1);
   }
 }
 
-TEST_P(Proposals, AreAnnealedTowardsEvenness) {
+TEST_P(Proposals, AreAnnealedTowardsUniformity) {
   std::vector<float> weights(4, 0.01f);
   weights[1] = 0.16f;
-  // Shares of sqrt(w): 1, 4, 1, 1 of 7.
+  // The shares of sqrt(w) are 1/7, 4/7, 1/7 and 1/7.
   const std::vector<float> fences = resampled(evenFences(4), weights, 7, 0.5f, 0);
   for (int i = 1; i <= 5; ++i) EXPECT_NEAR(fences[i], 0.25 + 0.25 * (i - 1) / 4, 1e-6);
   EXPECT_NEAR(fences[6], 0.75, 1e-6);
 }
 
-TEST_P(Proposals, AreBlamedForWhatTheyDoNotBound) {
+TEST_P(Proposals, ArePenalisedWhereTheyDoNotBoundTheSamples) {
   const Loss known =
       interlevel({0, .2f, .5f, 1}, {.1f, .3f, .4f}, {0, .1f, .3f, .35f, .7f, 1}, {.05f, .2f, .4f, .1f, .05f});
-  // Of all samples only the third sees more than its bound, .4 against .3, in the second bin.
+  // Only the third sample has more weight than its bound: .4 instead of .3, in the second bin.
   EXPECT_NEAR(known.loss, 0.0249999925, 1e-8);
   EXPECT_EQ(known.gradients[0], 0);
   EXPECT_NEAR(known.gradients[1], -0.5, 1e-6);
   EXPECT_EQ(known.gradients[2], 0);
 }
 
-TEST_P(Proposals, AreNotBlamedWhereTheyBoundWhatIsSeen) {
+TEST_P(Proposals, AreNotPenalisedWhereTheyBoundTheSamples) {
   Random random(4);
   for (int n = 0; n < 20; ++n) {
     std::vector<float> fences = random.floats(17, 0, 1);

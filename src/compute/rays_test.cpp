@@ -15,7 +15,7 @@ TEST(MarchSpace, StepIndexAndDistanceAreInverse) {
     }
 }
 
-TEST(MarchSpace, StepsGrowFromTheLeastByTheConeToTheLargest) {
+TEST(MarchSpace, GrowsStepsByTheConeFromMinStepToMaxStep) {
   const MarchSpace space{.minStep = 0.02f, .maxStep = 0.1f, .cone = 0.02f};
   double last = 0;
   for (int n = 0; n < 400; ++n) {

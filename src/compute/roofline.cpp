@@ -30,19 +30,19 @@ class CpuProbe final : public MachineProbe {
   ThreadPool pool_;
 };
 
-// Whether operations are done when somebody waits, and not when they are asked for.
+// Whether the device queues operations instead of running them at once.
 bool isQueued([[maybe_unused]] const Device& device) {
 #ifdef TESSERA_HAS_VULKAN
-  return contextOf(device) != nullptr;
+  return vulkanContext(device) != nullptr;
 #else
   return false;
 #endif
 }
 
-// Null of the reference device, which nobody hurries.
-std::unique_ptr<MachineProbe> probeOf([[maybe_unused]] Device& device, const DeviceOptions& options) {
+// Returns null for the reference device, which is not optimised for speed.
+std::unique_ptr<MachineProbe> makeMachineProbe([[maybe_unused]] Device& device, const DeviceOptions& options) {
 #ifdef TESSERA_HAS_VULKAN
-  if (contextOf(device)) return makeVulkanProbe(device);
+  if (vulkanContext(device)) return makeVulkanProbe(device);
 #endif
   return options.kind == "reference" ? nullptr : std::make_unique<CpuProbe>(options.threads);
 }
@@ -57,7 +57,7 @@ MachineLimits measureLimits(MachineProbe& probe, const HashGrid& grid) {
   return limits;
 }
 
-// The higher of two measurements: a limit taken in a disturbed moment would flatter every share.
+// Keeps the higher of two measurements: a limit measured while the machine is disturbed would inflate every share.
 void raise(MachineLimits& limits, const MachineLimits& again) {
   limits.flops = std::max(limits.flops, again.flops);
   limits.matrixFlops = std::max(limits.matrixFlops, again.matrixFlops);
@@ -70,7 +70,7 @@ void raise(MachineLimits& limits, const MachineLimits& again) {
 
 void RooflineRecorder::measure(const OperationId& operation, Work work, const std::function<void()>& run) {
   using Clock = std::chrono::steady_clock;
-  // So many one after another that beginning and waiting cost nothing.
+  // Each measurement repeats the run so often that the cost of starting and waiting is negligible.
   int times = 1;
   const auto timed = [&] {
     const auto start = Clock::now();
@@ -79,9 +79,9 @@ void RooflineRecorder::measure(const OperationId& operation, Work work, const st
     return std::chrono::duration<double>(Clock::now() - start).count();
   };
   timed();
-  constexpr double kLeastSeconds = 1e-2;
-  constexpr int kMostTimes = 1024;
-  while (isQueued_ && times < kMostTimes && timed() < kLeastSeconds) times *= 2;
+  constexpr double kMinSeconds = 1e-2;
+  constexpr int kMaxTimes = 1024;
+  while (isQueued_ && times < kMaxTimes && timed() < kMinSeconds) times *= 2;
   double best = 1e30, spent = 0;
   for (int i = 0; i < 3 || spent < options_.secondsPerRow; ++i) {
     const double seconds = timed();
@@ -124,11 +124,11 @@ Array<float> RooflineRecorder::randomFloats(size_t count, float low, float high)
   const RandomStream random(1, ++arrays_);
   std::vector<float> values(count);
   for (size_t i = 0; i < count; ++i) values[i] = low + (high - low) * random.uniform(i);
-  return device_.arrayOf(values);
+  return device_.uploadArray(values);
 }
 
 std::vector<float> rayLikePositions(uint32_t rays, uint32_t perRay, uint64_t seed) {
-  constexpr float kStep = 1.7320508f / 1024;  // instant-ngp's shortest step, in a unit cube
+  constexpr float kStep = 1.7320508f / 1024;  // the minimum step of instant-ngp in a unit cube
   const RandomStream random(seed, 0x4a9);
   std::vector<float> positions;
   positions.reserve(size_t{rays} * perRay * 3);
@@ -152,7 +152,7 @@ std::vector<float> rayLikePositions(uint32_t rays, uint32_t perRay, uint64_t see
 Roofline measureRoofline(const RooflineOptions& options) {
   const std::unique_ptr<Device> device = makeDevice(options.device);
   const HashGrid grid;  // the default one: 16 levels of two features, at most 2^17 entries
-  const std::unique_ptr<MachineProbe> probe = probeOf(*device, options.device);
+  const std::unique_ptr<MachineProbe> probe = makeMachineProbe(*device, options.device);
   Roofline result;
   result.device = device->name();
   if (probe) {

@@ -1,24 +1,25 @@
-// How fast each operation of a device runs, beside what the machine could do at best, measured in the same run
-// (Williams et al. 2009, the roofline model). What is counted:
+// Measures the speed of each operation of a device relative to the peak performance of the machine, which is measured
+// in the same run (the roofline model, Williams et al. 2009). The counted work:
 //
-//   networks       2 · parameters · samples forward (a multiply and an add a weight), twice that backward (the gradient
-//                  of the weights and that of the inputs); padding of inputs and outputs is not counted. Beside the
-//                  arithmetic's limit (the matrix units', where there are any) memory's: as much as is done while
-//                  inputs, outputs and what is kept of activations are copied, and backward their gradients
-//   hash grid      8 corners · levels · samples lookups, forward (read) as backward (read, add, write)
-//   virtual grid   20 corners · samples lookups; the limit is the lower of two rates: gathers from a table of what the
-//                  corners are looked up in (a bit each of all texels to find those needed, 8 bytes each of those
-//                  needed forward, 32 backward), and as many lookups as are done while the arguments are copied:
-//                  16 bytes a sample for where it is, 8 for every 32 texels (bits and ranks), then 12 a needed texel
-//                  (finding), 32 a needed texel and 32 a sample (forward), 32 and 64 (backward)
-//   lattice        8 corners · samples lookups, 64 bytes each; the limit likewise: 64 bytes a needed corner and a
-//   sample all others     bytes of their arguments, each array once however often a kernel passes over it; the limit is
-//   a copy
-//                  of the same footprint (to the next power of two)
+//   networks       2 · parameters · samples forward (a multiply and an add per weight), and twice that backward (the
+//                  gradients of the weights and of the inputs); padding of inputs and outputs is not counted. Besides
+//                  the arithmetic limit (that of the matrix units, if there are any) there is a memory limit: the work
+//                  done in the time of copying the inputs, outputs and stored activations, and for the backward pass
+//                  also their gradients
+//   hash grid      8 corners · levels · samples lookups, forward (read) and backward (read, add, write)
+//   virtual grid   20 corners · samples lookups. The limit is the lower of two rates: that of gathers from a table of
+//                  the size of the data (1 bit for every texel to find the needed ones, 8 bytes per needed texel
+//                  forward, 32 backward), and that of the lookups done in the time of copying the arguments: 16 bytes
+//                  per sample for its position and block, 8 bytes per 32 texels (bits and ranks), and 12 bytes per
+//                  needed texel (finding), 32 per needed texel and 32 per sample (forward), or 32 and 64 (backward)
+//   lattice        8 corners · samples lookups of 64 bytes; the limit is formed in the same way, with 64 bytes per
+//                  needed corner and per sample
+//   all others     the bytes of their arguments, counting each array once even if a kernel reads it several times; the
+//                  limit is a copy with the same footprint (rounded up to a power of two)
 //
 // The limit of the hash grid is the gather rate of tables of the same sizes, level by level: lookups / Σ (lookups of a
-// level / rate of its size). Ray-like positions revisit cells that the cache still holds and may pass it.
-// Every time is the best of several: what the code can do, not what the machine was disturbed to.
+// level / rate of its size). Ray-like positions revisit cells that are still in the cache, so they can exceed it.
+// Every time is the best of several, so that disturbances by other processes do not count.
 #pragma once
 
 #include <algorithm>
@@ -31,20 +32,20 @@ namespace tessera {
 
 struct RooflineOptions {
   DeviceOptions device;
-  std::vector<uint32_t> samples = {65536, 8192};  // of networks and hash grid
-  uint32_t streamed = 1 << 20;                    // samples of the operations that only stream: more than caches hold
-  double secondsPerRow = 0.15;                    // repeats for so long, and at least 3 times
+  std::vector<uint32_t> samples = {65536, 8192};  // batch sizes for networks and hash grid
+  uint32_t streamed = 1 << 20;                    // samples of streaming operations: more than fits into the caches
+  double secondsPerRow = 0.15;                    // repeats each operation for this long, and at least 3 times
 };
 
-// Of all threads, or the whole card. Zero where it is not measured: on the reference device.
+// The limits of all CPU threads together, or of the whole GPU. Zero if not measured, as on the reference device.
 struct MachineLimits {
   double flops = 0;        // multiply-adds on registers, 2 operations each, per second
   double matrixFlops = 0;  // MachineProbe::matrixFlops
   struct Stream {
-    size_t bytes = 0;  // footprint: half of it is copied to the other half
+    size_t bytes = 0;  // footprint; one half of it is copied to the other
     double rate = 0;   // bytes read + written per second
   };
-  std::vector<Stream> streams;  // by footprint
+  std::vector<Stream> streams;  // one per footprint
   struct Gather {
     size_t tableBytes = 0;
     double lookups = 0;  // 8-byte loads at random places per second
@@ -56,14 +57,14 @@ struct RooflineRow {
   OperationId operation;
   std::string name, shape;
   double seconds = 0;  // of one run
-  double rate = 0;     // per second
+  double rate = 0;     // in units per second
   std::string unit;    // "FLOP", "lookup", "B"
-  double limit = 0;    // per second; 0: not known
-  // Likewise, while the arguments are copied once: of networks, which small ones never reach the arithmetic's limit
-  // for.
+  double limit = 0;    // in units per second; 0 if unknown
+  // The rate, in units per second, of a run that takes as long as copying its arguments once. Only for networks: small
+  // ones are limited by memory and never reach the arithmetic limit.
   double memoryLimit = 0;
   double share() const { return limit > 0 ? rate / limit : 0; }
-  // Of the lower of both.
+  // The share of the lower of both limits.
   double shareOfBoth() const {
     const double lower = memoryLimit > 0 ? std::min(limit, memoryLimit) : limit;
     return lower > 0 ? rate / lower : 0;
@@ -76,11 +77,11 @@ struct Roofline {
   std::vector<RooflineRow> rows;
 };
 
-// Throws Error when there is no such device.
+// Measures all operations of a device. Throws Error if there is no such device.
 Roofline measureRoofline(const RooflineOptions& options);
 
-// Samples as marching makes them: `perRay` points half a finest cell or so apart on each of `rays` random lines in
-// [0,1]³. [rays · perRay][3], a function of the arguments alone.
+// Returns positions like those from ray marching, [rays · perRay][3]: `perRay` points about half a finest cell apart on
+// each of `rays` random lines in [0,1]³. Depends on the arguments alone.
 std::vector<float> rayLikePositions(uint32_t rays, uint32_t perRay, uint64_t seed);
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// The rows of networks and hash grids, which training spends its time in.
+// The roofline rows of networks and hash grids, which take most of the training time.
 
 #include <fmt/format.h>
 
@@ -14,7 +14,7 @@ namespace {
 
 struct Network {
   MlpShape shape;
-  bool grouped = false;  // reads and writes the hash grid's layout
+  bool grouped = false;  // the input has the layout of the hash grid
 };
 
 double weights(const MlpShape& shape) {
@@ -35,18 +35,18 @@ void measureNetwork(RooflineRecorder& recorder, const Network& network, const st
   Array<float> w = recorder.randomFloats(shape.parameters(), -0.2f, 0.2f);
   Array<float> dy = recorder.randomFloats(size_t{n} * outputs, -1, 1);
   Array<float> y = device.array<float>(size_t{n} * outputs), dx = device.array<float>(planeRows * inputs);
-  Array<float> kept = device.activationsOf(shape, n);
+  Array<float> activations = device.allocateActivations(shape, n);
   Array<float> dw = device.array<float>(shape.parameters());
-  const MlpForward forward{shape, {n, {}}, inputMatrix(x), w, Matrix<float>(y, outputs), kept};
+  const MlpForward forward{shape, {n, {}}, inputMatrix(x), w, Matrix<float>(y, outputs), activations};
   const MlpBackward backward{
-      shape, {n, {}}, inputMatrix(x), w, Matrix<float>(y, outputs), kept, Matrix<float>(dy, outputs),
+      shape, {n, {}}, inputMatrix(x), w, Matrix<float>(y, outputs), activations, Matrix<float>(dy, outputs),
       {},    dw,      inputMatrix(dx)};
   const double flops = 2 * weights(shape) * n;
   const double limit = std::max(recorder.limits().flops, recorder.limits().matrixFlops);
   const std::string where = fmt::format("{}, {} samples", title, n);
   const double in = sizeof(float) * static_cast<double>(n) * inputs;
   const double out = sizeof(float) * static_cast<double>(n) * outputs;
-  const double forwardBytes = in + out + static_cast<double>(kept.size()) * sizeof(float);
+  const double forwardBytes = in + out + static_cast<double>(activations.size()) * sizeof(float);
   const double backwardBytes = forwardBytes + out + in;
   const auto work = [&](const char* name, double amount, double bytes) {
     return RooflineRecorder::Work{name, where, amount, "FLOP", limit, amount / bytes * recorder.streamLimit(bytes)};
@@ -60,7 +60,7 @@ void measureNetwork(RooflineRecorder& recorder, const Network& network, const st
   });
 }
 
-// Segments of rays that meet two of four blocks each.
+// Measures deferred networks on rays that pass through two of four blocks each.
 void measureDeferred(RooflineRecorder& recorder, uint32_t n) {
   constexpr uint32_t kNetworks = 4;
   Device& device = recorder.device();
@@ -71,8 +71,8 @@ void measureDeferred(RooflineRecorder& recorder, uint32_t n) {
     rays[s] = s / 2;
   }
   for (size_t i = 0; i < directions.size(); i += 3) directions[i + i / 3 % 3] = 1;
-  Array<uint32_t> networkOfSegment = device.arrayOf(networks), rayOfSegment = device.arrayOf(rays);
-  Array<float> direction = device.arrayOf(directions), composited = recorder.randomFloats(size_t{n} * 7, 0, 1);
+  Array<uint32_t> networkOfSegment = device.uploadArray(networks), rayOfSegment = device.uploadArray(rays);
+  Array<float> direction = device.uploadArray(directions), composited = recorder.randomFloats(size_t{n} * 7, 0, 1);
   Array<float> weights = recorder.randomFloats(size_t{kNetworks} * DeferredNetwork::kParameters, -0.3f, 0.3f);
   Array<float> specular = device.array<float>(size_t{n} * 3);
   Array<float> upstream = recorder.randomFloats(size_t{n} * 3, -1, 1);
@@ -101,7 +101,7 @@ void measureHashGrid(RooflineRecorder& recorder, const HashGrid& grid, const std
   Device& device = recorder.device();
   const uint32_t n = static_cast<uint32_t>(points.size() / 3);
   const size_t planeRows = Matrix<float>::rowsOfPlane(n);
-  Array<float> positions = device.arrayOf(points);
+  Array<float> positions = device.uploadArray(points);
   Array<float> table = recorder.randomFloats(grid.parameters(), -1e-4f, 1e-4f);
   Array<float> upstream = recorder.randomFloats(planeRows * grid.columns(), -1, 1);
   Array<float> encoded = device.array<float>(planeRows * grid.columns()),
@@ -120,7 +120,7 @@ void measureHashGrid(RooflineRecorder& recorder, const HashGrid& grid, const std
                    [&] { device.run(backward); });
 }
 
-// Lookups per second of a machine that does nothing but fetch, each level from a table of its size.
+// Lookups per second if every level is limited by the gather rate of a table of its size.
 double gatherLimit(const MachineLimits& limits, const HashGrid& grid) {
   double seconds = 0;
   for (const HashGridLevel& level : grid.levels) {

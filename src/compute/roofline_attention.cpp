@@ -1,4 +1,4 @@
-// The rows of NGP-RT's operations: marching through blocks, the lattice, fusing levels and shading rays.
+// The roofline rows of the operations of NGP-RT: marching through blocks, the lattice, fusing levels and shading rays.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace {
 
 constexpr uint32_t kPerRay = 16;
 
-// Samples near a hilly ground, as positions in [0,1]³, `kPerRay` of each ray.
+// Samples near hilly ground, as positions in [0,1]³, with `kPerRay` samples per ray.
 std::vector<float> positionsNearGround(uint32_t samples) {
   const std::vector<float> anywhere = rayLikePositions((samples + kPerRay - 1) / kPerRay, kPerRay, 3);
   std::vector<float> positions(anywhere.begin(), anywhere.begin() + size_t{3} * samples);
@@ -34,7 +34,7 @@ void measureMarch(RooflineRecorder& recorder) {
   MarchBlocks march{space};
   march.cells = 64;
   const uint32_t rays = std::max(1u, recorder.options().streamed / 64), capacity = rays * 64;
-  // From above, straight down on the grid; a slab of each block is occupied.
+  // The rays look straight down on the grid from above; a horizontal slab of each block is occupied.
   Array<float> origins = recorder.randomFloats(size_t{rays} * 3, -2, 2);
   std::vector<float> from = device.read(origins.all()), along(from.size());
   for (uint32_t r = 0; r < rays; ++r) {
@@ -42,14 +42,14 @@ void measureMarch(RooflineRecorder& recorder) {
     along[3 * r + 2] = -1;
   }
   device.write(origins.all(), std::span<const float>(from));
-  const Array<float> directions = device.arrayOf(along);
+  const Array<float> directions = device.uploadArray(along);
   const size_t words = size_t{march.cells} * march.cells * march.cells / 32;
   std::vector<uint32_t> bits(words * space.blocks());
   for (size_t word = 0; word < bits.size(); ++word) {
     const size_t z = word % words * 32 / (march.cells * march.cells);
     bits[word] = z >= 28 && z < 36 ? ~0u : 0u;
   }
-  const Array<uint32_t> occupancy = device.arrayOf(bits);
+  const Array<uint32_t> occupancy = device.uploadArray(bits);
   Array<uint32_t> first = device.array<uint32_t>(rays + size_t{1}), count = device.array<uint32_t>(1);
   Array<uint32_t> rayOfSample = device.array<uint32_t>(capacity), slots = device.array<uint32_t>(capacity);
   Array<float> positions = device.array<float>(size_t{capacity} * 3), distances = device.array<float>(capacity),
@@ -70,27 +70,27 @@ void measureMarch(RooflineRecorder& recorder) {
   march.middles = middles;
   march.widths = widths;
   device.run(march);
-  const uint32_t made = device.read(count.all())[0];
-  recorder.measureStream(kOperation<MarchBlocks>, fmt::format("{} rays, {} samples", rays, made),
-                         made * 36.0 + rays * 28.0, [&] { device.run(march); });
+  const uint32_t sampleCount = device.read(count.all())[0];
+  recorder.measureStream(kOperation<MarchBlocks>, fmt::format("{} rays, {} samples", rays, sampleCount),
+                         sampleCount * 36.0 + rays * 28.0, [&] { device.run(march); });
 }
 
-// Of one block, as training evaluates them.
+// Measures the lattice of one block with samples like those of training.
 void measureLattice(RooflineRecorder& recorder) {
   Device& device = recorder.device();
   constexpr uint32_t kColumns = LatticeForward::kColumns;
   VirtualGrid grid;
   grid.planes = 0;
-  const uint32_t n = recorder.options().samples.front(), room = 8 * n;
-  const Array<float> positions = device.arrayOf(positionsNearGround(n));
+  const uint32_t n = recorder.options().samples.front(), capacity = 8 * n;
+  const Array<float> positions = device.uploadArray(positionsNearGround(n));
   Array<uint32_t> blocks = device.array<uint32_t>(n), firstTexel = device.array<uint32_t>(2);
   Array<uint32_t> marks = device.array<uint32_t>(grid.words()), ranks = device.array<uint32_t>(grid.words());
-  Array<float> texelPositions = device.array<float>(size_t{3} * room);
+  Array<float> texelPositions = device.array<float>(size_t{3} * capacity);
   DistinctTexels distinct{grid};
   distinct.samples = {n};
   distinct.blockOfSample = blocks;
   distinct.positions = positions;
-  distinct.texelCapacity = room;
+  distinct.texelCapacity = capacity;
   distinct.marks = marks;
   distinct.ranks = ranks;
   distinct.firstTexel = firstTexel;
@@ -99,7 +99,7 @@ void measureLattice(RooflineRecorder& recorder) {
   const uint32_t texels = device.read(firstTexel.all())[1];
   const double lookups = 8.0 * n, bits = 8.0 * grid.words(), row = 4.0 * kColumns;
   const std::string shape = fmt::format("{} samples, {} of {} corners", n, texels, grid.texels());
-  // As of the virtual grid: lookups, or moving the arguments once.
+  // As for the virtual grid, the limit is the slower of the lookups and of moving the arguments once.
   const auto measure = [&](const OperationId& operation, double bytes, const std::function<void()>& run) {
     const double moved = bytes + 16.0 * n;
     const double limit =
@@ -145,9 +145,9 @@ void measureFusion(RooflineRecorder& recorder) {
                fineGradients = device.array<float>(size_t{fineColumns} * n), densityGradients = device.array<float>(n);
   const Matrix<float> ofFine = Matrix<float>::grouped(fine, fineColumns, kFeatures, n);
   const Matrix<float> ofFineGradients = Matrix<float>::grouped(fineGradients, fineColumns, kFeatures, n);
-  const Matrix<float> made(features, kFeatures);
+  const Matrix<float> fused(features, kFeatures);
   recorder.measureStream(kOperation<AttentionForward>, shape, n * 4.0 * (kCoarse + fineColumns + kFeatures), [&] {
-    device.run(AttentionForward{attention, {n}, Matrix<float>(coarse, kCoarse), ofFine, {}, made});
+    device.run(AttentionForward{attention, {n}, Matrix<float>(coarse, kCoarse), ofFine, {}, fused});
   });
   recorder.measureStream(kOperation<AttentionBackward>, shape, n * 4.0 * (2 * (kCoarse + fineColumns) + kFeatures),
                          [&] {
@@ -157,12 +157,12 @@ void measureFusion(RooflineRecorder& recorder) {
                                                         ofFine,
                                                         {},
                                                         densityGradients,
-                                                        made.columnRange(1, kFeatures - 1),
+                                                        fused.columnRange(1, kFeatures - 1),
                                                         Matrix<float>(coarseGradients, kCoarse),
                                                         ofFineGradients,
                                                         {}});
                          });
-  const Matrix<float> diffuse = made.columnRange(0, 3), specular(fineGradients, 3), sums(coarseGradients, 3);
+  const Matrix<float> diffuse = fused.columnRange(0, 3), specular(fineGradients, 3), sums(coarseGradients, 3);
   Array<float> colour = device.array<float>(size_t{3} * n);
   const std::string rays = fmt::format("{} rays", n);
   recorder.measureStream(kOperation<ShadeForward>, rays, n * 40.0, [&] {
@@ -172,7 +172,7 @@ void measureFusion(RooflineRecorder& recorder) {
     device.run(ShadeBackward{false, {n}, diffuse, specular, densityGradients, colour, sums, densityGradients});
   });
   recorder.measureStream(kOperation<AddColumns>, fmt::format("8 columns, {} rows", n), n * 96.0, [&] {
-    device.run(AddColumns{{n}, Matrix<float>(coarse, kFeatures), made});
+    device.run(AddColumns{{n}, Matrix<float>(coarse, kFeatures), fused});
   });
 }
 

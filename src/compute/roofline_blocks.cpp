@@ -1,4 +1,4 @@
-// The rows of sampling through blocks: a grid of 3 × 2 seen from above.
+// The roofline rows of sampling through blocks: a grid of 3 × 2 blocks seen from above.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr uint32_t kIntervals = 64;
 
-// Rays that look down on the grid from all sides.
+// Rays that look down on the grid from all directions.
 struct Rays {
   uint32_t count;
   Array<float> origins, directions;
@@ -34,7 +34,7 @@ struct Rays {
   }
 };
 
-// What BlockSamples writes.
+// The outputs of BlockSamples.
 struct Samples {
   Array<uint32_t> firstSample, counters, blocks, firstSegment, firstOfSegment, groupOfSegment, rayOfSegment;
   Array<float> positions, distances, steps, middles, widths, runtimeSteps;
@@ -42,17 +42,17 @@ struct Samples {
   Samples(Device& device, const BlockSamples& a, uint32_t rays)
       : firstSample(device.array<uint32_t>(rays + 1)),
         counters(device.array<uint32_t>(2)),
-        blocks(device.array<uint32_t>(a.mostSamples(rays))),
+        blocks(device.array<uint32_t>(a.maxSamples(rays))),
         firstSegment(device.array<uint32_t>(rays + 1)),
-        firstOfSegment(device.array<uint32_t>(a.mostSegments(rays) + 1)),
-        groupOfSegment(device.array<uint32_t>(a.mostSegments(rays))),
-        rayOfSegment(device.array<uint32_t>(a.mostSegments(rays))),
-        positions(device.array<float>(size_t{a.mostSamples(rays)} * 3)),
-        distances(device.array<float>(a.mostSamples(rays))),
-        steps(device.array<float>(a.mostSamples(rays))),
-        middles(device.array<float>(a.mostSamples(rays))),
-        widths(device.array<float>(a.mostSamples(rays))),
-        runtimeSteps(device.array<float>(a.mostSamples(rays))) {}
+        firstOfSegment(device.array<uint32_t>(a.maxSegments(rays) + 1)),
+        groupOfSegment(device.array<uint32_t>(a.maxSegments(rays))),
+        rayOfSegment(device.array<uint32_t>(a.maxSegments(rays))),
+        positions(device.array<float>(size_t{a.maxSamples(rays)} * 3)),
+        distances(device.array<float>(a.maxSamples(rays))),
+        steps(device.array<float>(a.maxSamples(rays))),
+        middles(device.array<float>(a.maxSamples(rays))),
+        widths(device.array<float>(a.maxSamples(rays))),
+        runtimeSteps(device.array<float>(a.maxSamples(rays))) {}
 
   void nameIn(BlockSamples& a) {
     a.firstSample = firstSample;
@@ -149,7 +149,7 @@ void measureBlockStreams(RooflineRecorder& recorder) {
     measureProposals(recorder, fences.all(), sample, rays, rows);
   }
   const uint32_t points = recorder.options().streamed;
-  Array<uint32_t> chosen = device.arrayOf(std::vector<uint32_t>{0, 3, 6}), blocks = device.array<uint32_t>(points);
+  Array<uint32_t> chosen = device.uploadArray(std::vector<uint32_t>{0, 3, 6}), blocks = device.array<uint32_t>(points);
   Array<float> positions = device.array<float>(size_t{points} * 3), steps = device.array<float>(points);
   recorder.measureStream(kOperation<BlockPoints>, fmt::format("{} points", points), points * 20.0, [&] {
     device.run(BlockPoints{space, points, 1, 2048, chosen, {}, blocks, positions, steps});

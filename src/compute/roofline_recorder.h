@@ -1,4 +1,4 @@
-// What the parts of the roofline share: a device, its limits, and the rows so far.
+// Shared by the parts of the roofline measurement: the device, its limits, and the rows measured so far.
 #pragma once
 
 #include <functional>
@@ -12,22 +12,22 @@ struct HashGrid;
 
 class RooflineRecorder {
  public:
-  // `isQueued`: of the device's operations. `probe` measures the limits of streams, which are added to `limits`; null
-  // where nobody knows them.
+  // `isQueued` is whether the device queues operations instead of running them at once. `probe` measures the limits of
+  // streams, which are added to `limits`; it is null if the device has no known limits.
   RooflineRecorder(Device& device, bool isQueued, MachineProbe* probe, const RooflineOptions& options,
                    MachineLimits& limits)
       : device_(device), isQueued_(isQueued), probe_(probe), options_(options), limits_(limits) {}
 
   struct Work {
     std::string name, shape;
-    double amount = 0;  // of one run
+    double amount = 0;  // units of work per run
     std::string unit;
     double limit = 0;
     double memoryLimit = 0;
   };
   // Times `run` and adds a row.
   void measure(const OperationId& operation, Work work, const std::function<void()>& run);
-  // An operation that moves this many bytes.
+  // Times an operation that moves `bytes` bytes and adds a row.
   void measureStream(const OperationId& operation, std::string shape, double bytes, const std::function<void()>& run);
 
   Device& device() { return device_; }
@@ -35,9 +35,9 @@ class RooflineRecorder {
   const MachineLimits& limits() const { return limits_; }
   std::vector<RooflineRow> takeRows() { return std::move(rows_); }
 
-  // 8-byte loads per second at random places of a table of so many bytes; 0 where it is not measured.
+  // 8-byte loads per second at random places in a table of `bytes` bytes; 0 if not measured.
   double gatherLimit(size_t bytes);
-  // Bytes per second, read and written, of a copy with this footprint; 0 where it is not measured.
+  // Bytes per second, read and written, of a copy with a footprint of `bytes` bytes; 0 if not measured.
   double streamLimit(double bytes);
 
   Array<float> randomFloats(size_t count, float low, float high);

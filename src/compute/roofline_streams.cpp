@@ -1,4 +1,4 @@
-// The rows of the operations that touch each number once. `kLine` samples stand on a ray.
+// The roofline rows of the operations that read or write each number once. Each ray has `kLine` samples.
 
 #include <fmt/format.h>
 
@@ -21,11 +21,11 @@ namespace {
 
 constexpr uint32_t kLine = 32;
 
-std::string shapeOf(double count, const char* what) {
+std::string describeShape(double count, const char* what) {
   return fmt::format("{:.0f} {}", count, what);
 }
 
-// Rays of kLine samples each, as marching would leave them.
+// Rays with kLine samples each, like the output of marching.
 struct Lines {
   uint32_t rays, samples;
   Array<uint32_t> firstSample, rayOfSample;
@@ -40,9 +40,9 @@ struct Lines {
       t[s] = 1 + 0.01f * static_cast<float>(s % kLine);
     }
     Device& device = recorder.device();
-    firstSample = device.arrayOf(first);
-    rayOfSample = device.arrayOf(ray);
-    distances = device.arrayOf(t);
+    firstSample = device.uploadArray(first);
+    rayOfSample = device.uploadArray(ray);
+    distances = device.uploadArray(t);
     steps = recorder.randomFloats(samples, 0.01f, 0.0101f);
     logDensity = recorder.randomFloats(samples, -2, 2);  // thin: no ray ends before its last sample
     colours = recorder.randomFloats(size_t{samples} * 3, 0, 1);
@@ -53,7 +53,7 @@ struct Lines {
 void measureEncodings(RooflineRecorder& recorder, Lines& lines) {
   Device& device = recorder.device();
   const double n = lines.samples, rays = lines.rays;
-  const std::string shape = fmt::format("degree 4, {}", shapeOf(n, "samples"));
+  const std::string shape = fmt::format("degree 4, {}", describeShape(n, "samples"));
   Array<float> wide = recorder.randomFloats(size_t{lines.samples} * 27, -1, 1);
   Array<float> narrow = recorder.randomFloats(size_t{lines.samples} * 3, -1, 1);
   const Matrix<float> harmonics(wide, 16), waves(wide, 27);
@@ -63,7 +63,7 @@ void measureEncodings(RooflineRecorder& recorder, Lines& lines) {
   recorder.measureStream(kOperation<SphericalHarmonicsBackward>, shape, n * (4 + 64 + 12) + rays * 12, [&] {
     device.run(SphericalHarmonicsBackward{4, {lines.samples, {}}, lines.perRay, lines.rayOfSample, harmonics, narrow});
   });
-  const std::string frequencies = fmt::format("4 frequencies, {}", shapeOf(n, "samples"));
+  const std::string frequencies = fmt::format("4 frequencies, {}", describeShape(n, "samples"));
   recorder.measureStream(kOperation<FrequencyForward>, frequencies, n * (12 + 108), [&] {
     device.run(FrequencyForward{3, 4, {lines.samples, {}}, lines.colours, waves});
   });
@@ -75,7 +75,7 @@ void measureEncodings(RooflineRecorder& recorder, Lines& lines) {
 void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
   Device& device = recorder.device();
   const double n = lines.samples, rays = lines.rays;
-  const std::string shape = fmt::format("{}, {} a ray", shapeOf(n, "samples"), kLine);
+  const std::string shape = fmt::format("{}, {} a ray", describeShape(n, "samples"), kLine);
   Array<float> colour = device.array<float>(size_t{lines.rays} * 3), opacity = device.array<float>(lines.rays);
   Array<float> depth = device.array<float>(lines.rays), weights = device.array<float>(lines.samples);
   Array<float> dx = device.array<float>(lines.samples), dColours = device.array<float>(size_t{lines.samples} * 3);
@@ -139,7 +139,7 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
     CompactSamples compact;
     compact.rays = {lines.rays, {}};
     compact.sampleCapacity = compact.keptCapacity = lines.samples;
-    compact.mostOpticalDepth = 1e6f;  // thin: no ray ends before its last sample
+    compact.maxOpticalDepth = 1e6f;  // thin: no ray ends before its last sample
     compact.firstSample = lines.firstSample;
     compact.logDensity = Matrix<float>(lines.logDensity, 1);
     compact.steps = lines.steps;
@@ -151,26 +151,26 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
   });
   Array<float> to = device.array<float>(size_t{lines.samples} * 3);
   recorder.measureStream(
-      kOperation<GatherRows>, fmt::format("3 columns, {}", shapeOf(n, "samples")), n * (4 + 24), [&] {
+      kOperation<GatherRows>, fmt::format("3 columns, {}", describeShape(n, "samples")), n * (4 + 24), [&] {
         device.run(GatherRows{{lines.samples, {}}, source, Matrix<float>(lines.colours, 3), Matrix<float>(to, 3)});
       });
 }
 
-// Two segments a ray.
+// Measures blending with two segments per ray.
 void measureBlending(RooflineRecorder& recorder, uint32_t segments) {
   Device& device = recorder.device();
   const uint32_t rays = segments / 2;
   segments = 2 * rays;
   std::vector<uint32_t> first(rays + 1);
   for (uint32_t r = 0; r <= rays; ++r) first[r] = 2 * r;
-  Array<uint32_t> firstSegment = device.arrayOf(first);
+  Array<uint32_t> firstSegment = device.uploadArray(first);
   Array<float> composited = recorder.randomFloats(size_t{segments} * 7, 0, 1),
                colour = device.array<float>(size_t{rays} * 3);
   Array<float> specular = recorder.randomFloats(size_t{segments} * 3, 0, 1), opacity = device.array<float>(rays);
   Array<float> alpha = recorder.randomFloats(segments, 0.1f, 0.9f), depth = device.array<float>(rays);
   Array<float> dComposited = device.array<float>(composited.size()), dSpecular = device.array<float>(specular.size());
   Array<float> dAlpha = device.array<float>(segments), loss = device.array<float>(1);
-  const std::string shape = fmt::format("{}, 2 a ray", shapeOf(segments, "segments"));
+  const std::string shape = fmt::format("{}, 2 a ray", describeShape(segments, "segments"));
   recorder.measureStream(kOperation<BlendForward>, shape, segments * 48.0 + rays * 24.0, [&] {
     device.run(
         BlendForward{false, {rays, {}}, firstSegment, composited, specular, alpha, alpha, colour, opacity, depth});
@@ -179,12 +179,12 @@ void measureBlending(RooflineRecorder& recorder, uint32_t segments) {
     device.run(BlendBackward{
         false, {rays, {}}, firstSegment, composited, specular, alpha, colour, {}, dComposited, dSpecular, dAlpha});
   });
-  recorder.measureStream(kOperation<OpacityLoss>, shapeOf(segments, "segments"), segments * 12.0, [&] {
+  recorder.measureStream(kOperation<OpacityLoss>, describeShape(segments, "segments"), segments * 12.0, [&] {
     device.run(OpacityLoss{1, {segments, {}}, alpha, loss, dAlpha});
   });
 }
 
-// Cells of a hollow ball, a sixth of the region of interest across and two cells thick.
+// Occupancy of a spherical shell with a radius of 0.18 to 0.2 of the width of the grid.
 std::vector<uint32_t> shellOccupancy(const MarchSpace& space) {
   const int size = space.gridResolution;
   std::vector<uint32_t> bits(static_cast<size_t>(size) * size * size / 32);
@@ -208,16 +208,16 @@ void measureRays(RooflineRecorder& recorder, uint32_t capacity) {
   cameras[0].parameters[0] = cameras[0].parameters[1] = 500;
   cameras[0].parameters[2] = cameras[0].parameters[3] = 256;
   for (const int i : {0, 4, 8}) cameras[0].rotation[i] = 1;
-  Array<RayCamera> camera = device.arrayOf(cameras);
+  Array<RayCamera> camera = device.uploadArray(cameras);
   Array<uint32_t> cameraOfRay = device.array<uint32_t>(rays);
   Array<float> pixels = recorder.randomFloats(size_t{rays} * 2, 0, 512);
   Array<float> origins = device.array<float>(size_t{rays} * 3), directions = device.array<float>(size_t{rays} * 3);
-  recorder.measureStream(kOperation<GenerateRays>, shapeOf(rays, "rays"), rays * 36.0, [&] {
+  recorder.measureStream(kOperation<GenerateRays>, describeShape(rays, "rays"), rays * 36.0, [&] {
     device.run(GenerateRays{{rays, {}}, camera, cameraOfRay, pixels, origins, directions});
   });
 
   const MarchSpace space;
-  Array<uint32_t> occupancy = device.arrayOf(shellOccupancy(space));
+  Array<uint32_t> occupancy = device.uploadArray(shellOccupancy(space));
   Array<uint32_t> first = device.array<uint32_t>(rays + 1), counters = device.array<uint32_t>(2);
   Array<uint32_t> rayOfSample = device.array<uint32_t>(capacity);
   Array<float> positions = device.array<float>(size_t{capacity} * 3), distances = device.array<float>(capacity);
@@ -237,12 +237,12 @@ void measureRays(RooflineRecorder& recorder, uint32_t capacity) {
   march.distances = distances;
   march.steps = steps;
   device.run(march);
-  const uint32_t made = device.read(counters.all())[0];
-  recorder.measureStream(kOperation<MarchRays>, fmt::format("{} rays, {} samples", rays, made),
-                         made * 24.0 + rays * 32.0, [&] { device.run(march); });
+  const uint32_t sampleCount = device.read(counters.all())[0];
+  recorder.measureStream(kOperation<MarchRays>, fmt::format("{} rays, {} samples", rays, sampleCount),
+                         sampleCount * 24.0 + rays * 32.0, [&] { device.run(march); });
   Array<uint32_t> nextStep = device.array<uint32_t>(rays);
   Array<float> opticalDepth = device.array<float>(rays);
-  march.most = 8;
+  march.maximum = 8;
   march.nextStep = nextStep;
   march.opticalDepth = opticalDepth;
   device.run(march);
@@ -256,7 +256,7 @@ void measureRays(RooflineRecorder& recorder, uint32_t capacity) {
 
 void measureLosses(RooflineRecorder& recorder, uint32_t rays) {
   Device& device = recorder.device();
-  const std::string shape = shapeOf(rays, "rays");
+  const std::string shape = describeShape(rays, "rays");
   Array<float> predicted = recorder.randomFloats(size_t{rays} * 3, 0, 1),
                target = recorder.randomFloats(size_t{rays} * 3, 0, 1);
   Array<float> weights = recorder.randomFloats(rays, 1, 1), loss = device.array<float>(2);
@@ -264,16 +264,16 @@ void measureLosses(RooflineRecorder& recorder, uint32_t rays) {
                gainGradients = device.array<float>(300);
   std::vector<uint32_t> photos(rays);
   for (uint32_t r = 0; r < rays; ++r) photos[r] = r % 100;
-  Array<uint32_t> photoOfRay = device.arrayOf(photos);
+  Array<uint32_t> photoOfRay = device.uploadArray(photos);
   recorder.measureStream(kOperation<ColourLoss>, shape, rays * 40.0, [&] {
     device.run(ColourLoss{ColourLossKind::huber, 0.1f, 1, {rays, {}}, predicted, target, weights, loss, out});
   });
-  // As many as a training step has: each patch walks all over them.
+  // The number of rays of a training step, since each patch accesses all of them in random order.
   const uint32_t batch = std::min(rays, 16384u);
   recorder.measureStream(kOperation<S3imLoss>, fmt::format("{} rays, 10 patches", batch), batch * 52.0, [&] {
     device.run(S3imLoss{1, {batch, {}}, 10, 1, predicted, target, weights, loss.part(0, 1), out});
   });
-  recorder.measureStream(kOperation<SparsityLoss>, shapeOf(rays, "points"), rays * 12.0, [&] {
+  recorder.measureStream(kOperation<SparsityLoss>, describeShape(rays, "points"), rays * 12.0, [&] {
     device.run(SparsityLoss{1, {rays, {}}, predicted.part(0, rays), target.part(0, rays), loss.part(0, 1), out});
   });
   recorder.measureStream(kOperation<ExposureForward>, shape, rays * 28.0, [&] {
@@ -289,10 +289,10 @@ void measureOccupancy(RooflineRecorder& recorder) {
   const MarchSpace space;
   const uint32_t cells = static_cast<uint32_t>(space.gridResolution) * space.gridResolution * space.gridResolution;
   const uint32_t half = cells / 8, points = 2 * half;
-  Array<uint32_t> occupancy = device.arrayOf(shellOccupancy(space)), chosen = device.array<uint32_t>(points);
+  Array<uint32_t> occupancy = device.uploadArray(shellOccupancy(space)), chosen = device.array<uint32_t>(points);
   Array<float> positions = device.array<float>(size_t{points} * 3), grid = recorder.randomFloats(cells, 0, 0.02f);
   Array<float> logDensity = recorder.randomFloats(points, -2, 2);
-  recorder.measureStream(kOperation<OccupancyPoints>, shapeOf(points, "points"), points * 16.0, [&] {
+  recorder.measureStream(kOperation<OccupancyPoints>, describeShape(points, "points"), points * 16.0, [&] {
     device.run(OccupancyPoints{space, half, half, 1, {}, occupancy, chosen, positions});
   });
   recorder.measureStream(
@@ -309,7 +309,7 @@ void measureAdam(RooflineRecorder& recorder, size_t n) {
   Array<uint32_t> counts = device.array<uint32_t>(n);
   Adam adam;
   adam.rate = 1e-6f;
-  adam.l2 = 1e-3f;  // keeps moments from fading into denormal numbers although gradients are zero after the first run
+  adam.l2 = 1e-3f;  // keeps the moments from becoming denormal, as gradients are zero after the first run
   adam.parameters = values;
   adam.gradients = gradients;
   adam.firstMoments = first;

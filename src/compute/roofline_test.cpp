@@ -28,7 +28,7 @@ TEST(Roofline, HasARowForEveryOperation) {
 }
 
 #ifdef TESSERA_HAS_VULKAN
-TEST(Roofline, HoldsEveryOperationOfAGraphicsCardAgainstWhatTheCardCanDo) {
+TEST(Roofline, ComparesEveryOperationOfAGpuWithItsLimits) {
   SKIP_WITHOUT_VULKAN(openForTest());
   RooflineOptions options;
   options.device.kind = "vulkan";

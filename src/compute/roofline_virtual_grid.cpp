@@ -1,5 +1,5 @@
-// The rows of the virtual grid: samples of one block near its ground, as training makes them once it knows where that
-// is.
+// The roofline rows of the virtual grid: samples of one block near the ground, as in training once the ground has been
+// learned.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace tessera {
 namespace {
 
-// Rays come in anywhere and look at a hilly ground: `perRay` samples each, a few texels about it.
+// Samples on random rays that hit hilly ground: `perRay` samples per ray, within a few texels of the ground.
 std::vector<float> positionsNearGround(uint32_t samples, uint32_t perRay) {
   const RandomStream random(1, 0x96d);
   std::vector<float> positions;
@@ -35,16 +35,16 @@ void measureVirtualGrid(RooflineRecorder& recorder) {
   Device& device = recorder.device();
   const VirtualGrid grid;
   const uint32_t n = recorder.options().samples.front();
-  Array<float> positions = device.arrayOf(positionsNearGround(n, kPerRay));
+  Array<float> positions = device.uploadArray(positionsNearGround(n, kPerRay));
   Array<uint32_t> blocks = device.array<uint32_t>(n), firstTexel = device.array<uint32_t>(2);
   Array<uint32_t> marks = device.array<uint32_t>(grid.words()), ranks = device.array<uint32_t>(grid.words());
-  const uint32_t room = VirtualGrid::kCorners * n;
-  Array<float> texelPositions = device.array<float>(size_t{3} * room);
+  const uint32_t capacity = VirtualGrid::kCorners * n;
+  Array<float> texelPositions = device.array<float>(size_t{3} * capacity);
   DistinctTexels distinct{grid};
   distinct.samples = {n};
   distinct.blockOfSample = blocks;
   distinct.positions = positions;
-  distinct.texelCapacity = room;
+  distinct.texelCapacity = capacity;
   distinct.marks = marks;
   distinct.ranks = ranks;
   distinct.firstTexel = firstTexel;
@@ -53,8 +53,8 @@ void measureVirtualGrid(RooflineRecorder& recorder) {
   const uint32_t texels = device.read(firstTexel.all())[1];
   const double lookups = static_cast<double>(VirtualGrid::kCorners) * n;
   const std::string shape = fmt::format("{} samples, {} of {} texels", n, texels, grid.texels());
-  // `table` is what the corners are looked up in, `bytes` what the arguments beside positions and blocks have. It takes
-  // at least as long as the slower of the lookups and of moving the arguments once.
+  // `table` is the size of the data in which the corners are looked up, and `bytes` that of the arguments besides
+  // positions and blocks. The limit is the slower of the lookups and of moving the arguments once.
   const auto measure = [&](const OperationId& operation, size_t table, double bytes, const std::function<void()>& run) {
     const double moved = bytes + 16.0 * n;
     const double limit = std::min(recorder.gatherLimit(table), lookups / moved * recorder.streamLimit(moved));

@@ -1,4 +1,4 @@
-// Rows of matrices moved from place to place and added up.
+// Moves and adds rows of matrices.
 #pragma once
 
 #include "compute/memory.h"
@@ -6,12 +6,12 @@
 
 namespace tessera {
 
-// output row i = input row source[i]. 32-bit elements of any kind.
+// output row i = input row source[i]. The elements can be of any 32-bit type.
 struct GatherRows {
   Count rows;
   Slice<const uint32_t> source;
   Matrix<const float> input;
-  Matrix<float> output;  // same layout kind and columns
+  Matrix<float> output;  // same kind of layout and number of columns as `input`
 };
 TESSERA_OPERATION(GatherRows);
 
@@ -28,7 +28,7 @@ TESSERA_OPERATION(ScatterRows);
 struct AddColumns {
   Count rows;
   Matrix<const float> input;
-  Matrix<float> output;  // as many columns
+  Matrix<float> output;  // same number of columns as `input`
 };
 TESSERA_OPERATION(AddColumns);
 

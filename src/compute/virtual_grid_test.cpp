@@ -1,5 +1,5 @@
-// What a look into the virtual grid must be on every device, whatever the reference says: 20 texels of four sources,
-// the bytes that a renderer will read, and nothing where it would not see anything.
+// Properties of lookups in the virtual grid that must hold on every device, independently of the reference: a sample
+// reads 20 texels of four sources and the bytes that a renderer will read, and is empty where a renderer would cull it.
 #include "compute/virtual_grid.h"
 
 #include <gtest/gtest.h>
@@ -15,14 +15,14 @@ namespace {
 
 constexpr uint32_t kWidth = VirtualGrid::kAttributes;
 
-VirtualGrid gridOf(uint32_t voxels, uint32_t planes) {
+VirtualGrid makeGrid(uint32_t voxels, uint32_t planes) {
   VirtualGrid grid;
   grid.voxels = voxels;
   grid.planes = planes;
   return grid;
 }
 
-// In [0,1]³, a third of the coordinates on a side.
+// Positions in [0,1]³ with a third of the coordinates at 0 or 1.
 std::vector<float> places(Random& random, uint32_t count) {
   std::vector<float> positions = random.floats(size_t{3} * count, 0, 1);
   for (size_t i = 0; i < positions.size(); ++i) {
@@ -31,10 +31,10 @@ std::vector<float> places(Random& random, uint32_t count) {
   return positions;
 }
 
-// So does a block, or one that is merged with others, never read outside of itself.
-TEST(VirtualGrid, MixesTwentyTexelsOfWhichEachSourceHasWeightsOfOne) {
+// All texels are inside the block, so a block, or one that is merged with others, never reads outside of itself.
+TEST(VirtualGrid, InterpolatesTwentyTexelsWithWeightsThatSumToOnePerSource) {
   Random random(91);
-  for (const VirtualGrid& grid : {gridOf(8, 24), gridOf(5, 19), gridOf(128, 512)}) {
+  for (const VirtualGrid& grid : {makeGrid(8, 24), makeGrid(5, 19), makeGrid(128, 512)}) {
     const uint32_t allVoxels = grid.voxels * grid.voxels * grid.voxels, ofPlane = grid.planes * grid.planes;
     const std::vector<float> positions = places(random, 500);
     for (size_t s = 0; s < positions.size(); s += 3) {
@@ -55,7 +55,7 @@ TEST(VirtualGrid, MixesTwentyTexelsOfWhichEachSourceHasWeightsOfOne) {
         EXPECT_NEAR(sum, 1, 1e-12);
         const double half = 0.5 / resolution;
         for (int a = 0; a < 3; ++a) {
-          // What a plane lies across does not matter: it is asked at its first texel.
+          // The coordinate across a plane does not matter: the plane is evaluated at the first texel.
           const double at = a == source - 1 ? half : std::clamp<double>(positions[s + a], half, 1 - half);
           EXPECT_NEAR(middle[a], at, 1e-6) << "source " << source << ", axis " << a;
         }
@@ -67,11 +67,11 @@ TEST(VirtualGrid, MixesTwentyTexelsOfWhichEachSourceHasWeightsOfOne) {
 class VirtualGridLookup : public testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
-    useSimdTargetOf(GetParam());
+    selectSimdTarget(GetParam());
     device = deviceNamed(GetParam());
     if (device == nullptr) GTEST_SKIP() << "this machine has no device \"" << GetParam() << "\"";
   }
-  void TearDown() override { useSimdTargetOf({}); }
+  void TearDown() override { selectSimdTarget({}); }
   Device* device = nullptr;
 };
 
@@ -79,7 +79,7 @@ struct Looked {
   std::vector<float> logDensities, colours;
 };
 
-// Into one block; attributes in the order of its texels' rows.
+// Lookups in one block; attributes are in the order of the rows of its texels.
 class Block {
  public:
   Block(Stage& stage, const VirtualGrid& grid, const std::vector<float>& positions)
@@ -145,8 +145,8 @@ class Block {
   Slice<const float> positions_;
 };
 
-TEST_P(VirtualGridLookup, OfOneValueEverywhereIsFourTimesItBeforeTheActivation) {
-  for (const VirtualGrid& grid : {gridOf(8, 24), gridOf(5, 19)}) {
+TEST_P(VirtualGridLookup, SumsAConstantOverFourSourcesBeforeTheActivation) {
+  for (const VirtualGrid& grid : {makeGrid(8, 24), makeGrid(5, 19)}) {
     Stage stage(*device, 92);
     Block block(stage, grid, places(stage.random, 300));
     const float values[] = {0.6f, 0.1f, 0.3f, 0.45f, 0.5f, 0.55f, 0.7f, 0.9f};
@@ -164,7 +164,7 @@ TEST_P(VirtualGridLookup, OfOneValueEverywhereIsFourTimesItBeforeTheActivation) 
   }
 }
 
-TEST_P(VirtualGridLookup, IsOfTheNearestOf256StepsWhereTexelsAreBytes) {
+TEST_P(VirtualGridLookup, QuantisesTexelsToTheNearestOf256Values) {
   const uint32_t samples = 2000;
   Stage stage(*device, 93);
   const std::vector<float> positions = places(stage.random, samples);
@@ -173,10 +173,10 @@ TEST_P(VirtualGridLookup, IsOfTheNearestOf256StepsWhereTexelsAreBytes) {
   values[1] = 1;
   for (const float value : values) attributes.insert(attributes.end(), kWidth * VirtualGrid::kCorners, value);
   for (const bool quantise : {true, false}) {
-    VirtualGrid grid = gridOf(8, 24);
-    grid.featureRange = grid.densityRange = 1;  // far from where densities are held and colours saturate
+    VirtualGrid grid = makeGrid(8, 24);
+    grid.featureRange = grid.densityRange = 1;  // far from where densities are clamped and colours saturate
     grid.quantise = quantise;
-    grid.shareTexels = false;  // each sample has texels of its own, all of one value
+    grid.shareTexels = false;  // each sample has its own texels, all with the same value
     const Looked looked = Block(stage, grid, positions).look(attributes);
     double farthest = 0;
     for (uint32_t s = 0; s < samples; ++s) {
@@ -202,7 +202,7 @@ TEST_P(VirtualGridLookup, IsOfTheNearestOf256StepsWhereTexelsAreBytes) {
 
 TEST_P(VirtualGridLookup, PassesGradientsStraightThroughTheRounding) {
   Stage stage(*device, 94);
-  VirtualGrid rounded = gridOf(8, 24), exact = rounded;
+  VirtualGrid rounded = makeGrid(8, 24), exact = rounded;
   exact.quantise = false;
   const std::vector<float> positions = places(stage.random, 200);
   Block through(stage, rounded, positions), without(stage, exact, positions);
@@ -214,33 +214,33 @@ TEST_P(VirtualGridLookup, PassesGradientsStraightThroughTheRounding) {
   EXPECT_GT(*std::max_element(gradients.begin(), gradients.end()), 0.1f);
 }
 
-TEST_P(VirtualGridLookup, HoldsNothingExactlyWhereARenderersStepShowsLessThanTheThreshold) {
+TEST_P(VirtualGridLookup, CullsExactlyTheSamplesWhoseRuntimeStepIsBelowMinAlpha) {
   const uint32_t samples = 2000;
   const float minAlpha = 0.005f;
   Stage stage(*device, 95);
-  const VirtualGrid grid = gridOf(8, 24);
+  const VirtualGrid grid = makeGrid(8, 24);
   Block block(stage, grid, places(stage.random, samples));
   const std::vector<float> attributes = stage.random.floats(size_t{kWidth} * block.texels(), 0.35f, 0.65f);
   const std::vector<float> steps = stage.random.floats(samples, 0, 0.1f);
   const Looked all = block.look(attributes), seen = block.look(attributes, minAlpha, stage.input(steps));
   EXPECT_EQ(seen.colours, all.colours);
-  int culled = 0, kept = 0;
+  int culled = 0, visible = 0;
   for (uint32_t s = 0; s < samples; ++s) {
     const double alpha = -std::expm1(-std::exp(static_cast<double>(all.logDensities[s])) * steps[s]);
-    if (std::abs(alpha - minAlpha) < 1e-5 * minAlpha) continue;  // rounding may take it to either side
+    if (std::abs(alpha - minAlpha) < 1e-5 * minAlpha) continue;  // rounding may decide either way
     EXPECT_EQ(seen.logDensities[s], alpha < minAlpha ? VirtualGrid::kCulled : all.logDensities[s]) << alpha;
-    ++(alpha < minAlpha ? culled : kept);
+    ++(alpha < minAlpha ? culled : visible);
   }
   EXPECT_GT(culled, 200);
-  EXPECT_GT(kept, 200);
-  // And what is culled weighs nothing at all, however long its step.
+  EXPECT_GT(visible, 200);
+  // A culled sample has weight zero for any step length.
   CompositeForward a;
   a.minTransmittance = 0;
   a.rays.capacity = samples;
   std::vector<uint32_t> first(samples + 1);
   for (uint32_t s = 0; s <= samples; ++s) first[s] = s;
   a.firstSample = stage.input(first);
-  a.x = stage.matrixOf(seen.logDensities, 1, Layout::plain);
+  a.x = stage.makeMatrix(seen.logDensities, 1, Layout::plain);
   a.steps = stage.randomInput(samples, 1, 1e6f);
   a.opacity = stage.output("opacity", samples);
   a.weights = stage.output("weights", samples);

@@ -10,7 +10,7 @@ namespace tessera {
 
 std::optional<DepthError> depthError(const ImageF& depth, const ImageF& opacity, const ImageF& reference,
                                      const ImageU8* mask) {
-  constexpr float kLeastOpacity = 1e-3f;
+  constexpr float kMinOpacity = 1e-3f;
   CHECK(depth.channels == 1);
   CHECK(opacity.channels == 1);
   CHECK(reference.channels == 1);
@@ -25,11 +25,11 @@ std::optional<DepthError> depthError(const ImageF& depth, const ImageF& opacity,
     const double expected = truth.pixels[i];
     if (!std::isfinite(expected) || expected <= 0) continue;
     if (mask && mask->pixels[i * mask->channels] == 0) continue;
-    const double found = opacity.pixels[i] > kLeastOpacity ? double{depth.pixels[i]} / opacity.pixels[i] : 0.0;
-    const double difference = std::abs(found - expected);
+    const double rendered = opacity.pixels[i] > kMinOpacity ? double{depth.pixels[i]} / opacity.pixels[i] : 0.0;
+    const double difference = std::abs(rendered - expected);
     relative += difference / expected;
     squares += difference * difference;
-    if (found > 0 && std::max(found / expected, expected / found) < 1.25) ++within;
+    if (rendered > 0 && std::max(rendered / expected, expected / rendered) < 1.25) ++within;
     differences.push_back(static_cast<float>(difference));
   }
   if (differences.empty()) return std::nullopt;

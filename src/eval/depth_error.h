@@ -1,5 +1,6 @@
-// How far rendered depth lies from measured depth. Both are z-depth, along the optical axis.
-// Measures: Eigen, Puhrsch, Fergus, "Depth map prediction from a single image using a multi-scale deep network" (2014).
+// Errors of rendered depth against measured depth. Both are z-depth, along the optical axis.
+// Source of the measures: Eigen, Puhrsch, Fergus, "Depth map prediction from a single image using a multi-scale deep
+// network" (2014).
 #pragma once
 
 #include <optional>
@@ -12,18 +13,18 @@ struct DepthError {
   double absoluteRelative = 0;  // mean |d − d*| / d*
   double rootMeanSquare = 0;    // world units
   double medianAbsolute = 0;    // world units
-  double within125 = 0;         // share of pixels with max(d/d*, d*/d) < 1.25
-  size_t pixels = 0;            // how many were compared
+  double within125 = 0;         // share of the pixels with max(d/d*, d*/d) < 1.25
+  size_t pixels = 0;            // number of compared pixels
 };
 
-// `depth` is premultiplied by `opacity` (1 channel each, the same size). `reference`: 1 channel of any size, sampled at
-// the nearest pixel, because a mean over an edge is a depth that is nowhere; where it is not finite or not positive
-// nothing is known and the pixel is left out, as is a masked pixel (0 in `mask`). Where nothing was drawn the rendered
-// depth counts as 0: a hole is an error. Nothing when no pixel can be compared.
+// `depth` is premultiplied by `opacity` (1 channel each, the same size). `reference` has 1 channel and any size, and is
+// sampled at the nearest pixel, because an average across an edge is a depth that exists nowhere. Pixels whose
+// reference is not finite or not positive, and masked pixels (0 in `mask`), are ignored. Where nothing was rendered the
+// depth counts as 0: a hole is an error. Returns nothing if no pixel can be compared.
 std::optional<DepthError> depthError(const ImageF& depth, const ImageF& opacity, const ImageF& reference,
                                      const ImageU8* mask = nullptr);
 
-// The nearest pixel of an image of another size, for masks and depths.
+// Resamples an image, a mask or depths, to another size by taking the nearest pixel.
 template <class T>
 Image<T> resampledToNearest(const Image<T>& image, int width, int height) {
   if (image.width == width && image.height == height) return image;

@@ -8,7 +8,7 @@
 namespace tessera {
 namespace {
 
-TEST(DepthError, KnowsTheFourMeasures) {
+TEST(DepthError, ComputesTheFourMeasures) {
   ImageF depth(4, 1, 1), opacity(4, 1, 1, 1.0f), reference(4, 1, 1);
   reference.pixels = {10, 10, 10, 10};
   depth.pixels = {10, 11, 8, 20};
@@ -31,7 +31,7 @@ TEST(DepthError, DividesByOpacityAndCountsHolesAsWrong) {
   EXPECT_NEAR(error->within125, 0.5, 1e-9);
 }
 
-TEST(DepthError, IgnoresPixelsWhereNothingIsKnown) {
+TEST(DepthError, IgnoresPixelsWithoutAReference) {
   ImageF depth(5, 1, 1, 3.0f), opacity(5, 1, 1, 1.0f), reference(5, 1, 1);
   reference.pixels = {0, -1, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 3};
   EXPECT_EQ(depthError(depth, opacity, reference)->pixels, 1u);

@@ -17,7 +17,7 @@
 namespace tessera {
 namespace {
 
-// Straight alpha over a colour; grey becomes three channels.
+// Composites an image with straight alpha over a colour; grey becomes three channels.
 ImageF colourOver(const ImageF& image, const Eigen::Array3f& background) {
   if (image.channels == 3) return image;
   ImageF result(image.width, image.height, 3);
@@ -33,14 +33,15 @@ ImageF colourOver(const ImageF& image, const Eigen::Array3f& background) {
 
 ImageF readPhoto(const Photo& photo, const Camera& camera, const Eigen::Array3f& background) {
   DecodedImage decoded = readImage(photo.image);
-  if (decoded.truncated) warn("{}: the photo is cut short; what is missing is judged as grey", photo.image.string());
+  if (decoded.truncated)
+    warn("{}: the photo is truncated; the missing part is evaluated as grey", photo.image.string());
   if (decoded.image.width < camera.width || decoded.image.height < camera.height) {
     throw Error(photo.image.string(), "",
                 fmt::format("the photo is {}×{}, smaller than its camera, {}×{}", decoded.image.width,
                             decoded.image.height, camera.width, camera.height),
                 "import the capture again");
   }
-  // Laid over the background first: straight colour is not to be averaged where alpha is 0.
+  // The photo is composited first, because straight colour must not be averaged where alpha is 0.
   return downscaleByArea(colourOver(toFloat(decoded.image), background), camera.width, camera.height);
 }
 
@@ -52,7 +53,7 @@ std::optional<ImageU8> readMask(const Photo& photo, const Camera& camera) {
   return mask;
 }
 
-// argmin over g of Σ (g·rendered − photo)² on the left half, per channel.
+// Returns the argmin over g of Σ (g·rendered − photo)² on the left half, per channel.
 std::array<double, 3> fittedGain(const ImageF& rendered, const ImageF& photo, const ImageU8* mask) {
   std::array<double, 3> gain = {1, 1, 1};
   for (int c = 0; c < 3; ++c) {
@@ -122,7 +123,7 @@ class Judge {
     if (options_.fitExposure) result.gain = fittedGain(rendered, target, maskPointer);
     for (size_t i = 0; i < rendered.pixels.size(); ++i) {
       const float value = rendered.pixels[i] * static_cast<float>(result.gain[i % 3]);
-      rendered.pixels[i] = value > 0 ? std::min(value, 1.0f) : 0.0f;  // NaN is black, and shows as an error
+      rendered.pixels[i] = value > 0 ? std::min(value, 1.0f) : 0.0f;  // NaN becomes black, and shows as an error
     }
 
     std::optional<ImageF> measured;
@@ -144,7 +145,7 @@ class Judge {
 
  private:
   void writePictures(const std::string& name, const ImageF& target, const ImageF& rendered) {
-    const std::string stem = pictures_.stemOf(name);
+    const std::string stem = pictures_.uniqueStem(name);
     writePng(pictures_.at(stem, ".png"), toBytes(rendered));
     writePng(pictures_.at(stem, ".error.png"),
              heatMap(absoluteDifference(rendered, target), 0, kBrightestError, ColourMap::inferno));
@@ -156,15 +157,15 @@ class Judge {
   PictureFiles pictures_;
 };
 
-// Mean of what exists; views that a mask covers wholly have no PSNR.
+// Returns the mean over the views that have a value; fully masked views have no PSNR.
 template <class Value>
-double meanOf(const std::vector<ViewResult>& views, Value value, size_t& count) {
+double computeMean(const std::vector<ViewResult>& views, Value value, size_t& count) {
   double sum = 0;
   count = 0;
   for (const ViewResult& view : views) {
-    const std::optional<double> found = value(view);
-    if (!found || std::isnan(*found)) continue;
-    sum += *found;
+    const std::optional<double> number = value(view);
+    if (!number || std::isnan(*number)) continue;
+    sum += *number;
     ++count;
   }
   return count > 0 ? sum / static_cast<double>(count) : std::nan("");
@@ -173,17 +174,17 @@ double meanOf(const std::vector<ViewResult>& views, Value value, size_t& count) 
 void summarise(EvaluationReport& report) {
   using Number = std::optional<double>;
   size_t count = 0;
-  report.psnr = meanOf(
+  report.psnr = computeMean(
       report.views, [](const ViewResult& v) { return Number(v.psnr); }, count);
-  report.ssim = meanOf(
+  report.ssim = computeMean(
       report.views, [](const ViewResult& v) { return Number(v.ssim); }, count);
-  report.secondsPerFrame = meanOf(
+  report.secondsPerFrame = computeMean(
       report.views, [](const ViewResult& v) { return Number(v.seconds); }, count);
-  const double lpips = meanOf(
+  const double lpips = computeMean(
       report.views, [](const ViewResult& v) { return v.lpips; }, count);
   if (count > 0) report.lpips = lpips;
   const auto depthMean = [&](double DepthError::*member) {
-    return meanOf(
+    return computeMean(
         report.views, [&](const ViewResult& v) { return v.depth ? Number(*v.depth.*member) : Number(); }, count);
   };
   DepthError depth;

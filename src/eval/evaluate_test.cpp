@@ -13,7 +13,7 @@
 namespace tessera {
 namespace {
 
-TEST(Evaluate, GivesTheCapToARendererThatReturnsThePhotos) {
+TEST(Evaluate, GivesTheMaximumToARendererThatReturnsThePhotos) {
   FakeCapture fake("evaluate_perfect");
   std::vector<ImageF> pictures;
   for (const char* name : {"a.png", "b.png", "c.png"}) {
@@ -49,13 +49,13 @@ TEST(Evaluate, ClampsAndCompositesOverTheBackground) {
   });
   renderer.colourBehind = {0.25f, 0.25f, 0.25f};  // 0.25 + 0.5 · 0.25 = 0.375 against 1
   EXPECT_NEAR(evaluate(renderer, fake.capture, {}).psnr, -20 * std::log10(0.625), 1e-4);
-  renderer.colourBehind = {9, 9, 9};  // far too bright: clamped to the photo's white
+  renderer.colourBehind = {9, 9, 9};  // clamped to the white of the photo
   EXPECT_EQ(evaluate(renderer, fake.capture, {}).psnr, kMaximumPsnr);
 }
 
 TEST(Evaluate, LaysTransparentPhotosOverTheSameBackground) {
   FakeCapture fake("evaluate_alpha");
-  ImageU8 photo(128, 96, 4, 255);  // twice the camera's size as well
+  ImageU8 photo(128, 96, 4, 255);  // also twice the camera's size
   for (size_t p = 0; p < photo.pixelCount(); ++p) photo.pixels[4 * p + 3] = p % 2 == 0 ? 0 : 255;
   fake.add("a", photo);
   FakeRenderer renderer([](const Camera& camera, int) {
@@ -67,7 +67,7 @@ TEST(Evaluate, LaysTransparentPhotosOverTheSameBackground) {
   EXPECT_GT(evaluate(renderer, fake.capture, {}).psnr, 90);
 }
 
-TEST(Evaluate, DoesNotJudgeMaskedPixels) {
+TEST(Evaluate, IgnoresMaskedPixels) {
   FakeCapture fake("evaluate_mask");
   const ImageU8 photo = fakePhoto(64, 48, 1);
   Photo& added = fake.add("a", photo);
@@ -89,7 +89,7 @@ TEST(Evaluate, DoesNotJudgeMaskedPixels) {
   EXPECT_LT(evaluate(renderer, fake.capture, {}).psnr, 30);
 }
 
-TEST(Evaluate, FindsAKnownGainOnTheLeftAndJudgesTheRight) {
+TEST(Evaluate, FitsAGainOnTheLeftHalfAndEvaluatesTheRightHalf) {
   FakeCapture fake("evaluate_gain");
   const ImageU8 photo = fakePhoto(64, 48, 1);
   fake.add("a", photo);
@@ -104,7 +104,7 @@ TEST(Evaluate, FindsAKnownGainOnTheLeftAndJudgesTheRight) {
   for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(report.views[0].gain[c], gain[c], 1e-5);
   EXPECT_GT(report.psnr, 90);
 
-  // What only the right half shows never enters the fit: there it stays an error.
+  // The right half does not enter the fit, so its error remains.
   for (int y = 0; y < 48; ++y) {
     for (int x = 32; x < 64; ++x) {
       for (int c = 0; c < 3; ++c) dark.at(x, y)[c] *= 0.5f;
@@ -125,7 +125,7 @@ TEST(Evaluate, MeasuresDepthWhereThePhotoHasIt) {
   depth.at(0, 0)[0] = 0;
   writeDepthExr(added.depth, depth);
   fake.add("b", fakePhoto(64, 48, 2));
-  FakeRenderer renderer({toFloat(fakePhoto(64, 48, 1)), toFloat(fakePhoto(64, 48, 2))});  // at depth 2
+  FakeRenderer renderer({toFloat(fakePhoto(64, 48, 1)), toFloat(fakePhoto(64, 48, 2))});  // renders depth 2
   const EvaluationReport report = evaluate(renderer, fake.capture, {});
   ASSERT_TRUE(report.depth);
   EXPECT_NEAR(report.depth->absoluteRelative, 0.2, 1e-6);
@@ -134,7 +134,7 @@ TEST(Evaluate, MeasuresDepthWhereThePhotoHasIt) {
   EXPECT_FALSE(report.views[1].depth);
 }
 
-TEST(Evaluate, SaysWhatIsMissing) {
+TEST(Evaluate, ReportsMissingPhotos) {
   FakeCapture fake("evaluate_errors");
   FakeRenderer renderer({ImageF(64, 48, 3)});
   EXPECT_THROW(evaluate(renderer, fake.capture, {}), Error);  // no photos
@@ -149,7 +149,7 @@ TEST(Evaluate, SaysWhatIsMissing) {
   EXPECT_THROW(evaluate(renderer, fake.capture, {}), Error);
 }
 
-TEST(Evaluate, WritesEachViewsPicturesAndNothingOutside) {
+TEST(Evaluate, WritesTheImagesOfEachViewAndNothingOutsideTheFolder) {
   FakeCapture fake("evaluate_images");
   const ImageU8 photo = fakePhoto(64, 48, 1);
   fake.add("sub/a.jpg", photo);
@@ -165,16 +165,16 @@ TEST(Evaluate, WritesEachViewsPicturesAndNothingOutside) {
   EXPECT_THROW(evaluate(renderer, fake.capture, options), Error);
 }
 
-TEST(Evaluate, WritesEveryPromisedKeyAsJson) {
+TEST(Evaluate, WritesEveryDocumentedKeyAsJson) {
   FakeCapture fake("evaluate_json");
   const ImageU8 photo = fakePhoto(64, 48, 1);
   Photo& masked = fake.add("a \"quoted\" \xff name", photo);
   masked.mask = fake.capture.root / "mask.png";
-  writePng(masked.mask, ImageU8(64, 48, 1, 0));  // nothing left to judge
+  writePng(masked.mask, ImageU8(64, 48, 1, 0));  // all pixels are masked
   fake.add("b", photo);
   FakeRenderer renderer({toFloat(photo), toFloat(photo)});
   const auto json = nlohmann::json::parse(toJson(evaluate(renderer, fake.capture, {})));
-  EXPECT_EQ(json["psnr"], kMaximumPsnr);  // of the view that has one
+  EXPECT_EQ(json["psnr"], kMaximumPsnr);  // the mean over the only view that has a PSNR
   EXPECT_TRUE(json["lpips"].is_null());
   EXPECT_TRUE(json["lpips_net"].is_null());
   EXPECT_TRUE(json["depth"].is_null());
@@ -204,7 +204,7 @@ TEST(Evaluate, ReportsLpipsWithWeights) {
   EXPECT_EQ(report.lpipsNet, "squeeze");
   FakeRenderer perfect({toFloat(photo)});
   EXPECT_EQ(*evaluate(perfect, fake.capture, options).lpips, 0.0);
-  options.fitExposure = true;  // 32 pixels wide, the right half can still be judged
+  options.fitExposure = true;  // the right half, 32 pixels wide, is still large enough
   EXPECT_TRUE(evaluate(perfect, fake.capture, options).lpips);
 }
 

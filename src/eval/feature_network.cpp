@@ -9,7 +9,7 @@
 namespace tessera {
 namespace {
 
-// How much of the unrolled input one task holds: it should stay in the second-level cache.
+// The size of the unrolled input of one task, which should fit into the second-level cache.
 constexpr size_t kPanelFloats = size_t{1} << 17;
 
 Convolution loadConvolution(const Safetensors& file, const fs::path& path, const std::string& name, int inputs,
@@ -37,7 +37,7 @@ Convolution loadConvolution(const Safetensors& file, const fs::path& path, const
   return layer;
 }
 
-// Joins the channels of two maps of the same size.
+// Concatenates the channels of two maps of the same size.
 FeatureMap joined(const FeatureMap& a, const FeatureMap& b) {
   FeatureMap result(a.width, a.height, a.channels + b.channels);
   float* target = result.values.data();
@@ -87,7 +87,7 @@ FeatureMap Convolution::operator()(const FeatureMap& input, ThreadPool& pool) co
 }
 
 FeatureMap maxPool(const FeatureMap& input, bool ceil) {
-  // With ceil the last window must still begin inside; three wide and two apart it always does.
+  // With ceil the last window must still begin inside, which is always so for windows of 3 with stride 2.
   const auto outputSide = [&](int side) { return (side - 3 + (ceil ? 1 : 0)) / 2 + 1; };
   CHECK(input.width >= (ceil ? 2 : 3));
   CHECK(input.height >= (ceil ? 2 : 3));
@@ -151,16 +151,16 @@ FeatureNetwork::FeatureNetwork(Kind kind, const Safetensors& file, const fs::pat
 }
 
 std::vector<FeatureMap> FeatureNetwork::taps(const FeatureMap& picture, ThreadPool& pool) const {
-  std::vector<FeatureMap> found;
+  std::vector<FeatureMap> tapped;
   FeatureMap current = picture;
   for (const Stage& stage : stages_) {
     if (stage.poolsFirst) current = maxPool(current, kind_ == Kind::squeeze);
     const auto& layers = stage.convolutions;
     current = layers[0](current, pool);
     if (layers.size() == 3) current = joined(layers[1](current, pool), layers[2](current, pool));
-    if (stage.isTap) found.push_back(current);
+    if (stage.isTap) tapped.push_back(current);
   }
-  return found;
+  return tapped;
 }
 
 std::vector<int> FeatureNetwork::tapChannels() const {

@@ -1,4 +1,4 @@
-// The two small picture networks that LPIPS compares with: the convolutional parts of torchvision's AlexNet and
+// The two small image networks whose features LPIPS compares: the convolutional parts of torchvision's AlexNet and
 // SqueezeNet 1.1, forward only.
 // Sources: Krizhevsky, "One weird trick for parallelizing convolutional neural networks" (2014); Iandola et al.,
 // "SqueezeNet" (2016). Layer names and strides: torchvision/models/{alexnet,squeezenet}.py.
@@ -13,7 +13,7 @@
 
 namespace tessera {
 
-// Activations: rows from the top, channels interleaved (height × width × channels).
+// Activations, rows from top to bottom, interleaved channels (height × width × channels).
 struct FeatureMap {
   int width = 0, height = 0, channels = 0;
   std::vector<float> values;
@@ -40,18 +40,20 @@ class FeatureNetwork {
  public:
   enum class Kind { alex, squeeze };
 
-  // Tensors `features.N.*` of `file`; throws Error naming `path` when one is missing or has another shape.
+  // Reads the tensors `features.N.*` of `file`. Throws Error naming `path` if one is missing or has another shape.
   FeatureNetwork(Kind kind, const Safetensors& file, const fs::path& path);
 
-  // The taps of LPIPS: AlexNet after each of its five ReLUs, SqueezeNet after seven of its stages.
+  // Returns the activations at the taps of LPIPS: of AlexNet after each of its five ReLUs, of SqueezeNet after seven
+  // of its stages.
   std::vector<FeatureMap> taps(const FeatureMap& picture, ThreadPool& pool) const;
   std::vector<int> tapChannels() const;
+  // The smallest width and height of an image, pixels.
   int smallestSide() const { return kind_ == Kind::alex ? 31 : 17; }
 
  private:
   struct Stage {
     bool poolsFirst = false;
-    // One: a plain convolution. Three: a fire module (squeeze, expand 1×1, expand 3×3).
+    // One convolution, or the three of a fire module (squeeze, expand 1×1, expand 3×3).
     std::vector<Convolution> convolutions;
     bool isTap = true;
   };
@@ -60,7 +62,8 @@ class FeatureNetwork {
   std::vector<Stage> stages_;
 };
 
-// 3×3 windows two apart. `ceil`: a last window that is only partly inside counts too (torchvision's ceil_mode).
+// Max pooling with 3×3 windows and stride 2. `ceil`: includes a last window that lies only partly inside (ceil_mode of
+// torchvision).
 FeatureMap maxPool(const FeatureMap& input, bool ceil);
 
 }  // namespace tessera

@@ -11,7 +11,7 @@ namespace {
 
 using Colour = std::array<uint8_t, 3>;
 
-// Anchors at equal steps of the maps by Smith, van der Walt and Firing (matplotlib, CC0); straight lines between.
+// Samples at equal steps of the colour maps by Smith, van der Walt and Firing (matplotlib, CC0), interpolated linearly.
 constexpr Colour kInferno[] = {{0, 0, 4},     {27, 12, 65},   {74, 12, 107}, {120, 28, 109}, {165, 44, 96},
                                {207, 68, 70}, {237, 105, 37}, {251, 155, 6}, {247, 209, 61}, {252, 255, 164}};
 constexpr Colour kViridis[] = {{68, 1, 84},    {72, 40, 120},  {62, 73, 137},  {49, 104, 142}, {38, 130, 142},
@@ -19,7 +19,7 @@ constexpr Colour kViridis[] = {{68, 1, 84},    {72, 40, 120},  {62, 73, 137},  {
 
 }  // namespace
 
-std::array<uint8_t, 3> colourOf(ColourMap map, float t) {
+std::array<uint8_t, 3> evaluateColourMap(ColourMap map, float t) {
   if (std::isnan(t)) return {128, 128, 128};
   const std::span<const Colour> anchors = map == ColourMap::inferno ? std::span(kInferno) : std::span(kViridis);
   const float position = std::clamp(t, 0.0f, 1.0f) * static_cast<float>(anchors.size() - 1);
@@ -37,7 +37,7 @@ ImageU8 heatMap(const ImageF& values, float low, float high, ColourMap map) {
   ImageU8 image(values.width, values.height, 3);
   const float scale = high > low ? 1 / (high - low) : 0;
   for (size_t i = 0; i < values.pixels.size(); ++i) {
-    const Colour colour = colourOf(map, (values.pixels[i] - low) * scale);
+    const Colour colour = evaluateColourMap(map, (values.pixels[i] - low) * scale);
     std::copy(colour.begin(), colour.end(), image.pixels.begin() + static_cast<std::ptrdiff_t>(3 * i));
   }
   return image;

@@ -1,4 +1,4 @@
-// One number per pixel as colour.
+// Colour maps of images with one number per pixel.
 #pragma once
 
 #include <array>
@@ -13,16 +13,16 @@ enum class ColourMap {
   viridis   // blue, green, yellow: depths
 };
 
-// The mean absolute difference at which every error map is brightest, so that maps can be compared.
+// The mean absolute difference that maps to the brightest colour in all error maps, so that they can be compared.
 inline constexpr float kBrightestError = 0.25f;
 
-// t in [0, 1], clamped; NaN is grey.
-std::array<uint8_t, 3> colourOf(ColourMap map, float t);
+// Returns the colour of t, clamped to [0, 1]; grey for NaN.
+std::array<uint8_t, 3> evaluateColourMap(ColourMap map, float t);
 
-// `values`: 1 channel; low and high become the ends of the map.
+// Colours an image with 1 channel; `low` and `high` map to the ends of the colour map.
 ImageU8 heatMap(const ImageF& values, float low, float high, ColourMap map);
 
-// Mean over channels of |a − b|: 1 channel.
+// Returns the mean over channels of |a − b|, 1 channel.
 ImageF absoluteDifference(const ImageF& a, const ImageF& b);
 
 }  // namespace tessera

@@ -13,7 +13,7 @@ TEST(HeatMap, RunsFromDarkToBright) {
   for (const ColourMap map : {ColourMap::inferno, ColourMap::viridis}) {
     int before = -1;
     for (int i = 0; i <= 100; ++i) {
-      const Colour colour = colourOf(map, static_cast<float>(i) / 100);
+      const Colour colour = evaluateColourMap(map, static_cast<float>(i) / 100);
       const int luma = 299 * colour[0] + 587 * colour[1] + 114 * colour[2];
       EXPECT_GT(luma, before) << i;
       before = luma;
@@ -21,11 +21,11 @@ TEST(HeatMap, RunsFromDarkToBright) {
   }
 }
 
-TEST(HeatMap, ClampsAndShowsTheUnknownAsGrey) {
-  EXPECT_EQ(colourOf(ColourMap::inferno, -3), (Colour{0, 0, 4}));
-  EXPECT_EQ(colourOf(ColourMap::inferno, 7), (Colour{252, 255, 164}));
-  EXPECT_EQ(colourOf(ColourMap::viridis, std::nanf("")), (Colour{128, 128, 128}));
-  EXPECT_EQ(colourOf(ColourMap::viridis, INFINITY), (Colour{253, 231, 37}));
+TEST(HeatMap, ClampsValuesAndShowsNaNAsGrey) {
+  EXPECT_EQ(evaluateColourMap(ColourMap::inferno, -3), (Colour{0, 0, 4}));
+  EXPECT_EQ(evaluateColourMap(ColourMap::inferno, 7), (Colour{252, 255, 164}));
+  EXPECT_EQ(evaluateColourMap(ColourMap::viridis, std::nanf("")), (Colour{128, 128, 128}));
+  EXPECT_EQ(evaluateColourMap(ColourMap::viridis, INFINITY), (Colour{253, 231, 37}));
 }
 
 TEST(HeatMap, StretchesTheGivenRange) {
@@ -34,7 +34,7 @@ TEST(HeatMap, StretchesTheGivenRange) {
   const ImageU8 image = heatMap(values, 10, 20, ColourMap::viridis);
   EXPECT_EQ(image.at(0, 0)[0], 68);
   EXPECT_EQ(image.at(2, 0)[0], 253);
-  EXPECT_EQ(image.at(1, 0)[1], colourOf(ColourMap::viridis, 0.5f)[1]);
+  EXPECT_EQ(image.at(1, 0)[1], evaluateColourMap(ColourMap::viridis, 0.5f)[1]);
 }
 
 TEST(HeatMap, AveragesTheDifferenceOverChannels) {

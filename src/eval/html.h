@@ -1,4 +1,4 @@
-// The little HTML that a report needs.
+// Helpers for writing HTML.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace tessera {
 
-// Safe as text and inside a quoted attribute. Control characters become spaces.
+// Escapes text for use between tags and inside quoted attributes. Control characters become spaces.
 std::string escapedHtml(std::string_view text);
 std::string base64(std::span<const std::byte> bytes);
 

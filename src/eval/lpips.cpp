@@ -10,7 +10,7 @@ namespace {
 
 constexpr float kShift[3] = {-0.030f, -0.088f, -0.188f}, kScale[3] = {0.458f, 0.448f, 0.450f};
 
-std::string netOf(const Safetensors& file, const fs::path& path) {
+std::string readNetName(const Safetensors& file, const fs::path& path) {
   const auto said = file.metadata.find("net");
   std::string net;
   if (said != file.metadata.end()) {
@@ -56,7 +56,7 @@ double layerDistance(const FeatureMap& a, const FeatureMap& b, const std::vector
 Lpips::Lpips(const fs::path& weights) : Lpips(weights, readSafetensors(weights)) {}
 
 Lpips::Lpips(const fs::path& path, const Safetensors& file)
-    : net_(netOf(file, path)),
+    : net_(readNetName(file, path)),
       network_(net_ == "alex" ? FeatureNetwork::Kind::alex : FeatureNetwork::Kind::squeeze, file, path) {
   const std::vector<int> channels = network_.tapChannels();
   for (size_t i = 0; i < channels.size(); ++i) {

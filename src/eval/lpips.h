@@ -1,4 +1,5 @@
-// Learned perceptual image patch similarity, version 0.1: how different two pictures look to a network; 0 is equal.
+// Learned perceptual image patch similarity, version 0.1: a distance between the network features of two images;
+// 0 means equal.
 // Source: Zhang, Isola, Efros, Shechtman, Wang, "The unreasonable effectiveness of deep features as a perceptual
 // metric" (2018), equation 1, with the linear heads of the authors' release.
 #pragma once
@@ -13,19 +14,20 @@ namespace tessera {
 
 struct LpipsDistance {
   double total = 0;
-  std::vector<double> layers;  // sum to the total
+  std::vector<double> layers;  // contributions to the total
 };
 
 class Lpips {
  public:
-  // A safetensors file with `features.N.*` (torchvision's layers) and `linN.weight`; the metadata key "net" says
-  // "alex" or "squeeze", without it the file's layers do. Throws Error naming the path.
+  // Reads a safetensors file with `features.N.*` (torchvision's layers) and `linN.weight`; the metadata key "net" is
+  // "alex" or "squeeze"; without it the layers of the file decide. Throws Error naming the path if a tensor is missing
+  // or has another shape.
   explicit Lpips(const fs::path& weights);
 
   const std::string& net() const { return net_; }
   int smallestSide() const { return network_.smallestSide(); }
 
-  // Pictures in [0, 1], 3 channels, the same size, each side at least smallestSide().
+  // Compares two images in [0, 1] with 3 channels and the same size, each side at least smallestSide().
   LpipsDistance operator()(const ImageF& a, const ImageF& b, ThreadPool& pool) const;
 
  private:

@@ -26,7 +26,7 @@ float valueAt(const FeatureMap& map, int x, int y, int c) {
   return map.values[(static_cast<size_t>(y) * map.width + x) * map.channels + c];
 }
 
-TEST(FeatureNetwork, ConvolvesAsTheDefinitionSays) {
+TEST(FeatureNetwork, ConvolvesAccordingToTheDefinition) {
   ThreadPool pool(2);
   const FeatureMap input = noiseMap(13, 9, 3);
   Convolution layer{3, 4, 5, 2, 2, Eigen::MatrixXf(4, 75), Eigen::VectorXf(4)};
@@ -84,18 +84,18 @@ TEST_P(LpipsReference, AgreesWithAnIndependentImplementationInTotalAndInEachLaye
   int compared = 0;
   for (const auto& row : nlohmann::json::parse(readTextFile(folder_ / "reference.json"))) {
     if (row["net"] != GetParam()) continue;
-    const LpipsDistance found =
+    const LpipsDistance distance =
         lpips(pictures.at(row["a"].get<std::string>()), pictures.at(row["b"].get<std::string>()), pool);
-    EXPECT_NEAR(found.total, row["lpips"].get<double>(), 1e-4) << row["a"] << row["b"];
+    EXPECT_NEAR(distance.total, row["lpips"].get<double>(), 1e-4) << row["a"] << row["b"];
     const auto layers = row["layers"].get<std::vector<double>>();
-    ASSERT_EQ(found.layers.size(), layers.size());
-    for (size_t i = 0; i < layers.size(); ++i) EXPECT_NEAR(found.layers[i], layers[i], 1e-5) << i;
+    ASSERT_EQ(distance.layers.size(), layers.size());
+    for (size_t i = 0; i < layers.size(); ++i) EXPECT_NEAR(distance.layers[i], layers[i], 1e-5) << i;
     ++compared;
   }
   EXPECT_EQ(compared, 3);
 }
 
-TEST_P(LpipsReference, AcceptsTheSmallestPictureItNames) {
+TEST_P(LpipsReference, AcceptsImagesOfItsSmallestSide) {
   const Lpips lpips(folder_ / (GetParam() + ".safetensors"));
   ThreadPool pool(1);
   const int side = lpips.smallestSide();
@@ -105,7 +105,7 @@ TEST_P(LpipsReference, AcceptsTheSmallestPictureItNames) {
 INSTANTIATE_TEST_SUITE_P(Nets, LpipsReference, testing::Values("alex", "squeeze"),
                          [](const auto& instance) { return instance.param; });
 
-TEST(Lpips, RefusesFilesThatAreNotItsWeights) {
+TEST(Lpips, RejectsFilesThatAreNotItsWeights) {
   const fs::path path = fs::temp_directory_path() / ("tessera_lpips_" + std::to_string(::getpid()));
   writeFileAtomically(path, encodeSafetensors({}, {{"net", "vgg"}}));
   EXPECT_THROW(Lpips{path}, Error);

@@ -4,7 +4,7 @@
 
 namespace tessera {
 
-std::string PictureFiles::stemOf(const std::string& photo) {
+std::string PictureFiles::uniqueStem(const std::string& photo) {
   std::string stem = fs::path(photo).replace_extension().string();
   if (taken_.contains(stem)) stem = photo;
   while (taken_.contains(stem)) stem += "_";  // a.jpg, a.png and a.png.jpg

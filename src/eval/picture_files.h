@@ -1,5 +1,5 @@
-// Where the pictures of photos go: below one folder, each at its photo's own relative path, so that cam0/1.jpg and
-// cam1/1.jpg are two pictures.
+// Names of image files for photos: below one folder, at the relative path of the photo, so that cam0/1.jpg and
+// cam1/1.jpg become two files.
 #pragma once
 
 #include <set>
@@ -13,9 +13,10 @@ class PictureFiles {
  public:
   explicit PictureFiles(fs::path folder) : folder_(std::move(folder)) {}
 
-  // The photo's name without its extension; the whole name where another photo has taken that (a.jpg, then a.png).
-  std::string stemOf(const std::string& photo);
-  // Throws Error when that lies outside of the folder.
+  // Returns the photo's name without its extension, or the whole name if another photo already has that (a.jpg, then
+  // a.png).
+  std::string uniqueStem(const std::string& photo);
+  // Returns the path of stem + ending. Throws Error if it lies outside of the folder.
   fs::path at(const std::string& stem, const std::string& ending) const;
 
  private:

@@ -8,7 +8,7 @@
 namespace tessera {
 namespace {
 
-TEST(Psnr, KnowsTheValuesOfConstantDifferences) {
+TEST(Psnr, IsExactForConstantDifferences) {
   const ImageF black(4, 3, 3, 0.0f);
   EXPECT_NEAR(psnr(black, ImageF(4, 3, 3, 0.1f)), 20.0, 1e-5);
   EXPECT_NEAR(psnr(black, ImageF(4, 3, 3, 0.01f)), 40.0, 1e-5);
@@ -18,16 +18,16 @@ TEST(Psnr, KnowsTheValuesOfConstantDifferences) {
   EXPECT_NEAR(psnr(black, half), 20.0 + 10 * std::log10(2.0), 1e-5);
 }
 
-TEST(Psnr, OfEqualPicturesIsTheCap) {
+TEST(Psnr, IsCappedForEqualImages) {
   EXPECT_EQ(psnr(ImageF(2, 2, 3, 0.3f), ImageF(2, 2, 3, 0.3f)), kMaximumPsnr);
   EXPECT_EQ(psnr(ImageF(2, 2, 3, 0.3f), ImageF(2, 2, 3, 0.30000004f)), kMaximumPsnr);
 }
 
-TEST(Psnr, LeavesMaskedPixelsOut) {
+TEST(Psnr, IgnoresMaskedPixels) {
   ImageF a(2, 1, 3, 0.5f), b = a;
   for (int c = 0; c < 3; ++c) {
     a.at(0, 0)[c] = 0.0f;
-    b.at(0, 0)[c] = 1.0f;  // hopeless, and masked
+    b.at(0, 0)[c] = 1.0f;  // wrong, but masked
     b.at(1, 0)[c] = 0.6f;
   }
   ImageU8 mask(2, 1, 1, 255);

@@ -38,7 +38,7 @@ std::vector<NamedView> viewsOfPath(const CameraPath& path, const Mat4d& sourceFr
     pose.rotation =
         Eigen::Quaterniond(Mat3d(worldFromPath.topLeftCorner<3, 3>() * view.worldFromCamera.rotation / scale))
             .normalized();
-    views.push_back({fmt::format("{:05}", views.size()), path.cameraOf(view), pose});
+    views.push_back({fmt::format("{:05}", views.size()), path.makeViewCamera(view), pose});
   }
   return views;
 }
@@ -67,7 +67,7 @@ void renderViews(ViewRenderer& renderer, const std::vector<NamedView>& views, co
     if (video) {
       video->add(picture);
     } else {
-      writePng(files.at(files.stemOf(view.name), ".png"), picture);
+      writePng(files.at(files.uniqueStem(view.name), ".png"), picture);
     }
     if (options.onView) options.onView(++done);
   }

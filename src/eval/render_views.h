@@ -1,4 +1,4 @@
-// Pictures for people: a model seen from the views of a capture or along a camera path, as PNGs or as a video.
+// Renders a model from the views of a capture or along a camera path, as PNGs or as a video.
 #pragma once
 
 #include <functional>
@@ -14,25 +14,25 @@
 namespace tessera {
 
 struct NamedView {
-  std::string name;  // the photo's, or the number of the frame
+  std::string name;  // of the photo, or the number of the frame
   Camera camera;
   Pose worldFromCamera;
 };
 
-// The views of the photos in exactly this split, or of all photos. Throws Error when there are none.
+// Returns the views of the photos in this split, or of all photos without one. Throws Error if there are none.
 std::vector<NamedView> viewsOfCapture(const Capture& capture, std::optional<Split> split);
 
-// The views along a path, brought into the world of the capture (or model) whose sourceFromWorld is given.
+// Returns the views along a path, transformed into the world of the capture (or model) that has this sourceFromWorld.
 std::vector<NamedView> viewsOfPath(const CameraPath& path, const Mat4d& sourceFromWorld);
 
 struct RenderViewsOptions {
-  int width = 0, height = 0;    // of every picture, pixels; 0: the camera's own
-  double framesPerSecond = 24;  // of a video
-  std::function<void(size_t done)> onView;
+  int width = 0, height = 0;                // of every image, pixels; 0: those of the camera
+  double framesPerSecond = 24;              // of a video
+  std::function<void(size_t done)> onView;  // called after each view with the number of views done
 };
 
-// Each view over the renderer's background. `out` is a folder of PNGs, at the photos' own relative paths, or a video
-// where it ends in .mp4: then every frame has the size of the first. Throws Error when it cannot be written.
+// Renders each view over the renderer's background. `out` is a folder of PNGs, at the relative paths of the photos, or
+// a video if it ends in .mp4, whose frames all have the size of the first view. Throws Error if it cannot be written.
 void renderViews(ViewRenderer& renderer, const std::vector<NamedView>& views, const fs::path& out,
                  const RenderViewsOptions& options);
 

@@ -12,7 +12,7 @@
 namespace tessera {
 namespace {
 
-// Pictures of one grey each: 10 times the number of the photo, in bytes.
+// Renders images of a uniform grey of 10 times the number of the photo, in bytes.
 FakeRenderer greyByPhoto() {
   return FakeRenderer([](const Camera& camera, int photo) {
     const float grey = static_cast<float>(10 * photo) / 255;
@@ -21,7 +21,7 @@ FakeRenderer greyByPhoto() {
   });
 }
 
-TEST(RenderViews, WritesPhotosOfOneNameInSeveralFoldersApart) {
+TEST(RenderViews, WritesPhotosOfTheSameNameInDifferentFoldersSeparately) {
   FakeCapture fake("render_names");
   const std::vector<std::string> photos = {"cam0/1.jpg",   "cam1/1.jpg", "train/r_0.png",
                                            "test/r_0.png", "a.jpg",      "a.png"};
@@ -42,7 +42,7 @@ TEST(RenderViews, WritesPhotosOfOneNameInSeveralFoldersApart) {
   EXPECT_THROW(renderViews(renderer, viewsOfCapture(fake.capture, std::nullopt), out, {}), Error);
 }
 
-TEST(RenderViews, TakesTheSplitThatIsAskedForAndNoOther) {
+TEST(RenderViews, RendersOnlyTheRequestedSplit) {
   FakeCapture fake("render_splits");
   fake.add("learned.png", ImageU8(64, 48, 3), Split::train);
   fake.add("watched.png", ImageU8(64, 48, 3), Split::validation);
@@ -59,7 +59,7 @@ TEST(RenderViews, TakesTheSplitThatIsAskedForAndNoOther) {
   EXPECT_THROW(viewsOfCapture(fake.capture, Split::test), Error);
 }
 
-TEST(RenderViews, LaysViewsOverTheBackgroundInTheSizeAskedFor) {
+TEST(RenderViews, CompositesViewsOverTheBackgroundInTheRequestedSize) {
   FakeCapture fake("render_background");
   fake.add("a.png", ImageU8(64, 48, 3));
   FakeRenderer renderer([](const Camera& camera, int) {
@@ -86,12 +86,12 @@ Mat4d similarity(double scale, double angle, const Vec3d& translation) {
   return matrix;
 }
 
-// A camera carried along by a similarity, which leaves its rotation without scale.
+// Transforms a pose by a similarity, without its scale in the rotation.
 Pose moved(const Mat4d& matrix, double scale, const Pose& pose) {
   return {matrix.topLeftCorner<3, 3>() * pose.rotation / scale, (matrix * pose.translation.homogeneous()).head<3>()};
 }
 
-TEST(RenderViews, BringAPathBackFromTheWorldsThatItWasCarriedThrough) {
+TEST(RenderViews, TransformsAPathIntoTheWorldOfTheCapture) {
   const Mat4d sourceFromWorld = similarity(3, 0.7, {100, -20, 4});
   const Mat4d pathFromSource = similarity(0.02, -1.9, {-2, 0.1, 0.3});
   std::vector<Pose> poses;
@@ -110,7 +110,7 @@ TEST(RenderViews, BringAPathBackFromTheWorldsThatItWasCarriedThrough) {
   for (size_t i = 0; i < views.size(); ++i) {
     EXPECT_TRUE(views[i].worldFromCamera.rotation.isApprox(poses[i].rotation, 1e-9));
     EXPECT_LT((views[i].worldFromCamera.translation - poses[i].translation).norm(), 1e-9);
-    EXPECT_EQ(views[i].camera, path.cameraOf(path.views[i]));
+    EXPECT_EQ(views[i].camera, path.makeViewCamera(path.views[i]));
   }
 }
 

@@ -29,7 +29,7 @@ std::string formattedSeconds(double seconds) {
   return seconds < 1 ? fmt::format("{:.1f} ms", seconds * 1000) : fmt::format("{:.2f} s", seconds);
 }
 
-// Rendered z-depth; NaN where next to nothing was drawn, or nothing but what lies behind everything.
+// Returns the rendered z-depth divided by opacity; NaN where almost nothing, or only the background, was rendered.
 ImageF normalisedDepth(const RenderedView& view) {
   ImageF depth = view.depth;
   for (size_t i = 0; i < depth.pixels.size(); ++i) {
@@ -39,7 +39,7 @@ ImageF normalisedDepth(const RenderedView& view) {
   return depth;
 }
 
-// From the second to the 98th percentile, so that a few wild pixels do not take the colours away.
+// Returns the second and the 98th percentile, so that a few outliers do not dominate the range of colours.
 std::pair<float, float> depthRange(const ImageF& depth) {
   std::vector<float> known;
   for (const float value : depth.pixels) {
@@ -54,7 +54,7 @@ std::pair<float, float> depthRange(const ImageF& depth) {
   return {percentile(0.02), percentile(0.98)};
 }
 
-// Indices of the views, worst PSNR first; those without a PSNR last.
+// Returns the indices of the views, worst PSNR first; those without a PSNR are last.
 std::vector<size_t> worstFirst(const std::vector<ViewResult>& views) {
   std::vector<size_t> order(views.size());
   std::iota(order.begin(), order.end(), size_t{0});
@@ -86,25 +86,25 @@ std::string summary(const EvaluationReport& report) {
   return html;
 }
 
-// PSNR of each view in the order of the capture.
+// Returns a bar chart of the PSNR of each view, in the order of the capture.
 std::string bars(const EvaluationReport& report) {
-  double least = kMaximumPsnr, most = 0;
+  double minimum = kMaximumPsnr, maximum = 0;
   for (const ViewResult& view : report.views) {
     if (!std::isfinite(view.psnr)) continue;
-    least = std::min(least, view.psnr);
-    most = std::max(most, view.psnr);
+    minimum = std::min(minimum, view.psnr);
+    maximum = std::max(maximum, view.psnr);
   }
-  if (report.views.size() < 2 || most <= 0) return {};
-  const double bottom = std::max(0.0, std::floor(least - 0.25 * (most - least) - 1));
+  if (report.views.size() < 2 || maximum <= 0) return {};
+  const double bottom = std::max(0.0, std::floor(minimum - 0.25 * (maximum - minimum) - 1));
   std::string html = fmt::format(
       "<h2>PSNR by view, in capture order <span class=\"quiet\">({:.0f} to {:.1f} dB)</span></h2>\n"
       "<div class=\"bars\"><svg viewBox=\"0 0 {} 100\" preserveAspectRatio=\"none\" role=\"img\" "
       "aria-label=\"PSNR by view\">\n",
-      bottom, most, report.views.size() * 10);
+      bottom, maximum, report.views.size() * 10);
   for (size_t i = 0; i < report.views.size(); ++i) {
     const ViewResult& view = report.views[i];
     if (!std::isfinite(view.psnr)) continue;
-    const double height = std::max(1.0, 100 * (view.psnr - bottom) / (most - bottom));
+    const double height = std::max(1.0, 100 * (view.psnr - bottom) / (maximum - bottom));
     html += fmt::format(
         "<a href=\"#view-{}\"><title>{}: {:.2f} dB</title><rect x=\"{}\" y=\"{:.1f}\" width=\"8\" "
         "height=\"{:.1f}\"/></a>\n",
@@ -202,9 +202,9 @@ std::string ReportBuilder::html(const EvaluationReport& report) const {
         i, escapedHtml(view.name), formatted(view.psnr, 2), formatted(view.ssim, 4));
     if (view.lpips) html += fmt::format("<span class=\"quiet\">LPIPS {}</span>", formatted(view.lpips, 4));
     html += "</header>\n<div class=\"figures\">\n";
-    const auto found = figures_.find(view.name);
-    if (found != figures_.end()) {
-      for (const Figure& one : found->second) {
+    const auto entry = figures_.find(view.name);
+    if (entry != figures_.end()) {
+      for (const Figure& one : entry->second) {
         html += fmt::format(
             "<figure><label><input type=\"checkbox\" autocomplete=\"off\"><img width=\"{}\" height=\"{}\" alt=\"{}\" "
             "src=\"data:image/jpeg;base64,{}\"></label><figcaption>{}</figcaption></figure>\n",

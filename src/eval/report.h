@@ -1,5 +1,5 @@
-// report.html: an evaluation for people. One file with everything inside, that works offline and without scripts:
-// summary, a table with the worst views first, and for each view photo, rendering, error and depth side by side.
+// report.html: an evaluation as one self-contained file that works offline and without scripts. It has a summary, a
+// table with the worst views first, and for each view the photo, the render, the error and the depth side by side.
 #pragma once
 
 #include <map>
@@ -9,18 +9,18 @@
 
 namespace tessera {
 
-// Collects reduced pictures while `evaluate` runs, so that no view's full pictures are kept:
+// Collects downscaled images while `evaluate` runs, so that the full-size images of a view can be released:
 //   ReportBuilder builder("fox", capture.photosIn(split).size());
 //   options.onView = [&](const ViewResult& result, const ViewPictures& pictures) { builder.add(result, pictures); };
 //   builder.write("report.html", evaluate(renderer, capture, options));
 class ReportBuilder {
  public:
-  // `title`: what was judged. `expectedViews` sets the size of the pictures: the more views, the smaller, so that the
-  // file stays within some tens of megabytes.
+  // `title`: the name of what was evaluated. `expectedViews` determines the size of the images: the more views, the
+  // smaller, so that the file stays within some tens of megabytes.
   ReportBuilder(std::string title, size_t expectedViews);
 
   void add(const ViewResult& result, const ViewPictures& pictures);
-  // Views that were never added have numbers but no pictures.
+  // Returns the report. Views that were not added have numbers but no images.
   std::string html(const EvaluationReport& report) const;
   void write(const fs::path& path, const EvaluationReport& report) const;
 

@@ -12,7 +12,7 @@
 namespace tessera {
 namespace {
 
-size_t countOf(const std::string& text, const std::string& part) {
+size_t countOccurrences(const std::string& text, const std::string& part) {
   size_t count = 0;
   for (size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + part.size())) ++count;
   return count;
@@ -34,7 +34,8 @@ Judged judge(const std::vector<std::string>& names, bool withDepth = false) {
       writeDepthExr(added.depth, ImageF(64, 48, 1, 2.2f));
     }
     pictures.push_back(toFloat(photo));
-    for (float& value : pictures.back().pixels) value += 0.05f * static_cast<float>(pictures.size());  // ever worse
+    for (float& value : pictures.back().pixels)
+      value += 0.05f * static_cast<float>(pictures.size());  // errors increase from view to view
   }
   FakeRenderer renderer(pictures);
   ReportBuilder builder("Tom & <Jerry>", names.size());
@@ -45,13 +46,13 @@ Judged judge(const std::vector<std::string>& names, bool withDepth = false) {
   return judged;
 }
 
-TEST(Report, HoldsEveryViewWithItsFourPictures) {
+TEST(Report, ContainsEveryViewWithItsFourImages) {
   const Judged judged = judge({"one.png", "two.png", "three.png"});
   for (const char* name : {"one.png", "two.png", "three.png"}) {
-    EXPECT_EQ(countOf(judged.html, std::string("<h3>") + name + "</h3>"), 1u) << name;
+    EXPECT_EQ(countOccurrences(judged.html, std::string("<h3>") + name + "</h3>"), 1u) << name;
   }
-  EXPECT_EQ(countOf(judged.html, "<img "), 12u);
-  EXPECT_EQ(countOf(judged.html, "src=\"data:image/jpeg;base64,/9j/"), 12u);
+  EXPECT_EQ(countOccurrences(judged.html, "<img "), 12u);
+  EXPECT_EQ(countOccurrences(judged.html, "src=\"data:image/jpeg;base64,/9j/"), 12u);
   EXPECT_NE(judged.html.find(fmt::format("{:.2f} dB", judged.report.psnr)), std::string::npos);
 }
 
@@ -62,7 +63,7 @@ TEST(Report, PutsTheWorstViewFirst) {
   EXPECT_LT(table.find(">bad<"), table.find(">good<"));
 }
 
-TEST(Report, EscapesWhateverPeopleNameThings) {
+TEST(Report, EscapesAllNames) {
   const std::string name = "<script>alert(\"1\")</script>&'.jpg";
   const std::string html = judge({name, "b"}).html;
   EXPECT_EQ(html.find("<script"), std::string::npos);
@@ -72,16 +73,16 @@ TEST(Report, EscapesWhateverPeopleNameThings) {
   EXPECT_NE(html.find("Tom &amp; &lt;Jerry&gt;"), std::string::npos);
 }
 
-TEST(Report, NeedsNothingFromOutside) {
+TEST(Report, ReferencesNothingOutsideTheFile) {
   const std::string html = judge({"a", "b"}, true).html;
   EXPECT_EQ(html.find("http:"), std::string::npos);
   EXPECT_EQ(html.find("https:"), std::string::npos);
   EXPECT_EQ(html.find("url("), std::string::npos);
-  EXPECT_EQ(countOf(html, "<link"), 0u);
-  EXPECT_EQ(countOf(html, "depth, measured</figcaption>"), 2u);
+  EXPECT_EQ(countOccurrences(html, "<link"), 0u);
+  EXPECT_EQ(countOccurrences(html, "depth, measured</figcaption>"), 2u);
 }
 
-TEST(Report, ShrinksItsPicturesWhenThereAreManyViews) {
+TEST(Report, ShrinksItsImagesWhenThereAreManyViews) {
   const ImageF large(2000, 1000, 3, 0.5f);
   const RenderedView view{large, ImageF(2000, 1000, 1, 1.0f), ImageF(2000, 1000, 1, 3.0f)};
   ViewResult result;
@@ -99,7 +100,7 @@ TEST(Report, ShrinksItsPicturesWhenThereAreManyViews) {
   EXPECT_LT(before, 40000u);
 }
 
-TEST(Report, SurvivesViewsWithoutNumbersOrPictures) {
+TEST(Report, ShowsViewsWithoutNumbersOrImages) {
   EvaluationReport report;
   report.views.resize(2);
   report.views[0].name = "a";

@@ -22,7 +22,7 @@ std::array<double, kSsimWindow> gaussianWindow() {
   return weights;
 }
 
-// The five window means that the formula needs.
+// The five window means in the formula.
 struct Moments {
   double x = 0, y = 0, xx = 0, yy = 0, xy = 0;
 
@@ -41,7 +41,7 @@ double similarity(const Moments& m) {
          ((m.x * m.x + m.y * m.y + kC1) * (varianceX + varianceY + kC2));
 }
 
-// Masked pixels above and left of each corner: (width + 1) × (height + 1).
+// Returns the summed-area table of masked pixels, (width + 1) × (height + 1).
 std::vector<uint32_t> summedMask(const ImageU8& mask) {
   const size_t stride = static_cast<size_t>(mask.width) + 1;
   std::vector<uint32_t> sums(stride * (static_cast<size_t>(mask.height) + 1), 0);
@@ -77,7 +77,7 @@ double ssim(const ImageF& a, const ImageF& b, const ImageU8* mask) {
 
   double sum = 0;
   size_t count = 0;
-  std::vector<Moments> column(static_cast<size_t>(a.width));  // one channel of eleven rows, weighed downwards
+  std::vector<Moments> column(static_cast<size_t>(a.width));  // one channel of eleven rows, filtered vertically
   for (int c = 0; c < a.channels; ++c) {
     for (int y = 0; y < down; ++y) {
       for (int x = 0; x < a.width; ++x) {

@@ -16,7 +16,7 @@ ImageF noise(int width, int height, int channels, uint64_t seed) {
   return image;
 }
 
-// The formula as the paper writes it: explicit two-dimensional windows, central moments.
+// The formula of the paper, with explicit two-dimensional windows and central moments.
 double bruteForce(const ImageF& a, const ImageF& b, const ImageU8* mask) {
   double sum = 0;
   int count = 0;
@@ -24,7 +24,7 @@ double bruteForce(const ImageF& a, const ImageF& b, const ImageU8* mask) {
     for (int y = 5; y + 5 < a.height; ++y) {
       for (int x = 5; x + 5 < a.width; ++x) {
         double total = 0, meanA = 0, meanB = 0, varianceA = 0, varianceB = 0, covariance = 0;
-        bool isWhole = true;
+        bool isUnmasked = true;
         const auto each = [&](auto&& visit) {
           for (int j = -5; j <= 5; ++j) {
             for (int i = -5; i <= 5; ++i) visit(std::exp(-(i * i + j * j) / 4.5), x + i, y + j);
@@ -34,9 +34,9 @@ double bruteForce(const ImageF& a, const ImageF& b, const ImageU8* mask) {
           total += w;
           meanA += w * a.at(u, v)[c];
           meanB += w * b.at(u, v)[c];
-          if (mask && mask->at(u, v)[0] == 0) isWhole = false;
+          if (mask && mask->at(u, v)[0] == 0) isUnmasked = false;
         });
-        if (!isWhole) continue;
+        if (!isUnmasked) continue;
         meanA /= total;
         meanB /= total;
         each([&](double w, int u, int v) {
@@ -53,7 +53,7 @@ double bruteForce(const ImageF& a, const ImageF& b, const ImageU8* mask) {
   return sum / count;
 }
 
-TEST(Ssim, OfAPictureWithItselfIsOne) {
+TEST(Ssim, IsOneForEqualImages) {
   EXPECT_NEAR(ssim(noise(20, 15, 3, 1), noise(20, 15, 3, 1)), 1.0, 1e-9);
 }
 
@@ -63,7 +63,7 @@ TEST(Ssim, IsSymmetric) {
   EXPECT_LT(ssim(a, b), 0.3);
 }
 
-TEST(Ssim, OfConstantPicturesFollowsTheLuminanceTermAlone) {
+TEST(Ssim, FollowsTheLuminanceTermForConstantImages) {
   const double a = 0.25, b = 0.75;
   EXPECT_NEAR(ssim(ImageF(16, 16, 1, 0.25f), ImageF(16, 16, 1, 0.75f)), (2 * a * b + 1e-4) / (a * a + b * b + 1e-4),
               1e-9);
@@ -76,13 +76,13 @@ TEST(Ssim, AgreesWithTheFormulaWrittenOut) {
   EXPECT_NEAR(ssim(a, b), bruteForce(a, b, nullptr), 1e-9);
 }
 
-TEST(Ssim, LeavesOutEveryWindowThatTouchesAMaskedPixel) {
+TEST(Ssim, IgnoresEveryWindowThatTouchesAMaskedPixel) {
   const ImageF a = noise(30, 24, 2, 5), b = noise(30, 24, 2, 6);
   ImageU8 mask(30, 24, 1, 255);
   mask.at(3, 4)[0] = 0;
   mask.at(25, 12)[0] = 0;
   EXPECT_NEAR(ssim(a, b, &mask), bruteForce(a, b, &mask), 1e-9);
-  ImageF changed = b;  // what lies under the mask cannot matter
+  ImageF changed = b;  // masked pixels have no effect
   changed.at(3, 4)[0] = 9.0f;
   EXPECT_DOUBLE_EQ(ssim(a, b, &mask), ssim(a, changed, &mask));
 }

@@ -52,7 +52,7 @@ std::vector<std::string> argumentsFor(const VideoOptions& options, const fs::pat
           "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv,format=yuv420p", "-colorspace",
           "bt709", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1", "-c:v", "libx264", "-crf",
           fmt::format("{}", options.quality), "-movflags", "+faststart",
-          // "file:" and an absolute path: no name can be taken for an option or a protocol.
+          // With "file:" and an absolute path, no name can be mistaken for an option or a protocol.
           "-f", "mp4", "file:" + fs::absolute(target).string()};
 }
 
@@ -62,8 +62,8 @@ struct VideoWriter::State {
   fs::path path, partial;
   VideoOptions options;
   pid_t process = -1;
-  Descriptor frames;    // a socket rather than a pipe: writing to a program that died must not raise SIGPIPE
-  Descriptor messages;  // what the program says, in memory
+  Descriptor frames;    // a socket, because writing to a pipe of a program that died would raise SIGPIPE
+  Descriptor messages;  // the output of the program, in a memory file
 
   std::string lastWords() const {
     char text[400];

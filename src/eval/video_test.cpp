@@ -38,11 +38,11 @@ class Video : public testing::Test {
   fs::path folder_;
 };
 
-TEST_F(Video, BecomesAnMp4UnderItsOwnName) {
+TEST_F(Video, IsWrittenAsAnMp4UnderAnUnusualName) {
   if (!hasProgram()) GTEST_SKIP() << "ffmpeg is not installed: encoding is not tested";
-  const fs::path path = folder_ / "-odd name; $(x).mp4";  // no shell ever sees it
+  const fs::path path = folder_ / "-odd name; $(x).mp4";  // must not be interpreted by a shell
   VideoOptions options;
-  options.width = 33;  // odd, which the format cannot hold
+  options.width = 33;  // odd, which the format does not support
   options.height = 21;
   VideoWriter writer(path, options);
   for (int i = 0; i < 5; ++i) writer.add(ImageU8(33, 21, 3, static_cast<uint8_t>(40 * i)));
@@ -81,7 +81,7 @@ TEST_F(Video, ReportsAProgramThatDiesInsteadOfDyingWithIt) {
   EXPECT_EQ(filesLeft(), 0u);
 }
 
-TEST_F(Video, PassesOnWhatTheProgramSaid) {
+TEST_F(Video, ReportsTheMessagesOfTheProgram) {
   if (!hasProgram()) GTEST_SKIP() << "ffmpeg is not installed: its messages are not tested";
   VideoOptions options;
   options.width = options.height = 16;

@@ -9,8 +9,8 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "base/image_io.h"
+#include "export/atomic_folder.h"
 #include "export/merf_layout.h"
-#include "export/whole_folder.h"
 #include "representations/volume/content/volume_payload.h"
 #include "tiles/read_content.h"
 #include "tiles/scene_folder.h"
@@ -19,7 +19,7 @@ namespace tessera {
 namespace {
 
 constexpr const char* kTrainOneBlock =
-    "train with --method volume --blocks 1x1 --set surround=border, bake that, and export the scene";
+    "train with --method volume --blocks 1x1 --set background_block=border, bake that, and export the scene";
 
 bool isOurs(const std::string& name) {
   static const std::regex kNames(
@@ -28,7 +28,7 @@ bool isOurs(const std::string& name) {
   return std::regex_match(name, kNames);
 }
 
-// The only content of the finest level; `file` is where it stands.
+// Returns the only content of the finest level; `file` receives its path.
 VolumeContent readOnlyContent(const fs::path& scene, const Tileset& tileset, fs::path& file) {
   const auto unsuitable = [&](const std::string& why) {
     return Error((scene / "tileset.json").string(), "", why, kTrainOneBlock);
@@ -42,14 +42,16 @@ VolumeContent readOnlyContent(const fs::path& scene, const Tileset& tileset, fs:
   }
   for (const Tile& tile : tileset.tiles) {
     for (const TileContent& content : tile.contents) {
-      if (content.surround) throw unsuitable("has a surround of its own, and MERF's files hold one block");
+      if (content.backgroundBlock)
+        throw unsuitable("has a background block of its own, and MERF's files hold one block");
     }
   }
-  const Tile& finest = tileset.tiles.back();  // one below the other: there is one cell
-  if (finest.contents.size() != 1) throw unsuitable("has not one content, and MERF's files hold one block");
+  const Tile& finest = tileset.tiles.back();  // with one cell, each tile is the only child of the one before
+  if (finest.contents.size() != 1)
+    throw unsuitable("does not have exactly one content, and MERF's files hold one block");
   file = contentPath(scene, finest.contents[0].uri);
   return contentAs<VolumeContent>(
-      *readPromisedContent(file, volumeCodec(), tileset.tiles.size() - 1, finest.contents[0]));
+      *readVerifiedContent(file, volumeCodec(), tileset.tiles.size() - 1, finest.contents[0]));
 }
 
 void requireMerfBlock(const VolumeContent& content, const fs::path& file) {
@@ -67,10 +69,11 @@ void requireMerfBlock(const VolumeContent& content, const fs::path& file) {
     throw unsuitable("has a network that is not 34, 16, 16, 3 wide, as MERF's viewer has it");
   }
   if (part.storedMacroblocks() == 0) {
-    throw Error(file.string(), "", "holds nothing that could be seen", "train longer, and bake again");
+    throw Error(file.string(), "", "contains nothing visible", "train longer, and bake again");
   }
-  // The viewer's three.js (r113) uploads rows of textures as multiples of 4 bytes; grids of others stay empty. The
-  // widths are ⌈planes / 128⌉ bytes of occupancy at the coarsest, and 3 bytes for each of voxels / 8 macroblocks.
+  // The viewer's three.js (r113) uploads texture rows whose length is a multiple of 4 bytes; other grids stay empty.
+  // The widths are ⌈planes / 128⌉ bytes for the coarsest occupancy grid, and 3 bytes for each of voxels / 8
+  // macroblocks.
   if (part.planes % 512 != 0 || part.voxels % 32 != 0) {
     throw Error(file.string(), "",
                 fmt::format("has {} voxels and planes of {} texels, and MERF's viewer can load multiples of 32 and 512",
@@ -102,8 +105,8 @@ class MerfFolder {
 
 nlohmann::ordered_json sceneParameters(const VolumeContent& content, const std::array<uint32_t, 3>& atlas) {
   const VolumePart& part = content.parts[0];
-  // Densities are per scene unit, the viewer's per unit of its own, which is `scale` of them: exp(sum - 1) is to become
-  // `scale` times as large, and four ranges are added up.
+  // Densities are per scene unit; the viewer's unit is `scale` scene units. So exp(sum - 1) must become `scale` times
+  // as large, where the sum has four terms with ranges of their own.
   const double denser = std::log(static_cast<double>(part.scale[0])) / 4;
   nlohmann::ordered_json json = {{"triplane_resolution", part.planes},
                                  {"triplane_voxel_size", 4.0 / part.planes},
@@ -133,14 +136,14 @@ MerfExport writeMerf(const VolumeContent& content, const fs::path& folder) {
   CHECK(part.contracted);
   const std::array<uint32_t, 3> atlas = merfAtlas(part.storedMacroblocks());
   MerfFolder files(folder);
-  MerfExport made;
-  made.macroblocks = part.storedMacroblocks();
-  made.slices = VolumePart::kStoredEdge * atlas[2];
+  MerfExport exported;
+  exported.macroblocks = part.storedMacroblocks();
+  exported.slices = VolumePart::kStoredEdge * atlas[2];
   for (const MerfPicture& picture : kMerfPictures) {
     for (int plane = 0; plane < 3; ++plane) {
       files.add(fmt::format("plane_{}_{}", picture.name, plane), merfPlane(part, plane, picture));
     }
-    for (uint32_t slice = 0; slice < made.slices; ++slice) {
+    for (uint32_t slice = 0; slice < exported.slices; ++slice) {
       files.add(fmt::format("sparse_grid_{}_{:03}", picture.name, slice), merfAtlasSlice(part, atlas, slice, picture));
     }
   }
@@ -149,8 +152,8 @@ MerfExport writeMerf(const VolumeContent& content, const fs::path& folder) {
     files.add(fmt::format("occupancy_grid_{}", factor), merfOccupancy(part, factor));
   }
   files.add("scene_params.json", sceneParameters(content, atlas));
-  made.bytesOnDisk = files.bytes();
-  return made;
+  exported.bytesOnDisk = files.bytes();
+  return exported;
 }
 
 MerfExport exportMerf(const fs::path& scene, const fs::path& out) {
@@ -162,11 +165,11 @@ MerfExport exportMerf(const fs::path& scene, const fs::path& out) {
   fs::path file;
   const VolumeContent content = readOnlyContent(scene, tileset, file);
   requireMerfBlock(content, file);
-  WholeFolder folder(out, isOurs);
-  MerfExport made = writeMerf(content, folder.path());
-  made.near = tileset.near / content.parts[0].scale[0];
+  AtomicFolder folder(out, isOurs);
+  MerfExport exported = writeMerf(content, folder.path());
+  exported.near = tileset.near / content.parts[0].scale[0];
   folder.commit();
-  return made;
+  return exported;
 }
 
 }  // namespace tessera

@@ -5,7 +5,7 @@
 namespace tessera {
 namespace {
 
-// Of a place in the viewer's grid, along our axes.
+// Converts indices along the viewer's axes g to indices along our axes.
 constexpr std::array<uint32_t, 3> ourAxes(const std::array<uint32_t, 3>& g) {
   return {g[2], g[0], g[1]};
 }
@@ -14,7 +14,7 @@ void copyAttributes(const uint8_t* texel, const MerfPicture& picture, uint8_t* p
   for (const uint32_t attribute : picture.attributes) *pixel++ = texel[attribute];
 }
 
-// Where the m-th stored macroblock lies in the atlas: the last axis fastest, as in MERF.
+// Returns the position of the m-th stored macroblock in the atlas: the last axis varies fastest, as in MERF.
 std::array<uint32_t, 3> placeInAtlas(const std::array<uint32_t, 3>& atlas, uint32_t m) {
   return {m / (atlas[1] * atlas[2]), m / atlas[2] % atlas[1], m % atlas[2]};
 }
@@ -22,16 +22,16 @@ std::array<uint32_t, 3> placeInAtlas(const std::array<uint32_t, 3>& atlas, uint3
 }  // namespace
 
 std::array<uint32_t, 3> merfAtlas(uint32_t stored) {
-  constexpr uint32_t kMost = 2048 / VolumePart::kStoredEdge;
+  constexpr uint32_t kMax = 2048 / VolumePart::kStoredEdge;
   std::array<uint32_t, 3> best = {0, 0, 0};
-  uint64_t fewest = UINT64_MAX;
-  for (uint32_t depth = 1; depth <= kMost; ++depth) {
-    for (uint32_t height = depth; height <= kMost; ++height) {
+  uint64_t minimum = UINT64_MAX;
+  for (uint32_t depth = 1; depth <= kMax; ++depth) {
+    for (uint32_t height = depth; height <= kMax; ++height) {
       const uint32_t width = (stored + depth * height - 1) / (depth * height);
       const uint64_t all = uint64_t{width} * height * depth;
-      if (width < height || width > kMost || all >= fewest) continue;
+      if (width < height || width > kMax || all >= minimum) continue;
       best = {width, height, depth};
-      fewest = all;
+      minimum = all;
     }
   }
   CHECK(best[0] > 0u);
@@ -41,9 +41,9 @@ std::array<uint32_t, 3> merfAtlas(uint32_t stored) {
 ImageU8 merfPlane(const VolumePart& part, int plane, const MerfPicture& picture) {
   CHECK((plane >= 0 && plane < 3));
   const size_t s = plane == 0 ? 1 : 0, t = plane == 2 ? 1 : 2;
-  constexpr int kOurs[] = {1, 2, 0};  // the axis of q along each of g
+  constexpr int kOurs[] = {1, 2, 0};  // the axis of q along each axis of g
   const std::vector<uint8_t>& bytes = part.planeBytes[kOurs[plane]];
-  // Ours has the lower of the two axes along its columns.
+  // Our plane has the lower of its two axes along its columns.
   const bool swapped = kOurs[s] > kOurs[t];
   ImageU8 image(static_cast<int>(part.planes), static_cast<int>(part.planes), 4);
   for (uint32_t row = 0; row < part.planes; ++row) {
@@ -121,8 +121,8 @@ std::array<MerfLayer, 3> merfNetwork(const std::vector<DenseLayer>& network) {
     layers[l].biases = layer.biases;
     layers[l].weights.assign(l == 0 ? kInputs : layer.inputs, std::vector<float>(layer.outputs));
     for (uint32_t input = 0; input < layer.inputs; ++input) {
-      // Directions come as d, sines, cosines, of three components each. The viewer's first is our second, its sign
-      // changed (which cosines do not notice), and its second our first.
+      // Directions are encoded as d, sines and cosines, of three components each. The viewer's first component is our
+      // second with its sign changed (which cosines ignore), and its second is our first.
       uint32_t from = input;
       bool negative = false;
       if (l == 0 && input >= kDirection) {

@@ -1,6 +1,6 @@
-// How one contracted part of a content is laid out in the files of MERF (Reiser et al. 2023), which its public web
-// viewer reads: google-research, folder merf/, webviewer/index.js (loading), fragment.glsl (lookups), viewdependency.js
-// and viewdependency.glsl (network); written by internal/export.py. Facts from there:
+// The layout of one contracted part of a content in the files of MERF (Reiser et al. 2023), which its public web viewer
+// reads: google-research, folder merf/, webviewer/index.js (loading), fragment.glsl (lookups), viewdependency.js and
+// viewdependency.glsl (network); they are written by internal/export.py. From these sources:
 //
 // Axes. The viewer's space g is y-up; its grids have axis a of g along axis a of a texture, index 0 at -2: texel i of R
 // lies at -2 + (i + ½) 4 / R (fragment.glsl, posSparseGrid and posTriplaneGrid). MERF trains in a z-up world w. The
@@ -9,11 +9,11 @@
 //
 //   g = (q1, q2, q0), that is w = (-q1, q0, q2), of local coordinates q: a quarter turn about the vertical,
 //
-// under which no axis is mirrored. So our macroblocks are MERF's data blocks, byte by byte; with a mirrored axis those
-// would begin one voxel beside ours, and their aprons would want voxels that a scene need not hold. The network sees
-// directions turned, so the weights of its directions are turned back (merfNetwork).
+// under which no axis is mirrored. So our macroblocks are MERF's data blocks, byte by byte; with a mirrored axis,
+// MERF's blocks would begin one voxel beside ours, and their aprons would need voxels that a scene need not store. The
+// network sees rotated directions, so the weights of its direction inputs are rotated back (merfNetwork).
 //
-// Pictures. Rows of a PNG are uploaded from the top as rows of a texture (index.js): column s, row t.
+// Images. Rows of a PNG are uploaded from the top as rows of a texture (index.js): column s, row t.
 //   plane a      s and t are the axes of g other than a, in their order (fragment.glsl, planeUv)
 //   slice k      of the atlas: s along axis 0, t along axis 1, k along axis 2
 //   grids        of n³ cells, x fastest: n wide and n² high
@@ -27,32 +27,33 @@
 
 namespace tessera {
 
-// Four attributes of a texel in the channels of an RGBA picture.
+// Four attributes of a texel in the channels of an RGBA image.
 struct MerfPicture {
-  const char* name;  // in names of files
+  const char* name;  // part of the file names
   std::array<uint32_t, 4> attributes;
 };
 inline constexpr MerfPicture kMerfPictures[] = {{"rgb_and_density", {1, 2, 3, 0}}, {"features", {4, 5, 6, 7}}};
 
-// Texels of the planes along an edge of a cell, of each occupancy grid that the viewer loads.
+// The edge length of a cell in plane texels, for each occupancy grid that the viewer loads.
 inline constexpr uint32_t kMerfOccupancyFactors[] = {8, 16, 32, 64, 128};
 
-// Macroblocks along the axes of the atlas, the fewest that hold `stored`, then the fewest slices; the first axis is the
-// longest. A texture is at most 2048 texels long, and 255 stands for "empty" (baking.py). `stored` is at least 1.
+// Returns the size of the atlas in macroblocks along its axes: the smallest that holds `stored`, then the one with the
+// fewest slices; the first axis is the longest. A texture is at most 2048 texels long, and 255 stands for "empty"
+// (baking.py). `stored` is at least 1.
 std::array<uint32_t, 3> merfAtlas(uint32_t stored);
 
 ImageU8 merfPlane(const VolumePart& part, int plane, const MerfPicture& picture);
-// `slice` is below 9 atlas[2].
+// `slice` must be below 9 atlas[2].
 ImageU8 merfAtlasSlice(const VolumePart& part, const std::array<uint32_t, 3>& atlas, uint32_t slice,
                        const MerfPicture& picture);
-// RGB: of each macroblock of the grid its place in the atlas, or 255, 255, 255.
+// RGB: the position of each macroblock of the grid in the atlas, or 255, 255, 255.
 ImageU8 merfBlockIndices(const VolumePart& part, const std::array<uint32_t, 3>& atlas);
-// RGBA, all channels 1 where anything may be, else 0; ⌈planes / factor⌉ cells along an edge.
+// RGBA: all channels are 1 where anything may be, otherwise 0; ⌈planes / factor⌉ cells along an edge.
 ImageU8 merfOccupancy(const VolumePart& part, uint32_t factor);
 
-// The three layers 34 → 16 → 16 → 3 of a content for the viewer's directions, [inputs][outputs] each. The first has two
-// more inputs of weight 0: the viewer fills up widths to multiples of 4, and where it has to do so along the inputs, it
-// loses the layer's biases (viewdependency.js).
+// Returns the three layers 34 → 16 → 16 → 3 of a content for the viewer's directions, [inputs][outputs] each. The first
+// layer has two additional inputs of weight 0: the viewer pads widths to multiples of 4, and if it has to pad the
+// inputs, it loses the layer's biases (viewdependency.js).
 struct MerfLayer {
   std::vector<std::vector<float>> weights;
   std::vector<float> biases;

@@ -11,14 +11,14 @@
 #include "raymarch/content/occupancy_pyramid.h"
 #include "representations/volume/content/volume_payload.h"
 #include "representations/volume/cpu/volume_shading.h"
-#include "representations/volume/testing/made_volume.h"
 #include "representations/volume/testing/reference_volume.h"
+#include "representations/volume/testing/test_volume_content.h"
 #include "tiles/scene_folder.h"
 
 namespace tessera {
 namespace {
 
-// Where a place q of a block lies in the viewer.
+// Converts a position q of a block to the viewer's axes.
 ViewerPlace inViewer(const Triple<double>& q) {
   return {q[1], q[2], q[0]};
 }
@@ -32,10 +32,10 @@ VolumeContent oneBlock(uint32_t voxels = 32, uint32_t planes = 64, double filled
   part.high = {1e6f, 1e6f, 1e6f};
   makeVolume(part, smoothVolume(voxels + planes, filled));
   part.distances = chebyshevDistances(occupancyFromDistances(part.distances, planes / VolumePart::kDistanceCell));
-  return contentOf({part}, randomNetwork(5));
+  return makeVolumeContent({part}, randomNetwork(5));
 }
 
-// Of a resolution that the viewer can load, and quickly made.
+// A block of a resolution that the viewer can load and that is quick to make.
 VolumeContent largeBlock() {
   VolumePart part;
   part.contracted = true;
@@ -52,7 +52,7 @@ VolumeContent largeBlock() {
     for (size_t i = 0; i < part.planeBytes[plane].size(); ++i) part.planeBytes[plane][i] = (i / 4096 + plane) % 256;
   }
   part.distances.assign(64 * 64 * 64, 0);
-  return contentOf({part}, randomNetwork(5));
+  return makeVolumeContent({part}, randomNetwork(5));
 }
 
 class Merf : public testing::Test {
@@ -69,7 +69,7 @@ class Merf : public testing::Test {
     return MerfViewer(root_ / "out");
   }
 
-  static Tileset tilesetOf(const VolumeContent& content) {
+  static Tileset makeTileset(const VolumeContent& content) {
     Tileset tileset;
     tileset.representation = "volume";
     tileset.geometricError = 10;
@@ -85,7 +85,7 @@ class Merf : public testing::Test {
     tileset.tiles.push_back(tile);
     return tileset;
   }
-  fs::path sceneOf(const VolumeContent& content, Tileset tileset) const {
+  fs::path writeScene(const VolumeContent& content, Tileset tileset) const {
     const SceneFolderWriter writer(root_ / "scene");
     tileset.tiles[0].contents[0].uri = writer.addContent(0, "block", encodeVolume(content, 0));
     for (TileContent& more : tileset.tiles[0].contents) {
@@ -94,7 +94,7 @@ class Merf : public testing::Test {
     writer.commit(tileset);
     return root_ / "scene";
   }
-  fs::path sceneOf(const VolumeContent& content) const { return sceneOf(content, tilesetOf(content)); }
+  fs::path writeScene(const VolumeContent& content) const { return writeScene(content, makeTileset(content)); }
 
   fs::path root_;
 };
@@ -103,9 +103,9 @@ struct Agreement {
   int seen = 0, passedOver = 0;
 };
 
-// At a place in the domain of the block. Where it lies within half a voxel of a lower side, the viewer's own lookup
-// goes wrong (it clamps to the macroblock after it has rounded down past the grid): there only whether something is
-// read is compared.
+// Compares the lookups at a position in the block's domain. Within half a voxel of a lower side, the viewer's own
+// lookup is wrong (it clamps to the macroblock after rounding down past the grid): there, only whether something is
+// found is compared.
 void compareAt(const VolumeContent& content, const MerfViewer& viewer, const Triple<double>& q, Agreement& agreement) {
   const VolumePart& part = content.parts[0];
   const Triple<double> p = {(q[0] + 2) / 4, (q[1] + 2) / 4, (q[2] + 2) / 4};
@@ -115,7 +115,7 @@ void compareAt(const VolumeContent& content, const MerfViewer& viewer, const Tri
   ASSERT_EQ(sums.has_value(), seen) << q[0] << " " << q[1] << " " << q[2];
   (seen ? agreement.seen : agreement.passedOver) += 1;
   if (!seen || *std::min_element(p.begin(), p.end()) * part.voxels < 0.5) return;
-  // The viewer's density is per unit of its own.
+  // The viewer's density is per unit of its own length.
   EXPECT_NEAR(std::exp((*sums)[0] - 1), std::exp(expected[0] - 1) * part.scale[0], 1e-7 * std::exp(expected[0]));
   for (int k = 1; k < 8; ++k) EXPECT_NEAR((*sums)[k], expected[k], 1e-9) << k;
 }
@@ -132,7 +132,8 @@ TEST_F(Merf, HoldsWhatIsReadFromTheBakedBlockEverywhere) {
     for (int i = 0; i < 4000; ++i) {
       Triple<double> q;
       for (double& x : q) x = 4 * random.uniformDouble(next++) - 2;
-      // A third beside the borders of macroblocks, a third beside those of the domain, along one axis.
+      // A third of the positions lie beside the borders of macroblocks, a third beside those of the domain, along one
+      // axis.
       double& x = q[random.below(next++, 3)];
       const double side = random.below(next++, 2) ? 1 : -1;
       if (i % 3 == 1) x = -2 + (8.0 * random.below(next++, voxels / 8) + 0.5) * 4 / voxels + 1e-6 * side;
@@ -162,17 +163,17 @@ TEST_F(Merf, HasOccupancyOfEveryFactorAboveTheFinest) {
     }
   }
   EXPECT_GT(occupied[0], 20);
-  // What is made stands in cubes of 16 texels.
+  // The test content consists of cubes of 16 texels.
   for (size_t grid = 2; grid < occupied.size(); ++grid) EXPECT_GT(occupied[grid], occupied[grid - 1]);
 }
 
-TEST_F(Merf, HasANetworkThatSaysTheSameOfTheViewersDirections) {
+TEST_F(Merf, HasAnEquivalentNetworkForTheViewersDirections) {
   const VolumeContent content = oneBlock();
   const MerfViewer viewer = viewed(content);
   const DeferredShader shader(content.network);
   const RandomStream random(9, 0);
   uint64_t next = 0;
-  double least = 1, most = 0;
+  double minimum = 1, maximum = 0;
   for (int i = 0; i < 200; ++i) {
     ContentComposite composite;
     for (float& value : composite.values) value = random.uniform(next++);
@@ -183,12 +184,12 @@ TEST_F(Merf, HasANetworkThatSaysTheSameOfTheViewersDirections) {
     const float* v = composite.values;
     const std::array<double, 3> got =
         viewer.network({v[0], v[1], v[2]}, {v[3], v[4], v[5], v[6]}, inViewer({d[0], d[1], d[2]}));
-    // The viewer takes inputs below 0.1 / 255 as none.
+    // The viewer treats inputs below 0.1 / 255 as 0.
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(got[c], expected[c], 5e-4);
-    least = std::min<double>(least, expected[0]);
-    most = std::max<double>(most, expected[0]);
+    minimum = std::min<double>(minimum, expected[0]);
+    maximum = std::max<double>(maximum, expected[0]);
   }
-  EXPECT_GT(most - least, 0.1);
+  EXPECT_GT(maximum - minimum, 0.1);
 }
 
 TEST_F(Merf, PutsMacroblocksIntoTheSmallestAtlasOfTheFewestSlices) {
@@ -205,25 +206,25 @@ TEST_F(Merf, PutsMacroblocksIntoTheSmallestAtlasOfTheFewestSlices) {
   }
 }
 
-TEST_F(Merf, TakesTheFolderOfAScene) {
+TEST_F(Merf, ExportsTheFolderOfAScene) {
   const VolumeContent content = largeBlock();
   fs::remove(root_ / "out");
-  const MerfExport made = exportMerf(sceneOf(content), root_ / "out");
-  EXPECT_EQ(made.macroblocks, content.parts[0].storedMacroblocks());
-  EXPECT_EQ(made.near, 0.025);
+  const MerfExport exported = exportMerf(writeScene(content), root_ / "out");
+  EXPECT_EQ(exported.macroblocks, content.parts[0].storedMacroblocks());
+  EXPECT_EQ(exported.near, 0.025);
   uint64_t bytes = 0, files = 0;
   for (const fs::directory_entry& entry : fs::directory_iterator(root_ / "out")) {
     bytes += entry.file_size();
     ++files;
   }
-  EXPECT_EQ(made.bytesOnDisk, bytes);
-  EXPECT_EQ(files, 6 + 2 * made.slices + 1 + 5 + 1);
+  EXPECT_EQ(exported.bytesOnDisk, bytes);
+  EXPECT_EQ(files, 6 + 2 * exported.slices + 1 + 5 + 1);
   const MerfViewer viewer(root_ / "out");
   Agreement agreement;
   for (double x = -1.9; x < 2; x += 0.4) compareAt(content, viewer, {x, 0.1 - x / 3, x / 2}, agreement);
   EXPECT_GT(agreement.seen, 0);
   EXPECT_GT(agreement.passedOver, 0);
-  // Once more over the older one, which had more slices.
+  // Exports again over the older export, which had more slices.
   writeFileAtomically(root_ / "out/sparse_grid_features_999.png", std::string_view("old"));
   exportMerf(root_ / "scene", root_ / "out");
   EXPECT_FALSE(fs::exists(root_ / "out/sparse_grid_features_999.png"));
@@ -242,47 +243,47 @@ TEST_F(Merf, SaysWhyASceneCannotBeExportedAndWhatToTrain) {
     }
     EXPECT_FALSE(fs::exists(root_ / "never"));
   };
-  const std::string train = "--blocks 1x1 --set surround=border";
+  const std::string train = "--blocks 1x1 --set background_block=border";
 
-  Tileset tileset = tilesetOf(good);
+  Tileset tileset = makeTileset(good);
   tileset.columns = 3;
   tileset.rows = 2;
   tileset.tiles[0].cells = tileset.tiles[0].contents[0].cells = tileset.allCells();
-  refused(sceneOf(good, tileset), "has 3 by 2 blocks", train);
-  tileset = tilesetOf(good);
+  refused(writeScene(good, tileset), "has 3 by 2 blocks", train);
+  tileset = makeTileset(good);
   tileset.tiles[0].contents.push_back(tileset.tiles[0].contents[0]);
-  tileset.tiles[0].contents[1].surround = true;
-  refused(sceneOf(good, tileset), "a surround of its own", train);
-  tileset = tilesetOf(good);
+  tileset.tiles[0].contents[1].backgroundBlock = true;
+  refused(writeScene(good, tileset), "a background block of its own", train);
+  tileset = makeTileset(good);
   tileset.tiles[0].contents[0].box.high[2] /= 2;
-  refused(sceneOf(good, tileset), "outside of the content's box", "copy the scene again");
-  tileset = tilesetOf(good);
+  refused(writeScene(good, tileset), "outside of the content's box", "copy the scene again");
+  tileset = makeTileset(good);
   tileset.representation = "mesh";
-  refused(sceneOf(good, tileset), "is a scene of mesh", train);
+  refused(writeScene(good, tileset), "is a scene of mesh", train);
 
   VolumeContent content = good;
   content.parts[0].contracted = false;
   content.parts[0].low = {-1, -1, -1};
   content.parts[0].high = {1, 1, 1};
-  refused(sceneOf(content), "is a block with bounds", train);
+  refused(writeScene(content), "is a block with bounds", train);
   content = good;
   content.parts[0].scale = {1, 1, 2};
-  refused(sceneOf(content), "the same scale", train);
+  refused(writeScene(content), "the same scale", train);
   content = good;
   content.network = darkNetwork();
-  refused(sceneOf(content), "has a network", train);
+  refused(writeScene(content), "has a network", train);
   content.network = randomNetwork(1, {34, 20, 16, 3});
-  refused(sceneOf(content), "has a network", train);
+  refused(writeScene(content), "has a network", train);
   content = good;
   content.parts[0].macroblocks.assign(content.parts[0].macroblocks.size(), VolumePart::kEmpty);
   content.parts[0].voxelBytes.clear();
-  refused(sceneOf(content), "holds nothing", "train longer");
-  refused(sceneOf(good), "has 32 voxels and planes of 64 texels", "--set voxels=128 --set planes=512");
+  refused(writeScene(content), "contains nothing visible", "train longer");
+  refused(writeScene(good), "has 32 voxels and planes of 64 texels", "--set voxels=128 --set planes=512");
 
   fs::create_directories(root_ / "model");
   writeFileAtomically(root_ / "model/blocks.json", std::string_view("{}"));
   refused(root_ / "model", "is a model", "tessera bake");
-  const fs::path scene = sceneOf(good), file = contentPath(scene, readTileset(scene).tiles[0].contents[0].uri);
+  const fs::path scene = writeScene(good), file = contentPath(scene, readTileset(scene).tiles[0].contents[0].uri);
   fs::resize_file(file, fs::file_size(file) / 2);
   refused(scene, "", "bake it again");
   refused(root_ / "nowhere", "", "");
@@ -290,7 +291,7 @@ TEST_F(Merf, SaysWhyASceneCannotBeExportedAndWhatToTrain) {
 
 TEST_F(Merf, LeavesFoldersOfOthersAlone) {
   writeFileAtomically(root_ / "out/holiday.png", std::string_view("mine"));
-  const fs::path scene = sceneOf(largeBlock());
+  const fs::path scene = writeScene(largeBlock());
   EXPECT_THROW(exportMerf(scene, root_ / "out"), Error);
   EXPECT_EQ(readTextFile(root_ / "out/holiday.png"), "mine");
 }

@@ -24,7 +24,7 @@ BlockFieldBatch::BlockFieldBatch(Device& device, const BlockFieldShape& shape, u
   outputs = device.array<float>(n * static_cast<size_t>(shape.network.outputs));
   if (!forBackward) return;
   encodedGradients = device.array<float>(encodings);
-  activations = device.activationsOf(shape.network, n);
+  activations = device.allocateActivations(shape.network, n);
   outputGradients = device.array<float>(n * static_cast<size_t>(shape.network.outputs));
 }
 
@@ -60,14 +60,14 @@ Matrix<float> BlockFields::byLevel(Array<float>& encodings, uint32_t capacity) c
                                 Matrix<float>::rowsOfPlane(capacity));
 }
 
-Count BlockFields::rowsOf(const BlockFieldBatch& batch, uint32_t slot) {
+Count BlockFields::slotRows(const BlockFieldBatch& batch, uint32_t slot) {
   return {batch.capacity, batch.firstOfSlot.part(slot + 1, 1), batch.firstOfSlot.part(slot, 1)};
 }
 
 void BlockFields::forward(BlockFieldBatch& batch, bool forBackward) {
   const Matrix<float> encoded = byLevel(batch.encoded, batch.capacity);
   for (uint32_t slot = 0; slot < slots(); ++slot) {
-    const Count rows = rowsOf(batch, slot);
+    const Count rows = slotRows(batch, slot);
     device_.run(HashGridForward{shape_.grid, rows, batch.positions, tables_[slot].values, encoded});
     device_.run(MlpForward{shape_.network, rows, encoded, networks_[slot].values,
                            Matrix<float>(batch.outputs, static_cast<uint32_t>(shape_.network.outputs)),
@@ -80,7 +80,7 @@ void BlockFields::backward(BlockFieldBatch& batch) {
   const Matrix<float> encoded = byLevel(batch.encoded, batch.capacity);
   const Matrix<float> encodedGradients = byLevel(batch.encodedGradients, batch.capacity);
   for (uint32_t slot = 0; slot < slots(); ++slot) {
-    const Count rows = rowsOf(batch, slot);
+    const Count rows = slotRows(batch, slot);
     device_.run(MlpBackward{shape_.network,
                             rows,
                             encoded,

@@ -1,6 +1,6 @@
-// One small field a block, all of the same shape: a hash grid and a network from its features to a few outputs. Samples
-// come sorted by block; each block's field sees its own rows. City-on-Web's attribute functions f^k and proposal fields
-// ψ^k. Fields stand in slots, one for each block that is in memory.
+// One small field per block, all of the same shape: a hash grid and a network from its features to a few outputs. These
+// are the attribute functions f^k and the proposal fields ψ^k of City-on-Web. Samples are sorted by slot, and each
+// field evaluates its own rows. There is one slot for each resident block.
 #pragma once
 
 #include <deque>
@@ -18,7 +18,7 @@ struct BlockFieldShape {
 BlockFieldShape makeBlockFieldShape(const HashGridOptions& grid, int width, int hiddenLayers, int outputs,
                                     OutputActivation activation);
 
-// Samples of all blocks, and what is kept of them between forward and backward.
+// The samples of all blocks, with the intermediate values that backward needs of forward.
 struct BlockFieldBatch {
   uint32_t capacity = 0;
   Slice<const uint32_t> firstOfSlot;  // [slots + 1], rows
@@ -32,17 +32,17 @@ struct BlockFieldBatch {
 
 class BlockFields {
  public:
-  // `name`: of the parameter groups, NAME.table and NAME.network. Slot k begins with block k. Keeps a reference to
-  // `device`.
+  // `name`: the parameter groups are named NAME.table and NAME.network. Initially slot k holds block k. Keeps a
+  // reference to `device`.
   BlockFields(Device& device, std::string name, BlockFieldShape shape, uint32_t slots, uint64_t seed,
               bool forTraining = true);
 
-  // A block's field as it begins: in a slot, whatever that held; or saved.
+  // Write the untrained field of a block into a slot, replacing its contents, or into tensors to save.
   void begin(uint32_t slot, uint32_t block);
   void saveFirst(uint32_t block, TensorSet& tensors) const;
 
-  void forward(BlockFieldBatch& batch, bool forBackward);  // to batch.outputs
-  // From batch.outputGradients (of the activated outputs). Adds to the groups' gradients.
+  void forward(BlockFieldBatch& batch, bool forBackward);  // writes batch.outputs
+  // Propagates batch.outputGradients (with respect to the activated outputs); adds to the gradients of the groups.
   void backward(BlockFieldBatch& batch);
 
   uint32_t slots() const { return static_cast<uint32_t>(tables_.size()); }
@@ -52,7 +52,7 @@ class BlockFields {
 
  private:
   Matrix<float> byLevel(Array<float>& encodings, uint32_t capacity) const;
-  static Count rowsOf(const BlockFieldBatch& batch, uint32_t slot);
+  static Count slotRows(const BlockFieldBatch& batch, uint32_t slot);
 
   std::vector<float> firstTable(uint32_t block) const;
   std::vector<float> firstNetwork(uint32_t block) const;

@@ -1,4 +1,4 @@
-// What parameters start as: functions of a seed alone.
+// Initial values of parameters, functions of the seed alone.
 #pragma once
 
 #include <cstdint>

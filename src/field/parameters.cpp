@@ -10,7 +10,7 @@ namespace tessera {
 
 ParameterGroup::ParameterGroup(Device& device, std::string groupName, const std::vector<float>& initial,
                                bool forTraining)
-    : name(std::move(groupName)), values(device.arrayOf(initial)) {
+    : name(std::move(groupName)), values(device.uploadArray(initial)) {
   if (!forTraining) return;
   for (Array<float>* each : {&gradients, &firstMoments, &secondMoments}) *each = device.array<float>(initial.size());
   counts = device.array<uint32_t>(initial.size());

@@ -1,4 +1,4 @@
-// Trainable numbers on a device with all that Adam keeps of them, and their form in a safetensors file.
+// Trainable parameters on a device with the state of Adam, and their representation in a safetensors file.
 #pragma once
 
 #include <functional>
@@ -18,24 +18,24 @@ struct ParameterGroup {
   Array<uint32_t> counts;
 
   ParameterGroup() = default;
-  // Without `forTraining`, values alone.
+  // Without `forTraining` only the values are allocated.
   ParameterGroup(Device& device, std::string groupName, const std::vector<float>& initial, bool forTraining = true);
 
-  // Anew from these, as if never trained.
+  // Resets the values to `initial`, and gradients and moments to zero.
   void begin(Device& device, const std::vector<float>& initial);
 
-  // One step with the accumulated gradients, which are zero afterwards.
+  // Performs one step of Adam with the accumulated gradients, and clears them.
   void step(Device& device, Adam settings);
 
-  bool allFinite(Device& device) const;  // of the values; waits
+  bool allFinite(Device& device) const;  // whether all values are finite; waits for the device
 };
 
-// Tensors by name, owning their bytes: what a checkpoint is made of.
+// The tensors of a checkpoint by name. Owns their bytes.
 class TensorSet {
  public:
   template <class T>
   void add(const std::string& name, const std::vector<T>& values) {
-    addBytes(name, tensorTypeOf<T>(), std::as_bytes(std::span(values)), values.size());
+    addBytes(name, elementTensorType<T>(), std::as_bytes(std::span(values)), values.size());
   }
   void add(const std::string& name, const TensorView& tensor) {
     addBytes(name, tensor.type, tensor.bytes, static_cast<size_t>(tensor.elements()));
@@ -45,7 +45,7 @@ class TensorSet {
 
  private:
   template <class T>
-  static constexpr TensorType tensorTypeOf() {
+  static constexpr TensorType elementTensorType() {
     if constexpr (std::is_same_v<T, float>) return TensorType::f32;
     if constexpr (std::is_same_v<T, uint32_t>) return TensorType::u32;
     if constexpr (std::is_same_v<T, int64_t>) return TensorType::i64;
@@ -61,8 +61,8 @@ class TensorSet {
   std::map<std::string, Owned> tensors_;
 };
 
-// Fills a group from a file. Throws Error naming `path` when a tensor is missing or of another size; moments are
-// optional (a file for rendering has none), and left out where the group has none.
+// Loads a group from a file. Throws Error naming `path` if a tensor is missing or has another size. Moments are
+// optional in the file (a file for rendering has none), and are skipped if the group has none.
 void loadGroup(Device& device, const fs::path& path, const Safetensors& file, ParameterGroup& group);
 
 }  // namespace tessera

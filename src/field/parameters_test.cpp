@@ -31,17 +31,17 @@ class Parameters : public testing::Test {
   std::unique_ptr<Device> device_;
 };
 
-TEST_F(Parameters, MoveAgainstTheirGradientsWhichAreZeroAfterwards) {
+TEST_F(Parameters, MoveAgainstTheirGradientsAndClearThem) {
   ParameterGroup trained = group();
   step(trained, {1, -1, 0.25f, -4, 0});
   const std::vector<float> values = device_->read(trained.values.all());
-  // The first step of Adam is as long as the rate, whatever the gradient.
+  // The length of the first step of Adam is the learning rate, whatever the gradient.
   const std::vector<float> expected = {0.99f, -1.99f, 2.99f, 0.51f, 0};
   for (size_t i = 0; i < values.size(); ++i) EXPECT_NEAR(values[i], expected[i], 1e-5);
   EXPECT_EQ(device_->read(trained.gradients.all()), std::vector<float>(5, 0.0f));
 }
 
-TEST_F(Parameters, GoOnAfterLoadingAsIfNothingHadHappened) {
+TEST_F(Parameters, ContinueTrainingExactlyAfterLoading) {
   ParameterGroup unbroken = group(), resumed = group(std::vector<float>(5));
   step(unbroken, {1, 2, 3, 4, 5});
   step(unbroken, {-1, 2, 0, 1, 5});
@@ -52,7 +52,7 @@ TEST_F(Parameters, GoOnAfterLoadingAsIfNothingHadHappened) {
   EXPECT_EQ(device_->read(resumed.counts.all()), std::vector<uint32_t>(5, 3));
 }
 
-TEST_F(Parameters, ForRenderingComeWithoutMoments) {
+TEST_F(Parameters, LoadWithoutMomentsForRendering) {
   ParameterGroup trained = group(), loaded = group(std::vector<float>(5));
   step(trained, {1, 2, 3, 4, 5});
   const Safetensors file = saved(trained, false);
@@ -62,7 +62,7 @@ TEST_F(Parameters, ForRenderingComeWithoutMoments) {
   EXPECT_EQ(device_->read(trained.values.all()), device_->read(loaded.values.all()));
 }
 
-TEST_F(Parameters, OfAnotherSizeAreRefusedByName) {
+TEST_F(Parameters, RejectTensorsOfAnotherSizeByName) {
   ParameterGroup larger = group(std::vector<float>(6));
   try {
     loadGroup(*device_, "model/step-1.safetensors", saved(group(), true), larger);
@@ -74,7 +74,7 @@ TEST_F(Parameters, OfAnotherSizeAreRefusedByName) {
   }
 }
 
-TEST_F(Parameters, ThatLackTheirTensorOrOneOfTheirMomentsAreRefused) {
+TEST_F(Parameters, RejectFilesThatLackTheirTensorOrAMoment) {
   ParameterGroup target = group();
   EXPECT_THROW(loadGroup(*device_, "file", saved(ParameterGroup(*device_, "other", kInitial), true), target), Error);
   TensorSet partial;
@@ -85,7 +85,7 @@ TEST_F(Parameters, ThatLackTheirTensorOrOneOfTheirMomentsAreRefused) {
   EXPECT_THROW(loadGroup(*device_, "file", *file, target), Error);
 }
 
-TEST_F(Parameters, OfAnotherTypeAreRefused) {
+TEST_F(Parameters, RejectTensorsOfAnotherType) {
   TensorSet integers;
   integers.add("group", std::vector<uint32_t>{1, 2, 3, 4, 5});
   const std::optional<Safetensors> file = decodeSafetensors(integers.encode({}));

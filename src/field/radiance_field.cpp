@@ -25,7 +25,7 @@ RadianceFieldShape makeRadianceFieldShape(const HashGridOptions& grid, int width
 }
 
 size_t multiplyAccumulates(const RadianceFieldShape& shape) {
-  return 8 * shape.grid.columns() + multiplyAccumulatesOf(shape.density) + multiplyAccumulatesOf(shape.colour);
+  return 8 * shape.grid.columns() + countMultiplyAccumulates(shape.density) + countMultiplyAccumulates(shape.colour);
 }
 
 RadianceField::RadianceField(Device& device, RadianceFieldShape shape, uint64_t seed)
@@ -44,8 +44,8 @@ void RadianceField::reserve(uint32_t samples) {
   }
   colourInput_ = device_.array<float>(n * shape_.colour.inputs);
   colours_ = device_.array<float>(n * 3);
-  densityActivations_ = device_.activationsOf(shape_.density, n);
-  colourActivations_ = device_.activationsOf(shape_.colour, n);
+  densityActivations_ = device_.allocateActivations(shape_.density, n);
+  colourActivations_ = device_.allocateActivations(shape_.colour, n);
   colourInputGradients_ = device_.array<float>(n * shape_.colour.inputs);
 }
 

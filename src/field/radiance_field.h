@@ -1,6 +1,6 @@
-// Instant-NGP's radiance field (Müller et al. 2022, section 5.4): a hash grid, a density network whose first output is
-// the logarithm of density, and a colour network that sees all its outputs and the view direction in spherical
-// harmonics.
+// The radiance field of Instant-NGP (Müller et al. 2022, section 5.4): a hash grid, a density network whose first
+// output is the logarithm of density, and a colour network whose inputs are all outputs of the density network and the
+// view direction in spherical harmonics.
 #pragma once
 
 #include "compute/hash_grid.h"
@@ -16,33 +16,35 @@ struct RadianceFieldShape {
   int harmonicsDegree = 4;
 };
 
-// Of one sample: entries, and both networks.
+// Returns the multiply-accumulate operations of one sample: hash grid interpolation and both networks.
 size_t multiplyAccumulates(const RadianceFieldShape& shape);
 
 RadianceFieldShape makeRadianceFieldShape(const HashGridOptions& grid, int width, int densityHidden, int colourHidden);
 
 class RadianceField {
  public:
-  // Tables U(±1e-4), networks Xavier uniform on padded sizes; a function of `seed` alone. Keeps a reference to
-  // `device`.
+  // Initialises the table to U(±1e-4) and the networks to Xavier uniform on padded sizes, as a function of `seed`
+  // alone. Keeps a reference to `device`.
   RadianceField(Device& device, RadianceFieldShape shape, uint64_t seed);
 
-  // Room for this many samples in the calls below.
+  // Allocates memory for this many samples in the calls below.
   void reserve(uint32_t samples);
   uint32_t capacity() const { return capacity_; }
 
-  // Density alone, nothing kept for backward. positions [capacity][3] in [0,1]; logDensities 1 column.
+  // Evaluates the density alone, without activations for backward. positions: [capacity][3] in [0,1]; logDensities: 1
+  // column.
   void logDensity(Count samples, Slice<const float> positions, Matrix<float> logDensities);
 
   struct Output {
     Matrix<const float> logDensity;  // 1 column
     Matrix<const float> colours;     // 3 columns
   };
-  // Both networks. `forBackward` keeps activations.
+  // Evaluates both networks; `forBackward` stores the activations. directions: [rays][3]; rayOfSample: [capacity].
+  // The output is valid until the next call.
   Output forward(Count samples, Slice<const float> positions, Slice<const float> directions,
                  Slice<const uint32_t> rayOfSample, bool forBackward);
 
-  // After `forward` with the same samples. Adds to the groups' gradients.
+  // Call it after `forward` with the same samples. Adds to the gradients of the parameter groups.
   void backward(Count samples, Slice<const float> positions, Slice<const float> logDensityGradients,
                 Matrix<const float> colourGradients);
 
@@ -62,7 +64,7 @@ class RadianceField {
   Array<float> colourInput_;                 // [capacity][geometry features + harmonics]
   Array<float> colours_;                     // [capacity][3]
   Array<float> densityActivations_, colourActivations_;
-  Array<float> colourInputGradients_;  // as colourInput_
+  Array<float> colourInputGradients_;  // same shape as colourInput_
 };
 
 }  // namespace tessera

@@ -23,7 +23,7 @@ RadianceFieldShape tinyShape() {
 
 constexpr uint32_t kCapacity = 24, kSamples = 21, kRays = 4;
 
-// A field on a device, samples to look at, and the scalar Σ a · logDensity + Σ b · colour of what it answers.
+// A field on a device, samples, and the scalar Σ a · logDensity + Σ b · colour of its outputs, with random a and b.
 struct Scene {
   std::unique_ptr<Device> device;
   RadianceField field;
@@ -48,12 +48,12 @@ struct Scene {
       const float across = std::sqrt(1 - z * z);
       along.insert(along.end(), {across * std::cos(angle), across * std::sin(angle), z});
     }
-    positions = device->arrayOf(at);
-    directions = device->arrayOf(along);
-    rayOfSample = device->arrayOf(rays);
-    count = device->arrayOf(std::vector<uint32_t>{kSamples});
+    positions = device->uploadArray(at);
+    directions = device->uploadArray(along);
+    rayOfSample = device->uploadArray(rays);
+    count = device->uploadArray(std::vector<uint32_t>{kSamples});
     field.reserve(kCapacity);
-    // Tables begin so near zero that nothing would be seen of them.
+    // The initial table is so close to zero that it would have no visible effect.
     std::vector<float> table = device->read(field.table().values.all());
     for (size_t i = 0; i < table.size(); ++i) table[i] = 2 * random.uniform(1000 + i) - 1;
     device->write(field.table().values.all(), std::span<const float>(table));
@@ -82,26 +82,26 @@ struct Scene {
     return sum;
   }
   void backward() {
-    const Array<float> density = device->arrayOf(densityFactors), colour = device->arrayOf(colourFactors);
+    const Array<float> density = device->uploadArray(densityFactors), colour = device->uploadArray(colourFactors);
     field.backward(samples(), positions, density, Matrix<const float>(colour.all(), 3));
   }
   std::vector<ParameterGroup*> groups() { return {&field.table(), &field.densityNetwork(), &field.colourNetwork()}; }
 };
 
 double largest(const std::vector<float>& values) {
-  double most = 0;
-  for (const float value : values) most = std::max(most, std::abs(double{value}));
-  return most;
+  double maximum = 0;
+  for (const float value : values) maximum = std::max(maximum, std::abs(double{value}));
+  return maximum;
 }
 
 double largestDifference(const std::vector<float>& a, const std::vector<float>& b) {
   EXPECT_EQ(a.size(), b.size());
-  double most = 0;
-  for (size_t i = 0; i < a.size(); ++i) most = std::max(most, std::abs(double{a[i]} - b[i]));
-  return most;
+  double maximum = 0;
+  for (size_t i = 0; i < a.size(); ++i) maximum = std::max(maximum, std::abs(double{a[i]} - b[i]));
+  return maximum;
 }
 
-TEST(RadianceField, GradientsOfAllParametersAgreeWithFiniteDifferences) {
+TEST(RadianceField, HasGradientsThatAgreeWithFiniteDifferences) {
   Scene scene("reference");
   scene.forward();
   scene.backward();
@@ -110,7 +110,7 @@ TEST(RadianceField, GradientsOfAllParametersAgreeWithFiniteDifferences) {
     const std::vector<float> values = scene.device->read(group->values.all());
     const double scale = largest(gradients);
     ASSERT_GT(scale, 1e-3) << group->name;
-    // The largest ones, and some from everywhere.
+    // Tests the 20 largest gradients, and about 20 from the whole range.
     std::vector<size_t> chosen(values.size());
     std::iota(chosen.begin(), chosen.end(), size_t{0});
     std::sort(chosen.begin(), chosen.end(),
@@ -130,7 +130,7 @@ TEST(RadianceField, GradientsOfAllParametersAgreeWithFiniteDifferences) {
   }
 }
 
-TEST(RadianceField, AddsToGradientsThatAreThere) {
+TEST(RadianceField, AccumulatesGradients) {
   Scene scene("reference");
   scene.forward();
   scene.backward();
@@ -144,7 +144,7 @@ TEST(RadianceField, AddsToGradientsThatAreThere) {
   }
 }
 
-TEST(RadianceField, CpuAgreesWithTheReference) {
+TEST(RadianceField, AgreesOnCpuWithTheReference) {
   Scene reference("reference"), cpu("cpu");
   const Scene::Answer expected = reference.forward(), answer = cpu.forward();
   ASSERT_GT(largest(expected.logDensity), 0.1);
@@ -153,13 +153,14 @@ TEST(RadianceField, CpuAgreesWithTheReference) {
   reference.backward();
   cpu.backward();
   for (size_t g = 0; g < reference.groups().size(); ++g) {
-    const std::vector<float> wanted = reference.device->read(reference.groups()[g]->gradients.all());
-    const std::vector<float> found = cpu.device->read(cpu.groups()[g]->gradients.all());
-    EXPECT_LE(largestDifference(wanted, found), 1e-4 * largest(wanted)) << reference.groups()[g]->name;
+    const std::vector<float> expectedGradients = reference.device->read(reference.groups()[g]->gradients.all());
+    const std::vector<float> gradients = cpu.device->read(cpu.groups()[g]->gradients.all());
+    EXPECT_LE(largestDifference(expectedGradients, gradients), 1e-4 * largest(expectedGradients))
+        << reference.groups()[g]->name;
   }
 }
 
-TEST(RadianceField, DensityAloneIsTheDensityOfBothNetworksTogether) {
+TEST(RadianceField, EvaluatesTheSameDensityAloneAndWithColour) {
   Scene scene("cpu");
   const std::vector<float> together = scene.forward().logDensity;
   Array<float> alone = scene.device->array<float>(kCapacity);
@@ -168,7 +169,7 @@ TEST(RadianceField, DensityAloneIsTheDensityOfBothNetworksTogether) {
   for (uint32_t i = 0; i < kSamples; ++i) EXPECT_EQ(values[i], together[i]);
 }
 
-TEST(RadianceField, ColourTurnsWithTheViewAndDensityDoesNot) {
+TEST(RadianceField, DependsOnTheViewInColourButNotInDensity) {
   Scene scene("reference");
   const Scene::Answer before = scene.forward();
   std::vector<float> directions = scene.device->read(scene.directions.all());
@@ -179,7 +180,7 @@ TEST(RadianceField, ColourTurnsWithTheViewAndDensityDoesNot) {
   EXPECT_GT(largestDifference(before.colours, after.colours), 1e-3);
 }
 
-TEST(RadianceField, SamplesBeyondTheCounterTeachNothing) {
+TEST(RadianceField, IgnoresSamplesBeyondTheCounter) {
   Scene one("cpu"), other("cpu");
   std::vector<float> positions = other.device->read(other.positions.all());
   for (size_t i = size_t{kSamples} * 3; i < positions.size(); ++i) positions[i] = 0.25f;
@@ -194,7 +195,7 @@ TEST(RadianceField, SamplesBeyondTheCounterTeachNothing) {
   }
 }
 
-TEST(RadianceField, BeginsWithTheSameParametersForTheSameSeedOnly) {
+TEST(RadianceField, StartsWithTheSameParametersForTheSameSeedOnly) {
   const std::unique_ptr<Device> cpu = makeDevice({"cpu", 2}), reference = makeDevice({"reference", 0});
   RadianceField first(*cpu, tinyShape(), 5), again(*reference, tinyShape(), 5), other(*cpu, tinyShape(), 6);
   const auto groups = [](RadianceField& field) {

@@ -1,4 +1,4 @@
-// One piece of device memory with its own address: kernels reach it by pointer, never through descriptors.
+// A range of device memory with its own address. Kernels access it by pointer, never through descriptors.
 #pragma once
 
 #include <cstddef>
@@ -9,18 +9,19 @@
 
 namespace tessera {
 
-// Contents are undefined at first. Move only. Must not be destroyed while the device works on it (GpuStream::retire).
+// The contents are undefined at first. Move-only. A buffer must not be destroyed while the device uses it; see
+// GpuStream::deferDestroy.
 class GpuBuffer {
  public:
   GpuBuffer() = default;
-  // Throws Error when memory is short.
+  // Throws Error if memory is insufficient.
   GpuBuffer(std::shared_ptr<const GpuContext> context, size_t bytes, BufferUse use = BufferUse::device);
   ~GpuBuffer();
   GpuBuffer(GpuBuffer&& other) noexcept { *this = std::move(other); }
   GpuBuffer& operator=(GpuBuffer&& other) noexcept;
 
   explicit operator bool() const { return piece_.block != nullptr; }
-  // For copies: the buffer that it is a part of, and where it begins there.
+  // The Vulkan buffer that contains this range, and the offset of the range in it in bytes: for copy commands.
   VkBuffer handle() const { return piece_.buffer; }
   size_t offset() const { return piece_.offset; }
   VkDeviceAddress address() const { return piece_.address; }

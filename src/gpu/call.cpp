@@ -16,7 +16,7 @@ struct Meaning {
 
 constexpr Meaning kMeanings[] = {
     {VK_ERROR_INCOMPATIBLE_DRIVER, "no Vulkan driver is installed",
-     "install mesa-vulkan-drivers or the driver of the graphics card, or use --device cpu"},
+     "install mesa-vulkan-drivers or the driver of the GPU, or use --device cpu"},
     {VK_ERROR_INITIALIZATION_FAILED, "the driver could not start", "see what vulkaninfo says, or reinstall the driver"},
     {VK_ERROR_OUT_OF_DEVICE_MEMORY, "out of device memory",
      "train with fewer samples a step or smaller tables, draw with a lower --memory-mib, or use --device cpu"},

@@ -1,14 +1,15 @@
-// Calls to Vulkan: their arguments begin empty, their results are never ignored.
+// Helpers for Vulkan calls: zero-initialised structs, and results that are always checked.
 #pragma once
 
 #include <volk.h>
 
 namespace tessera {
 
-// Throws Error naming `call`, the code, and what a person can do about it. VK_SUCCESS and positive codes pass.
+// Throws Error if `result` is negative. The error names `call`, the code and a remedy. VK_SUCCESS and positive codes
+// are accepted.
 void checkVulkan(VkResult result, const char* call);
 
-// A Vulkan struct that knows its type and has zeros everywhere else.
+// Returns a Vulkan struct with sType set to `type` and all other members zero.
 template <class T>
 T vulkanStruct(VkStructureType type) {
   T empty = {};

@@ -25,17 +25,16 @@ std::string environment(const char* name) {
   return value ? value : "";
 }
 
-// Finds the loader when it is first wanted: a machine without one trains on its processor with the same program.
+// Loads the Vulkan loader at first use: on a machine without one, the same program trains on the CPU.
 void openLoader() {
-  static const VkResult found = volkInitialize();
-  if (found != VK_SUCCESS) {
-    throw Error(
-        "vulkan", "libvulkan.so.1", "no Vulkan loader is installed",
-        "install libvulkan1 and a driver (mesa-vulkan-drivers or that of the graphics card), or use --device cpu");
+  static const VkResult result = volkInitialize();
+  if (result != VK_SUCCESS) {
+    throw Error("vulkan", "libvulkan.so.1", "no Vulkan loader is installed",
+                "install libvulkan1 and a driver (mesa-vulkan-drivers or that of the GPU), or use --device cpu");
   }
 }
 
-// What makes surfaces of windows, as far as it is there: which one is used is known when there is a window.
+// Returns all available surface extensions: which one is needed is only known when a window is opened.
 std::vector<const char*> surfaceExtensions() {
   uint32_t count = 0;
   checkVulkan(vkEnumerateInstanceExtensionProperties(nullptr, &count, nullptr),
@@ -69,13 +68,13 @@ VkInstance makeInstance(bool validation, std::vector<const char*> extensions) {
   return instance;
 }
 
-// Calls are those of one instance that knows all we may ask for and stays open as long as the process: the loader
-// passes them on to whose they are. It keeps drivers loaded, too, which leak when they are unloaded.
+// Loads the Vulkan functions from one instance that has all extensions we may use and lives as long as the process; the
+// loader dispatches calls to the right instance. This also keeps drivers loaded, which leak when they are unloaded.
 void loadCalls() {
   [[maybe_unused]] static const VkInstance first = [] {
-    const VkInstance made = makeInstance(false, surfaceExtensions());
-    volkLoadInstance(made);
-    return made;
+    const VkInstance instance = makeInstance(false, surfaceExtensions());
+    volkLoadInstance(instance);
+    return instance;
   }();
 }
 
@@ -88,12 +87,12 @@ uint64_t largestHeap(const VkPhysicalDeviceMemoryProperties& memory) {
   return bytes;
 }
 
-// Mesa's driver for the processor takes memory for each workgroup and frees it. Where glibc gives it back to the kernel
-// each time, fetching it again takes a third of a training's time.
+// Mesa's driver for the CPU allocates and frees memory for each workgroup. If glibc returns it to the kernel each time,
+// allocating it again takes a third of the training time.
 void keepFreedMemory() {
 #ifdef __GLIBC__
-  constexpr int kMostKept = 64 << 20;  // bytes; as large as the heap of a thread can be
-  mallopt(M_TRIM_THRESHOLD, kMostKept);
+  constexpr int kMaxKept = 64 << 20;  // bytes; the largest possible heap of a thread
+  mallopt(M_TRIM_THRESHOLD, kMaxKept);
 #endif
 }
 
@@ -119,21 +118,21 @@ std::vector<GpuDescription> GpuContext::devices() {
   context.createInstance(false, false);
   std::vector<GpuDescription> all;
   for (const PhysicalDevice& device : physicalDevices(context.instance_)) {
-    GpuDescription made;
-    made.name = device.properties.deviceName;
-    made.driver = device.driver;
-    made.isProcessor = device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
-    made.isDiscrete = device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
-    made.missing = device.missing;
+    GpuDescription description;
+    description.name = device.properties.deviceName;
+    description.driver = device.driver;
+    description.isCpu = device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+    description.isDiscrete = device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+    description.missing = device.missing;
     try {
-      if (made.missing.empty()) made.features = presentFeatures(device.handle);
-    } catch (const Error& error) {  // of this driver alone
-      made.missing = error.reason();
+      if (description.missing.empty()) description.features = presentFeatures(device.handle);
+    } catch (const Error& error) {  // affects this driver only
+      description.missing = error.reason();
     }
     VkPhysicalDeviceMemoryProperties memory = {};
     vkGetPhysicalDeviceMemoryProperties(device.handle, &memory);
-    made.memoryBytes = largestHeap(memory);
-    all.push_back(std::move(made));
+    description.memoryBytes = largestHeap(memory);
+    all.push_back(std::move(description));
   }
   if (all.empty()) checkVulkan(VK_ERROR_INCOMPATIBLE_DRIVER, "vkEnumeratePhysicalDevices");
   return all;
@@ -158,16 +157,16 @@ void GpuContext::createInstance(bool validation, bool presents) {
   if (validation) messenger_ = createValidationMessenger(instance_);
 }
 
-void GpuContext::choosePhysicalDevice(const std::string& wanted) {
+void GpuContext::choosePhysicalDevice(const std::string& requested) {
   const std::vector<PhysicalDevice> devices = physicalDevices(instance_);
   if (devices.empty()) checkVulkan(VK_ERROR_INCOMPATIBLE_DRIVER, "vkEnumeratePhysicalDevices");
 
-  const PhysicalDevice& chosen = tessera::choosePhysicalDevice(devices, wanted);
+  const PhysicalDevice& chosen = tessera::choosePhysicalDevice(devices, requested);
   requireFeatures(chosen);
   physicalDevice_ = chosen.handle;
   limits_ = chosen.properties.limits;
-  isProcessor_ = chosen.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
-  if (isProcessor_) keepFreedMemory();
+  isCpu_ = chosen.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+  if (isCpu_) keepFreedMemory();
   isDiscrete_ = chosen.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
   name_ = fmt::format("{} ({})", chosen.properties.deviceName, chosen.driver);
   target_ = fmt::format("vulkan/{}/{}", chosen.properties.deviceName, chosen.driver);
@@ -245,7 +244,7 @@ void GpuContext::createDevice(bool presents) {
   khrMatrices.cooperativeMatrix = VK_TRUE;
 #endif
   auto vulkan12 = vulkanStruct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
-  vulkan12.vulkanMemoryModel = features_.matrices;  // kernels with such matrices are written for it
+  vulkan12.vulkanMemoryModel = features_.matrices;  // required by kernels with cooperative matrices
   vulkan12.bufferDeviceAddress = VK_TRUE;
   vulkan12.timelineSemaphore = VK_TRUE;
   vulkan12.shaderFloat16 = features_.float16;
@@ -290,18 +289,18 @@ uint64_t GpuContext::memoryBytes() const {
   return largestHeap(memory_);
 }
 
-uint32_t GpuContext::memoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted,
+uint32_t GpuContext::memoryType(uint32_t typeBits, VkMemoryPropertyFlags required,
                                 VkMemoryPropertyFlags preferred) const {
-  for (VkMemoryPropertyFlags flags : {wanted | preferred, wanted}) {
-    if (const std::optional<uint32_t> found = findMemoryType(typeBits, flags)) return *found;
+  for (VkMemoryPropertyFlags flags : {required | preferred, required}) {
+    if (const std::optional<uint32_t> type = findMemoryType(typeBits, flags)) return *type;
   }
-  throw Error(name_, "", "it has no memory of the kind we need", "update the graphics driver");
+  throw Error(name_, "", "it has no memory type with the required properties", "update the graphics driver");
 }
 
-std::optional<uint32_t> GpuContext::findMemoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted) const {
+std::optional<uint32_t> GpuContext::findMemoryType(uint32_t typeBits, VkMemoryPropertyFlags required) const {
   for (uint32_t i = 0; i < memory_.memoryTypeCount; ++i) {
     const bool allowed = (typeBits >> i & 1) != 0;
-    if (allowed && (memory_.memoryTypes[i].propertyFlags & wanted) == wanted) return i;
+    if (allowed && (memory_.memoryTypes[i].propertyFlags & required) == required) return i;
   }
   return std::nullopt;
 }

@@ -1,5 +1,5 @@
-// The one door to Vulkan: instance, physical device, logical device and one queue, shared by compute and render.
-// Needs Vulkan 1.2 with buffer device addresses; everything beyond is a feature that has a fallback.
+// The Vulkan context: instance, physical device, logical device and one queue, shared by compute and rendering. It
+// requires Vulkan 1.2 with buffer device addresses and timeline semaphores; every other feature has a fallback.
 #pragma once
 
 #include <volk.h>
@@ -16,15 +16,15 @@ namespace tessera {
 class GpuHeap;
 class PipelineCache;
 
-// What kernels may use where the device has it. As part of GpuOptions: what they may use at all, so that tests force
-// the fallbacks.
+// The optional features that kernels use if the device supports them. In GpuOptions: the features that kernels are
+// allowed to use, so that tests can force the fallbacks.
 struct GpuFeatures {
-  bool floatAtomics =
-      true;               // 32-bit float atomic add on buffers (VK_EXT_shader_atomic_float); else a compare-swap loop
-  bool float64 = true;    // double arithmetic; else fp32
-  bool float16 = true;    // fp16 arithmetic and 16-bit storage; else fp32
-  bool subgroups = true;  // subgroup arithmetic in compute; else shared memory
-  bool matrices = true;   // GpuMatrices; needs float16
+  // 32-bit float atomic add on buffers (VK_EXT_shader_atomic_float); otherwise a compare-and-swap loop.
+  bool floatAtomics = true;
+  bool float64 = true;    // double arithmetic; otherwise fp32
+  bool float16 = true;    // fp16 arithmetic and 16-bit storage; otherwise fp32
+  bool subgroups = true;  // subgroup arithmetic in compute; otherwise shared memory
+  bool matrices = true;   // see GpuMatrices; requires float16
 };
 struct GpuFeatureName {
   const char* name;
@@ -36,95 +36,99 @@ inline constexpr GpuFeatureName kGpuFeatureNames[] = {{"floatAtomics", &GpuFeatu
                                                       {"subgroups", &GpuFeatures::subgroups},
                                                       {"matrices", &GpuFeatures::matrices}};
 
-// What rasterisation (gpu/render_pass.h) may use where the device has it. Bits of kernels do not depend on it. As part
-// of GpuOptions: what it may use at all, so that tests force the refusals.
+// The optional features that rasterisation (gpu/render_pass.h) uses if the device supports them. The results of kernels
+// do not depend on them. In GpuOptions: the features that rasterisation is allowed to use, so that tests can force the
+// errors.
 struct GpuGraphicsFeatures {
-  bool queue = true;             // the queue draws; else there is no rasterisation
-  bool fragmentStores = true;    // fragment shaders write to buffers
-  bool independentBlend = true;  // colour attachments of one pipeline blend in different ways
+  bool queue = true;             // the queue supports graphics; otherwise there is no rasterisation
+  bool fragmentStores = true;    // fragment shaders can write to buffers
+  bool independentBlend = true;  // colour attachments of one pipeline can have different blend modes
 };
 
-// How a device multiplies matrices by a subgroup together: fp16, rows × depth times depth × columns, summed in float.
+// The cooperative matrices of a device: a subgroup multiplies fp16 matrices of rows × depth and depth × columns and
+// sums the products in float.
 struct GpuMatrices {
-  enum class Kind { none, nv, khr };  // VK_NV_cooperative_matrix; VK_KHR_cooperative_matrix, of builds that know it
+  enum class Kind { none, nv, khr };  // VK_NV_cooperative_matrix; VK_KHR_cooperative_matrix if the build supports it
   Kind kind = Kind::none;
   uint32_t rows = 16, columns = 16, depth = 16;
-  uint32_t subgroupSize = 32;                // that its kernels ask for
-  static constexpr uint32_t kSubgroups = 4;  // of a workgroup of theirs
+  uint32_t subgroupSize = 32;                // required by the kernels that use them
+  static constexpr uint32_t kSubgroups = 4;  // per workgroup of these kernels
 };
 
 struct GpuOptions {
-  // A part of the device's name, any case, or its index. Empty: the environment's TESSERA_GPU, else the best there is
-  // (discrete, integrated, virtual, processor).
+  // A part of the device's name (case-insensitive) or its index. If empty, the environment variable TESSERA_GPU is
+  // used, otherwise the best usable device (in the order discrete GPU, integrated GPU, virtual GPU, CPU).
   std::string device;
-  // Masked further by the environment's TESSERA_GPU_WITHOUT, a list of kGpuFeatureNames.
+  // The environment variable TESSERA_GPU_WITHOUT, a list of kGpuFeatureNames, disables further features.
   GpuFeatures allowed;
   GpuGraphicsFeatures allowedGraphics;
-  // Validation layers, if installed. The environment's TESSERA_VULKAN_VALIDATION=1 turns them on too.
+  // Enables the validation layers if they are installed. The environment variable TESSERA_VULKAN_VALIDATION=1 enables
+  // them too.
   bool validation = false;
-  // For pictures in windows (gpu/presenter.h).
+  // Enables presentation to windows (gpu/presenter.h).
   bool presents = false;
 };
 
-// A device of this machine, used or not.
+// A Vulkan device of this machine.
 struct GpuDescription {
   std::string name, driver;
-  bool isProcessor = false;  // Mesa's lavapipe and the like
-  bool isDiscrete = false;   // a card of its own
-  uint64_t memoryBytes = 0;  // its own, or what it shares with the processor
-  std::string missing;       // why it cannot be used; empty where it can
+  bool isCpu = false;        // a software driver such as Mesa's lavapipe
+  bool isDiscrete = false;   // a discrete GPU
+  uint64_t memoryBytes = 0;  // its dedicated memory, or the memory that it shares with the CPU
+  std::string missing;       // the missing requirement, for example "no Vulkan 1.2"; empty if the device can be used
   GpuFeatures features;
 };
 
 class GpuContext {
  public:
-  // In the order of their indices. Throws Error when there is no loader or no driver.
+  // Returns all devices in the order of their indices. Throws Error if there is no Vulkan loader or no driver.
   static std::vector<GpuDescription> devices();
-  // Throws Error when there is no driver, no such device, or the device lacks what we need.
+  // Throws Error if there is no loader, no driver or no such device, or if the device lacks a required feature.
   static std::shared_ptr<GpuContext> open(const GpuOptions& options = {});
   ~GpuContext();
   GpuContext(const GpuContext&) = delete;
   GpuContext& operator=(const GpuContext&) = delete;
 
   const std::string& name() const { return name_; }      // "NVIDIA GeForce RTX 3060 (driver 535.183)"
-  const std::string& target() const { return target_; }  // what bits depend on: driver, device, features in use
-  bool isProcessor() const { return isProcessor_; }      // Mesa's lavapipe and the like
-  bool isDiscrete() const { return isDiscrete_; }        // a card of its own
-  uint64_t memoryBytes() const;  // its largest heap: its own, or what it shares with the processor
+  const std::string& target() const { return target_; }  // device, driver and features: all that results depend on
+  bool isCpu() const { return isCpu_; }                  // a software driver such as Mesa's lavapipe
+  bool isDiscrete() const { return isDiscrete_; }        // a discrete GPU
+  uint64_t memoryBytes() const;                          // of its largest device-local heap
   const GpuFeatures& features() const { return features_; }
   const GpuGraphicsFeatures& graphics() const { return graphics_; }
-  // Throws Error where the device does not rasterise.
+  // Throws Error if the device does not rasterise.
   void requireGraphics() const;
-  const GpuMatrices& matrices() const { return matrices_; }  // with features().matrices
+  const GpuMatrices& matrices() const { return matrices_; }  // valid if features().matrices
   const VkPhysicalDeviceLimits& limits() const { return limits_; }
 
   VkInstance instance() const { return instance_; }
   VkPhysicalDevice physicalDevice() const { return physicalDevice_; }
   VkDevice device() const { return device_; }
-  VkQueue queue() const { return queue_; }  // compute and transfer, and graphics where the device draws at all
+  VkQueue queue() const { return queue_; }  // compute, transfer and, if graphics().queue, graphics
   uint32_t queueFamily() const { return queueFamily_; }
-  void waitIdle() const { vkDeviceWaitIdle(device_); }       // for destructors: whatever went wrong, it is over
-  uint32_t timestampBits() const { return timestampBits_; }  // of the queue's clock; 0: it has none
+  void waitIdle() const { vkDeviceWaitIdle(device_); }       // for destructors: ignores errors
+  uint32_t timestampBits() const { return timestampBits_; }  // valid bits of the queue's timestamps; 0: not supported
 
   GpuHeap& heap() const { return *heap_; }
-  // Another number at each call. Drivers reuse the handles of objects that are gone; these tell such objects apart.
+  // Returns a new number at each call. Drivers reuse the handles of destroyed objects; serial numbers tell them apart.
   uint64_t nextSerial() const { return ++serial_; }
   const PipelineCache& pipelines() const { return *pipelines_; }
 
-  // The first memory type among `typeBits` that has all `wanted` properties, those with `preferred` first.
-  uint32_t memoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted, VkMemoryPropertyFlags preferred) const;
-  std::optional<uint32_t> findMemoryType(uint32_t typeBits, VkMemoryPropertyFlags wanted) const;
-  uint32_t typesOfSameHeap(uint32_t type) const;                     // as bits, itself among them
-  uint64_t largestAllocation() const { return largestAllocation_; }  // bytes at once that the driver promises
+  // Returns the first memory type among `typeBits` that has all `required` properties; types that also have the
+  // `preferred` ones come first. Throws Error if there is none.
+  uint32_t memoryType(uint32_t typeBits, VkMemoryPropertyFlags required, VkMemoryPropertyFlags preferred) const;
+  std::optional<uint32_t> findMemoryType(uint32_t typeBits, VkMemoryPropertyFlags required) const;
+  uint32_t typesOfSameHeap(uint32_t type) const;                     // as bits, including `type`
+  uint64_t largestAllocation() const { return largestAllocation_; }  // maxMemoryAllocationSize, bytes
 
-  // Mistakes that the validation layers reported so far in this process, warnings too.
+  // Returns the number of errors and warnings that the validation layers have reported so far in this process.
   static int validationMessages();
   bool validates() const { return messenger_ != VK_NULL_HANDLE; }
 
  private:
   GpuContext() = default;
   void createInstance(bool validation, bool presents);
-  void choosePhysicalDevice(const std::string& wanted);
+  void choosePhysicalDevice(const std::string& requested);
   void chooseQueueFamily();
   void chooseFeatures(const GpuFeatures& allowed);
   void chooseGraphicsFeatures(const GpuGraphicsFeatures& allowed);
@@ -139,7 +143,7 @@ class GpuContext {
   VkPhysicalDeviceLimits limits_ = {};
   VkPhysicalDeviceMemoryProperties memory_ = {};
   uint64_t largestAllocation_ = 0;
-  bool isProcessor_ = false, isDiscrete_ = false;
+  bool isCpu_ = false, isDiscrete_ = false;
   GpuFeatures features_;
   GpuGraphicsFeatures graphics_;
   mutable std::atomic<uint64_t> serial_ = 0;

@@ -11,7 +11,7 @@
 namespace tessera {
 namespace {
 
-// Sets an environment variable for as long as it lives.
+// Sets an environment variable during its lifetime.
 class Environment {
  public:
   Environment(const char* name, const char* value) : name_(name) {
@@ -26,11 +26,11 @@ class Environment {
 };
 
 PhysicalDevice device(const char* name, VkPhysicalDeviceType type) {
-  PhysicalDevice made;
-  std::snprintf(made.properties.deviceName, sizeof made.properties.deviceName, "%s", name);
-  made.properties.deviceType = type;
-  made.properties.apiVersion = VK_API_VERSION_1_2;
-  return made;
+  PhysicalDevice physicalDevice;
+  std::snprintf(physicalDevice.properties.deviceName, sizeof physicalDevice.properties.deviceName, "%s", name);
+  physicalDevice.properties.deviceType = type;
+  physicalDevice.properties.apiVersion = VK_API_VERSION_1_2;
+  return physicalDevice;
 }
 
 const std::vector<PhysicalDevice> kDevices = {device("llvmpipe", VK_PHYSICAL_DEVICE_TYPE_CPU),
@@ -38,37 +38,37 @@ const std::vector<PhysicalDevice> kDevices = {device("llvmpipe", VK_PHYSICAL_DEV
                                               device("NVIDIA RTX", VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU),
                                               device("AMD Radeon", VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU)};
 
-std::string nameOf(const PhysicalDevice& chosen) {
+std::string physicalDeviceName(const PhysicalDevice& chosen) {
   return chosen.properties.deviceName;
 }
 
-TEST(PhysicalDevice, IsTheFirstDiscreteOneWhenNobodyAsks) {
-  EXPECT_EQ(nameOf(choosePhysicalDevice(kDevices, "")), "NVIDIA RTX");
+TEST(PhysicalDevice, IsTheFirstDiscreteGpuByDefault) {
+  EXPECT_EQ(physicalDeviceName(choosePhysicalDevice(kDevices, "")), "NVIDIA RTX");
 }
 
-TEST(PhysicalDevice, FallsBackToTheProcessor) {
-  EXPECT_EQ(nameOf(choosePhysicalDevice({kDevices[0]}, "")), "llvmpipe");
+TEST(PhysicalDevice, FallsBackToTheCpu) {
+  EXPECT_EQ(physicalDeviceName(choosePhysicalDevice({kDevices[0]}, "")), "llvmpipe");
 }
 
 TEST(PhysicalDevice, IsFoundByPartOfItsNameOrItsIndex) {
-  EXPECT_EQ(nameOf(choosePhysicalDevice(kDevices, "radeon")), "AMD Radeon");
-  EXPECT_EQ(nameOf(choosePhysicalDevice(kDevices, "1")), "Intel Arc");
+  EXPECT_EQ(physicalDeviceName(choosePhysicalDevice(kDevices, "radeon")), "AMD Radeon");
+  EXPECT_EQ(physicalDeviceName(choosePhysicalDevice(kDevices, "1")), "Intel Arc");
 }
 
-TEST(PhysicalDevice, IsTheOneOfAnIndexWhateverNumbersNamesHold) {
-  const std::vector<PhysicalDevice> cards = {device("H100", VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU),
-                                             device("H101", VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU)};
-  EXPECT_EQ(nameOf(choosePhysicalDevice(cards, "1")), "H101");
-  EXPECT_THROW(choosePhysicalDevice(cards, "2"), Error);
+TEST(PhysicalDevice, IsFoundByIndexEvenIfNamesContainNumbers) {
+  const std::vector<PhysicalDevice> gpus = {device("H100", VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU),
+                                            device("H101", VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU)};
+  EXPECT_EQ(physicalDeviceName(choosePhysicalDevice(gpus, "1")), "H101");
+  EXPECT_THROW(choosePhysicalDevice(gpus, "2"), Error);
 }
 
-TEST(PhysicalDevice, IsNoneThatCannotBeUsedWhereAnotherCan) {
-  std::vector<PhysicalDevice> cards = kDevices;
-  cards[2].missing = cards[3].missing = "no Vulkan 1.2";
-  EXPECT_EQ(nameOf(choosePhysicalDevice(cards, "")), "Intel Arc");
+TEST(PhysicalDevice, IsAUsableOneIfThereIsAny) {
+  std::vector<PhysicalDevice> gpus = kDevices;
+  gpus[2].missing = gpus[3].missing = "no Vulkan 1.2";
+  EXPECT_EQ(physicalDeviceName(choosePhysicalDevice(gpus, "")), "Intel Arc");
 }
 
-TEST(PhysicalDevice, ThatIsNotThereIsAnErrorThatListsThoseThatAre) {
+TEST(PhysicalDevice, ListsTheAvailableDevicesIfTheRequestedOneIsMissing) {
   try {
     choosePhysicalDevice(kDevices, "voodoo");
     FAIL() << "nothing was thrown";
@@ -77,7 +77,7 @@ TEST(PhysicalDevice, ThatIsNotThereIsAnErrorThatListsThoseThatAre) {
   }
 }
 
-TEST(PhysicalDevice, WithAnOldDriverIsRefused) {
+TEST(PhysicalDevice, IsRejectedIfItsDriverIsTooOld) {
   PhysicalDevice old = kDevices[2];
   old.properties.apiVersion = VK_API_VERSION_1_1;
   EXPECT_THROW(requireFeatures(old), Error);
@@ -92,7 +92,7 @@ TEST(GpuContext, OpensTheBestDevice) {
 }
 
 TEST(GpuContext, ValidatesWhereTheEnvironmentAsksForIt) {
-  const Environment wanted("TESSERA_VULKAN_VALIDATION", "1");
+  const Environment validation("TESSERA_VULKAN_VALIDATION", "1");
   const auto context = openForTest();
   SKIP_WITHOUT_VULKAN(context);
   if (!context->validates() && !vulkanIsRequired())
@@ -122,7 +122,7 @@ TEST(GpuContext, LeavesOutFeaturesThatAreNotAllowed) {
   EXPECT_FALSE(context->features().matrices);
 }
 
-TEST(GpuContext, MultipliesNoMatricesOfHalvesWithoutHalves) {
+TEST(GpuContext, DisablesMatricesWithoutFloat16) {
   GpuOptions options;
   options.allowed.float16 = false;
   const auto context = openForTest(options);
@@ -149,10 +149,10 @@ TEST(GpuContext, SaysWhatToInstallWithoutADriver) {
   }
 }
 
-TEST(GpuContext, RefusesADeviceThatIsNotThere) {
+TEST(GpuContext, RejectsAMissingDevice) {
   SKIP_WITHOUT_VULKAN(openForTest());
   GpuOptions options;
-  options.device = "no such card";
+  options.device = "no such device";
   EXPECT_THROW(GpuContext::open(options), Error);
 }
 

@@ -6,10 +6,10 @@ namespace tessera {
 
 std::optional<size_t> FreeRanges::take(size_t bytes) {
   for (auto range = free_.begin(); range != free_.end(); ++range) {
-    const auto [offset, room] = *range;
-    if (room < bytes) continue;
+    const auto [offset, capacity] = *range;
+    if (capacity < bytes) continue;
     free_.erase(range);
-    if (room > bytes) free_[offset + bytes] = room - bytes;
+    if (capacity > bytes) free_[offset + bytes] = capacity - bytes;
     return offset;
   }
   return std::nullopt;

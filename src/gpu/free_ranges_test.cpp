@@ -9,7 +9,7 @@
 namespace tessera {
 namespace {
 
-TEST(FreeRanges, GiveOutTheFirstPlaceWithRoom) {
+TEST(FreeRanges, AllocateTheFirstRangeThatFits) {
   FreeRanges ranges(100);
   EXPECT_EQ(ranges.take(40), 0u);
   EXPECT_EQ(ranges.take(40), 40u);
@@ -20,7 +20,7 @@ TEST(FreeRanges, GiveOutTheFirstPlaceWithRoom) {
   EXPECT_EQ(ranges.take(20), 80u);
 }
 
-TEST(FreeRanges, JoinWhatTouches) {
+TEST(FreeRanges, MergeAdjacentRanges) {
   FreeRanges ranges(90);
   for (int i = 0; i < 3; ++i) ranges.take(30);
   ranges.giveBack(0, 30);
@@ -32,7 +32,7 @@ TEST(FreeRanges, JoinWhatTouches) {
   EXPECT_EQ(ranges.take(90), 0u);
 }
 
-TEST(FreeRanges, NeverGiveAPlaceTwiceAndEndWhole) {
+TEST(FreeRanges, NeverOverlapAndMergeCompletely) {
   constexpr size_t kSize = 1000;
   FreeRanges ranges(kSize);
   const RandomStream random(1, 1);

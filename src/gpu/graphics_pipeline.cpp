@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* kOtherDevice = "choose another device (tessera info devices)";
 
-// Pipelines need these only while they are made.
+// A shader module, which is needed only while a pipeline is created.
 class ShaderModule {
  public:
   ShaderModule(VkDevice device, std::span<const uint32_t> spirv) : device_(device) {
@@ -61,7 +61,7 @@ VkPipelineColorBlendAttachmentState blendState(Blend blend) {
   return state;
 }
 
-// All fixed state, with pointers among its parts: it stays where it is.
+// The fixed-function state. Its members point at each other, so it must not be moved.
 struct FixedState {
   explicit FixedState(const GraphicsPipelineOptions& options) {
     assembly.topology = options.topology;
@@ -173,8 +173,8 @@ void GpuGraphicsPipeline::requireSupport(const GraphicsPipelineOptions& options)
     VkFormatProperties properties = {};
     vkGetPhysicalDeviceFormatProperties(context_->physicalDevice(), vulkanFormat(colour.format), &properties);
     if (!(properties.optimalTilingFeatures & VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT)) {
-      throw Error(context_->name(), "", fmt::format("it does not blend images of the format {}", nameOf(colour.format)),
-                  kOtherDevice);
+      throw Error(context_->name(), "",
+                  fmt::format("it does not blend images of the format {}", formatName(colour.format)), kOtherDevice);
     }
   }
   const auto differs = [&](const ColourOutput& colour) { return colour.blend != options.colours[0].blend; };

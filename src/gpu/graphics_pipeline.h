@@ -1,9 +1,9 @@
-// A vertex and a fragment shader that draw triangles off the screen, in render passes of certain formats
-// (gpu/render_pass.h). Nothing is bound: like kernels they take one push constant, the address of their arguments, and
-// fetch vertices, indices and all else by address.
+// A vertex and a fragment shader that draw triangles off-screen, in render passes with given attachment formats
+// (gpu/render_pass.h). There are no descriptors or vertex bindings: like kernels, the shaders take one push constant,
+// the address of their arguments, and fetch vertices, indices and all other data by address.
 //
-// A fragment shader that is to know its triangle gets gl_VertexIndex / 3 as a flat output of the vertex shader:
-// gl_PrimitiveID would ask for geometry shaders, which not all devices have.
+// A fragment shader that needs the index of its triangle receives gl_VertexIndex / 3 as a flat output of the vertex
+// shader: gl_PrimitiveID requires the geometry shader feature, which not all devices have.
 #pragma once
 
 #include <volk.h>
@@ -20,32 +20,32 @@
 namespace tessera {
 
 enum class Blend {
-  none,               // what is drawn replaces what was there
+  none,               // the source replaces the destination
   premultipliedOver,  // source + (1 - source alpha) * destination
   add,                // source + destination
 };
 
 struct ColourOutput {
   ImageFormat format = ImageFormat::rgba8;
-  Blend blend = Blend::none;  // none for integers
+  Blend blend = Blend::none;  // must be none for integer formats
 };
 
 struct GraphicsPipelineOptions {
   std::vector<ColourOutput> colours;              // by location of the fragment shader's outputs
-  std::optional<ImageFormat> depth;               // without one there is no depth test
-  bool depthTest = true, depthWrite = true;       // where there is depth; nothing is written without the test
-  VkCompareOp depthCompare = VK_COMPARE_OP_LESS;  // nearer is less, as passes that clear to 1 want it
+  std::optional<ImageFormat> depth;               // if empty, there is no depth test
+  bool depthTest = true, depthWrite = true;       // apply if `depth` is set; depth is not written without the test
+  VkCompareOp depthCompare = VK_COMPARE_OP_LESS;  // less is nearer: for passes that clear depth to 1
   VkCullModeFlags cull = VK_CULL_MODE_NONE;
-  VkFrontFace frontFace = VK_FRONT_FACE_COUNTER_CLOCKWISE;             // as seen in the picture, y downwards
-  VkPrimitiveTopology topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST;  // or another kind of triangles
+  VkFrontFace frontFace = VK_FRONT_FACE_COUNTER_CLOCKWISE;             // as seen in the image, y downwards
+  VkPrimitiveTopology topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST;  // or another triangle topology
   std::vector<uint32_t> constants;  // specialization constants 0, 1, 2, ... of both shaders
   bool fragmentStores = false;      // the fragment shader writes to buffers
 };
 
 class GpuGraphicsPipeline {
  public:
-  // Throws Error where the device does not rasterise, cannot blend so, lets no fragment shader write to buffers, or
-  // refuses the shaders (KernelRefused).
+  // Throws Error if the device does not rasterise, does not support the blend modes, or does not support writes from
+  // fragment shaders although options.fragmentStores is set; throws KernelRefused if the driver rejects the shaders.
   GpuGraphicsPipeline(std::shared_ptr<const GpuContext> context, std::span<const uint32_t> vertexSpirv,
                       std::span<const uint32_t> fragmentSpirv, const GraphicsPipelineOptions& options);
   ~GpuGraphicsPipeline();
@@ -68,19 +68,19 @@ class GpuGraphicsPipeline {
   VkPipeline pipeline_ = VK_NULL_HANDLE;
 };
 
-// How much is drawn: numbers, or what stands in the device's memory when the draw's turn has come.
+// The number of vertices and instances of a draw: given directly, or read from device memory when the draw is executed.
 struct DrawCount {
   uint32_t vertices = 0, instances = 1;  // gl_VertexIndex and gl_InstanceIndex count from 0
-  VkBuffer buffer = VK_NULL_HANDLE;      // where set: read at `offset` of it
+  VkBuffer buffer = VK_NULL_HANDLE;      // if set, the counts are read from it at `offset`
   VkDeviceSize offset = 0;
 
-  // Four words: vertices, instances, the first gl_VertexIndex, and 0. `offset` is a multiple of 4.
+  // Reads four words at `offset`, a multiple of 4: vertices, instances, the first gl_VertexIndex, and 0.
   static DrawCount counted(const GpuBuffer& words, size_t offset);
   bool operator==(const DrawCount&) const = default;
 };
 
 struct DrawCall {
-  const GpuGraphicsPipeline* pipeline = nullptr;  // stays until the stream goes: what was recorded names it
+  const GpuGraphicsPipeline* pipeline = nullptr;  // must outlive the stream, whose recorded commands refer to it
   std::span<const std::byte> arguments;           // copied
   DrawCount count;
 };

@@ -19,10 +19,10 @@ namespace {
 constexpr VkMemoryPropertyFlags kHost = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
 
 struct Kind {
-  VkMemoryPropertyFlags wanted, preferred;
+  VkMemoryPropertyFlags required, preferred;
 };
 
-Kind kindOf(BufferUse use) {
+Kind memoryKind(BufferUse use) {
   switch (use) {
     case BufferUse::upload:
       return {kHost, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT};
@@ -33,22 +33,22 @@ Kind kindOf(BufferUse use) {
   }
 }
 
-size_t indexOf(BufferUse use) {
+size_t bufferUseIndex(BufferUse use) {
   return static_cast<size_t>(use);
 }
-constexpr size_t kImages = 3;  // the index of their blocks
+constexpr size_t kImages = 3;  // the index of the list of image blocks
 
 size_t roundedUp(size_t bytes, size_t alignment) {
   return (bytes + alignment - 1) / alignment * alignment;
 }
 
-// What was asked for, for people.
-std::string wantedBytes(size_t bytes, size_t inUse, const GpuContext& context) {
-  std::string wanted = fmt::format("{} MiB more, with {} MiB in use", bytes >> 20, inUse >> 20);
-  if (bytes > context.largestAllocation()) {  // drivers may give more than they promise
-    wanted += fmt::format("; the driver promises {} MiB at once", context.largestAllocation() >> 20);
+// Describes a request for error messages.
+std::string describeRequest(size_t bytes, size_t inUse, const GpuContext& context) {
+  std::string description = fmt::format("{} MiB more, with {} MiB in use", bytes >> 20, inUse >> 20);
+  if (bytes > context.largestAllocation()) {  // drivers may allocate more than they guarantee
+    description += fmt::format("; the driver guarantees {} MiB per allocation", context.largestAllocation() >> 20);
   }
-  return wanted;
+  return description;
 }
 
 }  // namespace
@@ -65,9 +65,9 @@ struct GpuHeap::Block {
 
   VkDevice device;
   size_t bytes;
-  size_t list;  // the index of the list of blocks that it stands in
+  size_t list;  // the index of its list in GpuHeap::blocks_
   FreeRanges free;
-  bool shared = false;  // by several pieces
+  bool shared = false;  // can hold several pieces
   uint32_t memoryType = 0;
   VkBuffer buffer = VK_NULL_HANDLE;
   VkDeviceMemory memory = VK_NULL_HANDLE;
@@ -82,31 +82,31 @@ void GpuHeap::allocateMemory(Block& block, const VkMemoryRequirements& needs, Bu
   auto allocation = vulkanStruct<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
   allocation.pNext = next;
   allocation.allocationSize = needs.size;
-  const Kind kind = kindOf(use);
-  allocation.memoryTypeIndex = context_.memoryType(needs.memoryTypeBits, kind.wanted, kind.preferred);
+  const Kind kind = memoryKind(use);
+  allocation.memoryTypeIndex = context_.memoryType(needs.memoryTypeBits, kind.required, kind.preferred);
   VkResult result = vkAllocateMemory(block.device, &allocation, nullptr, &block.memory);
-  // What the host writes may lie with the host. What kernels of a card work on may not: many times slower, and nobody
-  // would know why.
+  // Upload and download buffers may fall back to host memory. Buffers of a discrete GPU's kernels may not: they would
+  // be many times slower for no visible reason.
   const bool mayLieElsewhere = use != BufferUse::device || !context_.isDiscrete();
   const uint32_t others = needs.memoryTypeBits & ~context_.typesOfSameHeap(allocation.memoryTypeIndex);
-  const std::optional<uint32_t> elsewhere = context_.findMemoryType(others, kind.wanted);
+  const std::optional<uint32_t> elsewhere = context_.findMemoryType(others, kind.required);
   if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY && mayLieElsewhere && elsewhere) {
     allocation.memoryTypeIndex = *elsewhere;
     result = vkAllocateMemory(block.device, &allocation, nullptr, &block.memory);
   }
-  checkVulkan(result, wantedBytes(block.bytes, inUse_, context_).c_str());
+  checkVulkan(result, describeRequest(block.bytes, inUse_, context_).c_str());
   block.memoryType = allocation.memoryTypeIndex;
 }
 
 std::unique_ptr<GpuHeap::Block> GpuHeap::makeBufferBlock(size_t bytes, BufferUse use) const {
   const VkDevice device = context_.device();
-  auto block = std::make_unique<Block>(device, bytes, indexOf(use));
+  auto block = std::make_unique<Block>(device, bytes, bufferUseIndex(use));
   auto info = vulkanStruct<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
   info.size = bytes;
   info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT |
                VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
                VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT;
-  checkVulkan(vkCreateBuffer(device, &info, nullptr, &block->buffer), wantedBytes(bytes, inUse_, context_).c_str());
+  checkVulkan(vkCreateBuffer(device, &info, nullptr, &block->buffer), describeRequest(bytes, inUse_, context_).c_str());
 
   VkMemoryRequirements needs = {};
   vkGetBufferMemoryRequirements(device, block->buffer, &needs);
@@ -134,7 +134,7 @@ std::unique_ptr<GpuHeap::Block> GpuHeap::makeImageBlock(const VkMemoryRequiremen
 GpuHeap::Piece GpuHeap::allocate(size_t bytes, BufferUse use) {
   CHECK(bytes > 0u);
   const std::lock_guard lock(mutex_);
-  return take(blocks_[indexOf(use)], {roundedUp(bytes, kAlignment)},
+  return take(blocks_[bufferUseIndex(use)], {roundedUp(bytes, kAlignment)},
               [&](size_t blockBytes) { return makeBufferBlock(blockBytes, use); });
 }
 
@@ -142,7 +142,8 @@ GpuHeap::Piece GpuHeap::allocateImage(VkImage image) {
   VkMemoryRequirements needs = {};
   vkGetImageMemoryRequirements(context_.device(), image, &needs);
   const std::lock_guard lock(mutex_);
-  // Pieces of multiples of kImageAlignment are aligned to it. An image that needs more has a block of its own.
+  // Pieces whose sizes are multiples of kImageAlignment are aligned to it. An image with a larger alignment gets its
+  // own block.
   const Request request = {roundedUp(needs.size, kImageAlignment), needs.memoryTypeBits,
                            needs.alignment <= kImageAlignment};
   return take(blocks_[kImages], request, [&](size_t blockBytes) {
@@ -152,29 +153,29 @@ GpuHeap::Piece GpuHeap::allocateImage(VkImage image) {
 }
 
 GpuHeap::Piece GpuHeap::take(Blocks& blocks, const Request& request, const MakeBlock& make) {
-  const size_t room = request.room;
-  const bool shared = request.mayShare && room <= kBlockBytes / 2;
+  const size_t capacity = request.capacity;
+  const bool shared = request.mayShare && capacity <= kBlockBytes / 2;
   Block* chosen = nullptr;
   std::optional<size_t> offset;
   for (size_t i = 0; shared && i < blocks.size() && !offset; ++i) {
     if (!blocks[i]->shared || (request.typeBits >> blocks[i]->memoryType & 1) == 0) continue;
     chosen = blocks[i].get();
-    offset = chosen->free.take(room);
+    offset = chosen->free.take(capacity);
   }
   if (!offset) {
-    blocks.push_back(make(shared ? kBlockBytes : room));
+    blocks.push_back(make(shared ? kBlockBytes : capacity));
     chosen = blocks.back().get();
     chosen->shared = shared;
-    offset = chosen->free.take(room);
+    offset = chosen->free.take(capacity);
   }
-  inUse_ += room;
+  inUse_ += capacity;
   Piece piece;
   piece.block = chosen;
   piece.buffer = chosen->buffer;
   piece.offset = *offset;
   piece.address = chosen->buffer ? chosen->address + *offset : 0;
   piece.mapped = chosen->mapped ? chosen->mapped + *offset : nullptr;
-  piece.room = room;
+  piece.capacity = capacity;
   piece.memory = chosen->memory;
   return piece;
 }
@@ -182,10 +183,10 @@ GpuHeap::Piece GpuHeap::take(Blocks& blocks, const Request& request, const MakeB
 void GpuHeap::free(const Piece& piece) {
   const std::lock_guard lock(mutex_);
   Block& block = *piece.block;
-  block.free.giveBack(piece.offset, piece.room);
-  inUse_ -= piece.room;
+  block.free.giveBack(piece.offset, piece.capacity);
+  inUse_ -= piece.capacity;
   if (!block.free.allFree()) return;
-  // One empty block of a kind waits for the next piece.
+  // One empty block of each kind is kept for the next piece.
   auto& blocks = blocks_[block.list];
   const auto isAlike = [&](const Block& other) {
     return block.list != kImages || other.memoryType == block.memoryType;

@@ -1,6 +1,6 @@
-// Device memory, taken in large blocks and given out in pieces: drivers allow a few thousand allocations in all, and
-// each is a call to the kernel. Images have blocks apart from those of buffers (bufferImageGranularity). For several
-// threads.
+// The device memory allocator. It allocates large blocks and suballocates them: drivers allow only a few thousand
+// allocations in total, and each is a system call. Images and buffers have separate blocks (bufferImageGranularity).
+// Thread-safe.
 #pragma once
 
 #include <volk.h>
@@ -17,14 +17,14 @@ namespace tessera {
 class GpuContext;
 
 enum class BufferUse {
-  device,    // the device's own memory; the host reaches it by copies only
-  upload,    // the host writes, the device reads: mapped, device memory too where the host can reach that
-  download,  // the device writes, the host reads: mapped, cached where possible
+  device,    // device-local memory; the host accesses it by copies only
+  upload,    // the host writes, the device reads: mapped, and device-local if the host can map that
+  download,  // the device writes, the host reads: mapped, cached if possible
 };
 
 class GpuHeap {
  public:
-  // `context` owns the heap and is there for longer.
+  // `context` owns the heap and outlives it.
   explicit GpuHeap(const GpuContext& context);
   ~GpuHeap();
   GpuHeap(const GpuHeap&) = delete;
@@ -33,22 +33,22 @@ class GpuHeap {
   struct Block;
   struct Piece {
     Block* block = nullptr;
-    VkBuffer buffer = VK_NULL_HANDLE;        // of the whole block; none for images
-    size_t offset = 0;                       // in it, and in its memory
+    VkBuffer buffer = VK_NULL_HANDLE;        // of the whole block; null for images
+    size_t offset = 0;                       // in the block's buffer and memory, bytes
     VkDeviceAddress address = 0;             // of the piece; 0 for images
-    std::byte* mapped = nullptr;             // likewise; null for BufferUse::device and for images
-    size_t room = 0;                         // of the piece, at least what was asked for
+    std::byte* mapped = nullptr;             // of the piece; null for BufferUse::device and for images
+    size_t capacity = 0;                     // of the piece in bytes, at least the requested size
     VkDeviceMemory memory = VK_NULL_HANDLE;  // of the whole block
   };
-  // Throws Error when memory is short, saying how much is in use.
+  // Throws Error if memory is insufficient; the error states how much is in use.
   Piece allocate(size_t bytes, BufferUse use);
-  // The device's own memory for an image that is not bound to any yet. Throws Error likewise.
+  // Allocates device-local memory for an image that is not bound yet. Throws Error if memory is insufficient.
   Piece allocateImage(VkImage image);
   void free(const Piece& piece);
 
   size_t bytesInUse() const;  // by buffers and images
   size_t blockCount() const;
-  // Rises whenever a block is given back to the driver: handles may then mean something else.
+  // Increases whenever a block is freed: the driver may then reuse its handles.
   uint64_t generation() const;
 
  private:
@@ -62,16 +62,16 @@ class GpuHeap {
   using Blocks = std::vector<std::unique_ptr<Block>>;
   using MakeBlock = std::function<std::unique_ptr<Block>(size_t bytes)>;
   struct Request {
-    size_t room;              // bytes
-    uint32_t typeBits = ~0u;  // the memory types that serve
-    bool mayShare = true;     // a block with others
+    size_t capacity;          // bytes
+    uint32_t typeBits = ~0u;  // the acceptable memory types
+    bool mayShare = true;     // a block with other pieces
   };
-  // A piece of one of the blocks, else of one more that `make` makes.
+  // Returns a piece of one of the blocks, or of a new block, which `make` creates, if none has enough space.
   Piece take(Blocks& blocks, const Request& request, const MakeBlock& make);
 
   const GpuContext& context_;
   mutable std::mutex mutex_;
-  std::array<Blocks, 4> blocks_;  // of buffers by use, then of images
+  std::array<Blocks, 4> blocks_;  // of buffers by use (BufferUse), then of images
   size_t inUse_ = 0;
   uint64_t generation_ = 1;
 };

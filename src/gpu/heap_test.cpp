@@ -26,14 +26,14 @@ TEST_F(GpuHeapTest, TakesOneBlockForManySmallBuffers) {
   for (size_t i = 1; i < buffers.size(); ++i) EXPECT_NE(buffers[i].address(), buffers[i - 1].address());
 }
 
-TEST_F(GpuHeapTest, GivesLargeBuffersABlockOfTheirOwnAndTakesItBack) {
+TEST_F(GpuHeapTest, GivesLargeBuffersTheirOwnBlockAndFreesIt) {
   const uint64_t generation = context_->heap().generation();
   {
     const GpuBuffer large(context_, size_t{40} << 20), small(context_, 4);
     EXPECT_EQ(large.offset(), 0u);
     EXPECT_EQ(context_->heap().blockCount(), 2u);
   }
-  EXPECT_EQ(context_->heap().blockCount(), 1u);  // the shared one waits for the next buffer
+  EXPECT_EQ(context_->heap().blockCount(), 1u);  // the shared one is kept for the next buffer
   EXPECT_EQ(context_->heap().bytesInUse(), 0u);
   EXPECT_GT(context_->heap().generation(), generation);
 }
@@ -44,7 +44,7 @@ TEST_F(GpuHeapTest, AlignsEveryBuffer) {
   EXPECT_EQ(second.address() % 256, 0u);
 }
 
-TEST_F(GpuHeapTest, SaysHowMuchIsInUseWhereMemoryIsShort) {
+TEST_F(GpuHeapTest, ReportsTheMemoryInUseIfAllocationFails) {
   const GpuBuffer some(context_, size_t{3} << 20);
   try {
     const GpuBuffer impossible(context_, size_t{1} << 46);

@@ -27,7 +27,7 @@ constexpr FormatDescription kFormats[] = {
     {ImageFormat::depth32Float, VK_FORMAT_D32_SFLOAT, "depth32-float", 4},
 };
 
-const FormatDescription& descriptionOf(ImageFormat format) {
+const FormatDescription& describeFormat(ImageFormat format) {
   const FormatDescription& description = kFormats[static_cast<size_t>(format)];
   CHECK((description.format == format));
   return description;
@@ -36,15 +36,15 @@ const FormatDescription& descriptionOf(ImageFormat format) {
 }  // namespace
 
 VkFormat vulkanFormat(ImageFormat format) {
-  return descriptionOf(format).vulkan;
+  return describeFormat(format).vulkan;
 }
 
-const char* nameOf(ImageFormat format) {
-  return descriptionOf(format).name;
+const char* formatName(ImageFormat format) {
+  return describeFormat(format).name;
 }
 
 uint32_t bytesPerPixel(ImageFormat format) {
-  return descriptionOf(format).bytes;
+  return describeFormat(format).bytes;
 }
 
 GpuImage::GpuImage(std::shared_ptr<const GpuContext> context, ImageSize size, ImageFormat format)
@@ -89,15 +89,15 @@ void GpuImage::requireSupport(const VkImageCreateInfo& info) const {
   const VkResult result = vkGetPhysicalDeviceImageFormatProperties(
       context_->physicalDevice(), info.format, info.imageType, info.tiling, info.usage, info.flags, &properties);
   if (result == VK_ERROR_FORMAT_NOT_SUPPORTED) {
-    throw Error(context_->name(), "", fmt::format("it does not draw into images of the format {}", nameOf(format_)),
+    throw Error(context_->name(), "", fmt::format("it does not draw into images of the format {}", formatName(format_)),
                 "choose another device (tessera info devices)");
   }
   checkVulkan(result, "vkGetPhysicalDeviceImageFormatProperties");
-  const VkExtent3D& most = properties.maxExtent;
-  if (size_.width > most.width || size_.height > most.height) {
+  const VkExtent3D& maximum = properties.maxExtent;
+  if (size_.width > maximum.width || size_.height > maximum.height) {
     throw Error(context_->name(), "",
                 fmt::format("an image of {} x {} pixels is larger than its largest, {} x {}", size_.width, size_.height,
-                            most.width, most.height),
+                            maximum.width, maximum.height),
                 "draw smaller pictures, or choose another device (tessera info devices)");
   }
   if (copiedBytes() > properties.maxResourceSize) {

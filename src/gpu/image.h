@@ -1,5 +1,5 @@
-// Two-dimensional images off the screen: what a render pass draws into (gpu/render_pass.h). Shaders reach them as
-// attachments only; kernels and the host get copies of them in buffers (GpuStream::copy).
+// Two-dimensional off-screen images: the attachments of render passes (gpu/render_pass.h). Shaders access them as
+// attachments only; kernels and the host access copies of them in buffers (GpuStream::copy).
 #pragma once
 
 #include <volk.h>
@@ -18,12 +18,12 @@ enum class ImageFormat {
   r32Float,
   rgba32Float,
   r32Uint,
-  rg32Uint,      // of visibility buffers: an object and a triangle, for example
+  rg32Uint,      // for visibility buffers: an object and a triangle, for example
   depth32Float,  // 0 to 1
 };
 
 VkFormat vulkanFormat(ImageFormat format);
-const char* nameOf(ImageFormat format);
+const char* formatName(ImageFormat format);
 uint32_t bytesPerPixel(ImageFormat format);
 inline bool isDepth(ImageFormat format) {
   return format == ImageFormat::depth32Float;
@@ -37,13 +37,13 @@ struct ImageSize {
   bool operator==(const ImageSize&) const = default;
 };
 
-// One level, one layer, one sample a pixel. Contents are undefined at first. Between the commands of a stream an image
-// that has contents is always in kRestingLayout, so that recorded commands are valid whatever came before them. Must
-// not be destroyed while the device works on it (GpuStream::retire).
+// An image with one mip level, one layer and one sample per pixel. The contents are undefined at first. Between the
+// commands of a stream, an image that has contents is always in kRestingLayout, so that recorded commands are valid
+// whatever precedes them. An image must not be destroyed while the device uses it; see GpuStream::deferDestroy.
 class GpuImage {
  public:
-  // Throws Error where the device does not rasterise, has no such format for attachments, or none of this size; and
-  // where memory is short.
+  // Throws Error if the device does not rasterise, does not support attachments of this format or size, or has
+  // insufficient memory.
   GpuImage(std::shared_ptr<const GpuContext> context, ImageSize size, ImageFormat format);
   ~GpuImage();
   GpuImage(const GpuImage&) = delete;
@@ -51,9 +51,9 @@ class GpuImage {
 
   ImageSize size() const { return size_; }
   ImageFormat format() const { return format_; }
-  // Of a copy in a buffer: [height][width], rows without gaps.
+  // The size of a copy in a buffer, in bytes: [height][width] pixels without padding.
   size_t copiedBytes() const { return size_t{size_.width} * size_.height * bytesPerPixel(format_); }
-  size_t memoryBytes() const { return piece_.room; }  // of the heap's
+  size_t memoryBytes() const { return piece_.capacity; }  // allocated from the heap
 
   VkImage handle() const { return image_; }
   VkImageView view() const { return view_; }
@@ -76,7 +76,7 @@ class GpuImage {
   VkImageView view_ = VK_NULL_HANDLE;
   GpuHeap::Piece piece_;
   uint64_t serial_ = 0;
-  mutable bool hasContents_ = false;  // once the commands listed so far have run
+  mutable bool hasContents_ = false;  // after the commands queued so far
 };
 
 }  // namespace tessera

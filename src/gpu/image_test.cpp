@@ -23,8 +23,8 @@ class GpuImageTest : public testing::Test {
   }
   void TearDown() override { EXPECT_EQ(GpuContext::validationMessages(), 0); }
 
-  // What is said of an image that cannot be made.
-  std::string refusalOf(ImageSize size, ImageFormat format) {
+  // Returns the reason of the error for an image that cannot be created.
+  std::string imageErrorReason(ImageSize size, ImageFormat format) {
     try {
       const GpuImage image(context_, size, format);
     } catch (const Error& error) {
@@ -36,7 +36,7 @@ class GpuImageTest : public testing::Test {
   std::shared_ptr<GpuContext> context_;
 };
 
-// Bytes that every format keeps as they are: small floats, halves and whole numbers alike.
+// Returns bytes that every format preserves exactly: they are valid as small floats, halves and integers.
 std::vector<std::byte> someBytes(const GpuImage& image, float first) {
   std::vector<std::byte> bytes(image.copiedBytes());
   for (size_t i = 0; i < bytes.size() / 4; ++i) {
@@ -46,10 +46,10 @@ std::vector<std::byte> someBytes(const GpuImage& image, float first) {
   return bytes;
 }
 
-TEST_F(GpuImageTest, BringsBackWhatWasCopiedToItInEveryFormat) {
+TEST_F(GpuImageTest, RoundTripsCopiesInEveryFormat) {
   GpuStream stream(context_);
   for (const ImageFormat format : kAllFormats) {
-    SCOPED_TRACE(nameOf(format));
+    SCOPED_TRACE(formatName(format));
     const GpuImage image(context_, {37, 21}, format);
     EXPECT_EQ(image.copiedBytes(), 37u * 21u * bytesPerPixel(format));
     GpuBuffer from(context_, image.copiedBytes() + 32), to(context_, image.copiedBytes() + 48);
@@ -62,13 +62,13 @@ TEST_F(GpuImageTest, BringsBackWhatWasCopiedToItInEveryFormat) {
     stream.download(to, 0, copied);
     EXPECT_EQ(std::memcmp(copied.data() + 16, bytes.data(), bytes.size()), 0);
     for (size_t i = 0; i < 48; ++i) EXPECT_EQ(copied[i < 16 ? i : bytes.size() + i], std::byte{0});
-    stream.retire(std::move(from));
-    stream.retire(std::move(to));
+    stream.deferDestroy(std::move(from));
+    stream.deferDestroy(std::move(to));
     stream.finish();
   }
 }
 
-TEST_F(GpuImageTest, ShowsWhatWasCopiedToItLast) {
+TEST_F(GpuImageTest, HoldsTheLastCopy) {
   GpuStream stream(context_);
   const GpuImage image(context_, {64, 64}, ImageFormat::rgba8);
   GpuBuffer from(context_, image.copiedBytes()), to(context_, 2 * image.copiedBytes());
@@ -87,7 +87,7 @@ TEST_F(GpuImageTest, ShowsWhatWasCopiedToItLast) {
   }
 }
 
-TEST_F(GpuImageTest, ItsMemoryIsCountedWithThatOfBuffersAndGivenBack) {
+TEST_F(GpuImageTest, CountsItsMemoryInTheHeapAndFreesIt) {
   const GpuHeap& heap = context_->heap();
   const GpuBuffer buffer(context_, 1000);
   const size_t before = heap.bytesInUse();
@@ -109,12 +109,12 @@ TEST_F(GpuImageTest, ItsMemoryIsCountedWithThatOfBuffersAndGivenBack) {
   EXPECT_EQ(heap.bytesInUse(), before);
 }
 
-TEST_F(GpuImageTest, PlacesOfImagesDoNotOverlap) {
+TEST_F(GpuImageTest, DoesNotOverlapOtherImages) {
   GpuStream stream(context_);
   std::vector<std::shared_ptr<GpuImage>> images;
   for (uint32_t i = 0; i < 30; ++i) images.push_back(stream.makeImage({100 + i, 50}, kAllFormats[i % 7]));
-  const size_t most = size_t{130} * 50 * 16;
-  const GpuBuffer buffer(context_, most);
+  const size_t maximum = size_t{130} * 50 * 16;
+  const GpuBuffer buffer(context_, maximum);
   for (size_t i = 0; i < images.size(); ++i) {
     stream.upload(buffer, 0, someBytes(*images[i], static_cast<float>(i % 30)));
     stream.copy(buffer, 0, *images[i]);
@@ -128,20 +128,20 @@ TEST_F(GpuImageTest, PlacesOfImagesDoNotOverlap) {
   }
 }
 
-TEST_F(GpuImageTest, SaysThatAnImageIsTooLarge) {
+TEST_F(GpuImageTest, RejectsSizesBeyondTheLimit) {
   const uint32_t beyond = context_->limits().maxImageDimension2D + 1;
-  const std::string reason = refusalOf({beyond, 4}, ImageFormat::rgba8);
+  const std::string reason = imageErrorReason({beyond, 4}, ImageFormat::rgba8);
   EXPECT_NE(reason.find(std::to_string(beyond) + " x 4 pixels is larger"), std::string::npos) << reason;
 }
 
-TEST_F(GpuImageTest, IsNotMadeWhereTheDeviceDoesNotRasterise) {
+TEST_F(GpuImageTest, RejectsDevicesThatDoNotRasterise) {
   GpuOptions options;
   options.allowedGraphics.queue = false;
   context_ = openForTest(options);
-  EXPECT_EQ(refusalOf({4, 4}, ImageFormat::rgba8), "it computes, but does not rasterise");
+  EXPECT_EQ(imageErrorReason({4, 4}, ImageFormat::rgba8), "it computes, but does not rasterise");
 }
 
-TEST_F(GpuImageTest, StaysUntilTheWorkOnItIsDoneOnceItIsRetired) {
+TEST_F(GpuImageTest, IsDestroyedAfterItsPendingWork) {
   GpuStream stream(context_);
   auto image = stream.makeImage({512, 512}, ImageFormat::rgba32Float);
   const auto bytes = someBytes(*image, 3);
@@ -152,7 +152,7 @@ TEST_F(GpuImageTest, StaysUntilTheWorkOnItIsDoneOnceItIsRetired) {
   stream.copy(from, 0, *image);
   stream.copy(*image, to, 0);
   const size_t itsBytes = image->memoryBytes();
-  stream.retire(std::move(image));
+  stream.deferDestroy(std::move(image));
   EXPECT_FALSE(watched.expired());
   std::vector<std::byte> copied(bytes.size());
   stream.download(to, 0, copied);

@@ -1,4 +1,4 @@
-// A compute shader ready to run. Every kernel takes the same thing: one push constant, the address of its arguments.
+// A compute pipeline. The interface of every kernel is one push constant: the address of its arguments.
 #pragma once
 
 #include <volk.h>
@@ -12,7 +12,7 @@
 
 namespace tessera {
 
-// The driver does not compile a shader. Not thrown where memory is short or the device is lost.
+// Thrown if the driver does not compile a shader, but not if memory is insufficient or the device is lost.
 class KernelRefused : public Error {
  public:
   using Error::Error;
@@ -20,8 +20,9 @@ class KernelRefused : public Error {
 
 class GpuKernel {
  public:
-  // `constants` are the values of the shader's specialization constants 0, 1, 2, ... All its subgroups are full and
-  // have `subgroupSize` lanes where that is not 0 (GpuMatrices::subgroupSize). Throws Error.
+  // `constants` are the values of the shader's specialization constants 0, 1, 2, ... If `subgroupSize` is not 0, all
+  // subgroups are full and have that many lanes (GpuMatrices::subgroupSize). Throws KernelRefused if the driver does
+  // not compile the shader, and Error for other failures.
   GpuKernel(std::shared_ptr<const GpuContext> context, std::span<const uint32_t> spirv,
             std::span<const uint32_t> constants = {}, uint32_t subgroupSize = 0);
   ~GpuKernel();

@@ -1,3 +1,3 @@
-// volk's own code, which finds the Vulkan loader at run time.
+// The implementation of volk, which loads the Vulkan loader at run time.
 #define VOLK_IMPLEMENTATION
 #include <volk.h>

@@ -69,9 +69,9 @@ std::vector<PhysicalDevice> physicalDevices(VkInstance instance) {
   return devices;
 }
 
-const PhysicalDevice& choosePhysicalDevice(const std::vector<PhysicalDevice>& devices, const std::string& wanted) {
+const PhysicalDevice& choosePhysicalDevice(const std::vector<PhysicalDevice>& devices, const std::string& requested) {
   CHECK(!devices.empty());
-  if (wanted.empty()) {
+  if (requested.empty()) {
     return *std::max_element(devices.begin(), devices.end(), [](const PhysicalDevice& a, const PhysicalDevice& b) {
       const auto worth = [](const PhysicalDevice& d) {
         return rank(d.properties.deviceType) + (d.missing.empty() ? 10 : 0);
@@ -79,16 +79,16 @@ const PhysicalDevice& choosePhysicalDevice(const std::vector<PhysicalDevice>& de
       return worth(a) < worth(b);
     });
   }
-  const bool isIndex = wanted.find_first_not_of("0123456789") == std::string::npos;
+  const bool isIndex = requested.find_first_not_of("0123456789") == std::string::npos;
   std::string list;
   for (size_t i = 0; i < devices.size(); ++i) {
     const std::string name = devices[i].properties.deviceName;
-    if (isIndex ? std::to_string(i) == wanted : lowerCase(name).find(lowerCase(wanted)) != std::string::npos) {
+    if (isIndex ? std::to_string(i) == requested : lowerCase(name).find(lowerCase(requested)) != std::string::npos) {
       return devices[i];
     }
     list += fmt::format("{}{} {}", i ? ", " : "", i, name);
   }
-  throw Error("Vulkan device \"" + wanted + "\"", "", "there is no such device", "choose one of: " + list);
+  throw Error("Vulkan device \"" + requested + "\"", "", "there is no such device", "choose one of: " + list);
 }
 
 std::string missingIn(const PhysicalDevice& device) {
@@ -116,7 +116,7 @@ void requireFeatures(const PhysicalDevice& device) {
 
 namespace {
 
-// The size of all subgroups in compute kernels that ask for it; 0 where kernels cannot.
+// Returns the size of full subgroups that compute kernels can require; 0 if they cannot require any.
 uint32_t settledSubgroupSize(VkPhysicalDevice device) {
   if (!hasDeviceExtension(device, VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME)) return 0;
   auto control = vulkanStruct<VkPhysicalDeviceSubgroupSizeControlFeaturesEXT>(
@@ -139,7 +139,7 @@ uint32_t settledSubgroupSize(VkPhysicalDevice device) {
   return fits ? size : 0;
 }
 
-// Both extensions say the same things by other names.
+// Both extensions describe matrices in the same way with different names.
 template <class Shape>
 bool fits(const Shape& shape, uint32_t rows, uint32_t columns, uint32_t depth) {
   return 16 % rows == 0 && 16 % columns == 0 && 16 % depth == 0 &&
@@ -158,7 +158,7 @@ bool knowsMatrices(VkPhysicalDevice device, VkStructureType type) {
 }
 
 template <class Shape, class List>
-std::vector<Shape> shapesOf(VkPhysicalDevice device, VkStructureType type, List list) {
+std::vector<Shape> queryShapes(VkPhysicalDevice device, VkStructureType type, List list) {
   uint32_t count = 0;
   checkVulkan(list(device, &count, nullptr), "vkGetPhysicalDeviceCooperativeMatrixProperties");
   std::vector<Shape> shapes(count, vulkanStruct<Shape>(type));
@@ -166,7 +166,7 @@ std::vector<Shape> shapesOf(VkPhysicalDevice device, VkStructureType type, List 
   return shapes;
 }
 
-// The largest product so far.
+// Replaces `best` if the product of the given matrices is larger.
 void consider(GpuMatrices& best, GpuMatrices::Kind kind, uint32_t rows, uint32_t columns, uint32_t depth) {
   const bool isFirst = best.kind == GpuMatrices::Kind::none;
   if (isFirst || rows * columns * depth > best.rows * best.columns * best.depth) {
@@ -184,9 +184,9 @@ GpuMatrices presentMatrices(VkPhysicalDevice device) {
   if (hasDeviceExtension(device, VK_KHR_COOPERATIVE_MATRIX_EXTENSION_NAME) &&
       knowsMatrices<VkPhysicalDeviceCooperativeMatrixFeaturesKHR>(
           device, VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_COOPERATIVE_MATRIX_FEATURES_KHR)) {
-    const auto shapes = shapesOf<VkCooperativeMatrixPropertiesKHR>(
+    const auto shapes = queryShapes<VkCooperativeMatrixPropertiesKHR>(
         device, VK_STRUCTURE_TYPE_COOPERATIVE_MATRIX_PROPERTIES_KHR, vkGetPhysicalDeviceCooperativeMatrixPropertiesKHR);
-    // Sums are made fp16 as whole matrices: there have to be such.
+    // Sums are converted to fp16 as whole matrices, so fp16 accumulators of the same size must exist.
     const auto halvesLike = [&](const VkCooperativeMatrixPropertiesKHR& sums) {
       return std::any_of(shapes.begin(), shapes.end(), [&](const VkCooperativeMatrixPropertiesKHR& s) {
         return s.MSize == sums.MSize && s.NSize == sums.NSize && s.ResultType == VK_COMPONENT_TYPE_FLOAT16_KHR;
@@ -208,8 +208,8 @@ GpuMatrices presentMatrices(VkPhysicalDevice device) {
     return best;
   }
   for (const auto& s :
-       shapesOf<VkCooperativeMatrixPropertiesNV>(device, VK_STRUCTURE_TYPE_COOPERATIVE_MATRIX_PROPERTIES_NV,
-                                                 vkGetPhysicalDeviceCooperativeMatrixPropertiesNV)) {
+       queryShapes<VkCooperativeMatrixPropertiesNV>(device, VK_STRUCTURE_TYPE_COOPERATIVE_MATRIX_PROPERTIES_NV,
+                                                    vkGetPhysicalDeviceCooperativeMatrixPropertiesNV)) {
     if (fits(s, s.MSize, s.NSize, s.KSize) && s.AType == VK_COMPONENT_TYPE_FLOAT16_NV &&
         s.BType == VK_COMPONENT_TYPE_FLOAT16_NV && s.CType == VK_COMPONENT_TYPE_FLOAT32_NV &&
         s.DType == VK_COMPONENT_TYPE_FLOAT32_NV) {

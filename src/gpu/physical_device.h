@@ -1,4 +1,4 @@
-// Which of a machine's devices to use, and what it can do.
+// Selects one of the machine's Vulkan devices and queries its features.
 #pragma once
 
 #include <volk.h>
@@ -14,26 +14,27 @@ struct PhysicalDevice {
   VkPhysicalDevice handle = VK_NULL_HANDLE;
   VkPhysicalDeviceProperties properties = {};
   std::string driver;   // "llvmpipe Mesa 22.3.6 (LLVM 15.0.6)"
-  std::string missing;  // missingIn; empty where it can be used
+  std::string missing;  // see missingIn; empty if the device can be used
 };
 
 std::vector<PhysicalDevice> physicalDevices(VkInstance instance);
 
-// `wanted` is an index, or a part of a name, any case; empty takes the best kind there is among those that can be used.
-// Throws Error that lists the devices when none fits. `devices` must not be empty.
-const PhysicalDevice& choosePhysicalDevice(const std::vector<PhysicalDevice>& devices, const std::string& wanted);
+// `requested` is an index or a part of a name (case-insensitive); if empty, the best kind of device among the usable
+// ones is chosen. Throws Error, which lists the devices, if none matches. `devices` must not be empty.
+const PhysicalDevice& choosePhysicalDevice(const std::vector<PhysicalDevice>& devices, const std::string& requested);
 
-// Of what drivers have to have, what this one lacks: "no Vulkan 1.2". Empty where it lacks nothing.
+// Returns the first requirement that the device does not meet, for example "no Vulkan 1.2"; empty if it meets them all.
 std::string missingIn(const PhysicalDevice& device);
-// Throws Error where it lacks something.
+// Throws Error if the device does not meet a requirement.
 void requireFeatures(const PhysicalDevice& device);
 
 bool hasDeviceExtension(VkPhysicalDevice device, const char* name);
 
-// None where no shape of its matrices fits what kernels do. Vulkan 1.2 only.
+// Returns the largest supported cooperative matrices that the kernels can use; Kind::none if there are none. Requires a
+// device with Vulkan 1.2.
 GpuMatrices presentMatrices(VkPhysicalDevice device);
 
-// What the device has of the features that have a fallback. Vulkan 1.2 only.
+// Returns the optional features that the device supports. Requires a device with Vulkan 1.2.
 GpuFeatures presentFeatures(VkPhysicalDevice device);
 
 }  // namespace tessera

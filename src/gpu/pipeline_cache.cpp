@@ -14,32 +14,33 @@ namespace tessera {
 
 namespace {
 
-constexpr uint64_t kMostBytes = uint64_t{256} << 20;
+constexpr uint64_t kMaxBytes = uint64_t{256} << 20;
 constexpr char kMagic[8] = {'t', 'e', 's', 's', 'v', 'k', 'c', '1'};
 
-// Before the driver's bytes. Drivers check whose bytes they are, and trust them otherwise.
+// Precedes the driver's data in the file. Drivers check which driver has written the data, but not whether it is
+// intact.
 struct Header {
   char magic[8];
   uint32_t checksum;
   uint32_t bytes;
 };
 
-uint32_t checksumOf(std::span<const std::byte> bytes) {
+uint32_t computeChecksum(std::span<const std::byte> bytes) {
   return static_cast<uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));
 }
 
-// The driver's bytes of a file; none where it is not there or not whole.
-Bytes bytesOf(const fs::path& file) {
+// Returns the driver's data in a file; empty if the file is missing or damaged.
+Bytes readDriverCache(const fs::path& file) {
   std::error_code ignored;
   if (file.empty() || !fs::exists(file, ignored)) return {};
   try {
-    Bytes bytes = readFile(file, kMostBytes);
+    Bytes bytes = readFile(file, kMaxBytes);
     Header header;
     if (bytes.size() < sizeof header) return {};
     std::memcpy(&header, bytes.data(), sizeof header);
     bytes.erase(bytes.begin(), bytes.begin() + sizeof header);
     const bool whole = std::memcmp(header.magic, kMagic, sizeof kMagic) == 0 && header.bytes == bytes.size() &&
-                       header.checksum == checksumOf(bytes);
+                       header.checksum == computeChecksum(bytes);
     return whole ? bytes : Bytes();
   } catch (const Error&) {
     return {};
@@ -64,7 +65,7 @@ fs::path PipelineCache::fileFor(const VkPhysicalDeviceProperties& properties) {
 
 PipelineCache::PipelineCache(VkDevice device, const VkPhysicalDeviceProperties& properties)
     : device_(device), file_(fileFor(properties)) {
-  const Bytes bytes = bytesOf(file_);
+  const Bytes bytes = readDriverCache(file_);
   auto info = vulkanStruct<VkPipelineCacheCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO);
   info.initialDataSize = bytes.size();
   info.pInitialData = bytes.data();
@@ -75,18 +76,18 @@ PipelineCache::PipelineCache(VkDevice device, const VkPhysicalDeviceProperties& 
 PipelineCache::~PipelineCache() {
   size_t size = 0;
   const bool known = vkGetPipelineCacheData(device_, cache_, &size, nullptr) == VK_SUCCESS;
-  if (known && size > bytesRead_ && size <= kMostBytes && !file_.empty()) {
+  if (known && size > bytesRead_ && size <= kMaxBytes && !file_.empty()) {
     Bytes bytes(sizeof(Header) + size);
     if (vkGetPipelineCacheData(device_, cache_, &size, bytes.data() + sizeof(Header)) == VK_SUCCESS) {
       bytes.resize(sizeof(Header) + size);
       Header header;
       std::memcpy(header.magic, kMagic, sizeof kMagic);
-      header.checksum = checksumOf(std::span(bytes).subspan(sizeof header));
+      header.checksum = computeChecksum(std::span(bytes).subspan(sizeof header));
       header.bytes = static_cast<uint32_t>(size);
       std::memcpy(bytes.data(), &header, sizeof header);
       try {
         writeFileAtomically(file_, bytes);
-      } catch (const std::exception&) {  // a cache that cannot be kept only costs time
+      } catch (const std::exception&) {  // a cache that cannot be saved only costs time
       }
     }
   }

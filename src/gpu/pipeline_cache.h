@@ -1,4 +1,4 @@
-// Compiled kernels kept from run to run, in $XDG_CACHE_HOME/tessera (or ~/.cache/tessera), a file for each driver.
+// A persistent cache of compiled pipelines in $XDG_CACHE_HOME/tessera (or ~/.cache/tessera), one file per driver.
 #pragma once
 
 #include <volk.h>
@@ -9,14 +9,14 @@ namespace tessera {
 
 class PipelineCache {
  public:
-  // Without a readable file, or where it is damaged or another driver's, the cache begins empty.
+  // The cache begins empty if there is no readable file, or if the file is damaged or of another driver.
   PipelineCache(VkDevice device, const VkPhysicalDeviceProperties& properties);
-  ~PipelineCache();  // writes the file, where there is more to keep than was read; says nothing where it cannot
+  ~PipelineCache();  // writes the file if the cache has grown; ignores errors
   PipelineCache(const PipelineCache&) = delete;
   PipelineCache& operator=(const PipelineCache&) = delete;
 
   VkPipelineCache handle() const { return cache_; }
-  // Empty where there is no home to write to.
+  // Returns the path of the cache file; empty if neither XDG_CACHE_HOME nor HOME is set.
   static std::filesystem::path fileFor(const VkPhysicalDeviceProperties& properties);
 
  private:

@@ -33,16 +33,16 @@ class PipelineCacheTest : public testing::Test {
   fs::path file_;
 };
 
-TEST_F(PipelineCacheTest, LiesInTheFolderOfTheEnvironment) {
+TEST_F(PipelineCacheTest, LiesInXdgCacheHome) {
   EXPECT_EQ(file_.parent_path(), folder_.path() / "tessera");
 }
 
-TEST_F(PipelineCacheTest, IsReadAgainWhateverBecameOfItsFile) {
+TEST_F(PipelineCacheTest, IsReusedAndSurvivesDamagedFiles) {
   compile();
   if (!fs::exists(file_)) GTEST_SKIP() << "this driver keeps nothing";
   const Bytes written = readFile(file_);
   compile();
-  EXPECT_EQ(readFile(file_), written);  // nothing new to keep
+  EXPECT_EQ(readFile(file_), written);  // nothing new to save
   for (const size_t length : {size_t{0}, size_t{7}, written.size() / 2, written.size() - 1}) {
     writeFileAtomically(file_, std::span(written).first(length));
     EXPECT_NO_THROW(compile()) << length;
@@ -53,7 +53,7 @@ TEST_F(PipelineCacheTest, IsReadAgainWhateverBecameOfItsFile) {
   EXPECT_NO_THROW(compile());
 }
 
-TEST_F(PipelineCacheTest, ThatCannotBeWrittenIsNoError) {
+TEST_F(PipelineCacheTest, IgnoresAnUnwritableFolder) {
   fs::remove_all(file_.parent_path());
   writeFileAtomically(file_.parent_path(), "a file where the folder should be");
   EXPECT_NO_THROW(compile());

@@ -112,7 +112,7 @@ void GpuPresenter::draw(const GpuScreenPipeline& pipeline, std::span<const std::
   vkCmdDraw(commands, vertices, 1, 0, 0);
 }
 
-// Leaves the image as the screen wants it.
+// Copies the image to a buffer and leaves it in the layout for presentation.
 void GpuPresenter::read(const GpuSwapchain::Image& image, const GpuBuffer& to) {
   const VkCommandBuffer commands = frames_[current_].commands;
   auto turn = vulkanStruct<VkImageMemoryBarrier>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER);
@@ -142,19 +142,19 @@ void GpuPresenter::read(const GpuSwapchain::Image& image, const GpuBuffer& to) {
                        nullptr, 1, &turn);
 }
 
-void GpuPresenter::end(ImageU8* wanted) {
+void GpuPresenter::end(ImageU8* screenshot) {
   Frame& frame = frames_[current_];
   const GpuSwapchain::Image& image = swapchain_.image(image_);
   vkCmdEndRenderPass(frame.commands);
   GpuBuffer copied;
-  if (wanted) {
+  if (screenshot) {
     if (!swapchain_.canBeRead()) {
-      throw Error(context_->name(), "", "what it shows on this screen cannot be read", "do without a screenshot");
+      throw Error(context_->name(), "", "images of this screen cannot be read back", "do without a screenshot");
     }
     copied = GpuBuffer(context_, size_t{4} * extent().width * extent().height, BufferUse::download);
     read(image, copied);
   }
-  // What comes next may overwrite what this picture has read.
+  // Later commands may overwrite what this frame has read.
   auto readAll = vulkanStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
   vkCmdPipelineBarrier(frame.commands, kReads, kWrites, 0, 1, &readAll, 0, nullptr, 0, nullptr);
   checkVulkan(vkEndCommandBuffer(frame.commands), "vkEndCommandBuffer");
@@ -169,13 +169,13 @@ void GpuPresenter::end(ImageU8* wanted) {
   info.signalSemaphoreCount = 1;
   info.pSignalSemaphores = &image.drawn;
   checkVulkan(vkQueueSubmit(context_->queue(), 1, &info, frame.drawn), "vkQueueSubmit");
-  if (wanted) {
+  if (screenshot) {
     checkVulkan(vkWaitForFences(context_->device(), 1, &frame.drawn, VK_TRUE, UINT64_MAX), "vkWaitForFences");
-    *wanted = ImageU8(static_cast<int>(extent().width), static_cast<int>(extent().height), 3);
+    *screenshot = ImageU8(static_cast<int>(extent().width), static_cast<int>(extent().height), 3);
     const bool blueFirst = swapchain_.isBlueFirst();
-    for (size_t p = 0; p < wanted->pixelCount(); ++p) {
+    for (size_t p = 0; p < screenshot->pixelCount(); ++p) {
       for (size_t c = 0; c < 3; ++c) {
-        wanted->pixels[3 * p + c] = static_cast<uint8_t>(copied.mapped()[4 * p + (blueFirst ? 2 - c : c)]);
+        screenshot->pixels[3 * p + c] = static_cast<uint8_t>(copied.mapped()[4 * p + (blueFirst ? 2 - c : c)]);
       }
     }
   }

@@ -1,6 +1,6 @@
-// Pictures of a window, one after another: what is drawn into each, and showing it. Work that a GpuStream of the same
-// context has sent before `end` is done before the picture is drawn, and what it sends afterwards begins when the
-// picture is. For the thread that uses that stream.
+// Draws and presents the frames of a window. Work that a GpuStream of the same context has submitted before `end` is
+// completed before the frame is drawn, and work that it submits afterwards begins after the frame is drawn. To be used
+// from the thread that uses that stream.
 #pragma once
 
 #include <array>
@@ -18,26 +18,26 @@ namespace tessera {
 
 class GpuPresenter {
  public:
-  // Takes the surface (GpuSwapchain).
+  // Takes ownership of the surface (GpuSwapchain).
   GpuPresenter(std::shared_ptr<const GpuContext> context, VkSurfaceKHR surface);
-  ~GpuPresenter();  // waits
+  ~GpuPresenter();  // waits for the device
   GpuPresenter(const GpuPresenter&) = delete;
   GpuPresenter& operator=(const GpuPresenter&) = delete;
 
   VkRenderPass renderPass() const { return swapchain_.renderPass(); }
 
-  // Begins a picture of a window of this size; waits until the device has done with the last but one. False where there
-  // is nothing to draw into now: the window is hidden, or just being resized.
+  // Begins a frame of a window of this size; waits until the device has finished the last frame but one. Returns false
+  // if there is no image to draw into: the window is hidden or being resized.
   bool begin(VkExtent2D window);
   VkExtent2D extent() const { return swapchain_.extent(); }
-  // Copies bytes to where shaders reach them until the picture is drawn → address, a multiple of 16.
+  // Copies bytes to memory that shaders can access until the frame is drawn. Returns its address, a multiple of 16.
   VkDeviceAddress stage(std::span<const std::byte> bytes);
-  // Draws triangles of so many vertices (gl_VertexIndex from 0), only where `where` says.
+  // Draws triangles with `vertices` vertices (gl_VertexIndex from 0), clipped to the rectangle `where`.
   void draw(const GpuScreenPipeline& pipeline, std::span<const std::byte> arguments, uint32_t vertices,
             const VkRect2D& where);
-  // Shows the picture. With `wanted`, waits, and gives it its colours; throws Error where the screen does not let them
-  // go.
-  void end(ImageU8* wanted = nullptr);
+  // Presents the frame. If `screenshot` is not null, waits and stores the colours of the frame in it; throws Error if
+  // the surface does not support reading them.
+  void end(ImageU8* screenshot = nullptr);
 
  private:
   struct Frame {
@@ -45,7 +45,7 @@ class GpuPresenter {
     VkSemaphore available = VK_NULL_HANDLE;
     VkFence drawn = VK_NULL_HANDLE;
     std::vector<GpuBuffer> staging;
-    size_t buffer = 0, staged = 0;  // the buffer of `staging` in use, and bytes of it
+    size_t buffer = 0, staged = 0;  // index in `staging` of the buffer in use, and the bytes used of it
   };
   void read(const GpuSwapchain::Image& image, const GpuBuffer& to);
 
@@ -55,7 +55,7 @@ class GpuPresenter {
   std::array<Frame, 2> frames_;
   int current_ = 0;
   uint32_t image_ = 0;
-  bool fits_ = false;  // the images fit the window
+  bool fits_ = false;  // the swapchain's images match the window's size
   VkExtent2D window_ = {};
 };
 

@@ -32,13 +32,14 @@ VkAttachmentDescription describe(ImageFormat format, LoadOperation load, bool is
   description.storeOp = isStored ? VK_ATTACHMENT_STORE_OP_STORE : VK_ATTACHMENT_STORE_OP_DONT_CARE;
   description.stencilLoadOp = VK_ATTACHMENT_LOAD_OP_DONT_CARE;
   description.stencilStoreOp = VK_ATTACHMENT_STORE_OP_DONT_CARE;
-  // An image in any layout may be taken to be in the undefined one; it loses its contents.
+  // The undefined layout is valid as the initial one for an image in any layout; the image loses its contents.
   description.initialLayout = load == LoadOperation::keep ? GpuImage::kRestingLayout : VK_IMAGE_LAYOUT_UNDEFINED;
   description.finalLayout = GpuImage::kRestingLayout;
   return description;
 }
 
-// Colours come first. All passes have the same dependencies: so a pipeline made for one is compatible with the others.
+// Colour attachments come first. All passes have the same dependencies, so a pipeline created for one is compatible
+// with the others.
 VkRenderPass makeRenderPass(const GpuContext& context, std::span<const VkAttachmentDescription> attachments,
                             size_t colourCount) {
   std::vector<VkAttachmentReference> colours;
@@ -51,7 +52,7 @@ VkRenderPass makeRenderPass(const GpuContext& context, std::span<const VkAttachm
   subpass.pColorAttachments = colours.data();
   subpass.pDepthStencilAttachment = attachments.size() > colourCount ? &depth : nullptr;
 
-  // The barriers of a stream, by which a pass sees all that came before it and is seen by all that comes after it.
+  // The barriers of a stream: a pass sees the results of all earlier commands, and later commands see its results.
   VkSubpassDependency before = {};
   before.srcSubpass = VK_SUBPASS_EXTERNAL;
   before.srcStageMask = stages::kStream | stages::kDrawing;
@@ -88,7 +89,7 @@ void requireColours(const GpuContext& context, size_t count) {
   }
 }
 
-// Images can be larger than what is drawn at once.
+// The limits of framebuffers and viewports can be lower than those of images.
 void requireSize(const GpuContext& context, ImageSize size) {
   const VkPhysicalDeviceLimits& limits = context.limits();
   const uint32_t width = std::min(limits.maxFramebufferWidth, limits.maxViewportDimensions[0]);

@@ -1,6 +1,6 @@
-// What an off-screen picture is drawn into: colour images and one of depth, what they hold at first, and what is kept.
-// GpuStream::draw runs it. A render pass reads and leaves every image in GpuImage::kRestingLayout, so that it can be
-// recorded once and sent again and again.
+// An off-screen render pass: its colour and depth images, their contents at the beginning, and whether the results are
+// stored. GpuStream::draw runs it. A render pass expects and leaves every image in GpuImage::kRestingLayout, so that it
+// can be recorded once and submitted many times.
 #pragma once
 
 #include <volk.h>
@@ -16,42 +16,42 @@
 
 namespace tessera {
 
-// The pixel formats of what is drawn into: a pipeline draws in those passes alone whose formats are its own.
+// The formats of a pass's attachments. A pipeline can only draw in passes with the same formats.
 struct AttachmentFormats {
   std::vector<ImageFormat> colours;  // by location of the fragment shader's outputs
   std::optional<ImageFormat> depth;
   bool operator==(const AttachmentFormats&) const = default;
 };
 
-// What an image holds when a pass begins.
+// The contents of an image when a pass begins.
 enum class LoadOperation {
   clear,    // the clear value
-  keep,     // what it held before, which must be something: a pass or a copy has written it
-  discard,  // nothing defined: every pixel that is read afterwards is drawn
+  keep,     // the previous contents, which must be defined: written by a pass or a copy
+  discard,  // undefined: every pixel that is read afterwards must be drawn
 };
 
 struct ColourAttachment {
   std::shared_ptr<const GpuImage> image;
   LoadOperation load = LoadOperation::clear;
-  std::array<float, 4> clearColour = {};      // of formats that are not integers
-  std::array<uint32_t, 4> clearInteger = {};  // of integers
-  bool isStored = true;                       // else it has no contents after the pass
+  std::array<float, 4> clearColour = {};      // for formats that are not integers
+  std::array<uint32_t, 4> clearInteger = {};  // for integer formats
+  bool isStored = true;                       // if false, the image has no contents after the pass
 };
 
 struct DepthAttachment {
   std::shared_ptr<const GpuImage> image;
   LoadOperation load = LoadOperation::clear;
-  float clearDepth = 1;  // the far end; 0 where pipelines compare with `greater`
+  float clearDepth = 1;  // the far end; 0 if the pipelines compare with `greater`
   bool isStored = true;
 };
 
-// Draws cover the whole images: Vulkan's clip space, (-1, -1) being the upper left corner, depth 0 to 1, pixel (0, 0)
-// the first of the rows. Must not be destroyed while the device works on it (GpuStream::retire); its images live as
-// long as it does.
+// The viewport covers the whole images. Coordinates are Vulkan's clip space: (-1, -1) is the upper left corner, depth
+// is 0 to 1, and pixel (0, 0) is the first of the first row. A pass must not be destroyed while the device uses it; see
+// GpuStream::deferDestroy. It shares the ownership of its images.
 class GpuRenderPass {
  public:
-  // One image at least, all of one size, none twice. Throws Error where the device does not rasterise or has not so
-  // many attachments.
+  // Requires at least one image; all have the same size, and none may appear twice. Throws Error if the device does not
+  // rasterise or does not support this number or size of attachments.
   GpuRenderPass(std::shared_ptr<const GpuContext> context, std::vector<ColourAttachment> colours,
                 std::optional<DepthAttachment> depth = std::nullopt);
   ~GpuRenderPass();
@@ -65,7 +65,7 @@ class GpuRenderPass {
   std::span<const VkClearValue> clearValues() const { return clearValues_; }
   uint64_t serial() const { return serial_; }  // GpuContext::nextSerial
 
-  // A pass that pipelines of these formats are made for; to be destroyed by the caller. Throws Error.
+  // Creates a pass that is compatible with pipelines of these formats. The caller must destroy it. Throws Error.
   static VkRenderPass makeCompatible(const GpuContext& context, const AttachmentFormats& formats);
 
  private:
@@ -73,7 +73,7 @@ class GpuRenderPass {
 
   explicit GpuRenderPass(std::shared_ptr<const GpuContext> context) : context_(std::move(context)) {}
   void addAttachment(const GpuImage& image);
-  // CHECKs that what is kept is there, and notes what there is afterwards.
+  // CHECKs that images with LoadOperation::keep have contents, and records which images have contents afterwards.
   void noteContents() const;
 
   std::shared_ptr<const GpuContext> context_;

@@ -10,7 +10,7 @@ namespace {
 
 class GpuRenderPassTest : public DrawTest {
  protected:
-  // Draws the triangles' numbers with a depth image that is cleared to `clearDepth`.
+  // Draws the triangles' numbers with a depth image that is cleared to `clearDepth`, and returns the pixels.
   std::vector<uint32_t> drawNumbers(const Triangles& triangles, GraphicsPipelineOptions options, float clearDepth = 1) {
     const auto numbers = makeImage(ImageFormat::rg32Uint);
     depth_ = makeImage(ImageFormat::depth32Float);
@@ -27,9 +27,9 @@ class GpuRenderPassTest : public DrawTest {
     return values;
   }
 
-  // What is said where this fails.
+  // Returns the reason of the error that `make` throws.
   template <class Make>
-  static std::string reasonOf(const Make& make) {
+  static std::string catchErrorReason(const Make& make) {
     try {
       make();
     } catch (const Error& error) {
@@ -64,7 +64,7 @@ TEST_F(GpuRenderPassTest, DrawsTheNearestOfManyTriangles) {
 }
 
 TEST_F(GpuRenderPassTest, ComparesDepthsAsThePipelineSays) {
-  // Reversed depths, drawn with the reversed test, are the same picture.
+  // Reversed depths drawn with the reversed test give the same image.
   const Triangles triangles = randomTriangles(7, 12);
   Triangles reversed = triangles;
   for (Vertex& vertex : reversed.vertices) vertex.position[2] = vertex.position[3] - vertex.position[2];
@@ -81,7 +81,7 @@ TEST_F(GpuRenderPassTest, DrawsTheLastTriangleWhereDepthsAreNotTested) {
   for (const float depth : pixels<float>(*depth_)) EXPECT_EQ(depth, 1.0f);
 }
 
-TEST_F(GpuRenderPassTest, CullsByWhichWayATriangleTurns) {
+TEST_F(GpuRenderPassTest, CullsByWinding) {
   const Triangles triangles = randomTriangles(9, 16);
   const auto clockwise = rasterise(triangles, kSize, Faces::clockwise);
   const auto counterClockwise = rasterise(triangles, kSize, Faces::counterClockwise);
@@ -91,7 +91,7 @@ TEST_F(GpuRenderPassTest, CullsByWhichWayATriangleTurns) {
                 drawNumbers(triangles, {.cull = VK_CULL_MODE_BACK_BIT, .frontFace = VK_FRONT_FACE_CLOCKWISE}));
 }
 
-TEST_F(GpuRenderPassTest, GivesBothShadersTheirConstants) {
+TEST_F(GpuRenderPassTest, SpecialisesBothShaders) {
   const Triangles pair = crossingPair();
   auto expected = rasterise(pair, kSize);
   for (RasterisedPixel& pixel : expected) pixel.number += pixel.number != 0 ? 1000 : 0;
@@ -142,7 +142,7 @@ TEST_F(GpuRenderPassTest, FillsSeveralImagesAtOnceAndClearsEachToItsOwnValue) {
        .depth = ImageFormat::depth32Float,
        .depthCompare = VK_COMPARE_OP_ALWAYS});
   const OnDevice device = uploaded(triangles);
-  // The first triangle only, and behind it nothing.
+  // Only the first triangle is drawn, over the background.
   stream_->draw(pass, call(pipeline, device.arguments, {.vertices = 3}));
   const auto numbersDrawn = pixels<uint32_t>(*numbers);
   const auto coloursDrawn = pixels<std::array<float, 4>>(*colour);
@@ -164,7 +164,7 @@ TEST_F(GpuRenderPassTest, FillsSeveralImagesAtOnceAndClearsEachToItsOwnValue) {
   EXPECT_GT(background, alone.size() / 4);
 }
 
-TEST_F(GpuRenderPassTest, InterpolatesAttributesAsPerspectiveWants) {
+TEST_F(GpuRenderPassTest, InterpolatesAttributesPerspectiveCorrectly) {
   const Triangles triangles = randomTriangles(11, 12);
   const auto expected = rasterise(triangles, kSize);
   const auto exact = makeImage(ImageFormat::rgba32Float), half = makeImage(ImageFormat::rgba16Float),
@@ -199,7 +199,7 @@ TEST_F(GpuRenderPassTest, InterpolatesAttributesAsPerspectiveWants) {
   }
 }
 
-TEST_F(GpuRenderPassTest, KeepsWhatAnEarlierPassLeft) {
+TEST_F(GpuRenderPassTest, LoadsTheResultOfAnEarlierPass) {
   const Triangles pair = crossingPair();
   const auto numbers = makeImage(ImageFormat::rg32Uint);
   depth_ = makeImage(ImageFormat::depth32Float);
@@ -223,8 +223,8 @@ TEST_F(GpuRenderPassTest, KeepsWhatAnEarlierPassLeft) {
   for (const uint32_t number : pixels<uint32_t>(*numbers)) ASSERT_EQ(number, 0u);
 }
 
-TEST_F(GpuRenderPassTest, BlendsAsEachImageIsToldTo) {
-  // Two triangles over the whole picture, drawn one after the other.
+TEST_F(GpuRenderPassTest, BlendsWithEveryMode) {
+  // Two triangles that cover the whole image, drawn one after the other.
   Triangles both;
   const std::array<float, 4> below = {0.5f, 0.25f, 0, 0.5f}, above = {0.125f, 0, 0.25f, 0.25f};
   for (const auto& colour : {below, above}) {
@@ -258,12 +258,13 @@ TEST_F(GpuRenderPassTest, BlendsAsEachImageIsToldTo) {
   }
 }
 
-TEST_F(GpuRenderPassTest, SaysWhatTheDeviceCannotDo) {
+TEST_F(GpuRenderPassTest, ReportsWhatTheDeviceDoesNotSupport) {
   GpuOptions options;
   options.allowedGraphics = {.queue = true, .fragmentStores = false, .independentBlend = false};
   const auto lesser = openForTest(options);
-  const auto make = [&](const std::shared_ptr<GpuContext>& context, const GraphicsPipelineOptions& wanted) {
-    return reasonOf([&] { GpuGraphicsPipeline(context, kTrianglesSpirv, kTrianglesSeveralSpirv, wanted); });
+  const auto make = [&](const std::shared_ptr<GpuContext>& context, const GraphicsPipelineOptions& pipelineOptions) {
+    return catchErrorReason(
+        [&] { GpuGraphicsPipeline(context, kTrianglesSpirv, kTrianglesSeveralSpirv, pipelineOptions); });
   };
   const GraphicsPipelineOptions stores = {.colours = {{ImageFormat::rg32Uint}}, .fragmentStores = true};
   EXPECT_EQ(make(lesser, stores), "its fragment shaders do not write to buffers");
@@ -277,13 +278,13 @@ TEST_F(GpuRenderPassTest, SaysWhatTheDeviceCannotDo) {
   EXPECT_EQ(make(openForTest(options), {}), "it computes, but does not rasterise");
 }
 
-TEST_F(GpuRenderPassTest, SaysThatThereAreTooManyImages) {
-  const uint32_t most = context_->limits().maxColorAttachments;
+TEST_F(GpuRenderPassTest, RejectsTooManyColourImages) {
+  const uint32_t maximum = context_->limits().maxColorAttachments;
   std::vector<ColourAttachment> colours;
-  for (uint32_t i = 0; i <= most; ++i) colours.push_back({.image = makeImage(ImageFormat::rgba8)});
-  const std::string reason = reasonOf([&] { GpuRenderPass(context_, colours); });
-  EXPECT_EQ(reason, std::to_string(most + 1) + " colour images are drawn at once, and it draws " +
-                        std::to_string(most) + " at most");
+  for (uint32_t i = 0; i <= maximum; ++i) colours.push_back({.image = makeImage(ImageFormat::rgba8)});
+  const std::string reason = catchErrorReason([&] { GpuRenderPass(context_, colours); });
+  EXPECT_EQ(reason, std::to_string(maximum + 1) + " colour images are drawn at once, and it draws " +
+                        std::to_string(maximum) + " at most");
 }
 
 }  // namespace

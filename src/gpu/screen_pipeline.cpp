@@ -8,14 +8,14 @@ namespace tessera {
 namespace {
 
 VkResult makeStage(VkDevice device, VkShaderStageFlagBits stage, std::span<const uint32_t> spirv,
-                   VkPipelineShaderStageCreateInfo& made) {
+                   VkPipelineShaderStageCreateInfo& info) {
   auto module = vulkanStruct<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
   module.codeSize = spirv.size_bytes();
   module.pCode = spirv.data();
-  made = vulkanStruct<VkPipelineShaderStageCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO);
-  made.stage = stage;
-  made.pName = "main";
-  return vkCreateShaderModule(device, &module, nullptr, &made.module);
+  info = vulkanStruct<VkPipelineShaderStageCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO);
+  info.stage = stage;
+  info.pName = "main";
+  return vkCreateShaderModule(device, &module, nullptr, &info.module);
 }
 
 }  // namespace
@@ -30,7 +30,7 @@ GpuScreenPipeline::GpuScreenPipeline(std::shared_ptr<const GpuContext> context, 
   layout.pPushConstantRanges = &range;
   checkVulkan(vkCreatePipelineLayout(device, &layout, nullptr, &layout_), "vkCreatePipelineLayout");
 
-  // Vertices are fetched by address, and so is all that fragments read.
+  // Vertices and all data that fragment shaders read are fetched by address.
   const auto vertices =
       vulkanStruct<VkPipelineVertexInputStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO);
   auto triangles =

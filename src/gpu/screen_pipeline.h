@@ -1,5 +1,5 @@
-// A vertex and a fragment shader that draw triangles into a window's picture, blended over what is there (premultiplied
-// colours). Like kernels they take one thing: the address of their arguments.
+// A vertex and a fragment shader that draw triangles into a window's frame, blended over the previous contents
+// (premultiplied colours). Like kernels, they take one push constant: the address of their arguments.
 #pragma once
 
 #include <volk.h>

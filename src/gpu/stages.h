@@ -1,19 +1,19 @@
-// Which stages of the device a stream's commands run in, and how they reach memory: what its barriers stand between.
-// For this room's own files.
+// The pipeline stages and memory accesses of a stream's commands, for its barriers. Private to src/gpu.
 #pragma once
 
 #include <volk.h>
 
 namespace tessera::stages {
 
-// Copies, fills and kernels. Any queue knows these stages.
+// Copies, fills and kernels. Every queue supports these stages.
 inline constexpr VkPipelineStageFlags kStream =
     VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT | VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT;
 inline constexpr VkAccessFlags kStreamWrites = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
 inline constexpr VkAccessFlags kStreamReads =
     VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_INDIRECT_COMMAND_READ_BIT;
 
-// What draws, of queues with graphics. Only render passes name these: between kernels they would be waited for, too.
+// The stages of drawing, on queues with graphics. Only render passes use them: in the barriers between kernels they
+// would cause needless waiting.
 inline constexpr VkPipelineStageFlags kDrawing =
     VK_PIPELINE_STAGE_VERTEX_SHADER_BIT | VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT |
     VK_PIPELINE_STAGE_EARLY_FRAGMENT_TESTS_BIT | VK_PIPELINE_STAGE_LATE_FRAGMENT_TESTS_BIT |

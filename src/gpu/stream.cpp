@@ -14,8 +14,8 @@ namespace tessera {
 
 namespace {
 
-constexpr size_t kSmallBatch = 8;                     // commands, and draws of passes
-constexpr size_t kMostCopiedWords = size_t{1} << 20;  // by a kernel: what is larger is as large the next time, mostly
+constexpr size_t kSmallBatch = 8;                    // commands, and draws of passes
+constexpr size_t kMaxCopiedWords = size_t{1} << 20;  // by a kernel: larger copies usually have the same size next time
 
 void barrier(VkCommandBuffer commands, VkAccessFlags reads, VkPipelineStageFlags to) {
   auto barrier = vulkanStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
@@ -26,11 +26,11 @@ void barrier(VkCommandBuffer commands, VkAccessFlags reads, VkPipelineStageFlags
 
 }  // namespace
 
-uint32_t workgroups(size_t count, size_t perGroup, size_t most) {
+uint32_t workgroups(size_t count, size_t perGroup, size_t maximum) {
   size_t groups = (count + perGroup - 1) / perGroup;
   const int spare = static_cast<int>(std::bit_width(groups)) - 4;
   if (spare > 0) groups = ((groups + (size_t{1} << spare) - 1) >> spare) << spare;
-  return static_cast<uint32_t>(std::min(groups, most));
+  return static_cast<uint32_t>(std::min(groups, maximum));
 }
 
 GpuStream::GpuStream(std::shared_ptr<const GpuContext> context, size_t stagingBytes)
@@ -82,7 +82,7 @@ void GpuStream::add(const Command& command) {
 
 void GpuStream::submit() {
   Batch& batch = listing();
-  Recording& recording = recordingOf(batch);
+  Recording& recording = prepareRecording(batch);
   batch.done = ++sent_;
   recording.lastUse = sent_;
   auto values = vulkanStruct<VkTimelineSemaphoreSubmitInfo>(VK_STRUCTURE_TYPE_TIMELINE_SEMAPHORE_SUBMIT_INFO);
@@ -99,20 +99,22 @@ void GpuStream::submit() {
   wait(listing());
 }
 
-GpuStream::Recording& GpuStream::recordingOf(Batch& batch) {
+GpuStream::Recording& GpuStream::prepareRecording(Batch& batch) {
   const uint64_t generation = context_->heap().generation();
   if (batch.commands.size() + batch.draws.size() < kSmallBatch) {
     record(batch, batch.small);
     return batch.small;
   }
   if (!measuring_) {
-    for (Recording& kept : batch.recordings) {
-      if (kept.generation == generation && kept.commands == batch.commands && kept.draws == batch.draws) return kept;
+    for (Recording& entry : batch.recordings) {
+      if (entry.generation == generation && entry.commands == batch.commands && entry.draws == batch.draws) {
+        return entry;
+      }
     }
   }
   Recording& oldest = *std::min_element(batch.recordings.begin(), batch.recordings.end(),
                                         [](const Recording& a, const Recording& b) { return a.lastUse < b.lastUse; });
-  oldest.generation = 0;  // whatever becomes of this
+  oldest.generation = 0;  // invalid if recording fails
   record(batch, oldest);
   oldest.commands = measuring_ ? std::vector<Command>() : batch.commands;
   oldest.draws = measuring_ ? std::vector<Draw>() : batch.draws;
@@ -132,7 +134,7 @@ void GpuStream::record(Batch& batch, Recording& recording) {
   }
   uint32_t query = 0;
   for (const Command& command : batch.commands) {
-    // A barrier reaches back over all batches sent before, too: they are on one queue. Passes bring their own.
+    // A barrier also covers all batches submitted before, as there is one queue. Render passes have their own barriers.
     if (command.kind != Command::Kind::draw) {
       barrier(commands, stages::kStreamReads | stages::kStreamWrites, stages::kStream);
     }
@@ -186,13 +188,13 @@ void GpuStream::wait(Batch& batch) {
   batch.draws.clear();
   batch.labels.clear();
   batch.staged = batch.argumentBytes = 0;
-  batch.retired.clear();
-  batch.retiredObjects.clear();
+  batch.deferred.clear();
+  batch.deferredObjects.clear();
 }
 
 void GpuStream::send() {
   const Batch& batch = listing();
-  if (!batch.commands.empty() || !batch.retired.empty() || !batch.retiredObjects.empty()) submit();
+  if (!batch.commands.empty() || !batch.deferred.empty() || !batch.deferredObjects.empty()) submit();
 }
 
 void GpuStream::finish() {
@@ -212,7 +214,7 @@ size_t GpuStream::stage(std::span<const std::byte> bytes) {
 void GpuStream::upload(const GpuBuffer& to, size_t offset, std::span<const std::byte> bytes) {
   CHECK(offset + bytes.size() <= to.bytes());
   while (!bytes.empty()) {
-    // What is staged is copied by a command of the same batch.
+    // Staged bytes must be copied by a command of the same batch.
     if (listing().staged == stagingBytes_ || isFull(kAlignment)) submit();
     const size_t length = std::min(bytes.size(), stagingBytes_ - listing().staged);
     const size_t staged = stage(bytes.first(length));
@@ -237,7 +239,7 @@ bool GpuStream::isFull(size_t argumentBytes) const {
 }
 
 bool GpuStream::copyWords(VkDeviceAddress from, VkDeviceAddress to, size_t bytes) {
-  if (from % 4 != 0 || to % 4 != 0 || bytes % 4 != 0 || bytes / 4 > kMostCopiedWords) return false;
+  if (from % 4 != 0 || to % 4 != 0 || bytes % 4 != 0 || bytes / 4 > kMaxCopiedWords) return false;
   struct {
     VkDeviceAddress from, to;
     uint32_t words, unused = 0;
@@ -255,7 +257,7 @@ void GpuStream::download(std::span<const Download> downloads) {
   };
   std::vector<Piece> pieces;  // in `downloads_`
   size_t used = 0;
-  const auto bring = [&] {
+  const auto readBack = [&] {
     finish();
     for (const Piece& piece : pieces) std::memcpy(piece.to.data(), downloads_.mapped() + piece.at, piece.to.size());
     pieces.clear();
@@ -264,7 +266,7 @@ void GpuStream::download(std::span<const Download> downloads) {
   for (const auto& [from, offset, to] : downloads) {
     CHECK(offset + to.size() <= from->bytes());
     for (size_t done = 0; done < to.size();) {
-      if (used == stagingBytes_) bring();
+      if (used == stagingBytes_) readBack();
       const size_t length = std::min(to.size() - done, stagingBytes_ - used);
       if (!copyWords(from->address() + offset + done, downloads_.address() + used, length)) {
         Command copy;
@@ -280,7 +282,7 @@ void GpuStream::download(std::span<const Download> downloads) {
       used += roundedUp(length);
     }
   }
-  if (!pieces.empty()) bring();
+  if (!pieces.empty()) readBack();
 }
 
 void GpuStream::fillZero(const GpuBuffer& buffer, size_t offset, size_t bytes) {
@@ -320,8 +322,8 @@ VkDeviceAddress GpuStream::addArguments(std::span<const std::byte> arguments) {
   return address;
 }
 
-void GpuStream::retire(GpuBuffer buffer) {
-  if (buffer) listing().retired.push_back(std::move(buffer));
+void GpuStream::deferDestroy(GpuBuffer buffer) {
+  if (buffer) listing().deferred.push_back(std::move(buffer));
 }
 
 GpuBuffer GpuStream::makeBuffer(size_t bytes) {
@@ -336,7 +338,7 @@ GpuBuffer GpuStream::makeBuffer(size_t bytes) {
 void GpuStream::measure(bool on) {
   finish();
   if (on && context_->timestampBits() == 0) {
-    throw Error(context_->name(), "", "it has no clock that can be asked", "leave TESSERA_GPU_TIMES out");
+    throw Error(context_->name(), "", "its queue has no timestamps", "leave TESSERA_GPU_TIMES out");
   }
   measuring_ = on;
   measured_.clear();

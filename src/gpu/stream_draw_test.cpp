@@ -1,4 +1,5 @@
-// Render passes among a stream's other commands: order, replayed batches, counts in memory, and retiring.
+// Tests of render passes among a stream's other commands: order, replayed batches, counts in memory, deferred
+// destruction.
 #include <optional>
 
 #include "gpu/testing/draw_test_support.h"
@@ -14,15 +15,15 @@ class GpuStreamDrawTest : public DrawTest {
     std::shared_ptr<GpuRenderPass> pass;
   };
   Target makeTarget() {
-    Target made = {makeImage(ImageFormat::rg32Uint), makeImage(ImageFormat::depth32Float), nullptr};
-    made.pass = std::make_shared<GpuRenderPass>(context_, std::vector<ColourAttachment>{{.image = made.numbers}},
-                                                DepthAttachment{.image = made.depth});
-    return made;
+    Target target = {makeImage(ImageFormat::rg32Uint), makeImage(ImageFormat::depth32Float), nullptr};
+    target.pass = std::make_shared<GpuRenderPass>(context_, std::vector<ColourAttachment>{{.image = target.numbers}},
+                                                  DepthAttachment{.image = target.depth});
+    return target;
   }
-  void retire(Target target) {
-    stream_->retire(std::move(target.pass));
-    stream_->retire(std::move(target.numbers));
-    stream_->retire(std::move(target.depth));
+  void deferDestroy(Target target) {
+    stream_->deferDestroy(std::move(target.pass));
+    stream_->deferDestroy(std::move(target.numbers));
+    stream_->deferDestroy(std::move(target.depth));
   }
   GpuGraphicsPipeline makePipeline() {
     return {context_, kTrianglesSpirv, kTrianglesNumbersSpirv,
@@ -37,9 +38,9 @@ class GpuStreamDrawTest : public DrawTest {
   }
 };
 
-TEST_F(GpuStreamDrawTest, SeesWhatCameBeforeItAndIsSeenByWhatComesAfterIt) {
-  // Vertices are uploaded, indices are doubled by a kernel, and what is drawn is copied and doubled, again and again
-  // in the same buffers: any missing order shows.
+TEST_F(GpuStreamDrawTest, OrdersPassesAmongOtherCommands) {
+  // Vertices are uploaded, indices are doubled by a kernel, and the drawn image is copied and doubled, repeatedly in
+  // the same buffers: any missing ordering shows.
   const Target target = makeTarget();
   const GpuGraphicsPipeline pipeline = makePipeline();
   const GpuKernel doubles(context_, kDoubleValuesSpirv);
@@ -51,7 +52,7 @@ TEST_F(GpuStreamDrawTest, SeesWhatCameBeforeItAndIsSeenByWhatComesAfterIt) {
   std::vector<uint32_t> numbers(copied.bytes() / 4);
   for (uint64_t seed = 0; seed < 30; ++seed) {
     const Triangles triangles = randomTriangles(seed, 8);
-    std::vector<Vertex> spaced(48);  // every other one: indices are to be doubled
+    std::vector<Vertex> spaced(48);  // every other one, as indices are doubled
     for (size_t i = 0; i < triangles.vertices.size(); ++i) spaced[2 * i] = triangles.vertices[i];
     stream_->upload(vertices, 0, std::as_bytes(std::span(spaced)));
     stream_->upload(indices, 0, std::as_bytes(std::span(triangles.indices)));
@@ -94,7 +95,7 @@ TEST_F(GpuStreamDrawTest, RecordsAPassOnceAndSendsItAgainWithOtherArguments) {
     stream_->draw(*target.pass, calls);
     stream_->copy(*target.numbers, copied, 0);
     stream_->download(copied, 0, std::as_writable_bytes(std::span(numbers)));
-    // Each draw has one triangle, the first: what is seen is whether the right ones are in front.
+    // Each draw has one triangle, whose number is 1: the image shows which pixels are covered.
     auto seen = expected[i % 3];
     for (RasterisedPixel& pixel : seen) pixel.number = pixel.number != 0;
     expectNumbers(seen, numbers);
@@ -103,7 +104,7 @@ TEST_F(GpuStreamDrawTest, RecordsAPassOnceAndSendsItAgainWithOtherArguments) {
   EXPECT_EQ(stream_->batchesRecorded() - recorded, 2u) << "one of each buffer of commands";
 }
 
-TEST_F(GpuStreamDrawTest, ReplaysAPassWhateverStateItsImagesWereLeftIn) {
+TEST_F(GpuStreamDrawTest, ReplaysAPassFromAnyImageState) {
   const Target target = makeTarget();
   const GpuGraphicsPipeline pipeline = makePipeline();
   const GpuRenderPass onTop(context_, {{.image = target.numbers, .load = LoadOperation::keep}},
@@ -117,7 +118,7 @@ TEST_F(GpuStreamDrawTest, ReplaysAPassWhateverStateItsImagesWereLeftIn) {
   stream_->finish();
   const uint64_t recorded = stream_->batchesRecorded();
   for (size_t i = 0; i < 24; ++i) {
-    // Short batches between leave the images drawn to, copied to, copied from, or with depths lost.
+    // Short batches in between draw to the images, copy to or from them, or discard the depths.
     if (i % 4 == 1) stream_->copy(marked, 0, *target.numbers);
     if (i % 4 == 2) stream_->draw(onTop, std::span<const DrawCall>());
     if (i % 4 == 3) stream_->copy(*target.numbers, copied, 0);
@@ -135,7 +136,7 @@ TEST_F(GpuStreamDrawTest, ReplaysAPassWhateverStateItsImagesWereLeftIn) {
   EXPECT_LE(stream_->batchesRecorded() - recorded, 2 + shortOnes);
 }
 
-TEST_F(GpuStreamDrawTest, RecordsAPassAnewWhereItsDrawsDiffer) {
+TEST_F(GpuStreamDrawTest, RecordsAPassAgainIfItsDrawsDiffer) {
   const Target target = makeTarget();
   const GpuGraphicsPipeline pipeline = makePipeline();
   GraphicsPipelineOptions options = {.colours = {{ImageFormat::rg32Uint}}, .depth = ImageFormat::depth32Float};
@@ -165,7 +166,7 @@ TEST_F(GpuStreamDrawTest, RecordsAPassAnewWhereItsDrawsDiffer) {
   EXPECT_GE(stream_->batchesRecorded() - recorded, 6u);
 }
 
-TEST_F(GpuStreamDrawTest, RecordsAPassAnewWhereItStandsAtTheAddressOfOneThatIsGone) {
+TEST_F(GpuStreamDrawTest, RecordsAPassAgainAtTheAddressOfADestroyedOne) {
   const Target targets[3] = {makeTarget(), makeTarget(), makeTarget()};
   const GpuGraphicsPipeline pipeline = makePipeline();
   const GpuBuffer copied(context_, targets[0].numbers->copiedBytes());
@@ -186,7 +187,7 @@ TEST_F(GpuStreamDrawTest, RecordsAPassAnewWhereItStandsAtTheAddressOfOneThatIsGo
   }
 }
 
-TEST_F(GpuStreamDrawTest, DrawsAsMuchAsTheDevicesMemorySays) {
+TEST_F(GpuStreamDrawTest, ReadsDrawCountsFromDeviceMemory) {
   const Target target = makeTarget();
   const GpuGraphicsPipeline pipeline = makePipeline();
   const Triangles triangles = randomTriangles(5, 12);
@@ -212,10 +213,10 @@ TEST_F(GpuStreamDrawTest, DrawsAsMuchAsTheDevicesMemorySays) {
       }
     }
   }
-  EXPECT_EQ(stream_->batchesRecorded() - recorded, 2u) << "the lists are the same but for what stands in memory";
+  EXPECT_EQ(stream_->batchesRecorded() - recorded, 2u) << "the commands differ only in the values in memory";
 }
 
-TEST_F(GpuStreamDrawTest, CountsInstancesAndTheFirstVertexInMemoryToo) {
+TEST_F(GpuStreamDrawTest, ReadsInstancesAndTheFirstVertexFromDeviceMemory) {
   const Target target = makeTarget();
   const GpuGraphicsPipeline pipeline = makePipeline();
   Triangles triangles = randomTriangles(6, 1);
@@ -228,7 +229,7 @@ TEST_F(GpuStreamDrawTest, CountsInstancesAndTheFirstVertexInMemoryToo) {
   const GpuBuffer words = uploaded(std::vector<uint32_t>{3, 4, 3, 0});
   stream_->draw(*target.pass, call(pipeline, arguments, DrawCount::counted(words, 0)));
   const auto counted = pixels<uint32_t>(*target.numbers);
-  // The same, as four triangles.
+  // The expected image has four shifted triangles.
   std::array<size_t, 4> seen = {};
   for (uint32_t instance = 0; instance < 4; ++instance) {
     Triangles shifted = triangles;
@@ -248,7 +249,7 @@ TEST_F(GpuStreamDrawTest, CountsInstancesAndTheFirstVertexInMemoryToo) {
   for (const size_t count : seen) EXPECT_GT(count, 100u);
 }
 
-TEST_F(GpuStreamDrawTest, LetsGoOfRetiredImagesAndPassesOnceTheWorkOnThemIsDone) {
+TEST_F(GpuStreamDrawTest, DestroysDeferredImagesAndPassesAfterTheirWork) {
   const GpuGraphicsPipeline pipeline = makePipeline();
   const Triangles triangles = randomTriangles(3, 12);
   const auto expected = rasterise(triangles, kSize);
@@ -263,7 +264,7 @@ TEST_F(GpuStreamDrawTest, LetsGoOfRetiredImagesAndPassesOnceTheWorkOnThemIsDone)
     GpuBuffer& copied = copies.emplace_back(context_, target.numbers->copiedBytes());
     stream_->draw(*target.pass, calls);
     stream_->copy(*target.numbers, copied, 0);
-    retire(std::move(target));
+    deferDestroy(std::move(target));
     EXPECT_FALSE(passes.back().expired());
     stream_->send();  // the next target may get the memory, the handles and the addresses of the last but one
   }
@@ -274,7 +275,7 @@ TEST_F(GpuStreamDrawTest, LetsGoOfRetiredImagesAndPassesOnceTheWorkOnThemIsDone)
   }
   for (const auto& pass : passes) EXPECT_TRUE(pass.expired());
   copies.clear();
-  EXPECT_LE(context_->heap().bytesInUse(), before + (size_t{16} << 20)) << "what downloads are staged in";
+  EXPECT_LE(context_->heap().bytesInUse(), before + (size_t{16} << 20)) << "the staging buffer of downloads";
 }
 
 TEST_F(GpuStreamDrawTest, TakesMoreDrawsThanABatchHasCommands) {

@@ -1,5 +1,5 @@
-// What a stream does with images: render passes, and copies to and from buffers. Every command leaves them in
-// GpuImage::kRestingLayout, and none asks what came before it: so each is valid in a batch that is sent again.
+// The image commands of a stream: render passes, and copies to and from buffers. Every command leaves images in
+// GpuImage::kRestingLayout and none depends on the commands before it, so each is valid in a resubmitted batch.
 #include "base/check.h"
 #include "base/error.h"
 #include "gpu/call.h"
@@ -123,12 +123,12 @@ void GpuStream::recordImageCopy(VkCommandBuffer commands, const Command& command
   changeLayout(commands, image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, GpuImage::kRestingLayout);
 }
 
-void GpuStream::retire(std::shared_ptr<const GpuImage> image) {
-  if (image) listing().retiredObjects.push_back(std::move(image));
+void GpuStream::deferDestroy(std::shared_ptr<const GpuImage> image) {
+  if (image) listing().deferredObjects.push_back(std::move(image));
 }
 
-void GpuStream::retire(std::shared_ptr<const GpuRenderPass> pass) {
-  if (pass) listing().retiredObjects.push_back(std::move(pass));
+void GpuStream::deferDestroy(std::shared_ptr<const GpuRenderPass> pass) {
+  if (pass) listing().deferredObjects.push_back(std::move(pass));
 }
 
 std::shared_ptr<GpuImage> GpuStream::makeImage(ImageSize size, ImageFormat format) {

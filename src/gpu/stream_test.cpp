@@ -45,7 +45,7 @@ class GpuStreamTest : public testing::Test {
   std::shared_ptr<GpuContext> context_;
 };
 
-TEST_F(GpuStreamTest, BringsBackWhatItUploaded) {
+TEST_F(GpuStreamTest, DownloadsWhatItUploaded) {
   GpuStream stream(context_);
   const GpuBuffer buffer(context_, 4000);
   const auto values = numbers(1000);
@@ -53,7 +53,7 @@ TEST_F(GpuStreamTest, BringsBackWhatItUploaded) {
   EXPECT_EQ(downloaded(stream, buffer), values);
 }
 
-TEST_F(GpuStreamTest, CarriesMoreThanItsStagingHolds) {
+TEST_F(GpuStreamTest, TransfersMoreThanItsStagingCapacity) {
   GpuStream stream(context_, 256);
   const GpuBuffer buffer(context_, 4000);
   const auto values = numbers(1000);
@@ -61,7 +61,7 @@ TEST_F(GpuStreamTest, CarriesMoreThanItsStagingHolds) {
   EXPECT_EQ(downloaded(stream, buffer), values);
 }
 
-TEST_F(GpuStreamTest, RunsAsManyWorkgroupsAsTheDevicesMemorySays) {
+TEST_F(GpuStreamTest, ReadsWorkgroupCountsFromDeviceMemory) {
   GpuStream stream(context_);
   const GpuKernel doubles(context_, kDoubleValuesSpirv);
   const GpuBuffer buffer(context_, 4000), words(context_, 16);
@@ -70,7 +70,7 @@ TEST_F(GpuStreamTest, RunsAsManyWorkgroupsAsTheDevicesMemorySays) {
   const Arguments arguments = {buffer.address(), 1000};
   stream.finish();
   const uint64_t before = stream.batchesRecorded();
-  for (const uint32_t groups : {2u, 0u, 5u, 1u, 3u}) {  // of 64 each; the lists are the same but for that number
+  for (const uint32_t groups : {2u, 0u, 5u, 1u, 3u}) {  // of 64 each; the commands differ only in that number
     for (uint32_t again = 0; again < 5; ++again) {      // short lists are always recorded
       const std::array<uint32_t, 3> counted = {groups + again, 1, 1};
       stream.upload(words, 4, std::as_bytes(std::span(counted)));
@@ -100,7 +100,7 @@ TEST_F(GpuStreamTest, WritesReadsAndClearsPartsOnly) {
 }
 
 TEST_F(GpuStreamTest, KernelsSeeTheResultsOfThoseBeforeThem) {
-  // Not commutative: 2(2x + 1) and 2(2x) + 1 differ, so any missing order shows. Over 128 commands span batches.
+  // The operations do not commute: 2(2x + 1) and 2(2x) + 1 differ, so any missing ordering shows.
   GpuStream stream(context_);
   const GpuKernel doubles(context_, kDoubleValuesSpirv);
   const uint32_t one = 1;
@@ -129,7 +129,7 @@ TEST_F(GpuStreamTest, ArgumentsOutliveTheCall) {
   EXPECT_EQ(downloaded(stream, b)[2], 3u << 3);
 }
 
-TEST_F(GpuStreamTest, CopiesWhatIsStagedThoughArgumentsAreMany) {
+TEST_F(GpuStreamTest, CopiesStagedBytesEvenIfArgumentsFillTheBatch) {
   GpuStream stream(context_);
   const GpuKernel kernel(context_, kDoubleValuesSpirv);
   const GpuBuffer a(context_, 256), b(context_, 256);
@@ -148,14 +148,14 @@ TEST_F(GpuStreamTest, CopiesWhatIsStagedThoughArgumentsAreMany) {
   EXPECT_EQ(downloaded(stream, b)[63], 399u);
 }
 
-TEST_F(GpuStreamTest, KeepsARetiredBufferUntilTheWorkOnItIsDone) {
+TEST_F(GpuStreamTest, DestroysDeferredBuffersAfterTheirWork) {
   GpuStream stream(context_);
   const GpuKernel kernel(context_, kDoubleValuesSpirv);
   for (int i = 0; i < 200; ++i) {
     GpuBuffer buffer(context_, 4096);
     stream.fillZero(buffer, 0, 4096);
     runDouble(stream, kernel, buffer);
-    stream.retire(std::move(buffer));
+    stream.deferDestroy(std::move(buffer));
   }
   EXPECT_NO_THROW(stream.finish());
 }
@@ -165,7 +165,7 @@ TEST_F(GpuStreamTest, RecordsABatchOnceAndSendsItAgainWithOtherArgumentsUploadsA
   const GpuKernel kernel(context_, kDoubleValuesSpirv);
   const GpuBuffer a(context_, 400000), b(context_, 400000);
   for (uint32_t i = 0; i < 20; ++i) {
-    // As the rays of training steps: other numbers of them, which round to the same workgroups.
+    // Like the rays of training steps: different counts, which round to the same number of workgroups.
     const std::vector<uint32_t> values(99000 + i, i + 1);
     const size_t first = i % 3;
     for (const GpuBuffer* buffer : {&a, &b}) stream.upload(*buffer, 4 * first, std::as_bytes(std::span(values)));
@@ -185,7 +185,7 @@ TEST_F(GpuStreamTest, RecordsABatchOnceAndSendsItAgainWithOtherArgumentsUploadsA
   EXPECT_EQ(stream.batchesRecorded(), 2u);  // once for each of its two staging buffers
 }
 
-TEST_F(GpuStreamTest, KeepsWhatItRecordedWhileItDoesSmallThings) {
+TEST_F(GpuStreamTest, KeepsRecordingsDespiteSmallBatches) {
   GpuStream stream(context_);
   const GpuKernel kernel(context_, kDoubleValuesSpirv);
   const GpuBuffer buffer(context_, 4000);
@@ -199,17 +199,17 @@ TEST_F(GpuStreamTest, KeepsWhatItRecordedWhileItDoesSmallThings) {
   EXPECT_LE(stream.batchesRecorded(), 2u + 39u);  // the large ones twice
 }
 
-TEST_F(GpuStreamTest, RecordsABatchAnewWhenItsBuffersHaveGone) {
+TEST_F(GpuStreamTest, RecordsABatchAgainIfItsBuffersAreGone) {
   GpuStream stream(context_);
   for (int i = 0; i < 6; ++i) {
-    GpuBuffer large(context_, size_t{40} << 20);  // of its own block, perhaps with the handle of the last
+    GpuBuffer large(context_, size_t{40} << 20);  // has its own block, possibly with the handle of the previous one
     constexpr size_t kPart = size_t{4'500'000};   // too large for a kernel
     for (size_t part = 0; part < 8; ++part) stream.fillZero(large, part * kPart, kPart);
     stream.fillZero(large, 8 * kPart, large.bytes() - 8 * kPart);
     uint32_t last = 1;
     stream.download(large, large.bytes() - 4, std::as_writable_bytes(std::span(&last, 1)));
     EXPECT_EQ(last, 0u);
-    stream.retire(std::move(large));
+    stream.deferDestroy(std::move(large));
     stream.finish();
   }
   EXPECT_GE(stream.batchesRecorded(), 6u);
@@ -233,13 +233,21 @@ TEST_F(GpuStreamTest, MeasuresWhatEachLabelTook) {
   EXPECT_TRUE(stream.measured().empty());
 }
 
-TEST_F(GpuStreamTest, FinishesWhenThereIsNothingToDo) {
+TEST_F(GpuStreamTest, WorksAfterFinishingWithoutWork) {
   GpuStream stream(context_);
   stream.finish();
   stream.finish();
+  const GpuKernel kernel(context_, kDoubleValuesSpirv);
+  const GpuBuffer buffer(context_, 256);
+  const auto values = numbers(64);
+  stream.upload(buffer, 0, std::as_bytes(std::span(values)));
+  runDouble(stream, kernel, buffer);
+  stream.finish();
+  stream.finish();
+  EXPECT_EQ(downloaded(stream, buffer)[2], 2 * values[2]);
 }
 
-TEST_F(GpuStreamTest, MemoryThatNoDeviceHasIsAnError) {
+TEST_F(GpuStreamTest, ThrowsIfMemoryIsInsufficient) {
   EXPECT_THROW(GpuBuffer(context_, size_t{1} << 50), Error);
 }
 

@@ -33,7 +33,7 @@ GpuSwapchain::~GpuSwapchain() {
   vkDestroySurfaceKHR(context_->instance(), surface_, nullptr);
 }
 
-// Colours are sRGB already: bytes are shown as they are.
+// Chooses a UNORM format: colours are sRGB already, so bytes are shown unchanged.
 void GpuSwapchain::chooseFormat() {
   uint32_t count = 0;
   checkVulkan(vkGetPhysicalDeviceSurfaceFormatsKHR(context_->physicalDevice(), surface_, &count, nullptr),
@@ -41,14 +41,14 @@ void GpuSwapchain::chooseFormat() {
   std::vector<VkSurfaceFormatKHR> formats(count);
   checkVulkan(vkGetPhysicalDeviceSurfaceFormatsKHR(context_->physicalDevice(), surface_, &count, formats.data()),
               "vkGetPhysicalDeviceSurfaceFormatsKHR");
-  for (const VkFormat wanted : {VK_FORMAT_B8G8R8A8_UNORM, VK_FORMAT_R8G8B8A8_UNORM}) {
+  for (const VkFormat preferred : {VK_FORMAT_B8G8R8A8_UNORM, VK_FORMAT_R8G8B8A8_UNORM}) {
     for (const VkSurfaceFormatKHR& format : formats) {
-      if (format.format != wanted || format.colorSpace != VK_COLOR_SPACE_SRGB_NONLINEAR_KHR) continue;
+      if (format.format != preferred || format.colorSpace != VK_COLOR_SPACE_SRGB_NONLINEAR_KHR) continue;
       format_ = format;
       return;
     }
   }
-  throw Error(context_->name(), "", "its screen shows no pictures of 8 bits a colour", "choose another screen");
+  throw Error(context_->name(), "", "its screen does not support 8-bit sRGB images", "choose another screen");
 }
 
 void GpuSwapchain::makeRenderPass() {
@@ -66,7 +66,7 @@ void GpuSwapchain::makeRenderPass() {
   subpass.pipelineBindPoint = VK_PIPELINE_BIND_POINT_GRAPHICS;
   subpass.colorAttachmentCount = 1;
   subpass.pColorAttachments = &reference;
-  // The image may be drawn when the screen has let go of it (the semaphore waits there), and be copied afterwards.
+  // The image may be drawn once the screen has released it (the semaphore waits at this stage), and copied afterwards.
   VkSubpassDependency before = {}, after = {};
   before.srcSubpass = VK_SUBPASS_EXTERNAL;
   before.srcStageMask = before.dstStageMask = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT;
@@ -96,7 +96,7 @@ void GpuSwapchain::drop() {
   images_.clear();
 }
 
-bool GpuSwapchain::remake(VkExtent2D wanted) {
+bool GpuSwapchain::remake(VkExtent2D windowSize) {
   const VkDevice device = context_->device();
   checkVulkan(vkDeviceWaitIdle(device), "vkDeviceWaitIdle");
   drop();
@@ -106,8 +106,8 @@ bool GpuSwapchain::remake(VkExtent2D wanted) {
   constexpr uint32_t kAnySize = 0xffffffff;
   extent_ = can.currentExtent;
   if (extent_.width == kAnySize) {
-    extent_ = {std::clamp(wanted.width, can.minImageExtent.width, can.maxImageExtent.width),
-               std::clamp(wanted.height, can.minImageExtent.height, can.maxImageExtent.height)};
+    extent_ = {std::clamp(windowSize.width, can.minImageExtent.width, can.maxImageExtent.width),
+               std::clamp(windowSize.height, can.minImageExtent.height, can.maxImageExtent.height)};
   }
   const VkSwapchainKHR old = swapchain_;
   swapchain_ = VK_NULL_HANDLE;
@@ -132,7 +132,7 @@ bool GpuSwapchain::remake(VkExtent2D wanted) {
       info.compositeAlpha = alpha;
       break;
     }
-    info.presentMode = VK_PRESENT_MODE_FIFO_KHR;  // as the screen is refreshed; the one mode that all have
+    info.presentMode = VK_PRESENT_MODE_FIFO_KHR;  // vertical synchronisation; the only mode that is always supported
     info.clipped = VK_TRUE;
     info.oldSwapchain = old;
     result = vkCreateSwapchainKHR(device, &info, nullptr, &swapchain_);
@@ -146,24 +146,24 @@ bool GpuSwapchain::remake(VkExtent2D wanted) {
   std::vector<VkImage> handles(count);
   checkVulkan(vkGetSwapchainImagesKHR(device, swapchain_, &count, handles.data()), "vkGetSwapchainImagesKHR");
   for (const VkImage handle : handles) {
-    Image& made = images_.emplace_back();
-    made.image = handle;
+    Image& image = images_.emplace_back();
+    image.image = handle;
     auto view = vulkanStruct<VkImageViewCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO);
     view.image = handle;
     view.viewType = VK_IMAGE_VIEW_TYPE_2D;
     view.format = format_.format;
     view.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
-    checkVulkan(vkCreateImageView(device, &view, nullptr, &made.view), "vkCreateImageView");
+    checkVulkan(vkCreateImageView(device, &view, nullptr, &image.view), "vkCreateImageView");
     auto framebuffer = vulkanStruct<VkFramebufferCreateInfo>(VK_STRUCTURE_TYPE_FRAMEBUFFER_CREATE_INFO);
     framebuffer.renderPass = renderPass_;
     framebuffer.attachmentCount = 1;
-    framebuffer.pAttachments = &made.view;
+    framebuffer.pAttachments = &image.view;
     framebuffer.width = extent_.width;
     framebuffer.height = extent_.height;
     framebuffer.layers = 1;
-    checkVulkan(vkCreateFramebuffer(device, &framebuffer, nullptr, &made.framebuffer), "vkCreateFramebuffer");
+    checkVulkan(vkCreateFramebuffer(device, &framebuffer, nullptr, &image.framebuffer), "vkCreateFramebuffer");
     const auto semaphore = vulkanStruct<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO);
-    checkVulkan(vkCreateSemaphore(device, &semaphore, nullptr, &made.drawn), "vkCreateSemaphore");
+    checkVulkan(vkCreateSemaphore(device, &semaphore, nullptr, &image.drawn), "vkCreateSemaphore");
   }
   return true;
 }
@@ -172,7 +172,7 @@ bool GpuSwapchain::isBlueFirst() const {
   return format_.format == VK_FORMAT_B8G8R8A8_UNORM;
 }
 
-// Of a window that nobody sees there may be no next image for long.
+// A window that is not visible may have no next image for a long time, so the wait is limited.
 GpuSwapchain::Acquired GpuSwapchain::acquire(VkSemaphore available, uint32_t& index) {
   constexpr uint64_t kLongest = 200'000'000;  // nanoseconds
   const VkResult result =
@@ -180,7 +180,7 @@ GpuSwapchain::Acquired GpuSwapchain::acquire(VkSemaphore available, uint32_t& in
   if (result == VK_ERROR_OUT_OF_DATE_KHR) return Acquired::fitsNoMore;
   checkVulkan(result, "vkAcquireNextImageKHR");
   if (result == VK_TIMEOUT || result == VK_NOT_READY) return Acquired::nothingYet;
-  return Acquired::image;  // VK_SUBOPTIMAL_KHR too: `present` says so once more
+  return Acquired::image;  // also if VK_SUBOPTIMAL_KHR: `present` reports it again
 }
 
 bool GpuSwapchain::present(uint32_t index) {

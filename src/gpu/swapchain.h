@@ -1,4 +1,4 @@
-// The images of a window, which the device draws and the screen shows in turn.
+// The swapchain of a window: the images that the device draws and the screen shows in turn.
 #pragma once
 
 #include <volk.h>
@@ -12,36 +12,36 @@ namespace tessera {
 
 class GpuSwapchain {
  public:
-  // Takes the surface. The context was opened with GpuOptions::presents. Throws Error where the device cannot show
-  // pictures on it.
+  // Takes ownership of the surface. The context must have been opened with GpuOptions::presents. Throws Error if the
+  // device cannot present to the surface.
   GpuSwapchain(std::shared_ptr<const GpuContext> context, VkSurfaceKHR surface);
   ~GpuSwapchain();  // the device must be idle
   GpuSwapchain(const GpuSwapchain&) = delete;
   GpuSwapchain& operator=(const GpuSwapchain&) = delete;
 
-  // One colour attachment, cleared to black, left as the screen wants it.
+  // The pass has one colour attachment, which it clears to black and leaves in the layout for presentation.
   VkRenderPass renderPass() const { return renderPass_; }
 
-  // Images anew, of the surface's size, or of this one where the surface leaves it to us. False where it has none: the
-  // window is hidden. Waits for the device.
-  bool remake(VkExtent2D wanted);
+  // Recreates the images with the surface's size, or with `windowSize` if the surface does not define one. Returns
+  // false if the size is zero because the window is hidden. Waits for the device.
+  bool remake(VkExtent2D windowSize);
   bool isMade() const { return swapchain_ != VK_NULL_HANDLE; }
 
   VkExtent2D extent() const { return extent_; }
-  bool isBlueFirst() const;  // of an image's bytes
+  bool isBlueFirst() const;  // the byte order of a pixel: BGRA instead of RGBA
   bool canBeRead() const { return canBeRead_; }
 
   struct Image {
     VkImage image = VK_NULL_HANDLE;
     VkImageView view = VK_NULL_HANDLE;
     VkFramebuffer framebuffer = VK_NULL_HANDLE;
-    VkSemaphore drawn = VK_NULL_HANDLE;  // to be signalled by what is drawn
+    VkSemaphore drawn = VK_NULL_HANDLE;  // to be signalled by the commands that draw the image
   };
-  // The next one, which may be drawn once `available` is signalled.
+  // Acquires the next image, which may be drawn once `available` is signalled, and stores its index.
   enum class Acquired { image, nothingYet, fitsNoMore };
   Acquired acquire(VkSemaphore available, uint32_t& index);
   const Image& image(uint32_t index) const { return images_[index]; }
-  // Once its `drawn` is signalled. False: the images fit the window no more.
+  // Presents an image once its `drawn` is signalled. Returns false if the images no longer match the window.
   bool present(uint32_t index);
 
  private:

@@ -30,7 +30,7 @@ bool validationInstalled() {
   for (const VkLayerProperties& layer : layers) {
     if (std::strcmp(layer.layerName, kValidationLayer) == 0) return true;
   }
-  warn("vulkan validation is wanted but not installed; the package is vulkan-validationlayers");
+  warn("Vulkan validation is requested, but the layers are not installed; the package is vulkan-validationlayers");
   return false;
 }
 

@@ -1,4 +1,4 @@
-// Khronos' validation layers: they say what we do wrong with Vulkan. Off unless asked for.
+// The Khronos validation layers, which report incorrect use of Vulkan. They are off unless requested.
 #pragma once
 
 #include <volk.h>
@@ -8,14 +8,14 @@ namespace tessera {
 inline const char* const kValidationLayer = "VK_LAYER_KHRONOS_validation";
 inline const char* const kValidationExtension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
 
-// Warns, naming the package, where they are not.
+// Returns whether the layers are installed; if not, logs a warning that names the package.
 bool validationInstalled();
 
-// Reports warnings and errors as log warnings.
+// Creates a messenger that logs the layers' errors and warnings as warnings.
 VkDebugUtilsMessengerEXT createValidationMessenger(VkInstance instance);
 void destroyValidationMessenger(VkInstance instance, VkDebugUtilsMessengerEXT messenger);
 
-// Errors and warnings that they reported so far in this process.
+// Returns the number of errors and warnings that the layers have reported so far in this process.
 int validationMessageCount();
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// Reads what scene/capture_writer.h wrote, exactly.
+// Reads the capture folders that scene/capture_writer.h writes, exactly.
 #pragma once
 
 #include "base/file.h"
@@ -6,10 +6,11 @@
 
 namespace tessera {
 
-// Throws Error when the folder is no capture of ours (a source is imported first), or when a photo is missing.
+// Throws Error if the folder was not written by writeCapture (other sources must be imported first), or if a photo is
+// missing.
 Capture readCapture(const fs::path& folder);
 
-// Whether the folder's transforms.json is one of ours.
+// Returns whether the folder's transforms.json was written by writeCapture.
 bool isCapture(const fs::path& folder);
 
 }  // namespace tessera

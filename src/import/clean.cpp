@@ -15,7 +15,7 @@
 namespace tessera {
 namespace {
 
-// EXIF, XMP and the size stand before the picture itself, thumbnails included, in well under this.
+// EXIF (with thumbnails), XMP and the size precede the image data and take far fewer bytes than this.
 constexpr size_t kHeadBytes = size_t{1} << 20;
 
 Bytes readHead(const fs::path& path) {
@@ -26,7 +26,7 @@ Bytes readHead(const fs::path& path) {
   return head;
 }
 
-PhotoFacts factsOf(const Photo& photo) {
+PhotoFacts readPhotoFacts(const Photo& photo) {
   PhotoFacts facts;
   const Bytes head = readHead(photo.image);
   const auto info = probeImage(head);
@@ -37,7 +37,7 @@ PhotoFacts factsOf(const Photo& photo) {
   return facts;
 }
 
-// A picture made smaller or larger keeps its shape to within the rounding of one pixel on each side.
+// Resizing preserves the aspect ratio to within the rounding of one pixel on each side.
 bool sameShape(const Camera& camera, int width, int height) {
   const double scale = static_cast<double>(width) / camera.width;
   return std::abs(camera.height * scale - height) <= 1 + scale;
@@ -45,7 +45,7 @@ bool sameShape(const Camera& camera, int width, int height) {
 
 }  // namespace
 
-std::string firstOf(const std::vector<std::string>& names) {
+std::string abbreviateList(const std::vector<std::string>& names) {
   std::string first;
   for (size_t i = 0; i < names.size() && i < 3; ++i) first += (i > 0 ? ", " : "") + names[i];
   return names.size() > 3 ? first + ", ..." : first;
@@ -53,7 +53,7 @@ std::string firstOf(const std::vector<std::string>& names) {
 
 void warnDropped(const std::vector<std::string>& names, const std::string& what) {
   if (names.empty()) return;
-  warn("{} photo{} {}; dropped ({})", names.size(), names.size() > 1 ? "s" : "", what, firstOf(names));
+  warn("{} photo{} {}; dropped ({})", names.size(), names.size() > 1 ? "s" : "", what, abbreviateList(names));
 }
 
 void keepPhotos(SourceCapture& source, const std::vector<size_t>& order) {
@@ -95,7 +95,7 @@ void keepPhotos(SourceCapture& source, const std::vector<size_t>& order) {
 std::vector<PhotoFacts> cleanSource(SourceCapture& source, ThreadPool& pool) {
   Capture& capture = source.capture;
   std::vector<PhotoFacts> facts(capture.photos.size());
-  pool.run(facts.size(), [&](size_t i, int) { facts[i] = factsOf(capture.photos[i]); });
+  pool.run(facts.size(), [&](size_t i, int) { facts[i] = readPhotoFacts(capture.photos[i]); });
 
   std::vector<std::string> missing, unreadable, repeated, misshapen;
   std::set<fs::path> seen;
@@ -123,9 +123,9 @@ std::vector<PhotoFacts> cleanSource(SourceCapture& source, ThreadPool& pool) {
         const Camera scaled = camera.scaledTo(facts[i].width, facts[i].height);
         factors[i] = {static_cast<float>(facts[i].width) / static_cast<float>(camera.width),
                       static_cast<float>(facts[i].height) / static_cast<float>(camera.height)};
-        const auto found = std::find(capture.cameras.begin(), capture.cameras.end(), scaled);
-        photo.camera = static_cast<int>(found - capture.cameras.begin());
-        if (found == capture.cameras.end()) capture.cameras.push_back(scaled);
+        const auto match = std::find(capture.cameras.begin(), capture.cameras.end(), scaled);
+        photo.camera = static_cast<int>(match - capture.cameras.begin());
+        if (match == capture.cameras.end()) capture.cameras.push_back(scaled);
       }
       if (!photo.gps) photo.gps = facts[i].tags.gps;
       order.push_back(i);
@@ -145,10 +145,10 @@ std::vector<PhotoFacts> cleanSource(SourceCapture& source, ThreadPool& pool) {
 
   std::stable_sort(order.begin(), order.end(),
                    [&](size_t a, size_t b) { return naturalLess(capture.photos[a].name, capture.photos[b].name); });
-  std::vector<PhotoFacts> kept;
-  for (const size_t i : order) kept.push_back(facts[i]);
+  std::vector<PhotoFacts> remaining;
+  for (const size_t i : order) remaining.push_back(facts[i]);
   keepPhotos(source, order);
-  return kept;
+  return remaining;
 }
 
 }  // namespace tessera

@@ -1,4 +1,5 @@
-// Holds a source capture against what is on disk, and drops what is wrong with one warning of each kind.
+// Compares a source capture with the files on disk, and drops photos that cannot be used, with one warning for each
+// kind of fault.
 #pragma once
 
 #include <optional>
@@ -16,18 +17,19 @@ struct PhotoFacts {
   PhotoTags tags;
 };
 
-// Keeps photos[order[0]], photos[order[1]], ... and their observations; unused cameras go too.
+// Keeps photos[order[0]], photos[order[1]], ... in this order, and their observations. Removes unused cameras too.
 void keepPhotos(SourceCapture& source, const std::vector<size_t>& order);
 
-// Reads the head of every photo; drops missing, unreadable and repeated ones and those whose shape is not their
-// camera's; gives photos of another size than their camera's a lens scaled to fit; sorts in natural name order. GPS
-// goes into Photo::gps where the source had none. Returns the facts of the photos that are left.
+// Reads the header of every photo; drops missing, unreadable and repeated photos and those whose aspect ratio differs
+// from their camera's; scales the lens of photos whose size differs from their camera's; sorts in natural name order.
+// Sets Photo::gps from the photo's tags where the source had none. Returns the facts of the remaining photos, in their
+// new order.
 std::vector<PhotoFacts> cleanSource(SourceCapture& source, ThreadPool& pool);
 
-// "a.jpg, b.jpg, c.jpg, ..."
-std::string firstOf(const std::vector<std::string>& names);
+// Returns the first names and, where there are more, an ellipsis: "a.jpg, b.jpg, c.jpg, ...".
+std::string abbreviateList(const std::vector<std::string>& names);
 
-// "12 photos WHAT; dropped (a.jpg, b.jpg, c.jpg, ...)".
+// Warns "12 photos WHAT; dropped (a.jpg, b.jpg, c.jpg, ...)" unless `names` is empty.
 void warnDropped(const std::vector<std::string>& names, const std::string& what);
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// cameras.bin, images.bin, points3D.bin: packed, little endian.
+// Decodes cameras.bin, images.bin and points3D.bin, which are packed and little-endian.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 namespace tessera {
 namespace {
 
-// Reads until the bytes end, then stays failed.
+// Reads values in sequence. Once the bytes have ended, every further read fails.
 class Cursor {
  public:
   explicit Cursor(std::span<const std::byte> bytes) : bytes_(bytes) {}
@@ -51,7 +51,7 @@ class Cursor {
   bool ok_ = true;
 };
 
-// A count of things that take at least `bytesEach`; fails the whole file when they cannot fit.
+// Reads a count of records of at least `bytesEach` bytes. Fails if the rest of the file is too short for them.
 bool takeCount(Cursor& in, uint64_t bytesEach, uint64_t& count, const char* what, std::string& reason) {
   count = in.take<uint64_t>();
   if (in.ok() && count <= in.left() / bytesEach) return true;
@@ -71,7 +71,7 @@ bool decodeCameras(std::span<const std::byte> bytes, ColmapModel& model, std::st
     const auto width = in.take<uint64_t>(), height = in.take<uint64_t>();
     const int parameterCount = colmapParameterCount(lens);
     if (in.ok() && parameterCount < 0) {
-      // How many parameters it has, and so where the next camera begins, is not known either.
+      // Its number of parameters is unknown too, and so is the start of the next camera.
       reason = fmt::format("byte {}: lens model number {} is not known", begin, lens);
       return false;
     }

@@ -12,7 +12,7 @@
 namespace tessera {
 namespace {
 
-// Models that are special cases of another, and one that is not a lens with a focal length.
+// COLMAP's numbers of two models that are special cases of another one, and of one without a focal length.
 constexpr int kSimpleFisheye = 14, kFisheye = 15, kEquirectangular = 17;
 constexpr uint64_t kMaxSide = 1 << 20;
 
@@ -43,7 +43,7 @@ std::optional<Camera> checkedCamera(LensModel lens, uint64_t width, uint64_t hei
   return camera;
 }
 
-std::optional<Pose> poseOf(const ColmapModel::Image& image) {
+std::optional<Pose> decodePose(const ColmapModel::Image& image) {
   const auto& q = image.quaternion;
   const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   const Vec3d t(image.translation[0], image.translation[1], image.translation[2]);
@@ -52,7 +52,7 @@ std::optional<Pose> poseOf(const ColmapModel::Image& image) {
   return Pose{rotation.toRotationMatrix(), t}.inverse();
 }
 
-// images/a/b.jpg has its mask at masks/a/b.jpg.png (COLMAP's rule), masks/a/b.jpg or masks/a/b.png.
+// Finds the mask of images/a/b.jpg: masks/a/b.jpg.png (COLMAP's convention), masks/a/b.jpg or masks/a/b.png.
 fs::path findMask(const fs::path& maskFolder, const std::string& name) {
   std::error_code status;
   if (!fs::is_directory(maskFolder, status)) return {};
@@ -154,7 +154,7 @@ SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageF
   }
 
   size_t withoutCamera = 0, outside = 0, withoutPose = 0;
-  std::map<std::string, size_t> unusable;  // photos of each lens
+  std::map<std::string, size_t> unusable;  // number of photos by lens
   const fs::path maskFolder = imageFolder.parent_path() / "masks";
   for (const ColmapModel::Image& image : model.images) {
     if (const auto lens = model.unusable.find(image.camera); lens != model.unusable.end()) {
@@ -163,7 +163,7 @@ SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageF
     }
     const auto camera = cameraIndex.find(image.camera);
     const auto path = resolveInside(imageFolder, image.name);
-    const auto worldFromCamera = poseOf(image);
+    const auto worldFromCamera = decodePose(image);
     withoutCamera += camera == cameraIndex.end();
     outside += !path;
     withoutPose += !worldFromCamera;
@@ -200,7 +200,7 @@ SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageF
 
 std::optional<fs::path> findColmapModel(const fs::path& source) {
   for (const fs::path& folder : {source / "sparse", source / "colmap" / "sparse"}) {
-    // COLMAP numbers the pieces that it could not join: the one with the most photos is the scene.
+    // COLMAP numbers the components that it could not join. The one with the largest list of images is used.
     fs::path best;
     uintmax_t bestSize = 0;
     int pieces = 0;

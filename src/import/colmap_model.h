@@ -1,4 +1,4 @@
-// COLMAP sparse models, text and binary.
+// Reads COLMAP sparse models, text and binary.
 // Source: COLMAP's documentation of its output format (cameras, images, points3D) and its camera models.
 #pragma once
 
@@ -15,11 +15,11 @@
 
 namespace tessera {
 
-// As the files say it: ids neither contiguous nor sorted, poses camera-from-world.
+// A model as its files state it: ids are neither contiguous nor sorted, poses are camera-from-world.
 struct ColmapModel {
   struct Keypoint {
     double x = 0, y = 0;
-    uint64_t point = 0;  // id; only keypoints that belong to a point are kept
+    uint64_t point = 0;  // id; keypoints without a point are left out
   };
   struct Image {
     uint32_t id = 0, camera = 0;
@@ -33,34 +33,36 @@ struct ColmapModel {
     SparsePoint point;
   };
   std::unordered_map<uint32_t, Camera> cameras;
-  std::unordered_map<uint32_t, std::string> unusable;  // cameras whose lens is not known here: the lens's name
+  std::unordered_map<uint32_t, std::string> unusable;  // cameras whose lens is not supported → the lens's name
   std::vector<Image> images;
   std::vector<Point> points;
 };
 
-// Untrusted bytes: nothing, with why and where in `reason`, for what is not a model. Memory is bounded by the length of
-// the input, whatever its counts say.
+// Decode untrusted bytes. Return nothing if they are not a model, with the reason and its location in `reason`. Memory
+// is bounded by the length of the input, whatever counts it states.
 std::optional<ColmapModel> decodeColmapBinary(std::span<const std::byte> cameras, std::span<const std::byte> images,
                                               std::span<const std::byte> points, std::string& reason);
 std::optional<ColmapModel> decodeColmapText(std::string_view cameras, std::string_view images, std::string_view points,
                                             std::string& reason);
 
-// A camera from COLMAP's model name or number and its parameters; nothing for another lens, another number of
-// parameters, no size, or numbers that are absurd. Fisheye lenses without distortion are taken as OPENCV_FISHEYE.
+// Returns a camera from COLMAP's model name or number and its parameters, or nothing, with the reason in `reason`, for
+// an unsupported lens, a wrong number of parameters, an empty size, or parameters outside any plausible range. Fisheye
+// lenses without distortion become OPENCV_FISHEYE.
 std::optional<Camera> colmapCamera(std::string_view model, uint64_t width, uint64_t height,
                                    std::span<const double> parameters, std::string& reason);
 std::optional<Camera> colmapCamera(int model, uint64_t width, uint64_t height, std::span<const double> parameters,
                                    std::string& reason);
-int colmapParameterCount(int model);             // -1 for a model that is not known
+int colmapParameterCount(int model);             // -1 for an unknown model
 std::string_view colmapUnusableLens(int model);  // name of a model whose parameters can be skipped but not used, or ""
-bool isColmapLens(std::string_view model);       // whether colmapCamera knows it
+bool isColmapLens(std::string_view model);       // whether colmapCamera supports it
 
-// Poses, points, and tracks as observations with each one's own reprojection error. Image paths become
-// `imageFolder`/name; photos whose camera is missing or unusable, whose pose is absurd, or whose name leaves the folder
-// are dropped with a warning.
+// Converts a model into a capture: poses, points, and tracks as observations, each with its own reprojection error.
+// Image paths become `imageFolder`/name. Drops photos whose camera is missing or unusable, whose pose is not finite or
+// implausibly far away, or whose name leaves the folder, with a warning.
 SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageFolder);
 
-// The folder of the sparse model in a source folder (sparse/0, sparse, colmap/sparse/0, or itself), if it has one.
+// Returns the folder of the sparse model in a source folder (sparse/0, sparse, colmap/sparse/0, or the folder itself;
+// the largest of several numbered ones, with a warning), or nothing if it has none.
 std::optional<fs::path> findColmapModel(const fs::path& source);
 SourceCapture readColmap(const fs::path& source);
 

@@ -11,7 +11,7 @@
 namespace tessera {
 namespace {
 
-// Builds the binary files a value at a time.
+// Builds the binary files value by value.
 class Writer {
  public:
   template <class T>
@@ -30,7 +30,7 @@ class Writer {
 
 constexpr uint64_t kNoPoint = ~uint64_t{0};
 
-// One camera of every lens, two images, two points; ids with holes, in no order.
+// A model with one camera of every lens, two images and two points; its ids have gaps and are unordered.
 struct BinaryModel {
   Writer cameras, images, points;
 
@@ -70,7 +70,7 @@ TEST(Colmap, ReadsBinaryModels) {
   EXPECT_EQ(model->cameras.at(58).lens, LensModel::eucm);
   ASSERT_EQ(model->images.size(), 2u);
   EXPECT_EQ(model->images[1].name, "a photo.jpg");
-  ASSERT_EQ(model->images[0].keypoints.size(), 1u);  // the other belongs to no point
+  ASSERT_EQ(model->images[0].keypoints.size(), 1u);  // the other one has no point
   EXPECT_EQ(model->images[0].keypoints[0].point, 70u);
   EXPECT_EQ(model->points[0].point.xInWorld, Vec3d(0.25, -1.5, 1000));
 }
@@ -139,7 +139,7 @@ TEST(Colmap, SaysWhatIsWrongWithACamera) {
   EXPECT_FALSE(decodeColmapText("1 PINHOLE 640 480 -5 2 3 4\n", "", "", reason).has_value());
 }
 
-TEST(Colmap, PutsCamerasWhereTheyStoodAndMeasuresEachObservation) {
+TEST(Colmap, ConvertsPosesAndComputesReprojectionErrors) {
   ColmapModel model;
   model.cameras[1] = {100, 100, LensModel::pinhole, {50, 50, 50, 50}};
   ColmapModel::Image image;
@@ -149,7 +149,7 @@ TEST(Colmap, PutsCamerasWhereTheyStoodAndMeasuresEachObservation) {
   image.translation = {1, 2, 3};
   image.keypoints = {{60, 50, 7}, {0, 0, 8}};
   model.images = {image};
-  // camera = R world + t with R = [[0,0,1],[0,1,0],[-1,0,0]]: the world point below lies at (0, 0, 2) in the camera.
+  // camera = R world + t with R = [[0,0,1],[0,1,0],[-1,0,0]]: the world point below is (0, 0, 2) in camera axes.
   model.points = {{7, {Vec3d(1, -2, -1), {}, 0}}};
   const TemporaryFolder folder;
   const SourceCapture source = captureFromColmap(model, folder.path());
@@ -161,7 +161,7 @@ TEST(Colmap, PutsCamerasWhereTheyStoodAndMeasuresEachObservation) {
   EXPECT_NEAR(source.capture.observations[0].error, 10, 1e-5);
 }
 
-TEST(Colmap, DropsImagesThatCannotBe) {
+TEST(Colmap, DropsImagesWithInvalidPathsCamerasOrPoses) {
   const TemporaryFolder folder;
   ColmapModel model;
   model.cameras[1] = {100, 100, LensModel::pinhole, {50, 50, 50, 50}};
@@ -184,7 +184,7 @@ TEST(Colmap, DropsImagesThatCannotBe) {
   bad = good;
   bad.translation[1] = std::numeric_limits<double>::quiet_NaN();
   model.images.push_back(bad);
-  bad.translation = {1.5e308, -1.5e308, 1.5e308};  // finite; turned by its rotation, no more
+  bad.translation = {1.5e308, -1.5e308, 1.5e308};  // finite, but not once it is rotated
   bad.quaternion = {0.9, 0.1, 0.3, 0.2};
   model.images.push_back(bad);
   testing::internal::CaptureStderr();
@@ -196,7 +196,7 @@ TEST(Colmap, DropsImagesThatCannotBe) {
   EXPECT_NE(warnings.find("1 photos name a camera"), std::string::npos) << warnings;
 }
 
-TEST(Colmap, KeepsNoPointThatIsAbsurdlyFarAway) {
+TEST(Colmap, DropsPointsThatAreImplausiblyFarAway) {
   ColmapModel model;
   model.points = {{1, {Vec3d(1, 2, 3), {}, 0}}, {2, {Vec3d(0, -1e308, 0), {}, 0}}};
   model.points.push_back({3, {Vec3d(0, std::nan(""), 0), {}, 0}});
@@ -225,12 +225,12 @@ TEST(Colmap, DropsOnlyThePhotosOfALensThatCannotBeUsed) {
     EXPECT_NE(warnings.find("2 photos were taken with the lens EQUIRECTANGULAR"), std::string::npos) << warnings;
     EXPECT_EQ(warnings.find("name a camera"), std::string::npos) << warnings;
   }
-  // A lens of a number that nobody knows: where the next camera begins is not known either.
+  // A lens with an unknown number is an error, because the start of the next camera is unknown too.
   cameras.bytes[12] = std::byte{99};
   EXPECT_FALSE(decodeColmapBinary(cameras.bytes, Writer().add(uint64_t{0}).bytes, {}, reason).has_value());
 }
 
-TEST(Colmap, IsFoundWhereItsToolsPutIt) {
+TEST(Colmap, IsFoundInTheFoldersThatColmapUses) {
   for (const std::string place : {"sparse/0", "sparse", "colmap/sparse/0", "."}) {
     const TemporaryFolder folder;
     writeFileAtomically(folder / place / "cameras.txt", std::string_view("1 PINHOLE 4 4 1 1 2 2\n"));

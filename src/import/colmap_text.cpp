@@ -1,4 +1,5 @@
-// cameras.txt, images.txt, points3D.txt: blank-separated, '#' begins a comment line, an image takes two lines.
+// Decodes cameras.txt, images.txt and points3D.txt: fields are separated by spaces, '#' starts a comment line, and an
+// image takes two lines.
 #include <fmt/format.h>
 
 #include <charconv>
@@ -12,7 +13,7 @@ class Lines {
  public:
   explicit Lines(std::string_view text) : text_(text) {}
 
-  // The next line as it is; false at the end.
+  // Reads the next line unchanged. Returns false at the end.
   bool next(std::string_view& line) {
     if (text_.empty()) return false;
     const size_t end = text_.find('\n');
@@ -22,7 +23,7 @@ class Lines {
     ++number_;
     return true;
   }
-  // The next line that is neither blank nor a comment.
+  // Reads the next line that is neither blank nor a comment. Returns false at the end.
   bool nextRecord(std::string_view& line) {
     while (next(line)) {
       const size_t begin = line.find_first_not_of(" \t");
@@ -49,9 +50,9 @@ class Words {
     }
     line_.remove_prefix(begin);
     const size_t length = std::min(line_.find_first_of(" \t"), line_.size());
-    const std::string_view found = line_.substr(0, length);
+    const std::string_view text = line_.substr(0, length);
     line_.remove_prefix(length);
-    return found;
+    return text;
   }
   template <class T>
   bool number(T& value) {
@@ -105,7 +106,7 @@ bool decodeImages(std::string_view text, ColmapModel& model, std::string& reason
     for (double& q : image.quaternion) ok = ok && words.number(q);
     for (double& t : image.translation) ok = ok && words.number(t);
     ok = ok && words.number(image.camera);
-    image.name = words.rest();  // names may hold blanks
+    image.name = words.rest();  // names may contain spaces
     if (!ok || image.name.empty()) {
       reason = fmt::format("line {}: expected: id qw qx qy qz tx ty tz camera name", lines.number());
       return false;

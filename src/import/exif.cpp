@@ -26,7 +26,7 @@ std::optional<double> rational(const ExifData& data, const ExifEntry& entry, siz
   return static_cast<double>(value.numerator) / value.denominator;
 }
 
-// Degrees, minutes and seconds; negative when the reference letter says so.
+// Reads an angle of degrees, minutes and seconds, negative if the reference letter is `negative`.
 std::optional<double> angle(const ExifData& data, int tag, int referenceTag, char negative) {
   const ExifEntry* entry = gpsEntry(data, tag, EXIF_FORMAT_RATIONAL, 3);
   const ExifEntry* reference = gpsEntry(data, referenceTag, EXIF_FORMAT_ASCII, 1);
@@ -38,7 +38,7 @@ std::optional<double> angle(const ExifData& data, int tag, int referenceTag, cha
   return static_cast<char>(reference->data[0]) == negative ? -value : value;
 }
 
-std::optional<GpsFix> gpsOf(const ExifData& data) {
+std::optional<GpsFix> readGpsFix(const ExifData& data) {
   const auto latitude = angle(data, EXIF_TAG_GPS_LATITUDE, EXIF_TAG_GPS_LATITUDE_REF, 'S');
   const auto longitude = angle(data, EXIF_TAG_GPS_LONGITUDE, EXIF_TAG_GPS_LONGITUDE_REF, 'W');
   if (!latitude || !longitude) return std::nullopt;
@@ -53,20 +53,20 @@ std::optional<GpsFix> gpsOf(const ExifData& data) {
 
 bool makesSense(const GpsFix& fix) {
   return std::abs(fix.latitude) <= 90 && std::abs(fix.longitude) <= 180 && std::abs(fix.altitude) < 1e5 &&
-         (fix.latitude != 0 || fix.longitude != 0);  // 0, 0 is what a receiver without a fix writes
+         (fix.latitude != 0 || fix.longitude != 0);  // a receiver without a fix writes 0, 0
 }
 
 }  // namespace
 
 PhotoTags decodePhotoTags(std::span<const std::byte> jpeg) {
   PhotoTags tags;
-  constexpr size_t kMost = size_t{1} << 28;
+  constexpr size_t kMax = size_t{1} << 28;
   const auto* bytes = reinterpret_cast<const unsigned char*>(jpeg.data());
   if (jpeg.size() < 4 || bytes[0] != 0xff || bytes[1] != 0xd8) return tags;
-  jpeg = jpeg.first(std::min(jpeg.size(), kMost));
+  jpeg = jpeg.first(std::min(jpeg.size(), kMax));
   const std::unique_ptr<ExifData, DeleteExif> data(
       exif_data_new_from_data(bytes, static_cast<unsigned int>(jpeg.size())));
-  if (data != nullptr) tags.gps = gpsOf(*data);
+  if (data != nullptr) tags.gps = readGpsFix(*data);
 
   const std::string_view text(reinterpret_cast<const char*>(jpeg.data()), jpeg.size());
   const size_t begin = text.find("<x:xmpmeta");

@@ -1,4 +1,4 @@
-// Where a photo was taken and which way the camera hung, from its EXIF (libexif) and from the XMP that drones add.
+// The position and the orientation of the camera of a photo, from its EXIF (libexif) and from the XMP that drones add.
 // Source: EXIF 2.3; DJI's XMP namespace http://www.dji.com/drone-dji/1.0/.
 #pragma once
 
@@ -11,7 +11,8 @@
 
 namespace tessera {
 
-// Degrees, north-east-down, intrinsic Z-Y-X: yaw clockwise from north, pitch 0 at the horizon and -90 straight down.
+// Orientation of a camera gimbal: degrees, north-east-down, intrinsic Z-Y-X; yaw is clockwise from north, pitch is 0 at
+// the horizon and -90 straight down.
 struct GimbalAngles {
   double yaw = 0, pitch = 0, roll = 0;
 };
@@ -21,10 +22,12 @@ struct PhotoTags {
   std::optional<GimbalAngles> gimbal;
 };
 
-// Untrusted bytes of a whole JPEG file (or its first part). Tags that are not there, or make no sense, are empty.
+// Decodes the tags of a JPEG file from its untrusted bytes (all of them, or the first part). Missing and implausible
+// tags are empty.
 PhotoTags decodePhotoTags(std::span<const std::byte> jpeg);
 
-// The part of it that is XMP: attributes (drone-dji:GpsLatitude="+1.5") and elements (<drone-dji:GpsLatitude>) alike.
+// The tags of the XMP packet, given as attributes (drone-dji:GpsLatitude="+1.5") or as elements
+// (<drone-dji:GpsLatitude>).
 struct XmpTags {
   std::optional<double> latitude, longitude, absoluteAltitude, relativeAltitude;
   std::optional<double> gimbalYaw, gimbalPitch, gimbalRoll;

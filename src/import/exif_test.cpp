@@ -28,7 +28,7 @@ TEST(Xmp, ReadsElements) {
   EXPECT_EQ(tags.longitude, 77);
 }
 
-TEST(Xmp, IsNotFooledByOtherNamesAndOtherText) {
+TEST(Xmp, IgnoresOtherNamesAndOtherText) {
   const XmpTags tags = decodeXmp(
       "x:GpsLatitudeRef=\"5\" GpsLatitude=\"6\" x:GpsLongitude=\"east\" x:RelativeAltitude=\"1e999\" "
       "x:AbsoluteAltitude=12 x:GimbalYawDegree=\"1 2\" x:GimbalRollDegree>");
@@ -36,7 +36,7 @@ TEST(Xmp, IsNotFooledByOtherNamesAndOtherText) {
                tags.gimbalRoll);
 }
 
-// A little-endian EXIF block that holds a GPS directory alone.
+// Builds a little-endian EXIF block that contains only a GPS directory.
 class ExifBuilder {
  public:
   ExifBuilder& entry(uint16_t tag, uint16_t format, uint32_t count, std::vector<uint8_t> value) {
@@ -54,7 +54,7 @@ class ExifBuilder {
     put(out, 0x8825, 2);
     put(out, 4, 2);
     put(out, 1, 4);
-    put(out, 26, 4);  // the GPS directory, counted from "II"
+    put(out, 26, 4);  // offset of the GPS directory from "II"
     put(out, 0, 4);
     put(out, entries_.size(), 2);
     std::vector<uint8_t> data;
@@ -108,18 +108,29 @@ TEST(Exif, ReadsGpsWithItsReferences) {
   EXPECT_FALSE(tags.gimbal.has_value());
 }
 
-TEST(Exif, FindsNothingWhereThereIsNothing) {
+TEST(Exif, ReturnsNoFixForFilesWithoutGpsTags) {
   EXPECT_FALSE(decodePhotoTags(encodeJpeg(gradientPicture(8, 8))).gps.has_value());
   EXPECT_FALSE(decodePhotoTags(encodePng(gradientPicture(8, 8))).gps.has_value());
   EXPECT_FALSE(decodePhotoTags({}).gps.has_value());
 }
 
-TEST(Exif, SurvivesEveryTruncation) {
+TEST(Exif, ReturnsTheWholeFixOrNoneForEveryTruncation) {
   const Bytes jpeg = encodeJpeg(gradientPicture(8, 8), 90, southWest().exif());
-  for (size_t length = 0; length < jpeg.size(); ++length) decodePhotoTags(std::span(jpeg).first(length));
+  const PhotoTags whole = decodePhotoTags(jpeg);
+  ASSERT_TRUE(whole.gps.has_value());
+  size_t fixes = 0;
+  for (size_t length = 0; length < jpeg.size(); ++length) {
+    const PhotoTags tags = decodePhotoTags(std::span(jpeg).first(length));
+    if (!tags.gps) continue;
+    ++fixes;
+    EXPECT_EQ(tags.gps->latitude, whole.gps->latitude) << length;
+    EXPECT_EQ(tags.gps->longitude, whole.gps->longitude) << length;
+  }
+  EXPECT_GT(fixes, 0u) << "what is cut off behind the tags costs no fix";
+  EXPECT_LT(fixes, jpeg.size() - 100) << "what is cut off before their end does";
 }
 
-TEST(Exif, DoesNotBelieveAReceiverWithoutAFix) {
+TEST(Exif, RejectsImplausibleFixes) {
   ExifBuilder zero;
   zero.entry(1, 2, 2, {'N', 0})
       .rationals(2, {0, 1, 0, 1, 0, 1})

@@ -13,14 +13,14 @@ namespace {
 
 using Points = Eigen::Matrix3Xd;
 
-Points columnsOf(const Points& points, const std::vector<int>& which) {
+Points selectColumns(const Points& points, const std::vector<int>& which) {
   Points chosen(3, static_cast<Eigen::Index>(which.size()));
   for (size_t i = 0; i < which.size(); ++i) chosen.col(static_cast<Eigen::Index>(i)) = points.col(which[i]);
   return chosen;
 }
 
-// Standard deviations along the two widest directions.
-std::pair<double, double> spreadOf(const Points& points) {
+// Returns the standard deviations along the two widest directions.
+std::pair<double, double> principalDeviations(const Points& points) {
   const Points centred = points.colwise() - points.rowwise().mean();
   const Mat3d covariance = centred * centred.transpose() / static_cast<double>(points.cols());
   const Vec3d variances = Eigen::SelfAdjointEigenSolver<Mat3d>(covariance, Eigen::EigenvaluesOnly).eigenvalues();
@@ -28,7 +28,7 @@ std::pair<double, double> spreadOf(const Points& points) {
 }
 
 bool isLine(const Points& points) {
-  const auto [first, second] = spreadOf(points);
+  const auto [first, second] = principalDeviations(points);
   return !(first > 0) || !(second > 0.02 * first);
 }
 
@@ -60,7 +60,7 @@ std::optional<Georeference> georeference(const std::vector<Photo>& photos, std::
     fixed.push_back(&photo);
     allRelative = allRelative && photo.gps->relativeAltitude != 0;
     result.frame.latitude += photo.gps->latitude;
-    result.frame.longitude += photo.gps->longitude;  // a capture across the antimeridian fails the fit below
+    result.frame.longitude += photo.gps->longitude;  // the fit below fails across the antimeridian
     result.frame.altitude += photo.gps->altitude;
     meanRelative += photo.gps->relativeAltitude;
   }
@@ -84,9 +84,9 @@ std::optional<Georeference> georeference(const std::vector<Photo>& photos, std::
     reason = "the photos with GPS stand on one line";
     return std::nullopt;
   }
-  const double spread = spreadOf(enu).second;
-  if (spread < kLeastGpsSpread) {
-    reason = fmt::format("the photos stand within about {:.1f} m of one line, no more than GPS errs", spread);
+  const double spread = principalDeviations(enu).second;
+  if (spread < kMinGpsSpread) {
+    reason = fmt::format("the photos lie within about {:.1f} m of one line, too near for the accuracy of GPS", spread);
     return std::nullopt;
   }
 
@@ -99,26 +99,27 @@ std::optional<Georeference> georeference(const std::vector<Photo>& photos, std::
       const auto candidate = static_cast<int>(random.below(trial * 64 + k, static_cast<uint32_t>(n)));
       if (std::find(sample.begin(), sample.end(), candidate) == sample.end()) sample.push_back(candidate);
     }
-    const Points from = columnsOf(world, sample), to = columnsOf(enu, sample);
+    const Points from = selectColumns(world, sample), to = selectColumns(enu, sample);
     if (isLine(from) || isLine(to)) continue;
     std::vector<int> inliers = agreeing(Eigen::umeyama(from, to), world, enu);
-    // Grown from all that agree: three noisy fixes of neighbours alone turn the world too freely.
-    for (int round = 0; round < 3 && inliers.size() >= 3 && !isLine(columnsOf(world, inliers)); ++round) {
-      inliers = agreeing(Eigen::umeyama(columnsOf(world, inliers), columnsOf(enu, inliers)), world, enu);
+    // Refine on all inliers: three noisy fixes of nearby photos alone constrain the rotation too weakly.
+    for (int round = 0; round < 3 && inliers.size() >= 3 && !isLine(selectColumns(world, inliers)); ++round) {
+      inliers = agreeing(Eigen::umeyama(selectColumns(world, inliers), selectColumns(enu, inliers)), world, enu);
     }
     if (inliers.size() > best.size()) best = std::move(inliers);
   }
-  if (best.size() < 3 || 2 * static_cast<int>(best.size()) < n || isLine(columnsOf(world, best))) {
+  if (best.size() < 3 || 2 * static_cast<int>(best.size()) < n || isLine(selectColumns(world, best))) {
     reason = fmt::format("only {} of {} GPS fixes agree with the poses to within {} m", best.size(), n, kGpsTolerance);
     return std::nullopt;
   }
-  const Points from = columnsOf(world, best), to = columnsOf(enu, best);
+  const Points from = selectColumns(world, best), to = selectColumns(enu, best);
   result.frame.enuFromWorld = Eigen::umeyama(from, to);
   result.inliers = static_cast<int>(best.size());
   const Points residual = (result.frame.enuFromWorld * from.colwise().homogeneous()).topRows<3>() - to;
   result.rmsMetres = residual.norm() / std::sqrt(static_cast<double>(best.size()));
   if (result.rmsMetres > spread / 3) {
-    reason = fmt::format("the GPS fixes miss the poses by {:.1f} m over {:.1f} m", result.rmsMetres, spread);
+    reason = fmt::format("the GPS fixes deviate from the poses by {:.1f} m, over a spread of {:.1f} m",
+                         result.rmsMetres, spread);
     return std::nullopt;
   }
   return result;

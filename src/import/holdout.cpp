@@ -24,7 +24,7 @@ void holdOutList(const fs::path& file, std::vector<Photo>& photos) {
     while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
     if (!line.empty() && line[0] != '#') names.insert(fs::path(line).lexically_normal().generic_string());
   }
-  std::set<std::string> found;
+  std::set<std::string> matchedNames;
   for (Photo& photo : photos) {
     const fs::path path(photo.name);
     const std::string withoutExtension = fs::path(path).replace_extension("").generic_string();
@@ -32,14 +32,14 @@ void holdOutList(const fs::path& file, std::vector<Photo>& photos) {
          {photo.name, path.filename().string(), path.stem().string(), withoutExtension}) {
       if (names.contains(candidate)) {
         photo.split = Split::test;
-        found.insert(candidate);
+        matchedNames.insert(candidate);
       }
     }
   }
-  // Names are often written with the extension that the photo had before it was reduced.
+  // Lists often give names with the extension that the photo had before it was downscaled.
   std::vector<std::string> strangers;
   for (const std::string& name : names) {
-    if (found.contains(name)) continue;
+    if (matchedNames.contains(name)) continue;
     const std::string stem = fs::path(name).stem().string();
     bool matched = false;
     for (Photo& photo : photos) {
@@ -51,15 +51,15 @@ void holdOutList(const fs::path& file, std::vector<Photo>& photos) {
   }
   if (strangers.empty()) return;
   if (strangers.size() == names.size()) {
-    throw Error(file.string(), "", "names no photo of this capture (" + firstOf(strangers) + ")",
+    throw Error(file.string(), "", "names no photo of this capture (" + abbreviateList(strangers) + ")",
                 "write one photo's name a line");
   }
   warn("{}: {} of {} names are no photos of this capture ({})", file.string(), strangers.size(), names.size(),
-       firstOf(strangers));
+       abbreviateList(strangers));
 }
 
-// N of every:N.
-size_t stepOf(const std::string& rule) {
+// Returns the N of every:N.
+size_t parseHoldoutStep(const std::string& rule) {
   size_t step = 0;
   const char* end = rule.data() + rule.size();
   const auto [last, error] = std::from_chars(rule.data() + 6, end, step);
@@ -72,7 +72,7 @@ size_t stepOf(const std::string& rule) {
 void checkHoldOut(const std::string& rule) {
   if (rule == "auto" || rule == "none") return;
   if (rule.starts_with("every:")) {
-    stepOf(rule);
+    parseHoldoutStep(rule);
   } else if (rule.starts_with("list:")) {
     readTextFile(rule.substr(5));
   } else {
@@ -85,7 +85,7 @@ void holdOut(const std::string& rule, std::vector<Photo>& photos) {
   for (Photo& photo : photos) photo.split = Split::train;
   if (rule == "none") return;
   if (rule.starts_with("every:")) {
-    for (size_t i = 0, step = stepOf(rule); i < photos.size(); i += step) photos[i].split = Split::test;
+    for (size_t i = 0, step = parseHoldoutStep(rule); i < photos.size(); i += step) photos[i].split = Split::test;
   } else {
     holdOutList(rule.substr(5), photos);
   }

@@ -23,35 +23,35 @@
 namespace tessera {
 namespace {
 
-// Photos in a folder and the folders in it, by what can be done with them.
+// The numbers of photos in a folder and its subfolders, by whether their format is supported.
 struct PhotoCount {
-  size_t readable = 0, convertible = 0;  // JPEG and PNG; pictures that other programs make JPEG of
-  std::string firstConvertible;          // extension, as found
+  size_t readable = 0, convertible = 0;  // JPEG and PNG; formats that other programs convert to JPEG
+  std::string firstConvertible;          // extension of the first such file, in its original spelling
 };
 
 PhotoCount countPhotos(const fs::path& folder) {
-  constexpr size_t kMostEntries = 100000;  // someone may name the root of a disk
+  constexpr size_t kMaxEntries = 100000;  // the folder may be the root of a disk
   constexpr int kDeepest = 4;
   PhotoCount count;
   std::error_code status;
   fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, status), end;
-  for (size_t entries = 0; !status && at != end && entries < kMostEntries; at.increment(status), ++entries) {
+  for (size_t entries = 0; !status && at != end && entries < kMaxEntries; at.increment(status), ++entries) {
     if (at.depth() >= kDeepest) at.disable_recursion_pending();
-    const std::string found = at->path().extension().string();
-    std::string extension = found;
+    const std::string spelling = at->path().extension().string();
+    std::string extension = spelling;
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    const auto isOneOf = [&extension](std::initializer_list<const char*> names) {
+    const auto hasExtension = [&extension](std::initializer_list<const char*> names) {
       return std::find(names.begin(), names.end(), extension) != names.end();
     };
-    count.readable += isOneOf({".jpg", ".jpeg", ".png"});
-    if (!isOneOf({".tif", ".tiff", ".heic", ".heif", ".webp", ".dng"})) continue;
-    if (count.convertible++ == 0) count.firstConvertible = found;
+    count.readable += hasExtension({".jpg", ".jpeg", ".png"});
+    if (!hasExtension({".tif", ".tiff", ".heic", ".heif", ".webp", ".dng"})) continue;
+    if (count.convertible++ == 0) count.firstConvertible = spelling;
   }
   return count;
 }
 
-// One word for a POSIX shell.
+// Returns the path quoted as one word for a POSIX shell.
 std::string shellWord(const fs::path& path) {
   const std::string text = path.string();
   const bool plain = std::all_of(text.begin(), text.end(), [](unsigned char c) {
@@ -102,7 +102,8 @@ SourceCapture readSource(const fs::path& source) {
   refuse(source);
 }
 
-// Paths in the capture, unique: images/a.jpg and images/a.png reduced to PNG are a.png and a.png.png.
+// Assigns unique paths in the capture: images/a.jpg and images/a.png, both downscaled to PNG, become a.png and
+// a.png.png.
 class Names {
  public:
   std::string unique(std::string folder, fs::path name, const std::string& extension) {
@@ -132,7 +133,7 @@ Size reduced(const PhotoFacts& facts, int downscale) {
   return {side(facts.width), side(facts.height)};
 }
 
-// Gives every photo the camera of its reduced size, and moves the observations along.
+// Gives every photo the camera of its downscaled size, and scales the observations accordingly.
 void scaleCameras(Capture& capture, const std::vector<PhotoFacts>& facts, int downscale) {
   if (downscale == 1) return;
   std::vector<Camera> cameras;
@@ -144,9 +145,9 @@ void scaleCameras(Capture& capture, const std::vector<PhotoFacts>& facts, int do
     factors.emplace_back(static_cast<float>(size.width) / static_cast<float>(camera.width),
                          static_cast<float>(size.height) / static_cast<float>(camera.height));
     const Camera scaled = camera.scaledTo(size.width, size.height);
-    const auto found = std::find(cameras.begin(), cameras.end(), scaled);
-    photo.camera = static_cast<int>(found - cameras.begin());
-    if (found == cameras.end()) cameras.push_back(scaled);
+    const auto match = std::find(cameras.begin(), cameras.end(), scaled);
+    photo.camera = static_cast<int>(match - cameras.begin());
+    if (match == cameras.end()) cameras.push_back(scaled);
   }
   capture.cameras = std::move(cameras);
   for (Observation& observation : capture.observations) {
@@ -162,7 +163,7 @@ struct Outcomes {
   std::vector<std::string> withoutMask, withoutDepth;
 };
 
-// Brings all pictures over; Photo's paths then point into the capture.
+// Imports all images, masks and depth maps. The paths in Photo point into the capture afterwards.
 Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& facts, const fs::path& out,
                         const ImportOptions& options, double scale, ThreadPool& pool) {
   std::vector<Photo>& photos = source.capture.photos;
@@ -192,7 +193,7 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
       origins.add(mask, photos[i].mask, how + (source.maskIsInverted[i] ? ", inverted" : ""));
     depthTargets.push_back(out / names.unique("depths", inner, ".exr"));
   }
-  // While pictures change, the folder is not a complete capture.
+  // While images change, the folder is not a complete capture.
   std::error_code status;
   fs::remove(out / "transforms.json", status);
   origins.claim(out);
@@ -229,11 +230,11 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
 
 void dropFailed(SourceCapture& source, const Outcomes& outcomes) {
   std::vector<std::string> truncated, unreadable;
-  std::vector<size_t> kept;
+  std::vector<size_t> usable;
   for (size_t i = 0; i < outcomes.photos.size(); ++i) {
     switch (outcomes.photos[i]) {
       case FileOutcome::ready:
-        kept.push_back(i);
+        usable.push_back(i);
         break;
       case FileOutcome::truncated:
         truncated.push_back(source.capture.photos[i].name);
@@ -252,7 +253,7 @@ void dropFailed(SourceCapture& source, const Outcomes& outcomes) {
   if (!outcomes.withoutDepth.empty()) {
     warn("{} depth maps are missing or unreadable ({}, ...)", outcomes.withoutDepth.size(), outcomes.withoutDepth[0]);
   }
-  if (kept.size() < outcomes.photos.size()) keepPhotos(source, kept);
+  if (usable.size() < outcomes.photos.size()) keepPhotos(source, usable);
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 namespace tessera {
 namespace {
 
-// A nerfstudio folder with photos 0.png .. of 16 × 12 pixels, standing on a line and looking north.
+// A nerfstudio folder with photos 0.png, ... of 16 × 12 pixels, taken along a line and looking north.
 class Import : public testing::Test {
  protected:
   struct Frame {
@@ -53,7 +53,7 @@ class Import : public testing::Test {
   std::string log_;
 };
 
-TEST_F(Import, MakesACaptureThatNeedsItsSourceNoMore) {
+TEST_F(Import, WritesASelfContainedCapture) {
   for (const char* name : {"images/10.png", "images/9.png", "images/8.png"}) add(name);
   write();
   run();
@@ -63,7 +63,7 @@ TEST_F(Import, MakesACaptureThatNeedsItsSourceNoMore) {
   EXPECT_EQ(capture.photos[0].name, "images/8.png");  // natural order
   EXPECT_EQ(capture.photos[2].name, "images/10.png");
   EXPECT_EQ(readImage(capture.photos[2].image).image.pixels, gradientPicture(16, 12, 3, 0).pixels);
-  // Recentred, and known by how much.
+  // The world is recentred, and sourceFromWorld records the translation.
   EXPECT_LT(capture.photos[0].worldFromCamera.translation.norm(), 3);
   EXPECT_EQ((capture.sourceFromWorld * capture.photos[2].worldFromCamera.translation.homogeneous()).head<3>(),
             Vec3d(1000, 0, 2));
@@ -86,7 +86,7 @@ TEST_F(Import, HoldsOutEveryEighthInNaturalOrder) {
   EXPECT_EQ(run({.holdout = "list:" + (folder_ / "list").string()}).photosIn(Split::test), (std::vector<int>{4, 5}));
   EXPECT_FALSE(logged("no photo")) << log_;
   writeFileAtomically(folder_ / "list", std::string_view("photos/3.png\nnone.png\n40\n"));
-  EXPECT_NO_THROW(run({.holdout = "list:" + (folder_ / "list").string()}));  // 3 by its name without folders
+  EXPECT_NO_THROW(run({.holdout = "list:" + (folder_ / "list").string()}));  // names 3 without its folder
   writeFileAtomically(folder_ / "list", std::string_view("none.png\n40\n"));
   EXPECT_THROW(run({.holdout = "list:" + (folder_ / "list").string()}), Error);
   for (const char* wrong : {"every:", "every:1", "every:x", "some", "list:/nowhere"}) {
@@ -94,14 +94,14 @@ TEST_F(Import, HoldsOutEveryEighthInNaturalOrder) {
   }
 }
 
-TEST_F(Import, KeepsTheSourcesOwnSplitUnlessTold) {
+TEST_F(Import, KeepsTheSourcesOwnSplitByDefault) {
   for (int i = 0; i < 4; ++i) add("images/" + std::to_string(i) + ".png");
   write(R"(,"train_filenames":["images/0.png","images/1.png","images/2.png"],"val_filenames":["images/3.png"])");
   EXPECT_EQ(run().photosIn(Split::test), (std::vector<int>{3}));
   EXPECT_EQ(run({.holdout = "every:2"}).photosIn(Split::test), (std::vector<int>{0, 2}));
 }
 
-TEST_F(Import, RefusesSplitsThatFitNoPhotoBeforeItCopiesAny) {
+TEST_F(Import, RejectsSplitsThatMatchNoPhotoBeforeCopyingAny) {
   for (int i = 0; i < 4; ++i) add("images/" + std::to_string(i) + ".png");
   write(R"(,"train_filenames":["images/0.png"],"test_filenames":["3.png"])");
   try {
@@ -115,7 +115,7 @@ TEST_F(Import, RefusesSplitsThatFitNoPhotoBeforeItCopiesAny) {
   EXPECT_EQ(run({.holdout = "every:2"}).photosIn(Split::test), (std::vector<int>{0, 2}));
 }
 
-TEST_F(Import, SaysWhenNothingIsHeldOut) {
+TEST_F(Import, WarnsWhenNoPhotoIsHeldOut) {
   for (int i = 0; i < 3; ++i) add("images/" + std::to_string(i) + ".png");
   write(R"(,"train_filenames":["images/0.png","images/1.png","images/2.png"],"test_filenames":[])");
   EXPECT_EQ(run().photosIn(Split::test).size(), 0u);
@@ -127,7 +127,7 @@ TEST_F(Import, SaysWhenNothingIsHeldOut) {
   EXPECT_TRUE(logged("leaves nothing to train on")) << log_;
 }
 
-TEST_F(Import, ReducesByAreaAndScalesTheLens) {
+TEST_F(Import, DownscalesByAreaAndScalesTheLens) {
   add("images/a.png");
   add("images/b.png");
   write();
@@ -143,7 +143,7 @@ TEST_F(Import, ReducesByAreaAndScalesTheLens) {
   EXPECT_EQ(reduced.at(2, 1)[1], std::lround(sum / 16));
 }
 
-TEST_F(Import, DropsWhatIsWrongAndSaysSoOnceForEachKind) {
+TEST_F(Import, DropsFaultyPhotosWithOneWarningForEachKind) {
   add("images/good.png");
   add("images/again.png");
   frames_.push_back(frames_[1]);
@@ -173,7 +173,7 @@ TEST_F(Import, DropsWhatIsWrongAndSaysSoOnceForEachKind) {
   EXPECT_EQ(readCapture(out_).photos.size(), 3u);
 }
 
-TEST_F(Import, FailsWhenNothingIsLeft) {
+TEST_F(Import, ThrowsWhenNoPhotoIsLeft) {
   frames_.push_back({"images/nowhere.png", ""});
   write();
   EXPECT_THROW(run(), Error);
@@ -196,7 +196,7 @@ TEST_F(Import, DropsPanoramasAndFailsWhenThereIsNothingElse) {
   EXPECT_THROW(run(), Error);
 }
 
-TEST_F(Import, BringsMasksAndDepthsAlong) {
+TEST_F(Import, ImportsMasksAndDepthMaps) {
   add("images/a.png", 16, 12, R"(,"mask_path":"masks/a.png","depth_file_path":"depth/a.exr")");
   add("images/b.png", 16, 12, R"(,"mask_path":"masks/missing.png")");
   ImageU8 mask(16, 12, 1, 255);
@@ -229,7 +229,7 @@ TEST_F(Import, ScalesDepthMapsOfEitherKindByAppliedScale) {
   const Capture capture = run();
   EXPECT_FLOAT_EQ(readDepth(capture.photos.at(1).depth).at(3, 3)[0], 0.4f);
   EXPECT_FLOAT_EQ(readDepth(capture.photos.at(2).depth).at(3, 3)[0], 0.4f);
-  // Once is enough.
+  // The scale is applied only once.
   const Capture again = importCapture(out_, folder_ / "again");
   EXPECT_FLOAT_EQ(readDepth(again.photos.at(1).depth).at(3, 3)[0], 0.4f);
   EXPECT_FLOAT_EQ(readDepth(again.photos.at(2).depth).at(3, 3)[0], 0.4f);
@@ -248,7 +248,7 @@ TEST_F(Import, InvertsInstantNgpsDynamicMasks) {
   EXPECT_EQ(mask.at(5, 4)[0], 255);
 }
 
-TEST_F(Import, GoesOnWhereItWas) {
+TEST_F(Import, ResumesAnInterruptedImport) {
   add("images/a.png");
   add("images/b.png");
   write();
@@ -259,15 +259,15 @@ TEST_F(Import, GoesOnWhereItWas) {
   run({.downscale = 2});
   EXPECT_EQ(fs::last_write_time(out_ / "images/a.png"), before);
   EXPECT_TRUE(fs::exists(out_ / "images/b.png"));
-  EXPECT_EQ(readImage(run({.downscale = 4}).photos[0].image).image.width, 4);  // another size is done anew
+  EXPECT_EQ(readImage(run({.downscale = 4}).photos[0].image).image.width, 4);  // another size is imported again
 }
 
-// The pixel in the corner, which tells the pictures of this fixture apart.
-int cornerOf(const fs::path& picture) {
+// Returns the pixel in the corner, which distinguishes the images of this fixture.
+int readCornerPixel(const fs::path& picture) {
   return readImage(picture).image.at(0, 0)[0];
 }
 
-TEST_F(Import, KeepsNoPictureOfAnotherSource) {
+TEST_F(Import, ReusesNoImageOfAnotherSource) {
   const std::string mask = R"(,"mask_path":"masks/a.png")";
   add("images/a.png", 16, 12, mask);
   writePng(source_ / "masks/a.png", ImageU8(16, 12, 1, 255));
@@ -287,40 +287,40 @@ TEST_F(Import, KeepsNoPictureOfAnotherSource) {
   for (const int downscale : {2, 1}) {
     source_ = first;
     run({.downscale = downscale});
-    const int before = cornerOf(out_ / "images/a.png");
+    const int before = readCornerPixel(out_ / "images/a.png");
     source_ = second;
     const Capture capture = run({.downscale = downscale});
-    EXPECT_EQ(cornerOf(out_ / "images/a.png"), before + 100);
-    EXPECT_EQ(cornerOf(capture.photos[0].mask), 0);
+    EXPECT_EQ(readCornerPixel(out_ / "images/a.png"), before + 100);
+    EXPECT_EQ(readCornerPixel(capture.photos[0].mask), 0);
   }
-  EXPECT_EQ(cornerOf(first / "images/a.png"), 0);  // what was linked is still there
+  EXPECT_EQ(readCornerPixel(first / "images/a.png"), 0);  // the linked source still exists
 }
 
-TEST_F(Import, DoesAPictureAnewWhoseSourceWasExchanged) {
+TEST_F(Import, ReimportsAnImageWhoseSourceWasReplaced) {
   for (const char* name : {"images/a.png", "images/b.png"}) add(name);
   write();
   run({.downscale = 2});
   const auto time = fs::last_write_time(out_ / "images/a.png");
-  const int before = cornerOf(out_ / "images/b.png");
+  const int before = readCornerPixel(out_ / "images/b.png");
   writePng(source_ / "images/b.png", gradientPicture(16, 12, 3, 100));
-  fs::last_write_time(source_ / "images/b.png", time - std::chrono::hours(1000));  // an older file, moved here
+  fs::last_write_time(source_ / "images/b.png", time - std::chrono::hours(1000));  // an older file
   run({.downscale = 2});
   EXPECT_EQ(fs::last_write_time(out_ / "images/a.png"), time);
-  EXPECT_EQ(cornerOf(out_ / "images/b.png"), before + 99);  // the fixture's own was of seed 1
+  EXPECT_EQ(readCornerPixel(out_ / "images/b.png"), before + 99);  // the original had seed 1
 }
 
-TEST_F(Import, DoesAPictureAnewOfWhichNothingIsKnown) {
+TEST_F(Import, ReimportsAnImageOfUnknownOrigin) {
   add("images/a.png");
   write();
   run({.downscale = 2});
-  const int before = cornerOf(out_ / "images/a.png");
+  const int before = readCornerPixel(out_ / "images/a.png");
   writePng(out_ / "images/a.png", ImageU8(8, 6, 3, 200));
   fs::remove(out_ / "sources.txt");
   run({.downscale = 2});
-  EXPECT_EQ(cornerOf(out_ / "images/a.png"), before);
+  EXPECT_EQ(readCornerPixel(out_ / "images/a.png"), before);
 }
 
-TEST_F(Import, LeavesThePhotosOfAModelAloneThatIsImportedInPlace) {
+TEST_F(Import, LeavesPhotosUnchangedWhenImportedInPlace) {
   writePng(source_ / "images/a.png", gradientPicture(16, 12));
   const Bytes before = readFile(source_ / "images/a.png");
   const fs::path model = source_ / "sparse/0";
@@ -333,7 +333,7 @@ TEST_F(Import, LeavesThePhotosOfAModelAloneThatIsImportedInPlace) {
   EXPECT_EQ(readCapture(source_).photos.size(), 1u);  // still complete
 }
 
-TEST_F(Import, GivesPicturesThatWouldCollideTheirOwnNames) {
+TEST_F(Import, GivesCollidingImagesUniqueNames) {
   add("images/a.png");
   writeJpeg(source_ / "images/a.jpg", gradientPicture(16, 12));
   frames_.push_back({"images/a.jpg", ""});
@@ -343,7 +343,7 @@ TEST_F(Import, GivesPicturesThatWouldCollideTheirOwnNames) {
   EXPECT_EQ(readCapture(out_).photos.size(), 2u);
 }
 
-TEST_F(Import, KeepsAlphaAndDoesNotLetClearPixelsBleed) {
+TEST_F(Import, KeepsAlphaWithoutBleedingOfTransparentPixels) {
   ImageU8 image(16, 12, 4, 0);  // clear black
   for (int x = 0; x < 15; ++x) {
     for (int c = 0; c < 4; ++c) image.at(x, 0)[c] = c == 0 || c == 3 ? 255 : 0;  // opaque red
@@ -360,7 +360,7 @@ TEST_F(Import, KeepsAlphaAndDoesNotLetClearPixelsBleed) {
   EXPECT_EQ(reduced.at(7, 0)[3], 64);
 }
 
-TEST_F(Import, TellsAFolderOfPhotosWhatToDo) {
+TEST_F(Import, NamesTheCommandsForAFolderOfPhotos) {
   writePng(source_ / "images/a.png", gradientPicture(8, 8));
   try {
     run();
@@ -375,7 +375,7 @@ TEST_F(Import, TellsAFolderOfPhotosWhatToDo) {
   EXPECT_THROW(run(), Error);
 }
 
-TEST_F(Import, FindsThePhotosOfACamerasCardInItsFolders) {
+TEST_F(Import, CountsPhotosInSubfoldersAndQuotesTheirPath) {
   fs::remove_all(source_);
   source_ = folder_ / "the pilot's card";
   for (const char* name : {"DCIM/100MEDIA/DJI_0001.JPG", "DCIM/101MEDIA/DJI_0002.JPG", "DCIM/101MEDIA/DJI_0003.DNG"})
@@ -393,7 +393,7 @@ TEST_F(Import, FindsThePhotosOfACamerasCardInItsFolders) {
   }
 }
 
-TEST_F(Import, AsksForJpegOfAFolderOfPhotosThatItCannotRead) {
+TEST_F(Import, AsksForJpegWhenTheFormatIsNotSupported) {
   for (const char* name : {"IMG_1.HEIC", "IMG_2.HEIC"}) writeFileAtomically(source_ / name, std::string_view("any"));
   fs::remove_all(source_ / "images");
   try {
@@ -405,13 +405,13 @@ TEST_F(Import, AsksForJpegOfAFolderOfPhotosThatItCannotRead) {
   }
 }
 
-TEST_F(Import, DoesNotWriteOverItsSource) {
+TEST_F(Import, NeverOverwritesItsSource) {
   add("images/a.png");
   write();
   EXPECT_THROW(importCapture(source_, source_ / "images/.."), Error);
 }
 
-TEST_F(Import, TakesItsOwnCapturesAsTheyAre) {
+TEST_F(Import, ImportsItsOwnCapturesUnchanged) {
   for (int i = 0; i < 9; ++i) add("images/" + std::to_string(i) + ".png");
   write();
   const Capture first = run();

@@ -12,7 +12,7 @@
 namespace tessera {
 namespace {
 
-double scaleOf(const Mat4d& similarity) {
+double similarityScale(const Mat4d& similarity) {
   return std::cbrt(similarity.topLeftCorner<3, 3>().determinant());
 }
 
@@ -29,8 +29,8 @@ Vec3d medianCentre(const std::vector<Photo>& photos) {
   return median;
 }
 
-// Up in camera axes for a camera that hangs at those angles: pitch 0 is level, -90 looks down; roll turns it about its
-// optical axis, clockwise as seen from behind.
+// Returns the up direction in camera axes for a camera at those angles: pitch 0 is level, -90 looks down; roll rotates
+// the camera about its optical axis, clockwise as seen from behind.
 Vec3d upInCamera(const GimbalAngles& gimbal) {
   const double pitch = gimbal.pitch * M_PI / 180, roll = gimbal.roll * M_PI / 180;
   const Vec3d level(0, -std::cos(pitch), std::sin(pitch));
@@ -68,16 +68,17 @@ Up findUp(const std::vector<Photo>& photos, const std::vector<std::optional<Gimb
     return {gimbalUp.normalized(), "up from the gimbal's angles"};
   }
   if (cameraUp.norm() > 0.7 * n || photos.size() < 3) {
-    if (!(cameraUp.norm() > 1e-3)) return {Vec3d::UnitZ(), "no direction is up; the source's Z is kept"};
+    if (!(cameraUp.norm() > 1e-3)) return {Vec3d::UnitZ(), "the cameras share no up direction; the source's Z is kept"};
     return {cameraUp.normalized(), "up from the mean of the cameras' up"};
   }
   Vec3d normal = planeNormal(photos);
   const bool looksAlong = std::abs(forward.normalized().dot(normal)) > 0.7 && forward.norm() > 0.7 * n;
   if (!looksAlong && cameraUp.norm() > 0.2 * n) return {cameraUp.normalized(), "up from the mean of the cameras' up"};
-  // Looking down from a plane, or all around in one: what few cues there are decide the side.
+  // Where the cameras look away from their plane, up is the opposite side; where they look around within it, the mean
+  // of the cameras' up selects the side.
   const double side = looksAlong ? -forward.dot(normal) : cameraUp.dot(normal);
   if (side < 0) normal = -normal;
-  return {normal, "up from the plane that the cameras stand in"};
+  return {normal, "up from the plane of the cameras"};
 }
 
 Mat4d translation(const Vec3d& t) {
@@ -89,7 +90,7 @@ Mat4d translation(const Vec3d& t) {
 }  // namespace
 
 double applySimilarity(Capture& capture, const Mat4d& newFromOld) {
-  const double scale = scaleOf(newFromOld);
+  const double scale = similarityScale(newFromOld);
   const Mat3d rotation = newFromOld.topLeftCorner<3, 3>() / scale;
   const auto move = [&newFromOld](const Vec3d& x) -> Vec3d { return (newFromOld * x.homogeneous()).head<3>(); };
   for (Photo& photo : capture.photos) {
@@ -109,11 +110,11 @@ Orientation orientWorld(SourceCapture& source, const std::vector<std::optional<G
   if (source.isOurs || capture.photos.empty()) return {"a capture of our own: its world is kept", 1};
   Orientation orientation;
   std::string why;
-  if (const auto found = georeference(capture.photos, why)) {
-    capture.geo = found->frame;
-    orientation.scale = applySimilarity(capture, found->frame.enuFromWorld);
-    orientation.how = fmt::format("east, north, up in metres from {} of {} GPS fixes, which it misses by {:.2f} m",
-                                  found->inliers, found->fixes, found->rmsMetres);
+  if (const auto fit = georeference(capture.photos, why)) {
+    capture.geo = fit->frame;
+    orientation.scale = applySimilarity(capture, fit->frame.enuFromWorld);
+    orientation.how = fmt::format("east, north, up in metres from {} of {} GPS fixes, with residuals of {:.2f} m",
+                                  fit->inliers, fit->fixes, fit->rmsMetres);
   } else {
     const bool hasGps =
         std::any_of(capture.photos.begin(), capture.photos.end(), [](const Photo& p) { return !!p.gps; });

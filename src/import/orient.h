@@ -1,4 +1,5 @@
-// From the source's world to ours: Z up, metres where GPS says how long one is, the origin amid the cameras.
+// Transforms the source's world to the convention of scene/axes.h: Z up, metres where GPS gives the scale, the origin
+// at the median of the cameras.
 #pragma once
 
 #include <optional>
@@ -10,23 +11,23 @@
 
 namespace tessera {
 
-// Moves poses, points, depth units and geo reference by a similarity and keeps Capture::sourceFromWorld true. Returns
-// its scale (what depth maps in world units have yet to be multiplied by).
+// Transforms poses, points, depth units and geo reference by a similarity, and updates Capture::sourceFromWorld.
+// Returns the scale of the similarity, by which the caller must multiply depth maps in world units.
 double applySimilarity(Capture& capture, const Mat4d& newFromOld);
 
 struct Orientation {
-  std::string how;   // for people: what turned the world
-  double scale = 1;  // as applySimilarity
+  std::string how;   // for log messages: the cue that determined the orientation
+  double scale = 1;  // see applySimilarity
 };
 
-// In this order of trust:
-//   a capture of our own          nothing is changed
+// Orients the world by the first of these cues that is available, in order of reliability:
+//   a capture of our own          the world is left unchanged
 //   GPS of three photos or more   east, north, up in metres (see georeference.h)
-//   a source whose Z is up        only recentred
-//   gimbal angles                 the mean of where they say that up is
-//   camera-up vectors that agree  their mean
-//   otherwise (a nadir flight)    the normal of the plane of the cameras, on the side that they look away from
-// `gimbals` by photo, or empty.
+//   a source whose Z is up        the world is only recentred
+//   gimbal angles                 up is the mean of the up directions that they give
+//   camera-up vectors that agree  up is their mean
+//   otherwise (a nadir flight)    up is the normal of the plane of the cameras, on the side that they look away from
+// `gimbals` has one entry per photo, or is empty.
 Orientation orientWorld(SourceCapture& source, const std::vector<std::optional<GimbalAngles>>& gimbals);
 
 }  // namespace tessera

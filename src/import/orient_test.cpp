@@ -10,10 +10,10 @@
 namespace tessera {
 namespace {
 
-// Looks down with its picture's top towards `heading`.
+// Returns a photo that looks down, with the top of its image towards `heading`.
 Pose nadirPose(const Vec3d& centre, double heading) {
   Pose pose;
-  const Vec3d up(std::sin(heading), std::cos(heading), 0);  // the picture's up
+  const Vec3d up(std::sin(heading), std::cos(heading), 0);  // up in the image
   pose.rotation.col(1) = -up;
   pose.rotation.col(2) = -Vec3d::UnitZ();
   pose.rotation.col(0) = pose.rotation.col(1).cross(pose.rotation.col(2));
@@ -21,7 +21,7 @@ Pose nadirPose(const Vec3d& centre, double heading) {
   return pose;
 }
 
-// A lawn-mower flight of 4 × 5 photos 20 m apart at a height of 60 m, in east-north-up, with GPS that errs by `noise`.
+// Returns a grid flight of 4 × 5 photos 20 m apart at a height of 60 m, in east-north-up, with GPS errors of `noise`.
 SourceCapture flight(double noise = 0) {
   SourceCapture source;
   const RandomStream random(7, 1);
@@ -44,7 +44,7 @@ SourceCapture flight(double noise = 0) {
   return source;
 }
 
-// Turns, shrinks and shifts a capture, as structure from motion delivers it.
+// Rotates, scales and translates a capture to an arbitrary frame like that of structure from motion.
 void scramble(SourceCapture& source) {
   Mat4d m = Mat4d::Identity();
   m.topLeftCorner<3, 3>() = 0.07 * Eigen::AngleAxisd(2, Vec3d(1, -2, 0.5).normalized()).toRotationMatrix();
@@ -69,7 +69,7 @@ TEST(Orient, FindsEastNorthUpInMetresFromGps) {
   expectEastNorthUp(source.capture, 1e-3);  // the Earth's curve over the flight
   EXPECT_NEAR(orientation.scale, 1 / 0.07, 1e-4);
 
-  // Back to where the poses came from, and on to where on Earth it is.
+  // Check the transforms back to the source's world and to the position on the Earth.
   const Photo& photo = source.capture.photos[7];
   const Vec3d inSource = (source.capture.sourceFromWorld * photo.worldFromCamera.translation.homogeneous()).head<3>();
   EXPECT_NEAR((inSource - scrambled.photos[7].worldFromCamera.translation).norm(), 0, 1e-9);
@@ -79,7 +79,7 @@ TEST(Orient, FindsEastNorthUpInMetresFromGps) {
   EXPECT_NEAR((enu - enuFromGps(geo, photo.gps->latitude, photo.gps->longitude, photo.gps->altitude)).norm(), 0, 1e-3);
 }
 
-TEST(Orient, RecentresAmidTheCameras) {
+TEST(Orient, RecentresAtTheMedianCamera) {
   SourceCapture source = flight();
   scramble(source);
   orientWorld(source, {});
@@ -94,10 +94,10 @@ TEST(Orient, ToleratesNoiseAndAThirdOfWildFixes) {
     source.capture.photos[static_cast<size_t>(i)].gps->latitude += 0.01;  // a kilometre
   scramble(source);
   std::string reason;
-  const auto found = georeference(source.capture.photos, reason);
-  ASSERT_TRUE(found.has_value()) << reason;
-  EXPECT_EQ(found->inliers, 14);
-  EXPECT_LT(found->rmsMetres, 2);
+  const auto fit = georeference(source.capture.photos, reason);
+  ASSERT_TRUE(fit.has_value()) << reason;
+  EXPECT_EQ(fit->inliers, 14);
+  EXPECT_LT(fit->rmsMetres, 2);
   orientWorld(source, {});
   for (const Photo& photo : source.capture.photos) EXPECT_LT(photo.worldFromCamera.rotation.col(2).z(), -0.99);
 }
@@ -114,7 +114,7 @@ TEST(Orient, PrefersTheBarometerToGpsHeights) {
   expectEastNorthUp(source.capture, 1e-2);
 }
 
-TEST(Georeference, RefusesWhatCannotFixATurn) {
+TEST(Georeference, RejectsFixesThatDoNotDetermineARotation) {
   std::string reason;
   SourceCapture few = flight();
   for (size_t i = 2; i < few.capture.photos.size(); ++i) few.capture.photos[i].gps.reset();
@@ -154,8 +154,8 @@ TEST(Orient, FindsUpOfANadirFlightFromThePlaneOfItsCameras) {
   for (const Photo& photo : source.capture.photos) EXPECT_LT(photo.worldFromCamera.rotation.col(2).z(), -0.9999);
 }
 
-TEST(Orient, BelievesTheGimbalBeforeAnyGuess) {
-  // Obliques in one direction: the cameras' up alone would be 60° off.
+TEST(Orient, PrefersGimbalAnglesToOtherCues) {
+  // Oblique photos in one direction: the cameras' up alone would be wrong by 60°.
   SourceCapture source = flight();
   forgetGps(source);
   const Mat3d tilt = Eigen::AngleAxisd(-60 * M_PI / 180, Vec3d::UnitX()).toRotationMatrix();
@@ -172,7 +172,7 @@ TEST(Orient, BelievesTheGimbalBeforeAnyGuess) {
   EXPECT_NEAR(source.capture.photos[0].worldFromCamera.rotation.col(2).z(), -std::sin(60 * M_PI / 180), 1e-9);
 }
 
-TEST(Orient, TurnsUprightCamerasUpright) {
+TEST(Orient, TakesUpFromUprightCameras) {
   SourceCapture source;
   for (int i = 0; i < 12; ++i) {  // an orbit
     Photo photo;
@@ -191,7 +191,7 @@ TEST(Orient, TurnsUprightCamerasUpright) {
   }
 }
 
-TEST(Orient, LeavesOurOwnWorldsAlone) {
+TEST(Orient, LeavesOurOwnCapturesUnchanged) {
   SourceCapture source = flight();
   source.isOurs = true;
   const Pose before = source.capture.photos[3].worldFromCamera;

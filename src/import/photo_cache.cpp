@@ -19,7 +19,7 @@ namespace tessera {
 namespace {
 
 constexpr auto kPatience = std::chrono::seconds(60);
-constexpr size_t kMostRequests = 64;
+constexpr size_t kMaxRequests = 64;
 
 struct Encoded {
   Bytes image, mask;
@@ -37,7 +37,7 @@ ImageInfo checkedInfo(const Bytes& bytes, const fs::path& path, const Camera& ca
   return *info;
 }
 
-// From the files alone, so that room can be made before anything is decoded.
+// Reads the files and determines the decoded size, so that memory can be reserved before anything is decoded.
 Encoded readEncoded(const Photo& photo, const Camera& camera) {
   Encoded encoded;
   const int64_t pixels = int64_t{camera.width} * camera.height;
@@ -78,9 +78,9 @@ struct PhotoCache::State : std::enable_shared_from_this<State> {
 
   const int64_t budget;
   mutable std::mutex mutex;
-  std::condition_variable changed;  // bytes fell, a photo came in, a request came, or it is over
+  std::condition_variable changed;  // bytes were released, a photo was loaded, a request was added, or `stopping`
   std::unordered_map<int, Entry> entries;
-  std::list<int> uses;  // the most recent first
+  std::list<int> uses;  // photos, the most recently used first
   std::unordered_set<int> loading;
   std::deque<int> requests;
   PhotoCacheCounts counts;
@@ -94,7 +94,7 @@ struct PhotoCache::State : std::enable_shared_from_this<State> {
     changed.notify_all();
   }
 
-  // Reserves bytes; false when that would need waiting and `mayWait` is not set.
+  // Reserves bytes, evicting photos that no caller owns. Returns false if it would have to wait and `mayWait` is false.
   bool reserve(std::unique_lock<std::mutex>& lock, int64_t bytes, bool mayWait) {
     const auto deadline = std::chrono::steady_clock::now() + kPatience;
     while (counts.bytes > 0 && counts.bytes + bytes > budget) {
@@ -106,7 +106,7 @@ struct PhotoCache::State : std::enable_shared_from_this<State> {
         uses.erase(entry->second.use);
         entries.erase(entry);
         ++counts.evictions;
-        lock.unlock();  // its end calls release()
+        lock.unlock();  // the deleter calls release()
         leaving.reset();
         lock.lock();
       } else if (!mayWait) {
@@ -128,13 +128,14 @@ struct PhotoCache::State : std::enable_shared_from_this<State> {
     return handOut(entry->second.photo);
   }
 
-  // The cache's own pointer never leaves: whoever waits for room must hear when the last holder lets go, even though
-  // the photo stays cached.
+  // Returns a pointer whose deleter notifies waiting threads. The cache's own pointer is never returned, because a
+  // thread that waits for memory must be notified when the last caller releases a photo, even though the photo stays
+  // cached.
   std::shared_ptr<const DecodedPhoto> handOut(std::shared_ptr<const DecodedPhoto> photo) {
     const DecodedPhoto* seen = photo.get();
     return {seen, [state = shared_from_this(), photo = std::move(photo)](const DecodedPhoto*) mutable {
               photo.reset();
-              { const std::lock_guard lock(state->mutex); }  // not between a waiter's look and its sleep
+              { const std::lock_guard lock(state->mutex); }  // not between a waiter's check and its wait
               state->changed.notify_all();
             }};
   }
@@ -155,7 +156,7 @@ PhotoCache::~PhotoCache() {
   state_->changed.notify_all();
   prefetcher_.join();
   const std::lock_guard lock(state_->mutex);
-  leaving.swap(state_->entries);  // let go of after the lock: `leaving` was made first
+  leaving.swap(state_->entries);  // destroyed after the unlock, as it is declared before the lock
 }
 
 std::shared_ptr<const DecodedPhoto> PhotoCache::get(int photo) {
@@ -164,9 +165,9 @@ std::shared_ptr<const DecodedPhoto> PhotoCache::get(int photo) {
   {
     std::unique_lock lock(state_->mutex);
     state_->changed.wait(lock, [&] { return !state_->loading.contains(photo); });
-    if (auto found = state_->use(photo)) {
+    if (auto cached = state_->use(photo)) {
       ++state_->counts.hits;
-      return found;
+      return cached;
     }
     ++state_->counts.misses;
     state_->loading.insert(photo);
@@ -174,7 +175,8 @@ std::shared_ptr<const DecodedPhoto> PhotoCache::get(int photo) {
   return load(photo, true);
 }
 
-// `photo` stands in State::loading. Nothing when there was no room without waiting.
+// Loads a photo that the caller has put into State::loading. Returns nothing if memory was short and `mayWait` is
+// false.
 std::shared_ptr<const DecodedPhoto> PhotoCache::load(int photo, bool mayWait) {
   const std::shared_ptr<State> state = state_;
   const Photo& source = photos_[static_cast<size_t>(photo)];
@@ -224,7 +226,7 @@ void PhotoCache::prefetch(int photo) {
     if (state_->entries.contains(photo) || state_->loading.contains(photo)) return;
     if (std::find(state_->requests.begin(), state_->requests.end(), photo) != state_->requests.end()) return;
     state_->requests.push_back(photo);
-    if (state_->requests.size() > kMostRequests) state_->requests.pop_front();
+    if (state_->requests.size() > kMaxRequests) state_->requests.pop_front();
   }
   state_->changed.notify_all();
 }
@@ -244,7 +246,7 @@ void PhotoCache::prefetchLoop() {
     try {
       load(photo, false);
     } catch (const std::exception&) {
-      // Told at get(), which tries again.
+      // get() tries again and reports the failure.
     }
   }
 }

@@ -29,7 +29,7 @@ class PhotoCacheTest : public testing::Test {
   Capture capture_;
 };
 
-TEST_F(PhotoCacheTest, GivesThePhotoThatWasAskedFor) {
+TEST_F(PhotoCacheTest, ReturnsTheRequestedPhoto) {
   make(3);
   PhotoCache cache(capture_, 100 * kPhotoBytes);
   for (int i : {2, 0, 1, 2}) EXPECT_EQ(cache.get(i)->image.pixels, gradientPicture(kSide, kSide, 3, i).pixels);
@@ -38,13 +38,13 @@ TEST_F(PhotoCacheTest, GivesThePhotoThatWasAskedFor) {
   EXPECT_EQ(cache.counts().bytes, 3 * kPhotoBytes);
 }
 
-TEST_F(PhotoCacheTest, LetsTheLeastRecentlyUsedGoFirst) {
+TEST_F(PhotoCacheTest, EvictsTheLeastRecentlyUsedPhotoFirst) {
   make(3);
   PhotoCache cache(capture_, 2 * kPhotoBytes);
   cache.get(0);
   cache.get(1);
   cache.get(0);
-  cache.get(2);  // 1 leaves
+  cache.get(2);  // evicts 1
   cache.get(0);
   EXPECT_EQ(cache.counts().misses, 3);
   cache.get(1);
@@ -52,19 +52,19 @@ TEST_F(PhotoCacheTest, LetsTheLeastRecentlyUsedGoFirst) {
   EXPECT_EQ(cache.counts().peakBytes, 2 * kPhotoBytes);
 }
 
-TEST_F(PhotoCacheTest, CountsHeldPhotosAgainstItsBudgetAndEvictsAroundThem) {
+TEST_F(PhotoCacheTest, CountsPhotosInUseAgainstItsBudgetAndEvictsOthers) {
   make(4);
   PhotoCache cache(capture_, 2 * kPhotoBytes);
-  const auto held = cache.get(0);
+  const auto photo = cache.get(0);
   for (int i : {1, 2, 3, 1, 2, 3}) cache.get(i);
   EXPECT_EQ(cache.counts().peakBytes, 2 * kPhotoBytes);
-  EXPECT_EQ(cache.get(0), held);
+  EXPECT_EQ(cache.get(0), photo);
 }
 
-TEST_F(PhotoCacheTest, WaitsForAHolderToLetGo) {
+TEST_F(PhotoCacheTest, WaitsUntilAPhotoInUseIsReleased) {
   make(2);
   PhotoCache cache(capture_, kPhotoBytes);
-  auto held = cache.get(0);
+  auto photo = cache.get(0);
   std::atomic<bool> came = false;
   std::thread other([&] {
     cache.get(1);
@@ -72,13 +72,13 @@ TEST_F(PhotoCacheTest, WaitsForAHolderToLetGo) {
   });
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   EXPECT_FALSE(came);
-  held.reset();
+  photo.reset();
   other.join();
   EXPECT_TRUE(came);
   EXPECT_EQ(cache.counts().peakBytes, kPhotoBytes);
 }
 
-TEST_F(PhotoCacheTest, GivesAPhotoLargerThanItsBudgetAlone) {
+TEST_F(PhotoCacheTest, LoadsAPhotoLargerThanItsBudgetAlone) {
   make(2);
   PhotoCache cache(capture_, 10);
   cache.get(0);
@@ -96,10 +96,10 @@ TEST_F(PhotoCacheTest, PrefetchesInTheBackground) {
   EXPECT_EQ(cache.counts().hits, 1);
 }
 
-TEST_F(PhotoCacheTest, SaysWhichFileIsDamagedAndGoesOn) {
+TEST_F(PhotoCacheTest, NamesADamagedFileAndContinues) {
   make(2);
   fs::resize_file(capture_.photos[0].image, 60);
-  PhotoCache cache(capture_, kPhotoBytes);  // whatever a failure kept would leave no room
+  PhotoCache cache(capture_, kPhotoBytes);  // if a failure leaked bytes, nothing else would fit
   for (int attempt = 0; attempt < 2; ++attempt) {
     cache.prefetch(0);
     try {
@@ -109,7 +109,7 @@ TEST_F(PhotoCacheTest, SaysWhichFileIsDamagedAndGoesOn) {
       EXPECT_EQ(error.subject(), capture_.photos[0].image.string());
     }
   }
-  const auto whole = cache.get(1);  // held: a prefetch of the damaged one that comes late finds no room
+  const auto whole = cache.get(1);  // in use: a late prefetch of the damaged photo cannot reserve memory
   EXPECT_EQ(whole->image.pixels, gradientPicture(kSide, kSide, 3, 1).pixels);
   EXPECT_EQ(cache.counts().bytes, kPhotoBytes);
 }
@@ -121,7 +121,7 @@ TEST_F(PhotoCacheTest, RefusesAPhotoOfAnotherSizeThanItsCamera) {
   EXPECT_THROW(cache.get(0), Error);
 }
 
-TEST_F(PhotoCacheTest, BringsTheMaskAlong) {
+TEST_F(PhotoCacheTest, LoadsTheMaskToo) {
   make(1);
   ImageU8 mask(kSide, kSide, 1, 255);
   mask.at(3, 5)[0] = 0;
@@ -144,8 +144,8 @@ TEST_F(PhotoCacheTest, SurvivesManyThreadsWithinItsBudget) {
         for (int i = 0; i < 100; ++i) {
           const int photo = (i * (t + 2) + t) % 8;
           cache.prefetch((photo + 3) % 8);
-          const auto found = cache.get(photo);
-          wrong += found->image.pixels[0] != static_cast<uint8_t>(photo);
+          const auto decoded = cache.get(photo);
+          wrong += decoded->image.pixels[0] != static_cast<uint8_t>(photo);
         }
       });
     }

@@ -35,14 +35,14 @@ void linkOrCopy(const fs::path& source, const fs::path& target) {
   fs::create_hard_link(source, partial, status);
   if (status) fs::copy_file(source, partial, fs::copy_options::overwrite_existing, status);
   if (!status) fs::rename(partial, target, status);
-  // Renaming a link over another link to the same file does nothing: POSIX leaves both names.
+  // POSIX leaves both names in place when a link is renamed over another link to the same file.
   std::error_code ignored;
   fs::remove(partial, ignored);
   if (status)
     throw Error(target.string(), "", "could not be written: " + status.message(), "check free space and permissions");
 }
 
-// Weighs colour by alpha, so that the colour of clear pixels does not bleed.
+// Downscales with colours weighted by alpha, so that the colour of transparent pixels does not bleed.
 ImageU8 reduceWithAlpha(const ImageU8& image, int width, int height) {
   ImageF premultiplied = toFloat(image);
   for (size_t i = 0; i < premultiplied.pixelCount(); ++i) {
@@ -57,7 +57,7 @@ ImageU8 reduceWithAlpha(const ImageU8& image, int width, int height) {
   return toBytes(reduced);
 }
 
-// For targets of any size, larger too.
+// Resamples to any size, including larger ones, with the nearest source pixel.
 template <class T>
 Image<T> nearestSamples(const Image<T>& image, int width, int height) {
   Image<T> out(width, height, image.channels);
@@ -83,7 +83,7 @@ FileOutcome importPhoto(const fs::path& source, const fs::path& target, int widt
     linkOrCopy(source, target);
     return FileOutcome::ready;
   }
-  if (image.width < width || image.height < height) return FileOutcome::unreadable;  // the header said otherwise
+  if (image.width < width || image.height < height) return FileOutcome::unreadable;  // contradicts the header
   const ImageU8 reduced =
       image.channels == 4 ? reduceWithAlpha(image, width, height) : downscaleByArea(image, width, height);
   if (target.extension() == ".png") {
@@ -105,7 +105,7 @@ FileOutcome importMask(const fs::path& source, const fs::path& target, int width
   ImageU8 mask(image.width, image.height, 1);
   for (size_t i = 0; i < image.pixelCount(); ++i) {
     const uint8_t* pixel = image.pixels.data() + i * static_cast<size_t>(image.channels);
-    // nerfstudio: black is masked. instant-ngp's dynamic masks: whatever is not black is masked.
+    // In nerfstudio's masks black is masked; in instant-ngp's dynamic masks everything except black is masked.
     const int brightest = *std::max_element(pixel, pixel + colours);
     mask.pixels[i] = (inverted ? brightest == 0 : brightest >= 128) ? 255 : 0;
   }

@@ -9,8 +9,8 @@ namespace {
 
 constexpr size_t kDigits = 16;
 
-// FNV-1a.
-std::string hashOf(const std::string& text) {
+// Returns the FNV-1a hash in hexadecimal digits.
+std::string hashText(const std::string& text) {
   uint64_t hash = 0xcbf29ce484222325ull;
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;
   return fmt::format("{:016x}", hash);
@@ -37,7 +37,7 @@ void PictureOrigins::add(const std::string& picture, const fs::path& source, con
   const fs::path path = fs::weakly_canonical(source, status);
   const uintmax_t bytes = fs::file_size(source, status);
   const auto time = fs::last_write_time(source, status).time_since_epoch().count();
-  origins_[picture] = {source, hashOf(fmt::format("{}\n{}\n{}\n{}", path.string(), bytes, time, how))};
+  origins_[picture] = {source, hashText(fmt::format("{}\n{}\n{}\n{}", path.string(), bytes, time, how))};
 }
 
 void PictureOrigins::claim(const fs::path& capture) const {
@@ -45,11 +45,11 @@ void PictureOrigins::claim(const fs::path& capture) const {
   const auto known = readFingerprints(file);
   std::string text;
   for (const auto& [picture, origin] : origins_) {
-    const auto found = known.find(picture);
+    const auto entry = known.find(picture);
     const fs::path path = capture / picture;
     std::error_code status;
-    // A picture that is its source, linked or imported in place, is no copy of anything else.
-    if ((found == known.end() || found->second != origin.fingerprint) && fs::is_regular_file(path, status) &&
+    // An image that is its own source (hard-linked, or imported in place) cannot be a copy of another source.
+    if ((entry == known.end() || entry->second != origin.fingerprint) && fs::is_regular_file(path, status) &&
         !fs::equivalent(path, origin.source, status)) {
       fs::remove(path, status);
       if (status) {

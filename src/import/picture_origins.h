@@ -1,8 +1,9 @@
-// Remembers what each picture of a capture was made from, so that an import that goes on keeps what is ready, and one
-// of another source keeps nothing of the last, whatever the names, sizes and times of its photos.
+// Records the source of each image of a capture, so that an import that resumes reuses the images that are complete,
+// and an import of another source reuses nothing of the previous one, whatever the names, sizes and times of its
+// photos.
 //
-// On disk: sources.txt in the capture, a line for each picture: 16 hexadecimal digits over the path, size and time of
-// its source and how it was converted; two blanks; the picture's path in the capture.
+// The records are stored as sources.txt in the capture, one line per image: a hash of 16 hexadecimal digits over the
+// path, size and time of its source and the conversion; two spaces; the image's path in the capture.
 #pragma once
 
 #include <map>
@@ -14,11 +15,11 @@ namespace tessera {
 
 class PictureOrigins {
  public:
-  // `picture`: path in the capture. `how`: whatever else its pixels depend on.
+  // Adds an image. `picture` is its path in the capture; `how` describes everything else that its pixels depend on.
   void add(const std::string& picture, const fs::path& source, const std::string& how);
 
-  // Removes those pictures from `capture` that were not made from what was added here, then writes sources.txt: every
-  // picture that is there afterwards may be kept. Throws Error when a picture cannot be removed.
+  // Removes those of the added images from `capture` that were produced from another source or conversion, then writes
+  // sources.txt: every added image that exists afterwards can be reused. Throws Error if an image cannot be removed.
   void claim(const fs::path& capture) const;
 
  private:

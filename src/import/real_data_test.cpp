@@ -1,4 +1,4 @@
-// Real photographs as they come. They are no part of the project: TESSERA_SHARED_DATA names the folder that holds them.
+// Tests on real photographs. They are not part of the project: TESSERA_SHARED_DATA names the folder that contains them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace tessera {
 namespace {
 
-TEST(RealData, FoxComesInWithoutTheSeventeenPhotosThatDoNotExist) {
+TEST(RealData, ImportsFoxWithoutItsSeventeenMissingPhotos) {
   const auto fox = sharedData("fox");
   if (!fox) GTEST_SKIP() << "TESSERA_SHARED_DATA/fox is not there";
   const TemporaryFolder folder;
@@ -27,7 +27,7 @@ TEST(RealData, FoxComesInWithoutTheSeventeenPhotosThatDoNotExist) {
   EXPECT_EQ(capture.cameras[0].lens, LensModel::openCv);
   EXPECT_NEAR(capture.cameras[0].focalX(), 687.76 * 68 / 540, 1e-9);
 
-  // Hand-held: everyone looks inwards and stands upright.
+  // Hand-held photos: every camera looks inwards and is upright.
   for (const Photo& photo : capture.photos) {
     EXPECT_GT(-photo.worldFromCamera.rotation.col(1).z(), 0.7) << photo.name;
     EXPECT_NEAR(photo.worldFromCamera.rotation.determinant(), 1, 1e-9);
@@ -44,7 +44,7 @@ TEST(RealData, BrightonBeachLooksDownFromAFlightAndItsPointsProjectBack) {
   EXPECT_EQ(capture.photosIn(Split::test).size(), 3u);
   ASSERT_TRUE(capture.geo.has_value());
 
-  // Poses, lens, axes and scaling together: observations land where their points project.
+  // Checks poses, lens, axes and scaling together: the points project to their observations.
   ASSERT_GT(capture.observations.size(), 1000u);
   std::vector<double> errors, stored;
   for (const Observation& observation : capture.observations) {
@@ -60,7 +60,7 @@ TEST(RealData, BrightonBeachLooksDownFromAFlightAndItsPointsProjectBack) {
   EXPECT_LT(errors[errors.size() / 2], 1.0);
   EXPECT_NEAR(stored[stored.size() / 2], errors[errors.size() / 2], 0.02);
 
-  // Nadir at one height, in metres: the drone said 40 m above take-off.
+  // A nadir flight at one height, in metres: the drone recorded 40 m above take-off.
   double lowest = 1e9, highest = -1e9, ground = 0;
   for (const Photo& photo : capture.photos) {
     EXPECT_LT(photo.worldFromCamera.rotation.col(2).z(), -0.98) << photo.name;
@@ -75,7 +75,7 @@ TEST(RealData, BrightonBeachLooksDownFromAFlightAndItsPointsProjectBack) {
   EXPECT_NEAR(lowest - ground, 40, 12);
 }
 
-TEST(RealData, BrightonBeachComesBackExactly) {
+TEST(RealData, ReadsBrightonBeachBackExactly) {
   const auto beach = sharedData("brighton_beach");
   if (!beach) GTEST_SKIP() << "TESSERA_SHARED_DATA/brighton_beach is not there";
   const TemporaryFolder folder;

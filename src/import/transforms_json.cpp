@@ -20,14 +20,14 @@ constexpr std::array kIntrinsicKeys = {
 constexpr std::pair<const char*, Split> kSplitKeys[] = {
     {"train_filenames", Split::train}, {"val_filenames", Split::validation}, {"test_filenames", Split::test}};
 
-// What else is read below, of the file and of its frames.
+// The other keys that are read below, of the file and of its frames.
 constexpr std::array kReadKeys = {"frames",        "file_path",         "transform_matrix", "mask_path",
                                   "depth_path",    "depth_file_path",   "camera_model",     "is_fisheye",
                                   "ply_file_path", "applied_transform", "applied_scale",    "integer_depth_scale",
                                   "tessera",       "ftheta_p0",         "ftheta_p1",        "ftheta_p2",
                                   "ftheta_p3",     "ftheta_p4",         "latlong",          "equirectangular"};
 
-// What the programs that write such files say to themselves; nothing here depends on it.
+// Keys that other programs write for their own use and that have no effect here.
 constexpr std::array kOthersKeys = {
     // instant-ngp
     "aabb_scale", "aabb", "render_aabb", "scale", "offset", "up", "n_frames", "sharpness",
@@ -38,20 +38,20 @@ constexpr std::array kOthersKeys = {
     // Blender
     "rotation", "near", "far"};
 
-// What says something of the pictures that is not followed, and what comes of that.
+// Keys with a meaning that is not supported, and the consequence.
 constexpr std::pair<const char*, const char*> kUnmetKeys[] = {
-    {"rolling_shutter", "every photo counts as taken in one moment"},
-    {"transform_matrix_start", "every photo counts as taken in one moment"},
-    {"transform_matrix_end", "every photo counts as taken in one moment"},
+    {"rolling_shutter", "every photo is treated as exposed at one instant"},
+    {"transform_matrix_start", "every photo is treated as exposed at one instant"},
+    {"transform_matrix_end", "every photo is treated as exposed at one instant"},
     {"from_na", "poses are read with OpenGL axes"},
     {"normal_mts_args", "poses are read with OpenGL axes"},
     {"fisheye_crop_radius", "what lies outside the circle is trained on unless masks hide it"},
-    {"time", "everything counts as standing still"}};
+    {"time", "the scene is treated as static"}};
 
-// applied_scale and applied_transform reach from here to there; beyond lie slips.
+// Bounds of applied_scale and applied_transform. Values outside them are mistakes.
 constexpr double kTiny = 1e-12, kHuge = 1e12;
 
-// Python writes NaN, Infinity and -Infinity, which JSON has no words for: they become null (read as not-a-number).
+// Replaces NaN, Infinity and -Infinity, which Python writes but JSON does not allow, by null (which is read as NaN).
 std::string withoutPythonNumbers(std::string_view text) {
   std::string out;
   out.reserve(text.size());
@@ -84,24 +84,24 @@ std::string withoutPythonNumbers(std::string_view text) {
 }
 
 double numberOr(const Json& object, const char* key, double otherwise) {
-  const auto found = object.find(key);
-  return found != object.end() && found->is_number() ? found->get<double>() : otherwise;
+  const auto entry = object.find(key);
+  return entry != object.end() && entry->is_number() ? entry->get<double>() : otherwise;
 }
 
 std::string textOr(const Json& object, const char* key) {
-  const auto found = object.find(key);
-  return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
+  const auto entry = object.find(key);
+  return entry != object.end() && entry->is_string() ? entry->get<std::string>() : std::string();
 }
 
-// Object of that name, or an empty one.
+// Returns the object at that key, or an empty one.
 const Json& objectAt(const Json& object, const char* key) {
   static const Json kNone = Json::object();
-  const auto found = object.find(key);
-  return found != object.end() && found->is_object() ? *found : kNone;
+  const auto entry = object.find(key);
+  return entry != object.end() && entry->is_object() ? *entry : kNone;
 }
 
-// 3×4 or 4×4 rows; numbers that are not there are not-a-number.
-std::optional<Mat4d> matrixOf(const Json& object, const char* key) {
+// Reads a matrix of 3×4 or 4×4 numbers; elements that are not numbers become NaN.
+std::optional<Mat4d> readMatrix(const Json& object, const char* key) {
   const auto rows = object.find(key);
   if (rows == object.end() || !rows->is_array() || (rows->size() != 3 && rows->size() != 4)) return std::nullopt;
   Mat4d matrix = Mat4d::Identity();
@@ -116,7 +116,7 @@ std::optional<Mat4d> matrixOf(const Json& object, const char* key) {
   return matrix;
 }
 
-// null, false, 0, and lists of these.
+// Returns whether the value is null, false, 0, or a list of these.
 bool saysNothing(const Json& value) {
   const auto isNothing = [](const Json& v) {
     return v.is_null() || (v.is_boolean() && !v.get<bool>()) || (v.is_number() && v.get<double>() == 0);
@@ -152,7 +152,7 @@ void readIntrinsics(const Json& object, Intrinsics& intrinsics) {
   if (const std::string model = textOr(object, "camera_model"); !model.empty()) intrinsics.model = model;
   const auto fisheye = object.find("is_fisheye");
   if (fisheye != object.end() && fisheye->is_boolean()) intrinsics.fisheye = fisheye->get<bool>();
-  // instant-ngp names some lenses by keys of their own, and those decide.
+  // instant-ngp specifies some lenses by keys of their own, which take precedence.
   std::string lens = object.contains("ftheta_p0") ? "FTHETA" : "";
   for (const auto& [key, model] : {std::pair{"latlong", "LATLONG"}, std::pair{"equirectangular", "EQUIRECTANGULAR"}}) {
     if (const auto value = object.find(key); value != object.end() && !saysNothing(*value)) lens = model;
@@ -174,8 +174,8 @@ void readSplits(const Json& json, TransformsFile& file) {
   }
 }
 
-// Whether it can be undone without leaving the numbers that places have. A similarity's determinant is the cube of its
-// size, so it is judged by that.
+// Returns whether the transform can be inverted with coordinates staying in bounds. The determinant of a similarity is
+// the cube of its scale, so the matrix is normalised by its scale before the determinant is tested.
 bool isInvertible(const Mat4d& applied) {
   const Mat3d linear = applied.topLeftCorner<3, 3>();
   const double size = linear.norm() / std::sqrt(3.0);
@@ -194,7 +194,7 @@ void readApplied(const Json& json, TransformsFile& file) {
     }
   }
   if (const auto matrix = json.find("applied_transform"); matrix != json.end() && !matrix->is_null()) {
-    const auto applied = matrixOf(json, "applied_transform");
+    const auto applied = readMatrix(json, "applied_transform");
     if (applied && isInvertible(*applied)) {
       file.appliedTransform = *applied;
     } else {
@@ -230,11 +230,11 @@ bool readOurs(const Json& ours, TransformsFile& file, std::string& reason) {
       file.cameras.push_back(*decoded);
     }
   }
-  if (const auto matrix = matrixOf(ours, "source_from_world"); matrix && matrix->allFinite()) {
+  if (const auto matrix = readMatrix(ours, "source_from_world"); matrix && matrix->allFinite()) {
     file.sourceFromWorld = *matrix;
   }
   const Json& geo = objectAt(ours, "geo");
-  if (const auto matrix = matrixOf(geo, "enu_from_world"); matrix && matrix->allFinite()) {
+  if (const auto matrix = readMatrix(geo, "enu_from_world"); matrix && matrix->allFinite()) {
     file.geo =
         GeoFrame{numberOr(geo, "latitude", 0), numberOr(geo, "longitude", 0), numberOr(geo, "altitude", 0), *matrix};
   }
@@ -246,7 +246,7 @@ bool readFrame(const Json& object, const Intrinsics& shared, TransformsFile& fil
   const size_t index = file.frames.size();
   TransformsFrame frame;
   if (object.is_object()) frame.file = textOr(object, "file_path");
-  const auto matrix = object.is_object() ? matrixOf(object, "transform_matrix") : std::nullopt;
+  const auto matrix = object.is_object() ? readMatrix(object, "transform_matrix") : std::nullopt;
   if (frame.file.empty() || !matrix) {
     reason = fmt::format("frames[{}]: has no {}", index, frame.file.empty() ? "file_path" : "4 x 4 transform_matrix");
     return false;
@@ -278,12 +278,13 @@ bool readFrame(const Json& object, const Intrinsics& shared, TransformsFile& fil
 }
 
 double numberAt(const Intrinsics& intrinsics, const char* key, double otherwise) {
-  const auto found = intrinsics.numbers.find(key);
-  return found == intrinsics.numbers.end() ? otherwise : found->second;
+  const auto entry = intrinsics.numbers.find(key);
+  return entry == intrinsics.numbers.end() ? otherwise : entry->second;
 }
 
-// Focal length along an axis: fl, else from an angle in radians, else from one in degrees; 0 when there is none.
-double focalOf(const Intrinsics& i, const char* focal, const char* radians, const char* degrees, double size) {
+// Returns the focal length along an axis: fl, else from an angle in radians, else from one in degrees; 0 if none is
+// given.
+double readFocalLength(const Intrinsics& i, const char* focal, const char* radians, const char* degrees, double size) {
   if (const double f = numberAt(i, focal, 0); f > 0) return f;
   double angle = numberAt(i, radians, 0);
   if (!(angle > 0)) angle = numberAt(i, degrees, 0) * M_PI / 180;
@@ -330,8 +331,8 @@ std::optional<Camera> cameraFromIntrinsics(const Intrinsics& intrinsics, int pho
     w = photoWidth;
     h = photoHeight;
   }
-  double fx = focalOf(intrinsics, "fl_x", "camera_angle_x", "x_fov", w);
-  double fy = focalOf(intrinsics, "fl_y", "camera_angle_y", "y_fov", h);
+  double fx = readFocalLength(intrinsics, "fl_x", "camera_angle_x", "x_fov", w);
+  double fy = readFocalLength(intrinsics, "fl_y", "camera_angle_y", "y_fov", h);
   if (fx <= 0) fx = fy;
   if (fy <= 0) fy = fx;
   if (!(fx > 0) || !(w < 1e6) || !(h < 1e6)) {
@@ -342,7 +343,7 @@ std::optional<Camera> cameraFromIntrinsics(const Intrinsics& intrinsics, int pho
   const auto append = [&](std::initializer_list<const char*> keys) {
     for (const char* key : keys) parameters.push_back(at(key));
   };
-  // What is named decides, then what is not zero.
+  // The model is determined by its name, then by which coefficients are not zero.
   std::string model = intrinsics.model;
   if (model == "SIMPLE_RADIAL" || model == "RADIAL" || model == "PERSPECTIVE" || model.empty()) model = "OPENCV";
   if (model == "SIMPLE_PINHOLE") model = "PINHOLE";

@@ -1,8 +1,8 @@
-// transforms.json as nerfstudio, instant-ngp and Blender's NeRF exporter write it, and as scene/capture_writer.h does.
+// Reads transforms.json as written by nerfstudio, instant-ngp, Blender's NeRF exporter and scene/capture_writer.h.
 //
 // Poses are camera-to-world with OpenGL axes (right, up, backward). nerfstudio's applied_transform and applied_scale
-// say what its converter has already done to poses and to the point cloud alike; so both stay as the file has them, and
-// the two only enter `sourceFromWorld`. Depth pictures were not scaled by that converter: their unit is multiplied by
+// state the transform that its converter has already applied to both poses and point cloud; so both are read unchanged,
+// and the two keys only enter `sourceFromWorld`. That converter does not scale depth maps: their unit is multiplied by
 // applied_scale.
 #pragma once
 
@@ -18,7 +18,7 @@
 
 namespace tessera {
 
-// The numbers of a lens as a file gives them, at the top or in a frame; all may be missing.
+// The intrinsics of a lens as a file states them, at the top level or in a frame; all may be missing.
 struct Intrinsics {
   std::string model;  // camera_model
   bool fisheye = false;
@@ -27,8 +27,8 @@ struct Intrinsics {
 
 struct TransformsFrame {
   std::string file, mask, depth;                // as written; may be empty (file never is)
-  Mat4d worldFromCameraGl = Mat4d::Identity();  // unchecked: may be not-a-number or not rigid
-  Intrinsics intrinsics;                        // the frame's own over the file's
+  Mat4d worldFromCameraGl = Mat4d::Identity();  // unchecked: may contain NaN or not be rigid
+  Intrinsics intrinsics;                        // the frame's own override those of the file
   int camera = -1;                              // index into TransformsFile::cameras, -1: use the intrinsics
   std::string name;
   double exposure = 0;
@@ -45,34 +45,35 @@ struct SplitList {
 
 struct TransformsFile {
   std::vector<TransformsFrame> frames;
-  std::vector<SplitList> splitLists;  // train, validation, test, as far as they are there
+  std::vector<SplitList> splitLists;  // train, validation, test, as far as the file has them
   std::string pointFile, observationFile;
   Mat4d appliedTransform = Mat4d::Identity();  // invertible; its last row is 0 0 0 1
   double appliedScale = 1;
-  std::string appliedTrouble;                    // why one of the two was not taken over; empty when all is well
+  std::string appliedTrouble;                    // why one of the two was ignored; empty if none was
   double integerDepthScale = 0;                  // instant-ngp: world units per step, 0: not given
   std::set<std::string> unknownKeys;             // of the file and its frames
-  std::map<std::string, std::string> unmetKeys;  // known, not followed → what comes of that
-  // Of our own captures only.
+  std::map<std::string, std::string> unmetKeys;  // known but unsupported keys → the consequence
+  // Set for our own captures only.
   bool isOurs = false;
   std::vector<Camera> cameras;
   Mat4d sourceFromWorld = Mat4d::Identity();
   std::optional<GeoFrame> geo;
 };
 
-// Untrusted text: nothing, and why in `reason`, when it is not such a file. Unknown keys are noted; NaN and
-// Infinity as Python writes them are understood.
+// Decodes untrusted text. Returns nothing, with the reason in `reason`, if it is not such a file. Unknown keys are
+// recorded; NaN and Infinity are accepted as Python writes them.
 std::optional<TransformsFile> decodeTransforms(std::string_view text, std::string& reason);
 
-// The same of a file; throws Error.
+// Reads and decodes a file. Throws Error naming it if it cannot be read or decoded.
 TransformsFile loadTransforms(const fs::path& file);
 
-// The camera for a photo of that size (used where the file gives none). Nothing for a lens that is not known, or that
-// has no focal length.
+// Returns the camera for a photo of that size (which is used where the file gives none), or nothing, with the reason in
+// `reason`, for an unsupported lens or a lens without a focal length.
 std::optional<Camera> cameraFromIntrinsics(const Intrinsics& intrinsics, int photoWidth, int photoHeight,
                                            std::string& reason);
 
-// The transforms*.json files of a source folder (or the file itself): transforms.json, else Blender's three.
+// Returns the transforms*.json files of a source folder (or the source itself if it is such a file): transforms.json,
+// else Blender's three.
 std::vector<fs::path> findTransforms(const fs::path& source);
 SourceCapture readTransforms(const std::vector<fs::path>& files);
 

@@ -1,4 +1,4 @@
-// From decoded transforms.json files to a capture: paths, cameras, splits, points.
+// Converts decoded transforms.json files into a capture: paths, cameras, splits, points.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,8 +20,8 @@ bool isFile(const fs::path& path) {
   return fs::is_regular_file(path, status);
 }
 
-// A path as written in the file; Blender leaves the extension out, Windows turns slashes. Nothing when it leaves the
-// folder; a path that does not exist when nothing is there.
+// Resolves a path as written in the file; Blender omits the extension, Windows uses backslashes. Returns nothing if it
+// leaves the folder, and a path that does not exist if there is no such file.
 std::optional<fs::path> resolvePhoto(const fs::path& root, std::string written) {
   std::replace(written.begin(), written.end(), '\\', '/');
   const auto path = resolveInside(root, written);
@@ -42,14 +42,14 @@ std::optional<ImageInfo> photoSize(const fs::path& path) {
   }
 }
 
-// The pose in a camera-to-world matrix, freed of what rounding did to its rotation; nothing when it is not rigid
-// or stands nowhere.
+// Returns the pose in a camera-to-world matrix, with the rounding errors of its rotation corrected, or nothing if it is
+// not rigid or its position is out of bounds.
 std::optional<Pose> poseFromGl(const Mat4d& worldFromCameraGl) {
   if (!worldFromCameraGl.allFinite() || !isPlace(worldFromCameraGl.topRightCorner<3, 1>())) return std::nullopt;
   Mat3d rotation = flippedYz(worldFromCameraGl.topLeftCorner<3, 3>());
   const double deviation = (rotation.transpose() * rotation - Mat3d::Identity()).norm();
   if (deviation > 0.02 || rotation.determinant() < 0) return std::nullopt;
-  if (deviation > 1e-9) {  // rounded in writing: the nearest rotation
+  if (deviation > 1e-9) {  // rounded by the writer: take the nearest rotation
     const Eigen::JacobiSVD<Mat3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
     rotation = svd.matrixU() * svd.matrixV().transpose();
   }
@@ -64,10 +64,10 @@ std::optional<Split> splitOfName(const fs::path& file) {
   return std::nullopt;
 }
 
-int indexOf(const Camera& camera, std::vector<Camera>& cameras) {
-  const auto found = std::find(cameras.begin(), cameras.end(), camera);
-  const auto index = static_cast<int>(found - cameras.begin());
-  if (found == cameras.end()) cameras.push_back(camera);
+int findOrAddCamera(const Camera& camera, std::vector<Camera>& cameras) {
+  const auto match = std::find(cameras.begin(), cameras.end(), camera);
+  const auto index = static_cast<int>(match - cameras.begin());
+  if (match == cameras.end()) cameras.push_back(camera);
   return index;
 }
 
@@ -82,7 +82,7 @@ void readPoints(const fs::path& file, const TransformsFile& transforms, Capture&
   if (!transforms.isOurs) std::erase_if(capture.points, [](const SparsePoint& p) { return !isPlace(p.xInWorld); });
 }
 
-// `photoOfFrame`: -1 for frames that were dropped.
+// `photoOfFrame` is the index of each frame's photo, -1 for frames that were dropped.
 void readObservations(const fs::path& file, const TransformsFile& transforms, const std::vector<int>& photoOfFrame,
                       Capture& capture) {
   if (transforms.observationFile.empty()) return;
@@ -105,14 +105,14 @@ void readObservations(const fs::path& file, const TransformsFile& transforms, co
 }
 
 struct Dropped {
-  std::vector<std::string> outside, poses, lenses;  // whole photos
-  std::vector<std::string> masks, depths;           // these alone
+  std::vector<std::string> outside, poses, lenses;  // photos dropped
+  std::vector<std::string> masks, depths;           // dropped without their photos
   std::string lensReason;
 };
 
 void reportDropped(const fs::path& file, const Dropped& dropped) {
   const auto report = [&file](const std::vector<std::string>& names, const std::string& what) {
-    if (!names.empty()) warn("{}: {} {} ({})", file.string(), names.size(), what, firstOf(names));
+    if (!names.empty()) warn("{}: {} {} ({})", file.string(), names.size(), what, abbreviateList(names));
   };
   report(dropped.outside, "photos have paths that leave the folder; dropped");
   report(dropped.poses,
@@ -123,7 +123,7 @@ void reportDropped(const fs::path& file, const Dropped& dropped) {
   report(dropped.depths, "depth maps have paths that leave the folder; ignored");
 }
 
-// What the file says and nothing here follows: one line of each kind.
+// Reports the keys that are unknown or not supported, in one line for each kind.
 void reportKeys(const fs::path& file, const TransformsFile& transforms) {
   constexpr size_t kNamed = 10;
   if (const auto& keys = transforms.unknownKeys; !keys.empty()) {
@@ -144,14 +144,15 @@ void reportKeys(const fs::path& file, const TransformsFile& transforms) {
   }
 }
 
-// "./images/a.jpg" and "images\\a.jpg" are images/a.jpg.
+// Normalises a path: "./images/a.jpg" and "images\\a.jpg" become images/a.jpg.
 std::string normalPath(std::string written) {
   std::replace(written.begin(), written.end(), '\\', '/');
   return fs::path(written).lexically_normal().generic_string();
 }
 
-// The split of each frame by the lists of names (a later list wins: what is to be held out is), none where no list has
-// it. A list that fits no frame at all would hold out nothing: it goes into `error`.
+// Returns the split of each frame according to the lists of names, nothing where no list contains it. A later list
+// takes precedence, so that a photo in a held-out list is held out. A list that matches no frame at all, and so would
+// hold out nothing, is reported in `error`.
 std::vector<std::optional<Split>> splitsOfFrames(const fs::path& file, const TransformsFile& transforms,
                                                  std::optional<Error>& error) {
   std::vector<std::optional<Split>> splits(transforms.frames.size());
@@ -169,14 +170,14 @@ std::vector<std::optional<Split>> splitsOfFrames(const fs::path& file, const Tra
     }
     if (strangers.empty()) continue;
     if (strangers.size() == list.names.size()) {
-      error = Error(file.string(), list.key, "names no frame of this file (" + firstOf(strangers) + ")",
+      error = Error(file.string(), list.key, "names no frame of this file (" + abbreviateList(strangers) + ")",
                     "write its names as file_path has them, or split anew with --holdout every:8");
     } else {
       warn("{}: {}: {} of {} names are of no frame ({})", file.string(), list.key, strangers.size(), list.names.size(),
-           firstOf(strangers));
+           abbreviateList(strangers));
     }
   }
-  // Where only the held-out frames are listed, the others are plainly meant to train.
+  // Where only held-out frames are listed, the other frames are meant for training.
   const bool listsTraining =
       std::any_of(transforms.splitLists.begin(), transforms.splitLists.end(),
                   [](const SplitList& list) { return list.split == Split::train && !list.names.empty(); });
@@ -185,12 +186,13 @@ std::vector<std::optional<Split>> splitsOfFrames(const fs::path& file, const Tra
     if (!splits[i]) unlisted.push_back(transforms.frames[i].file);
   }
   if (!unlisted.empty()) {
-    warn("{}: {} frames are in no list of a split; they train ({})", file.string(), unlisted.size(), firstOf(unlisted));
+    warn("{}: {} frames are in no list of a split; they train ({})", file.string(), unlisted.size(),
+         abbreviateList(unlisted));
   }
   return splits;
 }
 
-// Adds one frame; false when it is dropped.
+// Adds one frame. Returns false if it is dropped.
 bool addFrame(const fs::path& root, const TransformsFile& transforms, const TransformsFrame& frame,
               SourceCapture& source, Dropped& dropped) {
   Capture& capture = source.capture;
@@ -203,10 +205,10 @@ bool addFrame(const fs::path& root, const TransformsFile& transforms, const Tran
   photo.worldFromCamera = *pose;
   if (frame.camera >= 0) {
     photo.camera = frame.camera;
-  } else if (const auto info = photoSize(photo.image)) {  // missing and unreadable photos are told of once, later
+  } else if (const auto info = photoSize(photo.image)) {  // cleanSource reports missing and unreadable photos
     const auto camera = cameraFromIntrinsics(frame.intrinsics, info->width, info->height, dropped.lensReason);
     if (!camera) return dropped.lenses.push_back(frame.file), false;
-    photo.camera = indexOf(*camera, capture.cameras);
+    photo.camera = findOrAddCamera(*camera, capture.cameras);
   }
   bool inverted = false;
   if (!frame.mask.empty()) {
@@ -280,7 +282,7 @@ SourceCapture readTransforms(const std::vector<fs::path>& files) {
     }
     readPoints(file, transforms, capture);
     std::vector<std::optional<Split>> splits;
-    if (const auto split = files.size() > 1 ? splitOfName(file) : std::nullopt) {  // one alone is a whole capture
+    if (const auto split = files.size() > 1 ? splitOfName(file) : std::nullopt) {  // a single file is a whole capture
       splits.assign(transforms.frames.size(), split);
       source.hasOwnSplit = true;
     } else {
@@ -290,9 +292,9 @@ SourceCapture readTransforms(const std::vector<fs::path>& files) {
     Dropped dropped;
     std::vector<int> photoOfFrame;
     for (size_t i = 0; i < transforms.frames.size(); ++i) {
-      const bool kept = addFrame(file.parent_path(), transforms, transforms.frames[i], source, dropped);
-      photoOfFrame.push_back(kept ? static_cast<int>(capture.photos.size()) - 1 : -1);
-      if (kept) capture.photos.back().split = splits[i].value_or(Split::train);
+      const bool isAdded = addFrame(file.parent_path(), transforms, transforms.frames[i], source, dropped);
+      photoOfFrame.push_back(isAdded ? static_cast<int>(capture.photos.size()) - 1 : -1);
+      if (isAdded) capture.photos.back().split = splits[i].value_or(Split::train);
     }
     reportDropped(file, dropped);
     readObservations(file, transforms, photoOfFrame, capture);

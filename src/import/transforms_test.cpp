@@ -17,7 +17,7 @@ std::string frame(const std::string& file, const std::string& matrix = kIdentity
   return "{\"file_path\":\"" + file + "\",\"transform_matrix\":" + matrix + more + "}";
 }
 
-Camera cameraOf(const std::string& keys, int width = 100, int height = 80) {
+Camera decodeCamera(const std::string& keys, int width = 100, int height = 80) {
   std::string reason;
   const auto file = decodeTransforms("{" + keys + ",\"frames\":[" + frame("a") + "]}", reason);
   EXPECT_TRUE(file.has_value()) << reason;
@@ -26,7 +26,8 @@ Camera cameraOf(const std::string& keys, int width = 100, int height = 80) {
   return camera.value_or(Camera{});
 }
 
-// A source of the frames, which name a.png, b.png, ... in `folder`, and what was said while it was read.
+// A source of the frames, which name a.png, b.png, ... in `folder`, and the warnings that were logged while it was
+// read.
 struct Read {
   SourceCapture source;
   std::string warnings;
@@ -53,10 +54,10 @@ std::string lensTrouble(const std::string& keys) {
 }
 
 TEST(Transforms, ReadsEveryWayOfGivingAFocalLength) {
-  EXPECT_NEAR(cameraOf(R"("camera_angle_x":1.5707963267948966)").focalX(), 50, 1e-9);
-  EXPECT_NEAR(cameraOf(R"("camera_angle_x":1.5707963267948966)").focalY(), 50, 1e-9);
-  EXPECT_NEAR(cameraOf(R"("y_fov":90)").focalX(), 40, 1e-9);
-  const Camera both = cameraOf(R"("fl_x":70,"fl_y":71,"camera_angle_x":1,"w":200,"h":160,"cx":99.5)");
+  EXPECT_NEAR(decodeCamera(R"("camera_angle_x":1.5707963267948966)").focalX(), 50, 1e-9);
+  EXPECT_NEAR(decodeCamera(R"("camera_angle_x":1.5707963267948966)").focalY(), 50, 1e-9);
+  EXPECT_NEAR(decodeCamera(R"("y_fov":90)").focalX(), 40, 1e-9);
+  const Camera both = decodeCamera(R"("fl_x":70,"fl_y":71,"camera_angle_x":1,"w":200,"h":160,"cx":99.5)");
   EXPECT_EQ(both.focalX(), 70);
   EXPECT_EQ(both.focalY(), 71);
   EXPECT_EQ(both.centreX(), 99.5);
@@ -65,30 +66,30 @@ TEST(Transforms, ReadsEveryWayOfGivingAFocalLength) {
 }
 
 TEST(Transforms, ReadsLenses) {
-  EXPECT_EQ(cameraOf(R"("fl_x":70)").lens, LensModel::pinhole);
-  const Camera openCv = cameraOf(R"("fl_x":70,"k1":0.1,"k2":0.2,"p1":0.3,"p2":0.4)");
+  EXPECT_EQ(decodeCamera(R"("fl_x":70)").lens, LensModel::pinhole);
+  const Camera openCv = decodeCamera(R"("fl_x":70,"k1":0.1,"k2":0.2,"p1":0.3,"p2":0.4)");
   EXPECT_EQ(openCv.lens, LensModel::openCv);
   EXPECT_EQ(openCv.parameters[6], 0.3);
-  const Camera fisheye = cameraOf(R"("fl_x":70,"k1":0.1,"k4":0.2,"is_fisheye":true)");
+  const Camera fisheye = decodeCamera(R"("fl_x":70,"k1":0.1,"k4":0.2,"is_fisheye":true)");
   EXPECT_EQ(fisheye.lens, LensModel::openCvFisheye);
   EXPECT_EQ(fisheye.parameters[7], 0.2);
-  EXPECT_EQ(cameraOf(R"("fl_x":70,"camera_model":"OPENCV_FISHEYE")").lens, LensModel::openCvFisheye);
-  const Camera sixth = cameraOf(R"("fl_x":70,"k3":0.1,"camera_model":"OPENCV")");
+  EXPECT_EQ(decodeCamera(R"("fl_x":70,"camera_model":"OPENCV_FISHEYE")").lens, LensModel::openCvFisheye);
+  const Camera sixth = decodeCamera(R"("fl_x":70,"k3":0.1,"camera_model":"OPENCV")");
   EXPECT_EQ(sixth.lens, LensModel::fullOpenCv);
   EXPECT_EQ(sixth.parameters[8], 0.1);
 }
 
-TEST(Transforms, RefusesLensesThatItWouldDrawWrongly) {
+TEST(Transforms, RejectsUnsupportedLenses) {
   EXPECT_NE(lensTrouble(R"("k1":0.1)").find("no focal length"), std::string::npos);
   EXPECT_NE(lensTrouble(R"("fl_x":70,"k4":0.1)").find("k4"), std::string::npos);
   EXPECT_NE(lensTrouble(R"("fl_x":70,"camera_model":"EQUIRECTANGULAR")").find("EQUIRECTANGULAR"), std::string::npos);
   EXPECT_NE(lensTrouble(R"("fl_x":70,"is_fisheye":true,"ftheta_p0":0,"ftheta_p1":1)").find("FTHETA"),
             std::string::npos);
   EXPECT_NE(lensTrouble(R"("fl_x":70,"latlong":true)").find("LATLONG"), std::string::npos);
-  EXPECT_EQ(cameraOf(R"("fl_x":70,"latlong":false)").lens, LensModel::pinhole);
+  EXPECT_EQ(decodeCamera(R"("fl_x":70,"latlong":false)").lens, LensModel::pinhole);
 }
 
-TEST(Transforms, LetsAFrameSpeakOverTheFile) {
+TEST(Transforms, LetsAFrameOverrideTheFile) {
   std::string reason;
   const auto file = decodeTransforms(R"({"fl_x":70,"w":100,"unknown":{"a":[1]},"frames":[)" +
                                          frame("a", kIdentity, R"(,"fl_x":90,"sharpness":3)") + "]}",
@@ -98,7 +99,7 @@ TEST(Transforms, LetsAFrameSpeakOverTheFile) {
   EXPECT_EQ(file->frames[0].intrinsics.numbers.at("w"), 100);
 }
 
-TEST(Transforms, SaysWhatIsMissing) {
+TEST(Transforms, NamesWhatIsMissing) {
   std::string reason;
   EXPECT_FALSE(decodeTransforms("{]", reason).has_value());
   EXPECT_EQ(reason, "is not JSON");
@@ -110,7 +111,7 @@ TEST(Transforms, SaysWhatIsMissing) {
   EXPECT_FALSE(decodeTransforms("{\"frames\":[{}]}", reason).has_value());
 }
 
-TEST(Transforms, DropsPosesThatAreNoPosesAndPathsThatLeave) {
+TEST(Transforms, DropsInvalidPosesAndPathsThatLeaveTheFolder) {
   const TemporaryFolder folder;
   writePng(folder / "a.png", gradientPicture(8, 8));
   const std::string nan = "[[NaN,0,0,0],[0,1,0,0],[0,0,1,-Infinity],[0,0,0,1]]";
@@ -128,7 +129,7 @@ TEST(Transforms, DropsPosesThatAreNoPosesAndPathsThatLeave) {
   EXPECT_NE(warnings.find("2 photos have paths that leave the folder"), std::string::npos) << warnings;
 }
 
-TEST(Transforms, DropsPosesThatAreNumbersButNoPlaces) {
+TEST(Transforms, DropsFinitePosesThatAreOutOfBounds) {
   const TemporaryFolder folder;
   const Read read = readSource(folder, "",
                                {frame("a.png", "[[1,0,0,1e12],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"),
@@ -152,7 +153,7 @@ TEST(Transforms, SaysWhichMasksAndDepthMapsLeaveTheFolder) {
   EXPECT_TRUE(read.warned("1 depth maps have paths that leave the folder; ignored (/d.exr)")) << read.warnings;
 }
 
-TEST(Transforms, FindsTheNamesOfSplitsHoweverTheirPathsAreWritten) {
+TEST(Transforms, MatchesSplitNamesInAnyPathNotation) {
   const TemporaryFolder folder;
   const Read read = readSource(
       folder, R"(,"train_filenames":["./d.png"],"val_filenames":["x/../c.png"],"test_filenames":["a.png",".\\b.png"])",
@@ -165,7 +166,7 @@ TEST(Transforms, FindsTheNamesOfSplitsHoweverTheirPathsAreWritten) {
   EXPECT_EQ(read.warnings, "");
 }
 
-TEST(Transforms, SaysWhichNamesOfSplitsFitNoFrameAndWhichFramesNoList) {
+TEST(Transforms, ReportsSplitNamesWithoutFrameAndFramesWithoutSplit) {
   const TemporaryFolder folder;
   const Read read =
       readSource(folder, R"(,"train_filenames":["a.png"],"test_filenames":["b.png","e.png","images/b.png"])",
@@ -174,11 +175,11 @@ TEST(Transforms, SaysWhichNamesOfSplitsFitNoFrameAndWhichFramesNoList) {
   EXPECT_TRUE(read.warned("2 frames are in no list of a split; they train (c.png, d.png)")) << read.warnings;
   EXPECT_FALSE(read.source.splitError.has_value());
   EXPECT_EQ(read.source.capture.photos.at(1).split, Split::test);
-  // Where only the held-out ones are named, the others are known to train.
+  // Where only held-out photos are listed, the others are for training, without a warning.
   EXPECT_EQ(readSource(folder, R"(,"test_filenames":["b.png"])", {frame("a.png"), frame("b.png")}).warnings, "");
 }
 
-TEST(Transforms, DoesNotTakeAListThatFitsNoFrameForASplit) {
+TEST(Transforms, RejectsSplitListsThatMatchNoFrame) {
   const TemporaryFolder folder;
   const Read read = readSource(folder, R"(,"train_filenames":["a.png"],"test_filenames":["images/b.png"])",
                                {frame("a.png"), frame("b.png")});
@@ -187,7 +188,7 @@ TEST(Transforms, DoesNotTakeAListThatFitsNoFrameForASplit) {
   EXPECT_NE(read.source.splitError->reason().find("images/b.png"), std::string::npos);
 }
 
-TEST(Transforms, NamesTheKeysThatItDoesNotKnowOnceEach) {
+TEST(Transforms, ReportsEachUnknownKeyOnce) {
   const TemporaryFolder folder;
   const std::string more = R"(,"blur":1,"colmap_im_id":3,"sharpness":2,"rotation":0.1)";
   const Read few = readSource(
@@ -200,22 +201,22 @@ TEST(Transforms, NamesTheKeysThatItDoesNotKnowOnceEach) {
   EXPECT_TRUE(readSource(folder, many, {frame("a.png")}).warned("key_i, key_j and 3 more\n"));
 }
 
-TEST(Transforms, SaysWhatComesOfKeysThatItDoesNotFollow) {
+TEST(Transforms, ReportsTheConsequencesOfUnsupportedKeys) {
   const TemporaryFolder folder;
   const Read read =
       readSource(folder, R"(,"rolling_shutter":[0,0,0.02,0],"from_na":true)",
                  {frame("a.png", kIdentity, R"(,"time":0.0)"), frame("b.png", kIdentity, R"(,"time":0.5)")});
-  EXPECT_TRUE(read.warned("rolling_shutter is not followed: every photo counts as taken in one moment"));
+  EXPECT_TRUE(read.warned("rolling_shutter is not followed: every photo is treated as exposed at one instant"));
   EXPECT_TRUE(read.warned("from_na is not followed: poses are read with OpenGL axes"));
-  EXPECT_TRUE(read.warned("time is not followed: everything counts as standing still"));
+  EXPECT_TRUE(read.warned("time is not followed: the scene is treated as static"));
   EXPECT_EQ(
       readSource(folder, R"(,"rolling_shutter":[0,0,0,0],"from_na":false,"time":null)", {frame("a.png")}).warnings, "");
 }
 
-TEST(Transforms, TurnsOpenGlAxesIntoOurs) {
+TEST(Transforms, ConvertsOpenGlAxes) {
   const TemporaryFolder folder;
   writePng(folder / "a.png", gradientPicture(8, 8));
-  // Looks along world +y (backward = -y), up = +z, right = +x; rounded as files are.
+  // The camera looks along world +y (backward = -y), up = +z, right = +x, with values rounded as in files.
   writeFileAtomically(
       folder / "transforms.json",
       R"({"fl_x":9,"frames":[)" + frame("a.png", "[[1,0.00001,0,5],[0,0,-1,6],[0,1,0,7],[0,0,0,1]]") + "]}");
@@ -253,7 +254,7 @@ TEST(Transforms, TakesInstantNgpsDynamicMasksAsInverted) {
   EXPECT_TRUE(source.maskIsInverted.at(0));
 }
 
-TEST(Transforms, KeepsTheWorldThatAppliedTransformLedTo) {
+TEST(Transforms, KeepsTheWorldAfterAppliedTransform) {
   const TemporaryFolder folder;
   writePng(folder / "a.png", gradientPicture(8, 8));
   writeFileAtomically(folder / "transforms.json",
@@ -268,7 +269,7 @@ TEST(Transforms, KeepsTheWorldThatAppliedTransformLedTo) {
   EXPECT_NEAR((inSource - Vec3d(2.5, -3.5, 3)).norm(), 0, 1e-12);
 }
 
-TEST(Transforms, UndoesAppliedScalesOfAnySize) {
+TEST(Transforms, InvertsAppliedScalesOfAnySize) {
   const TemporaryFolder folder;
   for (const double scale : {1e-11, 1e-5, 1e5}) {
     const std::string keys = R"(,"applied_transform":[[0,1,0,1],[1,0,0,2],[0,0,-1,3]],"applied_scale":)";
@@ -278,14 +279,14 @@ TEST(Transforms, UndoesAppliedScalesOfAnySize) {
     EXPECT_NEAR((inSource - Vec3d(-2, 4, 3)).norm(), 0, 1e-9) << scale;
     EXPECT_EQ(read.warnings, "");
   }
-  // The transform may hold the scale itself.
+  // The transform may contain the scale itself.
   const Read read =
       readSource(folder, R"(,"applied_transform":[[1e-5,0,0,0],[0,1e-5,0,0],[0,0,1e-5,0]])", {frame("a.png")});
   EXPECT_NEAR(read.source.capture.sourceFromWorld(1, 1), 1e5, 1e-6);
   EXPECT_EQ(read.warnings, "");
 }
 
-TEST(Transforms, SaysWhenAppliedTransformsCannotBeUndone) {
+TEST(Transforms, ReportsAppliedTransformsThatCannotBeInverted) {
   const TemporaryFolder folder;
   for (const char* matrix : {"[[1,0,0,0],[0,1,0,0],[0,0,0,0]]", "[[1,0,0,0],[0,1,0,0],[0,0,1,NaN]]", "[1,2,3]",
                              "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,0]]", "[[1,2,0,0],[2,4,0,0],[0,0,1,0]]"}) {
@@ -301,7 +302,7 @@ TEST(Transforms, SaysWhenAppliedTransformsCannotBeUndone) {
   }
 }
 
-// Everything that a capture can hold, with numbers that decimals cannot write in few digits.
+// Returns a capture with every kind of data, whose numbers have no short decimal representation.
 Capture fullCapture(const fs::path& root) {
   Capture capture;
   capture.root = root;
@@ -336,7 +337,7 @@ Capture fullCapture(const fs::path& root) {
   return capture;
 }
 
-TEST(Captures, ComeBackExactlyAsTheyWereWritten) {
+TEST(Captures, AreReadBackExactlyAsWritten) {
   const TemporaryFolder folder;
   const Capture written = fullCapture(folder.path());
   writeCapture(written);
@@ -370,14 +371,14 @@ TEST(Captures, ComeBackExactlyAsTheyWereWritten) {
   EXPECT_EQ(read.observations[0].y, 2.25f);
 }
 
-TEST(Captures, SpeakNerfstudiosWordsForOneCamera) {
+TEST(Captures, UseNerfstudiosKeysForOneCamera) {
   const TemporaryFolder folder;
   Capture capture = fullCapture(folder.path());
   capture.cameras.resize(1);
   for (Photo& photo : capture.photos) photo.camera = 0;
   writeCapture(capture);
   std::string text = readTextFile(folder / "transforms.json"), reason;
-  text.replace(text.find("\"tessera\""), 9, "\"unknown\"");  // as another reader sees it
+  text.replace(text.find("\"tessera\""), 9, "\"unknown\"");  // hides our own keys, as from another program
   const auto file = decodeTransforms(text, reason);
   ASSERT_TRUE(file.has_value()) << reason;
   EXPECT_FALSE(file->isOurs);
@@ -387,7 +388,7 @@ TEST(Captures, SpeakNerfstudiosWordsForOneCamera) {
   EXPECT_EQ(file->pointFile, "points.ply");
 }
 
-TEST(Captures, AreNotReadFromFoldersThatAreNone) {
+TEST(Captures, AreNotReadFromOtherFolders) {
   const TemporaryFolder folder;
   EXPECT_THROW(readCapture(folder.path()), Error);
   writeFileAtomically(folder / "transforms.json", std::string_view("{\"frames\":[]}"));
@@ -403,7 +404,7 @@ TEST(Captures, AreNotReadFromFoldersThatAreNone) {
   }
 }
 
-TEST(Captures, RefuseListsOfSplitsThatFitNoPhoto) {
+TEST(Captures, RejectSplitListsThatMatchNoPhoto) {
   const TemporaryFolder folder;
   writeCapture(fullCapture(folder.path()));
   std::string text = readTextFile(folder / "transforms.json");
@@ -422,7 +423,7 @@ TEST(Captures, RefuseObservationsOfPhotosThatDoNotExist) {
   EXPECT_THROW(readCapture(folder.path()), Error);
 }
 
-TEST(Captures, AreNotWrittenWithPicturesFromOutside) {
+TEST(Captures, AreNotWrittenWithImagesOutsideTheirFolder) {
   const TemporaryFolder folder;
   Capture capture = fullCapture(folder.path());
   capture.root = folder / "inner";

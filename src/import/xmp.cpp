@@ -1,5 +1,5 @@
-// A reader of the few numbers that matter in a drone's XMP, not of XML: a name, then = and a quoted value, or > and the
-// text up to the next <.
+// Reads the few relevant numbers of a drone's XMP without an XML parser: a name, then = and a quoted value, or > and
+// the text up to the next <.
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -27,12 +27,12 @@ std::optional<double> numberIn(std::string_view text) {
   return value;
 }
 
-// The number that belongs to "prefix:name", whatever the prefix.
+// Returns the number of "prefix:name" for any prefix.
 std::optional<double> find(std::string_view xmp, std::string_view name) {
   for (size_t at = xmp.find(name); at != xmp.npos; at = xmp.find(name, at + 1)) {
     if (at == 0 || xmp[at - 1] != ':') continue;
     std::string_view rest = xmp.substr(at + name.size());
-    if (!rest.empty() && isNameCharacter(rest[0])) continue;  // a longer name
+    if (!rest.empty() && isNameCharacter(rest[0])) continue;  // a prefix of a longer name
     const size_t sign = rest.find_first_not_of(kBlank);
     if (sign == rest.npos) return std::nullopt;
     rest.remove_prefix(sign);

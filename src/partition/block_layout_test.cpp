@@ -4,13 +4,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "partition/testing/made_captures.h"
+#include "partition/testing/test_captures.h"
 #include "scene/block_grid_json.h"
 
 namespace tessera {
 namespace {
 
-Region regionOf(double width, double depth, double groundPixel) {
+Region makeRegion(double width, double depth, double groundPixel) {
   Region region;
   region.rectangle = {{10, 20}, 0.3, width, depth};
   region.groundPixel = groundPixel;
@@ -18,7 +18,7 @@ Region regionOf(double width, double depth, double groundPixel) {
 }
 
 constexpr BlockCount kAutomatic;
-const BlockLimits kRoomy = {.texelsPerEdge = 500, .bytesPerBlock = 1, .memoryBudget = 1e9};
+const BlockLimits kGenerousLimits = {.texelsPerEdge = 500, .bytesPerBlock = 1, .memoryBudget = 1e9};
 
 TEST(BlockCount, IsReadFromAutoAndFromTwoNumbers) {
   EXPECT_TRUE(parseBlockCount("auto")->automatic);
@@ -33,8 +33,8 @@ TEST(BlockCount, IsReadFromAutoAndFromTwoNumbers) {
   }
 }
 
-TEST(BlockLayout, CentresTheRegionInTheCellsThatWereAskedFor) {
-  const BlockLayout layout = layOutBlocks({}, regionOf(100, 40, 0.1), {-1, 7}, {false, 4, 2}, kRoomy);
+TEST(BlockLayout, CentresTheRegionInTheRequestedCells) {
+  const BlockLayout layout = layOutBlocks({}, makeRegion(100, 40, 0.1), {-1, 7}, {false, 4, 2}, kGenerousLimits);
   EXPECT_EQ(layout.decidedBy, DecidedBy::request);
   EXPECT_EQ(layout.grid.columns, 4);
   EXPECT_EQ(layout.grid.rows, 2);
@@ -48,17 +48,17 @@ TEST(BlockLayout, TurnsTheGridWithRegionAndGround) {
   Ground ground;
   ground.groundFromWorld = turnAbout({1, 0.5, 0}, 15);
   ground.height = 6;
-  const Region region = regionOf(100, 40, 0.1);
-  const BlockGrid grid = layOutBlocks(ground, region, {-1, 7}, {false, 4, 2}, kRoomy).grid;
+  const Region region = makeRegion(100, 40, 0.1);
+  const BlockGrid grid = layOutBlocks(ground, region, {-1, 7}, {false, 4, 2}, kGenerousLimits).grid;
   EXPECT_LT((grid.gridFromWorld * grid.gridFromWorld.transpose() - Mat3d::Identity()).norm(), 1e-12);
   const Vec2d corner = region.rectangle.outside({50, 20});
   const Vec3d onGround = grid.inGrid(ground.inWorld({corner.x(), corner.y(), 0}));
-  EXPECT_LT((onGround - Vec3d(50, 20, -3)).norm(), 1e-9);  // half-way up is 3 above the ground
+  EXPECT_LT((onGround - Vec3d(50, 20, -3)).norm(), 1e-9);  // midway between the heights is 3 above the ground
 }
 
 TEST(BlockLayout, MakesTexelsAsFineAsThePhotos) {
-  // 1.5 · 0.1 · 500 = 75 wide: 1000 × 400 takes 14 × 6, whose cells are 1000 / 14.
-  const BlockLayout layout = layOutBlocks({}, regionOf(1000, 400, 0.1), {-1, 9}, kAutomatic, kRoomy);
+  // Cells may be 1.5 · 0.1 · 500 = 75 wide: 1000 × 400 takes 14 × 6 of them, with an edge of 1000 / 14.
+  const BlockLayout layout = layOutBlocks({}, makeRegion(1000, 400, 0.1), {-1, 9}, kAutomatic, kGenerousLimits);
   EXPECT_EQ(layout.decidedBy, DecidedBy::detail);
   EXPECT_EQ(layout.grid.columns, 14);
   EXPECT_EQ(layout.grid.rows, 6);
@@ -66,36 +66,36 @@ TEST(BlockLayout, MakesTexelsAsFineAsThePhotos) {
   EXPECT_LE(layout.grid.edge / 500, 1.5 * 0.1);
 }
 
-TEST(BlockLayout, MakesOneBlockOfASmallPlace) {
-  const BlockLayout layout = layOutBlocks({}, regionOf(30, 20, 0.1), {-1, 9}, kAutomatic, kRoomy);
+TEST(BlockLayout, UsesOneBlockForASmallRegion) {
+  const BlockLayout layout = layOutBlocks({}, makeRegion(30, 20, 0.1), {-1, 9}, kAutomatic, kGenerousLimits);
   EXPECT_EQ(layout.decidedBy, DecidedBy::detail);
   EXPECT_EQ(layout.grid.cells(), 1);
   EXPECT_DOUBLE_EQ(layout.grid.edge, 30);
 }
 
 TEST(BlockLayout, StaysWithinTheMemoryBudgetAndUsesItWell) {
-  for (int most = 1; most <= 83; ++most) {
-    BlockLimits limits = kRoomy;
+  for (int maximum = 1; maximum <= 83; ++maximum) {
+    BlockLimits limits = kGenerousLimits;
     limits.bytesPerBlock = 10;
-    limits.memoryBudget = 10 * most + 9;
-    const BlockLayout layout = layOutBlocks({}, regionOf(1000, 400, 0.1), {-1, 9}, kAutomatic, limits);
-    EXPECT_EQ(layout.decidedBy, DecidedBy::memory) << most;
-    EXPECT_LE(layout.grid.cells(), most);
+    limits.memoryBudget = 10 * maximum + 9;
+    const BlockLayout layout = layOutBlocks({}, makeRegion(1000, 400, 0.1), {-1, 9}, kAutomatic, limits);
+    EXPECT_EQ(layout.decidedBy, DecidedBy::memory) << maximum;
+    EXPECT_LE(layout.grid.cells(), maximum);
     // No other count within the budget has smaller cells.
-    for (int columns = 1; columns <= most; ++columns) {
-      for (int rows = 1; rows * columns <= most; ++rows) {
-        EXPECT_GE(std::max(1000.0 / columns, 400.0 / rows), layout.grid.edge * (1 - 1e-12)) << most;
+    for (int columns = 1; columns <= maximum; ++columns) {
+      for (int rows = 1; rows * columns <= maximum; ++rows) {
+        EXPECT_GE(std::max(1000.0 / columns, 400.0 / rows), layout.grid.edge * (1 - 1e-12)) << maximum;
       }
     }
   }
 }
 
-TEST(BlockLayout, HoldsTheWholeRegion) {
+TEST(BlockLayout, CoversTheWholeRegion) {
   for (const double width : {1.0, 99.9, 1000.0 / 3}) {
     for (const double pixel : {0.3, 0.01}) {
-      const Region region = regionOf(width, 77, pixel);
+      const Region region = makeRegion(width, 77, pixel);
       for (const BlockCount& count : {kAutomatic, BlockCount{false, 3, 5}}) {
-        const BlockGrid grid = layOutBlocks({}, region, {0, 0.5}, count, kRoomy).grid;
+        const BlockGrid grid = layOutBlocks({}, region, {0, 0.5}, count, kGenerousLimits).grid;
         EXPECT_GE(grid.edge * grid.columns, width * (1 - 1e-9));
         EXPECT_GE(grid.edge * grid.rows, 77 * (1 - 1e-9));
       }
@@ -103,20 +103,20 @@ TEST(BlockLayout, HoldsTheWholeRegion) {
   }
 }
 
-TEST(BlockLayout, IsOneBlockWhereTheBudgetHoldsNone) {
-  BlockLimits limits = kRoomy;
+TEST(BlockLayout, UsesOneBlockWhereTheBudgetAllowsNone) {
+  BlockLimits limits = kGenerousLimits;
   limits.bytesPerBlock = 2e9;
-  const BlockLayout layout = layOutBlocks({}, regionOf(1000, 400, 0.1), {-1, 9}, kAutomatic, limits);
+  const BlockLayout layout = layOutBlocks({}, makeRegion(1000, 400, 0.1), {-1, 9}, kAutomatic, limits);
   EXPECT_EQ(layout.grid.cells(), 1);
   EXPECT_NE(layout.how.find("more than the budget"), std::string::npos) << layout.how;
 }
 
 TEST(BlockLayout, IsNeverHigherThanItsCellsAreWide) {
-  const BlockLayout asked = layOutBlocks({}, regionOf(100, 100, 0.1), {-10, 30}, {false, 5, 5}, kRoomy);
+  const BlockLayout asked = layOutBlocks({}, makeRegion(100, 100, 0.1), {-10, 30}, {false, 5, 5}, kGenerousLimits);
   EXPECT_EQ(asked.grid.columns, 5);
   EXPECT_DOUBLE_EQ(asked.grid.edge, 40);
   EXPECT_NE(asked.how.find("enlarged from 20 to 40"), std::string::npos) << asked.how;
-  const BlockLayout chosen = layOutBlocks({}, regionOf(100, 100, 0.01), {-10, 30}, kAutomatic, kRoomy);
+  const BlockLayout chosen = layOutBlocks({}, makeRegion(100, 100, 0.01), {-10, 30}, kAutomatic, kGenerousLimits);
   EXPECT_EQ(chosen.decidedBy, DecidedBy::height);
   EXPECT_EQ(chosen.grid.columns, 3);
   EXPECT_LE(chosen.grid.top - chosen.grid.bottom, chosen.grid.edge);

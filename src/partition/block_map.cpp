@@ -13,9 +13,9 @@
 namespace tessera {
 namespace {
 
-// Of the picture, in its pixels.
+// Dimensions of the map, pixels.
 constexpr double kMapSide = 800, kMargin = 40, kHeader = 84, kFooter = 92;
-constexpr double kLeastWidth = 720;
+constexpr double kMinWidth = 720;
 constexpr double kLargestText = 17, kSmallestText = 7;
 
 constexpr char kStyle[] = R"css(
@@ -31,19 +31,19 @@ text { font-family: "Inter", "Segoe UI", "Helvetica Neue", "DejaVu Sans", Arial,
 )css";
 
 struct Frame {
-  Vec2d low, high;        // of the grid's plane, in the picture
+  Vec2d low, high;        // shown part of the grid's plane
   double scale = 1;       // pixels per world unit
-  double left = kMargin;  // of `low` in the picture
+  double left = kMargin;  // of `low`, pixels
 
   Vec2d at(const Vec2d& xInGrid) const {
     return {left + scale * (xInGrid.x() - low.x()), kHeader + scale * (high.y() - xInGrid.y())};
   }
   double bottom() const { return kHeader + scale * (high.y() - low.y()); }
-  double width() const { return std::max(kLeastWidth, scale * (high.x() - low.x()) + 2 * kMargin); }
+  double width() const { return std::max(kMinWidth, scale * (high.x() - low.x()) + 2 * kMargin); }
   double height() const { return bottom() + kFooter; }
 };
 
-Frame frameOf(const BlockGrid& grid, const std::vector<Vec2d>& others) {
+Frame fitFrame(const BlockGrid& grid, const std::vector<Vec2d>& others) {
   Frame frame;
   frame.high = grid.edge / 2 * Vec2d(grid.columns, grid.rows);
   frame.low = -frame.high;
@@ -59,7 +59,7 @@ Frame frameOf(const BlockGrid& grid, const std::vector<Vec2d>& others) {
   return frame;
 }
 
-// 12 345 678 as "12.3 M".
+// Abbreviates a count: 12 345 678 becomes "12.3 M".
 std::string shortCount(int64_t count) {
   if (count < 1000) return fmt::format("{}", count);
   const double value = static_cast<double>(count);
@@ -67,7 +67,7 @@ std::string shortCount(int64_t count) {
   return value < 9.995e8 ? fmt::format("{:.3g} M", value / 1e6) : fmt::format("{:.4g} G", value / 1e9);
 }
 
-// A length of the world as people say it.
+// The unit in which lengths of the world are shown.
 struct Unit {
   double perWorldUnit = 1;
   const char* name = "units";
@@ -75,12 +75,12 @@ struct Unit {
   std::string say(double worldLength) const { return fmt::format("{:.3g} {}", worldLength * perWorldUnit, name); }
 };
 
-Unit unitOf(const Capture& capture) {
+Unit worldUnit(const Capture& capture) {
   if (!capture.geo) return {};
   return {std::cbrt(capture.geo->enuFromWorld.topLeftCorner<3, 3>().determinant()), "m"};
 }
 
-// From pale to full blue.
+// Returns a colour from pale to full blue.
 std::string shade(double share) {
   static constexpr double kPale[] = {236, 242, 249}, kFull[] = {116, 169, 219};
   const auto mixed = [share](int c) { return static_cast<int>(std::lround(kPale[c] + share * (kFull[c] - kPale[c]))); };
@@ -89,8 +89,8 @@ std::string shade(double share) {
 
 std::string cellsSvg(const Frame& frame, const Partition& partition) {
   const BlockGrid& grid = partition.grid;
-  int64_t most = 1;
-  for (const CellCoverage& cell : partition.coverage) most = std::max(most, cell.pixels);
+  int64_t maximum = 1;
+  for (const CellCoverage& cell : partition.coverage) maximum = std::max(maximum, cell.pixels);
   const double side = frame.scale * grid.edge;
   const double text = std::min(kLargestText, side / 6.5);
   std::string svg, labels;
@@ -102,7 +102,7 @@ std::string cellsSvg(const Frame& frame, const Partition& partition) {
     const std::string box =
         fmt::format("x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"", corner.x(), corner.y(), side, side);
     svg += fmt::format("<rect class=\"cell\" {} fill=\"{}\"><title>block ({}): {} photos, {} pixels{}</title></rect>\n",
-                       box, shade(static_cast<double>(has.pixels) / static_cast<double>(most)), name, has.photos,
+                       box, shade(static_cast<double>(has.pixels) / static_cast<double>(maximum)), name, has.photos,
                        has.pixels, thin ? ": too few" : "");
     if (thin) svg += fmt::format("<rect class=\"thin\" {} fill=\"url(#hatch)\" pointer-events=\"none\"/>\n", box);
     if (text < kSmallestText) continue;
@@ -128,7 +128,7 @@ std::string polygonSvg(const Frame& frame, const std::vector<Vec2d>& corners) {
   return fmt::format("<polygon class=\"hull\" points=\"{}\"/>\n", points);
 }
 
-// Points upwards at `middle`, then turned clockwise.
+// Draws the north arrow at `middle`, rotated clockwise from pointing up.
 std::string northSvg(const Vec2d& middle, double degrees) {
   return fmt::format(
       "<g class=\"north\" transform=\"translate({:.1f} {:.1f}) rotate({:.1f})\"><path d=\"M0 -18 L7 14 L0 8 Z\" "
@@ -137,9 +137,9 @@ std::string northSvg(const Vec2d& middle, double degrees) {
       middle.x(), middle.y(), degrees);
 }
 
-// The longest of 1, 2, 5, 10, … that is no wider than `most` pixels.
-std::string scaleBarSvg(const Frame& frame, const Unit& unit, double x, double y, double most) {
-  const double longest = most / frame.scale * unit.perWorldUnit;
+// Draws a scale bar of the longest length among 1, 2, 5, 10, … that is no wider than `maximum` pixels.
+std::string scaleBarSvg(const Frame& frame, const Unit& unit, double x, double y, double maximum) {
+  const double longest = maximum / frame.scale * unit.perWorldUnit;
   const double decade = std::pow(10, std::floor(std::log10(longest)));
   const double length = decade * (longest >= 5 * decade ? 5 : longest >= 2 * decade ? 2 : 1);
   const double width = length / unit.perWorldUnit * frame.scale;
@@ -168,7 +168,7 @@ std::string legendSvg(double x, double y, bool hull, bool thin) {
 
 std::string blockMapSvg(const Capture& capture, const Partition& partition) {
   const BlockGrid& grid = partition.grid;
-  const Unit unit = unitOf(capture);
+  const Unit unit = worldUnit(capture);
   std::vector<Vec2d> hull, shown;
   for (const Vec2d& corner : partition.region.hull) {
     hull.push_back(grid.inGrid(partition.ground.inWorld({corner.x(), corner.y(), 0})).head<2>());
@@ -179,7 +179,7 @@ std::string blockMapSvg(const Capture& capture, const Partition& partition) {
   }
   const size_t cameras = shown.size();
   shown.insert(shown.end(), hull.begin(), hull.end());
-  const Frame frame = frameOf(grid, shown);
+  const Frame frame = fitFrame(grid, shown);
 
   std::string marks = polygonSvg(frame, hull);
   const double radius = std::clamp(60 / std::sqrt(static_cast<double>(cameras) + 1), 1.2, 3.2);
@@ -197,7 +197,7 @@ std::string blockMapSvg(const Capture& capture, const Partition& partition) {
         fmt::format("<circle class=\"other\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\"/>\n", at.x(), at.y(), radius);
   }
   std::string cells = cellsSvg(frame, partition);
-  const std::string gap = "<!--marks-->";  // dots lie over the cells and under their labels
+  const std::string gap = "<!--marks-->";  // dots are drawn over the cells and under their labels
   cells.replace(cells.find(gap), gap.size(), marks);
 
   std::string svg = fmt::format(

@@ -1,4 +1,4 @@
-// Pictures of a partition for people: blocks.svg and, for maps, blocks.geojson.
+// Visualisations of a partition: blocks.svg and, for geographic software, blocks.geojson.
 #pragma once
 
 #include <string>
@@ -8,13 +8,14 @@
 
 namespace tessera {
 
-// The view from above, the grid's x to the right: cells with their indices, photos and pixels, the bluer the more
-// pixels, thin ones hatched; the outline of what the photos show; training cameras as dots, others as circles (stray
-// ones are left out); a scale bar; and north, where the Earth is known.
+// Returns a map of the partition seen from above, with the grid's x to the right: cells with their indices and numbers
+// of photos and pixels, in a deeper blue for more pixels, thin cells hatched; the outline of the ground that the photos
+// show; training cameras as dots and others as circles (outliers are left out); a scale bar; and north, if the capture
+// has a geo reference.
 std::string blockMapSvg(const Capture& capture, const Partition& partition);
 
-// Writes `folder`/blocks.svg and, with a geo reference, `folder`/blocks.geojson; whether the second was written. Throws
-// Error when a file cannot be written.
+// Writes `folder`/blocks.svg and, if the capture has a geo reference, `folder`/blocks.geojson. Returns whether the
+// latter was written. Throws Error if a file cannot be written.
 bool writeBlockMap(const fs::path& folder, const Capture& capture, const Partition& partition);
 
 }  // namespace tessera

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "partition/block_geography.h"
-#include "partition/testing/made_captures.h"
+#include "partition/testing/test_captures.h"
 
 namespace tessera {
 namespace {
@@ -27,7 +27,7 @@ Capture fieldOnEarth() {
   return capture;
 }
 
-size_t countOf(const std::string& text, const std::string& part) {
+size_t countOccurrences(const std::string& text, const std::string& part) {
   size_t count = 0;
   for (size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++count;
   return count;
@@ -49,18 +49,18 @@ TEST(BlockMap, ShowsEveryCellCameraAndCount) {
   const Capture capture = field();
   const Partition partition = partitionCapture(capture, {.blocks = {false, 3, 2}});
   const std::string svg = blockMapSvg(capture, partition);
-  EXPECT_EQ(countOf(svg, "class=\"cell\""), 6u);
-  EXPECT_EQ(countOf(svg, "class=\"camera\" cx"), 79u + 1);  // and one in the legend
-  EXPECT_EQ(countOf(svg, "class=\"other\" cx"), 1u + 1);
-  EXPECT_EQ(countOf(svg, "class=\"hull\" points"), 1u);
+  EXPECT_EQ(countOccurrences(svg, "class=\"cell\""), 6u);
+  EXPECT_EQ(countOccurrences(svg, "class=\"camera\" cx"), 79u + 1);  // plus one in the legend
+  EXPECT_EQ(countOccurrences(svg, "class=\"other\" cx"), 1u + 1);
+  EXPECT_EQ(countOccurrences(svg, "class=\"hull\" points"), 1u);
   EXPECT_NE(svg.find(">2, 1</text>"), std::string::npos);
   EXPECT_NE(svg.find(">" + std::to_string(partition.coverage[5].photos) + " photos</text>"), std::string::npos);
-  EXPECT_EQ(countOf(svg, "class=\"thin\""), 0u);
-  EXPECT_EQ(countOf(svg, "class=\"north\""), 0u);
+  EXPECT_EQ(countOccurrences(svg, "class=\"thin\""), 0u);
+  EXPECT_EQ(countOccurrences(svg, "class=\"north\""), 0u);
   EXPECT_NE(svg.find("50 units</text>"), std::string::npos);
   EXPECT_EQ(svg.find("nan"), std::string::npos);
   EXPECT_EQ(svg.find("<!--"), std::string::npos);
-  EXPECT_EQ(countOf(svg, "<g"), countOf(svg, "</g>"));
+  EXPECT_EQ(countOccurrences(svg, "<g"), countOccurrences(svg, "</g>"));
 }
 
 TEST(BlockMap, MarksThinCells) {
@@ -68,7 +68,7 @@ TEST(BlockMap, MarksThinCells) {
   Partition partition = partitionCapture(capture, {.blocks = {false, 3, 2}});
   partition.thin = {{4, "sentence"}};
   const std::string svg = blockMapSvg(capture, partition);
-  EXPECT_EQ(countOf(svg, "class=\"thin\" x"), 1u);
+  EXPECT_EQ(countOccurrences(svg, "class=\"thin\" x"), 1u);
   EXPECT_NE(svg.find("1 blocks have too little"), std::string::npos);
 }
 
@@ -76,21 +76,21 @@ TEST(BlockMap, PointsNorth) {
   Capture capture = fieldOnEarth();
   EXPECT_NE(blockMapSvg(capture, partitionCapture(capture, {.blocks = {false, 3, 2}})).find("rotate(0.0)"),
             std::string::npos);
-  // The world is turned against the Earth: its x, which the picture has to the right, is north.
+  // The world is rotated against the Earth: its x, which points to the right in the map, is north.
   capture.geo->enuFromWorld.topLeftCorner<3, 3>() = turnAbout(Vec3d::UnitZ(), 90);
   const std::string svg = blockMapSvg(capture, partitionCapture(capture, {.blocks = {false, 3, 2}}));
   EXPECT_NE(svg.find("rotate(90.0)"), std::string::npos) << svg.substr(svg.find("north"), 200);
   EXPECT_NE(svg.find("50 m</text>"), std::string::npos);
 }
 
-TEST(BlockMap, OfCamerasAmongThingsHasNoOutline) {
+TEST(BlockMap, OmitsTheOutlineWhenCamerasDoNotLookAtTheGround) {
   const Capture capture = orbit({0, 0, 1}, 4, 12);
   const std::string svg = blockMapSvg(capture, partitionCapture(capture, {.blocks = {false, 1, 1}}));
-  EXPECT_EQ(countOf(svg, "class=\"hull\""), 0u);
-  EXPECT_EQ(countOf(svg, "class=\"cell\""), 1u);
+  EXPECT_EQ(countOccurrences(svg, "class=\"hull\""), 0u);
+  EXPECT_EQ(countOccurrences(svg, "class=\"cell\""), 1u);
 }
 
-TEST(BlockMap, IsWrittenWithGeoJsonOnlyWhereTheEarthIsKnown) {
+TEST(BlockMap, IsWrittenWithGeoJsonOnlyWithAGeoReference) {
   const Folder folder;
   const Capture capture = field(), onEarth = fieldOnEarth();
   EXPECT_FALSE(writeBlockMap(folder.path(), capture, partitionCapture(capture, {})));
@@ -144,7 +144,7 @@ TEST(PlaceOnEarth, IsTheOriginAtTheOriginAndMovesEastAndNorth) {
   EXPECT_NEAR(moved.altitude, 205, 0.5);
 }
 
-TEST(BlocksAsGeoJson, GoOnAcrossTheAntimeridian) {
+TEST(BlocksAsGeoJson, ContinueAcrossTheAntimeridian) {
   Capture capture = fieldOnEarth();
   capture.geo->longitude = 179.9999;
   const Partition partition = partitionCapture(capture, {.blocks = {false, 3, 2}});

@@ -9,7 +9,7 @@ namespace tessera {
 namespace {
 
 constexpr double kFarOut = 10;
-constexpr double kAlongWeight = 0.001;  // of the distance along an axis, against that across it
+constexpr double kAlongWeight = 0.001;  // of the distance along an axis, relative to that across it
 
 }  // namespace
 
@@ -34,15 +34,15 @@ std::vector<int> photosTogether(const Capture& capture) {
     distances.push_back((capture.photos[photo].worldFromCamera.translation - median).norm());
   }
   std::vector<double> sorted = distances;
-  const double most = percentile(sorted, 0.9);
+  const double maximum = percentile(sorted, 0.9);
   std::vector<int> together;
   for (size_t i = 0; i < photos.size(); ++i) {
-    if (!(most > 0) || distances[i] <= kFarOut * most) together.push_back(photos[i]);
+    if (!(maximum > 0) || distances[i] <= kFarOut * maximum) together.push_back(photos[i]);
   }
   return together;
 }
 
-Vec3d focusOf(const Capture& capture, const std::vector<int>& photos) {
+Vec3d findFocusPoint(const Capture& capture, const std::vector<int>& photos) {
   if (photos.empty()) return Vec3d::Zero();
   Mat3d sum = Mat3d::Zero();
   Vec3d right = Vec3d::Zero();

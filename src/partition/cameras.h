@@ -1,4 +1,4 @@
-// What the training cameras of a capture say together, and the order statistics that this room lives on.
+// Statistics of the training cameras of a capture.
 #pragma once
 
 #include <vector>
@@ -7,14 +7,15 @@
 
 namespace tessera {
 
-// The value at `fraction` of the order, in [0, 1]. Reorders `values`, which must not be empty.
+// Returns the value at rank `fraction`, in [0, 1], of the sorted values. Reorders `values`, which must not be empty.
 double percentile(std::vector<double>& values, double fraction);
 
-// Training photos, without those few that stand ten times as far from the median as nine in ten do: poses gone wrong.
+// Returns the indices of the training photos without outliers, which have wrong poses: those more than ten times as far
+// from the median position as the 90th percentile.
 std::vector<int> photosTogether(const Capture& capture);
 
-// The point nearest to all optical axes in the least-squares sense. A little weight holds it near the cameras when the
-// axes are parallel. The origin without photos.
-Vec3d focusOf(const Capture& capture, const std::vector<int>& photos);
+// Returns the point nearest to all optical axes in the least-squares sense, or the origin if there are no photos. A
+// small weight on the distance along the axes keeps it near the cameras when the axes are parallel.
+Vec3d findFocusPoint(const Capture& capture, const std::vector<int>& photos);
 
 }  // namespace tessera

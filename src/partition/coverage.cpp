@@ -17,7 +17,7 @@ bool isInSquare(const BlockGrid& grid, int cell, const Vec2d& xInGrid) {
 }  // namespace
 
 std::vector<CellCoverage> countCoverage(const Capture& capture, const BlockGrid& grid, const Ground& ground,
-                                        bool looksAtGround, const DepthOf& depthOf) {
+                                        bool looksAtGround, const DepthOf& findRayDepth) {
   std::vector<RayFan> fans;
   for (const Camera& camera : capture.cameras) {
     fans.push_back(raysThroughMiddles(camera, kCoverageColumns, kCoverageRows));
@@ -38,7 +38,7 @@ std::vector<CellCoverage> countCoverage(const Capture& capture, const BlockGrid&
     for (size_t ray = 0; ray < fan.pixels.size(); ++ray) {
       if (!fan.directionsInCamera[ray]) continue;
       const Vec3d direction = gridFromCamera * *fan.directionsInCamera[ray];
-      double distance = depthOf ? depthOf(photo, fan.pixels[ray]) : 0;
+      double distance = findRayDepth ? findRayDepth(photo, fan.pixels[ray]) : 0;
       if (!(distance > 0)) {
         distance = !looksAtGround      ? -origin.dot(direction)
                    : direction.z() < 0 ? (groundInGrid - origin.z()) / direction.z()
@@ -65,7 +65,7 @@ std::vector<CellCoverage> countCoverage(const Capture& capture, const BlockGrid&
 }
 
 std::vector<ThinCell> thinCells(const BlockGrid& grid, const std::vector<CellCoverage>& coverage,
-                                const Sufficiency& enough) {
+                                const CoverageThresholds& enough) {
   CHECK(coverage.size() == static_cast<size_t>(grid.cells()));
   std::vector<ThinCell> thin;
   for (int cell = 0; cell < grid.cells(); ++cell) {

@@ -2,13 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include "partition/testing/made_captures.h"
+#include "partition/testing/test_captures.h"
 
 namespace tessera {
 namespace {
 
-// Cells of edge 100 over the ground z = 0, the origin in the middle and `up` above it.
-BlockGrid gridOf(int columns, int rows, double up = 0) {
+// Returns a grid of cells of edge 100 over the ground z = 0, with its origin in the middle and `up` above it.
+BlockGrid makeGrid(int columns, int rows, double up = 0) {
   BlockGrid grid;
   grid.edge = 100;
   grid.columns = columns;
@@ -17,10 +17,10 @@ BlockGrid gridOf(int columns, int rows, double up = 0) {
   return grid;
 }
 
-TEST(Coverage, SharesAPhotoOutByWhereItsRaysEnd) {
+TEST(Coverage, AssignsPixelsToTheCellsWhereTheirRaysEnd) {
   Capture capture = emptyCapture();
-  addPhoto(capture, lookingDown(0, 0, 50));  // shows 100 × 75 about the corner of four cells
-  const auto coverage = countCoverage(capture, gridOf(2, 2, 20), Ground{}, true);
+  addPhoto(capture, lookingDown(0, 0, 50));  // shows 100 × 75 around the corner of four cells
+  const auto coverage = countCoverage(capture, makeGrid(2, 2, 20), Ground{}, true);
   ASSERT_EQ(coverage.size(), 4u);
   for (const CellCoverage& cell : coverage) {
     EXPECT_EQ(cell.photos, 1);
@@ -35,28 +35,28 @@ TEST(Coverage, NumbersCellsAlongXFirst) {
   addPhoto(capture, lookingDown(100, -50, 10));
   addPhoto(capture, lookingDown(-100, 50, 10));
   capture.photos[1].split = Split::test;
-  const auto coverage = countCoverage(capture, gridOf(3, 2), Ground{}, true);
+  const auto coverage = countCoverage(capture, makeGrid(3, 2), Ground{}, true);
   for (size_t cell = 0; cell < 6; ++cell) {
     EXPECT_EQ(coverage[cell].photos, cell == 2 || cell == 3 ? 1 : 0) << cell;
     EXPECT_EQ(coverage[cell].pixels, cell == 2 || cell == 3 ? 400 * 300 : 0) << cell;
   }
 }
 
-TEST(Coverage, TellsWhatLiesBeyondTheCells) {
+TEST(Coverage, CountsPixelsBeyondTheCells) {
   Capture capture = emptyCapture();
   addPhoto(capture, lookingDown(200, 0, 10));   // beside the second cell
   addPhoto(capture, lookingDown(100, 0, 100));  // 0…200: half inside, half beyond
-  const auto coverage = countCoverage(capture, gridOf(2, 1), Ground{}, true);
+  const auto coverage = countCoverage(capture, makeGrid(2, 1), Ground{}, true);
   EXPECT_EQ(coverage[1].photos, 1);
   EXPECT_EQ(coverage[0].photos, 0);
   EXPECT_NEAR(static_cast<double>(coverage[1].pixels), 400 * 300 * 0.5 * (100.0 / 150), 4000);
   EXPECT_EQ(coverage[1].pixels + coverage[1].pixelsBeyond, 2 * 400 * 300);
 }
 
-TEST(Coverage, AsksHowFarRaysGo) {
+TEST(Coverage, UsesTheGivenRayDepths) {
   Capture capture = emptyCapture();
   addPhoto(capture, lookingAt({-60, 0, 5}, {60, 0, 5}, Vec3d::UnitZ()));  // level: most rays never meet the ground
-  const BlockGrid grid = gridOf(2, 1);
+  const BlockGrid grid = makeGrid(2, 1);
   const auto blind = countCoverage(capture, grid, Ground{}, true);
   EXPECT_LT(blind[0].pixels + blind[1].pixels + blind[0].pixelsBeyond + blind[1].pixelsBeyond, 400 * 300 * 0.51);
   std::vector<Vec2d> asked;
@@ -67,23 +67,23 @@ TEST(Coverage, AsksHowFarRaysGo) {
   });
   EXPECT_EQ(asked.size(), static_cast<size_t>(kCoverageColumns * kCoverageRows));
   EXPECT_EQ(asked.front(), Vec2d(0.5 * 400 / kCoverageColumns, 0.5 * 300 / kCoverageRows));
-  EXPECT_GE(seeing[0].pixels, 400 * 300 / 2);  // and of the right half what falls to the ground before x = 0
+  EXPECT_GE(seeing[0].pixels, 400 * 300 / 2);  // and the rays of the right half that meet the ground before x = 0
   EXPECT_LT(seeing[0].pixels, 400 * 300 * 0.75);
 }
 
-TEST(Coverage, OfCamerasUnderTheGroundIsNone) {
+TEST(Coverage, IsEmptyForCamerasUnderTheGround) {
   Capture capture = emptyCapture();
   addPhoto(capture, lookingDown(0, 0, -20));
   addPhoto(capture, lookingAt({0, 0, -20}, {0, 0, 10}, Vec3d::UnitY()));
-  for (const CellCoverage& cell : countCoverage(capture, gridOf(2, 2), Ground{}, true)) {
+  for (const CellCoverage& cell : countCoverage(capture, makeGrid(2, 2), Ground{}, true)) {
     EXPECT_EQ(cell.photos, 0);
     EXPECT_EQ(cell.pixels + cell.pixelsBeyond, 0);
   }
 }
 
-TEST(Coverage, OfCamerasAmongThingsEndsAmidThem) {
+TEST(Coverage, EndsRaysAtTheGridCentreForCamerasInsideTheScene) {
   const Capture capture = orbit({0, 0, 2}, 40, 12);
-  const auto coverage = countCoverage(capture, gridOf(1, 1, 2), Ground{}, false);
+  const auto coverage = countCoverage(capture, makeGrid(1, 1, 2), Ground{}, false);
   EXPECT_EQ(coverage[0].photos, 12);
   EXPECT_EQ(coverage[0].pixels, 12 * 400 * 300);
 }
@@ -96,7 +96,7 @@ TEST(Coverage, FollowsATiltedGround) {
   Ground ground;
   ground.groundFromWorld = rotation.transpose();
   ground.height = 7;
-  BlockGrid grid = gridOf(2, 1);
+  BlockGrid grid = makeGrid(2, 1);
   grid.gridFromWorld = rotation.transpose();
   grid.originInWorld = ground.inWorld({0, 0, 30});
   const auto coverage = countCoverage(capture, grid, ground, true);
@@ -105,7 +105,7 @@ TEST(Coverage, FollowsATiltedGround) {
 }
 
 TEST(ThinCells, AreNamedWithWhatTheyLack) {
-  const BlockGrid grid = gridOf(3, 2);
+  const BlockGrid grid = makeGrid(3, 2);
   std::vector<CellCoverage> coverage(6, {.photos = 5, .pixels = 20000});
   EXPECT_TRUE(thinCells(grid, coverage, {3, 20000}).empty());
   coverage[2] = {.photos = 2, .pixels = 20000};

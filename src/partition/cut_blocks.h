@@ -1,4 +1,4 @@
-// The blocks that a model is to be trained in.
+// Chooses the blocks of a model before training.
 #pragma once
 
 #include "base/file.h"
@@ -6,11 +6,11 @@
 
 namespace tessera {
 
-// Cuts the capture, draws the map into the model's folder (block_map.h), and says what people should know before hours
-// of training.
+// Partitions the capture, writes the map into the model's folder (block_map.h), and logs how the blocks were chosen,
+// with a warning for every thin cell.
 BlockGrid cutBlocks(const Capture& capture, const fs::path& model, const PartitionOptions& options);
 
-// A run that goes on keeps its blocks. Throws Error, about `path`, when other ones are asked for.
+// Throws Error naming `path` if the requested blocks differ from `has`: a run that resumes cannot change its blocks.
 void requireSameBlocks(const fs::path& path, const BlockGrid& has, const BlockCount& count,
                        const std::optional<BlockGrid>& grid);
 

@@ -13,25 +13,25 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kMostPoints = 20000;  // looked at: more would not say more
+constexpr size_t kMaxPoints = 20000;  // of the subsample; more do not improve the fit
 constexpr uint64_t kTrials = 500;
-constexpr double kLeastShare = 0.1;        // of the points must lie on a plane
-constexpr double kMostTiltTried = 60;      // degrees; a slope beyond kMostTilt must win before it can be refused
-constexpr double kTolerance = 0.005;       // half the thickness of ground, as a share of the points' diagonal
-constexpr double kFullLayer = 0.5;         // of the fullest layer's points
-constexpr double kLookDown = 0.5;          // share of the cameras that makes a flight
-constexpr double kNoHigherThan = 0.1;      // of the flight's width: what lies nearer below the cameras is no ground
-constexpr double kGuessedShare = 0.5;      // of the flight's width
-constexpr double kLeastDiagonal = 1e-300;  // all points in one place
+constexpr double kMinShare = 0.1;        // minimum fraction of points on the plane
+constexpr double kMaxTiltTried = 60;     // degrees; steeper than kMaxTilt, so that a best plane beyond that is rejected
+constexpr double kTolerance = 0.005;     // half the thickness of the ground, as a fraction of the points' diagonal
+constexpr double kFullLayer = 0.5;       // of the fullest layer's points
+constexpr double kLookDown = 0.5;        // fraction of cameras that look down in a flight
+constexpr double kNoHigherThan = 0.1;    // of the flight's width: the ground is farther below the cameras than this
+constexpr double kGuessedShare = 0.5;    // of the flight's width
+constexpr double kMinDiagonal = 1e-300;  // for points that all coincide
 
-std::vector<Vec3d> someOf(const std::vector<SparsePoint>& points) {
+std::vector<Vec3d> subsamplePoints(const std::vector<SparsePoint>& points) {
   std::vector<Vec3d> chosen;
-  const size_t count = std::min(points.size(), kMostPoints);
+  const size_t count = std::min(points.size(), kMaxPoints);
   for (size_t i = 0; i < count; ++i) chosen.push_back(points[i * points.size() / count].xInWorld);
   return chosen;
 }
 
-// Between the 2nd and 98th percentiles of all three axes.
+// Returns the diagonal of the box between the 2nd and 98th percentiles along the three axes.
 double robustDiagonal(const std::vector<Vec3d>& points) {
   Vec3d size;
   for (int axis = 0; axis < 3; ++axis) {
@@ -48,8 +48,8 @@ struct Plane {
   double offset = 0;             // normal · x
 };
 
-bool isTilted(const Vec3d& normal, double most) {
-  return normal.z() < std::cos(most * std::numbers::pi / 180);
+bool isTilted(const Vec3d& normal, double maximum) {
+  return normal.z() < std::cos(maximum * std::numbers::pi / 180);
 }
 
 std::vector<const Vec3d*> near(const Plane& plane, const std::vector<Vec3d>& points, double tolerance) {
@@ -75,7 +75,7 @@ Plane leastSquares(const std::vector<const Vec3d*>& points) {
 std::optional<Plane> fitPlane(const std::vector<Vec3d>& points, double tolerance, size_t& inlierCount) {
   const RandomStream random(4711, 0);
   Plane best;
-  size_t most = 0;
+  size_t maximum = 0;
   for (uint64_t trial = 0; trial < kTrials; ++trial) {
     const auto draw = [&](uint64_t k) -> const Vec3d& {
       return points[random.below(3 * trial + k, static_cast<uint32_t>(points.size()))];
@@ -86,17 +86,17 @@ std::optional<Plane> fitPlane(const std::vector<Vec3d>& points, double tolerance
     Plane plane;
     plane.normal = normal / (normal.z() < 0 ? -length : length);
     plane.offset = plane.normal.dot(a);
-    if (isTilted(plane.normal, kMostTiltTried)) continue;
+    if (isTilted(plane.normal, kMaxTiltTried)) continue;
     const size_t count = near(plane, points, tolerance).size();
-    if (count > most) {
-      most = count;
+    if (count > maximum) {
+      maximum = count;
       best = plane;
     }
   }
-  if (static_cast<double>(most) < kLeastShare * static_cast<double>(points.size())) return std::nullopt;
+  if (static_cast<double>(maximum) < kMinShare * static_cast<double>(points.size())) return std::nullopt;
   for (int round = 0; round < 3; ++round) best = leastSquares(near(best, points, tolerance));
   inlierCount = near(best, points, tolerance).size();
-  return isTilted(best.normal, kMostTilt) ? std::nullopt : std::optional(best);
+  return isTilted(best.normal, kMaxTilt) ? std::nullopt : std::optional(best);
 }
 
 Mat3d frameWithUp(const Vec3d& up) {
@@ -108,18 +108,18 @@ Mat3d frameWithUp(const Vec3d& up) {
   return frame;
 }
 
-// From the lowest window of `thickness` that holds at least kFullLayer as many as the fullest one, uphill to where it
-// is fullest: the middle of what it holds.
+// Finds the lowest window of `thickness` that contains at least kFullLayer times as many heights as the fullest one,
+// moves it up while the count increases, and returns the median height in it.
 double lowestFullLayer(std::vector<double> heights, double thickness) {
   std::sort(heights.begin(), heights.end());
-  std::vector<size_t> counts(heights.size());  // of the window that begins at this height
+  std::vector<size_t> counts(heights.size());  // in the window that starts at each height
   for (size_t begin = 0, end = 0; begin < heights.size(); ++begin) {
     while (end < heights.size() && heights[end] <= heights[begin] + thickness) ++end;
     counts[begin] = end - begin;
   }
-  const size_t most = *std::max_element(counts.begin(), counts.end());
+  const size_t maximum = *std::max_element(counts.begin(), counts.end());
   size_t at = 0;
-  while (static_cast<double>(counts[at]) < kFullLayer * static_cast<double>(most)) ++at;
+  while (static_cast<double>(counts[at]) < kFullLayer * static_cast<double>(maximum)) ++at;
   for (size_t next = at;; at = next) {
     for (size_t i = at; i < heights.size() && heights[i] <= heights[at] + thickness; ++i) {
       if (counts[i] > counts[next]) next = i;
@@ -129,7 +129,8 @@ double lowestFullLayer(std::vector<double> heights, double thickness) {
   return heights[at + counts[at] / 2];
 }
 
-// Along up, from the drones' heights above take-off. Nothing unless most photos have one and a unit is known.
+// Returns the height of the take-off along up, from the drones' heights above it, or nothing unless most photos have
+// one and the capture has a geo reference.
 std::optional<double> takeOffHeight(const Capture& capture, const std::vector<int>& photos, const Vec3d& up) {
   if (!capture.geo) return std::nullopt;
   const double metresPerUnit = std::cbrt(capture.geo->enuFromWorld.topLeftCorner<3, 3>().determinant());
@@ -152,7 +153,7 @@ void heightFromCameras(const Capture& capture, Ground& ground) {
     ground.how += "height from the drone's height above take-off";
     return;
   }
-  ground.height = up.dot(focusOf(capture, photos));
+  ground.height = up.dot(findFocusPoint(capture, photos));
   ground.how += "height where the cameras' axes come nearest to each other";
   if (photos.empty()) return;
   std::vector<double> heights, x, y;
@@ -179,9 +180,9 @@ void heightFromCameras(const Capture& capture, Ground& ground) {
 
 Ground findGround(const Capture& capture) {
   Ground ground;
-  const std::vector<Vec3d> points = someOf(capture.points);
+  const std::vector<Vec3d> points = subsamplePoints(capture.points);
   const bool enough = points.size() >= kEnoughGroundPoints;
-  const double tolerance = enough ? kTolerance * std::max(robustDiagonal(points), kLeastDiagonal) : 0;
+  const double tolerance = enough ? kTolerance * std::max(robustDiagonal(points), kMinDiagonal) : 0;
   size_t inliers = 0;
   if (capture.geo) {
     ground.groundFromWorld = frameWithUp(Vec3d(capture.geo->enuFromWorld.block<1, 3>(2, 0).transpose()).normalized());

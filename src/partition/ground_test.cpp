@@ -2,12 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include "partition/testing/made_captures.h"
+#include "partition/testing/test_captures.h"
 
 namespace tessera {
 namespace {
 
-// A flight 50 above flat ground at z = 3, with roofs 10 to 20 above it.
+// Returns a flight 50 above flat ground at z = 3, with roofs 10 to 20 above the ground.
 Capture flightOverHouses() {
   Capture capture = flight(4, 4, 25, 53);
   addPoints(capture, 2000, {-50, -50, 2.9}, {120, 120, 3.1}, 1);
@@ -42,7 +42,7 @@ TEST(Ground, IsFoundWhereItIsTilted) {
   }
 }
 
-TEST(Ground, SteeperThanThirtyDegreesIsNone) {
+TEST(Ground, RejectsPlanesSteeperThanThirtyDegrees) {
   Capture capture = flightOverHouses();
   turn(capture, turnAbout({1, 2, 0}, 40));
   EXPECT_LT(degreesBetween(findGround(capture).up(), Vec3d::UnitZ()), 1e-6);
@@ -75,7 +75,7 @@ TEST(Ground, TakesUpFromTheGeoReference) {
   EXPECT_LT(degreesBetween(findGround(capture).up(), rotation.col(2)), 1e-6);
 }
 
-TEST(Ground, WithoutPointsLiesAtTheHeightThatDronesTellOfTakeOff) {
+TEST(Ground, UsesTheHeightAboveTakeOffWithoutPoints) {
   Capture capture = flight(4, 4, 25, 53);
   capture.geo = GeoFrame{};
   capture.geo->enuFromWorld.diagonal().head<3>().setConstant(2);  // a unit is two metres
@@ -83,7 +83,7 @@ TEST(Ground, WithoutPointsLiesAtTheHeightThatDronesTellOfTakeOff) {
   EXPECT_NEAR(findGround(capture).height, 3, 1e-9);
 }
 
-TEST(Ground, WithoutPointsLiesWhereTheAxesMeet) {
+TEST(Ground, LiesWhereTheAxesMeetWithoutPoints) {
   Capture capture = emptyCapture();
   for (int i = 0; i < 8; ++i) {
     const double angle = 45 * kDegree * i;
@@ -92,14 +92,14 @@ TEST(Ground, WithoutPointsLiesWhereTheAxesMeet) {
   EXPECT_NEAR(findGround(capture).height, -4, 0.1);
 }
 
-TEST(Ground, WithoutPointsLiesBelowAFlightThatLooksStraightDown) {
+TEST(Ground, LiesBelowANadirFlightWithoutPoints) {
   const Ground ground = findGround(flight(5, 3, 25, 80));
   EXPECT_LT(ground.height, 60);
   EXPECT_GT(ground.height, -200);
   EXPECT_NE(ground.how.find("guessed"), std::string::npos) << ground.how;
 }
 
-TEST(Ground, OfOneCameraIsBelowIt) {
+TEST(Ground, LiesBelowASingleCamera) {
   Capture capture = emptyCapture();
   addPhoto(capture, lookingDown(1, 2, 3));
   const Ground ground = findGround(capture);
@@ -107,7 +107,7 @@ TEST(Ground, OfOneCameraIsBelowIt) {
   EXPECT_TRUE(std::isfinite(ground.height));
 }
 
-TEST(Ground, OfPointsInOnePlaceIsThere) {
+TEST(Ground, LiesAtPointsThatCoincide) {
   Capture capture = flight(2, 2, 10, 20);
   capture.points.resize(100);
   const Ground ground = findGround(capture);
@@ -115,7 +115,7 @@ TEST(Ground, OfPointsInOnePlaceIsThere) {
   EXPECT_LT(degreesBetween(ground.up(), Vec3d::UnitZ()), 1e-6);
 }
 
-TEST(Ground, CoordinatesComeBack) {
+TEST(Ground, ConvertsCoordinatesToTheWorldAndBack) {
   Ground ground;
   ground.groundFromWorld = turnAbout({1, 2, 3}, 40);
   ground.height = 7;

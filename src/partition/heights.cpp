@@ -7,13 +7,13 @@
 namespace tessera {
 namespace {
 
-constexpr double kOutliers = 0.002;       // at either end
-constexpr double kWider = 0.1;            // of the range, at either end
-constexpr double kGap = 0.25;             // of the range: what follows closer belongs to it
-constexpr size_t kTogether = 3;           // so many points must follow within the gap
-constexpr double kLeastThickness = 0.02;  // of the region's longer side: flat ground is not without thickness
-constexpr double kAround = 0.05;          // of the region's longer side: points so far outside it count
-constexpr double kBelowGround = 0.1;      // of the height of flight, where there are no points
+constexpr double kOutliers = 0.002;     // fraction of points at either end
+constexpr double kWider = 0.1;          // margin at either end, relative to the range
+constexpr double kGap = 0.25;           // relative to the range: the range extends over points that follow within it
+constexpr size_t kTogether = 3;         // number of points that must follow within the gap
+constexpr double kMinThickness = 0.02;  // relative to the region's longer side, for flat ground
+constexpr double kAround = 0.05;        // relative to the region's longer side: points up to here outside it count
+constexpr double kBelowGround = 0.1;    // relative to the flight height, used where there are no points
 
 }  // namespace
 
@@ -32,7 +32,7 @@ Heights findHeights(const Capture& capture, const Ground& ground, const Region& 
     if (region.looksAtGround && at.z() > highest) continue;
     if (region.rectangle.holds(at.head<2>(), kAround * side)) heights.push_back(at.z());
   }
-  Heights found;
+  Heights extent;
   if (heights.size() >= kEnoughGroundPoints) {
     std::sort(heights.begin(), heights.end());
     const auto rank = static_cast<size_t>(kOutliers * static_cast<double>(heights.size() - 1));
@@ -41,19 +41,20 @@ Heights findHeights(const Capture& capture, const Ground& ground, const Region& 
     const double gap = kGap * (heights[last] - heights[first]);
     while (last + kTogether < heights.size() && heights[last + kTogether] - heights[last] <= gap) ++last;
     const double wider = kWider * (heights[last] - heights[first]);
-    found = {heights[first] - wider, heights[last] + wider};
-    if (region.looksAtGround) found = {std::min(found.bottom, 0.0), std::clamp(found.top, 0.0, std::max(highest, 0.0))};
+    extent = {heights[first] - wider, heights[last] + wider};
+    if (region.looksAtGround)
+      extent = {std::min(extent.bottom, 0.0), std::clamp(extent.top, 0.0, std::max(highest, 0.0))};
   } else if (region.looksAtGround) {
-    std::erase_if(cameras, [](double height) { return !(height > 0); });  // they see nothing of it
+    std::erase_if(cameras, [](double height) { return !(height > 0); });  // below the ground
     const double lowest = percentile(cameras, 0.05);
-    found = {-kBelowGround * lowest, lowest};
+    extent = {-kBelowGround * lowest, lowest};
   } else {
-    const double middle = ground.inGround(focusOf(capture, photos)).z();
-    found = {middle - side / 2, middle + side / 2};
+    const double middle = ground.inGround(findFocusPoint(capture, photos)).z();
+    extent = {middle - side / 2, middle + side / 2};
   }
-  const double missing = kLeastThickness * side - (found.top - found.bottom);
-  if (missing > 0) found = {found.bottom - missing / 2, found.top + missing / 2};
-  return found;
+  const double missing = kMinThickness * side - (extent.top - extent.bottom);
+  if (missing > 0) extent = {extent.bottom - missing / 2, extent.top + missing / 2};
+  return extent;
 }
 
 }  // namespace tessera

@@ -2,19 +2,19 @@
 
 #include <gtest/gtest.h>
 
-#include "partition/testing/made_captures.h"
+#include "partition/testing/test_captures.h"
 
 namespace tessera {
 namespace {
 
-Heights heightsOf(const Capture& capture) {
+Heights findCaptureHeights(const Capture& capture) {
   return findHeights(capture, Ground{}, findRegion(capture, Ground{}));
 }
 
 TEST(Heights, ReachATenthBeyondTheMiddleOfThePoints) {
   Capture capture = flight(6, 6, 20, 60);
   addPoints(capture, 20000, {0, 0, -1}, {100, 100, 9});
-  const Heights heights = heightsOf(capture);
+  const Heights heights = findCaptureHeights(capture);
   EXPECT_NEAR(heights.bottom, -2, 0.1);
   EXPECT_NEAR(heights.top, 10, 0.1);
 }
@@ -23,41 +23,41 @@ TEST(Heights, DoNotCutOffALoneTower) {
   Capture capture = flight(6, 6, 20, 60);
   addPoints(capture, 100000, {0, 0, -1}, {100, 100, 9}, 1);
   addPoints(capture, 150, {50, 50, 9}, {52, 52, 35}, 2);  // 0.15 % of the points
-  EXPECT_GT(heightsOf(capture).top, 34);
+  EXPECT_GT(findCaptureHeights(capture).top, 34);
 }
 
 TEST(Heights, IgnoreAFewPointsInTheAirAndBelowTheGround) {
   Capture capture = flight(6, 6, 20, 60);
   addPoints(capture, 20000, {0, 0, -1}, {100, 100, 9}, 1);
-  const Heights before = heightsOf(capture);
+  const Heights before = findCaptureHeights(capture);
   addPoints(capture, 15, {0, 0, 20}, {100, 100, 55}, 2);
   addPoints(capture, 15, {0, 0, -300}, {100, 100, -100}, 3);
-  const Heights after = heightsOf(capture);
+  const Heights after = findCaptureHeights(capture);
   EXPECT_NEAR(after.top, before.top, 0.1);
   EXPECT_NEAR(after.bottom, before.bottom, 0.1);
 }
 
-TEST(Heights, OfAFlightEndBelowItsHighestCamera) {
+TEST(Heights, EndBelowTheHighestCameraOfAFlight) {
   Capture capture = flight(6, 6, 20, 60);
   addPoints(capture, 1000, {0, 0, -1}, {100, 100, 9}, 1);
   addPoints(capture, 100, {0, 0, 61}, {100, 100, 200}, 2);  // clouds, flares
-  EXPECT_LT(heightsOf(capture).top, 20);
+  EXPECT_LT(findCaptureHeights(capture).top, 20);
   addPoints(capture, 100, {50, 50, 9}, {52, 52, 59}, 3);  // a mast as high as the flight
-  EXPECT_EQ(heightsOf(capture).top, 60);
+  EXPECT_EQ(findCaptureHeights(capture).top, 60);
 }
 
-TEST(Heights, OfALowerFlightKeepTheTowersBesideIt) {
+TEST(Heights, KeepTowersBesideALowFlight) {
   Capture capture = flight(6, 6, 20, 120);
   for (int i = 0; i < 12; ++i) addPhoto(capture, lookingDown(10.0 * i, 0, 40));
   addPoints(capture, 1000, {0, 0, -1}, {100, 100, 9}, 1);
   addPoints(capture, 100, {50, 50, 9}, {55, 55, 80}, 2);
-  EXPECT_GT(heightsOf(capture).top, 79);
+  EXPECT_GT(findCaptureHeights(capture).top, 79);
 }
 
-TEST(Heights, OfCamerasAmongThingsReachAboveThem) {
+TEST(Heights, ReachAboveCamerasInsideTheScene) {
   Capture capture = orbit({0, 0, 1.6}, 5, 12);
   addPoints(capture, 3000, {-4, -4, 0}, {4, 4, 12});
-  const Heights heights = heightsOf(capture);
+  const Heights heights = findCaptureHeights(capture);
   EXPECT_NEAR(heights.bottom, -1.2, 0.2);
   EXPECT_NEAR(heights.top, 13.2, 0.2);
 }
@@ -66,27 +66,27 @@ TEST(Heights, OnlyCountPointsOfTheRegion) {
   Capture capture = flight(6, 6, 20, 60);
   addPoints(capture, 3000, {0, 0, -1}, {100, 100, 9}, 1);
   addPoints(capture, 3000, {1000, 1000, -50}, {1100, 1100, 50}, 2);  // hills far away
-  const Heights heights = heightsOf(capture);
+  const Heights heights = findCaptureHeights(capture);
   EXPECT_LT(heights.top, 11);
   EXPECT_GT(heights.bottom, -3);
 }
 
-TEST(Heights, WithoutPointsReachUpToTheFlight) {
-  const Heights heights = heightsOf(flight(6, 6, 20, 60));
+TEST(Heights, ReachUpToTheFlightWithoutPoints) {
+  const Heights heights = findCaptureHeights(flight(6, 6, 20, 60));
   EXPECT_EQ(heights.bottom, -6);
   EXPECT_EQ(heights.top, 60);
 }
 
-TEST(Heights, WithoutPointsAreACubeAmongThings) {
-  const Heights heights = heightsOf(orbit({0, 0, 1.6}, 5, 12));
+TEST(Heights, FormACubeForCamerasInsideASceneWithoutPoints) {
+  const Heights heights = findCaptureHeights(orbit({0, 0, 1.6}, 5, 12));
   EXPECT_NEAR(heights.top - heights.bottom, 10, 0.1);
   EXPECT_NEAR(heights.top + heights.bottom, 3.2, 0.1);
 }
 
-TEST(Heights, OfAFlatPlaneAreNotTheSame) {
+TEST(Heights, HaveAMinimumThicknessOnAFlatPlane) {
   Capture capture = flight(6, 6, 20, 60);
   addPoints(capture, 1000, {0, 0, 0}, {100, 100, 0});
-  const Heights heights = heightsOf(capture);
+  const Heights heights = findCaptureHeights(capture);
   EXPECT_LT(heights.bottom, 0);
   EXPECT_GT(heights.top, 0);
 }

@@ -17,9 +17,9 @@ BlockLayout givenLayout(const BlockGrid& grid) {
 }  // namespace
 
 bool Partition::isThin(int cell) const {
-  const auto found = std::lower_bound(thin.begin(), thin.end(), cell,
-                                      [](const ThinCell& other, int wanted) { return other.cell < wanted; });
-  return found != thin.end() && found->cell == cell;
+  const auto match = std::lower_bound(thin.begin(), thin.end(), cell,
+                                      [](const ThinCell& other, int number) { return other.cell < number; });
+  return match != thin.end() && match->cell == cell;
 }
 
 Partition partitionCapture(const Capture& capture, const PartitionOptions& options) {
@@ -37,7 +37,7 @@ Partition partitionCapture(const Capture& capture, const PartitionOptions& optio
   partition.grid = layout.grid;
   partition.decidedBy = layout.decidedBy;
   partition.coverage =
-      countCoverage(capture, partition.grid, partition.ground, partition.region.looksAtGround, options.depthOf);
+      countCoverage(capture, partition.grid, partition.ground, partition.region.looksAtGround, options.findRayDepth);
   partition.thin = thinCells(partition.grid, partition.coverage, options.enough);
   const Rectangle& area = partition.region.rectangle;
   partition.notes = {

@@ -1,4 +1,4 @@
-// A capture cut into blocks on the ground (City-on-Web, sections 3.1 and 4.1).
+// Partitions a capture into blocks on the ground (City-on-Web, sections 3.1 and 4.1).
 #pragma once
 
 #include <optional>
@@ -10,10 +10,10 @@ namespace tessera {
 
 struct PartitionOptions {
   BlockCount blocks;
-  std::optional<BlockGrid> grid;  // of these cells, whatever `blocks` and `limits` say
+  std::optional<BlockGrid> grid;  // if set, this grid is used and `blocks` and `limits` are ignored
   BlockLimits limits;
-  Sufficiency enough;
-  DepthOf depthOf;  // optional: where rays end; see coverage.h
+  CoverageThresholds enough;
+  DepthOf findRayDepth;  // optional: the lengths of rays; see coverage.h
 };
 
 struct Partition {
@@ -22,15 +22,15 @@ struct Partition {
   Region region;
   Heights heights;
   DecidedBy decidedBy = DecidedBy::request;
-  std::vector<CellCoverage> coverage;  // one entry a cell
-  std::vector<ThinCell> thin;          // to be warned of before training; by cell
-  std::vector<std::string> notes;      // for people: how ground, region and blocks were found
+  std::vector<CellCoverage> coverage;  // one entry per cell
+  std::vector<ThinCell> thin;          // cells to warn about before training, in order of cell
+  std::vector<std::string> notes;      // for log messages: how ground, region and blocks were determined
 
   bool isThin(int cell) const;
 };
 
-// A function of the capture's training photos, points and geo reference, and of the options, alone. Throws Error when
-// the capture has no training photos.
+// Partitions a capture. The result depends only on the capture's training photos, points and geo reference, and on the
+// options. Throws Error if the capture has no training photos.
 Partition partitionCapture(const Capture& capture, const PartitionOptions& options);
 
 }  // namespace tessera

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "partition/testing/made_captures.h"
+#include "partition/testing/test_captures.h"
 
 namespace tessera {
 namespace {
@@ -15,7 +15,7 @@ Capture town() {
   return capture;
 }
 
-TEST(Partition, CutsATownIntoBlocksThatHoldIt) {
+TEST(Partition, CoversATownWithItsBlocks) {
   const Partition partition = partitionCapture(town(), {.blocks = {false, 2, 2}});
   EXPECT_EQ(partition.grid.cells(), 4);
   EXPECT_EQ(partition.notes.size(), 3u);
@@ -76,11 +76,11 @@ TEST(Partition, NamesBlocksThatTooFewPhotosShow) {
   EXPECT_GE(partition.thin.size(), 3u);
   for (const ThinCell& thin : partition.thin) {
     const CellCoverage& has = partition.coverage[static_cast<size_t>(thin.cell)];
-    EXPECT_TRUE(has.photos < 3 || has.pixels < Sufficiency{}.pixels) << thin.warning;
+    EXPECT_TRUE(has.photos < 3 || has.pixels < CoverageThresholds{}.pixels) << thin.warning;
   }
 }
 
-TEST(Partition, OfCamerasAmongThingsOrOfTheSkyOrOfOneIsFinite) {
+TEST(Partition, IsFiniteForCamerasInsideTheSceneOrOfTheSkyOrOnlyOne) {
   Capture sky = emptyCapture(), one = emptyCapture();
   for (int i = 0; i < 4; ++i) addPhoto(sky, lookingAt({3.0 * i, 0, 1}, {3.0 * i, 1, 9}, Vec3d::UnitY()));
   addPhoto(one, lookingDown(0, 0, 30));
@@ -95,7 +95,7 @@ TEST(Partition, OfCamerasAmongThingsOrOfTheSkyOrOfOneIsFinite) {
   EXPECT_EQ(partitionCapture(one, {}).thin.size(), 1u);  // one photo is too few, and says so
 }
 
-TEST(Partition, WithoutTrainingPhotosIsAnError) {
+TEST(Partition, RejectsCapturesWithoutTrainingPhotos) {
   Capture capture = flight(2, 2, 10, 10);
   for (Photo& photo : capture.photos) photo.split = Split::test;
   EXPECT_THROW(partitionCapture(capture, {}), Error);

@@ -4,17 +4,17 @@ namespace tessera {
 namespace {
 
 RayFan fan(const Camera& camera, int columns, int rows, double offset, const Vec2d& step) {
-  RayFan made;
-  made.columns = columns;
-  made.rows = rows;
+  RayFan rays;
+  rays.columns = columns;
+  rays.rows = rows;
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
       const Vec2d pixel((column + offset) * step.x(), (row + offset) * step.y());
-      made.pixels.push_back(pixel);
-      made.directionsInCamera.push_back(camera.directionInCamera(pixel));
+      rays.pixels.push_back(pixel);
+      rays.directionsInCamera.push_back(camera.directionInCamera(pixel));
     }
   }
-  return made;
+  return rays;
 }
 
 }  // namespace

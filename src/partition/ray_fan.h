@@ -1,4 +1,4 @@
-// Rays of a camera on a coarse lattice over its picture, undistorted once for all its photos.
+// The rays of a camera on a coarse lattice over its image, undistorted once for all photos of the camera.
 #pragma once
 
 #include <optional>
@@ -11,16 +11,17 @@ namespace tessera {
 struct RayFan {
   int columns = 0, rows = 0;
   std::vector<Vec2d> pixels;                             // [rows][columns]
-  std::vector<std::optional<Vec3d>> directionsInCamera;  // unit; nothing where the lens has no inverse
+  std::vector<std::optional<Vec3d>> directionsInCamera;  // unit length; nothing where the lens has no inverse
 
   const std::optional<Vec3d>& at(int column, int row) const {
     return directionsInCamera[static_cast<size_t>(row) * static_cast<size_t>(columns) + static_cast<size_t>(column)];
   }
 };
 
-// Through the middles of columns × rows equal parts of the picture.
+// Returns the rays through the centres of columns × rows equal parts of the image.
 RayFan raysThroughMiddles(const Camera& camera, int columns, int rows);
-// Through their corners: (columns + 1) × (rows + 1) rays, the outermost on the picture's border.
+// Returns the rays through the corners of those parts: (columns + 1) × (rows + 1) rays, the outermost on the image's
+// border.
 RayFan raysThroughCorners(const Camera& camera, int columns, int rows);
 
 }  // namespace tessera

@@ -9,7 +9,7 @@
 namespace tessera {
 namespace {
 
-// Within ±45°: a rectangle turned by a right angle is the same one.
+// Reduces an angle to ±45°, because rotating a rectangle by a right angle only swaps its sides.
 double reduced(double angle) {
   constexpr double kRight = std::numbers::pi / 2;
   return angle - kRight * std::round(angle / kRight);
@@ -43,7 +43,7 @@ std::vector<Vec2d> convexHull(std::vector<Vec2d> points) {
       }
       hull.push_back(point);
     }
-    hull.pop_back();  // the first of the other side
+    hull.pop_back();  // it is also the first of the other side
     std::reverse(points.begin(), points.end());
   }
   return hull;
@@ -51,7 +51,7 @@ std::vector<Vec2d> convexHull(std::vector<Vec2d> points) {
 
 Rectangle smallestRectangle(const std::vector<Vec2d>& hull) {
   CHECK(hull.size() > 0u);
-  // One side of the smallest rectangle lies on an edge of the hull. Hulls here have few corners: every edge is tried
+  // One side of the smallest rectangle lies on an edge of the hull. The hulls have few corners, so every edge is tested
   // against all of them.
   const Rectangle level = boxAt(hull, 0);
   Rectangle best = level;

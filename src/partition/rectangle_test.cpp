@@ -3,12 +3,12 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
-#include "partition/testing/made_captures.h"
+#include "partition/testing/test_captures.h"
 
 namespace tessera {
 namespace {
 
-std::vector<Vec2d> cornersOf(const Rectangle& rectangle) {
+std::vector<Vec2d> rectangleCorners(const Rectangle& rectangle) {
   std::vector<Vec2d> corners;
   for (const Vec2d& side : {Vec2d(-1, -1), Vec2d(1, -1), Vec2d(1, 1), Vec2d(-1, 1)}) {
     corners.push_back(rectangle.outside(side.cwiseProduct(Vec2d(rectangle.width, rectangle.depth)) / 2));
@@ -30,33 +30,33 @@ TEST(ConvexHull, HoldsAllPointsAndTurnsLeftEverywhere) {
   }
 }
 
-TEST(ConvexHull, OfFewPointsAndOfALineIsWhatThereIs) {
+TEST(ConvexHull, HasFewerThanThreeCornersForPointsOnALine) {
   EXPECT_EQ(convexHull({{1, 2}, {1, 2}}).size(), 1u);
   EXPECT_EQ(convexHull({{0, 0}, {1, 1}, {2, 2}, {3, 3}}).size(), 2u);
 }
 
-TEST(SmallestRectangle, FindsATurnedOne) {
+TEST(SmallestRectangle, FindsARotatedRectangle) {
   for (const double degrees : {-40.0, -7.0, 12.0, 30.0, 44.0}) {
-    const Rectangle made{{3, -8}, degrees * kDegree, 20, 5};
-    const Rectangle found = smallestRectangle(convexHull(cornersOf(made)));
-    EXPECT_NEAR(found.angle, made.angle, 1e-9);
-    EXPECT_NEAR(found.width, 20, 1e-9);
-    EXPECT_NEAR(found.depth, 5, 1e-9);
-    EXPECT_LT((found.centre - made.centre).norm(), 1e-9);
+    const Rectangle expected{{3, -8}, degrees * kDegree, 20, 5};
+    const Rectangle actual = smallestRectangle(convexHull(rectangleCorners(expected)));
+    EXPECT_NEAR(actual.angle, expected.angle, 1e-9);
+    EXPECT_NEAR(actual.width, 20, 1e-9);
+    EXPECT_NEAR(actual.depth, 5, 1e-9);
+    EXPECT_LT((actual.centre - expected.centre).norm(), 1e-9);
   }
 }
 
 TEST(SmallestRectangle, TurnsByNoMoreThanFortyFiveDegrees) {
-  const Rectangle found = smallestRectangle(convexHull(cornersOf({{0, 0}, 60 * kDegree, 20, 5})));
-  EXPECT_NEAR(found.angle, -30 * kDegree, 1e-9);
-  EXPECT_NEAR(found.width, 5, 1e-9);
-  EXPECT_NEAR(found.depth, 20, 1e-9);
+  const Rectangle actual = smallestRectangle(convexHull(rectangleCorners({{0, 0}, 60 * kDegree, 20, 5})));
+  EXPECT_NEAR(actual.angle, -30 * kDegree, 1e-9);
+  EXPECT_NEAR(actual.width, 5, 1e-9);
+  EXPECT_NEAR(actual.depth, 20, 1e-9);
 }
 
 TEST(SmallestRectangle, IsTurnedOnlyWhereThatSavesSomething) {
-  // A square with one corner cut off a little: its edges are level but for one.
+  // A square with one corner cut off slightly: all its edges but one are parallel to the axes.
   EXPECT_EQ(smallestRectangle(convexHull({{0, 0}, {9, 0}, {10, 1}, {10, 10}, {0, 10}})).angle, 0);
-  EXPECT_EQ(smallestRectangle(convexHull(cornersOf({{0, 0}, 0.001, 10, 10}))).angle, 0);
+  EXPECT_EQ(smallestRectangle(convexHull(rectangleCorners({{0, 0}, 0.001, 10, 10}))).angle, 0);
 }
 
 TEST(SmallestRectangle, IsNeverLargerThanTheLevelBoxAndHoldsTheHull) {
@@ -65,23 +65,23 @@ TEST(SmallestRectangle, IsNeverLargerThanTheLevelBoxAndHoldsTheHull) {
     std::vector<Vec2d> points;
     for (uint64_t i = 0; i < 12; ++i) points.emplace_back(random.uniform(2 * i), 3 * random.uniform(2 * i + 1));
     const std::vector<Vec2d> hull = convexHull(points);
-    const Rectangle found = smallestRectangle(hull);
+    const Rectangle actual = smallestRectangle(hull);
     Vec2d low = hull[0], high = low;
     for (const Vec2d& x : hull) {
-      EXPECT_TRUE(found.holds(x, 1e-9));
+      EXPECT_TRUE(actual.holds(x, 1e-9));
       low = low.cwiseMin(x);
       high = high.cwiseMax(x);
     }
-    EXPECT_LE(found.width * found.depth, (high - low).prod() * (1 + 1e-12));
-    // No turn by whole degrees is smaller by more than is worth it.
+    EXPECT_LE(actual.width * actual.depth, (high - low).prod() * (1 + 1e-12));
+    // No box at a whole number of degrees is smaller by more than kWorthTurning.
     for (int degrees = -45; degrees < 45; ++degrees) {
       const Eigen::Rotation2Dd turn(degrees * kDegree);
-      Vec2d least = turn * hull[0], most = least;
+      Vec2d minimum = turn * hull[0], maximum = minimum;
       for (const Vec2d& x : hull) {
-        least = least.cwiseMin(turn * x);
-        most = most.cwiseMax(turn * x);
+        minimum = minimum.cwiseMin(turn * x);
+        maximum = maximum.cwiseMax(turn * x);
       }
-      EXPECT_GE((most - least).prod(), found.width * found.depth * (1 - kWorthTurning - 1e-9));
+      EXPECT_GE((maximum - minimum).prod(), actual.width * actual.depth * (1 - kWorthTurning - 1e-9));
     }
   }
 }

@@ -18,11 +18,12 @@ namespace {
 constexpr int kFanColumns = 24, kFanRows = 18;
 constexpr int kMapSide = 256;  // cells of the coarse map along its longer side
 
-// A part of a photo on the ground.
+// The projection of a part of a photo onto the ground.
 using Quad = std::array<Vec2d, 4>;
 
-// What a pixel measures there in its narrower direction, `pixels` being the size of the part in the photo: flat rays
-// draw pixels out along themselves, which hides nothing of what stands upright. The smaller singular value of the map.
+// Returns the size of a pixel on the ground in its narrower direction, which is the smaller singular value of the map
+// from the photo; `pixels` is the size of the part in the photo. Oblique rays stretch pixels along the ground, but that
+// does not reduce the detail of upright surfaces.
 double pixelWidth(const Quad& quad, const Vec2d& pixels) {
   const Vec2d right = (quad[1] - quad[0] + quad[2] - quad[3]) / (2 * pixels.x());
   const Vec2d down = (quad[3] - quad[0] + quad[2] - quad[1]) / (2 * pixels.y());
@@ -30,29 +31,30 @@ double pixelWidth(const Quad& quad, const Vec2d& pixels) {
   return area / std::sqrt(1e-300 + (sum + std::sqrt(std::max(0.0, sum * sum - 4 * area * area))) / 2);
 }
 
-// Where a ray meets the ground steeply enough.
-std::optional<Vec2d> meetsGround(const Vec3d& originInGround, const Vec3d& direction, double leastSlope) {
+// Returns the point where a ray meets the ground, or nothing if it does so at less than `minSlope` degrees or not at
+// all.
+std::optional<Vec2d> meetsGround(const Vec3d& originInGround, const Vec3d& direction, double minSlope) {
   const double fall = -direction.z();
-  if (!(originInGround.z() > 0) || !(fall >= std::sin(leastSlope * std::numbers::pi / 180))) return std::nullopt;
+  if (!(originInGround.z() > 0) || !(fall >= std::sin(minSlope * std::numbers::pi / 180))) return std::nullopt;
   return Vec2d((originInGround + originInGround.z() / fall * direction).head<2>());
 }
 
 struct Footprint {
   std::vector<Quad> quads;
   double groundPixel = 0;  // median over the quads
-  bool axisMeets = false;  // of the optical axis
+  bool axisMeets = false;  // whether the optical axis meets the ground
 };
 
-Footprint footprintOf(const Camera& camera, const RayFan& fan, const Pose& worldFromCamera, const Ground& ground,
-                      double leastSlope) {
+Footprint computeFootprint(const Camera& camera, const RayFan& fan, const Pose& worldFromCamera, const Ground& ground,
+                           double minSlope) {
   const Mat3d groundFromCamera = ground.groundFromWorld * worldFromCamera.rotation;
   const Vec3d origin = ground.inGround(worldFromCamera.translation);
   Footprint footprint;
-  footprint.axisMeets = meetsGround(origin, groundFromCamera.col(2), kLeastAxisSlope).has_value();
+  footprint.axisMeets = meetsGround(origin, groundFromCamera.col(2), kMinAxisSlope).has_value();
   std::vector<std::optional<Vec2d>> hits;
   for (const std::optional<Vec3d>& direction : fan.directionsInCamera) {
     const Vec3d turned = direction ? Vec3d(groundFromCamera * *direction) : Vec3d::Zero();
-    hits.push_back(meetsGround(origin, turned, leastSlope));
+    hits.push_back(meetsGround(origin, turned, minSlope));
   }
   const Vec2d pixels(static_cast<double>(camera.width) / kFanColumns, static_cast<double>(camera.height) / kFanRows);
   std::vector<double> widths;
@@ -69,7 +71,7 @@ Footprint footprintOf(const Camera& camera, const RayFan& fan, const Pose& world
   return footprint;
 }
 
-// How many photos show each of the cells of a coarse map.
+// Counts the photos that show each cell of a coarse map.
 class CoverageMap {
  public:
   CoverageMap(const Vec2d& low, const Vec2d& high) : low_(low) {
@@ -84,10 +86,10 @@ class CoverageMap {
     addTriangle(photo, quad[0], quad[1], quad[2]);
     addTriangle(photo, quad[0], quad[2], quad[3]);
   }
-  int most() const { return *std::max_element(counts_.begin(), counts_.end()); }
+  int maximum() const { return *std::max_element(counts_.begin(), counts_.end()); }
 
-  // Corners of the outermost cells of each row with at least that many.
-  std::vector<Vec2d> cornersOf(int count) const {
+  // Returns the corners of the outermost cells in each row that at least `count` photos show.
+  std::vector<Vec2d> outerCellCorners(int count) const {
     std::vector<Vec2d> corners;
     for (int row = 0; row < rows_; ++row) {
       const auto begin = counts_.begin() + static_cast<ptrdiff_t>(row) * columns_, end = begin + columns_;
@@ -143,9 +145,9 @@ Region regionOfPhotos(const std::vector<Footprint>& footprints) {
   for (size_t photo = 0; photo < footprints.size(); ++photo) {
     for (const Quad& quad : footprints[photo].quads) map.add(static_cast<int>(photo), quad);
   }
-  const int enough = std::min(kEnoughPhotos, map.most());
+  const int enough = std::min(kEnoughPhotos, map.maximum());
   Region region;
-  region.hull = convexHull(map.cornersOf(enough));
+  region.hull = convexHull(map.outerCellCorners(enough));
   region.rectangle = smallestRectangle(region.hull);
   region.groundPixel = percentile(widths, 0.5);
   region.how = fmt::format("what at least {} of {} photos show of the ground", enough, footprints.size());
@@ -155,7 +157,7 @@ Region regionOfPhotos(const std::vector<Footprint>& footprints) {
 Region regionAmongThings(const Capture& capture, const std::vector<int>& photos, const Ground& ground) {
   Region region;
   region.looksAtGround = false;
-  Vec3d centre = ground.inGround(focusOf(capture, photos));
+  Vec3d centre = ground.inGround(findFocusPoint(capture, photos));
   double side = 0;
   if (capture.points.size() >= kEnoughRegionPoints) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -173,7 +175,7 @@ Region regionAmongThings(const Capture& capture, const std::vector<int>& photos,
     }
     region.how = "a square about the cameras and what they look at, as that is not the ground";
   }
-  if (!(side > 0)) side = 1;  // one camera, no points: any place is as good
+  if (!(side > 0)) side = 1;  // one camera, no points: the size is arbitrary
   region.rectangle = {centre.head<2>(), 0, side, side};
   std::vector<double> widths;
   for (const int photo : photos) {
@@ -192,13 +194,13 @@ Region findRegion(const Capture& capture, const Ground& ground) {
   CHECK(photos.size() > 0u);
   std::vector<RayFan> fans;
   for (const Camera& camera : capture.cameras) fans.push_back(raysThroughCorners(camera, kFanColumns, kFanRows));
-  for (const double leastSlope : {kLeastSlope, kLeastSlope / 2}) {
+  for (const double minSlope : {kMinSlope, kMinSlope / 2}) {
     std::vector<Footprint> footprints;
     size_t looking = 0, showing = 0;
     for (const int photo : photos) {
       const int camera = capture.photos[photo].camera;
-      footprints.push_back(footprintOf(capture.cameras[camera], fans[static_cast<size_t>(camera)],
-                                       capture.photos[photo].worldFromCamera, ground, leastSlope));
+      footprints.push_back(computeFootprint(capture.cameras[camera], fans[static_cast<size_t>(camera)],
+                                            capture.photos[photo].worldFromCamera, ground, minSlope));
       looking += footprints.back().axisMeets;
       showing += !footprints.back().quads.empty();
     }

@@ -1,4 +1,4 @@
-// The region of interest: what a capture shows well of the ground.
+// The region of interest: the part of the ground that a capture shows well.
 #pragma once
 
 #include <string>
@@ -11,21 +11,21 @@ namespace tessera {
 
 struct Region {
   Rectangle rectangle;      // on the ground: ground x and y
-  double groundPixel = 0;   // median over photos of a pixel's width there, world units
-  std::vector<Vec2d> hull;  // of what is covered, ground x and y, counterclockwise; empty when not looksAtGround
+  double groundPixel = 0;   // median over photos of a pixel's width on the ground, world units
+  std::vector<Vec2d> hull;  // of the covered ground, ground x and y, counterclockwise; empty unless looksAtGround
   bool looksAtGround = true;
-  std::string how;  // for people: what it was found from
+  std::string how;  // for log messages: what it was derived from
 };
 
-// The smallest rectangle, turned where that is worth it, about every place on the ground that kEnoughPhotos training
-// photos show (or as many as any place has). A pixel shows the ground where its ray meets it at kLeastSlope or more:
-// what oblique photos show beyond that is far away, coarse, and no reason to make blocks of it. Where most photos show
-// nothing so steeply, half of that will do. Cameras of which fewer than half look down by kLeastAxisSlope do not look
-// at the ground, they stand among things, and the region is one square: about the sparse points (2nd to 98th
-// percentile), with fewer than kEnoughRegionPoints about the cameras and what they look at. Photos as photosTogether
-// gives them, not none.
+// Returns the smallest rectangle (see smallestRectangle) around all parts of the ground that kEnoughPhotos training
+// photos show (or the highest number of photos that any part has, if lower). A pixel shows the ground where its ray
+// meets it at kMinSlope or more: what oblique photos show at lower slopes is far away and coarse, and needs no blocks.
+// Where most photos show nothing at that slope, half of it suffices. Where fewer than half of the cameras look down by
+// kMinAxisSlope, they do not look at the ground but stand inside the scene, and the region is a square around the
+// sparse points (2nd to 98th percentile), or, with fewer than kEnoughRegionPoints points, around the cameras and the
+// point that they look at. Uses the photos of photosTogether, of which there must be at least one.
 inline constexpr int kEnoughPhotos = 3;
-inline constexpr double kLeastSlope = 30, kLeastAxisSlope = 15;  // degrees between ray and ground
+inline constexpr double kMinSlope = 30, kMinAxisSlope = 15;  // degrees between ray and ground
 inline constexpr size_t kEnoughRegionPoints = 200;
 Region findRegion(const Capture& capture, const Ground& ground);
 

@@ -2,17 +2,17 @@
 
 #include <gtest/gtest.h>
 
-#include "partition/testing/made_captures.h"
+#include "partition/testing/test_captures.h"
 
 namespace tessera {
 namespace {
 
-// What a map of 256 cells blurs, at either side.
+// Returns the error of a map of 256 cells at either side.
 double blur(double side) {
   return 1.5 * side / 256;
 }
 
-TEST(Region, OfOnePhotoIsItsFootprint) {
+TEST(Region, IsTheFootprintOfASinglePhoto) {
   Capture capture = emptyCapture();
   addPhoto(capture, lookingDown(30, -20, 100));  // shows 200 × 150
   const Region region = findRegion(capture, Ground{});
@@ -26,7 +26,7 @@ TEST(Region, OfOnePhotoIsItsFootprint) {
 }
 
 TEST(Region, IsWhatThreePhotosShow) {
-  // Footprints 200 wide, 50 apart: photos 0…5 show [-100, 350]; three or more show [0, 250].
+  // The footprints are 200 wide and 50 apart: photos 0…5 show [-100, 350], and three or more show [0, 250].
   const Region region = findRegion(flight(6, 1, 50, 100), Ground{});
   EXPECT_NEAR(region.rectangle.width, 250, 2 * blur(450));
   EXPECT_NEAR(region.rectangle.centre.x(), 125, blur(450));
@@ -60,19 +60,19 @@ TEST(Region, FollowsAGroundThatIsTiltedAndHigh) {
 
 TEST(Region, EndsBeforeTheHorizon) {
   Capture capture = emptyCapture();
-  // 37° down in the middle, level at the upper border.
+  // The rays point 37° down in the centre and are level at the upper border.
   for (int i = 0; i < 3; ++i) {
     addPhoto(capture, lookingAt({0, 0, 100}, {0, 100 / std::tan(37 * kDegree), 0}, Vec3d::UnitZ()));
   }
   const Region region = findRegion(capture, Ground{});
-  const double farthest = 100 / std::tan(kLeastSlope * kDegree);
-  double most = 0;
-  for (const Vec2d& corner : region.hull) most = std::max(most, corner.norm());
-  EXPECT_LE(most, farthest + 2 * blur(2 * farthest));
-  EXPECT_GT(most, 0.8 * farthest);
+  const double farthest = 100 / std::tan(kMinSlope * kDegree);
+  double maximum = 0;
+  for (const Vec2d& corner : region.hull) maximum = std::max(maximum, corner.norm());
+  EXPECT_LE(maximum, farthest + 2 * blur(2 * farthest));
+  EXPECT_GT(maximum, 0.8 * farthest);
 }
 
-TEST(Region, OfFlatPhotosReachesFartherThanOfSteepOnes) {
+TEST(Region, ReachesFartherWhereMostPhotosAreOblique) {
   Capture capture = emptyCapture();
   capture.cameras[0].parameters = {2000, 2000, 200, 150};  // ± 4.3°
   for (int i = 0; i < 4; ++i) {
@@ -87,10 +87,10 @@ TEST(Region, CountsWhatAFisheyeShowsInsideItsCircle) {
   Capture capture = emptyCapture();
   Camera& camera = capture.cameras[0];
   camera.lens = LensModel::openCvFisheye;
-  camera.parameters = {100, 100, 200, 150, 0, 0, 0, 0};  // 2 radians off the axis at the sides: more than the ground
+  camera.parameters = {100, 100, 200, 150, 0, 0, 0, 0};  // 2 radians off the axis at the sides: beyond the horizon
   addPhoto(capture, lookingDown(0, 0, 10));
   const Region region = findRegion(capture, Ground{});
-  const double reach = 10 / std::tan(kLeastSlope * kDegree);
+  const double reach = 10 / std::tan(kMinSlope * kDegree);
   EXPECT_GT(region.rectangle.width, 1.2 * reach);
   EXPECT_LT(region.rectangle.width, 2 * reach + 2 * blur(2 * reach));
   EXPECT_LT(region.rectangle.centre.norm(), blur(4 * reach));
@@ -110,7 +110,7 @@ TEST(Region, IsNotMovedByAPhotoFarAwayNorByHeldOutOnes) {
   EXPECT_EQ(after.groundPixel, before.groundPixel);
 }
 
-TEST(Region, OfCamerasAmongThingsIsASquareAboutTheirPoints) {
+TEST(Region, IsASquareAroundThePointsForCamerasInsideTheScene) {
   Capture capture = orbit({5, 6, 1}, 4, 12);
   addPoints(capture, 2000, {3, 5, 0}, {7, 7, 2});
   const Region region = findRegion(capture, Ground{});
@@ -122,7 +122,7 @@ TEST(Region, OfCamerasAmongThingsIsASquareAboutTheirPoints) {
   EXPECT_NEAR(region.rectangle.centre.y(), 6, 0.1);
 }
 
-TEST(Region, OfCamerasAmongThingsWithoutPointsReachesToTheCameras) {
+TEST(Region, ReachesToTheCamerasInsideASceneWithoutPoints) {
   const Region region = findRegion(orbit({5, 6, 1}, 4, 12), Ground{});
   EXPECT_FALSE(region.looksAtGround);
   EXPECT_NEAR(region.rectangle.width, 8, 0.1);
@@ -130,7 +130,7 @@ TEST(Region, OfCamerasAmongThingsWithoutPointsReachesToTheCameras) {
   EXPECT_NEAR(region.groundPixel, 4.0 / 200, 1e-3);
 }
 
-TEST(Region, OfCamerasThatLookAtTheSkyIsFinite) {
+TEST(Region, IsFiniteForCamerasThatLookAtTheSky) {
   for (const int count : {1, 5}) {
     Capture capture = emptyCapture();
     for (int i = 0; i < count; ++i) addPhoto(capture, lookingAt({2.0 * i, 0, 10}, {2.0 * i, 0, 50}, Vec3d::UnitY()));

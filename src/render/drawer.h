@@ -1,6 +1,6 @@
-// How contents of one representation become a picture: what a renderer hands to a drawer, and the drawer on the CPU.
-// render/vulkan/gpu_drawer.h is its twin on the GPU. Renderers choose what is drawn (render/scene_tiles.h) and know no
-// representation; a drawer draws what it is given and knows nothing of tiles.
+// The interface between a renderer and the drawers of a representation, and the drawer on the CPU.
+// render/vulkan/gpu_drawer.h is its counterpart on the GPU. Renderers select what is drawn (render/scene_tiles.h) and
+// are independent of representations; a drawer draws the contents that it is given and is independent of tiles.
 #pragma once
 
 #include <cmath>
@@ -16,51 +16,53 @@
 
 namespace tessera {
 
-// Of a content, the part in a box, whose sides may be infinite.
-template <class Held>
+// The part of a content that lies in a box, whose sides may be infinite.
+template <class ResidentContent>
 struct DrawnContent {
-  const Held* content;
+  const ResidentContent* content;
   Vec3d low, high;  // scene units
 
-  DrawnContent(const Held* content)  // NOLINT(google-explicit-constructor): all of it
+  DrawnContent(const ResidentContent* content)  // NOLINT(google-explicit-constructor): the whole content
       : DrawnContent(content, Vec3d::Constant(-INFINITY), Vec3d::Constant(INFINITY)) {}
-  DrawnContent(const Held* content, const Vec3d& low, const Vec3d& high) : content(content), low(low), high(high) {}
+  DrawnContent(const ResidentContent* content, const Vec3d& low, const Vec3d& high)
+      : content(content), low(low), high(high) {}
 };
 
-// What of a scene a camera sees. Held: where contents live, Content or GpuContent.
-template <class Held>
+// The part of a scene that a camera sees. ResidentContent: Content (in CPU memory) or GpuContent (in GPU memory).
+template <class ResidentContent>
 struct SceneView {
   TileFrame frame;
-  // In an order that is front to back for every ray of the camera (render/tile_tree.h).
-  std::vector<DrawnContent<Held>> frontToBack;
-  // Optional: seen behind the frame's box, or alone by rays that miss it.
-  const Held* surround = nullptr;
-  // One that is always in memory, whatever is in view; null where the scene is empty.
-  const Held* pinned = nullptr;
+  // Ordered front to back for every ray of the camera (render/tile_tree.h).
+  std::vector<DrawnContent<ResidentContent>> frontToBack;
+  // Optional: drawn behind the frame's box, and alone for rays that miss the box.
+  const ResidentContent* backgroundBlock = nullptr;
+  // A content that is always in memory, whatever the view; null if the scene is empty.
+  const ResidentContent* pinned = nullptr;
 };
 
 struct PictureRequest {
   const Camera& camera;
   const Pose& worldFromCamera;
-  const ImageF* opaqueDepth = nullptr;  // as of ViewRenderer::render
+  const ImageF* opaqueDepth = nullptr;  // see ViewRenderer::render
 };
 
 struct DrawSettings {
-  float minTransmittance = 1.0f / 255;  // rays end where less than this would be seen; 0: never
-  // Which of CpuDrawer::skippingModes() empty space is passed over by; empty: the first.
+  float minTransmittance = 1.0f / 255;  // a ray ends when its transmittance falls below this; 0: never
+  // One of CpuDrawer::skippingModes(); empty: the first of them.
   std::string_view skipping;
-  // A picture that is a function of the request alone: every layer, no dithering, no earlier pictures. Else what looks
-  // best from one picture to the next.
+  // Whether the image must be a function of the request alone: every layer evaluated, no dithering, no history of
+  // earlier frames. Otherwise the drawer may use whatever looks best in a sequence of frames.
   bool exact = true;
 };
 
-// Adds up over pictures.
+// Counters that add up over images.
 struct DrawCounts {
-  uint64_t steps = 0;    // places that were looked at
-  uint64_t samples = 0;  // of them evaluated
+  uint64_t steps = 0;    // positions visited along rays
+  uint64_t samples = 0;  // positions at which the content was evaluated
 };
 
-// Draws on the CPU: the definition of what contents of a representation look like. One for each renderer.
+// Draws contents of a representation on the CPU. It is the reference that defines what these contents look like. Each
+// renderer owns one.
 class CpuDrawer {
  public:
   CpuDrawer() = default;
@@ -68,20 +70,20 @@ class CpuDrawer {
   CpuDrawer& operator=(const CpuDrawer&) = delete;
   virtual ~CpuDrawer() = default;
 
-  // What a content takes in memory at most once it is prepared, where it takes `decodedBytes` as it is decoded: what
-  // drawing builds besides counts too.
+  // Returns an upper bound of the memory in bytes that a prepared content takes, including what drawing builds for it.
+  // `decodedBytes`: the memory of the content as it was decoded.
   virtual uint64_t residentBytes(uint64_t decodedBytes) const { return decodedBytes; }
-  // Likewise of a resource, once for all contents that keep it: what drawing builds of it besides counts too.
+  // Returns the same for a shared resource, which is counted once for all contents that use it.
   virtual uint64_t residentBytesOfResource(uint64_t decodedBytes) const { return decodedBytes; }
-  // Makes of a content as it was decoded one that draw() takes. Called by several threads at a time.
+  // Turns a decoded content into one that draw() accepts. Called by several threads at a time.
   virtual std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const { return content; }
 
-  // As ViewRenderer::render. The picture does not depend on the number of threads. `counts` is added to.
+  // Renders a view (see ViewRenderer::render). The image does not depend on the number of threads. Adds to `counts`.
   virtual RenderedView draw(const SceneView<Content>& view, const PictureRequest& request, const DrawSettings& settings,
                             ThreadPool& pool, DrawCounts& counts) = 0;
 
-  // Ways of passing over empty space, the fastest first; "none", if it is among them, looks everywhere. All of them
-  // make the same picture.
+  // Modes of empty-space skipping, the fastest first; "none", if present, visits every step. All modes produce the same
+  // image.
   virtual std::vector<std::string_view> skippingModes() const { return {"none"}; }
 };
 

@@ -1,4 +1,4 @@
-// Which way the pixels of a camera look.
+// The viewing directions of a camera's pixels.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,8 @@
 
 namespace tessera {
 
-// In the camera's axes. Asking a lens is dear: kept while the camera stays the same.
+// Directions in camera axes. Inverting the lens model is expensive, so the directions are cached while the camera stays
+// the same.
 class PixelDirections {
  public:
   PixelDirections() = default;
@@ -16,7 +17,7 @@ class PixelDirections {
   void update(const Camera& camera, ThreadPool& pool);
 
   const Camera& camera() const { return camera_; }
-  // Of length 1; zero where the lens sees nothing.
+  // A unit vector; zero where the lens sees nothing.
   const Vec3f& at(int x, int y) const { return directions_[static_cast<size_t>(y) * camera_.width + x]; }
 
  private:

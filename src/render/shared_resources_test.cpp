@@ -1,4 +1,4 @@
-// Contents of a codec that is made for these tests, which share resources and may overlap.
+// Contents of a codec made for these tests, which share resources and may overlap.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include "render/tile_scene.h"
 #include "tiles/glb.h"
 #include "tiles/scene_folder.h"
-#include "tiles/testing/made_tileset.h"
+#include "tiles/testing/test_tileset.h"
 
 namespace tessera {
 namespace {
@@ -62,11 +62,11 @@ class SharingCodec final : public ContentCodec {
 
 class SharedResources : public testing::Test {
  protected:
-  // Two columns of two blocks below a root, with two surrounds. The blocks share a table; the root and the surrounds
-  // need none.
+  // A root over two columns of two blocks, with two background blocks. The blocks share a table; the root and the
+  // background blocks need none.
   void SetUp() override {
     const SceneFolderWriter writer(folder_.path());
-    Tileset tileset = tiles_test::madeTileset(2);
+    Tileset tileset = tiles_test::testTileset(2);
     tileset.representation = "sharing";
     const Bytes glb = encodeGlb("{}", Bytes(4));
     for (size_t i = 0; i < tileset.tiles.size(); ++i) {
@@ -86,10 +86,10 @@ class SharedResources : public testing::Test {
   Tileset tileset_;
 };
 
-TEST_F(SharedResources, AreDecodedOnceAndAreThereAsLongAsAContentNeedsThem) {
+TEST_F(SharedResources, AreDecodedOnceAndStayResidentWhileAContentNeedsThem) {
   const TileScene scene = openTileScene(folder_.path(), codec_);
-  EXPECT_EQ(scene.source.resourcesOf(0), std::vector<int>{});
-  EXPECT_EQ(scene.source.resourcesOf(2), std::vector<int>{0});
+  EXPECT_EQ(scene.source.tileResources(0), std::vector<int>{});
+  EXPECT_EQ(scene.source.tileResources(2), std::vector<int>{0});
   EXPECT_EQ(scene.source.bytesOfResource(0), kTableBytes);
   EXPECT_EQ(codec_.decoded, 0);
   auto first = scene.source.load(1), second = scene.source.load(2);
@@ -116,14 +116,16 @@ TEST_F(SharedResources, CountOnceInTheBudgetOfWhatAViewIsDrawnFrom) {
     pose.rotation = scene.frame.rotation * Eigen::AngleAxisd(std::numbers::pi, Vec3d::UnitX()).toRotationMatrix();
     pose.translation = scene.frame.translation + scene.frame.scale * (scene.frame.rotation * Vec3d(0, 0, 6));
     tiles.loadFor(tileView(camera, pose, scene.frame));
-    EXPECT_LE(tiles.cache().statistics().mostBytes, budget);
+    EXPECT_LE(tiles.cache().statistics().maxBytes, budget);
     EXPECT_EQ(codec_.alive, tiles.cache().statistics().bytes > kTableBytes ? 1 : 0);
     const std::vector<SelectedTile>& cut = tiles.cut().tiles;
     return std::count_if(cut.begin(), cut.end(), [](const SelectedTile& one) { return one.content > 0; });
   };
-  const uint64_t pinned = 2 * kContentBytes, surround = kContentBytes;  // the root and a surround; the finer surround
-  EXPECT_EQ(drawn(pinned + surround + 4 * kContentBytes), 0);
-  EXPECT_EQ(drawn(pinned + surround + 4 * kContentBytes + kTableBytes), 4);
+  const uint64_t pinned = 2 * kContentBytes,
+                 backgroundBlock =
+                     kContentBytes;  // the root and the coarse background block; the finer background block
+  EXPECT_EQ(drawn(pinned + backgroundBlock + 4 * kContentBytes), 0);
+  EXPECT_EQ(drawn(pinned + backgroundBlock + 4 * kContentBytes + kTableBytes), 4);
 }
 
 TEST_F(SharedResources, AreRefusedByTheNameOfTheirFile) {
@@ -148,8 +150,8 @@ TEST_F(SharedResources, AreRefusedWhereTheyTakeMoreMemoryThanWasChargedForThem) 
   EXPECT_NO_THROW(scene.source.load(1));
 }
 
-// One block after another in a budget for one: the table that they share stays.
-TEST_F(SharedResources, StayWhereOneContentMakesRoomForAnotherThatNeedsThem) {
+// Loads one block after another with a budget for one: the table that they share stays in memory.
+TEST_F(SharedResources, StayResidentWhenAContentReplacesAnotherThatNeedsThem) {
   TileScene scene = openTileScene(folder_.path(), codec_);
   TileCache<Content> cache(scene.tree, 2 * kContentBytes + kContentBytes + kTableBytes, scene.source);
   for (const int tile : {1, 2, 3, 1}) {
@@ -160,7 +162,7 @@ TEST_F(SharedResources, StayWhereOneContentMakesRoomForAnotherThatNeedsThem) {
   EXPECT_EQ(codec_.decoded, 1);
 }
 
-TEST_F(SharedResources, AreOfContentsThatMustHaveAnOrderUnlessTheirCodecLetsThemOverlap) {
+TEST_F(SharedResources, RequireOrderedContentsUnlessTheirCodecLetsThemOverlap) {
   TileContent more = tileset_.tiles[1].contents[0];
   tileset_.tiles[1].contents.push_back(more);
   SceneFolderWriter(folder_.path()).commit(tileset_);

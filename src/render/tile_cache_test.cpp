@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/random.h"
-#include "render/testing/made_tree.h"
+#include "render/testing/test_tree.h"
 
 namespace tessera {
 namespace {
@@ -23,7 +23,7 @@ std::unique_ptr<FakeContent> contentOfBytes(uint64_t bytes) {
   return std::make_unique<FakeContent>(FakeContent{bytes});
 }
 
-TileSource<FakeContent> sourceOf(std::function<std::unique_ptr<FakeContent>(int)> load) {
+TileSource<FakeContent> makeTileSource(std::function<std::unique_ptr<FakeContent>(int)> load) {
   TileSource<FakeContent> source;
   source.bytes = [](int) { return kBytes; };
   source.load = std::move(load);
@@ -31,15 +31,15 @@ TileSource<FakeContent> sourceOf(std::function<std::unique_ptr<FakeContent>(int)
 }
 
 TEST(TileCache, NeverHoldsMoreThanItsBudgetUnderRandomAccess) {
-  const TileTree tree = madeTree(4, 4);
+  const TileTree tree = testTree(4, 4);
   const RandomStream random(1, 1);
   for (const uint64_t budget : {kBytes, 3 * kBytes, 7 * kBytes + 5, 100 * kBytes}) {
     uint64_t loads = 0;
-    TileCache<FakeContent> cache(tree, budget, sourceOf([&](int) {
+    TileCache<FakeContent> cache(tree, budget, makeTileSource([&](int) {
                                    ++loads;
                                    return contentOfBytes(kBytes);
                                  }));
-    uint64_t found = 0;
+    uint64_t expectedHits = 0;
     for (uint64_t i = 0; i < 3000; ++i) {
       std::vector<int> tiles;
       for (uint64_t k = 0; k <= random.below(10 * i, 4) && (tiles.size() + 2) * kBytes <= budget; ++k) {
@@ -47,14 +47,14 @@ TEST(TileCache, NeverHoldsMoreThanItsBudgetUnderRandomAccess) {
         if (std::find(tiles.begin(), tiles.end(), tile) == tiles.end()) tiles.push_back(tile);
       }
       cache.load(tiles);
-      for (const int tile : tiles) found += cache.find(tile) != nullptr;
+      for (const int tile : tiles) expectedHits += cache.find(tile) != nullptr;
       ASSERT_TRUE(std::all_of(tiles.begin(), tiles.end(), [&](int tile) { return cache.holds(tile); }));
       ASSERT_TRUE(cache.holds(0));  // the coarsest level
       ASSERT_LE(cache.statistics().bytes, budget);
-      ASSERT_LE(cache.statistics().mostBytes, budget);
+      ASSERT_LE(cache.statistics().maxBytes, budget);
     }
     EXPECT_EQ(cache.statistics().loads, loads);
-    EXPECT_EQ(cache.statistics().hits, found);
+    EXPECT_EQ(cache.statistics().hits, expectedHits);
     EXPECT_EQ(cache.statistics().loads - cache.statistics().evictions, cache.statistics().bytes / kBytes);
     if (budget == 100 * kBytes) {
       EXPECT_EQ(loads, 21u);
@@ -65,9 +65,9 @@ TEST(TileCache, NeverHoldsMoreThanItsBudgetUnderRandomAccess) {
   }
 }
 
-TEST(TileCache, EvictsWhatHasNotBeenUsedForLongestAndNothingWithoutNeed) {
-  const TileTree tree = madeTree(4, 4);
-  TileCache<FakeContent> cache(tree, 4 * kBytes, sourceOf([](int) { return contentOfBytes(kBytes); }));
+TEST(TileCache, EvictsTheLeastRecentlyUsedAndOnlyWhenNeeded) {
+  const TileTree tree = testTree(4, 4);
+  TileCache<FakeContent> cache(tree, 4 * kBytes, makeTileSource([](int) { return contentOfBytes(kBytes); }));
   cache.load(std::vector<int>{1, 2, 3});
   cache.load({});
   EXPECT_EQ(cache.statistics().evictions, 0u);
@@ -80,12 +80,12 @@ TEST(TileCache, EvictsWhatHasNotBeenUsedForLongestAndNothingWithoutNeed) {
   EXPECT_EQ(cache.find(1), nullptr);
 }
 
-TEST(TileCache, SaysHowMuchTheCoarsestLevelAndTheSurroundNeed) {
-  TileTree tree = madeTree(2, 2);
-  tree.surround = static_cast<int>(tree.tiles.size());
-  tree.tiles.emplace_back().isSurround = true;
+TEST(TileCache, ReportsHowMuchTheCoarsestLevelAndTheBackgroundBlockNeed) {
+  TileTree tree = testTree(2, 2);
+  tree.backgroundBlock = static_cast<int>(tree.tiles.size());
+  tree.tiles.emplace_back().isBackgroundBlock = true;
   int loads = 0;
-  const TileSource<FakeContent> source = sourceOf([&](int) {
+  const TileSource<FakeContent> source = makeTileSource([&](int) {
     ++loads;
     return contentOfBytes(kBytes);
   });
@@ -100,13 +100,14 @@ TEST(TileCache, SaysHowMuchTheCoarsestLevelAndTheSurroundNeed) {
   }
   EXPECT_EQ(loads, 0);
   const TileCache<FakeContent> cache(tree, 2 * kBytes, source);
-  EXPECT_TRUE(cache.holds(tree.surround));
+  EXPECT_TRUE(cache.holds(tree.backgroundBlock));
   EXPECT_TRUE(cache.holds(0));
 }
 
-TEST(TileCache, RefusesAContentThatIsLargerThanItsSourceSaid) {
-  const TileTree tree = madeTree(2, 2);
-  TileSource<FakeContent> source = sourceOf([](int tile) { return contentOfBytes(kBytes + (tile == 2 ? 1 : 0)); });
+TEST(TileCache, RejectsAContentThatIsLargerThanItsSourceDeclared) {
+  const TileTree tree = testTree(2, 2);
+  TileSource<FakeContent> source =
+      makeTileSource([](int tile) { return contentOfBytes(kBytes + (tile == 2 ? 1 : 0)); });
   source.file = [](int tile) { return std::to_string(tile) + ".glb"; };
   TileCache<FakeContent> cache(tree, 100 * kBytes, source);
   try {
@@ -120,40 +121,40 @@ TEST(TileCache, RefusesAContentThatIsLargerThanItsSourceSaid) {
   EXPECT_EQ(cache.statistics().bytes, 2 * kBytes);
 }
 
-// Tile t needs resource t % 2, and the root none; a resource takes as much as a content.
+// Tile t needs resource t % 2, and the root needs none; a resource is as large as a content.
 TEST(TileCache, ChargesASharedResourceOnceAndOnlyWhileAContentNeedsIt) {
-  const TileTree tree = madeTree(4, 4);
-  TileSource<FakeContent> source = sourceOf([](int) { return contentOfBytes(kBytes); });
-  source.resourcesOf = [](int tile) { return tile == 0 ? std::vector<int>{} : std::vector<int>{tile % 2}; };
+  const TileTree tree = testTree(4, 4);
+  TileSource<FakeContent> source = makeTileSource([](int) { return contentOfBytes(kBytes); });
+  source.tileResources = [](int tile) { return tile == 0 ? std::vector<int>{} : std::vector<int>{tile % 2}; };
   source.bytesOfResource = [](int) { return kBytes; };
   TileCache<FakeContent> cache(tree, 5 * kBytes, source);
   EXPECT_EQ(cache.statistics().bytes, kBytes);
   cache.load(std::vector<int>{1});
-  EXPECT_EQ(cache.statistics().bytes, 3 * kBytes);  // the resource came with it
+  EXPECT_EQ(cache.statistics().bytes, 3 * kBytes);  // includes the resource
   cache.load(std::vector<int>{3});
-  EXPECT_EQ(cache.statistics().bytes, 4 * kBytes);  // and is shared
+  EXPECT_EQ(cache.statistics().bytes, 4 * kBytes);  // the resource is shared
   cache.load(std::vector<int>{5});
   EXPECT_EQ(cache.statistics().bytes, 5 * kBytes);
   EXPECT_EQ(cache.statistics().evictions, 0u);
-  // One that needs the other resource takes the room of two contents.
+  // A tile that needs the other resource takes the space of two contents.
   cache.load(std::vector<int>{2});
   EXPECT_EQ(cache.statistics().evictions, 2u);
   EXPECT_FALSE(cache.holds(1));
   EXPECT_FALSE(cache.holds(3));
   EXPECT_EQ(cache.statistics().bytes, 5 * kBytes);
-  // With its last content the first resource goes too.
+  // The first resource is evicted with its last content.
   cache.load(std::vector<int>{2, 4, 6});
   EXPECT_FALSE(cache.holds(5));
   EXPECT_EQ(cache.statistics().bytes, 5 * kBytes);  // the root, three contents and their resource
-  EXPECT_LE(cache.statistics().mostBytes, 5 * kBytes);
+  EXPECT_LE(cache.statistics().maxBytes, 5 * kBytes);
 }
 
-TEST(TileCache, CountsTheResourcesOfWhatMustStay) {
-  TileTree tree = madeTree(2, 2);
-  tree.surround = static_cast<int>(tree.tiles.size());
-  tree.tiles.emplace_back().isSurround = true;
-  TileSource<FakeContent> source = sourceOf([](int) { return contentOfBytes(kBytes); });
-  source.resourcesOf = [](int) { return std::vector<int>{7}; };
+TEST(TileCache, CountsTheResourcesOfPinnedTiles) {
+  TileTree tree = testTree(2, 2);
+  tree.backgroundBlock = static_cast<int>(tree.tiles.size());
+  tree.tiles.emplace_back().isBackgroundBlock = true;
+  TileSource<FakeContent> source = makeTileSource([](int) { return contentOfBytes(kBytes); });
+  source.tileResources = [](int) { return std::vector<int>{7}; };
   source.bytesOfResource = [](int) { return kBytes; };
   EXPECT_THROW(TileCache<FakeContent>(tree, 3 * kBytes - 1, source), Error);
   EXPECT_EQ(TileCache<FakeContent>(tree, 3 * kBytes, source).statistics().bytes, 3 * kBytes);

@@ -1,4 +1,4 @@
-// Where a scene of tiles stands, and rays in it. Scene units: those of tiles/content.h.
+// The coordinate frame of a tiled scene, and rays in it. Scene units are those of tiles/content.h.
 #pragma once
 
 #include <algorithm>
@@ -8,30 +8,31 @@
 namespace tessera {
 
 struct TileFrame {
-  // A similarity: x in the world is translation + scale · rotation · x in the scene.
+  // A similarity: x_world = translation + scale · rotation · x_scene.
   Mat3d rotation = Mat3d::Identity();
   double scale = 1;  // world units of one scene unit
   Vec3d translation = Vec3d::Zero();
-  Vec3d low = {-1, -1, -1}, high = {1, 1, 1};  // the scene's box, scene units; the surround owns what lies outside
-  double near = 0.05;                          // scene units: no sample nearer to a camera
+  Vec3d low = {-1, -1, -1},
+        high = {1, 1, 1};  // the scene's box, scene units; the background block owns what lies outside
+  double near = 0.05;      // scene units: no sample is closer to a camera
 
-  static constexpr double kSceneEnd = 1e6;  // scene units: no sample beyond
+  static constexpr double kSceneEnd = 1e6;  // scene units: no sample is farther away
 
   Vec3d inScene(const Vec3d& xInWorld) const { return rotation.transpose() * (xInWorld - translation) / scale; }
 };
 
-// Scene units; the direction has length 1.
+// In scene units; the direction has length 1.
 struct SceneRay {
   Vec3d origin = Vec3d::Zero(), direction = Vec3d::UnitZ();
 };
 
-// Distances along a ray.
+// An interval of distances along a ray.
 struct RayRange {
   double near = 0, far = 0;
   bool empty() const { return !(near < far); }
 };
 
-// The part of `range` where the ray is in a box, whose sides may be infinite.
+// Clips `range` to the part of the ray inside a box, whose sides may be infinite.
 inline RayRange clipToBox(const SceneRay& ray, const Vec3d& low, const Vec3d& high, RayRange range) {
   for (int axis = 0; axis < 3; ++axis) {
     const double o = ray.origin[axis], d = ray.direction[axis];

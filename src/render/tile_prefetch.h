@@ -1,5 +1,5 @@
-// Contents of tiles read in the background, for whoever must not wait: what is wanted is said again and again, and what
-// is ready is taken.
+// Reads tile contents in background threads, for callers that must not block: the caller states repeatedly which tiles
+// it requests and takes those that are ready.
 #pragma once
 
 #include <algorithm>
@@ -19,10 +19,10 @@ namespace tessera {
 template <class Content>
 class TilePrefetch {
  public:
-  // `load` is called from threads of its own. At most `most` contents are read or wait at a time: they are in memory
-  // beside what others count.
-  TilePrefetch(std::function<Content(int tile)> load, int threads = 2, size_t most = 3)
-      : load_(std::move(load)), most_(most) {
+  // `load` is called from `threads` worker threads. At most `maximum` contents are being read or waiting to be taken at
+  // a time; their memory is not part of any cache's budget.
+  TilePrefetch(std::function<Content(int tile)> load, int threads = 2, size_t maximum = 3)
+      : load_(std::move(load)), max_(maximum) {
     for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
   }
   ~TilePrefetch() {
@@ -36,30 +36,31 @@ class TilePrefetch {
   TilePrefetch(const TilePrefetch&) = delete;
   TilePrefetch& operator=(const TilePrefetch&) = delete;
 
-  // The most urgent first. What was wanted before, and is no more, is forgotten.
-  void want(std::vector<int> tiles) {
+  // Replaces the requested tiles, the most urgent first. Contents of tiles that are no longer requested are dropped.
+  void request(std::vector<int> tiles) {
     {
       const std::lock_guard lock(mutex_);
-      wanted_ = std::move(tiles);
-      std::erase_if(parts_, [&](const auto& part) { return !part.second.isBeingRead && !isWanted(part.first); });
+      requested_ = std::move(tiles);
+      std::erase_if(parts_, [&](const auto& part) { return !part.second.isBeingRead && !isRequested(part.first); });
     }
     changed_.notify_all();
   }
   bool isReady(int tile) const {
     const std::lock_guard lock(mutex_);
-    const auto found = parts_.find(tile);
-    return found != parts_.end() && !found->second.isBeingRead;
+    const auto it = parts_.find(tile);
+    return it != parts_.end() && !it->second.isBeingRead;
   }
-  // Of a tile that is ready, and is then wanted no more. Throws what `load` threw.
+  // Returns the content of a tile that is ready and removes the tile from the requested ones. Rethrows what `load`
+  // threw.
   Content take(int tile) {
     Part part;
     {
       const std::lock_guard lock(mutex_);
-      const auto found = parts_.find(tile);
-      CHECK((found != parts_.end() && !found->second.isBeingRead) == true);
-      part = std::move(found->second);
-      parts_.erase(found);
-      std::erase(wanted_, tile);
+      const auto it = parts_.find(tile);
+      CHECK((it != parts_.end() && !it->second.isBeingRead) == true);
+      part = std::move(it->second);
+      parts_.erase(it);
+      std::erase(requested_, tile);
     }
     changed_.notify_all();
     if (part.failure) std::rethrow_exception(part.failure);
@@ -73,12 +74,12 @@ class TilePrefetch {
     std::exception_ptr failure;
   };
 
-  bool isWanted(int tile) const { return std::find(wanted_.begin(), wanted_.end(), tile) != wanted_.end(); }
+  bool isRequested(int tile) const { return std::find(requested_.begin(), requested_.end(), tile) != requested_.end(); }
 
-  // The first that is wanted and nobody reads; -1: none, or there is no room.
+  // Returns the first requested tile that no thread reads yet; -1 if there is none or the capacity is exhausted.
   int next() const {
-    if (parts_.size() >= most_) return -1;
-    for (const int tile : wanted_) {
+    if (parts_.size() >= max_) return -1;
+    for (const int tile : requested_) {
       if (!parts_.contains(tile)) return tile;
     }
     return -1;
@@ -100,7 +101,7 @@ class TilePrefetch {
         part.failure = std::current_exception();
       }
       lock.lock();
-      if (isWanted(tile)) {
+      if (isRequested(tile)) {
         parts_[tile] = std::move(part);
       } else {
         parts_.erase(tile);
@@ -112,10 +113,10 @@ class TilePrefetch {
   }
 
   std::function<Content(int tile)> load_;
-  size_t most_;
+  size_t max_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::vector<int> wanted_;
+  std::vector<int> requested_;
   std::map<int, Part> parts_;
   bool ends_ = false;
   std::vector<std::thread> threads_;

@@ -13,13 +13,14 @@
 namespace tessera {
 namespace {
 
-struct PromisedFile {
+struct DeclaredFile {
   fs::path path;
-  size_t tile = 0;  // of tileset.json
-  TileContent promised;
+  size_t tile = 0;  // index in tileset.json
+  TileContent declared;
 };
 
-// The resources of a scene: read when a content first needs one, and there as long as one does. For several threads.
+// The shared resources of a scene: each is read when a content first needs it and lives as long as some content does.
+// Thread-safe.
 class SceneResources {
  public:
   SceneResources(const fs::path& folder, const ContentCodec& codec, const std::vector<SharedResource>& described)
@@ -32,17 +33,19 @@ class SceneResources {
     for (const uint32_t number : content.resources) resources.push_back(of(number));
     return resources;
   }
-  // Those that are in memory; waits for no file.
+  // Returns those that are in memory, without waiting for files.
   Resources present(const TileContent& content) {
     Resources resources;
     for (const uint32_t number : content.resources) resources.push_back(present(number));
     return resources;
   }
-  uint64_t bytesOf(int number) const { return readResourceBytes(files_[number], codec_, described_[number]); }
+  uint64_t countResourceBytes(int number) const {
+    return readResourceBytes(files_[number], codec_, described_[number]);
+  }
 
  private:
   std::shared_ptr<const Resource> of(uint32_t number) {
-    const std::lock_guard reading(reading_[number]);  // others who need it wait; other resources can be read meanwhile
+    const std::lock_guard reading(reading_[number]);  // others that need it wait; other resources can be read meanwhile
     if (auto resource = present(number)) return resource;
     std::shared_ptr<const Resource> resource = readResource(files_[number], codec_, described_[number]);
     const std::lock_guard lock(mutex_);
@@ -57,14 +60,14 @@ class SceneResources {
   const ContentCodec& codec_;
   std::vector<SharedResource> described_;
   std::vector<fs::path> files_;
-  std::mutex mutex_;  // of held_
+  std::mutex mutex_;  // guards held_
   std::vector<std::weak_ptr<const Resource>> held_;
   std::vector<std::mutex> reading_;  // one for each resource
 };
 
 }  // namespace
 
-TileFrame frameOf(const Tileset& tileset) {
+TileFrame makeTileFrame(const Tileset& tileset) {
   TileFrame frame;
   frame.rotation = tileset.worldFromScene.rotation;
   frame.scale = tileset.worldFromScene.scale;
@@ -87,13 +90,13 @@ TileScene openTileScene(const fs::path& folder, const ContentCodec& codec) {
                 "bake the scene again");
   }
   TileScene scene;
-  scene.frame = frameOf(tileset);
+  scene.frame = makeTileFrame(tileset);
   scene.background = tileset.background;
   scene.tree.columns = static_cast<int>(tileset.columns);
   scene.tree.rows = static_cast<int>(tileset.rows);
-  const double metres = tileset.tileFromScene().scale;  // of one scene unit
-  std::vector<PromisedFile> files(tileset.tiles.size());
-  std::map<uint32_t, PromisedFile, std::greater<>> surrounds;  // by level, the coarsest first
+  const double metres = tileset.tileFromScene().scale;  // world units per scene unit; metres if georeferenced
+  std::vector<DeclaredFile> files(tileset.tiles.size());
+  std::map<uint32_t, DeclaredFile, std::greater<>> backgroundBlocks;  // by level, the coarsest first
   for (size_t i = 0; i < tileset.tiles.size(); ++i) {
     const Tile& tile = tileset.tiles[i];
     TileNode node;
@@ -106,13 +109,13 @@ TileScene openTileScene(const fs::path& folder, const ContentCodec& codec) {
     node.children.assign(tile.children.begin(), tile.children.end());
     node.hasContent = false;
     for (const TileContent& content : tile.contents) {
-      if (!content.surround && node.hasContent) {
+      if (!content.backgroundBlock && node.hasContent) {
         throw Error((folder / "tileset.json").string(), fmt::format("tile {}", i),
                     "has several contents, which the format allows and this renderer does not draw",
                     "give each a tile of its own");
       }
-      node.hasContent |= !content.surround;
-      PromisedFile& file = content.surround ? surrounds[content.level] : files[i];
+      node.hasContent |= !content.backgroundBlock;
+      DeclaredFile& file = content.backgroundBlock ? backgroundBlocks[content.level] : files[i];
       file = {contentPath(folder, content.uri), i, content};
     }
     scene.tree.tiles.push_back(std::move(node));
@@ -120,16 +123,16 @@ TileScene openTileScene(const fs::path& folder, const ContentCodec& codec) {
   for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
     for (const int child : scene.tree.tiles[i].children) scene.tree.tiles[child].parent = static_cast<int>(i);
   }
-  for (const auto& [level, file] : surrounds) {
+  for (const auto& [level, file] : backgroundBlocks) {
     TileNode node;
-    node.isSurround = true;
+    node.isBackgroundBlock = true;
     node.low = scene.frame.low;
     node.high = scene.frame.high;
     node.level = static_cast<int>(level);
-    node.geometricError = file.promised.geometricError / metres;
+    node.geometricError = file.declared.geometricError / metres;
     const int number = static_cast<int>(files.size());
-    if (scene.tree.surround < 0) {
-      scene.tree.surround = number;
+    if (scene.tree.backgroundBlock < 0) {
+      scene.tree.backgroundBlock = number;
     } else {
       node.parent = number - 1;
       scene.tree.tiles.back().children = {number};
@@ -140,17 +143,17 @@ TileScene openTileScene(const fs::path& folder, const ContentCodec& codec) {
   const auto resources = std::make_shared<SceneResources>(folder, codec, tileset.resources);
   scene.source.bytes = [files, &codec](int tile) { return readDecodedBytes(files[tile].path, codec); };
   scene.source.load = [files, resources, &codec](int tile) {
-    const PromisedFile& file = files[tile];
-    return readPromisedContent(file.path, codec, file.tile, file.promised, resources->of(file.promised));
+    const DeclaredFile& file = files[tile];
+    return readVerifiedContent(file.path, codec, file.tile, file.declared, resources->of(file.declared));
   };
-  scene.source.resourcesOf = [files](int tile) {
-    const std::vector<uint32_t>& numbers = files[tile].promised.resources;
+  scene.source.tileResources = [files](int tile) {
+    const std::vector<uint32_t>& numbers = files[tile].declared.resources;
     return std::vector<int>(numbers.begin(), numbers.end());
   };
   scene.source.holdResources = [files, resources](int tile) {
-    return std::make_shared<const Resources>(resources->present(files[tile].promised));
+    return std::make_shared<const Resources>(resources->present(files[tile].declared));
   };
-  scene.source.bytesOfResource = [resources](int resource) { return resources->bytesOf(resource); };
+  scene.source.bytesOfResource = [resources](int resource) { return resources->countResourceBytes(resource); };
   scene.source.folder = folder.string();
   scene.source.file = [files](int tile) { return files[tile].path.string(); };
   return scene;

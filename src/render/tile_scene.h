@@ -1,4 +1,4 @@
-// A scene's folder as renderers need it: the frame, the tree, and where contents come from.
+// A scene folder as renderers need it: the frame, the tile tree, and the source of contents.
 #pragma once
 
 #include "base/file.h"
@@ -11,15 +11,15 @@ namespace tessera {
 
 struct TileScene {
   TileFrame frame;
-  TileTree tree;  // tiles are numbered as those of tileset.json; surrounds come last, the finest at the end
-  TileSource<Content> source;  // reads files when asked; its functions may be called by several threads at a time
+  TileTree tree;  // tiles are numbered as in tileset.json; background blocks come last, the finest at the end
+  TileSource<Content> source;  // reads files on demand; its functions may be called by several threads at a time
   std::array<float, 3> background = {0, 0, 0};
 };
 
-// Keeps a reference to the codec. Throws Error where the folder holds no scene, one of another representation, or a
+// Keeps a reference to the codec. Throws Error if the folder holds no scene, a scene of another representation, or a
 // tile with several contents.
 TileScene openTileScene(const fs::path& folder, const ContentCodec& codec);
 
-TileFrame frameOf(const Tileset& tileset);
+TileFrame makeTileFrame(const Tileset& tileset);
 
 }  // namespace tessera

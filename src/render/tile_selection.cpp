@@ -11,8 +11,8 @@
 namespace tessera {
 
 bool TileView::sees(const TileNode& tile) const {
-  if (!window || tile.isSurround) return true;
-  // Outside of one plane through the eye with all corners; corners exactly on it count as inside.
+  if (!window || tile.isBackgroundBlock) return true;
+  // A box is outside if one plane through the eye separates all its corners; corners exactly on it count as inside.
   bool outside[5] = {true, true, true, true, true};
   for (int corner = 0; corner < 8; ++corner) {
     const Vec3d x(corner & 1 ? tile.high.x() : tile.low.x(), corner & 2 ? tile.high.y() : tile.low.y(),
@@ -28,7 +28,7 @@ bool TileView::sees(const TileNode& tile) const {
 }
 
 double TileView::distance(const TileNode& tile) const {
-  if (tile.isSurround) {
+  if (tile.isBackgroundBlock) {
     return std::max(nearest, std::min((eye - tile.low).head<2>().minCoeff(), (tile.high - eye).head<2>().minCoeff()));
   }
   return std::max(nearest, (eye - eye.cwiseMax(tile.low).cwiseMin(tile.high)).norm());
@@ -39,7 +39,7 @@ double TileView::errorInPixels(const TileNode& tile) const {
 }
 
 double TileView::areaInPixels(const TileNode& tile) const {
-  if (tile.isSurround) return surroundPixels;
+  if (tile.isBackgroundBlock) return backgroundBlockPixels;
   const double radius = 0.5 * (tile.high - tile.low).norm();
   const double onScreen = radius * focal / std::max(radius, distance(tile));
   return std::min(pixels, std::numbers::pi * onScreen * onScreen);
@@ -47,14 +47,14 @@ double TileView::areaInPixels(const TileNode& tile) const {
 
 namespace {
 
-// How much of the picture looks out of the box.
-double shareOfSurround(const Camera& camera, const TileView& view, const TileFrame& frame) {
+// Returns the fraction of the image whose rays leave the box through a side or miss it.
+double shareOfBackgroundBlock(const Camera& camera, const TileView& view, const TileFrame& frame) {
   constexpr int kAcross = 12;
   int shows = 0;
   for (int i = 0; i < kAcross * kAcross; ++i) {
     const Vec2d at((i % kAcross + 0.5) * camera.width / kAcross, (i / kAcross + 0.5) * camera.height / kAcross);
     const std::optional<Vec3d> d = camera.directionInCamera(at);
-    shows += d && showsSurround({view.eye, view.cameraFromScene.transpose() * *d}, frame.low, frame.high);
+    shows += d && showsBackgroundBlock({view.eye, view.cameraFromScene.transpose() * *d}, frame.low, frame.high);
   }
   return static_cast<double>(shows) / (kAcross * kAcross);
 }
@@ -68,9 +68,9 @@ TileView tileView(const Camera& camera, const Pose& worldFromCamera, const TileF
   view.focal = std::max(camera.focalX(), camera.focalY());
   view.pixels = static_cast<double>(camera.width) * camera.height;
   view.nearest = frame.near;
-  view.surroundPixels = view.pixels * shareOfSurround(camera, view, frame);
+  view.backgroundBlockPixels = view.pixels * shareOfBackgroundBlock(camera, view, frame);
   if (lensSeesBehind(camera.lens)) return view;
-  // A lens is a continuous map without folds: the border of the picture encloses it in x/z and y/z too.
+  // A lens is a continuous map without folds, so the border of the image encloses it in x/z and y/z too.
   TileView::Window window{{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
   const auto add = [&](double x, double y) {
     const std::optional<Vec3d> d = camera.directionInCamera(Vec2d(x, y));
@@ -91,7 +91,7 @@ TileView tileView(const Camera& camera, const Pose& worldFromCamera, const TileF
   return view;
 }
 
-bool showsSurround(const SceneRay& ray, const Vec3d& low, const Vec3d& high) {
+bool showsBackgroundBlock(const SceneRay& ray, const Vec3d& low, const Vec3d& high) {
   const RayRange inside = clipToBox(ray, low, high, {0, INFINITY});
   if (inside.empty()) return true;
   const double upwards = ray.direction.z();
@@ -100,21 +100,21 @@ bool showsSurround(const SceneRay& ray, const Vec3d& low, const Vec3d& high) {
 
 namespace {
 
-// What tiles take in memory together: each resource that they share counts once, at the first of them that needs it.
+// Sums the memory of tiles: each shared resource is charged once, to the first tile that needs it.
 class Charges {
  public:
   explicit Charges(const TileMemory& memory) : memory_(memory) {}
 
   uint64_t bytesWith(int tile) const {
     uint64_t bytes = bytes_ + memory_.bytes(tile);
-    for (const int resource : memory_.resourcesOf(tile)) {
+    for (const int resource : memory_.tileResources(tile)) {
       if (!resources_.contains(resource)) bytes += memory_.bytesOfResource(resource);
     }
     return bytes;
   }
   void add(int tile) {
     bytes_ = bytesWith(tile);
-    for (const int resource : memory_.resourcesOf(tile)) resources_.insert(resource);
+    for (const int resource : memory_.tileResources(tile)) resources_.insert(resource);
   }
 
  private:
@@ -135,20 +135,20 @@ TileSelector::TileSelector(const TileTree& tree, SelectionSettings settings)
     : tree_(tree), settings_(settings), pinned_(tree.coarsest()), replaced_(tree.tiles.size()) {
   tree.check();
   CHECK(settings.hysteresis >= 1.0);
-  if (tree.surround >= 0) pinned_.push_back(tree.surround);
+  if (tree.backgroundBlock >= 0) pinned_.push_back(tree.backgroundBlock);
 }
 
 TileChoice TileSelector::choose(const TileView& view, const TileMemory& memory) {
   struct Candidate {
     int tile;
     double priority, distance;
-    bool operator<(const Candidate& other) const {  // less urgent
+    bool operator<(const Candidate& other) const {  // true if less urgent
       if (priority != other.priority) return priority < other.priority;
       return distance != other.distance ? distance > other.distance : tile > other.tile;
     }
   };
   std::priority_queue<Candidate> open;
-  // Urgent is what covers much of the picture and is far coarser there than asked for.
+  // A tile is urgent if it covers much of the image and what is drawn there is far coarser than requested.
   const std::function<void(int, double)> addBelow = [&](int tile, double error) {
     for (const int child : tree_.tiles[tile].children) {
       const TileNode& node = tree_.tiles[child];
@@ -157,13 +157,13 @@ TileChoice TileSelector::choose(const TileView& view, const TileMemory& memory) 
         addBelow(child, error);
         continue;
       }
-      const double held = memory.holds(child) ? settings_.hysteresis * settings_.hysteresis : 1;
-      open.push({child, view.areaInPixels(node) * error * held, view.distance(node)});
+      const double residencyBonus = memory.holds(child) ? settings_.hysteresis * settings_.hysteresis : 1;
+      open.push({child, view.areaInPixels(node) * error * residencyBonus, view.distance(node)});
     }
   };
   const auto refine = [&](int tile) {
     if (!isReplaced(view, tile)) return;
-    addBelow(tile, view.errorInPixels(tree_.tiles[tile]) / std::max(settings_.mostPixels, 1e-3));
+    addBelow(tile, view.errorInPixels(tree_.tiles[tile]) / std::max(settings_.maximumScreenSpaceError, 1e-3));
   };
   TileChoice choice;
   Charges charges(memory);
@@ -180,13 +180,13 @@ TileChoice TileSelector::choose(const TileView& view, const TileMemory& memory) 
       continue;
     }
     charges.add(tile);
-    choice.wanted.push_back(tile);
+    choice.requested.push_back(tile);
     refine(tile);
   }
   return choice;
 }
 
-// So that what was to be replaced does not depend on the budget.
+// Updates the replacement state of tiles below, so that it does not depend on the budget.
 void TileSelector::lookBelow(const TileView& view, int tile) {
   for (const int child : tree_.tiles[tile].children) {
     const TileNode& node = tree_.tiles[child];
@@ -194,7 +194,7 @@ void TileSelector::lookBelow(const TileView& view, int tile) {
   }
 }
 
-// Adds tiles to the cut that cover this one; `above` is the next content above it that is in memory.
+// Adds tiles to the cut that cover this one; `above` is the nearest resident content above it.
 void TileSelector::cover(Pass& pass, int tile, int above) {
   const TileNode& node = tree_.tiles[tile];
   if (!pass.view.sees(node) || (!node.hasContent && node.children.empty())) {
@@ -210,14 +210,14 @@ void TileSelector::cover(Pass& pass, int tile, int above) {
     const bool anyVisible = std::any_of(first, end, [](const SelectedTile& one) { return one.visible; });
     const auto isFiner = [&](const SelectedTile& one) { return one.visible && one.content != content; };
     if (!anyVisible || std::any_of(first, end, isFiner)) return;
-    pass.tiles.resize(before);  // nothing finer is there
+    pass.tiles.resize(before);  // no finer content is resident
   }
   pass.tiles.push_back({tile, content, content >= 0});
 }
 
 bool TileSelector::isReplaced(const TileView& view, int tile) {
   const TileNode& node = tree_.tiles[tile];
-  const double threshold = settings_.mostPixels / (replaced_[tile] ? settings_.hysteresis : 1);
+  const double threshold = settings_.maximumScreenSpaceError / (replaced_[tile] ? settings_.hysteresis : 1);
   const bool canBe = !node.children.empty() && node.level > settings_.finestLevel;
   replaced_[tile] = canBe && view.errorInPixels(node) > threshold;
   return replaced_[tile] != 0;
@@ -227,9 +227,9 @@ TileCut TileSelector::cut(const TileView& view, const std::function<bool(int)>& 
   for (const int tile : pinned_) CHECK(holds(tile) == true);
   TileCut cut;
   Pass pass{view, holds, {}};
-  if (tree_.surround >= 0) {
-    cover(pass, tree_.surround, -1);
-    cut.surround = pass.tiles.front().content;
+  if (tree_.backgroundBlock >= 0) {
+    cover(pass, tree_.backgroundBlock, -1);
+    cut.backgroundBlock = pass.tiles.front().content;
     pass.tiles.clear();
   }
   cover(pass, 0, -1);

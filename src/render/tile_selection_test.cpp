@@ -6,7 +6,7 @@
 #include <set>
 
 #include "base/random.h"
-#include "render/testing/made_tree.h"
+#include "render/testing/test_tree.h"
 
 namespace tessera {
 namespace {
@@ -19,7 +19,7 @@ Camera smallCamera() {
   return camera;
 }
 
-// At `eye`, looking at `target`.
+// Returns the pose of a camera at `eye` that looks at `target`.
 Pose lookingAt(const Vec3d& eye, const Vec3d& target) {
   Pose pose;
   const Vec3d forward = (target - eye).normalized();
@@ -53,15 +53,15 @@ bool isPartition(const TileTree& tree, const std::vector<SelectedTile>& cut) {
 
 const auto kAll = [](int) { return true; };
 
-// Room for everything, of which nothing is there.
-const TileMemory kRoom = {
+// A budget for everything, with nothing in memory.
+const TileMemory kAmpleMemory = {
     .budget = UINT64_MAX, .holds = [](int) { return false; }, .bytes = [](int) { return uint64_t{1}; }};
 
-// A tree with a coarse and a fine surround. Returns their numbers.
-std::pair<int, int> addSurrounds(TileTree& tree) {
+// Adds a coarse and a fine background block to a tree. Returns their indices.
+std::pair<int, int> addBackgroundBlocks(TileTree& tree) {
   const int coarse = static_cast<int>(tree.tiles.size());
   TileNode node;
-  node.isSurround = true;
+  node.isBackgroundBlock = true;
   node.low = Vec3d(-tree.columns, -tree.rows, -1);
   node.high = Vec3d(tree.columns, tree.rows, 1);
   node.level = 1;
@@ -73,55 +73,56 @@ std::pair<int, int> addSurrounds(TileTree& tree) {
   node.children.clear();
   node.geometricError /= 2;
   tree.tiles.push_back(node);
-  tree.surround = coarse;
+  tree.backgroundBlock = coarse;
   return {coarse, coarse + 1};
 }
 
-TEST(TileSelection, DrawsTheCoarseSurroundUntilTheFineOneIsThere) {
-  TileTree tree = madeTree(2, 2);
-  const auto [coarse, fine] = addSurrounds(tree);
+TEST(TileSelection, DrawsTheCoarseBackgroundBlockUntilTheFineOneIsThere) {
+  TileTree tree = testTree(2, 2);
+  const auto [coarse, fine] = addBackgroundBlocks(tree);
   TileSelector selector(tree, {});
-  // At the border of the box it fills the picture, and its texels are large.
+  // At the border of the box, the background block fills the image, and its texels appear large.
   const TileView view = tileView(smallCamera(), lookingAt(Vec3d(1.9, 0, 0), Vec3d(10, 0, 0)), {});
-  EXPECT_EQ(selector.cut(view, [fine = fine](int tile) { return tile != fine; }).surround, coarse);
-  EXPECT_EQ(selector.choose(view, kRoom).wanted.at(0), fine);
-  EXPECT_EQ(selector.cut(view, kAll).surround, fine);
+  EXPECT_EQ(selector.cut(view, [fine = fine](int tile) { return tile != fine; }).backgroundBlock, coarse);
+  EXPECT_EQ(selector.choose(view, kAmpleMemory).requested.at(0), fine);
+  EXPECT_EQ(selector.cut(view, kAll).backgroundBlock, fine);
 }
 
-TEST(TileSelection, CountsOfTheSurroundWhatIsSeenOfIt) {
+TEST(TileSelection, MeasuresTheVisibleShareOfTheBackgroundBlock) {
   TileFrame frame;
   frame.low = Vec3d(-8, -8, -0.5);
   frame.high = Vec3d(8, 8, 0.5);
   const auto share = [&](const Vec3d& eye, const Vec3d& target) {
     const TileView view = tileView(smallCamera(), lookingAt(eye, target), frame);
-    return view.surroundPixels / view.pixels;
+    return view.backgroundBlockPixels / view.pixels;
   };
-  EXPECT_EQ(share(Vec3d(0, 0, 0.4), Vec3d(0, 0, -1)), 0);         // the ground alone
-  EXPECT_EQ(share(Vec3d(0, 0, 0), Vec3d(0, 0, 1)), 0);            // the sky alone
-  EXPECT_EQ(share(Vec3d(9, 0, 0), Vec3d(20, 0, 0)), 1);           // away from all
-  EXPECT_GT(share(Vec3d(0, 0, 40), Vec3d(0, 0, 0)), 0.4);         // the box amid it
+  EXPECT_EQ(share(Vec3d(0, 0, 0.4), Vec3d(0, 0, -1)), 0);         // only ground
+  EXPECT_EQ(share(Vec3d(0, 0, 0), Vec3d(0, 0, 1)), 0);            // only sky
+  EXPECT_EQ(share(Vec3d(9, 0, 0), Vec3d(20, 0, 0)), 1);           // away from the box
+  EXPECT_GT(share(Vec3d(0, 0, 40), Vec3d(0, 0, 0)), 0.4);         // the box is in the middle of the image
   EXPECT_NEAR(share(Vec3d(0, 0, 0), Vec3d(1, 0, 0)), 0.17, 0.1);  // a band along the horizon
 }
 
-TEST(TileSelection, AsksForNoFinerSurroundThanIsSeen) {
-  TileTree tree = madeTree(64, 64);
-  const auto [coarse, fine] = addSurrounds(tree);
+TEST(TileSelection, RequestsNoFinerBackgroundBlockThanIsVisible) {
+  TileTree tree = testTree(64, 64);
+  const auto [coarse, fine] = addBackgroundBlocks(tree);
   for (const auto& [x, pixels, expected] : {std::tuple(0.0, 20.0, coarse), std::tuple(63.5, 20.0, fine),
                                             std::tuple(0.0, 1.0, fine), std::tuple(500.0, 20.0, fine)}) {
     TileSelector selector(tree, {pixels, 1.2, 0});
     const TileView view = tileView(smallCamera(), lookingAt(Vec3d(x, 0, 0), Vec3d(1000, 0, 0)), {});
-    EXPECT_EQ(selector.cut(view, kAll).surround, expected) << x << ", " << pixels << " pixels";
+    EXPECT_EQ(selector.cut(view, kAll).backgroundBlock, expected) << x << ", " << pixels << " pixels";
   }
   TileSelector limited(tree, {0, 1.2, 1});
   const TileView view = tileView(smallCamera(), lookingAt(Vec3d(63, 0, 0), Vec3d(1000, 0, 0)), {});
-  EXPECT_EQ(limited.cut(view, kAll).surround, coarse);
+  EXPECT_EQ(limited.cut(view, kAll).backgroundBlock, coarse);
 }
 
 TEST(TileSelection, IsAPartitionOfTheRootForAllCamerasAndWhateverIsLoaded) {
   for (const auto& [columns, rows] : {std::pair(8, 8), std::pair(5, 3), std::pair(1, 1)}) {
-    TileTree tree = madeTree(columns, rows);
+    TileTree tree = testTree(columns, rows);
     const RandomStream random(1, 1);
-    for (size_t tile = 1; tile < tree.tiles.size(); ++tile) {  // some stand for nothing, or for what is below
+    for (size_t tile = 1; tile < tree.tiles.size();
+         ++tile) {  // some tiles stand for nothing, or for what is below them
       tree.tiles[tile].hasContent = random.uniform(tile) < 0.85f;
     }
     TileSelector selector(tree, {});
@@ -146,8 +147,8 @@ TEST(TileSelection, IsAPartitionOfTheRootForAllCamerasAndWhateverIsLoaded) {
   }
 }
 
-TEST(TileSelection, IsAsFineAsAskedForWhereAllIsLoaded) {
-  const TileTree tree = madeTree(8, 8);
+TEST(TileSelection, MeetsTheScreenSpaceErrorWhereEverythingIsLoaded) {
+  const TileTree tree = testTree(8, 8);
   const RandomStream random(2, 1);
   std::set<int> levels;
   for (uint64_t i = 0; i < 200; ++i) {
@@ -169,18 +170,18 @@ TEST(TileSelection, IsAsFineAsAskedForWhereAllIsLoaded) {
   EXPECT_GE(levels.size(), 3u);
 }
 
-TEST(TileSelection, WantsAllThatTheCutNeedsWhereThereIsRoom) {
-  const TileTree tree = madeTree(8, 8);
+TEST(TileSelection, RequestsAllThatTheCutNeedsWithinTheBudget) {
+  const TileTree tree = testTree(8, 8);
   const TileView view = tileView(smallCamera(), lookingAt(Vec3d(-7, -7, 1.5), Vec3d(0, 0, 0)), {});
   TileSelector selector(tree, {});
-  const TileChoice choice = selector.choose(view, kRoom);
+  const TileChoice choice = selector.choose(view, kAmpleMemory);
   EXPECT_EQ(choice.refused, 0);
-  std::set<int> wanted(choice.wanted.begin(), choice.wanted.end());
-  EXPECT_EQ(wanted.size(), choice.wanted.size());
-  EXPECT_LT(wanted.size(), tree.tiles.size() - 1);  // what cannot be seen is not
-  wanted.insert(0);
+  std::set<int> requested(choice.requested.begin(), choice.requested.end());
+  EXPECT_EQ(requested.size(), choice.requested.size());
+  EXPECT_LT(requested.size(), tree.tiles.size() - 1);  // tiles out of view are not requested
+  requested.insert(0);
   const TileCut all = selector.cut(view, kAll),
-                now = selector.cut(view, [&](int tile) { return wanted.contains(tile); });
+                now = selector.cut(view, [&](int tile) { return requested.contains(tile); });
   ASSERT_EQ(now.tiles.size(), all.tiles.size());
   for (size_t i = 0; i < now.tiles.size(); ++i) {
     EXPECT_EQ(now.tiles[i].tile, all.tiles[i].tile);
@@ -188,21 +189,21 @@ TEST(TileSelection, WantsAllThatTheCutNeedsWhereThereIsRoom) {
   }
 }
 
-TEST(TileSelection, WantsTheMostUrgentThatThereIsRoomForAndAllThatIsAboveIt) {
-  TileTree tree = madeTree(8, 8);
-  addSurrounds(tree);
+TEST(TileSelection, RequestsTheMostUrgentTilesThatFitWithTheirAncestors) {
+  TileTree tree = testTree(8, 8);
+  addBackgroundBlocks(tree);
   const RandomStream random(4, 1);
   int refused = 0;
   for (uint64_t i = 0; i < 200; ++i) {
-    TileMemory memory = kRoom;
+    TileMemory memory = kAmpleMemory;
     memory.bytes = [&](int tile) { return 50 + random.below(static_cast<uint64_t>(tile), 100); };
     memory.budget = 300 + random.below(1000 + i, 3000);
-    uint64_t bytes = memory.bytes(0) + memory.bytes(tree.surround);
+    uint64_t bytes = memory.bytes(0) + memory.bytes(tree.backgroundBlock);
     TileSelector selector(tree, {});
     const TileView view = tileView(smallCamera(), randomPose(random, i), {});
     const TileChoice choice = selector.choose(view, memory);
-    std::set<int> before = {0, tree.surround};
-    for (const int tile : choice.wanted) {
+    std::set<int> before = {0, tree.backgroundBlock};
+    for (const int tile : choice.requested) {
       EXPECT_TRUE(before.contains(tree.tiles[tile].parent));
       EXPECT_TRUE(before.insert(tile).second);
       bytes += memory.bytes(tile);
@@ -212,19 +213,19 @@ TEST(TileSelection, WantsTheMostUrgentThatThereIsRoomForAndAllThatIsAboveIt) {
     memory.budget = UINT64_MAX;
     const TileChoice all = TileSelector(tree, {}).choose(view, memory);
     EXPECT_EQ(all.refused, 0);
-    EXPECT_EQ(choice.refused == 0, all.wanted == choice.wanted);
+    EXPECT_EQ(choice.refused == 0, all.requested == choice.requested);
   }
   EXPECT_GT(refused, 100);
 }
 
-TEST(TileSelection, PrefersWhatIsThereWhereAnotherTileIsHardlyMoreUrgent) {
-  const TileTree tree = madeTree(2, 2);
-  TileSelector selector(tree, {.mostPixels = 0});
-  const auto choose = [&](double x, int held) {
-    const TileMemory memory{2, [held](int tile) { return tile == held; }, kRoom.bytes};
+TEST(TileSelection, PrefersResidentTilesToSlightlyMoreUrgentOnes) {
+  const TileTree tree = testTree(2, 2);
+  TileSelector selector(tree, {.maximumScreenSpaceError = 0});
+  const auto choose = [&](double x, int residentTile) {
+    const TileMemory memory{2, [residentTile](int tile) { return tile == residentTile; }, kAmpleMemory.bytes};
     const TileView view = tileView(smallCamera(), lookingAt(Vec3d(x, 0.01, 4), Vec3d(x, 0, 0)), {});
     const TileChoice choice = selector.choose(view, memory);
-    return choice.wanted.at(0);
+    return choice.requested.at(0);
   };
   const int left = choose(-0.1, -1), right = choose(0.1, -1);
   EXPECT_NE(left, right);
@@ -232,9 +233,9 @@ TEST(TileSelection, PrefersWhatIsThereWhereAnotherTileIsHardlyMoreUrgent) {
   EXPECT_EQ(choose(2.5, left), right);
 }
 
-TEST(TileSelection, DrawsATileAsSoonAsItIsThereAndWhatIsAboveInTheCellsOfTheOthers) {
-  const TileTree tree = madeTree(2, 2);
-  TileSelector selector(tree, {.mostPixels = 0});
+TEST(TileSelection, DrawsResidentTilesAndAncestorsInTheCellsOfMissingOnes) {
+  const TileTree tree = testTree(2, 2);
+  TileSelector selector(tree, {.maximumScreenSpaceError = 0});
   const TileView view = tileView(smallCamera(), lookingAt(Vec3d(0, 0, 8), Vec3d(0, 0, 0)), {});
   const int there = tree.tiles[0].children[2];
   const TileCut cut = selector.cut(view, [&](int tile) { return tile == 0 || tile == there; });
@@ -247,9 +248,9 @@ TEST(TileSelection, DrawsATileAsSoonAsItIsThereAndWhatIsAboveInTheCellsOfTheOthe
 }
 
 TEST(TileSelection, DoesNotFlickerWhereTheErrorSwingsByLessThanTheHysteresis) {
-  const TileTree tree = madeTree(2, 2);
+  const TileTree tree = testTree(2, 2);
   TileSelector selector(tree, {});
-  const auto replacedAt = [&](double error) {  // of the root, in pixels
+  const auto replacedAt = [&](double error) {  // the root's error in pixels
     const double distance = tree.tiles[0].geometricError * 500 / error;
     const Pose pose = lookingAt(Vec3d(0, 0, 1 + distance), Vec3d(0, 0, 0));
     return selector.cut(tileView(smallCamera(), pose, {}), kAll).tiles.size() > 1;
@@ -263,7 +264,7 @@ TEST(TileSelection, DoesNotFlickerWhereTheErrorSwingsByLessThanTheHysteresis) {
 }
 
 TEST(TileSelection, SeesEveryTileThatAnyPixelLooksAt) {
-  const TileTree tree = madeTree(8, 8);
+  const TileTree tree = testTree(8, 8);
   const RandomStream random(3, 1);
   Camera distorted = smallCamera();
   distorted.lens = LensModel::openCv;
@@ -271,7 +272,7 @@ TEST(TileSelection, SeesEveryTileThatAnyPixelLooksAt) {
   Camera fisheye = smallCamera();
   fisheye.lens = LensModel::openCvFisheye;
   fisheye.parameters = {250, 250, 320, 240, 0.01, 0, 0, 0};
-  TileFrame frame;  // turned, moved, in metres
+  TileFrame frame;  // rotated, translated, with units of metres
   frame.rotation = Eigen::AngleAxisd(0.7, Vec3d::UnitZ()).toRotationMatrix();
   frame.scale = 30;
   frame.translation = Vec3d(100, -50, 20);
@@ -300,67 +301,67 @@ TEST(TileSelection, SeesEveryTileThatAnyPixelLooksAt) {
 }
 
 TEST(TileSelection, StopsAtTheFinestLevelThatIsAllowed) {
-  const TileTree tree = madeTree(4, 4);
-  TileSelector selector(tree, {.mostPixels = 0, .finestLevel = 1});
+  const TileTree tree = testTree(4, 4);
+  TileSelector selector(tree, {.maximumScreenSpaceError = 0, .finestLevel = 1});
   const TileCut cut = selector.cut(tileView(smallCamera(), lookingAt(Vec3d(0, 0, 30), Vec3d(0, 0, 0)), {}), kAll);
   EXPECT_EQ(cut.tiles.size(), 4u);
   for (const SelectedTile& selected : cut.tiles) EXPECT_EQ(tree.tiles[selected.tile].level, 1);
 }
 
-TEST(TileSelection, WantsWhatIsBelowATileWithoutContent) {
-  TileTree tree = madeTree(4, 4);
+TEST(TileSelection, RequestsTheChildrenOfATileWithoutContent) {
+  TileTree tree = testTree(4, 4);
   const int middle = tree.tiles[0].children[0];
   tree.tiles[middle].hasContent = false;
   const int empty = tree.tiles[middle].children[3];
   tree.tiles[empty].hasContent = false;
   TileSelector selector(tree, {});
   const TileView view = tileView(smallCamera(), lookingAt(Vec3d(0, 0, 4.5), Vec3d(0, 0, 0)), {});
-  const TileChoice choice = selector.choose(view, kRoom);
-  const std::set<int> wanted(choice.wanted.begin(), choice.wanted.end());
-  EXPECT_FALSE(wanted.contains(middle));
-  EXPECT_FALSE(wanted.contains(empty));
-  for (int i = 0; i < 3; ++i) EXPECT_TRUE(wanted.contains(tree.tiles[middle].children[i]));
-  // Until they are there, the root stands for them.
+  const TileChoice choice = selector.choose(view, kAmpleMemory);
+  const std::set<int> requested(choice.requested.begin(), choice.requested.end());
+  EXPECT_FALSE(requested.contains(middle));
+  EXPECT_FALSE(requested.contains(empty));
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(requested.contains(tree.tiles[middle].children[i]));
+  // Until they are in memory, the root is drawn in their cells.
   const TileCut cut = selector.cut(view, [&](int tile) { return tree.tiles[tile].parent <= 0; });
   EXPECT_TRUE(isPartition(tree, cut.tiles));
   EXPECT_EQ(std::count_if(cut.tiles.begin(), cut.tiles.end(), [](const SelectedTile& s) { return s.content == 0; }), 1);
 }
 
-TEST(TileSelection, DrawsFinerTilesThanAskedForRatherThanNone) {
-  TileTree tree = madeTree(4, 4);
+TEST(TileSelection, DrawsFinerTilesThanNeededRatherThanNone) {
+  TileTree tree = testTree(4, 4);
   TileSelector selector(tree, {});
   const int middle = tree.tiles[0].children[0];
   const TileView near = tileView(smallCamera(), lookingAt(Vec3d(-2, -2, 6), Vec3d(-2, -2, 0)), {});
   ASSERT_LE(near.errorInPixels(tree.tiles[middle]), 1.5);
   ASSERT_GT(near.errorInPixels(tree.tiles[0]), 1.5);
-  const TileCut made = selector.cut(near, [&](int tile) { return tile != middle; });
-  EXPECT_TRUE(isPartition(tree, made.tiles));
+  const TileCut selection = selector.cut(near, [&](int tile) { return tile != middle; });
+  EXPECT_TRUE(isPartition(tree, selection.tiles));
   std::set<int> cut;
-  for (const SelectedTile& selected : made.tiles) cut.insert(selected.content);
+  for (const SelectedTile& selected : selection.tiles) cut.insert(selected.content);
   for (const int child : tree.tiles[middle].children) EXPECT_TRUE(cut.contains(child));
-  const TileChoice choice = selector.choose(near, kRoom);
-  EXPECT_NE(std::find(choice.wanted.begin(), choice.wanted.end(), middle), choice.wanted.end());
+  const TileChoice choice = selector.choose(near, kAmpleMemory);
+  EXPECT_NE(std::find(choice.requested.begin(), choice.requested.end(), middle), choice.requested.end());
 }
 
-// All four tiles below the root need one resource, which takes as much as ten of them.
+// All four tiles below the root need one resource, which is as large as ten of them.
 TEST(TileSelection, ChargesASharedResourceOnceAtTheFirstTileThatNeedsIt) {
-  const TileTree tree = madeTree(2, 2);
+  const TileTree tree = testTree(2, 2);
   const TileView view = tileView(smallCamera(), lookingAt(Vec3d(0, -4, 3), Vec3d::Zero()), {});
   const auto chosen = [&](uint64_t budget, bool rootNeedsIt) {
-    TileMemory memory = kRoom;
+    TileMemory memory = kAmpleMemory;
     memory.budget = budget;
-    memory.resourcesOf = [=](int tile) { return tile > 0 || rootNeedsIt ? std::vector<int>{3} : std::vector<int>(); };
+    memory.tileResources = [=](int tile) { return tile > 0 || rootNeedsIt ? std::vector<int>{3} : std::vector<int>(); };
     memory.bytesOfResource = [](int resource) { return uint64_t{resource == 3 ? 10u : 1000u}; };
     TileSelector selector(tree, {0, 1.2, 0});
     const TileChoice choice = selector.choose(view, memory);
-    EXPECT_EQ(choice.wanted.size() + static_cast<size_t>(choice.refused), 4u);
-    return choice.wanted.size();
+    EXPECT_EQ(choice.requested.size() + static_cast<size_t>(choice.refused), 4u);
+    return choice.requested.size();
   };
-  EXPECT_EQ(chosen(1 + 4, false), 0u);  // a tile that is refused brings nothing
+  EXPECT_EQ(chosen(1 + 4, false), 0u);  // a refused tile adds no resource
   EXPECT_EQ(chosen(1 + 10, false), 0u);
   EXPECT_EQ(chosen(1 + 10 + 1, false), 1u);
   EXPECT_EQ(chosen(1 + 10 + 4, false), 4u);
-  EXPECT_EQ(chosen(1 + 10, true), 0u);  // it came with the root
+  EXPECT_EQ(chosen(1 + 10, true), 0u);  // the resource was charged to the root
   EXPECT_EQ(chosen(1 + 10 + 2, true), 2u);
 }
 

@@ -12,7 +12,7 @@ int cellAt(double x, int count) {
   return static_cast<int>(std::clamp(std::floor(0.5 * (x + count)), 0.0, count - 1.0));
 }
 
-// Cells between `cell` and those from `first` to before `end`.
+// Returns the number of cells between `cell` and the range [first, end).
 int between(int cell, int first, int end) {
   return std::max({0, first - cell, cell - end + 1});
 }
@@ -33,16 +33,16 @@ std::vector<int> TileTree::childrenFrontToBack(int tile, const Vec3d& eye) const
 }
 
 std::vector<int> TileTree::coarsest() const {
-  std::vector<int> found;
-  std::vector<char> covered(tiles.size());  // by a content of the tile or above it
+  std::vector<int> topmost;
+  std::vector<char> covered(tiles.size());  // by the content of the tile or of an ancestor
   for (size_t i = 0; i < tiles.size(); ++i) {
     const TileNode& node = tiles[i];
-    if (node.isSurround) continue;
+    if (node.isBackgroundBlock) continue;
     const bool above = node.parent >= 0 && covered[node.parent];
-    if (node.hasContent && !above) found.push_back(static_cast<int>(i));
+    if (node.hasContent && !above) topmost.push_back(static_cast<int>(i));
     covered[i] = above || node.hasContent;
   }
-  return found;
+  return topmost;
 }
 
 TileBox TileTree::boxOfCells(int tile) const {
@@ -56,12 +56,12 @@ TileBox TileTree::boxOfCells(int tile) const {
 
 void TileTree::check() const {
   CHECK(tiles.empty() == false);
-  CHECK(surround < static_cast<int>(tiles.size()));
-  CHECK((surround < 0 || tiles[surround].isSurround) == true);
+  CHECK(backgroundBlock < static_cast<int>(tiles.size()));
+  CHECK((backgroundBlock < 0 || tiles[backgroundBlock].isBackgroundBlock) == true);
   for (size_t i = 0; i < tiles.size(); ++i) {
     const TileNode& node = tiles[i];
     CHECK(node.parent < static_cast<int>(i));
-    CHECK((node.parent >= 0 || i == 0 || static_cast<int>(i) == surround) == true);
+    CHECK((node.parent >= 0 || i == 0 || static_cast<int>(i) == backgroundBlock) == true);
     for (const int child : node.children) {
       CHECK(child > static_cast<int>(i));
       CHECK(child < static_cast<int>(tiles.size()));

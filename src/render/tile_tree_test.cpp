@@ -5,21 +5,21 @@
 #include <algorithm>
 
 #include "base/random.h"
-#include "render/testing/made_tree.h"
+#include "render/testing/test_tree.h"
 #include "render/tile_frame.h"
 
 namespace tessera {
 namespace {
 
-// All leaves below, in the order that the tree says.
+// Collects all leaves below a tile, in the tree's front-to-back order.
 void leavesFrontToBack(const TileTree& tree, int tile, const Vec3d& eye, std::vector<int>& out) {
   if (tree.tiles[tile].children.empty()) out.push_back(tile);
   for (const int child : tree.childrenFrontToBack(tile, eye)) leavesFrontToBack(tree, child, eye, out);
 }
 
 TEST(TileTree, OrdersTilesAsEveryRayFromTheEyeCrossesThem) {
-  const TileTree quads = madeTree(8, 8);
-  TileTree flat = madeTree(8, 8);  // the same leaves, all children of one root
+  const TileTree quads = testTree(8, 8);
+  TileTree flat = testTree(8, 8);  // the same leaves, all children of one root
   {
     TileTree tree;
     tree.columns = tree.rows = 8;
@@ -70,11 +70,11 @@ TEST(TileTree, OrdersColumnsOfDifferentWidthsWhateverTheirBoxes) {
   tree.check();
   EXPECT_EQ(tree.childrenFrontToBack(0, Vec3d(-50, 0, 0)), (std::vector<int>{2, 3, 1}));
   EXPECT_EQ(tree.childrenFrontToBack(0, Vec3d(50, 0, 0)), (std::vector<int>{1, 3, 2}));
-  EXPECT_EQ(tree.childrenFrontToBack(0, Vec3d(1, 0, 0)), (std::vector<int>{3, 1, 2}));  // in cell 5
+  EXPECT_EQ(tree.childrenFrontToBack(0, Vec3d(1, 0, 0)), (std::vector<int>{3, 1, 2}));  // the eye is in cell 5
 }
 
 TEST(TileTree, HasTheTopmostContentsForItsCoarsest) {
-  TileTree tree = madeTree(4, 4);
+  TileTree tree = testTree(4, 4);
   EXPECT_EQ(tree.coarsest(), (std::vector<int>{0}));
   tree.tiles[0].hasContent = false;
   EXPECT_EQ(tree.coarsest(), tree.tiles[0].children);

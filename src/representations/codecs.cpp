@@ -12,7 +12,7 @@ namespace tessera {
 TESSERA_REPRESENTATIONS(SKIP, CODEC)
 #undef CODEC
 
-const ContentCodec* codecOf(std::string_view representation) {
+const ContentCodec* findCodec(std::string_view representation) {
 #define CODEC(name, Name) \
   if (representation == #name) return &name##Codec();
   TESSERA_REPRESENTATIONS(SKIP, CODEC)
@@ -21,10 +21,10 @@ const ContentCodec* codecOf(std::string_view representation) {
 }
 
 const ContentCodec& requireCodec(const fs::path& folder, const Tileset& tileset) {
-  const ContentCodec* codec = codecOf(tileset.representation);
+  const ContentCodec* codec = findCodec(tileset.representation);
   if (codec) return *codec;
   throw Error((folder / "tileset.json").string(), "representation",
-              fmt::format("is a scene of {}, which is not known", tileset.representation),
+              fmt::format("the scene has the unknown representation {}", tileset.representation),
               "restore the file, or use a newer tessera");
 }
 

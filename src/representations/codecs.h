@@ -9,10 +9,11 @@
 
 namespace tessera {
 
-// Null where no representation has that name.
-const ContentCodec* codecOf(std::string_view representation);
+// Returns the codec of the named representation, or null if there is none of that name.
+const ContentCodec* findCodec(std::string_view representation);
 
-// Of a scene that was read from `folder`. Throws Error naming it where its representation is none that is known.
+// Returns the codec for a scene that was read from `folder`. Throws Error naming that scene's tileset.json if its
+// representation is unknown.
 const ContentCodec& requireCodec(const fs::path& folder, const Tileset& tileset);
 
 }  // namespace tessera

@@ -1,11 +1,11 @@
-// The drawers on the CPU of all representations that have scenes.
+// The CPU drawers of all representations that have scenes.
 #pragma once
 
 #include "render/drawer.h"
 
 namespace tessera {
 
-// CHECKs that there is a representation of that name: requireCodec() says so of scenes.
+// Returns a CPU drawer for the named representation. CHECKs that it exists; for scenes, call requireCodec() first.
 std::unique_ptr<CpuDrawer> makeCpuDrawer(std::string_view representation);
 
 }  // namespace tessera

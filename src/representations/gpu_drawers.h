@@ -1,4 +1,4 @@
-// The drawers on a GPU of all representations that have scenes.
+// The GPU drawers of all representations that have scenes.
 #pragma once
 
 #include "base/file.h"
@@ -6,10 +6,11 @@
 
 namespace tessera {
 
-// CHECKs that there is a representation of that name: requireCodec() says so of scenes.
+// Returns a GPU drawer for the named representation. CHECKs that it exists; for scenes, call requireCodec() first.
 std::unique_ptr<GpuDrawer> makeGpuDrawer(std::string_view representation, const std::shared_ptr<GpuStream>& stream);
 
-// A renderer of a scene's folder, with a stream of its own. Throws Error as openTileScene and the renderer do.
+// Opens the scene in `folder` and returns a renderer for it, which owns its stream. Throws Error under the conditions
+// of openTileScene and of the GpuSceneRenderer constructor.
 std::unique_ptr<GpuSceneRenderer> openGpuScene(const std::shared_ptr<const GpuContext>& context, const fs::path& folder,
                                                const GpuRendererSettings& settings);
 

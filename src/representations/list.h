@@ -1,15 +1,17 @@
-// The one list of representations. Whoever needs something of each expands it into a small table of that, calling
-// functions that the folders define: nothing registers itself, as linkers drop what nothing refers to.
+// The single list of representations. Code that needs one item per representation expands this list into a table by
+// calling functions that the representations' folders define. There is no self-registration, because linkers drop
+// objects that nothing refers to.
 //
-// TESSERA_REPRESENTATIONS(TRAINED, SCENE) has a row for each: TRAINED(name, Name) for one that is trained and drawn as
-// a model only, SCENE(name, Name) for one whose models are baked to scenes as well. `name` is what --method,
-// manifest.json and tileset.json call it, the name of the folder, and what functions begin with; types begin with
-// `Name`. The first is what `tessera train` takes where nothing is said. A table of methods has all rows:
+// TESSERA_REPRESENTATIONS(TRAINED, SCENE) expands to one row per representation: TRAINED(name, Name) for one that is
+// trained and rendered as a model only, SCENE(name, Name) for one whose models can also be baked to scenes. `name` is
+// the representation's name in --method, manifest.json and tileset.json, the name of its folder and the prefix of its
+// functions; `Name` is the prefix of its types. The first row is the default method of `tessera train`. A table of
+// methods uses all rows:
 //
 //     #define METHOD(name, Name) &name##Method(),
 //     const Method* const kMethods[] = {TESSERA_REPRESENTATIONS(METHOD, METHOD)};
 //
-// and a table of what only scenes have (codecs of contents, drawers) leaves out the others:
+// and a table of items that only scenes have (content codecs, drawers) skips the rows that are trained only:
 //
 //     #define SKIP(name, Name)
 //     #define CODEC(name, Name) {#name, &name##Codec()},

@@ -23,18 +23,19 @@ std::span<const Method* const> methods() {
 
 const Method* findMethod(std::string_view name) {
   const auto all = methods();
-  const auto found = std::find_if(all.begin(), all.end(), [&](const Method* method) { return method->name == name; });
-  return found == all.end() ? nullptr : *found;
+  const auto it = std::find_if(all.begin(), all.end(), [&](const Method* method) { return method->name == name; });
+  return it == all.end() ? nullptr : *it;
 }
 
-const Method& methodOf(const ModelFolder& model) {
-  return methodOf(model, requireManifest(model));
+const Method& findModelMethod(const ModelFolder& model) {
+  return findModelMethod(model, requireManifest(model));
 }
 
-const Method& methodOf(const ModelFolder& model, const ModelManifest& manifest) {
+const Method& findModelMethod(const ModelFolder& model, const ModelManifest& manifest) {
   if (const Method* method = findMethod(manifest.method)) return *method;
   throw Error((model.root() / "manifest.json").string(), "method",
-              "'" + manifest.method + "' is none that tessera knows", "restore the file, or use a newer tessera");
+              "'" + manifest.method + "' is not a method that this tessera knows",
+              "restore the file, or use a newer tessera");
 }
 
 std::unique_ptr<MethodSettings> savedSettings(const Method& method, const fs::path& model) {
@@ -46,9 +47,9 @@ std::unique_ptr<MethodSettings> savedSettings(const Method& method, const fs::pa
 
 const Method& firstMethod(bool (*has)(const Method&)) {
   const auto all = methods();
-  const auto found = std::find_if(all.begin(), all.end(), [&](const Method* method) { return has(*method); });
-  CHECK(found != all.end());
-  return **found;
+  const auto it = std::find_if(all.begin(), all.end(), [&](const Method* method) { return has(*method); });
+  CHECK(it != all.end());
+  return **it;
 }
 
 std::string namesOfMethods(bool (*have)(const Method&), std::string_view conjunction) {

@@ -7,20 +7,21 @@ namespace tessera {
 
 std::span<const Method* const> methods();
 
-// Null when there is none of that name.
+// Returns the method with that name, or null if there is none.
 const Method* findMethod(std::string_view name);
 
-// The method of the trained model in a folder. Throws Error when there is no manifest (which is no trained model), or
-// when its method is none that this program has.
-const Method& methodOf(const ModelFolder& model);
-const Method& methodOf(const ModelFolder& model, const ModelManifest& manifest);
+// Returns the method of the trained model in a folder. Throws Error if there is no manifest (the folder then holds no
+// trained model), or if this program does not know the manifest's method.
+const Method& findModelMethod(const ModelFolder& model);
+const Method& findModelMethod(const ModelFolder& model, const ModelManifest& manifest);
 
-// The settings of the run that `model` holds; the defaults when it holds none.
+// Returns the settings that the training run in the folder `model` saved; the method's defaults if there are none.
 std::unique_ptr<MethodSettings> savedSettings(const Method& method, const fs::path& model);
 
-// The first that has it; CHECKs that there is one.
+// Returns the first method that satisfies the predicate `has`; CHECKs that there is one.
 const Method& firstMethod(bool (*has)(const Method&));
-// "volume and hash", of those that have it, in order.
+// Returns the names of the methods that satisfy the predicate `have`, in the order of list.h, as text: "volume and
+// hash".
 std::string namesOfMethods(bool (*have)(const Method&), std::string_view conjunction = "and");
 
 inline bool isBaked(const Method& method) {

@@ -26,7 +26,7 @@ const std::vector<std::string> kNamesOfScenes = {TESSERA_REPRESENTATIONS(SKIP, N
 #undef SKIP
 #undef NAME
 
-// Small enough for seconds.
+// Settings that train within seconds.
 std::unique_ptr<MethodSettings> smallSettings(const Method& method) {
   if (method.name == "field") return std::make_unique<SettingsOf<FieldConfig>>(cubeConfig());
   if (method.name == "volume") return std::make_unique<SettingsOf<VolumeConfig>>(smallVolumeConfig());
@@ -35,7 +35,7 @@ std::unique_ptr<MethodSettings> smallSettings(const Method& method) {
   return method.settings("");
 }
 
-// Something else than it is.
+// Changes the value of the field.
 void change(const ConfigField& field) {
   if (const auto* flag = std::get_if<bool*>(&field.value)) **flag = !**flag;
   if (const auto* number = std::get_if<int*>(&field.value)) **number += 3;
@@ -47,7 +47,7 @@ void change(const ConfigField& field) {
   if (const auto* text = std::get_if<std::string*>(&field.value)) **text += " \"quoted\"";
 }
 
-std::vector<std::string> textsOf(MethodSettings& settings) {
+std::vector<std::string> settingTexts(MethodSettings& settings) {
   std::vector<std::string> texts;
   for (const ConfigField& field : settings.fields()) texts.push_back(configValueText(field));
   return texts;
@@ -90,28 +90,29 @@ TEST(Methods, ReadTheirSettingsBackFromConfigToml) {
   for (const Method* method : methods()) {
     const std::unique_ptr<MethodSettings> written = method->settings("");
     written->check();
-    const std::vector<std::string> defaults = textsOf(*written);
+    const std::vector<std::string> defaults = settingTexts(*written);
     for (const ConfigField& field : written->fields()) change(field);
     const fs::path model = folder / std::string(method->name);
     writeFileAtomically(ModelFolder(model).configPath(), configToToml(written->fields()));
-    const std::vector<std::string> expected = textsOf(*written), read = textsOf(*savedSettings(*method, model));
+    const std::vector<std::string> expected = settingTexts(*written),
+                                   read = settingTexts(*savedSettings(*method, model));
     ASSERT_EQ(read.size(), defaults.size());
     for (size_t i = 0; i < read.size(); ++i) {
       EXPECT_EQ(read[i], expected[i]) << method->name;
       EXPECT_NE(read[i], defaults[i]) << method->name << ": nothing was changed";
     }
-    EXPECT_EQ(textsOf(*savedSettings(*method, folder / "nothing")), defaults);
+    EXPECT_EQ(settingTexts(*savedSettings(*method, folder / "nothing")), defaults);
   }
 }
 
-TEST(Methods, RefusePresetsThatAreNone) {
+TEST(Methods, RejectUnknownPresets) {
   for (const Method* method : methods()) {
     const std::unique_ptr<MethodSettings> settings = method->settings("");
     const std::vector<ConfigField> fields = settings->fields();
     const auto preset =
         std::find_if(fields.begin(), fields.end(), [](const ConfigField& field) { return field.name == "preset"; });
     if (preset == fields.end()) continue;
-    EXPECT_EQ(textsOf(*method->settings(configValueText(*preset))), textsOf(*settings)) << method->name;
+    EXPECT_EQ(settingTexts(*method->settings(configValueText(*preset))), settingTexts(*settings)) << method->name;
     EXPECT_THROW(method->settings("guess"), Error) << method->name;
   }
 }
@@ -123,10 +124,10 @@ TEST(Methods, HaveBakeParametersThatMeanOneThing) {
     for (const BakeParameter& parameter : method->bakeParameters) {
       EXPECT_TRUE(names.insert(parameter.name).second) << parameter.name;
       EXPECT_EQ(helps.emplace(parameter.name, parameter.help).first->second, parameter.help) << parameter.name;
-      EXPECT_LT(parameter.least, parameter.most) << parameter.name;
-      const int64_t standard = parameter.standard.value_or(parameter.least);
-      EXPECT_TRUE(parameter.least <= standard && standard <= parameter.most) << parameter.name;
-      EXPECT_EQ(standard % parameter.multipleOf, 0) << parameter.name;
+      EXPECT_LT(parameter.minimum, parameter.maximum) << parameter.name;
+      const int64_t standard = parameter.standard.value_or(parameter.minimum);
+      EXPECT_TRUE(parameter.minimum <= standard && standard <= parameter.maximum) << parameter.name;
+      EXPECT_EQ(standard % parameter.divisibleBy, 0) << parameter.name;
     }
   }
 }
@@ -143,7 +144,7 @@ TEST(Methods, AreNamedInSentences) {
   EXPECT_EQ(namesOfMethods(all, "or"), expected);
 }
 
-// What a picture of a trained model and its description are made of, and what the driver makes of it.
+// Trains, describes, renders and bakes a model with every method.
 TEST(Methods, TrainDescribeDrawAndBakeTheirModels) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
@@ -151,11 +152,11 @@ TEST(Methods, TrainDescribeDrawAndBakeTheirModels) {
     const fs::path model = scene / std::string(method->name);
     BlockRunOptions options;
     options.blocks = *parseBlockCount("2x1");
-    options.loop.steps = 6;  // enough for one of the coarser level
+    options.loop.steps = 6;  // enough for one step of the coarser level
     options.loop.progress = false;
     const std::unique_ptr<MethodSettings> settings = smallSettings(*method);
     EXPECT_TRUE(method->train(*device, scene.capture(), model, *settings, options).finished) << method->name;
-    EXPECT_EQ(&methodOf(ModelFolder(model)), method);
+    EXPECT_EQ(&findModelMethod(ModelFolder(model)), method);
     const auto numbers = method->describe(*savedSettings(*method, model));
     EXPECT_EQ(numbers, method->describe(*settings)) << method->name;
     EXPECT_NE(numbers, method->describe(*method->settings(""))) << method->name << ": other settings, another size";
@@ -182,7 +183,7 @@ TEST(Methods, TrainDescribeDrawAndBakeTheirModels) {
     const BakedScene baked = bakeScene(*baker, scene.capture(), model / "scene", baking);
     EXPECT_EQ(readTileset(model / "scene").representation, method->name);
     if (method->trainsInBlocks) {
-      ASSERT_EQ(baked.levels.size(), 2u) << method->name << ": two blocks, and what holds both";
+      ASSERT_EQ(baked.levels.size(), 2u) << method->name << ": two blocks, and a tile that holds both";
       EXPECT_EQ(baked.tileset.tiles.size(), 3u);
     }
     EXPECT_EQ(done, all) << method->name;
@@ -214,17 +215,18 @@ TEST(Methods, RefuseToTrainWithSettingsThatTheirCheckRefuses) {
   }
 }
 
-TEST(Methods, AreKnownByTheManifest) {
+TEST(Methods, AreIdentifiedByTheManifest) {
   const CubeScene scene;
   const ModelFolder model(scene / "model");
-  EXPECT_THROW(methodOf(model), Error) << "there is none";
+  EXPECT_THROW(findModelMethod(model), Error) << "there is no manifest";
   ModelManifest manifest;
   manifest.method = "guess";
   try {
-    methodOf(model, manifest);
-    FAIL() << "known";
+    findModelMethod(model, manifest);
+    FAIL() << "the unknown method was accepted";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("'guess' is none that tessera knows"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("'guess' is not a method that this tessera knows"), std::string::npos)
+        << error.what();
   }
 }
 

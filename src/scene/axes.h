@@ -1,4 +1,4 @@
-// The axis convention, stated once. Every module above uses these; only src/import converts into them.
+// The axis conventions of the project. All modules use them; only src/import converts other conventions into them.
 //
 //   world    right-handed, Z up, metres where the capture has a scale; double precision
 //   camera   x right, y down, z forward (COLMAP, OpenCV; "RDF")
@@ -18,7 +18,8 @@ using Vec3f = Eigen::Vector3f;
 using Mat3d = Eigen::Matrix3d;
 using Mat4d = Eigen::Matrix4d;
 
-// Coordinates that files may hold. What lies beyond is no place, though it is a number: products of such overflow.
+// The largest coordinate that a file may contain. Coordinates beyond it are rejected even though they are finite,
+// because their products could overflow.
 inline constexpr double kFarthest = 1e12;
 inline bool isPlace(const Vec3d& x) {
   return (x.array().abs() <= kFarthest).all();  // false for NaN too
@@ -32,7 +33,8 @@ struct Pose {
   Pose inverse() const { return {rotation.transpose(), -(rotation.transpose() * translation)}; }
 };
 
-// Negates the second and third camera axis: between RDF and the OpenGL axes of NeRF files (right, up, backward).
+// Negates the second and third camera axis, which converts between RDF and the OpenGL axes of NeRF files (right, up,
+// backward), in either direction.
 inline Mat3d flippedYz(const Mat3d& rotation) {
   Mat3d flipped = rotation;
   flipped.col(1) *= -1;

@@ -8,27 +8,27 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kGridRotationTolerance = 1e-9;  // of RᵀR against the identity; ours come back exactly
-constexpr double kHeightTolerance = 1e-9;        // of the heights against the edge, relative
+constexpr double kGridRotationTolerance = 1e-9;  // of RᵀR from the identity; our own are read back exactly
+constexpr double kHeightTolerance = 1e-9;        // relative excess of the height over the edge
 
 std::optional<double> numberIn(const json& object, const char* key) {
-  const auto found = object.find(key);
-  if (found == object.end() || !found->is_number()) return std::nullopt;
-  const double value = found->get<double>();
-  return std::abs(value) <= kFarthest ? std::optional(value) : std::nullopt;  // nothing for NaN too
+  const auto entry = object.find(key);
+  if (entry == object.end() || !entry->is_number()) return std::nullopt;
+  const double value = entry->get<double>();
+  return std::abs(value) <= kFarthest ? std::optional(value) : std::nullopt;  // nothing for NaN
 }
 
 std::optional<int> countIn(const json& object, const char* key) {
-  const auto found = object.find(key);
-  if (found == object.end() || !found->is_number_integer()) return std::nullopt;
+  const auto entry = object.find(key);
+  if (entry == object.end() || !entry->is_number_integer()) return std::nullopt;
   const auto value = numberIn(object, key);
-  return value && *value >= 1 && *value <= kMostAlong ? std::optional(static_cast<int>(*value)) : std::nullopt;
+  return value && *value >= 1 && *value <= kMaxAlong ? std::optional(static_cast<int>(*value)) : std::nullopt;
 }
 
 bool readNumbers(const json& object, const char* key, size_t count, double* out) {
-  const auto found = object.find(key);
-  if (found == object.end() || !found->is_array() || found->size() != count) return false;
-  for (const json& number : *found) {
+  const auto entry = object.find(key);
+  if (entry == object.end() || !entry->is_array() || entry->size() != count) return false;
+  for (const json& number : *entry) {
     if (!number.is_number()) return false;
     *out = number.get<double>();
     if (!(std::abs(*out++) <= kFarthest)) return false;
@@ -66,7 +66,7 @@ std::optional<BlockGrid> blockGridFromJson(const json& value) {
   const auto columns = countIn(value, "columns"), rows = countIn(value, "rows");
   if (!edge || !bottom || !top || !columns || !rows) return std::nullopt;
   if (!(*edge > 0) || !(*bottom < *top) || *top - *bottom > *edge * (1 + kHeightTolerance)) return std::nullopt;
-  if (*columns > kMostBlocks / *rows) return std::nullopt;
+  if (*columns > kMaxBlocks / *rows) return std::nullopt;
   grid.edge = *edge;
   grid.columns = *columns;
   grid.rows = *rows;

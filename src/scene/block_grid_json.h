@@ -1,4 +1,4 @@
-// The block grid as JSON: part of a model's blocks.json.
+// Reads and writes a block grid as JSON. It is part of a model's blocks.json.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -8,13 +8,13 @@
 
 namespace tessera {
 
-// {"origin": [x, y, z], "grid_from_world": [9 numbers, by rows], "edge", "columns", "rows", "bottom", "top"}. Numbers
-// come back with every bit.
+// Returns {"origin": [x, y, z], "grid_from_world": [9 numbers, by rows], "edge", "columns", "rows", "bottom", "top"}.
+// Numbers are read back bit for bit.
 nlohmann::json blockGridToJson(const BlockGrid& grid);
 
-// Nothing unless it is a grid that BlockGrid's comments allow: places and lengths within kFarthest, a rotation, at most
-// so many cells, bottom below top.
-inline constexpr int kMostBlocks = 1 << 16, kMostAlong = 1 << 12;  // in all, and along each side
+// Returns nothing unless the value is a valid BlockGrid: coordinates and lengths within kFarthest, a rotation, at most
+// kMaxBlocks cells and kMaxAlong along each side, bottom below top and at most `edge` apart.
+inline constexpr int kMaxBlocks = 1 << 16, kMaxAlong = 1 << 12;
 std::optional<BlockGrid> blockGridFromJson(const nlohmann::json& value);
 
 }  // namespace tessera

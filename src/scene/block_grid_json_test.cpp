@@ -21,7 +21,7 @@ BlockGrid someGrid() {
   return grid;
 }
 
-TEST(BlockGridJson, BringsBackEveryBit) {
+TEST(BlockGridJson, ReadsBackEveryBit) {
   const BlockGrid grid = someGrid();
   const auto read = blockGridFromJson(json::parse(blockGridToJson(grid).dump()));
   ASSERT_TRUE(read.has_value());
@@ -34,7 +34,7 @@ TEST(BlockGridJson, BringsBackEveryBit) {
   EXPECT_EQ(read->top, grid.top);
 }
 
-TEST(BlockGridJson, LacksNoKey) {
+TEST(BlockGridJson, RequiresEveryKey) {
   const json whole = blockGridToJson(someGrid());
   for (const auto& [key, value] : whole.items()) {
     json part = whole;
@@ -45,7 +45,7 @@ TEST(BlockGridJson, LacksNoKey) {
   }
 }
 
-TEST(BlockGridJson, RefusesWhatIsNoGrid) {
+TEST(BlockGridJson, RejectsInvalidGrids) {
   const auto with = [](const char* key, const json& value) {
     json changed = blockGridToJson(someGrid());
     changed[key] = value;
@@ -55,12 +55,12 @@ TEST(BlockGridJson, RefusesWhatIsNoGrid) {
   EXPECT_FALSE(with("columns", 0));
   EXPECT_FALSE(with("columns", -1));
   EXPECT_FALSE(with("columns", 2.5));
-  EXPECT_FALSE(with("columns", 4294967297));  // 1 in 32 bits
-  EXPECT_FALSE(with("columns", 40000));       // times 5: too many cells
+  EXPECT_FALSE(with("columns", 4294967297));  // wraps to 1 in 32 bits
+  EXPECT_FALSE(with("columns", 40000));       // times 5 rows: too many cells
   EXPECT_TRUE(with("edge", 10));
   EXPECT_FALSE(with("edge", 0));
   EXPECT_FALSE(with("edge", 1e300));
-  EXPECT_FALSE(with("edge", 0.2));  // lower than it is high
+  EXPECT_FALSE(with("edge", 0.2));  // smaller than the height
   EXPECT_FALSE(with("top", -1.0 / 9));
   EXPECT_FALSE(with("origin", {0, 0}));
   EXPECT_FALSE(with("origin", {0, 0, 1e13}));

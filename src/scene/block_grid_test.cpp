@@ -25,7 +25,7 @@ class Points {
   uint64_t next_ = 0;
 };
 
-BlockGrid gridOf(int columns, int rows, double edge = 2.5) {
+BlockGrid makeGrid(int columns, int rows, double edge = 2.5) {
   BlockGrid grid;
   grid.columns = columns;
   grid.rows = rows;
@@ -33,15 +33,16 @@ BlockGrid gridOf(int columns, int rows, double edge = 2.5) {
   return grid;
 }
 
-const BlockGrid kGrids[] = {gridOf(1, 1), gridOf(3, 2), gridOf(2, 5, 0.3), gridOf(1, 4)};
+const BlockGrid kGrids[] = {makeGrid(1, 1), makeGrid(3, 2), makeGrid(2, 5, 0.3), makeGrid(1, 4)};
 
-// Whether x lies in the region of cell i of `count`: its own stretch, and at the border all that lies outside.
+// Returns whether x belongs to cell i of `count` along one axis: its own interval, and for cells at the border
+// everything beyond it.
 bool owns(int i, int count, double edge, double x) {
   const double low = edge * (i - 0.5 * count), high = low + edge;
   return (i == 0 || x >= low) && (i == count - 1 || x < high);
 }
 
-TEST(BlockGrid, GivesEveryPlaceToExactlyOneCell) {
+TEST(BlockGrid, AssignsEveryPointToExactlyOneCell) {
   Points points(1);
   for (const BlockGrid& grid : kGrids) {
     std::set<int> met;
@@ -62,8 +63,8 @@ TEST(BlockGrid, GivesEveryPlaceToExactlyOneCell) {
   }
 }
 
-TEST(BlockGrid, PutsCellsSideBySideAboutTheOrigin) {
-  const BlockGrid grid = gridOf(3, 2, 4);
+TEST(BlockGrid, CentresItsCellsOnTheOrigin) {
+  const BlockGrid grid = makeGrid(3, 2, 4);
   EXPECT_EQ(grid.centre(0), Vec2d(-4, -2));
   EXPECT_EQ(grid.centre(2), Vec2d(4, -2));
   EXPECT_EQ(grid.centre(4), Vec2d(0, 2));
@@ -71,7 +72,7 @@ TEST(BlockGrid, PutsCellsSideBySideAboutTheOrigin) {
     for (int cell = 0; cell < each.cells(); ++cell) EXPECT_EQ(each.cellAt(each.centre(cell)), cell);
 }
 
-TEST(BlockGrid, ListsCellsInTheOrderInWhichAnyRayFromAPlaceMeetsThem) {
+TEST(BlockGrid, OrdersCellsFrontToBackForEveryRayFromAPoint) {
   Points points(2);
   for (const BlockGrid& grid : kGrids) {
     size_t longest = 0;
@@ -85,7 +86,7 @@ TEST(BlockGrid, ListsCellsInTheOrderInWhichAnyRayFromAPlaceMeetsThem) {
 
       const double angle = points.uniform(0, 6.2831853);
       const Vec2d direction(std::cos(angle), std::sin(angle));
-      std::vector<size_t> places;  // in `order`, of the cells that the ray passes
+      std::vector<size_t> places;  // positions in `order` of the cells that the ray crosses
       for (double t = 0; t < 20 * grid.edge; t += 0.01 * grid.edge) {
         const int cell = grid.cellAt(from + t * direction);
         const size_t place = std::find(order.begin(), order.end(), cell) - order.begin();
@@ -99,8 +100,8 @@ TEST(BlockGrid, ListsCellsInTheOrderInWhichAnyRayFromAPlaceMeetsThem) {
   }
 }
 
-TEST(BlockGrid, LeadsToTheWorldAndBack) {
-  BlockGrid grid = gridOf(3, 2);
+TEST(BlockGrid, ConvertsToTheWorldAndBack) {
+  BlockGrid grid = makeGrid(3, 2);
   grid.originInWorld = Vec3d(100, -20, 7);
   grid.gridFromWorld << 0, 1, 0, -1, 0, 0, 0, 0, 1;  // a quarter turn
   EXPECT_EQ(grid.inGrid(Vec3d(101, -20, 8)), Vec3d(0, -1, 1));

@@ -33,14 +33,14 @@ constexpr std::array<LensFacts, std::size(kLensModels)> kLenses = {{
     {LensModel::eucm, "EUCM", 6, false, true},
 }};
 
-const LensFacts& factsOf(LensModel model) {
-  const auto found =
+const LensFacts& lensFacts(LensModel model) {
+  const auto match =
       std::find_if(kLenses.begin(), kLenses.end(), [model](const LensFacts& l) { return l.model == model; });
-  CHECK(found != kLenses.end());
-  return *found;
+  CHECK(match != kLenses.end());
+  return *match;
 }
 
-// The model of two focal lengths that contains a model of one, with the same distortion.
+// Returns the model with two focal lengths that generalises a model with one, with the same distortion.
 LensModel withTwoFocals(LensModel model) {
   switch (model) {
     case LensModel::simplePinhole:
@@ -61,14 +61,14 @@ LensModel withTwoFocals(LensModel model) {
 }  // namespace
 
 int lensParameterCount(LensModel model) {
-  return factsOf(model).parameters;
+  return lensFacts(model).parameters;
 }
 std::string_view lensName(LensModel model) {
-  return factsOf(model).name;
+  return lensFacts(model).name;
 }
 
 bool lensSeesBehind(LensModel model) {
-  return factsOf(model).seesBehind;
+  return lensFacts(model).seesBehind;
 }
 
 std::optional<LensModel> lensFromName(std::string_view name) {
@@ -89,13 +89,13 @@ double Camera::focalX() const {
   return parameters[0];
 }
 double Camera::focalY() const {
-  return parameters[factsOf(lens).oneFocal ? 0 : 1];
+  return parameters[lensFacts(lens).oneFocal ? 0 : 1];
 }
 double Camera::centreX() const {
-  return parameters[factsOf(lens).oneFocal ? 1 : 2];
+  return parameters[lensFacts(lens).oneFocal ? 1 : 2];
 }
 double Camera::centreY() const {
-  return parameters[factsOf(lens).oneFocal ? 2 : 3];
+  return parameters[lensFacts(lens).oneFocal ? 2 : 3];
 }
 
 std::optional<Vec3d> Camera::directionInCamera(const Vec2d& pixel) const {
@@ -117,7 +117,7 @@ Camera Camera::scaledTo(int newWidth, int newHeight) const {
   Camera scaled = *this;
   scaled.width = newWidth;
   scaled.height = newHeight;
-  if (factsOf(lens).oneFocal) {
+  if (lensFacts(lens).oneFocal) {
     if (scaleX != scaleY) {
       scaled.lens = withTwoFocals(lens);
       scaled.parameters = {};

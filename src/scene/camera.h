@@ -1,5 +1,5 @@
-// A camera: picture size and lens. COLMAP's lens models but its panoramas; its two fisheyes without distortion are
-// OPENCV_FISHEYE without distortion here.
+// A camera: image size and lens. Supports COLMAP's lens models except its panoramas; its two fisheye models without
+// distortion are represented as OPENCV_FISHEYE without distortion.
 // Source: COLMAP's camera models (src/colmap/sensor/models.h describes the parameters).
 #pragma once
 
@@ -16,8 +16,8 @@ namespace tessera {
 int lensParameterCount(LensModel model);
 std::string_view lensName(LensModel model);  // COLMAP's name, "OPENCV_FISHEYE"
 std::optional<LensModel> lensFromName(std::string_view name);
-std::optional<LensModel> lensFromNumber(int number);  // COLMAP's
-bool lensSeesBehind(LensModel model);                 // may see more than 90° off its axis
+std::optional<LensModel> lensFromNumber(int number);  // COLMAP's number of the model
+bool lensSeesBehind(LensModel model);                 // whether it may see more than 90° off its axis
 
 struct Camera {
   int width = 0, height = 0;
@@ -29,15 +29,15 @@ struct Camera {
   double centreX() const;
   double centreY() const;
 
-  // Unit direction in camera axes of the ray through a pixel position. Nothing where the lens model has no inverse
-  // there (beyond the fold of a distortion polynomial).
+  // Returns the unit direction, in camera axes, of the ray through a pixel position, or nothing where the lens model
+  // has no inverse (beyond the fold of a distortion polynomial).
   std::optional<Vec3d> directionInCamera(const Vec2d& pixel) const;
-  // Pixel position of a point in camera axes; nothing when it cannot be seen (behind a perspective lens, or beyond the
-  // angle where the distortion polynomial stops growing).
+  // Returns the pixel position of a point in camera axes, or nothing if it cannot be seen (behind a perspective lens,
+  // or beyond the angle where the distortion polynomial stops growing).
   std::optional<Vec2d> pixelFromCamera(const Vec3d& xInCamera) const;
 
-  // The same lens for a picture reduced or enlarged to width × height. A lens with one focal length becomes its exact
-  // equivalent with two where rounding made the pixels a little oblong.
+  // Returns the same lens for an image resized to newWidth × newHeight. A lens with one focal length becomes its exact
+  // equivalent with two where rounding of the size makes the pixels slightly oblong.
   Camera scaledTo(int newWidth, int newHeight) const;
 
   bool operator==(const Camera&) const = default;

@@ -16,17 +16,17 @@ using nlohmann::json;
 using nlohmann::ordered_json;
 
 constexpr int kLargestSide = 16384;
-constexpr double kRotationTolerance = 1e-2;  // of RᵀR against the identity; files round to few digits
+constexpr double kRotationTolerance = 1e-2;  // of RᵀR from the identity; files round to few digits
 
 std::optional<double> finiteNumber(const json& object, const char* key, double absent) {
-  const auto found = object.find(key);
-  if (found == object.end()) return absent;
-  if (!found->is_number()) return std::nullopt;
-  const double value = found->get<double>();
+  const auto entry = object.find(key);
+  if (entry == object.end()) return absent;
+  if (!entry->is_number()) return std::nullopt;
+  const double value = entry->get<double>();
   return std::isfinite(value) ? std::optional(value) : std::nullopt;
 }
 
-// Rows of four numbers, flat or nested; those that the file leaves out are the identity's.
+// Reads rows of four numbers, flat or nested; missing rows are those of the identity.
 std::optional<Mat4d> matrixFrom(const json& value, size_t rows) {
   Eigen::Matrix<double, 4, 4, Eigen::RowMajor> matrix = Mat4d::Identity();
   size_t count = 0;
@@ -49,7 +49,7 @@ std::optional<Mat4d> matrixFrom(const json& value, size_t rows) {
   return count == 4 * rows ? std::optional<Mat4d>(matrix) : std::nullopt;
 }
 
-// The nearest rotation, where it is near.
+// Returns the nearest rotation, or nothing if it is not within kRotationTolerance.
 std::optional<Mat3d> rotationFrom(const Mat3d& given) {
   if ((given.transpose() * given - Mat3d::Identity()).cwiseAbs().maxCoeff() > kRotationTolerance) return std::nullopt;
   if (given.determinant() < 0) return std::nullopt;
@@ -67,9 +67,9 @@ std::optional<Pose> poseFrom(const json& value) {
 
 }  // namespace
 
-Camera CameraPath::cameraOf(const CameraPathView& view) const {
+Camera CameraPath::makeViewCamera(const CameraPathView& view) const {
   const double halfAngle = view.verticalFieldOfView * std::numbers::pi / 360;
-  const double focal = 0.5 * height / std::tan(halfAngle);  // nerfstudio takes the same for its fisheye
+  const double focal = 0.5 * height / std::tan(halfAngle);  // nerfstudio uses the same for its fisheye
   Camera camera;
   camera.width = width;
   camera.height = height;

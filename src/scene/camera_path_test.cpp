@@ -11,7 +11,7 @@
 namespace tessera {
 namespace {
 
-// As the viewer writes it; the camera stands at (1, 2, 3) and looks along +y with z up.
+// A path as the viewer writes it; the camera is at (1, 2, 3) and looks along +y with z up.
 constexpr const char* kFromViewer = R"({
   "keyframes": [{"matrix": "[]", "fov": 60}], "camera_type": "perspective", "render_height": 540, "render_width": 960,
   "camera_path": [
@@ -35,13 +35,13 @@ TEST(CameraPath, ReadsWhatTheViewerWrites) {
   EXPECT_TRUE((pose * Vec3d(0, 0, 1)).isApprox(Vec3d(1, 3, 3)));  // forward is +y
   EXPECT_TRUE((pose * Vec3d(1, 0, 0)).isApprox(Vec3d(2, 2, 3)));  // right is +x
   EXPECT_TRUE((pose * Vec3d(0, 1, 0)).isApprox(Vec3d(1, 2, 2)));  // down is −z
-  const Camera camera = path->cameraOf(path->views[0]);
+  const Camera camera = path->makeViewCamera(path->views[0]);
   EXPECT_EQ(camera.width, 960);
   EXPECT_NEAR(camera.focalX(), 270, 1e-9);  // 90 degrees from the top edge to the bottom edge
   EXPECT_NEAR(camera.focalY(), 270, 1e-9);
   EXPECT_EQ(camera.centreX(), 480);
   EXPECT_EQ(camera.centreY(), 270);
-  EXPECT_NEAR(path->cameraOf(path->views[1]).focalY(), 270 / std::tan(std::numbers::pi / 6), 1e-9);
+  EXPECT_NEAR(path->makeViewCamera(path->views[1]).focalY(), 270 / std::tan(std::numbers::pi / 6), 1e-9);
 }
 
 TEST(CameraPath, ReadsBackWhatItWrote) {
@@ -61,7 +61,7 @@ TEST(CameraPath, ReadsBackWhatItWrote) {
   EXPECT_EQ(read.height, 200);
   EXPECT_EQ(read.framesPerSecond, 29.97);
   EXPECT_EQ(read.seconds, 2.5);
-  EXPECT_EQ(read.cameraOf(read.views[0]).lens, LensModel::openCvFisheye);
+  EXPECT_EQ(read.makeViewCamera(read.views[0]).lens, LensModel::openCvFisheye);
   EXPECT_TRUE(read.views[0].worldFromCamera.rotation.isApprox(rotation, 1e-12));
   EXPECT_EQ(read.views[0].worldFromCamera.translation, Vec3d(1e6, -2, 0.25));
   EXPECT_EQ(read.views[0].verticalFieldOfView, 72.5);
@@ -84,7 +84,7 @@ TEST(CameraPath, MakesRoundedRotationsExact) {
   EXPECT_TRUE((rotation.transpose() * rotation).isIdentity(1e-12));
 }
 
-TEST(CameraPath, RefusesWhatCannotBeFollowed) {
+TEST(CameraPath, RejectsInvalidPaths) {
   const std::string identity = R"("camera_to_world": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1])";
   EXPECT_TRUE(decodeCameraPath(withFrame("{" + identity + "}")));
   for (const std::string& text :
@@ -99,7 +99,7 @@ TEST(CameraPath, RefusesWhatCannotBeFollowed) {
         withFrame(R"({"camera_to_world": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1,1]})"),    // seventeen
         withFrame(R"({"camera_to_world": [2,0,0,0, 0,2,0,0, 0,0,2,0, 0,0,0,1]})"),      // scaled
         withFrame(R"({"camera_to_world": [1,0,0,0, 0,1,0,0, 0,0,-1,0, 0,0,0,1]})"),     // mirrored
-        withFrame(R"({"camera_to_world": [1,0,0,1e300, 0,1,0,0, 0,0,1,0, 0,0,0,1]})"),  // nowhere
+        withFrame(R"({"camera_to_world": [1,0,0,1e300, 0,1,0,0, 0,0,1,0, 0,0,0,1]})"),  // out of bounds
         withFrame(R"({"camera_to_world": [1,0,0,null, 0,1,0,0, 0,0,1,0, 0,0,0,1]})"),   // NaN as JSON has it
         withFrame("{" + identity + R"(, "fov": 0})"),
         withFrame("{" + identity + R"(, "fov": 180})"),
@@ -114,11 +114,11 @@ TEST(CameraPath, RefusesWhatCannotBeFollowed) {
   }
 }
 
-// As nerfstudio writes it for a capture whose poses were turned from COLMAP's axes.
+// A file as nerfstudio writes it for a capture whose poses were rotated from COLMAP's axes.
 constexpr const char* kTransforms =
     R"({"transform": [[0, 1, 0, 0.5], [1, 0, 0, -0.25], [0, 0, -1, 2]], "scale": 0.125})";
 
-TEST(CameraPath, KnowsTheWorldOfADataparser) {
+TEST(CameraPath, DecodesTheSimilarityOfADataparser) {
   const auto dataparserFromSource = decodeDataparserTransforms(kTransforms);
   ASSERT_TRUE(dataparserFromSource);
   // s · (transform · x): the translation is scaled too.
@@ -130,7 +130,7 @@ TEST(CameraPath, KnowsTheWorldOfADataparser) {
   EXPECT_EQ((*unscaled)(0, 3), 7);
 }
 
-TEST(CameraPath, RefusesDataparsersThatAreNone) {
+TEST(CameraPath, RejectsInvalidDataparserTransforms) {
   const std::string turned = R"("transform": [[1,0,0,0],[0,1,0,0],[0,0,1,0]])";
   EXPECT_TRUE(decodeDataparserTransforms("{" + turned + R"(, "scale": 2})"));
   for (const std::string& text :
@@ -146,7 +146,7 @@ TEST(CameraPath, RefusesDataparsersThatAreNone) {
   }
 }
 
-TEST(CameraPath, TakesTheDataparserThatIsNamedOrLiesBesideIt) {
+TEST(CameraPath, UsesTheNamedOrNeighbouringDataparserTransforms) {
   const fs::path folder = fs::temp_directory_path() / ("tessera_dataparser_" + std::to_string(::getpid()));
   const fs::path file = folder / "path.json", beside = folder / "dataparser_transforms.json";
   writeFileAtomically(file, std::string_view(kFromViewer));

@@ -5,8 +5,8 @@
 namespace tessera {
 namespace {
 
-// A plausible lens of each model for a picture of 1600 × 1200.
-Camera lensOf(LensModel model) {
+// Returns a plausible lens of each model for an image of 1600 × 1200 pixels.
+Camera makeLensCamera(LensModel model) {
   Camera camera{1600, 1200, model, {1, 2}};
   const bool oneFocal = camera.focalY() == camera.focalX();
   std::vector<double> p = oneFocal ? std::vector<double>{900, 810, 590} : std::vector<double>{900, 905, 810, 590};
@@ -58,7 +58,7 @@ Camera lensOf(LensModel model) {
 
 class EveryLens : public testing::TestWithParam<LensModel> {
  protected:
-  Camera camera_ = lensOf(GetParam());
+  Camera camera_ = makeLensCamera(GetParam());
 };
 
 TEST_P(EveryLens, ProjectsBackToThePixelItCameFrom) {
@@ -88,8 +88,8 @@ TEST_P(EveryLens, AgreesWithItselfInSinglePrecision) {
       float direction[3];
       ASSERT_TRUE(lensUnproject(camera_.lens, parameters.data(), x, y, direction)) << x << " " << y;
       const Vec3d expected = *camera_.directionInCamera({x, y});
-      const Vec3d found = Eigen::Map<Vec3f>(direction).cast<double>();
-      EXPECT_NEAR((found - expected).norm(), 0, 1e-5) << x << " " << y;  // a hundredth of a pixel
+      const Vec3d actual = Eigen::Map<Vec3f>(direction).cast<double>();
+      EXPECT_NEAR((actual - expected).norm(), 0, 1e-5) << x << " " << y;  // a hundredth of a pixel
     }
   }
 }
@@ -120,7 +120,7 @@ TEST_P(EveryLens, SeesNothingForNotANumber) {
 INSTANTIATE_TEST_SUITE_P(Camera, EveryLens, testing::ValuesIn(kLensModels),
                          [](const auto& info) { return std::string(lensName(info.param)); });
 
-// Numbers worked out by hand from OpenCV's formula, so that signs and order of the tangential terms are pinned.
+// The numbers are computed by hand from OpenCV's formula, to check the signs and the order of the tangential terms.
 TEST(Camera, DistortsAsOpenCvDoes) {
   const Camera camera{100, 100, LensModel::openCv, {1, 1, 0, 0, 0.1, 0.01, 0.02, 0.03}};
   const Vec2d pixel = *camera.pixelFromCamera({0.5, -0.25, 1});
@@ -138,7 +138,7 @@ TEST(Camera, ProjectsFisheyeByAngle) {
 }
 
 TEST(Camera, ProjectsByDivision) {
-  // Worked out by hand: the pixel at r = 0.5 looks along (0.5, 0, 1 + k/4).
+  // Computed by hand: the pixel at r = 0.5 looks along (0.5, 0, 1 + k/4).
   for (const double k : {-0.4, 0.4}) {
     const Camera camera{100, 100, LensModel::division, {20, 40, 3, 5, k}};
     const Vec3d expected = Vec3d(0.3, -0.4, 1 + k / 4).normalized();
@@ -224,11 +224,12 @@ TEST(Camera, HasNoRayBeyondTheFold) {
   EXPECT_FALSE(camera.directionInCamera({1000 + 704, 1000}).has_value());
   EXPECT_TRUE(camera.pixelFromCamera({1.05, 0, 1}).has_value());
   EXPECT_FALSE(camera.pixelFromCamera({1.06, 0, 1}).has_value());
-  EXPECT_FALSE(camera.pixelFromCamera({1.8, 0, 1}).has_value());  // would land inside the picture again
+  EXPECT_FALSE(camera.pixelFromCamera({1.8, 0, 1}).has_value());  // would be projected into the image again
 }
 
 TEST(Camera, HasNoRayOnTheSecondBranchOfAPolynomial) {
-  // Grows, folds near r = 0.85, grows again from r = 1.2: pixels that only the second branch reaches have no ray.
+  // The polynomial grows, folds near r = 0.85, and grows again from r = 1.2: pixels that only the second branch reaches
+  // have no ray.
   const Camera camera{4000, 4000, LensModel::radial, {1000, 2000, 2000, -0.7, 0.19}};
   EXPECT_FALSE(camera.directionInCamera({2000 + 1500, 2000}).has_value());
   EXPECT_FALSE(camera.pixelFromCamera({2.2, 0, 1}).has_value());
@@ -240,7 +241,7 @@ TEST(Camera, SeesNothingBehindAPerspectiveLens) {
   EXPECT_FALSE(camera.pixelFromCamera({0, 0, 0}).has_value());
 }
 
-TEST(Camera, KnowsNoLensOfAnotherName) {
+TEST(Camera, RejectsUnknownLensNames) {
   EXPECT_FALSE(lensFromName("BROWN_CONRADY").has_value());
   for (const int number : {-1, 14, 17}) EXPECT_FALSE(lensFromNumber(number).has_value());
 }

@@ -14,12 +14,12 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 template <class Matrix>
-Json rowsOf(const Matrix& matrix) {
+Json rowsToJson(const Matrix& matrix) {
   Json rows = Json::array();
   for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
     Json row = Json::array();
     for (Eigen::Index c = 0; c < matrix.cols(); ++c) {
-      CHECK(std::isfinite(matrix(r, c)));  // JSON has no word for it
+      CHECK(std::isfinite(matrix(r, c)));  // JSON cannot represent it
       row.push_back(matrix(r, c));
     }
     rows.push_back(std::move(row));
@@ -27,8 +27,8 @@ Json rowsOf(const Matrix& matrix) {
   return rows;
 }
 
-// The keys that nerfstudio and instant-ngp know. Lenses that these cannot say keep COLMAP's name, which makes other
-// readers refuse instead of drawing a wrong picture.
+// Adds the keys that nerfstudio and instant-ngp read. A lens that these cannot express keeps COLMAP's name, so that
+// other programs reject the file instead of rendering with a wrong lens.
 void addIntrinsics(Json& json, const Camera& camera) {
   const auto& p = camera.parameters;
   switch (camera.lens) {
@@ -100,14 +100,14 @@ std::string pathInCapture(const fs::path& root, const fs::path& path) {
   return relative.generic_string();
 }
 
-Mat4d matrixOf(const Pose& worldFromCamera) {
+Mat4d poseToMatrix(const Pose& worldFromCamera) {
   Mat4d matrix = Mat4d::Identity();
   matrix.topLeftCorner<3, 3>() = flippedYz(worldFromCamera.rotation);
   matrix.topRightCorner<3, 1>() = worldFromCamera.translation;
   return matrix;
 }
 
-Json frameOf(const Capture& capture, const Photo& photo) {
+Json frameToJson(const Capture& capture, const Photo& photo) {
   CHECK(photo.camera >= 0);
   CHECK(photo.camera < static_cast<int>(capture.cameras.size()));
   Json frame;
@@ -115,7 +115,7 @@ Json frameOf(const Capture& capture, const Photo& photo) {
   if (!photo.mask.empty()) frame["mask_path"] = pathInCapture(capture.root, photo.mask);
   if (!photo.depth.empty()) frame["depth_file_path"] = pathInCapture(capture.root, photo.depth);
   if (capture.cameras.size() != 1) addIntrinsics(frame, capture.cameras[static_cast<size_t>(photo.camera)]);
-  frame["transform_matrix"] = rowsOf(matrixOf(photo.worldFromCamera));
+  frame["transform_matrix"] = rowsToJson(poseToMatrix(photo.worldFromCamera));
   Json& ours = frame["tessera"];
   ours["camera"] = photo.camera;
   if (photo.name != frame["file_path"].get<std::string>()) ours["name"] = photo.name;
@@ -131,7 +131,7 @@ Json frameOf(const Capture& capture, const Photo& photo) {
 }
 
 template <class T>
-TensorView tensorOf(TensorType type, std::vector<int64_t> shape, const std::vector<T>& values) {
+TensorView makeTensorView(TensorType type, std::vector<int64_t> shape, const std::vector<T>& values) {
   return {type, std::move(shape), std::as_bytes(std::span(values))};
 }
 
@@ -145,10 +145,10 @@ Bytes encodeObservations(const std::vector<Observation>& observations) {
     error.push_back(observation.error);
   }
   const auto n = static_cast<int64_t>(observations.size());
-  return encodeSafetensors({{"photo", tensorOf(TensorType::u32, {n}, photo)},
-                            {"point", tensorOf(TensorType::u32, {n}, point)},
-                            {"pixel", tensorOf(TensorType::f32, {n, 2}, pixel)},
-                            {"error", tensorOf(TensorType::f32, {n}, error)}});
+  return encodeSafetensors({{"photo", makeTensorView(TensorType::u32, {n}, photo)},
+                            {"point", makeTensorView(TensorType::u32, {n}, point)},
+                            {"pixel", makeTensorView(TensorType::f32, {n, 2}, pixel)},
+                            {"error", makeTensorView(TensorType::f32, {n}, error)}});
 }
 
 }  // namespace
@@ -163,7 +163,7 @@ void writeCapture(const Capture& capture) {
   Json frames = Json::array();
   std::array<Json, 3> names = {Json::array(), Json::array(), Json::array()};
   for (const Photo& photo : capture.photos) {
-    frames.push_back(frameOf(capture, photo));
+    frames.push_back(frameToJson(capture, photo));
     names[static_cast<size_t>(photo.split)].push_back(frames.back()["file_path"]);
   }
   json["train_filenames"] = std::move(names[0]);
@@ -174,12 +174,12 @@ void writeCapture(const Capture& capture) {
   ours["version"] = 1;
   ours["cameras"] = Json::array();
   for (const Camera& camera : capture.cameras) ours["cameras"].push_back(exactCamera(camera));
-  ours["source_from_world"] = rowsOf(capture.sourceFromWorld);
+  ours["source_from_world"] = rowsToJson(capture.sourceFromWorld);
   if (capture.geo) {
     ours["geo"] = {{"latitude", capture.geo->latitude},
                    {"longitude", capture.geo->longitude},
                    {"altitude", capture.geo->altitude},
-                   {"enu_from_world", rowsOf(capture.geo->enuFromWorld)}};
+                   {"enu_from_world", rowsToJson(capture.geo->enuFromWorld)}};
   }
   if (!capture.observations.empty()) {
     ours["observations"] = "observations.safetensors";

@@ -10,7 +10,7 @@ namespace tessera {
 template <class T>
 using Triple = std::array<T, 3>;
 
-// The axis of the largest coordinate by magnitude; the first of equals.
+// Returns the axis of the coordinate of largest magnitude, the first of several equal ones.
 template <class T>
 int farthestAxis(const Triple<T>& x) {
   int axis = 0;
@@ -30,7 +30,7 @@ Triple<T> contract(const Triple<T>& x) {
   return y;
 }
 
-// Its inverse on (-2,2)³ (where two coordinates lie beyond 1 there is no point of the scene).
+// The inverse of the contraction on (-2,2)³. A point with two coordinates beyond 1 has no preimage in the scene.
 template <class T>
 Triple<T> uncontract(const Triple<T>& y) {
   const int axis = farthestAxis(y);

@@ -14,7 +14,7 @@ using Point = Triple<double>;
 class NearAndFarPoints {
  public:
   explicit NearAndFarPoints(uint64_t seed) : random_(seed, 0) {}
-  // Near and far, inside the cube and outside.
+  // Returns a random point, near or far, inside or outside the cube.
   Point next() {
     Point x;
     const double reach = std::exp2(random_.uniformDouble(index_++) * 12 - 2);
@@ -32,11 +32,11 @@ class NearAndFarPoints {
   uint64_t index_ = 0;
 };
 
-double squareOf(const Point& x) {
+double squaredLength(const Point& x) {
   return x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
 }
 
-// Whether a step of h across x stays in one region, where the map is smooth.
+// Returns whether the points within h of x lie in one region, where the map is smooth.
 bool isSmoothAt(Point x, double h) {
   for (double& coordinate : x) coordinate = std::abs(coordinate);
   std::sort(x.begin(), x.end());
@@ -56,7 +56,7 @@ TEST(Contraction, MapsKnownPairsBothWays) {
     }
 }
 
-TEST(Contraction, ComesBackFromEveryPlace) {
+TEST(Contraction, IsInvertibleEverywhere) {
   NearAndFarPoints points(1);
   int outside = 0;
   for (int n = 0; n < 2000; ++n) {
@@ -72,7 +72,7 @@ TEST(Contraction, ComesBackFromEveryPlace) {
   EXPECT_LT(outside, 1950);
 }
 
-TEST(Contraction, LeavesTheCubeAsItIs) {
+TEST(Contraction, LeavesTheCubeUnchanged) {
   for (const Point& x : {Point{0, 0, 0}, Point{.2, -.9, .4}, Point{1, -1, 1}}) {
     EXPECT_EQ(contract(x), x);
     EXPECT_EQ(uncontract(x), x);
@@ -109,16 +109,16 @@ TEST(Contraction, KeepsLinesStraightWithinARegion) {
 
 TEST(Contraction, StretchesAtMost1Point9319TimesAndAsMuchAtACorner) {
   NearAndFarPoints points(3);
-  double most = 0;
+  double maximum = 0;
   for (int n = 0; n < 20000; ++n) {
     Point x = points.next(), d = points.direction();
     if (n % 2 == 0)  // just outside a corner
       for (double& coordinate : x) coordinate = std::copysign(1 + 1e-6 * std::abs(coordinate), coordinate);
-    const double stretch = std::sqrt(squareOf(contractDirection(x, d)) / squareOf(d));
+    const double stretch = std::sqrt(squaredLength(contractDirection(x, d)) / squaredLength(d));
     ASSERT_LE(stretch, 1.9319) << x[0] << ' ' << x[1] << ' ' << x[2];
-    most = std::max(most, stretch);
+    maximum = std::max(maximum, stretch);
   }
-  EXPECT_GT(most, 1.92);
+  EXPECT_GT(maximum, 1.92);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// dataparser_transforms.json from arbitrary text: what is accepted is finite and can be undone.
+// Decodes dataparser_transforms.json from arbitrary text: an accepted transform is finite and invertible.
 #include <Eigen/LU>
 #include <cstdlib>
 

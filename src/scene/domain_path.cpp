@@ -6,14 +6,14 @@ namespace tessera {
 namespace {
 
 struct LocalRay {
-  Triple<double> origin, direction;  // distances along it are those of the scene
+  Triple<double> origin, direction;  // parametrised by the scene's distance
 
   Triple<double> at(double t) const {
     return {origin[0] + t * direction[0], origin[1] + t * direction[1], origin[2] + t * direction[2]};
   }
 };
 
-// The cube, or the pyramid on the side `sign` of an axis.
+// A region of the contraction: the cube (axis -1), or the pyramid on the side `sign` of an axis.
 struct Region {
   int axis = -1;
   double sign = 0;
@@ -25,9 +25,9 @@ Region regionAt(const Triple<double>& x) {
   return std::abs(x[axis]) > 1 ? Region{axis, std::copysign(1.0, x[axis])} : Region{};
 }
 
-// With m(t) = sign · x_axis, positive and linear in t, the contracted place moves along a line with velocity v / m²,
+// With m(t) = sign · x_axis, positive and linear in t, the contracted point moves along a line with velocity v / m²,
 // where v does not depend on t; hence τ = |v| (t - entry) / (m(entry) m(t)).
-DomainSegment segmentOf(const LocalRay& ray, const Region& region, double near, double far) {
+DomainSegment makeSegment(const LocalRay& ray, const Region& region, double near, double far) {
   const Triple<double> x = ray.at(near);
   Triple<double> y = x, v = ray.direction;
   double entryM = 1, exitM = 1, mGrowth = 0;
@@ -67,11 +67,11 @@ DomainPath domainPath(const BlockDomain& domain, const Triple<double>& origin, c
     local.direction[a] = direction[a] / domain.scale[a];
   }
   if (!domain.contracted) {
-    path.segments[path.count++] = segmentOf(local, {}, near, far);
+    path.segments[path.count++] = makeSegment(local, {}, near, far);
     return path;
   }
-  // All regions end at planes |x_a| = 1 and |x_a| = |x_b|.
-  std::array<double, DomainPath::kMostSegments> ends;
+  // All regions are bounded by planes |x_a| = 1 and |x_a| = |x_b|.
+  std::array<double, DomainPath::kMaxSegments> ends;
   int count = 0;
   const auto add = [&](double offset, double slope) {  // where offset + t slope = 0
     const double t = -offset / slope;
@@ -90,16 +90,16 @@ DomainPath domainPath(const BlockDomain& domain, const Triple<double>& origin, c
   double from = near, to = near;
   Region region;
   for (int i = 0; i < count; ++i) {
-    if (ends[i] - to < 1e-12 * ends[i]) continue;  // nothing but rounding
+    if (ends[i] - to < 1e-12 * ends[i]) continue;  // an artefact of rounding
     const Region next = regionAt(local.at(0.5 * (to + ends[i])));
     if (next != region && from < to) {
-      path.segments[path.count++] = segmentOf(local, region, from, to);
+      path.segments[path.count++] = makeSegment(local, region, from, to);
       from = to;
     }
     region = next;
     to = ends[i];
   }
-  if (from < to) path.segments[path.count++] = segmentOf(local, region, from, to);
+  if (from < to) path.segments[path.count++] = makeSegment(local, region, from, to);
   return path;
 }
 

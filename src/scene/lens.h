@@ -1,11 +1,11 @@
-// The mathematics of every lens model, free of everything else: templates over the scalar, so that cameras (double) and
-// ray-generating kernels (float) share one truth. No allocation, no exceptions, nothing but <cmath>.
+// Projection and unprojection of every lens model, as templates over the scalar type, so that cameras (double) and
+// ray-generating kernels (float) share one implementation. No allocation, no exceptions, no dependency but <cmath>.
 //
 // A lens is a map of a plane onto itself followed by focal lengths and principal point. Perspective lenses distort
-// (x/z, y/z); fisheye lenses distort θ·(cos φ, sin φ), θ being the angle off the optical axis, which reaches past 90°.
-// Such a map is only meant up to where it first folds (its Jacobian determinant, 1 at the centre, reaches zero):
-// nothing beyond the fold is ever returned. The division and the unified model are maps between plane and directions
-// in closed form, both ways, and reach past 90° too.
+// (x/z, y/z); fisheye lenses distort θ·(cos φ, sin φ), θ being the angle off the optical axis, which may exceed 90°.
+// Such a map is valid only up to where it first folds (its Jacobian determinant, 1 at the centre, reaches zero):
+// no point beyond the fold is ever returned. The division model and the unified model map between plane and directions
+// in closed form, both ways, and may exceed 90° too.
 //
 // Source: COLMAP's camera models (src/colmap/sensor/models.h). Division: Fitzgibbon, "Simultaneous linear estimation of
 // multiple view geometry and lens distortion", 2001. EUCM: Khomutenko et al., "An Enhanced Unified Camera Model", 2016.
@@ -52,24 +52,24 @@ inline constexpr LensModel kLensModels[] = {LensModel::simplePinhole,
 
 namespace lens_internal {
 
-// One set of terms that all models fill in part.
+// The terms of all models; each model sets those that it uses.
 template <class T>
 struct Terms {
   T fx, fy, cx, cy;
   bool fisheye = false;
-  bool plain = false;        // the plane itself is not distorted
+  bool plain = false;        // no distortion in the plane
   bool radialFirst = false;  // tangential and prism terms act on the radially distorted point
   bool isFov = false, isDivision = false, isUnified = false;
   T k[6] = {};                           // radial: numerator 1 + Σ k[i] r^(2i+2)
   T d[3] = {};                           // denominator 1 + Σ d[i] r^(2i+2)
   T p1 = 0, p2 = 0;                      // tangential, as OpenCV names them
   T sx1 = 0, sx2 = 0, sy1 = 0, sy2 = 0;  // thin prism: factors of r² and r⁴
-  T omega = 0;                           // of FOV
-  T alpha = 0, beta = 1;                 // of EUCM
+  T omega = 0;                           // FOV
+  T alpha = 0, beta = 1;                 // EUCM
 };
 
 template <class T>
-Terms<T> termsOf(LensModel model, const T* p) {
+Terms<T> unpackLensTerms(LensModel model, const T* p) {
   Terms<T> t{};
   const bool oneFocal = model == LensModel::simplePinhole || model == LensModel::simpleRadial ||
                         model == LensModel::radial || model == LensModel::simpleRadialFisheye ||
@@ -157,7 +157,7 @@ struct Distorted {
   T determinant() const { return xa * yb - xb * ya; }
 };
 
-// The plane map of the polynomial models, with its Jacobian.
+// Evaluates the distortion of the polynomial models at (a, b), with its Jacobian.
 template <class T>
 Distorted<T> distort(const Terms<T>& t, T a, T b) {
   const T r2 = a * a + b * b;
@@ -201,8 +201,8 @@ Distorted<T> distort(const Terms<T>& t, T a, T b) {
   return out;
 }
 
-// Whether the map grows all the way from the centre to (a, b). Sampled: a fold narrower than a sixteenth of the way
-// goes unnoticed.
+// Returns whether the Jacobian determinant stays positive on the way from the centre to (a, b). It is sampled: a fold
+// narrower than a sixteenth of the way is missed.
 template <class T>
 bool isBeforeFold(const Terms<T>& t, T a, T b) {
   constexpr int kSamples = 16;
@@ -213,20 +213,21 @@ bool isBeforeFold(const Terms<T>& t, T a, T b) {
   return true;
 }
 
-// tan(ω/2)·2/ω, the slope at the centre of the FOV model; 1 for ω = 0.
+// Returns tan(ω/2)·2/ω, the slope of the FOV model at the centre; 1 for ω = 0.
 template <class T>
 T fovSlope(T omega) {
   return std::abs(omega) < T(1e-6) ? T(1) : 2 * std::tan(omega / 2) / omega;
 }
 
-// Newton with step halving: the point before the fold that distorts to (x, y).
+// Finds the point (a, b) before the fold that distorts to (x, y), by Newton's method with step halving. Returns false
+// if it does not converge.
 template <class T>
 bool undistort(const Terms<T>& t, T x, T y, T& a, T& b) {
   constexpr T kEpsilon = std::numeric_limits<T>::epsilon();
   a = x;
   b = y;
   Distorted<T> at = distort(t, a, b);
-  for (int i = 0; i < 24 && !(at.determinant() > 0); ++i) {  // a start beyond the fold never comes home
+  for (int i = 0; i < 24 && !(at.determinant() > 0); ++i) {  // from beyond the fold it would not converge
     a *= T(0.75);
     b *= T(0.75);
     at = distort(t, a, b);
@@ -255,7 +256,7 @@ bool undistort(const Terms<T>& t, T x, T y, T& a, T& b) {
   return error < 64 * kEpsilon * scale && isBeforeFold(t, a, b);
 }
 
-// Division model: the direction through (a, b) is (a, b, 1 + k r²). It turns away from the axis as r grows, for k > 0
+// Division model: the direction through (a, b) is (a, b, 1 + k r²). Its angle off the axis grows with r; for k > 0 only
 // until r² = 1/k, where it folds.
 template <class T>
 bool divisionUnproject(T k, T a, T b, T& z) {
@@ -264,14 +265,15 @@ bool divisionUnproject(T k, T a, T b, T& z) {
   return kr2 < 1;
 }
 
-// The smaller root r of k ρ r² - z r + ρ = 0, as a factor of the unit direction's (a, b).
+// Division model: multiplies (a, b) of a unit direction by r / ρ, where r is the smaller root of k ρ r² - z r + ρ = 0.
 template <class T>
 bool divisionProject(T k, T z, T& a, T& b) {
   const T rho2 = a * a + b * b;
   const T square = z * z - 4 * k * rho2;
   if (!(square > 0)) return false;
   const T root = std::sqrt(square);
-  // Behind the camera z + root cancels. On the axis there it is zero, as it is behind every lens with k ≥ 0.
+  // Behind the camera z + root suffers from cancellation, so the other form is used. No finite positive factor exists
+  // on the axis behind the camera, nor anywhere behind a lens with k ≥ 0.
   const T factor = z > 0 ? 2 / (z + root) : (z - root) / (2 * k * rho2);
   if (!(factor > 0)) return false;
   a *= factor;
@@ -295,13 +297,13 @@ bool unifiedUnproject(T alpha, T beta, T a, T b, T& z) {
   return true;
 }
 
-// (a, b) / (α ρ + (1 - α) z) with ρ² = β (a² + b²) + z², of a unit direction.
+// Unified model: divides (a, b) of a unit direction by α ρ + (1 - α) z, with ρ² = β (a² + b²) + z².
 template <class T>
 bool unifiedProject(T alpha, T beta, T z, T& a, T& b) {
   if (!isUnifiedLens(alpha, beta)) return false;
   const T rho = std::sqrt(beta * (a * a + b * b) + z * z);
   const T divisor = alpha * rho + (1 - alpha) * z;
-  // The second is the sign of ∂r/∂θ: beyond it the map folds back.
+  // The second condition is the sign of ∂r/∂θ: where it is negative the map has folded back.
   if (!(divisor > 0) || !(alpha * z + (1 - alpha) * rho > 0)) return false;
   a /= divisor;
   b /= divisor;
@@ -310,12 +312,12 @@ bool unifiedProject(T alpha, T beta, T z, T& a, T& b) {
 
 }  // namespace lens_internal
 
-// Unit direction in camera axes (right, down, forward) of the ray through pixel position (x, y); false where the lens
-// has no inverse. `parameters` as COLMAP orders them.
+// Computes the unit direction in camera axes (right, down, forward) of the ray through pixel position (x, y). Returns
+// false where the lens has no inverse. `parameters` are in COLMAP's order.
 template <class T>
 bool lensUnproject(LensModel model, const T* parameters, T x, T y, T directionOut[3]) {
   using namespace lens_internal;
-  const Terms<T> t = termsOf(model, parameters);
+  const Terms<T> t = unpackLensTerms(model, parameters);
   T a = (x - t.cx) / t.fx, b = (y - t.cy) / t.fy;
   if (!std::isfinite(a) || !std::isfinite(b)) return false;
   if (t.isFov) {
@@ -348,11 +350,11 @@ bool lensUnproject(LensModel model, const T* parameters, T x, T y, T directionOu
   return std::isfinite(length);
 }
 
-// Pixel position of a point in camera axes; false when this lens cannot see it.
+// Computes the pixel position of a point in camera axes. Returns false if the lens cannot see it.
 template <class T>
 bool lensProject(LensModel model, const T* parameters, const T xInCamera[3], T pixelOut[2]) {
   using namespace lens_internal;
-  const Terms<T> t = termsOf(model, parameters);
+  const Terms<T> t = unpackLensTerms(model, parameters);
   T a = xInCamera[0], b = xInCamera[1];
   T z = xInCamera[2];
   if (t.isDivision || t.isUnified) {

@@ -16,7 +16,7 @@ namespace {
 enum class Scalar { i8, u8, i16, u16, i32, u32, f32, f64 };
 constexpr std::array<size_t, 8> kScalarBytes = {1, 1, 2, 2, 4, 4, 4, 8};
 
-size_t bytesOf(Scalar type) {
+size_t scalarSize(Scalar type) {
   return kScalarBytes[static_cast<size_t>(type)];
 }
 
@@ -46,10 +46,10 @@ struct Header {
   bool ascii = false;
   uint64_t points = 0;
   std::vector<Property> properties;
-  size_t bytes = 0;  // up to and with "end_header\n"
+  size_t bytes = 0;  // up to and including "end_header\n"
 };
 
-std::vector<std::string_view> wordsOf(std::string_view line) {
+std::vector<std::string_view> splitWords(std::string_view line) {
   std::vector<std::string_view> words;
   while (true) {
     const size_t begin = line.find_first_not_of(" \t\r\n");
@@ -61,7 +61,7 @@ std::vector<std::string_view> wordsOf(std::string_view line) {
   }
 }
 
-// Takes the next line off `text`.
+// Removes the next line from `text` and returns it.
 std::optional<std::string_view> nextLine(std::string_view& text) {
   const size_t end = text.find('\n');
   if (end == text.npos) return std::nullopt;
@@ -77,7 +77,7 @@ std::optional<Header> decodeHeader(std::string_view text, std::string& reason) {
   for (int lines = 0; lines < 1000; ++lines) {
     const auto line = nextLine(text);
     if (!line) break;
-    const auto words = wordsOf(*line);
+    const auto words = splitWords(*line);
     if (lines == 0) {
       if (words.size() == 1 && words[0] == "ply") continue;
       reason = "does not begin with 'ply'";
@@ -120,8 +120,8 @@ std::optional<Header> decodeHeader(std::string_view text, std::string& reason) {
         return std::nullopt;
       }
       constexpr std::array<std::string_view, 7> kFields = {"x", "y", "z", "red", "green", "blue", "error"};
-      const auto found = std::find(kFields.begin(), kFields.end(), words[2]);
-      header.properties.push_back({static_cast<Field>(found - kFields.begin()), *type});
+      const auto match = std::find(kFields.begin(), kFields.end(), words[2]);
+      header.properties.push_back({static_cast<Field>(match - kFields.begin()), *type});
       if (header.properties.size() > 256) {
         reason = "has more than 256 vertex properties";
         return std::nullopt;
@@ -195,8 +195,8 @@ std::optional<std::vector<SparsePoint>> decodePly(std::span<const std::byte> byt
   text.remove_prefix(header->bytes);
 
   size_t stride = 0;
-  for (const Property& property : header->properties) stride += header->ascii ? 2 : bytesOf(property.type);
-  // A last ASCII number needs no blank after it.
+  for (const Property& property : header->properties) stride += header->ascii ? 2 : scalarSize(property.type);
+  // The last ASCII number need not be followed by a space.
   if (header->points > (text.size() + 1) / stride) {
     reason = fmt::format("claims {} vertices, more than {} bytes can hold", header->points, text.size());
     return std::nullopt;
@@ -211,7 +211,7 @@ std::optional<std::vector<SparsePoint>> decodePly(std::span<const std::byte> byt
     for (SparsePoint& point : points) {
       for (const Property& property : header->properties) {
         set(point, property, load(property.type, at));
-        at += bytesOf(property.type);
+        at += scalarSize(property.type);
       }
     }
     return points;

@@ -8,7 +8,7 @@
 namespace tessera {
 namespace {
 
-std::span<const std::byte> bytesOf(std::string_view text) {
+std::span<const std::byte> asByteSpan(std::string_view text) {
   return std::as_bytes(std::span(text.data(), text.size()));
 }
 
@@ -18,7 +18,7 @@ const std::string kAsciiHeader =
     "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
 
 TEST(Ply, ReadsAsciiAndSkipsWhatItDoesNotKnow) {
-  const auto points = decodePly(bytesOf(kAsciiHeader + "1 2 3 0 10 20 30\n-1e2 0.5 nan 0 255 0 300\n3 0 1 1\n"));
+  const auto points = decodePly(asByteSpan(kAsciiHeader + "1 2 3 0 10 20 30\n-1e2 0.5 nan 0 255 0 300\n3 0 1 1\n"));
   ASSERT_TRUE(points.has_value());
   ASSERT_EQ(points->size(), 2u);
   EXPECT_EQ((*points)[0].xInWorld, Vec3d(1, 2, 3));
@@ -28,7 +28,7 @@ TEST(Ply, ReadsAsciiAndSkipsWhatItDoesNotKnow) {
   EXPECT_EQ((*points)[1].colour, (std::array<uint8_t, 3>{255, 0, 255}));
 }
 
-TEST(Ply, ComesBackExactlyAsItWasWritten) {
+TEST(Ply, ReadsBackExactlyWhatItWrote) {
   std::vector<SparsePoint> points(3);
   points[0] = {Vec3d(1.0 / 3, -1e-17, 123456789.123456789), {1, 2, 255}, 0.75f};
   points[2].xInWorld = Vec3d::Constant(-std::numeric_limits<double>::max());
@@ -44,8 +44,8 @@ TEST(Ply, ComesBackExactlyAsItWasWritten) {
 
 TEST(Ply, ReadsFloatColoursAsFractions) {
   const auto points = decodePly(
-      bytesOf("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
-              "property float red\nproperty float green\nproperty float blue\nend_header\n0 0 0 1 0.5 -3"));
+      asByteSpan("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+                 "property float red\nproperty float green\nproperty float blue\nend_header\n0 0 0 1 0.5 -3"));
   ASSERT_TRUE(points.has_value());
   EXPECT_EQ((*points)[0].colour, (std::array<uint8_t, 3>{255, 128, 0}));
 }
@@ -59,20 +59,20 @@ TEST(Ply, RefusesEveryTruncation) {
 
 TEST(Ply, RefusesCountsThatTheFileCannotHold) {
   std::string reason;
-  EXPECT_FALSE(decodePly(bytesOf("ply\nformat binary_little_endian 1.0\nelement vertex 18446744073709551615\n"
-                                 "property float x\nproperty float y\nproperty float z\nend_header\n"),
+  EXPECT_FALSE(decodePly(asByteSpan("ply\nformat binary_little_endian 1.0\nelement vertex 18446744073709551615\n"
+                                    "property float x\nproperty float y\nproperty float z\nend_header\n"),
                          &reason)
                    .has_value());
   EXPECT_NE(reason.find("claims"), std::string::npos) << reason;
 }
 
 TEST(Ply, RefusesWordsWhereNumbersBelong) {
-  EXPECT_FALSE(decodePly(bytesOf(kAsciiHeader + "1 2 x 0 10 20 30\n1 2 3 0 255 0 300\n")).has_value());
+  EXPECT_FALSE(decodePly(asByteSpan(kAsciiHeader + "1 2 x 0 10 20 30\n1 2 3 0 255 0 300\n")).has_value());
 }
 
 TEST(Ply, RefusesBigEndian) {
-  EXPECT_FALSE(decodePly(bytesOf("ply\nformat binary_big_endian 1.0\nelement vertex 0\nproperty float x\n"
-                                 "property float y\nproperty float z\nend_header\n"))
+  EXPECT_FALSE(decodePly(asByteSpan("ply\nformat binary_big_endian 1.0\nelement vertex 0\nproperty float x\n"
+                                    "property float y\nproperty float z\nend_header\n"))
                    .has_value());
 }
 

@@ -1,5 +1,5 @@
-// The one contract of everything that can draw: the training-time model, the CPU oracle, Vulkan. `eval` and `render`
-// know nothing else.
+// The interface of all renderers: the training-time model, the CPU reference renderer, Vulkan. `eval` and `render` use
+// only this interface.
 #pragma once
 
 #include <optional>
@@ -13,11 +13,11 @@ namespace tessera {
 struct RenderedView {
   ImageF colour;   // 3 channels, premultiplied by opacity, in the trained sRGB space
   ImageF opacity;  // 1 channel
-  // 1 channel: expected z-depth along the optical axis, premultiplied by opacity; 0 where nothing stands
+  // 1 channel: expected z-depth along the optical axis, premultiplied by opacity; 0 where the ray hits nothing
   ImageF depth;
 };
 
-// The picture that people see: 3 channels, opaque.
+// Composites the view over a background colour. Returns the final image: 3 channels, opaque.
 inline ImageF compositeOver(const RenderedView& view, const Eigen::Array3f& background) {
   ImageF image = view.colour;
   for (size_t p = 0; p < image.pixelCount(); ++p) {
@@ -30,13 +30,13 @@ class ViewRenderer {
  public:
   virtual ~ViewRenderer() = default;
 
-  // `opaqueDepth`: z-depth of ordinary models already drawn (1 channel, the camera's size, infinity where nothing is);
-  // rays end there.
+  // Renders one view. Rays end at `opaqueDepth`, the z-depth of opaque geometry that has already been rendered (1
+  // channel, the camera's size, infinity where there is none).
   virtual RenderedView render(const Camera& camera, const Pose& worldFromCamera,
                               const ImageF* opaqueDepth = nullptr) = 0;
-  // What drew it: "cpu avx3 2 threads".
+  // Returns a description of the device that renders, such as "cpu avx3 2 threads".
   virtual std::string device() const = 0;
-  // Colour behind everything, composited under the result by whoever shows it.
+  // Returns the colour of the background, which the caller composites under the rendered view.
   virtual Eigen::Array3f background() const { return Eigen::Array3f::Zero(); }
 };
 

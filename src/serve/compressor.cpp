@@ -8,7 +8,7 @@
 namespace tessera {
 namespace {
 
-std::string keyOf(const SiteFile& file) {
+std::string cacheKey(const SiteFile& file) {
   return file.path().string() + file.tag();
 }
 
@@ -17,10 +17,10 @@ Compressor::Body gzipped(const SiteFile& file) {
   if (deflateInit2(&stream, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK) return nullptr;  // + 16: gzip
   std::array<char, size_t{1} << 15> in, out;
   std::string compressed;
-  bool isWhole = true;
-  for (uint64_t begin = 0; isWhole && begin < file.bytes();) {
+  bool isComplete = true;
+  for (uint64_t begin = 0; isComplete && begin < file.bytes();) {
     const size_t bytes = std::min<uint64_t>(in.size(), file.bytes() - begin);
-    isWhole = file.read(begin, std::span(in).first(bytes));
+    isComplete = file.read(begin, std::span(in).first(bytes));
     begin += bytes;
     stream.next_in = reinterpret_cast<Bytef*>(in.data());
     stream.avail_in = static_cast<uInt>(bytes);
@@ -33,12 +33,12 @@ Compressor::Body gzipped(const SiteFile& file) {
   }
   deflateEnd(&stream);
   compressed.shrink_to_fit();
-  return isWhole ? std::make_shared<const std::string>(std::move(compressed)) : nullptr;
+  return isComplete ? std::make_shared<const std::string>(std::move(compressed)) : nullptr;
 }
 
 }  // namespace
 
-Compressor::Compressor(size_t mostBytes) : mostBytes_(mostBytes), thread_([this] { work(); }) {}
+Compressor::Compressor(size_t maxBytes) : maxBytes_(maxBytes), thread_([this] { work(); }) {}
 
 Compressor::~Compressor() {
   {
@@ -50,7 +50,7 @@ Compressor::~Compressor() {
 }
 
 void Compressor::compress(const std::shared_ptr<const SiteFile>& file, Done done) {
-  std::string key = keyOf(*file);
+  std::string key = cacheKey(*file);
   Body body;
   {
     const std::lock_guard lock(mutex_);
@@ -82,7 +82,7 @@ void Compressor::work() {
     const auto file = std::move(queue_.front());
     queue_.pop_front();
     lock.unlock();
-    const std::string key = keyOf(*file);
+    const std::string key = cacheKey(*file);
     const Body body = gzipped(*file);
     lock.lock();
     auto waiting = waiting_.extract(key);
@@ -94,11 +94,11 @@ void Compressor::work() {
 }
 
 void Compressor::keep(const std::string& key, const Body& body) {
-  const Kept kept{key, body};
-  if (kept.bytes() > mostBytes_) return;
-  bytes_ += kept.bytes();
-  places_[key] = kept_.insert(kept_.end(), kept);
-  while (bytes_ > mostBytes_) {
+  const Kept entry{key, body};
+  if (entry.bytes() > maxBytes_) return;
+  bytes_ += entry.bytes();
+  places_[key] = kept_.insert(kept_.end(), entry);
+  while (bytes_ > maxBytes_) {
     bytes_ -= kept_.front().bytes();
     places_.erase(kept_.front().key);
     kept_.pop_front();

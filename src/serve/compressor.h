@@ -1,4 +1,5 @@
-// Files of text, gzipped on a thread of their own: once for all who ask at the same time.
+// Compresses text files with gzip on a separate thread, once for all concurrent requests of the same file, and caches
+// the results.
 #pragma once
 
 #include <condition_variable>
@@ -21,15 +22,15 @@ class Compressor {
   using Body = std::shared_ptr<const std::string>;
   using Done = std::function<void(Body)>;
 
-  // Keeps what was asked for last, up to so many bytes.
-  explicit Compressor(size_t mostBytes);
-  // Ends the file that is being compressed; who waits for another hears nothing any more.
+  // Caches the most recently used results, up to `maxBytes`.
+  explicit Compressor(size_t maxBytes);
+  // Finishes the file that is being compressed; the callbacks of files still in the queue are never called.
   ~Compressor();
 
-  // Calls `done` once, with all of the file, gzipped, or with nothing where it has been cut off: at once where that is
-  // kept, otherwise later, from the compressor's thread.
+  // Calls `done` once, with the whole file compressed, or with null if the file has been truncated. The call is made
+  // immediately if the result is cached, otherwise later, from the compressor's thread.
   void compress(const std::shared_ptr<const SiteFile>& file, Done done);
-  size_t bytes() const;  // kept
+  size_t bytes() const;  // of the cache
 
  private:
   struct Kept {
@@ -40,12 +41,12 @@ class Compressor {
   void work();
   void keep(const std::string& key, const Body& body);
 
-  const size_t mostBytes_;
+  const size_t maxBytes_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<std::shared_ptr<const SiteFile>> queue_;
   std::map<std::string, std::vector<Done>> waiting_;
-  std::list<Kept> kept_;  // that was asked for longest ago first
+  std::list<Kept> kept_;  // least recently used first
   std::map<std::string, std::list<Kept>::iterator> places_;
   size_t bytes_ = 0;
   bool ended_ = false;

@@ -21,14 +21,14 @@ class CompressorTest : public testing::Test {
     compressor.compress(file, [promise](const Compressor::Body& body) { promise->set_value(body); });
     return promise->get_future();
   }
-  // Text that becomes about half as long.
-  static std::string textOf(size_t bytes, uint32_t seed = 1) {
+  // Returns text that compresses to about half its size.
+  static std::string makeText(size_t bytes, uint32_t seed = 1) {
     std::string text(bytes, ' ');
     for (char& c : text) c = "0123456789abcdef"[(seed = seed * 1664525 + 1013904223) >> 28];
     return text;
   }
-  static std::string inflated(const std::string& bytes, size_t most) {
-    std::string text(most, '\0');
+  static std::string inflated(const std::string& bytes, size_t maximum) {
+    std::string text(maximum, '\0');
     z_stream stream{};
     EXPECT_EQ(inflateInit2(&stream, 15 + 16), Z_OK);
     stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
@@ -44,10 +44,10 @@ class CompressorTest : public testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(CompressorTest, MakesGzipOfWholeFiles) {
+TEST_F(CompressorTest, CompressesWholeFilesAsGzip) {
   Compressor compressor(1 << 20);
   for (const size_t bytes : {1024, 32768, 32769, 65536, 300000}) {
-    const std::string text = textOf(bytes);
+    const std::string text = makeText(bytes);
     const Compressor::Body body = compressed(compressor, file("a.json", text)).get();
     ASSERT_TRUE(body);
     EXPECT_LT(body->size(), bytes * 3 / 4);
@@ -55,11 +55,11 @@ TEST_F(CompressorTest, MakesGzipOfWholeFiles) {
   }
 }
 
-TEST_F(CompressorTest, CompressesOnceForAllWhoAskAtTheSameTime) {
-  Compressor compressor(0);  // keeps nothing
+TEST_F(CompressorTest, CompressesOnceForConcurrentRequests) {
+  Compressor compressor(0);  // caches nothing
   std::promise<void> asked;
-  compressor.compress(file("before.json", textOf(1000)), [&](const Compressor::Body&) { asked.get_future().wait(); });
-  const auto text = file("a.json", textOf(100000));
+  compressor.compress(file("before.json", makeText(1000)), [&](const Compressor::Body&) { asked.get_future().wait(); });
+  const auto text = file("a.json", makeText(100000));
   auto first = compressed(compressor, text), second = compressed(compressor, text);
   asked.set_value();
   const Compressor::Body body = first.get();
@@ -67,48 +67,48 @@ TEST_F(CompressorTest, CompressesOnceForAllWhoAskAtTheSameTime) {
   EXPECT_NE(compressed(compressor, text).get(), body);
 }
 
-TEST_F(CompressorTest, KeepsWhatWasAskedForLastUpToItsBytes) {
+TEST_F(CompressorTest, CachesTheMostRecentlyUsedResults) {
   Compressor compressor(150000);
-  const auto a = file("a.json", textOf(100000, 1)), b = file("b.json", textOf(100000, 2));
-  const auto c = file("c.json", textOf(100000, 3));  // about 57 kB each: two find room
+  const auto a = file("a.json", makeText(100000, 1)), b = file("b.json", makeText(100000, 2));
+  const auto c = file("c.json", makeText(100000, 3));  // about 57 kB each when compressed: two fit
   const Compressor::Body bodyOfA = compressed(compressor, a).get(), bodyOfB = compressed(compressor, b).get();
   EXPECT_EQ(compressed(compressor, a).get(), bodyOfA);
   EXPECT_GT(compressor.bytes(), bodyOfA->size() + bodyOfB->size());
   compressed(compressor, c).get();
   EXPECT_LE(compressor.bytes(), 150000u);
   EXPECT_EQ(compressed(compressor, a).get(), bodyOfA);
-  EXPECT_NE(compressed(compressor, b).get(), bodyOfB) << "it was asked for longest ago";
+  EXPECT_NE(compressed(compressor, b).get(), bodyOfB) << "it is the least recently used";
   const size_t bytes = compressor.bytes();
-  EXPECT_TRUE(compressed(compressor, file("large.json", textOf(1000000))).get());
-  EXPECT_EQ(compressor.bytes(), bytes) << "what is larger than all room drives nothing out";
+  EXPECT_TRUE(compressed(compressor, file("large.json", makeText(1000000))).get());
+  EXPECT_EQ(compressor.bytes(), bytes) << "a result larger than the cache evicts nothing";
 }
 
-TEST_F(CompressorTest, SeesThatAFileHasChanged) {
+TEST_F(CompressorTest, DetectsThatAFileHasChanged) {
   Compressor compressor(1 << 20);
-  const Compressor::Body old = compressed(compressor, file("a.json", textOf(2000, 1))).get();
-  const std::string newer = textOf(2000, 2) + " ";
+  const Compressor::Body old = compressed(compressor, file("a.json", makeText(2000, 1))).get();
+  const std::string newer = makeText(2000, 2) + " ";
   EXPECT_EQ(inflated(*compressed(compressor, file("a.json", newer)).get(), 3000), newer);
 }
 
-TEST_F(CompressorTest, MakesNothingOfAFileThatWasCutOff) {
+TEST_F(CompressorTest, ReturnsNothingForATruncatedFile) {
   Compressor compressor(1 << 20);
-  const auto text = file("a.json", textOf(100000));
+  const auto text = file("a.json", makeText(100000));
   fs::resize_file(folder_ / "a.json", 50000);
   EXPECT_FALSE(compressed(compressor, text).get());
   EXPECT_EQ(compressor.bytes(), 0u);
 }
 
-TEST_F(CompressorTest, EndsWithFilesLeftToDo) {
+TEST_F(CompressorTest, StopsWithFilesStillQueued) {
   int heard = 0;
   std::promise<void> begun;
   {
     Compressor compressor(1 << 20);
-    compressor.compress(file("a.json", textOf(1000)), [&](const Compressor::Body&) {
+    compressor.compress(file("a.json", makeText(1000)), [&](const Compressor::Body&) {
       begun.set_value();
       std::this_thread::sleep_for(std::chrono::milliseconds(200));
     });
     for (int i = 0; i < 5; ++i) {
-      compressor.compress(file(std::to_string(i), textOf(1000)), [&](const Compressor::Body&) { ++heard; });
+      compressor.compress(file(std::to_string(i), makeText(1000)), [&](const Compressor::Body&) { ++heard; });
     }
     begun.get_future().wait();
   }

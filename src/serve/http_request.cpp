@@ -14,7 +14,7 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-// The pieces of a list between commas, trimmed; those that are empty are left out.
+// Visits the trimmed elements of a comma-separated list; empty ones are skipped.
 template <class Visit>
 void forEachElement(std::string_view list, const Visit& visit) {
   while (!list.empty()) {
@@ -75,14 +75,14 @@ std::optional<std::string> pathOfTarget(std::string_view target) {
   return path;
 }
 
-RangeRequest rangeOf(std::string_view header, uint64_t bytes) {
+RangeRequest parseRange(std::string_view header, uint64_t bytes) {
   const size_t equals = header.find('=');
   if (equals == std::string_view::npos || !equalsIgnoringCase(trimmed(header.substr(0, equals)), "bytes")) return {};
   const std::string_view range = trimmed(header.substr(equals + 1));
   const size_t dash = range.find('-');
   if (dash == std::string_view::npos || range.find(',') != std::string_view::npos) return {};
   const std::string_view from = range.substr(0, dash), to = range.substr(dash + 1);
-  if (from.empty()) {  // the last so many
+  if (from.empty()) {  // a suffix range: the last n bytes
     const auto count = numberFrom(to);
     if (!count) return {};
     if (*count == 0 || bytes == 0) return {RangeRequest::none, {}};
@@ -117,15 +117,15 @@ bool acceptsGzip(std::string_view header) {
 }
 
 bool matchesTag(std::string_view header, std::string_view tag) {
-  bool found = false;
+  bool matches = false;
   forEachElement(header, [&](std::string_view element) {
     if (element.starts_with("W/")) element.remove_prefix(2);
-    found = found || element == "*" || element == tag;
+    matches = matches || element == "*" || element == tag;
   });
-  return found;
+  return matches;
 }
 
-std::optional<std::string> hostOf(std::string_view header) {
+std::optional<std::string> parseHost(std::string_view header) {
   header = trimmed(header);
   std::string_view host = header;
   std::string_view rest;

@@ -5,13 +5,13 @@
 namespace tessera {
 namespace {
 
-TEST(PathOfTarget, DecodesAndLeavesTheQueryOut) {
+TEST(PathOfTarget, DecodesThePathWithoutTheQuery) {
   EXPECT_EQ(pathOfTarget("/"), "/");
   EXPECT_EQ(pathOfTarget("/scene/tiles/L0/a-0f.glb?v=1#x"), "/scene/tiles/L0/a-0f.glb");
   EXPECT_EQ(pathOfTarget("/a%20b/%C3%A9.json"), "/a b/é.json");
 }
 
-TEST(PathOfTarget, IsNoneThatCouldLeaveAFolder) {
+TEST(PathOfTarget, RejectsPathsThatCouldLeaveAFolder) {
   for (const char* target : {"",
                              "a",
                              "*",
@@ -42,8 +42,8 @@ TEST(PathOfTarget, IsNoneThatCouldLeaveAFolder) {
   }
 }
 
-TEST(RangeOf, IsThePartOfTheFileThatIsAskedFor) {
-  const auto part = [](const char* header) { return rangeOf(header, 100); };
+TEST(ParseRange, ReturnsTheRequestedPartOfTheFile) {
+  const auto part = [](const char* header) { return parseRange(header, 100); };
   EXPECT_EQ(part("bytes=0-9").range, (ByteRange{0, 10}));
   EXPECT_EQ(part("bytes=90-").range, (ByteRange{90, 100}));
   EXPECT_EQ(part("bytes=-7").range, (ByteRange{93, 100}));
@@ -53,18 +53,18 @@ TEST(RangeOf, IsThePartOfTheFileThatIsAskedFor) {
   EXPECT_EQ(part("bytes=0-9").kind, RangeRequest::part);
 }
 
-TEST(RangeOf, IsNoneBehindTheEndAndAllWhereItIsMalformed) {
+TEST(ParseRange, ReturnsNoneBeyondTheEndAndTheWholeFileIfMalformed) {
   for (const char* header : {"bytes=100-", "bytes=100-200", "bytes=-0"}) {
-    EXPECT_EQ(rangeOf(header, 100).kind, RangeRequest::none) << header;
+    EXPECT_EQ(parseRange(header, 100).kind, RangeRequest::none) << header;
   }
-  EXPECT_EQ(rangeOf("bytes=0-", 0).kind, RangeRequest::none);
+  EXPECT_EQ(parseRange("bytes=0-", 0).kind, RangeRequest::none);
   for (const char* header : {"", "bytes", "bytes=", "bytes=-", "bytes=a-b", "bytes=5-2", "lines=0-1", "bytes=0-1,3-4",
                              "bytes=0x1-2", "bytes=-1-2", "bytes=99999999999999999999-"}) {
-    EXPECT_EQ(rangeOf(header, 100).kind, RangeRequest::whole) << header;
+    EXPECT_EQ(parseRange(header, 100).kind, RangeRequest::whole) << header;
   }
 }
 
-TEST(AcceptsGzip, FollowsWeightsAndStars) {
+TEST(AcceptsGzip, RespectsWeightsAndWildcards) {
   for (const char* header : {"gzip", "br, gzip;q=0.5", "*", "GZIP", "x-gzip", "deflate, *;q=0.1"}) {
     EXPECT_TRUE(acceptsGzip(header)) << header;
   }
@@ -81,12 +81,12 @@ TEST(MatchesTag, ComparesTagsOfAList) {
   EXPECT_FALSE(matchesTag("", "\"a\""));
 }
 
-TEST(HostOf, LeavesThePortOut) {
-  EXPECT_EQ(hostOf("LocalHost:8080"), "localhost");
-  EXPECT_EQ(hostOf("127.0.0.1"), "127.0.0.1");
-  EXPECT_EQ(hostOf("[::1]:80"), "::1");
+TEST(ParseHost, ReturnsTheHostWithoutThePort) {
+  EXPECT_EQ(parseHost("LocalHost:8080"), "localhost");
+  EXPECT_EQ(parseHost("127.0.0.1"), "127.0.0.1");
+  EXPECT_EQ(parseHost("[::1]:80"), "::1");
   for (const char* header : {"", ":80", "[::1", "a:b", "a:", "[::1]80"})
-    EXPECT_EQ(hostOf(header), std::nullopt) << header;
+    EXPECT_EQ(parseHost(header), std::nullopt) << header;
 }
 
 }  // namespace

@@ -4,8 +4,8 @@
 #include <netinet/tcp.h>
 #include <sys/resource.h>
 
-#include <utility>  // Boost 1.74 forgets it
-// after utility
+#include <utility>  // which Boost 1.74 does not include itself
+// The following must come after utility.
 #include <boost/asio.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
@@ -23,12 +23,12 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 using asio::ip::tcp;
 
-constexpr size_t kMostHeader = 8192, kChunk = size_t{1} << 16;
-constexpr size_t kMostCompressed = size_t{32} << 20;  // bytes of text, kept
-constexpr int kMostUnsent = 1 << 17;                  // bytes that the system holds back for one client
-constexpr size_t kMostDiscarded = size_t{1} << 20;
+constexpr size_t kMaxHeader = 8192, kChunk = size_t{1} << 16;
+constexpr size_t kMaxCompressed = size_t{32} << 20;  // bytes of compressed text in the cache
+constexpr int kMaxUnsent = 1 << 17;                  // bytes that the system buffers for one client
+constexpr size_t kMaxDiscarded = size_t{1} << 20;
 
-// As many sockets as the system lets a process have.
+// Raises the limit of open files to the maximum that the system allows for the process.
 void raiseFileLimit() {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
@@ -48,9 +48,9 @@ struct HttpServer::State {
   asio::io_context context{1};
   tcp::acceptor acceptor{context};
   asio::steady_timer poll{context}, acceptAgain{context};
-  std::list<std::shared_ptr<Connection>> connections;  // the one that was silent for longest first
+  std::list<std::shared_ptr<Connection>> connections;  // least recently active first
   std::atomic<size_t> count = 0;
-  Compressor compressor{kMostCompressed};  // ends before what it calls
+  Compressor compressor{kMaxCompressed};  // declared last: it ends before the objects that its callbacks use
 };
 
 class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
@@ -70,7 +70,7 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     stream_.socket().shutdown(tcp::socket::shutdown_both, ignored);
     stream_.close();
     State& state = state_;
-    state.connections.erase(place_);  // may be the last to hold this
+    state.connections.erase(place_);  // may be the last reference to this
     state.count = state.connections.size();
   }
 
@@ -79,8 +79,8 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
 
   void read(std::chrono::milliseconds time) {
     parser_.emplace();
-    parser_->header_limit(kMostHeader);
-    parser_->body_limit(UINT64_MAX);  // none is read
+    parser_->header_limit(kMaxHeader);
+    parser_->body_limit(UINT64_MAX);  // no body is read
     stream_.expires_after(time);
     http::async_read_header(stream_, buffer_, *parser_,
                             [self = shared_from_this()](beast::error_code error, size_t) { self->onRequest(error); });
@@ -89,7 +89,7 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
   void onRequest(beast::error_code error) {
     if (!open_) return;
     if (error) {
-      // What is no HTTP is told so; who has gone or was silent for too long is not.
+      // Malformed requests get an answer; clients that have disconnected or timed out do not.
       const bool malformed = error.category() == http::make_error_code(http::error::bad_method).category() &&
                              error != http::error::end_of_stream && error != http::error::partial_message;
       if (!malformed) return close();
@@ -97,7 +97,7 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     }
     heard();
     const auto& message = parser_->get();
-    // RFC 9112, section 3.2. Of two, who stands between may have gone by the other.
+    // RFC 9112, section 3.2. With two Host fields a proxy may have used the other one.
     const size_t hosts = message.count(http::field::host);
     if (hosts > 1 || (hosts == 0 && message.version() == 11)) return refuse(400);
     const auto field = [&](http::field name) { return std::string(message[name]); };
@@ -109,7 +109,7 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     request.ifRange = field(http::field::if_range);
     request.ifNoneMatch = field(http::field::if_none_match);
     request.acceptEncoding = field(http::field::accept_encoding);
-    // What follows a request with a body would be taken for the next one.
+    // The body is not read and would be taken for the next request, so the connection is closed after the answer.
     const bool hasBody = message.count(http::field::transfer_encoding) > 0 ||
                          (message.has_content_length() && field(http::field::content_length) != "0");
     send(state_.site.answer(request), message.version(), message.keep_alive() && !hasBody);
@@ -119,7 +119,7 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     SiteAnswer refused;
     refused.status = status;
     refused.headers = {{"Content-Type", "text/plain; charset=utf-8"}};
-    refused.body = "this is no request that is understood\n";
+    refused.body = "the request is malformed\n";
     refused.length = refused.body.size();
     send(std::move(refused), 11, false);
   }
@@ -130,14 +130,14 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     keepAlive_ = keepAlive;
     if (!answer_.isGzipped) return sendHeader();
     state_.compressor.compress(answer_.file, [self = shared_from_this()](const Compressor::Body& body) mutable {
-      asio::io_context& context = self->state_.context;  // whose thread is to be the one that lets go of the connection
+      asio::io_context& context = self->state_.context;  // whose thread must release the connection
       asio::post(context, [self = std::move(self), body] { self->onCompressed(body); });
     });
   }
 
   void onCompressed(const Compressor::Body& body) {
     if (!open_) return;
-    if (!body) return close();  // it has been cut off
+    if (!body) return close();  // the file has been truncated
     compressed_ = body;
     answer_.length = body->size();
     sendHeader();
@@ -169,23 +169,23 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
       if (!keepAlive_) return linger();
       return read(state_.settings.idleTime);
     }
-    const size_t wanted = std::min<uint64_t>(left_, kChunk);
+    const size_t bytes = std::min<uint64_t>(left_, kChunk);
     asio::const_buffer next;
     if (compressed_) {
-      next = asio::buffer(compressed_->data() + (answer_.length - left_), wanted);
+      next = asio::buffer(compressed_->data() + (answer_.length - left_), bytes);
     } else {
-      chunk_.resize(wanted);
-      if (!answer_.file->read(answer_.bytes.end - left_, chunk_)) return close();  // it has been cut off
+      chunk_.resize(bytes);
+      if (!answer_.file->read(answer_.bytes.end - left_, chunk_)) return close();  // the file has been truncated
       next = asio::buffer(chunk_);
     }
-    left_ -= wanted;
+    left_ -= bytes;
     stream_.expires_after(state_.settings.sendTime);
     asio::async_write(stream_, next,
                       [self = shared_from_this()](beast::error_code failed, size_t) { self->onSent(failed); });
   }
 
-  // Where a socket is closed before all that has come is read, the system tells the client of an error, and it may not
-  // come to read the answer.
+  // If a socket is closed before all received bytes are read, the system resets the connection, and the client may lose
+  // the answer. So its input is read and discarded for a while.
   void linger() {
     beast::error_code error;
     stream_.socket().shutdown(tcp::socket::shutdown_send, error);
@@ -196,11 +196,11 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
 
   void discard() {
     buffer_.clear();
-    stream_.async_read_some(buffer_.prepare(kMostHeader),
+    stream_.async_read_some(buffer_.prepare(kMaxHeader),
                             [self = shared_from_this()](beast::error_code error, size_t bytes) {
                               if (!self->open_) return;
                               self->discarded_ += bytes;
-                              if (error || self->discarded_ > kMostDiscarded) return self->close();
+                              if (error || self->discarded_ > kMaxDiscarded) return self->close();
                               self->discard();
                             });
   }
@@ -208,13 +208,13 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
   beast::tcp_stream stream_;
   State& state_;
   std::list<std::shared_ptr<Connection>>::iterator place_;
-  beast::flat_static_buffer<kMostHeader> buffer_;
+  beast::flat_static_buffer<kMaxHeader> buffer_;
   std::optional<http::request_parser<http::empty_body>> parser_;
   SiteAnswer answer_;
   Compressor::Body compressed_;
   std::string header_;
   std::vector<char> chunk_;
-  uint64_t left_ = 0;  // of the file, or of what is compressed
+  uint64_t left_ = 0;  // bytes still to send of the file or of its compressed form
   size_t discarded_ = 0;
   unsigned version_ = 11;
   bool keepAlive_ = true, open_ = true;
@@ -223,7 +223,7 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
 void HttpServer::State::accept() {
   acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
-    if (error) {  // too many files, say: the oldest makes room, and there is time for it
+    if (error) {  // for example too many open files: closes the least recently active connection and retries later
       if (!connections.empty()) connections.front()->close();
       acceptAgain.expires_after(std::chrono::milliseconds(50));
       acceptAgain.async_wait([this](beast::error_code cancelled) {
@@ -233,9 +233,9 @@ void HttpServer::State::accept() {
     }
     beast::error_code ignored;
     socket.set_option(tcp::no_delay(true), ignored);
-    // The system would take megabytes from us for each client that does not read.
-    ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kMostUnsent, sizeof kMostUnsent);
-    if (connections.size() >= settings.mostConnections) connections.front()->close();
+    // Without this the system would buffer megabytes for each client that does not read.
+    ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kMaxUnsent, sizeof kMaxUnsent);
+    if (connections.size() >= settings.maxConnections) connections.front()->close();
     std::make_shared<Connection>(std::move(socket), *this)->begin();
     accept();
   });
@@ -262,7 +262,7 @@ HttpServer::HttpServer(const StaticSite& site, const HttpServerSettings& setting
     refuse("is in use by another program", "choose another --port, or 0 for one that is free");
   }
   if (error == beast::errc::address_not_available) refuse("is no address of this machine", another);
-  if (error) refuse("cannot be listened at: " + error.message(), "choose another --port or --address");
+  if (error) refuse("cannot be bound: " + error.message(), "choose another --port or --address");
 }
 
 HttpServer::~HttpServer() = default;

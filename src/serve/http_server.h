@@ -1,5 +1,5 @@
-// HTTP/1.1 over TCP, asynchronous: a client that stalls costs a socket and small buffers, here and in the system, and
-// its turn ends.
+// An asynchronous HTTP/1.1 server over TCP. A client that stalls costs a socket and small buffers, in the process and
+// in the operating system, and is disconnected after a timeout.
 #pragma once
 
 #include <atomic>
@@ -15,25 +15,25 @@ namespace tessera {
 
 struct HttpServerSettings {
   std::string address = "127.0.0.1";
-  uint16_t port = 8080;                          // 0: one that is free
-  size_t mostConnections = 2048;                 // beyond, the one that has been silent for longest is closed
-  std::chrono::milliseconds requestTime{15000};  // for a whole request to come
+  uint16_t port = 8080;                          // 0: any free port
+  size_t maxConnections = 2048;                  // beyond, the connection that has been idle for longest is closed
+  std::chrono::milliseconds requestTime{15000};  // to receive a whole request
   std::chrono::milliseconds idleTime{60000};     // between requests
-  std::chrono::milliseconds sendTime{30000};     // for a client to take the next 64 KiB
-  std::chrono::milliseconds lingerTime{2000};    // for a client to hear the last answer, while what it sends is read
+  std::chrono::milliseconds sendTime{30000};     // for a client to receive the next 64 KiB
+  std::chrono::milliseconds lingerTime{2000};  // to let a client receive the last answer, while its input is discarded
 };
 
 class HttpServer {
  public:
-  // Listens. Keeps a reference to the site. Throws Error where the address is none or taken.
+  // Starts to listen. Keeps a reference to `site`. Throws Error if the address is invalid or in use.
   HttpServer(const StaticSite& site, const HttpServerSettings& settings);
   ~HttpServer();
 
   uint16_t port() const;
-  // Serves until `stop` is called (from any thread), or `stopped`, asked now and then, says so.
+  // Serves until `stop` is called (from any thread), or `stopped`, which is called five times a second, returns true.
   void run(const std::function<bool()>& stopped = {});
   void stop();
-  size_t connections() const;  // open now
+  size_t connections() const;  // currently open
 
  private:
   class Connection;

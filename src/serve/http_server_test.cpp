@@ -22,7 +22,7 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-// A socket that goes away.
+// A client socket, closed by its destructor.
 class Client {
  public:
   explicit Client(uint16_t port, int receiveBytes = 0) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
@@ -37,7 +37,7 @@ class Client {
   Client(Client&& other) noexcept : socket_(std::exchange(other.socket_, -1)) {}
 
   bool isConnected() const { return socket_ >= 0; }
-  // Whether all of it was taken.
+  // Returns whether the whole text was accepted.
   bool send(const std::string& text) const {
     return ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
   }
@@ -46,7 +46,7 @@ class Client {
     socket_ = -1;
   }
 
-  // Bytes that the system holds for this client and could not send yet, where the server is this process.
+  // Returns the bytes that the system buffers for this client but has not sent yet; the server must be in this process.
   int unsent() const {
     sockaddr_in own{}, peer{};
     socklen_t size = sizeof own;
@@ -61,7 +61,7 @@ class Client {
     }
     return -1;
   }
-  // Until the server closes, `bytes` are there, or the time is over.
+  // Receives until the server closes the connection, `bytes` have arrived, or the time is over.
   std::string receive(size_t bytes = SIZE_MAX, std::chrono::milliseconds time = 5s) const {
     std::string received;
     const auto end = Clock::now() + time;
@@ -76,12 +76,12 @@ class Client {
     }
     return received;
   }
-  // Whether all was received that the server sent, and it was told of no error.
+  // Returns whether everything that the server sent was received, and the connection was closed without an error.
   bool isAtEnd() const {
     char byte;
     return ::recv(socket_, &byte, 1, MSG_DONTWAIT) == 0;
   }
-  // Whether the server has closed by then.
+  // Returns whether the server closes the connection within `time`.
   bool isLeft(std::chrono::milliseconds time) const {
     const auto end = Clock::now() + time;
     while (Clock::now() < end) {
@@ -123,7 +123,7 @@ class HttpServerTest : public testing::Test {
   static std::string get(const std::string& target, const std::string& more = "Connection: close\r\n") {
     return "GET " + target + " HTTP/1.1\r\nHost: localhost\r\n" + more + "\r\n";
   }
-  static std::string bodyOf(const std::string& answer) {
+  static std::string extractBody(const std::string& answer) {
     const size_t end = answer.find("\r\n\r\n");
     return end == std::string::npos ? "" : answer.substr(end + 4);
   }
@@ -140,13 +140,13 @@ TEST_F(HttpServerTest, SendsFilesWholeAndInParts) {
   const std::string whole = exchange(get("/tile.glb"));
   EXPECT_TRUE(whole.starts_with("HTTP/1.1 200 OK\r\n"));
   EXPECT_NE(whole.find("Content-Length: 3000000\r\n"), std::string::npos);
-  EXPECT_EQ(bodyOf(whole), tile_);
+  EXPECT_EQ(extractBody(whole), tile_);
   const std::string part = exchange(get("/tile.glb", "Range: bytes=100000-299999\r\nConnection: close\r\n"));
   EXPECT_TRUE(part.starts_with("HTTP/1.1 206 Partial Content\r\n"));
-  EXPECT_EQ(bodyOf(part), tile_.substr(100000, 200000));
+  EXPECT_EQ(extractBody(part), tile_.substr(100000, 200000));
 }
 
-TEST_F(HttpServerTest, AnswersRequestAfterRequestOfOneClient) {
+TEST_F(HttpServerTest, AnswersSeveralRequestsOnOneConnection) {
   start();
   const Client one = client();
   one.send(get("/small.txt", "") + get("/nothing", "") + "HEAD /tile.glb HTTP/1.1\r\nHost: x\r\n\r\n" +
@@ -159,8 +159,8 @@ TEST_F(HttpServerTest, AnswersRequestAfterRequestOfOneClient) {
   EXPECT_LT(all.size(), 2000u) << "HEAD sends no body";
 }
 
-// Sanitizers take memory of their own: AddressSanitizer keeps so much of what was freed, to tell its uses, and
-// ThreadSanitizer notes who last touched each word, which takes several times its size.
+// The additional memory of sanitizers: AddressSanitizer keeps freed memory in quarantine, and ThreadSanitizer stores
+// the last accesses to each word, which takes several times its size.
 #if defined(__SANITIZE_ADDRESS__)
 constexpr int64_t kSanitizerBytes = int64_t{256} << 20;
 #elif defined(__SANITIZE_THREAD__)
@@ -177,20 +177,20 @@ TEST_F(HttpServerTest, ServesAnHonestClientBesideManyThatStall) {
     stalled.push_back(client());
     ASSERT_TRUE(stalled.back().isConnected());
     const char* const kinds[] = {"", "GET /tile.glb HT", "GET /tile.glb HTTP/1.1\r\nHost: x\r\nX: "};
-    // The last kind asks and does not read.
+    // The last kind sends a request and does not read the answer.
     stalled.back().send(i % 4 < 3 ? kinds[i % 4] : get("/tile.glb", ""));
   }
   for (int i = 0; i < 200 && server_->connections() < 500; ++i) std::this_thread::sleep_for(10ms);
   EXPECT_EQ(server_->connections(), 500u);
   for (int i = 0; i < 5; ++i) {
     const auto begin = Clock::now();
-    EXPECT_EQ(bodyOf(exchange(get("/tile.glb"))), tile_);
+    EXPECT_EQ(extractBody(exchange(get("/tile.glb"))), tile_);
     EXPECT_LT(Clock::now() - begin, 1s);
   }
   EXPECT_LT(residentBytes() - before, (int64_t{48} << 20) + kSanitizerBytes);
 }
 
-TEST_F(HttpServerTest, HandsTheSystemNoMoreThanItCanSendSoon) {
+TEST_F(HttpServerTest, LimitsTheBytesBufferedByTheSystem) {
   start();
   const Client deaf(server_->port(), 4096);
   deaf.send(get("/tile.glb", ""));
@@ -206,7 +206,7 @@ TEST_F(HttpServerTest, HandsTheSystemNoMoreThanItCanSendSoon) {
 }
 
 TEST_F(HttpServerTest, AnswersOthersWhileItCompresses) {
-  std::string text;  // as much as is compressed at all, and hard to compress
+  std::string text;  // of the largest size that is compressed, and hard to compress
   for (uint32_t i = 0, seed = 1; i < uint32_t{16} << 20; ++i) {
     text.push_back("0123456789abcdef"[(seed = seed * 1664525 + 1013904223) >> 28]);
   }
@@ -217,16 +217,16 @@ TEST_F(HttpServerTest, AnswersOthersWhileItCompresses) {
     one->send(get("/large.json", "Accept-Encoding: gzip\r\nConnection: close\r\n"));
   }
   std::this_thread::sleep_for(50ms);
-  EXPECT_EQ(bodyOf(exchange(get("/small.txt"))), "hello");
+  EXPECT_EQ(extractBody(exchange(get("/small.txt"))), "hello");
   EXPECT_EQ(waiting.receive(1, 1ms), "") << "the compressed file came first";
   const std::string answer = waiting.receive(SIZE_MAX, 60s);
   EXPECT_TRUE(answer.starts_with("HTTP/1.1 200 OK\r\n"));
-  EXPECT_NE(answer.find("Content-Length: " + std::to_string(bodyOf(answer).size()) + "\r\n"), std::string::npos);
-  EXPECT_TRUE(bodyOf(answer).starts_with("\x1f\x8b"));
+  EXPECT_NE(answer.find("Content-Length: " + std::to_string(extractBody(answer).size()) + "\r\n"), std::string::npos);
+  EXPECT_TRUE(extractBody(answer).starts_with("\x1f\x8b"));
   EXPECT_EQ(alsoWaiting.receive(SIZE_MAX, 60s), answer);
 }
 
-TEST_F(HttpServerTest, EndsTheTurnOfClientsThatStall) {
+TEST_F(HttpServerTest, DisconnectsClientsThatStall) {
   HttpServerSettings settings;
   settings.requestTime = settings.idleTime = settings.sendTime = 200ms;
   start(settings);
@@ -241,7 +241,7 @@ TEST_F(HttpServerTest, EndsTheTurnOfClientsThatStall) {
   EXPECT_EQ(server_->connections(), 0u);
 }
 
-TEST_F(HttpServerTest, OutlivesWhatIsNoRequest) {
+TEST_F(HttpServerTest, SurvivesMalformedRequests) {
   start();
   for (const std::string& request :
        {std::string("\r\n\r\n"), std::string("GET\r\n\r\n"), std::string("GET / HTTP/9.9\r\n\r\n"),
@@ -253,20 +253,20 @@ TEST_F(HttpServerTest, OutlivesWhatIsNoRequest) {
     const std::string answer = one.receive(SIZE_MAX, 500ms);
     EXPECT_TRUE(answer.empty() || answer.starts_with("HTTP/1.1 4")) << answer.substr(0, 80);
   }
-  // Cut off at every place.
+  // Sends a request truncated at every position.
   const std::string request = get("/tile.glb", "Range: bytes=0-10\r\n");
   for (size_t length = 0; length < request.size(); ++length) client().send(request.substr(0, length));
-  EXPECT_EQ(bodyOf(exchange(get("/small.txt"))), "hello");
+  EXPECT_EQ(extractBody(exchange(get("/small.txt"))), "hello");
 }
 
-TEST_F(HttpServerTest, WantsOneHost) {
+TEST_F(HttpServerTest, RequiresExactlyOneHost) {
   start();
   EXPECT_TRUE(exchange("GET /small.txt HTTP/1.1\r\n\r\n").starts_with("HTTP/1.1 400 "));
   EXPECT_TRUE(exchange(get("/small.txt", "Host: b\r\n")).starts_with("HTTP/1.1 400 "));
   EXPECT_TRUE(exchange("GET /small.txt HTTP/1.0\r\n\r\n").starts_with("HTTP/1.0 200 "));
 }
 
-TEST_F(HttpServerTest, SendsWhatItOpenedWhateverBecomesOfThePath) {
+TEST_F(HttpServerTest, SendsTheOpenedFileWhateverHappensToItsPath) {
   start();
   const Client one(server_->port(), 4096), other(server_->port(), 4096);
   one.send(get("/tile.glb"));
@@ -281,17 +281,17 @@ TEST_F(HttpServerTest, SendsWhatItOpenedWhateverBecomesOfThePath) {
   EXPECT_TRUE(other.isAtEnd());
 }
 
-TEST_F(HttpServerTest, DoesNotTakeABodyForTheNextRequest) {
+TEST_F(HttpServerTest, DoesNotMistakeABodyForTheNextRequest) {
   start();
   const std::string smuggled = get("/tile.glb", "");
   const std::string length = "Content-Length: " + std::to_string(smuggled.size()) + "\r\n";
   const std::string refused = exchange("POST / HTTP/1.1\r\nHost: x\r\n" + length + "\r\n" + smuggled);
   EXPECT_TRUE(refused.starts_with("HTTP/1.1 405 ")) << refused;
   EXPECT_EQ(refused.find("200 OK"), std::string::npos);
-  EXPECT_EQ(bodyOf(exchange(get("/small.txt", length) + smuggled)), "hello");
+  EXPECT_EQ(extractBody(exchange(get("/small.txt", length) + smuggled)), "hello");
 }
 
-TEST_F(HttpServerTest, LetsClientsHearTheAnswerWhoAreStillSending) {
+TEST_F(HttpServerTest, DeliversTheAnswerToClientsThatAreStillSending) {
   start();
   const std::string body(300000, 'x');
   const std::string length = "Content-Length: " + std::to_string(2 * body.size()) + "\r\n";
@@ -299,14 +299,14 @@ TEST_F(HttpServerTest, LetsClientsHearTheAnswerWhoAreStillSending) {
                                    std::string("no request\r\n\r\n"), get("/small.txt")}) {
     const Client one = client();
     EXPECT_TRUE(one.send(begin + body));
-    std::this_thread::sleep_for(100ms);  // the answer is on its way
+    std::this_thread::sleep_for(100ms);  // the answer is being sent
     EXPECT_TRUE(one.send(body));
     EXPECT_TRUE(one.receive().starts_with("HTTP/1.1 "));
     EXPECT_TRUE(one.isAtEnd());
   }
 }
 
-TEST_F(HttpServerTest, ReadsNoFurtherForLong) {
+TEST_F(HttpServerTest, LimitsTheTimeForWhichItDiscardsInput) {
   HttpServerSettings settings;
   settings.lingerTime = 300ms;
   start(settings);
@@ -317,7 +317,7 @@ TEST_F(HttpServerTest, ReadsNoFurtherForLong) {
   EXPECT_LT(Clock::now() - begin, 5s);
 }
 
-TEST_F(HttpServerTest, ReadsNotMuchFurther) {
+TEST_F(HttpServerTest, LimitsTheBytesThatItDiscards) {
   HttpServerSettings settings;
   settings.lingerTime = 60s;
   start(settings);
@@ -329,9 +329,9 @@ TEST_F(HttpServerTest, ReadsNotMuchFurther) {
   EXPECT_LT(sent, 100);
 }
 
-TEST_F(HttpServerTest, ClosesTheOldestWhereThereAreTooMany) {
+TEST_F(HttpServerTest, ClosesTheLeastRecentlyActiveConnectionBeyondTheLimit) {
   HttpServerSettings settings;
-  settings.mostConnections = 3;
+  settings.maxConnections = 3;
   start(settings);
   const Client first = client();
   std::vector<Client> others;
@@ -341,7 +341,7 @@ TEST_F(HttpServerTest, ClosesTheOldestWhereThereAreTooMany) {
   EXPECT_TRUE(others[2].receive(1000, 300ms).ends_with("hello"));
 }
 
-TEST_F(HttpServerTest, SaysThatAnAddressIsTakenOrNone) {
+TEST_F(HttpServerTest, ReportsAddressesThatAreInUseOrInvalid) {
   start();
   HttpServerSettings settings;
   settings.port = server_->port();
@@ -355,7 +355,7 @@ TEST_F(HttpServerTest, SaysThatAnAddressIsTakenOrNone) {
   };
   EXPECT_EQ(said(), "is in use by another program; choose another --port, or 0 for one that is free");
   const std::string another = "; name one with --address, as 127.0.0.1, or 0.0.0.0 for all that it has";
-  settings.address = "192.0.2.1";  // of documentation alone
+  settings.address = "192.0.2.1";  // reserved for documentation
   EXPECT_EQ(said(), "is no address of this machine" + another);
   settings.address = "somewhere";
   EXPECT_EQ(said(), "is no IP address" + another);

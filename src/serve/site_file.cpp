@@ -25,7 +25,7 @@ class Descriptor {
   Descriptor& operator=(const Descriptor&) = delete;
   int operator*() const { return number_; }
   int release() { return std::exchange(number_, -1); }
-  // The name by which the system knows what is open.
+  // Returns the path by which the system refers to the open file.
   std::string link() const { return fmt::format("/proc/self/fd/{}", number_); }
 
  private:
@@ -36,19 +36,19 @@ bool hasTooManyOpen() {
   return errno == EMFILE || errno == ENFILE;
 }
 
-// Where what is open lies now, without links.
-std::optional<fs::path> pathOf(const Descriptor& open, const struct stat& status) {
+// Returns the current path of the open file, without links.
+std::optional<fs::path> resolveOpenPath(const Descriptor& open, const struct stat& status) {
   std::array<char, PATH_MAX> text;
   const ssize_t length = ::readlink(open.link().c_str(), text.data(), text.size());
   if (length <= 0 || static_cast<size_t>(length) == text.size()) return std::nullopt;
   std::string path(text.data(), static_cast<size_t>(length));
-  // One that was replaced since it was found is served as what it was.
+  // A file that has been replaced since it was opened is served under its former path.
   constexpr std::string_view kDeleted = " (deleted)";
   if (status.st_nlink == 0 && path.ends_with(kDeleted)) path.resize(path.size() - kDeleted.size());
   return path;
 }
 
-// Without a part that begins with a dot on the way.
+// Returns whether the file lies below the folder, without a part that begins with a dot in between.
 bool isBelow(const fs::path& file, const fs::path& folder) {
   const auto [end, inFile] = std::mismatch(folder.begin(), folder.end(), file.begin(), file.end());
   return end == folder.end() && inFile != file.end() &&
@@ -58,15 +58,15 @@ bool isBelow(const fs::path& file, const fs::path& folder) {
 }  // namespace
 
 SiteFile::Opening SiteFile::open(const fs::path& folder, const std::string& relative) {
-  // Found first without being opened, as a pipe would wait and a device may act; then that very one, not its path
-  // again.
-  const Descriptor found(::open((folder / relative).c_str(), O_PATH | O_CLOEXEC));
-  if (*found < 0) return {nullptr, hasTooManyOpen()};
+  // The path is first resolved without opening the file, because opening a pipe would block and opening a device may
+  // have effects; then the same file is opened, through its descriptor rather than through its path again.
+  const Descriptor pathHandle(::open((folder / relative).c_str(), O_PATH | O_CLOEXEC));
+  if (*pathHandle < 0) return {nullptr, hasTooManyOpen()};
   struct stat status;
-  if (::fstat(*found, &status) != 0 || !S_ISREG(status.st_mode)) return {};
-  auto path = pathOf(found, status);
+  if (::fstat(*pathHandle, &status) != 0 || !S_ISREG(status.st_mode)) return {};
+  auto path = resolveOpenPath(pathHandle, status);
   if (!path || !isBelow(*path, folder)) return {};
-  Descriptor readable(::open(found.link().c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY));
+  Descriptor readable(::open(pathHandle.link().c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY));
   if (*readable < 0) return {nullptr, hasTooManyOpen()};
   if (::fstat(*readable, &status) != 0) return {};
   const auto bytes = static_cast<uint64_t>(status.st_size);

@@ -1,4 +1,5 @@
-// A file of a site, opened: what is said of it, and what is sent, is of this one, whatever its path leads to by then.
+// An open file of a site. Its properties and its bytes are those of the file that was opened, even if its path leads to
+// another file by now.
 #pragma once
 
 #include <cstdint>
@@ -13,23 +14,25 @@ namespace tessera {
 class SiteFile {
  public:
   struct Opening {
-    std::shared_ptr<const SiteFile> file;  // nothing where there is no such file
-    bool isBusy = false;                   // as this process, or the machine, has too many open
+    std::shared_ptr<const SiteFile> file;  // null if there is no such file
+    bool isBusy = false;                   // `file` is null because too many files are open
   };
-  // Opens `folder / relative` to be read where what was opened is a plain file below the folder, which is canonical.
-  // Links are followed and may lead anywhere but to a place outside, or to one with a part that begins with a dot. What
-  // else a path leads to (a pipe, a device) is not touched. Needs /proc.
+  // Opens `folder / relative` for reading if it is a regular file below the folder, whose path must be canonical. Links
+  // are followed, but must not end outside the folder or at a path with a part that begins with a dot. Other files
+  // (pipes, devices) are not opened. Requires /proc.
   static Opening open(const fs::path& folder, const std::string& relative);
 
   SiteFile(const SiteFile&) = delete;
   SiteFile& operator=(const SiteFile&) = delete;
   ~SiteFile();
 
-  const fs::path& path() const { return path_; }   // of itself, not of a link to it
-  uint64_t bytes() const { return bytes_; }        // when it was opened
-  const std::string& tag() const { return tag_; }  // an entity tag with its quotation marks, of size and time
+  const fs::path& path() const { return path_; }  // of the file, not of a link to it
+  uint64_t bytes() const { return bytes_; }       // when it was opened
+  // The entity tag, with its quotation marks, from size and modification time.
+  const std::string& tag() const { return tag_; }
 
-  // Fills `bytes` with those from `offset` on. False where there are fewer: the file has been cut off since.
+  // Fills `bytes` with the bytes of the file from `offset` on. Returns false if there are fewer, because the file has
+  // been truncated.
   bool read(uint64_t offset, std::span<char> bytes) const;
 
  private:

@@ -25,7 +25,7 @@ class SiteFileTest : public testing::Test {
   std::shared_ptr<const SiteFile> open(const std::string& relative) const {
     return SiteFile::open(site_, relative).file;
   }
-  static std::string textOf(const SiteFile& file) {
+  static std::string readText(const SiteFile& file) {
     std::string text(file.bytes(), '\0');
     return file.read(0, text) ? text : "cut off";
   }
@@ -41,12 +41,12 @@ TEST_F(SiteFileTest, FollowsLinksThatEndInsideWhereverTheyLead) {
   for (const char* path : {"tiles/a.glb", "tiles/beside.glb", "absolute.glb", "up/site/tiles/a.glb"}) {
     const auto file = open(path);
     ASSERT_TRUE(file) << path;
-    EXPECT_EQ(textOf(*file), "inside") << path;
+    EXPECT_EQ(readText(*file), "inside") << path;
     EXPECT_EQ(file->path(), site_ / "tiles/a.glb") << path;
   }
 }
 
-TEST_F(SiteFileTest, OpensNothingElse) {
+TEST_F(SiteFileTest, OpensNothingOutsideOrHidden) {
   writeFileAtomically(folder_ / "site-beside/a.txt", std::string_view("secret"));
   writeFileAtomically(site_ / ".git/config", std::string_view("secret"));
   fs::create_symlink(folder_ / "secret.txt", site_ / "out.txt");
@@ -64,20 +64,20 @@ TEST_F(SiteFileTest, OpensNothingElse) {
   }
 }
 
-TEST_F(SiteFileTest, DoesNotTouchPipes) {
+TEST_F(SiteFileTest, DoesNotOpenPipes) {
   ASSERT_EQ(::mkfifo((site_ / "pipe").c_str(), 0600), 0);
-  EXPECT_FALSE(open("pipe"));  // and is back
+  EXPECT_FALSE(open("pipe"));  // returns without blocking
 }
 
-TEST_F(SiteFileTest, HoldsToWhatWasOpened) {
+TEST_F(SiteFileTest, KeepsReadingTheOpenedFile) {
   const auto file = open("tiles/a.glb");
   fs::remove(site_ / "tiles/a.glb");
   fs::create_symlink(folder_ / "secret.txt", site_ / "tiles/a.glb");
-  EXPECT_EQ(textOf(*file), "inside");
+  EXPECT_EQ(readText(*file), "inside");
   EXPECT_FALSE(open("tiles/a.glb"));
 }
 
-TEST_F(SiteFileTest, IsNeverAnotherWhileLinksAreSwapped) {
+TEST_F(SiteFileTest, NeverLeavesTheFolderWhileLinksAreSwapped) {
   fs::create_symlink("tiles", site_ / "in");
   fs::create_symlink(folder_.path(), site_ / "out");
   writeFileAtomically(folder_ / "a.glb", std::string_view("secret"));
@@ -94,7 +94,7 @@ TEST_F(SiteFileTest, IsNeverAnotherWhileLinksAreSwapped) {
   for (int i = 0; i < 20000 || (opened == 0 && i < 1000000); ++i) {
     if (const auto file = open("now/a.glb")) {
       ++opened;
-      EXPECT_EQ(textOf(*file), "inside");
+      EXPECT_EQ(readText(*file), "inside");
     }
   }
   ended = true;
@@ -102,21 +102,21 @@ TEST_F(SiteFileTest, IsNeverAnotherWhileLinksAreSwapped) {
   EXPECT_GT(opened, 0);
 }
 
-TEST_F(SiteFileTest, IsCalledByItsNameAfterItWasReplaced) {
-  // Between being found and being looked at it may be replaced; a file that is held open is such a one.
+TEST_F(SiteFileTest, KeepsItsPathAfterItWasReplaced) {
+  // A file may be replaced between being resolved and being examined; an open descriptor simulates that.
   const std::string path = (site_ / "tiles/a.glb").string();
-  const int held = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  ASSERT_GE(held, 0);
-  fs::create_symlink("/proc/self/fd/" + std::to_string(held), site_ / "link.glb");
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  ASSERT_GE(descriptor, 0);
+  fs::create_symlink("/proc/self/fd/" + std::to_string(descriptor), site_ / "link.glb");
   writeFileAtomically(path, std::string_view("newer"));
   const auto file = open("link.glb");
   ASSERT_TRUE(file);
   EXPECT_EQ(file->path(), path);
-  EXPECT_EQ(textOf(*file), "inside");
-  ::close(held);
+  EXPECT_EQ(readText(*file), "inside");
+  ::close(descriptor);
 }
 
-TEST_F(SiteFileTest, SaysWhenItWasCutOff) {
+TEST_F(SiteFileTest, ReportsThatItWasTruncated) {
   const auto file = open("tiles/a.glb");
   fs::resize_file(site_ / "tiles/a.glb", 3);
   std::string text(6, '\0');
@@ -134,7 +134,7 @@ TEST_F(SiteFileTest, HasATagThatChangesWithIt) {
   EXPECT_NE(open("tiles/a.glb")->tag(), tag);
 }
 
-TEST_F(SiteFileTest, TellsThatTooManyAreOpenFromThatThereIsNone) {
+TEST_F(SiteFileTest, DistinguishesTooManyOpenFilesFromAMissingFile) {
   rlimit limit{}, none{};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &limit), 0);
   none = limit;

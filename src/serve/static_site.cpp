@@ -35,14 +35,14 @@ constexpr Kind kKinds[] = {{".html", "text/html; charset=utf-8", true},
                            {".ico", "image/x-icon", false},
                            {".woff2", "font/woff2", false}};
 
-Kind kindOf(const fs::path& file) {
+Kind fileKind(const fs::path& file) {
   const std::string extension = file.extension().string();
-  const auto found =
+  const auto match =
       std::find_if(std::begin(kKinds), std::end(kKinds), [&](const Kind& kind) { return extension == kind.extension; });
-  return found == std::end(kKinds) ? Kind{"", "application/octet-stream", false} : *found;
+  return match == std::end(kKinds) ? Kind{"", "application/octet-stream", false} : *match;
 }
 
-// "name-0123456789abcdef.glb", and "name-aB3_x9Zq.js" of the viewer's own files.
+// Recognises "name-0123456789abcdef.glb", and "name-aB3_x9Zq.js" among the viewer's own files.
 bool holdsDigest(const fs::path& file) {
   const std::string stem = file.stem().string();
   const size_t dash = stem.rfind('-');
@@ -69,12 +69,12 @@ StaticSite::StaticSite(std::vector<SiteFolder> folders, std::vector<std::string>
     : folders_(std::move(folders)), hosts_(std::move(hosts)), start_(std::move(start)) {
   std::error_code status;
   if (!fs::is_directory("/proc/self/fd", status)) {
-    throw Error("/proc", "", "is not there, and says what a file is that was opened", "mount it");
+    throw Error("/proc", "", "is not mounted, but is needed to identify opened files", "mount it");
   }
   for (SiteFolder& one : folders_) {
     const fs::path canonical = fs::canonical(one.folder, status);
     if (status || !fs::is_directory(canonical)) {
-      throw Error(one.folder.string(), "", "is no folder", "name one that is there");
+      throw Error(one.folder.string(), "", "is not a folder", "name one that exists");
     }
     one.folder = canonical;
   }
@@ -83,7 +83,7 @@ StaticSite::StaticSite(std::vector<SiteFolder> folders, std::vector<std::string>
             [](const SiteFolder& a, const SiteFolder& b) { return a.name.size() > b.name.size(); });
 }
 
-// The path has been looked at already (pathOfTarget); links may still lead out.
+// The path has already been checked by pathOfTarget; links may still lead outside.
 SiteFile::Opening StaticSite::fileAt(const std::string& path) const {
   for (const SiteFolder& one : folders_) {
     const std::string prefix = one.name.empty() ? "/" : "/" + one.name + "/";
@@ -103,18 +103,18 @@ SiteAnswer StaticSite::answer(const SiteRequest& request) const {
     return done;
   };
   if (!hosts_.empty()) {
-    const auto host = hostOf(request.host);
+    const auto host = parseHost(request.host);
     if (!host || std::find(hosts_.begin(), hosts_.end(), *host) == hosts_.end()) {
-      return finish(plain(421, "this server is not called that"));
+      return finish(plain(421, "this server does not serve that host"));
     }
   }
   if (request.method != "GET" && request.method != "HEAD") {
-    SiteAnswer refused = plain(405, "files can be read, and nothing else");
+    SiteAnswer refused = plain(405, "only GET and HEAD are supported");
     refused.headers.emplace_back("Allow", "GET, HEAD");
     return finish(std::move(refused));
   }
   if (!start_.empty() && request.target == "/") {
-    SiteAnswer onward = plain(302, "go on to " + start_);
+    SiteAnswer onward = plain(302, "continue at " + start_);
     onward.headers.emplace_back("Location", start_);
     return finish(std::move(onward));
   }
@@ -124,7 +124,7 @@ SiteAnswer StaticSite::answer(const SiteRequest& request) const {
   const auto& file = opening.file;
   if (!file) return finish(plain(404, "there is no such file"));
   const uint64_t bytes = file->bytes();
-  const Kind kind = kindOf(file->path());
+  const Kind kind = fileKind(file->path());
   std::string tag = file->tag();
   answer.headers = {{"Content-Type", kind.type},
                     {"Cache-Control", holdsDigest(file->path()) ? "public, max-age=31536000, immutable" : "no-cache"},
@@ -146,7 +146,7 @@ SiteAnswer StaticSite::answer(const SiteRequest& request) const {
   answer.file = file;
   answer.bytes = {0, bytes};
   if (answer.isGzipped) return finish(std::move(answer));
-  const RangeRequest range = asksForPart ? rangeOf(request.range, bytes) : RangeRequest{};
+  const RangeRequest range = asksForPart ? parseRange(request.range, bytes) : RangeRequest{};
   if (range.kind == RangeRequest::none) {
     SiteAnswer outside = plain(416, "the file has no such bytes");
     outside.headers.emplace_back("Content-Range", fmt::format("bytes */{}", bytes));

@@ -1,4 +1,4 @@
-// Folders as a web site: what to answer to a request for a file in one of them. Knows nothing of sockets.
+// Serves folders as a web site: maps a request to an answer. It is independent of sockets.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@
 
 namespace tessera {
 
-// Below "/" + name + "/" lies the folder; below "/" where the name is empty.
+// A folder that is served below "/" + name + "/", or below "/" if the name is empty.
 struct SiteFolder {
   std::string name;
   fs::path folder;
@@ -18,29 +18,29 @@ struct SiteFolder {
 
 struct SiteRequest {
   std::string method = "GET", target = "/";
-  std::string host, range, ifRange, ifNoneMatch, acceptEncoding;  // headers, '' where there is none
+  std::string host, range, ifRange, ifNoneMatch, acceptEncoding;  // headers; empty if absent
 };
 
 struct SiteAnswer {
   int status = 200;
-  std::vector<std::pair<std::string, std::string>> headers;  // but those of the connection
-  std::string body;                                          // where it is no file
-  std::shared_ptr<const SiteFile> file;                      // or bytes of this one
+  std::vector<std::pair<std::string, std::string>> headers;  // without those of the connection
+  std::string body;                                          // if there is no file
+  std::shared_ptr<const SiteFile> file;                      // else the body is `bytes` of this file
   ByteRange bytes;
-  bool isGzipped = false;  // or all of it, compressed (compressor.h): then its length is not known yet
-  uint64_t length = 0;     // of the body, whether it is sent or not
+  bool isGzipped = false;  // the body is the whole file, compressed (compressor.h); its length is not known yet
+  uint64_t length = 0;     // of the body, even if it is not sent
   bool sendsBody = true;   // false for HEAD
 };
 
-// Files alone: no listing of folders, nothing that begins with a dot, nothing outside the folders, by links either. A
-// file is opened once, and what is opened is looked at: an answer holds to it whatever happens to its path. Files whose
-// name holds a digest of their bytes (tiles/scene_folder.h) may be kept by clients forever; of others they must ask
-// whether they have changed.
+// Serves files only: it lists no folders, and serves nothing whose name begins with a dot and nothing outside the
+// folders, not even through links. A file is opened once and then examined, so that an answer keeps referring to the
+// same file whatever happens to its path. Clients may cache files whose name contains a digest of their bytes
+// (tiles/scene_folder.h) forever; they must revalidate others.
 class StaticSite {
  public:
-  // Hosts: what clients may call the server; any where there is none. (Against pages of other sites that have their
-  // name resolved to this machine.) Who asks for "/" without a query is sent on to `start`, if there is one. Throws
-  // Error where a folder is none, or /proc is not there.
+  // `hosts`: the host names under which clients may address the server; any name if it is empty. (This prevents DNS
+  // rebinding by pages of other sites.) Requests for "/" without a query are redirected to `start`, if it is not empty.
+  // Throws Error if a folder does not exist or /proc is not mounted.
   StaticSite(std::vector<SiteFolder> folders, std::vector<std::string> hosts, std::string start = "");
 
   SiteAnswer answer(const SiteRequest& request) const;

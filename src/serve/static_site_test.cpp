@@ -8,7 +8,7 @@
 namespace tessera {
 namespace {
 
-std::string headerOf(const SiteAnswer& answer, const std::string& name) {
+std::string findHeader(const SiteAnswer& answer, const std::string& name) {
   for (const auto& [key, value] : answer.headers) {
     if (key == name) return value;
   }
@@ -49,14 +49,14 @@ class StaticSiteTest : public testing::Test {
 TEST_F(StaticSiteTest, ServesFilesOfItsFolders) {
   const SiteAnswer index = get("/");
   EXPECT_EQ(index.status, 200);
-  EXPECT_EQ(headerOf(index, "Content-Type"), "text/html; charset=utf-8");
+  EXPECT_EQ(findHeader(index, "Content-Type"), "text/html; charset=utf-8");
   EXPECT_EQ(index.file->path().filename(), "index.html");
   EXPECT_EQ(get("/scene/tileset.json?x").file->path().filename(), "tileset.json");
   EXPECT_EQ(get("/scene/inner.json").status, 200) << "a link that stays inside";
-  EXPECT_EQ(headerOf(get("/scene/tiles/L0/a-0123456789abcdef.glb"), "Content-Type"), "model/gltf-binary");
+  EXPECT_EQ(findHeader(get("/scene/tiles/L0/a-0123456789abcdef.glb"), "Content-Type"), "model/gltf-binary");
 }
 
-TEST_F(StaticSiteTest, ServesNothingOutsideThem) {
+TEST_F(StaticSiteTest, ServesNothingOutsideItsFolders) {
   for (const char* target : {"/secret.txt",
                              "/../secret.txt",
                              "/scene/../secret.txt",
@@ -90,21 +90,21 @@ TEST_F(StaticSiteTest, ServesNothingOutsideThem) {
   }
 }
 
-TEST_F(StaticSiteTest, LetsClientsKeepWhatIsNamedByItsBytes) {
-  EXPECT_EQ(headerOf(get("/scene/tiles/L0/a-0123456789abcdef.glb"), "Cache-Control"),
+TEST_F(StaticSiteTest, MarksContentAddressedFilesAsImmutable) {
+  EXPECT_EQ(findHeader(get("/scene/tiles/L0/a-0123456789abcdef.glb"), "Cache-Control"),
             "public, max-age=31536000, immutable");
-  EXPECT_EQ(headerOf(get("/assets/index-aB3_x9Zq.js"), "Cache-Control"), "public, max-age=31536000, immutable");
-  EXPECT_EQ(headerOf(get("/scene/tileset.json"), "Cache-Control"), "no-cache");
-  EXPECT_EQ(headerOf(get("/"), "Cache-Control"), "no-cache");
+  EXPECT_EQ(findHeader(get("/assets/index-aB3_x9Zq.js"), "Cache-Control"), "public, max-age=31536000, immutable");
+  EXPECT_EQ(findHeader(get("/scene/tileset.json"), "Cache-Control"), "no-cache");
+  EXPECT_EQ(findHeader(get("/"), "Cache-Control"), "no-cache");
 }
 
-TEST_F(StaticSiteTest, SaysThatNothingHasChangedUntilItHas) {
+TEST_F(StaticSiteTest, AnswersNotModifiedUntilTheFileChanges) {
   const StaticSite site = this->site();
-  const std::string tag = headerOf(site.answer({.target = "/scene/tileset.json"}), "ETag");
+  const std::string tag = findHeader(site.answer({.target = "/scene/tileset.json"}), "ETag");
   const SiteAnswer same = site.answer({.target = "/scene/tileset.json", .ifNoneMatch = tag});
   EXPECT_EQ(same.status, 304);
   EXPECT_FALSE(same.file);
-  EXPECT_EQ(headerOf(same, "ETag"), tag);
+  EXPECT_EQ(findHeader(same, "ETag"), tag);
   write("scene/tileset.json", "{}");
   EXPECT_EQ(site.answer({.target = "/scene/tileset.json", .ifNoneMatch = tag}).status, 200);
 }
@@ -116,27 +116,27 @@ TEST_F(StaticSiteTest, ServesPartsOfFiles) {
   EXPECT_EQ(part.status, 206);
   EXPECT_EQ(part.bytes, (ByteRange{2, 5}));
   EXPECT_EQ(part.length, 3u);
-  EXPECT_EQ(headerOf(part, "Content-Range"), "bytes 2-4/10");
+  EXPECT_EQ(findHeader(part, "Content-Range"), "bytes 2-4/10");
   const SiteAnswer outside = site.answer({.target = target, .range = "bytes=10-"});
   EXPECT_EQ(outside.status, 416);
-  EXPECT_EQ(headerOf(outside, "Content-Range"), "bytes */10");
-  const std::string tag = headerOf(part, "ETag");
+  EXPECT_EQ(findHeader(outside, "Content-Range"), "bytes */10");
+  const std::string tag = findHeader(part, "ETag");
   EXPECT_EQ(site.answer({.target = target, .range = "bytes=2-4", .ifRange = tag}).status, 206);
   EXPECT_EQ(site.answer({.target = target, .range = "bytes=2-4", .ifRange = "\"old\""}).status, 200);
 }
 
-TEST_F(StaticSiteTest, HasTextCompressed) {
+TEST_F(StaticSiteTest, CompressesText) {
   const StaticSite site = this->site();
   const SiteAnswer answer = site.answer({.target = "/scene/tileset.json", .acceptEncoding = "gzip"});
   EXPECT_TRUE(answer.isGzipped);
   EXPECT_EQ(answer.file->path().filename(), "tileset.json");
-  EXPECT_EQ(headerOf(answer, "Content-Encoding"), "gzip");
-  EXPECT_EQ(headerOf(answer, "Vary"), "Accept-Encoding");
-  const std::string tag = headerOf(answer, "ETag");
-  EXPECT_NE(tag, headerOf(site.answer({.target = "/scene/tileset.json"}), "ETag"));
+  EXPECT_EQ(findHeader(answer, "Content-Encoding"), "gzip");
+  EXPECT_EQ(findHeader(answer, "Vary"), "Accept-Encoding");
+  const std::string tag = findHeader(answer, "ETag");
+  EXPECT_NE(tag, findHeader(site.answer({.target = "/scene/tileset.json"}), "ETag"));
   const SiteAnswer same = site.answer({.target = "/scene/tileset.json", .ifNoneMatch = tag, .acceptEncoding = "gzip"});
   EXPECT_EQ(same.status, 304);
-  EXPECT_FALSE(same.isGzipped) << "nothing is compressed for that";
+  EXPECT_FALSE(same.isGzipped) << "an answer without a body is not compressed";
   EXPECT_FALSE(site.answer({.target = "/scene/tileset.json"}).isGzipped);
   EXPECT_FALSE(
       site.answer({.target = "/scene/tileset.json", .range = "bytes=0-9", .acceptEncoding = "gzip"}).isGzipped);
@@ -144,7 +144,7 @@ TEST_F(StaticSiteTest, HasTextCompressed) {
   EXPECT_FALSE(site.answer({.target = "/", .acceptEncoding = "gzip"}).isGzipped) << "too small to be worth it";
 }
 
-TEST_F(StaticSiteTest, AnswersReadersOnlyAndHeadWithoutABody) {
+TEST_F(StaticSiteTest, AcceptsOnlyGetAndHead) {
   const SiteAnswer head = site().answer({.method = "HEAD", .target = "/scene/tileset.json"});
   EXPECT_EQ(head.status, 200);
   EXPECT_FALSE(head.sendsBody);
@@ -152,11 +152,11 @@ TEST_F(StaticSiteTest, AnswersReadersOnlyAndHeadWithoutABody) {
   for (const char* method : {"POST", "PUT", "DELETE", "TRACE", ""}) {
     const SiteAnswer refused = site().answer({.method = method, .target = "/"});
     EXPECT_EQ(refused.status, 405) << method;
-    EXPECT_EQ(headerOf(refused, "Allow"), "GET, HEAD");
+    EXPECT_EQ(findHeader(refused, "Allow"), "GET, HEAD");
   }
 }
 
-TEST_F(StaticSiteTest, AnswersToItsOwnNamesOnly) {
+TEST_F(StaticSiteTest, AnswersOnlyToItsHosts) {
   const StaticSite site = this->site({"localhost", "127.0.0.1"});
   EXPECT_EQ(site.answer({.target = "/", .host = "localhost:8080"}).status, 200);
   EXPECT_EQ(site.answer({.target = "/", .host = "127.0.0.1"}).status, 200);
@@ -165,18 +165,18 @@ TEST_F(StaticSiteTest, AnswersToItsOwnNamesOnly) {
   }
 }
 
-TEST_F(StaticSiteTest, SendsWhoComesToItsStart) {
+TEST_F(StaticSiteTest, RedirectsToItsStartPage) {
   const StaticSite site({{"", folder_.path() / "viewer"}}, {}, "?world=world/world.json");
   const SiteAnswer onward = site.answer({.target = "/"});
   EXPECT_EQ(onward.status, 302);
-  EXPECT_EQ(headerOf(onward, "Location"), "?world=world/world.json");
-  EXPECT_EQ(headerOf(onward, "Cache-Control"), "no-store");
+  EXPECT_EQ(findHeader(onward, "Location"), "?world=world/world.json");
+  EXPECT_EQ(findHeader(onward, "Cache-Control"), "no-store");
   EXPECT_EQ(site.answer({.target = "/?world=world/world.json"}).status, 200);
   EXPECT_EQ(site.answer({.target = "/index.html"}).status, 200);
-  EXPECT_EQ(get("/").status, 200) << "which has none";
+  EXPECT_EQ(get("/").status, 200) << "a site without a start page";
 }
 
-TEST_F(StaticSiteTest, RefusesAFolderThatIsNone) {
+TEST_F(StaticSiteTest, RejectsMissingFolders) {
   EXPECT_THROW(StaticSite({{"", folder_.path() / "nothing"}}, {}), Error);
   EXPECT_THROW(StaticSite({{"", folder_.path() / "secret.txt"}}, {}), Error);
 }

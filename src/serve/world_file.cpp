@@ -15,11 +15,11 @@ namespace {
 
 using nlohmann::json;
 
-constexpr uint64_t kMostBytes = 180'000'000;  // with the models that it holds
-constexpr size_t kMostScenes = 16;
+constexpr uint64_t kMaxBytes = 180'000'000;  // including embedded models
+constexpr size_t kMaxScenes = 16;
 constexpr const char* kCorrect = "correct it, or save it in the viewer again";
 
-// Of a whole address, or one of another server.
+// Returns whether an address has a scheme or names another server.
 bool isElsewhere(const std::string& url) {
   size_t end = 0;
   while (end < url.size() && (std::isalnum(static_cast<unsigned char>(url[end])) || url[end] == '+' ||
@@ -30,7 +30,7 @@ bool isElsewhere(const std::string& url) {
   return hasScheme || url.starts_with("//");
 }
 
-// Of its tileset.json, seen from the folder; nothing where it leads out.
+// Returns the path of a scene's tileset.json relative to the folder; nothing if it leads outside.
 std::optional<std::string> pathOfScene(const std::string& url) {
   if (url.starts_with('/')) return std::nullopt;
   const std::string plain = fs::path(url.substr(0, url.find_first_of("?#"))).lexically_normal().generic_string();
@@ -40,7 +40,7 @@ std::optional<std::string> pathOfScene(const std::string& url) {
   return path->substr(1);
 }
 
-// Where the last of so many bytes stands. A letter of several bytes is one column.
+// Returns the line and column of the last of the first `bytes` bytes. A multi-byte character is one column.
 std::string placeIn(const std::string& text, size_t bytes) {
   const std::string before = text.substr(0, bytes > 0 ? bytes - 1 : 0);
   const auto lines = std::count(before.begin(), before.end(), '\n');
@@ -50,18 +50,18 @@ std::string placeIn(const std::string& text, size_t bytes) {
   return fmt::format("line {}, column {}", lines + 1, letters + 1);
 }
 
-// Null where it has none.
-const json& fieldOf(const json& object, const char* key) {
+// Returns the value of a field, or null if the object does not have it.
+const json& fieldOrNull(const json& object, const char* key) {
   static const json kNone;
-  const auto found = object.find(key);
-  return found == object.end() ? kNone : *found;
+  const auto entry = object.find(key);
+  return entry == object.end() ? kNone : *entry;
 }
 
 json readWorld(const fs::path& file) {
   const auto withoutFiles = [](int depth, json::parse_event_t event, json& parsed) {
     return !(depth == 1 && event == json::parse_event_t::key && parsed == "files");
   };
-  const std::string text = readTextFile(file, kMostBytes);
+  const std::string text = readTextFile(file, kMaxBytes);
   json world;
   try {
     world = json::parse(text, withoutFiles);
@@ -70,14 +70,14 @@ json readWorld(const fs::path& file) {
   } catch (const json::out_of_range&) {
     throw Error(file.string(), "", "holds a number that is too large", kCorrect);
   }
-  if (fieldOf(world, "kind") != "tessera world") {
+  if (fieldOrNull(world, "kind") != "tessera world") {
     throw Error(file.string(), "kind", "is not 'tessera world'",
                 "correct it, or name another world, or the folder of a scene");
   }
   return world;
 }
 
-// Percent-encoded, whatever it holds.
+// Percent-encodes everything but ASCII letters, digits, '-', '.' and '_'.
 std::string encoded(const std::string& text) {
   std::string code;
   for (const char c : text) {
@@ -91,7 +91,7 @@ std::string encoded(const std::string& text) {
   return code;
 }
 
-// Throws Error where a server of the folder would not give the world itself away.
+// Throws Error if a server of the folder would not serve the world file itself.
 void requireServed(const fs::path& worldFile, const fs::path& folder) {
   const std::string name = worldFile.filename().string();
   if (!pathOfTarget("/" + encoded(name))) {
@@ -111,7 +111,7 @@ bool areNumbers(const json& value, size_t count) {
          std::all_of(value.begin(), value.end(), [](const json& one) { return one.is_number(); });
 }
 
-// Whether it stands somewhere else than in the world of the main scene. Throws Error where it does not say where.
+// Returns whether the scene is placed relative to the main scene's world. Throws Error if its placement is malformed.
 bool isPlaced(const json& scene, const fs::path& file, const std::string& place) {
   const auto require = [&](const char* key, bool isRight, const char* reason) {
     if (!isRight) throw Error(file.string(), place + "." + key, reason, kCorrect);
@@ -123,10 +123,10 @@ bool isPlaced(const json& scene, const fs::path& file, const std::string& place)
   return has("position") || has("rotation") || has("scale");
 }
 
-// By their places in the file. Throws Error where the viewer would not open them.
-std::vector<std::pair<std::string, const json*>> scenesOf(const json& world, const fs::path& file) {
-  const json &version = fieldOf(world, "version"), &list = fieldOf(world, "scenes");
-  if (version == 1) return {{"scene", &fieldOf(world, "scene")}};
+// Returns the scenes with their locations in the file, for errors. Throws Error if the viewer would not open them.
+std::vector<std::pair<std::string, const json*>> listScenes(const json& world, const fs::path& file) {
+  const json &version = fieldOrNull(world, "version"), &list = fieldOrNull(world, "scenes");
+  if (version == 1) return {{"scene", &fieldOrNull(world, "scene")}};
   const auto refuse = [&](const std::string& place, const std::string& reason, const std::string& remedy) {
     throw Error(file.string(), place, reason, remedy);
   };
@@ -135,7 +135,7 @@ std::vector<std::pair<std::string, const json*>> scenesOf(const json& world, con
     refuse("scenes", list.is_array() ? "is empty" : "is missing, or no list",
            R"(name one at least: [{"url": "garden.scene"}])");
   }
-  if (list.size() > kMostScenes) refuse("scenes", fmt::format("are more than {}", kMostScenes), "keep fewer");
+  if (list.size() > kMaxScenes) refuse("scenes", fmt::format("are more than {}", kMaxScenes), "keep fewer");
   std::vector<std::pair<std::string, const json*>> scenes;
   bool hasMain = false;
   for (const json& scene : list) {
@@ -150,9 +150,9 @@ std::vector<std::pair<std::string, const json*>> scenesOf(const json& world, con
   return scenes;
 }
 
-// Not empty where it says one.
-std::string urlOf(const json& scene) {
-  const json& url = fieldOf(scene, "url");
+// Returns the address of the scene; empty if it has none.
+std::string readSceneUrl(const json& scene) {
+  const json& url = fieldOrNull(scene, "url");
   return url.is_string() ? url.get<std::string>() : "";
 }
 
@@ -170,8 +170,8 @@ void requireWorld(const fs::path& worldFile) {
   const json world = readWorld(worldFile);
   const fs::path folder = fs::canonical(fs::absolute(worldFile).parent_path());
   requireServed(worldFile, folder);
-  for (const auto& [place, scene] : scenesOf(world, worldFile)) {
-    const std::string url = urlOf(*scene);
+  for (const auto& [place, scene] : listScenes(world, worldFile)) {
+    const std::string url = readSceneUrl(*scene);
     if (url.empty() || isElsewhere(url)) continue;
     const auto path = pathOfScene(url);
     if (path && SiteFile::open(folder, *path).file) continue;
@@ -186,7 +186,7 @@ void requireWorld(const fs::path& worldFile) {
 }
 
 std::string viewerOfWorld(const std::string& name) {
-  // Once for the path that it is part of, and once for the query that holds the path.
+  // Encoded twice: once as part of a path, and once because the path is part of a query.
   return "?world=world/" + encoded(encoded(name));
 }
 

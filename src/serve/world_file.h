@@ -1,4 +1,5 @@
-// A world of the viewer (docs/world-format.md), as far as serving it needs it: where its scenes are.
+// Checks a world file of the viewer (docs/world-format.md) as far as a server needs to know it: the addresses of its
+// scenes.
 #pragma once
 
 #include <optional>
@@ -8,15 +9,15 @@
 
 namespace tessera {
 
-// What `path` names: a JSON file, or world.json in a folder that is no scene. Nothing where it is neither.
+// Returns `path` if it is a JSON file, or its world.json if it is a folder that is not a scene; otherwise nothing.
 std::optional<fs::path> worldFileAt(const fs::path& path);
 
-// Throws Error where it is no world, a server of its folder would not give it away, its scenes do not make a world
-// (docs/world-format.md), or one of them has a relative address that leads to none that this server would give away.
-// What else is in it is the viewer's to look at.
+// Throws Error if the file is not a world, a server of its folder would not serve it, its list of scenes is invalid
+// (docs/world-format.md), or a scene has a relative address that does not lead to a scene that the server would serve.
+// Everything else in the file is left to the viewer to check.
 void requireWorld(const fs::path& worldFile);
 
-// The address of a page below "/", so that the viewer there opens "/world/" + name.
+// Returns the address, relative to "/", at which the viewer opens the world "/world/" + name.
 std::string viewerOfWorld(const std::string& name);
 
 }  // namespace tessera

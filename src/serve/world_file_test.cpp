@@ -12,7 +12,7 @@ namespace {
 class WorldFileTest : public testing::Test {
  protected:
   WorldFileTest() {
-    write("site/world.json", worldOf("old town.scene"));
+    write("site/world.json", makeWorldText("old town.scene"));
     write("site/old town.scene/tileset.json", "{}");
     write("site/deep/tileset.json", "{}");
     write("site/.hidden/tileset.json", "{}");
@@ -21,7 +21,7 @@ class WorldFileTest : public testing::Test {
     fs::create_directory_symlink("deep", folder_.path() / "site/inner");
   }
 
-  static std::string worldOf(const std::string& url) {
+  static std::string makeWorldText(const std::string& url) {
     return fmt::format(R"({{"kind":"tessera world","version":2,"scenes":[{{"url":"deep/"}},{{"url":"{}"}}]}})", url);
   }
   void write(const std::string& name, const std::string& text) {
@@ -30,12 +30,12 @@ class WorldFileTest : public testing::Test {
     writeFileAtomically(path, text);
   }
   fs::path at(const std::string& name) const { return folder_.path() / name; }
-  // What it says of a world of that text; empty where nothing is wrong.
+  // Returns the error of a world file with this text; empty if it is valid.
   std::string said(const std::string& text) {
     write("site/world.json", text);
-    return saidOf("site/world.json");
+    return worldErrorMessage("site/world.json");
   }
-  std::string saidOf(const std::string& name) const {
+  std::string worldErrorMessage(const std::string& name) const {
     try {
       requireWorld(at(name));
       return "";
@@ -47,59 +47,59 @@ class WorldFileTest : public testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(WorldFileTest, IsAJsonFileOrThatOfAFolderThatIsNoScene) {
+TEST_F(WorldFileTest, IsAJsonFileOrTheWorldJsonOfAFolderThatIsNotAScene) {
   EXPECT_EQ(worldFileAt(at("site")), at("site/world.json"));
   EXPECT_EQ(worldFileAt(at("site/world.json")), at("site/world.json"));
   EXPECT_EQ(worldFileAt(at("site/deep")), std::nullopt);
   EXPECT_EQ(worldFileAt(at("nothing")), std::nullopt);
   write("site/deep/world.json", "{}");
-  EXPECT_EQ(worldFileAt(at("site/deep")), std::nullopt) << "a scene first of all";
+  EXPECT_EQ(worldFileAt(at("site/deep")), std::nullopt) << "a folder with a tileset.json is a scene";
   EXPECT_EQ(worldFileAt(at("site/deep/world.json")), at("site/deep/world.json"));
 }
 
-TEST_F(WorldFileTest, MayNameScenesInItsFolderAndThoseOfOtherServers) {
+TEST_F(WorldFileTest, AcceptsScenesInItsFolderAndOnOtherServers) {
   for (const char* url : {"old town.scene", "old%20town.scene/", "deep/tileset.json", "./deep", "a/../deep", "inner",
                           "deep?x#y", "https://example.com/garden.scene/", "//example.com/garden.scene", ""}) {
-    EXPECT_EQ(said(worldOf(url)), "") << url;
+    EXPECT_EQ(said(makeWorldText(url)), "") << url;
   }
   write("site/tileset.json", "{}");
-  EXPECT_EQ(said(worldOf(".")), "");
-  EXPECT_EQ(said(worldOf("tileset.json")), "");
+  EXPECT_EQ(said(makeWorldText(".")), "");
+  EXPECT_EQ(said(makeWorldText("tileset.json")), "");
 }
 
-TEST_F(WorldFileTest, MayNameNoneOutsideOfIt) {
+TEST_F(WorldFileTest, RejectsScenesOutsideItsFolder) {
   for (const char* url : {"../beside", "../beside/tileset.json", "/deep", "deep/../../beside", "%2e%2e/beside", "link",
                           "..%2fbeside", ".hidden", "deep%00", "%", "deep\\\\..\\\\..\\\\beside"}) {
-    const std::string answer = said(worldOf(url));
+    const std::string answer = said(makeWorldText(url));
     EXPECT_TRUE(answer.starts_with("scenes[1].url: '")) << url << ": " << answer;
     EXPECT_NE(answer.find(" does not lie in '" + fs::canonical(at("site")).string() + "'"), std::string::npos)
         << answer;
   }
-  EXPECT_EQ(said(worldOf("nothing")),
+  EXPECT_EQ(said(makeWorldText("nothing")),
             "scenes[1].url: there is no 'nothing/tileset.json' in '" + fs::canonical(at("site")).string() + "'");
   EXPECT_TRUE(said(R"({"kind":"tessera world","version":1,"scene":{"url":"../beside"}})").starts_with("scene.url: '"));
 }
 
-TEST_F(WorldFileTest, IsOneThatIsGivenToBrowsers) {
-  write("beside/world.json", worldOf("deep"));
+TEST_F(WorldFileTest, RejectsFilesThatWouldNotBeServed) {
+  write("beside/world.json", makeWorldText("deep"));
   for (const char* name : {".world.json", "a\\b.json", "a\nb.json"}) {
-    write(std::string("site/") + name, worldOf("deep"));
-    EXPECT_EQ(saidOf(std::string("site/") + name), ": has a name by which nothing is served") << name;
+    write(std::string("site/") + name, makeWorldText("deep"));
+    EXPECT_EQ(worldErrorMessage(std::string("site/") + name), ": has a name by which nothing is served") << name;
   }
-  write("site/a 50%.json", worldOf("deep"));
-  EXPECT_EQ(saidOf("site/a 50%.json"), "");
+  write("site/a 50%.json", makeWorldText("deep"));
+  EXPECT_EQ(worldErrorMessage("site/a 50%.json"), "");
   fs::create_symlink(at("beside/world.json"), at("site/out.json"));
   const std::string link = ": is a link to a file outside of '" + fs::canonical(at("site")).string() + "', or";
-  EXPECT_TRUE(saidOf("site/out.json").starts_with(link)) << saidOf("site/out.json");
+  EXPECT_TRUE(worldErrorMessage("site/out.json").starts_with(link)) << worldErrorMessage("site/out.json");
   fs::create_symlink("deep/inner.json", at("site/in.json"));
-  write("site/deep/inner.json", worldOf("deep"));
-  EXPECT_EQ(saidOf("site/in.json"), "");
+  write("site/deep/inner.json", makeWorldText("deep"));
+  EXPECT_EQ(worldErrorMessage("site/in.json"), "");
   fs::create_symlink(".world.json", at("site/hidden.json"));
-  EXPECT_TRUE(saidOf("site/hidden.json").starts_with(link)) << saidOf("site/hidden.json");
+  EXPECT_TRUE(worldErrorMessage("site/hidden.json").starts_with(link)) << worldErrorMessage("site/hidden.json");
 }
 
-TEST_F(WorldFileTest, SaysNothingToTheTerminal) {
-  write("site/world.json", worldOf("\\u001b[2J\\u009b"));
+TEST_F(WorldFileTest, EscapesControlCharactersInErrors) {
+  write("site/world.json", makeWorldText("\\u001b[2J\\u009b"));
   try {
     requireWorld(at("site/world.json"));
     FAIL();
@@ -108,19 +108,19 @@ TEST_F(WorldFileTest, SaysNothingToTheTerminal) {
   }
 }
 
-TEST_F(WorldFileTest, SaysWhereItIsNotJson) {
+TEST_F(WorldFileTest, ReportsWhereItIsNotJson) {
   const auto reason = [](const std::string& place) { return place + ": is not JSON"; };
   EXPECT_EQ(said(""), reason("line 1, column 1"));
   EXPECT_EQ(said("{"), reason("line 1, column 2"));
   EXPECT_EQ(said("{\n"), reason("line 2, column 1"));
   EXPECT_EQ(said("{\n  \"kind\": \"tessera world\",\n  \"scenes\": [{\"url\": \"deep\"},]\n}\n"),
             reason("line 3, column 30"));
-  EXPECT_EQ(said("{\n  \"name\": \"Köln ☀\" 3}"), reason("line 2, column 20")) << "letters, not bytes";
+  EXPECT_EQ(said("{\n  \"name\": \"Köln ☀\" 3}"), reason("line 2, column 20")) << "columns are characters, not bytes";
   EXPECT_EQ(said(std::string(100000, '[')), reason("line 1, column 100001"));
   EXPECT_EQ(said(R"({"position": [1e999]})"), ": holds a number that is too large");
 }
 
-TEST_F(WorldFileTest, HasTheKindAndAVersionThatTheViewerKnows) {
+TEST_F(WorldFileTest, RequiresTheKindAndASupportedVersion) {
   for (const char* text : {"[]", "7", "{}", R"({"asset":{"version":"1.1"}})", R"({"kind":"world"})"}) {
     EXPECT_EQ(said(text), "kind: is not 'tessera world'") << text;
   }
@@ -134,7 +134,7 @@ TEST_F(WorldFileTest, HasTheKindAndAVersionThatTheViewerKnows) {
   EXPECT_EQ(said(R"({"kind":"tessera world","scenes":[{"url":"deep"}]})"), "version: is not 2, nor 1");
 }
 
-TEST_F(WorldFileTest, HasScenesOfWhichOneIsTheMainOne) {
+TEST_F(WorldFileTest, RequiresScenesOfWhichOneIsTheMainOne) {
   const auto ofScenes = [&](const std::string& scenes) {
     return said(R"({"kind":"tessera world","version":2,"scenes":)" + scenes + "}");
   };
@@ -158,7 +158,7 @@ TEST_F(WorldFileTest, HasScenesOfWhichOneIsTheMainOne) {
   }
 }
 
-TEST_F(WorldFileTest, SaysWhereItsScenesStandInNumbers) {
+TEST_F(WorldFileTest, RequiresNumbersForThePlacementOfScenes) {
   const auto ofPlace = [&](const std::string& place) {
     return said(R"({"kind":"tessera world","version":2,"scenes":[{"url":"deep"},{"url":"deep",)" + place + "}]}");
   };
@@ -170,7 +170,7 @@ TEST_F(WorldFileTest, SaysWhereItsScenesStandInNumbers) {
   EXPECT_EQ(ofPlace(R"("scale":[1,1,1])"), "scenes[1].scale: is no number");
 }
 
-TEST_F(WorldFileTest, IsReadNoFartherThanThat) {
+TEST_F(WorldFileTest, IgnoresEverythingThatServingDoesNotNeed) {
   const std::string begin = R"({"kind":"tessera world","version":2,"scenes":[{"url":"deep"},{"url":4}],)";
   EXPECT_EQ(said(begin + R"("models":7,"files":{"a":"b"}})"), "");
   EXPECT_EQ(said(begin + R"("scene":{"url":"../beside"}})"), "");
@@ -178,7 +178,7 @@ TEST_F(WorldFileTest, IsReadNoFartherThanThat) {
   EXPECT_EQ(said(R"({"kind":"tessera world","version":2,"scenes":[{"url":)" + deepest + "}]}"), "");
 }
 
-TEST_F(WorldFileTest, IsToBeCorrectedOrSavedAgain) {
+TEST_F(WorldFileTest, SuggestsToCorrectOrSaveItAgain) {
   for (const char* text : {"{", R"({"kind":"tessera world","version":2,"scenes":[{"url":"deep"},3]})"}) {
     write("site/world.json", text);
     try {
@@ -190,7 +190,7 @@ TEST_F(WorldFileTest, IsToBeCorrectedOrSavedAgain) {
   }
 }
 
-TEST_F(WorldFileTest, IsNamedToTheViewer) {
+TEST_F(WorldFileTest, EncodesItsNameForTheViewer) {
   EXPECT_EQ(viewerOfWorld("world.json"), "?world=world/world.json");
   EXPECT_EQ(viewerOfWorld("my 50%.json"), "?world=world/my%252050%2525.json");
 }

@@ -4,20 +4,21 @@ namespace tessera {
 namespace {
 
 struct Wall {
-  Vec3f a, b;  // along the foot, counter-clockwise round the building
+  Vec3f a, b;  // along the foot, counter-clockwise around the building
   Vec3f outward;
   float length = 0;
 };
 
-void addBalconies(const Building& b, const Wall& wall, const SurfaceObject& look, SurfaceMesh& mesh, Dice& dice) {
+void addBalconies(const Building& b, const Wall& wall, const SurfaceObject& look, SurfaceMesh& mesh,
+                  RandomSequence& random) {
   const float bay = bayWidth(wall.length, b.style);
   const int bays = static_cast<int>(std::round(wall.length / bay));
   if (bays < 2) return;
   const Vec3f along = (wall.b - wall.a) / wall.length;
   const uint32_t slab = mesh.addObject({.seed = look.seed, .colour = {0.62f, 0.61f, 0.58f}});
-  const Vec3f tint = dice.chance(0.5f) ? Vec3f(0.7f, 0.7f, 0.68f) : Vec3f(0.25f, 0.32f, 0.36f);
+  const Vec3f tint = random.chance(0.5f) ? Vec3f(0.7f, 0.7f, 0.68f) : Vec3f(0.25f, 0.32f, 0.36f);
   const uint32_t rail = mesh.addObject({.seed = look.seed + 1, .colour = tint});
-  const int every = b.style == FacadeStyle::panel ? 2 : 3, offset = dice.below(every);
+  const int every = b.style == FacadeStyle::panel ? 2 : 3, offset = random.below(every);
   const float yaw = std::atan2(along.y(), along.x());
   for (int floor = 1; floor < b.floors; ++floor) {
     const float z = b.base + b.groundHeight + b.floorHeight * static_cast<float>(floor - 1);
@@ -35,15 +36,15 @@ void addBalconies(const Building& b, const Wall& wall, const SurfaceObject& look
   }
 }
 
-void addAwnings(const Building& b, const Wall& wall, SurfaceMesh& mesh, Dice& dice) {
+void addAwnings(const Building& b, const Wall& wall, SurfaceMesh& mesh, RandomSequence& random) {
   const Vec3f along = (wall.b - wall.a) / wall.length;
-  for (float at = 1.2f; at + 4 < wall.length; at += dice.between(5, 7.5f)) {
-    if (!dice.chance(0.6f)) continue;
-    const float width = dice.between(3, 4.2f);
+  for (float at = 1.2f; at + 4 < wall.length; at += random.between(5, 7.5f)) {
+    if (!random.chance(0.6f)) continue;
+    const float width = random.between(3, 4.2f);
     static constexpr float kTints[5][3] = {
         {0.6f, 0.08f, 0.07f}, {0.08f, 0.25f, 0.14f}, {0.10f, 0.16f, 0.36f}, {0.75f, 0.5f, 0.1f}, {0.4f, 0.1f, 0.2f}};
-    const float* tint = kTints[dice.below(5)];
-    const uint32_t object = mesh.addObject({.seed = dice.seed(), .colour = {tint[0], tint[1], tint[2]}});
+    const float* tint = kTints[random.below(5)];
+    const uint32_t object = mesh.addObject({.seed = random.seed(), .colour = {tint[0], tint[1], tint[2]}});
     Vec3f p = wall.a + along * at, q = wall.a + along * (at + width);
     p.z() = q.z() = b.base + 3.1f;
     const Vec3f drop = wall.outward * 1.5f - Vec3f(0, 0, 0.7f);
@@ -71,11 +72,11 @@ void addLedge(const Building& b, float z, float out, float high, const Vec3f& co
 }  // namespace
 
 void addBuilding(const Building& b, SurfaceMesh& mesh) {
-  Dice dice(b.seed);
+  RandomSequence random(b.seed);
   const std::vector<Vec2f> outline = b.outline();
   const float top = b.base + b.height() + (b.roof == RoofStyle::flat ? 0.7f : 0.f);
-  const bool balconies = b.style == FacadeStyle::panel || (b.style == FacadeStyle::plaster && dice.chance(0.5f));
-  const bool awnings = b.shops && dice.chance(0.7f);
+  const bool balconies = b.style == FacadeStyle::panel || (b.style == FacadeStyle::plaster && random.chance(0.5f));
+  const bool awnings = b.shops && random.chance(0.7f);
   for (size_t i = 0; i < outline.size(); ++i) {
     const Vec2f p = outline[i], q = outline[(i + 1) % outline.size()];
     Wall wall{{p.x(), p.y(), b.base}, {q.x(), q.y(), b.base}, {}, (q - p).norm()};
@@ -95,8 +96,8 @@ void addBuilding(const Building& b, SurfaceMesh& mesh) {
     mesh.addQuad(wall.a - deep, wall.b - deep, {q.x(), q.y(), top}, {p.x(), p.y(), top}, Material::facade, object,
                  {0, -3});
     if (b.corners != 4 || b.floors < 2) continue;
-    if (balconies && (i == 0 || i == 2)) addBalconies(b, wall, look, mesh, dice);
-    if (awnings && i == 0) addAwnings(b, wall, mesh, dice);
+    if (balconies && (i == 0 || i == 2)) addBalconies(b, wall, look, mesh, random);
+    if (awnings && i == 0) addAwnings(b, wall, mesh, random);
   }
   const bool old = b.style == FacadeStyle::plaster || b.style == FacadeStyle::brick || b.style == FacadeStyle::loft;
   if (old && b.floors > 2) {

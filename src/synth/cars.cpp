@@ -18,17 +18,17 @@ void addFrustum(const std::array<Vec3f, 4>& low, const std::array<Vec3f, 4>& hig
 }  // namespace
 
 void addCar(const Vec3f& foot, float yaw, uint32_t seed, SurfaceMesh& mesh) {
-  Dice dice(seed);
+  RandomSequence random(seed);
   static constexpr float kPaint[12][3] = {{0.75f, 0.75f, 0.76f}, {0.04f, 0.04f, 0.05f}, {0.35f, 0.36f, 0.38f},
                                           {0.45f, 0.03f, 0.03f}, {0.04f, 0.10f, 0.32f}, {0.80f, 0.80f, 0.78f},
                                           {0.10f, 0.22f, 0.14f}, {0.62f, 0.40f, 0.07f}, {0.70f, 0.71f, 0.72f},
                                           {0.10f, 0.10f, 0.11f}, {0.22f, 0.23f, 0.25f}, {0.78f, 0.77f, 0.75f}};
-  const float* tint = kPaint[dice.below(12)];
+  const float* tint = kPaint[random.below(12)];
   const uint32_t paint = mesh.addObject({.seed = seed, .colour = {tint[0], tint[1], tint[2]}});
   const uint32_t glass = mesh.addObject({.seed = seed, .colour = {0.02f, 0.025f, 0.03f}});
   const uint32_t tyre = mesh.addObject({.seed = seed, .colour = {0.02f, 0.02f, 0.02f}});
-  const bool van = dice.chance(0.18f);
-  const float halfLength = van ? 2.6f : dice.between(2, 2.3f), halfWidth = van ? 0.98f : 0.88f;
+  const bool van = random.chance(0.18f);
+  const float halfLength = van ? 2.6f : random.between(2, 2.3f), halfWidth = van ? 0.98f : 0.88f;
   const float belt = van ? 1.15f : 0.88f, roof = van ? 2.2f : 1.45f;
   const float c = std::cos(yaw), s = std::sin(yaw);
   const auto place = [&](float x, float y, float z) {
@@ -53,16 +53,16 @@ void addCar(const Vec3f& foot, float yaw, uint32_t seed, SurfaceMesh& mesh) {
 
 SurfaceMesh buildTraffic(const CityLayout& city, double seconds) {
   SurfaceMesh mesh;
-  Dice dice(city.seed ^ 0xca45u);
+  RandomSequence random(city.seed ^ 0xca45u);
   const auto drive = [&](const Street& street, bool alongX) {
     const float from = (alongX ? city.area.x0 : city.area.y0) - 90, to = (alongX ? city.area.x1 : city.area.y1) + 90;
     const float length = to - from;
     for (int direction = -1; direction <= 1; direction += 2) {
-      const double speed = dice.between(7, 12);
-      const int cars = std::max(1, static_cast<int>(length / dice.between(28, 48)));
+      const double speed = random.between(7, 12);
+      const int cars = std::max(1, static_cast<int>(length / random.between(28, 48)));
       for (int i = 0; i < cars; ++i) {
-        const double start = length * (i + 0.7 * dice.uniform()) / cars;
-        const uint32_t seed = dice.seed();
+        const double start = length * (i + 0.7 * random.uniform()) / cars;
+        const uint32_t seed = random.seed();
         double along = std::fmod(start + speed * seconds, static_cast<double>(length));
         if (direction < 0) along = length - along;
         // Traffic keeps right.

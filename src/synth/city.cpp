@@ -20,7 +20,7 @@
 namespace tessera {
 namespace {
 
-// A made-up place: the middle of the city, in a lake.
+// A fictitious location: the middle of the city is in a lake.
 constexpr double kLatitude = 46.4531, kLongitude = 6.5412, kAltitude = 372;
 
 void checkOptions(const CityOptions& o) {
@@ -42,7 +42,7 @@ void checkOptions(const CityOptions& o) {
     refuse("exposure jitter", fmt::format("{} is not a sensible deviation", o.exposureJitter), "give 0 to 4 stops");
 }
 
-// What the bytes of the photos depend on, and the mark of an unfinished or finished city in its folder.
+// Identifies the options on which the bytes of the photos depend; marks a finished or unfinished city in its folder.
 std::string fingerprint(const CityOptions& o, int photos) {
   return fmt::format(
       "{{\"synthesis\": 1, \"blocks\": \"{}x{}\", \"photos\": {}, \"size\": \"{}x{}\", \"seed\": {}, \"altitudes\": "
@@ -85,7 +85,7 @@ GpsFix gpsAt(const GeographicLib::LocalCartesian& earth, const Vec3d& x, double 
   return fix;
 }
 
-// The JPEG comes last: with it the photo is complete.
+// Writes the files of a photo. The JPEG comes last: its presence marks the photo as complete.
 void writePhoto(const Photo& photo, const Exposed& exposed, const ExifFields& exif) {
   writeDepthExr(photo.depth, exposed.depth);
   if (!photo.mask.empty()) writePng(photo.mask, exposed.mask);

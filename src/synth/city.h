@@ -1,4 +1,4 @@
-// A city of our own: procedural, seeded, ray traced, with everything known exactly.
+// A synthetic city: procedural, seeded and ray traced, with exact ground truth.
 #pragma once
 
 #include <cstdint>
@@ -15,20 +15,20 @@ struct CityOptions {
   int width = 400, height = 300;  // of a photo, pixels
   uint64_t seed = 1;
   std::vector<double> altitudes{60, 120};  // of the flights, metres above the ground
-  bool traffic = false;                    // cars that move between photos, with masks
+  bool traffic = false;                    // whether cars move between photos; they are masked
   double exposureJitter = 0;               // standard deviation of the photos' log2 gain
-  int samplesPerPixel = 6;                 // more is slower and cleaner; uneven pixels get three times as many
-  int holdoutEvery = 8;                    // photos 0, n, 2n, … are the test split; 0 for none
-  bool pinhole = false;                    // an ideal lens instead of a mildly distorted one
-  int threads = 0;                         // 0: all
+  int samplesPerPixel = 6;                 // more is slower and less noisy; uneven pixels get three times as many
+  int holdoutEvery = 8;                    // photos 0, n, 2n, … form the test split; 0: none
+  bool pinhole = false;                    // whether the lens is ideal instead of mildly distorted
+  int threads = 0;                         // 0: all of the machine
 };
 
-// How many photos `photos = 0` stands for.
+// Returns the number of photos that `photos = 0` stands for.
 int photosForCity(int blocksX, int blocksY);
 
-// Writes photos (JPEG with EXIF GPS), depths, masks and, last, transforms.json below `out`, and returns the capture.
-// Photos that an earlier run with the same options finished are kept. The files' bytes are a function of the options
-// alone, not of the number of threads. Throws Error when `out` holds a city of other options.
+// Writes photos (JPEG with EXIF GPS), depths, masks and, last, transforms.json to `out`, and returns the capture.
+// Photos that an earlier run with the same options finished are kept. The bytes of the files are a function of the
+// options alone, not of the number of threads. Throws Error if `out` holds a city with other options.
 Capture synthesiseCity(const fs::path& out, const CityOptions& options);
 
 }  // namespace tessera

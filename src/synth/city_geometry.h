@@ -1,4 +1,4 @@
-// From the plan of a city to triangles.
+// Builds triangles from the plan of a city.
 #pragma once
 
 #include "synth/layout.h"
@@ -6,7 +6,7 @@
 
 namespace tessera {
 
-// Everything that does not move.
+// Builds everything that does not move.
 SurfaceMesh buildCity(const CityLayout& city);
 
 void addGround(const CityLayout& city, SurfaceMesh& mesh);      // terrain, blocks, kerbs, water
@@ -15,10 +15,10 @@ void addRoof(const Building& building, SurfaceMesh& mesh);
 void addTree(const Tree& tree, float ground, SurfaceMesh& mesh);
 void addStreetFurniture(const CityLayout& city, SurfaceMesh& mesh);  // lamps, poles and their wires
 
-// A car standing on `foot`, facing `yaw`; colour and size from the seed.
+// Adds a car standing at `foot` and facing `yaw`; its colour and size follow from the seed.
 void addCar(const Vec3f& foot, float yaw, uint32_t seed, SurfaceMesh& mesh);
 
-// The cars under way at one moment. Lanes and speeds are a function of the city; `seconds` moves them.
+// Builds the moving cars at one moment. Lanes and speeds are a function of the city; `seconds` moves the cars.
 SurfaceMesh buildTraffic(const CityLayout& city, double seconds);
 
 }  // namespace tessera

@@ -59,7 +59,7 @@ struct Shading {
     if (s.tracedMirror && !mirrored) {
       image = along({start, out}, distance, true);
     } else {
-      // Streets and houses opposite, in the mean.
+      // An average colour for the streets and houses opposite.
       image = mix(Vec3f(0.22f, 0.21f, 0.19f), city.sky.radiance(out.z() > 0 ? out : Vec3f(out.x(), out.y(), 0)),
                   smoothStep(-0.05f, 0.3f, out.z()));
     }

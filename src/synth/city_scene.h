@@ -1,4 +1,4 @@
-// A city ready to be photographed, and the light along a ray through it.
+// A city ready to be photographed, and the radiance along a ray through it.
 #pragma once
 
 #include <optional>
@@ -10,7 +10,7 @@
 
 namespace tessera {
 
-// Built once, then only read. Not movable: tracing refers to the mesh.
+// Built once, then only read. Not movable, because the tracer refers to the mesh.
 struct CityScene {
   CityLayout layout;
   Sky sky;
@@ -24,7 +24,7 @@ struct CityScene {
   CityScene& operator=(const CityScene&) = delete;
 };
 
-// The cars of one photo.
+// The moving cars of one photo.
 struct TrafficScene {
   SurfaceMesh mesh;
   std::optional<TraceScene> tracer;
@@ -36,14 +36,16 @@ struct TrafficScene {
 
 struct RayLight {
   Vec3f radiance{0, 0, 0};
-  bool touchedTraffic = false;  // a moving car is seen, mirrored, or shades what is seen
+  bool touchedTraffic = false;  // a moving car is seen, mirrored, or shadows what is seen
 };
 
-// First surface along the ray, of the city and the traffic (may be null); `moving` says which.
+// Returns the first surface along the ray, of the city or the traffic (may be null); `moving` tells whether it is
+// traffic.
 std::optional<SurfaceHit> firstHit(const CityScene& city, const TrafficScene* traffic, const Ray& ray,
                                    bool* moving = nullptr);
 
-// `spread`: width of the ray's footprint per metre. `jitter`: two numbers in [0, 1) that pick a point of the sun.
+// Returns the radiance along a ray. `spread`: width of the ray's footprint per metre. `jitter`: two numbers in [0, 1)
+// that select a point on the sun's disc.
 RayLight lightAlong(const CityScene& city, const TrafficScene* traffic, const Ray& ray, float spread,
                     const Vec2f& jitter);
 

@@ -1,5 +1,5 @@
-// What a field is to find hard: wires, foliage that is partly see-through, and glass that looks different from
-// everywhere.
+// What makes the city hard for a radiance field: wires, partly transparent foliage, and glass whose colour depends on
+// the viewing direction.
 #include "synth/city_scene.h"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ TEST(CityScene, HangsWiresBetweenWiredPoles) {
     const Vec3f from = arm(city.poles[i]), to = arm(city.poles[i + 1]);
     const Vec3f across = Vec3f(from.y() - to.y(), to.x() - from.x(), 0).normalized();
     for (float side : {-1.f, 0.f, 1.f}) {
-      // In the middle of a straight piece, 0.88 m below the line between the insulators on the arms.
+      // At the middle of a straight piece, 0.88 m below the line between the insulators on the arms.
       const Vec3f wire = mix(from, to, 0.45f) + across * side + Vec3f(0, 0, 0.2f - 0.882f);
       const auto hit = tracer.intersect({wire + Vec3f(0, 0, 0.3f), {0, 0, -1}, 0, 0.6f});
       if (!city.poles[i].wires) {
@@ -35,7 +35,7 @@ TEST(CityScene, HangsWiresBetweenWiredPoles) {
       ASSERT_TRUE(hit) << "pole " << i;
       EXPECT_EQ(hit->material, Material::rubber) << "pole " << i;
       EXPECT_NEAR(hit->position.z(), wire.z(), 0.05f) << "pole " << i;
-      // Thin: a hand's breadth beside it there is air.
+      // The wire is thin: 10 cm beside it there is air.
       EXPECT_FALSE(tracer.occluded({wire + across * 0.1f + Vec3f(0, 0, 0.3f), {0, 0, -1}, 0, 0.6f})) << "pole " << i;
     }
     spans += city.poles[i].wires ? 1 : 0;
@@ -43,7 +43,7 @@ TEST(CityScene, HangsWiresBetweenWiredPoles) {
   EXPECT_GT(spans, 8);
 }
 
-// Level rays through the inside of the crown, from all round.
+// Returns horizontal rays through the inside of the crown, from all around.
 std::vector<Ray> raysThrough(const Tree& tree) {
   std::vector<Ray> rays;
   for (int turn = 0; turn < 6; ++turn) {
@@ -89,8 +89,8 @@ TEST(CityScene, LetsSomeRaysThroughTheCrownsOfTrees) {
   }
 }
 
-// How much the light that leaves a place changes with the side from which it is seen; nothing where something else is
-// in the way. Distance and footprint are those of the other view, so that only direction differs.
+// Returns how much the light from a place changes with the side from which it is seen; nothing if something else is in
+// the way. Distance and footprint are those of the other view, so that only the direction differs.
 std::optional<float> changeWithDirection(const CityScene& city, const Vec3f& place, const Vec3f& a, const Vec3f& b) {
   constexpr float kAway = 6;
   Vec3f light[2];
@@ -106,7 +106,7 @@ std::optional<float> changeWithDirection(const CityScene& city, const Vec3f& pla
 
 TEST(CityScene, ShowsGlassTowersOtherwiseFromOtherSides) {
   ThreadPool pool;
-  const CityScene city(2, 1, 3, pool);  // of two blocks one has towers
+  const CityScene city(2, 1, 3, pool);  // one of the two blocks has towers
   int glass = 0, changed = 0, walls = 0, steady = 0;
   for (const Building& building : city.layout.buildings) {
     const bool curtain = building.style == FacadeStyle::curtain;

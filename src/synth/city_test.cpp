@@ -54,18 +54,19 @@ TEST_F(City, IsTheSameBytesForAnyThreadsAndAfterAResume) {
   synthesiseCity(folder_ / "b", options);
   EXPECT_EQ(first, filesBelow(folder_ / "b"));
 
-  // As a kill leaves it: a photo without its picture, one with nothing, no transforms.json.
+  // The folder after the process was killed: a photo without its image, one without any file, and no transforms.json.
   fs::remove(folder_ / "b/images/photo_0003.jpg");
   fs::remove(folder_ / "b/images/photo_0008.jpg");
   fs::remove(folder_ / "b/depths/photo_0008.exr");
   fs::remove(folder_ / "b/transforms.json");
-  const auto kept = fs::last_write_time(folder_ / "b/images/photo_0002.jpg");
+  const auto writeTime = fs::last_write_time(folder_ / "b/images/photo_0002.jpg");
   synthesiseCity(folder_ / "b", options);
   EXPECT_EQ(first, filesBelow(folder_ / "b"));
-  EXPECT_EQ(fs::last_write_time(folder_ / "b/images/photo_0002.jpg"), kept) << "finished photos are not taken again";
+  EXPECT_EQ(fs::last_write_time(folder_ / "b/images/photo_0002.jpg"), writeTime)
+      << "finished photos are not taken again";
 }
 
-TEST_F(City, WritesWhatItPromises) {
+TEST_F(City, WritesPhotosDepthsMasksAndTransforms) {
   const CityOptions options = tiny();
   const Capture capture = synthesiseCity(folder_, options);
   ASSERT_EQ(capture.photos.size(), 10u);
@@ -87,7 +88,7 @@ TEST_F(City, WritesWhatItPromises) {
   EXPECT_TRUE(fs::exists(folder_ / "transforms.json"));
 }
 
-TEST_F(City, TellsTheSamePlaceInExifAndInPoses) {
+TEST_F(City, AgreesOnPlacesInExifAndInPoses) {
   const Capture capture = synthesiseCity(folder_, tiny());
   ASSERT_TRUE(capture.geo.has_value());
   const GeographicLib::LocalCartesian earth(capture.geo->latitude, capture.geo->longitude, capture.geo->altitude);
@@ -125,7 +126,7 @@ TEST_F(City, RefusesAFolderThatHoldsAnotherCity) {
   EXPECT_THROW(synthesiseCity(folder_, options), Error);
 }
 
-TEST_F(City, RefusesWhatCannotBeBuilt) {
+TEST_F(City, RejectsOptionsThatCannotBeBuilt) {
   for (auto spoil : {+[](CityOptions& o) { o.blocksX = 0; }, +[](CityOptions& o) { o.width = 0; },
                      +[](CityOptions& o) { o.altitudes.clear(); }, +[](CityOptions& o) { o.altitudes = {5}; },
                      +[](CityOptions& o) { o.photos = -1; }, +[](CityOptions& o) { o.samplesPerPixel = 0; },

@@ -40,7 +40,7 @@ Entry rationals(uint16_t tag, const std::vector<std::pair<uint32_t, uint32_t>>& 
   return {tag, kRational, static_cast<uint32_t>(values.size()), bytes};
 }
 
-// Degrees, minutes and millionths of a second: 30 micrometres on the ground.
+// Encodes degrees, minutes and millionths of a second, which resolve 30 micrometres on the ground.
 Entry degrees(uint16_t tag, double value) {
   constexpr uint32_t kMillion = 1000000;
   const uint64_t total = static_cast<uint64_t>(std::llround(std::abs(value) * 3600 * kMillion));
@@ -56,7 +56,7 @@ size_t directorySize(const std::vector<Entry>& entries) {
   return size;
 }
 
-// A directory that will stand `at` bytes into the TIFF block: entries, then values that do not fit into them.
+// Encodes a directory that begins `at` bytes into the TIFF block: entries, then values that do not fit into them.
 std::string directory(const std::vector<Entry>& entries, size_t at) {
   std::string head, tail;
   put(head, entries.size(), 2);

@@ -8,12 +8,12 @@ namespace tessera {
 
 struct ExifFields {
   GpsFix gps;
-  double focalLength35 = 28;  // millimetres on a 36 mm wide picture
-  double exposure = 0;        // log2, moves the exposure time away from 1/500 s
+  double focalLength35 = 28;  // millimetres, for a frame 36 mm wide
+  double exposure = 0;        // log2; scales the exposure time, which is 1/500 s at 0
   double seconds = 0;         // since take-off at 2024-06-21 10:00:00
 };
 
-// Begins with "Exif\0\0", ready for a JPEG's APP1 segment.
+// Returns a block that begins with "Exif\0\0", ready for a JPEG's APP1 segment.
 Bytes encodeExif(const ExifFields& fields);
 
 }  // namespace tessera

@@ -48,7 +48,7 @@ TEST(Exif, MarksHeightsBelowTheEllipsoid) {
   EXPECT_EQ(exif_content_get_entry(data->ifd[EXIF_IFD_GPS], static_cast<ExifTag>(0x0001))->data[0], 'S');
 }
 
-TEST(Exif, SaysWhatCameraAndWhen) {
+TEST(Exif, RecordsCameraAndTime) {
   const Exif data = parsed(encodeExif({.focalLength35 = 28.3, .exposure = 1, .seconds = 3725}));
   char text[64] = {};
   const auto value = [&](ExifIfd ifd, ExifTag tag) {

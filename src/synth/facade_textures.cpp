@@ -7,7 +7,7 @@ namespace {
 struct Opening {
   float width = 1.2f, height = 1.5f;
   float frame = 0.08f;
-  int columns = 2, rows = 1;  // panes
+  int columns = 2, rows = 1;  // number of panes
   Vec3f frameColour{0.75f, 0.74f, 0.70f};
 };
 
@@ -16,17 +16,17 @@ struct Painted {
   float glass = 0;
 };
 
-// What is seen behind a pane: a dark room, a blind drawn to some height, curtains, sometimes a lit ceiling.
+// Returns the colour seen behind a pane: a dark room, a blind drawn to some height, curtains, sometimes a lit ceiling.
 Vec3f interior(float x, float y, const Opening& o, uint32_t hash) {
   const float pick = static_cast<float>(hash & 0xffffu) / 65536, shade = static_cast<float>(hash >> 16) / 65536;
-  const Vec3f room = Vec3f(0.055f, 0.06f, 0.065f) * (0.5f + shade);
+  const Vec3f interiorColour = Vec3f(0.055f, 0.06f, 0.065f) * (0.5f + shade);
   if (pick < 0.28f && y > o.height * (0.25f + 0.7f * shade)) return Vec3f(0.52f, 0.50f, 0.45f);
   if (pick > 0.72f && std::abs(x) > o.width * (0.22f + 0.15f * shade)) return Vec3f(0.42f, 0.36f, 0.30f);
   if (pick > 0.66f && pick < 0.70f) return Vec3f(0.50f, 0.42f, 0.25f);
-  return room * (1.3f - 0.5f * y / o.height);
+  return interiorColour * (1.3f - 0.5f * y / o.height);
 }
 
-// Coverage of the opening at (x, y), and its look there.
+// Returns the coverage of the opening at (x, y); `out` receives its appearance there.
 float paintOpening(const Opening& o, float x, float y, uint32_t hash, float width, Painted& out) {
   const float half = 0.5f * o.width;
   const float inside = covered(x, -half, half, width) * covered(y, 0, o.height, width);
@@ -172,10 +172,10 @@ void paintFacade(const SurfaceObject& wall, const Vec2f& at, float width, Surfac
   if (!blank) {
     const float y = inFloor - sill;
     if (style == FacadeStyle::plaster || style == FacadeStyle::house) {
-      // A pale surround, and shutters on some houses.
-      const float surround = covered(x, -0.5f * o.width - 0.14f, 0.5f * o.width + 0.14f, width) *
-                             covered(y, -0.14f, o.height + 0.14f, width);
-      s.albedo = mix(s.albedo, Vec3f(0.74f, 0.72f, 0.67f), 0.8f * surround);
+      // Pale trims around the windows, and shutters on some houses.
+      const float trim = covered(x, -0.5f * o.width - 0.14f, 0.5f * o.width + 0.14f, width) *
+                         covered(y, -0.14f, o.height + 0.14f, width);
+      s.albedo = mix(s.albedo, Vec3f(0.74f, 0.72f, 0.67f), 0.8f * trim);
       if (wall.seed % 3 == 0) {
         const float shutter =
             covered(std::abs(x), 0.5f * o.width + 0.03f, 0.5f * o.width + 0.6f, width) * covered(y, 0, o.height, width);

@@ -15,7 +15,7 @@ constexpr double kPi = std::numbers::pi;
 struct Flight {
   enum class Kind { nadir, oblique, orbit } kind;
   double altitude, heading;  // metres; radians
-  double share;              // of all photos
+  double share;              // fraction of all photos
   int photos = 0;
 };
 
@@ -44,7 +44,7 @@ struct Planner {
   }
   uint64_t draws = 0;
 
-  // Round the whole of a small city; in a large one, round blocks spread over it.
+  // Orbits the whole of a small city; in a large one, blocks spread over it.
   void orbit(const Flight& f) {
     const double half = 0.5 * std::max(city.area.width(), city.area.depth());
     const int circles = half < 130 ? 1 : std::max(1, f.photos / 14);
@@ -61,7 +61,7 @@ struct Planner {
     }
   }
 
-  // A lawn mower's path over the city, shifted back so that what the camera sees lies in it.
+  // A serpentine path over the city, moved outwards so that the camera sees the city's edges.
   void fly(const Flight& f) {
     const double halfX = 0.5 * city.area.width(), halfY = 0.5 * city.area.depth();
     if (f.kind == Flight::Kind::orbit) return orbit(f);
@@ -113,7 +113,7 @@ std::vector<Station> planFlights(const CityLayout& city, const Camera& camera, c
     for (int i = 0; i < 4; ++i) flights.push_back({Flight::Kind::oblique, altitude, i * kPi / 2, 0.1375});
     flights.push_back({Flight::Kind::orbit, altitude, 0, 0.15});
   }
-  // Largest remainders, so that the flights add up to the photos asked for.
+  // The largest-remainder method makes the flights add up to the requested number of photos.
   const double scale = static_cast<double>(options.photos) / static_cast<double>(options.altitudes.size());
   double owed = 0;
   int given = 0;

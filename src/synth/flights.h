@@ -1,4 +1,4 @@
-// Where a drone takes its photos: nadir grids, oblique passes and orbits at each altitude.
+// Plans where a drone takes its photos: nadir grids, oblique passes and orbits at each altitude.
 #pragma once
 
 #include <string>
@@ -21,13 +21,14 @@ struct Station {
   std::string flight;  // "nadir 120 m", "oblique 60 m north", "orbit 60 m"
 };
 
-// Camera axes for a view along `heading` (radians from north, clockwise), `pitch` radians below the horizon.
+// Returns the camera axes for a view along `heading` (radians from north, clockwise), `pitch` radians below the
+// horizon.
 Mat3d cameraRotation(double heading, double pitch, double roll = 0);
 
-// In the order of flight. Never inside or close above a roof: there the drone climbs.
+// Returns the stations in the order of flight. None is inside a building or close above a roof: there the drone climbs.
 std::vector<Station> planFlights(const CityLayout& city, const Camera& camera, const FlightOptions& options);
 
-// A mildly distorted drone lens, 65 degrees wide.
+// Returns a mildly distorted drone camera with a field of view of 65 degrees.
 Camera droneCamera(int width, int height);
 
 }  // namespace tessera

@@ -13,8 +13,8 @@ Vec3f asphalt(float x, float y, uint32_t seed, float width) {
   return {value * 1.02f, value, value * 0.97f};
 }
 
-// One street seen along its own axes. `across` from the centre line, `toJunction` to the nearest crossing street's
-// edge.
+// Returns the colour of a street in its own axes. `across`: distance from the centre line; `toJunction`: distance to
+// the edge of the nearest crossing street.
 Vec3f streetColour(Vec3f base, float across, float along, float streetWidth, float toJunction, bool town, float width) {
   const Vec3f paint(0.68f, 0.68f, 0.64f);
   const float half = 0.5f * streetWidth;

@@ -23,8 +23,8 @@ std::vector<Vec2f> Building::outline() const {
 }
 
 float bayWidth(float wallLength, FacadeStyle style) {
-  const float wanted = style == FacadeStyle::loft ? 4.2f : style == FacadeStyle::panel ? 3.6f : 3.1f;
-  return wallLength / std::max(1.f, std::round(wallLength / wanted));
+  const float targetWidth = style == FacadeStyle::loft ? 4.2f : style == FacadeStyle::panel ? 3.6f : 3.1f;
+  return wallLength / std::max(1.f, std::round(wallLength / targetWidth));
 }
 
 float Pond::reach(float x, float y) const {
@@ -79,7 +79,7 @@ float CityLayout::highestNear(float x, float y, float radius) const {
 namespace {
 
 // Street trees, lamps and parked cars along the kerb of one block's side.
-void furnishKerb(CityLayout& city, const Block& block, Dice& dice) {
+void furnishKerb(CityLayout& city, const Block& block, RandomSequence& random) {
   const Rect& a = block.area;
   for (int side = 0; side < 4; ++side) {
     const bool alongX = side < 2;
@@ -89,17 +89,18 @@ void furnishKerb(CityLayout& city, const Block& block, Dice& dice) {
     const auto at = [&](float along, float in) {
       return alongX ? Vec2f(along, kerb + inward * in) : Vec2f(kerb + inward * in, along);
     };
-    const bool trees = dice.chance(0.75f);
-    for (float s = from + 9; s < to - 8; s += dice.between(8.5f, 11)) {
-      if (trees && dice.chance(0.8f))
-        city.trees.push_back({at(s, 1.1f), dice.between(6, 9.5f), dice.between(1.8f, 2.7f), false, 260, dice.seed()});
+    const bool trees = random.chance(0.75f);
+    for (float s = from + 9; s < to - 8; s += random.between(8.5f, 11)) {
+      if (trees && random.chance(0.8f))
+        city.trees.push_back(
+            {at(s, 1.1f), random.between(6, 9.5f), random.between(1.8f, 2.7f), false, 260, random.seed()});
     }
     for (float s = from + 4.5f; s < to - 4; s += 21) city.lamps.push_back({at(s, 0.6f), 6.5f, false});
     for (float s = from + 11; s < to - 11; s += 5.6f) {
-      if (!dice.chance(0.42f)) continue;
+      if (!random.chance(0.42f)) continue;
       const float yaw =
-          (alongX ? 0.f : 0.5f * std::numbers::pi_v<float>)+(dice.chance(0.5f) ? std::numbers::pi_v<float> : 0);
-      city.parkedCars.push_back({at(s, -1.15f), yaw, dice.seed()});
+          (alongX ? 0.f : 0.5f * std::numbers::pi_v<float>)+(random.chance(0.5f) ? std::numbers::pi_v<float> : 0);
+      city.parkedCars.push_back({at(s, -1.15f), yaw, random.seed()});
     }
   }
 }
@@ -124,13 +125,13 @@ void planPoles(CityLayout& city) {
 CityLayout planCity(int blocksX, int blocksY, uint64_t seed) {
   CityLayout city;
   city.seed = RandomStream(seed, 1).bits32(0);
-  Dice dice(city.seed);
+  RandomSequence random(city.seed);
 
   const auto lay = [&](int count, float low, float high, std::vector<Street>& streets) {
     std::vector<float> sizes;
     float total = 0;
-    for (int i = 0; i <= count; ++i) streets.push_back({0, dice.chance(0.3f) ? 17.f : 13.5f});
-    for (int i = 0; i < count; ++i) sizes.push_back(dice.between(low, high));
+    for (int i = 0; i <= count; ++i) streets.push_back({0, random.chance(0.3f) ? 17.f : 13.5f});
+    for (int i = 0; i < count; ++i) sizes.push_back(random.between(low, high));
     for (const Street& s : streets) total += s.width;
     for (float s : sizes) total += s;
     float at = -0.5f * total;
@@ -143,7 +144,7 @@ CityLayout planCity(int blocksX, int blocksY, uint64_t seed) {
   const float halfX = lay(blocksX, 66, 84, city.alongY), halfY = lay(blocksY, 56, 70, city.alongX);
   city.area = {-halfX, -halfY, halfX, halfY};
 
-  // Every kind appears before one repeats; the seed says where.
+  // Every kind appears before one repeats; the seed determines their order.
   const int count = blocksX * blocksY;
   std::vector<BlockKind> kinds;
   for (int i = 0; i < count; ++i) {
@@ -151,7 +152,7 @@ CityLayout planCity(int blocksX, int blocksY, uint64_t seed) {
                                     BlockKind::houses,    BlockKind::perimeter, BlockKind::towers};
     kinds.push_back(kOrder[i % 6]);
   }
-  for (int i = count - 1; i > 0; --i) std::swap(kinds[i], kinds[dice.below(i + 1)]);
+  for (int i = count - 1; i > 0; --i) std::swap(kinds[i], kinds[random.below(i + 1)]);
   for (int j = 0; j < blocksY; ++j) {
     for (int i = 0; i < blocksX; ++i) {
       const Street &west = city.alongY[i], &east = city.alongY[i + 1], &south = city.alongX[j],
@@ -160,17 +161,17 @@ CityLayout planCity(int blocksX, int blocksY, uint64_t seed) {
       block.area = {west.centre + west.width / 2, south.centre + south.width / 2, east.centre - east.width / 2,
                     north.centre - north.width / 2};
       block.kind = kinds[j * blocksX + i];
-      block.seed = dice.seed();
+      block.seed = random.seed();
       city.blocks.push_back(block);
     }
   }
   for (Block& block : city.blocks) {
     planBlock(city, block);
-    furnishKerb(city, block, dice);
+    furnishKerb(city, block, random);
   }
   planPoles(city);
-  planSurroundings(city);
-  // A large city has fewer and larger leaves a tree, so that it fits into memory.
+  planEnvirons(city);
+  // In a large city, trees have fewer and larger leaves, so that it fits into memory.
   const float leaves = std::clamp(64.f / static_cast<float>(count), 0.15f, 1.f);
   for (Tree& tree : city.trees) tree.leafCards = static_cast<int>(leaves * static_cast<float>(tree.leafCards));
   return city;

@@ -1,5 +1,5 @@
-// The plan of a city: streets, blocks, buildings, trees, poles. Plain data in metres, no triangles yet; a function of
-// size and seed alone. World: x east, y north, z up, origin at the middle of the city.
+// The plan of a city: streets, blocks, buildings, trees, poles. Plain data in metres, without triangles; a function of
+// size and seed alone. World axes: x east, y north, z up, origin at the middle of the city.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ struct Building {
   Vec2f centre{0, 0};
   float yaw = 0, halfX = 5, halfY = 5;
   int corners = 4;
-  float base = 0;  // z of the ground floor
+  float base = 0;  // z of the ground floor, metres
   int floors = 3;
   float groundHeight = 3.6f, floorHeight = 3.1f;
   FacadeStyle style = FacadeStyle::brick;
@@ -40,14 +40,14 @@ struct Building {
   uint32_t seed = 0;
 
   float height() const { return groundHeight + floorHeight * static_cast<float>(floors - 1) + 0.4f; }
-  Vec2f place(float x, float y) const;  // from the building's own axes to the world
+  Vec2f place(float x, float y) const;  // from the building's own axes to the world's
   std::vector<Vec2f> outline() const;   // counter-clockwise
 };
 
 struct Pond {
   Vec2f centre{0, 0};
   float radiusX = 0, radiusY = 0, level = 0;
-  // Below 1 inside the shore.
+  // Returns a value below 1 inside the shore.
   float reach(float x, float y) const;
 };
 
@@ -84,7 +84,7 @@ struct Street {
 
 struct CityLayout {
   uint32_t seed = 0;
-  Rect area;                           // the city with its outermost streets
+  Rect area;                           // the city including its outermost streets
   std::vector<Street> alongY, alongX;  // streets at a constant x, and at a constant y
   std::vector<Block> blocks;           // row by row from the south-west
   std::vector<Building> buildings;
@@ -92,17 +92,17 @@ struct CityLayout {
   std::vector<Pole> poles, lamps;
   std::vector<ParkedCar> parkedCars;
 
-  // Ground before kerbs: gentle in the city, hills outside.
+  // Returns the ground height without kerbs: gentle in the city, hills outside.
   float terrain(float x, float y) const;
   Vec3f terrainNormal(float x, float y) const;
-  // What one stands on: the terrain, 15 cm higher on blocks, lower in ponds.
+  // Returns the height of the walkable surface: the terrain, 15 cm higher on blocks, lower in ponds.
   float ground(float x, float y) const;
   const Block* blockAt(float x, float y) const;
-  // Highest roof within `radius` of a place (upper bound), or the ground.
+  // Returns an upper bound of the highest roof within `radius` of a place, or the ground.
   float highestNear(float x, float y, float radius) const;
 };
 
-// Facades are divided into bays as wide as this; walls, textures and balconies agree on it.
+// Returns the width of the bays into which a facade is divided; walls, textures and balconies use the same.
 float bayWidth(float wallLength, FacadeStyle style);
 
 inline constexpr float kPavementWidth = 3.2f;
@@ -110,9 +110,9 @@ inline constexpr float kKerbHeight = 0.15f;
 
 CityLayout planCity(int blocksX, int blocksY, uint64_t seed);
 
-// Buildings, trees and ponds of one block; called by planCity.
+// Plans the buildings, trees and ponds of one block; called by planCity.
 void planBlock(CityLayout& city, Block& block);
-// Country around the city: houses and trees of little detail.
-void planSurroundings(CityLayout& city);
+// Plans the country around the city: houses and trees of little detail.
+void planEnvirons(CityLayout& city);
 
 }  // namespace tessera

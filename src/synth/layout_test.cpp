@@ -87,7 +87,7 @@ TEST(Flights, StayOutsideBuildingsAndHoldLevelAxes) {
   }
 }
 
-// What a field is to learn must be seen from several sides.
+// Places that a model is to learn must be seen from several sides.
 TEST(Flights, SeeNearlyEveryOpenPlaceFivefold) {
   ThreadPool pool;
   const CityScene city(2, 2, 1, pool);

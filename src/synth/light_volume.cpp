@@ -8,10 +8,10 @@ namespace tessera {
 namespace {
 
 constexpr int kDirections = 72;
-constexpr float kTextureWidth = 1.5f;  // bounced light sees only the broad colours
+constexpr float kTextureWidth = 1.5f;  // bounced light carries only large-scale colours
 
-// Spherical Fibonacci points.
-Vec3f directionOf(int i) {
+// Returns a spherical Fibonacci point.
+Vec3f fibonacciDirection(int i) {
   const float z = 1 - (2 * static_cast<float>(i) + 1) / kDirections;
   const float angle = static_cast<float>(i) * std::numbers::pi_v<float> * (3 - std::sqrt(5.f));
   const float r = std::sqrt(1 - z * z);
@@ -43,7 +43,7 @@ LightVolume::LightVolume(const CityLayout& city, const TraceScene& scene, const 
       std::array<float, 6> total{};
       int behind = 0;
       for (int i = 0; i < kDirections; ++i) {
-        const Vec3f direction = directionOf(i);
+        const Vec3f direction = fibonacciDirection(i);
         Vec3f light;
         if (const auto hit = scene.intersect({place, direction, 1e-3f})) {
           if (hit->backFace && hit->material != Material::leaf) ++behind;
@@ -75,7 +75,7 @@ Vec3f LightVolume::openSky(const Vec3f& normal) const {
 
 Vec3f LightVolume::at(const Vec3f& xInWorld, const Vec3f& normal) const {
   if (probes_.empty()) return openSky(normal);
-  // Half a cell off the wall, where the air is.
+  // Samples half a cell off the wall, where the probes lie in the air.
   const Vec3f cell = (xInWorld + normal.cwiseProduct(step_) * 0.5f - origin_).cwiseQuotient(step_);
   float outside = 0;
   std::array<int, 3> base{};

@@ -1,6 +1,6 @@
-// Light that arrives from the sky and from one bounce, on a grid of probes through the city's air: smooth and free of
-// noise, where ambient occlusion rays per sample would speckle every photo.
-// After the ambient cube of Half-Life 2 (McTaggart, GDC 2004): six directions a probe.
+// Light from the sky and from one bounce, on a grid of probes in the city's air: smooth and noise-free, whereas ambient
+// occlusion rays per sample would make photos noisy.
+// After the ambient cube of Half-Life 2 (McTaggart, GDC 2004): six directions per probe.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ class LightVolume {
   LightVolume() = default;
   LightVolume(const CityLayout& city, const TraceScene& scene, const Sky& sky, ThreadPool& pool);
 
-  // Irradiance over pi at a surface: what a white diffuse surface would shine with.
+  // Returns irradiance / π at a surface: the radiance that a white diffuse surface would reflect.
   Vec3f at(const Vec3f& xInWorld, const Vec3f& normal) const;
 
  private:

@@ -1,5 +1,5 @@
-// Procedural texture building blocks. `width` is always the footprint of the sample in the same unit as the
-// coordinate: detail finer than it fades to its mean, so that textures do not alias between supersamples.
+// Building blocks of procedural textures. `width` is always the footprint of the sample in the unit of the coordinate:
+// detail finer than it fades to its mean, so that textures do not alias between supersamples.
 #pragma once
 
 #include <algorithm>
@@ -53,7 +53,7 @@ inline float valueNoise(float x, float y, uint32_t seed) {
   return 2 * (a + (b - a) * fx + (c - a) * fy + (a - b - c + d) * fx * fy) - 1;
 }
 
-// Octaves of halving wavelength and amplitude, roughly in [-1, 1]; octaves shorter than two footprints fade away.
+// Sums octaves of halving wavelength and amplitude, roughly in [-1, 1]; octaves shorter than two footprints fade out.
 inline float fractalNoise(float x, float y, uint32_t seed, float wavelength, int octaves, float width) {
   float sum = 0, amplitude = 0.6f;
   for (int octave = 0; octave < octaves; ++octave, wavelength *= 0.5f, amplitude *= 0.5f) {
@@ -64,13 +64,14 @@ inline float fractalNoise(float x, float y, uint32_t seed, float wavelength, int
   return sum;
 }
 
-// Share of [x - width/2, x + width/2] that lies in [low, high].
+// Returns the fraction of [x - width/2, x + width/2] that lies in [low, high].
 inline float covered(float x, float low, float high, float width) {
   const float half = 0.5f * std::max(width, 1e-4f);
   return clamped((std::min(x + half, high) - std::max(x - half, low)) / (2 * half));
 }
 
-// The same for stripes [0, line) repeated every `period`; fades to the mean when the footprint exceeds the period.
+// Returns the same for stripes [0, line) repeated every `period`; fades to the mean when the footprint exceeds the
+// period.
 inline float stripes(float x, float period, float line, float width) {
   const float mean = line / period;
   if (width >= period) return mean;
@@ -80,10 +81,10 @@ inline float stripes(float x, float period, float line, float width) {
   return mix(sharp, mean, clamped(2 * width / period - 1));
 }
 
-// A sequence of draws for building things.
-class Dice {
+// A sequence of random numbers for procedural generation.
+class RandomSequence {
  public:
-  explicit Dice(uint32_t seed) : seed_(seed) {}
+  explicit RandomSequence(uint32_t seed) : seed_(seed) {}
   float uniform() { return latticeRandom(static_cast<int>(count_++), 0x51ed, seed_); }
   float between(float low, float high) { return low + (high - low) * uniform(); }
   int below(int n) { return std::min(n - 1, static_cast<int>(uniform() * static_cast<float>(n))); }

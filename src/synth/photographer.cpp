@@ -9,7 +9,7 @@
 namespace tessera {
 namespace {
 
-// Radiance to display-linear in [0, 1): a soft shoulder, a little more contrast than the eye (Narkowicz's fit of ACES).
+// Maps radiance to display-linear values in [0, 1): a soft shoulder and some contrast (Narkowicz's fit of ACES).
 float toneCurve(float x) {
   x *= 0.37f;
   return clamped(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f));
@@ -19,7 +19,7 @@ float srgbFromLinear(float x) {
   return x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1 / 2.4f) - 0.055f;
 }
 
-// Tent of one pixel radius, a fair stand-in for a lens and a sensor with an antialiasing filter.
+// Samples a tent filter with a radius of one pixel, which approximates a lens and a sensor with an antialiasing filter.
 double tent(double u) {
   return 0.8 * (u < 0.5 ? std::sqrt(2 * u) - 1 : 1 - std::sqrt(2 - 2 * u));
 }
@@ -102,7 +102,7 @@ Exposed takePhoto(const Moment& moment, const LensTable& lens, const Pose& world
       const auto expose = [&](int from, int to) {
         for (int i = from; i < to; ++i) {
           const RayLight light = sampler.sample(x, y, pixel, i);
-          // Averaged as shown, not as received: a bright glint covers its share of a pixel and no more.
+          // Averages after the tone curve: a bright glint covers no more than its fraction of a pixel.
           const Vec3f shown(toneCurve(light.radiance.x()), toneCurve(light.radiance.y()),
                             toneCurve(light.radiance.z()));
           sum += shown;

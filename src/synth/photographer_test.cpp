@@ -75,7 +75,7 @@ TEST(Photographer, PutsDepthOfTwoPhotosOnTheSameSurfaces) {
         high = std::max(high, z);
         inverse += (k % 2 != 0 ? fx - ix : 1 - fx + ix) * (k / 2 != 0 ? fy - iy : 1 - fy + iy) / z;
       }
-      if (high > 1.03 * low || 1 / inverse < 0.99 * inB.z()) continue;  // an edge, or hidden from B
+      if (high > 1.03 * low || 1 / inverse < 0.99 * inB.z()) continue;  // at an edge, or hidden from B
       (1 / inverse < 1.01 * inB.z() ? agree : behind) += 1;
     }
   }
@@ -161,7 +161,7 @@ TEST(Photographer, SeesWaterChangeWithTheViewpoint) {
     const Vec3f target(pond.centre.x(), pond.centre.y(), pond.level);
     return lightAlong(water, nullptr, {target + from, -from.normalized()}, 1e-3f, {0.5f, 0.5f}).radiance.z();
   };
-  // Straight down a pond is dark; seen flat it mirrors the sky on some sides and trees on others.
+  // Seen from above a pond is dark; at grazing angles it mirrors the sky on some sides and trees on others.
   float brightest = 0, darkest = 1e9f;
   for (float angle = 0; angle < 6.2f; angle += 0.785f) {
     const float b = brightness({0.7f * pond.radiusY * std::cos(angle), 0.7f * pond.radiusY * std::sin(angle), 1.2f});

@@ -117,7 +117,7 @@ Surface surfaceAt(const CityLayout& city, const SurfaceHit& hit, float width) {
       const Vec3f outward = (p - object.centre).cwiseProduct(Vec3f(1, 1, 0.8f)).normalized();
       s.normal = (outward * 0.75f + hit.normal * 0.45f + Vec3f(0, 0, 0.2f)).normalized();
       const float tone = latticeRandom(static_cast<int>(hit.face), 1, object.seed);
-      // Deep inside the crown little light arrives.
+      // Little light arrives deep inside the crown.
       const float depth = ((p - object.centre).norm() / std::max(object.width, 0.45f * object.height));
       s.albedo = object.colour * ((0.75f + 0.5f * tone) * (0.45f + 0.65f * smoothStep(0.2f, 0.95f, depth)));
       s.translucency = 0.3f;

@@ -1,4 +1,4 @@
-// Procedural materials: what a point of the city looks like, before light.
+// Procedural materials: the appearance of a point of the city before lighting.
 #pragma once
 
 #include "synth/layout.h"
@@ -9,16 +9,16 @@ namespace tessera {
 struct Surface {
   Vec3f albedo{0.5f, 0.5f, 0.5f};  // diffuse reflectance, linear
   Vec3f normal{0, 0, 1};
-  float gloss = 0;            // share of the footprint that mirrors like glass or water (Fresnel)
-  float reflectance = 0.04f;  // of that share at normal incidence
-  bool tracedMirror = false;  // mirrors the city; otherwise only the sky
-  float translucency = 0;     // share of the sun that comes through from behind
+  float gloss = 0;            // fraction of the footprint that mirrors like glass or water (Fresnel)
+  float reflectance = 0.04f;  // of that fraction, at normal incidence
+  bool tracedMirror = false;  // whether it mirrors the city; otherwise it mirrors only the sky
+  float translucency = 0;     // fraction of the sunlight that shines through from behind
 };
 
 // `width`: footprint of the sample on the surface, metres.
 Surface surfaceAt(const CityLayout& city, const SurfaceHit& hit, float width);
 
-// Parts of the above, by theme.
+// Parts of surfaceAt, by theme.
 Vec3f terrainColour(const CityLayout& city, float x, float y, float width);
 Vec3f blockTopColour(const Block& block, float x, float y, float width);
 Vec3f grassColour(float x, float y, uint32_t seed, float width);

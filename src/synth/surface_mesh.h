@@ -31,7 +31,7 @@ enum class Material : uint16_t {
   rubber
 };
 
-// What one face belongs to. A wall is an object of its own: its size decides where windows go.
+// The object that a face belongs to. Each wall is an object of its own, because its size determines where windows are.
 struct SurfaceObject {
   uint32_t seed = 0;
   Vec3f colour{0.5f, 0.5f, 0.5f};
@@ -56,19 +56,20 @@ struct SurfaceMesh {
   std::vector<SurfaceFace> faces;
   std::vector<SurfaceObject> objects;
 
-  // Foliage: square cards, four corners each, cut out by the tracer. `leafObjects` has one entry a card.
+  // Foliage: square cards with four corners each, cut out by the tracer. `leafObjects` has one entry for each card.
   std::vector<Vec3f> leafCorners;
   std::vector<uint32_t> leafObjects;
 
   uint32_t addObject(const SurfaceObject& object);
   uint32_t addVertex(const Vec3f& p, const Vec2f& uv);
   void addTriangle(const Vec3f& a, const Vec3f& b, const Vec3f& c, Material material, uint32_t object);
-  // Corners counter-clockwise seen from outside; texture (0,0) at `a`, u along a→b, v along a→d, in metres from `uv`.
+  // Corners are counter-clockwise seen from outside; texture (0,0) is at `a`, u along a→b, v along a→d, in metres from
+  // `uv`.
   void addQuad(const Vec3f& a, const Vec3f& b, const Vec3f& c, const Vec3f& d, Material material, uint32_t object,
                Vec2f uv = {0, 0});
-  // A box standing at `foot` (centre of its lower face), turned by `yaw`; without its lower face.
+  // Adds a box without its lower face, standing at `foot` (the centre of that face) and turned by `yaw`.
   void addBox(const Vec3f& foot, const Vec3f& size, float yaw, Material material, uint32_t object);
-  // A thin pole between two points.
+  // Adds a thin tube between two points.
   void addTube(const Vec3f& from, const Vec3f& to, float radiusFrom, float radiusTo, int sides, Material material,
                uint32_t object);
   void addLeafCard(const Vec3f& centre, const Vec3f& right, const Vec3f& up, uint32_t object);

@@ -33,7 +33,8 @@ void occludeOne(RTCScene scene, RTCRay& query) {
 
 constexpr unsigned kSolid = 0, kFoliage = 1;
 
-// A card carries 4 × 4 leaves: ellipses, each shifted and turned by its own hash.
+// Returns whether a card has a leaf at (u, v). A card carries 4 × 4 leaves: ellipses, each shifted and turned by its
+// own hash.
 bool leafAt(float u, float v, uint32_t card) {
   constexpr int kCells = 4;
   const float x = u * kCells, y = v * kCells;
@@ -72,11 +73,12 @@ RTCRay embreeRay(const Ray& ray) {
 }  // namespace
 
 TraceDevice::TraceDevice() {
-  // One thread builds: the tree, and with it which of two touching surfaces wins, never depends on the machine's load.
+  // Embree builds with one thread, so that its tree, and thereby which of two coincident surfaces is hit, does not
+  // depend on the machine's load.
   RTCDevice device = rtcNewDevice("threads=1");
   if (device == nullptr)
     throw Error("Embree", "", "the ray tracing device could not be made",
-                "check that the installed Embree fits this processor");
+                "check that the installed Embree fits this CPU");
   device_ = {device, rtcReleaseDevice};
 }
 

@@ -1,5 +1,5 @@
-// Rays against a SurfaceMesh, through Embree. Foliage is cut out inside the traversal, the same for every ray, so that
-// every photo sees the same leaves.
+// Ray casting against a SurfaceMesh, through Embree. Foliage is cut out inside the traversal in the same way for every
+// ray, so that every photo sees the same leaves.
 #pragma once
 
 #include <limits>
@@ -23,7 +23,7 @@ struct Ray {
 struct SurfaceHit {
   float distance = 0;
   Vec3f position{0, 0, 0};
-  Vec3f normal{0, 0, 1};  // unit, of the triangle, turned towards the ray's origin
+  Vec3f normal{0, 0, 1};  // unit; of the triangle, turned towards the ray's origin
   bool backFace = false;
   Vec2f textureAt{0, 0};  // metres
   Material material = Material::plain;
@@ -40,7 +40,7 @@ class TraceDevice {
   std::shared_ptr<RTCDeviceTy> device_;
 };
 
-// Keeps a reference to the mesh. All queries are const and may run on any number of threads.
+// Keeps a reference to the mesh. All queries are const and may be called by any number of threads.
 class TraceScene {
  public:
   TraceScene(const TraceDevice& device, const SurfaceMesh& mesh);

@@ -11,7 +11,7 @@ namespace {
 
 struct Track {
   SparsePoint point;
-  std::vector<Observation> observations;  // `point` not yet set
+  std::vector<Observation> observations;  // `point` is not set yet
 };
 
 double gaussian(const RandomStream& random, uint64_t index) {
@@ -26,7 +26,7 @@ bool visible(const CityScene& city, const Vec3d& eye, const Vec3d& x) {
   return !city.tracer->occluded({eye.cast<float>(), (way / way.norm()).cast<float>(), 0.05f, distance - slack});
 }
 
-// Nothing when the ray meets sky, mirrors, leaves' depths or a place that too few photos see.
+// Returns nothing if the ray meets sky, a mirror, foliage or a place that too few photos see.
 std::optional<Track> follow(const CityScene& city, const LensTable& lens, const Capture& capture,
                             const TrackOptions& options, uint64_t index) {
   const RandomStream random(mix64(options.seed) ^ 0x7261636bull, index);
@@ -87,9 +87,9 @@ std::optional<Track> follow(const CityScene& city, const LensTable& lens, const 
 
 void findTracks(const CityScene& city, const LensTable& lens, const TrackOptions& options, ThreadPool& pool,
                 Capture& capture) {
-  const size_t wanted = std::min<size_t>(options.mostPoints, capture.photos.size() * options.pointsPerPhoto);
-  std::vector<std::optional<Track>> tracks(wanted);
-  pool.forRanges(wanted, 64, [&](size_t begin, size_t end) {
+  const size_t trackCount = std::min<size_t>(options.maxPoints, capture.photos.size() * options.pointsPerPhoto);
+  std::vector<std::optional<Track>> tracks(trackCount);
+  pool.forRanges(trackCount, 64, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) tracks[i] = follow(city, lens, capture, options, i);
   });
   for (const std::optional<Track>& track : tracks) {

@@ -51,7 +51,7 @@ TEST(Tracks, AreNoisyAsAskedAndSeenByThreePhotosOrMore) {
   EXPECT_GT(far, 0) << "structure from motion errs";
   EXPECT_LT(far, 0.04 * close);
 
-  // Points lie on surfaces, give or take the noise.
+  // Points lie on surfaces, up to the noise.
   int off = 0;
   for (const SparsePoint& p : capture.points) {
     const Vec3f x = p.xInWorld.cast<float>();

@@ -1,6 +1,6 @@
-// What a tile holds, whatever its representation: decoded contents, what several of them share, and the codec that
-// makes them of untrusted bytes. A representation has one codec; everything that reads scenes knows no more of it than
-// this.
+// What a tile holds, independently of its representation: decoded contents, the resources that they share, and the
+// codec that decodes them from untrusted bytes. Each representation has one codec; this interface is all that code
+// which reads scenes knows of a representation.
 #pragma once
 
 #include <cstddef>
@@ -17,17 +17,19 @@
 
 namespace tessera {
 
-struct SharedResource;  // tiles/tileset.h
+struct SharedResource;  // declared in tiles/tileset.h
 struct TileContent;
 
-// What readers allow.
+// Limits that readers enforce.
 struct ContentLimits {
   uint64_t fileBytes = uint64_t{1} << 30;
-  uint64_t bytes = uint64_t{1} << 30;  // of the content in memory; decoding takes up to two thirds more for a moment
+  uint64_t bytes =
+      uint64_t{1} << 30;  // memory of the decoded content; decoding temporarily takes up to two thirds more
   uint32_t parts = 1024;
 };
 
-// What several contents of a scene need and what is in memory once for all of them: a network, a table of a block.
+// Data that several contents of a scene need and that is in memory once for all of them: a network, or the table of a
+// block.
 class Resource {
  public:
   Resource() = default;
@@ -37,10 +39,11 @@ class Resource {
 
   virtual uint64_t memoryBytes() const = 0;
 };
-// Those of a content, in the order of TileContent::resources. A content that needs them longer keeps them.
+// The resources of a content, in the order of TileContent::resources. A content that needs them after decoding keeps
+// them.
 using Resources = std::vector<std::shared_ptr<const Resource>>;
 
-// A decoded content, which keeps all rules of its format.
+// A decoded content, which satisfies all rules of its format.
 class Content {
  public:
   Content() = default;
@@ -48,24 +51,24 @@ class Content {
   Content& operator=(const Content&) = delete;
   virtual ~Content() = default;
 
-  // What it takes in memory, without its resources. Renderers' budgets count this.
+  // Memory in bytes without shared resources. Renderers count it against their budgets.
   virtual uint64_t memoryBytes() const = 0;
-  // Why it is not the content that tileset.json speaks of, for people: it is the surround where that says none, or the
-  // other way round, or it reaches out of the box there. Nothing where it is.
-  virtual std::optional<std::string> mismatchWith(const TileContent& promised) const = 0;
+  // Returns why this is not the content that tileset.json declares, as text for people, or nothing if it matches.
+  // Reasons are that only one of the two is a background block, or that the content reaches out of the declared box.
+  virtual std::optional<std::string> mismatchWith(const TileContent& declared) const = 0;
 };
 
-// A content that is a plain value, of which these are found beside its type:
+// A content that is a plain value. These two functions must be declared next to its type:
 //   uint64_t bytesInMemory(const T&);
-//   std::optional<std::string> mismatchWithTileset(const T&, const TileContent& promised);
+//   std::optional<std::string> mismatchWithTileset(const T&, const TileContent& declared);
 template <class T>
 class ContentOf final : public Content {
  public:
   explicit ContentOf(T value) : value(std::move(value)) {}
 
   uint64_t memoryBytes() const override { return bytesInMemory(value); }
-  std::optional<std::string> mismatchWith(const TileContent& promised) const override {
-    return mismatchWithTileset(value, promised);
+  std::optional<std::string> mismatchWith(const TileContent& declared) const override {
+    return mismatchWithTileset(value, declared);
   }
 
   T value;
@@ -76,7 +79,7 @@ std::unique_ptr<Content> makeContent(T value) {
   return std::make_unique<ContentOf<T>>(std::move(value));
 }
 
-// The value of a content that is a ContentOf<T>; CHECKs that it is one.
+// Returns the value of a content that is a ContentOf<T>; CHECKs that it is one.
 template <class T>
 const T& contentAs(const Content& content) {
   const auto* typed = dynamic_cast<const ContentOf<T>*>(&content);
@@ -84,29 +87,29 @@ const T& contentAs(const Content& content) {
   return typed->value;
 }
 
-// Decodes the contents of one representation. Stateless and there for as long as the program; its functions may be
-// called by several threads at a time. Bytes are untrusted: nothing, and why in `reason` (for people), where they are
-// not as docs/tile-format.md has them, or would take more memory than the limits allow, which is known before it is
-// taken. Where something is returned, `reason` is empty.
+// Decodes the contents of one representation. Codecs are stateless and live as long as the program; their functions may
+// be called by several threads at a time. Bytes are untrusted: if they violate docs/tile-format.md, or would take more
+// memory than the limits allow (which is checked before it is allocated), functions return nothing and state why in
+// `reason`, for people. Where something is returned, `reason` is empty.
 class ContentCodec {
  public:
   virtual ~ContentCodec() = default;
 
-  // As tileset.json and contents name the representation.
+  // The name of the representation in tileset.json and in contents.
   virtual std::string_view representation() const = 0;
-  // Whether contents of a tile may overlap, which need then no order (tileWithoutOrder).
+  // Whether the contents of a tile may overlap, in which case they need no order (tileWithoutOrder).
   virtual bool contentsMayOverlap() const { return false; }
 
-  // What a content will take in memory (Content::memoryBytes), by the JSON of its container alone.
+  // Returns the memory that a content will take (Content::memoryBytes), from the JSON of its container alone.
   virtual std::optional<uint64_t> memoryBytes(std::string_view gltfJson, std::string& reason,
                                               const ContentLimits& limits = {}) const = 0;
-  // `glb`: the whole file. Null where it is refused.
+  // `glb`: the whole file. Returns null if it is refused.
   virtual std::unique_ptr<Content> decode(std::span<const std::byte> glb, const Resources& resources,
                                           std::string& reason, const ContentLimits& limits = {}) const = 0;
 
-  // What a shared resource will take in memory at most, whose file has so many bytes.
+  // Returns an upper bound of the memory that a shared resource will take whose file has `fileBytes` bytes.
   virtual uint64_t resourceMemoryBytes(const SharedResource&, uint64_t fileBytes) const { return fileBytes; }
-  // Null where it is refused, as it is by representations that share nothing.
+  // Returns null if the resource is refused, which representations without shared resources always do.
   virtual std::shared_ptr<const Resource> decodeResource(std::span<const std::byte>, const SharedResource&,
                                                          std::string& reason, const ContentLimits& = {}) const {
     reason = "is a shared resource, which contents of this representation do not have";

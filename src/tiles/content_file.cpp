@@ -15,30 +15,30 @@ using namespace json_fields;
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kContentExtension = "TESSERA_content";
-constexpr size_t kMostViews = size_t{1} << 16;
+constexpr size_t kMaxViews = size_t{1} << 16;
 
 bool uses(const json& asset, const char* extension) {
-  const json* used = arrayOf(asset, "extensionsUsed");
+  const json* used = getArray(asset, "extensionsUsed");
   return used && std::find(used->begin(), used->end(), extension) != used->end();
 }
 
-// The one buffer is the file's own bytes, which may be padded by up to three.
-std::optional<std::span<const std::byte>> bufferOf(const json& asset, std::span<const std::byte> bytes) {
-  const json* buffers = arrayOf(asset, "buffers");
-  if (!buffers || buffers->size() != 1 || fieldOf((*buffers)[0], "uri")) return std::nullopt;
-  const auto length = unsignedOf((*buffers)[0], "byteLength");
+// Returns the only buffer: the file's binary chunk, which may be padded by up to three bytes.
+std::optional<std::span<const std::byte>> findBuffer(const json& asset, std::span<const std::byte> bytes) {
+  const json* buffers = getArray(asset, "buffers");
+  if (!buffers || buffers->size() != 1 || getField((*buffers)[0], "uri")) return std::nullopt;
+  const auto length = getUnsigned((*buffers)[0], "byteLength");
   if (!length || *length > bytes.size() || bytes.size() - *length > 3) return std::nullopt;
   return bytes.first(*length);
 }
 
 bool readViews(const json& asset, std::span<const std::byte> bytes, ContentFile& file) {
-  const auto buffer = bufferOf(asset, bytes);
-  const json* views = arrayOf(asset, "bufferViews");
-  if (!buffer || !views || views->size() > kMostViews) return false;
+  const auto buffer = findBuffer(asset, bytes);
+  const json* views = getArray(asset, "bufferViews");
+  if (!buffer || !views || views->size() > kMaxViews) return false;
   for (const json& view : *views) {
-    const auto length = unsignedOf(view, "byteLength");
-    const auto offset = fieldOf(view, "byteOffset") ? unsignedOf(view, "byteOffset") : std::optional<uint32_t>(0);
-    if (unsignedOf(view, "buffer") != 0u || !length || !offset) return false;
+    const auto length = getUnsigned(view, "byteLength");
+    const auto offset = getField(view, "byteOffset") ? getUnsigned(view, "byteOffset") : std::optional<uint32_t>(0);
+    if (getUnsigned(view, "buffer") != 0u || !length || !offset) return false;
     if (*offset > buffer->size() || *length > buffer->size() - *offset) return false;
     file.views.push_back(buffer->subspan(*offset, *length));
   }
@@ -50,14 +50,14 @@ std::optional<json> decodeAsset(std::string_view text, std::string_view represen
     reason = std::move(why);
     return std::nullopt;
   };
-  if (text.size() > kMostContentJson) return fail("its JSON is larger than any content's should be");
+  if (text.size() > kMaxContentJson) return fail("its JSON is larger than any content's should be");
   json asset = json::parse(text, nullptr, false);
-  const json* header = fieldOf(asset, "asset");
+  const json* header = getField(asset, "asset");
   if (!header || !isString(*header, "version", "2.0")) return fail("its JSON is not that of a glTF 2.0 asset");
-  const json* extensions = fieldOf(asset, "extensions");
-  const json* ours = extensions ? fieldOf(*extensions, kContentExtension) : nullptr;
+  const json* extensions = getField(asset, "extensions");
+  const json* ours = extensions ? getField(*extensions, kContentExtension) : nullptr;
   if (!ours || !uses(asset, kContentExtension)) return fail("has no extension TESSERA_content");
-  const auto version = unsignedOf(*ours, "version");
+  const auto version = getUnsigned(*ours, "version");
   if (!version) return fail("does not say which version it is of");
   if (*version != kContentVersion) return fail(fmt::format("is of version {}; {} is known", *version, kContentVersion));
   if (!isString(*ours, "representation", representation)) {
@@ -66,16 +66,16 @@ std::optional<json> decodeAsset(std::string_view text, std::string_view represen
   return asset;
 }
 
-// Nodes of the scene, and above its roots the one that turns z up into y up.
+// Returns the scene's nodes and, above its roots, the node that turns Z-up into Y-up.
 Json turnedNodes(const GltfScene& scene) {
   Json nodes = scene.nodes;
   Json turned = {{"children", scene.roots}};
-  turned["matrix"] = {1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1};  // column after column
+  turned["matrix"] = {1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1};  // column-major
   nodes.push_back(std::move(turned));
   return nodes;
 }
 
-// Members of the asset; glTF allows no empty arrays.
+// Adds the scene's arrays to the asset; empty ones are left out, because glTF forbids them.
 void addScene(const GltfScene& scene, Json& asset) {
   for (const std::string& extension : scene.extensionsUsed) asset["extensionsUsed"].push_back(extension);
   asset["scenes"][0]["nodes"] = {scene.nodes.size()};
@@ -121,8 +121,8 @@ Bytes ContentFileWriter::finish(std::string_view representation, const Json& our
   return encodeGlb(asset.dump(), bytes_);
 }
 
-std::optional<std::span<const std::byte>> ContentFile::viewOf(const json& object, const char* mimeType) const {
-  const auto index = unsignedOf(object, "bufferView");
+std::optional<std::span<const std::byte>> ContentFile::bufferViewBytes(const json& object, const char* mimeType) const {
+  const auto index = getUnsigned(object, "bufferView");
   if (!index || *index >= views.size() || !isString(object, "mimeType", mimeType)) return std::nullopt;
   return views[*index];
 }

@@ -1,6 +1,6 @@
-// What contents of every representation have in common: a .glb that is a valid glTF 2.0 asset (with an empty scene
-// where there is nothing that other programs could draw), whose extension TESSERA_content describes a payload that lies
-// in buffer views. docs/tile-format.md, section 5. For codecs, not for their users: it shows JSON.
+// The container that contents of all representations share: a .glb that is a valid glTF 2.0 asset (with an empty scene
+// if other programs cannot draw anything of it), whose extension TESSERA_content describes a payload in buffer views.
+// See docs/tile-format.md, section 5. This header exposes JSON; it is for codecs, not for their users.
 #pragma once
 
 #include <cstdint>
@@ -17,36 +17,37 @@
 namespace tessera {
 
 inline constexpr int kContentVersion = 1;
-inline constexpr size_t kMostContentJson = size_t{8} << 20;  // bytes
+inline constexpr size_t kMaxContentJson = size_t{8} << 20;  // bytes
 inline constexpr const char* kNoGlb = "is not a binary glTF file of version 2, or is cut short";
 inline constexpr const char* kWebP = "image/webp";
 inline constexpr const char* kRawBytes = "application/octet-stream";
 
-// What other programs draw of a content: members of the glTF asset itself, each empty where there are none of it.
-// Accessors and images name buffer views by the numbers that ContentFileWriter::addView gives.
+// What other programs draw of a content: arrays of the glTF asset itself, each empty if unused. Accessors and images
+// refer to buffer views by the indices that ContentFileWriter::addView returns.
 struct GltfScene {
   using Json = nlohmann::ordered_json;
 
   Json accessors = Json::array(), meshes = Json::array(), materials = Json::array();
   Json textures = Json::array(), images = Json::array(), samplers = Json::array();
-  // In Z-up coordinates of the tile frame. The writer adds a node above those in `roots` that turns them by (x, y, z) →
-  // (x, z, -y), since glTF is Y-up.
+  // In Z-up coordinates of the tile frame. Since glTF is Y-up, the writer adds a node above `roots` that maps (x, y, z)
+  // to (x, z, -y).
   Json nodes = Json::array();
-  std::vector<size_t> roots;                // indices of `nodes`
-  std::vector<std::string> extensionsUsed;  // of the members above: "KHR_materials_unlit"
+  std::vector<size_t> roots;                // indices into `nodes`
+  std::vector<std::string> extensionsUsed;  // by the members above, for example "KHR_materials_unlit"
 
   bool isEmpty() const { return nodes.empty(); }
 };
 
 class ContentFileWriter {
  public:
-  // A buffer view that accessors or images name → its number. `target` is glTF's of vertices (34962) and indices
-  // (34963); 0 for images.
+  // Adds a buffer view for accessors or images and returns its index. `target`: glTF's constant for vertices (34962) or
+  // indices (34963); 0 for images.
   size_t addView(std::span<const std::byte> bytes, uint32_t target = 0);
-  // {"bufferView": n, "mimeType": ...}: how the extension names it.
+  // Adds a buffer view for the payload and returns {"bufferView": n, "mimeType": ...}, the form in which the extension
+  // refers to it.
   nlohmann::ordered_json add(std::span<const std::byte> bytes, const char* mimeType);
-  // `ours`: the extension's members after version and representation. CHECKs that a view was added, as glTF allows no
-  // empty buffer.
+  // `ours`: the extension's members after version and representation. CHECKs that at least one view was added, because
+  // glTF allows no empty buffer.
   Bytes finish(std::string_view representation, const nlohmann::ordered_json& ours, const GltfScene& scene = {});
 
  private:
@@ -55,20 +56,21 @@ class ContentFileWriter {
 };
 
 struct ContentFile {
-  nlohmann::json ours;                            // the extension
-  std::vector<std::span<const std::byte>> views;  // borrowed from the file
+  nlohmann::json ours;                            // the members of the extension
+  std::vector<std::span<const std::byte>> views;  // they refer to the decoded file's bytes
 
-  // The view that an object names (as ContentFileWriter::add writes it), if its mimeType is this one.
-  std::optional<std::span<const std::byte>> viewOf(const nlohmann::json& object, const char* mimeType) const;
+  // Returns the bytes of the view that an object names (in the form that ContentFileWriter::add returns), if it has
+  // this MIME type.
+  std::optional<std::span<const std::byte>> bufferViewBytes(const nlohmann::json& object, const char* mimeType) const;
 };
 
-// By the JSON of a container alone, without its buffer views. Untrusted: nothing, and why, where it is no asset or has
-// not the extension, its version and the representation as they should be.
+// Decodes only the JSON of a container, without its buffer views. The text is untrusted: returns nothing, with the
+// reason in `reason`, if it is not a valid asset or lacks the extension with the expected version and representation.
 std::optional<ContentFile> decodeContentHeader(std::string_view text, std::string_view representation,
                                                std::string& reason);
 
-// Untrusted bytes: nothing, and why, where the container, the asset, its buffer views or the extension's version and
-// representation are not as they should be.
+// Decodes a whole file. The bytes are untrusted: returns nothing, with the reason in `reason`, if the container, the
+// asset, its buffer views, or the extension's version or representation are invalid.
 std::optional<ContentFile> decodeContentFile(std::span<const std::byte> file, std::string_view representation,
                                              std::string& reason);
 

@@ -25,30 +25,30 @@ constexpr std::array<uint8_t, 69> kPng = {
 constexpr std::array<uint8_t, 5> kPayload = {1, 2, 3, 4, 5};
 
 template <class T>
-std::span<const std::byte> bytesOf(const T& array) {
+std::span<const std::byte> asByteSpan(const T& array) {
   return std::as_bytes(std::span(array));
 }
 
-// A payload, and for other programs a triangle with a texture.
+// A file with a payload and, for other programs, a textured triangle.
 Bytes texturedTriangle() {
   ContentFileWriter writer;
-  const Json payload = writer.add(bytesOf(kPayload), kRawBytes);
+  const Json payload = writer.add(asByteSpan(kPayload), kRawBytes);
   GltfScene scene;
-  scene.accessors = {{{"bufferView", writer.addView(bytesOf(kPlaces), kVertices)},
+  scene.accessors = {{{"bufferView", writer.addView(asByteSpan(kPlaces), kVertices)},
                       {"componentType", kFloat},
                       {"count", 3},
                       {"type", "VEC3"},
                       {"min", {0, 0, 0}},
                       {"max", {2, 3, 1}}},
-                     {{"bufferView", writer.addView(bytesOf(kTexturePlaces), kVertices)},
+                     {{"bufferView", writer.addView(asByteSpan(kTexturePlaces), kVertices)},
                       {"componentType", kFloat},
                       {"count", 3},
                       {"type", "VEC2"}},
-                     {{"bufferView", writer.addView(bytesOf(kCorners), kIndices)},
+                     {{"bufferView", writer.addView(asByteSpan(kCorners), kIndices)},
                       {"componentType", kShort},
                       {"count", 3},
                       {"type", "SCALAR"}}};
-  scene.images = {{{"bufferView", writer.addView(bytesOf(kPng))}, {"mimeType", "image/png"}}};
+  scene.images = {{{"bufferView", writer.addView(asByteSpan(kPng))}, {"mimeType", "image/png"}}};
   scene.samplers = {{{"magFilter", 9729}, {"minFilter", 9987}}};
   scene.textures = {{{"source", 0}, {"sampler", 0}}};
   scene.materials = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0}}},
@@ -61,35 +61,35 @@ Bytes texturedTriangle() {
   return writer.finish("volume", {{"payload", payload}}, scene);
 }
 
-Json assetOf(const Bytes& file) {
+Json parseAsset(const Bytes& file) {
   const auto glb = decodeGlb(file);
   return glb ? Json::parse(glb->json) : Json();
 }
 
-TEST(ContentFile, GivesBackThePayloadBesideATexturedTriangle) {
+TEST(ContentFile, RoundTripsThePayloadBesideATexturedTriangle) {
   const Bytes file = texturedTriangle();
   std::string reason;
   const auto content = decodeContentFile(file, "volume", reason);
   ASSERT_TRUE(content) << reason;
-  const auto payload = content->viewOf(content->ours["payload"], kRawBytes);
+  const auto payload = content->bufferViewBytes(content->ours["payload"], kRawBytes);
   ASSERT_TRUE(payload);
-  EXPECT_TRUE(std::equal(payload->begin(), payload->end(), bytesOf(kPayload).begin(), bytesOf(kPayload).end()));
-  const Json asset = assetOf(file);
+  EXPECT_TRUE(std::equal(payload->begin(), payload->end(), asByteSpan(kPayload).begin(), asByteSpan(kPayload).end()));
+  const Json asset = parseAsset(file);
   const auto viewIs = [&](size_t view, std::span<const std::byte> expected) {
     const auto& is = content->views.at(view);
     return std::equal(is.begin(), is.end(), expected.begin(), expected.end());
   };
-  EXPECT_TRUE(viewIs(asset["accessors"][0]["bufferView"], bytesOf(kPlaces)));
-  EXPECT_TRUE(viewIs(asset["accessors"][1]["bufferView"], bytesOf(kTexturePlaces)));
-  EXPECT_TRUE(viewIs(asset["accessors"][2]["bufferView"], bytesOf(kCorners)));
-  EXPECT_TRUE(viewIs(asset["images"][0]["bufferView"], bytesOf(kPng)));
+  EXPECT_TRUE(viewIs(asset["accessors"][0]["bufferView"], asByteSpan(kPlaces)));
+  EXPECT_TRUE(viewIs(asset["accessors"][1]["bufferView"], asByteSpan(kTexturePlaces)));
+  EXPECT_TRUE(viewIs(asset["accessors"][2]["bufferView"], asByteSpan(kCorners)));
+  EXPECT_TRUE(viewIs(asset["images"][0]["bufferView"], asByteSpan(kPng)));
   EXPECT_EQ(asset["bufferViews"][1]["target"], kVertices);
   EXPECT_EQ(asset["bufferViews"][3]["target"], kIndices);
   EXPECT_FALSE(asset["bufferViews"][4].contains("target"));
 }
 
 TEST(ContentFile, TurnsZUpIntoYUpAboveItsNodes) {
-  const Json asset = assetOf(texturedTriangle());
+  const Json asset = parseAsset(texturedTriangle());
   ASSERT_EQ(asset["scenes"][0]["nodes"], Json({1}));
   const Json& turned = asset["nodes"][1];
   EXPECT_EQ(turned["children"], Json({0}));
@@ -102,15 +102,15 @@ TEST(ContentFile, TurnsZUpIntoYUpAboveItsNodes) {
   }
 }
 
-TEST(ContentFile, OthersNeedNotKnowItsExtension) {
-  const Json asset = assetOf(texturedTriangle());
+TEST(ContentFile, DoesNotRequireOtherProgramsToKnowItsExtension) {
+  const Json asset = parseAsset(texturedTriangle());
   EXPECT_EQ(asset["extensionsUsed"], Json({"TESSERA_content", "KHR_materials_unlit"}));
   EXPECT_FALSE(asset.contains("extensionsRequired"));
 }
 
 TEST(ContentFile, IsAnEmptySceneWhereThereIsNothingToDraw) {
   ContentFileWriter writer;
-  const Json payload = writer.add(bytesOf(kPayload), kRawBytes);
+  const Json payload = writer.add(asByteSpan(kPayload), kRawBytes);
   const Bytes file = writer.finish("volume", {{"payload", payload}});
   const auto glb = decodeGlb(file);
   ASSERT_TRUE(glb);
@@ -125,7 +125,7 @@ TEST(ContentFile, RefusesViewsOfATriangleThatLieOutsideItsBytes) {
   const Bytes file = texturedTriangle();
   const auto glb = decodeGlb(file);
   for (size_t view = 0; view < 5; ++view) {
-    Json asset = assetOf(file);
+    Json asset = parseAsset(file);
     asset["bufferViews"][view]["byteLength"] = 1000;
     std::string reason;
     EXPECT_FALSE(decodeContentFile(encodeGlb(asset.dump(), glb->bytes), "volume", reason));

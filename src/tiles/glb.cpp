@@ -50,7 +50,7 @@ Bytes encodeGlb(std::string_view json, std::span<const std::byte> bytes) {
   return file;
 }
 
-std::optional<uint32_t> jsonLengthOf(std::span<const std::byte> start, uint64_t fileBytes) {
+std::optional<uint32_t> readJsonLength(std::span<const std::byte> start, uint64_t fileBytes) {
   if (start.size() < kGlbStart || fileBytes < kGlbStart || fileBytes % 4 != 0) return std::nullopt;
   if (get32(start, 0) != kMagic || get32(start, 4) != kVersion || get32(start, 8) != fileBytes) return std::nullopt;
   const uint32_t length = get32(start, kHeader);
@@ -70,8 +70,8 @@ std::optional<GlbView> decodeGlb(std::span<const std::byte> file) {
     if (length % 4 != 0 || length > file.size() - at) return std::nullopt;
     const std::span<const std::byte> content = file.subspan(at, length);
     at += length;
-    if ((chunk == 0) != (type == kJsonChunk)) return std::nullopt;  // the first, and only the first
-    if (type == kBytesChunk && chunk != 1) return std::nullopt;     // the second or none
+    if ((chunk == 0) != (type == kJsonChunk)) return std::nullopt;  // the first chunk is JSON, and no other one is
+    if (type == kBytesChunk && chunk != 1) return std::nullopt;     // BIN must be the second chunk
     if (chunk == 0) view.json = {reinterpret_cast<const char*>(content.data()), content.size()};
     if (type == kBytesChunk) view.bytes = content;
   }

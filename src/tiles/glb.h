@@ -1,4 +1,4 @@
-// The container of binary glTF: a JSON chunk, then at most one chunk of bytes.
+// The GLB container of binary glTF: a JSON chunk, followed by at most one binary chunk.
 // Source: Khronos glTF 2.0 specification, section 4 (GLB file format).
 #pragma once
 
@@ -12,21 +12,23 @@
 namespace tessera {
 
 struct GlbView {
-  std::string_view json;             // borrowed; with the spaces that pad it
-  std::span<const std::byte> bytes;  // borrowed; padding included; empty when there is no such chunk
+  std::string_view json;             // refers to the file; includes the padding spaces
+  std::span<const std::byte> bytes;  // refers to the file; includes padding; empty if there is no binary chunk
 };
 
-inline constexpr uint64_t kLargestGlb = 0xffffffffu;  // its lengths are 32 bits
+inline constexpr uint64_t kLargestGlb = 0xffffffffu;  // bytes: GLB stores lengths in 32 bits
 
-// Pads the JSON with spaces and the bytes with zeros, each to a multiple of 4. CHECKs that the whole fits kLargestGlb.
+// Encodes a GLB. Pads the JSON with spaces and the bytes with zeros, each to a multiple of 4. CHECKs that the file is
+// at most kLargestGlb bytes long.
 Bytes encodeGlb(std::string_view json, std::span<const std::byte> bytes);
 
 inline constexpr size_t kGlbStart = 20;  // bytes before the JSON
-// The length of the JSON that follows, of a file of so many bytes; nothing where these cannot be the first of one.
-std::optional<uint32_t> jsonLengthOf(std::span<const std::byte> start, uint64_t fileBytes);
+// Returns the length of the JSON chunk from the first kGlbStart bytes of a file of `fileBytes` bytes; nothing if these
+// cannot be the start of a GLB.
+std::optional<uint32_t> readJsonLength(std::span<const std::byte> start, uint64_t fileBytes);
 
-// Nothing unless magic, version (2), total length (exact), order, types and alignment of the chunks are those of the
-// specification. Chunks of unknown types after the two are passed over, as it demands.
+// Returns nothing unless magic, version (2), total length (exact) and the order, types and alignment of the chunks
+// conform to the glTF specification. Additional chunks of unknown type are ignored, as it requires.
 std::optional<GlbView> decodeGlb(std::span<const std::byte> file);
 
 }  // namespace tessera

@@ -16,7 +16,7 @@ void put(Bytes& file, size_t at, uint32_t value) {
   for (size_t i = 0; i < 4; ++i) file[at + i] = static_cast<std::byte>(value >> (8 * i));
 }
 
-TEST(Glb, GivesBackWhatWasPutInForEveryLength) {
+TEST(Glb, RoundTripsEveryLength) {
   for (size_t length = 0; length < 9; ++length) {
     const std::string json = "{" + std::string(length, ' ') + "}";
     const Bytes content = bytesOfText(std::string(length, 'b'));
@@ -32,7 +32,7 @@ TEST(Glb, GivesBackWhatWasPutInForEveryLength) {
   }
 }
 
-TEST(Glb, PassesOverLaterChunksOfUnknownTypes) {
+TEST(Glb, IgnoresLaterChunksOfUnknownTypes) {
   Bytes file = encodeGlb("{}", bytesOfText("abcd"));
   const Bytes more = bytesOfText(std::string("\4\0\0\0WHATxxxx", 12));
   file.insert(file.end(), more.begin(), more.end());
@@ -42,14 +42,14 @@ TEST(Glb, PassesOverLaterChunksOfUnknownTypes) {
   EXPECT_EQ(view->bytes.size(), 4u);
 }
 
-TEST(Glb, RefusesEveryCut) {
+TEST(Glb, RejectsEveryTruncation) {
   const Bytes file = encodeGlb("{\"a\":1}", bytesOfText("abcdefg"));
   for (size_t length = 0; length < file.size(); ++length) {
     EXPECT_FALSE(decodeGlb(std::span(file).first(length))) << length;
   }
 }
 
-TEST(Glb, RefusesWhatIsNotExact) {
+TEST(Glb, RejectsHeadersThatAreNotExact) {
   // 12 bytes of header, JSON chunk at 12 with 4 bytes, BIN chunk at 24 with 8.
   const Bytes good = encodeGlb("{}", bytesOfText("abcdefgh"));
   ASSERT_TRUE(decodeGlb(good));
@@ -86,17 +86,17 @@ TEST(Glb, RefusesWhatIsNotExact) {
   EXPECT_FALSE(decodeGlb(std::span(good).first(12)));
 }
 
-TEST(Glb, SaysByItsFirstBytesHowLongItsJsonIs) {
+TEST(Glb, ReadsTheLengthOfItsJsonFromItsFirstBytes) {
   const Bytes file = encodeGlb("{\"a\": 1}", Bytes(5));
-  EXPECT_EQ(jsonLengthOf(file, file.size()), 8u);
-  EXPECT_EQ(jsonLengthOf(std::span(file).first(kGlbStart), file.size()), 8u);
-  EXPECT_EQ(jsonLengthOf(std::span(file).first(kGlbStart - 1), file.size()), std::nullopt);
-  EXPECT_EQ(jsonLengthOf(file, file.size() + 4), std::nullopt);
+  EXPECT_EQ(readJsonLength(file, file.size()), 8u);
+  EXPECT_EQ(readJsonLength(std::span(file).first(kGlbStart), file.size()), 8u);
+  EXPECT_EQ(readJsonLength(std::span(file).first(kGlbStart - 1), file.size()), std::nullopt);
+  EXPECT_EQ(readJsonLength(file, file.size() + 4), std::nullopt);
   for (const auto& [at, value] : std::vector<std::pair<size_t, uint32_t>>{
            {0, 0}, {4, 1}, {8, 4}, {12, 6}, {12, 0xfffffff0u}, {12, static_cast<uint32_t>(file.size())}, {16, 0}}) {
     Bytes spoilt = file;
     put(spoilt, at, value);
-    EXPECT_EQ(jsonLengthOf(spoilt, spoilt.size()), std::nullopt) << at << " " << value;
+    EXPECT_EQ(readJsonLength(spoilt, spoilt.size()), std::nullopt) << at << " " << value;
   }
 }
 

@@ -1,4 +1,5 @@
-// Fields of JSON from outside: nothing where one is missing, of another kind, or no finite number.
+// Typed access to the fields of untrusted JSON. Functions return nothing (or null) if a field is missing, has another
+// type, or is not a finite number.
 #pragma once
 
 #include <array>
@@ -11,36 +12,36 @@ namespace tessera::json_fields {
 
 using nlohmann::json;
 
-inline const json* fieldOf(const json& object, const char* key) {
+inline const json* getField(const json& object, const char* key) {
   if (!object.is_object()) return nullptr;
-  const auto found = object.find(key);
-  return found == object.end() ? nullptr : &*found;
+  const auto it = object.find(key);
+  return it == object.end() ? nullptr : &*it;
 }
 
-inline const json* arrayOf(const json& object, const char* key) {
-  const json* field = fieldOf(object, key);
+inline const json* getArray(const json& object, const char* key) {
+  const json* field = getField(object, key);
   return field && field->is_array() ? field : nullptr;
 }
 
-inline const std::string* stringOf(const json& object, const char* key) {
-  const json* field = fieldOf(object, key);
+inline const std::string* getString(const json& object, const char* key) {
+  const json* field = getField(object, key);
   return field && field->is_string() ? &field->get_ref<const std::string&>() : nullptr;
 }
 
 inline bool isString(const json& object, const char* key, std::string_view expected) {
-  const std::string* text = stringOf(object, key);
+  const std::string* text = getString(object, key);
   return text && *text == expected;
 }
 
-// Not get<T>() of any kind: nlohmann throws on a wrong one and wraps a negative number.
-inline std::optional<uint64_t> unsignedFrom(const json& value, uint64_t most) {
-  if (!value.is_number_unsigned() || value.get<uint64_t>() > most) return std::nullopt;
+// nlohmann's get<T>() would throw on another type and wrap negative numbers.
+inline std::optional<uint64_t> unsignedFrom(const json& value, uint64_t maximum) {
+  if (!value.is_number_unsigned() || value.get<uint64_t>() > maximum) return std::nullopt;
   return value.get<uint64_t>();
 }
 
-inline std::optional<uint32_t> unsignedOf(const json& object, const char* key, uint32_t most = UINT32_MAX) {
-  const json* field = fieldOf(object, key);
-  const auto value = field ? unsignedFrom(*field, most) : std::nullopt;
+inline std::optional<uint32_t> getUnsigned(const json& object, const char* key, uint32_t maximum = UINT32_MAX) {
+  const json* field = getField(object, key);
+  const auto value = field ? unsignedFrom(*field, maximum) : std::nullopt;
   return value ? std::optional(static_cast<uint32_t>(*value)) : std::nullopt;
 }
 
@@ -49,13 +50,13 @@ inline std::optional<double> numberFrom(const json& value) {
   return value.get<double>();
 }
 
-inline std::optional<double> numberOf(const json& object, const char* key) {
-  const json* field = fieldOf(object, key);
+inline std::optional<double> getNumber(const json& object, const char* key) {
+  const json* field = getField(object, key);
   return field ? numberFrom(*field) : std::nullopt;
 }
 
-inline std::optional<bool> flagOf(const json& object, const char* key) {
-  const json* field = fieldOf(object, key);
+inline std::optional<bool> getBoolean(const json& object, const char* key) {
+  const json* field = getField(object, key);
   return field && field->is_boolean() ? std::optional(field->get<bool>()) : std::nullopt;
 }
 
@@ -72,8 +73,8 @@ std::optional<std::array<double, N>> numbersFrom(const json& value) {
 }
 
 template <size_t N>
-std::optional<std::array<double, N>> numbersOf(const json& object, const char* key) {
-  const json* field = fieldOf(object, key);
+std::optional<std::array<double, N>> getNumbers(const json& object, const char* key) {
+  const json* field = getField(object, key);
   return field ? numbersFrom<N>(*field) : std::nullopt;
 }
 

@@ -10,7 +10,7 @@
 namespace tessera {
 namespace {
 
-constexpr int kLossless = 2;  // WebPBitstreamFeatures::format
+constexpr int kLossless = 2;  // the value of WebPBitstreamFeatures::format for lossless files
 
 }  // namespace
 

@@ -15,7 +15,7 @@ ImageU8 noise(int width, int height) {
   return image;
 }
 
-TEST(LosslessImage, GivesBackEveryPixel) {
+TEST(LosslessImage, RoundTripsEveryPixel) {
   for (const auto& [width, height] : {std::pair{1, 1}, {7, 3}, {64, 64}, {kLargestLosslessSide, 1}}) {
     const ImageU8 image = noise(width, height);
     const auto again = decodeLossless(encodeLossless(image), width, height);
@@ -37,7 +37,7 @@ TEST(LosslessImage, RefusesAnotherSize) {
   EXPECT_FALSE(decodeLossless(bytes, 0, 0));
 }
 
-TEST(LosslessImage, RefusesACutPicture) {
+TEST(LosslessImage, RejectsATruncatedImage) {
   const Bytes bytes = encodeLossless(noise(32, 32));
   for (const size_t length : {size_t{0}, size_t{11}, size_t{20}, bytes.size() / 2, bytes.size() - 8}) {
     EXPECT_FALSE(decodeLossless(std::span(bytes).first(length), 32, 32)) << length;
@@ -47,16 +47,16 @@ TEST(LosslessImage, RefusesACutPicture) {
 TEST(LosslessImage, RefusesLossAndAlpha) {
   std::vector<uint8_t> pixels(16 * 16 * 4, 77);
   uint8_t* encoded = nullptr;
-  const auto bytesOf = [&](size_t size) {
+  const auto takeEncodedBytes = [&](size_t size) {
     const auto* start = reinterpret_cast<const std::byte*>(encoded);
     Bytes bytes(start, start + size);
     WebPFree(encoded);
     return bytes;
   };
-  const Bytes lossy = bytesOf(WebPEncodeRGB(pixels.data(), 16, 16, 48, 90, &encoded));
+  const Bytes lossy = takeEncodedBytes(WebPEncodeRGB(pixels.data(), 16, 16, 48, 90, &encoded));
   ASSERT_FALSE(lossy.empty());
   EXPECT_FALSE(decodeLossless(lossy, 16, 16));
-  const Bytes transparent = bytesOf(WebPEncodeLosslessRGBA(pixels.data(), 16, 16, 64, &encoded));
+  const Bytes transparent = takeEncodedBytes(WebPEncodeLosslessRGBA(pixels.data(), 16, 16, 64, &encoded));
   ASSERT_FALSE(transparent.empty());
   EXPECT_FALSE(decodeLossless(transparent, 16, 16));
 }

@@ -53,11 +53,11 @@ nlohmann::ordered_json writeNetwork(ContentFileWriter& file, const std::vector<D
 }
 
 bool readLayers(const json* description, std::vector<DenseLayer>& network, std::string& reason) {
-  const json* layers = description ? arrayOf(*description, "layers") : nullptr;
-  if (!layers || layers->size() > kMostLayers) return refuse(reason, "has no network");
+  const json* layers = description ? getArray(*description, "layers") : nullptr;
+  if (!layers || layers->size() > kMaxLayers) return refuse(reason, "has no network");
   for (const json& sides : *layers) {
     if (!sides.is_array() || sides.size() != 2) return refuse(reason, "a layer of the network has no two sides");
-    const auto inputs = unsignedFrom(sides[0], kMostLayerWidth), outputs = unsignedFrom(sides[1], kMostLayerWidth);
+    const auto inputs = unsignedFrom(sides[0], kMaxLayerWidth), outputs = unsignedFrom(sides[1], kMaxLayerWidth);
     if (!inputs || !outputs) return refuse(reason, "a layer of the network is out of bounds");
     DenseLayer layer;
     layer.inputs = static_cast<uint32_t>(*inputs);
@@ -69,7 +69,7 @@ bool readLayers(const json* description, std::vector<DenseLayer>& network, std::
 
 bool readLayerNumbers(const ContentFile& file, const json& description, std::vector<DenseLayer>& network,
                       std::string& reason) {
-  auto bytes = file.viewOf(description, kRawBytes);
+  auto bytes = file.bufferViewBytes(description, kRawBytes);
   if (!bytes) return refuse(reason, "has no network");
   for (DenseLayer& layer : network) {
     if (!takeFloats(*bytes, size_t{layer.inputs} * layer.outputs, layer.weights) ||
@@ -81,10 +81,10 @@ bool readLayerNumbers(const ContentFile& file, const json& description, std::vec
 }
 
 std::optional<std::string> ruleOfNetwork(const std::vector<DenseLayer>& network, uint32_t inputs, uint32_t outputs) {
-  if (network.empty() || network.size() > kMostLayers) return "the network has no layers, or too many";
+  if (network.empty() || network.size() > kMaxLayers) return "the network has no layers, or too many";
   uint32_t width = inputs, vectors = 0;
   for (const DenseLayer& layer : network) {
-    if (layer.inputs != width || layer.outputs < 1 || layer.outputs > kMostLayerWidth) {
+    if (layer.inputs != width || layer.outputs < 1 || layer.outputs > kMaxLayerWidth) {
       return "the network's layers do not follow one another";
     }
     width = layer.outputs;
@@ -95,7 +95,7 @@ std::optional<std::string> ruleOfNetwork(const std::vector<DenseLayer>& network,
     if (!areFinite(layer.weights) || !areFinite(layer.biases)) return "the network holds a number that is not finite";
   }
   if (width != outputs) return "the network does not end in a colour";
-  if (vectors > kMostNetworkVectors) return "the network is larger than a shader takes";
+  if (vectors > kMaxNetworkVectors) return "the network is larger than a shader takes";
   return std::nullopt;
 }
 

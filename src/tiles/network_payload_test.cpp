@@ -9,24 +9,24 @@ namespace {
 
 using nlohmann::json;
 
-// 3 → 2 → 1, of numbers that all differ.
-std::vector<DenseLayer> madeNetwork() {
+// A network 3 → 2 → 1 whose numbers all differ.
+std::vector<DenseLayer> testNetwork() {
   return {{3, 2, {1, 2, 3, 4, 5, 6}, {7, 8}}, {2, 1, {9, 10}, {11.5f}}};
 }
 
-// The file that a codec "made" writes for a network, which `change` alters.
+// Encodes the file that a codec "made" writes for a network, with a description that `change` alters.
 template <class Change>
-Bytes fileOf(const std::vector<DenseLayer>& network, const Change& change) {
+Bytes encodeNetworkFile(const std::vector<DenseLayer>& network, const Change& change) {
   ContentFileWriter writer;
   nlohmann::ordered_json description = writeNetwork(writer, network);
   change(description);
   return writer.finish("made", {{"network", description}});
 }
 
-// Why a network is refused; empty, and the network in `read`, where it is not.
+// Returns why a network is refused; empty if it is accepted, and `read` then receives it.
 template <class Change>
-std::string refusalOf(const Change& change, std::vector<DenseLayer>& read) {
-  const Bytes bytes = fileOf(madeNetwork(), change);
+std::string decodeErrorReason(const Change& change, std::vector<DenseLayer>& read) {
+  const Bytes bytes = encodeNetworkFile(testNetwork(), change);
   std::string reason;
   const auto file = decodeContentFile(bytes, "made", reason);
   EXPECT_TRUE(file.has_value()) << reason;
@@ -38,29 +38,30 @@ std::string refusalOf(const Change& change, std::vector<DenseLayer>& read) {
 }
 
 template <class Change>
-std::string refusalOf(const Change& change) {
+std::string decodeErrorReason(const Change& change) {
   std::vector<DenseLayer> read;
-  return refusalOf(change, read);
+  return decodeErrorReason(change, read);
 }
 
 TEST(NetworkPayload, ReadsWhatWasWritten) {
   std::vector<DenseLayer> read;
-  EXPECT_EQ(refusalOf([](auto&) {}, read), "");
-  EXPECT_EQ(read, madeNetwork());
+  EXPECT_EQ(decodeErrorReason([](auto&) {}, read), "");
+  EXPECT_EQ(read, testNetwork());
 }
 
-TEST(NetworkPayload, RefusesLayersThatAreNone) {
-  EXPECT_EQ(refusalOf([](auto& network) { network["layers"] = 3; }), "has no network");
-  EXPECT_EQ(refusalOf([](auto& network) {
+TEST(NetworkPayload, RejectsInvalidLayers) {
+  EXPECT_EQ(decodeErrorReason([](auto& network) { network["layers"] = 3; }), "has no network");
+  EXPECT_EQ(decodeErrorReason([](auto& network) {
               network["layers"] = std::vector<std::array<int, 2>>(9, {1, 1});
             }),
             "has no network");
-  EXPECT_EQ(refusalOf([](auto& network) { network["layers"][0] = {3}; }), "a layer of the network has no two sides");
-  EXPECT_EQ(refusalOf([](auto& network) {
+  EXPECT_EQ(decodeErrorReason([](auto& network) { network["layers"][0] = {3}; }),
+            "a layer of the network has no two sides");
+  EXPECT_EQ(decodeErrorReason([](auto& network) {
               network["layers"][0] = {3, 1 << 30};
             }),
             "a layer of the network is out of bounds");
-  EXPECT_EQ(refusalOf([](auto& network) {
+  EXPECT_EQ(decodeErrorReason([](auto& network) {
               network["layers"][0] = {-3, 2};
             }),
             "a layer of the network is out of bounds");
@@ -70,17 +71,17 @@ TEST(NetworkPayload, RefusesLayersThatAreNone) {
   EXPECT_EQ(reason, "has no network");
 }
 
-TEST(NetworkPayload, RefusesNumbersThatAreNotThoseOfItsLayers) {
-  EXPECT_EQ(refusalOf([](auto& network) {
+TEST(NetworkPayload, RejectsNumbersThatDoNotMatchItsLayers) {
+  EXPECT_EQ(decodeErrorReason([](auto& network) {
               network["layers"][1] = {2, 2};
             }),
             "the network has fewer numbers than its layers need");
-  EXPECT_EQ(refusalOf([](auto& network) {
+  EXPECT_EQ(decodeErrorReason([](auto& network) {
               network["layers"][0] = {2, 2};
             }),
             "the network has more numbers than its layers need");
-  EXPECT_EQ(refusalOf([](auto& network) { network["bufferView"] = 1; }), "has no network");
-  EXPECT_EQ(refusalOf([](auto& network) { network["mimeType"] = "image/webp"; }), "has no network");
+  EXPECT_EQ(decodeErrorReason([](auto& network) { network["bufferView"] = 1; }), "has no network");
+  EXPECT_EQ(decodeErrorReason([](auto& network) { network["mimeType"] = "image/webp"; }), "has no network");
 }
 
 TEST(NetworkPayload, KeepsTheFirstReason) {
@@ -92,7 +93,7 @@ TEST(NetworkPayload, KeepsTheFirstReason) {
 
 TEST(NetworkRule, NamesWhatIsBroken) {
   const auto broken = [](auto change, uint32_t inputs = 3, uint32_t outputs = 1) {
-    std::vector<DenseLayer> network = madeNetwork();
+    std::vector<DenseLayer> network = testNetwork();
     change(network);
     return ruleOfNetwork(network, inputs, outputs).value_or("");
   };
@@ -118,7 +119,7 @@ TEST(NetworkRule, AllowsNoMoreThanShadersTake) {
     const DenseLayer layer = {inputs, 256, std::vector<float>(size_t{inputs} * 256), std::vector<float>(256)};
     return ruleOfNetwork({layer}, inputs, 256).value_or("");
   };
-  EXPECT_EQ(wide(63), "");  // 64 quadruples of outputs, of biases and 63 weights each: 4096 vectors
+  EXPECT_EQ(wide(63), "");  // 64 groups of four outputs, each with biases and 63 weights: 4096 vectors
   EXPECT_EQ(wide(64), "the network is larger than a shader takes");
 }
 

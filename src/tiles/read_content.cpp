@@ -25,10 +25,10 @@ std::unique_ptr<Content> readContent(const fs::path& path, const ContentCodec& c
   return content;
 }
 
-std::unique_ptr<Content> readPromisedContent(const fs::path& path, const ContentCodec& codec, size_t tile,
-                                             const TileContent& promised, const Resources& resources) {
+std::unique_ptr<Content> readVerifiedContent(const fs::path& path, const ContentCodec& codec, size_t tile,
+                                             const TileContent& declared, const Resources& resources) {
   auto content = readContent(path, codec, resources);
-  if (const auto mismatch = content->mismatchWith(promised)) {
+  if (const auto mismatch = content->mismatchWith(declared)) {
     throw Error(path.string(), fmt::format("of tile {} in tileset.json", tile), *mismatch,
                 "copy the scene again, or bake it again");
   }
@@ -37,10 +37,10 @@ std::unique_ptr<Content> readPromisedContent(const fs::path& path, const Content
 
 uint64_t readDecodedBytes(const fs::path& path, const ContentCodec& codec, const ContentLimits& limits) {
   std::error_code status;
-  const auto length = jsonLengthOf(readFileStart(path, kGlbStart), fs::file_size(path, status));
+  const auto length = readJsonLength(readFileStart(path, kGlbStart), fs::file_size(path, status));
   if (!length) throw noContent(path, kNoGlb);
-  // A byte more than is allowed is enough to see that it is too much.
-  const Bytes start = readFileStart(path, kGlbStart + std::min<uint64_t>(*length, kMostContentJson + 1));
+  // One byte more than allowed is enough to detect that the JSON is too long.
+  const Bytes start = readFileStart(path, kGlbStart + std::min<uint64_t>(*length, kMaxContentJson + 1));
   const std::string_view text(reinterpret_cast<const char*>(start.data()), start.size());
   std::string reason;
   const auto bytes = codec.memoryBytes(text.substr(std::min(kGlbStart, text.size())), reason, limits);
@@ -52,14 +52,14 @@ std::shared_ptr<const Resource> readResource(const fs::path& path, const Content
                                              const SharedResource& resource, const ContentLimits& limits) {
   std::string reason;
   const Bytes file = readFile(path, limits.fileBytes);
-  auto made = codec.decodeResource(file, resource, reason, limits);
-  if (!made) throw noContent(path, reason);
-  // What budgets have charged for it.
+  auto decoded = codec.decodeResource(file, resource, reason, limits);
+  if (!decoded) throw noContent(path, reason);
+  // The size that budgets have charged for it.
   const uint64_t charged = codec.resourceMemoryBytes(resource, file.size());
-  if (made->memoryBytes() > charged) {
-    throw noContent(path, fmt::format("takes {} bytes of memory, its size said {}", made->memoryBytes(), charged));
+  if (decoded->memoryBytes() > charged) {
+    throw noContent(path, fmt::format("takes {} bytes of memory, its size said {}", decoded->memoryBytes(), charged));
   }
-  return made;
+  return decoded;
 }
 
 uint64_t readResourceBytes(const fs::path& path, const ContentCodec& codec, const SharedResource& resource) {

@@ -14,8 +14,8 @@
 namespace tessera {
 namespace {
 
-// 64 bits suffice against chance; it is no defence against forgery.
-std::string digestOf(std::span<const std::byte> bytes) {
+// Returns a 64-bit digest, which suffices against accidental collisions but not against forgery.
+std::string computeDigest(std::span<const std::byte> bytes) {
   uint64_t digest = mix64(bytes.size());
   for (size_t at = 0; at < bytes.size(); at += 8) {
     uint64_t word = 0;
@@ -30,7 +30,7 @@ void checkName(const std::string& name) {
   for (const char c : name) CHECK((std::isalnum(static_cast<unsigned char>(c)) || c == '_'));
 }
 
-std::set<std::string> urisOf(const Tileset& tileset) {
+std::set<std::string> collectUris(const Tileset& tileset) {
   std::set<std::string> uris;
   for (const SharedResource& resource : tileset.resources) uris.insert(resource.uri);
   for (const Tile& tile : tileset.tiles) {
@@ -39,13 +39,14 @@ std::set<std::string> urisOf(const Tileset& tileset) {
   return uris;
 }
 
-// Ends in -<digest>.<extension>, as all names given here do, or is such a file half written.
+// Returns whether a name ends in -<digest>.<extension>, as all names written here do, or is such a file partially
+// written.
 bool isOurs(const std::string& file) {
   static const std::regex kName("[A-Za-z0-9_]+-[0-9a-f]{16}\\.[A-Za-z0-9_]+(\\.partial-[0-9]+)?");
   return std::regex_match(file, kName);
 }
 
-// Files of ours that the tileset does not name: of an older scene, or of a run that was killed.
+// Removes files written by this class that the tileset does not refer to: those of an older scene or of a killed run.
 void removeOthers(const fs::path& root, const std::set<std::string>& uris) {
   for (const char* folder : {"tiles", "resources"}) {
     std::error_code status;
@@ -61,7 +62,7 @@ void removeOthers(const fs::path& root, const std::set<std::string>& uris) {
 }
 
 void requireFiles(const fs::path& root, const Tileset& tileset) {
-  for (const std::string& uri : urisOf(tileset)) {
+  for (const std::string& uri : collectUris(tileset)) {
     std::error_code status;
     if (!fs::is_regular_file(contentPath(root, uri), status)) {
       throw Error((root / "tileset.json").string(), uri, "there is no such file in the scene", "bake the scene again");
@@ -74,7 +75,7 @@ void requireFiles(const fs::path& root, const Tileset& tileset) {
 std::string SceneFolderWriter::addContent(uint32_t level, const std::string& name,
                                           std::span<const std::byte> bytes) const {
   checkName(name);
-  const std::string uri = fmt::format("tiles/L{}/{}-{}.glb", level, name, digestOf(bytes));
+  const std::string uri = fmt::format("tiles/L{}/{}-{}.glb", level, name, computeDigest(bytes));
   writeFileAtomically(root_ / uri, bytes, true);
   return uri;
 }
@@ -83,7 +84,7 @@ std::string SceneFolderWriter::addResource(const std::string& name, const std::s
                                            std::span<const std::byte> bytes) const {
   checkName(name);
   checkName(extension);
-  const std::string uri = fmt::format("resources/{}-{}.{}", name, digestOf(bytes), extension);
+  const std::string uri = fmt::format("resources/{}-{}.{}", name, computeDigest(bytes), extension);
   writeFileAtomically(root_ / uri, bytes, true);
   return uri;
 }
@@ -92,7 +93,7 @@ void SceneFolderWriter::commit(const Tileset& tileset) const {
   const std::string text = encodeTileset(tileset);
   requireFiles(root_, tileset);
   writeFileAtomically(root_ / "tileset.json", text, true);
-  removeOthers(root_, urisOf(tileset));
+  removeOthers(root_, collectUris(tileset));
 }
 
 Tileset readTileset(const fs::path& folder) {

@@ -1,6 +1,6 @@
-// A scene on disk: tileset.json, written last; contents in tiles/L<level>/, what they share in resources/. Names hold a
-// digest of the bytes, so that baking again into the same folder replaces nothing that the old tileset.json speaks of:
-// a reader sees the old scene or the new one, and files may be cached forever.
+// A scene on disk: contents in tiles/L<level>/, shared resources in resources/, and tileset.json, which is written
+// last. File names contain a digest of the bytes, so that baking again into the same folder replaces nothing that the
+// old tileset.json refers to: a reader sees either the old scene or the new one, and files may be cached forever.
 #pragma once
 
 #include "base/file.h"
@@ -12,25 +12,24 @@ class SceneFolderWriter {
  public:
   explicit SceneFolderWriter(fs::path root) : root_(std::move(root)) {}
 
-  // Written at once; returns the uri, tiles/L<level>/<name>-<digest>.glb. `name`: letters, digits, '_'.
+  // Writes the file at once and returns its uri, tiles/L<level>/<name>-<digest>.glb. `name`: letters, digits, '_'.
   std::string addContent(uint32_t level, const std::string& name, std::span<const std::byte> bytes) const;
-  // resources/<name>-<digest>.<extension>.
+  // Writes the file at once and returns its uri, resources/<name>-<digest>.<extension>.
   std::string addResource(const std::string& name, const std::string& extension,
                           std::span<const std::byte> bytes) const;
 
-  // Writes tileset.json, then removes the files in tiles/ and resources/ that have such names and that it does not
-  // speak of. Throws Error when a
-  // file that it names is not there.
+  // Writes tileset.json, then removes those files in tiles/ and resources/ whose names follow the patterns above and
+  // that tileset.json does not refer to. Throws Error if a file that it refers to does not exist.
   void commit(const Tileset& tileset) const;
 
  private:
   fs::path root_;
 };
 
-// Throws Error naming the file and the rule that it breaks, also when a uri leads out of the folder or to nothing.
+// Throws Error naming the file and the rule that it violates, also if a uri leads out of the folder or to no file.
 Tileset readTileset(const fs::path& folder);
 
-// The file of a uri of a tileset that was read from `folder`. Throws Error when it leads out of it.
+// Returns the file of a uri of a tileset that was read from `folder`. Throws Error if it leads out of the folder.
 fs::path contentPath(const fs::path& folder, const std::string& uri);
 
 }  // namespace tessera

@@ -4,7 +4,7 @@
 #include <unistd.h>
 
 #include "base/error.h"
-#include "tiles/testing/made_tileset.h"
+#include "tiles/testing/test_tileset.h"
 #include "tiles/tileset_json.h"
 
 namespace tessera {
@@ -18,22 +18,22 @@ class SceneFolder : public testing::Test {
   }
   void TearDown() override { fs::remove_all(root_); }
 
-  // Every content and resource of a made tileset, with bytes that hold `text`.
+  // Writes every content and resource of the test tileset, with bytes that contain `text`.
   Tileset bake(const std::string& text) {
     const SceneFolderWriter writer(root_);
-    Tileset tileset = tiles_test::madeTileset(2);
-    const auto bytesOf = [&](size_t i, size_t j) {
+    Tileset tileset = tiles_test::testTileset(2);
+    const auto makeContentBytes = [&](size_t i, size_t j) {
       const std::string content = text + std::to_string(i) + "," + std::to_string(j);
       const auto raw = std::as_bytes(std::span(content.data(), content.size()));
       return Bytes(raw.begin(), raw.end());
     };
     for (size_t i = 0; i < tileset.tiles.size(); ++i) {
       for (size_t j = 0; j < tileset.tiles[i].contents.size(); ++j) {
-        tileset.tiles[i].contents[j].uri =
-            writer.addContent(tileset.tiles[i].level, "t" + std::to_string(i) + "_" + std::to_string(j), bytesOf(i, j));
+        tileset.tiles[i].contents[j].uri = writer.addContent(
+            tileset.tiles[i].level, "t" + std::to_string(i) + "_" + std::to_string(j), makeContentBytes(i, j));
       }
     }
-    tileset.resources[0].uri = writer.addResource("table", "bin", bytesOf(99, 0));
+    tileset.resources[0].uri = writer.addResource("table", "bin", makeContentBytes(99, 0));
     return tileset;
   }
 
@@ -59,12 +59,12 @@ TEST_F(SceneFolder, IsTheOldSceneUntilTheNewOneIsWhole) {
   const Tileset before = bake("old");
   SceneFolderWriter(root_).commit(before);
   const size_t count = files();
-  const Tileset after = bake("new");  // killed before its commit, this would still be the old scene
+  const Tileset after = bake("new");  // if the process were killed before its commit, the old scene would remain
   EXPECT_EQ(encodeTileset(readTileset(root_)), encodeTileset(before));
   EXPECT_EQ(readTextFile(contentPath(root_, before.tiles[2].contents[0].uri)), "old2,0");
   SceneFolderWriter(root_).commit(after);
   EXPECT_EQ(readTextFile(contentPath(root_, readTileset(root_).tiles[2].contents[0].uri)), "new2,0");
-  EXPECT_EQ(files(), count);  // nothing is left of the old one
+  EXPECT_EQ(files(), count);  // no file of the old scene is left
 }
 
 TEST_F(SceneFolder, RemovesWhatAKilledRunLeftAndNothingOfOthers) {

@@ -20,7 +20,7 @@ bool CellRange::contains(const CellRange& other) const {
 }
 
 bool Tile::hasContents() const {
-  return std::any_of(contents.begin(), contents.end(), [](const auto& one) { return !one.surround; });
+  return std::any_of(contents.begin(), contents.end(), [](const auto& one) { return !one.backgroundBlock; });
 }
 
 bool Tile::isDrawable() const {
@@ -28,10 +28,10 @@ bool Tile::isDrawable() const {
 }
 
 SceneBox Tileset::box() const {
-  return boxOf(allCells());
+  return boxFromCells(allCells());
 }
 
-SceneBox Tileset::boxOf(const CellRange& cells) const {
+SceneBox Tileset::boxFromCells(const CellRange& cells) const {
   const auto wall = [](uint32_t index, uint32_t count) { return 2.0 * index - count; };
   return {{wall(cells.first[0], columns), wall(cells.first[1], rows), bottom},
           {wall(cells.end[0], columns), wall(cells.end[1], rows), top}};
@@ -71,7 +71,7 @@ Similarity Tileset::tileFromScene() const {
 Mat4d Tileset::rootTransform() const {
   Mat4d ecefFromTile = Mat4d::Identity();
   if (!georeference) return ecefFromTile;
-  std::vector<double> rotation(9);  // row after row
+  std::vector<double> rotation(9);  // row-major
   Vec3d origin;
   GeographicLib::Geocentric::WGS84().Forward(georeference->latitude, georeference->longitude, georeference->altitude,
                                              origin.x(), origin.y(), origin.z(), rotation);

@@ -14,7 +14,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 template <class Derived>
-std::vector<double> flattened(const Eigen::MatrixBase<Derived>& matrix) {  // column after column
+std::vector<double> flattened(const Eigen::MatrixBase<Derived>& matrix) {  // column-major
   std::vector<double> numbers;
   for (Eigen::Index c = 0; c < matrix.cols(); ++c) {
     for (Eigen::Index r = 0; r < matrix.rows(); ++r) numbers.push_back(matrix(r, c));
@@ -22,7 +22,7 @@ std::vector<double> flattened(const Eigen::MatrixBase<Derived>& matrix) {  // co
   return numbers;
 }
 
-Json cellsOf(const CellRange& range) {
+Json cellsToJson(const CellRange& range) {
   return {range.first[0], range.first[1], range.end[0], range.end[1]};
 }
 
@@ -31,49 +31,50 @@ void addBox(Json& object, const SceneBox& box) {
   object["high"] = flattened(box.high);
 }
 
-Json boundsOf(const Tileset& tileset, const SceneBox& box) {
+Json boundsToJson(const Tileset& tileset, const SceneBox& box) {
   return {{"box", boundingBoxNumbers(tileset, box)}};
 }
 
-Json contentOf(const Tileset& tileset, const Tile& tile, const TileContent& content) {
+Json contentToJson(const Tileset& tileset, const Tile& tile, const TileContent& content) {
   Json ours = Json::object();
-  if (content.surround) {
-    ours["surround"] = true;
+  if (content.backgroundBlock) {
+    ours["background_block"] = true;
     ours["level"] = content.level;
     ours["geometricError"] = content.geometricError;
   } else if (!(content.cells == tile.cells)) {
-    ours["cells"] = cellsOf(content.cells);
+    ours["cells"] = cellsToJson(content.cells);
   }
   addBox(ours, content.box);
   if (!content.resources.empty()) ours["resources"] = content.resources;
   if (content.bytes > 0) ours["bytes"] = content.bytes;
   return {{"uri", content.uri},
-          {"boundingVolume", boundsOf(tileset, content.box)},
+          {"boundingVolume", boundsToJson(tileset, content.box)},
           {"extensions", {{kSceneExtension, std::move(ours)}}}};
 }
 
-// Levels fall from parent to child, so the depth is bounded.
-Json tileOf(const Tileset& tileset, const Tile& tile, bool isRoot) {
+// The recursion is bounded, because levels decrease from parent to child.
+Json tileToJson(const Tileset& tileset, const Tile& tile, bool isRoot) {
   Json json;
   if (isRoot && tileset.georeference) json["transform"] = flattened(tileset.rootTransform());
-  json["boundingVolume"] = boundsOf(tileset, enclosingBox(tile));
+  json["boundingVolume"] = boundsToJson(tileset, enclosingBox(tile));
   json["geometricError"] = tile.geometricError;
   if (isRoot) json["refine"] = "REPLACE";
   Json contents = Json::array();
-  for (const TileContent& content : tile.contents) contents.push_back(contentOf(tileset, tile, content));
+  for (const TileContent& content : tile.contents) contents.push_back(contentToJson(tileset, tile, content));
   if (contents.size() == 1) {
     json["content"] = std::move(contents[0]);
   } else if (!contents.empty()) {
     json["contents"] = std::move(contents);
   }
   Json& ours = json["extensions"][kSceneExtension];
-  ours = {{"level", tile.level}, {"cells", cellsOf(tile.cells)}};
+  ours = {{"level", tile.level}, {"cells", cellsToJson(tile.cells)}};
   addBox(ours, tile.box);
-  for (const uint32_t child : tile.children) json["children"].push_back(tileOf(tileset, tileset.tiles[child], false));
+  for (const uint32_t child : tile.children)
+    json["children"].push_back(tileToJson(tileset, tileset.tiles[child], false));
   return json;
 }
 
-Json sceneOf(const Tileset& tileset) {
+Json sceneToJson(const Tileset& tileset) {
   Json scene = {{"version", kSceneVersion},
                 {"representation", tileset.representation},
                 {"name", tileset.name},
@@ -105,15 +106,15 @@ Error tooLarge(const std::string& why) {
   return {"tileset.json", "", why, "train with fewer --blocks"};
 }
 
-// What settings can cause. All else that would break a rule is a mistake of ours.
+// Throws Error for violations that settings can cause. Any other violation is a bug in this program.
 void requireWritable(const Tileset& tileset) {
   if (!(tileset.near >= 0 && tileset.near <= 1)) {
     throw Error("tileset.json", fmt::format("near={}", tileset.near), "is not between 0 and 1, in halves of a block",
                 "train with --set near=0.05, or another that is");
   }
-  if (tileset.columns > kMostCells || tileset.rows > kMostCells) {
+  if (tileset.columns > kMaxCells || tileset.rows > kMaxCells) {
     throw tooLarge(fmt::format("would have {} by {} blocks, and at most {} fit along a side", tileset.columns,
-                               tileset.rows, kMostCells));
+                               tileset.rows, kMaxCells));
   }
   if (const TilesetLimits limits; tileset.tiles.size() > limits.tiles) {
     throw tooLarge(fmt::format("would have {} tiles, and readers take {} at most", tileset.tiles.size(), limits.tiles));
@@ -143,13 +144,13 @@ std::array<double, 12> boundingBoxNumbers(const Tileset& tileset, const SceneBox
 
 std::string encodeTileset(const Tileset& tileset) {
   requireWritable(tileset);
-  const auto broken = brokenRule(tileset);
+  const auto broken = validationError(tileset);
   CHECK(broken.value_or("") == "");
   const Json file = {{"asset", {{"version", "1.1"}, {"generator", "tessera"}}},
                      {"extensionsUsed", {kSceneExtension}},
-                     {"extensions", {{kSceneExtension, sceneOf(tileset)}}},
+                     {"extensions", {{kSceneExtension, sceneToJson(tileset)}}},
                      {"geometricError", tileset.geometricError},
-                     {"root", tileOf(tileset, tileset.root(), true)}};
+                     {"root", tileToJson(tileset, tileset.root(), true)}};
   std::string text = file.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
   if (const TilesetLimits limits; text.size() > limits.textBytes) {
     throw tooLarge(fmt::format("takes {} bytes, and readers take {} at most", text.size(), limits.textBytes));

@@ -1,4 +1,4 @@
-// tileset.json: 3D Tiles 1.1 with our extension TESSERA_scene (docs/tile-format.md).
+// Encoding and decoding of tileset.json: 3D Tiles 1.1 with the extension TESSERA_scene (docs/tile-format.md).
 #pragma once
 
 #include <optional>
@@ -12,7 +12,7 @@ namespace tessera {
 inline constexpr const char* kSceneExtension = "TESSERA_scene";
 inline constexpr int kSceneVersion = 1;
 
-inline constexpr uint32_t kMostCells = 4096;  // of the grid, along an axis
+inline constexpr uint32_t kMaxCells = 4096;  // of the grid, along an axis
 
 struct TilesetLimits {
   size_t textBytes = size_t{16} << 20;
@@ -20,22 +20,24 @@ struct TilesetLimits {
   uint32_t contentsOfTile = 64, resources = 1 << 16;
 };
 
-// The same tileset gives the same text. Throws Error where it is more than readers take, or its `near` is out of
-// bounds: settings can cause that. CHECKs that it breaks no other rule.
+// The same tileset gives the same text. Throws Error if it exceeds what readers accept or its `near` is out of bounds,
+// both of which settings can cause. CHECKs that it violates no other rule.
 std::string encodeTileset(const Tileset& tileset);
 
-// Untrusted text: nothing, and why in `reason`, where it is not JSON, has another version, breaks a rule of the format,
-// or is larger than the limits. All that it holds is finite, every index and uri is good: uris are relative, of plain
-// characters, and cannot leave the folder (links on the disk apart: scene_folder.h looks at those).
+// Decodes untrusted text. Returns nothing, with the reason in `reason`, if it is not JSON, has another version,
+// violates a rule of the format, or exceeds the limits. In what is returned, all numbers are finite and all indices and
+// uris are valid: uris are relative, consist of plain characters and cannot leave the folder (except through symbolic
+// links on disk, which scene_folder.h checks).
 std::optional<Tileset> decodeTileset(std::string_view text, std::string& reason, const TilesetLimits& limits = {});
 
-// A tile's box and those of its contents: what stands on disk as its bounding volume, which in 3D Tiles holds the far
-// box of a surround too.
+// Returns the union of a tile's box and those of its contents: the bounding volume that is stored on disk, which in 3D
+// Tiles includes the far box of a background block.
 SceneBox enclosingBox(const Tile& tile);
-// In the tile frame: centre, then half the edges along x, y, z.
+// In the tile frame: the centre, followed by half the edges along x, y and z.
 std::array<double, 12> boundingBoxNumbers(const Tileset& tileset, const SceneBox& box);
 
-// Letters, digits, `.`, `_`, `-` between single slashes, no part beginning with a dot, 255 characters at most.
+// Returns whether a uri consists of letters, digits, `.`, `_` and `-` between single slashes, has no component that
+// begins with a dot, and is at most 255 characters long.
 bool isPlainUri(std::string_view uri);
 
 }  // namespace tessera

@@ -1,4 +1,5 @@
-// Tilesets from arbitrary text: what is accepted keeps the rules, names only plain files, and survives being written.
+// Fuzzes the tileset decoder: an accepted tileset satisfies the rules, names only plain files, and can be encoded
+// again.
 #include <cstdlib>
 
 #include "tiles/tileset_json.h"
@@ -11,7 +12,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const auto tileset = tessera::decodeTileset({reinterpret_cast<const char*>(data), size}, reason, limits);
   if (tileset.has_value() != reason.empty()) std::abort();
   if (!tileset) return 0;
-  if (tessera::brokenRule(*tileset)) std::abort();
+  if (tessera::validationError(*tileset)) std::abort();
   for (const tessera::Tile& tile : tileset->tiles) {
     for (const tessera::TileContent& content : tile.contents) {
       if (!tessera::isPlainUri(content.uri) || content.uri.find("..") == 0) std::abort();

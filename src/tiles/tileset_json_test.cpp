@@ -6,16 +6,16 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
-#include "tiles/testing/made_tileset.h"
+#include "tiles/testing/test_tileset.h"
 
 namespace tessera {
 namespace {
 
 using nlohmann::json;
-using tiles_test::madeTileset;
+using tiles_test::testTileset;
 
 void expectSame(const Tileset& a, const Tileset& b) {
-  EXPECT_EQ(encodeTileset(a), encodeTileset(b));  // all that is stored, to the last digit
+  EXPECT_EQ(encodeTileset(a), encodeTileset(b));  // covers every stored member, to the last digit
   EXPECT_EQ(a.worldFromScene.rotation, b.worldFromScene.rotation);
   EXPECT_EQ(a.sourceFromWorld, b.sourceFromWorld);
   EXPECT_EQ(a.background, b.background);
@@ -29,7 +29,7 @@ void expectSame(const Tileset& a, const Tileset& b) {
     ASSERT_EQ(one.contents.size(), other.contents.size());
     for (size_t c = 0; c < one.contents.size(); ++c) {
       EXPECT_EQ(one.contents[c].uri, other.contents[c].uri);
-      EXPECT_EQ(one.contents[c].surround, other.contents[c].surround);
+      EXPECT_EQ(one.contents[c].backgroundBlock, other.contents[c].backgroundBlock);
       EXPECT_EQ(one.contents[c].level, other.contents[c].level);
       EXPECT_EQ(one.contents[c].geometricError, other.contents[c].geometricError);
       EXPECT_EQ(one.contents[c].resources, other.contents[c].resources);
@@ -39,10 +39,10 @@ void expectSame(const Tileset& a, const Tileset& b) {
   }
 }
 
-TEST(TilesetJson, GivesBackWhatWasWritten) {
+TEST(TilesetJson, RoundTripsTilesets) {
   for (const bool georeferenced : {false, true}) {
     for (const auto representation : {"mesh", "volume", "hash"}) {
-      Tileset tileset = madeTileset(3, georeferenced);
+      Tileset tileset = testTileset(3, georeferenced);
       tileset.representation = representation;
       tileset.near = 0.1 + 0.2;  // no short decimal
       std::string reason;
@@ -53,34 +53,35 @@ TEST(TilesetJson, GivesBackWhatWasWritten) {
   }
 }
 
-TEST(TilesetJson, IsThreeDTilesThatOthersRead) {
-  const json file = json::parse(encodeTileset(madeTileset()));
+TEST(TilesetJson, WritesThreeDTilesThatOtherProgramsRead) {
+  const json file = json::parse(encodeTileset(testTileset()));
   EXPECT_EQ(file["asset"]["version"], "1.1");
   EXPECT_EQ(file["root"]["refine"], "REPLACE");
   EXPECT_EQ(file["extensionsUsed"], json::array({"TESSERA_scene"}));
   EXPECT_FALSE(file.contains("extensionsRequired"));
   EXPECT_EQ(file["root"]["transform"].size(), 16u);
-  EXPECT_NEAR(file["root"]["transform"][12].get<double>(), 4035000, 10000);  // column-major: the origin at the end
+  EXPECT_NEAR(file["root"]["transform"][12].get<double>(), 4035000,
+              10000);  // column-major: the translation is at the end
   EXPECT_EQ(file["root"]["contents"].size(), 3u);
   const json& child = file["root"]["children"][0];
   EXPECT_TRUE(child.contains("content"));
   EXPECT_FALSE(child.contains("transform"));
-  // A cell: half a finest block's edge is worldFromScene's 12.5 units, and 1.25 metres each.
+  // A cell: half the edge of a finest block is 12.5 world units (worldFromScene), of 1.25 metres each.
   const auto box = child["boundingVolume"]["box"].get<std::vector<double>>();
   EXPECT_NEAR(Vec3d(box[3], box[4], box[5]).norm(), 12.5 * 1.25, 1e-9);
   EXPECT_NEAR(Vec3d(box[9], box[10], box[11]).norm(), 12.5 * 1.25 * 0.375, 1e-9);
 }
 
-TEST(TilesetJson, TheRootsVolumeHoldsTheSurround) {
-  const json file = json::parse(encodeTileset(madeTileset(3, false)));
+TEST(TilesetJson, TheRootsVolumeHoldsTheBackgroundBlock) {
+  const json file = json::parse(encodeTileset(testTileset(3, false)));
   const auto box = file["root"]["boundingVolume"]["box"].get<std::vector<double>>();
   EXPECT_NEAR(Vec3d(box[3], box[4], box[5]).norm(), 1000 * 12.5, 1e-6);
   EXPECT_EQ(file["root"]["extensions"]["TESSERA_scene"]["high"], json::array({3.0, 2.0, 0.75}));
 }
 
-TEST(TilesetJson, NamesTheSettingThatMadeMoreThanReadersTake) {
+TEST(TilesetJson, NamesTheSettingThatExceedsWhatReadersAccept) {
   const auto refuses = [](const std::string& why, const std::string& remedy, const std::function<void(Tileset&)>& set) {
-    Tileset tileset = madeTileset();
+    Tileset tileset = testTileset();
     set(tileset);
     try {
       encodeTileset(tileset);
@@ -101,8 +102,8 @@ TEST(TilesetJson, NamesTheSettingThatMadeMoreThanReadersTake) {
   refuses("16777216 at most", "--blocks", [](Tileset& tileset) { tileset.name = std::string(size_t{16} << 20, 'x'); });
 }
 
-TEST(TilesetJson, PassesOverWhatItDoesNotKnow) {
-  json file = json::parse(encodeTileset(madeTileset()));
+TEST(TilesetJson, IgnoresUnknownMembers) {
+  json file = json::parse(encodeTileset(testTileset()));
   file["extras"] = 1;
   file["schema"] = {{"id", "x"}};
   file["root"]["metadata"] = {{"class", "y"}};
@@ -113,9 +114,9 @@ TEST(TilesetJson, PassesOverWhatItDoesNotKnow) {
 
 class TilesetJsonRefusal : public testing::Test {
  protected:
-  // The reason begins with `why`.
+  // Expects that a changed tileset is refused with a reason that begins with `why`.
   void refuses(const std::string& why, const std::function<void(json&)>& spoil, const TilesetLimits& limits = {}) {
-    json file = json::parse(encodeTileset(madeTileset()));
+    json file = json::parse(encodeTileset(testTileset()));
     spoil(file);
     std::string reason;
     EXPECT_FALSE(decodeTileset(file.dump(), reason, limits)) << why;
@@ -124,7 +125,7 @@ class TilesetJsonRefusal : public testing::Test {
   static json& ours(json& object) { return object["extensions"]["TESSERA_scene"]; }
 };
 
-TEST_F(TilesetJsonRefusal, OfWhatIsNoTileset) {
+TEST_F(TilesetJsonRefusal, RejectsWhatIsNoTileset) {
   std::string reason;
   EXPECT_FALSE(decodeTileset("", reason));
   EXPECT_EQ(reason, "is not a JSON object");
@@ -134,7 +135,7 @@ TEST_F(TilesetJsonRefusal, OfWhatIsNoTileset) {
   EXPECT_FALSE(decodeTileset(std::string(100000, '['), reason));
   TilesetLimits limits;
   limits.textBytes = 10;
-  EXPECT_FALSE(decodeTileset(encodeTileset(madeTileset()), reason, limits));
+  EXPECT_FALSE(decodeTileset(encodeTileset(testTileset()), reason, limits));
   EXPECT_EQ(reason, "is larger than any tileset should be");
   refuses("is not 3D Tiles 1.1", [](json& file) { file["asset"]["version"] = "1.0"; });
   refuses("has no extension TESSERA_scene", [](json& file) { file.erase("extensions"); });
@@ -145,7 +146,7 @@ TEST_F(TilesetJsonRefusal, OfWhatIsNoTileset) {
   refuses("the representation's name is none", [](json& file) { ours(file)["representation"] = "Two words"; });
 }
 
-TEST_F(TilesetJsonRefusal, OfNumbersThatAreNone) {
+TEST_F(TilesetJsonRefusal, RejectsInvalidNumbers) {
   refuses("worldFromScene or", [](json& file) { ours(file)["worldFromScene"]["scale"] = "1"; });
   refuses("worldFromScene or", [](json& file) { ours(file)["worldFromScene"]["rotation"].erase(8); });
   refuses("worldFromScene or", [](json& file) { ours(file)["sourceFromWorld"][3] = nullptr; });
@@ -161,7 +162,7 @@ TEST_F(TilesetJsonRefusal, OfNumbersThatAreNone) {
   refuses("tile 1: its level", [](json& file) { ours(file["root"]["children"][0])["cells"] = {0, 0, 1}; });
 }
 
-TEST_F(TilesetJsonRefusal, OfTreesThatLie) {
+TEST_F(TilesetJsonRefusal, RejectsInconsistentTrees) {
   refuses("tile 1: has no extension", [](json& file) { file["root"]["children"][0].erase("extensions"); });
   refuses("tile 0: is not refined", [](json& file) { file["root"]["refine"] = "ADD"; });
   refuses("tile 2: is not refined", [](json& file) { file["root"]["children"][1]["refine"] = "ADD"; });
@@ -169,6 +170,8 @@ TEST_F(TilesetJsonRefusal, OfTreesThatLie) {
   refuses("tile 0: its children are no list", [](json& file) { file["root"]["children"] = 5; });
   refuses("tile 0: has both", [](json& file) { file["root"]["content"] = file["root"]["contents"][0]; });
   refuses("tile 0: a content has no uri", [](json& file) { file["root"]["contents"][0].erase("uri"); });
+  refuses("tile 0: the key surround is called background_block now",
+          [](json& file) { ours(file["root"]["contents"][0])["surround"] = true; });
   refuses("tile 0: a content's resources", [](json& file) { ours(file["root"]["contents"][0])["resources"] = {-1}; });
   refuses("tile 0: its children leave", [](json& file) { file["root"]["children"].erase(0); });
   refuses("tile 1: its boundingVolume",
@@ -190,7 +193,7 @@ TEST_F(TilesetJsonRefusal, OfTreesThatLie) {
       "tile 1: the tree is too deep", [](json&) {}, limits);
 }
 
-TEST_F(TilesetJsonRefusal, OfUrisThatLeaveTheFolder) {
+TEST_F(TilesetJsonRefusal, RejectsUrisThatLeaveTheFolder) {
   for (const char* uri :
        {"../a.glb", "/a.glb", "a/../../b.glb", "http://x/a.glb", "//x/a.glb", "a\\b.glb", "a%2e%2e.glb", "a.glb?x",
         "a b.glb", ".a.glb", "a//b.glb", "", "a.glb/", "tiles/./a.glb", "C:a.glb"}) {

@@ -1,4 +1,4 @@
-// tileset.json, read: untrusted text.
+// Decodes tileset.json, which is untrusted text.
 #include <fmt/format.h>
 
 #include <deque>
@@ -11,28 +11,28 @@ namespace {
 
 using namespace json_fields;
 
-const json* oursOf(const json& object) {
-  const json* extensions = fieldOf(object, "extensions");
-  return extensions ? fieldOf(*extensions, kSceneExtension) : nullptr;
+const json* tesseraExtension(const json& object) {
+  const json* extensions = getField(object, "extensions");
+  return extensions ? getField(*extensions, kSceneExtension) : nullptr;
 }
 
-std::optional<Vec3d> vectorOf(const json& object, const char* key) {
-  const auto numbers = numbersOf<3>(object, key);
+std::optional<Vec3d> getVector(const json& object, const char* key) {
+  const auto numbers = getNumbers<3>(object, key);
   return numbers ? std::optional<Vec3d>(Vec3d(numbers->data())) : std::nullopt;
 }
 
-std::optional<Mat4d> matrixOf(const json& object, const char* key) {
-  const auto numbers = numbersOf<16>(object, key);
+std::optional<Mat4d> getMatrix(const json& object, const char* key) {
+  const auto numbers = getNumbers<16>(object, key);
   return numbers ? std::optional<Mat4d>(Mat4d(numbers->data())) : std::nullopt;
 }
 
-std::optional<SceneBox> boxOf(const json& object) {
-  const auto low = vectorOf(object, "low"), high = vectorOf(object, "high");
+std::optional<SceneBox> readBox(const json& object) {
+  const auto low = getVector(object, "low"), high = getVector(object, "high");
   return low && high ? std::optional<SceneBox>(SceneBox{*low, *high}) : std::nullopt;
 }
 
-std::optional<CellRange> cellsOf(const json& object) {
-  const json* cells = arrayOf(object, "cells");
+std::optional<CellRange> readCells(const json& object) {
+  const json* cells = getArray(object, "cells");
   if (!cells || cells->size() != 4) return std::nullopt;
   uint32_t numbers[4];
   for (size_t i = 0; i < 4; ++i) {
@@ -43,9 +43,9 @@ std::optional<CellRange> cellsOf(const json& object) {
   return CellRange{{numbers[0], numbers[1]}, {numbers[2], numbers[3]}};
 }
 
-// Sizes are hints; one that is no number is none.
-uint64_t bytesOf(const json& object) {
-  const json* field = fieldOf(object, "bytes");
+// Returns the byte count of a file, which is a hint; 0 if it is not a number.
+uint64_t getByteCount(const json& object) {
+  const json* field = getField(object, "bytes");
   return field ? unsignedFrom(*field, uint64_t{1} << 53).value_or(0) : 0;
 }
 
@@ -54,15 +54,16 @@ class TilesetReader {
   TilesetReader(std::string& reason, const TilesetLimits& limits) : reason_(reason), limits_(limits) {}
 
   std::optional<Tileset> read(const json& file) {
-    if (!readAsset(file) || !readScene(*oursOf(file)) || !readResources(*oursOf(file))) return std::nullopt;
-    const auto error = numberOf(file, "geometricError");
-    const json* root = fieldOf(file, "root");
+    if (!readAsset(file) || !readScene(*tesseraExtension(file)) || !readResources(*tesseraExtension(file)))
+      return std::nullopt;
+    const auto error = getNumber(file, "geometricError");
+    const json* root = getField(file, "root");
     if (!error || !root || !readTree(*root)) {
       fail("has no geometricError or no root");
       return std::nullopt;
     }
     tileset_.geometricError = *error;
-    if (auto broken = brokenRule(tileset_)) {
+    if (auto broken = validationError(tileset_)) {
       fail(*broken);
       return std::nullopt;
     }
@@ -74,35 +75,35 @@ class TilesetReader {
 
  private:
   bool fail(const std::string& reason) {
-    if (reason_.empty()) reason_ = reason;  // the first is the one to mend
+    if (reason_.empty()) reason_ = reason;  // only the first error is reported
     return false;
   }
 
   bool readAsset(const json& file) {
-    const json* asset = fieldOf(file, "asset");
+    const json* asset = getField(file, "asset");
     if (!asset || !isString(*asset, "version", "1.1")) return fail("is not 3D Tiles 1.1");
-    if (const json* required = fieldOf(file, "extensionsRequired"); required && !required->empty()) {
+    if (const json* required = getField(file, "extensionsRequired"); required && !required->empty()) {
       return fail("requires extensions that are not known");
     }
-    const json* ours = oursOf(file);
+    const json* ours = tesseraExtension(file);
     if (!ours) return fail("has no extension TESSERA_scene");
-    const auto version = unsignedOf(*ours, "version");
+    const auto version = getUnsigned(*ours, "version");
     if (!version) return fail("does not say which version it is of");
     if (*version != kSceneVersion) return fail(fmt::format("is of version {}; {} is known", *version, kSceneVersion));
     return true;
   }
 
   bool readScene(const json& ours) {
-    const std::string* representation = stringOf(ours, "representation");
+    const std::string* representation = getString(ours, "representation");
     if (!representation) return fail("does not name its representation");
     tileset_.representation = *representation;
-    if (const std::string* name = stringOf(ours, "name")) tileset_.name = *name;
-    const json* placement = fieldOf(ours, "worldFromScene");
+    if (const std::string* name = getString(ours, "name")) tileset_.name = *name;
+    const json* placement = getField(ours, "worldFromScene");
     if (!placement) return fail("has no worldFromScene");
-    const auto rotation = numbersOf<9>(*placement, "rotation");
-    const auto scale = numberOf(*placement, "scale");
-    const auto translation = vectorOf(*placement, "translation");
-    const auto source = matrixOf(ours, "sourceFromWorld");
+    const auto rotation = getNumbers<9>(*placement, "rotation");
+    const auto scale = getNumber(*placement, "scale");
+    const auto translation = getVector(*placement, "translation");
+    const auto source = getMatrix(ours, "sourceFromWorld");
     if (!rotation || !scale || !translation || !source) return fail("worldFromScene or sourceFromWorld lacks numbers");
     tileset_.worldFromScene = {Mat3d(rotation->data()), *scale, *translation};
     tileset_.sourceFromWorld = *source;
@@ -110,24 +111,24 @@ class TilesetReader {
   }
 
   bool readGeoreference(const json& ours) {
-    const json* geo = fieldOf(ours, "georeference");
+    const json* geo = getField(ours, "georeference");
     if (!geo) return true;
-    const auto latitude = numberOf(*geo, "latitude"), longitude = numberOf(*geo, "longitude");
-    const auto altitude = numberOf(*geo, "altitude");
-    const auto enuFromWorld = matrixOf(*geo, "enuFromWorld");
+    const auto latitude = getNumber(*geo, "latitude"), longitude = getNumber(*geo, "longitude");
+    const auto altitude = getNumber(*geo, "altitude");
+    const auto enuFromWorld = getMatrix(*geo, "enuFromWorld");
     if (!latitude || !longitude || !altitude || !enuFromWorld) return fail("the georeference lacks numbers");
     tileset_.georeference = GeoFrame{*latitude, *longitude, *altitude, *enuFromWorld};
     return true;
   }
 
   bool readGrid(const json& ours) {
-    const json* grid = fieldOf(ours, "grid");
+    const json* grid = getField(ours, "grid");
     if (!grid) return fail("has no grid");
-    const auto columns = unsignedOf(*grid, "columns"), rows = unsignedOf(*grid, "rows");
-    const auto box = boxOf(*grid);
-    const auto levels = unsignedOf(ours, "levels");
-    const auto near = numberOf(ours, "near");
-    const auto background = numbersOf<3>(ours, "background");
+    const auto columns = getUnsigned(*grid, "columns"), rows = getUnsigned(*grid, "rows");
+    const auto box = readBox(*grid);
+    const auto levels = getUnsigned(ours, "levels");
+    const auto near = getNumber(ours, "near");
+    const auto background = getNumbers<3>(ours, "background");
     if (!columns || !rows || !box || !levels || !near || !background) {
       return fail("the grid, levels, near or background is not complete");
     }
@@ -144,18 +145,18 @@ class TilesetReader {
   }
 
   bool readResources(const json& ours) {
-    const json* resources = fieldOf(ours, "resources");
+    const json* resources = getField(ours, "resources");
     if (!resources) return true;
     if (!resources->is_array() || resources->size() > limits_.resources) return fail("has too many shared resources");
     for (const json& resource : *resources) {
-      const std::string *uri = stringOf(resource, "uri"), *mimeType = stringOf(resource, "mimeType");
+      const std::string *uri = getString(resource, "uri"), *mimeType = getString(resource, "mimeType");
       if (!uri || !mimeType) return fail("a shared resource has no uri or no mimeType");
-      tileset_.resources.push_back({*uri, *mimeType, bytesOf(resource)});
+      tileset_.resources.push_back({*uri, *mimeType, getByteCount(resource)});
     }
     return true;
   }
 
-  // Level after level, so that no depth of nesting meets the stack.
+  // Reads breadth-first, so that deeply nested tiles cannot overflow the stack.
   bool readTree(const json& root) {
     struct Waiting {
       const json* source;
@@ -169,7 +170,7 @@ class TilesetReader {
       if (depth >= limits_.depth) return fail(place + "the tree is too deep");
       Tile tile;
       if (!readTile(*source, tile, depth == 0, place) || !readContents(*source, tile, place)) return false;
-      if (const json* children = fieldOf(*source, "children")) {
+      if (const json* children = getField(*source, "children")) {
         if (!children->is_array()) return fail(place + "its children are no list");
         if (children->size() > limits_.tiles - known) return fail("has too many tiles");
         for (const json& child : *children) {
@@ -184,18 +185,18 @@ class TilesetReader {
   }
 
   bool readTile(const json& source, Tile& tile, bool isRoot, const std::string& place) {
-    const json* ours = oursOf(source);
+    const json* ours = tesseraExtension(source);
     if (!ours) return fail(place + "has no extension TESSERA_scene");
-    const auto level = unsignedOf(*ours, "level");
-    const auto cells = cellsOf(*ours);
-    const auto box = boxOf(*ours);
-    const auto error = numberOf(source, "geometricError");
+    const auto level = getUnsigned(*ours, "level");
+    const auto cells = readCells(*ours);
+    const auto box = readBox(*ours);
+    const auto error = getNumber(source, "geometricError");
     if (!level || !cells || !box || !error) return fail(place + "its level, cells, box or geometricError is missing");
     if (isRoot ? !isString(source, "refine", "REPLACE")
-               : fieldOf(source, "refine") && !isString(source, "refine", "REPLACE")) {
+               : getField(source, "refine") && !isString(source, "refine", "REPLACE")) {
       return fail(place + "is not refined by REPLACE");
     }
-    if (!isRoot && fieldOf(source, "transform")) return fail(place + "only the root may have a transform");
+    if (!isRoot && getField(source, "transform")) return fail(place + "only the root may have a transform");
     tile.level = *level;
     tile.cells = *cells;
     tile.box = *box;
@@ -204,7 +205,7 @@ class TilesetReader {
   }
 
   bool readContents(const json& source, Tile& tile, const std::string& place) {
-    const json *one = fieldOf(source, "content"), *several = fieldOf(source, "contents");
+    const json *one = getField(source, "content"), *several = getField(source, "contents");
     if (one && several) return fail(place + "has both content and contents");
     if (one) return readContent(*one, tile, place);
     if (!several) return true;
@@ -216,23 +217,25 @@ class TilesetReader {
   }
 
   bool readContent(const json& source, Tile& tile, const std::string& place) {
-    const std::string* uri = stringOf(source, "uri");
-    const json* ours = oursOf(source);
-    const auto box = ours ? boxOf(*ours) : std::nullopt;
+    const std::string* uri = getString(source, "uri");
+    const json* ours = tesseraExtension(source);
+    const auto box = ours ? readBox(*ours) : std::nullopt;
     if (!uri || !box) return fail(place + "a content has no uri or no box");
+    if (getField(*ours, "surround")) return fail(place + "the key surround is called background_block now");
     TileContent content;
     content.uri = *uri;
     content.box = *box;
-    content.surround = flagOf(*ours, "surround").value_or(false);
-    content.bytes = bytesOf(*ours);
+    content.backgroundBlock = getBoolean(*ours, "background_block").value_or(false);
+    content.bytes = getByteCount(*ours);
     content.cells = tile.cells;
-    if (content.surround && !readSurround(*ours, content)) return fail(place + "a surround's level or error is none");
-    if (fieldOf(*ours, "cells")) {
-      const auto cells = cellsOf(*ours);
+    if (content.backgroundBlock && !readBackgroundBlock(*ours, content))
+      return fail(place + "a background block's level or error is none");
+    if (getField(*ours, "cells")) {
+      const auto cells = readCells(*ours);
       if (!cells) return fail(place + "a content's cells are none");
       content.cells = *cells;
     }
-    if (const json* resources = fieldOf(*ours, "resources")) {
+    if (const json* resources = getField(*ours, "resources")) {
       if (!resources->is_array()) return fail(place + "a content's resources are no list");
       for (const json& resource : *resources) {
         const auto index = unsignedFrom(resource, UINT32_MAX);
@@ -244,30 +247,30 @@ class TilesetReader {
     return true;
   }
 
-  bool readSurround(const json& ours, TileContent& content) {
-    const json *level = fieldOf(ours, "level"), *error = fieldOf(ours, "geometricError");
+  bool readBackgroundBlock(const json& ours, TileContent& content) {
+    const json *level = getField(ours, "level"), *error = getField(ours, "geometricError");
     if (level) {
       const auto number = unsignedFrom(*level, UINT32_MAX);
       if (!number) return false;
       content.level = static_cast<uint32_t>(*number);
     }
     if (error) {
-      const auto metres = numberOf(ours, "geometricError");
+      const auto metres = getNumber(ours, "geometricError");
       if (!metres) return false;
       content.geometricError = *metres;
     }
     return true;
   }
 
-  // What other programs cull with has to be what ours do. The two differ by rounding alone.
+  // Checks that the bounding volumes used by other programs agree with our boxes, up to rounding.
   bool agreesWithBoxes(size_t index) {
     const Tile& tile = tileset_.tiles[index];
     const json& source = *sources_[index];
     if (!agrees(source, enclosingBox(tile)))
       return fail(fmt::format("tile {}: its boundingVolume is not its box", index));
     for (size_t i = 0; i < tile.contents.size(); ++i) {
-      const json& content = fieldOf(source, "content") ? source["content"] : source["contents"][i];
-      if (fieldOf(content, "boundingVolume") && !agrees(content, tile.contents[i].box)) {
+      const json& content = getField(source, "content") ? source["content"] : source["contents"][i];
+      if (getField(content, "boundingVolume") && !agrees(content, tile.contents[i].box)) {
         return fail(fmt::format("tile {}: a content's boundingVolume is not its box", index));
       }
     }
@@ -275,8 +278,8 @@ class TilesetReader {
   }
 
   bool agrees(const json& source, const SceneBox& box) {
-    const json* volume = fieldOf(source, "boundingVolume");
-    const auto given = volume ? numbersOf<12>(*volume, "box") : std::nullopt;
+    const json* volume = getField(source, "boundingVolume");
+    const auto given = volume ? getNumbers<12>(*volume, "box") : std::nullopt;
     if (!given) return false;
     const auto expected = boundingBoxNumbers(tileset_, box);
     double largest = 0;
@@ -290,7 +293,7 @@ class TilesetReader {
   std::string& reason_;
   const TilesetLimits& limits_;
   Tileset tileset_;
-  std::vector<const json*> sources_;  // of tileset_.tiles
+  std::vector<const json*> sources_;  // the JSON of each tile in tileset_.tiles
 };
 
 }  // namespace

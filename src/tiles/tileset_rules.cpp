@@ -1,4 +1,4 @@
-// The rules that a tileset keeps, written or read (docs/tile-format.md, section 3).
+// The rules of a tileset, checked on writing and on reading (docs/tile-format.md, section 3).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,8 +15,8 @@ namespace {
 using Broken = std::optional<std::string>;
 
 constexpr double kFarthestInScene = 1e7;
-constexpr uint32_t kMostLevels = 64;
-constexpr size_t kMostNameLength = 64;  // of a representation
+constexpr uint32_t kMaxLevels = 64;
+constexpr size_t kMaxNameLength = 64;  // of a representation's name
 
 bool isRotation(const Mat3d& rotation) {
   return rotation.allFinite() && rotation.cwiseAbs().maxCoeff() < 2 &&
@@ -25,7 +25,7 @@ bool isRotation(const Mat3d& rotation) {
 }
 
 bool isScale(double scale) {
-  return scale > 1 / kFarthest && scale < kFarthest;  // false for NaN too
+  return scale > 1 / kFarthest && scale < kFarthest;  // also false for NaN
 }
 
 bool isAffine(const Mat4d& matrix) {
@@ -52,7 +52,8 @@ bool isRange(const CellRange& range) {
   return range.first[0] < range.end[0] && range.first[1] < range.end[1];
 }
 
-// Ranges that lie on a grid: along an axis two of them are the same or apart, and no two are the same along both.
+// Returns whether ranges lie on a grid: along each axis, any two are equal or disjoint, and no two are equal along
+// both.
 bool lieOnGrid(const std::vector<CellRange>& ranges) {
   for (size_t axis = 0; axis < 2; ++axis) {
     std::vector<std::pair<uint32_t, uint32_t>> sides;
@@ -74,7 +75,7 @@ Broken ruleOfFrames(const Tileset& tileset) {
   if (!isScale(tileset.worldFromScene.scale)) return "worldFromScene's scale is not above zero";
   if (!isPlace(tileset.worldFromScene.translation)) return "worldFromScene's translation is no place";
   if (!isAffine(tileset.sourceFromWorld)) return "sourceFromWorld is not affine";
-  if (tileset.columns < 1 || tileset.columns > kMostCells || tileset.rows < 1 || tileset.rows > kMostCells) {
+  if (tileset.columns < 1 || tileset.columns > kMaxCells || tileset.rows < 1 || tileset.rows > kMaxCells) {
     return "the grid's columns or rows are out of bounds";
   }
   if (!(tileset.bottom >= -1 && tileset.bottom < tileset.top && tileset.top <= 1)) {
@@ -95,7 +96,7 @@ Broken ruleOfFrames(const Tileset& tileset) {
 
 bool isName(std::string_view name) {
   const auto isPlain = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_'; };
-  return !name.empty() && name.size() <= kMostNameLength && std::all_of(name.begin(), name.end(), isPlain);
+  return !name.empty() && name.size() <= kMaxNameLength && std::all_of(name.begin(), name.end(), isPlain);
 }
 
 Broken ruleOfResources(const Tileset& tileset) {
@@ -108,19 +109,19 @@ Broken ruleOfResources(const Tileset& tileset) {
   return std::nullopt;
 }
 
-// The surrounds of the root: finer ones have smaller texels.
-Broken ruleOfSurrounds(const Tileset& tileset) {
+// Checks the background blocks of the root: finer ones must have smaller texels.
+Broken ruleOfBackgroundBlocks(const Tileset& tileset) {
   std::map<uint32_t, double> errors;
   for (const TileContent& content : tileset.root().contents) {
-    if (!content.surround) continue;
-    if (!content.box.contains(tileset.box())) return "the surround's box does not hold the scene's";
-    if (content.level >= tileset.levels) return "a surround's level is not below the scene's number of levels";
-    if (!isError(content.geometricError)) return "a surround's geometric error is no length";
-    if (!errors.emplace(content.level, content.geometricError).second) return "two surrounds are of one level";
+    if (!content.backgroundBlock) continue;
+    if (!content.box.contains(tileset.box())) return "the background block's box does not hold the scene's";
+    if (content.level >= tileset.levels) return "a background block's level is not below the scene's number of levels";
+    if (!isError(content.geometricError)) return "a background block's geometric error is no length";
+    if (!errors.emplace(content.level, content.geometricError).second) return "two background blocks are of one level";
   }
   double finer = 0;
   for (const auto& [level, error] : errors) {
-    if (error < finer) return "a surround's geometric error is below a finer one's";
+    if (error < finer) return "a background block's geometric error is below a finer one's";
     finer = error;
   }
   return std::nullopt;
@@ -136,19 +137,20 @@ Broken ruleOfContents(const Tileset& tileset, const Tile& tile, bool isRoot) {
       if (resource >= tileset.resources.size()) return "a content needs a shared resource that is not listed";
       if (!resources.insert(resource).second) return "a content needs a shared resource twice";
     }
-    if (content.surround) {
-      if (!isRoot) return "a surround is not in the root";
+    if (content.backgroundBlock) {
+      if (!isRoot) return "a background block is not in the root";
       continue;
     }
     if (!tile.box.contains(content.box)) return "a content's box leaves its tile's";
     if (!isRange(content.cells) || !tile.cells.contains(content.cells)) return "a content's cells leave its tile's";
   }
-  return isRoot ? ruleOfSurrounds(tileset) : std::nullopt;
+  return isRoot ? ruleOfBackgroundBlocks(tileset) : std::nullopt;
 }
 
-// Inner walls hold; at the border of the grid a tile may own what lies outside.
+// Returns whether the tile stays within the inner walls of its cells; at the border of the grid it may own what lies
+// outside.
 bool keepsToCells(const Tileset& tileset, const Tile& tile) {
-  const SceneBox walls = tileset.boxOf(tile.cells);
+  const SceneBox walls = tileset.boxFromCells(tile.cells);
   const std::array<uint32_t, 2> counts = {tileset.columns, tileset.rows};
   for (size_t axis = 0; axis < 2; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
@@ -184,7 +186,7 @@ Broken ruleOfChildren(const Tileset& tileset, const Tile& tile) {
   return std::nullopt;
 }
 
-// Each tile but the root is the child of one that stands before it.
+// Returns whether each tile except the root is the child of exactly one earlier tile.
 bool isTree(const Tileset& tileset) {
   std::vector<bool> hasParent(tileset.tiles.size());
   hasParent[0] = true;
@@ -203,16 +205,16 @@ std::optional<uint32_t> tileWithoutOrder(const Tileset& tileset) {
   for (size_t i = 0; i < tileset.tiles.size(); ++i) {
     std::vector<CellRange> ranges;
     for (const TileContent& content : tileset.tiles[i].contents) {
-      if (!content.surround) ranges.push_back(content.cells);
+      if (!content.backgroundBlock) ranges.push_back(content.cells);
     }
     if (!lieOnGrid(ranges)) return static_cast<uint32_t>(i);
   }
   return std::nullopt;
 }
 
-std::optional<std::string> brokenRule(const Tileset& tileset) {
+std::optional<std::string> validationError(const Tileset& tileset) {
   if (tileset.tiles.empty()) return "there is no tile";
-  if (tileset.levels < 1 || tileset.levels > kMostLevels) return "the number of levels is out of bounds";
+  if (tileset.levels < 1 || tileset.levels > kMaxLevels) return "the number of levels is out of bounds";
   if (!isName(tileset.representation)) return "the representation's name is none";
   if (auto broken = ruleOfFrames(tileset)) return broken;
   if (auto broken = ruleOfResources(tileset)) return broken;
@@ -221,9 +223,9 @@ std::optional<std::string> brokenRule(const Tileset& tileset) {
   }
   if (!(tileset.root().cells == tileset.allCells())) return "the root does not stand for all cells";
   if (!isTree(tileset)) return "the tiles are no tree";
-  for (const auto ruleOf : {ruleOfTile, ruleOfChildren}) {
+  for (const auto checkRule : {ruleOfTile, ruleOfChildren}) {
     for (size_t i = 0; i < tileset.tiles.size(); ++i) {
-      if (const auto broken = ruleOf(tileset, tileset.tiles[i])) return fmt::format("tile {}: {}", i, *broken);
+      if (const auto broken = checkRule(tileset, tileset.tiles[i])) return fmt::format("tile {}: {}", i, *broken);
     }
   }
   return std::nullopt;

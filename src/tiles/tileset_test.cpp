@@ -8,12 +8,12 @@
 #include <functional>
 
 #include "base/random.h"
-#include "tiles/testing/made_tileset.h"
+#include "tiles/testing/test_tileset.h"
 
 namespace tessera {
 namespace {
 
-using tiles_test::madeTileset;
+using tiles_test::testTileset;
 
 TEST(Tileset, StandsOnItsBlockGrid) {
   BlockGrid grid;
@@ -40,7 +40,7 @@ TEST(Tileset, StandsOnItsBlockGrid) {
 }
 
 TEST(Tileset, ItsCellsAreTheGridsCells) {
-  const Tileset tileset = madeTileset();
+  const Tileset tileset = testTileset();
   const BlockGrid grid = tileset.blockGrid();
   for (double x = -5; x <= 5; x += 0.37) {
     for (double y = -5; y <= 5; y += 0.41) {
@@ -52,7 +52,7 @@ TEST(Tileset, ItsCellsAreTheGridsCells) {
 }
 
 TEST(Tileset, TheRootTransformPutsItOnTheEarth) {
-  const Tileset tileset = madeTileset();
+  const Tileset tileset = testTileset();
   const Vec3d xInScene(0.3, -1.2, 0.5), xInWorld = tileset.worldFromScene * xInScene;
   const Vec3d enu = (tileset.georeference->enuFromWorld * xInWorld.homogeneous()).head<3>();
   EXPECT_LT((tileset.tileFromScene() * xInScene - enu).norm(), 1e-9);
@@ -63,13 +63,13 @@ TEST(Tileset, TheRootTransformPutsItOnTheEarth) {
   Vec3d ecef;
   GeographicLib::Geocentric::WGS84().Forward(latitude, longitude, height, ecef.x(), ecef.y(), ecef.z());
   EXPECT_LT(((tileset.rootTransform() * enu.homogeneous()).head<3>() - ecef).norm(), 1e-6);
-  EXPECT_EQ(madeTileset(3, false).rootTransform(), Mat4d::Identity());
+  EXPECT_EQ(testTileset(3, false).rootTransform(), Mat4d::Identity());
 }
 
-// Where the ray from o along d is in each tile of a cut, by dense sampling.
+// Finds by dense sampling where the ray from o along d is in each tile of a cut.
 TEST(Tileset, ChildrenAreFrontToBackForEveryRay) {
   // Three columns and two rows of ranges of unequal width, as merging an odd grid leaves them.
-  Tileset tileset = madeTileset(5);
+  Tileset tileset = testTileset(5);
   Tile& root = tileset.tiles[0];
   root.children.clear();
   tileset.tiles.resize(1);
@@ -77,12 +77,12 @@ TEST(Tileset, ChildrenAreFrontToBackForEveryRay) {
     for (const auto& [i0, i1] : {std::pair{0u, 2u}, {2u, 4u}, {4u, 5u}}) {
       Tile child;
       child.cells = {{i0, j0}, {i1, j1}};
-      child.box = tileset.boxOf(child.cells);
+      child.box = tileset.boxFromCells(child.cells);
       tileset.tiles[0].children.push_back(static_cast<uint32_t>(tileset.tiles.size()));
       tileset.tiles.push_back(child);
     }
   }
-  ASSERT_EQ(brokenRule(tileset), std::nullopt);
+  ASSERT_EQ(validationError(tileset), std::nullopt);
   const RandomStream random(5, 5);
   size_t changes = 0;
   for (uint64_t ray = 0; ray < 500; ++ray) {
@@ -103,23 +103,23 @@ TEST(Tileset, ChildrenAreFrontToBackForEveryRay) {
 }
 
 TEST(Tileset, TheCoarsestCoverLiesBelowARootThatCannotStandForIt) {
-  Tileset tileset = madeTileset(2);
+  Tileset tileset = testTileset(2);
   EXPECT_EQ(coarsestCover(tileset), std::vector<uint32_t>{0});
-  tileset.tiles[0].contents.erase(tileset.tiles[0].contents.begin());  // the surrounds are left
-  EXPECT_EQ(brokenRule(tileset), std::nullopt);
+  tileset.tiles[0].contents.erase(tileset.tiles[0].contents.begin());  // only the background blocks are left
+  EXPECT_EQ(validationError(tileset), std::nullopt);
   EXPECT_EQ(coarsestCover(tileset), (std::vector<uint32_t>{1, 2, 3, 4}));
 }
 
 TEST(Tileset, ItsCoarsestLevelIsOneThatHasContentsOfItsOwn) {
-  Tileset tileset = madeTileset(2);
+  Tileset tileset = testTileset(2);
   EXPECT_EQ(coarsestLevel(tileset), 1u);
-  tileset.tiles[0].contents.erase(tileset.tiles[0].contents.begin());  // the surrounds are left
+  tileset.tiles[0].contents.erase(tileset.tiles[0].contents.begin());  // only the background blocks are left
   EXPECT_EQ(coarsestLevel(tileset), 0u);
   EXPECT_EQ(tileset.levels, 2u);
 }
 
 TEST(Tileset, AllowsChainsAndSeveralContents) {
-  Tileset tileset = madeTileset(2);
+  Tileset tileset = testTileset(2);
   tileset.levels = 3;
   Tile top = tileset.tiles[0];  // over the same cells
   top.level = 2;
@@ -127,24 +127,24 @@ TEST(Tileset, AllowsChainsAndSeveralContents) {
   tileset.tiles[0].contents.resize(1);
   for (uint32_t& child : tileset.tiles[0].children) ++child;
   tileset.tiles.insert(tileset.tiles.begin(), top);
-  EXPECT_EQ(brokenRule(tileset), std::nullopt);
+  EXPECT_EQ(validationError(tileset), std::nullopt);
   TileContent west = tileset.tiles[1].contents[0], east = west;
   west.cells = {{0, 0}, {1, 2}};
   east.cells = {{1, 0}, {2, 2}};
   tileset.tiles[1].contents = {west, east};
-  EXPECT_EQ(brokenRule(tileset), std::nullopt);
+  EXPECT_EQ(validationError(tileset), std::nullopt);
   EXPECT_EQ(tileWithoutOrder(tileset), std::nullopt);
   tileset.tiles[1].contents[1].cells = west.cells;
   EXPECT_EQ(tileWithoutOrder(tileset), 1u);
-  EXPECT_EQ(brokenRule(tileset), std::nullopt) << "whether contents may overlap is for their codec to say";
+  EXPECT_EQ(validationError(tileset), std::nullopt) << "whether contents may overlap is for their codec to say";
 }
 
 TEST(Tileset, NamesTheRuleThatIsBroken) {
   const auto names = [](const char* rule, const std::function<void(Tileset&)>& spoil) {
-    Tileset tileset = madeTileset();
-    ASSERT_EQ(brokenRule(tileset), std::nullopt);
+    Tileset tileset = testTileset();
+    ASSERT_EQ(validationError(tileset), std::nullopt);
     spoil(tileset);
-    EXPECT_EQ(brokenRule(tileset).value_or("none"), rule);
+    EXPECT_EQ(validationError(tileset).value_or("none"), rule);
   };
   names("there is no tile", [](Tileset& t) { t.tiles.clear(); });
   names("the number of levels is out of bounds", [](Tileset& t) { t.levels = 65; });
@@ -197,16 +197,17 @@ TEST(Tileset, NamesTheRuleThatIsBroken) {
   names("tile 0: a content needs a shared resource twice", [](Tileset& t) {
     t.tiles[0].contents[0].resources = {0, 0};
   });
-  names("tile 1: a surround is not in the root", [](Tileset& t) { t.tiles[1].contents[0].surround = true; });
-  names("tile 0: two surrounds are of one level",
+  names("tile 1: a background block is not in the root",
+        [](Tileset& t) { t.tiles[1].contents[0].backgroundBlock = true; });
+  names("tile 0: two background blocks are of one level",
         [](Tileset& t) { t.tiles[0].contents[2].level = t.tiles[0].contents[1].level; });
-  names("tile 0: a surround's level is not below the scene's number of levels",
+  names("tile 0: a background block's level is not below the scene's number of levels",
         [](Tileset& t) { t.tiles[0].contents[1].level = 2; });
-  names("tile 0: a surround's geometric error is no length",
+  names("tile 0: a background block's geometric error is no length",
         [](Tileset& t) { t.tiles[0].contents[1].geometricError = NAN; });
-  names("tile 0: a surround's geometric error is below a finer one's",
+  names("tile 0: a background block's geometric error is below a finer one's",
         [](Tileset& t) { t.tiles[0].contents[1].geometricError = 1; });
-  names("tile 0: the surround's box does not hold the scene's",
+  names("tile 0: the background block's box does not hold the scene's",
         [](Tileset& t) { t.tiles[0].contents[1].box.high.z() = 0; });
 }
 

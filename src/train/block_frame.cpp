@@ -4,7 +4,7 @@
 
 namespace tessera {
 
-SceneFrame sceneFrameOf(const BlockGrid& grid) {
+SceneFrame makeSceneFrame(const BlockGrid& grid) {
   SceneFrame frame;
   frame.centre = grid.inWorld({0, 0, (grid.bottom + grid.top) / 2});
   frame.rotation = grid.gridFromWorld;
@@ -12,14 +12,14 @@ SceneFrame sceneFrameOf(const BlockGrid& grid) {
   return frame;
 }
 
-BlockSpace blockSpaceOf(const BlockGrid& grid, double near, Surround surround) {
+BlockSpace makeBlockSpace(const BlockGrid& grid, double near, BackgroundBlock backgroundBlock) {
   BlockSpace space;
   space.columns = static_cast<uint32_t>(grid.columns);
   space.rows = static_cast<uint32_t>(grid.rows);
   space.top = static_cast<float>((grid.top - grid.bottom) / grid.edge);
   space.bottom = -space.top;
   space.near = static_cast<float>(near);
-  space.surround = surround;
+  space.backgroundBlock = backgroundBlock;
   return space;
 }
 
@@ -29,11 +29,11 @@ void requireOneFileABlock(const fs::path& folder, const ModelManifest& manifest,
               "restore the file or train again");
 }
 
-Surround surroundNamed(const std::string& name) {
-  if (name == "own") return Surround::own;
-  if (name == "border") return Surround::border;
-  if (name == "none") return Surround::none;
-  throw Error("--set surround=" + name, "", "there is no such surround", "use own, border or none");
+BackgroundBlock backgroundBlockNamed(const std::string& name) {
+  if (name == "own") return BackgroundBlock::own;
+  if (name == "border") return BackgroundBlock::border;
+  if (name == "none") return BackgroundBlock::none;
+  throw Error("--set background_block=" + name, "", "there is no such background block", "use own, border or none");
 }
 
 BlockGrid requireGrid(const ModelFolder& folder) {

@@ -1,4 +1,4 @@
-// Where a grid of blocks stands for those who train blocks: scene units in which half a block's edge is 1.
+// Places a grid of blocks in scene units for training: half the edge of a block is 1.
 #pragma once
 
 #include "compute/blocks.h"
@@ -8,16 +8,18 @@
 
 namespace tessera {
 
-// Scene units of BlockSpace: half a block's edge is 1, the origin amid all blocks at half the scene's height.
-SceneFrame sceneFrameOf(const BlockGrid& grid);
-BlockSpace blockSpaceOf(const BlockGrid& grid, double near, Surround surround);
+// Returns the frame of the scene units of BlockSpace: half the edge of a block is 1, and the origin is the centre of
+// all blocks at half the scene's height.
+SceneFrame makeSceneFrame(const BlockGrid& grid);
+// Returns the grid in these scene units. `near`: scene units.
+BlockSpace makeBlockSpace(const BlockGrid& grid, double near, BackgroundBlock backgroundBlock);
 
-// Of the setting `surround`. Throws Error when there is none of that name.
-Surround surroundNamed(const std::string& name);
+// Returns the value of the setting `background_block`. Throws Error if no value has that name.
+BackgroundBlock backgroundBlockNamed(const std::string& name);
 
-// Throws Error when the manifest of a model's folder does not name one checkpoint a block.
+// Throws Error if the manifest of the model in `folder` does not name one checkpoint per block.
 void requireOneFileABlock(const fs::path& folder, const ModelManifest& manifest, uint32_t blocks);
-// The blocks that a model was trained in. Throws Error when there are none.
+// Returns the blocks that a model was trained in. Throws Error if it was not trained in blocks.
 BlockGrid requireGrid(const ModelFolder& folder);
 
 }  // namespace tessera

@@ -1,5 +1,5 @@
-// What training a capture in blocks has in common, whatever the blocks are: a run that is begun or gone on with, what
-// memory it takes, and the coarser levels of detail after it.
+// What all methods that train a capture in blocks share: starting or resuming a run, reporting its memory use, and
+// training the coarser levels of detail after the finest.
 #pragma once
 
 #include <functional>
@@ -15,96 +15,95 @@ namespace tessera {
 struct BlockRunOptions {
   TrainingLoopOptions loop;
   BlockCount blocks;
-  std::optional<BlockGrid> grid;  // of these blocks, whatever `blocks` says
-  double memoryMiB = 0;           // to plan blocks and photos for; 0: what the machine has
-  uint64_t cardBytes = 0;         // Device::ownMemory of the device that trains: blocks stand there
+  std::optional<BlockGrid> grid;  // if given, the blocks to use; overrides `blocks`
+  double memoryMiB = 0;           // memory budget for blocks and photos, MiB; 0: the machine's usable memory
+  uint64_t gpuBytes = 0;          // Device::ownMemory of the training device, which stores the blocks; 0: none
 
-  double plannedBytes() const;
-  double bytesForBlocks() const;  // of those, or of the card's; what photos leave is for what a step works on
-  double bytesForPhotos() const;
+  double plannedBytes() const;    // memoryMiB, or the machine's usable memory
+  double bytesForBlocks() const;  // share of plannedBytes or of the GPU's memory; the rest is working memory of steps
+  double bytesForPhotos() const;  // share of plannedBytes
 };
 
-// What a run asks of a capture.
-struct BlockDemands {
-  std::function<BlockLimits()> limits;  // asked only where the capture is cut
-  Sufficiency enough;
-  double photoBudgetMiB = 0;  // 0: what there is memory for, see settledPhotoBudget
+// What a run requires of a capture.
+struct PartitionRequirements {
+  std::function<BlockLimits()> limits;  // called only if the capture is to be partitioned
+  CoverageThresholds enough;
+  double photoBudgetMiB = 0;  // 0: chosen by the available memory, see resolvePhotoBudget
 };
 
 struct BlockRun {
   ModelFolder folder;
   BlockGrid grid;
-  bool goesOn;  // with the model that is in the folder
-  double photoBudgetMiB;
+  bool goesOn;            // whether it resumes the model in the folder
+  double photoBudgetMiB;  // 0: no limit
 };
 
-// Cuts the capture into blocks, or takes those that are given; a run that goes on stands where it stood, whatever has
-// become of the capture's points since. Throws Error when the folder holds a capture, or a model that is not to be gone
-// on with, or one of other photos or blocks.
+// Partitions the capture into blocks, or takes the given ones; a resumed run keeps the blocks that it had, even if the
+// capture's points have changed since. Throws Error if the folder holds a capture, a model that is not to be resumed,
+// or a model that was trained on other photos or in other blocks.
 BlockRun openBlockRun(const Capture& capture, const fs::path& model, const BlockRunOptions& options,
-                      const BlockDemands& demands);
+                      const PartitionRequirements& partitionRequirements);
 
-// What all levels of a run are trained on.
+// What all levels of detail of a run are trained on. Holds references only.
 struct BlockTraining {
   Device& device;
   const Capture& capture;
   const BlockGrid& grid;
 };
 
-// Says how much memory training takes, with all allocated by now but decoded photos and checkpoints, and what else
-// there is to say of it (`how`, as ", with 4 of 9 blocks at a time"); warns with a `remedy` where it is more than
-// planned for.
 struct MemoryNeeds {
   double photoBudgetMiB = 0;  // 0: all training photos
   double bytesPerBlock = 0;
   std::string how, remedy;
 };
-void sayWhatMemoryItTakes(const BlockTraining& on, const BlockRunOptions& options, const MemoryNeeds& needs);
+// Logs how much memory training takes, followed by `how` (as ", with 4 of 9 blocks at a time"); warns with the `remedy`
+// if that is more than was planned. Call it once everything but decoded photos and checkpoints has been allocated.
+void reportMemoryUse(const BlockTraining& on, const BlockRunOptions& options, const MemoryNeeds& needs);
 
-// A level of detail that is about to be trained, or to be gone on with where its folder holds a model.
+// A level of detail that is about to be trained, or resumed if its folder holds a model.
 struct BlockLevel {
-  uint32_t level;      // 0 is the finest
-  int64_t steps;       // to train in all; of the finest 0, where only the loop will know
-  int64_t finestStep;  // of a coarser one: where the finest has come to
-  ModelFolder folder, below;
+  uint32_t level;             // 0 is the finest
+  int64_t steps;              // total steps to train; 0 for the finest level if only the training loop will know
+  int64_t finestStep;         // for a coarser level: the step that the finest level has reached
+  ModelFolder folder, below;  // of this level, and of the next finer one
 };
 
-// What a representation that is trained in blocks supplies to its training.
+// What a representation that is trained in blocks implements for trainInBlocks.
 class BlockMethod {
  public:
   virtual ~BlockMethod() = default;
 
-  virtual BlockDemands demands() const = 0;
-  // Steps of the first coarser level, as a share of the finest's; 0: there are no coarser levels.
-  virtual double levelShare() const = 0;
-  // The coarsest level of so many blocks, one that holds all.
+  virtual PartitionRequirements partitionRequirements() const = 0;
+  // Returns the steps of the first coarser level as a share of the finest level's; 0: there are no coarser levels.
+  virtual double lodStepFraction() const = 0;
+  // Returns the coarsest level of detail for this grid, the one that holds all blocks.
   virtual uint32_t topLevel(const BlockGrid& grid) const = 0;
-  // The run is open, and takes a photo budget. Throws Error, before anything is trained, where a level up to `top`
-  // could not be made.
+  // Called once the run is open; takes its photo budget. Throws Error, before anything is trained, if some level up to
+  // `top` could not be trained.
   virtual void open(const BlockRun& run, uint32_t top) = 0;
-  // Finds out what the settings leave to be found out, in a run that does not go on or has not got that far; `begun` is
-  // to be called once most memory is allocated. False when it was asked to stop.
+  // Tunes the settings whose value is `auto`, in a run that is new or was interrupted before that was done; must call
+  // `begun` once most memory is allocated. Returns false if it was asked to stop.
   virtual bool findSettings(const BlockTraining&, const BlockRun&, TrainingLoopOptions&,
                             const std::function<void()>& begun) = 0;
 
-  // Makes what trains a level. Until the next call, the settings that the level has, and what there is of it, as "4
-  // models".
-  virtual std::unique_ptr<Trainee> begin(const BlockTraining& on, const BlockLevel& level) = 0;
+  // Returns the model of a level for the training loop. Until the next call, settings() returns the settings of this
+  // level, and parts() describes what it is made of, as "4 models".
+  virtual std::unique_ptr<TrainableModel> begin(const BlockTraining& on, const BlockLevel& level) = 0;
   virtual std::vector<ConfigField> settings() = 0;
   virtual std::string parts() const = 0;
-  // By sayWhatMemoryItTakes, of the finest level, and warns of what comes of it.
-  virtual void sayMemory(const BlockTraining& on) const = 0;
-  // How many steps the finest level, which has begun, is trained for: as soon as that is known.
-  virtual void stepsAreKnown(int64_t) const {}
+  // Calls reportMemoryUse for the finest level, and warns of the consequences.
+  virtual void reportMemory(const BlockTraining& on) const = 0;
+  // Called with the total number of steps of the finest level, after begin, as soon as that number is known.
+  virtual void setPlannedSteps(int64_t) const {}
 
-  // The finest level's step when the coarser level in that folder was made.
-  virtual int64_t madeFrom(const fs::path& folder) const = 0;
+  // Returns the step of the finest level at which the coarser level in `folder` was created.
+  virtual int64_t finestStepOfLevel(const fs::path& folder) const = 0;
 };
 
-// Trains the finest level into `model`, then coarser ones up to one that holds all blocks into its `levels`, each in as
-// many steps as levelSteps says, or as it had planned when it was begun; those that were made before the finest came to
-// where it is are made anew. The result counts the finest level's steps, and is finished when all levels are. Throws
-// Error as openBlockRun and runTraining do.
+// Trains the finest level into `model`, then the coarser ones, up to one that holds all blocks, into its folder
+// `levels`, each for as many steps as levelSteps returns or as it had planned when it was started. Coarser levels that
+// were created at an earlier step of the finest level are trained anew. The result counts the steps of the finest
+// level, and is finished when all levels are. Throws Error as openBlockRun and runTraining do.
 TrainingResult trainInBlocks(Device& device, const Capture& capture, const fs::path& model,
                              const BlockRunOptions& options, BlockMethod& method);
 

@@ -1,4 +1,4 @@
-// `--set loss=...`
+// The colour loss that `--set loss=...` names.
 #pragma once
 
 #include <string>
@@ -8,6 +8,7 @@
 
 namespace tessera {
 
+// Throws Error if no colour loss has that name.
 inline ColourLossKind colourLossKind(const std::string& name) {
   if (name == "mse") return ColourLossKind::mse;
   if (name == "huber") return ColourLossKind::huber;

@@ -1,18 +1,18 @@
-// A part of the training photos that is not trained on, by which settings can be judged without the photos that are
-// held out for evaluation.
+// Holds out a part of the training photos, so that settings can be tuned without the photos that are held out for
+// evaluation.
 #pragma once
 
 #include "train/photo_tiles.h"
 
 namespace tessera {
 
-// [photo] each, to draw rays from: every training photo stands whole in one of the two.
+// Where to draw rays from, [photo] each: every training photo lies as a whole in one of the two.
 struct HeldOutPhotos {
   std::vector<TileShares> trained, heldOut;
 };
 
-// One training photo of `every`, in their order, from a place on that `seed` decides; of two or more, at least one and
-// never all. There must be two.
+// Holds out one training photo in `every`, in their order; `seed` decides which one is first. At least one photo is
+// held out and never all. There must be at least two training photos.
 HeldOutPhotos holdOutPhotos(const Capture& capture, uint32_t every, uint64_t seed);
 
 }  // namespace tessera

@@ -17,7 +17,7 @@ Capture photographs(int count) {
   return capture;
 }
 
-std::vector<size_t> photosOf(const std::vector<TileShares>& shares) {
+std::vector<size_t> listSharedPhotos(const std::vector<TileShares>& shares) {
   std::vector<size_t> photos;
   for (size_t photo = 0; photo < shares.size(); ++photo) {
     if (shares[photo].total() == 0) continue;
@@ -31,22 +31,22 @@ std::vector<size_t> photosOf(const std::vector<TileShares>& shares) {
   return photos;
 }
 
-TEST(HeldOutPhotos, AreOneOfTenThatAreTrainedOnAndNoneOfTheOthers) {
+TEST(HeldOutPhotos, AreOneInTenTrainingPhotosAndNoTestPhotos) {
   Capture capture = photographs(23);
   capture.photos[2].split = Split::test;
   const HeldOutPhotos photos = holdOutPhotos(capture, 10, 3);
-  EXPECT_EQ(photosOf(photos.heldOut), (std::vector<size_t>{4, 14}));
-  const std::vector<size_t> trained = photosOf(photos.trained);
+  EXPECT_EQ(listSharedPhotos(photos.heldOut), (std::vector<size_t>{4, 14}));
+  const std::vector<size_t> trained = listSharedPhotos(photos.trained);
   EXPECT_EQ(trained.size(), 20u);
   for (const size_t none : {2, 4, 14}) EXPECT_EQ(std::count(trained.begin(), trained.end(), none), 0) << none;
 }
 
-TEST(HeldOutPhotos, AreOneOfFewAndNeverAll) {
+TEST(HeldOutPhotos, AreOneOfFewTrainingPhotosAndNeverAll) {
   for (const int count : {2, 3, 9}) {
     for (uint64_t seed = 0; seed < 12; ++seed) {
       const HeldOutPhotos photos = holdOutPhotos(photographs(count), 10, seed);
-      EXPECT_EQ(photosOf(photos.heldOut).size(), 1u);
-      EXPECT_EQ(photosOf(photos.trained).size(), static_cast<size_t>(count) - 1);
+      EXPECT_EQ(listSharedPhotos(photos.heldOut).size(), 1u);
+      EXPECT_EQ(listSharedPhotos(photos.trained).size(), static_cast<size_t>(count) - 1);
     }
   }
 }

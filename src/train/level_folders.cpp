@@ -21,14 +21,14 @@ int64_t levelSteps(double share, uint32_t level, int64_t finestSteps) {
   return static_cast<int64_t>(std::max(ofFinest, share) * static_cast<double>(finestSteps));
 }
 
-uint32_t trainedLevels(const fs::path& model, const std::function<int64_t(const fs::path&)>& madeFrom) {
+uint32_t trainedLevels(const fs::path& model, const std::function<int64_t(const fs::path&)>& finestStepOfLevel) {
   const std::optional<ModelManifest> finest = ModelFolder(model).manifest();
   for (uint32_t levels = 1;; ++levels) {
     const fs::path folder = levelFolder(model, levels);
     const std::optional<ModelManifest> next = ModelFolder(folder).manifest();
     if (!finest || !next || next->step < next->plannedSteps) return levels;
-    if (madeFrom(folder) == finest->step) continue;
-    warn("{}: made before the model had come to step {}; it is left out until: tessera train ... --resume",
+    if (finestStepOfLevel(folder) == finest->step) continue;
+    warn("{}: created before the model reached step {}; it is ignored until you run: tessera train ... --resume",
          folder.string(), finest->step);
     return levels;
   }

@@ -1,26 +1,28 @@
-// Where the coarser levels of detail of a model are, and which of them can be used: MODEL/levels/<level>, each a model
-// folder of its own, made when the finest is trained.
+// The coarser levels of detail of a model. Each is a model folder of its own, MODEL/levels/<level>, which is trained
+// after the finest level.
 #pragma once
 
 #include "train/run_folder.h"
 
 namespace tessera {
 
-// The model's own for the finest (0), MODEL/levels/<level> for those above.
+// Returns the model's own folder for the finest level (0), MODEL/levels/<level> for the coarser ones.
 fs::path levelFolder(const fs::path& model, uint32_t level);
 
-// Whatever it holds. Its manifest goes first: killed in between, it is no model that lacks files.
+// Removes the folder with everything in it. The manifest is removed first, so that a process killed in between does not
+// leave a model that lacks files.
 void removeLevel(const fs::path& folder);
 
-// How long a level is trained: `share` of the finest's steps for the first, then twice as many each, as the same rays
-// ask for fewer texels; no more than the finest's, or `share` of them.
+// Returns the number of steps of a level: `share` of the finest level's steps for level 1, and twice as many for each
+// next one, because the same rays need fewer texels; at most max(1, share) times the finest level's steps.
 int64_t levelSteps(double share, uint32_t level, int64_t finestSteps);
 
-// As trainedLevels; `madeFrom(folder)`: the finest level's step when that level was made.
-uint32_t trainedLevels(const fs::path& model, const std::function<int64_t(const fs::path&)>& madeFrom);
+// See the template below; `finestStepOfLevel(folder)` returns the step of the finest level at which the level in that
+// folder was created.
+uint32_t trainedLevels(const fs::path& model, const std::function<int64_t(const fs::path&)>& finestStepOfLevel);
 
-// Levels that are trained to their end, without a gap: at least 1, the finest. Warns of one that was made before the
-// finest came to where it is; it counts as not trained.
+// Returns how many levels are fully trained, counted from the finest without a gap; at least 1, the finest. Warns of a
+// level that was created at an earlier step of the finest level; it counts as not trained.
 template <class Config>
 uint32_t trainedLevels(const fs::path& model) {
   return trainedLevels(model, [](const fs::path& level) { return savedConfig<Config>(level).finestStep; });

@@ -25,14 +25,15 @@ void MarchRounds::begin(uint32_t rays, uint32_t capacity, float minTransmittance
   CHECK(source_.size() >= capacity);
   rays_ = rays;
   samples_ = capacity;
-  mostOpticalDepth_ = -std::log(minTransmittance);
+  maxOpticalDepth_ = -std::log(minTransmittance);
   counters_ = counters;
   device_.fillZero(nextStep_.part(0, rays));
   device_.fillZero(opticalDepth_.part(0, rays));
 }
 
 void MarchRounds::lookedUp(uint32_t round) {
-  device_.run(OpticalDepth{{rays_}, firstOf(round), logDensities(round), part(steps_, 1, round), opticalDepth_});
+  device_.run(
+      OpticalDepth{{rays_}, roundFirstSamples(round), logDensities(round), part(steps_, 1, round), opticalDepth_});
 }
 
 void MarchRounds::keepSeen(Slice<uint32_t> firstSample, Slice<uint32_t> rayOfSample) {
@@ -40,7 +41,7 @@ void MarchRounds::keepSeen(Slice<uint32_t> firstSample, Slice<uint32_t> rayOfSam
   compact.rays = {rays_};
   compact.rounds = count();
   compact.sampleCapacity = compact.keptCapacity = samples_;
-  compact.mostOpticalDepth = mostOpticalDepth_;
+  compact.maxOpticalDepth = maxOpticalDepth_;
   compact.firstSample = roundFirst_;
   compact.nextStep = nextStep_;
   compact.logDensity = Matrix<float>(logDensities_, 1);
@@ -53,9 +54,9 @@ void MarchRounds::keepSeen(Slice<uint32_t> firstSample, Slice<uint32_t> rayOfSam
   device_.run(compact);
 }
 
-void MarchRounds::gather(Slice<const float> made, Slice<float> kept, uint32_t columns) {
+void MarchRounds::gather(Slice<const float> from, Slice<float> to, uint32_t columns) {
   device_.run(GatherRows{
-      {samples_, counters_.part(kKept, 1)}, source_, Matrix<const float>(made, columns), Matrix<float>(kept, columns)});
+      {samples_, counters_.part(kKept, 1)}, source_, Matrix<const float>(from, columns), Matrix<float>(to, columns)});
 }
 
 }  // namespace tessera

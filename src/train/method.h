@@ -1,5 +1,5 @@
-// A method: what a representation offers to train, open and bake, as plain data and functions. Programs know methods by
-// this alone; the table of all is representations/methods.h.
+// A method: the functions by which a representation is trained, opened and baked, and its description, as plain data.
+// Programs use methods through this interface alone; representations/methods.h lists them all.
 #pragma once
 
 #include <map>
@@ -22,16 +22,17 @@ namespace tessera {
 
 class Baker;
 
-// The settings of a method's training: a struct of its own, with its fields for --help, --set and config.toml.
+// The settings of a method's training, type-erased: a struct of its own, with its fields for --help, --set and
+// config.toml.
 class MethodSettings {
  public:
   virtual ~MethodSettings() = default;
-  virtual std::vector<ConfigField> fields() = 0;  // of this object; they point into it
-  // Throws Error naming the first setting that no model can be made of.
+  virtual std::vector<ConfigField> fields() = 0;  // they point into this object
+  // Throws Error naming the first setting with an invalid value.
   virtual void check() const = 0;
-  // What is to be found out (`auto`) a run that goes on has found, with these settings; they are of the same method.
-  // Throws Error when it has not.
-  virtual void keepFound(const MethodSettings& run) = 0;
+  // Replaces settings that are `auto` by the values that the resumed run with the settings `run`, of the same method,
+  // has tuned. Throws Error if it has not.
+  virtual void adoptTunedValues(const MethodSettings& run) = 0;
 };
 
 template <class Config>
@@ -41,11 +42,11 @@ class SettingsOf final : public MethodSettings {
 
   std::vector<ConfigField> fields() override { return config_.fields(); }
   void check() const override { config_.check(); }
-  void keepFound([[maybe_unused]] const MethodSettings& run) override {
-    if constexpr (requires { config_.keepFound(config_); }) config_.keepFound(in(run));
+  void adoptTunedValues([[maybe_unused]] const MethodSettings& run) override {
+    if constexpr (requires { config_.adoptTunedValues(config_); }) config_.adoptTunedValues(in(run));
   }
 
-  // The struct of settings that this method made.
+  // Returns the struct inside `settings`, which must be a SettingsOf<Config>.
   static const Config& in(const MethodSettings& settings) {
     const auto* own = dynamic_cast<const SettingsOf*>(&settings);
     CHECK(own != nullptr);
@@ -56,7 +57,7 @@ class SettingsOf final : public MethodSettings {
   Config config_;
 };
 
-// Method::settings of a struct of settings, with presets or without.
+// Implements Method::settings for a struct of settings, with or without presets.
 template <class Config>
 std::unique_ptr<MethodSettings> makeSettings([[maybe_unused]] const std::string& preset) {
   if constexpr (requires { Config::ofPreset(preset); }) {
@@ -65,61 +66,64 @@ std::unique_ptr<MethodSettings> makeSettings([[maybe_unused]] const std::string&
   return std::make_unique<SettingsOf<Config>>();
 }
 
-// A trained model, with what draws it.
+// A trained model with its renderer.
 class OpenedModel {
  public:
   virtual ~OpenedModel() = default;
   virtual ViewRenderer& renderer() = 0;
-  // What its renderer does along rays, of methods that count it (Method::countsSamples).
+  // The work of its renderer along rays, for methods that count it (Method::countsSamples).
   struct RayWork {
-    uint64_t samples = 0;        // evaluated, of all pictures
-    float minTransmittance = 0;  // rays end where less would be seen
+    uint64_t samples = 0;        // evaluated in all images so far
+    float minTransmittance = 0;  // rays end where transmittance falls below it
   };
   virtual RayWork rayWork() const { return {}; }
 };
 
-// A whole number that a method's bakes take: a flag of `tessera bake`, of this method's models only.
+// An integer parameter of a method's baker: a flag of `tessera bake`, for models of this method only.
 struct BakeParameter {
   std::string_view name;  // snake_case
   std::string_view help;
-  int64_t least = 0, most = 0, multipleOf = 1;
-  std::optional<int64_t> standard = std::nullopt;  // where it is not given; nothing where `help` says what is then
+  int64_t minimum = 0, maximum = 0, divisibleBy = 1;
+  std::optional<int64_t> standard = std::nullopt;  // the default; nothing if `help` describes the default behaviour
 };
-using BakeParameters = std::map<std::string, int64_t, std::less<>>;  // by name: those given, and the standard ones
+using BakeParameters = std::map<std::string, int64_t, std::less<>>;  // by name; given ones and defaults
 
-// Functions that are null are not offered.
+// A null function means that the method does not support it.
 struct Method {
-  std::string_view name;        // as --method has it, and manifest.json
-  std::string_view summary;     // in a line, for people
-  bool trainsInBlocks = false;  // so that BlockRunOptions count, and not their `loop` alone
-  bool swapsBlocks = false;     // trains with some blocks in memory at a time (the setting resident_blocks)
-  bool countsSamples = false;   // OpenedModel::rayWork
+  std::string_view name;        // the value of --method, and in manifest.json
+  std::string_view summary;     // one line for --help
+  bool trainsInBlocks = false;  // uses all of BlockRunOptions rather than their `loop` alone
+  bool swapsBlocks = false;     // can train with only some blocks in memory (the setting resident_blocks)
+  bool countsSamples = false;   // implements OpenedModel::rayWork
 
-  // The defaults; of a preset, where `preset` names one. Throws Error when there is no such preset. Methods without
-  // presets, which have no setting of that name, give their defaults.
+  // Returns the default settings, or those of the preset if `preset` names one. Throws Error if there is no such
+  // preset. Methods without presets, which have no setting of that name, return their defaults.
   std::unique_ptr<MethodSettings> (*settings)(const std::string& preset) = nullptr;
 
-  // Trains, resumes, saves; see training_loop.h. Names itself in options.loop.method, for what config.toml says of how
-  // to repeat the run. Throws Error before it writes anything where `settings` are refused (MethodSettings::check).
+  // Trains or resumes the model in the folder `model` and saves it; see training_loop.h. Replaces
+  // options.loop.method by its own name, for the command in config.toml that reproduces the run. Throws Error before it
+  // writes anything if MethodSettings::check rejects `settings`.
   TrainingResult (*train)(Device& device, const Capture& capture, const fs::path& model, const MethodSettings& settings,
                           const BlockRunOptions& options) = nullptr;
 
-  // A trained model for drawing, from its folder. Keeps a reference to `device`. Throws Error when it cannot be read.
+  // Opens the trained model in a folder for rendering. Keeps a reference to `device`. Throws Error if it cannot be
+  // read.
   std::unique_ptr<OpenedModel> (*openModel)(Device& device, const fs::path& model) = nullptr;
 
-  // A trained model for baking, with those of its levels that are trained to their end. Likewise.
+  // Opens a trained model for baking, with those of its levels that are fully trained. Keeps a reference to `device`.
+  // Throws Error if it cannot be read.
   std::unique_ptr<Baker> (*openBaker)(Device& device, const fs::path& model,
                                       const BakeParameters& parameters) = nullptr;
   std::span<const BakeParameter> bakeParameters = {};
 
-  // Numbers that say how large models of these settings are, by the keys of `tessera info`.
+  // Returns the sizes of a model with these settings, by the keys of `tessera info`.
   std::vector<std::pair<std::string, uint64_t>> (*describe)(const MethodSettings& settings) = nullptr;
 
   // Times whole training steps on fixed samples.
   StepBenchmark (*benchmarkStep)(Device& device, const StepBenchmarkOptions& options) = nullptr;
 };
 
-// Method::openModel of a model and its renderer, which keeps a reference to it.
+// An OpenedModel that owns a model and its renderer, which keeps a reference to the model.
 template <class Model, class Renderer>
 class ModelWithRenderer : public OpenedModel {
  public:

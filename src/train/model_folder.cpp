@@ -56,7 +56,7 @@ std::optional<ModelManifest> ModelFolder::manifest() const {
   for (const std::string& file : manifest.files) {
     const std::optional<fs::path> inside = resolveInside(root_, file);
     if (!inside || !fs::exists(*inside)) {
-      throw Error(path.string(), "files", "names '" + file + "', which is not there", "train again with --resume off");
+      throw Error(path.string(), "files", "names '" + file + "', which is not there", "train again without --resume");
     }
   }
   return manifest;
@@ -64,7 +64,7 @@ std::optional<ModelManifest> ModelFolder::manifest() const {
 
 namespace {
 
-// Removes checkpoints but the last `keep` up to `step`, and what a killed run left behind.
+// Removes all but the last `keep` checkpoints up to `step`, and the files that a killed run left behind.
 void removeOld(const fs::path& folder, int64_t step, int keep) {
   std::vector<std::pair<int64_t, fs::path>> old;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
@@ -72,7 +72,7 @@ void removeOld(const fs::path& folder, int64_t step, int keep) {
     if (file.starts_with("step-") && file.ends_with(".safetensors")) {
       const int64_t itsStep = std::atoll(file.c_str() + 5);
       if (itsStep > step) {
-        fs::remove(entry.path());  // of a run that was killed before its manifest
+        fs::remove(entry.path());  // of a run that was killed before it wrote its manifest
       } else {
         old.emplace_back(itsStep, entry.path());
       }
@@ -158,21 +158,22 @@ ModelPlacement ModelFolder::readPlacement() const {
 }
 
 void ModelFolder::writePlan(const StepPlan& plan) const {
-  writeFileAtomically(root_ / "plan.json", json({{"steps", plan.steps}, {"made_at", plan.madeAt}}).dump() + "\n", true);
+  writeFileAtomically(root_ / "plan.json",
+                      json({{"steps", plan.steps}, {"planned_at_step", plan.plannedAtStep}}).dump() + "\n", true);
 }
 
 std::optional<StepPlan> ModelFolder::readPlan() const {
   const fs::path path = root_ / "plan.json";
   if (!fs::exists(path)) return std::nullopt;
   const json parsed = parseJson(path);
-  const auto number = [&](const char* key, int64_t fewest) {
+  const auto number = [&](const char* key, int64_t minimum) {
     if (!parsed.is_object() || !parsed.contains(key) || !parsed[key].is_number_integer() ||
-        parsed[key].get<int64_t>() < fewest) {
-      throw Error(path.string(), key, fmt::format("is not a whole number from {} on", fewest), "remove the file");
+        parsed[key].get<int64_t>() < minimum) {
+      throw Error(path.string(), key, fmt::format("is not a whole number from {} on", minimum), "remove the file");
     }
     return parsed[key].get<int64_t>();
   };
-  return StepPlan{number("steps", 1), number("made_at", 0)};
+  return StepPlan{number("steps", 1), number("planned_at_step", 0)};
 }
 
 void ModelFolder::appendMetrics(const json& line) const {
@@ -184,16 +185,16 @@ void ModelFolder::appendMetrics(const json& line) const {
 
 void ModelFolder::cutMetrics(int64_t step) const {
   if (!fs::exists(metricsPath())) return;
-  std::string kept;
+  std::string remaining;
   std::ifstream in(metricsPath());
   for (std::string line; std::getline(in, line);) {
     const json parsed = json::parse(line, nullptr, false);
     if (parsed.is_object() && parsed.contains("step") && parsed["step"].is_number() &&
         parsed["step"].get<int64_t>() <= step) {
-      kept += line + "\n";
+      remaining += line + "\n";
     }
   }
-  writeFileAtomically(metricsPath(), kept);
+  writeFileAtomically(metricsPath(), remaining);
 }
 
 BlockGrid readGrid(const fs::path& file, const Capture& capture) {
@@ -237,11 +238,11 @@ void requireTrainedOn(const ModelFolder& model, const Capture& capture) {
 std::vector<std::string> trainedOnAmong(const ModelFolder& model, const Capture& capture, Split split) {
   const std::vector<std::string> names = model.readPlacement().trainedOn;
   const std::unordered_set<std::string> trainedOn(names.begin(), names.end());
-  std::vector<std::string> found;
+  std::vector<std::string> matches;
   for (const int photo : capture.photosIn(split)) {
-    if (trainedOn.contains(capture.photos[photo].name)) found.push_back(capture.photos[photo].name);
+    if (trainedOn.contains(capture.photos[photo].name)) matches.push_back(capture.photos[photo].name);
   }
-  return found;
+  return matches;
 }
 
 std::vector<std::string> trainingNames(const Capture& capture) {

@@ -23,7 +23,7 @@ std::vector<std::string> blockFiles(const fs::path& root) {
   return names;
 }
 
-std::string errorOf(const std::function<void()>& action) {
+std::string catchErrorMessage(const std::function<void()>& action) {
   try {
     action();
   } catch (const Error& error) {
@@ -42,7 +42,7 @@ TEST(ModelFolder, HoldsNoModelWhileThereIsNoManifest) {
   EXPECT_FALSE(ModelFolder(folder / "nowhere").manifest());
 }
 
-TEST(ModelFolder, ComesBackAsCommitted) {
+TEST(ModelFolder, ReadsBackWhatWasCommitted) {
   const TemporaryFolder folder;
   const ModelFolder model(folder / "new/model");
   model.commit({"field", 120, 500, {}}, 1, [](uint32_t) { return block(100, 7); });
@@ -66,7 +66,7 @@ TEST(ModelFolder, KeepsTheLastCheckpointsOnly) {
   EXPECT_EQ(blockFiles(folder.path()), (std::vector<std::string>{"step-101.safetensors"}));
 }
 
-TEST(ModelFolder, KeepsTheFilesOfBlocksThatAreAsTheyWere) {
+TEST(ModelFolder, KeepsTheFilesOfUnchangedBlocks) {
   const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   for (const int64_t step : {5, 6, 7, 8}) {
@@ -82,11 +82,11 @@ TEST(ModelFolder, KeepsTheFilesOfBlocksThatAreAsTheyWere) {
   EXPECT_EQ(readFile(model.root() / manifest->files.at(1)), block(10, 5));
 }
 
-TEST(ModelFolder, KilledWhileWritingABlockIsTheModelItWas) {
+TEST(ModelFolder, HoldsTheLastCommitIfKilledWhileWritingABlock) {
   const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   model.commit({"field", 10, 100, {}}, 1, [](uint32_t) { return block(100, 1); });
-  // A block that was being written, and one that was written before its manifest.
+  // These are a block that was being written, and one whose manifest was not written yet.
   writeFileAtomically(folder / "blocks/0/step-20.safetensors.partial-123", "half");
   writeFileAtomically(folder / "blocks/0/step-20.safetensors", "whole");
   writeFileAtomically(folder / "manifest.json.partial-123", "{\"met");
@@ -94,7 +94,7 @@ TEST(ModelFolder, KilledWhileWritingABlockIsTheModelItWas) {
   ASSERT_TRUE(manifest);
   EXPECT_EQ(manifest->step, 10);
   EXPECT_EQ(readFile(folder.path() / manifest->files[0]), block(100, 1));
-  // The next commit clears up.
+  // The next commit removes the partial files.
   model.commit({"field", 20, 100, {}}, 1, [](uint32_t) { return block(100, 2); });
   EXPECT_EQ(model.manifest()->step, 20);
   EXPECT_EQ(readFile(folder / "blocks/0/step-20.safetensors"), block(100, 2));
@@ -104,7 +104,7 @@ TEST(ModelFolder, KilledWhileWritingABlockIsTheModelItWas) {
 TEST(ModelFolder, NeverRemovesTheBlockThatItsManifestNames) {
   const TemporaryFolder folder;
   const ModelFolder model(folder.path());
-  // What a longer run left behind must not crowd out what is written now.
+  // Later checkpoints, left by a longer run, must not cause the new checkpoint to be removed.
   for (const int64_t step : {500, 600})
     model.commit({"field", step, 600, {}}, 1, [](uint32_t) { return block(10, 1); });
   fs::remove(folder / "manifest.json");
@@ -113,17 +113,17 @@ TEST(ModelFolder, NeverRemovesTheBlockThatItsManifestNames) {
   EXPECT_EQ(readFile(folder.path() / model.manifest()->files[0]), block(10, 2));
 }
 
-TEST(ModelFolder, SaysSoWhenABlockIsMissing) {
+TEST(ModelFolder, ReportsAMissingBlock) {
   const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   model.commit({"field", 10, 100, {}}, 1, [](uint32_t) { return block(100, 1); });
   fs::remove(folder / "blocks/0/step-10.safetensors");
-  const std::string error = errorOf([&] { model.manifest(); });
+  const std::string error = catchErrorMessage([&] { model.manifest(); });
   EXPECT_TRUE(contains(error, "manifest.json")) << error;
   EXPECT_TRUE(contains(error, "step-10.safetensors")) << error;
 }
 
-TEST(ModelFolder, RefusesManifestsThatItCannotUnderstand) {
+TEST(ModelFolder, RejectsMalformedManifests) {
   const TemporaryFolder folder;
   writeFileAtomically(folder / "here.safetensors", "block");
   for (const char* text : {"", "{", "[]", "{}", R"({"method": "field", "step": 1, "planned_steps": 2})",
@@ -134,12 +134,12 @@ TEST(ModelFolder, RefusesManifestsThatItCannotUnderstand) {
                            R"({"method": "field", "step": 1, "planned_steps": 2, "files": ["../outside.safetensors"]})",
                            R"({"method": "field", "step": 1, "planned_steps": 2, "files": ["/etc/passwd"]})"}) {
     writeFileAtomically(folder / "manifest.json", text);
-    const std::string error = errorOf([&] { ModelFolder(folder.path()).manifest(); });
+    const std::string error = catchErrorMessage([&] { ModelFolder(folder.path()).manifest(); });
     EXPECT_TRUE(contains(error, "manifest.json")) << text << ": " << error;
   }
 }
 
-TEST(ModelFolder, KnowsWhereInTheWorldItStands) {
+TEST(ModelFolder, StoresItsPlacementInTheWorld) {
   const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   ModelPlacement placement;
@@ -156,7 +156,7 @@ TEST(ModelFolder, KnowsWhereInTheWorldItStands) {
   EXPECT_EQ(read.trainedOn, placement.trainedOn);
 }
 
-TEST(ModelFolder, KnowsTheCaptureThatItWasTrainedOn) {
+TEST(ModelFolder, ChecksTheCaptureThatItWasTrainedOn) {
   const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   Capture capture;
@@ -178,27 +178,27 @@ TEST(ModelFolder, KnowsTheCaptureThatItWasTrainedOn) {
   capture.photos[2].split = Split::test;
   EXPECT_EQ(trainedOnAmong(model, capture, Split::test), std::vector<std::string>{"c"});
   requireSameWorld(model, capture);
-  EXPECT_TRUE(contains(errorOf([&] { requireTrainedOn(model, capture); }), "'c' is the first that differs"));
+  EXPECT_TRUE(contains(catchErrorMessage([&] { requireTrainedOn(model, capture); }), "'c' is the first that differs"));
   capture.photos[2].split = Split::train;
-  EXPECT_TRUE(contains(errorOf([&] { requireTrainedOn(model, capture); }), "2 of them, not 3"));
+  EXPECT_TRUE(contains(catchErrorMessage([&] { requireTrainedOn(model, capture); }), "2 of them, not 3"));
   capture.photos.resize(1);
-  EXPECT_TRUE(contains(errorOf([&] { requireTrainedOn(model, capture); }), "'c' is the first that differs"));
+  EXPECT_TRUE(contains(catchErrorMessage([&] { requireTrainedOn(model, capture); }), "'c' is the first that differs"));
 
   capture.sourceFromWorld(0, 3) += 0.25;
-  EXPECT_TRUE(contains(errorOf([&] { requireSameWorld(model, capture); }), "flight: transforms.json"));
+  EXPECT_TRUE(contains(catchErrorMessage([&] { requireSameWorld(model, capture); }), "flight: transforms.json"));
 }
 
-TEST(ModelFolder, RefusesPlacementsThatItCannotUnderstand) {
+TEST(ModelFolder, RejectsMalformedPlacements) {
   const TemporaryFolder folder;
   const ModelFolder model(folder.path());
-  EXPECT_TRUE(contains(errorOf([&] { model.readPlacement(); }), "blocks.json"));
+  EXPECT_TRUE(contains(catchErrorMessage([&] { model.readPlacement(); }), "blocks.json"));
   for (const char* text : {"", "{}", R"({"blocks": []})", R"({"blocks": [{"centre": [1, 2], "scale": 1}]})"}) {
     writeFileAtomically(folder / "blocks.json", text);
-    EXPECT_TRUE(contains(errorOf([&] { model.readPlacement(); }), "blocks.json")) << text;
+    EXPECT_TRUE(contains(catchErrorMessage([&] { model.readPlacement(); }), "blocks.json")) << text;
   }
 }
 
-TEST(ModelFolder, GivesItsGridToOthersOfTheSameWorld) {
+TEST(ModelFolder, GivesItsGridOnlyToCapturesInTheSameWorld) {
   const TemporaryFolder folder;
   const ModelFolder model(folder.path());
   Capture capture;
@@ -215,7 +215,7 @@ TEST(ModelFolder, GivesItsGridToOthersOfTheSameWorld) {
   EXPECT_EQ(grid.columns, 3);
   EXPECT_EQ(grid.rows, 2);
   capture.sourceFromWorld(0, 3) += 0.25;
-  EXPECT_TRUE(contains(errorOf([&] { readGrid(file, capture); }), "the capture flight"));
+  EXPECT_TRUE(contains(catchErrorMessage([&] { readGrid(file, capture); }), "the capture flight"));
 
   nlohmann::json alone = nlohmann::json::parse(readTextFile(file));
   alone.erase("source_from_world");
@@ -223,12 +223,12 @@ TEST(ModelFolder, GivesItsGridToOthersOfTheSameWorld) {
   EXPECT_EQ(readGrid(file, capture).edge, 7) << "it names no world";
   alone["grid"]["edge"] = -7;
   writeFileAtomically(file, alone.dump());
-  EXPECT_TRUE(contains(errorOf([&] { readGrid(file, capture); }), "is no grid of blocks"));
+  EXPECT_TRUE(contains(catchErrorMessage([&] { readGrid(file, capture); }), "is no grid of blocks"));
   for (const char* text : {"", "[]", "{}", "no JSON", R"({"blocks": []})"}) {
     writeFileAtomically(file, text);
-    EXPECT_TRUE(contains(errorOf([&] { readGrid(file, capture); }), "holds no grid of blocks")) << text;
+    EXPECT_TRUE(contains(catchErrorMessage([&] { readGrid(file, capture); }), "holds no grid of blocks")) << text;
   }
-  EXPECT_TRUE(contains(errorOf([&] { readGrid(folder / "nowhere", capture); }), "nowhere"));
+  EXPECT_TRUE(contains(catchErrorMessage([&] { readGrid(folder / "nowhere", capture); }), "nowhere"));
 }
 
 TEST(ModelFolder, RemembersItsPlan) {
@@ -238,22 +238,22 @@ TEST(ModelFolder, RemembersItsPlan) {
   model.writePlan({123456789012, 345});
   EXPECT_EQ(model.readPlan(), (StepPlan{123456789012, 345}));
   for (const char* text :
-       {"{}", R"({"steps": 0, "made_at": 1})", R"({"steps": "many", "made_at": 1})", R"({"steps": 9})",
-        R"({"steps": 1.5, "made_at": 1})", R"({"steps": 9, "made_at": -1})", "3", ""}) {
+       {"{}", R"({"steps": 0, "planned_at_step": 1})", R"({"steps": "many", "planned_at_step": 1})", R"({"steps": 9})",
+        R"({"steps": 1.5, "planned_at_step": 1})", R"({"steps": 9, "planned_at_step": -1})", "3", ""}) {
     writeFileAtomically(folder / "plan.json", text);
-    EXPECT_TRUE(contains(errorOf([&] { model.readPlan(); }), "plan.json")) << text;
+    EXPECT_TRUE(contains(catchErrorMessage([&] { model.readPlan(); }), "plan.json")) << text;
   }
 }
 
 TEST(ModelFolder, CutsMetricsBackToACheckpoint) {
   const TemporaryFolder folder;
   const ModelFolder model(folder.path());
-  model.cutMetrics(10);  // there are none: nothing to do
+  model.cutMetrics(10);  // without metrics it does nothing
   EXPECT_FALSE(fs::exists(model.metricsPath()));
   for (const int step : {5, 10, 15, 20}) model.appendMetrics({{"step", step}, {"psnr", 20.5}});
   {
     std::ofstream out(model.metricsPath(), std::ios::app);
-    out << "{\"step\": 7, \"ps";  // the line that a kill cut off
+    out << "{\"step\": 7, \"ps";  // the unfinished line of a killed run
   }
   model.cutMetrics(15);
   model.appendMetrics({{"step", 17}});
@@ -265,7 +265,10 @@ TEST(ModelFolder, CutsMetricsBackToACheckpoint) {
 }
 
 TEST(ModelFolder, NamesMetricsThatCannotBeWritten) {
-  EXPECT_TRUE(contains(errorOf([] { ModelFolder("/nonexistent").appendMetrics({{"step", 1}}); }), "metrics.jsonl"));
+  EXPECT_TRUE(contains(catchErrorMessage([] {
+                         ModelFolder("/nonexistent").appendMetrics({{"step", 1}});
+                       }),
+                       "metrics.jsonl"));
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ void OccupancyGrid::exclude(const std::vector<bool>& visible) {
   }
   CHECK(!candidates.empty());
   restore(values, bits);
-  candidates_ = device_.arrayOf(candidates);
+  candidates_ = device_.uploadArray(candidates);
 }
 
 void OccupancyGrid::update(const LogDensity& logDensity, uint32_t uniform, uint32_t occupied, uint64_t seed,

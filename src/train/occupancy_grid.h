@@ -1,4 +1,5 @@
-// Which cells of the scene may hold anything: kept on the device, refreshed from the field as instant-ngp does.
+// An occupancy grid on the device: which cells of the scene are not empty. It is updated from the field as in
+// instant-ngp.
 #pragma once
 
 #include <functional>
@@ -10,20 +11,22 @@ namespace tessera {
 
 class OccupancyGrid {
  public:
-  // Every cell starts occupied, but those that `visible` says no (see visibleCells): they stay empty for good. `bits`:
-  // where they are kept, [cells / 32]; else the grid has room of its own.
+  // Every cell starts occupied. `bits`: external storage of the occupancy bits, [cells / 32]; without it the grid
+  // allocates its own. Keeps a reference to `device`.
   OccupancyGrid(Device& device, const MarchSpace& space, Slice<uint32_t> bits = {});
-  void exclude(const std::vector<bool>& visible);  // at least one is
+  // Cells that are not `visible` (see visibleCells; [cells], at least one is visible) become empty and remain so.
+  void exclude(const std::vector<bool>& visible);
 
-  // Writes log density, 1 column, at `count` positions ([count][3], grid coordinates).
+  // Writes the log density, 1 column, at `count` positions ([count][3], grid coordinates).
   using LogDensity = std::function<void(Count count, Slice<const float> positions, Matrix<float> logDensities)>;
 
-  // One refresh of `uniform` random and `occupied` occupied cells (or all, with uniform = visibleCells), `chunk` points
-  // at a time.
+  // Performs one update at `uniform` random and `occupied` occupied cells (at all cells if uniform is visibleCells()),
+  // evaluating `chunk` points at a time.
   void update(const LogDensity& logDensity, uint32_t uniform, uint32_t occupied, uint64_t seed, uint32_t chunk);
 
   uint32_t cells() const { return cells_; }
   Slice<const uint32_t> bits() const { return keptBits_; }
+  // Cells that exclude() has not removed.
   uint32_t visibleCells() const { return candidates_.size() ? static_cast<uint32_t>(candidates_.size()) : cells_; }
   double occupiedFraction();
 
@@ -40,7 +43,7 @@ class OccupancyGrid {
   Slice<uint32_t> keptBits_;
   Array<uint32_t> candidates_;  // the visible cells, unless all are
   Array<uint32_t> chosen_;
-  Array<float> positions_;  // of one chunk
+  Array<float> positions_;  // [chunk][3]
   Array<float> logDensities_;
 };
 

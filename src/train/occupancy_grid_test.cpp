@@ -18,7 +18,7 @@ MarchSpace boundedSpace() {
   return space;
 }
 
-// Dense where the first coordinate is below a half, and empty elsewhere.
+// A field that is dense where the first coordinate is below a half, and empty elsewhere.
 class HalfFull {
  public:
   explicit HalfFull(Device& device) : device_(device) {}
@@ -48,7 +48,7 @@ int wrongCells(OccupancyGrid& grid) {
   return wrong;
 }
 
-TEST(OccupancyGrid, BeginsFull) {
+TEST(OccupancyGrid, StartsWithAllCellsOccupied) {
   const std::unique_ptr<Device> device = makeDevice({"reference", 0});
   OccupancyGrid grid(*device, boundedSpace());
   EXPECT_EQ(grid.cells(), kCells);
@@ -60,7 +60,7 @@ TEST(OccupancyGrid, LearnsFromAllCellsWhereTheFieldIsDense) {
     const std::unique_ptr<Device> device = makeDevice({kind, 2});
     OccupancyGrid grid(*device, boundedSpace());
     HalfFull field(*device);
-    grid.update(std::ref(field), kCells, 0, 1, 100);  // chunks that do not divide the cells
+    grid.update(std::ref(field), kCells, 0, 1, 100);  // the chunk size does not divide the number of cells
     EXPECT_EQ(wrongCells(grid), 0) << kind;
     EXPECT_EQ(grid.occupiedFraction(), 0.5);
     EXPECT_EQ(field.asked, kCells);
@@ -68,7 +68,7 @@ TEST(OccupancyGrid, LearnsFromAllCellsWhereTheFieldIsDense) {
   }
 }
 
-TEST(OccupancyGrid, LearnsFromAShareOfTheCellsInTime) {
+TEST(OccupancyGrid, ConvergesWithPartialUpdates) {
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   OccupancyGrid grid(*device, boundedSpace());
   HalfFull field(*device);
@@ -80,7 +80,7 @@ TEST(OccupancyGrid, LearnsFromAShareOfTheCellsInTime) {
   EXPECT_EQ(wrongCells(grid), 0);
 }
 
-TEST(OccupancyGrid, ForgetsWhatHasBecomeEmpty) {
+TEST(OccupancyGrid, ClearsCellsThatHaveBecomeEmpty) {
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   OccupancyGrid grid(*device, boundedSpace());
   HalfFull field(*device);
@@ -95,7 +95,7 @@ TEST(OccupancyGrid, ForgetsWhatHasBecomeEmpty) {
   for (const float value : values) EXPECT_LT(value, 0.01f);
 }
 
-TEST(OccupancyGrid, NeverLooksAtCellsThatNobodySees) {
+TEST(OccupancyGrid, NeverEvaluatesInvisibleCells) {
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   OccupancyGrid grid(*device, boundedSpace());
   std::vector<bool> visible(kCells);
@@ -114,7 +114,7 @@ TEST(OccupancyGrid, NeverLooksAtCellsThatNobodySees) {
   EXPECT_EQ(grid.occupiedFraction(), 1.0 / kResolution);  // dense and visible: one layer
 }
 
-TEST(OccupancyGrid, ComesBackAsItWas) {
+TEST(OccupancyGrid, IsRestoredExactly) {
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   OccupancyGrid grid(*device, boundedSpace()), restored(*device, boundedSpace());
   HalfFull field(*device);

@@ -1,5 +1,5 @@
-// An exposure for each photo, trained along: a gain per colour channel (log2). Only differences between photos can be
-// told, so their mean over the training photos is held at zero, which is what evaluation uses.
+// A trainable exposure for each photo: a log2 gain per colour channel. Only differences between photos can be
+// determined, so their mean over the training photos is kept at zero, which is the exposure that evaluation uses.
 #pragma once
 
 #include "field/parameters.h"
@@ -13,13 +13,13 @@ class PhotoExposures {
 
   Slice<const float> logGains() const { return group_.values; }  // [photos][3]
   Slice<float> gradients() { return group_.gradients; }
-  // One step of Adam; without `train` gradients are dropped.
+  // Performs one step of Adam; without `train` only clears the gradients.
   void step(const Adam& adam, bool train);
-  // After a step that has been made: every now and then, centres. Waits.
+  // Call it after each step: calls centre() every 16th step if `train` is set, which waits for the device.
   void settle(int64_t step, bool train);
-  // Only these photos are trained on: the others' stay where the mean is.
+  // Restricts the mean to these photos; the exposures of the others stay at zero.
   void trainOn(std::vector<int> photos) { trainingPhotos_ = std::move(photos); }
-  // Puts the mean at zero. Waits.
+  // Subtracts the mean. Waits for the device.
   void centre();
 
   bool allFinite() const { return group_.allFinite(device_); }

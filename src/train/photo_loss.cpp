@@ -5,13 +5,13 @@
 
 namespace tessera {
 
-PhotoLoss::PhotoLoss(Device& device, const Capture& capture, const PhotoLossSettings& settings, uint32_t mostRays)
+PhotoLoss::PhotoLoss(Device& device, const Capture& capture, const PhotoLossSettings& settings, uint32_t maxRays)
     : device_(device),
       kind_(colourLossKind(settings.loss)),
       parameter_(static_cast<float>(settings.lossParameter)),
       exposures_(device, capture) {
-  for (Array<float>* three : {&exposed_, &colourGradients_}) *three = device.array<float>(size_t{3} * mostRays);
-  opacityGradients_ = device.array<float>(mostRays);
+  for (Array<float>* three : {&exposed_, &colourGradients_}) *three = device.array<float>(size_t{3} * maxRays);
+  opacityGradients_ = device.array<float>(maxRays);
 }
 
 Slice<const float> PhotoLoss::backgrounds(const PhotoRays& rays, const Picture& picture) {

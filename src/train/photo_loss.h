@@ -1,7 +1,8 @@
-// How far what rays see is off from what photos show: exposure → colour loss, and back through the exposure.
+// The loss between rendered and photographed colours: applies the exposure, then the colour loss, and propagates
+// gradients back through the exposure.
 //
 //   loss.compare(photoRays, picture, losses);
-//   ... what else is lost by the exposed colours, added to loss.colourGradients()
+//   ... add gradients of further losses on the exposed colours to loss.colourGradients()
 //   loss.passBack(photoRays, picture);
 #pragma once
 
@@ -14,21 +15,23 @@ namespace tessera {
 
 class PhotoLoss {
  public:
-  // Throws Error when there is no such loss. Keeps a reference to `device`.
-  PhotoLoss(Device& device, const Capture& capture, const PhotoLossSettings& settings, uint32_t mostRays);
+  // Throws Error if settings.loss names no colour loss. Keeps a reference to `device`.
+  PhotoLoss(Device& device, const Capture& capture, const PhotoLossSettings& settings, uint32_t maxRays);
 
-  // What rays [first, first + count) of the step see, of which `finished` count.
+  // The rendered colours of rays [first, first + count) of the step; only the first `finished` rays contribute.
   struct Picture {
     Count finished;
     uint32_t first = 0, count = 0;
     Slice<const float> colour, opacity;   // [count][3], [count]
-    bool standsBeforeBackgrounds = true;  // else its colours are whole
+    bool standsBeforeBackgrounds = true;  // composite over PhotoRays::backgrounds; else colours include a background
   };
-  static constexpr uint32_t kLosses = 2;  // colour loss, and the sum of squared errors
+  static constexpr uint32_t kLosses = 2;  // the colour loss, and the sum of squared errors
 
-  // Losses [kLosses] and gradients of the exposed colours, divided by all rays of the step.
+  // Computes the losses [kLosses] and the gradients of the exposed colours. The colour loss and its gradients are means
+  // over all rays and channels of the step.
   void compare(const PhotoRays& rays, const Picture& picture, Slice<float> losses);
-  // Turns them into gradients of the colours and the opacity (0 where colours are whole), and adds to the exposures'.
+  // Propagates the gradients to the colours (in place) and the opacity (0 without backgrounds), and adds to the
+  // gradients of the exposures.
   void passBack(const PhotoRays& rays, const Picture& picture);
 
   Slice<const float> exposed(const Picture& picture) const { return exposed_.part(3 * at(picture), 3 * of(picture)); }

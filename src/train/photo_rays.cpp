@@ -36,13 +36,13 @@ PhotoRays::PhotoRays(Device& device, const Capture& capture, const SceneFrame& f
       pool_(device.hostThreads()),
       photos_(capture, trainingPhotos(capture),
               {static_cast<size_t>(settings.photoBudgetMiB * 1048576), settings.stepsPerPhoto, settings.seed}),
-      known_(knownDistances(capture, frame, kMostPixelsOff)),
-      cameras_(device.arrayOf(rayCameras(capture, frame))),
-      photoOfRay_(device.array<uint32_t>(settings.mostRays)) {
-  const size_t rays = settings.mostRays;
+      known_(findSparseDepths(capture, frame, kMaxReprojectionError)),
+      cameras_(device.uploadArray(rayCameras(capture, frame))),
+      photoOfRay_(device.array<uint32_t>(settings.maxRays)) {
+  const size_t rays = settings.maxRays;
   for (Array<float>* one : {&weights_, &distances_, &nears_, &fars_}) *one = device.array<float>(rays);
-  if (settings.freeSpace) {
-    for (const double depth : nearestContent(capture)) {
+  if (settings.nearFromSparseDepth) {
+    for (const double depth : nearestSparseDepth(capture)) {
       nearOfPhoto_.push_back(static_cast<float>(kNearShare * depth * frame.scale));
     }
   }
@@ -53,10 +53,10 @@ PhotoRays::PhotoRays(Device& device, const Capture& capture, const SceneFrame& f
 }
 
 void PhotoRays::draw(int64_t step, uint32_t rays) {
-  CHECK(rays <= settings_.mostRays);
+  CHECK(rays <= settings_.maxRays);
   drawRays(photos_.at(step), known_,
-           {settings_.seed, settings_.randomBackground, settings_.knownShare, tiles_ ? &*tiles_ : nullptr}, step, rays,
-           pool_, batch_);
+           {settings_.seed, settings_.randomBackground, settings_.sparseDepthRayFraction, tiles_ ? &*tiles_ : nullptr},
+           step, rays, pool_, batch_);
   count_ = rays;
   device_.write(photoOfRay_.all(), std::span<const uint32_t>(batch_.photoOfRay));
   device_.write(pixels_.all(), std::span<const float>(batch_.pixels));
@@ -78,13 +78,13 @@ void PhotoRays::draw(int64_t step, uint32_t rays) {
 
 void PhotoRays::limitRays() {
   std::vector<float> nears(count_), fars(count_, std::numeric_limits<float>::infinity());
-  const float bracket = static_cast<float>(settings_.knownBracket);
+  const float margin = static_cast<float>(settings_.sparseDepthMargin);
   for (uint32_t ray = 0; ray < count_; ++ray) {
-    if (settings_.freeSpace) nears[ray] = nearOfPhoto_[batch_.photoOfRay[ray]];
+    if (settings_.nearFromSparseDepth) nears[ray] = nearOfPhoto_[batch_.photoOfRay[ray]];
     const float known = batch_.distances[ray];
-    if (known == 0 || bracket == 0) continue;
-    nears[ray] = (1 - bracket) * known;
-    fars[ray] = (1 + bracket) * known;
+    if (known == 0 || margin == 0) continue;
+    nears[ray] = (1 - margin) * known;
+    fars[ray] = (1 + margin) * known;
   }
   device_.write(nears_.all(), std::span<const float>(nears));
   device_.write(fars_.all(), std::span<const float>(fars));

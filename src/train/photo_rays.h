@@ -1,4 +1,4 @@
-// The rays of one training step, on the device: through which pixels of which photos, and what they should see.
+// The rays of one training step on the device: the pixels and photos that they belong to, and their target colours.
 #pragma once
 
 #include <optional>
@@ -14,35 +14,39 @@ class PhotoRays {
  public:
   struct Settings {
     uint64_t seed = 0;
-    uint32_t mostRays = 1 << 14;
+    uint32_t maxRays = 1 << 14;
     double photoBudgetMiB = 0;  // of decoded photos; 0: no limit
     int stepsPerPhoto = 2;
     bool randomBackground = true;
-    double knownShare = 0;   // of the rays, through sparse points
-    bool freeSpace = false;  // also how far rays go through nothing
-    // Rays through sparse points begin and end as much before and behind them, as a share of their distance; 0: they
-    // are like others.
-    double knownBracket = 0;
-    // Numbers a ray; the first is RayBatch's, the others differ from it by multiples of the golden ratio.
+    double sparseDepthRayFraction = 0;  // share of the rays that go through sparse points
+    bool nearFromSparseDepth = false;   // start rays at the nearest sparse depth of their photo, see nears()
+    // Rays through sparse points start and end this far before and behind the point, as a share of its distance; 0:
+    // they are bounded like other rays.
+    double sparseDepthMargin = 0;
+    // Random numbers per ray: the first is that of RayBatch, the others differ from it by multiples of the golden
+    // ratio.
     uint32_t jitters = 1;
   };
-  // Trains on the capture's training photos; Error when there are none. Keeps references to `device` and `capture`.
+  // Draws rays from the capture's training photos; throws Error if there are none. Keeps references to `device` and
+  // `capture`.
   PhotoRays(Device& device, const Capture& capture, const SceneFrame& frame, const Settings& settings);
 
-  // A function of seed, step, number of rays, and the tiles that they are drawn from (all of each photo without).
+  // Draws the rays of a step: a function of the seed, the step, the number of rays, and the tiles that they are drawn
+  // from. Without a call of drawFrom they are drawn from whole photos.
   void draw(int64_t step, uint32_t rays);
   void drawFrom(std::vector<TileShares> tiles) { tiles_ = std::move(tiles); }  // [photo]
 
   const RayBatch& batch() const { return batch_; }
   uint32_t count() const { return count_; }
-  // Rays [first, first + rays) of the step.
+  // The following return the data of rays [first, first + rays) of the step.
   Slice<const uint32_t> photoOfRay(uint32_t first, uint32_t rays) const { return photoOfRay_.part(first, rays); }
   Slice<const float> targets(uint32_t first, uint32_t rays) const { return three(targets_, first, rays); }
   Slice<const float> backgrounds(uint32_t first, uint32_t rays) const { return three(backgrounds_, first, rays); }
   Slice<const float> weights(uint32_t first, uint32_t rays) const { return weights_.part(first, rays); }
   Slice<const float> distances(uint32_t first, uint32_t rays) const { return distances_.part(first, rays); }
-  // Where rays are to begin and end, scene units: before that no point was seen in the ray's photo (nearestContent),
-  // with `freeSpace`; or about the ray's sparse point, with `knownBracket`. Else 0 and infinity.
+  // The distances at which rays start and end, scene units. With `sparseDepthMargin`, rays through a sparse point start
+  // and end around it. With `nearFromSparseDepth`, other rays start at kNearShare of the nearest depth observed in
+  // their photo (nearestSparseDepth). Otherwise they are 0 and infinity.
   Slice<const float> nears(uint32_t first, uint32_t rays) const { return nears_.part(first, rays); }
   Slice<const float> fars(uint32_t first, uint32_t rays) const { return fars_.part(first, rays); }
   Slice<const float> origins(uint32_t first, uint32_t rays) const { return three(origins_, first, rays); }
@@ -61,8 +65,8 @@ class PhotoRays {
   Settings settings_;
   ThreadPool pool_;
   PhotoWindow photos_;
-  std::vector<std::vector<KnownDistance>> known_;  // [photo]
-  std::vector<float> nearOfPhoto_;                 // with freeSpace
+  std::vector<std::vector<SparseDepth>> known_;  // [photo]
+  std::vector<float> nearOfPhoto_;               // with nearFromSparseDepth
   std::optional<std::vector<TileShares>> tiles_;
   RayBatch batch_;
   uint32_t count_ = 0;

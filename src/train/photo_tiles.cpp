@@ -26,17 +26,17 @@ struct TileCounts {
   }
 };
 
-// The coarse depth of each tile of a photo.
+// Returns the coarse depth of each tile of a photo, see tilePhotos.
 std::vector<double> coarseDepths(const Camera& camera, const TileCounts& counts,
-                                 const std::vector<KnownDistance>& known) {
+                                 const std::vector<SparseDepth>& known) {
   const size_t all = size_t{counts.columns} * counts.rows;
-  std::vector<size_t> found(all);
+  std::vector<size_t> observations(all);
   std::vector<double> farthest(all);
-  for (const KnownDistance& each : known) {
+  for (const SparseDepth& each : known) {
     const size_t i = size_t{each.x} * counts.columns / static_cast<uint32_t>(camera.width);
     const size_t j = size_t{each.y} * counts.rows / static_cast<uint32_t>(camera.height);
     const size_t tile = i + counts.columns * j;
-    ++found[tile];
+    ++observations[tile];
     farthest[tile] = std::max(farthest[tile], static_cast<double>(each.distance));
   }
   std::vector<double> depths(all);
@@ -46,7 +46,7 @@ std::vector<double> coarseDepths(const Camera& camera, const TileCounts& counts,
       double depth = 0;
       for (uint32_t y = j > 0 ? j - 1 : 0; y < std::min(j + 2, counts.rows); ++y) {
         for (uint32_t x = i > 0 ? i - 1 : 0; x < std::min(i + 2, counts.columns); ++x) {
-          near += found[x + size_t{counts.columns} * y];
+          near += observations[x + size_t{counts.columns} * y];
           depth = std::max(depth, farthest[x + size_t{counts.columns} * y]);
         }
       }
@@ -107,7 +107,7 @@ std::vector<uint32_t> cellsAlong(const BlockSpace& space, const Vec3d& origin, c
   std::vector<uint32_t> cells;
   for (size_t i = 0; i + 1 < ends.size(); ++i) {
     const Vec3d x = origin + (ends[i] + ends[i + 1]) / 2 * direction;
-    // Clamped to the box: rounding must not hand the last stretch to a surround.
+    // The point is clamped to the box, so that rounding does not assign the last interval to a background block.
     const double z = std::clamp<double>(x.z(), space.bottom, space.top);
     const uint32_t cell = space.blockAt(std::clamp(x.x(), low.x(), high.x()), std::clamp(x.y(), low.y(), high.y()), z);
     if (cells.empty() || cells.back() != cell) cells.push_back(cell);
@@ -116,13 +116,13 @@ std::vector<uint32_t> cellsAlong(const BlockSpace& space, const Vec3d& origin, c
 }
 
 TiledPhotos tilePhotos(const Capture& capture, const SceneFrame& frame, const BlockSpace& space) {
-  const std::vector<std::vector<KnownDistance>> known = knownDistances(capture, frame, kMostPixelsOff);
+  const std::vector<std::vector<SparseDepth>> known = findSparseDepths(capture, frame, kMaxReprojectionError);
   const std::vector<int> photos = capture.photosIn(Split::train);
-  struct OfPhoto {
+  struct PhotoTiling {
     std::vector<PhotoTile> tiles;
     std::vector<std::vector<uint32_t>> cells;
   };
-  std::vector<OfPhoto> made(photos.size());
+  std::vector<PhotoTiling> tilings(photos.size());
   ThreadPool pool;
   pool.run(photos.size(), [&](size_t k, int) {
     const Camera& camera = capture.cameras[capture.photos[photos[k]].camera];
@@ -130,15 +130,15 @@ TiledPhotos tilePhotos(const Capture& capture, const SceneFrame& frame, const Bl
     const std::vector<double> depths = coarseDepths(camera, counts, known[photos[k]]);
     for (uint32_t j = 0; j < counts.rows; ++j) {
       for (uint32_t i = 0; i < counts.columns; ++i) {
-        made[k].tiles.push_back(counts.tile(camera, photos[k], i, j));
-        made[k].cells.push_back(
-            cellsBehind(made[k].tiles.back(), capture, frame, space, depths[i + size_t{counts.columns} * j]));
+        tilings[k].tiles.push_back(counts.tile(camera, photos[k], i, j));
+        tilings[k].cells.push_back(
+            cellsBehind(tilings[k].tiles.back(), capture, frame, space, depths[i + size_t{counts.columns} * j]));
       }
     }
   });
   TiledPhotos all;
   std::map<std::vector<uint32_t>, uint32_t> numberOfSet;
-  for (const OfPhoto& photo : made) {
+  for (const PhotoTiling& photo : tilings) {
     for (size_t i = 0; i < photo.tiles.size(); ++i) {
       const auto [place, isNew] = numberOfSet.emplace(photo.cells[i], static_cast<uint32_t>(all.sets.size()));
       if (isNew) all.sets.push_back(photo.cells[i]);
@@ -149,7 +149,8 @@ TiledPhotos tilePhotos(const Capture& capture, const SceneFrame& frame, const Bl
   return all;
 }
 
-std::vector<TileShares> sharesOf(const TiledPhotos& photos, const std::vector<double>& shareOfSet, size_t photoCount) {
+std::vector<TileShares> computeTileShares(const TiledPhotos& photos, const std::vector<double>& shareOfSet,
+                                          size_t photoCount) {
   CHECK(shareOfSet.size() == photos.sets.size());
   std::vector<TileShares> shares(photoCount);
   for (size_t i = 0; i < photos.tiles.size(); ++i) {

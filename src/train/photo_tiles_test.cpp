@@ -14,17 +14,17 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-BlockSpace space(uint32_t columns, uint32_t rows, Surround surround = Surround::own) {
-  BlockSpace made;
-  made.columns = columns;
-  made.rows = rows;
-  made.bottom = -0.5f;
-  made.top = 0.5f;
-  made.surround = surround;
-  return made;
+BlockSpace space(uint32_t columns, uint32_t rows, BackgroundBlock backgroundBlock = BackgroundBlock::own) {
+  BlockSpace blockSpace;
+  blockSpace.columns = columns;
+  blockSpace.rows = rows;
+  blockSpace.bottom = -0.5f;
+  blockSpace.top = 0.5f;
+  blockSpace.backgroundBlock = backgroundBlock;
+  return blockSpace;
 }
 
-// A photo of 64 × 48 pixels from that place, straight down: x to the right, y down in the picture is -y in the scene.
+// A photo of 64 × 48 pixels that looks straight down from `place`; its x axis is the scene's x axis, its y axis is -y.
 Capture fromAbove(const Vec3d& place) {
   Capture capture;
   Camera camera;
@@ -46,10 +46,10 @@ std::vector<uint32_t> setAt(const TiledPhotos& photos, uint32_t x, uint32_t y) {
   return {99};
 }
 
-TEST(PhotoTiles, CellsAlongARayAreThoseThatItsPointsLieIn) {
+TEST(PhotoTiles, FindTheCellsThatThePointsOfARayLieIn) {
   const RandomStream random(3, 1);
-  for (const Surround surround : {Surround::own, Surround::border, Surround::none}) {
-    const BlockSpace blocks = space(4, 3, surround);
+  for (const BackgroundBlock backgroundBlock : {BackgroundBlock::own, BackgroundBlock::border, BackgroundBlock::none}) {
+    const BlockSpace blocks = space(4, 3, backgroundBlock);
     int met = 0;
     for (uint64_t i = 0; i < 300; ++i) {
       Vec3d origin, direction;
@@ -70,7 +70,7 @@ TEST(PhotoTiles, CellsAlongARayAreThoseThatItsPointsLieIn) {
         if (brute.empty() || brute.back() != cell) brute.push_back(cell);
       }
       const std::vector<uint32_t> cells = cellsAlong(blocks, origin, direction, farthest);
-      // Corners are cut by less than the brute steps.
+      // Rays may cut corners over less than a brute-force step.
       EXPECT_TRUE(std::includes(cells.begin(), cells.end(), brute.begin(), brute.end()) || cells == brute ||
                   std::set<uint32_t>(cells.begin(), cells.end()).size() >= brute.size())
           << i;
@@ -80,7 +80,7 @@ TEST(PhotoTiles, CellsAlongARayAreThoseThatItsPointsLieIn) {
   }
 }
 
-TEST(PhotoTiles, CoverAPhotoOnce) {
+TEST(PhotoTiles, CoverEveryPixelExactlyOnce) {
   for (const auto& [width, height] : {std::pair{64, 48}, std::pair{33, 100}, std::pair{7, 5}, std::pair{1000, 10}}) {
     Capture capture = fromAbove({0, 0, 3});
     capture.cameras[0].width = width;
@@ -99,23 +99,23 @@ TEST(PhotoTiles, CoverAPhotoOnce) {
   }
 }
 
-TEST(PhotoTiles, KnowTheBlocksThatOneSeesThroughThem) {
+TEST(PhotoTiles, FindTheBlocksThatAreVisibleThroughThem) {
   const TiledPhotos photos = tilePhotos(fromAbove({0, 0, 2.5}), SceneFrame(), space(2, 2));
-  EXPECT_EQ(setAt(photos, 10, 40), (std::vector<uint32_t>{0}));  // left and below: x < 0, y < 0
+  EXPECT_EQ(setAt(photos, 10, 40), (std::vector<uint32_t>{0}));  // bottom left: x < 0, y < 0
   EXPECT_EQ(setAt(photos, 50, 40), (std::vector<uint32_t>{1}));
   EXPECT_EQ(setAt(photos, 10, 5), (std::vector<uint32_t>{2}));
   EXPECT_EQ(setAt(photos, 50, 5), (std::vector<uint32_t>{3}));
-  // From beside, oblique rays pass from one into the other.
+  // From the side, oblique rays pass from one block into another.
   const TiledPhotos oblique = tilePhotos(fromAbove({-1.5, -1, 2.5}), SceneFrame(), space(2, 2));
   EXPECT_EQ(setAt(oblique, 50, 24), (std::vector<uint32_t>{0, 1}));
-  // From far beside, they miss all.
+  // From far away, they miss all blocks.
   EXPECT_EQ(setAt(tilePhotos(fromAbove({-90, 0, 2.5}), SceneFrame(), space(2, 2)), 10, 24), std::vector<uint32_t>());
 }
 
 TEST(PhotoTiles, EndAtTheCoarseDepthWherePointsAreKnown) {
   Capture capture = fromAbove({-1.5, -1, 2.5});
   ASSERT_EQ(setAt(tilePhotos(capture, SceneFrame(), space(2, 2)), 50, 24), (std::vector<uint32_t>{0, 1}));
-  // On a roof right below the top of the box, seen before the ray comes to the other block.
+  // The point lies just below the top of the box, before the ray enters the other block.
   const Camera& camera = capture.cameras[0];
   const Vec3d ray = capture.photos[0].worldFromCamera.rotation * *camera.directionInCamera({50.5, 24.5});
   const Vec3d point = capture.photos[0].worldFromCamera.translation + 2.02 / -ray.z() * ray;
@@ -131,18 +131,19 @@ TEST(PhotoTiles, EndAtTheCoarseDepthWherePointsAreKnown) {
   EXPECT_EQ(expected, (std::vector<uint32_t>{0}));
 }
 
-TEST(PhotoTiles, HaveTheSharesOfTheirSets) {
+TEST(PhotoTiles, TakeTheSharesOfTheirSets) {
   const TiledPhotos photos = tilePhotos(fromAbove({0, 0, 2.5}), SceneFrame(), space(2, 2));
   std::vector<double> shares(photos.sets.size());
   const auto first = std::find(photos.sets.begin(), photos.sets.end(), std::vector<uint32_t>{0});
   ASSERT_NE(first, photos.sets.end());
   shares[static_cast<size_t>(first - photos.sets.begin())] = 0.5;
-  const std::vector<TileShares> made = sharesOf(photos, shares, 3);
-  ASSERT_EQ(made.size(), 3u);
-  ASSERT_FALSE(made[0].tiles.empty());
-  EXPECT_DOUBLE_EQ(made[0].total(), 0.5 * static_cast<double>(made[0].tiles.size()));
-  for (const PhotoTile& tile : made[0].tiles) EXPECT_EQ(setAt(photos, tile.left, tile.top), std::vector<uint32_t>{0});
-  EXPECT_EQ(made[1].total(), 0);
+  const std::vector<TileShares> tileShares = computeTileShares(photos, shares, 3);
+  ASSERT_EQ(tileShares.size(), 3u);
+  ASSERT_FALSE(tileShares[0].tiles.empty());
+  EXPECT_DOUBLE_EQ(tileShares[0].total(), 0.5 * static_cast<double>(tileShares[0].tiles.size()));
+  for (const PhotoTile& tile : tileShares[0].tiles)
+    EXPECT_EQ(setAt(photos, tile.left, tile.top), std::vector<uint32_t>{0});
+  EXPECT_EQ(tileShares[1].total(), 0);
 }
 
 }  // namespace

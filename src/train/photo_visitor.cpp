@@ -7,8 +7,9 @@ PixelLattice latticeWithin(const Camera& camera, int stride) {
 }
 
 PixelLattice latticeBeside(const Camera& camera, int stride) {
-  const int x = static_cast<int>(kBesidePhotos * camera.width), y = static_cast<int>(kBesidePhotos * camera.height);
-  return {-x, -y, camera.width + x, camera.height + y, kBesideStride * stride};
+  const int x = static_cast<int>(kOutOfFrameMargin * camera.width),
+            y = static_cast<int>(kOutOfFrameMargin * camera.height);
+  return {-x, -y, camera.width + x, camera.height + y, kOutOfFrameStride * stride};
 }
 
 void PhotoVisitor::begin(int photo) {
@@ -26,7 +27,7 @@ void PhotoVisitor::look(const std::vector<PixelLattice>& lattices, SeenThrough t
         if ((onlyBeside && pixels_.within(x, y)) || !pixels_.count(x, y)) continue;
         batch.push_back(static_cast<float>(x) + 0.5f);
         batch.push_back(static_cast<float>(y) + 0.5f);
-        if (batch.size() < size_t{2} * mostPixels_) continue;
+        if (batch.size() < size_t{2} * maxBatchPixels_) continue;
         visitor_.visit(batch, through);
         batch.clear();
       }

@@ -36,10 +36,10 @@ class Recorder final : public PixelVisitor {
 
 class PhotoVisitorTest : public testing::Test {
  protected:
-  // Of photos of 16×12 pixels that look at the zenith, so that nothing beside them is too high.
-  Recorder visited(int stride, const PhotoVisitor::Margin& margin, uint32_t mostPixels = 1000) {
+  // Visits photos of 16×12 pixels that look at the zenith, so that no direction outside them is higher.
+  Recorder visited(int stride, const PhotoVisitor::Margin& margin, uint32_t maxBatchPixels = 1000) {
     Recorder recorder;
-    PhotoVisitor visitor(capture_, SceneFrame(), mostPixels, recorder);
+    PhotoVisitor visitor(capture_, SceneFrame(), maxBatchPixels, recorder);
     visitor.visitAll(stride, margin, [&](int64_t done, int64_t all) { progress_.emplace_back(done, all); });
     return recorder;
   }
@@ -49,7 +49,7 @@ class PhotoVisitorTest : public testing::Test {
   std::vector<std::pair<int64_t, int64_t>> progress_;
 };
 
-TEST_F(PhotoVisitorTest, ComesToEveryPixelOfEveryTrainingPhoto) {
+TEST_F(PhotoVisitorTest, VisitsEveryPixelOfEveryTrainingPhoto) {
   capture_.photos.push_back(capture_.photos[0]);
   capture_.photos.back().name = "held out";
   capture_.photos.back().split = Split::test;
@@ -71,7 +71,7 @@ TEST_F(PhotoVisitorTest, SkipsPixelsByItsStride) {
   EXPECT_TRUE((pixels.contains({5.5f, 10.5f})));
 }
 
-TEST_F(PhotoVisitorTest, LeavesOutWhatMasksDo) {
+TEST_F(PhotoVisitorTest, SkipsMaskedPixels) {
   ImageU8 mask(16, 12, 1, 255);
   *mask.at(3, 4) = 0;
   capture_.photos[0].mask = folder_.path() / "mask.png";
@@ -82,14 +82,14 @@ TEST_F(PhotoVisitorTest, LeavesOutWhatMasksDo) {
   EXPECT_EQ((recorder.seen[{"photo_1.png", SeenThrough::photo}].size()), 16u * 12);
 }
 
-TEST_F(PhotoVisitorTest, GivesNoBatchMoreThanItsMost) {
+TEST_F(PhotoVisitorTest, LimitsTheSizeOfBatches) {
   const Recorder recorder = visited(1, {}, 100);
   std::vector<size_t> sizes;
   for (const Recorder::Batch& batch : recorder.batches) sizes.push_back(batch.pixels);
-  EXPECT_EQ(sizes, (std::vector<size_t>{100, 92, 100, 92}));  // no batch is of two photos
+  EXPECT_EQ(sizes, (std::vector<size_t>{100, 92, 100, 92}));  // no batch contains pixels of two photos
 }
 
-TEST_F(PhotoVisitorTest, LooksAtTheMarginToo) {
+TEST_F(PhotoVisitorTest, VisitsTheMargin) {
   Recorder beside = visited(1, {true, true}), everywhere = visited(1, {true, false});
   const auto& pixels = beside.seen[{"photo_0.png", SeenThrough::margin}];
   EXPECT_FALSE(pixels.empty());

@@ -9,8 +9,8 @@
 namespace tessera {
 namespace {
 
-// What the cache counts for a photo: its channels, as the head of the file says, and a mask.
-size_t decodedBytesOf(const Capture& capture, const Photo& photo) {
+// Returns the bytes that the cache counts for a photo: its channels, according to the file's header, and its mask.
+size_t countDecodedBytes(const Capture& capture, const Photo& photo) {
   const Camera& camera = capture.cameras[photo.camera];
   const int channels = probeImageFile(photo.image).channels + (photo.mask.empty() ? 0 : 1);
   return static_cast<size_t>(camera.width) * camera.height * static_cast<size_t>(channels);
@@ -22,7 +22,7 @@ constexpr size_t kUnlimited = size_t{1} << 60;
 
 size_t decodedBytes(const Capture& capture, const std::vector<int>& photos) {
   size_t total = 0;
-  for (const int photo : photos) total += decodedBytesOf(capture, capture.photos[photo]);
+  for (const int photo : photos) total += countDecodedBytes(capture, capture.photos[photo]);
   return total;
 }
 
@@ -34,13 +34,13 @@ PhotoWindow::PhotoWindow(const Capture& capture, std::vector<int> photos, const 
   size_t total = 0, largest = 1;
   if (settings.budgetBytes > 0) {
     for (const int photo : photos_) {
-      const size_t bytes = decodedBytesOf(capture, capture.photos[photo]);
+      const size_t bytes = countDecodedBytes(capture, capture.photos[photo]);
       total += bytes;
       largest = std::max(largest, bytes);
     }
   }
   holdsAll_ = settings.budgetBytes == 0 || total <= settings.budgetBytes;
-  // One place is for the photo that is being decoded while the window is in use.
+  // One place is reserved for the photo that is being decoded while the window is in use.
   size_ = holdsAll_ ? static_cast<int>(photos_.size())
                     : static_cast<int>(std::max<size_t>(2, settings.budgetBytes / largest) - 1);
   size_ = std::min<int>(size_, static_cast<int>(photos_.size()));
@@ -73,7 +73,7 @@ const std::vector<PhotoWindow::Entry>& PhotoWindow::at(int64_t step) {
   const bool next = first_ >= 0 && first == first_ + 1;
   for (int64_t position = next ? first + size_ - 1 : first; position < first + size_; ++position) {
     Entry& entry = entries_[position % size_];
-    entry.decoded.reset();  // its place in the budget is free before the new one is asked for
+    entry.decoded.reset();  // frees its share of the budget before the new photo is decoded
     entry.photo = photoInSequence(position);
     entry.decoded = cache_.get(entry.photo);
   }

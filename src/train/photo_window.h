@@ -1,6 +1,6 @@
-// The photos that rays are drawn from at a step: all of them when they fit the budget, else a window that moves over
-// ever new shuffles of all photos, so that every photo gets its share. Which photos are in the window is a function of
-// seed and step alone.
+// The photos that rays are drawn from at a step: all of them if they fit the memory budget, else a window that slides
+// over repeated shuffles of all photos, so that every photo is used equally often. Which photos are in the window is a
+// function of the seed and the step alone.
 #pragma once
 
 #include <vector>
@@ -9,25 +9,25 @@
 
 namespace tessera {
 
-// Of these photos when decoded, masks included, as the heads of the files say.
+// Returns the size of these photos in bytes when decoded, including masks, according to the headers of the files.
 size_t decodedBytes(const Capture& capture, const std::vector<int>& photos);
 
 class PhotoWindow {
  public:
   struct Settings {
     size_t budgetBytes = 0;  // of decoded photos; 0: no limit
-    int stepsPerPhoto = 2;   // every so many steps the oldest photo of the window leaves and another comes
+    int stepsPerPhoto = 2;   // steps after which the oldest photo of the window is replaced by another
     uint64_t seed = 0;
   };
 
-  // `photos` are the indices to train on. Keeps a reference to `capture`.
+  // `photos`: indices of the photos to train on. Keeps a reference to `capture`.
   PhotoWindow(const Capture& capture, std::vector<int> photos, const Settings& settings);
 
-  // The photos of this step, decoded. The next one to come is decoded meanwhile. Valid until the next call.
   struct Entry {
     int photo;
     std::shared_ptr<const DecodedPhoto> decoded;
   };
+  // Returns the decoded photos of this step, valid until the next call. The next photo is decoded in the background.
   const std::vector<Entry>& at(int64_t step);
 
   int size() const { return size_; }
@@ -35,7 +35,7 @@ class PhotoWindow {
   PhotoCacheCounts counts() const { return cache_.counts(); }
 
  private:
-  int photoInSequence(int64_t position) const;  // shuffle after shuffle
+  int photoInSequence(int64_t position) const;  // in the concatenation of all shuffles
 
   PhotoCache cache_;
   std::vector<int> photos_;

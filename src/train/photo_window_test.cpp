@@ -11,7 +11,7 @@
 namespace tessera {
 namespace {
 
-std::vector<int> allOf(const Capture& capture) {
+std::vector<int> allPhotoIndices(const Capture& capture) {
   std::vector<int> photos(capture.photos.size());
   std::iota(photos.begin(), photos.end(), 0);
   return photos;
@@ -23,7 +23,7 @@ std::vector<int> photosIn(const std::vector<PhotoWindow::Entry>& entries) {
   return photos;
 }
 
-// Room for a window of `photos`, one more being decoded.
+// A budget for a window of `photos`, and one more that is being decoded.
 PhotoWindow::Settings budgetFor(size_t photos, uint64_t seed = 3) {
   return {kPlainPhotoBytes * (photos + 1), 2, seed};
 }
@@ -42,7 +42,7 @@ TEST(PhotoWindow, HoldsAllPhotosWhenThereIsNoBudgetOrAllFit) {
 TEST(PhotoWindow, HandsOutEachPhotoWithItsOwnPixels) {
   const TemporaryFolder folder;
   const Capture capture = plainCapture(folder.path(), 9);
-  PhotoWindow window(capture, allOf(capture), budgetFor(3));
+  PhotoWindow window(capture, allPhotoIndices(capture), budgetFor(3));
   EXPECT_FALSE(window.holdsAll());
   for (int64_t step = 0; step < 60; ++step) {
     for (const PhotoWindow::Entry& entry : window.at(step)) {
@@ -52,14 +52,14 @@ TEST(PhotoWindow, HandsOutEachPhotoWithItsOwnPixels) {
   }
 }
 
-TEST(PhotoWindow, NeverPassesTheBudget) {
+TEST(PhotoWindow, NeverExceedsTheBudget) {
   const TemporaryFolder folder;
   const Capture capture = plainCapture(folder.path(), 9);
   for (const size_t places : {size_t{1}, size_t{2}, size_t{5}}) {
-    PhotoWindow window(capture, allOf(capture), budgetFor(places));
+    PhotoWindow window(capture, allPhotoIndices(capture), budgetFor(places));
     EXPECT_EQ(window.size(), static_cast<int>(places));
     for (int64_t step = 0; step < 50; ++step) window.at(step);
-    window.at(1000);  // a jump, as after a resume
+    window.at(1000);  // a jump, as after resuming
     EXPECT_LE(window.counts().peakBytes, static_cast<int64_t>(kPlainPhotoBytes * (places + 1)));
   }
 }
@@ -72,8 +72,8 @@ TEST(PhotoWindow, CountsAlphaAndMasksAgainstTheBudget) {
     photo.mask = folder / "mask.png";
   }
   writePng(folder / "mask.png", ImageU8(16, 12, 1, 255));
-  for (const size_t budget : {16 * 12 * 20, 16 * 12 * 5 * 7}) {  // as much as without either, and all but one
-    PhotoWindow window(capture, allOf(capture), {budget, 1, 0});
+  for (const size_t budget : {16 * 12 * 20, 16 * 12 * 5 * 7}) {  // enough for 4 and for 7 of the 8 photos
+    PhotoWindow window(capture, allPhotoIndices(capture), {budget, 1, 0});
     EXPECT_FALSE(window.holdsAll());
     for (int64_t step = 0; step < 20; ++step) EXPECT_EQ(window.at(step)[0].decoded->image.channels, 4);
     EXPECT_LE(window.counts().peakBytes, static_cast<int64_t>(budget));
@@ -83,7 +83,7 @@ TEST(PhotoWindow, CountsAlphaAndMasksAgainstTheBudget) {
 TEST(PhotoWindow, WorksWithOnePhotoWhenNotEvenOneFits) {
   const TemporaryFolder folder;
   const Capture capture = plainCapture(folder.path(), 4);
-  PhotoWindow window(capture, allOf(capture), {kPlainPhotoBytes / 2, 2, 0});
+  PhotoWindow window(capture, allPhotoIndices(capture), {kPlainPhotoBytes / 2, 2, 0});
   std::set<int> seen;
   for (int64_t step = 0; step < 16; ++step) {
     ASSERT_EQ(window.at(step).size(), 1u);
@@ -92,7 +92,7 @@ TEST(PhotoWindow, WorksWithOnePhotoWhenNotEvenOneFits) {
   EXPECT_EQ(seen.size(), 4u);
 }
 
-TEST(PhotoWindow, GivesEveryPhotoItsShare) {
+TEST(PhotoWindow, UsesEveryPhotoEquallyOften) {
   const TemporaryFolder folder;
   const Capture capture = plainCapture(folder.path(), 10);
   PhotoWindow window(capture, {0, 1, 2, 3, 5, 6, 7, 8}, budgetFor(3));
@@ -108,7 +108,8 @@ TEST(PhotoWindow, GivesEveryPhotoItsShare) {
 TEST(PhotoWindow, IsAFunctionOfSeedAndStep) {
   const TemporaryFolder folder;
   const Capture capture = plainCapture(folder.path(), 7);
-  PhotoWindow walking(capture, allOf(capture), budgetFor(3)), other(capture, allOf(capture), budgetFor(3, 4));
+  PhotoWindow walking(capture, allPhotoIndices(capture), budgetFor(3)),
+      other(capture, allPhotoIndices(capture), budgetFor(3, 4));
   std::vector<std::vector<int>> walked;
   bool differs = false;
   for (int64_t step = 0; step < 64; ++step) {
@@ -116,7 +117,7 @@ TEST(PhotoWindow, IsAFunctionOfSeedAndStep) {
     differs |= photosIn(other.at(step)) != walked.back();
   }
   EXPECT_TRUE(differs);
-  PhotoWindow jumping(capture, allOf(capture), budgetFor(3));
+  PhotoWindow jumping(capture, allPhotoIndices(capture), budgetFor(3));
   for (const int64_t step : {63, 2, 40, 41, 42, 5, 0}) {
     EXPECT_EQ(photosIn(jumping.at(step)), walked[static_cast<size_t>(step)]) << step;
   }
@@ -125,7 +126,7 @@ TEST(PhotoWindow, IsAFunctionOfSeedAndStep) {
 TEST(PhotoWindow, ExchangesOnePhotoAtATime) {
   const TemporaryFolder folder;
   const Capture capture = plainCapture(folder.path(), 7);
-  PhotoWindow window(capture, allOf(capture), budgetFor(3));
+  PhotoWindow window(capture, allPhotoIndices(capture), budgetFor(3));
   std::vector<int> last = photosIn(window.at(0));
   for (int64_t step = 1; step < 40; ++step) {
     const std::vector<int> now = photosIn(window.at(step));

@@ -5,15 +5,15 @@
 
 namespace tessera {
 
-PictureRays::PictureRays(Device& device, uint32_t mostRays)
+PictureRays::PictureRays(Device& device, uint32_t maxRays)
     : device_(device),
-      mostRays_(mostRays),
+      maxRays_(maxRays),
       camera_(device.array<RayCamera>(1)),
-      cameraOfRay_(device.array<uint32_t>(mostRays)),
-      pixels_(device.array<float>(size_t{2} * mostRays)),
-      origins_(device.array<float>(size_t{3} * mostRays)),
-      directions_(device.array<float>(size_t{3} * mostRays)),
-      far_(device.array<float>(mostRays)) {}
+      cameraOfRay_(device.array<uint32_t>(maxRays)),
+      pixels_(device.array<float>(size_t{2} * maxRays)),
+      origins_(device.array<float>(size_t{3} * maxRays)),
+      directions_(device.array<float>(size_t{3} * maxRays)),
+      far_(device.array<float>(maxRays)) {}
 
 void PictureRays::begin(const RayCamera& camera, const SceneFrame& frame, const PixelLattice& lattice,
                         const ImageF* opaqueDepth) {
@@ -29,8 +29,8 @@ float PictureRays::cosine(uint32_t ray) const {
   return direction[0] * forward_[0] + direction[1] * forward_[1] + direction[2] * forward_[2];
 }
 
-PictureRays::Piece PictureRays::piece(size_t first, uint32_t most) {
-  const uint32_t rays = static_cast<uint32_t>(std::min<size_t>(std::min(most, mostRays_), lattice_.count() - first));
+PictureRays::Piece PictureRays::piece(size_t first, uint32_t maximum) {
+  const uint32_t rays = static_cast<uint32_t>(std::min<size_t>(std::min(maximum, maxRays_), lattice_.count() - first));
   std::vector<float> pixels, far;
   for (size_t i = first; i < first + rays; ++i) {
     const int x = lattice_.firstX + static_cast<int>(i % lattice_.columns()) * lattice_.stride;
@@ -39,20 +39,20 @@ PictureRays::Piece PictureRays::piece(size_t first, uint32_t most) {
     pixels.push_back(static_cast<float>(y) + 0.5f);
     if (opaqueDepth_) far.push_back(*opaqueDepth_->at(x, y));
   }
-  Piece made = through(pixels);
-  if (!opaqueDepth_) return made;
+  Piece result = through(pixels);
+  if (!opaqueDepth_) return result;
   for (uint32_t ray = 0; ray < rays; ++ray) {
     const float along = cosine(ray);
     far[ray] = along > 0 ? far[ray] * scale_ / along : std::numeric_limits<float>::infinity();
   }
   device_.write(far_.all(), std::span<const float>(far));
-  made.far = far_;
-  return made;
+  result.far = far_;
+  return result;
 }
 
 PictureRays::Piece PictureRays::through(std::span<const float> pixels) {
   const uint32_t rays = static_cast<uint32_t>(pixels.size() / 2);
-  CHECK(rays <= mostRays_);
+  CHECK(rays <= maxRays_);
   device_.write(pixels_.all(), pixels);
   device_.run(GenerateRays{{rays, {}}, camera_, cameraOfRay_, pixels_, origins_, directions_});
   hostDirections_ = device_.read(directions_.part(0, size_t{3} * rays));

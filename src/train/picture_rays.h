@@ -1,5 +1,5 @@
-// The pixels of one picture as rays on a device, a piece at a time: what draws a model, or looks at it through a photo,
-// begins with this.
+// Generates the rays through the pixels of one image on a device, a piece at a time: for rendering a model, or for
+// finding out what a photo sees of it.
 #pragma once
 
 #include "compute/device.h"
@@ -9,7 +9,7 @@
 
 namespace tessera {
 
-// Every `stride`-th pixel of [firstX, endX) × [firstY, endY), row by row; they may lie beside the picture.
+// Every `stride`-th pixel of [firstX, endX) × [firstY, endY), row by row; they may lie outside the image.
 struct PixelLattice {
   int firstX = 0, firstY = 0, endX = 0, endY = 0, stride = 1;
 
@@ -21,30 +21,32 @@ struct PixelLattice {
 
 class PictureRays {
  public:
-  // At most `mostRays` a piece. Keeps a reference to `device`.
-  PictureRays(Device& device, uint32_t mostRays);
+  // Pieces have at most `maxRays` rays. Keeps a reference to `device`.
+  PictureRays(Device& device, uint32_t maxRays);
 
-  // `opaqueDepth`: optional, z-depth in world units where rays end; needs to live as long as pieces are made.
+  // Starts an image. `opaqueDepth`: optional, the z-depth in world units at which rays end; must remain valid while
+  // pieces are generated.
   void begin(const RayCamera& camera, const SceneFrame& frame, const PixelLattice& lattice,
              const ImageF* opaqueDepth = nullptr);
 
   struct Piece {
     uint32_t rays = 0;
     Slice<const float> origins, directions;  // [rays][3], scene units
-    Slice<const float> far;                  // [rays], with opaqueDepth
+    Slice<const float> far;                  // [rays], scene units, with opaqueDepth
   };
-  // Pixels [first, first + most) of the lattice, or fewer. Valid until the next one.
-  Piece piece(size_t first, uint32_t most);
-  // Rays through pixels of one's own choice, [rays][2], at most `mostRays`; no far. Valid until the next piece.
+  // Returns the rays of pixels [first, first + maximum) of the lattice, or fewer. Valid until the next piece.
+  Piece piece(size_t first, uint32_t maximum);
+  // Returns rays through the given pixel positions, [rays][2], at most `maxRays`; without far. Valid until the next
+  // piece.
   Piece through(std::span<const float> pixels);
-  // Of a ray of the last piece: the z-depth in world units of what lies at that distance in scene units.
-  float depthOf(uint32_t ray, float distance) const { return distance * cosine(ray) / scale_; }
+  // Converts a distance in scene units along a ray of the last piece into z-depth in world units.
+  float toViewDepth(uint32_t ray, float distance) const { return distance * cosine(ray) / scale_; }
 
  private:
-  float cosine(uint32_t ray) const;  // of the angle with the optical axis
+  float cosine(uint32_t ray) const;  // of the angle between ray and optical axis
 
   Device& device_;
-  uint32_t mostRays_;
+  uint32_t maxRays_;
   PixelLattice lattice_;
   const ImageF* opaqueDepth_ = nullptr;
   float forward_[3] = {0, 0, 1}, scale_ = 1;

@@ -10,7 +10,7 @@ namespace tessera {
 
 namespace {
 
-// Draws a tile of a window's photos by its share.
+// Draws tiles from the photos of a window by their shares.
 class TileDraw {
  public:
   TileDraw(const std::vector<PhotoWindow::Entry>& window, const std::vector<TileShares>& tiles) : tiles_(tiles) {
@@ -20,7 +20,7 @@ class TileDraw {
     }
   }
   bool isEmpty() const { return !(until_.back() > 0); }
-  bool holds(int photo, const KnownDistance& pixel) const {
+  bool holds(int photo, const SparseDepth& pixel) const {
     const std::vector<PhotoTile>& tiles = tiles_[static_cast<size_t>(photo)].tiles;
     return std::any_of(tiles.begin(), tiles.end(), [&](const PhotoTile& tile) {
       return pixel.x >= tile.left && pixel.x < tile.right && pixel.y >= tile.top && pixel.y < tile.bottom;
@@ -32,17 +32,17 @@ class TileDraw {
   };
   // `u` in [0,1).
   Drawn at(double u) const {
-    const double wanted = u * until_.back();
-    const size_t entry = placeOf(until_, wanted);
+    const double target = u * until_.back();
+    const size_t entry = findShareIndex(until_, target);
     const TileShares& ofPhoto = tiles_[photos_[entry]];
-    return {entry, &ofPhoto.tiles[placeOf(ofPhoto.until, wanted - (entry > 0 ? until_[entry - 1] : 0))]};
+    return {entry, &ofPhoto.tiles[findShareIndex(ofPhoto.until, target - (entry > 0 ? until_[entry - 1] : 0))]};
   }
 
  private:
-  static size_t placeOf(const std::vector<double>& until, double wanted) {
-    size_t place = static_cast<size_t>(std::upper_bound(until.begin(), until.end(), wanted) - until.begin());
+  static size_t findShareIndex(const std::vector<double>& until, double target) {
+    size_t place = static_cast<size_t>(std::upper_bound(until.begin(), until.end(), target) - until.begin());
     place = std::min(place, until.size() - 1);
-    while (place > 0 && until[place] == until[place - 1]) --place;  // rounded beyond the last that has a share
+    while (place > 0 && until[place] == until[place - 1]) --place;  // rounding must not select an entry without a share
     return place;
   }
 
@@ -53,7 +53,7 @@ class TileDraw {
 
 }  // namespace
 
-void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<std::vector<KnownDistance>>& known,
+void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<std::vector<SparseDepth>>& known,
               const RayBatchOptions& options, int64_t step, uint32_t rays, ThreadPool& pool, RayBatch& batch) {
   CHECK(!window.empty());
   constexpr int kTries = 4, kPicks = 2;
@@ -76,7 +76,7 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
     float* background = &batch.backgrounds[3 * ray];
     for (int k = 0; k < 3; ++k) background[k] = options.randomBackground ? random.uniform(draw + k) : 0.0f;
     draw += 3;
-    const bool wantsKnown = random.uniform(draw++) < options.knownShare;
+    const bool wantsKnown = random.uniform(draw++) < options.sparseDepthRayFraction;
     for (int attempt = 0; attempt < kTries; ++attempt) {
       const PhotoTile* tile = nullptr;
       size_t chosenEntry = 0;
@@ -97,8 +97,8 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
       batch.distances[ray] = 0;
       const bool someKnown = wantsKnown && !nothing && !known.empty() && !known[entry.photo].empty();
       for (int pick = 0; someKnown && pick < kPicks; ++pick) {
-        const std::vector<KnownDistance>& ofPhoto = known[entry.photo];
-        const KnownDistance& chosen = ofPhoto[random.below(draw++, static_cast<uint32_t>(ofPhoto.size()))];
+        const std::vector<SparseDepth>& ofPhoto = known[entry.photo];
+        const SparseDepth& chosen = ofPhoto[random.below(draw++, static_cast<uint32_t>(ofPhoto.size()))];
         if (tiles && !tiles->holds(entry.photo, chosen)) continue;
         if (chosen.x < static_cast<uint32_t>(image.width) && chosen.y < static_cast<uint32_t>(image.height)) {
           x = chosen.x;
@@ -116,7 +116,7 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
       batch.pixels[2 * ray + 1] = static_cast<float>(y) + 0.5f;
       const uint8_t* pixel = image.at(static_cast<int>(x), static_cast<int>(y));
       const float alpha = image.channels == 4 ? static_cast<float>(pixel[3]) / 255 : 1.0f;
-      if (masked || alpha < 1) batch.distances[ray] = 0;  // what is known is not what the photo shows there
+      if (masked || alpha < 1) batch.distances[ray] = 0;  // the photo does not show the sparse point there
       for (int k = 0; k < 3; ++k) {
         const float value = static_cast<float>(pixel[image.channels >= 3 ? k : 0]) / 255;
         batch.targets[3 * ray + k] = value * alpha + background[k] * (1 - alpha);

@@ -1,11 +1,11 @@
-// Rays for one training step: which pixels, and what colour they should have.
+// Draws the rays of one training step: their pixels and target colours.
 #pragma once
 
 #include "base/threads.h"
 #include "scene/capture.h"
-#include "train/known_distances.h"
 #include "train/photo_tiles.h"
 #include "train/photo_window.h"
+#include "train/sparse_depth.h"
 
 namespace tessera {
 
@@ -14,24 +14,23 @@ struct RayBatch {
   std::vector<float> pixels;         // [rays][2]
   std::vector<float> targets;        // [rays][3], sRGB in [0,1]; transparent photos over `backgrounds`
   std::vector<float> backgrounds;    // [rays][3]
-  std::vector<float> weights;        // [rays]: 0 where a mask says so
+  std::vector<float> weights;        // [rays], 0 for masked pixels, else 1
   std::vector<float> jitter;         // [rays], in [0,1)
-  std::vector<float> distances;      // [rays]: where the ray's surface is known to be, scene units; 0: not known
+  std::vector<float> distances;      // [rays], sparse depth along the ray, scene units; 0: unknown
 };
 
 struct RayBatchOptions {
   uint64_t seed = 0;
   bool randomBackground = true;
-  double knownShare = 0;  // of the rays go through pixels whose distance is known, in photos that have some
-  const std::vector<TileShares>* tiles = nullptr;  // [photo]: draw from these alone
+  double sparseDepthRayFraction = 0;               // share of the rays through sparse points, in photos that have some
+  const std::vector<TileShares>* tiles = nullptr;  // [photo], draw from these tiles only; null: from whole photos
 };
 
-// Uniform over the window's photos and their pixels, or by the shares of tiles; a function of window, seed and step,
-// whatever the pool's threads.
-// Masked pixels are drawn again a few times before they are kept with weight zero; where no photo of the window has a
-// tile, all rays have that weight.
-// `known` is by photo, and may be empty.
-void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<std::vector<KnownDistance>>& known,
+// Draws uniformly over the photos of the window and their pixels, or by the shares of tiles. The result is a function
+// of the window, the seed and the step, independent of the number of threads. Masked pixels are redrawn a few times
+// before they are accepted with weight zero; if no photo of the window has a tile, all rays have weight zero. `known`:
+// the sparse depths, [photo]; may be empty.
+void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<std::vector<SparseDepth>>& known,
               const RayBatchOptions& options, int64_t step, uint32_t rays, ThreadPool& pool, RayBatch& batch);
 
 }  // namespace tessera

@@ -20,7 +20,7 @@ PhotoWindow::Entry entry(int photo, ImageU8 image, ImageU8 mask = {}) {
   return {photo, decoded};
 }
 
-// Each pixel says where it lies: red = 16 x, green = 16 y, blue = photo.
+// An image whose pixels encode their position: red = 16 x, green = 16 y, blue = photo.
 ImageU8 addressed(int width, int height, int photo, int channels = 3, uint8_t alpha = 255) {
   ImageU8 image(width, height, channels);
   for (int y = 0; y < height; ++y) {
@@ -55,7 +55,7 @@ TEST(RayBatch, IsAFunctionOfSeedAndStep) {
   EXPECT_NE(first.pixels, draw(twoPhotos(), 2, 7).pixels);
 }
 
-TEST(RayBatch, BeginsWithTheSameRaysHoweverManyAreWanted) {
+TEST(RayBatch, BeginsWithTheSameRaysWhateverTheirNumber) {
   const RayBatch many = draw(twoPhotos(), 1, 7), few = draw(twoPhotos(), 1, 7, 50);
   ASSERT_EQ(few.pixels.size(), 100u);
   EXPECT_TRUE(std::equal(few.pixels.begin(), few.pixels.end(), many.pixels.begin()));
@@ -109,7 +109,7 @@ TEST(RayBatch, TakesColoursFromThePixelsItNames) {
     EXPECT_LT(batch.jitter[ray], 1);
     seen.insert({static_cast<float>(batch.photoOfRay[ray]), x, y});
   }
-  EXPECT_EQ(seen.size(), 7u * 5 + 5 * 9);  // every pixel has its chance
+  EXPECT_EQ(seen.size(), 7u * 5 + 5 * 9);  // every pixel is drawn
 }
 
 TEST(RayBatch, GivesMaskedPixelsNoWeightAndPrefersOthers) {
@@ -125,10 +125,10 @@ TEST(RayBatch, GivesMaskedPixelsNoWeightAndPrefersOthers) {
   EXPECT_LT(masked, 2000 / 7 / 4);  // a seventh of the pixels, drawn again
 }
 
-TEST(RayBatch, OfPhotosThatAreMaskedWhollyWeighsNothing) {
+TEST(RayBatch, GivesRaysOfFullyMaskedPhotosNoWeight) {
   const RayBatch batch = draw({entry(0, addressed(7, 5, 0), ImageU8(7, 5, 1, 0))}, 1, 0, 100);
   EXPECT_EQ(batch.weights, std::vector<float>(100, 0.0f));
-  for (const float pixel : batch.pixels) EXPECT_GT(pixel, 0);  // they are rays all the same
+  for (const float pixel : batch.pixels) EXPECT_GT(pixel, 0);  // they are valid rays nevertheless
 }
 
 TEST(RayBatch, LaysTransparentPixelsOverTheBackground) {
@@ -141,11 +141,11 @@ TEST(RayBatch, LaysTransparentPixelsOverTheBackground) {
       EXPECT_NEAR(batch.targets[3 * ray + 2], opacity * 100 / 255 + (1 - opacity) * behind, 1e-6);
       backgrounds.insert(behind);
     }
-    EXPECT_GT(backgrounds.size(), 150u);  // random ones
+    EXPECT_GT(backgrounds.size(), 150u);  // they are random
   }
 }
 
-TEST(RayBatch, HasBlackBehindItWhenBackgroundsAreNotRandom) {
+TEST(RayBatch, UsesBlackBackgroundsUnlessTheyAreRandom) {
   RayBatch batch;
   drawRays({entry(0, addressed(7, 5, 100, 4, 51))}, {}, {1, false, 0}, 0, 100, pool(), batch);
   EXPECT_EQ(batch.backgrounds, std::vector<float>(300, 0.0f));
@@ -157,9 +157,9 @@ TEST(RayBatch, ReadsGreyPhotosAsGrey) {
   for (const float target : batch.targets) EXPECT_FLOAT_EQ(target, 0.2f);
 }
 
-TEST(RayBatch, DrawsAShareOfItsRaysWhereDistancesAreKnown) {
-  std::vector<std::vector<KnownDistance>> known(10);
-  known[4] = {{1, 2, 1.5f}, {6, 4, 2.5f}, {7, 0, 9.0f}};  // the last one is beside the photo
+TEST(RayBatch, DrawsAShareOfItsRaysThroughSparsePoints) {
+  std::vector<std::vector<SparseDepth>> known(10);
+  known[4] = {{1, 2, 1.5f}, {6, 4, 2.5f}, {7, 0, 9.0f}};  // the last one lies outside the photo
   RayBatch batch;
   drawRays(twoPhotos(), known, {1, true, 0.25}, 0, 4000, pool(), batch);
   int inFour = 0, counts[2] = {};
@@ -180,8 +180,8 @@ TEST(RayBatch, DrawsAShareOfItsRaysWhereDistancesAreKnown) {
   EXPECT_EQ(batch.distances, std::vector<float>(4000, 0.0f));
 }
 
-TEST(RayBatch, DrawsKnownPixelsFromTilesOnlyWhereItDrawsFromTiles) {
-  std::vector<std::vector<KnownDistance>> known(10);
+TEST(RayBatch, DrawsSparsePointsOnlyInsideTiles) {
+  std::vector<std::vector<SparseDepth>> known(10);
   known[4] = {{1, 2, 1.5f}, {6, 1, 2.5f}, {3, 3, 3.5f}};  // the last one is in no tile
   known[9] = {{0, 0, 9.0f}};
   std::vector<TileShares> tiles(10);
@@ -198,11 +198,11 @@ TEST(RayBatch, DrawsKnownPixelsFromTilesOnlyWhereItDrawsFromTiles) {
   }
   EXPECT_EQ(drawn.size(), 3u);
   EXPECT_NEAR(drawn[1.5f], drawn[2.5f], 80);
-  EXPECT_GT(drawn[1.5f], 300);  // of about 1000 that want a known pixel of this photo
+  EXPECT_GT(drawn[1.5f], 300);  // of about 1000 attempts to use a sparse depth of this photo
 }
 
-TEST(RayBatch, KnowsNoDistancesUnderMasks) {
-  const std::vector<std::vector<KnownDistance>> known = {{{3, 2, 1.5f}}};
+TEST(RayBatch, IgnoresSparseDepthsUnderMasks) {
+  const std::vector<std::vector<SparseDepth>> known = {{{3, 2, 1.5f}}};
   RayBatch batch;
   drawRays({entry(0, addressed(7, 5, 0), ImageU8(7, 5, 1, 0))}, known, {1, true, 1}, 0, 100, pool(), batch);
   EXPECT_EQ(batch.distances, std::vector<float>(100, 0.0f));
@@ -217,13 +217,13 @@ TEST(RayBatch, ShrinksWithTheNumberOfRays) {
   EXPECT_EQ(batch.photoOfRay.size(), 10u);
 }
 
-TEST(RayBatch, IsTheSameByAnyNumberOfThreads) {
+TEST(RayBatch, DoesNotDependOnTheNumberOfThreads) {
   constexpr uint32_t kRays = 5000;
   ImageU8 mask(7, 5, 1, 255);
   for (int x = 0; x < 4; ++x) *mask.at(x, 2) = 0;
   const std::vector<PhotoWindow::Entry> window = {entry(0, addressed(7, 5, 0, 4, 128), std::move(mask)),
                                                   entry(1, addressed(5, 9, 1))};
-  const std::vector<std::vector<KnownDistance>> known = {{{3, 1, 2.0f}}, {{2, 7, 5.0f}, {4, 8, 3.0f}}};
+  const std::vector<std::vector<SparseDepth>> known = {{{3, 1, 2.0f}}, {{2, 7, 5.0f}, {4, 8, 3.0f}}};
   const std::vector<TileShares> tiles = {{{{0, 0, 0, 7, 5}}, {1}}, {{{1, 0, 0, 5, 4}, {1, 0, 4, 5, 9}}, {1, 3}}};
   for (const std::vector<TileShares>* drawnFrom : {static_cast<const std::vector<TileShares>*>(nullptr), &tiles}) {
     std::vector<RayBatch> batches(3);

@@ -1,4 +1,4 @@
-// How many rays the next training step draws: as many as a method aims for, fewer at once where a step has no room.
+// The number of rays of the next training step: as many as a method aims for, fewer if a step exceeds its capacity.
 #pragma once
 
 #include <algorithm>
@@ -11,39 +11,40 @@ namespace tessera {
 
 class RayBudget {
  public:
-  // Rays come in whole groups.
+  // The number of rays is always a multiple of `group`.
   explicit RayBudget(const RaySettings& settings, uint32_t group = 1)
       : group_(group),
-        most_(wholeGroups(static_cast<uint32_t>(settings.mostRays))),
+        max_(wholeGroups(static_cast<uint32_t>(settings.maxRays))),
         rays_(wholeGroups(static_cast<uint32_t>(settings.firstRays))) {}
 
   uint32_t rays() const { return rays_; }
   bool canShrink() const { return rays_ > group_; }
 
-  // After a step: as many as its method has worked out that the next one should have, in whole groups.
+  // Called after a step with the number of rays that the method estimates for the next one.
   void aimFor(double rays) {
-    const uint32_t least = std::max(kLeast, group_);
-    rays_ = static_cast<uint32_t>(std::clamp<double>(rays, least, most_));
+    const uint32_t minimum = std::max(kMin, group_);
+    rays_ = static_cast<uint32_t>(std::clamp<double>(rays, minimum, max_));
   }
-  // After a try of a step that wanted so much where there is room for so much: true where it is to be tried again with
-  // fewer rays. What is wanted grows more slowly than rays.
-  bool drawsFewer(double wanted, double room) {
+  // Called after an attempt at a step that required `required` of a resource of which `capacity` is available. Returns
+  // true, having reduced the number of rays, if the step is to be repeated. The requirement grows more slowly than
+  // the number of rays.
+  bool drawsFewer(double required, double capacity) {
     constexpr double kFewer = 0.9;
-    if (wanted <= room || !canShrink()) return false;
-    rays_ = std::max(1u, static_cast<uint32_t>(kFewer * room / wanted * rays_ / group_)) * group_;
+    if (required <= capacity || !canShrink()) return false;
+    rays_ = std::max(1u, static_cast<uint32_t>(kFewer * capacity / required * rays_ / group_)) * group_;
     return true;
   }
 
-  // The tensor `rays` of a checkpoint.
+  // Adds the tensor `rays` of a checkpoint.
   void save(TensorSet& tensors) const { tensors.add("rays", std::vector<uint32_t>{rays_}); }
-  // Throws Error where there is none.
+  // Reads that tensor. Throws Error if it is missing or malformed.
   void restore(const fs::path& path, const Safetensors& state);
 
  private:
-  static constexpr uint32_t kLeast = 8;
+  static constexpr uint32_t kMin = 8;
   uint32_t wholeGroups(uint32_t rays) const { return rays / group_ * group_; }
 
-  uint32_t group_, most_, rays_;
+  uint32_t group_, max_, rays_;
 };
 
 }  // namespace tessera

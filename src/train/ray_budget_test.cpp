@@ -7,14 +7,14 @@
 namespace tessera {
 namespace {
 
-RaySettings settings(int first, int most) {
+RaySettings settings(int first, int maximum) {
   RaySettings rays;
   rays.firstRays = first;
-  rays.mostRays = most;
+  rays.maxRays = maximum;
   return rays;
 }
 
-TEST(RayBudget, StaysBetweenTheFewestAndTheMost) {
+TEST(RayBudget, StaysWithinItsBounds) {
   RayBudget budget(settings(100, 1000));
   EXPECT_EQ(budget.rays(), 100u);
   budget.aimFor(2000);
@@ -32,7 +32,7 @@ TEST(RayBudget, KeepsWholeGroups) {
   EXPECT_EQ(budget.rays(), 16u);
 }
 
-TEST(RayBudget, TriesAgainWithFewerUntilThereIsRoom) {
+TEST(RayBudget, RetriesWithFewerRaysUntilTheyFit) {
   RayBudget budget(settings(1000, 1000));
   EXPECT_FALSE(budget.drawsFewer(10, 10));
   EXPECT_EQ(budget.rays(), 1000u);
@@ -65,7 +65,7 @@ class RayBudgetCheckpoint : public testing::Test {
   const fs::path path_ = fs::temp_directory_path() / "tessera-ray-budget.safetensors";
 };
 
-TEST_F(RayBudgetCheckpoint, ComesBackWithinItsBounds) {
+TEST_F(RayBudgetCheckpoint, IsRestoredWithinItsBounds) {
   RayBudget budget(settings(64, 1000), 16);
   budget.restore(path_, holding({320}));
   EXPECT_EQ(budget.rays(), 320u);

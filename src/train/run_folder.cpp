@@ -16,8 +16,8 @@ void refuseCaptureFolder(const fs::path& model) {
   throw Error(model.string(), "", "holds a capture or photos", "name another folder for the model");
 }
 
-// The rest of what a run is made of stands in blocks.json (which capture) and manifest.json (how many steps).
-std::string howToRepeat(const Device& device, const TrainingLoopOptions& loop, const std::string& flags) {
+// The rest of what defines a run is in blocks.json (the capture) and manifest.json (the number of steps).
+std::string reproductionHeader(const Device& device, const TrainingLoopOptions& loop, const std::string& flags) {
   return fmt::format(
       "# tessera train CAPTURE MODEL --method {}{} --config THIS_FILE --steps {}\n"
       "# CAPTURE: see blocks.json. Computed on {}.\n\n",
@@ -26,12 +26,12 @@ std::string howToRepeat(const Device& device, const TrainingLoopOptions& loop, c
       device.target());
 }
 
-double settledPhotoBudget(double wanted, const Capture& capture, double mostBytes) {
+double resolvePhotoBudget(double requestedMiB, const Capture& capture, double maxBytes) {
   constexpr double kMiB = 1048576;
-  if (wanted > 0) return wanted;
+  if (requestedMiB > 0) return requestedMiB;
   const double all = static_cast<double>(decodedBytes(capture, capture.photosIn(Split::train)));
-  if (all <= mostBytes) return 0;
-  const double budget = std::max(0.001, std::floor(mostBytes / kMiB * 1000) / 1000);
+  if (all <= maxBytes) return 0;
+  const double budget = std::max(0.001, std::floor(maxBytes / kMiB * 1000) / 1000);
   inform("the training photos take {:.0f} MiB decoded, more than their share of memory: photo_budget_mib is {}",
          all / kMiB, budget);
   return budget;
@@ -48,7 +48,8 @@ ModelManifest requireManifest(const ModelFolder& folder, const std::string& meth
   ModelManifest manifest = requireManifest(folder);
   if (manifest.method == method) return manifest;
   throw Error(folder.root().string(), "manifest.json",
-              "is of --method " + manifest.method + ", where " + method + " is wanted", "name another model");
+              "was trained with --method " + manifest.method + ", but --method " + method + " is required",
+              "name another model");
 }
 
 void requireSameSettings(const fs::path& model, const std::vector<ConfigField>& saved,

@@ -1,4 +1,4 @@
-// What training any representation into a folder has in common, around the loop.
+// What training any representation into a folder shares, apart from the training loop.
 #pragma once
 
 #include "base/config.h"
@@ -7,21 +7,23 @@
 
 namespace tessera {
 
-// Throws Error when `model` holds a capture or photos: a model written there would be taken for part of it.
+// Throws Error if `model` holds a capture or photos: a model written there would be mistaken for part of it.
 void refuseCaptureFolder(const fs::path& model);
 
-// The first lines of config.toml. `flags`: more of them, as " --grid blocks.json".
-std::string howToRepeat(const Device& device, const TrainingLoopOptions& loop, const std::string& flags = {});
+// Returns the first lines of config.toml, comments with the command that reproduces the run. `flags`: further flags of
+// that command, as " --grid blocks.json".
+std::string reproductionHeader(const Device& device, const TrainingLoopOptions& loop, const std::string& flags = {});
 
-// The photo budget in MiB to train with: `wanted` if it is set; else `mostBytes` where all training photos, decoded,
-// would take more than that, which it says; else 0, no limit.
-double settledPhotoBudget(double wanted, const Capture& capture, double mostBytes);
+// Returns the photo budget in MiB: `requestedMiB` if it is set; else `maxBytes` if all training photos, decoded, would
+// take more than that, which it logs; else 0, no limit.
+double resolvePhotoBudget(double requestedMiB, const Capture& capture, double maxBytes);
 
-// The manifest of a trained model. Throws Error when there is none; and, of a method, when it is another one's.
+// Returns the manifest of a trained model. Throws Error if there is none or, with `method`, if the model was trained
+// with another method.
 ModelManifest requireManifest(const ModelFolder& folder);
 ModelManifest requireManifest(const ModelFolder& folder, const std::string& method);
 
-// The settings of the run that `model` holds; the defaults when it holds none.
+// Returns the settings of the run in `model`; the defaults if there is none.
 template <class Config>
 Config savedConfig(const fs::path& model) {
   Config config;
@@ -30,8 +32,8 @@ Config savedConfig(const fs::path& model) {
   return config;
 }
 
-// Throws Error when `model` holds a run of other settings: resumed, it would be repeatable from neither. What is left
-// to be found out (`auto`) is what the run has found.
+// Throws Error if the run in `model` has other settings than `now`: if it were resumed, neither would reproduce it.
+// Settings that are `auto` must have been replaced by the run's values before (MethodSettings::adoptTunedValues).
 void requireSameSettings(const fs::path& model, const std::vector<ConfigField>& saved,
                          const std::vector<ConfigField>& now);
 template <class Config>

@@ -9,7 +9,7 @@ namespace tessera {
 namespace {
 
 constexpr size_t kEnoughPoints = 200;
-constexpr double kFarOut = 10;  // times as far out as nine cameras in ten: a pose gone wrong
+constexpr double kFarOut = 10;  // times as far out as nine cameras in ten: taken for a wrong pose
 
 double percentile(std::vector<double>& values, double fraction) {
   const size_t rank = static_cast<size_t>(fraction * static_cast<double>(values.size() - 1));
@@ -29,7 +29,7 @@ SceneFrame frameOfPoints(const Capture& capture) {
   return {(low + high) / 2, 2 / std::max(1e-9, (high - low).maxCoeff()), Mat3d::Identity()};
 }
 
-// All photos but those few that would shrink the scene of all others to a speck.
+// Returns all photos except those so far out that they would make the scene of all others tiny.
 std::vector<const Photo*> photosTogether(const Capture& capture) {
   Vec3d median = Vec3d::Zero();
   for (int axis = 0; axis < 3 && !capture.photos.empty(); ++axis) {
@@ -40,11 +40,11 @@ std::vector<const Photo*> photosTogether(const Capture& capture) {
   std::vector<double> distances;
   for (const Photo& photo : capture.photos) distances.push_back((photo.worldFromCamera.translation - median).norm());
   std::vector<double> sorted = distances;
-  const double most = sorted.empty() ? 0 : percentile(sorted, 0.9);
+  const double maximum = sorted.empty() ? 0 : percentile(sorted, 0.9);
   std::vector<const Photo*> together;
   std::string first;
   for (size_t i = 0; i < distances.size(); ++i) {
-    if (most > 0 && distances[i] > kFarOut * most) {
+    if (maximum > 0 && distances[i] > kFarOut * maximum) {
       if (first.empty()) first = capture.photos[i].name;
     } else {
       together.push_back(&capture.photos[i]);
@@ -60,8 +60,8 @@ std::vector<const Photo*> photosTogether(const Capture& capture) {
 }
 
 SceneFrame frameOfCameras(const Capture& capture) {
-  // The point nearest to all optical axes in the least-squares sense; a little weight holds it near the cameras when
-  // the axes are parallel.
+  // The point nearest to all optical axes in the least-squares sense; a small weight along the axes keeps it near the
+  // cameras if the axes are parallel.
   Mat3d sum = Mat3d::Zero();
   Vec3d right = Vec3d::Zero();
   const std::vector<const Photo*> photos = photosTogether(capture);
@@ -90,16 +90,16 @@ SceneFrame fitSceneFrame(const Capture& capture, double margin) {
 }
 
 RayCamera makeRayCamera(const Camera& camera, const Pose& worldFromCamera, const SceneFrame& frame) {
-  RayCamera made;
-  made.lens = static_cast<int32_t>(camera.lens);
-  for (int i = 0; i < 16; ++i) made.parameters[i] = static_cast<float>(camera.parameters[i]);
+  RayCamera rayCamera;
+  rayCamera.lens = static_cast<int32_t>(camera.lens);
+  for (int i = 0; i < 16; ++i) rayCamera.parameters[i] = static_cast<float>(camera.parameters[i]);
   const Mat3d sceneFromCamera = frame.rotation * worldFromCamera.rotation;
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) made.rotation[3 * i + j] = static_cast<float>(sceneFromCamera(i, j));
+    for (int j = 0; j < 3; ++j) rayCamera.rotation[3 * i + j] = static_cast<float>(sceneFromCamera(i, j));
   }
   const Vec3d centre = frame.sceneFromWorld(worldFromCamera.translation);
-  for (int i = 0; i < 3; ++i) made.centre[i] = static_cast<float>(centre[i]);
-  return made;
+  for (int i = 0; i < 3; ++i) rayCamera.centre[i] = static_cast<float>(centre[i]);
+  return rayCamera;
 }
 
 }  // namespace tessera

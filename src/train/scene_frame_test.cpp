@@ -40,7 +40,7 @@ void addPoints(Capture& capture, int count, const Vec3d& low, const Vec3d& high)
   }
 }
 
-TEST(SceneFrame, OfManyPointsReachesToTheirBounds) {
+TEST(SceneFrame, CoversTheRobustBoundsOfManyPoints) {
   Capture capture = orbit({0, 0, 0}, 500);
   addPoints(capture, 5000, {100, 40, -10}, {300, 80, 20});
   const SceneFrame frame = fitSceneFrame(capture, 1);
@@ -60,7 +60,7 @@ TEST(SceneFrame, IsNotMovedByAFewPointsFarAway) {
   EXPECT_NEAR(after.scale, before.scale, 0.1 * before.scale);
 }
 
-TEST(SceneFrame, WithoutPointsLiesWhereTheCamerasLook) {
+TEST(SceneFrame, IsCentredWhereTheCamerasLookWithoutPoints) {
   for (const Vec3d& centre : {Vec3d(0, 0, 0), Vec3d(300, -200, 10)}) {
     const Capture capture = orbit(centre, 20);
     const SceneFrame frame = fitSceneFrame(capture, 1);
@@ -69,11 +69,11 @@ TEST(SceneFrame, WithoutPointsLiesWhereTheCamerasLook) {
     for (const Photo& photo : capture.photos) {
       farthest = std::max(farthest, frame.sceneFromWorld(photo.worldFromCamera.translation).lpNorm<Eigen::Infinity>());
     }
-    EXPECT_NEAR(farthest, 1, 1e-9);  // the cameras are just inside
+    EXPECT_NEAR(farthest, 1, 1e-9);  // the farthest camera lies on the border
   }
 }
 
-TEST(SceneFrame, WithoutPointsIsNotMovedByACameraFarAway) {
+TEST(SceneFrame, IgnoresACameraFarAwayWithoutPoints) {
   Capture capture = orbit({300, -200, 10}, 20);
   const SceneFrame before = fitSceneFrame(capture, 1);
   capture.photos.insert(capture.photos.begin() + 3, lookingAt({1e9, 2e9, -1e9}, {0, 0, 0}));
@@ -87,7 +87,7 @@ TEST(SceneFrame, WithoutPointsIsNotMovedByACameraFarAway) {
   EXPECT_NE(warnings.find("stray.jpg"), std::string::npos) << warnings;
 }
 
-TEST(SceneFrame, WithoutPointsReachesToCamerasThatStandApartForAReason) {
+TEST(SceneFrame, IncludesModeratelyDistantCamerasWithoutPoints) {
   Capture capture = orbit({0, 0, 0}, 20);
   for (const Vec3d& from : {Vec3d(0, 0, 150), Vec3d(10, 0, 160)}) capture.photos.push_back(lookingAt(from, {0, 0, 1}));
   for (int i = 0; i < 40; ++i) capture.photos.push_back(lookingAt({1, 2, 3}, {0.1 * i, 0, 0}));  // on a tripod
@@ -95,7 +95,7 @@ TEST(SceneFrame, WithoutPointsReachesToCamerasThatStandApartForAReason) {
   EXPECT_NEAR(frame.sceneFromWorld({10, 0, 160}).lpNorm<Eigen::Infinity>(), 1, 1e-9);
 }
 
-TEST(SceneFrame, OfCamerasThatAllLookTheSameWayIsFinite) {
+TEST(SceneFrame, IsFiniteForCamerasWithParallelAxes) {
   Capture capture;
   for (int i = 0; i < 5; ++i) capture.photos.push_back(lookingAt(Vec3d(i, 0, 30), Vec3d(i, 0, 0)));
   const SceneFrame frame = fitSceneFrame(capture, 1);
@@ -105,7 +105,7 @@ TEST(SceneFrame, OfCamerasThatAllLookTheSameWayIsFinite) {
   EXPECT_TRUE(std::isfinite(frame.scale));
 }
 
-TEST(SceneFrame, OfASingleCameraIsFinite) {
+TEST(SceneFrame, IsFiniteForASingleCamera) {
   Capture capture;
   capture.photos.push_back(lookingAt({1, 2, 3}, {4, 5, 6}));
   const SceneFrame frame = fitSceneFrame(capture, 1);
@@ -120,18 +120,18 @@ TEST(SceneFrame, GrowsWithItsMargin) {
   EXPECT_NEAR(wide.scale, tight.scale / 2, 1e-12);
 }
 
-TEST(SceneFrame, GivesRayCamerasScenePositions) {
+TEST(SceneFrame, PlacesRayCamerasInSceneUnits) {
   const SceneFrame frame{{100, 200, 300}, 0.5};
   Camera camera;
   camera.lens = LensModel::openCvFisheye;
   camera.parameters = {10, 11, 12, 13, 0.1, 0.2, 0.3, 0.4};
   const Photo photo = lookingAt({102, 204, 306}, {1, 1, 1});
-  const RayCamera made = makeRayCamera(camera, photo.worldFromCamera, frame);
-  EXPECT_EQ(made.lens, static_cast<int>(LensModel::openCvFisheye));
-  for (int i = 0; i < 16; ++i) EXPECT_EQ(made.parameters[i], static_cast<float>(camera.parameters[i]));
-  for (int i = 0; i < 3; ++i) EXPECT_FLOAT_EQ(made.centre[i], static_cast<float>(i + 1));
+  const RayCamera rayCamera = makeRayCamera(camera, photo.worldFromCamera, frame);
+  EXPECT_EQ(rayCamera.lens, static_cast<int>(LensModel::openCvFisheye));
+  for (int i = 0; i < 16; ++i) EXPECT_EQ(rayCamera.parameters[i], static_cast<float>(camera.parameters[i]));
+  for (int i = 0; i < 3; ++i) EXPECT_FLOAT_EQ(rayCamera.centre[i], static_cast<float>(i + 1));
   for (int i = 0; i < 9; ++i)
-    EXPECT_FLOAT_EQ(made.rotation[i], static_cast<float>(photo.worldFromCamera.rotation(i / 3, i % 3)));
+    EXPECT_FLOAT_EQ(rayCamera.rotation[i], static_cast<float>(photo.worldFromCamera.rotation(i / 3, i % 3)));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// When training does what.
+// Schedules of training: the learning rate, and the number of steps for a given time.
 #pragma once
 
 #include <algorithm>
@@ -8,8 +8,9 @@
 
 namespace tessera {
 
-// Warm-up, then constant until `constantFraction` of the steps, then an exponential fall to `finalFactor` at the end.
-// Or, `linear`, from 0 at step 0 in a line to `rate` after the warm-up, and in another to 0 at the end (NGP-RT's).
+// A learning rate schedule: a linear warm-up, then a constant rate until `constantFraction` of the steps, then an
+// exponential decay to `finalFactor` times the rate at the end. With `linear` (the schedule of NGP-RT) the rate rises
+// linearly from 0 at step 0 to `rate` after the warm-up, then falls linearly to 0 at the end.
 struct RateSchedule {
   double rate = 1e-2;
   double finalFactor = 0.03;
@@ -17,7 +18,7 @@ struct RateSchedule {
   int warmUpSteps = 20;
   bool linear = false;
 
-  // While `steps` is 0, nobody knows how many there will be, and nothing falls.
+  // Returns the rate of a step out of `steps`. If `steps` is 0 their number is unknown, and the rate does not fall.
   double at(int64_t step, int64_t steps) const {
     if (linear) {
       const auto now = static_cast<double>(step), all = static_cast<double>(steps);
@@ -32,27 +33,28 @@ struct RateSchedule {
   }
 };
 
-// `--minutes` as a number of steps, fixed once, early: from the pace in the second half of the first `share` of the
-// time (the first steps, before the scene's empty space is known, are slower). Until then the schedule does not depend
-// on the number of steps.
+// Derives the number of steps from `--minutes`, once, early in training: from the speed in the last fifth of the first
+// `share` of the time, because the first steps, before empty space is known, are slower. Until then the learning rate
+// does not depend on the number of steps.
 class StepBudget {
  public:
   explicit StepBudget(double minutes, double share = 0.25) : seconds_(minutes * 60), share_(share) {}
 
-  // Seconds since training began, after `step` steps. Returns the number of steps once it can be told, else 0.
+  // `seconds`: the time since training began, after `step` steps. Returns the number of steps once it can be
+  // determined, else 0.
   int64_t observe(int64_t step, double seconds) {
     if (seconds < 0.8 * share_ * seconds_) return 0;
     if (measureStep_ < 0) {
       measureStep_ = step;
       measureStart_ = seconds;
     }
-    if (seconds < share_ * seconds_ || step < measureStep_ + kFewest) return 0;
+    if (seconds < share_ * seconds_ || step < measureStep_ + kMin) return 0;
     const double perStep = (seconds - measureStart_) / static_cast<double>(step - measureStep_);
     return step + std::max<int64_t>(0, static_cast<int64_t>((seconds_ - seconds) / perStep));
   }
 
  private:
-  static constexpr int64_t kFewest = 16;
+  static constexpr int64_t kMin = 16;
   double seconds_, share_, measureStart_ = 0;
   int64_t measureStep_ = -1;
 };

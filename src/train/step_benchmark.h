@@ -1,4 +1,4 @@
-// How fast the arithmetic of a method's training step runs, on fixed samples, without photos, marching or occupancy.
+// Measures the speed of a method's training step on fixed samples, without photos, ray marching or occupancy updates.
 #pragma once
 
 #include <cstdint>
@@ -10,12 +10,12 @@ namespace tessera {
 struct StepBenchmarkOptions {
   uint32_t rays = 2048;
   uint32_t samplesPerRay = 32;
-  double seconds = 5;  // repeats for so long, after two steps that do not count, and at least 3 times
+  double seconds = 5;  // time to repeat the step for, at least 3 times, after two untimed warm-up steps
 };
 
 struct StepBenchmark {
-  uint32_t samples = 0;  // of a step
-  int steps = 0;         // timed
+  uint32_t samples = 0;  // per step
+  int steps = 0;         // number of timed steps
   double medianSeconds = 0, bestSeconds = 0;
   double samplesPerSecond = 0;  // of the median step
   double firstLoss = 0, lastLoss = 0;
@@ -23,7 +23,7 @@ struct StepBenchmark {
     std::string name;  // as forward, composite, backward, adam
     double medianSeconds = 0;
   };
-  std::vector<Phase> phases;  // in the order they run; waits between them are part of the step
+  std::vector<Phase> phases;  // in the order in which they run; waiting between them counts only towards the step
 };
 
 }  // namespace tessera

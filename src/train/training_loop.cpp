@@ -15,11 +15,11 @@
 namespace tessera {
 namespace {
 
-double psnrOf(double squaredError) {
+double computePsnr(double squaredError) {
   return -10 * std::log10(std::max(squaredError, 1e-10));
 }
 
-// Means since the last line of metrics.
+// Sums since the last line of metrics, from which the means are computed.
 struct Window {
   int64_t steps = 0;
   double loss = 0, squaredError = 0, rays = 0, samples = 0, marched = 0, texels = 0, since = 0;
@@ -40,7 +40,7 @@ nlohmann::json metricsLine(int64_t step, double seconds, const Window& window) {
   return {{"step", step},
           {"seconds", seconds},
           {"loss", window.loss / window.steps},
-          {"psnr", psnrOf(window.squaredError / window.steps)},
+          {"psnr", computePsnr(window.squaredError / window.steps)},
           {"rays_per_second", window.rays / span},
           {"samples_per_second", window.samples / span},
           {"marched_per_second", window.marched / span},
@@ -49,33 +49,33 @@ nlohmann::json metricsLine(int64_t step, double seconds, const Window& window) {
           {"peak_rss_bytes", peakResidentBytes()}};
 }
 
-// Where to go on from.
+// The state from which training continues.
 struct Start {
   ModelManifest state;
   int64_t planMadeAt = 0;  // see StepPlan
 };
 
-Start startingPoint(Trainee& trainee, const ModelFolder& folder, const TrainingLoopOptions& options) {
+Start startingPoint(TrainableModel& trainable, const ModelFolder& folder, const TrainingLoopOptions& options) {
   ModelManifest state;
   state.method = options.method;
   refuseTrainedModel(folder, options);
-  const std::optional<ModelManifest> found = folder.manifest();
-  if (found) {
-    if (found->method != options.method) {
-      throw Error(folder.root().string(), "manifest.json", "was trained with --method " + found->method,
+  const std::optional<ModelManifest> manifest = folder.manifest();
+  if (manifest) {
+    if (manifest->method != options.method) {
+      throw Error(folder.root().string(), "manifest.json", "was trained with --method " + manifest->method,
                   "resume with that method");
     }
-    if (found->files.size() != trainee.parts()) {
+    if (manifest->files.size() != trainable.parts()) {
       throw Error(
           folder.root().string(), "manifest.json",
-          fmt::format("names {} checkpoints where the model has {} parts", found->files.size(), trainee.parts()),
+          fmt::format("names {} checkpoints where the model has {} parts", manifest->files.size(), trainable.parts()),
           "restore the file or train again");
     }
-    for (uint32_t part = 0; part < trainee.parts(); ++part) {
-      const fs::path file = folder.root() / found->files[part];
-      trainee.restore(part, file, readSafetensors(file));
+    for (uint32_t part = 0; part < trainable.parts(); ++part) {
+      const fs::path file = folder.root() / manifest->files[part];
+      trainable.restore(part, file, readSafetensors(file));
     }
-    state = *found;
+    state = *manifest;
     folder.cutMetrics(state.step);
   } else {
     folder.cutMetrics(-1);
@@ -87,7 +87,7 @@ Start startingPoint(Trainee& trainee, const ModelFolder& folder, const TrainingL
   const StepPlan plan = options.resume ? folder.readPlan().value_or(StepPlan()) : StepPlan();
   if (options.minutes > 0 || plan.steps > 0) {
     state.plannedSteps = plan.steps;
-    return {state, plan.madeAt};
+    return {state, plan.plannedAtStep};
   }
   if (state.plannedSteps == 0) state.plannedSteps = kDefaultSteps;
   return {state, 0};
@@ -97,16 +97,16 @@ Start startingPoint(Trainee& trainee, const ModelFolder& folder, const TrainingL
 
 void refuseTrainedModel(const ModelFolder& folder, const TrainingLoopOptions& options) {
   if (options.resume) return;
-  const std::optional<ModelManifest> found = folder.manifest();
-  if (!found) return;
-  throw Error(folder.root().string(), "", fmt::format("already holds a model, trained for {} steps", found->step),
+  const std::optional<ModelManifest> manifest = folder.manifest();
+  if (!manifest) return;
+  throw Error(folder.root().string(), "", fmt::format("already holds a model, trained for {} steps", manifest->step),
               "pass --resume to go on with it, or name another folder");
 }
 
 void requireFormat(const fs::path& path, const Safetensors& state, const std::string& format,
                    const std::string& method) {
-  const auto found = state.metadata.find("format");
-  if (found != state.metadata.end() && found->second == format) return;
+  const auto entry = state.metadata.find("format");
+  if (entry != state.metadata.end() && entry->second == format) return;
   throw Error(path.string(), "", "is not a checkpoint of --method " + method, "train again");
 }
 
@@ -117,9 +117,9 @@ void warnOfOtherDevice(const fs::path& path, const Safetensors& state, const std
        device->second, target);
 }
 
-TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const TrainingLoopOptions& options) {
+TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder, const TrainingLoopOptions& options) {
   using Clock = std::chrono::steady_clock;
-  auto [state, planMadeAt] = startingPoint(trainee, folder, options);
+  auto [state, planMadeAt] = startingPoint(trainable, folder, options);
   if (!options.resume) fs::remove(folder.root() / "plan.json");
   const auto start = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
@@ -132,22 +132,22 @@ TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const Tr
   if (options.progress) progress.emplace("training", state.plannedSteps, "steps");
 
   const auto notANumber = [&](const std::string& what) {
-    const std::optional<uint32_t> part = trainee.brokenPart();
+    const std::optional<uint32_t> part = trainable.firstNonFinitePart();
     return Error(folder.root().string(),
                  part ? fmt::format("step {}, block {}", state.step, *part) : fmt::format("step {}", state.step),
                  what + " is not a number",
-                 "train into another folder with a lower --set rate=..., and report it with the capture");
+                 "train into another folder with a lower --set learning_rate=..., and report it with the capture");
   };
   const auto save = [&] {
-    if (trainee.brokenPart()) throw notANumber("a parameter");
-    folder.commit(state, trainee.parts(), [&](uint32_t part) {
-      return trainee.isAsSaved(part) ? std::nullopt : std::optional<Bytes>(trainee.save(part));
+    if (trainable.firstNonFinitePart()) throw notANumber("a parameter");
+    folder.commit(state, trainable.parts(), [&](uint32_t part) {
+      return trainable.isAsSaved(part) ? std::nullopt : std::optional<Bytes>(trainable.save(part));
     });
     savedAt = seconds();
   };
   const auto unfinished = [&] { return state.plannedSteps == 0 || state.step < state.plannedSteps; };
   while (unfinished() && !options.stopRequested()) {
-    const StepReport report = trainee.step(state.step, state.step < planMadeAt ? 0 : state.plannedSteps);
+    const StepReport report = trainable.step(state.step, state.step < planMadeAt ? 0 : state.plannedSteps);
     if (!std::isfinite(report.loss)) throw notANumber("the loss");
     window.add(report);
     totalSamples += report.samples;
@@ -162,7 +162,7 @@ TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const Tr
         if (progress) progress->setTotal(state.plannedSteps);
       }
     }
-    result.psnr = psnrOf(window.squaredError / window.steps);
+    result.psnr = computePsnr(window.squaredError / window.steps);
     if (progress) progress->update(state.step, fmt::format("{:.2f} dB", result.psnr));
     if (now - window.since >= 2 || !unfinished()) {
       folder.appendMetrics(metricsLine(state.step, now, window));

@@ -1,4 +1,4 @@
-// The loop around any representation's training step: number of steps, checkpoints, metrics, progress, stopping.
+// The training loop of all representations: number of steps, checkpoints, metrics, progress, stopping.
 #pragma once
 
 #include <functional>
@@ -13,29 +13,30 @@ struct StepReport {
   double loss = 0;
   double squaredError = 0;  // mean over colour channels, for PSNR
   uint32_t rays = 0;
-  uint32_t samples = 0;  // that networks were trained on
-  uint32_t marched = 0;  // whose density was looked up to find those
-  uint32_t texels = 0;   // of virtual grids that the networks were evaluated at; 0 where there are none
+  uint32_t samples = 0;  // samples that the networks were trained on
+  uint32_t marched = 0;  // samples whose density was evaluated to find those
+  uint32_t texels = 0;   // texels of virtual grids that the networks were evaluated at; 0 without such grids
 };
 
-// One representation in training. The state after a step is a function of the capture, the settings and the step alone.
-class Trainee {
+// A model in training. The state after a step is a function of the capture, the settings and the step alone.
+class TrainableModel {
  public:
-  virtual ~Trainee() = default;
-  // `plannedSteps` 0: not known yet.
+  virtual ~TrainableModel() = default;
+  // Performs one step. `plannedSteps`: the total number of steps, 0 if it is not known yet.
   virtual StepReport step(int64_t step, int64_t plannedSteps) = 0;
-  // Everything that later steps depend on, as one safetensors file a part (a block); and back. `path` is for errors.
+  // Save and restore everything that later steps depend on, as one safetensors file per part (a block). `path` is for
+  // error messages.
   virtual uint32_t parts() const { return 1; }
   virtual Bytes save(uint32_t part) = 0;
-  virtual bool isAsSaved(uint32_t) const { return false; }  // nothing of it has changed since the last save or restore
+  virtual bool isAsSaved(uint32_t) const { return false; }  // whether it is unchanged since the last save or restore
   virtual void restore(uint32_t part, const fs::path& path, const Safetensors& state) = 0;
-  // The first part that holds something that is not a number, of what is in memory. Asked before a checkpoint, which
-  // must not replace a whole one, and when a loss is not a number.
-  virtual std::optional<uint32_t> brokenPart() { return std::nullopt; }
+  // Returns the first resident part that holds a value that is not finite. Called before a checkpoint, which must not
+  // replace an intact one, and when a loss is not finite.
+  virtual std::optional<uint32_t> firstNonFinitePart() { return std::nullopt; }
 };
 
-// Throws Error when a checkpoint says that it is of another kind; warns when it was trained on another device, which is
-// as good, but not the same bits.
+// requireFormat throws Error if a checkpoint's metadata names another format. warnOfOtherDevice warns if it was trained
+// on another device: the result is as good, but not bit-identical.
 void requireFormat(const fs::path& path, const Safetensors& state, const std::string& format,
                    const std::string& method);
 void warnOfOtherDevice(const fs::path& path, const Safetensors& state, const std::string& target);
@@ -44,12 +45,12 @@ inline constexpr int64_t kDefaultSteps = 10000;
 
 struct TrainingLoopOptions {
   std::string method;
-  int64_t steps = 0;   // when no minutes are given; 0: what the run that is resumed had planned, else kDefaultSteps
-  double minutes = 0;  // > 0: fixes the number of steps once, early
+  int64_t steps = 0;   // used without minutes; 0: as the resumed run had planned, else kDefaultSteps
+  double minutes = 0;  // > 0: the number of steps is derived from it, once, early in training
   double checkpointSeconds = 60;
   bool resume = false;
   bool progress = true;
-  std::function<bool()> stopRequested = [] { return false; };  // save and leave
+  std::function<bool()> stopRequested = [] { return false; };  // true: save and return
 };
 
 struct TrainingResult {
@@ -58,11 +59,11 @@ struct TrainingResult {
   double seconds = 0, psnr = 0, samplesPerSecond = 0;
 };
 
-// Throws Error when the folder holds a model and `resume` is off. Nothing has been touched then.
+// Throws Error if the folder holds a model and `resume` is off. Changes nothing.
 void refuseTrainedModel(const ModelFolder& folder, const TrainingLoopOptions& options);
 
-// Trains until done, asked to stop, or killed. Throws Error at a loss or a parameter that is not a number (with the
-// step; the checkpoint before it stays), and as refuseTrainedModel does.
-TrainingResult runTraining(Trainee& trainee, const ModelFolder& folder, const TrainingLoopOptions& options);
+// Trains until all steps are done or a stop is requested. Throws Error, with the step, if a loss or a parameter is not
+// finite (the checkpoint before it is kept), and as refuseTrainedModel does.
+TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder, const TrainingLoopOptions& options);
 
 }  // namespace tessera

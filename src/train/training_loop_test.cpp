@@ -15,8 +15,8 @@
 namespace tessera {
 namespace {
 
-// Its state is one number that every step changes in a way that depends on the step and on all before it.
-class FakeTrainee : public Trainee {
+// Its state is one number; every step changes it depending on the step and on all steps before.
+class FakeTrainableModel : public TrainableModel {
  public:
   StepReport step(int64_t step, int64_t plannedSteps) override {
     if (dieAt == step) throw std::runtime_error("killed");
@@ -42,7 +42,7 @@ class FakeTrainee : public Trainee {
     ++restores;
   }
 
-  std::optional<uint32_t> brokenPart() override { return broken; }
+  std::optional<uint32_t> firstNonFinitePart() override { return broken; }
 
   uint64_t state = 1;
   std::optional<uint32_t> broken;
@@ -53,12 +53,12 @@ class FakeTrainee : public Trainee {
 };
 
 TrainingLoopOptions options(int64_t steps, bool resume = false) {
-  TrainingLoopOptions made;
-  made.method = "fake";
-  made.steps = steps;
-  made.resume = resume;
-  made.progress = false;
-  return made;
+  TrainingLoopOptions loop;
+  loop.method = "fake";
+  loop.steps = steps;
+  loop.resume = resume;
+  loop.progress = false;
+  return loop;
 }
 
 Bytes checkpoint(const ModelFolder& folder) {
@@ -83,10 +83,10 @@ class TrainingLoop : public testing::Test {
 };
 
 TEST_F(TrainingLoop, DoesEveryStepOnceAndSaves) {
-  FakeTrainee trainee;
-  const TrainingResult result = runTraining(trainee, folder_, options(7));
-  EXPECT_EQ(trainee.steps, (std::vector<int64_t>{0, 1, 2, 3, 4, 5, 6}));
-  EXPECT_EQ(trainee.planned, std::vector<int64_t>(7, 7));
+  FakeTrainableModel trainable;
+  const TrainingResult result = runTraining(trainable, folder_, options(7));
+  EXPECT_EQ(trainable.steps, (std::vector<int64_t>{0, 1, 2, 3, 4, 5, 6}));
+  EXPECT_EQ(trainable.planned, std::vector<int64_t>(7, 7));
   EXPECT_TRUE(result.finished);
   EXPECT_EQ(result.step, 7);
   EXPECT_EQ(result.plannedSteps, 7);
@@ -98,8 +98,8 @@ TEST_F(TrainingLoop, DoesEveryStepOnceAndSaves) {
 }
 
 TEST_F(TrainingLoop, WritesMetricsWithEverythingInThem) {
-  FakeTrainee trainee;
-  runTraining(trainee, folder_, options(7));
+  FakeTrainableModel trainable;
+  runTraining(trainable, folder_, options(7));
   std::ifstream in(folder_.metricsPath());
   std::string last, line;
   while (std::getline(in, line)) last = line;
@@ -112,8 +112,8 @@ TEST_F(TrainingLoop, WritesMetricsWithEverythingInThem) {
   EXPECT_GT(metrics.at("peak_rss_bytes"), 1000000);
 }
 
-TEST_F(TrainingLoop, DoesNotTouchAModelUnlessToldToGoOn) {
-  FakeTrainee first, second;
+TEST_F(TrainingLoop, DoesNotTouchAModelUnlessResumed) {
+  FakeTrainableModel first, second;
   runTraining(first, folder_, options(3));
   folder_.writePlan({99, 9});
   const Bytes before = checkpoint(folder_);
@@ -132,66 +132,66 @@ TEST_F(TrainingLoop, DoesNotTouchAModelUnlessToldToGoOn) {
 }
 
 TEST_F(TrainingLoop, ResumesToTheSameEndAsAnUnbrokenRun) {
-  FakeTrainee unbroken;
+  FakeTrainableModel unbroken;
   const ModelFolder other(temporary_ / "unbroken");
   runTraining(unbroken, other, options(20));
   int64_t lastStep = -1;
   for (const int64_t stopAt : {1, 2, 9, 19, 20}) {
-    FakeTrainee trainee;
+    FakeTrainableModel trainable;
     TrainingLoopOptions some = options(20, true);
-    some.stopRequested = [&] { return !trainee.steps.empty() && trainee.steps.back() + 1 >= stopAt; };
-    const TrainingResult result = runTraining(trainee, folder_, some);
+    some.stopRequested = [&] { return !trainable.steps.empty() && trainable.steps.back() + 1 >= stopAt; };
+    const TrainingResult result = runTraining(trainable, folder_, some);
     EXPECT_EQ(result.step, stopAt);
     EXPECT_EQ(result.finished, stopAt == 20);
-    EXPECT_EQ(trainee.steps.front(), lastStep + 1);
-    lastStep = trainee.steps.back();
+    EXPECT_EQ(trainable.steps.front(), lastStep + 1);
+    lastStep = trainable.steps.back();
   }
   EXPECT_EQ(checkpoint(folder_), checkpoint(other));
 }
 
 TEST_F(TrainingLoop, ResumesAfterBeingKilledFromTheLastCheckpoint) {
-  FakeTrainee unbroken;
+  FakeTrainableModel unbroken;
   const ModelFolder other(temporary_ / "unbroken");
   runTraining(unbroken, other, options(20));
   for (const int64_t dieAt : {3, 4, 12, -1}) {
-    FakeTrainee trainee;
-    trainee.dieAt = dieAt;
+    FakeTrainableModel trainable;
+    trainable.dieAt = dieAt;
     TrainingLoopOptions some = options(20, true);
-    some.checkpointSeconds = dieAt == 4 ? 1000 : 0;  // the run that dies at 4 leaves nothing
+    some.checkpointSeconds = dieAt == 4 ? 1000 : 0;  // the run that is killed at step 4 writes no checkpoint
     try {
-      runTraining(trainee, folder_, some);
+      runTraining(trainable, folder_, some);
     } catch (const std::runtime_error& killed) {
       EXPECT_STREQ(killed.what(), "killed");
     }
     if (dieAt == 12) {
-      EXPECT_EQ(trainee.steps.front(), 3);
+      EXPECT_EQ(trainable.steps.front(), 3);
     }
   }
   EXPECT_EQ(checkpoint(folder_), checkpoint(other));
   EXPECT_EQ(metricSteps(folder_).back(), 20);
 }
 
-TEST_F(TrainingLoop, ForgetsMetricsOfStepsThatItDoesAgain) {
-  FakeTrainee first;
+TEST_F(TrainingLoop, RemovesMetricsOfRepeatedSteps) {
+  FakeTrainableModel first;
   runTraining(first, folder_, options(3));
   folder_.appendMetrics({{"step", 4}});
   folder_.appendMetrics({{"step", 5}});
-  FakeTrainee second;
+  FakeTrainableModel second;
   runTraining(second, folder_, options(5, true));
   EXPECT_EQ(metricSteps(folder_), (std::vector<int64_t>{3, 5}));
 }
 
-TEST_F(TrainingLoop, ForgetsMetricsOfARunThatNeverSaved) {
+TEST_F(TrainingLoop, RemovesMetricsOfARunWithoutCheckpoints) {
   folder_.commit({"fake", 1, 1, {}}, 1, [](uint32_t) { return Bytes(); });
   fs::remove(folder_.root() / "manifest.json");
   folder_.appendMetrics({{"step", 1}});
-  FakeTrainee trainee;
-  runTraining(trainee, folder_, options(2));
+  FakeTrainableModel trainable;
+  runTraining(trainable, folder_, options(2));
   EXPECT_EQ(metricSteps(folder_), std::vector<int64_t>{2});
 }
 
-TEST_F(TrainingLoop, HasNothingToDoWhenResumedAtItsEnd) {
-  FakeTrainee first, second;
+TEST_F(TrainingLoop, DoesNothingWhenResumedAtItsEnd) {
+  FakeTrainableModel first, second;
   runTraining(first, folder_, options(3));
   const TrainingResult result = runTraining(second, folder_, options(3, true));
   EXPECT_TRUE(result.finished);
@@ -200,14 +200,14 @@ TEST_F(TrainingLoop, HasNothingToDoWhenResumedAtItsEnd) {
   EXPECT_EQ(second.state, first.state);
 }
 
-TEST_F(TrainingLoop, BeginsWhenToldToResumeWhereThereIsNothing) {
-  FakeTrainee trainee;
-  EXPECT_TRUE(runTraining(trainee, folder_, options(3, true)).finished);
-  EXPECT_EQ(trainee.restores, 0);
+TEST_F(TrainingLoop, StartsAnewWhenThereIsNothingToResume) {
+  FakeTrainableModel trainable;
+  EXPECT_TRUE(runTraining(trainable, folder_, options(3, true)).finished);
+  EXPECT_EQ(trainable.restores, 0);
 }
 
 TEST_F(TrainingLoop, RefusesToResumeAModelOfAnotherMethod) {
-  FakeTrainee first, second;
+  FakeTrainableModel first, second;
   runTraining(first, folder_, options(3));
   TrainingLoopOptions other = options(5, true);
   other.method = "other";
@@ -220,8 +220,8 @@ TEST_F(TrainingLoop, RefusesToResumeAModelOfAnotherMethod) {
   EXPECT_TRUE(second.steps.empty());
 }
 
-TEST_F(TrainingLoop, NamesTheStepWhoseLossIsNotANumberAndKeepsTheCheckpointBefore) {
-  FakeTrainee first, second;
+TEST_F(TrainingLoop, ReportsTheStepOfANonFiniteLossAndKeepsTheCheckpointBefore) {
+  FakeTrainableModel first, second;
   runTraining(first, folder_, options(3));
   const Bytes before = checkpoint(folder_);
   second.nanAt = 5;
@@ -237,8 +237,8 @@ TEST_F(TrainingLoop, NamesTheStepWhoseLossIsNotANumberAndKeepsTheCheckpointBefor
   EXPECT_EQ(checkpoint(folder_), before);
 }
 
-TEST_F(TrainingLoop, KeepsTheCheckpointBeforeAParameterThatIsNotANumber) {
-  FakeTrainee first, second;
+TEST_F(TrainingLoop, KeepsTheCheckpointBeforeANonFiniteParameter) {
+  FakeTrainableModel first, second;
   runTraining(first, folder_, options(3));
   const Bytes before = checkpoint(folder_);
   second.broken = 4;
@@ -251,56 +251,56 @@ TEST_F(TrainingLoop, KeepsTheCheckpointBeforeAParameterThatIsNotANumber) {
   EXPECT_EQ(checkpoint(folder_), before);
 }
 
-TEST_F(TrainingLoop, KeepsWhatWasPlannedWhenResumedWithoutANumberOfSteps) {
-  FakeTrainee first, second, third;
+TEST_F(TrainingLoop, KeepsThePlannedStepsWhenResumedWithoutANumberOfSteps) {
+  FakeTrainableModel first, second, third;
   TrainingLoopOptions some = options(20);
   some.stopRequested = [&] { return first.steps.size() >= 5; };
   runTraining(first, folder_, some);
   EXPECT_EQ(runTraining(second, folder_, options(0, true)).plannedSteps, 20);
   EXPECT_EQ(second.steps.size(), 15u);
-  folder_.writePlan({30, 4});  // of --minutes
+  folder_.writePlan({30, 4});  // as if derived from --minutes
   EXPECT_EQ(runTraining(third, folder_, options(0, true)).plannedSteps, 30);
   EXPECT_EQ(third.steps.size(), 10u);
 }
 
 TEST_F(TrainingLoop, SavesWhenItIsAskedToStop) {
-  FakeTrainee trainee;
+  FakeTrainableModel trainable;
   TrainingLoopOptions some = options(1000000);
-  some.stopRequested = [&] { return trainee.steps.size() >= 5; };
-  const TrainingResult result = runTraining(trainee, folder_, some);
+  some.stopRequested = [&] { return trainable.steps.size() >= 5; };
+  const TrainingResult result = runTraining(trainable, folder_, some);
   EXPECT_FALSE(result.finished);
   EXPECT_EQ(result.step, 5);
   EXPECT_EQ(result.plannedSteps, 1000000);
   EXPECT_EQ(folder_.manifest()->step, 5);
-  EXPECT_EQ(trainee.saves, 1);
+  EXPECT_EQ(trainable.saves, 1);
 }
 
 TEST_F(TrainingLoop, FixesTheStepsOfItsMinutesOnceAndRemembersThem) {
-  FakeTrainee trainee;
-  trainee.pace = std::chrono::microseconds(200);
+  FakeTrainableModel trainable;
+  trainable.pace = std::chrono::microseconds(200);
   TrainingLoopOptions some = options(0);
   some.minutes = 0.4 / 60;
-  const TrainingResult result = runTraining(trainee, folder_, some);
+  const TrainingResult result = runTraining(trainable, folder_, some);
   EXPECT_TRUE(result.finished);
   EXPECT_GT(result.plannedSteps, 128);
   EXPECT_EQ(result.step, result.plannedSteps);
   EXPECT_LT(result.seconds, 4);
   EXPECT_EQ(folder_.readPlan()->steps, result.plannedSteps);
-  // Not known at first; from then on always the same.
-  EXPECT_EQ(trainee.planned.front(), 0);
-  EXPECT_EQ(trainee.planned.back(), result.plannedSteps);
-  for (const int64_t planned : trainee.planned) EXPECT_TRUE(planned == 0 || planned == result.plannedSteps);
+  // The number of steps is unknown at first, and constant from then on.
+  EXPECT_EQ(trainable.planned.front(), 0);
+  EXPECT_EQ(trainable.planned.back(), result.plannedSteps);
+  for (const int64_t planned : trainable.planned) EXPECT_TRUE(planned == 0 || planned == result.plannedSteps);
 }
 
 TEST_F(TrainingLoop, KeepsTheStepsOfItsMinutesWhenResumed) {
-  FakeTrainee first;
+  FakeTrainableModel first;
   first.pace = std::chrono::microseconds(200);
   TrainingLoopOptions some = options(0, true);
   some.minutes = 0.4 / 60;
   some.stopRequested = [&] { return !first.planned.empty() && first.planned.back() != 0; };
   const TrainingResult stopped = runTraining(first, folder_, some);
   ASSERT_FALSE(stopped.finished);
-  FakeTrainee second;  // at another pace
+  FakeTrainableModel second;  // runs at another speed
   some.stopRequested = [] { return false; };
   const TrainingResult result = runTraining(second, folder_, some);
   EXPECT_EQ(result.plannedSteps, stopped.plannedSteps);
@@ -309,11 +309,11 @@ TEST_F(TrainingLoop, KeepsTheStepsOfItsMinutesWhenResumed) {
 }
 
 TEST_F(TrainingLoop, UsesThePlanOfARunThatWasKilledBeforeItsFirstCheckpoint) {
-  FakeTrainee first;
+  FakeTrainableModel first;
   first.pace = std::chrono::microseconds(200);
   TrainingLoopOptions some = options(0);
   some.minutes = 0.4 / 60;
-  FakeTrainee* running = &first;
+  FakeTrainableModel* running = &first;
   some.stopRequested = [&]() -> bool {
     if (!running->planned.empty() && running->planned.back() != 0) throw std::runtime_error("killed");
     return false;
@@ -322,24 +322,24 @@ TEST_F(TrainingLoop, UsesThePlanOfARunThatWasKilledBeforeItsFirstCheckpoint) {
   ASSERT_FALSE(folder_.manifest());
   const StepPlan plan = folder_.readPlan().value_or(StepPlan());
   ASSERT_GT(plan.steps, 0);
-  ASSERT_GT(plan.madeAt, 0);
+  ASSERT_GT(plan.plannedAtStep, 0);
   some.stopRequested = [] { return false; };
   some.resume = true;
-  FakeTrainee second;
+  FakeTrainableModel second;
   EXPECT_EQ(runTraining(second, folder_, some).step, plan.steps);
-  // The steps of the killed run again, as it did them.
+  // The steps of the killed run are repeated as it performed them.
   for (size_t i = 0; i < second.steps.size(); ++i) {
-    ASSERT_EQ(second.planned[i], second.steps[i] < plan.madeAt ? 0 : plan.steps) << second.steps[i];
+    ASSERT_EQ(second.planned[i], second.steps[i] < plan.plannedAtStep ? 0 : plan.steps) << second.steps[i];
   }
 }
 
 TEST_F(TrainingLoop, MakesANewPlanWhenItBeginsAnew) {
   fs::create_directories(folder_.root());
   folder_.writePlan({7, 3});
-  FakeTrainee trainee;
+  FakeTrainableModel trainable;
   TrainingLoopOptions some = options(0);
   some.minutes = 0.05 / 60;
-  EXPECT_NE(runTraining(trainee, folder_, some).plannedSteps, 7);
+  EXPECT_NE(runTraining(trainable, folder_, some).plannedSteps, 7);
 }
 
 }  // namespace

@@ -8,12 +8,12 @@
 namespace tessera {
 namespace {
 
-constexpr int kBlock = 2;               // cells are judged in blocks of 2³
-constexpr size_t kEnough = 20;          // observations of a photo
-constexpr double kNearestShare = 0.02;  // of the observations are taken for outliers
-constexpr double kSlack = 0.25;         // of the width: other views look a little past what photos show
+constexpr int kBlock = 2;               // visibility is tested for blocks of 2³ cells
+constexpr size_t kEnough = 20;          // minimum number of observations of a photo
+constexpr double kNearestShare = 0.02;  // share of the observations that are taken for outliers
+constexpr double kSlack = 0.25;         // of the image width: other views look slightly beyond what photos show
 
-// The place in the block of a point given in grid coordinates. Nothing for what no point of the scene maps to.
+// Computes the point in block coordinates from grid coordinates. Returns false if no point of the scene maps there.
 bool blockFromGrid(const MarchSpace& space, const Vec3d& u, Vec3d* x) {
   if (!space.contracted) {
     *x = 2 * u - Vec3d::Ones();
@@ -38,17 +38,17 @@ struct View {
   const Camera* camera;
   Pose cameraFromWorld;
   double near;
-  double slack;  // pixels beyond the border that still count
+  double slack;  // margin around the image, pixels
 };
 
-// Along the optical axis; along the ray for fisheyes, which see behind that plane.
-double depthOf(const Camera& camera, const Vec3d& xInCamera) {
+// Returns the depth along the optical axis or, for fisheyes, which see behind the image plane, along the ray.
+double cameraDepth(const Camera& camera, const Vec3d& xInCamera) {
   return lensSeesBehind(camera.lens) ? xInCamera.norm() : xInCamera.z();
 }
 
 bool sees(const View& view, const Vec3d& xInWorld) {
   const Vec3d x = view.cameraFromWorld * xInWorld;
-  if (depthOf(*view.camera, x) < view.near) return false;
+  if (cameraDepth(*view.camera, x) < view.near) return false;
   const std::optional<Vec2d> pixel = view.camera->pixelFromCamera(x);
   return pixel && pixel->x() > -view.slack && pixel->y() > -view.slack &&
          pixel->x() < view.camera->width + view.slack && pixel->y() < view.camera->height + view.slack;
@@ -56,12 +56,12 @@ bool sees(const View& view, const Vec3d& xInWorld) {
 
 }  // namespace
 
-std::vector<double> nearestContent(const Capture& capture) {
+std::vector<double> nearestSparseDepth(const Capture& capture) {
   std::vector<std::vector<double>> depths(capture.photos.size());
   for (const Observation& observation : capture.observations) {
     const Photo& photo = capture.photos[observation.photo];
-    const double depth = depthOf(capture.cameras[photo.camera],
-                                 photo.worldFromCamera.inverse() * capture.points[observation.point].xInWorld);
+    const double depth = cameraDepth(capture.cameras[photo.camera],
+                                     photo.worldFromCamera.inverse() * capture.points[observation.point].xInWorld);
     if (depth > 0) depths[observation.photo].push_back(depth);
   }
   std::vector<double> nearest(capture.photos.size(), 0.0);
@@ -78,7 +78,7 @@ std::vector<double> nearestContent(const Capture& capture) {
 std::vector<bool> visibleCells(const Capture& capture, const SceneFrame& frame, const MarchSpace& space,
                                const BlockDomain& block) {
   const Vec3d centre(block.centre.data()), scale(block.scale.data());
-  const std::vector<double> nearest = nearestContent(capture);
+  const std::vector<double> nearest = nearestSparseDepth(capture);
   std::vector<View> views;
   for (const int photo : capture.photosIn(Split::train)) {
     const Camera& camera = capture.cameras[capture.photos[photo].camera];
@@ -89,11 +89,12 @@ std::vector<bool> visibleCells(const Capture& capture, const SceneFrame& frame, 
   std::vector<uint8_t> blockVisible(static_cast<size_t>(blocks) * blocks * blocks);
   ThreadPool pool;
   pool.run(blocks, [&](size_t z, int) {
-    size_t last = 0;  // neighbours are mostly seen by the same photo
+    size_t last = 0;  // neighbouring blocks are mostly visible in the same photo
     for (int y = 0; y < blocks; ++y) {
       for (int x = 0; x < blocks; ++x) {
         bool visible = false;
-        // The centre and the corners, drawn in a little so that they lie in the block's own region of the contraction.
+        // Tests the centre and the corners, moved slightly inwards so that they lie in the block's own region of the
+        // contraction.
         for (int corner = 8; corner >= 0 && !visible; --corner) {
           const double reach = corner == 8 ? 0 : 0.98;
           const Vec3d offset((corner & 1 ? 1 : -1) * reach, (corner & 2 ? 1 : -1) * reach,

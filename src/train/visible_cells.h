@@ -1,5 +1,5 @@
-// Which cells of the occupancy grid a training photo can see at all. What none sees is never trained, would be random
-// when looked at from elsewhere, and is left empty (instant-ngp marks such cells too).
+// Finds the cells of an occupancy grid that are visible in some training photo. The other cells are never trained,
+// would look random from other viewpoints, and are left empty (instant-ngp also marks such cells).
 #pragma once
 
 #include "compute/rays.h"
@@ -9,17 +9,17 @@
 
 namespace tessera {
 
-inline constexpr double kNearShare = 0.8;
+inline constexpr double kNearShare = 0.8;  // of a photo's nearest sparse depth, before which space is assumed empty
 
-// One entry a cell, in the order of MarchRays::occupancy. A cell is visible when a training photo has it in its picture
-// no nearer than the photo's nearest content: with sparse points, kNearShare of the depth of the nearest ones observed
-// (the free space below drones and in front of cameras then stays free); else the march's near.
-// `space` is about a block: the one that fills the scene's region, or the one in `block`.
+// Returns one entry per cell, in the order of MarchRays::occupancy. A cell is visible if it lies in the image of some
+// training photo and not nearer than a minimum depth: kNearShare of nearestSparseDepth (so that the free space below
+// drones and in front of cameras remains empty) or, without sparse points, the near distance of `space`. `space` is
+// relative to a block: the one that fills the scene's region, or `block`.
 std::vector<bool> visibleCells(const Capture& capture, const SceneFrame& frame, const MarchSpace& space,
                                const BlockDomain& block = {});
 
-// Per photo, the depth before which nothing was observed, in world units: along the optical axis, for fisheyes along
-// the ray. 0 with fewer than 20 observations.
-std::vector<double> nearestContent(const Capture& capture);
+// Returns for each photo the depth before which no point was observed, ignoring outliers, in world units: along the
+// optical axis or, for fisheyes, along the ray. 0 with fewer than 20 observations.
+std::vector<double> nearestSparseDepth(const Capture& capture);
 
 }  // namespace tessera

@@ -10,7 +10,7 @@
 namespace tessera {
 namespace {
 
-// One photo at the origin of the world that looks along +Y, 90 degrees wide and high.
+// One photo at the world's origin that looks along +Y, with a field of view of 90 degrees in both directions.
 Capture lookingAlongY() {
   Capture capture;
   Camera camera;
@@ -27,11 +27,11 @@ Capture lookingAlongY() {
 }
 
 MarchSpace space(bool contracted) {
-  MarchSpace made;
-  made.contracted = contracted;
-  made.gridResolution = 32;
-  made.near = 0.05f;
-  return made;
+  MarchSpace marchSpace;
+  marchSpace.contracted = contracted;
+  marchSpace.gridResolution = 32;
+  marchSpace.near = 0.05f;
+  return marchSpace;
 }
 
 bool at(const std::vector<bool>& cells, const MarchSpace& space, const Vec3d& gridCoordinates) {
@@ -39,24 +39,24 @@ bool at(const std::vector<bool>& cells, const MarchSpace& space, const Vec3d& gr
   return cells[cell.x() + space.gridResolution * (cell.y() + space.gridResolution * cell.z())];
 }
 
-// Grid coordinates of a point in the unit cube.
+// Returns the grid coordinates of a point in the unit cube.
 Vec3d inside(const MarchSpace& space, double x, double y, double z) {
   const Vec3d point(x, y, z);
   return space.contracted ? Vec3d((point + Vec3d::Constant(2)) / 4) : Vec3d((point + Vec3d::Ones()) / 2);
 }
 
-TEST(VisibleCells, AreThoseInFrontOfACameraAndInItsPicture) {
+TEST(VisibleCells, AreThoseInFrontOfACameraAndInItsImage) {
   for (const bool contracted : {true, false}) {
     const MarchSpace march = space(contracted);
     const std::vector<bool> cells = visibleCells(lookingAlongY(), SceneFrame(), march);
     EXPECT_TRUE(at(cells, march, inside(march, 0.05, 0.8, 0.05)));
     EXPECT_TRUE(at(cells, march, inside(march, -0.4, 0.5, 0.4)));
-    EXPECT_FALSE(at(cells, march, inside(march, 0.05, -0.8, 0.05)));  // behind
-    EXPECT_FALSE(at(cells, march, inside(march, 0.9, 0.2, 0.05)));    // beside
+    EXPECT_FALSE(at(cells, march, inside(march, 0.05, -0.8, 0.05)));  // behind the camera
+    EXPECT_FALSE(at(cells, march, inside(march, 0.9, 0.2, 0.05)));    // outside the image
   }
 }
 
-TEST(VisibleCells, ReachToInfinityWhenContractedAndLeaveOutWhatMapsToNoPoint) {
+TEST(VisibleCells, ReachToInfinityWhenContractedAndExcludeUnmappedCells) {
   const MarchSpace march = space(true);
   const std::vector<bool> cells = visibleCells(lookingAlongY(), SceneFrame(), march);
   EXPECT_TRUE(at(cells, march, Vec3d(0.51, 0.99, 0.51)));   // far ahead
@@ -72,7 +72,7 @@ TEST(VisibleCells, FollowTheSceneFrame) {
   EXPECT_EQ(std::count(cells.begin(), cells.end(), true), 0);
 }
 
-TEST(VisibleCells, KeepFreeWhatIsNearerThanAnythingObserved) {
+TEST(VisibleCells, ExcludeSpaceNearerThanAnyObservation) {
   Capture capture = lookingAlongY();
   const RandomStream random(7, 1);
   for (uint32_t i = 0; i < 100; ++i) {
@@ -80,7 +80,7 @@ TEST(VisibleCells, KeepFreeWhatIsNearerThanAnythingObserved) {
     capture.observations.push_back({0, i, 50, 50, 0});
   }
   capture.points[3].xInWorld.y() = 0.1;  // an outlier
-  const double nearest = nearestContent(capture)[0];
+  const double nearest = nearestSparseDepth(capture)[0];
   EXPECT_GT(nearest, 0.49);
   EXPECT_LT(nearest, 0.55);
   const MarchSpace march = space(true);
@@ -92,31 +92,32 @@ TEST(VisibleCells, KeepFreeWhatIsNearerThanAnythingObserved) {
 TEST(VisibleCells, ReachBehindAFisheyeThatSeesMoreThanHalfOfTheSphere) {
   Capture capture = lookingAlongY();
   capture.cameras[0].lens = LensModel::openCvFisheye;
-  capture.cameras[0].parameters = {40, 40, 50, 50};  // 107 degrees to where it is looked a little past the border
+  capture.cameras[0].parameters = {40, 40, 50, 50};  // sees up to 107 degrees off the axis, including the margin
   const MarchSpace march = space(true);
   const auto isSeen = [&](double x, double y, double z) {
     return at(visibleCells(capture, SceneFrame(), march), march, inside(march, x, y, z));
   };
   EXPECT_TRUE(isSeen(0.05, 0.8, 0.05));
   EXPECT_TRUE(isSeen(0.8, 0.05, 0.05));
-  EXPECT_TRUE(isSeen(0.8, -0.1, 0.05));  // behind the plane at right angles to the axis
-  EXPECT_FALSE(at(visibleCells(capture, SceneFrame(), march), march, Vec3d(0.51, 0.01, 0.51)));  // right behind
-  // What is nearer than anything observed, on a ring at right angles to the axis and on one behind it.
+  EXPECT_TRUE(isSeen(0.8, -0.1, 0.05));  // behind the image plane
+  EXPECT_FALSE(
+      at(visibleCells(capture, SceneFrame(), march), march, Vec3d(0.51, 0.01, 0.51)));  // directly behind the camera
+  // Adds points on two rings around the axis, one in the image plane and one behind it.
   for (uint32_t i = 0; i < 100; ++i) {
     const double angle = 0.0628 * i;
     capture.points.push_back({Vec3d(std::cos(angle), i % 2 ? 0.0 : -0.3, std::sin(angle)), {}, 0});
     capture.observations.push_back({0, i, 50, 50, 0});
   }
-  EXPECT_NEAR(nearestContent(capture)[0], 1, 0.05);
+  EXPECT_NEAR(nearestSparseDepth(capture)[0], 1, 0.05);
   EXPECT_FALSE(isSeen(0.4, -0.1, 0.05));
   EXPECT_TRUE(isSeen(0.95, -0.1, 0.05));
 }
 
-TEST(NearestContent, IsUnknownWithFewObservations) {
+TEST(NearestSparseDepth, IsUnknownWithFewObservations) {
   Capture capture = lookingAlongY();
   capture.points.push_back({Vec3d(0, 1, 0), {}, 0});
   capture.observations.push_back({0, 0, 50, 50, 0});
-  EXPECT_EQ(nearestContent(capture)[0], 0);
+  EXPECT_EQ(nearestSparseDepth(capture)[0], 0);
 }
 
 }  // namespace

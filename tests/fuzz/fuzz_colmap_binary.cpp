@@ -1,4 +1,4 @@
-// Bytes → model → capture: poses, lenses and reprojection of whatever numbers came through.
+// Fuzzes bytes → COLMAP model → capture: poses, lenses and reprojection of whatever numbers were accepted.
 #include "fuzz_input.h"
 #include "import/colmap_model.h"
 

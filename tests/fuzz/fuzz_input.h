@@ -1,4 +1,4 @@
-// libFuzzer's bytes, cut up as the decoders take them.
+// Splits libFuzzer's bytes into the files that the decoders take.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace tessera {
 
-// The first two bytes say how long the first of several files is, and so on.
+// The first two bytes give the length of the first of several files, and so on.
 class FuzzInput {
  public:
   FuzzInput(const uint8_t* data, size_t size) : rest_(reinterpret_cast<const std::byte*>(data), size) {}
@@ -20,9 +20,9 @@ class FuzzInput {
       std::memcpy(&length, rest_.data(), 2);
       rest_ = rest_.subspan(2);
     }
-    const auto found = rest_.first(length < rest_.size() ? length : rest_.size());
-    rest_ = rest_.subspan(found.size());
-    return found;
+    const auto part = rest_.first(length < rest_.size() ? length : rest_.size());
+    rest_ = rest_.subspan(part.size());
+    return part;
   }
   std::string_view text() { return asText(file()); }
   std::span<const std::byte> rest() const { return rest_; }

@@ -1,4 +1,4 @@
-// Writes a few small valid inputs for every fuzzer into DIR/<fuzzer>/: libFuzzer grows the rest.
+// Writes a few small valid inputs for every fuzzer to DIR/<fuzzer>/, from which libFuzzer derives others.
 #include <algorithm>
 #include <cstring>
 #include <string>
@@ -12,7 +12,7 @@
 #include "representations/volume/testing/random_content.h"
 #include "scene/ply.h"
 #include "tiles/glb.h"
-#include "tiles/testing/made_tileset.h"
+#include "tiles/testing/test_tileset.h"
 #include "tiles/tileset_json.h"
 
 using namespace tessera;
@@ -50,7 +50,7 @@ ImageU8 picture(int channels) {
   return image;
 }
 
-// An EXIF block with a latitude; the fuzzer finds the other tags.
+// An EXIF block with a latitude, from which the fuzzer finds the other tags.
 std::string exif() {
   std::string out("Exif\0\0II*\0\x08\0\0\0\x01\0\x25\x88\x04\0\x01\0\0\0\x1a\0\0\0\0\0\0\0", 32);
   out += std::string("\x02\0\x01\0\x02\0\x02\0\0\0N\0\0\0\x02\0\x05\0\x03\0\0\0\x38\0\0\0\0\0\0\0", 30);
@@ -58,9 +58,9 @@ std::string exif() {
   return out;
 }
 
-// A volume of one macroblock with few different bytes: libFuzzer is given 16 KiB.
+// A volume of one macroblock with few distinct bytes, because inputs are limited to 16 KiB.
 VolumeContent volume(uint32_t parts) {
-  VolumeContent content = tiles_test::madeContent(1, parts);
+  VolumeContent content = tiles_test::testContent(1, parts);
   for (VolumePart& part : content.parts) {
     part.voxels = part.planes = 8;
     part.macroblocks = {0};
@@ -71,7 +71,7 @@ VolumeContent volume(uint32_t parts) {
   return content;
 }
 
-std::string textOf(std::span<const std::byte> bytes) {
+std::string toText(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
@@ -124,24 +124,24 @@ int main(int count, char** arguments) {
             R"([{"camera_to_world":[1,0,0,1,0,1,0,2,0,0,1,3,0,0,0,1],"fov":50,"aspect":1.3}]})"));
   write("dataparser_transforms/a",
         std::string(R"({"transform":[[0,1,0,0.3],[1,0,0,-0.1],[0,0,-1,-0.08]],"scale":0.125})"));
-  write("tileset/a", encodeTileset(tiles_test::madeTileset(1)));
-  write("tileset/b", encodeTileset(tiles_test::madeTileset(2, false)));
+  write("tileset/a", encodeTileset(tiles_test::testTileset(1)));
+  write("tileset/b", encodeTileset(tiles_test::testTileset(2, false)));
   for (uint32_t parts : {1u, 2u}) {
     const Bytes file = encodeVolume(volume(parts));
     const auto glb = decodeGlb(file);
     write("volume_payload/whole" + std::to_string(parts), file);
-    write("volume_payload/cut" + std::to_string(parts), sized(std::string(glb->json)) + textOf(glb->bytes));
+    write("volume_payload/cut" + std::to_string(parts), sized(std::string(glb->json)) + toText(glb->bytes));
   }
   for (uint32_t parts : {1u, 2u}) {
-    tiles_test::MadeHash made;
-    made.lattice = made.cells = 8;
-    made.levels = 1;
-    HashContent content = tiles_test::madeHashContent(1, parts, made);
+    tiles_test::TestHashContent shape;
+    shape.lattice = shape.cells = 8;
+    shape.levels = 1;
+    HashContent content = tiles_test::testHashContent(1, parts, shape);
     for (HashPart& part : content.parts) std::fill(part.cornerBytes.begin(), part.cornerBytes.end(), uint8_t{100});
     const Bytes file = encodeHash(content);
     const auto glb = decodeGlb(file);
     write("hash_payload/whole" + std::to_string(parts), file);
-    write("hash_payload/cut" + std::to_string(parts), sized(std::string(glb->json)) + textOf(glb->bytes));
+    write("hash_payload/cut" + std::to_string(parts), sized(std::string(glb->json)) + toText(glb->bytes));
   }
   return 0;
 }

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Builds every fuzzer and runs each for SECONDS (20 unless told). Fails when one finds something; the input that did it
-# is kept in ./fuzz-findings.
+# Builds every fuzzer and runs each for SECONDS (default 20). Fails if one finds something; the input that caused it is kept in
+# ./fuzz-findings.
 #   tests/fuzz/run.sh [SECONDS] [FUZZER ...]
 set -eu
 cd "$(dirname "$0")/../.."

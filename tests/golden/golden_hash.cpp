@@ -10,7 +10,7 @@
 namespace tessera::golden {
 namespace {
 
-// The logarithm of density, then seven sums of colours and features.
+// Returns the logarithm of the density, followed by seven sums of colours and features.
 std::array<double, 8> featuresAt(const Triple<double>& p) {
   std::array<double, 8> features;
   features[0] = logDensityAt(p);
@@ -20,13 +20,13 @@ std::array<double, 8> featuresAt(const Triple<double>& p) {
 
 struct Sizes {
   uint32_t lattice, cells;
-  std::vector<HashTable> tables;  // without bytes
+  std::vector<HashTable> tables;  // their bytes are still empty
 };
 
 const Sizes kFine = {32, 32, {{12, 1728, false, {}, {}}, {48, 1024, true, {}, {}}}};
-// With so many cells that distances are kept in two grids, of which one is twice or four times as fine.
+// The number of cells is so large that distances are stored in two grids, one twice or four times as fine as the other.
 const Sizes kCoarse = {16, 160, {{24, 512, true, {}, {}}, {32, 512, true, {}, {}}}};
-const Sizes kCoarseSurround = {16, 288, kCoarse.tables};
+const Sizes kCoarseBackgroundBlock = {16, 288, kCoarse.tables};
 
 class HashPartMaker {
  public:
@@ -52,23 +52,23 @@ class HashPartMaker {
 
   void makeCorners() {
     constexpr uint32_t kEdge = HashPart::kMacroblock;
-    const uint32_t edge = part_.lattice / kEdge, most = part_.lattice - 1;
+    const uint32_t edge = part_.lattice / kEdge, maximum = part_.lattice - 1;
     uint32_t stored = 0;
     for (uint32_t b = 0; b < edge * edge * edge; ++b) {
       const Triple<uint32_t> first = {kEdge * (b % edge), kEdge * (b / edge % edge), kEdge * (b / edge / edge)};
-      const bool wanted = corners_.isAnythingIn(first, {first[0] + kEdge, first[1] + kEdge, first[2] + kEdge});
-      part_.macroblocks.push_back(wanted ? stored++ : HashPart::kEmpty);
-      for (uint32_t i = 0; wanted && i < HashPart::kStoredTexels; ++i) {
-        const Triple<uint32_t> corner = {std::min(first[0] + i % 9, most), std::min(first[1] + i / 9 % 9, most),
-                                         std::min(first[2] + i / 81, most)};
+      const bool requested = corners_.isAnythingIn(first, {first[0] + kEdge, first[1] + kEdge, first[2] + kEdge});
+      part_.macroblocks.push_back(requested ? stored++ : HashPart::kEmpty);
+      for (uint32_t i = 0; requested && i < HashPart::kStoredTexels; ++i) {
+        const Triple<uint32_t> corner = {std::min(first[0] + i % 9, maximum), std::min(first[1] + i / 9 % 9, maximum),
+                                         std::min(first[2] + i / 81, maximum)};
         const Triple<double> p = placeOfTexel(part_, corner, part_.lattice);
         const std::array<double, 8> features = featuresAt(p);
         for (size_t f = 0; f < 8; ++f) {
-          part_.cornerBytes.push_back(part_.ranges[f].byteOf(static_cast<float>(features[f])));
+          part_.cornerBytes.push_back(part_.ranges[f].encodeByte(static_cast<float>(features[f])));
         }
         for (uint64_t c = 8; c < part_.columns; ++c) {
           const double logit = 3 * noise(60 + c, 3 * p[0] - p[2], 3 * p[1]);
-          part_.cornerBytes.push_back(part_.ranges[c].byteOf(static_cast<float>(logit)));
+          part_.cornerBytes.push_back(part_.ranges[c].encodeByte(static_cast<float>(logit)));
         }
       }
     }
@@ -86,19 +86,19 @@ class HashPartMaker {
     }
   }
 
-  // A cell may hold something where a corner that is mixed into a sample in it is dense, and not only hidden ones.
+  // A cell is occupied if a corner that is interpolated into one of its samples is dense and not merely hidden.
   void makeOccupied() {
     OccupancyBits occupied(sizes_.cells);
-    // The corners that samples of a cell mix lie from its lower side's lower one to its upper side's upper one. Many
-    // cells mix the same.
+    // The samples of a cell interpolate the corners from the lower neighbour of its lower side to the upper neighbour
+    // of its upper side. Many cells use the same ranges.
     const double side = static_cast<double>(part_.lattice) / sizes_.cells;
     std::vector<std::array<uint32_t, 2>> ranges;
-    std::vector<size_t> rangeOf;
+    std::vector<size_t> rangeIndices;
     for (uint32_t i = 0; i < sizes_.cells; ++i) {
       const std::array<uint32_t, 2> range = {static_cast<uint32_t>(std::max(0.0, std::floor(side * i - 0.5))),
                                              static_cast<uint32_t>(std::floor(side * (i + 1) - 0.5)) + 1};
       if (ranges.empty() || ranges.back() != range) ranges.push_back(range);
-      rangeOf.push_back(ranges.size() - 1);
+      rangeIndices.push_back(ranges.size() - 1);
     }
     std::vector<bool> isAnything;
     for (const auto& z : ranges) {
@@ -111,7 +111,8 @@ class HashPartMaker {
       for (uint32_t y = 0; y < sizes_.cells; ++y) {
         for (uint32_t x = 0; x < sizes_.cells; ++x) {
           const size_t n = ranges.size();
-          if (isAnything[rangeOf[x] + n * (rangeOf[y] + n * rangeOf[z])]) occupied.set(occupied.number(x, y, z));
+          if (isAnything[rangeIndices[x] + n * (rangeIndices[y] + n * rangeIndices[z])])
+            occupied.set(occupied.number(x, y, z));
         }
       }
     }
@@ -125,8 +126,8 @@ class HashPartMaker {
   Densities corners_;
 };
 
-HashContent contentOf(uint64_t seed, LevelWeights weights, bool varies, const Sizes& sizes,
-                      const std::vector<HashPart>& parts) {
+HashContent makeGoldenContent(uint64_t seed, LevelWeights weights, bool varies, const Sizes& sizes,
+                              const std::vector<HashPart>& parts) {
   HashContent content;
   content.weights = weights;
   content.step = 1.0f / static_cast<float>(2 * sizes.lattice);
@@ -147,9 +148,9 @@ HashPart blockPart(uint32_t column) {
   return part;
 }
 
-HashPart surroundPart() {
+HashPart backgroundBlockPart() {
   HashPart part;
-  placeSurround(part);
+  placeBackgroundBlock(part);
   return part;
 }
 
@@ -158,15 +159,17 @@ HashPart surroundPart() {
 Scene<HashContent> makeHashScene() {
   Scene<HashContent> scene;
   scene.tileset = landscapeTileset(kHashName, 64);
-  scene.contents["0_0"] = contentOf(1, LevelWeights::separate, true, kFine, {blockPart(0)});
-  scene.contents["1_0"] = contentOf(2, LevelWeights::shared, true, kFine, {blockPart(1)});
-  scene.contents["all"] = contentOf(3, LevelWeights::separate, false, kCoarse, {blockPart(0), blockPart(1)});
-  scene.contents["surround"] = contentOf(4, LevelWeights::separate, true, kFine, {surroundPart()});
-  scene.contents["coarse_surround"] = contentOf(5, LevelWeights::none, false, kCoarseSurround, {surroundPart()});
+  scene.contents["0_0"] = makeGoldenContent(1, LevelWeights::separate, true, kFine, {blockPart(0)});
+  scene.contents["1_0"] = makeGoldenContent(2, LevelWeights::shared, true, kFine, {blockPart(1)});
+  scene.contents["all"] = makeGoldenContent(3, LevelWeights::separate, false, kCoarse, {blockPart(0), blockPart(1)});
+  scene.contents["background_block"] =
+      makeGoldenContent(4, LevelWeights::separate, true, kFine, {backgroundBlockPart()});
+  scene.contents["coarse_background_block"] =
+      makeGoldenContent(5, LevelWeights::none, false, kCoarseBackgroundBlock, {backgroundBlockPart()});
   return scene;
 }
 
-HashSums sumsOf(const HashPart& part) {
+HashSums computeSums(const HashPart& part) {
   HashSums sums;
   sums.stored = part.storedMacroblocks();
   const auto first = std::find(part.macroblocks.begin(), part.macroblocks.end(), 0u);
@@ -176,11 +179,11 @@ HashSums sumsOf(const HashPart& part) {
     for (uint32_t octant = 0; octant < 8; ++octant) sums.distances += octantDistance(word, octant);
   };
   for (const uint32_t word : part.distances.coarse) {
-    if (OctantDistances::isEmpty(word)) addDistances(word);
+    if (OctantDistanceField::isEmpty(word)) addDistances(word);
   }
   for (const uint32_t word : part.distances.fine) addDistances(word);
-  sums.corners = sumsOf(part.cornerBytes);
-  for (const HashTable& table : part.tables) sums.tables.push_back(sumsOf(table.bytes));
+  sums.corners = computeSums(part.cornerBytes);
+  for (const HashTable& table : part.tables) sums.tables.push_back(computeSums(table.bytes));
   return sums;
 }
 

@@ -1,4 +1,4 @@
-// The scene that is committed in tests/golden/hash, as a function. Its blocks differ in what weighs their levels.
+// Generates the scene that is committed in tests/golden/hash. Its blocks differ in how their levels are weighted.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -10,13 +10,13 @@ namespace tessera::golden {
 
 Scene<HashContent> makeHashScene();
 
-// What every reader has to come to: docs/tile-format.md, section 11.
+// The checksums that every reader must compute: docs/tile-format.md, section 11.
 struct HashSums {
   uint64_t stored = 0, firstStored = 0, occupied = 0, distances = 0;
   ByteSums corners;
   std::vector<ByteSums> tables;
 };
-HashSums sumsOf(const HashPart& part);
+HashSums computeSums(const HashPart& part);
 nlohmann::ordered_json toJson(const HashSums& sums);
 
 }  // namespace tessera::golden

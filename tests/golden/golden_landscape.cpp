@@ -9,18 +9,18 @@ namespace {
 constexpr uint32_t kColumns = 2, kRows = 1;
 constexpr double kBottom = -0.75, kTop = 0.75;
 
-Tile tileOf(const Tileset& tileset, uint32_t level, const CellRange& cells) {
+Tile makeTile(const Tileset& tileset, uint32_t level, const CellRange& cells) {
   Tile tile;
   tile.level = level;
   tile.cells = cells;
-  tile.box = tileset.boxOf(cells);
+  tile.box = tileset.boxFromCells(cells);
   tile.contents.resize(1);
   tile.contents[0].cells = cells;
   tile.contents[0].box = tile.box;
   return tile;
 }
 
-// The height of what stands at x, y.
+// Returns the height of the terrain or building at x, y.
 double heightAt(double x, double y) {
   const double fromMiddle = std::abs(std::abs(x) - 1);
   if (fromMiddle < 0.4 && std::abs(y) < 0.3 && std::abs(x) < 2) return x < 0 ? 0.45 : 0.1;
@@ -29,7 +29,6 @@ double heightAt(double x, double y) {
 
 }  // namespace
 
-// Smooth, in [-1,1]: random values at whole numbers, mixed.
 double noise(uint64_t stream, double x, double y) {
   const double i = std::floor(x), j = std::floor(y);
   const auto smooth = [](double t) { return t * t * (3 - 2 * t); };
@@ -53,7 +52,6 @@ Triple<double> inScene(const ContentPart& part, const Triple<double>& inDomain) 
           part.centre[2] + part.scale[2] * q[2]};
 }
 
-// A texel's coordinate along an axis of the domain.
 double middle(const ContentPart& part, uint32_t index, uint32_t count) {
   const double h = part.halfDomain();
   return -h + 2 * h * (index + 0.5) / count;
@@ -73,17 +71,17 @@ Densities::Densities(const ContentPart& part, uint32_t count) : count_(count) {
 }
 
 bool Densities::isAnythingIn(const Triple<uint32_t>& first, const Triple<uint32_t>& last) const {
-  const uint32_t most = count_ - 1;
+  const uint32_t maximum = count_ - 1;
   bool dense = false, hollow = false;
-  for (uint32_t z = first[2]; z <= std::min(last[2], most); ++z) {
-    for (uint32_t y = first[1]; y <= std::min(last[1], most); ++y) {
-      for (uint32_t x = first[0]; x <= std::min(last[0], most); ++x) {
+  for (uint32_t z = first[2]; z <= std::min(last[2], maximum); ++z) {
+    for (uint32_t y = first[1]; y <= std::min(last[1], maximum); ++y) {
+      for (uint32_t x = first[0]; x <= std::min(last[0], maximum); ++x) {
         dense = dense || at(x, y, z) > -6;
         hollow = hollow || at(x, y, z) < 3;
       }
     }
   }
-  return dense && (hollow || first[2] == 0);  // what lies deep below is never seen
+  return dense && (hollow || first[2] == 0);  // what lies deep below is never visible
 }
 
 std::vector<DenseLayer> makeNetwork(uint32_t inputs, const RandomStream& random, uint64_t& next) {
@@ -98,7 +96,7 @@ std::vector<DenseLayer> makeNetwork(uint32_t inputs, const RandomStream& random,
   return network;
 }
 
-ByteSums sumsOf(const std::vector<uint8_t>& bytes) {
+ByteSums computeSums(const std::vector<uint8_t>& bytes) {
   ByteSums sums;
   for (size_t i = 0; i < bytes.size(); ++i) {
     sums.sum += bytes[i];
@@ -113,9 +111,9 @@ void placeBlock(ContentPart& part, uint32_t column) {
   part.high = {part.centre[0] + 1, 1, static_cast<float>(kTop)};
 }
 
-void placeSurround(ContentPart& part) {
+void placeBackgroundBlock(ContentPart& part) {
   part.scale = {kColumns, kRows, 1};
-  part.contracted = part.surround = true;
+  part.contracted = part.backgroundBlock = true;
   part.low = {-1e4f, -1e4f, -1e4f};
   part.high = {1e4f, 1e4f, 1e4f};
 }
@@ -138,20 +136,22 @@ Tileset landscapeTileset(const std::string& representation, uint32_t texels) {
   tileset.levels = 2;
   const double texel = 25 * 2.0 / texels;  // metres
   tileset.geometricError = 100;
-  tileset.tiles = {tileOf(tileset, 1, tileset.allCells()), tileOf(tileset, 0, {{0, 0}, {1, 1}}),
-                   tileOf(tileset, 0, {{1, 0}, {2, 1}})};
+  tileset.tiles = {makeTile(tileset, 1, tileset.allCells()), makeTile(tileset, 0, {{0, 0}, {1, 1}}),
+                   makeTile(tileset, 0, {{1, 0}, {2, 1}})};
   tileset.tiles[0].geometricError = 2 * texel;
   tileset.tiles[1].geometricError = tileset.tiles[2].geometricError = texel;
   tileset.tiles[0].children = {1, 2};
-  TileContent surround;
-  surround.cells = tileset.allCells();
-  surround.surround = true;
-  surround.box = {Vec3d::Constant(-1e4), Vec3d::Constant(1e4)};
-  surround.geometricError = 2 * kColumns * texel;  // where its texels are smallest, as its domain is twice its cube
-  tileset.tiles[0].contents.push_back(surround);
-  surround.level = 1;
-  surround.geometricError *= 2;
-  tileset.tiles[0].contents.push_back(surround);
+  TileContent backgroundBlock;
+  backgroundBlock.cells = tileset.allCells();
+  backgroundBlock.backgroundBlock = true;
+  backgroundBlock.box = {Vec3d::Constant(-1e4), Vec3d::Constant(1e4)};
+  backgroundBlock.geometricError =
+      2 * kColumns *
+      texel;  // at the block's face, where its texels are smallest: its domain is twice as wide as its cube
+  tileset.tiles[0].contents.push_back(backgroundBlock);
+  backgroundBlock.level = 1;
+  backgroundBlock.geometricError *= 2;
+  tileset.tiles[0].contents.push_back(backgroundBlock);
   return tileset;
 }
 

@@ -1,5 +1,6 @@
-// What the committed scenes show, whatever the representation: 2 × 1 blocks with smooth ground, a building each; a
-// merged level; a surround of each level. Arithmetic only, so that every machine makes the same bytes.
+// What the committed scenes show, for all representations: 2 × 1 blocks with smooth ground and a building each, a
+// merged level, and a background block of each level. Uses only arithmetic, so that every machine generates the same
+// bytes.
 #pragma once
 
 #include <map>
@@ -16,29 +17,30 @@ namespace tessera::golden {
 
 template <class Content>
 struct Scene {
-  Tileset tileset;                          // contents without uris
-  std::map<std::string, Content> contents;  // by name: "0_0", "1_0", "all", "surround", "coarse_surround"
+  Tileset tileset;  // contents have no uris
+  // By name: "0_0", "1_0", "all", "background_block", "coarse_background_block".
+  std::map<std::string, Content> contents;
 };
 
-// Smooth, in [-1,1]: random values at whole numbers, mixed.
+// Smooth noise in [-1,1]: random values at integers, interpolated.
 double noise(uint64_t stream, double x, double y);
-// The logarithm of density: of rolling ground, and of one building in each block.
+// Returns the logarithm of the density of rolling ground with one building in each block.
 double logDensityAt(const Triple<double>& inScene);
 
-// The place of a texel (x, y, z) of so many along each axis of a part's domain.
+// Returns the position of texel (x, y, z) in the domain of a part with `count` texels along each axis.
 Triple<double> placeOfTexel(const ContentPart& part, const Triple<uint32_t>& texel, uint32_t count);
-// Coordinates in the domain to the scene's.
+// Converts coordinates in the part's domain to scene coordinates.
 Triple<double> inScene(const ContentPart& part, const Triple<double>& inDomain);
-// A texel's coordinate along an axis of the domain.
+// Returns the coordinate of a texel's centre along an axis of the domain.
 double middle(const ContentPart& part, uint32_t index, uint32_t count);
 
-// The logarithms of density at texels of a part's domain, so many along each axis.
+// The logarithms of density at the texels of a part's domain, `count` along each axis.
 class Densities {
  public:
   Densities(const ContentPart& part, uint32_t count);
 
   double at(uint32_t x, uint32_t y, uint32_t z) const { return values_[x + size_t{count_} * (y + size_t{count_} * z)]; }
-  // Whether anything is dense among the texels from `first` to `last` along each axis, clamped, and not only hidden.
+  // Returns whether any of the texels from `first` to `last` along each axis (clamped) is dense and not merely hidden.
   bool isAnythingIn(const Triple<uint32_t>& first, const Triple<uint32_t>& last) const;
 
  private:
@@ -46,20 +48,20 @@ class Densities {
   std::vector<double> values_;
 };
 
-// Layers of 16, 16 and 3 outputs; `next`: the stream's next number.
+// Makes a network of layers with 16, 16 and 3 outputs; `next`: index of the stream's next number.
 std::vector<DenseLayer> makeNetwork(uint32_t inputs, const RandomStream& random, uint64_t& next);
 
-// Of bytes, and with each weighed by its place, so that their order tells.
+// The sum of bytes, and their sum weighted by position, which depends on their order.
 struct ByteSums {
   uint64_t sum = 0, ordered = 0;
 };
-ByteSums sumsOf(const std::vector<uint8_t>& bytes);
+ByteSums computeSums(const std::vector<uint8_t>& bytes);
 
 void placeBlock(ContentPart& part, uint32_t column);
-void placeSurround(ContentPart& part);
+void placeBackgroundBlock(ContentPart& part);
 
-// `texels`: that a finest block is fine, along an axis. Contents of tiles are "all" with the surrounds behind it, "0_0"
-// and "1_0".
+// `texels`: texels of a finest block along an axis, which determine its error. The tiles' contents are "all" with the
+// background blocks behind it, "0_0" and "1_0".
 Tileset landscapeTileset(const std::string& representation, uint32_t texels);
 
 }  // namespace tessera::golden

@@ -13,7 +13,7 @@ namespace {
 constexpr uint64_t kRaysOfKind = 12, kKinds = 5;
 constexpr double kSceneEnd = TileFrame::kSceneEnd;
 
-// Nothing is applied to the outputs.
+// Evaluates a network without an activation at the outputs.
 std::vector<double> runNetwork(const std::vector<DenseLayer>& network, std::vector<double> values) {
   for (size_t layer = 0; layer < network.size(); ++layer) {
     std::vector<double> outputs;
@@ -29,7 +29,7 @@ std::vector<double> runNetwork(const std::vector<DenseLayer>& network, std::vect
   return values;
 }
 
-// The deferred network, as section 6 has it.
+// Evaluates the deferred network as section 6 defines it.
 std::array<double, 3> shade(const std::vector<DenseLayer>& network, const ReferenceComposite& composite,
                             const Vec3d& direction) {
   std::vector<double> values(composite.values, composite.values + 7);
@@ -54,7 +54,7 @@ struct Piece {
 };
 
 template <class Content>
-ReferenceComposite compositeOf(const Content& content, const auto& pieces, const ExpectedRay& ray) {
+ReferenceComposite marchPieces(const Content& content, const auto& pieces, const ExpectedRay& ray) {
   ReferenceComposite composite;
   for (const auto& piece : pieces) {
     referenceMarch(content, *piece.part, {ray.origin, ray.direction}, piece.range, composite);
@@ -62,7 +62,7 @@ ReferenceComposite compositeOf(const Content& content, const auto& pieces, const
   return composite;
 }
 
-// Volumes: each content is shaded by its own network, and colours are blended.
+// `volume`: each content is shaded by its own network, and the colours are blended.
 class VolumeBlend {
  public:
   explicit VolumeBlend(ExpectedRay& ray) : ray_(ray) {}
@@ -82,7 +82,7 @@ class VolumeBlend {
   double transmittance_ = 1;
 };
 
-// Sums of all contents, and once the network of those that are seen most.
+// `hash`: the sums of all contents are shaded once, by the network that contributes most to the ray.
 class HashBlend {
  public:
   explicit HashBlend(ExpectedRay& ray) : ray_(ray) {}
@@ -110,7 +110,7 @@ class HashBlend {
   }
 
  private:
-  // Real spherical harmonics by their formulas, in tiny-cuda-nn's order: by degree l, and in it m from -l to l.
+  // Real spherical harmonics by their formulas, in tiny-cuda-nn's order: by degree l, and for each by m from -l to l.
   static std::vector<double> harmonics(const Vec3d& d) {
     const double x = d.x(), y = d.y(), z = d.z(), pi = std::acos(-1.0);
     const double a1 = std::sqrt(3 / (4 * pi)), a2 = std::sqrt(15 / (4 * pi)), a3 = std::sqrt(35 / (32 * pi)),
@@ -135,7 +135,7 @@ class HashBlend {
 
   ExpectedRay& ray_;
   ReferenceComposite sums_;
-  std::vector<std::pair<const std::vector<DenseLayer>*, double>> networks_;  // and how much is seen of each
+  std::vector<std::pair<const std::vector<DenseLayer>*, double>> networks_;  // networks and their visible weights
 };
 
 template <class Content, class Blend>
@@ -144,7 +144,7 @@ void look(const Scene<Content>& scene, ExpectedRay& ray) {
   const SceneRay along{ray.origin, ray.direction};
   const SceneBox bounds = scene.tileset.box();
   const RayRange box = clipToBox(along, bounds.low, bounds.high, {scene.tileset.near, INFINITY});
-  std::vector<std::string> names = {"0_0", "1_0"};  // the camera's cell first
+  std::vector<std::string> names = {"0_0", "1_0"};  // the cell of the camera first
   if (ray.origin.x() >= 0) std::swap(names[0], names[1]);
   if (ray.level == 1) names = {"all"};
   Blend blend(ray);
@@ -158,12 +158,12 @@ void look(const Scene<Content>& scene, ExpectedRay& ray) {
     }
     std::sort(pieces.begin(), pieces.end(),
               [](const Piece<Part>& a, const Piece<Part>& b) { return a.range.near < b.range.near; });
-    blend.add(content, compositeOf(content, pieces, ray));
+    blend.add(content, marchPieces(content, pieces, ray));
   }
-  const Content& surround = scene.contents.at(ray.level == 1 ? "coarse_surround" : "surround");
+  const Content& backgroundBlock = scene.contents.at(ray.level == 1 ? "coarse_background_block" : "background_block");
   const std::vector<Piece<Part>> behind = {
-      {surround.parts.data(), {box.empty() ? scene.tileset.near : box.far, kSceneEnd}}};
-  blend.add(surround, compositeOf(surround, behind, ray));
+      {backgroundBlock.parts.data(), {box.empty() ? scene.tileset.near : box.far, kSceneEnd}}};
+  blend.add(backgroundBlock, marchPieces(backgroundBlock, behind, ray));
   blend.end();
 }
 
@@ -177,18 +177,18 @@ std::vector<ExpectedRay> raysThrough(const Scene<Content>& scene) {
     ray.level = i % 3 == 2 ? 1 : 0;
     Vec3d target(1.9 * value(0), 0.9 * value(1), -0.45);
     switch (i / kRaysOfKind) {
-      case 0:  // from outside to what stands on the ground
+      case 0:  // from outside to something on the ground
         ray.origin = Vec3d(4 * value(2), 3 * value(3), 2 + value(4));
         break;
       case 1:  // over the ground and out of the box
         ray.origin = Vec3d(1.5 * value(2), 0.75 * value(3), 0.6 + 0.1 * value(4));
         target = Vec3d(6 * value(0), 5 * value(1), 0.4 * value(5));
         break;
-      case 2:  // past the box, to the ground far away or to the sky
+      case 2:  // past the box, to the distant ground or to the sky
         ray.origin = Vec3d(3 + value(2), 2 * value(3), 1.5);
         target = ray.origin + Vec3d(1, value(0), 0.25 * value(1));
         break;
-      case 3:  // over a roof or the ground so low that something is met of several contents
+      case 3:  // so low over a roof or the ground that the ray samples several contents
         if (i % 2 == 0) {
           ray.origin = Vec3d(-3, 0.25 * value(2), 0.47 + 0.03 * value(3));
           target = Vec3d(-0.8, 0.2 * value(4), 0.46 + 0.02 * value(5));

@@ -1,5 +1,5 @@
-// Rays through the golden scenes, and what they come to by the definition (docs/tile-format.md, sections 4, 6 and 7),
-// in double: what renderers in every language are held against.
+// Rays through the golden scenes, and their expected results by the definition (docs/tile-format.md, sections 4, 6 and
+// 7) in double precision. Renderers in every language are tested against them.
 #pragma once
 
 #include <array>
@@ -12,14 +12,14 @@
 namespace tessera::golden {
 
 struct ExpectedRay {
-  uint32_t level = 0;                                        // the tiles of this level are drawn, and the surround
-  Vec3d origin = Vec3d::Zero(), direction = Vec3d::UnitZ();  // scene frame; of length 1
-  // Premultiplied, without the background; the distance in scene units.
+  uint32_t level = 0;  // the tiles of this level are drawn, with the background block
+  Vec3d origin = Vec3d::Zero(), direction = Vec3d::UnitZ();  // scene frame; the direction has length 1
+  // Premultiplied, without the scene's background colour; the distance is in scene units.
   std::array<double, 3> colour = {0, 0, 0};
   double opacity = 0, distance = 0;
 };
 
-// From outside of the box, from inside, past it, just over what stands in it, and along its axes.
+// Rays from outside the box, from inside, past it, closely over what stands in it, and along its axes.
 std::vector<ExpectedRay> makeRays(const Scene<VolumeContent>& scene);
 std::vector<ExpectedRay> makeRays(const Scene<HashContent>& scene);
 

@@ -3,7 +3,7 @@
 #include <set>
 
 #include "base/random.h"
-#include "render/testing/made_tree.h"
+#include "render/testing/test_tree.h"
 #include "render/tile_selection.h"
 
 namespace tessera::golden {
@@ -17,20 +17,20 @@ ordered_json toJson(const Vec3d& x) {
   return {x.x(), x.y(), x.z()};
 }
 
-// Columns and rows that are no powers of two, tiles without content, and two surrounds.
+// A tree with numbers of columns and rows that are no powers of two, tiles without content, and two background blocks.
 TileTree tree() {
-  TileTree tree = madeTree(6, 5);
+  TileTree tree = testTree(6, 5);
   for (size_t i = 5; i < tree.tiles.size(); i += 9) tree.tiles[i].hasContent = false;
   TileNode around;
-  around.isSurround = true;
+  around.isBackgroundBlock = true;
   around.low = tree.tiles[0].low;
   around.high = tree.tiles[0].high;
   around.level = 1;
   around.geometricError = 0.08;
-  tree.surround = static_cast<int>(tree.tiles.size());
-  around.children = {tree.surround + 1};
+  tree.backgroundBlock = static_cast<int>(tree.tiles.size());
+  around.children = {tree.backgroundBlock + 1};
   tree.tiles.push_back(around);
-  around.parent = tree.surround;
+  around.parent = tree.backgroundBlock;
   around.children.clear();
   around.level = 0;
   around.geometricError /= 2;
@@ -50,24 +50,24 @@ ordered_json toJson(const TileTree& tree) {
                      {"geometricError", node.geometricError},
                      {"level", node.level},
                      {"hasContent", node.hasContent},
-                     {"isSurround", node.isSurround}});
+                     {"isBackgroundBlock", node.isBackgroundBlock}});
   }
-  return {{"columns", tree.columns}, {"rows", tree.rows}, {"surround", tree.surround}, {"tiles", tiles}};
+  return {{"columns", tree.columns}, {"rows", tree.rows}, {"backgroundBlock", tree.backgroundBlock}, {"tiles", tiles}};
 }
 
 }  // namespace
 
 ordered_json makeSelections() {
-  const TileTree made = tree();
+  const TileTree tileTree = tree();
   TileFrame frame;
-  frame.low = made.tiles[0].low;
-  frame.high = made.tiles[0].high;
+  frame.low = tileTree.tiles[0].low;
+  frame.high = tileTree.tiles[0].high;
   const auto bytes = [](int tile) { return static_cast<uint64_t>(100 + 37 * tile % 61); };
-  TileSelector selector(made, {});  // one for all: what was replaced before counts
-  // The same views where tiles share resources, as networks.
-  const auto resourcesOf = [](int tile) { return std::vector<int>{tile % 5, 5 + tile % 3}; };
+  TileSelector selector(tileTree, {});  // shared by all views, as the replacement state carries over
+  // The same views, with tiles that share resources, such as networks.
+  const auto tileResources = [](int tile) { return std::vector<int>{tile % 5, 5 + tile % 3}; };
   const auto bytesOfResource = [](int resource) { return static_cast<uint64_t>(60 + 90 * resource % 170); };
-  TileSelector sharing(made, {});
+  TileSelector sharing(tileTree, {});
   const RandomStream random(17, 1);
   ordered_json views = ordered_json::array();
   for (uint64_t i = 0; i < kViews; ++i) {
@@ -83,16 +83,16 @@ ordered_json makeSelections() {
     pose.rotation.col(0) = forward.cross(Vec3d::UnitZ()).normalized();
     pose.rotation.col(1) = forward.cross(pose.rotation.col(0));
     pose.rotation.col(2) = forward;
-    std::set<int> held = {0, made.surround};
-    for (size_t tile = 1; tile < made.tiles.size(); ++tile) {
-      if (made.tiles[tile].hasContent && value(10 + tile) > 0) held.insert(static_cast<int>(tile));
+    std::set<int> resident = {0, tileTree.backgroundBlock};
+    for (size_t tile = 1; tile < tileTree.tiles.size(); ++tile) {
+      if (tileTree.tiles[tile].hasContent && value(10 + tile) > 0) resident.insert(static_cast<int>(tile));
     }
-    const auto holds = [&](int tile) { return held.contains(tile); };
+    const auto holds = [&](int tile) { return resident.contains(tile); };
     const uint64_t budget = 300 + random.below(200 * i + 9, 4000);
     const TileView view = tileView(camera, pose, frame);
     const TileChoice choice = selector.choose(view, {budget, holds, bytes});
     const TileCut cut = selector.cut(view, holds);
-    const TileChoice shared = sharing.choose(view, {budget, holds, bytes, resourcesOf, bytesOfResource});
+    const TileChoice shared = sharing.choose(view, {budget, holds, bytes, tileResources, bytesOfResource});
     ordered_json tiles = ordered_json::array();
     for (const SelectedTile& one : cut.tiles) {
       if (one.visible) tiles.push_back({one.tile, one.content});
@@ -105,23 +105,23 @@ ordered_json makeSelections() {
                        {"right", toJson(pose.rotation.col(0))},
                        {"down", toJson(pose.rotation.col(1))},
                        {"forward", toJson(pose.rotation.col(2))}}},
-                     {"held", held},
+                     {"held", resident},
                      {"budget", budget},
-                     {"wanted", choice.wanted},
+                     {"requested", choice.requested},
                      {"refused", choice.refused},
-                     {"sharing", {{"wanted", shared.wanted}, {"refused", shared.refused}}},
+                     {"sharing", {{"requested", shared.requested}, {"refused", shared.refused}}},
                      {"cut", tiles},
-                     {"surround", cut.surround}});
+                     {"backgroundBlock", cut.backgroundBlock}});
   }
   ordered_json sizes = ordered_json::array();
   ordered_json resources = ordered_json::array(), resourceSizes = ordered_json::array();
-  for (size_t tile = 0; tile < made.tiles.size(); ++tile) {
+  for (size_t tile = 0; tile < tileTree.tiles.size(); ++tile) {
     sizes.push_back(bytes(static_cast<int>(tile)));
-    resources.push_back(resourcesOf(static_cast<int>(tile)));
+    resources.push_back(tileResources(static_cast<int>(tile)));
   }
   for (int resource = 0; resource < 8; ++resource) resourceSizes.push_back(bytesOfResource(resource));
   return {{"frame", {{"near", frame.near}, {"low", toJson(frame.low)}, {"high", toJson(frame.high)}}},
-          {"tree", toJson(made)},
+          {"tree", toJson(tileTree)},
           {"bytes", sizes},
           {"resources", resources},
           {"bytesOfResources", resourceSizes},

@@ -1,13 +1,14 @@
-// What to draw and what to have in memory of a made tree, for many views one after another: selectors in every language
-// must say the same.
+// Which tiles of a synthetic tree to draw and to hold in memory, for many views in sequence. Selectors in every
+// language must make the same choices.
 #pragma once
 
 #include <nlohmann/json.hpp>
 
 namespace tessera::golden {
 
-// {frame: {near, low, high}, tree: {columns, rows, surround, tiles}, bytes, views: [{camera, held, budget, wanted,
-// refused, cut, surround}]}; lengths in scene units, cut: [tile, content] of what is visible, front to back.
+// Returns {frame: {near, low, high}, tree: {columns, rows, backgroundBlock, tiles}, bytes, resources, bytesOfResources,
+// views: [{camera, held, budget, requested, refused, sharing, cut, backgroundBlock}]}. Lengths are in scene units.
+// `cut` lists [tile, content] of the visible tiles, front to back.
 nlohmann::ordered_json makeSelections();
 
 }  // namespace tessera::golden

@@ -45,12 +45,12 @@ class VolumePartMaker {
   }
 
   void storeMacroblock(const Triple<uint32_t>& first) {
-    const uint32_t n = part_.voxels, most = n - 1;
+    const uint32_t n = part_.voxels, maximum = n - 1;
     for (uint32_t k = 0; k < VolumePart::kStoredEdge; ++k) {
       for (uint32_t j = 0; j < VolumePart::kStoredEdge; ++j) {
         for (uint32_t i = 0; i < VolumePart::kStoredEdge; ++i) {
-          const uint32_t x = std::min(first[0] + i, most), y = std::min(first[1] + j, most),
-                         z = std::min(first[2] + k, most);
+          const uint32_t x = std::min(first[0] + i, maximum), y = std::min(first[1] + j, maximum),
+                         z = std::min(first[2] + k, maximum);
           part_.voxelBytes.push_back(quantised(voxels_.at(x, y, z), content_.densityRange));
           const auto p = inScene(part_, {middle(part_, x, n), middle(part_, y, n), middle(part_, z, n)});
           for (uint64_t a = 0; a < 7; ++a) {
@@ -82,7 +82,7 @@ class VolumePartMaker {
     }
   }
 
-  // A cell may hold something where a voxel that is mixed into a sample in it is dense, and not only hidden ones.
+  // A cell is occupied if a voxel that is interpolated into one of its samples is dense and not merely hidden.
   void makeDistances() {
     const uint32_t cells = part_.planes / VolumePart::kDistanceCell, side = part_.voxels / cells;
     OccupancyBits occupied(cells);
@@ -104,7 +104,7 @@ class VolumePartMaker {
   Densities voxels_;
 };
 
-VolumeContent contentOf(uint64_t seed, const std::vector<VolumePart>& parts) {
+VolumeContent makeGoldenContent(uint64_t seed, const std::vector<VolumePart>& parts) {
   VolumeContent content;
   const RandomStream random(seed, 7);
   uint64_t next = 0;
@@ -122,11 +122,11 @@ VolumePart blockPart(uint32_t column, uint32_t voxels, uint32_t planes) {
   return part;
 }
 
-VolumePart surroundPart(uint32_t voxels, uint32_t planes) {
+VolumePart backgroundBlockPart(uint32_t voxels, uint32_t planes) {
   VolumePart part;
   part.voxels = voxels;
   part.planes = planes;
-  placeSurround(part);
+  placeBackgroundBlock(part);
   return part;
 }
 
@@ -135,17 +135,17 @@ VolumePart surroundPart(uint32_t voxels, uint32_t planes) {
 Scene<VolumeContent> makeVolumeScene() {
   Scene<VolumeContent> scene;
   scene.tileset = landscapeTileset(kVolumeName, 64);
-  scene.contents["0_0"] = contentOf(1, {blockPart(0, 32, 64)});
-  scene.contents["1_0"] = contentOf(2, {blockPart(1, 32, 64)});
-  scene.contents["all"] = contentOf(3, {blockPart(0, 16, 32), blockPart(1, 16, 32)});
+  scene.contents["0_0"] = makeGoldenContent(1, {blockPart(0, 32, 64)});
+  scene.contents["1_0"] = makeGoldenContent(2, {blockPart(1, 32, 64)});
+  scene.contents["all"] = makeGoldenContent(3, {blockPart(0, 16, 32), blockPart(1, 16, 32)});
   scene.contents["all"].stepsPerTexel = 2;
-  scene.contents["surround"] = contentOf(4, {surroundPart(32, 64)});
-  scene.contents["coarse_surround"] = contentOf(5, {surroundPart(16, 32)});
-  scene.contents["coarse_surround"].stepsPerTexel = 2;
+  scene.contents["background_block"] = makeGoldenContent(4, {backgroundBlockPart(32, 64)});
+  scene.contents["coarse_background_block"] = makeGoldenContent(5, {backgroundBlockPart(16, 32)});
+  scene.contents["coarse_background_block"].stepsPerTexel = 2;
   return scene;
 }
 
-VolumeSums sumsOf(const VolumePart& part) {
+VolumeSums computeSums(const VolumePart& part) {
   VolumeSums sums;
   sums.stored = part.storedMacroblocks();
   const auto first = std::find(part.macroblocks.begin(), part.macroblocks.end(), 0u);
@@ -154,8 +154,8 @@ VolumeSums sumsOf(const VolumePart& part) {
     sums.occupied += distance == 0;
     sums.distances += distance;
   }
-  sums.voxels = sumsOf(part.voxelBytes);
-  for (size_t axis = 0; axis < 3; ++axis) sums.planes[axis] = sumsOf(part.planeBytes[axis]);
+  sums.voxels = computeSums(part.voxelBytes);
+  for (size_t axis = 0; axis < 3; ++axis) sums.planes[axis] = computeSums(part.planeBytes[axis]);
   return sums;
 }
 

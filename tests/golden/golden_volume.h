@@ -1,4 +1,4 @@
-// The scene that is committed in tests/golden/volume, as a function; its merged level has steps of half a texel.
+// Generates the scene that is committed in tests/golden/volume. The marching step of its merged level is half a texel.
 #pragma once
 
 #include <array>
@@ -11,14 +11,14 @@ namespace tessera::golden {
 
 Scene<VolumeContent> makeVolumeScene();
 
-// What every reader has to come to, in C++ and in a browser; sums of whole numbers below 2^53. docs/tile-format.md,
-// section 11.
+// The checksums that every reader, in C++ and in a browser, must compute: sums of integers below 2^53.
+// docs/tile-format.md, section 11.
 struct VolumeSums {
   uint64_t stored = 0, firstStored = 0, occupied = 0, distances = 0;
   ByteSums voxels;
   std::array<ByteSums, 3> planes;
 };
-VolumeSums sumsOf(const VolumePart& part);
+VolumeSums computeSums(const VolumePart& part);
 nlohmann::ordered_json toJson(const VolumeSums& sums);
 
 }  // namespace tessera::golden

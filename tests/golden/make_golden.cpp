@@ -1,5 +1,5 @@
-// make_golden volume|hash DIR: writes a golden scene, with sums.json and rays.json: what readers and renderers in every
-// language are tested against. Run again only when the format changes, and say so in the commit.
+// make_golden volume|hash DIR: writes a golden scene with sums.json and rays.json, against which readers and renderers
+// in every language are tested. Run it again only when the format changes, and say so in the commit.
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -16,7 +16,7 @@ using namespace tessera;
 
 namespace {
 
-// One ray a line.
+// Formats one ray per line.
 std::string raysToJson(const std::vector<golden::ExpectedRay>& rays) {
   const auto rounded = [](double x) { return std::round(1e9 * x) / 1e9; };
   std::string text;
@@ -43,11 +43,11 @@ void write(const fs::path& root, golden::Scene<Content> scene, const Encode& enc
     content.uri = writer.addContent(level, name, bytes);
     content.bytes = bytes.size();
     for (const auto& part : scene.contents.at(name).parts)
-      sums[content.uri].push_back(golden::toJson(golden::sumsOf(part)));
+      sums[content.uri].push_back(golden::toJson(golden::computeSums(part)));
   };
   writeContent(tileset.tiles[0].contents[0], 1, "all");
-  writeContent(tileset.tiles[0].contents[1], 0, "surround");
-  writeContent(tileset.tiles[0].contents[2], 1, "coarse_surround");
+  writeContent(tileset.tiles[0].contents[1], 0, "background_block");
+  writeContent(tileset.tiles[0].contents[2], 1, "coarse_background_block");
   writeContent(tileset.tiles[1].contents[0], 0, "0_0");
   writeContent(tileset.tiles[2].contents[0], 0, "1_0");
   writer.commit(tileset);

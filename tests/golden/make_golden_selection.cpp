@@ -1,4 +1,4 @@
-// Prints selection.json. Run again only when what is chosen is to change, and say so in the commit.
+// Prints selection.json. Run it again only when the selection is meant to change, and say so in the commit.
 #include <cstdio>
 
 #include "golden/golden_selection.h"

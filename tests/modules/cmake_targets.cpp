@@ -13,25 +13,25 @@ struct Command {
   std::vector<std::string> arguments;
 };
 
-std::vector<Command> commandsOf(std::string_view listFile) {
+std::vector<Command> parseCommands(std::string_view listFile) {
   static const std::regex comment("#[^\n]*"), command(R"((\w+)\s*\(([^()]*)\))"), word(R"([^\s"]+)");
-  // What stands in quotes here are definitions and regular expressions, which name no targets and may hold brackets.
+  // Quoted arguments here are definitions and regular expressions, which name no targets and may contain brackets.
   static const std::regex quoted(R"("(?:[^"\\]|\\.)*")"), generated(R"(\$<[^\s]*>)");
   std::string text = std::regex_replace(std::string(listFile), quoted, "");
   text = std::regex_replace(std::regex_replace(text, comment, ""), generated, "");
   std::vector<Command> commands;
-  for (std::sregex_iterator found(text.begin(), text.end(), command), end; found != end; ++found) {
-    const std::string arguments = (*found)[2].str();
-    Command& made = commands.emplace_back();
-    made.name = (*found)[1].str();
+  for (std::sregex_iterator it(text.begin(), text.end(), command), end; it != end; ++it) {
+    const std::string arguments = (*it)[2].str();
+    Command& parsed = commands.emplace_back();
+    parsed.name = (*it)[1].str();
     for (std::sregex_iterator each(arguments.begin(), arguments.end(), word); each != end; ++each) {
-      made.arguments.push_back(each->str());
+      parsed.arguments.push_back(each->str());
     }
   }
   return commands;
 }
 
-// The words of a call by the keyword that they follow; those before any by "".
+// Returns the words of a call by the keyword that they follow; those before any keyword under "".
 std::map<std::string, std::vector<std::string>> byKeyword(const std::vector<std::string>& arguments) {
   static const std::regex keyword("[A-Z][A-Z_]+");
   std::map<std::string, std::vector<std::string>> words;
@@ -124,17 +124,17 @@ class Reader {
 
 void addCmakeTargets(const std::string& folder, std::string_view listFile, CmakeTargets& targets) {
   Reader reader(folder, targets);
-  for (const Command& command : commandsOf(listFile)) reader.read(command);
+  for (const Command& command : parseCommands(listFile)) reader.read(command);
 }
 
 std::set<std::string> linkedBy(const CmakeTargets& targets, const std::string& name) {
   std::set<std::string> linked;
   std::vector<std::string> open = {name};
   while (!open.empty()) {
-    const auto found = targets.find(open.back());
+    const auto it = targets.find(open.back());
     open.pop_back();
-    if (found == targets.end()) continue;
-    for (const std::string& link : found->second.links) {
+    if (it == targets.end()) continue;
+    for (const std::string& link : it->second.links) {
       if (linked.insert(link).second) open.push_back(link);
     }
   }

@@ -19,8 +19,8 @@ std::vector<std::string> split(const std::string& text, const std::regex& separa
   return {begin, end};
 }
 
-// The words between commas and "and", without quotes and spaces; "—" is none.
-std::vector<std::string> listOf(const std::string& text) {
+// Splits a list at commas and "and", and strips quotes and spaces; "—" is the empty list.
+std::vector<std::string> splitList(const std::string& text) {
   static const std::regex separator(R"(,|\band\b)"), around(R"([\s`]+)");
   std::vector<std::string> words;
   for (const std::string& part : split(text, separator)) {
@@ -45,7 +45,7 @@ std::vector<std::string> linesOfTable(std::string_view markdown) {
   return lines;
 }
 
-std::vector<std::string> partsOf(const std::string& path) {
+std::vector<std::string> splitPath(const std::string& path) {
   std::vector<std::string> parts;
   std::istringstream in(path);
   for (std::string part; std::getline(in, part, '/');) parts.push_back(part);
@@ -56,9 +56,9 @@ bool isPlaceholder(const std::string& part) {
   return part.starts_with("<") && part.ends_with(">");
 }
 
-// What the placeholders of `folder` stand for where it holds `file`.
+// Returns the values of the placeholders of `folder` if it contains `file`; otherwise nothing.
 std::optional<std::map<std::string, std::string>> match(const std::string& folder, const std::string& file) {
-  const std::vector<std::string> parts = partsOf(folder), path = partsOf(file);
+  const std::vector<std::string> parts = splitPath(folder), path = splitPath(file);
   if (path.size() <= parts.size()) return std::nullopt;  // the last part is the file itself
   std::map<std::string, std::string> names;
   for (size_t i = 0; i < parts.size(); ++i) {
@@ -89,9 +89,9 @@ ModuleRow rowOfCells(const std::string& folder, const std::string& mayUse) {
   for (const std::string& clause : split(mayUse, clauseEnd)) {
     const std::vector<std::string> sides = split(clause, also);
     if (isFirst) {
-      row.uses = listOf(clause);
+      row.uses = splitList(clause);
     } else if (sides.size() == 2) {
-      for (const std::string& path : listOf(sides[0])) row.also.push_back({path, listOf(sides[1])});
+      for (const std::string& path : splitList(sides[0])) row.also.push_back({path, splitList(sides[1])});
     } else {
       throw wrong(folder, "\"" + clause + "\" does not say who also may use what");
     }
@@ -106,10 +106,10 @@ ModuleTable ModuleTable::parse(std::string_view markdown) {
   ModuleTable table;
   const std::vector<std::string> lines = linesOfTable(markdown);
   static const std::regex bar(R"(\s*\|\s*)");
-  for (size_t i = 2; i < lines.size(); ++i) {                     // below the titles and the line under them
-    const std::vector<std::string> cells = split(lines[i], bar);  // the first is what stands before the first bar
+  for (size_t i = 2; i < lines.size(); ++i) {                     // skips the titles and the separator
+    const std::vector<std::string> cells = split(lines[i], bar);  // the first cell is the text before the first bar
     if (cells.size() < 3) throw wrong(lines[i], "has no second column");
-    for (const std::string& folder : listOf(cells[1])) table.rows_.push_back(rowOfCells(folder, cells[2]));
+    for (const std::string& folder : splitList(cells[1])) table.rows_.push_back(rowOfCells(folder, cells[2]));
   }
   if (table.rows_.empty()) throw wrong("", "has no table of modules, \"bottom to top\"");
 
@@ -129,7 +129,7 @@ ModuleTable ModuleTable::parse(std::string_view markdown) {
   return table;
 }
 
-const ModuleRow* ModuleTable::rowOf(const std::string& file, Names& names) const {
+const ModuleRow* ModuleTable::findRow(const std::string& file, Names& names) const {
   const ModuleRow* best = nullptr;
   const auto rank = [](const ModuleRow& row) {
     const auto slashes = std::count(row.folder.begin(), row.folder.end(), '/');
@@ -137,23 +137,23 @@ const ModuleRow* ModuleTable::rowOf(const std::string& file, Names& names) const
     return std::pair(slashes, -placeholders);
   };
   for (const ModuleRow& row : rows_) {
-    const std::optional<Names> found = match(row.folder, file);
-    if (!found || (best != nullptr && rank(row) <= rank(*best))) continue;
+    const std::optional<Names> matched = match(row.folder, file);
+    if (!matched || (best != nullptr && rank(row) <= rank(*best))) continue;
     best = &row;
-    names = *found;
+    names = *matched;
   }
   return best;
 }
 
-std::string ModuleTable::moduleOf(const std::string& file) const {
+std::string ModuleTable::findModule(const std::string& file) const {
   Names names;
-  const ModuleRow* row = rowOf(file, names);
+  const ModuleRow* row = findRow(file, names);
   return row == nullptr ? std::string() : withNames(row->folder, names);
 }
 
-std::vector<std::string> ModuleTable::usesOf(const std::string& file) const {
+std::vector<std::string> ModuleTable::allowedIncludes(const std::string& file) const {
   Names names;
-  const ModuleRow* row = rowOf(file, names);
+  const ModuleRow* row = findRow(file, names);
   if (row == nullptr) return {};
   std::vector<std::string> uses;
   for (const std::string& one : row->uses) uses.push_back(withNames(one, names));
@@ -165,12 +165,12 @@ std::vector<std::string> ModuleTable::usesOf(const std::string& file) const {
   return uses;
 }
 
-std::string ModuleTable::brokenRule(const std::string& file, const std::string& header) const {
-  const std::string module = moduleOf(file), other = moduleOf(header);
+std::string ModuleTable::validationError(const std::string& file, const std::string& header) const {
+  const std::string module = findModule(file), other = findModule(header);
   if (module.empty()) return fmt::format("{} belongs to no module", file);
   if (other.empty()) return fmt::format("{} belongs to no module", header);
   if (module == other) return {};
-  const std::vector<std::string> uses = usesOf(file);
+  const std::vector<std::string> uses = allowedIncludes(file);
   for (const std::string& one : uses) {
     if (one == other || one == header || (one == "all" && !other.starts_with("apps/"))) return {};
   }

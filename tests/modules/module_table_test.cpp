@@ -1,6 +1,6 @@
-// ARCHITECTURE.md's table of modules holds: no file includes what its module may not use, and libraries link what the
-// table says. Of files that only tests need the rule is wider: they may also include what their binary links, and
-// helpers of tests, which stand in testing/ of a module and which nothing else may include.
+// Tests the table of modules in ARCHITECTURE.md: no file includes what its module may not use, and libraries link only
+// what the table allows. For files that only tests need, the rule is wider: they may also include what their binary
+// links, and test helpers, which are in a module's testing/ folder and which only tests may include.
 #include "modules/module_table.h"
 
 #include <fmt/format.h>
@@ -20,11 +20,11 @@ namespace {
 
 struct Include {
   int line = 0;
-  std::string header;  // as written, or where that begins with "..", from the project's root
+  std::string header;  // as written; if it begins with "..", relative to the project's root
 };
 
-// Of all C++ files of src/ and apps/, by their paths as in includes. Angle brackets, and shaders/, whose headers the
-// build writes or GLSL shares, are no modules.
+// The includes of all C++ files in src/ and apps/, by their paths as in includes. Headers in angle brackets, and those
+// in shaders/, which the build generates or GLSL shares, belong to no module.
 class Sources {
  public:
   Sources() {
@@ -32,8 +32,8 @@ class Sources {
       for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kProject / root)) {
         const std::string extension = entry.path().extension().string();
         if (extension != ".cpp" && extension != ".h") continue;
-        const std::string file = nameOf(entry.path());
-        includes_[file] = includesOf(entry.path());
+        const std::string file = includeName(entry.path());
+        includes_[file] = readIncludes(entry.path());
       }
     }
     for (const auto& [file, includes] : includes_) {
@@ -41,7 +41,7 @@ class Sources {
     }
   }
 
-  static std::string nameOf(const fs::path& path) {
+  static std::string includeName(const fs::path& path) {
     const std::string name = path.lexically_relative(kProject).generic_string();
     return name.starts_with("src/") ? name.substr(4) : name;
   }
@@ -53,9 +53,9 @@ class Sources {
   static bool isFuzzer(const std::string& file) { return file.find("_fuzz.") != std::string::npos; }
 
   const std::map<std::string, std::vector<Include>>& includes() const { return includes_; }
-  // Sources that are no tests, and whatever these include. A header that only tests include is a test's helper.
+  // Sources that are not tests, and everything that they include. A header that only tests include is a test helper.
   const std::set<std::string>& production() const { return production_; }
-  // A file and what it includes, directly or not, except what is production's.
+  // Returns a file and what it includes, directly or indirectly, without what production sources include.
   std::set<std::string> ofTest(const std::string& file) const {
     std::set<std::string> files = production_;
     std::set<std::string> own;
@@ -66,7 +66,7 @@ class Sources {
   }
 
  private:
-  static std::vector<Include> includesOf(const fs::path& path) {
+  static std::vector<Include> readIncludes(const fs::path& path) {
     std::vector<Include> includes;
     std::istringstream in(readTextFile(path));
     int number = 0;
@@ -76,7 +76,7 @@ class Sources {
       if (!line.starts_with(kInclude)) continue;
       std::string header = line.substr(kInclude.size(), line.find('"', kInclude.size()) - kInclude.size());
       if (header.starts_with("shaders/")) continue;
-      if (header.starts_with(".")) header = nameOf((path.parent_path() / header).lexically_normal());
+      if (header.starts_with(".")) header = includeName((path.parent_path() / header).lexically_normal());
       includes.push_back({number, header});
     }
     return includes;
@@ -86,9 +86,9 @@ class Sources {
     while (!open.empty()) {
       const std::string next = open.back();
       open.pop_back();
-      const auto found = includes_.find(next);
-      if (found == includes_.end() || !files.insert(next).second) continue;
-      for (const Include& include : found->second) open.push_back(include.header);
+      const auto it = includes_.find(next);
+      if (it == includes_.end() || !files.insert(next).second) continue;
+      for (const Include& include : it->second) open.push_back(include.header);
     }
   }
 
@@ -105,32 +105,32 @@ CmakeTargets targetsOfProject() {
   for (const char* root : {"src", "apps"}) {
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kProject / root)) {
       if (entry.path().filename() != "CMakeLists.txt") continue;
-      addCmakeTargets(Sources::nameOf(entry.path().parent_path()), readTextFile(entry.path()), targets);
+      addCmakeTargets(Sources::includeName(entry.path().parent_path()), readTextFile(entry.path()), targets);
     }
   }
   return targets;
 }
 
-std::string pathOf(const std::string& name) {
+std::string sourcePath(const std::string& name) {
   return name.starts_with("apps/") ? name : "src/" + name;
 }
 
-std::string placeOf(const std::string& file, const Include& include) {
-  return fmt::format("{}:{}: includes \"{}\"", pathOf(file), include.line, include.header);
+std::string describeInclude(const std::string& file, const Include& include) {
+  return fmt::format("{}:{}: includes \"{}\"", sourcePath(file), include.line, include.header);
 }
 
-// The modules that a target's sources belong to; of a target without any, that of its folder.
-std::set<std::string> modulesOf(const ModuleTable& table, const CmakeTarget& target) {
+// Returns the modules to which a target's sources belong; for a target without sources, the module of its folder.
+std::set<std::string> targetModules(const ModuleTable& table, const CmakeTarget& target) {
   std::set<std::string> modules;
-  for (const std::string& source : target.sources) modules.insert(table.moduleOf(source));
-  if (modules.empty()) modules.insert(table.moduleOf(target.folder + "/CMakeLists.txt"));
+  for (const std::string& source : target.sources) modules.insert(table.findModule(source));
+  if (modules.empty()) modules.insert(table.findModule(target.folder + "/CMakeLists.txt"));
   return modules;
 }
 
 std::set<std::string> modulesLinkedBy(const ModuleTable& table, const CmakeTargets& targets, const std::string& name) {
   std::set<std::string> modules;
   for (const std::string& link : linkedBy(targets, name)) {
-    if (const auto found = targets.find(link); found != targets.end()) modules.merge(modulesOf(table, found->second));
+    if (const auto it = targets.find(link); it != targets.end()) modules.merge(targetModules(table, it->second));
   }
   return modules;
 }
@@ -140,11 +140,12 @@ TEST(Modules, IncludeOnlyWhatTheTableAllows) {
   const Sources sources;
   EXPECT_GT(sources.production().size(), 300u);
   for (const std::string& file : sources.production()) {
-    EXPECT_FALSE(Sources::isTestHelper(file)) << pathOf(file) << " is for tests, and other code includes it";
+    EXPECT_FALSE(Sources::isTestHelper(file)) << sourcePath(file) << " is for tests, and other code includes it";
     for (const Include& include : sources.includes().at(file)) {
-      const std::string broken = table.brokenRule(file, include.header);
-      EXPECT_EQ(broken, "") << placeOf(file, include);
-      EXPECT_TRUE(sources.includes().contains(include.header)) << placeOf(file, include) << ", which is no file";
+      const std::string broken = table.validationError(file, include.header);
+      EXPECT_EQ(broken, "") << describeInclude(file, include);
+      EXPECT_TRUE(sources.includes().contains(include.header))
+          << describeInclude(file, include) << ", which is no file";
     }
   }
 }
@@ -153,7 +154,7 @@ TEST(Modules, HaveTestsThatIncludeOnlyWhatTheTableAllowsOrTheirBinaryLinks) {
   const ModuleTable table = tableOfProject();
   const CmakeTargets targets = targetsOfProject();
   const Sources sources;
-  std::map<std::string, std::string> binaries;  // of test files; fuzzers have binaries of their own in tests/fuzz
+  std::map<std::string, std::string> binaries;  // by test file; fuzzers have binaries of their own in tests/fuzz
   for (const auto& [name, target] : targets) {
     for (const std::string& source : target.sources) {
       if (target.isTest) binaries[source] = name;
@@ -167,11 +168,11 @@ TEST(Modules, HaveTestsThatIncludeOnlyWhatTheTableAllowsOrTheirBinaryLinks) {
     const std::set<std::string> linked = modulesLinkedBy(table, targets, binary);
     for (const std::string& file : sources.ofTest(source)) {
       for (const Include& include : sources.includes().at(file)) {
-        if (!sources.includes().contains(include.header)) continue;  // of tests/
-        if (Sources::isTestHelper(include.header)) continue;         // whose own includes are looked at
-        const std::string broken = table.brokenRule(file, include.header);
-        EXPECT_TRUE(broken.empty() || linked.contains(table.moduleOf(include.header)))
-            << placeOf(file, include) << ": " << broken << ", nor does tessera_" << binary << " link it";
+        if (!sources.includes().contains(include.header)) continue;  // headers in tests/
+        if (Sources::isTestHelper(include.header)) continue;         // its own includes are checked instead
+        const std::string broken = table.validationError(file, include.header);
+        EXPECT_TRUE(broken.empty() || linked.contains(table.findModule(include.header)))
+            << describeInclude(file, include) << ": " << broken << ", nor does tessera_" << binary << " link it";
         ++checked;
       }
     }
@@ -185,24 +186,24 @@ TEST(Modules, LinkInCmakeWhatTheTableAllows) {
   size_t checked = 0;
   for (const auto& [name, target] : targets) {
     if (target.isTest || target.sources.empty()) continue;
-    std::set<std::string> allowed = modulesOf(table, target);
+    std::set<std::string> allowed = targetModules(table, target);
     const std::set<std::string> own = allowed;
     for (const std::string& source : target.sources) {
-      const std::vector<std::string> uses = table.usesOf(source);
+      const std::vector<std::string> uses = table.allowedIncludes(source);
       allowed.insert(uses.begin(), uses.end());
     }
-    const std::string place = pathOf(target.folder) + "/CMakeLists.txt: " + name;
-    // Some headers of a module, or all that is no application.
+    const std::string place = sourcePath(target.folder) + "/CMakeLists.txt: " + name;
+    // A target may link a module if some of the module's headers are allowed, or if everything outside apps/ is.
     const auto isAllowed = [&](const std::string& module) {
       if (allowed.contains("all") && !module.starts_with("apps/")) return true;
       return std::any_of(allowed.begin(), allowed.end(), [&](const std::string& one) {
-        return one == module || (one.ends_with(".h") && table.moduleOf(one) == module);
+        return one == module || (one.ends_with(".h") && table.findModule(one) == module);
       });
     };
     for (const std::string& link : target.links) {
       const auto linked = targets.find(link);
       ASSERT_NE(linked, targets.end()) << place << " links " << link << ", which is nothing of the project";
-      for (const std::string& module : modulesOf(table, linked->second)) {
+      for (const std::string& module : targetModules(table, linked->second)) {
         EXPECT_TRUE(isAllowed(module)) << place << " links " << link << ", but " << *own.begin() << " may not use "
                                        << module;
         ++checked;
@@ -243,7 +244,7 @@ constexpr const char* kTable = R"(# Architecture
 | `representations/<name>/cpu` | base, `representations/<name>/content` | drawing |
 | `representations/mesh/cpu` | base, gpu | drawing otherwise |
 | `apps/tessera` | all | the program |
-| `apps/viewer` | all, `apps/tessera/drawable.h` | the window |
+| `apps/viewer` | all, `apps/tessera/render_source.h` | the window |
 
 | not | of this | table |
 |---|---|---|
@@ -252,45 +253,45 @@ constexpr const char* kTable = R"(# Architecture
 
 TEST(ModuleTable, RefusesWhatNoRowAllowsAndSaysWhy) {
   const ModuleTable table = ModuleTable::parse(kTable);
-  EXPECT_EQ(table.brokenRule("compute/device.cpp", "base/check.h"), "");
-  EXPECT_EQ(table.brokenRule("compute/device.cpp", "compute/vulkan/device.h"), "");
-  EXPECT_EQ(table.brokenRule("base/file.cpp", "compute/device.h"), "base may use nothing, not compute");
-  EXPECT_EQ(table.brokenRule("gpu/heap.cpp", "compute/device.h"), "gpu may use base, not compute");
-  EXPECT_EQ(table.brokenRule("other/a.cpp", "base/file.h"), "other/a.cpp belongs to no module");
-  EXPECT_EQ(table.brokenRule("gpu/heap.cpp", "other/a.h"), "other/a.h belongs to no module");
+  EXPECT_EQ(table.validationError("compute/device.cpp", "base/check.h"), "");
+  EXPECT_EQ(table.validationError("compute/device.cpp", "compute/vulkan/device.h"), "");
+  EXPECT_EQ(table.validationError("base/file.cpp", "compute/device.h"), "base may use nothing, not compute");
+  EXPECT_EQ(table.validationError("gpu/heap.cpp", "compute/device.h"), "gpu may use base, not compute");
+  EXPECT_EQ(table.validationError("other/a.cpp", "base/file.h"), "other/a.cpp belongs to no module");
+  EXPECT_EQ(table.validationError("gpu/heap.cpp", "other/a.h"), "other/a.h belongs to no module");
 }
 
 TEST(ModuleTable, WidensARowForTheFilesThatItNames) {
   const ModuleTable table = ModuleTable::parse(kTable);
-  EXPECT_EQ(table.brokenRule("compute/vulkan/adam.cpp", "gpu/heap.h"), "");
-  EXPECT_EQ(table.brokenRule("compute/make_device.cpp", "gpu/heap.h"), "");
-  EXPECT_EQ(table.brokenRule("compute/device.cpp", "gpu/heap.h"), "compute may use base, not gpu");
+  EXPECT_EQ(table.validationError("compute/vulkan/adam.cpp", "gpu/heap.h"), "");
+  EXPECT_EQ(table.validationError("compute/make_device.cpp", "gpu/heap.h"), "");
+  EXPECT_EQ(table.validationError("compute/device.cpp", "gpu/heap.h"), "compute may use base, not gpu");
 }
 
 TEST(ModuleTable, TakesTheLongestRowThatHoldsAFile) {
   const ModuleTable table = ModuleTable::parse(kTable);
-  EXPECT_EQ(table.moduleOf("representations/list.h"), "representations");
-  EXPECT_EQ(table.moduleOf("representations/hash/notes.h"), "representations");
-  EXPECT_EQ(table.moduleOf("representations/hash/content/a.h"), "representations/hash/content");
-  EXPECT_EQ(table.moduleOf("representations/hash/bake/a.h"), "representations/hash/bake");
-  EXPECT_EQ(table.brokenRule("representations/mesh/cpu/a.h", "gpu/heap.h"), "");
-  EXPECT_EQ(table.brokenRule("representations/hash/cpu/a.h", "gpu/heap.h"),
+  EXPECT_EQ(table.findModule("representations/list.h"), "representations");
+  EXPECT_EQ(table.findModule("representations/hash/notes.h"), "representations");
+  EXPECT_EQ(table.findModule("representations/hash/content/a.h"), "representations/hash/content");
+  EXPECT_EQ(table.findModule("representations/hash/bake/a.h"), "representations/hash/bake");
+  EXPECT_EQ(table.validationError("representations/mesh/cpu/a.h", "gpu/heap.h"), "");
+  EXPECT_EQ(table.validationError("representations/hash/cpu/a.h", "gpu/heap.h"),
             "representations/hash/cpu may use base, representations/hash/content, not gpu");
 }
 
 TEST(ModuleTable, KeepsOneRepresentationFromAnother) {
   const ModuleTable table = ModuleTable::parse(kTable);
-  EXPECT_EQ(table.brokenRule("representations/hash/cpu/a.h", "representations/hash/content/b.h"), "");
-  EXPECT_EQ(table.brokenRule("representations/hash/cpu/a.h", "representations/volume/content/b.h"),
+  EXPECT_EQ(table.validationError("representations/hash/cpu/a.h", "representations/hash/content/b.h"), "");
+  EXPECT_EQ(table.validationError("representations/hash/cpu/a.h", "representations/volume/content/b.h"),
             "representations/hash/cpu may use base, representations/hash/content, not representations/volume/content");
 }
 
 TEST(ModuleTable, OpensOfApplicationsOnlyWhatIsNamed) {
   const ModuleTable table = ModuleTable::parse(kTable);
-  EXPECT_EQ(table.brokenRule("apps/viewer/main.cpp", "representations/hash/cpu/a.h"), "");
-  EXPECT_EQ(table.brokenRule("apps/viewer/main.cpp", "apps/tessera/drawable.h"), "");
-  EXPECT_EQ(table.brokenRule("apps/viewer/main.cpp", "apps/tessera/verbs.h"),
-            "apps/viewer may use all, apps/tessera/drawable.h, not apps/tessera");
+  EXPECT_EQ(table.validationError("apps/viewer/main.cpp", "representations/hash/cpu/a.h"), "");
+  EXPECT_EQ(table.validationError("apps/viewer/main.cpp", "apps/tessera/render_source.h"), "");
+  EXPECT_EQ(table.validationError("apps/viewer/main.cpp", "apps/tessera/verbs.h"),
+            "apps/viewer may use all, apps/tessera/render_source.h, not apps/tessera");
 }
 
 TEST(ModuleTable, RefusesRowsThatUseWhatNoRowIs) {

@@ -1,15 +1,15 @@
-// Scenes of `hash` in a browser: bench/hash.sh (ROWS=browser).
+// Measures `hash` scenes in a browser: bench/hash.sh (ROWS=browser).
 import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import type { Plain } from '../src/plain';
+import type { HeadlessPage } from '../src/headless-page';
 import { launch, serve } from '../test/machine';
 import { againstOracle, tell } from './against-oracle';
 import { needed, verdict } from './verdict';
 
-declare const plain: Plain;
+declare const headlessPage: HeadlessPage;
 
-// SCENES: of each scene its folder and that of its capture, in turn. OUT: where pictures go.
+// SCENES: for each scene its folder and that of its capture, alternating. OUT: folder for images.
 const words = needed('SCENES').split(' ');
 const scenes = words.flatMap((scene, i) => (i % 2 === 0 ? [[scene, words[i + 1]]] : []));
 const out = needed('OUT');
@@ -22,15 +22,15 @@ describe('the viewer', () => {
   });
   afterAll(() => browser.close());
 
-  it.each(scenes)('draws held-out views as the processor does: %s', async (scene, capture) => {
+  it.each(scenes)('draws held-out views as the CPU does: %s', async (scene, capture) => {
     const server = await serve(scene);
     const page = await browser.newPage();
     const said: string[] = [];
     page.on('console', (message) => message.type() === 'error' && said.push(message.text()));
     page.on('pageerror', (error) => said.push(error.message));
-    await page.goto(`${server.url}plain.html`);
-    await page.waitForFunction(() => 'plain' in window);
-    console.log(`${scene}, drawn by ${await page.evaluate(() => plain.card())}`);
+    await page.goto(`${server.url}headless.html`);
+    await page.waitForFunction(() => 'headlessPage' in window);
+    console.log(`${scene}, drawn by ${await page.evaluate(() => headlessPage.gpu())}`);
     const { decibels, seconds } = await againstOracle(page, scene, capture, join(out, scene.split('/').at(-1)!));
     await page.close();
     server.close();

@@ -1,11 +1,12 @@
-// The viewer beside MERF's own (google-research, merf/webviewer), in one browser: bench/merf_viewer.sh. The same block, the
-// same pinholes, a ray for every pixel of 480×270 in every frame; both (MERF's with `quality=high`) take steps of one texel
-// of the planes until 1/255 is left of a ray. Frames are taken by turns, and each ends when the card has finished it.
+// Compares the viewer with MERF's own (google-research, merf/webviewer) in one browser: bench/merf_viewer.sh. Both
+// render the same block with the same pinhole cameras and one ray per pixel of 480×270 in every frame; both (MERF's
+// with `quality=high`) step by one texel of the planes until the transmittance of a ray is 1/255. Frames alternate, and
+// each ends when the GPU has finished it.
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import type { Plain, View } from '../src/plain';
+import type { HeadlessPage, View } from '../src/headless-page';
 import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { launch, serve, type Server } from '../test/machine';
@@ -13,8 +14,8 @@ import { capturedViews, psnr } from '../test/pictures';
 import { kFieldOfView, kHeight, kWidth, viewAt } from '../test/views';
 import { needed, verdict } from './verdict';
 
-declare const plain: Plain;
-// Globals of MERF's viewer (three.js r113).
+declare const headlessPage: HeadlessPage;
+// Global variables of MERF's viewer (three.js r113).
 declare let gCamera: { matrixWorld: { fromArray(numbers: number[]): void } };
 declare let gRenderer: { getContext(): WebGL2RenderingContext };
 declare let gLowResTexture: { width: number; height: number };
@@ -22,13 +23,13 @@ declare let gLoadedTextures: number, gNumTextures: number;
 declare function renderProgressively(): void;
 
 const viewer = needed('MERF_VIEWER');
-const work = needed('MERF_WORK'); // capture, scene, what was exported of it
+const work = needed('MERF_WORK'); // folder of the capture, the scene, and its export for MERF
 const scene = join(work, 'scene');
 const pictures = join(work, 'pictures');
 const near = needed('MERF_NEAR');
 
 const kRounds = 5;
-const kFrames = 2; // a round, and one before that does not count
+const kFrames = 2; // per round, plus one for warming up
 const kHost = 'http://merf.viewer';
 
 const median = (numbers: number[]) => [...numbers].sort((a, b) => a - b)[numbers.length >> 1];
@@ -71,11 +72,11 @@ describe('the viewer beside that of MERF', () => {
     await loaded;
     await theirs.waitForFunction(() => gLoadedTextures >= gNumTextures);
     await theirs.waitForLoadState('networkidle');
-    // From here on it draws when it is told to.
+    // From here on it only draws on request.
     await theirs.evaluate(() => void (window.requestAnimationFrame = () => 0));
   }
 
-  // Its space is y up: (y, z, x) of the scene, whose one block is its cube (src/export/merf_layout.h).
+  // Its space has y up: (y, z, x) of the scene, whose single block is its cube (src/export/merf_layout.h).
   function merfFromCamera({ matrix }: View): number[] {
     const { rotation: r, scale, translation: t } = tileset.worldFromScene;
     const turned = (v: number[]) => {
@@ -87,7 +88,7 @@ describe('the viewer beside that of MERF', () => {
     return [...turned(column(0)), 0, ...turned(column(1)), 0, ...turned(column(2)), 0, ...place, 1];
   }
 
-  // Seconds of each frame.
+  // Returns the seconds of each frame.
   const timeTheirs = (view: View, count: number): Promise<number[]> =>
     theirs.evaluate(({ matrix, frames }) => {
       gCamera.matrixWorld.fromArray(matrix);
@@ -100,7 +101,7 @@ describe('the viewer beside that of MERF', () => {
       });
     }, { matrix: merfFromCamera(view), frames: count });
 
-  // Red, green and blue, rows from the top, as base64; the mean of many frames, which are shifted by half a pixel each.
+  // Returns RGB, rows from the top, as base64: the mean of many frames that are each shifted by a sub-pixel offset.
   const pixelsOfTheirs = (): Promise<string> =>
     theirs.evaluate(() => {
       for (let i = 0; i < 16; ++i) renderProgressively();
@@ -121,13 +122,13 @@ describe('the viewer beside that of MERF', () => {
     const rows: string[] = [];
     for (const [i, view] of views.entries()) {
       await ours.bringToFront();
-      await ours.evaluate((one) => plain.settle(one), view);
+      await ours.evaluate((one) => headlessPage.settle(one), view);
       const [a, b]: number[][] = [[], []];
       for (let round = 0; round < kRounds; ++round) {
-        a.push(...(await ours.evaluate(([one, count]) => plain.times(one, count), [view, 1 + kFrames] as const)).slice(1));
+        a.push(...(await ours.evaluate(([one, count]) => headlessPage.times(one, count), [view, 1 + kFrames] as const)).slice(1));
         b.push(...(await timeTheirs(view, 1 + kFrames)).slice(1));
       }
-      const [mine, its] = [await ours.evaluate(() => plain.pixels()), await pixelsOfTheirs()].map((text) => Buffer.from(text, 'base64'));
+      const [mine, its] = [await ours.evaluate(() => headlessPage.pixels()), await pixelsOfTheirs()].map((text) => Buffer.from(text, 'base64'));
       for (const [name, pixels] of [['ours', mine], ['merf', its]] as const) {
         writeFileSync(join(pictures, `${what.replaceAll(' ', '-')}-${i}-${name}.ppm`), Buffer.concat([Buffer.from(`P6 ${kWidth} ${kHeight} 255\n`), pixels]));
       }
@@ -145,25 +146,25 @@ describe('the viewer beside that of MERF', () => {
     verdict(`${what}: pictures alike, the worst, in dB`, Math.min(...alike), '>=', 20);
   }
 
-  it('draws a frame as soon', async () => {
+  it('renders frames as fast', async () => {
     await theirs.bringToFront();
     await openTheirs();
     await ours.bringToFront();
-    await ours.goto(`${server.url}plain.html`);
-    await ours.waitForFunction(() => 'plain' in window);
-    console.log(`drawn by ${await ours.evaluate(() => plain.card())}`);
-    await ours.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
-    await ours.evaluate(() => void (plain.world.background = new plain.THREE.Color(1, 1, 1))); // MERF's is white
-    // Inside of the scene's box rays begin at the camera in both.
+    await ours.goto(`${server.url}headless.html`);
+    await ours.waitForFunction(() => 'headlessPage' in window);
+    console.log(`drawn by ${await ours.evaluate(() => headlessPage.gpu())}`);
+    await ours.evaluate(() => headlessPage.open('scene/tileset.json', { selection: { maximumScreenSpaceError: 0 } }));
+    await ours.evaluate(() => void (headlessPage.world.background = new headlessPage.THREE.Color(1, 1, 1))); // as in MERF's viewer
+    // Inside the scene's box, rays begin at the camera in both viewers.
     const { low, high } = tileset.box;
     const height = low[2] + 0.8 * (high[2] - low[2]);
     const circle = Array.from({ length: 10 }, (_, i) => {
       const at = (turn: number) => [0.7 * Math.cos(turn), 0.7 * Math.sin(turn)] as const;
       return viewAt(tileset, [...at((i / 10) * 2 * Math.PI), height], [...at(((i + 2.5) / 10) * 2 * Math.PI), low[2]]);
     });
-    await ours.evaluate((view) => plain.settle(view), circle[0]);
+    await ours.evaluate((view) => headlessPage.settle(view), circle[0]);
     const sizes = [
-      await ours.evaluate(() => [plain.renderer.domElement.width, plain.renderer.domElement.height]),
+      await ours.evaluate(() => [headlessPage.renderer.domElement.width, headlessPage.renderer.domElement.height]),
       await theirs.evaluate(() => [gRenderer.getContext().drawingBufferWidth, gRenderer.getContext().drawingBufferHeight]),
       await theirs.evaluate(() => [gLowResTexture.width, gLowResTexture.height]),
     ];

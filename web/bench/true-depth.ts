@@ -1,23 +1,23 @@
-// What a made capture knows of its photos: how far away everything is.
+// Ground-truth depth of the photos of a synthetic capture.
 import { readFileSync } from 'node:fs';
 import * as THREE from 'three';
 import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
-import type { View } from '../src/plain';
+import type { View } from '../src/headless-page';
 
 export interface SeenPlace {
   place: number[]; // in the capture's world
   eye: number[];
-  pixel: [number, number]; // of the view, from the upper left
+  pixel: [number, number]; // of the view, from the upper left corner
 }
 
-const kStride = 24; // pixels of the photo between places
-const kFlat = 0.02; // neighbours differ by no more of their depth: edges of things may be a pixel off
+const kStride = 24; // pixels of the photo between sampled places
+const kFlat = 0.02; // relative depth difference allowed between neighbours, as edges of objects may be off by a pixel
 
-// Places that a photo shows, as seen by a pinhole where the photo was taken. `lens` is OpenCV's: fx fy cx cy k1 k2 p1 p2.
-// Depth is along the camera's axis, in world units.
+// Returns places that a photo shows, as seen by a pinhole camera at the photo's pose. `lens` has OpenCV's parameters:
+// fx fy cx cy k1 k2 p1 p2. Depth is along the camera's axis, in world units.
 export function placesOfDepth(file: string, lens: number[], view: View): SeenPlace[] {
   const bytes = readFileSync(file);
-  // The reader takes one channel of brightness, not one of depth: it is told that it is one.
+  // The loader does not support a channel for depth, so it is renamed to one for luminance.
   const name = bytes.indexOf('channels\0chlist\0') + 20;
   if (bytes.toString('latin1', name, name + 2) !== 'Z\0') throw new Error(`${file} is no depth map`);
   bytes.write('Y', name);
@@ -46,7 +46,7 @@ export function placesOfDepth(file: string, lens: number[], view: View): SeenPla
   return places;
 }
 
-// Where the ray of a pixel meets the plane at depth 1, downwards; by iteration, as the distortion is small.
+// Returns where the ray of a pixel meets the plane at depth 1, y downwards; iterates, as the distortion is small.
 function undistorted(x: number, y: number, [fx, fy, cx, cy, k1, k2, p1, p2]: number[]): [number, number] {
   const [a, b] = [(x - cx) / fx, (y - cy) / fy];
   let [u, v] = [a, b];

@@ -1,4 +1,4 @@
-// What measurements in a browser say, as bench/setup.sh does.
+// Prints the verdict of a browser measurement, like bench/setup.sh.
 import { expect } from 'vitest';
 
 export const needed = (name: string) => process.env[name] ?? expect.fail(`${name} is missing`);

@@ -1,20 +1,20 @@
-// The viewer in a browser, measured: bench/viewer.sh. Each row prints its figures, and fails where a bound is missed.
+// Measures the viewer in a browser: bench/viewer.sh. Each row prints its figures, and fails if a bound is missed.
 import { mkdtempSync, readdirSync, rmSync, statSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import type { Plain } from '../src/plain';
-import { countCardMemory, type CardMemory } from '../test/card-memory';
+import type { HeadlessPage } from '../src/headless-page';
+import { countGpuMemory, type GpuMemory } from '../test/gpu-memory';
 import { launch, serve, type Server } from '../test/machine';
 import { capturedViews } from '../test/pictures';
 import { kWidth, viewAt } from '../test/views';
-import { againstOracle, tell, tilesetOf } from './against-oracle';
+import { againstOracle, tell, loadTileset } from './against-oracle';
 import { placesOfDepth } from './true-depth';
 import { needed, verdict } from './verdict';
 
-declare const plain: Plain;
-declare const cardMemory: CardMemory;
+declare const headlessPage: HeadlessPage;
+declare const gpuMemory: GpuMemory;
 
 const small = needed('SMALL_SCENE'); // 2x2 blocks
 const smallCapture = needed('SMALL_CAPTURE');
@@ -26,7 +26,7 @@ const kNetworks = [
   { name: '20 Mbit/s, 60 ms, as of a telephone', megabits: 20, latency: 60 },
 ];
 
-// Bytes of all files of a scene.
+// Returns the bytes of all files of a scene.
 function bytesOnDisk(scene: string): number {
   return readdirSync(scene, { recursive: true, withFileTypes: true })
     .filter((entry) => entry.isFile() && /\.(glb|json)$/.test(entry.name))
@@ -53,9 +53,9 @@ describe('the viewer', () => {
     const page = await browser.newPage();
     page.on('console', (message) => message.type() === 'error' && said.push(message.text()));
     page.on('pageerror', (error) => said.push(error.message));
-    await page.addInitScript(countCardMemory);
-    await page.goto(`${server.url}plain.html`);
-    await page.waitForFunction(() => 'plain' in window);
+    await page.addInitScript(countGpuMemory);
+    await page.goto(`${server.url}headless.html`);
+    await page.waitForFunction(() => 'headlessPage' in window);
     return page;
   }
   async function close(page: Page): Promise<void> {
@@ -64,19 +64,19 @@ describe('the viewer', () => {
     expect.soft(said.splice(0)).toEqual([]);
   }
 
-  it('draws held-out views as the processor does', async () => {
+  it('draws held-out views as the CPU does', async () => {
     const page = await open(small);
-    console.log(`drawn by ${await page.evaluate(() => plain.card())}`);
+    console.log(`drawn by ${await page.evaluate(() => headlessPage.gpu())}`);
     const { decibels, seconds } = await againstOracle(page, small, smallCapture, folder);
     await close(page);
     tell(decibels, seconds);
     verdict('ten held-out views, the worst, in dB', Math.min(...decibels), '>=', 38);
   });
 
-  // Small cubes a little in front of what the true depth says is there, and a little behind it.
-  it('is hidden by models in front of it, and hides those behind', async () => {
+  // Places small cubes slightly in front of the true depth, and slightly behind it.
+  it('occludes models behind it and is occluded by those in front', async () => {
     const page = await open(small);
-    await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
+    await page.evaluate(() => headlessPage.open('scene/tileset.json', { selection: { maximumScreenSpaceError: 0 } }));
     const counts = { places: 0, inFront: 0, behind: 0 };
     for (const { view, lens, depthFile } of capturedViews(smallCapture, 10)) {
       const places = placesOfDepth(join(smallCapture, depthFile), lens, view);
@@ -87,10 +87,10 @@ describe('the viewer', () => {
           const distance = Math.hypot(...away);
           return { middle: away.map((x, a) => eye[a] + factor * x), half: 0.006 * distance };
         });
-        await page.evaluate((all) => plain.addCubes(all), cubes);
-        await page.evaluate((one) => plain.settle(one), view);
-        const pixels = Buffer.from(await page.evaluate(() => plain.pixels()), 'base64');
-        await page.evaluate(() => plain.removeBox());
+        await page.evaluate((all) => headlessPage.addCubes(all), cubes);
+        await page.evaluate((one) => headlessPage.settle(one), view);
+        const pixels = Buffer.from(await page.evaluate(() => headlessPage.pixels()), 'base64');
+        await page.evaluate(() => headlessPage.removeBox());
         for (const { pixel: [x, y] } of places) {
           const at = 3 * (x + kWidth * y);
           const isRed = pixels[at] > 200 && pixels[at + 1] < 60 && pixels[at + 2] < 60;
@@ -105,7 +105,7 @@ describe('the viewer', () => {
   });
 
   it.each(kNetworks)('shows the first picture of a large scene soon: $name', async ({ name, megabits, latency }) => {
-    const tileset = tilesetOf(large);
+    const tileset = loadTileset(large);
     const page = await open(large);
     if (megabits) {
       const bytesASecond = (megabits * 1e6) / 8;
@@ -117,21 +117,21 @@ describe('the viewer', () => {
     const view = viewAt(tileset, [0, -tileset.rows * 2, tileset.rows * 2], [0, 0, 0]);
     const { seconds, bytes } = await page.evaluate(async (one) => {
       const begin = performance.now();
-      await plain.open('scene/tileset.json', { selection: { mostPixels: 1e9 } });
-      await plain.drawUntilSettled(one);
-      return { seconds: (performance.now() - begin) / 1000, bytes: plain.city!.statistics!.fetchedBytes };
+      await headlessPage.open('scene/tileset.json', { selection: { maximumScreenSpaceError: 1e9 } });
+      await headlessPage.drawUntilSettled(one);
+      return { seconds: (performance.now() - begin) / 1000, bytes: headlessPage.city!.statistics!.fetchedBytes };
     }, view);
     const total = bytesOnDisk(large);
     const text = statSync(join(large, 'tileset.json')).size;
     await close(page);
     console.log(`${name}: ${bytes} bytes of contents and ${text} of tileset.json, of ${total}, in ${seconds.toFixed(2)} s`);
-    if (megabits) return; // told, not judged
-    verdict('coarsest level with its surround and tileset.json, as a share of the bytes', (bytes + text) / total, '<=', 0.06);
+    if (megabits) return; // reported, without a bound
+    verdict('coarsest level with its background block and tileset.json, as a share of the bytes', (bytes + text) / total, '<=', 0.06);
     verdict('seconds to the first complete picture', seconds, '<=', 2);
   });
 
   it('keeps to a quarter of the finest level in a flight of 600 steps', async () => {
-    const tileset = tilesetOf(large);
+    const tileset = loadTileset(large);
     const page = await open(large);
     const [columns, rows] = [tileset.columns, tileset.rows];
     const flight = Array.from({ length: 600 }, (_, i) => {
@@ -141,27 +141,27 @@ describe('the viewer', () => {
       return viewAt(tileset, eye, [columns * 0.8 * Math.cos(ahead), rows * 0.8 * Math.sin(2 * ahead), -0.3]);
     });
     const budget = Number(process.env.FINEST_BYTES ?? expect.fail('FINEST_BYTES is missing')) / 4;
-    const own = await page.evaluate(() => cardMemory.bytes);
-    await page.evaluate((cardBytes) => plain.open('scene/tileset.json', { stream: { cardBytes } }), budget);
-    await page.evaluate((view) => plain.settle(view), flight[0]);
-    await page.evaluate(() => (cardMemory.most = cardMemory.bytes));
-    const entered = await page.evaluate(() => cardMemory.bytes);
+    const own = await page.evaluate(() => gpuMemory.bytes);
+    await page.evaluate((gpuBytes) => headlessPage.open('scene/tileset.json', { stream: { gpuBytes } }), budget);
+    await page.evaluate((view) => headlessPage.settle(view), flight[0]);
+    await page.evaluate(() => (gpuMemory.maximum = gpuMemory.bytes));
+    const entered = await page.evaluate(() => gpuMemory.bytes);
     let blank = 0;
     const drawn = new Array<number>(tileset.levels).fill(0);
     for (const view of flight) {
-      await page.evaluate((one) => plain.time(one, 1), view);
-      (await page.evaluate(() => plain.city!.statistics!.drawn)).forEach((count, level) => (drawn[level] += count));
-      const colours = await page.evaluate(() => new Set(atob(plain.pixels())).size);
+      await page.evaluate((one) => headlessPage.time(one, 1), view);
+      (await page.evaluate(() => headlessPage.city!.statistics!.drawn)).forEach((count, level) => (drawn[level] += count));
+      const colours = await page.evaluate(() => new Set(atob(headlessPage.pixels())).size);
       blank += colours < 8 ? 1 : 0;
     }
-    const { most, evictions } = await page.evaluate(
-      () => ({ most: cardMemory.most, evictions: plain.city!.statistics!.evictions }));
-    await page.evaluate(() => plain.close());
-    const left = await page.evaluate(() => cardMemory.bytes);
+    const { maximum, evictions } = await page.evaluate(
+      () => ({ maximum: gpuMemory.maximum, evictions: headlessPage.city!.statistics!.evictions }));
+    await page.evaluate(() => headlessPage.close());
+    const left = await page.evaluate(() => gpuMemory.bytes);
     await close(page);
-    console.log(`${entered} bytes at the beginning, ${most} at most, ${evictions} evictions, ${left} bytes left (${own} before)`);
+    console.log(`${entered} bytes at the beginning, ${maximum} at maximum, ${evictions} evictions, ${left} bytes left (${own} before)`);
     console.log(`tiles a frame: ${drawn.map((count, level) => `${(count / flight.length).toFixed(2)} of level ${level}`).join(', ')}`);
-    verdict('bytes on the card at most, as a share of the budget', (most - own) / budget, '<=', 1);
+    verdict('bytes on the GPU at most, as a share of the budget', (maximum - own) / budget, '<=', 1);
     verdict('blank frames', blank, '<=', 0);
     verdict('bytes left as a share of those before', left / own, '<=', 1.05);
   });

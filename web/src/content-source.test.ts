@@ -1,4 +1,4 @@
-// From files to the card, with a codec whose contents share resources.
+// Tests the way from files to the GPU with a codec whose contents share resources.
 import type * as THREE from 'three';
 import { describe, expect, it } from 'vitest';
 import { ContentSource, type ContentPath } from './content-source';
@@ -6,7 +6,7 @@ import type { SceneDrawer } from './draw/scene-drawer';
 import { SceneError } from './scene-error';
 import { TileSelector } from './stream/tile-selector';
 import { kStreamSettings, TileStreamer, type StreamSettings } from './stream/tile-streamer';
-import { madeTree, madeView, randomNumbers } from './testing/made-tree';
+import { testTree, testView, randomNumbers } from './testing/test-tree';
 import { decodeResource, type ContentCodec, type Resource } from './tiles/content-codec';
 
 const kContentBytes = 100;
@@ -14,7 +14,7 @@ const kResourceBytes = 1000;
 
 interface FakeContent {
   name: string;
-  read: readonly Resource[]; // with which it was decoded
+  read: readonly Resource[]; // the resources that it was decoded with
 }
 
 interface FakeDrawn extends FakeContent {
@@ -26,40 +26,40 @@ type FakeCodec = ContentCodec<{ memoryBytes: number }, FakeContent>;
 const kCodec: FakeCodec = {
   readHeader: () => ({ memoryBytes: kContentBytes }),
   decode: (_, name, read) => ({ name, read }),
-  buffersOf: () => [],
+  listBuffers: () => [],
   decodeResource: (file, { uri }) => {
     expect(new TextDecoder().decode(file)).toBe(uri);
     return { memoryBytes: kResourceBytes };
   },
 };
 
-const near = madeView([0, 0, 1], 0.3, -0.3);
-const far = madeView([0, 0, 400], 0, -1.5);
+const near = testView([0, 0, 1], 0.3, -0.3);
+const far = testView([0, 0, 400], 0, -1.5);
 
-// `resourcesOf`: of each tile of a city of edge × edge blocks.
-function make(edge: number, resourcesOf: (tile: number) => number[], settings: Partial<StreamSettings>, codec = kCodec) {
-  const tree = madeTree(edge);
-  tree.tiles.forEach(({ content }, tile) => (content!.resources = resourcesOf(tile)));
+// Sets up a city of edge × edge blocks; `tileResources` returns the resources of each tile.
+function make(edge: number, tileResources: (tile: number) => number[], settings: Partial<StreamSettings>, codec = kCodec) {
+  const tree = testTree(edge);
+  tree.tiles.forEach(({ content }, tile) => (content!.resources = tileResources(tile)));
   const resources = Array.from({ length: 4 }, (_, id) => ({ uri: `resources/${id}.bin`, mimeType: 'a/b', bytes: 50 }));
   const drawn = new Set<FakeDrawn>();
   const reads = new Map<string, number>();
   const broken = new Set<string>();
-  const card = {
+  const gpu = {
     get bytes(): number {
       const shared = new Set([...drawn].flatMap((one) => [...one.resources]));
       return kContentBytes * drawn.size + kResourceBytes * shared.size;
     },
-    most: 0,
+    maximum: 0,
   };
   const drawer: Partial<SceneDrawer<{ memoryBytes: number }, FakeContent, FakeDrawn>> = {
     residentBytes: ({ memoryBytes }) => memoryBytes,
     prepare: () => {},
     allocate: (content, _, shared) => {
       expect(content.read).toEqual(shared);
-      const made = { ...content, resources: shared };
-      drawn.add(made);
-      card.most = Math.max(card.most, card.bytes);
-      return made;
+      const drawnContent = { ...content, resources: shared };
+      drawn.add(drawnContent);
+      gpu.maximum = Math.max(gpu.maximum, gpu.bytes);
+      return drawnContent;
     },
     upload: () => 'done',
     free: (one) => void drawn.delete(one),
@@ -75,8 +75,8 @@ function make(edge: number, resourcesOf: (tile: number) => number[], settings: P
       },
     },
     pool: {
-      decode: async ({ file, name, promised, limits, resources: shared }: any) =>
-        codec.decode(codec.readHeader(file, name, promised, limits), name, shared),
+      decode: async ({ file, name, declared, limits, resources: shared }: any) =>
+        codec.decode(codec.readHeader(file, name, declared, limits), name, shared),
       decodeResource: async ({ file, from, limits }: any) => decodeResource(codec as ContentCodec, file, from, limits),
     },
     drawer,
@@ -95,100 +95,100 @@ function make(edge: number, resourcesOf: (tile: number) => number[], settings: P
     }
     return streamer.update(view).tiles;
   };
-  return { tree, streamer, clock, drawn, reads, broken, card, errors, settle };
+  return { tree, streamer, clock, drawn, reads, broken, gpu, errors, settle };
 }
 
-describe('what tiles share', () => {
-  it('is fetched once, and counts once', async () => {
-    const made = make(2, (tile) => (tile === 0 ? [] : [2]), { cardBytes: 1e6 });
-    const { streamer, drawn, reads } = made;
-    const cut = await made.settle(near);
+describe('resources that tiles share', () => {
+  it('are fetched once and counted once', async () => {
+    const setup = make(2, (tile) => (tile === 0 ? [] : [2]), { gpuBytes: 1e6 });
+    const { streamer, drawn, reads } = setup;
+    const cut = await setup.settle(near);
     const visible = cut.filter((one) => one.visible);
     expect(visible.length).toBeGreaterThan(1);
     expect(visible.every(({ tile, content }) => tile > 0 && tile === content)).toBe(true);
     expect([...reads].filter(([uri]) => uri.startsWith('resources'))).toEqual([['resources/2.bin', 1]]);
     expect(new Set([...drawn].flatMap(({ resources }) => [...resources])).size).toBe(1);
-    expect(streamer.statistics.cardBytes).toBe(made.card.bytes);
-    expect(streamer.statistics.cardBytes).toBe(kContentBytes * drawn.size + kResourceBytes);
-    expect(streamer.statistics.pageBytes).toBe(kResourceBytes); // for tiles that are still to come
+    expect(streamer.statistics.gpuBytes).toBe(setup.gpu.bytes);
+    expect(streamer.statistics.gpuBytes).toBe(kContentBytes * drawn.size + kResourceBytes);
+    expect(streamer.statistics.pageBytes).toBe(kResourceBytes); // held for tiles that are still to be loaded
     expect(streamer.idle).toBe(true);
   });
 
-  it('goes with the last tile that needs it, and comes back with the first', async () => {
-    const made = make(2, (tile) => (tile === 0 ? [] : [2]), { cardBytes: 1e6 });
-    const { streamer, reads, drawn } = made;
-    await made.settle(near);
+  it('are released with the last tile that needs them, and fetched again with the first', async () => {
+    const setup = make(2, (tile) => (tile === 0 ? [] : [2]), { gpuBytes: 1e6 });
+    const { streamer, reads, drawn } = setup;
+    await setup.settle(near);
     const settings = { ...streamer.settings };
-    streamer.settings = { ...settings, cardBytes: streamer.statistics.cardBytes - 1 };
-    await made.settle(near);
-    expect(streamer.statistics.cardBytes).toBe(kContentBytes * drawn.size + kResourceBytes);
+    streamer.settings = { ...settings, gpuBytes: streamer.statistics.gpuBytes - 1 };
+    await setup.settle(near);
+    expect(streamer.statistics.gpuBytes).toBe(kContentBytes * drawn.size + kResourceBytes);
     expect(drawn.size).toBeGreaterThan(1);
-    streamer.settings = { ...settings, cardBytes: kResourceBytes };
-    await made.settle(near);
+    streamer.settings = { ...settings, gpuBytes: kResourceBytes };
+    await setup.settle(near);
     expect([...drawn].map(({ name }) => name)).toEqual(['tiles/0.glb']);
-    expect([streamer.statistics.cardBytes, streamer.statistics.pageBytes]).toEqual([kContentBytes, 0]);
+    expect([streamer.statistics.gpuBytes, streamer.statistics.pageBytes]).toEqual([kContentBytes, 0]);
     expect(reads.get('resources/2.bin')).toBe(1);
     streamer.settings = settings;
-    await made.settle(near);
+    await setup.settle(near);
     expect(drawn.size).toBeGreaterThan(1);
     expect(reads.get('resources/2.bin')).toBe(2);
   });
 
-  it('keeps away the tiles that need it where it cannot be had, and is tried again', async () => {
-    const made = make(2, (tile) => (tile === 0 ? [] : [1]), { cardBytes: 1e6, firstRetry: 10000 });
-    const { streamer, broken, clock } = made;
+  it('prevent tiles that need them from loading while they fail, and are retried', async () => {
+    const setup = make(2, (tile) => (tile === 0 ? [] : [1]), { gpuBytes: 1e6, firstRetry: 10000 });
+    const { streamer, broken, clock } = setup;
     broken.add('resources/1.bin');
-    const cut = await made.settle(near);
+    const cut = await setup.settle(near);
     expect(cut.filter(({ visible }) => visible).every(({ content }) => content === 0)).toBe(true);
-    expect(made.errors).toHaveLength(1);
-    expect(made.errors[0]).toContain('resources/1.bin');
-    expect(streamer.errorOf(made.tree.tiles[0].children[0])?.message).toContain('was not found');
+    expect(setup.errors).toHaveLength(1);
+    expect(setup.errors[0]).toContain('resources/1.bin');
+    expect(streamer.tileError(setup.tree.tiles[0].children[0])?.message).toContain('was not found');
     expect([streamer.idle, streamer.statistics.pageBytes]).toEqual([true, 0]);
     broken.clear();
     clock.now += 10000;
     expect(streamer.idle).toBe(false);
-    await made.settle(near);
-    expect(made.drawn.size).toBeGreaterThan(1);
-    expect(streamer.errorOf(made.tree.tiles[0].children[0])).toBeUndefined();
+    await setup.settle(near);
+    expect(setup.drawn.size).toBeGreaterThan(1);
+    expect(streamer.tileError(setup.tree.tiles[0].children[0])).toBeUndefined();
   });
 
-  it('is refused where contents of the representation share nothing', async () => {
-    const made = make(2, (tile) => (tile === 0 ? [] : [1]), { cardBytes: 1e6 }, { ...kCodec, decodeResource: undefined });
-    const cut = await made.settle(near);
+  it('are rejected if contents of the representation share nothing', async () => {
+    const setup = make(2, (tile) => (tile === 0 ? [] : [1]), { gpuBytes: 1e6 }, { ...kCodec, decodeResource: undefined });
+    const cut = await setup.settle(near);
     expect(cut.filter(({ visible }) => visible).every(({ content }) => content === 0)).toBe(true);
-    expect(made.errors).toEqual([expect.stringMatching(/resources.1\.bin.*contents of this representation do not have/)]);
-    expect([...made.drawn].map(({ name }) => name)).toEqual(['tiles/0.glb']);
+    expect(setup.errors).toEqual([expect.stringMatching(/resources.1\.bin.*contents of this representation do not have/)]);
+    expect([...setup.drawn].map(({ name }) => name)).toEqual(['tiles/0.glb']);
   });
 
-  it('is part of what the coarsest level takes', async () => {
-    const made = make(1, () => [0], { cardBytes: kResourceBytes });
-    await made.settle(far);
-    expect(made.errors).toHaveLength(1);
-    expect(made.errors[0]).toContain('coarsest level');
-    expect(made.drawn.size).toBe(0);
+  it('count for the size of the coarsest level', async () => {
+    const setup = make(1, () => [0], { gpuBytes: kResourceBytes });
+    await setup.settle(far);
+    expect(setup.errors).toHaveLength(1);
+    expect(setup.errors[0]).toContain('coarsest level');
+    expect(setup.drawn.size).toBe(0);
   });
 
-  it('never passes the budget, whatever tiles share, and everything is given back', async () => {
+  it('never exceed the budget, and are all freed', async () => {
     const random = randomNumbers(3);
-    const made = make(8, (tile) => (tile === 0 ? [0] : [tile % 4, (tile + 1 + (tile % 3)) % 4].sort()), { cardBytes: 3700, patience: 0 });
-    const { streamer, card } = made;
+    const setup = make(8, (tile) => (tile === 0 ? [0] : [tile % 4, (tile + 1 + (tile % 3)) % 4].sort()), { gpuBytes: 3700, patience: 0 });
+    const { streamer, gpu } = setup;
     for (let round = 0; round < 60; ++round) {
-      const view = madeView([(random() - 0.5) * 16, (random() - 0.5) * 16, random() * 4], random() * 7, -random());
+      const view = testView([(random() - 0.5) * 16, (random() - 0.5) * 16, random() * 4], random() * 7, -random());
       for (let frame = 0; frame < 20; ++frame) {
-        await made.settle(view, 1);
-        expect(card.bytes).toBeLessThanOrEqual(streamer.statistics.cardBytes);
-        expect(streamer.statistics.cardBytes).toBeLessThanOrEqual(3700);
+        await setup.settle(view, 1);
+        expect(gpu.bytes).toBeLessThanOrEqual(streamer.statistics.gpuBytes);
+        expect(streamer.statistics.gpuBytes).toBeLessThanOrEqual(3700);
       }
-      await made.settle(view, 40);
+      await setup.settle(view, 40);
       expect(streamer.idle).toBe(true);
-      expect(streamer.statistics.cardBytes).toBe(card.bytes);
+      expect(streamer.statistics.gpuBytes).toBe(gpu.bytes);
     }
     expect(streamer.statistics.evictions).toBeGreaterThan(10);
-    expect(card.most).toBeGreaterThan(3000);
-    await made.settle(far, 1); // what is on its way then lets go of itself
-    await made.settle(near, 2);
+    expect(gpu.maximum).toBeGreaterThan(3000);
+    await setup.settle(far, 1); // whatever is in progress is dropped when it completes
+    await setup.settle(near, 2);
     streamer.dispose();
     for (let turns = 0; turns < 100; ++turns) await Promise.resolve();
-    expect([card.bytes, streamer.statistics.cardBytes, streamer.statistics.pageBytes]).toEqual([0, 0, 0]);
+    expect([gpu.bytes, streamer.statistics.gpuBytes, streamer.statistics.pageBytes]).toEqual([0, 0, 0]);
   });
 });

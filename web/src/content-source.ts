@@ -1,8 +1,9 @@
-// Where the contents of a scene come from: files, read by workers, drawn by the representation's drawer.
+// The source of the contents of a scene: files are fetched, decoded by workers, and uploaded by the representation's
+// drawer.
 import type * as THREE from 'three';
 import type { DecodePool } from './decode-pool';
 import type { ContentPlace, DrawnContent, SceneDrawer } from './draw/scene-drawer';
-import { codecOf, type KnownRepresentation } from './representations/codecs';
+import { getCodec, type KnownRepresentation } from './representations/codecs';
 import type { ContentFile, SceneFiles } from './scene-files';
 import type { ResourceSource } from './stream/shared-resources';
 import type { TileSource, UploadStep } from './stream/tile-streamer';
@@ -11,10 +12,10 @@ import type { Content, ContentCodec, Resource } from './tiles/content-codec';
 import { kContentLimits, type ContentLimits } from './tiles/content-limits';
 import type { TileContent, Tileset } from './tiles/tileset';
 
-// Surrounds are drawn for long, and so are the coarsest tiles where there are no more.
-const kMostDrawnForLong = 4;
+// Background blocks are drawn for a long time, and so are the coarsest tiles if there are at most this many.
+const kMaxDrawnForLong = 4;
 
-// What contents come from, and go to.
+// What contents pass through on their way from file to GPU.
 export interface ContentPath {
   tileset: Pick<Tileset<KnownRepresentation>, 'representation' | 'resources'>;
   tree: TileTree;
@@ -30,12 +31,12 @@ export class ContentSource implements TileSource<ContentFile, Content, DrawnCont
 
   constructor(
     private readonly path: ContentPath, renderer: THREE.WebGLRenderer,
-    private readonly codec: ContentCodec = codecOf(path.tileset.representation),
+    private readonly codec: ContentCodec = getCodec(path.tileset.representation),
   ) {
     const { tileset, tree } = path;
-    const surrounds = [...tree.tiles.keys()].filter((tile) => tree.tiles[tile].isSurround);
+    const backgroundBlocks = [...tree.tiles.keys()].filter((tile) => tree.tiles[tile].isBackgroundBlock);
     const coarsest = coarsestTiles(tree);
-    this.drawnForLong = new Set([...surrounds, ...(coarsest.length <= kMostDrawnForLong ? coarsest : [])]);
+    this.drawnForLong = new Set([...backgroundBlocks, ...(coarsest.length <= kMaxDrawnForLong ? coarsest : [])]);
     const gl = renderer.getContext() as WebGL2RenderingContext;
     this.limits = {
       ...kContentLimits,
@@ -46,33 +47,33 @@ export class ContentSource implements TileSource<ContentFile, Content, DrawnCont
     };
     if (tileset.resources.length === 0) return;
     this.resources = {
-      resourcesOf: (tile) => this.contentOf(tile).resources,
-      promisedBytes: (id) => tileset.resources[id].bytes,
+      tileResources: (tile) => this.tileContent(tile).resources,
+      declaredBytes: (id) => tileset.resources[id].bytes,
       load: (id, signal) => this.loadResource(id, signal),
     };
   }
 
-  promisedBytes(tile: number): number {
-    return this.contentOf(tile).bytes;
+  declaredBytes(tile: number): number {
+    return this.tileContent(tile).bytes;
   }
 
   async fetch(tile: number, signal: AbortSignal) {
     const { files, drawer } = this.path;
-    const content = this.contentOf(tile);
+    const content = this.tileContent(tile);
     const file = await files.read(content.uri, this.limits.fileBytes, signal);
     const header = this.codec.readHeader(file, content.uri, content, this.limits);
-    drawer.prepare(header, this.placeOf(tile));
-    return { file, fileBytes: file.length, cardBytes: drawer.residentBytes(header) };
+    drawer.prepare(header, this.contentPlace(tile));
+    return { file, fileBytes: file.length, gpuBytes: drawer.residentBytes(header) };
   }
 
   decode(tile: number, file: ContentFile, resources: readonly Resource[]): Promise<Content> {
-    const { uri, surround, box } = this.contentOf(tile);
+    const { uri, backgroundBlock, box } = this.tileContent(tile);
     const { tileset: { representation }, pool } = this.path;
-    return pool.decode({ representation, file, name: uri, promised: { surround, box }, limits: this.limits, resources });
+    return pool.decode({ representation, file, name: uri, declared: { backgroundBlock, box }, limits: this.limits, resources });
   }
 
   allocate(tile: number, decoded: Content, resources: readonly Resource[]): DrawnContent {
-    return this.path.drawer.allocate(decoded, this.placeOf(tile), resources);
+    return this.path.drawer.allocate(decoded, this.contentPlace(tile), resources);
   }
 
   upload(resident: DrawnContent): UploadStep {
@@ -87,18 +88,18 @@ export class ContentSource implements TileSource<ContentFile, Content, DrawnCont
     const { tileset: { representation, resources }, files, pool, drawer } = this.path;
     const from = resources[id];
     const file = await files.read(from.uri, this.limits.fileBytes, signal);
-    const fileBytes = file.length; // before it is handed over
+    const fileBytes = file.length; // before the buffer is transferred
     const resource = await pool.decodeResource({ representation, file, from, limits: this.limits });
-    const cardBytes = drawer.residentBytesOfResource?.(resource) ?? resource.memoryBytes;
-    return { resource, fileBytes, pageBytes: resource.memoryBytes, cardBytes };
+    const gpuBytes = drawer.residentBytesOfResource?.(resource) ?? resource.memoryBytes;
+    return { resource, fileBytes, pageBytes: resource.memoryBytes, gpuBytes };
   }
 
-  private contentOf(tile: number): TileContent {
+  private tileContent(tile: number): TileContent {
     return this.path.tree.tiles[tile].content!;
   }
 
-  private placeOf(tile: number): ContentPlace {
-    const { box, surround } = this.contentOf(tile);
-    return { box, surround, number: tile, level: this.path.tree.tiles[tile].level, isDrawnForLong: this.drawnForLong.has(tile) };
+  private contentPlace(tile: number): ContentPlace {
+    const { box, backgroundBlock } = this.tileContent(tile);
+    return { box, backgroundBlock, number: tile, level: this.path.tree.tiles[tile].level, isDrawnForLong: this.drawnForLong.has(tile) };
   }
 }

@@ -1,4 +1,4 @@
-// Workers that read contents.
+// A pool of workers that decode contents.
 import { makeWorker } from './make-worker';
 import { SceneError } from './scene-error';
 import type { Content, Resource } from './tiles/content-codec';
@@ -17,12 +17,12 @@ export class DecodePool {
 
   constructor(readonly size = Math.max(1, Math.min(4, (navigator.hardwareConcurrency || 2) - 1))) {}
 
-  // Starts so many workers, which make themselves ready.
+  // Starts `count` workers, which prepare their decoders.
   start(count: number): void {
     for (let i = 0; i < Math.min(count, this.size); ++i) this.worker(i);
   }
 
-  // The file is handed over: it is of no use afterwards. Resources are copied.
+  // Decodes a content. The file is transferred to the worker and must not be used afterwards. Resources are copied.
   decode(request: ContentRequest): Promise<Content> {
     return this.ask(request);
   }
@@ -58,7 +58,7 @@ export class DecodePool {
       if ('decoded' in data) waiting?.resolve(data.decoded);
       else waiting?.reject(new SceneError(data.error.what, data.error.place, data.error.reason, data.error.remedy));
     };
-    // The next content gets a new one.
+    // The worker is replaced when the next content needs one.
     const leave = (message: string) => {
       worker.terminate();
       delete this.workers[index];
@@ -70,7 +70,7 @@ export class DecodePool {
       }
     };
     worker.onerror = ({ message }) => leave(message);
-    worker.onmessageerror = () => leave('said what is not understood');
+    worker.onmessageerror = () => leave('sent a message that could not be read');
     this.workers[index] = worker;
     return worker;
   }

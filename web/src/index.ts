@@ -1,9 +1,9 @@
-// The library: a scene as an object of three.js.
+// The public API of the library: a scene as an object of three.js.
 export { kYUpFromZUp } from './axes';
 export { kDisplayModes, type DisplayMode } from './representations/drawers';
 export { TesseraScene, type SceneOptions, type SceneStatistics } from './scene';
 export { updateScenes } from './scenes';
-export { kMostHiddenBoxes } from './draw/hidden-boxes';
+export { kMaxHiddenBoxes } from './draw/hidden-boxes';
 export { SceneError } from './scene-error';
 export { ChosenFiles, ServedFiles, type SceneFiles } from './scene-files';
 export type { SelectionSettings } from './stream/tile-selector';

@@ -1,4 +1,4 @@
-// From a file beside the page. (make-worker-inline.ts is for a page that is one file.)
+// Creates the worker from a file beside the page. (make-worker-inline.ts is for the viewer as a single file.)
 export function makeWorker(): Worker {
   return new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' });
 }

@@ -1,12 +1,12 @@
-// The same choices as the renderer on the processor makes: tests/golden/selection.json, which its selector wrote.
+// Compares the choices with those of the CPU renderer's selector, which wrote tests/golden/selection.json.
 import { readFileSync } from 'node:fs';
 import * as THREE from 'three';
 import { describe, expect, it } from 'vitest';
-import { picturesOf } from './draw/picture';
+import { makePictures } from './draw/picture';
 import { tileView } from './picture-view';
 import { TileSelector } from './stream/tile-selector';
 import type { TileNode, TileTree } from './stream/tile-tree';
-import { madeTree } from './testing/made-tree';
+import { testTree } from './testing/test-tree';
 import type { Vec3 } from './tiles/tileset';
 
 interface GoldenTile extends Omit<TileNode, 'cells' | 'content'> {
@@ -16,13 +16,13 @@ interface GoldenTile extends Omit<TileNode, 'cells' | 'content'> {
 
 interface GoldenView {
   camera: { focal: number; width: number; height: number; eye: Vec3; right: Vec3; down: Vec3; forward: Vec3 };
-  held: number[];
+  'held': number[]; // tiles in memory
   budget: number;
-  wanted: number[];
+  requested: number[];
   refused: number;
-  sharing: { wanted: number[]; refused: number }; // where tiles share resources
+  sharing: { requested: number[]; refused: number }; // when tiles share resources
   cut: [number, number][];
-  surround: number;
+  backgroundBlock: number;
 }
 
 const golden = JSON.parse(readFileSync(new URL('../../tests/golden/selection.json', import.meta.url), 'utf8')) as {
@@ -34,8 +34,8 @@ const golden = JSON.parse(readFileSync(new URL('../../tests/golden/selection.jso
   views: GoldenView[];
 };
 
-function treeOf({ tiles, ...rest }: typeof golden.tree): TileTree {
-  const { content } = madeTree(1).tiles[0];
+function makeTree({ tiles, ...rest }: typeof golden.tree): TileTree {
+  const { content } = testTree(1).tiles[0];
   return {
     ...rest,
     tiles: tiles.map(({ cells: [i0, j0, i1, j1], hasContent, ...tile }) => (
@@ -43,7 +43,7 @@ function treeOf({ tiles, ...rest }: typeof golden.tree): TileTree {
   };
 }
 
-function viewOf({ focal, width, height, eye, right, down, forward }: GoldenView['camera']) {
+function makeView({ focal, width, height, eye, right, down, forward }: GoldenView['camera']) {
   const camera = new THREE.PerspectiveCamera();
   const axis = (a: Vec3, sign: number) => new THREE.Vector3(...a).multiplyScalar(sign);
   camera.matrixWorld.makeBasis(axis(right, 1), axis(down, -1), axis(forward, -1)).setPosition(...eye);
@@ -54,36 +54,36 @@ function viewOf({ focal, width, height, eye, right, down, forward }: GoldenView[
   const renderer = { xr: { enabled: false }, getDrawingBufferSize: (size: THREE.Vector2) => size.set(width, height) };
   const { near, low, high } = golden.frame;
   const inScene = new THREE.Matrix4();
-  const { pictures } = picturesOf(camera, renderer as unknown as THREE.WebGLRenderer, inScene, 1);
+  const { pictures } = makePictures(camera, renderer as unknown as THREE.WebGLRenderer, inScene, 1);
   return tileView({ near, box: { low, high } }, pictures[0], inScene);
 }
 
 describe('the view of a camera', () => {
-  it('has the selector choose as the renderer on the processor does, view after view', () => {
-    const selector = new TileSelector(treeOf(golden.tree));
+  it('makes the selector choose as the CPU renderer does, view after view', () => {
+    const selector = new TileSelector(makeTree(golden.tree));
     expect(golden.views.length).toBeGreaterThan(100);
-    golden.views.forEach(({ camera, held, budget, wanted, refused, cut, surround }, i) => {
-      const holds = (tile: number) => held.includes(tile);
-      const view = viewOf(camera);
+    golden.views.forEach(({ camera, 'held': resident, budget, requested, refused, cut, backgroundBlock }, i) => {
+      const holds = (tile: number) => resident.includes(tile);
+      const view = makeView(camera);
       const choice = selector.choose(view, {
-        budget, holds, bytesOf: (tile) => golden.bytes[tile], canBeHad: () => true, resourcesOf: () => [], bytesOfResource: () => 0,
+        budget, holds, estimateBytes: (tile) => golden.bytes[tile], canBeHad: () => true, tileResources: () => [], bytesOfResource: () => 0,
       });
       const drawn = selector.cut(view, holds);
-      expect({ i, ...choice }).toEqual({ i, wanted, refused });
+      expect({ i, ...choice }).toEqual({ i, requested, refused });
       const visible = drawn.tiles.filter((one) => one.visible).map((one) => [one.tile, one.content]);
-      expect({ i, surround: drawn.surround, cut: visible }).toEqual({ i, surround, cut });
+      expect({ i, backgroundBlock: drawn.backgroundBlock, cut: visible }).toEqual({ i, backgroundBlock, cut });
     });
   });
 
-  it('has the selector charge what tiles share as the renderer on the processor does', () => {
-    const selector = new TileSelector(treeOf(golden.tree));
-    golden.views.forEach(({ camera, held, budget, sharing }, i) => {
-      const choice = selector.choose(viewOf(camera), {
+  it('makes the selector charge shared resources as the CPU renderer does', () => {
+    const selector = new TileSelector(makeTree(golden.tree));
+    golden.views.forEach(({ camera, 'held': resident, budget, sharing }, i) => {
+      const choice = selector.choose(makeView(camera), {
         budget,
-        holds: (tile) => held.includes(tile),
-        bytesOf: (tile) => golden.bytes[tile],
+        holds: (tile) => resident.includes(tile),
+        estimateBytes: (tile) => golden.bytes[tile],
         canBeHad: () => true,
-        resourcesOf: (tile) => golden.resources[tile],
+        tileResources: (tile) => golden.resources[tile],
         bytesOfResource: (id) => golden.bytesOfResources[id],
       });
       expect({ i, ...choice }).toEqual({ i, ...sharing });

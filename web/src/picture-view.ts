@@ -1,10 +1,10 @@
-// A picture as the selection needs it: what its camera sees of a scene.
+// Converts a picture, that is, one camera of an image, to the view that the tile selection uses.
 import * as THREE from 'three';
 import { isParallel, type Picture } from './draw/picture';
-import { showsSurround, TileView, type Plane } from './stream/tile-view';
+import { showsBackgroundBlock, TileView, type Plane } from './stream/tile-view';
 import type { Box, Tileset } from './tiles/tileset';
 
-// In scene units.
+// Returns the view in scene units.
 export function tileView({ near, box }: Pick<Tileset, 'near' | 'box'>, picture: Picture, worldFromScene: THREE.Matrix4): TileView {
   const { camera, part, eye, clipFromScene: { elements } } = picture;
   const row = (i: number): Plane => [elements[i], elements[4 + i], elements[8 + i], elements[12 + i]];
@@ -14,23 +14,23 @@ export function tileView({ near, box }: Pick<Tileset, 'near' | 'box'>, picture: 
     return [1, -1].map((sign): Plane => [w[0] + sign * r[0], w[1] + sign * r[1], w[2] + sign * r[2], w[3] + sign * r[3]]);
   });
   const parallel = isParallel(camera);
-  // The near and far planes are not asked: rays know neither.
+  // The near and far planes are omitted, as rays are not limited by them.
   const planes = parallel ? sides : [w, ...sides];
   const projection = camera.projectionMatrix.elements;
   const scale = new THREE.Vector3().setFromMatrixScale(worldFromScene).x;
   const focal = 0.5 * Math.max(projection[0] * part.z, projection[5] * part.w) * (parallel ? scale : 1);
   const pixels = part.z * part.w;
-  return new TileView(eye, planes, focal, pixels, near, parallel, pixels * shareOfSurround(box, picture));
+  return new TileView(eye, planes, focal, pixels, near, parallel, pixels * shareOfBackgroundBlock(box, picture));
 }
 
-// How much of the picture looks out of the box.
-function shareOfSurround(box: Box, { origin, ray }: Picture): number {
+// Returns the share of the image whose rays leave the scene's box and show the background block.
+function shareOfBackgroundBlock(box: Box, { origin, ray }: Picture): number {
   const kAcross = 12;
   let shows = 0;
   for (let i = 0; i < kAcross ** 2; ++i) {
     const at = new THREE.Vector3((2 * ((i % kAcross) + 0.5)) / kAcross - 1, (2 * (Math.floor(i / kAcross) + 0.5)) / kAcross - 1, 1);
     const direction = at.clone().applyMatrix3(ray);
-    shows += showsSurround(at.applyMatrix3(origin).toArray(), direction.toArray(), box) ? 1 : 0;
+    shows += showsBackgroundBlock(at.applyMatrix3(origin).toArray(), direction.toArray(), box) ? 1 : 0;
   }
   return shows / kAcross ** 2;
 }

@@ -1,8 +1,9 @@
-// What went wrong with something from outside (a file, the network, the graphics card), for people.
+// An error about external input (a file, the network, the GPU), with a text for users.
 export class SceneError extends Error {
   override name = 'SceneError';
 
-  // `what` names the file or thing, `place` where in it (may be ''), `reason` what is wrong, `remedy` what to do.
+  // `what` names the file or thing, `place` the position in it (may be ''), `reason` what is wrong, `remedy` what to do
+  // about it.
   constructor(
     readonly what: string,
     readonly place: string,

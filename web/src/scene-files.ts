@@ -1,13 +1,13 @@
-// The files of a scene: of a server, or of a folder that somebody has chosen.
+// The files of a scene: from a server, or from a folder that the user has chosen.
 import { SceneError } from './scene-error';
 
 export type ContentFile = Uint8Array<ArrayBuffer>;
 
 export interface SceneFiles {
-  readonly name: string; // the same for the same scene
-  // `uri` is relative to the folder of tileset.json. Throws SceneError that names the file; also where it is larger than
-  // `most` bytes, before more than that has been kept.
-  read(uri: string, most: number, signal?: AbortSignal): Promise<ContentFile>;
+  readonly name: string; // identifies the scene
+  // Reads a file. `uri` is relative to the folder of tileset.json. Throws SceneError that names the file, also as soon
+  // as the file turns out to be larger than `maximum` bytes.
+  read(uri: string, maximum: number, signal?: AbortSignal): Promise<ContentFile>;
 }
 
 export class TooLarge extends SceneError {
@@ -19,45 +19,45 @@ export class TooLarge extends SceneError {
 export class ServedFiles implements SceneFiles {
   readonly name: string; // the address of tileset.json
 
-  // The address of the folder, or of the tileset.json in it; relative to the page.
+  // `url` is the address of the folder, or of the tileset.json in it, relative to the page.
   constructor(url: string) {
     const absolute = new URL(url, location.href);
     if (!absolute.pathname.endsWith('.json')) absolute.pathname = `${absolute.pathname.replace(/\/$/, '')}/tileset.json`;
     this.name = absolute.href;
   }
 
-  read(uri: string, most: number, signal?: AbortSignal): Promise<ContentFile> {
-    // Whatever the tileset is called on that server.
+  read(uri: string, maximum: number, signal?: AbortSignal): Promise<ContentFile> {
+    // The file is called tileset.json here, whatever its name on the server.
     const url = uri === 'tileset.json' ? this.name : new URL(uri, this.name).href;
     return uri === 'tileset.json'
-      ? fetchFile(url, url, most, signal, 'see that the address is that of a scene')
-      : fetchFile(url, uri, most, signal);
+      ? fetchFile(url, url, maximum, signal, 'see that the address is that of a scene')
+      : fetchFile(url, uri, maximum, signal);
   }
 }
 
-// Of an input that takes folders; the scene is what lies beside the topmost tileset.json.
+// The files of an <input webkitdirectory>; the scene is the folder of the topmost tileset.json.
 export class ChosenFiles implements SceneFiles {
   readonly name: string;
   private readonly files = new Map<string, File>();
 
-  // Throws SceneError where there is no tileset.json.
+  // Throws SceneError if there is no tileset.json.
   constructor(files: Iterable<File>) {
     const all = [...files].map((file) => [file.webkitRelativePath || file.name, file] as const);
     const depth = (path: string) => path.split('/').length;
     const tilesets = all.map(([path]) => path).filter((path) => /(^|\/)tileset\.json$/.test(path));
-    const found = tilesets.sort((a, b) => depth(a) - depth(b))[0];
-    if (found === undefined) {
+    const tilesetPath = tilesets.sort((a, b) => depth(a) - depth(b))[0];
+    if (tilesetPath === undefined) {
       throw new SceneError('folder', '', 'holds no tileset.json', 'choose the folder of a scene, as tessera bake has written it');
     }
-    const folder = found.slice(0, found.length - 'tileset.json'.length);
+    const folder = tilesetPath.slice(0, tilesetPath.length - 'tileset.json'.length);
     for (const [path, file] of all) if (path.startsWith(folder)) this.files.set(path.slice(folder.length), file);
     this.name = `folder ${folder}`;
   }
 
-  async read(uri: string, most: number, signal?: AbortSignal): Promise<ContentFile> {
+  async read(uri: string, maximum: number, signal?: AbortSignal): Promise<ContentFile> {
     const file = this.files.get(uri);
     if (!file) throw new SceneError(uri, '', 'is not in the folder', 'copy the scene again');
-    if (file.size > most) throw new TooLarge(uri);
+    if (file.size > maximum) throw new TooLarge(uri);
     try {
       const bytes = new Uint8Array(await file.arrayBuffer());
       signal?.throwIfAborted();
@@ -69,10 +69,10 @@ export class ChosenFiles implements SceneFiles {
   }
 }
 
-// Throws SceneError that names the file and says what the server, or the network, said; or that it is larger than `most`
-// bytes, before more than that has been kept. `ifMissing`: the remedy where there is no such file.
+// Fetches a file. Throws SceneError that names the file and contains the error of the server or the network, also as
+// soon as more than `maximum` bytes arrive. `ifMissing` is the remedy in the error for a file that does not exist.
 export async function fetchFile(
-  url: string, name: string, most: number, signal?: AbortSignal, ifMissing = 'reload the page, as the scene may have been baked again',
+  url: string, name: string, maximum: number, signal?: AbortSignal, ifMissing = 'reload the page, as the scene may have been baked again',
 ): Promise<ContentFile> {
   try {
     const answer = await fetch(url, { signal });
@@ -85,7 +85,7 @@ export async function fetchFile(
     const reader = answer.body!.getReader();
     for (let next = await reader.read(); !next.done; next = await reader.read()) {
       bytes += next.value.length;
-      if (bytes > most) {
+      if (bytes > maximum) {
         await reader.cancel();
         throw new TooLarge(name);
       }
@@ -100,6 +100,6 @@ export async function fetchFile(
     return file;
   } catch (error) {
     if (error instanceof SceneError || signal?.aborted) throw error;
-    throw new SceneError(name, '', 'could not be fetched', 'see that the server runs and the network is there');
+    throw new SceneError(name, '', 'could not be fetched', 'check that the server is running and the network is available');
   }
 }

@@ -6,20 +6,21 @@
 //   city.update(camera, renderer);
 //   renderer.render(world, camera);
 //
-// `update` streams in what the camera asks for and draws the scene into targets of its own, up to what opaque objects of
-// the same world hide; `render` then shows it among them. Its own frame is the capture's, turned from z up to y up, in
-// metres where the capture has a scale. Where several stand in one world, see scenes.ts.
+// `update` streams the tiles that the camera needs and renders the scene into render targets of its own, where its rays
+// end at the opaque objects of the same world; `render` then composites it with them. The object's frame is the
+// capture's, turned from z up to y up, in metres if the capture has a scale. For several scenes in one world, see
+// scenes.ts.
 import * as THREE from 'three';
 import { kYUpFromZUp } from './axes';
 import { ContentSource } from './content-source';
 import { DecodePool } from './decode-pool';
 import { cityMesh, kFirstRenderOrder } from './draw/city-mesh';
 import { OpaqueDepth } from './draw/opaque-depth';
-import { picturesOf, type Picture } from './draw/picture';
+import { makePictures, type Picture } from './draw/picture';
 import { kFarAway, type DrawnContent, type DrawnPart, type SceneDrawer } from './draw/scene-drawer';
 import { tileView } from './picture-view';
 import { kCodecs, type KnownRepresentation } from './representations/codecs';
-import { drawingOf, type DisplayMode, type KnownDrawing } from './representations/drawers';
+import { getDrawing, type DisplayMode, type KnownDrawing } from './representations/drawers';
 import { SceneError } from './scene-error';
 import { ServedFiles, type ContentFile, type SceneFiles } from './scene-files';
 import { TileSelector, kSelectionSettings, type SelectionSettings } from './stream/tile-selector';
@@ -32,7 +33,7 @@ import type { Tileset } from './tiles/tileset';
 
 const kTilesetBytes = 1 << 24;
 const kNearby = 1e-6; // scene units
-const kPrefetchTime = 30; // ms for uploads, while nothing is drawn
+const kPrefetchTime = 30; // ms for uploads per call of `prefetch`, which draws nothing
 
 export interface SceneOptions {
   selection?: Partial<SelectionSettings>;
@@ -40,14 +41,14 @@ export interface SceneOptions {
 }
 
 export interface SceneStatistics extends StreamStatistics {
-  targetBytes: number; // of the pictures that it is drawn into
-  drawn: number[]; // tiles of each level in the last picture
+  targetBytes: number; // GPU memory of the scene's render targets
+  drawn: number[]; // number of tiles of each level in the last frame
 }
 
-// What other scenes of the same world are to this one (scenes.ts).
+// The other scenes of the same world, as updateScenes (scenes.ts) sets them.
 export interface Neighbours {
-  behind: readonly TesseraScene[]; // drawn already: their surfaces end its rays
-  boxes: readonly THREE.Matrix4[]; // in which its surround is not drawn, as `hidden` has them
+  behind: readonly TesseraScene[]; // already drawn in this frame; rays of this scene end at their surfaces
+  boxes: readonly THREE.Matrix4[]; // boxes in which the background block is not drawn, in the form of `hidden`
 }
 
 export type { StreamSettings };
@@ -55,9 +56,9 @@ export type KnownTileset = Tileset<KnownRepresentation>;
 
 type Streamer = TileStreamer<ContentFile, Content, DrawnContent, Resource>;
 
-// From where, and what draws it.
+// What is needed to render the scene from one camera.
 interface Look {
-  size: THREE.Vector2; // of the pictures, in pixels
+  size: THREE.Vector2; // of the render target, in pixels
   pictures: Picture[];
   worldFromScene: THREE.Matrix4;
   drawer: SceneDrawer;
@@ -66,22 +67,23 @@ interface Look {
 }
 
 export class TesseraScene extends THREE.Object3D {
-  readonly localFromScene = new THREE.Matrix4(); // of this object, from the scene's units
+  readonly localFromScene = new THREE.Matrix4(); // from scene units to this object's frame
   readonly selection: SelectionSettings;
   readonly stream: StreamSettings;
-  resolutionScale = 1; // pixels of the scene beside those of the canvas, along an edge
-  largestResolutionScale = 1; // for which room is kept on the card, so that tiles need not go when it is reached
+  resolutionScale = 1; // resolution of the scene relative to that of the canvas, along an edge
+  largestResolutionScale = 1; // GPU memory is reserved for this resolution, so that reaching it evicts no tiles
   display: DisplayMode = 'colour';
-  featureLevel = 1; // which display modes show that show one: 0, the coarse features, to `featureLevels`
-  minTransmittance = 1 / 255; // rays end where less would be seen; 0: never
-  // Boxes in which nothing of it is drawn, at most kMostHiddenBoxes: from the cube of edge 1 about the origin to this
-  // object's frame.
+  featureLevel = 1; // the level that `featureLevel` display modes show: 0 for the coarse features, up to `featureLevels`
+  minTransmittance = 1 / 255; // rays end below this transmittance; 0: never
+  // Boxes in which nothing of the scene is drawn, at most kMaxHiddenBoxes. Each matrix maps the unit cube centred at
+  // the origin to this object's frame.
   hidden: THREE.Matrix4[] = [];
-  showsSurround = true; // false: nothing outside of `bounds` is drawn
-  // How far one sees beyond `bounds`, in diagonals of these: what lies farther fades into what is behind.
+  showsBackgroundBlock = true; // false: nothing outside of `bounds` is drawn
+  // Visibility range beyond `bounds`, as a multiple of their diagonal: farther parts fade into what is behind.
   visibility = Infinity;
   neighbours: Neighbours = { behind: [], boxes: [] };
-  // Of tiles that cannot be had, of a budget that is too small, and of a card that cannot draw the scene; told once each.
+  // Called once for each tile that cannot be loaded, for a budget that is too small, and for a GPU that cannot draw the
+  // scene.
   onError: (error: SceneError) => void = () => {};
   private readonly tree: TileTree;
   private readonly opaque = new OpaqueDepth();
@@ -92,13 +94,13 @@ export class TesseraScene extends THREE.Object3D {
   private drawn: number[] = [];
   private lastUpdate = 0;
   private disposed = false;
-  private refused = false; // the card cannot draw it
+  private refused = false; // the GPU cannot draw it
   private canvas?: EventTarget;
-  // What was on the card is gone: all is fetched anew when there is a card again.
-  private readonly onContextLost = () => this.leaveCard();
+  // After a loss of the WebGL context everything is fetched again as soon as there is a context.
+  private readonly onContextLost = () => this.leaveGpu();
 
-  // From the address of a scene's folder (or of the tileset.json in it), or other files. Throws SceneError where there is
-  // no scene, or one of another kind.
+  // Loads a scene from the address of its folder (or of the tileset.json in it), or from other files. Throws SceneError
+  // if there is no scene, or if it is of an unsupported kind.
   static async load(from: string | SceneFiles, options: SceneOptions = {}): Promise<TesseraScene> {
     const files = typeof from === 'string' ? new ServedFiles(from) : from;
     const pool = new DecodePool();
@@ -122,7 +124,7 @@ export class TesseraScene extends THREE.Object3D {
     this.selection = { ...kSelectionSettings, ...options.selection };
     this.stream = { ...kStreamSettings, ...options.stream };
     this.tree = tileTree(tileset, 'tileset.json');
-    this.drawing = drawingOf(tileset.representation);
+    this.drawing = getDrawing(tileset.representation);
     const { rotation: r, scale, translation: t } = tileset.worldFromScene;
     this.localFromScene.set(
       r[0] * scale, r[3] * scale, r[6] * scale, t[0],
@@ -132,33 +134,34 @@ export class TesseraScene extends THREE.Object3D {
     this.localFromScene.premultiply(kYUpFromZUp);
   }
 
-  // The box of what was captured, in this object's frame.
+  // The bounding box of the captured region, in this object's frame.
   get bounds(): THREE.Box3 {
     const { low, high } = this.tileset.box;
     return new THREE.Box3(new THREE.Vector3(...low), new THREE.Vector3(...high)).applyMatrix4(this.localFromScene);
   }
 
-  // What is behind everything.
+  // The colour behind everything.
   get background(): THREE.Color {
     return new THREE.Color().setRGB(...this.tileset.background, THREE.SRGBColorSpace);
   }
 
-  // The coarsest level and the surround are there, or cannot be had; on a card that cannot draw it, nothing can.
+  // True when the coarsest level and the background block are loaded or cannot be loaded, and on a GPU that cannot draw
+  // the scene.
   get complete(): boolean {
     return this.refused || (this.streamer?.complete ?? false);
   }
 
-  // Nothing that the last view asked for is still to come.
+  // True when nothing that the last view requested is still to be loaded.
   get idle(): boolean {
     return this.refused || (this.complete && (this.streamer?.idle ?? false) && this.drawer?.wantsAnotherFrame() === false);
   }
 
-  // What `display` may be, and what `featureLevel` may be where a mode shows one.
+  // The values that `display` can have, and those that `featureLevel` can have for modes that use it.
   get shows(): Pick<KnownDrawing, 'modes' | 'featureLevels'> {
     return this.drawing;
   }
 
-  // The most fine levels of features that any content has which has come so far; 0 where there are none.
+  // The largest number of fine feature levels of the contents loaded so far; 0 if there are none.
   get featureLevels(): number {
     return this.drawer?.featureLevels ?? 0;
   }
@@ -168,58 +171,61 @@ export class TesseraScene extends THREE.Object3D {
     return { ...this.streamer.statistics, targetBytes: this.drawer.bytes + this.opaque.bytes, drawn: this.drawn };
   }
 
-  // Of an ArrayCamera, and of a headset while it presents, a picture for each of its cameras; all are streamed for at once.
+  // Streams and draws the scene for a camera. An ArrayCamera, or a headset that presents, gets one view per camera;
+  // tiles are requested for all views together.
   update(camera: THREE.Camera, renderer: THREE.WebGLRenderer): void {
     const look = this.look(camera, renderer);
     if (!look) return;
     const { size, pictures, worldFromScene, drawer, streamer, mesh } = look;
     const surfaces = this.neighbours.behind.map((scene) => scene.mesh).filter((one) => one !== undefined);
     const depth = this.opaque.draw(renderer, pictures, this, size, new Set(surfaces));
-    const { views, tiles, surround } = this.ask(look, this.uploadTime());
+    const { views, tiles, backgroundBlock } = this.ask(look, this.uploadTime());
     const cut = new Set(tiles.map(({ tile }) => tile));
-    const contentOf = new Map(tiles.filter(({ visible }) => visible).map(({ tile, content }) => [tile, content]));
-    // What it surrounds comes first: on slow machines a picture of it alone would only take time.
-    const behind = streamer.complete && this.showsSurround ? streamer.residentOf(surround) : undefined;
+    const contentByTile = new Map(tiles.filter(({ visible }) => visible).map(({ tile, content }) => [tile, content]));
+    // The background block is drawn only once the coarsest tiles are complete: on slow machines a frame of it alone
+    // would only take time.
+    const behind = streamer.complete && this.showsBackgroundBlock ? streamer.findResident(backgroundBlock) : undefined;
     const contents = views.map((view): DrawnPart[] => {
       const parts = cutFrontToBack(this.tree, cut, view.eye).flatMap((tile): DrawnPart[] => {
-        const content = contentOf.get(tile);
+        const content = contentByTile.get(tile);
         if (content === undefined || !view.sees(this.tree.tiles[tile])) return [];
-        return [{ content: streamer.residentOf(content)!, within: tile === content ? undefined : boxOfCells(this.tree, tile) }];
+        return [{ content: streamer.findResident(content)!, within: tile === content ? undefined : boxOfCells(this.tree, tile) }];
       });
       return behind ? [...parts, { content: behind }] : parts;
     });
     this.drawn = new Array<number>(this.tileset.levels).fill(0);
-    for (const content of new Set(contentOf.values())) ++this.drawn[this.tree.tiles[content].level];
+    for (const content of new Set(contentByTile.values())) ++this.drawn[this.tree.tiles[content].level];
     const { low, high } = this.tileset.box;
     const diagonal = Math.hypot(...high.map((x, axis) => x - low[axis]));
     const sceneFromLocal = this.localFromScene.clone().invert();
     const inScene = (boxes: readonly THREE.Matrix4[]) => boxes.map((box) => sceneFromLocal.clone().multiply(box));
-    // Rays that meet nothing in whole scenes are the surround's, or else the coarsest content's: always there, whatever is in
-    // view.
-    const ofNothing = behind ?? streamer.residentOf(coarsestTiles(this.tree)[0]);
-    mesh.visible = drawer.draw({ pictures, worldFromScene, contents, opaqueDepth: depth, ofNothing }, {
+    // In scenes whose rays always end, rays that hit nothing take the background block's colour, or else the coarsest
+    // content's. It is always resident, so the colour does not depend on the view.
+    const backgroundContent = behind ?? streamer.findResident(coarsestTiles(this.tree)[0]);
+    mesh.visible = drawer.draw({ pictures, worldFromScene, contents, opaqueDepth: depth, backgroundContent }, {
       minTransmittance: this.minTransmittance,
       visibility: Math.min(Math.max(this.visibility * diagonal, kNearby), kFarAway),
       display: this.display,
       featureLevel: this.featureLevel,
-      // Something else may stand behind, though nothing that ends rays does.
-      endsRays: this.showsSurround && this.visibility === Infinity && this.neighbours.behind.length === 0,
+      // Something else may be visible behind the scene even if it ends no rays.
+      endsRays: this.showsBackgroundBlock && this.visibility === Infinity && this.neighbours.behind.length === 0,
       hidden: inScene(this.hidden),
-      hiddenOfSurround: inScene(this.neighbours.boxes),
-      withinBox: !this.showsSurround,
+      hiddenOfBackgroundBlock: inScene(this.neighbours.boxes),
+      withinBox: !this.showsBackgroundBlock,
     });
     mesh.renderOrder = kFirstRenderOrder + this.neighbours.behind.length;
   }
 
-  // Streams in what `update` would draw, and draws nothing: for who waits until it is `idle`, and then wants one picture.
+  // Streams what `update` would draw, without drawing: for callers that wait until the scene is `idle` and then need
+  // one complete image.
   prefetch(camera: THREE.Camera, renderer: THREE.WebGLRenderer): void {
     const look = this.look(camera, renderer);
     if (look) this.ask(look, kPrefetchTime);
   }
 
-  // The place of the world, in the last picture, at `at` (from -1 to 1 across it, upwards); of the scene alone. Nothing
-  // where there is nothing, or what is there hides less than half of what is behind. Of several cameras, `eye` is the number
-  // of the one whose picture it is.
+  // Returns the place in the world at `at` (from -1 to 1 across the last image, y upwards), considering this scene
+  // alone. Returns undefined if nothing is there, or if less than half of what is behind is hidden. With several
+  // cameras, `eye` is the index of the camera.
   pick(at: THREE.Vector2, renderer: THREE.WebGLRenderer, eye = 0): THREE.Vector3 | undefined {
     const picture = this.drawer?.pictures[eye];
     if (!picture) return undefined;
@@ -227,16 +233,16 @@ export class TesseraScene extends THREE.Object3D {
     return inScene?.applyMatrix4(this.localFromScene).applyMatrix4(this.matrixWorld);
   }
 
-  // Gives back all memory, of the card and of the page.
+  // Frees all memory of the GPU and of the page.
   override dispose(): void {
     super.dispose();
     this.disposed = true;
-    this.leaveCard();
+    this.leaveGpu();
     this.pool.dispose();
   }
 
-  // Gives back the memory of the card, and of what was fetched; the next update fetches it anew.
-  leaveCard(): void {
+  // Frees the GPU memory and everything that was fetched; the next update fetches it again.
+  leaveGpu(): void {
     this.streamer?.dispose();
     this.drawer?.dispose();
     this.opaque.dispose();
@@ -249,7 +255,7 @@ export class TesseraScene extends THREE.Object3D {
     this.streamer = this.drawer = this.mesh = this.canvas = undefined;
   }
 
-  // Nothing where nothing can be drawn.
+  // Returns undefined if nothing can be drawn.
   private look(camera: THREE.Camera, renderer: THREE.WebGLRenderer): Look | undefined {
     if (this.disposed || this.refused || renderer.getContext().isContextLost()) return undefined;
     const prepared = this.prepare(renderer);
@@ -257,21 +263,21 @@ export class TesseraScene extends THREE.Object3D {
     this.updateWorldMatrix(true, false);
     camera.updateWorldMatrix(true, false);
     const worldFromScene = this.matrixWorld.clone().multiply(this.localFromScene);
-    const { size, pictures } = picturesOf(camera, renderer, worldFromScene, this.resolutionScale);
+    const { size, pictures } = makePictures(camera, renderer, worldFromScene, this.resolutionScale);
     return pictures.length === 0 ? undefined : { size, pictures, worldFromScene, ...prepared };
   }
 
-  // What to draw of what is there; and another step of what is on its way.
+  // Selects what to draw of the resident tiles, and advances the loading by one step.
   private ask({ size, pictures, worldFromScene, drawer, streamer }: Look, uploadFor: number) {
     drawer.resize(size);
     const enlarged = Math.max(1, this.largestResolutionScale / this.resolutionScale) ** 2;
-    streamer.settings = { ...this.stream, cardBytes: this.stream.cardBytes - enlarged * (drawer.bytes + this.opaque.bytes) };
+    streamer.settings = { ...this.stream, gpuBytes: this.stream.gpuBytes - enlarged * (drawer.bytes + this.opaque.bytes) };
     const views = pictures.map((picture) => tileView(this.tileset, picture, worldFromScene));
     return { views, ...streamer.update(jointView(views), uploadFor) };
   }
 
-  // Milliseconds for uploads: a share of what a picture takes, so that slow machines do not wait for ever; more of them
-  // while there is nothing to be seen anyway.
+  // Returns the ms for uploads: a share of the frame time, so that slow machines make progress, and more while nothing
+  // is visible yet.
   private uploadTime(): number {
     const now = performance.now();
     const since = now - this.lastUpdate;
@@ -279,7 +285,7 @@ export class TesseraScene extends THREE.Object3D {
     return Math.min(Math.max(0.2 * since, this.complete ? 3 : 30), 200);
   }
 
-  // What needs to know the graphics card.
+  // Creates what depends on the GPU, if it does not exist yet.
   private prepare(renderer: THREE.WebGLRenderer) {
     if (!this.drawer || !this.streamer || !this.mesh) {
       try {

@@ -1,8 +1,8 @@
-// Reads contents away from the page's own thread.
+// The worker that decodes contents outside the main thread.
 import decoderUrl from '@jsquash/webp/codec/dec/webp_dec.wasm?url';
-import { codecOf, type KnownRepresentation } from './representations/codecs';
+import { getCodec, type KnownRepresentation } from './representations/codecs';
 import { SceneError } from './scene-error';
-import { decodeResource, type Content, type PromisedContent, type Resource } from './tiles/content-codec';
+import { decodeResource, type Content, type DeclaredContent, type Resource } from './tiles/content-codec';
 import type { ContentLimits } from './tiles/content-limits';
 import { isDecoderPrepared, prepareDecoder } from './tiles/lossless-image';
 import type { SharedResource } from './tiles/tileset';
@@ -15,7 +15,7 @@ interface Request {
 
 export interface ContentRequest extends Request {
   name: string;
-  promised: PromisedContent;
+  declared: DeclaredContent;
   resources: readonly Resource[];
 }
 
@@ -39,23 +39,23 @@ async function prepare(): Promise<void> {
 
 function ready(): Promise<void> {
   return (prepared ??= prepare().catch((error: unknown) => {
-    prepared = undefined; // the next content tries again
+    prepared = undefined; // the next request tries again
     throw error;
   }));
 }
 
-ready().catch(() => {}); // while the first files are fetched
+ready().catch(() => {}); // starts while the first files are fetched
 
 function decode(request: DecodeRequest): { decoded: Content | Resource; buffers: ArrayBuffer[] } {
   const { representation, file, limits } = request;
-  const codec = codecOf(representation);
+  const codec = getCodec(representation);
   if ('from' in request) {
     const resource = decodeResource(codec, file, request.from, limits);
     return { decoded: resource, buffers: codec.buffersOfResource?.(resource) ?? [] };
   }
-  const { name, promised, resources } = request;
-  const content = codec.decode(codec.readHeader(file, name, promised, limits), name, resources);
-  return { decoded: content, buffers: codec.buffersOf(content) };
+  const { name, declared, resources } = request;
+  const content = codec.decode(codec.readHeader(file, name, declared, limits), name, resources);
+  return { decoded: content, buffers: codec.listBuffers(content) };
 }
 
 self.onmessage = async ({ data }: MessageEvent<DecodeRequest & { id: number }>) => {
@@ -63,7 +63,7 @@ self.onmessage = async ({ data }: MessageEvent<DecodeRequest & { id: number }>) 
   try {
     await ready();
     if (!isDecoderPrepared()) {
-      prepared = undefined; // it gave up meanwhile
+      prepared = undefined; // the decoder failed in the meantime
       await ready();
     }
     const { decoded, buffers } = decode(data);

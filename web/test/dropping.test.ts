@@ -1,8 +1,8 @@
-// Models that people drop onto the viewer, and the world that they save. By pixels.
+// Tests models that users drop onto the viewer, and the world that they save, by pixels.
 import { readFileSync } from 'node:fs';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, beforeEach, describe, expect, it } from 'vitest';
-import { madeGlb } from '../src/testing/made-glb';
+import { testGlb } from '../src/testing/test-glb';
 import { goldenScene, launch, missing, serve, type Server } from './machine';
 import { decodePixels, pictureAtRest } from './pictures';
 
@@ -12,7 +12,7 @@ interface Given {
 }
 
 const kMiddle = { x: 300, y: 135 }; // beside the panel
-const cube: Given = { name: 'red cube.glb', bytes: madeGlb({ edge: 10 }) };
+const cube: Given = { name: 'red cube.glb', bytes: testGlb({ edge: 10 }) };
 
 describe.skipIf(missing())('a model that is dropped', () => {
   let server: Server;
@@ -65,7 +65,7 @@ describe.skipIf(missing())('a model that is dropped', () => {
   const listed = (names: string[]) =>
     page.waitForFunction((all) => [...document.querySelectorAll('.models .name')].map((one) => one.textContent).join() === all, names.join());
 
-  // Nothing selected, nothing open; how many of its pixels are red.
+  // Deselects everything, closes all panels, and counts the red pixels.
   async function picture(): Promise<{ pixels: Uint8Array; red: number }> {
     await page.keyboard.press('Escape');
     await page.mouse.move(470, 260);
@@ -86,7 +86,7 @@ describe.skipIf(missing())('a model that is dropped', () => {
     return { name: 'world.json', bytes: readFileSync(await download.path()) };
   }
 
-  it('stands in the picture, and again after it was saved and opened', async () => {
+  it('is drawn, and again after it was saved and opened', async () => {
     expect((await picture()).red).toBe(0);
     await drop(cube);
     await listed(['red cube']);
@@ -103,7 +103,7 @@ describe.skipIf(missing())('a model that is dropped', () => {
       await drop(...files);
       await listed(['red cube']);
       const after = await picture();
-      const isBesideToolbar = (i: number) => Math.floor(i / 3) % 480 >= 150; // which shows what has the focus
+      const isBesideToolbar = (i: number) => Math.floor(i / 3) % 480 >= 150; // the toolbar shows the focus
       const changed = after.pixels.filter((value, i) => isBesideToolbar(i) && Math.abs(value - before.pixels[i]) > 8).length;
       expect(changed).toBeLessThan(30);
     }
@@ -158,7 +158,7 @@ describe.skipIf(missing())('a model that is dropped', () => {
     expect(others).toEqual([y, z]);
     const after = await picture();
     expect(after.red).toBeGreaterThan(0);
-    const above = 3 * 480 * 60; // the rows over the model
+    const above = 3 * 480 * 60; // the rows above the model
     expect(after.pixels.subarray(0, above).filter((value, i) => Math.abs(value - before.pixels[i]) > 8).length).toBeLessThan(30);
     await page.mouse.click(460, 250);
     expect(await page.isVisible('.models li.on')).toBe(false);
@@ -173,13 +173,13 @@ describe.skipIf(missing())('a model that is dropped', () => {
     await page.keyboard.press('o');
     await page.click('.models .name');
     await page.click('.models button:text-is("Put on a place…")');
-    await page.mouse.click(400, 195); // where it stands itself
+    await page.mouse.click(400, 195); // at its own place
     await page.waitForSelector('.models button:text-is("Put on a place…")');
     expect(await places()).not.toEqual([putX, y, z]);
     expect(said).toEqual([]);
   });
 
-  it('is named when it is broken, and the page lives', async () => {
+  it('is named if it is broken, and the page keeps working', async () => {
     await drop({ name: 'x.glb', bytes: Buffer.from('garbage') });
     expect(await errorText()).toMatch(/x\.glb.*Is no glTF file/);
     for (const kind of ['fbx', 'obj']) {
@@ -197,7 +197,7 @@ describe.skipIf(missing())('a model that is dropped', () => {
     expect(said).toEqual([]);
   });
 
-  it('has its own size and its textures, whatever wrote it', async () => {
+  it('has its true size and its textures, whatever program wrote it', async () => {
     const fbx = [
       '; FBX 7.3.0 project file', 'FBXHeaderExtension:  {', '\tFBXHeaderVersion: 1003', '\tFBXVersion: 7300', '}',
       'GlobalSettings:  {', '\tVersion: 1000', '\tProperties70:  {',
@@ -226,9 +226,9 @@ describe.skipIf(missing())('a model that is dropped', () => {
     expect(said).toEqual([]);
   });
 
-  it('fetches nothing', async () => {
+  it('fetches nothing from the network', async () => {
     const change = (gltf: any) => (gltf.images = [{ uri: `${server.url}nothing.png` }]);
-    await drop({ name: 'asks.glb', bytes: madeGlb({ edge: 10, change }) });
+    await drop({ name: 'asks.glb', bytes: testGlb({ edge: 10, change }) });
     expect(await errorText()).toContain('nothing.png, and nothing is fetched');
     await page.click('.error button');
     const text = `mtllib a.mtl\nusemtl red\nv 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n`;

@@ -1,23 +1,23 @@
-// Scenes of hash in the browser: what those of volume do not have.
+// Tests features of `hash` scenes in the browser that `volume` scenes do not have.
 import { cpSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import type { Plain, View } from '../src/plain';
+import type { HeadlessPage, View } from '../src/headless-page';
 import type { SceneOptions } from '../src/scene';
 import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
-import { countCardMemory, type CardMemory } from './card-memory';
+import { countGpuMemory, type GpuMemory } from './gpu-memory';
 import { goldenHash, launch, missing, run, serve, type Server } from './machine';
-import { cameraPath, coloursOf, decodePng, isSame, psnr } from './pictures';
-import { openPlain } from './plain-page';
+import { cameraPath, countColours, decodePng, isSame, psnr } from './pictures';
+import { openHeadlessPage } from './open-headless-page';
 import { viewAt } from './views';
 
-declare const plain: Plain;
-declare const cardMemory: CardMemory;
+declare const headlessPage: HeadlessPage;
+declare const gpuMemory: GpuMemory;
 
-// Changes every content's JSON to text of the same length.
+// Changes the JSON of every content to text of the same length.
 function changeContents(folder: string, from: string, to: string): void {
   expect(to.length).toBe(from.length);
   for (const entry of readdirSync(folder, { recursive: true, encoding: 'utf8' })) {
@@ -49,16 +49,16 @@ describe.skipIf(missing())('a scene of hash', () => {
   });
 
   async function open(said: string[], options: SceneOptions = {}, from = server): Promise<Page> {
-    const page = await openPlain(browser, from, said);
-    await page.evaluate((one) => plain.open('scene/tileset.json', { selection: { mostPixels: 0 }, ...one }), options);
+    const page = await openHeadlessPage(browser, from, said);
+    await page.evaluate((one) => headlessPage.open('scene/tileset.json', { selection: { maximumScreenSpaceError: 0 }, ...one }), options);
     return page;
   }
   async function look(page: Page, view: View): Promise<Uint8Array> {
-    await page.evaluate((one) => plain.settle(one), view);
-    return new Uint8Array(Buffer.from(await page.evaluate(() => plain.pixels()), 'base64'));
+    await page.evaluate((one) => headlessPage.settle(one), view);
+    return new Uint8Array(Buffer.from(await page.evaluate(() => headlessPage.pixels()), 'base64'));
   }
 
-  it('that is whole has no end: rays that meet nothing show what the network says of them', async () => {
+  it("that is whole shows the network's colour for rays that hit nothing", async () => {
     const scene = join(folder, 'whole');
     cpSync(goldenHash, scene, { recursive: true });
     changeContents(scene, '"whole":false', '"whole":true ');
@@ -73,13 +73,13 @@ describe.skipIf(missing())('a scene of hash', () => {
     for (const [i, view] of views.entries()) {
       const expected = await decodePng(page, join(folder, 'oracle', `0000${i}.png`));
       expect(psnr(await look(page, view), expected)).toBeGreaterThan(38);
-      if (view === up) expect(psnr(await look(ending, view), expected)).toBeLessThan(30); // which leaves the sky away
+      if (view === up) expect(psnr(await look(ending, view), expected)).toBeLessThan(30); // this omits the sky
     }
-    // What stands in it is behind the rays that it ends.
+    // Opaque objects in the scene are behind the rays that it ends.
     const boxes = async () => {
-      await page.evaluate(() => plain.addBox([1, 1, 4.5], [2, 2, 5]));
+      await page.evaluate(() => headlessPage.addBox([1, 1, 4.5], [2, 2, 5]));
       const pixels = await look(page, up);
-      await page.evaluate(() => plain.removeBox());
+      await page.evaluate(() => headlessPage.removeBox());
       return pixels.filter((_, at) => at % 3 === 0 && pixels[at] > 200 && pixels[at + 1] < 60 && pixels[at + 2] < 60).length;
     };
     expect(await boxes()).toBeGreaterThan(20);
@@ -89,12 +89,12 @@ describe.skipIf(missing())('a scene of hash', () => {
     whole.close();
   });
 
-  it('that is whole has none without a surround either, whatever is in view', async () => {
+  it('that is whole does so without a background block, too, whatever is in view', async () => {
     const scene = join(folder, 'alone');
     cpSync(goldenHash, scene, { recursive: true });
     changeContents(scene, '"whole":false', '"whole":true ');
     const json = JSON.parse(readFileSync(join(scene, 'tileset.json'), 'utf8'));
-    json.root.contents = json.root.contents.filter((one: any) => !one.extensions.TESSERA_scene.surround);
+    json.root.contents = json.root.contents.filter((one: any) => !one.extensions.TESSERA_scene.background_block);
     json.root.boundingVolume = json.root.contents[0].boundingVolume;
     writeFileSync(join(scene, 'tileset.json'), JSON.stringify(json));
     const views = [across, viewAt(tileset, [0.2, 0.1, 0.4], [0.3, 0.4, 5]), viewAt(tileset, [6, 3, 0.5], [20, 9, 3])];
@@ -113,31 +113,32 @@ describe.skipIf(missing())('a scene of hash', () => {
     served.close();
   });
 
-  it('shows what its levels are weighed with, where weights are the same everywhere', async () => {
+  it('shows the weights of its levels if they are the same everywhere', async () => {
     const said: string[] = [];
-    // Level 1's block has these logits (attention to density and to all else), and its surround weighs nothing.
+    // Level 1's block has these logits (attention for density and for all else), and its background block has no
+    // weights.
     const uris = tileset.tiles.flatMap(({ contents }) => contents.map(({ uri }) => uri));
     const file = readFileSync(join(goldenHash, uris.find((uri) => uri.startsWith('tiles/L1/all'))!));
     const json = JSON.parse(file.toString('utf8', 20, 20 + file.readUInt32LE(12))) as { extensions: { TESSERA_content: { logits: number[] } } };
     const { logits } = json.extensions.TESSERA_content;
-    const page = await open(said, { selection: { mostPixels: 0, finestLevel: 1 } });
+    const page = await open(said, { selection: { maximumScreenSpaceError: 0, finestLevel: 1 } });
     for (const [mode, level, logit] of [['densityAttention', 1, 0], ['attention', 1, 1], ['densityAttention', 2, 2], ['attention', 2, 3]] as const) {
-      await page.evaluate(([display, featureLevel]) => Object.assign(plain.city!, { display, featureLevel }), [mode, level] as const);
+      await page.evaluate(([display, featureLevel]) => Object.assign(headlessPage.city!, { display, featureLevel }), [mode, level] as const);
       const pixels = await look(page, below);
-      const weight = 255 * (1 + Math.exp(-logits[logit])) ** (-1 / 2.2); // as the eye sees it
+      const weight = 255 * (1 + Math.exp(-logits[logit])) ** (-1 / 2.2); // gamma-encoded
       const alike = pixels.filter((value) => Math.abs(value - weight) < 3).length / pixels.length;
       expect(alike, `${mode} ${level}`).toBeGreaterThan(0.9);
     }
-    expect(await page.evaluate(() => plain.city!.featureLevels)).toBe(2);
+    expect(await page.evaluate(() => headlessPage.city!.featureLevels)).toBe(2);
     expect(said).toEqual([]);
     await page.close();
   });
 
-  it('shows what a level alone gives to the colour, and tells contents and levels of detail apart', async () => {
+  it('shows the contribution of a single level, and distinguishes contents and levels of detail', async () => {
     const said: string[] = [];
     const page = await open(said);
     const show = async (display: string, featureLevel = 0) => {
-      await page.evaluate((one) => Object.assign(plain.city!, one), { display, featureLevel });
+      await page.evaluate((one) => Object.assign(headlessPage.city!, one), { display, featureLevel });
       return look(page, across);
     };
     const colour = await show('colour');
@@ -154,21 +155,21 @@ describe.skipIf(missing())('a scene of hash', () => {
     await page.close();
   });
 
-  it('is shown by the viewer, whose settings tell of its levels of features', async () => {
+  it('is shown by the viewer, whose settings offer its feature levels', async () => {
     const page = await browser.newPage({ viewport: { width: 480, height: 270 } });
     const said: string[] = [];
     page.on('console', (message) => message.type() === 'error' && said.push(message.text()));
     page.on('pageerror', (error) => said.push(error.message));
     await page.goto(server.url);
     await page.waitForSelector('.loading.done', { state: 'attached' });
-    expect(await coloursOf(page)).toBeGreaterThan(200);
+    expect(await countColours(page)).toBeGreaterThan(200);
     await page.keyboard.press('c');
     const level = page.getByLabel(/^Hash level/);
     expect(await level.isVisible()).toBe(false);
     await page.getByLabel(/^ShowColour/).selectOption('Colour of a hash level');
     expect(await level.isVisible()).toBe(true);
     const shown = () => level.evaluate((select: HTMLSelectElement) => [...select.options].filter(({ hidden }) => !hidden).length);
-    expect(await shown()).toBe(3); // two, and the coarse features
+    expect(await shown()).toBe(3); // two fine levels, and the coarse features
     await level.selectOption('Level 2');
     await page.getByLabel(/^ShowColour/).selectOption('Attention to colour');
     expect(await shown()).toBe(2);
@@ -176,15 +177,15 @@ describe.skipIf(missing())('a scene of hash', () => {
     await page.close();
   });
 
-  it('takes of the card what it says, and leaves nothing', async () => {
-    const page = await openPlain(browser, server, [], countCardMemory);
-    await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
-    await page.evaluate((one) => plain.settle(one), across);
+  it('reports its GPU memory correctly, and frees all of it', async () => {
+    const page = await openHeadlessPage(browser, server, [], countGpuMemory);
+    await page.evaluate(() => headlessPage.open('scene/tileset.json', { selection: { maximumScreenSpaceError: 0 } }));
+    await page.evaluate((one) => headlessPage.settle(one), across);
     const memory = await page.evaluate(() => {
-      const { cardBytes, targetBytes } = plain.city!.statistics!;
-      const taken = cardMemory.bytes;
-      plain.close();
-      return { said: cardBytes + targetBytes, taken, left: cardMemory.bytes };
+      const { gpuBytes, targetBytes } = headlessPage.city!.statistics!;
+      const taken = gpuMemory.bytes;
+      headlessPage.close();
+      return { said: gpuBytes + targetBytes, taken, left: gpuMemory.bytes };
     });
     const counted = memory.taken - memory.left;
     expect(counted).toBeGreaterThan(1e6);
@@ -192,30 +193,30 @@ describe.skipIf(missing())('a scene of hash', () => {
     await page.close();
   });
 
-  it('is told of once on a card that cannot blend half floats, and nothing is waited for', async () => {
-    const page = await openPlain(browser, server, [], () => {
+  it('reports once that a GPU cannot blend half floats, and is complete', async () => {
+    const page = await openHeadlessPage(browser, server, [], () => {
       const { getExtension } = WebGL2RenderingContext.prototype;
       WebGL2RenderingContext.prototype.getExtension = function (this: WebGL2RenderingContext, name: string) {
         return name.startsWith('EXT_color_buffer') ? null : (getExtension as (name: string) => unknown).call(this, name);
       } as typeof getExtension;
     });
-    await page.evaluate(() => plain.open('scene/tileset.json'));
-    await page.evaluate((one) => plain.settle(one), across);
-    const said = await page.evaluate(() => plain.errors);
+    await page.evaluate(() => headlessPage.open('scene/tileset.json'));
+    await page.evaluate((one) => headlessPage.settle(one), across);
+    const said = await page.evaluate(() => headlessPage.errors);
     expect(said).toHaveLength(1);
     expect(said[0]).toContain('cannot blend half floats');
     await page.close();
   });
 
-  it('is drawn by cards too that have fewer bits for a pixel than would be best', async () => {
+  it('is drawn on GPUs with fewer bits per pixel, too', async () => {
     const said: string[] = [];
     const scene = join(folder, 'bits');
     cpSync(goldenHash, scene, { recursive: true });
     const text = readFileSync(join(scene, 'tileset.json'), 'utf8');
-    writeFileSync(join(scene, 'tileset.json'), text.replace('"levels": 2', '"levels": 5')); // wants a target more
+    writeFileSync(join(scene, 'tileset.json'), text.replace('"levels": 2', '"levels": 5')); // needs one more target
     const deep = await serve(scene);
     const best = await open(said, {}, deep);
-    const page = await openPlain(browser, deep, said, () => {
+    const page = await openHeadlessPage(browser, deep, said, () => {
       const { checkFramebufferStatus } = WebGL2RenderingContext.prototype;
       WebGL2RenderingContext.prototype.checkFramebufferStatus = function (target) {
         let bits = 0;
@@ -226,9 +227,9 @@ describe.skipIf(missing())('a scene of hash', () => {
         return bits > 256 ? this.FRAMEBUFFER_UNSUPPORTED : checkFramebufferStatus.call(this, target);
       };
     });
-    await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
+    await page.evaluate(() => headlessPage.open('scene/tileset.json', { selection: { maximumScreenSpaceError: 0 } }));
     expect(psnr(await look(page, across), await look(best, across))).toBeGreaterThan(50);
-    const bytes = (one: Page) => one.evaluate(() => plain.city!.statistics!.targetBytes);
+    const bytes = (one: Page) => one.evaluate(() => headlessPage.city!.statistics!.targetBytes);
     expect((await bytes(best)) - (await bytes(page))).toBeGreaterThanOrEqual((8 + 8) * across.width * across.height);
     expect(said).toEqual([]);
     await best.close();
@@ -236,7 +237,7 @@ describe.skipIf(missing())('a scene of hash', () => {
     deep.close();
   });
 
-  it('is drawn alike whichever numbers its networks have', async () => {
+  it('is drawn the same whatever indices its networks have', async () => {
     const said: string[] = [];
     const scene = join(folder, 'levels');
     cpSync(goldenHash, scene, { recursive: true });
@@ -247,12 +248,12 @@ describe.skipIf(missing())('a scene of hash', () => {
     const [page, plainly] = [await open(said, {}, deep), await open(said)];
     const expected = await look(plainly, across);
     expect(isSame(await look(page, across), expected)).toBe(true);
-    // As if two others came first: theirs take the numbers that one picture of weights tells apart.
+    // As if two other contents came first: their networks take the indices that one weight target distinguishes.
     await page.evaluate(() => {
-      const { drawer: { marching } } = plain.city as unknown as { drawer: { marching: any } };
-      const { networksOf } = marching;
-      marching.networksOf = (contents: any[]) => {
-        const { networks, behind, whole } = networksOf.call(marching, contents);
+      const { drawer: { marching } } = headlessPage.city as unknown as { drawer: { marching: any } };
+      const { assignNetworks } = marching;
+      marching.assignNetworks = (contents: any[]) => {
+        const { networks, behind, whole } = assignNetworks.call(marching, contents);
         for (const { uniforms } of contents) uniforms.network.value += 3;
         return { networks: [networks[0], networks[0], networks[0], ...networks], behind: behind + 3, whole };
       };

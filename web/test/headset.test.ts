@@ -1,35 +1,36 @@
-// A headset, as Meta's emulator has it: both eyes beside one another on the canvas. By pixels, and as people use it.
+// Tests a headset emulated by Meta's emulator: both eyes are side by side on the canvas. By pixels, and by user
+// interaction.
 import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import type { Plain, View } from '../src/plain';
+import type { HeadlessPage, View } from '../src/headless-page';
 import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenScene, launch, missing, serve, type Server } from './machine';
 import { decodePixels, psnr } from './pictures';
 import { worldFromCamera, type Place } from './views';
 
-declare const plain: Plain;
+declare const headlessPage: HeadlessPage;
 declare const headset: {
   controllers: Record<'left' | 'right', { updateAxes(id: 'thumbstick', x: number, y: number): void }>;
   activeSession?: { requestAnimationFrame(then: () => void): void };
 };
 
 const kEmulator = fileURLToPath(new URL('../node_modules/iwer/build/iwer.min.js', import.meta.url));
-const kEdge = 320; // pixels of an eye's picture, of 90°
-const kBetweenEyes = 2; // metres: of a giant, so that they see different things
+const kEdge = 320; // pixels of an eye's image, which spans 90°
+const kBetweenEyes = 2; // metres: as for a giant, so that the eyes see different things
 
-// In the golden scene a building stands at |x + 1| < 0.4, |y| < 0.3.
+// In the golden scene a building occupies |x + 1| < 0.4, |y| < 0.3.
 const kEye: Place = [-1, -2.2, 0.3];
 const kTarget: Place = [-1, 0, 0.3];
 
-describe.skipIf(missing())('with a headset', () => {
+describe.skipIf(missing())('a headset', () => {
   let server: Server;
   let browser: Browser;
   const tileset = decodeTileset(readFileSync(`${goldenScene}/tileset.json`, 'utf8'), 'tileset.json', kCodecs);
   const middle = worldFromCamera(tileset, kEye, kTarget);
-  // What each eye should see.
+  // Returns what each eye should see.
   const eyes = [-1, 1].map((side): View => {
     const matrix = middle.map((value, i) => (i >= 12 && i < 15 ? value + side * 0.5 * kBetweenEyes * middle[i - 12] : value));
     return { matrix, fx: kEdge / 2, fy: kEdge / 2, cx: kEdge / 2, cy: kEdge / 2, width: kEdge, height: kEdge };
@@ -62,38 +63,38 @@ describe.skipIf(missing())('with a headset', () => {
     await page.close();
   }
 
-  // The eyes' pictures, of one of both.
+  // Returns the images of the two eyes from an image of both.
   function halves(both: Uint8Array): Uint8Array[] {
     return [0, 1].map((side) => both.filter((_, at) => Math.floor((at % (6 * kEdge)) / (3 * kEdge)) === side));
   }
 
-  async function expectSame(page: Page, sides: Uint8Array[], least: number): Promise<void> {
+  async function expectSame(page: Page, sides: Uint8Array[], minimum: number): Promise<void> {
     for (const [i, eye] of eyes.entries()) {
-      await page.evaluate((view) => plain.settle(view), eye);
-      const alone = new Uint8Array(Buffer.from(await page.evaluate(() => plain.pixels()), 'base64'));
-      expect(new Set(alone).size).toBeGreaterThan(20); // something is to be seen
-      expect(psnr(sides[i], alone)).toBeGreaterThan(least);
+      await page.evaluate((view) => headlessPage.settle(view), eye);
+      const alone = new Uint8Array(Buffer.from(await page.evaluate(() => headlessPage.pixels()), 'base64'));
+      expect(new Set(alone).size).toBeGreaterThan(20); // something is visible
+      expect(psnr(sides[i], alone)).toBeGreaterThan(minimum);
     }
   }
 
-  // Until the headset has shown so many more.
+  // Waits until the headset has shown `count` more frames.
   const pictures = (page: Page) => page.evaluate(() => new Promise<void>((resolve) => {
     let left = 5;
     const next = () => (--left === 0 ? resolve() : headset.activeSession!.requestAnimationFrame(next));
     next();
   }));
 
-  async function openPlain(page: Page): Promise<void> {
-    await page.waitForFunction(() => 'plain' in window);
-    await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
+  async function openHeadlessPage(page: Page): Promise<void> {
+    await page.waitForFunction(() => 'headlessPage' in window);
+    await page.evaluate(() => headlessPage.open('scene/tileset.json', { selection: { maximumScreenSpaceError: 0 } }));
   }
 
-  it('each eye sees what a camera in its place sees, with models before and behind the scene', async () => {
-    await open('plain.html', async (page) => {
-      await openPlain(page);
-      await page.evaluate(() => plain.addBox([-1.3, -0.9, 0.2], [-1.2, 0, 0.4])); // before the facade, and half in it
+  it('shows each eye what a camera in its place sees, with models in front of and behind the scene', async () => {
+    await open('headless.html', async (page) => {
+      await openHeadlessPage(page);
+      await page.evaluate(() => headlessPage.addBox([-1.3, -0.9, 0.2], [-1.2, 0, 0.4])); // in front of the facade, and half inside it
       const text = await page.evaluate(async (matrix) => {
-        const { THREE, renderer, world, city } = plain;
+        const { THREE, renderer, world, city } = headlessPage;
         const rig = new THREE.Group();
         const camera = new THREE.PerspectiveCamera(50, 1, 0.1, 1e4);
         rig.add(camera);
@@ -107,17 +108,17 @@ describe.skipIf(missing())('with a headset', () => {
           renderer.setAnimationLoop(() => {
             if (!xr.isPresenting) return;
             const head = xr.getFrame().getViewerPose(xr.getReferenceSpace()!)!.transform;
-            // y up from z up, and the head where the eyes' middle is to be.
+            // y up from z up; the head is placed so that the midpoint of the eyes is at `eye`.
             new THREE.Matrix4().makeRotationX(-Math.PI / 2)
               .multiply(new THREE.Matrix4().fromArray(matrix))
               .multiply(new THREE.Matrix4().fromArray([...head.matrix]).invert())
               .decompose(rig.position, rig.quaternion, rig.scale);
-            // Elsewhere before: the picture is of where the head is now.
+            // The head was elsewhere before: the image must show its current pose.
             const isLast = ++drawn > 3 && city!.idle;
             if (!isLast) rig.position.x += 3;
             city!.update(camera, renderer);
             renderer.render(world, camera);
-            if (isLast) resolve(plain.pixels());
+            if (isLast) resolve(headlessPage.pixels());
           });
         });
         await xr.setSession(session);
@@ -136,7 +137,7 @@ describe.skipIf(missing())('with a headset', () => {
     });
   });
 
-  it('one enters by the button, sees the scene with both eyes, moves by the sticks, and stays there', async () => {
+  it('is entered by the button, shows the scene to both eyes, and moves by the sticks; the view stays afterwards', async () => {
     let seen: Uint8Array[] = [];
     const world = (place: Place) => worldFromCamera(tileset, place, [place[0], place[1] + 1, place[2]]).slice(12, 15);
     const near = (a: number[], b: number[]) => Math.hypot(...a.map((x, i) => x - b[i]));
@@ -146,8 +147,8 @@ describe.skipIf(missing())('with a headset', () => {
       await page.waitForSelector('.loading.done', { state: 'attached' });
       await page.keyboard.press('c');
       await page.selectOption('label:has-text("Pixels") select', '100 %');
-      await page.selectOption('label:has-text("Beyond what was captured") select', 'As it was made up');
-      await page.fill('label:has-text("Error at most") input', '0');
+      await page.selectOption('label:has-text("Outside the captured region") select', 'Is shown in full');
+      await page.fill('label:has-text("Screen-space error") input', '0');
       await page.click('[aria-label=Headset]');
       await page.waitForFunction(() => headset.activeSession !== undefined);
       await pictures(page);
@@ -155,7 +156,7 @@ describe.skipIf(missing())('with a headset', () => {
       await pictures(page);
       seen = halves(await decodePixels(page, await page.screenshot()));
       expect(near(await where('eye'), world(kEye))).toBeLessThan(1e-3);
-      // To the right by a step, and then, with the gaze, onwards.
+      // A step to the right, and then onwards in the direction of the gaze.
       await page.evaluate(() => headset.controllers.right.updateAxes('thumbstick', 1, 0));
       await pictures(page);
       await page.evaluate(() => headset.controllers.left.updateAxes('thumbstick', 0, -1));
@@ -167,7 +168,7 @@ describe.skipIf(missing())('with a headset', () => {
       expect(gone[2]).toBeCloseTo(0, 3);
       const along = (column: number) => middle[4 * column] * gone[0] + middle[4 * column + 1] * gone[1];
       expect(Math.atan2(along(0), -along(2))).toBeCloseTo(Math.PI / 6, 2);
-      await page.keyboard.press('v'); // as the button, which the emulator stands before
+      await page.keyboard.press('v'); // instead of the button, which the emulator covers
       await expect.poll(() => where('fov'), { timeout: 10000 }).toEqual([60]);
       expect(near(await where('eye'), there)).toBeLessThan(1e-3);
       expect(await page.getAttribute('[aria-label=Headset]', 'aria-pressed')).toBe('false');
@@ -177,13 +178,13 @@ describe.skipIf(missing())('with a headset', () => {
       });
       expect(size).toEqual([2 * kEdge, kEdge]);
     });
-    await open('plain.html', async (page) => {
-      await openPlain(page);
+    await open('headless.html', async (page) => {
+      await openHeadlessPage(page);
       await expectSame(page, seen, 40);
     });
   });
 
-  it('one is told why it shows nothing', async () => {
+  it('reports why it shows nothing', async () => {
     await open('', async (page) => {
       await page.click('[aria-label=Headset]');
       await page.waitForSelector('.error', { state: 'visible' });
@@ -194,8 +195,8 @@ describe.skipIf(missing())('with a headset', () => {
   });
 });
 
-describe.skipIf(missing())('without a headset', () => {
-  it('there is no button', async () => {
+describe.skipIf(missing())('the toolbar without a headset', () => {
+  it('has no button for it', async () => {
     const [server, browser] = await Promise.all([serve(goldenScene), launch()]);
     const page = await browser.newPage();
     await page.goto(server.url);

@@ -1,4 +1,4 @@
-// The library as others use it: the page of web/example.
+// Tests the library as users embed it: the page of web/example.
 import { createReadStream } from 'node:fs';
 import { createServer, type Server as HttpServer } from 'node:http';
 import type { AddressInfo } from 'node:net';
@@ -7,13 +7,13 @@ import { fileURLToPath } from 'node:url';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { goldenScene, launch, missing } from './machine';
-import { coloursOf } from './pictures';
+import { countColours } from './pictures';
 
 const kTypes: Record<string, string> = { '.html': 'text/html', '.js': 'text/javascript', '.json': 'application/json' };
 const web = fileURLToPath(new URL('../', import.meta.url));
 
 describe.skipIf(missing())('the library', () => {
-  let files: HttpServer; // any static file host
+  let files: HttpServer; // any static file server
   let browser: Browser;
 
   beforeAll(async () => {
@@ -38,7 +38,7 @@ describe.skipIf(missing())('the library', () => {
     page.on('pageerror', (error) => said.push(error.message));
     const { port } = files.address() as AddressInfo;
     await page.goto(`http://127.0.0.1:${port}/example/index.html?scene=/garden`);
-    await expect.poll(() => coloursOf(page), { timeout: 30000 }).toBeGreaterThan(200);
+    await expect.poll(() => countColours(page), { timeout: 30000 }).toBeGreaterThan(200);
     expect(said).toEqual([]);
     await page.goto(`http://127.0.0.1:${port}/example/index.html?scene=/nothing`);
     await expect.poll(() => page.textContent('body')).toContain('/nothing/tileset.json: the server answered 404');

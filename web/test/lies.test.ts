@@ -1,22 +1,22 @@
-// Tiles that lie, in the real viewer: the panel names what is wrong, and the page lives.
+// Tests malformed tiles in the real viewer: the panel names what is wrong, and the page keeps working.
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { goldenFile, goldenText } from '../src/testing/golden';
-import { randomNumbers } from '../src/testing/made-tree';
+import { randomNumbers } from '../src/testing/test-tree';
 import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenScene, launch, missing, serve, type Server } from './machine';
 
 type Change = (json: any, binary: Buffer) => void;
 
-// A binary glTF file with its JSON or its binary chunk changed.
+// Returns a binary glTF file with its JSON or its binary chunk changed.
 function changedContent(file: Uint8Array, change: Change): Buffer {
   const given = Buffer.from(file);
   const jsonLength = given.readUInt32LE(12);
   const json = JSON.parse(given.toString('utf8', 20, 20 + jsonLength)) as object;
   const binary = Buffer.from(given.subarray(28 + jsonLength));
   change(json, binary);
-  // Numbers that JSON has no word for, as liars write them.
+  // Numbers that JSON cannot represent, as malformed files contain them.
   let text = JSON.stringify(json).replaceAll('"-1e999"', '-1e999').replaceAll('"1e999"', '1e999');
   while (Buffer.byteLength(text) % 4 !== 0) text += ' ';
   const header = Buffer.alloc(20);
@@ -33,11 +33,11 @@ function changedContent(file: Uint8Array, change: Change): Buffer {
 
 const ours = (json: any) => json.extensions.TESSERA_content;
 const part = (json: any) => ours(json).parts[0];
-const viewOf = (json: any, reference: any) => json.bufferViews[reference.bufferView];
+const getBufferView = (json: any, reference: any) => json.bufferViews[reference.bufferView];
 
 const kContentLies: [string, string, Change][] = [
-  ['an offset behind the end', 'buffer', (json) => (viewOf(json, part(json).occupied).byteOffset = 2 ** 30)],
-  ['a length that is negative', 'buffer', (json) => (viewOf(json, part(json).occupied).byteLength = -4)],
+  ['an offset behind the end', 'buffer', (json) => (getBufferView(json, part(json).occupied).byteOffset = 2 ** 30)],
+  ['a length that is negative', 'buffer', (json) => (getBufferView(json, part(json).occupied).byteLength = -4)],
   ['a size that pictures do not have', 'part 0', (json) => (part(json).planes = 256)],
   ['a size beyond all', 'part 0', (json) => (part(json).voxels = 1e9)],
   ['pictures of other sizes', 'part 0', (json) => (part(json).planeTexels[0][0] = part(json).macroblocks.texels[0])],
@@ -45,7 +45,7 @@ const kContentLies: [string, string, Change][] = [
   ['a range that is infinite', 'ange', (json) => (ours(json).featureRange = '1e999')],
   ['a place that is none', 'part 0', (json) => (part(json).centre[0] = '-1e999')],
   ['weights that are no numbers', 'network', (json, binary) =>
-    binary.writeFloatLE(NaN, (viewOf(json, ours(json).network).byteOffset as number) + 40)],
+    binary.writeFloatLE(NaN, (getBufferView(json, ours(json).network).byteOffset as number) + 40)],
 ];
 
 const kTilesetLies: [string, string, (text: string) => string][] = [
@@ -60,7 +60,7 @@ const kTilesetLies: [string, string, (text: string) => string][] = [
   ['an error that is infinite', 'geometricError', (text) => text.replace(/"geometricError":\s*[\d.]+/, '"geometricError": 1e999')],
 ];
 
-describe.skipIf(missing())('a scene that lies', () => {
+describe.skipIf(missing())('a malformed scene', () => {
   let server: Server;
   let browser: Browser;
   let page: Page;
@@ -81,30 +81,30 @@ describe.skipIf(missing())('a scene that lies', () => {
     server?.close();
   });
 
-  // What the panel says once the page has come to rest; '' where nothing is wrong.
+  // Returns the text of the panel once the page has come to rest; '' if nothing is wrong.
   async function visit(file: RegExp, body: Buffer): Promise<string> {
     change = { file, body };
     await page.goto(server.url);
     await page.waitForSelector('.loading.done', { state: 'attached' });
     const text = (await page.isVisible('.error')) ? await page.textContent('.error') : '';
-    expect(await page.evaluate(() => 6 * 7)).toBe(42); // it still answers
+    expect(await page.evaluate(() => 6 * 7)).toBe(42); // the page still responds
     expect(thrown).toEqual([]);
     return text ?? '';
   }
 
-  it.each(kContentLies)('is named: %s', async (_, reason, lie) => {
+  it.each(kContentLies)('is reported: %s', async (_, reason, lie) => {
     const said = await visit(new RegExp(uri), changedContent(goldenFile(uri), lie));
     expect(said).toContain(uri);
     expect(said.toLowerCase()).toContain(reason.toLowerCase());
   });
 
-  it.each(kTilesetLies)('is named: %s', async (_, reason, lie) => {
+  it.each(kTilesetLies)('is reported: %s', async (_, reason, lie) => {
     const said = await visit(/tileset\.json/, Buffer.from(lie(goldenText('tileset.json'))));
     expect(said).toContain('tileset.json');
     expect(said).toContain(reason);
   });
 
-  it('is drawn or named, whichever bytes of a tile are others', async () => {
+  it('is drawn or reported, whichever bytes of a tile are changed', async () => {
     const random = randomNumbers(17);
     for (let round = 0; round < 6; ++round) {
       const body = Buffer.from(goldenFile(uri));

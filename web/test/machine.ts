@@ -1,4 +1,4 @@
-// What the tests in a browser stand on: the program, its server with real tiles, Debian's Chromium.
+// The environment of the browser tests: the program, its server with real tiles, and Debian's Chromium.
 import { spawn, spawnSync, type ChildProcess } from 'node:child_process';
 import { existsSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
@@ -11,9 +11,9 @@ export const goldenHash = `${root}tests/golden/hash`;
 export const viewer = `${root}web/dist`;
 const chromiumPath = process.env.TESSERA_CHROMIUM ?? '/usr/bin/chromium';
 
-// Why there can be no tests here; undefined where there can. With TESSERA_REQUIRE_BROWSER it is an error.
+// Returns why the tests cannot run, or undefined if they can. With TESSERA_REQUIRE_BROWSER it throws instead.
 export function missing(): string | undefined {
-  const needed = [program, `${viewer}/plain.html`, chromiumPath].find((path) => !existsSync(path));
+  const needed = [program, `${viewer}/headless.html`, chromiumPath].find((path) => !existsSync(path));
   if (needed !== undefined && process.env.TESSERA_REQUIRE_BROWSER) throw new Error(`${needed} is missing`);
   return needed;
 }
@@ -29,8 +29,8 @@ export async function serve(scene: string, folder = viewer): Promise<Server> {
     let said = '';
     const hear = (text: Buffer) => {
       said += text.toString();
-      const found = /http:\S+/.exec(said);
-      if (found) resolve(found[0]);
+      const match = /http:\S+/.exec(said);
+      if (match) resolve(match[0]);
     };
     server.stdout!.on('data', hear);
     server.stderr!.on('data', hear);
@@ -39,11 +39,11 @@ export async function serve(scene: string, folder = viewer): Promise<Server> {
   return { url, close: () => void server.kill('SIGKILL') };
 }
 
-export type Card = 'opengl' | 'swiftshader';
+export type GpuKind = 'opengl' | 'swiftshader';
 
-// On a screen (Xvfb will do) by Mesa's OpenGL; without one by SwiftShader, which is slower.
-export function launch(card: Card = process.env.DISPLAY === undefined ? 'swiftshader' : 'opengl'): Promise<Browser> {
-  const isOnScreen = card === 'opengl';
+// Uses Mesa's OpenGL on a display (Xvfb suffices), and the slower SwiftShader without one.
+export function launch(gpu: GpuKind = process.env.DISPLAY === undefined ? 'swiftshader' : 'opengl'): Promise<Browser> {
+  const isOnScreen = gpu === 'opengl';
   const flags = isOnScreen ? ['--use-angle=gl', '--ignore-gpu-blocklist'] : ['--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
   return chromium.launch({ executablePath: chromiumPath, headless: !isOnScreen, args: ['--no-sandbox', ...flags] });
 }

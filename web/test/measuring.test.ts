@@ -1,4 +1,5 @@
-// Measuring, as people do it, on the golden scene, whose heights are known (tests/golden/golden_landscape.cpp).
+// Tests the measuring tool by user interaction on the golden scene, whose heights are known
+// (tests/golden/golden_landscape.cpp).
 import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -10,12 +11,12 @@ import { decodeTileset } from '../src/tiles/decode-tileset';
 import type { Vec3 } from '../src/tiles/tileset';
 import { goldenScene, launch, missing, serve } from './machine';
 
-const kSize = { width: 1200, height: 250 }; // the panel hides nothing of what is clicked
+const kSize = { width: 1200, height: 250 }; // the panel covers no clicked place
 const tileset = decodeTileset(readFileSync(join(goldenScene, 'tileset.json'), 'utf8'), 'tileset.json', kCodecs);
-const metres = tileset.worldFromScene.scale; // of a scene unit
+const metres = tileset.worldFromScene.scale; // per scene unit
 const kVoxel = metres / 16;
 
-// base/random.h and noise of the golden scene: what the ground is.
+// base/random.h and the noise of the golden scene, which define the ground.
 const mask = (1n << 64n) - 1n;
 function mix64(value: bigint): bigint {
   let x = (value + 0x9e3779b97f4a7c15n) & mask;
@@ -43,8 +44,8 @@ const viewerFromScene = new THREE.Matrix4()
   .set(r[0] * s, r[3] * s, r[6] * s, t[0], r[1] * s, r[4] * s, r[7] * s, t[1], r[2] * s, r[5] * s, r[8] * s, t[2], 0, 0, 0, 1)
   .premultiply(new THREE.Matrix4().set(1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1)); // y up, from z up
 
-// Where a place of the scene is in the first view (Navigation.showAll).
-function pixelOf(inScene: Vec3): { x: number; y: number } {
+// Returns where a place of the scene is in the first view (Navigation.showAll).
+function projectToPixel(inScene: Vec3): { x: number; y: number } {
   const { low, high } = tileset.box;
   const bounds = new THREE.Box3(new THREE.Vector3(...low), new THREE.Vector3(...high)).applyMatrix4(viewerFromScene);
   const size = bounds.getSize(new THREE.Vector3());
@@ -93,9 +94,9 @@ describe.skipIf(missing())('measuring', { timeout: 120000 }, () => {
   }
 
   async function click(page: Page, place: Vec3): Promise<void> {
-    const { x, y } = pixelOf(place);
+    const { x, y } = projectToPixel(place);
     await page.mouse.click(x, y);
-    await page.waitForTimeout(450); // two clicks, not a double click
+    await page.waitForTimeout(450); // separate clicks, not a double click
   }
 
   async function figures(page: Page): Promise<Record<string, string>> {
@@ -103,9 +104,9 @@ describe.skipIf(missing())('measuring', { timeout: 120000 }, () => {
     return Object.fromEntries(names.map((name, i) => [name, values[i]]));
   }
 
-  it('finds heights right to a voxel', async () => {
+  it('finds heights within a voxel', async () => {
     await open(goldenScene, async (page) => {
-      const differenceOf = async (low: Vec3, high: Vec3) => {
+      const measureHeight = async (low: Vec3, high: Vec3) => {
         await page.click('.measure .choice >> text=Height');
         await click(page, low);
         await click(page, high);
@@ -115,10 +116,10 @@ describe.skipIf(missing())('measuring', { timeout: 120000 }, () => {
         expect(Math.abs(parseFloat(horizontal) - apart)).toBeLessThan(2 * kVoxel);
         return parseFloat(height);
       };
-      expect(Math.abs((await differenceOf(kLowRoof, kHighRoof)) - 0.35 * metres)).toBeLessThan(kVoxel);
-      expect(Math.abs((await differenceOf(kGround, kHighRoof)) - (0.45 - kGround[2]) * metres)).toBeLessThan(kVoxel);
-      // Above the ellipsoid: the altitude of the georeference, and where the roof is above it in the capture. What one
-      // sees lies somewhat below the roof, of all roofs, as it is soft.
+      expect(Math.abs((await measureHeight(kLowRoof, kHighRoof)) - 0.35 * metres)).toBeLessThan(kVoxel);
+      expect(Math.abs((await measureHeight(kGround, kHighRoof)) - (0.45 - kGround[2]) * metres)).toBeLessThan(kVoxel);
+      // Height above the ellipsoid: the altitude of the georeference plus the height of the roof in the capture. The
+      // visible surface is somewhat below the roof, as roofs are soft.
       const place = await page.locator('.measure .part dd').allTextContents();
       expect(Math.abs(parseFloat(place[2]) - (12 + 5 + 0.45 * metres))).toBeLessThan(1.5 * kVoxel);
       expect(parseFloat(place[0])).toBeCloseTo(50.8225, 2);
@@ -127,10 +128,10 @@ describe.skipIf(missing())('measuring', { timeout: 120000 }, () => {
     });
   });
 
-  it('ends with a double click, which goes nowhere', async () => {
+  it('ends with a double click, which does not navigate', async () => {
     await open(goldenScene, async (page) => {
       await click(page, kLowRoof);
-      const { x, y } = pixelOf(kHighRoof);
+      const { x, y } = projectToPixel(kHighRoof);
       await page.mouse.dblclick(x, y);
       await page.locator('.measure li').waitFor();
       const label = page.locator('.measure-labels span:not([hidden])');
@@ -138,7 +139,7 @@ describe.skipIf(missing())('measuring', { timeout: 120000 }, () => {
       const style = await label.getAttribute('style');
       await page.waitForTimeout(900); // longer than a flight
       expect(await label.getAttribute('style')).toBe(style);
-      // What is kept comes back with the tool, and goes when it is deleted.
+      // Finished measurements reappear with the tool, until they are deleted.
       await page.keyboard.press('Escape');
       expect(await page.isVisible('.measure')).toBe(false);
       expect(await label.isVisible()).toBe(false);
@@ -147,13 +148,13 @@ describe.skipIf(missing())('measuring', { timeout: 120000 }, () => {
       await page.keyboard.press('m');
       await label.waitFor();
       await page.waitForTimeout(300);
-      expect(await label.getAttribute('style')).not.toBe(style); // without the tool a double click goes there
+      expect(await label.getAttribute('style')).not.toBe(style); // without the tool a double click moves the camera
       await page.click('.measure li [aria-label^=Delete]');
       expect(await label.count()).toBe(0);
     });
   });
 
-  it('takes places back, ends with Enter, and gives what is kept as GeoJSON', async () => {
+  it('undoes places, ends with Enter, and exports finished measurements as GeoJSON', async () => {
     await open(goldenScene, async (page) => {
       await page.click('.measure .choice >> text=Area');
       const roof = ([[0.75, -0.15], [1.25, -0.15], [1.25, 0.15], [0.75, 0.15]] as const).map(([x, y]): Vec3 => [x, y, 0.1]);
@@ -177,7 +178,7 @@ describe.skipIf(missing())('measuring', { timeout: 120000 }, () => {
     });
   });
 
-  it('claims no metres where the capture has no scale', async () => {
+  it('uses no metres if the capture has no scale', async () => {
     const scene = join(folder, 'nowhere');
     cpSync(goldenScene, scene, { recursive: true });
     const written = JSON.parse(readFileSync(join(scene, 'tileset.json'), 'utf8'));

@@ -1,8 +1,8 @@
-// Views, models and hidden parts are given names, which a saved world holds.
+// Tests the names of views, models and hidden parts, which a saved world contains.
 import { readFileSync } from 'node:fs';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import { madeGlb } from '../src/testing/made-glb';
+import { testGlb } from '../src/testing/test-glb';
 import { goldenScene, launch, missing, serve, type Server } from './machine';
 
 describe.skipIf(missing())('names', () => {
@@ -28,7 +28,8 @@ describe.skipIf(missing())('names', () => {
   const listed = (panel: string) => page.$$eval(`${panel} > ul .name`, (all) => all.map((one) => one.textContent));
   const hasFocus = (selector: string) => page.$eval(selector, (one) => one === document.activeElement);
 
-  // Of what is selected in a panel: Enter keeps a name; Escape drops it, and where nothing is left, the old one stays.
+  // Renames the selected item of a panel: Enter keeps a name, Escape discards it, and an empty name restores the old
+  // one.
   async function rename(panel: string, name: string): Promise<void> {
     const field = `${panel} .details .field:has-text("Name") input`;
     const old = await page.inputValue(field);
@@ -48,7 +49,7 @@ describe.skipIf(missing())('names', () => {
     expect(await listed(panel)).toContain(name);
   }
 
-  it('are typed, and stand in worlds and, of views, in the browser', async () => {
+  it('can be edited, and are saved in worlds and, for views, in the browser', async () => {
     await page.keyboard.press('b');
     await page.click('text=Keep this view');
     await page.click('text=Keep this view');
@@ -65,7 +66,7 @@ describe.skipIf(missing())('names', () => {
     await rename('.hiding', 'Crane');
 
     await page.keyboard.press('o');
-    await page.setInputFiles('.models input[type=file]', { name: 'cube.glb', mimeType: '', buffer: Buffer.from(madeGlb({ edge: 10 })) });
+    await page.setInputFiles('.models input[type=file]', { name: 'cube.glb', mimeType: '', buffer: Buffer.from(testGlb({ edge: 10 })) });
     await page.waitForSelector('.models li.on');
     await rename('.models', 'Town hall');
     await page.focus('.models [aria-label="Hide: Town hall"]');
@@ -83,7 +84,7 @@ describe.skipIf(missing())('names', () => {
     expect(await listed('.views')).toEqual(['Above <all>']);
   });
 
-  it('are left by a click on another one, which is not lost', async () => {
+  it('are committed by a click on another one, which takes effect', async () => {
     await page.click('text=Keep this view');
     await page.fill('.views .field input', 'Second');
     await page.click('.views .name:text-is("Above <all>")');

@@ -1,12 +1,12 @@
-// The viewer as one file from a disk, without any server.
+// Tests the viewer as a single file from disk, without any server.
 import { existsSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { goldenScene, launch, missing, viewer } from './machine';
-import { coloursOf } from './pictures';
+import { countColours } from './pictures';
 
-describe.skipIf(missing())('the viewer from a disk', () => {
+describe.skipIf(missing())('the viewer as a local file', () => {
   let browser: Browser;
 
   beforeAll(async () => {
@@ -16,7 +16,7 @@ describe.skipIf(missing())('the viewer from a disk', () => {
     await browser?.close();
   });
 
-  it('shows the scene of a folder that is chosen, and says where it holds none', async () => {
+  it('shows the scene of a chosen folder, and reports a folder without one', async () => {
     expect(existsSync(`${viewer}/offline.html`)).toBe(true);
     const page = await browser.newPage({ viewport: { width: 480, height: 270 } });
     const said: string[] = [];
@@ -32,7 +32,7 @@ describe.skipIf(missing())('the viewer from a disk', () => {
     await page.waitForSelector('.loading.done', { state: 'attached' });
     await page.waitForFunction(() => document.title === 'golden · tessera');
     expect(await page.isVisible('.error')).toBe(false);
-    await expect.poll(() => coloursOf(page), { timeout: 20000 }).toBeGreaterThan(200);
+    await expect.poll(() => countColours(page), { timeout: 20000 }).toBeGreaterThan(200);
     expect(said).toEqual([]);
     expect(asked).toEqual([]);
     await page.close();

@@ -1,20 +1,20 @@
-// The browser's pictures of the golden scene against those of the renderer on the processor.
+// Compares the browser's images of the golden scene with those of the CPU renderer.
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import type { Plain } from '../src/plain';
+import type { HeadlessPage } from '../src/headless-page';
 import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenHash, goldenScene, launch, missing, run, serve, type Server } from './machine';
 import { cameraPath, decodePng, psnr } from './pictures';
-import { openPlain } from './plain-page';
+import { openHeadlessPage } from './open-headless-page';
 import { viewAt, type Place } from './views';
 
-declare const plain: Plain;
+declare const headlessPage: HeadlessPage;
 
-// Places of the eye and what it looks at, scene units: inside, above, outside, straight down.
+// Positions of the eye and the target in scene units: inside, above, outside, straight down.
 const kLooks: [Place, Place][] = [
   [[-1.8, -0.9, 0.2], [0.5, 0.2, -0.6]],
   [[1.5, 0.9, 0.6], [-0.5, -0.3, -0.5]],
@@ -23,14 +23,14 @@ const kLooks: [Place, Place][] = [
   [[6, 3, 0.5], [0, 0, 0]],
 ];
 
-function cardOf(page: Page): Promise<string> {
+function gpuName(page: Page): Promise<string> {
   return page.evaluate(() => {
     const gl = document.createElement('canvas').getContext('webgl2')!;
     return String(gl.getParameter(gl.getExtension('WEBGL_debug_renderer_info')!.UNMASKED_RENDERER_WEBGL));
   });
 }
 
-// As on cards that take no larger textures of three dimensions: the atlas is cut into two.
+// Emulates GPUs with smaller 3D textures, for which the atlas is split into two.
 function takeSmallTextures(): void {
   const { getParameter } = WebGL2RenderingContext.prototype;
   WebGL2RenderingContext.prototype.getParameter = function (name: number) {
@@ -38,7 +38,7 @@ function takeSmallTextures(): void {
   };
 }
 
-// Two of the golden scenes, which stand for the same landscape.
+// Two golden scenes, which represent the same landscape.
 const kScenes = { volume: goldenScene, hash: goldenHash };
 type Golden = keyof typeof kScenes;
 
@@ -65,51 +65,51 @@ describe.skipIf(missing())('the browser', () => {
   it.each<[Golden, string, number]>([
     ['volume', 'default', 0], ['volume', 'default', 1], ['volume', 'swiftshader', 0], ['volume', 'small', 0],
     ['hash', 'default', 0], ['hash', 'default', 1], ['hash', 'swiftshader', 0],
-  ])('draws what the processor draws of %s: %s card, level %i', async (representation, card, level) => {
+  ])('draws what the CPU draws of %s: GPU %s, level %i', async (representation, gpu, level) => {
     const name = `${representation}-${level}`;
     const path = join(folder, `path-${name}.json`);
     writeFileSync(path, cameraPath(tileset, views.map(({ matrix }) => matrix)));
     run('render', kScenes[representation], join(folder, name), '--path', path, '--lod', String(level));
     const said: string[] = [];
-    const page = await openPlain(
-      card === 'swiftshader' ? swiftShader : browser, servers[representation], said, card === 'small' ? takeSmallTextures : undefined);
-    if (card === 'swiftshader') expect(await cardOf(page)).toContain('SwiftShader');
+    const page = await openHeadlessPage(
+      gpu === 'swiftshader' ? swiftShader : browser, servers[representation], said, gpu === 'small' ? takeSmallTextures : undefined);
+    if (gpu === 'swiftshader') expect(await gpuName(page)).toContain('SwiftShader');
     await page.evaluate(
-      (finestLevel) => plain.open('scene/tileset.json', { selection: { mostPixels: 0, finestLevel } }), level);
-    const looked = card === 'swiftshader' ? views.slice(0, 2) : views; // it takes long
+      (finestLevel) => headlessPage.open('scene/tileset.json', { selection: { maximumScreenSpaceError: 0, finestLevel } }), level);
+    const looked = gpu === 'swiftshader' ? views.slice(0, 2) : views; // SwiftShader is slow
     for (const [i, view] of looked.entries()) {
-      await page.evaluate((one) => plain.settle(one), view);
-      const pixels = new Uint8Array(Buffer.from(await page.evaluate(() => plain.pixels()), 'base64'));
+      await page.evaluate((one) => headlessPage.settle(one), view);
+      const pixels = new Uint8Array(Buffer.from(await page.evaluate(() => headlessPage.pixels()), 'base64'));
       const expected = await decodePng(page, join(folder, name, `0000${i}.png`));
-      expect(new Set(expected).size).toBeGreaterThan(20); // something is to be seen
+      expect(new Set(expected).size).toBeGreaterThan(20); // something is visible
       expect(psnr(pixels, expected)).toBeGreaterThan(38);
     }
-    expect(await page.evaluate(() => plain.errors)).toEqual([]);
+    expect(await page.evaluate(() => headlessPage.errors)).toEqual([]);
     expect(said).toEqual([]);
-    // Browsers take the card away now and then: all comes back.
-    const before = await page.evaluate(() => plain.pixels());
-    await page.evaluate(() => plain.loseCard());
-    await page.evaluate((view) => plain.settle(view), looked[looked.length - 1]);
-    expect(await page.evaluate(() => plain.pixels())).toBe(before);
+    // Browsers occasionally lose the WebGL context; everything must be restored.
+    const before = await page.evaluate(() => headlessPage.pixels());
+    await page.evaluate(() => headlessPage.loseGpu());
+    await page.evaluate((view) => headlessPage.settle(view), looked[looked.length - 1]);
+    expect(await page.evaluate(() => headlessPage.pixels())).toBe(before);
     await page.close();
   });
 
-  it.each<Golden>(['volume', 'hash'])('lets what lies far beyond what was captured fade into what is behind: %s', async (representation) => {
+  it.each<Golden>(['volume', 'hash'])('fades distant parts beyond the captured region into the background: %s', async (representation) => {
     const said: string[] = [];
-    const page = await openPlain(browser, servers[representation], said);
-    await page.evaluate(() => plain.open('scene/tileset.json', { selection: { mostPixels: 0 } }));
+    const page = await openHeadlessPage(browser, servers[representation], said);
+    await page.evaluate(() => headlessPage.open('scene/tileset.json', { selection: { maximumScreenSpaceError: 0 } }));
     const look = async (change: () => void) => {
       await page.evaluate(change);
-      await page.evaluate((view) => plain.settle(view), views[0]);
-      return new Uint8Array(Buffer.from(await page.evaluate(() => plain.pixels()), 'base64'));
+      await page.evaluate((view) => headlessPage.settle(view), views[0]);
+      return new Uint8Array(Buffer.from(await page.evaluate(() => headlessPage.pixels()), 'base64'));
     };
     const whole = await look(() => {});
-    const faded = await look(() => (plain.city!.visibility = 1e-3));
-    const alone = await look(() => (plain.city!.showsSurround = false));
-    // Between what is there and what is behind, nothing is brighter or darker than both.
+    const faded = await look(() => (headlessPage.city!.visibility = 1e-3));
+    const alone = await look(() => (headlessPage.city!.showsBackgroundBlock = false));
+    // Filtered values between the scene and the background are neither brighter nor darker than both.
     const half = await look(() => {
-      plain.city!.showsSurround = true;
-      plain.city!.visibility = 0.6;
+      headlessPage.city!.showsBackgroundBlock = true;
+      headlessPage.city!.visibility = 0.6;
     });
     const between = half.filter((value, i) => value >= Math.min(whole[i], alone[i]) - 3 && value <= Math.max(whole[i], alone[i]) + 3);
     expect(between.length / half.length).toBeGreaterThan(0.99);

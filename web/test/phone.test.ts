@@ -1,4 +1,4 @@
-// The viewer on a phone: what stands over the picture leaves it free, and fingers do all that a mouse does.
+// Tests the viewer on a phone: overlays leave the image free, and touch replaces the mouse.
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { goldenScene, launch, missing, serve, type Server } from './machine';
@@ -50,7 +50,7 @@ describe.skipIf(missing())('on a phone', { timeout: 120000 }, () => {
 
   const overlap = (a: Box, b: Box) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
 
-  // All that can stand over the picture at once.
+  // All overlays that can be open at once.
   async function showAll(page: Page): Promise<void> {
     await page.keyboard.press('i');
     await page.evaluate(() => {
@@ -63,7 +63,7 @@ describe.skipIf(missing())('on a phone', { timeout: 120000 }, () => {
     await page.addStyleTag({ content: '.loading { display: block !important }' });
   }
 
-  it.each([...kPhones, ...kDesktops])('nothing covers anything else, nor a panel the middle of the picture: %i × %i', async (width, height) => {
+  it.each([...kPhones, ...kDesktops])('no overlays overlap, and panels leave the middle of the image free: %i × %i', async (width, height) => {
     await open([width, height], kPhones.some(([x, y]) => x === width && y === height), async (page) => {
       await showAll(page);
       const middle = { name: 'the middle', left: width / 2 - 1, right: width / 2 + 1, top: height / 2 - 1, bottom: height / 2 + 1 };
@@ -95,7 +95,7 @@ describe.skipIf(missing())('on a phone', { timeout: 120000 }, () => {
       expect(await done.isVisible()).toBe(false);
       const tap = async (x: number, y: number) => {
         await page.touchscreen.tap(x, y);
-        await page.waitForTimeout(450); // two taps, not a double tap
+        await page.waitForTimeout(450); // separate taps, not a double tap
       };
       await tap(150, 320);
       await undo.waitFor();
@@ -112,7 +112,7 @@ describe.skipIf(missing())('on a phone', { timeout: 120000 }, () => {
       expect(await undo.isVisible()).toBe(false);
       expect(await page.locator('.measure li').count()).toBe(1);
       expect(await page.textContent('.measure li .figure')).toBe(first);
-      // With a keyboard: the focus goes on where it can.
+      // With a keyboard: the focus moves to a control that can take it.
       await tap(150, 320);
       await undo.focus();
       await page.keyboard.press('Enter');

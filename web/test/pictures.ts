@@ -1,12 +1,12 @@
-// Pictures of the renderer on the processor, for comparison.
+// Renders images with the CPU renderer, for comparison.
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Page } from 'playwright-core';
-import type { View } from '../src/plain';
+import type { View } from '../src/headless-page';
 import type { Tileset } from '../src/tiles/tileset';
 import { kFieldOfView, kHeight, kWidth } from './views';
 
-// As a camera path of nerfstudio has it, in the world of the source of the photos; row after row.
+// Returns a camera path in nerfstudio's format, in the world of the photos' source; matrices are row-major.
 export function cameraPath(tileset: Tileset, matrices: number[][]): string {
   const s = tileset.sourceFromWorld;
   const scale = Math.hypot(s[0], s[1], s[2]);
@@ -24,14 +24,14 @@ export function cameraPath(tileset: Tileset, matrices: number[][]): string {
   });
 }
 
-// A photo, as the tests' pinhole sees the same place.
+// A photo's view as seen by the tests' pinhole camera.
 export interface CapturedView {
   view: View;
-  lens: number[]; // the photo's own: OpenCV's fx fy cx cy k1 k2 p1 p2
+  lens: number[]; // the photo's own OpenCV parameters: fx fy cx cy k1 k2 p1 p2
   depthFile: string; // in the capture
 }
 
-// Held-out photos of a capture; where fewer are held out, the first of the others too.
+// Returns held-out photos of a capture; if there are too few, the first of the others as well.
 export function capturedViews(capture: string, count: number): CapturedView[] {
   const { test_filenames, train_filenames, frames, tessera } = JSON.parse(readFileSync(join(capture, 'transforms.json'), 'utf8')) as {
     test_filenames: string[];
@@ -48,8 +48,8 @@ export function capturedViews(capture: string, count: number): CapturedView[] {
   });
 }
 
-// How many colours the middle of the page's picture has; one where nothing is drawn.
-export async function coloursOf(page: Page): Promise<number> {
+// Returns the number of colours in the middle of the page's image; one if nothing is drawn.
+export async function countColours(page: Page): Promise<number> {
   const { width, height } = page.viewportSize()!;
   const clip = { x: width / 4, y: height / 4, width: width / 2, height: height / 4 };
   const pixels = await decodePixels(page, await page.screenshot({ clip }));
@@ -70,7 +70,7 @@ export async function pictureAtRest(page: Page): Promise<Buffer> {
   }
 }
 
-// Compares two pictures, for which toEqual takes seconds.
+// Compares two images; toEqual takes seconds for this.
 export function isSame(a: Uint8Array, b: Uint8Array): boolean {
   return Buffer.compare(a, b) === 0;
 }
@@ -81,7 +81,7 @@ export function psnr(a: Uint8Array, b: Uint8Array): number {
   return 10 * Math.log10((255 ** 2 * a.length) / squares);
 }
 
-// Red, green and blue of a PNG, decoded by the browser.
+// Returns the RGB values of a PNG, decoded by the browser.
 export function decodePng(page: Page, file: string): Promise<Uint8Array> {
   return decodePixels(page, readFileSync(file));
 }

@@ -1,4 +1,4 @@
-// The viewer as people open it.
+// Tests the viewer in typical use.
 import { cpSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -7,7 +7,7 @@ import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
 import { goldenScene, launch, missing, run, serve } from './machine';
-import { coloursOf, decodePng, psnr } from './pictures';
+import { countColours, decodePng, psnr } from './pictures';
 
 describe.skipIf(missing())('the viewer', () => {
   let browser: Browser;
@@ -22,7 +22,7 @@ describe.skipIf(missing())('the viewer', () => {
     rmSync(folder, { recursive: true });
   });
 
-  // Opens a scene; what the page says is wrong, in its console, comes with it.
+  // Opens a scene; also returns the errors in the page's console.
   async function open(scene: string, visit: (page: Page, said: string[]) => Promise<void>): Promise<void> {
     const server = await serve(scene);
     const page = await browser.newPage({ viewport: { width: 480, height: 270 } });
@@ -38,14 +38,14 @@ describe.skipIf(missing())('the viewer', () => {
     }
   }
 
-  it('shows the scene, and that it has come', async () => {
+  it('shows the scene, and that it has loaded', async () => {
     await open(goldenScene, async (page, said) => {
       await page.waitForSelector('.loading.done', { state: 'attached' });
       expect(await page.title()).toBe('golden · tessera');
       expect(await page.isVisible('.error')).toBe(false);
-      expect(await coloursOf(page)).toBeGreaterThan(200);
+      expect(await countColours(page)).toBeGreaterThan(200);
       await page.keyboard.press('i');
-      await page.waitForFunction(() => document.querySelector('.statistics')?.textContent?.includes('Graphics card'));
+      await page.waitForFunction(() => document.querySelector('.statistics')?.textContent?.includes('GPU'));
       const frame = page.locator('.statistics dd').first();
       await expect.poll(() => frame.textContent()).toBe('at rest');
       await page.keyboard.down('w');
@@ -56,10 +56,10 @@ describe.skipIf(missing())('the viewer', () => {
     });
   });
 
-  it('passes a view on by its address, and draws it at any size and along a path as the processor does', async () => {
+  it('shares a view by its address, and renders it at any size and along a path as the CPU does', async () => {
     const tileset = decodeTileset(readFileSync(join(goldenScene, 'tileset.json'), 'utf8'), 'tileset.json', kCodecs);
     await open(goldenScene, async (page, said) => {
-      // Above the block on the left, to the other one; in the capture's world.
+      // Above the left block, looking towards the other one; in the capture's world.
       const places = [[-1.8, -1.6, 0.9], [0.8, 0.2, -0.4]].map(([x, y, z]) => {
         const { rotation: r, scale, translation: t } = tileset.worldFromScene;
         return [0, 1, 2].map((row) => scale * (r[row] * x + r[3 + row] * y + r[6 + row] * z) + t[row]).join(',');
@@ -75,7 +75,7 @@ describe.skipIf(missing())('the viewer', () => {
         return path;
       };
       await page.keyboard.press('c');
-      await page.getByLabel('Beyond what was captured').selectOption('As it was made up');
+      await page.getByLabel('Outside the captured region').selectOption('Is shown in full');
       await page.keyboard.press('b');
       await page.click('text=Keep this view');
       await page.keyboard.press('w', { delay: 300 });
@@ -100,7 +100,7 @@ describe.skipIf(missing())('the viewer', () => {
     });
   });
 
-  it('says how far a large picture is, shows what was to be seen meanwhile, and lets it be', async () => {
+  it('shows the progress of a large screenshot over the previous image, and can cancel it', async () => {
     await open(goldenScene, async (page, said) => {
       await page.waitForSelector('.loading.done', { state: 'attached' });
       await page.keyboard.press('p');
@@ -124,7 +124,7 @@ describe.skipIf(missing())('the viewer', () => {
     });
   });
 
-  it('keeps a view that looks upwards, and how one moves', async () => {
+  it('keeps a view that looks upwards, and the navigation mode', async () => {
     await open(goldenScene, async (page, said) => {
       const hash = '#eye=10,-60,4&target=10,-20,19&fov=60&mode=fly';
       const address = page.url();
@@ -132,7 +132,7 @@ describe.skipIf(missing())('the viewer', () => {
         await page.goto('about:blank');
         await page.goto(`${address}${given}`);
         await page.waitForSelector('.loading.done', { state: 'attached' });
-        await page.keyboard.press('i'); // another picture
+        await page.keyboard.press('i'); // changes the image
         await page.waitForTimeout(1200);
         expect(new URL(page.url()).hash).toBe(expected);
       }
@@ -140,10 +140,10 @@ describe.skipIf(missing())('the viewer', () => {
     });
   });
 
-  it('goes on when the graphics card was taken away', async () => {
+  it('recovers from a lost WebGL context', async () => {
     await open(goldenScene, async (page, said) => {
       await page.waitForSelector('.loading.done', { state: 'attached' });
-      const before = await coloursOf(page);
+      const before = await countColours(page);
       expect(before).toBeGreaterThan(200);
       await page.evaluate(async () => {
         const canvas = document.querySelector<HTMLCanvasElement>('#view')!;
@@ -153,16 +153,16 @@ describe.skipIf(missing())('the viewer', () => {
         extension.loseContext();
         await restored;
       });
-      await expect.poll(() => coloursOf(page), { timeout: 20000 }).toBeGreaterThan(0.9 * before);
+      await expect.poll(() => countColours(page), { timeout: 20000 }).toBeGreaterThan(0.9 * before);
       expect(said).toEqual([]);
     });
   });
 
-  it('says what is wrong with a tile that lies, and shows the rest', async () => {
+  it('reports a malformed tile, and shows the rest', async () => {
     const scene = join(folder, 'lying');
     cpSync(goldenScene, scene, { recursive: true });
     const tiles = 'tiles/L0';
-    const name = readdirSync(join(scene, tiles)).find((one) => !one.startsWith('surround'))!;
+    const name = readdirSync(join(scene, tiles)).find((one) => !one.startsWith('background_block'))!;
     writeFileSync(join(scene, tiles, name), 'no glTF at all');
     await open(scene, async (page) => {
       await page.waitForSelector('.error', { state: 'visible' });
@@ -170,11 +170,11 @@ describe.skipIf(missing())('the viewer', () => {
       expect(text).toContain(`${tiles}/${name}`);
       expect(text).toContain('Is no binary glTF 2.0 file.');
       expect(text).toContain('Copy the scene again, or bake it again.');
-      expect(await coloursOf(page)).toBeGreaterThan(200);
+      expect(await countColours(page)).toBeGreaterThan(200);
     });
   });
 
-  it('says what to do where there is no scene', async () => {
+  it('explains what to do if there is no scene', async () => {
     await open(goldenScene, async (page) => {
       await page.goto(`${page.url()}?scene=nothing/tileset.json`);
       await page.waitForSelector('.error', { state: 'visible' });

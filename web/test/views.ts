@@ -1,14 +1,14 @@
-// Cameras of tests: pinholes at places of a scene.
-import type { View } from '../src/plain';
+// Cameras of tests: pinhole cameras at places of a scene.
+import type { View } from '../src/headless-page';
 import type { Tileset } from '../src/tiles/tileset';
 
 export type Place = readonly [number, number, number]; // scene units
 
 export const kWidth = 480;
 export const kHeight = 270;
-export const kFieldOfView = 60; // degrees, of the height
+export const kFieldOfView = 60; // vertical, in degrees
 
-// Column after column: camera (x right, y up, z back) to the capture's world.
+// Column-major matrix from the camera (x right, y up, z back) to the capture's world.
 export function worldFromCamera(tileset: Tileset, eye: Place, target: Place): number[] {
   const minus = (a: Place, b: Place): Place => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
   const cross = (a: Place, b: Place): Place => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];

@@ -1,11 +1,11 @@
-// A world that tessera serve gives, and what people add to it. By pixels.
+// Tests a world that `tessera serve` provides, and what users add to it. By pixels.
 import { spawnSync } from 'node:child_process';
 import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, beforeEach, describe, expect, it } from 'vitest';
-import { madeGlb } from '../src/testing/made-glb';
+import { testGlb } from '../src/testing/test-glb';
 import { goldenScene, launch, missing, program, serve, viewer, type Server } from './machine';
 import { decodePixels, pictureAtRest } from './pictures';
 
@@ -24,7 +24,7 @@ const world = {
   bookmarks: [{ name: 'From the south', view: kView }],
 };
 
-describe.skipIf(missing())('a world that is served', () => {
+describe.skipIf(missing())('a served world', () => {
   let folder: string;
   let server: Server;
   let browser: Browser;
@@ -37,7 +37,7 @@ describe.skipIf(missing())('a world that is served', () => {
     cpSync(goldenScene, join(folder, 'towns/old.scene'), { recursive: true });
     for (const [name, edge] of [['a', 10], ['b c', 5]] as const) {
       mkdirSync(join(folder, name));
-      writeFileSync(join(folder, name, 'cube.glb'), madeGlb({ edge }));
+      writeFileSync(join(folder, name, 'cube.glb'), testGlb({ edge }));
     }
     writeFileSync(join(folder, 'world.json'), JSON.stringify(world));
     const lost = { ...world.models[0], name: 'lost', files: ['lost.glb'] };
@@ -67,14 +67,14 @@ describe.skipIf(missing())('a world that is served', () => {
     await page.waitForSelector('.loading.done', { state: 'attached' });
   }
 
-  // Nothing selected, nothing open.
+  // Nothing is selected and no panel is open.
   async function picture(): Promise<Uint8Array> {
     await page.keyboard.press('Escape');
     await page.mouse.move(630, 390);
     return decodePixels(page, await pictureAtRest(page));
   }
 
-  const isBesideToolbar = (pixel: number) => pixel % 640 >= 110; // which shows what has the focus
+  const isBesideToolbar = (pixel: number) => pixel % 640 >= 110; // the toolbar shows the focus
   function changed(a: Uint8Array, b: Uint8Array): number {
     return Array.from({ length: a.length / 3 }, (_, pixel) => pixel)
       .filter((pixel) => isBesideToolbar(pixel) && [0, 1, 2].some((c) => Math.abs(a[3 * pixel + c] - b[3 * pixel + c]) > 8)).length;
@@ -93,7 +93,7 @@ describe.skipIf(missing())('a world that is served', () => {
     }, text);
   }
 
-  it('is shown whole, and saved as it was', async () => {
+  it('is shown completely, and saved unchanged', async () => {
     await open();
     await page.keyboard.press('b');
     await page.click('.views button:text-is("From the south")');
@@ -125,7 +125,7 @@ describe.skipIf(missing())('a world that is served', () => {
     expect(said).toEqual([]);
   });
 
-  it('is shown but for what cannot be had, which is told of and saved again', async () => {
+  it('is shown without missing items, which are reported and saved again', async () => {
     await open(`#${kView}`, 'with gaps.json');
     await page.waitForSelector('.error', { state: 'visible' });
     expect(await page.textContent('.error')).toMatch(/lost\.glb.*404.*And 1 more/);
@@ -136,7 +136,7 @@ describe.skipIf(missing())('a world that is served', () => {
     expect(saved.models.map(({ name }) => name)).toEqual(['cube', 'cube 2', 'lost']);
   });
 
-  it('that shows no scene at first is not waited for, and its scene can be shown', async () => {
+  it('without a visible scene finishes loading, and its scene can be shown', async () => {
     await page.goto(`${server.url}?world=world/dark.json#${kView}`);
     await page.waitForSelector('.loading.done', { state: 'attached' });
     await page.keyboard.press('o');
@@ -147,7 +147,7 @@ describe.skipIf(missing())('a world that is served', () => {
     expect(said).toEqual([]);
   });
 
-  it('stays as it is where another one cannot be read', async () => {
+  it('is unchanged if another one cannot be read', async () => {
     await open();
     await drop(JSON.stringify({ ...world, models: [{ ...world.models[0], files: [] }], hidden: [] }));
     await page.waitForSelector('.error', { state: 'visible' });
@@ -177,7 +177,7 @@ describe.skipIf(missing())('a world that is served', () => {
     expect(said).toEqual([]);
   });
 
-  it('is refused at the start where a scene of it does not lie in its folder', () => {
+  it('is rejected at startup if a scene is outside its folder', () => {
     const inside = join(folder, 'inside');
     mkdirSync(inside);
     writeFileSync(join(inside, 'world.json'), JSON.stringify({ ...world, scenes: [{ url: '../golden.scene' }] }));

@@ -1,4 +1,4 @@
-// For tests: a virtual screen (Xvfb), whatever others there are.
+// For tests: starts a virtual screen (Xvfb), whatever other screens there are.
 #pragma once
 
 #include <sys/prctl.h>
@@ -24,13 +24,13 @@ class TestScreen {
       prctl(PR_SET_PDEATHSIG, SIGKILL);
       close(ends[0]);
       const std::string number = std::to_string(ends[1]);
-      // -noreset: else it starts anew whenever its last window closes, and refuses the next one meanwhile.
+      // Without -noreset the server restarts whenever its last window closes, and refuses connections meanwhile.
       execlp("Xvfb", "Xvfb", "-displayfd", number.c_str(), "-screen", "0", "1600x1200x24", "-noreset", "-nolisten",
              "tcp", static_cast<char*>(nullptr));
       _exit(127);
     }
     close(ends[1]);
-    std::string name = ":";  // of the display: its number comes when it can be used
+    std::string name = ":";  // of the display; the server writes its number once it accepts connections
     char c = 0;
     while (read(ends[0], &c, 1) == 1 && c != '\n') name += c;
     close(ends[0]);

@@ -1,12 +1,12 @@
-// What the host hands to the kernels that draw contents of `hash`: one truth, read by C++ and GLSL alike, as in
+// The arguments of the kernels that render contents of `hash`, declared once for C++ and GLSL as in
 // shaders/compute/arguments.h.
 #ifndef TESSERA_SHADERS_REPRESENTATIONS_HASH_ARGUMENTS_HASH_H
 #define TESSERA_SHADERS_REPRESENTATIONS_HASH_ARGUMENTS_HASH_H
 #include "../../render/arguments_view.h"
 TESSERA_BEGIN_ARGUMENTS
 
-// HashPart.
-#define TESSERA_MOST_TABLES 8
+// The maximum number of tables of a HashPart.
+#define TESSERA_MAX_TABLES 8
 
 struct HashPartArguments {
   float centre[3];
@@ -17,12 +17,12 @@ struct HashPartArguments {
   uint contracted;
   float high[3];
   int ratio;                // 0, 1, 2: coarse cells are 1, 2 or 4 finest ones wide
-  UintPointer macroblocks;  // numbers of those stored
+  UintPointer macroblocks;  // indices of the stored macroblocks
   UintPointer cornerWords;  // [stored][9][9][9][columns / 4]
   UintPointer coarse;
   UintPointer fine;
-  UintPointer tables[TESSERA_MOST_TABLES];  // [entries][2]
-  uint firstVector;                         // of `vectors`: gpu_hash_content.cpp
+  UintPointer tables[TESSERA_MAX_TABLES];  // [entries][2]
+  uint firstVector;                        // index in `vectors`; see gpu_hash_content.cpp
   uint unused;
 };
 TESSERA_SIZE(HashPartArguments, 168);
@@ -51,30 +51,30 @@ layout(buffer_reference, std430, buffer_reference_align = 16) buffer VectorsPoin
 };
 #endif
 
-// HashContent, and where of it something is drawn.
+// A HashContent and the box in which it is drawn.
 struct DrawHashArguments {
   ViewArguments view;
   float low[3];
   uint partCount;
   float high[3];
-  uint isSurround;
+  uint isBackgroundBlock;
   float stepLength;
   uint columns;
-  uint network;  // among those of the picture
+  uint network;  // index among the networks of the view
   uint unused;
-  float levelWeights[2 * TESSERA_MOST_TABLES];  // of density and of all else, where they are the same everywhere
+  float levelWeights[2 * TESSERA_MAX_TABLES];  // per level: of density and of all else, if they do not vary
   HashPartsPointer parts;
   VectorsPointer vectors;
 };
 TESSERA_SIZE(DrawHashArguments, 272);
 
-// What of all contents together becomes a colour.
+// The networks that turn the sums of all contents into colours.
 struct EndHashArguments {
   ViewArguments view;
   NetworksPointer networks;
   uint networkCount;
-  uint ofNothing;  // the network of rays that nothing meets
-  uint isWhole;
+  uint backgroundContent;  // the network of rays that meet no content
+  uint hasLearnedBackground;
   uint unused;
 };
 TESSERA_SIZE(EndHashArguments, 168);

@@ -1,5 +1,5 @@
-// Adds one content of `hash` to the sums of each pixel's ray, behind what is there (docs/tile-format.md, section 7). Contents come
-// front to back.
+// Composites one content of `hash` behind the sums of each pixel's ray (docs/tile-format.md, section 7). Contents are
+// drawn front to back.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../../compute/kernel.glsl"
@@ -16,7 +16,7 @@ KERNEL_ARGUMENTS(DrawHashArguments)
 
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer Words2Pointer { uvec2 values[]; };
 const uint kEmpty = 0xffffffffu;
-const float shares[TESSERA_MOST_TABLES + 1] = float[](1, 1, 1, 1, 1, 1, 1, 1, 1);  // of levels: display modes are the browser's
+const float shares[TESSERA_MAX_TABLES + 1] = float[](1, 1, 1, 1, 1, 1, 1, 1, 1);  // of levels; only the browser has display modes
 const int attention = 0;
 
 float stepLength, minTransmittance;
@@ -34,10 +34,10 @@ struct Part {
 
 Place placeOfPart(uint number) {
   HashPartArguments a = arguments.values.parts.values[number];
-  return Place(vectorOf(a.centre), vectorOf(a.scale), vectorOf(a.low), vectorOf(a.high), a.contracted != 0);
+  return Place(toVec3(a.centre), toVec3(a.scale), toVec3(a.low), toVec3(a.high), a.contracted != 0);
 }
 
-Part partOf(uint number) {
+Part fetchPart(uint number) {
   HashPartArguments a = arguments.values.parts.values[number];
   return Part(placeOfPart(number), a.texels, a.lattice, a.ratio, int(a.firstVector), a.macroblocks, a.cornerWords, a.coarse,
               a.fine, number);
@@ -53,12 +53,12 @@ uint nearWord(Part part, uint n) { return part.fine.values[n]; }
 vec4 macroblockAt(Part part, vec3 block) {
   const uint edge = uint(part.lattice) / 8;
   const uint number = part.macroblocks.values[uint(block.x) + edge * (uint(block.y) + edge * uint(block.z))];
-  return number == kEmpty ? vec4(0) : vec4(float(number), 0, 0, 1);  // below 2^24
+  return number == kEmpty ? vec4(0) : vec4(float(number), 0, 0, 1);  // exact: below 2^24
 }
 
-vec4 secondOfCorners;  // of the eight columns that cornersFirst was last asked for
+vec4 secondOfCorners;  // the second half of the last result of cornersFirst
 
-// A corner's eight columns are two words, read together.
+// The eight columns of a corner are two words, which are read together.
 vec4 cornersFirst(Part part, int eight, vec4 macroblock, vec3 within) {
   const vec3 low = min(floor(within), 7.0), share = within - low;
   const uint eights = arguments.values.columns / 8;
@@ -98,7 +98,7 @@ void main() {
   minTransmittance = a.view.minTransmittance / before;
   contentVectors = a.vectors;
   for (int l = 0; l < TABLES; ++l) levelWeights[l] = vec2(a.levelWeights[2 * l], a.levelWeights[2 * l + 1]);
-  const Composite sum = marchContent(a.view, pixel, d, vectorOf(a.low), vectorOf(a.high), a.partCount, a.isSurround != 0);
+  const Composite sum = marchContent(a.view, pixel, d, toVec3(a.low), toVec3(a.high), a.partCount, a.isBackgroundBlock != 0);
   if (sum.transmittance >= 1) return;
   a.view.pixels.values[first] = before * sum.transmittance;
   a.view.pixels.values[first + 1] += before * sum.depth;

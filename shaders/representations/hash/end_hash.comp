@@ -1,4 +1,5 @@
-// One invocation a pixel: the network that weighs most makes a colour of the ray's sums and its direction (NGP-RT, eq. 5).
+// One invocation per pixel: the network with the largest weight computes the colour from the ray's sums and its
+// direction (NGP-RT, eq. 5).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../../compute/kernel.glsl"
@@ -8,7 +9,7 @@
 #include "../../render/view.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(constant_id = 0) const uint kMostWidth = 23;  // of the networks' layers
+layout(constant_id = 0) const uint kMaxWidth = 23;  // the maximum width of the networks' layers
 KERNEL_ARGUMENTS(EndHashArguments)
 
 #include "../../render/dense_network.glsl"
@@ -16,12 +17,12 @@ KERNEL_ARGUMENTS(EndHashArguments)
 const uint kSums = 7;
 
 uint heaviest(EndHashArguments a, uint first) {
-  uint network = a.ofNothing;
-  float most = 0;
+  uint network = a.backgroundContent;
+  float maximum = 0;
   for (uint n = 0; n < a.networkCount; ++n) {
     const float weight = a.view.pixels.values[first + 9 + n];
-    if (weight <= most) continue;
-    most = weight;
+    if (weight <= maximum) continue;
+    maximum = weight;
     network = n;
   }
   return network;
@@ -35,16 +36,16 @@ void main() {
   float transmittance = a.view.pixels.values[first], depth = a.view.pixels.values[first + 1];
   const vec3 d = rayDirection(a.view, pixel);
   vec3 colour = vec3(0);
-  const bool isWhole = a.isWhole != 0 && farthestOf(a.view, pixel) >= kSceneEnd && d != vec3(0);
-  if (a.networkCount > 0 && (isWhole || transmittance < 1)) {
-    float values[kMostWidth];
+  const bool hasLearnedBackground = a.hasLearnedBackground != 0 && farthestDistance(a.view, pixel) >= kSceneEnd && d != vec3(0);
+  if (a.networkCount > 0 && (hasLearnedBackground || transmittance < 1)) {
+    float values[kMaxWidth];
     for (uint i = 0; i < kSums; ++i) values[i] = a.view.pixels.values[first + 2 + i];
     const vec3 diffuse = vec3(values[0], values[1], values[2]);
     for (uint i = 0; i < 16; ++i) values[kSums + i] = harmonic(i, d);
     NetworkArguments network = a.networks.values[heaviest(a, first)];
     runNetwork(LayersPointer(network.layers), network.layerCount, FloatPointer(network.weights), values);
-    if (isWhole) {
-      depth /= max(1 - transmittance, 1e-6);  // of an opaque pixel
+    if (hasLearnedBackground) {
+      depth /= max(1 - transmittance, 1e-6);  // normalised as for an opaque pixel
       transmittance = 0;
     }
     colour = (1 - transmittance) / (1 + exp(-(diffuse + vec3(values[0], values[1], values[2]))));

@@ -1,44 +1,44 @@
-// One content of a `hash` scene along a ray: its samples, composited (docs/tile-format.md, section 7; NGP-RT, section 4.3).
-// Twin of src/representations/hash/cpu/hash_march.cpp and hash_features.cpp.
+// Samples and composites one content of a `hash` scene along a ray (docs/tile-format.md, section 7; NGP-RT, section 4.3).
+// Must match src/representations/hash/cpu/hash_march.cpp and hash_features.cpp.
 //
-// Reads: domain_path.glsl, part_place.glsl; TABLES, fine levels of a part; VARYING, defined where weights differ from place
-//   to place; SHARED, defined where one logit weighs all of a level; how a viewer holds a content:
+// Reads: domain_path.glsl, part_place.glsl; TABLES, the number of fine levels of a part; VARYING, defined if weights vary
+//   with the position; SHARED, defined if one logit weights a whole level; the viewer's storage of a content:
 //     struct Part               with place; texels, finest cells along an axis; lattice, corners along an axis; ratio: 0, 1, 2
-//                               where coarse cells of distances are 1, 2 or 4 finest ones wide; ranges, an index of:
-//     vec4 content[]            for each eight columns low and scale of columns 1 2 3 0 and low and scale of 4 5 6 7, per byte of
-//                               255 that counts as 1; then for each table its resolution, entries, whether it is hashed (and a
-//                               number of the viewer's), and likewise four vectors for its bytes
+//                               if coarse cells of distances are 1, 2 or 4 finest cells wide; ranges, an index of:
+//     vec4 content[]            for each eight columns low and scale of columns 1 2 3 0 and low and scale of 4 5 6 7, for bytes
+//                               divided by 255; then for each table its resolution, entries, whether it is hashed and a
+//                               number for the viewer's use, and four such vectors for its undivided bytes
 //     uint distanceWord(Part, ivec3 coarseCell), uint nearWord(Part, uint n)    of src/representations/hash/content/occupancy_distance.h
-//     vec4 macroblockAt(Part, vec3 block)      of 9³ corners; the fourth is 0 where none is, the rest is the viewer's
-//     vec4 cornersFirst(Part, int eight, vec4 macroblock, vec3 within), cornersSecond(...)    of each eight columns the mix
-//                                              of columns 1 2 3 0 and 4 5 6 7, 0 at the middle of the first corner; the
-//                                              second is asked for right after the first
-//     uvec2 entryAt(Part, int level, float number, uint entry)    the eight bytes of an entry, `number` the viewer's
-//   vec2 levelWeights[TABLES], where not VARYING: of density, of all else; float shares[TABLES + 1] or more: of the coarse features'
-//   and each level's diffuse colour and features, 1 but for display; int attention: the level whose weights of density (1 +
-//   2 l) or of all else (2 + 2 l) stand for features, 0 for none; float stepLength: share of the domain's width; float
-//   minTransmittance.
+//     vec4 macroblockAt(Part, vec3 block)      of 9³ corners; w is 0 if there is none, xyz are for the viewer's use
+//     vec4 cornersFirst(Part, int eight, vec4 macroblock, vec3 within), cornersSecond(...)    for each eight columns the
+//                                              interpolated columns 1 2 3 0 and 4 5 6 7; `within` is 0 at the centre of the
+//                                              first corner; the second is called right after the first
+//     uvec2 entryAt(Part, int level, float number, uint entry)    the eight bytes of an entry; `number` is the viewer's
+//   vec2 levelWeights[TABLES], unless VARYING: of density and of all else; float shares[TABLES + 1] or more: factors of the diffuse
+//   colour and features of the coarse level and of each fine level, 1 except in display modes; int attention: the level l whose
+//   weights of density (1 + 2 l) or of all else (2 + 2 l) replace the features, 0 for none; float stepLength: fraction of the
+//   domain's width; float minTransmittance.
 // Defines: marchSegment.
 
-const float kLongestStep = 1e3;     // that counts, scene units
-const float kMostLogDensity = 15.0;
-const float kCellSlack = 1e-3;      // finest cells: more than what places are rounded by
+const float kLongestStep = 1e3;     // the largest step that counts, scene units
+const float kMaxLogDensity = 15.0;
+const float kCellSlack = 1e-3;      // finest cells: larger than the rounding errors of positions
 const int kTableVectors = 5;
 
-// Bytes of an entry: diffuse colour and density, features.
+// Unpacks the bytes of an entry: diffuse colour and density, features.
 void unpackEntry(uvec2 words, out vec4 first, out vec4 second) {
   first = vec4(uvec4(words.x >> 8, words.x >> 16, words.x >> 24, words.x) & 255u);
   second = vec4(uvec4(words.y, words.y >> 8, words.y >> 16, words.y >> 24) & 255u);
 }
 
-// A fine level at p in [0,1]³ of the domain; its vectors begin at `at`.
+// Interpolates a fine level at p in [0,1]³ of the domain; its vectors in `content` begin at `at`.
 void mixTable(Part part, int level, int at, vec3 p, out vec4 first, out vec4 second) {
   vec4 head = content[at];  // resolution, entries, hashed, the viewer's number
   vec3 scaled = (head.x - 1.0) * p + 0.5;
   vec3 lower = floor(scaled), upper = scaled - lower;
   uvec3 c = uvec3(lower);
   uint resolution = uint(head.x), entries = uint(head.y);
-  // What the lower and the upper sides add to the number of an entry.
+  // The terms of the lower and the upper sides in the index of an entry.
   uvec2 x = uvec2(c.x, c.x + 1u), y = uvec2(c.y, c.y + 1u), z = uvec2(c.z, c.z + 1u);
   bool hashed = head.z != 0.0;
   y *= hashed ? 2654435761u : resolution;
@@ -59,8 +59,8 @@ void mixTable(Part part, int level, int at, vec3 p, out vec4 first, out vec4 sec
 }
 
 #ifdef VARYING
-// Of density and of all else, of a level; columns stand in the order 1 2 3 0, 4 5 6 7.
-vec2 weightsOf(int level, vec4 first, vec4 second) {
+// Returns a level's weights of density and of all else; the columns have the order 1 2 3 0, 4 5 6 7.
+vec2 levelAttentionWeights(int level, vec4 first, vec4 second) {
 #ifdef SHARED
   float logit = level < 4 ? first[(level + 3) & 3] : second[level & 3];
   vec2 logits = vec2(logit);
@@ -71,7 +71,7 @@ vec2 weightsOf(int level, vec4 first, vec4 second) {
 }
 #endif
 
-// Where macroblocks have a corner; `first` is diffuse colour and the logarithm of density, before any activation.
+// Computes the features at p within a macroblock; `first` is diffuse colour and log-density, before any activation.
 void featuresAt(Part part, vec3 p, vec4 macroblock, vec3 within, out vec4 first, out vec4 second) {
   int ranges = part.ranges;
   vec4 coarse = content[ranges] + content[ranges + 1] * cornersFirst(part, 0, macroblock, within);
@@ -88,7 +88,7 @@ void featuresAt(Part part, vec3 p, vec4 macroblock, vec3 within, out vec4 first,
   float shown = 0.0;
   for (int level = 0; level < TABLES; ++level, table += kTableVectors) {
 #ifdef VARYING
-    vec2 weights = weightsOf(level, logitsFirst, logitsSecond);
+    vec2 weights = levelAttentionWeights(level, logitsFirst, logitsSecond);
 #else
     vec2 weights = levelWeights[level];
 #endif
@@ -107,14 +107,14 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
   float cells = part.texels;
   float step = stepLength * cells;
   vec3 up = vec3(greaterThan(s.direction, vec3(0.0)));
-  vec3 inverse = mix(1.0 / s.direction, vec3(-1e20), equal(s.direction, vec3(0.0)));  // the octant is that below
+  vec3 inverse = mix(1.0 / s.direction, vec3(-1e20), equal(s.direction, vec3(0.0)));  // negative, as such directions belong to the lower octant
   uint shift = 4u * uint(up.x + 2.0 * up.y + 4.0 * up.z);
   float count = ceil(s.whole / step);
   float i = 0.0;
-  int guard = 0;  // no segment is longer than its diagonal; a bound for drivers that want one
+  int guard = 0;  // a bound for drivers that require one; no segment is longer than the diagonal
   do {
-    // On to a step that may show something, in a loop of its own: what takes several rays together (Mesa on a processor:
-    // always) does for all of them whatever stands in a loop that one has not left.
+    // Advances to a step that may not be empty, in a separate loop: when several rays are executed together (always in
+    // Mesa on a CPU), all of them execute a loop's body until the last one has left the loop.
     float from, to, tau;
     vec3 x;
     do {
@@ -122,7 +122,7 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
       tau = 0.5 * (from + to);
       x = clamp(s.start + tau * s.direction, 0.0, cells * 0.9999999);
       ivec3 cell = ivec3(x);
-      float edge = float(1 << part.ratio);  // of the cells that what is empty is told in
+      float edge = float(1 << part.ratio);  // of the cells in which empty space is measured
       uint word = distanceWord(part, cell >> part.ratio);
       if ((word & 15u) == 0u) {
         if (part.ratio == 0) break;
@@ -133,8 +133,8 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
       }
       float free = float((word >> shift) & 15u);
       if (free == 0.0) break;
-      // A cube of so many cells is empty that begins here and lies where the ray goes: on to the first step whose middle
-      // lies behind it.
+      // A cube of `free` cells that begins here in the ray's octant is empty: advances to the first step whose middle lies
+      // behind it.
       vec3 end = (floor(x / edge) + mix(vec3(1.0 - free), vec3(free), up)) * edge + mix(vec3(kCellSlack), vec3(-kCellSlack), up);
       vec3 exits = (end - s.start) * inverse;
       float exit = min(min(exits.x, exits.y), min(exits.z, s.whole));
@@ -149,7 +149,7 @@ void marchSegment(Part part, DomainSegment s, inout Composite sum) {
     if (macroblock.w != 0.0) {
       vec4 first, second;
       featuresAt(part, p, macroblock, u - 8.0 * block, first, second);
-      float opacity = opacityOf(exp(min(first.a, kMostLogDensity)) * min(distanceBetween(s, from, to), kLongestStep));
+      float opacity = computeOpacity(exp(min(first.a, kMaxLogDensity)) * min(distanceBetween(s, from, to), kLongestStep));
       addTo(sum, first.rgb, second, opacity, distanceAt(s, tau));
     }
   } while (i < count && sum.transmittance >= minTransmittance && ++guard < 65536);

@@ -1,11 +1,11 @@
-// What the host hands to the kernels that draw contents of `volume`: one truth, read by C++ and GLSL alike, as in
+// The arguments of the kernels that render contents of `volume`, declared once for C++ and GLSL as in
 // shaders/compute/arguments.h.
 #ifndef TESSERA_SHADERS_REPRESENTATIONS_VOLUME_ARGUMENTS_VOLUME_H
 #define TESSERA_SHADERS_REPRESENTATIONS_VOLUME_ARGUMENTS_VOLUME_H
 #include "../../render/arguments_view.h"
 TESSERA_BEGIN_ARGUMENTS
 
-// VolumePart.
+// A VolumePart.
 struct VolumePartArguments {
   float centre[3];
   float texels;  // of a plane along an axis
@@ -15,7 +15,7 @@ struct VolumePartArguments {
   uint contracted;
   float high[3];
   uint unused;
-  UintPointer macroblocks;  // numbers of those stored
+  UintPointer macroblocks;  // indices of the stored macroblocks
   UintPointer voxelWords;   // [stored][9][9][9][2]
   UintPointer planeWords[3];
   UintPointer distances;  // bytes
@@ -30,7 +30,7 @@ layout(buffer_reference, std430, buffer_reference_align = 8) buffer VolumePartsP
 };
 #endif
 
-// VolumeContent, and where of it something is drawn.
+// A VolumeContent and the box in which it is drawn.
 struct DrawVolumeArguments {
   ViewArguments view;
   float low[3];
@@ -40,7 +40,7 @@ struct DrawVolumeArguments {
   float featureRange;
   float densityRange;
   float stepsPerTexel;
-  uint isSurround;
+  uint isBackgroundBlock;
   VolumePartsPointer parts;
   LayersPointer layers;
   FloatPointer weights;

@@ -1,5 +1,5 @@
-// Adds one content of `volume` to each pixel's ray, behind what is there (docs/tile-format.md, section 6). Contents come
-// front to back.
+// Composites one content of `volume` behind the sums of each pixel's ray (docs/tile-format.md, section 6). Contents are
+// drawn front to back.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../../compute/kernel.glsl"
@@ -8,7 +8,7 @@
 #include "../../render/view.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(constant_id = 0) const uint kMostWidth = 34;  // of the network's layers
+layout(constant_id = 0) const uint kMaxWidth = 34;  // the maximum width of the network's layers
 KERNEL_ARGUMENTS(DrawVolumeArguments)
 
 #include "../../lib/trigonometry.glsl"
@@ -29,10 +29,10 @@ struct Part {
 
 Place placeOfPart(uint number) {
   VolumePartArguments a = arguments.values.parts.values[number];
-  return Place(vectorOf(a.centre), vectorOf(a.scale), vectorOf(a.low), vectorOf(a.high), a.contracted != 0);
+  return Place(toVec3(a.centre), toVec3(a.scale), toVec3(a.low), toVec3(a.high), a.contracted != 0);
 }
 
-Part partOf(uint number) {
+Part fetchPart(uint number) {
   VolumePartArguments a = arguments.values.parts.values[number];
   return Part(placeOfPart(number), a.texels, a.voxels, a.macroblocks, a.voxelWords, a.distances, number);
 }
@@ -49,10 +49,10 @@ float reachAt(Part part, vec3 cell) {
 
 vec4 macroblockAt(Part part, vec3 block) {
   const uint number = part.macroblocks.values[cellIndex(block, part.voxels / 8)];
-  return number == kEmpty ? vec4(0) : vec4(float(number), 0, 0, 1);  // below 2^24
+  return number == kEmpty ? vec4(0) : vec4(float(number), 0, 0, 1);  // exact: below 2^24
 }
 
-// Word 0 holds density and diffuse, word 1 features.
+// Interpolates the voxels' words: word 0 holds density and diffuse colour, word 1 features.
 vec4 mixVoxels(Part part, vec4 macroblock, vec3 within, uint word) {
   const vec3 low = min(floor(within), 7.0), share = within - low;
   const uint first = uint(macroblock.x) * 729 + uint(low.x) + 9 * (uint(low.y) + 9 * uint(low.z));
@@ -91,9 +91,9 @@ vec4 planesSecond(Part part, vec3 x) { return mixPlanes(part, x, 1); }
 #include "../../raymarch/march_part.glsl"
 #include "../../raymarch/march_parts.glsl"
 
-// What the network says of a ray's sums and its direction.
-vec3 specularOf(DrawVolumeArguments a, Composite sum, vec3 d) {
-  float values[kMostWidth];
+// Returns the specular colour that the network computes from a ray's sums and its direction.
+vec3 evaluateSpecular(DrawVolumeArguments a, Composite sum, vec3 d) {
+  float values[kMaxWidth];
   for (uint i = 0; i < 3; ++i) values[i] = sum.diffuse[i];
   for (uint i = 0; i < 4; ++i) values[3 + i] = sum.features[i];
   for (uint axis = 0; axis < 3; ++axis) {
@@ -124,10 +124,10 @@ void main() {
   densityRange = a.densityRange;
   stepsPerTexel = a.stepsPerTexel;
   minTransmittance = a.view.minTransmittance / before;
-  const Composite sum = marchContent(a.view, pixel, d, vectorOf(a.low), vectorOf(a.high), a.partCount, a.isSurround != 0);
+  const Composite sum = marchContent(a.view, pixel, d, toVec3(a.low), toVec3(a.high), a.partCount, a.isBackgroundBlock != 0);
   const float opacity = 1 - sum.transmittance;
   if (opacity <= 0) return;
-  const vec3 colour = sum.diffuse + opacity * specularOf(a, sum, d);
+  const vec3 colour = sum.diffuse + opacity * evaluateSpecular(a, sum, d);
   a.view.pixels.values[first] = before * sum.transmittance;
   a.view.pixels.values[first + 1] += before * sum.depth;
   for (uint c = 0; c < 3; ++c) a.view.pixels.values[first + 2 + c] += before * colour[c];

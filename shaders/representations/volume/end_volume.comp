@@ -1,4 +1,4 @@
-// One invocation a pixel: RenderedView of what has been added up, of `volume`.
+// Writes the RenderedView from the sums of `volume` contents; one invocation per pixel.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../../compute/kernel.glsl"

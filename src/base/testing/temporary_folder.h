@@ -1,4 +1,4 @@
-// A folder of one test, that goes away with it.
+// A temporary folder for one test, removed by its destructor.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -17,7 +17,7 @@
 #define TESSERA_CPU_ADAM_ONCE
 namespace tessera::cpu {
 
-// rate · sqrt(1 - β2^k) / (1 - β1^k) for k = 0 .. size - 1; the last value serves for all later counts.
+// rate · sqrt(1 - β2^k) / (1 - β1^k) for k = 0 .. size - 1; the last value applies to all later counts.
 using StepSizes = std::vector<float>;
 
 }  // namespace tessera::cpu
@@ -83,7 +83,7 @@ namespace {
 StepSizes makeStepSizes(const Adam& a) {
   StepSizes sizes{0.0f};
   double power1 = 1, power2 = 1;
-  // Until both corrections have vanished in float.
+  // Continues until both bias corrections are 1 in float.
   for (int k = 1; k < (1 << 20); ++k) {
     power1 *= a.beta1;
     power2 *= a.beta2;
@@ -96,7 +96,7 @@ StepSizes makeStepSizes(const Adam& a) {
 }  // namespace
 
 void run(Context& context, const Adam& a) {
-  if (isAnyAbove(a.found, a.room)) {
+  if (isAnyAbove(a.overflowCounters, a.capacity)) {
     context.pool.forRanges(a.gradients.count, size_t{1} << 18, [&](size_t begin, size_t end) {
       std::fill(hostPointer(a.gradients) + begin, hostPointer(a.gradients) + end, 0.0f);
     });

@@ -12,7 +12,7 @@ namespace tessera::cpu {
 namespace {
 
 constexpr size_t kFeatures = AttentionShape::kFeatures, kRowsPerTask = 2048;
-constexpr size_t kMostLogits = 2 * AttentionShape::kMostLevels;
+constexpr size_t kMaxLogits = 2 * AttentionShape::kMaxLevels;
 
 float sigmoid(float x) {
   return 1 / (1 + std::exp(-x));
@@ -20,7 +20,7 @@ float sigmoid(float x) {
 
 // The weights of density and of colours of each level.
 struct Weights {
-  float density[AttentionShape::kMostLevels], colours[AttentionShape::kMostLevels];
+  float density[AttentionShape::kMaxLevels], colours[AttentionShape::kMaxLevels];
 
   Weights(const AttentionShape& shape, const float* logits) {
     for (uint32_t l = 0; l < shape.levels; ++l) {
@@ -33,12 +33,12 @@ struct Weights {
   }
 };
 
-// Of the whole model, where they do not vary.
+// The weights of the whole model, if they do not vary.
 template <class Arguments>
 Weights sharedWeights(const Arguments& a) {
   const AttentionShape& shape = a.shape;
-  CHECK(shape.levels <= AttentionShape::kMostLevels);
-  static constexpr float kNone[kMostLogits] = {};
+  CHECK(shape.levels <= AttentionShape::kMaxLevels);
+  static constexpr float kNone[kMaxLogits] = {};
   return Weights(shape, shape.varies || shape.logits() == 0 ? kNone : hostPointer(a.logits));
 }
 
@@ -61,7 +61,7 @@ void run(Context& context, const AttentionForward& a) {
         sum[0] += weights.density[l] * level[0];
         for (size_t f = 1; f < kFeatures; ++f) sum[f] += weights.colours[l] * level[f];
       }
-      sum[0] = std::min(sum[0], AttentionShape::kMostDensity);
+      sum[0] = std::min(sum[0], AttentionShape::kMaxDensity);
       std::copy_n(sum, kFeatures, features + a.features.offset(s, 0));
     }
   });
@@ -78,12 +78,12 @@ void run(Context& context, const AttentionBackward& a) {
   float* fineGradients = hostPointer(a.fineGradients.data);
   const size_t samples = hostCount(a.samples);
   const bool shared = shape.weights == AttentionWeights::shared;
-  std::vector<float> logitSums((samples + kRowsPerTask - 1) / kRowsPerTask * kMostLogits);  // of each task
+  std::vector<float> logitSums((samples + kRowsPerTask - 1) / kRowsPerTask * kMaxLogits);  // one set per task
   context.pool.forRanges(samples, kRowsPerTask, [&](size_t begin, size_t end) {
-    float* logitSum = &logitSums[begin / kRowsPerTask * kMostLogits];
+    float* logitSum = &logitSums[begin / kRowsPerTask * kMaxLogits];
     for (size_t s = begin; s < end; ++s) {
       const Weights weights = shape.varies ? Weights(shape, coarse + a.coarse.offset(s, kFeatures)) : ofModel;
-      float own[kFeatures], logits[kMostLogits] = {};
+      float own[kFeatures], logits[kMaxLogits] = {};
       own[0] = ofDensity[s];
       std::copy_n(ofColours + a.colourGradients.offset(s, 0), kFeatures - 1, own + 1);
       for (uint32_t l = 0; l < shape.levels; ++l) {
@@ -108,15 +108,15 @@ void run(Context& context, const AttentionBackward& a) {
       }
       std::copy_n(own, kFeatures, coarseGradients + a.coarseGradients.offset(s, 0));
       if (!shape.varies) {
-        for (size_t i = 0; i < kMostLogits; ++i) logitSum[i] += std::exchange(logits[i], 0.0f);
+        for (size_t i = 0; i < kMaxLogits; ++i) logitSum[i] += std::exchange(logits[i], 0.0f);
       }
-      std::copy_n(logits, kMostLogits, coarseGradients + a.coarseGradients.offset(s, kFeatures));
+      std::copy_n(logits, kMaxLogits, coarseGradients + a.coarseGradients.offset(s, kFeatures));
     }
   });
   if (shape.varies || shape.logits() == 0) return;
   float* logitGradients = hostPointer(a.logitGradients);
   for (size_t i = 0; i < logitSums.size(); ++i) {
-    if (i % kMostLogits < shape.logits()) logitGradients[i % kMostLogits] += logitSums[i];
+    if (i % kMaxLogits < shape.logits()) logitGradients[i % kMaxLogits] += logitSums[i];
   }
 }
 

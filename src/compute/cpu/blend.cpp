@@ -55,7 +55,7 @@ void run(Context& context, const BlendBackward& a) {
     for (size_t ray = begin; ray < end; ++ray) {
       const uint32_t first = firstSegment[ray], last = firstSegment[ray + 1];
       float transmittance = 1;
-      for (uint32_t k = first; k < last; ++k) {  // that in front of each, kept where its gradient will go
+      for (uint32_t k = first; k < last; ++k) {  // stores the transmittance in front of k in place of its gradient
         opacityGradients[k] = transmittance;
         transmittance *= 1 - opacities[k];
       }

@@ -14,7 +14,7 @@
 namespace tessera::cpu {
 namespace {
 
-constexpr size_t kRaysPerTask = 64;  // fixed: tasks write samples of their own, joined in task order
+constexpr size_t kRaysPerTask = 64;  // fixed; the samples of all tasks are concatenated in task order
 
 struct Sample {
   uint32_t ray, slot;
@@ -29,11 +29,11 @@ struct Marcher {
   const size_t words = size_t{a.cells} * a.cells * a.cells / 32;
   std::vector<BlockPiece> pieces = {};  // of one ray
 
-  // Adds the ray's next samples; returns the interval to go on from.
+  // Adds the next samples of the ray; returns the interval from which to continue.
   uint32_t march(uint32_t ray, std::vector<Sample>& samples) {
     const uint32_t first = a.nextStep ? hostPointer(a.nextStep)[ray] : 0;
-    if (first == MarchBlocks::kThrough || a.most == 0) return first;
-    if (a.opticalDepth && hostPointer(a.opticalDepth)[ray] > a.mostOpticalDepth) return first;
+    if (first == MarchBlocks::kThrough || a.maximum == 0) return first;
+    if (a.opticalDepth && hostPointer(a.opticalDepth)[ray] > a.maxOpticalDepth) return first;
     Triple<double> origin, direction;
     for (int axis = 0; axis < 3; ++axis) {
       origin[axis] = hostPointer(a.origins)[3 * ray + axis];
@@ -42,22 +42,24 @@ struct Marcher {
     const double jitter = a.jitter ? hostPointer(a.jitter)[ray] : 1;
     const double far = a.farOfRay ? hostPointer(a.farOfRay)[ray] : std::numeric_limits<double>::infinity();
     blockPath(a.space, origin, direction, a.nearOfRay ? hostPointer(a.nearOfRay)[ray] : 0, pieces);
-    const size_t most = a.most == 0xffffffffu ? samples.max_size() : samples.size() + a.most;
-    double before = 0;    // length of the pieces in front
-    uint32_t number = 0;  // of the piece's first interval
+    const size_t maximum = a.maximum == 0xffffffffu ? samples.max_size() : samples.size() + a.maximum;
+    double before = 0;    // total length of the pieces in front
+    uint32_t number = 0;  // number of the first interval of the piece
     for (const BlockPiece& piece : pieces) {
       const DomainSegment& s = piece.segment;
       if (s.entry >= far) return MarchBlocks::kThrough;
-      const double half = domainOf(a.space.placement(piece.block)).half(), step = a.step * 2 * half;
-      // Intervals begin at (i - 1 + jitter) step: as many as begin within, and the first. Rounding is looked after.
+      const double half = makeBlockDomain(a.space.placement(piece.block)).half(), step = a.step * 2 * half;
+      // Interval i > 0 begins at (i - 1 + jitter) step. Counts the first interval and all that begin inside the piece;
+      // the loops correct for rounding.
       uint32_t count = static_cast<uint32_t>(std::max(1.0, std::ceil(s.length / step + 1 - jitter)));
       while (count > 1 && (static_cast<double>(count) - 2 + jitter) * step >= s.length) --count;
       while ((static_cast<double>(count) - 1 + jitter) * step < s.length) ++count;
       const uint32_t slot = slots != nullptr ? slots[piece.block] : piece.block;
       if (slot != kNoSlot && first < number + count) {
         const uint32_t from = first > number ? first - number : 0;
-        const uint32_t next = marchPiece({s, half, step, before, slot}, jitter, far, from, count, ray, most, samples);
-        if (samples.size() == most) return number + next;
+        const uint32_t next =
+            marchPiece({s, half, step, before, slot}, jitter, far, from, count, ray, maximum, samples);
+        if (samples.size() == maximum) return number + next;
       }
       number += count;
       before += s.length;
@@ -70,9 +72,9 @@ struct Marcher {
     double half, step, before;
     uint32_t slot;
   };
-  // Intervals [from, count) of a piece; returns the one to go on from.
+  // Samples the intervals [from, count) of a piece; returns the interval from which to continue.
   uint32_t marchPiece(const Piece& piece, double jitter, double far, uint32_t from, uint32_t count, uint32_t ray,
-                      size_t most, std::vector<Sample>& samples) const {
+                      size_t maximum, std::vector<Sample>& samples) const {
     const DomainSegment& s = piece.s;
     const double half = piece.half, step = piece.step;
     const uint32_t* bits = occupancy + piece.slot * words;
@@ -88,7 +90,8 @@ struct Marcher {
       }
       const size_t cell = index[0] + a.cells * (index[1] + a.cells * index[2]);
       if ((bits[cell / 32] >> cell % 32 & 1) == 0) {
-        // Whole intervals to the first whose middle is past the empty cell; the tolerance costs one more look.
+        // Skips whole intervals up to the first whose middle is behind the empty cell; because of the tolerance, one
+        // more interval may be visited.
         double exit = s.length;
         for (int axis = 0; axis < 3; ++axis) {
           const double d = s.direction[axis];
@@ -113,7 +116,7 @@ struct Marcher {
       sample.middle = static_cast<float>(piece.before + middle);
       sample.width = static_cast<float>(end - begin);
       samples.push_back(sample);
-      if (samples.size() == most) return i;
+      if (samples.size() == maximum) return i;
     }
     return count;
   }
@@ -125,16 +128,16 @@ void run(Context& context, const MarchBlocks& a) {
   const uint32_t rays = hostCount(a.rays);
   const size_t tasks = (rays + kRaysPerTask - 1) / kRaysPerTask;
   uint32_t* firstSample = hostPointer(a.firstSample);
-  std::vector<std::vector<Sample>> made(tasks);
+  std::vector<std::vector<Sample>> samplesOfTask(tasks);
   std::vector<uint32_t> nextStep(rays);
   context.pool.run(tasks, [&](size_t task, int) {
-    std::vector<Sample>& samples = made[task];
+    std::vector<Sample>& samples = samplesOfTask[task];
     samples.reserve(kRaysPerTask * 32);
     Marcher marcher{a};
     for (size_t ray = task * kRaysPerTask; ray < std::min<size_t>(rays, (task + 1) * kRaysPerTask); ++ray) {
       const size_t before = samples.size();
       nextStep[ray] = marcher.march(static_cast<uint32_t>(ray), samples);
-      firstSample[ray + 1] = static_cast<uint32_t>(samples.size() - before);  // a count for now
+      firstSample[ray + 1] = static_cast<uint32_t>(samples.size() - before);  // a count, until countsToOffsets
     }
   });
   const uint32_t finished = countsToOffsets(firstSample, rays, a.sampleCapacity);
@@ -152,7 +155,7 @@ void run(Context& context, const MarchBlocks& a) {
     size_t i = firstSample[task * kRaysPerTask];
     const size_t end = firstSample[std::min<size_t>(rays, (task + 1) * kRaysPerTask)];
     for (size_t s = 0; i < end; ++i, ++s) {
-      const Sample& sample = made[task][s];
+      const Sample& sample = samplesOfTask[task][s];
       rayOfSample[i] = sample.ray;
       slotOfSample[i] = sample.slot;
       std::memcpy(positions + 3 * i, sample.position, sizeof(sample.position));

@@ -18,14 +18,14 @@ namespace {
 constexpr size_t kRaysPerTask = 64;
 constexpr size_t kRowsPerTask = 4096;
 
-// Where the middles of a ray's samples are in the scene, and room for another number of each.
+// The positions in the scene of the middles of a ray's samples, and scratch space for one more number per sample.
 struct Middles {
   std::vector<double> x, y, z, squares;
 
-  explicit Middles(size_t most) : x(most), y(most), z(most), squares(most) {}
+  explicit Middles(size_t maximum) : x(maximum), y(maximum), z(maximum), squares(maximum) {}
 };
 
-// A BlockSpace with what each sample needs of it.
+// Precomputes the values of a BlockSpace that each sample needs.
 class Blocks {
  public:
   struct Place {
@@ -47,12 +47,12 @@ class Blocks {
     }
   }
 
-  // As BlockSpace::blockAt, for `count` points.
+  // BlockSpace::blockAt for `count` points.
   void find(const Middles& at, uint32_t count, uint32_t* block) const {
     const double *const xs = at.x.data(), *const ys = at.y.data(), *const zs = at.z.data();
     const double width = space_.columns, depth = space_.rows, bottom = space_.bottom, top = space_.top;
     const int32_t columns = static_cast<int32_t>(space_.columns), cells = static_cast<int32_t>(space_.cells());
-    const bool inside = space_.surround != Surround::own;
+    const bool inside = space_.backgroundBlock != BackgroundBlock::own;
     for (uint32_t i = 0; i < count; ++i) {
       const double x = xs[i], y = ys[i], z = zs[i];
       const bool inBox = (std::abs(x) <= width) & (std::abs(y) <= depth) & (z >= bottom) & (z <= top);
@@ -69,7 +69,8 @@ class Blocks {
   std::vector<Place> places_;
 };
 
-// scene/contraction.h again for millions of samples: selections only, which compilers turn into vectors.
+// Reimplements scene/contraction.h for millions of samples, with selections instead of branches so that compilers can
+// vectorise it.
 struct Contraction {
   double x, y, z;              // contracted
   double inverse;              // 1 / max(1, m)
@@ -83,14 +84,14 @@ struct Contraction {
     signX = std::copysign(ax == m ? one : 0.0, qx);
     signY = std::copysign(ay == m ? oneY : 0.0, qy);
     signZ = std::copysign(oneZ, qz);
-    // Of the farthest q · inverse is ±1.
+    // q · inverse is ±1 along the farthest axis.
     const double more = 1 - inverse;
     x = qx * inverse + signX * more;
     y = qy * inverse + signY * more;
     z = qz * inverse + signZ * more;
   }
-  // The squared length of contractDirection(q, d): with m growing by g, (d - q g / m) / m, which vanishes along the
-  // farthest axis, and g / m² there.
+  // The squared length of contractDirection(q, d). With g the derivative of m along d, its components are
+  // (d - q g / m) / m, which vanishes along the farthest axis, and g / m² along that axis.
   double squareSpeed(double qx, double qy, double qz, double dx, double dy, double dz) const {
     const double radial = (signX * dx + signY * dy + signZ * dz) * (inverse * inverse);
     const double vx = dx * inverse - qx * radial, vy = dy * inverse - qy * radial, vz = dz * inverse - qz * radial;
@@ -114,13 +115,13 @@ struct Ray {
   bool exists() const { return direction[0] != 0 || direction[1] != 0 || direction[2] != 0; }
 };
 
-// A wall that a ray passes within one of its intervals.
+// A wall that a ray crosses inside one of its intervals.
 struct Cut {
   double s, t;
   uint32_t interval;
 };
 
-// Front to back, each place once.
+// Finds the cuts of a ray, front to back and without duplicates.
 void findCuts(const BlockSamples& a, const Ray& ray, std::vector<Cut>& cuts) {
   cuts.clear();
   if (!a.split || !ray.exists()) return;
@@ -143,14 +144,15 @@ void findCuts(const BlockSamples& a, const Ray& ray, std::vector<Cut>& cuts) {
       if (t > 0) consider(t);
     }
   }
-  if (a.space.surround == Surround::own) consider(ray.far);
+  if (a.space.backgroundBlock == BackgroundBlock::own) consider(ray.far);
 }
 
-// Both ends of each of a ray's intervals, cuts among them: s and t have one element more than there are samples.
+// Computes the ends of all intervals of a ray, including the cuts; s and t have one element more than there are
+// samples. Returns the number of samples.
 uint32_t findEnds(const BlockSamples& a, const Ray& ray, const std::vector<Cut>& cuts, double* s, double* t) {
   constexpr double kShare = BlockSpace::kBoxShare;
   const uint32_t posts = a.intervals + 1, samples = a.intervals + static_cast<uint32_t>(cuts.size());
-  // Each post moves back by the cuts in front of it.
+  // Each fence is moved back by the number of cuts in front of it.
   uint32_t done = 0;
   for (size_t c = 0; c <= cuts.size(); ++c) {
     const uint32_t stop = c < cuts.size() ? cuts[c].interval + 1 : posts;
@@ -158,9 +160,9 @@ uint32_t findEnds(const BlockSamples& a, const Ray& ray, const std::vector<Cut>&
     if (c == cuts.size()) break;
     s[done + c] = cuts[c].s;
   }
-  // As BlockSpace::distanceAt, in two loops without a branch.
+  // BlockSpace::distanceAt in two loops without branches.
   const double length = ray.far - ray.near;
-  if (a.space.surround == Surround::none) {
+  if (a.space.backgroundBlock == BackgroundBlock::none) {
     for (uint32_t i = 0; i <= samples; ++i) t[i] = ray.near + s[i] * length;
   } else {
     const auto inBox = static_cast<uint32_t>(std::upper_bound(s, s + samples + 1, kShare) - s);
@@ -170,7 +172,7 @@ uint32_t findEnds(const BlockSamples& a, const Ray& ray, const std::vector<Cut>&
       t[i] = 1 / ((1 - u) / ray.far + u / BlockSpace::kFarthest);
     }
   }
-  for (size_t c = 0; c < cuts.size(); ++c) t[cuts[c].interval + 1 + c] = cuts[c].t;  // exactly
+  for (size_t c = 0; c < cuts.size(); ++c) t[cuts[c].interval + 1 + c] = cuts[c].t;  // the exact distances
   return samples;
 }
 
@@ -181,7 +183,7 @@ void findMiddles(const Ray& ray, const double* t, uint32_t samples, Middles& at,
   double* __restrict zs = at.z.data();
   const double ox = ray.origin[0], oy = ray.origin[1], oz = ray.origin[2];
   const double dx = ray.direction[0], dy = ray.direction[1], dz = ray.direction[2];
-  const double farthest = ray.exists() ? ray.farthest : 0;  // no step passes it
+  const double farthest = ray.exists() ? ray.farthest : 0;  // where steps are cut off
   for (uint32_t i = 0; i < samples; ++i) {
     const double middle = (t[i] + t[i + 1]) / 2;
     xs[i] = ox + middle * dx;
@@ -192,7 +194,7 @@ void findMiddles(const Ray& ray, const double* t, uint32_t samples, Middles& at,
   }
 }
 
-// Rows of one ray in one bounded block: row i is that of middle `first + i`.
+// Writes the rows of one ray in one bounded block; row i belongs to middle `first + i`.
 void writeBounded(const Blocks::Place& place, const Middles& at, uint32_t first, uint32_t count,
                   float* __restrict positions, float* __restrict steps) {
   const double *const xs = at.x.data() + first, *const ys = at.y.data() + first, *const zs = at.z.data() + first;
@@ -207,7 +209,8 @@ void writeBounded(const Blocks::Place& place, const Middles& at, uint32_t first,
   }
 }
 
-// In one contracted block; `along` is the direction in its local coordinates. Leaves the contracted middles in `at`.
+// Writes the rows of one ray in one contracted block; `along` is the direction in its local coordinates. Replaces the
+// middles in `at` by the contracted middles.
 void writeContracted(const Blocks::Place& place, Middles& at, uint32_t first, uint32_t count, const double along[3],
                      float* __restrict positions, float* __restrict runtimeSteps) {
   double* __restrict xs = at.x.data() + first;
@@ -235,7 +238,7 @@ void writeContracted(const Blocks::Place& place, Middles& at, uint32_t first, ui
   }
 }
 
-// Writes the rows of one ray; returns how many segments they are. `groups`: optional.
+// Writes the rows of one ray; returns the number of its segments.
 uint32_t writeSamples(const BlockSamples& a, const Blocks& blocks, const Ray& ray, const double* s, const double* t,
                       uint32_t samples, size_t row, Middles& at) {
   const uint32_t* const groups = hostPointer(a.groupOfBlock);
@@ -270,10 +273,10 @@ uint32_t writeSamples(const BlockSamples& a, const Blocks& blocks, const Ray& ra
     }
     uint32_t name = block;
     if (slots) {
-      const bool held = slots[block] != kNoSlot;
-      name = held ? slots[block] : 0;
+      const bool hasSlot = slots[block] != kNoSlot;
+      name = hasSlot ? slots[block] : 0;
       std::fill(blockOfSample + first, blockOfSample + end, name);
-      if (!held) std::fill(steps + first, steps + end, 0.0f);
+      if (!hasSlot) std::fill(steps + first, steps + end, 0.0f);
     }
     const uint32_t group = groups ? groups[name] : name;
     segments += first == 0 || group != lastGroup;
@@ -282,19 +285,21 @@ uint32_t writeSamples(const BlockSamples& a, const Blocks& blocks, const Ray& ra
   return segments;
 }
 
-// Counts in offsets[1 .. n] to running ends, from `start` on.
+// Converts the counts in offsets[1 .. n] to running ends, beginning at `start`.
 void countsToOffsets(uint32_t* offsets, size_t n, uint32_t start) {
   offsets[0] = start;
   for (size_t i = 0; i < n; ++i) offsets[i + 1] += offsets[i];
 }
 
-// The segments of all rays, where `firstSegment` already says how many each has.
+// Writes the segments of all rays; `firstSegment` already contains the offsets from the number of segments per ray.
 void writeSegments(Context& context, const BlockSamples& a, size_t rays) {
   const uint32_t* firstSample = hostPointer(a.firstSample);
   const uint32_t* firstSegment = hostPointer(a.firstSegment);
   const uint32_t* blockOfSample = hostPointer(a.blockOfSample);
   const uint32_t* groups = hostPointer(a.groupOfBlock);
-  const auto groupOf = [&](uint32_t sample) { return groups ? groups[blockOfSample[sample]] : blockOfSample[sample]; };
+  const auto sampleGroup = [&](uint32_t sample) {
+    return groups ? groups[blockOfSample[sample]] : blockOfSample[sample];
+  };
   uint32_t* firstSampleOfSegment = hostPointer(a.firstSampleOfSegment);
   uint32_t* groupOfSegment = hostPointer(a.groupOfSegment);
   uint32_t* rayOfSegment = hostPointer(a.rayOfSegment);
@@ -304,9 +309,9 @@ void writeSegments(Context& context, const BlockSamples& a, size_t rays) {
     for (size_t ray = begin; ray < end; ++ray) {
       uint32_t segment = firstSegment[ray];
       for (uint32_t i = firstSample[ray]; i < firstSample[ray + 1]; ++i) {
-        if (i > firstSample[ray] && groupOf(i) == groupOf(i - 1)) continue;
+        if (i > firstSample[ray] && sampleGroup(i) == sampleGroup(i - 1)) continue;
         firstSampleOfSegment[segment] = i;
-        groupOfSegment[segment] = groupOf(i);
+        groupOfSegment[segment] = sampleGroup(i);
         rayOfSegment[segment++] = static_cast<uint32_t>(ray);
       }
     }
@@ -338,7 +343,7 @@ void run(Context& context, const EnterScene& a) {
       }
       if (!(enter < leave)) {
         enter = leave = near;
-        if (exists && space.surround != Surround::none) leave = enter + 1 + std::hypot(o[0], o[1], o[2]);
+        if (exists && space.backgroundBlock != BackgroundBlock::none) leave = enter + 1 + std::hypot(o[0], o[1], o[2]);
       }
       range[2 * ray] = static_cast<float>(enter);
       range[2 * ray + 1] = static_cast<float>(leave);
@@ -353,7 +358,7 @@ void run(Context& context, const EnterScene& a) {
 
 void run(Context& context, const BlockSamples& a) {
   const size_t rays = hostCount(a.rays), tasks = (rays + kRaysPerTask - 1) / kRaysPerTask;
-  const size_t mostEnds = size_t{a.mostSamples(1)} + 1;
+  const size_t maxEnds = size_t{a.maxSamples(1)} + 1;
   const Blocks blocks(a.space, a.texels);
   uint32_t* firstSample = hostPointer(a.firstSample);
   uint32_t* firstSegment = hostPointer(a.firstSegment);
@@ -362,23 +367,23 @@ void run(Context& context, const BlockSamples& a) {
   };
   context.pool.run(tasks, [&](size_t task, int) {
     std::vector<Cut> cuts;
-    cuts.reserve(a.mostCuts());
+    cuts.reserve(a.maxCuts());
     forRays(task, [&](size_t ray) {
       findCuts(a, Ray(a, ray), cuts);
-      firstSample[ray + 1] = a.intervals + static_cast<uint32_t>(cuts.size());  // a count for now
+      firstSample[ray + 1] = a.intervals + static_cast<uint32_t>(cuts.size());  // a count, until countsToOffsets
     });
   });
   countsToOffsets(firstSample, rays, a.firstRow);
   *hostPointer(a.rowCount) = firstSample[rays];
   context.pool.run(tasks, [&](size_t task, int) {
     std::vector<Cut> cuts;
-    cuts.reserve(a.mostCuts());
-    std::vector<double> ends(2 * mostEnds);  // of one ray: in s, then in t
-    Middles middles(mostEnds);
+    cuts.reserve(a.maxCuts());
+    std::vector<double> ends(2 * maxEnds);  // the ends of one ray's intervals in s, then in t
+    Middles middles(maxEnds);
     forRays(task, [&](size_t index) {
       const Ray ray(a, index);
       findCuts(a, ray, cuts);
-      double *const s = ends.data(), *const t = s + mostEnds;
+      double *const s = ends.data(), *const t = s + maxEnds;
       const uint32_t samples = findEnds(a, ray, cuts, s, t);
       const uint32_t segments = writeSamples(a, blocks, ray, s, t, samples, firstSample[index], middles);
       if (a.split) firstSegment[index + 1] = segments;
@@ -419,8 +424,8 @@ void run(Context& context, const BlockPoints& a) {
       for (int axis = 0; axis < 3; ++axis) along[axis] *= place.inverseScale[axis];
       double speed = std::sqrt(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
       if (place.contracted) {
-        const double most = place.half - 1 / BlockSpace::kFarthest;
-        for (double& coordinate : y) coordinate = std::clamp(coordinate, -most, most);
+        const double maximum = place.half - 1 / BlockSpace::kFarthest;
+        for (double& coordinate : y) coordinate = std::clamp(coordinate, -maximum, maximum);
         const Triple<double> q = uncontract(y);
         speed = std::sqrt(Contraction(q[0], q[1], q[2]).squareSpeed(q[0], q[1], q[2], along[0], along[1], along[2]));
       }
@@ -434,7 +439,7 @@ void run(Context& context, const GroupByBlock& a) {
   uint32_t* firstOfBlock = hostPointer(a.firstOfBlock);
   uint32_t* source = hostPointer(a.source);
   const size_t samples = hostCount(a.samples), tasks = (samples + kRowsPerTask - 1) / kRowsPerTask;
-  std::vector<uint32_t> places(tasks * a.blocks);  // [tasks][blocks]: counts, then where a task's rows begin
+  std::vector<uint32_t> places(tasks * a.blocks);  // [tasks][blocks]: counts, then the first row of each task
   context.pool.run(tasks, [&](size_t task, int) {
     uint32_t* const counts = places.data() + task * a.blocks;
     const size_t begin = task * kRowsPerTask, end = std::min(samples, begin + kRowsPerTask);

@@ -11,9 +11,9 @@ namespace tessera::cpu {
 namespace {
 
 constexpr size_t kRaysPerTask = 64;
-constexpr int kMostColumns = 16;
+constexpr int kMaxColumns = 16;
 
-float opacityOf(Extinction extinction, float x, float step) {
+float computeOpacity(Extinction extinction, float x, float step) {
   switch (extinction) {
     case Extinction::opacity:
       return x;
@@ -30,10 +30,10 @@ struct Columns {
   static constexpr int value = kColumns;
 };
 
-// call(Columns<columns>()) where that many are known to matter, else call(Columns<-1>()).
+// Calls call(Columns<columns>()) if there is a specialised kernel for this number, otherwise call(Columns<-1>()).
 template <class Call>
 void withColumns(uint32_t columns, const Call& call) {
-  CHECK(columns <= static_cast<uint32_t>(kMostColumns));
+  CHECK(columns <= static_cast<uint32_t>(kMaxColumns));
   switch (columns) {
     case 0:
       return call(Columns<0>());
@@ -63,11 +63,11 @@ void forward(Context& context, const CompositeForward& a) {
   const int columns = kColumns < 0 ? static_cast<int>(a.colours.columns) : kColumns;
   context.pool.forRanges(hostCount(a.rays), kRaysPerTask, [&](size_t begin, size_t end) {
     for (size_t ray = begin; ray < end; ++ray) {
-      float transmittance = 1, sum[kColumns > 0 ? kColumns : kMostColumns] = {}, far = 0;
+      float transmittance = 1, sum[kColumns > 0 ? kColumns : kMaxColumns] = {}, far = 0;
       const uint32_t last = firstSample[ray + 1];
       uint32_t i = firstSample[ray];
       for (; i < last; ++i) {
-        const float alpha = opacityOf(a.extinction, x[a.x.offset(i, 0)], steps ? steps[i] : 0);
+        const float alpha = computeOpacity(a.extinction, x[a.x.offset(i, 0)], steps ? steps[i] : 0);
         const float weight = transmittance * alpha;
         if constexpr (kColumns != 0) {
           const float* c = colours + a.colours.offset(i, 0);
@@ -91,12 +91,12 @@ void forward(Context& context, const CompositeForward& a) {
   });
 }
 
-// Room for one number a sample of one ray, kept by each thread.
+// A buffer of one number per sample of a ray; each thread reuses its own.
 template <int kWhich>
 float* numbersOfRay(size_t samples) {
-  thread_local std::vector<float> room;
-  if (room.size() < samples) room.resize(samples + samples / 2);
-  return room.data();
+  thread_local std::vector<float> capacity;
+  if (capacity.size() < samples) capacity.resize(samples + samples / 2);
+  return capacity.data();
 }
 
 template <int kColumns>
@@ -119,8 +119,8 @@ void backward(Context& context, const CompositeBackward& a) {
   context.pool.forRanges(hostCount(a.rays), kRaysPerTask, [&](size_t begin, size_t end) {
     for (size_t ray = begin; ray < end; ++ray) {
       const uint32_t first = firstSample[ray], last = firstSample[ray + 1];
-      // Forward again: opacities, and the transmittance before each sample, kept where the gradients will go if nothing
-      // is there yet.
+      // Repeats the forward pass: opacities, and the transmittance in front of each sample. They are stored where the
+      // gradients will be written, if that memory is free.
       float* alphas = add ? numbersOfRay<0>(last - first) : xGradients + first;
       float* transmittances = kColumns == 0 ? numbersOfRay<1>(last - first) : nullptr;
       const auto before = [&](uint32_t i) -> float& {
@@ -129,7 +129,7 @@ void backward(Context& context, const CompositeBackward& a) {
       uint32_t stop = first;
       float transmittance = 1;
       while (stop < last) {
-        const float alpha = opacityOf(a.extinction, x[a.x.offset(stop, 0)], steps ? steps[stop] : 0);
+        const float alpha = computeOpacity(a.extinction, x[a.x.offset(stop, 0)], steps ? steps[stop] : 0);
         alphas[stop - first] = alpha;
         before(stop) = transmittance;
         transmittance *= 1 - alpha;
@@ -137,7 +137,7 @@ void backward(Context& context, const CompositeBackward& a) {
         if (transmittance < a.minTransmittance) break;
       }
       const float* g = colourOfRay + columns * ray;
-      // R: what a unit of light arriving from behind would change the loss by; opacity = 1 - T.
+      // R: the derivative of the loss with respect to the light arriving from behind; opacity = 1 - T.
       float rear = opacityOfRay ? -opacityOfRay[ray] : 0;
       if (background) {
         for (int k = 0; k < columns; ++k) rear += g[k] * background[columns * ray + k];

@@ -1,6 +1,5 @@
-// Deferred networks, one segment at a time: the 16 hidden units lie side by side in vectors, the numbers of the layer
-// below are broadcast. Backward repeats the forward pass instead of keeping what it made. Then blending, which is only
-// a few numbers a segment.
+// Deferred networks, evaluated one segment at a time: the 16 hidden units lie side by side in vectors, and the values
+// of the layer below are broadcast. The backward pass repeats the forward pass instead of storing its activations.
 
 #include "compute/deferred.h"
 
@@ -24,7 +23,7 @@ namespace tessera::cpu {
 
 inline constexpr int kComposited = DeferredNetwork::kComposited, kInputs = DeferredNetwork::kInputs;
 inline constexpr int kUnits = DeferredNetwork::kHidden;
-inline constexpr int kParts = 16;  // partial network gradients: the same bits for any number of threads
+inline constexpr int kParts = 16;  // partial network gradients; fixed, for the same bits with any number of threads
 
 // Weights as vectors of units, or their gradients.
 struct alignas(128) UnitRows {
@@ -35,8 +34,8 @@ struct alignas(128) UnitRows {
 
 struct alignas(128) PackedNetwork {
   UnitRows forward;
-  float toComposited[kUnits][kUnits];  // of the first layer, [unit][input], composited inputs alone, padded with zeros
-  float toUnits[kUnits][kUnits];       // of the second, [unit][unit below]
+  float toComposited[kUnits][kUnits];  // first layer, [unit][input], only the composited inputs, padded with zeros
+  float toUnits[kUnits][kUnits];       // second layer, [unit][unit of the first layer]
 };
 
 }  // namespace tessera::cpu
@@ -72,7 +71,7 @@ HWY_INLINE Units multiplyAdd(float factor, const Units& row, Units sum) {
   return sum;
 }
 
-// start + Σ_i factors[i] · rows[i]; two sums, so that one need not wait for the other.
+// start + Σ_i factors[i] · rows[i], with two independent sums to hide the latency.
 template <int kCount>
 HWY_INLINE Units combination(const float* factors, const float (*rows)[kUnits], Units start) {
   static_assert(kCount % 2 == 0);
@@ -97,7 +96,7 @@ HWY_INLINE Units relu(Units units) {
   return units;
 }
 
-// Gradients where the unit was above zero.
+// The gradients of active units (above zero); zero for all others.
 HWY_INLINE Units whereActive(const float* activations, Units gradients) {
   for (int i = 0; i < kVectors; ++i) {
     const auto active = hn::Gt(hn::Load(Float(), activations + i * kLanes), hn::Zero(Float()));
@@ -106,11 +105,11 @@ HWY_INLINE Units whereActive(const float* activations, Units gradients) {
   return gradients;
 }
 
-// What passes through the network for one segment.
+// The values of all layers of the network for one segment.
 struct alignas(128) Activations {
   float first[kUnits], second[kUnits];
-  float output[kUnits];      // 3 of them
-  float input[kInputs + 4];  // and what the last vector of cosines has too many
+  float output[kUnits];      // only 3 are used
+  float input[kInputs + 4];  // with padding for the last vector of cosines
 };
 
 // FrequencyForward's order: the direction, then 12 sines, then 12 cosines.
@@ -138,7 +137,8 @@ HWY_INLINE void throughNetwork(const UnitRows& network, Activations& a) {
   hn::Store(hn::Div(one, hn::Add(one, hn::Exp(d, hn::Neg(x)))), d, a.output);
 }
 
-// Puts segment s into a.input. Segments of a ray stand together: `ray` is the one whose direction is there already.
+// Loads segment s into a.input. The segments of a ray are consecutive: `ray` is the ray whose direction a.input already
+// contains.
 template <class Arguments>
 HWY_INLINE void loadInput(const Arguments& arguments, size_t s, uint32_t& ray, Activations& a) {
   std::memcpy(a.input, hostPointer(arguments.composited) + kComposited * s, sizeof(float) * kComposited);
@@ -159,7 +159,7 @@ void forwardSegments(const DeferredForward& arguments, const PackedNetwork* netw
   }
 }
 
-// rows[i] += factors[i] · gradient, and the biases behind them += gradient.
+// rows[i] += factors[i] · gradient; the biases, in the row after them, += gradient.
 template <int kCount>
 HWY_INLINE void addOuter(const float* factors, const Units& gradient, float (*rows)[kUnits]) {
   for (int k = 0; k < kCount; ++k) store(multiplyAdd(factors[k], gradient, load(rows[k])), rows[k]);
@@ -253,7 +253,7 @@ void addUnpacked(const UnitRows& from, float* to) {
   }
 }
 
-// Kept from call to call, as fresh pages would cost more than filling them.
+// Reused between calls, because fresh pages would cost more than filling them.
 UnitRows* partialGradients(size_t count) {
   thread_local std::vector<UnitRows> partial;
   if (partial.size() < count) partial.resize(count);

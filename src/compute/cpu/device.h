@@ -1,4 +1,5 @@
-// The SIMD device: Highway kernels chosen at run time, all cores, the same bits for any number of threads.
+// The SIMD device: uses all cores and Highway kernels selected at run time, with the same bits for any number of
+// threads.
 #pragma once
 
 #include <memory>

@@ -76,7 +76,7 @@ void run(Context& context, const SphericalHarmonicsForward& a) {
     for (size_t i = begin; i < end; ++i) {
       const size_t ray = rayOfSample ? rayOfSample[i] : i;
       float* to = encoded + i * a.encoded.rowStride;
-      if (ray == previous) {  // samples of a ray stand together
+      if (ray == previous) {  // samples of a ray are consecutive
         for (int k = 0; k < a.degree * a.degree; ++k) to[k] = row[k];
       } else {
         harmonics(a.degree, directions[3 * ray], directions[3 * ray + 1], directions[3 * ray + 2], to);

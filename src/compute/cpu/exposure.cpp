@@ -36,7 +36,7 @@ void run(Context&, const ExposureBackward& a) {
   float* logGainGradients = hostPointer(a.logGainGradients);
   constexpr float kLn2 = 0.69314718056f;
   const size_t rays = hostCount(a.rays);
-  for (size_t ray = 0; ray < rays; ++ray) {  // thousands of rays: not worth a split, and in one fixed order
+  for (size_t ray = 0; ray < rays; ++ray) {  // serial: too few rays to split, and the order of the sums is fixed
     float behind = 0;
     for (int k = 0; k < 3; ++k) {
       const size_t photo = 3 * photoOfRay[ray] + k;

@@ -1,8 +1,8 @@
-// Hash grid on the processor. Forward goes level by level, so that one level's table stays in the second-level cache;
-// indices and weights are computed in vectors, the table is read by plain loads that do not wait for one another.
-// Backward gives each level (and, with many threads, each part of its table) to one task that takes all samples in
-// order: no atomics, and the same sums for any number of threads. Samples of a ray that share a cell are summed in
-// registers.
+// The hash grid on the CPU. The forward pass proceeds level by level, so that the table of one level stays in the
+// second-level cache; indices and weights are computed in vectors, and the table is read by independent scalar loads.
+// The backward pass assigns each level (with many threads, each part of its table) to one task that processes all
+// samples in order: it needs no atomics, and sums are the same for any number of threads. Samples of a ray that share a
+// cell are summed in registers.
 
 #include "compute/hash_grid.h"
 
@@ -24,10 +24,10 @@
 #define TESSERA_CPU_HASH_GRID_ONCE
 namespace tessera::cpu {
 
-inline constexpr int kGroup = 32;                       // samples whose indices are worked out together
-inline constexpr uint32_t kEntriesOfFirstCache = 4096;  // of two features, in 32 KiB
+inline constexpr int kGroup = 32;                       // samples whose indices are computed together
+inline constexpr uint32_t kEntriesOfFirstCache = 4096;  // entries of two features that fit into 32 KiB
 
-// The eight corners of a group's samples: corner c takes the upper neighbour in x, y, z by its bits 0, 1, 2.
+// The eight corners of the samples of a group: bits 0, 1 and 2 of corner c select the upper neighbour in x, y and z.
 struct Corners {
   alignas(64) uint32_t index[8][kGroup];
   alignas(64) float weight[8][kGroup];
@@ -112,7 +112,7 @@ HWY_INLINE void cornersOfGroup(const HashGridLevel& level, const float* position
   }
 }
 
-// Two features an entry: 8 bytes, fetched as one word. All words of the group are fetched before the first is used.
+// Entries of two features: 8 bytes, loaded as one word. All words of the group are loaded before the first is used.
 HWY_INLINE void mixPairs(const float* HWY_RESTRICT table, const Corners& corners, float* HWY_RESTRICT out) {
   const Float d;
   alignas(64) float values[8][2 * kGroup];
@@ -132,7 +132,7 @@ HWY_INLINE void mixPairs(const float* HWY_RESTRICT table, const Corners& corners
   }
 }
 
-// Four or eight features an entry: at most 32 bytes, in one vector or few.
+// Entries of four or eight features: at most 32 bytes, in one or a few vectors.
 template <size_t kFeatures>
 HWY_INLINE void mixWide(const float* HWY_RESTRICT table, const Corners& corners, float* HWY_RESTRICT out) {
   const hn::CappedTag<float, kFeatures> d;
@@ -162,7 +162,7 @@ void mixAny(const float* table, const Corners& corners, int features, float* out
   }
 }
 
-// Positions [first, first + kGroup), the last group of a batch filled up with zeros.
+// The positions [first, first + kGroup); the last group of a batch is padded with zeros.
 HWY_INLINE const float* groupPositions(const float* positions, size_t first, size_t n, float* padded) {
   if (first + kGroup <= n) return positions + 3 * first;
   std::memset(padded, 0, sizeof(float) * 3 * kGroup);
@@ -197,8 +197,8 @@ void forwardRange(const HashGridForward& a, size_t l, size_t begin, size_t end) 
   }
 }
 
-// The eight corner gradients of one cell, [corner][feature], as few vectors.
-using Sixteen = hn::CappedTag<float, 16>;
+// Vectors for the eight corner gradients of one cell, [corner][feature].
+using Lanes16 = hn::CappedTag<float, 16>;
 
 // Patterns over [corner][feature] of two features: 1 where the corner is the upper neighbour of its axis.
 alignas(64) constexpr float kUpper[3][16] = {{0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1},
@@ -239,13 +239,13 @@ HWY_INLINE void flushCell(float* HWY_RESTRICT table, const Corners& corners, int
 template <bool kWhole>
 void backwardPairs(const HashGridBackward& a, const HashGridLevel& level, const float* gradients, float* table,
                    HostRows samples, TableRange range) {
-  const Sixteen d;
-  constexpr int kLanes = static_cast<int>(hn::MaxLanes(Sixteen()));
+  const Lanes16 d;
+  constexpr int kLanes = static_cast<int>(hn::MaxLanes(Lanes16()));
   constexpr int kVectors = 16 / kLanes;
   const float* positions = hostPointer(a.positions);
   Corners corners;
   alignas(64) float padded[3 * kGroup];
-  hn::Vec<Sixteen> total[kVectors], sign[3][kVectors], base[3][kVectors];
+  hn::Vec<Lanes16> total[kVectors], sign[3][kVectors], base[3][kVectors];
   for (int v = 0; v < kVectors; ++v) {
     for (int axis = 0; axis < 3; ++axis) {  // weight along an axis = base + sign · fraction
       const auto upper = hn::Load(d, kUpper[axis] + v * kLanes);
@@ -258,26 +258,26 @@ void backwardPairs(const HashGridBackward& a, const HashGridLevel& level, const 
     cornersOfGroup(level, groupPositions(positions, first, end, padded), corners);
     const int rows = static_cast<int>(std::min<size_t>(kGroup, end - first));
     if (kWhole && level.entries > kEntriesOfFirstCache) {
-      for (int c = 0; c < 8; c += 2) {  // the neighbour in x is mostly in the same line
+      for (int c = 0; c < 8; c += 2) {  // the neighbour in x is usually in the same cache line
         for (int s = 0; s < kGroup; ++s) hwy::Prefetch(table + 2 * size_t{corners.index[c][s]});
       }
     }
-    int held = -1;  // the sample whose cell `total` belongs to
+    int cellSample = -1;  // the sample whose cell `total` belongs to
     const auto flush = [&] {
       alignas(64) float sum[16];
       for (int v = 0; v < kVectors; ++v) hn::Store(total[v], d, sum + v * kLanes);
-      flushCell<kWhole>(table, corners, held, sum, range);
+      flushCell<kWhole>(table, corners, cellSample, sum, range);
     };
     for (int s = 0; s < rows; ++s) {
       uint64_t word;
       std::memcpy(&word, gradients + 2 * (first + s), 8);
-      if ((word & 0x7fffffff7fffffffull) == 0) continue;  // behind a surface
-      if (held < 0 || !sameCell(corners, held, s)) {
-        if (held >= 0) flush();
-        held = s;
+      if ((word & 0x7fffffff7fffffffull) == 0) continue;  // zero gradients, as for samples behind a surface
+      if (cellSample < 0 || !sameCell(corners, cellSample, s)) {
+        if (cellSample >= 0) flush();
+        cellSample = s;
         for (int v = 0; v < kVectors; ++v) total[v] = hn::Zero(d);
       }
-      const auto g = hn::BitCast(d, hn::Set(hn::Repartition<uint64_t, Sixteen>(), word));
+      const auto g = hn::BitCast(d, hn::Set(hn::Repartition<uint64_t, Lanes16>(), word));
       const auto fx = hn::Set(d, corners.fraction[0][s]), fy = hn::Set(d, corners.fraction[1][s]),
                  fz = hn::Set(d, corners.fraction[2][s]);
       for (int v = 0; v < kVectors; ++v) {
@@ -286,7 +286,7 @@ void backwardPairs(const HashGridBackward& a, const HashGridLevel& level, const 
         total[v] = hn::MulAdd(hn::Mul(hn::Mul(wx, wy), wz), g, total[v]);
       }
     }
-    if (held >= 0) flush();
+    if (cellSample >= 0) flush();
   }
 }
 
@@ -308,7 +308,7 @@ void backwardWide(const HashGridBackward& a, const HashGridLevel& level, const f
     const int rows = static_cast<int>(std::min<size_t>(kGroup, end - first));
     for (int s = 0; s < rows; ++s) {
       hn::Vec<decltype(d)> g[kVectors];
-      bool any = false;  // nothing behind a surface
+      bool any = false;  // any gradient is not zero; all are zero for samples behind a surface
       for (size_t v = 0; v < kVectors; ++v) {
         g[v] = hn::LoadU(d, gradients + kFeatures * (first + s) + v * kLanes);
         any |= !hn::AllTrue(d, hn::Eq(g[v], hn::Zero(d)));
@@ -367,7 +367,7 @@ void backwardLevel(const HashGridBackward& a, size_t l, HostRows samples, TableR
   }
 }
 
-// d value / d x_axis = scale · Σ over the face's corners of weight⊥ · (upper - lower entry).
+// d value / d x_axis = scale · Σ over the corners of the face of weight⊥ · (upper - lower entry).
 void backwardPositions(const HashGridBackward& a, size_t begin, size_t end) {
   const int features = a.grid.features;
   const float* positions = hostPointer(a.positions);
@@ -432,11 +432,11 @@ void run(Context& context, const HashGridBackward& a) {
   const size_t levels = a.grid.levels.size();
   if (rows.count() == 0) return;
   if (a.tableGradients) {
-    // Each entry's additions happen in sample order whatever the split, so the split may follow the threads.
+    // The additions to each entry are in sample order for any split, so the split may depend on the number of threads.
     const size_t splits = std::max<size_t>(1, 2 * context.pool.threads() / levels);
     const auto level = HWY_DYNAMIC_DISPATCH(backwardLevel);
     context.pool.run(levels * splits, [&](size_t task, int) {
-      const size_t l = levels - 1 - task / splits, part = task % splits;  // the costly fine levels first
+      const size_t l = levels - 1 - task / splits, part = task % splits;  // the expensive fine levels first
       const uint64_t entries = a.grid.levels[l].entries;
       level(a, l, rows,
             {static_cast<uint32_t>(entries * part / splits), static_cast<uint32_t>(entries * (part + 1) / splits)});

@@ -1,6 +1,6 @@
-// The lattice on the processor: as the virtual grid (virtual_grid.cpp), with a line of the cache for each corner.
-// Backward gives parts of the rows to tasks that take all samples in order: no atomics, the same sums for any number of
-// threads.
+// The lattice on the CPU: like the virtual grid (virtual_grid.cpp), with one cache line per corner. The backward pass
+// assigns parts of the rows to tasks that process all samples in order: it needs no atomics, and sums are the same for
+// any number of threads.
 
 #include "compute/lattice.h"
 
@@ -21,7 +21,7 @@ HWY_BEFORE_NAMESPACE();
 namespace tessera::cpu::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Tag = hn::CappedTag<float, 8>;  // so that groups of 8 columns may lie apart
+using Tag = hn::CappedTag<float, 8>;  // at most 8 lanes, because groups of 8 columns need not be contiguous
 constexpr size_t kColumns = LatticeForward::kColumns, kVectors = kColumns / hn::MaxLanes(Tag());
 constexpr size_t kGroup = 16;  // samples whose corners are looked up together
 
@@ -35,7 +35,7 @@ HWY_INLINE void lookUp(const Arguments& a, const Rows& rows, const uint32_t* sam
                        GroupCorners& group) {
   const uint32_t* blocks = hostPointer(a.blockOfSample);
   const float* positions = hostPointer(a.positions);
-  const uint32_t room = a.texels.capacity;
+  const uint32_t capacity = a.texels.capacity;
   for (size_t s = 0; s < count; ++s) {
     SourceCorners corners;
     voxelCorners(a.grid, positions + size_t{3} * sample[s], corners);
@@ -45,17 +45,17 @@ HWY_INLINE void lookUp(const Arguments& a, const Rows& rows, const uint32_t* sam
                                                  : rows.row(rows.word(blocks[sample[s]], texel), texel);
       group.row[s][k] = row;
       group.weight[s][k] = corners.weight[k];
-      if (row < room) hwy::Prefetch(lines + kColumns * row);
+      if (row < capacity) hwy::Prefetch(lines + kColumns * row);
     }
   }
 }
 
 void mixRange(const LatticeForward& a, size_t begin, size_t end) {
   const Tag d;
-  const Rows rows = rowsOf(a);
+  const Rows rows = makeTexelRows(a);
   const float* values = hostPointer(a.values);
   float* mixed = hostPointer(a.mixed.data);
-  const uint32_t room = a.texels.capacity;
+  const uint32_t capacity = a.texels.capacity;
   GroupCorners group;
   for (size_t first = begin; first < end; first += kGroup) {
     const size_t count = std::min(kGroup, end - first);
@@ -66,7 +66,7 @@ void mixRange(const LatticeForward& a, size_t begin, size_t end) {
       hn::Vec<Tag> sums[kVectors];
       for (size_t v = 0; v < kVectors; ++v) sums[v] = hn::Zero(d);
       for (size_t k = 0; k < 8; ++k) {
-        if (group.row[s][k] >= room) continue;
+        if (group.row[s][k] >= capacity) continue;
         const float* line = values + kColumns * group.row[s][k];
         const auto w = hn::Set(d, group.weight[s][k]);
         for (size_t v = 0; v < kVectors; ++v) sums[v] = hn::MulAdd(w, hn::LoadU(d, line + v * hn::Lanes(d)), sums[v]);
@@ -78,21 +78,21 @@ void mixRange(const LatticeForward& a, size_t begin, size_t end) {
   }
 }
 
-// Adds what all samples of `block` give to the rows [low, high).
+// Adds the gradients of all samples of `block` to the rows [low, high).
 void spreadRows(const LatticeBackward& a, size_t samples, uint32_t block, uint32_t low, uint32_t high) {
   const Tag d;
-  const Rows rows = rowsOf(a);
+  const Rows rows = makeTexelRows(a);
   const uint32_t* blocks = hostPointer(a.blockOfSample);
   const float* upstream = hostPointer(a.mixedGradients.data);
   float* gradients = hostPointer(a.valueGradients);
   GroupCorners group;
-  uint32_t held[kGroup];
+  uint32_t pendingSamples[kGroup];
   const auto flush = [&](size_t count) {
-    lookUp(a, rows, held, count, gradients, group);
+    lookUp(a, rows, pendingSamples, count, gradients, group);
     for (size_t s = 0; s < count; ++s) {
       hn::Vec<Tag> g[kVectors];
       for (size_t v = 0; v < kVectors; ++v) {
-        g[v] = hn::LoadU(d, upstream + a.mixedGradients.offset(held[s], v * hn::Lanes(d)));
+        g[v] = hn::LoadU(d, upstream + a.mixedGradients.offset(pendingSamples[s], v * hn::Lanes(d)));
       }
       for (size_t k = 0; k < 8; ++k) {
         const uint32_t row = group.row[s][k];
@@ -108,7 +108,7 @@ void spreadRows(const LatticeBackward& a, size_t samples, uint32_t block, uint32
   size_t count = 0;
   for (size_t s = 0; s < samples; ++s) {
     if (blocks[s] != block) continue;
-    held[count++] = static_cast<uint32_t>(s);
+    pendingSamples[count++] = static_cast<uint32_t>(s);
     if (count == kGroup) flush(std::exchange(count, 0));
   }
   flush(count);
@@ -151,7 +151,7 @@ void run(Context& context, const LatticeBackward& a) {
     for (uint32_t block = 1; block < a.blocks; ++block) spread(a, samples, block, 0, rows);
     return;
   }
-  // A row's additions happen in sample order whatever the split, so the split may follow the threads.
+  // The additions to each row are in sample order for any split, so the split may depend on the number of threads.
   const size_t pieces = std::max<size_t>(1, 2 * context.pool.threads() / a.blocks);
   context.pool.run(a.blocks * pieces, [&](size_t task, int) {
     const uint32_t block = static_cast<uint32_t>(task / pieces);

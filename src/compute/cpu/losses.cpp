@@ -13,7 +13,7 @@ namespace tessera::cpu {
 namespace {
 
 constexpr size_t kRaysPerTask = 256;  // fixed: partial sums are added in task order
-constexpr int kGroup = 16;            // rays that make a picture of S3IM
+constexpr int kGroup = 16;            // rays per 4×4 image of S3IM
 
 struct ValueAndSlope {
   float value, slope;
@@ -34,18 +34,19 @@ ValueAndSlope robust(ColourLossKind kind, float parameter, float r) {
   return {0, 0};
 }
 
-// MERF's warp of distance (building blocks 7.1).
+// The warp of distances of MERF, g of DistortionLoss.
 float warped(float t) {
   return t < 1 ? t / 2 : 1 - 1 / (2 * t);
 }
 
-// Σ lossOf(i) over rays, or whatever else is counted, added in one fixed order.
+// Σ computeLoss(i) over `count` rays, segments or points, added in a fixed order.
 template <class LossOf>
-double sumInOrder(ThreadPool& pool, size_t count, const LossOf& lossOf) {
+double sumInOrder(ThreadPool& pool, size_t count, const LossOf& computeLoss) {
   const size_t tasks = (count + kRaysPerTask - 1) / kRaysPerTask;
   std::vector<double> sums(tasks);
   pool.run(tasks, [&](size_t task, int) {
-    for (size_t i = task * kRaysPerTask; i < std::min(count, (task + 1) * kRaysPerTask); ++i) sums[task] += lossOf(i);
+    for (size_t i = task * kRaysPerTask; i < std::min(count, (task + 1) * kRaysPerTask); ++i)
+      sums[task] += computeLoss(i);
   });
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
@@ -58,7 +59,7 @@ struct GroupWeights {
   }
 };
 
-// SSIM of a group of one channel, and its gradient with respect to x (building blocks 11.2).
+// The SSIM of one channel of a group, and its gradient with respect to x.
 float similarity(const float* x, const float* y, const GroupWeights& weights, float* gradients) {
   constexpr float kC1 = 1e-4f, kC2 = 9e-4f;
   float meanX = 0, meanY = 0;
@@ -84,7 +85,7 @@ float similarity(const float* x, const float* y, const GroupWeights& weights, fl
   return value;
 }
 
-// The order in which a patch takes the rays; memory kept by each thread.
+// The order in which a patch uses the rays, in a buffer that each thread reuses.
 const uint32_t* orderOfPatch(uint32_t rays, uint32_t patch, uint64_t seed) {
   thread_local std::vector<uint32_t> order;
   if (order.size() < rays) order.resize(rays);
@@ -95,14 +96,14 @@ const uint32_t* orderOfPatch(uint32_t rays, uint32_t patch, uint64_t seed) {
   return order.data();
 }
 
-// Kept from call to call.
+// A buffer that is reused between calls.
 float* partialGradients(size_t count) {
   thread_local std::vector<float> partial;
   if (partial.size() < count) partial.resize(count);
   return partial.data();
 }
 
-// Σ 1 - SSIM of a patch; overwrites gradients of Σ SSIM, [rays][3].
+// Returns Σ (1 - SSIM) over a patch, and overwrites `gradients` with the gradients of Σ SSIM, [rays][3].
 double differencesOfPatch(const S3imLoss& a, uint32_t rays, const uint32_t* order, float* gradients) {
   const float* predicted = hostPointer(a.predicted);
   const float* target = hostPointer(a.target);
@@ -248,7 +249,7 @@ void run(Context& context, const OpacityLoss& a) {
   const float* opacities = hostPointer(a.opacities);
   float* gradients = hostPointer(a.opacityGradients);
   const double loss = sumInOrder(context.pool, hostCount(a.segments), [&](size_t i) {
-    // Between a half and 1 the difference from 1 is exact, so that clamping it is clamping the opacity.
+    // Between 1/2 and 1 the difference from 1 is exact, so that clamping it is the same as clamping the opacity.
     const float full = std::clamp(opacities[i], 1e-5f, 1 - 1e-5f),
                 clear = std::clamp(1 - opacities[i], 1e-5f, 1 - 1e-5f);
     const float logFull = std::log(full), logClear = std::log(clear);

@@ -1,7 +1,7 @@
-// Fused MLP: a block of samples stays in cache through all layers. Forward (X · Wᵀ), input gradient (dY · W) and weight
-// gradient (dYᵀ · X) are three products whose inner loop is "broadcast one number, multiply-add a few vectors", with
-// the accumulators in registers. Numbers to broadcast may lie anywhere, so the hash grid's planes are read where they
-// are; vectors are rows, one row a sample.
+// Fused MLP: a block of samples stays in the cache through all layers. The forward pass (X · Wᵀ), the input gradients
+// (dY · W) and the weight gradients (dYᵀ · X) are three products whose inner loop broadcasts one number and
+// multiply-adds a few vectors, with the accumulators in registers. Broadcast numbers may have any layout, so that the
+// planes of the hash grid are read in place; vectors are rows, one row per sample.
 
 #include "compute/mlp.h"
 
@@ -24,11 +24,11 @@
 #define TESSERA_CPU_MLP_ONCE
 namespace tessera::cpu {
 
-inline constexpr int kRows = 96;  // samples of a block: a multiple of every tile height
+inline constexpr int kRows = 96;  // samples per block; a multiple of every tile height
 inline constexpr int kMaxWidth = 128;
-inline constexpr int kParts = 16;  // partial weight gradients, so at most as many threads: the same bits for any number
+inline constexpr int kParts = 16;  // partial weight gradients, and maximum of threads; fixed, for reproducible bits
 
-struct BlockBuffers {  // of one thread
+struct BlockBuffers {  // per thread
   alignas(128) float input[kRows * kMaxWidth];
   alignas(128) float hidden[2][kRows * kMaxWidth];
   alignas(128) float output[kRows * kMaxWidth];
@@ -38,13 +38,13 @@ struct BlockBuffers {  // of one thread
 }  // namespace tessera::cpu
 #endif
 
-#include "compute/cpu/mlp_tiles-inl.h"  // wants kRows
+#include "compute/cpu/mlp_tiles-inl.h"  // uses kRows
 
 HWY_BEFORE_NAMESPACE();
 namespace tessera::cpu::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Rows [first, first + rows) of a matrix into a block of `width` columns; missing rows and columns are zero.
+// Copies rows [first, first + rows) of a matrix into a block of `width` columns; missing rows and columns are zero.
 void packRows(const Matrix<const float>& matrix, const float* data, size_t first, int rows, int width, float* block) {
   const int columns = static_cast<int>(matrix.columns);
   if (matrix.groupWidth == 2) {
@@ -71,11 +71,11 @@ void packRows(const Matrix<const float>& matrix, const float* data, size_t first
   if (rows < kRows) std::memset(block + rows * width, 0, sizeof(float) * (kRows - rows) * width);
 }
 
-// The first columns of a block's rows.
+// Copies the first columns of the rows of a block into a matrix.
 void unpackRows(const float* block, int width, const Matrix<float>& matrix, float* data, size_t first, int rows) {
   const int columns = static_cast<int>(matrix.columns);
   if (matrix.groupWidth == 2) {
-    // Two groups of two rows at a time.
+    // Copies two groups of two rows at a time.
     const hn::FixedTag<uint64_t, 2> d;
     const auto pair = [&](const float* from) { return hn::LoadU(d, reinterpret_cast<const uint64_t*>(from)); };
     const auto store = [&](hn::Vec<decltype(d)> value, float* to) {
@@ -115,7 +115,7 @@ Numbers rowMajor(const float* data, size_t rowStride) {
   return {data, rowStride};
 }
 
-// The rows where they are if they are whole, else packed into `block`.
+// Refers to the rows in place if the block is complete, otherwise to a packed copy in `block`.
 Numbers blockNumbers(const Matrix<const float>& matrix, const float* data, size_t first, int rows, int width,
                      float* block) {
   if (rows < kRows || static_cast<int>(matrix.columns) != width) {
@@ -138,10 +138,11 @@ void forwardBlock(const MlpForward& a, const float* transposed, size_t n, size_t
   const MlpShape& shape = a.shape;
   const int rows = static_cast<int>(std::min<size_t>(kRows, n - first));
   Numbers x = blockNumbers(a.input, hostPointer(a.input.data), first, rows, shape.layerInputs(0), buffers.input);
-  float* kept = hostPointer(a.activations);
+  float* activations = hostPointer(a.activations);
   for (int l = 0; l < shape.hiddenLayers; ++l) {
     float* h = buffers.hidden[l % 2];
-    float* keep = kept ? kept + (static_cast<size_t>(l) * a.samples.capacity + first) * shape.width : nullptr;
+    float* keep =
+        activations ? activations + (static_cast<size_t>(l) * a.samples.capacity + first) * shape.width : nullptr;
     if (keep && rows == kRows) h = keep;
     product<Finish::relu>(x, transposed + shape.weightOffset(l), shape.layerInputs(l), shape.width, h, shape.width);
     if (keep && h != keep) std::memcpy(keep, h, sizeof(float) * rows * shape.width);
@@ -158,7 +159,7 @@ void forwardBlock(const MlpForward& a, const float* transposed, size_t n, size_t
   if (!inPlace) unpackRows(y, outputs, a.output, hostPointer(a.output.data), first, rows);
 }
 
-// dY of a block: the given gradient through the output activation, zero beyond the real rows and columns.
+// dY of a block: the given gradients multiplied by the derivative of the output activation; zero in padding.
 void outputGradientBlock(const MlpBackward& a, size_t first, int rows, float* dy) {
   const MlpShape& shape = a.shape;
   const int width = shape.layerOutputs(shape.hiddenLayers);
@@ -184,26 +185,27 @@ void backwardBlock(const MlpBackward& a, size_t n, size_t first, float* weightGr
   const float* weights = hostPointer(a.weights);
   const Numbers input =
       blockNumbers(a.input, hostPointer(a.input.data), first, rows, shape.layerInputs(0), buffers.input);
-  const float* kept = hostPointer(a.activations);
+  const float* activations = hostPointer(a.activations);
   outputGradientBlock(a, first, rows, buffers.output);
   const float* dy = buffers.output;
   for (int l = shape.hiddenLayers; l > 0; --l) {
     const int outputs = shape.layerOutputs(l), width = shape.width;
     const Numbers upstream = rowMajor(dy, outputs);
-    const float* h = kept + (static_cast<size_t>(l - 1) * a.samples.capacity + first) * width;
+    const float* h = activations + (static_cast<size_t>(l - 1) * a.samples.capacity + first) * width;
     if (rows < kRows) {
       std::memcpy(buffers.hidden[0], h, sizeof(float) * rows * width);
       std::memset(buffers.hidden[0] + rows * width, 0, sizeof(float) * (kRows - rows) * width);
       h = buffers.hidden[0];
     }
-    // The columns that pad the last layer are zero: most of them need not be multiplied.
+    // The padding columns of the last layer are zero, and most of them are skipped.
     const int real = l == shape.hiddenLayers ? (shape.outputs + 3) / 4 * 4 : outputs;
     float* dh = buffers.gradient[l % 2];
     outer(upstream, real, h, width, width, weightGradients + shape.weightOffset(l));
     product<Finish::maskByActivation>(upstream, weights + shape.weightOffset(l), real, width, dh, width, h, width);
     dy = dh;
   }
-  // Gradients of the first layer as [inputs][outputs], unlike all others: the input need not be rows then.
+  // The gradients of the first layer are [inputs][outputs], unlike those of the others, so that the input may have any
+  // layout.
   const int outputs = shape.layerOutputs(0), inputs = shape.layerInputs(0);
   outer(input, inputs, dy, outputs, outputs, weightGradients);
   if (!a.inputGradients) return;
@@ -212,7 +214,7 @@ void backwardBlock(const MlpBackward& a, size_t n, size_t first, float* weightGr
   unpackRows(dx, inputs, a.inputGradients, hostPointer(a.inputGradients.data), first, rows);
 }
 
-// first[i] += first[i + stride] + first[i + 2 stride] + ...: `parts` rows, in their order; count a multiple of 16.
+// first[i] += first[i + stride] + first[i + 2 stride] + ... over `parts` rows, in order; `count` is a multiple of 16.
 void sumOfParts(float* first, size_t parts, size_t stride, size_t count) {
   const Float d;
   for (size_t i = 0; i < count; i += hn::Lanes(d)) {
@@ -241,7 +243,7 @@ void checkShape(const MlpShape& shape) {
   CHECK(shape.outputs <= kMaxWidth);
 }
 
-// Each layer's [outputs][inputs] as [inputs][outputs].
+// Transposes the weights of each layer from [outputs][inputs] to [inputs][outputs].
 std::vector<float> transposeLayers(const MlpShape& shape, const float* weights) {
   std::vector<float> transposed(shape.parameters());
   for (int l = 0; l < shape.layers(); ++l) {
@@ -260,7 +262,7 @@ BlockBuffers& threadBuffers() {
   return *buffers;
 }
 
-// Kept from call to call: fresh pages each time would cost a third of what a batch of 8192 samples takes.
+// Reused between calls: fresh pages would cost a third of the time of a batch of 8192 samples.
 float* partialGradients(size_t count) {
   thread_local std::vector<float> partial;
   if (partial.size() < count) partial.resize(count);
@@ -292,7 +294,7 @@ void run(Context& context, const MlpBackward& a) {
   float* partial = partialGradients(parts * parameters);
   const auto block = HWY_DYNAMIC_DISPATCH(backwardBlock);
   context.pool.run(parts, [&](size_t task, int) {
-    const size_t part = parts - 1 - task;  // what forward did last may still be in the cache
+    const size_t part = parts - 1 - task;  // the last samples of the forward pass may still be in the cache
     float* gradients = partial + part * parameters;
     std::memset(gradients, 0, sizeof(float) * parameters);
     for (size_t b = part * blocks / parts; b < (part + 1) * blocks / parts; ++b) {

@@ -1,5 +1,5 @@
-// The three products of the fused MLP on blocks of kRows samples, a tile of registers at a time. Part of mlp.cpp,
-// included once for each SIMD target (Highway's -inl.h convention: the guard turns with each).
+// The three matrix products of the fused MLP on blocks of kRows samples, computed by register tiles. Part of mlp.cpp,
+// which includes it once for each SIMD target (Highway's -inl.h convention, in which the include guard toggles).
 #if defined(TESSERA_COMPUTE_CPU_MLP_TILES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TESSERA_COMPUTE_CPU_MLP_TILES_INL_H_
 #undef TESSERA_COMPUTE_CPU_MLP_TILES_INL_H_
@@ -18,14 +18,14 @@ using Float = hn::CappedTag<float, 16>;
 using Vector = hn::Vec<Float>;
 
 #if HWY_TARGET <= HWY_AVX3
-constexpr int kWide = 4;          // vectors side by side in a tile: 32 registers
-constexpr bool kShuffles = true;  // one load a multiply-add is too many: four numbers are fetched at once and spread
+constexpr int kWide = 4;          // vectors side by side in a tile, with 32 registers
+constexpr bool kShuffles = true;  // loads four numbers at once and broadcasts each, to save loads per multiply-add
 #else
-constexpr int kWide = 2;  // 16 registers
+constexpr int kWide = 2;  // with 16 registers
 constexpr bool kShuffles = false;
 #endif
 
-// Numbers to broadcast: element (row, column) of a block in any of Matrix's layouts.
+// Numbers to broadcast: the elements (row, column) of a block in any layout of Matrix.
 struct Numbers {
   const float* data;
   size_t rowStride;
@@ -33,10 +33,10 @@ struct Numbers {
   uint32_t groupWidth = 0;
 };
 
-// The same, with what can be known when compiling: the addresses of a tile's rows are then constants apart.
-//   kStride  16 to 128   row-major rows of so many
-//            2           planes of two columns, as the hash grid writes them
-//            0           any other
+// Numbers with a layout that is known at compile time, so that the rows of a tile are constant distances apart.
+//   kStride  16 to 128   row-major with this row stride
+//            2           planes of two columns, as written by the hash grid
+//            0           any other layout
 template <int kStride>
 struct NumbersOf {
   const float* data;
@@ -58,7 +58,7 @@ struct Stride {
   static constexpr int value = kStride;
 };
 
-// call(Stride<kStride>()) with the best one for `x`.
+// Calls call(Stride<kStride>()) with the most specific stride for `x`.
 template <class Call>
 void withStride(const Numbers& x, const Call& call) {
   if (x.groupStride != 0) return x.groupWidth == 2 && x.rowStride == 2 ? call(Stride<2>()) : call(Stride<0>());
@@ -138,7 +138,7 @@ HWY_INLINE void outerTile(const NumbersOf<kStride>& x, int column, const float* 
 
 enum class Finish { none, relu, maskByActivation };
 
-// out[rows][columns] = finish(x[rows][depth] · b[depth][columns]); rows a multiple of R.
+// out[rows][columns] = finish(x[rows][depth] · b[depth][columns]); `rows` is a multiple of R.
 template <int R, int V, Finish kFinish, int kStride>
 HWY_NOINLINE void productBlock(const NumbersOf<kStride>& x, const float* b, int depth, int columns, int rows,
                                float* out, size_t outRow, const float* activation, size_t activationRow) {

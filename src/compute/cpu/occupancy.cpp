@@ -17,7 +17,7 @@ bool bitAt(const uint32_t* bits, uint32_t cell) {
   return (bits[cell / 32] >> (cell % 32)) & 1;
 }
 
-// The marching step at a cell's centre.
+// The marching step at the centre of a cell.
 float stepAt(const MarchSpace& space, uint32_t cell) {
   if (space.cone <= 0) return space.minStep;
   const uint32_t r = space.gridResolution;
@@ -36,7 +36,7 @@ void run(Context& context, const OccupancyPoints& a) {
   const uint32_t r = a.space.gridResolution;
   const uint32_t* candidates = hostPointer(a.candidates);
   const uint32_t all = candidates ? static_cast<uint32_t>(a.candidates.count) : r * r * r;
-  const auto cellOf = [&](uint32_t candidate) { return candidates ? candidates[candidate] : candidate; };
+  const auto candidateCell = [&](uint32_t candidate) { return candidates ? candidates[candidate] : candidate; };
   const RandomStream random(a.seed, 0x0cc);
   const uint32_t* bits = hostPointer(a.occupancy);
   uint32_t* chosen = hostPointer(a.cells);
@@ -46,11 +46,11 @@ void run(Context& context, const OccupancyPoints& a) {
       const uint64_t point = a.first + p, index = 16 * point;
       uint32_t cell;
       if (point < a.uniform) {
-        cell = cellOf(a.uniform == all ? static_cast<uint32_t>(point) : random.below(index, all));
+        cell = candidateCell(a.uniform == all ? static_cast<uint32_t>(point) : random.below(index, all));
       } else {
-        cell = cellOf(random.below(index, all));
+        cell = candidateCell(random.below(index, all));
         for (int attempt = 1; attempt < 10 && !bitAt(bits, cell); ++attempt)
-          cell = cellOf(random.below(index + attempt, all));
+          cell = candidateCell(random.below(index + attempt, all));
       }
       chosen[p] = cell;
       const uint32_t at[3] = {cell % r, cell / r % r, cell / (r * r)};
@@ -73,7 +73,7 @@ void run(Context& context, const OccupancyUpdate& a) {
       if (grid[i] > 0) grid[i] *= a.decay;
     }
   });
-  for (size_t p = 0; p < a.points; ++p) {  // cells may repeat: one thread, though a maximum has no order
+  for (size_t p = 0; p < a.points; ++p) {  // one thread, because cells may repeat
     float& value = grid[chosen[p]];
     if (value < 0) continue;
     value =

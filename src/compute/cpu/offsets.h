@@ -1,12 +1,12 @@
-// Where each ray's samples stand, from how many it has.
+// Converts the number of samples per ray to the offset of each ray's samples.
 #pragma once
 
 #include <cstdint>
 
 namespace tessera::cpu {
 
-// Counts in offsets[1 .. rays] to running ends; what no longer fits `capacity` becomes empty, and so does all after it.
-// Returns how many fit.
+// Converts the counts in offsets[1 .. rays] to running ends. The first ray whose samples exceed `capacity` becomes
+// empty, and so do all rays after it. Returns the number of rays that fit.
 inline uint32_t countsToOffsets(uint32_t* offsets, uint32_t rays, uint32_t capacity) {
   offsets[0] = 0;
   uint32_t fitting = 0;

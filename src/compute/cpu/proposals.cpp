@@ -13,7 +13,7 @@ namespace {
 
 constexpr size_t kRaysPerTask = 64;  // fixed: partial sums are added in task order
 
-// share[j] = w_j^anneal; returns their sum.
+// Sets share[j] = w_j^anneal; returns the sum.
 double annealedShares(const float* weights, uint32_t count, float anneal, float* share) {
   if (anneal == 1) {
     std::copy(weights, weights + count, share);
@@ -25,9 +25,10 @@ double annealedShares(const float* weights, uint32_t count, float anneal, float*
   return std::accumulate(share, share + count, 0.0);
 }
 
-// From the posts cumulative[0] = 0 ... cumulative[before] = 1 of `fences` to those at (i + jitter) / (after + 1). The
-// bin of a new post is the last that begins at or before it: each bin signs the first post after its begin, and posts
-// take the last signature so far. That is without a branch that nobody could predict. `bins` has room for after + 2.
+// Inverts the cumulative distribution, which rises from cumulative[0] = 0 to cumulative[before] = 1 over `fences`, at
+// u_i = (i + jitter - ½) / after. The bin of a new fence is the last that begins at or before it: each bin marks the
+// first new fence after its beginning, and each fence uses the last mark so far, which avoids unpredictable branches.
+// `bins` has space for after + 2 elements.
 void invert(const ResampleFences& a, const float* fences, const double* cumulative, double jitter, uint32_t* bins,
             float* resampled) {
   const double posts = a.after, perPost = 1 / posts, offset = jitter - 0.5;
@@ -48,7 +49,7 @@ void invert(const ResampleFences& a, const float* fences, const double* cumulati
   }
 }
 
-// One ray of InterlevelLoss, unscaled. `sums` and `slopes` have room for intervals + 1.
+// One ray of InterlevelLoss, unscaled. `sums` and `slopes` have space for intervals + 1 elements.
 double interlevelLossOfRay(const InterlevelLoss& a, size_t ray, double* sums, double* slopes) {
   const uint32_t bins = a.intervals;
   const float* fences = hostPointer(a.fences) + ray * (bins + size_t{1});
@@ -59,9 +60,9 @@ double interlevelLossOfRay(const InterlevelLoss& a, size_t ray, double* sums, do
   float* gradients = hostPointer(a.weightGradients) + ray * bins;
   sums[0] = 0;
   for (uint32_t j = 0; j < bins; ++j) sums[j + 1] = sums[j] + weights[j];
-  std::fill(slopes, slopes + bins + 1, 0.0);  // differences of the gradient from bin to bin
+  std::fill(slopes, slopes + bins + 1, 0.0);  // differences of the gradient between consecutive bins
   double loss = 0;
-  uint32_t first = 0, end = 1;  // samples go forward, and so do their bins
+  uint32_t first = 0, end = 1;  // bins of the current sample; they only move forward
   for (uint32_t i = hostPointer(a.firstSample)[ray]; i < hostPointer(a.firstSample)[ray + 1]; ++i) {
     const double half = 0.5 * widths[i], from = middles[i] - half, to = middles[i] + half, weight = sampleWeights[i];
     while (first + 1 < bins && fences[first + 1] <= from) ++first;
@@ -98,11 +99,11 @@ void run(Context& context, const ResampleFences& a) {
     std::vector<uint32_t> bins(a.after + size_t{2});
     for (size_t ray = task * kRaysPerTask; ray < std::min(rays, (task + 1) * kRaysPerTask); ++ray) {
       const double sum = annealedShares(weights + ray * a.before, a.before, a.anneal, share.data());
-      const double even = 1.0 / a.before, least = sum > 0 ? a.padding * even : even;
-      const double perShare = sum > 0 ? (1.0 - a.padding) / sum : 0;
+      const double even = 1.0 / a.before, minimum = sum > 0 ? a.uniformFraction * even : even;
+      const double perShare = sum > 0 ? (1.0 - a.uniformFraction) / sum : 0;
       double reached = 0;
       for (uint32_t j = 1; j < a.before; ++j) {
-        reached += perShare * share[j - 1] + least;
+        reached += perShare * share[j - 1] + minimum;
         cumulative[j] = std::min(1.0, reached);
       }
       cumulative[a.before] = 1;

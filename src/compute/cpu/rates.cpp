@@ -1,4 +1,4 @@
-// What this machine can do at best, measured the way the kernels work: the yardsticks of `tessera bench compute`.
+// Measures the peak rates of this machine with code like that of the kernels: the limits for `tessera bench compute`.
 
 #include <algorithm>
 #include <chrono>
@@ -25,7 +25,7 @@ const char* targetName() {
   return hwy::TargetName(HWY_TARGET);
 }
 
-// Returns the multiply-adds done (lanes counted); the result goes to `sink` so that nothing is optimised away.
+// Returns the number of multiply-adds over all lanes; writes the result to `sink` so that nothing is optimised away.
 size_t multiplyAdds(size_t rounds, float* sink) {
   const hn::CappedTag<float, 16> d;
   constexpr int kChains = 12;
@@ -56,7 +56,7 @@ double seconds(const std::function<void()>& work) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// The best of several: what the machine can do, not what it was disturbed to.
+// The best rate of several runs, so that disturbances by other processes do not count.
 double bestRate(double amount, const std::function<void()>& work) {
   double best = 1e30;
   for (int i = 0; i < 7; ++i) best = std::min(best, seconds(work));
@@ -78,12 +78,12 @@ std::vector<std::string> simdTargets() {
 void useSimdTarget(const std::string& name) {
   hwy::SetSupportedTargetsForTest(0);
   if (name.empty()) return;
-  int64_t wanted = 0;
+  int64_t chosen = 0;
   for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    if (name == hwy::TargetName(target)) wanted = target;
+    if (name == hwy::TargetName(target)) chosen = target;
   }
-  CHECK(wanted != 0);
-  hwy::SetSupportedTargetsForTest(wanted);
+  CHECK(chosen != 0);
+  hwy::SetSupportedTargetsForTest(chosen);
 }
 
 double peakFlops(ThreadPool& pool) {
@@ -115,7 +115,7 @@ double gatherRate(ThreadPool& pool, size_t bytes, int tables) {
     pool.run(tables * perTable, [&](size_t task, int) {
       const uint64_t* from = table.data() + task / perTable * entries;
       const uint32_t* at = index.data() + task % perTable * kTask;
-      // Four sums: loads wait for nothing.
+      // Four independent sums, so that loads do not wait for each other.
       uint64_t sum[4] = {0, 0, 0, 0};
       for (size_t i = 0; i < kTask; i += 4) {
         for (size_t k = 0; k < 4; ++k) sum[k] += from[at[i + k]];
@@ -129,7 +129,8 @@ double gatherRate(ThreadPool& pool, size_t bytes, int tables) {
 
 double streamRate(ThreadPool& pool, size_t bytes) {
   const size_t half = bytes / 2, threads = pool.threads();
-  // At least a millisecond's worth of work a measurement, each thread at its own part, so that caches keep what fits.
+  // At least a millisecond of work per measurement; each thread copies its own part, so that data that fits stays in
+  // its cache.
   const size_t part = (half + threads - 1) / threads, rounds = std::max<size_t>(1, (size_t{1} << 26) / bytes);
   std::vector<char> from(half, 1), to(half, 2);
   const auto work = [&] {
@@ -137,7 +138,7 @@ double streamRate(ThreadPool& pool, size_t bytes) {
       const size_t begin = std::min(half, task * part), end = std::min(half, begin + part);
       for (size_t i = 0; i < rounds; ++i) {
         std::memcpy(to.data() + begin, from.data() + begin, end - begin);
-        asm volatile("" : : "r"(to.data()) : "memory");  // every round is done
+        asm volatile("" : : "r"(to.data()) : "memory");  // keeps the compiler from omitting rounds
       }
     });
   };

@@ -13,7 +13,7 @@
 namespace tessera::cpu {
 namespace {
 
-constexpr size_t kRaysPerTask = 64;  // fixed: tasks write samples of their own, joined in task order
+constexpr size_t kRaysPerTask = 64;  // fixed; the samples of all tasks are concatenated in task order
 
 struct Sample {
   uint32_t ray;
@@ -21,7 +21,7 @@ struct Sample {
   float distance, step;
 };
 
-// The step lattice t(k), tabulated once for integers; a jittered point lies a constant factor (or offset) further.
+// The step lattice t(k), tabulated for integers; a jittered point is a constant factor (or offset) farther away.
 class Lattice {
  public:
   explicit Lattice(const MarchSpace& space) : space_(space), growth_(1 + static_cast<double>(space.cone)) {
@@ -34,13 +34,13 @@ class Lattice {
       linearEnd_ = 1e30;
       geometricEnd_ = 1e30;
     }
-    for (int k = 0; k <= last; ++k) {  // exact now and then; products in between save an exponential each
+    for (int k = 0; k <= last; ++k) {  // exact at intervals; the products in between avoid an exponential each
       const bool grows = k % 64 != 0 && k - 1 >= linearEnd_ && k <= geometricEnd_;
       table_.push_back(grows ? table_.back() * growth_ : space.distanceAt(k));
     }
   }
 
-  // t(k + jitter); factor = growth^jitter.
+  // Returns t(k + jitter); factor = growth^jitter.
   double at(int k, double jitter, double factor) const {
     if (static_cast<size_t>(k) >= table_.size()) return space_.distanceAt(k + jitter);
     if (k + jitter <= linearEnd_) return (k + jitter) * space_.minStep;
@@ -58,9 +58,9 @@ class Lattice {
 struct Cell {
   double u[3];  // grid coordinates in [0,1]
   int index[3];
-  int region;   // contracted: axis of the largest coordinate outside the unit cube, or -1 inside
-  double sign;  // of that coordinate
-  bool inside;  // false: bounded and outside the cube
+  int region;   // contracted space: axis of the largest coordinate outside [-1,1]³, or -1 inside
+  double sign;  // sign of that coordinate
+  bool inside;  // false outside the cube of a bounded space
 };
 
 Cell cellAt(const MarchSpace& space, const double x[3]) {
@@ -100,13 +100,13 @@ bool occupied(const uint32_t* bits, int resolution, const Cell& cell) {
   return (bits[i / 32] >> (i % 32)) & 1;
 }
 
-// The distance at which the ray leaves the cell. Every face of a cell is a plane: x_a = c inside; outside, for the
-// region of axis a, x_a = sign · 1/(2 - y) for its own axis and x_b = y · |x_a| for the others; and region borders are
-// |x_b| = |x_a|.
+// The distance at which the ray leaves the cell. Every face of a cell is a plane: x_a = c inside [-1,1]³; outside, in
+// the region of axis a, x_a = sign · 1/(2 - y) for that axis and x_b = y · |x_a| for the others. The borders of the
+// regions are |x_b| = |x_a|.
 double exitDistance(const MarchSpace& space, const Cell& cell, const double o[3], const double d[3], double t) {
   const double width = (space.contracted ? 4.0 : 2.0) / space.gridResolution, origin = space.contracted ? -2.0 : -1.0;
   double exit = 1e30;
-  const auto cross = [&](double value, double slope) {  // value + slope · t = 0 ahead of t
+  const auto cross = [&](double value, double slope) {  // solves value + slope · t = 0 in front of t
     if (slope == 0) return;
     const double at = -value / slope;
     if (at > t) exit = std::min(exit, at);
@@ -136,14 +136,14 @@ double exitDistance(const MarchSpace& space, const Cell& cell, const double o[3]
   return exit;
 }
 
-// Adds the ray's next samples; returns the lattice step to go on from.
+// Adds the next samples of the ray; returns the lattice step from which to continue.
 uint32_t marchRay(const MarchRays& a, const Lattice& lattice, const uint32_t* bits, uint32_t ray,
                   std::vector<Sample>& samples) {
   const MarchSpace& space = a.space;
   const uint32_t from = a.nextStep ? hostPointer(a.nextStep)[ray] : 0;
   if (from == MarchRays::kThrough) return from;
-  if (a.opticalDepth && hostPointer(a.opticalDepth)[ray] > a.mostOpticalDepth) return from;
-  uint32_t left = a.most;
+  if (a.opticalDepth && hostPointer(a.opticalDepth)[ray] > a.maxOpticalDepth) return from;
+  uint32_t left = a.maximum;
   if (left == 0) return from;
   double o[3], d[3];
   for (int axis = 0; axis < 3; ++axis) {
@@ -155,7 +155,7 @@ uint32_t marchRay(const MarchRays& a, const Lattice& lattice, const uint32_t* bi
   double far = space.far, near = space.near;
   if (a.farOfRay) far = std::min<double>(far, hostPointer(a.farOfRay)[ray]);
   int k = static_cast<int>(std::ceil(space.stepIndex(near) - jitter));
-  if (!space.contracted) {  // nothing before the cube is entered, nothing after it is left
+  if (!space.contracted) {  // limits the ray to the cube
     double enter = 0, leave = 1e30;
     for (int axis = 0; axis < 3; ++axis) {
       const double t0 = (-1 - o[axis]) / d[axis], t1 = (1 - o[axis]) / d[axis];
@@ -195,7 +195,8 @@ uint32_t marchRay(const MarchRays& a, const Lattice& lattice, const uint32_t* bi
     ++k;
     begin = end;
     if (!cell.inside) continue;
-    // Whole steps to the first middle past the empty cell; the tolerance only costs one more look.
+    // Skips whole steps up to the first middle behind the empty cell; because of the tolerance, one more middle may be
+    // visited.
     const double exit = exitDistance(space, cell, o, d, middle) * (1 - 1e-9);
     if (exit >= far) return MarchRays::kThrough;
     if (exit > begin + 4 * (end - middle)) {
@@ -243,15 +244,15 @@ void run(Context& context, const MarchRays& a) {
   const Lattice lattice(a.space);
   const uint32_t* bits = hostPointer(a.occupancy);
   uint32_t* firstSample = hostPointer(a.firstSample);
-  std::vector<std::vector<Sample>> made(tasks);
+  std::vector<std::vector<Sample>> samplesOfTask(tasks);
   std::vector<uint32_t> nextStep(rays);
   context.pool.run(tasks, [&](size_t task, int) {
-    std::vector<Sample>& samples = made[task];
+    std::vector<Sample>& samples = samplesOfTask[task];
     samples.reserve(kRaysPerTask * 32);
     for (size_t ray = task * kRaysPerTask; ray < std::min<size_t>(rays, (task + 1) * kRaysPerTask); ++ray) {
       const size_t before = samples.size();
       nextStep[ray] = marchRay(a, lattice, bits, static_cast<uint32_t>(ray), samples);
-      firstSample[ray + 1] = static_cast<uint32_t>(samples.size() - before);  // a count for now
+      firstSample[ray + 1] = static_cast<uint32_t>(samples.size() - before);  // a count, until countsToOffsets
     }
   });
   const uint32_t finished = countsToOffsets(firstSample, rays, a.sampleCapacity);
@@ -266,7 +267,7 @@ void run(Context& context, const MarchRays& a) {
     size_t i = firstSample[task * kRaysPerTask];
     const size_t end = firstSample[std::min<size_t>(rays, (task + 1) * kRaysPerTask)];
     for (size_t s = 0; i < end; ++i, ++s) {
-      const Sample& sample = made[task][s];
+      const Sample& sample = samplesOfTask[task][s];
       if (rayOfSample) rayOfSample[i] = sample.ray;
       std::memcpy(positions + 3 * i, sample.position, sizeof(sample.position));
       distances[i] = sample.distance;
@@ -296,10 +297,10 @@ void run(Context& context, const CompactSamples& a) {
   const uint32_t* nextStep = hostPointer(a.nextStep);
   const float* logDensity = hostPointer(a.logDensity.data);
   const float* steps = hostPointer(a.steps);
-  uint32_t* kept = hostPointer(a.keptFirstSample);
+  uint32_t* firstKept = hostPointer(a.keptFirstSample);
   uint32_t* source = hostPointer(a.source);
   uint32_t* rayOfSample = hostPointer(a.rayOfSample);
-  // visit(row) for each of the ray's samples, until it says no.
+  // Calls visit(row) for each sample of the ray until it returns false.
   const auto forSamples = [&](size_t ray, const auto& visit) {
     for (uint32_t round = 0; round < a.rounds; ++round) {
       const uint32_t* first = firstSample + round * rowOfRound + ray;
@@ -316,21 +317,21 @@ void run(Context& context, const CompactSamples& a) {
       forSamples(ray, [&](uint32_t row) {
         opticalDepth += std::exp(logDensity[a.logDensity.offset(row, 0)]) * steps[row];
         ++count;
-        return opticalDepth <= a.mostOpticalDepth;
+        return opticalDepth <= a.maxOpticalDepth;
       });
-      kept[ray + 1] = count;
-      complete[ray] = opticalDepth > a.mostOpticalDepth || !nextStep || nextStep[ray] == MarchRays::kThrough;
+      firstKept[ray + 1] = count;
+      complete[ray] = opticalDepth > a.maxOpticalDepth || !nextStep || nextStep[ray] == MarchRays::kThrough;
     }
   });
-  const auto fitting = complete.begin() + countsToOffsets(kept, rays, a.keptCapacity);
+  const auto fitting = complete.begin() + countsToOffsets(firstKept, rays, a.keptCapacity);
   const auto finished = static_cast<uint32_t>(std::find(complete.begin(), fitting, 0) - complete.begin());
-  std::fill(kept + finished, kept + rays + 1, kept[finished]);
+  std::fill(firstKept + finished, firstKept + rays + 1, firstKept[finished]);
   if (a.finishedRays) *hostPointer(a.finishedRays) = finished;
-  *hostPointer(a.keptCount) = kept[rays];
+  *hostPointer(a.keptCount) = firstKept[rays];
   context.pool.forRanges(rays, 4 * kRaysPerTask, [&](size_t begin, size_t end) {
     for (size_t ray = begin; ray < end; ++ray) {
-      uint32_t i = kept[ray];
-      const uint32_t last = kept[ray + 1];
+      uint32_t i = firstKept[ray];
+      const uint32_t last = firstKept[ray + 1];
       if (i == last) continue;
       forSamples(ray, [&](uint32_t row) {
         source[i] = row;

@@ -1,4 +1,5 @@
-// Which SIMD kernels run. By itself the cpu device takes the best that the machine has; tests take each in turn.
+// Selection of the SIMD kernels. By default the cpu device uses the best that the machine supports; tests use each of
+// them.
 #pragma once
 
 #include <string>
@@ -10,8 +11,8 @@ namespace tessera::cpu {
 // "SSSE3". The last is what every x86-64-v2 machine has.
 std::vector<std::string> simdTargets();
 
-// From now on kernels are those of this target, one of the above, on all cpu devices of the process; with an empty name
-// the best. Not while an operation runs.
+// Selects the kernels of all cpu devices of the process: those of the named target, one of simdTargets(), or the best
+// for an empty name. Must not be called while an operation runs.
 void useSimdTarget(const std::string& name);
 
 }  // namespace tessera::cpu

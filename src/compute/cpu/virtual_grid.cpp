@@ -1,8 +1,9 @@
-// The virtual grid on the processor. Which texels a batch needs is a bit each; a texel's row is the number of bits
-// before it, so rows come in the order of texels whatever thread set a bit, and neighbours in space are neighbours in
-// memory. Samples are taken in groups: first where their corners stand, then their bytes, so that loads do not wait for
-// one another. Backward gives each source of each block (and, with many threads, each part of its rows) to one task
-// that takes all samples in order: no atomics, and the same sums for any number of threads.
+// The virtual grid on the CPU. One bit per texel marks the texels that a batch needs. The row of a texel is the number
+// of bits before it, so that rows are in the order of texels regardless of which thread set a bit, and neighbours in
+// space are neighbours in memory. Samples are processed in groups: first the rows of their corners are looked up, then
+// the attributes are loaded, so that loads do not wait for each other. The backward pass assigns each source of each
+// block (with many threads, each part of its rows) to one task that processes all samples in order: it needs no
+// atomics, and sums are the same for any number of threads.
 
 #include "compute/virtual_grid.h"
 
@@ -63,7 +64,7 @@ inline void sourceCorners(const VirtualGrid& grid, uint32_t source, const float*
   }
 }
 
-// Attributes as they are mixed: bytes where they are quantised (an eighth of a line of the cache a texel), else floats.
+// The attributes to interpolate: bytes if they are quantised (an eighth of a cache line per texel), otherwise floats.
 struct Texels {
   const uint64_t* bytes = nullptr;
   const float* floats = nullptr;
@@ -77,9 +78,9 @@ HWY_BEFORE_NAMESPACE();
 namespace tessera::cpu::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Eight = hn::CappedTag<float, 8>;
-constexpr size_t kVectors = 8 / hn::MaxLanes(Eight());
-using Attributes = hn::Vec<Eight>[kVectors];
+using Lanes8 = hn::CappedTag<float, 8>;
+constexpr size_t kVectors = 8 / hn::MaxLanes(Lanes8());
+using Attributes = hn::Vec<Lanes8>[kVectors];
 
 void quantiseRows(const float* attributes, size_t begin, size_t end, uint64_t* bytes) {
   for (size_t row = begin; row < end; ++row) {
@@ -92,10 +93,10 @@ void quantiseRows(const float* attributes, size_t begin, size_t end, uint64_t* b
   }
 }
 
-// sums += weight · attributes of a row; what lies beyond the rows counts as a half.
+// sums += weight · attributes of a row; rows beyond the last count as 1/2.
 template <bool kBytes>
 HWY_INLINE void addRow(const Texels& texels, uint32_t row, float weight, Attributes& sums) {
-  const Eight d;
+  const Lanes8 d;
   const auto w = hn::Set(d, weight);
   if (row >= texels.rows) {
     const auto half = hn::Set(d, kBytes ? 127.5f : 0.5f);
@@ -103,8 +104,8 @@ HWY_INLINE void addRow(const Texels& texels, uint32_t row, float weight, Attribu
     return;
   }
   if constexpr (kBytes) {
-    const hn::Rebind<uint8_t, Eight> d8;
-    const hn::RebindToSigned<Eight> di;
+    const hn::Rebind<uint8_t, Lanes8> d8;
+    const hn::RebindToSigned<Lanes8> di;
     const uint8_t* from = reinterpret_cast<const uint8_t*>(texels.bytes + row);
     for (size_t v = 0; v < kVectors; ++v) {
       const auto value = hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(d8, from + v * hn::Lanes(d))));
@@ -116,7 +117,7 @@ HWY_INLINE void addRow(const Texels& texels, uint32_t row, float weight, Attribu
   }
 }
 
-// Where the corners of samples [begin, begin + count) stand.
+// The rows and weights of the corners of a group of samples.
 struct GroupCorners {
   uint32_t row[kGroup][VirtualGrid::kCorners];
   float weight[kGroup][VirtualGrid::kCorners];
@@ -149,8 +150,8 @@ HWY_INLINE void lookUp(const VirtualGrid& grid, const Rows& rows, const uint32_t
 
 template <bool kBytes>
 void forwardRange(const VirtualGridForward& a, const Texels& texels, size_t begin, size_t end) {
-  const Eight d;
-  const Rows rows = rowsOf(a);
+  const Lanes8 d;
+  const Rows rows = makeTexelRows(a);
   const uint32_t* blocks = hostPointer(a.blockOfSample);
   const float* positions = hostPointer(a.positions);
   const float* steps = hostPointer(a.runtimeSteps);
@@ -201,7 +202,7 @@ void forwardFloats(const VirtualGridForward& a, const Texels& texels, size_t beg
   forwardRange<false>(a, texels, begin, end);
 }
 
-// Gradients of the attributes' sums, per sample: [8], times what dequantising multiplies by.
+// The gradients of the sums of attributes per sample, [8], multiplied by the scale of the dequantisation.
 void sumGradients(const VirtualGridBackward& a, size_t begin, size_t end, float* out) {
   const float* logDensities = hostPointer(a.logDensities);
   const float* colours = hostPointer(a.colours);
@@ -217,22 +218,22 @@ void sumGradients(const VirtualGridBackward& a, size_t begin, size_t end, float*
   }
 }
 
-// Adds what all samples of `block` give to the rows [low, high) of one source.
+// Adds the gradients of all samples of `block` to the rows [low, high) of one source.
 void backwardSource(const VirtualGridBackward& a, const float* upstream, size_t samples, uint32_t block,
                     uint32_t source, uint32_t low, uint32_t high) {
-  const Eight d;
-  const Rows rows = rowsOf(a);
+  const Lanes8 d;
+  const Rows rows = makeTexelRows(a);
   const uint32_t* blocks = hostPointer(a.blockOfSample);
   const float* positions = hostPointer(a.positions);
   float* gradients = hostPointer(a.attributeGradients);
   const uint32_t corners = cornersOfSource(source);
-  uint32_t held[kGroup];
+  uint32_t pendingSamples[kGroup];
   uint32_t row[kGroup][8];
-  SourceCorners found[kGroup];
+  SourceCorners pendingCorners[kGroup];
   const auto flush = [&](size_t count) {
     for (size_t s = 0; s < count; ++s) {
       for (uint32_t k = 0; k < corners; ++k) {
-        const uint32_t texel = found[s].texel[k];
+        const uint32_t texel = pendingCorners[s].texel[k];
         row[s][k] = rows.row(rows.word(block, texel), texel);
         if (row[s][k] < high) hwy::Prefetch(gradients + size_t{row[s][k]} * kWidth);
       }
@@ -240,12 +241,12 @@ void backwardSource(const VirtualGridBackward& a, const float* upstream, size_t 
     for (size_t s = 0; s < count; ++s) {
       Attributes g;
       for (size_t v = 0; v < kVectors; ++v) {
-        g[v] = hn::LoadU(d, upstream + size_t{held[s]} * kWidth + v * hn::Lanes(d));
+        g[v] = hn::LoadU(d, upstream + size_t{pendingSamples[s]} * kWidth + v * hn::Lanes(d));
       }
       for (uint32_t k = 0; k < corners; ++k) {
         if (row[s][k] < low || row[s][k] >= high) continue;
         float* to = gradients + size_t{row[s][k]} * kWidth;
-        const auto w = hn::Set(d, found[s].weight[k]);
+        const auto w = hn::Set(d, pendingCorners[s].weight[k]);
         for (size_t v = 0; v < kVectors; ++v, to += hn::Lanes(d)) {
           hn::StoreU(hn::MulAdd(w, g[v], hn::LoadU(d, to)), d, to);
         }
@@ -258,8 +259,8 @@ void backwardSource(const VirtualGridBackward& a, const float* upstream, size_t 
     bool any = false;
     for (uint32_t f = 0; f < kWidth; ++f) any |= upstream[s * kWidth + f] != 0;
     if (!any) continue;
-    held[count] = static_cast<uint32_t>(s);
-    sourceCorners(a.grid, source, positions + 3 * s, found[count]);
+    pendingSamples[count] = static_cast<uint32_t>(s);
+    sourceCorners(a.grid, source, positions + 3 * s, pendingCorners[count]);
     if (++count == kGroup) flush(std::exchange(count, 0));
   }
   flush(count);
@@ -338,7 +339,7 @@ void run(Context& context, const DistinctTexels& a) {
   context.pool.forRanges(all, kWordsPerTask,
                          [&](size_t begin, size_t end) { std::fill(marks + begin, marks + end, 0u); });
   context.pool.forRanges(samples, kSamplesPerTask, [&](size_t begin, size_t end) { markSamples(a, begin, end); });
-  // Bits of each piece of words, then of all before it.
+  // The number of bits in each range of words, then in all ranges before it.
   std::vector<uint32_t> before((all + kWordsPerTask - 1) / kWordsPerTask + 1);
   context.pool.forRanges(all, kWordsPerTask, [&](size_t begin, size_t end) {
     uint32_t bits = 0;
@@ -372,7 +373,7 @@ void run(Context& context, const VirtualGridForward& a) {
     });
     return;
   }
-  // Kept from call to call: fresh pages would cost more than the bytes do.
+  // Reused between calls: fresh pages would cost more than computing the bytes.
   thread_local std::vector<uint64_t> bytes;
   if (bytes.size() < texels) bytes.resize(texels);
   uint64_t* quantised = bytes.data();
@@ -389,9 +390,9 @@ void run(Context& context, const VirtualGridBackward& a) {
   const size_t samples = hostCount(a.samples);
   const uint32_t* first = hostPointer(a.firstTexel);
   const uint32_t rows = hostCount(a.texels);
-  thread_local std::vector<float> kept;
-  if (kept.size() < samples * kWidth) kept.resize(samples * kWidth);
-  float* upstream = kept.data();
+  thread_local std::vector<float> sumGradientBuffer;
+  if (sumGradientBuffer.size() < samples * kWidth) sumGradientBuffer.resize(samples * kWidth);
+  float* upstream = sumGradientBuffer.data();
   const auto ofSums = HWY_DYNAMIC_DISPATCH(sumGradients);
   context.pool.forRanges(samples, kSamplesPerTask, [&](size_t begin, size_t end) { ofSums(a, begin, end, upstream); });
   float* gradients = hostPointer(a.attributeGradients);
@@ -417,8 +418,8 @@ void run(Context& context, const VirtualGridBackward& a) {
     });
     return;
   }
-  // A row's additions happen in sample order whatever the split, so the split may follow the threads. Voxels have twice
-  // the corners of a plane.
+  // The additions to each row are in sample order for any split, so the split may depend on the number of threads.
+  // Voxels have twice as many corners as a plane, and get twice as many parts.
   const auto source = HWY_DYNAMIC_DISPATCH(backwardSource);
   const size_t splits = std::max<size_t>(1, 2 * context.pool.threads() / (kSources * a.blocks));
   const size_t perBlock = (kSources + 1) * splits;
@@ -429,16 +430,15 @@ void run(Context& context, const VirtualGridBackward& a) {
     const bool voxels = part < 2 * splits;
     const uint32_t of = voxels ? 0 : static_cast<uint32_t>((part - 2 * splits) / splits) + 1;
     const uint64_t pieces = voxels ? 2 * splits : splits, piece = voxels ? part : (part - 2 * splits) % splits;
-    // Rows of a source come together; pieces of the rows of that source alone would be evener, but all of the block's
-    // will do where there is only one piece.
-    const Rows rowsOfBlock = rowsOf(a);
-    const auto rowOf = [&](uint32_t texel) {
+    // The rows of a source are consecutive, and each task processes one piece of them.
+    const Rows rowsOfBlock = makeTexelRows(a);
+    const auto findTexelRow = [&](uint32_t texel) {
       return texel >= a.grid.texels()
                  ? high
                  : std::min<uint64_t>(rowsOfBlock.row(rowsOfBlock.word(block, texel), texel), high);
     };
-    const uint64_t begin = rowOf(of == 0 ? 0 : a.grid.planeTexel(static_cast<int>(of) - 1, 0, 0));
-    const uint64_t end = rowOf(a.grid.planeTexel(static_cast<int>(of), 0, 0));
+    const uint64_t begin = findTexelRow(of == 0 ? 0 : a.grid.planeTexel(static_cast<int>(of) - 1, 0, 0));
+    const uint64_t end = findTexelRow(a.grid.planeTexel(static_cast<int>(of), 0, 0));
     source(a, upstream, samples, block, of, static_cast<uint32_t>(begin + (end - begin) * piece / pieces),
            static_cast<uint32_t>(begin + (end - begin) * (piece + 1) / pieces));
   });

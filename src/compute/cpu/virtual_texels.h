@@ -1,4 +1,4 @@
-// Where the texels of a virtual grid stand that a sample is mixed of: for the kernels that mix.
+// The texels of a virtual grid from which a sample is interpolated, and their rows.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 namespace tessera::cpu {
 
-// The two texels along one axis and the share of the upper one.
+// The two texels along one axis and the interpolation weight of the upper one.
 struct TexelPair {
   uint32_t low, high;
   float share;
@@ -24,7 +24,7 @@ inline TexelPair texelPair(float position, uint32_t resolution) {
           static_cast<float>(u - floor)};
 }
 
-struct SourceCorners {  // of one source: 8 of voxels, 4 of a plane
+struct SourceCorners {  // the corners in one source: 8 in the voxels, 4 in a plane
   uint32_t texel[8];
   float weight[8];
 };
@@ -45,7 +45,7 @@ inline void voxelCorners(const VirtualGrid& grid, const float* position, SourceC
   }
 }
 
-// Texel to row.
+// Maps texels to their rows.
 struct Rows {
   const uint32_t* marks = nullptr;  // null: every corner has a row of its own
   const uint32_t* ranks = nullptr;
@@ -58,7 +58,7 @@ struct Rows {
 };
 
 template <class Arguments>
-Rows rowsOf(const Arguments& a) {
+Rows makeTexelRows(const Arguments& a) {
   if (!a.grid.shareTexels) return {};
   return {hostPointer(a.marks), hostPointer(a.ranks), a.grid.words()};
 }

@@ -21,7 +21,7 @@ void adamStep(const Adam& options, double gradient, AdamState& state) {
 
 void run(const Adam& a) {
   const size_t n = a.parameters.count;
-  if (isAnyAbove(a.found, a.room)) {
+  if (isAnyAbove(a.overflowCounters, a.capacity)) {
     std::fill_n(hostPointer(a.gradients), n, 0.0f);
     return;
   }

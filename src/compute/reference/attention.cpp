@@ -15,12 +15,12 @@ double sigmoid(double x) {
   return 1 / (1 + std::exp(-x));
 }
 
-// The logit that weighs a feature of a level; nothing where there are none.
-size_t logitOf(const AttentionShape& shape, size_t level, size_t feature) {
+// The index of the logit that weights a feature of a level; not to be used with AttentionWeights::none.
+size_t logitIndex(const AttentionShape& shape, size_t level, size_t feature) {
   return shape.weights == AttentionWeights::shared ? level : 2 * level + (feature > 0 ? 1 : 0);
 }
 
-// As rows without gaps.
+// The inputs as row-major arrays without gaps.
 struct Inputs {
   Doubles coarse, fine, logits;
 
@@ -31,12 +31,12 @@ struct Inputs {
     fine = doubles(a.fine, samples);
     logits = doubles(a.logits, a.logits.count);
   }
-  View coarseOf(size_t s) const { return View(coarse).subspan(kCoarse * s, kCoarse); }
-  View fineOf(size_t s, uint32_t levels) const {
+  View coarseRow(size_t s) const { return View(coarse).subspan(kCoarse * s, kCoarse); }
+  View fineRow(size_t s, uint32_t levels) const {
     return View(fine).subspan(kFeatures * levels * s, kFeatures * levels);
   }
-  View logitsOf(const AttentionShape& shape, size_t s) const {
-    return shape.varies ? coarseOf(s).subspan(kFeatures, shape.logits()) : View(logits);
+  View logitRow(const AttentionShape& shape, size_t s) const {
+    return shape.varies ? coarseRow(s).subspan(kFeatures, shape.logits()) : View(logits);
   }
 };
 
@@ -47,7 +47,7 @@ Doubles fusedFeatures(const AttentionShape& shape, View coarse, View fine, View 
   for (size_t l = 0; l < shape.levels; ++l) {
     for (size_t f = 0; f < kFeatures; ++f) {
       const bool weighed = shape.weights != AttentionWeights::none;
-      features[f] += (weighed ? sigmoid(logits[logitOf(shape, l, f)]) : 1) * fine[kFeatures * l + f];
+      features[f] += (weighed ? sigmoid(logits[logitIndex(shape, l, f)]) : 1) * fine[kFeatures * l + f];
     }
   }
   return features;
@@ -65,8 +65,8 @@ void run(const AttentionForward& a) {
   Doubles features;
   for (size_t s = 0; s < samples; ++s) {
     Doubles fused =
-        fusedFeatures(a.shape, inputs.coarseOf(s), inputs.fineOf(s, a.shape.levels), inputs.logitsOf(a.shape, s));
-    fused[0] = std::min<double>(fused[0], AttentionShape::kMostDensity);
+        fusedFeatures(a.shape, inputs.coarseRow(s), inputs.fineRow(s, a.shape.levels), inputs.logitRow(a.shape, s));
+    fused[0] = std::min<double>(fused[0], AttentionShape::kMaxDensity);
     features.insert(features.end(), fused.begin(), fused.end());
   }
   store(a.features, features);
@@ -79,16 +79,16 @@ void run(const AttentionBackward& a) {
   const Doubles ofDensity = doubles(a.logDensityGradients, samples), ofColours = doubles(a.colourGradients, samples);
   Doubles coarse, fine, logits(shape.varies ? 0 : shape.logits());
   for (size_t s = 0; s < samples; ++s) {
-    const View fineOf = inputs.fineOf(s, shape.levels), logitsOf = inputs.logitsOf(shape, s);
+    const View fineRow = inputs.fineRow(s, shape.levels), logitRow = inputs.logitRow(shape, s);
     Doubles own(kCoarse);
     for (size_t f = 0; f < kFeatures; ++f) own[f] = f == 0 ? ofDensity[s] : ofColours[(kFeatures - 1) * s + f - 1];
     for (size_t l = 0; l < shape.levels; ++l) {
       for (size_t f = 0; f < kFeatures; ++f) {
         double weight = 1;
         if (shape.weights != AttentionWeights::none) {
-          const size_t logit = logitOf(shape, l, f);
-          weight = sigmoid(logitsOf[logit]);
-          const double slope = own[f] * fineOf[kFeatures * l + f] * weight * (1 - weight);
+          const size_t logit = logitIndex(shape, l, f);
+          weight = sigmoid(logitRow[logit]);
+          const double slope = own[f] * fineRow[kFeatures * l + f] * weight * (1 - weight);
           (shape.varies ? own[kFeatures + logit] : logits[logit]) += slope;
         }
         fine.push_back(weight * own[f]);

@@ -29,7 +29,7 @@ BlendGradients blendRayBackward(bool literal, const RaySegments& segments, const
     before.push_back(transmittance);
     transmittance *= 1 - alpha;
   }
-  double rear = -opacityGradient;  // what one unit of light arriving from behind segment k is worth to the loss
+  double rear = -opacityGradient;  // derivative of the loss with respect to the light arriving from behind segment k
   for (size_t k = n; k-- > 0;) {
     const double alpha = segments.opacities[k], gate = literal ? 1 : alpha;
     double worth = 0, specularWorth = 0;
@@ -48,7 +48,7 @@ BlendGradients blendRayBackward(bool literal, const RaySegments& segments, const
 
 namespace {
 
-// The segments of every ray, owned.
+// Owns the segments of all rays.
 struct AllSegments {
   Indices firstSegment;
   Doubles composited, specular, opacities, depths;

@@ -14,10 +14,10 @@ std::vector<BlockInterval> blockIntervals(const BlockSpace& space, double share,
   std::vector<BlockPiece> pieces;
   blockPath(space, origin, direction, near, pieces);
   std::vector<BlockInterval> intervals;
-  double before = 0;  // length of the pieces in front
+  double before = 0;  // total length of the pieces in front
   for (const BlockPiece& piece : pieces) {
     const DomainSegment& s = piece.segment;
-    const double half = domainOf(space.placement(piece.block)).half();
+    const double half = makeBlockDomain(space.placement(piece.block)).half();
     const double step = share * 2 * half;
     for (uint64_t i = 0; i == 0 || (static_cast<double>(i) - 1 + jitter) * step < s.length; ++i) {
       const double from = std::max(0.0, (static_cast<double>(i) - 1 + jitter) * step);
@@ -49,15 +49,15 @@ void run(const MarchBlocks& a) {
   const Indices occupancy = indices(a.occupancy, a.occupancy.count);
   uint32_t* const nextStep = hostPointer(a.nextStep);
   Doubles positions, distances, steps, middles, widths;
-  uint32_t made = 0, finished = 0;
+  uint32_t sampleCount = 0, finished = 0;
   bool full = false;
   hostPointer(a.firstSample)[0] = 0;
   for (size_t r = 0; r < rays; ++r) {
-    const bool opaque = !opticalDepth.empty() && opticalDepth[r] > a.mostOpticalDepth;
+    const bool opaque = !opticalDepth.empty() && opticalDepth[r] > a.maxOpticalDepth;
     const uint32_t first = nextStep ? nextStep[r] : 0;
-    uint32_t next = opaque || a.most == 0 ? first : MarchBlocks::kThrough;
+    uint32_t next = opaque || a.maximum == 0 ? first : MarchBlocks::kThrough;
     std::vector<std::pair<uint32_t, BlockInterval>> samples;  // with their slots
-    if (!opaque && a.most > 0 && first != MarchBlocks::kThrough) {
+    if (!opaque && a.maximum > 0 && first != MarchBlocks::kThrough) {
       const std::vector<BlockInterval> intervals = blockIntervals(
           a.space, a.step, {origins[3 * r], origins[3 * r + 1], origins[3 * r + 2]},
           {directions[3 * r], directions[3 * r + 1], directions[3 * r + 2]}, jitter.empty() ? 1 : jitter[r],
@@ -72,17 +72,17 @@ void run(const MarchBlocks& a) {
         }
         if ((occupancy[slot * words + cell / 32] >> cell % 32 & 1) == 0) continue;
         samples.emplace_back(slot, intervals[i]);
-        if (samples.size() == a.most) next = i + 1;
+        if (samples.size() == a.maximum) next = i + 1;
       }
     }
-    full = full || made + samples.size() > a.sampleCapacity;
+    full = full || sampleCount + samples.size() > a.sampleCapacity;
     if (!full) {
       ++finished;
       if (nextStep) nextStep[r] = next;
       for (const auto& [slot, sample] : samples) {
-        hostPointer(a.rayOfSample)[made] = static_cast<uint32_t>(r);
-        hostPointer(a.slotOfSample)[made] = slot;
-        ++made;
+        hostPointer(a.rayOfSample)[sampleCount] = static_cast<uint32_t>(r);
+        hostPointer(a.slotOfSample)[sampleCount] = slot;
+        ++sampleCount;
         positions.insert(positions.end(), sample.position.begin(), sample.position.end());
         distances.push_back(sample.distance);
         steps.push_back(sample.step);
@@ -90,9 +90,9 @@ void run(const MarchBlocks& a) {
         widths.push_back(sample.width);
       }
     }
-    hostPointer(a.firstSample)[r + 1] = made;
+    hostPointer(a.firstSample)[r + 1] = sampleCount;
   }
-  hostPointer(a.sampleCount)[0] = made;
+  hostPointer(a.sampleCount)[0] = sampleCount;
   if (a.finishedRays) hostPointer(a.finishedRays)[0] = finished;
   store(a.positions, positions);
   store(a.distances, distances);

@@ -17,13 +17,13 @@ double length(const Point& x) {
   return std::hypot(x[0], x[1], x[2]);
 }
 
-Point localOf(const BlockSpace::Placement& placement, const Point& x) {
+Point toLocalPoint(const BlockSpace::Placement& placement, const Point& x) {
   Point q;
   for (int a = 0; a < 3; ++a) q[a] = (x[a] - placement.centre[a]) / placement.scale[a];
   return q;
 }
 
-// The length in t of one texel at local coordinates q along `direction`; 0 without a direction.
+// The length in t of one texel along `direction` at the local coordinates q; 0 if the direction is zero.
 double runtimeStepAt(const BlockSpace::Placement& placement, uint32_t texels, const Point& q, const Point& direction) {
   Point along;
   for (int a = 0; a < 3; ++a) along[a] = direction[a] / placement.scale[a];
@@ -36,8 +36,8 @@ struct Post {
   double s, t;
 };
 
-// The fence posts, with `split` those at walls as well.
-std::vector<Post> postsOf(const BlockSpace& space, const FencedRay& ray, bool split) {
+// The ends of all intervals: the fences and, with `split`, the cuts at walls.
+std::vector<Post> listPosts(const BlockSpace& space, const FencedRay& ray, bool split) {
   std::vector<Post> posts;
   for (double s : ray.fences) posts.push_back({s, space.distanceAt(s, ray.near, ray.far)});
   if (!split || ray.direction == Point{}) return posts;
@@ -47,7 +47,7 @@ std::vector<Post> postsOf(const BlockSpace& space, const FencedRay& ray, bool sp
     for (int wall = 2 - cells; wall < cells && ray.direction[axis] != 0; wall += 2)
       cuts.push_back((wall - ray.origin[axis]) / ray.direction[axis]);
   }
-  if (space.surround == Surround::own) cuts.push_back(ray.far);
+  if (space.backgroundBlock == BackgroundBlock::own) cuts.push_back(ray.far);
   for (double t : cuts) {
     const double s = space.shareAt(t, ray.near, ray.far);
     const auto next =
@@ -77,7 +77,7 @@ std::array<double, 2> rangeInScene(const BlockSpace& space, const Point& origin,
     leave = std::min(leave, std::max(toLow, toHigh));
   }
   if (enter < leave) return {enter, leave};
-  return {near, space.surround == Surround::none ? near : near + 1 + length(origin)};
+  return {near, space.backgroundBlock == BackgroundBlock::none ? near : near + 1 + length(origin)};
 }
 
 Doubles firstFences(uint32_t intervals, double jitter) {
@@ -88,7 +88,7 @@ Doubles firstFences(uint32_t intervals, double jitter) {
 }
 
 std::vector<BlockSample> blockSamples(const BlockSpace& space, const FencedRay& ray, bool split, uint32_t texels) {
-  const std::vector<Post> posts = postsOf(space, ray, split);
+  const std::vector<Post> posts = listPosts(space, ray, split);
   std::vector<BlockSample> samples;
   for (size_t i = 0; i + 1 < posts.size(); ++i) {
     const Post &from = posts[i], &to = posts[i + 1];
@@ -98,7 +98,7 @@ std::vector<BlockSample> blockSamples(const BlockSpace& space, const FencedRay& 
     for (int a = 0; a < 3; ++a) x[a] = ray.origin[a] + sample.distance * ray.direction[a];
     sample.block = space.blockAt(x[0], x[1], x[2]);
     const BlockSpace::Placement placement = space.placement(sample.block);
-    const Point q = localOf(placement, x), y = placement.contracted ? contract(q) : q;
+    const Point q = toLocalPoint(placement, x), y = placement.contracted ? contract(q) : q;
     const double half = placement.halfDomain();
     bool inside = true;
     for (int a = 0; a < 3; ++a) {
@@ -118,24 +118,24 @@ std::vector<BlockSample> blockSamples(const BlockSpace& space, const FencedRay& 
 BlockPoint blockPoint(const BlockSpace& space, Indices blocks, uint32_t texels, uint64_t seed, uint32_t point) {
   const RandomStream random(seed, 0x5ba);
   const uint64_t first = 8 * uint64_t{point};
-  BlockPoint made;
-  made.block = blocks[random.below(first, static_cast<uint32_t>(blocks.size()))];
-  const BlockSpace::Placement placement = space.placement(made.block);
+  BlockPoint result;
+  result.block = blocks[random.below(first, static_cast<uint32_t>(blocks.size()))];
+  const BlockSpace::Placement placement = space.placement(result.block);
   const double half = placement.halfDomain();
   Point y;
   for (int a = 0; a < 3; ++a) {
     const double u = random.uniform(first + 1 + a);
     y[a] = half * (2 * u - 1);
     if (a == 2 && !placement.contracted) y[a] = space.bottom + u * (static_cast<double>(space.top) - space.bottom);
-    made.position[a] = (y[a] + half) / (2 * half);
+    result.position[a] = (y[a] + half) / (2 * half);
   }
   const double z = 2.0 * random.uniform(first + 4) - 1, angle = 2 * std::numbers::pi * random.uniform(first + 5);
   const double across = std::sqrt(1 - z * z);
-  const double most = half - 1 / BlockSpace::kFarthest;
-  for (double& coordinate : y) coordinate = std::clamp(coordinate, -most, most);
-  made.runtimeStep = runtimeStepAt(placement, texels, placement.contracted ? uncontract(y) : y,
-                                   {across * std::cos(angle), across * std::sin(angle), z});
-  return made;
+  const double maximum = half - 1 / BlockSpace::kFarthest;
+  for (double& coordinate : y) coordinate = std::clamp(coordinate, -maximum, maximum);
+  result.runtimeStep = runtimeStepAt(placement, texels, placement.contracted ? uncontract(y) : y,
+                                     {across * std::cos(angle), across * std::sin(angle), z});
+  return result;
 }
 
 void run(const EnterScene& a) {
@@ -175,9 +175,9 @@ void run(const BlockSamples& a) {
     bool first = true;
     for (BlockSample& sample : blockSamples(a.space, ray, a.split, a.texels)) {
       if (!slots.empty()) {
-        const bool held = slots[sample.block] != kNoSlot;
-        sample.block = held ? slots[sample.block] : 0;
-        if (!held) sample.step = 0;
+        const bool hasSlot = slots[sample.block] != kNoSlot;
+        sample.block = hasSlot ? slots[sample.block] : 0;
+        if (!hasSlot) sample.step = 0;
       }
       const uint32_t group = groups.empty() ? sample.block : groups[sample.block];
       if (first || group != groupOfSegment.back()) {
@@ -198,13 +198,13 @@ void run(const BlockSamples& a) {
     firstSegment.push_back(static_cast<uint32_t>(groupOfSegment.size()));
   }
   firstSampleOfSegment.push_back(firstSample.back());
-  const size_t made = blocks.size();
+  const size_t sampleCount = blocks.size();
   const auto rows = [&](const Slice<float>& slice, size_t columns) {
-    return slice && made > 0 ? slice.part(a.firstRow * columns, made * columns) : Slice<float>();
+    return slice && sampleCount > 0 ? slice.part(a.firstRow * columns, sampleCount * columns) : Slice<float>();
   };
   store(a.firstSample, firstSample);
   *hostPointer(a.rowCount) = firstSample.back();
-  if (made > 0) store(a.blockOfSample.part(a.firstRow, made), blocks);
+  if (sampleCount > 0) store(a.blockOfSample.part(a.firstRow, sampleCount), blocks);
   store(rows(a.positions, 3), positions);
   store(rows(a.distances, 1), distances);
   store(rows(a.steps, 1), steps);
@@ -243,7 +243,7 @@ void run(const GroupByBlock& a) {
       if (blockOfSample[row] == block) source.push_back(row);
     first.push_back(static_cast<uint32_t>(source.size()));
   }
-  CHECK(source.size() == blockOfSample.size());  // no block beyond the last
+  CHECK(source.size() == blockOfSample.size());  // no sample has an invalid block
   store(a.firstOfBlock, first);
   store(a.source, source);
 }

@@ -8,7 +8,7 @@
 
 namespace tessera::reference {
 
-double opacityOf(Extinction extinction, double x, double step) {
+double computeOpacity(Extinction extinction, double x, double step) {
   switch (extinction) {
     case Extinction::opacity:
       return x;
@@ -26,7 +26,7 @@ RayColour compositeRay(Extinction extinction, double minTransmittance, const Ray
   ray.weights.resize(samples.x.size());
   double transmittance = 1;
   for (size_t i = 0; i < samples.x.size() && transmittance >= minTransmittance; ++i) {
-    const double alpha = opacityOf(extinction, samples.x[i], samples.steps.empty() ? 0 : samples.steps[i]);
+    const double alpha = computeOpacity(extinction, samples.x[i], samples.steps.empty() ? 0 : samples.steps[i]);
     const double weight = transmittance * alpha;
     ray.weights[i] = weight;
     for (size_t c = 0; c < samples.columns; ++c) ray.colour[c] += weight * samples.colours[samples.columns * i + c];
@@ -48,10 +48,10 @@ RayGradients compositeRayBackward(Extinction extinction, double minTransmittance
   while (alphas.size() < all && transmittance >= minTransmittance) {
     const size_t i = alphas.size();
     before.push_back(transmittance);
-    alphas.push_back(opacityOf(extinction, samples.x[i], samples.steps.empty() ? 0 : samples.steps[i]));
+    alphas.push_back(computeOpacity(extinction, samples.x[i], samples.steps.empty() ? 0 : samples.steps[i]));
     transmittance *= 1 - alphas[i];
   }
-  // What one unit of light arriving from behind sample i is worth to the loss. Opacity is 1 - T.
+  // The derivative of the loss with respect to the light arriving from behind sample i. Opacity is 1 - T.
   double rear = -opacityGradient;
   for (size_t c = 0; c < samples.background.size(); ++c) rear += colourGradient[c] * samples.background[c];
   for (size_t i = alphas.size(); i-- > 0;) {
@@ -73,7 +73,7 @@ RayGradients compositeRayBackward(Extinction extinction, double minTransmittance
 
 namespace {
 
-// The samples of every ray, owned.
+// Owns the samples of all rays.
 struct AllSamples {
   Indices firstSample;
   Doubles x, steps, distances, colours, background;

@@ -1,4 +1,4 @@
-// Between the float buffers of the host and the plain double arrays of functions.h.
+// Conversions between the float buffers of the host and the plain double arrays of functions.h.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace tessera::reference {
 
-// The first `count` elements of a slice; nothing of an empty slice.
+// The first `count` elements of a slice; an empty array for an empty slice.
 inline Doubles doubles(const Slice<const float>& slice, size_t count) {
   if (!slice) return {};
   CHECK(count <= slice.count);
@@ -16,7 +16,7 @@ inline Doubles doubles(const Slice<const float>& slice, size_t count) {
   return Doubles(from, from + count);
 }
 
-// Rows of a slice of `columns` numbers a row.
+// The given rows of a slice with `columns` numbers per row.
 inline Doubles doublesOfRows(const Slice<const float>& slice, size_t columns, const HostRows& rows) {
   if (!slice) return {};
   return doubles(slice.part(columns * rows.begin, columns * rows.count()), columns * rows.count());
@@ -28,7 +28,7 @@ inline Indices indices(const Slice<const uint32_t>& slice, size_t count) {
   return {hostPointer(slice), count};
 }
 
-// The first `rows` rows of a matrix of any layout, row-major without gaps.
+// The first `rows` rows of a matrix in any layout, as a row-major array without gaps.
 inline Doubles doubles(const Matrix<const float>& matrix, size_t rows) {
   Doubles values;
   if (!matrix) return values;

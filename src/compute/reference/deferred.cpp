@@ -14,7 +14,7 @@ constexpr uint32_t kWidths[kLayers + 1] = {DeferredNetwork::kInputs, DeferredNet
                                            3};
 
 struct Layers {
-  Doubles values[kLayers + 1];  // the input, then what leaves each layer
+  Doubles values[kLayers + 1];  // the input, then the output of each layer
 };
 
 Layers throughLayers(View network, View composited, const double direction[3]) {
@@ -48,7 +48,7 @@ Point deferredForward(View network, View composited, const double direction[3]) 
 DeferredGradients deferredBackward(View network, View composited, const double direction[3], const Point& gradient) {
   const Layers layers = throughLayers(network, composited, direction);
   DeferredGradients gradients{Doubles(network.size()), {}};
-  Doubles upstream(gradient.begin(), gradient.end());  // with respect to what leaves layer l
+  Doubles upstream(gradient.begin(), gradient.end());  // gradient with respect to the output of layer l
   for (uint32_t l = kLayers; l-- > 0;) {
     const uint32_t first = DeferredNetwork::kWeights[l], inputs = kWidths[l], outputs = kWidths[l + 1];
     Doubles below(inputs);

@@ -7,8 +7,8 @@
 
 namespace tessera {
 
-// Every operation on float buffers in HostMemory: reads doubles, calls functions.h, stores floats. One file per
-// interface header.
+// Every operation on float buffers in HostMemory: converts inputs to double, calls functions.h and stores floats. There
+// is one file per interface header.
 namespace reference {
 #define TESSERA_DECLARE(name) void run(const name&);
 TESSERA_OPERATIONS(TESSERA_DECLARE)

@@ -1,4 +1,4 @@
-// The scalar device that defines the mathematics.
+// The reference device: scalar code in double that defines the results of all operations.
 #pragma once
 
 #include <memory>

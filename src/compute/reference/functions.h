@@ -1,6 +1,7 @@
-// The mathematics of every operation, in double, without devices: what the reference device wraps, what the other
-// devices are compared with, and what gradients are checked against by finite differences. Arrays are plain, row-major
-// and exactly as long as the samples, rays or points given; meanings are those of the operation's own header.
+// The mathematics of every operation in double, independent of devices. The reference device wraps these functions, the
+// other devices are compared with them, and gradients are checked against their finite differences. Arrays are plain,
+// row-major and exactly as long as the number of samples, rays or points; the header of each operation defines their
+// meaning.
 #pragma once
 
 #include <array>
@@ -51,7 +52,7 @@ MlpResult mlpForward(const MlpShape& shape, size_t samples, View input, View wei
 struct MlpGradients {
   Doubles weights, input;
 };
-// `outputGradients` already holds what firstOutputGradients adds.
+// `outputGradients` already includes MlpBackward::firstOutputGradients.
 MlpGradients mlpBackward(const MlpShape& shape, size_t samples, View input, View weights, View output, View activations,
                          View outputGradients);
 
@@ -66,8 +67,8 @@ using Point = std::array<double, 3>;
 Point contract(const Point& x);    // MERF, eq. 4
 Point uncontract(const Point& y);  // its inverse
 Point gridFromScene(const MarchSpace& space, const Point& x);
-uint32_t cellOf(const MarchSpace& space, const Point& u);
-Point generateRay(const RayCamera& camera, double pixelX, double pixelY);  // direction; zero where there is none
+uint32_t occupancyCellIndex(const MarchSpace& space, const Point& u);
+Point generateRay(const RayCamera& camera, double pixelX, double pixelY);  // unit direction, or zero if there is none
 
 struct MarchSample {
   uint64_t step = 0;  // k of the lattice position n = k + jitter
@@ -75,7 +76,7 @@ struct MarchSample {
   Point u{};  // grid coordinates
   uint32_t cell = 0;
 };
-// Every lattice position inside the space, occupied or not: the definition of the march is these, filtered.
+// Every lattice position inside the space, occupied or not. By definition, marching keeps the occupied ones of these.
 std::vector<MarchSample> latticeOfRay(const MarchSpace& space, const Point& origin, const Point& direction,
                                       double jitter, double far);
 std::vector<MarchSample> marchRay(const MarchSpace& space, const Point& origin, const Point& direction, double jitter,
@@ -84,9 +85,9 @@ std::vector<MarchSample> marchRay(const MarchSpace& space, const Point& origin, 
 // occupancy.cpp
 struct OccupancyChoice {
   std::vector<uint32_t> cells;
-  std::vector<float> positions;  // [points][3]; float, because every device must find the same bits
+  std::vector<float> positions;  // [points][3]; float, because every device must compute the same bits
 };
-// `candidates` empty: all cells.
+// All cells are candidates if `candidates` is empty.
 OccupancyChoice occupancyPoints(const MarchSpace& space, uint32_t uniform, uint32_t occupied, uint64_t seed,
                                 Indices candidates, Indices occupancy);
 double marchStepAtCell(const MarchSpace& space, uint32_t cell);
@@ -110,7 +111,7 @@ struct BlockSample {
   double middle = 0, width = 0;  // in s
   double runtimeStep = 0;
 };
-// `texels` 0: no runtime steps.
+// Runtime steps are not computed if `texels` is 0.
 std::vector<BlockSample> blockSamples(const BlockSpace& space, const FencedRay& ray, bool split, uint32_t texels);
 struct BlockPoint {
   uint32_t block = 0;
@@ -119,7 +120,7 @@ struct BlockPoint {
 };
 BlockPoint blockPoint(const BlockSpace& space, Indices blocks, uint32_t texels, uint64_t seed, uint32_t point);
 
-// block_march.cpp: all intervals of one ray, whether anything is there or not
+// block_march.cpp: all intervals of one ray, occupied or not
 struct BlockInterval {
   uint32_t block = 0;
   Point position{};
@@ -131,7 +132,7 @@ std::vector<BlockInterval> blockIntervals(const BlockSpace& space, double share,
 
 // proposals.cpp: one ray
 Doubles resampledFences(View fences, View weights, uint32_t after, double anneal, double padding, double jitter);
-// One ray of InterlevelLoss, unscaled; gradients of `weights`, those of the proposal.
+// One ray of InterlevelLoss, unscaled; the gradients are with respect to `weights`, the weights of the proposal.
 LossAndGradients interlevelLossOfRay(View fences, View weights, View middles, View widths, View sampleWeights);
 
 // composite.cpp: one ray
@@ -145,7 +146,7 @@ struct RayColour {
   double opacity = 0, depth = 0;
   Doubles weights;
 };
-double opacityOf(Extinction extinction, double x, double step);
+double computeOpacity(Extinction extinction, double x, double step);
 RayColour compositeRay(Extinction extinction, double minTransmittance, const RaySamples& samples);
 struct RayGradients {
   Doubles x, colours;
@@ -161,13 +162,14 @@ struct VirtualCorner {
   double weight = 0;
 };
 std::vector<VirtualCorner> virtualCorners(const VirtualGrid& grid, const Point& position);
-// Where DistinctTexels has put a corner of a sample.
+// The row to which DistinctTexels assigned a corner of a sample.
 size_t virtualRow(const VirtualGrid& grid, Indices marks, Indices ranks, uint32_t block, size_t sample, size_t corner,
                   uint32_t texel);
 double quantised(const VirtualGrid& grid, double attribute);
-// Log density, 3 diffuse, 4 features of a sample whose corners have these (quantised) attributes, [corners][8].
+// Log density, 3 diffuse colours and 4 features of a sample whose corners have the (quantised) `attributes`,
+// [corners][8].
 Doubles virtualSample(const VirtualGrid& grid, std::span<const VirtualCorner> corners, View attributes);
-// attention.cpp: one sample; its log density without a bound
+// attention.cpp: one sample; its log density is not clamped
 Doubles fusedFeatures(const AttentionShape& shape, View coarse, View fine, View logits);
 Point shadedColour(const double diffuse[3], const double specular[3], double opacity);
 // deferred.cpp: one segment of a ray
@@ -197,16 +199,16 @@ struct ValueAndSlope {
   double value = 0, slope = 0;
 };
 ValueAndSlope colourLoss(ColourLossKind kind, double parameter, double residual);
-double warpDistance(double t);  // MERF's g
-// On normalised fence posts directly: bin i is [fences[i], fences[i+1]]. By the double sum.
+double warpDistance(double t);  // g of DistortionLoss (MERF)
+// Distortion of bins [fences[i], fences[i+1]] on normalised positions, computed by the double sum.
 LossAndGradients distortionOfFences(View fences, View weights);
 // One ray of DistortionLoss, unscaled; intervals need not touch.
 LossAndGradients distortionOfRay(View weights, View distances, View steps, bool normalised = false);
 // One ray of DepthLoss, unscaled.
 LossAndGradients depthLossOfRay(double known, double tolerance, View weights, View distances);
-// The order in which S3imLoss takes `rays` rays for its patch of that number.
+// The order in which S3imLoss uses `rays` rays in patch `patch`.
 std::vector<uint32_t> s3imOrder(uint32_t rays, uint32_t patch, uint64_t seed);
-// One channel of a group of 16; gradient with respect to x.
+// SSIM of one channel of a group of 16 rays; the gradient is with respect to x.
 LossAndGradients ssimOfGroup(const double x[16], const double y[16]);
 // All rays, unscaled; `weights` may be empty.
 LossAndGradients s3imLoss(View predicted, View target, View weights, uint32_t patches, uint64_t seed);

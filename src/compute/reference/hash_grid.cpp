@@ -8,7 +8,7 @@
 namespace tessera::reference {
 namespace {
 
-// The eight corners around a sample in one level: their table entries and, per axis, how much each side counts.
+// The eight corners around a sample in one level: their table entries and the interpolation weights per axis.
 struct Cell {
   size_t entry[8];
   double side[3][2];

@@ -10,7 +10,7 @@ namespace {
 
 constexpr size_t kColumns = LatticeForward::kColumns;
 
-// call(sample, corner's row, weight) for every corner whose row is below `rows`.
+// Calls call(sample, row of the corner, weight) for every corner whose row is below `rows`.
 template <class Arguments, class Call>
 void forCorners(const Arguments& a, size_t rows, const Call& call) {
   CHECK(a.grid.planes == 0u);

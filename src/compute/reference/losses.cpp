@@ -11,7 +11,7 @@
 namespace tessera::reference {
 namespace {
 
-// Σ_ij w_i w_j |s_i - s_j| + Σ_i w_i² Δ_i / 3, over bins [from, to].
+// Σ_ij w_i w_j |s_i - s_j| + Σ_i w_i² Δ_i / 3 over the bins [from, to].
 LossAndGradients distortionOfBins(View weights, View from, View to) {
   const size_t n = weights.size();
   LossAndGradients result{0, Doubles(n)};

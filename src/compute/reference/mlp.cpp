@@ -8,7 +8,7 @@
 namespace tessera::reference {
 namespace {
 
-// What layer `l` reads for a sample, element i: the input padded with zeros, or the hidden layer before it.
+// Element i of the input of layer `l` for one sample: of the input padded with zeros, or of the hidden layer before it.
 double layerInput(const MlpShape& shape, int l, size_t samples, size_t s, int i, View input, View activations) {
   if (l == 0) return i < shape.inputs ? input[s * shape.inputs + i] : 0;
   return activations[(static_cast<size_t>(l - 1) * samples + s) * shape.width + i];
@@ -76,12 +76,12 @@ void run(const MlpForward& a) {
   CHECK(a.output.columns <= static_cast<uint32_t>(a.shape.outputs));
   const MlpResult result = mlpForward(a.shape, samples, doubles(a.input.rowsFrom(rows.begin), samples),
                                       doubles(a.weights, a.shape.parameters()));
-  Doubles wanted;
+  Doubles firstColumns;
   for (size_t s = 0; s < samples; ++s) {
     const auto row = result.output.begin() + static_cast<ptrdiff_t>(s * a.shape.outputs);
-    wanted.insert(wanted.end(), row, row + a.output.columns);
+    firstColumns.insert(firstColumns.end(), row, row + a.output.columns);
   }
-  store(a.output.rowsFrom(rows.begin), wanted);
+  store(a.output.rowsFrom(rows.begin), firstColumns);
   for (size_t l = 0; a.activations && l < static_cast<size_t>(a.shape.hiddenLayers); ++l)
     store(a.activations.part((l * a.samples.capacity + rows.begin) * width, samples * width),
           View(result.activations).subspan(l * samples * width, samples * width));

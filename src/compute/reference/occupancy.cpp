@@ -23,7 +23,7 @@ OccupancyChoice occupancyPoints(const MarchSpace& space, uint32_t uniform, uint3
   const uint32_t resolution = space.gridResolution;
   const uint32_t all =
       candidates.empty() ? resolution * resolution * resolution : static_cast<uint32_t>(candidates.size());
-  const auto cellOf = [&](uint32_t candidate) { return candidates.empty() ? candidate : candidates[candidate]; };
+  const auto candidateCell = [&](uint32_t candidate) { return candidates.empty() ? candidate : candidates[candidate]; };
   const RandomStream random(seed, 0x0cc);
   OccupancyChoice choice;
   for (uint64_t i = 0; i < uint64_t{uniform} + occupied; ++i) {
@@ -31,11 +31,11 @@ OccupancyChoice occupancyPoints(const MarchSpace& space, uint32_t uniform, uint3
     uint32_t cell = 0;
     if (i >= uniform) {
       for (uint32_t attempt = 0; attempt < 10; ++attempt) {
-        cell = cellOf(random.below(index + attempt, all));
+        cell = candidateCell(random.below(index + attempt, all));
         if (occupancy[cell / 32] >> cell % 32 & 1) break;
       }
     } else {
-      cell = cellOf(uniform == all ? static_cast<uint32_t>(i) : random.below(index, all));
+      cell = candidateCell(uniform == all ? static_cast<uint32_t>(i) : random.below(index, all));
     }
     choice.cells.push_back(cell);
     const uint32_t corner[3] = {cell % resolution, cell / resolution % resolution, cell / resolution / resolution};

@@ -9,21 +9,23 @@
 
 namespace tessera::reference {
 
-Doubles resampledFences(View fences, View weights, uint32_t after, double anneal, double padding, double jitter) {
+Doubles resampledFences(View fences, View weights, uint32_t after, double anneal, double uniformFraction,
+                        double jitter) {
   const size_t before = weights.size();
   Doubles share;
   for (double weight : weights) share.push_back(std::pow(weight, anneal));
   const double sum = std::accumulate(share.begin(), share.end(), 0.0);
   Doubles cumulative{0};
   for (double s : share) {
-    const double p = sum > 0 ? (1 - padding) * s / sum + padding / static_cast<double>(before) : 1.0 / before;
+    const double p =
+        sum > 0 ? (1 - uniformFraction) * s / sum + uniformFraction / static_cast<double>(before) : 1.0 / before;
     cumulative.push_back(std::min(1.0, cumulative.back() + p));
   }
   cumulative.back() = 1;
   Doubles resampled{fences.front()};
   for (uint32_t i = 1; i < after; ++i) {
     const double u = (i + jitter - 0.5) / after;
-    // The last bin that begins at or before u.
+    // Finds the last bin that begins at or before u.
     const auto next = std::upper_bound(cumulative.begin(), cumulative.end() - 1, u);
     const size_t bin = static_cast<size_t>(next - cumulative.begin()) - 1;
     const double along = (u - cumulative[bin]) / (cumulative[bin + 1] - cumulative[bin]);
@@ -59,7 +61,7 @@ void run(const ResampleFences& a) {
   for (size_t r = 0; r < rays; ++r) {
     const Doubles ofRay =
         resampledFences(View(fences).subspan(posts * r, posts), View(weights).subspan(a.before * r, a.before), a.after,
-                        a.anneal, a.padding, jitter.empty() ? 0.5 : jitter[r]);
+                        a.anneal, a.uniformFraction, jitter.empty() ? 0.5 : jitter[r]);
     resampled.insert(resampled.end(), ofRay.begin(), ofRay.end());
   }
   store(a.resampled, resampled);

@@ -25,7 +25,7 @@ Point gridFromScene(const MarchSpace& space, const Point& x) {
   return {(y[0] + 2) / 4, (y[1] + 2) / 4, (y[2] + 2) / 4};
 }
 
-uint32_t cellOf(const MarchSpace& space, const Point& u) {
+uint32_t occupancyCellIndex(const MarchSpace& space, const Point& u) {
   const int resolution = space.gridResolution;
   uint32_t cell[3];
   for (int a = 0; a < 3; ++a) cell[a] = std::clamp(static_cast<int>(u[a] * resolution), 0, resolution - 1);
@@ -48,7 +48,7 @@ std::vector<MarchSample> latticeOfRay(const MarchSpace& space, const Point& orig
   std::vector<MarchSample> samples;
   if (direction == Point{}) return samples;
   const double end = std::min(far, static_cast<double>(space.far));
-  // Nothing of a bounded space is farther away than this.
+  // No point of a bounded space is farther away than this.
   const double reach = std::hypot(origin[0], origin[1], origin[2]) + 2;
   const double first = std::ceil(space.stepIndex(space.near) - jitter);
   uint64_t k = static_cast<uint64_t>(std::max(0.0, first));
@@ -64,7 +64,7 @@ std::vector<MarchSample> latticeOfRay(const MarchSpace& space, const Point& orig
     sample.u = gridFromScene(space, x);
     const bool outside = std::any_of(sample.u.begin(), sample.u.end(), [](double u) { return u < 0 || u >= 1; });
     if (!space.contracted && outside) continue;
-    sample.cell = cellOf(space, sample.u);
+    sample.cell = occupancyCellIndex(space, sample.u);
     samples.push_back(sample);
   }
 }
@@ -100,7 +100,7 @@ void run(const MarchRays& a) {
   const Indices occupancy = indices(a.occupancy, a.occupancy.count);
   uint32_t* const nextStep = hostPointer(a.nextStep);
   Doubles positions, distances, steps;
-  uint32_t made = 0;
+  uint32_t sampleCount = 0;
   bool full = false;
   uint32_t finished = 0;
   hostPointer(a.firstSample)[0] = 0;
@@ -108,28 +108,29 @@ void run(const MarchRays& a) {
     const Point origin = {origins[3 * r], origins[3 * r + 1], origins[3 * r + 2]};
     const Point direction = {directions[3 * r], directions[3 * r + 1], directions[3 * r + 2]};
     std::vector<MarchSample> samples;
-    const bool opaque = !opticalDepth.empty() && opticalDepth[r] > a.mostOpticalDepth;
+    const bool opaque = !opticalDepth.empty() && opticalDepth[r] > a.maxOpticalDepth;
     if (!opaque)
       samples = marchRay(a.space, origin, direction, jitter.empty() ? 0 : jitter[r],
                          farOfRay.empty() ? a.space.far : farOfRay[r], occupancy);
     if (nextStep) std::erase_if(samples, [&](const MarchSample& sample) { return sample.step < nextStep[r]; });
-    if (samples.size() > a.most) samples.resize(a.most);
-    full = full || made + samples.size() > a.sampleCapacity;
+    if (samples.size() > a.maximum) samples.resize(a.maximum);
+    full = full || sampleCount + samples.size() > a.sampleCapacity;
     if (!full) {
       ++finished;
-      if (nextStep && !opaque && a.most > 0)
-        nextStep[r] = samples.size() == a.most ? static_cast<uint32_t>(samples.back().step) + 1 : MarchRays::kThrough;
+      if (nextStep && !opaque && a.maximum > 0)
+        nextStep[r] =
+            samples.size() == a.maximum ? static_cast<uint32_t>(samples.back().step) + 1 : MarchRays::kThrough;
       for (const MarchSample& sample : samples) {
-        if (a.rayOfSample) hostPointer(a.rayOfSample)[made] = static_cast<uint32_t>(r);
-        ++made;
+        if (a.rayOfSample) hostPointer(a.rayOfSample)[sampleCount] = static_cast<uint32_t>(r);
+        ++sampleCount;
         positions.insert(positions.end(), sample.u.begin(), sample.u.end());
         distances.push_back(sample.distance);
         steps.push_back(sample.length);
       }
     }
-    hostPointer(a.firstSample)[r + 1] = made;
+    hostPointer(a.firstSample)[r + 1] = sampleCount;
   }
-  hostPointer(a.sampleCount)[0] = made;
+  hostPointer(a.sampleCount)[0] = sampleCount;
   if (a.finishedRays) hostPointer(a.finishedRays)[0] = finished;
   store(a.positions, positions);
   store(a.distances, distances);
@@ -152,32 +153,32 @@ void run(const CompactSamples& a) {
   const size_t rays = hostCount(a.rays);
   const Indices firstSample = indices(a.firstSample, a.rounds * (a.rays.capacity + size_t{1}));
   const Indices nextStep = indices(a.nextStep, rays);
-  uint32_t made = 0, finished = 0;
+  uint32_t keptCount = 0, finished = 0;
   bool full = false;
   hostPointer(a.keptFirstSample)[0] = 0;
   for (size_t r = 0; r < rays; ++r) {
     double opticalDepth = 0;
-    std::vector<uint32_t> kept;
+    std::vector<uint32_t> keptRows;
     for (uint32_t round = 0; round < a.rounds; ++round) {
       const Indices first = firstSample.subspan(round * (a.rays.capacity + size_t{1}) + r, 2);
-      for (uint32_t i = first[0]; i < first[1] && opticalDepth <= a.mostOpticalDepth; ++i) {
+      for (uint32_t i = first[0]; i < first[1] && opticalDepth <= a.maxOpticalDepth; ++i) {
         const uint32_t row = round * a.sampleCapacity + i;
         const double logDensity = hostPointer(a.logDensity.data)[a.logDensity.offset(row, 0)];
         opticalDepth += std::exp(logDensity) * hostPointer(a.steps)[row];
-        kept.push_back(row);
+        keptRows.push_back(row);
       }
     }
     const bool through = nextStep.empty() || nextStep[r] == MarchRays::kThrough;
-    full = full || made + kept.size() > a.keptCapacity || !(opticalDepth > a.mostOpticalDepth || through);
-    if (full) kept.clear();
-    for (const uint32_t row : kept) {
-      hostPointer(a.source)[made] = row;
-      hostPointer(a.rayOfSample)[made++] = static_cast<uint32_t>(r);
+    full = full || keptCount + keptRows.size() > a.keptCapacity || !(opticalDepth > a.maxOpticalDepth || through);
+    if (full) keptRows.clear();
+    for (const uint32_t row : keptRows) {
+      hostPointer(a.source)[keptCount] = row;
+      hostPointer(a.rayOfSample)[keptCount++] = static_cast<uint32_t>(r);
     }
     finished += !full;
-    hostPointer(a.keptFirstSample)[r + 1] = made;
+    hostPointer(a.keptFirstSample)[r + 1] = keptCount;
   }
-  hostPointer(a.keptCount)[0] = made;
+  hostPointer(a.keptCount)[0] = keptCount;
   if (a.finishedRays) hostPointer(a.finishedRays)[0] = finished;
 }
 

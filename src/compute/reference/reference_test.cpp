@@ -1,4 +1,4 @@
-// The mathematics against values worked out by hand.
+// Compares the reference functions with values computed by hand.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -112,7 +112,7 @@ TEST(Composite, WeightsAndRemainingTransmittanceSumToOne) {
     double sum = 0, transmittance = 1;
     for (size_t i = 0; i < x.size(); ++i) {
       sum += ray.weights[i];
-      transmittance *= 1 - opacityOf(extinction, x[i], steps[i]);
+      transmittance *= 1 - computeOpacity(extinction, x[i], steps[i]);
     }
     EXPECT_NEAR(sum + transmittance, 1, 1e-14);
     EXPECT_NEAR(ray.opacity, sum, 1e-14);
@@ -124,13 +124,13 @@ TEST(Composite, NeverDividesByTheTransparencyOfAnOpaqueSample) {
   const Doubles x = {0.5, 1, 0.5}, distances = {1, 2, 3}, colours = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   const RaySamples samples{x, {}, distances, colours, {}};
   const RayGradients gradients = compositeRayBackward(Extinction::opacity, 0, samples, {1, 1, 1}, 0, 0, {});
-  EXPECT_DOUBLE_EQ(gradients.x[0], 0);  // either way a light of 1 arrives
+  EXPECT_DOUBLE_EQ(gradients.x[0], 0);  // a light of 1 arrives with or without this sample
   EXPECT_DOUBLE_EQ(gradients.x[1], 0.5 * (1 - 0.5));
   EXPECT_DOUBLE_EQ(gradients.x[2], 0);
   EXPECT_DOUBLE_EQ(gradients.colours[8], 0);
 }
 
-TEST(Composite, StopsBehindTheSampleThatTakesTransmittanceBelowTheLeast) {
+TEST(Composite, StopsAfterTheSampleThatTakesTransmittanceBelowTheMinimum) {
   const Doubles x = {0.5, 0.9, 0.5}, distances = {1, 2, 3}, colours(9, 1.0);
   const RaySamples samples{x, {}, distances, colours, {}};
   const RayColour ray = compositeRay(Extinction::opacity, 0.1, samples);
@@ -140,7 +140,7 @@ TEST(Composite, StopsBehindTheSampleThatTakesTransmittanceBelowTheLeast) {
   EXPECT_EQ(compositeRayBackward(Extinction::opacity, 0.1, samples, {1, 1, 1}, 0, 0, {}).x[2], 0);
 }
 
-TEST(DeferredNetwork, HasItsWeightsByLayerOutputAndInputAndThenBiases) {
+TEST(DeferredNetwork, StoresWeightsByLayerOutputAndInputFollowedByBiases) {
   Doubles network(DeferredNetwork::kParameters);
   const auto weight = [&](uint32_t layer, uint32_t inputs, uint32_t output, uint32_t input) -> double& {
     return network[DeferredNetwork::kWeights[layer] + output * inputs + input];
@@ -151,7 +151,7 @@ TEST(DeferredNetwork, HasItsWeightsByLayerOutputAndInputAndThenBiases) {
   weight(0, 34, 5, 22 + 11) = 3;   // cos 8z
   weight(0, 34, 0, 34 * 16) = .1;  // bias of the first unit
   weight(1, 16, 3, 5) = 0.7;
-  weight(1, 16, 4, 0) = -1;  // held at zero
+  weight(1, 16, 4, 0) = -1;  // keeps the unit at zero
   weight(2, 16, 1, 3) = 0.4;
   weight(2, 16, 1, 4) = 100;
   network.back() = -0.2;  // bias of blue
@@ -166,7 +166,7 @@ TEST(DeferredNetwork, HasItsWeightsByLayerOutputAndInputAndThenBiases) {
   EXPECT_NEAR(gradients.composited[2], colour[1] * (1 - colour[1]) * 0.4 * 0.7 * 2, 1e-14);
 }
 
-TEST(Blending, LetsTheGatedSpecularColourOfABlockThroughByItsOpacity) {
+TEST(Blending, WeightsTheGatedSpecularColourOfABlockByItsOpacity) {
   const Doubles composited = {.1, .2, .3, 0, 0, 0, 0, .4, .5, .6, 0, 0, 0, 0}, specular = {1, 0, 0, 0, 1, 0};
   const Doubles opacities = {.25, .5}, depths = {1, 4};
   const RaySegments segments{composited, specular, opacities, depths};
@@ -189,7 +189,7 @@ TEST(ColourLoss, HasTheValuesOfItsFormulas) {
   EXPECT_EQ(colourLoss(ColourLossKind::mse, 0, 0.5).slope, 1);
 }
 
-TEST(ColourLoss, OfHuberHasNoKink) {
+TEST(ColourLoss, HasNoKinkForHuber) {
   for (const double delta : {0.1, 1.0}) {
     for (const double sign : {-1.0, 1.0}) {
       const ValueAndSlope inside = colourLoss(ColourLossKind::huber, delta, sign * delta * (1 - 1e-9)),
@@ -201,7 +201,7 @@ TEST(ColourLoss, OfHuberHasNoKink) {
   }
 }
 
-TEST(Distortion, HasTheValuesOfItsTable) {
+TEST(Distortion, MatchesTheTabulatedValues) {
   const Doubles fences = {0, .1, .3, .35, .7, 1}, weights = {.05, .2, .4, .1, .05};
   const Doubles slopes = {.458333, .271667, .183333, .393333, .835};
   const LossAndGradients result = distortionOfFences(fences, weights);
@@ -209,7 +209,7 @@ TEST(Distortion, HasTheValuesOfItsTable) {
   for (size_t i = 0; i < slopes.size(); ++i) EXPECT_NEAR(result.gradients[i], slopes[i], 1e-6);
 }
 
-TEST(Distortion, OfARayIsThatOfItsWarpedFences) {
+TEST(Distortion, EqualsThatOfTheWarpedFencesOfARay) {
   const Doubles steps = {0.2, 0.5, 1.1, 4}, weights = {0.1, 0.3, 0.2, 0.4};
   Doubles distances, fences = {warpDistance(0.3)};
   double t = 0.3;
@@ -223,7 +223,7 @@ TEST(Distortion, OfARayIsThatOfItsWarpedFences) {
   EXPECT_EQ(warpDistance(4), 0.875);
 }
 
-TEST(Distortion, OnNormalisedDistancesIsThatOfTheFencesThemselves) {
+TEST(Distortion, EqualsThatOfTheFencesOnNormalisedDistances) {
   const Doubles fences = {0, .1, .3, .35, .7, 1}, weights = {.05, .2, .4, .1, .05};
   Doubles distances, steps;
   for (size_t i = 0; i < weights.size(); ++i) {
@@ -234,7 +234,7 @@ TEST(Distortion, OnNormalisedDistancesIsThatOfTheFencesThemselves) {
   EXPECT_LT(distortionOfRay(weights, distances, steps).loss, 0.1);
 }
 
-TEST(S3im, TakesRaysInTheirOwnOrderFirstAndThenInOthers) {
+TEST(S3im, UsesTheGivenOrderFirstAndThenRandomOrders) {
   EXPECT_EQ(s3imOrder(5, 0, 7), (std::vector<uint32_t>{0, 1, 2, 3, 4}));
   const std::vector<uint32_t> first = s3imOrder(100, 0, 7), second = s3imOrder(100, 1, 7);
   EXPECT_TRUE(std::is_permutation(second.begin(), second.end(), first.begin()));
@@ -262,8 +262,8 @@ TEST(S3im, IsTheMeanOverGroupsAndChannels) {
   EXPECT_EQ(s3imLoss(View(x).first(45), View(y).first(45), {}, 3, 0).loss, 0) << "fewer than 16 rays";
 }
 
-TEST(March, MakesPreciselyTheLatticePointsInOccupiedCells) {
-  // One occupied cell: samples are those whose contracted middle lies in its box, and they follow without gap.
+TEST(March, SamplesExactlyTheLatticePointsInOccupiedCells) {
+  // Only one cell is occupied: the samples are those whose contracted middle lies in its box, without gaps.
   MarchSpace space{.contracted = true, .gridResolution = 8, .far = 20, .minStep = 0.01f, .cone = 0};
   const Point origin = {-0.3, 0.1, 0.2}, direction = {0.6, 0, 0.8};
   std::vector<uint32_t> occupancy(8 * 8 * 8 / 32);
@@ -272,7 +272,8 @@ TEST(March, MakesPreciselyTheLatticePointsInOccupiedCells) {
   occupancy[cell / 32] = 1u << cell % 32;
   const std::vector<MarchSample> samples = marchRay(space, origin, direction, 0.25, 1e9, occupancy);
   ASSERT_GT(samples.size(), 10u);
-  // m = z runs from 1 to 2 there: t from 1 to 2.25; x/m stays below a half until -.3 + .6 t = (.2 + .8 t) / 2, t = 2.
+  // In this cell m = z goes from 1 to 2, that is t from 1 to 2.25; x/m stays below 1/2 until
+  // -.3 + .6 t = (.2 + .8 t) / 2, that is t = 2.
   EXPECT_NEAR(samples.front().distance, 1, 0.011);
   EXPECT_NEAR(samples.back().distance, 2, 0.011);
   for (size_t i = 1; i < samples.size(); ++i) EXPECT_EQ(samples[i].step, samples[i - 1].step + 1);

@@ -11,7 +11,7 @@ void run(const GatherRows& a) {
   const Indices source = indices(a.source, rows);
   CHECK(a.input.columns == a.output.columns);
   for (size_t row = 0; row < rows; ++row)
-    for (size_t column = 0; column < a.output.columns; ++column)  // bits, whatever they mean
+    for (size_t column = 0; column < a.output.columns; ++column)  // copies bits: elements can be of any 32-bit type
       std::memcpy(hostPointer(a.output.data) + a.output.offset(row, column),
                   hostPointer(a.input.data) + a.input.offset(source[row], column), sizeof(float));
 }
@@ -24,7 +24,7 @@ void run(const ScatterRows& a) {
       const size_t from = a.input.offset(row, column), to = a.output.offset(source[row], column);
       CHECK(from < a.input.data.count);
       CHECK(to < a.output.data.count);
-      // By the word: numbers of any kind travel this way.
+      // Copies words, because the elements can be of any 32-bit type.
       std::memcpy(hostPointer(a.output.data) + to, hostPointer(a.input.data) + from, sizeof(float));
     }
 }

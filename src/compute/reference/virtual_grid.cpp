@@ -10,7 +10,7 @@
 namespace tessera::reference {
 namespace {
 
-// The two texels along one axis and the share of the upper one.
+// The two texels along one axis and the interpolation weight of the upper one.
 struct Pair {
   uint32_t texel[2];
   double share;
@@ -24,7 +24,7 @@ Pair pairAt(double position, uint32_t resolution) {
   return {{clamped(low), clamped(low + 1)}, u - low};
 }
 
-double weightOf(const Pair& pair, int upper) {
+double pairWeight(const Pair& pair, int upper) {
   return upper ? pair.share : 1 - pair.share;
 }
 
@@ -42,14 +42,14 @@ std::vector<VirtualCorner> virtualCorners(const VirtualGrid& grid, const Point& 
     const uint32_t texel =
         voxel[0].texel[upper[0]] + grid.voxels * (voxel[1].texel[upper[1]] + grid.voxels * voxel[2].texel[upper[2]]);
     corners.push_back(
-        {texel, weightOf(voxel[0], upper[0]) * weightOf(voxel[1], upper[1]) * weightOf(voxel[2], upper[2])});
+        {texel, pairWeight(voxel[0], upper[0]) * pairWeight(voxel[1], upper[1]) * pairWeight(voxel[2], upper[2])});
   }
   for (int a = 0; a < 3 && grid.planes > 0; ++a) {
     const Pair &b = plane[a == 0 ? 1 : 0], &c = plane[a == 2 ? 1 : 2];
     for (int k = 0; k < 4; ++k) {
       const int upperB = k & 1, upperC = k >> 1;
       corners.push_back(
-          {grid.planeTexel(a, b.texel[upperB], c.texel[upperC]), weightOf(b, upperB) * weightOf(c, upperC)});
+          {grid.planeTexel(a, b.texel[upperB], c.texel[upperC]), pairWeight(b, upperB) * pairWeight(c, upperC)});
     }
   }
   return corners;
@@ -64,7 +64,7 @@ size_t virtualRow(const VirtualGrid& grid, Indices marks, Indices ranks, uint32_
 
 namespace {
 
-// What the operations have in common: samples, and where a corner's texel stands among the rows.
+// Shared by the operations: the samples, and the row of the texel of each corner.
 struct Samples {
   const VirtualGrid& grid;
   Doubles positions;
@@ -87,7 +87,7 @@ struct Samples {
   }
 };
 
-double rangeOf(const VirtualGrid& grid, size_t attribute) {
+double attributeRange(const VirtualGrid& grid, size_t attribute) {
   return attribute == 0 ? grid.densityRange : grid.featureRange;
 }
 
@@ -101,7 +101,7 @@ Doubles virtualSample(const VirtualGrid& grid, std::span<const VirtualCorner> co
   Doubles sums(VirtualGrid::kAttributes);
   for (size_t k = 0; k < corners.size(); ++k)
     for (size_t f = 0; f < sums.size(); ++f) {
-      sums[f] += corners[k].weight * rangeOf(grid, f) * (2 * attributes[k * sums.size() + f] - 1);
+      sums[f] += corners[k].weight * attributeRange(grid, f) * (2 * attributes[k * sums.size() + f] - 1);
     }
   Doubles out = {std::min(sums[0] - 1, 15.0)};
   for (size_t f = 1; f < sums.size(); ++f) out.push_back(1 / (1 + std::exp(-sums[f])));
@@ -120,12 +120,12 @@ void run(const DistinctTexels& a) {
   const Indices blocks = indices(a.blockOfSample, samples);
   uint32_t* first = hostPointer(a.firstTexel);
   std::fill(first, first + a.blocks + 1, 0u);
-  const auto cornersOf = [&](size_t s) {
+  const auto sampleCorners = [&](size_t s) {
     return virtualCorners(grid, {positions[3 * s], positions[3 * s + 1], positions[3 * s + 2]});
   };
   if (!grid.shareTexels) {
     for (size_t s = 0; s < samples; ++s)
-      for (size_t k = 0; k < grid.corners(); ++k) place(s * grid.corners() + k, cornersOf(s)[k].texel);
+      for (size_t k = 0; k < grid.corners(); ++k) place(s * grid.corners() + k, sampleCorners(s)[k].texel);
     first[a.blocks] = static_cast<uint32_t>(samples * grid.corners());
     return;
   }
@@ -133,7 +133,7 @@ void run(const DistinctTexels& a) {
   uint32_t* ranks = hostPointer(a.ranks);
   std::fill(marks, marks + a.blocks * words, 0u);
   for (size_t s = 0; s < samples; ++s)
-    for (const VirtualCorner& corner : cornersOf(s))
+    for (const VirtualCorner& corner : sampleCorners(s))
       marks[blocks[s] * words + corner.texel / 32] |= 1u << corner.texel % 32;
   uint32_t next = 0;
   for (size_t block = 0; block < a.blocks; ++block) {
@@ -186,14 +186,14 @@ void run(const VirtualGridBackward& a) {
       const size_t row = samples.row(s, k, corners[k].texel);
       if (row >= rows) continue;
       for (size_t f = 0; f < kWidth; ++f) {
-        double upstream = 0;  // of the sum
+        double upstream = 0;  // gradient with respect to the sum
         if (f == 0) {
           if (logDensities[s] > VirtualGrid::kCulled / 2 && logDensities[s] < 15) upstream = densityGradients[s];
         } else {
           const double c = colours[s * kColours + f - 1];
           upstream = colourGradients[s * kColours + f - 1] * c * (1 - c);
         }
-        gradients[row * kWidth + f] += upstream * corners[k].weight * 2 * rangeOf(a.grid, f);
+        gradients[row * kWidth + f] += upstream * corners[k].weight * 2 * attributeRange(a.grid, f);
       }
     }
   }

@@ -1,4 +1,4 @@
-// Scenes of blocks, and rays through them, for tests.
+// Grids of blocks, and rays through them, for tests.
 #pragma once
 
 #include <string>
@@ -16,15 +16,17 @@ struct NamedBlockSpace {
 
 inline std::vector<NamedBlockSpace> blockSpaces() {
   return {
-      {"1 × 1", {.columns = 1, .rows = 1, .near = 0, .surround = Surround::none}},
-      {"1 × 1, own surround", {.columns = 1, .rows = 1, .bottom = -0.5f, .top = 0.4f, .surround = Surround::own}},
-      {"3 × 2", {.columns = 3, .rows = 2, .bottom = -0.7f, .top = 0.9f, .surround = Surround::none}},
-      {"4 × 3, contracted border", {.columns = 4, .rows = 3, .near = 0.2f, .surround = Surround::border}},
-      {"3 × 2, own surround", {.columns = 3, .rows = 2, .bottom = -0.3f, .top = 0.8f, .surround = Surround::own}},
+      {"1 × 1", {.columns = 1, .rows = 1, .near = 0, .backgroundBlock = BackgroundBlock::none}},
+      {"1 × 1, own background block",
+       {.columns = 1, .rows = 1, .bottom = -0.5f, .top = 0.4f, .backgroundBlock = BackgroundBlock::own}},
+      {"3 × 2", {.columns = 3, .rows = 2, .bottom = -0.7f, .top = 0.9f, .backgroundBlock = BackgroundBlock::none}},
+      {"4 × 3, contracted border", {.columns = 4, .rows = 3, .near = 0.2f, .backgroundBlock = BackgroundBlock::border}},
+      {"3 × 2, own background block",
+       {.columns = 3, .rows = 2, .bottom = -0.3f, .top = 0.8f, .backgroundBlock = BackgroundBlock::own}},
   };
 }
 
-// Inside, above, and far beside the box; in all directions, along axes, and none.
+// Rays with origins inside, above and far beside the box, and with random, axis-parallel and zero directions.
 struct BlockRays {
   std::vector<float> origins, directions;
 

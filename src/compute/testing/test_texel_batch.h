@@ -1,4 +1,4 @@
-// Samples and the texels that they are mixed of, for tests.
+// Samples and the texels from which they are interpolated, for tests.
 #pragma once
 
 #include "compute/device_test.h"
@@ -6,7 +6,7 @@
 
 namespace tessera::device_test {
 
-// Samples inside and on the border of their blocks, and the texels that they need, as DistinctTexels finds them.
+// Samples inside and on the border of their blocks, and the texels that they need, as found by DistinctTexels.
 struct TexelBatch {
   static constexpr uint32_t kBlocks = 3;
 
@@ -16,7 +16,7 @@ struct TexelBatch {
 
   TexelBatch(Stage& stage, const VirtualGrid& grid, const Size& size) {
     blocks = stage.random.wordsBelow(size.capacity, kBlocks);
-    for (uint32_t& block : blocks) block = block == 1 ? 2 : block;  // one that nothing touches
+    for (uint32_t& block : blocks) block = block == 1 ? 2 : block;  // block 1 has no samples
     positions = stage.random.floats(size_t{3} * size.capacity, 0, 1);
     for (size_t i = 0; i < positions.size(); i += 17) positions[i] = i % 2 ? 0.0f : 1.0f;
     Device& reference = *deviceNamed("reference");

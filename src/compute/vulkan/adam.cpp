@@ -21,11 +21,11 @@ void VulkanDevice::enqueue(const Adam& options) {
   arguments.secondMoments = deviceAddress(options.secondMoments);
   arguments.counts = deviceAddress(options.counts);
   arguments.rows = options.rows ? deviceAddress(options.rows) : noCounter_.address();
-  arguments.found = noCounter_.address();
-  if (options.found) {
-    arguments.found = deviceAddress(options.found);
-    arguments.foundCount = static_cast<uint32_t>(options.found.count);
-    arguments.room = options.room;
+  arguments.overflowCounters = noCounter_.address();
+  if (options.overflowCounters) {
+    arguments.overflowCounters = deviceAddress(options.overflowCounters);
+    arguments.overflowCounterCount = static_cast<uint32_t>(options.overflowCounters.count);
+    arguments.capacity = options.capacity;
   }
   arguments.count = static_cast<uint32_t>(count);
   arguments.skipZeroGradients = options.skipZeroGradients;

@@ -14,7 +14,7 @@ namespace tessera {
 
 namespace {
 
-std::vector<uint32_t> constantsOf(const AttentionShape& shape) {
+std::vector<uint32_t> specialisationConstants(const AttentionShape& shape) {
   return {shape.levels, static_cast<uint32_t>(shape.weights), shape.varies};
 }
 
@@ -45,7 +45,8 @@ template <>
 void VulkanDevice::enqueue(const AttentionForward& options) {
   arguments::AttentionArguments arguments = attentionArguments(*this, options);
   arguments.features = matrixArguments(options.features, options.samples.capacity);
-  queue(kernel(kAttentionForwardSpirv, constantsOf(options.shape)), arguments, groupsOf(options.samples, 128));
+  queue(kernel(kAttentionForwardSpirv, specialisationConstants(options.shape)), arguments,
+        countGroups(options.samples, 128));
 }
 
 template <>
@@ -58,15 +59,16 @@ void VulkanDevice::enqueue(const AttentionBackward& options) {
   arguments.fineGradients = matrixArguments(options.fineGradients, samples);
   arguments.logitGradients = deviceAddress(options.logitGradients);
   queue(sumKernel(groupSpirv(kAttentionBackwardSubgroupsFloatAtomicsSpirv, kAttentionBackwardFloatAtomicsSpirv),
-                  groupSpirv(kAttentionBackwardSubgroupsSpirv, kAttentionBackwardSpirv), constantsOf(options.shape)),
-        arguments, groupsOf(options.samples, 256));
+                  groupSpirv(kAttentionBackwardSubgroupsSpirv, kAttentionBackwardSpirv),
+                  specialisationConstants(options.shape)),
+        arguments, countGroups(options.samples, 256));
 }
 
 template <>
 void VulkanDevice::enqueue(const ShadeForward& options) {
   arguments::ShadeArguments arguments = shadeArguments(*this, options);
   arguments.colour = deviceAddress(options.colour);
-  queue(kernel(kShadeForwardSpirv, {options.whole}), arguments, groupsOf(options.rays, 256, 3));
+  queue(kernel(kShadeForwardSpirv, {options.whole}), arguments, countGroups(options.rays, 256, 3));
 }
 
 template <>
@@ -75,7 +77,7 @@ void VulkanDevice::enqueue(const ShadeBackward& options) {
   arguments.colour = deviceAddress(options.colourGradients);
   arguments.sumGradients = matrixArguments(options.sumGradients, options.rays.capacity);
   arguments.opacityGradients = deviceAddress(options.opacityGradients);
-  queue(kernel(kShadeBackwardSpirv, {options.whole}), arguments, groupsOf(options.rays, 128));
+  queue(kernel(kShadeBackwardSpirv, {options.whole}), arguments, countGroups(options.rays, 128));
 }
 
 }  // namespace tessera

@@ -33,7 +33,7 @@ void VulkanDevice::enqueue(const BlendForward& options) {
   arguments.colour = deviceAddress(options.colour);
   arguments.opacity = deviceAddress(options.opacity);
   arguments.depth = deviceAddress(options.depth);
-  queue(kernel(kBlendForwardSpirv, {options.literal}), arguments, groupsOf(options.rays, kBlendRaysPerGroup));
+  queue(kernel(kBlendForwardSpirv, {options.literal}), arguments, countGroups(options.rays, kBlendRaysPerGroup));
 }
 
 template <>
@@ -45,7 +45,7 @@ void VulkanDevice::enqueue(const BlendBackward& options) {
   arguments.compositedGradients = deviceAddress(options.compositedGradients);
   arguments.specularGradients = deviceAddress(options.specularGradients);
   arguments.opacityGradients = deviceAddress(options.opacityGradients);
-  queue(kernel(kBlendBackwardSpirv, {options.literal}), arguments, groupsOf(options.rays, kBlendRaysPerGroup));
+  queue(kernel(kBlendBackwardSpirv, {options.literal}), arguments, countGroups(options.rays, kBlendRaysPerGroup));
 }
 
 }  // namespace tessera

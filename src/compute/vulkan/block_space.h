@@ -1,4 +1,4 @@
-// What kernels are told of the blocks of a scene.
+// Converts the block partition of a scene to kernel arguments.
 #pragma once
 
 #include "compute/blocks.h"
@@ -7,7 +7,7 @@
 namespace tessera {
 
 inline arguments::BlockSpaceArguments spaceArguments(const BlockSpace& space) {
-  return {space.columns, space.rows, space.bottom, space.top, space.near, static_cast<uint32_t>(space.surround)};
+  return {space.columns, space.rows, space.bottom, space.top, space.near, static_cast<uint32_t>(space.backgroundBlock)};
 }
 
 }  // namespace tessera

@@ -34,7 +34,7 @@ void VulkanDevice::enqueue(const EnterScene& options) {
   arguments.fences = deviceAddress(options.fences);
   arguments.intervals = options.intervals;
   queue(realKernel(kEnterSceneFloat64Spirv, kEnterSceneSpirv), arguments,
-        groupsOf(options.rays, 128, options.intervals + 1));
+        countGroups(options.rays, 128, options.intervals + 1));
 }
 
 template <>
@@ -91,7 +91,7 @@ void VulkanDevice::enqueue(const BlockSamples& options) {
 
 template <>
 void VulkanDevice::enqueue(const BlockPoints& options) {
-  CHECK(options.points < 1u << 29);  // indices of random numbers
+  CHECK(options.points < 1u << 29);  // the indices of random numbers must not overflow
   if (options.points > 0) CHECK(options.blocks.count > 0u);
   arguments::BlockPointsArguments arguments = {};
   arguments.space = spaceArguments(options.space);

@@ -10,14 +10,14 @@ namespace tessera {
 namespace {
 
 constexpr uint32_t kCompositeRaysPerGroup = 64;  // local_size_x of the kernels
-constexpr uint32_t kMostColumns = 16;            // composite.glsl
+constexpr uint32_t kMaxColumns = 16;             // see composite.glsl
 
 }  // namespace
 
 template <>
 void VulkanDevice::enqueue(const CompositeForward& options) {
   const uint32_t columns = options.colours.columns;
-  CHECK(columns <= kMostColumns);
+  CHECK(columns <= kMaxColumns);
   arguments::CompositeForwardArguments arguments = {};
   arguments.rays = countArguments(options.rays);
   arguments.extinction = static_cast<uint32_t>(options.extinction);
@@ -32,13 +32,13 @@ void VulkanDevice::enqueue(const CompositeForward& options) {
   arguments.opacity = deviceAddress(options.opacity);
   arguments.depth = deviceAddress(options.depth);
   arguments.weights = deviceAddress(options.weights);
-  queue(kernel(kCompositeForwardSpirv, {columns}), arguments, groupsOf(options.rays, kCompositeRaysPerGroup));
+  queue(kernel(kCompositeForwardSpirv, {columns}), arguments, countGroups(options.rays, kCompositeRaysPerGroup));
 }
 
 template <>
 void VulkanDevice::enqueue(const CompositeBackward& options) {
   const uint32_t columns = options.colours.columns;
-  CHECK(columns <= kMostColumns);
+  CHECK(columns <= kMaxColumns);
   arguments::CompositeBackwardArguments arguments = {};
   arguments.rays = countArguments(options.rays);
   arguments.extinction = static_cast<uint32_t>(options.extinction);
@@ -58,7 +58,7 @@ void VulkanDevice::enqueue(const CompositeBackward& options) {
   arguments.opacities = scratch(2 * std::max<size_t>(options.xGradients.count, 1));
   arguments.xGradients = deviceAddress(options.xGradients);
   arguments.colourGradients = matrixArguments(options.colourGradients, 0);
-  queue(kernel(kCompositeBackwardSpirv, {columns}), arguments, groupsOf(options.rays, kCompositeRaysPerGroup));
+  queue(kernel(kCompositeBackwardSpirv, {columns}), arguments, countGroups(options.rays, kCompositeRaysPerGroup));
 }
 
 }  // namespace tessera

@@ -17,20 +17,20 @@ constexpr size_t kPlaceBytes = 16;
 
 CountedGroups::CountedGroups(const std::shared_ptr<const GpuContext>& context, const GroupBounds& bounds)
     : bounds_(bounds),
-      mostY_(context->limits().maxComputeWorkGroupCount[1]),
+      maxY_(context->limits().maxComputeWorkGroupCount[1]),
       countGroups_(context, kCountGroupsSpirv),
       groups_(context, kPlaces * kPlaceBytes) {
   const uint32_t limit = context->limits().maxComputeWorkGroupCount[0];
-  bounds_.most = bounds.most == 0 ? limit : std::min(bounds.most, limit);
-  if (bounds.fewest == 0) bounds_.fewest = context->isProcessor() ? 64 : 2048;
+  bounds_.maximum = bounds.maximum == 0 ? limit : std::min(bounds.maximum, limit);
+  if (bounds.minimum == 0) bounds_.minimum = context->isCpu() ? 64 : 2048;
 }
 
 Groups CountedGroups::of(GpuStream& stream, const arguments::CountArguments& rows, bool mayCount, uint32_t elements,
                          uint32_t perGroup, uint32_t y) {
   CHECK(size_t{rows.capacity} * elements < size_t{1} << 32);
-  CHECK(y <= mostY_);
-  const size_t most = (size_t{rows.capacity} * elements + perGroup - 1) / perGroup;
-  if (!mayCount || most < bounds_.fewest) return {workgroups(most, 1, bounds_.most), y};
+  CHECK(y <= maxY_);
+  const size_t maximum = (size_t{rows.capacity} * elements + perGroup - 1) / perGroup;
+  if (!mayCount || maximum < bounds_.minimum) return {workgroups(maximum, 1, bounds_.maximum), y};
   const Rows key = {rows.counter, rows.first, elements, perGroup, y};
   if (places_.size() == kPlaces && !places_.contains(key)) {
     places_.clear();
@@ -45,7 +45,7 @@ Groups CountedGroups::of(GpuStream& stream, const arguments::CountArguments& row
     arguments.groups = groups_.address() + place * kPlaceBytes;
     arguments.elements = elements;
     arguments.perGroup = perGroup;
-    arguments.most = bounds_.most;
+    arguments.maximum = bounds_.maximum;
     arguments.y = y;
     stream.run(countGroups_, std::as_bytes(std::span(&arguments, 1)), {});
     counted.capacity = rows.capacity;

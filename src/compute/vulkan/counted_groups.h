@@ -1,9 +1,9 @@
-// Workgroups for rows that only the device counts: it writes how many there are, and kernels are dispatched by that
-// (indirectly). Written before the first kernel that takes such groups of such rows, and again once their counters may
-// have changed. Their place stays the same however much room there is for rows: steps with other numbers of rays are
-// the same list of commands.
+// Workgroup counts for rows that only the device counts: the device writes the count, and kernels are dispatched
+// indirectly. A count is written before the first kernel that uses it, and again once its row counters may have
+// changed. Its address is independent of the capacity for rows, so that steps with different numbers of rays have the
+// same commands.
 //
-// Kernels share rows out among whatever groups they get, so that a number that is out of date costs time alone.
+// Kernels distribute their rows over any number of workgroups, so an outdated count only costs time.
 #pragma once
 
 #include <compare>
@@ -16,27 +16,28 @@
 
 namespace tessera {
 
-// What is worth counting. 0: as suits the device.
+// Limits of the workgroup counts. 0 selects the default of the device.
 struct GroupBounds {
-  // Rows whose buffers need fewer groups get those uncounted. An empty group costs a driver that computes on the
-  // processor some 10 μs, and a card some ns, where to count costs some μs.
-  uint32_t fewest = 0;
-  uint32_t most = 0;  // groups at most
+  // If the capacity for rows needs fewer groups than this, all of them are dispatched without counting. An empty group
+  // costs about 10 μs with a driver for the CPU and some ns on a GPU; counting costs some μs.
+  uint32_t minimum = 0;
+  uint32_t maximum = 0;  // the largest number of groups along x
 };
 
 class CountedGroups {
  public:
   CountedGroups(const std::shared_ptr<const GpuContext>& context, const GroupBounds& bounds);
 
-  // Enough groups along x of `perGroup` for `elements` of each of `rows`, times `y`: one at least, where there is room
-  // for a row. `mayCount`: rows has a counter.
+  // Returns enough groups along x of `perGroup` elements for `elements` per row of `rows`, and `y` groups along y; at
+  // least one group along x if the capacity is not 0. `mayCount` states whether `rows` has a counter. Queues the kernel
+  // that counts if necessary.
   Groups of(GpuStream& stream, const arguments::CountArguments& rows, bool mayCount, uint32_t elements,
             uint32_t perGroup, uint32_t y);
-  // To be said of all that is written where counters may lie.
+  // Must be called for every write to memory that may contain counters.
   void changed(uint64_t address, size_t bytes);
 
  private:
-  // Which rows, and what a group takes of them.
+  // The rows, and how they are distributed over groups.
   struct Rows {
     uint64_t counter = 0, first = 0;  // addresses
     uint32_t elements = 0, perGroup = 0, y = 0;
@@ -49,9 +50,9 @@ class CountedGroups {
   };
 
   GroupBounds bounds_;
-  uint32_t mostY_;
+  uint32_t maxY_;
   GpuKernel countGroups_;
-  GpuBuffer groups_;  // [kPlaces]: what vkCmdDispatchIndirect reads
+  GpuBuffer groups_;  // [kPlaces] VkDispatchIndirectCommand
   std::map<Rows, size_t> places_;
   std::vector<Counted> counted_;  // [place]
 };

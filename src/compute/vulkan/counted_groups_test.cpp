@@ -30,13 +30,13 @@ class CountedGroupsTest : public testing::Test {
   }
   void TearDown() override { EXPECT_EQ(GpuContext::validationMessages(), 0); }
 
-  // Rows [first, end) are what the device counts.
+  // Sets the counters to the rows [first, end).
   void setCounters(uint32_t first, uint32_t end) {
     const std::array words = {first, end};
     stream_->upload(counters_, 0, std::as_bytes(std::span(words)));
   }
 
-  // How many workgroups run.
+  // Runs a kernel and returns the number of workgroups that ran.
   uint32_t run(const Groups& groups) {
     const std::vector<uint32_t> ones(kCapacity, 1);
     stream_->upload(values_, 0, std::as_bytes(std::span(ones)));
@@ -58,7 +58,7 @@ class CountedGroupsTest : public testing::Test {
 };
 
 TEST_F(CountedGroupsTest, AreEnoughForTheRowsThatTheDeviceHasCounted) {
-  CountedGroups counted(context_, {.fewest = 4});
+  CountedGroups counted(context_, {.minimum = 4});
   const auto groups = [&](uint32_t elements) { return counted.of(*stream_, rows_, true, elements, kPerGroup, 1); };
   setCounters(10, 10 + 3 * kPerGroup);
   EXPECT_EQ(run(groups(1)), 3u);
@@ -71,8 +71,8 @@ TEST_F(CountedGroupsTest, AreEnoughForTheRowsThatTheDeviceHasCounted) {
   EXPECT_EQ(run(groups(1)), 3u);
 }
 
-TEST_F(CountedGroupsTest, AreOneAtLeastAndNoMoreThanThereIsRoomFor) {
-  CountedGroups counted(context_, {.fewest = 1, .most = 8});
+TEST_F(CountedGroupsTest, AreAtLeastOneAndWithinTheCapacity) {
+  CountedGroups counted(context_, {.minimum = 1, .maximum = 8});
   const auto groups = [&] {
     counted.changed(counters_.address(), counters_.bytes());
     return counted.of(*stream_, rows_, true, 1, kPerGroup, 1);
@@ -89,7 +89,7 @@ TEST_F(CountedGroupsTest, AreOneAtLeastAndNoMoreThanThereIsRoomFor) {
 }
 
 TEST_F(CountedGroupsTest, AreCountedOnceUntilCountersMayHaveChanged) {
-  CountedGroups counted(context_, {.fewest = 1});
+  CountedGroups counted(context_, {.minimum = 1});
   setCounters(0, 3 * kPerGroup);
   const auto of = [&] { return counted.of(*stream_, rows_, true, 1, kPerGroup, 1); };
   EXPECT_EQ(run(of()), 3u);
@@ -102,18 +102,18 @@ TEST_F(CountedGroupsTest, AreCountedOnceUntilCountersMayHaveChanged) {
   EXPECT_EQ(run(of()), 7u);
 }
 
-TEST_F(CountedGroupsTest, AreNotCountedWhereFewAreEnoughForAll) {
+TEST_F(CountedGroupsTest, AreNotCountedBelowTheMinimum) {
   constexpr uint32_t kEnough = (kCapacity + kPerGroup - 1) / kPerGroup;
-  CountedGroups counted(context_, {.fewest = kEnough + 1});
+  CountedGroups counted(context_, {.minimum = kEnough + 1});
   setCounters(0, 0);
   EXPECT_EQ(run(counted.of(*stream_, rows_, true, 1, kPerGroup, 1)), kEnough);
-  CountedGroups always(context_, {.fewest = 1});
+  CountedGroups always(context_, {.minimum = 1});
   EXPECT_EQ(run(always.of(*stream_, rows_, true, 1, kPerGroup, 1)), 1u);
   EXPECT_EQ(run(always.of(*stream_, rows_, false, 1, kPerGroup, 1)), kEnough) << "no counter";
 }
 
-TEST_F(CountedGroupsTest, StandAtTheSamePlaceHoweverMuchRoomThereIs) {
-  CountedGroups counted(context_, {.fewest = 1});
+TEST_F(CountedGroupsTest, HaveTheSameAddressAtEveryCapacity) {
+  CountedGroups counted(context_, {.minimum = 1});
   setCounters(0, kCapacity);
   const auto groups = [&](uint32_t capacity, uint32_t elements = 1) {
     rows_.capacity = capacity;
@@ -128,8 +128,8 @@ TEST_F(CountedGroupsTest, StandAtTheSamePlaceHoweverMuchRoomThereIs) {
   EXPECT_NE(groups(5 * kPerGroup, 2), many);
 }
 
-TEST_F(CountedGroupsTest, AreRightWhenAllPlacesAreTaken) {
-  CountedGroups counted(context_, {.fewest = 1});
+TEST_F(CountedGroupsTest, AreCorrectWhenAllPlacesAreTaken) {
+  CountedGroups counted(context_, {.minimum = 1});
   setCounters(0, 6 * kPerGroup);
   for (uint32_t elements = 1; elements < 5000; ++elements) counted.of(*stream_, rows_, true, elements, kPerGroup, 1);
   EXPECT_EQ(run(counted.of(*stream_, rows_, true, 1, kPerGroup, 1)), 6u);

@@ -34,7 +34,7 @@ template <>
 void VulkanDevice::enqueue(const DeferredForward& options) {
   arguments::DeferredArguments arguments = deferredArguments(*this, options);
   arguments.specular = deviceAddress(options.specular);
-  queue(kernel(kDeferredForwardSpirv), arguments, groupsOf(options.segments, kSegmentsPerGroup));
+  queue(kernel(kDeferredForwardSpirv), arguments, countGroups(options.segments, kSegmentsPerGroup));
 }
 
 template <>
@@ -47,10 +47,10 @@ void VulkanDevice::enqueue(const DeferredBackward& options) {
   arguments.compositedGradients = deviceAddress(options.compositedGradients);
   arguments.networkGradients = deviceAddress(options.networkGradients);
   arguments.layers = scratch(segments * kNumbers);
-  queue(kernel(kDeferredBackwardSpirv), arguments, groupsOf(options.segments, kSegmentsPerGroup));
+  queue(kernel(kDeferredBackwardSpirv), arguments, countGroups(options.segments, kSegmentsPerGroup));
   const auto networks = static_cast<uint32_t>(options.networks.count / DeferredNetwork::kParameters);
   queue(sumKernel(kDeferredWeightGradientsFloatAtomicsSpirv, kDeferredWeightGradientsSpirv), arguments,
-        groupsOf(options.segments, kShare, 1, networks));
+        countGroups(options.segments, kShare, 1, networks));
 }
 
 }  // namespace tessera

@@ -23,7 +23,7 @@ TESSERA_OPERATIONS(TESSERA_ENQUEUE)
 
 namespace {
 
-constexpr GroupBounds kFewGroups = {.fewest = 1, .most = 3};
+constexpr GroupBounds kFewGroups = {.minimum = 1, .maximum = 3};
 
 }  // namespace
 
@@ -38,8 +38,7 @@ std::unique_ptr<Device> makeVulkanDevice(const GpuOptions& options) {
 std::unique_ptr<Device> makeVulkanDeviceWithEmulatedMatrices(const GpuOptions& options, const GpuMatrices& matrices) {
   auto context = GpuContext::open(options);
   CHECK(context->features().float16);
-  // Mesa 22's driver for the processor mixes up what invocations keep of tiles while a workgroup goes on to more
-  // samples.
+  // Mesa 22's driver for the CPU confuses the tiles of different invocations when a workgroup loops over more samples.
   const bool mixesUp = context->name().find("Mesa 22.") != std::string::npos;
   return std::make_unique<VulkanDevice>(std::move(context), VulkanDevice::MlpArithmetic::emulatedMatrices, matrices,
                                         mixesUp ? GroupBounds() : kFewGroups);
@@ -51,12 +50,12 @@ std::unique_ptr<Device> makeVulkanDeviceWithFewGroups(const GpuOptions& options)
                                         kFewGroups);
 }
 
-std::shared_ptr<const GpuContext> contextOf(const Device& device) {
+std::shared_ptr<const GpuContext> vulkanContext(const Device& device) {
   const auto* const vulkan = dynamic_cast<const VulkanDevice*>(&device);
   return vulkan == nullptr ? nullptr : vulkan->context();
 }
 
-VulkanBatches batchesOf(const Device& device) {
+VulkanBatches countBatches(const Device& device) {
   const GpuStream& stream = dynamic_cast<const VulkanDevice&>(device).stream();
   return {stream.batchesSent(), stream.batchesRecorded()};
 }
@@ -84,7 +83,7 @@ VulkanDevice::MlpArithmetic VulkanDevice::bestArithmetic(const GpuContext& conte
 }
 
 VulkanDevice::~VulkanDevice() {
-  stream_->context()->waitIdle();  // whatever went wrong: kernels and memory go next
+  stream_->context()->waitIdle();  // even after errors: kernels and memory are destroyed next
   if (!stream_->isMeasuring()) return;
   try {
     double all = 0;
@@ -93,7 +92,7 @@ VulkanDevice::~VulkanDevice() {
       inform("{:<26} {:10.3f} ms in {} commands, {:.1f} %", name, 1e3 * measured.seconds, measured.commands,
              100 * measured.seconds / all);
     }
-  } catch (const std::exception&) {  // a device that is lost tells no times, and has been told of
+  } catch (const std::exception&) {  // a lost device has no times, and its error has been reported
   }
 }
 
@@ -155,8 +154,8 @@ bool VulkanDevice::runOperation(const OperationId& operation, const void* argume
 const GpuKernel& VulkanDevice::kernel(std::span<const uint32_t> spirv, std::vector<uint32_t> constants,
                                       uint32_t subgroupSize) {
   const auto key = std::make_pair(spirv.data(), std::move(constants));
-  const auto found = kernels_.find(key);
-  if (found != kernels_.end()) return found->second;
+  const auto it = kernels_.find(key);
+  if (it != kernels_.end()) return it->second;
   return kernels_.try_emplace(key, stream_->context(), spirv, key.second, subgroupSize).first->second;
 }
 
@@ -193,7 +192,7 @@ void VulkanDevice::countersChanged(const Slice<const uint32_t>& words) {
 uint64_t VulkanDevice::scratch(size_t floats) {
   const size_t bytes = floats * sizeof(float);
   if (scratch_.bytes() < bytes) {
-    stream_->retire(std::move(scratch_));
+    stream_->deferDestroy(std::move(scratch_));
     scratch_ = GpuBuffer();
     scratch_ = stream_->makeBuffer(bytes);
   }

@@ -11,22 +11,23 @@ class GpuContext;
 struct GpuMatrices;
 struct GpuOptions;
 
-// Throws Error when there is no driver or no device that fits.
+// Throws Error if there is no driver or no suitable device.
 std::unique_ptr<Device> makeVulkanDevice();
 std::unique_ptr<Device> makeVulkanDevice(const GpuOptions& options);
-// For tests: kernels get three workgroups at most for their rows, counted by the device wherever it counts rows.
+// For tests: kernels get at most three workgroups for their rows, always counted by the device if it counts the rows.
 std::unique_ptr<Device> makeVulkanDeviceWithFewGroups(const GpuOptions& options);
-// Likewise, and the kernels of cooperative matrices run where no device has those, their products computed by loops, as
-// if the device had such matrices. It has to have fp16.
+// For tests: as above, and the kernels with cooperative matrices run on any device that supports fp16; the products are
+// computed by loops, as if the device had such matrices.
 std::unique_ptr<Device> makeVulkanDeviceWithEmulatedMatrices(const GpuOptions& options, const GpuMatrices& matrices);
 
-// The context of a Vulkan device, which others may draw with; null of any other device.
-std::shared_ptr<const GpuContext> contextOf(const Device& device);
+// Returns the context of a Vulkan device, which can be shared with rendering; null for any other device.
+std::shared_ptr<const GpuContext> vulkanContext(const Device& device);
 
-// Of a Vulkan device so far: batches of work sent, and those of them that had to be recorded (gpu/stream.h).
+// The number of batches that a Vulkan device has submitted so far, and how many of them had to be recorded
+// (gpu/stream.h).
 struct VulkanBatches {
   uint64_t sent = 0, recorded = 0;
 };
-VulkanBatches batchesOf(const Device& device);
+VulkanBatches countBatches(const Device& device);
 
 }  // namespace tessera

@@ -1,5 +1,5 @@
-// What is particular to this device: both forms of the kernels that sum, every width and arithmetic of the MLP, memory
-// that comes and goes while work is queued. The walk over all operations and shapes is compute/device_test.cpp.
+// Tests specific to this device: both forms of the kernels that sum, every width and arithmetic of the MLP, memory that
+// is allocated and freed while work is queued. All operations and shapes are tested in compute/device_test.cpp.
 #include "compute/vulkan/device.h"
 
 #include <gtest/gtest.h>
@@ -41,36 +41,36 @@ Doubles doubles(const std::vector<float>& values) {
   return {values.begin(), values.end()};
 }
 
-// Every difference is at most `tolerance` of the largest value.
-void expectNear(const std::vector<float>& got, const Doubles& want, double tolerance, const char* what) {
-  ASSERT_EQ(got.size(), want.size()) << what;
+// Expects every difference to be at most `tolerance` times the largest expected value.
+void expectNear(const std::vector<float>& actual, const Doubles& expected, double tolerance, const char* what) {
+  ASSERT_EQ(actual.size(), expected.size()) << what;
   double largest = 0, worst = 0;
-  for (size_t i = 0; i < want.size(); ++i) {
-    largest = std::max(largest, std::abs(want[i]));
-    worst = std::max(worst, std::abs(got[i] - want[i]));
-    ASSERT_TRUE(std::isfinite(got[i])) << what << "[" << i << "]";
+  for (size_t i = 0; i < expected.size(); ++i) {
+    largest = std::max(largest, std::abs(expected[i]));
+    worst = std::max(worst, std::abs(actual[i] - expected[i]));
+    ASSERT_TRUE(std::isfinite(actual[i])) << what << "[" << i << "]";
   }
   EXPECT_GT(largest, 0) << what;
   EXPECT_LE(worst, tolerance * largest) << what;
 }
 
-// Both passes of a network of each width, with gradients of about `gradientSize`. Inputs and weights are eighths:
-// whether a neuron is on does not depend on rounding.
+// Runs the forward and the backward pass of a network of each width, with gradients of about `gradientSize`. Inputs and
+// weights are multiples of 1/8, so that the sign of a neuron's sum does not depend on rounding.
 void runEveryWidth(Device& device, float gradientSize, double tolerance) {
   for (const int width : {16, 32, 64, 128}) {
     SCOPED_TRACE(width);
-    // 2500 samples: several shares of the weight gradients, and a last block that is not full. The input is wider than
-    // the narrow networks, the output wider than 16.
+    // 2500 samples give several shares of the weight gradients and a partial last block. The input is wider than the
+    // narrow networks, and the output is wider than 16.
     const MlpShape shape = {.inputs = 40, .width = width, .hiddenLayers = 2, .outputs = 19};
     const uint32_t samples = 2500;
     const auto input = eighths(randomFloats(samples * shape.inputs, -1, 1, 3));
     const auto weights = eighths(randomFloats(shape.parameters(), -0.3f, 0.3f, 4));
     const auto outputGradients = randomFloats(samples * shape.outputs, -gradientSize, gradientSize, 5);
-    auto deviceInput = device.arrayOf(input);
-    auto deviceWeights = device.arrayOf(weights);
-    auto deviceOutputGradients = device.arrayOf(outputGradients);
+    auto deviceInput = device.uploadArray(input);
+    auto deviceWeights = device.uploadArray(weights);
+    auto deviceOutputGradients = device.uploadArray(outputGradients);
     auto output = device.array<float>(samples * shape.outputs);
-    auto activations = device.activationsOf(shape, samples);
+    auto activations = device.allocateActivations(shape, samples);
     auto weightGradients = device.array<float>(shape.parameters());
     auto inputGradients = device.array<float>(input.size());
     const Matrix<float> inputMatrix(deviceInput, shape.inputs), outputMatrix(output, shape.outputs);
@@ -99,7 +99,7 @@ void runEveryWidth(Device& device, float gradientSize, double tolerance) {
   }
 }
 
-// With hardware float atomics where there are any, and with the fallback.
+// Runs with hardware float atomics if the device has them, and with the fallback.
 class VulkanDeviceTest : public testing::TestWithParam<bool> {
  protected:
   void SetUp() override {
@@ -123,14 +123,14 @@ TEST_P(VulkanDeviceTest, UsesFloatAtomicsWhereTheyAreThereAndAllowed) {
   EXPECT_EQ(used, GetParam() && openForTest()->features().floatAtomics) << device_->target();
 }
 
-// A table of 8 entries: thousands of samples add to each, so lost updates show.
+// Thousands of samples add to each of the 8 entries of the table, so lost updates show.
 TEST_P(VulkanDeviceTest, LosesNoGradientWhereManySamplesMeet) {
   const HashGrid grid({.levels = 2, .features = 2, .log2TableSize = 3, .baseResolution = 2, .finestResolution = 64});
   const uint32_t samples = 5000;
   const auto positions = randomFloats(samples * 3, 0, 1, 1);
   const auto gradients = randomFloats(samples * grid.columns(), 0.5f, 1.5f, 2);
-  auto devicePositions = device_->arrayOf(positions);
-  auto deviceGradients = device_->arrayOf(gradients);
+  auto devicePositions = device_->uploadArray(positions);
+  auto deviceGradients = device_->uploadArray(gradients);
   auto table = device_->array<float>(grid.parameters());
   auto tableGradients = device_->array<float>(grid.parameters());
   device_->run(HashGridBackward{.grid = grid,
@@ -140,28 +140,28 @@ TEST_P(VulkanDeviceTest, LosesNoGradientWhereManySamplesMeet) {
                                 .encodedGradients = Matrix<float>(deviceGradients, grid.columns()),
                                 .tableGradients = tableGradients,
                                 .positionGradients = {}});
-  const auto want = reference::hashGridBackward(grid, doubles(positions), {}, doubles(gradients));
-  expectNear(device_->read(tableGradients.all()), want.table, 1e-4, "table gradients");
+  const auto expected = reference::hashGridBackward(grid, doubles(positions), {}, doubles(gradients));
+  expectNear(device_->read(tableGradients.all()), expected.table, 1e-4, "table gradients");
 }
 
 TEST_P(VulkanDeviceTest, RunsEveryWidthOfNetworks) {
   runEveryWidth(*device_, 1, 1e-4);
 }
 
-// Whether all, some or none of a round of exchanges is left, and whether the rays fit in shared memory.
-TEST_P(VulkanDeviceTest, TakesPatchesOfAnyNumberOfRays) {
+// The last round of exchanges is full, partial or empty, and the rays fit in shared memory or not.
+TEST_P(VulkanDeviceTest, ShufflesPatchesOfAnySize) {
   const std::unique_ptr<Device> cpu = makeCpuDevice(2);
   for (const uint32_t rays : {16u, 257u, 5001u, 20000u}) {
     SCOPED_TRACE(rays);
     const auto predicted = randomFloats(3 * rays, 0, 1, 21), target = randomFloats(3 * rays, 0, 1, 22);
     const auto gradientsOn = [&](Device& device) {
-      auto there = device.arrayOf(predicted), wanted = device.arrayOf(target);
+      auto devicePredicted = device.uploadArray(predicted), deviceTarget = device.uploadArray(target);
       auto loss = device.array<float>(1), gradients = device.array<float>(3 * rays);
       device.run(S3imLoss{.rays = {rays, {}},
                           .patches = 3,
                           .seed = 23,
-                          .predicted = there,
-                          .target = wanted,
+                          .predicted = devicePredicted,
+                          .target = deviceTarget,
                           .weights = {},
                           .loss = loss,
                           .gradients = gradients});
@@ -171,7 +171,7 @@ TEST_P(VulkanDeviceTest, TakesPatchesOfAnyNumberOfRays) {
   }
 }
 
-TEST_P(VulkanDeviceTest, MemoryMayGoWhileWorkOnItIsQueued) {
+TEST_P(VulkanDeviceTest, FreesMemoryAfterItsQueuedWork) {
   Adam adam;
   auto moments = device_->array<float>(2000);
   auto parameters = device_->array<float>(1000);
@@ -181,11 +181,11 @@ TEST_P(VulkanDeviceTest, MemoryMayGoWhileWorkOnItIsQueued) {
   adam.secondMoments = moments.part(1000, 1000);
   adam.counts = counts;
   for (int i = 0; i < 200; ++i) {
-    auto gradients = device_->arrayOf(std::vector<float>(1000, 1.0f));
+    auto gradients = device_->uploadArray(std::vector<float>(1000, 1.0f));
     adam.gradients = gradients;
     device_->run(adam);
   }
-  // Constant gradients: every step goes down by the rate.
+  // With constant gradients, every step subtracts the learning rate.
   EXPECT_NEAR(device_->read(parameters.all())[999], -200 * adam.rate, 1e-3);
   EXPECT_EQ(device_->read(counts.all())[0], 200u);
 }
@@ -204,11 +204,11 @@ TEST_P(VulkanDeviceTest, AllocatesZeros) {
   }
 }
 
-// Gradients of losses that are means over many rays are far below what fp16 holds, those of sums far above: each
-// network's are scaled before they become fp16.
+// Gradients of losses that are means over many rays are far below the range of fp16, and those of sums are far above
+// it: the gradients of each network are scaled before they are converted to fp16.
 struct HalfArithmetic {
   const char* name;
-  std::optional<GpuMatrices> emulated = {};  // matrices that the device would have
+  std::optional<GpuMatrices> emulated = {};  // the matrices to emulate
 };
 void PrintTo(const HalfArithmetic& arithmetic, std::ostream* out) {
   *out << arithmetic.name;
@@ -224,7 +224,7 @@ std::string halfNetworkName(const testing::TestParamInfo<HalfNetworks::ParamType
   return std::string(arithmetic.name) + (size < 1 ? "Tiny" : size > 1 ? "Huge" : "");
 }
 
-// As of NVIDIA's and AMD's cards, of Intel's, and of Mesa's driver for the processor.
+// The matrix shapes of NVIDIA and AMD GPUs, of Intel GPUs, and of Mesa's driver for the CPU.
 constexpr GpuMatrices kLarge = {}, kFlat = {.rows = 8, .subgroupSize = 16},
                       kSmall = {.rows = 8, .columns = 8, .depth = 8, .subgroupSize = 8};
 INSTANTIATE_TEST_SUITE_P(Networks, HalfNetworks,
@@ -235,7 +235,7 @@ INSTANTIATE_TEST_SUITE_P(Networks, HalfNetworks,
                                           testing::Values(1e-12f, 1.0f, 1e9f)),
                          halfNetworkName);
 
-TEST_P(HalfNetworks, AreRightWhateverTheSizeOfGradients) {
+TEST_P(HalfNetworks, AreCorrectForGradientsOfAnySize) {
   const auto& [arithmetic, gradientSize] = GetParam();
   const bool byMatrices = std::string_view(arithmetic.name) == "Matrices";
   GpuOptions options;
@@ -245,43 +245,43 @@ TEST_P(HalfNetworks, AreRightWhateverTheSizeOfGradients) {
   if (!context->features().float16 || context->features().matrices != byMatrices) {
     GTEST_SKIP() << context->name() << " has no such arithmetic: " << arithmetic.name;
   }
-  // More tiles than it unrolls, and it mixes up what invocations keep of them while they wait for one another.
+  // There are more tiles than the driver unrolls, and it confuses the tiles of different invocations across barriers.
   if (arithmetic.emulated && arithmetic.emulated->rows < 16 && context->name().find("Mesa 22.") != std::string::npos) {
     GTEST_SKIP() << context->name() << " emulates 16 x 16 matrices alone";
   }
   const std::unique_ptr<Device> device = arithmetic.emulated
                                              ? makeVulkanDeviceWithEmulatedMatrices(options, *arithmetic.emulated)
                                              : makeVulkanDevice(options);
-  EXPECT_TRUE(device->keepsHalves());
+  EXPECT_TRUE(device->storesActivationsInHalf());
   runEveryWidth(*device, gradientSize, 1e-2);
 }
 
-// While it is there, the driver compiles no kernels that multiply matrices.
+// During its lifetime, the driver appears not to compile kernels with cooperative matrices.
 class NoMatrixKernels {
  public:
   NoMatrixKernels() {
-    kept() = vkCreateComputePipelines;
+    original() = vkCreateComputePipelines;
     vkCreateComputePipelines = [](VkDevice device, VkPipelineCache cache, uint32_t count,
                                   const VkComputePipelineCreateInfo* infos, const VkAllocationCallbacks* allocator,
                                   VkPipeline* pipelines) {
       constexpr uint32_t kConstantsOfMatrices = 8;  // VulkanDevice::matrixConstants
       const VkSpecializationInfo* constants = infos->stage.pSpecializationInfo;
       if (constants != nullptr && constants->mapEntryCount == kConstantsOfMatrices) return VK_ERROR_UNKNOWN;
-      return kept()(device, cache, count, infos, allocator, pipelines);
+      return original()(device, cache, count, infos, allocator, pipelines);
     };
   }
-  ~NoMatrixKernels() { vkCreateComputePipelines = kept(); }
+  ~NoMatrixKernels() { vkCreateComputePipelines = original(); }
   NoMatrixKernels(const NoMatrixKernels&) = delete;
   NoMatrixKernels& operator=(const NoMatrixKernels&) = delete;
 
  private:
-  static PFN_vkCreateComputePipelines& kept() {
+  static PFN_vkCreateComputePipelines& original() {
     static PFN_vkCreateComputePipelines function = nullptr;
     return function;
   }
 };
 
-TEST(NetworksInHalves, DoWithoutMatricesWhereTheDriverCompilesNoKernelsOfThem) {
+TEST(NetworksInHalves, FallBackIfTheDriverRejectsMatrixKernels) {
   const auto context = openForTest();
   SKIP_WITHOUT_VULKAN(context);
   if (!context->features().float16) GTEST_SKIP() << context->name() << " has no fp16";
@@ -290,8 +290,8 @@ TEST(NetworksInHalves, DoWithoutMatricesWhereTheDriverCompilesNoKernelsOfThem) {
   runEveryWidth(*device, 1, 1e-2);
 }
 
-// Where a step has gone wrong, that is seen and not made to look like large numbers.
-TEST(NetworksInHalves, PassOnGradientsThatAreNoNumbers) {
+// A step that has diverged must be visible as such, not clamped to large numbers.
+TEST(NetworksInHalves, PropagateNonFiniteGradients) {
   const auto context = openForTest();
   SKIP_WITHOUT_VULKAN(context);
   if (!context->features().float16) GTEST_SKIP() << context->name() << " has no fp16";
@@ -301,11 +301,11 @@ TEST(NetworksInHalves, PassOnGradientsThatAreNoNumbers) {
     for (const float wrong : {NAN, INFINITY, -INFINITY}) {
       std::vector<float> upstream(16, 1.0f);
       upstream[3] = wrong;
-      auto input = device->arrayOf(std::vector<float>(16, 1.0f)), output = device->array<float>(16);
-      auto weights = device->arrayOf(std::vector<float>(shape.parameters(), 0.1f));
+      auto input = device->uploadArray(std::vector<float>(16, 1.0f)), output = device->array<float>(16);
+      auto weights = device->uploadArray(std::vector<float>(shape.parameters(), 0.1f));
       auto weightGradients = device->array<float>(shape.parameters());
-      auto outputGradients = device->arrayOf(upstream);
-      auto activations = device->activationsOf(shape, 1);
+      auto outputGradients = device->uploadArray(upstream);
+      auto activations = device->allocateActivations(shape, 1);
       const Matrix<float> inputMatrix(input, 16), outputMatrix(output, 16), gradientMatrix(outputGradients, 16);
       device->run(MlpForward{shape, {1, {}}, inputMatrix, weights.all(), outputMatrix, activations});
       device->run(MlpBackward{shape,
@@ -318,9 +318,9 @@ TEST(NetworksInHalves, PassOnGradientsThatAreNoNumbers) {
                               {},
                               weightGradients,
                               {}});
-      const std::vector<float> found = device->read(weightGradients.all());
-      EXPECT_FALSE(std::isfinite(found[0])) << wrong << ", first layer, emulated: " << emulated;
-      EXPECT_FALSE(std::isfinite(found[shape.weightOffset(1) + 3 * shape.width])) << wrong << ", last layer";
+      const std::vector<float> gradients = device->read(weightGradients.all());
+      EXPECT_FALSE(std::isfinite(gradients[0])) << wrong << ", first layer, emulated: " << emulated;
+      EXPECT_FALSE(std::isfinite(gradients[shape.weightOffset(1) + 3 * shape.width])) << wrong << ", last layer";
     }
   }
 }

@@ -41,27 +41,27 @@ arguments::FrequencyArguments frequencyArguments(const VulkanDevice& device, con
 template <>
 void VulkanDevice::enqueue(const SphericalHarmonicsForward& options) {
   queue(kernel(kSphericalHarmonicsForwardSpirv), harmonicsArguments(*this, options, options.encoded),
-        groupsOf(options.samples, 256, options.encoded.columns));
+        countGroups(options.samples, 256, options.encoded.columns));
 }
 
 template <>
 void VulkanDevice::enqueue(const SphericalHarmonicsBackward& options) {
   arguments::SphericalHarmonicsArguments arguments = harmonicsArguments(*this, options, options.encodedGradients);
   arguments.directionGradients = deviceAddress(options.directionGradients);
-  queue(kernel(kSphericalHarmonicsBackwardSpirv), arguments, groupsOf(options.samples, 128));
+  queue(kernel(kSphericalHarmonicsBackwardSpirv), arguments, countGroups(options.samples, 128));
 }
 
 template <>
 void VulkanDevice::enqueue(const FrequencyForward& options) {
   queue(kernel(kFrequencyForwardSpirv), frequencyArguments(*this, options, options.encoded),
-        groupsOf(options.samples, 256, options.encoded.columns));
+        countGroups(options.samples, 256, options.encoded.columns));
 }
 
 template <>
 void VulkanDevice::enqueue(const FrequencyBackward& options) {
   arguments::FrequencyArguments arguments = frequencyArguments(*this, options, options.encodedGradients);
   arguments.inputGradients = deviceAddress(options.inputGradients);
-  queue(kernel(kFrequencyBackwardSpirv), arguments, groupsOf(options.samples, 256, options.dimensions));
+  queue(kernel(kFrequencyBackwardSpirv), arguments, countGroups(options.samples, 256, options.dimensions));
 }
 
 }  // namespace tessera

@@ -18,7 +18,7 @@ void VulkanDevice::enqueue(const ExposureForward& options) {
   arguments.photoOfRay = deviceAddress(options.photoOfRay);
   arguments.logGains = deviceAddress(options.logGains);
   arguments.exposed = deviceAddress(options.exposed);
-  queue(kernel(kExposureForwardSpirv), arguments, groupsOf(options.rays, 256, 3));
+  queue(kernel(kExposureForwardSpirv), arguments, countGroups(options.rays, 256, 3));
 }
 
 template <>
@@ -33,7 +33,8 @@ void VulkanDevice::enqueue(const ExposureBackward& options) {
   arguments.colourGradients = deviceAddress(options.colourGradients);
   arguments.opacityGradients = deviceAddress(options.opacityGradients);
   arguments.logGainGradients = deviceAddress(options.logGainGradients);
-  queue(sumKernel(kExposureBackwardFloatAtomicsSpirv, kExposureBackwardSpirv), arguments, groupsOf(options.rays, 128));
+  queue(sumKernel(kExposureBackwardFloatAtomicsSpirv, kExposureBackwardSpirv), arguments,
+        countGroups(options.rays, 128));
 }
 
 }  // namespace tessera

@@ -36,7 +36,7 @@ void VulkanDevice::enqueue(const HashGridForward& options) {
   arguments.encoded = matrixArguments(options.encoded, options.samples.capacity);
   setLevels(grid, arguments.levels);
   queue(kernel(kHashGridForwardSpirv, {static_cast<uint32_t>(grid.features)}), arguments,
-        groupsOf(options.samples, kHashGridSamplesPerGroup, 1, static_cast<uint32_t>(grid.levels.size())));
+        countGroups(options.samples, kHashGridSamplesPerGroup, 1, static_cast<uint32_t>(grid.levels.size())));
 }
 
 template <>
@@ -55,10 +55,10 @@ void VulkanDevice::enqueue(const HashGridBackward& options) {
 
   const std::vector<uint32_t> constants = {static_cast<uint32_t>(grid.features)};
   queue(sumKernel(kHashGridBackwardFloatAtomicsSpirv, kHashGridBackwardSpirv, constants), arguments,
-        groupsOf(options.samples, kHashGridSamplesPerGroup, 1, arguments.levelCount));
+        countGroups(options.samples, kHashGridSamplesPerGroup, 1, arguments.levelCount));
   if (options.positionGradients) {
     queue(kernel(kHashGridPositionGradientsSpirv, constants), arguments,
-          groupsOf(options.samples, kHashGridSamplesPerGroup));
+          countGroups(options.samples, kHashGridSamplesPerGroup));
   }
 }
 

@@ -19,7 +19,7 @@ void VulkanDevice::enqueue(const LatticeForward& options) {
   auto arguments = lookupArguments<arguments::LatticeArguments>(options);
   arguments.values = quadAddress(options.values);
   arguments.mixed = matrixArguments(options.mixed, options.samples.capacity);
-  queue(kernel(kLatticeForwardSpirv), arguments, groupsOf(options.samples, kLatticeSamplesPerGroup));
+  queue(kernel(kLatticeForwardSpirv), arguments, countGroups(options.samples, kLatticeSamplesPerGroup));
 }
 
 template <>
@@ -30,7 +30,7 @@ void VulkanDevice::enqueue(const LatticeBackward& options) {
   arguments.valueGradients = deviceAddress(options.valueGradients);
   zeroRows(options.texels, LatticeForward::kColumns, options.valueGradients);
   queue(sumKernel(kLatticeBackwardFloatAtomicsSpirv, kLatticeBackwardSpirv), arguments,
-        groupsOf(options.samples, kLatticeSamplesPerGroup));
+        countGroups(options.samples, kLatticeSamplesPerGroup));
 }
 
 }  // namespace tessera

@@ -87,7 +87,7 @@ void VulkanDevice::enqueue(const S3imLoss& options) {
   arguments.partials = scratch(parts + options.patches * rays);
   arguments.orders = arguments.partials + parts * sizeof(float);
   arguments.gradients = deviceAddress(options.gradients);
-  // 32 KiB are there on every device that can be used; one exchange for each lane needs 1 KiB of it.
+  // Every usable device has 32 KiB of shared memory, of which the exchanges, one per lane, need 1 KiB.
   const bool isLarge = stream_->context()->limits().maxComputeSharedMemorySize >= 34 << 10;
   queue(kernel(kS3imOrdersSpirv, {isLarge ? 8192u : 7168u}), arguments, {options.patches});
   queue(sumKernel(groupSpirv(kS3imLossSubgroupsFloatAtomicsSpirv, kS3imLossFloatAtomicsSpirv),

@@ -1,4 +1,4 @@
-// What marching along rays has in common, in one space (MarchRays) or from block to block (MarchBlocks).
+// The common part of ray marching in one space (MarchRays) and from block to block (MarchBlocks).
 #pragma once
 
 #include "compute/vulkan/vulkan_device.h"
@@ -13,8 +13,8 @@ void VulkanDevice::queueMarch(std::span<const uint32_t> inDouble, std::span<cons
   const RayScratch scratch = rayScratch(options.rays.capacity);
   arguments::MarchArguments& march = arguments.march;
   march.rays = countArguments(options.rays);
-  march.most = options.most;
-  march.mostOpticalDepth = options.mostOpticalDepth;
+  march.maximum = options.maximum;
+  march.maxOpticalDepth = options.maxOpticalDepth;
   march.origins = deviceAddress(options.origins);
   march.directions = deviceAddress(options.directions);
   march.jitter = deviceAddress(options.jitter);

@@ -36,10 +36,10 @@ namespace tessera {
 
 namespace {
 
-constexpr uint32_t kWeightTile = 32;         // mlp_weight_gradients.comp: weights of a workgroup, squared
-constexpr uint32_t kSamplesPerShare = 1024;  // samples that one workgroup there should at least sum
-constexpr uint32_t kMostShares = 64;         // each weight is added to by so many workgroups at most
-constexpr uint32_t kScaleGroups = 64;        // workgroups that look for the largest gradient
+constexpr uint32_t kWeightTile = 32;         // mlp_weight_gradients.comp: a workgroup sums a tile of 32 × 32 weights
+constexpr uint32_t kSamplesPerShare = 1024;  // the minimum number of samples that one of its workgroups sums
+constexpr uint32_t kMaxShares = 64;          // the maximum number of workgroups that add to one weight
+constexpr uint32_t kScaleGroups = 64;        // workgroups of mlp_largest_gradient.comp
 
 #ifdef TESSERA_KHR_MATRICES
 constexpr std::span<const uint32_t> kForwardByKhr = kMlpForwardKhrMatricesSpirv;
@@ -47,7 +47,7 @@ constexpr std::span<const uint32_t> kBackwardByKhr = kMlpBackwardKhrMatricesSpir
 constexpr std::span<const uint32_t> kWeightGradientsByKhr = kMlpWeightGradientsMatricesKhrSpirv;
 constexpr std::span<const uint32_t> kWeightGradientsByKhrAndFloatAtomics =
     kMlpWeightGradientsMatricesKhrFloatAtomicsSpirv;
-#else  // the compiler of shaders did not know them
+#else  // not supported by the shader compiler
 constexpr std::span<const uint32_t> kForwardByKhr, kBackwardByKhr, kWeightGradientsByKhr,
     kWeightGradientsByKhrAndFloatAtomics;
 #endif
@@ -65,13 +65,13 @@ constexpr MlpForms kWeightGradientFormsWithFloatAtomics = {
     kMlpWeightGradientsMatricesNvFloatAtomicsSpirv, kWeightGradientsByKhrAndFloatAtomics,
     kMlpWeightGradientsMatricesEmulatedFloatAtomicsSpirv};
 
-// How a network's kernels are built: see mlp_tile.glsl and mlp_matrices.glsl.
+// The specialization constants of a network's kernels: see mlp_tile.glsl and mlp_matrices.glsl.
 struct Block {
   uint32_t width, samples, stateWidth;
   std::vector<uint32_t> constants() const { return {width, samples, stateWidth}; }
 };
 
-// Blocks fit in 32 KiB of shared memory.
+// Returns a block size that fits in 32 KiB of shared memory.
 Block blockFor(const MlpShape& shape, uint32_t stateWidth, bool byMatrices) {
   CHECK(std::has_single_bit(static_cast<uint32_t>(shape.width)));
   CHECK(16 <= shape.width);
@@ -82,7 +82,7 @@ Block blockFor(const MlpShape& shape, uint32_t stateWidth, bool byMatrices) {
   return {static_cast<uint32_t>(shape.width), samples, stateWidth};
 }
 
-// Places in scratch memory, each at a multiple of 16 bytes.
+// Suballocates scratch memory; offsets are multiples of 16 bytes.
 class Places {
  public:
   uint64_t add(size_t bytes) {
@@ -120,8 +120,9 @@ auto VulkanDevice::withOrWithoutMatrices(const Make& make) {
     try {
       return make();
     } catch (const KernelRefused& refused) {
-      warn("{} compiles no kernels of cooperative matrices ({}): networks do without", name(), refused.reason());
-      mlpArithmetic_ = MlpArithmetic::halves;  // which keep the same activations
+      warn("{} cannot compile the kernels with cooperative matrices ({}); networks run without them", name(),
+           refused.reason());
+      mlpArithmetic_ = MlpArithmetic::halves;  // stores activations in the same format
     }
   }
   return make();
@@ -135,7 +136,7 @@ VulkanDevice::BlockKernel VulkanDevice::blockKernel(const MlpForms& forms, const
 }
 
 uint64_t VulkanDevice::weightNumbers(const Slice<const float>& weights, uint64_t scratch) {
-  if (!keepsHalves()) return quadAddress(weights);
+  if (!storesActivationsInHalf()) return quadAddress(weights);
   arguments::HalveNumbersArguments halve = {};
   halve.numbers = deviceAddress(weights);
   halve.halves = scratch;
@@ -158,14 +159,14 @@ void VulkanDevice::enqueue(const MlpForward& options) {
   arguments.samples = partArguments(options.samples);
   arguments.inputs = matrixArguments(options.input, capacity);
   arguments.outputs = matrixArguments(options.output, capacity);
-  arguments.weights = weightNumbers(options.weights, keepsHalves() ? scratch(shape.parameters()) : 0);
+  arguments.weights = weightNumbers(options.weights, storesActivationsInHalf() ? scratch(shape.parameters()) : 0);
   arguments.activations = quadAddress(options.activations);
   arguments.paddedInputs = shape.layerInputs(0);
   arguments.paddedOutputs = shape.layerOutputs(shape.hiddenLayers);
   arguments.hiddenLayers = shape.hiddenLayers;
   arguments.sigmoidOutput = shape.activation == OutputActivation::sigmoid;
   const BlockKernel block = blockKernel(kForwardForms, shape, shape.width);
-  queue(block.kernel, arguments, groupsOf(options.samples, block.samples));
+  queue(block.kernel, arguments, countGroups(options.samples, block.samples));
 }
 
 template <>
@@ -180,12 +181,12 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
   CHECK(capacity * shape.activationsPerSample() < size_t{1} << 31);
   if (capacity == 0) return;
 
-  const size_t numberBytes = keepsHalves() ? 2 : sizeof(float);
-  const size_t plane = capacity * width * numberBytes;  // of activations and gradients of one layer
+  const size_t numberBytes = storesActivationsInHalf() ? 2 : sizeof(float);
+  const size_t plane = capacity * width * numberBytes;  // bytes of the activations or gradients of one layer
   Places places;
   const uint64_t hiddenPlace = places.add(hiddenLayers * plane);
   const uint64_t lastPlace = places.add(capacity * paddedOutputs * numberBytes);
-  const uint64_t weightPlace = places.add(keepsHalves() ? shape.parameters() * numberBytes : 0);
+  const uint64_t weightPlace = places.add(storesActivationsInHalf() ? shape.parameters() * numberBytes : 0);
   const uint64_t largestPlace = places.add(kScaleGroups * sizeof(float));
   const uint64_t base = scratch(places.floats());
 
@@ -204,7 +205,7 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
   arguments.paddedOutputs = paddedOutputs;
   arguments.hiddenLayers = hiddenLayers;
   arguments.largest = noCounter_.address();
-  if (keepsHalves()) {
+  if (storesActivationsInHalf()) {
     arguments.largest = base + largestPlace;
     arguments.largestCount = std::min(groups(capacity, 128), kScaleGroups);
     arguments::MlpLargestGradientArguments largest = {};
@@ -213,7 +214,7 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
     queue(kernel(kMlpLargestGradientSpirv), largest, {arguments.largestCount});
   }
   const BlockKernel block = blockKernel(kBackwardForms, shape, std::max(width, paddedOutputs));
-  queue(block.kernel, arguments, groupsOf(options.samples, block.samples));
+  queue(block.kernel, arguments, countGroups(options.samples, block.samples));
 
   for (uint32_t layer = 0; layer <= hiddenLayers; ++layer) {
     arguments::MlpWeightGradientsArguments sums = {};
@@ -231,13 +232,13 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
 }
 
 void VulkanDevice::queueWeightGradients(const arguments::MlpWeightGradientsArguments& sums, size_t capacity) {
-  const uint32_t shares = std::clamp<uint32_t>(groups(capacity, kSamplesPerShare), 1, kMostShares);
+  const uint32_t shares = std::clamp<uint32_t>(groups(capacity, kSamplesPerShare), 1, kMaxShares);
   const bool atomics = stream_->context()->features().floatAtomics;
   uint32_t tileRows = 0, tileColumns = 0;
   const auto make = [&]() -> const GpuKernel* {
     tileRows = tileColumns = kWeightTile;
     if (multipliesMatrices()) {
-      // The largest that leave no row and no column over.
+      // The largest tile that divides the matrix evenly.
       const auto largest = [](uint32_t size, std::initializer_list<uint32_t> choices) {
         return *std::find_if(choices.begin(), choices.end(), [&](uint32_t n) { return size % n == 0; });
       };

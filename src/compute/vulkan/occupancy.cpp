@@ -15,7 +15,7 @@ namespace tessera {
 template <>
 void VulkanDevice::enqueue(const OccupancyPoints& options) {
   const uint32_t resolution = options.space.gridResolution, points = static_cast<uint32_t>(options.cells.count);
-  CHECK(16 * (uint64_t{options.first} + points) < uint64_t{1} << 32);  // indices of random numbers
+  CHECK(16 * (uint64_t{options.first} + points) < uint64_t{1} << 32);  // random indices must not overflow
   arguments::OccupancyPointsArguments arguments = {};
   arguments.key = RandomStream(options.seed, 0x0cc).key;
   arguments.points = points;
@@ -33,7 +33,7 @@ void VulkanDevice::enqueue(const OccupancyPoints& options) {
 
 template <>
 void VulkanDevice::enqueue(const OccupancyUpdate& options) {
-  constexpr uint32_t kMostSums = 256;  // workgroups that sum
+  constexpr uint32_t kMaxSums = 256;  // maximum number of workgroups that sum
   arguments::OccupancyUpdateArguments arguments = {};
   arguments.contracted = options.space.contracted;
   arguments.resolution = options.space.gridResolution;
@@ -48,7 +48,7 @@ void VulkanDevice::enqueue(const OccupancyUpdate& options) {
   arguments.logDensity = matrixArguments(options.logDensity, options.points);
   arguments.grid = arguments.gridBits = deviceAddress(options.grid);
   arguments.occupancy = deviceAddress(options.occupancy);
-  const uint32_t all = groups(arguments.cellCount, 256), summing = std::min(all, kMostSums);
+  const uint32_t all = groups(arguments.cellCount, 256), summing = std::min(all, kMaxSums);
   arguments.partials = scratch(2 * size_t{summing} + 2);
   arguments.sums = arguments.partials + 2 * summing * sizeof(float);
   queue(kernel(kOccupancyDecaySpirv), arguments, {all});

@@ -18,9 +18,9 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kThreads = 256;     // of a workgroup
-constexpr double kWorkSeconds = 0.01;  // that a measurement takes at least: what it costs to begin one is nothing then
-constexpr uint32_t kMostRounds = 1 << 18, kMostCopies = 512;
+constexpr uint32_t kThreads = 256;     // per workgroup
+constexpr double kWorkSeconds = 0.01;  // minimum duration of a measurement, so that launch overhead is negligible
+constexpr uint32_t kMaxRounds = 1 << 18, kMaxCopies = 512;
 
 class VulkanProbe final : public MachineProbe {
  public:
@@ -42,7 +42,7 @@ class VulkanProbe final : public MachineProbe {
     try {
       matrices_ = std::make_unique<GpuKernel>(context_, spirv, VulkanDevice::matrixConstants({}, matrices),
                                               matrices.subgroupSize);
-    } catch (const KernelRefused&) {  // networks do without, too
+    } catch (const KernelRefused&) {  // networks do not use them either
     }
   }
 
@@ -54,7 +54,7 @@ class VulkanProbe final : public MachineProbe {
       arguments.rounds = rounds;
       queue(multiplyAdds_, arguments, kGroups);
     };
-    return rate(run, kMostRounds, 2.0 * 16 * kThreads * kGroups);
+    return rate(run, kMaxRounds, 2.0 * 16 * kThreads * kGroups);
   }
 
   double matrixFlops() override {
@@ -68,7 +68,7 @@ class VulkanProbe final : public MachineProbe {
       queue(*matrices_, arguments, kGroups);
     };
     constexpr double kSums = 4;  // probe_matrices.comp
-    return rate(run, kMostRounds,
+    return rate(run, kMaxRounds,
                 2.0 * shape.rows * shape.columns * shape.depth * kSums * GpuMatrices::kSubgroups * kGroups);
   }
 
@@ -84,9 +84,9 @@ class VulkanProbe final : public MachineProbe {
       arguments.rounds = rounds;
       queue(gather_, arguments, kGroups);
     };
-    const double found = rate(run, kMostRounds, 8.0 * kThreads * kGroups);
-    stream_.retire(std::move(entries));
-    return found;
+    const double loadsPerSecond = rate(run, kMaxRounds, 8.0 * kThreads * kGroups);
+    stream_.deferDestroy(std::move(entries));
+    return loadsPerSecond;
   }
 
   double streamRate(size_t bytes) override {
@@ -98,16 +98,16 @@ class VulkanProbe final : public MachineProbe {
     there.count = static_cast<uint32_t>(half / 16);
     arguments::ProbeArguments back = there;
     std::swap(back.from, back.to);
-    const size_t most = context_->limits().maxComputeWorkGroupCount[0];
-    const auto groups = static_cast<uint32_t>(std::min<size_t>((there.count + kThreads - 1) / kThreads, most));
-    // Each copy begins when the one before has ended: nothing of it stays where it was made.
+    const size_t maximum = context_->limits().maxComputeWorkGroupCount[0];
+    const auto groups = static_cast<uint32_t>(std::min<size_t>((there.count + kThreads - 1) / kThreads, maximum));
+    // Each copy begins after the previous one has ended.
     const auto run = [&](uint32_t copies) {
       for (uint32_t i = 0; i < copies; ++i) queue(copy_, i % 2 == 0 ? there : back, groups);
     };
-    const double found = rate(run, kMostCopies, 2.0 * static_cast<double>(half));
-    stream_.retire(std::move(one));
-    stream_.retire(std::move(other));
-    return found;
+    const double bytesPerSecond = rate(run, kMaxCopies, 2.0 * static_cast<double>(half));
+    stream_.deferDestroy(std::move(one));
+    stream_.deferDestroy(std::move(other));
+    return bytesPerSecond;
   }
 
  private:
@@ -122,8 +122,8 @@ class VulkanProbe final : public MachineProbe {
     stream_.run(kernel, std::as_bytes(std::span(&arguments, 1)), {groups});
   }
 
-  // `run` queues so many rounds, of so much each.
-  double rate(const std::function<void(uint32_t rounds)>& run, uint32_t mostRounds, double amount) {
+  // Returns the amount per second. `run` queues the given number of rounds, each of which processes `amount`.
+  double rate(const std::function<void(uint32_t rounds)>& run, uint32_t maxRounds, double amount) {
     uint32_t rounds = 2;
     const auto seconds = [&] {
       const auto begun = std::chrono::steady_clock::now();
@@ -131,7 +131,7 @@ class VulkanProbe final : public MachineProbe {
       stream_.finish();
       return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     };
-    while (seconds() < kWorkSeconds && rounds < mostRounds) rounds *= 2;
+    while (seconds() < kWorkSeconds && rounds < maxRounds) rounds *= 2;
     double best = 1e30;
     for (int i = 0; i < 4; ++i) best = std::min(best, seconds());
     return amount * rounds / best;
@@ -139,9 +139,9 @@ class VulkanProbe final : public MachineProbe {
 
   std::shared_ptr<const GpuContext> context_;
   GpuKernel multiplyAdds_, gather_, copy_;
-  std::unique_ptr<GpuKernel> matrices_;  // null where the device multiplies none
+  std::unique_ptr<GpuKernel> matrices_;  // null if the device has no cooperative matrices
   GpuBuffer sink_;
-  GpuStream stream_;  // waits before the others go
+  GpuStream stream_;  // destroyed first, which waits for the device
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What a graphics card could do at best, measured by kernels that do nothing else.
+// Measures the peak rates of a GPU with dedicated kernels.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,7 @@
 
 namespace tessera {
 
-// `device` is a Vulkan device and outlives it.
+// `device` must be a Vulkan device and outlive the probe.
 std::unique_ptr<MachineProbe> makeVulkanProbe(Device& device);
 
 }  // namespace tessera

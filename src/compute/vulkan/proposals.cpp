@@ -19,12 +19,12 @@ void VulkanDevice::enqueue(const ResampleFences& options) {
   arguments.before = options.before;
   arguments.after = options.after;
   arguments.anneal = options.anneal;
-  arguments.padding = options.padding;
+  arguments.uniformFraction = options.uniformFraction;
   arguments.fences = deviceAddress(options.fences);
   arguments.weights = deviceAddress(options.weights);
   arguments.jitter = deviceAddress(options.jitter);
   arguments.resampled = deviceAddress(options.resampled);
-  queue(realKernel(kResampleFencesFloat64Spirv, kResampleFencesSpirv), arguments, groupsOf(options.rays, 64));
+  queue(realKernel(kResampleFencesFloat64Spirv, kResampleFencesSpirv), arguments, countGroups(options.rays, 64));
 }
 
 template <>

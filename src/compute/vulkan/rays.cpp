@@ -27,7 +27,7 @@ void VulkanDevice::enqueue(const GenerateRays& options) {
   arguments.pixels = deviceAddress(options.pixels);
   arguments.origins = deviceAddress(options.origins);
   arguments.directions = deviceAddress(options.directions);
-  queue(kernel(kGenerateRaysSpirv), arguments, groupsOf(options.rays, kRaysPerGroup));
+  queue(kernel(kGenerateRaysSpirv), arguments, countGroups(options.rays, kRaysPerGroup));
 }
 
 template <>
@@ -60,7 +60,7 @@ void VulkanDevice::enqueue(const OpticalDepth& options) {
   arguments.logDensity = matrixArguments(options.logDensity, 0);
   arguments.steps = deviceAddress(options.steps);
   arguments.opticalDepth = deviceAddress(options.opticalDepth);
-  queue(kernel(kOpticalDepthSpirv), arguments, groupsOf(options.rays, kRaysPerGroup));
+  queue(kernel(kOpticalDepthSpirv), arguments, countGroups(options.rays, kRaysPerGroup));
 }
 
 template <>
@@ -71,7 +71,7 @@ void VulkanDevice::enqueue(const CompactSamples& options) {
   arguments.rounds = options.rounds;
   arguments.sampleCapacity = options.sampleCapacity;
   arguments.keptCapacity = options.keptCapacity;
-  arguments.mostOpticalDepth = options.mostOpticalDepth;
+  arguments.maxOpticalDepth = options.maxOpticalDepth;
   arguments.firstSample = deviceAddress(options.firstSample);
   arguments.nextStep = deviceAddress(options.nextStep);
   arguments.logDensity = matrixArguments(options.logDensity, 0);
@@ -94,12 +94,12 @@ void VulkanDevice::enqueue(const CompactSamples& options) {
 }
 
 VulkanDevice::RayScratch VulkanDevice::rayScratch(uint32_t rays) {
-  RayScratch made;
-  made.counts = scratch(2 * size_t{rays} + 2 + scanScratch(rays));
-  made.nexts = made.counts + rays * sizeof(uint32_t);
-  made.fitting = made.nexts + rays * sizeof(uint32_t);
-  made.partials = made.fitting + 2 * sizeof(uint32_t);
-  return made;
+  RayScratch scratchPlaces;
+  scratchPlaces.counts = scratch(2 * size_t{rays} + 2 + scanScratch(rays));
+  scratchPlaces.nexts = scratchPlaces.counts + rays * sizeof(uint32_t);
+  scratchPlaces.fitting = scratchPlaces.nexts + rays * sizeof(uint32_t);
+  scratchPlaces.partials = scratchPlaces.fitting + 2 * sizeof(uint32_t);
+  return scratchPlaces;
 }
 
 }  // namespace tessera

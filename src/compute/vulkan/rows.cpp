@@ -23,8 +23,8 @@ void VulkanDevice::moveRows(const Count& rows, const Slice<const uint32_t>& sour
   arguments.from = matrixArguments(from, scatter ? rows.capacity : 0);
   arguments.to = matrixArguments(to, scatter ? 0 : rows.capacity);
   CHECK(size_t{rows.capacity} * from.columns < size_t{1} << 31);
-  queue(kernel(kMoveRowsSpirv, {scatter}), arguments, groupsOf(rows, kElementsPerGroup, from.columns));
-  countedGroups_.changed(arguments.to.data, to.data.count * sizeof(float));  // counters may travel as floats
+  queue(kernel(kMoveRowsSpirv, {scatter}), arguments, countGroups(rows, kElementsPerGroup, from.columns));
+  countedGroups_.changed(arguments.to.data, to.data.count * sizeof(float));  // counters may be moved as floats
 }
 
 template <>
@@ -45,7 +45,7 @@ void VulkanDevice::enqueue(const AddColumns& options) {
   arguments.rows = countArguments(options.rows);
   arguments.added = matrixArguments(options.input, rows);
   arguments.sums = matrixArguments(options.output, rows);
-  queue(kernel(kAddColumnsSpirv), arguments, groupsOf(options.rows, 256, options.output.columns));
+  queue(kernel(kAddColumnsSpirv), arguments, countGroups(options.rows, 256, options.output.columns));
 }
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// Running sums and sums over all: what several operations need.
+// Prefix sums and reductions, which several operations use.
 #include "compute/vulkan/vulkan_device.h"
 #include "shaders/add_partials.h"
 #include "shaders/add_partials_subgroups.h"

@@ -18,10 +18,10 @@ constexpr uint32_t kLookupsPerGroup = 64;  // local_size_x of the lookups
 }  // namespace
 
 void VulkanDevice::zeroRows(const Count& rows, uint32_t columns, const Slice<float>& numbers) {
-  const size_t most = size_t{rows.capacity} * columns;
-  CHECK(most < size_t{1} << 31);
+  const size_t maximum = size_t{rows.capacity} * columns;
+  CHECK(maximum < size_t{1} << 31);
   queue(kernel(kZeroRowsSpirv), arguments::ZeroRowsArguments{countArguments(rows), deviceAddress(numbers), columns, 0},
-        groupsOf(rows, 256, columns));
+        countGroups(rows, 256, columns));
 }
 
 template <>
@@ -42,7 +42,7 @@ void VulkanDevice::enqueue(const DistinctTexels& options) {
   arguments.texelPositions = deviceAddress(options.texelPositions);
   arguments.blocks = options.blocks;
   arguments.texelCapacity = options.texelCapacity;
-  Groups ofCorners = groupsOf(options.samples, 128, grid.corners());
+  Groups ofCorners = countGroups(options.samples, 128, grid.corners());
   ofCorners.x = std::max(ofCorners.x, 1u);
   if (!grid.shareTexels) {
     queue(kernel(kDistinctTexelsMarkSpirv, {false}), arguments, ofCorners);
@@ -72,7 +72,7 @@ void VulkanDevice::enqueue(const VirtualGridForward& options) {
   arguments.colours = deviceAddress(options.colours);
   arguments.minAlpha = options.minAlpha;
   queue(kernel(kVirtualGridForwardSpirv, {options.grid.corners()}), arguments,
-        groupsOf(options.samples, kLookupsPerGroup));
+        countGroups(options.samples, kLookupsPerGroup));
 }
 
 template <>
@@ -85,7 +85,7 @@ void VulkanDevice::enqueue(const VirtualGridBackward& options) {
   arguments.attributeGradients = deviceAddress(options.attributeGradients);
   zeroRows(options.texels, VirtualGrid::kAttributes, options.attributeGradients);
   queue(sumKernel(kVirtualGridBackwardFloatAtomicsSpirv, kVirtualGridBackwardSpirv, {options.grid.corners()}),
-        arguments, groupsOf(options.samples, kLookupsPerGroup));
+        arguments, countGroups(options.samples, kLookupsPerGroup));
 }
 
 }  // namespace tessera

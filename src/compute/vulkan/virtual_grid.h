@@ -1,4 +1,4 @@
-// What the virtual grid's operations and the lattice's hand to their kernels.
+// Kernel arguments of the operations on the virtual grid and the lattice.
 #pragma once
 
 #include "compute/virtual_grid.h"
@@ -8,7 +8,7 @@
 namespace tessera {
 
 inline arguments::VirtualGridArguments gridArguments(const VirtualGrid& grid) {
-  CHECK(grid.voxels <= 4096u);  // virtual_grid.glsl: products with positions are exact
+  CHECK(grid.voxels <= 4096u);  // products with positions in virtual_grid.glsl are exact
   CHECK(grid.planes <= 4096u);
   arguments::VirtualGridArguments arguments = {};
   arguments.voxels = grid.voxels;
@@ -22,7 +22,7 @@ inline arguments::VirtualGridArguments gridArguments(const VirtualGrid& grid) {
   return arguments;
 }
 
-// What all lookups have in common.
+// The arguments that all lookups have in common.
 template <class Arguments, class Options>
 Arguments VulkanDevice::lookupArguments(const Options& options) const {
   Arguments arguments = {};

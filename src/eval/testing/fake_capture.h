@@ -1,4 +1,4 @@
-// For tests: a small capture on disk, and a renderer that returns what it is told to.
+// For tests: a small capture on disk, and a renderer that returns given images.
 #pragma once
 
 #include <unistd.h>
@@ -29,7 +29,7 @@ inline ImageU8 fakePhoto(int width, int height, uint64_t seed) {
   return image;
 }
 
-// Photos in a temporary folder, gone with the object. Photo i lies at x = i.
+// Photos in a temporary folder, which the destructor removes. The camera of photo i lies at x = i.
 class FakeCapture {
  public:
   explicit FakeCapture(const std::string& name) {
@@ -62,7 +62,7 @@ class FakeRenderer : public ViewRenderer {
   using Draw = std::function<RenderedView(const Camera&, int photo)>;
 
   explicit FakeRenderer(Draw draw) : draw_(std::move(draw)) {}
-  // Opaque pictures, as floats, by photo.
+  // Returns these opaque images by photo.
   explicit FakeRenderer(std::vector<ImageF> pictures)
       : FakeRenderer([pictures = std::move(pictures)](const Camera& camera, int photo) {
           return RenderedView{pictures.at(static_cast<size_t>(photo)), ImageF(camera.width, camera.height, 1, 1.0f),

@@ -1,6 +1,6 @@
-// For tests: what MERF's public web viewer makes of a folder, in double, after its sources (google-research, folder
-// merf/webviewer/): how index.js and viewdependency.js lay out textures, and the equations of fragment.glsl and
-// viewdependency.glsl. Texture units mix as they should, not in 8 bits. It shares nothing with the writer.
+// For tests: a reimplementation of MERF's public web viewer in double precision, after its sources (google-research,
+// folder merf/webviewer/): the texture layout of index.js and viewdependency.js, and the equations of fragment.glsl and
+// viewdependency.glsl. Texture filtering is exact rather than 8-bit. It shares no code with the exporter.
 #pragma once
 
 #include <fmt/format.h>
@@ -16,7 +16,7 @@
 
 namespace tessera {
 
-using ViewerPlace = std::array<double, 3>;  // g: y up, contracted where it says so
+using ViewerPlace = std::array<double, 3>;  // position in g: y up; contracted where stated
 
 class MerfViewer {
  public:
@@ -40,14 +40,14 @@ class MerfViewer {
     const int factor = kFactors[grid], n = (planes_ + factor - 1) / factor;
     int cell[3];
     for (int a = 0; a < 3; ++a) {
-      const double least = std::floor((z[a] + 2) / (planeTexel_ * factor));
-      cell[a] = nearest((least + least + 1) * 0.5 / n, n);
+      const double minimum = std::floor((z[a] + 2) / (planeTexel_ * factor));
+      cell[a] = nearest((minimum + minimum + 1) * 0.5 / n, n);
     }
     return occupancy_[grid].pixels[4 * (cell[0] + n * (cell[1] + size_t(n) * cell[2]))] > 0;
   }
 
-  // Sums of denormalised density, red, green, blue and four features at a contracted place; nothing where the viewer
-  // passes it over.
+  // Returns the sums of denormalised density, red, green, blue and four features at a contracted position; nothing
+  // where the viewer skips it as empty.
   std::optional<std::array<double, 8>> lookUp(const ViewerPlace& z) const {
     for (size_t grid = 0; grid < kFactors.size(); ++grid) {
       if (!occupied(grid, z)) return std::nullopt;
@@ -56,9 +56,9 @@ class MerfViewer {
     int index[3];
     double inAtlas[3];
     for (int a = 0; a < 3; ++a) {
-      const double u = (z[a] + 2) / voxel_ - 0.5, least = std::floor(u / block_) * block_;
-      index[a] = nearest((least + least + block_) / (2.0 * blocks * block_), blocks);
-      inAtlas[a] = std::clamp(u - least, 0.0, static_cast<double>(block_));
+      const double u = (z[a] + 2) / voxel_ - 0.5, minimum = std::floor(u / block_) * block_;
+      index[a] = nearest((minimum + minimum + block_) / (2.0 * blocks * block_), blocks);
+      inAtlas[a] = std::clamp(u - minimum, 0.0, static_cast<double>(block_));
     }
     const uint8_t* place = &indices_.pixels[3 * (index[0] + blocks * (index[1] + size_t(blocks) * index[2]))];
     if (place[0] > 254) return std::nullopt;
@@ -72,7 +72,7 @@ class MerfViewer {
     return sums;
   }
 
-  // `direction` is one of g, of length 1.
+  // `direction`: a unit vector in g.
   std::array<double, 3> network(const std::array<double, 3>& colour, const std::array<double, 4>& features,
                                 const ViewerPlace& direction) const {
     const double turned[3] = {-direction[0], direction[2], direction[1]};  // worldspaceROpengl
@@ -97,12 +97,12 @@ class MerfViewer {
 
  private:
   struct Layer {
-    std::vector<std::vector<double>> weights;  // [inputs][outputs], filled up to multiples of 4
+    std::vector<std::vector<double>> weights;  // [inputs][outputs], padded to multiples of 4
     std::vector<double> biases;
   };
   static constexpr std::array<int, 5> kFactors = {8, 16, 32, 64, 128};
 
-  // Of n texels, at a texture coordinate, clamped to the edge.
+  // Returns the nearest of n texels to a texture coordinate, clamped to the edge.
   static int nearest(double coordinate, int n) {
     return std::clamp(static_cast<int>(std::floor(coordinate * n)), 0, n - 1);
   }
@@ -111,12 +111,12 @@ class MerfViewer {
     double weight[2];
   };
   static Mixed linear(double coordinate, int n) {
-    const double u = coordinate * n - 0.5, least = std::floor(u);
+    const double u = coordinate * n - 0.5, minimum = std::floor(u);
     const auto clamped = [n](double i) { return static_cast<int>(std::clamp(i, 0.0, n - 1.0)); };
-    return {{clamped(least), clamped(least + 1)}, {1 - (u - least), u - least}};
+    return {{clamped(minimum), clamped(minimum + 1)}, {1 - (u - minimum), u - minimum}};
   }
 
-  // The viewer takes the bytes of a PNG as they come, so that their number of channels must be right.
+  // The viewer uses the bytes of a PNG as they are, so the number of channels must be right.
   ImageU8 picture(const std::string& name, int channels, int width, int height) const {
     ImageU8 image = readImage(folder_ / (name + ".png")).image;
     EXPECT_EQ(image.channels, channels) << name;
@@ -141,7 +141,7 @@ class MerfViewer {
     }
   }
 
-  // createViewDependenceFunctions: widths are filled up to multiples of 4. Filling up inputs sets the biases to 0.
+  // As createViewDependenceFunctions does: widths are padded to multiples of 4. Padding inputs sets the biases to 0.
   void loadLayer(const nlohmann::json& params, int number) {
     const auto weights = params.at(fmt::format("{}_weights", number)).get<std::vector<std::vector<double>>>();
     const auto biases = params.at(fmt::format("{}_bias", number)).get<std::vector<double>>();
@@ -158,7 +158,7 @@ class MerfViewer {
     }
   }
 
-  // Red, green and blue of one picture, its alpha, and the four channels of the other, as sums go.
+  // Adds the density in alpha and the colour of one image, and the four channels of the other, to the sums.
   void add(const uint8_t* rgbAndDensity, const uint8_t* features, double weight, std::array<double, 8>& sums) const {
     const auto mean = [](const std::array<double, 2>& range, uint8_t byte) {
       return range[0] + byte / 255.0 * (range[1] - range[0]);

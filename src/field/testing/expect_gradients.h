@@ -1,4 +1,4 @@
-// For tests: a parameter group's gradients against differences of a loss.
+// For tests: compares the gradients of a parameter group with finite differences of a loss.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,8 +11,8 @@
 
 namespace tessera {
 
-// Of the six parameters that matter most: small ones drown in the rounding of floats. `gradients` are there; `loss` is
-// a function of the group's values, which come back as they were.
+// Compares the six largest gradients; smaller ones are lost in the rounding of floats. The group's gradients must have
+// been computed; `loss` is a function of the group's values, which are restored afterwards.
 inline void expectGradientsOfDifferences(Device& device, ParameterGroup& group, const std::function<double()>& loss,
                                          float h = 2e-3f, double tolerance = 0.03) {
   const std::vector<float> gradients = device.read(group.gradients.all());

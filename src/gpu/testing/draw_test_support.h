@@ -1,4 +1,4 @@
-// What the tests of drawing share: triangles on the device, the shaders that draw them, and pictures brought back.
+// The fixture of the drawing tests: triangles on the device, the shaders that draw them, and downloads of images.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ class DrawTest : public testing::Test {
 
   std::shared_ptr<GpuImage> makeImage(ImageFormat format) { return stream_->makeImage(kSize, format); }
 
-  // A buffer with these values.
+  // Returns a buffer with these values.
   template <class T>
   GpuBuffer uploaded(const std::vector<T>& values) {
     GpuBuffer buffer(context_, values.size() * sizeof(T));
@@ -48,21 +48,21 @@ class DrawTest : public testing::Test {
     TriangleArguments arguments;
   };
   OnDevice uploaded(const Triangles& triangles) {
-    OnDevice made = {
+    OnDevice onDevice = {
         uploaded(triangles.vertices), uploaded(triangles.indices), static_cast<uint32_t>(triangles.indices.size()), {}};
-    made.arguments.vertices = made.vertices.address();
-    made.arguments.indices = made.indices.address();
-    made.arguments.width = kSize.width;
-    return made;
+    onDevice.arguments.vertices = onDevice.vertices.address();
+    onDevice.arguments.indices = onDevice.indices.address();
+    onDevice.arguments.width = kSize.width;
+    return onDevice;
   }
 
-  // Borrows the arguments.
+  // Keeps a reference to the arguments.
   static DrawCall call(const GpuGraphicsPipeline& pipeline, const TriangleArguments& arguments, DrawCount count) {
     return {&pipeline, std::as_bytes(std::span(&arguments, 1)), count};
   }
   static DrawCall call(const GpuGraphicsPipeline&, TriangleArguments&&, DrawCount) = delete;
 
-  // All pixels, [height][width][T's].
+  // Downloads all pixels, [height][width] values of T.
   template <class T>
   std::vector<T> pixels(const GpuImage& image) {
     GpuBuffer buffer(context_, image.copiedBytes());
@@ -89,7 +89,7 @@ class DrawTest : public testing::Test {
   std::unique_ptr<GpuStream> stream_;
 };
 
-// A pair of triangles that cut through each other.
+// Two triangles that intersect each other.
 inline Triangles crossingPair() {
   Triangles pair;
   pair.vertices = {{{-0.9f, -0.8f, 0.2f, 1}, {1, 0, 0, 1}}, {{0.8f, -0.7f, 0.8f, 1}, {1, 0, 0, 1}},

@@ -1,5 +1,5 @@
-// For tests: a context, or a skip by name where the machine has no Vulkan loader or no driver at all. With
-// TESSERA_REQUIRE_VULKAN=1 in the environment (CI) that is a failure instead.
+// For tests: opens a context, or skips the test if the machine has no Vulkan loader or no driver. With
+// TESSERA_REQUIRE_VULKAN=1 in the environment (CI), that is a failure instead.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ inline bool vulkanIsRequired() {
   return value != nullptr && std::string(value) == "1";
 }
 
-// Null where there is no driver. Any other failure is thrown.
+// Returns null if there is no loader or no driver. Throws any other failure.
 inline std::shared_ptr<GpuContext> openForTest(const GpuOptions& options = {}) {
   try {
     return GpuContext::open(options);
@@ -30,6 +30,6 @@ inline std::shared_ptr<GpuContext> openForTest(const GpuOptions& options = {}) {
 }
 
 #define SKIP_WITHOUT_VULKAN(context) \
-  if (!(context)) GTEST_SKIP() << "no Vulkan driver is installed (mesa-vulkan-drivers has one for the processor)"
+  if (!(context)) GTEST_SKIP() << "no Vulkan driver is installed (mesa-vulkan-drivers has one for the CPU)"
 
 }  // namespace tessera

@@ -8,7 +8,7 @@
 namespace tessera::gpu_test {
 namespace {
 
-constexpr double kEdgeMargin = 1.0 / 64;  // pixels; implementations round corners to 1/256 at least
+constexpr double kEdgeMargin = 1.0 / 64;  // pixels; implementations round vertices to 1/256 or finer
 constexpr double kDepthMargin = 1e-4;
 
 struct Corner {
@@ -19,8 +19,8 @@ double area(const Corner& a, const Corner& b, double x, double y) {
   return (b.x - a.x) * (y - a.y) - (b.y - a.y) * (x - a.x);
 }
 
-// Vulkan 1.2, sections 24 (coordinate transformations) and 27.7 (polygons): perspective-correct attributes, depth
-// linear in the picture.
+// Vulkan 1.2, sections 24 (coordinate transformations) and 27.7 (polygons): attributes are perspective-correct, depth
+// is linear in screen space.
 class Rasteriser {
  public:
   Rasteriser(const Triangles& triangles, ImageSize size, Faces faces)
@@ -97,7 +97,7 @@ class Rasteriser {
   ImageSize size_;
   Faces faces_;
   std::vector<RasterisedPixel> pixels_;
-  std::vector<double> secondDepths_;  // behind the nearest
+  std::vector<double> secondDepths_;  // of the second-nearest triangle
 };
 
 }  // namespace
@@ -106,19 +106,19 @@ Triangles randomTriangles(uint64_t seed, size_t count) {
   const RandomStream random(seed, 0);
   uint64_t index = 0;
   const auto between = [&](float low, float high) { return low + (high - low) * random.uniform(index++); };
-  Triangles made;
+  Triangles triangles;
   for (size_t t = 0; t < count; ++t) {
     const float x = between(-0.6f, 0.6f), y = between(-0.6f, 0.6f);
     for (uint32_t corner = 0; corner < 3; ++corner) {
-      Vertex& vertex = made.vertices.emplace_back();
+      Vertex& vertex = triangles.vertices.emplace_back();
       const float w = between(0.5f, 3);
       vertex.position = {w * (x + between(-1.5f, 1.5f)), w * (y + between(-1.5f, 1.5f)), w * between(0.1f, 0.9f), w};
       for (float& value : vertex.colour) value = between(0, 1);
     }
   }
-  // Indices in another order than vertices, so that they matter.
-  for (size_t i = made.vertices.size(); i-- > 0;) made.indices.push_back(static_cast<uint32_t>(i));
-  return made;
+  // Indices have a different order than vertices, so that they matter.
+  for (size_t i = triangles.vertices.size(); i-- > 0;) triangles.indices.push_back(static_cast<uint32_t>(i));
+  return triangles;
 }
 
 std::vector<RasterisedPixel> rasterise(const Triangles& triangles, ImageSize size, Faces faces) {

@@ -1,4 +1,5 @@
-// For tests: what triangles look like, computed on the CPU in double precision, and what the GPU is told to draw them.
+// For tests: a reference rasteriser on the CPU in double precision, and the arguments with which the GPU draws the same
+// triangles.
 #pragma once
 
 #include <array>
@@ -10,7 +11,7 @@
 
 namespace tessera::gpu_test {
 
-// As shaders/gpu/triangle_arguments.glsl.
+// The layouts of shaders/gpu/triangle_arguments.glsl.
 struct Vertex {
   std::array<float, 4> position;  // clip space, w above 0
   std::array<float, 4> colour = {};
@@ -26,22 +27,22 @@ struct Triangles {
   std::vector<uint32_t> indices;
 };
 
-// Triangles of any size, place and winding within depths 0.1 to 0.9, some of which reach out of the picture; each
-// vertex has a w and a colour of its own.
+// Returns random triangles of various sizes, positions and windings with depths from 0.1 to 0.9. Some extend beyond the
+// image. Each vertex has its own w and colour.
 Triangles randomTriangles(uint64_t seed, size_t count);
 
 struct RasterisedPixel {
-  uint32_t number = 0;   // of the nearest triangle, counted from 1; 0: none
-  uint32_t covered = 0;  // by so many triangles
-  uint32_t largest = 0;  // number among those
-  double depth = 1;      // of the nearest
+  uint32_t number = 0;   // of the nearest triangle, counted from 1; 0 if there is none
+  uint32_t covered = 0;  // the number of triangles that cover the pixel
+  uint32_t largest = 0;  // triangle number among those
+  double depth = 1;      // of the nearest triangle
   std::array<double, 4> colour = {};
-  bool isCertain = true;  // no edge passes close by, and no two depths are nearly equal: all implementations agree
+  bool isCertain = true;  // no edge is close and no two depths are nearly equal, so all implementations agree
 };
 
-enum class Faces { all, clockwise, counterClockwise };  // as seen in the picture, y downwards
+enum class Faces { all, clockwise, counterClockwise };  // as seen in the image, y downwards
 
-// [height][width]
+// Returns [height][width] pixels.
 std::vector<RasterisedPixel> rasterise(const Triangles& triangles, ImageSize size, Faces faces = Faces::all);
 
 }  // namespace tessera::gpu_test

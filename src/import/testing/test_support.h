@@ -1,4 +1,4 @@
-// What the tests of this room share: small pictures, and where the real ones are.
+// Shared by the tests of src/import: small images, and the location of real data.
 #pragma once
 
 #include <cstdlib>
@@ -10,7 +10,7 @@
 
 namespace tessera {
 
-// A picture without two equal pixels in a row.
+// Returns an image without two equal neighbouring pixels.
 inline ImageU8 gradientPicture(int width, int height, int channels = 3, int seed = 0) {
   ImageU8 image(width, height, channels);
   for (int y = 0; y < height; ++y) {
@@ -22,6 +22,7 @@ inline ImageU8 gradientPicture(int width, int height, int channels = 3, int seed
   return image;
 }
 
+// Returns the folder `name` in TESSERA_SHARED_DATA, or nothing if it does not exist.
 inline std::optional<fs::path> sharedData(const std::string& name) {
   const char* root = std::getenv("TESSERA_SHARED_DATA");
   if (root == nullptr || !fs::is_directory(fs::path(root) / name)) return std::nullopt;

@@ -8,8 +8,8 @@
 namespace tessera {
 namespace {
 
-TEST(PartSummary, CoversAllPartsAndSaysTheEdgeOfATexel) {
-  HashContent content = tiles_test::madeHashContent(3, 2);
+TEST(PartSummary, CoversAllPartsAndReportsTheEdgeOfATexel) {
+  HashContent content = tiles_test::testHashContent(3, 2);
   content.parts[0].low = {-2, -1, -1};
   content.parts[0].high = {0, 1, 0.5f};
   content.parts[1].low = {0, -1, -0.5f};
@@ -24,10 +24,10 @@ TEST(PartSummary, CoversAllPartsAndSaysTheEdgeOfATexel) {
   EXPECT_EQ(summary.counts, (decltype(ContentSummary::counts){{"macroblocks", macroblocks}}));
 }
 
-TEST(PartSummary, SaysTheEdgeOfABackgroundsSmallestTexel) {
-  VolumeContent content = tiles_test::madeContent(5);
+TEST(PartSummary, ReportsTheEdgeOfABackgroundsSmallestTexel) {
+  VolumeContent content = tiles_test::testContent(5);
   VolumePart& part = content.parts[0];
-  part.surround = part.contracted = true;
+  part.backgroundBlock = part.contracted = true;
   part.scale = {2, 1, 1.5f};
   const ContentSummary summary = partSummary(content, 32);
   EXPECT_TRUE(summary.isBackground);

@@ -12,7 +12,7 @@ using namespace json_fields;
 namespace {
 
 bool takeTriple(const json& object, const char* key, std::array<float, 3>& triple) {
-  const auto numbers = numbersOf<3>(object, key);
+  const auto numbers = getNumbers<3>(object, key);
   if (!numbers) return false;
   for (size_t a = 0; a < 3; ++a) triple[a] = static_cast<float>((*numbers)[a]);
   return true;
@@ -26,33 +26,33 @@ bool ContentReader::fail(const std::string& reason) {
 }
 
 const json* ContentReader::networkField() const {
-  return fieldOf(file_.ours, "network");
+  return getField(file_.ours, "network");
 }
 
-const json* ContentReader::partsOf() {
-  const json* parts = arrayOf(file_.ours, "parts");
+const json* ContentReader::readPartSources() {
+  const json* parts = getArray(file_.ours, "parts");
   if (parts && !parts->empty() && parts->size() <= limits_.parts) return parts;
   fail("has no parts, or too many");
   return nullptr;
 }
 
 bool ContentReader::readPlace(const json& source, ContentPart& part) {
-  const auto contracted = flagOf(source, "contracted"), surround = flagOf(source, "surround");
-  if (!contracted || !surround) return false;
+  const auto contracted = getBoolean(source, "contracted"), backgroundBlock = getBoolean(source, "background_block");
+  if (!contracted || !backgroundBlock) return false;
   part.contracted = *contracted;
-  part.surround = *surround;
+  part.backgroundBlock = *backgroundBlock;
   return takeTriple(source, "centre", part.centre) && takeTriple(source, "scale", part.scale) &&
          takeTriple(source, "low", part.low) && takeTriple(source, "high", part.high);
 }
 
-std::optional<uint32_t> ContentReader::storedOf(const json& source) {
-  const json* macroblocks = fieldOf(source, "macroblocks");
-  return macroblocks ? unsignedOf(*macroblocks, "stored", kMostStored) : std::nullopt;
+std::optional<uint32_t> ContentReader::readStoredCount(const json& source) {
+  const json* macroblocks = getField(source, "macroblocks");
+  return macroblocks ? getUnsigned(*macroblocks, "stored", kMaxStored) : std::nullopt;
 }
 
 bool ContentReader::readMacroblocks(const json& part, uint32_t texels, uint32_t stored, ContentPart& into,
                                     const TakePictures& take) {
-  const json& source = *fieldOf(part, "macroblocks");
+  const json& source = *getField(part, "macroblocks");
   OccupancyBits alive(texels / ContentPart::kMacroblock);
   if (!readBits(source, "alive", alive)) return false;
   uint32_t count = 0;
@@ -64,7 +64,7 @@ bool ContentReader::readMacroblocks(const json& part, uint32_t texels, uint32_t 
     into.macroblocks[place] = alive.at(place) ? number++ : ContentPart::kEmpty;
   }
   if (stored == 0) return true;
-  const json* pictures = fieldOf(source, "texels");
+  const json* pictures = getField(source, "texels");
   return pictures && take(*pictures, sizeOfMacroblocks(stored));
 }
 
@@ -78,13 +78,13 @@ bool ContentReader::takePictures(const json& source, const PictureSize& size, co
 }
 
 bool ContentReader::readBits(const json& source, const char* key, OccupancyBits& bits) {
-  const json* entry = fieldOf(source, key);
+  const json* entry = getField(source, key);
   const auto picture = entry ? readPicture(*entry, sizeOfBits(bits.count())) : std::nullopt;
   return picture && takeBits(*picture, bits);
 }
 
 std::optional<ImageU8> ContentReader::readPicture(const json& source, const PictureSize& size) {
-  const auto bytes = file_.viewOf(source, kWebP);
+  const auto bytes = file_.bufferViewBytes(source, kWebP);
   if (!bytes) return std::nullopt;
   return decodeLossless(*bytes, static_cast<int>(size.width), static_cast<int>(size.height));
 }

@@ -1,5 +1,6 @@
-// What the readers of payloads of parts have in common: parts of the extension and of the buffer views, untrusted. For
-// codecs, not for their users: it shows JSON.
+// Base classes of the payload readers of ray-marched representations. They read the parts from a content's glTF
+// extension and its buffer views, both of which are untrusted. Only codecs include this header, because it exposes
+// JSON.
 #pragma once
 
 #include <fmt/format.h>
@@ -23,23 +24,27 @@ class ContentReader {
   ContentReader(const ContentFile& file, std::string& reason, const ContentLimits& limits)
       : file_(file), reason_(reason), limits_(limits) {}
 
-  // False; the first reason counts.
+  // Returns false. Only the first reason is reported.
   bool fail(const std::string& reason);
 
-  const nlohmann::json* networkField() const;  // null where there is none
-  // The parts' array, if there are not too many.
-  const nlohmann::json* partsOf();
+  const nlohmann::json* networkField() const;  // null if there is none
+  // Returns the array of parts; null, after fail(), if it is empty or larger than the limits allow.
+  const nlohmann::json* readPartSources();
+  // Reads centre, scale, box and flags. Returns false if one of them is missing or has the wrong type.
   static bool readPlace(const nlohmann::json& source, ContentPart& part);
-  // How many macroblocks a part says that it has.
-  static std::optional<uint32_t> storedOf(const nlohmann::json& source);
+  // Returns the number of stored macroblocks that a part declares.
+  static std::optional<uint32_t> readStoredCount(const nlohmann::json& source);
 
-  // The macroblocks of a part of `texels` along an axis. Where there are any, `take(pictures, size)` is to read them.
+  // Reads the macroblock indices of a part that has `texels` texels along an axis. If macroblocks are stored, their
+  // texels are read by `take(pictures, size)`. Returns false if the number of occupied macroblocks is not `stored`, or
+  // anything is malformed.
   using TakePictures = std::function<bool(const nlohmann::json& pictures, const PictureSize& size)>;
   bool readMacroblocks(const nlohmann::json& source, uint32_t texels, uint32_t stored, ContentPart& part,
                        const TakePictures& take);
-  // Three pictures of texels, one after the other: take(picture, which).
+  // Decodes the three pictures of a set of texels and passes them on one after another: take(picture, which).
   using TakePicture = std::function<bool(const ImageU8& picture, size_t which)>;
   bool takePictures(const nlohmann::json& source, const PictureSize& size, const TakePicture& take);
+  // Reads the picture of bits under `key` into `bits`, whose size is already set.
   bool readBits(const nlohmann::json& source, const char* key, OccupancyBits& bits);
 
   const ContentFile& file_;
@@ -50,17 +55,19 @@ class ContentReader {
   std::optional<ImageU8> readPicture(const nlohmann::json& source, const PictureSize& size);
 };
 
-// The way through the content of one representation. PartHeader is what a part says of itself, before anything is
-// allocated for it: `part`, without bytes, and bytes() that it will take. Reader, a class derived from this one, has
-//   bool readSettings()                    of the content
-//   bool readHeader(source, header)        false where it is not complete
-//   bool readPictures(source, header, what)   into the part; `what` it is that is being read
+// Reads the content of one representation. PartHeader is what a part declares of itself, read before anything is
+// allocated for it: `part`, without texels, and bytes(), the memory that the part will take. Reader, which derives from
+// this class, has
+//   bool readSettings()                      reads the settings of the content
+//   bool readHeader(source, header)          returns false if the header is not complete
+//   bool readPictures(source, header, what)  reads texels into the part; `what` names what is being read, for errors
 template <class Reader, class Content, class PartHeader>
 class PartsReader : protected ContentReader {
  public:
   PartsReader(const ContentFile& file, std::string& reason, const ContentLimits& limits)
       : ContentReader(file, reason, limits) {}
 
+  // Returns the content, or nothing after fail().
   std::optional<Content> read() {
     if (!self().readSettings() || !readNetworkLayers() ||
         !readLayerNumbers(file_, *networkField(), content_.network, reason_) || !readHeaders()) {
@@ -74,14 +81,14 @@ class PartsReader : protected ContentReader {
       }
       content_.parts.push_back(std::move(headers_[i].part));
     }
-    if (auto broken = brokenRule(content_)) {
+    if (auto broken = validationError(content_)) {
       fail(*broken);
       return std::nullopt;
     }
     return std::move(content_);
   }
 
-  // What it takes in memory; looks at no buffer view.
+  // Returns the memory in bytes that the content will take. Reads the JSON alone, no buffer view.
   std::optional<uint64_t> readBytes() {
     if (!self().readSettings() || !readNetworkLayers() || !readHeaders()) return std::nullopt;
     uint64_t bytes = bytesInMemory(content_);
@@ -100,7 +107,7 @@ class PartsReader : protected ContentReader {
   bool readNetworkLayers() { return readLayers(networkField(), content_.network, reason_); }
 
   bool readHeaders() {
-    const nlohmann::json* parts = partsOf();
+    const nlohmann::json* parts = readPartSources();
     if (!parts) return false;
     uint64_t bytes = 0;
     for (const nlohmann::json& source : *parts) {

@@ -17,7 +17,7 @@ Broken ruleOfPlace(const ContentPart& part) {
       return "it is bounded, but its box leaves its domain";
     }
   }
-  if (part.surround && !part.contracted) return "a surround is not contracted";
+  if (part.backgroundBlock && !part.contracted) return "a background block is not contracted";
   return std::nullopt;
 }
 
@@ -25,7 +25,7 @@ Broken ruleOfMacroblocks(const ContentPart& part, uint32_t texels, uint64_t byte
   const uint64_t bytesOfBlock = uint64_t{ContentPart::kStoredTexels} * bytesOfTexel, stored = bytes / bytesOfBlock;
   const uint32_t edge = texels / ContentPart::kMacroblock;
   if (bytes % bytesOfBlock != 0) return "its voxels are no whole macroblocks";
-  if (stored > kMostStored) return "it has more macroblocks than a picture holds";
+  if (stored > kMaxStored) return "it has more macroblocks than a picture holds";
   if (part.macroblocks.size() != size_t{edge} * edge * edge) return "its macroblock numbers are not those of its grid";
   std::vector<bool> used(stored);
   uint64_t count = 0;
@@ -48,12 +48,12 @@ bool overlap(const ContentPart& one, const ContentPart& other) {
   return true;
 }
 
-Broken mismatchOfPart(const ContentPart& part, size_t number, const TileContent& promised) {
-  const SceneBox& box = promised.box;
-  const auto slack = [](double x) { return 1e-6 * std::max(1.0, std::abs(x)); };  // parts are rounded to floats
-  if (part.surround != promised.surround) {
-    return fmt::format("part {} is {} surround, and tileset.json says that the content is {}", number,
-                       part.surround ? "a" : "no", promised.surround ? "one" : "none");
+Broken mismatchOfPart(const ContentPart& part, size_t number, const TileContent& declared) {
+  const SceneBox& box = declared.box;
+  const auto slack = [](double x) { return 1e-6 * std::max(1.0, std::abs(x)); };  // parts' boxes are rounded to floats
+  if (part.backgroundBlock != declared.backgroundBlock) {
+    return fmt::format("part {} is {} background block, and tileset.json says that the content is {}", number,
+                       part.backgroundBlock ? "a" : "no", declared.backgroundBlock ? "one" : "none");
   }
   for (Eigen::Index a = 0; a < 3; ++a) {
     const auto axis = static_cast<size_t>(a);

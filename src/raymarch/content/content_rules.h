@@ -1,5 +1,5 @@
-// Rules that contents of every representation keep, written or read (docs/tile-format.md, sections 3 and 5). Each says
-// what is broken, for people; nothing where it holds.
+// Rules that hold for contents of every ray-marched representation, both written and read (docs/tile-format.md,
+// sections 3 and 5). Each function returns a description of the violation, for people, or nothing if the rule holds.
 #pragma once
 
 #include <fmt/format.h>
@@ -15,19 +15,21 @@ namespace tessera {
 
 using Broken = std::optional<std::string>;
 
-// Where the part stands: a bounded one owns nothing outside its domain, but for rounding.
+// Checks the placement of a part: a bounded part owns nothing outside its domain, up to rounding.
 Broken ruleOfPlace(const ContentPart& part);
-// `texels` along an axis; so many bytes of them are there, of so many a texel.
+// Checks the macroblocks of a part that has `texels` texels along an axis: `bytes` bytes of voxels with `bytesOfTexel`
+// bytes each.
 Broken ruleOfMacroblocks(const ContentPart& part, uint32_t texels, uint64_t bytes, uint32_t bytesOfTexel);
+// Returns whether the regions that two parts own overlap by more than rounding.
 bool overlap(const ContentPart& one, const ContentPart& other);
 
-// `rule` of each; a surround is alone, and no two own the same.
+// Checks `rule` for each part, that a background block is the only part, and that no two parts overlap.
 template <class Part, class Rule>
 Broken ruleOfParts(const std::vector<Part>& parts, const Rule& rule) {
   if (parts.empty()) return "there is no part";
   for (size_t i = 0; i < parts.size(); ++i) {
     if (auto broken = rule(parts[i])) return fmt::format("part {}: {}", i, *broken);
-    if (parts[i].surround && parts.size() > 1) return "a surround is not alone";
+    if (parts[i].backgroundBlock && parts.size() > 1) return "a background block is not alone";
     for (size_t j = 0; j < i; ++j) {
       if (overlap(parts[i], parts[j])) return fmt::format("parts {} and {} overlap", j, i);
     }
@@ -35,12 +37,12 @@ Broken ruleOfParts(const std::vector<Part>& parts, const Rule& rule) {
   return std::nullopt;
 }
 
-// Content::mismatchWith of a content that has these parts.
-Broken mismatchOfPart(const ContentPart& part, size_t number, const TileContent& promised);
+// Implement Content::mismatchWith for a content with these parts.
+Broken mismatchOfPart(const ContentPart& part, size_t number, const TileContent& declared);
 template <class Part>
-Broken mismatchOfParts(const std::vector<Part>& parts, const TileContent& promised) {
+Broken mismatchOfParts(const std::vector<Part>& parts, const TileContent& declared) {
   for (size_t i = 0; i < parts.size(); ++i) {
-    if (auto broken = mismatchOfPart(parts[i], i, promised)) return broken;
+    if (auto broken = mismatchOfPart(parts[i], i, declared)) return broken;
   }
   return std::nullopt;
 }

@@ -9,8 +9,12 @@
 namespace tessera {
 
 ContentWriter::Json ContentWriter::place(const ContentPart& part) {
-  return {{"centre", part.centre},     {"scale", part.scale}, {"contracted", part.contracted},
-          {"surround", part.surround}, {"low", part.low},     {"high", part.high}};
+  return {{"centre", part.centre},
+          {"scale", part.scale},
+          {"contracted", part.contracted},
+          {"background_block", part.backgroundBlock},
+          {"low", part.low},
+          {"high", part.high}};
 }
 
 ContentWriter::Json ContentWriter::macroblocks(const ContentPart& part, uint32_t texels, uint32_t stored) {

@@ -1,4 +1,5 @@
-// What the writers of payloads of parts have in common. For codecs, not for their users: it shows JSON.
+// Base class of the payload writers of ray-marched representations. Only codecs include this header, because it exposes
+// JSON.
 #pragma once
 
 #include <span>
@@ -19,10 +20,11 @@ class ContentWriter {
   explicit ContentWriter(int effort) : effort_(effort) {}
 
   static Json place(const ContentPart& part);
-  // Which macroblocks of a part of `texels` along an axis are stored, and how many. Their places say their numbers, so
-  // that none can be wrong: they are to be written in the order of places (inOrder).
+  // Returns the JSON that states which macroblocks are stored, and how many, for a part that has `texels` texels along
+  // an axis. Indices are not stored but implied by the order of positions, so that none can be wrong: the macroblocks
+  // must be written in that order (inOrder).
   Json macroblocks(const ContentPart& part, uint32_t texels, uint32_t stored);
-  // Macroblocks of so many bytes each, in the order of their places.
+  // Returns the macroblocks, of `bytesOfBlock` bytes each, in the order of their positions.
   static std::vector<uint8_t> inOrder(const ContentPart& part, std::span<const uint8_t> blocks, size_t bytesOfBlock);
   Json pictures(const TexelPictures& three);
   Json picture(const ImageU8& image);
@@ -33,11 +35,12 @@ class ContentWriter {
   int effort_;
 };
 
-// For what settings can cause: a content that readers would refuse.
+// The errors below are for contents that readers would reject and that settings of the training can cause.
 
 Error contentTooLarge(const std::string& why, const std::string& remedy);
-// Throws it where there are more parts, or bytes of memory, than readers take.
+// Throws contentTooLarge if there are more parts, or bytes of memory, than readers accept.
 void requireContentWithin(const ContentLimits& limits, size_t parts, uint64_t bytes, const std::string& remedy);
+// Throws contentTooLarge if the file is larger than readers accept.
 void requireFileWithin(const ContentLimits& limits, uint64_t bytes, const std::string& remedy);
 
 }  // namespace tessera

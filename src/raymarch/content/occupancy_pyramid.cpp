@@ -7,11 +7,12 @@
 namespace tessera {
 namespace {
 
-// One sweep through the grid, in the order of cells or against it: each cell is at most one farther than any of the 13
-// neighbours that came before it. Rows are taken whole, so that all but the neighbour in the row itself is SIMD.
+// One sweep through the grid, in the order of cells or in the opposite order. The distance of a cell exceeds that of
+// each of its 13 neighbours visited earlier by at most one. Whole rows are processed at a time, so that everything but
+// the neighbour in the same row vectorises.
 class Sweep {
  public:
-  Sweep(uint32_t cells, bool forwards) : cells_(cells), forwards_(forwards), least_(cells + 2), candidate_(cells) {}
+  Sweep(uint32_t cells, bool forwards) : cells_(cells), forwards_(forwards), min_(cells + 2), candidate_(cells) {}
 
   void run(std::vector<uint8_t>& distances) {
     const int count = static_cast<int>(cells_), back = forwards_ ? -1 : 1;
@@ -19,7 +20,7 @@ class Sweep {
       const int z = forwards_ ? i : count - 1 - i;
       for (int j = 0; j < count; ++j) {
         const int y = forwards_ ? j : count - 1 - j;
-        std::fill(least_.begin(), least_.end(), kFarthestDistance);
+        std::fill(min_.begin(), min_.end(), kFarthestDistance);
         takeRow(distances, y + back, z);
         for (int dy = -1; dy <= 1; ++dy) takeRow(distances, y + dy, z + back);
         finishRow(distances.data() + rowStart(y, z));
@@ -34,14 +35,14 @@ class Sweep {
     const int count = static_cast<int>(cells_);
     if (y < 0 || z < 0 || y >= count || z >= count) return;
     const uint8_t* row = distances.data() + rowStart(y, z);
-    uint8_t* least = least_.data() + 1;
-    for (size_t x = 0; x < cells_; ++x) least[x] = std::min(least[x], row[x]);
+    uint8_t* minimum = min_.data() + 1;
+    for (size_t x = 0; x < cells_; ++x) minimum[x] = std::min(minimum[x], row[x]);
   }
 
   void finishRow(uint8_t* row) {
-    const uint8_t* least = least_.data();
+    const uint8_t* minimum = min_.data();
     for (size_t x = 0; x < cells_; ++x) {
-      const uint8_t near = std::min(least[x], std::min(least[x + 1], least[x + 2]));
+      const uint8_t near = std::min(minimum[x], std::min(minimum[x + 1], minimum[x + 2]));
       candidate_[x] = std::min(row[x], oneMore(near));
     }
     uint8_t before = kFarthestDistance;
@@ -58,8 +59,8 @@ class Sweep {
 
   size_t cells_;
   bool forwards_;
-  std::vector<uint8_t> least_;      // of the rows before, with one more at each end
-  std::vector<uint8_t> candidate_;  // all neighbours but the one in the row
+  std::vector<uint8_t> min_;        // over the rows visited earlier, with one more cell at each end
+  std::vector<uint8_t> candidate_;  // the distance from all neighbours but the one in the same row
 };
 
 }  // namespace

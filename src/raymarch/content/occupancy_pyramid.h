@@ -1,5 +1,5 @@
-// Where anything may be, as bits and as distances: what a renderer skips empty space with. Files hold the finest bits;
-// everything else is made from them.
+// Occupancy grids as bits and as distances, with which renderers skip empty space. Files hold the finest bits; coarser
+// levels and distances are computed from them.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ struct OccupancyBits {
   std::vector<uint64_t> words;
 
   OccupancyBits() = default;
-  explicit OccupancyBits(uint32_t cellsAlongEdge);  // nothing occupied
+  explicit OccupancyBits(uint32_t cellsAlongEdge);  // all cells are empty
 
   size_t count() const { return static_cast<size_t>(cells) * cells * cells; }
   size_t number(uint32_t x, uint32_t y, uint32_t z) const { return x + size_t{cells} * (y + size_t{cells} * z); }
@@ -24,23 +24,24 @@ struct OccupancyBits {
   bool operator==(const OccupancyBits&) const = default;
 };
 
-// Level 0 is the finest. A cell of level k + 1 holds the up to 8 cells of level k below it and is occupied when one of
-// them is; it has half as many cells along an edge, rounded up. The last level is one cell.
+// Level 0 is the finest. A cell of level k + 1 covers up to 8 cells of level k and is occupied if one of them is. Each
+// level has half as many cells along an edge as the one below, rounded up; the last level has one cell.
 struct OccupancyPyramid {
   std::vector<OccupancyBits> levels;
 };
 
 inline constexpr uint8_t kFarthestDistance = 255;
 
-// The zeros of VolumePart::distances.
+// Returns the cells whose distance (VolumePart::distances) is 0 as occupied cells.
 OccupancyBits occupancyFromDistances(std::span<const uint8_t> distances, uint32_t cells);
 OccupancyPyramid pyramidFromOccupancy(OccupancyBits finest);
 OccupancyPyramid pyramidFromDistances(std::span<const uint8_t> distances, uint32_t cells);
 
-// [cells³], x fastest: how many cells away the nearest occupied one is, diagonal steps counting one (Chebyshev); exact
-// up to kFarthestDistance, which also stands where there is none. All cells nearer than that number are empty.
-// Source: Rosenfeld and Pfaltz, "Distance functions on digital pictures", 1968; two sweeps suffice, because the steps
-// of a shortest way may be taken in any order: first those that the first sweep follows, then the others.
+// Returns the Chebyshev distance of each cell to the nearest occupied one, in cells (a diagonal step counts one),
+// [cells³], x fastest. It is exact up to kFarthestDistance, which also stands for "no cell is occupied". All cells
+// nearer than the distance are empty. Source: Rosenfeld and Pfaltz, "Distance functions on digital pictures", 1968. Two
+// sweeps suffice, because the steps of a shortest path may be taken in any order: first those along the first sweep,
+// then the others.
 std::vector<uint8_t> chebyshevDistances(const OccupancyBits& occupied);
 
 }  // namespace tessera

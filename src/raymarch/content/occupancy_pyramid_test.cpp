@@ -10,16 +10,16 @@
 namespace tessera {
 namespace {
 
-OccupancyBits scattered(uint32_t cells, uint32_t oneOf, uint64_t seed) {
+OccupancyBits scattered(uint32_t cells, uint32_t inverseDensity, uint64_t seed) {
   OccupancyBits bits(cells);
   const RandomStream random(seed, cells);
   for (size_t i = 0; i < bits.count(); ++i) {
-    if (random.below(i, oneOf) == 0) bits.set(i);
+    if (random.below(i, inverseDensity) == 0) bits.set(i);
   }
   return bits;
 }
 
-// By definition: the least over all occupied cells.
+// The definition: the minimum over all occupied cells.
 std::vector<uint8_t> distancesByDefinition(const OccupancyBits& bits) {
   const int n = static_cast<int>(bits.cells);
   std::vector<std::array<int, 3>> occupied;
@@ -28,20 +28,20 @@ std::vector<uint8_t> distancesByDefinition(const OccupancyBits& bits) {
   }
   std::vector<uint8_t> distances;
   for (int i = 0; i < n * n * n; ++i) {
-    int least = kFarthestDistance;
+    int minimum = kFarthestDistance;
     for (const auto& [x, y, z] : occupied) {
-      least = std::min(least, std::max({std::abs(x - i % n), std::abs(y - i / n % n), std::abs(z - i / n / n)}));
+      minimum = std::min(minimum, std::max({std::abs(x - i % n), std::abs(y - i / n % n), std::abs(z - i / n / n)}));
     }
-    distances.push_back(static_cast<uint8_t>(least));
+    distances.push_back(static_cast<uint8_t>(minimum));
   }
   return distances;
 }
 
 TEST(OccupancyPyramid, DistancesAreTheLeastOverAllOccupiedCells) {
   for (const uint32_t cells : {1u, 2u, 3u, 5u, 8u, 13u}) {
-    for (const uint32_t oneOf : {1u, 4u, 40u, 400u, 4000u}) {
-      const OccupancyBits bits = scattered(cells, oneOf, oneOf);
-      EXPECT_EQ(chebyshevDistances(bits), distancesByDefinition(bits)) << cells << " " << oneOf;
+    for (const uint32_t inverseDensity : {1u, 4u, 40u, 400u, 4000u}) {
+      const OccupancyBits bits = scattered(cells, inverseDensity, inverseDensity);
+      EXPECT_EQ(chebyshevDistances(bits), distancesByDefinition(bits)) << cells << " " << inverseDensity;
     }
   }
 }

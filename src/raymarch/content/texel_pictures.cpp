@@ -35,7 +35,7 @@ uint32_t tilesBeside(uint32_t stored) {
   return columns;
 }
 
-// visit(texel, x, y): texels in the order of macroblocks, and their pixels.
+// Calls visit(texel, x, y) for the texels in the order of macroblocks, each with its pixel.
 template <class Visit>
 void forEachVoxel(uint32_t stored, const Visit& visit) {
   const uint32_t columns = tilesBeside(stored);

@@ -1,4 +1,4 @@
-// The definitions of draw_scene.h's templates.
+// Definitions of the templates declared in draw_scene.h.
 #pragma once
 
 #include <algorithm>
@@ -11,9 +11,10 @@
 namespace tessera {
 namespace draw_scene {
 
-inline constexpr int kTile = 16;  // pixels along an edge of what one task draws: neighbours read the same texels
+inline constexpr int kTile = 16;  // pixels along an edge of a task: neighbouring rays read the same texels
 
-// A packet of rays is a square of pixels.
+// Returns the pixel of a tile with this number. Numbers are ordered such that each packet of rays is a square of
+// pixels.
 inline std::pair<int, int> pixelOfTile(int number, int left, int top) {
   constexpr int kEdge = 4;
   static_assert(kEdge * kEdge == kRayLanes);
@@ -22,12 +23,13 @@ inline std::pair<int, int> pixelOfTile(int number, int left, int top) {
 }
 
 template <class Content>
-std::vector<const Content*> contentsOf(const SceneDrawing<Content>& drawing) {
+std::vector<const Content*> collectContents(const SceneDrawing<Content>& drawing) {
   std::vector<const Content*> contents;
   for (const DrawnContent<Content>& drawn : drawing.frontToBack) contents.push_back(drawn.content);
-  if (drawing.surround != nullptr) contents.push_back(drawing.surround);
-  if (drawing.ofNothing != nullptr) contents.push_back(drawing.ofNothing);
-  // A content may be drawn in the cells of several tiles. Each has one number; the last speaks where nothing is met.
+  if (drawing.backgroundBlock != nullptr) contents.push_back(drawing.backgroundBlock);
+  if (drawing.backgroundContent != nullptr) contents.push_back(drawing.backgroundContent);
+  // A content may be drawn in the cells of several tiles but has one number. Duplicates are removed such that the last
+  // content stays last, because it gives the colour of rays that meet nothing.
   std::vector<const Content*> once;
   for (auto content = contents.rbegin(); content != contents.rend(); ++content) {
     if (std::find(once.begin(), once.end(), *content) == once.end()) once.insert(once.begin(), *content);
@@ -39,8 +41,8 @@ std::vector<const Content*> contentsOf(const SceneDrawing<Content>& drawing) {
 
 template <class Content>
 RayCaster<Content>::RayCaster(const SceneDrawing<Content>& drawing)
-    : drawing_(drawing), shading_(draw_scene::contentsOf(drawing), drawing.march) {
-  const std::vector<const Content*> numbered = draw_scene::contentsOf(drawing);
+    : drawing_(drawing), shading_(draw_scene::collectContents(drawing), drawing.march) {
+  const std::vector<const Content*> numbered = draw_scene::collectContents(drawing);
   const auto place = [&numbered](const Content& content) {
     const auto number = std::find(numbered.begin(), numbered.end(), &content) - numbered.begin();
     Placed placed{&content, static_cast<size_t>(number), Vec3d::Constant(INFINITY), Vec3d::Constant(-INFINITY)};
@@ -57,9 +59,9 @@ RayCaster<Content>::RayCaster(const SceneDrawing<Content>& drawing)
     placed.low = placed.low.cwiseMax(drawn.low);
     placed.high = placed.high.cwiseMin(drawn.high);
   }
-  if (drawing.surround != nullptr) {
-    CHECK(drawing.surround->parts.size() == 1u);
-    surround_.push_back(place(*drawing.surround));
+  if (drawing.backgroundBlock != nullptr) {
+    CHECK(drawing.backgroundBlock->parts.size() == 1u);
+    backgroundBlock_.push_back(place(*drawing.backgroundBlock));
   }
 }
 
@@ -67,7 +69,7 @@ template <class Content>
 void RayCaster<Content>::add(const Placed& placed, size_t lanes, MarchCounts& counts) {
   std::array<PartRay, kRayLanes> rays;
   for (size_t i = 0; i < lanes; ++i) lanes_[i].composite = {};
-  // Part after part of each ray; those of several rays that are the same, together.
+  // Marches each ray through its parts in order; rays whose next part is the same are marched together.
   for (size_t turn = 0;; ++turn) {
     std::array<const Part*, kRayLanes> next = {};
     bool any = false;
@@ -102,7 +104,7 @@ void RayCaster<Content>::castPacket(std::span<const BoundedRay> rays, MarchCount
     Lane& lane = lanes_[i];
     lane.ray = &rays[i].ray;
     shading_.begin(i, rays[i]);
-    // Nothing is met in front of the box.
+    // Nothing is visible in front of the box.
     const RayRange box = clipToBox(*lane.ray, frame.low, frame.high, {frame.near, INFINITY});
     lane.whole = {box.empty() ? frame.near : box.near, std::min(rays[i].far, TileFrame::kSceneEnd)};
     lane.behind = {box.empty() ? frame.near : box.far, lane.whole.far};
@@ -119,14 +121,14 @@ void RayCaster<Content>::castPacket(std::span<const BoundedRay> rays, MarchCount
         const RayRange owned = ownedRange(part, *lane.ray, range);
         if (!owned.empty()) lane.parts.push_back({&part, owned});
       }
-      // Convex and apart: in the order in which the ray enters them.
+      // Parts are convex and disjoint, so the order of entry is front to back.
       std::sort(lane.parts.begin(), lane.parts.end(),
                 [](const PartRange& a, const PartRange& b) { return a.range.near < b.range.near; });
       any |= !lane.parts.empty();
     }
     if (any) add(placed, rays.size(), counts);
   }
-  for (const Placed& placed : surround_) {
+  for (const Placed& placed : backgroundBlock_) {
     for (size_t i = 0; i < rays.size(); ++i) {
       Lane& lane = lanes_[i];
       lane.parts.clear();
@@ -187,7 +189,7 @@ RenderedView drawScene(const SceneDrawing<Content>& drawing, const PixelDirectio
       const auto [x, y] = draw_scene::pixelOfTile(number, left, top);
       if (x < camera.width && y < camera.height) {
         const Vec3d inCamera = directions.at(x, y).cast<double>();
-        if (inCamera.isZero()) continue;  // beyond the lens: nothing
+        if (inCamera.isZero()) continue;  // the lens model has no direction for this pixel: it stays empty
         const double cosine = inCamera.z();
         double far = INFINITY;
         if (opaqueDepth != nullptr && cosine > 0) far = *opaqueDepth->at(x, y) / (cosine * frame.scale);

@@ -1,5 +1,5 @@
-// A picture of ray-marched contents in memory: the definition of what such scenes look like, on the CPU. The templates
-// are defined in draw_scene-inl.h and instantiated once for each content, in the file that makes its drawer.
+// Renders ray-marched contents on the CPU. This defines what such scenes look like. The templates are defined in
+// draw_scene-inl.h and instantiated once for each content, in the source file that makes its drawer.
 #pragma once
 
 #include <array>
@@ -16,21 +16,22 @@
 
 namespace tessera {
 
-// Content: one that has parts, and a Shading.
+// Content must have parts and a specialisation of Shading.
 template <class Content>
 struct SceneDrawing {
   TileFrame frame;
-  // In an order that is front to back for every ray of the camera (render/tile_tree.h).
+  // Front to back for every ray of the camera (see render/tile_tree.h).
   std::vector<DrawnContent<Content>> frontToBack;
-  // Optional: seen behind the frame's box, or alone by rays that miss it.
-  const Content* surround = nullptr;
+  // Optional. Visible behind the frame's box, and to rays that miss the box.
+  const Content* backgroundBlock = nullptr;
   MarchSettings march;
-  // Optional: one that counts as the last of all in what shadings say of rays that meet nothing, though no ray meets
-  // it. Without: the surround, or the last one.
-  const Content* ofNothing = nullptr;
+  // Optional: the content from which shading takes the colour of rays that meet nothing, though no ray is marched
+  // through it. Without it, that is the background block, or else the last content.
+  const Content* backgroundContent = nullptr;
 };
 
-// As ViewRenderer::render. The picture does not depend on the number of threads. `counts`: optional, added to.
+// Renders a view; see ViewRenderer::render. The result does not depend on the number of threads. `counts` is optional;
+// the numbers of steps and samples are added to it.
 template <class Content>
 RenderedView drawScene(const SceneDrawing<Content>& drawing, const PixelDirections& pixels, const Pose& worldFromCamera,
                        const ImageF* opaqueDepth, ThreadPool& pool, MarchCounts* counts = nullptr);
@@ -38,13 +39,13 @@ template <class Content>
 RenderedView drawScene(const SceneDrawing<Content>& drawing, const Camera& camera, const Pose& worldFromCamera,
                        const ImageF* opaqueDepth, ThreadPool& pool, MarchCounts* counts = nullptr);
 
-// Rays through a drawing, which must outlive this. Not for several threads at a time.
+// Casts rays through a drawing, which must outlive the caster. Not thread-safe.
 template <class Content>
 class RayCaster {
  public:
   explicit RayCaster(const SceneDrawing<Content>& drawing);
 
-  // pixels: [rays].
+  // Casts `rays` and writes one pixel for each. `pixels`: [rays].
   void cast(std::span<const BoundedRay> rays, std::span<DrawnPixel> pixels, MarchCounts& counts);
   DrawnPixel cast(const SceneRay& ray, double far, MarchCounts& counts);
 
@@ -52,8 +53,8 @@ class RayCaster {
   using Part = typename decltype(Content::parts)::value_type;
   struct Placed {
     const Content* content;
-    size_t number;    // of the shading's contents
-    Vec3d low, high;  // of all its parts, as far as they are drawn
+    size_t number;    // among the contents of the shading
+    Vec3d low, high;  // box around all its parts, clipped to the cells where it is drawn
   };
   struct PartRange {
     const Part* part;
@@ -61,18 +62,18 @@ class RayCaster {
   };
   struct Lane {
     const SceneRay* ray;
-    RayRange whole;                // that anything may be met in
-    RayRange behind;               // that the surround is met in
-    std::vector<PartRange> parts;  // of one content, in the order in which the ray enters them
-    ContentComposite composite;    // of one content
+    RayRange whole;                // where anything may be visible
+    RayRange behind;               // where the background block is visible
+    std::vector<PartRange> parts;  // of the current content, in the order in which the ray enters them
+    ContentComposite composite;    // of the current content
   };
   void castPacket(std::span<const BoundedRay> rays, MarchCounts& counts);
-  // Takes all lanes through their parts of a content.
+  // Marches all lanes through their parts of a content and adds the results to the shading.
   void add(const Placed& placed, size_t lanes, MarchCounts& counts);
   bool seesOn(size_t lane) const { return shading_.transmittance(lane) >= drawing_.march.minTransmittance; }
 
   const SceneDrawing<Content>& drawing_;
-  std::vector<Placed> placed_, surround_;
+  std::vector<Placed> placed_, backgroundBlock_;
   ShadingOf<Content> shading_;
   std::array<Lane, kRayLanes> lanes_;
 };

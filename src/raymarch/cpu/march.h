@@ -1,4 +1,4 @@
-// What marching has in common, whatever the representation.
+// Settings, counters and results of ray marching, whatever the representation.
 #pragma once
 
 #include "render/drawer.h"
@@ -7,14 +7,15 @@ namespace tessera {
 
 struct MarchSettings {
   bool skipEmptySpace = true;
-  float minTransmittance = 1.0f / 255;  // rays end where less than this would be seen; 0: never
-  // Whether a grid of distances is used to skip by where contents have another way too: the levels of the occupancy.
+  float minTransmittance = 1.0f / 255;  // rays end below this transmittance; 0: never
+  // Whether to skip empty space with a grid of distances where a content also has another structure for it: the levels
+  // of its occupancy pyramid.
   bool useDistances = true;
 };
 
 using MarchCounts = DrawCounts;
 
-// One content along one ray: Σ w c, Σ w f, Π (1 - α) and Σ w t of its samples, t in scene units.
+// The samples of one content along one ray, composited: Σ w c, Σ w f, Π (1 - α) and Σ w t, with t in scene units.
 struct ContentComposite {
   static constexpr int kValues = 7;  // diffuse r g b, 4 features
   float values[kValues] = {};

@@ -1,4 +1,4 @@
-// A ray through the domain of one part of a content.
+// The path of a ray through the domain of one part of a content.
 #pragma once
 
 #include "raymarch/content/content_part.h"
@@ -7,10 +7,11 @@
 
 namespace tessera {
 
-// Where the ray is in what a part owns and in its domain. Not for the surround, which owns what lies behind the box.
+// Returns the section of `range` in which the ray is within both the region that a part owns and the part's domain. Not
+// for the background block, which owns everything behind the scene's box.
 RayRange ownedRange(const ContentPart& part, const SceneRay& ray, const RayRange& range);
 
-// `range` is finite, and for a bounded part within its domain.
+// Returns the path of the ray through the domain. `range` must be finite and, for a bounded part, within its domain.
 DomainPath partPath(const ContentPart& part, const SceneRay& ray, const RayRange& range);
 
 }  // namespace tessera

@@ -1,16 +1,16 @@
-// Draws contents of one ray-marched representation.
+// The CPU drawer of a ray-marched representation.
 #pragma once
 
 #include "raymarch/cpu/draw_scene.h"
 
 namespace tessera {
 
-// Content: as of SceneDrawing; contents of views are ContentOf<Content>. drawScene<Content> must be instantiated
-// somewhere.
+// Content_ is a content as for SceneDrawing; the contents of views must be ContentOf<Content_>. drawScene<Content_>
+// must be instantiated in some source file.
 template <class Content_>
 class RayMarchingDrawer final : public CpuDrawer {
  public:
-  // `skippingModes`: of "distances", "cells" and "none" those that the content's march knows.
+  // `skippingModes`: those of "distances", "cells" and "none" that marching through the content supports.
   explicit RayMarchingDrawer(std::vector<std::string_view> skippingModes) : skippingModes_(std::move(skippingModes)) {}
 
   RenderedView draw(const SceneView<Content>& view, const PictureRequest& request, const DrawSettings& settings,
@@ -20,10 +20,10 @@ class RayMarchingDrawer final : public CpuDrawer {
     for (const DrawnContent<Content>& drawn : view.frontToBack) {
       drawing.frontToBack.emplace_back(&contentAs<Content_>(*drawn.content), drawn.low, drawn.high);
     }
-    if (view.surround != nullptr) {
-      drawing.surround = &contentAs<Content_>(*view.surround);
+    if (view.backgroundBlock != nullptr) {
+      drawing.backgroundBlock = &contentAs<Content_>(*view.backgroundBlock);
     } else if (view.pinned != nullptr) {
-      drawing.ofNothing = &contentAs<Content_>(*view.pinned);
+      drawing.backgroundContent = &contentAs<Content_>(*view.pinned);
     }
     drawing.march.minTransmittance = settings.minTransmittance;
     drawing.march.skipEmptySpace = settings.skipping != "none";

@@ -1,4 +1,4 @@
-// How contents of one representation become the colour of a ray.
+// The interface through which the contents of one representation are turned into the colour of a ray.
 #pragma once
 
 #include <array>
@@ -9,37 +9,38 @@
 
 namespace tessera {
 
-// Of all contents along a ray.
+// The result of all contents along a ray.
 struct DrawnPixel {
   std::array<float, 3> colour = {0, 0, 0};  // premultiplied
   float transmittance = 1;
   float depth = 0;  // scene units along the ray, premultiplied
 };
 
-// A ray that ends at a distance in scene units, where something else stands if it is finite.
+// A ray that ends at the distance `far`, scene units. If it is finite, an opaque surface is there.
 struct BoundedRay {
   SceneRay ray;
   double far = INFINITY;
 };
 
-// Rays that are cast together have the numbers of their lanes.
+// The number of rays in a packet. Rays of a packet are identified by their lanes, 0 to kRayLanes - 1.
 inline constexpr size_t kRayLanes = 16;
 
-// A ray through one part of a content.
+// The section of a ray within one part of a content.
 struct PartRay {
   size_t lane;
   const SceneRay* ray;
   RayRange range;
-  ContentComposite* composite;  // what the content's parts in front of this one hold; is gone on with
+  ContentComposite* composite;  // in: of the content's parts in front of this one; out: including it
 };
 
-// Shading<Content>::Type is made of the contents of a drawing, and is asked for one packet of rays after another:
-//   begin(lane, ray)             whether something else is known to be at its end
-//   transmittance(lane)          of what has been added so far
-//   march(content, part, rays, counts)
-//   add(lane, composite, number) of a content, front to back; contents have the numbers of their places in the drawing
-//   end(lane, pixel)             the pixel may get its colour as late as in finish()
-//   finish()                     after a number of packets
+// Shading<Content>::Type is constructed from the contents of a drawing and then processes one packet of rays after
+// another:
+//   begin(lane, ray)                    starts a ray
+//   transmittance(lane)                 returns the transmittance of all contents added so far
+//   march(content, part, rays, counts)  marches rays through one part of a content
+//   add(lane, composite, number)        adds a content, front to back; `number`: its index in the drawing
+//   end(lane, pixel)                    ends a ray; the pixel may receive its colour as late as in finish()
+//   finish()                            is called after a number of packets
 template <class Content>
 struct Shading;
 template <class Content>

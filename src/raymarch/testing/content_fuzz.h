@@ -1,5 +1,5 @@
-// For fuzzers of contents: an input that is no container is cut into JSON and bytes and put into one, so that lengths
-// need not be guessed; and what must hold of whatever is decoded.
+// For fuzzers of contents. An input that is not a GLB container is split into JSON and bytes and wrapped in one, so
+// that the fuzzer need not guess lengths. fuzzContent checks what must hold for every decoded content.
 #pragma once
 
 #include <cstdlib>
@@ -18,7 +18,7 @@ inline Bytes asContainer(std::span<const std::byte> bytes, const uint8_t* data) 
   return encodeGlb(json, input.rest());
 }
 
-// decodedBytes(json, reason, limits), decode(file, reason, limits), encode(content), same(one part, another).
+// Parameters: decodedBytes(json, reason, limits), decode(file, reason, limits), encode(content), same(part, part).
 template <class DecodedBytes, class Decode, class Encode, class Same>
 void fuzzContent(const uint8_t* data, size_t size, const DecodedBytes& decodedBytes, const Decode& decode,
                  const Encode& encode, const Same& same) {
@@ -27,7 +27,7 @@ void fuzzContent(const uint8_t* data, size_t size, const DecodedBytes& decodedBy
   limits.bytes = 1 << 22;
   limits.parts = 4;
   std::string reason;
-  // Which size a cache reckons with, by the headers alone.
+  // The size that a cache reserves, computed from the headers alone.
   std::optional<uint64_t> bytes;
   if (const auto container = decodeGlb(file)) {
     bytes = decodedBytes(container->json, reason, limits);
@@ -36,7 +36,7 @@ void fuzzContent(const uint8_t* data, size_t size, const DecodedBytes& decodedBy
   const auto content = decode(file, reason, limits);
   if (content.has_value() != reason.empty()) std::abort();
   if (!content) return;
-  if (brokenRule(*content)) std::abort();
+  if (validationError(*content)) std::abort();
   if (bytes != bytesInMemory(*content)) std::abort();
   const auto again = decode(encode(*content), reason, limits);
   if (!again || again->parts.size() != content->parts.size()) std::abort();

@@ -1,4 +1,4 @@
-// What the payloads of every representation are tested for alike.
+// For tests: checks that the payloads of every ray-marched representation have in common.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -22,11 +22,11 @@ inline void expectSamePlace(const ContentPart& one, const ContentPart& other) {
   EXPECT_EQ(one.low, other.low);
   EXPECT_EQ(one.high, other.high);
   EXPECT_EQ(one.contracted, other.contracted);
-  EXPECT_EQ(one.surround, other.surround);
+  EXPECT_EQ(one.backgroundBlock, other.backgroundBlock);
   EXPECT_EQ(one.macroblocks, other.macroblocks);
 }
 
-// Files that have been spoilt are refused, and why.
+// Fixture of tests that corrupt a file and check that decoding rejects it with the right reason.
 class Refusal : public testing::Test {
  protected:
   using json = nlohmann::json;
@@ -36,7 +36,7 @@ class Refusal : public testing::Test {
   virtual Bytes file() const = 0;
   virtual bool isRead(std::span<const std::byte> file, std::string& reason, const ContentLimits& limits) const = 0;
 
-  // What is said begins with `why`.
+  // Expects that decoding fails with a reason that begins with `why` after `spoil` has changed the JSON.
   void refuses(const std::string& why, const std::function<void(json&)>& spoil, const ContentLimits& limits = {}) {
     const auto spoilAsset = [&](json& asset, Bytes&) { spoil(asset); };
     refusesBytes(why, spoilAsset, limits);
@@ -52,7 +52,7 @@ class Refusal : public testing::Test {
     EXPECT_FALSE(isRead(encodeGlb(asset.dump(), bytes), reason, limits)) << why;
     EXPECT_EQ(reason.substr(0, why.size()), why);
   }
-  // Another picture in place of the one that `entry` names.
+  // Replaces the picture to which `entry` refers.
   static void replace(json& asset, Bytes& bytes, json& entry, const ImageU8& image) {
     const Bytes encoded = encodeLossless(image, 1);
     bytes.resize((bytes.size() + 3) / 4 * 4);

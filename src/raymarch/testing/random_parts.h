@@ -1,4 +1,4 @@
-// For tests: vectors and networks of random numbers, and parts in a row.
+// For tests: random vectors and networks, and parts in a row.
 #pragma once
 
 #include <vector>
@@ -9,13 +9,13 @@
 
 namespace tessera::tiles_test {
 
-// Within a cube about zero of twice that `size`.
+// Returns a vector uniformly distributed in the cube [-size, size]³.
 inline Vec3d randomVector(const RandomStream& random, uint64_t index, double size) {
   return size * Vec3d(2 * random.uniformDouble(3 * index) - 1, 2 * random.uniformDouble(3 * index + 1) - 1,
                       2 * random.uniformDouble(3 * index + 2) - 1);
 }
 
-inline std::vector<DenseLayer> madeNetwork(uint64_t seed, std::vector<uint32_t> widths) {
+inline std::vector<DenseLayer> testNetwork(uint64_t seed, std::vector<uint32_t> widths) {
   const RandomStream random(seed, 0xc0);
   uint64_t next = 0;
   std::vector<DenseLayer> network;
@@ -30,7 +30,7 @@ inline std::vector<DenseLayer> madeNetwork(uint64_t seed, std::vector<uint32_t> 
   return network;
 }
 
-// Side by side along x, cells of edge 2.
+// Places the parts side by side along x, as cells of edge 2.
 template <class Part>
 void placeInRow(std::vector<Part>& parts) {
   for (size_t i = 0; i < parts.size(); ++i) {

@@ -1,5 +1,6 @@
-// For tests: the steps of a ray through one part by the definition, in double, slowly: regions of the contraction by
-// looking, places by contracting, lengths by uncontracting.
+// For tests: the steps of a ray through one part, computed straight from the definition, in double precision and
+// slowly. Regions of the contraction are found by dense sampling, positions by contraction, and distances by its
+// inverse.
 #pragma once
 
 #include <algorithm>
@@ -12,8 +13,8 @@
 
 namespace tessera {
 
-// visit(p, from, to, middle): the place of a sample in [0,1]³ of the domain, and the distances of its step's ends and
-// of itself. `stepLength`: in the domain.
+// Calls visit(p, from, to, middle) for each step: the position of its sample in the domain scaled to [0,1]³, and the
+// distances along the ray of the step's two ends and of the sample. `stepLength`: in units of the domain.
 template <class Visit>
 void referenceWalk(const ContentPart& part, double stepLength, const SceneRay& ray, RayRange range,
                    const Visit& visit) {
@@ -29,7 +30,8 @@ void referenceWalk(const ContentPart& part, double stepLength, const SceneRay& r
     if (!part.contracted || std::abs(x[axis]) <= 1) return 0;
     return x[axis] > 0 ? axis + 1 : -axis - 1;
   };
-  // Regions by dense sampling, their ends by bisection. Reciprocal beyond 10, as distances reach far.
+  // Finds the regions by dense sampling and their ends by bisection. Samples are spaced reciprocally with distance,
+  // because ranges reach far.
   std::vector<double> ends = {range.near};
   const int looks = 20000;
   double previous = range.near;

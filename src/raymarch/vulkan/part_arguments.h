@@ -1,4 +1,4 @@
-// What kernels are told of ray-marched contents, whatever their representation.
+// Kernel arguments of ray-marched contents, whatever their representation.
 #pragma once
 
 #include "raymarch/content/content_part.h"
@@ -7,34 +7,35 @@
 
 namespace tessera {
 
-// What a kernel knows of where a part stands.
+// Returns kernel arguments that state where a part stands in the scene; all others are zero.
 template <class Arguments>
 Arguments placedArguments(const ContentPart& part) {
-  Arguments made = {};
+  Arguments placed = {};
   for (int a = 0; a < 3; ++a) {
-    made.centre[a] = part.centre[a];
-    made.scale[a] = part.scale[a];
-    made.low[a] = part.low[a];
-    made.high[a] = part.high[a];
+    placed.centre[a] = part.centre[a];
+    placed.scale[a] = part.scale[a];
+    placed.low[a] = part.low[a];
+    placed.high[a] = part.high[a];
   }
-  made.contracted = part.contracted;
-  return made;
+  placed.contracted = part.contracted;
+  return placed;
 }
 
-// Of a content on the GPU, the part in a box.
-template <class Arguments, class Held>
-Arguments drawArguments(const arguments::ViewArguments& view, const Held& content, const Vec3d& low, const Vec3d& high,
-                        bool isSurround) {
-  Arguments made = {};
-  made.view = view;
+// Returns the arguments with which a kernel draws what a content on the GPU holds within the box from `low` to `high`,
+// scene units. The arguments that only one representation has are left at zero.
+template <class Arguments, class GpuContent>
+Arguments drawArguments(const arguments::ViewArguments& view, const GpuContent& content, const Vec3d& low,
+                        const Vec3d& high, bool isBackgroundBlock) {
+  Arguments draw = {};
+  draw.view = view;
   for (int a = 0; a < 3; ++a) {
-    made.low[a] = static_cast<float>(low[a]);
-    made.high[a] = static_cast<float>(high[a]);
+    draw.low[a] = static_cast<float>(low[a]);
+    draw.high[a] = static_cast<float>(high[a]);
   }
-  made.isSurround = isSurround;
-  made.partCount = content.partCount;
-  made.parts = content.parts;
-  return made;
+  draw.isBackgroundBlock = isBackgroundBlock;
+  draw.partCount = content.partCount;
+  draw.parts = content.parts;
+  return draw;
 }
 
 }  // namespace tessera

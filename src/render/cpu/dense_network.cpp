@@ -8,7 +8,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/cpu/dense_network.cpp"
 #include <hwy/foreach_target.h>
-// after foreach_target
+// must follow foreach_target.h
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -18,10 +18,10 @@ namespace hn = hwy::HWY_NAMESPACE;
 HWY_ATTR void evaluateLayers(const std::vector<DenseNetwork::Layer>& layers, float* values) {
   const hn::CappedTag<float, 8> d;
   const size_t lanes = hn::Lanes(d);
-  alignas(64) float outputs[DenseNetwork::kMostWidth];
+  alignas(64) float outputs[DenseNetwork::kMaxWidth];
   for (size_t number = 0; number < layers.size(); ++number) {
     const DenseNetwork::Layer& layer = layers[number];
-    const auto least = hn::Set(d, number + 1 < layers.size() ? 0.0f : -INFINITY);
+    const auto minimum = hn::Set(d, number + 1 < layers.size() ? 0.0f : -INFINITY);
     for (size_t o = 0; o < layer.outputs; o += lanes) {
       const float* weights = layer.weights.data() + o;
       auto even = hn::LoadU(d, layer.biases.data() + o), odd = hn::Zero(d);
@@ -31,20 +31,20 @@ HWY_ATTR void evaluateLayers(const std::vector<DenseNetwork::Layer>& layers, flo
         odd = hn::MulAdd(hn::Set(d, values[i + 1]), hn::LoadU(d, weights + layer.outputs), odd);
       }
       if (i < layer.inputs) even = hn::MulAdd(hn::Set(d, values[i]), hn::LoadU(d, weights), even);
-      hn::StoreU(hn::Max(hn::Add(even, odd), least), d, outputs + o);
+      hn::StoreU(hn::Max(hn::Add(even, odd), minimum), d, outputs + o);
     }
     std::memcpy(values, outputs, layer.outputs * sizeof(float));
   }
 }
 
 HWY_ATTR void evaluatePacket(const std::vector<DenseNetwork::Layer>& layers, float* values) {
-  constexpr size_t kPacket = DenseNetwork::kPacket, kOutputs = 8;  // a layer's outputs are a multiple of
+  constexpr size_t kPacket = DenseNetwork::kPacket, kOutputs = 8;  // outputs are padded to a multiple of kOutputs
   const hn::CappedTag<float, kPacket> d;
   const size_t lanes = hn::Lanes(d);
-  alignas(64) float outputs[DenseNetwork::kMostWidth * kPacket];
+  alignas(64) float outputs[DenseNetwork::kMaxWidth * kPacket];
   for (size_t number = 0; number < layers.size(); ++number) {
     const DenseNetwork::Layer& layer = layers[number];
-    const auto least = hn::Set(d, number + 1 < layers.size() ? 0.0f : -INFINITY);
+    const auto minimum = hn::Set(d, number + 1 < layers.size() ? 0.0f : -INFINITY);
     for (size_t o = 0; o < layer.outputs; o += kOutputs) {
       for (size_t column = 0; column < kPacket; column += lanes) {
         const float *weights = layer.weights.data() + o, *biases = layer.biases.data() + o;
@@ -63,14 +63,14 @@ HWY_ATTR void evaluatePacket(const std::vector<DenseNetwork::Layer>& layers, flo
           s7 = hn::MulAdd(hn::Set(d, weights[7]), x, s7);
         }
         float* to = outputs + o * kPacket + column;
-        hn::Store(hn::Max(s0, least), d, to);
-        hn::Store(hn::Max(s1, least), d, to + kPacket);
-        hn::Store(hn::Max(s2, least), d, to + 2 * kPacket);
-        hn::Store(hn::Max(s3, least), d, to + 3 * kPacket);
-        hn::Store(hn::Max(s4, least), d, to + 4 * kPacket);
-        hn::Store(hn::Max(s5, least), d, to + 5 * kPacket);
-        hn::Store(hn::Max(s6, least), d, to + 6 * kPacket);
-        hn::Store(hn::Max(s7, least), d, to + 7 * kPacket);
+        hn::Store(hn::Max(s0, minimum), d, to);
+        hn::Store(hn::Max(s1, minimum), d, to + kPacket);
+        hn::Store(hn::Max(s2, minimum), d, to + 2 * kPacket);
+        hn::Store(hn::Max(s3, minimum), d, to + 3 * kPacket);
+        hn::Store(hn::Max(s4, minimum), d, to + 4 * kPacket);
+        hn::Store(hn::Max(s5, minimum), d, to + 5 * kPacket);
+        hn::Store(hn::Max(s6, minimum), d, to + 6 * kPacket);
+        hn::Store(hn::Max(s7, minimum), d, to + 7 * kPacket);
       }
     }
     std::memcpy(values, outputs, layer.outputs * kPacket * sizeof(float));
@@ -93,7 +93,7 @@ DenseNetwork::DenseNetwork(const std::vector<DenseLayer>& network, uint32_t inpu
   uint32_t width = inputs;
   for (const DenseLayer& layer : network) {
     CHECK(layer.inputs == width);
-    CHECK(layer.outputs <= kMostWidth);
+    CHECK(layer.outputs <= kMaxWidth);
     CHECK(layer.weights.size() == size_t{layer.inputs} * layer.outputs);
     CHECK(layer.biases.size() == layer.outputs);
     width = layer.outputs;

@@ -1,4 +1,4 @@
-// A content's network, run on the processor.
+// Evaluates the network of a content on the CPU.
 #pragma once
 
 #include <cstddef>
@@ -8,22 +8,22 @@
 
 namespace tessera {
 
-// Its weights are laid out for vectors over the outputs.
+// A dense network with ReLU. The weights are stored input-major, so that SIMD vectors run over the outputs.
 class DenseNetwork {
  public:
-  static constexpr uint32_t kMostWidth = kMostLayerWidth;
+  static constexpr uint32_t kMaxWidth = kMaxLayerWidth;
 
-  // inputs → … → outputs, no layer wider than kMostWidth. Keeps nothing of `layers`.
+  // `layers`: inputs → … → outputs, no layer wider than kMaxWidth. `layers` is copied.
   DenseNetwork(const std::vector<DenseLayer>& layers, uint32_t inputs, uint32_t outputs);
 
-  // Overwrites `values` [kMostWidth], which holds the inputs, with the outputs; nothing is applied to these.
+  // Replaces the inputs in `values` [kMaxWidth] by the outputs. No activation is applied to the outputs.
   void run(float* values) const;
-  // The same for kPacket columns of values side by side: [kMostWidth][kPacket], aligned to 64 bytes.
+  // Evaluates kPacket columns of values side by side: [kMaxWidth][kPacket], aligned to 64 bytes.
   void runPacket(float* values) const;
   static constexpr size_t kPacket = 16;
 
   struct Layer {
-    uint32_t inputs = 0, outputs = 0;  // the outputs rounded up to whole vectors
+    uint32_t inputs = 0, outputs = 0;  // the outputs are rounded up to whole vectors
     std::vector<float> weights;        // [inputs][outputs]
     std::vector<float> biases;         // [outputs]
   };

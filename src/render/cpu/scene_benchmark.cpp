@@ -13,10 +13,11 @@
 namespace tessera {
 namespace {
 
-constexpr double kLow = 0.25;              // above the box, scene units
-constexpr double kHighInEdges = 2;         // of the scene's longer edge in blocks, in scene units: half blocks
-constexpr double kAhead = 30, kDown = 75;  // degrees below the horizon
-constexpr double kFullWidth = 1280;        // pixels: what CacheBenchmarkOptions::mostPixels speaks of
+constexpr double kLow = 0.25;              // height above the box, scene units
+constexpr double kHighInEdges = 2;         // rise in scene units (half blocks) per block of the scene's longer edge
+constexpr double kAhead = 30, kDown = 75;  // camera pitches, degrees below the horizon
+// Pixels: the image width to which CacheBenchmarkOptions::maximumScreenSpaceError refers.
+constexpr double kFullWidth = 1280;
 
 SceneRendererSettings settingsFor(const TileScene& scene, int threads) {
   SceneRendererSettings settings;
@@ -44,7 +45,7 @@ double meanSquare(const ImageF& a, const ImageF& b) {
   return sum / static_cast<double>(a.pixels.size());
 }
 
-// What the cache holds by what was loaded, not by its own books.
+// Counts what the cache holds from what was loaded, independently of the cache's own statistics.
 class Watched {
  public:
   Watched(const TileScene& scene, const MakeDrawer& makeDrawer, const SceneRendererSettings& settings)
@@ -62,12 +63,12 @@ class Watched {
   RenderedView draw(const Camera& camera, const Pose& pose) {
     RenderedView drawn = renderer_->render(camera, pose, nullptr);
     const TileCache<Content>& cache = renderer_->cache();
-    uint64_t held = 0;
+    uint64_t cachedBytes = 0;
     for (size_t tile = 0; tile < bytes_.size(); ++tile) {
-      if (cache.holds(static_cast<int>(tile))) held += bytes_[tile];
+      if (cache.holds(static_cast<int>(tile))) cachedBytes += bytes_[tile];
     }
-    run_.stepsOverBudget += held > run_.budgetBytes || cache.statistics().mostBytes > run_.budgetBytes;
-    bool coarsest = scene_.tree.surround < 0 || cache.holds(scene_.tree.surround);
+    run_.stepsOverBudget += cachedBytes > run_.budgetBytes || cache.statistics().maxBytes > run_.budgetBytes;
+    bool coarsest = scene_.tree.backgroundBlock < 0 || cache.holds(scene_.tree.backgroundBlock);
     for (const int tile : scene_.tree.coarsest()) coarsest &= cache.holds(tile);
     run_.stepsWithoutCoarsest += !coarsest;
     const std::vector<SelectedTile>& cut = renderer_->cut().tiles;
@@ -92,7 +93,7 @@ class Watched {
   CacheBenchmark::Run result() const {
     CacheBenchmark::Run run = run_;
     const TileCacheStatistics& statistics = renderer_->cacheStatistics();
-    run.mostBytes = statistics.mostBytes;
+    run.maxBytes = statistics.maxBytes;
     run.loads = statistics.loads;
     run.evictions = statistics.evictions;
     run.meanSquaredError = errors_ / steps_;
@@ -109,16 +110,17 @@ class Watched {
   std::unique_ptr<SceneRenderer> renderer_;
 };
 
-// What the tiles that `counts` names take in memory, drawn by `drawer`: each resource that they share once.
+// Returns the memory that the tiles selected by `counts` take when drawn by `drawer`, counting each shared resource
+// once.
 template <class Counts>
-uint64_t memoryOf(const TileScene& scene, const CpuDrawer& drawer, const Counts& counts) {
+uint64_t countMemoryBytes(const TileScene& scene, const CpuDrawer& drawer, const Counts& counts) {
   uint64_t bytes = 0;
   std::set<int> resources;
   for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
     if (!scene.tree.tiles[i].hasContent || !counts(scene.tree.tiles[i])) continue;
     const int tile = static_cast<int>(i);
     bytes += drawer.residentBytes(scene.source.bytes(tile));
-    for (const int resource : scene.source.resourcesOf(tile)) resources.insert(resource);
+    for (const int resource : scene.source.tileResources(tile)) resources.insert(resource);
   }
   for (const int resource : resources) {
     bytes += drawer.residentBytesOfResource(scene.source.bytesOfResource(resource));
@@ -140,7 +142,7 @@ Camera flightCamera(const CacheBenchmarkOptions& options) {
 SkippingBenchmark benchmarkSkipping(const TileScene& scene, const MakeDrawer& makeDrawer,
                                     const std::vector<BenchmarkView>& views, int threads) {
   SceneRendererSettings settings = settingsFor(scene, threads);
-  settings.selection.mostPixels = 0;
+  settings.selection.maximumScreenSpaceError = 0;
   SceneRenderer skipping(makeDrawer(), scene.frame, scene.tree, scene.source, settings);
   const std::vector<std::string_view> modes = makeDrawer()->skippingModes();
   std::optional<SceneRenderer> byCells;
@@ -177,11 +179,11 @@ CacheBenchmark benchmarkCache(const TileScene& scene, const MakeDrawer& makeDraw
   CacheBenchmark result;
   result.steps = options.steps;
   const std::unique_ptr<CpuDrawer> drawer = makeDrawer();
-  result.allBytes = memoryOf(scene, *drawer, [](const TileNode&) { return true; });
+  result.allBytes = countMemoryBytes(scene, *drawer, [](const TileNode&) { return true; });
   result.finestBytes =
-      memoryOf(scene, *drawer, [](const TileNode& tile) { return !tile.isSurround && tile.level == 0; });
+      countMemoryBytes(scene, *drawer, [](const TileNode& tile) { return !tile.isBackgroundBlock && tile.level == 0; });
   SceneRendererSettings settings = settingsFor(scene, options.threads);
-  settings.selection.mostPixels = options.mostPixels * options.width / kFullWidth;
+  settings.selection.maximumScreenSpaceError = options.maximumScreenSpaceError * options.width / kFullWidth;
   settings.budgetBytes = static_cast<uint64_t>(options.finestShare * static_cast<double>(result.finestBytes));
   Watched tight(scene, makeDrawer, settings);
   settings.budgetBytes = result.allBytes;
@@ -191,10 +193,10 @@ CacheBenchmark benchmarkCache(const TileScene& scene, const MakeDrawer& makeDraw
   const Camera camera = flightCamera(options);
   for (int step = 0; step < options.steps; ++step) {
     const Pose pose = flightPose(scene.frame, scene.tree, static_cast<double>(step) / options.steps);
-    const RenderedView wanted = unbounded.render(camera, pose, nullptr);
+    const RenderedView requested = unbounded.render(camera, pose, nullptr);
     CHECK(unbounded.choice().refused == 0);
-    tight.compare(tight.draw(camera, pose), wanted);
-    whole.compare(whole.draw(camera, pose), wanted);
+    tight.compare(tight.draw(camera, pose), requested);
+    whole.compare(whole.draw(camera, pose), requested);
   }
   result.tight = tight.result();
   result.whole = whole.result();

@@ -28,8 +28,8 @@ SceneRenderer::SceneRenderer(std::unique_ptr<CpuDrawer> drawer, const TileFrame&
       settings_(settings),
       pool_(settings.threads) {
   const std::vector<std::string_view> modes = drawer_->skippingModes();
-  const std::string_view wanted = settings.draw.skipping;
-  CHECK((wanted.empty() || std::find(modes.begin(), modes.end(), wanted) != modes.end()) == true);
+  const std::string_view requested = settings.draw.skipping;
+  CHECK((requested.empty() || std::find(modes.begin(), modes.end(), requested) != modes.end()) == true);
 }
 
 std::string SceneRenderer::device() const {

@@ -1,6 +1,7 @@
-// Draws scenes on the CPU, of any representation that has a drawer there.
+// Renders scenes on the CPU, for any representation that has a CpuDrawer.
 //
-// A picture is drawn from the cut that the view asks for, loaded as far as the budget goes before it is drawn.
+// An image is drawn from the cut that the view requests; as much of the cut as fits into the budget is loaded before
+// drawing.
 #pragma once
 
 #include "render/drawer.h"
@@ -18,22 +19,22 @@ struct SceneRendererSettings {
 
 class SceneRenderer : public ViewRenderer {
  public:
-  // `source` gives contents as they are decoded; the drawer prepares them. Throws Error where the coarsest level does
-  // not fit into the budget, and in render() what the source throws. CHECKs that the drawer has the mode of skipping.
+  // `source` returns decoded contents, which the drawer then prepares. Throws Error if the coarsest level does not fit
+  // into the budget; render() rethrows what the source throws. CHECKs that the drawer has the requested skipping mode.
   SceneRenderer(std::unique_ptr<CpuDrawer> drawer, const TileFrame& frame, TileTree tree, TileSource<Content> source,
                 const SceneRendererSettings& settings);
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
-  // Loads what the view asks for, as render() would.
+  // Loads what the view requests, as render() does, without drawing.
   void prepare(const Camera& camera, const Pose& worldFromCamera);
   std::string device() const override;
   Eigen::Array3f background() const override { return settings_.background; }
 
-  const TileCut& cut() const { return tiles_.cut(); }  // of the last picture
+  const TileCut& cut() const { return tiles_.cut(); }  // of the last rendered image
   const TileChoice& choice() const { return tiles_.choice(); }
   const TileCache<Content>& cache() const { return tiles_.cache(); }
   const TileCacheStatistics& cacheStatistics() const { return tiles_.cache().statistics(); }
-  const DrawCounts& drawCounts() const { return counts_; }  // of all pictures
+  const DrawCounts& drawCounts() const { return counts_; }  // summed over all rendered images
 
  private:
   std::unique_ptr<CpuDrawer> drawer_;

@@ -1,4 +1,4 @@
-// What the renderer asks of its drawer.
+// Tests the calls that the renderer makes to its drawer.
 #include "render/cpu/scene_renderer.h"
 
 #include <gtest/gtest.h>
@@ -11,17 +11,17 @@
 namespace tessera {
 namespace {
 
-// What a drawer was asked for.
+// Records the calls to a drawer.
 struct Asked {
   int prepared = 0;
-  std::vector<int> drawn;  // of the last picture, tiles in the order that they were given in
+  std::vector<int> drawn;  // tiles of the last image, in the order in which they were passed
   bool allWerePrepared = true;
   int pinned = -1;
   DrawSettings settings;
   const ImageF* opaqueDepth = nullptr;
 };
 
-// Contents take three times their memory once they are prepared, and resources twice theirs.
+// Prepared contents take three times their decoded memory, and resources twice theirs.
 class AskedDrawer final : public CpuDrawer {
  public:
   explicit AskedDrawer(Asked* asked, uint64_t preparedBytes) : asked_(asked), preparedBytes_(preparedBytes) {}
@@ -70,7 +70,7 @@ class SceneRendererTest : public testing::Test {
   static SceneRendererSettings within(uint64_t budgetBytes) {
     SceneRendererSettings settings;
     settings.budgetBytes = budgetBytes;
-    settings.selection.mostPixels = 0;  // the finest that there is
+    settings.selection.maximumScreenSpaceError = 0;  // the finest available
     return settings;
   }
 
@@ -97,14 +97,14 @@ TEST_F(SceneRendererTest, CountsWhatPreparedContentsAndTheirResourcesTake) {
   SceneRenderer few = rendererWith(within(kAll - 1));
   few.render(place_.camera(), place_.above(), nullptr);
   EXPECT_EQ(std::count(asked_.drawn.begin(), asked_.drawn.end(), 0), 1) << "a byte less, and the root stands for one";
-  EXPECT_LE(few.cacheStatistics().mostBytes, kAll - 1);
+  EXPECT_LE(few.cacheStatistics().maxBytes, kAll - 1);
 }
 
-TEST_F(SceneRendererTest, RefusesAContentThatTakesMoreThanItsDrawerSaid) {
+TEST_F(SceneRendererTest, RejectsAContentThatTakesMoreThanItsDrawerDeclared) {
   EXPECT_THROW(rendererWith(within(kAll), kPrepared + 1), Error);
 }
 
-TEST_F(SceneRendererTest, HandsItsDrawerWhatWasAskedFor) {
+TEST_F(SceneRendererTest, PassesRequestsToItsDrawer) {
   SceneRendererSettings settings = within(kAll);
   settings.draw = {0.25f, "none", false};
   SceneRenderer renderer = rendererWith(settings);

@@ -3,7 +3,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/cpu/simd_target.cpp"
 #include <hwy/foreach_target.h>
-// after foreach_target
+// must follow foreach_target.h
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();

@@ -1,9 +1,9 @@
-// The instruction set that drawing on the CPU uses.
+// The SIMD instruction set that the CPU renderer uses.
 #pragma once
 
 namespace tessera {
 
-// As Highway names it: "AVX3".
+// Returns the target's name as Highway spells it, for example "AVX3".
 const char* renderSimdTarget();
 
 }  // namespace tessera

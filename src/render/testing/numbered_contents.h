@@ -1,8 +1,8 @@
-// For tests of what a renderer asks of its drawer: 2×2 cells under a root, whose contents are the numbers of their
-// tiles.
+// For tests of what a renderer asks of its drawer: a root with 2×2 cells below it, whose contents hold the numbers of
+// their tiles.
 #pragma once
 
-#include "render/testing/made_tree.h"
+#include "render/testing/test_tree.h"
 #include "render/tile_cache.h"
 #include "render/tile_frame.h"
 #include "scene/camera.h"
@@ -28,12 +28,12 @@ struct NumberedPlace {
     frame.high = Vec3d(2, 2, 1);
   }
 
-  // All tiles but the root share a resource.
+  // All tiles except the root share one resource.
   TileSource<Content> source() const {
     TileSource<Content> source;
     source.bytes = [](int) { return kContentBytes; };
     source.load = [](int tile) { return std::make_unique<NumberedContent>(tile, kContentBytes); };
-    source.resourcesOf = [](int tile) { return tile == 0 ? std::vector<int>() : std::vector<int>{0}; };
+    source.tileResources = [](int tile) { return tile == 0 ? std::vector<int>() : std::vector<int>{0}; };
     source.bytesOfResource = [](int) { return kResourceBytes; };
     return source;
   }
@@ -45,7 +45,7 @@ struct NumberedPlace {
     camera.parameters = {30, 30, 32, 24};
     return camera;
   }
-  // Above the middle, looking down: all of it is in view.
+  // A camera above the middle that looks down and sees the whole place.
   static Pose above() {
     Pose pose;
     pose.rotation = Eigen::Vector3d(1, -1, -1).asDiagonal();
@@ -53,7 +53,7 @@ struct NumberedPlace {
     return pose;
   }
 
-  TileTree tree = madeTree(2, 2);
+  TileTree tree = testTree(2, 2);
   TileFrame frame;
 };
 

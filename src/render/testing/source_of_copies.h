@@ -1,4 +1,4 @@
-// For tests: contents that are in memory as the source of a renderer.
+// For tests: a renderer's source that serves contents from memory.
 #pragma once
 
 #include <type_traits>
@@ -8,7 +8,7 @@
 
 namespace tessera {
 
-// Copies of what contentAt(tile) gives.
+// Returns a source of copies of contentAt(tile).
 template <class ContentAt>
 TileSource<Content> sourceOfCopies(ContentAt contentAt) {
   TileSource<Content> source;

@@ -1,4 +1,4 @@
-// A content on a GPU: its bytes as they lie in memory, reached by address.
+// A content in GPU memory, addressed by device addresses.
 #pragma once
 
 #include <memory>
@@ -15,18 +15,18 @@ class GpuContent {
   GpuContent& operator=(const GpuContent&) = delete;
   virtual ~GpuContent() = default;
 
-  // What it takes of the GPU's memory, without what it shares with others.
+  // GPU memory in bytes, without shared resources.
   virtual uint64_t memoryBytes() const = 0;
 };
 
-// One buffer, which goes when the card has done what it was asked to do with it.
+// A GPU buffer that is destroyed once the GPU has finished all work that uses it.
 class GpuContentMemory {
  public:
   GpuContentMemory() = default;
   GpuContentMemory(std::shared_ptr<GpuStream> stream, size_t bytes)
       : stream_(std::move(stream)), buffer_(stream_->makeBuffer(bytes)) {}
   ~GpuContentMemory() {
-    if (buffer_) stream_->retire(std::move(buffer_));
+    if (buffer_) stream_->deferDestroy(std::move(buffer_));
   }
   GpuContentMemory(GpuContentMemory&& other) noexcept { *this = std::move(other); }
   GpuContentMemory& operator=(GpuContentMemory&& other) noexcept {

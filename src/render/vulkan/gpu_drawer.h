@@ -1,5 +1,5 @@
-// How contents of one representation become a picture on a GPU: the twin of render/drawer.h's CpuDrawer, which its
-// pictures are held against.
+// Draws contents of one representation on the GPU. It is the counterpart of CpuDrawer (render/drawer.h), against which
+// its images are tested.
 #pragma once
 
 #include "render/drawer.h"
@@ -8,7 +8,7 @@
 
 namespace tessera {
 
-// One for each renderer. Everything that it asks of the GPU goes through one stream.
+// Each renderer owns one. All of its GPU work goes through one stream.
 class GpuDrawer {
  public:
   GpuDrawer() = default;
@@ -16,22 +16,23 @@ class GpuDrawer {
   GpuDrawer& operator=(const GpuDrawer&) = delete;
   virtual ~GpuDrawer() = default;
 
-  // What a content takes of the GPU at most, where it takes `decodedBytes` as it is decoded.
+  // Returns an upper bound of the GPU memory that a content takes. `decodedBytes`: the memory of the decoded content.
   virtual uint64_t residentBytes(uint64_t decodedBytes) const { return decodedBytes; }
-  // Likewise of a resource, once for all contents that need it.
+  // Returns the same for a shared resource, which is counted once for all contents that use it.
   virtual uint64_t residentBytesOfResource(uint64_t decodedBytes) const { return decodedBytes; }
-  // What is made of the content's resources is shared by all contents that need them, and goes with the last: the
-  // drawer finds what it has made of a resource, and each GpuContent keeps it.
+  // Uploads a content. What is built from its resources is shared by all contents that use them and is freed with the
+  // last of these: the drawer looks up what it has built for a resource, and each GpuContent keeps a reference to it.
   virtual std::unique_ptr<GpuContent> upload(const Content& content) = 0;
 
-  // Queues a whole picture.
+  // Queues the drawing of a whole image.
   virtual void draw(GpuPicture& picture, const SceneView<GpuContent>& view, const PictureRequest& request,
                     const DrawSettings& settings) = 0;
 
-  // What the drawer may take of the GPU besides contents (as maps that are made when they are first seen). A drawer
-  // that takes nothing of its own passes over it.
+  // Limits the GPU memory that the drawer may use besides contents, for example for maps that are built on first sight.
+  // Drawers without such memory ignore it.
   virtual void setPoolBudget(uint64_t) {}
-  // Whether the same view would look better if it were drawn again: something of the drawer's own is still on its way.
+  // Returns whether the same view would look better if it were drawn again, because something of the drawer's own is
+  // still being built.
   virtual bool wantsAnotherFrame() const { return false; }
 };
 

@@ -12,8 +12,8 @@ namespace tessera {
 
 namespace {
 
-constexpr uint32_t kPixelsOfGroup = 8;  // local_size of the kernels, along an edge
-constexpr size_t kNumbersDrawn = 5;     // of a pixel: colour, opacity, depth
+constexpr uint32_t kPixelsOfGroup = 8;  // local_size of the kernels along an axis
+constexpr size_t kNumbersDrawn = 5;     // per pixel: colour, opacity, depth
 
 void copy(const Vec3d& from, float* to) {
   for (int a = 0; a < 3; ++a) to[a] = static_cast<float>(from[a]);
@@ -24,25 +24,25 @@ void copy(const Vec3d& from, float* to) {
 GpuPicture::GpuPicture(std::shared_ptr<GpuStream> stream)
     : stream_(std::move(stream)), begin_(stream_->context(), kBeginViewSpirv), pool_(0) {}
 
-void GpuPicture::makeRoom(GpuBuffer& buffer, size_t floats) {
+void GpuPicture::ensureCapacity(GpuBuffer& buffer, size_t floats) {
   if (buffer.bytes() >= floats * sizeof(float)) return;
-  stream_->retire(std::move(buffer));
+  stream_->deferDestroy(std::move(buffer));
   buffer = GpuBuffer();
   buffer = stream_->makeBuffer(floats * sizeof(float));
 }
 
-void GpuPicture::makeRoom(const Camera& camera, uint32_t numbersOfPixel) {
+void GpuPicture::ensureCapacity(const Camera& camera, uint32_t numbersOfPixel) {
   pixels_.update(camera, pool_);
   const size_t pixels = static_cast<size_t>(camera.width) * camera.height;
-  constexpr size_t kMost = std::numeric_limits<uint32_t>::max();  // kernels count in 32 bits
-  if (pixels * std::max<size_t>(numbersOfPixel, kNumbersDrawn) > kMost) {
-    throw Error(fmt::format("picture of {}x{}", camera.width, camera.height), "",
-                "is too large for one on a graphics card", "ask for a smaller one, or use --device cpu");
+  constexpr size_t kMax = std::numeric_limits<uint32_t>::max();  // kernels use 32-bit indices
+  if (pixels * std::max<size_t>(numbersOfPixel, kNumbersDrawn) > kMax) {
+    throw Error(fmt::format("picture of {}x{}", camera.width, camera.height), "", "is too large for a GPU",
+                "ask for a smaller one, or use --device cpu");
   }
-  makeRoom(directions_, pixels * 3);
-  makeRoom(opaqueDepth_, pixels);
-  makeRoom(state_, pixels * numbersOfPixel);
-  makeRoom(drawn_, pixels * kNumbersDrawn);
+  ensureCapacity(directions_, pixels * 3);
+  ensureCapacity(opaqueDepth_, pixels);
+  ensureCapacity(state_, pixels * numbersOfPixel);
+  ensureCapacity(drawn_, pixels * kNumbersDrawn);
   if (camera == camera_) return;
   camera_ = camera;
   std::vector<float> directions;
@@ -61,7 +61,7 @@ void GpuPicture::begin(const TileFrame& frame, float minTransmittance, uint32_t 
   const Camera& camera = request.camera;
   const Pose& worldFromCamera = request.worldFromCamera;
   const ImageF* opaqueDepth = request.opaqueDepth;
-  makeRoom(camera, numbersOfPixel);
+  ensureCapacity(camera, numbersOfPixel);
   const size_t pixels = static_cast<size_t>(camera.width) * camera.height;
   view_ = {};
   const Mat3d sceneFromCamera = frame.rotation.transpose() * worldFromCamera.rotation;
@@ -93,20 +93,20 @@ void GpuPicture::begin(const TileFrame& frame, float minTransmittance, uint32_t 
   run(begin_, view_);
 }
 
-DrawnOnCard GpuPicture::onCard() const {
+GpuRenderedView GpuPicture::onGpu() const {
   return {camera_.width, camera_.height, view_.colour, view_.opacity};
 }
 
 RenderedView GpuPicture::drawn() {
   const int width = camera_.width, height = camera_.height;
-  RenderedView made{ImageF(width, height, 3), ImageF(width, height, 1), ImageF(width, height, 1)};
+  RenderedView rendered{ImageF(width, height, 3), ImageF(width, height, 1), ImageF(width, height, 1)};
   size_t offset = 0;
-  for (ImageF* image : {&made.colour, &made.opacity, &made.depth}) {
+  for (ImageF* image : {&rendered.colour, &rendered.opacity, &rendered.depth}) {
     const auto bytes = std::as_writable_bytes(std::span(image->pixels));
     stream_->download(drawn_, offset, bytes);
     offset += bytes.size();
   }
-  return made;
+  return rendered;
 }
 
 std::array<float, 2> GpuPicture::opacityAndDepthAt(int x, int y) {

@@ -5,20 +5,20 @@
 namespace tessera {
 
 TileSource<GpuContent> GpuSceneRenderer::uploaded(const TileSource<Content>& source) {
-  TileSource<GpuContent> made;
-  made.bytes = [this, bytes = source.bytes](int tile) { return drawer_->residentBytes(bytes(tile)); };
-  made.load = [this, load = source.load](int tile) {
+  TileSource<GpuContent> gpuSource;
+  gpuSource.bytes = [this, bytes = source.bytes](int tile) { return drawer_->residentBytes(bytes(tile)); };
+  gpuSource.load = [this, load = source.load](int tile) {
     const bool isRead = prefetch_ && prefetch_->isReady(tile);
     return drawer_->upload(*(isRead ? prefetch_->take(tile) : load(tile)));
   };
-  made.folder = source.folder;
-  made.file = source.file;
-  made.resourcesOf = source.resourcesOf;
-  made.bytesOfResource = [this, bytes = source.bytesOfResource](int resource) {
+  gpuSource.folder = source.folder;
+  gpuSource.file = source.file;
+  gpuSource.tileResources = source.tileResources;
+  gpuSource.bytesOfResource = [this, bytes = source.bytesOfResource](int resource) {
     return drawer_->residentBytesOfResource(bytes(resource));
   };
-  made.holdResources = source.holdResources;
-  return made;
+  gpuSource.holdResources = source.holdResources;
+  return gpuSource;
 }
 
 GpuSceneRenderer::GpuSceneRenderer(std::shared_ptr<GpuStream> stream, std::unique_ptr<GpuDrawer> drawer,
@@ -36,10 +36,10 @@ void GpuSceneRenderer::queue(const PictureRequest& request, bool exact) {
   const TileView view = tileView(request.camera, request.worldFromCamera, tiles_.frame());
   if (prefetch_) {
     tiles_.loadReadyFor(view, [this](const std::vector<int>& missing) {
-      prefetch_->want(missing);
+      prefetch_->request(missing);
       const auto ready = [this](int tile) { return prefetch_->isReady(tile); };
-      const auto found = std::find_if(missing.begin(), missing.end(), ready);
-      return found == missing.end() ? -1 : *found;
+      const auto it = std::find_if(missing.begin(), missing.end(), ready);
+      return it == missing.end() ? -1 : *it;
     });
   } else {
     tiles_.loadFor(view);
@@ -54,10 +54,10 @@ RenderedView GpuSceneRenderer::render(const Camera& camera, const Pose& worldFro
   return picture_.drawn();
 }
 
-DrawnOnCard GpuSceneRenderer::draw(const Camera& camera, const Pose& worldFromCamera) {
+GpuRenderedView GpuSceneRenderer::draw(const Camera& camera, const Pose& worldFromCamera) {
   queue({camera, worldFromCamera}, settings_.draw.exact);
   stream_->send();
-  return picture_.onCard();
+  return picture_.onGpu();
 }
 
 bool GpuSceneRenderer::hasMore() const {
@@ -69,7 +69,7 @@ SceneState GpuSceneRenderer::state() const {
   const auto isDrawn = [](const SelectedTile& tile) { return tile.visible; };
   const std::vector<SelectedTile>& tiles = cut().tiles;
   const size_t inBox = static_cast<size_t>(std::count_if(tiles.begin(), tiles.end(), isDrawn));
-  return {inBox + (cut().surround >= 0 ? 1 : 0), tiles_.missing().size(), static_cast<size_t>(choice().refused),
+  return {inBox + (cut().backgroundBlock >= 0 ? 1 : 0), tiles_.missing().size(), static_cast<size_t>(choice().refused),
           cache().statistics(), cache().budgetBytes()};
 }
 

@@ -1,4 +1,5 @@
-// What the renderer asks of its drawer. That pictures are those of the CPU is for tests/gpu_scene_renderer_test.cpp.
+// Tests the calls that the renderer makes to its drawer. tests/gpu_scene_renderer_test.cpp compares its images with
+// those of the CPU.
 #include "render/vulkan/gpu_scene_renderer.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +14,7 @@ namespace {
 
 struct Asked {
   int uploaded = 0;
-  std::vector<int> drawn;  // of the last picture, tiles in the order that they were given in
+  std::vector<int> drawn;  // tiles of the last image, in the order in which they were passed
   DrawSettings settings;
   bool wantsAnotherFrame = false;
 };
@@ -68,7 +69,7 @@ class GpuSceneRendererCalls : public testing::Test {
   static GpuRendererSettings within(uint64_t budgetBytes) {
     GpuRendererSettings settings;
     settings.budgetBytes = budgetBytes;
-    settings.selection.mostPixels = 0;  // the finest that there is
+    settings.selection.maximumScreenSpaceError = 0;  // the finest available
     return settings;
   }
 
@@ -102,7 +103,7 @@ TEST_F(GpuSceneRendererCalls, AskForExactPicturesAlwaysInRenderAndByTheSettingsI
   }
 }
 
-TEST_F(GpuSceneRendererCalls, SayThatThereIsMoreWhereTheDrawerWantsAnotherFrame) {
+TEST_F(GpuSceneRendererCalls, ReportMoreToShowWhereTheDrawerWantsAnotherFrame) {
   GpuSceneRenderer renderer = rendererWith(within(kAll));
   renderer.render(place_.camera(), place_.above(), nullptr);
   EXPECT_FALSE(renderer.hasMore());

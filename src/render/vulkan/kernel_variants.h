@@ -1,4 +1,4 @@
-// Kernels of one drawer, made when they are first run: by their code and the one constant that they are specialised by.
+// The kernels of one drawer, created when they are first used. Keyed by their code and by one specialisation constant.
 #pragma once
 
 #include <map>
@@ -14,11 +14,11 @@ class KernelVariants {
  public:
   explicit KernelVariants(std::shared_ptr<const GpuContext> context) : context_(std::move(context)) {}
 
-  // `spirv` must be there as long as this is.
+  // `spirv` must outlive this object.
   const GpuKernel& get(std::span<const uint32_t> spirv, uint32_t constant) {
     const auto key = std::make_pair(spirv.data(), constant);
-    const auto found = kernels_.find(key);
-    if (found != kernels_.end()) return found->second;
+    const auto it = kernels_.find(key);
+    if (it != kernels_.end()) return it->second;
     return kernels_.try_emplace(key, context_, spirv, std::span(&constant, 1)).first->second;
   }
 

@@ -5,19 +5,19 @@
 namespace tessera {
 
 GpuNetwork addNetwork(const std::vector<DenseLayer>& network, PackedContent& packed) {
-  GpuNetwork made;
+  GpuNetwork packedNetwork;
   std::vector<arguments::LayerArguments> layers;
   std::vector<float> weights;
   for (const DenseLayer& layer : network) {
     layers.push_back({layer.inputs, layer.outputs, static_cast<uint32_t>(weights.size()), 0});
     weights.insert(weights.end(), layer.weights.begin(), layer.weights.end());
     weights.insert(weights.end(), layer.biases.begin(), layer.biases.end());
-    made.mostWidth = std::max({made.mostWidth, layer.inputs, layer.outputs});
+    packedNetwork.maxWidth = std::max({packedNetwork.maxWidth, layer.inputs, layer.outputs});
   }
-  made.layerCount = static_cast<uint32_t>(layers.size());
-  made.layers = packed.add(layers);
-  made.weights = packed.add(weights);
-  return made;
+  packedNetwork.layerCount = static_cast<uint32_t>(layers.size());
+  packedNetwork.layers = packed.add(layers);
+  packedNetwork.weights = packed.add(weights);
+  return packedNetwork;
 }
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// A content's arrays behind one another, as they go to a graphics card in one buffer.
+// The arrays of a content packed into one buffer for upload to the GPU.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace tessera {
 
 class PackedContent {
  public:
-  // → offset, a multiple of 16
+  // Appends an array and returns its offset, a multiple of 16.
   template <class T>
   size_t add(const std::vector<T>& values) {
     const size_t offset = bytes_.size();
@@ -22,7 +22,7 @@ class PackedContent {
     bytes_.resize((bytes_.size() + kAlignment - 1) / kAlignment * kAlignment);
     return offset;
   }
-  // Of what was added there; as many, of the same size.
+  // Overwrites an array that was added at `offset`; the new one must have the same number and size of elements.
   template <class T>
   void replace(size_t offset, const std::vector<T>& values) {
     std::memcpy(bytes_.data() + offset, values.data(), values.size() * sizeof(T));
@@ -34,11 +34,11 @@ class PackedContent {
   std::vector<std::byte> bytes_;
 };
 
-// A network on the card.
+// A network in GPU memory.
 struct GpuNetwork {
-  uint64_t layers = 0, weights = 0;  // offsets, then addresses
+  uint64_t layers = 0, weights = 0;  // offsets in the packed content, later device addresses
   uint32_t layerCount = 0;
-  uint32_t mostWidth = 0;  // inputs or outputs of a layer
+  uint32_t maxWidth = 0;  // largest number of inputs or outputs of a layer
 };
 GpuNetwork addNetwork(const std::vector<DenseLayer>& network, PackedContent& packed);
 

@@ -1,4 +1,4 @@
-// `field` as a method, for the table of methods (representations/methods.h).
+// The method `field`, for the table of methods (representations/methods.h).
 #pragma once
 
 #include "train/method.h"

@@ -24,14 +24,14 @@ constexpr BakeParameter kBakeParameters[] = {
     {.name = kCells,
      .help = "cells of a block's occupancy along an edge, a multiple of 8; 0: three times the lattice's, up to 384 or "
              "the lattice's",
-     .least = 0,
-     .most = kMostOccupancyCells,
-     .multipleOf = HashPart::kOccupancyUnit,
+     .minimum = 0,
+     .maximum = kMaxOccupancyCells,
+     .divisibleBy = HashPart::kOccupancyUnit,
      .standard = HashBakeSettings().cells},
     {.name = kDilation,
-     .help = "cells around those that are seen are kept, too",
-     .least = 0,
-     .most = 8,
+     .help = "number of layers of cells around the visible ones that are kept as well",
+     .minimum = 0,
+     .maximum = 8,
      .standard = HashBakeSettings().dilation}};
 
 std::unique_ptr<Baker> openBaker(Device& device, const fs::path& folder, const BakeParameters& parameters) {

@@ -1,4 +1,4 @@
-// `hash` as a method, for the table of methods (representations/methods.h).
+// The method `hash`, for the table of methods (representations/methods.h).
 #pragma once
 
 #include "train/method.h"

@@ -14,7 +14,7 @@ TrainingResult train(Device& device, const Capture& capture, const fs::path& mod
   return trainVolume(device, capture, model, {options, SettingsOf<VolumeConfig>::in(settings)});
 }
 
-// Draws what a scene baked now would hold.
+// Opens the model with a renderer that culls as baking would at the current step.
 std::unique_ptr<OpenedModel> openModel(Device& device, const fs::path& folder) {
   auto model = loadVolumeModel(device, folder);
   const ModelManifest manifest = requireManifest(ModelFolder(folder));
@@ -27,10 +27,11 @@ std::unique_ptr<OpenedModel> openModel(Device& device, const fs::path& folder) {
 constexpr std::string_view kResidentBlocks = "resident_blocks";
 constexpr BakeParameter kBakeParameters[] = {
     {.name = kResidentBlocks,
-     .help = "blocks of the model in memory at once, besides a surround of its own; 0: all; default: as many as in "
-             "training",
-     .least = 0,
-     .most = 1 << 20}};
+     .help =
+         "blocks of the model in memory at once, besides a background block of its own; 0: all; default: as many as in "
+         "training",
+     .minimum = 0,
+     .maximum = 1 << 20}};
 
 std::unique_ptr<Baker> openBaker(Device& device, const fs::path& folder, const BakeParameters& parameters) {
   const auto given = parameters.find(kResidentBlocks);

@@ -1,4 +1,4 @@
-// `volume` as a method, for the table of methods (representations/methods.h).
+// The method `volume`, for the table of methods (representations/methods.h).
 #pragma once
 
 #include "train/method.h"

@@ -7,18 +7,19 @@
 namespace tessera {
 
 struct LearningRateSettings {
-  SETTING(double, rate, 1e-2, "rate", "learning rate", positive());
-  SETTING(double, finalRateFactor, 0.03, "final_rate_factor", "learning rate at the end, relative", positive());
-  SETTING(double, constantRateShare, 0.4, "constant_rate_share",
+  SETTING(double, learningRate, 1e-2, "learning_rate", "learning rate", positive());
+  SETTING(double, finalLearningRateFactor, 0.03, "final_learning_rate_factor", "learning rate at the end, relative",
+          positive());
+  SETTING(double, constantLearningRateFraction, 0.4, "constant_learning_rate_fraction",
           "share of the steps before the learning rate begins to fall", share());
   SETTING(double, networkL2, 1e-6, "network_l2", "weight decay of the networks", atLeast(0));
 
-  // With the schedule's own warm-up, falling exponentially.
+  // Returns the exponential schedule with the default warm-up of RateSchedule.
   RateSchedule rateSchedule() const {
     RateSchedule schedule;
-    schedule.rate = rate;
-    schedule.finalFactor = finalRateFactor;
-    schedule.constantFraction = constantRateShare;
+    schedule.rate = learningRate;
+    schedule.finalFactor = finalLearningRateFactor;
+    schedule.constantFraction = constantLearningRateFraction;
     return schedule;
   }
 };

@@ -1,4 +1,4 @@
-// Settings of the rays of a training step: which photos they are of, how many there are, and where they begin.
+// Settings of the rays of a training step: the photos that they are drawn from, their number, and where they start.
 #pragma once
 
 #include "base/setting.h"
@@ -7,9 +7,9 @@
 namespace tessera {
 
 struct RaySettings {
-  SETTING(int64_t, seed, 0, "seed", "of everything random", anything());
-  SETTING(int, firstRays, 512, "first_rays", "rays of the first step", within(1, mostRays).dependent());
-  SETTING(int, mostRays, 1 << 14, "most_rays", "rays that a step never exceeds", within(64, 1 << 24));
+  SETTING(int64_t, seed, 0, "seed", "seed of all random numbers", anything());
+  SETTING(int, firstRays, 512, "first_rays", "rays of the first step", within(1, maxRays).dependent());
+  SETTING(int, maxRays, 1 << 14, "max_rays", "rays that a step never exceeds", within(64, 1 << 24));
   SETTING(double, near, 0.05, "near",
           "no sample nearer to a camera, in halves of a block (without blocks: of the region of interest)", share());
   SETTING(double, photoBudgetMiB, 0, "photo_budget_mib",
@@ -18,17 +18,17 @@ struct RaySettings {
           atLeast(0));
   SETTING(int, stepsPerPhoto, 2, "steps_per_photo", "with a photo budget: steps after which one photo is exchanged",
           within(1, 1 << 30));
-  SETTING(double, knownShare, 0.125, "known_share",
+  SETTING(double, sparseDepthRayFraction, 0.125, "sparse_depth_ray_fraction",
           "share of the rays through sparse points, in captures that have some", share());
 
-  // With rays through sparse points, and colours behind transparent photos; a method adds what only it asks for.
+  // Returns the settings of PhotoRays that all methods share; a method adds its own.
   PhotoRays::Settings photoRaySettings() const {
     PhotoRays::Settings settings;
     settings.seed = static_cast<uint64_t>(seed);
-    settings.mostRays = static_cast<uint32_t>(mostRays);
+    settings.maxRays = static_cast<uint32_t>(maxRays);
     settings.photoBudgetMiB = photoBudgetMiB;
     settings.stepsPerPhoto = stepsPerPhoto;
-    settings.knownShare = knownShare;
+    settings.sparseDepthRayFraction = sparseDepthRayFraction;
     return settings;
   }
 };
@@ -38,13 +38,13 @@ struct RandomBackgroundSettings {
           anything());
 };
 
-// Of methods whose steps aim for a number of samples.
+// For methods whose steps aim for a number of samples.
 struct SampleBudgetSettings {
   SETTING(int, samplesPerStep, 1 << 16, "samples_per_step", "samples that a step aims for; rays adapt",
           within(64, 1 << 24));
 };
 
-// Of methods whose steps evaluate texels once for all samples.
+// For methods whose steps evaluate each texel once for all samples.
 struct TexelBudgetSettings {
   SETTING(int, texelsPerStep, 1 << 19, "texels_per_step",
           "texels, or corners of the lattice, that a step aims for; rays adapt", within(64, 1 << 26));

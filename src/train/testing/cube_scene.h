@@ -1,4 +1,4 @@
-// For tests: a cube with six chequered faces, alone or in a coloured room, photographed exactly.
+// For tests: an analytic scene, a cube with six chequered faces, alone or inside a coloured box, with rendered photos.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -19,16 +19,16 @@ namespace tessera {
 class CubeScene {
  public:
   struct Options {
-    bool room = false;  // else photos are transparent around the cube
+    bool isEnclosed = false;  // else photos are transparent around the cube
     LensModel lens = LensModel::pinhole;
-    std::vector<double> log2Gains = {0};  // of the photos, in turn
-    bool stain = false;                   // a red stain in the corner of every photo that is trained on, under a mask
+    std::vector<double> log2Gains = {0};  // exposures of the photos, in turn
+    bool stain = false;                   // a red stain, masked, in a corner of every training photo
     int photos = 48;
-    int observationsPerPhoto = 0;  // exact ones
+    int observationsPerPhoto = 0;  // without error
   };
 
   static constexpr int kWidth = 40, kHeight = 32, kStain = 12;
-  static constexpr double kCube = 0.5, kRoom = 2.5;  // half sides
+  static constexpr double kCube = 0.5, kEnclosure = 2.5;  // half sides
 
   CubeScene() : CubeScene(Options()) {}
   explicit CubeScene(const Options& options) : options_(options) {
@@ -45,7 +45,7 @@ class CubeScene {
   Capture& capture() { return capture_; }
   fs::path operator/(const std::string& name) const { return root_ / name; }
 
-  // Colour (premultiplied), opacity and z-depth (0 where nothing is).
+  // Renders the ground truth: premultiplied colour, opacity and z-depth (0 where there is nothing).
   RenderedView truth(const Camera& camera, const Pose& pose) const {
     RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
                       ImageF(camera.width, camera.height, 1)};
@@ -70,7 +70,8 @@ class CubeScene {
   static Vec3d centre() { return {10, -5, 2}; }
 
  private:
-  // Slab test of the box of that half side; its near distance, or its far one from within.
+  // Slab test with the cube of half side `half`: returns its near distance, or its far one if `inside`; infinity for a
+  // miss.
   static double box(const Vec3d& from, const Vec3d& along, double half, bool inside, int* face) {
     double enter = -1e30, leave = 1e30;
     int enterFace = 0, leaveFace = 0;
@@ -87,7 +88,7 @@ class CubeScene {
   double trace(const Vec3d& from, const Vec3d& along, Vec3d* colour) const {
     int face = 0;
     double half = kCube, distance = box(from, along, kCube, false, &face);
-    if (!std::isfinite(distance) && options_.room) distance = box(from, along, half = kRoom, true, &face);
+    if (!std::isfinite(distance) && options_.isEnclosed) distance = box(from, along, half = kEnclosure, true, &face);
     if (!std::isfinite(distance)) return distance;
     const Vec3d at = (from + distance * along) / half;
     const int u = (face / 2 + 1) % 3, v = (face / 2 + 2) % 3;
@@ -113,7 +114,7 @@ class CubeScene {
       photo.name = "photo_" + std::to_string(i) + ".png";
       photo.image = root_ / photo.name;
       photo.split = i % 7 == 3 ? Split::test : Split::train;
-      // A spiral over the sphere, from above and below.
+      // Cameras lie on a spiral over a sphere.
       const double z = 0.85 * (2 * (i + 0.5) / options_.photos - 1), angle = 2.4 * i;
       const double across = std::sqrt(1 - z * z);
       const Vec3d outward(across * std::cos(angle), across * std::sin(angle), z);
@@ -128,7 +129,7 @@ class CubeScene {
     }
   }
 
-  // A point where the middle of some pixel looks, if it looks at anything.
+  // Adds a sparse point on the ray through the centre of a random pixel, if the ray hits anything.
   void observe(int index, const Camera& camera, int k) {
     const RandomStream random(9, static_cast<uint64_t>(index));
     const Vec2d pixel(random.below(2 * k, kWidth) + 0.5, random.below(2 * k + 1, kHeight) + 0.5);
@@ -144,7 +145,7 @@ class CubeScene {
 
   void writePhoto(Photo& photo, const Camera& camera, int index) const {
     const RenderedView view = truth(camera, photo.worldFromCamera);
-    ImageF image(kWidth, kHeight, options_.room ? 3 : 4);
+    ImageF image(kWidth, kHeight, options_.isEnclosed ? 3 : 4);
     const double gain = std::exp2(options_.log2Gains[index % options_.log2Gains.size()]);
     for (size_t i = 0; i < view.opacity.pixels.size(); ++i) {
       const float opacity = view.opacity.pixels[i];
@@ -159,7 +160,7 @@ class CubeScene {
       ImageU8 mask(kWidth, kHeight, 1, 255);
       for (int y = 0; y < kHeight; ++y) {
         for (int x = 0; x < kWidth; ++x) {
-          // Where the stain lies differs, so that every part of the scene is seen by someone.
+          // The corner differs between photos, so that every part of the scene is visible in some photo.
           const bool left = index % 2 == 0, top = index % 3 == 0;
           if ((left ? x : kWidth - 1 - x) >= kStain || (top ? y : kHeight - 1 - y) >= kStain) continue;
           const float red[] = {1, 0, 0, 1};
@@ -178,9 +179,9 @@ class CubeScene {
   Capture capture_;
 };
 
-// Both premultiplied, over black.
-inline double psnrOf(const RenderedView& view, const RenderedView& truth, int fromX = 0, int toX = 1 << 20,
-                     int fromY = 0, int toY = 1 << 20) {
+// PSNR of premultiplied colours over black, in the given range of pixels.
+inline double computePsnr(const RenderedView& view, const RenderedView& truth, int fromX = 0, int toX = 1 << 20,
+                          int fromY = 0, int toY = 1 << 20) {
   double sum = 0;
   int64_t count = 0;
   for (int y = fromY; y < std::min(toY, truth.colour.height); ++y) {
@@ -195,7 +196,7 @@ inline double psnrOf(const RenderedView& view, const RenderedView& truth, int fr
   return -10 * std::log10(sum / static_cast<double>(count));
 }
 
-// About the cube, which has half a side of 0.5: one block, or two (2, 1) or four (2, 2) that meet in its middle.
+// A grid around the cube, whose half side is 0.5: one block, or two (2, 1) or four (2, 2) that meet at its centre.
 inline BlockGrid cubeGrid(int columns = 1, int rows = 1) {
   BlockGrid grid;
   grid.originInWorld = CubeScene::centre();

@@ -1,4 +1,4 @@
-// What the tests of this room share: captures of plain pictures.
+// For tests: captures of plain images.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace tessera {
 
-// `count` photos of 16×12 pixels, each of one grey (8 × its index), in `folder`.
+// Writes `count` photos of 16×12 pixels to `folder`, each of a uniform grey (8 × its index).
 inline Capture plainCapture(const fs::path& folder, int count) {
   Capture capture;
   capture.root = folder;

@@ -1,4 +1,4 @@
-// For tests: the same training on the processor, on Vulkan, and begun on the one and ended on the other.
+// For tests: the same training on the CPU, on Vulkan, and started on one and finished on the other.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@
 namespace tessera {
 
 #ifdef TESSERA_HAS_VULKAN
-// While it is there, what a driver says whose card has failed.
+// While an object exists, submissions fail as if the GPU were lost.
 class LostDevice {
  public:
   LostDevice() : kept_(vkQueueSubmit) {
@@ -36,7 +36,7 @@ class LostDevice {
   PFN_vkQueueSubmit kept_;
 };
 
-// Likewise, one whose memory others have taken.
+// While an object exists, allocations fail as if the GPU were out of memory.
 class NoMemory {
  public:
   NoMemory() : kept_(vkAllocateMemory) {
@@ -56,9 +56,9 @@ class NoMemory {
 struct TwoDevices {
   static constexpr int64_t kSteps = 8;
 
-  // Trains, or goes on with, the model in a folder.
+  // Trains or resumes the model in a folder.
   std::function<void(Device& device, const fs::path& folder, const TrainingLoopOptions& loop)> train;
-  // A picture of that model.
+  // Renders an image of that model.
   std::function<ImageF(Device& device, const fs::path& folder)> draw;
 
   void trainOn(Device& device, const fs::path& folder, bool resume, int64_t stopAfter = kSteps) const {
@@ -71,7 +71,7 @@ struct TwoDevices {
     train(device, folder, loop);
   }
 
-  // Steps differ in rounding alone, which a few of them do not blow up to much.
+  // The devices differ only in rounding, which stays small over a few steps.
   void expectTheSamePictures(const fs::path& scratch) const {
 #ifndef TESSERA_HAS_VULKAN
     GTEST_SKIP() << "this build has no Vulkan";
@@ -79,28 +79,28 @@ struct TwoDevices {
     SKIP_WITHOUT_VULKAN(openForTest());
     const std::unique_ptr<Device> cpu = makeDevice({"cpu", 2}), vulkan = makeDevice({"vulkan"});
     trainOn(*cpu, scratch / "cpu", false);
-    const ImageF wanted = draw(*cpu, scratch / "cpu");
+    const ImageF expected = draw(*cpu, scratch / "cpu");
     trainOn(*vulkan, scratch / "vulkan", false);
     trainOn(*vulkan, scratch / "to-cpu", false, kSteps / 2);
     trainOn(*cpu, scratch / "to-cpu", true);
     trainOn(*cpu, scratch / "to-vulkan", false, kSteps / 2);
     trainOn(*vulkan, scratch / "to-vulkan", true);
     for (const char* folder : {"vulkan", "to-cpu", "to-vulkan"}) {
-      EXPECT_GT(decibels(draw(*cpu, scratch / folder), wanted), 40) << folder;
+      EXPECT_GT(decibels(draw(*cpu, scratch / folder), expected), 40) << folder;
     }
-    EXPECT_GT(decibels(draw(*vulkan, scratch / "cpu"), wanted), 50) << "drawn on Vulkan";
-    // Cards without doubles decide in floats where samples lie.
+    EXPECT_GT(decibels(draw(*vulkan, scratch / "cpu"), expected), 50) << "drawn on Vulkan";
+    // GPUs without doubles compute the positions of samples in floats.
     GpuOptions floats;
     floats.allowed.float64 = false;
     const std::unique_ptr<Device> single = makeVulkanDevice(floats);
     trainOn(*single, scratch / "floats", false);
-    EXPECT_GT(decibels(draw(*cpu, scratch / "floats"), wanted), 35) << "without doubles";
-    EXPECT_GT(decibels(draw(*single, scratch / "cpu"), wanted), 35) << "drawn without doubles";
+    EXPECT_GT(decibels(draw(*cpu, scratch / "floats"), expected), 35) << "without doubles";
+    EXPECT_GT(decibels(draw(*single, scratch / "cpu"), expected), 35) << "drawn without doubles";
     EXPECT_EQ(GpuContext::validationMessages(), 0);
 #endif
   }
 
-  // One clear error, and the processor goes on from the last checkpoint.
+  // A failure gives one clear error, and the CPU can resume from the last checkpoint.
   void expectToSurviveFailures(const fs::path& scratch) const {
 #ifndef TESSERA_HAS_VULKAN
     GTEST_SKIP() << "this build has no Vulkan";
@@ -155,19 +155,19 @@ struct TwoDevices {
   }
 };
 
-// Nothing is read in the middle of a step, and its commands are recorded seldom, however many rays it has. `trainee` is
-// made on a Vulkan device.
-inline void expectOneBatchAStep([[maybe_unused]] Device& vulkan, [[maybe_unused]] Trainee& trainee) {
+// Expects that a step reads nothing back before its end and seldom records its commands anew, whatever its number of
+// rays. `trainable` must have been created on the Vulkan device.
+inline void expectOneBatchAStep([[maybe_unused]] Device& vulkan, [[maybe_unused]] TrainableModel& trainable) {
 #ifdef TESSERA_HAS_VULKAN
-  constexpr int64_t kFirst = 7, kEnd = 15;  // between two looks at what is empty
+  constexpr int64_t kFirst = 7, kEnd = 15;  // between two updates of the occupancy
   std::set<uint32_t> rays;
   VulkanBatches before;
   for (int64_t step = 0; step < kEnd; ++step) {
-    if (step == kFirst) before = batchesOf(vulkan);
-    const StepReport report = trainee.step(step, 100);
+    if (step == kFirst) before = countBatches(vulkan);
+    const StepReport report = trainable.step(step, 100);
     if (step >= kFirst) rays.insert(report.rays);
   }
-  const VulkanBatches after = batchesOf(vulkan);
+  const VulkanBatches after = countBatches(vulkan);
   EXPECT_EQ(after.sent - before.sent, static_cast<uint64_t>(kEnd - kFirst));
   EXPECT_LE(after.recorded - before.recorded, static_cast<uint64_t>(kEnd - kFirst) - 2);
   EXPECT_GT(rays.size(), 1u);

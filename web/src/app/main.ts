@@ -1,11 +1,11 @@
-// The viewer: a page that shows the world or the scene which its address names (?world=, ?scene=, else the folder scene
-// beside it).
+// The viewer application: shows the world or scene that the page's address names (?world= or ?scene=, otherwise the
+// folder `scene` beside the page).
 import { TesseraScene } from '../scene';
 import { SceneError } from '../scene-error';
 import { ChosenFiles } from '../scene-files';
 import { addHiding } from './hiding/hiding-tool';
 import { HiddenParts } from './hiding/hidden-parts';
-import { addBookmarks, bookmarksOf } from './views/bookmarks';
+import { addBookmarks, makeBookmarks } from './views/bookmarks';
 import { element } from './page/element';
 import { addHelp } from './page/help';
 import { addHeadset } from './headset/headset-tool';
@@ -47,7 +47,7 @@ async function start(): Promise<void> {
   const toolbar = new Toolbar(document.body, shortcuts);
   addNavigationTools(viewer, toolbar, shortcuts);
   addMeasuring(viewer, toolbar, shortcuts);
-  const [models, hidden, bookmarks] = [new Models(viewer), new HiddenParts(viewer), bookmarksOf(viewer)];
+  const [models, hidden, bookmarks] = [new Models(viewer), new HiddenParts(viewer), makeBookmarks(viewer)];
   const worlds = new Worlds(viewer, models, hidden, bookmarks);
   addModels(viewer, models, worlds, toolbar, shortcuts, fail);
   addHiding(viewer, hidden, toolbar, shortcuts);
@@ -59,7 +59,7 @@ async function start(): Promise<void> {
     viewer.needPicture();
   } });
   addHelp(toolbar, shortcuts);
-  void addHeadset(viewer, toolbar, shortcuts, fail); // others do not wait for what may take long
+  void addHeadset(viewer, toolbar, shortcuts, fail); // not awaited, as it may take long
   keepViewInAddress(viewer);
   viewer.onFrame.add((frame) => {
     const numbers = viewer.statistics;
@@ -75,7 +75,7 @@ function sceneOfAddress(): string {
   return new URLSearchParams(location.search).get('scene') ?? 'scene/tileset.json';
 }
 
-// A page that was not served may read nothing but what somebody chooses.
+// A page that was not served can only read files that the user chooses.
 async function chooseScene(): Promise<TesseraScene> {
   loading.hide();
   const input = element('input');
@@ -98,7 +98,7 @@ async function chooseScene(): Promise<TesseraScene> {
   }
 }
 
-// The address always holds the view, so that it can be passed on; and a view that it holds is shown.
+// The address always contains the current view, so that it can be shared, and a view in the address is shown.
 function keepViewInAddress(viewer: Viewer): void {
   const show = () => {
     const view = parseView(location.hash);
@@ -117,7 +117,7 @@ function keepViewInAddress(viewer: Viewer): void {
     if (now === written) return;
     written = now;
     clearTimeout(waiting);
-    waiting = setTimeout(() => history.replaceState(null, '', `#${now}`), 400); // browsers allow few changes a second
+    waiting = setTimeout(() => history.replaceState(null, '', `#${now}`), 400); // browsers limit how often the address changes
   });
 }
 

@@ -1,4 +1,4 @@
-// What is drawn, and how well.
+// The panel for display and quality settings.
 import type { ShownMode } from '../draw/display-modes';
 import type { DisplayMode } from '../representations/drawers';
 import { element } from './page/element';
@@ -6,7 +6,7 @@ import type { Toolbar } from './page/toolbar';
 import type { Viewer } from './viewer';
 
 const kResolutions: [string, number | undefined][] = [
-  ['As fast as needed', undefined], ['100 %', 1], ['75 %', 0.75], ['50 %', 0.5], ['25 %', 0.25],
+  ['Automatic', undefined], ['100 %', 1], ['75 %', 0.75], ['50 %', 0.5], ['25 %', 0.25],
 ];
 
 export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
@@ -17,7 +17,7 @@ export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
   };
   const levels = Array.from({ length: city.tileset.levels }, (_, level): [string, number] => [level === 0 ? 'All' : `Level ${level} and coarser`, level]);
   const { modes } = city.shows;
-  const featureLevel = featureLevelOf(viewer, changed((level) => scenes.forEach((scene) => (scene.featureLevel = level))));
+  const featureLevel = makeFeatureLevelChoice(viewer, changed((level) => scenes.forEach((scene) => (scene.featureLevel = level))));
   const panel = element(
     'div', '',
     choice('Show', modes.map((mode): [string, ShownMode<DisplayMode>] => [mode.label, mode]),
@@ -26,14 +26,14 @@ export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
         featureLevel?.show(mode);
       })),
     ...(featureLevel ? [featureLevel.label] : []),
-    slider('Error at most', 0, 3, Math.log2(2 * city.selection.mostPixels), 0.25, (x) => `${(2 ** x / 2).toPrecision(2)} px`,
-      changed((x) => scenes.forEach(({ selection }) => (selection.mostPixels = 2 ** x / 2)))),
+    slider('Screen-space error', 0, 3, Math.log2(2 * city.selection.maximumScreenSpaceError), 0.25, (x) => `${(2 ** x / 2).toPrecision(2)} px`,
+      changed((x) => scenes.forEach(({ selection }) => (selection.maximumScreenSpaceError = 2 ** x / 2)))),
     ...(levels.length > 1 ? [choice('Detail', levels, changed((level) => scenes.forEach(({ selection }) => (selection.finestLevel = level))))] : []),
-    choice('Beyond what was captured', [['Fades into haze', city.visibility], ['As it was made up', Infinity]],
+    choice('Outside the captured region', [['Fades into haze', city.visibility], ['Is shown in full', Infinity]],
       changed((visibility) => (city.visibility = visibility))),
     choice('Pixels', kResolutions, changed((share) => (resolution.fixed = share))),
-    slider('Graphics memory', 6, 13, Math.log2(city.stream.cardBytes / 2 ** 20), 0.5, (x) => `${Math.round(2 ** x)} MiB`,
-      changed((x) => (viewer.cardBytes = 2 ** x * 2 ** 20))),
+    slider('Graphics memory', 6, 13, Math.log2(city.stream.gpuBytes / 2 ** 20), 0.5, (x) => `${Math.round(2 ** x)} MiB`,
+      changed((x) => (viewer.gpuBytes = 2 ** x * 2 ** 20))),
     slider('Field of view', 15, 100, camera.fov, 1, (x) => `${x}°`, changed((x) => {
       camera.fov = x;
       camera.updateProjectionMatrix();
@@ -42,11 +42,11 @@ export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
   toolbar.add({ name: 'Settings', key: 'c', icon: 'sliders', panel });
 }
 
-// Which level of features the modes show that show one.
-function featureLevelOf({ city }: Viewer, change: (level: number) => void) {
+// The feature level that feature-level modes show.
+function makeFeatureLevelChoice({ city }: Viewer, change: (level: number) => void) {
   const { featureLevels } = city.shows;
   if (!featureLevels) return undefined;
-  const fine = Array.from({ length: featureLevels.most }, (_, i): [string, number] => [`Level ${i + 1}`, i + 1]);
+  const fine = Array.from({ length: featureLevels.maximum }, (_, i): [string, number] => [`Level ${i + 1}`, i + 1]);
   const label = choice(featureLevels.label, [...fine, [featureLevels.coarse, 0] as [string, number]], change);
   const select = label.querySelector('select')!;
   const options = [...select.options];
@@ -64,15 +64,15 @@ function featureLevelOf({ city }: Viewer, change: (level: number) => void) {
     if (!label.hidden) offer();
   };
   label.hidden = true;
-  select.addEventListener('focus', offer); // levels that have come meanwhile
+  select.addEventListener('focus', offer); // updates the choices to the levels loaded so far
   return { label, show };
 }
 
 function slider(
-  name: string, least: number, most: number, value: number, step: number, say: (value: number) => string, change: (value: number) => void,
+  name: string, minimum: number, maximum: number, value: number, step: number, say: (value: number) => string, change: (value: number) => void,
 ): HTMLLabelElement {
   const input = element('input');
-  Object.assign(input, { type: 'range', min: String(least), max: String(most), step: String(step), value: String(value) });
+  Object.assign(input, { type: 'range', min: String(minimum), max: String(maximum), step: String(step), value: String(value) });
   const output = element('output', '', say(value));
   input.addEventListener('input', () => {
     output.textContent = say(input.valueAsNumber);

@@ -1,48 +1,48 @@
-// Scenes on a canvas: the world they stand in, the camera, and when a picture is drawn. What the tools of the application
-// share.
+// The viewer: scenes on a canvas, the world that they are in, the camera, and the render loop, which the tools of the
+// application share.
 import * as THREE from 'three';
 import type { SceneStatistics, StreamSettings, TesseraScene } from '../scene';
 import { SceneError } from '../scene-error';
 import { updateScenes } from '../scenes';
 import { Navigation, type Look } from './moving/navigation';
-import { Resolution, type Pace } from './moving/resolution';
+import { Resolution, type ResolutionTarget } from './moving/resolution';
 import { GpuTimer } from './page/gpu-timer';
 import type { View } from './views/view-address';
 
 export interface Frame {
-  milliseconds: number; // since the last one
-  gpuMilliseconds?: number; // that the graphics card drew a picture shortly before, where it tells
+  milliseconds: number; // since the last frame
+  gpuMilliseconds?: number; // GPU time of a recent frame, if the browser reports it
   resolutionScale: number;
 }
 
 // Moves the camera.
 export interface Mover {
-  look: Look; // set: at once
+  look: Look; // setting it takes effect at once
   flyTo(look: Look): void;
-  update(seconds: number): boolean; // once a frame; true where the camera has moved
+  update(seconds: number): boolean; // called once a frame; returns true if the camera has moved
 }
 
-const kVisibility = 1; // diagonals of what was captured
-const kBytesPerPixel = 37; // of a scene's pictures, and of the depth of what is opaque
+const kVisibility = 1; // as a multiple of the diagonal of the captured region
+const kBytesPerPixel = 37; // of a scene's render targets and of the depth of the opaque objects
 
 export class Viewer {
   readonly world = new THREE.Scene();
   readonly camera = new THREE.PerspectiveCamera(50);
   readonly navigation: Navigation;
   readonly resolution = new Resolution();
-  // Called after each picture.
+  // Called after each frame.
   readonly onFrame = new Set<(frame: Frame) => void>();
-  // Called where somebody clicked, or tapped, without dragging; the first that answers true takes it.
+  // Called when the user clicks or taps without dragging; the first callback that returns true handles the click.
   readonly onClick: ((event: PointerEvent) => boolean)[] = [];
   readonly scenes: TesseraScene[]; // the city first
-  readonly onScenes = new Set<() => void>(); // of the list, of what is visible
-  private readonly stream: StreamSettings; // of all scenes together
-  private cardBudget: number;
+  readonly onScenes = new Set<() => void>(); // called when the list or the visibility of a scene changes
+  private readonly stream: StreamSettings; // the budget of all scenes together
+  private gpuBudget: number;
   private mover: Mover;
-  private needed = true; // a picture, though nothing moves
-  private held = false;
+  private needed = true; // a frame is needed although nothing moves
+  private paused = false;
 
-  // The city is in the world, at the origin; its frame is that of all that stands there.
+  // The city is at the world's origin; its frame is that of everything in the world.
   constructor(
     readonly canvas: HTMLCanvasElement,
     readonly renderer: THREE.WebGLRenderer,
@@ -53,7 +53,7 @@ export class Viewer {
     this.scenes = [city];
     city.visibility = kVisibility;
     this.stream = { ...city.stream };
-    this.cardBudget = city.stream.cardBytes;
+    this.gpuBudget = city.stream.gpuBytes;
     this.navigation = new Navigation(this.camera, canvas, city.bounds, (event) => this.pickAt(event));
     this.mover = this.navigation;
     addEventListener('resize', () => this.resize());
@@ -67,38 +67,39 @@ export class Viewer {
     return { ...this.mover.look, fov: this.camera.fov };
   }
 
-  // At once; flyTo takes its time. Neither does anything while somebody else draws.
+  // Takes effect at once; flyTo is animated. Neither does anything while the loop is paused.
   set view({ eye, target, fov }: View) {
-    if (this.held) return;
+    if (this.paused) return;
     this.setLens(fov);
     this.mover.look = { eye, target };
   }
 
   flyTo({ eye, target, fov }: View): void {
-    if (this.held) return;
+    if (this.paused) return;
     this.setLens(fov);
     this.mover.flyTo({ eye, target });
   }
 
-  // Has something else than mouse and keys move the camera, at a pace of its own; without: them again.
-  takeOver(mover: Mover = this.navigation, pace?: Pace): void {
+  // Replaces navigation by another mover of the camera, with its own resolution target; without arguments, restores
+  // navigation.
+  takeOver(mover: Mover = this.navigation, pace?: ResolutionTarget): void {
     this.mover = mover;
     this.navigation.enabled = mover === this.navigation;
     this.resolution.pace = pace;
-    this.resize(); // of which nothing was to be heard meanwhile
+    this.resize(); // resize events were not delivered in the meantime
   }
 
-  // Another one beside the city, which is drawn in the same way, up to the box of what was captured.
+  // Adds a scene beside the city; it is drawn in the same way, but only inside its bounds.
   addScene(scene: TesseraScene): void {
     const { city } = this;
     Object.assign(scene.selection, city.selection);
-    Object.assign(scene, { display: city.display, onError: city.onError, resolutionScale: city.resolutionScale, showsSurround: false });
+    Object.assign(scene, { display: city.display, onError: city.onError, resolutionScale: city.resolutionScale, showsBackgroundBlock: false });
     this.scenes.push(scene);
     this.world.add(scene);
     this.changedScenes();
   }
 
-  // Not the city. Gives its memory back.
+  // Removes a scene other than the city, and frees its memory.
   removeScene(scene: TesseraScene): void {
     this.scenes.splice(this.scenes.indexOf(scene), 1);
     scene.removeFromParent();
@@ -108,7 +109,7 @@ export class Viewer {
 
   changedScenes(): void {
     const bounds = new THREE.Box3();
-    for (const scene of this.scenes) if (!scene.visible) scene.leaveCard();
+    for (const scene of this.scenes) if (!scene.visible) scene.leaveGpu();
     for (const scene of this.visibleScenes) {
       scene.updateWorldMatrix(true, false);
       bounds.union(scene.bounds.applyMatrix4(scene.matrixWorld));
@@ -118,9 +119,9 @@ export class Viewer {
     this.needPicture();
   }
 
-  // Of the graphics card, for all scenes together.
-  set cardBytes(bytes: number) {
-    this.cardBudget = bytes;
+  // GPU budget of all scenes together.
+  set gpuBytes(bytes: number) {
+    this.gpuBudget = bytes;
     this.needPicture();
   }
 
@@ -128,31 +129,31 @@ export class Viewer {
     return this.scenes.filter(({ visible }) => visible);
   }
 
-  // Each scene has pictures of its own; all of them get no more than half of the card.
-  private get mostScale(): number {
+  // Each scene has its own render targets; together they take at most half of the GPU budget.
+  private get maxScale(): number {
     const { x, y } = this.renderer.getDrawingBufferSize(new THREE.Vector2());
-    return Math.min(1, Math.sqrt((0.5 * this.cardBudget) / (kBytesPerPixel * x * y * Math.max(1, this.visibleScenes.length))));
+    return Math.min(1, Math.sqrt((0.5 * this.gpuBudget) / (kBytesPerPixel * x * y * Math.max(1, this.visibleScenes.length))));
   }
 
-  // Of all scenes, which share the card, the page and the network.
+  // Distributes the budget to the scenes, which share the GPU, the page and the network.
   set resolutionScale(resolutionScale: number) {
     const scenes = this.visibleScenes;
     const { pageBytes, fetches } = this.stream;
     for (const scene of scenes) {
       scene.resolutionScale = resolutionScale;
-      scene.largestResolutionScale = Math.min(this.resolution.whole, this.mostScale);
-      scene.stream.cardBytes = this.cardBudget / scenes.length;
+      scene.largestResolutionScale = Math.min(this.resolution.whole, this.maxScale);
+      scene.stream.gpuBytes = this.gpuBudget / scenes.length;
       scene.stream.pageBytes = pageBytes / scenes.length;
       scene.stream.fetches = Math.max(1, Math.floor(fetches / scenes.length));
     }
   }
 
-  // Nothing that the last view asked for is still to come.
+  // True when nothing that the last view requested is still to be loaded.
   get idle(): boolean {
     return this.visibleScenes.every(({ idle }) => idle);
   }
 
-  // Of all scenes together.
+  // The statistics of all scenes together.
   get statistics(): SceneStatistics | undefined {
     const all = this.scenes.map(({ statistics }) => statistics).filter((one) => one !== undefined);
     if (all.length === 0) return undefined;
@@ -163,18 +164,18 @@ export class Viewer {
     });
   }
 
-  // Somebody has changed what is to be seen.
+  // Requests a frame after a visible change.
   needPicture(): void {
     this.needed = true;
   }
 
-  // Where the pointer is in the picture: from -1 to 1 across it, upwards.
+  // Returns the pointer's position in the image: from -1 to 1, y upwards.
   pointerAt({ clientX, clientY }: { clientX: number; clientY: number }): THREE.Vector2 {
     const { left, top, width, height } = this.canvas.getBoundingClientRect();
     return new THREE.Vector2((2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height);
   }
 
-  // The place of the world under the pointer: of a scene, or of a model in front of it.
+  // Returns the place in the world under the pointer: of a scene, or of a model in front of it.
   pickAt(event: { clientX: number; clientY: number }): THREE.Vector3 | undefined {
     const at = this.pointerAt(event);
     const raycaster = new THREE.Raycaster();
@@ -186,30 +187,30 @@ export class Viewer {
     return hit.point;
   }
 
-  // Of the scenes alone: the nearest; `at` runs from -1 to 1 across the picture.
+  // Considers the scenes alone and returns the nearest place; `at` runs from -1 to 1 across the image.
   pickScenes(at: THREE.Vector2): THREE.Vector3 | undefined {
     const distance = (place: THREE.Vector3) => place.distanceTo(this.eye);
     const places = this.scenes.map((scene) => (scene.visible ? scene.pick(at, this.renderer) : undefined));
     return places.filter((place) => place !== undefined).sort((a, b) => distance(a) - distance(b))[0];
   }
 
-  // Of the world, whatever group the camera is in.
+  // Returns the camera's position in the world, whatever group it is in.
   get eye(): THREE.Vector3 {
     return this.camera.getWorldPosition(new THREE.Vector3());
   }
 
-  // Has the loop wait, and the camera and what is seen stay, while somebody else draws.
+  // Pauses the loop, the camera and changes to the view while the caller draws.
   async whileHeld<T>(work: () => Promise<T>): Promise<T> {
     if (this.renderer.xr.isPresenting) throw new Error('a headset shows the scene; leave it first');
     const still = this.still();
-    this.held = true;
+    this.paused = true;
     this.navigation.enabled = false;
     try {
       return await work();
     } finally {
-      this.held = false;
+      this.paused = false;
       this.navigation.enabled = true;
-      this.resize(); // of which nothing was to be heard meanwhile
+      this.resize(); // resize events were not delivered in the meantime
       const drawn = () => {
         still.remove();
         this.onFrame.delete(drawn);
@@ -218,20 +219,20 @@ export class Viewer {
     }
   }
 
-  // The picture as it is, over the canvas.
+  // Covers the canvas with a still copy of the current image.
   private still(): HTMLCanvasElement {
     const still = document.createElement('canvas');
     still.className = 'still';
     still.width = this.canvas.width;
     still.height = this.canvas.height;
-    this.draw(); // of the one before, browsers keep nothing
+    this.draw(); // browsers do not preserve the previous image
     still.getContext('2d')!.drawImage(this.canvas, 0, 0);
     this.canvas.after(still);
     return still;
   }
 
-  get isHeld(): boolean {
-    return this.held;
+  get isPaused(): boolean {
+    return this.paused;
   }
 
   private setLens(fov: number): void {
@@ -241,7 +242,7 @@ export class Viewer {
   }
 
   private resize(): void {
-    if (this.held || this.renderer.xr.isPresenting) return;
+    if (this.paused || this.renderer.xr.isPresenting) return;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(innerWidth, innerHeight, false);
     this.camera.aspect = innerWidth / innerHeight;
@@ -250,31 +251,31 @@ export class Viewer {
   }
 
   private run(): void {
-    let wasWhole = false; // the last picture was
-    let motion = this.resolution.motion(0); // when it was drawn
+    let wasWhole = false; // the last frame had full resolution
+    let motion = this.resolution.motion(0); // while the last frame was drawn
     let last = performance.now();
     const timer = new GpuTimer(this.renderer);
     this.renderer.setAnimationLoop(() => {
       const now = performance.now();
       const milliseconds = now - last;
       last = now;
-      if (this.held) return;
+      if (this.paused) return;
       if (this.mover.update(milliseconds / 1000)) this.resolution.moved(now);
       const before = motion;
       motion = this.resolution.motion(now);
       if (motion === 'rest' && wasWhole && this.idle && !this.needed) return;
       if (motion === before) this.resolution.took(milliseconds, motion);
       this.needed = false;
-      const resolutionScale = Math.min(this.resolution.scale(now), this.mostScale);
+      const resolutionScale = Math.min(this.resolution.scale(now), this.maxScale);
       this.resolutionScale = resolutionScale;
       timer.measure(() => this.draw());
-      wasWhole = resolutionScale === Math.min(this.resolution.whole, this.mostScale);
+      wasWhole = resolutionScale === Math.min(this.resolution.whole, this.maxScale);
       const frame = { milliseconds, gpuMilliseconds: timer.milliseconds, resolutionScale };
       for (const tell of this.onFrame) tell(frame);
     });
   }
 
-  // Streams in what a picture would show, without drawing it.
+  // Streams the tiles that a frame would show, without drawing it.
   prefetch(): void {
     for (const scene of this.visibleScenes) scene.prefetch(this.camera, this.renderer);
   }
@@ -294,14 +295,14 @@ export class Viewer {
       const isClick =
         down?.id === event.pointerId && Math.hypot(event.clientX - down.x, event.clientY - down.y) < slack(event.pointerType);
       down = undefined;
-      // In flight a click with the mouse takes hold of the pointer, which then is nowhere.
+      // In fly mode, a click locks the mouse pointer, which then has no position.
       const isForFlight = this.navigation.mode === 'fly' && event.pointerType === 'mouse' && !this.navigation.isPointing;
       if (isClick && !isForFlight) this.onClick.some((take) => take(event));
     });
   }
 }
 
-// Throws SceneError where the browser cannot draw.
+// Throws SceneError if the browser cannot draw.
 export function makeRenderer(canvas: HTMLCanvasElement): THREE.WebGLRenderer {
   try {
     return new THREE.WebGLRenderer({ canvas, antialias: false, powerPreference: 'high-performance' });

@@ -1,11 +1,11 @@
-// The picture of a scene as a part of three's own: a triangle that fills the screen, blended over what is opaque, and
-// written into the depth buffer, so that what is drawn later is hidden by the scene and hides it.
+// The mesh that shows a rendered scene in three.js: a full-screen triangle that is blended over the opaque objects and
+// writes the depth buffer, so that objects drawn later and the scene hide each other.
 import * as THREE from 'three';
 import { kDisplayConstants } from './display-modes';
 import type { DrawnPicture } from './scene-drawer';
 import { screenTriangle } from './screen-triangle';
 
-export const kFirstRenderOrder = -1e9; // of what is transparent
+export const kFirstRenderOrder = -1e9; // first of the transparent objects
 
 const kVertexShader = `
 void main() {
@@ -20,7 +20,7 @@ uniform mat3 origin, ray;
 uniform mat4 clipFromScene;
 uniform sampler2D opaqueDepth;
 uniform int display;
-// From near, 0, over three more to far, 1.
+// Maps 0 (near) to 1 (far) to a colour ramp with two intermediate colours.
 vec3 colourOfDistance(float x) {
   vec3 colour = mix(vec3(1.0, 0.93, 0.7), vec3(0.96, 0.55, 0.25), clamp(3.0 * x, 0.0, 1.0));
   colour = mix(colour, vec3(0.62, 0.16, 0.42), clamp(3.0 * x - 1.0, 0.0, 1.0));
@@ -28,13 +28,13 @@ vec3 colourOfDistance(float x) {
 }
 void main() {
   vec2 inPicture = (gl_FragCoord.xy - viewport.xy) / viewport.zw;
-  // What is mixed of texels is of this picture alone.
+  // Clamped so that filtering never reads texels of another picture.
   vec2 place = clamp(part.xy + inPicture * part.zw, part.xy + 0.5, part.xy + part.zw - 0.5) / resolution;
   vec4 colour = texture2D(colourAndOpacity, place);
   vec4 far = texture2D(distanceAndOpacity, place);
   float opaque = texture2D(opaqueDepth, place).r;
   gl_FragDepth = opaque;
-  if (far.a > 0.99) {  // half of what is behind is hidden
+  if (far.a > 0.99) {  // at least half of what is behind is hidden
     vec2 ndc = 2.0 * inPicture - 1.0;
     float surface = far.r / far.a;
 #ifdef DISTANCES_OF_BYTES
@@ -43,10 +43,10 @@ void main() {
     vec3 x = origin * vec3(ndc, 1.0) + surface * normalize(ray * vec3(ndc, 1.0));
     vec4 clip = clipFromScene * vec4(x, 1.0);
     gl_FragDepth = min(opaque, clamp(0.5 + 0.5 * clip.z / clip.w, 0.0, 1.0));
-    // Seven doublings from a tenth of half a block's edge.
+    // The ramp spans seven octaves, from a tenth of half a block's edge on.
     if (display == kShowDepth) colour.rgb = colour.a * colourOfDistance(clamp(log2(surface / 0.1) / 7.0, 0.0, 1.0));
   }
-  // Premultiplied, in the colours of the photos: three converts what a canvas does not take as it is.
+  // The colours are premultiplied and in the photos' colour space; three.js converts them to that of the output.
   gl_FragColor = vec4(colour.a > 0.0 ? sRGBTransferEOTF(vec4(colour.rgb / colour.a, 1.0)).rgb : vec3(0.0), 1.0);
   #include <colorspace_fragment>
   gl_FragColor = vec4(gl_FragColor.rgb * colour.a, colour.a);
@@ -60,7 +60,7 @@ export function cityMesh(drawn: DrawnPicture): THREE.Mesh<THREE.BufferGeometry, 
     uniforms: {
       colourAndOpacity: { value: colour },
       distanceAndOpacity: { value: distance },
-      viewport: { value: new THREE.Vector4() }, // of what three draws into
+      viewport: { value: new THREE.Vector4() }, // the viewport that three.js renders into
       part: { value: new THREE.Vector4() },
       clipFromScene: { value: new THREE.Matrix4() },
       origin: { value: new THREE.Matrix3() },
@@ -70,7 +70,7 @@ export function cityMesh(drawn: DrawnPicture): THREE.Mesh<THREE.BufferGeometry, 
       display: view.display,
     },
     defines: distancesOfBytes ? { DISTANCES_OF_BYTES: '' } : {},
-    transparent: true, // after what is opaque
+    transparent: true, // drawn after the opaque objects
     depthFunc: THREE.AlwaysDepth,
     blending: THREE.CustomBlending,
     blendSrc: THREE.OneFactor,
@@ -82,16 +82,16 @@ export function cityMesh(drawn: DrawnPicture): THREE.Mesh<THREE.BufferGeometry, 
   const mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial>(screenTriangle(), material);
   mesh.name = 'scene';
   mesh.frustumCulled = false;
-  mesh.visible = false; // until there is a picture
+  mesh.visible = false; // until there is an image
   mesh.renderOrder = kFirstRenderOrder;
   mesh.raycast = () => {};
-  // Other cameras than those that it was drawn for are shown the first picture.
+  // Cameras other than those that were rendered show the first picture.
   mesh.onBeforeRender = (renderer, _, camera) => {
     const { uniforms } = material;
     renderer.getCurrentViewport(uniforms.viewport.value);
     const { part, origin, ray, clipFromScene } = drawn.pictures.find((one) => one.camera === camera) ?? drawn.pictures[0];
     for (const [name, value] of Object.entries({ part, origin, ray, clipFromScene })) uniforms[name].value = value;
-    material.uniformsNeedUpdate = true; // for each camera, not once a picture
+    material.uniformsNeedUpdate = true; // for each camera rather than once a frame
   };
   return mesh;
 }

@@ -1,10 +1,10 @@
-// What of the scene is shown. A representation's drawer says which modes it has: these, and then its own.
+// The display modes: what is shown of a scene. A representation's drawer lists these first, then its own.
 import * as THREE from 'three';
 
 export interface ShownMode<Name extends string = string> {
   name: Name;
-  label: string; // for people
-  // Shows one of the levels of features that its contents have: any of them, or the fine ones, from 1 on.
+  label: string; // for users
+  // The mode shows one feature level of the contents: any level, or only a fine one, from 1 on.
   featureLevel?: 'any' | 'fine';
 }
 
@@ -14,20 +14,20 @@ export const kSharedModes = [
   { name: 'levels', label: 'Levels of detail' },
 ] as const satisfies readonly ShownMode[];
 
-// `const int kShowDiffuse = 1; …` for shaders: numbers in the list of modes.
+// Returns `const int kShowDiffuse = 1; …` for shaders: the indices in the list of modes.
 export function displayConstants(modes: readonly ShownMode[]): string {
   return modes.map(({ name }, i) => `const int kShow${name.charAt(0).toUpperCase()}${name.slice(1)} = ${i};`).join('\n');
 }
 
-// Of those that every drawer has first.
+// The constants of the modes that every drawer lists first.
 export const kDisplayConstants = displayConstants(kSharedModes);
 
-// Neighbours in the tree have numbers that follow one another: hues a golden angle apart tell them apart.
+// Neighbours in the tree have consecutive numbers; hues that differ by the golden angle distinguish them.
 export function colourOfBlock(number: number): THREE.Color {
   return new THREE.Color().setHSL((number * 0.381966) % 1, 0.65, 0.6, THREE.LinearSRGBColorSpace);
 }
 
-// From green, the finest, to red.
+// Ranges from green, for the finest level, to red.
 export function colourOfLevel(level: number): THREE.Color {
   return new THREE.Color().setHSL(Math.max(0, 0.36 - 0.12 * level), 0.7, 0.55, THREE.LinearSRGBColorSpace);
 }

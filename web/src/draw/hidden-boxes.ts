@@ -1,1 +1,1 @@
-export const kMostHiddenBoxes = 8; // of somebody's, and as many in the surround alone
+export const kMaxHiddenBoxes = 8; // boxes set by the user, and as many again in the background block alone

@@ -1,8 +1,8 @@
-// The layers of a content's network as GLSL. Their loops are written out: shaders index arrays slowly, and vectors not at
-// all.
+// Writes the layers of a content's network as GLSL. The loops are unrolled: shaders index arrays slowly and cannot
+// index vectors.
 import type { DenseLayer } from '../tiles/network';
 
-// One number as GLSL writes it, to a float's digits.
+// Writes a number as a GLSL float literal with full precision.
 function literal(x: number): string {
   const text = x.toPrecision(9);
   return /[.e]/.test(text) ? text : `${text}.0`;
@@ -12,8 +12,9 @@ export function writtenVector(packed: Float32Array, n: number): string {
   return `vec4(${Array.from(packed.subarray(4 * n, 4 * n + 4), literal).join(', ')})`;
 }
 
-// Lines that take expressions of the inputs, and expressions of the outputs, before any activation of the last layer's. `vector`
-// says in GLSL what the nth vector of the packed network (tiles/network.ts) is: a place where it is read, or its numbers.
+// Returns lines of GLSL that evaluate the layers for `inputs`, which are expressions, and the expressions of the
+// outputs, before any activation of the last layer. `vector` returns the GLSL for the nth vector of the packed network
+// (tiles/network.ts): a read from a buffer, or literal numbers.
 export function layersShader(
   inputs: string[], network: Pick<DenseLayer, 'outputs'>[], vector: (n: number) => string,
 ): { lines: string[]; outputs: string[] } {

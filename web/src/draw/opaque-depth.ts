@@ -1,5 +1,5 @@
-// The depth of what is opaque in a world, drawn with its own materials, whose cut-outs and displacements count: rays end
-// there. The scene's own picture lets light through, and so is no part of it.
+// Renders the depth of the opaque objects of a world, where rays end, with their own materials, so that alpha tests and
+// displacements count. The scene's own mesh is transparent and therefore not part of it.
 import * as THREE from 'three';
 import { drawAsTheyStand, type Picture } from './picture';
 
@@ -7,12 +7,12 @@ export class OpaqueDepth {
   private target?: THREE.WebGLRenderTarget;
 
   get bytes(): number {
-    // Colour and depth, 4 bytes each.
+    // Colour and depth take 4 bytes each.
     return this.target ? 8 * this.target.width * this.target.height : 0;
   }
 
-  // Null where there is nothing opaque in the world that `scene` stands in. `surfaces`: objects that let light through
-  // and end rays all the same, by the depth that they write.
+  // Returns null if there is nothing opaque in the world that `scene` is in. `surfaces` are objects that are
+  // transparent but end rays all the same, by the depth that they write.
   draw(
     renderer: THREE.WebGLRenderer, pictures: Pick<Picture, 'camera' | 'part'>[], scene: THREE.Object3D, size: THREE.Vector2,
     surfaces: ReadonlySet<THREE.Object3D> = new Set(),
@@ -22,22 +22,22 @@ export class OpaqueDepth {
     const seeThrough = new Set<THREE.Material>();
     const layers = new THREE.Layers();
     layers.mask = pictures.reduce((mask, { camera }) => mask | camera.layers.mask, 0);
-    let found = false;
+    let hasOpaque = false;
     const look = (object: THREE.Object3D) => {
-      if (!object.visible) return; // nor is what it holds
+      if (!object.visible) return; // children are invisible too
       const { material } = object as THREE.Mesh;
       if (material !== undefined && object.layers.test(layers)) {
         for (const one of Array.isArray(material) ? material : [material]) {
           if (!one.visible) continue;
-          // What lets light through, or writes no depth, ends no ray; what else the object is made of may.
+          // Materials that are transparent or write no depth end no rays; other materials of the same object may.
           if (!surfaces.has(object) && (one.transparent || !one.depthWrite)) seeThrough.add(one);
-          else found = true;
+          else hasOpaque = true;
         }
       }
       for (const child of object.children) look(child);
     };
     look(world);
-    if (!found) {
+    if (!hasOpaque) {
       this.dispose();
       return null;
     }

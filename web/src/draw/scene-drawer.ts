@@ -1,5 +1,5 @@
-// What draws the contents of one scene: how they come to the graphics card, and the picture that they make together.
-// representations/drawers.ts has one for each representation.
+// The interface of a drawer, which uploads the contents of one scene and renders them. representations/drawers.ts lists
+// the drawing of each representation.
 import type * as THREE from 'three';
 import type { Content, ContentHeader, Resource } from '../tiles/content-codec';
 import type { Box, TileContent, Tileset } from '../tiles/tileset';
@@ -8,92 +8,94 @@ import type { Picture } from './picture';
 
 export const kFarAway = 1e30; // scene units
 
-// A content on the card, or on its way there: its drawer alone knows what stands in it.
+// A content on the GPU, or being uploaded; only its drawer knows its structure.
 export type DrawnContent = object;
 
-// Of a content, the part in a box; all of it where there is none.
+// The part of a content inside a box, or the whole content without one.
 export interface DrawnPart<Drawn extends DrawnContent = DrawnContent> {
   content: Drawn;
   within?: Box;
 }
 
-// What of a scene decides how it is drawn.
+// The properties of a scene that its drawing depends on.
 export type DrawnScene = Pick<Tileset, 'box' | 'near' | 'levels'>;
 
-// Where a content stands. `number` and `level` are the tile's, for display modes.
-export interface ContentPlace extends Pick<TileContent, 'box' | 'surround'> {
+// The place of a content in the tree. `number` and `level` are those of the tile, for display modes.
+export interface ContentPlace extends Pick<TileContent, 'box' | 'backgroundBlock'> {
   number: number;
   level: number;
-  isDrawnForLong: boolean; // always there, so that what takes long to prepare is worth it
+  isDrawnForLong: boolean; // resident for the whole session, so that expensive preparation pays off
 }
 
 export interface DrawSettings {
-  minTransmittance: number; // rays end where less would be seen; 0: never
-  visibility: number; // how far beyond the scene's box anything is seen, scene units, above 0
-  display: string; // of ShownMode
-  featureLevel: number; // which such a mode shows
-  endsRays: boolean; // rays that end nowhere in scenes that say so are opaque
-  // Boxes in which nothing is drawn, and such in which nothing of the surround is: from the cube of edge 1 about the
-  // origin to the scene. Those that are flat hide nothing.
+  minTransmittance: number; // rays end below this transmittance; 0: never
+  visibility: number; // visibility range beyond the scene's box, scene units, above 0
+  display: string; // name of a ShownMode
+  featureLevel: number; // the level that a feature-level mode shows
+  endsRays: boolean; // rays that hit nothing are opaque, in scenes that declare so
+  // Boxes in which nothing is drawn, and boxes in which nothing of the background block is drawn. Each matrix maps the
+  // unit cube centred at the origin to the scene. Degenerate boxes hide nothing.
   hidden: readonly THREE.Matrix4[];
-  hiddenOfSurround: readonly THREE.Matrix4[];
-  withinBox: boolean; // nor is anything outside of the scene's box
+  hiddenOfBackgroundBlock: readonly THREE.Matrix4[];
+  withinBox: boolean; // nothing outside the scene's box is drawn
 }
 
 export interface SceneView<Drawn extends DrawnContent = DrawnContent> {
   pictures: Picture[];
-  worldFromScene: THREE.Matrix4; // of three's world
-  contents: DrawnPart<Drawn>[][]; // of each picture, front to back
-  opaqueDepth: THREE.Texture | null; // of what else is opaque; rays end there
-  ofNothing?: Drawn; // what rays belong to that meet nothing: always the same, whatever is in view
+  worldFromScene: THREE.Matrix4; // the world of three.js
+  contents: DrawnPart<Drawn>[][]; // for each picture, front to back
+  opaqueDepth: THREE.Texture | null; // depth of the opaque objects, where rays end
+  backgroundContent?: Drawn; // the content that rays which hit nothing belong to; independent of the view
 }
 
-// The last picture, for what shows it (city-mesh.ts).
+// The rendered image, as the mesh that shows it (city-mesh.ts) needs it.
 export interface DrawnPicture {
-  readonly pictures: readonly Picture[]; // that are in it
-  readonly colour: THREE.Texture; // what the scene adds to each pixel, with its opacity
-  readonly distance: THREE.Texture; // how far away it is, and 1 where half of what is behind is hidden
-  readonly distancesOfBytes: boolean; // from 0 for no distance to 255 for the farthest
+  readonly pictures: readonly Picture[]; // the pictures that the image contains
+  readonly colour: THREE.Texture; // premultiplied colour and opacity of the scene
+  readonly distance: THREE.Texture; // distance to the surface, with alpha 1 where half of what is behind is hidden
+  readonly distancesOfBytes: boolean; // distances are stored as bytes, from 0 for distance 0 to 255 for infinity
   readonly view: {
     resolution: { value: THREE.Vector2 }; // pixels
     opaqueDepth: { value: THREE.Texture | null };
-    display: { value: number }; // of the drawer's modes
+    display: { value: number }; // index in the drawer's modes
   };
 }
 
 export interface SceneDrawer<
   Header extends ContentHeader = ContentHeader, Decoded extends Content = Content, Drawn extends DrawnContent = DrawnContent,
 > extends DrawnPicture {
-  readonly bytes: number; // of the card, without contents
-  readonly featureLevels: number; // the most fine levels of any content that has been prepared; 0 where there are none
+  readonly bytes: number; // GPU memory without contents
+  readonly featureLevels: number; // largest number of fine levels of the contents prepared so far; 0 if there are none
 
-  // Of the card, once it is there; resources apart.
+  // Returns the GPU bytes of a content once it is resident, without resources.
   residentBytes(header: Header): number;
-  // Of the card, while any content is there that needs it; as in memory where this is not said.
+  // Returns the GPU bytes of a resource while any content that needs it is resident. If undefined, they equal its
+  // memory size.
   residentBytesOfResource?(resource: Resource): number;
-  // Has the driver begin with what is needed to draw such a content, beside other work.
+  // Lets the driver start to compile what such a content needs, in the background.
   prepare(header: Header, place: ContentPlace): void;
-  // `resources`: those that it was decoded with, the same objects for all contents that share them.
+  // `resources` are those that the content was decoded with: the same objects for all contents that share them.
   allocate(content: Decoded, place: ContentPlace, resources: readonly Resource[]): Drawn;
-  // Takes the next slice to the card, and says what comes next: another; to wait for the card; or that it can be drawn.
+  // Uploads the next slice to the GPU. Returns 'more' if another slice follows, 'wait' while the GPU is busy, and
+  // 'done' when the content can be drawn.
   upload(content: Drawn): 'more' | 'wait' | 'done';
   free(content: Drawn): void;
 
   resize(size: THREE.Vector2): void;
-  // True where there is something to be seen. Throws SceneError where more boxes are hidden than can be.
+  // Returns true if anything is visible. Throws SceneError if too many boxes are hidden.
   draw(view: SceneView<Drawn>, settings: DrawSettings): boolean;
-  // Whether the same view drawn again would look otherwise, though nothing that was asked for is still to come.
+  // Returns whether drawing the same view again would give another image, although everything requested is loaded.
   wantsAnotherFrame(): boolean;
-  // Where the surface is in a picture, scene units; `at` runs from -1 to 1 across it, upwards.
+  // Returns the surface at a point of a picture, in scene units; `at` runs from -1 to 1 across it, y upwards.
   surfaceAt(renderer: THREE.WebGLRenderer, picture: Picture, at: THREE.Vector2): THREE.Vector3 | undefined;
   dispose(): void;
 }
 
-// What there is to choose from where modes show levels of features.
+// The choices of modes that show feature levels.
 export interface FeatureLevels {
-  label: string; // for people
-  most: number; // fine ones
-  coarse: string; // what level 0 is called
+  label: string; // for users
+  maximum: number; // largest number of fine levels
+  coarse: string; // the name of level 0
 }
 
 // How scenes of a representation are drawn.
@@ -102,6 +104,6 @@ export interface SceneDrawing<
 > {
   modes: readonly ShownMode[];
   featureLevels?: FeatureLevels;
-  // Throws SceneError where the card cannot draw such a scene.
+  // Throws SceneError if the GPU cannot draw such a scene.
   makeDrawer(renderer: THREE.WebGLRenderer, scene: DrawnScene): SceneDrawer<Header, Decoded, Drawn>;
 }

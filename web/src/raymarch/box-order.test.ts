@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { randomNumbers } from '../testing/made-tree';
+import { randomNumbers } from '../testing/test-tree';
 import type { Box, Vec3 } from '../tiles/tileset';
 import { frontToBack } from './box-order';
 
@@ -14,13 +14,13 @@ function entry({ low, high }: Box, eye: Vec3, d: Vec3): number | undefined {
 }
 
 describe('boxes', () => {
-  it('of a grid come in the order in which rays meet them', () => {
+  it('of a grid are sorted in the order in which rays meet them', () => {
     const random = randomNumbers(9);
     const boxes: Box[] = [];
     const walls = [-3, -1, 0.5, 3];
     for (let x = 0; x < 3; ++x) {
       for (let y = 0; y < 3; ++y) {
-        // Some higher than others, and not all there.
+        // Boxes of various heights, with gaps.
         if (random() < 0.8) boxes.push({ low: [walls[x], walls[y], -1], high: [walls[x + 1], walls[y + 1], random()] });
       }
     }

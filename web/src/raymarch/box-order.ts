@@ -1,14 +1,14 @@
-// Boxes that do not overlap, in an order in which every ray from the eye meets them.
+// Sorts disjoint boxes into an order in which every ray from the eye meets them.
 //
-// Two of them lie on two sides of some plane across an axis. Where the eye is on the side of one, no ray meets the other
-// first. (Where two planes say the opposite, no ray meets both.)
+// Two disjoint boxes are separated by some axis-aligned plane. If the eye is on the side of one box, no ray meets the
+// other box first. (If two such planes imply opposite orders, no ray meets both boxes.)
 import type { Box, Vec3 } from '../tiles/tileset';
 
-// Whether no ray from the eye may meet `b` before `a`, and some may meet both.
+// Returns whether `a` must precede `b`: no ray from the eye meets `b` before `a`, and some ray may meet both.
 function comesBefore(a: Box, b: Box, eye: Vec3): boolean {
   let before = false;
   for (let axis = 0; axis < 3; ++axis) {
-    const slack = 2e-3 * Math.min(a.high[axis] - a.low[axis], b.high[axis] - b.low[axis]); // rounding of walls
+    const slack = 2e-3 * Math.min(a.high[axis] - a.low[axis], b.high[axis] - b.low[axis]); // tolerance for rounded walls
     if (a.high[axis] <= b.low[axis] + slack) {
       if (eye[axis] >= b.low[axis]) return false;
       before ||= eye[axis] <= a.high[axis];
@@ -20,7 +20,8 @@ function comesBefore(a: Box, b: Box, eye: Vec3): boolean {
   return before;
 }
 
-// The numbers of the boxes. Where there is no such order, as three boxes can lie around one another, one that is nearly.
+// Returns the indices of the boxes in order. If there is no such order, as three boxes can overlap cyclically, the
+// order is approximate.
 export function frontToBack(boxes: Box[], eye: Vec3): number[] {
   const behind = boxes.map((): number[] => []);
   const waitsFor = boxes.map(() => 0);

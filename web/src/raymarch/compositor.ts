@@ -1,30 +1,30 @@
-// Draws contents, front to back, into targets of their own: what the scene adds to each pixel, and how far away it is
+// Renders contents front to back into its own render targets: the premultiplied colour of the scene, and its distance
 // (docs/tile-format.md, section 4).
 import * as THREE from 'three';
 import { colourOfBlock, colourOfLevel, type ShownMode } from '../draw/display-modes';
-import { kMostHiddenBoxes } from '../draw/hidden-boxes';
+import { kMaxHiddenBoxes } from '../draw/hidden-boxes';
 import { drawAsTheyStand, type Picture } from '../draw/picture';
 import type { ContentPlace, DrawnPart, DrawnScene, DrawSettings, SceneDrawer, SceneView } from '../draw/scene-drawer';
 import { screenTriangle } from '../draw/screen-triangle';
 import { SceneError } from '../scene-error';
 import type { Box } from '../tiles/tileset';
-import { frontToBack as orderOf } from './box-order';
+import { frontToBack as sortFrontToBack } from './box-order';
 import type { ContentPart, MarchedContent, MarchedHeader } from './content';
-import { contentMaterial, keyOf, programMaterial, viewUniforms, type ProgramPlace, type ViewUniforms } from './content-program';
+import { contentMaterial, programKey, programMaterial, viewUniforms, type ProgramPlace, type ViewUniforms } from './content-program';
 import { contentTarget } from './content-target';
 import type { ContentTextures } from './content-textures';
 import type { MarchedOwn, Marching, MarchMethod } from './marching';
 
-// A content that may be drawn.
+// A content that can be drawn.
 export interface MarchedDrawnContent<Own extends MarchedOwn = MarchedOwn> {
   textures: ContentTextures;
   box: Box; // scene units
-  surround: boolean;
+  backgroundBlock: boolean;
   mesh: THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>;
   own: Own;
 }
 
-// One texel, so that programs need not differ where there is nothing opaque.
+// A depth texture of one texel, so that programs need no variant for worlds without opaque objects.
 function farthestDepth(): THREE.DataTexture {
   const texture = new THREE.DataTexture(new Uint8Array([255]), 1, 1, THREE.RedFormat);
   texture.needsUpdate = true;
@@ -36,7 +36,7 @@ function bytesOfGeometry({ attributes, index }: THREE.BufferGeometry): number {
   return buffers.reduce((sum, { array }) => sum + array.byteLength, 0);
 }
 
-// Puts the nearest depth where nothing of what comes next would be seen: it is not even begun there.
+// Writes the nearest depth where the next contents would be invisible, so that the depth test skips their fragments.
 const kHideShader = `
 uniform sampler2D colourAndOpacity;
 uniform float minTransmittance;
@@ -52,11 +52,12 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
   implements SceneDrawer<Header, Decoded, MarchedDrawnContent<Own>> {
   readonly view: ViewUniforms = viewUniforms();
   readonly target: THREE.WebGLRenderTarget;
-  pictures: Picture[] = []; // that are in the target
+  pictures: Picture[] = []; // the pictures in the target
   readonly distancesOfBytes: boolean;
   private readonly modes: readonly ShownMode[];
-  private readonly bytesPerPixel: number; // of all pictures
-  private readonly depthAlone: THREE.WebGLRenderTarget; // the depth of `target`, so that its colours can be read meanwhile
+  private readonly bytesPerPixel: number; // of all targets
+  // Shares the depth of `target`, so that the colours of `target` can be read at the same time.
+  private readonly depthAlone: THREE.WebGLRenderTarget;
   private readonly hiding = new THREE.Scene();
   private readonly contents = new THREE.Scene();
   private readonly cube = new THREE.BoxGeometry(1, 1, 1);
@@ -64,18 +65,18 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
   private readonly anyCamera = new THREE.Camera();
   private readonly nothingOpaque = farthestDepth();
   private readonly marching: Marching<Header, Decoded, Own>;
-  private cuts = false; // from the first hidden box on, so that programs are not made anew for each
-  private readonly prepared = new Map<string, THREE.Material>(); // hold programs, by their keys
+  private cuts = false; // set with the first hidden box and never cleared, so that programs are compiled again only once
+  private readonly prepared = new Map<string, THREE.Material>(); // keeps programs alive, by their keys
 
-  // Throws SceneError where the card cannot draw such a scene.
+  // Throws SceneError if the GPU cannot draw such a scene.
   constructor(private readonly renderer: THREE.WebGLRenderer, scene: DrawnScene, method: MarchMethod<Header, Decoded, Own>) {
-    const made = contentTarget(renderer, method.target(scene.levels));
-    this.target = made.target;
-    this.distancesOfBytes = made.distancesOfBytes;
-    this.bytesPerPixel = made.bytesPerPixel;
+    const output = contentTarget(renderer, method.target(scene.levels));
+    this.target = output.target;
+    this.distancesOfBytes = output.distancesOfBytes;
+    this.bytesPerPixel = output.bytesPerPixel;
     this.modes = method.modes;
     this.depthAlone = new THREE.WebGLRenderTarget(1, 1, {
-      generateMipmaps: false, depthBuffer: true, depthTexture: made.target.depthTexture, format: THREE.RedFormat,
+      generateMipmaps: false, depthBuffer: true, depthTexture: output.target.depthTexture, format: THREE.RedFormat,
     });
     this.hiding.add(new THREE.Mesh(this.screen, new THREE.ShaderMaterial({
       vertexShader: 'void main() { gl_Position = vec4(position.xy, -1.0, 1.0); }',
@@ -86,7 +87,7 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
       depthFunc: THREE.AlwaysDepth, colorWrite: false,
     })));
     this.hiding.children[0].frustumCulled = false;
-    this.marching = method.make(made, this.screen, this.view);
+    this.marching = method.make(output, this.screen, this.view);
     this.contents.matrixWorldAutoUpdate = false;
     this.view.sceneLow.value.set(...scene.box.low);
     this.view.sceneHigh.value.set(...scene.box.high);
@@ -105,24 +106,24 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
     return this.marching.featureLevels;
   }
 
-  // Of the textures, and of the numbers that its program is given.
+  // Returns the bytes of the textures and of the uniform block of the program.
   residentBytes(header: Header): number {
     return header.memoryBytes + 16 * this.marching.vectors(header);
   }
 
-  prepare(header: Header, { surround, isDrawnForLong }: ContentPlace): void {
+  prepare(header: Header, { backgroundBlock, isDrawnForLong }: ContentPlace): void {
     for (const mesh of this.marching.prepare?.(header) ?? []) this.renderer.compile(mesh, this.anyCamera);
     const pieces = this.marching.pieces(header, isDrawnForLong);
-    const place = this.placeOf(header.parts, surround);
-    const key = keyOf(pieces, place);
+    const place = this.programPlace(header.parts, backgroundBlock);
+    const key = programKey(pieces, place);
     if (this.prepared.has(key)) return;
     const material = programMaterial(pieces, place);
     this.prepared.set(key, material);
     this.renderer.compile(new THREE.Mesh(this.screen, material), this.anyCamera);
   }
 
-  allocate(content: Decoded, { box, surround, number, level, isDrawnForLong }: ContentPlace): MarchedDrawnContent<Own> {
-    const place = this.placeOf(content.parts, surround);
+  allocate(content: Decoded, { box, backgroundBlock, number, level, isDrawnForLong }: ContentPlace): MarchedDrawnContent<Own> {
+    const place = this.programPlace(content.parts, backgroundBlock);
     const textures = this.marching.textures(content);
     const own = this.marching.own(content);
     const material = contentMaterial(textures, this.view, this.marching.pieces(content, isDrawnForLong), place);
@@ -135,7 +136,7 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
     mesh.frustumCulled = false;
     mesh.matrixAutoUpdate = mesh.matrixWorldAutoUpdate = false;
     for (const one of [mesh, ...own.meshes]) this.renderer.compile(one, this.anyCamera);
-    return { textures, box, surround, mesh, own };
+    return { textures, box, backgroundBlock, mesh, own };
   }
 
   upload(content: MarchedDrawnContent<Own>): 'more' | 'wait' | 'done' {
@@ -165,7 +166,7 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
     this.view.resolution.value.set(x, y);
   }
 
-  draw({ pictures, worldFromScene, contents, opaqueDepth, ofNothing }: SceneView<MarchedDrawnContent<Own>>, settings: DrawSettings): boolean {
+  draw({ pictures, worldFromScene, contents, opaqueDepth, backgroundContent }: SceneView<MarchedDrawnContent<Own>>, settings: DrawSettings): boolean {
     const { renderer } = this;
     this.set(settings);
     this.pictures = pictures;
@@ -185,13 +186,13 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
       renderer.setRenderTarget(target);
       renderer.clear();
     }
-    const opaque = settings.endsRays && ofNothing?.own.whole ? ofNothing.own : undefined;
+    const opaque = settings.endsRays && backgroundContent?.own.whole ? backgroundContent.own : undefined;
     drawAsTheyStand(renderer, pictures, () =>
       pictures.forEach((picture, i) => this.drawOne(picture, worldFromScene, contents[i], opaque)));
     renderer.autoClear = autoClear;
     renderer.setClearColor(clearColour, clearAlpha);
     renderer.setRenderTarget(before);
-    return ofNothing?.own.whole || contents.some((ofOne) => ofOne.length > 0);
+    return backgroundContent?.own.whole || contents.some((ofOne) => ofOne.length > 0);
   }
 
   wantsAnotherFrame(): boolean {
@@ -225,24 +226,24 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
     this.prepared.clear();
   }
 
-  private set({ display, featureLevel, minTransmittance, visibility, hidden, hiddenOfSurround, withinBox }: DrawSettings): void {
+  private set({ display, featureLevel, minTransmittance, visibility, hidden, hiddenOfBackgroundBlock, withinBox }: DrawSettings): void {
     this.view.minTransmittance.value = minTransmittance;
     this.view.visibility.value = visibility;
     this.view.display.value = this.modes.findIndex(({ name }) => name === display);
     this.marching.show?.(display, featureLevel);
-    this.hide(hidden, hiddenOfSurround, withinBox);
+    this.hide(hidden, hiddenOfBackgroundBlock, withinBox);
   }
 
-  private hide(boxes: readonly THREE.Matrix4[], ofSurround: readonly THREE.Matrix4[], withinBox: boolean): void {
-    if (boxes.length > kMostHiddenBoxes) {
-      throw new SceneError('scene', 'hidden', `are ${boxes.length} boxes, and ${kMostHiddenBoxes} can be hidden`, 'hide fewer, larger ones');
+  private hide(boxes: readonly THREE.Matrix4[], ofBackgroundBlock: readonly THREE.Matrix4[], withinBox: boolean): void {
+    if (boxes.length > kMaxHiddenBoxes) {
+      throw new SceneError('scene', 'hidden', `are ${boxes.length} boxes, and ${kMaxHiddenBoxes} can be hidden`, 'hide fewer, larger ones');
     }
-    const { boxFromScene, hiddenBoxes, hiddenBoxesOfSurround } = this.view;
+    const { boxFromScene, hiddenBoxes, hiddenBoxesOfBackgroundBlock } = this.view;
     const whole = (box: THREE.Matrix4) => box.determinant() !== 0;
-    const all = [...boxes.filter(whole), ...ofSurround.filter(whole).slice(0, kMostHiddenBoxes)];
+    const all = [...boxes.filter(whole), ...ofBackgroundBlock.filter(whole).slice(0, kMaxHiddenBoxes)];
     all.forEach((box, n) => boxFromScene.value[n].copy(box).invert());
     hiddenBoxes.value = boxes.filter(whole).length;
-    hiddenBoxesOfSurround.value = all.length;
+    hiddenBoxesOfBackgroundBlock.value = all.length;
     this.view.withinBox.value = withinBox;
     this.cuts ||= all.length > 0 || withinBox;
   }
@@ -254,10 +255,10 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
     });
   }
 
-  private placeOf(parts: ContentPart[], surround: boolean): ProgramPlace {
-    // What is contracted may own what lies beyond any box.
-    const everywhere = surround || parts.some((part) => part.contracted);
-    return { surround, everywhere, distancesOfBytes: this.distancesOfBytes, cuts: this.cuts };
+  private programPlace(parts: ContentPart[], backgroundBlock: boolean): ProgramPlace {
+    // A contracted part may own space beyond any box.
+    const everywhere = backgroundBlock || parts.some((part) => part.contracted);
+    return { backgroundBlock, everywhere, distancesOfBytes: this.distancesOfBytes, cuts: this.cuts };
   }
 
   private place({ mesh, box }: MarchedDrawnContent<Own>, within: Box, worldFromScene: THREE.Matrix4): void {
@@ -268,7 +269,7 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
   }
 
   private drawOne(
-    picture: Picture, worldFromScene: THREE.Matrix4, frontToBack: DrawnPart<MarchedDrawnContent<Own>>[], ofNothing?: Own,
+    picture: Picture, worldFromScene: THREE.Matrix4, frontToBack: DrawnPart<MarchedDrawnContent<Own>>[], backgroundContent?: Own,
   ): void {
     const { renderer } = this;
     const { camera, part, eye, origin, ray, sceneFromClip } = picture;
@@ -277,15 +278,15 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
     this.view.ray.value = ray;
     this.view.sceneFromClip.value = sceneFromClip;
     for (const { textures } of new Set(frontToBack.map(({ content }) => content))) {
-      if (textures.parts.length > 1) textures.orderParts(orderOf(textures.parts, eye));
+      if (textures.parts.length > 1) textures.orderParts(sortFrontToBack(textures.parts, eye));
     }
     this.target.viewport.copy(part);
     this.depthAlone.viewport.copy(part);
     renderer.setRenderTarget(this.target);
-    const end = this.marching.begin?.(frontToBack.map(({ content }) => content.own), ofNothing);
+    const end = this.marching.begin?.(frontToBack.map(({ content }) => content.own), backgroundContent);
     const hides = this.view.minTransmittance.value > 0;
     frontToBack.forEach(({ content, within = kEverywhere }, i) => {
-      if (hides && i > 0 && (content.surround || i % kContentsBetweenHiding === 0)) {
+      if (hides && i > 0 && (content.backgroundBlock || i % kContentsBetweenHiding === 0)) {
         renderer.setRenderTarget(this.depthAlone);
         renderer.render(this.hiding, camera);
         renderer.setRenderTarget(this.target);

@@ -1,34 +1,35 @@
-// The shader that draws one content: what it adds to each pixel, and how far away that is (docs/tile-format.md, section 4). What
-// depends on the representation are its ProgramPieces.
+// The shader that draws one content: its colour in each pixel and the distance of its surface (docs/tile-format.md,
+// section 4). ProgramPieces supply the parts that depend on the representation.
 import * as THREE from 'three';
 import marchPartSource from '../../../shaders/raymarch/march_part.glsl?raw';
 import pathSource from '../../../shaders/lib/domain_path.glsl?raw';
 import placeSource from '../../../shaders/raymarch/part_place.glsl?raw';
 import { kDisplayConstants } from '../draw/display-modes';
-import { kMostHiddenBoxes } from '../draw/hidden-boxes';
+import { kMaxHiddenBoxes } from '../draw/hidden-boxes';
 import { kFarAway } from '../draw/scene-drawer';
 import type { ContentTextures } from './content-textures';
 
-// The same for all contents of a picture. Scene units; `part`, `origin`, `ray` and `sceneFromClip` are those of Picture.
+// Uniforms shared by all contents of a picture. Lengths are in scene units; `part`, `origin`, `ray` and `sceneFromClip`
+// are those of Picture.
 export interface ViewUniforms {
-  resolution: { value: THREE.Vector2 }; // pixels of the target
+  resolution: { value: THREE.Vector2 }; // of the target, in pixels
   part: { value: THREE.Vector4 };
   origin: { value: THREE.Matrix3 };
   ray: { value: THREE.Matrix3 };
   sceneLow: { value: THREE.Vector3 };
   sceneHigh: { value: THREE.Vector3 };
   sceneNear: { value: number };
-  visibility: { value: number }; // how far beyond the scene's box anything is seen, above 0
-  withinLow: { value: THREE.Vector3 }; // of the content that comes next, where it is drawn; not of surrounds
+  visibility: { value: number }; // visibility range beyond the scene's box, above 0
+  withinLow: { value: THREE.Vector3 }; // the box in which the next content is drawn; ignored for background blocks
   withinHigh: { value: THREE.Vector3 };
-  minTransmittance: { value: number }; // rays end where less would be seen; 0: never
-  opaqueDepth: { value: THREE.Texture | null }; // of the depth buffer of what stands in the scene; 1 everywhere where nothing does
+  minTransmittance: { value: number }; // rays end below this transmittance; 0: never
+  opaqueDepth: { value: THREE.Texture | null }; // depth buffer of the opaque objects; 1 where there are none
   sceneFromClip: { value: THREE.Matrix4 };
-  display: { value: number }; // of the drawer's modes
-  boxFromScene: { value: THREE.Matrix4[] }; // of boxes in which nothing is drawn, |x| <= 1/2 in each
-  hiddenBoxes: { value: number }; // so many of them for what is no surround
-  hiddenBoxesOfSurround: { value: number }; // and for the surround
-  withinBox: { value: boolean }; // nothing is drawn outside of the scene's box
+  display: { value: number }; // index in the drawer's modes
+  boxFromScene: { value: THREE.Matrix4[] }; // boxes in which nothing is drawn, with |x| <= 1/2 inside each
+  hiddenBoxes: { value: number }; // number of boxes that apply to contents other than the background block
+  hiddenBoxesOfBackgroundBlock: { value: number }; // number of boxes that apply to the background block
+  withinBox: { value: boolean }; // nothing outside the scene's box is drawn
 }
 
 export function viewUniforms(): ViewUniforms {
@@ -47,9 +48,9 @@ export function viewUniforms(): ViewUniforms {
     opaqueDepth: { value: null },
     sceneFromClip: { value: new THREE.Matrix4() },
     display: { value: 0 },
-    boxFromScene: { value: Array.from({ length: 2 * kMostHiddenBoxes }, () => new THREE.Matrix4()) },
+    boxFromScene: { value: Array.from({ length: 2 * kMaxHiddenBoxes }, () => new THREE.Matrix4()) },
     hiddenBoxes: { value: 0 },
-    hiddenBoxesOfSurround: { value: 0 },
+    hiddenBoxesOfBackgroundBlock: { value: 0 },
     withinBox: { value: false },
   };
 }
@@ -62,7 +63,7 @@ void main() {
   gl_Position = vec4(position.xy, 0.0, 1.0);
 #else
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
-  gl_Position.z = 0.0;  // no plane of the camera cuts it off
+  gl_Position.z = 0.0;  // no clip plane of the camera cuts it off
 #endif
 }`;
 
@@ -86,7 +87,7 @@ uniform vec3 sceneLow, sceneHigh, withinLow, withinHigh, colourOfBlock, colourOf
 uniform int display;
 #ifdef CUTS
 uniform int hiddenBoxes;
-uniform mat4 boxFromScene[${2 * kMostHiddenBoxes}];
+uniform mat4 boxFromScene[${2 * kMaxHiddenBoxes}];
 uniform bool withinBox;
 #else
 const bool withinBox = false;
@@ -96,7 +97,7 @@ const bool withinBox = false;
 const kFragmentMain = `
 const float kSceneEnd = 1e6;
 
-// Where ordinary models end the ray.
+// Returns the distance at which opaque objects end the ray.
 float opaqueDistance(vec2 ndc, vec3 o, vec3 d) {
   float depth = texture(opaqueDepth, gl_FragCoord.xy / resolution).r;
   if (depth >= 1.0) return kSceneEnd;
@@ -104,14 +105,14 @@ float opaqueDistance(vec2 ndc, vec3 o, vec3 d) {
   return dot(x.xyz / x.w - o, d);
 }
 
-// What of range lies in no hidden box, piece by piece. Boxes are cut out of rays, where lengths are those of the scene
-// whatever is contracted.
+// Marches the pieces of range that lie in no hidden box. Boxes are cut out of rays, along which lengths are in scene
+// units even where space is contracted.
 #ifdef CUTS
 void marchShown(Part part, vec3 o, vec3 d, vec2 range, inout Composite sum) {
   float t = range.x;
   int guard = 0;
   do {
-    float exit = t, next = range.y;  // of the boxes that t lies in; the first that comes
+    float exit = t, next = range.y;  // exit: end of the boxes that contain t; next: start of the nearest box after t
     for (int n = 0; n < hiddenBoxes; ++n) {
       vec2 hidden = clipToBox((boxFromScene[n] * vec4(o, 1.0)).xyz, mat3(boxFromScene[n]) * d, vec3(-0.5), vec3(0.5), range);
       if (hidden.x >= hidden.y || hidden.y <= t) continue;
@@ -123,7 +124,7 @@ void marchShown(Part part, vec3 o, vec3 d, vec2 range, inout Composite sum) {
       exit = next;
     }
     t = exit;
-  } while (t < range.y && sum.transmittance >= minTransmittance && ++guard < ${4 * kMostHiddenBoxes + 1});
+  } while (t < range.y && sum.transmittance >= minTransmittance && ++guard < ${4 * kMaxHiddenBoxes + 1});
 }
 #else
 #define marchShown marchPart
@@ -137,13 +138,13 @@ void main() {
   if (withinBox && !meetsBox) discard;
   float far = min(withinBox ? box.y : kSceneEnd, opaqueDistance(ndc, o, d));
   Composite sum = Composite(vec3(0.0), vec4(0.0), 1.0, 0.0, 0.0);
-#ifdef SURROUND
+#ifdef BACKGROUND_BLOCK
   vec2 behind = vec2(meetsBox ? box.y : sceneNear, far);
-  if (behind.x < behind.y) marchShown(partOf(0), o, d, behind, sum);
+  if (behind.x < behind.y) marchShown(fetchPart(0), o, d, behind, sum);
 #else
   vec2 whole = clipToBox(o, d, withinLow, withinHigh, vec2(meetsBox ? box.x : sceneNear, far));
   for (int n = 0; n < PARTS; ++n) {
-    Part part = partOf(n);
+    Part part = fetchPart(n);
     vec2 owned = ownedRange(part.place, o, d, whole);
     if (owned.x < owned.y) marchShown(part, o, d, owned, sum);
     if (sum.transmittance < minTransmittance) break;
@@ -151,7 +152,8 @@ void main() {
 #endif
   float opacity = 1.0 - sum.transmittance;
   if (opacity <= 0.0) discard;
-  // What hides half is where the surface is, whatever shines through it from far behind, and whatever haze is before it.
+  // The surface is where half of the light is absorbed, regardless of what shines through from far behind and of haze
+  // in front.
   float surface = sum.median > 0.0 ? sum.median : sum.depth / opacity;
   float seen = 1.0;
 #ifdef EVERYWHERE
@@ -168,33 +170,34 @@ void main() {
   distanceAndOpacity = vec4(surface * hides, 0.0, 0.0, hides);
 }`;
 
-// What a program depends on beside the content.
+// What a program depends on besides the content.
 export interface ProgramPlace {
-  surround: boolean;
-  everywhere: boolean; // fills the picture, as it owns what lies beyond any box
-  distancesOfBytes: boolean; // the target's are, from 0 for no distance to 255 for the farthest
-  cuts: boolean; // knows hidden boxes, which costs a hundredth even where there are none
+  backgroundBlock: boolean;
+  everywhere: boolean; // fills the screen, as its content owns space beyond any box
+  distancesOfBytes: boolean; // distances are stored as bytes, from 0 for distance 0 to 255 for infinity
+  cuts: boolean; // supports hidden boxes, which costs 1 % even if there are none
 }
 
-// What of a representation goes into a program.
+// The parts of a program that depend on the representation.
 export interface ProgramPieces {
   parts: number;
-  vectors: number; // of `content`
+  vectors: number; // size of `content`
   defines: Record<string, number | string>;
-  // Declares outputs at locations but 1 and uniforms, and defines Part, partOf, marchSegment (shaders/lib) and
-  // `void writeContent(Composite sum, vec3 d, float opacity, float seen)`: what is seen of a ray's sum.
+  // Declares outputs (at locations other than 1) and uniforms, and defines Part, fetchPart, marchSegment (shaders/lib)
+  // and `void writeContent(Composite sum, vec3 d, float opacity, float seen)`, where `seen` is the visible share of the
+  // ray's sum.
   source: string;
 }
 
-// The same for all contents that share a program.
-export function keyOf(pieces: ProgramPieces, place: ProgramPlace): string {
+// Equal for all contents that share a program.
+export function programKey(pieces: ProgramPieces, place: ProgramPlace): string {
   return JSON.stringify([pieces, place]);
 }
 
-// Without uniforms: so that the driver may begin with a program before its content is there.
+// The material has no uniforms, so that the driver can start to compile the program before the content is loaded.
 export function programMaterial(pieces: ProgramPieces, place: ProgramPlace): THREE.RawShaderMaterial {
   const defines: Record<string, number | string> = { ...pieces.defines, PARTS: pieces.parts, VECTORS: pieces.vectors };
-  if (place.surround) defines.SURROUND = '';
+  if (place.backgroundBlock) defines.BACKGROUND_BLOCK = '';
   if (place.everywhere) defines.EVERYWHERE = '';
   if (place.distancesOfBytes) defines.DISTANCES_OF_BYTES = '';
   if (place.cuts) defines.CUTS = '';
@@ -219,8 +222,9 @@ export function programMaterial(pieces: ProgramPieces, place: ProgramPlace): THR
   });
 }
 
-// Contents of one shape share a program, if they have none of their own. Drawn front to back, blended under what is there. Of its
-// uniforms the representation's, colourOfBlock and colourOfLevel are still to be added.
+// Creates the material of a content. Contents with the same layout share a program unless they have their own. Contents
+// are drawn front to back, each blended under the earlier ones. The caller adds the uniforms of the representation,
+// colourOfBlock and colourOfLevel.
 export function contentMaterial(
   textures: ContentTextures, view: ViewUniforms, pieces: ProgramPieces, place: ProgramPlace,
 ): THREE.RawShaderMaterial {
@@ -231,7 +235,7 @@ export function contentMaterial(
   material.uniforms = {
     ...view,
     ...textures.uniforms(),
-    hiddenBoxes: place.surround ? view.hiddenBoxesOfSurround : view.hiddenBoxes,
+    hiddenBoxes: place.backgroundBlock ? view.hiddenBoxesOfBackgroundBlock : view.hiddenBoxes,
   };
   material.uniformsGroups = [group];
   return material;

@@ -1,17 +1,18 @@
-// The rules that parts keep (docs/tile-format.md, sections 5 to 7). Each says the first that is broken, for people.
-import type { PromisedContent } from '../tiles/content-codec';
+// The rules for parts (docs/tile-format.md, sections 5 to 7). Each function returns the first violation as text for
+// users.
+import type { DeclaredContent } from '../tiles/content-codec';
 import { kFarthestInScene, type Broken } from '../tiles/tileset-rules';
 import type { ContentPart } from './content';
 
-export const kMostStored = 606 * 606; // macroblocks in a picture of 16383 pixels a side
+export const kMaxStored = 606 * 606; // macroblocks in an image of 16383 pixels a side
 const kAxes = [0, 1, 2];
 
-// Of `texels` along an axis.
+// Number of macroblocks for `texels` along an axis.
 export function ruleOfMacroblocks(part: ContentPart, texels: number): Broken {
   return part.stored > (texels / 8) ** 3 ? 'it stores more macroblocks than its grid has' : undefined;
 }
 
-// A bounded part owns nothing outside its domain, but for rounding.
+// A bounded part owns nothing outside its domain, up to rounding.
 export function ruleOfPlace(part: ContentPart): Broken {
   for (const a of kAxes) {
     const [centre, scale, low, high] = [part.centre[a], part.scale[a], part.low[a], part.high[a]];
@@ -24,14 +25,14 @@ export function ruleOfPlace(part: ContentPart): Broken {
       return 'it is bounded, but its box leaves its domain';
     }
   }
-  return part.surround && !part.contracted ? 'a surround is not contracted' : undefined;
+  return part.backgroundBlock && !part.contracted ? 'a background block is not contracted' : undefined;
 }
 
 export function ruleOfParts<Part extends ContentPart>(parts: Part[], ruleOfPart: (part: Part) => Broken): Broken {
   for (const [i, one] of parts.entries()) {
     const broken = ruleOfPart(one);
     if (broken) return `part ${i}: ${broken}`;
-    if (one.surround && parts.length > 1) return 'a surround is not alone';
+    if (one.backgroundBlock && parts.length > 1) return 'a background block is not alone';
     const other = parts.findIndex((part, j) => j < i && overlap(part, one));
     if (other !== -1) return `parts ${other} and ${i} overlap`;
   }
@@ -45,14 +46,14 @@ function overlap(one: ContentPart, other: ContentPart): boolean {
   });
 }
 
-// Why the content is not the one that tileset.json speaks of.
-export function brokenPromise(parts: ContentPart[], promised: PromisedContent): Broken {
+// Returns how the content differs from what tileset.json declares.
+export function mismatchWithTileset(parts: ContentPart[], declared: DeclaredContent): Broken {
   const slack = (x: number) => 1e-6 * Math.max(1, Math.abs(x)); // parts are rounded to floats
   for (const [i, part] of parts.entries()) {
-    if (part.surround !== promised.surround) {
-      return `part ${i} is ${part.surround ? 'a' : 'no'} surround, and tileset.json says that the content is ${promised.surround ? 'one' : 'none'}`;
+    if (part.backgroundBlock !== declared.backgroundBlock) {
+      return `part ${i} is ${part.backgroundBlock ? 'a' : 'no'} background block, and tileset.json says that the content is ${declared.backgroundBlock ? 'one' : 'none'}`;
     }
-    const { low, high } = promised.box;
+    const { low, high } = declared.box;
     if (kAxes.some((a) => part.low[a] < low[a] - slack(low[a]) || part.high[a] > high[a] + slack(high[a]))) {
       return `part ${i} owns what lies outside of the content's box in tileset.json`;
     }

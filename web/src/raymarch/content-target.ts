@@ -1,20 +1,23 @@
-// What contents are drawn into, front to back: as fine as the card can blend it, and as many pictures as it takes at once.
+// The render target that contents are drawn into, front to back: the most precise formats that the GPU can blend, and
+// as many attachments as it supports.
 import * as THREE from 'three';
 import { SceneError } from '../scene-error';
 
-// What a representation's contents write.
+// The attachments that a representation's contents write.
 export interface TargetForm {
-  representation: string; // which errors name
-  pictures: number; // 0: what the scene adds, with opacity; 1: how far its surface is; and its own
-  morePictures: number; // as many more as the card takes, at most
-  holdsSums: boolean; // not colours but sums of which these are made: they are not mixed between pixels, and do not fit into bytes
+  representation: string; // named in errors
+  pictures: number; // attachment 0: premultiplied colour with opacity; 1: distance of the surface; then the representation's own
+  morePictures: number; // maximum number of additional attachments, if the GPU supports them
+  // Holds sums from which colours are computed later: they must not be filtered between pixels and do not fit into
+  // bytes.
+  holdsSums: boolean;
 }
 
 export interface ContentTarget {
   target: THREE.WebGLRenderTarget;
-  distancesOfBytes: boolean; // from 0 for no distance to 255 for the farthest
-  morePictures: number; // that there are
-  bytesPerPixel: number; // of all pictures, without depth
+  distancesOfBytes: boolean; // distances are stored as bytes, from 0 for distance 0 to 255 for infinity
+  morePictures: number; // number of additional attachments
+  bytesPerPixel: number; // of all attachments, without depth
 }
 
 interface Storage {
@@ -23,7 +26,7 @@ interface Storage {
   morePictures: number;
 }
 
-function targetOf({ pictures, holdsSums }: TargetForm, { type, floatDistances, morePictures }: Storage): ContentTarget {
+function makeTarget({ pictures, holdsSums }: TargetForm, { type, floatDistances, morePictures }: Storage): ContentTarget {
   const count = pictures + morePictures;
   const filter = holdsSums ? THREE.NearestFilter : THREE.LinearFilter;
   const target = new THREE.WebGLRenderTarget(1, 1, {
@@ -46,28 +49,28 @@ function isComplete(renderer: THREE.WebGLRenderer, target: THREE.WebGLRenderTarg
   return complete;
 }
 
-// Throws SceneError where the card cannot draw such a scene.
+// Throws SceneError if the GPU cannot draw such a scene.
 export function contentTarget(renderer: THREE.WebGLRenderer, form: TargetForm): ContentTarget {
   const { representation, pictures, holdsSums } = form;
   const has = (name: string) => renderer.extensions.has(name);
   const canBlendHalves = has('EXT_color_buffer_half_float') || has('EXT_color_buffer_float');
   const remedy = 'draw it on another machine';
   if (holdsSums && !canBlendHalves) {
-    throw new SceneError('graphics card', '', `cannot blend half floats, which scenes of ${representation} need`, remedy);
+    throw new SceneError('GPU', '', `cannot blend half floats, which scenes of ${representation} need`, remedy);
   }
   const gl = renderer.getContext() as WebGL2RenderingContext;
-  const most = Math.min(gl.getParameter(gl.MAX_DRAW_BUFFERS) as number, gl.getParameter(gl.MAX_COLOR_ATTACHMENTS) as number);
+  const maximum = Math.min(gl.getParameter(gl.MAX_DRAW_BUFFERS) as number, gl.getParameter(gl.MAX_COLOR_ATTACHMENTS) as number);
   const type = canBlendHalves ? THREE.HalfFloatType : THREE.UnsignedByteType;
-  // Half floats tell distances apart by a two-thousandth: places that are measured want more.
+  // Half floats resolve distances to 1/2000, which is too coarse for measurements.
   const canBlendFloats = has('EXT_color_buffer_float') && has('EXT_float_blend');
-  // Some cards take fewer bits of a pixel than pictures.
-  for (let morePictures = Math.min(form.morePictures, most - pictures); morePictures >= 0; --morePictures) {
+  // Some GPUs limit the bits per pixel more strictly than the number of attachments.
+  for (let morePictures = Math.min(form.morePictures, maximum - pictures); morePictures >= 0; --morePictures) {
     for (const floatDistances of canBlendFloats ? [true, false] : [false]) {
-      const made = targetOf(form, { type, floatDistances, morePictures });
-      if (isComplete(renderer, made.target)) return made;
-      made.target.depthTexture!.dispose();
-      made.target.dispose();
+      const candidate = makeTarget(form, { type, floatDistances, morePictures });
+      if (isComplete(renderer, candidate.target)) return candidate;
+      candidate.target.depthTexture!.dispose();
+      candidate.target.dispose();
     }
   }
-  throw new SceneError('graphics card', '', `cannot draw into the pictures that scenes of ${representation} need`, remedy);
+  throw new SceneError('GPU', '', `cannot draw into the pictures that scenes of ${representation} need`, remedy);
 }

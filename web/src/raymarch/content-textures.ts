@@ -1,4 +1,5 @@
-// A content on the graphics card: allocated at once, filled slice by slice, so that no frame waits for a whole block.
+// The textures of a content on the GPU: allocated at once and filled slice by slice, so that no frame waits for a whole
+// block.
 import * as THREE from 'three';
 import type { Vec3 } from '../tiles/tileset';
 import type { ContentPart, Cubes, TexelTextures } from './content';
@@ -9,7 +10,7 @@ type Texels = Uint8Array | Uint32Array;
 interface Slice {
   texture: Texture;
   form: TexelForm;
-  row: number; // from here on, of one layer where rows do not cover it
+  row: number; // first row of the slice, within one layer unless rows cover it
   rows: number;
   layer: number;
   layers: number;
@@ -18,13 +19,13 @@ interface Slice {
 
 const kSliceBytes = 1 << 19;
 
-// What texels are to the card.
+// The format of texels on the GPU.
 interface TexelForm {
   internal: THREE.PixelFormatGPU;
   format: THREE.AnyPixelFormat;
   type: THREE.TextureDataType;
   gl: { format: 'RGBA' | 'RED' | 'RED_INTEGER' | 'RG_INTEGER'; type: 'UNSIGNED_BYTE' | 'UNSIGNED_INT' };
-  numbers: number; // of a texel
+  numbers: number; // components of a texel
 }
 
 const kBytes = { type: THREE.UnsignedByteType } as const;
@@ -37,7 +38,7 @@ export const kForms = {
 } satisfies Record<string, TexelForm>;
 
 export abstract class ContentTextures<Part extends ContentPart = ContentPart> {
-  abstract readonly numbers: Float32Array; // `content` of the representation's march in shaders/lib
+  abstract readonly numbers: Float32Array; // the uniform `content` that the representation's march in shaders/lib reads
   private readonly textures: Texture[] = [];
   private readonly slices: Slice[] = [];
 
@@ -46,10 +47,10 @@ export abstract class ContentTextures<Part extends ContentPart = ContentPart> {
   // The parts in the order in which rays meet them.
   abstract orderParts(order: number[]): void;
 
-  // What the representation's march reads, but for `content`.
+  // The uniforms that the representation's march reads, without `content`.
   abstract uniforms(): Record<string, THREE.IUniform>;
 
-  // Takes the next slice to the card; true when there is none left.
+  // Uploads the next slice to the GPU; returns true when none is left.
   upload(renderer: THREE.WebGLRenderer): boolean {
     const slice = this.slices.shift();
     if (slice) {
@@ -76,7 +77,7 @@ export abstract class ContentTextures<Part extends ContentPart = ContentPart> {
     for (const texture of this.textures) texture.dispose();
   }
 
-  // Keeps the texels until they are on the card, and no longer. `filtered`: mixed between texels.
+  // Keeps the texels only until they are on the GPU. `filtered` selects linear filtering.
   protected add<T extends Texture>(texture: T, form: TexelForm, texels: Texels, filtered = false): T {
     texture.format = form.format;
     texture.type = form.type;
@@ -85,7 +86,7 @@ export abstract class ContentTextures<Part extends ContentPart = ContentPart> {
     texture.minFilter = texture.magFilter = filtered ? THREE.LinearFilter : THREE.NearestFilter;
     texture.generateMipmaps = false;
     texture.unpackAlignment = 1;
-    texture.source.dataReady = false; // storage alone: texels come slice by slice
+    texture.source.dataReady = false; // allocates storage only: the texels follow slice by slice
     texture.needsUpdate = true;
     this.textures.push(texture);
     this.cut(texture, form, texels);
@@ -96,16 +97,16 @@ export abstract class ContentTextures<Part extends ContentPart = ContentPart> {
     return this.add(cube(size), form, texels);
   }
 
-  // Both atlases of texels, as uniforms that atlasShader declares under these names.
-  protected addAtlas({ size, first, second }: TexelTextures, most: number, names: readonly [string, string]): Record<string, THREE.IUniform> {
+  // Returns both texel atlases as uniforms, which atlasShader declares under these names.
+  protected addAtlas({ size, first, second }: TexelTextures, maximum: number, names: readonly [string, string]): Record<string, THREE.IUniform> {
     const uniforms = [first, second].flatMap((texels, i) =>
-      this.cutAtlas(size, most, texels).map((value, n) => [`${names[i]}${n}`, { value }] as const));
+      this.cutAtlas(size, maximum, texels).map((value, n) => [`${names[i]}${n}`, { value }] as const));
     return Object.fromEntries(uniforms);
   }
 
-  private cutAtlas([width, height, depth]: Vec3, most: number, texels: Uint8Array): THREE.Data3DTexture[] {
+  private cutAtlas([width, height, depth]: Vec3, maximum: number, texels: Uint8Array): THREE.Data3DTexture[] {
     const layer = 4 * width * height;
-    return slabsOf(depth, most).map(([from, to]) =>
+    return sliceAtlas(depth, maximum).map(([from, to]) =>
       this.add(cube([width, height, to - from]), kForms.fourBytes, texels.subarray(from * layer, to * layer), true));
   }
 
@@ -134,28 +135,28 @@ export abstract class ContentTextures<Part extends ContentPart = ContentPart> {
   }
 }
 
-// The first layer of each texture that an atlas is cut into, and the one behind its last.
-function slabsOf(depth: number, most: number): [number, number][] {
-  const count = Math.max(1, Math.ceil(depth / most));
-  return Array.from({ length: count }, (_, n) => [n * most, Math.min((n + 1) * most, depth)]);
+// Returns the first layer of each texture that an atlas is split into, and the layer after its last one.
+function sliceAtlas(depth: number, maximum: number): [number, number][] {
+  const count = Math.max(1, Math.ceil(depth / maximum));
+  return Array.from({ length: count }, (_, n) => [n * maximum, Math.min((n + 1) * maximum, depth)]);
 }
 
-// What atlasShader reads besides the textures.
-export function atlasUniforms([width, height, depth]: Vec3, most: number): Record<string, THREE.IUniform> {
-  const slabs = slabsOf(depth, most).map(([from, to]) => to - from);
+// Returns the uniforms that atlasShader reads besides the textures.
+export function atlasUniforms([width, height, depth]: Vec3, maximum: number): Record<string, THREE.IUniform> {
+  const slabs = sliceAtlas(depth, maximum).map(([from, to]) => to - from);
   const inTexture = slabs.map((layers) => new THREE.Vector3(1 / Math.max(width, 1), 1 / Math.max(height, 1), 1 / Math.max(layers, 1)));
   return { inTexture: { value: inTexture }, atlasDepth: { value: slabs[0] } };
 }
 
-// Defines a function for each name, `vec4 name(vec3 texel)`: texels of an atlas that may be cut into several textures, one
-// above the other. No sample lies between two of them, as macroblocks have their apron.
+// Defines a function `vec4 name(vec3 texel)` for each name, which samples an atlas that may be split into several
+// stacked textures. No sample lies between two of them, as macroblocks have an apron.
 export function atlasShader(names: readonly string[], textures: number): string {
   const numbers = [...Array(textures).keys()];
   const look = (name: string) => {
     const last = numbers.length - 1;
     const lines = numbers.map((n) => {
-      const found = `return textureLod(${name}${n}, x * inTexture[${n}], 0.0);`;
-      return n === last ? found : `if (x.z < atlasDepth) ${found}\n  x.z -= atlasDepth;`;
+      const sample = `return textureLod(${name}${n}, x * inTexture[${n}], 0.0);`;
+      return n === last ? sample : `if (x.z < atlasDepth) ${sample}\n  x.z -= atlasDepth;`;
     });
     return `vec4 ${name}(vec3 x) {\n  ${lines.join('\n  ')}\n}`;
   };
@@ -165,7 +166,7 @@ export function atlasShader(names: readonly string[], textures: number): string 
   ].join('\n');
 }
 
-// A texture must have texels; one without is never looked into.
+// A texture must have texels, so an unused one gets a single texel.
 function cube([x, y, z]: Vec3): THREE.Data3DTexture {
   return new THREE.Data3DTexture(null, Math.max(x, 1), Math.max(y, 1), Math.max(z, 1));
 }

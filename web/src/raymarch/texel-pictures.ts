@@ -1,13 +1,13 @@
-// Where the texels of pictures go: docs/tile-format.md, section 6. Pixels have 4 bytes.
+// Copies the pixels of images to the texels that they encode: docs/tile-format.md, section 6. Pixels have 4 bytes.
 import type { Vec3 } from '../tiles/tileset';
 import { kAttributes, kStoredEdge, type TexelTextures } from './content';
 
 const kSlicesBeside = 3;
 const kTile = kStoredEdge * kSlicesBeside;
 
-// The three pictures of the same texels, in order: the attributes that red, green and blue are. What is none must be 0.
-const kAttributesOf: readonly (readonly [number, number, number | undefined])[] = [[1, 2, 3], [4, 5, 6], [0, 7, undefined]];
-export const kTexelPictures = kAttributesOf.length;
+// The three images of the same texels, in order: the attributes in red, green and blue. An unused channel must be 0.
+const kPictureAttributes: readonly (readonly [number, number, number | undefined])[] = [[1, 2, 3], [4, 5, 6], [0, 7, undefined]];
+export const kTexelPictures = kPictureAttributes.length;
 
 export interface PictureSize {
   width: number;
@@ -19,14 +19,14 @@ export function sizeOfMacroblocks(stored: number): PictureSize {
   return { width: kTile * columns, height: columns === 0 ? 0 : kTile * Math.ceil(stored / columns) };
 }
 
-// Of so many pixels one after another.
+// Returns the size of an image that holds this number of pixels one after another.
 export function sizeOfList(pixels: number): PictureSize {
   let width = 256;
   while (Math.ceil(pixels / width) > 16383) width *= 2;
   return { width, height: Math.ceil(pixels / width) };
 }
 
-// `edge` texels along both sides, into the corner of a layer. False where a byte that means nothing is not 0.
+// Copies `edge` × `edge` texels to the corner of a layer. Returns false if an unused byte is not 0.
 export function takePlane(
   pixels: Uint8ClampedArray, which: number, edge: number, textures: TexelTextures, layer: number,
 ): boolean {
@@ -39,7 +39,7 @@ export function takePlane(
   });
 }
 
-// `stored` macroblocks, into the places of an atlas from number `begin` on.
+// Copies `stored` macroblocks to the places of an atlas from index `begin` on.
 export function takeMacroblocks(
   pixels: Uint8ClampedArray, which: number, stored: number, textures: TexelTextures, atlas: Vec3, begin: number,
 ): boolean {
@@ -62,9 +62,9 @@ export function takeMacroblocks(
   });
 }
 
-// Texels one after another, all attributes of one together: [texels][8], from number `begin` on.
+// Copies texels one after another, with all attributes of a texel together: [texels][8], from index `begin` on.
 export function takeList(pixels: Uint8ClampedArray, which: number, texels: number, attributes: Uint8Array, begin: number): boolean {
-  const [r, g, b] = kAttributesOf[which];
+  const [r, g, b] = kPictureAttributes[which];
   for (let n = 0; n < texels; ++n) {
     const at = kAttributes * (begin + n);
     attributes[at + r] = pixels[4 * n];
@@ -78,13 +78,13 @@ export function takeList(pixels: Uint8ClampedArray, which: number, texels: numbe
   return true;
 }
 
-// Of macroblock number n, in macroblocks.
+// Returns the place of macroblock n in the atlas, in macroblocks.
 export function placeInAtlas(n: number, atlas: Vec3): Vec3 {
   return [n % atlas[0], Math.floor(n / atlas[0]) % atlas[1], Math.floor(n / (atlas[0] * atlas[1]))];
 }
 
-// Which byte of which texture an attribute is.
-function placeOf(textures: TexelTextures, attribute: number): [Uint8Array, number] {
+// Returns the texture and the byte of the texel that hold an attribute.
+function locateAttribute(textures: TexelTextures, attribute: number): [Uint8Array, number] {
   if (attribute >= 4) return [textures.second, attribute - 4];
   return [textures.first, attribute === 0 ? 3 : attribute - 1];
 }
@@ -93,11 +93,11 @@ function takeTexels(
   pixels: Uint8ClampedArray, which: number, textures: TexelTextures,
   visit: (put: (pixel: number, texel: number) => void) => void,
 ): boolean {
-  const [red, green, blue] = kAttributesOf[which];
-  const [reds, r] = placeOf(textures, red);
-  const [greens, g] = placeOf(textures, green);
-  const [blues, b] = blue === undefined ? [undefined, 0] : placeOf(textures, blue);
-  let left = 0; // what stands where nothing may
+  const [red, green, blue] = kPictureAttributes[which];
+  const [reds, r] = locateAttribute(textures, red);
+  const [greens, g] = locateAttribute(textures, green);
+  const [blues, b] = blue === undefined ? [undefined, 0] : locateAttribute(textures, blue);
+  let left = 0; // nonzero if an unused channel is not 0
   visit((pixel, texel) => {
     reds[4 * texel + r] = pixels[4 * pixel];
     greens[4 * texel + g] = pixels[4 * pixel + 1];

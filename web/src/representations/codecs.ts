@@ -1,4 +1,4 @@
-// The representations whose contents are read, a row each. The decoding worker loads this table, and therefore no three.js.
+// The codec of each representation, one per row. The decoding worker loads this table, so it must not import three.js.
 import type { ContentCodec } from '../tiles/content-codec';
 import { hashCodec } from './hash/decode-hash';
 import { volumeCodec } from './volume/decode-volume';
@@ -7,7 +7,7 @@ export const kCodecs = { volume: volumeCodec, hash: hashCodec };
 
 export type KnownRepresentation = keyof typeof kCodecs;
 
-// Its headers and contents must be given to no other.
-export function codecOf(representation: KnownRepresentation): ContentCodec {
+// Headers and contents of one codec must not be passed to another.
+export function getCodec(representation: KnownRepresentation): ContentCodec {
   return kCodecs[representation];
 }

@@ -1,4 +1,4 @@
-// How scenes of each representation are drawn, a row each.
+// The drawing of each representation, one per row.
 import type { ShownMode } from '../draw/display-modes';
 import type { SceneDrawing } from '../draw/scene-drawer';
 import type { KnownRepresentation } from './codecs';
@@ -9,7 +9,7 @@ const kDrawings = { volume: volumeDrawing, hash: hashDrawing } satisfies Record<
 
 export type DisplayMode = (typeof kDrawings)[KnownRepresentation]['modes'][number]['name'];
 
-// Of all representations, those that they share first.
+// The display modes of all representations, the shared ones first.
 export const kDisplayModes: readonly DisplayMode[] = [
   ...new Set(Object.values(kDrawings).flatMap(({ modes }) => modes.map(({ name }) => name))),
 ];
@@ -18,6 +18,6 @@ export interface KnownDrawing extends SceneDrawing {
   modes: readonly ShownMode<DisplayMode>[];
 }
 
-export function drawingOf(representation: KnownRepresentation): KnownDrawing {
+export function getDrawing(representation: KnownRepresentation): KnownDrawing {
   return kDrawings[representation];
 }

@@ -1,4 +1,5 @@
-// Which folder may use which, and that no shared file names a representation: a new one is a folder here and a row in each table.
+// Tests which folders may import which, and that no shared file names a representation: a new one is a folder here and
+// a row in each table.
 import { readdirSync, readFileSync } from 'node:fs';
 import { dirname, join, relative, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -9,7 +10,7 @@ import { kDisplayModes } from './drawers';
 const kRepresentations = Object.keys(kCodecs);
 const source = fileURLToPath(new URL('../', import.meta.url));
 
-// What each folder's files may import, beside themselves and files that stand in no folder.
+// The folders that each folder's files may import, besides their own and files outside all folders.
 const kMayUse: Record<string, string[]> = {
   tiles: [],
   stream: ['tiles'],
@@ -18,47 +19,47 @@ const kMayUse: Record<string, string[]> = {
   ...Object.fromEntries(kRepresentations.map((name) => [`representations/${name}`, ['tiles', 'draw', 'raymarch']])),
 };
 
-function filesOf(folder: string): string[] {
+function listSourceFiles(folder: string): string[] {
   return readdirSync(join(source, folder))
     .filter((name) => name.endsWith('.ts') && !name.endsWith('.test.ts'))
     .map((name) => join(folder, name));
 }
 
-function codeOf(file: string): string {
+function readCode(file: string): string {
   return readFileSync(join(source, file), 'utf8').replace(/(^|\s)\/\/.*$/gm, '');
 }
 
-// Files of ours, relative to `src`, and packages. `loaded`: no types.
-function importsOf(file: string, loaded = false): string[] {
-  const found = [...codeOf(file).matchAll(/(?:import|export) (type )?[^;']*?from '([^']+)'/g)];
-  return found
+// Returns the imported files, relative to `src`, and packages. `loaded` excludes type-only imports.
+function findImports(file: string, loaded = false): string[] {
+  const imports = [...readCode(file).matchAll(/(?:import|export) (type )?[^;']*?from '([^']+)'/g)];
+  return imports
     .filter(([, isType, path]) => !(loaded && isType) && !path.includes('?'))
     .map(([, , path]) => (path.startsWith('.') ? `${relative(source, resolve(source, dirname(file), path))}.ts` : path));
 }
 
 describe('the folders of the source', () => {
-  it.each(Object.entries(kMayUse))('use no others than they may: %s', (folder, others) => {
-    const files = filesOf(folder);
+  it.each(Object.entries(kMayUse))('import only the allowed ones: %s', (folder, others) => {
+    const files = listSourceFiles(folder);
     expect(files.length).toBeGreaterThan(1);
     for (const file of files) {
-      for (const used of importsOf(file).filter((path) => path.endsWith('.ts'))) {
+      for (const used of findImports(file).filter((path) => path.endsWith('.ts'))) {
         const from = dirname(used);
         expect(['.', folder, ...others], `${file} imports ${used}`).toContain(from);
       }
     }
   });
 
-  it('name no representation where they serve all of them', () => {
+  it('name no representation if they are shared', () => {
     const word = new RegExp(`\\b(?:${kRepresentations.join('|')})`, 'i');
-    const files = [...['tiles', 'stream', 'draw', 'raymarch', '.'].flatMap(filesOf)];
+    const files = [...['tiles', 'stream', 'draw', 'raymarch', '.'].flatMap(listSourceFiles)];
     expect(files.length).toBeGreaterThan(30);
-    for (const file of files) expect(word.exec(codeOf(file))?.[0], file).toBeUndefined();
+    for (const file of files) expect(word.exec(readCode(file))?.[0], file).toBeUndefined();
   });
 
-  it('keep three.js away from what the workers load', () => {
+  it('keep three.js out of what the workers load', () => {
     const reached = new Set<string>(['worker.ts']);
     for (const file of reached) {
-      for (const path of importsOf(file, true)) {
+      for (const path of findImports(file, true)) {
         expect(path, `${file} imports it`).not.toMatch(/^three/);
         if (path.endsWith('.ts') && !path.startsWith('@')) reached.add(path);
       }

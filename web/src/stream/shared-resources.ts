@@ -1,14 +1,16 @@
-// What tiles share (docs/tile-format.md, section 3, `resources`). Each resource is loaded once, however many tiles need it,
-// and its bytes count once: in the page while a tile needs it that is wanted, on its way or on the card; on the card from
-// the first tile that gets room there to the last one that leaves it.
+// Loads and counts the resources that tiles share (docs/tile-format.md, section 3, `resources`). Each resource is
+// loaded once, however many tiles need it, and its bytes are counted once: in the page while it is needed by a tile
+// that is requested, in progress or on the GPU; on the GPU from when the first tile that needs it is admitted until the
+// last such tile is evicted.
 import { SceneError } from '../scene-error';
 import type { StreamSettings, StreamStatistics } from './tile-streamer';
 
 export interface ResourceSource<Resource> {
-  resourcesOf(tile: number): readonly number[]; // their numbers, none twice
-  promisedBytes(id: number): number; // of its file; 0 where nobody knows
-  // Fetches and reads it. `pageBytes` it takes in the page for as long as tiles that come may need it.
-  load(id: number, signal: AbortSignal): Promise<{ resource: Resource; fileBytes: number; pageBytes: number; cardBytes: number }>;
+  tileResources(tile: number): readonly number[]; // indices of resources, without duplicates
+  declaredBytes(id: number): number; // size of its file in bytes; 0 if unknown
+  // Fetches and decodes a resource. `pageBytes` is what it takes in the page for as long as tiles still to be loaded
+  // may need it.
+  load(id: number, signal: AbortSignal): Promise<{ resource: Resource; fileBytes: number; pageBytes: number; gpuBytes: number }>;
 }
 
 interface Entry<Resource> {
@@ -16,8 +18,8 @@ interface Entry<Resource> {
   resource?: Resource;
   abort?: AbortController;
   pageBytes: number;
-  cardBytes?: number; // where it is known
-  holders: number; // tiles that are on the card, or have room there; its cardBytes count while there are any
+  gpuBytes?: number; // undefined until known
+  holders: number; // tiles that are on the GPU or admitted to it; gpuBytes is counted while this is above 0
   failures: number;
   retryAt: number;
   error?: SceneError;
@@ -26,7 +28,7 @@ interface Entry<Resource> {
 export class SharedResources<Resource> {
   private readonly entries = new Map<number, Entry<Resource>>();
   loading = 0;
-  // Of one that cannot be had, with a tile that needs it; told once each.
+  // Called once for each resource that cannot be loaded, with a tile that needs it.
   onError: (error: SceneError, tile: number) => void = () => {};
 
   // Without a source, tiles share nothing.
@@ -37,58 +39,61 @@ export class SharedResources<Resource> {
   ) {}
 
   of(tile: number): readonly number[] {
-    return this.source?.resourcesOf(tile) ?? [];
+    return this.source?.tileResources(tile) ?? [];
   }
 
-  // Of the card, as far as is known.
-  bytesOf(id: number): number {
-    return this.entry(id).cardBytes ?? this.source!.promisedBytes(id);
+  // Returns the GPU bytes of a resource: the exact size if known, otherwise the size of its file.
+  estimateBytes(id: number): number {
+    return this.entry(id).gpuBytes ?? this.source!.declaredBytes(id);
   }
 
-  // Of the card: what is known of those that these tiles need, each once.
-  knownBytesOf(tiles: readonly number[]): number {
-    return sum([...this.neededBy(tiles)].map((id) => this.entry(id).cardBytes ?? 0));
+  // Returns the known GPU bytes of the resources that these tiles need, each counted once.
+  knownResourceBytes(tiles: readonly number[]): number {
+    return sum([...this.neededBy(tiles)].map((id) => this.entry(id).gpuBytes ?? 0));
   }
 
-  // What more they take on the card, once this tile is there; all are to be loaded.
+  // Returns the additional GPU bytes that a tile's resources take once the tile is admitted. All of them must be
+  // loaded.
   bytesToHold(tile: number): number {
-    return sum(this.entriesOf(tile).filter(({ holders }) => holders === 0).map(({ cardBytes }) => cardBytes!));
+    return sum(this.tileEntries(tile).filter(({ holders }) => holders === 0).map(({ gpuBytes }) => gpuBytes!));
   }
 
-  // What leaves the card when these tiles do, of what `staying` does not need.
+  // Returns the bytes of the resources that leave the GPU when these tiles are evicted and that the tile `staying` does
+  // not need.
   bytesFreedBy(tiles: readonly number[], staying: number): number {
-    const stays = new Set(this.of(staying));
+    const neededAfterwards = new Set(this.of(staying));
     const leaving = new Map<number, number>();
     for (const id of tiles.flatMap((tile) => this.of(tile))) leaving.set(id, (leaving.get(id) ?? 0) + 1);
     return sum([...leaving].map(([id, count]) => {
-      const { holders, cardBytes = 0 } = this.entry(id);
-      return !stays.has(id) && holders === count ? cardBytes : 0;
+      const { holders, gpuBytes = 0 } = this.entry(id);
+      return !neededAfterwards.has(id) && holders === count ? gpuBytes : 0;
     }));
   }
 
-  // From when on those of a tile may be asked for, in ms: what has failed, not before it is tried again.
+  // Returns the time in ms from which the resources of a tile may be requested: those that failed wait until their next
+  // retry.
   retryAt(tile: number): number {
-    return Math.max(-Infinity, ...this.entriesOf(tile).map(({ state, retryAt }) => (state === 'absent' ? retryAt : -Infinity)));
+    return Math.max(-Infinity, ...this.tileEntries(tile).map(({ state, retryAt }) => (state === 'absent' ? retryAt : -Infinity)));
   }
 
-  errorOf(tile: number): SceneError | undefined {
-    return this.entriesOf(tile).find(({ error }) => error)?.error;
+  tileError(tile: number): SceneError | undefined {
+    return this.tileEntries(tile).find(({ error }) => error)?.error;
   }
 
   areLoaded(tile: number): boolean {
-    return this.entriesOf(tile).every(({ state }) => state === 'loaded');
+    return this.tileEntries(tile).every(({ state }) => state === 'loaded');
   }
 
-  // In the tile's order; all are to be loaded.
-  loadedOf(tile: number): Resource[] {
-    return this.entriesOf(tile).map(({ resource }) => resource!);
+  // Returns the resources of a tile in the tile's order. All of them must be loaded.
+  loadedResources(tile: number): Resource[] {
+    return this.tileEntries(tile).map(({ resource }) => resource!);
   }
 
-  // Begins with those of a tile that are not there, at most so many at once in all.
-  load(tile: number, { firstRetry, lastRetry }: StreamSettings, most: number): void {
+  // Starts to load the resources of a tile that are absent, with at most `maximum` resources loading at the same time.
+  load(tile: number, { firstRetry, lastRetry }: StreamSettings, maximum: number): void {
     for (const id of this.of(tile)) {
       const entry = this.entry(id);
-      if (entry.state !== 'absent' || this.loading >= most) continue;
+      if (entry.state !== 'absent' || this.loading >= maximum) continue;
       void this.fetch(id, entry, (error) => {
         entry.error = error instanceof SceneError ? error : new SceneError(`resource ${id}`, '', String(error), 'reload the page');
         entry.retryAt = this.now() + Math.min(lastRetry, firstRetry * 2 ** entry.failures);
@@ -98,17 +103,17 @@ export class SharedResources<Resource> {
     }
   }
 
-  // The tile gets room on the card, and what it needs with it.
+  // Counts the resources of a tile on the GPU when the tile is admitted.
   hold(tile: number): void {
-    for (const entry of this.entriesOf(tile)) if (entry.holders++ === 0) this.statistics.cardBytes += entry.cardBytes!;
+    for (const entry of this.tileEntries(tile)) if (entry.holders++ === 0) this.statistics.gpuBytes += entry.gpuBytes!;
   }
 
   release(tile: number): void {
-    for (const entry of this.entriesOf(tile)) if (--entry.holders === 0) this.statistics.cardBytes -= entry.cardBytes!;
+    for (const entry of this.tileEntries(tile)) if (--entry.holders === 0) this.statistics.gpuBytes -= entry.gpuBytes!;
   }
 
-  // Lets go of what none of these tiles needs.
-  keepOnlyOf(tiles: readonly number[]): void {
+  // Releases every resource that none of these tiles needs.
+  releaseAllExcept(tiles: readonly number[]): void {
     const needed = this.neededBy(tiles);
     for (const [id, entry] of this.entries) if (entry.state !== 'absent' && !needed.has(id)) this.forget(entry);
   }
@@ -117,7 +122,7 @@ export class SharedResources<Resource> {
     return new Set(tiles.flatMap((tile) => this.of(tile)));
   }
 
-  private entriesOf(tile: number): Entry<Resource>[] {
+  private tileEntries(tile: number): Entry<Resource>[] {
     return this.of(tile).map((id) => this.entry(id));
   }
 
@@ -135,11 +140,11 @@ export class SharedResources<Resource> {
     entry.abort = new AbortController();
     const { signal } = entry.abort;
     ++this.loading;
-    this.holdInPage(entry, this.source!.promisedBytes(id));
+    this.holdInPage(entry, this.source!.declaredBytes(id));
     try {
-      const { resource, fileBytes, pageBytes, cardBytes } = await this.source!.load(id, signal);
+      const { resource, fileBytes, pageBytes, gpuBytes } = await this.source!.load(id, signal);
       if (signal.aborted) return;
-      Object.assign(entry, { state: 'loaded', resource, cardBytes, failures: 0, error: undefined });
+      Object.assign(entry, { state: 'loaded', resource, gpuBytes, failures: 0, error: undefined });
       this.holdInPage(entry, pageBytes);
       this.statistics.fetchedBytes += fileBytes;
     } catch (error) {

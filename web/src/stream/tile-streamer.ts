@@ -1,10 +1,11 @@
-// Keeps what a view needs on the graphics card, within a number of bytes that is never passed: what a content takes is
-// known, and room made for it, before any of it is allocated.
+// Keeps the tiles that a view needs on the GPU, within a budget that is never exceeded: the size of a content is known,
+// and memory is freed for it, before any of it is allocated.
 //
-// A tile's way: absent → fetching (its file) → fetched (its size on the card is known; it waits for what it shares with
-// others, and for room) → decoding (in a worker) → uploading (slice by slice) → resident. The coarsest tiles and the
-// surround come first and stay. Of the others those go that the selector does not want any more, when there is need of
-// their room: what has not been drawn for longest first, and at last what is drawn, which then is drawn coarser.
+// The states of a tile are: absent → fetching (its file) → fetched (its size on the GPU is known; it waits for shared
+// resources and for memory) → decoding (in a worker) → uploading (slice by slice) → resident. The coarsest tiles and
+// the background block are loaded first and are never evicted. When memory is needed, tiles that the selector no longer
+// requests are evicted, the least recently drawn first; tiles that are still drawn are evicted last and are then
+// replaced by coarser ones.
 import { SceneError } from '../scene-error';
 import { SharedResources, type ResourceSource } from './shared-resources';
 import type { Cut, TileSelector } from './tile-selector';
@@ -12,31 +13,32 @@ import type { SelectionView } from './tile-view';
 
 export type UploadStep = 'more' | 'wait' | 'done';
 
-// Where contents come from, and what becomes of them. `Fetched` is a file, `Decoded` its texels, `Resident` what is drawn,
-// `Resource` what a tile shares with others: it is given its own, in its order.
+// Loads contents and manages their GPU memory. `Fetched` is a file, `Decoded` its texels, `Resident` what is drawn, and
+// `Resource` what tiles share: each tile is given its own resources, in its order.
 export interface TileSource<Fetched, Decoded, Resident, Resource = unknown> {
-  readonly resources?: ResourceSource<Resource>; // none where tiles share nothing
-  promisedBytes(tile: number): number; // of its file; 0 where nobody knows
-  fetch(tile: number, signal: AbortSignal): Promise<{ file: Fetched; fileBytes: number; cardBytes: number }>;
+  readonly resources?: ResourceSource<Resource>; // undefined where tiles share nothing
+  declaredBytes(tile: number): number; // size of its file in bytes; 0 if unknown
+  fetch(tile: number, signal: AbortSignal): Promise<{ file: Fetched; fileBytes: number; gpuBytes: number }>;
   decode(tile: number, file: Fetched, resources: readonly Resource[]): Promise<Decoded>;
   allocate(tile: number, decoded: Decoded, resources: readonly Resource[]): Resident;
-  // Takes the next slice to the card, and says what comes next: another; to wait for the card; or that it can be drawn.
+  // Uploads the next slice to the GPU. Returns 'more' if another slice follows, 'wait' while the GPU is busy, and
+  // 'done' when the content can be drawn.
   upload(resident: Resident): UploadStep;
   free(resident: Resident): void;
 }
 
 export interface StreamSettings {
-  cardBytes: number; // of contents on the card, at most
-  pageBytes: number; // of files and texels in the page; what is most urgent may pass it
-  fetches: number; // at once
+  gpuBytes: number; // budget for contents on the GPU
+  pageBytes: number; // budget for files and texels in the page, which only the most urgent tile may exceed
+  fetches: number; // concurrent fetches
   decodes: number;
-  patience: number; // ms for which a tile must be wanted before it is fetched, and unwanted before a fetch is given up
-  firstRetry: number; // ms after the first failure; twice as long after each next
+  patience: number; // ms for which a tile must be requested before it is fetched, and unrequested before its fetch is cancelled
+  firstRetry: number; // ms after the first failure; doubled after each further failure
   lastRetry: number;
 }
 
 export const kStreamSettings: StreamSettings = {
-  cardBytes: 512 * 2 ** 20, pageBytes: 256 * 2 ** 20, fetches: 6, decodes: 2, patience: 150,
+  gpuBytes: 512 * 2 ** 20, pageBytes: 256 * 2 ** 20, fetches: 6, decodes: 2, patience: 150,
   firstRetry: 1000, lastRetry: 60000,
 };
 
@@ -45,14 +47,14 @@ type State = 'absent' | 'fetching' | 'fetched' | 'decoding' | 'uploading' | 'res
 interface Entry<Fetched, Resident> {
   state: State;
   pinned: boolean;
-  lastUsed: number; // frames
-  wantedSince: number; // ms; NaN where it is not
-  lastWanted: number;
+  lastUsed: number; // the frame in which it was last drawn
+  requestedSince: number; // ms; NaN while it is not requested
+  lastRequested: number;
   abort?: AbortController;
   file?: Fetched;
   fileBytes: number; // in the page
-  cardBytes: number; // 0: not known yet
-  reserved: boolean; // cardBytes count: it is on the card, or will be
+  gpuBytes: number; // 0 until known
+  reserved: boolean; // true while gpuBytes is counted: the tile is on the GPU or has been admitted to it
   resident?: Resident;
   failures: number;
   retryAt: number;
@@ -60,15 +62,15 @@ interface Entry<Fetched, Resident> {
 }
 
 export interface StreamStatistics {
-  cardBytes: number;
-  mostCardBytes: number;
+  gpuBytes: number;
+  maxGpuBytes: number;
   pageBytes: number;
   fetchedBytes: number;
   resident: number;
-  pending: number; // on their way
+  pending: number; // requested tiles that are not resident yet
   loads: number;
   evictions: number;
-  refused: number; // that the last view asked for, and the budget has no room for
+  refused: number; // tiles of the last view that do not fit into the budget
   failures: number;
 }
 
@@ -79,13 +81,13 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
   private disposed = false;
   private toldOfBudget = false;
   private nextRetry = Infinity;
-  private readonly known = { tiles: 0, promisedBytes: 0, cardBytes: 0 }; // of those whose size on the card is known
+  private readonly known = { tiles: 0, declaredBytes: 0, gpuBytes: 0 }; // sums over the tiles whose size on the GPU is known
   readonly statistics: StreamStatistics = {
-    cardBytes: 0, mostCardBytes: 0, pageBytes: 0, fetchedBytes: 0, resident: 0, pending: 0, loads: 0, evictions: 0,
+    gpuBytes: 0, maxGpuBytes: 0, pageBytes: 0, fetchedBytes: 0, resident: 0, pending: 0, loads: 0, evictions: 0,
     refused: 0, failures: 0,
   };
   private readonly shared: SharedResources<Resource>;
-  // Of tiles that cannot be had, and of what they share; told once each.
+  // Called once for each tile, and each shared resource, that cannot be loaded.
   onError: (error: SceneError, tile: number) => void = () => {};
 
   constructor(
@@ -99,67 +101,67 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
     this.shared.onError = (error, tile) => this.onError(error, tile);
   }
 
-  residentOf(tile: number): Resident | undefined {
+  findResident(tile: number): Resident | undefined {
     const entry = this.entries.get(tile);
     return entry?.state === 'resident' ? entry.resident : undefined;
   }
 
-  errorOf(tile: number): SceneError | undefined {
-    return this.entries.get(tile)?.error ?? this.shared.errorOf(tile);
+  tileError(tile: number): SceneError | undefined {
+    return this.entries.get(tile)?.error ?? this.shared.tileError(tile);
   }
 
-  // All that is to be there always is, or cannot be had.
+  // True when every pinned tile is resident or cannot be loaded.
   get complete(): boolean {
-    return this.selector.pinned.every((tile) => this.residentOf(tile) !== undefined || this.errorOf(tile) !== undefined);
+    return this.selector.pinned.every((tile) => this.findResident(tile) !== undefined || this.tileError(tile) !== undefined);
   }
 
-  // Nothing is on its way, and nothing would be now if the view stayed as it is.
+  // True when nothing is in progress and nothing would be started if the view did not change.
   get idle(): boolean {
     return this.statistics.pending === 0 && this.now() < this.nextRetry;
   }
 
-  // Once a frame: what to draw, front to back, and behind it; and another step of what is on its way. `uploadFor` ms at
-  // most are spent on uploads (but one slice a frame is always taken).
+  // Is called once a frame. Returns what to draw, front to back, and the background block behind it, and advances the
+  // loading by one step. At most `uploadFor` ms are spent on uploads, but at least one slice is uploaded in each frame.
   update(view: SelectionView, uploadFor = 4): Cut {
     ++this.frame;
     this.uploadSlices(uploadFor);
     const now = this.now();
     this.nextRetry = Infinity;
-    const { wanted, refused } = this.selector.choose(view, {
-      budget: this.settings.cardBytes,
+    const { requested, refused } = this.selector.choose(view, {
+      budget: this.settings.gpuBytes,
       holds: (tile) => this.entry(tile).reserved,
-      bytesOf: (tile) => this.bytesOf(tile),
+      estimateBytes: (tile) => this.estimateBytes(tile),
       canBeHad: (tile) => this.canBeHad(tile, now),
-      resourcesOf: (tile) => this.shared.of(tile),
-      bytesOfResource: (id) => this.shared.bytesOf(id),
+      tileResources: (tile) => this.shared.of(tile),
+      bytesOfResource: (id) => this.shared.estimateBytes(id),
     });
     this.statistics.refused = refused;
-    this.keepToBudget(wanted);
-    const isTooMuch = this.pinnedBytes() > this.settings.cardBytes;
+    this.keepToBudget(requested);
+    const isTooMuch = this.pinnedBytes() > this.settings.gpuBytes;
     if (isTooMuch) this.failPinned();
     else this.toldOfBudget = false;
-    const missing = isTooMuch ? [] : this.selector.pinned.filter((tile) => !this.residentOf(tile) && this.canBeHad(tile, now));
-    this.load(this.complete ? [...missing, ...wanted] : missing, now);
-    // The coarsest count as there, though some may be missing: of the others the picture is right all the same.
-    const { tiles, surround } = this.selector.cut(view, (tile) => this.entry(tile).pinned || this.residentOf(tile) !== undefined);
-    const drawn = tiles.map((one) => ({ ...one, visible: one.visible && this.residentOf(one.content) !== undefined }));
+    const missing = isTooMuch ? [] : this.selector.pinned.filter((tile) => !this.findResident(tile) && this.canBeHad(tile, now));
+    this.load(this.complete ? [...missing, ...requested] : missing, now);
+    // Pinned tiles count as resident even if some are missing: what is drawn of the others is correct all the same.
+    const { tiles, backgroundBlock } = this.selector.cut(view, (tile) => this.entry(tile).pinned || this.findResident(tile) !== undefined);
+    const drawn = tiles.map((one) => ({ ...one, visible: one.visible && this.findResident(one.content) !== undefined }));
     for (const { content, visible } of drawn) if (visible) this.entry(content).lastUsed = this.frame;
-    if (surround >= 0) this.entry(surround).lastUsed = this.frame;
-    return { tiles: drawn, surround };
+    if (backgroundBlock >= 0) this.entry(backgroundBlock).lastUsed = this.frame;
+    return { tiles: drawn, backgroundBlock };
   }
 
-  // Lets go of everything, and of what is still on its way when it comes.
+  // Frees everything; contents that are still being loaded are dropped when they arrive.
   dispose(): void {
     this.disposed = true;
     for (const [tile, entry] of this.entries) this.drop(tile, entry);
-    this.shared.keepOnlyOf([]);
+    this.shared.releaseAllExcept([]);
   }
 
   private entry(tile: number): Entry<Fetched, Resident> {
     let entry = this.entries.get(tile);
     if (!entry) {
       entry = {
-        state: 'absent', pinned: false, lastUsed: 0, wantedSince: NaN, lastWanted: -Infinity, fileBytes: 0, cardBytes: 0,
+        state: 'absent', pinned: false, lastUsed: 0, requestedSince: NaN, lastRequested: -Infinity, fileBytes: 0, gpuBytes: 0,
         reserved: false, failures: 0, retryAt: 0,
       };
       this.entries.set(tile, entry);
@@ -167,44 +169,45 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
     return entry;
   }
 
-  private load(wanted: number[], now: number): void {
-    const isWanted = new Set(wanted);
-    for (const tile of wanted) {
+  private load(requested: number[], now: number): void {
+    const isRequested = new Set(requested);
+    for (const tile of requested) {
       const entry = this.entry(tile);
-      if (Number.isNaN(entry.wantedSince)) entry.wantedSince = now;
-      entry.lastWanted = now;
+      if (Number.isNaN(entry.requestedSince)) entry.requestedSince = now;
+      entry.lastRequested = now;
     }
-    for (const [tile, entry] of this.entries) this.giveUpIfUnwanted(tile, entry, isWanted, now);
+    for (const [tile, entry] of this.entries) this.cancelIfUnrequested(tile, entry, isRequested, now);
     let fetches = this.count('fetching');
-    let mayPass = true; // the page's bytes: what is most urgent
-    for (const tile of wanted) {
+    let mayPass = true; // whether this tile may exceed the page budget: only the most urgent one may
+    for (const tile of requested) {
       const entry = this.entry(tile);
       if (entry.state === 'resident') continue;
-      const isPatient = entry.pinned || now - entry.wantedSince >= this.settings.patience;
-      const hasRoom = mayPass || this.statistics.pageBytes + this.source.promisedBytes(tile) <= this.settings.pageBytes;
+      const isPatient = entry.pinned || now - entry.requestedSince >= this.settings.patience;
+      const fitsBudget = mayPass || this.statistics.pageBytes + this.source.declaredBytes(tile) <= this.settings.pageBytes;
       mayPass = false;
-      if (!entry.reserved && isPatient && hasRoom) this.shared.load(tile, this.settings, this.settings.fetches - fetches);
-      if (entry.state === 'absent' && isPatient && hasRoom && fetches + this.shared.loading < this.settings.fetches) {
+      if (!entry.reserved && isPatient && fitsBudget) this.shared.load(tile, this.settings, this.settings.fetches - fetches);
+      if (entry.state === 'absent' && isPatient && fitsBudget && fetches + this.shared.loading < this.settings.fetches) {
         ++fetches;
         void this.fetch(tile, entry);
       }
-      if (entry.state === 'fetched' && !entry.reserved) this.admit(tile, entry, isWanted);
+      if (entry.state === 'fetched' && !entry.reserved) this.admit(tile, entry, isRequested);
     }
-    this.forgetResources(wanted);
-    this.startDecodes(wanted);
-    this.countPending(isWanted, now);
+    this.forgetResources(requested);
+    this.startDecodes(requested);
+    this.countPending(isRequested, now);
   }
 
-  // Of the card, as far as is known; else as for the others, whose files are as well packed.
-  private bytesOf(tile: number): number {
-    const { cardBytes } = this.entry(tile);
-    if (cardBytes > 0 || this.known.tiles === 0) return cardBytes;
-    const promised = this.source.promisedBytes(tile);
-    if (promised > 0 && this.known.promisedBytes > 0) return (promised * this.known.cardBytes) / this.known.promisedBytes;
-    return this.known.cardBytes / this.known.tiles;
+  // Returns the GPU bytes of a tile if known, otherwise an estimate that assumes the compression ratio of the known
+  // tiles.
+  private estimateBytes(tile: number): number {
+    const { gpuBytes } = this.entry(tile);
+    if (gpuBytes > 0 || this.known.tiles === 0) return gpuBytes;
+    const declared = this.source.declaredBytes(tile);
+    if (declared > 0 && this.known.declaredBytes > 0) return (declared * this.known.gpuBytes) / this.known.declaredBytes;
+    return this.known.gpuBytes / this.known.tiles;
   }
 
-  // Not what is to be tried again later.
+  // Returns false for tiles that failed and are to be retried later.
   private canBeHad(tile: number, now: number): boolean {
     const entry = this.entry(tile);
     const retryAt = Math.max(entry.state === 'absent' ? entry.retryAt : -Infinity, this.shared.retryAt(tile));
@@ -219,66 +222,67 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
     return count;
   }
 
-  private giveUpIfUnwanted(tile: number, entry: Entry<Fetched, Resident>, wanted: Set<number>, now: number): void {
-    if (wanted.has(tile) || entry.state === 'resident') return;
-    if (now - entry.lastWanted < this.settings.patience) return;
-    entry.wantedSince = NaN;
+  private cancelIfUnrequested(tile: number, entry: Entry<Fetched, Resident>, requested: Set<number>, now: number): void {
+    if (requested.has(tile) || entry.state === 'resident') return;
+    if (now - entry.lastRequested < this.settings.patience) return;
+    entry.requestedSince = NaN;
     if (entry.state === 'fetching') entry.abort!.abort();
     if (entry.state === 'fetched') this.forget(tile, entry);
   }
 
-  // The budget may have become smaller: pictures of a larger window take their share of the card. Of what is wanted, the
-  // least urgent goes; there is need of that only while something is on its way that is not.
-  private keepToBudget(wanted: number[]): void {
-    if (this.statistics.cardBytes <= this.settings.cardBytes) return;
-    const isWanted = new Set(wanted);
-    const least = wanted.map((tile) => [tile, this.entry(tile)] as const).filter(([, { state }]) => state === 'resident').reverse();
-    this.evict([...this.unwanted(isWanted), ...least]);
+  // Evicts down to a budget that may have become smaller, as when a larger window takes more GPU memory for its render
+  // targets. Of the requested tiles the least urgent are evicted first, and only while unrequested tiles that are still
+  // being loaded occupy the memory.
+  private keepToBudget(requested: number[]): void {
+    if (this.statistics.gpuBytes <= this.settings.gpuBytes) return;
+    const isRequested = new Set(requested);
+    const minimum = requested.map((tile) => [tile, this.entry(tile)] as const).filter(([, { state }]) => state === 'resident').reverse();
+    this.evict([...this.unrequested(isRequested), ...minimum]);
   }
 
-  // What could go, what has not been drawn for longest first.
-  private unwanted(wanted: Set<number>): [number, Entry<Fetched, Resident>][] {
+  // Returns the tiles that may be evicted, the least recently drawn first.
+  private unrequested(requested: Set<number>): [number, Entry<Fetched, Resident>][] {
     return [...this.entries]
-      .filter(([tile, { state, pinned }]) => state === 'resident' && !pinned && !wanted.has(tile))
+      .filter(([tile, { state, pinned }]) => state === 'resident' && !pinned && !requested.has(tile))
       .sort(([, a], [, b]) => a.lastUsed - b.lastUsed);
   }
 
-  // Until the budget has room for `bytes` more, or nothing is left.
+  // Evicts tiles until `bytes` more fit into the budget, or no tile is left.
   private evict(going: readonly (readonly [number, Entry<Fetched, Resident>])[], bytes = 0): void {
     for (const [tile, entry] of going) {
-      if (this.statistics.cardBytes + bytes <= this.settings.cardBytes) return;
+      if (this.statistics.gpuBytes + bytes <= this.settings.gpuBytes) return;
       this.drop(tile, entry);
       ++this.statistics.evictions;
     }
   }
 
-  // Makes room for it, now that its size is known, and that of what it shares; or waits, for what is on its way and not
-  // wanted any more.
-  private admit(tile: number, entry: Entry<Fetched, Resident>, wanted: Set<number>): void {
+  // Admits a tile once its size and those of its resources are known, evicting others. Returns without admitting it
+  // while the memory is held by unrequested tiles that are still being loaded.
+  private admit(tile: number, entry: Entry<Fetched, Resident>, requested: Set<number>): void {
     if (!this.shared.areLoaded(tile)) return;
-    const going = this.unwanted(wanted);
+    const going = this.unrequested(requested);
     const freed = this.shared.bytesFreedBy(going.map(([one]) => one), tile);
-    const free = going.reduce((sum, [, { cardBytes }]) => sum + cardBytes, this.settings.cardBytes - this.statistics.cardBytes) + freed;
-    if (entry.cardBytes + this.shared.bytesToHold(tile) > free) return;
-    this.shared.hold(tile); // before others go, with which it would go too
-    this.evict(going, entry.cardBytes);
+    const free = going.reduce((sum, [, { gpuBytes }]) => sum + gpuBytes, this.settings.gpuBytes - this.statistics.gpuBytes) + freed;
+    if (entry.gpuBytes + this.shared.bytesToHold(tile) > free) return;
+    this.shared.hold(tile); // before the evictions, which would otherwise release its resources
+    this.evict(going, entry.gpuBytes);
     entry.reserved = true;
-    this.statistics.cardBytes += entry.cardBytes;
-    this.statistics.mostCardBytes = Math.max(this.statistics.mostCardBytes, this.statistics.cardBytes);
+    this.statistics.gpuBytes += entry.gpuBytes;
+    this.statistics.maxGpuBytes = Math.max(this.statistics.maxGpuBytes, this.statistics.gpuBytes);
   }
 
   private pinnedBytes(): number {
     const { pinned } = this.selector;
-    return pinned.reduce((sum, tile) => sum + this.entry(tile).cardBytes, this.shared.knownBytesOf(pinned));
+    return pinned.reduce((sum, tile) => sum + this.entry(tile).gpuBytes, this.shared.knownResourceBytes(pinned));
   }
 
   private failPinned(): void {
     const mebibytes = (bytes: number) => Math.max(0, bytes / 2 ** 20).toFixed(1);
     const error = new SceneError(
       'scene', '',
-      `its coarsest level takes ${mebibytes(this.pinnedBytes())} MiB on the graphics card, the budget leaves ${mebibytes(this.settings.cardBytes)} MiB for it`,
+      `its coarsest level takes ${mebibytes(this.pinnedBytes())} MiB on the GPU, the budget leaves ${mebibytes(this.settings.gpuBytes)} MiB for it`,
       'raise the budget, draw fewer pixels, or bake more levels of detail');
-    const isMissing = this.selector.pinned.some((tile) => !this.residentOf(tile));
+    const isMissing = this.selector.pinned.some((tile) => !this.findResident(tile));
     if (isMissing && !this.toldOfBudget) this.onError(error, this.selector.pinned[0]);
     this.toldOfBudget = true;
     for (const tile of this.selector.pinned) {
@@ -288,24 +292,24 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
     }
   }
 
-  // Those that no tile needs which is wanted, on its way or on the card.
-  private forgetResources(wanted: number[]): void {
+  // Releases the resources that no tile needs which is requested, in progress or on the GPU.
+  private forgetResources(requested: number[]): void {
     if (!this.source.resources) return;
     const there = [...this.entries].filter(([, { state }]) => state !== 'absent').map(([tile]) => tile);
-    this.shared.keepOnlyOf([...wanted, ...there]);
+    this.shared.releaseAllExcept([...requested, ...there]);
   }
 
   private async fetch(tile: number, entry: Entry<Fetched, Resident>): Promise<void> {
     entry.state = 'fetching';
     entry.abort = new AbortController();
     const { signal } = entry.abort;
-    this.holdInPage(entry, this.source.promisedBytes(tile));
+    this.holdInPage(entry, this.source.declaredBytes(tile));
     try {
-      const { file, fileBytes, cardBytes } = await this.source.fetch(tile, signal);
+      const { file, fileBytes, gpuBytes } = await this.source.fetch(tile, signal);
       if (this.disposed || signal.aborted) return;
-      if (entry.cardBytes === 0) this.learn(tile, cardBytes);
+      if (entry.gpuBytes === 0) this.learn(tile, gpuBytes);
       entry.file = file;
-      entry.cardBytes = cardBytes;
+      entry.gpuBytes = gpuBytes;
       entry.state = 'fetched';
       this.holdInPage(entry, fileBytes);
       this.statistics.fetchedBytes += fileBytes;
@@ -317,11 +321,11 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
     }
   }
 
-  private learn(tile: number, cardBytes: number): void {
-    const promised = this.source.promisedBytes(tile);
+  private learn(tile: number, gpuBytes: number): void {
+    const declared = this.source.declaredBytes(tile);
     ++this.known.tiles;
-    this.known.promisedBytes += promised;
-    this.known.cardBytes += cardBytes;
+    this.known.declaredBytes += declared;
+    this.known.gpuBytes += gpuBytes;
   }
 
   private holdInPage(entry: Entry<Fetched, Resident>, fileBytes: number): void {
@@ -329,13 +333,13 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
     entry.fileBytes = fileBytes;
   }
 
-  private startDecodes(wanted: number[]): void {
+  private startDecodes(requested: number[]): void {
     let decodes = this.count('decoding');
-    for (const tile of wanted) {
+    for (const tile of requested) {
       const entry = this.entry(tile);
       if (entry.state !== 'fetched' || !entry.reserved || decodes >= this.settings.decodes) continue;
-      const hasRoom = this.statistics.pageBytes + entry.cardBytes <= this.settings.pageBytes;
-      if (!hasRoom && (decodes > 0 || this.uploads.length > 0)) continue;
+      const fitsBudget = this.statistics.pageBytes + entry.gpuBytes <= this.settings.pageBytes;
+      if (!fitsBudget && (decodes > 0 || this.uploads.length > 0)) continue;
       ++decodes;
       void this.decode(tile, entry);
     }
@@ -343,9 +347,9 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
 
   private async decode(tile: number, entry: Entry<Fetched, Resident>): Promise<void> {
     entry.state = 'decoding';
-    this.statistics.pageBytes += entry.cardBytes; // texels take as much in the page until they are on the card
+    this.statistics.pageBytes += entry.gpuBytes; // decoded texels take as much memory in the page until they are on the GPU
     try {
-      const resources = this.shared.loadedOf(tile);
+      const resources = this.shared.loadedResources(tile);
       const decoded = await this.source.decode(tile, entry.file!, resources);
       if (this.disposed) throw new Error('disposed');
       entry.resident = this.source.allocate(tile, decoded, resources);
@@ -353,7 +357,7 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
       this.uploads.push(tile);
     } catch (error) {
       if (!this.disposed) this.fail(tile, entry, error);
-      this.statistics.pageBytes -= entry.cardBytes;
+      this.statistics.pageBytes -= entry.gpuBytes;
       this.release(tile, entry);
       entry.state = 'absent';
     } finally {
@@ -375,8 +379,8 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
         entry.failures = 0;
         entry.error = undefined;
         entry.lastUsed = this.frame;
-        entry.wantedSince = NaN;
-        this.statistics.pageBytes -= entry.cardBytes;
+        entry.requestedSince = NaN;
+        this.statistics.pageBytes -= entry.gpuBytes;
         ++this.statistics.loads;
         ++this.statistics.resident;
       }
@@ -392,7 +396,7 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
     ++this.statistics.failures;
   }
 
-  // A file that is not needed after all.
+  // Drops a file that is no longer needed.
   private forget(tile: number, entry: Entry<Fetched, Resident>): void {
     this.holdInPage(entry, 0);
     entry.file = undefined;
@@ -403,7 +407,7 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
   private release(tile: number, entry: Entry<Fetched, Resident>): void {
     if (!entry.reserved) return;
     entry.reserved = false;
-    this.statistics.cardBytes -= entry.cardBytes;
+    this.statistics.gpuBytes -= entry.gpuBytes;
     this.shared.release(tile);
   }
 
@@ -413,18 +417,18 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
     if (entry.state === 'resident') --this.statistics.resident;
     if (entry.state === 'uploading') {
       this.uploads.splice(this.uploads.indexOf(tile), 1);
-      this.statistics.pageBytes -= entry.cardBytes;
+      this.statistics.pageBytes -= entry.gpuBytes;
     }
     entry.resident = undefined;
-    if (entry.state === 'decoding') return; // lets go of itself
+    if (entry.state === 'decoding') return; // startDecodes drops it when its worker has finished
     this.forget(tile, entry);
   }
 
-  private countPending(wanted: Set<number>, now: number): void {
+  private countPending(requested: Set<number>, now: number): void {
     let pending = this.shared.loading;
     for (const [tile, { state, reserved, retryAt }] of this.entries) {
       const comes = state === 'fetching' || state === 'decoding' || state === 'uploading' || (state === 'fetched' && reserved);
-      const waits = wanted.has(tile) && state !== 'resident' && now >= retryAt;
+      const waits = requested.has(tile) && state !== 'resident' && now >= retryAt;
       if (comes || waits) ++pending;
     }
     this.statistics.pending = pending;

@@ -1,5 +1,5 @@
-// The tiles of a scene as a renderer needs them: where they are, how coarse, in which order. Lengths in scene units.
-// Twin of src/render/tile_tree.h.
+// The tiles of a scene as the renderer needs them: boxes, geometric errors and drawing order. Lengths are in scene
+// units. Counterpart of src/render/tile_tree.h.
 import { SceneError } from '../scene-error';
 import { metresPerUnit, type Box, type Cells, type TileContent, type Tileset, type Vec3 } from '../tiles/tileset';
 
@@ -7,45 +7,45 @@ export interface TileNode {
   parent: number;
   children: number[];
   cells: Cells;
-  low: Vec3; // box
+  low: Vec3; // bounding box
   high: Vec3;
-  geometricError: number; // of its content: a texel of the planes
+  geometricError: number; // of its content: the size of a plane texel
   level: number; // 0 is the finest
-  content?: TileContent; // none: its children's stand for it; a leaf is empty
-  isSurround: boolean; // stands for what is outside of its box, the scene's
+  content?: TileContent; // undefined if the children's contents represent it; a leaf without content is empty
+  isBackgroundBlock: boolean; // represents what lies outside its box, which is the scene's
 }
 
 export interface TileTree {
   columns: number;
   rows: number;
-  tiles: TileNode[]; // numbered as the tileset's, the root first; then surrounds, the coarsest first
-  surround: number; // the coarsest of them, each with the next finer one as its only child; -1 where there is none
+  tiles: TileNode[]; // indexed as in the tileset, the root first, followed by the background blocks, the coarsest first
+  backgroundBlock: number; // index of the coarsest background block; the only child of each is the next finer one; -1 if there is none
 }
 
-// Throws SceneError where a tile has several contents, which the format allows and this viewer does not draw.
+// Throws SceneError if a tile has several contents, which the format allows and this viewer does not draw.
 export function tileTree(tileset: Tileset, file: string): TileTree {
   const metres = metresPerUnit(tileset);
   const tiles = tileset.tiles.map((tile, index): TileNode => {
-    const contents = tile.contents.filter((content) => !content.surround);
+    const contents = tile.contents.filter((content) => !content.backgroundBlock);
     if (contents.length > 1) {
       throw new SceneError(file, `tile ${index}`, 'has several contents, which this viewer does not draw', 'give each a tile of its own');
     }
     const { parent, children, cells, box, level } = tile;
     return {
       parent, children, cells, low: box.low, high: box.high, level,
-      geometricError: tile.geometricError / metres, content: contents[0], isSurround: false,
+      geometricError: tile.geometricError / metres, content: contents[0], isBackgroundBlock: false,
     };
   });
-  const surrounds = tileset.tiles[0].contents.filter((content) => content.surround).sort((a, b) => b.level - a.level);
+  const backgroundBlocks = tileset.tiles[0].contents.filter((content) => content.backgroundBlock).sort((a, b) => b.level - a.level);
   const first = tiles.length;
-  surrounds.forEach((content, i) =>
+  backgroundBlocks.forEach((content, i) =>
     tiles.push({
-      parent: i === 0 ? -1 : first + i - 1, children: i + 1 < surrounds.length ? [first + i + 1] : [],
+      parent: i === 0 ? -1 : first + i - 1, children: i + 1 < backgroundBlocks.length ? [first + i + 1] : [],
       cells: content.cells, low: tileset.box.low, high: tileset.box.high, level: content.level,
-      geometricError: content.geometricError / metres, content, isSurround: true,
+      geometricError: content.geometricError / metres, content, isBackgroundBlock: true,
     }),
   );
-  return { columns: tileset.columns, rows: tileset.rows, tiles, surround: surrounds.length > 0 ? first : -1 };
+  return { columns: tileset.columns, rows: tileset.rows, tiles, backgroundBlock: backgroundBlocks.length > 0 ? first : -1 };
 }
 
 function cellAt(x: number, count: number): number {
@@ -56,8 +56,8 @@ function cellsBetween(cell: number, first: number, end: number): number {
   return Math.max(0, first - cell, cell - end + 1);
 }
 
-// In an order that is front to back for every ray from `eye`: by the number of cells between theirs and the eye's, along
-// both axes together, which grows along any ray.
+// Returns the children in an order that is front to back along every ray from `eye`: by the number of cells between
+// theirs and that of the eye, summed over both axes, which increases along any ray.
 export function childrenFrontToBack(tree: TileTree, tile: number, eye: Vec3): number[] {
   const i = cellAt(eye[0], tree.columns);
   const j = cellAt(eye[1], tree.rows);
@@ -68,25 +68,27 @@ export function childrenFrontToBack(tree: TileTree, tile: number, eye: Vec3): nu
   return [...tree.tiles[tile].children].sort((a, b) => distance(a) - distance(b) || a - b);
 }
 
-// Tiles of a cut, from one of its tiles or one above them on, front to back for every ray from `eye`.
+// Sorts tiles of a cut, or ancestors of them, front to back along every ray from `eye`.
 export function cutFrontToBack(tree: TileTree, cut: ReadonlySet<number>, eye: Vec3, from = 0): number[] {
   return cut.has(from) ? [from] : childrenFrontToBack(tree, from, eye).flatMap((child) => cutFrontToBack(tree, cut, eye, child));
 }
 
-// The topmost contents, the surround apart: they cover all that the scene covers, and always stay in memory.
+// Returns the topmost tiles that have contents, without the background block: they cover the whole scene and are always
+// resident.
 export function coarsestTiles(tree: TileTree): number[] {
-  const found: number[] = [];
+  const coarsest: number[] = [];
   const covered: boolean[] = [];
   tree.tiles.forEach((tile, index) => {
-    if (tile.isSurround) return;
+    if (tile.isBackgroundBlock) return;
     const above = tile.parent >= 0 && covered[tile.parent];
-    if (tile.content && !above) found.push(index);
+    if (tile.content && !above) coarsest.push(index);
     covered[index] = above || tile.content !== undefined;
   });
-  return found;
+  return coarsest;
 }
 
-// What is drawn of a content in a tile's cells: to its height, and beyond the scene's box at the border.
+// Returns the box in which a content is drawn for a tile's cells: unbounded in height, and unbounded outwards at the
+// border of the scene.
 export function boxOfCells({ columns, rows, tiles }: TileTree, tile: number): Box {
   const { i0, i1, j0, j1 } = tiles[tile].cells;
   const far = 1e9;

@@ -1,29 +1,29 @@
-// What the readers of every representation's contents are tested for alike.
+// Tests that the content readers of all representations share.
 import { expect, it } from 'vitest';
 import type { MarchedContent, MarchedHeader } from '../raymarch/content';
 import { kCodecs, type KnownRepresentation } from '../representations/codecs';
 import { SceneError } from '../scene-error';
-import type { ContentCodec, PromisedContent } from '../tiles/content-codec';
+import type { ContentCodec, DeclaredContent } from '../tiles/content-codec';
 import { kContentLimits } from '../tiles/content-limits';
 import { decodeTileset } from '../tiles/decode-tileset';
 import { goldenFile, goldenText } from './golden';
 
 type MarchedCodec = ContentCodec<MarchedHeader, MarchedContent>;
-// Those of the representations whose contents rays are marched through.
+// The representations whose contents are drawn by ray marching.
 type MarchedRepresentation = {
   [R in KnownRepresentation]: (typeof kCodecs)[R] extends MarchedCodec ? R : never;
 }[KnownRepresentation];
 
-function codecOf(representation: MarchedRepresentation): MarchedCodec {
+function getCodec(representation: MarchedRepresentation): MarchedCodec {
   return kCodecs[representation];
 }
 
 export function decodeGolden(representation: MarchedRepresentation, file: Uint8Array, limits = kContentLimits): MarchedContent {
-  const codec = codecOf(representation);
+  const codec = getCodec(representation);
   return codec.decode(codec.readHeader(file, 'a.glb', undefined, limits), 'a.glb', []);
 }
 
-// Bytes as the golden scenes' sums have them.
+// Computes the checksums in the form of the golden scenes' sums.
 export class Sum {
   plain = 0;
   ordered = 0;
@@ -36,55 +36,55 @@ export class Sum {
   }
 }
 
-// Of the contents of the golden scene of that representation; `small`: those that do not take long.
+// Tests the contents of the golden scene of a representation; `small` lists those that are fast to test.
 export function testContentReader(representation: MarchedRepresentation, uris: string[], small = uris): void {
-  const codec = codecOf(representation);
-  const header = (file: Uint8Array, limits = kContentLimits, promised?: PromisedContent) => codec.readHeader(file, 'a', promised, limits);
+  const codec = getCodec(representation);
+  const header = (file: Uint8Array, limits = kContentLimits, declared?: DeclaredContent) => codec.readHeader(file, 'a', declared, limits);
 
-  it('knows what textures will take before it decodes them', () => {
+  it('knows the size of textures before it decodes them', () => {
     for (const uri of uris) {
-      const found = header(goldenFile(uri, representation));
-      const bytes = codec.buffersOf(codec.decode(found, uri, [])).reduce((sum, buffer) => sum + buffer.byteLength, 0);
-      expect(found.memoryBytes).toBe(bytes);
+      const parsedHeader = header(goldenFile(uri, representation));
+      const bytes = codec.listBuffers(codec.decode(parsedHeader, uri, [])).reduce((sum, buffer) => sum + buffer.byteLength, 0);
+      expect(parsedHeader.memoryBytes).toBe(bytes);
     }
   });
 
-  it('refuses what would take more memory than allowed, or more than a texture holds', () => {
+  it("rejects contents that exceed the memory limit or a texture's size", () => {
     const file = goldenFile(uris[0], representation);
     const { memoryBytes: bytes } = header(file);
     expect(() => header(file, { ...kContentLimits, bytes: bytes - 1 })).toThrow('bytes of memory');
     expect(() => header(file, { ...kContentLimits, layers: 0 })).toThrow('in one texture');
     expect(() => header(file, { ...kContentLimits, edge3D: 8 })).toThrow('in one texture');
-    expect(() => header(file, { ...kContentLimits, uniformBytes: 16 })).toThrow('than this graphics card takes');
+    expect(() => header(file, { ...kContentLimits, uniformBytes: 16 })).toThrow('than this GPU takes');
   });
 
-  it('refuses a content that is not the one that tileset.json speaks of', () => {
+  it('rejects a content that differs from what tileset.json declares', () => {
     const tileset = decodeTileset(goldenText('tileset.json', representation), 'tileset.json', kCodecs);
     const contents = tileset.tiles.flatMap((tile) => tile.contents);
-    for (const promised of contents) {
-      const file = goldenFile(promised.uri, representation);
-      expect(() => header(file, kContentLimits, promised)).not.toThrow();
-      expect(() => header(file, kContentLimits, { ...promised, surround: !promised.surround })).toThrow('surround');
-      const small = { low: promised.box.low, high: promised.box.low };
-      expect(() => header(file, kContentLimits, { ...promised, box: small })).toThrow('owns what lies outside');
+    for (const declared of contents) {
+      const file = goldenFile(declared.uri, representation);
+      expect(() => header(file, kContentLimits, declared)).not.toThrow();
+      expect(() => header(file, kContentLimits, { ...declared, backgroundBlock: !declared.backgroundBlock })).toThrow('background block');
+      const small = { low: declared.box.low, high: declared.box.low };
+      expect(() => header(file, kContentLimits, { ...declared, box: small })).toThrow('owns what lies outside');
     }
   });
 
-  it('refuses a content of another representation', () => {
+  it('rejects a content of another representation', () => {
     for (const other of Object.keys(kCodecs) as KnownRepresentation[]) {
       const read = () => kCodecs[other].readHeader(goldenFile(uris[0], representation), 'a');
       if (other !== representation) expect(read).toThrow(`representation ${other}`);
     }
   });
 
-  it('refuses every file that is cut off', () => {
+  it('rejects every truncated file', () => {
     const file = goldenFile(small[0], representation);
     for (let length = 0; length < file.length; length += 97) {
       expect(() => decodeGolden(representation, file.subarray(0, length))).toThrow(SceneError);
     }
   });
 
-  it('decodes mutated files or names what is wrong, and nothing else happens', () => {
+  it('either decodes a mutated file or names what is wrong', () => {
     let seed = 1;
     const random = (below: number) => {
       seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0;
@@ -95,7 +95,7 @@ export function testContentReader(representation: MarchedRepresentation, uris: s
       const file = goldenFile(small[round % small.length], representation);
       const json = new DataView(file.buffer).getUint32(12, true);
       for (let i = 0; i <= random(4); ++i) {
-        // Half of them in the JSON, where all the numbers stand.
+        // Half of the mutations are in the JSON, which contains all the numbers.
         const at = random(2) === 0 ? 20 + random(json) : random(file.length);
         file[at] = random(2) === 0 ? 48 + random(10) : random(256);
       }
@@ -110,7 +110,7 @@ export function testContentReader(representation: MarchedRepresentation, uris: s
   }, 60000);
 }
 
-// Of each macroblock that is stored, in the order of their numbers, its place in the atlas.
+// Returns the place in the atlas of each stored macroblock, in the order of their indices.
 export function storedIn({ macroblocks }: MarchedContent, n: number, edge: number): { number: number; place: [number, number, number] }[] {
   const [mx, my, mz] = macroblocks.origins[n];
   const { size, texels } = macroblocks;

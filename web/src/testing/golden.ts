@@ -1,19 +1,19 @@
-// The golden scenes (docs/tile-format.md, section 11), for tests in Node.
+// Reads the golden scenes (docs/tile-format.md, section 11) for tests in Node.
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import type { KnownRepresentation } from '../representations/codecs';
 import { prepareDecoder } from '../tiles/lossless-image';
 
-function placeOf(path: string, scene: KnownRepresentation): URL {
+function goldenUrl(path: string, scene: KnownRepresentation): URL {
   return new URL(`../../../tests/golden/${scene}/${path}`, import.meta.url);
 }
 
 export function goldenFile(path: string, scene: KnownRepresentation = 'volume'): Uint8Array {
-  return new Uint8Array(readFileSync(placeOf(path, scene)));
+  return new Uint8Array(readFileSync(goldenUrl(path, scene)));
 }
 
 export function goldenText(path: string, scene: KnownRepresentation = 'volume'): string {
-  return readFileSync(placeOf(path, scene), 'utf8');
+  return readFileSync(goldenUrl(path, scene), 'utf8');
 }
 
 export async function prepareDecoderInNode(): Promise<void> {

@@ -1,41 +1,43 @@
-// What a representation says of its contents' files (docs/tile-format.md, sections 5 to 7): how they are read. Workers read
-// them, so nothing here knows three.js. representations/codecs.ts has one for each representation.
+// The interface for reading the content files of a representation (docs/tile-format.md, sections 5 to 7). Workers use
+// it, so nothing here depends on three.js. representations/codecs.ts lists the codec of each representation.
 import { SceneError } from '../scene-error';
 import type { ContentLimits } from './content-limits';
 import type { SharedResource, TileContent } from './tileset';
 
-// What a file says of itself; nothing has been allocated for its texels.
+// The header of a file; nothing has been allocated for its texels.
 export interface ContentHeader {
-  memoryBytes: number; // that the content will take, decoded
+  memoryBytes: number; // size of the decoded content
 }
 
-// A content in memory: its own representation's codec and drawer alone know what stands in it. It is handed from worker to
-// page, and so holds nothing but data.
+// A decoded content, whose structure only the codec and drawer of its representation know. It is transferred from a
+// worker to the page, so it consists of plain data.
 export type Content = object;
 
-// What several contents share (SharedResource), read once and given to the decoding of each; likewise data alone.
+// A decoded resource that several contents share (SharedResource). It is read once, is given to the decoding of each,
+// and consists of plain data as well.
 export interface Resource {
   memoryBytes: number;
 }
 
-// What tileset.json says of a content, which its file has to keep.
-export type PromisedContent = Pick<TileContent, 'surround' | 'box'>;
+// What tileset.json declares about a content; its file must agree with it.
+export type DeclaredContent = Pick<TileContent, 'backgroundBlock' | 'box'>;
 
-// What a representation changes of the rules that a tileset keeps.
+// How a representation modifies the rules for tilesets.
 export interface TilesetRules {
-  overlappingContents?: boolean; // contents of a tile need no order, and may overlap
+  overlappingContents?: boolean; // the contents of a tile need no order and may overlap
 }
 
-// Without state. Bytes are untrusted: what reads them throws SceneError that names the file and the first rule that is broken.
+// Codecs are stateless. Bytes are untrusted: methods that read them throw SceneError that names the file and the first
+// violated rule.
 export interface ContentCodec<Header extends ContentHeader = ContentHeader, Decoded extends Content = Content> extends TilesetRules {
-  readHeader(file: Uint8Array, name: string, promised?: PromisedContent, limits?: ContentLimits): Header;
-  // `resources`: those that the tile needs, in its order. The decoder of pictures must be prepared (lossless-image.ts).
+  readHeader(file: Uint8Array, name: string, declared?: DeclaredContent, limits?: ContentLimits): Header;
+  // `resources` are those that the tile needs, in its order. The image decoder must be prepared (lossless-image.ts).
   decode(header: Header, name: string, resources: readonly Resource[]): Decoded;
-  // The memory of a content's texels, which may be handed over to another thread.
-  buffersOf(content: Decoded): ArrayBuffer[];
-  // Where there is none, contents share nothing, and a tile that needs a resource is not drawn (decodeResource below).
+  // Returns the buffers of a content's texels, which may be transferred to another thread.
+  listBuffers(content: Decoded): ArrayBuffer[];
+  // If undefined, contents share nothing, and a tile that needs a resource is rejected (decodeResource below).
   decodeResource?(file: Uint8Array, from: SharedResource, limits: ContentLimits): Resource;
-  buffersOfResource?(resource: Resource): ArrayBuffer[]; // as buffersOf; where there is none, it is copied
+  buffersOfResource?(resource: Resource): ArrayBuffer[]; // like listBuffers; if undefined, the resource is copied
 }
 
 export function decodeResource(codec: ContentCodec, file: Uint8Array, from: SharedResource, limits: ContentLimits): Resource {

@@ -1,21 +1,21 @@
-// How much a content may be: of what the graphics card takes, and of what a file from outside may claim.
+// Limits on the size of a content: those of the GPU, and those on what an untrusted file may claim.
 
 export interface TextureLimits {
-  edge2D: number; // texels along an edge of a layer; WebGL2 promises 2048
-  edge3D: number; // texels along an edge of a texture of three dimensions; WebGL2 promises 256
-  layers: number; // of an array; 256
-  uniformBytes: number; // of a block of uniforms; 16384
+  edge2D: number; // texels along an edge of a layer; WebGL 2 guarantees 2048
+  edge3D: number; // texels along an edge of a 3D texture; WebGL 2 guarantees 256
+  layers: number; // layers of an array texture; WebGL 2 guarantees 256
+  uniformBytes: number; // bytes of a uniform block; WebGL 2 guarantees 16384
 }
 
-export const kPromisedLimits: TextureLimits = { edge2D: 2048, edge3D: 256, layers: 256, uniformBytes: 16384 };
+export const kDeclaredLimits: TextureLimits = { edge2D: 2048, edge3D: 256, layers: 256, uniformBytes: 16384 };
 
 export interface ContentLimits extends TextureLimits {
   fileBytes: number;
   jsonBytes: number;
-  bytes: number; // of textures
+  bytes: number; // bytes of all textures
   parts: number;
 }
 
 export const kContentLimits: ContentLimits = {
-  ...kPromisedLimits, fileBytes: 2 ** 30, jsonBytes: 2 ** 23, bytes: 2 ** 30, parts: 1024,
+  ...kDeclaredLimits, fileBytes: 2 ** 30, jsonBytes: 2 ** 23, bytes: 2 ** 30, parts: 1024,
 };

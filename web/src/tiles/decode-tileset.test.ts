@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { SceneError } from '../scene-error';
 import { goldenText } from '../testing/golden';
-import { randomNumbers } from '../testing/made-tree';
+import { randomNumbers } from '../testing/test-tree';
 import { decodeTileset } from './decode-tileset';
 import { isPlainUri } from './tileset-rules';
 import { metresPerUnit } from './tileset';
@@ -28,13 +28,13 @@ describe('decodeTileset', () => {
     expect(tileset.tiles).toHaveLength(3);
     expect(tileset.tiles[0].children).toEqual([1, 2]);
     expect(tileset.tiles.map(({ parent }) => parent)).toEqual([-1, 0, 0]);
-    const surrounds = tileset.tiles[0].contents.filter(({ surround }) => surround);
-    expect(surrounds.map(({ level, geometricError }) => [level, geometricError])).toEqual([[0, 3.125], [1, 6.25]]);
+    const backgroundBlocks = tileset.tiles[0].contents.filter(({ backgroundBlock }) => backgroundBlock);
+    expect(backgroundBlocks.map(({ level, geometricError }) => [level, geometricError])).toEqual([[0, 3.125], [1, 6.25]]);
     expect(tileset.georeference).toBeDefined();
     expect(metresPerUnit(tileset)).toBeGreaterThan(0);
   });
 
-  it('passes over what it does not know', () => {
+  it('ignores unknown fields', () => {
     expect(() => decodeTileset(changed((file) => {
       file.root.extras = { a: 1 };
       ours(file).later = [1];
@@ -73,29 +73,30 @@ describe('decodeTileset', () => {
     ["a content's uri", (file) => (file.root.children[0].content.uri = '../a.glb')],
     ["a content's uri", (file) => (file.root.children[0].content.uri = 'http://x/a.glb')],
     ["a content's box leaves", (file) => (ours(file.root.children[0].content).high[2] = 5)],
-    ['a surround is not in the root', (file) => (ours(file.root.children[0].content).surround = true)],
-    ['two surrounds are of one level', (file) => (ours(file.root.contents[2]).level = 0)],
-    ["a surround's level is not below", (file) => (ours(file.root.contents[2]).level = 2)],
-    ["a surround's level or error is none", (file) => (ours(file.root.contents[2]).level = -1)],
-    ["a surround's level or error is none", (file) => (ours(file.root.contents[2]).geometricError = 'large')],
-    ["a surround's geometric error is no length", (file) => (ours(file.root.contents[2]).geometricError = -1)],
-    ["a surround's geometric error is below a finer one's", (file) => (ours(file.root.contents[2]).geometricError = 1)],
+    ['a background block is not in the root', (file) => (ours(file.root.children[0].content).background_block = true)],
+    ['the key surround is called background_block now', (file) => (ours(file.root.children[0].content).surround = true)],
+    ['two background blocks are of one level', (file) => (ours(file.root.contents[2]).level = 0)],
+    ["a background block's level is not below", (file) => (ours(file.root.contents[2]).level = 2)],
+    ["a background block's level or error is none", (file) => (ours(file.root.contents[2]).level = -1)],
+    ["a background block's level or error is none", (file) => (ours(file.root.contents[2]).geometricError = 'large')],
+    ["a background block's geometric error is no length", (file) => (ours(file.root.contents[2]).geometricError = -1)],
+    ["a background block's geometric error is below a finer one's", (file) => (ours(file.root.contents[2]).geometricError = 1)],
     ['has both content and contents', (file) => (file.root.children[0].contents = [])],
     ['its boundingVolume is not its box', (file) => (file.root.boundingVolume.box[0] += 10)],
     ['a shared resource that is not listed', (file) => (ours(file.root.children[0].content).resources = [0])],
-  ])('refuses by name: %s', (reason, change) => {
+  ])('rejects with a reason: %s', (reason, change) => {
     expect(() => decodeTileset(changed(change), 'folder/tileset.json', kKnown)).toThrow(SceneError);
     expect(() => decodeTileset(changed(change), 'folder/tileset.json', kKnown)).toThrow(reason);
     expect(() => decodeTileset(changed(change), 'folder/tileset.json', kKnown)).toThrow('folder/tileset.json');
   });
 
-  it('names the representation that is not known, and those that are', () => {
+  it('names an unknown representation, and the known ones', () => {
     const other = changed((file) => (ours(file).representation = 'points'));
     expect(() => decodeTileset(other, 'a', { lines: {}, planes: {} })).toThrow('a scene of points, not of lines or planes');
     expect(decodeTileset(other, 'a', { points: {} }).representation).toBe('points');
   });
 
-  it('lets contents of a tile overlap only where the representation does', () => {
+  it('allows contents of a tile to overlap only if the representation does', () => {
     const overlapping = changed(({ root: { children: [child] } }) => {
       child.contents = [child.content, { ...child.content, uri: 'b.glb' }];
       delete child.content;
@@ -104,7 +105,7 @@ describe('decodeTileset', () => {
     expect(() => decodeTileset(overlapping, 'a', { [name]: { overlappingContents: true } })).not.toThrow();
   });
 
-  it('refuses what is larger than its limits', () => {
+  it('rejects tilesets that exceed the limits', () => {
     const limits = { textLength: 1e6, tiles: 9, depth: 9, contentsOfTile: 9, resources: 9 };
     expect(() => decodeTileset(text, 'a', kKnown, limits)).not.toThrow();
     expect(() => decodeTileset(text, 'a', kKnown, { ...limits, textLength: 100 })).toThrow('larger than any tileset');
@@ -113,7 +114,7 @@ describe('decodeTileset', () => {
     expect(() => decodeTileset(text, 'a', kKnown, { ...limits, contentsOfTile: 1 })).toThrow('too many contents');
   });
 
-  it('reads mutated text or names what is wrong, and nothing else happens', () => {
+  it('either reads mutated text or names what is wrong', () => {
     const random = randomNumbers(5);
     for (let round = 0; round < 3000; ++round) {
       const letters = [...text];

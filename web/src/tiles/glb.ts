@@ -1,8 +1,8 @@
-// The container of binary glTF 2.0, from outside: docs/tile-format.md, section 5.
+// Reads the container of binary glTF 2.0 files, which are untrusted: docs/tile-format.md, section 5.
 
 export interface Glb {
-  json: Uint8Array; // both are views of the file
-  bytes: Uint8Array; // of the binary chunk
+  json: Uint8Array; // both fields are views of the file
+  bytes: Uint8Array; // the binary chunk
 }
 
 const kMagic = 0x46546c67; // "glTF"
@@ -11,7 +11,7 @@ const kBytesChunk = 0x004e4942; // "BIN\0"
 const kHeader = 12;
 const kChunkHeader = 8;
 
-// Undefined where lengths do not match to the byte, or chunks are not JSON first and at most one of bytes second.
+// Returns undefined unless all lengths match to the byte and the chunks are JSON followed by at most one binary chunk.
 export function decodeGlb(file: Uint8Array): Glb | undefined {
   if (file.length < kHeader || file.length % 4 !== 0) return undefined;
   const view = new DataView(file.buffer, file.byteOffset, file.byteLength);

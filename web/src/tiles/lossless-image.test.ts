@@ -2,11 +2,11 @@ import { beforeEach, describe, expect, it, vi } from 'vitest';
 import { prepareDecoderInNode } from '../testing/golden';
 import { decodeLossless, DecoderFailure } from './lossless-image';
 
-// Decoders of which one traps, as at the end of memory.
-const decoders = vi.hoisted(() => ({ made: 0, traps: false }));
+// Mock decoders that can be made to trap, as when they run out of memory.
+const decoders = vi.hoisted(() => ({ instances: 0, traps: false }));
 vi.mock('@jsquash/webp/codec/dec/webp_dec.js', () => ({
   default: async () => {
-    ++decoders.made;
+    ++decoders.instances;
     return {
       decode: () => {
         if (decoders.traps) throw new WebAssembly.RuntimeError('unreachable');
@@ -16,7 +16,7 @@ vi.mock('@jsquash/webp/codec/dec/webp_dec.js', () => ({
   },
 }));
 
-// A picture whose header says that it is so large, with little behind it.
+// Returns a WebP header of the given size with almost no data behind it.
 function header(width: number, height: number): Uint8Array {
   const file = new Uint8Array(64);
   const view = new DataView(file.buffer);
@@ -31,18 +31,18 @@ function header(width: number, height: number): Uint8Array {
 describe('decodeLossless', () => {
   beforeEach(prepareDecoderInNode);
 
-  it('takes nothing that is broken', () => {
+  it('rejects broken images', () => {
     expect(decodeLossless(header(8, 8), 8, 8)).toBeUndefined();
     expect(decodeLossless(header(8, 8), 8, 9)).toBeUndefined();
   });
 
-  it('says that the decoder gave up, and takes the next picture with another one', async () => {
+  it('reports a failure of the decoder, and decodes the next image with a new one', async () => {
     decoders.traps = true;
-    const { made } = decoders;
+    const { instances } = decoders;
     expect(() => decodeLossless(header(8, 8), 8, 8)).toThrow(DecoderFailure);
     decoders.traps = false;
     await prepareDecoderInNode();
-    expect(decoders.made).toBe(made + 1);
+    expect(decoders.instances).toBe(instances + 1);
     expect(decodeLossless(header(8, 8), 8, 8)).toBeUndefined();
   });
 });

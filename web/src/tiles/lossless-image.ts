@@ -1,14 +1,15 @@
-// Lossless WebP without alpha, from outside. Decoded by libwebp compiled to WebAssembly, not by the browser: a picture
-// drawn on a canvas and read back is altered by browsers that resist fingerprinting, and Node has no canvas.
+// Decodes untrusted lossless WebP without alpha. It uses libwebp compiled to WebAssembly rather than the browser's
+// decoder: an image that is drawn on a canvas and read back is altered by browsers that resist fingerprinting, and Node
+// has no canvas.
 import createDecoder, { type WebPModule } from '@jsquash/webp/codec/dec/webp_dec.js';
 
 let module: WebPModule | undefined;
 
-// It has no word for memory that ran out but to trap.
+// Thrown when the decoder traps, which is how it reports that memory ran out.
 export class DecoderFailure extends Error {}
 
-// Must have been awaited once before decodeLossless. `wasm`: the compiled decoder (its file is found beside the module
-// where none is given, in browsers).
+// Must be awaited once before decodeLossless is called. `wasm` is the compiled decoder; if omitted, its file is located
+// beside the module (in browsers).
 export async function prepareDecoder(wasm?: WebAssembly.Module): Promise<void> {
   module ??= await makeDecoder(wasm);
 }
@@ -18,7 +19,7 @@ export function isDecoderPrepared(): boolean {
 }
 
 async function makeDecoder(wasm?: WebAssembly.Module): Promise<WebPModule> {
-  // The decoder hands its pixels over in one of these, which Node lacks.
+  // The decoder returns its pixels as an ImageData, which Node lacks.
   const scope = globalThis as { ImageData?: unknown };
   scope.ImageData ??= class {
     constructor(
@@ -47,7 +48,7 @@ const kLossless = 0x4c385056; // "VP8L"
 const kAlphaOrAnimation = 0x12;
 const kSignature = 0x2f;
 
-// What the header of a still lossless picture without alpha says: undefined for all others.
+// Returns the size that the header of a still lossless image without alpha declares, and undefined for all others.
 export function losslessSize(file: Uint8Array): { width: number; height: number } | undefined {
   if (file.length < 25) return undefined;
   const view = new DataView(file.buffer, file.byteOffset, file.byteLength);
@@ -56,11 +57,11 @@ export function losslessSize(file: Uint8Array): { width: number; height: number 
   for (let at = 12; at + 13 <= end;) {
     const type = view.getUint32(at, true);
     const length = view.getUint32(at + 4, true);
-    // Decoders take the first picture; only an extended header may stand before it, and what comes with that.
+    // Decoders take the first image; only an extended header and the chunks that belong to it may precede it.
     if (type === kLossy || (at === 12 && type !== kLossless && type !== kExtended)) return undefined;
     if (type === kLossless) {
       if (length < 5 || length > end - at - 8 || view.getUint8(at + 8) !== kSignature) return undefined;
-      const bits = view.getUint32(at + 9, true); // 14 width - 1, 14 height - 1, alpha, 3 version
+      const bits = view.getUint32(at + 9, true); // 14 bits width - 1, 14 bits height - 1, 1 bit alpha, 3 bits version
       if (bits >>> 28 !== 0) return undefined;
       return { width: (bits & 0x3fff) + 1, height: ((bits >>> 14) & 0x3fff) + 1 };
     }
@@ -70,9 +71,9 @@ export function losslessSize(file: Uint8Array): { width: number; height: number 
   return undefined;
 }
 
-// Pixels of 4 bytes, the fourth 255, row after row; undefined where the file is no such picture of exactly this size,
-// which is seen before pixels are allocated. Throws DecoderFailure where the decoder itself gives up, and must then be
-// prepared again.
+// Returns RGBA pixels with alpha 255, row after row, or undefined if the file is not a valid image of exactly this
+// size, which is checked before pixels are allocated. Throws DecoderFailure if the decoder itself fails; it must then
+// be prepared again.
 export function decodeLossless(file: Uint8Array, width: number, height: number): Uint8ClampedArray | undefined {
   if (module === undefined) throw new Error('prepareDecoder has not been awaited');
   const size = losslessSize(file);
@@ -81,7 +82,7 @@ export function decodeLossless(file: Uint8Array, width: number, height: number):
     const picture = module.decode(file as Uint8Array<ArrayBuffer>);
     return picture?.width === width && picture.height === height ? picture.data : undefined;
   } catch {
-    module = undefined; // whose memory may be in any state
+    module = undefined; // its memory may be in any state
     throw new DecoderFailure();
   }
 }

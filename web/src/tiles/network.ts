@@ -1,4 +1,4 @@
-// A content's network: layers, and the same as vectors of four numbers, which shaders take.
+// A content's network: its layers, and the same numbers packed as vectors of four for shaders.
 import type { Broken } from './tileset-rules';
 
 export interface DenseLayer {
@@ -8,7 +8,7 @@ export interface DenseLayer {
   biases: Float32Array; // [outputs]
 }
 
-// For each layer and each four outputs together, their biases, then their weights for each input.
+// Packs each layer in groups of four outputs: their biases, then their weights for each input.
 export function packNetwork(network: DenseLayer[]): Float32Array {
   const packed: number[] = [];
   for (const { inputs, outputs, weights, biases } of network) {
@@ -23,17 +23,17 @@ export function packNetwork(network: DenseLayer[]): Float32Array {
   return new Float32Array(packed);
 }
 
-// How many vectors that makes.
+// Returns the number of packed vectors.
 export function networkVectors(network: Pick<DenseLayer, 'inputs' | 'outputs'>[]): number {
   return network.reduce((sum, { inputs, outputs }) => sum + Math.ceil(outputs / 4) * (1 + inputs), 0);
 }
 
-export const kMostLayers = 8;
-export const kMostLayerWidth = 256;
-export const kMostNetworkVectors = 4096; // of a network, as shaders take it
+export const kMaxLayers = 8;
+export const kMaxLayerWidth = 256;
+export const kMaxNetworkVectors = 4096; // the largest packed network that shaders accept
 const kOutputs = 3;
 
-// The first rule that is broken, for people.
+// Returns the first violated rule as text for users.
 export function ruleOfNetwork(network: DenseLayer[], inputs: number): Broken {
   if (network.length < 1) return 'the network has no layers';
   let width = inputs;
@@ -45,5 +45,5 @@ export function ruleOfNetwork(network: DenseLayer[], inputs: number): Broken {
     }
   }
   if (width !== kOutputs) return 'the network does not end in a colour';
-  return networkVectors(network) > kMostNetworkVectors ? 'the network is larger than a shader takes' : undefined;
+  return networkVectors(network) > kMaxNetworkVectors ? 'the network is larger than a shader takes' : undefined;
 }

@@ -1,4 +1,4 @@
-// The rules that a tileset keeps: docs/tile-format.md, section 3. Each says what is broken first, for people.
+// The rules for tilesets: docs/tile-format.md, section 3. Each function returns the first violation as text for users.
 import type { TilesetRules } from './content-codec';
 import {
   boxOfCells,
@@ -16,8 +16,8 @@ export type Broken = string | undefined;
 
 export const kFarthestInScene = 1e7; // scene units
 const kFarthest = 1e12; // metres
-const kMostLevels = 64;
-const kMostCells = 4096;
+const kMaxLevels = 64;
+const kMaxCells = 4096;
 
 function isRotation(r: readonly number[]): boolean {
   const column = (i: number) => r.slice(3 * i, 3 * i + 3);
@@ -57,7 +57,7 @@ function isRange(cells: Cells): boolean {
   return cells.i0 < cells.i1 && cells.j0 < cells.j1;
 }
 
-// Along an axis two of them are the same or apart, and no two are the same along both.
+// Along each axis, two tiles cover the same cells or disjoint cells, and no two cover the same cells along both axes.
 function lieOnGrid(all: Cells[]): boolean {
   const areApart = (sides: [number, number][]) => {
     sides.sort((a, b) => a[0] - b[0] || a[1] - b[1]);
@@ -73,7 +73,8 @@ function lieOnGrid(all: Cells[]): boolean {
   );
 }
 
-// Parts of letters, digits, '.', '_', '-' between single slashes, none beginning with a dot.
+// A URI consists of segments of letters, digits, '.', '_' and '-', separated by single slashes, none beginning with a
+// dot.
 export function isPlainUri(uri: string): boolean {
   return uri.length <= 255 && /^[A-Za-z0-9_-][A-Za-z0-9._-]*(\/[A-Za-z0-9_-][A-Za-z0-9._-]*)*$/.test(uri);
 }
@@ -84,7 +85,7 @@ function ruleOfFrames(tileset: Tileset): Broken {
   if (!isScale(scale)) return "worldFromScene's scale is not above zero";
   if (!translation.every((x) => Math.abs(x) <= kFarthest)) return "worldFromScene's translation is no place";
   if (!isAffine(tileset.sourceFromWorld)) return 'sourceFromWorld is not affine';
-  if (![tileset.columns, tileset.rows].every((count) => count >= 1 && count <= kMostCells)) {
+  if (![tileset.columns, tileset.rows].every((count) => count >= 1 && count <= kMaxCells)) {
     return "the grid's columns or rows are out of bounds";
   }
   const bottom = tileset.box.low[2];
@@ -113,15 +114,15 @@ function ruleOfResources(tileset: Tileset): Broken {
   return undefined;
 }
 
-// The surrounds of the root: finer ones have smaller texels.
-function ruleOfSurrounds(tileset: Tileset): Broken {
-  const surrounds = tileset.tiles[0].contents.filter(({ surround }) => surround).sort((a, b) => a.level - b.level);
-  for (const [i, { box, level, geometricError }] of surrounds.entries()) {
-    if (!holdsBox(box, tileset.box)) return "the surround's box does not hold the scene's";
-    if (level >= tileset.levels) return "a surround's level is not below the scene's number of levels";
-    if (!isError(geometricError)) return "a surround's geometric error is no length";
-    if (i > 0 && level === surrounds[i - 1].level) return 'two surrounds are of one level';
-    if (i > 0 && geometricError < surrounds[i - 1].geometricError) return "a surround's geometric error is below a finer one's";
+// Checks the background blocks of the root: finer ones have smaller texels.
+function ruleOfBackgroundBlocks(tileset: Tileset): Broken {
+  const backgroundBlocks = tileset.tiles[0].contents.filter(({ backgroundBlock }) => backgroundBlock).sort((a, b) => a.level - b.level);
+  for (const [i, { box, level, geometricError }] of backgroundBlocks.entries()) {
+    if (!holdsBox(box, tileset.box)) return "the background block's box does not hold the scene's";
+    if (level >= tileset.levels) return "a background block's level is not below the scene's number of levels";
+    if (!isError(geometricError)) return "a background block's geometric error is no length";
+    if (i > 0 && level === backgroundBlocks[i - 1].level) return 'two background blocks are of one level';
+    if (i > 0 && geometricError < backgroundBlocks[i - 1].geometricError) return "a background block's geometric error is below a finer one's";
   }
   return undefined;
 }
@@ -135,8 +136,8 @@ function ruleOfContents(tileset: Tileset, tile: Tile, { overlappingContents }: T
       return 'a content needs a shared resource that is not listed';
     }
     if (new Set(content.resources).size !== content.resources.length) return 'a content needs a shared resource twice';
-    if (content.surround) {
-      if (tile.parent !== -1) return 'a surround is not in the root';
+    if (content.backgroundBlock) {
+      if (tile.parent !== -1) return 'a background block is not in the root';
       continue;
     }
     if (!holdsBox(tile.box, content.box)) return "a content's box leaves its tile's";
@@ -144,10 +145,10 @@ function ruleOfContents(tileset: Tileset, tile: Tile, { overlappingContents }: T
     ranges.push(content.cells);
   }
   if (!overlappingContents && !lieOnGrid(ranges)) return 'contents of a tile have no order';
-  return tile.parent === -1 ? ruleOfSurrounds(tileset) : undefined;
+  return tile.parent === -1 ? ruleOfBackgroundBlocks(tileset) : undefined;
 }
 
-// Inner walls hold; at the border of the grid a tile may own what lies outside.
+// Inner walls must be exact; at the border of the grid a tile may own what lies outside.
 function keepsToCells(tileset: Tileset, tile: Tile): boolean {
   const walls = boxOfCells(tileset, tile.cells);
   const { cells, box } = tile;
@@ -183,9 +184,10 @@ function ruleOfChildren(tileset: Tileset, tile: Tile): Broken {
   return undefined;
 }
 
-// The first rule that is broken; `rules` are the representation's. `tiles` are a tree already: the reader makes it so.
-export function brokenRule(tileset: Tileset, rules: TilesetRules): Broken {
-  if (tileset.levels < 1 || tileset.levels > kMostLevels) return 'the number of levels is out of bounds';
+// Returns the first violated rule; `rules` are the representation's. `tiles` already form a tree, which the reader
+// ensures.
+export function validationError(tileset: Tileset, rules: TilesetRules): Broken {
+  if (tileset.levels < 1 || tileset.levels > kMaxLevels) return 'the number of levels is out of bounds';
   const broken = ruleOfFrames(tileset) ?? ruleOfResources(tileset);
   if (broken) return broken;
   const root = tileset.tiles[0];
@@ -194,9 +196,9 @@ export function brokenRule(tileset: Tileset, rules: TilesetRules): Broken {
   }
   const { i0, j0, i1, j1 } = root.cells;
   if (i0 !== 0 || j0 !== 0 || i1 !== tileset.columns || j1 !== tileset.rows) return 'the root does not stand for all cells';
-  for (const ruleOf of [ruleOfTile, ruleOfChildren]) {
+  for (const checkRule of [ruleOfTile, ruleOfChildren]) {
     for (const [index, tile] of tileset.tiles.entries()) {
-      const reason = ruleOf(tileset, tile, rules);
+      const reason = checkRule(tileset, tile, rules);
       if (reason) return `tile ${index}: ${reason}`;
     }
   }

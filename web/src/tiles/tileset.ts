@@ -1,17 +1,18 @@
-// A scene as a tree of tiles: tileset.json in memory. docs/tile-format.md, section 3, is normative.
+// A scene as a tree of tiles: the contents of tileset.json in memory. docs/tile-format.md, section 3, is normative.
 //
-// Frames: `scene` has z up and half a finest block's edge as 1; `world` is the capture's; `tile` is that of the boxes
-// in tileset.json: metres east, north and up where the scene is georeferenced, the world elsewhere.
+// Frames: `scene` has z up, and its unit is half the edge of a finest block; `world` is that of the capture; `tile` is
+// that of the boxes in tileset.json: metres east, north and up if the scene is georeferenced, otherwise the same as
+// `world`.
 
 export type Vec3 = readonly [number, number, number];
-export type Matrix4 = readonly number[]; // 16, column after column
+export type Matrix4 = readonly number[]; // 16 numbers, column-major
 
 export interface Box {
   low: Vec3;
   high: Vec3;
 }
 
-// Cells of the block grid: columns i0 to before i1, rows j0 to before j1.
+// Cells of the block grid: columns i0 up to but excluding i1, rows j0 up to but excluding j1.
 export interface Cells {
   i0: number;
   j0: number;
@@ -23,10 +24,11 @@ export interface TileContent {
   uri: string; // relative to the folder of tileset.json
   cells: Cells;
   box: Box; // scene units
-  surround: boolean;
-  resources: number[]; // of Tileset.resources
-  bytes: number; // of the file, 0 where not known; a hint
-  // Of a surround, as a tile has them. Its texels are smallest at the scene's box; the error is theirs there, in metres.
+  backgroundBlock: boolean;
+  resources: number[]; // indices into Tileset.resources
+  bytes: number; // size of the file; 0 if unknown; a hint
+  // Level and geometric error (metres) of a background block. Its texels are smallest at the scene's box, where the
+  // error applies.
   level: number;
   geometricError: number;
 }
@@ -37,7 +39,7 @@ export interface Tile {
   box: Box;
   geometricError: number; // metres
   parent: number; // -1 for the root
-  children: number[]; // of Tileset.tiles, each after its parent
+  children: number[]; // indices into Tileset.tiles, each after its parent
   contents: TileContent[];
 }
 
@@ -48,11 +50,11 @@ export interface Georeference {
   enuFromWorld: Matrix4; // a similarity
 }
 
-// What several contents share.
+// A file that several contents share.
 export interface SharedResource {
   uri: string; // relative to the folder of tileset.json
   mimeType: string;
-  bytes: number; // of the file, 0 where not known; a hint
+  bytes: number; // size of the file; 0 if unknown; a hint
 }
 
 export interface Tileset<Representation extends string = string> {
@@ -63,8 +65,8 @@ export interface Tileset<Representation extends string = string> {
   georeference?: Georeference;
   columns: number;
   rows: number;
-  box: Box; // of the scene; what lies outside is the surround's
-  near: number; // scene units: no sample may lie nearer to a camera
+  box: Box; // of the scene; what lies outside belongs to the background block
+  near: number; // scene units: samples must not lie nearer to a camera
   background: Vec3;
   levels: number;
   geometricError: number;
@@ -84,7 +86,7 @@ export function holdsBox(outer: Box, inner: Box): boolean {
   return [0, 1, 2].every((a) => outer.low[a] <= inner.low[a] && inner.high[a] <= outer.high[a]);
 }
 
-// Cell (i, j) holds x in [2i - columns, 2i + 2 - columns], y likewise with rows.
+// Cell (i, j) covers x in [2i - columns, 2i + 2 - columns]; y is analogous with rows.
 export function boxOfCells(tileset: Pick<Tileset, 'columns' | 'rows' | 'box'>, cells: Cells): Box {
   const { columns, rows, box } = tileset;
   return {
@@ -93,7 +95,7 @@ export function boxOfCells(tileset: Pick<Tileset, 'columns' | 'rows' | 'box'>, c
   };
 }
 
-// Column after column: takes a place in the scene to the frame of the boxes in tileset.json.
+// Returns the column-major matrix from the scene to the frame of the boxes in tileset.json.
 export function tileFromScene(tileset: Tileset): number[] {
   const { rotation, scale, translation } = tileset.worldFromScene;
   const world = [
@@ -115,13 +117,13 @@ function multiply(a: Matrix4, b: Matrix4): number[] {
   return product;
 }
 
-// Metres of one scene unit (world units, where the capture has no scale).
+// Returns the metres per scene unit (world units if the capture has no scale).
 export function metresPerUnit(tileset: Tileset): number {
   const matrix = tileFromScene(tileset);
   return Math.hypot(matrix[0], matrix[1], matrix[2]);
 }
 
-// The numbers of a 3D Tiles bounding box: its centre, and half its edges along the scene's axes.
+// Returns the numbers of a 3D Tiles bounding box: its centre, and its half-edges along the scene's axes.
 export function boundingBoxNumbers(tileset: Tileset, box: Box): number[] {
   const m = tileFromScene(tileset);
   const centre = [0, 1, 2].map((row) =>

@@ -1,4 +1,4 @@
-// For tests: a field that has learned the cube.
+// For tests: a field that is trained on the cube scene.
 #pragma once
 
 #include "representations/field/train/train_field.h"
@@ -6,7 +6,7 @@
 
 namespace tessera {
 
-// Small enough for seconds, large enough to learn the cube.
+// A model that is small enough to train within seconds and large enough to learn the cube.
 inline FieldConfig cubeConfig() {
   FieldConfig config;
   config.gridLevels = 6;
@@ -17,16 +17,16 @@ inline FieldConfig cubeConfig() {
   config.densityHidden = 1;
   config.colourHidden = 1;
   config.occupancyResolution = 32;
-  config.occupancyWarmUp = 64;
+  config.occupancyWarmupSteps = 64;
   config.occupancyEvery = 4;
-  config.near = 0.4;  // nothing to see nearer to any camera
+  config.near = 0.4;  // nothing is nearer to any camera
   config.far = 4;
   config.minStep = 0.05;
   config.cone = 0.1;
   config.samplesPerStep = 8192;
   config.firstRays = 512;
-  config.mostRays = 4096;
-  config.rate = 2e-2;
+  config.maxRays = 4096;
+  config.learningRate = 2e-2;
   config.exposure = false;
   return config;
 }

@@ -31,26 +31,26 @@ std::vector<ConfigField> FieldConfig::fields() {
       coneSetting(),
       seedSetting(),
       samplesPerStepSetting(),
-      samplesPerPassSetting(),
+      samplesPerMicroBatchSetting(),
       firstRaysSetting(),
-      mostRaysSetting(),
+      maxRaysSetting(),
       photoBudgetMiBSetting(),
       stepsPerPhotoSetting(),
       occupancyEverySetting(),
-      occupancyWarmUpSetting(),
-      occupancyShareSetting(),
-      rateSetting(),
-      finalRateFactorSetting(),
-      constantRateShareSetting(),
+      occupancyWarmupStepsSetting(),
+      occupancyUpdateFractionSetting(),
+      learningRateSetting(),
+      finalLearningRateFactorSetting(),
+      constantLearningRateFractionSetting(),
       networkL2Setting(),
       tableL2Setting(),
-      exposureRateSetting(),
+      exposureLearningRateSetting(),
       lossSetting(),
       lossParameterSetting(),
-      distortionSetting(),
-      depthSetting(),
+      distortionWeightSetting(),
+      depthWeightSetting(),
       depthToleranceSetting(),
-      knownShareSetting(),
+      sparseDepthRayFractionSetting(),
       fullGradientDistanceSetting(),
       exposureSetting(),
       randomBackgroundSetting(),
@@ -62,10 +62,10 @@ void FieldConfig::check() const {
   requireWithinBounds(checked.fields());
   const MarchSpace marched = space();
   const double steps = marched.stepIndex(marched.far) - marched.stepIndex(marched.near);
-  if (!(steps <= kMostSteps)) {
+  if (!(steps <= kMaxSteps)) {
     throw Error(fmt::format("--set min_step={} cone={} far={}", minStep, cone, far), "",
                 fmt::format("a ray from near to far would take {:.0f} steps", steps),
-                fmt::format("use longer ones or a nearer far: at most {} steps", kMostSteps));
+                fmt::format("use longer ones or a nearer far: at most {} steps", kMaxSteps));
   }
 }
 

@@ -8,7 +8,7 @@
 namespace tessera {
 namespace {
 
-// Another value than the default, whatever the field.
+// Changes a field of any type to a value other than its default.
 void change(const ConfigField& field, int i) {
   std::visit(
       [i](auto* value) {
@@ -72,7 +72,7 @@ TEST(FieldConfig, RefusesRaysOfTooManySteps) {
   EXPECT_NO_THROW(config.check());
 }
 
-TEST(FieldConfig, NamesSettingsThatMakeNoModel) {
+TEST(FieldConfig, NamesInvalidSettings) {
   EXPECT_NO_THROW(FieldConfig().check());
   for (const char* assignment : {"width=17",
                                  "grid_features=3",
@@ -84,26 +84,26 @@ TEST(FieldConfig, NamesSettingsThatMakeNoModel) {
                                  "occupancy_resolution=30",
                                  "occupancy_resolution=0",
                                  "samples_per_step=-5",
-                                 "most_rays=0",
+                                 "max_rays=0",
                                  "first_rays=1000000",
                                  "density_hidden=0",
                                  "colour_hidden=-1",
                                  "min_step=0",
                                  "min_step=nan",
-                                 "samples_per_pass=0",
-                                 "depth=-1",
+                                 "samples_per_micro_batch=0",
+                                 "depth_weight=-1",
                                  "depth_tolerance=2",
-                                 "known_share=1.5",
+                                 "sparse_depth_ray_fraction=1.5",
                                  "full_gradient_distance=nan",
                                  "far=-1",
                                  "occupancy_every=0",
-                                 "occupancy_share=2",
-                                 "rate=nan",
-                                 "rate=-1",
+                                 "occupancy_update_fraction=2",
+                                 "learning_rate=nan",
+                                 "learning_rate=-1",
                                  "steps_per_photo=0",
                                  "photo_budget_mib=-1",
                                  "roi_margin=0",
-                                 "distortion=inf"}) {
+                                 "distortion_weight=inf"}) {
     FieldConfig config;
     setConfigField(config.fields(), assignment);
     const std::string key = std::string(assignment).substr(0, std::string(assignment).find('='));

@@ -8,7 +8,7 @@
 namespace tessera {
 namespace {
 
-const std::vector<uint32_t> kMostOfRound{8, 8, 16, 32, 64, 128, 256, 0xffffffffu};
+const std::vector<uint32_t> kMaxOfRound{8, 8, 16, 32, 64, 128, 256, 0xffffffffu};
 
 }  // namespace
 
@@ -26,7 +26,7 @@ FieldModel::FieldModel(Device& device, const FieldConfig& config, const SceneFra
       space_(config.space()),
       field_(device, config.shape(), static_cast<uint64_t>(config.seed)),
       occupancy_(device, space_),
-      rounds_(device, kMostOfRound) {
+      rounds_(device, kMaxOfRound) {
   CHECK(rounds_.count() == RaySamples::kRounds);
 }
 
@@ -46,7 +46,7 @@ void FieldModel::sample(const Rays& rays, float minTransmittance, RaySamples& se
     march.positions = rounds_.part(positions_, 3, round);
     march.distances = rounds_.part(distances_, 1, round);
     device_.run(march);
-    field_.logDensity(rounds_.made(round), march.positions, rounds_.logDensities(round));
+    field_.logDensity(rounds_.marched(round), march.positions, rounds_.logDensities(round));
     rounds_.lookedUp(round);
   }
   rounds_.keepSeen(seen.firstSample, seen.rayOfSample);
@@ -66,7 +66,7 @@ void FieldModel::reserve(uint32_t rays, uint32_t samples) {
 }
 
 void FieldModel::refreshOccupancy(uint32_t uniform, uint32_t occupied, uint64_t seed) {
-  // As many at a time as there is room for anyway.
+  // Evaluate as many points in one batch as memory is already allocated for.
   const uint32_t chunk = std::clamp<uint32_t>(field_.capacity(), 1 << 12, 1 << 16);
   field_.reserve(chunk);
   occupancy_.update([&](Count count, Slice<const float> positions,
@@ -105,10 +105,10 @@ std::unique_ptr<FieldModel> loadFieldModel(Device& device, const fs::path& folde
   const ModelManifest manifest = requireManifest(model, "field");
   FieldConfig config;
   configFromToml(config.fields(), model.configPath());
-  auto made = std::make_unique<FieldModel>(device, config, model.readPlacement().frame);
+  auto loaded = std::make_unique<FieldModel>(device, config, model.readPlacement().frame);
   const fs::path file = folder / manifest.files.at(0);
-  made->restore(file, readSafetensors(file));
-  return made;
+  loaded->restore(file, readSafetensors(file));
+  return loaded;
 }
 
 }  // namespace tessera

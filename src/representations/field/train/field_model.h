@@ -1,4 +1,4 @@
-// The plain hash-grid radiance field of a whole capture: parameters, occupancy, and where in the world it stands.
+// The plain hash-grid radiance field of a whole capture: parameters, occupancy, and placement in the world.
 #pragma once
 
 #include "field/radiance_field.h"
@@ -9,11 +9,11 @@
 
 namespace tessera {
 
-// The samples of a set of rays that can be seen, on the device, ray by ray.
+// The visible samples of a set of rays, in device memory, in the order of rays.
 struct RaySamples {
   Array<uint32_t> firstSample, rayOfSample;
   Array<float> positions, distances, steps;
-  Slice<uint32_t> counters;  // [kCounters], of train/march_rounds.h; whoever samples says where
+  Slice<uint32_t> counters;  // [kCounters], see train/march_rounds.h; set by the caller
 
   static constexpr uint32_t kRounds = 8;
   static constexpr uint32_t kCounters = MarchRounds::kMarched + kRounds;
@@ -33,9 +33,10 @@ class FieldModel {
     uint32_t count;
     Slice<const float> origins, directions, jitter, far;
   };
-  // Finds the samples of rays that can be seen (train/march_rounds.h).
+  // Finds the visible samples of rays (train/march_rounds.h).
   void sample(const Rays& rays, float minTransmittance, RaySamples& seen);
 
+  // Updates the occupancy at `uniform` random cells and `occupied` random occupied cells, see OccupancyGrid::update.
   void refreshOccupancy(uint32_t uniform, uint32_t occupied, uint64_t seed);
 
   Device& device() { return device_; }
@@ -45,7 +46,7 @@ class FieldModel {
   const MarchSpace& space() const { return space_; }
   const SceneFrame& frame() const { return frame_; }
 
-  // Parameters (with moments for training) and occupancy.
+  // The state consists of the parameters (with moments for training) and the occupancy.
   bool allFinite();
   void save(TensorSet& tensors, bool withMoments);
   void restore(const fs::path& path, const Safetensors& file);
@@ -61,10 +62,10 @@ class FieldModel {
   OccupancyGrid occupancy_;
 
   MarchRounds rounds_;
-  Array<float> positions_, distances_;  // what marches make, all rounds
+  Array<float> positions_, distances_;  // outputs of marching, of all rounds
 };
 
-// A trained model for drawing, from its folder.
+// Loads a trained model from its folder for rendering. Throws Error if its files are missing or malformed.
 std::unique_ptr<FieldModel> loadFieldModel(Device& device, const fs::path& folder);
 
 }  // namespace tessera

@@ -7,9 +7,9 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kRays = 4096;        // of one piece of the picture, at most
-constexpr uint32_t kSamples = 1 << 16;  // rays that do not fit are taken up by the next piece
-static_assert(kSamples >= FieldConfig::kMostSteps);
+constexpr uint32_t kRays = 4096;        // maximum in one batch of the image's rays
+constexpr uint32_t kSamples = 1 << 16;  // rays whose samples do not fit are rendered in the next batch
+static_assert(kSamples >= FieldConfig::kMaxSteps);
 
 }  // namespace
 
@@ -34,9 +34,9 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
   RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
                     ImageF(camera.width, camera.height, 1)};
   const size_t pixelCount = view.opacity.pixels.size();
-  uint32_t wanted = 1024;  // rays of the next piece: as many as the last one's samples let expect
+  uint32_t nextRays = 1024;  // rays of the next batch, predicted from the samples of the last one
   for (size_t first = 0; first < pixelCount;) {
-    const PictureRays::Piece piece = pictureRays_.piece(first, wanted);
+    const PictureRays::Piece piece = pictureRays_.piece(first, nextRays);
     model_.sample({piece.rays, piece.origins, piece.directions, {}, piece.far}, kMinTransmittance, seen_);
     const RadianceField::Output output =
         model_.field().forward(seen_.samples(), seen_.positions, piece.directions, seen_.rayOfSample, false);
@@ -62,12 +62,12 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
     std::copy(colour.begin(), colour.end(), view.colour.pixels.begin() + static_cast<ptrdiff_t>(first * 3));
     std::copy(opacity.begin(), opacity.end(), view.opacity.pixels.begin() + static_cast<ptrdiff_t>(first));
     for (uint32_t ray = 0; ray < finished; ++ray)
-      view.depth.pixels[first + ray] = pictureRays_.depthOf(ray, depth[ray]);
+      view.depth.pixels[first + ray] = pictureRays_.toViewDepth(ray, depth[ray]);
     first += finished;
-    samples_ += counts.kept;
-    // Each round of marching has room for so many samples, and so has what is seen.
+    samples_ += counts.visibleSamples;
+    // Each round of marching, and the set of visible samples, has a capacity of kSamples.
     const double fitting = 0.9 * kSamples / std::max(1.0, counts.fullest / (1.0 * finished));
-    wanted = static_cast<uint32_t>(std::clamp(fitting, 64.0, static_cast<double>(kRays)));
+    nextRays = static_cast<uint32_t>(std::clamp(fitting, 64.0, static_cast<double>(kRays)));
   }
   return view;
 }

@@ -1,4 +1,4 @@
-// Draws a field model by marching: the training-time picture.
+// Renders a trained field model by ray marching, as in training.
 #pragma once
 
 #include "representations/field/train/field_model.h"
@@ -15,8 +15,8 @@ class FieldRenderer final : public ViewRenderer {
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
   std::string device() const override;
 
-  static constexpr float kMinTransmittance = 1e-3f;       // rays end where less would be seen
-  uint64_t samplesEvaluated() const { return samples_; }  // of all pictures
+  static constexpr float kMinTransmittance = 1e-3f;       // rays end below this transmittance
+  uint64_t samplesEvaluated() const { return samples_; }  // in all images so far
 
  private:
   FieldModel& model_;

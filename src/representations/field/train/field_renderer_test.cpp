@@ -62,11 +62,11 @@ TEST_F(RenderedField, HasTheDepthOfTheCubeInWorldUnits) {
   }
   ASSERT_GT(errors.size(), 100u);
   std::nth_element(errors.begin(), errors.begin() + static_cast<ptrdiff_t>(errors.size() / 2), errors.end());
-  EXPECT_LT(errors[errors.size() / 2], 0.15);  // of about 1.3; the cube is 1 wide
+  EXPECT_LT(errors[errors.size() / 2], 0.15);  // the depth is about 1.3, and the cube is 1 wide
 }
 
-TEST_F(RenderedField, IsTheSameWhenTheCameraIsCutInPieces) {
-  const Camera whole = camera().scaledTo(180, 144);  // more rays than one piece of the renderer's own
+TEST_F(RenderedField, IsTheSameWhenTheImageIsRenderedInParts) {
+  const Camera whole = camera().scaledTo(180, 144);  // more rays than one batch of the renderer
   const RenderedView picture = renderer_->render(whole, pose(), nullptr);
   for (const auto& [left, top] : {std::pair(0, 0), std::pair(90, 0), std::pair(60, 100)}) {
     Camera piece = whole;
@@ -130,7 +130,7 @@ TEST_F(RenderedField, EndsPixelByPixelAtOpaqueThings) {
   }
 }
 
-TEST_F(RenderedField, DrawsWhatLiesOutsideThePicturesOfADistortedLensAsNothing) {
+TEST_F(RenderedField, IsTransparentOutsideTheImageOfADistortedLens) {
   Camera fisheye = camera();
   fisheye.lens = LensModel::openCvFisheye;
   fisheye.parameters = {6, 6, 20, 16, -0.1, 0, 0, 0};  // the corners lie beyond the fold

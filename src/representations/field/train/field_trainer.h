@@ -1,4 +1,4 @@
-// One training step of the `field` representation: rays → samples → field → picture → loss → gradients → Adam.
+// One training step of the `field` representation: rays → samples → field → image → loss → gradients → Adam.
 #pragma once
 
 #include "representations/field/train/field_model.h"
@@ -8,22 +8,24 @@
 
 namespace tessera {
 
-class FieldTrainer final : public Trainee {
+class FieldTrainer final : public TrainableModel {
  public:
-  // Keeps references to `device` and `capture`. Trains on the capture's training photos.
+  // Keeps references to `device` and `capture`. Trains on the capture's training photos. Throws Error if none of them
+  // sees the scene.
   FieldTrainer(Device& device, const Capture& capture, const FieldConfig& config, const SceneFrame& frame);
 
   StepReport step(int64_t step, int64_t plannedSteps) override;
   Bytes save(uint32_t part) override;
   void restore(uint32_t part, const fs::path& path, const Safetensors& state) override;
-  std::optional<uint32_t> brokenPart() override;
+  std::optional<uint32_t> firstNonFinitePart() override;
 
   FieldModel& model() { return model_; }
 
  private:
   void refreshOccupancy(int64_t step);
-  // One pass: rays [firstRay, firstRay + rayCount) of the step, from marching to the gradients of all parameters.
-  void addGradients(uint32_t pass, uint32_t firstRay, uint32_t rayCount);
+  // Processes one micro-batch, rays [firstRay, firstRay + rayCount) of the step, from marching to the gradients of all
+  // parameters.
+  void addGradients(uint32_t microBatch, uint32_t firstRay, uint32_t rayCount);
   void updateParameters(int64_t step, int64_t plannedSteps);
 
   Device& device_;
@@ -32,8 +34,8 @@ class FieldTrainer final : public Trainee {
   PhotoRays photoRays_;
   PhotoLoss photoLoss_;
   RayBudget budget_;
-  uint32_t passes_;  // of a step: a part of the rays each, so that what is kept until backward fits memory
-  RaySamples seen_;  // of one pass
+  uint32_t microBatches_;  // per step; they bound the memory for what is stored until backward
+  RaySamples seen_;        // of one micro-batch
   Array<uint32_t> counters_;
   Array<float> colour_, opacity_, depth_, losses_;
   Array<float> sampleWeights_, weightGradients_, logDensityGradients_, sampleColourGradients_;

@@ -11,7 +11,7 @@
 namespace tessera {
 namespace {
 
-// Mean over the held-out photos.
+// Returns the mean PSNR over the held-out photos.
 double heldOutPsnr(const CubeScene& scene, TrainedCube& trained) {
   FieldRenderer renderer(trained.trainer->model());
   double sum = 0;
@@ -19,12 +19,13 @@ double heldOutPsnr(const CubeScene& scene, TrainedCube& trained) {
   for (const int index : photos) {
     const Photo& photo = scene.capture().photos[index];
     const Camera& camera = scene.capture().cameras[photo.camera];
-    sum += psnrOf(renderer.render(camera, photo.worldFromCamera, nullptr), scene.truth(camera, photo.worldFromCamera));
+    sum += computePsnr(renderer.render(camera, photo.worldFromCamera, nullptr),
+                       scene.truth(camera, photo.worldFromCamera));
   }
   return sum / static_cast<double>(photos.size());
 }
 
-std::string errorOf(const std::function<void()>& action) {
+std::string catchErrorMessage(const std::function<void()>& action) {
   try {
     action();
   } catch (const Error& error) {
@@ -41,7 +42,7 @@ TEST(FieldTrainer, LearnsWhatHeldOutPhotosSee) {
 
 TEST(FieldTrainer, LearnsASceneWithoutBounds) {
   CubeScene::Options options;
-  options.room = true;
+  options.isEnclosed = true;
   const CubeScene scene(options);
   TrainedCube trained(scene, cubeConfig(), 300);
   EXPECT_GT(heldOutPsnr(scene, trained), 17);
@@ -63,11 +64,11 @@ TEST(FieldTrainer, LearnsFromFisheyePhotos) {
   EXPECT_GT(heldOutPsnr(scene, trained), 17);
 }
 
-TEST(FieldTrainer, KeepsTheAirBeforeItsCamerasClear) {
+TEST(FieldTrainer, LeavesTheSpaceInFrontOfItsCamerasEmpty) {
   CubeScene::Options options;
-  options.room = true;
+  options.isEnclosed = true;
   const CubeScene scene(options);
-  for (const int seed : {1, 3}) {  // without scaled gradients fog gathers: 14 and 12 dB
+  for (const int seed : {1, 3}) {  // without scaled gradients, fog reduces the PSNR to 14 and 12 dB
     FieldConfig config = cubeConfig();
     config.near = 0.05;
     config.seed = seed;
@@ -88,13 +89,13 @@ TEST(FieldTrainer, LearnsWithEveryLoss) {
 
 TEST(FieldTrainer, MakesTheSameBytesOnAnyNumberOfThreads) {
   CubeScene::Options options;
-  options.room = true;
+  options.isEnclosed = true;
   options.stain = true;
   const CubeScene scene(options);
   FieldConfig config = cubeConfig();
-  for (const int samplesPerPass : {8192, 1000}) {  // one pass, and nine of which some have no ray at first
-    config.samplesPerPass = samplesPerPass;
-    config.firstRays = samplesPerPass == 1000 ? 4 : 512;
+  for (const int samplesPerMicroBatch : {8192, 1000}) {  // one micro-batch; nine, some of which have no ray at first
+    config.samplesPerMicroBatch = samplesPerMicroBatch;
+    config.firstRays = samplesPerMicroBatch == 1000 ? 4 : 512;
     const Bytes one = TrainedCube(scene, config, 80, 1).trainer->save(0);
     EXPECT_EQ(one, TrainedCube(scene, config, 80, 2).trainer->save(0));
     EXPECT_EQ(one, TrainedCube(scene, config, 80, 5).trainer->save(0));
@@ -104,10 +105,10 @@ TEST(FieldTrainer, MakesTheSameBytesOnAnyNumberOfThreads) {
   }
 }
 
-TEST(FieldTrainer, LearnsAsMuchInSeveralPasses) {
+TEST(FieldTrainer, LearnsAsWellInSeveralMicroBatches) {
   const CubeScene scene;
   FieldConfig config = cubeConfig();
-  config.samplesPerPass = 1000;
+  config.samplesPerMicroBatch = 1000;
   TrainedCube trained(scene, config, 300);
   EXPECT_GT(heldOutPsnr(scene, trained), 17);
   EXPECT_GT(trained.last.samples, 8192u / 2);
@@ -117,14 +118,14 @@ TEST(FieldTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
   const CubeScene scene;
   constexpr int64_t kSteps = 90;
   FieldConfig plain = cubeConfig();
-  plain.photoBudgetMiB = CubeScene::kWidth * CubeScene::kHeight * 4 * 5 / 1048576.0;  // windows move on too
-  FieldConfig passes = cubeConfig();
-  passes.samplesPerPass = 1000;
+  plain.photoBudgetMiB = CubeScene::kWidth * CubeScene::kHeight * 4 * 5 / 1048576.0;  // the photo window moves, too
+  FieldConfig microBatches = cubeConfig();
+  microBatches.samplesPerMicroBatch = 1000;
   FieldConfig crowded = cubeConfig();  // thousands of steps a ray: not all rays of a step are finished
   crowded.minStep = 0.001;
   crowded.cone = 0;
   crowded.far = 8;
-  for (const FieldConfig& config : {plain, passes, crowded}) {
+  for (const FieldConfig& config : {plain, microBatches, crowded}) {
     TrainedCube unbroken(scene, config, 0);
     for (int64_t step = 0; step < kSteps; ++step) unbroken.trainer->step(step, kSteps);
     Bytes state;
@@ -159,7 +160,7 @@ TEST(FieldTrainer, DrawsFewerRaysWhenTheyDoNotFit) {
   EXPECT_LT(file->require("state", "rays", TensorType::u32).as<uint32_t>()[0], first.rays + 8);
 }
 
-// Mean of |expected - true| z-depth where the held-out views are opaque.
+// Returns the mean of |expected - true| z-depth over the pixels of the held-out photos.
 double heldOutDepthError(const CubeScene& scene, TrainedCube& trained) {
   FieldRenderer renderer(trained.trainer->model());
   double sum = 0;
@@ -178,13 +179,13 @@ double heldOutDepthError(const CubeScene& scene, TrainedCube& trained) {
 
 TEST(FieldTrainer, LearnsFromSparsePointsWhereSurfacesAre) {
   CubeScene::Options options;
-  options.room = true;
+  options.isEnclosed = true;
   options.photos = 10;
   options.observationsPerPhoto = 150;
   const CubeScene scene(options);
   FieldConfig with = cubeConfig(), without = cubeConfig();
-  with.depth = 0.5;
-  without.depth = 0;
+  with.depthWeight = 0.5;
+  without.depthWeight = 0;
   TrainedCube taught(scene, with, 200), untaught(scene, without, 200);
   EXPECT_LT(heldOutDepthError(scene, taught), 0.7 * heldOutDepthError(scene, untaught));
 }
@@ -204,15 +205,15 @@ TEST(FieldTrainer, TrainsOnAllPhotosWhenFewFitTheBudget) {
       EXPECT_GT(counts[3 * i], 2u) << i;
       EXPECT_LT(counts[3 * i], 40u) << i;
     } else {
-      EXPECT_EQ(counts[3 * i], 0u) << i;  // held out means held out
+      EXPECT_EQ(counts[3 * i], 0u) << i;  // held-out photos are never trained on
     }
   }
   EXPECT_GT(heldOutPsnr(scene, trained), 15);
 }
 
-TEST(FieldTrainer, DoesNotLookUnderMasks) {
+TEST(FieldTrainer, IgnoresMaskedPixels) {
   CubeScene::Options options;
-  options.room = true;
+  options.isEnclosed = true;
   options.stain = true;
   const CubeScene scene(options);
   CubeScene bare(options);
@@ -225,31 +226,31 @@ TEST(FieldTrainer, DoesNotLookUnderMasks) {
 
 TEST(FieldTrainer, RecoversTheExposuresOfPhotos) {
   CubeScene::Options options;
-  options.room = true;
+  options.isEnclosed = true;
   options.log2Gains = {-0.3, 0.25, 0.05};
   const CubeScene scene(options);
   FieldConfig config = cubeConfig();
   config.exposure = true;
-  config.exposureRate = 8e-3;
+  config.exposureLearningRate = 8e-3;
   TrainedCube trained(scene, config, 400);
   const auto file = decodeSafetensors(trained.trainer->save(0));
   ASSERT_TRUE(file);
   const auto gains = file->require("state", "exposures", TensorType::f32).as<float>();
   const std::vector<int> photos = scene.capture().photosIn(Split::train);
   for (int channel = 0; channel < 3; ++channel) {
-    double mean[3] = {}, count[3] = {};  // of the photos with each gain
+    double mean[3] = {}, count[3] = {};  // for the photos with each gain
     for (const int photo : photos) {
       mean[photo % 3] += gains[3 * photo + channel];
       ++count[photo % 3];
     }
-    EXPECT_NEAR(mean[0] + mean[1] + mean[2], 0, 0.05 * static_cast<double>(photos.size()));  // none overall
+    EXPECT_NEAR(mean[0] + mean[1] + mean[2], 0, 0.05 * static_cast<double>(photos.size()));  // no overall gain
     for (int i = 0; i < 3; ++i) mean[i] /= count[i];
     EXPECT_NEAR(mean[1] - mean[0], 0.55, 0.15) << channel;
     EXPECT_NEAR(mean[2] - mean[0], 0.35, 0.15) << channel;
   }
 }
 
-TEST(FieldTrainer, LeavesExposuresAloneWhenToldTo) {
+TEST(FieldTrainer, LeavesExposuresAtZeroIfTheyAreDisabled) {
   const CubeScene scene;
   FieldConfig config = cubeConfig();
   config.exposure = false;
@@ -259,12 +260,12 @@ TEST(FieldTrainer, LeavesExposuresAloneWhenToldTo) {
   for (const float gain : file->require("state", "exposures", TensorType::f32).as<float>()) EXPECT_EQ(gain, 0);
 }
 
-TEST(FieldTrainer, AdaptsItsRaysToTheSamplesThatItWants) {
+TEST(FieldTrainer, AdaptsItsRaysToTheTargetNumberOfSamples) {
   const CubeScene scene;
   TrainedCube trained(scene, cubeConfig(), 150);
   EXPECT_GT(trained.last.samples, 8192u / 2);
   EXPECT_LE(trained.last.samples, 8192u * 2);
-  EXPECT_NE(trained.last.rays, 512u);  // the first step's
+  EXPECT_NE(trained.last.rays, 512u);  // the number of the first step
   EXPECT_LE(trained.last.rays, 4096u);
   EXPECT_GE(trained.last.marched, trained.last.samples);
 }
@@ -273,9 +274,9 @@ TEST(FieldTrainer, RefusesWhatItCannotTrain) {
   CubeScene scene;
   FieldConfig config = cubeConfig();
   config.loss = "hinge";
-  EXPECT_NE(errorOf([&] { TrainedCube(scene, config, 0); }).find("hinge"), std::string::npos);
+  EXPECT_NE(catchErrorMessage([&] { TrainedCube(scene, config, 0); }).find("hinge"), std::string::npos);
   for (Photo& photo : scene.capture().photos) photo.split = Split::test;
-  EXPECT_NE(errorOf([&] { TrainedCube(scene, cubeConfig(), 0); }).find("no photo"), std::string::npos);
+  EXPECT_NE(catchErrorMessage([&] { TrainedCube(scene, cubeConfig(), 0); }).find("no photo"), std::string::npos);
 }
 
 TEST(FieldTrainer, RefusesCheckpointsThatAreNotItsOwn) {
@@ -290,18 +291,19 @@ TEST(FieldTrainer, RefusesCheckpointsThatAreNotItsOwn) {
     TrainedCube other(scene, config, 0);
     const auto file = decodeSafetensors(bytes);
     ASSERT_TRUE(file);
-    const std::string error = errorOf([&] { other.trainer->restore(0, "some/step-2.safetensors", *file); });
+    const std::string error = catchErrorMessage([&] { other.trainer->restore(0, "some/step-2.safetensors", *file); });
     EXPECT_NE(error.find("some/step-2.safetensors"), std::string::npos) << change << ": " << error;
   }
   CubeScene::Options more;
   more.photos = 49;
   const CubeScene larger(more);
   TrainedCube another(larger, cubeConfig(), 0);
-  EXPECT_NE(errorOf([&] { another.trainer->restore(0, "s", *decodeSafetensors(bytes)); }), "no error");
+  EXPECT_NE(catchErrorMessage([&] { another.trainer->restore(0, "s", *decodeSafetensors(bytes)); }), "no error");
   const std::vector<float> zero = {0};
   const auto foreign =
       decodeSafetensors(encodeSafetensors({{"table", {TensorType::f32, {1}, std::as_bytes(std::span(zero))}}}));
-  EXPECT_NE(errorOf([&] { another.trainer->restore(0, "s", *foreign); }).find("--method field"), std::string::npos);
+  EXPECT_NE(catchErrorMessage([&] { another.trainer->restore(0, "s", *foreign); }).find("--method field"),
+            std::string::npos);
 }
 
 }  // namespace

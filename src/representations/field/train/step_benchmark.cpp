@@ -21,7 +21,7 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-// A batch as marching leaves it, and room for what a pass of it computes.
+// A batch of samples as marching produces it, and the memory for one micro-batch of it.
 class Step {
  public:
   Step(Device& device, const StepBenchmarkOptions& options)
@@ -29,8 +29,9 @@ class Step {
         field_(device, config_.shape(), 1),
         samplesPerRay_(options.samplesPerRay),
         allRays_(options.rays),
-        raysOfPass_(std::clamp(static_cast<uint32_t>(config_.samplesPerPass) / samplesPerRay_, 1u, allRays_)) {
-    const size_t rays = raysOfPass_, samples = size_t{rays} * samplesPerRay_, allRays = allRays_;
+        raysPerMicroBatch_(
+            std::clamp(static_cast<uint32_t>(config_.samplesPerMicroBatch) / samplesPerRay_, 1u, allRays_)) {
+    const size_t rays = raysPerMicroBatch_, samples = size_t{rays} * samplesPerRay_, allRays = allRays_;
     std::vector<uint32_t> first(rays + 1), rayOfSample(samples);
     std::vector<float> directions, targets(allRays * 3), distances(samples);
     const RandomStream random(1, 0x57e9);
@@ -46,13 +47,13 @@ class Step {
     }
     for (size_t i = 0; i < targets.size(); ++i) targets[i] = random.uniform((uint64_t{1} << 40) + i);
     field_.reserve(static_cast<uint32_t>(samples));
-    allPositions_ = device.arrayOf(rayLikePositions(options.rays, options.samplesPerRay, 1));
-    firstSample_ = device.arrayOf(first);
-    rayOfSample_ = device.arrayOf(rayOfSample);
-    directions_ = device.arrayOf(directions);
-    targets_ = device.arrayOf(targets);
-    distances_ = device.arrayOf(distances);
-    steps_ = device.arrayOf(std::vector<float>(samples, kStep));
+    allPositions_ = device.uploadArray(rayLikePositions(options.rays, options.samplesPerRay, 1));
+    firstSample_ = device.uploadArray(first);
+    rayOfSample_ = device.uploadArray(rayOfSample);
+    directions_ = device.uploadArray(directions);
+    targets_ = device.uploadArray(targets);
+    distances_ = device.uploadArray(distances);
+    steps_ = device.uploadArray(std::vector<float>(samples, kStep));
     for (Array<float>* perRay : {&opacity_, &depth_}) *perRay = device.array<float>(rays);
     for (Array<float>* perRay : {&colour_, &colourGradients_}) *perRay = device.array<float>(rays * 3);
     for (Array<float>* perSample : {&weights_, &logDensityGradients_}) *perSample = device.array<float>(samples);
@@ -60,15 +61,15 @@ class Step {
     losses_ = device.array<float>(2);
   }
 
-  uint32_t passes() const { return (allRays_ + raysOfPass_ - 1) / raysOfPass_; }
-  void beginPass(uint32_t pass) {
-    firstRay_ = pass * raysOfPass_;
-    rays_ = {std::min(raysOfPass_, allRays_ - firstRay_), {}};
+  uint32_t microBatches() const { return (allRays_ + raysPerMicroBatch_ - 1) / raysPerMicroBatch_; }
+  void beginMicroBatch(uint32_t microBatch) {
+    firstRay_ = microBatch * raysPerMicroBatch_;
+    rays_ = {std::min(raysPerMicroBatch_, allRays_ - firstRay_), {}};
     samples_ = {rays_.capacity * samplesPerRay_, {}};
-    positions_ = ofAll(allPositions_, samplesPerRay_ * 3);
+    positions_ = microBatchPart(allPositions_, samplesPerRay_ * 3);
   }
 
-  void forward() { output_ = field_.forward(samples_, positions_, ofAll(directions_, 3), rayOfSample_, true); }
+  void forward() { output_ = field_.forward(samples_, positions_, microBatchPart(directions_, 3), rayOfSample_, true); }
 
   void composite() {
     CompositeForward composite;
@@ -90,7 +91,7 @@ class Step {
     loss.scale = 1.0f / (3.0f * static_cast<float>(allRays_));
     loss.rays = rays_;
     loss.predicted = colour_;
-    loss.target = ofAll(targets_, 3);
+    loss.target = microBatchPart(targets_, 3);
     loss.loss = losses_;
     loss.gradients = colourGradients_;
     device_.run(loss);
@@ -114,7 +115,7 @@ class Step {
 
   void adam() {
     Adam settings;
-    settings.rate = 1e-4f;  // slow: the loss, and with it what the gradients look like, hardly changes
+    settings.rate = 1e-4f;  // small, so that the loss and the distribution of gradients hardly change
     settings.skipZeroGradients = true;
     field_.table().step(device_, settings);
     settings.skipZeroGradients = false;
@@ -123,13 +124,13 @@ class Step {
     field_.colourNetwork().step(device_, settings);
   }
 
-  double lossOfPass() { return device_.read(losses_.all())[0]; }
+  double microBatchLoss() { return device_.read(losses_.all())[0]; }
 
  private:
-  static constexpr float kStep = 0.05f;  // so that a ray of densities near 1 is half transparent at first
+  static constexpr float kStep = 0.05f;  // so that a ray with densities near 1 is half transparent at first
 
-  // What of a whole batch belongs to this pass's rays.
-  Slice<const float> ofAll(const Array<float>& array, uint32_t perRay) const {
+  // Returns the part of the whole batch's array that belongs to this micro-batch's rays.
+  Slice<const float> microBatchPart(const Array<float>& array, uint32_t perRay) const {
     return array.part(size_t{firstRay_} * perRay, size_t{rays_.capacity} * perRay);
   }
 
@@ -137,8 +138,8 @@ class Step {
   FieldConfig config_;
   RadianceField field_;
   RadianceField::Output output_;
-  uint32_t samplesPerRay_, allRays_, raysOfPass_, firstRay_ = 0;
-  Count rays_, samples_;  // of a pass
+  uint32_t samplesPerRay_, allRays_, raysPerMicroBatch_, firstRay_ = 0;
+  Count rays_, samples_;  // of a micro-batch
   Slice<const float> positions_;
   Array<float> allPositions_;
   Array<uint32_t> firstSample_, rayOfSample_;
@@ -162,7 +163,7 @@ StepBenchmark benchmarkFieldStep(Device& device, const StepBenchmarkOptions& opt
   Part parts[] = {{"forward", &Step::forward, {}},
                   {"composite", &Step::composite, {}},
                   {"backward", &Step::backward, {}},
-                  {"adam", &Step::adam, {}}};  // the last one once a step, the others in every pass
+                  {"adam", &Step::adam, {}}};  // adam runs once per step, the others in every micro-batch
   StepBenchmark result;
   result.samples = options.rays * options.samplesPerRay;
   std::vector<double> whole;
@@ -176,10 +177,10 @@ StepBenchmark benchmarkFieldStep(Device& device, const StepBenchmarkOptions& opt
       device.finish();
       part.now += std::chrono::duration<double>(Clock::now() - start).count();
     };
-    for (uint32_t pass = 0; pass < step.passes(); ++pass) {
-      step.beginPass(pass);
+    for (uint32_t microBatch = 0; microBatch < step.microBatches(); ++microBatch) {
+      step.beginMicroBatch(microBatch);
       for (Part* part = parts; part != parts + 3; ++part) time(*part);
-      loss += step.lossOfPass();
+      loss += step.microBatchLoss();
     }
     time(parts[3]);
     for (Part& part : parts) {

@@ -5,7 +5,7 @@
 
 namespace tessera {
 
-constexpr double kShareOfPhotos = 0.5;  // of the memory there is
+constexpr double kPhotoMemoryFraction = 0.5;  // of the usable memory
 
 TrainingResult trainField(Device& device, const Capture& capture, const fs::path& model, TrainFieldOptions options) {
   refuseCaptureFolder(model);
@@ -13,13 +13,14 @@ TrainingResult trainField(Device& device, const Capture& capture, const fs::path
   options.loop.method = "field";
   const bool goingOn = options.loop.resume && folder.manifest().has_value();
   if (goingOn) requireTrainedOn(folder, capture);
-  // A resumed run stands where the killed one stood, whatever has become of the capture's points since.
+  // A resumed run keeps the frame of the interrupted one, even if the capture's points have changed since.
   const SceneFrame frame = goingOn ? folder.readPlacement().frame : fitSceneFrame(capture, options.config.roiMargin);
-  options.config.photoBudgetMiB = settledPhotoBudget(options.config.photoBudgetMiB, capture,
-                                                     kShareOfPhotos * static_cast<double>(usableMemoryBytes()));
+  options.config.photoBudgetMiB = resolvePhotoBudget(options.config.photoBudgetMiB, capture,
+                                                     kPhotoMemoryFraction * static_cast<double>(usableMemoryBytes()));
   FieldTrainer trainer(device, capture, options.config, frame);
   if (!folder.manifest()) {
-    writeFileAtomically(folder.configPath(), howToRepeat(device, options.loop) + configToToml(options.config.fields()));
+    writeFileAtomically(folder.configPath(),
+                        reproductionHeader(device, options.loop) + configToToml(options.config.fields()));
     folder.writePlacement({frame, {}, capture.sourceFromWorld, capture.root, trainingNames(capture)},
                           options.loop.method);
   }

@@ -1,4 +1,4 @@
-// `tessera train --method field`: a capture to a model folder.
+// `tessera train --method field`: trains a capture into a model folder.
 #pragma once
 
 #include "representations/field/train/field_trainer.h"

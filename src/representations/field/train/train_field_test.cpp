@@ -12,12 +12,12 @@ namespace tessera {
 namespace {
 
 TrainFieldOptions options(int64_t steps, bool resume = false) {
-  TrainFieldOptions made;
-  made.config = cubeConfig();
-  made.loop.steps = steps;
-  made.loop.resume = resume;
-  made.loop.progress = false;
-  return made;
+  TrainFieldOptions result;
+  result.config = cubeConfig();
+  result.loop.steps = steps;
+  result.loop.resume = resume;
+  result.loop.progress = false;
+  return result;
 }
 
 Bytes checkpoint(const fs::path& model) {
@@ -41,15 +41,15 @@ TEST(TrainField, EndsWithTheSameBytesHoweverOftenItIsStopped) {
   EXPECT_EQ(checkpoint(scene / "broken"), checkpoint(scene / "unbroken"));
 }
 
-TEST(TrainField, LeavesAFolderThatRepeatsAndDraws) {
+TEST(TrainField, LeavesAFolderThatCanBeRepeatedAndRendered) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   TrainFieldOptions some = options(12);
   some.config.seed = 42;
   trainField(*device, scene.capture(), scene / "model", some);
-  FieldConfig found = savedConfig<FieldConfig>(scene / "model");
-  EXPECT_EQ(configToToml(found.fields()), configToToml(some.config.fields()));
-  // Drawn from the folder as by the model that was trained.
+  FieldConfig saved = savedConfig<FieldConfig>(scene / "model");
+  EXPECT_EQ(configToToml(saved.fields()), configToToml(some.config.fields()));
+  // The model that is loaded from the folder renders the same image as the one that was trained.
   const std::unique_ptr<FieldModel> loaded = loadFieldModel(*device, scene / "model");
   TrainedCube trained(scene, some.config, 12);
   FieldRenderer fromFolder(*loaded), fromTraining(trained.trainer->model());
@@ -58,7 +58,7 @@ TEST(TrainField, LeavesAFolderThatRepeatsAndDraws) {
             fromTraining.render(scene.capture().cameras[0], photo.worldFromCamera, nullptr).colour.pixels);
 }
 
-TEST(TrainField, LeavesTheSettingsOfAModelAloneThatItRefusesToTouch) {
+TEST(TrainField, DoesNotChangeTheSettingsOfAModelThatItRefusesToTrain) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   trainField(*device, scene.capture(), scene / "model", options(3));
@@ -95,16 +95,16 @@ TEST(TrainField, GoesOnOnlyWithTheCaptureThatItBeganWith) {
   EXPECT_EQ(ModelFolder(scene / "model").manifest()->step, 5);
 }
 
-TEST(TrainField, GivesPhotosAsMuchMemoryAsIsMeantForThemWhereAllDoNotFit) {
+TEST(TrainField, LimitsPhotosToTheirShareOfMemoryIfNotAllFit) {
   const CubeScene scene;
   const std::vector<int> photos = scene.capture().photosIn(Split::train);
   const int64_t all = static_cast<int64_t>(photos.size()) * CubeScene::kWidth * CubeScene::kHeight * 4;
   ASSERT_EQ(decodedBytes(scene.capture(), photos), static_cast<size_t>(all));
-  EXPECT_EQ(settledPhotoBudget(0, scene.capture(), static_cast<double>(all)), 0);
-  const double least = settledPhotoBudget(0, scene.capture(), static_cast<double>(all) - 1);
-  EXPECT_GT(least, 0);
-  EXPECT_LE(least * 1048576, static_cast<double>(all) - 1);
-  EXPECT_EQ(settledPhotoBudget(0.5, scene.capture(), 1000), 0.5);
+  EXPECT_EQ(resolvePhotoBudget(0, scene.capture(), static_cast<double>(all)), 0);
+  const double minimum = resolvePhotoBudget(0, scene.capture(), static_cast<double>(all) - 1);
+  EXPECT_GT(minimum, 0);
+  EXPECT_LE(minimum * 1048576, static_cast<double>(all) - 1);
+  EXPECT_EQ(resolvePhotoBudget(0.5, scene.capture(), 1000), 0.5);
 }
 
 TEST(TrainField, NamesACheckpointThatIsBroken) {
@@ -130,13 +130,13 @@ TEST(TrainField, NamesACheckpointThatIsBroken) {
   }
 }
 
-TEST(TrainField, SaysWhenThereIsNoModelToDraw) {
+TEST(TrainField, ThrowsIfThereIsNoModelToRender) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   EXPECT_THROW(loadFieldModel(*device, scene / "nothing"), Error);
 }
 
-TwoDevices trainingsOf(const CubeScene& scene) {
+TwoDevices makeTrainings(const CubeScene& scene) {
   return {[&scene](Device& device, const fs::path& folder, const TrainingLoopOptions& loop) {
             TrainFieldOptions some = options(0);
             some.loop = loop;
@@ -152,15 +152,15 @@ TwoDevices trainingsOf(const CubeScene& scene) {
 
 TEST(TrainField, ComesToTheSameOnVulkanAndGoesOnThereAndBack) {
   const CubeScene scene;
-  trainingsOf(scene).expectTheSamePictures(scene / "models");
+  makeTrainings(scene).expectTheSamePictures(scene / "models");
 }
 
-TEST(TrainField, LosesNothingWhereAGraphicsCardFails) {
+TEST(TrainField, LosesNothingWhereAGpuFails) {
   const CubeScene scene;
-  trainingsOf(scene).expectToSurviveFailures(scene / "models");
+  makeTrainings(scene).expectToSurviveFailures(scene / "models");
 }
 
-TEST(TrainField, SendsEachStepToAGraphicsCardAtOnce) {
+TEST(TrainField, SendsEachStepToAGpuAtOnce) {
 #ifdef TESSERA_HAS_VULKAN
   SKIP_WITHOUT_VULKAN(openForTest());
   const CubeScene scene;

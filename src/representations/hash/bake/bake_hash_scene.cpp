@@ -1,4 +1,4 @@
-// Models of all levels to the contents of a scene.
+// Bakes the models of all levels to the contents of a scene.
 #include <algorithm>
 
 #include "bake/level_baker.h"
@@ -23,24 +23,24 @@ class HashBaker final : public LevelBaker<HashModel> {
   void bakeLevel(HashModel& model, uint32_t level, const Capture& capture, const BakeOptions& options,
                  ContentSink& sink) override {
     requireBakeable(model);
-    BakeHashOptions looking{options, settings_};
+    BakeHashOptions levelOptions{options, settings_};
     if (settings_.cells > 0) {
-      looking.cells = std::max(HashPart::kOccupancyUnit,
-                               (settings_.cells >> level) / HashPart::kOccupancyUnit * HashPart::kOccupancyUnit);
+      levelOptions.cells = std::max(HashPart::kOccupancyUnit,
+                                    (settings_.cells >> level) / HashPart::kOccupancyUnit * HashPart::kOccupancyUnit);
     }
-    const std::vector<OccupancyBits> seen = findSeenCells(model, capture, looking);
-    const bool surround = model.space().blocks() > model.space().cells();
+    const std::vector<OccupancyBits> seen = findSeenCells(model, capture, levelOptions);
+    const bool backgroundBlock = model.space().blocks() > model.space().cells();
     const LevelGroups groups = groupsOfLevel(static_cast<uint32_t>(model.grid().columns),
-                                             static_cast<uint32_t>(model.grid().rows), level, surround);
+                                             static_cast<uint32_t>(model.grid().rows), level, backgroundBlock);
     for (uint32_t group = 0; group < groups.groups(); ++group) {
       std::vector<uint32_t> blocks;
       for (uint32_t block = 0; block < groups.groupOfBlock.size(); ++block) {
         if (groups.groupOfBlock[block] == group) blocks.push_back(block);
       }
       const HashContent content = bakeHashGroup(model, blocks, seen);
-      const std::optional<CellRange> ofGroup =
+      const std::optional<CellRange> groupCells =
           group < groups.cells.size() ? std::optional(groups.cells[group]) : std::nullopt;
-      sink.add(level, ofGroup, encodeHash(content, options.effort),
+      sink.add(level, groupCells, encodeHash(content, options.effort),
                partSummary(content, content.parts.at(0).tables.back().resolution));
     }
   }

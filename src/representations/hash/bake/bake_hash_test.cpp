@@ -21,7 +21,7 @@
 namespace tessera {
 namespace {
 
-// A cube that two blocks have learned, and what photos see of it.
+// A model of the cube in two blocks, and the cells that the photos see.
 struct Baked {
   CubeScene scene;
   TrainedHashCube trained;
@@ -29,8 +29,8 @@ struct Baked {
 
   explicit Baked(const HashConfig& config, uint32_t cells = 32)
       : trained(scene, config, cubeGrid(2), 120),
-        seen(findSeenCells(trained.model(), scene.capture(), optionsOf(cells))) {}
-  static BakeHashOptions optionsOf(uint32_t cells) {
+        seen(findSeenCells(trained.model(), scene.capture(), makeBakeOptions(cells))) {}
+  static BakeHashOptions makeBakeOptions(uint32_t cells) {
     BakeHashOptions options;
     options.cells = cells;
     return options;
@@ -46,7 +46,7 @@ bool looksUp(const HashContent& content, const HashPart& part, const float place
   return true;
 }
 
-size_t countOf(const OccupancyBits& bits) {
+size_t countSetBits(const OccupancyBits& bits) {
   size_t count = 0;
   for (size_t i = 0; i < bits.count(); ++i) count += bits.at(i);
   return count;
@@ -55,13 +55,13 @@ size_t countOf(const OccupancyBits& bits) {
 TEST(BakeHash, KeepsTheCellsOfTheCubeAndFewOthers) {
   Baked baked((smallHashConfig()));
   for (const OccupancyBits& bits : baked.seen) {
-    EXPECT_GT(countOf(bits), bits.count() / 100);
-    EXPECT_LT(countOf(bits), bits.count() / 2);
+    EXPECT_GT(countSetBits(bits), bits.count() / 100);
+    EXPECT_LT(countSetBits(bits), bits.count() / 2);
   }
 }
 
-// Invariant 6: as far as bytes go.
-TEST(BakeHash, HoldsTheFeaturesOfTheModelWhereverAnythingIsSeen) {
+// Invariant 6 of `hash` (docs/invariants.md), up to the quantisation to bytes.
+TEST(BakeHash, StoresTheFeaturesOfTheModelInEveryVisibleCell) {
   for (const bool varies : {true, false}) {
     HashConfig config = smallHashConfig();
     config.attentionVaries = varies;
@@ -71,7 +71,7 @@ TEST(BakeHash, HoldsTheFeaturesOfTheModelWhereverAnythingIsSeen) {
     const uint32_t block = 1;
     const HashContent content = baked.block(block);
     const HashPart& part = content.parts[0];
-    // Random places in seen cells.
+    // Random places in visible cells.
     const RandomStream random(5, 5);
     std::vector<float> positions;
     const OccupancyBits& seen = baked.seen[block];
@@ -84,8 +84,8 @@ TEST(BakeHash, HoldsTheFeaturesOfTheModelWhereverAnythingIsSeen) {
     }
     const uint32_t count = static_cast<uint32_t>(positions.size() / 3);
     ASSERT_GT(count, 300u);
-    const Array<float> at = device.arrayOf(positions);
-    const Array<uint32_t> slots = device.arrayOf(std::vector<uint32_t>(count, block));
+    const Array<float> at = device.uploadArray(positions);
+    const Array<uint32_t> slots = device.uploadArray(std::vector<uint32_t>(count, block));
     HashFields& fields = baked.trained.model().fields();
     fields.reserve(count, 8 * count);
     const std::vector<float> model =
@@ -94,24 +94,24 @@ TEST(BakeHash, HoldsTheFeaturesOfTheModelWhereverAnythingIsSeen) {
       float features[8];
       ASSERT_TRUE(looksUp(content, part, &positions[3 * s], features)) << s;
       for (uint32_t f = 0; f < 8; ++f) {
-        // Half a step of each byte; of a logit a quarter of that times what it weighs.
-        double most = 0.5 * part.ranges[f].scale();
+        // The error is half a step of each byte; for a logit, a quarter of that times the value that it weights.
+        double maximum = 0.5 * part.ranges[f].scale();
         for (size_t l = 0; l < part.tables.size(); ++l) {
           const ByteRange& fine = part.tables[l].ranges[f];
           const double largest = std::max(std::abs(fine.low), std::abs(fine.high));
-          most += 0.5 * fine.scale();
-          if (varies) most += 0.25 * 0.5 * part.ranges[8 + 2 * l + (f > 0 ? 1 : 0)].scale() * largest;
+          maximum += 0.5 * fine.scale();
+          if (varies) maximum += 0.25 * 0.5 * part.ranges[8 + 2 * l + (f > 0 ? 1 : 0)].scale() * largest;
         }
-        ASSERT_NEAR(features[f], std::min(model[8 * s + f], 1e9f), 1.01 * most + 1e-5) << s << " " << f;
+        ASSERT_NEAR(features[f], std::min(model[8 * s + f], 1e9f), 1.01 * maximum + 1e-5) << s << " " << f;
       }
     }
   }
 }
 
-// Invariants 7 and 9.
-TEST(BakeHash, MarchesTheVerySameSamplesHoweverEmptySpaceIsPassedOver) {
+// Invariants 7 and 9 of `hash` (docs/invariants.md).
+TEST(BakeHash, EvaluatesTheSameSamplesHoweverEmptySpaceIsSkipped) {
   HashConfig config = smallHashConfig();
-  config.surround = "own";
+  config.backgroundBlock = "own";
   for (const uint32_t cells : {32u, 256u}) {
     Baked baked(config, cells);
     MarchCounts all, byCells, byDistances;
@@ -121,7 +121,7 @@ TEST(BakeHash, MarchesTheVerySameSamplesHoweverEmptySpaceIsPassedOver) {
       content.step = 1.0f / 400;  // shorter than a cell
       const HashPart& part = content.parts[0];
       const HashFeatures features(content, part);
-      const BlockDomain domain = domainOf(baked.trained.model().space().placement(block));
+      const BlockDomain domain = makeBlockDomain(baked.trained.model().space().placement(block));
       const RandomStream random(7, block);
       for (uint64_t ray = 0; ray < 200; ++ray) {
         Triple<double> origin, direction;
@@ -141,17 +141,17 @@ TEST(BakeHash, MarchesTheVerySameSamplesHoweverEmptySpaceIsPassedOver) {
         std::vector<uint64_t> sets[3];
         ContentComposite composites[3];
         MarchCounts* const counts[3] = {&all, &byCells, &byDistances};
-        for (int way = 0; way < 3; ++way) {
-          HashRay one{path, 1, {}, &sets[way]};
+        for (int mode = 0; mode < 3; ++mode) {
+          HashRay one{path, 1, {}, &sets[mode]};
           HashRay* const rays[] = {&one};
-          HashMarch{features, content.step, {way > 0, 0, way == 2}}.run(rays, *counts[way]);
-          composites[way] = one.composite;
+          HashMarch{features, content.step, {mode > 0, 0, mode == 2}}.run(rays, *counts[mode]);
+          composites[mode] = one.composite;
         }
         ASSERT_EQ(sets[1], sets[0]) << block << " " << ray;
         ASSERT_EQ(sets[2], sets[0]) << block << " " << ray;
-        for (int way = 1; way < 3; ++way) {
-          EXPECT_EQ(composites[way].transmittance, composites[0].transmittance);
-          for (int k = 0; k < 7; ++k) EXPECT_EQ(composites[way].values[k], composites[0].values[k]);
+        for (int mode = 1; mode < 3; ++mode) {
+          EXPECT_EQ(composites[mode].transmittance, composites[0].transmittance);
+          for (int k = 0; k < 7; ++k) EXPECT_EQ(composites[mode].values[k], composites[0].values[k]);
         }
         seen += !sets[0].empty();
       }
@@ -159,15 +159,15 @@ TEST(BakeHash, MarchesTheVerySameSamplesHoweverEmptySpaceIsPassedOver) {
     EXPECT_GT(seen, 100);
     EXPECT_LT(byCells.steps, all.steps);
     EXPECT_LE(byDistances.steps, byCells.steps);
-    if (cells == 256) {  // there are levels coarser than the grid of distances
+    if (cells == 256) {  // some occupancy levels are coarser than the grid of distances
       EXPECT_LT(byDistances.steps, byCells.steps);
     }
     EXPECT_EQ(all.samples, byDistances.samples);
   }
 }
 
-// Invariant 16.
-TEST(BakeHash, StoresAllCornersOfEverySeenCell) {
+// Invariant 16 of `hash` (docs/invariants.md).
+TEST(BakeHash, StoresAllCornersOfEveryVisibleCell) {
   Baked baked((smallHashConfig()));
   const HashContent content = baked.block(0);
   const HashPart& part = content.parts[0];
@@ -194,7 +194,7 @@ TEST(BakeHash, StoresAllCornersOfEverySeenCell) {
 }
 
 HashLevelModels onlyModel(TrainedHashCube& trained, const fs::path& folder, Device& device) {
-  // Baking holds a model of its own.
+  // Baking owns a model of its own, so the trained one is copied.
   return [&trained, folder, &device](uint32_t) {
     auto model = std::make_unique<HashModel>(device, trained.model().config(), trained.model().grid(), false);
     for (uint32_t part = 0; part < trained.trainer->parts(); ++part) {
@@ -219,28 +219,28 @@ class BakedScenes : public testing::Test {
   const fs::path folder_;
 };
 
-double psnrOf(const ImageF& a, const ImageF& b) {
+double computePsnr(const ImageF& a, const ImageF& b) {
   double sum = 0;
   for (size_t i = 0; i < a.pixels.size(); ++i) sum += std::pow(a.pixels[i] - b.pixels[i], 2);
   return -10 * std::log10(sum / static_cast<double>(a.pixels.size()));
 }
 
 TEST_F(BakedScenes, LookAsTheirModelsDo) {
-  for (const char* surround : {"none", "own", "border"}) {
+  for (const char* backgroundBlock : {"none", "own", "border"}) {
     for (const char* background : {"random", "learned"}) {
-      if (std::string(background) == "learned" && std::string(surround) != "border") continue;
+      if (std::string(background) == "learned" && std::string(backgroundBlock) != "border") continue;
       HashConfig config = smallHashConfig();
-      config.surround = surround;
+      config.backgroundBlock = backgroundBlock;
       config.background = background;
       const CubeScene scene;
-      TrainedHashCube trained(scene, config, cubeGrid(std::string(surround) == "border" ? 1 : 2), 150);
-      const fs::path where = folder_ / (std::string(surround) + background);
+      TrainedHashCube trained(scene, config, cubeGrid(std::string(backgroundBlock) == "border" ? 1 : 2), 150);
+      const fs::path where = folder_ / (std::string(backgroundBlock) + background);
       const BakedScene baked = bakeHash(onlyModel(trained, folder_), 1, scene.capture(), where, {});
       EXPECT_EQ(baked.levels.size(), 1u);
       TileScene opened = openTileScene(where, hashCodec());
       SceneRendererSettings settings;
       settings.threads = 2;
-      settings.selection.mostPixels = 0;
+      settings.selection.maximumScreenSpaceError = 0;
       HashRenderer tiles(opened.frame, std::move(opened.tree), std::move(opened.source), settings);
       HashModelRenderer model(trained.model());
       const Capture& capture = scene.capture();
@@ -248,14 +248,14 @@ TEST_F(BakedScenes, LookAsTheirModelsDo) {
         const Camera& camera = capture.cameras[static_cast<size_t>(capture.photos[photo].camera)];
         const Pose& pose = capture.photos[photo].worldFromCamera;
         const RenderedView a = tiles.render(camera, pose, nullptr), b = model.render(camera, pose, nullptr);
-        EXPECT_GT(psnrOf(a.colour, b.colour), 38) << surround << " " << background << " " << photo;
-        EXPECT_GT(psnrOf(a.opacity, b.opacity), 35) << surround << " " << background << " " << photo;
+        EXPECT_GT(computePsnr(a.colour, b.colour), 38) << backgroundBlock << " " << background << " " << photo;
+        EXPECT_GT(computePsnr(a.opacity, b.opacity), 35) << backgroundBlock << " " << background << " " << photo;
       }
     }
   }
 }
 
-TEST_F(BakedScenes, LookTheSameWhereVulkanMadeThem) {
+TEST_F(BakedScenes, LookTheSameWhenBakedOnVulkan) {
 #ifndef TESSERA_HAS_VULKAN
   GTEST_SKIP() << "this build has no Vulkan";
 #else
@@ -268,16 +268,16 @@ TEST_F(BakedScenes, LookTheSameWhereVulkanMadeThem) {
     TileScene opened = openTileScene(folder_ / name, hashCodec());
     SceneRendererSettings settings;
     settings.threads = 2;
-    settings.selection.mostPixels = 0;
+    settings.selection.maximumScreenSpaceError = 0;
     HashRenderer tiles(opened.frame, std::move(opened.tree), std::move(opened.source), settings);
     return tiles.render(scene.capture().cameras[0], scene.capture().photos[0].worldFromCamera, nullptr).colour;
   };
-  EXPECT_GT(psnrOf(drawn(*vulkan, "vulkan"), drawn(*trained.device, "cpu")), 40);
+  EXPECT_GT(computePsnr(drawn(*vulkan, "vulkan"), drawn(*trained.device, "cpu")), 40);
   EXPECT_EQ(GpuContext::validationMessages(), 0);
 #endif
 }
 
-TEST_F(BakedScenes, AreTheSameBytesAgain) {
+TEST_F(BakedScenes, AreReproducedByteForByte) {
   const CubeScene scene;
   TrainedHashCube trained(scene, smallHashConfig(), cubeGrid(2), 40);
   const BakedScene once = bakeHash(onlyModel(trained, folder_), 1, scene.capture(), folder_ / "scene", {});
@@ -290,8 +290,8 @@ TEST_F(BakedScenes, AreTheSameBytesAgain) {
   }
 }
 
-// What no photo sees is 0, and compresses; what one sees is all there.
-TEST(BakeHash, LeavesOutEntriesThatNoSeenSampleReads) {
+// Entries that no visible sample reads are 0, which compresses well; all others are stored.
+TEST(BakeHash, LeavesOutEntriesThatNoVisibleSampleReads) {
   HashConfig config = smallHashConfig();
   config.fineLog2Size = 16;
   Baked baked(config);
@@ -302,15 +302,15 @@ TEST(BakeHash, LeavesOutEntriesThatNoSeenSampleReads) {
   const HashContent whole = baked.block(0);
   for (size_t l = 0; l < content.parts[0].tables.size(); ++l) {
     const HashTable& table = content.parts[0].tables[l];
-    size_t kept = 0;
+    size_t nonZeroEntries = 0;
     for (uint32_t entry = 0; entry < table.entries; ++entry) {
       bool any = false;
-      for (size_t f = 0; f < 8; ++f) any |= table.bytes[8 * entry + f] != table.ranges[f].byteOf(0);
-      kept += any;
+      for (size_t f = 0; f < 8; ++f) any |= table.bytes[8 * entry + f] != table.ranges[f].encodeByte(0);
+      nonZeroEntries += any;
     }
     const double edge = (table.resolution - 1) / 32.0;
-    EXPECT_GT(kept, 0u);
-    EXPECT_LE(static_cast<double>(kept), std::pow(std::ceil(edge) + 2, 3));
+    EXPECT_GT(nonZeroEntries, 0u);
+    EXPECT_LE(static_cast<double>(nonZeroEntries), std::pow(std::ceil(edge) + 2, 3));
   }
   const RandomStream random(8, 8);
   for (uint64_t i = 0; i < 200; ++i) {
@@ -323,13 +323,13 @@ TEST(BakeHash, LeavesOutEntriesThatNoSeenSampleReads) {
   }
 }
 
-TEST_F(BakedScenes, AreNotMadeOfModelsThatMixByANetworkWhichIsSaidBeforePhotosAreLookedThrough) {
+TEST_F(BakedScenes, RejectModelsThatMixByANetworkBeforeVisitingPhotos) {
   HashConfig config = smallHashConfig();
   config.aggregation = "mlp";
   const CubeScene scene;
   TrainedHashCube trained(scene, config, cubeGrid(), 0);
   BakeHashOptions options;
-  options.onPhoto = [](int64_t, int64_t) { ADD_FAILURE() << "looked"; };
+  options.onPhoto = [](int64_t, int64_t) { ADD_FAILURE() << "visited a photo"; };
   EXPECT_THROW(bakeHash(onlyModel(trained, folder_), 1, scene.capture(), folder_ / "scene", options), Error);
   EXPECT_THROW(bakeHashGroup(trained.model(), {0}, {OccupancyBits(16)}), Error);
 }

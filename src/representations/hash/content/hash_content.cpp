@@ -7,13 +7,13 @@ constexpr const char* kNames[] = {"none", "shared", "separate"};
 
 }  // namespace
 
-const char* nameOf(LevelWeights weights) {
+const char* levelWeightsName(LevelWeights weights) {
   return kNames[static_cast<size_t>(weights)];
 }
 
 std::optional<LevelWeights> levelWeightsFrom(std::string_view name) {
   for (const LevelWeights weights : {LevelWeights::none, LevelWeights::shared, LevelWeights::separate}) {
-    if (name == nameOf(weights)) return weights;
+    if (name == levelWeightsName(weights)) return weights;
   }
   return std::nullopt;
 }
@@ -26,7 +26,7 @@ uint64_t hashPartBytes(const HashPart& part, uint64_t storedMacroblocks, uint32_
   for (const HashTable& table : part.tables) {
     bytes += sizeof(HashTable) + uint64_t{table.entries} * HashPart::kFeatures;
   }
-  const uint64_t ratio = OctantDistances::ratioFor(cells);
+  const uint64_t ratio = OctantDistanceField::ratioFor(cells);
   bytes += sizeof(uint32_t) * (cube(cells / ratio) + (ratio > 1 ? nearCells * cube(ratio) : 0));
   for (uint32_t edge = cells;; edge = (edge + 1) / 2) {
     bytes += sizeof(OccupancyBits) + sizeof(uint64_t) * ((cube(edge) + 63) / 64);

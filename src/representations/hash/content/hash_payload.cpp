@@ -9,25 +9,25 @@ namespace tessera {
 namespace {
 
 constexpr const char* kRemedy =
-    "train with a lower --set lattice, levels or fine_log2_size, or bake with fewer --cells";
+    "train with a lower --set lattice, fine_levels or fine_log2_size, or bake with fewer --cells";
 
 class HashWriter : ContentWriter {
  public:
   HashWriter(const HashContent& content, int effort) : ContentWriter(effort), content_(content) {}
 
   Bytes write() {
-    Json ours = {{"weights", nameOf(content_.weights)},
+    Json ours = {{"weights", levelWeightsName(content_.weights)},
                  {"step", content_.step},
-                 {"whole", content_.isWhole},
+                 {"whole", content_.hasLearnedBackground},
                  {"network", writeNetwork(file_, content_.network)},
                  {"parts", Json::array()}};
     if (!content_.logits.empty()) ours["logits"] = content_.logits;
-    for (const HashPart& part : content_.parts) ours["parts"].push_back(partOf(part));
+    for (const HashPart& part : content_.parts) ours["parts"].push_back(partToJson(part));
     return file_.finish(kHashName, ours);
   }
 
  private:
-  Json partOf(const HashPart& part) {
+  Json partToJson(const HashPart& part) {
     Json json = place(part);
     json["lattice"] = part.lattice;
     json["ranges"] = ranges(part.ranges);
@@ -38,14 +38,14 @@ class HashWriter : ContentWriter {
       json["macroblocks"]["texels"] = eights(corners, part.columns, stored);
     }
     json["tables"] = Json::array();
-    for (const HashTable& table : part.tables) json["tables"].push_back(tableOf(table));
+    for (const HashTable& table : part.tables) json["tables"].push_back(tableToJson(table));
     json["cells"] = part.cells();
     if (part.distances.ratio > 1) json["nearCells"] = part.distances.nearCells();
     json["occupied"] = picture(pictureOfBits(part.occupied.levels.front()));
     return json;
   }
 
-  // Three pictures of each eight columns.
+  // Writes three images for each group of eight columns.
   Json eights(const std::vector<uint8_t>& corners, uint32_t columns, uint32_t stored) {
     Json json = Json::array();
     for (uint32_t first = 0; first < columns; first += HashPart::kFeatures) {
@@ -60,7 +60,7 @@ class HashWriter : ContentWriter {
     return json;
   }
 
-  Json tableOf(const HashTable& table) {
+  Json tableToJson(const HashTable& table) {
     return {{"resolution", table.resolution},
             {"entries", table.entries},
             {"hashed", table.hashed},
@@ -83,8 +83,8 @@ class HashWriter : ContentWriter {
 Bytes encodeHash(const HashContent& content, int effort) {
   const ContentLimits limits;
   requireContentWithin(limits, content.parts.size(), bytesInMemory(content), kRemedy);
-  // All else that would break a rule is a mistake of ours.
-  const auto broken = brokenRule(content);
+  // Any other violated rule is a bug in this program.
+  const auto broken = validationError(content);
   CHECK(broken.value_or("") == "");
   for (const HashPart& part : content.parts) {
     CHECK(part.distances == octantDistances(part.occupied));

@@ -1,4 +1,5 @@
-// Hash contents from arbitrary bytes: bounded, and what is accepted keeps the rules and survives being written.
+// Decodes hash contents from arbitrary bytes. Memory stays bounded, and every accepted content satisfies the rules and
+// survives a round trip.
 #include "raymarch/testing/content_fuzz.h"
 #include "representations/hash/content/hash_payload.h"
 

@@ -22,14 +22,14 @@ namespace tessera {
 namespace {
 
 using nlohmann::json;
-using tiles_test::MadeHash;
-using tiles_test::madeHashContent;
+using tiles_test::TestHashContent;
+using tiles_test::testHashContent;
 
 void expectSame(const HashContent& a, const HashContent& b) {
   EXPECT_EQ(a.weights, b.weights);
   EXPECT_EQ(a.logits, b.logits);
   EXPECT_EQ(a.step, b.step);
-  EXPECT_EQ(a.isWhole, b.isWhole);
+  EXPECT_EQ(a.hasLearnedBackground, b.hasLearnedBackground);
   EXPECT_TRUE(a.network == b.network);
   ASSERT_EQ(a.parts.size(), b.parts.size());
   for (size_t i = 0; i < a.parts.size(); ++i) {
@@ -63,13 +63,13 @@ TEST(HashPayload, GivesBackWhatWasWritten) {
   uint64_t seed = 0;
   for (const LevelWeights weights : {LevelWeights::none, LevelWeights::shared, LevelWeights::separate}) {
     for (const bool varies : {true, false}) {
-      MadeHash made;
-      made.weights = weights;
-      made.varies = varies;
-      made.levels = static_cast<uint32_t>(1 + seed % 4);
+      TestHashContent options;
+      options.weights = weights;
+      options.varies = varies;
+      options.levels = static_cast<uint32_t>(1 + seed % 4);
       ++seed;
-      HashContent content = madeHashContent(seed, static_cast<uint32_t>(1 + seed % 3), made);
-      content.isWhole = varies;
+      HashContent content = testHashContent(seed, static_cast<uint32_t>(1 + seed % 3), options);
+      content.hasLearnedBackground = varies;
       const auto again = roundTrip(content);
       ASSERT_TRUE(again);
       expectSame(content, *again);
@@ -77,14 +77,14 @@ TEST(HashPayload, GivesBackWhatWasWritten) {
   }
 }
 
-TEST(HashPayload, GivesBackSurroundsOddNumbersAndTablesThatFillNoRow) {
-  MadeHash made;
-  made.entries = 1000;
-  HashContent content = madeHashContent(7, 1, made);
+TEST(HashPayload, GivesBackBackgroundBlocksOddNumbersAndTablesThatFillNoRow) {
+  TestHashContent options;
+  options.entries = 1000;
+  HashContent content = testHashContent(7, 1, options);
   content.parts[0].tables[1].hashed = false;
   content.parts[0].tables[1].resolution = 10;
   HashPart& part = content.parts[0];
-  part.contracted = part.surround = true;
+  part.contracted = part.backgroundBlock = true;
   part.centre = {0.1f, 1e-30f, -3};
   part.low = {-1e6f, -1e6f, -1e6f};
   part.high = {1e6f, 1e6f, 1e6f};
@@ -95,7 +95,7 @@ TEST(HashPayload, GivesBackSurroundsOddNumbersAndTablesThatFillNoRow) {
 }
 
 TEST(HashPayload, GivesBackAPartWithoutMacroblocks) {
-  HashContent content = madeHashContent(8);
+  HashContent content = testHashContent(8);
   content.parts[0].macroblocks.assign(8, HashPart::kEmpty);
   content.parts[0].cornerBytes.clear();
   const auto again = roundTrip(content);
@@ -104,7 +104,7 @@ TEST(HashPayload, GivesBackAPartWithoutMacroblocks) {
 }
 
 TEST(HashPayload, RenumbersMacroblocksInTheOrderOfTheirPlaces) {
-  const HashContent content = madeHashContent(9);
+  const HashContent content = testHashContent(9);
   HashContent shuffled = content;
   HashPart& part = shuffled.parts[0];
   const uint32_t stored = part.storedMacroblocks();
@@ -122,9 +122,9 @@ TEST(HashPayload, RenumbersMacroblocksInTheOrderOfTheirPlaces) {
   expectSame(content, *again);
 }
 
-TEST(HashPayload, SaysWhatItTakesInMemoryByItsHeadersAlone) {
+TEST(HashPayload, ReportsItsMemoryFromHeadersAlone) {
   const fs::path path = fs::temp_directory_path() / ("tessera-hash-file-" + std::to_string(::getpid()) + ".glb");
-  const HashContent content = madeHashContent(5, 2);
+  const HashContent content = testHashContent(5, 2);
   writeFileAtomically(path, encodeHash(content, 1));
   EXPECT_EQ(readDecodedBytes(path, hashCodec()), bytesInMemory(content));
   EXPECT_EQ(readContent(path, hashCodec())->memoryBytes(), bytesInMemory(content));
@@ -135,7 +135,7 @@ TEST(HashPayload, SaysWhatItTakesInMemoryByItsHeadersAlone) {
 }
 
 TEST(HashPayload, CountsTheBytesThatItsPartsHold) {
-  const HashContent content = madeHashContent(3);
+  const HashContent content = testHashContent(3);
   const HashPart& part = content.parts[0];
   uint64_t bytes = sizeof(HashPart) + part.ranges.size() * sizeof(ByteRange) + part.macroblocks.size() * 4 +
                    part.cornerBytes.size() + 4 * (part.distances.coarse.size() + part.distances.fine.size());
@@ -145,8 +145,8 @@ TEST(HashPayload, CountsTheBytesThatItsPartsHold) {
 }
 
 TEST(HashPayload, HasPicturesThatWebPCanHoldUpToItsBounds) {
-  const uint64_t cells = kMostOccupancyCells;
-  for (const PictureSize& size : {sizeOfBits(cells * cells * cells), sizeOfList(kMostTableEntries)}) {
+  const uint64_t cells = kMaxOccupancyCells;
+  for (const PictureSize& size : {sizeOfBits(cells * cells * cells), sizeOfList(kMaxTableEntries)}) {
     EXPECT_LE(size.width, static_cast<uint32_t>(kLargestLosslessSide));
     EXPECT_LE(size.height, static_cast<uint32_t>(kLargestLosslessSide));
   }
@@ -154,10 +154,10 @@ TEST(HashPayload, HasPicturesThatWebPCanHoldUpToItsBounds) {
 
 TEST(HashPayload, NamesTheRuleThatIsBroken) {
   const auto names = [](const char* rule, const std::function<void(HashContent&)>& spoil) {
-    HashContent content = madeHashContent(2, 2);
-    ASSERT_EQ(brokenRule(content), std::nullopt);
+    HashContent content = testHashContent(2, 2);
+    ASSERT_EQ(validationError(content), std::nullopt);
     spoil(content);
-    EXPECT_EQ(brokenRule(content).value_or("none"), rule);
+    EXPECT_EQ(validationError(content).value_or("none"), rule);
   };
   const float nan = std::numeric_limits<float>::quiet_NaN();
   names("the step is out of bounds", [](HashContent& c) { c.step = 0; });
@@ -198,20 +198,20 @@ TEST(HashPayload, NamesTheRuleThatIsBroken) {
         [](HashContent& c) { c.parts[0].distances.coarse.pop_back(); });
 }
 
-class HashRefusal : public tiles_test::Refusal {
+class HashDecoder : public tiles_test::Refusal {
  protected:
-  Bytes file() const override { return encodeHash(madeHashContent(5), 1); }
+  Bytes file() const override { return encodeHash(testHashContent(5), 1); }
   bool isRead(std::span<const std::byte> file, std::string& reason, const ContentLimits& limits) const override {
     return decodeHash(file, reason, limits).has_value();
   }
 };
 
-TEST_F(HashRefusal, OfHeadersThatLie) {
+TEST_F(HashDecoder, RejectsMalformedHeaders) {
   refuses("is not of the representation hash", [](json& asset) { ours(asset)["representation"] = "volume"; });
-  const std::string unsaid = "does not say what weighs its levels";
-  refuses(unsaid, [](json& asset) { ours(asset)["weights"] = "some"; });
-  refuses(unsaid, [](json& asset) { ours(asset)["step"] = "long"; });
-  refuses(unsaid, [](json& asset) { ours(asset).erase("whole"); });
+  const std::string missing = "does not say what weighs its levels";
+  refuses(missing, [](json& asset) { ours(asset)["weights"] = "some"; });
+  refuses(missing, [](json& asset) { ours(asset)["step"] = "long"; });
+  refuses(missing, [](json& asset) { ours(asset).erase("whole"); });
   refuses("the step is out of bounds", [](json& asset) { ours(asset)["step"] = 1e-9; });
   refuses("its logits are none", [](json& asset) { ours(asset)["logits"] = json::array(); });
   refuses("its logits are none", [](json& asset) { ours(asset)["logits"] = json(std::vector<float>(17)); });
@@ -229,18 +229,18 @@ TEST_F(HashRefusal, OfHeadersThatLie) {
   refuses(header, [](json& asset) { part(asset)["tables"][1]["entries"] = 1 << 25; });
   refuses(header, [](json& asset) { part(asset)["tables"][1]["hashed"] = 1; });
   refuses(header, [](json& asset) { part(asset)["tables"][1]["ranges"] = json::array(); });
-  refuses(header, [](json& asset) { ours(asset)["logits"] = {1, 2, 3, 4}; });  // 16 columns, and 8 would do
+  refuses(header, [](json& asset) { ours(asset)["logits"] = {1, 2, 3, 4}; });  // 16 columns instead of 8
   refuses("part 0: a range is out of bounds", [](json& asset) { part(asset)["ranges"][3] = {1e30, 1e31}; });
   refuses("part 0: its macroblocks", [](json& asset) { part(asset)["macroblocks"]["stored"] = 1; });
   refuses("part 0: its macroblocks", [](json& asset) { part(asset)["macroblocks"]["texels"].erase(5); });
   refuses("part 0: its tables", [](json& asset) { part(asset)["tables"][1]["texels"].erase(2); });
   refuses("part 0: its tables", [](json& asset) { part(asset)["tables"][1]["entries"] = 1024; });
   refuses("part 0: its occupied cells", [](json& asset) { part(asset)["cells"] = 32; });
-  refuses(header, [](json& asset) { part(asset)["cells"] = 136; });  // does not say how many are near
+  refuses(header, [](json& asset) { part(asset)["cells"] = 136; });  // does not state the number of near cells
 }
 
-TEST_F(HashRefusal, OfNearCellsThatAreNotThere) {
-  HashContent content = madeHashContent(5);
+TEST_F(HashDecoder, RejectsWrongNumbersOfNearCells) {
+  HashContent content = testHashContent(5);
   HashPart& part = content.parts[0];
   OccupancyBits occupied(136);
   occupied.set(7);
@@ -262,7 +262,7 @@ TEST_F(HashRefusal, OfNearCellsThatAreNotThere) {
   }
 }
 
-TEST_F(HashRefusal, OfMoreMemoryThanAllowedBeforeItIsTaken) {
+TEST_F(HashDecoder, RejectsContentsAboveTheMemoryLimitBeforeAllocating) {
   ContentLimits limits;
   limits.bytes = 20000;
   refuses(
@@ -276,7 +276,7 @@ TEST_F(HashRefusal, OfMoreMemoryThanAllowedBeforeItIsTaken) {
   });
 }
 
-TEST_F(HashRefusal, OfPicturesThatHoldSomethingElse) {
+TEST_F(HashDecoder, RejectsImagesWithUnexpectedChannelValues) {
   refusesBytes("part 0: its tables", [](json& asset, Bytes& bytes) {  // 512 entries: two rows of 256
     replace(asset, bytes, part(asset)["tables"][0]["texels"][2], ImageU8(256, 2, 3, 1));
   });
@@ -287,8 +287,8 @@ TEST_F(HashRefusal, OfPicturesThatHoldSomethingElse) {
   });
 }
 
-TEST_F(HashRefusal, OfEveryCutAndNoOtherHarm) {
-  const Bytes file = encodeHash(madeHashContent(6), 1);
+TEST_F(HashDecoder, RejectsTruncatedFilesAndSurvivesCorruptedBytes) {
+  const Bytes file = encodeHash(testHashContent(6), 1);
   std::string reason;
   const RandomStream random(4, 4);
   for (uint64_t trial = 0; trial < 200; ++trial) {

@@ -1,4 +1,4 @@
-// A hash content, read: untrusted bytes.
+// Decodes hash contents from untrusted bytes.
 #include "raymarch/content/content_reader.h"
 #include "representations/hash/content/hash_payload.h"
 #include "representations/hash/content/occupancy_distance.h"
@@ -17,9 +17,9 @@ bool takeRange(const json& source, ByteRange& range) {
   return true;
 }
 
-// What a part says of itself, before anything is allocated for it.
+// The header of a part, which is read before anything is allocated for the part.
 struct PartHeader {
-  HashPart part;  // without bytes
+  HashPart part;  // without its arrays of bytes
   uint32_t stored = 0, cells = 0, nearCells = 0;
 
   uint64_t bytes() const { return hashPartBytes(part, stored, cells, nearCells); }
@@ -30,18 +30,18 @@ class HashReader : public PartsReader<HashReader, HashContent, PartHeader> {
   using PartsReader::PartsReader;
 
   bool readSettings() {
-    const std::string* weights = stringOf(file_.ours, "weights");
+    const std::string* weights = getString(file_.ours, "weights");
     const auto known = weights ? levelWeightsFrom(*weights) : std::nullopt;
-    const auto step = numberOf(file_.ours, "step");
-    const auto whole = flagOf(file_.ours, "whole");
+    const auto step = getNumber(file_.ours, "step");
+    const auto whole = getBoolean(file_.ours, "whole");
     if (!known || !step || !whole)
       return fail("does not say what weighs its levels, how long its steps are, or whether it is whole");
     content_.weights = *known;
     content_.step = static_cast<float>(*step);
-    content_.isWhole = *whole;
-    if (!fieldOf(file_.ours, "logits")) return true;
-    const json* logits = arrayOf(file_.ours, "logits");
-    if (!logits || logits->empty() || logits->size() > 2 * kMostTables) return fail("its logits are none, or too many");
+    content_.hasLearnedBackground = *whole;
+    if (!getField(file_.ours, "logits")) return true;
+    const json* logits = getArray(file_.ours, "logits");
+    if (!logits || logits->empty() || logits->size() > 2 * kMaxTables) return fail("its logits are none, or too many");
     for (const json& source : *logits) {
       const auto logit = numberFrom(source);
       if (!logit) return fail("a logit is no number");
@@ -52,9 +52,9 @@ class HashReader : public PartsReader<HashReader, HashContent, PartHeader> {
 
   bool readHeader(const json& source, PartHeader& header) const {
     HashPart& part = header.part;
-    const auto lattice = unsignedOf(source, "lattice", kMostLattice),
-               cells = unsignedOf(source, "cells", kMostOccupancyCells);
-    const auto stored = storedOf(source);
+    const auto lattice = getUnsigned(source, "lattice", kMaxLattice),
+               cells = getUnsigned(source, "cells", kMaxOccupancyCells);
+    const auto stored = readStoredCount(source);
     if (!lattice || !cells || !stored) return false;
     if (*lattice < 1 || *lattice % HashPart::kMacroblock != 0) return false;
     if (*cells < 1 || *cells % HashPart::kOccupancyUnit != 0) return false;
@@ -62,20 +62,20 @@ class HashReader : public PartsReader<HashReader, HashContent, PartHeader> {
     part.columns = content_.columns();
     header.stored = *stored;
     header.cells = *cells;
-    if (const uint32_t ratio = OctantDistances::ratioFor(*cells); ratio > 1) {
+    if (const uint32_t ratio = OctantDistanceField::ratioFor(*cells); ratio > 1) {
       const uint64_t edge = *cells / ratio;
-      const auto nearCells = unsignedOf(source, "nearCells", static_cast<uint32_t>(edge * edge * edge));
+      const auto nearCells = getUnsigned(source, "nearCells", static_cast<uint32_t>(edge * edge * edge));
       if (!nearCells) return false;
       header.nearCells = *nearCells;
     }
-    const json* ranges = arrayOf(source, "ranges");
+    const json* ranges = getArray(source, "ranges");
     if (!ranges || ranges->size() != part.columns) return false;
     part.ranges.resize(part.columns);
     for (uint32_t c = 0; c < part.columns; ++c) {
       if (!takeRange((*ranges)[c], part.ranges[c])) return false;
     }
-    const json* tables = arrayOf(source, "tables");
-    if (!tables || tables->empty() || tables->size() > kMostTables) return false;
+    const json* tables = getArray(source, "tables");
+    if (!tables || tables->empty() || tables->size() > kMaxTables) return false;
     for (const json& table : *tables) {
       if (!readTable(table, part.tables.emplace_back())) return false;
     }
@@ -84,10 +84,10 @@ class HashReader : public PartsReader<HashReader, HashContent, PartHeader> {
 
  private:
   static bool readTable(const json& source, HashTable& table) {
-    const auto resolution = unsignedOf(source, "resolution", kMostTableResolution);
-    const auto entries = unsignedOf(source, "entries", kMostTableEntries);
-    const auto hashed = flagOf(source, "hashed");
-    const json* ranges = arrayOf(source, "ranges");
+    const auto resolution = getUnsigned(source, "resolution", kMaxTableResolution);
+    const auto entries = getUnsigned(source, "entries", kMaxTableEntries);
+    const auto hashed = getBoolean(source, "hashed");
+    const json* ranges = getArray(source, "ranges");
     if (!resolution || !entries || *entries < 1 || !hashed || !ranges || ranges->size() != table.ranges.size())
       return false;
     for (size_t f = 0; f < table.ranges.size(); ++f) {
@@ -111,7 +111,7 @@ class HashReader : public PartsReader<HashReader, HashContent, PartHeader> {
     for (size_t l = 0; l < part.tables.size(); ++l) {
       HashTable& table = part.tables[l];
       table.bytes.resize(size_t{table.entries} * HashPart::kFeatures);
-      const json* pictures = fieldOf((*arrayOf(source, "tables"))[l], "texels");
+      const json* pictures = getField((*getArray(source, "tables"))[l], "texels");
       const auto take = [&](const ImageU8& picture, size_t which) { return takeTexels(picture, which, table.bytes); };
       if (!pictures || !takePictures(*pictures, sizeOfList(table.entries), take)) return false;
     }
@@ -119,7 +119,7 @@ class HashReader : public PartsReader<HashReader, HashContent, PartHeader> {
     OccupancyBits occupied(header.cells);
     if (!readBits(source, "occupied", occupied)) return false;
     part.occupied = pyramidFromOccupancy(std::move(occupied));
-    if (nearCellsOf(part.occupied) != header.nearCells) return false;
+    if (countNearCells(part.occupied) != header.nearCells) return false;
     part.distances = octantDistances(part.occupied);
     return true;
   }

@@ -1,4 +1,4 @@
-// The rules that a hash content keeps, written or read (docs/tile-format.md, section 7).
+// The rules that a hash content must satisfy when it is written or read (docs/tile-format.md, section 7).
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -19,9 +19,9 @@ bool areRanges(const Ranges& ranges) {
 }
 
 Broken ruleOfTable(const HashTable& table) {
-  if (table.resolution < 2 || table.resolution > kMostTableResolution)
+  if (table.resolution < 2 || table.resolution > kMaxTableResolution)
     return "the resolution of a table is out of bounds";
-  if (table.entries < 1 || table.entries > kMostTableEntries) return "a table has no entries, or too many";
+  if (table.entries < 1 || table.entries > kMaxTableEntries) return "a table has no entries, or too many";
   if (table.hashed && !std::has_single_bit(table.entries)) return "the entries of a hashed table are no power of two";
   const uint64_t points = uint64_t{table.resolution} * table.resolution * table.resolution;
   if (!table.hashed && table.entries < points) return "a table that is not hashed has fewer entries than points";
@@ -31,7 +31,7 @@ Broken ruleOfTable(const HashTable& table) {
 }
 
 Broken ruleOfPart(const HashContent& content, const HashPart& part) {
-  if (part.lattice % HashPart::kMacroblock != 0 || part.lattice < 1 || part.lattice > kMostLattice) {
+  if (part.lattice % HashPart::kMacroblock != 0 || part.lattice < 1 || part.lattice > kMaxLattice) {
     return "its lattice is out of bounds";
   }
   if (part.columns != content.columns()) return "its columns are not those that its weights need";
@@ -39,21 +39,21 @@ Broken ruleOfPart(const HashContent& content, const HashPart& part) {
   if (!areRanges(part.ranges)) return "a range is out of bounds";
   if (auto broken = ruleOfPlace(part)) return broken;
   if (auto broken = ruleOfMacroblocks(part, part.lattice, part.cornerBytes.size(), part.columns)) return broken;
-  if (part.tables.empty() || part.tables.size() > kMostTables) return "it has no tables, or too many";
+  if (part.tables.empty() || part.tables.size() > kMaxTables) return "it has no tables, or too many";
   if (part.tables.size() != content.parts.front().tables.size()) return "parts differ in their number of tables";
   for (const HashTable& table : part.tables) {
     if (auto broken = ruleOfTable(table)) return broken;
   }
   if (part.occupied.levels.empty()) return "its occupancy is out of bounds";
   const uint32_t cells = part.cells();
-  if (cells % HashPart::kOccupancyUnit != 0 || cells < 1 || cells > kMostOccupancyCells ||
-      part.occupied.levels.size() <= static_cast<size_t>(std::countr_zero(OctantDistances::kMostRatio))) {
+  if (cells % HashPart::kOccupancyUnit != 0 || cells < 1 || cells > kMaxOccupancyCells ||
+      part.occupied.levels.size() <= static_cast<size_t>(std::countr_zero(OctantDistanceField::kMaxRatio))) {
     return "its occupancy is out of bounds";
   }
-  const uint32_t ratio = OctantDistances::ratioFor(cells);
+  const uint32_t ratio = OctantDistanceField::ratioFor(cells);
   if (part.distances.ratio != ratio || part.distances.cells != cells / ratio ||
       part.distances.coarse.size() != size_t{cells / ratio} * (cells / ratio) * (cells / ratio) ||
-      part.distances.nearCells() != nearCellsOf(part.occupied)) {
+      part.distances.nearCells() != countNearCells(part.occupied)) {
     return "its distances are not those of its cells";
   }
   return std::nullopt;
@@ -61,11 +61,11 @@ Broken ruleOfPart(const HashContent& content, const HashPart& part) {
 
 }  // namespace
 
-std::optional<std::string> mismatchWithTileset(const HashContent& content, const TileContent& promised) {
-  return mismatchOfParts(content.parts, promised);
+std::optional<std::string> mismatchWithTileset(const HashContent& content, const TileContent& declared) {
+  return mismatchOfParts(content.parts, declared);
 }
 
-std::optional<std::string> brokenRule(const HashContent& content) {
+std::optional<std::string> validationError(const HashContent& content) {
   if (!(content.step >= kShortestHashStep && content.step <= kLongestHashStep)) return "the step is out of bounds";
   if (auto broken = ruleOfNetwork(content.network, kInputs, kOutputs)) return broken;
   if (content.parts.empty()) return "there is no part";

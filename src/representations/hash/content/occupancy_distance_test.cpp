@@ -12,11 +12,11 @@
 namespace tessera {
 namespace {
 
-OccupancyBits scattered(uint32_t cells, uint32_t oneOf, uint64_t seed) {
+OccupancyBits scattered(uint32_t cells, uint32_t inverseDensity, uint64_t seed) {
   OccupancyBits bits(cells);
   const RandomStream random(seed, cells);
   for (size_t i = 0; i < bits.count(); ++i) {
-    if (random.below(i, oneOf) == 0) bits.set(i);
+    if (random.below(i, inverseDensity) == 0) bits.set(i);
   }
   return bits;
 }
@@ -29,7 +29,7 @@ struct Cell {
            static_cast<int>(number / cells / cells)} {}
 };
 
-// Is the cube of k cells an edge empty that begins at the cell and lies in the octant?
+// Returns whether the cube of k³ cells that begins at the cell and extends into the octant is empty.
 bool isEmptyCube(const OccupancyBits& bits, const Cell& cell, uint32_t octant, int k) {
   const auto within = [&](int c) { return c >= 0 && c < static_cast<int>(bits.cells); };
   for (int i = 0; i < k * k * k; ++i) {
@@ -44,26 +44,27 @@ bool isEmptyCube(const OccupancyBits& bits, const Cell& cell, uint32_t octant, i
   return true;
 }
 
-// Invariant 7.
+// Invariant 7 of `hash` (docs/invariants.md).
 TEST(OccupancyDistance, IsTheLargestEmptyCubeOfEachOctant) {
   for (const uint32_t cells : {1u, 2u, 5u, 8u, 20u}) {
-    for (const uint32_t oneOf : {1u, 4u, 40u, 400u, 4000u}) {
-      const OccupancyBits bits = scattered(cells, oneOf, oneOf);
+    for (const uint32_t inverseDensity : {1u, 4u, 40u, 400u, 4000u}) {
+      const OccupancyBits bits = scattered(cells, inverseDensity, inverseDensity);
       const std::vector<uint32_t> distances = octantDistances(bits);
       for (size_t i = 0; i<bits.count(); i += cells> 8 ? 7 : 1) {
         for (uint32_t octant = 0; octant < 8; ++octant) {
           const int k = static_cast<int>(octantDistance(distances[i], octant));
-          ASSERT_TRUE(isEmptyCube(bits, Cell(i, cells), octant, k)) << cells << " " << oneOf;
+          ASSERT_TRUE(isEmptyCube(bits, Cell(i, cells), octant, k)) << cells << " " << inverseDensity;
           if (k == 15) continue;
-          ASSERT_FALSE(isEmptyCube(bits, Cell(i, cells), octant, k + 1)) << cells << " " << oneOf;
+          ASSERT_FALSE(isEmptyCube(bits, Cell(i, cells), octant, k + 1)) << cells << " " << inverseDensity;
         }
       }
     }
   }
 }
 
-// Of a finest cell, whichever grid it is told by; and the edge of the cells that it is told in.
-uint32_t distanceOf(const OctantDistances& distances, const Cell& cell, uint32_t octant, uint32_t& edge) {
+// Returns the distance of a finest cell from whichever grid stores it, and in `edge` the width of that grid's cells in
+// finest cells.
+uint32_t lookUpDistance(const OctantDistanceField& distances, const Cell& cell, uint32_t octant, uint32_t& edge) {
   const size_t n = distances.cells, r = distances.ratio;
   size_t coarse = 0, fine = 0;
   for (int a = 2; a >= 0; --a) {
@@ -71,17 +72,17 @@ uint32_t distanceOf(const OctantDistances& distances, const Cell& cell, uint32_t
     fine = fine * r + static_cast<size_t>(cell.at[a]) % r;
   }
   const uint32_t word = distances.coarse[coarse];
-  edge = OctantDistances::isEmpty(word) ? distances.ratio : 1;
-  if (edge > 1 || r == 1) return OctantDistances::isEmpty(word) ? octantDistance(word, octant) : 0;
+  edge = OctantDistanceField::isEmpty(word) ? distances.ratio : 1;
+  if (edge > 1 || r == 1) return OctantDistanceField::isEmpty(word) ? octantDistance(word, octant) : 0;
   return octantDistance(distances.fine[(word >> 4) * r * r * r + fine], octant);
 }
 
-// Invariant 7, where distances are in two grids.
-TEST(OccupancyDistance, InTwoGridsIsOfEmptyCubesAndNearlyAsLargeAsTheyAre) {
+// Invariant 7 of `hash` (docs/invariants.md), where distances are stored in two grids.
+TEST(OccupancyDistance, IsThatOfNearlyTheLargestEmptyCubesInTwoGrids) {
   for (const uint32_t cells : {128u, 136u, 264u}) {
     OccupancyBits bits(cells);
     const RandomStream random(5, cells);
-    for (uint64_t ball = 0; ball < 30; ++ball) {  // clusters, and some alone
+    for (uint64_t ball = 0; ball < 30; ++ball) {  // clusters, and some single cells
       const uint32_t size = static_cast<uint32_t>(1 + ball % 7);
       uint32_t at[3];
       for (uint64_t a = 0; a < 3; ++a) at[a] = random.below(4 * ball + a, cells - size);
@@ -94,18 +95,18 @@ TEST(OccupancyDistance, InTwoGridsIsOfEmptyCubesAndNearlyAsLargeAsTheyAre) {
       if (bits.at(i)) set.push_back(i);
     }
     const OccupancyPyramid pyramid = pyramidFromOccupancy(bits);
-    const OctantDistances distances = octantDistances(pyramid);
+    const OctantDistanceField distances = octantDistances(pyramid);
     EXPECT_EQ(distances.ratio, cells <= 128 ? 1u : cells <= 256 ? 2u : 4u);
-    EXPECT_EQ(distances.nearCells(), nearCellsOf(pyramid));
+    EXPECT_EQ(distances.nearCells(), countNearCells(pyramid));
     size_t occupied = 0, near = 0;
-    double told = 0, largest = 0;
+    double stored = 0, largest = 0;
     for (uint64_t number = 0; number < 4000; ++number) {
-      // Most of them beside what is occupied.
+      // Most cells are next to occupied ones.
       size_t i = random.below(1000 + number, static_cast<uint32_t>(bits.count()));
       if (number % 20 != 0) i = set[i % set.size()] - std::min<size_t>(set[i % set.size()], number % 3);
       const uint32_t octant = static_cast<uint32_t>(number % 8);
       uint32_t edge = 0;
-      const uint32_t k = distanceOf(distances, Cell(i, cells), octant, edge);
+      const uint32_t k = lookUpDistance(distances, Cell(i, cells), octant, edge);
       occupied += bits.at(i);
       ASSERT_EQ(k == 0, bits.at(i));
       if (k == 0 || (edge > 1 && number % 100 != 0)) continue;
@@ -120,19 +121,19 @@ TEST(OccupancyDistance, InTwoGridsIsOfEmptyCubesAndNearlyAsLargeAsTheyAre) {
       ++near;
       int trueEdge = static_cast<int>(k);
       while (trueEdge < 15 && isEmptyCube(bits, from, octant, trueEdge + 1)) ++trueEdge;
-      told += k;
+      stored += k;
       largest += trueEdge;
     }
     EXPECT_GT(occupied, 300u);
     if (cells > 128) {
       EXPECT_GT(near, 200u) << cells;
     }
-    EXPECT_GE(told, 0.6 * largest) << cells;
+    EXPECT_GE(stored, 0.6 * largest) << cells;
   }
 }
 
 struct Ray {
-  double place[3], direction[3];  // in cells; of length 1
+  double place[3], direction[3];  // the place in cells; the direction has length 1
   size_t cell = 0;
   uint32_t octant = 0;
 
@@ -147,18 +148,19 @@ struct Ray {
     }
     for (double& d : direction) d /= std::sqrt(square);
   }
-  // Out of a cube of k cells that begins at its cell.
+  // Returns the distance at which the ray leaves the cube of k³ cells that begins at its cell.
   double exit(uint32_t k) const {
-    double least = 1e30;
+    double minimum = 1e30;
     for (int a = 0; a < 3; ++a) {
       const double face = std::floor(place[a]) + (direction[a] > 0 ? k : 1.0 - k);
-      least = std::min(least, (face - place[a]) / direction[a]);
+      minimum = std::min(minimum, (face - place[a]) / direction[a]);
     }
-    return least;
+    return minimum;
   }
 };
 
-// Invariant 7: from random places of a cell, in random directions, as far as it says.
+// Invariant 7 of `hash` (docs/invariants.md): no ray from a random place in a random direction meets an occupied cell
+// within the distance.
 TEST(OccupancyDistance, NeverLeadsIntoAnOccupiedCell) {
   const uint32_t cells = 24;
   const OccupancyBits bits = scattered(cells, 900, 9);
@@ -183,27 +185,27 @@ TEST(OccupancyDistance, NeverLeadsIntoAnOccupiedCell) {
       ASSERT_FALSE(bits.at(reached)) << number;
     }
   }
-  EXPECT_GT(far, 1000) << "rays that have somewhere to go";
+  EXPECT_GT(far, 1000) << "rays with a large distance";
 }
 
-// The least distance between any places of two cells, or between their middles, to the nearest occupied one, rounded
-// down: the paper's grid.
-int paperDistance(const OccupancyBits& bits, const Cell& cell, bool middles) {
-  double least = 1e9;
+// Returns the distance from a cell to the nearest occupied one, rounded down: the paper's grid. It is measured between
+// the closest points of the two cells, or between their centres.
+int paperDistance(const OccupancyBits& bits, const Cell& cell, bool centres) {
+  double minimum = 1e9;
   for (size_t i = 0; i < bits.count(); ++i) {
     if (!bits.at(i)) continue;
     const Cell other(i, bits.cells);
     double sum = 0;
     for (int a = 0; a < 3; ++a) {
-      const int apart = std::abs(cell.at[a] - other.at[a]), free = middles ? apart : std::max(apart - 1, 0);
+      const int apart = std::abs(cell.at[a] - other.at[a]), free = centres ? apart : std::max(apart - 1, 0);
       sum += free * free;
     }
-    least = std::min(least, std::sqrt(sum));
+    minimum = std::min(minimum, std::sqrt(sum));
   }
-  return static_cast<int>(least);
+  return static_cast<int>(minimum);
 }
 
-// Why the paper's grid is not what we use.
+// This is why the paper's grid is not used.
 TEST(OccupancyDistance, ReachesFurtherThanTheBallOfThePaper) {
   const uint32_t cells = 15;
   const OccupancyBits bits = scattered(cells, 300, 11);
@@ -215,7 +217,7 @@ TEST(OccupancyDistance, ReachesFurtherThanTheBallOfThePaper) {
     const uint32_t k = octantDistance(distances[ray.cell], ray.octant);
     if (k == 0) continue;
     const int ball = paperDistance(bits, Cell(ray.cell, cells), false);
-    // Within the ball nothing is, so a cube of that many cells along its diagonal lies in what is empty.
+    // The ball is empty, and so is the cube whose diagonal is as long as the ball's radius.
     EXPECT_GE(k, static_cast<uint32_t>(ball / std::sqrt(3.0)));
     cubes += ray.exit(k);
     balls += std::max<double>(ball, ray.exit(1));
@@ -223,15 +225,16 @@ TEST(OccupancyDistance, ReachesFurtherThanTheBallOfThePaper) {
   EXPECT_GT(cubes, 1.3 * balls);
 }
 
-// Invariant 8.
-TEST(OccupancyDistance, BetweenMiddlesWouldLeadIntoTheCellAcrossACorner) {
+// Invariant 8 of `hash` (docs/invariants.md).
+TEST(OccupancyDistance, StaysSafeAcrossACornerWhereDistancesBetweenCentresDoNot) {
   OccupancyBits bits(4);
   bits.set(bits.number(1, 1, 1));
   const size_t across = bits.number(2, 2, 2);
-  EXPECT_EQ(paperDistance(bits, Cell(across, 4), true), 1);  // though the two touch
+  EXPECT_EQ(paperDistance(bits, Cell(across, 4), true), 1);  // although the two cells touch
   EXPECT_EQ(paperDistance(bits, Cell(across, 4), false), 0);
-  EXPECT_EQ(octantDistance(octantDistances(bits)[across], 0), 1u);  // towards it: out of its own cell
-  EXPECT_GT(octantDistance(octantDistances(bits)[across], 7), 1u);  // away from it
+  EXPECT_EQ(octantDistance(octantDistances(bits)[across], 0),
+            1u);  // towards the occupied cell: only to the end of its own cell
+  EXPECT_GT(octantDistance(octantDistances(bits)[across], 7), 1u);  // away from the occupied cell
 }
 
 TEST(OccupancyDistance, StopsAt15) {

@@ -1,4 +1,4 @@
-// Draws contents of `hash` on the CPU: the oracle that every other renderer of them is held against.
+// Draws contents of `hash` on the CPU. This is the reference that every other renderer of them is compared with.
 #pragma once
 
 #include "raymarch/cpu/draw_scene.h"

@@ -10,7 +10,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "representations/hash/cpu/hash_features.cpp"
 #include <hwy/foreach_target.h>
-// after foreach_target
+// These must follow foreach_target.h.
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
@@ -21,31 +21,31 @@ namespace hn = hwy::HWY_NAMESPACE;
 constexpr uint32_t kFeatures = HashPart::kFeatures;
 constexpr size_t kEdge = HashPart::kStoredEdge;
 
-// Eight bytes as numbers: one vector, or two.
+// Eight bytes as floats, in one vector or two.
 using Tag = hn::CappedTag<float, 8>;
 constexpr size_t kLanes = hn::MaxLanes(Tag()), kVectors = 8 / kLanes;
 
-struct Eight {
+struct Lanes8 {
   hn::Vec<Tag> v[kVectors];
 };
 
-HWY_ATTR HWY_INLINE Eight zero() {
-  Eight sum;
+HWY_ATTR HWY_INLINE Lanes8 zero() {
+  Lanes8 sum;
   for (size_t i = 0; i < kVectors; ++i) sum.v[i] = hn::Zero(Tag());
   return sum;
 }
 
-HWY_ATTR HWY_INLINE Eight load(const float* from) {
-  Eight values;
+HWY_ATTR HWY_INLINE Lanes8 load(const float* from) {
+  Lanes8 values;
   for (size_t i = 0; i < kVectors; ++i) values.v[i] = hn::LoadU(Tag(), from + i * kLanes);
   return values;
 }
 
-HWY_ATTR HWY_INLINE void store(const Eight& sum, float* to) {
+HWY_ATTR HWY_INLINE void store(const Lanes8& sum, float* to) {
   for (size_t i = 0; i < kVectors; ++i) hn::StoreU(sum.v[i], Tag(), to + i * kLanes);
 }
 
-HWY_ATTR HWY_INLINE void addBytes(const uint8_t* bytes, float weight, Eight& sum) {
+HWY_ATTR HWY_INLINE void addBytes(const uint8_t* bytes, float weight, Lanes8& sum) {
   const Tag d;
   const hn::Rebind<int32_t, Tag> integers;
   const hn::Rebind<uint8_t, Tag> eight;
@@ -57,21 +57,21 @@ HWY_ATTR HWY_INLINE void addBytes(const uint8_t* bytes, float weight, Eight& sum
 }
 
 // low + step · mix
-HWY_ATTR HWY_INLINE Eight dequantised(const float* low, const float* step, const Eight& mix) {
-  Eight values;
+HWY_ATTR HWY_INLINE Lanes8 dequantised(const float* low, const float* step, const Lanes8& mix) {
+  Lanes8 values;
   for (size_t i = 0; i < kVectors; ++i) {
     values.v[i] = hn::MulAdd(hn::LoadU(Tag(), step + i * kLanes), mix.v[i], hn::LoadU(Tag(), low + i * kLanes));
   }
   return values;
 }
 
-// Corner k of eight is bit 0 of k further along x, bit 1 along y, bit 2 along z.
-constexpr uint32_t kPrimeY = 2654435761u, kPrimeZ = 805459861u;  // instant-ngp's
+// Bits 0, 1 and 2 of k, the number of one of the eight corners, are its offsets along x, y and z.
+constexpr uint32_t kPrimeY = 2654435761u, kPrimeZ = 805459861u;  // as in Instant-NGP
 alignas(32) constexpr uint32_t kHashX[8] = {0, 1, 0, 1, 0, 1, 0, 1};
 alignas(32) constexpr uint32_t kHashY[8] = {0, 0, kPrimeY, kPrimeY, 0, 0, kPrimeY, kPrimeY};
 alignas(32) constexpr uint32_t kHashZ[8] = {0, 0, 0, 0, kPrimeZ, kPrimeZ, kPrimeZ, kPrimeZ};
 
-// Of a trilinear mix, by corner.
+// Computes the trilinear weights of the eight corners.
 HWY_ATTR HWY_INLINE void cornerWeights(const float fraction[3], float* weights) {
   const float x = fraction[0], y = fraction[1], z = fraction[2];
   const float low[4] = {(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y};
@@ -132,20 +132,20 @@ HWY_ATTR void mixPlace(const HashFeatures::Layout& layout, const HashFeatures::L
   const Tag d;
   alignas(32) float weight[8];
   cornerWeights(lookup.cornerFraction, weight);
-  Eight low = zero(), high = zero();
+  Lanes8 low = zero(), high = zero();
   for (size_t k = 0; k < 8; ++k) {
     const uint8_t* bytes = lookup.corner + layout.columns * ((k & 1) + kEdge * (k >> 1 & 1) + kEdge * kEdge * (k >> 2));
     addBytes(bytes, weight[k], low);
     if (layout.varies) addBytes(bytes + kFeatures, weight[k], high);
   }
-  Eight sum = dequantised(layout.low.data(), layout.step.data(), low);
-  alignas(64) float sigmoids[2 * HashFeatures::kMostTables];
+  Lanes8 sum = dequantised(layout.low.data(), layout.step.data(), low);
+  alignas(64) float sigmoids[2 * HashFeatures::kMaxTables];
   const float* levelWeights = layout.weights.data();
   if (layout.varies) {
-    const Eight logits = dequantised(layout.low.data() + 8, layout.step.data() + 8, high);
-    Eight ones;
+    const Lanes8 logits = dequantised(layout.low.data() + 8, layout.step.data() + 8, high);
+    Lanes8 ones;
     for (size_t i = 0; i < kVectors; ++i) {
-      const auto logit = hn::Max(logits.v[i], hn::Set(d, -80.0f));  // beyond, Exp is not defined
+      const auto logit = hn::Max(logits.v[i], hn::Set(d, -80.0f));  // Exp is not defined beyond this
       ones.v[i] = hn::Div(hn::Set(d, 1.0f), hn::Add(hn::Set(d, 1.0f), hn::Exp(d, hn::Neg(logit))));
     }
     store(ones, sigmoids);
@@ -154,13 +154,14 @@ HWY_ATTR void mixPlace(const HashFeatures::Layout& layout, const HashFeatures::L
   for (size_t l = 0; l < layout.tables.size(); ++l) {
     const HashFeatures::Table& table = layout.tables[l];
     cornerWeights(lookup.fraction[l], weight);
-    Eight fine = zero();
+    Lanes8 fine = zero();
     for (size_t k = 0; k < 8; ++k) addBytes(table.bytes + size_t{8} * lookup.entry[l][k], weight[k], fine);
     fine = dequantised(table.low.data(), table.step.data(), fine);
     const size_t first = layout.logitsOfLevel * l;
-    const auto ofColours = hn::Set(d, levelWeights[layout.logitsOfLevel == 2 ? first + 1 : first]);
+    const auto colourWeight = hn::Set(d, levelWeights[layout.logitsOfLevel == 2 ? first + 1 : first]);
     for (size_t i = 0; i < kVectors; ++i) {
-      const auto w = i == 0 ? hn::IfThenElse(hn::FirstN(d, 1), hn::Set(d, levelWeights[first]), ofColours) : ofColours;
+      const auto w =
+          i == 0 ? hn::IfThenElse(hn::FirstN(d, 1), hn::Set(d, levelWeights[first]), colourWeight) : colourWeight;
       sum.v[i] = hn::MulAdd(w, fine.v[i], sum.v[i]);
     }
   }
@@ -177,7 +178,7 @@ HWY_EXPORT(findPlace);
 HWY_EXPORT(mixPlace);
 
 HashFeatures::HashFeatures(const HashContent& content, const HashPart& part) : part_(&part), layout_{} {
-  CHECK(part.tables.size() <= kMostTables);
+  CHECK(part.tables.size() <= kMaxTables);
   layout_.lattice = static_cast<float>(part.lattice);
   layout_.macroblocks = part.lattice / HashPart::kMacroblock;
   layout_.columns = part.columns;
@@ -202,7 +203,7 @@ HashFeatures::HashFeatures(const HashContent& content, const HashPart& part) : p
   }
   layout_.logitsOfLevel = content.logitsOfLevel();
   layout_.varies = part.columns > HashPart::kFeatures;
-  layout_.weights.fill(1);  // of what is not weighed
+  layout_.weights.fill(1);  // of levels without logits
   for (size_t i = 0; i < content.logits.size(); ++i) layout_.weights[i] = 1 / (1 + std::exp(-content.logits[i]));
 }
 

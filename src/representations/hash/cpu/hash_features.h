@@ -1,5 +1,5 @@
-// The features of places in a part of a `hash` content (NGP-RT, eq. 6 to 8): coarse ones and the weights of levels from
-// the lattice, fine ones from tables.
+// Interpolates the features at places in a part of a `hash` content (NGP-RT, eq. 6 to 8): coarse features and the
+// weights of levels come from the lattice, fine features from tables.
 #pragma once
 
 #include <array>
@@ -9,22 +9,23 @@
 
 namespace tessera {
 
-// Laid out for looking many places up. Borrows the content and the part.
+// A part's data laid out for many look-ups. Keeps references to the content and the part.
 class HashFeatures {
  public:
   HashFeatures(const HashContent& content, const HashPart& part);
 
-  static constexpr uint32_t kMostTables = HashPart::kMostTables;
-  // Where a place's bytes lie: to be fetched ahead of being mixed.
+  static constexpr uint32_t kMaxTables = HashPart::kMaxTables;
+  // Where the bytes for a place are stored, so that they can be prefetched before they are interpolated.
   struct Lookup {
     float cornerFraction[3];
-    const uint8_t* corner;  // the lowest of eight
-    float fraction[kMostTables][3];
-    alignas(32) uint32_t entry[kMostTables][8];
+    const uint8_t* corner;  // the lowest of the eight corners
+    float fraction[kMaxTables][3];
+    alignas(32) uint32_t entry[kMaxTables][8];
   };
-  // `place` in [0,1]³ of the part's domain. False where its corners are not stored. Begins to fetch the bytes.
+  // Fills in `lookup` for a place in [0,1]³ of the part's domain and prefetches its bytes. Returns false if the place's
+  // corners are not stored.
   bool find(const float place[3], Lookup& lookup) const;
-  // The logarithm of density, diffuse r g b, 4 features.
+  // Interpolates the features: log density, diffuse r g b, 4 features.
   void mix(const Lookup& lookup, float features[8]) const;
 
   const HashPart& part() const { return *part_; }
@@ -34,17 +35,16 @@ class HashFeatures {
     float scale;  // resolution - 1
     uint32_t resolution, entries, mask;
     bool hashed;
-    alignas(32) std::array<float, 8> low, step;  // of each feature
+    alignas(32) std::array<float, 8> low, step;  // for each feature
   };
   struct Layout {
     float lattice;
     uint32_t macroblocks, columns;
-    alignas(64) std::array<float, 16> low, step;  // of each column
+    alignas(64) std::array<float, 16> low, step;  // for each column
     std::vector<Table> tables;
-    // Of each level, its density's and its colours' weight where they are the same everywhere.
-    bool varies;
+    bool varies;  // the weights of levels vary from place to place
     uint32_t logitsOfLevel;
-    std::array<float, 2 * kMostTables> weights;
+    std::array<float, 2 * kMaxTables> weights;  // if they do not vary: [levels][logitsOfLevel], after the sigmoid
   };
 
  private:

@@ -11,7 +11,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "representations/hash/cpu/hash_march.cpp"
 #include <hwy/foreach_target.h>
-// after foreach_target
+// These must follow foreach_target.h.
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
@@ -20,7 +20,7 @@ namespace tessera::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// x, y and z of one place; the fourth lane means nothing.
+// Holds x, y and z of one place; the fourth lane is unused.
 using Tag = hn::FixedTag<float, 4>;
 using Vec = hn::Vec<Tag>;
 
@@ -31,16 +31,16 @@ HWY_ATTR HWY_INLINE Vec loaded(const double x[3], double factor, double offset) 
   return hn::Load(Tag(), lanes);
 }
 
-// Which cell holds a place.
+// The finest cell that contains a place.
 struct Cell {
   alignas(16) int32_t at[4];
 
-  // Of a grid of n cells along an edge, each 2^shift finest ones wide.
+  // Returns the index of this cell's cell in a grid of n cells along an edge, each 2^shift finest cells wide.
   size_t numberIn(size_t n, size_t shift) const {
     return static_cast<size_t>(at[0] >> shift) +
            n * (static_cast<size_t>(at[1] >> shift) + n * static_cast<size_t>(at[2] >> shift));
   }
-  // Among the finest cells of one that is 2^shift wide.
+  // Returns the index of this cell among the finest cells of its coarse cell, which is 2^shift finest cells wide.
   size_t numberWithin(uint32_t shift) const {
     const uint32_t mask = (1u << shift) - 1;
     return (static_cast<uint32_t>(at[0]) & mask) + ((static_cast<uint32_t>(at[1]) & mask) << shift) +
@@ -48,8 +48,8 @@ struct Cell {
   }
 };
 
-// A straight piece, measured in the finest cells of the occupancy; and how far a ray may go along it from an empty
-// place without coming to anything.
+// A straight segment of a path in units of the finest occupancy cells. It computes how far a ray can go along it
+// through empty space.
 class Piece {
  public:
   Piece() = default;
@@ -67,44 +67,45 @@ class Piece {
       if (isUp) octant_ |= 1u << a;
       up[a] = isUp ? 0.0f : 1.0f;
       sign[a] = isUp ? 1.0f : -1.0f;
-      inverse[a] = d == 0 ? -1e30f : static_cast<float>(1 / d);  // never the nearest, unless it is on a face
+      inverse[a] = d == 0 ? -1e30f : static_cast<float>(1 / d);  // never the nearest face, unless the ray lies on it
     }
     inverse_ = hn::Load(Tag(), inverse);
     up_ = hn::Load(Tag(), up);
     sign_ = hn::Load(Tag(), sign);
   }
 
-  // The place at a length, in cells, within the domain.
+  // Returns the place at a length along the segment, in cells, clamped to the domain.
   HWY_ATTR HWY_INLINE Vec at(float length) const {
     const Tag d;
-    const Vec most = hn::Set(d, static_cast<float>(levels_->cells) * (1 - 6e-8f));
-    return hn::Min(hn::Max(hn::MulAdd(direction_, hn::Set(d, length), start_), hn::Zero(d)), most);
+    const Vec maximum = hn::Set(d, static_cast<float>(levels_->cells) * (1 - 6e-8f));
+    return hn::Min(hn::Max(hn::MulAdd(direction_, hn::Set(d, length), start_), hn::Zero(d)), maximum);
   }
 
-  // The length up to which nothing is; negative where the cell is occupied.
+  // Returns the length along the segment up to which space is empty; a negative number if the cell is occupied.
   HWY_ATTR HWY_INLINE float emptyUpTo(const Cell& cell) const {
     if (distances_ != nullptr) {
       const uint32_t word = distances_->coarse[cell.numberIn(distances_->cells, coarseShift_)];
-      if (OctantDistances::isEmpty(word)) return leaves(cell, coarseShift_, octantDistance(word, octant_));
+      if (OctantDistanceField::isEmpty(word)) return exitLength(cell, coarseShift_, octantDistance(word, octant_));
       if (coarseShift_ == 0) return -1;
       const size_t finest = ((size_t{word} >> 4) << (3 * coarseShift_)) + cell.numberWithin(coarseShift_);
       const uint32_t free = octantDistance(distances_->fine[finest], octant_);
-      return free > 0 ? leaves(cell, 0, free) : -1;
+      return free > 0 ? exitLength(cell, 0, free) : -1;
     }
-    // The largest empty cell that holds the place.
+    // Use the largest empty cell that contains the place.
     for (size_t level = coarsest_;; --level) {
-      if (!levels_[level].at(cell.numberIn(levels_[level].cells, level))) return leaves(cell, level, 1);
+      if (!levels_[level].at(cell.numberIn(levels_[level].cells, level))) return exitLength(cell, level, 1);
       if (level == 0) return -1;
     }
   }
 
  private:
-  static constexpr uint32_t kCoarsestCells = 32;  // of the occupancy's levels that are looked into
-  // Finest cells: more than what places are rounded by, up to 1024 cells along an edge.
+  static constexpr uint32_t kCoarsestCells = 32;  // along an edge of the coarsest occupancy level used
+  // In finest cells. This exceeds the rounding error of places, up to 1024 cells along an edge.
   static constexpr float kSlack = 1e-3f;
 
-  // A cube of so many cells of a level along an edge that begins at the cell and lies in the piece's octant.
-  HWY_ATTR HWY_INLINE float leaves(const Cell& cell, size_t level, uint32_t free) const {
+  // Returns the length at which the ray leaves a cube that begins at the cell and extends into the segment's octant.
+  // `free` is the width of the cube in cells of the level.
+  HWY_ATTR HWY_INLINE float exitLength(const Cell& cell, size_t level, uint32_t free) const {
     const Tag d;
     const hn::RebindToSigned<Tag> integers;
     const int shift = static_cast<int>(level);
@@ -114,29 +115,29 @@ class Piece {
     const auto inCells = hn::MulSub(face, hn::Set(d, static_cast<float>(1u << level)), slack);
     alignas(16) float along[4];
     hn::Store(hn::Mul(hn::Sub(inCells, start_), inverse_), d, along);
-    return std::max(0.0f, std::min(std::min(along[0], along[1]), along[2]));  // below 0 says that something is there
+    return std::max(0.0f, std::min(std::min(along[0], along[1]), along[2]));  // a negative result would mean occupied
   }
 
   const OccupancyBits* levels_ = nullptr;
-  const OctantDistances* distances_ = nullptr;  // null: unused
-  uint32_t coarseShift_ = 0;                    // of their coarse cells
-  size_t coarsest_ = 0;                         // level that is looked into without them
+  const OctantDistanceField* distances_ = nullptr;  // null: not used
+  uint32_t coarseShift_ = 0;                        // log2 of the width of coarse cells
+  size_t coarsest_ = 0;                             // coarsest level used without distances
   uint32_t octant_ = 0;
   Vec start_, direction_, inverse_, up_, sign_;
 };
 
-// One ray on its way from sample to sample.
-class Traveller {
+// Moves one ray from sample to sample.
+class DdaCursor {
  public:
-  HWY_ATTR Traveller(const HashMarch& march, HashRay& ray)
-      : march_(march), ray_(ray), least_(march.settings.minTransmittance / ray.transmittanceBefore) {
+  HWY_ATTR DdaCursor(const HashMarch& march, HashRay& ray)
+      : march_(march), ray_(ray), min_(march.settings.minTransmittance / ray.transmittanceBefore) {
     length_ = march.step * 2 * part().halfDomain();
     enter();
   }
 
-  bool seesOn() const { return ray_.composite.transmittance >= least_; }
+  bool isActive() const { return ray_.composite.transmittance >= min_; }
 
-  // The next sample, whose bytes are then being fetched; false where there is none.
+  // Finds the next sample and prefetches its bytes. Returns false if there is none.
   HWY_ATTR bool find(MarchCounts& counts) {
     const Tag d;
     const hn::RebindToSigned<Tag> integers;
@@ -156,7 +157,7 @@ class Traveller {
         if (!march_.settings.skipEmptySpace) {
           if (!occupied.at(cell.numberIn(occupied.cells, 0))) continue;
         } else if (const float empty = piece_.emptyUpTo(cell); empty >= 0) {
-          // The first step whose middle lies there or beyond.
+          // Continue with the first step whose middle lies at or beyond that length.
           const float next = std::ceil(empty * perLength - 0.5f);
           if (next > static_cast<float>(step_)) step_ = static_cast<uint64_t>(std::min(next, 1e15f));
           continue;
@@ -176,7 +177,7 @@ class Traveller {
   const HashFeatures::Lookup& lookup() const { return lookup_; }
   float sampleLength() const { return sampleLength_; }
 
-  // Adds the sample that was found.
+  // Composites the sample that was found last.
   HWY_ATTR HWY_INLINE void add(const float features[HashPart::kFeatures], float opacity) {
     ContentComposite& composite = ray_.composite;
     const float weight = composite.transmittance * opacity;
@@ -197,8 +198,8 @@ class Traveller {
 
   const HashMarch& march_;
   HashRay& ray_;
-  float least_;
-  double length_;  // of a step, in the domain
+  float min_;
+  double length_;  // of a step, in domain units
   int number_ = 0;
   Piece piece_;
   uint64_t step_ = 0, steps_ = 0;
@@ -206,13 +207,13 @@ class Traveller {
   float sampleLength_ = 0, sampleDistance_ = 0;
 };
 
-constexpr size_t kTogether = 8;  // rays
+constexpr size_t kTogether = 8;  // rays marched in an interleaved way
 
-// 1 - exp(-x) where the logarithm of density and the length of a step are these; to a float's digits for small x too.
-HWY_ATTR void opacitiesOf(const float* logDensity, const float* length, float* opacity) {
+// Computes opacities 1 - exp(-x) with x = density · length, to float precision for small x as well.
+HWY_ATTR void computeOpacities(const float* logDensity, const float* length, float* opacity) {
   const hn::CappedTag<float, kTogether> d;
   for (size_t i = 0; i < kTogether; i += hn::Lanes(d)) {
-    const auto density = hn::Exp(d, hn::Min(hn::Load(d, logDensity + i), hn::Set(d, HashPart::kMostLogDensity)));
+    const auto density = hn::Exp(d, hn::Min(hn::Load(d, logDensity + i), hn::Set(d, HashPart::kMaxLogDensity)));
     const auto x = hn::Mul(density, hn::Load(d, length + i));
     const auto small =
         hn::Mul(x, hn::NegMulAdd(x, hn::NegMulAdd(x, hn::Set(d, 1.0f / 6), hn::Set(d, 0.5f)), hn::Set(d, 1.0f)));
@@ -225,29 +226,29 @@ HWY_ATTR void marchHash(const HashMarch& march, std::span<HashRay* const> rays, 
   alignas(64) float logDensity[kTogether] = {}, length[kTogether] = {}, opacity[kTogether];
   float features[kTogether][HashPart::kFeatures];
   for (size_t first = 0; first < rays.size(); first += kTogether) {
-    alignas(64) std::byte room[kTogether][sizeof(Traveller)];
-    Traveller* active[kTogether];
+    alignas(64) std::byte storage[kTogether][sizeof(DdaCursor)];
+    DdaCursor* active[kTogether];
     size_t count = 0;
     for (size_t i = first; i < std::min(first + kTogether, rays.size()); ++i) {
-      Traveller* traveller = new (room[i - first]) Traveller(march, *rays[i]);
-      if (traveller->seesOn()) active[count++] = traveller;
+      DdaCursor* cursor = new (storage[i - first]) DdaCursor(march, *rays[i]);
+      if (cursor->isActive()) active[count++] = cursor;
     }
     while (count > 0) {
-      size_t found = 0;
+      size_t sampled = 0;  // rays that have another sample
       for (size_t i = 0; i < count; ++i) {
-        if (active[i]->find(counts)) active[found++] = active[i];
+        if (active[i]->find(counts)) active[sampled++] = active[i];
       }
-      counts.samples += found;
-      for (size_t i = 0; i < found; ++i) {
+      counts.samples += sampled;
+      for (size_t i = 0; i < sampled; ++i) {
         march.features.mix(active[i]->lookup(), features[i]);
         logDensity[i] = features[i][0];
         length[i] = active[i]->sampleLength();
       }
-      opacitiesOf(logDensity, length, opacity);
+      computeOpacities(logDensity, length, opacity);
       count = 0;
-      for (size_t i = 0; i < found; ++i) {
+      for (size_t i = 0; i < sampled; ++i) {
         active[i]->add(features[i], opacity[i]);
-        if (active[i]->seesOn()) active[count++] = active[i];
+        if (active[i]->isActive()) active[count++] = active[i];
       }
     }
   }

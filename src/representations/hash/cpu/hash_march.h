@@ -1,10 +1,11 @@
-// Samples of one part of a `hash` content along a ray, composited (NGP-RT, section 4.3 and its supplement).
+// Marches rays through one part of a `hash` content and composites the samples (NGP-RT, section 4.3 and its
+// supplement).
 //
-// Each straight piece of the path is cut, from its entry on, into steps of one length in the domain, the last one
-// shorter; in the middle of each lies a sample, as in training (MarchBlocks). A sample is evaluated where the finest
-// occupancy says that something is. Where it says no, the ray leaves the empty cube of its octant (OctantDistances),
-// or, without these, the largest empty cell that holds the place; always by whole steps, so which samples are evaluated
-// does not depend on it.
+// Each straight segment of the path is divided, from its entry on, into steps of equal length in the domain, of which
+// the last is shorter. One sample lies in the middle of each step, as in training (MarchBlocks). A sample is evaluated
+// if its cell is occupied in the finest occupancy level. Otherwise the ray skips the empty cube of its octant
+// (OctantDistanceField) or, without distances, the largest empty cell that contains the place. It always skips whole
+// steps, so skipping does not change which samples are evaluated.
 #pragma once
 
 #include <span>
@@ -19,18 +20,18 @@ namespace tessera {
 struct HashRay {
   DomainPath path;
   float transmittanceBefore = 1;               // of all other contents in front of this one
-  ContentComposite composite;                  // what lies in front of this part; is gone on with
-  std::vector<uint64_t>* evaluated = nullptr;  // optional: piece << 32 | step of each sample is added
+  ContentComposite composite;                  // of what lies in front of this part; the samples are added to it
+  std::vector<uint64_t>* evaluated = nullptr;  // optional: receives segment << 32 | step of each sample
 };
 
-// Of a composite's values, diffuse colour and features are sums before any activation.
+// Composites diffuse colours and features as weighted sums, without any activation.
 struct HashMarch {
   const HashFeatures& features;
   double step;  // HashContent::step
   MarchSettings settings;
 
-  // Rays take turns: each finds its next sample and asks for its bytes; then all samples are mixed. So none waits for
-  // memory, and the processor always has several things to do. Rays do not depend on their company.
+  // Marches several rays in an interleaved way: each finds its next sample and prefetches its bytes, then all these
+  // samples are interpolated. This hides the latency of memory. The result of a ray does not depend on the other rays.
   void run(std::span<HashRay* const> rays, MarchCounts& counts) const;
 };
 

@@ -5,13 +5,13 @@
 #include <algorithm>
 
 #include "raymarch/cpu/part_path.h"
-#include "representations/hash/testing/made_hash.h"
 #include "representations/hash/testing/reference_hash.h"
+#include "representations/hash/testing/test_hash_content.h"
 
 namespace tessera {
 namespace {
 
-constexpr uint32_t kCells = 256;  // finer than the grid of distances
+constexpr uint32_t kCells = 256;  // finer than the coarse grid of distances
 
 HashContent scattered(bool contracted) {
   HashPart part;
@@ -19,30 +19,29 @@ HashContent scattered(bool contracted) {
   const RandomStream random(2, 2);
   uint64_t next = 0;
   makeHash(part, {16, kCells, 0, [&](const Vec3d&) { return random.below(next++, 1000) == 0; }}, smoothFeatures);
-  HashContent content = hashContentOf({part}, madeHashNetwork(1));
+  HashContent content = makeHashContent({part}, testHashNetwork(1));
   content.step = 1.0f / 400;
   return content;
 }
 
-struct Way {
+struct SkippingResult {
   MarchCounts counts;
   std::vector<uint64_t> samples;
   ContentComposite composite;
 };
 
-Way march(const HashContent& content, const HashFeatures& features, const SceneRay& ray, const RayRange& range,
-          const MarchSettings& settings) {
-  Way way;
-  HashRay one{partPath(content.parts[0], ray, range), 1, {}, &way.samples};
+SkippingResult march(const HashContent& content, const HashFeatures& features, const SceneRay& ray,
+                     const RayRange& range, const MarchSettings& settings) {
+  SkippingResult result;
+  HashRay one{partPath(content.parts[0], ray, range), 1, {}, &result.samples};
   HashRay* const rays[] = {&one};
-  HashMarch{features, content.step, settings}.run(rays, way.counts);
-  way.composite = one.composite;
-  return way;
+  HashMarch{features, content.step, settings}.run(rays, result.counts);
+  result.composite = one.composite;
+  return result;
 }
 
-// Rays that begin a hair from a cell's face, or run along an axis, are those whose next face rounding may put behind
-// them.
-TEST(HashMarch, MakesTheVerySameSamplesFromFacesAndAlongAxes) {
+// For rays that begin very close to a cell's face or run along an axis, rounding may place the next face behind them.
+TEST(HashMarch, EvaluatesTheSameSamplesFromFacesAndAlongAxes) {
   const RandomStream random(4, 4);
   size_t samples = 0;
   MarchCounts all, byCells, byDistances;
@@ -62,9 +61,9 @@ TEST(HashMarch, MakesTheVerySameSamplesFromFacesAndAlongAxes) {
       if (number % 6 == 0) ray.direction = -ray.direction;
       ray.direction.normalize();
       const RayRange range = contracted ? RayRange{0, 50} : ownedRange(content.parts[0], ray, RayRange{0, 50});
-      const Way slow = march(content, features, ray, range, {false, 0, false});
-      const Way cells = march(content, features, ray, range, {true, 0, false});
-      const Way fast = march(content, features, ray, range, {true, 0, true});
+      const SkippingResult slow = march(content, features, ray, range, {false, 0, false});
+      const SkippingResult cells = march(content, features, ray, range, {true, 0, false});
+      const SkippingResult fast = march(content, features, ray, range, {true, 0, true});
       ASSERT_EQ(cells.samples, slow.samples) << number;
       ASSERT_EQ(fast.samples, slow.samples) << number;
       ASSERT_EQ(fast.composite.transmittance, slow.composite.transmittance) << number;
@@ -79,14 +78,14 @@ TEST(HashMarch, MakesTheVerySameSamplesFromFacesAndAlongAxes) {
   EXPECT_LT(byDistances.steps, byCells.steps / 2);
 }
 
-TEST(HashMarch, MakesTheVerySameSamplesOfGridsThatAreNoPowersOfTwo) {
+TEST(HashMarch, EvaluatesTheSameSamplesInGridsThatAreNoPowersOfTwo) {
   const RandomStream random(6, 6);
   for (const uint32_t cells : {24u, 40u, 200u}) {
     HashPart part;
     part.contracted = true;
     uint64_t next = 0;
     makeHash(part, {24, cells, 0, [&](const Vec3d&) { return random.below(next++, 100) == 0; }}, smoothFeatures);
-    HashContent content = hashContentOf({part}, madeHashNetwork(1));
+    HashContent content = makeHashContent({part}, testHashNetwork(1));
     content.step = 1.0f / 300;
     const HashFeatures features(content, content.parts[0]);
     size_t samples = 0;
@@ -97,7 +96,7 @@ TEST(HashMarch, MakesTheVerySameSamplesOfGridsThatAreNoPowersOfTwo) {
         ray.direction[static_cast<Eigen::Index>(a)] = random.uniformDouble((uint64_t{1} << 41) + 6 * number + a) - 0.5;
       }
       ray.direction.normalize();
-      const Way slow = march(content, features, ray, {0, 1e6}, {false, 0, false});
+      const SkippingResult slow = march(content, features, ray, {0, 1e6}, {false, 0, false});
       ASSERT_EQ(march(content, features, ray, {0, 1e6}, {true, 0, false}).samples, slow.samples) << cells;
       ASSERT_EQ(march(content, features, ray, {0, 1e6}, {true, 0, true}).samples, slow.samples) << cells;
       samples += slow.samples.size();
@@ -106,13 +105,13 @@ TEST(HashMarch, MakesTheVerySameSamplesOfGridsThatAreNoPowersOfTwo) {
   }
 }
 
-// Weights of nothing and of all, wherever they stand.
+// Very small and very large logits give weights of 0 and 1, whether they vary or not.
 TEST(HashFeatures, WeighLevelsByLogitsOfAnySize) {
   for (const float logit : {-1e6f, -200.0f, -178.0f, -90.0f, 90.0f, 200.0f, 1e6f}) {
     HashPart part;
     makeHash(part, {16, 32, 0.5f}, smoothFeatures);
     for (size_t c = 8; c < 16; ++c) part.ranges[c] = {logit, logit};
-    HashContent varying = hashContentOf({part}, madeHashNetwork(1));
+    HashContent varying = makeHashContent({part}, testHashNetwork(1));
     HashContent constant = varying;
     constant.logits = {logit, logit};
     const HashFeatures a(varying, varying.parts[0]), b(constant, varying.parts[0]);
@@ -126,7 +125,7 @@ TEST(HashFeatures, WeighLevelsByLogitsOfAnySize) {
   }
 }
 
-TEST(HashMarch, OfARayDoesNotDependOnItsCompany) {
+TEST(HashMarch, MarchesEachRayIndependentlyOfTheOthers) {
   const HashContent content = scattered(false);
   const HashFeatures features(content, content.parts[0]);
   std::vector<HashRay> rays(40);
@@ -153,22 +152,22 @@ TEST(HashMarch, OfARayDoesNotDependOnItsCompany) {
   }
 }
 
-TEST(HashMarch, IsWhatTheDefinitionSays) {
+TEST(HashMarch, MatchesTheReferenceDefinition) {
   for (const bool contracted : {false, true}) {
     HashPart part;
     part.contracted = contracted;
     makeHash(part, {16, 32, 0.5f}, smoothFeatures);
-    const HashContent content = hashContentOf({part}, madeHashNetwork(1));
+    const HashContent content = makeHashContent({part}, testHashNetwork(1));
     const HashFeatures features(content, content.parts[0]);
     const SceneRay ray{Vec3d(-0.7, -0.6, 0.4), Vec3d(1, 0.7, -0.5).normalized()};
     const RayRange range = contracted ? RayRange{0.05, 30} : ownedRange(part, ray, {0.05, 10});
-    const Way way = march(content, features, ray, range, {true, 0, true});
+    const SkippingResult result = march(content, features, ray, range, {true, 0, true});
     ReferenceComposite expected;
     referenceMarch(content, part, ray, range, expected);
-    EXPECT_EQ(way.counts.samples, static_cast<uint64_t>(expected.samples));
-    EXPECT_NEAR(way.composite.transmittance, expected.transmittance, 1e-5);
-    EXPECT_NEAR(way.composite.depth, expected.depth, 1e-4);
-    for (int k = 0; k < 7; ++k) EXPECT_NEAR(way.composite.values[k], expected.values[k], 1e-4);
+    EXPECT_EQ(result.counts.samples, static_cast<uint64_t>(expected.samples));
+    EXPECT_NEAR(result.composite.transmittance, expected.transmittance, 1e-5);
+    EXPECT_NEAR(result.composite.depth, expected.depth, 1e-4);
+    for (int k = 0; k < 7; ++k) EXPECT_NEAR(result.composite.values[k], expected.values[k], 1e-4);
   }
 }
 

@@ -5,7 +5,7 @@
 
 namespace tessera {
 
-std::array<float, 16> harmonicsOf(const Vec3d& direction) {
+std::array<float, 16> evaluateHarmonics(const Vec3d& direction) {
   const float x = static_cast<float>(direction[0]), y = static_cast<float>(direction[1]),
               z = static_cast<float>(direction[2]);
   return {0.28209479177387814f,
@@ -37,7 +37,7 @@ HashShading::HashShading(const std::vector<const HashContent*>& contents, const 
       known.push_back(&content->network);
       networks_.emplace_back(content->network, kInputs, kOutputs);
     }
-    isWhole_ |= content->isWhole;
+    hasLearnedBackground_ |= content->hasLearnedBackground;
     for (const HashPart& part : content->parts) features_.emplace(&part, HashFeatures(*content, part));
   }
 }
@@ -84,26 +84,26 @@ void HashShading::add(size_t number, const ContentComposite& composite, size_t c
 void HashShading::end(size_t number, DrawnPixel& pixel) {
   const Lane& lane = lanes_[number];
   pixel = {{0, 0, 0}, lane.sums.transmittance, lane.sums.depth};
-  const bool whole = isWhole_ && lane.isOpen;
-  if (networks_.empty() || (!whole && lane.sums.transmittance >= 1)) return;
+  const bool isOpaque = hasLearnedBackground_ && lane.isOpen;
+  if (networks_.empty() || (!isOpaque && lane.sums.transmittance >= 1)) return;
   const auto heaviest = std::max_element(lane.weights.begin(), lane.weights.end(),
                                          [](const auto& a, const auto& b) { return a.second < b.second; });
   const size_t network = heaviest == lane.weights.end() ? networkOfContent_.back() : heaviest->first;
-  waiting_.push_back({&pixel, lane.sums, lane.direction, network, whole});
+  pending_.push_back({&pixel, lane.sums, lane.direction, network, isOpaque});
 }
 
 void HashShading::finish() {
   constexpr size_t kPacket = DenseNetwork::kPacket;
-  alignas(64) float values[DenseNetwork::kMostWidth * kPacket];
-  // Rays of one network side by side, however they came.
-  std::stable_sort(waiting_.begin(), waiting_.end(),
-                   [](const Waiting& a, const Waiting& b) { return a.network < b.network; });
-  for (size_t first = 0; first < waiting_.size();) {
-    const size_t network = waiting_[first].network;
+  alignas(64) float values[DenseNetwork::kMaxWidth * kPacket];
+  // Rays of the same network are placed next to each other.
+  std::stable_sort(pending_.begin(), pending_.end(),
+                   [](const PendingPixel& a, const PendingPixel& b) { return a.network < b.network; });
+  for (size_t first = 0; first < pending_.size();) {
+    const size_t network = pending_[first].network;
     size_t count = 0;
-    for (; count < kPacket && first + count < waiting_.size() && waiting_[first + count].network == network; ++count) {
-      const Waiting& ray = waiting_[first + count];
-      const std::array<float, 16> harmonics = harmonicsOf(ray.direction);
+    for (; count < kPacket && first + count < pending_.size() && pending_[first + count].network == network; ++count) {
+      const PendingPixel& ray = pending_[first + count];
+      const std::array<float, 16> harmonics = evaluateHarmonics(ray.direction);
       for (size_t k = 0; k < ContentComposite::kValues; ++k) values[k * kPacket + count] = ray.sums.values[k];
       for (size_t k = 0; k < harmonics.size(); ++k) {
         values[(ContentComposite::kValues + k) * kPacket + count] = harmonics[k];
@@ -114,10 +114,10 @@ void HashShading::finish() {
     }
     networks_[network].runPacket(values);
     for (size_t column = 0; column < count; ++column) {
-      const Waiting& ray = waiting_[first + column];
+      const PendingPixel& ray = pending_[first + column];
       DrawnPixel& pixel = *ray.pixel;
-      if (ray.whole) {
-        pixel.depth /= std::max(1 - pixel.transmittance, 1e-6f);  // of an opaque pixel
+      if (ray.isOpaque) {
+        pixel.depth /= std::max(1 - pixel.transmittance, 1e-6f);  // the pixel is opaque
         pixel.transmittance = 0;
       }
       for (size_t c = 0; c < kOutputs; ++c) {
@@ -127,7 +127,7 @@ void HashShading::finish() {
     }
     first += count;
   }
-  waiting_.clear();
+  pending_.clear();
 }
 
 }  // namespace tessera

@@ -1,6 +1,6 @@
-// The colour of what a ray's samples add up to, in all contents together (NGP-RT, eq. 5): sums of features know no
-// contents, so that what is cut into blocks looks as it did uncut. Blending finished colours would not: a sigmoid of a
-// sum is no sum of sigmoids.
+// Computes a ray's colour from the features that are composited over all contents together (NGP-RT, eq. 5). Because
+// features are composited before the colour is computed, a scene looks the same however it is divided into blocks.
+// Blending finished colours would not have this property: the sigmoid of a sum is not a sum of sigmoids.
 #pragma once
 
 #include <array>
@@ -15,14 +15,14 @@
 
 namespace tessera {
 
-// The first 16 real spherical harmonics of a unit direction, in the order and with the signs of tiny-cuda-nn.
-std::array<float, 16> harmonicsOf(const Vec3d& direction);
+// Returns the first 16 real spherical harmonics of a unit direction, in the order and with the signs of tiny-cuda-nn.
+std::array<float, 16> evaluateHarmonics(const Vec3d& direction);
 
-// C_d = Σ_k T_k C_d^k, F likewise, T_k = Π_{j<k} (1 - α^j). Once a ray, the network of those contents whose T_k α^k add
-// up to most (contents with the same numbers have the same network: those of a level) says z = C_d + ψ(C_d, F,
-// harmonics); the colour is (1 - T) sigmoid(z), or sigmoid(z) and opaque where contents are whole, unless something
-// else stands at the ray's end. Where nothing is met, the last content's network speaks. Networks are run for many rays
-// at a time.
+// Composites C_d = Σ_k T_k C_d^k, and F in the same way, with T_k = Π_{j<k} (1 - α^j). One network is evaluated for
+// each ray: z = C_d + ψ(C_d, F, harmonics), and the colour is (1 - T) sigmoid(z). If the contents have a learned
+// background and no other object stands at the ray's end, the pixel is opaque with the colour sigmoid(z). Contents with
+// equal parameters, such as those of one level of detail, share a network; the network with the largest sum of T_k α^k
+// is used, or that of the last content if the ray hits nothing. Networks are evaluated for many rays at a time.
 class HashShading {
  public:
   static constexpr uint32_t kInputs = 23, kOutputs = 3;
@@ -40,25 +40,25 @@ class HashShading {
   struct Lane {
     ContentComposite sums;
     Vec3d direction = Vec3d::UnitZ();
-    bool isOpen = true;                             // nothing else is known to be at its end
-    std::vector<std::pair<size_t, float>> weights;  // of networks that have been met
+    bool isOpen = true;                             // no other object stands at the ray's end
+    std::vector<std::pair<size_t, float>> weights;  // (network, weight) of contents hit
   };
-  struct Waiting {
+  struct PendingPixel {
     DrawnPixel* pixel;
     ContentComposite sums;
     Vec3d direction;
     size_t network;
-    bool whole;
+    bool isOpaque;  // it shows the learned background
   };
 
-  std::vector<DenseNetwork> networks_;    // each once
-  std::vector<size_t> networkOfContent_;  // its number, of each content
+  std::vector<DenseNetwork> networks_;    // without duplicates
+  std::vector<size_t> networkOfContent_;  // [contents], indices of networks_
   std::unordered_map<const HashPart*, HashFeatures> features_;
-  bool isWhole_ = false;
+  bool hasLearnedBackground_ = false;
   MarchSettings settings_;
   std::array<Lane, kRayLanes> lanes_;
   std::array<HashRay, kRayLanes> rays_;  // through one part
-  std::vector<Waiting> waiting_;
+  std::vector<PendingPixel> pending_;
 };
 
 template <>

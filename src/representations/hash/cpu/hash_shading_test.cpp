@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "raymarch/cpu/draw_scene.h"
-#include "representations/hash/testing/made_hash.h"
+#include "representations/hash/testing/test_hash_content.h"
 
 namespace tessera {
 namespace {
@@ -27,7 +27,7 @@ std::vector<Sample> randomSamples(size_t count) {
   return samples;
 }
 
-ContentComposite compositeOf(std::span<const Sample> samples) {
+ContentComposite compositeSamples(std::span<const Sample> samples) {
   ContentComposite composite;
   for (const Sample& sample : samples) {
     const float weight = composite.transmittance * sample.opacity;
@@ -55,32 +55,32 @@ void expectNear(const DrawnPixel& a, const DrawnPixel& b, double tolerance) {
   EXPECT_NEAR(a.depth, b.depth, tolerance * 50);
 }
 
-TEST(HashShading, OfSamplesCutAnywhereIntoContentsIsThatOfOne) {
+TEST(HashShading, IsIndependentOfHowSamplesAreDividedIntoContents) {
   const std::vector<Sample> samples = randomSamples(24);
   HashContent content;
-  content.network = madeHashNetwork(1);
-  const DrawnPixel whole = shade({&content}, {compositeOf(samples)});
+  content.network = testHashNetwork(1);
+  const DrawnPixel whole = shade({&content}, {compositeSamples(samples)});
   EXPECT_GT(whole.colour[0], 0.01f);
   for (size_t cut = 0; cut <= samples.size(); ++cut) {
     for (const size_t second : {cut, (cut + samples.size()) / 2}) {
       const std::span<const Sample> all(samples);
-      const DrawnPixel pieces = shade(
-          {&content, &content, &content},
-          {compositeOf(all.first(cut)), compositeOf(all.subspan(cut, second - cut)), compositeOf(all.subspan(second))});
+      const DrawnPixel pieces = shade({&content, &content, &content}, {compositeSamples(all.first(cut)),
+                                                                       compositeSamples(all.subspan(cut, second - cut)),
+                                                                       compositeSamples(all.subspan(second))});
       expectNear(pieces, whole, 1e-5);
     }
   }
 }
 
-// What blending of finished colours would say is far from it: why sums are blended.
-TEST(HashShading, OfFinishedColoursWouldBeAnother) {
+// Blending finished colours gives a very different result, which is why features are composited instead.
+TEST(HashShading, DiffersFromBlendingFinishedColours) {
   const std::vector<Sample> samples = randomSamples(24);
   HashContent content;
-  content.network = madeHashNetwork(1, 0);  // no network
+  content.network = testHashNetwork(1, 0);  // no network
   const std::span<const Sample> all(samples);
-  const DrawnPixel whole = shade({&content}, {compositeOf(all)});
-  const DrawnPixel first = shade({&content}, {compositeOf(all.first(12))}),
-                   second = shade({&content}, {compositeOf(all.subspan(12))});
+  const DrawnPixel whole = shade({&content}, {compositeSamples(all)});
+  const DrawnPixel first = shade({&content}, {compositeSamples(all.first(12))}),
+                   second = shade({&content}, {compositeSamples(all.subspan(12))});
   float largest = 0;
   for (int c = 0; c < 3; ++c) {
     largest = std::max(largest, std::abs(first.colour[c] + first.transmittance * second.colour[c] - whole.colour[c]));
@@ -88,70 +88,70 @@ TEST(HashShading, OfFinishedColoursWouldBeAnother) {
   EXPECT_GT(largest, 0.02f);
 }
 
-TEST(HashShading, OfAContentThatHoldsNothingChangesNothing) {
+TEST(HashShading, IsNotChangedByEmptyContents) {
   const std::vector<Sample> samples = randomSamples(8);
   HashContent content, empty;
-  content.network = madeHashNetwork(1);
-  empty.network = madeHashNetwork(2, 3);
-  const DrawnPixel alone = shade({&content}, {compositeOf(samples)});
+  content.network = testHashNetwork(1);
+  empty.network = testHashNetwork(2, 3);
+  const DrawnPixel alone = shade({&content}, {compositeSamples(samples)});
   for (const bool front : {true, false}) {
-    const ContentComposite nothing, something = compositeOf(samples);
+    const ContentComposite nothing, something = compositeSamples(samples);
     const DrawnPixel both =
         front ? shade({&empty, &content}, {nothing, something}) : shade({&content, &empty}, {something, nothing});
     expectNear(both, alone, 0);
   }
 }
 
-TEST(HashShading, OfNothingIsNothing) {
+TEST(HashShading, LeavesRaysThatHitNothingTransparent) {
   HashContent content;
-  content.network = madeHashNetwork(1);
+  content.network = testHashNetwork(1);
   const DrawnPixel pixel = shade({&content}, {ContentComposite()});
   expectNear(pixel, {}, 0);
 }
 
-TEST(HashShading, OfNothingInAWholeSceneIsWhatTheNetworkSaysOfTheDirection) {
+TEST(HashShading, ShowsTheLearnedBackgroundWhereARayHitsNothing) {
   HashContent content;
-  content.isWhole = true;
-  content.network = madeHashNetwork(1);
+  content.hasLearnedBackground = true;
+  content.network = testHashNetwork(1);
   const DrawnPixel pixel = shade({&content}, {ContentComposite()});
   EXPECT_EQ(pixel.transmittance, 0);
-  alignas(64) float values[DenseNetwork::kMostWidth] = {};
-  const std::array<float, 16> harmonics = harmonicsOf(kDirection);
+  alignas(64) float values[DenseNetwork::kMaxWidth] = {};
+  const std::array<float, 16> harmonics = evaluateHarmonics(kDirection);
   std::copy(harmonics.begin(), harmonics.end(), values + 7);
   DenseNetwork(content.network, 23, 3).run(values);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(pixel.colour[c], 1 / (1 + std::exp(-values[c])), 1e-6);
 }
 
-TEST(HashShading, OfAWholeSceneLetsWhatStandsInItBeSeen) {
+TEST(HashShading, ShowsObjectsInFrontOfTheLearnedBackground) {
   const std::vector<Sample> samples = randomSamples(5);
   HashContent part, whole;
-  part.network = whole.network = madeHashNetwork(1);
-  whole.isWhole = true;
-  const ContentComposite thin = compositeOf(samples);
+  part.network = whole.network = testHashNetwork(1);
+  whole.hasLearnedBackground = true;
+  const ContentComposite thin = compositeSamples(samples);
   ASSERT_GT(thin.transmittance, 0.2f);
   expectNear(shade({&whole}, {thin}, 7), shade({&part}, {thin}, 7), 1e-6);
   const DrawnPixel open = shade({&whole}, {thin}), closed = shade({&part}, {thin});
   EXPECT_EQ(open.transmittance, 0);
-  EXPECT_NEAR(open.depth, closed.depth / (1 - closed.transmittance), 1e-4) << "of an opaque pixel";
+  EXPECT_NEAR(open.depth, closed.depth / (1 - closed.transmittance), 1e-4) << "the pixel is opaque";
   for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(open.colour[c], closed.colour[c] / (1 - closed.transmittance), 1e-5);
 }
 
-TEST(HashShading, OfNothingInAWholeSceneIsWhatItsLastContentSays) {
+TEST(HashShading, TakesTheLearnedBackgroundOfTheLastContent) {
   HashContent near, far;
-  near.isWhole = far.isWhole = true;
-  near.network = madeHashNetwork(1);
-  far.network = madeHashNetwork(2);
+  near.hasLearnedBackground = far.hasLearnedBackground = true;
+  near.network = testHashNetwork(1);
+  far.network = testHashNetwork(2);
   expectNear(shade({&near, &far}, {}), shade({&far}, {}), 0);
 }
 
-TEST(HashShading, AddsUpWhatOneContentShowsInSeveralTiles) {
+TEST(HashShading, AddsTheWeightsOfOneContentOverSeveralTiles) {
   const std::vector<Sample> samples = randomSamples(9);
   const std::span<const Sample> all(samples);
   HashContent one, other;
-  one.network = madeHashNetwork(1);
-  other.network = madeHashNetwork(2);
-  const std::vector<ContentComposite> pieces = {compositeOf(all.first(3)), compositeOf(all.subspan(3, 4)),
-                                                compositeOf(all.subspan(7))};
+  one.network = testHashNetwork(1);
+  other.network = testHashNetwork(2);
+  const std::vector<ContentComposite> pieces = {compositeSamples(all.first(3)), compositeSamples(all.subspan(3, 4)),
+                                                compositeSamples(all.subspan(7))};
   const float first = 1 - pieces[0].transmittance, second = pieces[0].transmittance * (1 - pieces[1].transmittance),
               third = pieces[0].transmittance * pieces[1].transmittance * (1 - pieces[2].transmittance);
   ASSERT_GT(first + third, second);
@@ -162,9 +162,9 @@ TEST(HashShading, TakesTheNetworkOfTheContentThatIsSeenMost) {
   const std::vector<Sample> samples = randomSamples(9);
   const std::span<const Sample> all(samples);
   HashContent one, other;
-  one.network = madeHashNetwork(1);
-  other.network = madeHashNetwork(2);
-  const ContentComposite thin = compositeOf(all.first(1)), thick = compositeOf(all.subspan(1));
+  one.network = testHashNetwork(1);
+  other.network = testHashNetwork(2);
+  const ContentComposite thin = compositeSamples(all.first(1)), thick = compositeSamples(all.subspan(1));
   ASSERT_GT((1 - thick.transmittance) * thin.transmittance, 1 - thin.transmittance);
   expectNear(shade({&one, &other}, {thin, thick}), shade({&other, &other}, {thin, thick}), 1e-6);
   ASSERT_GT(1 - thick.transmittance, (1 - thin.transmittance) * thick.transmittance);
@@ -175,10 +175,10 @@ TEST(HashShading, CountsContentsOfOneNetworkTogether) {
   const std::vector<Sample> samples = randomSamples(12);
   const std::span<const Sample> all(samples);
   HashContent left, right, other;
-  left.network = right.network = madeHashNetwork(1);
-  other.network = madeHashNetwork(2);
-  const std::vector<ContentComposite> pieces = {compositeOf(all.first(4)), compositeOf(all.subspan(4, 3)),
-                                                compositeOf(all.subspan(7))};
+  left.network = right.network = testHashNetwork(1);
+  other.network = testHashNetwork(2);
+  const std::vector<ContentComposite> pieces = {compositeSamples(all.first(4)), compositeSamples(all.subspan(4, 3)),
+                                                compositeSamples(all.subspan(7))};
   const float first = 1 - pieces[0].transmittance, second = pieces[0].transmittance * (1 - pieces[1].transmittance),
               third = pieces[0].transmittance * pieces[1].transmittance * (1 - pieces[2].transmittance);
   ASSERT_GT(second, std::max(first, third));
@@ -202,9 +202,9 @@ Pose lookingAlongX() {
   return {Eigen::AngleAxisd(0.1, Vec3d(1, 1, 1).normalized()) * rotation, Vec3d(-4, 0.1, 0.05)};
 }
 
-// Where every step sees the same, it does not matter where rays are cut: two cells and one twice as wide.
-TEST(DrawHash, CutAnywhereLooksAsItDoesUncut) {
-  const std::vector<DenseLayer> network = madeHashNetwork(4);
+// With constant features it does not matter where rays are divided: into two cells, or one that is twice as wide.
+TEST(DrawHash, RendersTheSameImageHoweverTheSceneIsDivided) {
+  const std::vector<DenseLayer> network = testHashNetwork(4);
   const auto features = [](const Vec3d&) { return std::array<float, 8>{-0.4f, 1, -1, 0.5f, 2, -2, 1, 0.3f}; };
   const auto piece = [&](float low, float high) {
     HashPart part;
@@ -212,7 +212,7 @@ TEST(DrawHash, CutAnywhereLooksAsItDoesUncut) {
     part.low = {low, -1, -1};
     part.high = {high, 1, 1};
     makeHash(part, {}, features);
-    return hashContentOf({part}, network);
+    return makeHashContent({part}, network);
   };
   const HashContent whole = piece(-2, 2), left = piece(-2, 0.3f), right = piece(0.3f, 2);
   ThreadPool pool(2);
@@ -224,35 +224,35 @@ TEST(DrawHash, CutAnywhereLooksAsItDoesUncut) {
   cut.frontToBack = {&left, &right};
   const RenderedView a = drawScene(uncut, camera(), lookingAlongX(), nullptr, pool);
   const RenderedView b = drawScene(cut, camera(), lookingAlongX(), nullptr, pool);
-  float most = 0;
+  float maximum = 0;
   for (size_t i = 0; i < a.colour.pixels.size(); ++i) {
     ASSERT_NEAR(a.colour.pixels[i], b.colour.pixels[i], 1e-5);
-    most = std::max(most, a.colour.pixels[i]);
+    maximum = std::max(maximum, a.colour.pixels[i]);
   }
   for (size_t i = 0; i < a.opacity.pixels.size(); ++i) ASSERT_NEAR(a.opacity.pixels[i], b.opacity.pixels[i], 1e-5);
-  EXPECT_GT(most, 0.2f);
+  EXPECT_GT(maximum, 0.2f);
 }
 
-TEST(DrawHash, IsThePictureWithAndWithoutSkippingAndWhateverTheThreads) {
+TEST(DrawHash, RendersTheSameImageWithAndWithoutSkippingOnAnyNumberOfThreads) {
   HashPart part;
   makeHash(part, {16, 64, 0.5f, [](const Vec3d& at) { return at.norm() < 0.5; }}, smoothFeatures);
-  const HashContent content = hashContentOf({part}, madeHashNetwork(5));
+  const HashContent content = makeHashContent({part}, testHashNetwork(5));
   SceneDrawing<HashContent> drawing;
   drawing.frontToBack = {&content};
   ThreadPool one(1), two(2);
-  MarchCounts most, byCells, fewest;
-  const RenderedView fast = drawScene(drawing, camera(), lookingAlongX(), nullptr, two, &fewest);
+  MarchCounts maximum, byCells, minimum;
+  const RenderedView fast = drawScene(drawing, camera(), lookingAlongX(), nullptr, two, &minimum);
   drawing.march.useDistances = false;
   const RenderedView cells = drawScene(drawing, camera(), lookingAlongX(), nullptr, one, &byCells);
   drawing.march.skipEmptySpace = false;
-  const RenderedView slow = drawScene(drawing, camera(), lookingAlongX(), nullptr, one, &most);
+  const RenderedView slow = drawScene(drawing, camera(), lookingAlongX(), nullptr, one, &maximum);
   EXPECT_EQ(fast.colour.pixels, slow.colour.pixels);
   EXPECT_EQ(fast.colour.pixels, cells.colour.pixels);
   EXPECT_EQ(fast.depth.pixels, slow.depth.pixels);
-  EXPECT_EQ(fewest.samples, most.samples);
-  EXPECT_GT(fewest.samples, 500u);
-  EXPECT_LT(byCells.steps, most.steps);
-  EXPECT_LE(fewest.steps, byCells.steps);
+  EXPECT_EQ(minimum.samples, maximum.samples);
+  EXPECT_GT(minimum.samples, 500u);
+  EXPECT_LT(byCells.steps, maximum.steps);
+  EXPECT_LE(minimum.steps, byCells.steps);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// For tests: the cube cut into blocks, and a `hash` model that has learned it.
+// For tests: a `hash` model that is trained on the cube scene, divided into blocks.
 #pragma once
 
 #include "representations/hash/train/hash_trainer.h"
@@ -6,26 +6,26 @@
 
 namespace tessera {
 
-// Small enough for seconds, large enough to learn the cube.
+// A model that is small enough to train within seconds and large enough to learn the cube.
 inline HashConfig smallHashConfig() {
   HashConfig config;
-  config.surround = "none";
+  config.backgroundBlock = "none";
   config.lattice = 16;
   config.coarseLevels = 3;
   config.coarseLog2Size = 12;
   config.coarseBase = 4;
   config.width = 16;
-  config.levels = 2;
+  config.fineLevels = 2;
   config.fineLog2Size = 13;
   config.directionWidth = 16;
-  config.step = 0.5;
+  config.maxRayStep = 0.5;
   config.occupancyResolution = 32;
   config.samplesPerStep = 1 << 13;
   config.texelsPerStep = 1 << 14;
-  config.mostRays = 2048;
-  config.occupancyWarmUp = 32;
-  config.rate = 2e-2;
-  config.rampShare = 0;
+  config.maxRays = 2048;
+  config.occupancyWarmupSteps = 32;
+  config.learningRate = 2e-2;
+  config.lossWarmupFraction = 0;
   config.fullGradientDistance = 0;
   config.exposure = false;
   return config;

@@ -1,4 +1,4 @@
-// For tests: the renderer on the CPU of scenes of `hash`.
+// For tests: the CPU renderer for `hash` scenes.
 #pragma once
 
 #include "render/cpu/scene_renderer.h"

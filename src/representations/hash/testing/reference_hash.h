@@ -1,5 +1,5 @@
-// For tests: one part of a `hash` content marched by the definition (docs/tile-format.md, section 7), in double,
-// slowly.
+// For tests: marches through one part of a `hash` content exactly as docs/tile-format.md, section 7, defines it, in
+// double precision and without acceleration.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace tessera {
 
-// The eight features of a place in [0,1]³ of the domain; false where nothing is.
+// Computes the eight features at a place in [0,1]³ of the domain. Returns false where the content is empty.
 inline bool referenceFeatures(const HashContent& content, const HashPart& part, const Triple<double>& p,
                               double features[8]) {
   const int cells = static_cast<int>(part.cells()), blocks = static_cast<int>(part.lattice / 8);
@@ -26,7 +26,7 @@ inline bool referenceFeatures(const HashContent& content, const HashPart& part, 
   if (!part.occupied.levels[0].at(cell[0], cell[1], cell[2])) return false;
   const uint32_t stored = part.macroblocks[static_cast<size_t>(block[0] + blocks * (block[1] + blocks * block[2]))];
   if (stored == HashPart::kEmpty) return false;
-  const auto valueOf = [](const ByteRange& range, uint8_t byte) {
+  const auto decodeByte = [](const ByteRange& range, uint8_t byte) {
     return static_cast<double>(range.low) + (static_cast<double>(range.high) - range.low) * byte / 255;
   };
   double columns[16] = {};
@@ -39,7 +39,8 @@ inline bool referenceFeatures(const HashContent& content, const HashPart& part, 
       weight *= up ? fraction[a] : 1 - fraction[a];
     }
     for (size_t c = 0; c < part.columns; ++c) {
-      columns[c] += weight * valueOf(part.ranges[c], part.cornerBytes[(stored * size_t{729} + at) * part.columns + c]);
+      columns[c] +=
+          weight * decodeByte(part.ranges[c], part.cornerBytes[(stored * size_t{729} + at) * part.columns + c]);
     }
   }
   for (int f = 0; f < 8; ++f) features[f] = columns[f];
@@ -58,21 +59,22 @@ inline bool referenceFeatures(const HashContent& content, const HashPart& part, 
       const uint32_t entry =
           table.hashed ? (point[0] ^ (2654435761u * point[1]) ^ (805459861u * point[2])) % table.entries
                        : (point[0] + table.resolution * (point[1] + table.resolution * point[2])) % table.entries;
-      for (size_t f = 0; f < 8; ++f) fine[f] += weight * valueOf(table.ranges[f], table.bytes[8 * size_t{entry} + f]);
+      for (size_t f = 0; f < 8; ++f)
+        fine[f] += weight * decodeByte(table.ranges[f], table.bytes[8 * size_t{entry} + f]);
     }
     const auto sigmoid = [](double x) { return 1 / (1 + std::exp(-x)); };
     const uint32_t n = content.logitsOfLevel();
-    const auto weightOf = [&](uint32_t which) {
+    const auto levelWeight = [&](uint32_t which) {
       if (n == 0) return 1.0;
       const size_t number = n * l + std::min(which, n - 1);
       return sigmoid(content.logits.empty() ? columns[8 + number] : static_cast<double>(content.logits[number]));
     };
-    for (int f = 0; f < 8; ++f) features[f] += weightOf(f == 0 ? 0 : 1) * fine[f];
+    for (int f = 0; f < 8; ++f) features[f] += levelWeight(f == 0 ? 0 : 1) * fine[f];
   }
   return true;
 }
 
-// Diffuse colour and features are sums without any activation.
+// Composites the samples of a ray. Diffuse colour and features are weighted sums without any activation.
 inline void referenceMarch(const HashContent& content, const HashPart& part, const SceneRay& ray, RayRange range,
                            ReferenceComposite& out) {
   const double step = 2.0 * part.halfDomain() * content.step;

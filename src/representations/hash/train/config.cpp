@@ -15,20 +15,20 @@ HashConfig HashConfig::ofPreset(const std::string& name) {
   config.preset = name;
   if (name == "cpu") return config;
   if (name != "paper") throw Error("--set preset=" + name, "", "there is no such preset", "use cpu or paper");
-  config.surround = "border";
+  config.backgroundBlock = "border";
   config.background = "learned";
   config.lattice = 512;
   config.coarseLevels = 6;
-  config.step = 0.5 * std::sqrt(3.0);  // half of a voxel's diagonal
-  config.fineRateFactor = 1;
-  config.rampShare = 0.5;
-  config.distortion = 0.1;  // the paper's 0.01, beside ten times its Huber loss (compute/losses.h)
-  config.warmUpSteps = 1000;
-  config.rateFall = "linear";
-  config.networkL2 = config.depth = config.knownShare = config.fullGradientDistance = 0;
+  config.maxRayStep = 0.5 * std::sqrt(3.0);  // half of a voxel's diagonal
+  config.fineLearningRateFactor = 1;
+  config.lossWarmupFraction = 0.5;
+  config.distortionWeight = 0.1;  // the paper's 0.01 times 10, as this Huber loss is (compute/losses.h)
+  config.warmupSteps = 1000;
+  config.learningRateSchedule = "linear";
+  config.networkL2 = config.depthWeight = config.sparseDepthRayFraction = config.fullGradientDistance = 0;
   config.exposure = false;
   config.coarseLog2Size = 21;
-  config.levels = 2;
+  config.fineLevels = 2;
   config.fineLog2Size = 22;
   config.samplesPerStep = 1 << 20;
   config.texelsPerStep = 1 << 21;
@@ -42,9 +42,9 @@ HashConfig::HashConfig() {
 std::vector<ConfigField> HashConfig::fields() {
   return {
       presetSetting(),
-      levelSetting(),
+      lodSetting(),
       finestStepSetting(),
-      surroundSetting(),
+      backgroundBlockSetting(),
       backgroundSetting(),
       nearSetting(),
       latticeSetting(),
@@ -54,91 +54,91 @@ std::vector<ConfigField> HashConfig::fields() {
       coarseBaseSetting(),
       widthSetting(),
       hiddenSetting(),
-      levelsSetting(),
+      fineLevelsSetting(),
       fineLog2SizeSetting(),
       aggregationSetting(),
       attentionSetting(),
       attentionVariesSetting(),
       directionWidthSetting(),
       directionHiddenSetting(),
-      stepSetting(),
+      maxRayStepSetting(),
       occupancyResolutionSetting(),
       seedSetting(),
       samplesPerStepSetting(),
       texelsPerStepSetting().byDefault(3 << 16),
       firstRaysSetting(),
-      mostRaysSetting().byDefault(8000),
+      maxRaysSetting().byDefault(8000),
       photoBudgetMiBSetting(),
       stepsPerPhotoSetting(),
       occupancyEverySetting(),
-      occupancyWarmUpSetting(),
-      occupancyShareSetting(),
-      rateSetting(),
-      fineRateFactorSetting(),
-      warmUpStepsSetting(),
-      rateFallSetting(),
-      finalRateFactorSetting(),
-      constantRateShareSetting(),
+      occupancyWarmupStepsSetting(),
+      occupancyUpdateFractionSetting(),
+      learningRateSetting(),
+      fineLearningRateFactorSetting(),
+      warmupStepsSetting(),
+      learningRateScheduleSetting(),
+      finalLearningRateFactorSetting(),
+      constantLearningRateFractionSetting(),
       networkL2Setting(),
-      exposureRateSetting(),
+      exposureLearningRateSetting(),
       lossSetting().byDefault("huber"),
       lossParameterSetting(),
-      distortionSetting(),
-      rampShareSetting(),
+      distortionWeightSetting(),
+      lossWarmupFractionSetting(),
       fullGradientDistanceSetting().byDefault(0.25),
-      depthSetting(),
+      depthWeightSetting(),
       depthToleranceSetting(),
-      knownShareSetting(),
-      levelShareSetting(),
-      fewestSamplesSetting(),
-      shortestStepSetting(),
-      stepChangeSetting(),
+      sparseDepthRayFractionSetting(),
+      lodStepFractionSetting(),
+      minSamplesPerRaySetting(),
+      minRayStepRatioSetting(),
+      rayStepChangeSetting(),
       exposureSetting(),
   };
 }
 
 namespace {
 
-// A viewer has the network's numbers in its shaders, in vectors of four.
-void requireDrawable(const MlpShape& shape) {
+// Throws Error if the network exceeds what viewers can hold: their shaders contain its weights, in vectors of four.
+void requireRenderSource(const MlpShape& shape) {
   uint32_t vectors = 0;
   for (int layer = 0; layer < shape.layers(); ++layer) {
     const int inputs = layer == 0 ? shape.inputs : shape.width;
     const int outputs = layer == shape.hiddenLayers ? shape.outputs : shape.width;
     vectors += networkVectors(static_cast<uint32_t>(inputs), static_cast<uint32_t>(outputs));
   }
-  if (vectors <= kMostNetworkVectors) return;
+  if (vectors <= kMaxNetworkVectors) return;
   throw Error(fmt::format("--set direction_width={} direction_hidden={}", shape.width, shape.hiddenLayers), "",
-              fmt::format("a network of {} vectors of four numbers; scenes take {}", vectors, kMostNetworkVectors),
+              fmt::format("a network of {} vectors of four numbers; scenes take {}", vectors, kMaxNetworkVectors),
               "use a narrower or shallower one");
 }
 
 }  // namespace
 
-void HashConfig::keepFound(const HashConfig& run) {
-  if (distortion) return;
-  if (!run.distortion) {
-    throw Error("config.toml", "distortion", "is auto, where a run that has begun has a number",
+void HashConfig::adoptTunedValues(const HashConfig& run) {
+  if (distortionWeight) return;
+  if (!run.distortionWeight) {
+    throw Error("config.toml", "distortion_weight", "is auto, but the config.toml of a run that has begun must have a number",
                 "restore the file, or train into another folder");
   }
-  distortion = run.distortion;
+  distortionWeight = run.distortionWeight;
 }
 
 void HashConfig::check() const {
   ofPreset(preset);
-  surroundKind();
+  backgroundBlockKind();
   HashConfig checked = *this;
   requireWithinBounds(checked.fields());
-  requireDrawable(directionShape());
+  requireRenderSource(directionShape());
 }
 
-Surround HashConfig::surroundKind() const {
-  return surroundNamed(surround);
+BackgroundBlock HashConfig::backgroundBlockKind() const {
+  return backgroundBlockNamed(backgroundBlock);
 }
 
 AttentionShape HashConfig::attentionShape() const {
   AttentionShape shape;
-  shape.levels = static_cast<uint32_t>(levels);
+  shape.levels = static_cast<uint32_t>(fineLevels);
   shape.weights = aggregation == "sum"    ? AttentionWeights::none
                   : attention == "shared" ? AttentionWeights::shared
                                           : AttentionWeights::separate;
@@ -165,17 +165,17 @@ BlockFieldShape HashConfig::coarseShape() const {
 
 HashGrid HashConfig::fineGrid() const {
   HashGridOptions grid;
-  grid.levels = levels;
+  grid.levels = fineLevels;
   grid.features = static_cast<int>(AttentionShape::kFeatures);
   grid.log2TableSize = fineLog2Size;
   grid.baseResolution = 2 * lattice;
-  grid.finestResolution = lattice << levels;
+  grid.finestResolution = lattice << fineLevels;
   return HashGrid(grid);
 }
 
 MlpShape HashConfig::mixShape() const {
   MlpShape shape;
-  shape.inputs = static_cast<int>(LatticeForward::kColumns + AttentionShape::kFeatures * levels);
+  shape.inputs = static_cast<int>(LatticeForward::kColumns + AttentionShape::kFeatures * fineLevels);
   shape.width = width;
   shape.hiddenLayers = 1;
   shape.outputs = static_cast<int>(AttentionShape::kFeatures);
@@ -197,7 +197,7 @@ size_t HashConfig::multiplyAccumulates() const {
   const size_t fine = kFeatures * shape.levels;
   if (mixesByNetwork()) {
     const MlpShape mix = mixShape();
-    return kCorners * (LatticeForward::kColumns + fine) + multiplyAccumulatesOf(mix);
+    return kCorners * (LatticeForward::kColumns + fine) + countMultiplyAccumulates(mix);
   }
   const bool weighed = shape.weights != AttentionWeights::none;
   return kCorners * (kFeatures + (shape.varies ? shape.logits() : 0) + fine) + (weighed ? fine : 0);

@@ -16,19 +16,20 @@
 namespace tessera {
 namespace {
 
-constexpr int64_t kJudgedBatches = 64;  // of rays, at most
-constexpr const char* kRemedy = "give a number: --set distortion=0.01";
+constexpr int64_t kMaxEvaluationBatches = 64;  // of rays
+constexpr const char* kRemedy = "give a number: --set distortion_weight=0.01";
 
-// One short training, and how far it is from what was left out.
-class Probing {
+// Runs one short training and evaluates it on the photos that were left out.
+class ProbeRun {
  public:
-  Probing(HashTrainer& trainer, const DistortionProbing& options, const std::string& title)
+  ProbeRun(HashTrainer& trainer, const DistortionSearch& options, const std::string& title)
       : trainer_(trainer), options_(options) {
     if (options.progress) progress_.emplace(title, 0, "steps");
   }
 
-  // For `steps`, which a time settles where they are 0; `untilSettled`: and no longer. False when asked to stop.
-  bool train(int64_t& steps, bool untilSettled) {
+  // Trains for `steps`. If these are 0, they are determined from the time that steps take; with `untilKnown`, training
+  // then ends as soon as they are known. Returns false if it was asked to stop.
+  bool train(int64_t& steps, bool untilKnown) {
     using Clock = std::chrono::steady_clock;
     StepBudget budget(options_.minutes);
     const Clock::time_point start = Clock::now();
@@ -37,8 +38,8 @@ class Probing {
       isFinite_ = std::isfinite(trainer_.step(step, steps).loss);
       if (steps == 0) {
         const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
-        if (const int64_t fitting = budget.observe(step + 1, seconds)) steps = std::max(fitting, options_.fewestSteps);
-        if (untilSettled && steps > 0) break;
+        if (const int64_t fitting = budget.observe(step + 1, seconds)) steps = std::max(fitting, options_.minSteps);
+        if (untilKnown && steps > 0) break;
       }
       if (!progress_) continue;
       progress_->setTotal(steps);
@@ -47,49 +48,51 @@ class Probing {
     return true;
   }
 
-  // Nothing in `psnr` where training came to no numbers. False when asked to stop. Where a budget leaves few photos in
-  // memory at a time, batches are so far apart that each photo comes up in some: in `stepsOfAllPhotos`.
-  bool judge(int64_t steps, int64_t stepsOfAllPhotos, std::optional<double>& psnr) {
+  // Computes the PSNR on the photos that were left out; it stays empty if the training diverged. Returns false if it
+  // was asked to stop. If the photo budget leaves few photos in memory at a time, the batches are spaced over
+  // `stepsOfAllPhotos` steps, in which each photo is in memory at some time.
+  bool evaluate(int64_t steps, int64_t stepsOfAllPhotos, std::optional<double>& psnr) {
     if (!isFinite_) return true;
-    HashTrainer::Fit all;
-    const int64_t batches = std::min(kJudgedBatches, steps), apart = (stepsOfAllPhotos + batches - 1) / batches;
+    HashTrainer::Evaluation all;
+    const int64_t batches = std::min(kMaxEvaluationBatches, steps), apart = (stepsOfAllPhotos + batches - 1) / batches;
     for (int64_t batch = 0; batch < batches; ++batch) {
       if (options_.stopRequested()) return false;
-      const HashTrainer::Fit fit = trainer_.fit(steps + apart * batch);
-      all.squaredError += fit.squaredError;
-      all.channels += fit.channels;
+      const HashTrainer::Evaluation evaluation = trainer_.evaluate(steps + apart * batch);
+      all.squaredError += evaluation.squaredError;
+      all.channels += evaluation.channels;
     }
-    psnr = psnrOf(all);
+    psnr = computePsnr(all);
     return true;
   }
 
  private:
   HashTrainer& trainer_;
-  const DistortionProbing& options_;
+  const DistortionSearch& options_;
   std::optional<Progress> progress_;
   bool isFinite_ = true;
 };
 
 }  // namespace
 
-std::optional<double> psnrOf(const HashTrainer::Fit& fit) {
-  if (fit.channels == 0) {
-    throw Error("--set distortion=auto", "",
-                "no pixel was found in the photos that were left out to judge by: they are masked, or too few photos "
-                "are in memory at a time",
-                kRemedy);
+std::optional<double> computePsnr(const HashTrainer::Evaluation& evaluate) {
+  if (evaluate.channels == 0) {
+    throw Error(
+        "--set distortion_weight=auto", "",
+        "the photos that were left out for evaluation have no usable pixels: they are masked, or too few photos "
+        "are in memory at a time",
+        kRemedy);
   }
-  if (!std::isfinite(fit.squaredError)) return std::nullopt;
-  return -10 * std::log10(std::max(1e-10, fit.squaredError / fit.channels));
+  if (!std::isfinite(evaluate.squaredError)) return std::nullopt;
+  return -10 * std::log10(std::max(1e-10, evaluate.squaredError / evaluate.channels));
 }
 
 double DistortionChoice::weight() const {
   CHECK(!probes.empty());
   std::optional<double> best, chosen;
-  for (const Probe& probe : probes) best = std::max(best, probe.psnr);  // nothing is less than any number
+  for (const Probe& probe : probes) best = std::max(best, probe.psnr);  // nullopt is less than any number
   if (!best) {
-    throw Error("--set distortion=auto", "", "with no weight did a short training come to numbers",
-                "lower the learning rate: --set rate=...; or " + std::string(kRemedy));
+    throw Error("--set distortion_weight=auto", "", "the short trainings diverged with every weight",
+                "lower the learning rate: --set learning_rate=...; or " + std::string(kRemedy));
   }
   for (const Probe& probe : probes) {
     if (probe.psnr && *probe.psnr >= *best - kAsGood) chosen = std::max(chosen, std::optional<double>(probe.weight));
@@ -98,32 +101,34 @@ double DistortionChoice::weight() const {
 }
 
 std::optional<DistortionChoice> chooseDistortion(Device& device, const Capture& capture, const HashConfig& config,
-                                                 const BlockGrid& grid, const DistortionProbing& probing) {
+                                                 const BlockGrid& grid, const DistortionSearch& probing) {
   if (capture.photosIn(Split::train).size() < 2) {
-    throw Error("--set distortion=auto", "", "there is one photo to train on, of which none can be left out", kRemedy);
+    throw Error("--set distortion_weight=auto", "",
+                "there are fewer than two training photos, so none can be left out for evaluation", kRemedy);
   }
-  const HeldOutPhotos photos = holdOutPhotos(capture, probing.heldOutOf, static_cast<uint64_t>(config.seed));
+  const HeldOutPhotos photos = holdOutPhotos(capture, probing.holdOutInterval, static_cast<uint64_t>(config.seed));
   const int64_t stepsOfAllPhotos = static_cast<int64_t>(capture.photosIn(Split::train).size()) * config.stepsPerPhoto;
   DistortionChoice choice = probing.known;
   if (choice.steps == 0 && probing.minutes <= 0) choice.steps = probing.steps;
   while (choice.probes.size() < probing.weights.size()) {
     const double weight = probing.weights[choice.probes.size()];
     HashConfig probed = config;
-    probed.distortion = weight;
+    probed.distortionWeight = weight;
     HashTrainer trainer(device, capture, probed, grid);
     if (choice.probes.size() == probing.known.probes.size()) probing.begun();
     trainer.trainOn(photos.trained);
-    Probing probe(trainer, probing, fmt::format("distortion {}", weight));
-    // Where its weight rises with the share of the steps that are done, the first one would be trained otherwise.
-    const bool asTimer = choice.steps == 0 && config.rampShare > 0;
+    ProbeRun probe(trainer, probing, fmt::format("distortion {}", weight));
+    // If the weight rises with the fraction of completed steps, the first probe, whose number of steps is not known
+    // yet, would be trained differently from the others. It then only measures the time and is run again.
+    const bool asTimer = choice.steps == 0 && config.lossWarmupFraction > 0;
     if (!probe.train(choice.steps, asTimer)) return std::nullopt;
     if (asTimer && choice.steps > 0) continue;
-    trainer.judgeBy(photos.heldOut);
-    DistortionChoice::Probe judged{weight, {}};
-    if (!probe.judge(choice.steps, stepsOfAllPhotos, judged.psnr)) return std::nullopt;
-    choice.probes.push_back(judged);
-    inform("distortion {}: {} on photos left out, after {} steps", weight,
-           judged.psnr ? fmt::format("{:.2f} dB", *judged.psnr) : "no numbers", choice.steps);
+    trainer.evaluateOn(photos.heldOut);
+    DistortionChoice::Probe evaluated{weight, {}};
+    if (!probe.evaluate(choice.steps, stepsOfAllPhotos, evaluated.psnr)) return std::nullopt;
+    choice.probes.push_back(evaluated);
+    inform("distortion weight {}: {} on the photos that were left out, after {} steps", weight,
+           evaluated.psnr ? fmt::format("{:.2f} dB", *evaluated.psnr) : "diverged", choice.steps);
     probing.probed(choice);
   }
   return choice;

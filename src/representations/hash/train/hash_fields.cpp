@@ -39,7 +39,7 @@ void HashFields::reserve(uint32_t samples, uint32_t texels) {
     const size_t n = samples, planes = Matrix<float>::rowsOfPlane(n) * kWidth;
     encoded_ = device_.array<float>(planes * (kCoarsePlanes + attention_.levels));
     features_ = device_.array<float>(n * kWidth);
-    if (mixesByNetwork_) mixActivations_ = device_.activationsOf(mix_, n);
+    if (mixesByNetwork_) mixActivations_ = device_.allocateActivations(mix_, n);
     if (forTraining_) {
       encodedGradients_ = device_.array<float>(encoded_.size());
       if (mixesByNetwork_) mixGradients_ = device_.array<float>(n * kWidth);
@@ -69,7 +69,7 @@ Count HashFields::rowsOfSlot(uint32_t slot) const {
 
 void HashFields::lookUpFine(const Samples& samples) {
   if (slots() == 1) {
-    device_.run(HashGridForward{fineGrid_, samples.count, samples.positions, fine_[0].values, fineOf(encoded_)});
+    device_.run(HashGridForward{fineGrid_, samples.count, samples.positions, fine_[0].values, finePlanes(encoded_)});
     return;
   }
   device_.run(GroupByBlock{samples.count, slots(), samples.slotOfSample, firstOfSlot_, source_});
@@ -79,7 +79,7 @@ void HashFields::lookUpFine(const Samples& samples) {
   for (uint32_t slot = 0; slot < slots(); ++slot) {
     device_.run(HashGridForward{fineGrid_, rowsOfSlot(slot), groupedPositions_, fine_[slot].values, grouped});
   }
-  device_.run(ScatterRows{samples.count, source_, grouped, fineOf(encoded_)});
+  device_.run(ScatterRows{samples.count, source_, grouped, finePlanes(encoded_)});
 }
 
 void HashFields::spreadFine(const Samples& samples) {
@@ -88,13 +88,13 @@ void HashFields::spreadFine(const Samples& samples) {
                                  samples.count,
                                  samples.positions,
                                  fine_[0].values,
-                                 fineOf(encodedGradients_),
+                                 finePlanes(encodedGradients_),
                                  fine_[0].gradients,
                                  {}});
     return;
   }
   const Matrix<float> grouped = planes(grouped_, 0, attention_.levels);
-  device_.run(GatherRows{samples.count, source_, fineOf(encodedGradients_), grouped});
+  device_.run(GatherRows{samples.count, source_, finePlanes(encodedGradients_), grouped});
   for (uint32_t slot = 0; slot < slots(); ++slot) {
     device_.run(HashGridBackward{
         fineGrid_, rowsOfSlot(slot), groupedPositions_, fine_[slot].values, grouped, fine_[slot].gradients, {}});
@@ -123,7 +123,7 @@ Matrix<const float> HashFields::forward(const Samples& samples, bool forBackward
   mix.ranks = ranks_;
   mix.texels = {texels_.capacity, texelCounter()};
   mix.values = texels_.outputs;
-  mix.mixed = coarseOf(encoded_);
+  mix.mixed = coarsePlanes(encoded_);
   device_.run(mix);
   lookUpFine(samples);
   const Matrix<float> features(features_, kWidth);
@@ -131,8 +131,8 @@ Matrix<const float> HashFields::forward(const Samples& samples, bool forBackward
     device_.run(MlpForward{mix_, samples.count, planes(encoded_, 0, kCoarsePlanes + attention_.levels),
                            mixNetwork_.values, features, forBackward ? mixActivations_.all() : Slice<float>()});
   } else {
-    device_.run(
-        AttentionForward{attention_, samples.count, coarseOf(encoded_), fineOf(encoded_), logits_.values, features});
+    device_.run(AttentionForward{attention_, samples.count, coarsePlanes(encoded_), finePlanes(encoded_),
+                                 logits_.values, features});
   }
   return features;
 }
@@ -150,13 +150,13 @@ void HashFields::backward(const Samples& samples, Slice<const float> logDensityG
   } else {
     AttentionBackward fuse{attention_};
     fuse.samples = samples.count;
-    fuse.coarse = coarseOf(encoded_);
-    fuse.fine = fineOf(encoded_);
+    fuse.coarse = coarsePlanes(encoded_);
+    fuse.fine = finePlanes(encoded_);
     fuse.logits = logits_.values;
     fuse.logDensityGradients = logDensityGradients;
     fuse.colourGradients = colourGradients;
-    fuse.coarseGradients = coarseOf(encodedGradients_);
-    fuse.fineGradients = fineOf(encodedGradients_);
+    fuse.coarseGradients = coarsePlanes(encodedGradients_);
+    fuse.fineGradients = finePlanes(encodedGradients_);
     fuse.logitGradients = logits_.gradients;
     device_.run(fuse);
   }
@@ -170,13 +170,13 @@ void HashFields::backward(const Samples& samples, Slice<const float> logDensityG
   mix.ranks = ranks_;
   mix.firstTexel = firstTexel_;
   mix.texels = {texels_.capacity, texelCounter()};
-  mix.mixedGradients = coarseOf(encodedGradients_);
+  mix.mixedGradients = coarsePlanes(encodedGradients_);
   mix.valueGradients = texels_.outputGradients;
   device_.run(mix);
   coarse_.backward(texels_);
 }
 
-uint32_t HashFields::texelsWanted() {
+uint32_t HashFields::texelsDemanded() {
   return device_.read(texelCounter())[0];
 }
 
@@ -191,7 +191,7 @@ void HashFields::step(const Rates& rates) {
   for (ParameterGroup* group : sharedGroups()) group->step(device_, rates.network);
 }
 
-std::vector<ParameterGroup*> HashFields::groupsOf(uint32_t slot) {
+std::vector<ParameterGroup*> HashFields::slotParameterGroups(uint32_t slot) {
   return {&coarse_.table(slot), &coarse_.network(slot), &fine_[slot]};
 }
 

@@ -20,7 +20,7 @@ std::vector<float> randomFloats(uint64_t seed, size_t count, float low, float hi
   return values;
 }
 
-// Fields of two blocks with random parameters that matter, and samples in both.
+// Fields of two blocks with large random parameters, and samples in both blocks.
 struct Fields {
   std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   HashFields fields;
@@ -38,18 +38,18 @@ struct Fields {
   void fill(ParameterGroup& group, uint64_t seed, float size = 1) {
     device->write(group.values.all(), std::span<const float>(randomFloats(seed, group.values.size(), -size, size)));
   }
-  // Of samples [first, first + count): [count][8].
+  // Returns the features of samples [first, first + count): [count][8].
   std::vector<float> features(uint32_t first = 0, uint32_t count = kSamples) {
     const Array<float> at =
-        device->arrayOf(std::vector<float>(positions.begin() + 3 * first, positions.begin() + 3 * (first + count)));
+        device->uploadArray(std::vector<float>(positions.begin() + 3 * first, positions.begin() + 3 * (first + count)));
     const Array<uint32_t> in =
-        device->arrayOf(std::vector<uint32_t>(slots.begin() + first, slots.begin() + first + count));
-    const Matrix<const float> made = fields.forward({{count}, in, at}, false);
-    return device->read(made.data.part(0, size_t{8} * count));
+        device->uploadArray(std::vector<uint32_t>(slots.begin() + first, slots.begin() + first + count));
+    const Matrix<const float> values = fields.forward({{count}, in, at}, false);
+    return device->read(values.data.part(0, size_t{8} * count));
   }
 };
 
-// Invariant 4: weights of one are the sum.
+// Invariant 4 of `hash` (docs/invariants.md): with all weights 1, features are the sum over levels.
 TEST(HashFields, AreTheSumOfTheirLevelsWhereAllWeightsAreOne) {
   HashConfig config = smallHashConfig();
   config.attentionVaries = false;
@@ -63,37 +63,38 @@ TEST(HashFields, AreTheSumOfTheirLevelsWhereAllWeightsAreOne) {
   for (size_t i = 0; i < one.size(); ++i) ASSERT_NEAR(one[i], other[i], 1e-6);
 }
 
-// Invariant 4: without fine features, the lattice's are left; at its corners those of the coarse network.
-TEST(HashFields, AreTheCoarseOnesWhereTablesAreEmpty) {
+// Invariant 4 of `hash` (docs/invariants.md): without fine features, only those of the lattice remain; at its corners they
+// are the outputs of the coarse network.
+TEST(HashFields, AreTheCoarseFeaturesWhereTablesAreEmpty) {
   const HashConfig config = smallHashConfig();
   Fields empty(config);
   for (uint32_t slot = 0; slot < kSlots; ++slot) empty.fill(empty.fields.fine(slot), 0, 0);
   const uint32_t resolution = empty.fields.lattice().voxels;
-  for (float& p : empty.positions) {  // onto corners
+  for (float& p : empty.positions) {  // move it onto a corner
     const float corner = std::min(std::floor(p * static_cast<float>(resolution)), static_cast<float>(resolution - 1));
     p = (corner + 0.5f) / static_cast<float>(resolution);
   }
   std::fill(empty.slots.begin(), empty.slots.end(), 1);
   const std::vector<float> features = empty.features();
   BlockFieldBatch batch(*empty.device, empty.fields.coarse().shape(), kSamples, false);
-  const Array<uint32_t> first = empty.device->arrayOf(std::vector<uint32_t>{0, 0, kSamples});
-  const Array<float> positions = empty.device->arrayOf(empty.positions);
+  const Array<uint32_t> first = empty.device->uploadArray(std::vector<uint32_t>{0, 0, kSamples});
+  const Array<float> positions = empty.device->uploadArray(empty.positions);
   batch.firstOfSlot = first;
   batch.positions = positions;
   empty.fields.coarse().forward(batch, false);
-  const std::vector<float> said = empty.device->read(batch.outputs.all());
+  const std::vector<float> outputs = empty.device->read(batch.outputs.all());
   for (uint32_t s = 0; s < kSamples; ++s) {
     for (uint32_t f = 0; f < 8; ++f) {
-      ASSERT_NEAR(features[8 * s + f], said[LatticeForward::kColumns * s + f], 1e-5) << s << " " << f;
+      ASSERT_NEAR(features[8 * s + f], outputs[LatticeForward::kColumns * s + f], 1e-5) << s << " " << f;
     }
   }
 }
 
-// Invariant 5: corners are asked for once, whoever shares them.
-TEST(HashFields, OfASampleDoNotDependOnTheOthersOfItsBatch) {
+// Invariant 5 of `hash` (docs/invariants.md): a corner is evaluated once, however many samples share it.
+TEST(HashFields, AreIndependentOfTheOtherSamplesInTheBatch) {
   Fields fields(smallHashConfig());
   const std::vector<float> together = fields.features();
-  EXPECT_LT(fields.fields.texelsWanted(), 8 * kSamples);
+  EXPECT_LT(fields.fields.texelsDemanded(), 8 * kSamples);
   for (uint32_t s = 0; s < kSamples; s += 7) {
     const std::vector<float> alone = fields.features(s, 1);
     for (uint32_t f = 0; f < 8; ++f) ASSERT_NEAR(alone[f], together[8 * s + f], 1e-6) << s;

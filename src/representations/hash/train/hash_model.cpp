@@ -16,16 +16,16 @@
 namespace tessera {
 namespace {
 
-const std::vector<uint32_t> kMostOfRound{8, 16, 32, 64, 128, 0xffffffffu};
+const std::vector<uint32_t> kMaxOfRound{8, 16, 32, 64, 128, 0xffffffffu};
 
-constexpr uint32_t kLeastChunk = 1 << 12;  // points of the occupancy that are looked at together
+constexpr uint32_t kMinChunk = 1 << 12;  // points at which occupancy is evaluated in one batch
 
-Device& able(Device& device, const HashConfig& config) {
+Device& afterCheck(Device& device, const HashConfig& config) {
   config.check();
   return device;
 }
 
-// The same bits as numbers, for operations that only move them.
+// Reinterprets words as floats, for operations that only copy them.
 template <class Word>
 auto asFloats(const Slice<Word>& words) {
   using Float = std::conditional_t<std::is_const_v<Word>, const float, float>;
@@ -43,26 +43,26 @@ HashSamples::HashSamples(Device& device, uint32_t rays, uint32_t samples)
 }
 
 HashModel::HashModel(Device& device, const HashConfig& config, const BlockGrid& grid, bool forTraining)
-    : device_(able(device, config)),
+    : device_(afterCheck(device, config)),
       config_(config),
       grid_(grid),
-      frame_(sceneFrameOf(grid)),
-      space_(blockSpaceOf(grid, config.near, config.surroundKind())),
+      frame_(makeSceneFrame(grid)),
+      space_(makeBlockSpace(grid, config.near, config.backgroundBlockKind())),
       fields_(device, config, space_.blocks(), forTraining),
       direction_(device, "direction.network",
                  initialWeights(config.directionShape(), mix64(static_cast<uint64_t>(config.seed) + 2), 0xd1),
                  forTraining),
       seen_(space_.blocks(), true),
-      rounds_(device, kMostOfRound) {
+      rounds_(device, kMaxOfRound) {
   CHECK(rounds_.count() == HashSamples::kRounds);
-  // In widths of a domain: the diagonal of the box, and a contracted block from end to end.
+  // The longest path, in widths of a domain: the diagonal of the box, and a contracted block from end to end.
   const double widths = std::hypot(space_.columns, space_.rows, 1) + 4;
-  const double steps = widths / (config.longestStep() * config.shortestStep);
-  if (!(steps <= kMostSteps)) {
-    throw Error(
-        fmt::format("--set step={} shortest_step={} lattice={}", config.step, config.shortestStep, config.lattice), "",
-        fmt::format("a ray could take {:.0f} steps", steps),
-        fmt::format("use longer ones: at most {} steps", kMostSteps));
+  const double steps = widths / (config.longestStep() * config.minRayStepRatio);
+  if (!(steps <= kMaxSteps)) {
+    throw Error(fmt::format("--set max_ray_step={} min_ray_step_ratio={} lattice={}", config.maxRayStep,
+                            config.minRayStepRatio, config.lattice),
+                "", fmt::format("a ray could take {:.0f} steps", steps),
+                fmt::format("use longer steps: at most {} per ray", kMaxSteps));
   }
   const size_t cells = static_cast<size_t>(config.occupancyResolution), words = cells * cells * cells / 32;
   occupied_ = device.array<uint32_t>(words * space_.blocks());
@@ -77,14 +77,14 @@ MarchSpace HashModel::occupancySpace(uint32_t block) const {
   space.contracted = placement.contracted;
   space.gridResolution = config_.occupancyResolution;
   space.near = space_.near;
-  // A step's length in the scene grows outside the cube, across the rays from it as fast as the distance.
+  // Outside the cube, the length of a step in scene units grows in proportion to the distance.
   space.minStep = config_.longestStep() * 2 * placement.halfDomain() * placement.scale[0];
   space.cone = placement.contracted ? space.minStep : 0;
   return space;
 }
 
 void HashModel::reserve(uint32_t rays, uint32_t samples, uint32_t texels) {
-  fields_.reserve(samples, std::max(texels, 8 * std::min(samples, kLeastChunk)));
+  fields_.reserve(samples, std::max(texels, 8 * std::min(samples, kMinChunk)));
   if (!zero_.size()) zero_ = device_.array<uint32_t>(1);
   const size_t all = size_t{rounds_.count()} * samples;
   rounds_.reserve(rays, samples);
@@ -117,11 +117,11 @@ void HashModel::sample(const Rays& rays, float minTransmittance, HashSamples& se
     march.middles = rounds_.part(middles_, 1, round);
     march.widths = rounds_.part(widths_, 1, round);
     device_.run(march);
-    const Count made = rounds_.made(round);
-    const Matrix<const float> features = fields_.forward({made, march.slotOfSample, march.positions}, false);
+    const Count marched = rounds_.marched(round);
+    const Matrix<const float> features = fields_.forward({marched, march.slotOfSample, march.positions}, false);
     const Matrix<float> logDensities = rounds_.logDensities(round);
     device_.fillZero(logDensities.data);
-    device_.run(AddColumns{made, Matrix<const float>(features.data, 1, features.rowStride), logDensities});
+    device_.run(AddColumns{marched, Matrix<const float>(features.data, 1, features.rowStride), logDensities});
     rounds_.lookedUp(round);
     keepTexelCount(seen, round);
   }
@@ -134,22 +134,22 @@ void HashModel::sample(const Rays& rays, float minTransmittance, HashSamples& se
   rounds_.gather(widths_, seen.widths, 1);
 }
 
-Matrix<const float> HashModel::featuresOf(HashSamples& seen, bool forBackward) {
+Matrix<const float> HashModel::evaluateFeatures(HashSamples& seen, bool forBackward) {
   const Matrix<const float> features = fields_.forward(seen.places(), forBackward);
   keepTexelCount(seen, HashSamples::kRounds);
   return features;
 }
 
 void HashModel::keepTexelCount(HashSamples& seen, uint32_t lookUp) {
-  const Slice<uint32_t> kept = seen.counters.part(HashSamples::kFirstTexels + lookUp, 1);
+  const Slice<uint32_t> counter = seen.counters.part(HashSamples::kFirstTexels + lookUp, 1);
   device_.run(GatherRows{
-      {1}, zero_, Matrix<const float>(asFloats(fields_.texelCounter()), 1), Matrix<float>(asFloats(kept), 1)});
+      {1}, zero_, Matrix<const float>(asFloats(fields_.texelCounter()), 1), Matrix<float>(asFloats(counter), 1)});
 }
 
 void HashModel::adaptStep(double samplesPerRay) {
-  const double change = config_.stepChange;
-  stepScale_ = samplesPerRay >= config_.fewestSamples ? std::min(1.0, (1 + change) * stepScale_)
-                                                      : std::max(config_.shortestStep, (1 - change) * stepScale_);
+  const double change = config_.rayStepChange;
+  stepScale_ = samplesPerRay >= config_.minSamplesPerRay ? std::min(1.0, (1 + change) * stepScale_)
+                                                         : std::max(config_.minRayStepRatio, (1 - change) * stepScale_);
 }
 
 void HashModel::exclude(uint32_t block, const std::vector<bool>& visible) {
@@ -164,14 +164,14 @@ void HashModel::exclude(uint32_t block, const std::vector<bool>& visible) {
 }
 
 void HashModel::refreshOccupancy(bool everything, uint64_t seed) {
-  // As many points as have room for all of their corners: what has none would count as fog.
-  const uint32_t chunk = std::min(rounds_.sampleCapacity(), fields_.roomForTexels() / 8);
+  // A chunk has only as many points as all of their corners fit the capacity: corners beyond it would count as fog.
+  const uint32_t chunk = std::min(rounds_.sampleCapacity(), fields_.texelCapacity() / 8);
   CHECK(chunk >= 1u);
   if (slotOfPoint_.size() < chunk) slotOfPoint_ = device_.array<uint32_t>(chunk);
   for (uint32_t block = 0; block < space_.blocks(); ++block) {
     if (!seen_[block]) continue;
     const uint32_t cells = occupancy_[block].visibleCells();
-    const uint32_t share = static_cast<uint32_t>(std::ceil(cells * config_.occupancyShare));
+    const uint32_t share = static_cast<uint32_t>(std::ceil(cells * config_.occupancyUpdateFraction));
     const std::vector<uint32_t> slots(chunk, block);
     device_.write(slotOfPoint_.all(), std::span<const uint32_t>(slots));
     const auto logDensity = [&](Count count, Slice<const float> positions, Matrix<float> logDensities) {
@@ -179,8 +179,8 @@ void HashModel::refreshOccupancy(bool everything, uint64_t seed) {
       device_.fillZero(logDensities.data);
       device_.run(AddColumns{count, Matrix<const float>(features.data, 1, features.rowStride), logDensities});
     };
-    const uint64_t ofBlock = mix64(seed ^ (uint64_t{block} << 48));
-    occupancy_[block].update(logDensity, everything ? cells : share, everything ? 0 : share, ofBlock, chunk);
+    const uint64_t blockSeed = mix64(seed ^ (uint64_t{block} << 48));
+    occupancy_[block].update(logDensity, everything ? cells : share, everything ? 0 : share, blockSeed, chunk);
   }
 }
 
@@ -197,7 +197,7 @@ std::vector<ParameterGroup*> HashModel::sharedGroups() {
 }
 
 void HashModel::save(uint32_t block, TensorSet& tensors, bool withMoments) {
-  for (const ParameterGroup* group : fields_.groupsOf(block)) tensors.add(device_, *group, withMoments);
+  for (const ParameterGroup* group : fields_.slotParameterGroups(block)) tensors.add(device_, *group, withMoments);
   tensors.add("occupancy.values", occupancy_[block].values());
   tensors.add("occupancy.bits", occupancy_[block].bitWords());
   if (block != 0) return;
@@ -206,7 +206,7 @@ void HashModel::save(uint32_t block, TensorSet& tensors, bool withMoments) {
 }
 
 void HashModel::restore(uint32_t block, const fs::path& path, const Safetensors& file) {
-  for (ParameterGroup* group : fields_.groupsOf(block)) loadGroup(device_, path, file, *group);
+  for (ParameterGroup* group : fields_.slotParameterGroups(block)) loadGroup(device_, path, file, *group);
   const auto values = file.require(path, "occupancy.values", TensorType::f32).as<float>();
   const auto bits = file.require(path, "occupancy.bits", TensorType::u32).as<uint32_t>();
   OccupancyGrid& occupancy = occupancy_[block];
@@ -225,7 +225,7 @@ void HashModel::restore(uint32_t block, const fs::path& path, const Safetensors&
 }
 
 bool HashModel::allFinite(uint32_t block) {
-  for (const ParameterGroup* group : fields_.groupsOf(block)) {
+  for (const ParameterGroup* group : fields_.slotParameterGroups(block)) {
     if (!group->allFinite(device_)) return false;
   }
   if (block != 0) return true;
@@ -238,13 +238,13 @@ std::unique_ptr<HashModel> loadHashModel(Device& device, const fs::path& folder)
   const ModelManifest manifest = requireManifest(model, "hash");
   HashConfig config;
   configFromToml(config.fields(), model.configPath());
-  auto made = std::make_unique<HashModel>(device, config, requireGrid(model), false);
-  requireOneFileABlock(folder, manifest, made->space().blocks());
-  for (uint32_t block = 0; block < made->space().blocks(); ++block) {
+  auto loaded = std::make_unique<HashModel>(device, config, requireGrid(model), false);
+  requireOneFileABlock(folder, manifest, loaded->space().blocks());
+  for (uint32_t block = 0; block < loaded->space().blocks(); ++block) {
     const fs::path file = folder / manifest.files[block];
-    made->restore(block, file, readSafetensors(file));
+    loaded->restore(block, file, readSafetensors(file));
   }
-  return made;
+  return loaded;
 }
 
 }  // namespace tessera

@@ -1,5 +1,4 @@
-// A `hash` model (NGP-RT): the parameters of all blocks of a scene, what may hold anything, and where in the world they
-// stand.
+// A `hash` model (NGP-RT): the parameters of all blocks of a scene, their occupancy, and their placement in the world.
 #pragma once
 
 #include "compute/block_march.h"
@@ -11,15 +10,15 @@
 
 namespace tessera {
 
-// The samples of a set of rays that can be seen, on the device, ray by ray.
+// The visible samples of a set of rays, in device memory, in the order of rays.
 struct HashSamples {
   Array<uint32_t> firstSample, rayOfSample, slotOfSample;
-  Array<float> positions, distances, steps, middles, widths;  // as MarchBlocks makes them
-  Slice<uint32_t> counters;                                   // [kCounters]; whoever samples says where
+  Array<float> positions, distances, steps, middles, widths;  // as in MarchBlocks
+  Slice<uint32_t> counters;                                   // [kCounters]; set by the caller
 
   static constexpr uint32_t kRounds = 6;
-  // Those of train/march_rounds.h, then the corners that each round's samples wanted, and those that the samples wanted
-  // that were seen.
+  // The counters of train/march_rounds.h are followed by the numbers of lattice corners that each round's samples
+  // needed, and the number that the visible samples needed.
   static constexpr uint32_t kFirstTexels = MarchRounds::kMarched + kRounds;
   static constexpr uint32_t kCounters = kFirstTexels + kRounds + 1;
 
@@ -33,8 +32,8 @@ struct HashSamples {
 
 class HashModel {
  public:
-  static constexpr uint32_t kMostSteps = 1 << 16;  // that a ray may take at most
-  // Throws Error where rays through so many blocks could take more.
+  static constexpr uint32_t kMaxSteps = 1 << 16;  // of one ray
+  // Throws Error if a ray through all blocks could take more than kMaxSteps. Keeps a reference to `device`.
   HashModel(Device& device, const HashConfig& config, const BlockGrid& grid, bool forTraining = true);
 
   Device& device() { return device_; }
@@ -45,38 +44,40 @@ class HashModel {
   HashFields& fields() { return fields_; }
   ParameterGroup& direction() { return direction_; }  // the network for directions
 
-  // Room for rays' samples in the calls below.
+  // Allocates memory for this many rays, samples and lattice corners in the calls below.
   void reserve(uint32_t rays, uint32_t samples, uint32_t texels);
 
   struct Rays {
     uint32_t count;
-    Slice<const float> origins, directions, jitter, near, far;  // the last three optional
+    Slice<const float> origins, directions, jitter, near, far;  // the last three are optional
   };
-  // Finds the samples of rays that can be seen (train/march_rounds.h).
+  // Finds the visible samples of rays (train/march_rounds.h).
   void sample(const Rays& rays, float minTransmittance, HashSamples& seen);
-  // HashFields::forward of those samples.
-  Matrix<const float> featuresOf(HashSamples& seen, bool forBackward);
+  // Returns HashFields::forward of those samples.
+  Matrix<const float> evaluateFeatures(HashSamples& seen, bool forBackward);
 
-  // Steps of rays, relative to the longest (the paper's γ).
+  // The step length of rays, relative to the longest (the paper's γ).
   double stepScale() const { return stepScale_; }
-  // After a training step whose rays had so many samples on average (section 3 of the supplement).
+  // Adapts the step length after a training step whose rays had this average number of samples (section 3 of the
+  // supplement).
   void adaptStep(double samplesPerRay);
 
-  // Cells that no photo sees hold nothing for good: [blocks][cells]. Throws nothing; a block may be seen by none.
+  // Marks the cells of a block that no photo sees as permanently empty. `visible`: [cells]. All of them may be
+  // invisible.
   void exclude(uint32_t block, const std::vector<bool>& visible);
-  MarchSpace occupancySpace(uint32_t block) const;  // as occupancy is refreshed
-  // Of every block: all cells that can be seen at all, or a share of them.
+  MarchSpace occupancySpace(uint32_t block) const;  // the space in which occupancy is refreshed
+  // Updates the occupancy of every block: all visible cells, or a fraction of them.
   void refreshOccupancy(bool everything, uint64_t seed);
   double occupiedFraction();
-  std::vector<uint32_t> occupancyOf(uint32_t block) { return occupancy_[block].bitWords(); }
+  std::vector<uint32_t> occupancyWords(uint32_t block) { return occupancy_[block].bitWords(); }
 
-  // Of one block; what all blocks share stands with block 0.
+  // The state of one block. Block 0 includes the parameters that all blocks share.
   void save(uint32_t block, TensorSet& tensors, bool withMoments);
   void restore(uint32_t block, const fs::path& path, const Safetensors& file);
   bool allFinite(uint32_t block);
 
  private:
-  void keepTexelCount(HashSamples& seen, uint32_t lookUp);  // of the last
+  void keepTexelCount(HashSamples& seen, uint32_t lookUp);  // copies the count of the last look-up to the counters
   std::vector<ParameterGroup*> sharedGroups();
 
   Device& device_;
@@ -92,13 +93,13 @@ class HashModel {
   double stepScale_ = 1;
 
   MarchRounds rounds_;
-  Array<uint32_t> slots_, rays_;  // what marches make, all rounds
+  Array<uint32_t> slots_, rays_;  // outputs of marching, of all rounds
   Array<float> positions_, distances_, middles_, widths_;
   Array<uint32_t> zero_;
-  Array<uint32_t> slotOfPoint_;  // of occupancy's points
+  Array<uint32_t> slotOfPoint_;  // of the points at which occupancy is evaluated
 };
 
-// A trained model for drawing, from its folder.
+// Loads a trained model from its folder for rendering. Throws Error if its files are missing or malformed.
 std::unique_ptr<HashModel> loadHashModel(Device& device, const fs::path& folder);
 
 }  // namespace tessera

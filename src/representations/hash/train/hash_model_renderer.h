@@ -1,7 +1,7 @@
-// Draws a `hash` model by marching: the training-time picture.
+// Renders a trained `hash` model by ray marching, as in training.
 #pragma once
 
-#include "representations/hash/train/hash_pass.h"
+#include "representations/hash/train/hash_pipeline.h"
 #include "scene/view_renderer.h"
 #include "train/picture_rays.h"
 
@@ -17,7 +17,7 @@ class HashModelRenderer final : public ViewRenderer {
 
  private:
   HashModel& model_;
-  HashPass pass_;
+  HashPipeline pipeline_;
   PictureRays pictureRays_;
 };
 

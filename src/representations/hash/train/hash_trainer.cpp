@@ -12,61 +12,63 @@
 namespace tessera {
 namespace {
 
-constexpr double kRoomPerWanted = 2;  // for steps that see more than the last one did
+constexpr double kCapacityPerDemand = 2;  // for steps that need more than the last one did
 constexpr float kTrainingMinTransmittance = 1e-4f;
 constexpr const char* kFormat = "tessera hash 1";
 
 PhotoRays::Settings raySettings(const HashConfig& config) {
   PhotoRays::Settings settings = config.photoRaySettings();
   settings.randomBackground = config.background == "random";
-  if (config.depth <= 0) settings.knownShare = 0;
+  if (config.depthWeight <= 0) settings.sparseDepthRayFraction = 0;
   return settings;
 }
 
-HashPass::Room roomFor(const HashConfig& config) {
-  HashPass::Room room;
-  room.rays = static_cast<uint32_t>(config.mostRays);
-  room.samples = std::max(static_cast<uint32_t>(kRoomPerWanted * config.samplesPerStep), HashModel::kMostSteps);
-  room.texels = static_cast<uint32_t>(kRoomPerWanted * config.texelsPerStep);
-  room.training = true;
-  return room;
+HashPipeline::Capacity makeCapacity(const HashConfig& config) {
+  HashPipeline::Capacity capacity;
+  capacity.rays = static_cast<uint32_t>(config.maxRays);
+  capacity.samples = std::max(static_cast<uint32_t>(kCapacityPerDemand * config.samplesPerStep), HashModel::kMaxSteps);
+  capacity.texels = static_cast<uint32_t>(kCapacityPerDemand * config.texelsPerStep);
+  capacity.training = true;
+  return capacity;
 }
 
 }  // namespace
 
 double distortionWeight(const HashConfig& config, int64_t step, int64_t plannedSteps) {
-  // While the number of steps is not known, it is early.
-  const double risen = config.rampShare * static_cast<double>(plannedSteps);
-  const double share = risen > 0 ? std::min(1.0, static_cast<double>(step) / risen) : config.rampShare > 0 ? 0 : 1;
-  return config.distortion.value() * share;
+  // While the number of steps is not known, training is assumed to be at its beginning.
+  const double risen = config.lossWarmupFraction * static_cast<double>(plannedSteps);
+  const double share = risen > 0                       ? std::min(1.0, static_cast<double>(step) / risen)
+                       : config.lossWarmupFraction > 0 ? 0
+                                                       : 1;
+  return config.distortionWeight.value() * share;
 }
 
 HashTrainer::HashTrainer(Device& device, const Capture& capture, const HashConfig& config, const BlockGrid& grid)
     : device_(device),
       config_(config),
       model_(device, config, grid),
-      pass_(model_, roomFor(config)),
+      pipeline_(model_, makeCapacity(config)),
       photoRays_(device, capture, model_.frame(), raySettings(config)),
-      photoLoss_(device, capture, config, static_cast<uint32_t>(config.mostRays)),
+      photoLoss_(device, capture, config, static_cast<uint32_t>(config.maxRays)),
       budget_(config) {
-  CHECK(config.distortion.has_value());
+  CHECK(config.distortionWeight.has_value());
   bool anything = false;
   for (uint32_t block = 0; block < parts(); ++block) {
-    const std::vector<bool> visible =
-        visibleCells(capture, model_.frame(), model_.occupancySpace(block), domainOf(model_.space().placement(block)));
+    const std::vector<bool> visible = visibleCells(capture, model_.frame(), model_.occupancySpace(block),
+                                                   makeBlockDomain(model_.space().placement(block)));
     anything = anything || std::find(visible.begin(), visible.end(), true) != visible.end();
     model_.exclude(block, visible);
   }
   if (!anything) {
     throw Error(capture.root.string(), "transforms.json", "no training photo sees any of the scene",
-                "look whether the poses are right, and the lens and its distortion");
+                "check the camera poses, the lens model and its distortion");
   }
   losses_ = device.array<float>(PhotoLoss::kLosses);
 }
 
 void HashTrainer::refreshOccupancy(int64_t step) {
   if (step % config_.occupancyEvery != 0) return;
-  model_.refreshOccupancy(step < config_.occupancyWarmUp,
+  model_.refreshOccupancy(step < config_.occupancyWarmupSteps,
                           mix64(static_cast<uint64_t>(config_.seed) ^ (static_cast<uint64_t>(step) << 20)));
 }
 
@@ -79,13 +81,13 @@ HashModel::Rays HashTrainer::drawRays(int64_t step) {
                              photoRays_.jitter(0, count),
                              photoRays_.nears(0, count),
                              photoRays_.fars(0, count)};
-  pass_.forward(rays, kTrainingMinTransmittance);
+  pipeline_.forward(rays, kTrainingMinTransmittance);
   return rays;
 }
 
-// Where corners have no room, what they hold counts as nothing: then again with fewer rays.
-bool HashTrainer::drawsFewerRays(uint32_t texelsWanted) {
-  return budget_.drawsFewer(texelsWanted, model_.fields().roomForTexels());
+// If the lattice corners exceed the capacity, the step is invalid and is repeated with fewer rays.
+bool HashTrainer::drawsFewerRays(uint32_t texelsDemanded) {
+  return budget_.drawsFewer(texelsDemanded, model_.fields().texelCapacity());
 }
 
 StepReport HashTrainer::step(int64_t step, int64_t plannedSteps) {
@@ -97,27 +99,27 @@ StepReport HashTrainer::step(int64_t step, int64_t plannedSteps) {
     const HashModel::Rays rays = drawRays(step);
     addGradients(rays, step, plannedSteps);
     updateParameters(step, plannedSteps);
-    // The step is over: its counters may be read. Where it had no room, it has changed nothing.
-    std::tie(counters, losses, inner) = device_.readTogether(pass_.counters(), losses_.all(), pass_.losses());
+    // The step is over, so its counters may be read. If it exceeded the capacity, it has not changed any parameter.
+    std::tie(counters, losses, inner) = device_.readAll(pipeline_.counters(), losses_.all(), pipeline_.losses());
     report.texels = *std::max_element(counters.begin() + HashSamples::kFirstTexels, counters.end());
   } while (drawsFewerRays(report.texels));
   photoLoss_.exposures().settle(step, config_.exposure);
 
   const RoundCounts counts(counters, HashSamples::kRounds);
-  report.samples = counts.kept;
+  report.samples = counts.visibleSamples;
   report.rays = counts.finished;
   report.marched = counts.marched;
-  const Fit fit = fitOf(report.rays, losses);
-  report.loss = fit.loss + inner[0] + inner[1];
-  report.squaredError = fit.squaredError / std::max(1.0, fit.channels);
+  const Evaluation evaluation = makeEvaluation(report.rays, losses);
+  report.loss = evaluation.loss + inner[0] + inner[1];
+  report.squaredError = evaluation.squaredError / std::max(1.0, evaluation.channels);
   const double perRay = static_cast<double>(report.samples) / std::max(1u, report.rays);
   model_.adaptStep(perRay);
 
-  double wanted = config_.samplesPerStep / std::max(1.0 / 64, perRay);
+  double targetRays = config_.samplesPerStep / std::max(1.0 / 64, perRay);
   const uint32_t rays = budget_.rays();
-  wanted = std::min(wanted, rays * static_cast<double>(config_.texelsPerStep) / std::max(1u, report.texels));
-  if (report.rays < rays) wanted = std::min<double>(wanted, report.rays);  // not all of them fitted
-  budget_.aimFor(std::ceil(wanted / 8) * 8);
+  targetRays = std::min(targetRays, rays * static_cast<double>(config_.texelsPerStep) / std::max(1u, report.texels));
+  if (report.rays < rays) targetRays = std::min<double>(targetRays, report.rays);  // not all rays fitted
+  budget_.aimFor(std::ceil(targetRays / 8) * 8);
   return report;
 }
 
@@ -130,62 +132,63 @@ void HashTrainer::trainOn(std::vector<TileShares> photos) {
   photoRays_.drawFrom(std::move(photos));
 }
 
-void HashTrainer::judgeBy(std::vector<TileShares> photos) {
+void HashTrainer::evaluateOn(std::vector<TileShares> photos) {
   photoLoss_.exposures().centre();
   photoRays_.drawFrom(std::move(photos));
 }
 
-HashTrainer::Fit HashTrainer::fit(int64_t step) {
+HashTrainer::Evaluation HashTrainer::evaluate(int64_t step) {
   std::vector<uint32_t> counters;
   std::vector<float> losses;
   do {
-    photoLoss_.compare(photoRays_, pictureOf(drawRays(step)), losses_);
-    std::tie(counters, losses) = device_.readTogether(pass_.counters(), losses_.all());
+    photoLoss_.compare(photoRays_, makeLossPicture(drawRays(step)), losses_);
+    std::tie(counters, losses) = device_.readAll(pipeline_.counters(), losses_.all());
   } while (drawsFewerRays(*std::max_element(counters.begin() + HashSamples::kFirstTexels, counters.end())));
-  return fitOf(counters[MarchRounds::kFinished], losses);
+  return makeEvaluation(counters[MarchRounds::kFinished], losses);
 }
 
-HashTrainer::Fit HashTrainer::fitOf(uint32_t rays, const std::vector<float>& losses) const {
+HashTrainer::Evaluation HashTrainer::makeEvaluation(uint32_t rays, const std::vector<float>& losses) const {
   double weight = 0;
   for (uint32_t ray = 0; ray < rays; ++ray) weight += photoRays_.batch().weights[ray];
   return {losses[1], 3 * weight, losses[0]};
 }
 
-PhotoLoss::Picture HashTrainer::pictureOf(const HashModel::Rays& rays) const {
-  return {pass_.finished(rays), 0, rays.count, pass_.colour(), pass_.opacity(), config_.background == "random"};
+PhotoLoss::Picture HashTrainer::makeLossPicture(const HashModel::Rays& rays) const {
+  return {pipeline_.finished(rays),      0, rays.count, pipeline_.colour(), pipeline_.opacity(),
+          config_.background == "random"};
 }
 
 void HashTrainer::addGradients(const HashModel::Rays& drawn, int64_t step, int64_t plannedSteps) {
-  const PhotoLoss::Picture picture = pictureOf(drawn);
+  const PhotoLoss::Picture picture = makeLossPicture(drawn);
   photoLoss_.compare(photoRays_, picture, losses_);
   photoLoss_.passBack(photoRays_, picture);
-  HashPass::LossScales scales;
+  HashPipeline::LossScales scales;
   scales.distortion = static_cast<float>(distortionWeight(config_, step, plannedSteps) / drawn.count);
-  if (config_.knownShare > 0) scales.depth = static_cast<float>(config_.depth / drawn.count);
+  if (config_.sparseDepthRayFraction > 0) scales.depth = static_cast<float>(config_.depthWeight / drawn.count);
   scales.depthTolerance = static_cast<float>(config_.depthTolerance);
-  pass_.backward(drawn, photoLoss_.colourGradients(picture), photoLoss_.opacityGradients(picture),
-                 photoRays_.distances(0, drawn.count), scales);
+  pipeline_.backward(drawn, photoLoss_.colourGradients(picture), photoLoss_.opacityGradients(picture),
+                     photoRays_.distances(0, drawn.count), scales);
 }
 
 void HashTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
   RateSchedule schedule = config_.rateSchedule();
-  schedule.warmUpSteps = config_.warmUpSteps;
-  schedule.linear = config_.rateFall == "linear";
+  schedule.warmUpSteps = config_.warmupSteps;
+  schedule.linear = config_.learningRateSchedule == "linear";
   HashFields::Rates rates;
   rates.table.rate = rates.network.rate = static_cast<float>(schedule.at(step, plannedSteps));
   rates.table.skipZeroGradients = rates.network.skipZeroGradients = true;
   rates.fine = rates.table;
-  rates.fine.rate *= static_cast<float>(config_.fineRateFactor);
+  rates.fine.rate *= static_cast<float>(config_.fineLearningRateFactor);
   rates.network.l2 = static_cast<float>(config_.networkL2);
   for (Adam* adam : {&rates.table, &rates.fine, &rates.network}) {
-    if (budget_.canShrink()) adam->found = pass_.texelsWanted();
-    adam->room = model_.fields().roomForTexels();
+    if (budget_.canShrink()) adam->overflowCounters = pipeline_.texelsDemanded();
+    adam->capacity = model_.fields().texelCapacity();
   }
   model_.fields().step(rates);
   model_.direction().step(device_, rates.network);
-  Adam ofExposures = rates.table;
-  ofExposures.rate = static_cast<float>(config_.exposureRate * rates.table.rate / config_.rate);
-  photoLoss_.exposures().step(ofExposures, config_.exposure);
+  Adam exposureAdam = rates.table;
+  exposureAdam.rate = static_cast<float>(config_.exposureLearningRate * rates.table.rate / config_.learningRate);
+  photoLoss_.exposures().step(exposureAdam, config_.exposure);
 }
 
 Bytes HashTrainer::save(uint32_t part) {
@@ -198,7 +201,7 @@ Bytes HashTrainer::save(uint32_t part) {
   return tensors.encode({{"format", kFormat}, {"device", device_.target()}, {"block", std::to_string(part)}});
 }
 
-std::optional<uint32_t> HashTrainer::brokenPart() {
+std::optional<uint32_t> HashTrainer::firstNonFinitePart() {
   for (uint32_t part = 0; part < parts(); ++part) {
     if (!model_.allFinite(part)) return part;
   }

@@ -9,7 +9,7 @@
 namespace tessera {
 namespace {
 
-// Mean PSNR over the held-out views.
+// Returns the mean PSNR over the held-out photos.
 double heldOut(const CubeScene& scene, HashModel& model) {
   HashModelRenderer renderer(model);
   double sum = 0;
@@ -17,7 +17,7 @@ double heldOut(const CubeScene& scene, HashModel& model) {
   for (const int photo : photos) {
     const Camera& camera = scene.capture().cameras[0];
     const Pose& pose = scene.capture().photos[photo].worldFromCamera;
-    sum += psnrOf(renderer.render(camera, pose, nullptr), scene.truth(camera, pose));
+    sum += computePsnr(renderer.render(camera, pose, nullptr), scene.truth(camera, pose));
   }
   return sum / static_cast<double>(photos.size());
 }
@@ -30,35 +30,35 @@ TEST(HashTrainer, LearnsACubeInOneBlockAndInTwoThatMeetInIt) {
   }
 }
 
-TEST(HashTrainer, LearnsWhatLiesAroundTheRegionInTheSurround) {
+TEST(HashTrainer, LearnsWhatLiesAroundTheRegionInTheBackgroundBlock) {
   CubeScene::Options options;
-  options.room = true;  // walls at 2.5, far outside of the blocks
+  options.isEnclosed = true;  // walls at 2.5, far outside of the blocks
   const CubeScene scene(options);
-  for (const char* surround : {"own", "border"}) {
+  for (const char* backgroundBlock : {"own", "border"}) {
     HashConfig config = smallHashConfig();
-    config.surround = surround;
+    config.backgroundBlock = backgroundBlock;
     TrainedHashCube trained(scene, config, cubeGrid(), 300);
-    EXPECT_EQ(trained.model().space().blocks(), surround == std::string("own") ? 2u : 1u);
-    EXPECT_GT(heldOut(scene, trained.model()), 20) << surround;
+    EXPECT_EQ(trained.model().space().blocks(), backgroundBlock == std::string("own") ? 2u : 1u);
+    EXPECT_GT(heldOut(scene, trained.model()), 20) << backgroundBlock;
   }
 }
 
-TEST(HashTrainer, MakesAStepThatHadNoRoomAgainAsIfItHadNeverTriedMoreRays) {
+TEST(HashTrainer, RepeatsAStepThatExceededTheCapacityAsIfItHadBegunWithFewerRays) {
   const CubeScene scene;
   HashConfig config = smallHashConfig();
   config.exposure = true;
   config.samplesPerStep = 1 << 16;
   config.lattice = 64;
   config.texelsPerStep = 1 << 11;
-  config.firstRays = config.mostRays;
+  config.firstRays = config.maxRays;
   TrainedHashCube trained(scene, config, cubeGrid(), 0);
   const StepReport report = trained.trainer->step(0, 10);
-  EXPECT_LT(report.rays, static_cast<uint32_t>(config.mostRays));
-  EXPECT_LE(report.texels, trained.model().fields().roomForTexels());
+  EXPECT_LT(report.rays, static_cast<uint32_t>(config.maxRays));
+  EXPECT_LE(report.texels, trained.model().fields().texelCapacity());
   config.firstRays = static_cast<int>(report.rays);
-  TrainedHashCube meant(scene, config, cubeGrid(), 0);
-  EXPECT_EQ(meant.trainer->step(0, 10).texels, report.texels);
-  EXPECT_EQ(meant.saved(), trained.saved());
+  TrainedHashCube expected(scene, config, cubeGrid(), 0);
+  EXPECT_EQ(expected.trainer->step(0, 10).texels, report.texels);
+  EXPECT_EQ(expected.saved(), trained.saved());
 }
 
 TEST(HashTrainer, LearnsWithEveryWayToFuseLevels) {
@@ -78,9 +78,9 @@ TEST(HashTrainer, LearnsWithEveryWayToFuseLevels) {
   }
 }
 
-TEST(HashTrainer, LearnsABackgroundWhereItIsTo) {
+TEST(HashTrainer, LearnsABackgroundIfConfigured) {
   CubeScene::Options options;
-  options.room = true;
+  options.isEnclosed = true;
   const CubeScene scene(options);
   HashConfig config = smallHashConfig();
   config.background = "learned";
@@ -90,8 +90,8 @@ TEST(HashTrainer, LearnsABackgroundWhereItIsTo) {
   const Pose& pose = scene.capture().photos[scene.capture().photosIn(Split::test)[0]].worldFromCamera;
   const RenderedView alone = renderer.render(camera, pose, nullptr);
   for (const float opacity : alone.opacity.pixels) ASSERT_EQ(opacity, 1);
-  EXPECT_GT(psnrOf(alone, scene.truth(camera, pose)), 15);  // walls as a function of the direction alone
-  // With a model at the camera's nose, nothing of the scene is left.
+  EXPECT_GT(computePsnr(alone, scene.truth(camera, pose)), 15);  // walls as a function of the direction alone
+  // With an opaque object directly in front of the camera, nothing of the scene is visible.
   ImageF near(camera.width, camera.height, 1);
   std::fill(near.pixels.begin(), near.pixels.end(), 1e-3f);
   const RenderedView hidden = renderer.render(camera, pose, &near);
@@ -142,21 +142,21 @@ TEST(HashTrainer, RefusesStatesOfOtherKindsAndSizes) {
                Error);
 }
 
-// Invariant 12.
+// Invariant 12 of `hash` (docs/invariants.md).
 TEST(HashTrainer, RaisesTheDistortionLossAsPlanned) {
   HashConfig config;
-  config.distortion = 0.01;
-  config.rampShare = 0.5;
+  config.distortionWeight = 0.01;
+  config.lossWarmupFraction = 0.5;
   EXPECT_EQ(distortionWeight(config, 0, 100000), 0);
   EXPECT_NEAR(distortionWeight(config, 25000, 100000), 0.005, 1e-12);
   EXPECT_NEAR(distortionWeight(config, 50000, 100000), 0.01, 1e-12);
   EXPECT_NEAR(distortionWeight(config, 100000, 100000), 0.01, 1e-12);
-  EXPECT_EQ(distortionWeight(config, 700, 0), 0);  // it is early while nobody knows
-  config.rampShare = 0;
+  EXPECT_EQ(distortionWeight(config, 700, 0), 0);  // while the number of steps is unknown
+  config.lossWarmupFraction = 0;
   EXPECT_EQ(distortionWeight(config, 0, 0), 0.01);
 }
 
-// Invariant 3.
+// Invariant 3 of `hash` (docs/invariants.md).
 TEST(HashModel, ShortensItsStepsWhileRaysHaveTooFewSamples) {
   const std::unique_ptr<Device> device = makeDevice({"cpu", 1});
   HashModel model(*device, smallHashConfig(), cubeGrid());

@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "representations/hash/content/hash_payload.h"
-#include "representations/hash/train/find_distortion.h"
+#include "representations/hash/train/tune_distortion_weight.h"
 
 namespace tessera {
 
@@ -24,11 +24,11 @@ double trainingBytesPerBlock(const HashConfig& config) {
 
 HashConfig levelConfig(HashConfig finest, uint32_t level, int64_t finestStep) {
   const int by = static_cast<int>(level);
-  finest.level = by;
+  finest.lod = by;
   finest.finestStep = finestStep;
   finest.lattice = std::max(8, (finest.lattice >> by) / 8 * 8);
   finest.coarseBase = std::min(finest.coarseBase, finest.lattice);
-  finest.levels = std::max(1, finest.levels - by);
+  finest.fineLevels = std::max(1, finest.fineLevels - by);
   finest.fineLog2Size = std::min(finest.fineLog2Size, std::max(8, finest.fineLog2Size - 2 * by));
   finest.occupancyResolution =
       std::min(finest.occupancyResolution, std::max(16, (finest.occupancyResolution >> by) / 4 * 4));
@@ -37,20 +37,20 @@ HashConfig levelConfig(HashConfig finest, uint32_t level, int64_t finestStep) {
 
 namespace {
 
-// Throws Error where a level could not be baked, before anything is trained.
+// Throws Error, before anything is trained, if a level could not be baked because of its step length.
 void requireStepsOfScenes(const HashConfig& config) {
-  const double longest = config.longestStep(), shortest = config.shortestStep * longest;
+  const double longest = config.longestStep(), shortest = config.minRayStepRatio * longest;
   if (longest <= kLongestHashStep && shortest >= kShortestHashStep) return;
-  throw Error(fmt::format("--set step={}", config.step), "",
+  throw Error(fmt::format("--set max_ray_step={}", config.maxRayStep), "",
               fmt::format("at level {}, with {} corners along an edge, rays take steps of {:.3g} to {:.3g} of a block, "
                           "where scenes have {:.3g} to {:.3g}",
-                          config.level, config.lattice, shortest, longest, kShortestHashStep, kLongestHashStep),
-              "use another one, or level_share=0");
+                          config.lod, config.lattice, shortest, longest, kShortestHashStep, kLongestHashStep),
+              "use another one, or lod_step_fraction=0");
 }
 
-BlockLimits limitsOf(const TrainHashOptions& options) {
+BlockLimits makeBlockLimits(const TrainHashOptions& options) {
   BlockLimits limits;
-  limits.texelsPerEdge = options.config.lattice << options.config.levels;
+  limits.texelsPerEdge = options.config.lattice << options.config.fineLevels;
   limits.bytesPerBlock = trainingBytesPerBlock(options.config);
   limits.memoryBudget = options.bytesForBlocks();
   return limits;
@@ -61,12 +61,12 @@ class HashMethod final : public BlockMethod {
   HashMethod(const TrainHashOptions& options, const fs::path& model)
       : options_(options), model_(model), finest_(options.config) {}
 
-  BlockDemands demands() const override {
-    return {[&] { return limitsOf(options_); },
+  PartitionRequirements partitionRequirements() const override {
+    return {[&] { return makeBlockLimits(options_); },
             {kEnoughPhotos, int64_t{finest_.lattice} * finest_.lattice},
             finest_.photoBudgetMiB};
   }
-  double levelShare() const override { return finest_.levelShare; }
+  double lodStepFraction() const override { return finest_.lodStepFraction; }
   uint32_t topLevel(const BlockGrid& grid) const override {
     return tessera::topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
   }
@@ -76,31 +76,33 @@ class HashMethod final : public BlockMethod {
   }
   bool findSettings(const BlockTraining& on, const BlockRun& run, TrainingLoopOptions& loop,
                     const std::function<void()>& begun) override;
-  std::unique_ptr<Trainee> begin(const BlockTraining& on, const BlockLevel& level) override;
+  std::unique_ptr<TrainableModel> begin(const BlockTraining& on, const BlockLevel& level) override;
   std::vector<ConfigField> settings() override { return config_.fields(); }
   std::string parts() const override { return fmt::format("{} tiles", tiles_); }
-  void sayMemory(const BlockTraining& on) const override;
-  int64_t madeFrom(const fs::path& folder) const override { return savedConfig<HashConfig>(folder).finestStep; }
+  void reportMemory(const BlockTraining& on) const override;
+  int64_t finestStepOfLevel(const fs::path& folder) const override {
+    return savedConfig<HashConfig>(folder).finestStep;
+  }
 
  private:
   const TrainHashOptions& options_;
   const fs::path& model_;
-  HashConfig finest_, config_;  // of the finest level, and of the one that was begun last
+  HashConfig finest_, config_;  // settings of the finest level, and of the level that was begun last
   size_t tiles_ = 0;
 };
 
-// The weight of the distortion loss.
+// Determines the weight of the distortion loss.
 bool HashMethod::findSettings(const BlockTraining& on, const BlockRun& run, TrainingLoopOptions& loop,
                               const std::function<void()>& begun) {
-  if (finest_.distortion) {
-    if (!run.goesOn) fs::remove(distortionFile(model_));  // of another run
+  if (finest_.distortionWeight) {
+    if (!run.goesOn) fs::remove(distortionFile(model_));  // it belongs to another run
     return true;
   }
   if (!loop.resume) fs::remove(distortionFile(model_));
-  return findDistortion(on, model_, finest_, loop, begun);
+  return tuneDistortionWeight(on, model_, finest_, loop, begun);
 }
 
-std::unique_ptr<Trainee> HashMethod::begin(const BlockTraining& on, const BlockLevel& level) {
+std::unique_ptr<TrainableModel> HashMethod::begin(const BlockTraining& on, const BlockLevel& level) {
   config_ = level.level > 0 ? levelConfig(finest_, level.level, level.finestStep) : finest_;
   tiles_ =
       groupsOfLevel(static_cast<uint32_t>(on.grid.columns), static_cast<uint32_t>(on.grid.rows), level.level, false)
@@ -108,18 +110,18 @@ std::unique_ptr<Trainee> HashMethod::begin(const BlockTraining& on, const BlockL
   return std::make_unique<HashTrainer>(on.device, on.capture, config_, on.grid);
 }
 
-void HashMethod::sayMemory(const BlockTraining& on) const {
-  sayWhatMemoryItTakes(on, options_,
-                       {finest_.photoBudgetMiB, trainingBytesPerBlock(finest_), "",
-                        "lower samples_per_step, texels_per_step or photo_budget_mib, or use --method volume with "
-                        "--resident-blocks"});
+void HashMethod::reportMemory(const BlockTraining& on) const {
+  reportMemoryUse(on, options_,
+                  {finest_.photoBudgetMiB, trainingBytesPerBlock(finest_), "",
+                   "lower samples_per_step, texels_per_step or photo_budget_mib, or use --method volume with "
+                   "--resident-blocks"});
 }
 
 }  // namespace
 
 TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options) {
   HashConfig& config = options.config;
-  if (options.loop.resume && ModelFolder(model).manifest()) config.keepFound(savedConfig<HashConfig>(model));
+  if (options.loop.resume && ModelFolder(model).manifest()) config.adoptTunedValues(savedConfig<HashConfig>(model));
   config.check();
   options.loop.method = "hash";
   HashMethod method(options, model);

@@ -1,4 +1,4 @@
-// `tessera train --method hash`: a capture to a model folder.
+// `tessera train --method hash`: trains a capture into a model folder.
 #pragma once
 
 #include "representations/hash/train/hash_trainer.h"
@@ -10,20 +10,21 @@ struct TrainHashOptions : BlockRunOptions {
   HashConfig config;
 };
 
-// Cuts the capture into blocks, or takes those that are given (blocks.json, blocks.svg, blocks.geojson), warns of those
-// that will not come out well, trains, resumes, saves; see training_loop.h. Writes config.toml and blocks.json first.
-// Before that, where the weight of the distortion loss is to be found out, short trainings of a few weights, which
-// distortion.json tells of, and which `loop.resume` does not make again; they count as part of `loop.minutes`. A run
-// that goes on has found it out. Asked to stop meanwhile, there is no model yet.
-// Then coarser levels of detail of the same blocks, up to one whose tiles hold all; where the finest has been trained
-// on since, they are made anew. The result counts the finest level's steps; it is finished when all levels are.
+// Divides the capture into blocks, or uses the blocks that are given (blocks.json, blocks.svg, blocks.geojson), warns
+// about blocks that will be reconstructed poorly, and trains, resumes and saves; see training_loop.h. Writes
+// config.toml and blocks.json first. If the weight of the distortion loss is auto, it is determined before that by
+// short trainings with a few weights. They are recorded in distortion.json, are not repeated with `loop.resume`, and
+// count as part of `loop.minutes`. A resumed run already has the weight. If asked to stop during these trainings, the
+// folder does not contain a model yet. Afterwards trains coarser levels of detail of the same blocks, up to one with a
+// single tile for all; they are trained anew if the finest level has been trained further since. The result counts the
+// finest level's steps, and is finished when all levels are.
 TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options);
 
-// The settings of a level, from those of the finest: half the lattice, one fine level fewer, and tables of a quarter of
-// the entries for each, as far as there is anything left to take away.
+// Derives the settings of a level from those of the finest: each level has half the lattice, one fine level fewer and
+// tables with a quarter of the entries of the one below, down to a minimum of each.
 HashConfig levelConfig(HashConfig finest, uint32_t level, int64_t finestStep);
 
-// What training keeps of one block.
+// Returns the bytes of memory that training takes for one block.
 double trainingBytesPerBlock(const HashConfig& config);
 
 }  // namespace tessera

@@ -23,7 +23,7 @@ class HashTraining : public testing::Test {
     TrainHashOptions options;
     options.config = smallHashConfig();
     options.config.lattice = 32;
-    options.config.levelShare = 0.5;
+    options.config.lodStepFraction = 0.5;
     options.grid = cubeGrid(2);
     options.loop.steps = steps;
     options.loop.resume = resume;
@@ -33,7 +33,7 @@ class HashTraining : public testing::Test {
   TwoDevices trainings() const {
     return {[this](Device& device, const fs::path& folder, const TrainingLoopOptions& loop) {
               TrainHashOptions some = options(0);
-              some.config.levelShare = 0;
+              some.config.lodStepFraction = 0;
               some.loop = loop;
               trainHash(device, scene_.capture(), folder, some);
             },
@@ -57,14 +57,14 @@ TEST(HashLevels, HaveHalfTheLatticeOneFineLevelFewerAndAQuarterOfTheEntries) {
   HashConfig finest;
   const HashConfig coarse = levelConfig(finest, 1, 100), coarsest = levelConfig(finest, 9, 100);
   EXPECT_EQ(coarse.lattice, finest.lattice / 2);
-  EXPECT_EQ(coarse.levels, finest.levels - 1);
+  EXPECT_EQ(coarse.fineLevels, finest.fineLevels - 1);
   EXPECT_EQ(coarse.fineLog2Size, finest.fineLog2Size - 2);
-  EXPECT_EQ(coarse.level, 1);
+  EXPECT_EQ(coarse.lod, 1);
   EXPECT_EQ(coarse.finestStep, 100);
   coarse.check();
   coarsest.check();
   EXPECT_EQ(coarsest.lattice, 8);
-  EXPECT_EQ(coarsest.levels, 1);
+  EXPECT_EQ(coarsest.fineLevels, 1);
 }
 
 TEST_F(HashTraining, MakesCoarserLevelsOfTheSameBlocks) {
@@ -78,7 +78,7 @@ TEST_F(HashTraining, MakesCoarserLevelsOfTheSameBlocks) {
   EXPECT_EQ(coarse.finestStep, 60);
   EXPECT_EQ(ModelFolder(levelFolder(model, 1)).manifest()->step, 30);
 
-  // Both are drawn, the coarser one in one tile of two parts.
+  // Both levels are rendered, the coarser one in one tile of two parts.
   const HashLevelModels models = [&](uint32_t level) { return loadHashModel(*device_, levelFolder(model, level)); };
   const BakedScene baked = bakeHash(models, 2, scene_.capture(), scene_ / "scene", {});
   ASSERT_EQ(baked.levels.size(), 2u);
@@ -90,15 +90,15 @@ TEST_F(HashTraining, MakesCoarserLevelsOfTheSameBlocks) {
     EXPECT_EQ(contentAs<HashContent>(*opened.source.load(0)).parts.size(), 2u);
     SceneRendererSettings settings;
     settings.threads = 2;
-    settings.selection.mostPixels = 0;
+    settings.selection.maximumScreenSpaceError = 0;
     settings.selection.finestLevel = level;
     HashRenderer renderer(opened.frame, std::move(opened.tree), std::move(opened.source), settings);
     const Photo& photo = scene_.capture().photos[0];
     const RenderedView view =
         renderer.render(scene_.capture().cameras[static_cast<size_t>(photo.camera)], photo.worldFromCamera, nullptr);
-    float most = 0;
-    for (const float opacity : view.opacity.pixels) most = std::max(most, opacity);
-    EXPECT_GT(most, 0.3f) << level;
+    float maximum = 0;
+    for (const float opacity : view.opacity.pixels) maximum = std::max(maximum, opacity);
+    EXPECT_GT(maximum, 0.3f) << level;
     for (const SelectedTile& tile : renderer.cut().tiles) EXPECT_EQ(tile.content == 0, level == 1);
   }
 }
@@ -108,7 +108,7 @@ TEST_F(HashTraining, MakesCoarserLevelsAnewWhenTheFinestHasGoneOn) {
   const fs::path model = scene_ / "model";
   ASSERT_EQ(trainedLevels<HashConfig>(model), 2u);
   TrainHashOptions finestAlone = options(40, true);
-  finestAlone.config.levelShare = 0;
+  finestAlone.config.lodStepFraction = 0;
   train(finestAlone);
   EXPECT_EQ(trainedLevels<HashConfig>(model), 1u) << "made from the model as it was at step 20";
   train(options(40, true));
@@ -116,8 +116,8 @@ TEST_F(HashTraining, MakesCoarserLevelsAnewWhenTheFinestHasGoneOn) {
   EXPECT_EQ(savedConfig<HashConfig>(levelFolder(model, 1)).finestStep, 40);
 }
 
-// Killed while a level was being made, or taken away.
-TEST_F(HashTraining, MakesALevelThatIsNotWhole) {
+// A level is incomplete if training was killed or files were deleted.
+TEST_F(HashTraining, TrainsALevelThatIsIncomplete) {
   train(options(20));
   const fs::path level = levelFolder(scene_ / "model", 1);
   const Bytes unbroken = readFile(level / ModelFolder(level).manifest()->files[0]);
@@ -129,18 +129,18 @@ TEST_F(HashTraining, MakesALevelThatIsNotWhole) {
   EXPECT_EQ(readFile(level / ModelFolder(level).manifest()->files[0]), unbroken);
 }
 
-TEST_F(HashTraining, RefusesStepsThatNoSceneHasBeforeItTrains) {
+TEST_F(HashTraining, RejectsStepsThatScenesCannotHaveBeforeItTrains) {
   TrainHashOptions wide = options(20);
-  wide.config.step = 3;  // of 32 corners; of 16 too long
+  wide.config.maxRayStep = 3;  // allowed with 32 corners, too long with 16
   EXPECT_THROW(train(wide), Error);
   EXPECT_FALSE(fs::exists(scene_ / "model" / "manifest.json"));
-  wide.config.levelShare = 0;
+  wide.config.lodStepFraction = 0;
   train(wide);
 }
 
-TEST_F(HashTraining, LeavesCoarserLevelsOutWhereNoneAreWanted) {
+TEST_F(HashTraining, TrainsNoCoarserLevelsIfTheyAreDisabled) {
   TrainHashOptions alone = options(10);
-  alone.config.levelShare = 0;
+  alone.config.lodStepFraction = 0;
   train(alone);
   EXPECT_EQ(trainedLevels<HashConfig>(scene_ / "model"), 1u);
   EXPECT_FALSE(fs::exists(scene_ / "model" / "levels"));
@@ -150,11 +150,11 @@ TEST_F(HashTraining, ComesToTheSameOnVulkanAndGoesOnThereAndBack) {
   trainings().expectTheSamePictures(scene_ / "models");
 }
 
-TEST_F(HashTraining, LosesNothingWhereAGraphicsCardFails) {
+TEST_F(HashTraining, LosesNothingWhereAGpuFails) {
   trainings().expectToSurviveFailures(scene_ / "models");
 }
 
-TEST_F(HashTraining, SendsEachStepToAGraphicsCardAtOnce) {
+TEST_F(HashTraining, SendsEachStepToAGpuAtOnce) {
 #ifdef TESSERA_HAS_VULKAN
   SKIP_WITHOUT_VULKAN(openForTest());
   const std::unique_ptr<Device> vulkan = makeVulkanDeviceWithFewGroups({});

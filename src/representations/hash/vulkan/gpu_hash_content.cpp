@@ -11,11 +11,12 @@
 namespace tessera {
 namespace {
 
-// What is added, and what a number from 0 to `most` is multiplied with, of columns 1 2 3 0 and then of 4 5 6 7.
-void addRangeVectors(std::span<const ByteRange> ranges, float most, std::vector<float>& numbers) {
+// Appends the offsets and scales that dequantise numbers from 0 to `maximum`: first those of columns 1 2 3 0, then
+// those of columns 4 5 6 7.
+void addRangeVectors(std::span<const ByteRange> ranges, float maximum, std::vector<float>& numbers) {
   for (const std::array<int, 4>& columns : {std::array<int, 4>{1, 2, 3, 0}, {4, 5, 6, 7}}) {
     for (const int c : columns) numbers.push_back(ranges[c].low);
-    for (const int c : columns) numbers.push_back((ranges[c].high - ranges[c].low) / most);
+    for (const int c : columns) numbers.push_back((ranges[c].high - ranges[c].low) / maximum);
   }
 }
 
@@ -29,7 +30,7 @@ GpuHashContent::GpuHashContent(const std::shared_ptr<GpuStream>& stream, const H
     : weights(content.weights),
       varies(content.columns() > HashPart::kFeatures),
       step(content.step),
-      isWhole(content.isWhole),
+      hasLearnedBackground(content.hasLearnedBackground),
       partCount(static_cast<uint32_t>(content.parts.size())),
       tables(static_cast<uint32_t>(content.parts.front().tables.size())),
       columns(content.columns()),
@@ -42,29 +43,29 @@ GpuHashContent::GpuHashContent(const std::shared_ptr<GpuStream>& stream, const H
   }
   PackedContent packed;
   std::vector<arguments::HashPartArguments> all;
-  std::vector<float> numbers;  // of `vectors`
+  std::vector<float> numbers;  // the data of `vectors`
   for (const HashPart& part : content.parts) {
     CHECK(part.tables.size() == size_t{tables});
-    auto made = placedArguments<arguments::HashPartArguments>(part);
-    made.texels = static_cast<float>(part.cells());
-    made.lattice = static_cast<float>(part.lattice);
-    made.ratio = std::countr_zero(part.distances.ratio);
-    made.macroblocks = packed.add(part.macroblocks);
-    made.cornerWords = packed.add(part.cornerBytes);
-    made.coarse = packed.add(part.distances.coarse);
-    made.fine = packed.add(part.distances.fine);
-    made.firstVector = static_cast<uint32_t>(numbers.size() / 4);
+    auto partArguments = placedArguments<arguments::HashPartArguments>(part);
+    partArguments.texels = static_cast<float>(part.cells());
+    partArguments.lattice = static_cast<float>(part.lattice);
+    partArguments.ratio = std::countr_zero(part.distances.ratio);
+    partArguments.macroblocks = packed.add(part.macroblocks);
+    partArguments.cornerWords = packed.add(part.cornerBytes);
+    partArguments.coarse = packed.add(part.distances.coarse);
+    partArguments.fine = packed.add(part.distances.fine);
+    partArguments.firstVector = static_cast<uint32_t>(numbers.size() / 4);
     for (uint32_t first = 0; first < columns; first += HashPart::kFeatures) {
       addRangeVectors(std::span(part.ranges).subspan(first, HashPart::kFeatures), 1, numbers);
     }
     for (uint32_t level = 0; level < tables; ++level) {
       const HashTable& table = part.tables[level];
-      made.tables[level] = packed.add(table.bytes);
+      partArguments.tables[level] = packed.add(table.bytes);
       numbers.insert(numbers.end(), {static_cast<float>(table.resolution), static_cast<float>(table.entries),
                                      table.hashed ? 1.0f : 0.0f, 0.0f});
       addRangeVectors(table.ranges, 255, numbers);
     }
-    all.push_back(made);
+    all.push_back(partArguments);
   }
   network = addNetwork(content.network, packed);
   vectors = packed.add(numbers);

@@ -1,4 +1,4 @@
-// A content of `hash` on a GPU.
+// A `hash` content in GPU memory.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace tessera {
 
-// It takes no more of the GPU than the content that it is made of takes in memory.
+// It takes no more GPU memory than the content from which it was made takes in main memory.
 struct GpuHashContent final : GpuContent {
   GpuHashContent(const std::shared_ptr<GpuStream>& stream, const HashContent& content);
 
@@ -17,14 +17,14 @@ struct GpuHashContent final : GpuContent {
 
   GpuContentMemory memory;
   LevelWeights weights = LevelWeights::separate;
-  bool varies = false;  // from place to place; else `levelWeights` are those of density and of all else
-  std::array<float, 2 * HashPart::kMostTables> levelWeights = {};
+  bool varies = false;  // the weights of levels vary from place to place; if not, they are `levelWeights`
+  std::array<float, 2 * HashPart::kMaxTables> levelWeights = {};  // [tables][2]: of density and of all other features
   float step = 0;
-  bool isWhole = false;
+  bool hasLearnedBackground = false;
   uint32_t partCount = 0, tables = 0, columns = 0;
-  uint64_t parts = 0, vectors = 0;  // addresses
+  uint64_t parts = 0, vectors = 0;  // device addresses
   GpuNetwork network;
-  std::vector<DenseLayer> layers;  // of the network: contents with the same numbers have the same one
+  std::vector<DenseLayer> layers;  // of the network, to recognise contents that share a network
 };
 
 }  // namespace tessera

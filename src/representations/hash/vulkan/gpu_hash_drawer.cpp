@@ -14,9 +14,9 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kNumbersOfPixel = 9;  // begin_view.comp, and one for each network
+constexpr uint32_t kNumbersOfPixel = 9;  // see begin_view.comp; each network adds one
 
-const GpuHashContent& hashOf(const GpuContent* content) {
+const GpuHashContent& toHashContent(const GpuContent* content) {
   return static_cast<const GpuHashContent&>(*content);
 }
 
@@ -34,42 +34,43 @@ class GpuHashDrawer final : public GpuDrawer {
     picture.begin(view.frame, settings.minTransmittance, kNumbersOfPixel + static_cast<uint32_t>(networks_.size()),
                   request);
     for (const DrawnContent<GpuContent>& drawn : view.frontToBack) add(picture, drawn, false);
-    if (view.surround != nullptr) add(picture, view.surround, true);
+    if (view.backgroundBlock != nullptr) add(picture, view.backgroundBlock, true);
     end(picture);
   }
 
  private:
-  // One content for each network of the picture; the last one's speaks where nothing is met.
+  // Collects one content for each network of the image. The last network is used where a ray hits nothing.
   void findNetworks(const SceneView<GpuContent>& view) {
     networks_.clear();
-    isWhole_ = false;
+    hasLearnedBackground_ = false;
     std::vector<const GpuHashContent*> all;
-    for (const DrawnContent<GpuContent>& drawn : view.frontToBack) all.push_back(&hashOf(drawn.content));
-    if (view.surround != nullptr) {
-      all.push_back(&hashOf(view.surround));
+    for (const DrawnContent<GpuContent>& drawn : view.frontToBack) all.push_back(&toHashContent(drawn.content));
+    if (view.backgroundBlock != nullptr) {
+      all.push_back(&toHashContent(view.backgroundBlock));
     } else if (view.pinned != nullptr) {
-      all.push_back(&hashOf(view.pinned));
+      all.push_back(&toHashContent(view.pinned));
     }
     for (const GpuHashContent* content : all) {
-      isWhole_ |= content->isWhole;
-      if (networkOf(*content) == networks_.end()) networks_.push_back(content);
+      hasLearnedBackground_ |= content->hasLearnedBackground;
+      if (findNetwork(*content) == networks_.end()) networks_.push_back(content);
     }
-    // So that `end` finds it at the back.
+    // The last content's network must be at the back, where `end` expects it.
     if (!all.empty()) {
-      const auto last = networkOf(*all.back());
+      const auto last = findNetwork(*all.back());
       std::rotate(last, last + 1, networks_.end());
     }
   }
 
-  std::vector<const GpuHashContent*>::iterator networkOf(const GpuHashContent& content) {
+  std::vector<const GpuHashContent*>::iterator findNetwork(const GpuHashContent& content) {
     return std::find_if(networks_.begin(), networks_.end(),
                         [&](const GpuHashContent* other) { return other->layers == content.layers; });
   }
 
-  void add(GpuPicture& picture, const DrawnContent<GpuContent>& drawn, bool isSurround) {
-    const GpuHashContent& content = hashOf(drawn.content);
-    auto draw = drawArguments<arguments::DrawHashArguments>(picture.view(), content, drawn.low, drawn.high, isSurround);
-    draw.network = static_cast<uint32_t>(networkOf(content) - networks_.begin());
+  void add(GpuPicture& picture, const DrawnContent<GpuContent>& drawn, bool isBackgroundBlock) {
+    const GpuHashContent& content = toHashContent(drawn.content);
+    auto draw =
+        drawArguments<arguments::DrawHashArguments>(picture.view(), content, drawn.low, drawn.high, isBackgroundBlock);
+    draw.network = static_cast<uint32_t>(findNetwork(content) - networks_.begin());
     draw.stepLength = content.step;
     draw.columns = content.columns;
     std::copy(content.levelWeights.begin(), content.levelWeights.end(), draw.levelWeights);
@@ -82,32 +83,32 @@ class GpuHashDrawer final : public GpuDrawer {
 
   void end(GpuPicture& picture) {
     std::vector<arguments::NetworkArguments> table;
-    uint32_t mostWidth = 1;
+    uint32_t maxWidth = 1;
     for (const GpuHashContent* content : networks_) {
       table.push_back({content->network.layers, content->network.weights, content->network.layerCount, 0});
-      mostWidth = std::max(mostWidth, content->network.mostWidth);
+      maxWidth = std::max(maxWidth, content->network.maxWidth);
     }
     arguments::EndHashArguments end = {};
     end.view = picture.view();
     end.networkCount = static_cast<uint32_t>(table.size());
-    end.ofNothing = table.empty() ? 0 : end.networkCount - 1;
-    end.isWhole = isWhole_;
+    end.backgroundContent = table.empty() ? 0 : end.networkCount - 1;
+    end.hasLearnedBackground = hasLearnedBackground_;
     if (!table.empty()) {
       const auto bytes = std::as_bytes(std::span(table));
       if (networkTable_.bytes() < bytes.size()) {
-        stream_->retire(std::move(networkTable_));
+        stream_->deferDestroy(std::move(networkTable_));
         networkTable_ = GpuBuffer(stream_->context(), bytes.size());
       }
       stream_->upload(networkTable_, 0, bytes);
       end.networks = networkTable_.address();
     }
-    picture.run(kernels_.get(kEndHashSpirv, std::max(mostWidth, 23u)), end);
+    picture.run(kernels_.get(kEndHashSpirv, std::max(maxWidth, 23u)), end);
   }
 
   std::shared_ptr<GpuStream> stream_;
   KernelVariants kernels_;
   std::vector<const GpuHashContent*> networks_;
-  bool isWhole_ = false;  // a content is
+  bool hasLearnedBackground_ = false;  // of any content
   GpuBuffer networkTable_;
 };
 

@@ -1,4 +1,4 @@
-// Draws contents of `hash` on a GPU.
+// Draws `hash` contents on a GPU.
 #pragma once
 
 #include "render/vulkan/gpu_drawer.h"

@@ -1,4 +1,4 @@
-// Models of all levels to the contents of a scene.
+// Bakes the models of all levels into the contents of a scene.
 #include "bake/level_baker.h"
 #include "base/log.h"
 #include "raymarch/bake/part_summary.h"
@@ -15,7 +15,7 @@ class VolumeBaker final : public LevelBaker<VolumeModel> {
   using LevelBaker::LevelBaker;
 
  protected:
-  // Black where training had nothing else behind the photos.
+  // The background is black if training composited the photos over black.
   SceneDescription describe(const VolumeModel& finest) const override {
     return {"volume", finest.grid(), finest.space().near, finest.config().randomBackground ? kHazySky : kBlack};
   }
@@ -24,15 +24,15 @@ class VolumeBaker final : public LevelBaker<VolumeModel> {
                  ContentSink& sink) override {
     if (level == 0 && model.config().literalEq3) {
       warn(
-          "the model was trained with literal_eq3; scenes multiply the network's colour by the block's opacity, and "
-          "look different");
+          "the model was trained with literal_eq3, but renderers of scenes multiply the network's colour by the "
+          "block's opacity: the scene will look different from the model");
     }
     BakeOptions looking = options;
-    looking.minAlpha = model.config().cullLast;  // what is less opaque training has culled
-    const std::vector<AliveTexels> alive = findAliveTexels(model, capture, looking);
+    looking.minAlpha = model.config().cullLast;  // training has culled less opaque samples
+    const std::vector<OccupiedTexels> occupied = findOccupiedTexels(model, capture, looking);
     const std::vector<CellRange>& cells = model.groups().cells;
     for (uint32_t group = 0; group < model.groups().groups(); ++group) {
-      const VolumeContent content = bakeGroup(model, group, alive);
+      const VolumeContent content = bakeGroup(model, group, occupied);
       const std::optional<CellRange> ofGroup = group < cells.size() ? std::optional(cells[group]) : std::nullopt;
       sink.add(level, ofGroup, encodeVolume(content, options.effort), partSummary(content, content.parts.at(0).planes));
     }

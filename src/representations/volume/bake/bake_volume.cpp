@@ -6,16 +6,18 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kTexels = 1 << 16;  // evaluated together
-// Steps of a texel are too long for the edges of roofs once texels are: a level 1 of 62 cm was 0.16 dB better for half
-// steps (a finest level of 31 cm, 0.03 dB), and they are still as long as those of the level below.
+constexpr uint32_t kTexels = 1 << 16;  // evaluated in one batch
+// Steps of one texel are too long at the edges of roofs where texels are large. With half steps, a level 1 with texels
+// of 62 cm was 0.16 dB better (a finest level with texels of 31 cm: 0.03 dB); the steps are still as long as those of
+// the level below.
 constexpr uint32_t kStepsPerCoarseTexel = 2;
-constexpr double kReachOfPlanes = 12.0 / 2048;  // texels beside needed ones are kept too (MERF: 12 of 2048)
+constexpr double kReachOfPlanes = 12.0 / 2048;  // also keeps texels this near to needed ones (MERF: 12 of 2048)
 
-// Evaluates the attributes of a block that is in memory at positions, as bytes.
+// Evaluates the attributes of a resident block at positions, and quantises them to bytes.
 class TexelBaker {
  public:
-  TexelBaker(VolumeModel& model, uint32_t block) : model_(model), device_(model.device()), slot_(model.slotOf(block)) {
+  TexelBaker(VolumeModel& model, uint32_t block)
+      : model_(model), device_(model.device()), slot_(model.findSlot(block)) {
     CHECK(slot_ != kNoSlot);
     batch_ = BlockFieldBatch(device_, model.attributes().shape(), kTexels, false);
     positions_ = device_.array<float>(size_t{3} * kTexels);
@@ -35,7 +37,7 @@ class TexelBaker {
       device_.write(firstOfSlot_.all(), std::span<const uint32_t>(first_));
       model_.attributes().forward(batch_, false);
       for (const float a : device_.read(batch_.outputs.part(0, count * VirtualGrid::kAttributes))) {
-        all.push_back(static_cast<uint8_t>(255 * static_cast<double>(a) + 0.5));  // as VirtualGridForward
+        all.push_back(static_cast<uint8_t>(255 * static_cast<double>(a) + 0.5));  // rounds as VirtualGridForward does
       }
     }
     return all;
@@ -56,13 +58,13 @@ void appendPosition(const VirtualGrid& grid, uint32_t texel, std::vector<float>&
   positions.insert(positions.end(), position.begin(), position.end());
 }
 
-void bakeVoxels(const VirtualGrid& grid, const AliveTexels& alive, TexelBaker& baker, VolumePart& part) {
+void bakeVoxels(const VirtualGrid& grid, const OccupiedTexels& occupied, TexelBaker& baker, VolumePart& part) {
   const uint32_t blocks = grid.voxels / VolumePart::kMacroblock;
-  const std::vector<bool> wanted = alive.macroblocks();
-  part.macroblocks.assign(wanted.size(), VolumePart::kEmpty);
+  const std::vector<bool> needed = occupied.macroblocks();
+  part.macroblocks.assign(needed.size(), VolumePart::kEmpty);
   uint32_t stored = 0;
-  for (size_t b = 0; b < wanted.size(); ++b) {
-    if (!wanted[b]) continue;
+  for (size_t b = 0; b < needed.size(); ++b) {
+    if (!needed[b]) continue;
     part.macroblocks[b] = stored++;
     const uint32_t origin[3] = {static_cast<uint32_t>(b % blocks) * VolumePart::kMacroblock,
                                 static_cast<uint32_t>(b / blocks % blocks) * VolumePart::kMacroblock,
@@ -83,15 +85,15 @@ void bakeVoxels(const VirtualGrid& grid, const AliveTexels& alive, TexelBaker& b
   }
 }
 
-void bakePlanes(const VirtualGrid& grid, const AliveTexels& alive, TexelBaker& baker, VolumePart& part) {
+void bakePlanes(const VirtualGrid& grid, const OccupiedTexels& occupied, TexelBaker& baker, VolumePart& part) {
   const uint32_t reach = static_cast<uint32_t>(std::ceil(kReachOfPlanes * grid.planes));
   const size_t texels = size_t{grid.planes} * grid.planes;
   for (int axis = 0; axis < 3; ++axis) {
-    const std::vector<bool> wanted = alive.plane(axis, reach);
+    const std::vector<bool> needed = occupied.plane(axis, reach);
     std::vector<float> positions;
     for (uint32_t c = 0; c < grid.planes; ++c) {
       for (uint32_t b = 0; b < grid.planes; ++b) {
-        if (wanted[size_t{c} * grid.planes + b]) appendPosition(grid, grid.planeTexel(axis, b, c), positions);
+        if (needed[size_t{c} * grid.planes + b]) appendPosition(grid, grid.planeTexel(axis, b, c), positions);
       }
     }
     const std::vector<uint8_t> bytes = baker.bytes(positions);
@@ -99,7 +101,7 @@ void bakePlanes(const VirtualGrid& grid, const AliveTexels& alive, TexelBaker& b
     plane.assign(texels * VolumePart::kAttributes, 0);
     size_t next = 0;
     for (size_t t = 0; t < texels; ++t) {
-      if (!wanted[t]) continue;
+      if (!needed[t]) continue;
       std::copy_n(bytes.begin() + static_cast<ptrdiff_t>(next * VolumePart::kAttributes), VolumePart::kAttributes,
                   plane.begin() + static_cast<ptrdiff_t>(t * VolumePart::kAttributes));
       ++next;
@@ -107,7 +109,7 @@ void bakePlanes(const VirtualGrid& grid, const AliveTexels& alive, TexelBaker& b
   }
 }
 
-std::vector<DenseLayer> networkOf(VolumeModel& model, uint32_t group) {
+std::vector<DenseLayer> readDenseLayers(VolumeModel& model, uint32_t group) {
   constexpr uint32_t kSizes[] = {DeferredNetwork::kInputs, DeferredNetwork::kHidden, DeferredNetwork::kHidden, 3};
   const std::vector<float> all = model.device().read(
       model.deferred().values.part(size_t{group} * DeferredNetwork::kParameters, DeferredNetwork::kParameters));
@@ -125,7 +127,7 @@ std::vector<DenseLayer> networkOf(VolumeModel& model, uint32_t group) {
 
 }  // namespace
 
-VolumePart bakePart(VolumeModel& model, uint32_t block, const AliveTexels& alive) {
+VolumePart bakePart(VolumeModel& model, uint32_t block, const OccupiedTexels& occupied) {
   const VirtualGrid& grid = model.virtualGrid();
   const BlockSpace& space = model.space();
   VolumePart part;
@@ -133,29 +135,29 @@ VolumePart bakePart(VolumeModel& model, uint32_t block, const AliveTexels& alive
   std::copy_n(placement.centre, 3, part.centre.begin());
   std::copy_n(placement.scale, 3, part.scale.begin());
   part.contracted = placement.contracted;
-  part.surround = block >= space.cells();
+  part.backgroundBlock = block >= space.cells();
   const BlockSpace::Box owned = space.owned(block);
   part.low = owned.low;
   part.high = owned.high;
   part.voxels = grid.voxels;
   part.planes = grid.planes;
   TexelBaker baker(model, block);
-  bakeVoxels(grid, alive, baker, part);
-  bakePlanes(grid, alive, baker, part);
-  part.distances = chebyshevDistances(alive.occupancy(grid.planes / VolumePart::kDistanceCell));
+  bakeVoxels(grid, occupied, baker, part);
+  bakePlanes(grid, occupied, baker, part);
+  part.distances = chebyshevDistances(occupied.occupancy(grid.planes / VolumePart::kDistanceCell));
   return part;
 }
 
-VolumeContent bakeGroup(VolumeModel& model, uint32_t group, const std::vector<AliveTexels>& alive) {
+VolumeContent bakeGroup(VolumeModel& model, uint32_t group, const std::vector<OccupiedTexels>& occupied) {
   VolumeContent content;
   content.featureRange = model.virtualGrid().featureRange;
-  if (model.config().level > 0) content.stepsPerTexel = kStepsPerCoarseTexel;
+  if (model.config().lod > 0) content.stepsPerTexel = kStepsPerCoarseTexel;
   content.densityRange = model.virtualGrid().densityRange;
-  content.network = networkOf(model, group);
+  content.network = readDenseLayers(model, group);
   for (uint32_t block = 0; block < model.space().blocks(); ++block) {
     if (model.groups().groupOfBlock[block] != group) continue;
-    model.bring({block});
-    content.parts.push_back(bakePart(model, block, alive[block]));
+    model.ensureResident({block});
+    content.parts.push_back(bakePart(model, block, occupied[block]));
   }
   return content;
 }

@@ -26,24 +26,24 @@ namespace {
 std::unique_ptr<VolumeRenderer> openScene(const fs::path& folder) {
   TileScene scene = openTileScene(folder, volumeCodec());
   SceneRendererSettings settings;
-  settings.selection.mostPixels = 0;
+  settings.selection.maximumScreenSpaceError = 0;
   settings.threads = 2;
   return std::make_unique<VolumeRenderer>(scene.frame, std::move(scene.tree), std::move(scene.source), settings);
 }
 
-// A copy, as baking owns the models that it bakes.
+// Returns copies, because baking takes ownership of the models that it bakes.
 LevelModels onlyLevel(TrainedVolumeCube& trained) {
   return [&](uint32_t) {
     VolumeModel& from = trained.model();
-    auto made = std::make_unique<VolumeModel>(from.device(), from.config(), from.grid());
-    made->copyFields(from);
-    made->device().write(made->deferred().values.all(),
+    auto copy = std::make_unique<VolumeModel>(from.device(), from.config(), from.grid());
+    copy->copyFields(from);
+    copy->device().write(copy->deferred().values.all(),
                          std::span<const float>(from.device().read(from.deferred().values.all())));
-    return made;
+    return copy;
   };
 }
 
-// What docs/tile-format.md says a sample's eight sums are, from the bytes of a part.
+// Computes the eight sums of a sample from the bytes of a part, as docs/tile-format.md defines them.
 std::array<double, 8> sumsFromBytes(const VolumeContent& content, const VolumePart& part, const float p[3]) {
   const auto value = [&](uint8_t byte, size_t attribute) {
     const double range = attribute == 0 ? content.densityRange : content.featureRange;
@@ -65,7 +65,7 @@ std::array<double, 8> sumsFromBytes(const VolumeContent& content, const VolumePa
   double share[3];
   for (int a = 0; a < 3; ++a) {
     v[a] = pairAt(p[a], part.voxels);
-    // Clamped first, then the macroblock; the apron holds the upper neighbour.
+    // The position is clamped before the macroblock is chosen; the apron stores the upper neighbour.
     const double u = std::clamp(static_cast<double>(p[a]) * part.voxels - 0.5, 0.0, part.voxels - 1.0);
     b[a] = static_cast<uint32_t>(u) / 8;
     inBlock[a] = static_cast<uint32_t>(u) % 8;
@@ -95,8 +95,8 @@ std::array<double, 8> sumsFromBytes(const VolumeContent& content, const VolumePa
   return sums;
 }
 
-// Invariant 6 of the specification: what training sees is what is read from tiles, at borders too.
-TEST(BakeVolume, StoresTheVeryNumbersThatTrainingSaw) {
+// Invariant 6 of docs/invariants.md: tiles store exactly the values that training used, at borders too.
+TEST(BakeVolume, StoresExactlyTheValuesThatTrainingUsed) {
   const CubeScene scene;
   TrainedVolumeCube trained(scene, smallVolumeConfig(), cubeGrid(2), 60);
   VolumeModel& model = trained.model();
@@ -105,38 +105,38 @@ TEST(BakeVolume, StoresTheVeryNumbersThatTrainingSaw) {
   const uint32_t kSamples = 300, block = 1;
   const RandomStream random(5, 0xba4e);
   std::vector<float> positions;
-  AliveTexels alive(grid);
+  OccupiedTexels occupied(grid);
   for (uint32_t s = 0; s < kSamples; ++s) {
     for (uint32_t a = 0; a < 3; ++a) {
       float p = random.uniform(4 * s + a);
       if (random.below(4 * s + 3, 8) == a) p = s % 2 ? 0.0f : 1.0f;
       positions.push_back(p);
     }
-    alive.mark(&positions[size_t{3} * s]);
+    occupied.mark(&positions[size_t{3} * s]);
   }
-  std::vector<AliveTexels> ofBlocks(2, AliveTexels(grid));
-  ofBlocks[block] = alive;
+  std::vector<OccupiedTexels> ofBlocks(2, OccupiedTexels(grid));
+  ofBlocks[block] = occupied;
   const VolumeContent content = bakeGroup(model, block, ofBlocks);
 
-  const Array<uint32_t> blocks = device.arrayOf(std::vector<uint32_t>(kSamples, block));
-  const Array<float> at = device.arrayOf(positions);
-  const uint32_t room = kSamples * VirtualGrid::kCorners;
+  const Array<uint32_t> blocks = device.uploadArray(std::vector<uint32_t>(kSamples, block));
+  const Array<float> at = device.uploadArray(positions);
+  const uint32_t capacity = kSamples * VirtualGrid::kCorners;
   Array<uint32_t> marks = device.array<uint32_t>(2 * grid.words()), ranks = device.array<uint32_t>(2 * grid.words());
   Array<uint32_t> firstTexel = device.array<uint32_t>(3);
-  Array<float> texelPositions = device.array<float>(3 * room), logDensities = device.array<float>(kSamples);
+  Array<float> texelPositions = device.array<float>(3 * capacity), logDensities = device.array<float>(kSamples);
   Array<float> colours = device.array<float>(7 * kSamples);
   DistinctTexels distinct{grid};
   distinct.blocks = 2;
   distinct.samples = {kSamples};
   distinct.blockOfSample = blocks;
   distinct.positions = at;
-  distinct.texelCapacity = room;
+  distinct.texelCapacity = capacity;
   distinct.marks = marks;
   distinct.ranks = ranks;
   distinct.firstTexel = firstTexel;
   distinct.texelPositions = texelPositions;
   device.run(distinct);
-  BlockFieldBatch batch(device, model.attributes().shape(), room, false);
+  BlockFieldBatch batch(device, model.attributes().shape(), capacity, false);
   batch.firstOfSlot = firstTexel;
   batch.positions = texelPositions;
   model.attributes().forward(batch, false);
@@ -146,14 +146,14 @@ TEST(BakeVolume, StoresTheVeryNumbersThatTrainingSaw) {
   forward.positions = at;
   forward.marks = marks;
   forward.ranks = ranks;
-  forward.texels = {room, firstTexel.part(2, 1)};
+  forward.texels = {capacity, firstTexel.part(2, 1)};
   forward.attributes = batch.outputs;
   forward.logDensities = logDensities;
   forward.colours = colours;
   device.run(forward);
-  // The same attributes mixed in double: what is left are the digits of floats.
+  // The same attributes interpolated in double precision: the remaining differences are rounding of floats.
   const std::unique_ptr<Device> reference = makeDevice({"reference", 1});
-  const auto onReference = [&](const auto& array) { return reference->arrayOf(device.read(array.all())); };
+  const auto onReference = [&](const auto& array) { return reference->uploadArray(device.read(array.all())); };
   const Array<uint32_t> exactBlocks = onReference(blocks), exactMarks = onReference(marks);
   const Array<uint32_t> exactRanks = onReference(ranks);
   const Array<float> exactAt = onReference(at), exactAttributes = onReference(batch.outputs);
@@ -164,7 +164,7 @@ TEST(BakeVolume, StoresTheVeryNumbersThatTrainingSaw) {
   exact.positions = exactAt;
   exact.marks = exactMarks;
   exact.ranks = exactRanks;
-  exact.texels = {room};
+  exact.texels = {capacity};
   exact.attributes = exactAttributes;
   exact.logDensities = exactDensities;
   exact.colours = exactColours;
@@ -177,12 +177,13 @@ TEST(BakeVolume, StoresTheVeryNumbersThatTrainingSaw) {
       for (size_t f = 1; f < 8; ++f) EXPECT_NEAR(colour[7 * s + f - 1], 1 / (1 + std::exp(-sums[f])), tolerance);
     }
   };
-  // Places among 32 voxels are floats, half a unit of which is 1e-6 of a voxel; densities of two differ by up to 28.
+  // Positions among 32 voxels are floats, with half a unit in the last place of 1e-6 of a voxel; the densities of two
+  // neighbouring voxels differ by up to 28.
   expectStored(device.read(logDensities.all()), device.read(colours.all()), 3e-5);
   expectStored(reference->read(exactDensities.all()), reference->read(exactColours.all()), 1e-6);
 }
 
-// A sample between the last voxel of a macroblock and the first of the next needs no other macroblock.
+// The apron: a sample between the last voxel of a macroblock and the first of the next needs no other macroblock.
 TEST(BakeVolume, RepeatsTheFirstTexelsOfTheNextMacroblock) {
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   VolumeModel model(*device, smallVolumeConfig(), cubeGrid());
@@ -190,12 +191,12 @@ TEST(BakeVolume, RepeatsTheFirstTexelsOfTheNextMacroblock) {
   std::vector<float> table(model.attributes().table(0).values.size());
   for (size_t i = 0; i < table.size(); ++i) table[i] = 2 * random.uniform(1000 + i) - 1;
   device->write(model.attributes().table(0).values.all(), std::span<const float>(table));
-  AliveTexels alive(model.virtualGrid());
+  OccupiedTexels occupied(model.virtualGrid());
   for (uint64_t i = 0; i < 40; ++i) {
     const float at[3] = {random.uniform(3 * i), random.uniform(3 * i + 1), random.uniform(3 * i + 2)};
-    alive.mark(at);
+    occupied.mark(at);
   }
-  const VolumePart part = bakePart(model, 0, alive);
+  const VolumePart part = bakePart(model, 0, occupied);
   const uint32_t blocks = part.voxels / 8;
   const uint8_t* bytes = part.voxelBytes.data();
   const auto texel = [&](uint32_t stored, const std::array<uint32_t, 3>& at) {
@@ -207,7 +208,7 @@ TEST(BakeVolume, RepeatsTheFirstTexelsOfTheNextMacroblock) {
     for (size_t axis = 0; axis < 3; ++axis) {
       const uint32_t stride = axis == 0 ? 1 : axis == 1 ? blocks : blocks * blocks;
       const bool isLast = b / stride % blocks == blocks - 1;
-      const uint32_t next = isLast ? b : b + stride;  // at the end of the grid the last texel once more
+      const uint32_t next = isLast ? b : b + stride;  // at the end of the grid, the apron repeats the last texel
       if (part.macroblocks[next] == VolumePart::kEmpty) continue;
       ++(isLast ? last : pairs);
       for (uint32_t i = 0; i < 81; ++i) {
@@ -227,24 +228,24 @@ TEST(BakeVolume, RepeatsTheFirstTexelsOfTheNextMacroblock) {
   }
   EXPECT_GT(pairs, 20);
   EXPECT_GT(last, 5);
-  EXPECT_LT(alike, 81 * pairs / 2) << "texels that are all the same show nothing";
+  EXPECT_LT(alike, 81 * pairs / 2) << "equal neighbouring texels would make the test vacuous";
 }
 
-// Invariant 4 of the specification, of what is baked: a place has one owner, the block that was trained there.
+// Invariant 4 of docs/invariants.md, for baked parts: every position has one owner, the block that was trained there.
 TEST(BakeVolume, GivesEveryPlaceToTheBlockThatWasTrainedThere) {
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
-  BlockGrid grid = cubeGrid(3);  // one block of nine is not at the border
+  BlockGrid grid = cubeGrid(3);  // 3 × 3 blocks, of which one is not at the border
   grid.rows = 3;
-  grid.bottom = -0.3;  // a lower box than the blocks' domains
+  grid.bottom = -0.3;  // the box is lower than the blocks' domains
   grid.top = 0.3;
-  for (const char* surround : {"none", "own", "border"}) {
+  for (const char* backgroundBlock : {"none", "own", "border"}) {
     VolumeConfig config = smallVolumeConfig();
-    config.surround = surround;
+    config.backgroundBlock = backgroundBlock;
     VolumeModel model(*device, config, grid);
     const BlockSpace& space = model.space();
     std::vector<VolumePart> parts;
     for (uint32_t block = 0; block < space.blocks(); ++block) {
-      parts.push_back(bakePart(model, block, AliveTexels(model.virtualGrid())));
+      parts.push_back(bakePart(model, block, OccupiedTexels(model.virtualGrid())));
     }
     const RandomStream random(7, 0xba4e);
     int inside = 0, beyond = 0;
@@ -254,83 +255,84 @@ TEST(BakeVolume, GivesEveryPlaceToTheBlockThatWasTrainedThere) {
         x[a] = (i % 2 ? 3.0 : 9.0) * (2 * random.uniformDouble(4 * i + a) - 1) * (a == 2 ? 0.5 : 1);
       }
       const bool inBox = std::abs(x[0]) < 3 && std::abs(x[1]) < 3 && x[2] > space.bottom && x[2] < space.top;
-      if (!inBox && space.surround == Surround::none) continue;  // rays end there
+      if (!inBox && space.backgroundBlock == BackgroundBlock::none) continue;  // nothing is drawn there
       const uint32_t trained = space.blockAt(x[0], x[1], x[2]);
       const BlockSpace::Placement placement = space.placement(trained);
       std::vector<uint32_t> expected = {trained}, owners;
-      for (int a = 0; a < 3; ++a) {  // what lies outside of the domain of a bounded block is empty (compute/blocks.h)
+      for (int a = 0; a < 3; ++a) {  // outside its domain, a bounded block is empty (compute/blocks.h)
         const bool within = std::abs(x[a] - placement.centre[a]) <= placement.scale[a];
         if (!placement.contracted && !within) expected.clear();
       }
       for (uint32_t block = 0; block < parts.size(); ++block) {
         const VolumePart& part = parts[block];
-        if (part.surround && inBox) continue;  // it is seen outside of the box alone
+        if (part.backgroundBlock && inBox) continue;  // it is visible only outside the box
         bool owns = true;
         for (int a = 0; a < 3; ++a) owns = owns && part.low[a] <= x[a] && x[a] < part.high[a];
         if (owns) owners.push_back(block);
       }
-      ASSERT_EQ(owners, expected) << surround << ": " << x[0] << " " << x[1] << " " << x[2];
+      ASSERT_EQ(owners, expected) << backgroundBlock << ": " << x[0] << " " << x[1] << " " << x[2];
       ++(inBox ? inside : beyond);
     }
     EXPECT_GT(inside, 1000);
-    EXPECT_TRUE(beyond > 1000 || space.surround == Surround::none);
+    EXPECT_TRUE(beyond > 1000 || space.backgroundBlock == BackgroundBlock::none);
   }
 }
 
-TEST(BakeVolume, LooksAsTheModelThatItWasBakedFrom) {
+TEST(BakeVolume, RendersLikeTheModelThatItWasBakedFrom) {
   const CubeScene scene;
   const TemporaryFolder folder;
-  for (const char* surround : {"none", "own"}) {
+  for (const char* backgroundBlock : {"none", "own"}) {
     VolumeConfig config = smallVolumeConfig();
-    config.surround = surround;
-    BlockGrid grid = cubeGrid(2);  // as one's own may be: its origin is not amid the heights
+    config.backgroundBlock = backgroundBlock;
+    BlockGrid grid = cubeGrid(2);  // like a grid given by the user: its origin is not in the middle of the heights
     grid.originInWorld.z() += grid.bottom;
     grid.top -= grid.bottom;
     grid.bottom = 0;
     TrainedVolumeCube trained(scene, config, grid, 300);
-    const BakedScene baked = bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / surround, {});
+    const BakedScene baked = bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / backgroundBlock, {});
     EXPECT_EQ(baked.tileset.tiles.size(), 3u);
     VolumeModelRenderer model(trained.model(), static_cast<float>(config.cullLast));
-    const std::unique_ptr<VolumeRenderer> tiles = openScene(folder / surround);
+    const std::unique_ptr<VolumeRenderer> tiles = openScene(folder / backgroundBlock);
     double ofModel = 0, ofTiles = 0;
     const std::vector<int> photos = scene.capture().photosIn(Split::test);
     for (const int photo : photos) {
       const Camera& camera = scene.capture().cameras[0];
       const Pose& pose = scene.capture().photos[photo].worldFromCamera;
       const RenderedView truth = scene.truth(camera, pose);
-      ofModel += psnrOf(model.render(camera, pose, nullptr), truth);
-      ofTiles += psnrOf(tiles->render(camera, pose, nullptr), truth);
+      ofModel += computePsnr(model.render(camera, pose, nullptr), truth);
+      ofTiles += computePsnr(tiles->render(camera, pose, nullptr), truth);
     }
-    EXPECT_NEAR(ofTiles / static_cast<double>(photos.size()), ofModel / static_cast<double>(photos.size()), 0.5)
-        << surround;
+    // After 300 steps the scene is 0.19 dB below its model; after 15 minutes of a city bench/volume.sh allows 0.15 dB.
+    const double count = static_cast<double>(photos.size());
+    EXPECT_NEAR(ofTiles / count, ofModel / count, 0.25) << backgroundBlock;
   }
 }
 
-TEST(BakeVolume, LooksAsTheModelOutsideOfTheBoxToo) {
+TEST(BakeVolume, RendersLikeTheModelOutsideTheBoxToo) {
   CubeScene::Options options;
-  options.room = true;  // walls far outside of the blocks
+  options.isEnclosed = true;  // with walls far outside the blocks
   const CubeScene scene(options);
   const TemporaryFolder folder;
-  for (const char* surround : {"own", "border"}) {
+  for (const char* backgroundBlock : {"own", "border"}) {
     VolumeConfig config = smallVolumeConfig();
-    config.surround = surround;
+    config.backgroundBlock = backgroundBlock;
     TrainedVolumeCube trained(scene, config, cubeGrid(2), 200);
-    bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / surround, {});
+    bakeVolume(onlyLevel(trained), 1, scene.capture(), folder / backgroundBlock, {});
     VolumeModelRenderer model(trained.model(), static_cast<float>(config.cullLast));
-    const std::unique_ptr<VolumeRenderer> tiles = openScene(folder / surround);
+    const std::unique_ptr<VolumeRenderer> tiles = openScene(folder / backgroundBlock);
     const Camera& camera = scene.capture().cameras[0];
     for (const int photo : {0, 11}) {
       const Pose& pose = scene.capture().photos[photo].worldFromCamera;
       const RenderedView a = model.render(camera, pose, nullptr), b = tiles->render(camera, pose, nullptr);
-      EXPECT_GT(psnrOf(b, a), 27) << surround;
+      EXPECT_GT(computePsnr(b, a), 27) << backgroundBlock;
       int far = 0;  // pixels of a wall
       for (const float depth : b.depth.pixels) far += depth > 3;
-      EXPECT_GT(far, 150) << surround;
+      EXPECT_GT(far, 150) << backgroundBlock;
     }
   }
 }
 
-TEST(BakeVolume, PutsLevelsAboveOneAnother) {
+TEST(BakeVolume, NestsLevelsOfDetail) {
   const CubeScene scene;
   const TemporaryFolder folder;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
@@ -338,7 +340,7 @@ TEST(BakeVolume, PutsLevelsAboveOneAnother) {
   options.config = smallVolumeConfig();
   options.blocks = *parseBlockCount("2x2");
   options.loop.steps = 60;
-  options.config.levelShare = 0.5;
+  options.config.lodStepFraction = 0.5;
   options.loop.progress = false;
   trainVolume(*device, scene.capture(), folder / "model", options);
   ASSERT_EQ(trainedLevels<VolumeConfig>(folder / "model"), 2u);
@@ -354,22 +356,22 @@ TEST(BakeVolume, PutsLevelsAboveOneAnother) {
   EXPECT_NEAR(root.geometricError, 2 * baked.tileset.tiles[1].geometricError, 1e-9);
   const VolumeContent merged =
       contentAs<VolumeContent>(*readContent(contentPath(folder / "scene", root.contents.at(0).uri), volumeCodec()));
-  EXPECT_EQ(merged.parts.size(), 4u) << "side by side, each with its own texels";
+  EXPECT_EQ(merged.parts.size(), 4u) << "one part for each block, with its own texels";
   EXPECT_EQ(merged.parts[0].planes, 32u);
-  // Looked at through half as many rows and columns: its texels are twice as large.
+  // A coarser level is baked with twice the pixel stride, because its texels are twice as large.
   const std::unique_ptr<VolumeModel> coarse = loadVolumeModel(*device, levelFolder(folder / "model", 1));
   const auto seenThroughEvery = [&](int stride) {
     BakeOptions looking;
     looking.stride = stride;
-    return bakePart(*coarse, 0, findAliveTexels(*coarse, scene.capture(), looking)[0]);
+    return bakePart(*coarse, 0, findOccupiedTexels(*coarse, scene.capture(), looking)[0]);
   };
   EXPECT_EQ(merged.parts[0].planeBytes, seenThroughEvery(16).planeBytes);
   EXPECT_NE(merged.parts[0].planeBytes, seenThroughEvery(8).planeBytes);
-  // Drawn at either level.
+  // The scene can be rendered at either level.
   for (const int finest : {0, 1}) {
     TileScene opened = openTileScene(folder / "scene", volumeCodec());
     SceneRendererSettings settings;
-    settings.selection.mostPixels = 0;
+    settings.selection.maximumScreenSpaceError = 0;
     settings.selection.finestLevel = finest;
     VolumeRenderer renderer(opened.frame, std::move(opened.tree), std::move(opened.source), settings);
     const RenderedView view =
@@ -379,7 +381,7 @@ TEST(BakeVolume, PutsLevelsAboveOneAnother) {
   }
 }
 
-TEST(BakeVolume, LooksTheSameWhereVulkanMadeIt) {
+TEST(BakeVolume, RendersTheSameWhenBakedOnVulkan) {
 #ifndef TESSERA_HAS_VULKAN
   GTEST_SKIP() << "this build has no Vulkan";
 #else
@@ -403,12 +405,12 @@ TEST(BakeVolume, LooksTheSameWhereVulkanMadeIt) {
     return openScene(folder / name)
         ->render(scene.capture().cameras[0], scene.capture().photos[0].worldFromCamera, nullptr);
   };
-  EXPECT_GT(psnrOf(drawn(*vulkan, "vulkan"), drawn(*trained.device, "cpu")), 40);
+  EXPECT_GT(computePsnr(drawn(*vulkan, "vulkan"), drawn(*trained.device, "cpu")), 40);
   EXPECT_EQ(GpuContext::validationMessages(), 0);
 #endif
 }
 
-TEST(BakeVolume, CullsWhatTrainingCulledInTheEndWhoeverBakes) {
+TEST(BakeVolume, CullsBelowTheLastThresholdOfTraining) {
   const CubeScene scene;
   const TemporaryFolder folder;
   VolumeConfig config = smallVolumeConfig();
@@ -420,8 +422,8 @@ TEST(BakeVolume, CullsWhatTrainingCulledInTheEndWhoeverBakes) {
   const auto contentAbove = [&](double minAlpha) {
     BakeOptions looking = options;
     looking.minAlpha = minAlpha;
-    const std::vector<AliveTexels> alive = findAliveTexels(trained.model(), scene.capture(), looking);
-    return encodeVolume(bakeGroup(trained.model(), 0, alive), options.effort);
+    const std::vector<OccupiedTexels> occupied = findOccupiedTexels(trained.model(), scene.capture(), looking);
+    return encodeVolume(bakeGroup(trained.model(), 0, occupied), options.effort);
   };
   const Bytes content = readFile(contentPath(folder / "scene", baked.tileset.root().contents.at(0).uri));
   EXPECT_EQ(content, contentAbove(config.cullLast));
@@ -440,12 +442,12 @@ TEST(BakeVolume, WritesTheSameSceneAgain) {
   EXPECT_EQ(readTileset(folder / "scene").tiles.size(), 1u) << "one block is its own root";
 }
 
-TEST(BakeVolume, KeepsNothingOfAModelThatHasSeenNothing) {
+TEST(BakeVolume, StoresNothingWhereNothingIsMarked) {
   const CubeScene scene;
   TrainedVolumeCube untrained(scene, smallVolumeConfig(), cubeGrid(), 0);
-  const VolumeContent content = bakeGroup(untrained.model(), 0, {AliveTexels(untrained.model().virtualGrid())});
+  const VolumeContent content = bakeGroup(untrained.model(), 0, {OccupiedTexels(untrained.model().virtualGrid())});
   EXPECT_EQ(content.parts[0].storedMacroblocks(), 0u);
-  EXPECT_FALSE(brokenRule(content));
+  EXPECT_FALSE(validationError(content));
   for (const uint8_t distance : content.parts[0].distances) EXPECT_EQ(distance, 255);
 }
 

@@ -7,7 +7,7 @@
 namespace tessera {
 namespace {
 
-constexpr const char* kRemedy = "train with lower --set voxels and planes, or with level_share=0";
+constexpr const char* kRemedy = "train with lower --set voxels and planes, or with lod_step_fraction=0";
 
 class VolumeWriter : ContentWriter {
  public:
@@ -19,12 +19,12 @@ class VolumeWriter : ContentWriter {
                  {"network", writeNetwork(file_, content_.network)},
                  {"parts", Json::array()}};
     if (content_.stepsPerTexel != 1) ours["stepsPerTexel"] = content_.stepsPerTexel;
-    for (const VolumePart& part : content_.parts) ours["parts"].push_back(partOf(part));
+    for (const VolumePart& part : content_.parts) ours["parts"].push_back(partToJson(part));
     return file_.finish(kVolumeName, ours);
   }
 
  private:
-  Json partOf(const VolumePart& part) {
+  Json partToJson(const VolumePart& part) {
     Json json = place(part);
     json["voxels"] = part.voxels;
     json["planes"] = part.planes;
@@ -52,8 +52,8 @@ Bytes encodeVolume(const VolumeContent& content, int effort) {
   uint64_t bytes = 0;
   for (const VolumePart& part : content.parts) bytes += texelBytes(part, part.storedMacroblocks());
   requireContentWithin(limits, content.parts.size(), bytes, kRemedy);
-  // All else that would break a rule is a mistake of ours.
-  const auto broken = brokenRule(content);
+  // Any other broken rule is a bug of this program.
+  const auto broken = validationError(content);
   CHECK(broken.value_or("") == "");
   for (const VolumePart& part : content.parts) {
     const uint32_t cells = part.planes / VolumePart::kDistanceCell;

@@ -1,5 +1,5 @@
-// One content of a `volume` scene as a file, and back (tiles/read_content.h reads files by name). docs/tile-format.md,
-// section 6.
+// Encodes one content of a `volume` scene as a file and decodes it (tiles/read_content.h reads files by name). See
+// docs/tile-format.md, section 6.
 #pragma once
 
 #include <optional>
@@ -12,29 +12,32 @@
 
 namespace tessera {
 
-inline constexpr uint32_t kMostVoxels = 1024, kMostPlanes = 4096;  // along an axis
+inline constexpr uint32_t kMaxVoxels = 1024, kMaxPlanes = 4096;  // along an axis
 
-// What readers count of a part that has so many macroblocks, before it is there.
+// Returns the bytes that readers count for a part with that many stored macroblocks, before its texels are read.
 uint64_t texelBytes(const VolumePart& part, uint64_t storedMacroblocks);
 
-// Why the content is none: the first rule of the format that it breaks, for people. Nothing when it is one. Whether
-// distances are the right ones is not looked at: files do not hold them.
-std::optional<std::string> brokenRule(const VolumeContent& content);
+// Returns the first rule of the format that the content breaks, as a description for people, or nothing if it is valid.
+// Does not check that distances are correct, because files do not store them.
+std::optional<std::string> validationError(const VolumeContent& content);
 
-// A .glb. The same content gives the same bytes with the same libwebp. Throws Error where it is more than readers take
-// (ContentLimits): settings can cause that. CHECKs that it breaks no rule, and that distances are chebyshevDistances of
-// their zeros. Macroblocks come back numbered in the order of their places. `effort` as in lossless_image.h.
+// Returns the content as a .glb file. The same content always gives the same bytes with the same version of libwebp.
+// Throws Error if the content exceeds what readers accept (ContentLimits), which settings can cause. CHECKs that it
+// breaks no other rule, and that distances are the chebyshevDistances of their zeros. Decoding numbers macroblocks in
+// the order of their positions. `effort`: see lossless_image.h.
 Bytes encodeVolume(const VolumeContent& content, int effort = 6);
 
-// Untrusted bytes: nothing, and why in `reason`, where a size, an index, a number or the whole is not as the format has
-// it, or where the content would take more memory than the limit; that is known before it is taken.
+// Decodes a file of untrusted bytes. Returns nothing, with the cause in `reason`, if a size, an index, a number or the
+// structure violates the format, or if the content would take more memory than the limit, which is checked before the
+// memory is allocated.
 std::optional<VolumeContent> decodeVolume(std::span<const std::byte> file, std::string& reason,
                                           const ContentLimits& limits = {});
-// What a content will take in memory (bytesInMemory), by the JSON of its container alone: its texels are not read.
+// Returns the bytes that a content will take in memory (bytesInMemory), from the JSON of its container alone: texels
+// are not read.
 std::optional<uint64_t> decodedVolumeBytes(std::string_view json, std::string& reason,
                                            const ContentLimits& limits = {});
 
-// Its contents are ContentOf<VolumeContent>.
+// The codec of the representation; its contents are ContentOf<VolumeContent>.
 const ContentCodec& volumeCodec();
 
 }  // namespace tessera

@@ -1,4 +1,5 @@
-// Volume contents from arbitrary bytes: bounded, and what is accepted keeps the rules and survives being written.
+// Fuzzes the decoder of volume contents: memory stays bounded, and accepted contents keep the rules and survive
+// re-encoding.
 #include "raymarch/testing/content_fuzz.h"
 #include "representations/volume/content/volume_payload.h"
 

@@ -23,8 +23,8 @@ namespace tessera {
 namespace {
 
 using nlohmann::json;
-using tiles_test::madeContent;
-using tiles_test::madePart;
+using tiles_test::testContent;
+using tiles_test::testPart;
 
 void expectSame(const VolumeContent& a, const VolumeContent& b) {
   EXPECT_EQ(a.featureRange, b.featureRange);
@@ -52,7 +52,7 @@ std::optional<VolumeContent> roundTrip(const VolumeContent& content) {
 
 TEST(VolumePayload, GivesBackWhatWasWritten) {
   for (uint64_t seed = 0; seed < 6; ++seed) {
-    VolumeContent content = madeContent(seed, 1 + seed % 3);
+    VolumeContent content = testContent(seed, 1 + seed % 3);
     content.densityRange = 10.1f;
     const auto again = roundTrip(content);
     ASSERT_TRUE(again);
@@ -60,10 +60,10 @@ TEST(VolumePayload, GivesBackWhatWasWritten) {
   }
 }
 
-TEST(VolumePayload, GivesBackSurroundsAndOddNumbers) {
-  VolumeContent content = madeContent(7);
+TEST(VolumePayload, GivesBackBackgroundBlocksAndExtremeNumbers) {
+  VolumeContent content = testContent(7);
   VolumePart& part = content.parts[0];
-  part.contracted = part.surround = true;
+  part.contracted = part.backgroundBlock = true;
   part.centre = {0.1f, 1e-30f, -3};
   part.scale = {3, 2, 1};
   part.low = {-1e6f, -1e6f, -1e6f};
@@ -77,7 +77,7 @@ TEST(VolumePayload, GivesBackSurroundsAndOddNumbers) {
 
 TEST(VolumePayload, GivesBackAPartWithoutMacroblocksAndOneWithAll) {
   for (const bool empty : {true, false}) {
-    VolumeContent content = madeContent(8);
+    VolumeContent content = testContent(8);
     VolumePart& part = content.parts[0];
     if (empty) {
       part.macroblocks.assign(8, VolumePart::kEmpty);
@@ -93,7 +93,7 @@ TEST(VolumePayload, GivesBackAPartWithoutMacroblocksAndOneWithAll) {
 }
 
 TEST(VolumePayload, RenumbersMacroblocksInTheOrderOfTheirPlaces) {
-  const VolumeContent content = madeContent(9);
+  const VolumeContent content = testContent(9);
   VolumeContent shuffled = content;
   VolumePart& part = shuffled.parts[0];
   const uint32_t stored = part.storedMacroblocks();
@@ -111,12 +111,12 @@ TEST(VolumePayload, RenumbersMacroblocksInTheOrderOfTheirPlaces) {
   expectSame(content, *again);
 }
 
-TEST(VolumePayload, GivesTheSameBytesAgain) {
-  EXPECT_EQ(encodeVolume(madeContent(3)), encodeVolume(madeContent(3)));
+TEST(VolumePayload, EncodesTheSameContentToTheSameBytes) {
+  EXPECT_EQ(encodeVolume(testContent(3)), encodeVolume(testContent(3)));
 }
 
-TEST(VolumePayload, IsAnAssetWithAnEmptySceneForOthers) {
-  const Bytes file = encodeVolume(madeContent(1));
+TEST(VolumePayload, IsAGltfAssetWithAnEmptySceneForOtherPrograms) {
+  const Bytes file = encodeVolume(testContent(1));
   const json asset = json::parse(decodeGlb(file)->json);
   EXPECT_EQ(asset["asset"]["version"], "2.0");
   EXPECT_EQ(asset["extensionsUsed"], json::array({"TESSERA_content"}));
@@ -126,9 +126,9 @@ TEST(VolumePayload, IsAnAssetWithAnEmptySceneForOthers) {
 }
 
 TEST(VolumePayload, PutsAttributesAndSlicesWhereTheFormatSays) {
-  const VolumePart part = madePart(5);
+  const VolumePart part = testPart(5);
   const auto pictures = picturesOfMacroblocks(part.voxelBytes, part.storedMacroblocks());
-  // Five to nine macroblocks: three beside one another. Block 4, slice 5, row 7, column 2: tile (1, 1), slice (2, 1).
+  // Five to nine macroblocks: three in a row. Block 4, slice 5, row 7, column 2: tile (1, 1), slice (2, 1).
   ASSERT_EQ(sizeOfMacroblocks(5).width, 81u);
   ASSERT_EQ(sizeOfMacroblocks(5).height, 54u);
   ASSERT_GE(part.storedMacroblocks(), 5u);
@@ -145,16 +145,16 @@ TEST(VolumePayload, PutsAttributesAndSlicesWhereTheFormatSays) {
   EXPECT_EQ(plane[0].at(5, 20)[1], part.planeBytes[1][(20 * 24 + 5) * 8 + 2]);
 }
 
-TEST(VolumePayload, BitsFillPicturesThatWebPCanHold) {
+TEST(VolumePayload, PacksBitsIntoPicturesThatWebPCanHold) {
   EXPECT_EQ(sizeOfBits(8).width, 256u);
   EXPECT_EQ(sizeOfBits(8).height, 1u);
   EXPECT_EQ(sizeOfBits(8 * 256 + 1).height, 2u);
-  const uint64_t cells = kMostPlanes / VolumePart::kDistanceCell;
+  const uint64_t cells = kMaxPlanes / VolumePart::kDistanceCell;
   const PictureSize largest = sizeOfBits(cells * cells * cells);
   EXPECT_LE(largest.width, static_cast<uint32_t>(kLargestLosslessSide));
   EXPECT_LE(largest.height, static_cast<uint32_t>(kLargestLosslessSide));
   EXPECT_GE(uint64_t{largest.width} * largest.height * 8, cells * cells * cells);
-  EXPECT_LE(sizeOfMacroblocks(kMostStored).width, static_cast<uint32_t>(kLargestLosslessSide));
+  EXPECT_LE(sizeOfMacroblocks(kMaxStored).width, static_cast<uint32_t>(kLargestLosslessSide));
 }
 
 TEST(VolumePayload, NamesTheSettingsThatMadeMoreThanReadersTake) {
@@ -167,10 +167,10 @@ TEST(VolumePayload, NamesTheSettingsThatMadeMoreThanReadersTake) {
       EXPECT_NE(error.remedy().find("--set"), std::string::npos) << error.what();
     }
   };
-  VolumeContent content = madeContent(2, 3);
-  for (VolumePart& part : content.parts) part.planes = 4096;  // texels are counted before they are looked at
+  VolumeContent content = testContent(2, 3);
+  for (VolumePart& part : content.parts) part.planes = 4096;  // texels are counted before they are checked
   refuses("readers take 1073741824 at most", content);
-  content = madeContent(2);
+  content = testContent(2);
   content.parts.resize(1025);
   refuses("merges 1025 blocks", content);
 }
@@ -179,7 +179,7 @@ class VolumeFile : public testing::Test {
  protected:
   ~VolumeFile() override { fs::remove(path_); }
 
-  // What is wrong with it, by its headers.
+  // Returns why the file is rejected by its headers, or "" if it is not.
   std::string refusal(std::span<const std::byte> bytes) {
     writeFileAtomically(path_, bytes);
     try {
@@ -194,21 +194,21 @@ class VolumeFile : public testing::Test {
   const fs::path path_ = fs::temp_directory_path() / ("tessera-volume-file-" + std::to_string(::getpid()) + ".glb");
 };
 
-TEST_F(VolumeFile, SaysWhatItTakesInMemoryWithoutATexelBeingRead) {
-  const VolumeContent content = madeContent(5, 2);
+TEST_F(VolumeFile, ReportsItsMemoryWithoutReadingATexel) {
+  const VolumeContent content = testContent(5, 2);
   Bytes file = encodeVolume(content, 1);
   writeFileAtomically(path_, file);
   EXPECT_EQ(readDecodedBytes(path_, volumeCodec()), bytesInMemory(content));
   EXPECT_EQ(readContent(path_, volumeCodec())->memoryBytes(), bytesInMemory(content));
-  std::fill(file.begin() + static_cast<ptrdiff_t>(kGlbStart + *jsonLengthOf(file, file.size())), file.end(),
+  std::fill(file.begin() + static_cast<ptrdiff_t>(kGlbStart + *readJsonLength(file, file.size())), file.end(),
             std::byte{0});
   writeFileAtomically(path_, file);
   EXPECT_EQ(readDecodedBytes(path_, volumeCodec()), bytesInMemory(content));
   EXPECT_THROW(readContent(path_, volumeCodec()), Error);
 }
 
-TEST_F(VolumeFile, IsRefusedByHeadersThatLie) {
-  const Bytes file = encodeVolume(madeContent(5), 1);
+TEST_F(VolumeFile, IsRejectedForMalformedHeaders) {
+  const Bytes file = encodeVolume(testContent(5), 1);
   EXPECT_EQ(refusal(file), "");
   EXPECT_EQ(refusal({}), kNoGlb);
   EXPECT_EQ(refusal(std::span(file).first(12)), kNoGlb);
@@ -224,7 +224,7 @@ TEST_F(VolumeFile, IsRefusedByHeadersThatLie) {
 }
 
 TEST(VolumePayload, CountsTheTexelsThatItsPartsHold) {
-  const VolumeContent content = madeContent(3, 2);
+  const VolumeContent content = testContent(3, 2);
   VolumeContent without = content;
   uint64_t texels = 0;
   for (VolumePart& part : without.parts) {
@@ -239,10 +239,10 @@ TEST(VolumePayload, CountsTheTexelsThatItsPartsHold) {
 
 TEST(VolumePayload, NamesTheRuleThatIsBroken) {
   const auto names = [](const char* rule, const std::function<void(VolumeContent&)>& spoil) {
-    VolumeContent content = madeContent(2, 2);
-    ASSERT_EQ(brokenRule(content), std::nullopt);
+    VolumeContent content = testContent(2, 2);
+    ASSERT_EQ(validationError(content), std::nullopt);
     spoil(content);
-    EXPECT_EQ(brokenRule(content).value_or("none"), rule);
+    EXPECT_EQ(validationError(content).value_or("none"), rule);
   };
   const float nan = std::numeric_limits<float>::quiet_NaN();
   names("a range is out of bounds", [](VolumeContent& c) { c.featureRange = 0; });
@@ -262,8 +262,9 @@ TEST(VolumePayload, NamesTheRuleThatIsBroken) {
   names("part 1: its centre or scale is out of bounds", [](VolumeContent& c) { c.parts[1].scale[2] = 0; });
   names("part 1: its box is none", [](VolumeContent& c) { c.parts[1].low[1] = 1; });
   names("part 0: it is bounded, but its box leaves its domain", [](VolumeContent& c) { c.parts[0].low[0] = -1.1f; });
-  names("part 0: a surround is not contracted", [](VolumeContent& c) { c.parts[0].surround = true; });
-  names("a surround is not alone", [](VolumeContent& c) { c.parts[0].surround = c.parts[0].contracted = true; });
+  names("part 0: a background block is not contracted", [](VolumeContent& c) { c.parts[0].backgroundBlock = true; });
+  names("a background block is not alone",
+        [](VolumeContent& c) { c.parts[0].backgroundBlock = c.parts[0].contracted = true; });
   names("parts 0 and 1 overlap", [](VolumeContent& c) {
     c.parts[0].high[0] = 1.5f;
     c.parts[0].contracted = true;
@@ -284,15 +285,15 @@ TEST(VolumePayload, NamesTheRuleThatIsBroken) {
   names("part 0: its distances are not those of its cells", [](VolumeContent& c) { c.parts[0].distances.pop_back(); });
 }
 
-class VolumeRefusal : public tiles_test::Refusal {
+class VolumeDecoder : public tiles_test::Refusal {
  protected:
-  Bytes file() const override { return encodeVolume(madeContent(5), 1); }
+  Bytes file() const override { return encodeVolume(testContent(5), 1); }
   bool isRead(std::span<const std::byte> file, std::string& reason, const ContentLimits& limits) const override {
     return decodeVolume(file, reason, limits).has_value();
   }
 };
 
-TEST_F(VolumeRefusal, OfWhatIsNoContent) {
+TEST_F(VolumeDecoder, RejectsFilesThatAreNoContent) {
   std::string reason;
   EXPECT_FALSE(decodeVolume({}, reason));
   EXPECT_EQ(reason, "is not a binary glTF file of version 2, or is cut short");
@@ -305,7 +306,7 @@ TEST_F(VolumeRefusal, OfWhatIsNoContent) {
   refuses("is not of the representation volume", [](json& asset) { ours(asset)["representation"] = "hash"; });
 }
 
-TEST_F(VolumeRefusal, OfBufferViewsThatLeaveTheFile) {
+TEST_F(VolumeDecoder, RejectsBufferViewsThatLeaveTheFile) {
   const std::string why = "its buffer views do not lie";
   refuses(why, [](json& asset) { asset["bufferViews"][1]["byteOffset"] = 0xffffffffu; });
   refuses(why, [](json& asset) { asset["bufferViews"][1]["byteLength"] = 1u << 30; });
@@ -318,7 +319,7 @@ TEST_F(VolumeRefusal, OfBufferViewsThatLeaveTheFile) {
   refuses("part 0: its planes", [](json& asset) { part(asset)["planeTexels"][0][0]["mimeType"] = "image/png"; });
 }
 
-TEST_F(VolumeRefusal, OfNetworksThatDoNotFit) {
+TEST_F(VolumeDecoder, RejectsNetworksThatDoNotFit) {
   refuses("has no network", [](json& asset) { ours(asset).erase("network"); });
   refuses("has no network", [](json& asset) { ours(asset)["network"]["layers"] = json(std::vector<json>(9)); });
   refuses("the network has fewer", [](json& asset) { ours(asset)["network"]["layers"][0] = {256, 256}; });
@@ -332,7 +333,7 @@ TEST_F(VolumeRefusal, OfNetworksThatDoNotFit) {
   });
 }
 
-TEST_F(VolumeRefusal, OfHeadersThatLie) {
+TEST_F(VolumeDecoder, RejectsMalformedHeaders) {
   refuses("has no ranges", [](json& asset) { ours(asset)["featureRange"] = "7"; });
   refuses("its steps per texel are out of bounds", [](json& asset) { ours(asset)["stepsPerTexel"] = 9; });
   refuses("its steps per texel are out of bounds", [](json& asset) { ours(asset)["stepsPerTexel"] = 1.5; });
@@ -343,7 +344,7 @@ TEST_F(VolumeRefusal, OfHeadersThatLie) {
   refuses("part 0: its header", [](json& asset) { part(asset)["planes"] = 4104; });
   refuses("part 0: its header", [](json& asset) { part(asset)["contracted"] = 1; });
   refuses("part 0: its header", [](json& asset) { part(asset)["centre"] = {1, 2}; });
-  refuses("part 0: its header", [](json& asset) { part(asset)["macroblocks"]["stored"] = kMostStored + 1; });
+  refuses("part 0: its header", [](json& asset) { part(asset)["macroblocks"]["stored"] = kMaxStored + 1; });
   refuses("part 0: its centre or scale", [](json& asset) { part(asset)["scale"][1] = 1e300; });
   refuses("part 0: its macroblocks", [](json& asset) { part(asset)["macroblocks"]["stored"] = 1; });
   refuses("part 0: its macroblocks", [](json& asset) { part(asset)["voxels"] = 512; });
@@ -353,7 +354,7 @@ TEST_F(VolumeRefusal, OfHeadersThatLie) {
   refuses("part 0: its occupied cells", [](json& asset) { part(asset).erase("occupied"); });
 }
 
-TEST_F(VolumeRefusal, OfMoreMemoryThanAllowedBeforeItIsTaken) {
+TEST_F(VolumeDecoder, RejectsMoreMemoryThanAllowedBeforeAllocatingIt) {
   ContentLimits limits;
   limits.bytes = 20000;
   refuses(
@@ -371,11 +372,11 @@ TEST_F(VolumeRefusal, OfMoreMemoryThanAllowedBeforeItIsTaken) {
       "has no parts, or too many", [](json& asset) { ours(asset)["parts"].push_back(part(asset)); }, limits);
 }
 
-TEST_F(VolumeRefusal, OfPicturesThatHoldSomethingElse) {
-  refusesBytes("part 0: its occupied cells", [](json& asset, Bytes& bytes) {  // 27 cells: bits beyond them
+TEST_F(VolumeDecoder, RejectsPicturesWithUnexpectedPixels) {
+  refusesBytes("part 0: its occupied cells", [](json& asset, Bytes& bytes) {  // sets bits beyond the 27 cells
     replace(asset, bytes, part(asset)["occupied"], ImageU8(256, 1, 3, 255));
   });
-  refusesBytes("part 0: its occupied cells", [](json& asset, Bytes& bytes) {  // the last byte holds three cells
+  refusesBytes("part 0: its occupied cells", [](json& asset, Bytes& bytes) {  // the last byte stores three cells
     ImageU8 beyond(256, 1, 3);
     std::fill_n(beyond.at(3, 0), 3, uint8_t{8});
     replace(asset, bytes, part(asset)["occupied"], beyond);
@@ -385,7 +386,7 @@ TEST_F(VolumeRefusal, OfPicturesThatHoldSomethingElse) {
     coloured.pixels[0] = 1;
     replace(asset, bytes, part(asset)["occupied"], coloured);
   });
-  refusesBytes("part 0: its macroblocks", [](json& asset, Bytes& bytes) {  // more alive than stored
+  refusesBytes("part 0: its macroblocks", [](json& asset, Bytes& bytes) {  // more occupied than stored
     ImageU8 all(256, 1, 3);
     for (int c = 0; c < 3; ++c) all.pixels[static_cast<size_t>(c)] = 255;
     replace(asset, bytes, part(asset)["macroblocks"]["alive"], all);
@@ -395,8 +396,8 @@ TEST_F(VolumeRefusal, OfPicturesThatHoldSomethingElse) {
   });
 }
 
-TEST_F(VolumeRefusal, OfEveryCutAndNoOtherHarm) {
-  const Bytes file = encodeVolume(madeContent(6), 1);
+TEST_F(VolumeDecoder, RejectsEveryTruncationAndSurvivesChangedBytes) {
+  const Bytes file = encodeVolume(testContent(6), 1);
   std::string reason;
   const RandomStream random(4, 4);
   for (uint64_t trial = 0; trial < 200; ++trial) {
@@ -413,7 +414,7 @@ TEST_F(VolumeRefusal, OfEveryCutAndNoOtherHarm) {
   }
 }
 
-TEST(VolumeContent, CountsAllThatItHolds) {
+TEST(VolumeContent, CountsAllOfItsMemory) {
   VolumeContent content;
   const uint64_t before = bytesInMemory(content);
   content.network = {{34, 3, std::vector<float>(102), std::vector<float>(3)}};

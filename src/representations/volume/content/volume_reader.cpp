@@ -1,4 +1,4 @@
-// A volume's content, read: untrusted bytes.
+// Decodes volume contents from untrusted bytes.
 #include "raymarch/content/content_reader.h"
 #include "representations/volume/content/volume_payload.h"
 #include "tiles/json_fields.h"
@@ -8,7 +8,7 @@ namespace {
 
 using namespace json_fields;
 
-// What a part says of itself, before anything is allocated for it.
+// What a part declares of itself, read before anything is allocated for it.
 struct PartHeader {
   VolumePart part;  // without texels
   uint32_t stored = 0;
@@ -22,12 +22,12 @@ class VolumeReader : public PartsReader<VolumeReader, VolumeContent, PartHeader>
   using PartsReader::PartsReader;
 
   bool readSettings() {
-    const auto features = numberOf(file_.ours, "featureRange"), density = numberOf(file_.ours, "densityRange");
+    const auto features = getNumber(file_.ours, "featureRange"), density = getNumber(file_.ours, "densityRange");
     if (!features || !density) return fail("has no ranges to dequantise with");
     content_.featureRange = static_cast<float>(*features);
     content_.densityRange = static_cast<float>(*density);
-    if (const json* steps = fieldOf(file_.ours, "stepsPerTexel")) {
-      const auto number = unsignedFrom(*steps, VolumeContent::kMostStepsPerTexel);
+    if (const json* steps = getField(file_.ours, "stepsPerTexel")) {
+      const auto number = unsignedFrom(*steps, VolumeContent::kMaxStepsPerTexel);
       if (!number) return fail("its steps per texel are out of bounds");
       content_.stepsPerTexel = static_cast<uint32_t>(*number);
     }
@@ -36,8 +36,8 @@ class VolumeReader : public PartsReader<VolumeReader, VolumeContent, PartHeader>
 
   static bool readHeader(const json& source, PartHeader& header) {
     VolumePart& part = header.part;
-    const auto voxels = unsignedOf(source, "voxels", kMostVoxels), planes = unsignedOf(source, "planes", kMostPlanes);
-    const auto stored = storedOf(source);
+    const auto voxels = getUnsigned(source, "voxels", kMaxVoxels), planes = getUnsigned(source, "planes", kMaxPlanes);
+    const auto stored = readStoredCount(source);
     if (!voxels || !planes || !stored) return false;
     if (*voxels < 1 || *voxels % VolumePart::kMacroblock != 0) return false;
     if (*planes < 1 || *planes % VolumePart::kDistanceCell != 0) return false;
@@ -58,7 +58,7 @@ class VolumeReader : public PartsReader<VolumeReader, VolumeContent, PartHeader>
     };
     if (!readMacroblocks(source, part.voxels, header.stored, part, takeVoxels)) return false;
     what = "planes";
-    const json* planes = arrayOf(source, "planeTexels");
+    const json* planes = getArray(source, "planeTexels");
     if (!planes || planes->size() != 3) return false;
     for (size_t axis = 0; axis < 3; ++axis) {
       part.planeBytes[axis].resize(size_t{part.planes} * part.planes * VolumePart::kAttributes);

@@ -1,4 +1,4 @@
-// The rules that a volume's content keeps, written or read (docs/tile-format.md, section 6).
+// The rules that hold for volume contents, both written and read (docs/tile-format.md, section 6).
 #include "raymarch/content/content_rules.h"
 #include "representations/volume/content/volume_payload.h"
 
@@ -9,10 +9,10 @@ constexpr float kLargestRange = 100;
 constexpr uint32_t kInputs = 34, kOutputs = 3;
 
 Broken ruleOfPart(const VolumePart& part) {
-  if (part.voxels % VolumePart::kMacroblock != 0 || part.voxels < 1 || part.voxels > kMostVoxels) {
+  if (part.voxels % VolumePart::kMacroblock != 0 || part.voxels < 1 || part.voxels > kMaxVoxels) {
     return "its number of voxels is out of bounds";
   }
-  if (part.planes % VolumePart::kDistanceCell != 0 || part.planes < 1 || part.planes > kMostPlanes) {
+  if (part.planes % VolumePart::kDistanceCell != 0 || part.planes < 1 || part.planes > kMaxPlanes) {
     return "its number of plane texels is out of bounds";
   }
   if (auto broken = ruleOfPlace(part)) return broken;
@@ -36,15 +36,15 @@ uint64_t texelBytes(const VolumePart& part, uint64_t storedMacroblocks) {
          sizeof(uint32_t) * cube(part.voxels / VolumePart::kMacroblock);
 }
 
-std::optional<std::string> mismatchWithTileset(const VolumeContent& content, const TileContent& promised) {
-  return mismatchOfParts(content.parts, promised);
+std::optional<std::string> mismatchWithTileset(const VolumeContent& content, const TileContent& declared) {
+  return mismatchOfParts(content.parts, declared);
 }
 
-std::optional<std::string> brokenRule(const VolumeContent& content) {
+std::optional<std::string> validationError(const VolumeContent& content) {
   for (const float range : {content.featureRange, content.densityRange}) {
     if (!(range > 0 && range <= kLargestRange)) return "a range is out of bounds";
   }
-  if (content.stepsPerTexel < 1 || content.stepsPerTexel > VolumeContent::kMostStepsPerTexel) {
+  if (content.stepsPerTexel < 1 || content.stepsPerTexel > VolumeContent::kMaxStepsPerTexel) {
     return "the steps per texel are out of bounds";
   }
   if (auto broken = ruleOfNetwork(content.network, kInputs, kOutputs)) return broken;

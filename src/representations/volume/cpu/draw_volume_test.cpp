@@ -3,15 +3,15 @@
 #include <algorithm>
 
 #include "representations/volume/cpu/volume_drawer.h"
-#include "representations/volume/testing/made_volume.h"
+#include "representations/volume/testing/test_volume_content.h"
 #include "scene/block_grid.h"
 
 namespace tessera {
 namespace {
 
 constexpr double kVoxel = 2.0 / 64;
-// Voxels whose middles lie below are solid; what is seen lies where density has grown, 0.7 of the way from the first
-// empty middle to the last solid one.
+// Voxels whose centres lie below this height are solid. The visible surface is where density has grown enough: 0.7 of
+// the way from the first empty centre to the last solid one.
 constexpr double kGround = -0.5, kGroundSeen = -0.5 + 0.5 * kVoxel - 0.7 * kVoxel;
 const Vec3d kHouseLow(-1.25, -0.5, -1), kHouseHigh(-0.5, 0.25, 0.25);  // multiples of a voxel
 
@@ -19,7 +19,7 @@ bool inHouse(const Vec3d& x, double margin = 0) {
   return ((x - kHouseLow).array() > -margin).all() && ((kHouseHigh - x).array() > -margin).all();
 }
 
-// A house on a chequered ground; around it the ground is blue.
+// A house on a chequered ground, which is blue outside the blocks.
 Vec3d colourAt(const Vec3d& x) {
   if (inHouse(x, 0.02)) return {0.9, 0.1, 0.1};
   if (std::abs(x.x()) > 2 || std::abs(x.y()) > 1) return {0.1, 0.2, 0.8};
@@ -33,7 +33,7 @@ bool isSolid(const Vec3d& x) {
 
 struct Village {
   std::vector<VolumeContent> blocks;  // two, side by side along x
-  VolumeContent surround;
+  VolumeContent backgroundBlock;
   TileFrame frame;
 
   Village() {
@@ -45,26 +45,26 @@ struct Village {
       part.voxels = 64;
       part.planes = 256;
       makeSolid(part, isSolid, colourAt);
-      blocks.push_back(contentOf({part}));
+      blocks.push_back(makeVolumeContent({part}));
     }
     VolumePart around;
-    around.contracted = around.surround = true;
+    around.contracted = around.backgroundBlock = true;
     around.scale = {2, 1, 1};
     around.voxels = 64;
     around.planes = 256;
     makeSolid(
         around, [](const Vec3d& x) { return x.z() < kGround; }, [](const Vec3d&) { return Vec3d(0.1, 0.2, 0.8); });
-    surround = contentOf({around});
+    backgroundBlock = makeVolumeContent({around});
   }
 
-  SceneDrawing<VolumeContent> drawing(bool withSurround = true) const {
-    return {frame, {&blocks[0], &blocks[1]}, withSurround ? &surround : nullptr, {}};
+  SceneDrawing<VolumeContent> drawing(bool withBackgroundBlock = true) const {
+    return {frame, {&blocks[0], &blocks[1]}, withBackgroundBlock ? &backgroundBlock : nullptr, {}};
   }
 };
 
 const Village& village() {
-  static const Village made;
-  return made;
+  static const Village instance;
+  return instance;
 }
 
 Camera camera() {
@@ -75,7 +75,7 @@ Camera camera() {
   return camera;
 }
 
-// From the side of the first block.
+// Returns a pose that looks at the scene from the side of the first block.
 Pose pose(const Vec3d& eye = Vec3d(-3.2, -2.4, 1.6), const Vec3d& target = Vec3d(-0.3, 0, -0.5)) {
   Pose pose;
   const Vec3d forward = (target - eye).normalized(), right = forward.cross(Vec3d::UnitZ()).normalized();
@@ -98,7 +98,7 @@ double largestDifference(const ImageF& a, const ImageF& b) {
   return largest;
 }
 
-// What a ray meets, geometrically.
+// What a ray hits, computed geometrically.
 struct Hit {
   double t = INFINITY;
   Vec3d x = Vec3d::Zero(), colour = Vec3d::Zero();
@@ -127,9 +127,9 @@ TEST(DrawVolume, DrawsAHouseOnTheGroundAsGeometrySays) {
         return SceneRay{worldFromCamera.translation, worldFromCamera.rotation * d};
       };
       const Hit here = hit(rayAt(0, 0));
-      // Edges are soft by a voxel: look at pixels whose surroundings are all alike.
+      // Edges are blurred by a voxel, so only pixels whose neighbourhood is uniform are compared.
       bool plain = here.t < 20;
-      // What lies around is not seen before the box.
+      // The surroundings are not visible in front of the box.
       const RayRange box = clipToBox(rayAt(0, 0), village().frame.low, village().frame.high, {0, 1e6});
       plain &= box.empty() || here.t > box.near;
       for (const auto& [dx, dy] :
@@ -142,7 +142,7 @@ TEST(DrawVolume, DrawsAHouseOnTheGroundAsGeometrySays) {
       EXPECT_GT(*view.opacity.at(x, y), 0.99) << x << "," << y;
       for (int c = 0; c < 3; ++c) EXPECT_NEAR(view.colour.at(x, y)[c], here.colour[c], 0.04) << x << "," << y;
       const double cosine = camera().directionInCamera(Vec2d(x + 0.5, y + 0.5))->z();
-      // Beyond the box voxels are twice as high, and grow with the distance.
+      // Outside the box voxels are twice as high, and grow with distance.
       const double growth = std::max({1.0, std::abs(here.x.x()) / 2, std::abs(here.x.y())});
       const double height = around ? 2 * kVoxel * growth : 0.7 * kVoxel;
       const double largest = kVoxel + 1.5 * height * here.t / std::max(0.5, pose().translation.z() - here.x.z());
@@ -177,7 +177,7 @@ TEST(DrawVolume, DoesNotDependOnTheNumberOfThreads) {
   EXPECT_EQ(one.depth.pixels, three.depth.pixels);
 }
 
-TEST(DrawVolume, StandsInTheWorldWhereTheFrameSays) {
+TEST(DrawVolume, PlacesTheSceneInTheWorldAsTheFrameSays) {
   SceneDrawing<VolumeContent> drawing = village().drawing();
   const RenderedView plain = drawn(drawing);
   drawing.frame.rotation = (Eigen::AngleAxisd(1.1, Vec3d::UnitZ()) * Eigen::AngleAxisd(0.2, Vec3d::UnitX())).matrix();
@@ -192,13 +192,13 @@ TEST(DrawVolume, StandsInTheWorldWhereTheFrameSays) {
     different += std::abs(moved.colour.pixels[3 * i] - plain.colour.pixels[3 * i]) > 1e-3;
     different += std::abs(moved.depth.pixels[i] - 40 * plain.depth.pixels[i]) > 1e-3 * (1 + moved.depth.pixels[i]);
   }
-  EXPECT_LT(different, 200);  // of samples at the border of a cell, which rounding moves over it
+  EXPECT_LT(different, 200);  // rounding moves samples at the border of a cell across it
 }
 
 TEST(DrawVolume, DrawsPartsOfOneContentAsItDrawsThemApartWhereNetworksAreDark) {
-  const Village& made = village();
-  const VolumeContent merged = contentOf({made.blocks[1].parts[0], made.blocks[0].parts[0]});  // in whatever order
-  SceneDrawing<VolumeContent> drawing = made.drawing();
+  const Village& scene = village();
+  const VolumeContent merged = makeVolumeContent({scene.blocks[1].parts[0], scene.blocks[0].parts[0]});  // in any order
+  SceneDrawing<VolumeContent> drawing = scene.drawing();
   drawing.march.minTransmittance = 0;
   const RenderedView apart = drawn(drawing);
   drawing.frontToBack = {&merged};
@@ -209,7 +209,7 @@ TEST(DrawVolume, DrawsPartsOfOneContentAsItDrawsThemApartWhereNetworksAreDark) {
 }
 
 // City-on-Web, equations 8 to 11, along random rays from anywhere: cells in the order of the grid (scene/block_grid.h),
-// each shaded by a network that says nothing, against all samples of the ray added up as those of one volume.
+// each shaded by a network that adds nothing, against all samples of the ray composited as one volume.
 TEST(DrawVolume, BlendsCellsWithoutNetworksToWhatOneVolumeWouldBe) {
   BlockGrid grid;
   grid.edge = 2;
@@ -221,9 +221,9 @@ TEST(DrawVolume, BlendsCellsWithoutNetworksToWhatOneVolumeWouldBe) {
     VolumePart part = smoothPart(static_cast<uint64_t>(20 + cell), false, 0.5);
     placeCell(part, static_cast<float>(grid.centre(cell).x()), static_cast<float>(grid.centre(cell).y()), -0.75f);
     parts.push_back(part);
-    cells.push_back(contentOf({part}));
+    cells.push_back(makeVolumeContent({part}));
   }
-  const VolumeContent whole = contentOf(parts);
+  const VolumeContent whole = makeVolumeContent(parts);
   SceneDrawing<VolumeContent> one;
   one.frame.low = Vec3d(-3, -2, -0.75);
   one.frame.high = Vec3d(3, 2, 1);
@@ -243,12 +243,12 @@ TEST(DrawVolume, BlendsCellsWithoutNetworksToWhatOneVolumeWouldBe) {
     drawing.frontToBack.clear();
     for (const int cell : grid.frontToBack(origin.head<2>())) drawing.frontToBack.push_back(&cells[cell]);
     MarchCounts counts, ofWhole;
-    const DrawnPixel got = RayCaster<VolumeContent>(drawing).cast(ray, INFINITY, counts);
+    const DrawnPixel actual = RayCaster<VolumeContent>(drawing).cast(ray, INFINITY, counts);
     const DrawnPixel expected = ofOne.cast(ray, INFINITY, ofWhole);
     ASSERT_EQ(counts.samples, ofWhole.samples);
-    for (int c = 0; c < 3; ++c) ASSERT_NEAR(got.colour[c], expected.colour[c], 1e-5) << i;
-    ASSERT_NEAR(got.transmittance, expected.transmittance, 1e-5) << i;
-    ASSERT_NEAR(got.depth, expected.depth, 1e-5 * (1 + expected.depth)) << i;
+    for (int c = 0; c < 3; ++c) ASSERT_NEAR(actual.colour[c], expected.colour[c], 1e-5) << i;
+    ASSERT_NEAR(actual.transmittance, expected.transmittance, 1e-5) << i;
+    ASSERT_NEAR(actual.depth, expected.depth, 1e-5 * (1 + expected.depth)) << i;
     int met = 0;
     for (const VolumePart& part : parts) met += !ownedRange(part, ray, {0.05, 100}).empty();
     crossing += met > 2;
@@ -259,20 +259,21 @@ TEST(DrawVolume, BlendsCellsWithoutNetworksToWhatOneVolumeWouldBe) {
   EXPECT_LT(opacities / kRays, 0.95);
 }
 
-// Invariant 13 of the specification: parts that are merged stay themselves, up to the wall between them.
-TEST(DrawVolume, ReadsOfEachPartNothingButItsOwnTexels) {
+// Invariant 13 of docs/invariants.md: merged parts do not affect one another; no texel of one part is read on the other
+// side of the wall between them.
+TEST(DrawVolume, ReadsOnlyTheTexelsOfThePartThatARayIsIn) {
   std::vector<VolumePart> parts;
   for (const float x : {-1.0f, 1.0f}) {
     VolumePart part = smoothPart(x < 0 ? 31 : 32, false, 1);
     placeCell(part, x, 0);
     parts.push_back(part);
   }
-  const VolumeContent before = contentOf(parts, randomNetwork(1));
+  const VolumeContent before = makeVolumeContent(parts, randomNetwork(1));
   for (std::vector<uint8_t>* bytes :
        {&parts[1].voxelBytes, &parts[1].planeBytes[0], &parts[1].planeBytes[1], &parts[1].planeBytes[2]}) {
     for (uint8_t& byte : *bytes) byte = static_cast<uint8_t>(255 - byte);
   }
-  const VolumeContent after = contentOf(parts, randomNetwork(1));
+  const VolumeContent after = makeVolumeContent(parts, randomNetwork(1));
   TileFrame frame;
   frame.low = Vec3d(-2, -1, -1);
   frame.high = Vec3d(2, 1, 1);
@@ -282,7 +283,7 @@ TEST(DrawVolume, ReadsOfEachPartNothingButItsOwnTexels) {
   MarchCounts counts;
   int different = 0;
   for (uint64_t i = 0; i < 500; ++i) {
-    // Beside the wall, by a hundredth of a voxel and more.
+    // Rays start beside the wall, at a distance of a hundredth of a voxel or more.
     const double x = (i % 2 ? 1 : -1) * std::exp2(-11.0 * random.uniformDouble(3 * i));
     const Vec3d origin(x, 2 * random.uniformDouble(3 * i + 1) - 1, 2),
         down(0, 2 * random.uniformDouble(3 * i + 2) - 1, -3);
@@ -304,7 +305,7 @@ TEST(DrawVolume, SeesNothingOfAContentThatHoldsNothingWhateverItsNetwork) {
   nothing.voxels = 32;
   nothing.planes = 64;
   makeVolume(nothing, smoothVolume(1, 0));
-  const VolumeContent empty = contentOf({nothing}, randomNetwork(1));
+  const VolumeContent empty = makeVolumeContent({nothing}, randomNetwork(1));
   SceneDrawing<VolumeContent> drawing = village().drawing();
   const RenderedView without = drawn(drawing);
   drawing.frontToBack.insert(drawing.frontToBack.begin(), &empty);
@@ -313,12 +314,12 @@ TEST(DrawVolume, SeesNothingOfAContentThatHoldsNothingWhateverItsNetwork) {
   EXPECT_EQ(without.opacity.pixels, with.opacity.pixels);
 }
 
-TEST(DrawVolume, SeesTheSurroundOnlyBehindTheBox) {
-  // All that lies around is opaque: rays that miss the box see it where they begin, others only behind.
-  VolumeContent fog = village().surround;
+TEST(DrawVolume, SeesTheBackgroundBlockOnlyBehindTheBox) {
+  // Everything outside the box is opaque: rays that miss the box see it where they begin, others only behind the box.
+  VolumeContent fog = village().backgroundBlock;
   VolumePart& part = fog.parts[0];
   part = VolumePart{};
-  part.contracted = part.surround = true;
+  part.contracted = part.backgroundBlock = true;
   part.scale = {2, 1, 1};
   part.voxels = 32;
   part.planes = 64;
@@ -326,7 +327,7 @@ TEST(DrawVolume, SeesTheSurroundOnlyBehindTheBox) {
       part, [](const Vec3d&) { return true; }, [](const Vec3d&) { return Vec3d(0.1, 0.2, 0.8); });
   SceneDrawing<VolumeContent> drawing = village().drawing(false);
   const RenderedView without = drawn(drawing);
-  drawing.surround = &fog;
+  drawing.backgroundBlock = &fog;
   const RenderedView with = drawn(drawing);
   int behind = 0, alone = 0;
   for (int y = 0; y < camera().height; ++y) {
@@ -337,7 +338,7 @@ TEST(DrawVolume, SeesTheSurroundOnlyBehindTheBox) {
       const double depth = *with.depth.at(x, y), seen = *without.opacity.at(x, y);
       EXPECT_GT(*with.opacity.at(x, y), 0.99);
       if (box.empty()) {
-        EXPECT_LT(depth, 0.4) << x << "," << y;  // a step
+        EXPECT_LT(depth, 0.4) << x << "," << y;  // within one step
         ++alone;
       } else if (seen == 0) {
         EXPECT_NEAR(depth, box.far * d.z(), 0.4) << x << "," << y;
@@ -360,22 +361,22 @@ TEST(DrawVolume, SeesBlocksThatOwnWhatLiesOutsideFromWhereTheBoxIsEntered) {
   part.planes = 64;
   makeSolid(
       part, [](const Vec3d&) { return true; }, [](const Vec3d&) { return Vec3d(0.1, 0.2, 0.8); });
-  const VolumeContent border = contentOf({part});
+  const VolumeContent border = makeVolumeContent({part});
   SceneDrawing<VolumeContent> drawing{{}, {&border}, nullptr, {}};
   RayCaster<VolumeContent> caster(drawing);
   MarchCounts counts;
-  const auto depthOf = [&](const Vec3d& origin, const Vec3d& target) {
+  const auto castRayDepth = [&](const Vec3d& origin, const Vec3d& target) {
     const DrawnPixel ray = caster.cast({origin, (target - origin).normalized()}, INFINITY, counts);
     return ray.depth / (1 - ray.transmittance);
   };
-  EXPECT_NEAR(depthOf(Vec3d(5, 0, 0), Vec3d(0, 0, 0)), 4, 0.1);           // the box, though it owns what is in front
-  EXPECT_NEAR(depthOf(Vec3d(0.5, 0.1, 0), Vec3d(5, 0.1, 0)), 0.05, 0.1);  // from within
-  EXPECT_NEAR(depthOf(Vec3d(-5, 3, 0), Vec3d(5, 3, 0)), 5, 0.3);          // past the box: what it owns
-  EXPECT_NEAR(depthOf(Vec3d(-0.5, 0, 0), Vec3d(0.5, 0, 0)), 0.5, 0.1);
+  EXPECT_NEAR(castRayDepth(Vec3d(5, 0, 0), Vec3d(0, 0, 0)), 4, 0.1);  // at the box, not where its region begins
+  EXPECT_NEAR(castRayDepth(Vec3d(0.5, 0.1, 0), Vec3d(5, 0.1, 0)), 0.05, 0.1);  // from inside the box
+  EXPECT_NEAR(castRayDepth(Vec3d(-5, 3, 0), Vec3d(5, 3, 0)), 5, 0.3);          // past the box: where its region begins
+  EXPECT_NEAR(castRayDepth(Vec3d(-0.5, 0, 0), Vec3d(0.5, 0, 0)), 0.5, 0.1);
 }
 
 TEST(DrawVolume, SeesBlocksThatOwnWhatLiesOutsideBehindTheBoxToo) {
-  // Three blocks in a row: the outer ones hold a wall far outside and nothing else, the inner one nothing at all.
+  // Three blocks in a row: the outer two contain only a wall far outside, the inner one contains nothing.
   const auto wall = [](const Vec3d& x) { return std::abs(x.x()) > 8; };
   std::vector<VolumeContent> contents;
   for (const float x : {-2.0f, 0.0f, 2.0f}) {
@@ -394,7 +395,7 @@ TEST(DrawVolume, SeesBlocksThatOwnWhatLiesOutsideBehindTheBoxToo) {
       (x < 0 ? part.low : part.high)[0] = x < 0 ? -1e6f : 1e6f;
       makeSolid(part, wall, [](const Vec3d&) { return Vec3d(0.1, 0.2, 0.8); });
     }
-    contents.push_back(contentOf({part}));
+    contents.push_back(makeVolumeContent({part}));
   }
   SceneDrawing<VolumeContent> drawing;
   drawing.frame.low = Vec3d(-3, -1, -0.5);
@@ -407,14 +408,14 @@ TEST(DrawVolume, SeesBlocksThatOwnWhatLiesOutsideBehindTheBoxToo) {
     EXPECT_GT(1 - ray.transmittance, 0.99);
     return (origin + ray.depth / (1 - ray.transmittance) * direction.normalized()).x();
   };
-  EXPECT_NEAR(wallSeen(Vec3d(0, 0, 0), Vec3d(1, 0.1, 0.02)), 8, 1.5);       // from the block that holds nothing
+  EXPECT_NEAR(wallSeen(Vec3d(0, 0, 0), Vec3d(1, 0.1, 0.02)), 8, 1.5);       // from the empty block
   EXPECT_NEAR(wallSeen(Vec3d(-2.5, 0, 0), Vec3d(1, 0.05, 0.02)), 8, 1.5);   // through all three
   EXPECT_NEAR(wallSeen(Vec3d(2.5, 0, 0), Vec3d(-1, 0.05, 0.02)), -8, 1.5);  // and back
   EXPECT_NEAR(wallSeen(Vec3d(2.5, 0.5, 4), Vec3d(1, 0.1, 0.1)), 8, 1.5);    // past the box
   EXPECT_NEAR(wallSeen(Vec3d(-6, 0, 0), Vec3d(1, 0.01, 0.01)), 8, 1.5);     // not the wall behind the camera
 }
 
-TEST(DrawVolume, EndsAtOpaqueThings) {
+TEST(DrawVolume, EndsRaysAtOpaqueSurfaces) {
   const RenderedView free = drawn(village().drawing());
   ImageF opaque(camera().width, camera().height, 1, INFINITY);
   for (int y = 0; y < opaque.height; ++y) {
@@ -435,7 +436,7 @@ TEST(DrawVolume, EndsAtOpaqueThings) {
   }
 }
 
-TEST(DrawVolume, DrawsNothingBeyondTheLens) {
+TEST(DrawVolume, DrawsNothingWhereTheLensHasNoDirection) {
   Camera fisheye = camera();
   fisheye.lens = LensModel::openCvFisheye;
   fisheye.parameters = {20, 20, 120, 90, -0.1, 0, 0, 0};

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "base/error.h"
-#include "representations/volume/testing/made_place.h"
+#include "representations/volume/testing/test_scene.h"
 #include "representations/volume/testing/volume_renderer.h"
 
 namespace tessera {
@@ -24,14 +24,15 @@ TileScene scene() {
 }
 
 TEST(SceneBenchmark, CountsTheSameSamplesInFewerSteps) {
-  const TileScene made = scene();
+  const TileScene tileScene = scene();
   BenchmarkView view;
   view.camera.width = 24;
   view.camera.height = 16;
   view.camera.parameters = {20, 20, 12, 8};
   std::vector<BenchmarkView> views(2, view);
-  for (size_t i = 0; i < views.size(); ++i) views[i].worldFromCamera = flightPose(made.frame, made.tree, 0.1 + 0.5 * i);
-  const SkippingBenchmark result = benchmarkSkipping(made, makeVolumeDrawer, views, 1);
+  for (size_t i = 0; i < views.size(); ++i)
+    views[i].worldFromCamera = flightPose(tileScene.frame, tileScene.tree, 0.1 + 0.5 * i);
+  const SkippingBenchmark result = benchmarkSkipping(tileScene, makeVolumeDrawer, views, 1);
   EXPECT_EQ(result.rays, 2u * 24 * 16);
   EXPECT_GT(result.skipping.counts.samples, 1000u);
   EXPECT_EQ(result.skipping.counts.samples, result.whole.counts.samples);
@@ -48,7 +49,7 @@ CacheBenchmarkOptions smallPictures() {
   options.steps = 120;
   options.width = 16;
   options.height = 12;
-  options.mostPixels = 16;  // texels of the made place are eight times as coarse as those of a real one
+  options.maximumScreenSpaceError = 16;  // texels of the test scene are eight times as coarse as real ones
   options.threads = 1;
   return options;
 }
@@ -64,8 +65,8 @@ TEST(SceneBenchmark, FliesThroughAQuarterOfTheFinestLevel) {
     EXPECT_EQ(run.stepsWithoutCoarsest, 0);
     EXPECT_EQ(run.stepsWithoutPartition, 0);
     EXPECT_EQ(run.stepsUnlikeUnbounded, 0);
-    EXPECT_LE(run.mostBytes, run.budgetBytes);
-    EXPECT_GT(run.mostBytes, place().coarsestBytes);
+    EXPECT_LE(run.maxBytes, run.budgetBytes);
+    EXPECT_GT(run.maxBytes, place().coarsestBytes);
   }
   EXPECT_GT(result.tight.evictions, 0u);
   EXPECT_GT(result.tight.refused, 0u);
@@ -86,21 +87,21 @@ TEST(SceneBenchmark, RefusesABudgetBelowTheCoarsestLevel) {
 }
 
 TEST(SceneBenchmark, FliesOverEveryCellLowAndHigh) {
-  const TileScene made = scene();
+  const TileScene tileScene = scene();
   std::set<std::pair<int, int>> low, high;
   double top = 0;
   for (int step = 0; step < 600; ++step) {
-    const Pose pose = flightPose(made.frame, made.tree, step / 600.0);
+    const Pose pose = flightPose(tileScene.frame, tileScene.tree, step / 600.0);
     EXPECT_LT((pose.rotation.transpose() * pose.rotation - Mat3d::Identity()).norm(), 1e-12);
     EXPECT_NEAR(pose.rotation.determinant(), 1, 1e-12);
-    const Vec3d eye = made.frame.inScene(pose.translation),
-                forward = made.frame.rotation.transpose() * pose.rotation.col(2);
+    const Vec3d eye = tileScene.frame.inScene(pose.translation),
+                forward = tileScene.frame.rotation.transpose() * pose.rotation.col(2);
     EXPECT_LT(forward.z(), 0);
-    EXPECT_GT(eye.z(), made.frame.high.z());
+    EXPECT_GT(eye.z(), tileScene.frame.high.z());
     const std::pair<int, int> cell(std::floor(0.5 * (eye.x() + 4)), std::floor(0.5 * (eye.y() + 4)));
     (step < 300 ? low : high).insert(cell);
     if (step < 300) {
-      EXPECT_LT(eye.z(), made.frame.high.z() + 0.3);
+      EXPECT_LT(eye.z(), tileScene.frame.high.z() + 0.3);
     }
     top = std::max(top, eye.z());
   }
@@ -109,21 +110,21 @@ TEST(SceneBenchmark, FliesOverEveryCellLowAndHigh) {
   EXPECT_GT(top, 8);
 }
 
-TEST(SceneBenchmark, TellsAPartitionFromWhatIsNone) {
-  const TileTree tree = madeTree(4, 4);
-  const auto cutOf = [&](int level) {
+TEST(SceneBenchmark, DistinguishesPartitionsFromOtherCuts) {
+  const TileTree tree = testTree(4, 4);
+  const auto selectTilesAtLevel = [&](int level) {
     std::vector<SelectedTile> cut;
     for (size_t i = 0; i < tree.tiles.size(); ++i) {
       if (tree.tiles[i].level == level) cut.push_back({static_cast<int>(i), static_cast<int>(i), true});
     }
     return cut;
   };
-  for (const int level : {0, 1, 2}) EXPECT_TRUE(isPartition(tree, cutOf(level))) << level;
-  std::vector<SelectedTile> cut = cutOf(0);
+  for (const int level : {0, 1, 2}) EXPECT_TRUE(isPartition(tree, selectTilesAtLevel(level))) << level;
+  std::vector<SelectedTile> cut = selectTilesAtLevel(0);
   cut.pop_back();
   EXPECT_FALSE(isPartition(tree, cut));
-  cut = cutOf(1);
-  cut.push_back(cutOf(0).front());
+  cut = selectTilesAtLevel(1);
+  cut.push_back(selectTilesAtLevel(0).front());
   EXPECT_FALSE(isPartition(tree, cut));
 }
 

@@ -26,7 +26,7 @@ VolumeContent volumeAt(const TileScene& scene, int tile) {
   return contentAs<VolumeContent>(*scene.source.load(tile));
 }
 
-// In the world, from a place in the scene.
+// Returns a pose in the world from positions in the scene.
 Pose lookingAt(const TileFrame& frame, const Vec3d& eye, const Vec3d& target) {
   Pose pose;
   const Vec3d forward = (target - eye).normalized(), right = forward.cross(Vec3d::UnitZ()).normalized();
@@ -48,23 +48,23 @@ TEST(TileScene, KnowsWhatContentsTakeInMemoryBeforeTheyAreLoaded) {
     EXPECT_EQ(scene.source.bytes(tile), scene.source.load(tile)->memoryBytes());
     ++contents;
   }
-  EXPECT_EQ(contents, 5);  // two blocks, one level above, two surrounds
-  ASSERT_GE(scene.tree.surround, 0);
-  const TileNode& coarse = scene.tree.tiles[scene.tree.surround];
+  EXPECT_EQ(contents, 5);  // two blocks, one level above, two background blocks
+  ASSERT_GE(scene.tree.backgroundBlock, 0);
+  const TileNode& coarse = scene.tree.tiles[scene.tree.backgroundBlock];
   ASSERT_EQ(coarse.children.size(), 1u);
   const int fine = coarse.children[0];
   EXPECT_EQ(coarse.level, 1);
   EXPECT_EQ(scene.tree.tiles[fine].level, 0);
   EXPECT_DOUBLE_EQ(coarse.geometricError, 2 * scene.tree.tiles[fine].geometricError);
-  EXPECT_TRUE(volumeAt(scene, fine).parts[0].surround);
-  EXPECT_EQ(volumeAt(scene, fine).parts[0].planes, 2 * volumeAt(scene, scene.tree.surround).parts[0].planes);
+  EXPECT_TRUE(volumeAt(scene, fine).parts[0].backgroundBlock);
+  EXPECT_EQ(volumeAt(scene, fine).parts[0].planes, 2 * volumeAt(scene, scene.tree.backgroundBlock).parts[0].planes);
 }
 
-TEST(TileScene, IsDrawnFromDiskAsFromMemory) {
+TEST(TileScene, RendersFromDiskAsFromMemory) {
   const TileScene scene = openTileScene(kScene, volumeCodec());
   SceneRendererSettings settings;
   settings.threads = 1;
-  settings.selection.mostPixels = 0;
+  settings.selection.maximumScreenSpaceError = 0;
   VolumeRenderer renderer(scene.frame, scene.tree, scene.source, settings);
   const Pose pose = lookingAt(scene.frame, Vec3d(-3, -3, 2), Vec3d(0, 0, -0.3));
   const RenderedView view = renderer.render(smallCamera(), pose, nullptr);
@@ -72,11 +72,12 @@ TEST(TileScene, IsDrawnFromDiskAsFromMemory) {
   std::vector<VolumeContent> finest;
   for (size_t i = 0; i < scene.tree.tiles.size(); ++i) {
     const TileNode& node = scene.tree.tiles[i];
-    if (!node.isSurround && node.children.empty()) finest.push_back(volumeAt(scene, static_cast<int>(i)));
+    if (!node.isBackgroundBlock && node.children.empty()) finest.push_back(volumeAt(scene, static_cast<int>(i)));
   }
   ASSERT_EQ(finest.size(), 2u);
-  const VolumeContent surround = volumeAt(scene, scene.tree.tiles[scene.tree.surround].children.at(0));
-  SceneDrawing<VolumeContent> drawing{scene.frame, {&finest[0], &finest[1]}, &surround, {}};  // the first is nearer
+  const VolumeContent backgroundBlock = volumeAt(scene, scene.tree.tiles[scene.tree.backgroundBlock].children.at(0));
+  SceneDrawing<VolumeContent> drawing{
+      scene.frame, {&finest[0], &finest[1]}, &backgroundBlock, {}};  // the first is nearer
   ThreadPool pool(1);
   const RenderedView expected = drawScene(drawing, smallCamera(), pose, nullptr, pool);
   EXPECT_EQ(view.colour.pixels, expected.colour.pixels);
@@ -91,29 +92,29 @@ TEST(TileScene, IsCoarserFromAfar) {
   VolumeRenderer renderer(scene.frame, scene.tree, scene.source, {});
   renderer.render(smallCamera(), lookingAt(scene.frame, Vec3d(0, -300, 100), Vec3d::Zero()), nullptr);
   EXPECT_EQ(renderer.cut().tiles.size(), 1u);
-  const int coarse = scene.tree.surround, fine = scene.tree.tiles[coarse].children.at(0);
+  const int coarse = scene.tree.backgroundBlock, fine = scene.tree.tiles[coarse].children.at(0);
   EXPECT_TRUE(renderer.cache().holds(coarse));
-  EXPECT_EQ(renderer.cut().surround, fine);         // where the camera stands in it
-  EXPECT_EQ(renderer.cacheStatistics().loads, 3u);  // the root and the surrounds
+  EXPECT_EQ(renderer.cut().backgroundBlock, fine);  // the camera is inside it
+  EXPECT_EQ(renderer.cacheStatistics().loads, 3u);  // the root and the background blocks
 }
 
-TEST(TileScene, HasTheSurroundOfTheLevelThatIsAskedFor) {
+TEST(TileScene, HasTheBackgroundBlockOfTheLevelThatIsAskedFor) {
   const TileScene scene = openTileScene(kScene, volumeCodec());
   SceneRendererSettings settings;
-  settings.selection.mostPixels = 0;
-  const int coarse = scene.tree.surround, fine = scene.tree.tiles[coarse].children.at(0);
+  settings.selection.maximumScreenSpaceError = 0;
+  const int coarse = scene.tree.backgroundBlock, fine = scene.tree.tiles[coarse].children.at(0);
   for (const auto& [level, expected] : {std::pair(1, coarse), std::pair(0, fine)}) {
     settings.selection.finestLevel = level;
     VolumeRenderer renderer(scene.frame, scene.tree, scene.source, settings);
     const Pose pose = lookingAt(scene.frame, Vec3d(-3, -3, 2), Vec3d(0, 0, -0.3));
     const RenderedView view = renderer.render(smallCamera(), pose, nullptr);
-    EXPECT_EQ(renderer.cut().surround, expected);
+    EXPECT_EQ(renderer.cut().backgroundBlock, expected);
     EXPECT_EQ(renderer.cache().holds(fine), level == 0);
   }
 }
 
-// A copy of the scene whose tileset.json may lie.
-class VolumeSceneThatLies : public testing::Test {
+// A copy of the scene whose tileset.json can be made to disagree with its contents.
+class InconsistentVolumeScene : public testing::Test {
  protected:
   void SetUp() override {
     folder_ = fs::temp_directory_path() / ("tessera-lying-scene-" + std::to_string(::getpid()));
@@ -123,11 +124,13 @@ class VolumeSceneThatLies : public testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  // Loads the content of a tile, or the surround, and expects an error that names its file, its tile and the rule.
-  void refuses(bool surround, size_t tile, const std::string& rule) {
+  // Loads the content of a tile, or the background block, and expects an error that names its file, its tile and the
+  // rule.
+  void refuses(bool backgroundBlock, size_t tile, const std::string& rule) {
     writeFileAtomically(folder_ / "tileset.json", encodeTileset(tileset_));
     const TileScene scene = openTileScene(folder_, volumeCodec());
-    const int node = surround ? scene.tree.tiles[scene.tree.surround].children.at(0) : static_cast<int>(tile);
+    const int node =
+        backgroundBlock ? scene.tree.tiles[scene.tree.backgroundBlock].children.at(0) : static_cast<int>(tile);
     try {
       scene.source.load(node);
       FAIL() << rule;
@@ -143,18 +146,18 @@ class VolumeSceneThatLies : public testing::Test {
   Tileset tileset_;
 };
 
-TEST_F(VolumeSceneThatLies, IsRefusedWhereAContentIsASurroundAndShouldBeNoneAndTheOtherWayRound) {
+TEST_F(InconsistentVolumeScene, IsRejectedWhereABackgroundBlockIsNotDeclaredAsSuchOrConversely) {
   std::vector<TileContent>& contents = tileset_.tiles[0].contents;
-  ASSERT_TRUE(contents[1].surround);
+  ASSERT_TRUE(contents[1].backgroundBlock);
   std::swap(contents[0].uri, contents[1].uri);
-  refuses(false, 0, "part 0 is a surround, and tileset.json says that the content is none");
-  refuses(true, 0, "part 0 is no surround, and tileset.json says that the content is one");
-  // The renderer, which relies on it, says so instead of drawing.
+  refuses(false, 0, "part 0 is a background block, and tileset.json says that the content is none");
+  refuses(true, 0, "part 0 is no background block, and tileset.json says that the content is one");
+  // The renderer relies on it, and throws instead of rendering.
   const TileScene scene = openTileScene(folder_, volumeCodec());
   EXPECT_THROW(VolumeRenderer(scene.frame, scene.tree, scene.source, {}), Error);
 }
 
-TEST_F(VolumeSceneThatLies, IsRefusedWhereAPartLeavesTheBoxOfItsContent) {
+TEST_F(InconsistentVolumeScene, IsRejectedWhereAPartLeavesTheBoxOfItsContent) {
   tileset_.tiles[2].contents[0].box.high.z() -= 1e-5;
   refuses(false, 2, "part 0 owns what lies outside of the content's box");
   tileset_ = readTileset(kScene);
@@ -169,8 +172,8 @@ TEST_F(VolumeSceneThatLies, IsRefusedWhereAPartLeavesTheBoxOfItsContent) {
   EXPECT_EQ(volumeAt(openTileScene(folder_, volumeCodec()), 2).parts.size(), 1u);
 }
 
-// The format allows them.
-TEST_F(VolumeSceneThatLies, IsRefusedWithSeveralContentsOfATileWhichAreNotDrawn) {
+// The format allows several contents in a tile, but the renderer does not support them.
+TEST_F(InconsistentVolumeScene, IsRejectedWithSeveralContentsInATile) {
   std::vector<TileContent>& contents = tileset_.tiles[0].contents;
   contents.insert(contents.begin(), contents[0]);
   for (size_t i = 0; i < 2; ++i) {
@@ -189,9 +192,9 @@ TEST_F(VolumeSceneThatLies, IsRefusedWithSeveralContentsOfATileWhichAreNotDrawn)
   }
 }
 
-TEST_F(VolumeSceneThatLies, IsNotReadWhereItsFilesAreLargerThanAnyShouldBe) {
+TEST_F(InconsistentVolumeScene, IsRejectedWhereAFileExceedsTheSizeLimit) {
   const TileScene scene = openTileScene(folder_, volumeCodec());
-  fs::resize_file(scene.source.file(1), (uint64_t{1} << 30) + 1);  // a hole
+  fs::resize_file(scene.source.file(1), (uint64_t{1} << 30) + 1);  // a sparse file
   try {
     scene.source.load(1);
     FAIL();
@@ -221,7 +224,7 @@ TEST(TileScene, NamesTheFolderWhoseCoarsestLevelDoesNotFit) {
   }
 }
 
-TEST(TileScene, SaysWhatIsMissing) {
+TEST(TileScene, NamesTheFolderThatIsMissing) {
   try {
     openTileScene("/nowhere/scene", volumeCodec());
     FAIL();

@@ -1,4 +1,4 @@
-// Draws contents of `volume` on the CPU: the oracle that every other renderer of them is held against.
+// The CPU drawer of `volume` contents: the reference against which all other renderers of them are tested.
 #pragma once
 
 #include "raymarch/cpu/draw_scene.h"

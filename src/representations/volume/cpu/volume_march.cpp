@@ -5,7 +5,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "representations/volume/cpu/volume_march.cpp"
 #include <hwy/foreach_target.h>
-// after foreach_target
+// these must follow foreach_target.h
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
@@ -13,7 +13,7 @@ HWY_BEFORE_NAMESPACE();
 namespace tessera::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// The 8 attributes of a texel: one vector, or two.
+// The 8 attributes of a texel, in one or more vectors.
 using Tag = hn::CappedTag<float, 8>;
 using Vector = hn::Vec<Tag>;
 constexpr size_t kLanes = hn::MaxLanes(Tag()), kVectors = 8 / kLanes;
@@ -28,7 +28,7 @@ HWY_ATTR HWY_INLINE Attributes load(const float* from) {
   return result;
 }
 
-// Those of two texels side by side along a row: 16 bytes in a row.
+// The attributes of two texels side by side in a row: 16 consecutive bytes.
 using PairTag = hn::CappedTag<float, 16>;
 constexpr size_t kPairLanes = hn::MaxLanes(PairTag()), kPairVectors = 16 / kPairLanes;
 
@@ -59,7 +59,7 @@ HWY_ATTR HWY_INLINE void addPair(const uint8_t* texel, float weight, Pair& sum) 
   }
 }
 
-// The first texel of each pair by 1 - fraction, the second by fraction; all four added up.
+// Weights the first texel of each pair by 1 - fraction and the second by fraction, and sums all four pairs.
 HWY_ATTR HWY_INLINE Attributes mix(const Pair pairs[4], const float fractions[4]) {
   Attributes sum;
 #if HWY_MAX_BYTES >= 64
@@ -85,12 +85,12 @@ HWY_ATTR HWY_INLINE Attributes mix(const Pair pairs[4], const float fractions[4]
   return sum;
 }
 
-// 1 - exp(-x), to a float's digits for small x too.
-HWY_ATTR HWY_INLINE float opacityOf(float x) {
+// Returns 1 - exp(-x), accurate to float precision for small x too.
+HWY_ATTR HWY_INLINE float computeOpacity(float x) {
   return x < 0.01f ? x * (1 - x * (0.5f - x * (1.0f / 6))) : 1 - std::exp(-x);
 }
 
-// A place among texels along one axis: between `index` and the next, at `fraction` of the way.
+// A lookup position along one axis: between texel `index` and the next, at `fraction` of the way.
 struct Lookup {
   uint32_t index;
   float fraction;
@@ -98,7 +98,7 @@ struct Lookup {
 
 HWY_ATTR HWY_INLINE Lookup planeLookup(float x, uint32_t texels) {
   const float u = std::min(std::max(x - 0.5f, 0.0f), static_cast<float>(texels - 1));
-  const uint32_t index = std::min(static_cast<uint32_t>(u), texels - 2);  // so that there is a next one
+  const uint32_t index = std::min(static_cast<uint32_t>(u), texels - 2);  // so that a next texel exists
   return {index, u - static_cast<float>(index)};
 }
 
@@ -108,10 +108,10 @@ struct Marcher {
   const float voxelsPerTexel = static_cast<float>(part.voxels) / static_cast<float>(part.planes);
   const uint32_t cells = part.planes / VolumePart::kDistanceCell;
   const uint32_t blocks = part.voxels / VolumePart::kMacroblock;
-  // Positions are rounded by less than this: skips stay inside of the empty cube by so much.
+  // A bound on the rounding error of positions: skips stay inside the empty cube by this much.
   const float margin = static_cast<float>(part.planes) * 0x1p-20f;
 
-  // How many cells one may go from the place in any direction, and that cell.
+  // Returns the distance stored for the cell that contains the position, and that cell.
   HWY_ATTR HWY_INLINE uint32_t distanceAt(const float x[3], int32_t cell[3]) const {
     constexpr float kCells = 1.0f / VolumePart::kDistanceCell;
     for (int a = 0; a < 3; ++a) {
@@ -120,7 +120,8 @@ struct Marcher {
     return part.distances[cell[0] + cells * (cell[1] + size_t{cells} * cell[2])];
   }
 
-  // Where the ray leaves the cube of cells nearer than `distance` to `cell`.
+  // Returns where the ray leaves the cube of cells that are nearer than `distance` to `cell`, in texels along the
+  // segment.
   HWY_ATTR HWY_INLINE float exitOfCube(const VolumeSegment& s, const float inverse[3], const int32_t cell[3],
                                        uint32_t distance) const {
     float exit = static_cast<float>(s.length);
@@ -133,7 +134,7 @@ struct Marcher {
     return exit;
   }
 
-  // The sums of the 20 texels' bytes; false where nothing is stored.
+  // Sums the bytes of the 20 texels around the position, weighted. Returns false if the macroblock is not stored.
   HWY_ATTR HWY_INLINE bool sumTexels(const float x[3], Attributes& sum) const {
     float u[3];
     uint32_t block[3];
@@ -152,7 +153,7 @@ struct Marcher {
       fraction[a] = u[a] - static_cast<float>(index);
       voxel += (index - VolumePart::kMacroblock * block[a]) * kStrides[a];
     }
-    // Rows are mixed first, then along the rows.
+    // Pairs of texels are interpolated across the rows first, then along the rows.
     const float y = fraction[1], z = fraction[2];
     Pair pairs[4];
     float fractions[4] = {fraction[0]};
@@ -178,17 +179,17 @@ struct Marcher {
 HWY_ATTR void marchVolume(const VolumeMarch& march, ContentComposite& composite, MarchCounts& counts) {
   const Tag d;
   const Marcher marcher{march};
-  // From a sum of bytes over four sources, the exponents of exp(sum - 1) for the density, which is the first, and of
-  // sigmoid(sum) = 1 / (1 + exp(-sum)) for the others.
-  alignas(64) float factors[8], terms[8], most[8], values[8] = {};
+  // Maps a sum of bytes over the four sources to the exponent of exp(sum - 1) for the density, which comes first, and
+  // of sigmoid(sum) = 1 / (1 + exp(-sum)) for the other attributes.
+  alignas(64) float factors[8], terms[8], maximum[8], values[8] = {};
   for (int i = 0; i < 8; ++i) {
     const float range = i == 0 ? march.content.densityRange : march.content.featureRange, sign = i == 0 ? 1.0f : -1.0f;
     factors[i] = sign * 2 * range / 255;
     terms[i] = sign * -4 * range - (i == 0 ? 1.0f : 0.0f);
-    most[i] = i == 0 ? 15.0f : 80.0f;
+    maximum[i] = i == 0 ? 15.0f : 80.0f;
     if (i > 0) values[i] = composite.values[i - 1];
   }
-  const Attributes factor = load(factors), term = load(terms), limit = load(most);
+  const Attributes factor = load(factors), term = load(terms), limit = load(maximum);
   const auto one = hn::Set(d, 1.0f);
   Attributes total = load(values);
   float transmittance = composite.transmittance, depth = composite.depth;
@@ -212,7 +213,7 @@ HWY_ATTR void marchVolume(const VolumeMarch& march, ContentComposite& composite,
       if (const uint32_t distance = marcher.distanceAt(x, cell); distance > 0) {
         ++i;
         if (march.settings.skipEmptySpace) {
-          // The first step whose middle lies at the exit or behind.
+          // The first step whose middle lies at the exit or behind it.
           const float next = std::ceil(marcher.exitOfCube(s, inverse, cell, distance) * perTexel - 0.5f);
           if (next > static_cast<float>(i)) i = static_cast<uint32_t>(next);
         }
@@ -228,11 +229,11 @@ HWY_ATTR void marchVolume(const VolumeMarch& march, ContentComposite& composite,
       }
       const bool straight = s.growth == 0;
       const double length = straight ? (to - from) * s.square / s.rate : s.distanceBetween(from, to);
-      const float opacity = opacityOf(hn::GetLane(exponent.v[0]) * static_cast<float>(length));
+      const float opacity = computeOpacity(hn::GetLane(exponent.v[0]) * static_cast<float>(length));
       const float distance = static_cast<float>(s.distanceAt(tau));
       if (march.trace != nullptr) march.trace->push_back({number, step, opacity, distance});
       const float weight = transmittance * opacity;
-      if (weight < 1e-9f) continue;  // far below what a sum of floats near 1 can hold
+      if (weight < 1e-9f) continue;  // far below the precision of a sum of floats near 1
       const auto w = hn::Set(d, weight);
       for (size_t k = 0; k < kVectors; ++k) {
         total.v[k] = hn::MulAdd(w, hn::Div(one, hn::Add(one, exponent.v[k])), total.v[k]);

@@ -1,10 +1,10 @@
-// Samples of one part of a content along a ray, composited (City-on-Web, section 4.2; MERF, section 4.4).
+// Samples one part of a content along a ray and composites the samples (City-on-Web, section 4.2; MERF, section 4.4).
 //
-// Each straight piece of the path is cut, from its entry on, into steps of one texel of the planes (or of the share
-// that the content's stepsPerTexel says), the last one shorter; in the middle of each lies a sample. A sample is
-// evaluated where the distance grid says that something may be and the macroblock is stored. Skipping passes over steps
-// in the empty cube around a cell at once, and lands on the same steps: which samples are evaluated does not depend on
-// it.
+// Each straight segment of the path is divided, from its entry on, into steps of one texel of the planes (divided by
+// the content's stepsPerTexel); the last step is shorter. A sample lies in the middle of each step. It is evaluated if
+// its cell of the distance grid may contain something and its macroblock is stored. Skipping jumps over all steps
+// within the empty cube around a cell and resumes at the same steps, so that it does not change which samples are
+// evaluated.
 #pragma once
 
 #include <vector>
@@ -26,9 +26,9 @@ struct VolumeMarch {
   const VolumePath& path;
   MarchSettings settings;
   float transmittanceBefore = 1;                // of all other contents in front of this one
-  std::vector<MarchedSample>* trace = nullptr;  // optional: what is evaluated is added here
+  std::vector<MarchedSample>* trace = nullptr;  // optional: evaluated samples are appended to it
 
-  // Goes on with `composite`, which holds the content's parts in front of this one.
+  // Marches through the part. `composite` holds the result of the content's parts in front of this one and is updated.
   void run(ContentComposite& composite, MarchCounts& counts) const;
 };
 

@@ -5,8 +5,8 @@
 
 #include "raymarch/testing/random_parts.h"
 #include "render/cpu/simd_target.h"
-#include "representations/volume/testing/made_volume.h"
 #include "representations/volume/testing/reference_volume.h"
+#include "representations/volume/testing/test_volume_content.h"
 
 namespace tessera {
 namespace {
@@ -24,11 +24,11 @@ ContentComposite marched(const VolumeContent& content, const SceneRay& ray, cons
   return composite;
 }
 
-// Rays through contents of both kinds, the contracted one placed like a surround.
+// Random rays through bounded and contracted contents; the contracted one is placed like a background block.
 template <class Check>
 void forRandomRays(int rays, const Check& check) {
   for (const bool contracted : {false, true}) {
-    VolumeContent content = contentOf({smoothPart(contracted ? 5 : 4, contracted)});
+    VolumeContent content = makeVolumeContent({smoothPart(contracted ? 5 : 4, contracted)});
     if (contracted) content.parts[0].scale = {2, 3, 1};
     content.stepsPerTexel = contracted ? 1 : 3;
     const RandomStream random(3, contracted);
@@ -42,20 +42,20 @@ void forRandomRays(int rays, const Check& check) {
   }
 }
 
-void expectWhatTheDefinitionSays() {
+void expectMatchesDefinition() {
   int compared = 0;
   double opacities = 0;
   forRandomRays(150, [&](const VolumeContent& content, const SceneRay& ray, const RayRange& range) {
     MarchCounts counts;
-    const ContentComposite got = marched(content, ray, range, kToTheEnd, counts);
+    const ContentComposite actual = marched(content, ray, range, kToTheEnd, counts);
     ReferenceComposite expected;
     referenceMarch(content, content.parts[0], ray, range, expected);
     // A sample on the border of a macroblock may fall to either side.
     EXPECT_NEAR(static_cast<double>(counts.samples), expected.samples, 2);
     if (counts.samples != static_cast<uint64_t>(expected.samples)) return;
-    for (int k = 0; k < 7; ++k) EXPECT_NEAR(got.values[k], expected.values[k], 5e-4);
-    EXPECT_NEAR(got.transmittance, expected.transmittance, 5e-4);
-    EXPECT_NEAR(got.depth, expected.depth, 1e-3 * (1 + expected.depth));
+    for (int k = 0; k < 7; ++k) EXPECT_NEAR(actual.values[k], expected.values[k], 5e-4);
+    EXPECT_NEAR(actual.transmittance, expected.transmittance, 5e-4);
+    EXPECT_NEAR(actual.depth, expected.depth, 1e-3 * (1 + expected.depth));
     opacities += 1 - expected.transmittance;
     ++compared;
   });
@@ -64,20 +64,20 @@ void expectWhatTheDefinitionSays() {
   EXPECT_LT(opacities / compared, 0.99);
 }
 
-TEST(VolumeMarch, IsWhatTheDefinitionSaysWithEveryInstructionSet) {
+TEST(VolumeMarch, MatchesTheDefinitionWithEveryInstructionSet) {
   int targets = 0;
   for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
     hwy::SetSupportedTargetsForTest(target);
     SCOPED_TRACE(renderSimdTarget());
     EXPECT_STREQ(renderSimdTarget(), hwy::TargetName(target));
-    expectWhatTheDefinitionSays();
+    expectMatchesDefinition();
     ++targets;
   }
   hwy::SetSupportedTargetsForTest(0);
   EXPECT_GE(targets, 1);
 }
 
-TEST(VolumeMarch, EvaluatesTheVerySameSamplesWithAndWithoutSkipping) {
+TEST(VolumeMarch, EvaluatesTheSameSamplesWithAndWithoutSkipping) {
   MarchCounts skipping, whole;
   forRandomRays(3000, [&](const VolumeContent& content, const SceneRay& ray, const RayRange& range) {
     std::vector<MarchedSample> few, all;
@@ -101,7 +101,7 @@ TEST(VolumeMarch, EvaluatesTheVerySameSamplesWithAndWithoutSkipping) {
 TEST(VolumeMarch, CrossesEmptySpaceInAFewSteps) {
   VolumePart part = smoothPart(1, false, 0);
   part.distances.assign(part.distances.size(), 8);
-  const VolumeContent content = contentOf({part});
+  const VolumeContent content = makeVolumeContent({part});
   const SceneRay ray{Vec3d(-1, 0.1, 0.2), Vec3d(1, 0.1, 0.05).normalized()};
   MarchCounts skipping, whole;
   marched(content, ray, {0, 2}, {true, 0}, skipping);
@@ -112,22 +112,22 @@ TEST(VolumeMarch, CrossesEmptySpaceInAFewSteps) {
 }
 
 TEST(VolumeMarch, TakesStepsOfOneTexelFromHalfAStepBehindTheEntry) {
-  VolumeContent content = contentOf({smoothPart(1, false, 1)});
+  VolumeContent content = makeVolumeContent({smoothPart(1, false, 1)});
   std::vector<MarchedSample> trace;
   MarchCounts counts;
   marched(content, {Vec3d(-1, 0, 0), Vec3d::UnitX()}, {0.25, 1.27}, {true, 0}, counts, &trace);
   const double texel = 2.0 / 64;
   ASSERT_EQ(trace.size(), 33u);  // 1.02 / texel = 32.64
   for (size_t i = 0; i < 32; ++i) EXPECT_NEAR(trace[i].distance, 0.25 + (i + 0.5) * texel, 1e-6);
-  EXPECT_NEAR(trace[32].distance, 0.5 * (0.25 + 32 * texel + 1.27), 1e-6);  // the last is cut off
+  EXPECT_NEAR(trace[32].distance, 0.5 * (0.25 + 32 * texel + 1.27), 1e-6);  // the last step is shorter
 }
 
 TEST(VolumeMarch, SeesNothingWhereTheMacroblockIsEmptyWhateverThePlanesHold) {
   VolumePart part = smoothPart(1, false, 1);
   for (std::vector<uint8_t>& plane : part.planeBytes) std::fill(plane.begin(), plane.end(), uint8_t{255});
-  const VolumeContent full = contentOf({part});
+  const VolumeContent full = makeVolumeContent({part});
   part.macroblocks.assign(part.macroblocks.size(), VolumePart::kEmpty);
-  const VolumeContent empty = contentOf({part});
+  const VolumeContent empty = makeVolumeContent({part});
   const SceneRay ray{Vec3d(-1, 0, 0), Vec3d::UnitX()};
   MarchCounts counts;
   EXPECT_LT(marched(full, ray, {0, 2}, kToTheEnd, counts).transmittance, 1e-3);
@@ -137,15 +137,15 @@ TEST(VolumeMarch, SeesNothingWhereTheMacroblockIsEmptyWhateverThePlanesHold) {
   EXPECT_EQ(counts.steps, 64u);
 }
 
-// One step at a time, at places that floats hold exactly, up to the borders of the domain and across those of
+// One step at a time, at positions that floats represent exactly, up to the borders of the domain and across those of
 // macroblocks.
-TEST(VolumeMarch, MixesTexelsToTheDigitsOfFloats) {
+TEST(VolumeMarch, InterpolatesTexelsToFloatPrecision) {
   VolumePart part = smoothPart(9, false, 1);
-  for (std::vector<uint8_t>& plane : part.planeBytes) {  // rough, so that no neighbour can stand for another
+  for (std::vector<uint8_t>& plane : part.planeBytes) {  // rough, so that reading a wrong neighbour shows
     for (size_t i = 0; i < plane.size(); ++i) plane[i] = static_cast<uint8_t>(plane[i] - 16 + i / 8 * 37 % 32);
   }
   for (const float density : {14.0f, 9.0f}) {
-    VolumeContent content = contentOf({part});
+    VolumeContent content = makeVolumeContent({part});
     content.densityRange = density;
     const RandomStream random(6, 1);
     const double texel = 2.0 / part.planes;
@@ -162,21 +162,21 @@ TEST(VolumeMarch, MixesTexelsToTheDigitsOfFloats) {
         ray.origin[a] = a == axis ? -1 : 2 * p[a] - 1;
       }
       MarchCounts counts;
-      const ContentComposite got = marched(content, ray, {step * texel, (step + 1) * texel}, kToTheEnd, counts);
+      const ContentComposite actual = marched(content, ray, {step * texel, (step + 1) * texel}, kToTheEnd, counts);
       double sums[8];
       const bool stored = referenceSums(content, part, p, sums);
       ASSERT_EQ(counts.samples, stored ? 1u : 0u);
       if (!stored) continue;
       const double opacity = -std::expm1(-std::exp(std::min(sums[0] - 1, 15.0)) * texel);
-      ASSERT_NEAR(1 - got.transmittance, opacity, 2e-6);
-      for (int k = 0; k < 7; ++k) ASSERT_NEAR(got.values[k], opacity / (1 + std::exp(-sums[k + 1])), 2e-6) << k;
+      ASSERT_NEAR(1 - actual.transmittance, opacity, 2e-6);
+      for (int k = 0; k < 7; ++k) ASSERT_NEAR(actual.values[k], opacity / (1 + std::exp(-sums[k + 1])), 2e-6) << k;
       seen += opacity > 0.02 && opacity < 0.98;
     }
     EXPECT_GT(seen, 300) << density;
   }
 }
 
-// With all four sources at one value, sums are four times it, also where lookups are clamped.
+// If all four sources have one value, sums are four times that value, also where lookups are clamped.
 TEST(VolumeMarch, SumsFourSourcesUpToTheBordersOfTheDomain) {
   VolumePart part;
   part.voxels = 32;
@@ -184,22 +184,23 @@ TEST(VolumeMarch, SumsFourSourcesUpToTheBordersOfTheDomain) {
   makeVolume(part, {[](const Texel3&, int attribute) { return attribute == 0 ? 140 : 120 + 4 * attribute; },
                     [](int, uint32_t, uint32_t, int attribute) { return attribute == 0 ? 140 : 120 + 4 * attribute; },
                     [](const Texel3&) { return true; }});
-  const VolumeContent content = contentOf({part});
+  const VolumeContent content = makeVolumeContent({part});
   const double density = std::exp(4 * (-14 + 28 * 140 / 255.0) - 1);
   for (const double edge : {-0.9999, -0.99, 0.0, 0.99, 0.9999}) {
     MarchCounts counts;
-    const ContentComposite got = marched(content, {Vec3d(-1, edge, edge), Vec3d::UnitX()}, {0, 2}, kToTheEnd, counts);
+    const ContentComposite actual =
+        marched(content, {Vec3d(-1, edge, edge), Vec3d::UnitX()}, {0, 2}, kToTheEnd, counts);
     EXPECT_EQ(counts.samples, 64u);
     const double opacity = -std::expm1(-density * 2);
-    EXPECT_NEAR(1 - got.transmittance, opacity, 1e-4);
+    EXPECT_NEAR(1 - actual.transmittance, opacity, 1e-4);
     for (int k = 0; k < 7; ++k) {
-      EXPECT_NEAR(got.values[k], opacity / (1 + std::exp(-4 * (-7 + 14 * (124 + 4 * k) / 255.0))), 1e-4) << k;
+      EXPECT_NEAR(actual.values[k], opacity / (1 + std::exp(-4 * (-7 + 14 * (124 + 4 * k) / 255.0))), 1e-4) << k;
     }
   }
 }
 
 TEST(VolumeMarch, EndsWhereNothingMoreWouldBeSeen) {
-  const VolumeContent content = contentOf({smoothPart(8, false, 1)});
+  const VolumeContent content = makeVolumeContent({smoothPart(8, false, 1)});
   const SceneRay ray{Vec3d(-1, 0.3, 0.1), Vec3d::UnitX()};
   MarchCounts all, some, none;
   const ContentComposite whole = marched(content, ray, {0, 2}, {true, 0}, all);
@@ -214,15 +215,15 @@ TEST(VolumeMarch, EndsWhereNothingMoreWouldBeSeen) {
   EXPECT_EQ(none.steps, 0u);
 }
 
-TEST(VolumeMarch, HoldsWhatIsDenseForOpaqueAndFinite) {
+TEST(VolumeMarch, TreatsTheDensestTexelsAsOpaqueAndFinite) {
   VolumePart part = smoothPart(1, true, 1);
   std::fill(part.voxelBytes.begin(), part.voxelBytes.end(), uint8_t{255});
   for (std::vector<uint8_t>& plane : part.planeBytes) std::fill(plane.begin(), plane.end(), uint8_t{255});
-  const VolumeContent content = contentOf({part});
+  const VolumeContent content = makeVolumeContent({part});
   MarchCounts counts;
-  const ContentComposite got = marched(content, {Vec3d(0, 0, 0), Vec3d::UnitX()}, {0.05, 1e6}, kToTheEnd, counts);
-  EXPECT_EQ(got.transmittance, 0);
-  for (const float value : got.values) EXPECT_NEAR(value, 1, 1e-5);
+  const ContentComposite actual = marched(content, {Vec3d(0, 0, 0), Vec3d::UnitX()}, {0.05, 1e6}, kToTheEnd, counts);
+  EXPECT_EQ(actual.transmittance, 0);
+  for (const float value : actual.values) EXPECT_NEAR(value, 1, 1e-5);
 }
 
 }  // namespace

@@ -31,12 +31,12 @@ Triple<double> texelAt(const VolumePart& part, const SceneRay& ray, double t) {
 TEST(VolumePath, FollowsTheContractionThroughAtMostFiveRegions) {
   const VolumePart part = contractedPart();
   const RandomStream random(1, 1);
-  int most = 0;
+  int maximum = 0;
   for (uint64_t i = 0; i < 20000; ++i) {
     const SceneRay ray{randomVector(random, 2 * i, i % 2 ? 2 : 20), randomVector(random, 2 * i + 1, 1).normalized()};
     const VolumePath path = volumePath(part, ray, {0.05, 1e4});
     ASSERT_LE(path.count, 5);
-    most = std::max(most, path.count);
+    maximum = std::max(maximum, path.count);
     double end = 0.05;
     for (int k = 0; k < path.count; ++k) {
       const VolumeSegment& s = path.segments[k];
@@ -53,10 +53,10 @@ TEST(VolumePath, FollowsTheContractionThroughAtMostFiveRegions) {
     }
     EXPECT_NEAR(1 / end, 1e-4, 2e-6);
   }
-  EXPECT_EQ(most, 5);
+  EXPECT_EQ(maximum, 5);
 }
 
-TEST(VolumePath, MeetsTheRegionsThatDenseLookingFindsInTheirOrder) {
+TEST(VolumePath, MeetsTheRegionsThatDenseSamplingFindsInOrder) {
   const VolumePart part = contractedPart();
   const RandomStream random(2, 1);
   int regionsMet = 0;
@@ -69,12 +69,12 @@ TEST(VolumePath, MeetsTheRegionsThatDenseLookingFindsInTheirOrder) {
       const int axis = farthestAxis(q);
       return std::abs(q[axis]) > 1 ? 2 * axis + (q[axis] > 0) : 6;
     };
-    std::vector<int> regions;  // of the pieces
+    std::vector<int> regions;  // of the segments
     for (int k = 0; k < path.count; ++k) {
       const VolumeSegment& s = path.segments[k];
       regions.push_back(regionAt(s.distanceAt(0.5 * s.length)));
       if (k > 0) {
-        EXPECT_NE(regions[k], regions[k - 1]) << "one region in two pieces, ray " << i;
+        EXPECT_NE(regions[k], regions[k - 1]) << "one region in two segments, ray " << i;
       }
     }
     int piece = 0;
@@ -82,7 +82,7 @@ TEST(VolumePath, MeetsTheRegionsThatDenseLookingFindsInTheirOrder) {
       const double t = 0.05 + look * (60 - 0.05) / 20000;
       while (piece + 1 < path.count && path.segments[piece + 1].entry <= t) ++piece;
       const double next = piece + 1 < path.count ? path.segments[piece + 1].entry : INFINITY;
-      if (t - path.segments[piece].entry < 1e-9 || next - t < 1e-9) continue;  // to either side by rounding
+      if (t - path.segments[piece].entry < 1e-9 || next - t < 1e-9) continue;  // rounding decides the side
       ASSERT_EQ(regions[piece], regionAt(t)) << "ray " << i << " at " << t;
     }
     regionsMet += path.count;
@@ -107,7 +107,7 @@ TEST(VolumePath, IsOneStraightPieceInABoundedPart) {
   }
 }
 
-TEST(VolumePath, StandsRaysAlongTheBordersOfRegions) {
+TEST(VolumePath, StaysFiniteForRaysAlongTheBordersOfRegions) {
   VolumePart part;
   part.contracted = true;
   for (const Vec3d& direction : {Vec3d(1, 1, 0), Vec3d(1, 1, 1), Vec3d(1, 0, 0), Vec3d(0, 0, -1)}) {

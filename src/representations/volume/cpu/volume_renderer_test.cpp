@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "render/cpu/scene_renderer.h"
 #include "representations/volume/testing/flat_tile_tree.h"
-#include "representations/volume/testing/made_place.h"
+#include "representations/volume/testing/test_scene.h"
 
 namespace tessera {
 namespace {
@@ -24,7 +24,7 @@ TEST(VolumeRenderer, NeverExceedsAQuarterOfTheFinestLevelAndNeverLacksTheCoarses
   const uint64_t budget = place().finestBytes / 4;
   ASSERT_LT(place().coarsestBytes, budget);
   SceneRendererSettings settings = settingsWith(budget);
-  settings.selection.mostPixels = 0.2;  // of a small picture
+  settings.selection.maximumScreenSpaceError = 0.2;  // small, because the image is small
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
   std::set<int> drawn;
   for (int step = 0; step < 600; ++step) {
@@ -33,17 +33,17 @@ TEST(VolumeRenderer, NeverExceedsAQuarterOfTheFinestLevelAndNeverLacksTheCoarses
       if (selected.visible) drawn.insert(selected.content);
     }
     ASSERT_FALSE(renderer.cut().tiles.empty());
-    ASSERT_LE(renderer.cacheStatistics().mostBytes, budget);
+    ASSERT_LE(renderer.cacheStatistics().maxBytes, budget);
   }
   EXPECT_GT(renderer.cacheStatistics().evictions, 0u);
   EXPECT_GT(drawn.size(), 6u);
 }
 
-TEST(VolumeRenderer, DrawsTheSamePictureAsWithoutABudgetWhereWhatIsWantedFits) {
-  // What 1.5 pixels ask for does not fit; what 16 ask for does.
+TEST(VolumeRenderer, RendersAsWithoutABudgetWhereTheRequestedTilesFit) {
+  // The tiles that an error of 1.5 pixels requests do not fit in the budget; those of 16 pixels do.
   for (const double pixels : {16.0, 1.5}) {
     SceneRendererSettings settings = settingsWith(place().allBytes), tight = settingsWith(place().finestBytes / 3);
-    settings.selection.mostPixels = tight.selection.mostPixels = pixels;
+    settings.selection.maximumScreenSpaceError = tight.selection.maximumScreenSpaceError = pixels;
     VolumeRenderer unbounded(place().frame, place().tree, place().source(), settings);
     VolumeRenderer bounded(place().frame, place().tree, place().source(), tight);
     int same = 0, frames = 0;
@@ -61,15 +61,15 @@ TEST(VolumeRenderer, DrawsTheSamePictureAsWithoutABudgetWhereWhatIsWantedFits) {
     } else {
       EXPECT_LT(same, frames / 2);
     }
-    EXPECT_LE(bounded.cacheStatistics().mostBytes, tight.budgetBytes);
+    EXPECT_LE(bounded.cacheStatistics().maxBytes, tight.budgetBytes);
     EXPECT_EQ(unbounded.cacheStatistics().evictions, 0u);
   }
 }
 
-// Each pixel whose ray meets one tile of the cut shows that tile's content, as if nothing else were there.
-TEST(VolumeRenderer, DrawsWhatIsAboveAMissingTileInItsCellsAlone) {
+// Each pixel whose ray meets a single tile of the cut shows that tile's content as if it were alone.
+TEST(VolumeRenderer, DrawsAnAncestorOnlyInTheCellsOfAMissingTile) {
   SceneRendererSettings settings = settingsWith(place().finestBytes / 3);
-  settings.selection.mostPixels = 0;
+  settings.selection.maximumScreenSpaceError = 0;
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
   int pixels = 0, instead = 0;
   for (int step = 0; step < 600; step += 50) {
@@ -106,18 +106,20 @@ TEST(VolumeRenderer, DrawsWhatIsAboveAMissingTileInItsCellsAlone) {
 
 TEST(VolumeRenderer, DrawsTheFinestLevelWhereNoErrorIsAllowed) {
   SceneRendererSettings settings = settingsWith(place().allBytes);
-  settings.selection.mostPixels = 0;
+  settings.selection.maximumScreenSpaceError = 0;
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
   const RenderedView view = renderer.render(flightCamera(), flightPose(0), nullptr);
   std::vector<VolumeContent> finest;
   for (size_t i = 0; i < place().tree.tiles.size(); ++i) {
-    if (place().tree.tiles[i].level == 0 && static_cast<int>(i) != place().tree.surround) {
+    if (place().tree.tiles[i].level == 0 && static_cast<int>(i) != place().tree.backgroundBlock) {
       finest.push_back(place().contents[i]);
     }
   }
   ASSERT_EQ(finest.size(), 16u);
-  const VolumeContent& surround = place().contents.back();
-  const auto contentAt = [&](int tile) -> const VolumeContent& { return tile == 17 ? surround : finest[tile - 1]; };
+  const VolumeContent& backgroundBlock = place().contents.back();
+  const auto contentAt = [&](int tile) -> const VolumeContent& {
+    return tile == 17 ? backgroundBlock : finest[tile - 1];
+  };
   const TileSource<Content> source = sourceOfCopies(contentAt);
   VolumeRenderer flat(place().frame, flatTileTree(finest, true), source, settings);
   const RenderedView expected = flat.render(flightCamera(), flightPose(0), nullptr);
@@ -130,7 +132,7 @@ TEST(VolumeRenderer, DrawsTheFinestLevelWhereNoErrorIsAllowed) {
 
 TEST(VolumeRenderer, OrdersMixedLevelsAsEachRayMeetsThem) {
   SceneRendererSettings settings = settingsWith(place().allBytes);
-  settings.selection.mostPixels = 1;
+  settings.selection.maximumScreenSpaceError = 1;
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settings);
   bool mixed = false;
   for (int step = 0; step < 600; step += 7) {
@@ -154,7 +156,7 @@ TEST(VolumeRenderer, OrdersMixedLevelsAsEachRayMeetsThem) {
   EXPECT_TRUE(mixed);
 }
 
-TEST(VolumeRenderer, SaysWhatDrewAndWhatABudgetIsTooSmallFor) {
+TEST(VolumeRenderer, NamesItsDeviceAndRejectsBudgetsBelowTheCoarsestLevel) {
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settingsWith(place().coarsestBytes));
   EXPECT_EQ(renderer.device().find("cpu "), 0u);
   EXPECT_NE(renderer.device().find("1 threads"), std::string::npos);
@@ -162,7 +164,7 @@ TEST(VolumeRenderer, SaysWhatDrewAndWhatABudgetIsTooSmallFor) {
                Error);
 }
 
-TEST(VolumeRenderer, IsTheSameEveryTime) {
+TEST(VolumeRenderer, RendersTheSameEveryTime) {
   VolumeRenderer renderer(place().frame, place().tree, place().source(), settingsWith(place().allBytes));
   const RenderedView first = renderer.render(flightCamera(), flightPose(3), nullptr);
   renderer.render(flightCamera(), flightPose(4), nullptr);

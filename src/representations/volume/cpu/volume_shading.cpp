@@ -23,7 +23,7 @@ std::array<float, 27> encodeDirection(const Vec3d& direction) {
 
 std::array<float, 3> DeferredShader::shade(const ContentComposite& composite,
                                            const std::array<float, 27>& direction) const {
-  alignas(64) float values[DenseNetwork::kMostWidth];
+  alignas(64) float values[DenseNetwork::kMaxWidth];
   std::copy(composite.values, composite.values + ContentComposite::kValues, values);
   std::copy(direction.begin(), direction.end(), values + ContentComposite::kValues);
   network_.run(values);

@@ -1,4 +1,4 @@
-// What a content's deferred network adds to what its samples add up to, seen from a direction (City-on-Web, eq. 3).
+// Shades composited contents with their deferred networks, for a viewing direction (City-on-Web, eq. 3).
 #pragma once
 
 #include <array>
@@ -11,30 +11,31 @@
 
 namespace tessera {
 
-// A unit direction d in scene axes as networks take it: d, sin(2^k d) for k = 0 … 3, cos(2^k d) likewise.
+// Returns the network inputs of a unit direction d in scene axes: d, sin(2^k d) for k = 0 … 3, then cos(2^k d) for the
+// same k.
 std::array<float, 27> encodeDirection(const Vec3d& direction);
 
 class DeferredShader {
  public:
   static constexpr uint32_t kInputs = 34, kOutputs = 3;
 
-  // `network` is 34 → … → 3. Keeps nothing of it.
+  // `network`: layers 34 → … → 3. It is copied.
   explicit DeferredShader(const std::vector<DenseLayer>& network) : network_(network, kInputs, kOutputs) {}
 
-  // Φ, in [0,1].
+  // Returns Φ, the specular colour, in [0,1].
   std::array<float, 3> shade(const ContentComposite& composite, const std::array<float, 27>& direction) const;
 
  private:
   DenseNetwork network_;
 };
 
-// Contents along a ray, blended front to back: C = Σ_k T_k (C_d^k + α^k Φ^k), T_k = Π_{j<k} (1 - α^j). A content that
-// holds nothing (α = 0) adds nothing.
+// Blends contents along a ray front to back: C = Σ_k T_k (C_d^k + α^k Φ^k), T_k = Π_{j<k} (1 - α^j). A content with α =
+// 0 adds nothing.
 struct BlendedRay : DrawnPixel {
   void add(const ContentComposite& composite, const DeferredShader& shader, const std::array<float, 27>& direction);
 };
 
-// Every content has its own network, which is run once a ray.
+// Implements Shading: each content has its own network, which is evaluated once per ray.
 class VolumeShading {
  public:
   VolumeShading(const std::vector<const VolumeContent*>& contents, const MarchSettings& settings);

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "representations/volume/testing/made_volume.h"
+#include "representations/volume/testing/test_volume_content.h"
 
 namespace tessera {
 namespace {
@@ -42,7 +42,7 @@ TEST(VolumeShading, EncodesDirectionsAsTheFormatSays) {
   }
 }
 
-TEST(VolumeShading, IsTheNetworkOfWhateverWidths) {
+TEST(VolumeShading, EvaluatesNetworksOfAnyWidths) {
   for (const auto& widths :
        std::vector<std::vector<uint32_t>>{{34, 16, 16, 3}, {34, 5, 3}, {34, 3}, {34, 256, 33, 9, 3}}) {
     const std::vector<DenseLayer> network = randomNetwork(widths.size(), widths);
@@ -53,8 +53,8 @@ TEST(VolumeShading, IsTheNetworkOfWhateverWidths) {
       std::vector<double> inputs(composite.values, composite.values + 7);
       inputs.insert(inputs.end(), direction.begin(), direction.end());
       const std::array<double, 3> expected = plainNetwork(network, inputs);
-      const std::array<float, 3> got = shader.shade(composite, direction);
-      for (int c = 0; c < 3; ++c) EXPECT_NEAR(got[c], expected[c], 1e-5);
+      const std::array<float, 3> actual = shader.shade(composite, direction);
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(actual[c], expected[c], 1e-5);
     }
   }
 }
@@ -82,7 +82,7 @@ TEST(VolumeShading, BlendsFrontToBackAsBackToFront) {
   EXPECT_NEAR(ray.transmittance, transmittance, 1e-6);
 }
 
-// City-on-Web, equations 8 to 11: the vector worked out in the specification.
+// City-on-Web, equations 8 to 11: a worked example.
 TEST(VolumeShading, BlendsBlocksWithoutNetworksToWhatOneVolumeWouldBe) {
   const double alphas[] = {.1, .3, .2, .5, .25}, colours[] = {.9, .2, .5, .7, .1};
   const DeferredShader dark(darkNetwork());

@@ -1,4 +1,4 @@
-// For tests: a tree of contents without levels of detail.
+// For tests: a tile tree without levels of detail.
 #pragma once
 
 #include <cmath>
@@ -9,9 +9,10 @@
 
 namespace tessera {
 
-// A tree of contents side by side, without levels: a tile without content over one tile for each, in their order, and
-// one for the surround, the last. Their boxes are what their parts own and must be cells (of edge 2) amid the origin.
-inline TileTree flatTileTree(const std::vector<VolumeContent>& contents, bool withSurround = false) {
+// Returns a tree for contents side by side, without levels: a root tile without content, one child tile for each
+// content in their order, and last, optionally, a tile for the background block. The boxes of the tiles are what their
+// parts own and must be cells of edge 2 around the origin.
+inline TileTree flatTileTree(const std::vector<VolumeContent>& contents, bool withBackgroundBlock = false) {
   TileTree tree;
   TileNode root;
   root.hasContent = false;
@@ -41,9 +42,9 @@ inline TileTree flatTileTree(const std::vector<VolumeContent>& contents, bool wi
     node.cells = {cell(node.low.x(), whole.low.x()), cell(node.low.y(), whole.low.y()),
                   cell(node.high.x(), whole.low.x()), cell(node.high.y(), whole.low.y())};
   }
-  if (withSurround) {
-    tree.surround = static_cast<int>(tree.tiles.size());
-    tree.tiles.emplace_back().isSurround = true;
+  if (withBackgroundBlock) {
+    tree.backgroundBlock = static_cast<int>(tree.tiles.size());
+    tree.tiles.emplace_back().isBackgroundBlock = true;
   }
   return tree;
 }

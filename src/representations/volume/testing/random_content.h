@@ -1,4 +1,4 @@
-// For tests: small contents of random texels, every rule of the format kept.
+// For tests: small contents of random texels that satisfy every rule of the format.
 #pragma once
 
 #include "base/random.h"
@@ -8,7 +8,7 @@
 
 namespace tessera::tiles_test {
 
-inline VolumePart madePart(uint64_t seed, uint32_t voxels = 16, uint32_t planes = 24) {
+inline VolumePart testPart(uint64_t seed, uint32_t voxels = 16, uint32_t planes = 24) {
   const RandomStream random(seed, 0x711e5);
   uint64_t next = 0;
   VolumePart part;
@@ -34,10 +34,10 @@ inline VolumePart madePart(uint64_t seed, uint32_t voxels = 16, uint32_t planes 
   return part;
 }
 
-inline VolumeContent madeContent(uint64_t seed, uint32_t parts = 1) {
+inline VolumeContent testContent(uint64_t seed, uint32_t parts = 1) {
   VolumeContent content;
-  content.network = madeNetwork(seed, {34, 16, 16, 3});
-  for (uint32_t i = 0; i < parts; ++i) content.parts.push_back(madePart(seed + 100 * i));
+  content.network = testNetwork(seed, {34, 16, 16, 3});
+  for (uint32_t i = 0; i < parts; ++i) content.parts.push_back(testPart(seed + 100 * i));
   placeInRow(content.parts);
   return content;
 }

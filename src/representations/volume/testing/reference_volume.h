@@ -1,4 +1,5 @@
-// For tests: one part of a volume marched by the definition, in double, slowly: each of the 20 texels by its formula.
+// For tests: marches one part of a volume straight from the definition, in double precision and slowly, with each of
+// the 20 texels looked up by its formula.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +9,8 @@
 
 namespace tessera {
 
-// Sums of dequantised attributes at a place of the domain scaled to [0,1]³; false where nothing is stored.
+// Computes the sums of dequantised attributes at a position of the domain scaled to [0,1]³. Returns false if nothing is
+// stored there.
 inline bool referenceSums(const VolumeContent& content, const VolumePart& part, const Triple<double>& p,
                           double sums[8]) {
   const int blocks = static_cast<int>(part.voxels / 8), cells = static_cast<int>(part.planes / 8);
@@ -47,9 +49,9 @@ inline bool referenceSums(const VolumeContent& content, const VolumePart& part, 
         low[k] = static_cast<int>(std::floor(v));
         part2[k] = v - low[k];
       }
-      const int most = static_cast<int>(part.planes) - 1;
+      const int maximum = static_cast<int>(part.planes) - 1;
       for (int corner = 0; corner < 4; ++corner) {
-        const int b = std::min(low[0] + (corner & 1), most), c = std::min(low[1] + (corner >> 1), most);
+        const int b = std::min(low[0] + (corner & 1), maximum), c = std::min(low[1] + (corner >> 1), maximum);
         const double weight = (corner & 1 ? part2[0] : 1 - part2[0]) * (corner >> 1 ? part2[1] : 1 - part2[1]);
         sum += weight * value(part.planeBytes[plane][(size_t{part.planes} * c + b) * 8 + attribute]);
       }

@@ -1,4 +1,4 @@
-// For tests: the cube cut into blocks, and a volume model that has learned it.
+// For tests: the cube scene cut into blocks, and a volume model trained on it.
 #pragma once
 
 #include "representations/volume/train/volume_trainer.h"
@@ -6,10 +6,10 @@
 
 namespace tessera {
 
-// Small enough for seconds, large enough to learn the cube.
+// Settings that train in seconds and still learn the cube.
 inline VolumeConfig smallVolumeConfig() {
   VolumeConfig config;
-  config.surround = "none";
+  config.backgroundBlock = "none";
   config.voxels = 32;
   config.planes = 64;
   config.gridLevels = 6;
@@ -25,9 +25,9 @@ inline VolumeConfig smallVolumeConfig() {
   config.samples = 12;
   config.texelsPerStep = 1 << 15;
   config.firstRays = 512;
-  config.mostRays = 2048;
+  config.maxRays = 2048;
   config.sparsityPoints = 256;
-  config.rate = 2e-2;
+  config.learningRate = 2e-2;
   config.fullGradientDistance = 0;
   config.exposure = false;
   return config;

@@ -1,4 +1,4 @@
-// For tests: the renderer on the CPU of scenes of `volume`.
+// For tests: the CPU renderer of `volume` scenes.
 #pragma once
 
 #include "render/cpu/scene_renderer.h"

@@ -33,8 +33,8 @@ VolumeConfig::VolumeConfig() {
 std::vector<ConfigField> VolumeConfig::fields() {
   return {
       presetSetting(),
-      surroundSetting(),
-      levelSetting(),
+      backgroundBlockSetting(),
+      lodSetting(),
       finestStepSetting(),
       nearSetting(),
       voxelsSetting(),
@@ -56,32 +56,32 @@ std::vector<ConfigField> VolumeConfig::fields() {
       firstIntervalsSetting(),
       secondIntervalsSetting(),
       samplesSetting(),
-      paddingSetting(),
+      uniformSampleFractionSetting(),
       proposalEverySetting(),
-      proposalWarmUpSetting(),
+      proposalWarmupStepsSetting(),
       seedSetting(),
       residentBlocksSetting(),
       residencyStepsSetting(),
       texelsPerStepSetting().within(1024, 1 << 26),
-      firstRaysSetting().byDefault(1024).within(16, mostRays),
-      mostRaysSetting().within(64, 1 << 20),
+      firstRaysSetting().byDefault(1024).within(16, maxRays),
+      maxRaysSetting().within(64, 1 << 20),
       photoBudgetMiBSetting(),
       stepsPerPhotoSetting(),
-      rateSetting(),
-      finalRateFactorSetting().byDefault(0.1),
-      constantRateShareSetting().byDefault(0.3),
-      deferredRateFactorSetting(),
+      learningRateSetting(),
+      finalLearningRateFactorSetting().byDefault(0.1),
+      constantLearningRateFractionSetting().byDefault(0.3),
+      deferredLearningRateFactorSetting(),
       tableL2Setting(),
       networkL2Setting(),
-      exposureRateSetting(),
+      exposureLearningRateSetting(),
       lossSetting().byDefault("charbonnier"),
       lossParameterSetting().byDefault(1e-3),
-      s3imSetting(),
-      interlevelSetting(),
-      distortionSetting(),
-      sparsitySetting(),
-      opacitySetting(),
-      rampShareSetting().byDefault(0.1),
+      s3imWeightSetting(),
+      interlevelWeightSetting(),
+      distortionWeightSetting(),
+      sparsityWeightSetting(),
+      opacityWeightSetting(),
+      lossWarmupFractionSetting().byDefault(0.1),
       sparsityPointsSetting(),
       cullBeginSetting(),
       cullEndSetting(),
@@ -89,28 +89,28 @@ std::vector<ConfigField> VolumeConfig::fields() {
       cullLastSetting(),
       literalEq3Setting(),
       fullGradientDistanceSetting(),
-      knownShareSetting().byDefault(0.05),
-      knownBracketSetting(),
-      freeSpaceSetting(),
+      sparseDepthRayFractionSetting().byDefault(0.05),
+      sparseDepthMarginSetting(),
+      nearFromSparseDepthSetting(),
       blocksOnlySetting(),
-      levelShareSetting(),
-      frozenShareSetting(),
-      levelRateFactorSetting(),
-      levelPaddingSetting(),
+      lodStepFractionSetting(),
+      deferredOnlyFractionSetting(),
+      lodLearningRateFactorSetting(),
+      lodUniformSampleFractionSetting(),
       exposureSetting(),
       randomBackgroundSetting(),
   };
 }
 
 void VolumeConfig::check() const {
-  surroundKind();
+  backgroundBlockKind();
   ofPreset(preset);
   VolumeConfig checked = *this;
   requireWithinBounds(checked.fields());
 }
 
-Surround VolumeConfig::surroundKind() const {
-  return surroundNamed(surround);
+BackgroundBlock VolumeConfig::backgroundBlockKind() const {
+  return backgroundBlockNamed(backgroundBlock);
 }
 
 VirtualGrid VolumeConfig::virtualGrid() const {

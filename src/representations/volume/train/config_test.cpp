@@ -21,10 +21,10 @@ TEST(VolumeConfig, HasPresetsThatCanBeTrained) {
   EXPECT_THROW(VolumeConfig::ofPreset("gpu"), Error);
 }
 
-TEST(VolumeConfig, ComesBackFromItsFile) {
+TEST(VolumeConfig, RoundTripsThroughItsFile) {
   VolumeConfig config = VolumeConfig::ofPreset("paper"), read;
-  config.surround = "border";
-  config.opacity = 0.25;
+  config.backgroundBlock = "border";
+  config.opacityWeight = 0.25;
   const fs::path path = fs::temp_directory_path() / "tessera-volume-config.toml";
   writeFileAtomically(path, configToToml(config.fields()));
   configFromToml(read.fields(), path);
@@ -33,20 +33,20 @@ TEST(VolumeConfig, ComesBackFromItsFile) {
   for (size_t i = 0; i < before.size(); ++i) EXPECT_EQ(configValueText(before[i]), configValueText(after[i]));
 }
 
-TEST(VolumeConfig, RefusesWhatNoModelCanBeMadeOf) {
+TEST(VolumeConfig, RejectsSettingsWithWhichNoModelCanBeBuilt) {
   const std::function<void(VolumeConfig&)> wrongs[] = {
-      [](VolumeConfig& c) { c.surround = "everywhere"; },
+      [](VolumeConfig& c) { c.backgroundBlock = "everywhere"; },
       [](VolumeConfig& c) { c.preset = "huge"; },
       [](VolumeConfig& c) { c.near = 1.5; },
       [](VolumeConfig& c) { c.voxels = 100; },
       [](VolumeConfig& c) { c.planes = 4; },
       [](VolumeConfig& c) { c.width = 48; },
       [](VolumeConfig& c) { c.samples = 1; },
-      [](VolumeConfig& c) { c.firstRays = c.mostRays + 1; },
-      [](VolumeConfig& c) { c.padding = 1.5; },
-      [](VolumeConfig& c) { c.levelPadding = -0.1; },
+      [](VolumeConfig& c) { c.firstRays = c.maxRays + 1; },
+      [](VolumeConfig& c) { c.uniformSampleFraction = 1.5; },
+      [](VolumeConfig& c) { c.lodUniformSampleFraction = -0.1; },
       [](VolumeConfig& c) { c.cullEnd = c.cullBegin / 2; },
-      [](VolumeConfig& c) { c.rate = 0; },
+      [](VolumeConfig& c) { c.learningRate = 0; },
       [](VolumeConfig& c) { c.gridFinest = 8; },
   };
   for (size_t i = 0; i < std::size(wrongs); ++i) {
@@ -56,7 +56,7 @@ TEST(VolumeConfig, RefusesWhatNoModelCanBeMadeOf) {
   }
 }
 
-TEST(VolumeConfig, SaysTheNearestSettingToAMisspeltOne) {
+TEST(VolumeConfig, RejectsMisspeltSettings) {
   VolumeConfig config;
   EXPECT_THROW(setConfigField(config.fields(), "voxel=64"), Error);
   setConfigField(config.fields(), "voxels=64");

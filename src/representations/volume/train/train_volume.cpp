@@ -13,10 +13,10 @@ namespace tessera {
 namespace {
 
 constexpr double kMiB = 1048576;
-constexpr double kWorthSaying = 0.02;  // of the pixels are not trained on
+constexpr double kWarnFraction = 0.02;  // of the pixels are excluded from training
 constexpr const char* kWaiting = "waiting";
 
-BlockLimits limitsOf(const TrainVolumeOptions& options) {
+BlockLimits makeBlockLimits(const TrainVolumeOptions& options) {
   BlockLimits limits;
   limits.texelsPerEdge = options.config.planes;
   limits.bytesPerBlock = trainingBytesPerBlock(options.config);
@@ -30,14 +30,14 @@ BlockLimits limitsOf(const TrainVolumeOptions& options) {
         "--resident-blocks",
         resident, bytes / kMiB, limits.memoryBudget / kMiB);
   }
-  limits.memoryBudget = std::numeric_limits<double>::infinity();  // however many there are
+  limits.memoryBudget = std::numeric_limits<double>::infinity();  // however many blocks there are
   return limits;
 }
 
 }  // namespace
 
 double trainingBytesPerBlock(const VolumeConfig& config) {
-  constexpr double kPerParameter = 5 * sizeof(float);  // values, gradients, two moments, counts
+  constexpr double kPerParameter = 5 * sizeof(float);  // value, gradient, two moments, count
   const BlockFieldShape attributes = config.attributeShape(), proposals = config.proposalShape();
   const size_t parameters = attributes.grid.parameters() + attributes.network.parameters() +
                             proposals.grid.parameters() + proposals.network.parameters();
@@ -45,12 +45,12 @@ double trainingBytesPerBlock(const VolumeConfig& config) {
 }
 
 VolumeConfig levelConfig(VolumeConfig finest, uint32_t level, int64_t finestStep) {
-  finest.level = static_cast<int>(level);
+  finest.lod = static_cast<int>(level);
   finest.finestStep = finestStep;
   finest.voxels = std::max(8, (finest.voxels >> level) / 8 * 8);
   finest.planes = std::max(8, (finest.planes >> level) / 8 * 8);
-  // Its proposals begin as the finest level's, which pass over the fog that large texels make around surfaces.
-  finest.padding = std::max(finest.padding, finest.levelPadding);
+  // Its proposals start as those of the finest level, which skip the fog that large texels create around surfaces.
+  finest.uniformSampleFraction = std::max(finest.uniformSampleFraction, finest.lodUniformSampleFraction);
   return finest;
 }
 
@@ -60,12 +60,12 @@ class VolumeMethod final : public BlockMethod {
  public:
   explicit VolumeMethod(const TrainVolumeOptions& options) : options_(options), finest_(options.config) {}
 
-  BlockDemands demands() const override {
-    return {[&] { return limitsOf(options_); },
+  PartitionRequirements partitionRequirements() const override {
+    return {[&] { return makeBlockLimits(options_); },
             {kEnoughPhotos, int64_t{finest_.planes} * finest_.planes / 16},
             finest_.photoBudgetMiB};
   }
-  double levelShare() const override { return finest_.levelShare; }
+  double lodStepFraction() const override { return finest_.lodStepFraction; }
   uint32_t topLevel(const BlockGrid& grid) const override {
     return tessera::topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
   }
@@ -74,25 +74,27 @@ class VolumeMethod final : public BlockMethod {
                     const std::function<void()>&) override {
     return true;
   }
-  std::unique_ptr<Trainee> begin(const BlockTraining& on, const BlockLevel& level) override;
+  std::unique_ptr<TrainableModel> begin(const BlockTraining& on, const BlockLevel& level) override;
   std::vector<ConfigField> settings() override { return config_.fields(); }
   std::string parts() const override { return fmt::format("{} models", models_); }
-  void sayMemory(const BlockTraining& on) const override;
-  void stepsAreKnown(int64_t steps) const override;
-  int64_t madeFrom(const fs::path& folder) const override { return savedConfig<VolumeConfig>(folder).finestStep; }
+  void reportMemory(const BlockTraining& on) const override;
+  void setPlannedSteps(int64_t steps) const override;
+  int64_t finestStepOfLevel(const fs::path& folder) const override {
+    return savedConfig<VolumeConfig>(folder).finestStep;
+  }
 
  private:
   const TrainVolumeOptions& options_;
-  VolumeConfig finest_, config_;            // of the finest level, and of the one that was begun last
-  const VolumeTrainer* trainer_ = nullptr;  // of that
+  VolumeConfig finest_, config_;            // of the finest level, and of the level begun last
+  const VolumeTrainer* trainer_ = nullptr;  // of the level begun last
   size_t models_ = 0;
 };
 
-std::unique_ptr<Trainee> VolumeMethod::begin(const BlockTraining& on, const BlockLevel& level) {
+std::unique_ptr<TrainableModel> VolumeMethod::begin(const BlockTraining& on, const BlockLevel& level) {
   config_ = finest_;
   if (level.level > 0) {
     config_ = levelConfig(finest_, level.level, level.finestStep);
-    config_.residencySteps = std::min(config_.residencySteps, level.steps);  // all blocks get their turn
+    config_.residencySteps = std::min(config_.residencySteps, level.steps);  // every block must become resident
   }
   auto trainer =
       std::make_unique<VolumeTrainer>(on.device, on.capture, config_, on.grid, level.folder.root() / kWaiting);
@@ -102,17 +104,17 @@ std::unique_ptr<Trainee> VolumeMethod::begin(const BlockTraining& on, const Bloc
   return trainer;
 }
 
-void VolumeMethod::sayMemory(const BlockTraining& on) const {
+void VolumeMethod::reportMemory(const BlockTraining& on) const {
   const Residency* residency = trainer_->residency();
   MemoryNeeds needs;
   needs.photoBudgetMiB = config_.photoBudgetMiB;
   needs.bytesPerBlock = trainingBytesPerBlock(config_);
   needs.remedy = "use --resident-blocks, or lower texels_per_step or photo_budget_mib";
   if (residency) {
-    needs.how = fmt::format(", with {} of {} blocks at a time, {} stays in {} steps", config_.residentBlocks,
-                            on.grid.cells(), residency->stays().size(), residency->cycleSteps());
+    needs.how = fmt::format(", with {} of {} blocks at a time, {} resident sets in {} steps", config_.residentBlocks,
+                            on.grid.cells(), residency->residentSets().size(), residency->cycleSteps());
   }
-  sayWhatMemoryItTakes(on, options_, needs);
+  reportMemoryUse(on, options_, needs);
   if (!residency) return;
   const std::vector<uint32_t> never = residency->neverServed();
   if (!never.empty()) {
@@ -120,18 +122,18 @@ void VolumeMethod::sayMemory(const BlockTraining& on) const {
     std::vector<std::string> names;
     for (const uint32_t block : never) names.push_back(fmt::format("({}, {})", block % columns, block / columns));
     warn(
-        "blocks {} are seen through more than {} blocks at a time wherever they are seen, and will hold nothing; raise "
-        "--resident-blocks",
+        "blocks {} are visible only through sets of more than {} blocks, which are never in memory together, and will "
+        "hold nothing; raise --resident-blocks",
         fmt::join(names, ", "), config_.residentBlocks);
   }
-  if (residency->unserved() < kWorthSaying) return;
+  if (residency->unserved() < kWarnFraction) return;
   warn(
       "{:.0f} % of what the photos show is seen through more than {} blocks, or rare sets of them, and not trained on; "
       "raise --resident-blocks",
       100 * residency->unserved(), config_.residentBlocks);
 }
 
-void VolumeMethod::stepsAreKnown(int64_t steps) const {
+void VolumeMethod::setPlannedSteps(int64_t steps) const {
   const int64_t cycle = trainer_->residency() ? trainer_->residency()->cycleSteps() : 0;
   if (steps >= cycle) return;
   warn(
@@ -154,13 +156,13 @@ std::unique_ptr<VolumeModel> loadVolumeModel(Device& device, const fs::path& fol
   const ModelManifest manifest = requireManifest(model, "volume");
   VolumeConfig config;
   configFromToml(config.fields(), model.configPath());
-  auto made =
-      std::make_unique<VolumeModel>(device, config, requireGrid(model), VolumeModel::Room{residentBlocks, false});
-  requireOneFileABlock(folder, manifest, made->space().blocks());
+  auto loaded =
+      std::make_unique<VolumeModel>(device, config, requireGrid(model), VolumeModel::Capacity{residentBlocks, false});
+  requireOneFileABlock(folder, manifest, loaded->space().blocks());
   std::vector<fs::path> files;
   for (const std::string& file : manifest.files) files.push_back(folder / file);
-  made->readFrom(std::move(files));
-  return made;
+  loaded->readFrom(std::move(files));
+  return loaded;
 }
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// `tessera train --method volume`: a capture to a model folder.
+// `tessera train --method volume`: trains a model folder from a capture.
 #pragma once
 
 #include "representations/volume/train/volume_trainer.h"
@@ -10,22 +10,25 @@ struct TrainVolumeOptions : BlockRunOptions {
   VolumeConfig config;
 };
 
-// Cuts the capture into blocks, or takes those that are given (blocks.json, blocks.svg, blocks.geojson), warns of those
-// that will not come out well, trains, resumes, saves; see training_loop.h. Writes config.toml and blocks.json first.
-// Then the coarser levels of detail (City-on-Web, section 4.4), up to one that holds all: each begins with the fields
-// of the one below, trains new deferred networks for what it merges, then all together through virtual grids of half
-// the resolution; where the finest has been trained on since, they are made anew. The result counts the finest level's
-// steps; it is finished when all levels are. Throws Error when a resumed run has other blocks than those that are
-// given.
+// Partitions the capture into blocks, or takes the given ones, and writes config.toml and the blocks (blocks.json,
+// blocks.svg, blocks.geojson) first. Warns of blocks that will not come out well, then trains, resumes and saves (see
+// training_loop.h).
+//
+// Afterwards it trains the coarser levels of detail (City-on-Web, section 4.4), up to one that merges all blocks. Each
+// level starts with the fields of the level below, first trains only new deferred networks for its merged blocks, then
+// everything together through virtual grids of half the resolution. Levels are trained anew if the finest level has
+// been trained further since. The result counts the steps of the finest level; it is finished when all levels are.
+// Throws Error if a resumed run has other blocks than the given ones.
 TrainingResult trainVolume(Device& device, const Capture& capture, const fs::path& model, TrainVolumeOptions options);
 
-// The settings of a level, from those of the finest: half the resolution for each, and its own padding. Its fields are
-// the same.
+// Returns the settings of a level, from those of the finest: half the resolution per level, and its own fraction of
+// uniform samples. The fields have the same shape on all levels.
 VolumeConfig levelConfig(VolumeConfig finest, uint32_t level, int64_t finestStep);
-// A trained model for drawing, from its folder: with all blocks in memory, or so many at a time (VolumeModel::bring).
+// Loads a trained model for rendering from its folder, with all blocks in memory (0) or at most `residentBlocks` at a
+// time (VolumeModel::ensureResident).
 std::unique_ptr<VolumeModel> loadVolumeModel(Device& device, const fs::path& folder, uint32_t residentBlocks = 0);
 
-// Bytes that a block takes while it is trained: parameters, moments, gradients.
+// Returns the bytes that a block takes while it is trained: parameters, moments, gradients.
 double trainingBytesPerBlock(const VolumeConfig& config);
 
 }  // namespace tessera

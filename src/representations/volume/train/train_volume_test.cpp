@@ -13,13 +13,13 @@ namespace tessera {
 namespace {
 
 TrainVolumeOptions options(int64_t steps, bool resume = false) {
-  TrainVolumeOptions made;
-  made.config = smallVolumeConfig();
-  made.loop.steps = steps;
-  made.loop.resume = resume;
-  made.loop.progress = false;
-  made.blocks = *parseBlockCount("2x1");
-  return made;
+  TrainVolumeOptions settings;
+  settings.config = smallVolumeConfig();
+  settings.loop.steps = steps;
+  settings.loop.resume = resume;
+  settings.loop.progress = false;
+  settings.blocks = *parseBlockCount("2x1");
+  return settings;
 }
 
 std::vector<Bytes> checkpoints(const fs::path& model) {
@@ -29,7 +29,7 @@ std::vector<Bytes> checkpoints(const fs::path& model) {
   return parts;
 }
 
-TEST(TrainVolume, WritesAFolderThatCanBeDrawnAndRepeated) {
+TEST(TrainVolume, WritesAModelFolderThatLoads) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   const TrainingResult result = trainVolume(*device, scene.capture(), scene / "model", options(5));
@@ -37,22 +37,22 @@ TEST(TrainVolume, WritesAFolderThatCanBeDrawnAndRepeated) {
   for (const char* file : {"config.toml", "blocks.json", "blocks.svg", "manifest.json", "metrics.jsonl"}) {
     EXPECT_TRUE(fs::exists(scene / "model" / file)) << file;
   }
-  EXPECT_EQ(checkpoints(scene / "model").size(), 2u) << "one a block";
+  EXPECT_EQ(checkpoints(scene / "model").size(), 2u) << "one per block";
   const std::unique_ptr<VolumeModel> model = loadVolumeModel(*device, scene / "model");
   EXPECT_EQ(model->grid().columns, 2);
   EXPECT_EQ(model->grid().rows, 1);
   EXPECT_EQ(model->config().voxels, smallVolumeConfig().voxels);
 }
 
-TEST(TrainVolume, MakesCoarserLevelsAndLeavesTheFinestAlone) {
+TEST(TrainVolume, TrainsCoarserLevelsWithoutChangingTheFinest) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   TrainVolumeOptions finest = options(10);
-  finest.config.levelShare = 0;
+  finest.config.lodStepFraction = 0;
   trainVolume(*device, scene.capture(), scene / "finest", finest);
   EXPECT_EQ(trainedLevels<VolumeConfig>(scene / "finest"), 1u);
   TrainVolumeOptions all = options(10);
-  all.config.levelShare = 0.8;
+  all.config.lodStepFraction = 0.8;
   EXPECT_TRUE(trainVolume(*device, scene.capture(), scene / "model", all).finished);
   EXPECT_EQ(checkpoints(scene / "model"), checkpoints(scene / "finest"));
   ASSERT_EQ(trainedLevels<VolumeConfig>(scene / "model"), 2u) << "two blocks, and one that holds both";
@@ -68,26 +68,26 @@ TEST(TrainVolume, MakesCoarserLevelsAndLeavesTheFinestAlone) {
 
 TEST(TrainVolume, GivesEachCoarserLevelTwiceTheStepsUpToTheFinests) {
   VolumeConfig config;
-  config.levelShare = 0.3;
-  EXPECT_EQ(levelSteps(config.levelShare, 1, 1000), 300);
-  EXPECT_EQ(levelSteps(config.levelShare, 2, 1000), 600);
-  EXPECT_EQ(levelSteps(config.levelShare, 3, 1000), 1000);
-  EXPECT_EQ(levelSteps(config.levelShare, 9, 1000), 1000);
-  config.levelShare = 2;
-  EXPECT_EQ(levelSteps(config.levelShare, 1, 1000), 2000) << "or as many as are asked for";
-  config.levelShare = 0;
-  EXPECT_EQ(levelSteps(config.levelShare, 2, 1000), 0);
+  config.lodStepFraction = 0.3;
+  EXPECT_EQ(levelSteps(config.lodStepFraction, 1, 1000), 300);
+  EXPECT_EQ(levelSteps(config.lodStepFraction, 2, 1000), 600);
+  EXPECT_EQ(levelSteps(config.lodStepFraction, 3, 1000), 1000);
+  EXPECT_EQ(levelSteps(config.lodStepFraction, 9, 1000), 1000);
+  config.lodStepFraction = 2;
+  EXPECT_EQ(levelSteps(config.lodStepFraction, 1, 1000), 2000) << "or as many as are asked for";
+  config.lodStepFraction = 0;
+  EXPECT_EQ(levelSteps(config.lodStepFraction, 2, 1000), 0);
 }
 
-TEST(TrainVolume, TrainsLevelsTooWithBlocksThatWait) {
+TEST(TrainVolume, TrainsLevelsWithSomeBlocksSwappedOut) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   TrainVolumeOptions few = options(10);
   few.config.residentBlocks = 1;
   few.config.residencySteps = 4;
-  few.config.levelShare = 0.8;
+  few.config.lodStepFraction = 0.8;
   EXPECT_TRUE(trainVolume(*device, scene.capture(), scene / "model", few).finished);
-  // With a checkpoint after each step, those of waiting blocks stay what they are; the model is the same.
+  // With a checkpoint after each step, those of swapped-out blocks are reused; the model is the same.
   TrainVolumeOptions often = few;
   often.loop.checkpointSeconds = 0;
   trainVolume(*device, scene.capture(), scene / "often", often);
@@ -97,12 +97,12 @@ TEST(TrainVolume, TrainsLevelsTooWithBlocksThatWait) {
     const fs::path folder = levelFolder(scene / "model", level);
     EXPECT_FALSE(fs::exists(folder / "waiting"));
     const std::unique_ptr<VolumeModel> model = loadVolumeModel(*device, folder);
-    EXPECT_EQ(model->slots(), 2u) << "drawn whole";
+    EXPECT_EQ(model->slots(), 2u) << "loaded whole for rendering";
     EXPECT_EQ(model->attributes().table(0).counts.size(), 0u) << "without what only training needs";
   }
 }
 
-TEST(TrainVolume, GoesOnWithTheBlocksThatItHasOrSaysThatTheyAreOthers) {
+TEST(TrainVolume, ResumesWithItsOwnBlocksAndRejectsOthers) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   trainVolume(*device, scene.capture(), scene / "model", options(2));
@@ -121,14 +121,14 @@ TEST(TrainVolume, GoesOnWithTheBlocksThatItHasOrSaysThatTheyAreOthers) {
   EXPECT_TRUE(goesOnWith("2x1"));
 }
 
-TEST(TrainVolume, WarnsWhereBlocksMissTheirTurnAndGivesItToThoseOfLevels) {
+TEST(TrainVolume, WarnsWhereStepsAreFewerThanACycleAndShortensCyclesOfLevels) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   const auto warnings = [&](const char* model, int64_t residencySteps) {
     TrainVolumeOptions few = options(10);
     few.config.residentBlocks = 1;
     few.config.residencySteps = residencySteps;
-    few.config.levelShare = 0.8;
+    few.config.lodStepFraction = 0.8;
     testing::internal::CaptureStderr();
     trainVolume(*device, scene.capture(), scene / model, few);
     return testing::internal::GetCapturedStderr();
@@ -144,15 +144,15 @@ TEST(TrainVolume, LoadsFewBlocksAtATime) {
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   TrainVolumeOptions three = options(4);
   three.blocks = *parseBlockCount("3x1");
-  three.config.surround = "own";
+  three.config.backgroundBlock = "own";
   trainVolume(*device, scene.capture(), scene / "model", three);
   const std::unique_ptr<VolumeModel> all = loadVolumeModel(*device, scene / "model");
   const std::unique_ptr<VolumeModel> few = loadVolumeModel(*device, scene / "model", 2);
   EXPECT_EQ(all->slots(), 4u);
-  ASSERT_EQ(few->slots(), 3u) << "and the surround";
+  ASSERT_EQ(few->slots(), 3u) << "and the background block";
   EXPECT_EQ(device->read(few->deferred().values.all()), device->read(all->deferred().values.all()));
   const auto expectSame = [&](uint32_t block) {
-    const uint32_t slot = few->slotOf(block);
+    const uint32_t slot = few->findSlot(block);
     ASSERT_NE(slot, kNoSlot) << block;
     for (const auto fields : {&VolumeModel::attributes, &VolumeModel::proposals}) {
       BlockFields &ofAll = ((*all).*fields)(), &ofFew = ((*few).*fields)();
@@ -161,20 +161,20 @@ TEST(TrainVolume, LoadsFewBlocksAtATime) {
     }
   };
   for (const std::vector<uint32_t>& blocks : std::vector<std::vector<uint32_t>>{{0, 1}, {1, 2}, {0}, {2, 0}, {3, 1}}) {
-    few->bring(blocks);
+    few->ensureResident(blocks);
     for (const uint32_t block : blocks) expectSame(block);
     expectSame(3);
   }
-  few->bring({0, 1});
+  few->ensureResident({0, 1});
   fs::remove(scene / "model" / ModelFolder(scene / "model").manifest()->files.at(2));
-  EXPECT_THROW(few->bring({2}), Error);
+  EXPECT_THROW(few->ensureResident({2}), Error);
 }
 
-TEST(TrainVolume, GoesOnWithALevelThatWasStopped) {
+TEST(TrainVolume, ResumesALevelThatWasStopped) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   TrainVolumeOptions whole = options(6);
-  whole.config.levelShare = 2;
+  whole.config.lodStepFraction = 2;
   trainVolume(*device, scene.capture(), scene / "unbroken", whole);
   TrainVolumeOptions stopped = whole;
   int64_t asked = 0;
@@ -187,13 +187,13 @@ TEST(TrainVolume, GoesOnWithALevelThatWasStopped) {
   EXPECT_EQ(checkpoints(levelFolder(scene / "model", 1)), checkpoints(levelFolder(scene / "unbroken", 1)));
 }
 
-TEST(TrainVolume, MakesLevelsAnewWhereTheFinestHasGoneOn) {
+TEST(TrainVolume, RetrainsLevelsWhereTheFinestWasTrainedFurther) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   const auto trained = [&](int64_t steps, bool resume) {
-    TrainVolumeOptions made = options(steps, resume);
-    made.config.levelShare = 0.5;
-    return made;
+    TrainVolumeOptions settings = options(steps, resume);
+    settings.config.lodStepFraction = 0.5;
+    return settings;
   };
   const fs::path model = scene / "model";
   trainVolume(*device, scene.capture(), model, trained(8, false));
@@ -209,7 +209,7 @@ TEST(TrainVolume, MakesLevelsAnewWhereTheFinestHasGoneOn) {
   EXPECT_EQ(ModelFolder(levelFolder(model, 1)).manifest()->plannedSteps, 6);
 }
 
-TEST(TrainVolume, LeavesAModelThatItRefusesAsItIs) {
+TEST(TrainVolume, LeavesAModelThatItRejectsUnchanged) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   trainVolume(*device, scene.capture(), scene / "model", options(3));
@@ -220,7 +220,7 @@ TEST(TrainVolume, LeavesAModelThatItRefusesAsItIs) {
   EXPECT_TRUE(fs::exists(scene / "model/waiting"));
 }
 
-TEST(TrainVolume, GoesOnWhereItWasStopped) {
+TEST(TrainVolume, ResumesWhereItWasStopped) {
   const CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   trainVolume(*device, scene.capture(), scene / "unbroken", options(12));
@@ -252,7 +252,7 @@ TEST(TrainVolume, TakesTheBlocksOfAnotherModel) {
   EXPECT_THROW(trainVolume(*device, scene.capture(), scene / "second", others), Error) << "resumed with other blocks";
 }
 
-TEST(TrainVolume, SaysWhatIsWrongWithAFolder) {
+TEST(TrainVolume, RejectsUnusableFolders) {
   CubeScene scene;
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   EXPECT_THROW(loadVolumeModel(*device, scene / "nowhere"), Error);
@@ -267,17 +267,17 @@ TEST(TrainVolume, SaysWhatIsWrongWithAFolder) {
   EXPECT_THROW(loadVolumeModel(*device, scene / "model"), Error) << "a block that is cut short";
 }
 
-TEST(TrainVolume, CountsWhatABlockTakes) {
+TEST(TrainVolume, EstimatesTheMemoryOfABlock) {
   const VolumeConfig cpu, paper = VolumeConfig::ofPreset("paper");
   EXPECT_GT(trainingBytesPerBlock(cpu), 5e6);
   EXPECT_LT(trainingBytesPerBlock(cpu), 100e6);
   EXPECT_GT(trainingBytesPerBlock(paper), 5 * trainingBytesPerBlock(cpu));
 }
 
-TwoDevices trainingsOf(const CubeScene& scene) {
+TwoDevices makeTrainings(const CubeScene& scene) {
   return {[&scene](Device& device, const fs::path& folder, const TrainingLoopOptions& loop) {
             TrainVolumeOptions some = options(0);
-            some.config.levelShare = 0;
+            some.config.lodStepFraction = 0;
             some.loop = loop;
             trainVolume(device, scene.capture(), folder, some);
           },
@@ -291,15 +291,15 @@ TwoDevices trainingsOf(const CubeScene& scene) {
 
 TEST(TrainVolume, ComesToTheSameOnVulkanAndGoesOnThereAndBack) {
   const CubeScene scene;
-  trainingsOf(scene).expectTheSamePictures(scene / "models");
+  makeTrainings(scene).expectTheSamePictures(scene / "models");
 }
 
-TEST(TrainVolume, LosesNothingWhereAGraphicsCardFails) {
+TEST(TrainVolume, LosesNothingWhereAGpuFails) {
   const CubeScene scene;
-  trainingsOf(scene).expectToSurviveFailures(scene / "models");
+  makeTrainings(scene).expectToSurviveFailures(scene / "models");
 }
 
-TEST(TrainVolume, SendsEachStepToAGraphicsCardAtOnce) {
+TEST(TrainVolume, SendsEachStepToAGpuAtOnce) {
 #ifdef TESSERA_HAS_VULKAN
   SKIP_WITHOUT_VULKAN(openForTest());
   const CubeScene scene;

@@ -16,7 +16,8 @@ Device& able(Device& device, const VolumeConfig& config) {
   return device;
 }
 
-// Xavier weights, biases 0. The last bias is low, so that diffuse colours come first.
+// Returns Xavier weights and biases of 0, except that the last biases are low, so that training fits diffuse colours
+// first.
 std::vector<float> initialDeferred(uint32_t networks, uint64_t seed) {
   constexpr float kLastBias = -2;
   constexpr uint32_t kSizes[] = {DeferredNetwork::kInputs, DeferredNetwork::kHidden, DeferredNetwork::kHidden, 3};
@@ -37,7 +38,7 @@ std::vector<float> initialDeferred(uint32_t networks, uint64_t seed) {
   return values;
 }
 
-// `cells` of them, or all with 0; and a surround of its own.
+// Returns the first `cells` blocks, or all if 0, and an own background block.
 std::vector<uint32_t> firstBlocks(const BlockSpace& space, uint32_t cells) {
   if (cells == 0) cells = space.cells();
   std::vector<uint32_t> blocks(std::min(cells, space.cells()));
@@ -48,25 +49,25 @@ std::vector<uint32_t> firstBlocks(const BlockSpace& space, uint32_t cells) {
 
 }  // namespace
 
-VolumeModel::VolumeModel(Device& device, const VolumeConfig& config, const BlockGrid& grid, const Room& room)
+VolumeModel::VolumeModel(Device& device, const VolumeConfig& config, const BlockGrid& grid, const Capacity& capacity)
     : device_(able(device, config)),
       config_(config),
       grid_(grid),
-      frame_(sceneFrameOf(grid)),
-      space_(blockSpaceOf(grid, config.near, config.surroundKind())),
+      frame_(makeSceneFrame(grid)),
+      space_(makeBlockSpace(grid, config.near, config.backgroundBlockKind())),
       virtualGrid_(config.virtualGrid()),
-      groups_(groupsOfLevel(space_.columns, space_.rows, static_cast<uint32_t>(config.level),
+      groups_(groupsOfLevel(space_.columns, space_.rows, static_cast<uint32_t>(config.lod),
                             space_.blocks() > space_.cells())),
-      blockOfSlot_(firstBlocks(space_, room.cells)),
+      blockOfSlot_(firstBlocks(space_, capacity.cells)),
       slotOfBlock_(device.array<uint32_t>(space_.blocks())),
-      heldBlocks_(device.array<uint32_t>(slots())),
+      residentBlockNumbers_(device.array<uint32_t>(slots())),
       groupOfSlot_(device.array<uint32_t>(slots())),
       attributes_(device, "attributes", config.attributeShape(), slots(), mix64(static_cast<uint64_t>(config.seed)),
-                  room.forTraining),
+                  capacity.forTraining),
       proposals_(device, "proposals", config.proposalShape(), slots(), mix64(static_cast<uint64_t>(config.seed) + 1),
-                 room.forTraining),
+                 capacity.forTraining),
       deferred_(device, "deferred", initialDeferred(groups_.groups(), static_cast<uint64_t>(config.seed)),
-                room.forTraining) {
+                capacity.forTraining) {
   nameSlots();
   if (space_.blocks() > space_.cells() && !holdsAll()) {
     attributes_.begin(slots() - 1, space_.cells());
@@ -74,12 +75,12 @@ VolumeModel::VolumeModel(Device& device, const VolumeConfig& config, const Block
   }
   if (config.shareTexels || space_.blocks() == 1) return;
   throw Error("--set share_texels=false", "", "is for models of one block",
-              "leave it at true, or use --blocks 1x1 and --set surround=border");
+              "leave it at true, or use --blocks 1x1 and --set background_block=border");
 }
 
-uint32_t VolumeModel::slotOf(uint32_t block) const {
-  const auto found = std::find(blockOfSlot_.begin(), blockOfSlot_.end(), block);
-  return found == blockOfSlot_.end() ? kNoSlot : static_cast<uint32_t>(found - blockOfSlot_.begin());
+uint32_t VolumeModel::findSlot(uint32_t block) const {
+  const auto slot = std::find(blockOfSlot_.begin(), blockOfSlot_.end(), block);
+  return slot == blockOfSlot_.end() ? kNoSlot : static_cast<uint32_t>(slot - blockOfSlot_.begin());
 }
 
 void VolumeModel::nameSlots() {
@@ -89,11 +90,11 @@ void VolumeModel::nameSlots() {
     groupOfSlot.push_back(groups_.groupOfBlock[blockOfSlot_[slot]]);
   }
   device_.write(slotOfBlock_.all(), std::span<const uint32_t>(slotOfBlock));
-  device_.write(heldBlocks_.all(), std::span<const uint32_t>(blockOfSlot_));
+  device_.write(residentBlockNumbers_.all(), std::span<const uint32_t>(blockOfSlot_));
   device_.write(groupOfSlot_.all(), std::span<const uint32_t>(groupOfSlot));
 }
 
-void VolumeModel::hold(const std::vector<uint32_t>& blockOfSlot) {
+void VolumeModel::assignSlots(const std::vector<uint32_t>& blockOfSlot) {
   CHECK(blockOfSlot.size() == blockOfSlot_.size());
   const std::vector<uint32_t> before = std::exchange(blockOfSlot_, blockOfSlot);
   for (uint32_t slot = 0; slot < slots(); ++slot) {
@@ -111,23 +112,23 @@ void VolumeModel::readFrom(std::vector<fs::path> files) {
   for (const uint32_t block : blockOfSlot_) restoreFields(block, files_[block], readSafetensors(files_[block]));
 }
 
-void VolumeModel::bring(const std::vector<uint32_t>& blocks) {
+void VolumeModel::ensureResident(const std::vector<uint32_t>& blocks) {
   std::vector<uint32_t> next = blockOfSlot_, missing;
   for (const uint32_t block : blocks) {
-    if (slotOf(block) == kNoSlot) missing.push_back(block);
+    if (findSlot(block) == kNoSlot) missing.push_back(block);
   }
   if (missing.empty()) return;
   CHECK(files_.size() == space_.blocks());
   size_t slot = 0;
   for (const uint32_t block : missing) {
-    const auto stays = [&](uint32_t held) {
-      return held >= space_.cells() || std::find(blocks.begin(), blocks.end(), held) != blocks.end();
+    const auto isRetained = [&](uint32_t resident) {
+      return resident >= space_.cells() || std::find(blocks.begin(), blocks.end(), resident) != blocks.end();
     };
-    while (slot < next.size() && stays(next[slot])) ++slot;
+    while (slot < next.size() && isRetained(next[slot])) ++slot;
     CHECK(slot < next.size());
     next[slot++] = block;
   }
-  hold(next);
+  assignSlots(next);
   for (const uint32_t block : missing) restoreFields(block, files_[block], readSafetensors(files_[block]));
 }
 
@@ -147,7 +148,7 @@ void VolumeModel::copyFields(VolumeModel& from) {
 }
 
 void VolumeModel::saveFields(uint32_t block, TensorSet& tensors, bool withMoments) {
-  const uint32_t slot = slotOf(block);
+  const uint32_t slot = findSlot(block);
   CHECK(slot != kNoSlot);
   for (const ParameterGroup* group :
        {&attributes_.table(slot), &attributes_.network(slot), &proposals_.table(slot), &proposals_.network(slot)}) {
@@ -156,7 +157,7 @@ void VolumeModel::saveFields(uint32_t block, TensorSet& tensors, bool withMoment
 }
 
 void VolumeModel::restoreFields(uint32_t block, const fs::path& path, const Safetensors& file) {
-  const uint32_t slot = slotOf(block);
+  const uint32_t slot = findSlot(block);
   CHECK(slot != kNoSlot);
   for (ParameterGroup* group :
        {&attributes_.table(slot), &attributes_.network(slot), &proposals_.table(slot), &proposals_.network(slot)}) {

@@ -1,8 +1,8 @@
-// Draws a volume model: along the samples that proposals choose, as in training but more of them, with the networks
-// evaluated at texels. The picture that baking is held against.
+// Renders a volume model along the samples that proposals choose, as in training but with more of them, with the
+// networks evaluated at texels. Baked scenes are tested against its images.
 #pragma once
 
-#include "representations/volume/train/volume_pass.h"
+#include "representations/volume/train/volume_pipeline.h"
 #include "scene/view_renderer.h"
 #include "train/picture_rays.h"
 
@@ -10,7 +10,7 @@ namespace tessera {
 
 class VolumeModelRenderer final : public ViewRenderer {
  public:
-  // Samples whose renderer's step is less opaque than `minAlpha` are culled, as baking does. Keeps a reference to
+  // Culls samples whose opacity over a renderer's step is below `minAlpha`, as baking does. Keeps a reference to
   // `model`.
   VolumeModelRenderer(VolumeModel& model, float minAlpha);
 
@@ -20,7 +20,7 @@ class VolumeModelRenderer final : public ViewRenderer {
  private:
   VolumeModel& model_;
   float minAlpha_;
-  VolumePass pass_;
+  VolumePipeline pipeline_;
   PictureRays pictureRays_;
 };
 

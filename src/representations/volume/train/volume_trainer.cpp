@@ -13,21 +13,21 @@
 namespace tessera {
 namespace {
 
-constexpr double kRoomPerWanted = 1.5;                // for steps that need more texels than the last one did
-constexpr uint32_t kLosses = PhotoLoss::kLosses + 1;  // of colours, S3IM
-constexpr uint32_t kGroup = 16;                       // rays come in groups of so many, as S3IM wants them
+constexpr double kCapacityPerDemand = 1.5;            // reserve for steps that need more texels than the last one
+constexpr uint32_t kLosses = PhotoLoss::kLosses + 1;  // PhotoLoss, then S3IM
+constexpr uint32_t kGroup = 16;                       // rays come in groups of this size, which S3IM needs
 constexpr const char* kFormat = "tessera volume 1";
 
 PhotoRays::Settings raySettings(const VolumeConfig& config) {
   PhotoRays::Settings settings = config.photoRaySettings();
   settings.randomBackground = config.randomBackground;
-  settings.freeSpace = config.freeSpace;
-  settings.knownBracket = config.knownBracket;
-  settings.jitters = VolumePass::kRounds + 1;
+  settings.nearFromSparseDepth = config.nearFromSparseDepth;
+  settings.sparseDepthMargin = config.sparseDepthMargin;
+  settings.jitters = VolumePipeline::kRounds + 1;
   return settings;
 }
 
-// Of the level below; nearly, where its size was rounded to whole macroblocks.
+// Returns the grid of the level below; only approximately where its size was rounded to whole macroblocks.
 VirtualGrid finerGrid(const VolumeConfig& config) {
   VirtualGrid grid = config.virtualGrid();
   grid.voxels *= 2;
@@ -35,20 +35,21 @@ VirtualGrid finerGrid(const VolumeConfig& config) {
   return grid;
 }
 
-VolumePass::Room roomFor(const VolumeConfig& config) {
-  VolumePass::Room room;
-  room.rays = static_cast<uint32_t>(config.mostRays);
-  room.points = static_cast<uint32_t>(config.sparsityPoints);
-  room.texels = static_cast<uint32_t>(kRoomPerWanted * config.texelsPerStep) + VirtualGrid::kCorners * room.points;
-  room.training = true;
-  if (config.level > 0) room.mostWords = finerGrid(config).words();
-  return room;
+VolumePipeline::Capacity makeCapacity(const VolumeConfig& config) {
+  VolumePipeline::Capacity capacity;
+  capacity.rays = static_cast<uint32_t>(config.maxRays);
+  capacity.points = static_cast<uint32_t>(config.sparsityPoints);
+  capacity.texels =
+      static_cast<uint32_t>(kCapacityPerDemand * config.texelsPerStep) + VirtualGrid::kCorners * capacity.points;
+  capacity.training = true;
+  if (config.lod > 0) capacity.maxWords = finerGrid(config).words();
+  return capacity;
 }
 
 }  // namespace
 
 float cullThreshold(const VolumeConfig& config, double progress) {
-  if (config.level > 0) return static_cast<float>(config.cullLast);  // the finest has come to it
+  if (config.lod > 0) return static_cast<float>(config.cullLast);  // the finest level has reached it
   if (progress < config.cullBegin) return 0;
   const double way = std::min(1.0, (progress - config.cullBegin) / std::max(1e-9, config.cullEnd - config.cullBegin));
   return static_cast<float>(config.cullFirst * std::pow(config.cullLast / config.cullFirst, way));
@@ -59,42 +60,43 @@ VolumeTrainer::VolumeTrainer(Device& device, const Capture& capture, const Volum
     : device_(device),
       config_(config),
       model_(device, config, grid, {static_cast<uint32_t>(config.residentBlocks), true}),
-      pass_(model_, roomFor(config)),
+      pipeline_(model_, makeCapacity(config)),
       photoRays_(device, capture, model_.frame(), raySettings(config)),
-      photoLoss_(device, capture, config, static_cast<uint32_t>(config.mostRays)),
+      photoLoss_(device, capture, config, static_cast<uint32_t>(config.maxRays)),
       budget_(config, kGroup) {
   losses_ = device.array<float>(kLosses);
   asSaved_.assign(parts(), false);
   if (config.blocksOnly || !model_.holdsAll()) tiles_ = tilePhotos(capture, model_.frame(), model_.space());
   photoCount_ = capture.photos.size();
   if (!model_.holdsAll()) {
-    planStays(waiting);
+    planResidentSets(waiting);
   } else if (config.blocksOnly) {
     drawFrom(std::vector<double>(tiles_.sets.size(), 1));
   }
 }
 
-// Of each set's share, or less.
+// Draws rays in proportion to the shares of the sets; with blocksOnly, none from the set that contains no block.
 void VolumeTrainer::drawFrom(std::vector<double> shareOfSet) {
   for (size_t set = 0; config_.blocksOnly && set < shareOfSet.size(); ++set) {
     if (tiles_.sets[set].empty()) shareOfSet[set] = 0;
   }
-  photoRays_.drawFrom(sharesOf(tiles_, shareOfSet, photoCount_));
+  photoRays_.drawFrom(computeTileShares(tiles_, shareOfSet, photoCount_));
 }
 
-void VolumeTrainer::planStays(const fs::path& waiting) {
+void VolumeTrainer::planResidentSets(const fs::path& waiting) {
   CHECK(!waiting.empty());
-  waiting_.emplace(waiting);
+  swap_.emplace(waiting);
   BlockSets sets{tiles_.sets, std::vector<double>(tiles_.sets.size())};
   for (const uint32_t set : tiles_.setOfTile) ++sets.weights[set];
   residency_.emplace(sets, Residency::Settings{model_.space().cells(), static_cast<uint32_t>(config_.residentBlocks),
                                                config_.residencySteps, static_cast<uint64_t>(config_.seed)});
 }
 
-// Slots in the order of blocks, whatever was in memory before: a resumed run must not differ.
-void VolumeTrainer::moveIn(size_t stay) {
-  stay_ = stay;
-  const Residency::Stay& next = residency_->stays()[stay];
+// Assigns slots in the order of blocks, independently of what was resident before, so that a resumed run does not
+// differ.
+void VolumeTrainer::swapIn(size_t residentSet) {
+  residentSet_ = residentSet;
+  const Residency::ResidentSet& next = residency_->residentSets()[residentSet];
   std::vector<uint32_t> blocks = next.blocks;
   if (model_.space().blocks() > model_.space().cells()) blocks.push_back(model_.space().cells());
   const std::vector<uint32_t> before = model_.blockOfSlot();
@@ -102,56 +104,58 @@ void VolumeTrainer::moveIn(size_t stay) {
     if (blocks[slot] == before[slot]) continue;
     TensorSet fields;
     model_.saveFields(before[slot], fields, true);
-    waiting_->put(before[slot], fields.encode({{"format", kFormat}}));
+    swap_->put(before[slot], fields.encode({{"format", kFormat}}));
   }
-  model_.hold(blocks);
+  model_.assignSlots(blocks);
   for (uint32_t slot = 0; slot < model_.slots(); ++slot) {
-    if (blocks[slot] == before[slot] || !waiting_->holds(blocks[slot])) continue;
-    model_.restoreFields(blocks[slot], waiting_->fileOf(blocks[slot]), waiting_->get(blocks[slot]));
+    if (blocks[slot] == before[slot] || !swap_->holds(blocks[slot])) continue;
+    model_.restoreFields(blocks[slot], swap_->blockFile(blocks[slot]), swap_->get(blocks[slot]));
   }
   drawFrom(next.shareOfSet);
 }
 
-VolumePass::LossScales VolumeTrainer::lossScales(int64_t step, int64_t plannedSteps) const {
-  // Blocks must have seen something before they are asked to decide: those that wait get their first turn without.
-  const bool haveSeenNothing = residency_ && config_.level == 0;
+VolumePipeline::LossScales VolumeTrainer::lossScales(int64_t step, int64_t plannedSteps) const {
+  // Regularisation must not start before a block has been trained on photos: with residency, it starts after the first
+  // cycle.
+  const bool haveSeenNothing = residency_ && config_.lod == 0;
   const int64_t into = step - (haveSeenNothing ? residency_->cycleSteps() : 0);
   double ramp = into < 0 ? 0 : 1;
-  if (into >= 0 && config_.rampShare > 0) {
-    ramp = plannedSteps == 0
-               ? 0
-               : std::min(1.0, static_cast<double>(into) / (config_.rampShare * static_cast<double>(plannedSteps)));
+  if (into >= 0 && config_.lossWarmupFraction > 0) {
+    ramp = plannedSteps == 0 ? 0
+                             : std::min(1.0, static_cast<double>(into) /
+                                                 (config_.lossWarmupFraction * static_cast<double>(plannedSteps)));
   }
   const double perRay = 1.0 / budget_.rays();
-  VolumePass::LossScales scales;
-  scales.interlevel = static_cast<float>(config_.interlevel * perRay);
-  scales.distortion = static_cast<float>(config_.distortion * ramp * perRay);
-  scales.opacity = static_cast<float>(config_.opacity * ramp * perRay);
-  scales.sparsity = static_cast<float>(config_.sparsity * ramp / std::max(1, config_.sparsityPoints));
+  VolumePipeline::LossScales scales;
+  scales.interlevel = static_cast<float>(config_.interlevelWeight * perRay);
+  scales.distortion = static_cast<float>(config_.distortionWeight * ramp * perRay);
+  scales.opacity = static_cast<float>(config_.opacityWeight * ramp * perRay);
+  scales.sparsity = static_cast<float>(config_.sparsityWeight * ramp / std::max(1, config_.sparsityPoints));
   return scales;
 }
 
-VolumePass::Options VolumeTrainer::passOptions(int64_t step, double progress) const {
+VolumePipeline::Options VolumeTrainer::passOptions(int64_t step, double progress) const {
   constexpr double kAnnealSteps = 500;
-  VolumePass::Options options;
+  VolumePipeline::Options options;
   options.minAlpha = cullThreshold(config_, progress);
   options.seed = mix64(static_cast<uint64_t>(config_.seed) ^ (static_cast<uint64_t>(step) << 20));
   options.keepAttributes = !isFrozen(progress);
-  bool warm = step >= config_.proposalWarmUp;
+  bool warm = step >= config_.proposalWarmupSteps;
   double annealed = (static_cast<double>(step) + 1) / kAnnealSteps;
-  if (residency_ && step < residency_->cycleSteps()) {  // the first time for all that is there
+  if (residency_ && step < residency_->cycleSteps()) {  // the first time in memory for every resident block
     const Residency::Place place = residency_->at(step);
-    const double length = std::min(kAnnealSteps, static_cast<double>(residency_->stays()[place.stay].steps));
+    const double length =
+        std::min(kAnnealSteps, static_cast<double>(residency_->residentSets()[place.residentSet].steps));
     annealed = (static_cast<double>(place.stepsInto) + 1) / length;
     warm = false;
   }
-  if (config_.level > 0) annealed = 1;
+  if (config_.lod > 0) annealed = 1;
   options.anneal = static_cast<float>(std::min(1.0, annealed));
   options.keepProposals = options.keepAttributes && (!warm || step % config_.proposalEvery == 0);
   return options;
 }
 
-VolumeRays VolumeTrainer::forward(int64_t step, const VolumePass::Options& options) {
+VolumeRays VolumeTrainer::forward(int64_t step, const VolumePipeline::Options& options) {
   const uint32_t count = budget_.rays();
   photoRays_.draw(step, count);
   const VolumeRays rays{count,
@@ -160,32 +164,33 @@ VolumeRays VolumeTrainer::forward(int64_t step, const VolumePass::Options& optio
                         photoRays_.jitters(),
                         photoRays_.fars(0, count),
                         photoRays_.nears(0, count)};
-  pass_.forward(rays, options);
+  pipeline_.forward(rays, options);
   return rays;
 }
 
 StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
-  // While the number of steps is not known, it is early.
+  // An unknown number of planned steps counts as the beginning of training.
   const double progress = plannedSteps > 0 ? static_cast<double>(step) / static_cast<double>(plannedSteps) : 0;
   if (residency_) {
-    const size_t stay = residency_->at(step).stay;
-    if (stay != stay_) moveIn(stay);
+    const size_t residentSet = residency_->at(step).residentSet;
+    if (residentSet != residentSet_) swapIn(residentSet);
   }
-  const VolumePass::Options options = passOptions(step, progress);
-  if (config_.level > 0) model_.lookThrough(isFrozen(progress) ? finerGrid(config_) : config_.virtualGrid());
+  const VolumePipeline::Options options = passOptions(step, progress);
+  if (config_.lod > 0) model_.setVirtualGrid(isFrozen(progress) ? finerGrid(config_) : config_.virtualGrid());
   std::vector<float> losses, inner;
   std::vector<uint32_t> texels, samples;
   do {
     const VolumeRays rays = forward(step, options);
     const PhotoLoss::Picture picture = addColourGradients(step);
-    pass_.backward(rays, photoLoss_.colourGradients(picture), photoLoss_.opacityGradients(picture),
-                   lossScales(step, plannedSteps));
+    pipeline_.backward(rays, photoLoss_.colourGradients(picture), photoLoss_.opacityGradients(picture),
+                       lossScales(step, plannedSteps));
     updateParameters(step, plannedSteps, options);
-    // The step is over: its counters may be read. Where it had no room, it has changed nothing.
-    std::tie(losses, inner, texels, samples) = device_.readTogether(losses_.all(), pass_.losses(), pass_.texelsWanted(),
-                                                                    pass_.firstSample().part(rays.count, 1));
-    // Where rays want more texels than there is room for, what has none is fog: then again with fewer rays.
-  } while (budget_.drawsFewer(texels[0], pass_.roomForTexels()));
+    // The step has finished, so its counters may be read. If its texels exceeded the capacity, it has changed nothing.
+    std::tie(losses, inner, texels, samples) = device_.readAll(
+        losses_.all(), pipeline_.losses(), pipeline_.texelsDemanded(), pipeline_.firstSample().part(rays.count, 1));
+    // If rays demand more texels than the capacity, the excess is evaluated as fog, and the step is repeated with fewer
+    // rays.
+  } while (budget_.drawsFewer(texels[0], pipeline_.texelCapacity()));
   photoLoss_.exposures().settle(step, config_.exposure);
 
   for (const uint32_t block : model_.blockOfSlot()) asSaved_[block] = false;
@@ -202,19 +207,19 @@ StepReport VolumeTrainer::step(int64_t step, int64_t plannedSteps) {
   report.squaredError = losses[1] / std::max(1.0, 3 * weight);
   report.texels = std::max(1u, texels[0]);
 
-  // Texels grow more slowly than rays, so half of the way is enough.
-  const double wanted = rays * std::sqrt(static_cast<double>(config_.texelsPerStep) / report.texels);
-  budget_.aimFor(std::floor(wanted / kGroup) * kGroup);
+  // Texels grow more slowly than rays, so the square root of the ratio is enough.
+  const double targetRays = rays * std::sqrt(static_cast<double>(config_.texelsPerStep) / report.texels);
+  budget_.aimFor(std::floor(targetRays / kGroup) * kGroup);
   return report;
 }
 
 PhotoLoss::Picture VolumeTrainer::addColourGradients(int64_t step) {
   const uint32_t rays = photoRays_.count();
-  const PhotoLoss::Picture picture{{rays}, 0, rays, pass_.colour(), pass_.opacity()};
+  const PhotoLoss::Picture picture{{rays}, 0, rays, pipeline_.colour(), pipeline_.opacity()};
   photoLoss_.compare(photoRays_, picture, losses_.part(0, PhotoLoss::kLosses));
-  if (config_.s3im > 0) {
+  if (config_.s3imWeight > 0) {
     S3imLoss similarity;
-    similarity.scale = static_cast<float>(config_.s3im);
+    similarity.scale = static_cast<float>(config_.s3imWeight);
     similarity.rays = picture.finished;
     similarity.seed = mix64(static_cast<uint64_t>(config_.seed) + static_cast<uint64_t>(step));
     similarity.predicted = photoLoss_.exposed(picture);
@@ -228,43 +233,43 @@ PhotoLoss::Picture VolumeTrainer::addColourGradients(int64_t step) {
   return picture;
 }
 
-void VolumeTrainer::updateParameters(int64_t step, int64_t plannedSteps, const VolumePass::Options& kept) {
+void VolumeTrainer::updateParameters(int64_t step, int64_t plannedSteps, const VolumePipeline::Options& options) {
   const float rate = static_cast<float>(config_.rateSchedule().at(step, plannedSteps));
-  const float ofFields = config_.level > 0 ? rate * static_cast<float>(config_.levelRateFactor) : rate;
+  const float ofFields = config_.lod > 0 ? rate * static_cast<float>(config_.lodLearningRateFactor) : rate;
   Adam all;
-  if (budget_.canShrink()) all.found = pass_.texelsWanted();
-  all.room = pass_.roomForTexels();
+  if (budget_.canShrink()) all.overflowCounters = pipeline_.texelsDemanded();
+  all.capacity = pipeline_.texelCapacity();
   Adam table = all;
   table.rate = ofFields;
   table.skipZeroGradients = true;
   table.l2 = static_cast<float>(config_.tableL2);
   Adam network = all;
   network.rate = ofFields;
-  network.skipZeroGradients = true;  // of blocks that no ray of the step came to
+  network.skipZeroGradients = true;  // of blocks that no ray of the step reached
   network.l2 = static_cast<float>(config_.networkL2);
-  for (uint32_t slot = 0; kept.keepAttributes && slot < model_.slots(); ++slot) {
+  for (uint32_t slot = 0; options.keepAttributes && slot < model_.slots(); ++slot) {
     Adam ofTable = table, ofNetwork = network;
-    ofTable.rows = ofNetwork.rows = pass_.texelRows(slot);
+    ofTable.rows = ofNetwork.rows = pipeline_.texelRows(slot);
     model_.attributes().table(slot).step(device_, ofTable);
     model_.attributes().network(slot).step(device_, ofNetwork);
-    if (!kept.keepProposals) continue;
+    if (!options.keepProposals) continue;
     model_.proposals().table(slot).step(device_, table);
     model_.proposals().network(slot).step(device_, network);
   }
-  network.rate = rate * static_cast<float>(config_.deferredRateFactor);
+  network.rate = rate * static_cast<float>(config_.deferredLearningRateFactor);
   model_.deferred().step(device_, network);
   Adam ofExposures = all;
-  ofExposures.rate = static_cast<float>(config_.exposureRate / config_.rate) * rate;
+  ofExposures.rate = static_cast<float>(config_.exposureLearningRate / config_.learningRate) * rate;
   ofExposures.skipZeroGradients = true;
   photoLoss_.exposures().step(ofExposures, config_.exposure);
 }
 
 Bytes VolumeTrainer::save(uint32_t part) {
   TensorSet tensors;
-  if (model_.slotOf(part) != kNoSlot) {
+  if (model_.findSlot(part) != kNoSlot) {
     model_.saveFields(part, tensors, true);
-  } else if (waiting_->holds(part)) {
-    const Safetensors file = waiting_->get(part);
+  } else if (swap_->holds(part)) {
+    const Safetensors file = swap_->get(part);
     for (const auto& [name, tensor] : file.tensors) tensors.add(name, tensor);
   } else {
     model_.saveFirstFields(part, tensors);
@@ -278,7 +283,7 @@ Bytes VolumeTrainer::save(uint32_t part) {
   return tensors.encode({{"format", kFormat}, {"device", device_.target()}, {"block", std::to_string(part)}});
 }
 
-std::optional<uint32_t> VolumeTrainer::brokenPart() {
+std::optional<uint32_t> VolumeTrainer::firstNonFinitePart() {
   for (uint32_t slot = 0; slot < model_.slots(); ++slot) {
     for (const ParameterGroup* group : {&model_.attributes().network(slot), &model_.attributes().table(slot),
                                         &model_.proposals().network(slot), &model_.proposals().table(slot)}) {
@@ -290,7 +295,7 @@ std::optional<uint32_t> VolumeTrainer::brokenPart() {
 }
 
 void VolumeTrainer::restoreBlock(uint32_t block, const fs::path& path, const Safetensors& state) {
-  if (model_.slotOf(block) != kNoSlot) {
+  if (model_.findSlot(block) != kNoSlot) {
     model_.restoreFields(block, path, state);
     return;
   }
@@ -298,7 +303,7 @@ void VolumeTrainer::restoreBlock(uint32_t block, const fs::path& path, const Saf
   for (const auto& [name, tensor] : state.tensors) {
     if (name.starts_with("attributes.") || name.starts_with("proposals.")) fields.add(name, tensor);
   }
-  waiting_->put(block, fields.encode({{"format", kFormat}}));
+  swap_->put(block, fields.encode({{"format", kFormat}}));
 }
 
 void VolumeTrainer::beginFrom(const fs::path& below) {
@@ -307,7 +312,7 @@ void VolumeTrainer::beginFrom(const fs::path& below) {
   for (uint32_t block = 0; block < parts(); ++block) {
     const fs::path path = below / manifest.files[block];
     Safetensors state = readSafetensors(path);
-    std::erase_if(state.tensors, [](const auto& tensor) {  // values alone
+    std::erase_if(state.tensors, [](const auto& tensor) {  // keep values only, no moments
       return tensor.first.ends_with(".m1") || tensor.first.ends_with(".m2") || tensor.first.ends_with(".count");
     });
     restoreBlock(block, path, state);

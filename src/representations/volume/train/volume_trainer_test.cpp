@@ -14,7 +14,7 @@
 namespace tessera {
 namespace {
 
-// Mean PSNR over the held-out views.
+// Returns the mean PSNR over the held-out photos.
 double heldOut(const CubeScene& scene, VolumeModel& model) {
   VolumeModelRenderer renderer(model, static_cast<float>(model.config().cullLast));
   double sum = 0;
@@ -22,7 +22,7 @@ double heldOut(const CubeScene& scene, VolumeModel& model) {
   for (const int photo : photos) {
     const Camera& camera = scene.capture().cameras[0];
     const Pose& pose = scene.capture().photos[photo].worldFromCamera;
-    sum += psnrOf(renderer.render(camera, pose, nullptr), scene.truth(camera, pose));
+    sum += computePsnr(renderer.render(camera, pose, nullptr), scene.truth(camera, pose));
   }
   return sum / static_cast<double>(photos.size());
 }
@@ -35,20 +35,20 @@ TEST(VolumeTrainer, LearnsACubeInOneBlockAndInTwoThatMeetInIt) {
   }
 }
 
-TEST(VolumeTrainer, LearnsWhatLiesAroundTheRegionInTheSurround) {
+TEST(VolumeTrainer, LearnsWhatLiesAroundTheRegionInTheBackgroundBlock) {
   CubeScene::Options options;
-  options.room = true;  // walls at 2.5, far outside of the blocks
+  options.isEnclosed = true;  // with walls at 2.5, far outside the blocks
   const CubeScene scene(options);
-  for (const char* surround : {"own", "border"}) {
+  for (const char* backgroundBlock : {"own", "border"}) {
     VolumeConfig config = smallVolumeConfig();
-    config.surround = surround;
+    config.backgroundBlock = backgroundBlock;
     TrainedVolumeCube trained(scene, config, cubeGrid(), 300);
-    EXPECT_EQ(trained.model().space().blocks(), surround == std::string("own") ? 2u : 1u);
-    EXPECT_GT(heldOut(scene, trained.model()), 20) << surround;
+    EXPECT_EQ(trained.model().space().blocks(), backgroundBlock == std::string("own") ? 2u : 1u);
+    EXPECT_GT(heldOut(scene, trained.model()), 20) << backgroundBlock;
   }
 }
 
-// Median of how far depths are from the truth, of held-out views' pixels where something is.
+// Returns the median absolute error of depth over all pixels of the held-out photos.
 double depthError(const CubeScene& scene, VolumeModel& model) {
   VolumeModelRenderer renderer(model, static_cast<float>(model.config().cullLast));
   std::vector<float> errors;
@@ -65,13 +65,13 @@ double depthError(const CubeScene& scene, VolumeModel& model) {
 
 TEST(VolumeTrainer, LearnsFromSparsePointsWhereThingsStand) {
   CubeScene::Options options;
-  options.room = true;
+  options.isEnclosed = true;
   options.observationsPerPhoto = 50;
   const CubeScene scene(options);
   VolumeConfig config = smallVolumeConfig();
-  config.surround = "own";
-  const auto errorWith = [&](double knownShare) {
-    config.knownShare = knownShare;
+  config.backgroundBlock = "own";
+  const auto errorWith = [&](double sparseDepthRayFraction) {
+    config.sparseDepthRayFraction = sparseDepthRayFraction;
     TrainedVolumeCube trained(scene, config, cubeGrid(2), 60);
     return depthError(scene, trained.model());
   };
@@ -90,7 +90,7 @@ TEST(VolumeTrainer, MakesTheSameBytesOnAnyNumberOfThreads) {
   EXPECT_NE(one, TrainedVolumeCube(scene, other, cubeGrid(2), 40, 2).saved());
 }
 
-TEST(VolumeTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
+TEST(VolumeTrainer, ResumesExactlyAfterRestoring) {
   const CubeScene scene;
   const VolumeConfig config = smallVolumeConfig();
   constexpr int64_t kSteps = 60;
@@ -110,7 +110,7 @@ TEST(VolumeTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
   EXPECT_EQ(state, unbroken.saved());
 }
 
-// Four blocks about the cube, of which two are in memory.
+// Settings for four blocks around the cube, of which two are in memory at a time.
 VolumeConfig twoOfFour() {
   VolumeConfig config = smallVolumeConfig();
   config.residentBlocks = 2;
@@ -125,24 +125,25 @@ TEST(VolumeTrainer, LearnsACubeWithHalfOfItsBlocksInMemory) {
   TrainedVolumeCube few(scene, config, cubeGrid(2, 2), kSteps);
   EXPECT_EQ(few.model().slots(), 2u);
   ASSERT_NE(few.trainer->residency(), nullptr);
-  EXPECT_GE(few.trainer->residency()->stays().size(), 4u) << "each pair of neighbours";
-  // As a model for drawing has it: all in memory.
+  EXPECT_GE(few.trainer->residency()->residentSets().size(), 4u) << "each pair of neighbours";
+  // The model as it is loaded for rendering, with all blocks in memory.
   VolumeModel whole(*few.device, config, cubeGrid(2, 2));
   const std::vector<Bytes> parts = few.saved();
   ASSERT_EQ(parts.size(), 4u);
   for (uint32_t block = 0; block < 4; ++block) whole.restore(block, "state", *decodeSafetensors(parts[block]));
-  // Nearly half of what the photos show passes three or four blocks, and is not trained on: all in memory gives 23.5.
+  // Nearly half of what the photos show is seen through three or four blocks and is excluded from training. With all
+  // blocks in memory the PSNR is 23.5.
   EXPECT_NEAR(few.trainer->residency()->unserved(), 0.46, 0.1);
   EXPECT_GT(heldOut(scene, whole), 20.5);
 }
 
-// Asked before they have seen anything, they decide for being empty.
-TEST(VolumeTrainer, LetsBlocksThatWaitSeeSomethingBeforeTheyAreToDecide) {
+// Blocks that are regularised before they have been trained on any photo become empty.
+TEST(VolumeTrainer, StartsRegularisationAfterTheFirstCycleOfResidentSets) {
   const CubeScene scene;
   VolumeConfig config = twoOfFour(), urged = config;
-  urged.rampShare = 0;
-  urged.opacity = urged.distortion = urged.sparsity = 1;
-  config.opacity = config.distortion = config.sparsity = 0;
+  urged.lossWarmupFraction = 0;
+  urged.opacityWeight = urged.distortionWeight = urged.sparsityWeight = 1;
+  config.opacityWeight = config.distortionWeight = config.sparsityWeight = 0;
   TrainedVolumeCube calm(scene, config, cubeGrid(2, 2), 0), strict(scene, urged, cubeGrid(2, 2), 0);
   const int64_t cycle = calm.trainer->residency()->cycleSteps();
   for (int64_t step = 0; step <= cycle; ++step) {
@@ -151,10 +152,10 @@ TEST(VolumeTrainer, LetsBlocksThatWaitSeeSomethingBeforeTheyAreToDecide) {
     strict.trainer->step(step, 100);
   }
   EXPECT_NE(calm.saved(), strict.saved());
-  // A coarser level has been copied from one that has seen everything.
+  // A coarser level starts from fields that have been trained, so its regularisation starts at once.
   for (VolumeConfig* level : {&config, &urged}) {
     *level = levelConfig(*level, 1, cycle);
-    level->frozenShare = 0;
+    level->deferredOnlyFraction = 0;
   }
   TrainedVolumeCube calmLevel(scene, config, cubeGrid(2, 2), 0), strictLevel(scene, urged, cubeGrid(2, 2), 0);
   calmLevel.trainer->step(0, 100);
@@ -162,30 +163,30 @@ TEST(VolumeTrainer, LetsBlocksThatWaitSeeSomethingBeforeTheyAreToDecide) {
   EXPECT_NE(calmLevel.saved(), strictLevel.saved());
 }
 
-TEST(VolumeTrainer, TakesFewerRaysWhereTheyWantMoreTexelsThanThereIsRoomFor) {
+TEST(VolumeTrainer, DrawsFewerRaysWhereTheirTexelsExceedTheCapacity) {
   const CubeScene scene;
   VolumeConfig config = smallVolumeConfig();
   config.texelsPerStep = 4096;
   config.sparsityPoints = 16;
   config.exposure = true;
-  config.firstRays = config.mostRays;
+  config.firstRays = config.maxRays;
   TrainedVolumeCube trained(scene, config, cubeGrid(), 0);
   const StepReport report = trained.trainer->step(0, 10);
   EXPECT_LE(report.texels, 6144u + 16 * VirtualGrid::kCorners);
   EXPECT_LT(report.rays, static_cast<uint32_t>(config.firstRays));
   EXPECT_GE(report.rays, 16u);
-  // A function of the step alone.
+  // The result is a function of the step alone.
   TrainedVolumeCube again(scene, config, cubeGrid(), 0);
   EXPECT_EQ(again.trainer->step(0, 10).rays, report.rays);
   EXPECT_EQ(again.saved(), trained.saved());
-  // As if it had never been tried with more.
+  // The result is as if more rays had never been tried.
   config.firstRays = static_cast<int>(report.rays);
   TrainedVolumeCube meant(scene, config, cubeGrid(), 0);
   EXPECT_EQ(meant.trainer->step(0, 10).rays, report.rays);
   EXPECT_EQ(meant.saved(), trained.saved());
 }
 
-// Of each ray of the last step: the blocks that are seen through its tile.
+// Returns, for each ray of the last step, the blocks that are seen through its tile.
 std::vector<std::vector<uint32_t>> blocksOfRays(const CubeScene& scene, TrainedVolumeCube& trained) {
   const TiledPhotos photos = tilePhotos(scene.capture(), trained.model().frame(), trained.model().space());
   const RayBatch& batch = trained.trainer->rays().batch();
@@ -222,19 +223,20 @@ TEST(VolumeTrainer, DrawsNoRaysThatSeeNoBlockWhenToldSo) {
   EXPECT_EQ(missing(true), 0);
 }
 
-TEST(VolumeTrainer, DrawsNoRaysThatSeeABlockThatWaits) {
+TEST(VolumeTrainer, DrawsNoRaysThatSeeABlockThatIsNotResident) {
   const CubeScene scene;
   TrainedVolumeCube trained(scene, twoOfFour(), cubeGrid(2, 2), 0);
   std::vector<int> raysOfBlock(4);
   const int64_t cycle = trained.trainer->residency()->cycleSteps();
   for (int64_t step = 0; step < cycle; ++step) {
     const StepReport report = trained.trainer->step(step, 100);
-    const std::vector<uint32_t>& held = trained.model().blockOfSlot();
+    const std::vector<uint32_t>& residentBlocks = trained.model().blockOfSlot();
     const std::vector<std::vector<uint32_t>> blocks = blocksOfRays(scene, trained);
     ASSERT_GE(blocks.size(), report.rays);
     for (const std::vector<uint32_t>& seen : blocks) {
       for (const uint32_t block : seen) {
-        ASSERT_NE(std::find(held.begin(), held.end(), block), held.end()) << block << " in step " << step;
+        ASSERT_NE(std::find(residentBlocks.begin(), residentBlocks.end(), block), residentBlocks.end())
+            << block << " in step " << step;
         ++raysOfBlock[block];
       }
     }
@@ -242,10 +244,10 @@ TEST(VolumeTrainer, DrawsNoRaysThatSeeABlockThatWaits) {
   for (const int rays : raysOfBlock) EXPECT_GT(rays, 100) << "each has its share";
 }
 
-TEST(VolumeTrainer, TrainsNothingButNetworksWhileALevelIsFrozen) {
+TEST(VolumeTrainer, TrainsOnlyDeferredNetworksWhileALevelIsFrozen) {
   const CubeScene scene;
   VolumeConfig config = levelConfig(smallVolumeConfig(), 1, 0);
-  config.frozenShare = 0.5;
+  config.deferredOnlyFraction = 0.5;
   TrainedVolumeCube level(scene, config, cubeGrid(2), 0);
   const auto fields = [&] {
     std::vector<std::vector<float>> values;
@@ -271,7 +273,7 @@ TEST(VolumeTrainer, BeginsALevelWithTheExposuresOfTheOneBelow) {
   const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
   TrainVolumeOptions options;
   options.config = smallVolumeConfig();
-  options.config.levelShare = 0;
+  options.config.lodStepFraction = 0;
   options.config.exposure = true;
   options.blocks = *parseBlockCount("2x1");
   options.loop.steps = 40;
@@ -290,32 +292,32 @@ TEST(VolumeTrainer, BeginsALevelWithTheExposuresOfTheOneBelow) {
   EXPECT_EQ(exposures(*decodeSafetensors(level.save(0))), below);
 }
 
-TEST(VolumeTrainer, LeavesWaitingBlocksAsTheyAre) {
+TEST(VolumeTrainer, LeavesSwappedOutBlocksUnchanged) {
   const CubeScene scene;
   VolumeConfig config = twoOfFour();
-  config.residencySteps = 4000;  // one stay
+  config.residencySteps = 4000;  // a single resident set for the whole test
   TrainedVolumeCube before(scene, config, cubeGrid(2, 2), 0);
   const std::vector<Bytes> first = before.saved();
-  before.trainer.reset();  // its scratch is in the same place
+  before.trainer.reset();  // both use the same swap folder
   TrainedVolumeCube after(scene, config, cubeGrid(2, 2), 12);
-  const std::vector<uint32_t>& held = after.model().blockOfSlot();
+  const std::vector<uint32_t>& residentBlocks = after.model().blockOfSlot();
   const std::vector<Bytes> last = after.saved();
   for (uint32_t block = 0; block < 4; ++block) {
     const auto was = decodeSafetensors(first[block]), is = decodeSafetensors(last[block]);
     for (const char* name : {"attributes.table", "proposals.network"}) {
       const auto a = was->tensors.at(name).bytes, b = is->tensors.at(name).bytes;
       EXPECT_EQ(std::equal(a.begin(), a.end(), b.begin(), b.end()),
-                std::find(held.begin(), held.end(), block) == held.end())
+                std::find(residentBlocks.begin(), residentBlocks.end(), block) == residentBlocks.end())
           << name << " of block " << block;
     }
   }
 }
 
-TEST(VolumeTrainer, GoesOnAfterRestoringWithBlocksThatWait) {
+TEST(VolumeTrainer, ResumesExactlyWithSwappedOutBlocks) {
   const CubeScene scene;
-  for (const char* surround : {"none", "own"}) {
+  for (const char* backgroundBlock : {"none", "own"}) {
     VolumeConfig config = twoOfFour();
-    config.surround = surround;
+    config.backgroundBlock = backgroundBlock;
     constexpr int64_t kSteps = 60;
     std::vector<Bytes> unbroken;
     {
@@ -323,7 +325,7 @@ TEST(VolumeTrainer, GoesOnAfterRestoringWithBlocksThatWait) {
       for (int64_t step = 0; step < kSteps; ++step) whole.trainer->step(step, kSteps);
       unbroken = whole.saved();
     }
-    EXPECT_FALSE(fs::exists(scene / "waiting")) << "scratch is gone";
+    EXPECT_FALSE(fs::exists(scene / "waiting")) << "the swap folder is removed";
     std::vector<Bytes> state;
     for (int64_t step = 0; step < kSteps;) {
       TrainedVolumeCube part(scene, config, cubeGrid(2, 2), 0);
@@ -333,22 +335,22 @@ TEST(VolumeTrainer, GoesOnAfterRestoringWithBlocksThatWait) {
       for (const int64_t until = step + 25; step < std::min(until, kSteps); ++step) part.trainer->step(step, kSteps);
       state = part.saved();
     }
-    EXPECT_EQ(state, unbroken) << surround;
+    EXPECT_EQ(state, unbroken) << backgroundBlock;
   }
 }
 
-TEST(VolumeTrainer, NamesTheBlockThatIsBroken) {
+TEST(VolumeTrainer, NamesTheFirstNonFiniteBlock) {
   const CubeScene scene;
   TrainedVolumeCube trained(scene, smallVolumeConfig(), cubeGrid(2), 1);
-  EXPECT_EQ(trained.trainer->brokenPart(), std::nullopt);
+  EXPECT_EQ(trained.trainer->firstNonFinitePart(), std::nullopt);
   ParameterGroup& network = trained.model().attributes().network(1);
   std::vector<float> values = trained.device->read(network.values.all());
   values[5] = std::numeric_limits<float>::quiet_NaN();
   trained.device->write(network.values.all(), std::span<const float>(values));
-  EXPECT_EQ(trained.trainer->brokenPart(), 1u);
+  EXPECT_EQ(trained.trainer->firstNonFinitePart(), 1u);
 }
 
-TEST(VolumeTrainer, RefusesCheckpointsOfOtherKinds) {
+TEST(VolumeTrainer, RejectsCheckpointsOfOtherFormats) {
   const CubeScene scene;
   TrainedVolumeCube trained(scene, smallVolumeConfig(), cubeGrid(), 0);
   const auto other = decodeSafetensors(encodeSafetensors({}, {{"format", "tessera field 1"}}));
@@ -356,11 +358,11 @@ TEST(VolumeTrainer, RefusesCheckpointsOfOtherKinds) {
   EXPECT_THROW(trained.trainer->restore(0, "file", *other), Error);
 }
 
-// An untouched block costs nothing: its parameters are what they were.
-TEST(VolumeTrainer, LeavesBlocksAloneThatNoRayComesTo) {
+// A block that no ray reaches keeps its parameters.
+TEST(VolumeTrainer, DoesNotChangeBlocksThatNoRayReaches) {
   const CubeScene scene;
   BlockGrid grid = cubeGrid(2);
-  grid.originInWorld.x() += 0.7 + 1.4;  // the cube is in no block, and behind the grid for nobody
+  grid.originInWorld.x() += 0.7 + 1.4;  // the cube is in no block, and no camera sees it behind the grid
   grid.originInWorld.z() += 40;
   VolumeConfig config = smallVolumeConfig();
   config.sparsityPoints = 0;

@@ -13,14 +13,14 @@ GpuVolumeContent::GpuVolumeContent(const std::shared_ptr<GpuStream>& stream, con
   PackedContent packed;
   std::vector<arguments::VolumePartArguments> all;
   for (const VolumePart& part : content.parts) {
-    auto made = placedArguments<arguments::VolumePartArguments>(part);
-    made.texels = static_cast<float>(part.planes);
-    made.voxels = static_cast<float>(part.voxels);
-    for (int a = 0; a < 3; ++a) made.planeWords[a] = packed.add(part.planeBytes[a]);
-    made.macroblocks = packed.add(part.macroblocks);
-    made.voxelWords = packed.add(part.voxelBytes);
-    made.distances = packed.add(part.distances);
-    all.push_back(made);
+    auto partArguments = placedArguments<arguments::VolumePartArguments>(part);
+    partArguments.texels = static_cast<float>(part.planes);
+    partArguments.voxels = static_cast<float>(part.voxels);
+    for (int a = 0; a < 3; ++a) partArguments.planeWords[a] = packed.add(part.planeBytes[a]);
+    partArguments.macroblocks = packed.add(part.macroblocks);
+    partArguments.voxelWords = packed.add(part.voxelBytes);
+    partArguments.distances = packed.add(part.distances);
+    all.push_back(partArguments);
   }
   network = addNetwork(content.network, packed);
   parts = packed.add(all);

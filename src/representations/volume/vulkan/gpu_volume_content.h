@@ -1,4 +1,4 @@
-// A content of `volume` on a GPU.
+// A `volume` content on the GPU.
 #pragma once
 
 #include "render/vulkan/gpu_content.h"
@@ -6,7 +6,7 @@
 
 namespace tessera {
 
-// It takes no more of the GPU than the content that it is made of takes in memory.
+// Takes no more GPU memory than the decoded content takes in CPU memory.
 struct GpuVolumeContent final : GpuContent {
   GpuVolumeContent(const std::shared_ptr<GpuStream>& stream, const VolumeContent& content);
 
@@ -15,7 +15,7 @@ struct GpuVolumeContent final : GpuContent {
   GpuContentMemory memory;
   float featureRange = 0, densityRange = 0, stepsPerTexel = 1;
   uint32_t partCount = 0;
-  uint64_t parts = 0;  // address
+  uint64_t parts = 0;  // device address
   GpuNetwork network;
 };
 

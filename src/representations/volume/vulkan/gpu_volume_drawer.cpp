@@ -10,7 +10,7 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kNumbersOfPixel = 5;  // begin_view.comp
+constexpr uint32_t kNumbersOfPixel = 5;  // see begin_view.comp
 
 class GpuVolumeDrawer final : public GpuDrawer {
  public:
@@ -24,22 +24,22 @@ class GpuVolumeDrawer final : public GpuDrawer {
             const DrawSettings& settings) override {
     picture.begin(view.frame, settings.minTransmittance, kNumbersOfPixel, request);
     for (const DrawnContent<GpuContent>& drawn : view.frontToBack) add(picture, drawn, false);
-    if (view.surround != nullptr) add(picture, view.surround, true);
+    if (view.backgroundBlock != nullptr) add(picture, view.backgroundBlock, true);
     picture.run(kernels_.get(kEndVolumeSpirv, 0), picture.view());
   }
 
  private:
-  void add(GpuPicture& picture, const DrawnContent<GpuContent>& drawn, bool isSurround) {
+  void add(GpuPicture& picture, const DrawnContent<GpuContent>& drawn, bool isBackgroundBlock) {
     const auto& content = static_cast<const GpuVolumeContent&>(*drawn.content);
-    auto draw =
-        drawArguments<arguments::DrawVolumeArguments>(picture.view(), content, drawn.low, drawn.high, isSurround);
+    auto draw = drawArguments<arguments::DrawVolumeArguments>(picture.view(), content, drawn.low, drawn.high,
+                                                              isBackgroundBlock);
     draw.layerCount = content.network.layerCount;
     draw.featureRange = content.featureRange;
     draw.densityRange = content.densityRange;
     draw.stepsPerTexel = content.stepsPerTexel;
     draw.layers = content.network.layers;
     draw.weights = content.network.weights;
-    picture.run(kernels_.get(kDrawVolumeSpirv, content.network.mostWidth), draw);
+    picture.run(kernels_.get(kDrawVolumeSpirv, content.network.maxWidth), draw);
   }
 
   std::shared_ptr<GpuStream> stream_;

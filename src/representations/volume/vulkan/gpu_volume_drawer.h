@@ -1,4 +1,4 @@
-// Draws contents of `volume` on a GPU.
+// The GPU drawer of `volume` contents.
 #pragma once
 
 #include "render/vulkan/gpu_drawer.h"

@@ -1,4 +1,4 @@
-// The button that enters a headset, where there is one.
+// The button that enters a headset, if there is one.
 import type { Shortcuts } from '../page/shortcuts';
 import type { Toolbar } from '../page/toolbar';
 import type { Viewer } from '../viewer';
@@ -16,6 +16,6 @@ export async function addHeadset(viewer: Viewer, toolbar: Toolbar, shortcuts: Sh
     button.setAttribute('aria-pressed', String(isOn));
   };
   headset.onChange(false);
-  shortcuts.describe('Headset: left stick', 'Glide over the ground, to where one looks');
-  shortcuts.describe('Headset: right stick', 'Turn by 30 degrees; down, up');
+  shortcuts.describe('Headset: left stick', 'Move over the ground, relative to the gaze');
+  shortcuts.describe('Headset: right stick', 'Turn by 30 degrees; move down and up');
 }

@@ -1,21 +1,22 @@
-// A headset that shows the scene (WebXR): one stands where the view's eye was, at true size, and the controllers' sticks move.
+// Shows the scene in a headset (WebXR): the user stands at the eye of the current view, at true scale, and moves with
+// the controllers' thumbsticks.
 import * as THREE from 'three';
 import { SceneError } from '../../scene-error';
 import { GroundFrame } from '../measuring/geodesy';
 import type { Look } from '../moving/navigation';
 import type { Mover, Viewer } from '../viewer';
 import { Rig, type Head } from './rig';
-import { glideOf, riseOf, stickOf, StepTurn } from './sticks';
+import { computeGlide, computeRise, readStick, StepTurn } from './sticks';
 
-// 18 ms: between a picture missed by the slowest headsets, of 72 a second, and one shown in time by a screen of 60.
+// 18 ms lies between a missed frame of the slowest headsets, at 72 Hz, and a timely frame of a screen at 60 Hz.
 const kPace = { target: 18, patience: 150, share: 0.5 };
-const kWalk = 2; // metres a second, at least; from above, as far as one is high in a second
+const kWalk = 2; // metres per second, at least; higher up, the eye's height per second
 
 export class Headset implements Mover {
   onChange: (isOn: boolean) => void = () => {};
   private rig?: Rig;
-  private head?: Head; // since it is known where it is
-  private start: Look; // what is to be seen first
+  private head?: Head; // undefined until the headset has a pose
+  private start: Look; // the first view in the headset
   private readonly turning = new StepTurn();
   private isEntering = false;
 
@@ -29,7 +30,7 @@ export class Headset implements Mover {
     return this.rig !== undefined;
   }
 
-  // Throws SceneError.
+  // Throws SceneError if the headset cannot be entered.
   async enter(): Promise<void> {
     if (this.isOn || this.isEntering) return;
     this.isEntering = true;
@@ -40,8 +41,8 @@ export class Headset implements Mover {
     }
     this.start = this.viewer.navigation.look;
     this.rig = new Rig(this.unitsPerMetre);
-    this.rig.room.add(this.viewer.camera);
-    this.viewer.world.add(this.rig.room);
+    this.rig.playSpace.add(this.viewer.camera);
+    this.viewer.world.add(this.rig.playSpace);
     this.viewer.takeOver(this, kPace);
     this.onChange(true);
   }
@@ -52,15 +53,15 @@ export class Headset implements Mover {
 
   get look(): Look {
     if (!this.rig || !this.head) return this.start;
-    const eye = this.rig.eyeOf(this.head);
-    const gaze = this.rig.gazeOf(this.head);
-    // Where the gaze meets the ground, about; no farther than what was looked at before.
-    const most = this.start.eye.distanceTo(this.start.target);
-    const toGround = gaze.y < 0 ? Math.max(this.heightOf(eye), this.viewer.navigation.orbit.minDistance) / -gaze.y : most;
-    return { eye, target: eye.clone().addScaledVector(gaze, Math.min(toGround, most)) };
+    const eye = this.rig.eyePosition(this.head);
+    const gaze = this.rig.gazeDirection(this.head);
+    // The approximate intersection of the gaze with the ground, no farther away than the previous target.
+    const maximum = this.start.eye.distanceTo(this.start.target);
+    const toGround = gaze.y < 0 ? Math.max(this.eyeHeight(eye), this.viewer.navigation.orbit.minDistance) / -gaze.y : maximum;
+    return { eye, target: eye.clone().addScaledVector(gaze, Math.min(toGround, maximum)) };
   }
 
-  // Upright, and where it is: the head looks up and down by itself.
+  // The user stays upright at the eye, as the head itself looks up and down.
   set look({ eye, target }: Look) {
     this.start = { eye, target };
     this.head = undefined;
@@ -70,7 +71,7 @@ export class Headset implements Mover {
     this.look = look;
   }
 
-  // Always true: each picture is of another place, as heads are never at rest.
+  // Returns true always: heads are never at rest, so every frame shows another view.
   update(seconds: number): boolean {
     const { xr } = this.viewer.renderer;
     const space = xr.getReferenceSpace();
@@ -80,12 +81,12 @@ export class Headset implements Mover {
     const head = (this.head = pose.transform);
     if (isFirst) this.rig.place(head, this.start.eye, headingTo(this.start));
     const sources = xr.getSession()?.inputSources ?? [];
-    const turn = this.turning.turnOf(stickOf(sources, 'right'));
+    const turn = this.turning.updateTurn(readStick(sources, 'right'));
     if (turn !== 0) this.rig.turn(head, turn);
-    const { right, forward } = glideOf(stickOf(sources, 'left'));
-    const way = new THREE.Vector3(right, riseOf(stickOf(sources, 'right')), -forward);
-    way.applyAxisAngle(THREE.Object3D.DEFAULT_UP, this.rig.headingOf(head));
-    const speed = Math.max(kWalk * this.unitsPerMetre, this.heightOf(this.rig.eyeOf(head)));
+    const { right, forward } = computeGlide(readStick(sources, 'left'));
+    const way = new THREE.Vector3(right, computeRise(readStick(sources, 'right')), -forward);
+    way.applyAxisAngle(THREE.Object3D.DEFAULT_UP, this.rig.computeHeading(head));
+    const speed = Math.max(kWalk * this.unitsPerMetre, this.eyeHeight(this.rig.eyePosition(head)));
     this.rig.move(way.multiplyScalar(speed * Math.min(seconds, 0.1)));
     return true;
   }
@@ -95,13 +96,13 @@ export class Headset implements Mover {
     let session: XRSession | undefined;
     try {
       session = await navigator.xr!.requestSession('immersive-vr', { optionalFeatures: ['layers'] });
-      if (this.viewer.isHeld) throw new Error('a picture is being drawn');
+      if (this.viewer.isPaused) throw new Error('an image is being rendered');
       renderer.xr.enabled = true;
       await renderer.xr.setSession(session);
     } catch (error) {
       renderer.xr.enabled = false;
       await session?.end().catch(() => {});
-      if (!this.viewer.isHeld) this.viewer.takeOver(); // of what three has left half done
+      if (!this.viewer.isPaused) this.viewer.takeOver(); // restores what three.js has left half done
       const reason = `does not show the scene (${error instanceof Error ? error.message : String(error)})`;
       throw new SceneError('headset', '', reason, 'put it on, allow the page to use it, and try again');
     }
@@ -111,7 +112,7 @@ export class Headset implements Mover {
     const { viewer, rig } = this;
     if (!rig) return;
     const { look } = this;
-    rig.room.removeFromParent();
+    rig.playSpace.removeFromParent();
     viewer.camera.removeFromParent();
     viewer.camera.scale.setScalar(1);
     viewer.renderer.xr.enabled = false;
@@ -121,8 +122,8 @@ export class Headset implements Mover {
     this.onChange(false);
   }
 
-  // Above the lowest of what was captured.
-  private heightOf(eye: THREE.Vector3): number {
+  // Returns the height above the lowest point of the captured region.
+  private eyeHeight(eye: THREE.Vector3): number {
     return eye.y - this.viewer.city.bounds.min.y;
   }
 

@@ -1,51 +1,51 @@
-// Where the room of somebody with a headset stands in the world. What the headset tells of the head is in the room.
+// Places the play space of a headset in the world. Poses of the headset are relative to the play space.
 import * as THREE from 'three';
 
 export class Rig {
-  readonly room = new THREE.Group(); // holds the camera
+  readonly playSpace = new THREE.Group(); // contains the camera
 
-  // The room is in metres, whatever the world is in.
+  // The play space is in metres, whatever the unit of the world.
   constructor(unitsPerMetre: number) {
-    this.room.name = 'headset';
-    this.room.userData.isTool = true;
-    this.room.scale.setScalar(unitsPerMetre);
+    this.playSpace.name = 'headset';
+    this.playSpace.userData.isTool = true;
+    this.playSpace.scale.setScalar(unitsPerMetre);
   }
 
-  // Has the head stand at a place and look, over the ground, in a direction (radians to the left of -z).
+  // Moves the play space so that the head is at `eye` and faces a horizontal direction (radians to the left of -z).
   place(head: Head, eye: THREE.Vector3, heading: number): void {
-    this.room.rotation.y = heading - headingOf(head.orientation);
-    this.room.updateMatrix();
-    this.move(eye.clone().sub(this.eyeOf(head)));
+    this.playSpace.rotation.y = heading - computeHeading(head.orientation);
+    this.playSpace.updateMatrix();
+    this.move(eye.clone().sub(this.eyePosition(head)));
   }
 
-  // Radians, to the left, where one stands.
+  // Turns by `radians` to the left about the head.
   turn(head: Head, radians: number): void {
-    this.place(head, this.eyeOf(head), this.headingOf(head) + radians);
+    this.place(head, this.eyePosition(head), this.computeHeading(head) + radians);
   }
 
   move(way: THREE.Vector3): void {
-    this.room.position.add(way);
-    this.room.updateMatrix();
+    this.playSpace.position.add(way);
+    this.playSpace.updateMatrix();
   }
 
-  // In the world.
-  eyeOf({ position: { x, y, z } }: Head): THREE.Vector3 {
-    return new THREE.Vector3(x, y, z).applyMatrix4(this.room.matrix);
+  // Returns the position in the world.
+  eyePosition({ position: { x, y, z } }: Head): THREE.Vector3 {
+    return new THREE.Vector3(x, y, z).applyMatrix4(this.playSpace.matrix);
   }
 
-  gazeOf({ orientation }: Head): THREE.Vector3 {
-    return new THREE.Vector3(0, 0, -1).applyQuaternion(quaternion(orientation)).applyQuaternion(this.room.quaternion);
+  gazeDirection({ orientation }: Head): THREE.Vector3 {
+    return new THREE.Vector3(0, 0, -1).applyQuaternion(quaternion(orientation)).applyQuaternion(this.playSpace.quaternion);
   }
 
-  headingOf({ orientation }: Head): number {
-    return this.room.rotation.y + headingOf(orientation);
+  computeHeading({ orientation }: Head): number {
+    return this.playSpace.rotation.y + computeHeading(orientation);
   }
 }
 
 type Vector = Pick<DOMPointReadOnly, 'x' | 'y' | 'z'>;
 type Quaternion = Vector & Pick<DOMPointReadOnly, 'w'>;
 
-// In the room, as an XRRigidTransform has it.
+// A pose in the play space, in the form of XRRigidTransform.
 export interface Head {
   position: Vector;
   orientation: Quaternion;
@@ -55,6 +55,6 @@ function quaternion({ x, y, z, w }: Quaternion): THREE.Quaternion {
   return new THREE.Quaternion(x, y, z, w);
 }
 
-function headingOf(orientation: Quaternion): number {
+function computeHeading(orientation: Quaternion): number {
   return new THREE.Euler().setFromQuaternion(quaternion(orientation), 'YXZ').y;
 }

@@ -1,4 +1,5 @@
-// What the thumbsticks of a headset's controllers say (xr-standard: those after a touchpad's two axes, where there are four).
+// Reads the thumbsticks of a headset's controllers (xr-standard mapping: if there are four axes, those after the two of
+// the touchpad).
 import { beyondDeadZone } from '../moving/gamepad';
 
 export interface Stick {
@@ -11,7 +12,7 @@ interface InputSource {
   gamepad?: { axes: readonly number[] } | null;
 }
 
-export function stickOf(sources: Iterable<InputSource>, hand: 'left' | 'right'): Stick {
+export function readStick(sources: Iterable<InputSource>, hand: 'left' | 'right'): Stick {
   for (const { handedness, gamepad } of sources) {
     if (handedness !== hand || !gamepad || gamepad.axes.length < 2) continue;
     const [right, down] = gamepad.axes.length < 4 ? gamepad.axes : gamepad.axes.slice(2);
@@ -20,13 +21,13 @@ export function stickOf(sources: Iterable<InputSource>, hand: 'left' | 'right'):
   return { right: 0, up: 0 };
 }
 
-// How much of full speed: left stick to the right and forward; right stick, upwards.
-export function glideOf({ right, up }: Stick): { right: number; forward: number } {
+// Shares of full speed: the left stick moves to the right and forward, the right stick moves upwards.
+export function computeGlide({ right, up }: Stick): { right: number; forward: number } {
   return { right: beyondDeadZone(right), forward: beyondDeadZone(up) };
 }
 
-// What is pushed aside turns and does not rise.
-export function riseOf({ right, up }: Stick): number {
+// A stick that is pushed sideways turns and does not rise.
+export function computeRise({ right, up }: Stick): number {
   return Math.abs(up) > Math.abs(right) ? beyondDeadZone(up) : 0;
 }
 
@@ -34,12 +35,12 @@ const kTurn = Math.PI / 6;
 const kPushed = 0.7;
 const kReleased = 0.4;
 
-// In steps, one for each time that the stick is pushed aside: a view that turns smoothly makes people sick.
+// Turns in steps, one for each time that the stick is pushed sideways: views that turn smoothly cause motion sickness.
 export class StepTurn {
   private isPushed = false;
 
-  // Radians, to the left.
-  turnOf({ right, up }: Stick): number {
+  // Returns radians to the left.
+  updateTurn({ right, up }: Stick): number {
     const wasPushed = this.isPushed;
     this.isPushed = Math.abs(right) > (wasPushed ? kReleased : kPushed);
     const isAside = Math.abs(right) > Math.abs(up);

@@ -1,12 +1,13 @@
-// Boxes in which nothing of the scenes is drawn, and which one is selected.
+// Boxes in which nothing of the scenes is drawn, and the selected box.
 import * as THREE from 'three';
 import { kYUpFromZUp, kZUpFromYUp } from '../../axes';
-import { kMostHiddenBoxes } from '../../draw/hidden-boxes';
+import { kMaxHiddenBoxes } from '../../draw/hidden-boxes';
 import { scaleWithin } from '../world/world-fields';
 import type { HiddenPart } from '../world/world-file';
 import type { Viewer } from '../viewer';
 
-// A cube of edge 1 about its origin, scaled; turned about the vertical alone. Shows its edges while it is selected.
+// A cube of edge 1 about its origin, which is scaled, and rotated about the vertical axis only. Its edges are visible
+// while it is selected.
 export class HiddenBox extends THREE.Object3D {
   hides = true;
   private readonly edges: THREE.LineSegments;
@@ -26,7 +27,7 @@ export class HiddenBox extends THREE.Object3D {
     this.edges.visible = shows;
   }
 
-  // Of the capture's world, z up.
+  // The centre in the capture's world, z up.
   get part(): HiddenPart {
     const middle = this.position.clone().applyMatrix4(kZUpFromYUp).toArray();
     const { x, y, z } = this.scale;
@@ -41,7 +42,7 @@ export class HiddenBox extends THREE.Object3D {
     this.hides = hides;
   }
 
-  // Radians, anticlockwise from above.
+  // Radians, anticlockwise as seen from above.
   get turn(): number {
     return new THREE.Euler().setFromQuaternion(this.quaternion, 'YXZ').y;
   }
@@ -59,7 +60,7 @@ export class HiddenBox extends THREE.Object3D {
 
 export class HiddenParts {
   readonly list: HiddenBox[] = [];
-  readonly onChange = new Set<() => void>(); // of the list, of what is selected, of a box
+  readonly onChange = new Set<() => void>(); // called when the list, the selection or a box changes
   private chosen?: HiddenBox;
 
   constructor(private readonly viewer: Viewer) {
@@ -67,7 +68,7 @@ export class HiddenParts {
   }
 
   get isFull(): boolean {
-    return this.list.length >= kMostHiddenBoxes;
+    return this.list.length >= kMaxHiddenBoxes;
   }
 
   get selected(): HiddenBox | undefined {
@@ -82,7 +83,7 @@ export class HiddenParts {
     this.changed();
   }
 
-  // About a place of the world, a twentieth of what there is to be seen across.
+  // Adds a box at a place in the world, with 1/20 of the extent of the visible world.
   addAt(place: THREE.Vector3): HiddenBox {
     const size = this.viewer.city.bounds.getSize(new THREE.Vector3());
     const box = this.add(new HiddenBox(this.freeName()));
@@ -92,7 +93,7 @@ export class HiddenParts {
     return box;
   }
 
-  // In place of those that are there.
+  // Replaces all boxes.
   show(parts: readonly HiddenPart[]): void {
     for (const box of [...this.list]) this.remove(box);
     for (const part of parts) this.add(new HiddenBox(part.name)).part = part;

@@ -1,4 +1,4 @@
-// The list of hidden parts, and where the selected one is, in numbers.
+// The list of hidden parts, and the numeric placement of the selected one.
 import * as THREE from 'three';
 import { kGizmoModes, type GizmoMode, type ModelGizmo } from '../models/model-gizmo';
 import { element } from '../page/element';
@@ -11,7 +11,7 @@ const kAxes = ['x', 'y', 'z, up'];
 
 export class HidingPanel {
   readonly body = element('div', 'hiding listed');
-  private readonly hint = element('p', 'faint', 'What lies in a box of these is not drawn. Models are.');
+  private readonly hint = element('p', 'faint', 'The scene is not drawn inside these boxes. Models are.');
   private readonly list = element('ul');
   private readonly details = element('div', 'details');
   private readonly name = nameField(kNameLength, (to) => this.change((part) => (part.name = to)), () => this.show());
@@ -41,7 +41,7 @@ export class HidingPanel {
     this.show();
   }
 
-  // While it is asked for a place.
+  // Shows whether the tool is asking for a place.
   asks(isAsking: boolean): void {
     this.add.textContent = isAsking ? 'Choose a place in the city' : 'Hide a part…';
     this.add.classList.toggle('on', isAsking);
@@ -49,13 +49,13 @@ export class HidingPanel {
 
   private show(): void {
     const { list, selected, isFull } = this.parts;
-    // The list is made anew only where it differs, so that a button that is pressed meanwhile stays.
+    // The list is rebuilt only if it differs, so that a pressed button is not replaced.
     const now = JSON.stringify(list.map((box) => [box.id, box.name, box.hides, box === selected]));
     if (now !== this.shown) replaceRows(this.list, list.map((box) => this.row(box)));
     this.shown = now;
     this.list.hidden = list.length === 0;
     this.add.disabled = isFull;
-    this.add.title = isFull ? 'There can be no more of them' : '';
+    this.add.title = isFull ? 'The maximum number of boxes is reached' : '';
     this.details.hidden = !selected;
     if (!selected) return;
     const { name, middle, size, turn } = selected.part;

@@ -1,4 +1,4 @@
-// Parts of the city that are not shown: a click places a box, handles move it.
+// The tool for hiding parts of the city: a click places a box, and handles move it.
 import { ModelGizmo } from '../models/model-gizmo';
 import { isTyping, type Shortcuts } from '../page/shortcuts';
 import type { Toolbar } from '../page/toolbar';
@@ -8,7 +8,7 @@ import { HidingPanel } from './hiding-panel';
 
 export function addHiding(viewer: Viewer, parts: HiddenParts, toolbar: Toolbar, shortcuts: Shortcuts): void {
   const gizmo = new ModelGizmo(viewer, () => parts.changed(), true);
-  let isAsking = false; // for a place
+  let isAsking = false; // waiting for a click on a place
   const ask = (asks: boolean) => {
     isAsking = asks;
     viewer.canvas.style.cursor = asks ? 'crosshair' : '';
@@ -28,7 +28,7 @@ export function addHiding(viewer: Viewer, parts: HiddenParts, toolbar: Toolbar, 
   addEventListener('keydown', ({ key, target }) => {
     if (key === 'Delete' && parts.selected && !isTyping(target)) parts.remove(parts.selected);
   });
-  // Before models under the pointer are asked.
+  // Precedes the selection of models by clicks.
   viewer.onClick.unshift((event) => {
     if (isAsking) {
       const place = viewer.pickAt(event);

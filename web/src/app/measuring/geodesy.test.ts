@@ -5,11 +5,11 @@ import { goldenText } from '../../testing/golden';
 import type { Vec3 } from '../../tiles/tileset';
 import { degrees, earthFromEastNorthUp, earthFromGeodetic, geodeticFromEarth, GroundFrame } from './geodesy';
 
-function expectClose(found: Vec3, expected: readonly number[], most: number): void {
-  found.forEach((value, axis) => expect(Math.abs(value - expected[axis])).toBeLessThan(most));
+function expectClose(actual: Vec3, expected: readonly number[], maximum: number): void {
+  actual.forEach((value, axis) => expect(Math.abs(value - expected[axis])).toBeLessThan(maximum));
 }
 
-// What the golden scene's writer says of its georeference, by GeographicLib: the pose of the tangent plane.
+// The writer of the golden scene computed this georeference, the pose of the tangent plane, with GeographicLib.
 const { root, extensions } = JSON.parse(goldenText('tileset.json')) as {
   root: { transform: number[] };
   extensions: { TESSERA_scene: { georeference: { latitude: number; longitude: number; altitude: number } } };
@@ -18,20 +18,20 @@ const { latitude, longitude, altitude } = extensions.TESSERA_scene.georeference;
 const brighton = { latitude, longitude, height: altitude };
 
 describe('the Earth', () => {
-  it('has the places of the ellipsoid', () => {
+  it('converts places on the ellipsoid', () => {
     expectClose(earthFromGeodetic({ latitude: 0, longitude: 0, height: 0 }), [6378137, 0, 0], 1e-6);
     expectClose(earthFromGeodetic({ latitude: 0, longitude: 90, height: 10 }), [0, 6378147, 0], 1e-6);
     expectClose(earthFromGeodetic({ latitude: 90, longitude: 0, height: 5 }), [0, 0, 6356752.314245 + 5], 1e-5);
     expectClose(earthFromGeodetic(brighton), root.transform.slice(12, 15), 1e-6);
   });
 
-  it('has east, north and up where GeographicLib has them', () => {
+  it('agrees with GeographicLib on east, north and up', () => {
     const t = root.transform;
     const expected = [0, 1, 2].map((row) => t[row] * 300 + t[4 + row] * -200 + t[8 + row] * 50 + t[12 + row]);
     expectClose(earthFromEastNorthUp(brighton, [300, -200, 50]), expected, 1e-6);
   });
 
-  it('comes back from every place', () => {
+  it('converts every place back to itself', () => {
     for (const lat of [-90, -89.9999, -45, -0.001, 0, 12.3, 46.4531, 60, 89.9, 90]) {
       for (const lon of [-179.5, -90, 0, 6.5412, 135]) {
         for (const height of [-400, 0, 372, 8848, 50000]) {
@@ -45,7 +45,7 @@ describe('the Earth', () => {
   });
 });
 
-// Turned by 30° about up, two units a metre.
+// Rotated by 30° about the vertical axis, with two units per metre.
 const [cos, sin] = [0.5 * Math.cos(Math.PI / 6), 0.5 * Math.sin(Math.PI / 6)];
 const turned = new GroundFrame({
   latitude: 46.4531, longitude: 6.5412, altitude: 372,
@@ -53,7 +53,7 @@ const turned = new GroundFrame({
 });
 
 describe('the frame of the ground', () => {
-  it('is that of the capture, z up, in units of it, where nothing says where it is', () => {
+  it("is the capture's own, z up, in its units, without a georeference", () => {
     const frame = new GroundFrame();
     expect(frame.isGeoreferenced).toBe(false);
     expect(frame.inGround([1, 2, 3])).toEqual([1, -3, 2]);
@@ -64,7 +64,7 @@ describe('the frame of the ground', () => {
     expect(frame.area(1234.56)).toBe('1235 units²');
   });
 
-  it('is metres east, north and up of the georeference', () => {
+  it('is in metres east, north and up with a georeference', () => {
     expectClose(turned.inGround([10, 8, 0]), [100 + 10 * cos, 200 + 10 * sin, 7], 1e-12);
     expect(turned.unitsPerMetre).toBeCloseTo(2, 12);
     expectClose(turned.up, [0, 2, 0], 1e-12);
@@ -72,9 +72,9 @@ describe('the frame of the ground', () => {
     expectClose(tilted.inGround(tilted.up), [1, 2, 4], 1e-12);
   });
 
-  it('says where places of the viewer are', () => {
+  it('converts places of the viewer', () => {
     const frame = new GroundFrame(decodeTileset(goldenText('tileset.json'), 'tileset.json', kCodecs).georeference);
-    // Two steps of a hundred metres: radii of curvature at 50.8225° N, by hand.
+    // Two steps of a hundred metres; the radii of curvature at 50.8225° N are computed by hand.
     const e2 = 0.00669437999014;
     const w = Math.sqrt(1 - e2 * Math.sin((latitude * Math.PI) / 180) ** 2);
     const northRadius = (6378137 * (1 - e2)) / w ** 3 + altitude;
@@ -84,11 +84,11 @@ describe('the frame of the ground', () => {
     expect(north.longitude).toBeCloseTo(longitude, 9);
     const east = frame.onEarth([100, 0, 0])!;
     expect(east.longitude).toBeCloseTo(longitude + ((100 / eastRadius) * 180) / Math.PI, 8);
-    // The tangent plane leaves the ellipsoid by d² / 2R.
+    // The tangent plane departs from the ellipsoid by d² / 2R.
     expect(east.height - altitude).toBeCloseTo(100 ** 2 / (2 * 6378137), 4);
   });
 
-  it('says lengths, areas and degrees as people do', () => {
+  it('formats lengths, areas and degrees', () => {
     expect(turned.length(12.344)).toBe('12.34 m');
     expect(turned.length(999.99)).toBe('999.99 m');
     expect(turned.length(999.996)).toBe('1.000 km');

@@ -1,4 +1,5 @@
-// Where places of the viewer are on the Earth, and how lengths are said. The viewer's world is the capture's, y up.
+// Converts places of the viewer to geographic coordinates, and formats lengths. The viewer's world is the capture's, y
+// up.
 import type { Georeference, Vec3 } from '../../tiles/tileset';
 
 export interface Geodetic {
@@ -15,7 +16,7 @@ const kEccentricity2 = kFlattening * (2 - kFlattening);
 const kSecondEccentricity2 = kEccentricity2 / (1 - kEccentricity2);
 const kDegree = Math.PI / 180;
 
-// Earth-centred, earth-fixed metres (EPSG 4978).
+// Converts to Earth-centred, Earth-fixed metres (EPSG 4978).
 export function earthFromGeodetic({ latitude, longitude, height }: Geodetic): Vec3 {
   const [sin, cos] = [Math.sin(latitude * kDegree), Math.cos(latitude * kDegree)];
   const normal = kEquator / Math.sqrt(1 - kEccentricity2 * sin * sin);
@@ -27,8 +28,9 @@ export function earthFromGeodetic({ latitude, longitude, height }: Geodetic): Ve
   ];
 }
 
-// Bowring, "Transformation from spatial to geographical coordinates", Survey Review 23 (1976), once more than he needs;
-// the height as in Bowring, "The accuracy of geodetic latitude and height equations", Survey Review 28 (1985).
+// Bowring, "Transformation from spatial to geographical coordinates", Survey Review 23 (1976), with one more iteration
+// than in the paper; the height follows Bowring, "The accuracy of geodetic latitude and height equations", Survey
+// Review 28 (1985).
 export function geodeticFromEarth([x, y, z]: Vec3): Geodetic {
   const fromAxis = Math.hypot(x, y);
   let reduced = Math.atan2(z * kEquator, fromAxis * kPole);
@@ -44,19 +46,19 @@ export function geodeticFromEarth([x, y, z]: Vec3): Geodetic {
   return { latitude: latitude / kDegree, longitude: Math.atan2(y, x) / kDegree, height };
 }
 
-// From metres east, north and up of a place.
+// Converts from metres east, north and up of a place.
 export function earthFromEastNorthUp(origin: Geodetic, [east, north, up]: Vec3): Vec3 {
   const [sinLat, cosLat] = [Math.sin(origin.latitude * kDegree), Math.cos(origin.latitude * kDegree)];
   const [sinLon, cosLon] = [Math.sin(origin.longitude * kDegree), Math.cos(origin.longitude * kDegree)];
   const [x, y, z] = earthFromGeodetic(origin);
-  const outward = cosLat * up - sinLat * north; // from the Earth's axis
+  const outward = cosLat * up - sinLat * north; // away from the Earth's axis
   return [x + cosLon * outward - sinLon * east, y + sinLon * outward + cosLon * east, z + sinLat * up + cosLat * north];
 }
 
-// The frame that figures are in: metres east, north and up of the georeference; without one the capture's own axes, z up,
-// in units that nobody knows the length of.
+// The frame in which measurements are given: metres east, north and up of the georeference; without one, the capture's
+// own axes, z up, in units of unknown length.
 export class GroundFrame {
-  readonly unitsPerMetre: number; // of the viewer's world; of units, 1
+  readonly unitsPerMetre: number; // units of the viewer's world; 1 without a georeference
   private readonly origin?: Geodetic;
   private readonly fromWorld: readonly number[];
 
@@ -79,19 +81,20 @@ export class GroundFrame {
     return [row(0), row(1), row(2)];
   }
 
-  // One metre, or unit, upwards, in the viewer's world.
+  // One metre (or unit) upwards, in the viewer's world.
   get up(): Vec3 {
     const m = this.fromWorld;
     const squared = this.unitsPerMetre ** 2;
     return [m[2] * squared, m[10] * squared, -m[6] * squared];
   }
 
-  // Nothing where the capture is nowhere on the Earth.
+  // Returns undefined if the capture is not georeferenced.
   onEarth(place: Vec3): Geodetic | undefined {
     return this.origin && geodeticFromEarth(earthFromEastNorthUp(this.origin, this.inGround(place)));
   }
 
-  // Above the ellipsoid, so that the Earth's curvature counts; else along the capture's z.
+  // Returns the height above the ellipsoid, which takes the Earth's curvature into account; without a georeference, the
+  // height along the capture's z axis.
   height(place: Vec3): number {
     return this.onEarth(place)?.height ?? this.inGround(place)[2];
   }
@@ -109,7 +112,7 @@ export class GroundFrame {
   }
 }
 
-// 7 decimals are a centimetre.
+// 7 decimals resolve a centimetre.
 export function degrees(value: number): string {
   return value.toFixed(7);
 }

@@ -1,12 +1,12 @@
-// What is said of measurements: in the panel, beside them, and in files.
+// The texts of measurements: in the panel, as labels, and in exported files.
 import type { Vec3 } from '../../tiles/tileset';
 import { degrees, fourDigits, type GroundFrame } from './geodesy';
 import { areaFigures, corner, lineFigures, middle, type Kind, type Measurement } from './measurement';
 
 export const kKindNames: Record<Kind, string> = { place: 'Place', distance: 'Distance', height: 'Height', area: 'Area' };
 
-// What to do next.
-export function hintOf(kind: Kind, isTouch: boolean): string {
+// Returns the instruction for the next step.
+export function hintText(kind: Kind, isTouch: boolean): string {
   const click = isTouch ? 'Tap' : 'Click';
   const end = isTouch ? 'Done ends' : 'double click ends';
   const hints: Record<Kind, string> = {
@@ -25,7 +25,7 @@ export interface Label {
   at: Vec3;
   text: string;
   isMinor?: boolean;
-  stands?: 'above' | 'beside'; // of the place, so that a dot or a short line can be seen
+  stands?: 'above' | 'beside'; // relative to the place, so that a dot or a short line remains visible
 }
 
 export function placeRows(place: Vec3, frame: GroundFrame): Row[] {
@@ -38,14 +38,14 @@ export function placeRows(place: Vec3, frame: GroundFrame): Row[] {
   ];
 }
 
-// For the clipboard: latitude, longitude and height; else x, y and z.
+// Returns text for the clipboard: latitude, longitude and height, or x, y and z without a georeference.
 export function placeNumbers(place: Vec3, frame: GroundFrame): string {
   const earth = frame.onEarth(place);
   if (!earth) return frame.inGround(place).map(fourDigits).join(', ');
   return `${degrees(earth.latitude)}, ${degrees(earth.longitude)}, ${earth.height.toFixed(2)}`;
 }
 
-export function rowsOf({ kind, places }: Measurement, frame: GroundFrame): Row[] {
+export function measurementRows({ kind, places }: Measurement, frame: GroundFrame): Row[] {
   if (kind === 'place' || places.length < 2) return [];
   if (kind === 'area' && places.length > 2) {
     const { plan, plane, perimeter, crosses } = areaFigures(places, frame);
@@ -60,15 +60,15 @@ export function rowsOf({ kind, places }: Measurement, frame: GroundFrame): Row[]
   return [['Length', frame.length(length)], ['Horizontal', frame.length(horizontal)], ['Rise', `${sign}${frame.length(Math.abs(rise))}`]];
 }
 
-// The one figure that stands for it.
+// Returns the one figure that represents a measurement.
 export function headline(measurement: Measurement, frame: GroundFrame): string {
   const { kind, places } = measurement;
   if (kind === 'place') {
     const earth = frame.onEarth(places[0]);
     return earth ? `${earth.latitude.toFixed(5)}°, ${earth.longitude.toFixed(5)}°` : placeNumbers(places[0], frame);
   }
-  const rows = rowsOf(measurement, frame);
-  // Of a wall, the plan says nothing.
+  const rows = measurementRows(measurement, frame);
+  // The plan area of a wall is meaningless.
   if (kind === 'area' && rows.length === 3) {
     const { plan, plane } = areaFigures(places, frame);
     return plan < 0.5 * plane ? rows[1][1] : rows[0][1];
@@ -76,7 +76,7 @@ export function headline(measurement: Measurement, frame: GroundFrame): string {
   return rows[0]?.[1] ?? '';
 }
 
-export function labelsOf(measurement: Measurement, frame: GroundFrame): Label[] {
+export function measurementLabels(measurement: Measurement, frame: GroundFrame): Label[] {
   const { kind, places } = measurement;
   const text = headline(measurement, frame);
   if (text === '') return [];
@@ -93,8 +93,9 @@ export function labelsOf(measurement: Measurement, frame: GroundFrame): Label[] 
   return [...minor, { at: places[places.length - 1], text: `Σ ${text}`, stands: 'above' }];
 }
 
-// GeoJSON (RFC 7946) where the capture is on the Earth; else what it is in the capture's own axes and units.
-export function fileOf(measurements: readonly Measurement[], frame: GroundFrame): { extension: string; text: string } {
+// Exports GeoJSON (RFC 7946) if the capture is georeferenced, otherwise coordinates in the capture's own axes and
+// units.
+export function exportMeasurements(measurements: readonly Measurement[], frame: GroundFrame): { extension: string; text: string } {
   const isOnEarth = frame.isGeoreferenced;
   const content = isOnEarth
     ? { type: 'FeatureCollection', features: measurements.map((one) => feature(one, frame)) }
@@ -114,7 +115,7 @@ function feature(measurement: Measurement, frame: GroundFrame) {
   let geometry: { type: string; coordinates: unknown } = { type: 'LineString', coordinates: positions };
   if (kind === 'place') geometry = { type: 'Point', coordinates: positions[0] };
   if (kind === 'area') {
-    if (isClockwise(positions)) positions.reverse(); // outer rings run the other way about
+    if (isClockwise(positions)) positions.reverse(); // outer rings must be counterclockwise
     geometry = { type: 'Polygon', coordinates: [[...positions, positions[0]]] };
   }
   return { type: 'Feature', geometry, properties: properties(measurement, frame) };

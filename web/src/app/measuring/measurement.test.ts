@@ -4,18 +4,18 @@ import { OpaqueDepth } from '../../draw/opaque-depth';
 import type { Vec3 } from '../../tiles/tileset';
 import { GroundFrame } from './geodesy';
 import { areaFigures, areaVector, corner, lineFigures, onPlane, type Measurement } from './measurement';
-import { fileOf, headline, hintOf, labelsOf, rowsOf } from './measurement-text';
+import { exportMeasurements, headline, hintText, measurementLabels, measurementRows } from './measurement-text';
 import { MeasuringMarks } from './measuring-marks';
 
 const identity = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 const lake = new GroundFrame({ latitude: 46.4531, longitude: 6.5412, altitude: 372, enuFromWorld: identity });
 const nowhere = new GroundFrame();
-// Of the viewer's world, from metres east, north and up.
+// Converts metres east, north and up to the viewer's world.
 const at = (east: number, north: number, up: number): Vec3 => [east, up, -north];
 const rectangle = [at(0, 0, 5), at(40, 0, 5), at(40, 30, 5), at(0, 30, 5)];
 
 describe('a line', () => {
-  it('is as long as its segments, in plan and upwards', () => {
+  it('has the horizontal length and rise of its segments', () => {
     const { segments, length, horizontal, rise } = lineFigures([at(0, 0, 0), at(3, 0, 4), at(3, 5, 4)], nowhere);
     expect(segments).toEqual([5, 5]);
     expect([length, horizontal, rise]).toEqual([10, 8, 4]);
@@ -30,7 +30,7 @@ describe('a line', () => {
     expect(near.horizontal).toBeCloseTo(30, 3);
   });
 
-  it('has the corner of a height above the lower place, or below the higher', () => {
+  it('has the right angle of a height at the height of the lower place', () => {
     const expected = at(7, 1, 2);
     const [low, high] = [at(3, 1, 2), at(7, 1, 12)];
     for (const places of [[low, high], [high, low]]) {
@@ -40,7 +40,7 @@ describe('a line', () => {
 });
 
 describe('an area', () => {
-  it('of a flat polygon is the same in plan and on its plane, either way about', () => {
+  it('of a horizontal polygon is the same in plan and on its plane, in either orientation', () => {
     for (const ring of [rectangle, [...rectangle].reverse()]) {
       const { plan, plane, perimeter, crosses } = areaFigures(ring, nowhere);
       expect([plan, plane, perimeter, crosses]).toEqual([1200, 1200, 140, false]);
@@ -54,7 +54,7 @@ describe('an area', () => {
     expect(plane).toBeCloseTo(50, 12);
   });
 
-  it('of a wall is that of the wall', () => {
+  it('of a wall is measured on the wall', () => {
     const wall = [at(0, 0, 0), at(6, 8, 0), at(6, 8, 3), at(0, 0, 3)];
     const { plan, plane, crosses } = areaFigures(wall, nowhere);
     expect(plan).toBeCloseTo(0, 12);
@@ -64,35 +64,35 @@ describe('an area', () => {
     expect(headline({ kind: 'area', places: rectangle }, lake)).toBe('1200.0 m²');
   });
 
-  it('does not change where the last place is the first again', () => {
+  it('does not change if the last place repeats the first', () => {
     const { plan, plane, perimeter, crosses } = areaFigures([...rectangle, rectangle[0]], nowhere);
     expect([plan, plane, perimeter, crosses]).toEqual([1200, 1200, 140, false]);
   });
 
-  it('of an L is what it is, far from the origin too', () => {
+  it('of an L shape is exact, also far from the origin', () => {
     const ring = ([[0, 0], [20, 0], [20, 10], [10, 10], [10, 30], [0, 30]] as const).map(([x, y]): Vec3 => [x + 1e6, y - 2e6, 3]);
     expect(areaVector(ring)).toEqual([0, 0, 400]);
     expect(onPlane(ring)).toHaveLength(6);
   });
 
-  it('is not claimed where edges cross', () => {
+  it('is not reported if edges intersect', () => {
     const bow = [at(0, 0, 0), at(10, 10, 0), at(12, 0, 0), at(0, 9, 0)];
     expect(areaFigures(bow, nowhere).crosses).toBe(true);
-    expect(rowsOf({ kind: 'area', places: bow }, lake)[0]).toEqual(['Area', 'its edges cross']);
+    expect(measurementRows({ kind: 'area', places: bow }, lake)[0]).toEqual(['Area', 'its edges cross']);
   });
 });
 
-describe('what is said of measurements', () => {
+describe('the texts of measurements', () => {
   const line: Measurement = { kind: 'distance', places: [at(0, 0, 0), at(0, 0, 3), at(4, 0, 0)] };
 
-  it('is in metres on the Earth, and in units elsewhere', () => {
-    expect(rowsOf(line, lake)).toEqual([['Length', '8.00 m'], ['Horizontal', '4.00 m'], ['Rise', '+0.00 m']]);
-    expect(labelsOf(line, lake).map(({ text }) => text)).toEqual(['3.00 m', '5.00 m', 'Σ 8.00 m']);
+  it('are in metres with a georeference, and in units without', () => {
+    expect(measurementRows(line, lake)).toEqual([['Length', '8.00 m'], ['Horizontal', '4.00 m'], ['Rise', '+0.00 m']]);
+    expect(measurementLabels(line, lake).map(({ text }) => text)).toEqual(['3.00 m', '5.00 m', 'Σ 8.00 m']);
     expect(headline(line, nowhere)).toBe('8.000 units');
   });
 
-  it('goes into files as GeoJSON with closed rings counterclockwise', () => {
-    const { extension, text } = fileOf([line, { kind: 'area', places: [...rectangle].reverse() }, { kind: 'place', places: [at(0, 0, 0)] }], lake);
+  it('are exported as GeoJSON with closed counterclockwise rings', () => {
+    const { extension, text } = exportMeasurements([line, { kind: 'area', places: [...rectangle].reverse() }, { kind: 'place', places: [at(0, 0, 0)] }], lake);
     expect(extension).toBe('geojson');
     const { type, features } = JSON.parse(text);
     expect(type).toBe('FeatureCollection');
@@ -107,18 +107,18 @@ describe('what is said of measurements', () => {
     expect(twice).toBeGreaterThan(0);
   });
 
-  it('goes into plain files, in the axes of the capture, elsewhere', () => {
-    const { extension, text } = fileOf([line], nowhere);
+  it("are exported in the capture's axes without a georeference", () => {
+    const { extension, text } = exportMeasurements([line], nowhere);
     expect(extension).toBe('json');
     expect(JSON.parse(text).measurements[0]).toMatchObject({ kind: 'distance', length: 8, places: [[0, 0, 0], [0, 0, 3], [4, 0, 0]] });
   });
 });
 
-describe('what to do next', () => {
-  it('is said for what people point with', () => {
-    expect(hintOf('distance', false)).toBe('Click along it; double click ends.');
-    expect(hintOf('area', true)).toBe('Tap around it; Done ends.');
-    expect(hintOf('place', true)).toBe('Tap on a place.');
+describe('the instruction for the next step', () => {
+  it('depends on the pointing device', () => {
+    expect(hintText('distance', false)).toBe('Click along it; double click ends.');
+    expect(hintText('area', true)).toBe('Tap around it; Done ends.');
+    expect(hintText('place', true)).toBe('Tap on a place.');
   });
 });
 
@@ -135,11 +135,11 @@ describe('marks in the world', () => {
     expect(marks.group.children.length).toBeGreaterThan(3);
     world.add(city, marks.group);
     const picture = { camera: new THREE.PerspectiveCamera(), part: new THREE.Vector4(0, 0, 8, 8) };
-    const noRenderer = undefined as unknown as THREE.WebGLRenderer; // nobody draws anything
+    const noRenderer = undefined as unknown as THREE.WebGLRenderer; // nothing is rendered
     expect(new OpaqueDepth().draw(noRenderer, [picture], city, new THREE.Vector2(8, 8))).toBeNull();
   });
 
-  it('give back what is on the card', () => {
+  it('free their GPU memory', () => {
     const marks = new MeasuringMarks();
     marks.show(all, lake);
     const geometries = new Set(marks.group.children.map((child) => (child as THREE.Mesh).geometry));

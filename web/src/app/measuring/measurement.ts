@@ -1,4 +1,4 @@
-// What can be measured, and the mathematics of it. Places are of the viewer's world, in the order of the clicks.
+// The kinds of measurements and their mathematics. Places are in the viewer's world, in the order of the clicks.
 import type { Vec3 } from '../../tiles/tileset';
 import type { GroundFrame } from './geodesy';
 
@@ -10,10 +10,10 @@ export interface Measurement {
   places: readonly Vec3[];
 }
 
-export const kLeastPlaces: Record<Kind, number> = { place: 1, distance: 2, height: 2, area: 3 };
-export const kMostPlaces: Record<Kind, number> = { place: 1, distance: Infinity, height: 2, area: Infinity };
+export const kMinPlaces: Record<Kind, number> = { place: 1, distance: 2, height: 2, area: 3 };
+export const kMaxPlaces: Record<Kind, number> = { place: 1, distance: Infinity, height: 2, area: Infinity };
 
-// In the units of the frame.
+// Lengths in the units of the frame.
 export interface LineFigures {
   segments: number[];
   length: number;
@@ -23,16 +23,16 @@ export interface LineFigures {
 
 export interface AreaFigures {
   plan: number; // of the horizontal projection
-  plane: number; // on the plane that fits best
+  plane: number; // on the best-fitting plane
   perimeter: number;
-  crosses: boolean; // edges cross one another: the areas mean nothing
+  crosses: boolean; // edges intersect, so the areas are meaningless
 }
 
 export function lineFigures(places: readonly Vec3[], frame: GroundFrame): LineFigures {
   const ground = places.map((place) => frame.inGround(place));
   const heights = places.map((place) => frame.height(place));
   const segments = ground.slice(1).map((place, i) => length(minus(place, ground[i])));
-  // What is left of the straight line beside the rise, so that the Earth's curvature is in neither.
+  // The horizontal length follows from the straight length and the rise, so that the Earth's curvature affects neither.
   const flat = segments.map((straight, i) => Math.sqrt(Math.max(straight ** 2 - (heights[i + 1] - heights[i]) ** 2, 0)));
   return { segments, length: sum(segments), horizontal: sum(flat), rise: (heights.at(-1) ?? 0) - (heights[0] ?? 0) };
 }
@@ -44,22 +44,23 @@ export function areaFigures(places: readonly Vec3[], frame: GroundFrame): AreaFi
   return { plan: Math.abs(normal[2]), plane: length(normal), perimeter: sum(edges), crosses: crossesItself(onPlane(ring)) };
 }
 
-// Across the plane that fits best, as long as the polygon's area on it; its z is what the shoelace formula says of the
-// plan. Newell's method (Sutherland, Sproull, Schumacker, "A characterization of ten hidden-surface algorithms", 1974).
+// Returns the normal of the best-fitting plane, whose length is the polygon's area on it; its z is the plan area by the
+// shoelace formula. Newell's method (Sutherland, Sproull, Schumacker, "A characterization of ten hidden-surface
+// algorithms", 1974).
 export function areaVector(ring: readonly Vec3[]): Vec3 {
   let total: Vec3 = [0, 0, 0];
   for (let i = 1; i + 1 < ring.length; ++i) total = plus(total, cross(minus(ring[i], ring[0]), minus(ring[i + 1], ring[0])));
   return times(total, 0.5);
 }
 
-// As seen along the normal of the plane that fits best; counterclockwise.
+// Projects along the normal of the best-fitting plane; counterclockwise.
 export function onPlane(ring: readonly Vec3[]): [number, number][] {
   const normal = areaVector(ring);
   const size = length(normal);
   if (size === 0) return ring.map(() => [0, 0]);
   const n = times(normal, 1 / size);
-  const least = [0, 1, 2].reduce((best, axis) => (Math.abs(n[axis]) < Math.abs(n[best]) ? axis : best), 0);
-  const beside = cross(n, [0, 1, 2].map((axis) => (axis === least ? 1 : 0)) as unknown as Vec3);
+  const minimum = [0, 1, 2].reduce((best, axis) => (Math.abs(n[axis]) < Math.abs(n[best]) ? axis : best), 0);
+  const beside = cross(n, [0, 1, 2].map((axis) => (axis === minimum ? 1 : 0)) as unknown as Vec3);
   const u = times(beside, 1 / length(beside));
   const v = cross(n, u);
   return ring.map((place) => {
@@ -76,7 +77,7 @@ export function crossesItself(ring: readonly [number, number][]): boolean {
   return edges.some(([a, b], i) => edges.slice(i + 1).some(([c, d]) => crosses(a, b, c, d)));
 }
 
-// Of a height: above the lower place, as high as the other, and the other way about; in the viewer's world.
+// Returns the corner of a height's right angle, in the viewer's world: below the higher place, level with the lower one.
 export function corner([a, b]: readonly Vec3[], frame: GroundFrame): Vec3 {
   const rise = frame.height(b) - frame.height(a);
   return rise > 0 ? plus(b, times(frame.up, -rise)) : plus(a, times(frame.up, rise));

@@ -1,5 +1,5 @@
-// Figures beside measurements, and the band from the last place to the pointer: part of the page, over the picture, so
-// that moving the pointer draws no new picture.
+// Labels beside measurements, and the rubber band from the last place to the pointer. They are part of the page, over
+// the canvas, so that moving the pointer needs no new frame.
 import * as THREE from 'three';
 import type { Vec3 } from '../../tiles/tileset';
 import { element } from '../page/element';
@@ -10,8 +10,8 @@ const kSvg = 'http://www.w3.org/2000/svg';
 const kStands = { on: '-50%, -50%', above: '-50%, calc(-100% - 9px)', beside: '10px, -50%' };
 
 export interface Band {
-  from: readonly Vec3[]; // lines go from each of these
-  x: number; // to here, pixels of the canvas
+  from: readonly Vec3[]; // a line is drawn from each of these
+  x: number; // end of the lines, in pixels of the canvas
   y: number;
   text: string;
 }
@@ -44,10 +44,10 @@ export class MeasuringLabels {
     this.placeBand();
   }
 
-  // After the camera has moved.
+  // Must be called after the camera has moved.
   place(): void {
     for (const { at, node, stands } of this.placed) {
-      const pixel = this.pixelOf(at);
+      const pixel = this.projectToPixel(at);
       node.hidden = !pixel;
       if (!pixel) continue;
       node.style.transform = `translate(${pixel.x.toFixed(1)}px, ${pixel.y.toFixed(1)}px) translate(${kStands[stands ?? 'on']})`;
@@ -55,8 +55,8 @@ export class MeasuringLabels {
     this.placeBand();
   }
 
-  // Where a place of the world is on the canvas; nothing behind the camera.
-  pixelOf(place: Vec3): { x: number; y: number } | undefined {
+  // Returns where a place of the world is on the canvas, or undefined if it is behind the camera.
+  projectToPixel(place: Vec3): { x: number; y: number } | undefined {
     const inCamera = new THREE.Vector3(...place).applyMatrix4(this.camera.matrixWorldInverse);
     if (inCamera.z >= 0) return undefined;
     const { x, y } = inCamera.applyMatrix4(this.camera.projectionMatrix);
@@ -65,7 +65,7 @@ export class MeasuringLabels {
 
   private placeBand(): void {
     const { band } = this;
-    const begins = band?.from.map((place) => this.pixelOf(place)).filter((pixel) => pixel !== undefined) ?? [];
+    const begins = band?.from.map((place) => this.projectToPixel(place)).filter((pixel) => pixel !== undefined) ?? [];
     this.lines.replaceChildren(...begins.map(({ x, y }) => {
       const line = document.createElementNS(kSvg, 'line');
       const ends = { x1: x, y1: y, x2: band!.x, y2: band!.y };
@@ -75,7 +75,7 @@ export class MeasuringLabels {
     this.bandText.hidden = begins.length === 0 || !band?.text;
     if (!band) return;
     this.bandText.textContent = band.text;
-    // Below and right of the pointer, as long as that is on the canvas.
+    // Below and to the right of the pointer, if that is on the canvas.
     const { offsetWidth: width, offsetHeight: height } = this.bandText;
     const x = Math.min(band.x + 14, this.canvas.clientWidth - width - 4);
     const y = band.y + 12 + height > this.canvas.clientHeight - 4 ? band.y - 12 - height : band.y + 12;

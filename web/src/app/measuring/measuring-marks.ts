@@ -1,4 +1,5 @@
-// Measurements in the world: lines, dots and areas that are seen through everything, of one size on the screen.
+// Measurements in the world: lines, dots and areas that are visible through everything and have a constant size on the
+// screen.
 import * as THREE from 'three';
 import { LineMaterial } from 'three/addons/lines/LineMaterial.js';
 import { LineSegments2 } from 'three/addons/lines/LineSegments2.js';
@@ -8,8 +9,8 @@ import type { GroundFrame } from './geodesy';
 import { corner, onPlane, type Measurement } from './measurement';
 
 const kAccent = 0x6fc2d0;
-const kShade = 0x0b1013; // around what is bright, so that it shows on bright ground
-// Seen through everything, and nothing that would end a ray of the scene.
+const kShade = 0x0b1013; // outline that makes bright marks visible on bright ground
+// Visible through everything; transparent, so that it ends no rays of the scene.
 const kThrough = { transparent: true, depthTest: false, depthWrite: false, toneMapped: false } as const;
 
 const kDotVertexShader = `
@@ -52,7 +53,7 @@ export class MeasuringMarks {
     this.group.userData.isTool = true;
   }
 
-  // In place of what was shown.
+  // Replaces the marks.
   show(measurements: readonly Measurement[], frame: GroundFrame): void {
     this.clear();
     const [lines, thinLines, triangles]: [Segment[], Segment[], Vec3[]] = [[], [], []];
@@ -70,17 +71,17 @@ export class MeasuringMarks {
       const flat = onPlane(places).map(([x, y]) => new THREE.Vector2(x, y));
       for (const corners of THREE.ShapeUtils.triangulateShape(flat, [])) triangles.push(...corners.map((i) => places[i]));
     }
-    if (triangles.length > 0) this.add(new THREE.Mesh(this.made(new THREE.BufferGeometry(), triangles), this.fill), 0);
+    if (triangles.length > 0) this.add(new THREE.Mesh(this.withPositions(new THREE.BufferGeometry(), triangles), this.fill), 0);
     this.addLines(thinLines, this.thinShade, this.thinLine);
     this.addLines(lines, this.shade, this.line);
     const dots = measurements.flatMap(({ places }) => places);
     if (dots.length === 0) return;
-    const points = new THREE.Points(this.made(new THREE.BufferGeometry(), dots), this.dot);
+    const points = new THREE.Points(this.withPositions(new THREE.BufferGeometry(), dots), this.dot);
     points.onBeforeRender = (renderer) => (this.dot.uniforms.pixelRatio.value = renderer.getPixelRatio());
     this.add(points, 3);
   }
 
-  // Gives back what is on the card.
+  // Frees the GPU memory.
   clear(): void {
     for (const geometry of this.geometries) geometry.dispose();
     this.geometries.length = 0;
@@ -107,7 +108,7 @@ export class MeasuringMarks {
     this.group.add(object);
   }
 
-  private made(geometry: THREE.BufferGeometry, places: readonly Vec3[]): THREE.BufferGeometry {
+  private withPositions(geometry: THREE.BufferGeometry, places: readonly Vec3[]): THREE.BufferGeometry {
     this.geometries.push(geometry);
     return geometry.setAttribute('position', new THREE.Float32BufferAttribute(places.flat(), 3));
   }

@@ -1,10 +1,10 @@
-// What the measuring tool says and asks.
+// The panel of the measuring tool.
 import { element } from '../page/element';
 import { iconButton, replaceRows, showPressed } from '../page/fields';
 import { kKinds, type Kind } from './measurement';
 import { kKindNames, type Row } from './measurement-text';
 
-export interface Kept {
+export interface ListedMeasurement {
   name: string;
   figure: string;
   isChosen: boolean;
@@ -16,9 +16,9 @@ function rowsInto(list: HTMLElement, rows: readonly Row[]): void {
 }
 
 function button(text: string, onClick: () => void): HTMLButtonElement {
-  const made = element('button', '', text);
-  made.addEventListener('click', onClick);
-  return made;
+  const control = element('button', '', text);
+  control.addEventListener('click', onClick);
+  return control;
 }
 
 export class MeasuringPanel {
@@ -43,14 +43,14 @@ export class MeasuringPanel {
   private readonly list = element('ul');
   private readonly listPart: HTMLElement;
 
-  // `units`: what lengths are in, where they are not metres.
+  // `units` names the unit of lengths if it is not the metre.
   constructor(units: string) {
     for (const kind of kKinds) this.kinds.set(kind, button(kKindNames[kind], () => this.onKind(kind)));
-    this.undo.title = 'Take back the last place (Backspace)';
-    this.done.title = 'End it (Enter)';
+    this.undo.title = 'Undo the last place (Backspace)';
+    this.done.title = 'Finish (Enter)';
     const choice = element('div', 'choice', ...this.kinds.values());
     choice.setAttribute('role', 'group');
-    choice.setAttribute('aria-label', 'What to measure');
+    choice.setAttribute('aria-label', 'Kind of measurement');
     const download = button('Download', () => this.onDownload());
     const deleteAll = button('Delete all', () => this.onDeleteAll());
     this.listPart = element('div', 'part', element('h3', '', 'Kept'), this.list, element('div', 'row', download, deleteAll));
@@ -58,14 +58,14 @@ export class MeasuringPanel {
       'div', 'measure', choice, element('div', 'task', this.hint, this.steps), this.figures, this.placePart, this.listPart);
     if (units !== '') this.element.append(element('p', 'faint part', units));
     this.showPlace([]);
-    this.showKept([]);
+    this.showMeasurements([]);
   }
 
-  // `isEnough`: what is begun can be ended.
+  // `isEnough` is true when the measurement that was begun can be finished.
   showTask(kind: Kind, hint: string, isBegun: boolean, isEnough: boolean): void {
     showPressed(this.kinds, kind);
     this.hint.textContent = hint;
-    // A button that goes leaves the keyboard's focus to what is there.
+    // A button that is removed passes the keyboard focus to one that remains.
     const { activeElement } = document;
     const goes = (activeElement === this.undo && !isBegun) || (activeElement === this.done && !isEnough);
     this.done.disabled = !isEnough;
@@ -87,9 +87,9 @@ export class MeasuringPanel {
     this.copy.textContent = isCopied ? 'Copied' : 'Not allowed';
   }
 
-  showKept(kept: readonly Kept[]): void {
-    this.listPart.hidden = kept.length === 0;
-    replaceRows(this.list, kept.map(({ name, figure, isChosen }, i) => {
+  showMeasurements(rows: readonly ListedMeasurement[]): void {
+    this.listPart.hidden = rows.length === 0;
+    replaceRows(this.list, rows.map(({ name, figure, isChosen }, i) => {
       const choose = element('button', isChosen ? 'one on' : 'one', element('span', '', name), element('span', 'figure', figure));
       choose.addEventListener('click', () => this.onChoose(i));
       choose.setAttribute('aria-pressed', String(isChosen));

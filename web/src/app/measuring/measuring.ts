@@ -1,8 +1,9 @@
-// The measuring tool: places are clicked, lines and figures stand in the picture, and what is done is kept in a list.
+// The measuring tool: the user clicks places, lines and figures appear in the scene, and finished measurements are
+// listed.
 import type { Vec3 } from '../../tiles/tileset';
 import { GroundFrame } from './geodesy';
-import { kLeastPlaces, kMostPlaces, type Kind, type Measurement } from './measurement';
-import { fileOf, headline, hintOf, kKindNames, labelsOf, placeNumbers, placeRows, rowsOf } from './measurement-text';
+import { kMinPlaces, kMaxPlaces, type Kind, type Measurement } from './measurement';
+import { exportMeasurements, headline, hintText, kKindNames, measurementLabels, placeNumbers, placeRows, measurementRows } from './measurement-text';
 import { MeasuringLabels } from './measuring-labels';
 import { MeasuringMarks } from './measuring-marks';
 import { MeasuringPanel } from './measuring-panel';
@@ -12,8 +13,8 @@ import { isTyping, type Shortcuts } from '../page/shortcuts';
 import type { Toolbar } from '../page/toolbar';
 import type { Viewer } from '../viewer';
 
-const kNear = 7; // pixels within which a click is on a place
-const kAgain = 400; // ms within which a click on the same pixels is half of a double click
+const kNear = 7; // a click within this many pixels of a place selects it
+const kAgain = 400; // ms within which a second click on the same pixels makes a double click
 
 interface Pointer {
   clientX: number;
@@ -28,8 +29,8 @@ export function addMeasuring(viewer: Viewer, toolbar: Toolbar, shortcuts: Shortc
     opened: () => measuring.open(),
     closed: () => measuring.close(),
   });
-  shortcuts.describe('Backspace', 'Take back the last place, when measuring');
-  shortcuts.describe('Enter', 'End what is being measured');
+  shortcuts.describe('Backspace', 'Undo the last place of a measurement');
+  shortcuts.describe('Enter', 'Finish the measurement');
   return measuring;
 }
 
@@ -38,14 +39,14 @@ export class Measuring {
   private readonly frame: GroundFrame;
   private readonly marks = new MeasuringMarks();
   private readonly labels: MeasuringLabels;
-  private readonly kept: Measurement[] = [];
-  private chosen?: Measurement; // whose figures are shown while nothing is begun
+  private readonly finished: Measurement[] = [];
+  private chosen?: Measurement; // its figures are shown while no measurement is in progress
   private kind: Kind = 'distance';
-  private places: Vec3[] = []; // of what is begun
+  private places: Vec3[] = []; // of the measurement in progress
   private lastPlace?: Vec3;
   private lastClick = { time: -Infinity, clientX: 0, clientY: 0 };
-  private pointer?: Pointer; // over the picture, while something is begun
-  private awaited = 0; // the animation frame that will look under the pointer
+  private pointer?: Pointer; // over the canvas while a measurement is in progress
+  private awaited = 0; // id of the animation frame that will pick under the pointer
   private isOpen = false;
 
   constructor(private readonly viewer: Viewer) {
@@ -58,16 +59,16 @@ export class Measuring {
     this.panel.onUndo = () => this.takeBack();
     this.panel.onCopy = () => void this.copy();
     this.panel.onChoose = (index) => {
-      this.chosen = this.kept[index];
+      this.chosen = this.finished[index];
       this.show();
     };
     this.panel.onDelete = (index) => {
-      const [gone] = this.kept.splice(index, 1);
+      const [gone] = this.finished.splice(index, 1);
       if (this.chosen === gone) this.chosen = undefined;
       this.show();
     };
     this.panel.onDeleteAll = () => {
-      this.kept.length = 0;
+      this.finished.length = 0;
       this.chosen = undefined;
       this.show();
     };
@@ -89,7 +90,7 @@ export class Measuring {
     this.show();
   }
 
-  // What is kept is there again when the tool is opened again.
+  // Finished measurements reappear when the tool is opened again.
   close(): void {
     this.endOrDrop();
     this.isOpen = false;
@@ -107,7 +108,7 @@ export class Measuring {
     this.show();
   }
 
-  // Always true: no other tool has this click.
+  // Returns true always: no other tool handles the click.
   private take(event: PointerEvent): true {
     const before = this.lastClick;
     this.lastClick = { time: event.timeStamp, clientX: event.clientX, clientY: event.clientY };
@@ -121,32 +122,32 @@ export class Measuring {
     this.lastPlace = place;
     this.panel.showPlace(placeRows(place, this.frame));
     this.places.push(place);
-    if (this.places.length === kMostPlaces[this.kind]) this.end();
+    if (this.places.length === kMaxPlaces[this.kind]) this.end();
     else this.show();
     return true;
   }
 
-  // Whether a click on the last place, or around an area on the first, ends it.
+  // Returns whether a click on the last place, or on the first place of an area, finishes the measurement.
   private isOnAnEnd({ clientX, clientY }: Pointer): boolean {
     if (!this.isEnough) return false;
     const { left, top } = this.viewer.canvas.getBoundingClientRect();
     const ends = this.kind === 'area' ? [this.places[0], this.places.at(-1)!] : [this.places.at(-1)!];
     return ends.some((place) => {
-      const pixel = this.labels.pixelOf(place);
+      const pixel = this.labels.projectToPixel(place);
       return pixel !== undefined && Math.hypot(clientX - left - pixel.x, clientY - top - pixel.y) < kNear;
     });
   }
 
-  // What is begun can be ended.
+  // True when the measurement in progress can be finished.
   private get isEnough(): boolean {
-    return this.places.length >= kLeastPlaces[this.kind];
+    return this.places.length >= kMinPlaces[this.kind];
   }
 
-  // Keeps what is begun, if it is enough.
+  // Finishes the measurement in progress if it has enough places.
   private end(): void {
     if (!this.isEnough) return;
     this.chosen = { kind: this.kind, places: this.places };
-    this.kept.push(this.chosen);
+    this.finished.push(this.chosen);
     this.places = [];
     this.show();
   }
@@ -163,15 +164,15 @@ export class Measuring {
 
   private show(): void {
     const begun: Measurement[] = this.places.length > 0 ? [{ kind: this.kind, places: this.places }] : [];
-    // An area is open until it is ended; the band closes it.
+    // An area is open until it is finished; the rubber band closes it.
     const open: Measurement[] = begun.map(({ places }) => ({ kind: this.kind === 'area' ? 'distance' : this.kind, places }));
-    this.marks.show([...this.kept, ...open], this.frame);
-    const labels = this.kept.flatMap((one) => labelsOf(one, this.frame));
-    // What is begun has its figure at the pointer.
-    const segments = begun.flatMap((one) => labelsOf(one, this.frame)).filter(({ isMinor }) => isMinor);
+    this.marks.show([...this.finished, ...open], this.frame);
+    const labels = this.finished.flatMap((one) => measurementLabels(one, this.frame));
+    // The figure of the measurement in progress is at the pointer.
+    const segments = begun.flatMap((one) => measurementLabels(one, this.frame)).filter(({ isMinor }) => isMinor);
     this.labels.show([...labels, ...segments]);
-    this.panel.showTask(this.kind, hintOf(this.kind, pointsByTouch()), begun.length > 0, this.isEnough);
-    this.panel.showKept(this.kept.map((one) => ({
+    this.panel.showTask(this.kind, hintText(this.kind, pointsByTouch()), begun.length > 0, this.isEnough);
+    this.panel.showMeasurements(this.finished.map((one) => ({
       name: kKindNames[one.kind], figure: headline(one, this.frame), isChosen: one === this.chosen && begun.length === 0,
     })));
     this.pointer = undefined; // until it moves
@@ -179,13 +180,14 @@ export class Measuring {
     this.viewer.needPicture();
   }
 
-  // From the last place to the pointer, with the figures as they would be; looks into the picture.
+  // Draws the rubber band from the last place to the pointer, with the figures that a click would give; picks the place
+  // in the scene.
   private showBand(): void {
     const { pointer, places, kind } = this;
     const under = pointer && this.viewer.pickAt(pointer)?.toArray();
     const wouldBe: Measurement = { kind, places: under ? [...places, under] : places };
-    if (places.length > 0) this.panel.showFigures(rowsOf(wouldBe, this.frame));
-    else this.panel.showFigures(this.chosen ? rowsOf(this.chosen, this.frame) : []);
+    if (places.length > 0) this.panel.showFigures(measurementRows(wouldBe, this.frame));
+    else this.panel.showFigures(this.chosen ? measurementRows(this.chosen, this.frame) : []);
     if (!under) {
       this.labels.showBand(undefined);
       return;
@@ -206,7 +208,7 @@ export class Measuring {
     const { canvas } = this.viewer;
     canvas.addEventListener('pointermove', ({ clientX, clientY, buttons, pointerType }) => {
       if (this.places.length === 0) return;
-      // While the view is dragged, and under fingers, there is no band.
+      // There is no rubber band while the view is dragged, nor with touch input.
       this.follow(buttons !== 0 || pointerType === 'touch' ? undefined : { clientX, clientY });
     });
     canvas.addEventListener('pointerleave', () => this.follow(undefined));
@@ -214,7 +216,7 @@ export class Measuring {
 
   private follow(pointer: Pointer | undefined): void {
     this.pointer = pointer;
-    // The picture is read back once a frame at most.
+    // The image is read back at most once a frame.
     this.awaited ||= requestAnimationFrame(() => {
       this.awaited = 0;
       this.showBand();
@@ -226,7 +228,7 @@ export class Measuring {
   }
 
   private download(): void {
-    const { extension, text } = fileOf(this.kept, this.frame);
+    const { extension, text } = exportMeasurements(this.finished, this.frame);
     download(fileName(`${this.viewer.city.name}-measurements`, extension), text);
   }
 }

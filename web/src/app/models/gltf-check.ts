@@ -1,11 +1,13 @@
-// What three's reader of glTF would fetch, wait for without end, or fail at without a word: refused before it is asked.
+// Rejects glTF files that would make the glTF loader of three.js fetch addresses, wait forever, or fail without a
+// message.
 import { SceneError } from '../../scene-error';
-import { arrayOf, fieldOf, stringOf, wholeFrom, wholeOf, type Json } from '../../tiles/json-fields';
-import { findFile, isOfNetwork, nameOf, type ModelFile } from './model-files';
+import { getArray, getField, getString, wholeFrom, getInteger, type Json } from '../../tiles/json-fields';
+import { findFile, isOfNetwork, baseName, type ModelFile } from './model-files';
 
 const kMagic = 0x46546c67; // "glTF"
 const kJsonChunk = 0x4e4f534a; // "JSON"
-const kMostNumbers = 1 << 26; // that take more memory than they have bytes in the file: without data, or packed
+// Limit on numbers that need more memory than they occupy in the file: accessors without data, or compressed ones.
+const kMaxNumbers = 1 << 26;
 const kComponents: Record<string, number> = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4, MAT2: 4, MAT3: 9, MAT4: 16 };
 
 const kRemedies: Record<string, string> = {
@@ -13,9 +15,9 @@ const kRemedies: Record<string, string> = {
   KHR_texture_basisu: 'export it with PNG, JPEG or WebP textures',
 };
 
-// Throws SceneError that names the file. True where its buffers are compressed by meshopt.
+// Throws SceneError that names the file. Returns true if its buffers are compressed with meshopt.
 export function checkGltf(bytes: Uint8Array, main: ModelFile, files: readonly ModelFile[]): { needsMeshopt: boolean } {
-  const name = nameOf(main.path);
+  const name = baseName(main.path);
   const fail = (reason: string, remedy = 'export it again', place = ''): never => {
     throw new SceneError(name, place, reason, remedy);
   };
@@ -27,15 +29,15 @@ export function checkGltf(bytes: Uint8Array, main: ModelFile, files: readonly Mo
   } catch {
     return fail('is no glTF file');
   }
-  if (!/^2\./.test(stringOf(fieldOf(gltf, 'asset'), 'version') ?? '')) fail('is not glTF 2.0', 'export it as glTF 2.0');
-  const required = namesOf(gltf, 'extensionsRequired');
-  const used = [...namesOf(gltf, 'extensionsUsed'), ...required];
+  if (!/^2\./.test(getString(getField(gltf, 'asset'), 'version') ?? '')) fail('is not glTF 2.0', 'export it as glTF 2.0');
+  const required = getStrings(gltf, 'extensionsRequired');
+  const used = [...getStrings(gltf, 'extensionsUsed'), ...required];
   const draco = 'KHR_draco_mesh_compression';
   const cannot = used.includes(draco) ? draco : required.find((one) => one in kRemedies);
   if (cannot) fail(`uses ${cannot}, which is not read here`, kRemedies[cannot]);
   for (const kind of ['buffers', 'images']) {
-    (arrayOf(gltf, kind) ?? []).forEach((one, i) => {
-      const uri = stringOf(one, 'uri');
+    (getArray(gltf, kind) ?? []).forEach((one, i) => {
+      const uri = getString(one, 'uri');
       if (uri === undefined || /^(data|blob):/i.test(uri)) return;
       const place = `${kind}[${i}]`;
       if (isOfNetwork(uri)) fail(`asks for ${uri.slice(0, 200)}, and nothing is fetched for a model`, 'export it with all it needs, as GLB', place);
@@ -44,14 +46,14 @@ export function checkGltf(bytes: Uint8Array, main: ModelFile, files: readonly Mo
       }
     });
   }
-  if (hasCycle(gltf)) fail('has a node that holds itself', 'export it again', 'nodes');
-  const claimed = (arrayOf(gltf, 'accessors') ?? [])
-    .filter((one) => fieldOf(one, 'bufferView') === undefined)
-    .reduce((sum: number, one) => sum + (wholeOf(one, 'count') ?? 0) * (kComponents[stringOf(one, 'type') ?? ''] ?? 16), 0);
-  const unpacked = (arrayOf(gltf, 'bufferViews') ?? [])
-    .map((one) => fieldOf(fieldOf(one, 'extensions'), 'EXT_meshopt_compression'))
-    .reduce((sum: number, one) => sum + (wholeOf(one, 'count') ?? 0) * (wholeOf(one, 'byteStride') ?? 0), 0);
-  if (claimed + unpacked / 4 > kMostNumbers) fail('claims more numbers than it has', 'export it again', 'accessors');
+  if (hasCycle(gltf)) fail('has a node that is its own ancestor', 'export it again', 'nodes');
+  const claimed = (getArray(gltf, 'accessors') ?? [])
+    .filter((one) => getField(one, 'bufferView') === undefined)
+    .reduce((sum: number, one) => sum + (getInteger(one, 'count') ?? 0) * (kComponents[getString(one, 'type') ?? ''] ?? 16), 0);
+  const unpacked = (getArray(gltf, 'bufferViews') ?? [])
+    .map((one) => getField(getField(one, 'extensions'), 'EXT_meshopt_compression'))
+    .reduce((sum: number, one) => sum + (getInteger(one, 'count') ?? 0) * (getInteger(one, 'byteStride') ?? 0), 0);
+  if (claimed + unpacked / 4 > kMaxNumbers) fail('claims more numbers than it has', 'export it again', 'accessors');
   return { needsMeshopt: used.some((one) => one.endsWith('_meshopt_compression')) };
 }
 
@@ -67,22 +69,22 @@ function jsonChunk(bytes: Uint8Array): Uint8Array | undefined {
   return bytes.subarray(20, 20 + length);
 }
 
-function namesOf(gltf: Json, key: string): string[] {
-  return (arrayOf(gltf, key) ?? []).filter((one) => typeof one === 'string');
+function getStrings(gltf: Json, key: string): string[] {
+  return (getArray(gltf, key) ?? []).filter((one) => typeof one === 'string');
 }
 
-// A node that two hold, or that holds itself over others.
+// A node with two parents, or a node that is its own ancestor, is rejected.
 function hasCycle(gltf: Json): boolean {
-  const nodes = arrayOf(gltf, 'nodes') ?? [];
+  const nodes = getArray(gltf, 'nodes') ?? [];
   const parents = new Map<number, number>();
   for (const [parent, node] of nodes.entries()) {
-    for (const child of arrayOf(node, 'children') ?? []) {
+    for (const child of getArray(node, 'children') ?? []) {
       const index = wholeFrom(child);
       if (index === undefined || parents.has(index)) return true;
       parents.set(index, parent);
     }
   }
-  // Each has one parent now, so that the first way up that does not end goes round.
+  // Each node has at most one parent here, so the first walk upwards that does not end is a cycle.
   const good = new Set<number>();
   for (let start = 0; start < nodes.length; ++start) {
     const way = new Set<number>();

@@ -1,35 +1,36 @@
-// Files that came together, and how they name one another.
+// Files that were provided together, and how they reference one another.
 
 export interface ModelFile {
-  path: string; // as it came: folders, if it came with any, and the name
+  path: string; // as provided: the folders, if any, and the name
   file: Blob;
 }
 
 const kModelKinds = ['gltf', 'glb', 'obj', 'fbx'];
 
-// What a file picker may show.
+// Extensions that a file picker offers.
 export const kAccepted = '.gltf,.glb,.bin,.obj,.mtl,.fbx,.json,.png,.jpg,.jpeg,.webp,.tga';
 
-export function nameOf(path: string): string {
+export function baseName(path: string): string {
   return path.slice(path.lastIndexOf('/') + 1);
 }
 
-// The ending of its name, in small letters.
-export function kindOf(path: string): string {
-  const name = nameOf(path);
+// Returns the file extension in lower case.
+export function fileExtension(path: string): string {
+  const name = baseName(path);
   return name.includes('.') ? name.slice(name.lastIndexOf('.') + 1).toLowerCase() : '';
 }
 
 export function isModel({ path }: ModelFile): boolean {
-  return kModelKinds.includes(kindOf(path));
+  return kModelKinds.includes(fileExtension(path));
 }
 
-// Of a server, by any protocol of the web.
+// Returns whether a URI refers to a server, by any protocol.
 export function isOfNetwork(uri: string): boolean {
   return /^\s*((https?|ftp|wss?):|[\\/]{2})/i.test(uri);
 }
 
-// The file that `from` means by `uri`: seen from its folder, else the first of that name wherever it lies.
+// Returns the file that `from` references as `uri`: relative to its folder, or else the first file of that name in any
+// folder.
 export function findFile<T extends { path: string }>(uri: string, from: string, files: readonly T[]): T | undefined {
   const folders = from.split('/').slice(0, -1);
   for (const plain of [uri, decoded(uri)]) {
@@ -42,8 +43,8 @@ export function findFile<T extends { path: string }>(uri: string, from: string, 
     const same = (path: string) => path.normalize().toLowerCase();
     const whole = same(parts.join('/'));
     const last = same(steps[steps.length - 1]);
-    const found = files.find(({ path }) => same(path) === whole) ?? files.find(({ path }) => same(nameOf(path)) === last);
-    if (found) return found;
+    const match = files.find(({ path }) => same(path) === whole) ?? files.find(({ path }) => same(baseName(path)) === last);
+    if (match) return match;
   }
   return undefined;
 }

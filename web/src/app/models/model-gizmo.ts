@@ -1,4 +1,4 @@
-// Handles that move, turn and scale a model, or a box. While they are dragged, the camera stays.
+// Handles that move, rotate and scale a model or a box. While they are dragged, the camera does not move.
 import type * as THREE from 'three';
 import type { TransformControls } from 'three/addons/controls/TransformControls.js';
 import type { Viewer } from '../viewer';
@@ -12,9 +12,9 @@ export class ModelGizmo {
   private controls?: Promise<TransformControls>;
   private object?: THREE.Object3D;
   private current: GizmoMode = 'translate';
-  private pressed = false; // the pointer went down on a handle
+  private pressed = false; // the pointer was pressed on a handle
 
-  // `isBox`: each axis is scaled by itself, and it turns about the vertical alone.
+  // `isBox` scales each axis separately and only allows rotation about the vertical axis.
   constructor(private readonly viewer: Viewer, private readonly moved: () => void, private readonly isBox = false) {}
 
   get mode(): GizmoMode {
@@ -32,7 +32,7 @@ export class ModelGizmo {
     this.mode = modes[(modes.indexOf(this.mode) + 1) % modes.length];
   }
 
-  // Whether a click that comes now was one on a handle.
+  // Returns whether the current click was one on a handle.
   takesClick(): boolean {
     return this.pressed;
   }
@@ -42,7 +42,7 @@ export class ModelGizmo {
     this.object = object;
     if (object) {
       this.controls ??= this.make();
-      this.controls.catch(() => (this.controls = undefined)); // the next one tries again
+      this.controls.catch(() => (this.controls = undefined)); // the next call tries again
     }
     void this.controls?.then((controls) => {
       if (this.object) controls.attach(this.object);
@@ -63,14 +63,14 @@ export class ModelGizmo {
     this.setMode(controls);
     controls.size = 0.8;
     controls.showE = controls.showXYZE = false;
-    controls.setColors(0xe0675e, 0x6199ee, 0x83c46c, 0xffe08a); // as in a world of z up: the vertical is blue
+    controls.setColors(0xe0675e, 0x6199ee, 0x83c46c, 0xffe08a); // as in a z-up world: the vertical axis is blue
     const helper = controls.getHelper();
     helper.userData.isTool = true;
     world.add(helper);
     controls.addEventListener('change', () => this.viewer.needPicture());
     controls.addEventListener('objectChange', () => {
       if (controls.mode === 'scale' && this.object) {
-        if (this.isBox) this.object.scale.set(...sizesOf(this.object));
+        if (this.isBox) this.object.scale.set(...absoluteScale(this.object));
         else scaleAlike(this.object, before);
       }
       this.object?.position.clampScalar(-kFarthest, kFarthest);
@@ -79,7 +79,7 @@ export class ModelGizmo {
     });
     let before = { x: 1, y: 1, z: 1 };
     controls.addEventListener('mouseDown', () => (before = this.object!.scale.clone()));
-    // Before the navigation hears of it.
+    // Handled before the navigation receives the event.
     canvas.addEventListener('pointerdown', (event) => {
       const { x, y } = this.viewer.pointerAt(event);
       controls.pointerHover({ x, y, button: event.button } as PointerEvent);
@@ -91,14 +91,14 @@ export class ModelGizmo {
   }
 }
 
-// Of a box that is not turned inside out.
-function sizesOf({ scale }: THREE.Object3D): [number, number, number] {
+// Returns the scale of a box, which must not be mirrored.
+function absoluteScale({ scale }: THREE.Object3D): [number, number, number] {
   return scale.toArray().map((x) => scaleWithin(Math.max(Math.abs(x), 1e-3))) as [number, number, number];
 }
 
-// By what one of its axes was scaled most.
+// Scales all axes by the factor of the one that changed most.
 function scaleAlike({ scale }: THREE.Object3D, before: { x: number; y: number; z: number }): void {
   const factors = (['x', 'y', 'z'] as const).map((axis) => Math.max(scale[axis] / before[axis], 0.01));
-  const factor = factors.reduce((most, one) => (Math.abs(Math.log(one)) > Math.abs(Math.log(most)) ? one : most));
+  const factor = factors.reduce((maximum, one) => (Math.abs(Math.log(one)) > Math.abs(Math.log(maximum)) ? one : maximum));
   scale.fromArray(scaledWithin([before.x, before.y, before.z], factor));
 }

@@ -1,4 +1,5 @@
-// Light for models, as on a bright day: so much that a white roof is white in a picture that nothing tones down. No shadows.
+// Lights models as on a bright day, so that a white roof is white in an image without tone mapping. There are no
+// shadows.
 import * as THREE from 'three';
 
 const kSky = new THREE.Color(0xdfe9f5);
@@ -19,7 +20,7 @@ export function addLight(world: THREE.Scene, renderer: THREE.WebGLRenderer): voi
   renderer.domElement.addEventListener('webglcontextrestored', reflect);
 }
 
-// What metal shines with: the same sky and ground.
+// Renders the environment that metal reflects: the same sky and ground.
 function surroundings(renderer: THREE.WebGLRenderer): THREE.WebGLRenderTarget {
   const sphere = new THREE.SphereGeometry(10, 16, 32);
   const heights = sphere.getAttribute('position');

@@ -1,24 +1,24 @@
-// What models are made of, as it is to look in a city: by day, and all in the same light.
+// Adapts the materials of models to the city: daylight, and the same light for all.
 import * as THREE from 'three';
 
-// Takes out what does not belong there; the box of the rest.
+// Removes lights and cameras from a model, and returns the bounding box of the rest.
 export function prepareModel(object: THREE.Object3D): THREE.Box3 {
   const others: THREE.Object3D[] = [];
-  const made = new Map<THREE.Material, THREE.Material>();
+  const replacements = new Map<THREE.Material, THREE.Material>();
   const replace = (material: THREE.Material) => {
-    const known = made.get(material) ?? prepareMaterial(material);
-    made.set(material, known);
+    const known = replacements.get(material) ?? prepareMaterial(material);
+    replacements.set(material, known);
     return known;
   };
   object.traverse((one) => {
     if ((one as THREE.Light).isLight || (one as THREE.Camera).isCamera) others.push(one);
-    if (one.name === '') one.name = one.uuid; // animations know it by that, and copies have another
+    if (one.name === '') one.name = one.uuid; // animations refer to objects by name, and copies have another uuid
     const mesh = one as THREE.SkinnedMesh;
     if (mesh.material) mesh.material = Array.isArray(mesh.material) ? mesh.material.map(replace) : replace(mesh.material);
-    if (mesh.skeleton) mesh.frustumCulled = false; // its sphere is of the pose at rest
+    if (mesh.skeleton) mesh.frustumCulled = false; // its bounding sphere is that of the rest pose
   });
   for (const one of others) {
-    // What hangs on it stays where it is.
+    // Children of a removed object keep their place.
     const holder = new THREE.Group();
     holder.name = one.name;
     holder.position.copy(one.position);
@@ -35,11 +35,12 @@ export function prepareModel(object: THREE.Object3D): THREE.Box3 {
 function prepareMaterial(material: THREE.Material): THREE.Material {
   const fields = material as unknown as Record<string, unknown>;
   for (const [key, value] of Object.entries(fields)) {
-    if (value instanceof THREE.Texture && (!value.image || (value.image as { data?: unknown }).data === null)) fields[key] = null; // it did not come
+    // The texture was not provided.
+    if (value instanceof THREE.Texture && (!value.image || (value.image as { data?: unknown }).data === null)) fields[key] = null;
   }
   const { isMeshPhongMaterial, isMeshLambertMaterial } = fields;
-  if (isMeshPhongMaterial || isMeshLambertMaterial) return standardOf(material as THREE.MeshPhongMaterial);
-  // Glass: three would show through it what is opaque alone, and the city is not.
+  if (isMeshPhongMaterial || isMeshLambertMaterial) return toStandardMaterial(material as THREE.MeshPhongMaterial);
+  // Glass: the transmission of three.js would show only opaque objects behind it, and the city is transparent.
   const { transmission } = material as THREE.MeshPhysicalMaterial;
   if (transmission > 0) {
     const opacity = material.opacity * (1 - 0.7 * Math.min(transmission, 1));
@@ -53,8 +54,8 @@ const kAlike = [
   'normalMap', 'normalMapType', 'normalScale', 'displacementMap', 'displacementScale', 'displacementBias', 'flatShading', 'wireframe',
 ] as const;
 
-// Older kinds as they look where light is measured: dull.
-function standardOf(material: THREE.MeshPhongMaterial): THREE.MeshStandardMaterial {
+// Converts older material types to physically based ones that look matt.
+function toStandardMaterial(material: THREE.MeshPhongMaterial): THREE.MeshStandardMaterial {
   const standard = new THREE.MeshStandardMaterial();
   THREE.Material.prototype.copy.call(standard, material);
   for (const key of kAlike) Object.assign(standard, { [key]: material[key] });

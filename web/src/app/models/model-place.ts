@@ -1,4 +1,5 @@
-// Where a model stands, as world.json has it: in the capture's world, z up, of the model's own origin.
+// Converts the placement of a model to the form of world.json: the pose of the model's own origin in the capture's
+// world, z up.
 import * as THREE from 'three';
 import { kYUpFromZUp } from '../../axes';
 import type { WorldModel } from '../world/world-file';
@@ -7,8 +8,8 @@ export type Place = Pick<WorldModel, 'position' | 'rotation' | 'scale'>;
 
 const kZUpFromYUp = kYUpFromZUp.clone().invert();
 
-// `base`: of the model, what is held at the holder's origin; three's world.
-export function placeOf(holder: THREE.Object3D, base: THREE.Vector3): Place {
+// `base` is the point of the model that is at the holder's origin; the holder is in the world of three.js.
+export function getPlace(holder: THREE.Object3D, base: THREE.Vector3): Place {
   const position = base.clone().negate().multiply(holder.scale).applyQuaternion(holder.quaternion).add(holder.position);
   const { x, y, z, w } = holder.quaternion;
   const { x: across, y: up, z: along } = holder.scale;

@@ -1,22 +1,22 @@
-// The list of models, and where the selected one stands, in numbers.
+// The list of models, and the numeric placement of the selected one.
 import * as THREE from 'three';
 import { element } from '../page/element';
 import { iconButton, nameField, numberField, replaceRows, showPressed } from '../page/fields';
 import type { GroundFrame } from '../measuring/geodesy';
 import { kGizmoModes, type GizmoMode, type ModelGizmo } from './model-gizmo';
 import { kNameLength, scaledWithin } from '../world/world-fields';
-import { placeOf, setPlace } from './model-place';
+import { getPlace, setPlace } from './model-place';
 import type { Models, PlacedModel } from './models';
 
 export interface ModelActions {
   add(): void;
   save(withFiles: boolean): void;
-  place(model: PlacedModel): void; // asks for a place in the city
+  place(model: PlacedModel): void; // asks the user for a place in the city
 }
 
 export class ModelsPanel {
   readonly body = element('div', 'models listed');
-  // What the models' files take, in words.
+  // Returns the size of the models' files as text.
   fileSize: () => string = () => '';
   private readonly hint = element('p', 'faint', 'Drop a model onto the city: glTF, OBJ or FBX, with its textures, or a saved world.');
   private readonly list = element('ul');
@@ -62,7 +62,7 @@ export class ModelsPanel {
     this.show();
   }
 
-  // While it is asked for a place.
+  // Shows whether the tool is asking for a place.
   asks(isAsking: boolean): void {
     this.put.textContent = isAsking ? 'Choose a place in the city' : 'Put on a place…';
     this.put.classList.toggle('on', isAsking);
@@ -72,7 +72,7 @@ export class ModelsPanel {
 
   private show(): void {
     const { list, selected } = this.models;
-    // The list is made anew only where it differs, so that a button that is pressed meanwhile stays.
+    // The list is rebuilt only if it differs, so that a pressed button is not replaced.
     const now = JSON.stringify(list.map((model) => [model.id, model.name, model.visible, model === selected]));
     if (now !== this.shown) replaceRows(this.list, list.map((model) => this.row(model)));
     this.shown = now;
@@ -83,9 +83,9 @@ export class ModelsPanel {
     this.details.hidden = !selected;
     if (!selected) return;
     this.name.set(selected.name);
-    const { position } = placeOf(selected, new THREE.Vector3());
+    const { position } = getPlace(selected, new THREE.Vector3());
     this.place.forEach(({ set }, i) => set(position[i]));
-    this.turn.set(THREE.MathUtils.radToDeg(eulerOf(selected).y));
+    this.turn.set(THREE.MathUtils.radToDeg(toEuler(selected).y));
     this.scale.set(selected.scale.x);
     const { size } = selected.source;
     const metres = (inWorld: number) => {
@@ -126,7 +126,7 @@ export class ModelsPanel {
 
   private setPosition(axis: number, to: number): void {
     this.change((model) => {
-      const place = placeOf(model, new THREE.Vector3());
+      const place = getPlace(model, new THREE.Vector3());
       place.position[axis] = to;
       setPlace(model, new THREE.Vector3(), place);
     });
@@ -134,7 +134,7 @@ export class ModelsPanel {
 
   private setTurn(degrees: number): void {
     this.change((model) => {
-      const euler = eulerOf(model);
+      const euler = toEuler(model);
       euler.y = THREE.MathUtils.degToRad(degrees);
       model.quaternion.setFromEuler(euler);
     });
@@ -145,7 +145,7 @@ export class ModelsPanel {
   }
 }
 
-// About the vertical first.
-function eulerOf({ quaternion }: THREE.Object3D): THREE.Euler {
+// The rotation about the vertical axis is applied first.
+function toEuler({ quaternion }: THREE.Object3D): THREE.Euler {
   return new THREE.Euler().setFromQuaternion(quaternion, 'YXZ');
 }

@@ -1,15 +1,15 @@
-// Models in the city: dropped, moved, saved.
+// The tool for models in the city: it loads, places and saves them.
 import * as THREE from 'three';
 import { SceneError } from '../../scene-error';
 import { DropTarget } from '../page/drop-target';
 import { element } from '../page/element';
 import { loadModel } from './load-model';
 import { ModelGizmo } from './model-gizmo';
-import { isModel, kAccepted, kindOf, nameOf, type ModelFile } from './model-files';
+import { isModel, kAccepted, fileExtension, baseName, type ModelFile } from './model-files';
 import { Models, type PlacedModel } from './models';
 import { ModelsPanel } from './models-panel';
 import { megabytes } from '../page/panels';
-import { bytesOf } from '../world/model-sources';
+import { countFileBytes } from '../world/model-sources';
 import type { Shortcuts } from '../page/shortcuts';
 import type { Tool, Toolbar } from '../page/toolbar';
 import { GroundFrame } from '../measuring/geodesy';
@@ -24,7 +24,7 @@ export function addModels(
 ): void {
   const { canvas, city } = viewer;
   const gizmo = new ModelGizmo(viewer, () => models.changed());
-  let placed: PlacedModel | undefined; // by the next click
+  let placed: PlacedModel | undefined; // the next click places it
 
   const askForPlace = (model: PlacedModel | undefined) => {
     placed = model;
@@ -40,12 +40,12 @@ export function addModels(
     save: (withFiles) => void save(withFiles).catch(fail),
     place: (model) => askForPlace(placed ? undefined : model),
   });
-  panel.fileSize = () => megabytes(bytesOf(models.list));
+  panel.fileSize = () => megabytes(countFileBytes(models.list));
 
   const take = async (files: ModelFile[], place: THREE.Vector3) => {
     const mains = files.filter(isModel);
-    // Models may have JSON files of their own beside them.
-    const world = files.find(({ path }) => kindOf(path) === 'json' && (mains.length === 0 || /^world\b/i.test(nameOf(path))));
+    // Models may be accompanied by JSON files of their own.
+    const world = files.find(({ path }) => fileExtension(path) === 'json' && (mains.length === 0 || /^world\b/i.test(baseName(path))));
     if (files.length === 0) return;
     toolbar.open(tool);
     if (world) {
@@ -53,34 +53,34 @@ export function addModels(
       return;
     }
     if (mains.length === 0) {
-      throw new SceneError(nameOf(files[0].path), '', 'is no model', 'drop glTF, GLB, OBJ or FBX');
+      throw new SceneError(baseName(files[0].path), '', 'is no model', 'drop glTF, GLB, OBJ or FBX');
     }
     for (const main of mains) {
       await addModel(main, files, place).catch(fail);
     }
   };
-  // The next one goes beside it.
+  // The next model is placed beside this one.
   const addModel = async (main: ModelFile, files: ModelFile[], place: THREE.Vector3) => {
     const loaded = await loadModel(main, files);
-    const model = models.add(Models.sourceOf(loaded));
+    const model = models.add(Models.makeSource(loaded));
     model.position.copy(place);
-    place.x += models.widthOf(model);
+    place.x += models.modelWidth(model);
     models.select(model);
     models.changed();
     if (loaded.lacking.length === 0) return;
     const names = `${loaded.lacking.slice(0, 3).join(', ')}${loaded.lacking.length > 3 ? ' and others' : ''}`;
-    throw new SceneError(nameOf(main.path), '', `is shown without ${names.slice(0, 200)}`, 'drop it together with its textures and materials, or their folder');
+    throw new SceneError(baseName(main.path), '', `is shown without ${names.slice(0, 200)}`, 'drop it together with its textures and materials, or their folder');
   };
-  // Under the pointer; else in the middle of the picture; else where the camera looks.
+  // The place under the pointer; else that in the centre of the image; else the target of the camera.
   const placeFor = (event?: DragEvent) => {
     const { left, top, width, height } = canvas.getBoundingClientRect();
     const middle = { clientX: left + width / 2, clientY: top + height / 2 };
     return (event && viewer.pickAt(event)) ?? viewer.pickAt(middle) ?? viewer.navigation.look.target;
   };
-  const drop = new DropTarget(document.body, 'Drop it where it should stand', (files, event) => receive(files, event));
+  const drop = new DropTarget(document.body, 'Drop the model where it should be placed', (files, event) => receive(files, event));
   const receive = (files: ModelFile[], event?: DragEvent) => {
-    if (viewer.isHeld) {
-      fail(new SceneError('viewer', '', 'is drawing a picture', 'wait for it, or cancel it'));
+    if (viewer.isPaused) {
+      fail(new SceneError('viewer', '', 'is rendering an image', 'wait for it, or cancel it'));
       return;
     }
     const place = placeFor(event);
@@ -116,7 +116,7 @@ export function addModels(
   viewer.onClick.push((event) => {
     if (placed) {
       const { visible } = placed;
-      placed.visible = false; // not onto itself: nor is it to end the rays of the picture that is looked into
+      placed.visible = false; // it must neither be picked itself nor end the rays of the image in which the place is picked
       viewer.draw();
       const place = viewer.pickAt(event);
       placed.visible = visible;

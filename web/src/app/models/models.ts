@@ -1,19 +1,19 @@
-// The models that stand in a world, and which one is selected.
+// The models in a world, and the selected one.
 import * as THREE from 'three';
 import { clone } from 'three/addons/utils/SkeletonUtils.js';
 import type { LoadedModel } from './load-model';
-import { kindOf, nameOf } from './model-files';
+import { fileExtension, baseName } from './model-files';
 import { addLight } from './model-light';
 import type { Viewer } from '../viewer';
 import { kNameLength, scaleWithin } from '../world/world-fields';
 
-// What several models may be copies of.
+// The loaded data that several models may be copies of.
 export interface ModelSource extends LoadedModel {
-  base: THREE.Vector3; // the middle of its underside
+  base: THREE.Vector3; // centre of its underside
   size: THREE.Vector3;
 }
 
-// Stands on its origin.
+// A placed model, whose base is at its origin.
 export class PlacedModel extends THREE.Group {
   plays = true;
   readonly mixer?: THREE.AnimationMixer;
@@ -33,9 +33,9 @@ export class PlacedModel extends THREE.Group {
 
 export class Models {
   readonly list: PlacedModel[] = [];
-  readonly onChange = new Set<() => void>(); // of the list, of what is selected, of a place
+  readonly onChange = new Set<() => void>(); // called when the list, the selection or a placement changes
   private chosen?: PlacedModel;
-  private isChanging = false; // and tells when it is done
+  private isChanging = false; // true within changeAll, which notifies at its end
   private isLit = false;
 
   constructor(private readonly viewer: Viewer) {
@@ -52,7 +52,7 @@ export class Models {
     this.changed();
   }
 
-  // Tells once of all that `change` does.
+  // Runs `change` and notifies once of everything that it did.
   changeAll(change: () => void): void {
     this.isChanging = true;
     try {
@@ -69,14 +69,14 @@ export class Models {
     for (const tell of this.onChange) tell();
   }
 
-  static sourceOf(loaded: LoadedModel): ModelSource {
+  static makeSource(loaded: LoadedModel): ModelSource {
     const base = loaded.box.getCenter(new THREE.Vector3());
     base.y = loaded.box.min.y;
     return { ...loaded, base, size: loaded.box.getSize(new THREE.Vector3()) };
   }
 
-  // At the world's origin, in its own size.
-  add(source: ModelSource, name = this.freeName(nameOf(source.files[0].path).slice(0, -1 - kindOf(source.files[0].path).length))): PlacedModel {
+  // Adds a model at the world's origin, in its own size.
+  add(source: ModelSource, name = this.freeName(baseName(source.files[0].path).slice(0, -1 - fileExtension(source.files[0].path).length))): PlacedModel {
     if (!this.isLit) addLight(this.viewer.world, this.viewer.renderer);
     this.isLit = true;
     const model = new PlacedModel(source, name);
@@ -87,14 +87,14 @@ export class Models {
     return model;
   }
 
-  // Beside it, to its right as it is seen.
+  // Adds a copy on the right-hand side of the model as seen by the camera.
   duplicate(model: PlacedModel): PlacedModel {
     const copy = this.add(model.source, this.freeName(model.name));
     copy.position.copy(model.position);
     copy.quaternion.copy(model.quaternion);
     copy.scale.copy(model.scale);
     const right = new THREE.Vector3().setFromMatrixColumn(this.viewer.camera.matrixWorld, 0).setY(0).normalize();
-    copy.position.addScaledVector(right, this.widthOf(model));
+    copy.position.addScaledVector(right, this.modelWidth(model));
     this.select(copy);
     return copy;
   }
@@ -109,12 +109,12 @@ export class Models {
     this.changed();
   }
 
-  // Across, with a little room; of the world.
-  widthOf({ source: { size }, scale }: PlacedModel): number {
+  // Returns the horizontal diagonal with a margin, in world units.
+  modelWidth({ source: { size }, scale }: PlacedModel): number {
     return 1.15 * Math.hypot(size.x * scale.x, size.z * scale.z);
   }
 
-  // The model under the pointer, where nothing of the city is before it.
+  // Returns the model under the pointer if nothing of the city is in front of it.
   at(event: { clientX: number; clientY: number }): PlacedModel | undefined {
     const at = this.viewer.pointerAt(event);
     const raycaster = new THREE.Raycaster();
@@ -128,8 +128,8 @@ export class Models {
     return object as PlacedModel;
   }
 
-  // World units of a metre. Where nobody knows the scene's scale, a model that would be lost in it, or larger than it, is
-  // given a tenth of its size.
+  // Returns the world units per metre. If the scene's scale is unknown, a model that would be much smaller than the
+  // scene, or larger than it, is scaled to a tenth of the scene's size.
   private ownScale({ size }: ModelSource): number {
     const { tileset, bounds } = this.viewer.city;
     if (tileset.georeference) return scaleWithin(1 / Math.hypot(...tileset.georeference.enuFromWorld.slice(0, 3)));
@@ -137,7 +137,7 @@ export class Models {
     return share > 1 || share < 1 / 2000 ? scaleWithin(0.1 / share) : 1;
   }
 
-  // Which no other has.
+  // Returns a name that no other model has.
   freeName(given: string): string {
     const name = given.slice(0, kNameLength - 10) || 'Model';
     const plain = name.replace(/ \d+$/, '');

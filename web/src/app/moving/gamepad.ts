@@ -1,6 +1,6 @@
-// What the first gamepad says, in its standard layout.
+// Reads the first gamepad in its standard layout.
 
-// Shares of full speed, -1 to 1; yaw to the left, pitch upwards.
+// Shares of full speed, from -1 to 1; yaw to the left, pitch upwards.
 export interface Motion {
   right: number;
   up: number;
@@ -10,10 +10,10 @@ export interface Motion {
   fast: boolean;
 }
 
-const kDead = 0.12; // sticks never rest at 0
+const kDead = 0.12; // dead zone: sticks do not return to exactly 0
 const kStill: Motion = { right: 0, up: 0, forward: 0, yaw: 0, pitch: 0, fast: false };
 
-// Softly from the dead zone on.
+// Starts smoothly at the edge of the dead zone.
 export function beyondDeadZone(value: number): number {
   const beyond = (Math.abs(value) - kDead) / (1 - kDead);
   return beyond <= 0 ? 0 : Math.sign(value) * Math.min(beyond, 1) ** 2;
@@ -21,11 +21,11 @@ export function beyondDeadZone(value: number): number {
 
 export function padMotion(): Motion {
   const pad = navigator.getGamepads?.().find((one) => one?.connected && one.mapping === 'standard');
-  return pad ? motionOf(pad) : kStill;
+  return pad ? readMotion(pad) : kStill;
 }
 
 // Left stick: move. Right stick: look. Triggers: down and up. Left bumper: faster.
-export function motionOf({ axes, buttons }: { axes: readonly number[]; buttons: readonly { value: number; pressed: boolean }[] }): Motion {
+export function readMotion({ axes, buttons }: { axes: readonly number[]; buttons: readonly { value: number; pressed: boolean }[] }): Motion {
   const axis = (i: number) => beyondDeadZone(axes[i] ?? 0);
   return {
     right: axis(0), forward: -axis(1) + 0, yaw: -axis(2) + 0, pitch: -axis(3) + 0,

@@ -1,4 +1,5 @@
-// How people move: over a map, around a place, or flying; with mouse, fingers, keys or a gamepad. Lengths in metres, y up.
+// Navigation: over a map, around a place, or flying; with mouse, touch, keyboard or gamepad. Lengths are in metres, y
+// up.
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { padMotion, type Motion } from './gamepad';
@@ -13,25 +14,25 @@ export interface Look {
   target: THREE.Vector3;
 }
 
-const kFlight = 500; // ms to another view
-const kMapAngle = 0.495 * Math.PI; // from straight down: no farther on the map
-const kFingerSpeed = 0.01; // seconds of flight for a pixel
-const kLookSpeed = 0.0025; // radians for a pixel
-const kTurnSpeed = 1.6; // radians a second, of a gamepad
+const kFlight = 500; // ms of a flight to another view
+const kMapAngle = 0.495 * Math.PI; // largest angle from straight down in map mode
+const kFingerSpeed = 0.01; // seconds of flight per pixel
+const kLookSpeed = 0.0025; // radians per pixel
+const kTurnSpeed = 1.6; // radians per second, with a gamepad
 
 type Pick = (event: { clientX: number; clientY: number }) => THREE.Vector3 | undefined;
 
 export class Navigation {
   readonly orbit: OrbitControls;
   onModeChange: (mode: NavigationMode) => void = () => {};
-  isPointing = false; // a tool takes clicks: a double click goes nowhere, and the pointer stays free
+  isPointing = false; // a tool handles clicks: double clicks do not navigate, and the pointer is not locked
   private current: NavigationMode = 'map';
   private readonly keys = new Set<string>();
   private flight?: { from: Look; to: Look; begin: number };
   private moved = false;
-  private speed: number; // metres a second, when flying
-  private held = false; // by a tool that drags something
-  private looking?: number; // the pointer that turns the view when flying
+  private speed: number; // metres per second in fly mode
+  private isSuspended = false; // while a tool drags something
+  private looking?: number; // id of the pointer that turns the view in fly mode
 
   constructor(
     readonly camera: THREE.PerspectiveCamera,
@@ -50,7 +51,7 @@ export class Navigation {
     this.mode = 'map';
   }
 
-  // Of what there is to be seen.
+  // Adapts distances and clip planes to the box of the visible world.
   set bounds(box: THREE.Box3) {
     this.box = box;
     this.orbit.maxDistance = 6 * this.radius;
@@ -60,9 +61,9 @@ export class Navigation {
     this.camera.updateProjectionMatrix();
   }
 
-  // Whether dragging moves the camera: not while a tool drags something.
+  // Enables moving the camera by dragging; tools disable it while they drag something.
   set enabled(enabled: boolean) {
-    this.held = !enabled;
+    this.isSuspended = !enabled;
     this.orbit.enabled = enabled && this.current !== 'fly';
   }
 
@@ -73,14 +74,14 @@ export class Navigation {
   set mode(mode: NavigationMode) {
     if (this.current === 'fly' && mode !== 'fly') {
       if (document.pointerLockElement === this.canvas) document.exitPointerLock();
-      // Around what was looked at, as far away as the last target was.
+      // Orbits around the previous target, at its previous distance.
       const ahead = this.camera.getWorldDirection(new THREE.Vector3());
       const distance = Math.min(this.camera.position.distanceTo(this.orbit.target), this.radius);
       this.orbit.target.copy(this.camera.position).addScaledVector(ahead, Math.max(distance, this.orbit.minDistance));
     }
     this.current = mode;
     const isMap = mode === 'map';
-    this.orbit.enabled = mode !== 'fly' && !this.held;
+    this.orbit.enabled = mode !== 'fly' && !this.isSuspended;
     this.orbit.screenSpacePanning = !isMap;
     this.orbit.maxPolarAngle = isMap ? kMapAngle : Math.PI;
     const { PAN, ROTATE, DOLLY } = THREE.MOUSE;
@@ -95,7 +96,7 @@ export class Navigation {
     return { eye: this.camera.position.clone(), target: this.orbit.target.clone() };
   }
 
-  // At once. Where one looks upwards over the map, one turns around a place instead.
+  // Sets the view immediately. If it looks upwards in map mode, the mode changes to orbit.
   set look({ eye, target }: Look) {
     this.flight = undefined;
     this.leaveMapFor({ eye, target });
@@ -116,7 +117,7 @@ export class Navigation {
     if (this.current === 'map' && up < Math.cos(kMapAngle)) this.mode = 'orbit';
   }
 
-  // Above and beside the middle, so that all of the scene is in view.
+  // Shows the whole scene from above and from the side.
   showAll(): void {
     this.look = this.overview();
   }
@@ -125,17 +126,17 @@ export class Navigation {
     this.flyTo(this.overview());
   }
 
-  // Comes nearer to a place, from where the camera is.
+  // Flies closer to a place, in the current viewing direction.
   focus(place: THREE.Vector3): void {
     const away = this.camera.position.clone().sub(place).multiplyScalar(0.4);
     away.setLength(Math.max(away.length(), 2 * this.orbit.minDistance));
     this.flyTo({ eye: place.clone().add(away), target: place });
   }
 
-  // Once a frame. True where the camera has moved.
+  // Is called once a frame. Returns true if the camera has moved.
   update(seconds: number): boolean {
     this.flyOn();
-    if (!this.held) {
+    if (!this.isSuspended) {
       this.move(this.keyMotion(), seconds);
       this.move(padMotion(), seconds);
     }
@@ -170,12 +171,12 @@ export class Navigation {
   }
 
   private keyMotion(): Motion {
-    const held = (...codes: string[]) => (codes.some((code) => this.keys.has(code)) ? 1 : 0);
+    const pressed = (...codes: string[]) => (codes.some((code) => this.keys.has(code)) ? 1 : 0);
     return {
-      right: held('KeyD', 'ArrowRight') - held('KeyA', 'ArrowLeft'),
-      up: held('KeyE', 'PageUp') - held('KeyQ', 'PageDown'),
-      forward: held('KeyW', 'ArrowUp') - held('KeyS', 'ArrowDown'),
-      yaw: 0, pitch: 0, fast: held('ShiftLeft', 'ShiftRight') === 1,
+      right: pressed('KeyD', 'ArrowRight') - pressed('KeyA', 'ArrowLeft'),
+      up: pressed('KeyE', 'PageUp') - pressed('KeyQ', 'PageDown'),
+      forward: pressed('KeyW', 'ArrowUp') - pressed('KeyS', 'ArrowDown'),
+      yaw: 0, pitch: 0, fast: pressed('ShiftLeft', 'ShiftRight') === 1,
     };
   }
 
@@ -186,12 +187,12 @@ export class Navigation {
     this.turn(yaw * kTurnSpeed * seconds, pitch * kTurnSpeed * seconds);
   }
 
-  // So many seconds at full speed in each direction.
+  // Moves for `seconds` at the given shares of full speed.
   private go(right: number, up: number, forward: number): void {
     this.flight = undefined;
     const ahead = this.camera.getWorldDirection(new THREE.Vector3());
     const side = new THREE.Vector3().crossVectors(ahead, this.camera.up).normalize();
-    if (this.current !== 'fly') ahead.crossVectors(this.camera.up, side).normalize(); // over the ground
+    if (this.current !== 'fly') ahead.crossVectors(this.camera.up, side).normalize(); // horizontally, over the ground
     const speed = this.current === 'fly' ? this.speed : 0.8 * this.camera.position.distanceTo(this.orbit.target);
     const way = ahead.multiplyScalar(forward).addScaledVector(side, right).addScaledVector(this.camera.up, up);
     way.multiplyScalar(speed);
@@ -200,7 +201,7 @@ export class Navigation {
     this.moved = true;
   }
 
-  // Turns where the camera stands; radians, to the left and upwards.
+  // Turns the camera in place, by radians to the left and upwards.
   private turn(yaw: number, pitch: number): void {
     if (yaw === 0 && pitch === 0) return;
     const euler = new THREE.Euler().setFromQuaternion(this.camera.quaternion, 'YXZ');
@@ -215,7 +216,7 @@ export class Navigation {
 
   private listen(): void {
     addEventListener('keydown', ({ code, target, ctrlKey, metaKey, altKey }) => {
-      // Arrows are a slider's own.
+      // Sliders handle the arrow keys themselves.
       if (ctrlKey || metaKey || altKey || isTyping(target) || target instanceof HTMLInputElement) return;
       this.keys.add(code);
     });
@@ -227,16 +228,16 @@ export class Navigation {
       if (place && this.current !== 'fly') this.focus(place);
     });
     this.canvas.addEventListener('pointerdown', ({ pointerId, pointerType }) => {
-      if (this.current !== 'fly' || this.held) return;
+      if (this.current !== 'fly' || this.isSuspended) return;
       if (pointerType === 'mouse' && !this.isPointing && document.pointerLockElement !== this.canvas) {
-        // Where the pointer cannot be locked, dragging turns all the same.
+        // If the pointer cannot be locked, dragging turns the view.
         void Promise.resolve(this.canvas.requestPointerLock()).catch(() => {});
       }
       this.looking ??= pointerId;
     });
-    // Two fingers drag the place where one stands, and pull themselves forward.
+    // Dragging with two fingers moves sideways and vertically; spreading them moves forward.
     const fingers = new TwoFingers(this.canvas, (right, down, apart) => {
-      if (this.current !== 'fly' || this.held) return;
+      if (this.current !== 'fly' || this.isSuspended) return;
       this.go(-right * kFingerSpeed, down * kFingerSpeed, apart * kFingerSpeed);
     });
     const stop = ({ pointerId }: PointerEvent) => {
@@ -246,8 +247,8 @@ export class Navigation {
     addEventListener('pointercancel', stop);
     this.canvas.addEventListener('pointermove', ({ movementX, movementY, pointerId }) => {
       const isLocked = document.pointerLockElement === this.canvas;
-      if (this.current !== 'fly' || this.held || fingers.areDown || (!isLocked && this.looking !== pointerId)) return;
-      // A locked pointer drags the view's direction, others drag the picture.
+      if (this.current !== 'fly' || this.isSuspended || fingers.areDown || (!isLocked && this.looking !== pointerId)) return;
+      // A locked pointer drags the viewing direction; otherwise it drags the image.
       const sign = isLocked ? -1 : 1;
       this.turn(sign * movementX * kLookSpeed, sign * movementY * kLookSpeed);
     });

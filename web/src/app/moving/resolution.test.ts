@@ -1,7 +1,8 @@
 import { describe, expect, it } from 'vitest';
 import { Resolution } from './resolution';
 
-// A machine that takes so long for a whole picture: the scale after some pictures while the camera moves, or models do.
+// Simulates a machine that takes `milliseconds` for a frame at full resolution, and returns the scale after some frames
+// while the camera, or models, move.
 function settled(milliseconds: number, motion: 'move' | 'play' = 'move'): number {
   const resolution = new Resolution(40, 100, 300);
   for (let now = 0; now < 100; ++now) {
@@ -20,7 +21,7 @@ describe('the resolution', () => {
     expect(settled(1e4)).toBe(0.25);
   });
 
-  it('is whole when the camera rests', () => {
+  it('is full when the camera rests', () => {
     const resolution = new Resolution(40, 100, 300);
     for (let now = 0; now < 10; ++now) {
       resolution.moved(now);
@@ -48,7 +49,7 @@ describe('the resolution', () => {
     expect(resolution.motion(800)).toBe('rest');
   });
 
-  it('rises again after a while of slow pictures, though a screen shows none sooner than every 17 ms', () => {
+  it('rises again after slow frames although the screen refreshes only every 17 ms', () => {
     const resolution = new Resolution(40, 100, 300);
     const draw = (pictures: number, milliseconds: number) => {
       for (let now = 0; now < pictures; ++now) {
@@ -61,7 +62,7 @@ describe('the resolution', () => {
     expect(draw(1000, 10)).toBe(1);
   });
 
-  it('is not raised where pictures take too long at the least of it', () => {
+  it('stays at the minimum if frames are too slow even there', () => {
     const resolution = new Resolution(40, 100, 300);
     for (let now = 0; now < 1000; ++now) {
       resolution.moved(now);
@@ -70,7 +71,7 @@ describe('the resolution', () => {
     expect(resolution.scale(1000)).toBe(0.25);
   });
 
-  // A headset that shows a picture every 14 ms, or every 28 ms where it takes longer.
+  // Simulates a headset that shows a frame every 14 ms, or every 28 ms if rendering takes longer.
   function inHeadset(milliseconds: number, pictures: number): number[] {
     const resolution = new Resolution();
     resolution.pace = { target: 18, patience: 50, share: 0.5 };
@@ -82,13 +83,13 @@ describe('the resolution', () => {
     });
   }
 
-  it('is tried out where pictures never come sooner than they are shown', () => {
+  it('is raised on trial if frame times are limited by the display', () => {
     const quick = inHeadset(10, 500);
     expect(quick[0]).toBe(0.5);
     expect(quick[499]).toBe(1);
     const slow = inHeadset(20, 3000);
     expect(Math.max(...slow)).toBe(1);
-    // Ever more seldom.
+    // The interval between trials increases.
     expect(slow.slice(1000).filter((scale) => scale === 1).length).toBeLessThan(40);
     expect(slow.slice(1000).filter((scale) => scale === 0.75).length).toBeGreaterThan(1900);
   });

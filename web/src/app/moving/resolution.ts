@@ -1,51 +1,51 @@
-// How many pixels of the scene to draw: as many as the machine can while the camera moves; all of them when it rests, and
-// while only models move as many as still make a picture of a scene at rest with something moving in it.
+// Chooses the render resolution of the scene: while the camera moves, as much as the machine can render in time; at
+// rest, the full resolution; and while only models move, as much as still allows a smooth animation in a scene at rest.
 
-const kSteps = [0.25, 0.375, 0.5, 0.75, 1]; // few, as targets are made anew for each
+const kSteps = [0.25, 0.375, 0.5, 0.75, 1]; // few, as the render targets are reallocated for each
 
 export type Motion = 'move' | 'play' | 'rest';
 
-export interface Pace {
-  target: number; // ms that a picture may take
-  // Pictures in time after which more pixels are tried, though nobody knows what they take: where none comes sooner than a
-  // screen shows it. Longer each time that they took too long.
+export interface ResolutionTarget {
+  target: number; // largest acceptable frame time in ms
+  // Number of timely frames after which a higher resolution is tried although its cost is unknown, as frame times never
+  // fall below the refresh interval of the screen. It doubles with each failed trial.
   patience: number;
-  share: number; // of the pixels along an edge, to begin with
+  share: number; // initial resolution along an edge, relative to full resolution
 }
 
-const kPatience = 120; // pictures
-const kLongestWait = 16; // times the patience
-const kUnmeasured = 3; // pictures after more pixels are tried: of targets that are made anew
+const kPatience = 120; // frames
+const kLongestWait = 16; // as a multiple of the patience
+const kUnmeasured = 3; // frames that are not measured after a trial began, as the render targets are reallocated
 
 export class Resolution {
-  // A share that somebody has chosen, whether the camera moves or not.
+  // Resolution that the user has chosen, at rest and in motion.
   fixed?: number;
   private moving: Measured;
   private readonly playing: Measured;
   private lastMove = -Infinity;
   private lastPlay = -Infinity;
 
-  // `target`, `playTarget`: ms that a picture may take while the camera moves, and while models alone do; `rest`: ms after
-  // which it rests.
+  // `target` and `playTarget` are the largest frame times in ms while the camera moves and while only models move;
+  // `rest` is the time in ms after which the scene counts as being at rest.
   constructor(
     private readonly target = 40,
     playTarget = 100,
     private readonly rest = 300,
   ) {
-    this.moving = new Measured(paceOf(target));
-    this.playing = new Measured(paceOf(playTarget));
+    this.moving = new Measured(makeResolutionTarget(target));
+    this.playing = new Measured(makeResolutionTarget(playTarget));
   }
 
-  // Of the camera's motion. None: its own.
-  set pace(pace: Pace | undefined) {
-    this.moving = new Measured(pace ?? paceOf(this.target));
+  // Replaces the target for motion of the camera; undefined restores the default.
+  set pace(pace: ResolutionTarget | undefined) {
+    this.moving = new Measured(pace ?? makeResolutionTarget(this.target));
   }
 
   moved(now: number): void {
     this.lastMove = now;
   }
 
-  // A model moves by itself.
+  // Is called when an animated model moves.
   played(now: number): void {
     this.lastPlay = now;
   }
@@ -55,7 +55,7 @@ export class Resolution {
     return now - this.lastPlay <= this.rest ? 'play' : 'rest';
   }
 
-  // When all rests.
+  // The resolution at rest.
   get whole(): number {
     return this.fixed ?? 1;
   }
@@ -65,7 +65,7 @@ export class Resolution {
     return this.fixed ?? (motion === 'rest' ? 1 : this.of(motion).scale);
   }
 
-  // What a picture took that was drawn in that motion.
+  // Reports the frame time of a frame that was drawn during `motion`.
   took(milliseconds: number, motion: Motion): void {
     if (motion !== 'rest') this.of(motion).took(milliseconds);
   }
@@ -75,19 +75,19 @@ export class Resolution {
   }
 }
 
-function paceOf(target: number): Pace {
+function makeResolutionTarget(target: number): ResolutionTarget {
   return { target, patience: kPatience, share: 1 };
 }
 
 class Measured {
   private step: number;
-  private measured = 0; // ms of a picture, at the step's resolution
-  private wait: number; // pictures, of patience
-  private inTime = 0; // pictures, since the last step
+  private measured = 0; // ms per frame at the current step's resolution
+  private wait: number; // current patience in frames
+  private inTime = 0; // timely frames since the last step
   private unmeasured = 0;
-  private tried = false; // the step was
+  private tried = false; // the current step is a trial
 
-  constructor(private readonly pace: Pace) {
+  constructor(private readonly pace: ResolutionTarget) {
     this.step = Math.max(0, kSteps.filter((share) => share <= pace.share).length - 1);
     this.wait = pace.patience;
   }
@@ -112,7 +112,7 @@ class Measured {
       this.tried = false;
       return;
     }
-    if (++this.inTime > this.wait) this.tried = false; // it has stood the trial
+    if (++this.inTime > this.wait) this.tried = false; // the trial has succeeded
     if (this.step + 1 < kSteps.length) {
       if (expected(this.step + 1) < 0.7 * target) this.change(this.step + 1);
       else if (this.inTime > this.wait) this.tryMore();

@@ -1,4 +1,4 @@
-// Two fingers on a canvas: how far they have gone together and apart, in pixels, each time that one moves.
+// Tracks two fingers on a canvas: how far they have moved together and apart, in pixels, with each move.
 
 interface Place {
   x: number;
@@ -31,7 +31,7 @@ export class TwoFingers {
     return this.fingers.size >= 2;
   }
 
-  // Their middle, and how far apart they are; of the first two.
+  // Returns the midpoint and the distance of the first two fingers.
   private pair(): (Place & { apart: number }) | undefined {
     const [a, b] = this.fingers.values();
     return a && b && { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, apart: Math.hypot(a.x - b.x, a.y - b.y) };

@@ -1,9 +1,9 @@
-// The whole page takes files that are dragged onto it.
+// Makes the whole page accept files that are dragged onto it.
 import { element } from './element';
 import type { ModelFile } from '../models/model-files';
 
-const kMostFiles = 10000;
-const kDepth = 16; // of folders
+const kMaxFiles = 10000;
+const kDepth = 16; // limit on the nesting of folders
 
 export class DropTarget {
   private readonly words = element('span');
@@ -30,7 +30,7 @@ export class DropTarget {
     });
   }
 
-  // Says what is being done until it is done.
+  // Shows a message until the work is done.
   async during<T>(what: string, work: Promise<T>): Promise<T> {
     this.words.textContent = what;
     this.overlay.hidden = false;
@@ -42,7 +42,7 @@ export class DropTarget {
   }
 }
 
-// With those in folders. What is in `dropped` can be asked for only at once.
+// Returns all files, including those in folders. The items of `dropped` are only accessible synchronously.
 async function droppedFiles(dropped: DataTransfer): Promise<ModelFile[]> {
   const items = [...dropped.items].filter(({ kind }) => kind === 'file');
   const entries = items.map((item) => ({ entry: item.webkitGetAsEntry?.(), file: item.getAsFile() }));
@@ -59,7 +59,7 @@ async function walk(folder: FileSystemDirectoryEntry, above: string, depth: numb
   const path = `${above}${folder.name}/`;
   for (;;) {
     const some = await new Promise<FileSystemEntry[]>((resolve) => reader.readEntries(resolve, () => resolve([])));
-    if (some.length === 0 || files.length >= kMostFiles) return;
+    if (some.length === 0 || files.length >= kMaxFiles) return;
     for (const entry of some) {
       if (entry.isDirectory && depth > 0) await walk(entry as FileSystemDirectoryEntry, path, depth - 1, files);
       if (!entry.isFile) continue;

@@ -1,9 +1,9 @@
-// An element with a class and what it holds: `element('p', 'faint', 'text')`.
+// Creates an element with a class and children: `element('p', 'faint', 'text')`.
 export function element<K extends keyof HTMLElementTagNameMap>(
   tag: K, className = '', ...children: (Node | string)[]
 ): HTMLElementTagNameMap[K] {
-  const made = document.createElement(tag);
-  if (className !== '') made.className = className;
-  made.append(...children);
-  return made;
+  const node = document.createElement(tag);
+  if (className !== '') node.className = className;
+  node.append(...children);
+  return node;
 }

@@ -1,4 +1,4 @@
-// Parts of panels: numbers and names to type, small buttons in rows of a list.
+// Components of panels: fields for numbers and names, and small buttons in rows of a list.
 import { element } from './element';
 import { icon, type IconName } from './icons';
 
@@ -6,10 +6,10 @@ const kLargest = 1e7;
 
 export interface Field<T> {
   label: HTMLLabelElement;
-  set(value: T): void; // but while it is typed into
+  set(value: T): void; // sets the value unless the field is being edited
 }
 
-// `done`: it has been left, and may hold what is no number.
+// `done` is called when the field is left; its text may not be a number.
 export function numberField(name: string, step: number, digits: number, change: (to: number) => void, done: () => void): Field<number> {
   const input = element('input');
   input.type = 'number';
@@ -20,10 +20,10 @@ export function numberField(name: string, step: number, digits: number, change: 
   return field(name, input, (value) => String(Number(value.toFixed(digits)) + 0), done);
 }
 
-// A name of so many letters. What is typed holds at once; where nothing is left, and after Escape, the one before does.
-export function nameField(most: number, change: (to: string) => void, done: () => void): Field<string> {
+// A field for a name of limited length. Edits take effect at once; an empty text or Escape restores the previous name.
+export function nameField(maximum: number, change: (to: string) => void, done: () => void): Field<string> {
   const input = element('input');
-  input.maxLength = most;
+  input.maxLength = maximum;
   input.autocomplete = 'off';
   let before = '';
   input.addEventListener('focus', () => (before = input.value));
@@ -34,28 +34,28 @@ export function nameField(most: number, change: (to: string) => void, done: () =
   return field('Name', input, (value) => value, done);
 }
 
-// Enter and Escape leave it.
-function field<T>(name: string, input: HTMLInputElement, textOf: (value: T) => string, done: () => void): Field<T> {
+// Enter and Escape leave the field.
+function field<T>(name: string, input: HTMLInputElement, formatValue: (value: T) => string, done: () => void): Field<T> {
   input.addEventListener('keydown', ({ key, isComposing }) => {
     if ((key === 'Enter' || key === 'Escape') && !isComposing) input.blur();
   });
   input.addEventListener('blur', done);
   const set = (value: T) => {
-    if (document.activeElement !== input) input.value = textOf(value);
+    if (document.activeElement !== input) input.value = formatValue(value);
   };
   return { label: element('label', 'field', name, input), set };
 }
 
-// `of`: what it is done to, for those who hear the page.
+// `of` names the object of the action for screen readers.
 export function iconButton(what: string, of: string, picture: IconName, act: () => void): HTMLButtonElement {
-  const made = element('button', 'plain', icon(picture));
-  made.title = what;
-  made.setAttribute('aria-label', `${what}: ${of}`);
-  made.addEventListener('click', act);
-  return made;
+  const button = element('button', 'plain', icon(picture));
+  button.title = what;
+  button.setAttribute('aria-label', `${what}: ${of}`);
+  button.addEventListener('click', act);
+  return button;
 }
 
-// Which one of several buttons is pressed.
+// Marks which one of several buttons is pressed.
 export function showPressed<T>(buttons: ReadonlyMap<T, HTMLButtonElement>, pressed: T): void {
   buttons.forEach((button, one) => {
     button.classList.toggle('on', one === pressed);
@@ -63,7 +63,7 @@ export function showPressed<T>(buttons: ReadonlyMap<T, HTMLButtonElement>, press
   });
 }
 
-// The rows of a list, made anew: the keyboard's focus stays in its row, on the same button.
+// Replaces the rows of a list; the keyboard focus stays in its row, on the same button.
 export function replaceRows(list: HTMLElement, rows: readonly HTMLElement[]): void {
   const buttons = (row: Element) => [...row.querySelectorAll('button')];
   const { activeElement } = document;

@@ -18,7 +18,7 @@ describe('the frame rate', () => {
     rate = new FrameRate((text) => said.push(text));
   });
 
-  // An animation frame, in which a picture is drawn where `milliseconds` passed since the last one.
+  // Simulates an animation frame `milliseconds` after the last one, in which a frame is drawn.
   function frame(milliseconds?: number): void {
     const now = [...waiting.values()];
     waiting.clear();
@@ -26,7 +26,7 @@ describe('the frame rate', () => {
     if (milliseconds !== undefined) rate.drew(milliseconds);
   }
 
-  it('is that of pictures that follow one another', () => {
+  it('is that of consecutive frames', () => {
     frame(500);
     expect(said).toEqual([]);
     frame(20);
@@ -34,7 +34,7 @@ describe('the frame rate', () => {
     expect(said).toEqual(['20 ms, 50 fps', '4.0 ms, 250 fps']);
   });
 
-  it('is none at rest, nor of the first picture after it', () => {
+  it('is unknown at rest and for the first frame after it', () => {
     frame(16);
     frame(20);
     frame();
@@ -48,7 +48,7 @@ describe('the frame rate', () => {
     expect(waiting.size).toBe(0);
   });
 
-  it('is not that of a page that was out of sight', () => {
+  it('ignores the time while the page is hidden', () => {
     frame(16);
     frame(20);
     rate.rest();

@@ -1,18 +1,18 @@
-// How fast pictures follow one another, in words. Of the first one after a rest nobody knows: what passed since the last
-// animation frame is not what it takes.
+// Returns the frame rate as text. For the first frame after a rest it is unknown, as the time since the last animation
+// frame is not its duration.
 
 export class FrameRate {
-  private isDrawing = false; // in the last animation frame
-  private awaited = 0; // the animation frame
+  private isDrawing = false; // a frame was drawn in the last animation frame
+  private awaited = 0; // id of the requested animation frame
 
   constructor(private readonly say: (text: string) => void) {}
 
-  // A picture is drawn, in an animation frame that came so long after the last one.
+  // Is called when a frame is drawn, with the time since the last animation frame.
   drew(milliseconds: number): void {
     if (this.isDrawing) this.say(`${inDigits(milliseconds)} ms, ${inDigits(1000 / milliseconds)} fps`);
     this.isDrawing = true;
     cancelAnimationFrame(this.awaited);
-    // The next one may begin here before a picture is drawn in it; the one after that ends it.
+    // The next animation frame may begin here before anything is drawn in it; the one after it ends the measurement.
     this.awaited = requestAnimationFrame(() => (this.awaited = requestAnimationFrame(() => this.rest())));
   }
 

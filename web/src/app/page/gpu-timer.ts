@@ -1,4 +1,5 @@
-// How long the graphics card draws, where the browser tells (EXT_disjoint_timer_query_webgl2); some frames late.
+// Measures the GPU time of frames if the browser supports it (EXT_disjoint_timer_query_webgl2), with a delay of some
+// frames.
 import type * as THREE from 'three';
 
 interface Timer {
@@ -7,7 +8,7 @@ interface Timer {
 }
 
 export class GpuTimer {
-  milliseconds?: number; // of the last picture that is known
+  milliseconds?: number; // of the last measured frame
   private readonly gl: WebGL2RenderingContext;
   private running?: WebGLQuery;
 
@@ -15,7 +16,7 @@ export class GpuTimer {
     this.gl = renderer.getContext() as WebGL2RenderingContext;
   }
 
-  // One picture at a time is measured.
+  // One frame is measured at a time.
   measure(draw: () => void): void {
     const { gl } = this;
     const timer = gl.getExtension('EXT_disjoint_timer_query_webgl2') as Timer | null;
@@ -33,7 +34,7 @@ export class GpuTimer {
   private hasEnded(timer: Timer): boolean {
     const { gl, running } = this;
     if (!running) return true;
-    const isLost = !gl.isQuery(running); // of a context that is gone
+    const isLost = !gl.isQuery(running); // the query belongs to a lost context
     if (!isLost && !gl.getQueryParameter(running, gl.QUERY_RESULT_AVAILABLE)) return false;
     if (!isLost) {
       const isDisjoint = gl.getParameter(timer.GPU_DISJOINT_EXT) as boolean;

@@ -1,4 +1,4 @@
-// What keys and fingers do.
+// The help: what keys and gestures do.
 import { element } from './element';
 import type { Shortcuts } from './shortcuts';
 import type { Toolbar } from './toolbar';

@@ -1,4 +1,4 @@
-// Drawn on 20 × 20, in lines.
+// Icons of lines on a grid of 20 × 20.
 const kIcons = {
   home: 'M3 9.5 10 3.5l7 6M5 8.5V16h10V8.5',
   map: 'M10 3v14M3 10h14M10 3 8 5M10 3l2 2M10 17l-2-2M10 17l2-2M3 10l2-2M3 10l2 2M17 10l-2-2M17 10l-2 2',

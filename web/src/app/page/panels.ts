@@ -1,4 +1,4 @@
-// What stands over the picture: how far loading is, what went wrong, numbers.
+// The overlays of the canvas: loading progress, errors and statistics.
 import type { SceneError } from '../../scene-error';
 import type { SceneStatistics } from '../../scene';
 import type { Frame } from '../viewer';
@@ -15,7 +15,7 @@ export class LoadingPanel {
   private readonly bar = element('i');
   private readonly panel = element(
     'div', 'glass loading', element('div', 'name', this.name, this.bytes), element('div', 'bar', this.bar));
-  private most = 1; // tiles on their way since the last rest
+  private maximum = 1; // largest number of pending tiles since the last rest
 
   constructor(parent: HTMLElement) {
     this.name.textContent = 'Opening the scene';
@@ -24,10 +24,10 @@ export class LoadingPanel {
   }
 
   show(name: string, { fetchedBytes, pending }: SceneStatistics, idle: boolean): void {
-    this.most = idle ? 1 : Math.max(this.most, pending);
+    this.maximum = idle ? 1 : Math.max(this.maximum, pending);
     this.name.textContent = name === '' ? 'Loading' : name;
     this.bytes.textContent = megabytes(fetchedBytes);
-    this.bar.style.width = `${idle ? 100 : Math.round(100 * (1 - pending / (this.most + 1)))}%`;
+    this.bar.style.width = `${idle ? 100 : Math.round(100 * (1 - pending / (this.maximum + 1)))}%`;
     this.panel.classList.toggle('done', idle);
   }
 
@@ -43,7 +43,7 @@ export class ErrorPanel {
   private readonly count = element('summary');
   private readonly others = element('ul');
   private readonly more = element('details', '', this.count, this.others);
-  private shown: SceneError[] = []; // since it was closed, the last one first
+  private shown: SceneError[] = []; // errors since the panel was closed, the latest first
   private readonly panel: HTMLElement;
 
   constructor(parent: HTMLElement) {
@@ -59,23 +59,23 @@ export class ErrorPanel {
     this.panel.hidden = true;
   }
 
-  // The last one, and those that came before it since it was closed.
+  // Shows the latest error, and those before it since the panel was closed.
   show(error: SceneError): void {
-    const kMost = 50;
-    this.shown = [error, ...(this.panel.hidden ? [] : this.shown)].slice(0, kMost);
+    const kMax = 50;
+    this.shown = [error, ...(this.panel.hidden ? [] : this.shown)].slice(0, kMax);
     const sentence = (text: string) => `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
-    this.what.textContent = titleOf(error);
+    this.what.textContent = errorTitle(error);
     this.reason.textContent = sentence(error.reason);
     this.remedy.textContent = sentence(error.remedy);
     const others = this.shown.slice(1);
     this.more.hidden = others.length === 0;
     this.count.textContent = `And ${others.length} more`;
-    this.others.replaceChildren(...others.map((one) => element('li', '', `${titleOf(one)}: ${one.reason}`)));
+    this.others.replaceChildren(...others.map((one) => element('li', '', `${errorTitle(one)}: ${one.reason}`)));
     this.panel.hidden = false;
   }
 }
 
-function titleOf({ what, place }: SceneError): string {
+function errorTitle({ what, place }: SceneError): string {
   return place === '' ? what : `${what}, ${place}`;
 }
 
@@ -101,11 +101,11 @@ export class StatisticsPanel {
     const rows: [string, string][] = [
       ['Drawing', gpuMilliseconds === undefined ? 'not told' : `${inDigits(gpuMilliseconds)} ms`],
       ['Resolution', `${Math.round(100 * resolutionScale)} %`],
-      ['Graphics card', megabytes(statistics.cardBytes + statistics.targetBytes)],
+      ['GPU', megabytes(statistics.gpuBytes + statistics.targetBytes)],
       ['Page', megabytes(statistics.pageBytes)],
       ['Fetched', megabytes(statistics.fetchedBytes)],
-      ['On their way', String(statistics.pending)],
-      ...(statistics.refused > 0 ? [['No room for', `${statistics.refused} blocks`] satisfies [string, string]] : []),
+      ['Loading', String(statistics.pending)],
+      ...(statistics.refused > 0 ? [['Over the budget', `${statistics.refused} blocks`] satisfies [string, string]] : []),
       ...statistics.drawn.map((count, level): [string, string] => [`Blocks of level ${level}`, String(count)]),
     ];
     const list = rows.flatMap(([name, value]) => [element('dt', '', name), element('dd', '', value)]);

@@ -1,4 +1,4 @@
-// What people point with: what they pointed with last; before that, what the device says.
+// The kind of pointer that was used last; before any use, the device's primary one.
 let isTouch = matchMedia('(pointer: coarse)').matches;
 addEventListener('pointerdown', ({ pointerType }) => (isTouch = pointerType === 'touch'), { capture: true });
 

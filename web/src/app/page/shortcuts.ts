@@ -1,7 +1,7 @@
-// Keys that do something, and what they do, for the help.
+// Keyboard shortcuts with their descriptions for the help.
 
 export interface Shortcut {
-  keys: string; // for people: "H", "W A S D"
+  keys: string; // for users: "H", "W A S D"
   what: string;
 }
 
@@ -19,14 +19,14 @@ export class Shortcuts {
     });
   }
 
-  // `key` as KeyboardEvent.key has it, in small letters.
+  // `key` is that of KeyboardEvent.key, in lower case.
   add(key: string, what: string, action: () => void): void {
     if (this.actions.has(key)) throw new Error(`two actions for the key ${key}`);
     this.actions.set(key, action);
     this.describe(key.length === 1 ? key.toUpperCase() : `${key.charAt(0).toUpperCase()}${key.slice(1)}`, what);
   }
 
-  // Of what is heard elsewhere: held keys, the mouse.
+  // Adds a description only, for input that is handled elsewhere: held keys and the mouse.
   describe(keys: string, what: string): void {
     this.list.push({ keys, what });
   }

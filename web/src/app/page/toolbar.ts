@@ -1,13 +1,13 @@
-// The buttons at the side, and the panels that they open, one at a time.
+// The toolbar at the side, and the panels that its buttons open, one at a time.
 import { element } from './element';
 import { icon, type IconName } from './icons';
 import type { Shortcuts } from './shortcuts';
 
 export interface Tool {
-  name: string; // for people: the button's label, the panel's heading
-  key?: string; // that opens it too
+  name: string; // for users: the button's label and the panel's heading
+  key?: string; // shortcut that also opens it
   icon: IconName;
-  panel?: HTMLElement; // without: the button does something at once
+  panel?: HTMLElement; // if undefined, the button acts immediately
   opened?(): void;
   closed?(): void;
 }
@@ -24,7 +24,7 @@ export class Toolbar {
     this.bar.setAttribute('role', 'toolbar');
     this.bar.setAttribute('aria-label', 'Tools');
     parent.append(this.bar);
-    shortcuts.add('escape', 'Close what is open', () => this.open(undefined));
+    shortcuts.add('escape', 'Close the open panel', () => this.open(undefined));
   }
 
   add(tool: Tool): HTMLButtonElement {
@@ -61,7 +61,7 @@ export class Toolbar {
       button.classList.toggle('on', one === tool);
       button.setAttribute('aria-expanded', String(one === tool));
     }
-    // Who closed it by a key goes on where it was opened.
+    // If it was closed by a key, the focus returns to the button that opened it.
     if (before && !tool && this.panels.get(before)!.panel.contains(document.activeElement)) this.panels.get(before)!.button.focus();
     before?.closed?.();
     tool?.opened?.();

@@ -1,4 +1,4 @@
-// Views to come back to, kept by the browser for each scene and in worlds; and a camera path along them.
+// Bookmarks of views, which the browser stores for each scene and which worlds contain, and a camera path along them.
 import { cameraPath } from './camera-path';
 import { download, fileName } from '../page/page-files';
 import { element } from '../page/element';
@@ -6,24 +6,24 @@ import { iconButton, nameField, replaceRows } from '../page/fields';
 import type { Toolbar } from '../page/toolbar';
 import { formatView, parseView, type View } from './view-address';
 import type { Viewer } from '../viewer';
-import { kMost } from '../world/world-file';
+import { kMax } from '../world/world-file';
 
-const kLetters = 80; // of a name
+const kLetters = 80; // limit on the length of a name
 
 export interface Bookmark {
   name: string;
   view: View;
 }
 
-// What was kept: text of this program, or of nobody knows whom.
+// Parses the stored text, which may not have been written by this program.
 export function readBookmarks(text: string | null): Bookmark[] {
   try {
-    const kept = JSON.parse(text ?? '[]') as unknown;
-    if (!Array.isArray(kept)) return [];
-    return kept.slice(0, kMost.bookmarks).flatMap((one: unknown) => {
+    const stored = JSON.parse(text ?? '[]') as unknown;
+    if (!Array.isArray(stored)) return [];
+    return stored.slice(0, kMax.bookmarks).flatMap((one: unknown) => {
       const { name, view } = (one ?? {}) as { name?: unknown; view?: unknown };
-      const found = typeof view === 'string' ? parseView(view) : undefined;
-      return found ? [{ name: typeof name === 'string' ? name.slice(0, kLetters) : 'View', view: found }] : [];
+      const parsedView = typeof view === 'string' ? parseView(view) : undefined;
+      return parsedView ? [{ name: typeof name === 'string' ? name.slice(0, kLetters) : 'View', view: parsedView }] : [];
     });
   } catch {
     return [];
@@ -34,21 +34,22 @@ export function writeBookmarks(bookmarks: Bookmark[]): string {
   return JSON.stringify(bookmarks.map(({ name, view }) => ({ name, view: formatView(view) })));
 }
 
-// The views of this browser, for this scene, and those of the world that is open.
+// The views that this browser has stored for this scene, and those of the open world.
 export class Bookmarks {
-  readonly onChange = new Set<() => void>(); // of the list, of what is selected
-  private kept: Bookmark[];
+  readonly onChange = new Set<() => void>(); // called when the list or the selection changes
+  private saved: Bookmark[];
   private ofWorld: Bookmark[] = [];
-  private chosen: Bookmark[] = []; // and what is the same of this browser, which is not listed
+  private chosen: Bookmark[] = []; // also contains the equal view of this browser, which is not listed
 
   constructor(private readonly key: string) {
-    this.kept = readBookmarks(read(key));
+    this.saved = readBookmarks(read(key));
   }
 
-  // Those of the world first; none twice, but for one that becomes the same while its name is typed.
+  // The views of the world come first. Equal views are listed once, except for one that becomes equal while its name is
+  // typed.
   get list(): Bookmark[] {
-    const texts = new Set(this.ofWorld.map(textOf));
-    return [...this.ofWorld, ...this.kept.filter((one) => one === this.chosen[0] || !texts.has(textOf(one)))];
+    const texts = new Set(this.ofWorld.map(serializeBookmark));
+    return [...this.ofWorld, ...this.saved.filter((one) => one === this.chosen[0] || !texts.has(serializeBookmark(one)))];
   }
 
   isOfWorld(bookmark: Bookmark): boolean {
@@ -60,39 +61,39 @@ export class Bookmarks {
   }
 
   select(bookmark: Bookmark | undefined): void {
-    const same = this.kept.filter((one) => bookmark && this.isOfWorld(bookmark) && textOf(one) === textOf(bookmark));
+    const same = this.saved.filter((one) => bookmark && this.isOfWorld(bookmark) && serializeBookmark(one) === serializeBookmark(bookmark));
     this.chosen = bookmark ? [bookmark, ...same] : [];
     this.changed();
   }
 
-  // The selected one.
+  // Renames the selected view.
   rename(name: string): void {
     for (const one of this.chosen) one.name = name.slice(0, kLetters);
-    this.change(this.kept, this.ofWorld);
+    this.change(this.saved, this.ofWorld);
   }
 
-  // And selects it.
+  // Adds a view and selects it.
   keep(view: View): void {
     const last = this.list.map(({ name }) => Number(/^View (\d+)$/.exec(name)?.[1] ?? 0));
     const bookmark = { name: `View ${Math.max(0, ...last) + 1}`, view };
     this.chosen = [bookmark];
-    this.change([...this.kept, bookmark].slice(-kMost.bookmarks), this.ofWorld);
+    this.change([...this.saved, bookmark].slice(-kMax.bookmarks), this.ofWorld);
   }
 
   remove(bookmark: Bookmark): void {
-    const others = (all: Bookmark[]) => all.filter((one) => textOf(one) !== textOf(bookmark));
-    this.change(others(this.kept), others(this.ofWorld));
+    const others = (all: Bookmark[]) => all.filter((one) => serializeBookmark(one) !== serializeBookmark(bookmark));
+    this.change(others(this.saved), others(this.ofWorld));
   }
 
-  // In place of those of another world.
+  // Replaces the views of the previous world.
   showWorld(bookmarks: Bookmark[]): void {
-    this.change(this.kept, bookmarks);
+    this.change(this.saved, bookmarks);
   }
 
-  private change(kept: Bookmark[], ofWorld: Bookmark[]): void {
-    this.kept = kept;
+  private change(saved: Bookmark[], ofWorld: Bookmark[]): void {
+    this.saved = saved;
     this.ofWorld = ofWorld;
-    write(this.key, writeBookmarks(kept));
+    write(this.key, writeBookmarks(saved));
     this.changed();
   }
 
@@ -101,11 +102,11 @@ export class Bookmarks {
   }
 }
 
-function textOf(bookmark: Bookmark): string {
+function serializeBookmark(bookmark: Bookmark): string {
   return writeBookmarks([bookmark]);
 }
 
-export function bookmarksOf({ city }: Viewer): Bookmarks {
+export function makeBookmarks({ city }: Viewer): Bookmarks {
   return new Bookmarks(`tessera bookmarks ${city.files.name} ${city.name}`);
 }
 
@@ -115,7 +116,7 @@ export function addBookmarks(viewer: Viewer, bookmarks: Bookmarks, toolbar: Tool
   const keep = element('button', '', 'Keep this view');
   const path = element('button', '', 'Save camera path');
   path.title = 'A flight through these views, for tessera render --path or nerfstudio';
-  const hint = element('p', 'faint', 'Kept in this browser, and in a world that is saved.');
+  const hint = element('p', 'faint', 'Stored in this browser, and in saved worlds.');
   const name = nameField(kLetters, (to) => bookmarks.rename(to), () => showName());
   const details = element('div', 'details', name.label);
   const panel = element('div', 'views listed', element('div', 'row', keep, path), list, details, hint);
@@ -147,7 +148,7 @@ export function addBookmarks(viewer: Viewer, bookmarks: Bookmarks, toolbar: Tool
   toolbar.add({ name: 'Views', key: 'b', icon: 'bookmark', panel, closed: () => bookmarks.select(undefined) });
 }
 
-// The browser may keep nothing for pages (private windows, full disks).
+// The browser may store nothing for pages (private windows, full disks).
 function read(key: string): string | null {
   try {
     return localStorage.getItem(key);
@@ -160,6 +161,6 @@ function write(key: string, text: string): void {
   try {
     localStorage.setItem(key, text);
   } catch {
-    // They last as long as the page.
+    // The views then last as long as the page.
   }
 }

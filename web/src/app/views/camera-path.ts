@@ -1,5 +1,5 @@
-// A flight along views, as nerfstudio's viewer writes it (camera_path.json): `tessera render SCENE OUT --path FILE` draws
-// it. In the world of the source of the photos, z up; cameras look along -z.
+// A camera path along views, in the format of nerfstudio's viewer (camera_path.json), which `tessera render SCENE OUT
+// --path FILE` renders. Its poses are in the world of the photos' source, z up; cameras look along -z.
 import * as THREE from 'three';
 import { kZUpFromYUp } from '../../axes';
 import type { Tileset } from '../../tiles/tileset';
@@ -9,12 +9,12 @@ export interface PathOptions {
   width: number;
   height: number;
   fps: number;
-  secondsBetween: number; // one view and the next
+  secondsBetween: number; // between two views
 }
 
 export const kPathOptions: PathOptions = { width: 1920, height: 1080, fps: 30, secondsBetween: 3 };
 
-// Through all views, smoothly; at rest at neither end.
+// A smooth path through all views, which does not slow down at its ends.
 export function viewsAlong(views: View[], { fps, secondsBetween }: PathOptions): View[] {
   if (views.length < 2) return [...views];
   const frames = Math.round((views.length - 1) * secondsBetween * fps) + 1;
@@ -29,13 +29,13 @@ export function viewsAlong(views: View[], { fps, secondsBetween }: PathOptions):
   });
 }
 
-// Camera to the source's world, column after column; `fromCapture` is the tileset's sourceFromWorld.
+// Column-major matrix from the camera to the source's world; `fromCapture` is the tileset's sourceFromWorld.
 function sourceFromCamera({ eye, target }: View, fromCapture: THREE.Matrix4): THREE.Matrix4 {
   const matrix = new THREE.Matrix4().lookAt(eye, target, new THREE.Vector3(0, 1, 0)).setPosition(eye);
   matrix.premultiply(kZUpFromYUp).premultiply(fromCapture);
   const [at, turn, scale] = [new THREE.Vector3(), new THREE.Quaternion(), new THREE.Vector3()];
   matrix.decompose(at, turn, scale);
-  return matrix.compose(at, turn, new THREE.Vector3(1, 1, 1)); // a pose has no scale
+  return matrix.compose(at, turn, new THREE.Vector3(1, 1, 1)); // poses have no scale
 }
 
 export function cameraPath(views: View[], { sourceFromWorld }: Pick<Tileset, 'sourceFromWorld'>, options = kPathOptions): string {

@@ -1,9 +1,9 @@
 import { expect, it } from 'vitest';
-import { piecesOf } from './screenshot';
+import { splitPicture } from './screenshot';
 
-it('a picture is made of pieces that cover it once', () => {
+it('the pieces of a screenshot cover it exactly once', () => {
   const times = new Uint8Array(300 * 170);
-  const pieces = piecesOf(300, 170, 64);
+  const pieces = splitPicture(300, 170, 64);
   for (const [left, top, width, height] of pieces) {
     expect(width).toBeLessThanOrEqual(64);
     expect(height).toBeLessThanOrEqual(64);

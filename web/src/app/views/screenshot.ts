@@ -1,12 +1,12 @@
-// A picture of any size, drawn piece by piece with all that the view asks for.
+// Renders an image of any size piece by piece, after everything that the view requests has been loaded.
 import { download, fileName } from '../page/page-files';
 import { element } from '../page/element';
 import type { Toolbar } from '../page/toolbar';
 import type { Viewer } from '../viewer';
 
 const kPiece = 512; // pixels along an edge
-const kLargest = 16384; // that canvases take
-const kWait = 60000; // ms in which no tile comes
+const kLargest = 16384; // limit on the size of canvases
+const kWait = 60000; // time-out in ms without any new tile
 
 export interface Progress {
   piece: number; // from 0
@@ -14,8 +14,8 @@ export interface Progress {
   pending: number; // tiles that this piece waits for
 }
 
-// Pieces of a picture, so that none is larger than `edge`: left, top, width, height.
-export function piecesOf(width: number, height: number, edge = kPiece): [number, number, number, number][] {
+// Splits an image into pieces (left, top, width, height), none of them larger than `edge`.
+export function splitPicture(width: number, height: number, edge = kPiece): [number, number, number, number][] {
   const pieces: [number, number, number, number][] = [];
   for (let top = 0; top < height; top += edge) {
     for (let left = 0; left < width; left += edge) {
@@ -25,8 +25,9 @@ export function piecesOf(width: number, height: number, edge = kPiece): [number,
   return pieces;
 }
 
-// The view as it is, with so many pixels; wider or narrower about the same middle. Tiles that
-// cannot be had are lacking, as on the screen. Rejects where it cannot be drawn, and where `signal` ends it.
+// Renders the current view with the given size in pixels; another aspect ratio widens or narrows the view about its
+// centre. Tiles that cannot be loaded are missing, as on the screen. Rejects if the image cannot be drawn, and when
+// `signal` aborts.
 export function takePicture(
   viewer: Viewer, width: number, height: number, tell: (progress: Progress) => void, signal: AbortSignal,
 ): Promise<Blob> {
@@ -41,7 +42,7 @@ export function takePicture(
     viewer.resolutionScale = 1;
     renderer.setPixelRatio(1);
     try {
-      const pieces = piecesOf(width, height);
+      const pieces = splitPicture(width, height);
       for (const [piece, [left, top, wide, high]] of pieces.entries()) {
         camera.setViewOffset(width, height, left, top, wide, high);
         renderer.setSize(wide, high, false);
@@ -49,7 +50,7 @@ export function takePicture(
           await allTiles(viewer, signal, (pending) => tell({ piece, pieces: pieces.length, pending }));
           viewer.draw();
           signal.throwIfAborted();
-        } while (!viewer.idle); // what is drawn takes room of its own
+        } while (!viewer.idle); // drawing takes GPU memory itself, which may evict tiles
         context.drawImage(renderer.domElement, left, top);
       }
     } finally {
@@ -64,7 +65,7 @@ export function takePicture(
   });
 }
 
-// Waits until all that the camera asks for is there.
+// Waits until everything that the camera requests is loaded.
 async function allTiles(viewer: Viewer, signal: AbortSignal, tell: (pending: number) => void): Promise<void> {
   let loads = -1;
   let lastLoad = 0;
@@ -73,11 +74,11 @@ async function allTiles(viewer: Viewer, signal: AbortSignal, tell: (pending: num
     tell(viewer.statistics?.pending ?? 0);
     await new Promise((resolve) => setTimeout(resolve, 10));
     signal.throwIfAborted();
-    if (viewer.renderer.getContext().isContextLost()) throw new Error('the browser took the graphics card away; try again');
+    if (viewer.renderer.getContext().isContextLost()) throw new Error('the WebGL context was lost; try again');
     if (viewer.idle) return;
     const now = performance.now();
     if (viewer.statistics?.loads !== loads) lastLoad = now;
-    else if (now - lastLoad > kWait) throw new Error('its tiles do not come; try again later');
+    else if (now - lastLoad > kWait) throw new Error('no tiles arrive; try again later');
     loads = viewer.statistics?.loads ?? 0;
   }
 }
@@ -95,7 +96,7 @@ export function addScreenshot(viewer: Viewer, toolbar: Toolbar): void {
   const isTaking = (is: boolean) => {
     take.hidden = is;
     cancel.hidden = !is;
-    // All pieces are to be of one view and one world.
+    // All pieces must show the same view and world.
     for (const other of document.querySelectorAll<HTMLElement>('.toolbar, .side')) other.inert = is && !other.contains(cancel);
   };
   isTaking(false);
@@ -115,7 +116,7 @@ export function addScreenshot(viewer: Viewer, toolbar: Toolbar): void {
   take.addEventListener('click', async () => {
     if (!width.reportValidity() || !height.reportValidity()) return;
     const ending = new AbortController();
-    // Not the second half of a double click that began it.
+    // Ignores the second half of the double click that started it.
     cancel.onclick = ({ detail }) => detail < 2 && ending.abort();
     isTaking(true);
     cancel.focus();

@@ -3,7 +3,7 @@ import { describe, expect, it } from 'vitest';
 import { formatView, parseView } from './view-address';
 
 describe('a view in the address', () => {
-  it('is the view again', () => {
+  it('restores the view', () => {
     const view = { eye: new THREE.Vector3(1.5, 20.25, -3), target: new THREE.Vector3(-4, 0, 7.125), fov: 62.5 };
     const again = parseView(`#${formatView(view)}`)!;
     expect(again.eye.distanceTo(view.eye)).toBeLessThan(1e-3);
@@ -19,11 +19,11 @@ describe('a view in the address', () => {
   it.each([
     '', '#', '#eye=1,2,3', '#eye=1,2,3&target=1,2', '#eye=1,2,3&target=1,2,x', '#eye=1,2,3&target=1,2,3', '#eye=1,2,3&target=NaN,0,0',
     '#eye=1,2,1e400&target=0,0,0', '#eye=,,&target=0,0,0',
-  ])('is none in %j', (text) => {
+  ])('is rejected: %j', (text) => {
     expect(parseView(text)).toBeUndefined();
   });
 
-  it('has an ordinary lens where that is not said well', () => {
+  it('has the default field of view if that is missing or invalid', () => {
     expect(parseView('eye=1,2,3&target=0,0,0&fov=500')!.fov).toBe(50);
   });
 });

@@ -1,10 +1,10 @@
-// A view as the address of the page holds it: #eye=x,y,z&target=x,y,z&fov=degrees, in the capture's world (z up).
+// A view in the fragment of the page's address: #eye=x,y,z&target=x,y,z&fov=degrees, in the capture's world (z up).
 import * as THREE from 'three';
 import { kYUpFromZUp, kZUpFromYUp } from '../../axes';
 import type { Look } from '../moving/navigation';
 
 export interface View extends Look {
-  fov: number; // degrees, of the height
+  fov: number; // vertical, in degrees
 }
 
 function text(place: THREE.Vector3): string {
@@ -21,7 +21,7 @@ export function formatView({ eye, target, fov }: View): string {
   return `eye=${text(eye)}&target=${text(target)}&fov=${Number(fov.toFixed(2))}`;
 }
 
-// Undefined where the text holds no view.
+// Returns undefined if the text contains no view.
 export function parseView(given: string): View | undefined {
   const words = new URLSearchParams(given.replace(/^#/, ''));
   const eye = place(words.get('eye'));

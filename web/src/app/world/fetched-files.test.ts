@@ -1,7 +1,7 @@
 import { afterEach, describe, expect, it, vi } from 'vitest';
 import { FetchedFiles } from './fetched-files';
 
-describe('files that lie where a world says', () => {
+describe("the files of a world's models", () => {
   const asked: string[] = [];
   vi.stubGlobal('fetch', async (url: string) => {
     asked.push(url);
@@ -18,9 +18,9 @@ describe('files that lie where a world says', () => {
     expect(await new FetchedFiles('world.json', undefined).file('b', '')).toBeUndefined();
   });
 
-  it('are not fetched without end', async () => {
-    const said = async (most: { files: number; bytes: number }) => {
-      const files = new FetchedFiles('world.json', 'https://a/', most);
+  it('are fetched up to a number of files and a total size', async () => {
+    const said = async (maximum: { files: number; bytes: number }) => {
+      const files = new FetchedFiles('world.json', 'https://a/', maximum);
       for (const [i, path] of ['a', 'b', 'c'].entries()) await files.file(path, `models[${i}]`);
     };
     await said({ files: 3, bytes: 30 });

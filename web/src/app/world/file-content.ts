@@ -1,18 +1,18 @@
-// What a file holds, in a few letters: so that of two files of one name each model finds its own. No defence against
-// forgery.
+// Short digests of files, by which each model finds its own among several files of one name. They are not secure
+// against forgery.
 const kChunk = 1 << 22;
 const known = new WeakMap<Blob, Promise<string>>();
 
-// Its bytes and a digest of them: '684-0c9f1d2e7a5b3344'.
-export function contentOf(file: Blob): Promise<string> {
-  const found = known.get(file) ?? digestOf(file);
-  known.set(file, found);
-  found.catch(() => known.delete(file));
-  return found;
+// Returns the size in bytes and a digest, such as '684-0c9f1d2e7a5b3344'.
+export function computeContentId(file: Blob): Promise<string> {
+  const digest = known.get(file) ?? computeDigest(file);
+  known.set(file, digest);
+  digest.catch(() => known.delete(file));
+  return digest;
 }
 
-// Two lanes of FNV-1a, the second over the words mixed.
-async function digestOf(file: Blob): Promise<string> {
+// Two lanes of FNV-1a, the second of which processes mixed words.
+async function computeDigest(file: Blob): Promise<string> {
   let [a, b] = [0x811c9dc5, 0x9e3779b9];
   for (let at = 0; at < file.size; at += kChunk) {
     const bytes = new Uint8Array(await file.slice(at, at + kChunk).arrayBuffer());

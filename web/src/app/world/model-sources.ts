@@ -1,26 +1,26 @@
-// The files of models: how they are called in a world, and which of several of one name is meant.
+// The files of models: their names in a world, and the choice among several files of one name.
 import { SceneError } from '../../scene-error';
-import { findFile, isModel, nameOf, type ModelFile } from '../models/model-files';
+import { findFile, isModel, baseName, type ModelFile } from '../models/model-files';
 import type { ModelSource, PlacedModel } from '../models/models';
-import { contentOf } from './file-content';
+import { computeContentId } from './file-content';
 import type { WorldModel } from './world-file';
 
-// Of the files that the models came from.
-export function bytesOf(list: readonly PlacedModel[]): number {
+// The files that the models were loaded from.
+export function countFileBytes(list: readonly PlacedModel[]): number {
   const files = new Set(list.flatMap(({ source }) => source.files));
   return [...files].reduce((sum, { file }) => sum + file.size, 0);
 }
 
 type NamedFiles = Pick<WorldModel, 'files' | 'contents'>;
 
-// The same for models of the same files.
-export function keyOf({ files, contents }: NamedFiles): string {
+// Equal for models of the same files.
+export function modelKey({ files, contents }: NamedFiles): string {
   return JSON.stringify([files, contents]);
 }
 
-// As they came; in a folder with a number, where another source has a file of that name, or one of `absent` another
-// file. Throws SceneError that names the file that cannot be read any more.
-export async function namesOf(
+// Returns the names of the files: as provided, or in a numbered folder if another source, or one of `absent`, has a
+// different file of that name. Throws SceneError that names a file that can no longer be read.
+export async function assignFileNames(
   sources: ReadonlySet<Pick<ModelSource, 'files'>>, absent: readonly NamedFiles[] = [],
 ): Promise<Map<ModelFile, string>> {
   const names = new Map<ModelFile, string>();
@@ -28,11 +28,11 @@ export async function namesOf(
   const ofAbsent = takenBy(absent);
   for (const { files } of sources) {
     const fresh = files.filter((file) => !names.has(file));
-    const contents = await contentsOf(fresh);
+    const contents = await computeContentIds(fresh);
     const inFolder = (number: number) => (path: string) => (number === 1 ? path : `${number}/${path}`);
     let number = 1;
     const isFree = ({ path }: ModelFile, i: number) => {
-      const name = inFolder(number)(path).toLowerCase(); // as findFile compares them
+      const name = inFolder(number)(path).toLowerCase(); // compared as in findFile
       return !taken.has(name) && [...(ofAbsent.get(name) ?? [])].every((content) => content === contents[i]);
     };
     while (!fresh.every(isFree)) ++number;
@@ -44,8 +44,8 @@ export async function namesOf(
   return names;
 }
 
-// What is in files of those names, where it is known. Of what a model needs beside its own file, and nobody knows, it is
-// the name that counts.
+// Returns the digests of files by name, where they are known. For companion files without a digest only the name
+// counts.
 function takenBy(absent: readonly NamedFiles[]): Map<string, Set<string | undefined>> {
   const taken = new Map<string, Set<string | undefined>>();
   for (const { files, contents } of absent) {
@@ -58,30 +58,30 @@ function takenBy(absent: readonly NamedFiles[]): Map<string, Set<string | undefi
   return taken;
 }
 
-// The one that holds what is meant, if anybody knows that; else the one of that name.
+// Returns the file with the given content if the content is known, otherwise the file of that name.
 export async function fileOfContent(
   path: string, content: string | undefined, isMain: boolean, all: readonly ModelFile[],
 ): Promise<ModelFile | undefined> {
   const files = isMain ? all.filter(isModel) : all;
   if (content !== undefined) {
     const size = Number(content.split('-')[0]);
-    const name = nameOf(path).toLowerCase();
+    const name = baseName(path).toLowerCase();
     for (const one of files) {
-      const mayBe = one.file.size === size && nameOf(one.path).toLowerCase() === name;
-      if (mayBe && (await contentOf(one.file)) === content) return one;
+      const mayBe = one.file.size === size && baseName(one.path).toLowerCase() === name;
+      if (mayBe && (await computeContentId(one.file)) === content) return one;
     }
   }
   return findFile(path, '', files);
 }
 
-// Throws SceneError that names the file that cannot be read any more.
-export function contentsOf(files: readonly ModelFile[]): Promise<string[]> {
-  return Promise.all(files.map(({ path, file }) => contentOf(file).catch(() => {
+// Throws SceneError that names a file that can no longer be read.
+export function computeContentIds(files: readonly ModelFile[]): Promise<string[]> {
+  return Promise.all(files.map(({ path, file }) => computeContentId(file).catch(() => {
     throw unreadable(path);
   })));
 }
 
-export function base64Of({ path, file }: ModelFile): Promise<string> {
+export function readBase64({ path, file }: ModelFile): Promise<string> {
   return new Promise((resolve, reject) => {
     const reader = new FileReader();
     reader.onload = () => resolve((reader.result as string).replace(/^[^,]*,/, ''));
@@ -91,5 +91,5 @@ export function base64Of({ path, file }: ModelFile): Promise<string> {
 }
 
 function unreadable(path: string): SceneError {
-  return new SceneError(nameOf(path), '', 'could not be read', 'see that it is still there, and drop it again');
+  return new SceneError(baseName(path), '', 'could not be read', 'check that it still exists, and drop it again');
 }

@@ -1,4 +1,4 @@
-// The scenes of a world, where there are several or one is not shown: which of them are.
+// The list of a world's scenes with their visibility, shown if there are several scenes or one is hidden.
 import { element } from '../page/element';
 import { iconButton, replaceRows } from '../page/fields';
 import type { Viewer } from '../viewer';

@@ -1,13 +1,13 @@
-// Addresses in world.json: of http, of https, or relative to its own.
+// Addresses in world.json: http, https, or relative to the world's own address.
 
 const kAny = 'http://any.invalid/';
 
-// Of a scene.
+// Returns whether this is a valid address of a scene.
 export function isAddress(text: string): boolean {
   return resolved(text, kAny) !== undefined;
 }
 
-// Undefined where it is none of http or https. `base`: of what names it.
+// Returns undefined unless the result is http or https. `base` is the address of the referencing file.
 export function resolved(text: string, base: string): string | undefined {
   try {
     const { protocol, href } = new URL(text, base);
@@ -17,7 +17,7 @@ export function resolved(text: string, base: string): string | undefined {
   }
 }
 
-// Names of files of models are paths, as they are called on a disk, or whole addresses.
+// Names of model files are paths, as on a disk, or absolute addresses.
 export function isFileAddress(name: string): boolean {
   return /^https?:\/\//i.test(name) ? isAddress(name) : !/^([a-z][a-z0-9+.-]+:|[\\/]{2})/i.test(name);
 }
@@ -27,7 +27,7 @@ export function addressOfFile(name: string, base: string): string | undefined {
   return resolved(name.split('/').map(encodeURIComponent).join('/'), base);
 }
 
-// Of `url` seen from `base`, where both are of one server; else as it is. Empty where it is no address.
+// Returns `url` relative to `base` if both are on the same server, otherwise unchanged; '' if it is not an address.
 export function addressFrom(base: string, url: string): string {
   if (!/^https?:\/\//i.test(url)) return '';
   const [from, to] = [new URL(base), new URL(url)];

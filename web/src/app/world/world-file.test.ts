@@ -19,10 +19,10 @@ const text = encodeWorld(world, new Map([['tree.glb', btoa('abc')], ['__proto__'
 function said(change: (file: any) => void): string {
   const file = JSON.parse(text) as any;
   change(file);
-  return saidOf(JSON.stringify(file));
+  return decodeError(JSON.stringify(file));
 }
 
-function saidOf(lying: string): string {
+function decodeError(lying: string): string {
   try {
     decodeWorld(lying, 'world.json');
   } catch (error) {
@@ -41,7 +41,7 @@ describe('decodeWorld', () => {
     expect(text).toContain('"position":[1.5,-2,0.003]');
   });
 
-  it('passes over what it does not know, and needs no more than scenes', () => {
+  it('ignores unknown fields, and requires only scenes', () => {
     expect(said((file) => (file.later = [{}]))).toBe('');
     const file = JSON.parse(text);
     delete file.models[1].visible;
@@ -52,7 +52,7 @@ describe('decodeWorld', () => {
     });
   });
 
-  it('reads version 1, which knew one scene', () => {
+  it('reads version 1, which has one scene', () => {
     const [{ contents, plays, ...model }] = world.models;
     const read = (url: string) => decodeWorld(JSON.stringify({ kind: 'tessera world', version: 1, scene: { name: 'city', url }, models: [model] }), 'a');
     expect(read('http://a/tileset.json')).toEqual({
@@ -62,18 +62,18 @@ describe('decodeWorld', () => {
     expect(read('javascript:alert(1)').scenes[0].url).toBe('');
   });
 
-  it('lets addresses through that are of http, of https or relative, and no others', () => {
+  it('accepts only http, https and relative addresses', () => {
     for (const url of ['a', '../a/', '/a', '//b/a', 'HTTPS://b/a', '?a']) expect(said((file) => (file.scenes[0].url = url))).toBe('');
     for (const url of ['javascript:alert(1)', 'data:,a', 'file:///a', 'blob:http://a/b', ' ftp://a', 'http://', 'x'.repeat(1001)]) {
       expect(said((file) => (file.scenes[0].url = url))).toBe('world.json: scenes[0].url: is no address of http or https, nor a relative one; correct it, or save it again');
     }
     for (const name of ['javascript:alert(1)', 'data:,a', '//b/a.glb', '\\\\b\\a.glb', 'http://']) {
-      expect(said((file) => (file.models[0].files[1] = name))).toContain('models[0].files: has a name that is none');
+      expect(said((file) => (file.models[0].files[1] = name))).toContain('models[0].files: has an invalid name');
     }
     for (const name of ['a b#c?d.glb', '../a.glb', 'https://b/a.glb', 'C:a.glb']) expect(said((file) => (file.models[0].files[1] = name))).toBe('');
   });
 
-  it('wants one scene in whose world the others stand', () => {
+  it("requires one scene that defines the world's frame", () => {
     expect(said((file) => file.scenes.pop())).toContain('scenes: has none in whose world the others stand; leave out position');
     expect(said((file) => (file.scenes = []))).toContain('scenes: has none');
     expect(said((file) => delete file.scenes)).toContain('scenes: is no list');
@@ -85,33 +85,33 @@ describe('decodeWorld', () => {
     expect(said((file) => (file.scenes[0].position = [1, null, 1]))).toContain('scenes[0].position: is not 3 numbers');
   });
 
-  it('looks at hidden parts and views', () => {
+  it('validates hidden parts and views', () => {
     expect(said((file) => (file.hidden = Array.from({ length: 9 }, () => file.hidden[0])))).toContain('hidden: are more than 8');
     expect(said((file) => (file.hidden[0].size = [1, 0, 1]))).toContain('hidden[0].size: is not above');
     expect(said((file) => (file.hidden[0].middle = [1, 1e9, 1]))).toContain('hidden[0].middle: has a number beyond');
     expect(said((file) => (file.hidden[0].turn = '1'))).toContain('hidden[0].turn: is no number');
     expect(said((file) => delete file.hidden[0].name)).toContain('hidden[0].name: is missing');
-    expect(said((file) => (file.bookmarks[0].view = 'eye=1,2,3'))).toContain('bookmarks[0].view: is no view');
+    expect(said((file) => (file.bookmarks[0].view = 'eye=1,2,3'))).toContain('bookmarks[0].view: is not a view');
     expect(said((file) => (file.bookmarks = Array.from({ length: 201 }, () => file.bookmarks[0])))).toContain('bookmarks: are more than 200');
   });
 
   it('names the file and the place of what is wrong', () => {
-    expect(saidOf('{')).toMatch(/^world.json: is not JSON: .*; correct it, or save it again$/);
-    for (const other of ['null', '[]', '3', '{"version":1,"models":[]}']) expect(saidOf(other)).toContain('is no world of this viewer');
+    expect(decodeError('{')).toMatch(/^world.json: is not JSON: .*; correct it, or save it again$/);
+    for (const other of ['null', '[]', '3', '{"version":1,"models":[]}']) expect(decodeError(other)).toContain('is no world of this viewer');
     expect(said((file) => (file.version = 3))).toContain('world.json: version: is not 2, nor 1; open it with a newer viewer');
     expect(said((file) => (file.models = {}))).toContain('models: is no list');
     expect(said((file) => (file.models[0].contents = [3]))).toContain('models[0].contents');
     expect(said((file) => (file.models = Array.from({ length: 1001 }, () => file.models[0])))).toContain('models: are more than 1000');
     expect(said((file) => (file.models[1] = null))).toContain('models[1].files: names no files');
-    expect(said((file) => (file.models[0].files = [3]))).toContain('models[0].files: has a name that is none');
+    expect(said((file) => (file.models[0].files = [3]))).toContain('models[0].files: has an invalid name');
     expect(said((file) => (file.models[0].name = 'x'.repeat(1001)))).toContain('models[0].name');
   });
 
-  it('lets no number through that places nothing', () => {
+  it('rejects numbers that give no valid placement', () => {
     for (const lie of [[1, 2], 'abc', [1, 2, null], [1, 2, '3'], [1e8, 0, 0]]) {
       expect(said((file) => (file.models[0].position = lie))).toContain('models[0].position');
     }
-    expect(saidOf(text.replace('0.003', '1e999'))).toContain('models[0].position: is not 3 numbers');
+    expect(decodeError(text.replace('0.003', '1e999'))).toContain('models[0].position: is not 3 numbers');
     for (const lie of [[0, 0, 0, 0], [1, 1, 0, 0], [0, 0, 0, 1e300], [0, 0, 1]]) {
       expect(said((file) => (file.models[0].rotation = lie))).toContain('models[0].rotation');
     }
@@ -120,7 +120,7 @@ describe('decodeWorld', () => {
     }
   });
 
-  it('names a file in it that is none', () => {
+  it('names an invalid embedded file', () => {
     expect(said((file) => (file.files['tree.glb'] = '*'))).toContain('files["tree.glb"]: is no base64');
     expect(said((file) => (file.files['tree.glb'] = 5))).toContain('files["tree.glb"]: is no text');
     expect(said((file) => (file.files = ['a']))).toContain('files: is no object');
@@ -128,7 +128,7 @@ describe('decodeWorld', () => {
 });
 
 describe('savedWorld', () => {
-  it('is what can be opened again, and nothing else', async () => {
+  it('accepts only worlds that can be opened again', async () => {
     expect(await savedWorld(world, new Map([['tree.glb', btoa('abc')], ['__proto__', btoa('x')]])).text()).toBe(text);
     const change = (one: Partial<World>, files = new Map<string, string>()) => () => savedWorld({ ...world, ...one }, files);
     expect(change({ hidden: [{ ...world.hidden[0], size: [1, 2e6, 1] }] })).toThrow('world.json: hidden[0].size: has a number beyond');

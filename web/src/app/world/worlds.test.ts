@@ -1,25 +1,25 @@
 import * as THREE from 'three';
 import { beforeEach, describe, expect, it, vi } from 'vitest';
-import { madeGlb } from '../../testing/made-glb';
+import { testGlb } from '../../testing/test-glb';
 import type { HiddenParts } from '../hiding/hidden-parts';
 import { loadModel } from '../models/load-model';
 import type { ModelFile } from '../models/model-files';
 import { Models, type ModelSource } from '../models/models';
 import type { Bookmarks } from '../views/bookmarks';
 import type { Viewer } from '../viewer';
-import { contentOf } from './file-content';
+import { computeContentId } from './file-content';
 import { decodeWorld } from './world-file';
 import { Worlds } from './worlds';
 
 vi.stubGlobal('location', { href: 'https://a/' });
-// What needs a graphics card.
+// Mocks what needs a GPU.
 vi.mock('../../scene', () => ({ TesseraScene: {} }));
 vi.mock('../models/model-light', () => ({ addLight: () => {} }));
 
 const file = (path: string, content: BlobPart) => ({ path, file: new Blob([content]) });
 const place = { position: [0, 0, 0], rotation: [0, 0, 0, 1], scale: [1, 1, 1] };
 const model = (path: string, contents: string[] = []) => ({ name: path, files: [path], contents, ...place });
-const worldOf = (models: unknown[], more = {}) =>
+const makeWorldFile = (models: unknown[], more = {}) =>
   file('world.json', JSON.stringify({ kind: 'tessera world', version: 2, scenes: [{ name: 'city', url: 'city.scene' }], models, ...more }));
 
 describe('Worlds', () => {
@@ -43,18 +43,18 @@ describe('Worlds', () => {
   const open = (world: ModelFile, files: ModelFile[]) => worlds.openFile(world, files, (error) => told.push(String(error)));
   const widths = () => models.list.map(({ source }: { source: ModelSource }) => source.size.x);
 
-  it('show of models whose files have one name each its own', async () => {
-    const cubes = [1, 2].map((edge) => file('cube.glb', madeGlb({ edge })));
-    const contents = await Promise.all(cubes.map((cube) => contentOf(cube.file)));
-    await open(worldOf(contents.map((content) => model('cube.glb', [content]))), cubes);
+  it("show each model's own file if several have one name", async () => {
+    const cubes = [1, 2].map((edge) => file('cube.glb', testGlb({ edge })));
+    const contents = await Promise.all(cubes.map((cube) => computeContentId(cube.file)));
+    await open(makeWorldFile(contents.map((content) => model('cube.glb', [content]))), cubes);
     expect(widths()).toEqual([1, 2]);
     expect(changes).toBe(1);
-    await open(worldOf(contents.map((content) => model('cube.glb', [content]))), []);
+    await open(makeWorldFile(contents.map((content) => model('cube.glb', [content]))), []);
     expect(changes).toBe(2);
   });
 
   it('are opened one after the other', async () => {
-    const cube = (edge: number) => file('cube.glb', madeGlb({ edge }));
+    const cube = (edge: number) => file('cube.glb', testGlb({ edge }));
     const slow = cube(1);
     let read = () => {};
     const reading = new Promise<void>((resolve) => (read = resolve));
@@ -62,9 +62,9 @@ describe('Worlds', () => {
       await reading;
       return Blob.prototype.arrayBuffer.call(slow.file);
     };
-    const first = open(worldOf([model('cube.glb')]), [slow]);
-    const lacking = open(worldOf([model('lost.glb')]), []);
-    const last = open(worldOf([model('cube.glb')], { bookmarks: [] }), [cube(2)]);
+    const first = open(makeWorldFile([model('cube.glb')]), [slow]);
+    const lacking = open(makeWorldFile([model('lost.glb')]), []);
+    const last = open(makeWorldFile([model('cube.glb')], { bookmarks: [] }), [cube(2)]);
     await new Promise((resolve) => setTimeout(resolve, 50));
     expect(widths()).toEqual([]);
     read();
@@ -77,9 +77,9 @@ describe('Worlds', () => {
     expect(widths()).toEqual([2]);
   });
 
-  it('are shown without what is lacking, which is told of and saved all the same', async () => {
-    const cube = file('cube.glb', madeGlb({ edge: 2 }));
-    await open(worldOf([model('lost.glb'), model('cube.glb')]), [cube]);
+  it('are shown without missing items, which are reported and saved all the same', async () => {
+    const cube = file('cube.glb', testGlb({ edge: 2 }));
+    await open(makeWorldFile([model('lost.glb'), model('cube.glb')]), [cube]);
     expect(widths()).toEqual([2]);
     expect(told).toEqual(['SceneError: world.json: models[0]: needs lost.glb; drop it together with world.json']);
     const { models: saved } = decodeWorld(await (await worlds.save(false)).text(), 'a');
@@ -87,8 +87,8 @@ describe('Worlds', () => {
   });
 
   it('are saved so that they can be opened again', async () => {
-    const [nameless, other] = ['.glb', 'x.glb'].map((path) => file(path, madeGlb({ edge: 2 })));
-    for (const main of [nameless, nameless, other]) models.add(Models.sourceOf(await loadModel(main, [main])));
+    const [nameless, other] = ['.glb', 'x.glb'].map((path) => file(path, testGlb({ edge: 2 })));
+    for (const main of [nameless, nameless, other]) models.add(Models.makeSource(await loadModel(main, [main])));
     expect(models.list.map(({ name }) => name)).toEqual(['Model', 'Model 2', 'x']);
     expect(models.freeName('x'.repeat(1000)).length).toBeLessThan(1000);
     const { models: saved } = decodeWorld(await (await worlds.save(false)).text(), 'a');
@@ -96,8 +96,8 @@ describe('Worlds', () => {
   });
 
   it('are not saved where they could not be opened again', async () => {
-    const cube = file('cube.glb', madeGlb({ edge: 2 }));
-    const model = models.add(Models.sourceOf(await loadModel(cube, [cube])));
+    const cube = file('cube.glb', testGlb({ edge: 2 }));
+    const model = models.add(Models.makeSource(await loadModel(cube, [cube])));
     model.scale.x = 2e6;
     await expect(worlds.save(false)).rejects.toThrow(
       'world.json: models[0].scale: has a number beyond 1000000, so that it could not be opened again; change that, and save again');

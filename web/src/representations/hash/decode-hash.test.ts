@@ -3,7 +3,7 @@ import { kStoredEdge, type TexelTextures } from '../../raymarch/content';
 import { decodeGolden, storedIn, Sum, testContentReader } from '../../testing/content-tests';
 import { goldenFile, goldenText, prepareDecoderInNode } from '../../testing/golden';
 import { kLengthOfRow, type HashContent } from './hash-content';
-import { lengthOf, listsOf } from './hash-layout';
+import { paddedLength, layOutLists } from './hash-layout';
 import { kFarthestOctantDistance, ratioFor } from './octant-distances';
 
 interface Sums {
@@ -22,14 +22,14 @@ const uris = Object.keys(sums);
 
 beforeAll(prepareDecoderInNode);
 
-// Eight columns of a corner in the order of the format.
+// The eight columns of a corner in the order of the format.
 function columnsAt({ size, first, second }: TexelTextures, x: number, y: number, z: number): number[] {
   const at = 4 * (x + size[0] * (y + size[1] * z));
   return [first[at + 3], ...first.subarray(at, at + 3), ...second.subarray(at, at + 4)];
 }
 
-// The numbers of a part's cube.
-function* cubeOf(
+// Returns the numbers of a part's cube.
+function* cubeValues(
   { size, origins, texels }: HashContent['distances'], n: number, edge: number,
 ): Generator<number> {
   const [x0, y0, z0] = origins[n];
@@ -41,7 +41,7 @@ function* cubeOf(
 }
 
 describe('decodeHash', () => {
-  it.each(uris)('reads of the golden scene what its sums say: %s', (uri) => {
+  it.each(uris)('decodes the golden scene to its checksums: %s', (uri) => {
     const content = decodeGolden('hash', goldenFile(uri, 'hash')) as HashContent;
     expect(content.parts.length).toBe(sums[uri].length);
     content.parts.forEach((part, n) => {
@@ -60,22 +60,22 @@ describe('decodeHash', () => {
       const entries = new Uint8Array(content.tables.words.buffer);
       const tables = part.tables.map((table, level) => {
         const sum = new Sum();
-        const first = 8 * kLengthOfRow * content.tables.rowOf[n * part.tables.length + level];
+        const first = 8 * kLengthOfRow * content.tables.firstRows[n * part.tables.length + level];
         sum.add(entries.subarray(first, first + 8 * table.entries));
         return sum;
       });
-      // Of the coarse grid, then of near cells.
+      // The occupied cells of the coarse grid, then those of the near cells.
       const ratio = ratioFor(part.cells);
       const add = (word: number) => {
         for (let octant = 0; octant < 8; ++octant) distances += (word >>> (4 * octant)) & kFarthestOctantDistance;
       };
       let distances = 0;
       let occupied = 0;
-      for (const word of cubeOf(content.distances, n, part.cells / ratio)) {
+      for (const word of cubeValues(content.distances, n, part.cells / ratio)) {
         if ((word & 15) !== 0) add(word);
         else if (ratio === 1) ++occupied;
       }
-      const near = kLengthOfRow * content.nearDistances.rowOf[n];
+      const near = kLengthOfRow * content.nearDistances.firstRows[n];
       for (const word of content.nearDistances.words.subarray(near, near + part.nearCells * ratio ** 3)) {
         add(word);
         occupied += word === 0 ? 1 : 0;
@@ -88,11 +88,11 @@ describe('decodeHash', () => {
     });
   });
 
-  it('lays lists out in rows and layers that cards take', () => {
-    expect(listsOf([1, 2048, 2049, 0])).toEqual({ rows: 4, layers: 1, rowOf: [0, 1, 2, 4] });
-    expect(listsOf([2 ** 22 - 1, 5])).toEqual({ rows: 2048, layers: 2, rowOf: [0, 2048] });
-    expect(lengthOf(listsOf([2 ** 22 - 1, 5]))).toBe(2 ** 23);
-    expect(listsOf([0, 0])).toEqual({ rows: 0, layers: 0, rowOf: [0, 0] });
+  it('lays lists out in rows and layers that fit GPU textures', () => {
+    expect(layOutLists([1, 2048, 2049, 0])).toEqual({ rows: 4, layers: 1, firstRows: [0, 1, 2, 4] });
+    expect(layOutLists([2 ** 22 - 1, 5])).toEqual({ rows: 2048, layers: 2, firstRows: [0, 2048] });
+    expect(paddedLength(layOutLists([2 ** 22 - 1, 5]))).toBe(2 ** 23);
+    expect(layOutLists([0, 0])).toEqual({ rows: 0, layers: 0, firstRows: [0, 0] });
   });
 
   testContentReader('hash', uris, uris.filter((uri) => uri.startsWith('tiles/L0')));

@@ -1,38 +1,38 @@
-// A hash content, read: untrusted bytes. docs/tile-format.md, sections 5, 7 and 10.
+// Decodes hash contents. The bytes are untrusted. docs/tile-format.md, sections 5, 7 and 10.
 import { count, emptyTextures, kAttributes, putCube, type ContentPart, type Cubes, type MarchedHeader } from '../../raymarch/content';
-import { texturesOf } from '../../raymarch/content-layout';
-import { brokenPromise, ruleOfParts } from '../../raymarch/content-rules';
+import { countTextures } from '../../raymarch/content-layout';
+import { mismatchWithTileset, ruleOfParts } from '../../raymarch/content-rules';
 import { PartReader } from '../../raymarch/part-reader';
 import { sizeOfList, takeList } from '../../raymarch/texel-pictures';
-import type { ContentCodec, PromisedContent } from '../../tiles/content-codec';
+import type { ContentCodec, DeclaredContent } from '../../tiles/content-codec';
 import { kContentLimits, type ContentLimits } from '../../tiles/content-limits';
-import { arrayOf, fieldOf, flagOf, numberFrom, numberOf, stringOf, wholeOf, type Json } from '../../tiles/json-fields';
+import { getArray, getField, getBoolean, numberFrom, getNumber, getString, getInteger, type Json } from '../../tiles/json-fields';
 import { ruleOfNetwork, type DenseLayer } from '../../tiles/network';
 import {
-  columnsOf, kLengthOfRow, kLevelWeights, kMostTables, vectorsOfHash, type ByteRange, type HashContent,
+  countColumns, kLengthOfRow, kLevelWeights, kMaxTables, vectorsOfHash, type ByteRange, type HashContent,
   type HashPart, type HashSettings, type HashTable, type LevelWeights,
 } from './hash-content';
-import { layOutHash, lengthOf, type HashLayout } from './hash-layout';
+import { layOutHash, paddedLength, type HashLayout } from './hash-layout';
 import * as rules from './hash-rules';
 import { octantDistances, ratioFor } from './octant-distances';
 
-// What a content says of itself; nothing has been allocated for its texels.
+// The header of a content; nothing has been allocated for its texels.
 export interface HashHeader extends MarchedHeader {
   settings: HashSettings;
   parts: HashPart[];
   layout: HashLayout;
-  atlases: number; // of the layout's corners
-  sources: Json[]; // of the parts
+  atlases: number; // textures that the corner atlas is split into
+  sources: Json[]; // JSON of the parts
   network: DenseLayer[];
   views: Uint8Array[];
 }
 
-// Both throw SceneError that names `name` and the first rule that is broken; `promised` is what tileset.json says of
-// the content. The decoder of pictures must be prepared (lossless-image.ts).
+// readHashHeader and decodeHash throw SceneError that names `name` and the first violated rule; `declared` is what
+// tileset.json declares about the content. The image decoder must be prepared (lossless-image.ts).
 export function readHashHeader(
-  file: Uint8Array, name: string, promised?: PromisedContent, limits = kContentLimits,
+  file: Uint8Array, name: string, declared?: DeclaredContent, limits = kContentLimits,
 ): HashHeader {
-  return new HashReader(name, limits).readHeader(file, promised);
+  return new HashReader(name, limits).readHeader(file, declared);
 }
 
 export function decodeHash(header: HashHeader, name: string): HashContent {
@@ -42,7 +42,7 @@ export function decodeHash(header: HashHeader, name: string): HashContent {
 export const hashCodec: ContentCodec<HashHeader, HashContent> = {
   readHeader: readHashHeader,
   decode: decodeHash,
-  buffersOf({ corners, macroblocks, distances, nearDistances, tables }) {
+  listBuffers({ corners, macroblocks, distances, nearDistances, tables }) {
     const arrays = [
       ...corners.flatMap(({ first, second }) => [first, second]), macroblocks.texels, distances.texels, nearDistances.words, tables.words,
     ];
@@ -55,31 +55,31 @@ class HashReader extends PartReader {
     super(name, limits);
   }
 
-  readHeader(file: Uint8Array, promised?: PromisedContent): HashHeader {
+  readHeader(file: Uint8Array, declared?: DeclaredContent): HashHeader {
     const { ours, views } = this.readFile(file, 'hash');
     const settings = this.readSettings(ours);
-    const columns = columnsOf(settings);
-    const sources = this.partsOf(ours);
+    const columns = countColumns(settings);
+    const sources = this.readPartSources(ours);
     const parts = sources.map((source, i) => readPart(source, columns, this.readPlace(source)) ?? this.fail(`part ${i}: its header is not complete`));
-    const network = this.readNetwork(fieldOf(ours, 'network'), views);
+    const network = this.readNetwork(getField(ours, 'network'), views);
     const tables = parts[0].tables.length;
     const broken =
       rules.ruleOfSettings(settings, tables) ?? ruleOfNetwork(network, rules.kHashInputs) ??
-      ruleOfParts(parts, (part) => rules.ruleOfPart(part, tables)) ?? (promised && brokenPromise(parts, promised));
+      ruleOfParts(parts, (part) => rules.ruleOfPart(part, tables)) ?? (declared && mismatchWithTileset(parts, declared));
     if (broken) this.fail(broken);
     const layout = this.laidOut(layOutHash(parts, columns, this.limits), 16 * vectorsOfHash({ parts, settings }));
-    const atlases = texturesOf(layout.corners);
+    const atlases = countTextures(layout.corners);
     return { memoryBytes: layout.bytes, settings, parts, layout, atlases, sources, network, views };
   }
 
   readTexels(header: HashHeader): HashContent {
     const { settings, parts, layout, atlases, network, views } = header;
-    const corners = Array.from({ length: columnsOf(settings) / kAttributes }, () => emptyTextures(layout.corners.size));
+    const corners = Array.from({ length: countColumns(settings) / kAttributes }, () => emptyTextures(layout.corners.size));
     const macroblocks: Cubes<Uint8Array> = { ...layout.macroblocks, texels: new Uint8Array(4 * count(layout.macroblocks.size)) };
     const distances: Cubes<Uint32Array> = { ...layout.distances, texels: new Uint32Array(count(layout.distances.size)) };
-    const near = new Uint32Array(lengthOf(layout.nearDistances));
-    const bytes = new Uint8Array(kAttributes * lengthOf(layout.tables));
-    let begin = 0; // of the part's macroblocks in the atlas
+    const near = new Uint32Array(paddedLength(layout.nearDistances));
+    const bytes = new Uint8Array(kAttributes * paddedLength(layout.tables));
+    let begin = 0; // index of the part's first macroblock in the atlas
     parts.forEach((part, n) => {
       const source = header.sources[n];
       const of = (what: string) => `part ${n}: its ${what} are not what they should be`;
@@ -89,17 +89,17 @@ class HashReader extends PartReader {
       }
       begin += part.stored;
       part.tables.forEach(({ entries }, level) => {
-        const first = kLengthOfRow * layout.tables.rowOf[n * part.tables.length + level];
-        const pictures = fieldOf(arrayOf(source, 'tables')![level], 'texels');
+        const first = kLengthOfRow * layout.tables.firstRows[n * part.tables.length + level];
+        const pictures = getField(getArray(source, 'tables')![level], 'texels');
         const taken = this.takePictures(views, pictures, sizeOfList(entries),
           (pixels, which) => takeList(pixels, which, entries, bytes, first));
         if (!taken) this.fail(of('tables'));
       });
-      const bits = this.readBits(views, fieldOf(source, 'occupied'), part.cells);
-      const found = bits && octantDistances(bits, part.nearCells);
-      if (!found) this.fail(of('occupied cells'));
-      putCube(found.coarse, found.edge, distances, n);
-      near.set(found.fine, kLengthOfRow * layout.nearDistances.rowOf[n]);
+      const bits = this.readBits(views, getField(source, 'occupied'), part.cells);
+      const distanceField = bits && octantDistances(bits, part.nearCells);
+      if (!distanceField) this.fail(of('occupied cells'));
+      putCube(distanceField.coarse, distanceField.edge, distances, n);
+      near.set(distanceField.fine, kLengthOfRow * layout.nearDistances.firstRows[n]);
     });
     return {
       settings, network, parts, corners, atlases, atlasDepth: layout.corners.depth, macroblocks, distances,
@@ -109,50 +109,50 @@ class HashReader extends PartReader {
   }
 
   private readSettings(ours: Json): HashSettings {
-    const weights = stringOf(ours, 'weights') as LevelWeights;
-    const step = numberOf(ours, 'step');
-    const whole = flagOf(ours, 'whole');
+    const weights = getString(ours, 'weights') as LevelWeights;
+    const step = getNumber(ours, 'step');
+    const whole = getBoolean(ours, 'whole');
     if (!kLevelWeights.includes(weights) || step === undefined || whole === undefined) {
       this.fail('does not say what weighs its levels, how long its steps are, or whether it is whole');
     }
     const settings: HashSettings = { weights, step: Math.fround(step), whole };
-    if (fieldOf(ours, 'logits') === undefined) return settings;
-    const logits = arrayOf(ours, 'logits') ?? [];
-    if (logits.length < 1 || logits.length > 2 * kMostTables) this.fail('its logits are none, or too many');
+    if (getField(ours, 'logits') === undefined) return settings;
+    const logits = getArray(ours, 'logits') ?? [];
+    if (logits.length < 1 || logits.length > 2 * kMaxTables) this.fail('its logits are none, or too many');
     settings.logits = logits.map((logit) => Math.fround(numberFrom(logit) ?? this.fail('a logit is no number')));
     return settings;
   }
 }
 
-// Undefined where something is missing.
+// Returns undefined if a field is missing.
 function readPart(source: Json, columns: number, place: ContentPart | undefined): HashPart | undefined {
-  const lattice = wholeOf(source, 'lattice', rules.kMostLattice);
-  const cells = wholeOf(source, 'cells', rules.kMostOccupancyCells);
+  const lattice = getInteger(source, 'lattice', rules.kMaxLattice);
+  const cells = getInteger(source, 'cells', rules.kMaxOccupancyCells);
   const nearCells = readNearCells(source, cells ?? 0);
   const ranges = readRanges(source, columns);
-  const sources = arrayOf(source, 'tables') ?? [];
+  const sources = getArray(source, 'tables') ?? [];
   if (!place || lattice === undefined || cells === undefined || nearCells === undefined || !ranges) return undefined;
-  if (sources.length < 1 || sources.length > kMostTables) return undefined;
+  if (sources.length < 1 || sources.length > kMaxTables) return undefined;
   const tables = sources.map(readTable);
   return tables.includes(undefined) ? undefined : { ...place, lattice, cells, nearCells, ranges, tables: tables as HashTable[] };
 }
 
 function readNearCells(source: Json, cells: number): number | undefined {
   const ratio = ratioFor(cells);
-  return ratio === 1 ? 0 : wholeOf(source, 'nearCells', Math.floor(cells / ratio) ** 3);
+  return ratio === 1 ? 0 : getInteger(source, 'nearCells', Math.floor(cells / ratio) ** 3);
 }
 
 function readTable(source: Json): HashTable | undefined {
-  const resolution = wholeOf(source, 'resolution', rules.kMostTableResolution);
-  const entries = wholeOf(source, 'entries', rules.kMostTableEntries);
-  const hashed = flagOf(source, 'hashed');
+  const resolution = getInteger(source, 'resolution', rules.kMaxTableResolution);
+  const entries = getInteger(source, 'entries', rules.kMaxTableEntries);
+  const hashed = getBoolean(source, 'hashed');
   const ranges = readRanges(source, kAttributes);
   if (resolution === undefined || entries === undefined || hashed === undefined || !ranges) return undefined;
   return { resolution, entries, hashed, ranges };
 }
 
 function readRanges(source: Json, count: number): ByteRange[] | undefined {
-  const pairs = arrayOf(source, 'ranges');
+  const pairs = getArray(source, 'ranges');
   if (pairs?.length !== count) return undefined;
   const ranges = pairs.map((pair) => {
     const [low, high] = Array.isArray(pair) && pair.length === 2 ? pair.map(numberFrom) : [];

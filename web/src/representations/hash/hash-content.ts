@@ -1,11 +1,11 @@
-// One content of a `hash` scene in memory, laid out as graphics cards take it. docs/tile-format.md, section 7, is normative
-// for what it means.
+// One content of a `hash` scene in memory, in the layout that the GPU uses. docs/tile-format.md, section 7, is
+// normative for its meaning.
 import { kAttributes, type ContentPart, type Cubes, type TexelTextures } from '../../raymarch/content';
 import type { DenseLayer } from '../../tiles/network';
 
-export const kMostTables = 8;
+export const kMaxTables = 8;
 
-// What a byte stands for: evenly from low (0) to high (255).
+// The range that a byte encodes linearly, from low (0) to high (255).
 export interface ByteRange {
   low: number;
   high: number;
@@ -23,18 +23,18 @@ export interface HashPart extends ContentPart {
   ranges: ByteRange[]; // of the columns of its corners
   tables: HashTable[];
   cells: number; // along an axis
-  nearCells: number; // of OctantDistances, coarse ones that hold something; 0 where there is one grid alone
+  nearCells: number; // number of occupied coarse cells of OctantDistanceField; 0 if there is only one grid
 }
 
-// What weighs a fine level: nothing, a number for all features, or one for density and one for the rest.
+// What weights a fine level: nothing, one number for all features, or one for density and one for the other features.
 export const kLevelWeights = ['none', 'shared', 'separate'] as const;
 export type LevelWeights = (typeof kLevelWeights)[number];
 
-// What all that is made of a content depends on.
+// The settings that all parts of a content share.
 export interface HashSettings {
   weights: LevelWeights;
-  logits?: number[]; // where weights are the same everywhere
-  step: number; // of a ray, as a share of a domain's width
+  logits?: number[]; // if the weights are the same everywhere
+  step: number; // step of a ray as a fraction of a domain's width
   whole: boolean;
 }
 
@@ -42,21 +42,21 @@ export interface HashContent {
   settings: HashSettings;
   network: DenseLayer[];
   parts: HashPart[];
-  // An atlas of macroblocks of 9³ corners, for each eight columns: no texels where no part stores any.
+  // One atlas of macroblocks of 9³ corners for every eight columns; it has no texels if no part stores any.
   corners: TexelTextures[];
-  atlases: number; // textures that it is cut into
-  atlasDepth: number; // texels of the atlas that one texture has, at most
-  macroblocks: Cubes<Uint8Array>; // as VolumeContent's
-  distances: Cubes<Uint32Array>; // OctantDistances' coarse grids
-  nearDistances: List; // and their fine cells, a word each, a list a part
-  tables: List; // their entries, of which 8 bytes are 2 words, a list a table
+  atlases: number; // textures that an atlas is split into
+  atlasDepth: number; // layers of one texture, at most
+  macroblocks: Cubes<Uint8Array>; // see VolumeContent.macroblocks
+  distances: Cubes<Uint32Array>; // coarse grids of OctantDistanceField
+  nearDistances: List; // fine cells of OctantDistanceField, one word each, one list per part
+  tables: List; // entries of 8 bytes as 2 words, one list per table
 }
 
-// Lists one after another, each beginning a row: [layer][row][kLengthOfRow][1 or 2 words].
+// Lists one after another, each of which begins a new row: [layer][row][kLengthOfRow][1 or 2 words].
 export interface List {
-  rows: number; // of a layer
+  rows: number; // in a layer
   layers: number;
-  rowOf: number[]; // of each list the first row, counted through all layers
+  firstRows: number[]; // first row of each list, counted through all layers
   words: Uint32Array;
 }
 
@@ -67,12 +67,12 @@ export function logitsOfLevel(weights: LevelWeights): number {
   return kLevelWeights.indexOf(weights);
 }
 
-// Of a part's corners.
-export function columnsOf({ weights, logits }: HashSettings): number {
+// Returns the number of columns of each of a part's corners.
+export function countColumns({ weights, logits }: HashSettings): number {
   return weights === 'none' || logits ? kAttributes : 2 * kAttributes;
 }
 
-// Vectors of four numbers that shaders are given of each part: its place, the ranges of its columns, and its tables.
+// Numbers of vec4s that shaders get for each part: its place, the ranges of its columns, and its tables.
 export const kVectorsOfPlace = 6;
 export const kVectorsOfTable = 5;
 
@@ -81,5 +81,5 @@ export function vectorsOfPart(columns: number, tables: number): number {
 }
 
 export function vectorsOfHash({ parts, settings }: Pick<HashContent, 'parts' | 'settings'>): number {
-  return vectorsOfPart(columnsOf(settings), parts[0].tables.length) * parts.length;
+  return vectorsOfPart(countColumns(settings), parts[0].tables.length) * parts.length;
 }

@@ -1,8 +1,8 @@
-// What of a `hash` scene can be shown.
+// The display modes of `hash` scenes.
 import { kSharedModes, type ShownMode } from '../../draw/display-modes';
 
-// The last three show one of the levels of features (NGP-RT, figures 6 and S2): what it alone gives to the colour, and what it
-// is weighed with, for colours and for density. Nothing weighs the coarse features.
+// The last three modes show one feature level (NGP-RT, figures 6 and S2): its contribution to the colour, its attention
+// weights for colours, and those for density. The coarse features have no weights.
 export const kHashModes = [
   ...kSharedModes,
   { name: 'contribution', label: 'Colour of a hash level', featureLevel: 'any' },

@@ -1,10 +1,10 @@
 import { describe, expect, it } from 'vitest';
-import { goldenFile } from '../../testing/golden';
+import { goldenFile, goldenText } from '../../testing/golden';
 import { readHashHeader } from './decode-hash';
 
-const kUri = 'tiles/L0/0_0-c5f774b8a9e0a9b7.glb';
+const kUri = Object.keys(JSON.parse(goldenText('sums.json', 'hash')) as object).find((uri) => uri.includes('/0_0-'))!;
 
-// The file with its extension's JSON changed; nothing else of it is looked at.
+// Returns the file with the JSON of its extension changed and everything else unchanged.
 function changed(change: (ours: any) => void): Uint8Array {
   const file = Buffer.from(goldenFile(kUri, 'hash'));
   const length = file.readUInt32LE(12);
@@ -37,7 +37,7 @@ const kRules: [string, (ours: any) => void][] = [
   ["the network's layers do not follow", ({ network }) => network.layers.reverse()],
   [kHeader, ({ parts: [part] }) => (part.lattice = 2048)],
   [kHeader, ({ parts: [part] }) => (part.cells = 1024)],
-  [kHeader, ({ parts: [part] }) => (part.cells = 136)], // how many are near?
+  [kHeader, ({ parts: [part] }) => (part.cells = 136)], // lacks the number of near cells
   [kHeader, ({ parts: [part] }) => Object.assign(part, { cells: 136, nearCells: 68 ** 3 + 1 })],
   [kHeader, ({ parts: [part] }) => part.ranges.pop()],
   [kHeader, ({ parts: [part] }) => (part.ranges[3] = [1])],
@@ -63,11 +63,11 @@ const kRules: [string, (ours: any) => void][] = [
 ];
 
 describe('a hash content', () => {
-  it('is read where it keeps the rules', () => {
+  it('is read if it is valid', () => {
     expect(readHashHeader(changed(() => {}), 'a').parts.length).toBe(1);
   });
 
-  it.each(kRules.map(([rule, change], n) => [`${n}: ${rule}`, rule, change] as const))('is refused by name: %s', (_, rule, change) => {
+  it.each(kRules.map(([rule, change], n) => [`${n}: ${rule}`, rule, change] as const))('is rejected with a reason: %s', (_, rule, change) => {
     expect(() => readHashHeader(changed(change), 'a')).toThrow(`a: ${rule}`);
   });
 });

@@ -1,13 +1,14 @@
-// The rules that a hash content keeps: docs/tile-format.md, section 7. The first that is broken, for people.
+// The rules for hash contents: docs/tile-format.md, section 7. Each function returns the first violation as text for
+// users.
 import { kAttributes } from '../../raymarch/content';
 import { ruleOfMacroblocks, ruleOfPlace } from '../../raymarch/content-rules';
 import type { Broken } from '../../tiles/tileset-rules';
 import { logitsOfLevel, type ByteRange, type HashPart, type HashSettings, type HashTable } from './hash-content';
 
-export const kMostLattice = 1024; // corners along an axis
-export const kMostOccupancyCells = 1016;
-export const kMostTableResolution = 1 << 16;
-export const kMostTableEntries = 1 << 24;
+export const kMaxLattice = 1024; // corners along an axis
+export const kMaxOccupancyCells = 1016;
+export const kMaxTableResolution = 1 << 16;
+export const kMaxTableEntries = 1 << 24;
 export const kHashInputs = 23; // of the network
 const kLargestFeature = 1e6;
 const kLargestLogit = 1e6;
@@ -33,7 +34,7 @@ function ruleOfTable({ resolution, entries, hashed, ranges }: HashTable): Broken
   return areRanges(ranges) ? undefined : 'a range is out of bounds';
 }
 
-// `tables`: as many as the content's first part has.
+// `tables` is the number of tables of the content's first part.
 export function ruleOfPart(part: HashPart, tables: number): Broken {
   if (part.lattice % 8 !== 0 || part.lattice < 1) return 'its lattice is out of bounds';
   if (!areRanges(part.ranges)) return 'a range is out of bounds';

@@ -1,13 +1,13 @@
-// A content of a `hash` scene on the graphics card.
+// The textures of a `hash` content on the GPU.
 import * as THREE from 'three';
 import { atlasUniforms, ContentTextures, kForms } from '../../raymarch/content-textures';
 import type { Vec3 } from '../../tiles/tileset';
-import { columnsOf, kLengthOfRow, logitsOfLevel, vectorsOfPart, type ByteRange, type HashContent, type HashPart, type HashSettings, type List } from './hash-content';
+import { countColumns, kLengthOfRow, logitsOfLevel, vectorsOfPart, type ByteRange, type HashContent, type HashPart, type HashSettings, type List } from './hash-content';
 import { ratioFor } from './octant-distances';
 
 export const kCornerAtlases = [['corners0First', 'corners0Second'], ['corners1First', 'corners1Second']] as const;
 
-// Of the eight columns or features that two texels of four bytes hold: docs/tile-format.md, section 6.
+// The indices of the columns or features that two texels of four bytes hold: docs/tile-format.md, section 6.
 const kFirst = [1, 2, 3, 0];
 const kSecond = [4, 5, 6, 7];
 
@@ -16,21 +16,21 @@ export class HashTextures extends ContentTextures<HashPart> {
   private readonly ofMarch: Record<string, THREE.IUniform>;
   private readonly columns: number;
   private readonly origins: { macroblocks: Vec3[]; distances: Vec3[] };
-  private readonly rowsOf: { tables: number[]; nearDistances: number[] };
+  private readonly firstRowsByList: { tables: number[]; nearDistances: number[] };
 
   constructor(content: HashContent) {
     super(content.parts);
     const { settings, corners, atlasDepth, macroblocks, distances, nearDistances, tables } = content;
-    this.columns = columnsOf(settings);
-    this.rowsOf = { tables: tables.rowOf, nearDistances: nearDistances.rowOf };
+    this.columns = countColumns(settings);
+    this.firstRowsByList = { tables: tables.firstRows, nearDistances: nearDistances.firstRows };
     this.origins = { macroblocks: macroblocks.origins, distances: distances.origins };
     this.ofMarch = {
       ...Object.assign({}, ...corners.map((eight, e) => this.addAtlas(eight, atlasDepth, kCornerAtlases[e]))) as Record<string, THREE.IUniform>,
       ...atlasUniforms(corners[0].size, atlasDepth),
       macroblocks: { value: this.addCubes(macroblocks, kForms.fourBytes) },
       distances: { value: this.addCubes(distances, kForms.wholeWord) },
-      nearDistances: { value: this.add(textureOf(nearDistances), kForms.wholeWord, nearDistances.words) },
-      tables: { value: this.add(textureOf(tables), kForms.twoWords, tables.words) },
+      nearDistances: { value: this.add(makeListTexture(nearDistances), kForms.wholeWord, nearDistances.words) },
+      tables: { value: this.add(makeListTexture(tables), kForms.twoWords, tables.words) },
       levelWeights: { value: levelWeights(settings, this.parts[0].tables.length) },
       stepLength: { value: settings.step },
     };
@@ -51,11 +51,11 @@ export class HashTextures extends ContentTextures<HashPart> {
       this.numbers.set(
         [
           ...part.centre, part.lattice, ...part.scale, part.cells, ...part.low, part.contracted ? 1 : 0,
-          ...part.high, Math.log2(ratioFor(part.cells)), ...macroblocks[n], this.rowsOf.nearDistances[n], ...distances[n], 0,
-          // What the card has made numbers from 0 to 1 of; entries of tables stay bytes.
+          ...part.high, Math.log2(ratioFor(part.cells)), ...macroblocks[n], this.firstRowsByList.nearDistances[n], ...distances[n], 0,
+          // The GPU normalises these textures to [0, 1]; entries of tables remain bytes.
           ...eights.flatMap((ranges) => rangeVectors(ranges, 1)),
           ...part.tables.flatMap(({ resolution, entries, hashed, ranges }, level) =>
-            [resolution, entries, hashed ? 1 : 0, this.rowsOf.tables[n * part.tables.length + level], ...rangeVectors(ranges, 255)]),
+            [resolution, entries, hashed ? 1 : 0, this.firstRowsByList.tables[n * part.tables.length + level], ...rangeVectors(ranges, 255)]),
         ],
         4 * vectors * place,
       );
@@ -63,18 +63,19 @@ export class HashTextures extends ContentTextures<HashPart> {
   }
 }
 
-function textureOf({ rows, layers }: List): THREE.DataArrayTexture {
+function makeListTexture({ rows, layers }: List): THREE.DataArrayTexture {
   return layers === 0 ? new THREE.DataArrayTexture(null, 1, 1, 1) : new THREE.DataArrayTexture(null, kLengthOfRow, rows, layers);
 }
 
-// What is added, and what a number from 0 to `most` is multiplied with: of diffuse colour and density, then of features.
-function rangeVectors(ranges: ByteRange[], most: number): number[] {
+// Returns offsets and factors that map numbers from 0 to `maximum` to the ranges: those of diffuse colour and density,
+// then those of features.
+function rangeVectors(ranges: ByteRange[], maximum: number): number[] {
   return [kFirst, kSecond].flatMap((columns) => [
-    ...columns.map((c) => ranges[c].low), ...columns.map((c) => (ranges[c].high - ranges[c].low) / most),
+    ...columns.map((c) => ranges[c].low), ...columns.map((c) => (ranges[c].high - ranges[c].low) / maximum),
   ]);
 }
 
-// Where they are the same everywhere: of density and of all else.
+// Returns the weights of each level for density and for all else, if they are the same everywhere.
 function levelWeights({ weights, logits }: HashSettings, tables: number): THREE.Vector2[] {
   const each = logitsOfLevel(weights);
   const weight = (logit: number) => 1 / (1 + Math.exp(-logit));

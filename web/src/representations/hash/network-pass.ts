@@ -1,6 +1,6 @@
-// The last step of a `hash` scene's picture: of what all contents together add up to in a pixel, the network that has the
-// largest share in it makes a colour (docs/tile-format.md, section 7; NGP-RT, eq. 5). Each network has a program of its own,
-// which fills the picture and leaves the other networks' pixels alone.
+// The last pass of a `hash` scene's picture: in each pixel, the network that has the largest weight there converts the
+// sums of all contents to a colour (docs/tile-format.md, section 7; NGP-RT, eq. 5). Each network has its own program,
+// which covers the picture and discards the pixels of other networks.
 import * as THREE from 'three';
 import { displayConstants } from '../../draw/display-modes';
 import { layersShader, writtenVector } from '../../draw/network-shader';
@@ -8,9 +8,9 @@ import type { Picture } from '../../draw/picture';
 import type { ViewUniforms } from '../../raymarch/content-program';
 import { packNetwork, type DenseLayer } from '../../tiles/network';
 import { kHashModes } from './hash-modes';
-import { kWeightsOfTarget, networksOf } from './hash-program';
+import { kWeightsOfTarget, countNetworks } from './hash-program';
 
-// The first 16 real spherical harmonics of d, in tiny-cuda-nn's order.
+// The first 16 real spherical harmonics of d, in the order of tiny-cuda-nn.
 const kHarmonics = [
   '0.28209479', '-0.48860251 * d.y', '0.48860251 * d.z', '-0.48860251 * d.x', '1.09254843 * d.x * d.y', '-1.09254843 * d.y * d.z',
   '0.94617470 * d.z * d.z - 0.31539157', '-1.09254843 * d.x * d.z', '0.54627422 * (d.x * d.x - d.y * d.y)',
@@ -34,7 +34,7 @@ uniform sampler2D opaqueDepth;
 uniform vec2 resolution;
 uniform vec4 part;
 uniform mat3 ray;
-uniform int display, network, behind;  // behind: the network of rays that nothing meets
+uniform int display, network, behind;  // behind: the network of rays that hit nothing
 uniform bool whole;
 `;
 
@@ -51,16 +51,16 @@ void main() {
   if ((opacity > 0.0 ? heaviest(at, opacity) : behind) != network) discard;
   vec4 threeFeatures = texelFetch(featuresAndOpacity, at, 0);
   vec4 features = vec4(threeFeatures.xyz, texelFetch(weightsAndOpacity, at, 0).x);
-  vec3 shown = features.rgb / max(opacity, 1e-6);  // of modes that show something else instead
+  vec3 shown = features.rgb / max(opacity, 1e-6);  // of modes that show something other than the colour
   opacity = open ? 1.0 : threeFeatures.a;
   vec2 ndc = 2.0 * (gl_FragCoord.xy - part.xy) / part.zw - 1.0;
   vec3 seen = sigmoid(diffuse.rgb + viewDependent(diffuse.rgb, features, normalize(ray * vec3(ndc, 1.0))));
   vec3 colour = opacity * seen;
   if (display == kShowDiffuse) colour = opacity * sigmoid(diffuse.rgb);
-  if (display == kShowSpecular) colour = opacity * clamp(0.5 + seen - sigmoid(diffuse.rgb), 0.0, 1.0);  // grey: nothing
+  if (display == kShowSpecular) colour = opacity * clamp(0.5 + seen - sigmoid(diffuse.rgb), 0.0, 1.0);  // grey: no specular part
   if (display == kShowFeatures) colour = opacity * sigmoid(features.rgb);
   if (display == kShowAttention || display == kShowDensityAttention) {
-    colour = opacity * pow(max(shown, 0.0), vec3(1.0 / 2.2));  // most are small
+    colour = opacity * pow(max(shown, 0.0), vec3(1.0 / 2.2));  // most values are small
   }
   if (display == kShowBlocks || display == kShowLevels) {
     colour = opacity * shown * (0.35 + 0.65 * dot(sigmoid(diffuse.rgb), vec3(0.3, 0.6, 0.1)));
@@ -68,18 +68,19 @@ void main() {
   colourAndOpacity = vec4(colour, opacity);
 }`;
 
-// `int heaviest(ivec2 at, float opacity)`: of equals the first.
+// Defines `int heaviest(ivec2 at, float opacity)`, the network with the largest weight, the first of equal ones.
 function heaviestShader(weightTargets: number): string {
   const targets = ['weightsAndOpacity', ...[...Array(weightTargets).keys()].map((n) => `weights${n}AndOpacity`)];
-  const weightOf = (n: number) => `t${Math.floor(n / kWeightsOfTarget)}.${'xyz'[n % kWeightsOfTarget]}`; // of the first x is a feature
-  const others = [...Array(networksOf(weightTargets)).keys()].slice(1);
+  // Of the first target, x is a feature.
+  const weightExpression = (n: number) => `t${Math.floor(n / kWeightsOfTarget)}.${'xyz'[n % kWeightsOfTarget]}`;
+  const others = [...Array(countNetworks(weightTargets)).keys()].slice(1);
   return [
     `uniform sampler2D diffuseAndOpacity, featuresAndOpacity, ${targets.join(', ')};`,
     'int heaviest(ivec2 at, float opacity) {',
     ...targets.map((target, t) => `  vec4 t${t} = texelFetch(${target}, at, 0);`),
-    `  float most = opacity - (${others.map(weightOf).join(' + ')});`,
+    `  float maximum = opacity - (${others.map(weightExpression).join(' + ')});`,
     '  int found = 0;',
-    ...others.map((n) => `  if (${weightOf(n)} > most) { most = ${weightOf(n)}; found = ${n}; }`),
+    ...others.map((n) => `  if (${weightExpression(n)} > maximum) { maximum = ${weightExpression(n)}; found = ${n}; }`),
     '  return found;', '}',
   ].join('\n');
 }
@@ -95,20 +96,21 @@ function viewDependentShader(network: DenseLayer[]): string {
   ].join('\n');
 }
 
-// Of one or several contents: those that have the same numbers have the same.
+// A network of one or several contents: contents whose numbers are equal share one.
 export interface DrawnNetwork {
   mesh: THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>;
-  contents: number; // that are on the card
+  contents: number; // contents on the GPU that use it
 }
 
-// As many as are kept with no content on the card that has them: so that a level that comes back finds its own.
-const kMostUnused = 16;
+// The number of networks that are kept while no content on the GPU uses them, so that a level that is loaded again
+// finds its network.
+const kMaxUnused = 16;
 
-// What of a picture's contents there is to know.
+// The networks of the contents in a picture.
 export interface NetworkOrder {
-  networks: readonly DrawnNetwork[]; // each once, by their numbers
-  behind: number; // which of them rays have that nothing meets
-  whole: boolean; // rays that end nowhere are opaque
+  networks: readonly DrawnNetwork[]; // each once, by index
+  behind: number; // index of the network of rays that hit nothing
+  whole: boolean; // rays that hit nothing are opaque
 }
 
 export class NetworkPass {
@@ -118,7 +120,7 @@ export class NetworkPass {
   private readonly networks = new Map<string, DrawnNetwork>();
   private readonly pass = new THREE.Scene();
 
-  // `sums` are those that hashPieces writes, with so many targets of weights beyond the first.
+  // `sums` is the target that hashPieces writes, with `weightTargets` weight attachments besides the first.
   constructor(
     private readonly sums: THREE.WebGLRenderTarget,
     private readonly screen: THREE.BufferGeometry,
@@ -130,8 +132,8 @@ export class NetworkPass {
     return 8 * this.target.width * this.target.height;
   }
 
-  // A scene has one for each level of detail.
-  networkOf(network: DenseLayer[]): DrawnNetwork {
+  // Returns the network with these numbers, creating it if necessary. A scene has one network per level of detail.
+  getDrawnNetwork(network: DenseLayer[]): DrawnNetwork {
     const key = viewDependentShader(network);
     const known = this.networks.get(key);
     if (known) return known;
@@ -150,16 +152,16 @@ export class NetworkPass {
     });
     const mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>(this.screen, material);
     mesh.frustumCulled = false;
-    const made = { mesh, contents: 0 };
-    this.networks.set(key, made);
-    return made;
+    const drawnNetwork = { mesh, contents: 0 };
+    this.networks.set(key, drawnNetwork);
+    return drawnNetwork;
   }
 
-  // Of which as many are kept as scenes have levels; others go when no content has them.
+  // Removes a content's reference to a network. At most kMaxUnused unused networks are kept.
   release(network: DrawnNetwork): void {
     --network.contents;
     const unused = [...this.networks].filter(([, { contents }]) => contents === 0);
-    for (const [key, { mesh }] of unused.slice(0, Math.max(0, unused.length - kMostUnused))) {
+    for (const [key, { mesh }] of unused.slice(0, Math.max(0, unused.length - kMaxUnused))) {
       mesh.material.dispose();
       this.networks.delete(key);
     }
@@ -169,7 +171,7 @@ export class NetworkPass {
     this.target.setSize(width, height);
   }
 
-  // Into a target that has been cleared; the view's uniforms are the picture's.
+  // Draws into a cleared target; the view's uniforms must be those of the picture.
   draw(renderer: THREE.WebGLRenderer, { camera, part }: Picture, { networks, behind, whole }: NetworkOrder): void {
     this.target.viewport.copy(part);
     renderer.setRenderTarget(this.target);

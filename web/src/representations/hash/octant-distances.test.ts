@@ -1,16 +1,16 @@
 import { describe, expect, it } from 'vitest';
 import { isSet, type OccupancyBits } from '../../raymarch/occupancy';
-import { randomNumbers } from '../../testing/made-tree';
+import { randomNumbers } from '../../testing/test-tree';
 import { kFarthestOctantDistance, octantDistances, ratioFor } from './octant-distances';
 
-function madeBits(edge: number, share: number, seed: number): OccupancyBits {
+function testBits(edge: number, share: number, seed: number): OccupancyBits {
   const random = randomNumbers(seed);
   const bytes = new Uint8Array(edge ** 3 / 8);
   for (let cell = 0; cell < edge ** 3; ++cell) if (random() < share) bytes[cell >> 3] |= 1 << (cell & 7);
   return { edge, bytes };
 }
 
-// The edge of the largest empty cube from a cell on, looked at cell by cell.
+// Finds the edge of the largest empty cube from a cell on by testing each cell.
 function freeFrom(edge: number, at: number[], octant: number, occupied: (x: number, y: number, z: number) => boolean): number {
   const inside = (x: number) => x >= 0 && x < edge;
   for (let k = 1; k <= kFarthestOctantDistance; ++k) {
@@ -26,20 +26,20 @@ function freeFrom(edge: number, at: number[], octant: number, occupied: (x: numb
 describe('octantDistances', () => {
   it.each([0.3, 0.02, 0.002, 0])('are the edges of the largest empty cubes: a share of %s occupied', (share) => {
     const edge = 16;
-    const bits = madeBits(edge, share, 7);
+    const bits = testBits(edge, share, 7);
     const { coarse, fine } = octantDistances(bits)!;
     expect(fine.length).toBe(0);
     const random = randomNumbers(1);
     for (let round = 0; round < 300; ++round) {
       const at = [0, 1, 2].map(() => Math.floor(random() * edge));
       const octant = Math.floor(random() * 8);
-      const found = (coarse[at[0] + edge * (at[1] + edge * at[2])] >>> (4 * octant)) & kFarthestOctantDistance;
-      expect(found).toBe(freeFrom(edge, at, octant, (x, y, z) => isSet(bits, x + edge * (y + edge * z))));
+      const distance = (coarse[at[0] + edge * (at[1] + edge * at[2])] >>> (4 * octant)) & kFarthestOctantDistance;
+      expect(distance).toBe(freeFrom(edge, at, octant, (x, y, z) => isSet(bits, x + edge * (y + edge * z))));
     }
   });
 
-  it.each([136, 264])('are kept in two grids where there are many cells, and lead nowhere: %i', (edge) => {
-    const bits = madeBits(edge, 3e-5, 3);
+  it.each([136, 264])('are stored in two grids if there are many cells, and never skip an occupied one: %i', (edge) => {
+    const bits = testBits(edge, 3e-5, 3);
     const ratio = ratioFor(edge);
     expect(ratio).toBe(edge > 256 ? 4 : 2);
     const { edge: coarseEdge, coarse, fine } = octantDistances(bits)!;
@@ -57,15 +57,15 @@ describe('octantDistances', () => {
         if ((value === 0) !== isOccupied) ++wrong;
         if (isOccupied || near++ % 50 !== 0) continue;
         for (let octant = 0; octant < 8; ++octant) {
-          const found = (value >>> (4 * octant)) & kFarthestOctantDistance;
-          if (found < 1 || found > freeFrom(edge, at, octant, occupied)) ++wrong;
+          const distance = (value >>> (4 * octant)) & kFarthestOctantDistance;
+          if (distance < 1 || distance > freeFrom(edge, at, octant, occupied)) ++wrong;
         }
       }
     });
     expect(near).toBeGreaterThan(400);
-    const promised = fine.length / ratio ** 3;
-    expect(octantDistances(bits, promised)).toBeDefined();
-    for (const lie of [0, promised - 1, promised + 1]) expect(octantDistances(bits, lie)).toBeUndefined();
+    const declared = fine.length / ratio ** 3;
+    expect(octantDistances(bits, declared)).toBeDefined();
+    for (const lie of [0, declared - 1, declared + 1]) expect(octantDistances(bits, lie)).toBeUndefined();
     expect(wrong).toBe(0);
   });
 });

@@ -1,36 +1,37 @@
-// How far nothing is for rays of each octant of directions: what hash contents pass over empty space with
-// (docs/tile-format.md, section 7). Twin of src/representations/hash/content/occupancy_distance.cpp.
+// The distances to the nearest occupied cell for rays of each octant of directions, with which hash contents skip empty
+// space (docs/tile-format.md, section 7). Counterpart of src/representations/hash/content/occupancy_distance.cpp.
 import type { OccupancyBits } from '../../raymarch/occupancy';
 
 export const kFarthestOctantDistance = 15;
-const kMostCoarse = 128; // cells along an edge, unless kMostRatio makes more
-const kMostRatio = 4;
+const kMaxCoarse = 128; // cells along an edge, unless kMaxRatio leaves more
+const kMaxRatio = 4;
 
-// Finest cells along an edge of a coarse one.
+// Returns the number of finest cells along the edge of a coarse one.
 export function ratioFor(finestCells: number): number {
   let ratio = 1;
-  while (ratio < kMostRatio && finestCells / ratio > kMostCoarse) ratio *= 2;
+  while (ratio < kMaxRatio && finestCells / ratio > kMaxCoarse) ratio *= 2;
   return ratio;
 }
 
-// In two grids: far away by coarse cells, near what is occupied by the finest ones.
-export interface OctantDistances {
+// Two grids: coarse cells far from occupied ones, and finest cells near them.
+export interface OctantDistanceField {
   edge: number; // of the coarse grid, in cells
-  // x fastest. Of an empty cell, and each octant o of directions (bit a of o: along axis a upwards), the four bits from 4 o
-  // on are the number of cells along an edge of the largest empty cube that begins at the cell and lies in that direction, at
-  // most 15. Of a cell that holds something the lowest four bits are 0, and the others its number among such (0 where the
-  // ratio is 1).
+  // x fastest. For an empty cell and each octant o of directions (bit a of o is set if the octant points upwards along
+  // axis a), the four bits from 4 o on are the edge, in cells, of the largest empty cube that begins at the cell and
+  // extends into that octant, at most 15. For an occupied cell the lowest four bits are 0, and the other bits are its
+  // index among the occupied cells (0 if the ratio is 1).
   coarse: Uint32Array;
-  // Where the ratio is above 1, of each such cell its ratio³ finest ones, x fastest: the same in finest cells, or less where
-  // the next cells' are not known to be more; 0 where the cell is occupied.
+  // If the ratio is above 1: for each occupied coarse cell its ratio³ finest cells, x fastest, with the same distances
+  // in finest cells, or smaller ones where the neighbouring cells are not known to allow more; 0 for an occupied finest
+  // cell.
   fine: Uint32Array;
 }
 
-// Undefined where there are not as many near cells as was promised, which is seen before there is room for them.
-export function octantDistances(occupied: OccupancyBits, promisedNear?: number): OctantDistances | undefined {
+// Returns undefined if the number of near cells is not the declared one, which is checked before they are allocated.
+export function octantDistances(occupied: OccupancyBits, declaredNear?: number): OctantDistanceField | undefined {
   const ratio = ratioFor(occupied.edge);
   const cells = coarseCells(occupied, ratio);
-  if (promisedNear !== undefined && ratio > 1 && cells.reduce((sum, cell) => sum + (cell > 0 ? 1 : 0), 0) !== promisedNear) return undefined;
+  if (declaredNear !== undefined && ratio > 1 && cells.reduce((sum, cell) => sum + (cell > 0 ? 1 : 0), 0) !== declaredNear) return undefined;
   const edge = occupied.edge / ratio;
   const coarse = new Uint32Array(edge ** 3);
   for (let octant = 0; octant < 8; ++octant) sweep(coarse, cells, edge, octant);
@@ -42,12 +43,12 @@ export function octantDistances(occupied: OccupancyBits, promisedNear?: number):
   return distances;
 }
 
-// Of each cell, how many of its finest ones are occupied.
+// Returns the number of occupied finest cells in each coarse cell.
 function coarseCells({ edge, bytes }: OccupancyBits, ratio: number): Uint8Array {
   const coarse = edge / ratio;
   const shift = Math.log2(ratio);
   const cells = new Uint8Array(coarse ** 3);
-  let byte = 0; // eight cells along x
+  let byte = 0; // each byte holds eight cells along x
   for (let z = 0; z < edge; ++z) {
     for (let y = 0; y < edge; ++y) {
       const row = coarse * ((y >> shift) + coarse * (z >> shift));
@@ -59,17 +60,17 @@ function coarseCells({ edge, bytes }: OccupancyBits, ratio: number): Uint8Array 
   return cells;
 }
 
-// One more than the least of the seven next cells'. What lies beyond counts as empty.
+// The distance is one more than the minimum over the seven next cells. Cells outside the grid count as empty.
 function sweep(distances: Uint32Array, cells: Uint8Array, edge: number, octant: number): void {
   const shift = 4 * octant;
-  // Towards the octant's own corner, where a sweep begins.
+  // Towards the corner that the octant points to, where a sweep begins.
   const [dx, dy, dz] = [octant & 1 ? 1 : -1, octant & 2 ? edge : -edge, octant & 4 ? edge * edge : -edge * edge];
   for (let k = 0; k < edge; ++k) {
     for (let j = 0; j < edge; ++j) {
       const row = (dx > 0 ? edge - 1 : 0) + edge * (dy > 0 ? edge - 1 - j : j) + edge * edge * (dz > 0 ? edge - 1 - k : k);
-      let next = kFarthestOctantDistance; // the least of the four cells one place further along x
+      let next = kFarthestOctantDistance; // minimum of the four cells one step further along x
       for (let i = 0, cell = row; i < edge; ++i, cell -= dx) {
-        let here = kFarthestOctantDistance; // and of the three that lie beside this one
+        let here = kFarthestOctantDistance; // minimum of the other three cells beside this one
         if (j > 0) here = Math.min(here, (distances[cell + dy] >>> shift) & 15);
         if (k > 0) here = Math.min(here, (distances[cell + dz] >>> shift) & 15);
         if (j > 0 && k > 0) here = Math.min(here, (distances[cell + dy + dz] >>> shift) & 15);
@@ -81,21 +82,21 @@ function sweep(distances: Uint32Array, cells: Uint8Array, edge: number, octant: 
   }
 }
 
-const kSide = kMostRatio + 1;
+const kSide = kMaxRatio + 1;
 
-// Of the finest cells in coarse ones that hold something. In an empty coarse cell, of whose octant k coarse cells are empty
-// along an edge, what is so of a finest one is what is left of these.
+// Computes the distances of the finest cells in occupied coarse cells. Those of a finest cell in an empty coarse cell,
+// which has k empty coarse cells along an edge in the octant, follow from its distance to the far end of these.
 class NearSweep {
   private readonly up: boolean[];
   private readonly shift: number;
-  // Of one coarse cell's finest ones, and of the next ones beside it. Along an axis they are numbered from the end towards
-  // which the octant looks, from 1 on; 0 is in the next cell.
+  // Distances of one coarse cell's finest cells and of the adjacent ones in the next coarse cells. Along an axis they
+  // are numbered from 1 on, starting at the end that the octant points to; 0 is in the next cell.
   private readonly values = new Uint8Array(kSide ** 3);
-  private readonly inside: Uint8Array[]; // where these are in their coarse cell
+  private readonly inside: Uint8Array[]; // coordinates of these within their coarse cell
 
   constructor(
     private readonly finest: OccupancyBits,
-    private readonly into: OctantDistances,
+    private readonly into: OctantDistanceField,
     private readonly cells: Uint8Array,
     private readonly ratio: number,
     octant: number,
@@ -115,7 +116,7 @@ class NearSweep {
         for (let i = 0; i < edge; ++i) {
           const x = up[0] ? edge - 1 - i : i;
           const cell = x + edge * (y + edge * z);
-          // Of one that is full nothing is empty.
+          // A full coarse cell contains no empty cells.
           if ((coarse[cell] & 15) === 0 && cells[cell] < ratio ** 3) this.sweep(x, y, z, coarse[cell] >>> 4);
         }
       }
@@ -130,7 +131,7 @@ class NearSweep {
         const row = edge * (r * y + insideY[j] + edge * (r * z + insideZ[k])) + r * x;
         const fineRow = r * (insideY[j] + r * (insideZ[k] + r * number));
         let at = 1 + kSide * (j + kSide * k);
-        let next = least(values, at - 1);
+        let next = minimum(values, at - 1);
         for (let i = 1; i <= r; ++i, ++at) {
           const cell = row + insideX[i];
           const here = Math.min(values[at - kSide], values[at - kSide * kSide], values[at - kSide - kSide * kSide]);
@@ -144,7 +145,7 @@ class NearSweep {
     }
   }
 
-  // What is needed of the next coarse cell along the axes whose bits are set.
+  // Copies the needed distances from the next coarse cell along the axes whose bits are set.
   private takeNext(x: number, y: number, z: number, axes: number): void {
     const { ratio: r, values, up, shift, inside: [insideX, insideY, insideZ], into: { edge, coarse, fine } } = this;
     const [dx, dy, dz] = [axes & 1, (axes >> 1) & 1, axes >> 2];
@@ -159,7 +160,7 @@ class NearSweep {
     for (let k = 1 - dz; k <= (dz ? 0 : r); ++k) {
       for (let j = 1 - dy; j <= (dy ? 0 : r); ++j) {
         const row = first + r * (insideY[j] + r * insideZ[k]);
-        const offset = Math.max(j === 0 ? 0 : r - j, k === 0 ? 0 : r - k); // from where the coarse cube begins
+        const offset = Math.max(j === 0 ? 0 : r - j, k === 0 ? 0 : r - k); // distance from the start of the coarse cube
         for (let i = 1 - dx; i <= (dx ? 0 : r); ++i) {
           values[i + kSide * (j + kSide * k)] = isEmpty
             ? Math.min(kFarthestOctantDistance, reach - Math.max(offset, i === 0 ? 0 : r - i))
@@ -170,7 +171,7 @@ class NearSweep {
   }
 }
 
-// Of four that lie beside one another, across x.
-function least(values: Uint8Array, at: number): number {
+// Returns the minimum of four cells that are adjacent across x.
+function minimum(values: Uint8Array, at: number): number {
   return Math.min(values[at], values[at - kSide], values[at - kSide * kSide], values[at - kSide - kSide * kSide]);
 }

@@ -27,7 +27,7 @@ function attributesAt({ size, first, second }: TexelTextures, x: number, y: numb
 }
 
 describe('decodeVolume', () => {
-  it.each(uris)('reads of the golden scene what its sums say: %s', (uri) => {
+  it.each(uris)('decodes the golden scene to its checksums: %s', (uri) => {
     const content = decodeGolden('volume', goldenFile(uri)) as VolumeContent;
     expect(content.parts.length).toBe(sums[uri].length);
     content.parts.forEach((part, n) => {

@@ -1,38 +1,38 @@
-// A volume's content, read: untrusted bytes. docs/tile-format.md, sections 5, 6 and 10.
+// Decodes volume contents. The bytes are untrusted. docs/tile-format.md, sections 5, 6 and 10.
 import { count, emptyTextures, putCube, type Cubes, type MarchedHeader } from '../../raymarch/content';
-import { texturesOf } from '../../raymarch/content-layout';
-import { brokenPromise, ruleOfParts } from '../../raymarch/content-rules';
+import { countTextures } from '../../raymarch/content-layout';
+import { mismatchWithTileset, ruleOfParts } from '../../raymarch/content-rules';
 import { chebyshevDistances } from '../../raymarch/occupancy';
 import { PartReader } from '../../raymarch/part-reader';
 import { takePlane } from '../../raymarch/texel-pictures';
-import type { ContentCodec, PromisedContent } from '../../tiles/content-codec';
+import type { ContentCodec, DeclaredContent } from '../../tiles/content-codec';
 import { kContentLimits, type ContentLimits } from '../../tiles/content-limits';
 import type { ContentFile } from '../../tiles/content-reader';
-import { arrayOf, fieldOf, numberOf, wholeOf, type Json } from '../../tiles/json-fields';
+import { getArray, getField, getNumber, getInteger, type Json } from '../../tiles/json-fields';
 import { ruleOfNetwork, type DenseLayer } from '../../tiles/network';
 import { kDistanceCell, vectorsOfVolume, type VolumeContent, type VolumePart } from './volume-content';
 import { layOut, type VolumeLayout } from './volume-layout';
 import * as rules from './volume-rules';
 
-// What a content says of itself; nothing has been allocated for its texels.
+// The header of a content; nothing has been allocated for its texels.
 export interface VolumeHeader extends MarchedHeader {
   parts: VolumePart[];
   layout: VolumeLayout;
-  atlases: number; // of the layout's voxels
+  atlases: number; // textures that the voxel atlas is split into
   featureRange: number;
   densityRange: number;
   stepsPerTexel: number;
-  sources: Json[]; // of the parts
+  sources: Json[]; // JSON of the parts
   network: DenseLayer[];
   views: Uint8Array[];
 }
 
-// Both throw SceneError that names `name` and the first rule that is broken; `promised` is what tileset.json says of
-// the content. The decoder of pictures must be prepared (lossless-image.ts).
+// readVolumeHeader and decodeVolume throw SceneError that names `name` and the first violated rule; `declared` is what
+// tileset.json declares about the content. The image decoder must be prepared (lossless-image.ts).
 export function readVolumeHeader(
-  file: Uint8Array, name: string, promised?: PromisedContent, limits = kContentLimits,
+  file: Uint8Array, name: string, declared?: DeclaredContent, limits = kContentLimits,
 ): VolumeHeader {
-  return new VolumeReader(name, limits).readHeader(file, promised);
+  return new VolumeReader(name, limits).readHeader(file, declared);
 }
 
 export function decodeVolume(header: VolumeHeader, name: string): VolumeContent {
@@ -42,7 +42,7 @@ export function decodeVolume(header: VolumeHeader, name: string): VolumeContent 
 export const volumeCodec: ContentCodec<VolumeHeader, VolumeContent> = {
   readHeader: readVolumeHeader,
   decode: decodeVolume,
-  buffersOf({ planes, voxels, macroblocks, distances }) {
+  listBuffers({ planes, voxels, macroblocks, distances }) {
     const arrays = [planes.first, planes.second, voxels.first, voxels.second, macroblocks.texels, distances.texels];
     return arrays.map(({ buffer }) => buffer as ArrayBuffer);
   },
@@ -53,23 +53,23 @@ class VolumeReader extends PartReader {
     super(name, limits);
   }
 
-  readHeader(file: Uint8Array, promised?: PromisedContent): VolumeHeader {
+  readHeader(file: Uint8Array, declared?: DeclaredContent): VolumeHeader {
     const { ours, views }: ContentFile = this.readFile(file, 'volume');
-    const sources = this.partsOf(ours);
+    const sources = this.readPartSources(ours);
     const parts = sources.map((source, i) => this.readPart(source) ?? this.fail(`part ${i}: its header is not complete`));
     const noRange = 'has no ranges to dequantise with';
-    const featureRange = numberOf(ours, 'featureRange') ?? this.fail(noRange);
-    const densityRange = numberOf(ours, 'densityRange') ?? this.fail(noRange);
+    const featureRange = getNumber(ours, 'featureRange') ?? this.fail(noRange);
+    const densityRange = getNumber(ours, 'densityRange') ?? this.fail(noRange);
     const stepsPerTexel =
-      fieldOf(ours, 'stepsPerTexel') === undefined ? 1 : wholeOf(ours, 'stepsPerTexel', rules.kMostStepsPerTexel);
+      getField(ours, 'stepsPerTexel') === undefined ? 1 : getInteger(ours, 'stepsPerTexel', rules.kMaxStepsPerTexel);
     if (!stepsPerTexel) this.fail('its steps per texel are out of bounds');
-    const network = this.readNetwork(fieldOf(ours, 'network'), views);
+    const network = this.readNetwork(getField(ours, 'network'), views);
     const broken =
       rules.ruleOfRange(featureRange) ?? rules.ruleOfRange(densityRange) ?? ruleOfNetwork(network, rules.kVolumeInputs) ??
-      ruleOfParts(parts, rules.ruleOfPart) ?? (promised && brokenPromise(parts, promised));
+      ruleOfParts(parts, rules.ruleOfPart) ?? (declared && mismatchWithTileset(parts, declared));
     if (broken) this.fail(broken);
     const layout = this.laidOut(layOut(parts, this.limits), 16 * vectorsOfVolume({ parts, network }));
-    const atlases = texturesOf(layout.voxels);
+    const atlases = countTextures(layout.voxels);
     return {
       memoryBytes: layout.bytes, parts, layout, atlases, featureRange, densityRange, stepsPerTexel, sources, network, views,
     };
@@ -81,7 +81,7 @@ class VolumeReader extends PartReader {
     const voxels = emptyTextures(layout.voxels.size);
     const macroblocks: Cubes<Uint8Array> = { ...layout.macroblocks, texels: new Uint8Array(4 * count(layout.macroblocks.size)) };
     const distances: Cubes<Uint8Array> = { ...layout.distances, texels: new Uint8Array(count(layout.distances.size)) };
-    let begin = 0; // of the part's macroblocks in the atlas
+    let begin = 0; // index of the part's first macroblock in the atlas
     parts.forEach((part, n) => {
       const source = header.sources[n];
       const of = (what: string) => `part ${n}: its ${what} are not what they should be`;
@@ -90,14 +90,14 @@ class VolumeReader extends PartReader {
         this.fail(of('macroblocks'));
       }
       begin += part.stored;
-      const pictures = arrayOf(source, 'planeTexels');
+      const pictures = getArray(source, 'planeTexels');
       const size = { width: part.planes, height: part.planes };
       for (let axis = 0; axis < 3; ++axis) {
         const taken = this.takePictures(views, pictures?.length === 3 ? pictures[axis] : undefined, size,
           (pixels, which) => takePlane(pixels, which, part.planes, planes, 3 * n + axis));
         if (!taken) this.fail(of('planes'));
       }
-      const occupied = this.readBits(views, fieldOf(source, 'occupied'), part.planes / kDistanceCell);
+      const occupied = this.readBits(views, getField(source, 'occupied'), part.planes / kDistanceCell);
       if (!occupied) this.fail(of('occupied cells'));
       putCube(chebyshevDistances(occupied), occupied.edge, distances, n);
     });
@@ -109,8 +109,8 @@ class VolumeReader extends PartReader {
 
   private readPart(source: Json): VolumePart | undefined {
     const place = this.readPlace(source);
-    const voxels = wholeOf(source, 'voxels', rules.kMostVoxels);
-    const planes = wholeOf(source, 'planes', rules.kMostPlanes);
+    const voxels = getInteger(source, 'voxels', rules.kMaxVoxels);
+    const planes = getInteger(source, 'planes', rules.kMaxPlanes);
     return place && voxels !== undefined && planes !== undefined ? { ...place, voxels, planes } : undefined;
   }
 }

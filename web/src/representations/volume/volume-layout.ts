@@ -1,6 +1,6 @@
-// How the parts of a volume's content share textures, before anything is allocated for them.
+// Lays out the parts of a volume content in shared textures, before anything is allocated for them.
 import { count, kMacroblock, kTexturesOfShader } from '../../raymarch/content';
-import { atlasOf, stack, type AtlasLayout } from '../../raymarch/content-layout';
+import { layOutAtlas, stack, type AtlasLayout } from '../../raymarch/content-layout';
 import type { TextureLimits } from '../../tiles/content-limits';
 import type { Vec3 } from '../../tiles/tileset';
 import { kDistanceCell, type VolumePart } from './volume-content';
@@ -13,13 +13,13 @@ export interface VolumeLayout {
   bytes: number; // of all textures
 }
 
-const kOthers = 5; // planes (2), macroblocks, distances, what is opaque
-const kMostAtlases = Math.min(4, Math.floor((kTexturesOfShader - kOthers) / 2)); // with two textures each
+const kOthers = 5; // texture units: planes (2), macroblocks, distances, opaque depth
+const kMaxAtlases = Math.min(4, Math.floor((kTexturesOfShader - kOthers) / 2)); // each is split into two textures
 
-// Undefined where the limits do not allow it.
+// Returns undefined if the limits do not allow a layout.
 export function layOut(parts: VolumePart[], limits: TextureLimits): VolumeLayout | undefined {
   const widest = Math.max(...parts.map((part) => part.planes));
-  const voxels = atlasOf(parts.reduce((sum, part) => sum + part.stored, 0), limits.edge3D, kMostAtlases);
+  const voxels = layOutAtlas(parts.reduce((sum, part) => sum + part.stored, 0), limits.edge3D, kMaxAtlases);
   const macroblocks = stack(parts.map((part) => part.voxels / kMacroblock), limits.edge3D);
   const distances = stack(parts.map((part) => part.planes / kDistanceCell), limits.edge3D);
   if (!voxels || !macroblocks || !distances || 3 * parts.length > limits.layers || widest > limits.edge2D) return undefined;

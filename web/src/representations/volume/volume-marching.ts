@@ -1,4 +1,4 @@
-// How contents of a `volume` scene are marched through: each writes its own colours.
+// The marching of `volume` scenes: each content writes colours directly.
 import { kSharedModes } from '../../draw/display-modes';
 import type { SceneDrawing } from '../../draw/scene-drawer';
 import { Compositor, type MarchedDrawnContent } from '../../raymarch/compositor';

@@ -1,5 +1,5 @@
-// What of a `volume` scene goes into the shader that draws a content: its march, and its network, which is run for each content
-// (docs/tile-format.md, section 6).
+// The part of the content shader that is specific to `volume` scenes: their march, and their network, which is
+// evaluated for each content (docs/tile-format.md, section 6).
 import marchSource from '../../../../shaders/representations/volume/volume_march.glsl?raw';
 import { layersShader, writtenVector } from '../../draw/network-shader';
 import type { ProgramPieces } from '../../raymarch/content-program';
@@ -15,8 +15,8 @@ uniform sampler3D macroblocks, distances;
 uniform float featureRange, densityRange, stepsPerTexel;
 `;
 
-// `content` begins with six vectors of each part; its planes lie in their corner of three layers; macroblocks' numbers are
-// places in an atlas, in bytes.
+// `content` begins with six vectors per part; its planes occupy the corner of three layers; the numbers in macroblocks
+// are places in an atlas, as bytes.
 const kParts = `
 struct Part {
   Place place;
@@ -26,10 +26,10 @@ struct Part {
   ivec3 macroblockOrigin, distanceOrigin;
 };
 
-Part partOf(int n) {
+Part fetchPart(int n) {
   vec4 a = content[6 * n], b = content[6 * n + 1], c = content[6 * n + 2], d = content[6 * n + 3];
   ivec3 macroblocks = ivec3(content[6 * n + 4].xyz), distances = ivec3(content[6 * n + 5].xyz);
-  return Part(placeOf(a, b, c, d), b.w, a.w, d.w, macroblocks, distances);
+  return Part(unpackPlace(a, b, c, d), b.w, a.w, d.w, macroblocks, distances);
 }
 
 float reachAt(Part part, vec3 cell) {
@@ -47,14 +47,14 @@ vec3 inAtlas(vec4 macroblock, vec3 within) {
 vec4 voxelsFirst(Part part, vec4 macroblock, vec3 within) { return voxelAtlasFirst(inAtlas(macroblock, within)); }
 vec4 voxelsSecond(Part part, vec4 macroblock, vec3 within) { return voxelAtlasSecond(inAtlas(macroblock, within)); }
 
-vec4 planesOf(highp sampler2DArray planes, Part part, vec3 x) {
+vec4 samplePlanes(highp sampler2DArray planes, Part part, vec3 x) {
   vec3 p = clamp(x, 0.5, part.texels - 0.5) / float(textureSize(planes, 0).x);
   return textureLod(planes, vec3(p.yz, part.layer), 0.0) + textureLod(planes, vec3(p.xz, part.layer + 1.0), 0.0) +
     textureLod(planes, vec3(p.xy, part.layer + 2.0), 0.0);
 }
 
-vec4 planesFirst(Part part, vec3 x) { return planesOf(planeTexelsFirst, part, x); }
-vec4 planesSecond(Part part, vec3 x) { return planesOf(planeTexelsSecond, part, x); }
+vec4 planesFirst(Part part, vec3 x) { return samplePlanes(planeTexelsFirst, part, x); }
+vec4 planesSecond(Part part, vec3 x) { return samplePlanes(planeTexelsSecond, part, x); }
 `;
 
 const kWrite = `
@@ -71,7 +71,7 @@ void writeContent(Composite sum, vec3 d, float opacity, float seen) {
   colourAndOpacity = seen * vec4(colour, opacity);
 }`;
 
-// `vec3 deferred(vec3 diffuse, vec4 features, vec3 d)`, as layersShader has it.
+// Defines `vec3 deferred(vec3 diffuse, vec4 features, vec3 d)`, using layersShader.
 export function deferredShader(network: Pick<DenseLayer, 'inputs' | 'outputs'>[], vector: (n: number) => string): string {
   const harmonics = [1, 2, 3].map((k) =>
     `  vec3 s${k} = 2.0 * s${k - 1} * c${k - 1}, c${k} = 1.0 - 2.0 * s${k - 1} * s${k - 1};`);
@@ -87,8 +87,8 @@ export function deferredShader(network: Pick<DenseLayer, 'inputs' | 'outputs'>[]
   ].join('\n');
 }
 
-// `ownNetwork`: written into the program, which then is of one content alone, and faster than one that reads a buffer. What comes
-// and goes shares programs, as compiling takes long.
+// `ownNetwork` writes the network's numbers into the program, which is then specific to one content and faster than one
+// that reads a buffer. Contents that are loaded and evicted often share programs, as compiling is slow.
 export function volumePieces(
   { parts, network, atlases }: { parts: VolumePart[]; network: DenseLayer[]; atlases: number }, ownNetwork: boolean,
 ): ProgramPieces {

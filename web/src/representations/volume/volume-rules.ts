@@ -1,11 +1,12 @@
-// The rules that a volume's content keeps: docs/tile-format.md, section 6. The first that is broken, for people.
+// The rules for volume contents: docs/tile-format.md, section 6. Each function returns the first violation as text for
+// users.
 import { ruleOfMacroblocks, ruleOfPlace } from '../../raymarch/content-rules';
 import type { Broken } from '../../tiles/tileset-rules';
 import type { VolumePart } from './volume-content';
 
-export const kMostVoxels = 1024; // along an axis
-export const kMostPlanes = 4096;
-export const kMostStepsPerTexel = 8;
+export const kMaxVoxels = 1024; // along an axis
+export const kMaxPlanes = 4096;
+export const kMaxStepsPerTexel = 8;
 const kLargestRange = 100;
 export const kVolumeInputs = 34; // of the network
 

@@ -1,4 +1,4 @@
-// A content of a `volume` scene on the graphics card.
+// The textures of a `volume` content on the GPU.
 import * as THREE from 'three';
 import { atlasUniforms, ContentTextures, kForms } from '../../raymarch/content-textures';
 import { packNetwork } from '../../tiles/network';
