@@ -39,7 +39,7 @@ interval() {
     for (i = 1; i <= n; ++i) sum += ARGV[i]
     for (i = 1; i <= n; ++i) squares += (ARGV[i] - sum / n) ^ 2
     half = n > 1 && n < 11 ? t[n - 1] * sqrt(squares / (n - 1) / n) : 99
-    printf "%.3f %.3f %.3f\n", sum / n, sum / n - half, sum / n + half
+    printf "%.4f %.4f %.4f\n", sum / n, sum / n - half, sum / n + half
   }' "$@"
 }
 
@@ -65,11 +65,18 @@ trained() {
 baked() {
   [ -e "$work/$2/tileset.json" ] || "$tessera" bake "$work/$1" "$work/$2" --capture "$work/$3"
 }
-# judged WHAT CAPTURE [LOD]: prints its held-out PSNR, from the file if it was evaluated before.
+# The weights of LPIPS: LPIPS, or those in TESSERA_SHARED_DATA if there are any.
+lpips=${LPIPS:-}
+[ -n "$lpips" ] || [ ! -e "${TESSERA_SHARED_DATA:-}/lpips/alex.safetensors" ] ||
+  lpips=$TESSERA_SHARED_DATA/lpips/alex.safetensors
+# judged WHAT CAPTURE [LOD]: prints its held-out PSNR, from the file if it was evaluated before; with weights, the file also has
+# LPIPS.
 judged() {
   local name=$1${3:+-lod$3}
-  [ -s "$work/$name.json" ] ||
-    "$tessera" eval "$work/$1" "$work/$2" --json "$work/$name.json" --report "$work/$name.html" ${3:+--lod "$3"} > /dev/null
+  if [ ! -s "$work/$name.json" ] || { [ -n "$lpips" ] && [ "$(jq .lpips "$work/$name.json")" = null ]; }; then
+    "$tessera" eval "$work/$1" "$work/$2" --json "$work/$name.json" --report "$work/$name.html" ${3:+--lod "$3"} \
+      ${lpips:+--lpips "$lpips"} > /dev/null
+  fi
   jq -r '.psnr * 100 | round / 100' "$work/$name.json"
 }
 difference() { awk -v a="$1" -v b="$2" 'BEGIN { d = a - b; print d < 0 ? -d : d }'; }
@@ -87,7 +94,7 @@ photographs() {
   echo '[]' > "$work/rows.json"
   for seed in ${SEEDS:-1 2 3}; do
     "$tessera" train "$work/capture" "$work/$seed" --method field --minutes "${MINUTES:-10}" --seed "$seed"
-    "$tessera" eval "$work/$seed" "$work/capture" --json "$work/eval.json" ${LPIPS:+--lpips "$LPIPS"}
+    "$tessera" eval "$work/$seed" "$work/capture" --json "$work/eval.json" ${lpips:+--lpips "$lpips"}
     jq --argjson seed "$seed" --slurpfile eval "$work/eval.json" \
       '. + [{seed: $seed, psnr: $eval[0].psnr, ssim: $eval[0].ssim, lpips: $eval[0].lpips, views: $eval[0].views}]' \
       "$work/rows.json" > "$work/next.json"

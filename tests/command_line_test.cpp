@@ -6,6 +6,7 @@
 #include <regex>
 
 #include "base/image_io.h"
+#include "base/testing/shared_data.h"
 #include "representations/list.h"
 #include "tests/program.h"
 
@@ -268,7 +269,7 @@ TEST_F(CommandLine, SaysWhatAFolderIsThatCannotBeServedAndWhatToDo) {
 TEST_F(CommandLine, StatesWhichPortsAreValid) {
   for (const char* port : {"99999", "65536", "-1", "x", "8.5", "80x", "99999999999999999999"}) {
     const std::string line = expectUsageError({"serve", at("missing"), "--port", port});
-    EXPECT_TRUE(contains(line, std::string("--port: '") + port + "' is no port")) << line;
+    EXPECT_TRUE(contains(line, std::string("--port: '") + port + "' is not a port")) << line;
     EXPECT_TRUE(contains(line, "from 0 to 65535")) << line;
   }
   for (const char* port : {"0", "65535"}) expectFailure({"serve", at("missing"), "--port", port});
@@ -564,14 +565,10 @@ TEST_F(CommandLine, SavesAndTellsWhenItIsInterrupted) {
 }
 
 TEST_F(CommandLine, ImportsPhotographsFromTheWild) {
-  const char* shared = std::getenv("TESSERA_SHARED_DATA");
+  SKIP_WITHOUT_SHARED_DATA("fox");
+  SKIP_WITHOUT_SHARED_DATA("brighton_beach");
   for (const char* name : {"fox", "brighton_beach"}) {
-    if (shared == nullptr || !fs::is_directory(fs::path(shared) / name)) {
-      GTEST_SKIP() << "TESSERA_SHARED_DATA/" << name << " is not there";
-    }
-  }
-  for (const char* name : {"fox", "brighton_beach"}) {
-    Said said = run({"import", (fs::path(shared) / name).string(), at(name), "--downscale", "8"});
+    Said said = run({"import", sharedData(name).string(), at(name), "--downscale", "8"});
     ASSERT_EQ(said.exitCode, 0) << said.err;
     EXPECT_TRUE(contains(said.out, std::string(name) == "fox" ? "50 photos" : "18 photos")) << said.out;
     said = run({"info", at(name), "--json"});

@@ -73,6 +73,7 @@ TEST_F(HashCommandLine, GoesFromACityToPicturesAndNumbers) {
   EXPECT_EQ(info.at("method"), "hash");
   EXPECT_EQ(info.at("blocks").at("columns"), 2);
   EXPECT_EQ(info.at("multiply_accumulates_per_sample"), 8 * 12 + 2 * 8 * 8 + 2 * 8);
+  EXPECT_EQ(info.at("view_dependent_multiply_accumulates_per_ray"), 16 * 23 + 16 * 16 + 16 * 3);
   const Said baked = run({"bake", model, at("scene")});
   ASSERT_EQ(baked.exitCode, 0) << baked.err;
   const Said scene = run({"info", at("scene"), "--json"});
@@ -93,6 +94,16 @@ TEST_F(HashCommandLine, GoesFromACityToPicturesAndNumbers) {
   EXPECT_EQ(skipping.at("skipping").at("samples"), skipping.at("whole").at("samples"));
   EXPECT_EQ(skipping.at("by_cells").at("samples"), skipping.at("whole").at("samples"));
   EXPECT_EQ(skipping.at("largest_difference"), 0);
+  ASSERT_EQ(run({"train", at("city"), at("beside"), "--method", "field", "--steps", "2"}).exitCode, 0);
+  const Said compared = run({"bench", "render", at("scene"), "--views", at("city"), "--against", at("beside"),
+                             "--threads", "2", "--json", "-"});
+  ASSERT_EQ(compared.exitCode, 0) << compared.err;
+  const json against = json::parse(compared.out).at("against");
+  for (const char* each : {"scene", "field", "field_culled"}) {
+    EXPECT_GT(against.at(each).at("frames_per_second"), 0) << each;
+    EXPECT_GE(against.at(each).at("densities_per_ray"), against.at(each).at("samples_per_ray")) << each;
+  }
+  EXPECT_LE(against.at("field_culled").at("densities_per_ray"), against.at("field").at("densities_per_ray"));
   const Said odd = run({"bake", model, at("odd"), "--cells", "12"});
   EXPECT_EQ(odd.exitCode, 2);
   EXPECT_NE(odd.err.find("multiple of 8"), std::string::npos) << odd.err;

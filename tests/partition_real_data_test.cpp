@@ -3,21 +3,14 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <cstdlib>
 #include <nlohmann/json.hpp>
-#include <optional>
 
+#include "base/testing/shared_data.h"
 #include "import/importer.h"
 #include "partition/block_map.h"
 
 namespace tessera {
 namespace {
-
-std::optional<fs::path> sharedData(const std::string& name) {
-  const char* root = std::getenv("TESSERA_SHARED_DATA");
-  if (root == nullptr || !fs::is_directory(fs::path(root) / name)) return std::nullopt;
-  return fs::path(root) / name;
-}
 
 class PartitionOfRealData : public testing::Test {
  protected:
@@ -36,9 +29,9 @@ class PartitionOfRealData : public testing::Test {
 };
 
 TEST_F(PartitionOfRealData, BrightonBeachIsAGeoreferencedFieldUnderAFlight) {
-  const auto beach = sharedData("brighton_beach");
-  if (!beach) GTEST_SKIP() << "TESSERA_SHARED_DATA/brighton_beach is not there";
-  const Capture capture = importCapture(*beach, folder_ / "capture", {.downscale = 8});
+  SKIP_WITHOUT_SHARED_DATA("brighton_beach");
+  const fs::path beach = sharedData("brighton_beach");
+  const Capture capture = importCapture(beach, folder_ / "capture", {.downscale = 8});
   const Partition partition = partitionCapture(capture, {.blocks = {false, 2, 2}, .enough = {3, 4096}});
 
   // The flight was 40 m above take-off; the beach is not flat.
@@ -87,9 +80,9 @@ TEST_F(PartitionOfRealData, BrightonBeachIsAGeoreferencedFieldUnderAFlight) {
 }
 
 TEST_F(PartitionOfRealData, FoxIsOneSquareAmongCameras) {
-  const auto fox = sharedData("fox");
-  if (!fox) GTEST_SKIP() << "TESSERA_SHARED_DATA/fox is not there";
-  const Capture capture = importCapture(*fox, folder_ / "capture", {.downscale = 8});
+  SKIP_WITHOUT_SHARED_DATA("fox");
+  const fs::path fox = sharedData("fox");
+  const Capture capture = importCapture(fox, folder_ / "capture", {.downscale = 8});
   const Partition partition = partitionCapture(capture, {.blocks = {false, 1, 1}});
   EXPECT_FALSE(partition.region.looksAtGround);
   EXPECT_EQ(partition.region.rectangle.width, partition.region.rectangle.depth);

@@ -46,7 +46,7 @@ int main(int argc, char** argv) {
   CLI::App app(
       "tessera turns photographs of a large place into a neural scene.\n"
       "  photos -import-> capture -train-> model -bake-> scene\n"
-      "  model or scene -eval, render-> numbers, pictures\n"
+      "  model or scene -eval, render-> numbers, images\n"
       "  scene -serve-> browser, model or scene -view-> window");
   app.name("tessera");
   app.require_subcommand(1);

@@ -30,7 +30,7 @@ class WarningRenderer final : public ViewRenderer {
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override {
     RenderedView view = renderer_->render(camera, worldFromCamera, opaqueDepth);
     if (renderer_->choice().refused > 0 && !std::exchange(warned_, true)) {
-      warn("{}: views do not fit into {:.4g} MiB at their finest level and are drawn coarser; raise --memory-mib",
+      warn("{}: views do not fit into {:.4g} MiB at their finest level and are rendered coarser; raise --memory-mib",
            folder_.string(), static_cast<double>(budgetBytes_) / 1048576);
     }
     return view;

@@ -25,7 +25,7 @@ std::string optionName(const BakeParameter& parameter) {
 CLI::Validator makeMultipleValidator(int64_t unit) {
   return CLI::Validator(
       [unit](const std::string& text) {
-        return std::stoll(text) % unit == 0 ? "" : fmt::format("{} is no multiple of {}", text, unit);
+        return std::stoll(text) % unit == 0 ? "" : fmt::format("{} is not a multiple of {}", text, unit);
       },
       fmt::format("a multiple of {}", unit));
 }

@@ -32,7 +32,7 @@ void addEvalVerb(CLI::App& app) {
   verb->add_option("--report", flags->report, "write a self-contained report.html here; default MODEL/report.html");
   verb->add_option("--images", flags->images, "write each rendering and its error map as PNG into this folder");
   verb->add_option("--lpips", flags->lpips, "LPIPS weights (safetensors)");
-  verb->add_option("--lod", flags->level, "of a scene: the finest level of detail to draw")
+  verb->add_option("--lod", flags->level, "of a scene: the finest level of detail to render")
       ->capture_default_str()
       ->check(CLI::Range(0, 64));
   verb->add_option("--memory-mib", flags->memoryMiB,

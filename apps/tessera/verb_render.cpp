@@ -22,15 +22,15 @@ struct RenderFlags {
 void addRenderVerb(CLI::App& app) {
   auto flags = std::make_shared<RenderFlags>();
   CLI::App* verb =
-      app.add_subcommand("render", "pictures of a model or scene: PNGs into a folder, or an .mp4 through ffmpeg");
+      app.add_subcommand("render", "images of a model or scene: PNGs into a folder, or an .mp4 through ffmpeg");
   verb->footer(
       "Examples:\n  tessera render fox.model frames/ --views fox.capture\n"
       "  tessera render fox.model flight.mp4 --path camera_path.json --size 1280x720");
   verb->add_option("model", flags->model, "model or scene folder")->required();
   verb->add_option("out", flags->out, "folder for PNGs, or a file ending in .mp4")->required();
-  CLI::Option* views = verb->add_option("--views", flags->views, "draw the views of this capture");
+  CLI::Option* views = verb->add_option("--views", flags->views, "render the views of this capture");
   CLI::Option* path =
-      verb->add_option("--path", flags->path, "draw along this nerfstudio camera path")->excludes(views);
+      verb->add_option("--path", flags->path, "render along this nerfstudio camera path")->excludes(views);
   verb->add_option("--dataparser-transforms", flags->dataparserTransforms,
                    "dataparser_transforms.json of the nerfstudio run whose viewer wrote the path; default: the one "
                    "beside the path, if there is one")
@@ -38,8 +38,8 @@ void addRenderVerb(CLI::App& app) {
   verb->add_option("--split", flags->split, "which photos' views")
       ->capture_default_str()
       ->check(CLI::IsMember({"test", "validation", "train", "all"}));
-  verb->add_option("--size", flags->size, "picture size, as 1280x720; default: the camera's own");
-  verb->add_option("--lod", flags->level, "of a scene: the finest level of detail to draw")
+  verb->add_option("--size", flags->size, "image size, as 1280x720; default: the camera's own");
+  verb->add_option("--lod", flags->level, "of a scene: the finest level of detail to render")
       ->capture_default_str()
       ->check(CLI::Range(0, 64));
   verb->add_option("--memory-mib", flags->memoryMiB,

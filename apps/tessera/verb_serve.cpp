@@ -60,7 +60,7 @@ void requireScene(const fs::path& path) {
 std::string portError(const std::string& text) {
   int port = 0;
   const bool isPort = CLI::detail::lexical_cast(text, port) && port >= 0 && port <= 65535;
-  return isPort ? "" : fmt::format("'{}' is no port: they are whole numbers from 0 to 65535", text);
+  return isPort ? "" : fmt::format("'{}' is not a port: they are whole numbers from 0 to 65535", text);
 }
 
 // A scene or a world, as it is served beside the viewer.

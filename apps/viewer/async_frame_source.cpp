@@ -165,7 +165,7 @@ std::optional<Vec3d> AsyncFrameSource::placeAt(double right, double down) {
 FrameSource::Facts AsyncFrameSource::facts() const {
   const std::lock_guard lock(mutex_);
   Facts facts = facts_;
-  facts.emplace_back("Picture", fmt::format("{} x {}", view_.view.colour.width, view_.view.colour.height));
+  facts.emplace_back("Image", fmt::format("{} x {}", view_.view.colour.width, view_.view.colour.height));
   return facts;
 }
 

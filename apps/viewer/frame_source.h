@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "render/vulkan/gpu_picture.h"
+#include "render/vulkan/gpu_frame.h"
 #include "scene/camera.h"
 
 namespace tessera {

@@ -36,7 +36,7 @@ FrameSource::Facts GpuFrameSource::facts() const {
   constexpr double kMiB = 1048576;
   Facts facts = {
       {"Drawn by", renderer_->device()},
-      {"Picture", fmt::format("{} x {}", camera_.width, camera_.height)},
+      {"Image", fmt::format("{} x {}", camera_.width, camera_.height)},
       {"Contents drawn", fmt::format("{}", state.drawn)},
       {"In memory", fmt::format("{:.1f} of {:.0f} MiB", static_cast<double>(state.cache.bytes) / kMiB,
                                 static_cast<double>(state.budgetBytes) / kMiB)},

@@ -60,7 +60,7 @@ PanelAction showPanel(const std::string& title, Navigation& navigation, const st
     ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthStretch);
     if (state.milliseconds > 0) {
       factRow("Moving",
-              fmt::format("{:.1f} pictures a second, {:.1f} ms", 1000 / state.milliseconds, state.milliseconds));
+              fmt::format("{:.1f} frames per second, {:.1f} ms", 1000 / state.milliseconds, state.milliseconds));
     }
     for (const auto& [name, value] : facts) factRow(name, value);
     factRow("All there is", state.isComplete ? "shown" : "not shown yet");

@@ -19,7 +19,7 @@ Error failed(const std::string& what, const std::string& remedy) {
 Window::Window(const std::string& title, int width, int height) {
   if (!glfwInit()) {
     throw failed("no screen",
-                 "run it in a desktop session; elsewhere tessera render makes pictures, tessera serve shows scenes");
+                 "run it in a desktop session; elsewhere tessera render writes images, tessera serve shows scenes");
   }
   glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
   glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);

@@ -213,7 +213,7 @@ void requireAllowedValue(std::string_view name, int value, const ConfigBounds& b
                 fmt::format("use one of {}", fmt::join(bounds.sizes, ", ")));
   }
   if (value % bounds.divisor != 0) {
-    throw Error(fmt::format("--set {}={}", name, value), "", fmt::format("is no multiple of {}", bounds.divisor),
+    throw Error(fmt::format("--set {}={}", name, value), "", fmt::format("is not a multiple of {}", bounds.divisor),
                 fmt::format("use {}={}", name, (value + bounds.rounding) / bounds.divisor * bounds.divisor));
   }
 }

@@ -48,11 +48,11 @@ void blockPath(const BlockSpace& space, const Triple<double>& origin, const Trip
   near = std::max<double>(near, space.near);
   const BlockSpace::Range box = space.rangeInBox(origin, direction, near);
   const Ray ray{origin, direction};
-  const bool own = space.backgroundBlock == BackgroundBlock::own;
+  const bool own = space.backgroundBlock == BackgroundBlockMode::own;
   if (!box.empty()) near = box.near;
   // The distance up to which cells own the ray.
-  double walled = own || space.backgroundBlock == BackgroundBlock::none ? box.far : BlockSpace::kFarthest;
-  if (box.empty() && space.backgroundBlock != BackgroundBlock::border) walled = near;
+  double walled = own || space.backgroundBlock == BackgroundBlockMode::none ? box.far : BlockSpace::kFarthest;
+  if (box.empty() && space.backgroundBlock != BackgroundBlockMode::border) walled = near;
   std::vector<double> walls;
   for (int axis : {0, 1}) {
     const int cells = static_cast<int>(axis == 0 ? space.columns : space.rows);

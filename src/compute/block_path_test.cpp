@@ -28,16 +28,17 @@ struct RandomRay {
   }
 };
 
-constexpr BackgroundBlock kBackgroundBlocks[] = {BackgroundBlock::none, BackgroundBlock::border, BackgroundBlock::own};
+constexpr BackgroundBlockMode kBackgroundBlocks[] = {BackgroundBlockMode::none, BackgroundBlockMode::border,
+                                                     BackgroundBlockMode::own};
 
-BlockSpace spaceWith(BackgroundBlock backgroundBlock) {
+BlockSpace spaceWith(BackgroundBlockMode backgroundBlock) {
   return {.columns = 4, .rows = 3, .bottom = -0.4f, .top = 0.7f, .near = 0.1f, .backgroundBlock = backgroundBlock};
 }
 
 TEST(BlockPath, MapsEachPointToItsBlockAndItsPositionInTheDomain) {
   const RandomStream random(1, 2);
   std::vector<BlockPiece> pieces;
-  for (const BackgroundBlock backgroundBlock : kBackgroundBlocks) {
+  for (const BackgroundBlockMode backgroundBlock : kBackgroundBlocks) {
     const BlockSpace space = spaceWith(backgroundBlock);
     for (uint64_t number = 0; number < 2000; ++number) {
       const RandomRay ray(random, number);
@@ -64,13 +65,13 @@ TEST(BlockPath, MapsEachPointToItsBlockAndItsPositionInTheDomain) {
 TEST(BlockPath, CoversTheWholeRayUpToItsFarthestDistance) {
   const RandomStream random(3, 4);
   std::vector<BlockPiece> pieces;
-  for (const BackgroundBlock backgroundBlock : {BackgroundBlock::none, BackgroundBlock::own}) {
+  for (const BackgroundBlockMode backgroundBlock : {BackgroundBlockMode::none, BackgroundBlockMode::own}) {
     const BlockSpace space = spaceWith(backgroundBlock);
     for (uint64_t number = 0; number < 2000; ++number) {
       const RandomRay ray(random, number);
       blockPath(space, ray.origin, ray.direction, 0.5, pieces);
       const BlockSpace::Range box = space.rangeInBox(ray.origin, ray.direction, 0.5);
-      const bool own = backgroundBlock == BackgroundBlock::own;
+      const bool own = backgroundBlock == BackgroundBlockMode::own;
       if (box.empty() && !own) {
         EXPECT_TRUE(pieces.empty());
         continue;
@@ -89,7 +90,7 @@ TEST(BlockPath, CoversTheWholeRayUpToItsFarthestDistance) {
 
 TEST(BlockPath, IsEmptyForDirectionZero) {
   std::vector<BlockPiece> pieces(3);
-  blockPath(spaceWith(BackgroundBlock::own), {0, 0, 0}, {0, 0, 0}, 0, pieces);
+  blockPath(spaceWith(BackgroundBlockMode::own), {0, 0, 0}, {0, 0, 0}, 0, pieces);
   EXPECT_TRUE(pieces.empty());
 }
 

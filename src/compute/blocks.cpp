@@ -29,7 +29,7 @@ BlockSpace::Placement BlockSpace::placement(uint32_t block) const {
   place.centre[0] = static_cast<float>(2 * i + 1) - static_cast<float>(columns);
   place.centre[1] = static_cast<float>(2 * j + 1) - static_cast<float>(rows);
   const bool atBorder = i == 0 || j == 0 || i + 1 == columns || j + 1 == rows;
-  place.contracted = backgroundBlock == BackgroundBlock::border && atBorder;
+  place.contracted = backgroundBlock == BackgroundBlockMode::border && atBorder;
   return place;
 }
 
@@ -46,7 +46,7 @@ BlockSpace::Box BlockSpace::owned(uint32_t block) const {
     if (j + 1 == rows) box.high[1] = kFar;
     box.low[2] = -kFar;
     box.high[2] = kFar;
-  } else if (backgroundBlock == BackgroundBlock::border) {
+  } else if (backgroundBlock == BackgroundBlockMode::border) {
     // Rays continue behind the box, and the block was trained up to the ends of its domain.
     box.low[2] = -1;
     box.high[2] = 1;
@@ -73,19 +73,19 @@ BlockSpace::Range BlockSpace::rangeInBox(const std::array<double, 3>& origin, co
 
 uint32_t BlockSpace::blockAt(double x, double y, double z) const {
   const bool inBox = std::abs(x) <= columns && std::abs(y) <= rows && z >= bottom && z <= top;
-  if (backgroundBlock == BackgroundBlock::own && !inBox) return cells();
+  if (backgroundBlock == BackgroundBlockMode::own && !inBox) return cells();
   return clampedCell(x, columns) + columns * clampedCell(y, rows);
 }
 
 double BlockSpace::distanceAt(double s, double near, double far) const {
-  if (backgroundBlock == BackgroundBlock::none) return near + s * (far - near);
+  if (backgroundBlock == BackgroundBlockMode::none) return near + s * (far - near);
   if (s <= kBoxShare) return near + s / kBoxShare * (far - near);
   const double u = (s - kBoxShare) / (1 - kBoxShare);
   return 1 / ((1 - u) / far + u / kFarthest);
 }
 
 double BlockSpace::shareAt(double t, double near, double far) const {
-  if (backgroundBlock == BackgroundBlock::none) return (t - near) / (far - near);
+  if (backgroundBlock == BackgroundBlockMode::none) return (t - near) / (far - near);
   if (t <= far) return kBoxShare * ((t - near) / (far - near));
   return kBoxShare + (1 - kBoxShare) * ((1 / far - 1 / t) / (1 / far - 1 / kFarthest));
 }

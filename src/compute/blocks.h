@@ -13,7 +13,7 @@ namespace tessera {
 //   border   the blocks at the border are contracted and own the half-strips and quadrants outside (the paper)
 //   own      one additional, contracted block owns it, so that the other blocks use their whole resolution for the
 //            region. It is visible only behind the region: rays begin where they enter the box
-enum class BackgroundBlock { none, border, own };
+enum class BackgroundBlockMode { none, border, own };
 
 // The grid of blocks, in scene units: half the edge of a block is 1, and the origin is the centre of the grid. The box
 // is [-columns, columns] × [-rows, rows] × [bottom, top]. Cell (i, j) has index i + columns · j and covers x in
@@ -22,11 +22,11 @@ struct BlockSpace {
   uint32_t columns = 1, rows = 1;
   float bottom = -1, top = 1;  // in [-1,1]
   float near = 0.05f;          // minimum distance of samples from the camera
-  BackgroundBlock backgroundBlock = BackgroundBlock::own;
+  BackgroundBlockMode backgroundBlock = BackgroundBlockMode::own;
 
   uint32_t cells() const { return columns * rows; }
   uint32_t blocks() const {
-    return cells() + (backgroundBlock == BackgroundBlock::own ? 1 : 0);
+    return cells() + (backgroundBlock == BackgroundBlockMode::own ? 1 : 0);
   }  // the background block is the last
 
   // Local coordinates are q = (x - centre) / scale per axis. A cell has scale 1 and the centre (2i + 1 - columns,
@@ -54,8 +54,8 @@ struct BlockSpace {
   };
   Range rangeInBox(const std::array<double, 3>& origin, const std::array<double, 3>& direction, double near) const;
 
-  // The block that owns a point: the cell of x and y, clamped to the grid; with BackgroundBlock::own, the background
-  // block for every point outside the box.
+  // The block that owns a point: the cell of x and y, clamped to the grid; with BackgroundBlockMode::own, the
+  // background block for every point outside the box.
   uint32_t blockAt(double x, double y, double z) const;
 
   // Maps s in [0,1] to the distance t along a ray that lies in the box for [near, far]. Unless backgroundBlock is none,
@@ -89,9 +89,9 @@ TESSERA_OPERATION(EnterScene);
 
 // Turns the intervals between fences into samples at their middles (in t). Rows are written from `firstRow` on, ray by
 // ray, front to back. With `split`, intervals are cut where the ray passes from one block to another: at every distance
-// where its x or y lies on an inner cell wall and, with BackgroundBlock::own, where it leaves the box (range[1]), if
-// that lies strictly inside an interval (in s). No sample then straddles two blocks, and the consecutive samples of a
-// ray in one block form a segment. A sample belongs to the block of its middle. Positions are in [0,1]³ over the
+// where its x or y lies on an inner cell wall and, with BackgroundBlockMode::own, where it leaves the box (range[1]),
+// if that lies strictly inside an interval (in s). No sample then straddles two blocks, and the consecutive samples of
+// a ray in one block form a segment. A sample belongs to the block of its middle. Positions are in [0,1]³ over the
 // block's domain; a sample outside the domain of a bounded block (above or below an inner cell of a grid whose border
 // is contracted) keeps its row with step 0 and a clamped position. Intervals are cut off at `farOfRay`: steps shrink,
 // to 0 beyond it, but middles are not moved. Computed in double. A ray with direction zero is not cut, and its steps
@@ -130,12 +130,12 @@ struct BlockSamples {
   Slice<uint32_t> groupOfSegment, rayOfSegment;
 
   uint32_t maxCuts() const {
-    return space.columns + space.rows - 2 + (space.backgroundBlock == BackgroundBlock::own ? 1 : 0);
+    return space.columns + space.rows - 2 + (space.backgroundBlock == BackgroundBlockMode::own ? 1 : 0);
   }
   uint32_t maxSamples(uint32_t rayCount) const { return rayCount * (intervals + (split ? maxCuts() : 0)); }
-  // BackgroundBlock::own may add one segment: rounding can leave a short first interval in front of the box.
+  // BackgroundBlockMode::own may add one segment: rounding can leave a short first interval in front of the box.
   uint32_t maxSegments(uint32_t rayCount) const {
-    return rayCount * (maxCuts() + 1 + (space.backgroundBlock == BackgroundBlock::own ? 1 : 0));
+    return rayCount * (maxCuts() + 1 + (space.backgroundBlock == BackgroundBlockMode::own ? 1 : 0));
   }
 };
 TESSERA_OPERATION(BlockSamples);

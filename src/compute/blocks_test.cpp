@@ -16,13 +16,13 @@
 namespace tessera::device_test {
 namespace {
 
-BlockSpace makeSpace(uint32_t columns, uint32_t rows, BackgroundBlock backgroundBlock) {
+BlockSpace makeSpace(uint32_t columns, uint32_t rows, BackgroundBlockMode backgroundBlock) {
   return {.columns = columns, .rows = rows, .bottom = -0.4f, .top = 0.6f, .backgroundBlock = backgroundBlock};
 }
 
-const BlockSpace kSpaces[] = {makeSpace(1, 1, BackgroundBlock::none),   makeSpace(3, 2, BackgroundBlock::none),
-                              makeSpace(4, 3, BackgroundBlock::border), makeSpace(1, 1, BackgroundBlock::own),
-                              makeSpace(3, 2, BackgroundBlock::own),    makeSpace(2, 5, BackgroundBlock::own)};
+const BlockSpace kSpaces[] = {makeSpace(1, 1, BackgroundBlockMode::none),   makeSpace(3, 2, BackgroundBlockMode::none),
+                              makeSpace(4, 3, BackgroundBlockMode::border), makeSpace(1, 1, BackgroundBlockMode::own),
+                              makeSpace(3, 2, BackgroundBlockMode::own),    makeSpace(2, 5, BackgroundBlockMode::own)};
 
 std::string spaceName(const BlockSpace& space) {
   constexpr const char* kNames[] = {"none", "border", "own"};
@@ -52,7 +52,7 @@ TEST(BlockSpace, GivesEveryPointToTheOneBlockThatOwnsIt) {
       const uint32_t block = space.blockAt(x, y, z);
       ASSERT_LT(block, space.blocks());
       met.insert(block);
-      if (space.backgroundBlock == BackgroundBlock::own && !isInBox(space, x, y, z)) {
+      if (space.backgroundBlock == BackgroundBlockMode::own && !isInBox(space, x, y, z)) {
         EXPECT_EQ(block, space.cells());
       } else {
         EXPECT_EQ(static_cast<int>(block), grid.cellAt(Vec2d(x, y))) << spaceName(space) << ": " << x << ' ' << y;
@@ -69,7 +69,8 @@ TEST(BlockSpace, GivesEveryPointToTheOneBlockThatOwnsIt) {
 }
 
 TEST(BlockSpace, ContractsTheBorderOrTheBackgroundBlockAlone) {
-  const BlockSpace border = makeSpace(4, 3, BackgroundBlock::border), own = makeSpace(4, 3, BackgroundBlock::own);
+  const BlockSpace border = makeSpace(4, 3, BackgroundBlockMode::border),
+                   own = makeSpace(4, 3, BackgroundBlockMode::own);
   for (uint32_t block = 0; block < 12; ++block) {
     EXPECT_EQ(border.placement(block).contracted, block != 5 && block != 6) << block;
     EXPECT_FALSE(own.placement(block).contracted);
@@ -83,7 +84,8 @@ TEST(BlockSpace, ContractsTheBorderOrTheBackgroundBlockAlone) {
 }
 
 TEST(BlockSpace, MeasuresTheBoxEvenlyAndTheRestInReciprocals) {
-  const BlockSpace open = makeSpace(3, 2, BackgroundBlock::own), closed = makeSpace(3, 2, BackgroundBlock::none);
+  const BlockSpace open = makeSpace(3, 2, BackgroundBlockMode::own),
+                   closed = makeSpace(3, 2, BackgroundBlockMode::none);
   EXPECT_EQ(closed.distanceAt(0.5, 2, 6), 4);
   EXPECT_EQ(open.distanceAt(0, 2, 6), 2);
   EXPECT_EQ(open.distanceAt(0.375, 2, 6), 4);
@@ -226,7 +228,7 @@ TEST_P(BlockSampling, EntersAndLeavesTheBoxWhereTheRangeEnds) {
       if (meets || isInside((near + far) / 2)) continue;
       const Triple<double> o = s.at(r, 0);
       EXPECT_EQ(s.range[2 * r], space.near);
-      EXPECT_NEAR(far - near, space.backgroundBlock == BackgroundBlock::none ? 0 : 1 + std::hypot(o[0], o[1], o[2]),
+      EXPECT_NEAR(far - near, space.backgroundBlock == BackgroundBlockMode::none ? 0 : 1 + std::hypot(o[0], o[1], o[2]),
                   1e-5);
     }
     EXPECT_GT(through, 30);
@@ -241,7 +243,7 @@ TEST_P(BlockSampling, LetsNoSampleStraddleBlocksAndMissesNothingOfTheRange) {
       double sum = 0, shares = 0;
       const double near = s.range[2 * r], far = s.range[2 * r + 1], length = far - near;
       for (uint32_t i = s.firstSample[r]; i < s.firstSample[r + 1]; ++i) {
-        if (space.backgroundBlock == BackgroundBlock::none || s.middles[i] < 0.75f) sum += s.steps[i];
+        if (space.backgroundBlock == BackgroundBlockMode::none || s.middles[i] < 0.75f) sum += s.steps[i];
         shares += s.widths[i];
         const auto [from, to] = s.sampleEnds(r, i);
         if (to - from < 1e-4) continue;  // too short to be resolved in float
@@ -252,7 +254,7 @@ TEST_P(BlockSampling, LetsNoSampleStraddleBlocksAndMissesNothingOfTheRange) {
       }
       EXPECT_NEAR(shares, 1, 1e-5);
       // An interval of the contracted border may extend across the end of the box, where it is not cut.
-      if (space.backgroundBlock != BackgroundBlock::border) {
+      if (space.backgroundBlock != BackgroundBlockMode::border) {
         EXPECT_NEAR(sum, length, 1e-4) << spaceName(space) << ", ray " << r;
       }
     }
@@ -280,7 +282,7 @@ TEST_P(BlockSampling, CutsOnlyAtWallsAndExactlyThere) {
           const double end = cut.distances[i] + 0.5 * cut.steps[i];
           EXPECT_NEAR(t, end, 1e-4);
         }
-        double apart = space.backgroundBlock == BackgroundBlock::own ? std::abs(s - 0.75) : 1;
+        double apart = space.backgroundBlock == BackgroundBlockMode::own ? std::abs(s - 0.75) : 1;
         for (int axis : {0, 1}) {
           const int cells = static_cast<int>(axis == 0 ? space.columns : space.rows);
           for (int wall = 2 - cells; wall < cells; wall += 2)
@@ -355,10 +357,10 @@ TEST_P(BlockSampling, PutsPositionsIntoTheDomainOfTheBlockOfTheMiddle) {
           EXPECT_NEAR(texel, 2 * place.halfDomain() / 128, 1e-4 * texel);
         }
       }
-    if (space.backgroundBlock == BackgroundBlock::own) {
+    if (space.backgroundBlock == BackgroundBlockMode::own) {
       EXPECT_EQ(outside, 0);
     }
-    if (space.backgroundBlock == BackgroundBlock::border) {
+    if (space.backgroundBlock == BackgroundBlockMode::border) {
       EXPECT_GT(outside, 0) << "no ray over an inner cell";
     }
   }

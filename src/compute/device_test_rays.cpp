@@ -262,15 +262,18 @@ OperationTests makeTests<GatherRows>() {
   tests.noGradient = "it moves what will be computed again";
   struct Shape {
     uint32_t columns;
-    Layout layout;
+    Layout input, output;
   };
-  for (const Shape& shape :
-       {Shape{1, Layout::plain}, Shape{3, Layout::plain}, Shape{16, Layout::strided}, Shape{8, Layout::grouped}})
+  for (const Shape& shape : {Shape{1, Layout::plain, Layout::plain}, Shape{3, Layout::plain, Layout::plain},
+                             Shape{16, Layout::strided, Layout::strided}, Shape{16, Layout::plain, Layout::strided},
+                             Shape{8, Layout::grouped, Layout::grouped}})
     for (const Size& size : kSizes)
-      tests.cases.push_back({fmt::format("{} columns, rows {}", shape.columns, toString(size)), [=](Stage& stage) {
+      tests.cases.push_back({fmt::format("{} columns{}, rows {}", shape.columns,
+                                         shape.input != shape.output ? " to other strides" : "", toString(size)),
+                             [=](Stage& stage) {
                                const uint32_t sources = 200;
                                // Arbitrary bits, because integers are moved too and can look like NaN or denormals.
-                               Matrix<float> input = stage.randomMatrix(sources, shape.columns, shape.layout, -1, 1);
+                               Matrix<float> input = stage.randomMatrix(sources, shape.columns, shape.input, -1, 1);
                                std::vector<uint32_t> bits(input.data.count);
                                for (uint32_t& word : bits) word = stage.random.bits() >> stage.random.below(32);
                                stage.device.writeBytes(*input.data.memory, input.data.first * sizeof(float),
@@ -279,7 +282,7 @@ OperationTests makeTests<GatherRows>() {
                                a.rows = stage.count(size);
                                a.source = stage.input(stage.random.wordsBelow(size.capacity, sources));
                                a.input = input;
-                               a.output = stage.outputMatrix("output", size.capacity, shape.columns, shape.layout, 0);
+                               a.output = stage.outputMatrix("output", size.capacity, shape.columns, shape.output, 0);
                                stage.device.run(a);
                              }});
   return tests;

@@ -88,16 +88,16 @@ ImageF withMaskedPixelsFrom(ImageF image, const ImageF& other, const ImageU8& ma
   return image;
 }
 
-class Judge {
+class ViewEvaluator {
  public:
-  explicit Judge(const EvaluateOptions& options)
+  explicit ViewEvaluator(const EvaluateOptions& options)
       : options_(options), pool_(options.threads), pictures_(options.imagesDir) {
     if (!options.lpipsWeights.empty()) lpips_.emplace(options.lpipsWeights);
   }
 
   std::string lpipsNet() const { return lpips_ ? lpips_->net() : std::string(); }
 
-  void judge(const ImageF& photo, const ImageF& rendered, const ImageU8* mask, ViewResult& result) {
+  void compare(const ImageF& photo, const ImageF& rendered, const ImageU8* mask, ViewResult& result) {
     result.psnr = tessera::psnr(rendered, photo, mask);
     result.ssim = tessera::ssim(rendered, photo, mask);
     if (lpips_ && std::min(photo.width, photo.height) >= lpips_->smallestSide()) {
@@ -131,9 +131,9 @@ class Judge {
     if (options_.fitExposure) {
       std::optional<ImageU8> halfMask;
       if (mask) halfMask = rightHalf(*mask);
-      judge(rightHalf(target), rightHalf(rendered), halfMask ? &*halfMask : nullptr, result);
+      compare(rightHalf(target), rightHalf(rendered), halfMask ? &*halfMask : nullptr, result);
     } else {
-      judge(target, rendered, maskPointer, result);
+      compare(target, rendered, maskPointer, result);
     }
     if (measured) result.depth = depthError(view.depth, view.opacity, *measured, maskPointer);
     if (!options_.imagesDir.empty()) writePictures(photo.name, target, rendered);
@@ -204,15 +204,15 @@ EvaluationReport evaluate(ViewRenderer& renderer, const Capture& capture, const 
     throw Error(capture.root.string(), "", fmt::format("no photo is in the split \"{}\"", splitName(options.split)),
                 "import with --holdout every:8, or choose another --split");
   }
-  Judge judge(options);
+  ViewEvaluator evaluator(options);
   EvaluationReport report;
   report.split = options.split;
   report.fitExposure = options.fitExposure;
-  report.lpipsNet = judge.lpipsNet();
+  report.lpipsNet = evaluator.lpipsNet();
   report.device = renderer.device();
   for (const int index : indices) {
     const Photo& photo = capture.photos[static_cast<size_t>(index)];
-    report.views.push_back(judge.view(renderer, photo, capture.cameras[static_cast<size_t>(photo.camera)]));
+    report.views.push_back(evaluator.view(renderer, photo, capture.cameras[static_cast<size_t>(photo.camera)]));
   }
   summarise(report);
   return report;

@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/testing/shared_data.h"
 #include "eval/psnr.h"
 #include "eval/testing/fake_capture.h"
 
@@ -190,14 +190,13 @@ TEST(Evaluate, WritesEveryDocumentedKeyAsJson) {
 }
 
 TEST(Evaluate, ReportsLpipsWithWeights) {
-  const char* shared = std::getenv("TESSERA_SHARED_DATA");
-  if (shared == nullptr) GTEST_SKIP() << "TESSERA_SHARED_DATA is not set: evaluation with LPIPS weights is not tested";
+  SKIP_WITHOUT_SHARED_DATA("lpips");
   FakeCapture fake("evaluate_lpips");
   const ImageU8 photo = fakePhoto(64, 48, 1);
   fake.add("a", photo);
   FakeRenderer renderer({toFloat(fakePhoto(64, 48, 2))});
   EvaluateOptions options;
-  options.lpipsWeights = fs::path(shared) / "lpips" / "squeeze.safetensors";
+  options.lpipsWeights = sharedData("lpips") / "squeeze.safetensors";
   const EvaluationReport report = evaluate(renderer, fake.capture, options);
   ASSERT_TRUE(report.lpips);
   EXPECT_GT(*report.lpips, 0.05);

@@ -3,13 +3,13 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <cstdlib>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/image_io.h"
 #include "base/random.h"
+#include "base/testing/shared_data.h"
 
 namespace tessera {
 namespace {
@@ -67,9 +67,8 @@ TEST(FeatureNetwork, PoolsWithAndWithoutThePartialLastWindow) {
 class LpipsReference : public testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
-    const char* shared = std::getenv("TESSERA_SHARED_DATA");
-    if (shared == nullptr) GTEST_SKIP() << "TESSERA_SHARED_DATA is not set: LPIPS is not compared with its reference";
-    folder_ = fs::path(shared) / "lpips";
+    SKIP_WITHOUT_SHARED_DATA("lpips");
+    folder_ = sharedData("lpips");
   }
 
   fs::path folder_;

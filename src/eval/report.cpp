@@ -81,7 +81,7 @@ std::string summary(const EvaluationReport& report) {
   html += "</div>\n";
   html += fmt::format(
       "<p class=\"quiet\" style=\"margin-top:.9rem\">Exposure: {}. PSNR compares the unrounded rendering "
-      "with the photo's bytes; SSIM uses 11×11 Gaussian windows that lie wholly inside the picture.</p>\n",
+      "with the photo's bytes; SSIM uses 11×11 Gaussian windows that lie wholly inside the image.</p>\n",
       escapedHtml(exposureName(report.fitExposure)));
   return html;
 }
@@ -192,7 +192,7 @@ std::string ReportBuilder::html(const EvaluationReport& report) const {
   html += bars(report);
   html += table(report, order);
   html +=
-      "<h2>Pictures</h2>\n<p class=\"quiet\" style=\"margin-bottom:.8rem\">Click a picture to enlarge it and again to "
+      "<h2>Images</h2>\n<p class=\"quiet\" style=\"margin-bottom:.8rem\">Click an image to enlarge it and again to "
       "return.</p>\n";
   for (const size_t i : order) {
     const ViewResult& view = report.views[i];

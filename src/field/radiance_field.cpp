@@ -4,13 +4,9 @@
 #include "field/initial_values.h"
 
 namespace tessera {
-namespace {
-
-constexpr int kGeometryFeatures = 16;
-
-}  // namespace
 
 RadianceFieldShape makeRadianceFieldShape(const HashGridOptions& grid, int width, int densityHidden, int colourHidden) {
+  constexpr int kGeometryFeatures = RadianceField::kGeometryFeatures;
   RadianceFieldShape shape{HashGrid(grid), {}, {}, 4};
   shape.density.inputs = static_cast<int>(shape.grid.columns());
   shape.density.width = width;
@@ -24,8 +20,12 @@ RadianceFieldShape makeRadianceFieldShape(const HashGridOptions& grid, int width
   return shape;
 }
 
-size_t multiplyAccumulates(const RadianceFieldShape& shape) {
-  return 8 * shape.grid.columns() + countMultiplyAccumulates(shape.density) + countMultiplyAccumulates(shape.colour);
+size_t densityMultiplyAccumulates(const RadianceFieldShape& shape) {
+  return 8 * shape.grid.columns() + countMultiplyAccumulates(shape.density);
+}
+
+size_t colourMultiplyAccumulates(const RadianceFieldShape& shape) {
+  return countMultiplyAccumulates(shape.colour);
 }
 
 RadianceField::RadianceField(Device& device, RadianceFieldShape shape, uint64_t seed)
@@ -54,26 +54,39 @@ Matrix<float> RadianceField::byLevel(Array<float>& encodings) {
                                 Matrix<float>::rowsOfPlane(capacity_));
 }
 
-void RadianceField::logDensity(Count samples, Slice<const float> positions, Matrix<float> logDensities) {
+Matrix<float> RadianceField::geometry() {
+  return Matrix<float>(colourInput_, shape_.colour.inputs).columnRange(0, kGeometryFeatures);
+}
+
+void RadianceField::density(Count samples, Slice<const float> positions, Matrix<float> geometry) {
   CHECK(samples.capacity <= capacity_);
   device_.run(HashGridForward{shape_.grid, samples, positions, table_.values, byLevel(encoded_)});
-  device_.run(MlpForward{shape_.density, samples, byLevel(encoded_), density_.values, logDensities, {}});
+  device_.run(MlpForward{shape_.density, samples, byLevel(encoded_), density_.values, geometry, {}});
 }
 
 RadianceField::Output RadianceField::forward(Count samples, Slice<const float> positions, Slice<const float> directions,
                                              Slice<const uint32_t> rayOfSample, bool forBackward) {
   CHECK(samples.capacity <= capacity_);
-  const Matrix<float> input(colourInput_, shape_.colour.inputs);
-  const Matrix<float> geometry = input.columnRange(0, kGeometryFeatures);
-  const uint32_t harmonics = shape_.harmonicsDegree * shape_.harmonicsDegree;
   device_.run(HashGridForward{shape_.grid, samples, positions, table_.values, byLevel(encoded_)});
-  device_.run(MlpForward{shape_.density, samples, byLevel(encoded_), density_.values, geometry,
+  device_.run(MlpForward{shape_.density, samples, byLevel(encoded_), density_.values, geometry(),
                          forBackward ? densityActivations_.all() : Slice<float>()});
+  return colour(samples, directions, rayOfSample, forBackward ? colourActivations_.all() : Slice<float>());
+}
+
+RadianceField::Output RadianceField::colour(Count samples, Slice<const float> directions,
+                                            Slice<const uint32_t> rayOfSample) {
+  return colour(samples, directions, rayOfSample, {});
+}
+
+RadianceField::Output RadianceField::colour(Count samples, Slice<const float> directions,
+                                            Slice<const uint32_t> rayOfSample, Slice<float> activations) {
+  CHECK(samples.capacity <= capacity_);
+  const Matrix<float> input(colourInput_, shape_.colour.inputs);
+  const uint32_t harmonics = shape_.harmonicsDegree * shape_.harmonicsDegree;
   device_.run(SphericalHarmonicsForward{shape_.harmonicsDegree, samples, directions, rayOfSample,
                                         input.columnRange(kGeometryFeatures, harmonics)});
-  device_.run(MlpForward{shape_.colour, samples, input, colour_.values, Matrix<float>(colours_, 3),
-                         forBackward ? colourActivations_.all() : Slice<float>()});
-  return {geometry.columnRange(0, 1), Matrix<float>(colours_, 3)};
+  device_.run(MlpForward{shape_.colour, samples, input, colour_.values, Matrix<float>(colours_, 3), activations});
+  return {geometry().columnRange(0, 1), Matrix<float>(colours_, 3)};
 }
 
 void RadianceField::backward(Count samples, Slice<const float> positions, Slice<const float> logDensityGradients,

@@ -16,13 +16,17 @@ struct RadianceFieldShape {
   int harmonicsDegree = 4;
 };
 
-// Returns the multiply-accumulate operations of one sample: hash grid interpolation and both networks.
-size_t multiplyAccumulates(const RadianceFieldShape& shape);
+// Returns the multiply-accumulate operations of the density of one sample: interpolation in the hash grid, and network.
+size_t densityMultiplyAccumulates(const RadianceFieldShape& shape);
+// Returns those of its colour: the view-dependent network.
+size_t colourMultiplyAccumulates(const RadianceFieldShape& shape);
 
 RadianceFieldShape makeRadianceFieldShape(const HashGridOptions& grid, int width, int densityHidden, int colourHidden);
 
 class RadianceField {
  public:
+  static constexpr int kGeometryFeatures = 16;  // outputs of the density network
+
   // Initialises the table to U(±1e-4) and the networks to Xavier uniform on padded sizes, as a function of `seed`
   // alone. Keeps a reference to `device`.
   RadianceField(Device& device, RadianceFieldShape shape, uint64_t seed);
@@ -31,9 +35,9 @@ class RadianceField {
   void reserve(uint32_t samples);
   uint32_t capacity() const { return capacity_; }
 
-  // Evaluates the density alone, without activations for backward. positions: [capacity][3] in [0,1]; logDensities: 1
-  // column.
-  void logDensity(Count samples, Slice<const float> positions, Matrix<float> logDensities);
+  // Evaluates the density network alone, without activations for backward. positions: [capacity][3] in [0,1];
+  // `geometry`: receives the network's first outputs, as many as it has columns; the first is the log density.
+  void density(Count samples, Slice<const float> positions, Matrix<float> geometry);
 
   struct Output {
     Matrix<const float> logDensity;  // 1 column
@@ -43,6 +47,10 @@ class RadianceField {
   // The output is valid until the next call.
   Output forward(Count samples, Slice<const float> positions, Slice<const float> directions,
                  Slice<const uint32_t> rayOfSample, bool forBackward);
+
+  // Evaluates the colour network alone, of samples whose outputs of the density network are in geometry().
+  Output colour(Count samples, Slice<const float> directions, Slice<const uint32_t> rayOfSample);
+  Matrix<float> geometry();  // [capacity][kGeometryFeatures], a part of wider rows
 
   // Call it after `forward` with the same samples. Adds to the gradients of the parameter groups.
   void backward(Count samples, Slice<const float> positions, Slice<const float> logDensityGradients,
@@ -55,6 +63,8 @@ class RadianceField {
 
  private:
   Matrix<float> byLevel(Array<float>& encodings);
+  Output colour(Count samples, Slice<const float> directions, Slice<const uint32_t> rayOfSample,
+                Slice<float> activations);
 
   Device& device_;
   RadianceFieldShape shape_;

@@ -164,7 +164,7 @@ TEST(RadianceField, EvaluatesTheSameDensityAloneAndWithColour) {
   Scene scene("cpu");
   const std::vector<float> together = scene.forward().logDensity;
   Array<float> alone = scene.device->array<float>(kCapacity);
-  scene.field.logDensity(scene.samples(), scene.positions, Matrix<float>(alone, 1));
+  scene.field.density(scene.samples(), scene.positions, Matrix<float>(alone, 1));
   const std::vector<float> values = scene.device->read(alone.all());
   for (uint32_t i = 0; i < kSamples; ++i) EXPECT_EQ(values[i], together[i]);
 }

@@ -19,7 +19,7 @@ constexpr Meaning kMeanings[] = {
      "install mesa-vulkan-drivers or the driver of the GPU, or use --device cpu"},
     {VK_ERROR_INITIALIZATION_FAILED, "the driver could not start", "see what vulkaninfo says, or reinstall the driver"},
     {VK_ERROR_OUT_OF_DEVICE_MEMORY, "out of device memory",
-     "train with fewer samples a step or smaller tables, draw with a lower --memory-mib, or use --device cpu"},
+     "train with fewer samples a step or smaller tables, render with a lower --memory-mib, or use --device cpu"},
     {VK_ERROR_OUT_OF_HOST_MEMORY, "out of memory", "close other programs, or lower --memory-mib"},
     {VK_ERROR_TOO_MANY_OBJECTS, "too many allocations", "use fewer blocks at a time"},
     {VK_ERROR_DEVICE_LOST, "the device stopped answering",

@@ -275,7 +275,7 @@ void GpuContext::createDevice(bool presents) {
 #endif
   if (presents) {
     if (!hasDeviceExtension(physicalDevice_, VK_KHR_SWAPCHAIN_EXTENSION_NAME)) {
-      throw Error(name_, "", "it cannot show pictures in windows", "choose another device (tessera info devices)");
+      throw Error(name_, "", "it cannot present images in windows", "choose another device (tessera info devices)");
     }
     extensions.push_back(VK_KHR_SWAPCHAIN_EXTENSION_NAME);
   }

@@ -89,7 +89,8 @@ void GpuImage::requireSupport(const VkImageCreateInfo& info) const {
   const VkResult result = vkGetPhysicalDeviceImageFormatProperties(
       context_->physicalDevice(), info.format, info.imageType, info.tiling, info.usage, info.flags, &properties);
   if (result == VK_ERROR_FORMAT_NOT_SUPPORTED) {
-    throw Error(context_->name(), "", fmt::format("it does not draw into images of the format {}", formatName(format_)),
+    throw Error(context_->name(), "",
+                fmt::format("it does not render into images of the format {}", formatName(format_)),
                 "choose another device (tessera info devices)");
   }
   checkVulkan(result, "vkGetPhysicalDeviceImageFormatProperties");
@@ -98,13 +99,13 @@ void GpuImage::requireSupport(const VkImageCreateInfo& info) const {
     throw Error(context_->name(), "",
                 fmt::format("an image of {} x {} pixels is larger than its largest, {} x {}", size_.width, size_.height,
                             maximum.width, maximum.height),
-                "draw smaller pictures, or choose another device (tessera info devices)");
+                "render smaller images, or choose another device (tessera info devices)");
   }
   if (copiedBytes() > properties.maxResourceSize) {
     throw Error(context_->name(), "",
                 fmt::format("an image of {} MiB is larger than its largest, {} MiB", copiedBytes() >> 20,
                             properties.maxResourceSize >> 20),
-                "draw smaller pictures, or choose another device (tessera info devices)");
+                "render smaller images, or choose another device (tessera info devices)");
   }
 }
 

@@ -83,7 +83,7 @@ void requireColours(const GpuContext& context, size_t count) {
   context.requireGraphics();
   if (count > context.limits().maxColorAttachments) {
     throw Error(context.name(), "",
-                fmt::format("{} colour images are drawn at once, and it draws {} at most", count,
+                fmt::format("{} colour images are rendered at once, and it renders {} at most", count,
                             context.limits().maxColorAttachments),
                 "choose another device (tessera info devices)");
   }
@@ -96,9 +96,9 @@ void requireSize(const GpuContext& context, ImageSize size) {
   const uint32_t height = std::min(limits.maxFramebufferHeight, limits.maxViewportDimensions[1]);
   if (size.width <= width && size.height <= height) return;
   throw Error(context.name(), "",
-              fmt::format("{} x {} pixels are drawn at once, and it draws {} x {} at most", size.width, size.height,
-                          width, height),
-              "draw smaller pictures, or choose another device (tessera info devices)");
+              fmt::format("{} x {} pixels are rendered at once, and it renders {} x {} at most", size.width,
+                          size.height, width, height),
+              "render smaller images, or choose another device (tessera info devices)");
 }
 
 }  // namespace

@@ -283,7 +283,7 @@ TEST_F(GpuRenderPassTest, RejectsTooManyColourImages) {
   std::vector<ColourAttachment> colours;
   for (uint32_t i = 0; i <= maximum; ++i) colours.push_back({.image = makeImage(ImageFormat::rgba8)});
   const std::string reason = catchErrorReason([&] { GpuRenderPass(context_, colours); });
-  EXPECT_EQ(reason, std::to_string(maximum + 1) + " colour images are drawn at once, and it draws " +
+  EXPECT_EQ(reason, std::to_string(maximum + 1) + " colour images are rendered at once, and it renders " +
                         std::to_string(maximum) + " at most");
 }
 

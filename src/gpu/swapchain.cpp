@@ -15,7 +15,7 @@ GpuSwapchain::GpuSwapchain(std::shared_ptr<const GpuContext> context, VkSurfaceK
   try {
     checkVulkan(result, "vkGetPhysicalDeviceSurfaceSupportKHR");
     if (!shows) {
-      throw Error(context_->name(), "", "it cannot show pictures on this screen",
+      throw Error(context_->name(), "", "it cannot present images on this screen",
                   "choose the device that the screen is connected to (tessera info devices)");
     }
     chooseFormat();

@@ -20,7 +20,7 @@ std::optional<Camera> checkedCamera(LensModel lens, uint64_t width, uint64_t hei
                                     std::string& reason) {
   Camera camera;
   if (width == 0 || height == 0 || width > kMaxSide || height > kMaxSide) {
-    reason = fmt::format("a picture of {} x {} pixels cannot be", width, height);
+    reason = fmt::format("an image of {} x {} pixels cannot be", width, height);
     return std::nullopt;
   }
   if (parameters.size() != static_cast<size_t>(lensParameterCount(lens))) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "base/testing/shared_data.h"
 #include "import/testing/test_support.h"
 
 namespace tessera {
@@ -146,9 +147,9 @@ TEST(Exif, RejectsImplausibleFixes) {
 }
 
 TEST(Exif, ReadsARealDrone) {
-  const auto beach = sharedData("brighton_beach");
-  if (!beach) GTEST_SKIP() << "TESSERA_SHARED_DATA/brighton_beach is not there";
-  const PhotoTags tags = decodePhotoTags(readFile(*beach / "images/DJI_0018.JPG"));
+  SKIP_WITHOUT_SHARED_DATA("brighton_beach");
+  const fs::path beach = sharedData("brighton_beach");
+  const PhotoTags tags = decodePhotoTags(readFile(beach / "images/DJI_0018.JPG"));
   ASSERT_TRUE(tags.gps.has_value());
   EXPECT_EQ(tags.gps->altitude, 198.31);
   EXPECT_EQ(tags.gps->relativeAltitude, 39.80);

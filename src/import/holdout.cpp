@@ -54,7 +54,7 @@ void holdOutList(const fs::path& file, std::vector<Photo>& photos) {
     throw Error(file.string(), "", "names no photo of this capture (" + abbreviateList(strangers) + ")",
                 "write one photo's name a line");
   }
-  warn("{}: {} of {} names are no photos of this capture ({})", file.string(), strangers.size(), names.size(),
+  warn("{}: {} of {} names are not photos of this capture ({})", file.string(), strangers.size(), names.size(),
        abbreviateList(strangers));
 }
 

@@ -81,7 +81,7 @@ TEST_F(Import, HoldsOutEveryEighthInNaturalOrder) {
   writeFileAtomically(folder_ / "list", std::string_view("# held out\n3.png\nimages/7.png\r\n12\nnone.png\n"));
   EXPECT_EQ(run({.holdout = "list:" + (folder_ / "list").string()}).photosIn(Split::test),
             (std::vector<int>{3, 7, 12}));
-  EXPECT_TRUE(logged("1 of 4 names are no photos of this capture (none.png)")) << log_;
+  EXPECT_TRUE(logged("1 of 4 names are not photos of this capture (none.png)")) << log_;
   writeFileAtomically(folder_ / "list", std::string_view("./images/4.png\n.//5.png\n"));
   EXPECT_EQ(run({.holdout = "list:" + (folder_ / "list").string()}).photosIn(Split::test), (std::vector<int>{4, 5}));
   EXPECT_FALSE(logged("no photo")) << log_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "base/testing/shared_data.h"
 #include "import/capture_reader.h"
 #include "import/importer.h"
 #include "import/testing/test_support.h"
@@ -11,11 +12,11 @@ namespace tessera {
 namespace {
 
 TEST(RealData, ImportsFoxWithoutItsSeventeenMissingPhotos) {
-  const auto fox = sharedData("fox");
-  if (!fox) GTEST_SKIP() << "TESSERA_SHARED_DATA/fox is not there";
+  SKIP_WITHOUT_SHARED_DATA("fox");
+  const fs::path fox = sharedData("fox");
   const TemporaryFolder folder;
   testing::internal::CaptureStderr();
-  const Capture capture = importCapture(*fox, folder / "out", {.downscale = 8});
+  const Capture capture = importCapture(fox, folder / "out", {.downscale = 8});
   const std::string warnings = testing::internal::GetCapturedStderr();
   EXPECT_NE(warnings.find("17 photos named by the source are not on disk"), std::string::npos) << warnings;
   EXPECT_EQ(warnings.find("unknown"), std::string::npos) << warnings;
@@ -36,10 +37,10 @@ TEST(RealData, ImportsFoxWithoutItsSeventeenMissingPhotos) {
 }
 
 TEST(RealData, BrightonBeachLooksDownFromAFlightAndItsPointsProjectBack) {
-  const auto beach = sharedData("brighton_beach");
-  if (!beach) GTEST_SKIP() << "TESSERA_SHARED_DATA/brighton_beach is not there";
+  SKIP_WITHOUT_SHARED_DATA("brighton_beach");
+  const fs::path beach = sharedData("brighton_beach");
   const TemporaryFolder folder;
-  const Capture capture = importCapture(*beach, folder / "out", {.downscale = 8});
+  const Capture capture = importCapture(beach, folder / "out", {.downscale = 8});
   ASSERT_EQ(capture.photos.size(), 18u);
   EXPECT_EQ(capture.photosIn(Split::test).size(), 3u);
   ASSERT_TRUE(capture.geo.has_value());
@@ -76,10 +77,10 @@ TEST(RealData, BrightonBeachLooksDownFromAFlightAndItsPointsProjectBack) {
 }
 
 TEST(RealData, ReadsBrightonBeachBackExactly) {
-  const auto beach = sharedData("brighton_beach");
-  if (!beach) GTEST_SKIP() << "TESSERA_SHARED_DATA/brighton_beach is not there";
+  SKIP_WITHOUT_SHARED_DATA("brighton_beach");
+  const fs::path beach = sharedData("brighton_beach");
   const TemporaryFolder folder;
-  const Capture written = importCapture(*beach, folder / "out", {.downscale = 16});
+  const Capture written = importCapture(beach, folder / "out", {.downscale = 16});
   const Capture read = readCapture(folder / "out");
   ASSERT_EQ(read.photos.size(), written.photos.size());
   EXPECT_EQ(read.cameras, written.cameras);

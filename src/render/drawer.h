@@ -40,7 +40,7 @@ struct SceneView {
   const ResidentContent* pinned = nullptr;
 };
 
-struct PictureRequest {
+struct ViewRequest {
   const Camera& camera;
   const Pose& worldFromCamera;
   const ImageF* opaqueDepth = nullptr;  // see ViewRenderer::render
@@ -79,7 +79,7 @@ class CpuDrawer {
   virtual std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const { return content; }
 
   // Renders a view (see ViewRenderer::render). The image does not depend on the number of threads. Adds to `counts`.
-  virtual RenderedView draw(const SceneView<Content>& view, const PictureRequest& request, const DrawSettings& settings,
+  virtual RenderedView draw(const SceneView<Content>& view, const ViewRequest& request, const DrawSettings& settings,
                             ThreadPool& pool, DrawCounts& counts) = 0;
 
   // Modes of empty-space skipping, the fastest first; "none", if present, visits every step. All modes produce the same

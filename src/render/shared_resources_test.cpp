@@ -48,7 +48,7 @@ class SharingCodec final : public ContentCodec {
                                                  std::string& reason, const ContentLimits&) const override {
     EXPECT_EQ(resource.mimeType, "application/octet-stream");
     if (bytes.size() != kTableBytes / 1000) {
-      reason = "is no table";
+      reason = "is not a table";
       return nullptr;
     }
     ++decoded;
@@ -137,7 +137,7 @@ TEST_F(SharedResources, AreRefusedByTheNameOfTheirFile) {
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.subject(), file.string());
-    EXPECT_EQ(error.reason(), "is no table");
+    EXPECT_EQ(error.reason(), "is not a table");
     EXPECT_FALSE(error.remedy().empty());
   }
 }
@@ -176,7 +176,7 @@ TEST_F(SharedResources, RequireOrderedContentsUnlessTheirCodecLetsThemOverlap) {
   };
   EXPECT_EQ(why(), "tile 1: contents of a tile have no order");
   codec_.mayOverlap = true;
-  EXPECT_EQ(why(), "tile 1: has several contents, which the format allows and this renderer does not draw");
+  EXPECT_EQ(why(), "tile 1: has several contents, which the format allows and this renderer does not support");
 }
 
 }  // namespace

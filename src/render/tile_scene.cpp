@@ -83,7 +83,7 @@ TileScene openTileScene(const fs::path& folder, const ContentCodec& codec) {
   if (tileset.representation != codec.representation()) {
     throw Error((folder / "tileset.json").string(), "",
                 fmt::format("is a scene of {}, not of {}", tileset.representation, codec.representation()),
-                "draw it with a viewer that knows it");
+                "open it with a viewer that supports it");
   }
   if (const auto tile = tileWithoutOrder(tileset); tile && !codec.contentsMayOverlap()) {
     throw Error((folder / "tileset.json").string(), fmt::format("tile {}", *tile), "contents of a tile have no order",
@@ -111,7 +111,7 @@ TileScene openTileScene(const fs::path& folder, const ContentCodec& codec) {
     for (const TileContent& content : tile.contents) {
       if (!content.backgroundBlock && node.hasContent) {
         throw Error((folder / "tileset.json").string(), fmt::format("tile {}", i),
-                    "has several contents, which the format allows and this renderer does not draw",
+                    "has several contents, which the format allows and this renderer does not support",
                     "give each a tile of its own");
       }
       node.hasContent |= !content.backgroundBlock;

@@ -95,7 +95,7 @@ std::string pathInCapture(const fs::path& root, const fs::path& path) {
   const fs::path relative = fs::weakly_canonical(fs::absolute(path)).lexically_relative(realRoot);
   if (relative.empty() || *relative.begin() == "..") {
     throw Error(path.string(), "", "lies outside the capture folder " + root.string(),
-                "a capture holds its own pictures: copy or link them into it");
+                "a capture contains its own photos: copy or link them into it");
   }
   return relative.generic_string();
 }
@@ -190,7 +190,7 @@ void writeCapture(const Capture& capture) {
   try {
     text = json.dump(1) + "\n";
   } catch (const Json::type_error&) {
-    throw Error((capture.root / "transforms.json").string(), "", "a picture's name is not UTF-8", "rename it");
+    throw Error((capture.root / "transforms.json").string(), "", "a photo's name is not UTF-8", "rename it");
   }
   writeFileAtomically(capture.root / "transforms.json", text);
 }

@@ -251,7 +251,7 @@ HttpServer::HttpServer(const StaticSite& site, const HttpServerSettings& setting
     throw Error(place, "", reason, remedy);
   };
   const char* another = "name one with --address, as 127.0.0.1, or 0.0.0.0 for all that it has";
-  if (error) refuse("is no IP address", another);
+  if (error) refuse("is not an IP address", another);
   tcp::acceptor& acceptor = state_->acceptor;
   const tcp::endpoint endpoint(address, settings.port);
   acceptor.open(endpoint.protocol(), error);
@@ -261,7 +261,7 @@ HttpServer::HttpServer(const StaticSite& site, const HttpServerSettings& setting
   if (error == asio::error::address_in_use) {
     refuse("is in use by another program", "choose another --port, or 0 for one that is free");
   }
-  if (error == beast::errc::address_not_available) refuse("is no address of this machine", another);
+  if (error == beast::errc::address_not_available) refuse("is not an address of this machine", another);
   if (error) refuse("cannot be bound: " + error.message(), "choose another --port or --address");
 }
 

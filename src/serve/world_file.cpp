@@ -68,7 +68,7 @@ json readWorld(const fs::path& file) {
   } catch (const json::parse_error& error) {
     throw Error(file.string(), placeIn(text, error.byte), "is not JSON", kCorrect);
   } catch (const json::out_of_range&) {
-    throw Error(file.string(), "", "holds a number that is too large", kCorrect);
+    throw Error(file.string(), "", "contains a number that is too large", kCorrect);
   }
   if (fieldOrNull(world, "kind") != "tessera world") {
     throw Error(file.string(), "kind", "is not 'tessera world'",
@@ -119,7 +119,7 @@ bool isPlaced(const json& scene, const fs::path& file, const std::string& place)
   const auto has = [&](const char* key) { return scene.contains(key); };
   require("position", !has("position") || areNumbers(scene["position"], 3), "is not 3 numbers");
   require("rotation", !has("rotation") || areNumbers(scene["rotation"], 4), "is not 4 numbers");
-  require("scale", !has("scale") || scene["scale"].is_number(), "is no number");
+  require("scale", !has("scale") || scene["scale"].is_number(), "is not a number");
   return has("position") || has("rotation") || has("scale");
 }
 
@@ -132,7 +132,7 @@ std::vector<std::pair<std::string, const json*>> listScenes(const json& world, c
   };
   if (version != 2) refuse("version", "is not 2, nor 1", "correct it, or use a newer tessera");
   if (!list.is_array() || list.empty()) {
-    refuse("scenes", list.is_array() ? "is empty" : "is missing, or no list",
+    refuse("scenes", list.is_array() ? "is empty" : "is missing, or not a list",
            R"(name one at least: [{"url": "garden.scene"}])");
   }
   if (list.size() > kMaxScenes) refuse("scenes", fmt::format("are more than {}", kMaxScenes), "keep fewer");
@@ -140,7 +140,7 @@ std::vector<std::pair<std::string, const json*>> listScenes(const json& world, c
   bool hasMain = false;
   for (const json& scene : list) {
     const std::string place = fmt::format("scenes[{}]", scenes.size());
-    if (!scene.is_object()) refuse(place, "is no object", kCorrect);
+    if (!scene.is_object()) refuse(place, "is not an object", kCorrect);
     if (!isPlaced(scene, file, place)) hasMain = true;
     scenes.emplace_back(place, &scene);
   }

@@ -117,7 +117,7 @@ TEST_F(WorldFileTest, ReportsWhereItIsNotJson) {
             reason("line 3, column 30"));
   EXPECT_EQ(said("{\n  \"name\": \"Köln ☀\" 3}"), reason("line 2, column 20")) << "columns are characters, not bytes";
   EXPECT_EQ(said(std::string(100000, '[')), reason("line 1, column 100001"));
-  EXPECT_EQ(said(R"({"position": [1e999]})"), ": holds a number that is too large");
+  EXPECT_EQ(said(R"({"position": [1e999]})"), ": contains a number that is too large");
 }
 
 TEST_F(WorldFileTest, RequiresTheKindAndASupportedVersion) {
@@ -139,11 +139,13 @@ TEST_F(WorldFileTest, RequiresScenesOfWhichOneIsTheMainOne) {
     return said(R"({"kind":"tessera world","version":2,"scenes":)" + scenes + "}");
   };
   const std::string deep = R"({"url":"deep"})";
-  EXPECT_EQ(said(R"({"kind":"tessera world","version":2,"scene":{"url":"deep"}})"), "scenes: is missing, or no list");
-  for (const char* scenes : {"\"deep\"", "null", "{}"}) EXPECT_EQ(ofScenes(scenes), "scenes: is missing, or no list");
+  EXPECT_EQ(said(R"({"kind":"tessera world","version":2,"scene":{"url":"deep"}})"),
+            "scenes: is missing, or not a list");
+  for (const char* scenes : {"\"deep\"", "null", "{}"})
+    EXPECT_EQ(ofScenes(scenes), "scenes: is missing, or not a list");
   EXPECT_EQ(ofScenes("[]"), "scenes: is empty");
   for (const char* scene : {"3", "null", "[]", "\"deep\""}) {
-    EXPECT_EQ(ofScenes("[" + deep + "," + scene + "]"), "scenes[1]: is no object");
+    EXPECT_EQ(ofScenes("[" + deep + "," + scene + "]"), "scenes[1]: is not an object");
   }
   std::string sixteen = deep;
   for (int i = 1; i < 16; ++i) sixteen += "," + deep;
@@ -167,7 +169,7 @@ TEST_F(WorldFileTest, RequiresNumbersForThePlacementOfScenes) {
     EXPECT_EQ(ofPlace(std::string(R"("position":)") + value), "scenes[1].position: is not 3 numbers") << value;
   }
   EXPECT_EQ(ofPlace(R"("rotation":[0,0,1])"), "scenes[1].rotation: is not 4 numbers");
-  EXPECT_EQ(ofPlace(R"("scale":[1,1,1])"), "scenes[1].scale: is no number");
+  EXPECT_EQ(ofPlace(R"("scale":[1,1,1])"), "scenes[1].scale: is not a number");
 }
 
 TEST_F(WorldFileTest, IgnoresEverythingThatServingDoesNotNeed) {

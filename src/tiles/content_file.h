@@ -18,7 +18,7 @@ namespace tessera {
 
 inline constexpr int kContentVersion = 1;
 inline constexpr size_t kMaxContentJson = size_t{8} << 20;  // bytes
-inline constexpr const char* kNoGlb = "is not a binary glTF file of version 2, or is cut short";
+inline constexpr const char* kNoGlb = "is not a binary glTF 2.0 file, or is cut short";
 inline constexpr const char* kWebP = "image/webp";
 inline constexpr const char* kRawBytes = "application/octet-stream";
 

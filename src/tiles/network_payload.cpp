@@ -90,12 +90,13 @@ std::optional<std::string> ruleOfNetwork(const std::vector<DenseLayer>& network,
     width = layer.outputs;
     vectors += networkVectors(layer.inputs, layer.outputs);
     if (layer.weights.size() != size_t{layer.inputs} * layer.outputs || layer.biases.size() != layer.outputs) {
-      return "the network's layers have not the numbers that they need";
+      return "a layer of the network has the wrong number of weights or biases";
     }
-    if (!areFinite(layer.weights) || !areFinite(layer.biases)) return "the network holds a number that is not finite";
+    if (!areFinite(layer.weights) || !areFinite(layer.biases))
+      return "the network contains a number that is not finite";
   }
   if (width != outputs) return "the network does not end in a colour";
-  if (vectors > kMaxNetworkVectors) return "the network is larger than a shader takes";
+  if (vectors > kMaxNetworkVectors) return "the network is too large for a shader";
   return std::nullopt;
 }
 

@@ -104,13 +104,13 @@ TEST(NetworkRule, NamesWhatIsBroken) {
   EXPECT_EQ(broken([](Network&) {}, 4), "the network's layers do not follow one another");
   EXPECT_EQ(broken([](Network& network) { network[1].inputs = 3; }), "the network's layers do not follow one another");
   EXPECT_EQ(broken([](Network& network) { network[1].weights.pop_back(); }),
-            "the network's layers have not the numbers that they need");
+            "a layer of the network has the wrong number of weights or biases");
   EXPECT_EQ(broken([](Network& network) { network[0].biases.push_back(0); }),
-            "the network's layers have not the numbers that they need");
+            "a layer of the network has the wrong number of weights or biases");
   EXPECT_EQ(broken([](Network& network) { network[1].biases[0] = std::numeric_limits<float>::infinity(); }),
-            "the network holds a number that is not finite");
+            "the network contains a number that is not finite");
   EXPECT_EQ(broken([](Network& network) { network[0].weights[5] = std::numeric_limits<float>::quiet_NaN(); }),
-            "the network holds a number that is not finite");
+            "the network contains a number that is not finite");
   EXPECT_EQ(broken([](Network&) {}, 3, 2), "the network does not end in a colour");
 }
 
@@ -120,7 +120,7 @@ TEST(NetworkRule, AllowsNoMoreThanShadersTake) {
     return ruleOfNetwork({layer}, inputs, 256).value_or("");
   };
   EXPECT_EQ(wide(63), "");  // 64 groups of four outputs, each with biases and 63 weights: 4096 vectors
-  EXPECT_EQ(wide(64), "the network is larger than a shader takes");
+  EXPECT_EQ(wide(64), "the network is too large for a shader");
 }
 
 }  // namespace

@@ -143,7 +143,7 @@ TEST_F(TilesetJsonRefusal, RejectsWhatIsNoTileset) {
   refuses("is of version 2; 1 is known", [](json& file) { ours(file)["version"] = 2; });
   refuses("does not say which version", [](json& file) { ours(file)["version"] = "1"; });
   refuses("does not name its representation", [](json& file) { ours(file)["representation"] = 7; });
-  refuses("the representation's name is none", [](json& file) { ours(file)["representation"] = "Two words"; });
+  refuses("the representation's name is not valid", [](json& file) { ours(file)["representation"] = "Two words"; });
 }
 
 TEST_F(TilesetJsonRefusal, RejectsInvalidNumbers) {
@@ -167,13 +167,13 @@ TEST_F(TilesetJsonRefusal, RejectsInconsistentTrees) {
   refuses("tile 0: is not refined", [](json& file) { file["root"]["refine"] = "ADD"; });
   refuses("tile 2: is not refined", [](json& file) { file["root"]["children"][1]["refine"] = "ADD"; });
   refuses("tile 1: only the root", [](json& file) { file["root"]["children"][0]["transform"] = json::array(); });
-  refuses("tile 0: its children are no list", [](json& file) { file["root"]["children"] = 5; });
+  refuses("tile 0: its children are not a list", [](json& file) { file["root"]["children"] = 5; });
   refuses("tile 0: has both", [](json& file) { file["root"]["content"] = file["root"]["contents"][0]; });
   refuses("tile 0: a content has no uri", [](json& file) { file["root"]["contents"][0].erase("uri"); });
   refuses("tile 0: the key surround is called background_block now",
           [](json& file) { ours(file["root"]["contents"][0])["surround"] = true; });
   refuses("tile 0: a content's resources", [](json& file) { ours(file["root"]["contents"][0])["resources"] = {-1}; });
-  refuses("tile 0: its children leave", [](json& file) { file["root"]["children"].erase(0); });
+  refuses("tile 0: its children do not cover", [](json& file) { file["root"]["children"].erase(0); });
   refuses("tile 1: its boundingVolume",
           [](json& file) { file["root"]["children"][0]["boundingVolume"]["box"][0] = 9; });
   refuses("tile 1: its boundingVolume", [](json& file) { file["root"]["children"][0].erase("boundingVolume"); });

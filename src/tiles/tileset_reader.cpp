@@ -171,7 +171,7 @@ class TilesetReader {
       Tile tile;
       if (!readTile(*source, tile, depth == 0, place) || !readContents(*source, tile, place)) return false;
       if (const json* children = getField(*source, "children")) {
-        if (!children->is_array()) return fail(place + "its children are no list");
+        if (!children->is_array()) return fail(place + "its children are not a list");
         if (children->size() > limits_.tiles - known) return fail("has too many tiles");
         for (const json& child : *children) {
           tile.children.push_back(known++);
@@ -229,17 +229,17 @@ class TilesetReader {
     content.bytes = getByteCount(*ours);
     content.cells = tile.cells;
     if (content.backgroundBlock && !readBackgroundBlock(*ours, content))
-      return fail(place + "a background block's level or error is none");
+      return fail(place + "a background block's level or geometric error is not valid");
     if (getField(*ours, "cells")) {
       const auto cells = readCells(*ours);
-      if (!cells) return fail(place + "a content's cells are none");
+      if (!cells) return fail(place + "a content's cells are malformed");
       content.cells = *cells;
     }
     if (const json* resources = getField(*ours, "resources")) {
-      if (!resources->is_array()) return fail(place + "a content's resources are no list");
+      if (!resources->is_array()) return fail(place + "a content's resources are not a list of numbers");
       for (const json& resource : *resources) {
         const auto index = unsignedFrom(resource, UINT32_MAX);
-        if (!index) return fail(place + "a content's resources are no list of numbers");
+        if (!index) return fail(place + "a content's resources are not a list of numbers");
         content.resources.push_back(static_cast<uint32_t>(*index));
       }
     }

@@ -71,9 +71,9 @@ bool lieOnGrid(const std::vector<CellRange>& ranges) {
 }
 
 Broken ruleOfFrames(const Tileset& tileset) {
-  if (!isRotation(tileset.worldFromScene.rotation)) return "worldFromScene's rotation is none";
+  if (!isRotation(tileset.worldFromScene.rotation)) return "worldFromScene's rotation is not a rotation";
   if (!isScale(tileset.worldFromScene.scale)) return "worldFromScene's scale is not above zero";
-  if (!isPlace(tileset.worldFromScene.translation)) return "worldFromScene's translation is no place";
+  if (!isPlace(tileset.worldFromScene.translation)) return "worldFromScene's translation is out of bounds";
   if (!isAffine(tileset.sourceFromWorld)) return "sourceFromWorld is not affine";
   if (tileset.columns < 1 || tileset.columns > kMaxCells || tileset.rows < 1 || tileset.rows > kMaxCells) {
     return "the grid's columns or rows are out of bounds";
@@ -83,13 +83,13 @@ Broken ruleOfFrames(const Tileset& tileset) {
   }
   if (!(tileset.near >= 0 && tileset.near <= 1)) return "near is not between 0 and 1";
   for (const float channel : tileset.background) {
-    if (!(channel >= 0 && channel <= 1)) return "the background is no colour";
+    if (!(channel >= 0 && channel <= 1)) return "the background is not a colour";
   }
   if (const auto& geo = tileset.georeference) {
     if (!(std::abs(geo->latitude) <= 90 && std::abs(geo->longitude) <= 180 && std::abs(geo->altitude) <= 1e5)) {
-      return "the georeference is no place on the Earth";
+      return "the georeference is not a place on the Earth";
     }
-    if (!isSimilarity(geo->enuFromWorld)) return "the georeference's enuFromWorld is no similarity";
+    if (!isSimilarity(geo->enuFromWorld)) return "the georeference's enuFromWorld is not a similarity";
   }
   return std::nullopt;
 }
@@ -114,10 +114,11 @@ Broken ruleOfBackgroundBlocks(const Tileset& tileset) {
   std::map<uint32_t, double> errors;
   for (const TileContent& content : tileset.root().contents) {
     if (!content.backgroundBlock) continue;
-    if (!content.box.contains(tileset.box())) return "the background block's box does not hold the scene's";
+    if (!content.box.contains(tileset.box())) return "the background block's box does not contain the scene's";
     if (content.level >= tileset.levels) return "a background block's level is not below the scene's number of levels";
-    if (!isError(content.geometricError)) return "a background block's geometric error is no length";
-    if (!errors.emplace(content.level, content.geometricError).second) return "two background blocks are of one level";
+    if (!isError(content.geometricError)) return "a background block's geometric error is not a length";
+    if (!errors.emplace(content.level, content.geometricError).second)
+      return "two background blocks have the same level";
   }
   double finer = 0;
   for (const auto& [level, error] : errors) {
@@ -130,8 +131,8 @@ Broken ruleOfBackgroundBlocks(const Tileset& tileset) {
 Broken ruleOfContents(const Tileset& tileset, const Tile& tile, bool isRoot) {
   for (const TileContent& content : tile.contents) {
     if (!isPlainUri(content.uri) || !content.uri.ends_with(".glb"))
-      return "a content's uri is not a plain one of a .glb";
-    if (!isBox(content.box)) return "a content's box is none";
+      return "a content's uri is not the plain name of a .glb file";
+    if (!isBox(content.box)) return "a content's box is empty or out of bounds";
     std::set<uint32_t> resources;
     for (const uint32_t resource : content.resources) {
       if (resource >= tileset.resources.size()) return "a content needs a shared resource that is not listed";
@@ -141,8 +142,9 @@ Broken ruleOfContents(const Tileset& tileset, const Tile& tile, bool isRoot) {
       if (!isRoot) return "a background block is not in the root";
       continue;
     }
-    if (!tile.box.contains(content.box)) return "a content's box leaves its tile's";
-    if (!isRange(content.cells) || !tile.cells.contains(content.cells)) return "a content's cells leave its tile's";
+    if (!tile.box.contains(content.box)) return "a content's box is not within its tile's";
+    if (!isRange(content.cells) || !tile.cells.contains(content.cells))
+      return "a content's cells are not within its tile's";
   }
   return isRoot ? ruleOfBackgroundBlocks(tileset) : std::nullopt;
 }
@@ -162,10 +164,10 @@ bool keepsToCells(const Tileset& tileset, const Tile& tile) {
 
 Broken ruleOfTile(const Tileset& tileset, const Tile& tile) {
   if (tile.level >= tileset.levels) return "its level is not below the scene's number of levels";
-  if (!isRange(tile.cells) || !tileset.allCells().contains(tile.cells)) return "its cells are not of the grid";
-  if (!isBox(tile.box)) return "its box is none";
-  if (!keepsToCells(tileset, tile)) return "its box leaves its cells";
-  if (!isError(tile.geometricError)) return "its geometric error is no length";
+  if (!isRange(tile.cells) || !tileset.allCells().contains(tile.cells)) return "its cells are not within the grid";
+  if (!isBox(tile.box)) return "its box is empty or out of bounds";
+  if (!keepsToCells(tileset, tile)) return "its box is not within its cells";
+  if (!isError(tile.geometricError)) return "its geometric error is not a length";
   return ruleOfContents(tileset, tile, &tile == &tileset.root());
 }
 
@@ -175,14 +177,14 @@ Broken ruleOfChildren(const Tileset& tileset, const Tile& tile) {
   for (const uint32_t index : tile.children) {
     const Tile& child = tileset.tiles[index];
     if (child.level >= tile.level) return "a child is not of a finer level";
-    if (!tile.cells.contains(child.cells)) return "a child's cells leave its own";
-    if (!tile.box.contains(child.box)) return "a child's box leaves its own";
+    if (!tile.cells.contains(child.cells)) return "a child's cells are not within its own";
+    if (!tile.box.contains(child.box)) return "a child's box is not within its own";
     if (child.geometricError > tile.geometricError) return "a child's geometric error is above its own";
     ranges.push_back(child.cells);
     cells += child.cells.cells();
   }
   if (!lieOnGrid(ranges)) return "its children do not lie on a grid";
-  if (!tile.children.empty() && cells != tile.cells.cells()) return "its children leave cells out";
+  if (!tile.children.empty() && cells != tile.cells.cells()) return "its children do not cover its cells";
   return std::nullopt;
 }
 
@@ -213,16 +215,16 @@ std::optional<uint32_t> tileWithoutOrder(const Tileset& tileset) {
 }
 
 std::optional<std::string> validationError(const Tileset& tileset) {
-  if (tileset.tiles.empty()) return "there is no tile";
+  if (tileset.tiles.empty()) return "there are no tiles";
   if (tileset.levels < 1 || tileset.levels > kMaxLevels) return "the number of levels is out of bounds";
-  if (!isName(tileset.representation)) return "the representation's name is none";
+  if (!isName(tileset.representation)) return "the representation's name is not valid";
   if (auto broken = ruleOfFrames(tileset)) return broken;
   if (auto broken = ruleOfResources(tileset)) return broken;
   if (!(tileset.geometricError >= tileset.root().geometricError && tileset.geometricError <= kFarthest)) {
     return "the tileset's geometric error is below its root's";
   }
-  if (!(tileset.root().cells == tileset.allCells())) return "the root does not stand for all cells";
-  if (!isTree(tileset)) return "the tiles are no tree";
+  if (!(tileset.root().cells == tileset.allCells())) return "the root does not cover all cells";
+  if (!isTree(tileset)) return "the tiles are not a tree";
   for (const auto checkRule : {ruleOfTile, ruleOfChildren}) {
     for (size_t i = 0; i < tileset.tiles.size(); ++i) {
       if (const auto broken = checkRule(tileset, tileset.tiles[i])) return fmt::format("tile {}: {}", i, *broken);

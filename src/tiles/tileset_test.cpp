@@ -146,68 +146,71 @@ TEST(Tileset, NamesTheRuleThatIsBroken) {
     spoil(tileset);
     EXPECT_EQ(validationError(tileset).value_or("none"), rule);
   };
-  names("there is no tile", [](Tileset& t) { t.tiles.clear(); });
+  names("there are no tiles", [](Tileset& t) { t.tiles.clear(); });
   names("the number of levels is out of bounds", [](Tileset& t) { t.levels = 65; });
-  names("the representation's name is none", [](Tileset& t) { t.representation.clear(); });
-  names("the representation's name is none", [](Tileset& t) { t.representation = "../volume"; });
-  names("the representation's name is none", [](Tileset& t) { t.representation = std::string(65, 'a'); });
-  names("worldFromScene's rotation is none", [](Tileset& t) { t.worldFromScene.rotation.col(0) *= -1; });
+  names("the representation's name is not valid", [](Tileset& t) { t.representation.clear(); });
+  names("the representation's name is not valid", [](Tileset& t) { t.representation = "../volume"; });
+  names("the representation's name is not valid", [](Tileset& t) { t.representation = std::string(65, 'a'); });
+  names("worldFromScene's rotation is not a rotation", [](Tileset& t) { t.worldFromScene.rotation.col(0) *= -1; });
   names("worldFromScene's scale is not above zero", [](Tileset& t) { t.worldFromScene.scale = 0; });
-  names("worldFromScene's translation is no place", [](Tileset& t) { t.worldFromScene.translation.x() = 1e13; });
+  names("worldFromScene's translation is out of bounds", [](Tileset& t) { t.worldFromScene.translation.x() = 1e13; });
   names("sourceFromWorld is not affine", [](Tileset& t) { t.sourceFromWorld(3, 0) = 1; });
   names("the grid's columns or rows are out of bounds", [](Tileset& t) { t.columns = 0; });
   names("the grid's heights are not within -1 and 1", [](Tileset& t) { t.bottom = t.top; });
   names("near is not between 0 and 1", [](Tileset& t) { t.near = -1; });
-  names("the background is no colour", [](Tileset& t) { t.background[1] = 1.5f; });
-  names("the georeference is no place on the Earth", [](Tileset& t) { t.georeference->latitude = 91; });
-  names("the georeference's enuFromWorld is no similarity",
+  names("the background is not a colour", [](Tileset& t) { t.background[1] = 1.5f; });
+  names("the georeference is not a place on the Earth", [](Tileset& t) { t.georeference->latitude = 91; });
+  names("the georeference's enuFromWorld is not a similarity",
         [](Tileset& t) { t.georeference->enuFromWorld(0, 0) *= 2; });
   names("the uri of a shared resource is not plain", [](Tileset& t) { t.resources[0].uri = "../a"; });
   names("a shared resource is listed twice", [](Tileset& t) { t.resources.push_back(t.resources[0]); });
   names("a shared resource has no mimeType", [](Tileset& t) { t.resources[0].mimeType.clear(); });
   names("the tileset's geometric error is below its root's", [](Tileset& t) { t.geometricError = 0.1; });
-  names("the root does not stand for all cells", [](Tileset& t) { t.tiles[0].cells.end[0] = 2; });
-  names("the tiles are no tree", [](Tileset& t) { t.tiles[1].children = {1}; });
-  names("the tiles are no tree", [](Tileset& t) { t.tiles[1].children = {2}; });
-  names("the tiles are no tree", [](Tileset& t) { t.tiles[0].children.pop_back(); });
-  names("the tiles are no tree", [](Tileset& t) { t.tiles[0].children.push_back(99); });
+  names("the root does not cover all cells", [](Tileset& t) { t.tiles[0].cells.end[0] = 2; });
+  names("the tiles are not a tree", [](Tileset& t) { t.tiles[1].children = {1}; });
+  names("the tiles are not a tree", [](Tileset& t) { t.tiles[1].children = {2}; });
+  names("the tiles are not a tree", [](Tileset& t) { t.tiles[0].children.pop_back(); });
+  names("the tiles are not a tree", [](Tileset& t) { t.tiles[0].children.push_back(99); });
   names("tile 0: its level is not below the scene's number of levels", [](Tileset& t) { t.tiles[0].level = 2; });
-  names("tile 2: its cells are not of the grid", [](Tileset& t) { t.tiles[2].cells.end[0] = 4; });
-  names("tile 1: its box is none", [](Tileset& t) { t.tiles[1].box.low.x() = NAN; });
-  names("tile 1: its box leaves its cells", [](Tileset& t) { t.tiles[1].box.high.x() += 0.1; });
-  names("tile 1: its geometric error is no length", [](Tileset& t) { t.tiles[1].geometricError = -1; });
+  names("tile 2: its cells are not within the grid", [](Tileset& t) { t.tiles[2].cells.end[0] = 4; });
+  names("tile 1: its box is empty or out of bounds", [](Tileset& t) { t.tiles[1].box.low.x() = NAN; });
+  names("tile 1: its box is not within its cells", [](Tileset& t) { t.tiles[1].box.high.x() += 0.1; });
+  names("tile 1: its geometric error is not a length", [](Tileset& t) { t.tiles[1].geometricError = -1; });
   names("tile 0: a child is not of a finer level", [](Tileset& t) { t.tiles[1].level = 1; });
-  names("tile 0: a child's box leaves its own", [](Tileset& t) { t.tiles[1].box.low.z() -= 1; });
+  names("tile 0: a child's box is not within its own", [](Tileset& t) { t.tiles[1].box.low.z() -= 1; });
   names("tile 0: a child's geometric error is above its own", [](Tileset& t) { t.tiles[1].geometricError = 1; });
   names("tile 0: its children do not lie on a grid", [](Tileset& t) { t.tiles[1] = t.tiles[2]; });
   names("tile 0: its children do not lie on a grid", [](Tileset& t) {
     t.tiles[1].cells.end[0] = 2;
     t.tiles[1].box.high.x() = 0;
   });
-  names("tile 0: its children leave cells out", [](Tileset& t) {
+  names("tile 0: its children do not cover its cells", [](Tileset& t) {
     t.tiles[0].children.pop_back();
     t.tiles.pop_back();
   });
-  names("tile 0: a content's uri is not a plain one of a .glb",
+  names("tile 0: a content's uri is not the plain name of a .glb file",
         [](Tileset& t) { t.tiles[0].contents[0].uri = "a.b3dm"; });
-  names("tile 0: a content's box is none", [](Tileset& t) { t.tiles[0].contents[0].box.high.y() = -5; });
-  names("tile 0: a content's box leaves its tile's", [](Tileset& t) { t.tiles[0].contents[0].box.high.y() = 5; });
-  names("tile 1: a content's cells leave its tile's", [](Tileset& t) { t.tiles[1].contents[0].cells.end[0] = 2; });
+  names("tile 0: a content's box is empty or out of bounds",
+        [](Tileset& t) { t.tiles[0].contents[0].box.high.y() = -5; });
+  names("tile 0: a content's box is not within its tile's",
+        [](Tileset& t) { t.tiles[0].contents[0].box.high.y() = 5; });
+  names("tile 1: a content's cells are not within its tile's",
+        [](Tileset& t) { t.tiles[1].contents[0].cells.end[0] = 2; });
   names("tile 0: a content needs a shared resource that is not listed", [](Tileset& t) { t.resources.clear(); });
   names("tile 0: a content needs a shared resource twice", [](Tileset& t) {
     t.tiles[0].contents[0].resources = {0, 0};
   });
   names("tile 1: a background block is not in the root",
         [](Tileset& t) { t.tiles[1].contents[0].backgroundBlock = true; });
-  names("tile 0: two background blocks are of one level",
+  names("tile 0: two background blocks have the same level",
         [](Tileset& t) { t.tiles[0].contents[2].level = t.tiles[0].contents[1].level; });
   names("tile 0: a background block's level is not below the scene's number of levels",
         [](Tileset& t) { t.tiles[0].contents[1].level = 2; });
-  names("tile 0: a background block's geometric error is no length",
+  names("tile 0: a background block's geometric error is not a length",
         [](Tileset& t) { t.tiles[0].contents[1].geometricError = NAN; });
   names("tile 0: a background block's geometric error is below a finer one's",
         [](Tileset& t) { t.tiles[0].contents[1].geometricError = 1; });
-  names("tile 0: the background block's box does not hold the scene's",
+  names("tile 0: the background block's box does not contain the scene's",
         [](Tileset& t) { t.tiles[0].contents[1].box.high.z() = 0; });
 }
 

@@ -12,7 +12,7 @@ SceneFrame makeSceneFrame(const BlockGrid& grid) {
   return frame;
 }
 
-BlockSpace makeBlockSpace(const BlockGrid& grid, double near, BackgroundBlock backgroundBlock) {
+BlockSpace makeBlockSpace(const BlockGrid& grid, double near, BackgroundBlockMode backgroundBlock) {
   BlockSpace space;
   space.columns = static_cast<uint32_t>(grid.columns);
   space.rows = static_cast<uint32_t>(grid.rows);
@@ -29,10 +29,10 @@ void requireOneFileABlock(const fs::path& folder, const ModelManifest& manifest,
               "restore the file or train again");
 }
 
-BackgroundBlock backgroundBlockNamed(const std::string& name) {
-  if (name == "own") return BackgroundBlock::own;
-  if (name == "border") return BackgroundBlock::border;
-  if (name == "none") return BackgroundBlock::none;
+BackgroundBlockMode parseBackgroundBlockMode(const std::string& name) {
+  if (name == "own") return BackgroundBlockMode::own;
+  if (name == "border") return BackgroundBlockMode::border;
+  if (name == "none") return BackgroundBlockMode::none;
   throw Error("--set background_block=" + name, "", "there is no such background block", "use own, border or none");
 }
 

@@ -12,10 +12,10 @@ namespace tessera {
 // all blocks at half the scene's height.
 SceneFrame makeSceneFrame(const BlockGrid& grid);
 // Returns the grid in these scene units. `near`: scene units.
-BlockSpace makeBlockSpace(const BlockGrid& grid, double near, BackgroundBlock backgroundBlock);
+BlockSpace makeBlockSpace(const BlockGrid& grid, double near, BackgroundBlockMode backgroundBlock);
 
 // Returns the value of the setting `background_block`. Throws Error if no value has that name.
-BackgroundBlock backgroundBlockNamed(const std::string& name);
+BackgroundBlockMode parseBackgroundBlockMode(const std::string& name);
 
 // Throws Error if the manifest of the model in `folder` does not name one checkpoint per block.
 void requireOneFileABlock(const fs::path& folder, const ModelManifest& manifest, uint32_t blocks);

@@ -6,10 +6,11 @@
 //   for (uint32_t round = 0; round < rounds.count(); ++round) {
 //     rounds.prepare(march, round);  // ... and further outputs of the march, in rounds.part(array, columns, round)
 //     device.run(march);
-//     ... evaluate the log densities of rounds.marched(round) samples into rounds.logDensities(round)
-//     rounds.lookedUp(round);
+//     ... evaluate the log densities of rounds.marched(round) samples into rounds.logDensities(round), or all that is
+//     stored of a sample into rounds.features(round)
+//     rounds.addOpticalDepths(round);
 //   }
-//   rounds.keepSeen(firstSample, rayOfSample);
+//   rounds.compactVisible(firstSample, rayOfSample);
 //   rounds.gather(array, visible, columns);
 #pragma once
 
@@ -25,7 +26,7 @@ namespace tessera {
 class MarchRounds {
  public:
   // Indices into the counters: visible samples, finished rays, and from kMarched on the samples marched in each round.
-  static constexpr uint32_t kKept = 0, kFinished = 1, kMarched = 2;
+  static constexpr uint32_t kVisible = 0, kFinished = 1, kMarched = 2;
 
   // `maximum`: [rounds], the most samples of a ray that each round marches; few at first, because most rays end early.
   // Keeps a reference to `device`.
@@ -33,8 +34,9 @@ class MarchRounds {
 
   uint32_t count() const { return static_cast<uint32_t>(max_.size()); }
 
-  // Allocates memory for `rays` rays, `samples` samples per round, and `samples` visible samples.
-  void reserve(uint32_t rays, uint32_t samples);
+  // Allocates memory for `rays` rays, `samples` samples per round, and `samples` visible samples. `features`: the
+  // number of values stored for each marched sample, of which the first is its log density.
+  void reserve(uint32_t rays, uint32_t samples, uint32_t features = 1);
   uint32_t sampleCapacity() const { return static_cast<uint32_t>(source_.size()); }
 
   // Starts new rays. `counters`: [kMarched + count()].
@@ -55,8 +57,9 @@ class MarchRounds {
   }
 
   Count marched(uint32_t round) const { return {samples_, counters_.part(kMarched + round, 1)}; }
-  Matrix<float> logDensities(uint32_t round) { return {part(logDensities_, 1, round), 1}; }
-  void lookedUp(uint32_t round);  // adds the densities of this round to the rays' optical depths
+  Matrix<float> features(uint32_t round) { return {part(features_, featureCount_, round), featureCount_}; }
+  Matrix<float> logDensities(uint32_t round) { return features(round).columnRange(0, 1); }
+  void addOpticalDepths(uint32_t round);  // adds the densities of this round to the rays' optical depths
 
   // Returns the part of this round of an array [count()][samples of a round][columns].
   template <class Element>
@@ -65,11 +68,12 @@ class MarchRounds {
   }
 
   // Finds the visible samples. Writes the first one of each ray, [rays + 1], and the ray of each one, [samples].
-  void keepSeen(Slice<uint32_t> firstSample, Slice<uint32_t> rayOfSample);
+  void compactVisible(Slice<uint32_t> firstSample, Slice<uint32_t> rayOfSample);
   // Copies what the marches wrote for the visible samples, from [count()][samples of a round][columns] to
   // [samples][columns].
   void gather(Slice<const float> from, Slice<float> to, uint32_t columns);
   void gatherSteps(Slice<float> to) { gather(steps_, to, 1); }
+  void gatherFeatures(Matrix<float> to);  // `to`: as many columns as features were reserved
 
  private:
   Slice<uint32_t> roundFirstSamples(uint32_t round) {
@@ -86,7 +90,9 @@ class MarchRounds {
 
   Array<uint32_t> nextStep_, source_;
   Array<uint32_t> roundFirst_;  // [count()][rays + 1]
-  Array<float> opticalDepth_, steps_, logDensities_;
+  uint32_t featureCount_ = 1;
+  Array<float> opticalDepth_, steps_;
+  Array<float> features_;  // [count()][samples][featureCount_]
 };
 
 // The counters of MarchRounds, read back from the device.
@@ -96,7 +102,7 @@ struct RoundCounts {
   uint32_t fullest;  // the largest number of samples in any round or of visible ones: all have the same capacity
 
   RoundCounts(std::span<const uint32_t> counters, uint32_t rounds)
-      : visibleSamples(counters[MarchRounds::kKept]), finished(counters[MarchRounds::kFinished]) {
+      : visibleSamples(counters[MarchRounds::kVisible]), finished(counters[MarchRounds::kFinished]) {
     const std::span<const uint32_t> perRound = counters.subspan(MarchRounds::kMarched, rounds);
     marched = std::accumulate(perRound.begin(), perRound.end(), 0u);
     fullest = std::max(visibleSamples, *std::max_element(perRound.begin(), perRound.end()));

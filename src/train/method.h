@@ -66,17 +66,29 @@ std::unique_ptr<MethodSettings> makeSettings([[maybe_unused]] const std::string&
   return std::make_unique<SettingsOf<Config>>();
 }
 
+// Limits a model to what its training photos see, by the rule that limits scenes when they are baked (BakeOptions,
+// HashBakeSettings): a cell is kept if a sample in it exceeds both thresholds in a pixel, or if it is beside such a
+// cell.
+struct CullOptions {
+  double minWeight = 0.005, minAlpha = 0.005;  // of a sample: its weight in the pixel, and its opacity
+  int dilation = 1;                            // number of layers of cells that are kept around those
+};
+
 // A trained model with its renderer.
 class OpenedModel {
  public:
   virtual ~OpenedModel() = default;
   virtual ViewRenderer& renderer() = 0;
-  // The work of its renderer along rays, for methods that count it (Method::countsSamples).
+
+  // The following are implemented by methods that count their work along rays (Method::countsSamples).
   struct RayWork {
-    uint64_t samples = 0;        // evaluated in all images so far
+    // The numbers of densities, and of samples with their colours, that were evaluated so far, cullUnseen included.
+    uint64_t densities = 0, samples = 0;
     float minTransmittance = 0;  // rays end where transmittance falls below it
   };
   virtual RayWork rayWork() const { return {}; }
+  // Limits the renderer to what the training photos of `capture` see. Throws Error if a mask cannot be read.
+  virtual void cullUnseen([[maybe_unused]] const Capture& capture, [[maybe_unused]] const CullOptions& options) {}
 };
 
 // An integer parameter of a method's baker: a flag of `tessera bake`, for models of this method only.

@@ -140,7 +140,7 @@ ModelPlacement ModelFolder::readPlacement() const {
     if (parsed.contains("grid")) {
       placement.grid = blockGridFromJson(parsed["grid"]);
       if (!placement.grid)
-        throw Error(path.string(), "grid", "is no grid of blocks", "restore the file or train again");
+        throw Error(path.string(), "grid", "is not a grid of blocks", "restore the file or train again");
     } else {
       const json& block = parsed.at("blocks").at(0);
       for (int axis = 0; axis < 3; ++axis) {
@@ -203,7 +203,7 @@ BlockGrid readGrid(const fs::path& file, const Capture& capture) {
   if (!parsed.is_object() || !parsed.contains("grid"))
     throw Error(file.string(), "grid", "the file holds no grid of blocks", kRemedy);
   const std::optional<BlockGrid> grid = blockGridFromJson(parsed["grid"]);
-  if (!grid) throw Error(file.string(), "grid", "is no grid of blocks", kRemedy);
+  if (!grid) throw Error(file.string(), "grid", "is not a grid of blocks", kRemedy);
   if (!parsed.contains("source_from_world")) return *grid;
   try {
     if (isSameWorld(capture.sourceFromWorld, sourceFromWorldIn(parsed))) return *grid;

@@ -223,7 +223,7 @@ TEST(ModelFolder, GivesItsGridOnlyToCapturesInTheSameWorld) {
   EXPECT_EQ(readGrid(file, capture).edge, 7) << "it names no world";
   alone["grid"]["edge"] = -7;
   writeFileAtomically(file, alone.dump());
-  EXPECT_TRUE(contains(catchErrorMessage([&] { readGrid(file, capture); }), "is no grid of blocks"));
+  EXPECT_TRUE(contains(catchErrorMessage([&] { readGrid(file, capture); }), "is not a grid of blocks"));
   for (const char* text : {"", "[]", "{}", "no JSON", R"({"blocks": []})"}) {
     writeFileAtomically(file, text);
     EXPECT_TRUE(contains(catchErrorMessage([&] { readGrid(file, capture); }), "holds no grid of blocks")) << text;

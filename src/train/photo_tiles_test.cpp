@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-BlockSpace space(uint32_t columns, uint32_t rows, BackgroundBlock backgroundBlock = BackgroundBlock::own) {
+BlockSpace space(uint32_t columns, uint32_t rows, BackgroundBlockMode backgroundBlock = BackgroundBlockMode::own) {
   BlockSpace blockSpace;
   blockSpace.columns = columns;
   blockSpace.rows = rows;
@@ -48,7 +48,8 @@ std::vector<uint32_t> setAt(const TiledPhotos& photos, uint32_t x, uint32_t y) {
 
 TEST(PhotoTiles, FindTheCellsThatThePointsOfARayLieIn) {
   const RandomStream random(3, 1);
-  for (const BackgroundBlock backgroundBlock : {BackgroundBlock::own, BackgroundBlock::border, BackgroundBlock::none}) {
+  for (const BackgroundBlockMode backgroundBlock :
+       {BackgroundBlockMode::own, BackgroundBlockMode::border, BackgroundBlockMode::none}) {
     const BlockSpace blocks = space(4, 3, backgroundBlock);
     int met = 0;
     for (uint64_t i = 0; i < 300; ++i) {

@@ -5,8 +5,8 @@
 #include <functional>
 #include <span>
 
+#include "train/image_rays.h"
 #include "train/photo_visibility.h"
-#include "train/picture_rays.h"
 
 namespace tessera {
 

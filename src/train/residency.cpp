@@ -144,7 +144,7 @@ Residency::Residency(const BlockSets& sets, const Settings& settings) : settings
   }
 }
 
-Residency::Place Residency::at(int64_t step) const {
+Residency::Position Residency::at(int64_t step) const {
   const int64_t cycle = step / cycleSteps_;
   std::vector<size_t> order(residentSets_.size());
   std::iota(order.begin(), order.end(), size_t{0});

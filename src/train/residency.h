@@ -39,13 +39,13 @@ class Residency {
   // The resident sets of one cycle, in no particular order.
   const std::vector<ResidentSet>& residentSets() const { return residentSets_; }
   int64_t cycleSteps() const { return cycleSteps_; }  // sum of the steps of all resident sets, at least one each
-  struct Place {
+  struct Position {
     size_t residentSet = 0;  // index
     int64_t stepsInto = 0;   // steps since it became resident
   };
   // Returns the resident set at a step, a function of step and seed: each cycle visits the resident sets in another
   // order.
-  Place at(int64_t step) const;
+  Position at(int64_t step) const;
   double unserved() const { return unserved_; }  // share of the total weight
   // Blocks that occur only in sets of more than `resident` blocks.
   const std::vector<uint32_t>& neverServed() const { return neverServed_; }

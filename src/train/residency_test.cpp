@@ -104,9 +104,9 @@ TEST(Residency, VisitsEveryResidentSetOncePerCycleInANewOrder) {
     std::vector<size_t> order;
     std::vector<int64_t> steps(residency.residentSets().size());
     for (int64_t step = cycle * residency.cycleSteps(); step < (cycle + 1) * residency.cycleSteps(); ++step) {
-      const Residency::Place place = residency.at(step);
-      EXPECT_EQ(place.stepsInto, steps[place.residentSet]++);
-      if (order.empty() || order.back() != place.residentSet) order.push_back(place.residentSet);
+      const Residency::Position position = residency.at(step);
+      EXPECT_EQ(position.stepsInto, steps[position.residentSet]++);
+      if (order.empty() || order.back() != position.residentSet) order.push_back(position.residentSet);
     }
     EXPECT_EQ(order.size(), residency.residentSets().size());
     for (size_t i = 0; i < steps.size(); ++i) EXPECT_EQ(steps[i], residency.residentSets()[i].steps);

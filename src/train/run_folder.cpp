@@ -40,7 +40,7 @@ double resolvePhotoBudget(double requestedMiB, const Capture& capture, double ma
 ModelManifest requireManifest(const ModelFolder& folder) {
   const std::optional<ModelManifest> manifest = folder.manifest();
   if (manifest) return *manifest;
-  throw Error(folder.root().string(), "manifest.json", "there is none: this is no trained model",
+  throw Error(folder.root().string(), "manifest.json", "is missing: this is not a trained model",
               "train one with: tessera train CAPTURE " + folder.root().string());
 }
 

@@ -105,7 +105,7 @@ ordered_json makeSelections() {
                        {"right", toJson(pose.rotation.col(0))},
                        {"down", toJson(pose.rotation.col(1))},
                        {"forward", toJson(pose.rotation.col(2))}}},
-                     {"held", resident},
+                     {"resident", resident},
                      {"budget", budget},
                      {"requested", choice.requested},
                      {"refused", choice.refused},

@@ -7,7 +7,7 @@
 namespace tessera::golden {
 
 // Returns {frame: {near, low, high}, tree: {columns, rows, backgroundBlock, tiles}, bytes, resources, bytesOfResources,
-// views: [{camera, held, budget, requested, refused, sharing, cut, backgroundBlock}]}. Lengths are in scene units.
+// views: [{camera, resident, budget, requested, refused, sharing, cut, backgroundBlock}]}. Lengths are in scene units.
 // `cut` lists [tile, content] of the visible tiles, front to back.
 nlohmann::ordered_json makeSelections();
 

@@ -16,7 +16,7 @@ interface GoldenTile extends Omit<TileNode, 'cells' | 'content'> {
 
 interface GoldenView {
   camera: { focal: number; width: number; height: number; eye: Vec3; right: Vec3; down: Vec3; forward: Vec3 };
-  'held': number[]; // tiles in memory
+  resident: number[]; // tiles in memory
   budget: number;
   requested: number[];
   refused: number;
@@ -62,7 +62,7 @@ describe('the view of a camera', () => {
   it('makes the selector choose as the CPU renderer does, view after view', () => {
     const selector = new TileSelector(makeTree(golden.tree));
     expect(golden.views.length).toBeGreaterThan(100);
-    golden.views.forEach(({ camera, 'held': resident, budget, requested, refused, cut, backgroundBlock }, i) => {
+    golden.views.forEach(({ camera, resident, budget, requested, refused, cut, backgroundBlock }, i) => {
       const holds = (tile: number) => resident.includes(tile);
       const view = makeView(camera);
       const choice = selector.choose(view, {
@@ -77,7 +77,7 @@ describe('the view of a camera', () => {
 
   it('makes the selector charge shared resources as the CPU renderer does', () => {
     const selector = new TileSelector(makeTree(golden.tree));
-    golden.views.forEach(({ camera, 'held': resident, budget, sharing }, i) => {
+    golden.views.forEach(({ camera, resident, budget, sharing }, i) => {
       const choice = selector.choose(makeView(camera), {
         budget,
         holds: (tile) => resident.includes(tile),

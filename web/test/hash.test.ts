@@ -58,10 +58,10 @@ describe.skipIf(missing())('a scene of hash', () => {
     return new Uint8Array(Buffer.from(await page.evaluate(() => headlessPage.pixels()), 'base64'));
   }
 
-  it("that is whole shows the network's colour for rays that hit nothing", async () => {
+  it("that has a learned background shows the network's colour for rays that hit nothing", async () => {
     const scene = join(folder, 'whole');
     cpSync(goldenHash, scene, { recursive: true });
-    changeContents(scene, '"whole":false', '"whole":true ');
+    changeContents(scene, '"learned_background":false', '"learned_background":true ');
     const up = viewAt(tileset, [0.2, 0.1, 0.4], [0.3, 0.4, 5]);
     const views = [across, up];
     writeFileSync(join(folder, 'path.json'), cameraPath(tileset, views.map(({ matrix }) => matrix)));
@@ -89,10 +89,10 @@ describe.skipIf(missing())('a scene of hash', () => {
     whole.close();
   });
 
-  it('that is whole does so without a background block, too, whatever is in view', async () => {
+  it('that has a learned background does so without a background block, too, whatever is in view', async () => {
     const scene = join(folder, 'alone');
     cpSync(goldenHash, scene, { recursive: true });
-    changeContents(scene, '"whole":false', '"whole":true ');
+    changeContents(scene, '"learned_background":false', '"learned_background":true ');
     const json = JSON.parse(readFileSync(join(scene, 'tileset.json'), 'utf8'));
     json.root.contents = json.root.contents.filter((one: any) => !one.extensions.TESSERA_scene.background_block);
     json.root.boundingVolume = json.root.contents[0].boundingVolume;
@@ -253,9 +253,9 @@ describe.skipIf(missing())('a scene of hash', () => {
       const { drawer: { marching } } = headlessPage.city as unknown as { drawer: { marching: any } };
       const { assignNetworks } = marching;
       marching.assignNetworks = (contents: any[]) => {
-        const { networks, behind, whole } = assignNetworks.call(marching, contents);
+        const { networks, behind, hasLearnedBackground } = assignNetworks.call(marching, contents);
         for (const { uniforms } of contents) uniforms.network.value += 3;
-        return { networks: [networks[0], networks[0], networks[0], ...networks], behind: behind + 3, whole };
+        return { networks: [networks[0], networks[0], networks[0], ...networks], behind: behind + 3, hasLearnedBackground };
       };
     });
     expect(psnr(await look(page, across), expected)).toBeGreaterThan(55);

@@ -73,7 +73,7 @@ describe.skipIf(missing())('on a phone', { timeout: 120000 }, () => {
         expect(Math.min(right - left, bottom - top)).toBeGreaterThan(39.9);
         expect(left >= 0 && top >= 0 && right <= width && bottom <= height).toBe(true);
       }
-      for (const { name } of tools.filter(({ name }) => /^(Measure|Models|Hide parts|Views|Picture|Settings|Help)$/.test(name))) {
+      for (const { name } of tools.filter(({ name }) => /^(Measure|Models|Hide parts|Views|Image|Settings|Help)$/.test(name))) {
         await page.locator(`.toolbar [aria-label="${name}"]`).click();
         const glass = await boxes(page, '.glass');
         expect(glass).toHaveLength(5);

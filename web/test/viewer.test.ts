@@ -88,7 +88,7 @@ describe.skipIf(missing())('the viewer', () => {
       await page.keyboard.press('p');
       await page.fill('[aria-label=Width]', '1200');
       await page.fill('[aria-label=Height]', '300');
-      const picture = await decodePng(page, await saved('Save picture'));
+      const picture = await decodePng(page, await saved('Save image'));
       const path = join(folder, 'path.json');
       writeFileSync(path, JSON.stringify({
         ...cameraPath, render_width: 1200, render_height: 300, fps: 1, seconds: 1,
@@ -109,12 +109,12 @@ describe.skipIf(missing())('the viewer', () => {
       const before = await besidePanel();
       await page.fill('[aria-label=Width]', '4000');
       await page.fill('[aria-label=Height]', '2000');
-      await page.click('text=Save picture');
+      await page.click('text=Save image');
       await page.waitForSelector('text=/Part [2-9] of 32/');
       expect(before.equals(await besidePanel())).toBe(true);
       expect(await page.locator('.toolbar').evaluate(({ inert }: HTMLElement) => inert)).toBe(true);
       await page.click('text=Cancel');
-      await page.waitForSelector('text=Save picture', { state: 'visible' });
+      await page.waitForSelector('text=Save image', { state: 'visible' });
       await page.waitForSelector('.still', { state: 'detached' });
       expect(await page.locator('.toolbar').evaluate(({ inert }: HTMLElement) => inert)).toBe(false);
       expect(await page.isVisible('.error')).toBe(false);

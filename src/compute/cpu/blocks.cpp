@@ -52,7 +52,7 @@ class Blocks {
     const double *const xs = at.x.data(), *const ys = at.y.data(), *const zs = at.z.data();
     const double width = space_.columns, depth = space_.rows, bottom = space_.bottom, top = space_.top;
     const int32_t columns = static_cast<int32_t>(space_.columns), cells = static_cast<int32_t>(space_.cells());
-    const bool inside = space_.backgroundBlock != BackgroundBlock::own;
+    const bool inside = space_.backgroundBlock != BackgroundBlockMode::own;
     for (uint32_t i = 0; i < count; ++i) {
       const double x = xs[i], y = ys[i], z = zs[i];
       const bool inBox = (std::abs(x) <= width) & (std::abs(y) <= depth) & (z >= bottom) & (z <= top);
@@ -144,7 +144,7 @@ void findCuts(const BlockSamples& a, const Ray& ray, std::vector<Cut>& cuts) {
       if (t > 0) consider(t);
     }
   }
-  if (a.space.backgroundBlock == BackgroundBlock::own) consider(ray.far);
+  if (a.space.backgroundBlock == BackgroundBlockMode::own) consider(ray.far);
 }
 
 // Computes the ends of all intervals of a ray, including the cuts; s and t have one element more than there are
@@ -162,7 +162,7 @@ uint32_t findEnds(const BlockSamples& a, const Ray& ray, const std::vector<Cut>&
   }
   // BlockSpace::distanceAt in two loops without branches.
   const double length = ray.far - ray.near;
-  if (a.space.backgroundBlock == BackgroundBlock::none) {
+  if (a.space.backgroundBlock == BackgroundBlockMode::none) {
     for (uint32_t i = 0; i <= samples; ++i) t[i] = ray.near + s[i] * length;
   } else {
     const auto inBox = static_cast<uint32_t>(std::upper_bound(s, s + samples + 1, kShare) - s);
@@ -343,7 +343,8 @@ void run(Context& context, const EnterScene& a) {
       }
       if (!(enter < leave)) {
         enter = leave = near;
-        if (exists && space.backgroundBlock != BackgroundBlock::none) leave = enter + 1 + std::hypot(o[0], o[1], o[2]);
+        if (exists && space.backgroundBlock != BackgroundBlockMode::none)
+          leave = enter + 1 + std::hypot(o[0], o[1], o[2]);
       }
       range[2 * ray] = static_cast<float>(enter);
       range[2 * ray + 1] = static_cast<float>(leave);

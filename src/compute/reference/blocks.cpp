@@ -47,7 +47,7 @@ std::vector<Post> listPosts(const BlockSpace& space, const FencedRay& ray, bool 
     for (int wall = 2 - cells; wall < cells && ray.direction[axis] != 0; wall += 2)
       cuts.push_back((wall - ray.origin[axis]) / ray.direction[axis]);
   }
-  if (space.backgroundBlock == BackgroundBlock::own) cuts.push_back(ray.far);
+  if (space.backgroundBlock == BackgroundBlockMode::own) cuts.push_back(ray.far);
   for (double t : cuts) {
     const double s = space.shareAt(t, ray.near, ray.far);
     const auto next =
@@ -77,7 +77,7 @@ std::array<double, 2> rangeInScene(const BlockSpace& space, const Point& origin,
     leave = std::min(leave, std::max(toLow, toHigh));
   }
   if (enter < leave) return {enter, leave};
-  return {near, space.backgroundBlock == BackgroundBlock::none ? near : near + 1 + length(origin)};
+  return {near, space.backgroundBlock == BackgroundBlockMode::none ? near : near + 1 + length(origin)};
 }
 
 Doubles firstFences(uint32_t intervals, double jitter) {

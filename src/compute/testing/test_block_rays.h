@@ -16,13 +16,14 @@ struct NamedBlockSpace {
 
 inline std::vector<NamedBlockSpace> blockSpaces() {
   return {
-      {"1 × 1", {.columns = 1, .rows = 1, .near = 0, .backgroundBlock = BackgroundBlock::none}},
+      {"1 × 1", {.columns = 1, .rows = 1, .near = 0, .backgroundBlock = BackgroundBlockMode::none}},
       {"1 × 1, own background block",
-       {.columns = 1, .rows = 1, .bottom = -0.5f, .top = 0.4f, .backgroundBlock = BackgroundBlock::own}},
-      {"3 × 2", {.columns = 3, .rows = 2, .bottom = -0.7f, .top = 0.9f, .backgroundBlock = BackgroundBlock::none}},
-      {"4 × 3, contracted border", {.columns = 4, .rows = 3, .near = 0.2f, .backgroundBlock = BackgroundBlock::border}},
+       {.columns = 1, .rows = 1, .bottom = -0.5f, .top = 0.4f, .backgroundBlock = BackgroundBlockMode::own}},
+      {"3 × 2", {.columns = 3, .rows = 2, .bottom = -0.7f, .top = 0.9f, .backgroundBlock = BackgroundBlockMode::none}},
+      {"4 × 3, contracted border",
+       {.columns = 4, .rows = 3, .near = 0.2f, .backgroundBlock = BackgroundBlockMode::border}},
       {"3 × 2, own background block",
-       {.columns = 3, .rows = 2, .bottom = -0.3f, .top = 0.8f, .backgroundBlock = BackgroundBlock::own}},
+       {.columns = 3, .rows = 2, .bottom = -0.3f, .top = 0.8f, .backgroundBlock = BackgroundBlockMode::own}},
   };
 }
 

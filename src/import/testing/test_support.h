@@ -1,9 +1,5 @@
-// Shared by the tests of src/import: small images, and the location of real data.
+// Shared by the tests of src/import: small images.
 #pragma once
-
-#include <cstdlib>
-#include <optional>
-#include <string>
 
 #include "base/image_io.h"
 #include "base/testing/temporary_folder.h"
@@ -20,13 +16,6 @@ inline ImageU8 gradientPicture(int width, int height, int channels = 3, int seed
     }
   }
   return image;
-}
-
-// Returns the folder `name` in TESSERA_SHARED_DATA, or nothing if it does not exist.
-inline std::optional<fs::path> sharedData(const std::string& name) {
-  const char* root = std::getenv("TESSERA_SHARED_DATA");
-  if (root == nullptr || !fs::is_directory(fs::path(root) / name)) return std::nullopt;
-  return fs::path(root) / name;
 }
 
 }  // namespace tessera

@@ -11,10 +11,11 @@ Broken ruleOfPlace(const ContentPart& part) {
     if (!(std::abs(centre) <= kFarthestInScene) || !(scale >= 1e-6f && scale <= kFarthestInScene)) {
       return "its centre or scale is out of bounds";
     }
-    if (!(low >= -kFarthestInScene && low < high && high <= kFarthestInScene)) return "its box is none";
+    if (!(low >= -kFarthestInScene && low < high && high <= kFarthestInScene))
+      return "its box is empty or out of bounds";
     const float slack = 1e-3f * scale;
     if (!part.contracted && (low < centre - scale - slack || high > centre + scale + slack)) {
-      return "it is bounded, but its box leaves its domain";
+      return "it is bounded, but its box is not within its domain";
     }
   }
   if (part.backgroundBlock && !part.contracted) return "a background block is not contracted";
@@ -24,8 +25,8 @@ Broken ruleOfPlace(const ContentPart& part) {
 Broken ruleOfMacroblocks(const ContentPart& part, uint32_t texels, uint64_t bytes, uint32_t bytesOfTexel) {
   const uint64_t bytesOfBlock = uint64_t{ContentPart::kStoredTexels} * bytesOfTexel, stored = bytes / bytesOfBlock;
   const uint32_t edge = texels / ContentPart::kMacroblock;
-  if (bytes % bytesOfBlock != 0) return "its voxels are no whole macroblocks";
-  if (stored > kMaxStored) return "it has more macroblocks than a picture holds";
+  if (bytes % bytesOfBlock != 0) return "its voxels are not whole macroblocks";
+  if (stored > kMaxStored) return "it has more macroblocks than an image can contain";
   if (part.macroblocks.size() != size_t{edge} * edge * edge) return "its macroblock numbers are not those of its grid";
   std::vector<bool> used(stored);
   uint64_t count = 0;
@@ -53,7 +54,7 @@ Broken mismatchOfPart(const ContentPart& part, size_t number, const TileContent&
   const auto slack = [](double x) { return 1e-6 * std::max(1.0, std::abs(x)); };  // parts' boxes are rounded to floats
   if (part.backgroundBlock != declared.backgroundBlock) {
     return fmt::format("part {} is {} background block, and tileset.json says that the content is {}", number,
-                       part.backgroundBlock ? "a" : "no", declared.backgroundBlock ? "one" : "none");
+                       part.backgroundBlock ? "a" : "not a", declared.backgroundBlock ? "one" : "not");
   }
   for (Eigen::Index a = 0; a < 3; ++a) {
     const auto axis = static_cast<size_t>(a);

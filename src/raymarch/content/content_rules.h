@@ -26,7 +26,7 @@ bool overlap(const ContentPart& one, const ContentPart& other);
 // Checks `rule` for each part, that a background block is the only part, and that no two parts overlap.
 template <class Part, class Rule>
 Broken ruleOfParts(const std::vector<Part>& parts, const Rule& rule) {
-  if (parts.empty()) return "there is no part";
+  if (parts.empty()) return "there are no parts";
   for (size_t i = 0; i < parts.size(); ++i) {
     if (auto broken = rule(parts[i])) return fmt::format("part {}: {}", i, *broken);
     if (parts[i].backgroundBlock && parts.size() > 1) return "a background block is not alone";

@@ -13,7 +13,7 @@ class RayMarchingDrawer final : public CpuDrawer {
   // `skippingModes`: those of "distances", "cells" and "none" that marching through the content supports.
   explicit RayMarchingDrawer(std::vector<std::string_view> skippingModes) : skippingModes_(std::move(skippingModes)) {}
 
-  RenderedView draw(const SceneView<Content>& view, const PictureRequest& request, const DrawSettings& settings,
+  RenderedView draw(const SceneView<Content>& view, const ViewRequest& request, const DrawSettings& settings,
                     ThreadPool& pool, DrawCounts& counts) override {
     SceneDrawing<Content_> drawing;
     drawing.frame = view.frame;

@@ -36,7 +36,7 @@ class AskedDrawer final : public CpuDrawer {
     ++asked_->prepared;
     return content;
   }
-  RenderedView draw(const SceneView<Content>& view, const PictureRequest& request, const DrawSettings& settings,
+  RenderedView draw(const SceneView<Content>& view, const ViewRequest& request, const DrawSettings& settings,
                     ThreadPool&, DrawCounts& counts) override {
     asked_->drawn.clear();
     for (const DrawnContent<Content>& drawn : view.frontToBack) {

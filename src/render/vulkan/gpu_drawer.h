@@ -4,7 +4,7 @@
 
 #include "render/drawer.h"
 #include "render/vulkan/gpu_content.h"
-#include "render/vulkan/gpu_picture.h"
+#include "render/vulkan/gpu_frame.h"
 
 namespace tessera {
 
@@ -25,7 +25,7 @@ class GpuDrawer {
   virtual std::unique_ptr<GpuContent> upload(const Content& content) = 0;
 
   // Queues the drawing of a whole image.
-  virtual void draw(GpuPicture& picture, const SceneView<GpuContent>& view, const PictureRequest& request,
+  virtual void draw(GpuFrame& frame, const SceneView<GpuContent>& view, const ViewRequest& request,
                     const DrawSettings& settings) = 0;
 
   // Limits the GPU memory that the drawer may use besides contents, for example for maps that are built on first sight.

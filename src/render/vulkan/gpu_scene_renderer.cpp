@@ -30,9 +30,9 @@ GpuSceneRenderer::GpuSceneRenderer(std::shared_ptr<GpuStream> stream, std::uniqu
       tiles_(scene.frame, std::move(scene.tree), uploaded(scene.source), settings.selection, settings.budgetBytes),
       settings_(settings),
       background_(scene.background[0], scene.background[1], scene.background[2]),
-      picture_(stream_) {}
+      frame_(stream_) {}
 
-void GpuSceneRenderer::queue(const PictureRequest& request, bool exact) {
+void GpuSceneRenderer::queue(const ViewRequest& request, bool exact) {
   const TileView view = tileView(request.camera, request.worldFromCamera, tiles_.frame());
   if (prefetch_) {
     tiles_.loadReadyFor(view, [this](const std::vector<int>& missing) {
@@ -46,18 +46,18 @@ void GpuSceneRenderer::queue(const PictureRequest& request, bool exact) {
   }
   DrawSettings settings = settings_.draw;
   settings.exact = exact;
-  drawer_->draw(picture_, tiles_.view(), request, settings);
+  drawer_->draw(frame_, tiles_.view(), request, settings);
 }
 
 RenderedView GpuSceneRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
   queue({camera, worldFromCamera, opaqueDepth}, true);
-  return picture_.drawn();
+  return frame_.drawn();
 }
 
 GpuRenderedView GpuSceneRenderer::draw(const Camera& camera, const Pose& worldFromCamera) {
   queue({camera, worldFromCamera}, settings_.draw.exact);
   stream_->send();
-  return picture_.onGpu();
+  return frame_.onGpu();
 }
 
 bool GpuSceneRenderer::hasMore() const {

@@ -57,7 +57,7 @@ class GpuSceneRenderer final : public GpuViewRenderer {
   std::string device() const override { return "vulkan " + stream_->context()->name(); }
   Eigen::Array3f background() const override { return background_; }
   Pixel pixelAt(int x, int y) override {
-    const auto [opacity, depth] = picture_.opacityAndDepthAt(x, y);
+    const auto [opacity, depth] = frame_.opacityAndDepthAt(x, y);
     return {opacity, depth};
   }
   SceneState state() const override;
@@ -67,7 +67,7 @@ class GpuSceneRenderer final : public GpuViewRenderer {
   const TileCache<GpuContent>& cache() const { return tiles_.cache(); }
 
  private:
-  void queue(const PictureRequest& request, bool exact);
+  void queue(const ViewRequest& request, bool exact);
   TileSource<GpuContent> uploaded(const TileSource<Content>& source);
 
   std::shared_ptr<GpuStream> stream_;
@@ -76,7 +76,7 @@ class GpuSceneRenderer final : public GpuViewRenderer {
   SceneTiles<GpuContent> tiles_;
   GpuRendererSettings settings_;
   Eigen::Array3f background_;
-  GpuPicture picture_;
+  GpuFrame frame_;
 };
 
 }  // namespace tessera

@@ -35,14 +35,14 @@ class AskedDrawer final : public GpuDrawer {
     ++asked_->uploaded;
     return std::make_unique<NumberedGpuContent>(static_cast<const NumberedContent&>(content).tile);
   }
-  void draw(GpuPicture& picture, const SceneView<GpuContent>& view, const PictureRequest& request,
+  void draw(GpuFrame& frame, const SceneView<GpuContent>& view, const ViewRequest& request,
             const DrawSettings& settings) override {
     asked_->drawn.clear();
     for (const DrawnContent<GpuContent>& drawn : view.frontToBack) {
       asked_->drawn.push_back(static_cast<const NumberedGpuContent&>(*drawn.content).tile);
     }
     asked_->settings = settings;
-    picture.begin(view.frame, settings.minTransmittance, 4, request);
+    frame.begin(view.frame, settings.minTransmittance, 4, request);
   }
   bool wantsAnotherFrame() const override { return asked_->wantsAnotherFrame; }
 

@@ -15,7 +15,12 @@ TrainingResult train(Device& device, const Capture& capture, const fs::path& mod
 class OpenedField final : public ModelWithRenderer<FieldModel, FieldRenderer> {
  public:
   using ModelWithRenderer::ModelWithRenderer;
-  RayWork rayWork() const override { return {renderer_->samplesEvaluated(), FieldRenderer::kMinTransmittance}; }
+  RayWork rayWork() const override {
+    return {renderer_->densitiesEvaluated(), renderer_->coloursEvaluated(), FieldRenderer::kMinTransmittance};
+  }
+  void cullUnseen(const Capture& capture, const CullOptions& options) override {
+    renderer_->cullUnseen(capture, options);
+  }
 };
 
 std::unique_ptr<OpenedModel> openModel(Device& device, const fs::path& folder) {
@@ -27,7 +32,8 @@ std::unique_ptr<OpenedModel> openModel(Device& device, const fs::path& folder) {
 std::vector<std::pair<std::string, uint64_t>> describe(const MethodSettings& settings) {
   const RadianceFieldShape shape = SettingsOf<FieldConfig>::in(settings).shape();
   return {{"parameters", shape.grid.parameters() + shape.density.parameters() + shape.colour.parameters()},
-          {"multiply_accumulates_per_sample", multiplyAccumulates(shape)}};
+          {"multiply_accumulates_per_sample", densityMultiplyAccumulates(shape)},
+          {"view_dependent_multiply_accumulates_per_sample", colourMultiplyAccumulates(shape)}};
 }
 
 }  // namespace
@@ -35,7 +41,7 @@ std::vector<std::pair<std::string, uint64_t>> describe(const MethodSettings& set
 const Method& fieldMethod() {
   static const Method kMethod = {
       .name = "field",
-      .summary = "one hash-grid radiance field of the whole capture, drawn as a model; quick, and never baked",
+      .summary = "one hash-grid radiance field of the whole capture, rendered as a model; quick, and never baked",
       .countsSamples = true,
       .settings = makeSettings<FieldConfig>,
       .train = train,

@@ -53,7 +53,8 @@ std::vector<std::pair<std::string, uint64_t>> describe(const MethodSettings& set
   const BlockFieldShape coarse = config.coarseShape();
   return {
       {"parameters_per_block", coarse.grid.parameters() + coarse.network.parameters() + config.fineGrid().parameters()},
-      {"multiply_accumulates_per_sample", config.multiplyAccumulates()}};
+      {"multiply_accumulates_per_sample", config.multiplyAccumulates()},
+      {"view_dependent_multiply_accumulates_per_ray", countMultiplyAccumulates(config.directionShape())}};
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ struct BlockSettings {
   SETTING(std::string, preset, "cpu", "preset", "the defaults of all others: cpu, or paper (large GPUs)", anything());
   SETTING(std::string, backgroundBlock, "own", "background_block",
           "what lies outside the region: own (a block of its own), border (the border blocks', as in the papers), none",
-          anything());  // see backgroundBlockNamed
+          anything());  // see parseBackgroundBlockMode
   SETTING(int, lod, 0, "lod", "level of detail: 0 is the finest; set by training for coarser levels", within(0, 16));
   SETTING(int64_t, finestStep, 0, "finest_step",
           "of a coarser level: steps of the finest one when it was created; set by training", anything());

@@ -186,13 +186,13 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
       renderer.setRenderTarget(target);
       renderer.clear();
     }
-    const opaque = settings.endsRays && backgroundContent?.own.whole ? backgroundContent.own : undefined;
+    const opaque = settings.endsRays && backgroundContent?.own.hasLearnedBackground ? backgroundContent.own : undefined;
     drawAsTheyStand(renderer, pictures, () =>
       pictures.forEach((picture, i) => this.drawOne(picture, worldFromScene, contents[i], opaque)));
     renderer.autoClear = autoClear;
     renderer.setClearColor(clearColour, clearAlpha);
     renderer.setRenderTarget(before);
-    return backgroundContent?.own.whole || contents.some((ofOne) => ofOne.length > 0);
+    return backgroundContent?.own.hasLearnedBackground || contents.some((ofOne) => ofOne.length > 0);
   }
 
   wantsAnotherFrame(): boolean {

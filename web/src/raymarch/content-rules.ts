@@ -19,10 +19,10 @@ export function ruleOfPlace(part: ContentPart): Broken {
     if (!(Math.abs(centre) <= kFarthestInScene) || !(scale >= 1e-6 && scale <= kFarthestInScene)) {
       return 'its centre or scale is out of bounds';
     }
-    if (!(low >= -kFarthestInScene && low < high && high <= kFarthestInScene)) return 'its box is none';
+    if (!(low >= -kFarthestInScene && low < high && high <= kFarthestInScene)) return 'its box is empty or out of bounds';
     const slack = 1e-3 * scale;
     if (!part.contracted && (low < centre - scale - slack || high > centre + scale + slack)) {
-      return 'it is bounded, but its box leaves its domain';
+      return 'it is bounded, but its box is not within its domain';
     }
   }
   return part.backgroundBlock && !part.contracted ? 'a background block is not contracted' : undefined;
@@ -51,7 +51,7 @@ export function mismatchWithTileset(parts: ContentPart[], declared: DeclaredCont
   const slack = (x: number) => 1e-6 * Math.max(1, Math.abs(x)); // parts are rounded to floats
   for (const [i, part] of parts.entries()) {
     if (part.backgroundBlock !== declared.backgroundBlock) {
-      return `part ${i} is ${part.backgroundBlock ? 'a' : 'no'} background block, and tileset.json says that the content is ${declared.backgroundBlock ? 'one' : 'none'}`;
+      return `part ${i} is ${part.backgroundBlock ? 'a' : 'not a'} background block, and tileset.json says that the content is ${declared.backgroundBlock ? 'one' : 'not'}`;
     }
     const { low, high } = declared.box;
     if (kAxes.some((a) => part.low[a] < low[a] - slack(low[a]) || part.high[a] > high[a] + slack(high[a]))) {

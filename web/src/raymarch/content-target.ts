@@ -72,5 +72,5 @@ export function contentTarget(renderer: THREE.WebGLRenderer, form: TargetForm): 
       candidate.target.dispose();
     }
   }
-  throw new SceneError('GPU', '', `cannot draw into the pictures that scenes of ${representation} need`, remedy);
+  throw new SceneError('GPU', '', `cannot render into the images that scenes of ${representation} need`, remedy);
 }

@@ -11,10 +11,10 @@ import type { ContentTextures } from './content-textures';
 export interface MarchedOwn {
   uniforms: Record<string, THREE.IUniform>; // of its program
   meshes: THREE.Mesh<THREE.BufferGeometry, THREE.Material>[]; // meshes whose programs must also be compiled before the content is drawn
-  whole: boolean; // rays that hit nothing are opaque
+  hasLearnedBackground: boolean; // rays that hit nothing are opaque
 }
 
-export const kNothingOwn: MarchedOwn = { uniforms: {}, meshes: [], whole: false };
+export const kNothingOwn: MarchedOwn = { uniforms: {}, meshes: [], hasLearnedBackground: false };
 
 // A final pass that converts the sums of all contents to colours.
 export interface LastPass {

@@ -36,13 +36,13 @@ export class ContentReader {
 
   protected readFile(file: Uint8Array, representation: string): ContentFile {
     if (file.length > this.limits.fileBytes) this.fail('is larger than any content should be');
-    const glb = decodeGlb(file) ?? this.fail('is no binary glTF 2.0 file');
+    const glb = decodeGlb(file) ?? this.fail('is not a binary glTF 2.0 file, or is cut short');
     if (glb.json.length > this.limits.jsonBytes) this.fail("its JSON is larger than any content's should be");
     let asset: Json;
     try {
       asset = JSON.parse(new TextDecoder().decode(glb.json));
     } catch {
-      this.fail('its JSON is none');
+      this.fail('its JSON is not that of a glTF 2.0 asset');
     }
     return { ours: this.readAsset(asset, representation), views: this.readViews(asset, glb.bytes) };
   }
@@ -105,7 +105,7 @@ export class ContentReader {
       return bytes && decodeLossless(bytes, width, height);
     } catch (error) {
       if (!(error instanceof DecoderFailure)) throw error;
-      this.fail('is more than the decoder of pictures has memory for', 'close other pages, or copy the scene again');
+      this.fail('is more than the image decoder has memory for', 'close other pages, or copy the scene again');
     }
   }
 }

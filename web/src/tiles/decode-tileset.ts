@@ -140,7 +140,7 @@ class TilesetReader<Representation extends string> {
     const name = getString(ours, 'representation') ?? this.fail('has no representation');
     if (Object.hasOwn(this.known, name)) return name as Representation;
     const others = Object.keys(this.known).join(' or ');
-    return this.fail(`has no representation that is known: it is a scene of ${name.slice(0, 32)}, not of ${others}`, '', 'draw it with a viewer that knows it');
+    return this.fail(`has no representation that is known: it is a scene of ${name.slice(0, 32)}, not of ${others}`, '', 'open it with a viewer that supports it');
   }
 
   private readResources(ours: Json): Tileset['resources'] {
@@ -164,7 +164,7 @@ class TilesetReader<Representation extends string> {
       const tile = this.readTile(source, parent, place);
       tile.contents = this.readContents(source, tile, place);
       const children = getField(source, 'children') ?? [];
-      if (!Array.isArray(children)) this.fail('its children are no list', place);
+      if (!Array.isArray(children)) this.fail('its children are not a list', place);
       if (children.length > this.limits.tiles - waiting.length) this.fail('has too many tiles');
       for (const child of children) {
         tile.children.push(waiting.length);
@@ -209,17 +209,17 @@ class TilesetReader<Representation extends string> {
     const missing = 'a content has no uri or no box';
     const resources = getField(ours, 'resources') ?? [];
     if (!Array.isArray(resources) || !resources.every((index) => wholeFrom(index) !== undefined)) {
-      this.fail("a content's resources are no list of numbers", place);
+      this.fail("a content's resources are not a list of numbers", place);
     }
     if (getField(ours, 'surround') !== undefined) this.fail('the key surround is called background_block now', place);
     const backgroundBlock = getBoolean(ours, 'background_block') ?? false;
     const ofBackgroundBlock = (key: string, read: (object: Json, key: string) => number | undefined) =>
-      backgroundBlock && getField(ours, key) !== undefined ? this.needed(read(ours, key), "a background block's level or error is none", place) : 0;
+      backgroundBlock && getField(ours, key) !== undefined ? this.needed(read(ours, key), "a background block's level or geometric error is not valid", place) : 0;
     return {
       uri: this.needed(getString(source, 'uri'), missing, place),
       box: this.needed(readBox(ours), missing, place),
       cells:
-        getField(ours, 'cells') === undefined ? tile.cells : this.needed(readCells(ours), "a content's cells are none", place),
+        getField(ours, 'cells') === undefined ? tile.cells : this.needed(readCells(ours), "a content's cells are malformed", place),
       backgroundBlock,
       resources: resources as number[],
       bytes: getByteCount(ours),

@@ -41,9 +41,9 @@ export function ruleOfNetwork(network: DenseLayer[], inputs: number): Broken {
     if (layer.inputs !== width || layer.outputs < 1) return "the network's layers do not follow one another";
     width = layer.outputs;
     if (!layer.weights.every(Number.isFinite) || !layer.biases.every(Number.isFinite)) {
-      return 'the network holds a number that is not finite';
+      return 'the network contains a number that is not finite';
     }
   }
   if (width !== kOutputs) return 'the network does not end in a colour';
-  return networkVectors(network) > kMaxNetworkVectors ? 'the network is larger than a shader takes' : undefined;
+  return networkVectors(network) > kMaxNetworkVectors ? 'the network is too large for a shader' : undefined;
 }

@@ -81,9 +81,9 @@ export function isPlainUri(uri: string): boolean {
 
 function ruleOfFrames(tileset: Tileset): Broken {
   const { rotation, scale, translation } = tileset.worldFromScene;
-  if (!isRotation(rotation)) return "worldFromScene's rotation is none";
+  if (!isRotation(rotation)) return "worldFromScene's rotation is not a rotation";
   if (!isScale(scale)) return "worldFromScene's scale is not above zero";
-  if (!translation.every((x) => Math.abs(x) <= kFarthest)) return "worldFromScene's translation is no place";
+  if (!translation.every((x) => Math.abs(x) <= kFarthest)) return "worldFromScene's translation is out of bounds";
   if (!isAffine(tileset.sourceFromWorld)) return 'sourceFromWorld is not affine';
   if (![tileset.columns, tileset.rows].every((count) => count >= 1 && count <= kMaxCells)) {
     return "the grid's columns or rows are out of bounds";
@@ -92,13 +92,13 @@ function ruleOfFrames(tileset: Tileset): Broken {
   const top = tileset.box.high[2];
   if (!(bottom >= -1 && bottom < top && top <= 1)) return "the grid's heights are not within -1 and 1";
   if (!(tileset.near >= 0 && tileset.near <= 1)) return 'near is not between 0 and 1';
-  if (!tileset.background.every((x) => x >= 0 && x <= 1)) return 'the background is no colour';
+  if (!tileset.background.every((x) => x >= 0 && x <= 1)) return 'the background is not a colour';
   const geo = tileset.georeference;
   if (geo) {
     if (!(Math.abs(geo.latitude) <= 90 && Math.abs(geo.longitude) <= 180 && Math.abs(geo.altitude) <= 1e5)) {
-      return 'the georeference is no place on the Earth';
+      return 'the georeference is not a place on the Earth';
     }
-    if (!isSimilarity(geo.enuFromWorld)) return "the georeference's enuFromWorld is no similarity";
+    if (!isSimilarity(geo.enuFromWorld)) return "the georeference's enuFromWorld is not a similarity";
   }
   return undefined;
 }
@@ -118,10 +118,10 @@ function ruleOfResources(tileset: Tileset): Broken {
 function ruleOfBackgroundBlocks(tileset: Tileset): Broken {
   const backgroundBlocks = tileset.tiles[0].contents.filter(({ backgroundBlock }) => backgroundBlock).sort((a, b) => a.level - b.level);
   for (const [i, { box, level, geometricError }] of backgroundBlocks.entries()) {
-    if (!holdsBox(box, tileset.box)) return "the background block's box does not hold the scene's";
+    if (!holdsBox(box, tileset.box)) return "the background block's box does not contain the scene's";
     if (level >= tileset.levels) return "a background block's level is not below the scene's number of levels";
-    if (!isError(geometricError)) return "a background block's geometric error is no length";
-    if (i > 0 && level === backgroundBlocks[i - 1].level) return 'two background blocks are of one level';
+    if (!isError(geometricError)) return "a background block's geometric error is not a length";
+    if (i > 0 && level === backgroundBlocks[i - 1].level) return 'two background blocks have the same level';
     if (i > 0 && geometricError < backgroundBlocks[i - 1].geometricError) return "a background block's geometric error is below a finer one's";
   }
   return undefined;
@@ -130,8 +130,8 @@ function ruleOfBackgroundBlocks(tileset: Tileset): Broken {
 function ruleOfContents(tileset: Tileset, tile: Tile, { overlappingContents }: TilesetRules): Broken {
   const ranges: Cells[] = [];
   for (const content of tile.contents) {
-    if (!isPlainUri(content.uri) || !content.uri.endsWith('.glb')) return "a content's uri is not a plain one of a .glb";
-    if (!isBox(content.box)) return "a content's box is none";
+    if (!isPlainUri(content.uri) || !content.uri.endsWith('.glb')) return "a content's uri is not the plain name of a .glb file";
+    if (!isBox(content.box)) return "a content's box is empty or out of bounds";
     if (content.resources.some((index) => index >= tileset.resources.length)) {
       return 'a content needs a shared resource that is not listed';
     }
@@ -140,8 +140,8 @@ function ruleOfContents(tileset: Tileset, tile: Tile, { overlappingContents }: T
       if (tile.parent !== -1) return 'a background block is not in the root';
       continue;
     }
-    if (!holdsBox(tile.box, content.box)) return "a content's box leaves its tile's";
-    if (!isRange(content.cells) || !holdsCells(tile.cells, content.cells)) return "a content's cells leave its tile's";
+    if (!holdsBox(tile.box, content.box)) return "a content's box is not within its tile's";
+    if (!isRange(content.cells) || !holdsCells(tile.cells, content.cells)) return "a content's cells are not within its tile's";
     ranges.push(content.cells);
   }
   if (!overlappingContents && !lieOnGrid(ranges)) return 'contents of a tile have no order';
@@ -163,10 +163,10 @@ function keepsToCells(tileset: Tileset, tile: Tile): boolean {
 function ruleOfTile(tileset: Tileset, tile: Tile, rules: TilesetRules): Broken {
   if (tile.level >= tileset.levels) return "its level is not below the scene's number of levels";
   const all = { i0: 0, j0: 0, i1: tileset.columns, j1: tileset.rows };
-  if (!isRange(tile.cells) || !holdsCells(all, tile.cells)) return 'its cells are not of the grid';
-  if (!isBox(tile.box)) return 'its box is none';
-  if (!keepsToCells(tileset, tile)) return 'its box leaves its cells';
-  if (!isError(tile.geometricError)) return 'its geometric error is no length';
+  if (!isRange(tile.cells) || !holdsCells(all, tile.cells)) return 'its cells are not within the grid';
+  if (!isBox(tile.box)) return 'its box is empty or out of bounds';
+  if (!keepsToCells(tileset, tile)) return 'its box is not within its cells';
+  if (!isError(tile.geometricError)) return 'its geometric error is not a length';
   return ruleOfContents(tileset, tile, rules);
 }
 
@@ -174,13 +174,13 @@ function ruleOfChildren(tileset: Tileset, tile: Tile): Broken {
   const children = tile.children.map((index) => tileset.tiles[index]);
   for (const child of children) {
     if (child.level >= tile.level) return 'a child is not of a finer level';
-    if (!holdsCells(tile.cells, child.cells)) return "a child's cells leave its own";
-    if (!holdsBox(tile.box, child.box)) return "a child's box leaves its own";
+    if (!holdsCells(tile.cells, child.cells)) return "a child's cells are not within its own";
+    if (!holdsBox(tile.box, child.box)) return "a child's box is not within its own";
     if (child.geometricError > tile.geometricError) return "a child's geometric error is above its own";
   }
   if (!lieOnGrid(children.map((child) => child.cells))) return 'its children do not lie on a grid';
   const cells = children.reduce((sum, child) => sum + cellsIn(child.cells), 0);
-  if (children.length > 0 && cells !== cellsIn(tile.cells)) return 'its children leave cells out';
+  if (children.length > 0 && cells !== cellsIn(tile.cells)) return 'its children do not cover its cells';
   return undefined;
 }
 
@@ -195,7 +195,7 @@ export function validationError(tileset: Tileset, rules: TilesetRules): Broken {
     return "the tileset's geometric error is below its root's";
   }
   const { i0, j0, i1, j1 } = root.cells;
-  if (i0 !== 0 || j0 !== 0 || i1 !== tileset.columns || j1 !== tileset.rows) return 'the root does not stand for all cells';
+  if (i0 !== 0 || j0 !== 0 || i1 !== tileset.columns || j1 !== tileset.rows) return 'the root does not cover all cells';
   for (const checkRule of [ruleOfTile, ruleOfChildren]) {
     for (const [index, tile] of tileset.tiles.entries()) {
       const reason = checkRule(tileset, tile, rules);

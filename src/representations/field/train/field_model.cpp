@@ -31,34 +31,46 @@ FieldModel::FieldModel(Device& device, const FieldConfig& config, const SceneFra
 }
 
 void FieldModel::sample(const Rays& rays, float minTransmittance, RaySamples& seen) {
+  march(rays, occupancy_.bits(), minTransmittance, 1, seen);
+}
+
+RadianceField::Output FieldModel::render(const Rays& rays, Slice<const uint32_t> cells, float minTransmittance,
+                                         RaySamples& seen) {
+  march(rays, cells, minTransmittance, RadianceField::kGeometryFeatures, seen);
+  rounds_.gatherFeatures(field_.geometry());
+  return field_.colour(seen.samples(), rays.directions, seen.rayOfSample);
+}
+
+void FieldModel::march(const Rays& rays, Slice<const uint32_t> cells, float minTransmittance, uint32_t features,
+                       RaySamples& seen) {
   const uint32_t capacity = static_cast<uint32_t>(seen.distances.size());
-  reserve(static_cast<uint32_t>(seen.firstSample.size()) - 1, capacity);
+  reserve(static_cast<uint32_t>(seen.firstSample.size()) - 1, capacity, features);
   CHECK(rays.count < seen.firstSample.size());
   MarchRays march{space_};
   march.origins = rays.origins;
   march.directions = rays.directions;
   march.jitter = rays.jitter;
   march.farOfRay = rays.far;
-  march.occupancy = occupancy_.bits();
+  march.occupancy = cells;
   rounds_.begin(rays.count, capacity, minTransmittance, seen.counters);
   for (uint32_t round = 0; round < RaySamples::kRounds; ++round) {
     rounds_.prepare(march, round);
     march.positions = rounds_.part(positions_, 3, round);
     march.distances = rounds_.part(distances_, 1, round);
     device_.run(march);
-    field_.logDensity(rounds_.marched(round), march.positions, rounds_.logDensities(round));
-    rounds_.lookedUp(round);
+    field_.density(rounds_.marched(round), march.positions, rounds_.features(round));
+    rounds_.addOpticalDepths(round);
   }
-  rounds_.keepSeen(seen.firstSample, seen.rayOfSample);
+  rounds_.compactVisible(seen.firstSample, seen.rayOfSample);
   rounds_.gather(positions_, seen.positions, 3);
   rounds_.gather(distances_, seen.distances, 1);
   rounds_.gatherSteps(seen.steps);
 }
 
-void FieldModel::reserve(uint32_t rays, uint32_t samples) {
+void FieldModel::reserve(uint32_t rays, uint32_t samples, uint32_t features) {
   const size_t all = size_t{rounds_.count()} * samples;
   field_.reserve(samples);
-  rounds_.reserve(rays, samples);
+  rounds_.reserve(rays, samples, features);
   if (distances_.size() < all) {
     positions_ = device_.array<float>(all * 3);
     distances_ = device_.array<float>(all);
@@ -70,7 +82,7 @@ void FieldModel::refreshOccupancy(uint32_t uniform, uint32_t occupied, uint64_t 
   const uint32_t chunk = std::clamp<uint32_t>(field_.capacity(), 1 << 12, 1 << 16);
   field_.reserve(chunk);
   occupancy_.update([&](Count count, Slice<const float> positions,
-                        Matrix<float> logDensities) { field_.logDensity(count, positions, logDensities); },
+                        Matrix<float> logDensities) { field_.density(count, positions, logDensities); },
                     uniform, occupied, seed, chunk);
 }
 

@@ -21,7 +21,7 @@ struct RaySamples {
   RaySamples() = default;
   RaySamples(Device& device, uint32_t rays, uint32_t samples);
 
-  Count samples() const { return {static_cast<uint32_t>(distances.size()), counters.part(MarchRounds::kKept, 1)}; }
+  Count samples() const { return {static_cast<uint32_t>(distances.size()), counters.part(MarchRounds::kVisible, 1)}; }
   Count finished(uint32_t rays) const { return {rays, counters.part(MarchRounds::kFinished, 1)}; }
 };
 
@@ -35,6 +35,10 @@ class FieldModel {
   };
   // Finds the visible samples of rays (train/march_rounds.h).
   void sample(const Rays& rays, float minTransmittance, RaySamples& seen);
+  // Finds the visible samples of rays for rendering, and evaluates them: each density once, and the colours of visible
+  // samples only. `cells`: those that rays march through, as occupancy().bits(). The output is valid until the next
+  // call.
+  RadianceField::Output render(const Rays& rays, Slice<const uint32_t> cells, float minTransmittance, RaySamples& seen);
 
   // Updates the occupancy at `uniform` random cells and `occupied` random occupied cells, see OccupancyGrid::update.
   void refreshOccupancy(uint32_t uniform, uint32_t occupied, uint64_t seed);
@@ -52,7 +56,9 @@ class FieldModel {
   void restore(const fs::path& path, const Safetensors& file);
 
  private:
-  void reserve(uint32_t rays, uint32_t samples);
+  void march(const Rays& rays, Slice<const uint32_t> cells, float minTransmittance, uint32_t features,
+             RaySamples& seen);
+  void reserve(uint32_t rays, uint32_t samples, uint32_t features);
 
   Device& device_;
   FieldConfig config_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "compute/composite.h"
+#include "train/photo_visitor.h"
 
 namespace tessera {
 namespace {
@@ -11,9 +12,79 @@ constexpr uint32_t kRays = 4096;        // maximum in one batch of the image's r
 constexpr uint32_t kSamples = 1 << 16;  // rays whose samples do not fit are rendered in the next batch
 static_assert(kSamples >= FieldConfig::kMaxSteps);
 
+// Returns the cells of a grid, [cells³], that are marked or have a marked neighbour, diagonal ones included.
+std::vector<bool> dilated(const std::vector<bool>& marked, int cells) {
+  std::vector<bool> result = marked;
+  const size_t strides[3] = {1, static_cast<size_t>(cells), static_cast<size_t>(cells) * static_cast<size_t>(cells)};
+  for (const size_t stride : strides) {
+    const std::vector<bool> before = result;
+    for (size_t i = 0; i < before.size(); ++i) {
+      if (!before[i]) continue;
+      const size_t place = i / stride % static_cast<size_t>(cells);
+      if (place > 0) result[i - stride] = true;
+      if (place + 1 < static_cast<size_t>(cells)) result[i + stride] = true;
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
-FieldRenderer::FieldRenderer(FieldModel& model) : model_(model), pictureRays_(model.device(), kRays) {
+// Marks the cells with samples that contribute to a pixel of a photo.
+class FieldRenderer::SeenCells final : public PixelVisitor {
+ public:
+  SeenCells(FieldRenderer& renderer, const CullOptions& options)
+      : marked(renderer.model_.occupancy().cells()),
+        resolution_(renderer.model_.space().gridResolution),
+        renderer_(renderer),
+        options_(options) {}
+
+  void begin(const Photo& photo, const Camera& camera) override {
+    const SceneFrame& frame = renderer_.model_.frame();
+    renderer_.imageRays_.begin(makeRayCamera(camera, photo.worldFromCamera, frame), frame, {});
+  }
+  void visit(std::span<const float> pixels, SeenThrough) override {
+    while (!pixels.empty()) {  // rays whose samples do not fit are rendered in the next batch
+      pixels = pixels.subspan(size_t{2} * markSamples(renderer_.renderPiece(renderer_.imageRays_.through(pixels))));
+    }
+  }
+
+  std::vector<bool> marked;  // [cells of the model's occupancy]
+
+ private:
+  // Returns the number of rays whose samples were marked.
+  uint32_t markSamples(const RoundCounts& counts) {
+    Device& device = renderer_.model_.device();
+    const RaySamples& seen = renderer_.seen_;
+    const std::vector<uint32_t> first = device.read(seen.firstSample.part(0, counts.finished + size_t{1}));
+    const std::vector<float> positions = device.read(seen.positions.part(0, size_t{3} * counts.visibleSamples));
+    const std::vector<float> weights = device.read(renderer_.weights_.part(0, counts.visibleSamples));
+    for (uint32_t ray = 0; ray < counts.finished; ++ray) {
+      float transmittance = 1;
+      for (uint32_t s = first[ray]; s < first[ray + 1]; ++s) {
+        const float alpha = weights[s] / std::max(transmittance, 1e-9f);
+        transmittance -= weights[s];
+        if (weights[s] > options_.minWeight && alpha > options_.minAlpha)
+          marked[cell(&positions[size_t{3} * s])] = true;
+      }
+    }
+    return counts.finished;
+  }
+  size_t cell(const float position[3]) const {
+    size_t number = 0;
+    for (int axis = 2; axis >= 0; --axis) {
+      const int along = static_cast<int>(static_cast<double>(position[axis]) * resolution_);
+      number = number * static_cast<size_t>(resolution_) + static_cast<size_t>(std::clamp(along, 0, resolution_ - 1));
+    }
+    return number;
+  }
+
+  int resolution_;
+  FieldRenderer& renderer_;
+  CullOptions options_;
+};
+
+FieldRenderer::FieldRenderer(FieldModel& model) : model_(model), imageRays_(model.device(), kRays) {
   Device& device = model.device();
   seen_ = RaySamples(device, kRays, kSamples);
   counters_ = device.array<uint32_t>(RaySamples::kCounters);
@@ -27,44 +98,60 @@ std::string FieldRenderer::device() const {
   return model_.device().name();
 }
 
+RoundCounts FieldRenderer::renderPiece(const ImageRays::Piece& piece) {
+  const RadianceField::Output output =
+      model_.render({piece.rays, piece.origins, piece.directions, {}, piece.far},
+                    seenCells_.size() > 0 ? seenCells_.all() : model_.occupancy().bits(), kMinTransmittance, seen_);
+  CompositeForward composite;
+  composite.minTransmittance = kMinTransmittance;
+  composite.rays = seen_.finished(piece.rays);
+  composite.firstSample = seen_.firstSample;
+  composite.x = output.logDensity;
+  composite.steps = seen_.steps;
+  composite.distances = seen_.distances;
+  composite.colours = output.colours;
+  composite.colour = colour_;
+  composite.opacity = opacity_;
+  composite.depth = depth_;
+  composite.weights = weights_;
+  model_.device().run(composite);
+  const RoundCounts counts(model_.device().read(counters_.all()), RaySamples::kRounds);
+  CHECK(counts.finished >= 1u);  // one ray's steps always fit
+  densities_ += counts.marched;
+  colours_ += counts.visibleSamples;
+  return counts;
+}
+
+void FieldRenderer::cullUnseen(const Capture& capture, const CullOptions& options) {
+  SeenCells seen(*this, options);
+  PhotoVisitor(capture, model_.frame(), kRays, seen).visitAll(1, {}, [](int64_t, int64_t) {});
+  for (int i = 0; i < options.dilation; ++i) seen.marked = dilated(seen.marked, model_.space().gridResolution);
+  std::vector<uint32_t> bits = model_.occupancy().bitWords();
+  for (size_t i = 0; i < seen.marked.size(); ++i) {
+    if (!seen.marked[i]) bits[i / 32] &= ~(1u << (i % 32));
+  }
+  seenCells_ = model_.device().uploadArray(bits);
+}
+
 RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
   Device& device = model_.device();
-  pictureRays_.begin(makeRayCamera(camera, worldFromCamera, model_.frame()), model_.frame(),
-                     PixelLattice::whole(camera), opaqueDepth);
+  imageRays_.begin(makeRayCamera(camera, worldFromCamera, model_.frame()), model_.frame(), PixelLattice::whole(camera),
+                   opaqueDepth);
   RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
                     ImageF(camera.width, camera.height, 1)};
   const size_t pixelCount = view.opacity.pixels.size();
   uint32_t nextRays = 1024;  // rays of the next batch, predicted from the samples of the last one
   for (size_t first = 0; first < pixelCount;) {
-    const PictureRays::Piece piece = pictureRays_.piece(first, nextRays);
-    model_.sample({piece.rays, piece.origins, piece.directions, {}, piece.far}, kMinTransmittance, seen_);
-    const RadianceField::Output output =
-        model_.field().forward(seen_.samples(), seen_.positions, piece.directions, seen_.rayOfSample, false);
-    CompositeForward composite;
-    composite.minTransmittance = kMinTransmittance;
-    composite.rays = seen_.finished(piece.rays);
-    composite.firstSample = seen_.firstSample;
-    composite.x = output.logDensity;
-    composite.steps = seen_.steps;
-    composite.distances = seen_.distances;
-    composite.colours = output.colours;
-    composite.colour = colour_;
-    composite.opacity = opacity_;
-    composite.depth = depth_;
-    composite.weights = weights_;
-    device.run(composite);
-    const RoundCounts counts(device.read(counters_.all()), RaySamples::kRounds);
+    const RoundCounts counts = renderPiece(imageRays_.piece(first, nextRays));
     const uint32_t finished = counts.finished;
-    CHECK(finished >= 1u);  // one ray's steps always fit
     const std::vector<float> colour = device.read(colour_.part(0, size_t{finished} * 3));
     const std::vector<float> opacity = device.read(opacity_.part(0, finished));
     const std::vector<float> depth = device.read(depth_.part(0, finished));
     std::copy(colour.begin(), colour.end(), view.colour.pixels.begin() + static_cast<ptrdiff_t>(first * 3));
     std::copy(opacity.begin(), opacity.end(), view.opacity.pixels.begin() + static_cast<ptrdiff_t>(first));
     for (uint32_t ray = 0; ray < finished; ++ray)
-      view.depth.pixels[first + ray] = pictureRays_.toViewDepth(ray, depth[ray]);
+      view.depth.pixels[first + ray] = imageRays_.toViewDepth(ray, depth[ray]);
     first += finished;
-    samples_ += counts.visibleSamples;
     // Each round of marching, and the set of visible samples, has a capacity of kSamples.
     const double fitting = 0.9 * kSamples / std::max(1.0, counts.fullest / (1.0 * finished));
     nextRays = static_cast<uint32_t>(std::clamp(fitting, 64.0, static_cast<double>(kRays)));

@@ -1,9 +1,12 @@
-// Renders a trained field model by ray marching, as in training.
+// Renders a trained field model by ray marching, as in training, in a single pass: the densities of marched samples and
+// the colours of visible ones are evaluated once.
 #pragma once
 
 #include "representations/field/train/field_model.h"
+#include "scene/capture.h"
 #include "scene/view_renderer.h"
-#include "train/picture_rays.h"
+#include "train/image_rays.h"
+#include "train/method.h"
 
 namespace tessera {
 
@@ -15,14 +18,26 @@ class FieldRenderer final : public ViewRenderer {
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
   std::string device() const override;
 
-  static constexpr float kMinTransmittance = 1e-3f;       // rays end below this transmittance
-  uint64_t samplesEvaluated() const { return samples_; }  // in all images so far
+  // From now on, renders only those occupied cells that the training photos see through unmasked pixels (CullOptions).
+  // Throws Error if a mask cannot be read.
+  void cullUnseen(const Capture& capture, const CullOptions& options);
+
+  static constexpr float kMinTransmittance = 1e-3f;  // rays end below this transmittance
+  // Return the numbers of samples whose densities, and whose colours, were evaluated so far, cullUnseen included.
+  uint64_t densitiesEvaluated() const { return densities_; }
+  uint64_t coloursEvaluated() const { return colours_; }
 
  private:
+  class SeenCells;
+
+  // Renders the rays of a piece into colour_, opacity_, depth_ and weights_, as far as their samples fit.
+  RoundCounts renderPiece(const ImageRays::Piece& piece);
+
   FieldModel& model_;
-  uint64_t samples_ = 0;
-  PictureRays pictureRays_;
+  uint64_t densities_ = 0, colours_ = 0;
+  ImageRays imageRays_;
   RaySamples seen_;
+  Array<uint32_t> seenCells_;  // after cullUnseen: as OccupancyGrid::bits
   Array<uint32_t> counters_;
   Array<float> colour_, opacity_, depth_, weights_;
 };

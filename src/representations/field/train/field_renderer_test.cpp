@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "base/error.h"
@@ -86,6 +87,63 @@ TEST_F(RenderedField, IsTheSameWhenTheImageIsRenderedInParts) {
     }
     EXPECT_LT(worst, 5e-3) << left << "," << top;
   }
+}
+
+TEST_F(RenderedField, HasTheDensitiesAndColoursOfTheTrainingPass) {
+  FieldModel& model = trained_->trainer->model();
+  Device& device = model.device();
+  constexpr uint32_t kRays = 64, kSamples = 1 << 12;
+  ImageRays rays(device, kRays);
+  rays.begin(makeRayCamera(camera(), pose(), model.frame()), model.frame(), PixelLattice::whole(camera()));
+  const ImageRays::Piece piece = rays.piece(static_cast<size_t>(camera().width) * 16, kRays);
+  RaySamples seen(device, kRays, kSamples);
+  Array<uint32_t> counters = device.array<uint32_t>(RaySamples::kCounters);
+  seen.counters = counters;
+  const FieldModel::Rays fieldRays{piece.rays, piece.origins, piece.directions, {}, {}};
+  struct Values {
+    std::vector<uint32_t> counters;
+    std::vector<float> densities, colours;
+  };
+  const auto read = [&](const RadianceField::Output& output) {
+    Values values{device.read(counters.all()), {}, {}};
+    const std::vector<float> densities = device.read(output.logDensity.data),
+                             colours = device.read(output.colours.data);
+    for (uint32_t i = 0; i < values.counters[MarchRounds::kVisible]; ++i) {
+      values.densities.push_back(densities[output.logDensity.offset(i, 0)]);
+      for (uint32_t k = 0; k < 3; ++k) values.colours.push_back(colours[output.colours.offset(i, k)]);
+    }
+    return values;
+  };
+  model.sample(fieldRays, FieldRenderer::kMinTransmittance, seen);
+  const Values training =
+      read(model.field().forward(seen.samples(), seen.positions, piece.directions, seen.rayOfSample, true));
+  const Values rendering =
+      read(model.render(fieldRays, model.occupancy().bits(), FieldRenderer::kMinTransmittance, seen));
+  ASSERT_GT(training.densities.size(), 100u);
+  EXPECT_EQ(rendering.counters, training.counters);
+  EXPECT_EQ(rendering.densities, training.densities);
+  EXPECT_EQ(rendering.colours, training.colours);
+}
+
+TEST_F(RenderedField, KeepsWhatTrainingPhotosSeeWhenUnseenCellsAreCulled) {
+  FieldRenderer whole(trained_->trainer->model());
+  const RenderedView before = whole.render(camera(), pose(), nullptr);
+  const uint64_t densities = whole.densitiesEvaluated();
+  FieldRenderer culled(trained_->trainer->model());
+  culled.cullUnseen(scene_->capture(), {});
+  const uint64_t culling = culled.densitiesEvaluated();
+  const RenderedView after = culled.render(camera(), pose(), nullptr);
+  EXPECT_LT(culled.densitiesEvaluated() - culling, densities);
+  double error = 0;
+  for (size_t i = 0; i < before.colour.pixels.size(); ++i) {
+    error += std::pow(before.colour.pixels[i] - after.colour.pixels[i], 2.0);
+  }
+  EXPECT_GT(-10 * std::log10(error / static_cast<double>(before.colour.pixels.size())), 25) << "only fog is missing";
+
+  CullOptions nothing;
+  nothing.minWeight = 2;  // no sample has such a weight
+  culled.cullUnseen(scene_->capture(), nothing);
+  for (const float opacity : culled.render(camera(), pose(), nullptr).opacity.pixels) EXPECT_EQ(opacity, 0);
 }
 
 TEST_F(RenderedField, IsTheSameEveryTime) {

@@ -34,17 +34,17 @@ class VisibilityMarker final : public PixelVisitor {
         options_(options),
         seen_(seen),
         pipeline_(model, {kBakingRays, kBakingSamples, 8 * kBakingSamples, false}),
-        pictureRays_(model.device(), kBakingRays) {}
+        imageRays_(model.device(), kBakingRays) {}
 
   void begin(const Photo& photo, const Camera& camera) override {
-    pictureRays_.begin(makeRayCamera(camera, photo.worldFromCamera, model_.frame()), model_.frame(), {});
+    imageRays_.begin(makeRayCamera(camera, photo.worldFromCamera, model_.frame()), model_.frame(), {});
   }
   // Rays that do not fit into one batch are processed in the next one.
   void visit(std::span<const float> pixels, SeenThrough through) override {
     const uint32_t firstBlock = through == SeenThrough::margin ? model_.space().cells() : 0;
     Device& device = model_.device();
     while (!pixels.empty()) {
-      const PictureRays::Piece piece = pictureRays_.through(pixels);
+      const ImageRays::Piece piece = imageRays_.through(pixels);
       pipeline_.forward({piece.rays, piece.origins, piece.directions, {}, {}, {}}, kBakingMinTransmittance);
       const RoundCounts counts(device.read(pipeline_.counters()), HashSamples::kRounds);
       const uint32_t samples = counts.visibleSamples, finished = counts.finished;
@@ -81,7 +81,7 @@ class VisibilityMarker final : public PixelVisitor {
   const BakeHashOptions& options_;
   std::vector<OccupancyBits>& seen_;
   HashPipeline pipeline_;
-  PictureRays pictureRays_;
+  ImageRays imageRays_;
 };
 
 // Returns the smallest range that contains all values.

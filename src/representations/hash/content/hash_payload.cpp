@@ -18,7 +18,7 @@ class HashWriter : ContentWriter {
   Bytes write() {
     Json ours = {{"weights", levelWeightsName(content_.weights)},
                  {"step", content_.step},
-                 {"whole", content_.hasLearnedBackground},
+                 {"learned_background", content_.hasLearnedBackground},
                  {"network", writeNetwork(file_, content_.network)},
                  {"parts", Json::array()}};
     if (!content_.logits.empty()) ours["logits"] = content_.logits;

@@ -163,13 +163,13 @@ TEST(HashPayload, NamesTheRuleThatIsBroken) {
   names("the step is out of bounds", [](HashContent& c) { c.step = 0; });
   names("the step is out of bounds", [&](HashContent& c) { c.step = nan; });
   names("the network's layers do not follow one another", [](HashContent& c) { c.network[0].inputs = 34; });
-  names("the network is larger than a shader takes", [](HashContent& c) {
+  names("the network is too large for a shader", [](HashContent& c) {
     const auto layer = [](uint32_t inputs, uint32_t outputs) {
       return DenseLayer{inputs, outputs, std::vector<float>(size_t{inputs} * outputs), std::vector<float>(outputs)};
     };
     c.network = {layer(23, 128), layer(128, 128), layer(128, 3)};
   });
-  names("there is no part", [](HashContent& c) { c.parts.clear(); });
+  names("there are no parts", [](HashContent& c) { c.parts.clear(); });
   names("its logits are not those of its tables", [](HashContent& c) { c.logits = {1, 2, 3}; });
   names("a logit is out of bounds", [&](HashContent& c) { c.logits = {1, 2, 3, nan}; });
   names("part 0: its columns are not those that its weights need", [](HashContent& c) { c.logits = {1, 2, 3, 4}; });
@@ -178,7 +178,7 @@ TEST(HashPayload, NamesTheRuleThatIsBroken) {
   names("part 0: a range is out of bounds", [&](HashContent& c) { c.parts[0].ranges[3].high = nan; });
   names("part 0: a range is out of bounds", [](HashContent& c) { c.parts[0].tables[1].ranges[3] = {1, 0}; });
   names("part 1: its centre or scale is out of bounds", [](HashContent& c) { c.parts[1].scale[2] = 0; });
-  names("part 0: its voxels are no whole macroblocks", [](HashContent& c) { c.parts[0].cornerBytes.pop_back(); });
+  names("part 0: its voxels are not whole macroblocks", [](HashContent& c) { c.parts[0].cornerBytes.pop_back(); });
   names("part 0: it has no tables, or too many", [](HashContent& c) {
     c.parts[0].tables.clear();
     c.parts[1].tables.clear();
@@ -187,11 +187,12 @@ TEST(HashPayload, NamesTheRuleThatIsBroken) {
   names("part 0: the resolution of a table is out of bounds",
         [](HashContent& c) { c.parts[0].tables[1].resolution = 1; });
   names("part 0: a table has no entries, or too many", [](HashContent& c) { c.parts[0].tables[1].entries = 0; });
-  names("part 0: the entries of a hashed table are no power of two",
+  names("part 0: the entries of a hashed table are not a power of two",
         [](HashContent& c) { c.parts[0].tables[1].entries = 500; });
   names("part 0: a table that is not hashed has fewer entries than points",
         [](HashContent& c) { c.parts[0].tables[0].resolution = 9; });
-  names("part 0: a table has not its entries", [](HashContent& c) { c.parts[0].tables[1].bytes.pop_back(); });
+  names("part 0: a table has the wrong number of entries",
+        [](HashContent& c) { c.parts[0].tables[1].bytes.pop_back(); });
   names("part 0: its occupancy is out of bounds", [](HashContent& c) { c.parts[0].occupied.levels.clear(); });
   names("part 0: its occupancy is out of bounds", [](HashContent& c) { c.parts[0].occupied.levels[0].cells = 12; });
   names("part 0: its distances are not those of its cells",
@@ -208,14 +209,15 @@ class HashDecoder : public tiles_test::Refusal {
 
 TEST_F(HashDecoder, RejectsMalformedHeaders) {
   refuses("is not of the representation hash", [](json& asset) { ours(asset)["representation"] = "volume"; });
-  const std::string missing = "does not say what weighs its levels";
+  const std::string missing = "weights, step or learned_background is missing or malformed";
   refuses(missing, [](json& asset) { ours(asset)["weights"] = "some"; });
   refuses(missing, [](json& asset) { ours(asset)["step"] = "long"; });
-  refuses(missing, [](json& asset) { ours(asset).erase("whole"); });
+  refuses(missing, [](json& asset) { ours(asset).erase("learned_background"); });
+  refuses("the key whole is called learned_background now", [](json& asset) { ours(asset)["whole"] = true; });
   refuses("the step is out of bounds", [](json& asset) { ours(asset)["step"] = 1e-9; });
-  refuses("its logits are none", [](json& asset) { ours(asset)["logits"] = json::array(); });
-  refuses("its logits are none", [](json& asset) { ours(asset)["logits"] = json(std::vector<float>(17)); });
-  refuses("a logit is no number", [](json& asset) { ours(asset)["logits"] = {"a"}; });
+  refuses("its logits are not a list, or", [](json& asset) { ours(asset)["logits"] = json::array(); });
+  refuses("its logits are not a list, or", [](json& asset) { ours(asset)["logits"] = json(std::vector<float>(17)); });
+  refuses("a logit is not a number", [](json& asset) { ours(asset)["logits"] = {"a"}; });
   refuses("has no parts", [](json& asset) { ours(asset)["parts"] = json::array(); });
   const std::string header = "part 0: its header";
   refuses(header, [](json& asset) { part(asset)["lattice"] = 17; });

@@ -33,18 +33,20 @@ class HashReader : public PartsReader<HashReader, HashContent, PartHeader> {
     const std::string* weights = getString(file_.ours, "weights");
     const auto known = weights ? levelWeightsFrom(*weights) : std::nullopt;
     const auto step = getNumber(file_.ours, "step");
-    const auto whole = getBoolean(file_.ours, "whole");
-    if (!known || !step || !whole)
-      return fail("does not say what weighs its levels, how long its steps are, or whether it is whole");
+    if (getField(file_.ours, "whole")) return fail("the key whole is called learned_background now");
+    const auto learnedBackground = getBoolean(file_.ours, "learned_background");
+    if (!known || !step || !learnedBackground)
+      return fail("weights, step or learned_background is missing or malformed");
     content_.weights = *known;
     content_.step = static_cast<float>(*step);
-    content_.hasLearnedBackground = *whole;
+    content_.hasLearnedBackground = *learnedBackground;
     if (!getField(file_.ours, "logits")) return true;
     const json* logits = getArray(file_.ours, "logits");
-    if (!logits || logits->empty() || logits->size() > 2 * kMaxTables) return fail("its logits are none, or too many");
+    if (!logits || logits->empty() || logits->size() > 2 * kMaxTables)
+      return fail("its logits are not a list, or are none or too many");
     for (const json& source : *logits) {
       const auto logit = numberFrom(source);
-      if (!logit) return fail("a logit is no number");
+      if (!logit) return fail("a logit is not a number");
       content_.logits.push_back(static_cast<float>(*logit));
     }
     return true;

@@ -22,11 +22,13 @@ Broken ruleOfTable(const HashTable& table) {
   if (table.resolution < 2 || table.resolution > kMaxTableResolution)
     return "the resolution of a table is out of bounds";
   if (table.entries < 1 || table.entries > kMaxTableEntries) return "a table has no entries, or too many";
-  if (table.hashed && !std::has_single_bit(table.entries)) return "the entries of a hashed table are no power of two";
+  if (table.hashed && !std::has_single_bit(table.entries))
+    return "the entries of a hashed table are not a power of two";
   const uint64_t points = uint64_t{table.resolution} * table.resolution * table.resolution;
   if (!table.hashed && table.entries < points) return "a table that is not hashed has fewer entries than points";
   if (!areRanges(table.ranges)) return "a range is out of bounds";
-  if (table.bytes.size() != uint64_t{table.entries} * HashPart::kFeatures) return "a table has not its entries";
+  if (table.bytes.size() != uint64_t{table.entries} * HashPart::kFeatures)
+    return "a table has the wrong number of entries";
   return std::nullopt;
 }
 
@@ -68,7 +70,7 @@ std::optional<std::string> mismatchWithTileset(const HashContent& content, const
 std::optional<std::string> validationError(const HashContent& content) {
   if (!(content.step >= kShortestHashStep && content.step <= kLongestHashStep)) return "the step is out of bounds";
   if (auto broken = ruleOfNetwork(content.network, kInputs, kOutputs)) return broken;
-  if (content.parts.empty()) return "there is no part";
+  if (content.parts.empty()) return "there are no parts";
   const size_t logits = content.parts.front().tables.size() * content.logitsOfLevel();
   if (content.logits.empty() ? logits > HashPart::kFeatures : logits != content.logits.size()) {
     return "its logits are not those of its tables";

@@ -118,7 +118,8 @@ void requireRenderSource(const MlpShape& shape) {
 void HashConfig::adoptTunedValues(const HashConfig& run) {
   if (distortionWeight) return;
   if (!run.distortionWeight) {
-    throw Error("config.toml", "distortion_weight", "is auto, but the config.toml of a run that has begun must have a number",
+    throw Error("config.toml", "distortion_weight",
+                "is auto, but the config.toml of a run that has begun must have a number",
                 "restore the file, or train into another folder");
   }
   distortionWeight = run.distortionWeight;
@@ -126,14 +127,14 @@ void HashConfig::adoptTunedValues(const HashConfig& run) {
 
 void HashConfig::check() const {
   ofPreset(preset);
-  backgroundBlockKind();
+  backgroundBlockMode();
   HashConfig checked = *this;
   requireWithinBounds(checked.fields());
   requireRenderSource(directionShape());
 }
 
-BackgroundBlock HashConfig::backgroundBlockKind() const {
-  return backgroundBlockNamed(backgroundBlock);
+BackgroundBlockMode HashConfig::backgroundBlockMode() const {
+  return parseBackgroundBlockMode(backgroundBlock);
 }
 
 AttentionShape HashConfig::attentionShape() const {

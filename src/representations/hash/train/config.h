@@ -94,7 +94,7 @@ struct HashConfig : BlockSettings,
   // Throws Error if there is no such preset.
   static HashConfig ofPreset(const std::string& name);
 
-  BackgroundBlock backgroundBlockKind() const;
+  BackgroundBlockMode backgroundBlockMode() const;
   AttentionShape attentionShape() const;
   bool mixesByNetwork() const { return aggregation == "mlp"; }
   VirtualGrid latticeGrid() const;      // voxels only, without planes
@@ -103,9 +103,10 @@ struct HashConfig : BlockSettings,
   MlpShape mixShape() const;            // with mixesByNetwork: lattice columns and fine levels → 8
   MlpShape directionShape() const;      // 3 diffuse, 4 features, 16 harmonics → 3
   // The multiply-accumulate operations of a renderer for one sample: for corners, entries and weights, and for the
-  // mixing network, if there is one.
+  // mixing network, if there is one; without directionShape(), which is evaluated once per ray.
   size_t multiplyAccumulates() const;
-  float longestStep() const { return static_cast<float>(maxRayStep / lattice); }  // as a fraction of the width of a domain
+  // The longest step of a ray, as a fraction of the width of a domain.
+  float longestStep() const { return static_cast<float>(maxRayStep / lattice); }
 };
 
 }  // namespace tessera

@@ -47,7 +47,7 @@ HashModel::HashModel(Device& device, const HashConfig& config, const BlockGrid& 
       config_(config),
       grid_(grid),
       frame_(makeSceneFrame(grid)),
-      space_(makeBlockSpace(grid, config.near, config.backgroundBlockKind())),
+      space_(makeBlockSpace(grid, config.near, config.backgroundBlockMode())),
       fields_(device, config, space_.blocks(), forTraining),
       direction_(device, "direction.network",
                  initialWeights(config.directionShape(), mix64(static_cast<uint64_t>(config.seed) + 2), 0xd1),
@@ -122,10 +122,10 @@ void HashModel::sample(const Rays& rays, float minTransmittance, HashSamples& se
     const Matrix<float> logDensities = rounds_.logDensities(round);
     device_.fillZero(logDensities.data);
     device_.run(AddColumns{marched, Matrix<const float>(features.data, 1, features.rowStride), logDensities});
-    rounds_.lookedUp(round);
+    rounds_.addOpticalDepths(round);
     keepTexelCount(seen, round);
   }
-  rounds_.keepSeen(seen.firstSample, seen.rayOfSample);
+  rounds_.compactVisible(seen.firstSample, seen.rayOfSample);
   rounds_.gather(asFloats(slots_.all()), asFloats(seen.slotOfSample.all()), 1);
   rounds_.gather(positions_, seen.positions, 3);
   rounds_.gather(distances_, seen.distances, 1);

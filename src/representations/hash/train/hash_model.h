@@ -25,7 +25,7 @@ struct HashSamples {
   HashSamples() = default;
   HashSamples(Device& device, uint32_t rays, uint32_t samples);
 
-  Count samples() const { return {static_cast<uint32_t>(distances.size()), counters.part(MarchRounds::kKept, 1)}; }
+  Count samples() const { return {static_cast<uint32_t>(distances.size()), counters.part(MarchRounds::kVisible, 1)}; }
   Count finished(uint32_t rays) const { return {rays, counters.part(MarchRounds::kFinished, 1)}; }
   HashFields::Samples places() const { return {samples(), slotOfSample.all(), positions.all()}; }
 };

@@ -19,7 +19,7 @@ HashPipeline::Capacity capacity() {
 }  // namespace
 
 HashModelRenderer::HashModelRenderer(HashModel& model)
-    : model_(model), pipeline_(model, capacity()), pictureRays_(model.device(), kRays) {}
+    : model_(model), pipeline_(model, capacity()), imageRays_(model.device(), kRays) {}
 
 std::string HashModelRenderer::device() const {
   return model_.device().name();
@@ -27,15 +27,15 @@ std::string HashModelRenderer::device() const {
 
 RenderedView HashModelRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
   Device& device = model_.device();
-  pictureRays_.begin(makeRayCamera(camera, worldFromCamera, model_.frame()), model_.frame(),
-                     PixelLattice::whole(camera), opaqueDepth);
+  imageRays_.begin(makeRayCamera(camera, worldFromCamera, model_.frame()), model_.frame(), PixelLattice::whole(camera),
+                   opaqueDepth);
   RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
                     ImageF(camera.width, camera.height, 1)};
   const bool learned = model_.config().background == "learned";
   const size_t pixelCount = view.opacity.pixels.size();
   uint32_t nextRays = 1024;  // rays of the next batch, predicted from the samples of the last one
   for (size_t first = 0; first < pixelCount;) {
-    const PictureRays::Piece piece = pictureRays_.piece(first, nextRays);
+    const ImageRays::Piece piece = imageRays_.piece(first, nextRays);
     const HashModel::Rays rays{piece.rays, piece.origins, piece.directions, {}, {}, piece.far};
     pipeline_.forward(rays, kDrawingMinTransmittance);
     const RoundCounts counts(device.read(pipeline_.counters()), HashSamples::kRounds);
@@ -52,7 +52,7 @@ RenderedView HashModelRenderer::render(const Camera& camera, const Pose& worldFr
       for (size_t c = 0; c < 3; ++c) view.colour.pixels[3 * pixel + c] = share * colour[3 * ray + c];
       view.opacity.pixels[pixel] = isOpaque ? 1 : opacity[ray];
       const float seenDepth = isOpaque ? depth[ray] / std::max(opacity[ray], 1e-6f) : depth[ray];
-      view.depth.pixels[pixel] = pictureRays_.toViewDepth(ray, seenDepth);
+      view.depth.pixels[pixel] = imageRays_.toViewDepth(ray, seenDepth);
     }
     first += finished;
     // Each round of marching, and the set of visible samples, has a capacity of kSamples.

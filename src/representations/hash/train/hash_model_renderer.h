@@ -3,7 +3,7 @@
 
 #include "representations/hash/train/hash_pipeline.h"
 #include "scene/view_renderer.h"
-#include "train/picture_rays.h"
+#include "train/image_rays.h"
 
 namespace tessera {
 
@@ -18,7 +18,7 @@ class HashModelRenderer final : public ViewRenderer {
  private:
   HashModel& model_;
   HashPipeline pipeline_;
-  PictureRays pictureRays_;
+  ImageRays imageRays_;
 };
 
 }  // namespace tessera

@@ -159,7 +159,7 @@ TEST(HashPipeline, ChangesLittleWhereRaysEndEarly) {
   constexpr float kEnd = 2e-3f;
   scene.pipeline->forward(scene.rays(), 1e-6f);
   const std::vector<float> whole = scene.device->read(scene.pipeline->sums());
-  const uint32_t all = scene.device->read(scene.pipeline->counters())[MarchRounds::kKept];
+  const uint32_t all = scene.device->read(scene.pipeline->counters())[MarchRounds::kVisible];
   const Matrix<const float> features = scene.model->fields().forward(scene.pipeline->samples().places(), false);
   const std::vector<float> sampleFeatures = scene.device->read(features.data);
   float largest = 0;
@@ -170,7 +170,7 @@ TEST(HashPipeline, ChangesLittleWhereRaysEndEarly) {
   }
   scene.pipeline->forward(scene.rays(), kEnd);
   const std::vector<float> early = scene.device->read(scene.pipeline->sums());
-  EXPECT_LT(scene.device->read(scene.pipeline->counters())[MarchRounds::kKept], 0.9 * all) << "some rays end early";
+  EXPECT_LT(scene.device->read(scene.pipeline->counters())[MarchRounds::kVisible], 0.9 * all) << "some rays end early";
   float change = 0;
   for (size_t i = 0; i < whole.size(); ++i) change = std::max(change, std::abs(early[i] - whole[i]));
   EXPECT_LE(change, kEnd * largest);

@@ -28,14 +28,14 @@ class GpuHashDrawer final : public GpuDrawer {
     return std::make_unique<GpuHashContent>(stream_, contentAs<HashContent>(content));
   }
 
-  void draw(GpuPicture& picture, const SceneView<GpuContent>& view, const PictureRequest& request,
+  void draw(GpuFrame& frame, const SceneView<GpuContent>& view, const ViewRequest& request,
             const DrawSettings& settings) override {
     findNetworks(view);
-    picture.begin(view.frame, settings.minTransmittance, kNumbersOfPixel + static_cast<uint32_t>(networks_.size()),
-                  request);
-    for (const DrawnContent<GpuContent>& drawn : view.frontToBack) add(picture, drawn, false);
-    if (view.backgroundBlock != nullptr) add(picture, view.backgroundBlock, true);
-    end(picture);
+    frame.begin(view.frame, settings.minTransmittance, kNumbersOfPixel + static_cast<uint32_t>(networks_.size()),
+                request);
+    for (const DrawnContent<GpuContent>& drawn : view.frontToBack) add(frame, drawn, false);
+    if (view.backgroundBlock != nullptr) add(frame, view.backgroundBlock, true);
+    end(frame);
   }
 
  private:
@@ -66,10 +66,10 @@ class GpuHashDrawer final : public GpuDrawer {
                         [&](const GpuHashContent* other) { return other->layers == content.layers; });
   }
 
-  void add(GpuPicture& picture, const DrawnContent<GpuContent>& drawn, bool isBackgroundBlock) {
+  void add(GpuFrame& frame, const DrawnContent<GpuContent>& drawn, bool isBackgroundBlock) {
     const GpuHashContent& content = toHashContent(drawn.content);
     auto draw =
-        drawArguments<arguments::DrawHashArguments>(picture.view(), content, drawn.low, drawn.high, isBackgroundBlock);
+        drawArguments<arguments::DrawHashArguments>(frame.view(), content, drawn.low, drawn.high, isBackgroundBlock);
     draw.network = static_cast<uint32_t>(findNetwork(content) - networks_.begin());
     draw.stepLength = content.step;
     draw.columns = content.columns;
@@ -78,10 +78,10 @@ class GpuHashDrawer final : public GpuDrawer {
     std::span<const uint32_t> spirv = kDrawHashSpirv;
     if (content.varies) spirv = kDrawHashVaryingSpirv;
     if (content.varies && content.weights == LevelWeights::shared) spirv = kDrawHashVaryingSharedSpirv;
-    picture.run(kernels_.get(spirv, content.tables), draw);
+    frame.run(kernels_.get(spirv, content.tables), draw);
   }
 
-  void end(GpuPicture& picture) {
+  void end(GpuFrame& frame) {
     std::vector<arguments::NetworkArguments> table;
     uint32_t maxWidth = 1;
     for (const GpuHashContent* content : networks_) {
@@ -89,7 +89,7 @@ class GpuHashDrawer final : public GpuDrawer {
       maxWidth = std::max(maxWidth, content->network.maxWidth);
     }
     arguments::EndHashArguments end = {};
-    end.view = picture.view();
+    end.view = frame.view();
     end.networkCount = static_cast<uint32_t>(table.size());
     end.backgroundContent = table.empty() ? 0 : end.networkCount - 1;
     end.hasLearnedBackground = hasLearnedBackground_;
@@ -102,7 +102,7 @@ class GpuHashDrawer final : public GpuDrawer {
       stream_->upload(networkTable_, 0, bytes);
       end.networks = networkTable_.address();
     }
-    picture.run(kernels_.get(kEndHashSpirv, std::max(maxWidth, 23u)), end);
+    frame.run(kernels_.get(kEndHashSpirv, std::max(maxWidth, 23u)), end);
   }
 
   std::shared_ptr<GpuStream> stream_;

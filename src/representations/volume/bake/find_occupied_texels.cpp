@@ -37,16 +37,16 @@ class OccupiedTexelFinder final : public PixelVisitor {
         options_(options),
         occupied_(occupied),
         pipeline_(model, rayCapacity(model)),
-        pictureRays_(model.device(), kRays) {
+        imageRays_(model.device(), kRays) {
     drawing_.minAlpha = static_cast<float>(options.minAlpha);
   }
   void begin(const Photo& photo, const Camera& camera) override {
-    pictureRays_.begin(makeRayCamera(camera, photo.worldFromCamera, model_.frame()), model_.frame(), {});
+    imageRays_.begin(makeRayCamera(camera, photo.worldFromCamera, model_.frame()), model_.frame(), {});
   }
   void visit(std::span<const float> pixels, SeenThrough through) override {
     const uint32_t firstBlock = through == SeenThrough::margin ? model_.space().cells() : 0;
     Device& device = model_.device();
-    const PictureRays::Piece piece = pictureRays_.through(pixels);
+    const ImageRays::Piece piece = imageRays_.through(pixels);
     pipeline_.forward({piece.rays, piece.origins, piece.directions, {}, {}, {}}, drawing_);
     const uint32_t samples = device.read(pipeline_.firstSample().part(piece.rays, 1))[0];
     const std::vector<float> weights = device.read(pipeline_.weights().part(0, samples));
@@ -67,7 +67,7 @@ class OccupiedTexelFinder final : public PixelVisitor {
   const BakeOptions& options_;
   std::vector<OccupiedTexels>& occupied_;
   VolumePipeline pipeline_;
-  PictureRays pictureRays_;
+  ImageRays imageRays_;
   VolumePipeline::Options drawing_;
 };
 

@@ -13,8 +13,8 @@
 #include "representations/volume/testing/volume_renderer.h"
 #include "representations/volume/train/train_volume.h"
 #include "tiles/scene_folder.h"
+#include "train/image_rays.h"
 #include "train/level_folders.h"
-#include "train/picture_rays.h"
 
 namespace tessera {
 namespace {
@@ -81,7 +81,7 @@ TEST(FindOccupiedTexels, FindsWhatThePixelsOfAllPhotosShow) {
   capacity.rays = kRays;
   capacity.texels = 20 * kRays * (12 + 4);
   VolumePipeline pipeline(model, capacity);
-  PictureRays pictureRays(device, kRays);
+  ImageRays imageRays(device, kRays);
   VolumePipeline::Options drawing;
   drawing.minAlpha = static_cast<float>(options.minAlpha);
   const int w = CubeScene::kWidth, h = CubeScene::kHeight;
@@ -91,9 +91,9 @@ TEST(FindOccupiedTexels, FindsWhatThePixelsOfAllPhotosShow) {
   float highest = -1;
   for (const int photo : scene.capture().photosIn(Split::train)) {
     const PixelLattice lattice{0, 0, w, h, 1};
-    pictureRays.begin(makePhotoCamera(photo), model.frame(), lattice);
+    imageRays.begin(makePhotoCamera(photo), model.frame(), lattice);
     for (size_t first = 0; first < lattice.count(); first += kRays) {
-      const PictureRays::Piece piece = pictureRays.piece(first, kRays);
+      const ImageRays::Piece piece = imageRays.piece(first, kRays);
       const std::vector<float> directions = device.read(piece.directions.part(0, size_t{3} * piece.rays));
       for (uint32_t ray = 0; ray < piece.rays; ++ray) highest = std::max(highest, directions[3 * ray + 2]);
     }
@@ -104,9 +104,9 @@ TEST(FindOccupiedTexels, FindsWhatThePixelsOfAllPhotosShow) {
     for (const bool beside : {false, true}) {
       const PixelLattice lattice =
           beside ? PixelLattice{-w / 2, -h / 2, w + w / 2, h + h / 2, 6} : PixelLattice{0, 0, w, h, 2};
-      pictureRays.begin(view, model.frame(), lattice);
+      imageRays.begin(view, model.frame(), lattice);
       for (size_t first = 0; first < lattice.count(); first += kRays) {
-        const PictureRays::Piece piece = pictureRays.piece(first, kRays);
+        const ImageRays::Piece piece = imageRays.piece(first, kRays);
         pipeline.forward({piece.rays, piece.origins, piece.directions, {}, {}, {}}, drawing);
         const std::vector<uint32_t> firstSample = device.read(pipeline.firstSample()),
                                     block = device.read(pipeline.blockOfSample());

@@ -251,17 +251,18 @@ TEST(VolumePayload, NamesTheRuleThatIsBroken) {
   names("the steps per texel are out of bounds", [](VolumeContent& c) { c.stepsPerTexel = 9; });
   names("the network has no layers, or too many", [](VolumeContent& c) { c.network.clear(); });
   names("the network's layers do not follow one another", [](VolumeContent& c) { c.network[1].inputs = 15; });
-  names("the network's layers have not the numbers that they need",
+  names("a layer of the network has the wrong number of weights or biases",
         [](VolumeContent& c) { c.network[1].weights.pop_back(); });
-  names("the network holds a number that is not finite", [&](VolumeContent& c) { c.network[1].biases[0] = nan; });
+  names("the network contains a number that is not finite", [&](VolumeContent& c) { c.network[1].biases[0] = nan; });
   names("the network does not end in a colour", [](VolumeContent& c) { c.network.pop_back(); });
-  names("there is no part", [](VolumeContent& c) { c.parts.clear(); });
+  names("there are no parts", [](VolumeContent& c) { c.parts.clear(); });
   names("part 0: its number of voxels is out of bounds", [](VolumeContent& c) { c.parts[0].voxels = 12; });
   names("part 0: its number of plane texels is out of bounds", [](VolumeContent& c) { c.parts[0].planes = 4104; });
   names("part 1: its centre or scale is out of bounds", [&](VolumeContent& c) { c.parts[1].centre[2] = nan; });
   names("part 1: its centre or scale is out of bounds", [](VolumeContent& c) { c.parts[1].scale[2] = 0; });
-  names("part 1: its box is none", [](VolumeContent& c) { c.parts[1].low[1] = 1; });
-  names("part 0: it is bounded, but its box leaves its domain", [](VolumeContent& c) { c.parts[0].low[0] = -1.1f; });
+  names("part 1: its box is empty or out of bounds", [](VolumeContent& c) { c.parts[1].low[1] = 1; });
+  names("part 0: it is bounded, but its box is not within its domain",
+        [](VolumeContent& c) { c.parts[0].low[0] = -1.1f; });
   names("part 0: a background block is not contracted", [](VolumeContent& c) { c.parts[0].backgroundBlock = true; });
   names("a background block is not alone",
         [](VolumeContent& c) { c.parts[0].backgroundBlock = c.parts[0].contracted = true; });
@@ -269,7 +270,7 @@ TEST(VolumePayload, NamesTheRuleThatIsBroken) {
     c.parts[0].high[0] = 1.5f;
     c.parts[0].contracted = true;
   });
-  names("part 0: its voxels are no whole macroblocks", [](VolumeContent& c) { c.parts[0].voxelBytes.pop_back(); });
+  names("part 0: its voxels are not whole macroblocks", [](VolumeContent& c) { c.parts[0].voxelBytes.pop_back(); });
   names("part 0: its macroblock numbers are not those of its grid",
         [](VolumeContent& c) { c.parts[0].macroblocks.pop_back(); });
   const auto firstStored = [](VolumeContent& c) -> uint32_t& {
@@ -281,7 +282,8 @@ TEST(VolumePayload, NamesTheRuleThatIsBroken) {
   names("part 0: the number of a macroblock is out of range", [&](VolumeContent& c) { firstStored(c) = 8; });
   names("part 0: a macroblock is used twice", [&](VolumeContent& c) { firstStored(c) = 1; });
   names("part 0: a macroblock is never used", [&](VolumeContent& c) { firstStored(c) = VolumePart::kEmpty; });
-  names("part 0: a plane has not its texels", [](VolumeContent& c) { c.parts[0].planeBytes[2].pop_back(); });
+  names("part 0: a plane has the wrong number of texels",
+        [](VolumeContent& c) { c.parts[0].planeBytes[2].pop_back(); });
   names("part 0: its distances are not those of its cells", [](VolumeContent& c) { c.parts[0].distances.pop_back(); });
 }
 
@@ -296,7 +298,7 @@ class VolumeDecoder : public tiles_test::Refusal {
 TEST_F(VolumeDecoder, RejectsFilesThatAreNoContent) {
   std::string reason;
   EXPECT_FALSE(decodeVolume({}, reason));
-  EXPECT_EQ(reason, "is not a binary glTF file of version 2, or is cut short");
+  EXPECT_EQ(reason, "is not a binary glTF 2.0 file, or is cut short");
   refuses("its JSON is not that", [](json& asset) { asset = json::array(); });
   refuses("its JSON is not that", [](json& asset) { asset["asset"]["version"] = "1.0"; });
   refuses("has no extension", [](json& asset) { asset.erase("extensions"); });
@@ -326,7 +328,7 @@ TEST_F(VolumeDecoder, RejectsNetworksThatDoNotFit) {
   refuses("a layer of the network is out", [](json& asset) { ours(asset)["network"]["layers"][0] = {34, 1 << 30}; });
   refuses("a layer of the network has no two", [](json& asset) { ours(asset)["network"]["layers"][0] = {34}; });
   refuses("the network has more", [](json& asset) { ours(asset)["network"]["layers"].erase(2); });
-  refusesBytes("the network holds a number that is not finite", [](json& asset, Bytes& bytes) {
+  refusesBytes("the network contains a number that is not finite", [](json& asset, Bytes& bytes) {
     const float nan = std::numeric_limits<float>::quiet_NaN();
     const size_t view = ours(asset)["network"]["bufferView"];
     std::memcpy(bytes.data() + asset["bufferViews"][view]["byteOffset"].get<size_t>() + 40, &nan, 4);

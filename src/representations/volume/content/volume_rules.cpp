@@ -20,7 +20,7 @@ Broken ruleOfPart(const VolumePart& part) {
     return broken;
   for (const std::vector<uint8_t>& plane : part.planeBytes) {
     if (plane.size() != size_t{part.planes} * part.planes * VolumePart::kAttributes)
-      return "a plane has not its texels";
+      return "a plane has the wrong number of texels";
   }
   const uint32_t cells = part.planes / VolumePart::kDistanceCell;
   if (part.distances.size() != size_t{cells} * cells * cells) return "its distances are not those of its cells";

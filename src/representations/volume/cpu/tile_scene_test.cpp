@@ -150,8 +150,8 @@ TEST_F(InconsistentVolumeScene, IsRejectedWhereABackgroundBlockIsNotDeclaredAsSu
   std::vector<TileContent>& contents = tileset_.tiles[0].contents;
   ASSERT_TRUE(contents[1].backgroundBlock);
   std::swap(contents[0].uri, contents[1].uri);
-  refuses(false, 0, "part 0 is a background block, and tileset.json says that the content is none");
-  refuses(true, 0, "part 0 is no background block, and tileset.json says that the content is one");
+  refuses(false, 0, "part 0 is a background block, and tileset.json says that the content is not");
+  refuses(true, 0, "part 0 is not a background block, and tileset.json says that the content is one");
   // The renderer relies on it, and throws instead of rendering.
   const TileScene scene = openTileScene(folder_, volumeCodec());
   EXPECT_THROW(VolumeRenderer(scene.frame, scene.tree, scene.source, {}), Error);

@@ -6,10 +6,8 @@
 
 namespace tessera {
 
-// Settings that train in seconds and still learn the cube.
-inline VolumeConfig smallVolumeConfig() {
-  VolumeConfig config;
-  config.backgroundBlock = "none";
+// Returns settings with the sizes of a model that trains within seconds; all else as in `config`.
+inline VolumeConfig shrunk(VolumeConfig config) {
   config.voxels = 32;
   config.planes = 64;
   config.gridLevels = 6;
@@ -27,6 +25,13 @@ inline VolumeConfig smallVolumeConfig() {
   config.firstRays = 512;
   config.maxRays = 2048;
   config.sparsityPoints = 256;
+  return config;
+}
+
+// Returns settings that train in seconds and still learn the cube.
+inline VolumeConfig smallVolumeConfig() {
+  VolumeConfig config = shrunk({});
+  config.backgroundBlock = "none";
   config.learningRate = 2e-2;
   config.fullGradientDistance = 0;
   config.exposure = false;

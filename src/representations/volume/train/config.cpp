@@ -4,11 +4,13 @@
 #include "train/block_frame.h"
 
 namespace tessera {
+
 VolumeConfig VolumeConfig::ofPreset(const std::string& name) {
   VolumeConfig config;
   config.preset = name;
   if (name == "cpu") return config;
   if (name != "paper") throw Error("--set preset=" + name, "", "there is no such preset", "use cpu or paper");
+  config.backgroundBlock = "border";
   config.voxels = 512;
   config.planes = 2048;
   config.gridLevels = 16;
@@ -21,8 +23,17 @@ VolumeConfig VolumeConfig::ofPreset(const std::string& name) {
   config.firstIntervals = config.secondIntervals = 64;
   config.samples = 32;
   config.proposalEvery = 1;
-  config.texelsPerStep = 1 << 22;
+  // With these networks, more would exceed what operations can index (2^31 activations). 16384 rays usually need fewer
+  // distinct texels; where they need more, a step has fewer rays.
+  config.texelsPerStep = 5 << 20;
+  config.firstRays = config.maxRays = 16384;
   config.sparsityPoints = 1 << 17;
+  config.constantLearningRateFraction = 0;
+  // The following are not in the paper.
+  config.networkL2 = config.fullGradientDistance = config.sparseDepthRayFraction = 0;
+  config.uniformSampleFraction = 0;
+  config.deferredLearningRateFactor = 1;
+  config.nearFromSparseDepth = config.exposure = false;
   return config;
 }
 
@@ -103,14 +114,14 @@ std::vector<ConfigField> VolumeConfig::fields() {
 }
 
 void VolumeConfig::check() const {
-  backgroundBlockKind();
+  backgroundBlockMode();
   ofPreset(preset);
   VolumeConfig checked = *this;
   requireWithinBounds(checked.fields());
 }
 
-BackgroundBlock VolumeConfig::backgroundBlockKind() const {
-  return backgroundBlockNamed(backgroundBlock);
+BackgroundBlockMode VolumeConfig::backgroundBlockMode() const {
+  return parseBackgroundBlockMode(backgroundBlock);
 }
 
 VirtualGrid VolumeConfig::virtualGrid() const {

@@ -13,8 +13,9 @@
 
 namespace tessera {
 
-// The defaults are those of the preset `cpu`. ofPreset changes those that differ in `paper`, which has the values of
-// the paper and of MERF.
+// The defaults are those of the preset `cpu`. ofPreset changes those that differ in `paper`, which has the sizes,
+// schedule, border blocks and losses of the paper, and the values of MERF where the paper states none; README.md lists
+// what it has in common with `cpu` although neither states it.
 struct VolumeConfig : BlockSettings,
                       RaySettings,
                       RandomBackgroundSettings,
@@ -99,7 +100,7 @@ struct VolumeConfig : BlockSettings,
   // Returns the settings of a preset. Throws Error if there is no preset of that name.
   static VolumeConfig ofPreset(const std::string& name);
 
-  BackgroundBlock backgroundBlockKind() const;
+  BackgroundBlockMode backgroundBlockMode() const;
   VirtualGrid virtualGrid() const;
   BlockFieldShape attributeShape() const;
   BlockFieldShape proposalShape() const;

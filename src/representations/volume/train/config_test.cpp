@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 
 #include "base/error.h"
@@ -21,9 +22,46 @@ TEST(VolumeConfig, HasPresetsThatCanBeTrained) {
   EXPECT_THROW(VolumeConfig::ofPreset("gpu"), Error);
 }
 
+// City-on-Web, section 5 (implementation details), and MERF.
+TEST(VolumeConfig, HasThePapersScheduleBorderBlocksAndLossesInThePresetPaper) {
+  const VolumeConfig paper = VolumeConfig::ofPreset("paper");
+  const RateSchedule schedule = paper.rateSchedule();
+  constexpr int64_t kSteps = 50000;
+  EXPECT_DOUBLE_EQ(schedule.at(schedule.warmUpSteps, kSteps), 1e-2 * std::pow(0.1, schedule.warmUpSteps / 5e4));
+  EXPECT_NEAR(schedule.at(kSteps / 2, kSteps), 1e-2 * std::sqrt(0.1), 1e-9);
+  EXPECT_DOUBLE_EQ(schedule.at(kSteps, kSteps), 1e-3);
+  EXPECT_EQ(paper.firstRays, 16384);
+  EXPECT_EQ(paper.maxRays, 16384);
+  EXPECT_EQ(paper.backgroundBlockMode(), BackgroundBlockMode::border);
+  EXPECT_EQ(paper.attributeShape().network.hiddenLayers, 3);
+  EXPECT_EQ(paper.attributeShape().network.width, 64);
+  EXPECT_EQ(paper.loss, "charbonnier");
+  for (const double weight :
+       {paper.s3imWeight, paper.interlevelWeight, paper.distortionWeight, paper.sparsityWeight, paper.opacityWeight}) {
+    EXPECT_GT(weight, 0);
+  }
+}
+
+TEST(VolumeConfig, HasNothingThatThePaperLacksInThePresetPaper) {
+  const VolumeConfig paper = VolumeConfig::ofPreset("paper");
+  for (const double addition :
+       {paper.networkL2, paper.fullGradientDistance, paper.sparseDepthRayFraction, paper.uniformSampleFraction}) {
+    EXPECT_EQ(addition, 0);
+  }
+  EXPECT_EQ(paper.deferredLearningRateFactor, 1);
+  for (const bool addition : {paper.nearFromSparseDepth, paper.exposure, paper.blocksOnly}) EXPECT_FALSE(addition);
+}
+
+// Operations index activations with 31 bits; VolumeTrainer reserves half as many texels again for steps that need more.
+TEST(VolumeConfig, HasBatchesThatOperationsCanIndexInThePresetPaper) {
+  const VolumeConfig paper = VolumeConfig::ofPreset("paper");
+  const double texels = 1.5 * paper.texelsPerStep + VirtualGrid::kCorners * paper.sparsityPoints;
+  EXPECT_LT(texels * static_cast<double>(paper.attributeShape().network.activationsPerSample()), std::pow(2.0, 31));
+}
+
 TEST(VolumeConfig, RoundTripsThroughItsFile) {
   VolumeConfig config = VolumeConfig::ofPreset("paper"), read;
-  config.backgroundBlock = "border";
+  config.backgroundBlock = "none";
   config.opacityWeight = 0.25;
   const fs::path path = fs::temp_directory_path() / "tessera-volume-config.toml";
   writeFileAtomically(path, configToToml(config.fields()));

@@ -54,7 +54,7 @@ VolumeModel::VolumeModel(Device& device, const VolumeConfig& config, const Block
       config_(config),
       grid_(grid),
       frame_(makeSceneFrame(grid)),
-      space_(makeBlockSpace(grid, config.near, config.backgroundBlockKind())),
+      space_(makeBlockSpace(grid, config.near, config.backgroundBlockMode())),
       virtualGrid_(config.virtualGrid()),
       groups_(groupsOfLevel(space_.columns, space_.rows, static_cast<uint32_t>(config.lod),
                             space_.blocks() > space_.cells())),

@@ -28,7 +28,7 @@ VolumePipeline::Capacity makeCapacity(const VolumeModel& model) {
 }  // namespace
 
 VolumeModelRenderer::VolumeModelRenderer(VolumeModel& model, float minAlpha)
-    : model_(model), minAlpha_(minAlpha), pipeline_(model, makeCapacity(model)), pictureRays_(model.device(), kRays) {}
+    : model_(model), minAlpha_(minAlpha), pipeline_(model, makeCapacity(model)), imageRays_(model.device(), kRays) {}
 
 std::string VolumeModelRenderer::device() const {
   return model_.device().name();
@@ -36,15 +36,15 @@ std::string VolumeModelRenderer::device() const {
 
 RenderedView VolumeModelRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
   Device& device = model_.device();
-  pictureRays_.begin(makeRayCamera(camera, worldFromCamera, model_.frame()), model_.frame(),
-                     PixelLattice::whole(camera), opaqueDepth);
+  imageRays_.begin(makeRayCamera(camera, worldFromCamera, model_.frame()), model_.frame(), PixelLattice::whole(camera),
+                   opaqueDepth);
   RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
                     ImageF(camera.width, camera.height, 1)};
   VolumePipeline::Options options;
   options.minAlpha = minAlpha_;
   options.uniformFraction = kUniformFraction;
   for (size_t first = 0; first < view.opacity.pixels.size(); first += kRays) {
-    const PictureRays::Piece piece = pictureRays_.piece(first, kRays);
+    const ImageRays::Piece piece = imageRays_.piece(first, kRays);
     pipeline_.forward({piece.rays, piece.origins, piece.directions, {}, piece.far, {}}, options);
     const std::vector<float> colour = device.read(pipeline_.colour().part(0, size_t{3} * piece.rays));
     const std::vector<float> opacity = device.read(pipeline_.opacity().part(0, piece.rays));
@@ -52,7 +52,7 @@ RenderedView VolumeModelRenderer::render(const Camera& camera, const Pose& world
     std::copy(colour.begin(), colour.end(), view.colour.pixels.begin() + static_cast<ptrdiff_t>(first * 3));
     std::copy(opacity.begin(), opacity.end(), view.opacity.pixels.begin() + static_cast<ptrdiff_t>(first));
     for (uint32_t ray = 0; ray < piece.rays; ++ray) {
-      view.depth.pixels[first + ray] = pictureRays_.toViewDepth(ray, depth[ray]);
+      view.depth.pixels[first + ray] = imageRays_.toViewDepth(ray, depth[ray]);
     }
   }
   return view;

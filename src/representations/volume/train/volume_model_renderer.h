@@ -4,7 +4,7 @@
 
 #include "representations/volume/train/volume_pipeline.h"
 #include "scene/view_renderer.h"
-#include "train/picture_rays.h"
+#include "train/image_rays.h"
 
 namespace tessera {
 
@@ -21,7 +21,7 @@ class VolumeModelRenderer final : public ViewRenderer {
   VolumeModel& model_;
   float minAlpha_;
   VolumePipeline pipeline_;
-  PictureRays pictureRays_;
+  ImageRays imageRays_;
 };
 
 }  // namespace tessera

@@ -143,10 +143,10 @@ VolumePipeline::Options VolumeTrainer::passOptions(int64_t step, double progress
   bool warm = step >= config_.proposalWarmupSteps;
   double annealed = (static_cast<double>(step) + 1) / kAnnealSteps;
   if (residency_ && step < residency_->cycleSteps()) {  // the first time in memory for every resident block
-    const Residency::Place place = residency_->at(step);
+    const Residency::Position position = residency_->at(step);
     const double length =
-        std::min(kAnnealSteps, static_cast<double>(residency_->residentSets()[place.residentSet].steps));
-    annealed = (static_cast<double>(place.stepsInto) + 1) / length;
+        std::min(kAnnealSteps, static_cast<double>(residency_->residentSets()[position.residentSet].steps));
+    annealed = (static_cast<double>(position.stepsInto) + 1) / length;
     warm = false;
   }
   if (config_.lod > 0) annealed = 1;

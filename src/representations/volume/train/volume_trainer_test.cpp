@@ -48,6 +48,15 @@ TEST(VolumeTrainer, LearnsWhatLiesAroundTheRegionInTheBackgroundBlock) {
   }
 }
 
+TEST(VolumeTrainer, LearnsACubeAndItsSurroundingsWithThePapersPreset) {
+  CubeScene::Options options;
+  options.isEnclosed = true;
+  const CubeScene scene(options);
+  TrainedVolumeCube trained(scene, shrunk(VolumeConfig::ofPreset("paper")), cubeGrid(2), 300);
+  EXPECT_EQ(trained.model().space().blocks(), 2u) << "no background block of its own";
+  EXPECT_GT(heldOut(scene, trained.model()), 18);
+}
+
 // Returns the median absolute error of depth over all pixels of the held-out photos.
 double depthError(const CubeScene& scene, VolumeModel& model) {
   VolumeModelRenderer renderer(model, static_cast<float>(model.config().cullLast));

@@ -20,26 +20,26 @@ class GpuVolumeDrawer final : public GpuDrawer {
     return std::make_unique<GpuVolumeContent>(stream_, contentAs<VolumeContent>(content));
   }
 
-  void draw(GpuPicture& picture, const SceneView<GpuContent>& view, const PictureRequest& request,
+  void draw(GpuFrame& frame, const SceneView<GpuContent>& view, const ViewRequest& request,
             const DrawSettings& settings) override {
-    picture.begin(view.frame, settings.minTransmittance, kNumbersOfPixel, request);
-    for (const DrawnContent<GpuContent>& drawn : view.frontToBack) add(picture, drawn, false);
-    if (view.backgroundBlock != nullptr) add(picture, view.backgroundBlock, true);
-    picture.run(kernels_.get(kEndVolumeSpirv, 0), picture.view());
+    frame.begin(view.frame, settings.minTransmittance, kNumbersOfPixel, request);
+    for (const DrawnContent<GpuContent>& drawn : view.frontToBack) add(frame, drawn, false);
+    if (view.backgroundBlock != nullptr) add(frame, view.backgroundBlock, true);
+    frame.run(kernels_.get(kEndVolumeSpirv, 0), frame.view());
   }
 
  private:
-  void add(GpuPicture& picture, const DrawnContent<GpuContent>& drawn, bool isBackgroundBlock) {
+  void add(GpuFrame& frame, const DrawnContent<GpuContent>& drawn, bool isBackgroundBlock) {
     const auto& content = static_cast<const GpuVolumeContent&>(*drawn.content);
-    auto draw = drawArguments<arguments::DrawVolumeArguments>(picture.view(), content, drawn.low, drawn.high,
-                                                              isBackgroundBlock);
+    auto draw =
+        drawArguments<arguments::DrawVolumeArguments>(frame.view(), content, drawn.low, drawn.high, isBackgroundBlock);
     draw.layerCount = content.network.layerCount;
     draw.featureRange = content.featureRange;
     draw.densityRange = content.densityRange;
     draw.stepsPerTexel = content.stepsPerTexel;
     draw.layers = content.network.layers;
     draw.weights = content.network.weights;
-    picture.run(kernels_.get(kDrawVolumeSpirv, content.network.maxWidth), draw);
+    frame.run(kernels_.get(kDrawVolumeSpirv, content.network.maxWidth), draw);
   }
 
   std::shared_ptr<GpuStream> stream_;

@@ -23,7 +23,7 @@ describe('checkGltf', () => {
   });
 
   it('names what is wrong', () => {
-    expect(said(new TextEncoder().encode('garbage'))).toBe('x.glb: is no glTF file; export it again');
+    expect(said(new TextEncoder().encode('garbage'))).toBe('x.glb: is not a glTF file; export it again');
     expect(said(cube().subarray(0, 100))).toContain('x.glb: is cut off');
     expect(said(cube((gltf) => (gltf.asset.version = '1.0')))).toContain('is not glTF 2.0');
     expect(said(new TextEncoder().encode('null'))).toContain('is not glTF 2.0');

@@ -27,7 +27,7 @@ export function checkGltf(bytes: Uint8Array, main: ModelFile, files: readonly Mo
   try {
     gltf = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(text));
   } catch {
-    return fail('is no glTF file');
+    return fail('is not a glTF file');
   }
   if (!/^2\./.test(getString(getField(gltf, 'asset'), 'version') ?? '')) fail('is not glTF 2.0', 'export it as glTF 2.0');
   const required = getStrings(gltf, 'extensionsRequired');

@@ -53,7 +53,7 @@ export function addModels(
       return;
     }
     if (mains.length === 0) {
-      throw new SceneError(baseName(files[0].path), '', 'is no model', 'drop glTF, GLB, OBJ or FBX');
+      throw new SceneError(baseName(files[0].path), '', 'is not a model', 'drop glTF, GLB, OBJ or FBX');
     }
     for (const main of mains) {
       await addModel(main, files, place).catch(fail);

@@ -60,7 +60,7 @@ export function takePicture(
     }
     const blob = await new Promise<Blob | null>((resolve) => picture.toBlob(resolve, 'image/png'));
     signal.throwIfAborted();
-    if (!blob) throw new Error(`the browser has no memory for a picture of ${width} by ${height}`);
+    if (!blob) throw new Error(`the browser has no memory for an image of ${width} by ${height}`);
     return blob;
   });
 }
@@ -91,7 +91,7 @@ export function addScreenshot(viewer: Viewer, toolbar: Toolbar): void {
     return input;
   };
   const [width, height] = [side('Width'), side('Height')];
-  const take = element('button', '', 'Save picture');
+  const take = element('button', '', 'Save image');
   const cancel = element('button', '', 'Cancel');
   const isTaking = (is: boolean) => {
     take.hidden = is;
@@ -135,5 +135,5 @@ export function addScreenshot(viewer: Viewer, toolbar: Toolbar): void {
     }
   });
   const panel = element('div', '', presets, element('div', 'row', width, '×', height), element('div', 'row', take, cancel), said);
-  toolbar.add({ name: 'Picture', key: 'p', icon: 'camera', panel });
+  toolbar.add({ name: 'Image', key: 'p', icon: 'camera', panel });
 }

@@ -26,13 +26,13 @@ export function numbersWithin(object: Json, key: string, count: number, maximum:
 }
 
 export function numberWithin(object: Json, key: string, maximum: number, fail: Fail): number {
-  const read = numberFrom(getField(object, key)) ?? fail(`.${key}`, 'is no number');
+  const read = numberFrom(getField(object, key)) ?? fail(`.${key}`, 'is not a number');
   return Math.abs(read) <= maximum ? read : fail(`.${key}`, `is beyond ${maximum}`);
 }
 
 export function readScales(values: Json[], place: string, fail: Fail): number[] {
   const read = values.map(numberFrom).filter((x) => x !== undefined);
-  if (read.length !== values.length) fail(place, 'is no number');
+  if (read.length !== values.length) fail(place, 'is not a number');
   if (!read.every((x) => x >= kScales.minimum)) fail(place, `is not above ${kScales.minimum}`);
   return read.every((x) => x <= kScales.maximum) ? read : fail(place, `has a number beyond ${kScales.maximum}`);
 }
@@ -41,7 +41,7 @@ export function readScales(values: Json[], place: string, fail: Fail): number[] 
 export function readQuaternion(object: Json, fail: Fail): Four {
   const read = numbersWithin(object, 'rotation', 4, 1.01, fail);
   const length = Math.hypot(...read);
-  if (Math.abs(length - 1) > 0.01) fail('.rotation', 'is no rotation');
+  if (Math.abs(length - 1) > 0.01) fail('.rotation', 'is not a rotation');
   return read.map((x) => x / length) as Four;
 }
 

@@ -65,7 +65,7 @@ describe('decodeWorld', () => {
   it('accepts only http, https and relative addresses', () => {
     for (const url of ['a', '../a/', '/a', '//b/a', 'HTTPS://b/a', '?a']) expect(said((file) => (file.scenes[0].url = url))).toBe('');
     for (const url of ['javascript:alert(1)', 'data:,a', 'file:///a', 'blob:http://a/b', ' ftp://a', 'http://', 'x'.repeat(1001)]) {
-      expect(said((file) => (file.scenes[0].url = url))).toBe('world.json: scenes[0].url: is no address of http or https, nor a relative one; correct it, or save it again');
+      expect(said((file) => (file.scenes[0].url = url))).toBe('world.json: scenes[0].url: is neither an address of http or https nor a relative one; correct it, or save it again');
     }
     for (const name of ['javascript:alert(1)', 'data:,a', '//b/a.glb', '\\\\b\\a.glb', 'http://']) {
       expect(said((file) => (file.models[0].files[1] = name))).toContain('models[0].files: has an invalid name');
@@ -76,12 +76,12 @@ describe('decodeWorld', () => {
   it("requires one scene that defines the world's frame", () => {
     expect(said((file) => file.scenes.pop())).toContain('scenes: has none in whose world the others stand; leave out position');
     expect(said((file) => (file.scenes = []))).toContain('scenes: has none');
-    expect(said((file) => delete file.scenes)).toContain('scenes: is no list');
+    expect(said((file) => delete file.scenes)).toContain('scenes: is not a list');
     expect(said((file) => (file.scenes = Array.from({ length: 17 }, () => file.scenes[1])))).toContain('scenes: are more than 16');
-    for (const none of [5, null, 'a', [], [{ url: 'a' }]]) expect(said((file) => file.scenes.push(none))).toContain('scenes[2]: is no object');
-    expect(said((file) => (file.scenes[0].scale = [1, 1, 1]))).toContain('scenes[0].scale: is no number');
+    for (const none of [5, null, 'a', [], [{ url: 'a' }]]) expect(said((file) => file.scenes.push(none))).toContain('scenes[2]: is not an object');
+    expect(said((file) => (file.scenes[0].scale = [1, 1, 1]))).toContain('scenes[0].scale: is not a number');
     expect(said((file) => (file.scenes[0].scale = 0))).toContain('scenes[0].scale: is not above 0.000001');
-    expect(said((file) => (file.scenes[0].rotation = [1, 1, 1, 1]))).toContain('scenes[0].rotation: is no rotation');
+    expect(said((file) => (file.scenes[0].rotation = [1, 1, 1, 1]))).toContain('scenes[0].rotation: is not a rotation');
     expect(said((file) => (file.scenes[0].position = [1, null, 1]))).toContain('scenes[0].position: is not 3 numbers');
   });
 
@@ -89,7 +89,7 @@ describe('decodeWorld', () => {
     expect(said((file) => (file.hidden = Array.from({ length: 9 }, () => file.hidden[0])))).toContain('hidden: are more than 8');
     expect(said((file) => (file.hidden[0].size = [1, 0, 1]))).toContain('hidden[0].size: is not above');
     expect(said((file) => (file.hidden[0].middle = [1, 1e9, 1]))).toContain('hidden[0].middle: has a number beyond');
-    expect(said((file) => (file.hidden[0].turn = '1'))).toContain('hidden[0].turn: is no number');
+    expect(said((file) => (file.hidden[0].turn = '1'))).toContain('hidden[0].turn: is not a number');
     expect(said((file) => delete file.hidden[0].name)).toContain('hidden[0].name: is missing');
     expect(said((file) => (file.bookmarks[0].view = 'eye=1,2,3'))).toContain('bookmarks[0].view: is not a view');
     expect(said((file) => (file.bookmarks = Array.from({ length: 201 }, () => file.bookmarks[0])))).toContain('bookmarks: are more than 200');
@@ -97,9 +97,9 @@ describe('decodeWorld', () => {
 
   it('names the file and the place of what is wrong', () => {
     expect(decodeError('{')).toMatch(/^world.json: is not JSON: .*; correct it, or save it again$/);
-    for (const other of ['null', '[]', '3', '{"version":1,"models":[]}']) expect(decodeError(other)).toContain('is no world of this viewer');
+    for (const other of ['null', '[]', '3', '{"version":1,"models":[]}']) expect(decodeError(other)).toContain('is not a world of this viewer');
     expect(said((file) => (file.version = 3))).toContain('world.json: version: is not 2, nor 1; open it with a newer viewer');
-    expect(said((file) => (file.models = {}))).toContain('models: is no list');
+    expect(said((file) => (file.models = {}))).toContain('models: is not a list');
     expect(said((file) => (file.models[0].contents = [3]))).toContain('models[0].contents');
     expect(said((file) => (file.models = Array.from({ length: 1001 }, () => file.models[0])))).toContain('models: are more than 1000');
     expect(said((file) => (file.models[1] = null))).toContain('models[1].files: names no files');
@@ -121,9 +121,9 @@ describe('decodeWorld', () => {
   });
 
   it('names an invalid embedded file', () => {
-    expect(said((file) => (file.files['tree.glb'] = '*'))).toContain('files["tree.glb"]: is no base64');
-    expect(said((file) => (file.files['tree.glb'] = 5))).toContain('files["tree.glb"]: is no text');
-    expect(said((file) => (file.files = ['a']))).toContain('files: is no object');
+    expect(said((file) => (file.files['tree.glb'] = '*'))).toContain('files["tree.glb"]: is not base64');
+    expect(said((file) => (file.files['tree.glb'] = 5))).toContain('files["tree.glb"]: is not text');
+    expect(said((file) => (file.files = ['a']))).toContain('files: is not an object');
   });
 });
 

@@ -94,12 +94,12 @@ export function decodeWorld(text: string, file: string): World {
   } catch (error) {
     return fail('', `is not JSON: ${(error as Error).message.slice(0, 200)}`); // most browsers include the position
   }
-  if (getString(world, 'kind') !== kKind) fail('', 'is no world of this viewer', 'choose one that was saved here');
+  if (getString(world, 'kind') !== kKind) fail('', 'is not a world of this viewer', 'choose one that was saved here');
   const version = getField(world, 'version');
   if (version !== 1 && version !== kVersion) fail('version', `is not ${kVersion}, nor 1`, 'open it with a newer viewer');
   const readList = <T>(key: 'scenes' | 'models' | 'hidden' | 'bookmarks', isNeeded: boolean, read: (one: Json, fail: Fail) => T): T[] => {
     if (getField(world, key) === undefined && !isNeeded) return [];
-    const list = getArray(world, key) ?? fail(key, 'is no list');
+    const list = getArray(world, key) ?? fail(key, 'is not a list');
     if (list.length > kMax[key]) fail(key, `are more than ${kMax[key]}`, 'keep fewer');
     return list.map((one, i) => read(one, (place, reason) => fail(`${key}[${i}]${place}`, reason)));
   };
@@ -121,9 +121,9 @@ function firstScene(scene: Json): WorldScene {
 }
 
 function readWorldScene(scene: Json, fail: Fail): WorldScene {
-  if (typeof scene !== 'object' || scene === null || Array.isArray(scene)) return fail('', 'is no object');
+  if (typeof scene !== 'object' || scene === null || Array.isArray(scene)) return fail('', 'is not an object');
   const url = getString(scene, 'url') ?? '';
-  if (url.length > kNameLength || (url !== '' && !isAddress(url))) return fail('.url', 'is no address of http or https, nor a relative one');
+  if (url.length > kNameLength || (url !== '' && !isAddress(url))) return fail('.url', 'is neither an address of http or https nor a relative one');
   const name = getString(scene, 'name') ?? '';
   if (name.length > kNameLength) return fail('.name', 'is too long');
   const isPlaced = ['position', 'rotation', 'scale'].some((key) => getField(scene, key) !== undefined);
@@ -176,13 +176,13 @@ function readBookmark(bookmark: Json, fail: Fail): World['bookmarks'][number] {
 function readFiles(files: Json, fail: (place: string, reason: string) => never): World['files'] {
   const read: World['files'] = new Map();
   if (files === undefined) return read;
-  if (typeof files !== 'object' || files === null || Array.isArray(files)) return fail('files', 'is no object');
+  if (typeof files !== 'object' || files === null || Array.isArray(files)) return fail('files', 'is not an object');
   let bytes = 0;
   for (const [name, text] of Object.entries(files)) {
     const place = `files[${JSON.stringify(name.slice(0, 100))}]`;
     if (name === '' || name.length > kNameLength || read.size === kMaxFilesHeld) fail(place, 'is one file too many, or has no name');
-    if (typeof text !== 'string') return fail(place, 'is no text');
-    const content = bytesOfBase64(text) ?? fail(place, 'is no base64');
+    if (typeof text !== 'string') return fail(place, 'is not text');
+    const content = bytesOfBase64(text) ?? fail(place, 'is not base64');
     bytes += content.length;
     if (bytes > kEmbeddedBytes) fail(place, `is beyond ${kEmbeddedBytes / 1e6} MB of models`);
     read.set(name, content);

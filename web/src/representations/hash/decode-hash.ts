@@ -111,15 +111,16 @@ class HashReader extends PartReader {
   private readSettings(ours: Json): HashSettings {
     const weights = getString(ours, 'weights') as LevelWeights;
     const step = getNumber(ours, 'step');
-    const whole = getBoolean(ours, 'whole');
-    if (!kLevelWeights.includes(weights) || step === undefined || whole === undefined) {
-      this.fail('does not say what weighs its levels, how long its steps are, or whether it is whole');
+    if (getField(ours, 'whole') !== undefined) this.fail('the key whole is called learned_background now');
+    const hasLearnedBackground = getBoolean(ours, 'learned_background');
+    if (!kLevelWeights.includes(weights) || step === undefined || hasLearnedBackground === undefined) {
+      this.fail('weights, step or learned_background is missing or malformed');
     }
-    const settings: HashSettings = { weights, step: Math.fround(step), whole };
+    const settings: HashSettings = { weights, step: Math.fround(step), hasLearnedBackground };
     if (getField(ours, 'logits') === undefined) return settings;
     const logits = getArray(ours, 'logits') ?? [];
-    if (logits.length < 1 || logits.length > 2 * kMaxTables) this.fail('its logits are none, or too many');
-    settings.logits = logits.map((logit) => Math.fround(numberFrom(logit) ?? this.fail('a logit is no number')));
+    if (logits.length < 1 || logits.length > 2 * kMaxTables) this.fail('its logits are not a list, or are none or too many');
+    settings.logits = logits.map((logit) => Math.fround(numberFrom(logit) ?? this.fail('a logit is not a number')));
     return settings;
   }
 }

@@ -35,7 +35,7 @@ export interface HashSettings {
   weights: LevelWeights;
   logits?: number[]; // if the weights are the same everywhere
   step: number; // step of a ray as a fraction of a domain's width
-  whole: boolean;
+  hasLearnedBackground: boolean;
 }
 
 export interface HashContent {

@@ -70,7 +70,7 @@ class HashMarching implements Marching<HashHeader, HashContent, HashOwn> {
   own(content: HashContent): HashOwn {
     const network = this.lastPass.getDrawnNetwork(content.network);
     ++network.contents;
-    return { uniforms: { network: { value: 0 } }, meshes: [network.mesh], whole: content.settings.whole, network };
+    return { uniforms: { network: { value: 0 } }, meshes: [network.mesh], hasLearnedBackground: content.settings.hasLearnedBackground, network };
   }
 
   release({ network }: HashOwn): void {
@@ -97,6 +97,6 @@ class HashMarching implements Marching<HashHeader, HashContent, HashOwn> {
     const networks = [...distinctNetworks].slice(0, countNetworks(this.weightTargets));
     const networkIndex = ({ network }: HashOwn) => (networks.includes(network) ? networks.indexOf(network) : networks.length - 1);
     for (const own of frontToBack) own.uniforms.network.value = networkIndex(own);
-    return { networks, whole: backgroundContent !== undefined, behind: backgroundContent ? networkIndex(backgroundContent) : 0 };
+    return { networks, hasLearnedBackground: backgroundContent !== undefined, behind: backgroundContent ? networkIndex(backgroundContent) : 0 };
   }
 }

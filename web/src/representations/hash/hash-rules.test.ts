@@ -19,16 +19,17 @@ function changed(change: (ours: any) => void): Uint8Array {
 }
 
 const kHeader = 'part 0: its header is not complete';
-const kUnsaid = 'does not say what weighs its levels';
+const kUnsaid = 'weights, step or learned_background is missing or malformed';
 const kRules: [string, (ours: any) => void][] = [
   [kUnsaid, (ours) => (ours.weights = 'some')],
-  [kUnsaid, (ours) => delete ours.whole],
+  [kUnsaid, (ours) => delete ours.learned_background],
+  ['the key whole is called learned_background now', (ours) => (ours.whole = true)],
   [kUnsaid, (ours) => (ours.step = '1')],
   ['the step is out of bounds', (ours) => (ours.step = 1e-9)],
   ['the step is out of bounds', (ours) => (ours.step = 0.2)],
-  ['its logits are none, or too many', (ours) => (ours.logits = [])],
-  ['its logits are none, or too many', (ours) => (ours.logits = new Array(17).fill(0))],
-  ['a logit is no number', (ours) => (ours.logits = ['a'])],
+  ['its logits are not a list, or are none or too many', (ours) => (ours.logits = [])],
+  ['its logits are not a list, or are none or too many', (ours) => (ours.logits = new Array(17).fill(0))],
+  ['a logit is not a number', (ours) => (ours.logits = ['a'])],
   // Weights that are the same everywhere need no columns.
   [kHeader, (ours) => (ours.logits = [1, 2, 3, 4])],
   ['its logits are not those of its tables', (ours) => Object.assign(ours, { logits: [1, 2, 3] }, ours.parts[0].ranges.splice(8))],
@@ -52,7 +53,7 @@ const kRules: [string, (ours: any) => void][] = [
   ['part 0: it stores more macroblocks', ({ parts: [part] }) => (part.lattice = 8)],
   ['part 0: the resolution of a table', ({ parts: [part] }) => (part.tables[1].resolution = 1)],
   ['part 0: a table has no entries', ({ parts: [part] }) => (part.tables[1].entries = 0)],
-  ['part 0: the entries of a hashed table are no power of two', ({ parts: [part] }) => (part.tables[1].entries = 1000)],
+  ['part 0: the entries of a hashed table are not a power of two', ({ parts: [part] }) => (part.tables[1].entries = 1000)],
   ['part 0: a table that is not hashed has fewer entries than points', ({ parts: [part] }) => (part.tables[0].resolution = 13)],
   ['part 0: its occupancy is out of bounds', ({ parts: [part] }) => (part.cells = 12)],
   ['part 1: parts differ in their number of tables', ({ parts }) => {

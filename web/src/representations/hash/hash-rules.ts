@@ -29,7 +29,7 @@ function areRanges(ranges: ByteRange[]): boolean {
 function ruleOfTable({ resolution, entries, hashed, ranges }: HashTable): Broken {
   if (resolution < 2) return 'the resolution of a table is out of bounds';
   if (entries < 1) return 'a table has no entries, or too many';
-  if (hashed && !Number.isInteger(Math.log2(entries))) return 'the entries of a hashed table are no power of two';
+  if (hashed && !Number.isInteger(Math.log2(entries))) return 'the entries of a hashed table are not a power of two';
   if (!hashed && entries < resolution ** 3) return 'a table that is not hashed has fewer entries than points';
   return areRanges(ranges) ? undefined : 'a range is out of bounds';
 }

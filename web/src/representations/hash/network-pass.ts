@@ -35,7 +35,7 @@ uniform vec2 resolution;
 uniform vec4 part;
 uniform mat3 ray;
 uniform int display, network, behind;  // behind: the network of rays that hit nothing
-uniform bool whole;
+uniform bool hasLearnedBackground;
 `;
 
 const kMain = `
@@ -46,7 +46,7 @@ void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   vec4 diffuse = texelFetch(diffuseAndOpacity, at, 0);
   float opacity = diffuse.a;
-  bool open = whole && texture(opaqueDepth, gl_FragCoord.xy / resolution).r >= 1.0;
+  bool open = hasLearnedBackground && texture(opaqueDepth, gl_FragCoord.xy / resolution).r >= 1.0;
   if (opacity <= 0.0 && !open) discard;
   if ((opacity > 0.0 ? heaviest(at, opacity) : behind) != network) discard;
   vec4 threeFeatures = texelFetch(featuresAndOpacity, at, 0);
@@ -110,7 +110,7 @@ const kMaxUnused = 16;
 export interface NetworkOrder {
   networks: readonly DrawnNetwork[]; // each once, by index
   behind: number; // index of the network of rays that hit nothing
-  whole: boolean; // rays that hit nothing are opaque
+  hasLearnedBackground: boolean; // rays that hit nothing are opaque
 }
 
 export class NetworkPass {
@@ -144,7 +144,7 @@ export class NetworkPass {
       vertexShader: kVertexShader,
       fragmentShader: [kHead, displayConstants(kHashModes), heaviestShader(this.weightTargets), key, kMain].join('\n'),
       uniforms: {
-        opaqueDepth, resolution, part, ray, display, network: { value: 0 }, behind: { value: 0 }, whole: { value: false },
+        opaqueDepth, resolution, part, ray, display, network: { value: 0 }, behind: { value: 0 }, hasLearnedBackground: { value: false },
         diffuseAndOpacity: { value: diffuse }, featuresAndOpacity: { value: features }, weightsAndOpacity: { value: weights[0] },
         ...Object.fromEntries(weights.slice(1).map((value, n) => [`weights${n}AndOpacity`, { value }])),
       },
@@ -172,14 +172,14 @@ export class NetworkPass {
   }
 
   // Draws into a cleared target; the view's uniforms must be those of the picture.
-  draw(renderer: THREE.WebGLRenderer, { camera, part }: Picture, { networks, behind, whole }: NetworkOrder): void {
+  draw(renderer: THREE.WebGLRenderer, { camera, part }: Picture, { networks, behind, hasLearnedBackground }: NetworkOrder): void {
     this.target.viewport.copy(part);
     renderer.setRenderTarget(this.target);
     networks.forEach(({ mesh }, number) => {
       const { uniforms } = mesh.material;
       uniforms.network.value = number;
       uniforms.behind.value = behind;
-      uniforms.whole.value = whole;
+      uniforms.hasLearnedBackground.value = hasLearnedBackground;
       this.pass.children = [mesh];
       renderer.render(this.pass, camera);
     });

@@ -19,10 +19,10 @@ struct PixelLattice {
   size_t count() const { return columns() * rows(); }
 };
 
-class PictureRays {
+class ImageRays {
  public:
   // Pieces have at most `maxRays` rays. Keeps a reference to `device`.
-  PictureRays(Device& device, uint32_t maxRays);
+  ImageRays(Device& device, uint32_t maxRays);
 
   // Starts an image. `opaqueDepth`: optional, the z-depth in world units at which rays end; must remain valid while
   // pieces are generated.

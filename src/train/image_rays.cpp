@@ -1,11 +1,11 @@
-#include "train/picture_rays.h"
+#include "train/image_rays.h"
 
 #include <algorithm>
 #include <limits>
 
 namespace tessera {
 
-PictureRays::PictureRays(Device& device, uint32_t maxRays)
+ImageRays::ImageRays(Device& device, uint32_t maxRays)
     : device_(device),
       maxRays_(maxRays),
       camera_(device.array<RayCamera>(1)),
@@ -15,8 +15,8 @@ PictureRays::PictureRays(Device& device, uint32_t maxRays)
       directions_(device.array<float>(size_t{3} * maxRays)),
       far_(device.array<float>(maxRays)) {}
 
-void PictureRays::begin(const RayCamera& camera, const SceneFrame& frame, const PixelLattice& lattice,
-                        const ImageF* opaqueDepth) {
+void ImageRays::begin(const RayCamera& camera, const SceneFrame& frame, const PixelLattice& lattice,
+                      const ImageF* opaqueDepth) {
   device_.write(camera_.all(), std::span<const RayCamera>(&camera, 1));
   lattice_ = lattice;
   opaqueDepth_ = opaqueDepth;
@@ -24,12 +24,12 @@ void PictureRays::begin(const RayCamera& camera, const SceneFrame& frame, const 
   scale_ = static_cast<float>(frame.scale);
 }
 
-float PictureRays::cosine(uint32_t ray) const {
+float ImageRays::cosine(uint32_t ray) const {
   const float* direction = &hostDirections_[size_t{3} * ray];
   return direction[0] * forward_[0] + direction[1] * forward_[1] + direction[2] * forward_[2];
 }
 
-PictureRays::Piece PictureRays::piece(size_t first, uint32_t maximum) {
+ImageRays::Piece ImageRays::piece(size_t first, uint32_t maximum) {
   const uint32_t rays = static_cast<uint32_t>(std::min<size_t>(std::min(maximum, maxRays_), lattice_.count() - first));
   std::vector<float> pixels, far;
   for (size_t i = first; i < first + rays; ++i) {
@@ -50,7 +50,7 @@ PictureRays::Piece PictureRays::piece(size_t first, uint32_t maximum) {
   return result;
 }
 
-PictureRays::Piece PictureRays::through(std::span<const float> pixels) {
+ImageRays::Piece ImageRays::through(std::span<const float> pixels) {
   const uint32_t rays = static_cast<uint32_t>(pixels.size() / 2);
   CHECK(rays <= maxRays_);
   device_.write(pixels_.all(), pixels);

@@ -1,4 +1,4 @@
-#include "render/vulkan/gpu_picture.h"
+#include "render/vulkan/gpu_frame.h"
 
 #include <fmt/format.h>
 
@@ -21,22 +21,22 @@ void copy(const Vec3d& from, float* to) {
 
 }  // namespace
 
-GpuPicture::GpuPicture(std::shared_ptr<GpuStream> stream)
+GpuFrame::GpuFrame(std::shared_ptr<GpuStream> stream)
     : stream_(std::move(stream)), begin_(stream_->context(), kBeginViewSpirv), pool_(0) {}
 
-void GpuPicture::ensureCapacity(GpuBuffer& buffer, size_t floats) {
+void GpuFrame::ensureCapacity(GpuBuffer& buffer, size_t floats) {
   if (buffer.bytes() >= floats * sizeof(float)) return;
   stream_->deferDestroy(std::move(buffer));
   buffer = GpuBuffer();
   buffer = stream_->makeBuffer(floats * sizeof(float));
 }
 
-void GpuPicture::ensureCapacity(const Camera& camera, uint32_t numbersOfPixel) {
+void GpuFrame::ensureCapacity(const Camera& camera, uint32_t numbersOfPixel) {
   pixels_.update(camera, pool_);
   const size_t pixels = static_cast<size_t>(camera.width) * camera.height;
   constexpr size_t kMax = std::numeric_limits<uint32_t>::max();  // kernels use 32-bit indices
   if (pixels * std::max<size_t>(numbersOfPixel, kNumbersDrawn) > kMax) {
-    throw Error(fmt::format("picture of {}x{}", camera.width, camera.height), "", "is too large for a GPU",
+    throw Error(fmt::format("image of {}x{}", camera.width, camera.height), "", "is too large for a GPU",
                 "ask for a smaller one, or use --device cpu");
   }
   ensureCapacity(directions_, pixels * 3);
@@ -56,8 +56,8 @@ void GpuPicture::ensureCapacity(const Camera& camera, uint32_t numbersOfPixel) {
   stream_->upload(directions_, 0, std::as_bytes(std::span(directions)));
 }
 
-void GpuPicture::begin(const TileFrame& frame, float minTransmittance, uint32_t numbersOfPixel,
-                       const PictureRequest& request) {
+void GpuFrame::begin(const TileFrame& frame, float minTransmittance, uint32_t numbersOfPixel,
+                     const ViewRequest& request) {
   const Camera& camera = request.camera;
   const Pose& worldFromCamera = request.worldFromCamera;
   const ImageF* opaqueDepth = request.opaqueDepth;
@@ -93,11 +93,11 @@ void GpuPicture::begin(const TileFrame& frame, float minTransmittance, uint32_t 
   run(begin_, view_);
 }
 
-GpuRenderedView GpuPicture::onGpu() const {
+GpuRenderedView GpuFrame::onGpu() const {
   return {camera_.width, camera_.height, view_.colour, view_.opacity};
 }
 
-RenderedView GpuPicture::drawn() {
+RenderedView GpuFrame::drawn() {
   const int width = camera_.width, height = camera_.height;
   RenderedView rendered{ImageF(width, height, 3), ImageF(width, height, 1), ImageF(width, height, 1)};
   size_t offset = 0;
@@ -109,7 +109,7 @@ RenderedView GpuPicture::drawn() {
   return rendered;
 }
 
-std::array<float, 2> GpuPicture::opacityAndDepthAt(int x, int y) {
+std::array<float, 2> GpuFrame::opacityAndDepthAt(int x, int y) {
   const size_t width = static_cast<size_t>(camera_.width), pixels = width * static_cast<size_t>(camera_.height);
   const size_t pixel = static_cast<size_t>(y) * width + static_cast<size_t>(x);
   CHECK(pixel < pixels);

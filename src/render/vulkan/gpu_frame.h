@@ -17,12 +17,12 @@ struct GpuRenderedView {
   uint64_t colour = 0, opacity = 0;
 };
 
-class GpuPicture {
+class GpuFrame {
  public:
-  explicit GpuPicture(std::shared_ptr<GpuStream> stream);
+  explicit GpuFrame(std::shared_ptr<GpuStream> stream);
 
   // Begins an image with `numbersOfPixel` accumulated values for each pixel (begin_view.comp).
-  void begin(const TileFrame& frame, float minTransmittance, uint32_t numbersOfPixel, const PictureRequest& request);
+  void begin(const TileFrame& frame, float minTransmittance, uint32_t numbersOfPixel, const ViewRequest& request);
   const arguments::ViewArguments& view() const { return view_; }
   // Runs a kernel with one invocation for each pixel.
   template <class Arguments>
