@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# From a clean Debian 12 to a measured picture: installs packages, builds, makes a small city, trains a model of it in
+# From a clean Debian 12 to a measured image: installs packages, builds, makes a small city, trains a model of it in
 # blocks, bakes that into a scene of tiles, judges the scene on photos that it has not seen, and serves it to browsers.
 # Run again, it goes on where it was.
 #   ./quickstart.sh [--no-serve]      --no-serve stops before the scene is served
@@ -27,5 +27,5 @@ echo
 echo "held-out views: $(grep -o '"psnr": *[0-9.]*' "$out/result.json" | head -1 | grep -o '[0-9.]*$') dB PSNR, after $((SECONDS - begin)) s"
 echo "scene:          $PWD/$out/city.scene"
 echo "report:         $PWD/$out/city.scene/report.html"
-echo "pictures:       $PWD/$out/images"
+echo "images:         $PWD/$out/images"
 [ "$serve" = no ] || exec "$tessera" serve "$out/city.scene"

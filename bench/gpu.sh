@@ -34,8 +34,8 @@ judge() {
     verdict "hash grids, $samples samples, % of the gather rate" "$(least '^HashGrid' " $samples samples\$" share)" '>=' 50
     verdict "networks, $samples samples, % of arithmetic or memory" "$(least '^Mlp' " $samples samples\$" share_of_both)" '>=' 30
   done
-  holds_of "hash at two levels, pictures a second at $(jq .city_hash_2_frames.width "$all") wide" .city_hash_2_frames.frames_per_second 108
-  holds_of "volume, pictures a second" .city_volume_frames.frames_per_second 100
+  holds_of "hash at two levels, frames per second at $(jq .city_hash_2_frames.width "$all") wide" .city_hash_2_frames.frames_per_second 108
+  holds_of "volume, frames per second" .city_volume_frames.frames_per_second 100
   # The time of tiny-cuda-nn relative to ours.
   if [ "$(jq 'has("tiny_cuda_nn")' "$all")" = true ]; then
     compared=$(jq -r '(.compute.operations // []) as $ours | .tiny_cuda_nn.operations[] | . as $theirs

@@ -38,7 +38,7 @@ skipping() {
     "$(value '.skipping.whole.rays_per_second / 1e3 | round / 1000') without"
   verdict "skipping, samples more or fewer than without" "$(value '.skipping.whole.samples - .skipping.skipping.samples | fabs')" '<=' 0
   verdict "skipping, times fewer steps" "$(value '.skipping.whole.steps / .skipping.skipping.steps * 100 | round / 100')" '>=' 5
-  verdict "skipping, pictures apart by, in 1/255" "$(value '.skipping.largest_difference * 255')" '<=' 1
+  verdict "skipping, images apart by, in 1/255" "$(value '.skipping.largest_difference * 255')" '<=' 1
 }
 
 flight() {
@@ -47,14 +47,14 @@ flight() {
   value() { jq "$1" "$out/flight.json"; }
   verdict "cache, most held as a share of its budget" "$(value '.cache.share.max_bytes / .cache.share.budget_bytes * 1000 | round / 1000')" '<=' 1
   verdict "cache, evictions" "$(value .cache.share.evictions)" '>=' 1
-  verdict "cache for all, pictures with all that the view asks for" "$(value .cache.all.steps_in_full)" '>=' "$(value .cache.steps)"
+  verdict "cache for all, images with all that the view asks for" "$(value .cache.all.steps_in_full)" '>=' "$(value .cache.steps)"
   local run name
   for run in share all; do
     name=$([ $run = share ] && echo cache || echo "cache for all")
-    verdict "$name, pictures over its budget" "$(value ".cache.$run.steps_over_budget")" '<=' 0
-    verdict "$name, pictures without the coarsest level" "$(value ".cache.$run.steps_without_coarsest")" '<=' 0
-    verdict "$name, pictures of a cut that is no partition" "$(value ".cache.$run.steps_without_partition")" '<=' 0
-    verdict "$name, unlike without a budget, of $(value ".cache.$run.steps_in_full") pictures where all was there" \
+    verdict "$name, images over its budget" "$(value ".cache.$run.steps_over_budget")" '<=' 0
+    verdict "$name, images without the coarsest level" "$(value ".cache.$run.steps_without_coarsest")" '<=' 0
+    verdict "$name, images of a cut that is no partition" "$(value ".cache.$run.steps_without_partition")" '<=' 0
+    verdict "$name, unlike without a budget, of $(value ".cache.$run.steps_in_full") images where all was there" \
       "$(value ".cache.$run.steps_unlike_unbounded")" '<=' 0
   done
 }

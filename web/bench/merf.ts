@@ -138,12 +138,12 @@ describe('the viewer beside that of MERF', () => {
       alike.push(psnr(mine, its));
       rows.push(
         `${i}: ours ${times[0]} s (median ${times[1]}), MERF's ${times[2]} s (${times[3]}), of medians ` +
-        `${ratio.toFixed(2)} times; pictures ${alike[i].toFixed(1)} dB apart`);
+        `${ratio.toFixed(2)} times; images ${alike[i].toFixed(1)} dB apart`);
     }
     console.log([what, ...rows].join('\n'));
     verdict(`${what}: MERF's frame as a multiple of ours, the least`, Math.min(...ratios), '>=', 1);
     verdict(`${what}: the median`, median(ratios), '>=', 1.5);
-    verdict(`${what}: pictures alike, the worst, in dB`, Math.min(...alike), '>=', 20);
+    verdict(`${what}: images alike, the worst, in dB`, Math.min(...alike), '>=', 20);
   }
 
   it('renders frames as fast', async () => {

@@ -127,7 +127,7 @@ describe('the viewer', () => {
     console.log(`${name}: ${bytes} bytes of contents and ${text} of tileset.json, of ${total}, in ${seconds.toFixed(2)} s`);
     if (megabits) return; // reported, without a bound
     verdict('coarsest level with its background block and tileset.json, as a share of the bytes', (bytes + text) / total, '<=', 0.06);
-    verdict('seconds to the first complete picture', seconds, '<=', 2);
+    verdict('seconds to the first complete image', seconds, '<=', 2);
   });
 
   it('keeps to a quarter of the finest level in a flight of 600 steps', async () => {
