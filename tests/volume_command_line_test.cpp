@@ -352,7 +352,7 @@ TEST_F(VolumeCommandLine, ExplainsWhatIsWrongWithModelsAndScenes) {
     EXPECT_TRUE(contains(said.err, "tessera: error: ")) << said.err;
     EXPECT_TRUE(contains(said.err, part)) << said.err;
   };
-  explained(run({"bake", at("city"), at("never")}), "no trained model");
+  explained(run({"bake", at("city"), at("never")}), "not a trained model");
   explained(run({"bake", model(), at("never"), "--capture", at("nowhere")}), "nowhere");
   explained(run(trainArguments(at("never"), {"--set", "background_block=all"})), "background_block");
   explained(run(trainArguments(at("never"), {"--set", "preset=gpu"})), "preset");
