@@ -181,7 +181,7 @@ describe.skipIf(missing())('a model that is dropped', () => {
 
   it('is named if it is broken, and the page keeps working', async () => {
     await drop({ name: 'x.glb', bytes: Buffer.from('garbage') });
-    expect(await errorText()).toMatch(/x\.glb.*Is no glTF file/);
+    expect(await errorText()).toMatch(/x\.glb.*Is not a glTF file/);
     for (const kind of ['fbx', 'obj']) {
       await page.click('.error button');
       await drop({ name: `x.${kind}`, bytes: Buffer.from('garbage') });

@@ -168,7 +168,7 @@ describe.skipIf(missing())('the viewer', () => {
       await page.waitForSelector('.error', { state: 'visible' });
       const text = await page.textContent('.error');
       expect(text).toContain(`${tiles}/${name}`);
-      expect(text).toContain('Is no binary glTF 2.0 file.');
+      expect(text).toContain('Is not a binary glTF 2.0 file, or is cut short.');
       expect(text).toContain('Copy the scene again, or bake it again.');
       expect(await countColours(page)).toBeGreaterThan(200);
     });
