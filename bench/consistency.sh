@@ -10,7 +10,8 @@
 #                without walls as control: the content at the walls may be harder or easier than elsewhere
 #   resolution   four blocks against one block of their size together, with twice the resolution along each axis, tables four times
 #                as large, and every distance that settings measure in blocks halved (the control of `seams`)
-# Resumable: everything is kept in build/bench/consistency, and what exists is not made again. LPIPS needs TESSERA_SHARED_DATA or LPIPS=FILE.
+# Resumable: everything is kept in build/bench/consistency, and what exists is not made again. LPIPS needs
+# TESSERA_SHARED_DATA or LPIPS=FILE.
 #   [ROWS="equal_rays equal_steps seams resolution"] [SEEDS="1 2 3 4 5"] [STEPS=1500] [RAYS=4096] [CITY="--size 400x300"]
 #   bench/consistency.sh
 set -euo pipefail

@@ -23,8 +23,8 @@ VolumeConfig VolumeConfig::ofPreset(const std::string& name) {
   config.firstIntervals = config.secondIntervals = 64;
   config.samples = 32;
   config.proposalEvery = 1;
-  // With these networks, more would exceed what operations can index (2^31 activations). 16384 rays usually need fewer
-  // distinct texels; where they need more, a step has fewer rays.
+  // With these networks, more would exceed what operations can index (2^31 activations). A step has fewer than 16384
+  // rays if these need more distinct texels.
   config.texelsPerStep = 5 << 20;
   config.firstRays = config.maxRays = 16384;
   config.sparsityPoints = 1 << 17;
