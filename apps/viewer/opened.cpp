@@ -27,9 +27,9 @@ bool isModel(const fs::path& folder) {
   return fs::exists(folder / "blocks.json");
 }
 
-// Extends the place's box in the world by a box that is given in other axes.
+// Sets the place's box to the box along the world's axes that encloses a box that is given in other axes.
 template <class ToWorld>
-void include(const Vec3d& low, const Vec3d& high, ToWorld toWorld, Place& place) {
+void setBox(const Vec3d& low, const Vec3d& high, ToWorld toWorld, Place& place) {
   place.low = Vec3d::Constant(INFINITY);
   place.high = Vec3d::Constant(-INFINITY);
   for (int corner = 0; corner < 8; ++corner) {
@@ -63,7 +63,7 @@ Place loadPlace(const ViewOptions& options) {
   if (isScene(options.folder)) {
     const Tileset tileset = readTileset(options.folder);
     const TileFrame frame = makeTileFrame(tileset);
-    include(
+    setBox(
         frame.low, frame.high,
         [&](const Vec3d& x) { return Vec3d(frame.translation + frame.scale * (frame.rotation * x)); }, place);
     sourceFromWorld = tileset.sourceFromWorld;
@@ -71,11 +71,12 @@ Place loadPlace(const ViewOptions& options) {
     const ModelPlacement placement = ModelFolder(options.folder).readPlacement();
     if (placement.grid) {
       const BlockGrid& grid = *placement.grid;
-      include(
-          {0, 0, grid.bottom}, {grid.columns * grid.edge, grid.rows * grid.edge, grid.top},
+      const Vec2d half = grid.edge / 2 * Vec2d(grid.columns, grid.rows);
+      setBox(
+          {-half.x(), -half.y(), grid.bottom}, {half.x(), half.y(), grid.top},
           [&](const Vec3d& x) { return grid.inWorld(x); }, place);
     } else {
-      include(
+      setBox(
           -Vec3d::Ones(), Vec3d::Ones(), [&](const Vec3d& x) { return placement.frame.worldFromScene(x); }, place);
     }
     sourceFromWorld = placement.sourceFromWorld;
