@@ -1,5 +1,3 @@
-#include "render/vulkan/gpu_scene_renderer.h"
-
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -7,6 +5,7 @@
 
 #include "gpu/testing/test_context.h"
 #include "render/testing/source_of_copies.h"
+#include "render/vulkan/gpu_scene_renderer.h"
 #include "representations/hash/testing/hash_renderer.h"
 #include "representations/hash/testing/test_hash_content.h"
 #include "representations/hash/vulkan/gpu_hash_drawer.h"
@@ -90,7 +89,7 @@ void withoutLogitColumns(HashContent& content) {
   }
 }
 
-class GpuSceneRendererTest : public testing::Test {
+class GpuDrawing : public testing::Test {
  protected:
   void SetUp() override {
     context_ = openForTest();
@@ -145,36 +144,36 @@ ImageF opaqueOnTheLeft() {
   return opaque;
 }
 
-TEST_F(GpuSceneRendererTest, DrawsVolumeAsTheCpuDoes) {
+TEST_F(GpuDrawing, DrawsVolumeAsTheCpuDoes) {
   compare<VolumeRenderer>(place(), place().allBytes, 1.5);
 }
 
-TEST_F(GpuSceneRendererTest, DrawsTheSameCutWithinABudget) {
+TEST_F(GpuDrawing, DrawsTheSameCutWithinABudget) {
   compare<VolumeRenderer>(place(), place().finestBytes / 3, 0.5);
 }
 
-TEST_F(GpuSceneRendererTest, EndsRaysOfVolumeWhereSomethingOpaqueStands) {
+TEST_F(GpuDrawing, EndsRaysOfVolumeWhereSomethingOpaqueStands) {
   const ImageF opaque = opaqueOnTheLeft();
   compare<VolumeRenderer>(place(), place().allBytes, 16, &opaque);
 }
 
-TEST_F(GpuSceneRendererTest, DrawsHashAsTheCpuDoes) {
+TEST_F(GpuDrawing, DrawsHashAsTheCpuDoes) {
   const HashPlace hashPlace(32);
   compare<HashRenderer>(hashPlace, hashPlace.allBytes, 1.5);
 }
 
-TEST_F(GpuSceneRendererTest, DrawsHashOfSeveralNetworksWithinABudget) {
+TEST_F(GpuDrawing, DrawsHashOfSeveralNetworksWithinABudget) {
   const HashPlace hashPlace(32);
   compare<HashRenderer>(hashPlace, hashPlace.coarsestBytes + (hashPlace.allBytes - hashPlace.coarsestBytes) / 2, 0.5);
 }
 
-TEST_F(GpuSceneRendererTest, SkipsEmptySpaceInTwoDistanceGrids) {
+TEST_F(GpuDrawing, SkipsEmptySpaceInTwoDistanceGrids) {
   const HashPlace hashPlace(136);
   ASSERT_GT(hashPlace.contents.front().parts.front().distances.ratio, 1u);
   compare<HashRenderer>(hashPlace, hashPlace.allBytes, 16);
 }
 
-TEST_F(GpuSceneRendererTest, WeighsLevelsOfHashInEveryWay) {
+TEST_F(GpuDrawing, WeighsLevelsOfHashInEveryWay) {
   const HashPlace shared(32, [](HashContent& content) { content.weights = LevelWeights::shared; });
   compare<HashRenderer>(shared, shared.allBytes, 16);
   const HashPlace none(32, [](HashContent& content) {
@@ -189,14 +188,14 @@ TEST_F(GpuSceneRendererTest, WeighsLevelsOfHashInEveryWay) {
   compare<HashRenderer>(everywhere, everywhere.allBytes, 16);
 }
 
-TEST_F(GpuSceneRendererTest, ShowsTheLearnedBackgroundOfHashWhereNothingIs) {
+TEST_F(GpuDrawing, ShowsTheLearnedBackgroundOfHashWhereNothingIs) {
   const HashPlace whole(32, [](HashContent& content) { content.hasLearnedBackground = true; });
   compare<HashRenderer>(whole, whole.allBytes, 1.5);
   const ImageF opaque = opaqueOnTheLeft();
   compare<HashRenderer>(whole, whole.allBytes, 16, &opaque);
 }
 
-TEST_F(GpuSceneRendererTest, ReadsContentsInTheBackgroundUntilTheImageEqualsTheBlockingOne) {
+TEST_F(GpuDrawing, ReadsContentsInTheBackgroundUntilTheImageEqualsTheBlockingOne) {
   GpuRendererSettings settings;
   settings.selection.maximumScreenSpaceError = 0.5;
   GpuSceneRenderer waits = onGpu(place(), settings);
@@ -226,7 +225,7 @@ TEST_F(GpuSceneRendererTest, ReadsContentsInTheBackgroundUntilTheImageEqualsTheB
   }
 }
 
-TEST_F(GpuSceneRendererTest, CanBeDestroyedWhileTheGpuStillDraws) {
+TEST_F(GpuDrawing, CanBeDestroyedWhileTheGpuStillDraws) {
   const HashPlace hashPlace(32);
   for (int i = 0; i < 3; ++i) {
     GpuSceneRenderer gpu = onGpu(hashPlace, {});
@@ -234,7 +233,7 @@ TEST_F(GpuSceneRendererTest, CanBeDestroyedWhileTheGpuStillDraws) {
   }
 }
 
-TEST_F(GpuSceneRendererTest, FollowsCamerasOfOtherSizes) {
+TEST_F(GpuDrawing, FollowsCamerasOfOtherSizes) {
   GpuSceneRenderer gpu = onGpu(place(), {});
   EXPECT_EQ(gpu.render(flightCamera(), flightPose(0), nullptr).colour.width, 64);
   EXPECT_EQ(gpu.render(flightCamera().scaledTo(20, 11), flightPose(0), nullptr).opacity.pixels.size(), 220u);

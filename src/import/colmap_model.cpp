@@ -37,7 +37,7 @@ std::optional<Camera> checkedCamera(LensModel lens, uint64_t width, uint64_t hei
     return std::nullopt;
   }
   if (lens == LensModel::eucm && !(parameters[4] >= 0 && parameters[4] <= 1 && parameters[5] > 0)) {
-    reason = "EUCM wants alpha from 0 to 1 and beta above 0";
+    reason = "EUCM requires alpha from 0 to 1 and beta above 0";
     return std::nullopt;
   }
   return camera;

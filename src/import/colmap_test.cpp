@@ -132,7 +132,7 @@ TEST(Colmap, SaysWhatIsWrongWithACamera) {
   EXPECT_FALSE(decodeColmapText("1 PINHOLE 640 480 1 2 3\n", "", "", reason).has_value());
   EXPECT_EQ(reason, "cameras.txt: line 1: PINHOLE takes 4 parameters, not 3");
   EXPECT_FALSE(decodeColmapText("1 EUCM 640 480 1 2 3 4 1.5 1\n", "", "", reason).has_value());
-  EXPECT_EQ(reason, "cameras.txt: line 1: EUCM wants alpha from 0 to 1 and beta above 0");
+  EXPECT_EQ(reason, "cameras.txt: line 1: EUCM requires alpha from 0 to 1 and beta above 0");
   EXPECT_FALSE(decodeColmapText("1 PINHOLE 640 480 1 2 1e300 4\n", "", "", reason).has_value());
   EXPECT_FALSE(decodeColmapText("1 PINHOLE 640 99999999999 1 2 3 4\n", "", "", reason).has_value());
   EXPECT_FALSE(decodeColmapText("1 PINHOLE 640 480 nan 2 3 4\n", "", "", reason).has_value());

@@ -1,4 +1,5 @@
-// The position and the orientation of the camera of a photo, from its EXIF (libexif) and from the XMP that drones add.
+// The GPS position of a photo, from its EXIF (libexif) or from the XMP that drones add, and the gimbal angles from that
+// XMP. The orientation tag of EXIF is not read: pixels are used as they are stored (see base/image_io.h).
 // Source: EXIF 2.3; DJI's XMP namespace http://www.dji.com/drone-dji/1.0/.
 #pragma once
 

@@ -16,7 +16,7 @@ void checkHoldOut(const std::string& rule);
 //   every:N    photo 0, N, 2N, ... are test, the others train
 //   list:FILE  the photos named in FILE, one per line (path, file name, or name without extension), are test
 //   none       all are train
-// Throws Error for any other rule, for a list none of whose names is a photo's, and if no photo would be left for
+// Throws Error for any other rule, for a list that names none of the photos, and if no photo would be left for
 // training.
 void holdOut(const std::string& rule, std::vector<Photo>& photos);
 

@@ -14,7 +14,7 @@
 #include "import/clean.h"
 #include "import/colmap_model.h"
 #include "import/holdout.h"
-#include "import/orient.h"
+#include "import/orient_world.h"
 #include "import/photo_files.h"
 #include "import/picture_origins.h"
 #include "import/transforms_json.h"
@@ -70,8 +70,7 @@ std::string shellWord(const fs::path& path) {
   const PhotoCount photos = countPhotos(images);
   if (photos.readable > 0) {
     throw Error(
-        source.string(), "",
-        fmt::format("holds {} photos but says nowhere from where they were taken", photos.readable),
+        source.string(), "", fmt::format("contains {} photos but no camera poses", photos.readable),
         fmt::format("{4}find their poses with COLMAP, then import again: "
                     "colmap feature_extractor --database_path {0} --image_path {1} "
                     "--ImageReader.camera_model OPENCV --ImageReader.single_camera 1 "
@@ -88,11 +87,11 @@ std::string shellWord(const fs::path& path) {
   }
   if (photos.convertible > 0) {
     throw Error(source.string(), "",
-                fmt::format("holds {} photos ({}), but photos must be JPEG or PNG", photos.convertible,
+                fmt::format("contains {} photos ({}), but photos must be JPEG or PNG", photos.convertible,
                             photos.firstConvertible),
                 "convert them to JPEG of full size and best quality, with their EXIF data, then import again");
   }
-  throw Error(source.string(), "", "is neither a COLMAP model (sparse/0 and images) nor has it a transforms.json",
+  throw Error(source.string(), "", "is not a COLMAP model (sparse/0 and images) and contains no transforms.json",
               "name the folder that holds one of them");
 }
 

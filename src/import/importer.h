@@ -33,7 +33,8 @@ struct ImportOptions {
 // Throws Error if `source` cannot be imported; if it is a plain folder of photos, the error names the commands to run.
 Capture importCapture(const fs::path& source, const fs::path& out, const ImportOptions& options = {});
 
-// Returns the format that a folder is recognised as: "COLMAP model", "transforms.json", ...; empty if it is none.
+// Returns the format that a folder is recognised as: "COLMAP model", "transforms.json", ...; empty if no format
+// matches.
 std::string sourceFormat(const fs::path& source);
 
 }  // namespace tessera

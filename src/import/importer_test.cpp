@@ -384,7 +384,7 @@ TEST_F(Import, CountsPhotosInSubfoldersAndQuotesTheirPath) {
     run();
     FAIL();
   } catch (const Error& error) {
-    EXPECT_NE(error.reason().find("holds 2 photos"), std::string::npos) << error.reason();
+    EXPECT_NE(error.reason().find("contains 2 photos but no camera poses"), std::string::npos) << error.reason();
     EXPECT_NE(error.remedy().find("1 others (.DNG)"), std::string::npos) << error.remedy();
     const std::string quoted = "'" + (folder_ / "the pilot'\\''s card").string();
     EXPECT_NE(error.remedy().find("--image_path " + quoted + "'"), std::string::npos) << error.remedy();
@@ -400,7 +400,7 @@ TEST_F(Import, AsksForJpegWhenTheFormatIsNotSupported) {
     run();
     FAIL();
   } catch (const Error& error) {
-    EXPECT_NE(error.reason().find("holds 2 photos (.HEIC)"), std::string::npos) << error.reason();
+    EXPECT_NE(error.reason().find("contains 2 photos (.HEIC)"), std::string::npos) << error.reason();
     EXPECT_NE(error.remedy().find("JPEG"), std::string::npos) << error.remedy();
   }
 }

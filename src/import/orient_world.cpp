@@ -1,4 +1,4 @@
-#include "import/orient.h"
+#include "import/orient_world.h"
 
 #include <fmt/format.h>
 

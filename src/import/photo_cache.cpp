@@ -113,7 +113,7 @@ struct PhotoCache::State : std::enable_shared_from_this<State> {
         return false;
       } else if (changed.wait_until(lock, deadline) == std::cv_status::timeout) {
         throw Error("photo cache", "", fmt::format("all of its {} MB have been held for a minute", budget / 1000000),
-                    "give photos a larger memory budget");
+                    "raise --set photo_budget_mib");
       }
     }
     counts.bytes += bytes;

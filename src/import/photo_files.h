@@ -7,6 +7,8 @@
 
 namespace tessera {
 
+// `ready`: the target is complete. Otherwise no target was written: the source ends early (truncated), or is missing or
+// cannot be decoded (unreadable). The functions below throw Error if the target cannot be written.
 enum class FileOutcome { ready, truncated, unreadable };
 
 // Imports a photo at width × height. Colours are averaged over area as sRGB values (which training compares with),

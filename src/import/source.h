@@ -18,7 +18,8 @@ struct SourceCapture {
   std::optional<Error> splitError;  // why Photo::split must not be used: the source's lists match none of its photos
   // By photo: whether its mask has the opposite meaning (instant-ngp's dynamic_mask: white = do not train on).
   std::vector<bool> maskIsInverted;
-  // By photo: world units per unit of an EXR depth map; 1 beyond the end. Integer maps have Photo::depthUnit.
+  // By photo: world units per unit of an EXR depth map; photos beyond the end of the vector have 1. Integer maps have
+  // Photo::depthUnit.
   std::vector<double> exrUnit;
 };
 

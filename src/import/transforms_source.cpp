@@ -171,7 +171,7 @@ std::vector<std::optional<Split>> splitsOfFrames(const fs::path& file, const Tra
     if (strangers.empty()) continue;
     if (strangers.size() == list.names.size()) {
       error = Error(file.string(), list.key, "names no frame of this file (" + abbreviateList(strangers) + ")",
-                    "write its names as file_path has them, or split anew with --holdout every:8");
+                    "write its names as in file_path, or choose a new split with --holdout every:8");
     } else {
       warn("{}: {}: {} of {} names are of no frame ({})", file.string(), list.key, strangers.size(), list.names.size(),
            abbreviateList(strangers));
@@ -259,7 +259,7 @@ std::vector<fs::path> findTransforms(const fs::path& source) {
 TransformsFile loadTransforms(const fs::path& file) {
   std::string reason;
   auto transforms = decodeTransforms(readTextFile(file), reason);
-  if (!transforms) throw Error(file.string(), "", reason, "mend the file or export it again");
+  if (!transforms) throw Error(file.string(), "", reason, "correct the file, or export it again");
   return std::move(*transforms);
 }
 

@@ -1,4 +1,4 @@
-// Tests the calls that the renderer makes to its drawer. tests/gpu_scene_renderer_test.cpp compares its images with
+// Tests the calls that the renderer makes to its drawer. tests/gpu_drawing_test.cpp compares its images with
 // those of the CPU.
 #include "render/vulkan/gpu_scene_renderer.h"
 
