@@ -233,7 +233,7 @@ TEST_F(CommandLine, ExplainsWhatIsWrongWithAFolder) {
   EXPECT_FALSE(fs::exists(at("out1") + "/transforms.json"));
 }
 
-TEST_F(CommandLine, SaysWhatAFolderIsThatCannotBeServedAndWhatToDo) {
+TEST_F(CommandLine, SaysWhyAFolderCannotBeServedAndWhatToDo) {
   const auto says = [](const std::string& what, const std::string& answer) {
     EXPECT_EQ(expectFailure({"serve", what}), "tessera: error: " + what + ": " + answer + "\n");
   };
@@ -249,7 +249,8 @@ TEST_F(CommandLine, SaysWhatAFolderIsThatCannotBeServedAndWhatToDo) {
   source.erase("tessera");
   writeFileAtomically(at("source/transforms.json"), source.dump());
   says(at("source"),
-       "holds photos that are not imported yet, no scene; import, train and bake them first: tessera import " +
+       "is a folder of photos that are not imported yet, not a scene; import, train and bake them first: tessera "
+       "import " +
            at("source") +
            " CAPTURE, then tessera train CAPTURE MODEL --method volume, then tessera bake "
            "MODEL SCENE");
@@ -299,11 +300,11 @@ TEST_F(CommandLine, ExplainsWhatIsWrongWithSettings) {
     return expectFailure({"train", city(), at("unset"), "--steps", "1", "--set", setting});
   };
   EXPECT_TRUE(contains(failure("learning_rat=3"), "did you mean 'learning_rate'?"));
-  EXPECT_TRUE(contains(failure("learning_rate=fast"), "rate wants a number"));
+  EXPECT_TRUE(contains(failure("learning_rate=fast"), "rate requires a number"));
   EXPECT_TRUE(contains(failure("rate"), "rate"));
   EXPECT_TRUE(contains(failure("loss=hinge"), "hinge"));
   EXPECT_TRUE(contains(expectFailure({"train", city(), at("unset"), "--steps", "1", "--seed", "99999999999999999999"}),
-                       "seed wants a whole number"));
+                       "seed requires a whole number"));
   writeFileAtomically(folder_ / "wrong.toml", "learning_rate = 1\nwidht = 64\n");
   const std::string file = expectFailure({"train", city(), at("unset"), "--config", at("wrong.toml")});
   EXPECT_TRUE(contains(file, "wrong.toml: line 2")) << file;
@@ -421,7 +422,7 @@ TEST_F(CommandLine, RejectsUnknownDevices) {
   EXPECT_TRUE(contains(failure, "cpu")) << "the remedy names a device: " << failure;
 }
 
-TEST_F(CommandLine, GoesTheWholeWayFromACityToPictures) {
+TEST_F(CommandLine, TrainsEvaluatesAndRendersASyntheticCity) {
   const std::string trained = at("whole");
   Said said = train(trained, {"--steps", "12", "--json"});
   ASSERT_EQ(said.exitCode, 0) << said.err;
@@ -520,7 +521,7 @@ TEST_F(CommandLine, FollowsACameraPath) {
   EXPECT_FALSE(fs::exists(at("none")));
 }
 
-TEST_F(CommandLine, FilmsACameraPath) {
+TEST_F(CommandLine, RendersACameraPathAsAVideo) {
   if (!isInPath("ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed: videos are not tested";
   const Said said = run({"render", model(), at("film/flight.mp4"), "--path", writePath("film.json", true)});
   ASSERT_EQ(said.exitCode, 0) << said.err;

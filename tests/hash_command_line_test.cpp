@@ -54,7 +54,7 @@ class HashCommandLine : public testing::Test {
   static inline fs::path folder_;
 };
 
-TEST_F(HashCommandLine, GoesFromACityToPicturesAndNumbers) {
+TEST_F(HashCommandLine, TrainsEvaluatesAndRendersASyntheticCity) {
   const std::string model = at("model");
   const Said trained = run(trainArguments(model, {"--steps", "40"}));
   ASSERT_EQ(trained.exitCode, 0) << trained.err;

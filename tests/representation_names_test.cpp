@@ -80,7 +80,7 @@ TEST(RepresentationNames, CoverTheList) {
   }
 }
 
-TEST(RepresentationNames, StandTogetherInFewFilesThatAreNoRepresentations) {
+TEST(RepresentationNames, OccurTogetherInAtMostTwoFiles) {
   constexpr size_t kMax = 2;
   std::string files;
   size_t count = 0;
@@ -94,7 +94,7 @@ TEST(RepresentationNames, StandTogetherInFewFilesThatAreNoRepresentations) {
   EXPECT_LE(count, kMax) << files;
 }
 
-TEST(RepresentationNames, DoNotStandInProgramsNorInWhatServesAllOfThem) {
+TEST(RepresentationNames, DoNotOccurInProgramsOrSharedModules) {
   const auto files =
       namesIn({"apps", "src/bake", "src/render", "src/tiles", "src/train", "web/src/tiles", "web/src/stream"});
   EXPECT_GT(files.size(), 120u);

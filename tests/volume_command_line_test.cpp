@@ -267,7 +267,7 @@ TEST_F(VolumeCommandLine, TakesThePresetOfASettingsFile) {
 TEST_F(VolumeCommandLine, PlansForTheMemoryThatItIsGiven) {
   const Said said = run(trainArguments(at("planned"), {"--steps", "2", "--memory-mib", "1"}));
   EXPECT_EQ(said.exitCode, 0) << said.err;
-  EXPECT_TRUE(contains(said.err, "more than the 1 MiB there are")) << said.err;
+  EXPECT_TRUE(contains(said.err, "more than the 1 MiB available")) << said.err;
   EXPECT_FALSE(contains(run(trainArguments(at("planned"), {"--steps", "2", "--resume"})).err, "there are"));
 }
 
@@ -283,7 +283,7 @@ TEST_F(VolumeCommandLine, RejectsInvalidBlocks) {
   EXPECT_EQ(both.exitCode, 2) << both.err;
   const Said cut = run({"train", at("city"), at("never"), "--method", "field", "--blocks", "2x2"});
   EXPECT_EQ(cut.exitCode, 2) << cut.err;
-  EXPECT_TRUE(contains(cut.err, "--blocks: is of --method ")) << cut.err;
+  EXPECT_TRUE(contains(cut.err, "--blocks: applies to --method ")) << cut.err;
   const Said ofField = run({"train", at("city"), at("never"), "--method", "field", "--grid", grid});
   EXPECT_EQ(ofField.exitCode, 2) << ofField.err;
   EXPECT_TRUE(contains(ofField.err, "--grid")) << ofField.err;

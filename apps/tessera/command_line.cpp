@@ -44,7 +44,7 @@ int runCommandLine(CLI::App& app, int argc, char** argv, const std::string& more
                      "check that the disk is mounted and has free space, and that the folder is writable");
     std::fprintf(stderr, "tessera: error: %s\n", said.what());
   } catch (const std::bad_alloc&) {
-    std::fprintf(stderr, "tessera: error: memory: this machine has not enough; %s\n", moreMemory.c_str());
+    std::fprintf(stderr, "tessera: error: memory: this machine does not have enough; %s\n", moreMemory.c_str());
   } catch (const std::exception& error) {
     std::fprintf(stderr, "tessera: error: internal: %s; please report it\n", error.what());
   }

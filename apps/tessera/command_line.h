@@ -12,7 +12,7 @@ namespace tessera {
 // Adds the flags of every verb that computes on a device.
 void addDeviceFlags(CLI::App& verb, DeviceOptions& options);
 
-// Parses the value of --size, "1280x720". Throws CLI::ValidationError if it is none.
+// Parses the value of --size, "1280x720". Throws CLI::ValidationError if it is not of this form.
 void parsePictureSize(const std::string& size, int& width, int& height);
 
 // Parses the command line, calls `run`, and reports an error as one line on stderr. Returns the exit status: 0, 1

@@ -70,6 +70,6 @@ int main(int argc, char** argv) {
   }
   return tessera::runCommandLine(
       app, argc, argv,
-      "lower --set photo_budget_mib, grid_log2_size or fine_log2_size; of field samples_per_micro_batch; of volume "
-      "texels_per_step, or keep few blocks with --resident-blocks");
+      "lower, with --set, those of photo_budget_mib, samples_per_micro_batch, texels_per_step, grid_log2_size and "
+      "fine_log2_size that the method has, or pass a smaller --resident-blocks");
 }

@@ -93,16 +93,19 @@ void addBakeVerb(CLI::App& app) {
   verb->footer("Example:\n  tessera bake city.model city.scene");
   verb->add_option("model", flags->model, "model folder, of --method " + namesOfMethods(isBaked, "or"))->required();
   verb->add_option("scene", flags->scene, "scene folder to write")->required();
-  verb->add_option("--capture", flags->capture, "what the model was trained on; default: where it was then");
+  verb->add_option("--capture", flags->capture,
+                   "capture that the model was trained on; default: its path at training time");
   verb->add_option("--stride", flags->options.stride,
                    "use every n-th pixel of rows and columns to find what is visible")
       ->capture_default_str()
       ->check(CLI::Range(1, 64));
   verb->add_option("--background", flags->options.background,
-                   "red, green and blue where no photo looked; default: a hazy sky")
+                   "red, green and blue for directions that no photo shows; default: a hazy sky")
       ->check(CLI::Range(0.0, 1.0));
   flags->parameters.addTo(*verb);
-  verb->add_option("--effort", flags->options.effort, "of compression")->capture_default_str()->check(CLI::Range(0, 9));
+  verb->add_option("--effort", flags->options.effort, "compression effort")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 9));
   verb->add_flag("--json", flags->json, "print the result as one JSON object");
   addDeviceFlags(*verb, flags->device);
   verb->callback([flags] {

@@ -229,7 +229,7 @@ void addBenchCompute(CLI::App& bench) {
   verb->add_option("--samples", flags->options.samples, "samples of networks and hash grids")
       ->capture_default_str()
       ->check(CLI::Range(32u, 1u << 22));
-  verb->add_option("--streamed", flags->options.streamed, "samples of what only streams")
+  verb->add_option("--streamed", flags->options.streamed, "samples of operations that memory bandwidth limits")
       ->capture_default_str()
       ->check(CLI::Range(32u, 1u << 24));
   addDeviceFlags(*verb, flags->options.device);

@@ -246,7 +246,8 @@ void addBenchRender(CLI::App& bench) {
   CLI::Option* ofViews =
       verb->add_option("--views", flags->views, "render this capture's held-out views with and without skipping");
   verb->add_option("--against", flags->against,
-                   fmt::format("or beside this model, of --method {}, in turn", namesOfMethods(countsSamples, "or")))
+                   fmt::format("instead, render these views alternately with this model of --method {}, and compare",
+                               namesOfMethods(countsSamples, "or")))
       ->needs(ofViews);
   CLI::Option* flight =
       verb->add_flag("--flight", flags->flight, "fly over all blocks, low and high, with a small cache");

@@ -32,11 +32,11 @@ void addEvalVerb(CLI::App& app) {
   verb->add_option("--report", flags->report, "write a self-contained report.html here; default MODEL/report.html");
   verb->add_option("--images", flags->images, "write each rendering and its error map as PNG into this folder");
   verb->add_option("--lpips", flags->lpips, "LPIPS weights (safetensors)");
-  verb->add_option("--lod", flags->level, "of a scene: the finest level of detail to render")
+  verb->add_option("--lod", flags->level, "scenes only: the finest level of detail to render")
       ->capture_default_str()
       ->check(CLI::Range(0, 64));
   verb->add_option("--memory-mib", flags->memoryMiB,
-                   "of a scene: memory for its contents; 0: half of the machine's, or of a GPU's own")
+                   "scenes only: memory for the contents; 0: half of the machine's, or of a GPU's own")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1e9));
   addDeviceFlags(*verb, flags->device);

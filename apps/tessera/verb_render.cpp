@@ -39,11 +39,11 @@ void addRenderVerb(CLI::App& app) {
       ->capture_default_str()
       ->check(CLI::IsMember({"test", "validation", "train", "all"}));
   verb->add_option("--size", flags->size, "image size, as 1280x720; default: the camera's own");
-  verb->add_option("--lod", flags->level, "of a scene: the finest level of detail to render")
+  verb->add_option("--lod", flags->level, "scenes only: the finest level of detail to render")
       ->capture_default_str()
       ->check(CLI::Range(0, 64));
   verb->add_option("--memory-mib", flags->memoryMiB,
-                   "of a scene: memory for its contents; 0: half of the machine's, or of a GPU's own")
+                   "scenes only: memory for the contents; 0: half of the machine's, or of a GPU's own")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1e9));
   addDeviceFlags(*verb, flags->device);

@@ -33,7 +33,7 @@ void requireScene(const fs::path& path) {
     case FolderKind::scene:
       return;
     case FolderKind::source:
-      throw Error(name, "", "holds photos that are not imported yet, no scene",
+      throw Error(name, "", "is a folder of photos that are not imported yet, not a scene",
                   "import, train and bake them first: tessera import " + name + " CAPTURE, then tessera train CAPTURE" +
                       intoScene);
     case FolderKind::capture:
@@ -60,7 +60,7 @@ void requireScene(const fs::path& path) {
 std::string portError(const std::string& text) {
   int port = 0;
   const bool isPort = CLI::detail::lexical_cast(text, port) && port >= 0 && port <= 65535;
-  return isPort ? "" : fmt::format("'{}' is not a port: they are whole numbers from 0 to 65535", text);
+  return isPort ? "" : fmt::format("'{}' is not a port: ports are whole numbers from 0 to 65535", text);
 }
 
 // A scene or a world, as it is served beside the viewer.
@@ -93,10 +93,10 @@ void addServeVerb(CLI::App& app) {
   verb->footer("Example:\n  tessera serve garden.scene --port 8080\n  tessera serve worlds/world.json");
   verb->add_option("scene", flags->scene, "scene folder; or world.json of the viewer, or the folder that it lies in")
       ->required();
-  verb->add_option("--port", flags->server.port, "0: any free port")
+  verb->add_option("--port", flags->server.port, "TCP port; 0: any free port")
       ->capture_default_str()
       ->check(CLI::Validator(portError, "0 to 65535"));
-  verb->add_option("--address", flags->server.address, "of this machine; 0.0.0.0: for everyone who can reach it")
+  verb->add_option("--address", flags->server.address, "address to listen on; 0.0.0.0: reachable from other machines")
       ->capture_default_str();
   verb->add_option("--viewer", flags->viewer, "folder of the viewer's files (tools/build-web.sh makes it)")
       ->capture_default_str();

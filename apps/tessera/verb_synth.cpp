@@ -31,10 +31,11 @@ void addSynthVerb(CLI::App& app) {
   auto flags = std::make_shared<SynthFlags>();
   verb->add_option("out", flags->out, "capture folder to write")->required();
   verb->add_option("--blocks", flags->blocks, "city blocks, east x north")->capture_default_str();
-  verb->add_option("--photos", flags->city.photos, "photos; 0: enough for the size")->capture_default_str();
+  verb->add_option("--photos", flags->city.photos, "number of photos; 0: enough for the size of the city")
+      ->capture_default_str();
   verb->add_option("--size", flags->size, "photo size in pixels")->capture_default_str();
-  verb->add_option("--seed", flags->city.seed, "another city")->capture_default_str();
-  verb->add_option("--altitudes", flags->city.altitudes, "flights, metres above ground")
+  verb->add_option("--seed", flags->city.seed, "seed; each value gives another city")->capture_default_str();
+  verb->add_option("--altitudes", flags->city.altitudes, "altitudes of the flights, metres above ground")
       ->delimiter(',')
       ->capture_default_str();
   verb->add_flag("--traffic", flags->city.traffic, "cars that move between photos, with masks");

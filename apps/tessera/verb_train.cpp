@@ -104,10 +104,10 @@ TrainingResult train(Device& device, const TrainFlags& flags) {
     options.memoryMiB = flags.memoryMiB;
     options.gpuBytes = device.ownMemory().bytes;
     if (!method.swapsBlocks && !flags.residentBlocks.empty()) {
-      throw CLI::ValidationError("--resident-blocks", "is of --method " + namesOfMethods(swapsBlocks));
+      throw CLI::ValidationError("--resident-blocks", "applies to --method " + namesOfMethods(swapsBlocks) + " only");
     }
   } else {
-    const std::string ofOthers = "is of --method " + namesOfMethods(trainsInBlocks);
+    const std::string ofOthers = "applies to --method " + namesOfMethods(trainsInBlocks) + " only";
     if (flags.blocks != kAutoBlocks) throw CLI::ValidationError("--blocks", ofOthers);
     if (!flags.grid.empty()) throw CLI::ValidationError("--grid", ofOthers);
     if (flags.memoryMiB > 0) throw CLI::ValidationError("--memory-mib", ofOthers);
@@ -155,7 +155,8 @@ void addTrainVerb(CLI::App& app) {
   CLI::Option* steps = verb->add_option("--steps", flags->loop.steps, "training steps")
                            ->default_str(fmt::format("{}, or what the resumed run had planned", kDefaultSteps))
                            ->check(CLI::Range(int64_t{1}, int64_t{1} << 40));
-  verb->add_option("--minutes", flags->loop.minutes, "as many steps as fit; fixed once, early")
+  verb->add_option("--minutes", flags->loop.minutes,
+                   "train for about this long; the number of steps is fixed early in training")
       ->check(amount(1e-3, 1e7))
       ->excludes(steps);
   verb->add_flag("--resume", flags->loop.resume, "go on with the model that is in the folder");

@@ -48,7 +48,7 @@ TEST(DynamicResolution, TriesMorePixelsWhereTheRefreshRateHidesTheirCost) {
   EXPECT_EQ(resolution.share(), 1);
 }
 
-TEST(DynamicResolution, TriesSeldomWhatFailedBefore) {
+TEST(DynamicResolution, RarelyRetriesAResolutionThatWasTooSlow) {
   DynamicResolution resolution(20);
   draw(resolution, 10, 60, 16);
   const double fits = resolution.share();

@@ -47,7 +47,8 @@ class FrameSource {
   virtual ~FrameSource() = default;
 
   // Returns the best image of a view that is available now. `window`: a pinhole camera of the window's size; images may
-  // have fewer pixels, mainly while the camera is `moving`. The image stays valid until the next update. Throws Error.
+  // have fewer pixels, mainly while the camera is `moving`. The image stays valid until the next update. Throws Error
+  // if the model or scene cannot be read any more or the GPU fails; errors of drawing threads are rethrown here.
   virtual ShownPicture update(const Camera& window, const Pose& worldFromCamera, bool moving) = 0;
 
   virtual Eigen::Array3f background() const = 0;

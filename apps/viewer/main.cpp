@@ -17,14 +17,14 @@ int main(int argc, char** argv) {
   std::string size = "1280x720", mode = "map";
   app.add_option("what", view.folder, "scene or model folder")->required();
   app.add_option("--views", view.views,
-                 "capture whose photos' views can be gone to; default: the one a model was trained on");
+                 "capture whose photo poses can be visited; default: the one that the model was trained on");
   app.add_option("--from", window.from, "photo whose view to begin with: the end of its name");
   app.add_option("--mode", mode, "how to move")->check(CLI::IsMember({"map", "orbit", "fly"}));
-  app.add_option("--size", size, "of the window, as 1280x720");
+  app.add_option("--size", size, "size of the window, such as 1280x720");
   app.add_option("--detail", view.maximumScreenSpaceError,
-                 "of a scene: pixels of error that may be seen; 0: the finest everywhere")
+                 "scenes only: pixels of error that may be seen; 0: the finest everywhere")
       ->check(CLI::Range(0.0, 1000.0));
-  app.add_option("--memory-mib", view.memoryMiB, "of a scene: memory of the GPU for its contents")
+  app.add_option("--memory-mib", view.memoryMiB, "scenes only: memory of the GPU for the contents")
       ->check(CLI::Range(1.0, 1e9));
   bool hidden = false;
   app.add_flag("--no-panel", hidden, "begin without the panel (F1 shows it)");

@@ -92,7 +92,7 @@ TEST(Navigation, NeverLooksUpwardsOverTheMap) {
   EXPECT_GT(navigation.look().eye.z(), navigation.look().target.z());
 }
 
-TEST(Navigation, WheelComesNearerButNeverThrough) {
+TEST(Navigation, ApproachesTheTargetWithTheWheelWithoutPassingIt) {
   Navigation navigation(kLow, kHigh);
   const Look before = navigation.look();
   Moves moves;
@@ -106,7 +106,7 @@ TEST(Navigation, WheelComesNearerButNeverThrough) {
   EXPECT_NEAR((navigation.look().eye - before.target).norm(), 6 * navigation.radius(), 1e-9);
 }
 
-TEST(Navigation, FlyingGoesWhereItLooksAndTurnsOnTheSpot) {
+TEST(Navigation, MovesInTheViewingDirectionAndTurnsInPlaceInFlyMode) {
   Navigation navigation(kLow, kHigh);
   navigation.setMode(NavigationMode::fly);
   const Look before = navigation.look();
@@ -131,7 +131,7 @@ TEST(Navigation, KeysOverTheMapKeepTheHeight) {
   EXPECT_GT(navigation.look().eye.y(), eye.y());
 }
 
-TEST(Navigation, FliesToAViewInHalfASecondAndWhoeverMovesStopsThat) {
+TEST(Navigation, FliesToAViewInHalfASecondUnlessTheUserMoves) {
   Navigation navigation(kLow, kHigh);
   const Look there{{3, -4, 5}, {0, 0, 1}};
   Moves still;

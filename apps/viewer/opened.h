@@ -27,6 +27,8 @@ struct Place {
 
 // Throws Error if the folder holds neither a scene nor a model.
 void requireViewable(const fs::path& folder);
+// Reads the box and the photo poses of a scene or model. Throws Error if either cannot be read, or if `options.views`
+// names a capture of another world.
 Place loadPlace(const ViewOptions& options);
 
 // If a model in training has not saved anything yet, waits until it has.

@@ -63,7 +63,7 @@ PanelAction showPanel(const std::string& title, Navigation& navigation, const st
               fmt::format("{:.1f} frames per second, {:.1f} ms", 1000 / state.milliseconds, state.milliseconds));
     }
     for (const auto& [name, value] : facts) factRow(name, value);
-    factRow("All there is", state.isComplete ? "shown" : "not shown yet");
+    factRow("Complete", state.isComplete ? "yes" : "not yet");
     const Vec3d& eye = navigation.look().eye;
     factRow("Camera", fmt::format("{:.2f}, {:.2f}, {:.2f}", eye.x(), eye.y(), eye.z()));
     if (navigation.mode() == NavigationMode::fly) factRow("Speed", fmt::format("{:.3g} a second", navigation.speed()));

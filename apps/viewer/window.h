@@ -20,7 +20,8 @@ class Window {
   Window& operator=(const Window&) = delete;
 
   GLFWwindow* handle() const { return window_; }
-  // Creates the surface into which the window's frames are presented; the caller owns it. Throws Error.
+  // Creates the surface into which the window's frames are presented; the caller owns it. Throws Error if the
+  // driver cannot draw into the window.
   VkSurfaceKHR makeSurface(VkInstance instance) const;
 
   bool isClosing() const;

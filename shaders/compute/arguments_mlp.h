@@ -59,8 +59,8 @@ struct HalveNumbersArguments {
 };
 TESSERA_SIZE(HalveNumbersArguments, 24);
 
-// gradients[o][i] += Σ_samples after[sample][o] · before[sample][i]: for the weights of one layer. The
-// layer's input is a matrix of floats (the network's input) or activations; columns beyond the matrix read as zero.
+// gradients[o][i] += Σ_samples after[sample][o] · x[sample][i], where x is the layer's input: the weight gradients of
+// one layer. x is a matrix of floats (the network's input) or activations; columns beyond the matrix read as zero.
 struct MlpWeightGradientsArguments {
   CountArguments samples;
   MatrixArguments inputs;     // empty if there are activations

@@ -19,7 +19,7 @@ void main() {
       transmittance *= 1 - a.opacities.values[k];
     }
     const vec3 gradient = pointAt(a.colour, ray);
-    float rear = IS_SET(a.opacity) ? -a.opacity.values[ray] : 0;  // derivative of the loss by the light from behind
+    float rear = IS_SET(a.opacity) ? -a.opacity.values[ray] : 0;  // derivative of the loss with respect to the light from behind
     for (uint k = end; k-- > first;) {
       const float alpha = a.opacities.values[k], gate = kLiteral ? 1 : alpha, reaching = a.transmittances.values[k];
       const vec3 diffuse =

@@ -1,5 +1,5 @@
 // CompositeBackward: one invocation per ray, which computes opacities front to back, then gradients back to front with
-// the derivative of the loss by the light from behind (`rear`). It never divides by 1 - opacity.
+// the derivative of the loss with respect to the light from behind (`rear`). It never divides by 1 - opacity.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel.glsl"

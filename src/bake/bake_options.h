@@ -9,17 +9,18 @@
 namespace tessera {
 
 struct BakeOptions {
-  // Keeps what training photos see: samples of their pixels whose weight in the image and whose opacity over a
+  // Baking keeps the samples along the rays of training photos whose weight in the image and whose opacity over a
   // renderer's step both exceed these thresholds (MERF). Bakers of models that were trained with a final opacity
   // threshold use that one.
   double minWeight = 0.005, minAlpha = 0.005;
-  // The scene's background, where no photo looked. Without it, the baker's default is used, for example a hazy sky.
+  // The scene's background, for directions that no photo shows. Without it, the baker's default is used, for example a
+  // hazy sky.
   std::optional<std::array<float, 3>> background;
-  int stride =
-      1;  // use every stride-th pixel along rows and columns; doubled at each coarser level that has a model of its own
+  // Every stride-th pixel along rows and columns is used; doubled at each coarser level that has a model of its own.
+  int stride = 1;
   int effort = 4;  // compression effort, 0 to 9
-  // Reports progress. `all` counts a photo once for each model that looks at it. For a model that holds only few blocks
-  // at a time, photos are processed in parts.
+  // Reports progress. `all` counts a photo once for each model with which it is processed. For a model that holds only
+  // few blocks at a time, photos are processed in parts.
   std::function<void(int64_t done, int64_t all)> onPhoto = [](int64_t, int64_t) {};
 };
 

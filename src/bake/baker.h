@@ -42,7 +42,7 @@ class ContentSink {
                    const ContentSummary& content, const std::vector<uint32_t>& resources = {}) = 0;
 };
 
-// The default background where no photo looked.
+// The default background, for directions that no photo shows.
 inline constexpr std::array<float, 3> kHazySky = {0.74f, 0.8f, 0.86f};
 
 // Properties of a scene besides its tiles.
@@ -50,7 +50,7 @@ struct SceneDescription {
   std::string representation;  // name of the representation
   BlockGrid grid;
   double near = 0.05;                          // scene units
-  std::array<float, 3> background = kHazySky;  // where no photo looked, unless BakeOptions override it
+  std::array<float, 3> background = kHazySky;  // for directions that no photo shows, unless BakeOptions override it
 };
 
 // The baker of an opened model of some method.
@@ -76,7 +76,8 @@ struct BakedScene {
   std::vector<BakedLevel> levels;  // the finest first; includes the backgrounds
 };
 
-// Bakes a model with its baker and writes the scene folder; tileset.json is written last.
+// Bakes a model with its baker and writes the scene folder; tileset.json is written last. Throws Error as Baker::bake
+// does, and if a file cannot be written.
 BakedScene bakeScene(Baker& baker, const Capture& capture, const fs::path& scene, const BakeOptions& options);
 
 }  // namespace tessera

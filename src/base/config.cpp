@@ -111,7 +111,7 @@ void setConfigField(const std::vector<ConfigField>& fields, std::string_view ass
                 remedyForUnknown(fields, name));
   }
   if (equals == std::string_view::npos || !assign(*field, assignment.substr(equals + 1))) {
-    throw Error("--set " + std::string(assignment), "", name + " wants " + typeName(*field),
+    throw Error("--set " + std::string(assignment), "", name + " requires " + typeName(*field),
                 "write " + name + "=VALUE");
   }
 }
@@ -193,7 +193,8 @@ void configFromToml(const std::vector<ConfigField>& fields, const fs::path& path
         },
         field->value);
     if (!read) {
-      throw Error(path.string(), place, fmt::format("{} wants {}", key.str(), typeName(*field)), "correct the value");
+      throw Error(path.string(), place, fmt::format("{} requires {}", key.str(), typeName(*field)),
+                  "correct the value");
     }
   }
 }

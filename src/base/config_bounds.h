@@ -14,7 +14,7 @@ namespace tessera {
 struct ConfigBounds {
   double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
   bool isBounded = false;                 // by [low, high], which excludes NaN
-  int divisor = 1, rounding = 0;          // only multiples; an error suggests value + rounding, rounded down to one
+  int divisor = 1, rounding = 0;          // multiples of divisor; errors suggest value + rounding, rounded down to one
   std::vector<int> sizes;                 // if not empty: one of these
   std::vector<std::string_view> choices;  // if not empty: one of these
   bool isDependent = false;               // depends on other settings: checked after those that do not

@@ -185,7 +185,7 @@ TEST_F(ConfigFile, RefusesWrongTypesWithFileAndLine) {
     const std::string error = catchErrorMessage("# first line\n" + std::string(line) + "\n");
     EXPECT_TRUE(contains(error, path_.string())) << line << ": " << error;
     EXPECT_TRUE(contains(error, "line 2")) << line << ": " << error;
-    EXPECT_TRUE(contains(error, " wants ")) << line << ": " << error;
+    EXPECT_TRUE(contains(error, " requires ")) << line << ": " << error;
   }
 }
 

@@ -5,6 +5,7 @@
 
 namespace tessera {
 
+// Return the largest and the current resident size of the process in bytes; 0 without /proc.
 int64_t peakResidentBytes();
 int64_t residentBytes();
 

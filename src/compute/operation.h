@@ -30,7 +30,7 @@ class OperationId {
 template <class Arguments>
 struct OperationTraits;
 
-// To be placed below the struct, in its namespace.
+// The macro must be placed below the struct, in its namespace.
 #define TESSERA_OPERATION(Arguments)              \
   template <>                                     \
   struct OperationTraits<Arguments> {             \

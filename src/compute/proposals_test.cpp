@@ -64,7 +64,7 @@ std::vector<float> evenFences(uint32_t intervals) {
   return fences;
 }
 
-TEST_P(Proposals, AreResampledEvenlyWhereWeightsAreEqualOrNone) {
+TEST_P(Proposals, AreResampledEvenlyWhereWeightsAreEqualOrZero) {
   for (float weight : {0.0f, 0.3f})
     for (float anneal : {1.0f, 0.3f}) {
       const std::vector<float> fences = resampled(evenFences(64), std::vector<float>(64, weight), 32, anneal);

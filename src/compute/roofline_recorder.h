@@ -22,8 +22,8 @@ class RooflineRecorder {
     std::string name, shape;
     double amount = 0;  // units of work per run
     std::string unit;
-    double limit = 0;
-    double memoryLimit = 0;
+    double limit = 0;        // units per second; 0 if unknown
+    double memoryLimit = 0;  // units per second, see RooflineRow; 0 if it does not apply
   };
   // Times `run` and adds a row.
   void measure(const OperationId& operation, Work work, const std::function<void()>& run);

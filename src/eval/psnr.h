@@ -8,9 +8,11 @@ namespace tessera {
 // The value for equal images, so that means and JSON remain finite.
 inline constexpr double kMaximumPsnr = 99.0;
 
-// a, b: the same size and channels. `mask`: one channel of the same size, 0 = ignore the pixel; may be null.
-// NaN if all pixels are masked.
+// Returns the mean squared difference over pixels and channels. The images must have the same size and number of
+// channels. `mask` has one channel of the same size, where 0 excludes a pixel; it may be null. Returns NaN if all
+// pixels are excluded.
 double meanSquaredError(const ImageF& a, const ImageF& b, const ImageU8* mask = nullptr);
+// Return the PSNR in decibels, at most kMaximumPsnr; NaN for NaN.
 double psnrFromMeanSquaredError(double error);
 double psnr(const ImageF& a, const ImageF& b, const ImageU8* mask = nullptr);
 

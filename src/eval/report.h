@@ -22,7 +22,7 @@ class ReportBuilder {
   void add(const ViewResult& result, const ViewPictures& pictures);
   // Returns the report. Views that were not added have numbers but no images.
   std::string html(const EvaluationReport& report) const;
-  void write(const fs::path& path, const EvaluationReport& report) const;
+  void write(const fs::path& path, const EvaluationReport& report) const;  // throws Error if it cannot be written
 
  private:
   struct Figure {

@@ -47,7 +47,7 @@ AtomicFolder::AtomicFolder(const fs::path& place, const std::function<bool(const
     for (const fs::directory_entry& entry : fs::directory_iterator(place_, status)) {
       const std::string name = entry.path().filename().string();
       if (entry.is_regular_file(status) && isOurs(name)) continue;
-      throw Error(place.string(), name, "is nothing that an export wrote, and would be lost", "name another folder");
+      throw Error(place.string(), name, "was not written by an export and would be lost", "name another folder");
     }
     if (status) throw Error(place.string(), "", status.message(), "check its permissions");
   }

@@ -17,7 +17,7 @@ class AtomicFolder {
   AtomicFolder(const AtomicFolder&) = delete;
 
   const fs::path& path() const { return beside_; }  // the folder to write into
-  void commit();                                    // replaces what stood at `place`
+  void commit();  // replaces what was at `place`; throws Error if it cannot be replaced
 
  private:
   fs::path place_, beside_;

@@ -48,7 +48,7 @@ VolumeContent readOnlyContent(const fs::path& scene, const Tileset& tileset, fs:
   }
   const Tile& finest = tileset.tiles.back();  // with one cell, each tile is the only child of the one before
   if (finest.contents.size() != 1)
-    throw unsuitable("does not have exactly one content, and MERF's files hold one block");
+    throw unsuitable("does not have exactly one content, but MERF supports only one block");
   file = contentPath(scene, finest.contents[0].uri);
   return contentAs<VolumeContent>(
       *readVerifiedContent(file, volumeCodec(), tileset.tiles.size() - 1, finest.contents[0]));
@@ -56,11 +56,11 @@ VolumeContent readOnlyContent(const fs::path& scene, const Tileset& tileset, fs:
 
 void requireMerfBlock(const VolumeContent& content, const fs::path& file) {
   const auto unsuitable = [&](const std::string& why) { return Error(file.string(), "", why, kTrainOneBlock); };
-  if (content.parts.size() != 1) throw unsuitable("is merged of several blocks, and MERF's files hold one");
+  if (content.parts.size() != 1) throw unsuitable("merges several blocks, but MERF supports only one");
   const VolumePart& part = content.parts[0];
-  if (!part.contracted) throw unsuitable("is a block with bounds, and MERF's is contracted to hold all of space");
+  if (!part.contracted) throw unsuitable("is a bounded block, but MERF requires a contracted one");
   if (part.scale[0] != part.scale[1] || part.scale[0] != part.scale[2]) {
-    throw unsuitable("has not the same scale along all axes");
+    throw unsuitable("has different scales along its axes");
   }
   const auto hasShape = [&](size_t layer, uint32_t inputs, uint32_t outputs) {
     return content.network[layer].inputs == inputs && content.network[layer].outputs == outputs;
@@ -158,8 +158,8 @@ MerfExport writeMerf(const VolumeContent& content, const fs::path& folder) {
 
 MerfExport exportMerf(const fs::path& scene, const fs::path& out) {
   if (!fs::exists(scene / "tileset.json") && fs::exists(scene / "blocks.json")) {
-    throw Error(scene.string(), "", "is a model; what MERF's files hold is made by baking",
-                "tessera bake it, and export the scene");
+    throw Error(scene.string(), "", "is a model, but only baked scenes can be exported",
+                "run tessera bake, and export the scene");
   }
   const Tileset tileset = readTileset(scene);
   fs::path file;

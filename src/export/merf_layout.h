@@ -48,7 +48,7 @@ ImageU8 merfAtlasSlice(const VolumePart& part, const std::array<uint32_t, 3>& at
                        const MerfPicture& picture);
 // RGB: the position of each macroblock of the grid in the atlas, or 255, 255, 255.
 ImageU8 merfBlockIndices(const VolumePart& part, const std::array<uint32_t, 3>& atlas);
-// RGBA: all channels are 1 where anything may be, otherwise 0; ⌈planes / factor⌉ cells along an edge.
+// RGBA: all channels are 1 in cells that may contain something, otherwise 0; ⌈planes / factor⌉ cells along an edge.
 ImageU8 merfOccupancy(const VolumePart& part, uint32_t factor);
 
 // Returns the three layers 34 → 16 → 16 → 3 of a content for the viewer's directions, [inputs][outputs] each. The first

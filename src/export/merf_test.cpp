@@ -265,10 +265,10 @@ TEST_F(Merf, SaysWhyASceneCannotBeExportedAndWhatToTrain) {
   content.parts[0].contracted = false;
   content.parts[0].low = {-1, -1, -1};
   content.parts[0].high = {1, 1, 1};
-  refused(writeScene(content), "is a block with bounds", train);
+  refused(writeScene(content), "is a bounded block", train);
   content = good;
   content.parts[0].scale = {1, 1, 2};
-  refused(writeScene(content), "the same scale", train);
+  refused(writeScene(content), "has different scales", train);
   content = good;
   content.network = darkNetwork();
   refused(writeScene(content), "has a network", train);

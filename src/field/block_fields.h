@@ -18,7 +18,7 @@ struct BlockFieldShape {
 BlockFieldShape makeBlockFieldShape(const HashGridOptions& grid, int width, int hiddenLayers, int outputs,
                                     OutputActivation activation);
 
-// The samples of all blocks, with the intermediate values that backward needs of forward.
+// The samples of all blocks, with the intermediate values of forward that backward needs.
 struct BlockFieldBatch {
   uint32_t capacity = 0;
   Slice<const uint32_t> firstOfSlot;  // [slots + 1], rows

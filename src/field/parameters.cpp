@@ -63,8 +63,8 @@ void loadArray(Device& device, const fs::path& path, const Safetensors& file, co
   const TensorView& tensor = file.require(path, name, type);
   if (tensor.elements() != static_cast<int64_t>(to.size())) {
     throw Error(path.string(), "tensor " + name,
-                fmt::format("has {} numbers where the model's settings want {}", tensor.elements(), to.size()),
-                "the file belongs to another config.toml");
+                fmt::format("has {} values, but the model's settings require {}", tensor.elements(), to.size()),
+                "restore the config.toml that the checkpoint was trained with, or train again");
   }
   device.write(to.all(), tensor.as<T>());
 }

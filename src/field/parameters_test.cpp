@@ -70,7 +70,7 @@ TEST_F(Parameters, RejectTensorsOfAnotherSizeByName) {
   } catch (const Error& error) {
     EXPECT_EQ(error.subject(), "model/step-1.safetensors");
     EXPECT_EQ(error.place(), "tensor group");
-    EXPECT_NE(error.reason().find("5 numbers"), std::string::npos) << error.what();
+    EXPECT_NE(error.reason().find("5 values"), std::string::npos) << error.what();
   }
 }
 

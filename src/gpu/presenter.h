@@ -1,6 +1,6 @@
 // Draws and presents the frames of a window. Work that a GpuStream of the same context has submitted before `end` is
-// completed before the frame is drawn, and work that it submits afterwards begins after the frame is drawn. To be used
-// from the thread that uses that stream.
+// completed before the frame is drawn, and work that it submits afterwards begins after the frame is drawn. It must be
+// used by the thread that uses that stream.
 #pragma once
 
 #include <array>

@@ -65,7 +65,8 @@ class GpuRenderPass {
   std::span<const VkClearValue> clearValues() const { return clearValues_; }
   uint64_t serial() const { return serial_; }  // GpuContext::nextSerial
 
-  // Creates a pass that is compatible with pipelines of these formats. The caller must destroy it. Throws Error.
+  // Creates a pass that is compatible with pipelines of these formats. The caller must destroy it. Throws
+  // Error if the driver cannot create it.
   static VkRenderPass makeCompatible(const GpuContext& context, const AttachmentFormats& formats);
 
  private:

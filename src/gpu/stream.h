@@ -1,6 +1,7 @@
 // An in-order queue of device work: copies, fills, kernels and render passes are collected and submitted in batches;
-// each sees the results of all commands before it. Only `download` and `finish` wait for all work. To be used by one
-// thread at a time.
+// each sees the results of all commands before it. Only `download` and `finish` wait for all work. It must be
+// used by one thread at a time. Functions that queue, submit or wait throw Error if the device is lost or memory is
+// insufficient.
 //
 // A batch with the same commands as an earlier one (usually a training step) is not recorded again: the recorded
 // command buffer is resubmitted with new arguments, which lie in memory. To make such batches frequent, small copies
@@ -90,7 +91,7 @@ class GpuStream {
   GpuBuffer makeBuffer(size_t bytes);
   std::shared_ptr<GpuImage> makeImage(ImageSize size, ImageFormat format);
 
-  // The device time of each label's commands since `measure(true)`. While measuring, every batch is recorded anew.
+  // The device time of each label's commands since `measure(true)`. While measuring, every batch is recorded again.
   struct Measured {
     double seconds = 0;
     uint64_t commands = 0;
@@ -149,7 +150,7 @@ class GpuStream {
   };
 
   static constexpr size_t kAlignment = 64;           // of staged bytes and of arguments, bytes
-  static constexpr size_t kCommandsPerBatch = 1024;  // a training step has some hundreds, more with many blocks
+  static constexpr size_t kCommandsPerBatch = 1024;  // a training step has a few hundred, more with many blocks
   static constexpr size_t kArgumentBytes = 512 * kCommandsPerBatch;
   static constexpr uint32_t kQueries = kCommandsPerBatch + 1;
   static size_t roundedUp(size_t bytes) { return (bytes + kAlignment - 1) / kAlignment * kAlignment; }

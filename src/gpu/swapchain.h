@@ -37,8 +37,13 @@ class GpuSwapchain {
     VkFramebuffer framebuffer = VK_NULL_HANDLE;
     VkSemaphore drawn = VK_NULL_HANDLE;  // to be signalled by the commands that draw the image
   };
-  // Acquires the next image, which may be drawn once `available` is signalled, and stores its index.
-  enum class Acquired { image, nothingYet, fitsNoMore };
+  enum class Acquired {
+    image,
+    nothingYet,  // no image became free in time; try again
+    fitsNoMore,  // the images no longer match the window: call remake()
+  };
+  // Acquires the next image, which may be drawn once `available` is signalled, and stores its index. Throws Error if
+  // the device is lost.
   Acquired acquire(VkSemaphore available, uint32_t& index);
   const Image& image(uint32_t index) const { return images_[index]; }
   // Presents an image once its `drawn` is signalled. Returns false if the images no longer match the window.

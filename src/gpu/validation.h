@@ -11,7 +11,8 @@ inline const char* const kValidationExtension = VK_EXT_DEBUG_UTILS_EXTENSION_NAM
 // Returns whether the layers are installed; if not, logs a warning that names the package.
 bool validationInstalled();
 
-// Creates a messenger that logs the layers' errors and warnings as warnings.
+// Creates a messenger that logs the layers' errors and warnings as warnings. The caller must destroy it before the
+// instance. Throws Error if it cannot be created.
 VkDebugUtilsMessengerEXT createValidationMessenger(VkInstance instance);
 void destroyValidationMessenger(VkInstance instance, VkDebugUtilsMessengerEXT messenger);
 

@@ -5,7 +5,7 @@
 // it stays replaced until the error has fallen below the threshold by the factor `hysteresis`. If a tile of the cut is
 // not in memory, its nearest resident ancestor is drawn in that tile's cells.
 //
-// The tiles requested in memory are chosen anew for each view: the most urgent first, as far as the budget allows. The
+// The tiles requested in memory are chosen again for each view: the most urgent first, as far as the budget allows. The
 // ancestors of a requested tile are requested too, so that whatever comes into view can be drawn from an ancestor at
 // once.
 #pragma once
@@ -42,7 +42,7 @@ struct TileView {
 
   bool sees(const TileNode& tile) const;  // true for every visible tile, and for few others
   // Distance to the tile's box. For the background block: to its nearest part beyond the sides of the scene's box,
-  // because above is sky and the ground hides what lies below.
+  // because the space above the box is sky and the ground hides the space below.
   double distance(const TileNode& tile) const;
   double errorInPixels(const TileNode& tile) const;
   double areaInPixels(const TileNode& tile) const;  // upper bound of the area that the tile covers
@@ -51,7 +51,7 @@ struct TileView {
 TileView tileView(const Camera& camera, const Pose& worldFromCamera, const TileFrame& frame);
 
 // Returns whether a ray shows the relevant part of the background block: it misses the scene's box or leaves it through
-// a side. Above is sky, and the ground hides what lies below.
+// a side. The space above is sky, and the ground hides the space below.
 bool showsBackgroundBlock(const SceneRay& ray, const Vec3d& low, const Vec3d& high);
 
 // What a selection is based on: the memory budget, the resident tiles and the sizes of tiles.

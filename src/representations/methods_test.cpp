@@ -117,7 +117,7 @@ TEST(Methods, RejectUnknownPresets) {
   }
 }
 
-TEST(Methods, HaveBakeParametersThatMeanOneThing) {
+TEST(Methods, GiveBakeParametersOfOneNameTheSameMeaning) {
   std::map<std::string_view, std::string_view> helps;
   for (const Method* method : methods()) {
     std::set<std::string_view> names;

@@ -8,7 +8,7 @@
 
 namespace tessera {
 
-// Grid axes: x and y along the cells' edges, z up, the origin at the centre of all cells, in scene units.
+// Grid axes: x and y along the cells' edges, z up, the origin at the centre of all cells. Lengths are in world units.
 struct BlockGrid {
   Vec3d originInWorld = Vec3d::Zero();
   Mat3d gridFromWorld = Mat3d::Identity();  // a rotation

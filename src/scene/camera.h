@@ -24,6 +24,7 @@ struct Camera {
   LensModel lens = LensModel::pinhole;
   std::array<double, 16> parameters{};  // as COLMAP orders them; the first lensParameterCount are used
 
+  // Focal lengths and principal point in pixels, in the convention of scene/axes.h.
   double focalX() const;
   double focalY() const;
   double centreX() const;

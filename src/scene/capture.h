@@ -51,7 +51,8 @@ struct Observation {
 
 // The position of the recentred world on the Earth: an east-north-up frame at a geographic origin.
 struct GeoFrame {
-  double latitude = 0, longitude = 0, altitude = 0;
+  double latitude = 0, longitude = 0;      // degrees, WGS 84
+  double altitude = 0;                     // metres, with the reference of GpsFix::altitude
   Mat4d enuFromWorld = Mat4d::Identity();  // similarity; metres
 };
 

@@ -15,7 +15,7 @@ namespace tessera {
 // [0, 1]), and error if present; skips other properties and elements. Returns nothing, with the reason in `reason`, if
 // the bytes are not such a file or end early. Positions may be NaN where the file contains NaN.
 std::optional<std::vector<SparsePoint>> decodePly(std::span<const std::byte> bytes, std::string* reason = nullptr);
-std::vector<SparsePoint> readPly(const fs::path& path);  // throws Error
+std::vector<SparsePoint> readPly(const fs::path& path);  // throws Error naming the file if it cannot be read or decoded
 
 // Encodes as binary little-endian: double x, y, z; uchar red, green, blue; float error. decodePly reads it back
 // exactly.

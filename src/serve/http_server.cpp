@@ -250,7 +250,7 @@ HttpServer::HttpServer(const StaticSite& site, const HttpServerSettings& setting
   const auto refuse = [&](const std::string& reason, const std::string& remedy) {
     throw Error(place, "", reason, remedy);
   };
-  const char* another = "name one with --address, as 127.0.0.1, or 0.0.0.0 for all that it has";
+  const char* another = "pass one with --address, such as 127.0.0.1, or 0.0.0.0 for all of this machine's addresses";
   if (error) refuse("is not an IP address", another);
   tcp::acceptor& acceptor = state_->acceptor;
   const tcp::endpoint endpoint(address, settings.port);

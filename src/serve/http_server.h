@@ -15,8 +15,8 @@ namespace tessera {
 
 struct HttpServerSettings {
   std::string address = "127.0.0.1";
-  uint16_t port = 8080;                          // 0: any free port
-  size_t maxConnections = 2048;                  // beyond, the connection that has been idle for longest is closed
+  uint16_t port = 8080;          // 0: any free port
+  size_t maxConnections = 2048;  // beyond this number, the connection that has been idle longest is closed
   std::chrono::milliseconds requestTime{15000};  // to receive a whole request
   std::chrono::milliseconds idleTime{60000};     // between requests
   std::chrono::milliseconds sendTime{30000};     // for a client to receive the next 64 KiB

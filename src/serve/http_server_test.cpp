@@ -354,7 +354,8 @@ TEST_F(HttpServerTest, ReportsAddressesThatAreInUseOrInvalid) {
     }
   };
   EXPECT_EQ(said(), "is in use by another program; choose another --port, or 0 for one that is free");
-  const std::string another = "; name one with --address, as 127.0.0.1, or 0.0.0.0 for all that it has";
+  const std::string another =
+      "; pass one with --address, such as 127.0.0.1, or 0.0.0.0 for all of this machine's addresses";
   settings.address = "192.0.2.1";  // reserved for documentation
   EXPECT_EQ(said(), "is not an address of this machine" + another);
   settings.address = "somewhere";

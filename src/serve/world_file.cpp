@@ -95,7 +95,7 @@ std::string encoded(const std::string& text) {
 void requireServed(const fs::path& worldFile, const fs::path& folder) {
   const std::string name = worldFile.filename().string();
   if (!pathOfTarget("/" + encoded(name))) {
-    throw Error(worldFile.string(), "", "has a name by which nothing is served",
+    throw Error(worldFile.string(), "", "has a name that the server does not serve",
                 "give it one that does not begin with a dot, and has no backslash or control character");
   }
   if (!SiteFile::open(folder, name).file) {
@@ -130,7 +130,7 @@ std::vector<std::pair<std::string, const json*>> listScenes(const json& world, c
   const auto refuse = [&](const std::string& place, const std::string& reason, const std::string& remedy) {
     throw Error(file.string(), place, reason, remedy);
   };
-  if (version != 2) refuse("version", "is not 2, nor 1", "correct it, or use a newer tessera");
+  if (version != 2) refuse("version", "is neither 1 nor 2", "correct it, or use a newer tessera");
   if (!list.is_array() || list.empty()) {
     refuse("scenes", list.is_array() ? "is empty" : "is missing, or not a list",
            R"(name one at least: [{"url": "garden.scene"}])");
@@ -145,7 +145,8 @@ std::vector<std::pair<std::string, const json*>> listScenes(const json& world, c
     scenes.emplace_back(place, &scene);
   }
   if (!hasMain) {
-    refuse("scenes", "has none in whose world the others stand", "leave out position, rotation and scale of one");
+    refuse("scenes", "contains no scene without a placement, which would define the frame of the world",
+           "leave out position, rotation and scale of one");
   }
   return scenes;
 }

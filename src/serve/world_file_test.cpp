@@ -84,7 +84,7 @@ TEST_F(WorldFileTest, RejectsFilesThatWouldNotBeServed) {
   write("beside/world.json", makeWorldText("deep"));
   for (const char* name : {".world.json", "a\\b.json", "a\nb.json"}) {
     write(std::string("site/") + name, makeWorldText("deep"));
-    EXPECT_EQ(worldErrorMessage(std::string("site/") + name), ": has a name by which nothing is served") << name;
+    EXPECT_EQ(worldErrorMessage(std::string("site/") + name), ": has a name that the server does not serve") << name;
   }
   write("site/a 50%.json", makeWorldText("deep"));
   EXPECT_EQ(worldErrorMessage("site/a 50%.json"), "");
@@ -129,9 +129,9 @@ TEST_F(WorldFileTest, RequiresTheKindAndASupportedVersion) {
   };
   for (const char* version : {"1", "2", "2.0"}) EXPECT_EQ(ofVersion(version), "") << version;
   for (const char* version : {"0", "3", "1.5", "\"2\"", "null", "true", "[2]"}) {
-    EXPECT_EQ(ofVersion(version), "version: is not 2, nor 1") << version;
+    EXPECT_EQ(ofVersion(version), "version: is neither 1 nor 2") << version;
   }
-  EXPECT_EQ(said(R"({"kind":"tessera world","scenes":[{"url":"deep"}]})"), "version: is not 2, nor 1");
+  EXPECT_EQ(said(R"({"kind":"tessera world","scenes":[{"url":"deep"}]})"), "version: is neither 1 nor 2");
 }
 
 TEST_F(WorldFileTest, RequiresScenesOfWhichOneIsTheMainOne) {
@@ -152,7 +152,7 @@ TEST_F(WorldFileTest, RequiresScenesOfWhichOneIsTheMainOne) {
   EXPECT_EQ(ofScenes("[" + sixteen + "]"), "");
   EXPECT_EQ(ofScenes("[" + sixteen + "," + deep + "]"), "scenes: are more than 16");
 
-  const std::string noMain = "scenes: has none in whose world the others stand";
+  const std::string noMain = "scenes: contains no scene without a placement, which would define the frame of the world";
   for (const char* place : {R"("position":[0,0,0])", R"("rotation":[0,0,0,1])", R"("scale":1)"}) {
     const std::string placed = std::string(R"({"url":"deep",)") + place + "}";
     EXPECT_EQ(ofScenes("[" + placed + "]"), noMain);

@@ -104,7 +104,7 @@ std::optional<float> changeWithDirection(const CityScene& city, const Vec3f& pla
   return (light[0] - light[1]).norm() / std::max(light[0].norm(), light[1].norm());
 }
 
-TEST(CityScene, ShowsGlassTowersOtherwiseFromOtherSides) {
+TEST(CityScene, ShowsGlassTowersDifferentlyFromDifferentSides) {
   ThreadPool pool;
   const CityScene city(2, 1, 3, pool);  // one of the two blocks has towers
   int glass = 0, changed = 0, walls = 0, steady = 0;

@@ -88,7 +88,7 @@ TEST(Flights, StayOutsideBuildingsAndHoldLevelAxes) {
 }
 
 // Places that a model is to learn must be seen from several sides.
-TEST(Flights, SeeNearlyEveryOpenPlaceFivefold) {
+TEST(Flights, SeeNearlyEveryOpenPlaceInAtLeastFivePhotos) {
   ThreadPool pool;
   const CityScene city(2, 2, 1, pool);
   const Camera camera = droneCamera(400, 300);

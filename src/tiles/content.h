@@ -1,6 +1,6 @@
 // What a tile holds, independently of its representation: decoded contents, the resources that they share, and the
-// codec that decodes them from untrusted bytes. Each representation has one codec; this interface is all that code
-// which reads scenes knows of a representation.
+// codec that decodes them from untrusted bytes. Each representation has one codec; code that reads scenes
+// knows a representation only through this interface.
 #pragma once
 
 #include <cstddef>
@@ -107,7 +107,7 @@ class ContentCodec {
   virtual std::unique_ptr<Content> decode(std::span<const std::byte> glb, const Resources& resources,
                                           std::string& reason, const ContentLimits& limits = {}) const = 0;
 
-  // Returns an upper bound of the memory that a shared resource will take whose file has `fileBytes` bytes.
+  // Returns an upper bound of the memory that a shared resource with a file of `fileBytes` bytes will take.
   virtual uint64_t resourceMemoryBytes(const SharedResource&, uint64_t fileBytes) const { return fileBytes; }
   // Returns null if the resource is refused, which representations without shared resources always do.
   virtual std::shared_ptr<const Resource> decodeResource(std::span<const std::byte>, const SharedResource&,

@@ -58,8 +58,9 @@ std::optional<json> decodeAsset(std::string_view text, std::string_view represen
   const json* ours = extensions ? getField(*extensions, kContentExtension) : nullptr;
   if (!ours || !uses(asset, kContentExtension)) return fail("has no extension TESSERA_content");
   const auto version = getUnsigned(*ours, "version");
-  if (!version) return fail("does not say which version it is of");
-  if (*version != kContentVersion) return fail(fmt::format("is of version {}; {} is known", *version, kContentVersion));
+  if (!version) return fail("does not state its version");
+  if (*version != kContentVersion)
+    return fail(fmt::format("has version {}; only {} is supported", *version, kContentVersion));
   if (!isString(*ours, "representation", representation)) {
     return fail(fmt::format("is not of the representation {}", representation));
   }

@@ -33,7 +33,8 @@ std::optional<Tileset> decodeTileset(std::string_view text, std::string& reason,
 // Returns the union of a tile's box and those of its contents: the bounding volume that is stored on disk, which in 3D
 // Tiles includes the far box of a background block.
 SceneBox enclosingBox(const Tile& tile);
-// In the tile frame: the centre, followed by half the edges along x, y and z.
+// Returns a box in the tile frame as 3D Tiles stores it: the centre, then the vectors of half the edges along the
+// scene's x, y and z (3 numbers each).
 std::array<double, 12> boundingBoxNumbers(const Tileset& tileset, const SceneBox& box);
 
 // Returns whether a uri consists of letters, digits, `.`, `_` and `-` between single slashes, has no component that

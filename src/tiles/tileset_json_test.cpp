@@ -140,8 +140,8 @@ TEST_F(TilesetJsonRefusal, RejectsWhatIsNoTileset) {
   refuses("is not 3D Tiles 1.1", [](json& file) { file["asset"]["version"] = "1.0"; });
   refuses("has no extension TESSERA_scene", [](json& file) { file.erase("extensions"); });
   refuses("requires extensions", [](json& file) { file["extensionsRequired"] = {"VENDOR_x"}; });
-  refuses("is of version 2; 1 is known", [](json& file) { ours(file)["version"] = 2; });
-  refuses("does not say which version", [](json& file) { ours(file)["version"] = "1"; });
+  refuses("has version 2; only 1 is supported", [](json& file) { ours(file)["version"] = 2; });
+  refuses("does not state its version", [](json& file) { ours(file)["version"] = "1"; });
   refuses("does not name its representation", [](json& file) { ours(file)["representation"] = 7; });
   refuses("the representation's name is not valid", [](json& file) { ours(file)["representation"] = "Two words"; });
 }

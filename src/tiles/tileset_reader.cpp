@@ -88,8 +88,9 @@ class TilesetReader {
     const json* ours = tesseraExtension(file);
     if (!ours) return fail("has no extension TESSERA_scene");
     const auto version = getUnsigned(*ours, "version");
-    if (!version) return fail("does not say which version it is of");
-    if (*version != kSceneVersion) return fail(fmt::format("is of version {}; {} is known", *version, kSceneVersion));
+    if (!version) return fail("does not state its version");
+    if (*version != kSceneVersion)
+      return fail(fmt::format("has version {}; only {} is supported", *version, kSceneVersion));
     return true;
   }
 

@@ -39,7 +39,7 @@ TEST(Tileset, StandsOnItsBlockGrid) {
   EXPECT_DOUBLE_EQ(again.top, 9);
 }
 
-TEST(Tileset, ItsCellsAreTheGridsCells) {
+TEST(Tileset, HasTheCellsOfItsBlockGrid) {
   const Tileset tileset = testTileset();
   const BlockGrid grid = tileset.blockGrid();
   for (double x = -5; x <= 5; x += 0.37) {

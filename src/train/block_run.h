@@ -102,8 +102,8 @@ class BlockMethod {
 
 // Trains the finest level into `model`, then the coarser ones, up to one that holds all blocks, into its folder
 // `levels`, each for as many steps as levelSteps returns or as it had planned when it was started. Coarser levels that
-// were created at an earlier step of the finest level are trained anew. The result counts the steps of the finest
-// level, and is finished when all levels are. Throws Error as openBlockRun and runTraining do.
+// were created at an earlier step of the finest level are trained again from the start. The result counts the steps of
+// the finest level, and is finished when all levels are. Throws Error as openBlockRun and runTraining do.
 TrainingResult trainInBlocks(Device& device, const Capture& capture, const fs::path& model,
                              const BlockRunOptions& options, BlockMethod& method);
 

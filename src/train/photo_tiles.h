@@ -16,7 +16,7 @@ struct PhotoTile {
 struct TiledPhotos {
   std::vector<PhotoTile> tiles;             // grouped by photo
   std::vector<uint32_t> setOfTile;          // [tiles], index into sets
-  std::vector<std::vector<uint32_t>> sets;  // distinct; increasing block numbers, without an own background block
+  std::vector<std::vector<uint32_t>> sets;  // distinct; increasing block numbers, without a separate background block
 };
 
 // Returns the grid cells that a ray crosses between its entry into the region's box and the distance `farthest` (scene

@@ -38,7 +38,7 @@ class BakePixelFilter {
   void begin(const Photo& photo, const Camera& camera);
   bool within(int x, int y) const { return x >= 0 && y >= 0 && x < camera_->width && y < camera_->height; }
   // Returns whether a pixel is used: within the photo, if the mask does not exclude it; outside, if it looks no higher
-  // than some photo does: above is sky, where what the model extrapolates is noise.
+  // than some photo does: the space above that is sky, where the model's extrapolation is noise.
   bool count(int x, int y) const;
 
  private:

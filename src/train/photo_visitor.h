@@ -26,7 +26,8 @@ class PixelVisitor {
   virtual void visit(std::span<const float> pixels, SeenThrough through) = 0;
 };
 
-// Return every `stride`-th pixel of a photo; and a sparser lattice of the photo with its margin of kOutOfFrameMargin.
+// latticeWithin returns every `stride`-th pixel of a photo; latticeBeside returns a sparser lattice of the photo and
+// its margin of kOutOfFrameMargin.
 PixelLattice latticeWithin(const Camera& camera, int stride);
 PixelLattice latticeBeside(const Camera& camera, int stride);
 
@@ -38,7 +39,7 @@ class PhotoVisitor {
 
   // Starts a photo. Throws Error if its mask cannot be read.
   void begin(int photo);
-  // Visits the pixels of these lattices; with `onlyBeside` none that lie within the photo.
+  // Visits the pixels of these lattices. With `onlyBeside`, pixels within the photo are skipped.
   void look(const std::vector<PixelLattice>& lattices, SeenThrough through, bool onlyBeside);
 
   struct Margin {

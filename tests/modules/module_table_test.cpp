@@ -218,7 +218,7 @@ TEST(Modules, LinkInCmakeWhatTheTableAllows) {
   EXPECT_GT(checked, 30u);
 }
 
-TEST(Modules, LetWhatOnlyDrawsScenesLinkNoTrainer) {
+TEST(Modules, LinkNoTrainerIntoLibrariesThatOnlyDrawScenes) {
   const CmakeTargets targets = targetsOfProject();
   for (const std::string scenes : {"scene_source", "cpu_drawers", "gpu_drawers"}) {
     const std::set<std::string> linked = linkedBy(targets, scenes);
@@ -286,7 +286,7 @@ TEST(ModuleTable, KeepsOneRepresentationFromAnother) {
             "representations/hash/cpu may use base, representations/hash/content, not representations/volume/content");
 }
 
-TEST(ModuleTable, OpensOfApplicationsOnlyWhatIsNamed) {
+TEST(ModuleTable, AllowsOnlyTheNamedFilesOfOtherApplications) {
   const ModuleTable table = ModuleTable::parse(kTable);
   EXPECT_EQ(table.validationError("apps/viewer/main.cpp", "representations/hash/cpu/a.h"), "");
   EXPECT_EQ(table.validationError("apps/viewer/main.cpp", "apps/tessera/render_source.h"), "");
@@ -294,7 +294,7 @@ TEST(ModuleTable, OpensOfApplicationsOnlyWhatIsNamed) {
             "apps/viewer may use all, apps/tessera/render_source.h, not apps/tessera");
 }
 
-TEST(ModuleTable, RefusesRowsThatUseWhatNoRowIs) {
+TEST(ModuleTable, RejectsUnknownModulesDuplicateRowsAndMissingTables) {
   EXPECT_THROW(ModuleTable::parse("## bottom to top\n| a | b |\n|---|---|\n| `base` | gone |\n"), Error);
   EXPECT_THROW(ModuleTable::parse("## bottom to top\n| a | b |\n|---|---|\n| `a` | — |\n| `a` | — |\n"), Error);
   EXPECT_THROW(ModuleTable::parse("## elsewhere\n| a | b |\n|---|---|\n| `base` | — |\n"), Error);

@@ -10,16 +10,19 @@ export interface SceneFiles {
   read(uri: string, maximum: number, signal?: AbortSignal): Promise<ContentFile>;
 }
 
+// Thrown for a file that is larger than the `maximum` that `read` was given.
 export class TooLarge extends SceneError {
   constructor(name: string, remedy = 'copy the scene again, or bake it again') {
     super(name, '', 'is larger than any such file should be', remedy);
   }
 }
 
+// The files of a scene on a server.
 export class ServedFiles implements SceneFiles {
   readonly name: string; // the address of tileset.json
 
-  // `url` is the address of the folder, or of the tileset.json in it, relative to the page.
+  // `url` is the address of the folder, or of the tileset.json in it, relative to the page. Throws TypeError if it is
+  // not a valid URL.
   constructor(url: string) {
     const absolute = new URL(url, location.href);
     if (!absolute.pathname.endsWith('.json')) absolute.pathname = `${absolute.pathname.replace(/\/$/, '')}/tileset.json`;
@@ -30,7 +33,7 @@ export class ServedFiles implements SceneFiles {
     // The file is called tileset.json here, whatever its name on the server.
     const url = uri === 'tileset.json' ? this.name : new URL(uri, this.name).href;
     return uri === 'tileset.json'
-      ? fetchFile(url, url, maximum, signal, 'see that the address is that of a scene')
+      ? fetchFile(url, url, maximum, signal, 'check that the address is that of a scene')
       : fetchFile(url, uri, maximum, signal);
   }
 }

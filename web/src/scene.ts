@@ -35,6 +35,7 @@ const kTilesetBytes = 1 << 24;
 const kNearby = 1e-6; // scene units
 const kPrefetchTime = 30; // ms for uploads per call of `prefetch`, which draws nothing
 
+// Both override the defaults, kSelectionSettings and kStreamSettings.
 export interface SceneOptions {
   selection?: Partial<SelectionSettings>;
   stream?: Partial<StreamSettings>;
@@ -100,7 +101,7 @@ export class TesseraScene extends THREE.Object3D {
   private readonly onContextLost = () => this.leaveGpu();
 
   // Loads a scene from the address of its folder (or of the tileset.json in it), or from other files. Throws SceneError
-  // if there is no scene, or if it is of an unsupported kind.
+  // if there is no scene, or if it is of an unsupported kind, and TypeError if the address is not a valid URL.
   static async load(from: string | SceneFiles, options: SceneOptions = {}): Promise<TesseraScene> {
     const files = typeof from === 'string' ? new ServedFiles(from) : from;
     const pool = new DecodePool();

@@ -14,8 +14,8 @@ export function updateScenes(scenes: readonly TesseraScene[], camera: THREE.Came
   const behind: TesseraScene[] = [];
   for (const { scene } of farthestFirst) {
     const worldToLocal = scene.matrixWorld.clone().invert();
-    // Where another scene is captured and visible, it is shown in place of this scene's background block. The nearest
-    // first.
+    // Where another scene is captured and visible, it is shown in place of this scene's background block. The boxes
+    // are ordered nearest first.
     const boxes = [...farthestFirst]
       .reverse()
       .filter((other) => other.scene !== scene && other.scene.complete && (other.scene.statistics?.resident ?? 0) > 0)

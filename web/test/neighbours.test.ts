@@ -124,7 +124,7 @@ describe.skipIf(missing()).each([['volume', goldenScene], ['hash', goldenHash]])
 
     it('is rejected if there are too many boxes', async () => {
       await hide(...Array.from({ length: 9 }, () => building));
-      await expect(picture(atFacade)).rejects.toThrow('hidden: are 9 boxes, and 8 can be hidden; hide fewer, larger ones');
+      await expect(picture(atFacade)).rejects.toThrow('hidden: contains 9 boxes; at most 8 are supported; hide fewer, larger ones');
       await hide();
     });
   });

@@ -8,6 +8,7 @@
 
 namespace tessera {
 
+// Uses `threads` threads; 0: all cores.
 std::unique_ptr<Device> makeCpuDevice(int threads = 0);
 
 }  // namespace tessera

@@ -19,7 +19,7 @@ namespace tessera {
 // Limits of the workgroup counts. 0 selects the default of the device.
 struct GroupBounds {
   // If the capacity for rows needs fewer groups than this, all of them are dispatched without counting. An empty group
-  // costs about 10 μs with a driver for the CPU and some ns on a GPU; counting costs some μs.
+  // costs about 10 μs with a driver for the CPU and a few ns on a GPU; counting costs a few μs.
   uint32_t minimum = 0;
   uint32_t maximum = 0;  // the largest number of groups along x
 };

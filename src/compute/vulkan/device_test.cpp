@@ -118,7 +118,7 @@ INSTANTIATE_TEST_SUITE_P(Sums, VulkanDeviceTest, testing::Bool(), [](const testi
   return info.param ? "WithFloatAtomics" : "WithCompareAndSwap";
 });
 
-TEST_P(VulkanDeviceTest, UsesFloatAtomicsWhereTheyAreThereAndAllowed) {
+TEST_P(VulkanDeviceTest, UsesFloatAtomicsWhereAvailableAndAllowed) {
   const bool used = device_->target().find("floatAtomics") != std::string::npos;
   EXPECT_EQ(used, GetParam() && openForTest()->features().floatAtomics) << device_->target();
 }

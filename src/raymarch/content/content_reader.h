@@ -76,7 +76,7 @@ class PartsReader : protected ContentReader {
     for (size_t i = 0; i < headers_.size(); ++i) {
       const char* what = "";
       if (!self().readPictures(*sources_[i], headers_[i], what)) {
-        fail(fmt::format("part {}: its {} are not what they should be", i, what));
+        fail(fmt::format("part {}: its {} are malformed", i, what));
         return std::nullopt;
       }
       content_.parts.push_back(std::move(headers_[i].part));

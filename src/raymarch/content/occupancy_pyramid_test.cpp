@@ -59,7 +59,7 @@ TEST(OccupancyPyramid, DistancesFromACornerReachTheFarEndAndStopAt255) {
   EXPECT_EQ(distances[bits.number(0, 299, 299)], 255);
 }
 
-TEST(OccupancyPyramid, NothingOccupiedIsFarAwayEverywhere) {
+TEST(OccupancyPyramid, HasTheMaximumDistanceEverywhereIfNothingIsOccupied) {
   const auto distances = chebyshevDistances(OccupancyBits(6));
   EXPECT_EQ(std::count(distances.begin(), distances.end(), kFarthestDistance), 216);
 }

@@ -18,7 +18,7 @@ struct GpuRendererSettings {
   bool inBackground = false;
 };
 
-// What is drawn of a scene, and what is resident for it.
+// The number of contents that the last image drew, and the state of the cache.
 struct SceneState {
   size_t drawn = 0;    // contents drawn in the last image
   size_t missing = 0;  // contents that it requested and that were not resident

@@ -7,9 +7,12 @@ namespace tessera {
 
 struct BlockSettings {
   // `cpu` selects the defaults, `paper` the values of the method's paper, for large GPUs.
-  SETTING(std::string, preset, "cpu", "preset", "the defaults of all others: cpu, or paper (large GPUs)", anything());
+  SETTING(std::string, preset, "cpu", "preset", "preset of all other defaults: cpu, or paper (for large GPUs)",
+          anything());
   SETTING(std::string, backgroundBlock, "own", "background_block",
-          "what lies outside the region: own (a block of its own), border (the border blocks', as in the papers), none",
+          "what represents the space outside the region: own (a separate background block), border (the blocks at the "
+          "border, "
+          "as in the papers) or none",
           anything());  // see parseBackgroundBlockMode
   SETTING(int, lod, 0, "lod", "level of detail: 0 is the finest; set by training for coarser levels", within(0, 16));
   SETTING(int64_t, finestStep, 0, "finest_step",

@@ -8,8 +8,8 @@ namespace tessera {
 
 struct LearningRateSettings {
   SETTING(double, learningRate, 1e-2, "learning_rate", "learning rate", positive());
-  SETTING(double, finalLearningRateFactor, 0.03, "final_learning_rate_factor", "learning rate at the end, relative",
-          positive());
+  SETTING(double, finalLearningRateFactor, 0.03, "final_learning_rate_factor",
+          "final learning rate, relative to learning_rate", positive());
   SETTING(double, constantLearningRateFraction, 0.4, "constant_learning_rate_fraction",
           "share of the steps before the learning rate begins to fall", share());
   SETTING(double, networkL2, 1e-6, "network_l2", "weight decay of the networks", atLeast(0));

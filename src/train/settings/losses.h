@@ -37,7 +37,8 @@ struct RampSettings {
 struct DepthLossSettings {
   SETTING(double, depthWeight, 0.03, "depth_weight", "weight of the depth loss, on rays through sparse points",
           atLeast(0));
-  SETTING(double, depthTolerance, 0.01, "depth_tolerance", "of sparse points' distances, relative", share());
+  SETTING(double, depthTolerance, 0.01, "depth_tolerance",
+          "relative tolerance of the depth loss for distances of sparse points", share());
 };
 
 }  // namespace tessera

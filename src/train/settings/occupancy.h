@@ -12,7 +12,8 @@ struct OccupancySettings {
   SETTING(int, occupancyWarmupSteps, 256, "occupancy_warmup_steps", "steps during which updates look at every cell",
           within(0, 1 << 30));
   SETTING(double, occupancyUpdateFraction, 0.0625, "occupancy_update_fraction",
-          "share of the cells that an update looks at, at random, and again among occupied ones", share());
+          "share of the cells that an update evaluates at random, and the same number again among the occupied cells",
+          share());
 };
 
 }  // namespace tessera

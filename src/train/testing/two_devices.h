@@ -155,7 +155,7 @@ struct TwoDevices {
   }
 };
 
-// Expects that a step reads nothing back before its end and seldom records its commands anew, whatever its number of
+// Expects that a step reads nothing back before its end and rarely records its commands again, whatever its number of
 // rays. `trainable` must have been created on the Vulkan device.
 inline void expectOneBatchAStep([[maybe_unused]] Device& vulkan, [[maybe_unused]] TrainableModel& trainable) {
 #ifdef TESSERA_HAS_VULKAN

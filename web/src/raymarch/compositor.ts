@@ -236,7 +236,7 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
 
   private hide(boxes: readonly THREE.Matrix4[], ofBackgroundBlock: readonly THREE.Matrix4[], withinBox: boolean): void {
     if (boxes.length > kMaxHiddenBoxes) {
-      throw new SceneError('scene', 'hidden', `are ${boxes.length} boxes, and ${kMaxHiddenBoxes} can be hidden`, 'hide fewer, larger ones');
+      throw new SceneError('scene', 'hidden', `contains ${boxes.length} boxes; at most ${kMaxHiddenBoxes} are supported`, 'hide fewer, larger ones');
     }
     const { boxFromScene, hiddenBoxes, hiddenBoxesOfBackgroundBlock } = this.view;
     const whole = (box: THREE.Matrix4) => box.determinant() !== 0;

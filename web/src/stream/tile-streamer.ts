@@ -31,10 +31,10 @@ export interface StreamSettings {
   gpuBytes: number; // budget for contents on the GPU
   pageBytes: number; // budget for files and texels in the page, which only the most urgent tile may exceed
   fetches: number; // concurrent fetches
-  decodes: number;
+  decodes: number; // worker threads that decode contents
   patience: number; // ms for which a tile must be requested before it is fetched, and unrequested before its fetch is cancelled
   firstRetry: number; // ms after the first failure; doubled after each further failure
-  lastRetry: number;
+  lastRetry: number; // ms; the largest delay between two attempts
 }
 
 export const kStreamSettings: StreamSettings = {
@@ -62,14 +62,14 @@ interface Entry<Fetched, Resident> {
 }
 
 export interface StreamStatistics {
-  gpuBytes: number;
-  maxGpuBytes: number;
-  pageBytes: number;
-  fetchedBytes: number;
-  resident: number;
+  gpuBytes: number; // of contents on the GPU, now
+  maxGpuBytes: number; // its maximum so far
+  pageBytes: number; // of files and texels in the page, now
+  fetchedBytes: number; // sum over all fetches
+  resident: number; // tiles on the GPU
   pending: number; // requested tiles that are not resident yet
-  loads: number;
-  evictions: number;
+  loads: number; // tiles that became resident so far
+  evictions: number; // tiles that were removed from the GPU so far
   refused: number; // tiles of the last view that do not fit into the budget
   failures: number;
 }

@@ -75,8 +75,8 @@ export class ContentReader {
     if (ours === undefined || !getArray(asset, 'extensionsUsed')?.includes(kExtension)) {
       this.fail(`has no extension ${kExtension}`);
     }
-    const version = getInteger(ours, 'version') ?? this.fail('does not say which version it is of');
-    if (version !== kContentVersion) this.fail(`is of version ${version}; ${kContentVersion} is known`);
+    const version = getInteger(ours, 'version') ?? this.fail('does not state its version');
+    if (version !== kContentVersion) this.fail(`has version ${version}; only ${kContentVersion} is supported`);
     if (getString(ours, 'representation') !== representation) this.fail(`is not of the representation ${representation}`);
     return ours;
   }

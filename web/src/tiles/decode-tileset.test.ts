@@ -45,7 +45,7 @@ describe('decodeTileset', () => {
     ['not 3D Tiles 1.1', (file) => (file.asset.version = '1.0')],
     ['requires extensions', (file) => (file.extensionsRequired = ['X'])],
     ['no extension TESSERA_scene', (file) => delete file.extensions],
-    ['is of version 2; 1 is known', (file) => (ours(file).version = 2)],
+    ['has version 2; only 1 is supported', (file) => (ours(file).version = 2)],
     ['no representation', (file) => (ours(file).representation = 'points')],
     ['lacks numbers', (file) => (ours(file).worldFromScene.scale = '1')],
     ["worldFromScene's rotation is not a rotation", (file) => (ours(file).worldFromScene.rotation[0] = 2)],

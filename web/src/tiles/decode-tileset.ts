@@ -88,8 +88,8 @@ class TilesetReader<Representation extends string> {
       this.fail('requires extensions that are not known');
     }
     const ours = this.needed(tesseraExtension(file), 'has no extension TESSERA_scene');
-    const version = this.needed(getInteger(ours, 'version'), 'does not say which version it is of');
-    if (version !== kSceneVersion) this.fail(`is of version ${version}; ${kSceneVersion} is known`);
+    const version = this.needed(getInteger(ours, 'version'), 'does not state its version');
+    if (version !== kSceneVersion) this.fail(`has version ${version}; only ${kSceneVersion} is supported`);
   }
 
   private readScene(file: Json): Tileset<Representation> {

@@ -107,7 +107,7 @@ void FieldModel::restore(const fs::path& path, const Safetensors& file) {
   const auto bits = file.require(path, "occupancy.bits", TensorType::u32).as<uint32_t>();
   if (values.size() != occupancy_.cells() || bits.size() != occupancy_.cells() / 32) {
     throw Error(path.string(), "tensor occupancy.values", "has another resolution than the settings",
-                "the file belongs to another config.toml");
+                "restore the config.toml that the checkpoint was trained with, or train again");
   }
   occupancy_.restore(values, bits);
 }

@@ -27,6 +27,7 @@ struct RaySamples {
 
 class FieldModel {
  public:
+  // Keeps a reference to `device`.
   FieldModel(Device& device, const FieldConfig& config, const SceneFrame& frame);
 
   struct Rays {

@@ -10,7 +10,8 @@ struct TrainFieldOptions {
   TrainingLoopOptions loop;
 };
 
-// Trains, resumes, saves; see training_loop.h. Writes config.toml and blocks.json first.
+// Trains or resumes the model and saves it; see training_loop.h. Writes config.toml and blocks.json first. Throws Error
+// as FieldTrainer and runTraining do.
 TrainingResult trainField(Device& device, const Capture& capture, const fs::path& model, TrainFieldOptions options);
 
 }  // namespace tessera

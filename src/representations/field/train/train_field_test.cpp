@@ -150,7 +150,7 @@ TwoDevices makeTrainings(const CubeScene& scene) {
           }};
 }
 
-TEST(TrainField, ComesToTheSameOnVulkanAndGoesOnThereAndBack) {
+TEST(TrainField, TrainsTheSameModelOnVulkanAndResumesOnEitherDevice) {
   const CubeScene scene;
   makeTrainings(scene).expectTheSamePictures(scene / "models");
 }
@@ -160,7 +160,7 @@ TEST(TrainField, LosesNothingWhereAGpuFails) {
   makeTrainings(scene).expectToSurviveFailures(scene / "models");
 }
 
-TEST(TrainField, SendsEachStepToAGpuAtOnce) {
+TEST(TrainField, SubmitsEachStepToTheGpuAsOneBatch) {
 #ifdef TESSERA_HAS_VULKAN
   SKIP_WITHOUT_VULKAN(openForTest());
   const CubeScene scene;

@@ -43,7 +43,7 @@ class HashReader : public PartsReader<HashReader, HashContent, PartHeader> {
     if (!getField(file_.ours, "logits")) return true;
     const json* logits = getArray(file_.ours, "logits");
     if (!logits || logits->empty() || logits->size() > 2 * kMaxTables)
-      return fail("its logits are not a list, or are none or too many");
+      return fail("its logits are not a list, or their number is out of bounds");
     for (const json& source : *logits) {
       const auto logit = numberFrom(source);
       if (!logit) return fail("a logit is not a number");

@@ -81,11 +81,11 @@ HWY_ATTR HWY_INLINE void cornerWeights(const float fraction[3], float* weights) 
   }
 }
 
-HWY_ATTR bool findPlace(const HashFeatures::Layout& layout, const HashPart& part, const float place[3],
+HWY_ATTR bool findPosition(const HashFeatures::Layout& layout, const HashPart& part, const float position[3],
                         HashFeatures::Lookup& lookup) {
   uint32_t block[3], within[3];
   for (int a = 0; a < 3; ++a) {
-    const float u = std::min(std::max(place[a] * layout.lattice - 0.5f, 0.0f), layout.lattice - 1);
+    const float u = std::min(std::max(position[a] * layout.lattice - 0.5f, 0.0f), layout.lattice - 1);
     const uint32_t index = static_cast<uint32_t>(u);
     lookup.cornerFraction[a] = u - static_cast<float>(index);
     block[a] = index / HashPart::kMacroblock;
@@ -104,7 +104,7 @@ HWY_ATTR bool findPlace(const HashFeatures::Layout& layout, const HashPart& part
     const HashFeatures::Table& table = layout.tables[l];
     uint32_t index[3];
     for (int a = 0; a < 3; ++a) {
-      const float at = place[a] * table.scale + 0.5f;
+      const float at = position[a] * table.scale + 0.5f;
       index[a] = static_cast<uint32_t>(at);
       lookup.fraction[l][a] = at - static_cast<float>(index[a]);
     }
@@ -174,7 +174,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace tessera {
 
-HWY_EXPORT(findPlace);
+HWY_EXPORT(findPosition);
 HWY_EXPORT(mixPlace);
 
 HashFeatures::HashFeatures(const HashContent& content, const HashPart& part) : part_(&part), layout_{} {
@@ -207,8 +207,8 @@ HashFeatures::HashFeatures(const HashContent& content, const HashPart& part) : p
   for (size_t i = 0; i < content.logits.size(); ++i) layout_.weights[i] = 1 / (1 + std::exp(-content.logits[i]));
 }
 
-bool HashFeatures::find(const float place[3], Lookup& lookup) const {
-  return HWY_DYNAMIC_DISPATCH(findPlace)(layout_, *part_, place, lookup);
+bool HashFeatures::find(const float position[3], Lookup& lookup) const {
+  return HWY_DYNAMIC_DISPATCH(findPosition)(layout_, *part_, position, lookup);
 }
 
 void HashFeatures::mix(const Lookup& lookup, float features[8]) const {

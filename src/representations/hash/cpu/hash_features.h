@@ -1,4 +1,4 @@
-// Interpolates the features at places in a part of a `hash` content (NGP-RT, eq. 6 to 8): coarse features and the
+// Interpolates the features at positions in a part of a `hash` content (NGP-RT, eq. 6 to 8): coarse features and the
 // weights of levels come from the lattice, fine features from tables.
 #pragma once
 
@@ -15,16 +15,16 @@ class HashFeatures {
   HashFeatures(const HashContent& content, const HashPart& part);
 
   static constexpr uint32_t kMaxTables = HashPart::kMaxTables;
-  // Where the bytes for a place are stored, so that they can be prefetched before they are interpolated.
+  // Where the bytes for a position are stored, so that they can be prefetched before they are interpolated.
   struct Lookup {
     float cornerFraction[3];
     const uint8_t* corner;  // the lowest of the eight corners
     float fraction[kMaxTables][3];
     alignas(32) uint32_t entry[kMaxTables][8];
   };
-  // Fills in `lookup` for a place in [0,1]³ of the part's domain and prefetches its bytes. Returns false if the place's
-  // corners are not stored.
-  bool find(const float place[3], Lookup& lookup) const;
+  // Fills in `lookup` for a position in [0,1]³ of the part's domain and prefetches its bytes. Returns false if the
+  // position's corners are not stored.
+  bool find(const float position[3], Lookup& lookup) const;
   // Interpolates the features: log density, diffuse r g b, 4 features.
   void mix(const Lookup& lookup, float features[8]) const;
 

@@ -4,7 +4,7 @@
 // Each straight segment of the path is divided, from its entry on, into steps of equal length in the domain, of which
 // the last is shorter. One sample lies in the middle of each step, as in training (MarchBlocks). A sample is evaluated
 // if its cell is occupied in the finest occupancy level. Otherwise the ray skips the empty cube of its octant
-// (OctantDistanceField) or, without distances, the largest empty cell that contains the place. It always skips whole
+// (OctantDistanceField) or, without distances, the largest empty cell that contains the position. It always skips whole
 // steps, so skipping does not change which samples are evaluated.
 #pragma once
 

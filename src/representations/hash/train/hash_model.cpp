@@ -212,7 +212,7 @@ void HashModel::restore(uint32_t block, const fs::path& path, const Safetensors&
   OccupancyGrid& occupancy = occupancy_[block];
   if (values.size() != occupancy.cells() || bits.size() != occupancy.cells() / 32) {
     throw Error(path.string(), "tensor occupancy.values", "has another resolution than the settings",
-                "the file belongs to another config.toml");
+                "restore the config.toml that the checkpoint was trained with, or train again");
   }
   occupancy.restore(values, bits);
   if (block != 0) return;

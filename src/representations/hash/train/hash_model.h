@@ -71,7 +71,8 @@ class HashModel {
   double occupiedFraction();
   std::vector<uint32_t> occupancyWords(uint32_t block) { return occupancy_[block].bitWords(); }
 
-  // The state of one block. Block 0 includes the parameters that all blocks share.
+  // Save and restore the state of one block. Block 0 includes the parameters that all blocks share. restore() throws
+  // Error naming `path` if a tensor is missing or has another size.
   void save(uint32_t block, TensorSet& tensors, bool withMoments);
   void restore(uint32_t block, const fs::path& path, const Safetensors& file);
   bool allFinite(uint32_t block);

@@ -15,9 +15,10 @@ struct TrainHashOptions : BlockRunOptions {
 // config.toml and blocks.json first. If the weight of the distortion loss is auto, it is determined before that by
 // short trainings with a few weights. They are recorded in distortion.json, are not repeated with `loop.resume`, and
 // count as part of `loop.minutes`. A resumed run already has the weight. If asked to stop during these trainings, the
-// folder does not contain a model yet. Afterwards trains coarser levels of detail of the same blocks, up to one with a
-// single tile for all; they are trained anew if the finest level has been trained further since. The result counts the
-// finest level's steps, and is finished when all levels are.
+// folder does not contain a model yet. Afterwards trains coarser levels of detail of the same blocks, up to a level
+// with a single tile for all blocks; they are trained again from the start if the finest level has been trained further
+// since. The result counts the finest level's steps, and is finished when all levels are. Throws Error as openBlockRun
+// and runTraining do.
 TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options);
 
 // Derives the settings of a level from those of the finest: each level has half the lattice, one fine level fewer and

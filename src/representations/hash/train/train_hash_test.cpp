@@ -103,7 +103,7 @@ TEST_F(HashTraining, MakesCoarserLevelsOfTheSameBlocks) {
   }
 }
 
-TEST_F(HashTraining, MakesCoarserLevelsAnewWhenTheFinestHasGoneOn) {
+TEST_F(HashTraining, RetrainsCoarserLevelsWhenTheFinestWasTrainedFurther) {
   train(options(20));
   const fs::path model = scene_ / "model";
   ASSERT_EQ(trainedLevels<HashConfig>(model), 2u);
@@ -146,7 +146,7 @@ TEST_F(HashTraining, TrainsNoCoarserLevelsIfTheyAreDisabled) {
   EXPECT_FALSE(fs::exists(scene_ / "model" / "levels"));
 }
 
-TEST_F(HashTraining, ComesToTheSameOnVulkanAndGoesOnThereAndBack) {
+TEST_F(HashTraining, TrainsTheSameModelOnVulkanAndResumesOnEitherDevice) {
   trainings().expectTheSamePictures(scene_ / "models");
 }
 
@@ -154,7 +154,7 @@ TEST_F(HashTraining, LosesNothingWhereAGpuFails) {
   trainings().expectToSurviveFailures(scene_ / "models");
 }
 
-TEST_F(HashTraining, SendsEachStepToAGpuAtOnce) {
+TEST_F(HashTraining, SubmitsEachStepToTheGpuAsOneBatch) {
 #ifdef TESSERA_HAS_VULKAN
   SKIP_WITHOUT_VULKAN(openForTest());
   const std::unique_ptr<Device> vulkan = makeVulkanDeviceWithFewGroups({});

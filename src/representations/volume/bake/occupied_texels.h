@@ -1,7 +1,7 @@
-// Marks where something visible is in a block, which is what baking keeps (MERF, section 4.3; City-on-Web, section
-// 4.5). It stores one bit for each texel of the three planes (planes of 512²: 96 KiB, 2048²: 1.5 MiB), and for space
-// 512 bytes for each brick of 16³ cells in which a cell is marked: about 1 MiB where there are surfaces, never more
-// than 16 MiB. Baking holds those of all blocks in memory.
+// The parts of a block in which something is visible; baking keeps only these (MERF, section 4.3; City-on-Web, section
+// 4.5). It stores one bit for each texel of the three planes (planes of 512²: 96 KiB, 2048²: 1.5 MiB) and, for the
+// block's volume, 512 bytes for each brick of 16³ cells in which a cell is marked: about 1 MiB where there are
+// surfaces, never more than 16 MiB. Baking holds those of all blocks in memory.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@ namespace tessera {
 
 class OccupiedTexels {
  public:
-  // Cells along an edge of space, at most: where planes are finer, four or more texels share a bit.
+  // The largest number of cells along an edge of the volume; where planes are finer, four or more texels share a bit.
   static constexpr uint32_t kMaxCells = 512;
 
   explicit OccupiedTexels(const VirtualGrid& grid);

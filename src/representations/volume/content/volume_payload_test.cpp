@@ -303,8 +303,8 @@ TEST_F(VolumeDecoder, RejectsFilesThatAreNoContent) {
   refuses("its JSON is not that", [](json& asset) { asset["asset"]["version"] = "1.0"; });
   refuses("has no extension", [](json& asset) { asset.erase("extensions"); });
   refuses("has no extension", [](json& asset) { asset["extensionsUsed"] = {"KHR_x"}; });
-  refuses("is of version 7; 1 is known", [](json& asset) { ours(asset)["version"] = 7; });
-  refuses("does not say which version", [](json& asset) { ours(asset).erase("version"); });
+  refuses("has version 7; only 1 is supported", [](json& asset) { ours(asset)["version"] = 7; });
+  refuses("does not state its version", [](json& asset) { ours(asset).erase("version"); });
   refuses("is not of the representation volume", [](json& asset) { ours(asset)["representation"] = "hash"; });
 }
 

@@ -210,7 +210,7 @@ TEST(DrawVolume, DrawsPartsOfOneContentAsItDrawsThemApartWhereNetworksAreDark) {
 
 // City-on-Web, equations 8 to 11, along random rays from anywhere: cells in the order of the grid (scene/block_grid.h),
 // each shaded by a network that adds nothing, against all samples of the ray composited as one volume.
-TEST(DrawVolume, BlendsCellsWithoutNetworksToWhatOneVolumeWouldBe) {
+TEST(DrawVolume, BlendsCellsWithoutNetworksLikeOneVolume) {
   BlockGrid grid;
   grid.edge = 2;
   grid.columns = 3;

@@ -83,7 +83,7 @@ TEST(VolumeShading, BlendsFrontToBackAsBackToFront) {
 }
 
 // City-on-Web, equations 8 to 11: a worked example.
-TEST(VolumeShading, BlendsBlocksWithoutNetworksToWhatOneVolumeWouldBe) {
+TEST(VolumeShading, BlendsBlocksWithoutNetworksLikeOneVolume) {
   const double alphas[] = {.1, .3, .2, .5, .25}, colours[] = {.9, .2, .5, .7, .1};
   const DeferredShader dark(darkNetwork());
   BlendedRay ray;

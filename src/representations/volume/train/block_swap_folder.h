@@ -18,6 +18,7 @@ class BlockSwapFolder {
 
   fs::path blockFile(uint32_t block) const;
   bool holds(uint32_t block) const { return swappedOut_.contains(block); }
+  // Write and read the file of a block. Throw Error if it cannot be written, read or decoded.
   void put(uint32_t block, const Bytes& file);
   Safetensors get(uint32_t block) const { return readSafetensors(blockFile(block)); }
 

@@ -46,8 +46,10 @@ struct VolumeConfig : BlockSettings,
           allowedValues({16, 32, 64, 128}));
   SETTING(int, firstIntervals, 32, "first_intervals", "intervals of a ray in the first proposal round",
           within(2, 1024));
-  SETTING(int, secondIntervals, 24, "second_intervals", "in the second round; 0: only one round", within(0, 1024));
-  SETTING(int, samples, 16, "samples", "of a ray; more where it crosses from block to block", within(2, 1024));
+  SETTING(int, secondIntervals, 24, "second_intervals",
+          "intervals of a ray in the second proposal round; 0: only one round", within(0, 1024));
+  SETTING(int, samples, 16, "samples", "final samples per ray; more where it crosses from block to block",
+          within(2, 1024));
   SETTING(double, uniformSampleFraction, 0.02, "uniform_sample_fraction",
           "share of the samples that are spread evenly whatever the proposals say", share());
   SETTING(int, proposalEvery, 4, "proposal_every", "steps between updates of the proposals after the warm-up",
@@ -63,8 +65,10 @@ struct VolumeConfig : BlockSettings,
           "rays through sparse points begin and end this share of their distance before and behind the point", share());
   SETTING(bool, nearFromSparseDepth, true, "near_from_sparse_depth",
           "assume empty space in front of the nearest sparse points that a photo shows", anything());
-  SETTING(bool, blocksOnly, false, "blocks_only",
-          "no rays from parts of photos that see no block, as where --grid is a part of the place", anything());
+  SETTING(
+      bool, blocksOnly, false, "blocks_only",
+      "draw no rays through parts of photos that see no block, for example if --grid covers only a part of the scene",
+      anything());
   // Optimiser
   SETTING(double, deferredLearningRateFactor, 0.3, "deferred_learning_rate_factor",
           "learning rate of the deferred networks, relative", atLeast(0));
@@ -75,13 +79,13 @@ struct VolumeConfig : BlockSettings,
           atLeast(0));
   SETTING(double, opacityWeight, 1e-3, "opacity_weight", "weight of the loss on semi-transparent blocks", atLeast(0));
   SETTING(int, sparsityPoints, 4096, "sparsity_points", "random points per step", within(0, 1 << 24));
-  SETTING(double, cullBegin, 0.4, "cull_begin",
-          "share of the steps from which on what a renderer would not see is culled", share());
-  SETTING(double, cullEnd, 0.8, "cull_end", "share of the steps at which the threshold is the last",
+  SETTING(double, cullBegin, 0.4, "cull_begin", "share of the steps after which culling begins", share());
+  SETTING(double, cullEnd, 0.8, "cull_end", "share of the steps at which the culling threshold reaches cull_last",
           within(cullBegin, 1).dependent());
-  SETTING(double, cullFirst, 5e-4, "cull_first", "opacity of a renderer's step below which it is culled, at first",
+  SETTING(double, cullFirst, 5e-4, "cull_first", "initial culling threshold: opacity over a renderer's step",
           within(ConfigBounds::kTiny, 1));
-  SETTING(double, cullLast, 5e-3, "cull_last", "the same in the end, and in baking", within(cullFirst, 1).dependent());
+  SETTING(double, cullLast, 5e-3, "cull_last", "final culling threshold, also used in baking",
+          within(cullFirst, 1).dependent());
   SETTING(bool, literalEq3, false, "literal_eq3",
           "add the deferred network's colour whole, as printed, not times the block's opacity", anything());
   // Levels of detail

@@ -289,7 +289,7 @@ TwoDevices makeTrainings(const CubeScene& scene) {
           }};
 }
 
-TEST(TrainVolume, ComesToTheSameOnVulkanAndGoesOnThereAndBack) {
+TEST(TrainVolume, TrainsTheSameModelOnVulkanAndResumesOnEitherDevice) {
   const CubeScene scene;
   makeTrainings(scene).expectTheSamePictures(scene / "models");
 }
@@ -299,7 +299,7 @@ TEST(TrainVolume, LosesNothingWhereAGpuFails) {
   makeTrainings(scene).expectToSurviveFailures(scene / "models");
 }
 
-TEST(TrainVolume, SendsEachStepToAGpuAtOnce) {
+TEST(TrainVolume, SubmitsEachStepToTheGpuAsOneBatch) {
 #ifdef TESSERA_HAS_VULKAN
   SKIP_WITHOUT_VULKAN(openForTest());
   const CubeScene scene;

@@ -38,7 +38,7 @@ std::vector<float> initialDeferred(uint32_t networks, uint64_t seed) {
   return values;
 }
 
-// Returns the first `cells` blocks, or all if 0, and an own background block.
+// Returns the first `cells` blocks, or all if 0, and the separate background block, if there is one.
 std::vector<uint32_t> firstBlocks(const BlockSpace& space, uint32_t cells) {
   if (cells == 0) cells = space.cells();
   std::vector<uint32_t> blocks(std::min(cells, space.cells()));

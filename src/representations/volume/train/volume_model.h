@@ -15,10 +15,11 @@ namespace tessera {
 class VolumeModel {
  public:
   struct Capacity {
-    uint32_t cells = 0;       // resident at once; 0: all. An own background block always is
+    uint32_t cells = 0;       // resident at once; 0: all. A separate background block is always resident
     bool forTraining = true;  // otherwise only values are allocated
   };
-  // Initially slot k holds block k, and the last slot an own background block.
+  // Initially slot k holds block k, and the last slot the separate background block, if there is one. Keeps a reference
+  // to `device`.
   VolumeModel(Device& device, const VolumeConfig& config, const BlockGrid& grid, const Capacity& capacity);
   VolumeModel(Device& device, const VolumeConfig& config, const BlockGrid& grid)
       : VolumeModel(device, config, grid, Capacity()) {}

@@ -72,7 +72,7 @@ double depthError(const CubeScene& scene, VolumeModel& model) {
   return errors[errors.size() / 2];
 }
 
-TEST(VolumeTrainer, LearnsFromSparsePointsWhereThingsStand) {
+TEST(VolumeTrainer, LearnsSurfacePositionsFromSparsePoints) {
   CubeScene::Options options;
   options.isEnclosed = true;
   options.observationsPerPhoto = 50;
@@ -214,7 +214,7 @@ std::vector<std::vector<uint32_t>> blocksOfRays(const CubeScene& scene, TrainedV
   return blocks;
 }
 
-TEST(VolumeTrainer, DrawsNoRaysThatSeeNoBlockWhenToldSo) {
+TEST(VolumeTrainer, DrawsOnlyRaysThatSeeABlockWithBlocksOnly) {
   const CubeScene scene;
   BlockGrid part = cubeGrid();
   part.edge /= 4;

@@ -74,7 +74,7 @@ describe('decodeWorld', () => {
   });
 
   it("requires one scene that defines the world's frame", () => {
-    expect(said((file) => file.scenes.pop())).toContain('scenes: has none in whose world the others stand; leave out position');
+    expect(said((file) => file.scenes.pop())).toContain('scenes: contains no scene without a placement, which would define the frame of the world; leave out position');
     expect(said((file) => (file.scenes = []))).toContain('scenes: has none');
     expect(said((file) => delete file.scenes)).toContain('scenes: is not a list');
     expect(said((file) => (file.scenes = Array.from({ length: 17 }, () => file.scenes[1])))).toContain('scenes: are more than 16');
@@ -98,7 +98,7 @@ describe('decodeWorld', () => {
   it('names the file and the place of what is wrong', () => {
     expect(decodeError('{')).toMatch(/^world.json: is not JSON: .*; correct it, or save it again$/);
     for (const other of ['null', '[]', '3', '{"version":1,"models":[]}']) expect(decodeError(other)).toContain('is not a world of this viewer');
-    expect(said((file) => (file.version = 3))).toContain('world.json: version: is not 2, nor 1; open it with a newer viewer');
+    expect(said((file) => (file.version = 3))).toContain('world.json: version: is neither 1 nor 2; open it with a newer viewer');
     expect(said((file) => (file.models = {}))).toContain('models: is not a list');
     expect(said((file) => (file.models[0].contents = [3]))).toContain('models[0].contents');
     expect(said((file) => (file.models = Array.from({ length: 1001 }, () => file.models[0])))).toContain('models: are more than 1000');

@@ -96,7 +96,7 @@ export function decodeWorld(text: string, file: string): World {
   }
   if (getString(world, 'kind') !== kKind) fail('', 'is not a world of this viewer', 'choose one that was saved here');
   const version = getField(world, 'version');
-  if (version !== 1 && version !== kVersion) fail('version', `is not ${kVersion}, nor 1`, 'open it with a newer viewer');
+  if (version !== 1 && version !== kVersion) fail('version', `is neither 1 nor ${kVersion}`, 'open it with a newer viewer');
   const readList = <T>(key: 'scenes' | 'models' | 'hidden' | 'bookmarks', isNeeded: boolean, read: (one: Json, fail: Fail) => T): T[] => {
     if (getField(world, key) === undefined && !isNeeded) return [];
     const list = getArray(world, key) ?? fail(key, 'is not a list');
@@ -104,7 +104,7 @@ export function decodeWorld(text: string, file: string): World {
     return list.map((one, i) => read(one, (place, reason) => fail(`${key}[${i}]${place}`, reason)));
   };
   const scenes = version === 1 ? [firstScene(getField(world, 'scene'))] : readList('scenes', true, readWorldScene);
-  if (!scenes.some(({ place }) => !place)) fail('scenes', 'has none in whose world the others stand', 'leave out position, rotation and scale of one');
+  if (!scenes.some(({ place }) => !place)) fail('scenes', 'contains no scene without a placement, which would define the frame of the world', 'leave out position, rotation and scale of one');
   return {
     scenes,
     models: readList('models', version === 1, readWorldModel),

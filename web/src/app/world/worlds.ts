@@ -29,7 +29,7 @@ export async function fetchWorld(url: string): Promise<NamedWorld> {
   const address = resolved(url, location.href);
   if (address === undefined) throw new SceneError(kWorldName, '', 'has no address of http or https', 'name another in ?world=');
   const name = baseName(new URL(address).pathname) || kWorldName;
-  const bytes = await fetchNamed(address, name, kWorldBytes, 'see that the address is right');
+  const bytes = await fetchNamed(address, name, kWorldBytes, 'check that the address is right');
   return { world: decodeWorld(new TextDecoder().decode(bytes), name), name, address };
 }
 

@@ -82,7 +82,7 @@ class HashReader extends PartReader {
     let begin = 0; // index of the part's first macroblock in the atlas
     parts.forEach((part, n) => {
       const source = header.sources[n];
-      const of = (what: string) => `part ${n}: its ${what} are not what they should be`;
+      const of = (what: string) => `part ${n}: its ${what} are malformed`;
       const { blocks } = layout.corners;
       if (!this.readMacroblocks(views, source, part.lattice, part.stored, blocks, begin, macroblocks, n, corners)) {
         this.fail(of('macroblocks'));
@@ -119,7 +119,7 @@ class HashReader extends PartReader {
     const settings: HashSettings = { weights, step: Math.fround(step), hasLearnedBackground };
     if (getField(ours, 'logits') === undefined) return settings;
     const logits = getArray(ours, 'logits') ?? [];
-    if (logits.length < 1 || logits.length > 2 * kMaxTables) this.fail('its logits are not a list, or are none or too many');
+    if (logits.length < 1 || logits.length > 2 * kMaxTables) this.fail('its logits are not a list, or their number is out of bounds');
     settings.logits = logits.map((logit) => Math.fround(numberFrom(logit) ?? this.fail('a logit is not a number')));
     return settings;
   }

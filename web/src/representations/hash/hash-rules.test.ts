@@ -27,8 +27,8 @@ const kRules: [string, (ours: any) => void][] = [
   [kUnsaid, (ours) => (ours.step = '1')],
   ['the step is out of bounds', (ours) => (ours.step = 1e-9)],
   ['the step is out of bounds', (ours) => (ours.step = 0.2)],
-  ['its logits are not a list, or are none or too many', (ours) => (ours.logits = [])],
-  ['its logits are not a list, or are none or too many', (ours) => (ours.logits = new Array(17).fill(0))],
+  ['its logits are not a list, or their number is out of bounds', (ours) => (ours.logits = [])],
+  ['its logits are not a list, or their number is out of bounds', (ours) => (ours.logits = new Array(17).fill(0))],
   ['a logit is not a number', (ours) => (ours.logits = ['a'])],
   // Weights that are the same everywhere need no columns.
   [kHeader, (ours) => (ours.logits = [1, 2, 3, 4])],

@@ -84,7 +84,7 @@ class VolumeReader extends PartReader {
     let begin = 0; // index of the part's first macroblock in the atlas
     parts.forEach((part, n) => {
       const source = header.sources[n];
-      const of = (what: string) => `part ${n}: its ${what} are not what they should be`;
+      const of = (what: string) => `part ${n}: its ${what} are malformed`;
       const { blocks } = layout.voxels;
       if (!this.readMacroblocks(views, source, part.voxels, part.stored, blocks, begin, macroblocks, n, [voxels])) {
         this.fail(of('macroblocks'));
