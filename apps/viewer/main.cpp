@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
   app.add_option("--detail", view.maximumScreenSpaceError,
                  "scenes only: pixels of error that may be seen; 0: the finest everywhere")
       ->check(CLI::Range(0.0, 1000.0));
-  app.add_option("--memory-mib", view.memoryMiB, "scenes only: memory of the GPU for the contents")
+  app.add_option("--memory-mib", view.memoryMiB, "scenes only: memory for the contents, on the GPU or the CPU")
       ->check(CLI::Range(1.0, 1e9));
   bool hidden = false;
   app.add_flag("--no-panel", hidden, "begin without the panel (F1 shows it)");

@@ -27,8 +27,9 @@ struct Place {
 
 // Throws Error if the folder holds neither a scene nor a model.
 void requireViewable(const fs::path& folder);
-// Reads the box and the photo poses of a scene or model. Throws Error if either cannot be read, or if `options.views`
-// names a capture of another world.
+// Reads the box and the photo poses of a scene or model. Throws Error if the box cannot be read, or if the capture that
+// `options.views` names cannot be read or is of another world. If a model's own capture cannot be used, warns and
+// returns no poses.
 Place loadPlace(const ViewOptions& options);
 
 // If a model in training has not saved anything yet, waits until it has.

@@ -1,6 +1,6 @@
 // Counter-based random numbers: a value is a function of (seed, stream, index) alone, so that any part of any step can
-// be reproduced, on any number of threads and after any resume. Numbers are mixed by
-// the finaliser of SplitMix64 (Steele, Lea and Flood, 2014).
+// be reproduced, on any number of threads and after any resume. Numbers are mixed by the finaliser of SplitMix64
+// (Steele, Lea and Flood, 2014).
 #pragma once
 
 #include <cstdint>

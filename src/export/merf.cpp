@@ -37,13 +37,13 @@ VolumeContent readOnlyContent(const fs::path& scene, const Tileset& tileset, fs:
     throw unsuitable(fmt::format("is a scene of {}, and MERF's viewer knows volume only", tileset.representation));
   }
   if (tileset.allCells().cells() != 1) {
-    throw unsuitable(fmt::format("has {} by {} blocks, and MERF's files hold one that owns all of space",
+    throw unsuitable(fmt::format("has {} by {} blocks, but MERF supports only one block, which owns all of space",
                                  tileset.columns, tileset.rows));
   }
   for (const Tile& tile : tileset.tiles) {
     for (const TileContent& content : tile.contents) {
       if (content.backgroundBlock)
-        throw unsuitable("has a background block of its own, and MERF's files hold one block");
+        throw unsuitable("has a separate background block, but MERF supports only one block");
     }
   }
   const Tile& finest = tileset.tiles.back();  // with one cell, each tile is the only child of the one before

@@ -253,7 +253,7 @@ TEST_F(Merf, SaysWhyASceneCannotBeExportedAndWhatToTrain) {
   tileset = makeTileset(good);
   tileset.tiles[0].contents.push_back(tileset.tiles[0].contents[0]);
   tileset.tiles[0].contents[1].backgroundBlock = true;
-  refused(writeScene(good, tileset), "a background block of its own", train);
+  refused(writeScene(good, tileset), "a separate background block", train);
   tileset = makeTileset(good);
   tileset.tiles[0].contents[0].box.high[2] /= 2;
   refused(writeScene(good, tileset), "outside of the content's box", "copy the scene again");

@@ -65,8 +65,9 @@ class GpuRenderPass {
   std::span<const VkClearValue> clearValues() const { return clearValues_; }
   uint64_t serial() const { return serial_; }  // GpuContext::nextSerial
 
-  // Creates a pass that is compatible with pipelines of these formats. The caller must destroy it. Throws
-  // Error if the driver cannot create it.
+  // Creates a pass that is compatible with pipelines of these formats. The caller must destroy it. Throws Error
+  // if the device does not rasterise or does not support this number of attachments, or if the driver cannot create the
+  // pass.
   static VkRenderPass makeCompatible(const GpuContext& context, const AttachmentFormats& formats);
 
  private:

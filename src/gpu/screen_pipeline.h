@@ -14,7 +14,7 @@ namespace tessera {
 
 class GpuScreenPipeline {
  public:
-  // Throws KernelRefused if the driver rejects the shaders. `renderPass` must be compatible with the passes in which it
+  // Throws Error if the driver rejects the shaders. `renderPass` must be compatible with the passes in which it
   // draws.
   GpuScreenPipeline(std::shared_ptr<const GpuContext> context, VkRenderPass renderPass,
                     std::span<const uint32_t> vertexSpirv, std::span<const uint32_t> fragmentSpirv);

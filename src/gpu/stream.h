@@ -1,6 +1,6 @@
 // An in-order queue of device work: copies, fills, kernels and render passes are collected and submitted in batches;
-// each sees the results of all commands before it. Only `download` and `finish` wait for all work. It must be
-// used by one thread at a time. Functions that queue, submit or wait throw Error if the device is lost or memory is
+// each sees the results of all commands before it. Only `download` and `finish` wait for all work. It must be used by
+// one thread at a time. Functions that queue, submit or wait throw Error if the device is lost or memory is
 // insufficient.
 //
 // A batch with the same commands as an earlier one (usually a training step) is not recorded again: the recorded

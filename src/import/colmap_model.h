@@ -65,7 +65,7 @@ SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageF
 // the largest of several numbered ones, with a warning), or nothing if it has none.
 std::optional<fs::path> findColmapModel(const fs::path& source);
 // Reads the model of a source folder. Throws Error naming the file or folder if it cannot be read or decoded. Warns if
-// it has no points.
+// there is no points3D file.
 SourceCapture readColmap(const fs::path& source);
 
 }  // namespace tessera

@@ -22,11 +22,11 @@ inline constexpr double kGpsTolerance = 8;  // metres
 inline constexpr double kMinGpsSpread = 5;  // metres
 
 // Returns the similarity from the photos' world to metres east, north and up. Returns nothing, with the reason in
-// `reason`, if there are fewer than three fixes, if they lie on one line (the
-// rotation about it is undetermined) or too near one (standard deviation across it below kMinGpsSpread, where the fit
-// would follow noise), if fewer than half of them agree within kGpsTolerance, or if the residual exceeds a third of
-// that deviation. Altitudes are the drone's heights above take-off where every photo has one (its barometer is far more
-// precise than GPS), shifted to the mean of the absolute altitudes.
+// `reason`, if there are fewer than three fixes, if they lie on one line (the rotation about it is undetermined) or too
+// near one (standard deviation across it below kMinGpsSpread, where the fit would follow noise), if fewer than half of
+// them agree within kGpsTolerance, or if the residual exceeds a third of that deviation. Altitudes are the drone's
+// heights above take-off where every photo has one (its barometer is far more precise than GPS), shifted to the mean of
+// the absolute altitudes.
 std::optional<Georeference> georeference(const std::vector<Photo>& photos, std::string& reason);
 
 // Returns the position of a fix in the frame's tangent plane: metres east, north and up. Latitude and longitude are in

@@ -7,8 +7,9 @@
 
 namespace tessera {
 
-// `ready`: the target is complete. Otherwise no target was written: the source ends early (truncated), or is missing or
-// cannot be decoded (unreadable). The functions below throw Error if the target cannot be written.
+// `ready`: the target is complete. Otherwise no target was written: a photo ends early (truncated), or the source
+// cannot be decoded or, for masks and depth maps, is missing (unreadable). The functions below throw Error if a source
+// cannot be read or the target cannot be written.
 enum class FileOutcome { ready, truncated, unreadable };
 
 // Imports a photo at width × height. Colours are averaged over area as sRGB values (which training compares with),

@@ -75,8 +75,8 @@ std::optional<Camera> cameraFromIntrinsics(const Intrinsics& intrinsics, int pho
 // Returns the transforms*.json files of a source folder (or the source itself if it is such a file): transforms.json,
 // else Blender's three.
 std::vector<fs::path> findTransforms(const fs::path& source);
-// Reads the files as one capture. Throws Error naming the file that cannot be read or decoded, or whose contents
-// contradict one another.
+// Reads the files as one capture. Throws Error naming the file that cannot be read or decoded, or that does
+// not fit transforms.json.
 SourceCapture readTransforms(const std::vector<fs::path>& files);
 
 }  // namespace tessera

@@ -1,6 +1,6 @@
-// MERF's piecewise-projective contraction (Reiser et al. 2023, eq. 4): it is the identity in the cube [-1,1]³
-// and maps everything outside the cube into (-2,2)³. Straight lines stay straight within each of its seven regions: the
-// cube, and one pyramid per side.
+// MERF's piecewise-projective contraction (Reiser et al. 2023, eq. 4): it is the identity in the cube [-1,1]³ and maps
+// everything outside the cube into (-2,2)³. Straight lines stay straight within each of its seven regions: the cube,
+// and one pyramid per side.
 #pragma once
 
 #include <array>

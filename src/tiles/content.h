@@ -1,6 +1,6 @@
 // What a tile holds, independently of its representation: decoded contents, the resources that they share, and the
-// codec that decodes them from untrusted bytes. Each representation has one codec; code that reads scenes
-// knows a representation only through this interface.
+// codec that decodes them from untrusted bytes. Each representation has one codec; code that reads scenes knows a
+// representation only through this interface.
 #pragma once
 
 #include <cstddef>

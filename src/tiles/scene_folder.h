@@ -15,8 +15,8 @@ class SceneFolderWriter {
   // Writes the file at once and returns its uri, tiles/L<level>/<name>-<digest>.glb. `name`: letters, digits, '_'.
   // Throws Error if it cannot be written.
   std::string addContent(uint32_t level, const std::string& name, std::span<const std::byte> bytes) const;
-  // Writes the file at once and returns its uri, resources/<name>-<digest>.<extension>. Throws Error if it cannot
-  // be written.
+  // Writes the file at once and returns its uri, resources/<name>-<digest>.<extension>. Throws Error if it cannot be
+  // written.
   std::string addResource(const std::string& name, const std::string& extension,
                           std::span<const std::byte> bytes) const;
 

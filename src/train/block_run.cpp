@@ -71,7 +71,8 @@ void reportMemoryUse(const BlockTraining& on, const BlockRunOptions& options, co
                         static_cast<double>(gpu.bytes) / kMiB);
   }
   inform("memory: at most {:.0f} MiB{}{}", bytes / kMiB, needs.how, ofGpu);
-  if (gpu.inUse > gpu.bytes) warn("the GPU has less memory than that: training will be slow or fail; {}", needs.remedy);
+  if (gpu.inUse > gpu.bytes)
+    warn("more GPU memory is in use than the GPU has: training will be slow or fail; {}", needs.remedy);
   if (bytes <= options.plannedBytes()) return;
   warn("that is more than the {:.0f} MiB available; {}", options.plannedBytes() / kMiB, needs.remedy);
 }

@@ -1,5 +1,5 @@
-// The kernels of one drawer, created when they are first used. They are identified by their
-// code and one specialisation constant.
+// The kernels of one drawer, created when they are first used. They are identified by their code and one
+// specialisation constant.
 #pragma once
 
 #include <map>

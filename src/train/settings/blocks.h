@@ -10,9 +10,8 @@ struct BlockSettings {
   SETTING(std::string, preset, "cpu", "preset", "preset of all other defaults: cpu, or paper (for large GPUs)",
           anything());
   SETTING(std::string, backgroundBlock, "own", "background_block",
-          "what represents the space outside the region: own (a separate background block), border (the blocks at the "
-          "border, "
-          "as in the papers) or none",
+          "what represents the space outside the region: own (a separate background block), border (the blocks at "
+          "the border, as in the papers) or none",
           anything());  // see parseBackgroundBlockMode
   SETTING(int, lod, 0, "lod", "level of detail: 0 is the finest; set by training for coarser levels", within(0, 16));
   SETTING(int64_t, finestStep, 0, "finest_step",

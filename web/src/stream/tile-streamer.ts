@@ -31,7 +31,7 @@ export interface StreamSettings {
   gpuBytes: number; // budget for contents on the GPU
   pageBytes: number; // budget for files and texels in the page, which only the most urgent tile may exceed
   fetches: number; // concurrent fetches
-  decodes: number; // worker threads that decode contents
+  decodes: number; // concurrent decodes; also the number of worker threads of a scene
   patience: number; // ms for which a tile must be requested before it is fetched, and unrequested before its fetch is cancelled
   firstRetry: number; // ms after the first failure; doubled after each further failure
   lastRetry: number; // ms; the largest delay between two attempts

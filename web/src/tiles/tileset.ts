@@ -46,7 +46,7 @@ export interface Tile {
 export interface Georeference {
   latitude: number; // degrees, WGS 84
   longitude: number;
-  altitude: number; // metres; mean of the photos' GPS altitudes, above the ellipsoid or the sea, as their EXIF gives them
+  altitude: number; // metres above the ellipsoid, or above the sea if the photos' GPS altitudes are
   enuFromWorld: Matrix4; // a similarity
 }
 

@@ -11,7 +11,7 @@ struct TrainFieldOptions {
 };
 
 // Trains or resumes the model and saves it; see training_loop.h. Writes config.toml and blocks.json first. Throws Error
-// as FieldTrainer and runTraining do.
+// if the folder holds a capture, or a model that was trained on other photos, and as FieldTrainer and runTraining do.
 TrainingResult trainField(Device& device, const Capture& capture, const fs::path& model, TrainFieldOptions options);
 
 }  // namespace tessera

@@ -82,7 +82,7 @@ HWY_ATTR HWY_INLINE void cornerWeights(const float fraction[3], float* weights) 
 }
 
 HWY_ATTR bool findPosition(const HashFeatures::Layout& layout, const HashPart& part, const float position[3],
-                        HashFeatures::Lookup& lookup) {
+                           HashFeatures::Lookup& lookup) {
   uint32_t block[3], within[3];
   for (int a = 0; a < 3; ++a) {
     const float u = std::min(std::max(position[a] * layout.lattice - 0.5f, 0.0f), layout.lattice - 1);

@@ -17,8 +17,8 @@ struct TrainHashOptions : BlockRunOptions {
 // count as part of `loop.minutes`. A resumed run already has the weight. If asked to stop during these trainings, the
 // folder does not contain a model yet. Afterwards trains coarser levels of detail of the same blocks, up to a level
 // with a single tile for all blocks; they are trained again from the start if the finest level has been trained further
-// since. The result counts the finest level's steps, and is finished when all levels are. Throws Error as openBlockRun
-// and runTraining do.
+// since. The result counts the finest level's steps, and is finished when all levels are. Throws Error as openBlockRun,
+// HashTrainer and runTraining do.
 TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options);
 
 // Derives the settings of a level from those of the finest: each level has half the lattice, one fine level fewer and

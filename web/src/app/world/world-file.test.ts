@@ -75,7 +75,7 @@ describe('decodeWorld', () => {
 
   it("requires one scene that defines the world's frame", () => {
     expect(said((file) => file.scenes.pop())).toContain('scenes: contains no scene without a placement, which would define the frame of the world; leave out position');
-    expect(said((file) => (file.scenes = []))).toContain('scenes: has none');
+    expect(said((file) => (file.scenes = []))).toContain('scenes: contains no scene without a placement');
     expect(said((file) => delete file.scenes)).toContain('scenes: is not a list');
     expect(said((file) => (file.scenes = Array.from({ length: 17 }, () => file.scenes[1])))).toContain('scenes: are more than 16');
     for (const none of [5, null, 'a', [], [{ url: 'a' }]]) expect(said((file) => file.scenes.push(none))).toContain('scenes[2]: is not an object');
