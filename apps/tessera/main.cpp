@@ -72,6 +72,5 @@ int main(int argc, char** argv) {
       app, argc, argv,
       "lower, with --set, those of photo_budget_mib, samples_per_micro_batch, samples_per_step, texels_per_step, "
       "grid_log2_size and fine_log2_size that the method has, or keep few blocks in memory with --resident-blocks "
-      "where "
-      "the method allows it");
+      "where the method allows it");
 }
