@@ -58,16 +58,29 @@ export async function countColours(page: Page): Promise<number> {
   return colours.size;
 }
 
-// Waits until everything has loaded and two screenshots in a row are the same, and returns the second.
+// Waits until everything has loaded and two screenshots in a row are the same, and returns the second. Frames of the
+// page lie before and between them: a change that the page has not drawn yet, or a resolution that it has not raised yet
+// after a motion, would otherwise give two equal screenshots on a busy machine.
 export async function pictureAtRest(page: Page): Promise<Buffer> {
-  await page.waitForSelector('.loading.done', { state: 'attached' });
+  const loaded = async () => {
+    await waitForFrames(page, 3);
+    await page.waitForSelector('.loading.done', { state: 'attached' });
+  };
+  await loaded();
   let picture = await page.screenshot();
   for (;;) {
-    await page.waitForTimeout(300);
+    await page.waitForTimeout(400); // longer than the viewer takes to count as being at rest
+    await loaded();
     const next = await page.screenshot();
     if (next.equals(picture)) return next;
     picture = next;
   }
+}
+
+function waitForFrames(page: Page, count: number): Promise<void> {
+  return page.evaluate(async (frames) => {
+    for (let i = 0; i < frames; ++i) await new Promise(requestAnimationFrame);
+  }, count);
 }
 
 // Compares two images; toEqual takes seconds for this.
