@@ -134,8 +134,10 @@ std::string differenceOfSamples(const Outputs& actual, const Outputs& expected) 
     for (size_t i = 0; i < expected.size(); ++i) {
       const Output &a = actual[i], &b = expected[i];
       const bool ofSamples = a.name == "positions" || a.name == "distances" || a.name == "steps" ||
-                             a.name == "middles" || a.name == "widths" || a.name == "runtimeSteps";
-      const bool names = a.name == "rayOfSample" || a.name == "slotOfSample" || a.name == "blockOfSample";
+                             a.name == "middles" || a.name == "widths" || a.name == "runtimeSteps" ||
+                             a.name == "barycentrics";
+      const bool names =
+          a.name == "rayOfSample" || a.name == "faces" || a.name == "slotOfSample" || a.name == "blockOfSample";
       const size_t columns = ofSamples ? b.values.size() / capacity : names ? 1 : 0;
       for (size_t row = 0; row < count * columns; ++row) {
         const size_t place = begin * columns + row, expectedPlace = expectedBegin * columns + row;

@@ -16,6 +16,7 @@
 #include "compute/losses.h"
 #include "compute/mlp.h"
 #include "compute/occupancy.h"
+#include "compute/octahedra.h"
 #include "compute/operation.h"
 #include "compute/proposals.h"
 #include "compute/rays.h"
@@ -41,6 +42,8 @@ namespace tessera {
   X(GatherRows)                 \
   X(OccupancyPoints)            \
   X(OccupancyUpdate)            \
+  X(TraceOctahedra)             \
+  X(OctahedraBackward)          \
   X(DistinctTexels)             \
   X(VirtualGridForward)         \
   X(VirtualGridBackward)        \

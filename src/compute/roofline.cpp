@@ -166,6 +166,7 @@ Roofline measureRoofline(const RooflineOptions& options) {
   measureBlockStreams(recorder);
   measureVirtualGrid(recorder);
   measureAttention(recorder);
+  measureOctahedra(recorder);
   measureParameterStreams(recorder);
   result.rows = recorder.takeRows();
   return result;

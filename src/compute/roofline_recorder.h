@@ -58,6 +58,7 @@ void measureSampleStreams(RooflineRecorder& recorder);  // encodings, marching, 
 void measureBlockStreams(RooflineRecorder& recorder);   // sampling through blocks and proposals
 void measureVirtualGrid(RooflineRecorder& recorder);
 void measureAttention(RooflineRecorder& recorder);         // marching in blocks, lattice, fusing levels, shading
+void measureOctahedra(RooflineRecorder& recorder);
 void measureParameterStreams(RooflineRecorder& recorder);  // losses, exposure, occupancy, Adam
 
 }  // namespace tessera

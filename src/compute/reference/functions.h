@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -18,6 +19,7 @@ struct BlockSpace;
 struct HashGrid;
 struct MarchSpace;
 struct MlpShape;
+struct OctahedraGrid;
 struct RayCamera;
 struct VirtualGrid;
 enum class ColourLossKind;
@@ -93,6 +95,28 @@ OccupancyChoice occupancyPoints(const MarchSpace& space, uint32_t uniform, uint3
 double marchStepAtCell(const MarchSpace& space, uint32_t cell);
 void occupancyUpdate(const MarchSpace& space, double decay, double threshold, Indices cells, View logDensity,
                      std::span<double> grid, std::span<uint32_t> occupancy);
+
+// octahedra.cpp
+struct FaceHit {
+  uint32_t face = 0;
+  double distance = 0;
+  Point position{};      // grid coordinates
+  Point barycentrics{};  // of all three vertices
+};
+// The cells of the vertices of a face; nothing if the face does not exist.
+std::optional<std::array<uint32_t, 3>> verticesOfFace(const OctahedraGrid& grid, uint32_t face);
+Point gridVertex(const OctahedraGrid& grid, View displacements, uint32_t vertex);
+// Where the line through `origin` along `direction` meets the plane of a face: outside the face if a barycentric
+// coordinate is negative. Nothing if the line is parallel to the plane.
+std::optional<FaceHit> hitPlaneOfFace(const OctahedraGrid& grid, View displacements, const Point& origin,
+                                      const Point& direction, uint32_t face);
+// Tries every face near the ray.
+std::vector<FaceHit> traceOctahedra(const OctahedraGrid& grid, View displacements, Indices occupancy,
+                                    const Point& origin, const Point& direction, double near, double far);
+// [3][3]: one hit's gradients with respect to the three vertices of its face.
+Doubles octahedraBackward(const OctahedraGrid& grid, View displacements, double minCosine, const Point& origin,
+                          const Point& direction, const FaceHit& hit, const Point& positionGradient,
+                          double distanceGradient);
 
 // blocks.cpp: one ray, one point
 std::array<double, 2> rangeInScene(const BlockSpace& space, const Point& origin, const Point& direction,

@@ -1,0 +1,56 @@
+// Arguments of octahedra grids (src/compute/octahedra.h).
+#ifndef TESSERA_SHADERS_COMPUTE_ARGUMENTS_OCTAHEDRA_H
+#define TESSERA_SHADERS_COMPUTE_ARGUMENTS_OCTAHEDRA_H
+#include "arguments.h"
+TESSERA_BEGIN_ARGUMENTS
+
+const uint kMaxReachingFaces = 112;
+
+struct TraceOctahedraArguments {
+  CountArguments rays;
+  uint resolution;
+  uint faceCount;  // of reachingFaces(), for cells of each parity
+  uint maximum;
+  float near;
+  FloatPointer origins;
+  FloatPointer directions;
+  FloatPointer farOfRay;  // optional
+  FloatPointer displacements;
+  UintPointer occupancy;
+  UintPointer counts;   // [rays]: numbers of hits, then their prefix sums
+  UintPointer fitting;  // [1]
+  UintPointer firstSample;
+  UintPointer sampleCount;
+  UintPointer finishedRays;  // optional
+  UintPointer rayOfSample;   // optional
+  UintPointer hitFaces;
+  FloatPointer barycentrics;
+  FloatPointer positions;
+  FloatPointer distances;
+  float gridFromScene[16];
+  // reachingFaces(): from the lowest bits on, 2 bits each for the octahedron's x + 1, y + 1 and z + 1, then the local
+  // number.
+  uint faces[2 * 112];
+};
+TESSERA_SIZE(TraceOctahedraArguments, 1120);
+
+struct OctahedraBackwardArguments {
+  CountArguments samples;
+  uint resolution;
+  float minCosine;
+  FloatPointer origins;
+  FloatPointer directions;
+  FloatPointer displacements;
+  UintPointer rayOfSample;
+  UintPointer faces;
+  FloatPointer barycentrics;
+  FloatPointer distances;
+  FloatPointer positionGradients;
+  FloatPointer distanceGradients;  // optional
+  SumPointer displacementGradients;
+  float gridFromScene[16];
+};
+TESSERA_SIZE(OctahedraBackwardArguments, 176);
+
+TESSERA_END_ARGUMENTS
+#endif

@@ -1,0 +1,211 @@
+// TraceOctahedra: one invocation per ray. The kernel runs twice: it counts hits, and after their prefix sums are known,
+// finds them again and writes them. A ray walks through the cells and, in each occupied one, is tested against all faces
+// that can reach into it; hits outside the cell are dropped, so that no face is hit twice and hits are sorted within a
+// cell only. The walk is computed in double if possible, and the faces in float relative to the point at which the ray
+// enters the cell.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "kernel.glsl"
+#include "arguments_octahedra.h"
+#include "octahedra.glsl"
+#include "real.glsl"
+#include "vectors.glsl"
+
+layout(local_size_x = 64) in;
+layout(constant_id = 0) const bool kWrite = false;
+KERNEL_ARGUMENTS(TraceOctahedraArguments)
+
+#define PARAMETERS arguments.values
+
+const uint kMaxHitsInCell = 64;  // the nearest are kept
+const real kNever = real(1e30);
+
+// A ray in homogeneous grid coordinates, start + t · slope, and its walk: g = entry + s · step, where the farthest
+// coordinate advances by 1 per unit of s.
+struct Ray {
+  uint index, row, endRow;  // rows of its hits: none is written beyond, even if the second run rounds differently
+  real start[4], slope[4];
+  real near, far;
+  realVec3 entry, step_;
+  int z;  // the axis along which the ray is longest
+};
+
+struct Hit {
+  float s;  // from the point at which the ray enters the cell
+  uint face;
+  vec2 barycentrics;
+};
+
+real coordinateAt(Ray ray, real t, int axis) {
+  return (ray.start[axis] + t * ray.slope[axis]) / (ray.start[3] + t * ray.slope[3]);
+}
+
+// Limits [begin, end] to where all coordinates are in [0, n]. All six bounds are linear in t.
+void clipToGrid(Ray ray, real n, inout real begin, inout real end) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int side = 0; side < 2; ++side) {
+      const real value = side == 1 ? n * ray.start[3] - ray.start[axis] : ray.start[axis];
+      const real rise = side == 1 ? n * ray.slope[3] - ray.slope[axis] : ray.slope[axis];
+      if (rise > 0) {
+        begin = max(begin, -value / rise);
+      } else if (rise < 0) {
+        end = min(end, -value / rise);
+      } else if (value < 0) {
+        end = -kNever;
+      }
+    }
+  }
+}
+
+bool isOccupied(ivec3 cell) {
+  const uint n = PARAMETERS.resolution, i = cell.x + n * (cell.y + n * cell.z);
+  return (PARAMETERS.occupancy.values[i / 32] >> i % 32 & 1) != 0;
+}
+
+// Finds the hits of a cell that the ray crosses from s = `enter` to `leave`, writes those that fit, and adds their number
+// to `count`. Returns false if the ray has all that it may have.
+bool addHits(Ray ray, ivec3 cell, real enter, real leave, inout uint count) {
+  const int n = int(PARAMETERS.resolution), x = (ray.z + 1) % 3, y = (ray.z + 2) % 3;
+  const vec3 step_ = vec3(ray.step_), origin = vec3(ray.entry + enter * ray.step_ - (realVec3(cell) + real(0.5)));
+  const float shearX = step_[x] / step_[ray.z], shearY = step_[y] / step_[ray.z], sign_ = step_[ray.z] > 0 ? 1 : -1;
+  const uint table = PARAMETERS.faceCount * ((cell.x + cell.y + cell.z) & 1);
+  Hit hits[kMaxHitsInCell];
+  uint hitCount = 0;
+  for (uint f = 0; f < PARAMETERS.faceCount; ++f) {
+    const uint packed = PARAMETERS.faces[table + f], local = packed >> 6;
+    const ivec3 octahedron = cell + ivec3(packed & 3, packed >> 2 & 3, packed >> 4 & 3) - 1;
+    vec3 v[3];  // sheared so that the ray is the z axis
+    bool exists = true;
+    for (uint corner = 0; corner < 3; ++corner) {
+      const ivec3 place = octahedron + faceCorner(local, corner);
+      if (any(lessThan(place, ivec3(0))) || any(greaterThanEqual(place, ivec3(n)))) {
+        exists = false;
+        break;
+      }
+      const vec3 at = vec3(place - cell) + pointAt(PARAMETERS.displacements, place.x + n * (place.y + n * place.z)) - origin;
+      v[corner] = vec3(at[x] - shearX * at[ray.z], at[y] - shearY * at[ray.z], at[ray.z] * sign_);
+    }
+    if (!exists) continue;
+    const vec3 areas = vec3(v[1].x * v[2].y - v[1].y * v[2].x, v[2].x * v[0].y - v[2].y * v[0].x,
+                            v[0].x * v[1].y - v[0].y * v[1].x);
+    const float sum = areas.x + areas.y + areas.z;
+    const bool inside = all(greaterThanEqual(areas, vec3(0))) || all(lessThanEqual(areas, vec3(0)));
+    if (!inside || sum == 0) continue;
+    const float s = dot(areas, vec3(v[0].z, v[1].z, v[2].z)) / sum;
+    if (!(s >= 0 && enter + s < leave)) continue;
+    const real t_ = ray.entry[ray.z] + (enter + s) * ray.step_[ray.z];
+    const real t = (t_ * ray.start[3] - ray.start[ray.z]) / (ray.slope[ray.z] - t_ * ray.slope[3]);
+    if (!(t > ray.near && t < ray.far)) continue;
+    const uint face = (octahedron.x + n * (octahedron.y + n * octahedron.z)) * kFacesPerCell + local;
+    uint place = min(hitCount, kMaxHitsInCell - 1);
+    if (hitCount == kMaxHitsInCell && s >= hits[place].s) continue;
+    for (; place > 0 && (s < hits[place - 1].s || (s == hits[place - 1].s && face < hits[place - 1].face)); --place) {
+      hits[place] = hits[place - 1];
+    }
+    hits[place] = Hit(s, face, areas.yz / sum);
+    hitCount = min(hitCount + 1, kMaxHitsInCell);
+  }
+  for (uint i = 0; i < hitCount; ++i) {
+    const uint row = ray.row + count;
+    if (kWrite && row < ray.endRow) {
+      const realVec3 g = ray.entry + (enter + hits[i].s) * ray.step_;
+      const real t = (g[ray.z] * ray.start[3] - ray.start[ray.z]) / (ray.slope[ray.z] - g[ray.z] * ray.slope[3]);
+      if (IS_SET(PARAMETERS.rayOfSample)) PARAMETERS.rayOfSample.values[row] = ray.index;
+      PARAMETERS.hitFaces.values[row] = hits[i].face;
+      for (uint k = 0; k < 2; ++k) PARAMETERS.barycentrics.values[2 * row + k] = hits[i].barycentrics[k];
+      storePoint(PARAMETERS.positions, row, clamp(vec3(g / real(n)), 0, 1));
+      PARAMETERS.distances.values[row] = float(t);
+    }
+    if (++count >= PARAMETERS.maximum) return false;
+  }
+  return true;
+}
+
+// Returns the number of hits of a ray.
+uint trace(uint index, uint row, uint endRow) {
+  const vec3 origin = pointAt(PARAMETERS.origins, index), direction = pointAt(PARAMETERS.directions, index);
+  if (direction == vec3(0) || PARAMETERS.maximum == 0) return 0;
+  Ray ray;
+  ray.index = index;
+  ray.row = row;
+  ray.endRow = endRow;
+  for (int i = 0; i < 4; ++i) {
+    ray.start[i] = PARAMETERS.gridFromScene[4 * i + 3];
+    ray.slope[i] = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      ray.start[i] += real(PARAMETERS.gridFromScene[4 * i + axis]) * real(origin[axis]);
+      ray.slope[i] += real(PARAMETERS.gridFromScene[4 * i + axis]) * real(direction[axis]);
+    }
+  }
+  ray.near = PARAMETERS.near;
+  ray.far = kNever;
+  if (IS_SET(PARAMETERS.farOfRay)) ray.far = min(ray.far, real(PARAMETERS.farOfRay.values[index]));
+  const int n = int(PARAMETERS.resolution);
+  real begin = ray.near, end = ray.far;
+  clipToGrid(ray, n, begin, end);
+  if (!(begin < end)) return 0;
+  real largest = 0;
+  ray.z = 0;
+  realVec3 along;
+  for (int axis = 0; axis < 3; ++axis) {
+    along[axis] = ray.slope[axis] * ray.start[3] - ray.start[axis] * ray.slope[3];
+    if (abs(along[axis]) > largest) {
+      largest = abs(along[axis]);
+      ray.z = axis;
+    }
+  }
+  if (!(largest > 0)) return 0;
+  ray.step_ = along / largest;
+  ivec3 cell;
+  realVec3 next;
+  for (int axis = 0; axis < 3; ++axis) {
+    ray.entry[axis] = clamp(coordinateAt(ray, begin, axis), real(0), real(n));
+    cell[axis] = min(int(ray.entry[axis]), n - 1);
+    // On a wall between two cells, the ray is in the one that it enters.
+    if (ray.step_[axis] < 0 && cell[axis] > 0 && ray.entry[axis] == cell[axis]) --cell[axis];
+    const int side = ray.step_[axis] > 0 ? 1 : 0;
+    next[axis] = ray.step_[axis] == 0 ? kNever : (cell[axis] + side - ray.entry[axis]) / ray.step_[axis];
+  }
+  const real last = abs(coordinateAt(ray, end, ray.z) - ray.entry[ray.z]);
+  real s = 0;
+  uint count = 0;
+  for (;;) {
+    int axis = next.y < next.x ? 1 : 0;
+    if (next.z < next[axis]) axis = 2;
+    const real leave = next[axis];
+    if (isOccupied(cell) && !addHits(ray, cell, s, leave, count)) return count;
+    if (!(leave < last)) return count;
+    s = max(s, leave);
+    cell[axis] += ray.step_[axis] > 0 ? 1 : -1;
+    if (cell[axis] < 0 || cell[axis] >= n) return count;
+    next[axis] = (cell[axis] + (ray.step_[axis] > 0 ? 1 : 0) - ray.entry[axis]) / ray.step_[axis];
+  }
+}
+
+void storeNothing(uint ray, uint row) {
+  if (IS_SET(PARAMETERS.rayOfSample)) PARAMETERS.rayOfSample.values[row] = ray;
+  PARAMETERS.hitFaces.values[row] = 0;
+  for (uint k = 0; k < 2; ++k) PARAMETERS.barycentrics.values[2 * row + k] = 0;
+  storePoint(PARAMETERS.positions, row, vec3(0));
+  PARAMETERS.distances.values[row] = 0;
+}
+
+void main() {
+  if (!kWrite) {
+    FOR_EACH_ROW(ray, PARAMETERS.rays) { PARAMETERS.counts.values[ray] = trace(ray, 0, 0); }
+    return;
+  }
+  const uint fitting = PARAMETERS.fitting.values[0];
+  if (gl_GlobalInvocationID.x == 0) {
+    PARAMETERS.firstSample.values[0] = 0;
+    if (IS_SET(PARAMETERS.finishedRays)) PARAMETERS.finishedRays.values[0] = fitting;
+  }
+  FOR_EACH_ROW(ray, PARAMETERS.rays) {
+    const bool fits = ray < fitting;
+    const uint first = ray == 0 ? 0 : PARAMETERS.counts.values[ray - 1], end = PARAMETERS.counts.values[ray];
+    PARAMETERS.firstSample.values[ray + 1] = fits ? end : PARAMETERS.sampleCount.values[0];
+    if (!fits || end == first) continue;
+    // Fills the rows that were counted but not written, because the second run rounded differently.
+    for (uint row = first + trace(ray, first, end); row < end; ++row) storeNothing(ray, row);
+  }
+}

@@ -1,0 +1,446 @@
+// Octahedra grids on the CPU. A ray walks through the cells of the grid and, in each occupied cell, is tested against
+// all faces that can reach into that cell: those of the octahedra among the 27 cells around it. Hits outside the cell
+// are dropped, so that no face is hit twice and cells can be skipped. As vertices never leave their cells, nothing is
+// missed, and hits are sorted within a cell only.
+//
+// The test is that of Woop et al. 2013 (watertight ray/triangle intersection): the 27 vertices are sheared once so that
+// the ray becomes the z axis; a face then needs three cross products. All faces are tested in vectors. The ray and the
+// cells are computed in double, and the faces in float relative to the point at which the ray enters the cell.
+
+#include "compute/octahedra.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "compute/cpu/kernels.h"
+#include "compute/cpu/offsets.h"
+#include "compute/host_memory.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "compute/cpu/octahedra.cpp"
+#include <hwy/foreach_target.h>
+// after foreach_target
+#include <hwy/highway.h>
+
+#ifndef TESSERA_CPU_OCTAHEDRA_ONCE
+#define TESSERA_CPU_OCTAHEDRA_ONCE
+namespace tessera::cpu {
+
+inline constexpr int kVertices = 27;          // of the cells around a cell; dx + 1 + 3 (dy + 1) + 9 (dz + 1)
+inline constexpr int kSlots = 32;             // two vectors of 16; slots without a vertex hold NaN
+inline constexpr int kMaxCandidates = 112;    // a multiple of 16
+inline constexpr size_t kMaxHitsInCell = 64;  // the nearest are kept; 27 faces is the most seen on random grids
+
+// The faces that can reach into a cell.
+struct Candidates {
+  int count = 0;                                     // a multiple of 16; those of no face have slots without a vertex
+  alignas(64) int32_t slot[3][kMaxCandidates] = {};  // the slots of the three vertices
+  int8_t cell[kMaxCandidates][3] = {};               // of the octahedron, relative to the cell
+  uint8_t local[kMaxCandidates] = {};                // number within the octahedron
+};
+
+inline Candidates makeCandidates(OctahedraPlacement placement, uint32_t parity) {
+  Candidates all;
+  for (const ReachingFace& face : reachingFaces(placement, parity)) {
+    const auto corners = octahedronFace(face.local);
+    for (int corner = 0; corner < 3; ++corner) {
+      int32_t slot = 0, stride = 1;
+      for (int axis = 0; axis < 3; ++axis) {
+        slot += stride * (face.octahedron[axis] + corners[corner][axis] + 1);
+        stride *= 3;
+      }
+      all.slot[corner][all.count] = slot;
+    }
+    for (int axis = 0; axis < 3; ++axis) all.cell[all.count][axis] = static_cast<int8_t>(face.octahedron[axis]);
+    all.local[all.count++] = static_cast<uint8_t>(face.local);
+  }
+  for (; all.count % 16 != 0; ++all.count) {
+    for (auto& slots : all.slot) slots[all.count] = kVertices;
+  }
+  return all;
+}
+
+inline const Candidates& selectCandidates(OctahedraPlacement placement, uint32_t parity) {
+  static const Candidates every = makeCandidates(OctahedraPlacement::all, 0);
+  static const Candidates even = makeCandidates(OctahedraPlacement::checkerboard, 0);
+  static const Candidates odd = makeCandidates(OctahedraPlacement::checkerboard, 1);
+  if (placement == OctahedraPlacement::all) return every;
+  return parity % 2 == 0 ? even : odd;
+}
+
+struct OctahedraHit {
+  uint32_t ray, face;
+  float barycentrics[2], position[3], distance;
+};
+
+// A ray in homogeneous coordinates of the grid: start + t · slope.
+struct HomogeneousRay {
+  double start[4], slope[4];
+
+  HomogeneousRay(const OctahedraGrid& grid, const float* origin, const float* direction) {
+    for (int row = 0; row < 4; ++row) {
+      const float* const m = grid.gridFromScene.data() + 4 * row;
+      start[row] = m[3];
+      slope[row] = 0;
+      for (int column = 0; column < 3; ++column) {
+        start[row] += double{m[column]} * origin[column];
+        slope[row] += double{m[column]} * direction[column];
+      }
+    }
+  }
+  // Limits [*begin, *end] to where all coordinates are in [0, n]. All six bounds are linear in t.
+  void clip(double n, double* begin, double* end) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const bool upper : {false, true}) {
+        const double value = upper ? n * start[3] - start[axis] : start[axis];
+        const double rise = upper ? n * slope[3] - slope[axis] : slope[axis];
+        if (rise > 0) {
+          *begin = std::max(*begin, -value / rise);
+        } else if (rise < 0) {
+          *end = std::min(*end, -value / rise);
+        } else if (value < 0) {
+          *end = -std::numeric_limits<double>::infinity();
+        }
+      }
+    }
+  }
+  double at(double t, int axis) const { return (start[axis] + t * slope[axis]) / (start[3] + t * slope[3]); }
+  // The parameter at which a coordinate has the value g.
+  double parameterAt(double g, int axis) const { return (g * start[3] - start[axis]) / (slope[axis] - g * slope[3]); }
+};
+
+}  // namespace tessera::cpu
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace tessera::cpu::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Float = hn::CappedTag<float, 16>;
+using Vector = hn::Vec<Float>;
+
+// A table of kSlots numbers.
+struct Table {
+#if HWY_TARGET == HWY_AVX3
+  Vector low, high;
+
+  explicit HWY_INLINE Table(const float* values)
+      : low(hn::Load(Float(), values)), high(hn::Load(Float(), values + 16)) {}
+  // Highway 1.0 has no lookup in two vectors.
+  HWY_INLINE Vector lookup(const int32_t* slots) const {
+    return Vector{_mm512_permutex2var_ps(low.raw, _mm512_load_si512(slots), high.raw)};
+  }
+#else
+  const float* values;
+
+  explicit HWY_INLINE Table(const float* all) : values(all) {}
+  HWY_INLINE Vector lookup(const int32_t* slots) const {
+    alignas(64) float hitCount[16];
+    for (size_t i = 0; i < hn::Lanes(Float()); ++i) hitCount[i] = values[slots[i]];
+    return hn::Load(Float(), hitCount);
+  }
+#endif
+};
+
+// The walk of one ray through the cells, in grid coordinates: g = entry + s · step, where the farthest coordinate
+// advances by 1 per unit of s.
+class Walk {
+ public:
+  Walk(const TraceOctahedra& a, uint32_t ray, std::vector<OctahedraHit>& hits)
+      : a_(a),
+        ray_(ray),
+        hits_(hits),
+        first_(hits.size()),
+        line_(a.grid, hostPointer(a.origins) + 3 * size_t{ray}, hostPointer(a.directions) + 3 * size_t{ray}),
+        displacements_(hostPointer(a.displacements)),
+        n_(static_cast<int>(a.grid.resolution)) {
+    for (auto& numbers : sheared_) std::fill(numbers, numbers + kSlots, std::numeric_limits<float>::quiet_NaN());
+  }
+
+  void run() {
+    if (a_.maximum == 0) return;
+    double begin = a_.near, end = 1e30;
+    if (a_.farOfRay) end = std::min(end, double{hostPointer(a_.farOfRay)[ray_]});
+    near_ = begin;
+    far_ = end;
+    line_.clip(n_, &begin, &end);
+    if (!(begin < end)) return;
+    double direction[3], largest = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      direction[axis] = line_.slope[axis] * line_.start[3] - line_.start[axis] * line_.slope[3];
+      if (std::abs(direction[axis]) > largest) {
+        largest = std::abs(direction[axis]);
+        z_ = axis;
+      }
+    }
+    if (!(largest > 0)) return;
+    x_ = (z_ + 1) % 3;
+    y_ = (z_ + 2) % 3;
+    int cell[3];
+    double next[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      step_[axis] = direction[axis] / largest;
+      entry_[axis] = std::clamp(line_.at(begin, axis), 0.0, double{static_cast<double>(n_)});
+      cell[axis] = std::min(static_cast<int>(entry_[axis]), n_ - 1);
+      // On a wall between two cells, the ray is in the one that it enters.
+      if (step_[axis] < 0 && cell[axis] > 0 && entry_[axis] == cell[axis]) --cell[axis];
+    }
+    const double last = std::abs(line_.at(end, z_) - entry_[z_]);
+    const auto wall = [&](int axis) {
+      if (step_[axis] == 0) return std::numeric_limits<double>::infinity();
+      return (cell[axis] + (step_[axis] > 0 ? 1 : 0) - entry_[axis]) / step_[axis];
+    };
+    for (int axis = 0; axis < 3; ++axis) next[axis] = wall(axis);
+    const uint32_t* const bits = hostPointer(a_.occupancy);
+    double s = 0;
+    for (;;) {
+      int axis = next[1] < next[0] ? 1 : 0;
+      if (next[2] < next[axis]) axis = 2;
+      const double leave = next[axis];
+      const uint32_t index = static_cast<uint32_t>(cell[0] + n_ * (cell[1] + n_ * cell[2]));
+      if ((bits[index / 32] >> index % 32 & 1) != 0 && !addHits(cell, index, s, leave)) return;
+      if (!(leave < last)) return;
+      s = std::max(s, leave);
+      cell[axis] += step_[axis] > 0 ? 1 : -1;
+      if (cell[axis] < 0 || cell[axis] >= n_) return;
+      next[axis] = wall(axis);
+    }
+  }
+
+ private:
+  struct Near {
+    double s;
+    uint32_t face;
+    float barycentrics[2];
+    bool operator<(const Near& other) const { return s != other.s ? s < other.s : face < other.face; }
+  };
+
+  // Writes the vertices of the cells around `cell` relative to the ray at `s`, sheared so that the ray is the z axis.
+  void HWY_INLINE shear(const int cell[3], double s) {
+    const float shearX = static_cast<float>(step_[x_] / step_[z_]), shearY = static_cast<float>(step_[y_] / step_[z_]);
+    const float sign = step_[z_] > 0 ? 1.0f : -1.0f;
+    float origin[3];  // of the ray, relative to the centre of the cell
+    for (int axis = 0; axis < 3; ++axis)
+      origin[axis] = static_cast<float>(entry_[axis] + s * step_[axis] - (cell[axis] + 0.5));
+    const bool inside =
+        cell[0] > 0 && cell[1] > 0 && cell[2] > 0 && cell[0] < n_ - 1 && cell[1] < n_ - 1 && cell[2] < n_ - 1;
+    int slot = 0;
+    for (int k = -1; k <= 1; ++k) {
+      for (int j = -1; j <= 1; ++j) {
+        const int64_t row = cell[0] + int64_t{n_} * (cell[1] + j + int64_t{n_} * (cell[2] + k));
+        const float* const from = displacements_ + 3 * row;
+        for (int i = -1; i <= 1; ++i, ++slot) {
+          if (!inside && (static_cast<uint32_t>(cell[0] + i) >= static_cast<uint32_t>(n_) ||
+                          static_cast<uint32_t>(cell[1] + j) >= static_cast<uint32_t>(n_) ||
+                          static_cast<uint32_t>(cell[2] + k) >= static_cast<uint32_t>(n_))) {
+            sheared_[0][slot] = sheared_[1][slot] = sheared_[2][slot] = std::numeric_limits<float>::quiet_NaN();
+            continue;
+          }
+          const float at[3] = {static_cast<float>(i) + from[3 * i] - origin[0],
+                               static_cast<float>(j) + from[3 * i + 1] - origin[1],
+                               static_cast<float>(k) + from[3 * i + 2] - origin[2]};
+          sheared_[0][slot] = at[x_] - shearX * at[z_];
+          sheared_[1][slot] = at[y_] - shearY * at[z_];
+          sheared_[2][slot] = at[z_] * sign;
+        }
+      }
+    }
+  }
+
+  // Adds the hits of a cell that the ray crosses from s = `enter` to `leave`; false if the ray has all that it may
+  // have.
+  bool addHits(const int cell[3], uint32_t index, double enter, double leave) {
+    shear(cell, enter);
+    const Candidates& faces = selectCandidates(a_.grid.placement, static_cast<uint32_t>(cell[0] + cell[1] + cell[2]));
+    const Float d;
+    const Vector zero = hn::Zero(d);
+    const Table tableX(sheared_[0]), tableY(sheared_[1]);
+    alignas(64) float edges[3][16];
+    Near near[kMaxHitsInCell];
+    size_t hitCount = 0;
+    for (int first = 0; first < faces.count; first += static_cast<int>(hn::Lanes(d))) {
+      const Vector ax = tableX.lookup(faces.slot[0] + first), ay = tableY.lookup(faces.slot[0] + first);
+      const Vector bx = tableX.lookup(faces.slot[1] + first), by = tableY.lookup(faces.slot[1] + first);
+      const Vector cx = tableX.lookup(faces.slot[2] + first), cy = tableY.lookup(faces.slot[2] + first);
+      // Twice the signed areas of the ray with each edge: the barycentric coordinates of the opposite vertices.
+      const Vector u = hn::MulSub(bx, cy, hn::Mul(by, cx)), v = hn::MulSub(cx, ay, hn::Mul(cy, ax)),
+                   w = hn::MulSub(ax, by, hn::Mul(ay, bx));
+      const Vector smallest = hn::Min(u, hn::Min(v, w)), largest = hn::Max(u, hn::Max(v, w));
+      // NaN compares false, but Min and Max may drop it: the sum keeps it.
+      const Vector sum = hn::Add(u, hn::Add(v, w));
+      const auto hit =
+          hn::And(hn::Ne(sum, zero), hn::And(hn::Or(hn::Ge(smallest, zero), hn::Le(largest, zero)), hn::Eq(sum, sum)));
+      uint8_t bytes[8] = {};
+      hn::StoreMaskBits(d, hit, bytes);
+      uint32_t mask = bytes[0] | uint32_t{bytes[1]} << 8;
+      if (mask == 0) continue;
+      hn::Store(u, d, edges[0]);
+      hn::Store(v, d, edges[1]);
+      hn::Store(w, d, edges[2]);
+      for (; mask != 0; mask &= mask - 1) {
+        const int lane = __builtin_ctz(mask), face = first + lane;
+        const float total = edges[0][lane] + edges[1][lane] + edges[2][lane];
+        float z = 0;
+        for (int corner = 0; corner < 3; ++corner) z += edges[corner][lane] * sheared_[2][faces.slot[corner][face]];
+        const double s = enter + double{z / total};
+        if (!(s >= enter && s < leave)) continue;
+        const int8_t* const offset = faces.cell[face];
+        const uint32_t octahedron = index + static_cast<uint32_t>(offset[0] + n_ * (offset[1] + n_ * offset[2]));
+        const Near one{
+            s, octahedron * kFacesPerCell + faces.local[face], {edges[1][lane] / total, edges[2][lane] / total}};
+        if (hitCount == kMaxHitsInCell && !(one < near[hitCount - 1])) continue;
+        size_t place = hitCount < kMaxHitsInCell ? hitCount++ : hitCount - 1;
+        for (; place > 0 && one < near[place - 1]; --place) near[place] = near[place - 1];
+        near[place] = one;
+      }
+    }
+    for (size_t i = 0; i < hitCount; ++i) {
+      const Near& one = near[i];
+      OctahedraHit hit{ray_, one.face, {one.barycentrics[0], one.barycentrics[1]}, {}, 0};
+      const double distance = line_.parameterAt(entry_[z_] + one.s * step_[z_], z_);
+      if (!(distance > near_ && distance < far_)) continue;
+      hit.distance = static_cast<float>(distance);
+      for (int axis = 0; axis < 3; ++axis)
+        hit.position[axis] = static_cast<float>(std::clamp((entry_[axis] + one.s * step_[axis]) / n_, 0.0, 1.0));
+      hits_.push_back(hit);
+      if (hits_.size() - first_ >= a_.maximum) return false;
+    }
+    return true;
+  }
+
+  const TraceOctahedra& a_;
+  uint32_t ray_;
+  std::vector<OctahedraHit>& hits_;
+  size_t first_;  // of the ray in hits_
+  HomogeneousRay line_;
+  const float* displacements_;
+  int n_, x_ = 0, y_ = 1, z_ = 2;  // z_: the axis along which the ray is longest
+  double near_ = 0, far_ = 0, entry_[3] = {}, step_[3] = {};
+  alignas(64) float sheared_[3][kSlots];
+};
+
+void traceRay(const TraceOctahedra& a, uint32_t ray, std::vector<OctahedraHit>& hits) {
+  const float* const direction = hostPointer(a.directions) + 3 * size_t{ray};
+  if (direction[0] == 0 && direction[1] == 0 && direction[2] == 0) return;
+  Walk(a, ray, hits).run();
+}
+
+}  // namespace tessera::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace tessera::cpu {
+
+HWY_EXPORT(traceRay);
+
+namespace {
+
+constexpr size_t kRaysPerTask = 64;  // fixed; the hits of all tasks are concatenated in task order
+
+// A face's vertices, and where they lie in the grid.
+struct FaceVertices {
+  uint32_t cell[3];
+  double at[3][3];
+
+  FaceVertices(const OctahedraGrid& grid, const float* displacements, uint32_t face) {
+    const uint32_t octahedron = face / kFacesPerCell, n = grid.resolution;
+    const int centre[3] = {static_cast<int>(octahedron % n), static_cast<int>(octahedron / n % n),
+                           static_cast<int>(octahedron / (n * n))};
+    const auto corners = octahedronFace(face % kFacesPerCell);
+    for (int corner = 0; corner < 3; ++corner) {
+      uint32_t stride = 1;
+      cell[corner] = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        const int place = centre[axis] + corners[corner][axis];
+        at[corner][axis] = place + 0.5;
+        cell[corner] += stride * static_cast<uint32_t>(place);
+        stride *= n;
+      }
+      for (int axis = 0; axis < 3; ++axis) at[corner][axis] += displacements[3 * size_t{cell[corner]} + axis];
+    }
+  }
+};
+
+// The face's normal, scaled so that a vertex's gradient is this times its barycentric coordinate.
+void scaledNormal(const OctahedraBackward& a, uint32_t sample, float out[3]) {
+  const FaceVertices face(a.grid, hostPointer(a.displacements), hostPointer(a.faces)[sample]);
+  const size_t ray = hostPointer(a.rayOfSample)[sample];
+  const HomogeneousRay line(a.grid, hostPointer(a.origins) + 3 * ray, hostPointer(a.directions) + 3 * ray);
+  const double t = hostPointer(a.distances)[sample], scale = line.start[3] + t * line.slope[3];
+  double normal[3], slope[3], across = 0, along = 0, normalSquare = 0, slopeSquare = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int x = (axis + 1) % 3, y = (axis + 2) % 3;
+    normal[axis] = (face.at[1][x] - face.at[0][x]) * (face.at[2][y] - face.at[0][y]) -
+                   (face.at[1][y] - face.at[0][y]) * (face.at[2][x] - face.at[0][x]);
+    slope[axis] = (line.slope[axis] - line.at(t, axis) * line.slope[3]) / scale;
+    across += normal[axis] * slope[axis];
+    along += slope[axis] * hostPointer(a.positionGradients)[3 * size_t{sample} + axis];
+    normalSquare += normal[axis] * normal[axis];
+    slopeSquare += slope[axis] * slope[axis];
+  }
+  across = std::copysign(std::max(std::abs(across), a.minCosine * std::sqrt(normalSquare * slopeSquare)), across);
+  along /= a.grid.resolution;
+  if (a.distanceGradients) along += hostPointer(a.distanceGradients)[sample];
+  for (int axis = 0; axis < 3; ++axis)
+    out[axis] = across == 0 ? 0.0f : static_cast<float>(along / across * normal[axis]);
+}
+
+}  // namespace
+
+void run(Context& context, const TraceOctahedra& a) {
+  const uint32_t rays = hostCount(a.rays);
+  const auto trace = HWY_DYNAMIC_DISPATCH(traceRay);
+  uint32_t* const firstSample = hostPointer(a.firstSample);
+  const size_t tasks = (rays + kRaysPerTask - 1) / kRaysPerTask;
+  std::vector<std::vector<OctahedraHit>> hitsOfTask(tasks);
+  context.pool.run(tasks, [&](size_t task, int) {
+    std::vector<OctahedraHit>& hits = hitsOfTask[task];
+    for (size_t ray = task * kRaysPerTask; ray < std::min<size_t>(rays, (task + 1) * kRaysPerTask); ++ray) {
+      const size_t before = hits.size();
+      trace(a, static_cast<uint32_t>(ray), hits);
+      firstSample[ray + 1] = static_cast<uint32_t>(hits.size() - before);
+    }
+  });
+  const uint32_t finished = countsToOffsets(firstSample, rays, a.sampleCapacity);
+  *hostPointer(a.sampleCount) = firstSample[rays];
+  if (a.finishedRays) *hostPointer(a.finishedRays) = finished;
+  context.pool.run(tasks, [&](size_t task, int) {
+    const size_t first = task * kRaysPerTask;
+    for (size_t i = 0; i < hitsOfTask[task].size(); ++i) {
+      const OctahedraHit& hit = hitsOfTask[task][i];
+      if (hit.ray >= finished) break;
+      const size_t row = firstSample[first] + i;
+      if (a.rayOfSample) hostPointer(a.rayOfSample)[row] = hit.ray;
+      hostPointer(a.faces)[row] = hit.face;
+      std::copy_n(hit.barycentrics, 2, hostPointer(a.barycentrics) + 2 * row);
+      std::copy_n(hit.position, 3, hostPointer(a.positions) + 3 * row);
+      hostPointer(a.distances)[row] = hit.distance;
+    }
+  });
+}
+
+void run(Context& context, const OctahedraBackward& a) {
+  const uint32_t samples = hostCount(a.samples);
+  std::vector<float> normals(size_t{3} * samples);
+  context.pool.forRanges(samples, 1024, [&](size_t begin, size_t end) {
+    for (size_t sample = begin; sample < end; ++sample)
+      scaledNormal(a, static_cast<uint32_t>(sample), &normals[3 * sample]);
+  });
+  // One thread adds, because samples share vertices; this is a small part of the work.
+  float* const sums = hostPointer(a.displacementGradients);
+  const float* const barycentrics = hostPointer(a.barycentrics);
+  for (size_t sample = 0; sample < samples; ++sample) {
+    const FaceVertices face(a.grid, hostPointer(a.displacements), hostPointer(a.faces)[sample]);
+    const float second = barycentrics[2 * sample], third = barycentrics[2 * sample + 1];
+    const float shares[3] = {1 - second - third, second, third};
+    for (int corner = 0; corner < 3; ++corner) {
+      float* const to = sums + 3 * size_t{face.cell[corner]};
+      for (int axis = 0; axis < 3; ++axis) to[axis] += shares[corner] * normals[3 * sample + axis];
+    }
+  }
+}
+
+}  // namespace tessera::cpu
+#endif

@@ -1,0 +1,118 @@
+// Grids of movable octahedra (Xu et al. 2023, UE4-NeRF, section 3.2): the triangles of `mesh`, the hits of rays on
+// them, and the gradient of hits with respect to the vertices.
+//
+// A grid has N³ cells with one vertex each, which moves within its cell. Grid coordinates are in units of cells: cell
+// (i, j, k) fills [i, i+1] × [j, j+1] × [k, k+1], and its vertex lies at (i, j, k) + 0.5 + displacement, with each
+// component of the displacement in [-0.5, 0.5]. The octahedron of a cell has the vertices of the six cells beside it as
+// corners and the cell's own vertex as centre. It has 20 faces: 8 outer ones, and 12 inner ones, each of which joins
+// the centre with an edge. A face with a vertex outside the grid does not exist.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "compute/memory.h"
+#include "compute/operation.h"
+
+namespace tessera {
+
+// Which cells carry an octahedron: those with an even i + j + k, so that octahedra and the tetrahedra between them fill
+// space, or all of them, so that faces overlap in space (each square between four cells is covered twice).
+enum class OctahedraPlacement { checkerboard, all };
+
+struct OctahedraGrid {
+  uint32_t resolution = 128;  // N, at most 512
+  OctahedraPlacement placement = OctahedraPlacement::checkerboard;
+  // Maps homogeneous positions (x, y, z, 1) of the scene to homogeneous grid coordinates; row-major. A projective
+  // matrix maps lines to lines and planes to planes, so that triangles are flat in the scene, too. The scene points
+  // that it maps into the grid must have a positive last coordinate.
+  std::array<float, 16> gridFromScene = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+
+  uint32_t cells() const { return resolution * resolution * resolution; }
+  // Bits of cells are those of MarchRays::occupancy: cell (i, j, k) at i + N (j + N k).
+  uint32_t words() const { return (cells() + 31) / 32; }
+};
+
+// Faces are numbered 20 · cell + local. Local numbers 0 to 7 are the outer faces: bit a is set if the corner along axis
+// a is on the negative side. Inner faces have the numbers 8 + 4 · pair + 2 · [s < 0] + [t < 0] with the pairs of axes
+// (x, y), (x, z), (y, z) and the sides s and t of the corners along the first and the second axis.
+inline constexpr uint32_t kFacesPerCell = 20, kOuterFaces = 8;
+
+// Returns the cells of the three vertices of a face, relative to the cell of the octahedron. Outer faces: the corners
+// along x, y and z. Inner faces: the centre, then the corners along the first and the second axis.
+constexpr std::array<std::array<int, 3>, 3> octahedronFace(uint32_t local) {
+  std::array<std::array<int, 3>, 3> corners{};
+  if (local < kOuterFaces) {
+    for (uint32_t axis = 0; axis < 3; ++axis) corners[axis][axis] = (local >> axis & 1) ? -1 : 1;
+    return corners;
+  }
+  const uint32_t pair = (local - kOuterFaces) / 4, signs = (local - kOuterFaces) % 4;
+  corners[1][pair == 2 ? 1 : 0] = (signs & 2) ? -1 : 1;
+  corners[2][pair == 0 ? 1 : 2] = (signs & 1) ? -1 : 1;
+  return corners;
+}
+
+inline bool carriesOctahedron(OctahedraPlacement placement, uint32_t i, uint32_t j, uint32_t k) {
+  return placement == OctahedraPlacement::all || (i + j + k) % 2 == 0;
+}
+
+// A face that can reach into a cell: a point of the face in that cell exists for some displacements.
+struct ReachingFace {
+  std::array<int, 3> octahedron;  // its cell, relative to the cell that the face reaches into
+  uint32_t local;
+};
+
+// Returns the faces that can reach into a cell with the given parity of i + j + k: 56, or 112 with octahedra in all
+// cells. Their vertices lie in the 27 cells around it.
+std::vector<ReachingFace> reachingFaces(OctahedraPlacement placement, uint32_t parity);
+
+// Finds the hits of rays with the faces of a grid, in the order of their distance along the ray (equal distances: of
+// their face numbers). A hit exists if its distance is in (near, farOfRay) and its position lies in an occupied cell. A
+// ray within the plane of a face does not hit it. A ray keeps its nearest `maximum` hits. Rays are completed in order
+// as long as their hits fit; the first ray that would exceed `sampleCapacity` gets no hits, and neither do the rays
+// after it.
+struct TraceOctahedra {
+  const OctahedraGrid& grid;
+  Count rays;
+  uint32_t sampleCapacity = 0;
+  uint32_t maximum = 0xffffffffu;  // hits per ray
+  float near = 0;
+  Slice<const float> origins;        // [rays][3], in the scene
+  Slice<const float> directions;     // [rays][3]; zero: the ray has no hits
+  Slice<const float> farOfRay;       // optional, [rays]
+  Slice<const float> displacements;  // [cells][3]
+  Slice<const uint32_t> occupancy;   // bits, [grid.words()]
+  Slice<uint32_t> firstSample;       // [rays + 1]: hits of ray r are [firstSample[r], firstSample[r+1])
+  Slice<uint32_t> sampleCount;       // [1]: total number of hits
+  Slice<uint32_t> finishedRays;      // optional, [1]: number of rays that fit
+  Slice<uint32_t> rayOfSample;       // optional, [sampleCapacity]
+  Slice<uint32_t> faces;             // [sampleCapacity]
+  Slice<float> barycentrics;         // [sampleCapacity][2], of the second and third vertex, in grid coordinates
+  Slice<float> positions;            // [sampleCapacity][3], grid coordinates / N, in [0,1]
+  Slice<float> distances;            // [sampleCapacity], in multiples of the direction's length
+};
+TESSERA_OPERATION(TraceOctahedra);
+
+// The gradient of the hits of TraceOctahedra with respect to the displacements of the vertices. A face's plane moves a
+// hit along the ray only: with g(t) the ray in grid coordinates, n the face's normal and λ the barycentric coordinates,
+// ∂t/∂v_i = λ_i n / (n · g'(t)) and ∂g/∂v_i = g'(t) ∂t/∂v_i. Hits that appear or disappear at the border of a face have
+// no gradient. Steep planes would move hits arbitrarily far: |n · g'| is taken as at least minCosine |n| |g'|, which is
+// no longer the gradient of the loss. Adds to `displacementGradients`.
+struct OctahedraBackward {
+  const OctahedraGrid& grid;
+  Count samples;
+  float minCosine = 0.1f;
+  Slice<const float> origins;            // [rays][3]
+  Slice<const float> directions;         // [rays][3]
+  Slice<const float> displacements;      // [cells][3]
+  Slice<const uint32_t> rayOfSample;     // [capacity]
+  Slice<const uint32_t> faces;           // [capacity]
+  Slice<const float> barycentrics;       // [capacity][2]
+  Slice<const float> distances;          // [capacity]
+  Slice<const float> positionGradients;  // [capacity][3], with respect to TraceOctahedra::positions
+  Slice<const float> distanceGradients;  // optional, [capacity]
+  Slice<float> displacementGradients;    // [cells][3]
+};
+TESSERA_OPERATION(OctahedraBackward);
+
+}  // namespace tessera

@@ -1,0 +1,134 @@
+#include "compute/octahedra.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+
+namespace tessera {
+namespace {
+
+constexpr OctahedraPlacement kPlacements[] = {OctahedraPlacement::checkerboard, OctahedraPlacement::all};
+
+using Cell = std::array<int, 3>;
+
+Cell plus(const Cell& a, const Cell& b) {
+  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+
+// Calls visit(vertices) for every face of a grid that exists.
+template <class Visit>
+void forFaces(int n, OctahedraPlacement placement, const Visit& visit) {
+  for (int cell = 0; cell < n * n * n; ++cell) {
+    const Cell centre = {cell % n, cell / n % n, cell / (n * n)};
+    if (!carriesOctahedron(placement, static_cast<uint32_t>(centre[0]), static_cast<uint32_t>(centre[1]),
+                           static_cast<uint32_t>(centre[2])))
+      continue;
+    for (uint32_t local = 0; local < kFacesPerCell; ++local) {
+      std::array<Cell, 3> vertices;
+      bool exists = true;
+      for (int corner = 0; corner < 3; ++corner) {
+        vertices[corner] = plus(centre, octahedronFace(local)[corner]);
+        for (const int at : vertices[corner]) exists = exists && at >= 0 && at < n;
+      }
+      if (exists) visit(local, vertices);
+    }
+  }
+}
+
+TEST(Octahedra, HaveEightOuterFacesAndTwelveThatContainTheCentre) {
+  std::set<std::set<Cell>> faces;
+  for (uint32_t local = 0; local < kFacesPerCell; ++local) {
+    const auto corners = octahedronFace(local);
+    const std::set<Cell> face(corners.begin(), corners.end());
+    EXPECT_EQ(face.size(), 3u);
+    EXPECT_TRUE(faces.insert(face).second) << local;
+    EXPECT_EQ(face.contains({0, 0, 0}), local >= kOuterFaces) << local;
+    std::set<int> axes;
+    for (const Cell& corner : corners)
+      for (int axis = 0; axis < 3; ++axis)
+        if (corner[axis] != 0) axes.insert(axis);
+    EXPECT_EQ(axes.size(), local < kOuterFaces ? 3u : 2u) << local;
+  }
+}
+
+TEST(Octahedra, AreRegularPolyhedraWithoutDisplacement) {
+  std::set<Cell> vertices;
+  std::set<std::set<Cell>> edges;
+  for (uint32_t local = 0; local < kOuterFaces; ++local) {
+    const auto corners = octahedronFace(local);
+    for (int i = 0; i < 3; ++i) {
+      vertices.insert(corners[i]);
+      edges.insert({corners[i], corners[(i + 1) % 3]});
+      int square = 0;
+      for (int axis = 0; axis < 3; ++axis)
+        square += (corners[i][axis] - corners[(i + 1) % 3][axis]) * (corners[i][axis] - corners[(i + 1) % 3][axis]);
+      EXPECT_EQ(square, 2);  // an edge of √2 cells
+    }
+  }
+  EXPECT_EQ(vertices.size(), 6u);
+  EXPECT_EQ(edges.size(), 12u);
+  EXPECT_EQ(vertices.size() - edges.size() + kOuterFaces, 2u);  // Euler
+}
+
+TEST(Octahedra, FillTheGridWithTheFacesOfThePaper) {
+  std::map<OctahedraPlacement, size_t> counts;
+  for (const OctahedraPlacement placement : kPlacements)
+    forFaces(6, placement, [&](uint32_t, const auto&) { ++counts[placement]; });
+  EXPECT_EQ(counts[OctahedraPlacement::checkerboard], 1400u);
+  EXPECT_EQ(counts[OctahedraPlacement::all], 2800u);
+}
+
+TEST(Octahedra, PutEqualNumbersOfFacesIntoEverySquareAndCubeBetweenCells) {
+  for (const OctahedraPlacement placement : kPlacements) {
+    std::map<std::pair<Cell, Cell>, int> outer, inner;  // by the box of the cells of the vertices
+    std::set<std::set<Cell>> all;
+    forFaces(5, placement, [&](uint32_t local, const std::array<Cell, 3>& vertices) {
+      Cell low = vertices[0], high = vertices[0];
+      for (const Cell& vertex : vertices)
+        for (int axis = 0; axis < 3; ++axis) {
+          low[axis] = std::min(low[axis], vertex[axis]);
+          high[axis] = std::max(high[axis], vertex[axis]);
+        }
+      ++(local < kOuterFaces ? outer : inner)[{low, high}];
+      EXPECT_TRUE(all.insert(std::set<Cell>(vertices.begin(), vertices.end())).second) << "no face exists twice";
+    });
+    EXPECT_EQ(outer.size(), 4u * 4 * 4);
+    EXPECT_EQ(inner.size(), 3u * 4 * 4 * 5);
+    const int share = placement == OctahedraPlacement::all ? 2 : 1;
+    for (const auto& [box, count] : outer) EXPECT_EQ(count, 4 * share);
+    for (const auto& [box, count] : inner) EXPECT_EQ(count, 2 * share);
+  }
+}
+
+// With octahedra in every second cell, a cube between eight cells holds one tetrahedron in its middle and four in its
+// corners. The corners belong to octahedra (an eighth of each).
+TEST(Octahedra, FillSpaceTogetherWithTetrahedra) {
+  const double octahedron = 4.0 / 3, tetrahedron = 1.0 / 3;
+  EXPECT_NEAR(octahedron / 2 + tetrahedron, 1, 1e-12);  // per cell: half an octahedron, one tetrahedron
+  double volume = 0;                                    // of an octahedron, from its faces
+  for (uint32_t local = 0; local < kOuterFaces; ++local) {
+    const auto c = octahedronFace(local);
+    volume += std::abs(c[0][0] * (c[1][1] * c[2][2] - c[1][2] * c[2][1])) / 6.0;
+  }
+  EXPECT_NEAR(volume, octahedron, 1e-12);
+}
+
+TEST(Octahedra, ReachIntoACellWithFaces) {
+  for (const uint32_t parity : {0u, 1u}) {
+    EXPECT_EQ(reachingFaces(OctahedraPlacement::checkerboard, parity).size(), 56u);
+    EXPECT_EQ(reachingFaces(OctahedraPlacement::all, parity).size(), 112u);
+  }
+  for (const ReachingFace& face : reachingFaces(OctahedraPlacement::checkerboard, 1)) {
+    const auto& [x, y, z] = face.octahedron;
+    EXPECT_EQ((x + y + z + 1) % 2, 0);
+    for (const Cell& corner : octahedronFace(face.local))
+      for (const int at : plus(face.octahedron, corner)) EXPECT_LE(std::abs(at), 1) << "beyond the 27 cells";
+  }
+}
+
+}  // namespace
+}  // namespace tessera

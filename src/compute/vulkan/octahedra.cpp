@@ -1,0 +1,85 @@
+#include "compute/octahedra.h"
+
+#include <algorithm>
+
+#include "compute/vulkan/vulkan_device.h"
+#include "shaders/compute/arguments_octahedra.h"
+#include "shaders/octahedra_backward.h"
+#include "shaders/octahedra_backward_float_atomics.h"
+#include "shaders/trace_octahedra.h"
+#include "shaders/trace_octahedra_float64.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr uint32_t kOctahedraRowsPerGroup = 64;  // local_size_x of the kernels
+
+}  // namespace
+
+template <>
+void VulkanDevice::enqueue(const TraceOctahedra& options) {
+  const RayScratch scratch = rayScratch(options.rays.capacity);
+  arguments::TraceOctahedraArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.resolution = options.grid.resolution;
+  arguments.maximum = options.maximum;
+  arguments.near = options.near;
+  arguments.origins = deviceAddress(options.origins);
+  arguments.directions = deviceAddress(options.directions);
+  arguments.farOfRay = deviceAddress(options.farOfRay);
+  arguments.displacements = deviceAddress(options.displacements);
+  arguments.occupancy = deviceAddress(options.occupancy);
+  arguments.counts = scratch.counts;
+  arguments.fitting = scratch.fitting;
+  arguments.firstSample = deviceAddress(options.firstSample);
+  arguments.sampleCount = deviceAddress(options.sampleCount);
+  arguments.finishedRays = deviceAddress(options.finishedRays);
+  arguments.rayOfSample = deviceAddress(options.rayOfSample);
+  arguments.hitFaces = deviceAddress(options.faces);
+  arguments.barycentrics = deviceAddress(options.barycentrics);
+  arguments.positions = deviceAddress(options.positions);
+  arguments.distances = deviceAddress(options.distances);
+  std::copy(options.grid.gridFromScene.begin(), options.grid.gridFromScene.end(), arguments.gridFromScene);
+  uint32_t* to = arguments.faces;
+  for (const uint32_t parity : {0u, 1u}) {
+    const std::vector<ReachingFace> faces = reachingFaces(options.grid.placement, parity);
+    arguments.faceCount = static_cast<uint32_t>(faces.size());
+    CHECK(faces.size() <= arguments::kMaxReachingFaces);
+    for (const ReachingFace& face : faces) {
+      *to = face.local << 6;
+      for (int axis = 0; axis < 3; ++axis) *to |= static_cast<uint32_t>(face.octahedron[axis] + 1) << 2 * axis;
+      ++to;
+    }
+  }
+  const Groups all = {atLeastOneGroup(options.rays.capacity, kOctahedraRowsPerGroup)};
+  queue(realKernel(kTraceOctahedraFloat64Spirv, kTraceOctahedraSpirv, {false}), arguments, all);
+  queueRunningSums(
+      {options.rays, scratch.counts, arguments.sampleCount, scratch.fitting, options.sampleCapacity, scratch.partials});
+  queue(realKernel(kTraceOctahedraFloat64Spirv, kTraceOctahedraSpirv, {true}), arguments, all);
+  countersChanged(options.sampleCount);
+  countersChanged(options.finishedRays);
+}
+
+template <>
+void VulkanDevice::enqueue(const OctahedraBackward& options) {
+  arguments::OctahedraBackwardArguments arguments = {};
+  arguments.samples = countArguments(options.samples);
+  arguments.resolution = options.grid.resolution;
+  arguments.minCosine = options.minCosine;
+  arguments.origins = deviceAddress(options.origins);
+  arguments.directions = deviceAddress(options.directions);
+  arguments.displacements = deviceAddress(options.displacements);
+  arguments.rayOfSample = deviceAddress(options.rayOfSample);
+  arguments.faces = deviceAddress(options.faces);
+  arguments.barycentrics = deviceAddress(options.barycentrics);
+  arguments.distances = deviceAddress(options.distances);
+  arguments.positionGradients = deviceAddress(options.positionGradients);
+  arguments.distanceGradients = deviceAddress(options.distanceGradients);
+  arguments.displacementGradients = deviceAddress(options.displacementGradients);
+  std::copy(options.grid.gridFromScene.begin(), options.grid.gridFromScene.end(), arguments.gridFromScene);
+  queue(sumKernel(kOctahedraBackwardFloatAtomicsSpirv, kOctahedraBackwardSpirv), arguments,
+        countGroups(options.samples, kOctahedraRowsPerGroup));
+}
+
+}  // namespace tessera
