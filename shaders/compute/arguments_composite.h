@@ -6,8 +6,10 @@ TESSERA_BEGIN_ARGUMENTS
 
 struct CompositeForwardArguments {
   CountArguments rays;
-  uint extinction;  // 0 opacity, 1 density, 2 logarithm of density
+  uint extinction;  // 0 opacity, 1 density, 2 logarithm of density, 3 logit
   float minTransmittance;
+  float offset;
+  uint unused;
   UintPointer firstSample;
   MatrixArguments x;
   FloatPointer steps;
@@ -19,7 +21,7 @@ struct CompositeForwardArguments {
   FloatPointer depth;  // optional
   FloatPointer weights;
 };
-TESSERA_SIZE(CompositeForwardArguments, 144);
+TESSERA_SIZE(CompositeForwardArguments, 152);
 
 struct CompositeBackwardArguments {
   CountArguments rays;
@@ -27,6 +29,8 @@ struct CompositeBackwardArguments {
   float minTransmittance;
   float fullGradientDistance;
   uint addToXGradients;
+  float offset;
+  uint unused;
   UintPointer firstSample;
   MatrixArguments x;
   FloatPointer steps;
@@ -41,7 +45,25 @@ struct CompositeBackwardArguments {
   FloatPointer xGradients;
   MatrixArguments colourGradients;    // optional
 };
-TESSERA_SIZE(CompositeBackwardArguments, 192);
+TESSERA_SIZE(CompositeBackwardArguments, 200);
+
+// OpaqueForward and OpaqueBackward.
+struct OpaqueArguments {
+  CountArguments rays;
+  float threshold;
+  float maxOpacity;
+  float minOpacity;
+  float offset;
+  UintPointer firstSample;
+  MatrixArguments x;
+  MatrixArguments colours;
+  FloatPointer colour;
+  FloatPointer opacity;             // forward
+  FloatPointer rayColourGradients;  // backward
+  FloatPointer xGradients;          // backward
+  MatrixArguments colourGradients;  // backward
+};
+TESSERA_SIZE(OpaqueArguments, 152);
 
 TESSERA_END_ARGUMENTS
 #endif

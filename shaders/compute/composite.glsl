@@ -1,8 +1,10 @@
 // Opacities for compositing and its gradients.
-// Defines: computeOpacity(), kMaxColumns, kOpacity, kDensity, kLogDensity.
+// Defines: computeOpacity(), usesSteps(), kMaxColumns, kOpacity, kDensity, kLogDensity, kLogit.
 
 const uint kMaxColumns = 16;
-const uint kOpacity = 0, kDensity = 1, kLogDensity = 2;
+const uint kOpacity = 0, kDensity = 1, kLogDensity = 2, kLogit = 3;
+
+bool usesSteps(uint extinction) { return extinction == kDensity || extinction == kLogDensity; }
 
 // Returns 1 - exp(-x), without loss of precision for small x.
 float oneMinusExp(float x) {
@@ -12,5 +14,6 @@ float oneMinusExp(float x) {
 
 float computeOpacity(uint extinction, float x, float length) {
   if (extinction == kOpacity) return x;
+  if (extinction == kLogit) return 1 / (1 + exp(-x));
   return oneMinusExp((extinction == kDensity ? x : exp(x)) * length);
 }

@@ -16,8 +16,8 @@ uint throughRay(CompositeBackwardArguments a, uint first, uint end) {
   float transmittance = 1;
   uint i = first;
   for (; i < end && transmittance >= a.minTransmittance; ++i) {
-    const float length = a.extinction == kOpacity ? 0 : a.steps.values[i];
-    const float alpha = computeOpacity(a.extinction, a.x.data.values[elementIndex(a.x, i, 0)], length);
+    const float length = usesSteps(a.extinction) ? a.steps.values[i] : 0;
+    const float alpha = computeOpacity(a.extinction, a.x.data.values[elementIndex(a.x, i, 0)] + a.offset, length);
     a.opacities.values[2 * i] = alpha;
     a.opacities.values[2 * i + 1] = transmittance;
     transmittance *= 1 - alpha;
@@ -27,8 +27,9 @@ uint throughRay(CompositeBackwardArguments a, uint first, uint end) {
 
 float slopeOfOpacity(CompositeBackwardArguments a, uint i, float alpha) {
   if (a.extinction == kOpacity) return 1;
+  if (a.extinction == kLogit) return alpha * (1 - alpha);
   const float slope = (1 - alpha) * a.steps.values[i];
-  return a.extinction == kDensity ? slope : slope * exp(clamp(a.x.data.values[elementIndex(a.x, i, 0)], -15, 15));
+  return a.extinction == kDensity ? slope : slope * exp(clamp(a.x.data.values[elementIndex(a.x, i, 0)] + a.offset, -15, 15));
 }
 
 void backward(CompositeBackwardArguments a, uint ray) {

@@ -19,8 +19,8 @@ void main() {
     for (uint i = a.firstSample.values[ray]; i < end; ++i) {
       float weight = 0;  // after early termination
       if (transmittance >= a.minTransmittance) {
-        const float length = a.extinction == kOpacity ? 0 : a.steps.values[i];
-        const float alpha = computeOpacity(a.extinction, a.x.data.values[elementIndex(a.x, i, 0)], length);
+        const float length = usesSteps(a.extinction) ? a.steps.values[i] : 0;
+        const float alpha = computeOpacity(a.extinction, a.x.data.values[elementIndex(a.x, i, 0)] + a.offset, length);
         weight = transmittance * alpha;
         [[unroll]] for (uint c = 0; c < kColumns; ++c) {
           sum[c] += weight * a.colours.data.values[elementIndex(a.colours, i, c)];

@@ -11,7 +11,13 @@ namespace tessera {
 //   opacity      α = x
 //   density      α = 1 - exp(-x · step)
 //   logDensity   α = 1 - exp(-exp(x) · step); the gradient of exp clamps x to [-15, 15]
-enum class Extinction { opacity, density, logDensity };
+//   logit        α = 1 / (1 + exp(-x))
+enum class Extinction { opacity, density, logDensity, logit };
+
+// Whether α depends on the step.
+constexpr bool usesSteps(Extinction extinction) {
+  return extinction == Extinction::density || extinction == Extinction::logDensity;
+}
 
 // colour = Σ w c + T · background, depth = Σ w t, opacity = 1 - T. A ray stops after the sample that takes T below
 // `minTransmittance`: later samples get weight zero, and T keeps its value at that sample. Colours have
@@ -20,10 +26,11 @@ enum class Extinction { opacity, density, logDensity };
 struct CompositeForward {
   Extinction extinction = Extinction::logDensity;
   float minTransmittance = 1e-4f;
+  float offset = 0;  // added to x
   Count rays;
   Slice<const uint32_t> firstSample;  // [rays + 1]
-  Matrix<const float> x;              // 1 column: opacity, density or log density
-  Slice<const float> steps;           // [samples]; not read with Extinction::opacity
+  Matrix<const float> x;              // 1 column: opacity, density, log density or logit
+  Slice<const float> steps;           // [samples]; read if usesSteps(extinction)
   Slice<const float> distances;       // [samples]; read only if depth is written
   Matrix<const float> colours;        // optional, [samples], 1 to 16 columns
   Slice<const float> background;      // optional, [rays][columns]; black if absent
@@ -41,6 +48,7 @@ TESSERA_OPERATION(CompositeForward);
 struct CompositeBackward {
   Extinction extinction = Extinction::logDensity;
   float minTransmittance = 1e-4f;
+  float offset = 0;
   float fullGradientDistance = 0;
   Count rays;
   Slice<const uint32_t> firstSample;
@@ -58,5 +66,36 @@ struct CompositeBackward {
   Matrix<float> colourGradients;           // [samples], as many columns as colours; required with colours
 };
 TESSERA_OPERATION(CompositeBackward);
+
+// Compositing of the second loss of UE4-NeRF (Xu et al. 2023, equations 4 to 6), which prepares surfaces for
+// rasterisers: only samples with α > threshold count, a ray ends after the sample that takes its opacity A = Σ w above
+// `maxOpacity`, and its colour is normalised, Σ w c / A. A ray with A < minOpacity has colour and opacity zero, and no
+// gradients. α is 1 / (1 + exp(-x - offset)).
+struct OpaqueForward {
+  float threshold = 0, maxOpacity = 0.8f, minOpacity = 1e-3f;
+  float offset = 0;
+  Count rays;
+  Slice<const uint32_t> firstSample;  // [rays + 1]
+  Matrix<const float> x;              // 1 column: logits
+  Matrix<const float> colours;        // [samples], 3 columns
+  Slice<float> colour;                // [rays][3]
+  Slice<float> opacity;               // [rays]: A
+};
+TESSERA_OPERATION(OpaqueForward);
+
+// Adds to xGradients and colourGradients. There is no gradient through the threshold and the choice of the last sample.
+struct OpaqueBackward {
+  float threshold = 0, maxOpacity = 0.8f, minOpacity = 1e-3f;
+  float offset = 0;
+  Count rays;
+  Slice<const uint32_t> firstSample;
+  Matrix<const float> x;
+  Matrix<const float> colours;
+  Slice<const float> colour;              // from OpaqueForward
+  Slice<const float> rayColourGradients;  // [rays][3]
+  Slice<float> xGradients;                // [samples]
+  Matrix<float> colourGradients;          // [samples], 3 columns
+};
+TESSERA_OPERATION(OpaqueBackward);
 
 }  // namespace tessera

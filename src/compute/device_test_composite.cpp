@@ -9,10 +9,11 @@
 namespace tessera::device_test {
 namespace {
 
-constexpr Extinction kExtinctions[] = {Extinction::opacity, Extinction::density, Extinction::logDensity};
+constexpr Extinction kExtinctions[] = {Extinction::opacity, Extinction::density, Extinction::logDensity,
+                                       Extinction::logit};
 // No column, every number of columns with a specialised kernel, some without one, and the maximum.
 constexpr uint32_t kColumns[] = {0, 1, 3, 5, 7, 8, 16};
-constexpr const char* kExtinctionNames[] = {"opacity", "density", "log density"};
+constexpr const char* kExtinctionNames[] = {"opacity", "density", "log density", "logit"};
 
 // Rays that stay transparent, that end in the middle, and that contain fully opaque samples.
 std::vector<float> randomExtinctions(Random& random, Extinction extinction, const std::vector<uint32_t>& first) {
@@ -30,6 +31,9 @@ std::vector<float> randomExtinctions(Random& random, Extinction extinction, cons
           break;
         case Extinction::logDensity:
           x.push_back(opaque ? 14.0f : random.uniform(-3, 2 + 2 * thick));
+          break;
+        case Extinction::logit:
+          x.push_back(opaque ? 30.0f : random.uniform(-3, 4 * thick));
           break;
       }
     }
@@ -59,10 +63,11 @@ void setInputs(Stage& stage, const Scene& scene, Extinction extinction, const Si
                bool withBackground, Arguments& a) {
   a.extinction = extinction;
   a.minTransmittance = size.capacity % 2 ? 1e-4f : 0.01f;
+  if (extinction == Extinction::logit) a.offset = -1.5f;
   a.rays = stage.count(size);
   a.firstSample = stage.input(scene.first);
   a.x = stage.makeMatrix(scene.x, 1, layout);
-  if (extinction != Extinction::opacity) a.steps = stage.input(scene.steps);
+  if (usesSteps(extinction)) a.steps = stage.input(scene.steps);
   a.distances = stage.input(scene.distances);
   if (scene.columns > 0) a.colours = stage.makeMatrix(scene.colours, scene.columns, layout);
   if (withBackground && scene.columns > 0) a.background = stage.input(scene.background);
@@ -190,11 +195,13 @@ OperationTests makeTests<CompositeBackward>() {
              stage.device.run(a);
 
              const Doubles steps = toDoubles(scene.steps), distances = toDoubles(scene.distances);
-             const auto loss = [&](View x, View colours) {
+             const auto loss = [&](View given, View colours) {
+               Doubles x(given.begin(), given.end());
+               for (double& value : x) value += a.offset;
                double sum = 0;
                for (size_t r = 0; r < rays; ++r) {
                  const size_t first = scene.first[r], count = scene.first[r + 1] - first;
-                 reference::RaySamples ray{x.subspan(first, count), View(steps).subspan(first, count),
+                 reference::RaySamples ray{View(x).subspan(first, count), View(steps).subspan(first, count),
                                            View(distances).subspan(first, count),
                                            colours.subspan(columns * first, columns * count)};
                  ray.columns = columns;
@@ -219,6 +226,133 @@ OperationTests makeTests<CompositeBackward>() {
              return pairs;
            }});
     }
+  return tests;
+}
+
+namespace {
+
+// Rays of OpaqueForward. No α is within a hundredth of the threshold, and no opacity of `maxOpacity`, so that rounding
+// changes no decision.
+struct OpaqueRays {
+  static constexpr float kThreshold = 0.3f, kMaxOpacity = 0.8f, kOffset = -1;
+  std::vector<uint32_t> first;
+  std::vector<float> x, colours;
+
+  OpaqueRays(Random& random, size_t rays) : first(1) {
+    for (size_t ray = 0; ray < rays; ++ray) {
+      const uint32_t count = random.below(30);
+      const float thick = ray % 3 == 0 ? 2.0f : 0.2f;
+      double transmittance = 1;
+      for (uint32_t i = 0; i < count;) {
+        const float logit = random.below(9) == 0 ? 20.0f : random.uniform(-4, thick) - kOffset;
+        const double alpha = reference::computeOpacity(Extinction::logit, double{logit} + kOffset, 0);
+        const double after = transmittance * (alpha > kThreshold ? 1 - alpha : 1);
+        if (std::abs(alpha - kThreshold) < 0.01 || std::abs(1 - after - kMaxOpacity) < 0.01) continue;
+        x.push_back(logit);
+        transmittance = after;
+        ++i;
+      }
+      first.push_back(static_cast<uint32_t>(x.size()));
+    }
+    colours = random.floats(3 * x.size(), 0, 1);
+  }
+  template <class Arguments>
+  void setInputs(Stage& stage, const Size& size, Layout layout, Arguments& a) const {
+    a.threshold = kThreshold;
+    a.maxOpacity = kMaxOpacity;
+    a.offset = kOffset;
+    a.rays = stage.count(size);
+    a.firstSample = stage.input(first);
+    a.x = stage.makeMatrix(x, 1, layout);
+    a.colours = stage.makeMatrix(colours, 3, layout);
+  }
+};
+
+}  // namespace
+
+template <>
+OperationTests makeTests<OpaqueForward>() {
+  OperationTests tests;
+  tests.noGradient = "its gradient is OpaqueBackward";
+  for (const Size& size : kSizes)
+    for (const Layout layout : {Layout::plain, Layout::strided})
+      tests.cases.push_back(
+          {fmt::format("rays {}{}", toString(size), layout == Layout::plain ? "" : ", strided"), [=](Stage& stage) {
+             const OpaqueRays rays(stage.random, size.capacity);
+             OpaqueForward a;
+             rays.setInputs(stage, size, layout, a);
+             a.colour = stage.output("colour", 3 * size.capacity);
+             a.opacity = stage.output("opacity", size.capacity);
+             stage.device.run(a);
+           }});
+  return tests;
+}
+
+template <>
+OperationTests makeTests<OpaqueBackward>() {
+  OperationTests tests;
+  const auto setColours = [](Stage& stage, const OpaqueRays& rays, OpaqueBackward& a) {
+    std::vector<float> colours;
+    for (size_t ray = 0; ray + 1 < rays.first.size(); ++ray) {
+      Doubles alphas;
+      for (uint32_t i = rays.first[ray]; i < rays.first[ray + 1]; ++i)
+        alphas.push_back(reference::computeOpacity(Extinction::logit, double{rays.x[i]} + a.offset, 0));
+      const Doubles all = toDoubles(rays.colours);
+      const auto colour =
+          reference::compositeOpaque(alphas, View(all).subspan(3 * size_t{rays.first[ray]}, 3 * alphas.size()),
+                                     a.threshold, a.maxOpacity, a.minOpacity)
+              .colour;
+      for (const double c : colour) colours.push_back(static_cast<float>(c));
+    }
+    a.colour = stage.input(colours);
+  };
+  for (const Size& size : kSmallSizes)
+    for (const Layout layout : {Layout::plain, Layout::strided})
+      tests.cases.push_back(
+          {fmt::format("rays {}{}", toString(size), layout == Layout::plain ? "" : ", strided"), [=](Stage& stage) {
+             const OpaqueRays rays(stage.random, size.capacity);
+             OpaqueBackward a;
+             rays.setInputs(stage, size, layout, a);
+             setColours(stage, rays, a);
+             a.rayColourGradients = stage.randomInput(3 * size.capacity, -1, 1);
+             a.xGradients = stage.output("xGradients", stage.random.floats(rays.x.size(), -1, 1));
+             const std::vector<float> initial = stage.random.floats(3 * rays.x.size(), -1, 1);
+             a.colourGradients = Matrix<float>(stage.output("colourGradients", initial), 3);
+             stage.device.run(a);
+           }});
+  tests.gradients.push_back(
+      {"logits and colours", [=](Stage& stage) {
+         const Size size{20};
+         const OpaqueRays rays(stage.random, size.capacity);
+         const std::vector<float> g = stage.random.floats(3 * size.capacity, -1, 1);
+         OpaqueBackward a;
+         rays.setInputs(stage, size, Layout::plain, a);
+         setColours(stage, rays, a);
+         a.rayColourGradients = stage.input(g);
+         a.xGradients = stage.output("xGradients", std::vector<float>(rays.x.size()));
+         a.colourGradients = Matrix<float>(stage.output("colourGradients", std::vector<float>(3 * rays.x.size())), 3);
+         stage.device.run(a);
+         const auto loss = [&](View x, View colours) {
+           double sum = 0;
+           for (size_t ray = 0; ray < size.capacity; ++ray) {
+             const size_t first = rays.first[ray], count = rays.first[ray + 1] - first;
+             Doubles alphas;
+             for (const double logit : x.subspan(first, count))
+               alphas.push_back(reference::computeOpacity(Extinction::logit, logit + a.offset, 0));
+             const auto colour = reference::compositeOpaque(alphas, colours.subspan(3 * first, 3 * count), a.threshold,
+                                                            a.maxOpacity, a.minOpacity)
+                                     .colour;
+             for (int c = 0; c < 3; ++c) sum += g[3 * ray + c] * colour[c];
+           }
+           return sum;
+         };
+         const Doubles x = toDoubles(rays.x), c = toDoubles(rays.colours);
+         return std::vector<GradientPair>{
+             {"logits", stage.device.read(a.xGradients),
+              centralDifferences([&](View moved) { return loss(moved, c); }, x, 1e-5, firstIndices(x.size()))},
+             {"colours", stage.device.read(a.colourGradients.data),
+              centralDifferences([&](View moved) { return loss(x, moved); }, c, 1e-4, firstIndices(c.size()))}};
+       }});
   return tests;
 }
 

@@ -61,6 +61,8 @@ namespace tessera {
   X(InterlevelLoss)             \
   X(CompositeForward)           \
   X(CompositeBackward)          \
+  X(OpaqueForward)              \
+  X(OpaqueBackward)             \
   X(DeferredForward)            \
   X(DeferredBackward)           \
   X(BlendForward)               \

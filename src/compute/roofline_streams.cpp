@@ -108,6 +108,29 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
   recorder.measureStream(kOperation<CompositeBackward>, shape, n * (24 + 16) + rays * 28,
                          [&] { device.run(backward); });
 
+  OpaqueForward opaque;
+  opaque.offset = -4;  // no ray ends before its last sample
+  opaque.rays = forward.rays;
+  opaque.firstSample = lines.firstSample;
+  opaque.x = forward.x;
+  opaque.colours = forward.colours;
+  opaque.colour = colour;
+  opaque.opacity = opacity;
+  recorder.measureStream(kOperation<OpaqueForward>, shape, n * 16 + rays * 20, [&] { device.run(opaque); });
+
+  OpaqueBackward opaqueBack;
+  opaqueBack.offset = opaque.offset;
+  opaqueBack.rays = forward.rays;
+  opaqueBack.firstSample = lines.firstSample;
+  opaqueBack.x = forward.x;
+  opaqueBack.colours = forward.colours;
+  opaqueBack.colour = colour;
+  opaqueBack.rayColourGradients = lines.perRay;
+  opaqueBack.xGradients = dx;
+  opaqueBack.colourGradients = Matrix<float>(dColours, 3);
+  recorder.measureStream(kOperation<OpaqueBackward>, shape, n * (16 + 2 * 16) + rays * 28,
+                         [&] { device.run(opaqueBack); });
+
   DistortionLoss distortion;
   distortion.rays = forward.rays;
   distortion.firstSample = lines.firstSample;

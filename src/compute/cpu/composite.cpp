@@ -21,6 +21,8 @@ float computeOpacity(Extinction extinction, float x, float step) {
       return -std::expm1(-x * step);
     case Extinction::logDensity:
       return -std::expm1(-std::exp(x) * step);
+    case Extinction::logit:
+      return 1 / (1 + std::exp(-x));
   }
   return 0;
 }
@@ -67,7 +69,7 @@ void forward(Context& context, const CompositeForward& a) {
       const uint32_t last = firstSample[ray + 1];
       uint32_t i = firstSample[ray];
       for (; i < last; ++i) {
-        const float alpha = computeOpacity(a.extinction, x[a.x.offset(i, 0)], steps ? steps[i] : 0);
+        const float alpha = computeOpacity(a.extinction, x[a.x.offset(i, 0)] + a.offset, steps ? steps[i] : 0);
         const float weight = transmittance * alpha;
         if constexpr (kColumns != 0) {
           const float* c = colours + a.colours.offset(i, 0);
@@ -129,7 +131,7 @@ void backward(Context& context, const CompositeBackward& a) {
       uint32_t stop = first;
       float transmittance = 1;
       while (stop < last) {
-        const float alpha = computeOpacity(a.extinction, x[a.x.offset(stop, 0)], steps ? steps[stop] : 0);
+        const float alpha = computeOpacity(a.extinction, x[a.x.offset(stop, 0)] + a.offset, steps ? steps[stop] : 0);
         alphas[stop - first] = alpha;
         before(stop) = transmittance;
         transmittance *= 1 - alpha;
@@ -160,7 +162,9 @@ void backward(Context& context, const CompositeBackward& a) {
         if (a.extinction == Extinction::density) {
           slope = slope * (1 - alpha) * steps[i];
         } else if (a.extinction == Extinction::logDensity) {
-          slope = slope * (1 - alpha) * steps[i] * std::exp(std::clamp(x[a.x.offset(i, 0)], -15.0f, 15.0f));
+          slope = slope * (1 - alpha) * steps[i] * std::exp(std::clamp(x[a.x.offset(i, 0)] + a.offset, -15.0f, 15.0f));
+        } else if (a.extinction == Extinction::logit) {
+          slope = slope * alpha * (1 - alpha);
         }
         if (fullDistance > 0 && distances[i] < fullDistance) {
           const float nearness = distances[i] / fullDistance, scale = nearness * nearness;
@@ -180,7 +184,75 @@ void backward(Context& context, const CompositeBackward& a) {
   });
 }
 
+// Calls visit(sample, α, transmittance in front of it) for the samples of a ray that count, front to back. Returns the
+// opacity of the ray.
+template <class Arguments, class Visit>
+float forOpaqueSamples(const Arguments& a, const float* x, size_t ray, const Visit& visit) {
+  const uint32_t* firstSample = hostPointer(a.firstSample);
+  float transmittance = 1;
+  for (uint32_t i = firstSample[ray]; i < firstSample[ray + 1] && 1 - transmittance <= a.maxOpacity; ++i) {
+    const float alpha = computeOpacity(Extinction::logit, x[a.x.offset(i, 0)] + a.offset, 0);
+    if (!(alpha > a.threshold)) continue;
+    visit(i, alpha, transmittance);
+    transmittance *= 1 - alpha;
+  }
+  return 1 - transmittance;
+}
+
 }  // namespace
+
+void run(Context& context, const OpaqueForward& a) {
+  const float* x = hostPointer(a.x.data);
+  const float* colours = hostPointer(a.colours.data);
+  float* colour = hostPointer(a.colour);
+  float* opacity = hostPointer(a.opacity);
+  context.pool.forRanges(hostCount(a.rays), kRaysPerTask, [&](size_t begin, size_t end) {
+    for (size_t ray = begin; ray < end; ++ray) {
+      float sum[3] = {};
+      const float opacityOfRay = forOpaqueSamples(a, x, ray, [&](uint32_t i, float alpha, float transmittance) {
+        for (int c = 0; c < 3; ++c) sum[c] += transmittance * alpha * colours[a.colours.offset(i, c)];
+      });
+      const bool counts = opacityOfRay >= a.minOpacity;
+      opacity[ray] = counts ? opacityOfRay : 0;
+      for (int c = 0; c < 3; ++c) colour[3 * ray + c] = counts ? sum[c] / opacityOfRay : 0;
+    }
+  });
+}
+
+void run(Context& context, const OpaqueBackward& a) {
+  const float* x = hostPointer(a.x.data);
+  const float* colours = hostPointer(a.colours.data);
+  const float* colourOfRay = hostPointer(a.colour);
+  const float* gradientOfRay = hostPointer(a.rayColourGradients);
+  float* xGradients = hostPointer(a.xGradients);
+  float* colourGradients = hostPointer(a.colourGradients.data);
+  struct Sample {
+    uint32_t index;
+    float alpha, transmittance;
+  };
+  context.pool.forRanges(hostCount(a.rays), kRaysPerTask, [&](size_t begin, size_t end) {
+    std::vector<Sample> samples;
+    for (size_t ray = begin; ray < end; ++ray) {
+      samples.clear();
+      const float opacity = forOpaqueSamples(a, x, ray, [&](uint32_t i, float alpha, float transmittance) {
+        samples.push_back({i, alpha, transmittance});
+      });
+      if (!(opacity >= a.minOpacity)) continue;
+      float rear = 0;
+      for (size_t k = samples.size(); k-- > 0;) {
+        const auto [i, alpha, transmittance] = samples[k];
+        float excess = 0;
+        for (int c = 0; c < 3; ++c) {
+          const float g = gradientOfRay[3 * ray + c] / opacity;
+          excess += g * (colours[a.colours.offset(i, c)] - colourOfRay[3 * ray + c]);
+          colourGradients[a.colourGradients.offset(i, c)] += transmittance * alpha * g;
+        }
+        xGradients[i] += transmittance * (excess - rear) * alpha * (1 - alpha);
+        rear = alpha * excess + (1 - alpha) * rear;
+      }
+    }
+  });
+}
 
 void run(Context& context, const CompositeForward& a) {
   withColumns(a.colours.columns, [&](auto columns) { forward<decltype(columns)::value>(context, a); });

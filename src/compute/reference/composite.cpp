@@ -16,6 +16,8 @@ double computeOpacity(Extinction extinction, double x, double step) {
       return -std::expm1(-x * step);
     case Extinction::logDensity:
       return -std::expm1(-std::exp(x) * step);
+    case Extinction::logit:
+      return 1 / (1 + std::exp(-x));
   }
   return 0;
 }
@@ -63,6 +65,7 @@ RayGradients compositeRayBackward(Extinction extinction, double minTransmittance
     }
     double slope = 1;  // ∂α/∂x
     if (extinction == Extinction::density) slope = (1 - alphas[i]) * samples.steps[i];
+    if (extinction == Extinction::logit) slope = alphas[i] * (1 - alphas[i]);
     if (extinction == Extinction::logDensity)
       slope = (1 - alphas[i]) * samples.steps[i] * std::exp(std::clamp(samples.x[i], -15.0, 15.0));
     gradients.x[i] = before[i] * (worth - rear) * slope;
@@ -85,7 +88,8 @@ struct AllSamples {
     firstSample = indices(a.firstSample, rays + 1);
     const size_t samples = firstSample[rays];
     x = doubles(a.x, samples);
-    if (a.extinction != Extinction::opacity) steps = doubles(a.steps, samples);
+    for (double& value : x) value += a.offset;
+    if (usesSteps(a.extinction)) steps = doubles(a.steps, samples);
     distances = doubles(a.distances, samples);
     columns = a.colours.columns;
     CHECK(columns <= 16u);
@@ -108,7 +112,114 @@ struct AllSamples {
   }
 };
 
+// One ray of OpaqueForward: which samples count, and with which weights.
+struct OpaqueRay {
+  std::vector<size_t> samples;
+  Doubles alphas, before;  // of those samples; transmittance in front of each
+  double opacity = 0;
+};
+
+OpaqueRay opaqueRay(View alphas, double threshold, double maxOpacity, double minOpacity) {
+  OpaqueRay ray;
+  double transmittance = 1;
+  for (size_t i = 0; i < alphas.size() && 1 - transmittance <= maxOpacity; ++i) {
+    if (!(alphas[i] > threshold)) continue;
+    ray.samples.push_back(i);
+    ray.alphas.push_back(alphas[i]);
+    ray.before.push_back(transmittance);
+    transmittance *= 1 - alphas[i];
+  }
+  if (1 - transmittance >= minOpacity) {
+    ray.opacity = 1 - transmittance;
+  } else {
+    ray.samples.clear();
+  }
+  return ray;
+}
+
+// The samples of all rays of OpaqueForward and OpaqueBackward.
+struct OpaqueSamples {
+  Indices firstSample;
+  Doubles alphas, colours;
+
+  template <class Arguments>
+  explicit OpaqueSamples(const Arguments& a) : firstSample(indices(a.firstSample, hostCount(a.rays) + size_t{1})) {
+    const size_t samples = firstSample.back();
+    for (const double x : doubles(a.x, samples)) alphas.push_back(computeOpacity(Extinction::logit, x + a.offset, 0));
+    CHECK(a.colours.columns == 3u);
+    colours = doubles(a.colours, samples);
+  }
+  View alphasOf(size_t ray) const {
+    return View(alphas).subspan(firstSample[ray], firstSample[ray + 1] - firstSample[ray]);
+  }
+  View coloursOf(size_t ray) const {
+    return View(colours).subspan(3 * size_t{firstSample[ray]}, 3 * size_t{firstSample[ray + 1] - firstSample[ray]});
+  }
+};
+
 }  // namespace
+
+OpaqueColour compositeOpaque(View alphas, View colours, double threshold, double maxOpacity, double minOpacity) {
+  const OpaqueRay ray = opaqueRay(alphas, threshold, maxOpacity, minOpacity);
+  OpaqueColour result;
+  result.opacity = ray.opacity;
+  for (size_t k = 0; k < ray.samples.size(); ++k)
+    for (int c = 0; c < 3; ++c)
+      result.colour[c] += ray.before[k] * ray.alphas[k] / ray.opacity * colours[3 * ray.samples[k] + c];
+  return result;
+}
+
+OpaqueGradients compositeOpaqueBackward(View alphas, View colours, double threshold, double maxOpacity,
+                                        double minOpacity, const Point& gradient) {
+  const OpaqueRay ray = opaqueRay(alphas, threshold, maxOpacity, minOpacity);
+  const OpaqueColour result = compositeOpaque(alphas, colours, threshold, maxOpacity, minOpacity);
+  OpaqueGradients gradients{Doubles(alphas.size()), Doubles(colours.size())};
+  double rear = 0;
+  for (size_t k = ray.samples.size(); k-- > 0;) {
+    const size_t i = ray.samples[k];
+    double excess = 0;
+    for (int c = 0; c < 3; ++c) {
+      excess += gradient[c] * (colours[3 * i + c] - result.colour[c]) / ray.opacity;
+      gradients.colours[3 * i + c] = ray.before[k] * ray.alphas[k] / ray.opacity * gradient[c];
+    }
+    gradients.alphas[i] = ray.before[k] * (excess - rear);
+    rear = ray.alphas[k] * excess + (1 - ray.alphas[k]) * rear;
+  }
+  return gradients;
+}
+
+void run(const OpaqueForward& a) {
+  const OpaqueSamples all(a);
+  Doubles colours, opacities;
+  for (size_t ray = 0; ray < hostCount(a.rays); ++ray) {
+    const OpaqueColour one =
+        compositeOpaque(all.alphasOf(ray), all.coloursOf(ray), a.threshold, a.maxOpacity, a.minOpacity);
+    colours.insert(colours.end(), one.colour.begin(), one.colour.end());
+    opacities.push_back(one.opacity);
+  }
+  store(a.colour, colours);
+  store(a.opacity, opacities);
+}
+
+void run(const OpaqueBackward& a) {
+  const OpaqueSamples all(a);
+  const size_t rays = hostCount(a.rays);
+  const Doubles rayGradients = doubles(a.rayColourGradients, 3 * rays);
+  Doubles x, colours;
+  for (size_t ray = 0; ray < rays; ++ray) {
+    const View alphas = all.alphasOf(ray);
+    const OpaqueGradients one =
+        compositeOpaqueBackward(alphas, all.coloursOf(ray), a.threshold, a.maxOpacity, a.minOpacity,
+                                {rayGradients[3 * ray], rayGradients[3 * ray + 1], rayGradients[3 * ray + 2]});
+    for (size_t i = 0; i < alphas.size(); ++i) x.push_back(one.alphas[i] * alphas[i] * (1 - alphas[i]));
+    colours.insert(colours.end(), one.colours.begin(), one.colours.end());
+  }
+  add(a.xGradients, x);
+  for (size_t i = 0; i < colours.size(); ++i) {
+    float& element = hostPointer(a.colourGradients.data)[a.colourGradients.offset(i / 3, i % 3)];
+    element = static_cast<float>(element + colours[i]);
+  }
+}
 
 void run(const CompositeForward& a) {
   const size_t rays = hostCount(a.rays);

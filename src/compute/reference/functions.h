@@ -180,6 +180,18 @@ RayGradients compositeRayBackward(Extinction extinction, double minTransmittance
                                   const Doubles& colourGradient, double opacityGradient, double depthGradient,
                                   View weightGradients);
 
+// One ray of OpaqueForward; colours are [n][3].
+struct OpaqueColour {
+  Point colour{};
+  double opacity = 0;
+};
+OpaqueColour compositeOpaque(View alphas, View colours, double threshold, double maxOpacity, double minOpacity);
+struct OpaqueGradients {
+  Doubles alphas, colours;
+};
+OpaqueGradients compositeOpaqueBackward(View alphas, View colours, double threshold, double maxOpacity,
+                                        double minOpacity, const Point& gradient);
+
 // virtual_grid.cpp
 struct VirtualCorner {
   uint32_t texel = 0;

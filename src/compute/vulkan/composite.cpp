@@ -4,6 +4,8 @@
 #include "shaders/composite_backward.h"
 #include "shaders/composite_forward.h"
 #include "shaders/compute/arguments_composite.h"
+#include "shaders/opaque_backward.h"
+#include "shaders/opaque_forward.h"
 
 namespace tessera {
 
@@ -11,6 +13,21 @@ namespace {
 
 constexpr uint32_t kCompositeRaysPerGroup = 64;  // local_size_x of the kernels
 constexpr uint32_t kMaxColumns = 16;             // see composite.glsl
+
+// The arguments that OpaqueForward and OpaqueBackward share, except for those that need the device.
+template <class Options>
+arguments::OpaqueArguments opaqueArguments(const Options& options) {
+  arguments::OpaqueArguments arguments = {};
+  arguments.threshold = options.threshold;
+  arguments.maxOpacity = options.maxOpacity;
+  arguments.minOpacity = options.minOpacity;
+  arguments.offset = options.offset;
+  arguments.firstSample = deviceAddress(options.firstSample);
+  arguments.x = matrixArguments(options.x, 0);
+  arguments.colours = matrixArguments(options.colours, 0);
+  arguments.colour = deviceAddress(options.colour);
+  return arguments;
+}
 
 }  // namespace
 
@@ -22,6 +39,7 @@ void VulkanDevice::enqueue(const CompositeForward& options) {
   arguments.rays = countArguments(options.rays);
   arguments.extinction = static_cast<uint32_t>(options.extinction);
   arguments.minTransmittance = options.minTransmittance;
+  arguments.offset = options.offset;
   arguments.firstSample = deviceAddress(options.firstSample);
   arguments.x = matrixArguments(options.x, 0);
   arguments.steps = deviceAddress(options.steps);
@@ -43,6 +61,7 @@ void VulkanDevice::enqueue(const CompositeBackward& options) {
   arguments.rays = countArguments(options.rays);
   arguments.extinction = static_cast<uint32_t>(options.extinction);
   arguments.minTransmittance = options.minTransmittance;
+  arguments.offset = options.offset;
   arguments.fullGradientDistance = options.fullGradientDistance;
   arguments.addToXGradients = options.addToXGradients;
   arguments.firstSample = deviceAddress(options.firstSample);
@@ -59,6 +78,24 @@ void VulkanDevice::enqueue(const CompositeBackward& options) {
   arguments.xGradients = deviceAddress(options.xGradients);
   arguments.colourGradients = matrixArguments(options.colourGradients, 0);
   queue(kernel(kCompositeBackwardSpirv, {columns}), arguments, countGroups(options.rays, kCompositeRaysPerGroup));
+}
+
+template <>
+void VulkanDevice::enqueue(const OpaqueForward& options) {
+  arguments::OpaqueArguments arguments = opaqueArguments(options);
+  arguments.rays = countArguments(options.rays);
+  arguments.opacity = deviceAddress(options.opacity);
+  queue(kernel(kOpaqueForwardSpirv), arguments, countGroups(options.rays, kCompositeRaysPerGroup));
+}
+
+template <>
+void VulkanDevice::enqueue(const OpaqueBackward& options) {
+  arguments::OpaqueArguments arguments = opaqueArguments(options);
+  arguments.rays = countArguments(options.rays);
+  arguments.rayColourGradients = deviceAddress(options.rayColourGradients);
+  arguments.xGradients = deviceAddress(options.xGradients);
+  arguments.colourGradients = matrixArguments(options.colourGradients, 0);
+  queue(kernel(kOpaqueBackwardSpirv), arguments, countGroups(options.rays, kCompositeRaysPerGroup));
 }
 
 }  // namespace tessera
