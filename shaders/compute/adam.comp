@@ -41,7 +41,8 @@ void main() {
     const float v = a.beta2 * a.secondMoments.values[i] + (1 - a.beta2) * gradient * gradient;
     const uint k = a.counts.values[i] + 1;
     const float rate = a.rate * sqrt(1 - power(a.beta2, k)) / (1 - power(a.beta1, k));
-    a.parameters.values[i] = parameter - rate * m / (sqrt(v) + a.epsilon);
+    const float moved = parameter - rate * m / (sqrt(v) + a.epsilon);
+    a.parameters.values[i] = abs(moved) > a.bound ? sign(moved) * a.bound : moved;
     a.firstMoments.values[i] = m;
     a.secondMoments.values[i] = v;
     a.counts.values[i] = k;

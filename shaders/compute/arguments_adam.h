@@ -21,7 +21,7 @@ struct AdamArguments {
   float beta2;
   float epsilon;
   float l2;
-  uint unused;
+  float bound;
 };
 TESSERA_SIZE(AdamArguments, 96);
 

@@ -112,5 +112,19 @@ struct OccupancyUpdateArguments {
 };
 TESSERA_SIZE(OccupancyUpdateArguments, 112);
 
+struct OccupancySamplesArguments {
+  CountArguments rays;
+  uint resolution;
+  float offset;
+  float minTransmittance;
+  uint unused;
+  UintPointer firstSample;
+  MatrixArguments x;
+  FloatPointer positions;
+  FloatPointer grid;
+  UintPointer gridBits;  // the same memory
+};
+TESSERA_SIZE(OccupancySamplesArguments, 96);
+
 TESSERA_END_ARGUMENTS
 #endif

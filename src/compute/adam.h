@@ -2,8 +2,10 @@
 // own steps, and a parameter whose gradient is exactly zero can be skipped entirely.
 //
 //   g += l2 · θ;  m = β1 m + (1-β1) g;  v = β2 v + (1-β2) g²;  k += 1
-//   θ -= rate · sqrt(1 - β2^k) / (1 - β1^k) · m / (sqrt(v) + ε)
+//   θ -= rate · sqrt(1 - β2^k) / (1 - β1^k) · m / (sqrt(v) + ε);  θ = min(max(θ, -bound), bound)
 #pragma once
+
+#include <limits>
 
 #include "compute/memory.h"
 #include "compute/operation.h"
@@ -15,6 +17,7 @@ struct Adam {
   float beta1 = 0.9f, beta2 = 0.99f;
   float epsilon = 1e-15f;
   float l2 = 0;
+  float bound = std::numeric_limits<float>::infinity();  // of the absolute values of parameters
   bool skipZeroGradients = false;  // for hash tables: neither decays the moments nor counts the step
   Slice<const uint32_t> rows;      // optional, [2]: equal values mean that no sample contributed; nothing is done then
   // Optional, any number of counters. A counter above `capacity` means that the step overflowed a buffer and its

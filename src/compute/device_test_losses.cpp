@@ -423,6 +423,7 @@ OperationTests makeTests<Adam>() {
                                  Adam a;
                                  a.skipZeroGradients = skip;
                                  a.l2 = l2;
+                                 if (count == 150001) a.bound = 0.7f;
                                  if (count == 1061) a.rows = stage.input(std::vector<uint32_t>{7, skip ? 7u : 8u});
                                  // Counters that stay within the capacity, or exceed it.
                                  if (count == 37)

@@ -344,4 +344,47 @@ OperationTests makeTests<OccupancyUpdate>() {
   return tests;
 }
 
+template <>
+OperationTests makeTests<OccupancySamples>() {
+  OperationTests tests;
+  tests.noGradient = "it is no part of the loss";
+  for (const Size& size : kSizes)
+    for (Layout layout : {Layout::plain, Layout::strided})
+      tests.cases.push_back(
+          {fmt::format("rays {}{}", toString(size), layout == Layout::strided ? ", strided" : ""), [=](Stage& stage) {
+             const uint32_t resolution = 12, cells = resolution * resolution * resolution;
+             OccupancySamples a;
+             a.resolution = resolution;
+             a.offset = -1;
+             std::vector<uint32_t> first{0};
+             std::vector<float> x;
+             for (size_t ray = 0; ray < size.capacity; ++ray) {
+               double transmittance = 1;
+               const uint32_t count = stage.random.below(30);
+               for (uint32_t i = 0; i < count;) {
+                 const float logit = stage.random.uniform(-4, ray % 2 ? 4.0f : 0.0f);
+                 const double after = transmittance / (1 + std::exp(double{logit} + a.offset));
+                 // Rounding must not decide whether the ray reaches the next sample.
+                 if (std::abs(after / a.minTransmittance - 1) < 0.01) continue;
+                 x.push_back(logit);
+                 transmittance = after;
+                 ++i;
+               }
+               first.push_back(static_cast<uint32_t>(x.size()));
+             }
+             std::vector<float> positions = stage.random.floats(3 * x.size(), 0, 1);
+             for (size_t i = 0; i < positions.size(); i += 17) positions[i] = 1;
+             std::vector<float> grid = stage.random.floats(cells, 0, 0.2f);
+             for (float& value : grid)
+               if (stage.random.below(5) == 0) value = -1;
+             a.rays = stage.count(size);
+             a.firstSample = stage.input(first);
+             a.x = stage.makeMatrix(x, 1, layout);
+             a.positions = stage.input(positions);
+             a.grid = stage.output("grid", grid, 1e-6);
+             stage.device.run(a);
+           }});
+  return tests;
+}
+
 }  // namespace tessera::device_test

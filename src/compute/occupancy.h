@@ -42,4 +42,19 @@ struct OccupancyUpdate {
 };
 TESSERA_OPERATION(OccupancyUpdate);
 
+// Raises the grid to the opacities of samples on rays, so that cells that no ray reaches decay to empty: grid = max(grid,
+// α) at the cell of each sample in front of which the ray's transmittance is above `minTransmittance`, where
+// α = 1 / (1 + exp(-x - offset)). The cell of a position is floor(position · resolution) per axis, clamped to the grid.
+// Cells with negative values do not change.
+struct OccupancySamples {
+  uint32_t resolution = 0;
+  float offset = 0, minTransmittance = 0.01f;
+  Count rays;
+  Slice<const uint32_t> firstSample;  // [rays + 1]
+  Matrix<const float> x;              // 1 column: logits
+  Slice<const float> positions;       // [samples][3], grid coordinates in [0,1]
+  Slice<float> grid;                  // [resolution³]
+};
+TESSERA_OPERATION(OccupancySamples);
+
 }  // namespace tessera

@@ -42,6 +42,7 @@ namespace tessera {
   X(GatherRows)                 \
   X(OccupancyPoints)            \
   X(OccupancyUpdate)            \
+  X(OccupancySamples)           \
   X(TraceOctahedra)             \
   X(OctahedraBackward)          \
   X(DistinctTexels)             \

@@ -131,6 +131,18 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
   recorder.measureStream(kOperation<OpaqueBackward>, shape, n * (16 + 2 * 16) + rays * 28,
                          [&] { device.run(opaqueBack); });
 
+  constexpr uint32_t kCells = 64;
+  Array<float> grid = device.array<float>(kCells * kCells * kCells);
+  OccupancySamples seen;
+  seen.resolution = kCells;
+  seen.offset = opaque.offset;
+  seen.rays = forward.rays;
+  seen.firstSample = lines.firstSample;
+  seen.x = forward.x;
+  seen.positions = lines.colours;  // anywhere in [0,1]³
+  seen.grid = grid;
+  recorder.measureStream(kOperation<OccupancySamples>, shape, n * 20 + rays * 4, [&] { device.run(seen); });
+
   DistortionLoss distortion;
   distortion.rays = forward.rays;
   distortion.firstSample = lines.firstSample;

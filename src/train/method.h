@@ -72,6 +72,7 @@ std::unique_ptr<MethodSettings> makeSettings([[maybe_unused]] const std::string&
 struct CullOptions {
   double minWeight = 0.005, minAlpha = 0.005;  // of a sample: its weight in the pixel, and its opacity
   int dilation = 1;                            // number of layers of cells that are kept around those
+  int stride = 1;                              // every stride-th pixel of a photo, along both axes, is looked through
 };
 
 // A trained model with its renderer.

@@ -63,6 +63,21 @@ void OccupancyGrid::update(const LogDensity& logDensity, uint32_t uniform, uint3
   device_.run(update);
 }
 
+void OccupancyGrid::fill(float value) {
+  std::vector<float> values = this->values();
+  for (float& each : values) each = each < 0 ? each : value;
+  device_.write(grid_.all(), std::span<const float>(values));
+}
+
+void OccupancyGrid::update(float decay, float threshold) {
+  OccupancyUpdate update{space_};
+  update.decay = decay;
+  update.threshold = threshold;
+  update.grid = grid_;
+  update.occupancy = keptBits_;
+  device_.run(update);
+}
+
 double OccupancyGrid::occupiedFraction() {
   uint64_t set = 0;
   for (const uint32_t word : bitWords()) set += std::popcount(word);

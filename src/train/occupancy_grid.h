@@ -24,6 +24,13 @@ class OccupancyGrid {
   // evaluating `chunk` points at a time.
   void update(const LogDensity& logDensity, uint32_t uniform, uint32_t occupied, uint64_t seed, uint32_t chunk);
 
+  // The values of the cells, to be raised by OccupancySamples; [cells].
+  Slice<float> raisedBySamples() { return grid_; }
+  // Sets all values that exclude() has not made negative.
+  void fill(float value);
+  // Lets the values decay, and sets the bits of those above min(threshold, mean).
+  void update(float decay, float threshold);
+
   uint32_t cells() const { return cells_; }
   Slice<const uint32_t> bits() const { return keptBits_; }
   // Cells that exclude() has not removed.

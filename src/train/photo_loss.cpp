@@ -25,7 +25,7 @@ void PhotoLoss::compare(const PhotoRays& rays, const Picture& picture, Slice<flo
   ColourLoss loss;
   loss.kind = kind_;
   loss.parameter = parameter_;
-  loss.scale = 1.0f / (3.0f * static_cast<float>(rays.count()));
+  loss.scale = picture.weight / (3.0f * static_cast<float>(rays.count()));
   loss.rays = picture.finished;
   loss.predicted = exposed(picture);
   loss.target = rays.targets(picture.first, picture.count);

@@ -24,6 +24,7 @@ class PhotoLoss {
     uint32_t first = 0, count = 0;
     Slice<const float> colour, opacity;   // [count][3], [count]
     bool standsBeforeBackgrounds = true;  // composite over PhotoRays::backgrounds; else colours include a background
+    float weight = 1;                     // of the colour loss
   };
   static constexpr uint32_t kLosses = 2;  // the colour loss, and the sum of squared errors
 

@@ -43,6 +43,7 @@ void adamRange(const Adam& a, const StepSizes& stepSizes, size_t begin, size_t e
   const auto zero = hn::Zero(d), l2 = hn::Set(d, a.l2), epsilon = hn::Set(d, a.epsilon);
   const auto beta1 = hn::Set(d, a.beta1), beta2 = hn::Set(d, a.beta2);
   const auto rest1 = hn::Set(d, 1 - a.beta1), rest2 = hn::Set(d, 1 - a.beta2);
+  const auto bound = hn::Set(d, a.bound);
   const auto lastStep = hn::Set(du, static_cast<uint32_t>(stepSizes.size() - 1));
   for (size_t i = begin; i < end; i += lanes) {
     const size_t count = std::min(lanes, end - i);
@@ -62,7 +63,8 @@ void adamRange(const Adam& a, const StepSizes& stepSizes, size_t begin, size_t e
     const auto k = hn::IfThenElse(hn::RebindMask(du, active), hn::Add(k0, hn::Set(du, 1u)), k0);
     const auto size = hn::GatherIndex(d, stepSizes.data(), hn::BitCast(di, hn::Min(k, lastStep)));
     const auto moved = hn::NegMulAdd(size, hn::Div(m, hn::Add(hn::Sqrt(v), epsilon)), theta);
-    hn::BlendedStore(moved, active, d, parameters + i);
+    const auto bounded = hn::IfThenElse(hn::Gt(hn::Abs(moved), bound), hn::CopySign(bound, moved), moved);
+    hn::BlendedStore(bounded, active, d, parameters + i);
     hn::BlendedStore(m, active, d, firstMoments + i);
     hn::BlendedStore(v, active, d, secondMoments + i);
     hn::BlendedStore(k, hn::RebindMask(du, active), du, counts + i);

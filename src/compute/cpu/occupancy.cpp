@@ -105,4 +105,39 @@ void run(Context& context, const OccupancyUpdate& a) {
   });
 }
 
+void run(Context& context, const OccupancySamples& a) {
+  const uint32_t rays = hostCount(a.rays), resolution = a.resolution;
+  const uint32_t* firstSample = hostPointer(a.firstSample);
+  const float* x = hostPointer(a.x.data);
+  const float* positions = hostPointer(a.positions);
+  struct Seen {
+    uint32_t cell;
+    float alpha;
+  };
+  constexpr size_t kRays = 256;
+  const size_t tasks = (rays + kRays - 1) / kRays;
+  std::vector<std::vector<Seen>> seenByTask(tasks);
+  context.pool.run(tasks, [&](size_t task, int) {
+    for (size_t ray = task * kRays; ray < std::min<size_t>(rays, (task + 1) * kRays); ++ray) {
+      float transmittance = 1;
+      for (uint32_t i = firstSample[ray]; i < firstSample[ray + 1] && transmittance > a.minTransmittance; ++i) {
+        const float alpha = 1 / (1 + std::exp(-x[a.x.offset(i, 0)] - a.offset));
+        uint32_t cell = 0;
+        for (int axis = 2; axis >= 0; --axis) {
+          const int place = static_cast<int>(positions[3 * size_t{i} + axis] * static_cast<float>(resolution));
+          cell = cell * resolution + std::min(static_cast<uint32_t>(place), resolution - 1);
+        }
+        seenByTask[task].push_back({cell, alpha});
+        transmittance *= 1 - alpha;
+      }
+    }
+  });
+  float* grid = hostPointer(a.grid);
+  for (const std::vector<Seen>& seen : seenByTask) {  // one thread, because cells repeat
+    for (const auto& [cell, alpha] : seen) {
+      if (grid[cell] >= 0) grid[cell] = std::max(grid[cell], alpha);
+    }
+  }
+}
+
 }  // namespace tessera::cpu

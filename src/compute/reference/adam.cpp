@@ -17,6 +17,8 @@ void adamStep(const Adam& options, double gradient, AdamState& state) {
   state.count += 1;
   const double rate = options.rate * std::sqrt(1 - std::pow(beta2, state.count)) / (1 - std::pow(beta1, state.count));
   state.parameter -= rate * state.firstMoment / (std::sqrt(state.secondMoment) + options.epsilon);
+  const double bound = options.bound;
+  if (std::abs(state.parameter) > bound) state.parameter = std::copysign(bound, state.parameter);
 }
 
 void run(const Adam& a) {

@@ -149,10 +149,10 @@ struct OpaqueSamples {
     CHECK(a.colours.columns == 3u);
     colours = doubles(a.colours, samples);
   }
-  View alphasOf(size_t ray) const {
+  View alphasOnRay(size_t ray) const {
     return View(alphas).subspan(firstSample[ray], firstSample[ray + 1] - firstSample[ray]);
   }
-  View coloursOf(size_t ray) const {
+  View coloursOnRay(size_t ray) const {
     return View(colours).subspan(3 * size_t{firstSample[ray]}, 3 * size_t{firstSample[ray + 1] - firstSample[ray]});
   }
 };
@@ -193,7 +193,7 @@ void run(const OpaqueForward& a) {
   Doubles colours, opacities;
   for (size_t ray = 0; ray < hostCount(a.rays); ++ray) {
     const OpaqueColour one =
-        compositeOpaque(all.alphasOf(ray), all.coloursOf(ray), a.threshold, a.maxOpacity, a.minOpacity);
+        compositeOpaque(all.alphasOnRay(ray), all.coloursOnRay(ray), a.threshold, a.maxOpacity, a.minOpacity);
     colours.insert(colours.end(), one.colour.begin(), one.colour.end());
     opacities.push_back(one.opacity);
   }
@@ -207,9 +207,9 @@ void run(const OpaqueBackward& a) {
   const Doubles rayGradients = doubles(a.rayColourGradients, 3 * rays);
   Doubles x, colours;
   for (size_t ray = 0; ray < rays; ++ray) {
-    const View alphas = all.alphasOf(ray);
+    const View alphas = all.alphasOnRay(ray);
     const OpaqueGradients one =
-        compositeOpaqueBackward(alphas, all.coloursOf(ray), a.threshold, a.maxOpacity, a.minOpacity,
+        compositeOpaqueBackward(alphas, all.coloursOnRay(ray), a.threshold, a.maxOpacity, a.minOpacity,
                                 {rayGradients[3 * ray], rayGradients[3 * ray + 1], rayGradients[3 * ray + 2]});
     for (size_t i = 0; i < alphas.size(); ++i) x.push_back(one.alphas[i] * alphas[i] * (1 - alphas[i]));
     colours.insert(colours.end(), one.colours.begin(), one.colours.end());

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/random.h"
+#include "compute/composite.h"
 #include "compute/reference/convert.h"
 #include "compute/reference/functions.h"
 
@@ -86,6 +87,27 @@ void run(const OccupancyUpdate& a) {
   occupancyUpdate(a.space, a.decay, a.threshold, indices(a.cells, a.points), doubles(a.logDensity, a.points), grid,
                   {hostPointer(a.occupancy), a.occupancy.count});
   store(a.grid, grid);
+}
+
+void run(const OccupancySamples& a) {
+  const size_t rays = hostCount(a.rays);
+  const Indices firstSample = indices(a.firstSample, rays + 1);
+  const Doubles x = doubles(a.x, firstSample[rays]);
+  float* const grid = hostPointer(a.grid);
+  for (size_t ray = 0; ray < rays; ++ray) {
+    double transmittance = 1;
+    for (uint32_t i = firstSample[ray]; i < firstSample[ray + 1] && transmittance > a.minTransmittance; ++i) {
+      const double alpha = computeOpacity(Extinction::logit, x[i] + a.offset, 0);
+      uint32_t cell = 0;
+      for (int axis = 2; axis >= 0; --axis) {
+        const float position = hostPointer(a.positions)[3 * size_t{i} + axis];  // float, as devices must agree on cells
+        const int place = static_cast<int>(position * static_cast<float>(a.resolution));
+        cell = cell * a.resolution + std::min(static_cast<uint32_t>(place), a.resolution - 1);
+      }
+      if (grid[cell] >= 0) grid[cell] = std::max(grid[cell], static_cast<float>(alpha));
+      transmittance *= 1 - alpha;
+    }
+  }
 }
 
 }  // namespace tessera::reference

@@ -34,6 +34,7 @@ void VulkanDevice::enqueue(const Adam& options) {
   arguments.beta2 = options.beta2;
   arguments.epsilon = options.epsilon;
   arguments.l2 = options.l2;
+  arguments.bound = options.bound;
   queue(kernel(kAdamSpirv), arguments, {groups(count, 256)});
 }
 

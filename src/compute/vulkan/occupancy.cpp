@@ -7,6 +7,7 @@
 #include "shaders/occupancy_decay.h"
 #include "shaders/occupancy_points.h"
 #include "shaders/occupancy_raise.h"
+#include "shaders/occupancy_samples.h"
 #include "shaders/occupancy_sums.h"
 #include "shaders/occupancy_sums_subgroups.h"
 
@@ -56,6 +57,20 @@ void VulkanDevice::enqueue(const OccupancyUpdate& options) {
   queue(kernel(groupSpirv(kOccupancySumsSubgroupsSpirv, kOccupancySumsSpirv)), arguments, {summing});
   addPartials(arguments.partials, summing, 2, arguments.sums);
   queue(kernel(kOccupancyBitsSpirv), arguments, {groups(arguments.cellCount / 32, 128)});
+}
+
+template <>
+void VulkanDevice::enqueue(const OccupancySamples& options) {
+  arguments::OccupancySamplesArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.resolution = options.resolution;
+  arguments.offset = options.offset;
+  arguments.minTransmittance = options.minTransmittance;
+  arguments.firstSample = deviceAddress(options.firstSample);
+  arguments.x = matrixArguments(options.x, 0);
+  arguments.positions = deviceAddress(options.positions);
+  arguments.grid = arguments.gridBits = deviceAddress(options.grid);
+  queue(kernel(kOccupancySamplesSpirv), arguments, countGroups(options.rays, 64));
 }
 
 }  // namespace tessera
